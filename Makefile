@@ -1,0 +1,201 @@
+# psabench: set-up, build, check, install. `make help` lists the targets. Own settings go on the command line or into config.mk.
+-include config.mk
+
+ifeq ($(origin CC),default)
+CC := gcc
+endif
+AR        ?= ar
+PKGCONFIG ?= pkg-config
+PREFIX    ?= /usr/local
+CFLAGS    ?= -O2 -g
+SAN       ?=#                         address,undefined
+WERROR    ?=#                         1: a warning is an error, as in make test
+BUILD     ?= build$(if $(filter clang%,$(notdir $(CC))),-clang)$(if $(SAN),-san)
+FUZZ_S    ?= 20
+SAN_E2E   := $(wildcard tests/e2e/test_bad_*.py) $(patsubst %,tests/e2e/test_%.py,unit tools canopen)
+# Build a part only, say DIRS='base chip' TESTS=test_ads1282 while the rest does not compile.
+DIRS      ?= base trace phys chip canopen board link control app
+TESTS     ?= $(basename $(notdir $(sort $(wildcard tests/unit/test_*.c))))
+
+# What correctness needs stands before the user's CFLAGS. -ffp-contract=off: the same bytes on every machine.
+STD   := -std=c11 -ffp-contract=off
+WARN  := -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wundef -Wstrict-prototypes -Wmissing-prototypes $(if $(WERROR),-Werror)
+SANFL := $(if $(SAN),-fsanitize=$(SAN) -fno-sanitize-recover=all -fno-omit-frame-pointer)
+INC   := -Iemu -Ibuild $(shell $(PKGCONFIG) --cflags libcjson yaml-0.1 2>/dev/null)
+LIBS  := $(shell $(PKGCONFIG) --libs libcjson yaml-0.1 2>/dev/null) -lm
+FLAGS   = $(STD) $(WARN) $(INC) $(CPPFLAGS)
+COMPILE = $(CC) $(FLAGS) $(SANFL) $(CFLAGS)
+LINK    = $(CC) $(SANFL) $(CFLAGS) $(LDFLAGS)
+
+# One word a step; V=1 shows the whole commands.
+Q  = $(if $(V),,@)
+say = $(if $(V),,@echo '  $(1)	$(2)')
+
+# build/gen/gen.mk is made from proto/psabench.yaml before anything is compiled and names the generated sources in GEN_SRC.
+PY     := .venv/bin/python
+NO_GEN := setup run test clean help uninstall lock
+ifneq ($(wildcard proto/psabench.yaml),)
+ifneq ($(if $(MAKECMDGOALS),$(filter-out $(NO_GEN),$(MAKECMDGOALS)),all),)
+include build/gen/gen.mk
+endif
+endif
+
+SRC      := $(sort $(foreach d,$(DIRS),$(wildcard emu/$(d)/*.c)))
+MAIN     := $(filter emu/app/main.c,$(SRC))
+OBJ      := $(patsubst %.c,$(BUILD)/obj/%.o,$(SRC) $(GEN_SRC))
+LIB_OBJ  := $(filter-out $(BUILD)/obj/emu/app/main.o,$(OBJ))
+TEST_BIN := $(addprefix $(BUILD)/tests/,$(TESTS))
+FUZZ_BIN := $(patsubst tests/fuzz/%.c,$(BUILD)/fuzz/%,$(sort $(wildcard tests/fuzz/fuzz_*.c)))
+C_FILES   = $(sort $(wildcard emu/*/*.[ch] tests/*/*.[ch]))
+
+.SECONDARY:
+.DELETE_ON_ERROR:
+.PHONY: all setup run test check pytest san builds e2e e2e-san e2e-vcan e2e-slc0 uml soak fuzz fuzz-each lint format golden docs install uninstall clean help lock
+
+## all: the emulator, build/psa-emu (make CC=clang and make SAN=address,undefined build beside it, in build-clang and build-san)
+all: $(if $(MAIN),$(BUILD)/psa-emu,$(LIB_OBJ))
+
+$(BUILD)/psa-emu: $(OBJ)
+	$(call say,LINK,$@)
+	$(Q)$(LINK) -o $@ $(OBJ) $(LIBS)
+
+$(BUILD)/obj/%.o: %.c Makefile
+	@mkdir -p $(@D)
+	$(call say,CC,$@)
+	$(Q)$(COMPILE) -MMD -MP -c -o $@ $<
+
+$(BUILD)/tests/%: $(BUILD)/obj/tests/unit/%.o $(LIB_OBJ)
+	@mkdir -p $(@D)
+	$(call say,LINK,$@)
+	$(Q)$(LINK) -o $@ $< $(LIB_OBJ) $(LIBS) -lcmocka
+
+build/gen/gen.mk: proto/psabench.yaml tools/gen_proto.py | $(PY)
+	@mkdir -p $(@D)
+	$(PY) tools/gen_proto.py --out $(@D)
+	@echo 'GEN_SRC := $$(sort $$(wildcard build/gen/*.c))' > $@
+
+$(PY):
+	tools/setup run
+
+## setup: system packages (as root or with sudo) and .venv, all that make test needs
+setup:
+	tools/setup test
+
+## run: set-up, build, and the main job: board up, accelerometers calibrated through the wire; report in build/run/report.html
+run:
+	@tools/setup run
+	@$(MAKE) --no-print-directory all
+	@.venv/bin/psabench run all --out build/run
+
+## test: set-up, build, and every test there is, on virtual CAN; ends with one line of counts
+test:
+	@tools/setup test
+	@python3 tools/test_all.py
+
+## check: the C unit tests (one: make check TESTS=test_sched)
+check: $(TEST_BIN)
+	@rc=0; for t in $(TEST_BIN); do echo "$$t"; $$t || rc=1; done; exit $$rc
+
+## san: the C unit tests under AddressSanitizer and UBSan
+san:
+	@$(MAKE) --no-print-directory SAN=address,undefined check
+
+## pytest: the Python tests, golden traces included
+pytest: all
+	$(PY) -m pytest $(wildcard tests/py tests/golden)
+
+## builds: the emulator as clang and -O0 make it, and under sanitizers, which must all do the same
+builds:
+	@$(MAKE) --no-print-directory CC=clang all
+	@$(MAKE) --no-print-directory CFLAGS='-O0 -g' BUILD=build-O0 all
+	@$(MAKE) --no-print-directory SAN=address,undefined all
+	@$(MAKE) --no-print-directory CC=clang SAN=address,undefined all
+
+## e2e: the end-to-end suite over the transports of the host (socketcand, slcan on a pty)
+e2e: all
+	$(PY) -m pytest tests/e2e -m "host and not soak"
+
+## e2e-san: what strangers and their mistakes do to the emulator, with it under AddressSanitizer and UBSan
+e2e-san:
+	@$(MAKE) --no-print-directory SAN=address,undefined all
+	PSA_EMU=$(CURDIR)/build-san/psa-emu $(PY) -m pytest $(SAN_E2E) -m "host and not soak"
+
+## uml: the end-to-end suite on a kernel's vcan0 and slc0: this kernel's, or a user-mode one's
+uml: e2e-vcan e2e-slc0
+
+e2e-vcan: all
+	tests/uml/native tests/uml/job_e2e.sh
+
+e2e-slc0: all
+	tests/uml/slc0
+
+## golden: write the golden traces anew; review the difference like code
+golden: all
+	GOLDEN=rewrite $(PY) -m pytest -q tests/golden
+
+## soak: the end-to-end tests that take a minute or more of real time, on the host and on vcan0
+soak: all
+	$(PY) -m pytest tests/e2e -m "host and soak"
+	tests/uml/native --timeout 1200 tests/uml/job_e2e.sh -m "vcan and soak"
+
+## fuzz: each tests/fuzz/fuzz_*.c for FUZZ_S seconds (libFuzzer, sanitizers)
+fuzz:
+	@$(MAKE) --no-print-directory CC=clang SAN=address,undefined,fuzzer-no-link BUILD=build-fuzz fuzz-each
+
+fuzz-each: $(FUZZ_BIN)
+	@for f in $(FUZZ_BIN); do echo "$$f"; $$f -max_total_time=$(FUZZ_S) -print_final_stats=1 || exit 1; done
+
+$(BUILD)/fuzz/%: $(BUILD)/obj/tests/fuzz/%.o $(LIB_OBJ)
+	@mkdir -p $(@D)
+	$(call say,LINK,$@)
+	$(Q)$(LINK) -fsanitize=fuzzer -o $@ $< $(LIB_OBJ) $(LIBS)
+
+## lint: formatting, warnings of gcc and clang, clang-tidy, include table and sizes, ruff, strict mypy
+lint: all
+	@FLAGS='$(FLAGS)' tools/lint
+
+## format: rewrite C and Python in the project's format
+format:
+	$(if $(C_FILES),clang-format -i $(C_FILES))
+	$(PY) -m ruff format .
+
+## docs: what follows from proto/psabench.yaml and is kept in git: DBC, EDS, docs/protocol.md
+docs: all
+	$(PY) tools/gen_proto.py
+	$(if $(wildcard tools/gen_docs.py),$(PY) tools/gen_docs.py)
+
+SIGROK := share/libsigrokdecode/decoders
+
+## install: psa-emu, protocol files, sigrok decoders (where sigrok looks, too) and sessions under $(DESTDIR)$(PREFIX)
+install: all
+	install -D -m 755 $(BUILD)/psa-emu $(DESTDIR)$(PREFIX)/bin/psa-emu
+	for f in $$(find -L proto decoders share -type f ! -name '*.pyc'); do \
+	    install -D -m 644 $$f $(DESTDIR)$(PREFIX)/share/psabench/$$f || exit 1; done
+	cd decoders && for f in $$(find -L * -type f ! -name '*.pyc'); do \
+	    install -D -m 644 $$f $(abspath $(DESTDIR)$(PREFIX))/$(SIGROK)/$$f || exit 1; done
+
+## uninstall: what install put there
+uninstall:
+	rm -f $(DESTDIR)$(PREFIX)/bin/psa-emu
+	rm -rf $(DESTDIR)$(PREFIX)/share/psabench $(patsubst decoders/%/pd.py,$(DESTDIR)$(PREFIX)/$(SIGROK)/%,$(wildcard decoders/*/pd.py))
+
+## compile_commands.json: how each file is compiled, for editors and clang-tidy
+compile_commands.json: Makefile $(SRC) $(GEN_SRC)
+	@{ echo '['; sep=; for f in $(SRC) $(GEN_SRC) $(wildcard tests/unit/*.c); do \
+	    printf '%s{"directory": "%s", "file": "%s", "command": "%s -c %s"}\n' "$$sep" '$(CURDIR)' $$f '$(COMPILE)' $$f; \
+	    sep=,; done; echo ']'; } > $@
+
+## lock: pin requirements.in in requirements.lock
+lock: $(PY)
+	.venv/bin/uv pip compile -q --upgrade --universal --python-version 3.11 --generate-hashes \
+	    --custom-compile-command 'make lock' -o requirements.lock requirements.in
+
+## clean: everything that was built; .venv stays
+clean:
+	rm -rf build build-* compile_commands.json
+
+## help: this list
+help:
+	@sed -n 's/^## \([a-z_.0-9-]*\): \(.*\)/  \1|\2/p' Makefile | while IFS='|' read -r t d; do printf '%-24s %s\n' "$$t" "$$d"; done
+
+-include $(OBJ:.o=.d) $(TEST_BIN:$(BUILD)/tests/%=$(BUILD)/obj/tests/unit/%.d)

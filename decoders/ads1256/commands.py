@@ -1,0 +1,1 @@
+../ads128x/commands.py

@@ -1,0 +1,103 @@
+#include "app/bench.h"
+
+#include <string.h>
+
+enum { START_NS = 1000000, NMT_START = 1, SDO_WRITE_U8 = 0x2F, OBJECT_FRAME_FORM = 0x2020 };
+
+int bench_find_unit(const struct scenario *s, const char *name)
+{
+    for (unsigned i = 0; i < s->unit_count; i++) {
+        if (strcmp(s->units[i].name, name) == 0) return (int)i;
+    }
+    return -1;
+}
+
+static void on_monitor(void *ctx, const struct can_msg *m, int64_t t_ns)
+{
+    struct bench *b = ctx;
+    if (b->on_frame) b->on_frame(b->ctx, m, t_ns);
+}
+
+static void on_refused(void *ctx, const char *unit, const char *why)
+{
+    struct bench *b = ctx;
+    if (b->on_refused) b->on_refused(b->ctx, unit, why);
+}
+
+/* What a host would do first, in frames that everybody sees. */
+static void on_start(void *ctx, int64_t t_ns)
+{
+    struct bench *b = ctx;
+    for (unsigned i = 0; i < b->scenario.unit_count; i++) {
+        const struct scenario_unit *u = &b->scenario.units[i];
+        struct can_msg m = {.id = 0x600u + u->cfg.node, .len = 8};
+        const uint8_t write[] = {SDO_WRITE_U8, OBJECT_FRAME_FORM & 0xFF, OBJECT_FRAME_FORM >> 8, 0, u->frame_form};
+        memcpy(m.data, write, sizeof write);
+        if (u->frame_form) can_send(&b->bus, &b->starter.node, &m, t_ns);
+    }
+    const struct can_msg start = {.id = 0, .len = 2, .data = {NMT_START, 0}};
+    if (b->scenario.start) can_send(&b->bus, &b->starter.node, &start, t_ns);
+}
+
+static void init_unit(struct bench *b, unsigned i)
+{
+    const struct scenario_unit *u = &b->scenario.units[i];
+    unit_init(&b->unit[i], &u->cfg, &b->head, &b->sched);
+    const struct psa2_can_cfg cfg = {.name = u->name, .node_id = u->cfg.node, .refused = on_refused, .ctx = b};
+    const struct psa2_can_port port = psa2_can_port(&b->unit[i].board);
+    psa2_can_init(&b->can[i], &cfg, &port, &b->bus, &b->sched);
+    b->unit[i].frame = psa2_can_frame;
+    b->unit[i].fault = psa2_can_fault;
+    b->unit[i].ctx = &b->can[i];
+}
+
+void bench_init(struct bench *b, const struct scenario *s, unsigned watched)
+{
+    memset(b, 0, sizeof *b);
+    b->scenario = *s;
+    b->watched = watched;
+    scenario_bind(&b->scenario);
+    sched_init(&b->sched);
+    can_bus_init(&b->bus, &s->bus, &b->sched);
+    head_init(&b->head, &s->head, &s->site, rng_stream(s->seed, 0, "head"));
+    for (unsigned i = 0; i < s->unit_count; i++) init_unit(b, i);
+    b->starter.node = (struct can_node){.name = "bench", .order = CAN_ORDER_FIFO, .fd = true};
+    b->monitor = (struct can_node){.name = "monitor", .fd = true, .rx = on_monitor, .ctx = b};
+    sched_ev(&b->starter.ev, on_start, b);
+}
+
+bool bench_record(struct bench *b, FILE *out, uint32_t unit_ns)
+{
+    struct unit *u = &b->unit[b->watched];
+    const struct vcd_cfg cfg = {.out = out,
+                                .scope = "psa2", /* whatever the unit's name: share/psa2.gtkw opens it */
+                                .unit_ns = unit_ns,
+                                .mask = (UINT32_C(1) << PSA2_LINES) - 1};
+    b->recording = vcd_open(&b->vcd, &cfg, &u->board.trace);
+    return b->recording;
+}
+
+void bench_power_up(struct bench *b)
+{
+    can_attach(&b->bus, &b->monitor);
+    can_attach(&b->bus, &b->starter.node);
+    for (unsigned i = 0; i < b->scenario.unit_count; i++) {
+        psa2_power_up(&b->unit[i].board, 0);
+        psa2_can_power_up(&b->can[i], 0);
+    }
+    sched_at(&b->sched, &b->starter.ev, START_NS);
+}
+
+void bench_follow(struct bench *b)
+{
+    for (unsigned i = 0; i < b->scenario.unit_count; i++) {
+        trace_advance(&b->unit[i].board.trace, b->sched.now_ns - TRACE_LAG_NS);
+    }
+}
+
+void bench_finish(struct bench *b)
+{
+    for (unsigned i = 0; i < b->scenario.unit_count; i++) trace_advance(&b->unit[i].board.trace, b->sched.now_ns);
+    if (b->recording) vcd_close(&b->vcd, b->sched.now_ns);
+    b->recording = false;
+}

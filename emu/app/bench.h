@@ -1,0 +1,51 @@
+/* What stands on the bench: head, units, bus, and who watches the lines. Assembled from a scenario; no OS, no clock. */
+#ifndef PSABENCH_APP_BENCH_H
+#define PSABENCH_APP_BENCH_H
+
+#include "app/scenario_yaml.h"
+#include "board/psa2_can.h"
+#include "trace/sampler.h"
+#include "trace/vcd.h"
+
+/* The bench's own node on the bus: writes the scenario's frame forms (SDO to 2020h) and starts the units (NMT). */
+struct bench_starter {
+    struct can_node node;
+    struct sched_ev ev;
+};
+
+struct bench {
+    struct scenario scenario;
+    struct sched sched;
+    struct can_bus bus;
+    struct head head;
+    struct unit unit[SCENARIO_UNITS_MAX];
+    struct psa2_can can[SCENARIO_UNITS_MAX];
+    struct can_node monitor;                                            /* hears every frame */
+    void (*on_frame)(void *ctx, const struct can_msg *m, int64_t t_ns); /* of the monitor; may be NULL */
+    void (*on_refused)(void *ctx, const char *unit, const char *why);   /* frame form; may be NULL */
+    void *ctx;
+    struct bench_starter starter;
+    unsigned watched; /* unit whose lines are recorded */
+    bool recording;
+    struct vcd vcd;
+    struct sampler sampler;
+};
+
+/* The scenario is copied. Megabytes: take it from the heap; it never moves afterwards. */
+void bench_init(struct bench *b, const struct scenario *s, unsigned watched);
+
+/* Index of the unit of that name, or -1. */
+int bench_find_unit(const struct scenario *s, const char *name);
+
+/* Records the lines of the watched unit; before power-up, so that the first edge is in it. False: no such time unit. */
+bool bench_record(struct bench *b, FILE *out, uint32_t unit_ns);
+
+void bench_power_up(struct bench *b);
+
+/* After time has moved: lines follow their watchers. */
+void bench_follow(struct bench *b);
+
+/* The end: what is still pending goes to the recording. */
+void bench_finish(struct bench *b);
+
+#endif

@@ -1,0 +1,78 @@
+#include "app/list.h"
+
+#include "app/find.h"
+#include "app/profile_yaml.h"
+#include "control/control.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* First sentence of the comment that a file begins with, as far as it stands on the first line: what the file is. */
+static void first_comment(const char *path, char *text, size_t cap)
+{
+    char line[256] = "";
+    text[0] = '\0';
+    FILE *in = fopen(path, "re");
+    if (!in) return;
+    const bool read = fgets(line, sizeof line, in);
+    fclose(in);
+    if (!read || line[0] != '#') return;
+    line[strcspn(line, "\n")] = '\0';
+    char *end = strstr(line, ". ");
+    if (end) end[1] = '\0';
+    snprintf(text, cap, "%s", line + 1 + strspn(line + 1, " "));
+}
+
+static void list_profile(FILE *out, const char *path, const char *comment)
+{
+    char why[512];
+    struct psa2_profile p;
+    if (!profile_yaml_load(path, &p, why, sizeof why)) {
+        fprintf(out, "%s\n", why);
+        return;
+    }
+    fprintf(out, "%-10s %s, %u bit words, CLK %.6g MHz, INT low %.3f us, a frame every %.3f us\n", p.name,
+            p.adc_is_1281 ? "ADS1281" : "ADS1282", p.word_bits, (double)p.line_hz / p.line_div * 1e-6,
+            (double)psa2_int_low_ns(&p) * 1e-3, (double)psa2_profile_period_ns(&p) * 1e-3);
+    if (*comment) fprintf(out, "           %s\n", comment);
+}
+
+static bool list(FILE *out, const char *proto_folder, char *why, size_t cap)
+{
+    char folder[FIND_PATH_MAX], path[FIND_PATH_MAX + FIND_NAME_MAX + 8], comment[256];
+    char(*names)[FIND_NAME_MAX];
+    unsigned count;
+    const bool profiles = strcmp(proto_folder, "profiles") == 0;
+    if (!find_proto_folder(proto_folder, folder, why, cap) || !find_names(folder, &names, &count, why, cap))
+        return false;
+    for (unsigned i = 0; i < count; i++) {
+        snprintf(path, sizeof path, "%s/%s.yaml", folder, names[i]);
+        first_comment(path, comment, sizeof comment);
+        if (profiles) list_profile(out, path, comment);
+        else fprintf(out, "%-10s %s\n", names[i], comment);
+    }
+    free(names);
+    return true;
+}
+
+bool list_profiles(FILE *out, char *why, size_t cap)
+{
+    return list(out, "profiles", why, cap);
+}
+
+bool list_scenarios(FILE *out, char *why, size_t cap)
+{
+    return list(out, "scenarios", why, cap);
+}
+
+void list_commands(FILE *out)
+{
+    char line[1024];
+    for (unsigned i = 0; control_markdown(control_commands, control_command_count, i, line, sizeof line); i++) {
+        fprintf(out, "%s\n", line);
+    }
+    fprintf(out, "\n");
+    for (unsigned i = 0; control_markdown(control_truth, control_truth_count, i, line, sizeof line); i++) {
+        fprintf(out, "%s\n", line);
+    }
+}

@@ -1,0 +1,214 @@
+#define _GNU_SOURCE /* ppoll */
+#include "app/loop.h"
+
+#include <poll.h>
+#include <time.h>
+
+/* ---- time */
+
+static int64_t min_ns(int64_t a, int64_t b)
+{
+    return a < b ? a : b;
+}
+
+/* One slice of simulated time towards until_ns; true when it has been reached. */
+static bool run_slice(struct loop *l, int64_t until_ns)
+{
+    const int64_t now_ns = l->sched->now_ns;
+    const int64_t next_ns = sched_next_ns(l->sched);
+    /* Over a stretch without events in one stride. */
+    const int64_t from_ns = next_ns > now_ns ? next_ns : now_ns;
+    const int64_t to_ns = from_ns >= until_ns ? until_ns : min_ns(until_ns, from_ns + PACE_SLICE_NS);
+    sched_run_until(l->sched, to_ns);
+    l->moved(l->ctx, to_ns);
+    return to_ns == until_ns;
+}
+
+/* Wall pace: everything due by now, instant by instant, so that each one's lateness is known. */
+static void run_wall(struct loop *l)
+{
+    const int64_t target_ns = min_ns(pace_target_ns(l->pace, l->sched->now_ns), l->end_ns);
+    const int64_t to_ns = min_ns(target_ns, l->sched->now_ns + PACE_BATCH_NS);
+    for (int64_t due_ns; (due_ns = sched_next_ns(l->sched)) <= to_ns;) {
+        sched_run_until(l->sched, due_ns);
+        pace_event(l->pace, due_ns, target_ns);
+    }
+    if (to_ns > l->sched->now_ns) sched_run_until(l->sched, to_ns);
+    l->moved(l->ctx, l->sched->now_ns);
+}
+
+static void run_step(struct loop *l)
+{
+    if (l->run == LOOP_ARMED && l->taken(l->ctx) >= l->after_taken) l->run = LOOP_RUNNING;
+    if (l->run != LOOP_RUNNING || links_full(l->links)) return;
+    run_slice(l, l->until_ns);
+}
+
+static bool step_over(const struct loop *l)
+{
+    return l->run == LOOP_RUNNING && l->sched->now_ns == l->until_ns && links_pending(l->links) == 0;
+}
+
+static void advance(struct loop *l)
+{
+    if (!l->started && (!l->may_start || l->may_start(l->ctx))) {
+        l->started = true;
+        pace_start(l->pace, l->sched->now_ns);
+    }
+    if (!l->started) return;
+    l->pace->turns++;
+    switch (l->pace->kind) {
+    case PACE_WALL:
+        run_wall(l);
+        break;
+    case PACE_STEP:
+        run_step(l);
+        break;
+    case PACE_FREE:
+        if (!links_full(l->links)) run_slice(l, l->end_ns);
+        break;
+    }
+}
+
+/* ---- waiting */
+
+/* How long ppoll may sleep, real ns: 0 not at all, SCHED_NEVER until something happens. */
+static int64_t patience_ns(const struct loop *l)
+{
+    int64_t wait_ns = SCHED_NEVER;
+    const int64_t clock_ns = pace_clock_ns();
+    for (const struct link *k = l->links->first; k; k = k->next) {
+        if (k->timer_due_ns) wait_ns = min_ns(wait_ns, k->timer_due_ns - clock_ns);
+    }
+    if (l->started && l->pace->kind == PACE_WALL) {
+        const int64_t due_ns = min_ns(sched_next_ns(l->sched), l->end_ns);
+        const int64_t at_ns = l->sched->now_ns + PACE_QUANTUM_NS;
+        if (due_ns < SCHED_NEVER)
+            wait_ns = min_ns(wait_ns, l->pace->origin_ns + (due_ns > at_ns ? due_ns : at_ns) - clock_ns);
+    }
+    const bool running = l->started && (l->pace->kind == PACE_FREE || l->run == LOOP_RUNNING);
+    if (running && !links_full(l->links) && (l->pace->kind == PACE_FREE || l->sched->now_ns < l->until_ns)) return 0;
+    if (l->run == LOOP_ARMED && l->taken(l->ctx) >= l->after_taken) return 0;
+    return wait_ns > 0 ? wait_ns : 0;
+}
+
+/* Input and timers of the links polled; p[i] belongs to the i-th link of the list at the time of the poll. */
+static void serve(struct loop *l, struct link **polled, const struct pollfd *p, unsigned n)
+{
+    const int64_t t_ns = l->sched->now_ns;
+    for (unsigned i = 0; i < n; i++) {
+        struct link *k = polled[i];
+        const short input = POLLIN | POLLHUP | POLLERR;
+        if (!k->gone && k->fd >= 0 && k->want_read && p[i].revents & input) k->readable(k, t_ns);
+        if (!k->gone && k->fd >= 0 && p[i].revents & (POLLOUT | POLLERR) && k->flush) k->flush(k, t_ns);
+    }
+}
+
+static void arm_timers(struct loop *l)
+{
+    for (struct link *k = l->links->first; k; k = k->next) {
+        if (!k->timer_ms) continue;
+        k->timer_due_ns = pace_clock_ns() + (int64_t)k->timer_ms * 1000000;
+        k->timer_ms = 0;
+    }
+}
+
+static void serve_timers(struct loop *l)
+{
+    const int64_t clock_ns = pace_clock_ns();
+    for (struct link *k = l->links->first; k; k = k->next) {
+        if (!k->timer_due_ns || k->timer_due_ns > clock_ns || k->gone) continue;
+        k->timer_due_ns = 0;
+        k->timer(k, l->sched->now_ns);
+    }
+}
+
+static unsigned collect(const struct loop *l, struct link **polled, struct pollfd *p)
+{
+    unsigned n = 0;
+    for (struct link *k = l->links->first; k && n < LOOP_LINKS_MAX; k = k->next) {
+        const short events = (short)((k->want_read ? POLLIN : 0) | (k->want_write ? POLLOUT : 0));
+        polled[n] = k;
+        /* An idle descriptor is left out: a hang-up would be reported for ever. */
+        p[n++] = (struct pollfd){.fd = events && !k->gone ? k->fd : -1, .events = events};
+    }
+    return n;
+}
+
+static void flush_all(struct loop *l)
+{
+    for (struct link *k = l->links->first; k; k = k->next) {
+        if (k->flush && !k->gone) k->flush(k, l->sched->now_ns);
+    }
+}
+
+static void wait_and_serve(struct loop *l, const sigset_t *unblocked)
+{
+    struct link *polled[LOOP_LINKS_MAX];
+    struct pollfd p[LOOP_LINKS_MAX];
+    arm_timers(l);
+    const unsigned n = collect(l, polled, p);
+    const int64_t ns = patience_ns(l);
+    const struct timespec t = {.tv_sec = (time_t)(ns / 1000000000), .tv_nsec = (long)(ns % 1000000000)};
+    const int ready = ppoll(p, n, ns == SCHED_NEVER ? NULL : &t, unblocked);
+    /* Input is stamped with the simulated time of its arrival: first bring the simulation there. */
+    if (ready > 0 && l->started && l->pace->kind == PACE_WALL) run_wall(l);
+    if (ready > 0) serve(l, polled, p, n);
+    serve_timers(l);
+    links_reap(l->links);
+}
+
+/* ---- */
+
+bool loop_step(struct loop *l, int64_t for_ns, uint64_t after_taken)
+{
+    if (l->run != LOOP_IDLE) return false;
+    l->run = LOOP_ARMED;
+    l->until_ns = l->sched->now_ns + for_ns;
+    l->after_taken = after_taken;
+    return true;
+}
+
+void loop_cancel_step(struct loop *l)
+{
+    l->run = LOOP_IDLE;
+}
+
+void loop_run(struct loop *l, const volatile sig_atomic_t *stop)
+{
+    sigset_t open;
+    sigprocmask(SIG_SETMASK, NULL, &open);
+    sigdelset(&open, SIGINT);
+    sigdelset(&open, SIGTERM);
+    while (!l->quit && !*stop && l->sched->now_ns < l->end_ns) {
+        const bool armed = l->run == LOOP_ARMED;
+        if (!armed) advance(l);
+        flush_all(l);
+        if (step_over(l)) {
+            l->run = LOOP_IDLE;
+            l->run_done(l->ctx);
+            flush_all(l);
+        }
+        wait_and_serve(l, &open);
+        if (armed) advance(l);
+    }
+}
+
+void loop_drain(struct loop *l, int patience_ms)
+{
+    int64_t progress_ns = pace_clock_ns();
+    size_t last = links_pending(l->links);
+    while (last > 0 && pace_clock_ns() - progress_ns < (int64_t)patience_ms * 1000000) {
+        struct link *polled[LOOP_LINKS_MAX];
+        struct pollfd p[LOOP_LINKS_MAX];
+        arm_timers(l);
+        const unsigned n = collect(l, polled, p);
+        if (poll(p, n, 10) > 0) serve(l, polled, p, n);
+        serve_timers(l);
+        flush_all(l);
+        links_reap(l->links);
+        const size_t now = links_pending(l->links);
+        if (now != last) progress_ns = pace_clock_ns();
+        last = now;
+    }
+}

@@ -1,0 +1,46 @@
+/* The one poll loop: one thread, no locks.
+ *
+ * A turn: run what is due at this pace, flush every link, wait for input or the next event, deliver input stamped with the
+ * simulated instant, fire the links' timers, reap. In step and free pace time stands still while a link's output is above
+ * its high-water mark, so that nothing is lost on the way to a slow reader. */
+#ifndef PSABENCH_APP_LOOP_H
+#define PSABENCH_APP_LOOP_H
+
+#include "app/pace.h"
+#include "base/sched.h"
+#include "link/link.h"
+
+#include <signal.h>
+
+#define LOOP_LINKS_MAX 96u
+
+struct loop {
+    struct sched *sched;
+    struct pace *pace;
+    struct links *links;
+    int64_t end_ns;                           /* simulated time at which to stop; SCHED_NEVER: run on */
+    bool (*may_start)(void *ctx);             /* free, wall: time waits until this is true; NULL: at once */
+    void (*moved)(void *ctx, int64_t now_ns); /* after time has moved: traces and files follow */
+    void (*run_done)(void *ctx);              /* a run of step pace is over and its output with the kernel */
+    uint64_t (*taken)(void *ctx);             /* frames taken from CAN clients so far */
+    void *ctx;
+    /* read-only outside loop.c */
+    bool quit, started;
+    enum { LOOP_IDLE, LOOP_ARMED, LOOP_RUNNING } run; /* step pace: ARMED waits for one look at all input */
+    int64_t until_ns;                                 /* of the run */
+    uint64_t after_taken;
+};
+
+/* Runs until quit, end_ns, or *stop becomes non-zero: set by a handler of SIGINT or SIGTERM, which the caller has blocked
+ * and which are open only while the loop waits, so that none is missed. */
+void loop_run(struct loop *l, const volatile sig_atomic_t *stop);
+
+/* Hands out what waits, while peers keep reading: at the end of a run. Gives up after patience_ms without progress. */
+void loop_drain(struct loop *l, int patience_ms);
+
+/* Step pace: time is to move by for_ns once after_taken frames of clients have been taken. False: a run is under way. */
+bool loop_step(struct loop *l, int64_t for_ns, uint64_t after_taken);
+
+void loop_cancel_step(struct loop *l); /* who asked has gone: stop where we are */
+
+#endif

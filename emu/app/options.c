@@ -1,0 +1,288 @@
+#define _GNU_SOURCE /* getopt_long */
+#include "app/options.h"
+
+#include "link/socketcand_tcp.h"
+
+#include <errno.h>
+#include <getopt.h>
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const char help[] =
+    "psa-emu [options] [SCENARIO]: a bench of PSA-2 converter boards on a CAN bus, in software\n"
+    "\n"
+    "SCENARIO is a YAML file or the name of one in proto/scenarios (default: calibrate).\n"
+    "\n"
+    "  --can socketcand[:PORT]  socketcand protocol on 127.0.0.1 (default, port 29536; 0 takes a free one)\n"
+    "  --can slcan[:LINK]       slcan on a pseudo-terminal, LINK is made a symbolic link to it\n"
+    "  --can socketcan:IFACE    an interface of the kernel: vcan0, can0\n"
+    "                           --can may be given several times: all are on one bus; --can none: no adapter\n"
+    "  --pace wall|step|free    real time (default), only when the control socket says so, as fast as it goes\n"
+    "  --for TIME               end after this much simulated time: 300ms, 10s, 2min; a bare number is seconds\n"
+    "  --wait-client            time begins when the first CAN client is there\n"
+    "  --seed N                 of all noise, instead of the scenario's\n"
+    "  --start                  units stream at once, without an NMT start command\n"
+    "  --bitrate HZ             of the bus, instead of the scenario's; 0: frames take no time\n"
+    "  --data-bitrate HZ        of FD frames with bit rate switch; 0: no FD on the bus\n"
+    "  --epoch SECONDS          added to the time stamps that clients see\n"
+    "  --control PATH           Unix socket for commands, one JSON object a line\n"
+    "  --truth PATH             Unix socket that tells the hidden parameters, for graders\n"
+    "  --unit NAME              unit whose lines --vcd and --line show (default: the first)\n"
+    "  --vcd FILE               record the lines as VCD\n"
+    "  --vcd-unit NS            time unit of the VCD (default 10)\n"
+    "  --line LINK              line port: INT, DATA and CLK as sampled bytes on a pseudo-terminal, LINK is made a\n"
+    "                           symbolic link to it; -: none\n"
+    "  --line-hz HZ             its samples a second (default 8000000)\n"
+    "  --quiet                  no counters on stderr at the end\n"
+    "  --list-scenarios         names for SCENARIO, and what each is\n"
+    "  --list-profiles          board profiles with their clocks and frame, and what each is\n"
+    "  --list-commands          commands of the control socket and the truth port\n"
+    "  --help, --version\n"
+    "\n"
+    "On stdout: one line `ready key=value ...` for each endpoint, then `ready all`. Exit status: 0 done, 2 bad input,\n"
+    "3 the machine refused something (port, interface, file), 130 ended by Ctrl-C.\n";
+
+const char *options_help(void)
+{
+    return help;
+}
+
+__attribute__((format(printf, 3, 4))) static bool fail(char *why, size_t cap, const char *format, ...)
+{
+    va_list ap;
+    va_start(ap, format);
+    vsnprintf(why, cap, format, ap);
+    va_end(ap);
+    return false;
+}
+
+static bool parse_u64(const char *text, uint64_t max, uint64_t *v)
+{
+    char *end;
+    errno = 0;
+    const unsigned long long x = strtoull(text, &end, 10);
+    if (text[0] < '0' || text[0] > '9' || *end || errno || x > max) return false;
+    *v = x;
+    return true;
+}
+
+bool options_duration(const char *text, int64_t *ns)
+{
+    static const struct {
+        const char *suffix;
+        double s;
+    } units[] = {{"", 1}, {"s", 1}, {"ms", 1e-3}, {"us", 1e-6}, {"ns", 1e-9}, {"min", 60}, {"h", 3600}};
+    char *end;
+    const double v = strtod(text, &end);
+    if (end == text || !isfinite(v)) return false;
+    for (unsigned i = 0; i < sizeof units / sizeof *units; i++) {
+        if (strcmp(end, units[i].suffix) != 0) continue;
+        const double s = v * units[i].s;
+        if (!(s >= 0 && s <= 1e6)) return false;
+        *ns = (int64_t)nearbyint(s * 1e9);
+        return true;
+    }
+    return false;
+}
+
+/* ---- one function for each kind of argument; o is filled in, why tells */
+
+struct target {
+    struct options *o;
+    char *why;
+    size_t cap;
+};
+
+static bool set_can(struct target *t, const char *arg)
+{
+    struct options *o = t->o;
+    o->can_given = true;
+    if (strcmp(arg, "none") == 0) return true;
+    if (o->can_count == OPTIONS_CAN_MAX)
+        return fail(t->why, t->cap, "--can %s: up to %u adapters", arg, OPTIONS_CAN_MAX);
+    struct options_can *c = &o->can[o->can_count];
+    const char *colon = strchr(arg, ':');
+    const size_t len = colon ? (size_t)(colon - arg) : strlen(arg);
+    const char *rest = colon && colon[1] ? colon + 1 : NULL;
+    uint64_t port = SOCKETCAND_PORT;
+    *c = (struct options_can){.arg = rest};
+    if (len == 10 && strncmp(arg, "socketcand", 10) == 0) {
+        c->kind = OPTIONS_SOCKETCAND;
+        if (rest && !parse_u64(rest, 65535, &port)) {
+            return fail(t->why, t->cap, "--can %s: \"%s\" is no port, 0 to 65535 (0: a free one)", arg, rest);
+        }
+        c->port = (uint16_t)port;
+    } else if (len == 5 && strncmp(arg, "slcan", 5) == 0) {
+        c->kind = OPTIONS_SLCAN;
+    } else if (len == 9 && strncmp(arg, "socketcan", 9) == 0 && rest) {
+        c->kind = OPTIONS_SOCKETCAN;
+    } else {
+        return fail(t->why, t->cap, "--can %s: socketcand[:PORT], slcan[:LINK], socketcan:IFACE or none is wanted",
+                    arg);
+    }
+    o->can_count++;
+    return true;
+}
+
+static bool set_pace(struct target *t, const char *arg)
+{
+    for (int k = PACE_WALL; k <= PACE_FREE; k++) {
+        t->o->pace = (enum pace_kind)k;
+        if (strcmp(arg, pace_name(t->o->pace)) == 0) return true;
+    }
+    return fail(t->why, t->cap, "--pace %s: wall, step or free is wanted", arg);
+}
+
+static bool set_for(struct target *t, const char *arg)
+{
+    if (options_duration(arg, &t->o->for_ns)) return true;
+    return fail(t->why, t->cap, "--for %s: a time is wanted, as 300ms, 10s or 2min, up to 1e6 s", arg);
+}
+
+static bool set_seed(struct target *t, const char *arg)
+{
+    t->o->seed_given = parse_u64(arg, UINT64_MAX, &t->o->seed);
+    return t->o->seed_given || fail(t->why, t->cap, "--seed %s: an integer from 0 to 2^64 - 1 is wanted", arg);
+}
+
+static bool set_rate(struct target *t, const char *arg, const char *name, uint32_t *hz, bool *given)
+{
+    uint64_t v;
+    *given = parse_u64(arg, 8000000, &v) && (v == 0 || v >= 10000);
+    if (!*given) return fail(t->why, t->cap, "--%s %s: 0 or 10000 to 8000000 bit/s is wanted", name, arg);
+    *hz = (uint32_t)v;
+    return true;
+}
+
+static bool set_bitrate(struct target *t, const char *arg)
+{
+    return set_rate(t, arg, "bitrate", &t->o->bitrate_hz, &t->o->bitrate_given);
+}
+
+static bool set_data_bitrate(struct target *t, const char *arg)
+{
+    return set_rate(t, arg, "data-bitrate", &t->o->data_bitrate_hz, &t->o->data_bitrate_given);
+}
+
+static bool set_epoch(struct target *t, const char *arg)
+{
+    char *end;
+    const double s = strtod(arg, &end);
+    if (end == arg || *end || !(s >= 0 && s <= 9e9)) {
+        return fail(t->why, t->cap, "--epoch %s: seconds are wanted, 0 to 9e9 (date +%%s gives today's)", arg);
+    }
+    t->o->epoch_ns = (int64_t)nearbyint(s) * 1000000000 + (int64_t)nearbyint((s - nearbyint(s)) * 1e9);
+    return true;
+}
+
+static bool set_vcd_unit(struct target *t, const char *arg)
+{
+    uint64_t v;
+    bool power = parse_u64(arg, 100000000, &v) && v > 0;
+    for (uint64_t x = power ? v : 1; x > 1; x /= 10) power = power && x % 10 == 0;
+    if (!power) return fail(t->why, t->cap, "--vcd-unit %s: 1, 10, 100 ... 100000000 ns is wanted", arg);
+    t->o->vcd_unit_ns = (uint32_t)v;
+    return true;
+}
+
+static bool set_line_hz(struct target *t, const char *arg)
+{
+    uint64_t v;
+    if (!parse_u64(arg, 100000000, &v) || v < 1000) {
+        return fail(t->why, t->cap, "--line-hz %s: 1000 to 100000000 samples a second are wanted", arg);
+    }
+    t->o->line_hz = (int64_t)v;
+    return true;
+}
+
+static bool set_path(struct target *t, const char *name, const char *arg, const char **path)
+{
+    if (!*arg) return fail(t->why, t->cap, "--%s: a path is wanted", name);
+    *path = arg;
+    return true;
+}
+
+// clang-format off
+static bool set_control(struct target *t, const char *arg) { return set_path(t, "control", arg, &t->o->control); }
+static bool set_truth(struct target *t, const char *arg)   { return set_path(t, "truth", arg, &t->o->truth); }
+static bool set_unit(struct target *t, const char *arg)    { return set_path(t, "unit", arg, &t->o->unit); }
+static bool set_vcd(struct target *t, const char *arg)     { return set_path(t, "vcd", arg, &t->o->vcd); }
+static bool set_line(struct target *t, const char *arg)    { return set_path(t, "line", arg, &t->o->line); }
+static bool set_wait(struct target *t, const char *arg)    { (void)arg; return t->o->wait_client = true; }
+static bool set_start(struct target *t, const char *arg)   { (void)arg; return t->o->start = true; }
+static bool set_quiet(struct target *t, const char *arg)   { (void)arg; return t->o->quiet = true; }
+static bool set_help(struct target *t, const char *arg)    { (void)arg; t->o->action = OPTIONS_HELP; return true; }
+static bool set_version(struct target *t, const char *arg) { (void)arg; t->o->action = OPTIONS_VERSION; return true; }
+static bool set_profiles(struct target *t, const char *arg) { (void)arg; t->o->action = OPTIONS_LIST_PROFILES; return true; }
+static bool set_scenarios(struct target *t, const char *arg) { (void)arg; t->o->action = OPTIONS_LIST_SCENARIOS; return true; }
+static bool set_commands(struct target *t, const char *arg) { (void)arg; t->o->action = OPTIONS_LIST_COMMANDS; return true; }
+
+static const struct {
+    const char *name;
+    int has_arg;
+    bool (*set)(struct target *t, const char *arg);
+} rows[] = {
+    {"can", required_argument, set_can},           {"pace", required_argument, set_pace},
+    {"for", required_argument, set_for},           {"seed", required_argument, set_seed},
+    {"bitrate", required_argument, set_bitrate},   {"data-bitrate", required_argument, set_data_bitrate},
+    {"epoch", required_argument, set_epoch},       {"control", required_argument, set_control},
+    {"truth", required_argument, set_truth},       {"unit", required_argument, set_unit},
+    {"vcd", required_argument, set_vcd},           {"vcd-unit", required_argument, set_vcd_unit},
+    {"line", required_argument, set_line},         {"line-hz", required_argument, set_line_hz},
+    {"wait-client", no_argument, set_wait},        {"start", no_argument, set_start},
+    {"quiet", no_argument, set_quiet},             {"help", no_argument, set_help},
+    {"version", no_argument, set_version},         {"list-profiles", no_argument, set_profiles},
+    {"list-scenarios", no_argument, set_scenarios}, {"list-commands", no_argument, set_commands},
+};
+// clang-format on
+#define ROWS (sizeof rows / sizeof *rows)
+
+static bool set_scenario(struct target *t, const char *arg)
+{
+    if (t->o->scenario)
+        return fail(t->why, t->cap, "%s: one scenario is enough, %s was given before", arg, t->o->scenario);
+    return set_path(t, "SCENARIO", arg, &t->o->scenario);
+}
+
+static bool unknown(struct target *t, const char *word, int c)
+{
+    if (c == ':') return fail(t->why, t->cap, "%s: an argument is missing (psa-emu --help)", word);
+    return fail(t->why, t->cap, "%s: unknown option or unwanted argument (psa-emu --help)", word);
+}
+
+static bool parse_all(struct target *t, int argc, char *const argv[])
+{
+    struct option longs[ROWS + 1] = {{0}};
+    for (unsigned i = 0; i < ROWS; i++) {
+        longs[i] = (struct option){.name = rows[i].name, .has_arg = rows[i].has_arg, .val = 256 + (int)i};
+    }
+    optind = 0;
+    for (int c; (c = getopt_long(argc, argv, "-:", longs, NULL)) != -1;) {
+        const bool is_row = c >= 256;
+        if (!is_row && c != 1) return unknown(t, argv[optind - 1], c);
+        if (is_row ? !rows[c - 256].set(t, optarg) : !set_scenario(t, optarg)) return false;
+    }
+    while (optind < argc) {
+        if (!set_scenario(t, argv[optind++])) return false;
+    }
+    return true;
+}
+
+bool options_parse(int argc, char *const argv[], struct options *o, char *why, size_t cap)
+{
+    *o = (struct options){.pace = PACE_WALL, .for_ns = INT64_MAX, .vcd_unit_ns = 10, .line_hz = 8000000};
+    struct target t = {o, why, cap};
+    if (!parse_all(&t, argc, argv)) return false;
+    if (o->pace == PACE_STEP && !o->control) {
+        return fail(why, cap, "--pace step: needs --control PATH, by which time is moved");
+    }
+    if (o->wait_client && o->pace == PACE_STEP) {
+        return fail(why, cap, "--wait-client: in step pace time waits for the control socket anyway");
+    }
+    if (!o->can_given)
+        o->can[o->can_count++] = (struct options_can){.kind = OPTIONS_SOCKETCAND, .port = SOCKETCAND_PORT};
+    return true;
+}

@@ -1,0 +1,63 @@
+/* The command line, parsed once into a struct; nothing reads argv after that. docs/emulator.md is its manual. */
+#ifndef PSABENCH_APP_OPTIONS_H
+#define PSABENCH_APP_OPTIONS_H
+
+#include "app/pace.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#define OPTIONS_CAN_MAX 8u
+
+enum options_can_kind { OPTIONS_SOCKETCAND, OPTIONS_SLCAN, OPTIONS_SOCKETCAN };
+
+struct options_can {
+    enum options_can_kind kind;
+    const char *arg; /* slcan: link or NULL; socketcan: interface */
+    uint16_t port;   /* socketcand; 0: a free one */
+};
+
+enum options_action {
+    OPTIONS_RUN,
+    OPTIONS_HELP,
+    OPTIONS_VERSION,
+    OPTIONS_LIST_PROFILES,
+    OPTIONS_LIST_SCENARIOS,
+    OPTIONS_LIST_COMMANDS
+};
+
+struct options {
+    enum options_action action;
+    const char *scenario; /* path or name; NULL: calibrate */
+    struct options_can can[OPTIONS_CAN_MAX];
+    unsigned can_count; /* none given: socketcand on its usual port */
+    bool can_given;
+    enum pace_kind pace;
+    int64_t for_ns; /* end of the run; INT64_MAX: none */
+    bool seed_given;
+    uint64_t seed;
+    const char *unit; /* whose lines are traced; NULL: the first */
+    const char *vcd;
+    uint32_t vcd_unit_ns;
+    const char *line; /* line port: symbolic link, "-" without one; NULL: no line port */
+    int64_t line_hz;
+    const char *control, *truth; /* paths of Unix sockets */
+    bool bitrate_given, data_bitrate_given;
+    uint32_t bitrate_hz, data_bitrate_hz;
+    int64_t epoch_ns; /* added to time stamps */
+    bool wait_client; /* time begins with the first CAN client */
+    bool start;       /* units start operational, without waiting for NMT */
+    bool quiet;       /* no counters on stderr at the end */
+};
+
+/* argv[0] is skipped; the strings stay the caller's. False with one line in why: what, where, what would be right. */
+bool options_parse(int argc, char *const argv[], struct options *o, char *why, size_t cap);
+
+/* The text of --help. */
+const char *options_help(void);
+
+/* "300ms", "10s", "2.5min", "1h", plain seconds. False when it is no such time or outside 0 ... 1e6 s. */
+bool options_duration(const char *text, int64_t *ns);
+
+#endif

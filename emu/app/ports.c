@@ -1,0 +1,201 @@
+#include "app/ports.h"
+
+#include <errno.h>
+#include <inttypes.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+
+__attribute__((format(printf, 3, 4))) static bool fail(char *why, size_t cap, const char *format, ...)
+{
+    va_list ap;
+    va_start(ap, format);
+    vsnprintf(why, cap, format, ap);
+    va_end(ap);
+    return false;
+}
+
+/* ---- CAN */
+
+static bool open_socketcand(struct ports *p, struct ports_can *c, const struct options_can *o, char *why, size_t cap)
+{
+    const int err = socketcand_listen(&c->socketcand, &p->hub, o->port);
+    if (!err) return true;
+    if (err == -EADDRINUSE) {
+        return fail(why, cap,
+                    "--can socketcand:%u: the port is taken on 127.0.0.1; another one, or 0 for a free one, is wanted",
+                    o->port);
+    }
+    return fail(why, cap, "--can socketcand:%u: %s", o->port, strerror(-err));
+}
+
+static bool open_slcan(struct ports *p, struct ports_can *c, const struct options_can *o, char *why, size_t cap)
+{
+    const int err = slcan_pty_open(&c->slcan, &p->hub, o->arg);
+    if (!err) return true;
+    if (err == -EEXIST)
+        return fail(why, cap, "--can slcan:%s: exists and is no symbolic link to a pty; another name is wanted",
+                    o->arg);
+    return fail(why, cap, "--can slcan%s%s: %s", o->arg ? ":" : "", o->arg ? o->arg : "", strerror(-err));
+}
+
+static bool open_socketcan(struct ports *p, struct ports_can *c, const struct options_can *o, char *why, size_t cap)
+{
+    const int err = socketcan_open(&c->socketcan, &p->hub, o->arg);
+    if (!err) return true;
+    if (err == -ENODEV) {
+        return fail(why, cap,
+                    "--can socketcan:%s: no such interface; as root: ip link add %s type vcan && ip link set %s up",
+                    o->arg, o->arg, o->arg);
+    }
+    if (err == -ENETDOWN)
+        return fail(why, cap, "--can socketcan:%s: is down; as root: ip link set %s up", o->arg, o->arg);
+    if (err == -EAFNOSUPPORT || err == -EPROTONOSUPPORT) {
+        return fail(why, cap, "--can socketcan:%s: this kernel has no CAN; --can socketcand and --can slcan need none",
+                    o->arg);
+    }
+    return fail(why, cap, "--can socketcan:%s: %s", o->arg, strerror(-err));
+}
+
+static bool open_can(struct ports *p, const struct options *o, char *why, size_t cap)
+{
+    typedef bool open_fn(struct ports *, struct ports_can *, const struct options_can *, char *, size_t);
+    static open_fn *const open[] = {
+        [OPTIONS_SOCKETCAND] = open_socketcand, [OPTIONS_SLCAN] = open_slcan, [OPTIONS_SOCKETCAN] = open_socketcan};
+    for (unsigned i = 0; i < o->can_count; i++) {
+        struct ports_can *c = calloc(1, sizeof *c);
+        if (!c) return fail(why, cap, "--can: no memory");
+        c->kind = o->can[i].kind;
+        if (!open[c->kind](p, c, &o->can[i], why, cap)) {
+            free(c);
+            return false;
+        }
+        p->can[p->can_count++] = c;
+    }
+    return true;
+}
+
+/* ---- line port: the sampler of the watched unit is its source */
+
+static bool line_start(void *ctx, int64_t t_ns)
+{
+    struct bench *b = ctx;
+    (void)t_ns;
+    return sampler_start(&b->sampler, &b->unit[b->watched].board.trace, &b->sampler.clock);
+}
+
+static void line_stop(void *ctx)
+{
+    sampler_stop(&((struct bench *)ctx)->sampler);
+}
+
+static size_t line_take(void *ctx, uint8_t *buf, size_t cap)
+{
+    return sampler_take(&((struct bench *)ctx)->sampler, buf, cap);
+}
+
+static size_t line_waiting(void *ctx)
+{
+    return ((struct bench *)ctx)->sampler.len;
+}
+
+static bool open_line(struct ports *p, struct bench *b, const struct options *o, char *why, size_t cap)
+{
+    if (!o->line) return true;
+    const char *name = strcmp(o->line, "-") == 0 ? NULL : o->line;
+    const struct line_source source = {b,         line_start,   line_stop,
+                                       line_take, line_waiting, p->hub.lossless ? SAMPLER_RING / 2 : 0};
+    b->sampler.clock = (struct clk){.hz = o->line_hz, .div = 1};
+    p->line = calloc(1, sizeof *p->line);
+    const int err = p->line ? line_pty_open(p->line, &p->links, &source, name) : -ENOMEM;
+    if (!err) return true;
+    free(p->line);
+    p->line = NULL;
+    if (err == -EEXIST)
+        return fail(why, cap, "--line %s: exists and is no symbolic link to a pty; another name is wanted", o->line);
+    return fail(why, cap, "--line %s: %s", o->line, strerror(-err));
+}
+
+/* ---- sockets and file */
+
+static bool open_socket(struct ctl_server *s, const char *option, const char *path, char *why, size_t cap)
+{
+    if (!path) return true;
+    const int err = ctl_listen(s, path);
+    if (!err) return true;
+    if (err == -EADDRINUSE) return fail(why, cap, "--%s %s: another process listens there", option, path);
+    if (err == -EEXIST) return fail(why, cap, "--%s %s: exists and is no socket; another path is wanted", option, path);
+    if (err == -ENAMETOOLONG) return fail(why, cap, "--%s %s: a path of a socket has up to 107 bytes", option, path);
+    return fail(why, cap, "--%s %s: %s", option, path, strerror(-err));
+}
+
+static bool open_vcd(struct ports *p, struct bench *b, const struct options *o, char *why, size_t cap)
+{
+    if (!o->vcd) return true;
+    p->vcd = fopen(o->vcd, "wbe");
+    if (!p->vcd) return fail(why, cap, "--vcd %s: %s", o->vcd, strerror(errno));
+    return bench_record(b, p->vcd, o->vcd_unit_ns) || fail(why, cap, "--vcd-unit %u: no unit of VCD", o->vcd_unit_ns);
+}
+
+bool ports_open(struct ports *p, struct bench *b, const struct options *o, char *why, size_t cap)
+{
+    p->control.listen.fd = p->truth.listen.fd = -1;
+    p->control.links = p->truth.links = &p->links;
+    p->hub.bus = &b->bus;
+    p->hub.links = &p->links;
+    p->hub.lossless = o->pace != PACE_WALL;
+    p->hub.epoch_ns = o->epoch_ns;
+    return open_can(p, o, why, cap) && open_line(p, b, o, why, cap) && open_vcd(p, b, o, why, cap) &&
+           open_socket(&p->control, "control", o->control, why, cap) &&
+           open_socket(&p->truth, "truth", o->truth, why, cap);
+}
+
+static void ready_pty(FILE *out, const char *what, const struct pty *pty)
+{
+    fprintf(out, "ready %s pty=%s%s%s\n", what, pty->path, pty->name ? " link=" : "", pty->name ? pty->name : "");
+}
+
+void ports_ready(const struct ports *p, const struct options *o, FILE *out)
+{
+    for (unsigned i = 0; i < p->can_count; i++) {
+        const struct ports_can *c = p->can[i];
+        if (c->kind == OPTIONS_SOCKETCAND)
+            fprintf(out, "ready can=socketcand host=127.0.0.1 port=%u\n", c->socketcand.port);
+        if (c->kind == OPTIONS_SLCAN) ready_pty(out, "can=slcan", &c->slcan.pty);
+        if (c->kind == OPTIONS_SOCKETCAN) {
+            fprintf(out, "ready can=socketcan channel=%s fd=%s\n", c->socketcan.can.name,
+                    c->socketcan.can.node.fd ? "true" : "false");
+        }
+    }
+    if (p->line) {
+        char what[64];
+        snprintf(what, sizeof what, "line=sampled hz=%" PRId64, o->line_hz);
+        ready_pty(out, what, &p->line->pty);
+    }
+    if (o->vcd) fprintf(out, "ready vcd=%s\n", o->vcd);
+    if (o->control) fprintf(out, "ready control=%s\n", o->control);
+    if (o->truth) fprintf(out, "ready truth=%s\n", o->truth);
+    fprintf(out, "ready all\n");
+    fflush(out);
+}
+
+static void close_can(struct ports_can *c)
+{
+    if (c->kind == OPTIONS_SOCKETCAND) socketcand_close(&c->socketcand);
+    if (c->kind == OPTIONS_SLCAN) slcan_pty_close(&c->slcan);
+    if (c->kind == OPTIONS_SOCKETCAN) socketcan_close(&c->socketcan);
+}
+
+void ports_close(struct ports *p)
+{
+    for (unsigned i = 0; i < p->can_count; i++) close_can(p->can[i]);
+    if (p->line) line_pty_close(p->line);
+    ctl_close(&p->control);
+    ctl_close(&p->truth);
+    for (struct link *l = p->links.first; l; l = l->next) l->gone = true;
+    links_reap(&p->links);
+    for (unsigned i = 0; i < p->can_count; i++) free(p->can[i]);
+    free(p->line);
+    if (p->vcd) fclose(p->vcd);
+    *p = (struct ports){.control.listen.fd = -1, .truth.listen.fd = -1};
+}

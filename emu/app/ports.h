@@ -1,0 +1,42 @@
+/* The endpoints of a running emulator: CAN adapters, line port, control socket, truth port, VCD file. */
+#ifndef PSABENCH_APP_PORTS_H
+#define PSABENCH_APP_PORTS_H
+
+#include "app/bench.h"
+#include "app/options.h"
+#include "link/can_hub.h"
+#include "link/ctl_sock.h"
+#include "link/line_pty.h"
+#include "link/slcan_pty.h"
+#include "link/socketcan.h"
+#include "link/socketcand_tcp.h"
+
+struct ports_can {
+    enum options_can_kind kind;
+    union {
+        struct socketcand_server socketcand;
+        struct slcan_pty slcan;
+        struct socketcan socketcan;
+    };
+};
+
+struct ports {
+    struct links links;
+    struct can_hub hub;
+    struct ports_can *can[OPTIONS_CAN_MAX];
+    unsigned can_count;
+    struct line_pty *line;
+    struct ctl_server control, truth; /* callbacks are filled in by the caller */
+    FILE *vcd;
+};
+
+/* Opens what the options ask for; links and hub of p are set up first with bench, epoch and say. False with one line in
+ * why: what, where, what would be right. ports_close() in either case. */
+bool ports_open(struct ports *p, struct bench *b, const struct options *o, char *why, size_t cap);
+
+/* Prints one `ready key=value ...` line for each endpoint, then `ready all`. */
+void ports_ready(const struct ports *p, const struct options *o, FILE *out);
+
+void ports_close(struct ports *p);
+
+#endif

@@ -1,0 +1,286 @@
+#define _GNU_SOURCE /* sigaction */
+#include "app/service.h"
+
+#include <inttypes.h>
+#include <stdio.h>
+#include <string.h>
+
+enum { DRAIN_MS = 5000 };
+
+static volatile sig_atomic_t stop_signal;
+
+static void on_signal(int number)
+{
+    stop_signal = number;
+}
+
+static void say(void *ctx, const char *text)
+{
+    (void)ctx;
+    fprintf(stderr, "psa-emu: %s\n", text);
+}
+
+/* ---- what the commands may do */
+
+static bool do_run(void *ctx, int64_t for_ns, uint64_t after_tx, char *why)
+{
+    struct service *s = ctx;
+    if (s->o->pace != PACE_STEP) {
+        snprintf(why, CONTROL_WHY_MAX, "time moves by itself in %s pace; --pace step is wanted", pace_name(s->o->pace));
+        return false;
+    }
+    if (loop_step(&s->loop, for_ns, after_tx)) return true;
+    snprintf(why, CONTROL_WHY_MAX, "another run is under way");
+    return false;
+}
+
+static void do_quit(void *ctx)
+{
+    ((struct service *)ctx)->loop.quit = true;
+}
+
+static bool do_vcd_flush(void *ctx, char *why)
+{
+    struct service *s = ctx;
+    if (s->bench->recording) vcd_flush(&s->bench->vcd);
+    else snprintf(why, CONTROL_WHY_MAX, "nothing is being recorded; --vcd FILE is wanted");
+    return s->bench->recording;
+}
+
+static uint64_t do_can_rx(void *ctx)
+{
+    const struct can_client *c = ((struct service *)ctx)->ports.hub.clients;
+    while (c && c->leaving) c = c->next;
+    return c ? c->delivered : 0;
+}
+
+static void put_client(const struct can_client *c, struct control_client *out)
+{
+    *out = (struct control_client){.adapter = c->adapter,
+                                   .name = c->name,
+                                   .delivered = c->delivered,
+                                   .taken = c->taken,
+                                   .dropped = c->dropped,
+                                   .overrun = c->overrun,
+                                   .refused = c->refused};
+}
+
+static bool do_client(void *ctx, unsigned i, struct control_client *out)
+{
+    const struct can_client *c = ((struct service *)ctx)->ports.hub.clients;
+    while (c && i--) c = c->next;
+    if (c) put_client(c, out);
+    return c != NULL;
+}
+
+static void do_gone(void *ctx, struct control_client *out)
+{
+    put_client(&((struct service *)ctx)->ports.hub.gone, out);
+}
+
+static void do_pace(void *ctx, struct control_pace *out)
+{
+    const struct pace *p = &((struct service *)ctx)->pace;
+    const struct pace_hist *e = &p->events, *f = &p->frames;
+    *out = (struct control_pace){.name = pace_name(p->kind),
+                                 .turns = p->turns,
+                                 .late = p->late,
+                                 .slips = p->slips,
+                                 .p50_us = pace_hist_us(e, 0.5),
+                                 .p99_us = pace_hist_us(e, 0.99),
+                                 .p999_us = pace_hist_us(e, 0.999),
+                                 .max_us = (double)e->max_ns * 1e-3,
+                                 .frames = f->total,
+                                 .frame_p50_us = pace_hist_us(f, 0.5),
+                                 .frame_p99_us = pace_hist_us(f, 0.99),
+                                 .frame_p999_us = pace_hist_us(f, 0.999),
+                                 .frame_max_us = (double)f->max_ns * 1e-3};
+}
+
+static void make_view(struct service *s)
+{
+    struct bench *b = s->bench;
+    s->view = (struct control_bench){.ctx = s,
+                                     .head = &b->head,
+                                     .bus = &b->bus,
+                                     .units = b->scenario.unit_count,
+                                     .seed = b->scenario.seed,
+                                     .scenario = b->scenario.path,
+                                     .run = do_run,
+                                     .quit = do_quit,
+                                     .vcd_flush = do_vcd_flush,
+                                     .can_rx = do_can_rx,
+                                     .client = do_client,
+                                     .gone = do_gone,
+                                     .pace = do_pace};
+    for (unsigned i = 0; i < s->view.units; i++) {
+        s->view.unit[i] = &b->unit[i];
+        s->view.node[i] = &b->can[i].node.stream;
+    }
+}
+
+/* ---- the two sockets */
+
+static void on_control_line(void *ctx, struct ctl_client *c, const char *line, int64_t t_ns)
+{
+    struct service *s = ctx;
+    const char *reply = control_line(&s->control, line, t_ns);
+    if (reply) ctl_reply(c, reply);
+    else s->runner = c;
+}
+
+static void on_control_gone(void *ctx, struct ctl_client *c)
+{
+    struct service *s = ctx;
+    if (s->runner != c) return;
+    s->runner = NULL;
+    control_run_forget(&s->control);
+    loop_cancel_step(&s->loop);
+}
+
+static void on_truth_line(void *ctx, struct ctl_client *c, const char *line, int64_t t_ns)
+{
+    struct service *s = ctx;
+    ctl_reply(c, control_line(&s->truth, line, t_ns));
+}
+
+static void on_truth_gone(void *ctx, struct ctl_client *c)
+{
+    (void)ctx;
+    (void)c;
+}
+
+/* ---- what the loop calls */
+
+static bool may_start(void *ctx)
+{
+    const struct service *s = ctx;
+    return !s->o->wait_client || s->ports.hub.clients_seen > 0;
+}
+
+static void tell_vcd_error(struct service *s, const char *what_now)
+{
+    const int err = vcd_error(&s->bench->vcd);
+    if (!err) return;
+    fprintf(stderr, "psa-emu: --vcd %s: %s; %s\n", s->o->vcd, strerror(err), what_now);
+    s->vcd_failed = true;
+}
+
+static void moved(void *ctx, int64_t now_ns)
+{
+    struct service *s = ctx;
+    (void)now_ns;
+    bench_follow(s->bench);
+    if (s->bench->recording) tell_vcd_error(s, "the recording ends here, the run goes on");
+}
+
+static void run_done(void *ctx)
+{
+    struct service *s = ctx;
+    if (s->runner) ctl_reply(s->runner, control_run_done(&s->control, s->bench->sched.now_ns));
+    s->runner = NULL;
+}
+
+static uint64_t taken(void *ctx)
+{
+    return ((struct service *)ctx)->ports.hub.taken;
+}
+
+/* Lateness of a frame: real time now against the instant its end stands on the bus. */
+static void on_frame(void *ctx, const struct can_msg *m, int64_t t_ns)
+{
+    struct service *s = ctx;
+    (void)m;
+    if (s->pace.kind == PACE_WALL) pace_hist_add(&s->pace.frames, pace_clock_ns() - s->pace.origin_ns - t_ns);
+}
+
+static void on_refused(void *ctx, const char *unit, const char *why)
+{
+    (void)ctx;
+    fprintf(stderr, "psa-emu: unit %s: %s\n", unit, why);
+}
+
+/* ---- life */
+
+bool service_open(struct service *s, struct bench *b, const struct options *o, char *why, size_t cap)
+{
+    memset(s, 0, sizeof *s);
+    s->o = o;
+    s->bench = b;
+    b->on_frame = on_frame;
+    b->on_refused = on_refused;
+    b->ctx = s;
+    pace_init(&s->pace, o->pace);
+    make_view(s);
+    control_init(&s->control, control_commands, control_command_count, &s->view);
+    control_init(&s->truth, control_truth, control_truth_count, &s->view);
+    s->ports.hub.say = say;
+    s->ports.control = (struct ctl_server){.line = on_control_line, .gone = on_control_gone, .ctx = s};
+    s->ports.truth = (struct ctl_server){.line = on_truth_line, .gone = on_truth_gone, .ctx = s};
+    s->loop = (struct loop){.sched = &b->sched,
+                            .pace = &s->pace,
+                            .links = &s->ports.links,
+                            .end_ns = o->for_ns,
+                            .may_start = may_start,
+                            .moved = moved,
+                            .run_done = run_done,
+                            .taken = taken,
+                            .ctx = s};
+    return ports_open(&s->ports, b, o, why, cap);
+}
+
+int service_run(struct service *s)
+{
+    sigset_t blocked;
+    const struct sigaction on_stop = {.sa_handler = on_signal}, ignore = {.sa_handler = SIG_IGN};
+    stop_signal = 0;
+    sigemptyset(&blocked);
+    sigaddset(&blocked, SIGINT);
+    sigaddset(&blocked, SIGTERM);
+    sigprocmask(SIG_BLOCK, &blocked, NULL);
+    sigaction(SIGINT, &on_stop, NULL);
+    sigaction(SIGTERM, &on_stop, NULL);
+    sigaction(SIGPIPE, &ignore, NULL);
+    bench_power_up(s->bench);
+    ports_ready(&s->ports, s->o, stdout);
+    loop_run(&s->loop, &stop_signal);
+    if (!stop_signal) loop_drain(&s->loop, DRAIN_MS);
+    return stop_signal;
+}
+
+static void tell_counters(const struct service *s)
+{
+    const struct can_client *c = s->ports.hub.clients;
+    const struct pace *p = &s->pace;
+    fprintf(stderr, "psa-emu: %.6f s simulated in %s pace, %" PRIu64 " frames on the bus\n",
+            (double)s->bench->sched.now_ns * 1e-9, pace_name(p->kind), s->bench->bus.frames);
+    if (p->kind == PACE_WALL) {
+        fprintf(
+            stderr,
+            "psa-emu: frames late by us: p50 %.0f, p99 %.0f, p99.9 %.0f, max %.0f; events 1 ms late or more: %" PRIu64
+            "; slips: %" PRIu64 "\n",
+            pace_hist_us(&p->frames, 0.5), pace_hist_us(&p->frames, 0.99), pace_hist_us(&p->frames, 0.999),
+            (double)p->frames.max_ns * 1e-3, p->late, p->slips);
+    }
+    for (; c; c = c->next) {
+        fprintf(stderr,
+                "psa-emu: %s %s: delivered %" PRIu64 ", taken %" PRIu64 ", dropped %" PRIu64 ", overrun %" PRIu64
+                ", refused %" PRIu64 "\n",
+                c->adapter, c->name, c->delivered, c->taken, c->dropped, c->overrun, c->refused);
+    }
+    c = &s->ports.hub.gone;
+    fprintf(stderr,
+            "psa-emu: clients gone: delivered %" PRIu64 ", taken %" PRIu64 ", dropped %" PRIu64 ", refused %" PRIu64
+            "\n",
+            c->delivered, c->taken, c->dropped, c->refused);
+}
+
+void service_close(struct service *s)
+{
+    const bool recorded = s->bench->recording;
+    bench_finish(s->bench);
+    if (recorded) tell_vcd_error(s, "the recording is not complete");
+    if (s->loop.started && !s->o->quiet) tell_counters(s);
+    ports_close(&s->ports);
+    control_run_forget(&s->control);
+}

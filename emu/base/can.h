@@ -1,0 +1,114 @@
+/* A CAN frame of ours and the bus that carries it in simulated time.
+ *
+ * A board, a recorder and every client of an adapter is a node. A bus with a bit rate serves one frame at a time: among
+ * the nodes that have something to send, the lowest identifier wins (classic arbitration), the frame takes its exact
+ * number of bits including stuffing (canbits.h), and at the end of frame every other node receives it; the interframe
+ * space follows. Frames sent at one instant all take part in the arbitration of that instant. A bus whose bit rate is 0
+ * is ideal: frames pass at once in the order of sending, yet each in its own event, so that a receiver that answers does
+ * not recurse. Nodes are owned by their owners and linked in; nothing allocates. Not modelled: errors on the wire
+ * (acknowledge, bus-off, overload frames); a frame that nobody receives passes. */
+#ifndef PSABENCH_BASE_CAN_H
+#define PSABENCH_BASE_CAN_H
+
+#include "base/sched.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+enum {
+    CAN_EXT = 1, /* 29-bit identifier */
+    CAN_RTR = 2, /* remote frame: passed on, never sent by us */
+    CAN_FD = 4,  /* FD frame, up to 64 bytes */
+    CAN_BRS = 8, /* FD data phase at the data bit rate */
+    CAN_ERROR = 16
+};
+
+struct can_msg {
+    uint32_t id;
+    uint8_t flags;
+    uint8_t len; /* bytes of data: 0..8 classic; 0..8, 12, 16, 20, 24, 32, 48, 64 FD */
+    uint8_t data[64];
+};
+
+#define CAN_QUEUE_MAX 128u
+
+struct can_waiting {
+    uint64_t number; /* order of can_send() on the whole bus */
+    struct can_msg m;
+};
+
+/* How a node chooses among its own waiting frames. */
+enum can_order { CAN_ORDER_PRIORITY, CAN_ORDER_FIFO };
+
+struct can_node {
+    const char *name;
+    enum can_order order;
+    bool fd; /* takes part in FD traffic; a classic node is not given FD frames and counts them */
+    /* End of somebody else's frame; may be NULL. */
+    void (*rx)(void *ctx, const struct can_msg *m, int64_t t_ns);
+    void (*sent)(void *ctx, const struct can_msg *m, int64_t t_ns); /* end of frame of one's own; may be NULL */
+    void *ctx;
+    /* read-only outside can.c */
+    uint32_t tx_frames, rx_frames, tx_overflow;
+    uint32_t fd_refused; /* FD frames it could not send or was not given */
+    struct can_waiting queue[CAN_QUEUE_MAX];
+    unsigned queued;
+    struct can_node *next;
+};
+
+struct can_bus_cfg {
+    uint32_t bitrate_hz;      /* nominal phase; 0: ideal bus, no time passes */
+    uint32_t data_bitrate_hz; /* data phase of FD frames with BRS; 0: a classic bus, FD frames are refused */
+};
+
+enum can_phase { CAN_IDLE, CAN_ARBITRATION, CAN_FRAME, CAN_IFS };
+
+/* Read-only outside can.c. */
+struct can_bus {
+    struct can_bus_cfg cfg;
+    struct sched *sched;
+    struct can_node *nodes; /* in order of attachment, which is the order of delivery */
+    struct sched_ev step;   /* end of the present phase */
+    enum can_phase phase;
+    struct can_node *sender;  /* of the frame on the wire; NULL if it has left */
+    struct can_node *next_rx; /* cursor of the delivery under way */
+    struct can_msg wire;
+    int64_t start_ns; /* start of the frame on the wire */
+    int64_t busy_ns;  /* of finished frames with their interframe space, since power-on */
+    uint64_t frames, number;
+    int64_t load_mark_ns, load_mark_busy_ns;
+};
+
+enum can_result { CAN_OK, CAN_FULL, CAN_NO_FD, CAN_BAD };
+
+void can_bus_init(struct can_bus *b, const struct can_bus_cfg *cfg, struct sched *s);
+
+/* The node's name, order, fd, rx, sent and ctx are filled in by the caller. */
+void can_attach(struct can_bus *b, struct can_node *n);
+void can_detach(struct can_bus *b, struct can_node *n); /* drops what it had queued; a frame on the wire is finished */
+
+/* Queues a copy. CAN_FULL: counted in tx_overflow; CAN_NO_FD: FD frame on a classic bus; CAN_BAD: no such length or id. */
+enum can_result can_send(struct can_bus *b, struct can_node *n, const struct can_msg *m, int64_t t_ns);
+
+/* Drops what the node has queued, as the reset of a controller does. */
+void can_flush(struct can_node *n);
+
+unsigned can_room(const struct can_node *n);
+
+/* Time on the wire, from start of frame to the end of the 3-bit interframe space. */
+int64_t can_frame_ns(const struct can_bus_cfg *cfg, const struct can_msg *m);
+
+/* Time the wire was in use since power-on, interframe spaces included. */
+int64_t can_busy_ns(const struct can_bus *b, int64_t t_ns);
+
+/* Load in units of 0.1 % since the previous call. */
+uint32_t can_load_permille(struct can_bus *b, int64_t t_ns);
+
+/* Whether the frame has a legal length, identifier and combination of flags. */
+bool can_valid(const struct can_msg *m);
+
+/* Value the identifier field has in arbitration: the lower one wins (base before extended, data before remote). */
+uint32_t can_arbitration(const struct can_msg *m);
+
+#endif

@@ -1,0 +1,159 @@
+#include "base/canbits.h"
+
+#include <stdbool.h>
+
+enum {
+    STUFF_RUN = 5,      /* so many equal bits are followed by a bit of the other level */
+    CRC15_POLY = 0x4599 /* ISO 11898-1, classic frames */
+};
+
+/* CRC delimiter, ACK slot, ACK delimiter, 7 bits end of frame, interframe space: never stuffed. */
+#define TAIL_BITS (1u + 1u + 1u + 7u + CAN_IFS_BITS)
+
+/* The sender's bit stream between start of frame and CRC. */
+struct stream {
+    unsigned bits;  /* sent so far, stuff bits included */
+    unsigned run;   /* equal bits up to now */
+    unsigned level; /* of the last bit */
+    uint32_t crc;   /* over the unstuffed bits */
+};
+
+/* A stuff bit is due before the next bit, so that a frame form may drop the one after its last bit. */
+static void stuff_if_due(struct stream *s)
+{
+    if (s->run < STUFF_RUN) return;
+    s->bits++;
+    s->level ^= 1u;
+    s->run = 1;
+}
+
+static void put_bit(struct stream *s, unsigned bit)
+{
+    stuff_if_due(s);
+    s->run = bit == s->level ? s->run + 1 : 1;
+    s->level = bit;
+    s->bits++;
+    const unsigned out = (unsigned)(s->crc >> 14) & 1u;
+    s->crc = (s->crc << 1) & 0x7FFFu;
+    if (out != bit) s->crc ^= CRC15_POLY;
+}
+
+static void put(struct stream *s, uint32_t value, unsigned bits)
+{
+    while (bits-- > 0) put_bit(s, (unsigned)(value >> bits) & 1u);
+}
+
+static void put_data(struct stream *s, const struct can_msg *m)
+{
+    for (unsigned i = 0; i < m->len; i++) put(s, m->data[i], 8);
+}
+
+/* Start of frame to the bit before IDE's successor: base identifier, or base, SRR, IDE and extension. */
+static void put_id(struct stream *s, const struct can_msg *m, unsigned rtr)
+{
+    put(s, 0, 1);
+    if (m->flags & CAN_EXT) {
+        put(s, m->id >> 18, 11);
+        put(s, 3, 2);
+        put(s, m->id & 0x3FFFFu, 18);
+        put(s, rtr, 1);
+    } else {
+        put(s, m->id, 11);
+        put(s, rtr << 1, 2);
+    }
+}
+
+static struct can_bits classic(const struct can_msg *m)
+{
+    struct stream s = {.level = 1};
+    const bool remote = m->flags & CAN_RTR;
+    put_id(&s, m, remote);
+    put(&s, 0, m->flags & CAN_EXT ? 2 : 1); /* r1, r0 */
+    put(&s, can_dlc(m->len), 4);
+    if (!remote) put_data(&s, m);
+    put(&s, s.crc, 15);
+    stuff_if_due(&s);
+    return (struct can_bits){s.bits + TAIL_BITS, 0};
+}
+
+/* Stuff count (3 bits Gray code and parity), CRC, and a fixed stuff bit before the first and after every fourth of them. */
+static unsigned fd_crc_bits(unsigned len)
+{
+    const unsigned bits = 4u + (len > 16u ? 21u : 17u);
+    return bits + (bits + 3u) / 4u;
+}
+
+static struct can_bits fd(const struct can_msg *m)
+{
+    struct stream s = {.level = 1};
+    const unsigned brs = m->flags & CAN_BRS ? 1 : 0;
+    put_id(&s, m, 0);
+    put(&s, 4 | brs, 3); /* FDF, res, BRS */
+    const unsigned arbitration = s.bits;
+    put(&s, 0, 1); /* ESI */
+    put(&s, can_dlc(m->len), 4);
+    put_data(&s, m);
+    /* No stuff bit after the last data bit: the fixed one stands there. */
+    const unsigned fast = s.bits - arbitration + fd_crc_bits(m->len);
+    return brs ? (struct can_bits){arbitration + TAIL_BITS, fast}
+               : (struct can_bits){arbitration + fast + TAIL_BITS, 0};
+}
+
+struct can_bits can_bits_exact(const struct can_msg *m)
+{
+    return m->flags & CAN_FD ? fd(m) : classic(m);
+}
+
+/* At most one stuff bit after the first five bits and one after every four that follow. */
+static unsigned most_stuff(unsigned bits)
+{
+    return (bits - 1u) / 4u;
+}
+
+static struct can_bits bound(uint8_t flags, uint8_t len, bool stuffed)
+{
+    const unsigned id = flags & CAN_EXT ? 33u : 14u; /* SOF .. IDE, or .. RTR of an extended frame */
+    const unsigned data = flags & CAN_RTR ? 0u : 8u * len;
+    if (!(flags & CAN_FD)) {
+        const unsigned bits = id + (flags & CAN_EXT ? 2u : 1u) + 4u + data + 15u;
+        return (struct can_bits){bits + (stuffed ? most_stuff(bits) : 0) + TAIL_BITS, 0};
+    }
+    const unsigned arbitration = id + 3u;
+    const unsigned dynamic = arbitration + 5u + data;
+    const unsigned stuff = stuffed ? most_stuff(dynamic) : 0;
+    const unsigned stuff_nominal = stuffed ? most_stuff(arbitration) : 0;
+    const unsigned nominal = arbitration + stuff_nominal + TAIL_BITS;
+    const unsigned fast = dynamic - arbitration + stuff - stuff_nominal + fd_crc_bits(len);
+    return flags & CAN_BRS ? (struct can_bits){nominal, fast} : (struct can_bits){nominal + fast, 0};
+}
+
+struct can_bits can_bits_least(uint8_t flags, uint8_t len)
+{
+    return bound(flags, len, false);
+}
+
+struct can_bits can_bits_worst(uint8_t flags, uint8_t len)
+{
+    return bound(flags, len, true);
+}
+
+static int64_t bits_ns(unsigned bits, uint32_t hz)
+{
+    return hz ? ((int64_t)bits * NS_PER_S + hz / 2) / hz : 0;
+}
+
+int64_t can_bits_ns(struct can_bits n, const struct can_bus_cfg *cfg)
+{
+    if (cfg->bitrate_hz == 0) return 0;
+    return bits_ns(n.nominal, cfg->bitrate_hz) + bits_ns(n.data, cfg->data_bitrate_hz);
+}
+
+uint8_t can_dlc(uint8_t len)
+{
+    static const uint8_t step[] = {12, 16, 20, 24, 32, 48, 64};
+    if (len <= 8) return len;
+    for (unsigned i = 0; i < sizeof step; i++) {
+        if (len <= step[i]) return (uint8_t)(9 + i);
+    }
+    return 15;
+}

@@ -1,0 +1,79 @@
+#include "base/detmath.h"
+
+#include <assert.h>
+#include <math.h>
+#include <stdint.h>
+
+#define LN2_HI 0x1.62e42fefa0000p-1 /* low 20 bits zero: k * LN2_HI is exact for |k| < 2^20 */
+#define LN2_LO 0x1.cf79abc9e3b3ap-40
+
+/* log(x) = k ln2 + 2 atanh(s), s = (m - 1)/(m + 1), m in [1/sqrt 2, sqrt 2): |s| < 0.1716, so s^23 is below 1e-18. */
+double det_log(double x)
+{
+    assert(x > 0.0);
+    int k;
+    double m = frexp(x, &k);
+    if (m < 0.70710678118654752440) {
+        m *= 2.0;
+        k--;
+    }
+    const double f = m - 1.0;
+    const double s = f / (2.0 + f);
+    const double z = s * s;
+    double sum = 0.0;
+    for (int n = 23; n >= 3; n -= 2) sum = (sum + 1.0 / n) * z;
+    return (double)k * LN2_HI + (2.0 * s + (2.0 * s * sum + (double)k * LN2_LO));
+}
+
+/* exp(x) = 2^k exp(r), |r| <= ln2/2, Taylor to r^17. */
+double det_exp(double x)
+{
+    assert(x >= -700.0 && x <= 700.0);
+    const double k = floor(x * 1.44269504088896340736 + 0.5);
+    const double r = (x - k * LN2_HI) - k * LN2_LO;
+    double sum = 1.0;
+    for (int n = 17; n >= 1; n--) sum = 1.0 + sum * r / n;
+    return ldexp(sum, (int)k);
+}
+
+/* pi/2 in three parts, each of the first two with 20 zero low bits. */
+#define PIO2_1 0x1.921fb54400000p+0
+#define PIO2_2 0x1.0b4611a600000p-34
+#define PIO2_3 0x1.3198a2e037073p-69
+
+static double poly_sin(double r)
+{
+    const double z = r * r;
+    double sum = 1.0;
+    for (int n = 21; n >= 3; n -= 2) sum = 1.0 - sum * z / (double)(n * (n - 1));
+    return r * sum;
+}
+
+static double poly_cos(double r)
+{
+    const double z = r * r;
+    double sum = 1.0;
+    for (int n = 22; n >= 2; n -= 2) sum = 1.0 - sum * z / (double)(n * (n - 1));
+    return sum;
+}
+
+/* sin(x + quarter pi/2) */
+static double sin_quarter(double x_rad, int64_t quarter)
+{
+    assert(fabs(x_rad) <= 1e6);
+    const double k = floor(x_rad * 0.63661977236758134308 + 0.5);
+    const double r = ((x_rad - k * PIO2_1) - k * PIO2_2) - k * PIO2_3;
+    const int64_t q = ((int64_t)k + quarter) & 3;
+    const double v = (q & 1) ? poly_cos(r) : poly_sin(r);
+    return (q & 2) ? -v : v;
+}
+
+double det_sin(double x_rad)
+{
+    return sin_quarter(x_rad, 0);
+}
+
+double det_cos(double x_rad)
+{
+    return sin_quarter(x_rad, 1);
+}

@@ -1,0 +1,13 @@
+/* Elementary functions built from IEEE-exact operations only (+ - * / sqrt, frexp, ldexp).
+ *
+ * libm's sin, log and exp choose other instructions on other processors and may differ in the last bit; "same seed, same
+ * bytes on every machine" cannot stand on them. Accuracy here is better than 4 ulp inside the stated ranges. Pure. */
+#ifndef PSABENCH_BASE_DETMATH_H
+#define PSABENCH_BASE_DETMATH_H
+
+double det_log(double x);     /* natural logarithm, x > 0 finite and normal */
+double det_exp(double x);     /* -700 <= x <= 700 */
+double det_sin(double x_rad); /* |x_rad| <= 1e6: reduced by pi/2 in three parts */
+double det_cos(double x_rad);
+
+#endif

@@ -1,0 +1,52 @@
+/* Event queue in simulated time.
+ *
+ * Time is int64_t nanoseconds since power-on of the bench. The event struct is intrusive: its owner embeds it, so that
+ * scheduling allocates nothing and cannot fail. Order is total: due time, then order of scheduling. One thread. */
+#ifndef PSABENCH_BASE_SCHED_H
+#define PSABENCH_BASE_SCHED_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#define SCHED_NEVER       INT64_MAX /* due time of an empty queue */
+#define SCHED_AT_ONCE_MAX 100000u   /* more events than this at one instant is a bug: somebody re-arms at zero delay */
+#define NS_PER_S          INT64_C(1000000000)
+
+typedef void sched_fn(void *ctx, int64_t t_ns); /* t_ns is the instant the event was due */
+
+/* One event. Zero it or call sched_ev() before first use; read-only outside sched.c afterwards. */
+struct sched_ev {
+    int64_t due_ns;
+    uint64_t seq; /* breaks ties: the earlier scheduled goes first */
+    sched_fn *fn;
+    void *ctx;
+    struct sched_ev *child, *sibling, *prev; /* pairing heap */
+    bool queued;
+};
+
+struct sched {
+    int64_t now_ns; /* read-only outside sched.c */
+    uint64_t seq;
+    uint32_t at_once;
+    int64_t at_once_ns;
+    struct sched_ev *root;
+};
+
+void sched_init(struct sched *s);
+
+/* Names what the event does; call once, while it is idle. */
+void sched_ev(struct sched_ev *e, sched_fn *fn, void *ctx);
+
+/* Arms the event for t_ns; an armed event is moved. The past is clamped to now. */
+void sched_at(struct sched *s, struct sched_ev *e, int64_t t_ns);
+
+/* Disarms; harmless for an idle event. */
+void sched_cancel(struct sched *s, struct sched_ev *e);
+
+/* Due time of the next event, SCHED_NEVER when there is none. */
+int64_t sched_next_ns(const struct sched *s);
+
+/* Runs everything due up to and including until_ns, in order, then leaves now at until_ns. */
+void sched_run_until(struct sched *s, int64_t until_ns);
+
+#endif

@@ -1,0 +1,78 @@
+#include "board/afe.h"
+
+#include "base/detmath.h"
+#include "base/sched.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#define NOMINAL_DEGC  25.0  /* tolerances are those at this temperature */
+#define SAME_DT_NS    1     /* steps of a clock that is no whole number of ns differ by this */
+#define FIRST_PULL_NS 31250 /* interval assumed before the first call: one block of the converter at 1000 SPS */
+#define TWO_PI        6.283185307179586
+
+struct afe_cfg afe_nominal(enum afe_input input)
+{
+    return (struct afe_cfg){
+        .input = input, .load_ohm = 1000.0, .divider_ratio = 8.0, .clip_v = 10.5, .filter_hz = 10e3};
+}
+
+void afe_init(struct afe *a, const struct afe_cfg *cfg, struct rng noise)
+{
+    *a = (struct afe){.cfg = *cfg, .noise = noise, .t_ns = -1};
+}
+
+static double with_ppm(double nominal, double tol_ppm, double tc_ppm_per_k, double dt_k)
+{
+    return nominal * (1.0 + 1e-6 * (tol_ppm + tc_ppm_per_k * dt_k));
+}
+
+static double clip(double v, double limit_v)
+{
+    return v > limit_v ? limit_v : v < -limit_v ? -limit_v : v;
+}
+
+/* Current -> load -> buffer. */
+static double load_v(const struct afe_cfg *c, double signal, double dt_k)
+{
+    const double v =
+        c->input == AFE_CURRENT ? signal * with_ppm(c->load_ohm, c->load_tol_ppm, c->load_tc_ppm_per_k, dt_k) : signal;
+    return clip(v + c->buffer_offset_v + c->buffer_offset_tc_v_per_k * dt_k, c->clip_v);
+}
+
+static double divide_v(const struct afe_cfg *c, double v, double dt_k)
+{
+    return v / with_ppm(c->divider_ratio, c->divider_tol_ppm, c->divider_tc_ppm_per_k, dt_k);
+}
+
+double afe_static_v(const struct afe_cfg *cfg, double signal, double temp_degc)
+{
+    const double dt_k = temp_degc - NOMINAL_DEGC;
+    return divide_v(cfg, load_v(cfg, signal, dt_k), dt_k);
+}
+
+/* Constants of a step of dt: they change only when the converter changes its pace. */
+static void retune(struct afe *a, int64_t dt_ns)
+{
+    const double dt_s = (double)dt_ns / (double)NS_PER_S;
+    const double x = TWO_PI * a->cfg.filter_hz * dt_s;
+    a->dt_ns = dt_ns;
+    a->keep = a->cfg.filter_hz <= 0.0 || x > 700.0 ? 0.0 : det_exp(-x);
+    a->noise_v = a->cfg.noise_v_rthz > 0.0 ? a->cfg.noise_v_rthz * sqrt(1.0 / (2.0 * dt_s)) : 0.0;
+}
+
+/* One pole, exact for an input that is held over the step: s <- x + (s - x) exp(-2 pi f dt). */
+double afe_out_v(struct afe *a, double signal, double temp_degc, int64_t t_ns)
+{
+    const bool first = a->t_ns < 0;
+    const int64_t dt_ns = first ? FIRST_PULL_NS : t_ns - a->t_ns;
+    if (dt_ns <= 0) return a->state_v;
+    if (llabs(dt_ns - a->dt_ns) > SAME_DT_NS) retune(a, dt_ns);
+    const double dt_k = temp_degc - NOMINAL_DEGC;
+    double v = load_v(&a->cfg, signal, dt_k);
+    if (a->noise_v > 0.0) v += a->noise_v * rng_gauss(&a->noise);
+    v = divide_v(&a->cfg, v, dt_k);
+    a->state_v = first ? v : v + (a->state_v - v) * a->keep; /* at power-on the filter has long been settled */
+    a->t_ns = t_ns;
+    return a->state_v;
+}

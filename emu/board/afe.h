@@ -1,0 +1,49 @@
+/* Analog chain of one accelerometer channel: current -> load resistor -> +-10 V -> buffer -> divider -> +-1.25 V -> filter
+ * -> buffer -> converter input (article section 5, figure 7). Each part with tolerance, temperature coefficient and
+ * noise, each a parameter; the tolerances are the unit's truth and never cross a link. */
+#ifndef PSABENCH_BOARD_AFE_H
+#define PSABENCH_BOARD_AFE_H
+
+#include "base/rng.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+enum afe_input {
+    AFE_CURRENT,
+    AFE_VOLTAGE
+}; /* quartz sensor through the load / voltage-output MEMS straight to the buffer */
+
+struct afe_cfg {
+    enum afe_input input;
+    double load_ohm, load_tol_ppm, load_tc_ppm_per_k;
+    double divider_ratio, divider_tol_ppm, divider_tc_ppm_per_k; /* nominal 8: +-10 V to +-1.25 V */
+    double buffer_offset_v, buffer_offset_tc_v_per_k;            /* referred to the load */
+    double clip_v;       /* supply-limited swing at the load, nominally 10 V plus margin */
+    double filter_hz;    /* corner of the one-pole anti-alias filter; 0: none */
+    double noise_v_rthz; /* white, at the load, one-sided density */
+};
+
+struct afe {
+    struct afe_cfg cfg;
+    struct rng noise;
+    double state_v; /* filter */
+    int64_t t_ns;   /* of the state; -1 before the first call */
+    int64_t dt_ns;  /* step for which the two constants hold */
+    double keep;    /* what remains of the filter's state after a step */
+    double noise_v; /* rms of one step's noise at the load */
+};
+
+void afe_init(struct afe *a, const struct afe_cfg *cfg, struct rng noise);
+
+/* Ideal chain, all tolerances and errors zero: 1 kohm (10 V at 10 mA), 1 : 8, 10 kHz, clipping at 10.5 V. */
+struct afe_cfg afe_nominal(enum afe_input input);
+
+/* Static transfer, pure: volts at the converter for a signal (A or V by cfg.input) at a board temperature. */
+double afe_static_v(const struct afe_cfg *cfg, double signal, double temp_degc);
+
+/* Volts at the converter at t_ns (never earlier than the last call; the same instant gives the same volts), filter and
+ * noise included. The filter takes the signal as held since the last call. */
+double afe_out_v(struct afe *a, double signal, double temp_degc, int64_t t_ns);
+
+#endif

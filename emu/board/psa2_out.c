@@ -1,0 +1,126 @@
+#include "board/psa2_parts.h"
+
+#include "base/bits.h"
+
+static const uint32_t out_lines = 1u << PSA2_LINE_INT | 1u << PSA2_LINE_DATA | 1u << PSA2_LINE_CLK;
+
+/* Half periods of CLK from INT fall to the falling grid edge at which word w begins. */
+static int64_t word_half(const struct psa2 *b, unsigned w)
+{
+    return 2 * ((int64_t)b->profile.lead_in_clk + w * (int64_t)(b->profile.word_bits + PSA2_GAP_CLK));
+}
+
+static int64_t edge_ns(const struct psa2 *b, int64_t half)
+{
+    return clk_edge_ns(&b->out.half, b->out.k0 + half);
+}
+
+static uint32_t low_bits(uint32_t v, unsigned bits)
+{
+    return bits == 32 ? v : v & ((UINT32_C(1) << bits) - 1);
+}
+
+/* The upper code_bits of the conversion word, sign-extended to the word's width. */
+static uint32_t code_word(const struct psa2_profile *p, uint32_t raw)
+{
+    const uint32_t code = (uint32_t)bits_sign_extend(raw >> (32 - p->code_bits), p->code_bits);
+    return low_bits(code, p->word_bits);
+}
+
+/* 16-bit code, above it 4 bits of channel and 4 of status: 24 bits, of which a 16-bit word keeps the code. */
+static uint32_t temp_word(const struct psa2_profile *p, const struct psa2_frame *f)
+{
+    const uint32_t w = f->temp_code | (uint32_t)(f->temp_channel & 0xF) << 16 | (uint32_t)(f->status & 0xF) << 20;
+    return low_bits(w, p->word_bits);
+}
+
+static void pack_words(const struct psa2_profile *p, struct psa2_frame *f)
+{
+    for (unsigned i = 0; i < PSA2_WORDS; i++)
+        f->word[i] = p->word[i] == PSA2_WORD_T ? temp_word(p, f) : code_word(p, f->raw[p->word[i]]);
+}
+
+/* Edges of one word up to an instant: DATA changes where CLK falls, CLK runs only while bits are sent. */
+static void report_word(struct psa2 *b, unsigned w, int64_t until_ns)
+{
+    for (unsigned bit = 0; bit < b->profile.word_bits; bit++) {
+        const int64_t fall = word_half(b, w) + 2 * (int64_t)bit;
+        if (edge_ns(b, fall) > until_ns) return;
+        trace_set(&b->trace, PSA2_LINE_DATA, b->out.f.word[w] >> bit & 1, edge_ns(b, fall));
+        if (edge_ns(b, fall + 1) > until_ns) return;
+        trace_set(&b->trace, PSA2_LINE_CLK, true, edge_ns(b, fall + 1));
+        if (edge_ns(b, fall + 2) > until_ns) return;
+        trace_set(&b->trace, PSA2_LINE_CLK, false, edge_ns(b, fall + 2));
+    }
+    trace_set(&b->trace, PSA2_LINE_DATA, false, edge_ns(b, word_half(b, w) + 2 * (int64_t)b->profile.word_bits));
+}
+
+/* Runs only while the line is watched: at INT fall, then at the end of each word but the last. */
+static void word_event(void *ctx, int64_t t_ns)
+{
+    struct psa2 *b = ctx;
+    struct psa2_out *o = &b->out;
+    if (o->watched_words < 0) trace_set(&b->trace, PSA2_LINE_INT, false, t_ns);
+    else report_word(b, (unsigned)o->watched_words, t_ns);
+    o->watched_words++;
+    if ((unsigned)o->watched_words + 1 >= PSA2_WORDS) return;
+    sched_at(b->sched, &o->word,
+             edge_ns(b, word_half(b, (unsigned)o->watched_words) + 2 * (int64_t)b->profile.word_bits));
+}
+
+/* The rest of a watched frame, up to now, and idle lines. */
+static void finish_watched(struct psa2 *b, int64_t t_ns)
+{
+    struct psa2_out *o = &b->out;
+    sched_cancel(b->sched, &o->word);
+    if (o->watched_words < 0) return;
+    for (unsigned w = (unsigned)o->watched_words; w < PSA2_WORDS; w++)
+        if (edge_ns(b, word_half(b, w)) <= t_ns) report_word(b, w, t_ns);
+    trace_set(&b->trace, PSA2_LINE_DATA, false, t_ns);
+    trace_set(&b->trace, PSA2_LINE_CLK, false, t_ns);
+    trace_set(&b->trace, PSA2_LINE_INT, true, t_ns);
+    o->watched_words = -1;
+}
+
+static void int_rise(void *ctx, int64_t t_ns)
+{
+    struct psa2 *b = ctx;
+    finish_watched(b, t_ns);
+    b->out.busy = false;
+    b->counters.frames++;
+    if (b->io.frame) b->io.frame(b->io.ctx, &b->out.f, t_ns);
+}
+
+void psa2_out_init(struct psa2 *b)
+{
+    b->out.half = (struct clk){.hz = 2 * (int64_t)b->profile.line_hz, .div = b->profile.line_div};
+    b->out.watched_words = -1;
+    sched_ev(&b->out.rise, int_rise, b);
+    sched_ev(&b->out.word, word_event, b);
+}
+
+void psa2_out_start(struct psa2 *b, const struct psa2_frame *f, int64_t t_ns)
+{
+    struct psa2_out *o = &b->out;
+    if (o->busy) {
+        b->counters.int_late++;
+        return;
+    }
+    o->busy = true;
+    o->k0 = clk_count_at(&o->half, t_ns);
+    o->k0 += o->k0 & 1;
+    o->f = *f;
+    o->f.t_int_fall_ns = edge_ns(b, 0);
+    o->f.t_int_rise_ns = edge_ns(b, 2 * (int64_t)psa2_frame_clks(&b->profile));
+    pack_words(&b->profile, &o->f);
+    b->latest = o->f;
+    sched_at(b->sched, &o->rise, o->f.t_int_rise_ns);
+    if (trace_watched(&b->trace, out_lines)) sched_at(b->sched, &o->word, o->f.t_int_fall_ns);
+}
+
+void psa2_out_stop(struct psa2 *b, int64_t t_ns)
+{
+    finish_watched(b, t_ns);
+    sched_cancel(b->sched, &b->out.rise);
+    b->out.busy = false;
+}

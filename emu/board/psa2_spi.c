@@ -1,0 +1,236 @@
+#include "board/psa2_parts.h"
+
+#include <assert.h>
+#include <string.h>
+
+/* Half periods of SClk in a byte, from its first rising edge. */
+enum { HALF_FIRST_FALL = 1, HALF_SAMPLE_A = 14, HALF_SAMPLE_T = 15, HALF_BYTE = 16 };
+
+#define GAP_A_TCLK 24 /* D p30, t_SCLKDLY: between bytes and commands of an ADS128x */
+#define GAP_T_TAU  24 /* t11 of an ADS1256 after SYNC and RDATAC; 4 after the others */
+#define CST_TAU    8  /* t10: CS low after the last falling SCLK */
+
+static const uint32_t accel_lines =
+    1u << PSA2_LINE_SCLK | 1u << PSA2_LINE_DIN | 1u << PSA2_LINE_DOUTX | 1u << PSA2_LINE_DOUTY | 1u << PSA2_LINE_DOUTZ;
+static const uint32_t temp_lines = 1u << PSA2_LINE_SCLK | 1u << PSA2_LINE_DINT | 1u << PSA2_LINE_DOUTT;
+
+static int32_t periods_ns(uint32_t hz, int32_t periods)
+{
+    return (int32_t)(((int64_t)periods * NS_PER_S + hz - 1) / hz);
+}
+
+int32_t psa2_tclk_ns(const struct psa2 *b, int32_t periods)
+{
+    return periods_ns(b->profile.fclk_hz, periods);
+}
+
+int32_t psa2_tau_ns(const struct psa2 *b, int32_t periods)
+{
+    return periods_ns(b->profile.temp_clkin_hz, periods);
+}
+
+struct psa2_xfer psa2_xfer_accel(const struct psa2 *b, const uint8_t *tx, unsigned count)
+{
+    assert(count > 0 && count <= PSA2_XFER_MAX);
+    struct psa2_xfer x = {.group = PSA2_ACCEL, .count = (uint8_t)count};
+    memcpy(x.tx, tx, count);
+    for (unsigned i = 0; i < count; i++) x.gap_ns[i] = psa2_tclk_ns(b, GAP_A_TCLK);
+    return x;
+}
+
+struct psa2_xfer psa2_xfer_temp(const struct psa2 *b, const uint8_t *tx, unsigned count)
+{
+    assert(count > 0 && count <= PSA2_XFER_MAX);
+    struct psa2_xfer x = {.group = PSA2_TEMP, .count = (uint8_t)count};
+    memcpy(x.tx, tx, count);
+    x.gap_ns[count - 1] = psa2_tau_ns(b, GAP_T_TAU);
+    return x;
+}
+
+bool psa2_spi_busy(const struct psa2 *b)
+{
+    return b->spi.phase != PSA2_SPI_IDLE;
+}
+
+static int64_t edge_ns(const struct psa2 *b, int64_t k)
+{
+    return clk_edge_ns(&b->spi.half, k);
+}
+
+static bool clocks_accel(const struct psa2 *b)
+{
+    return b->spi.x.group == PSA2_ACCEL || !b->profile.gate_sclk;
+}
+
+/* The next event of the byte under way. */
+static void arm(struct psa2 *b, enum psa2_spi_phase phase, int64_t t_ns)
+{
+    b->spi.phase = phase;
+    sched_at(b->sched, &b->spi.ev, t_ns);
+}
+
+static void begin_byte(struct psa2 *b, int64_t not_before_ns)
+{
+    struct psa2_spi *s = &b->spi;
+    s->k = clk_count_at(&s->half, not_before_ns);
+    if (s->k < s->free_k) s->k = s->free_k;
+    s->k += s->k & 1;
+    s->free_k = s->k + HALF_BYTE;
+    arm(b, PSA2_SPI_FIRST, edge_ns(b, s->k + HALF_FIRST_FALL));
+}
+
+void psa2_spi_start(struct psa2 *b, const struct psa2_xfer *x, int64_t t_ns)
+{
+    struct psa2_spi *s = &b->spi;
+    assert(!psa2_spi_busy(b));
+    s->x = *x;
+    s->at = 0;
+    memset(s->rx, 0, sizeof s->rx);
+    if (x->group == PSA2_TEMP) {
+        trace_set(&b->trace, PSA2_LINE_CST, false, t_ns);
+        ads1256_cs_pin(&b->tadc, false, t_ns);
+    }
+    /* One SClk period first: DOut is valid within 100 ns of DRD_A, DIn needs its set-up. */
+    const int64_t lead_ns = edge_ns(b, clk_count_at(&s->half, t_ns) + 2);
+    begin_byte(b, lead_ns > s->ready_ns[x->group] ? lead_ns : s->ready_ns[x->group]);
+}
+
+int64_t psa2_spi_span_ns(const struct psa2 *b, const struct psa2_xfer *x, int64_t t_ns)
+{
+    const int64_t wait_ns = b->spi.ready_ns[x->group] - t_ns;
+    int64_t span_ns = (wait_ns > 0 ? wait_ns : 0) + periods_ns(b->profile.sclk_hz, 2);
+    for (unsigned i = 0; i < x->count; i++)
+        span_ns += periods_ns(b->profile.sclk_hz, 9) + (i + 1u < x->count ? x->gap_ns[i] : 0);
+    return span_ns + (x->group == PSA2_TEMP ? psa2_tau_ns(b, CST_TAU) : periods_ns(b->profile.sclk_hz, 1));
+}
+
+/* Bits of a byte on one line; first_k is the half period at which bit 7 appears. */
+static void report_bits(struct psa2 *b, enum psa2_line line, uint8_t byte, int64_t first_k)
+{
+    for (int i = 0; i < 8; i++) trace_set(&b->trace, line, byte >> (7 - i) & 1, edge_ns(b, first_k + 2 * i));
+}
+
+static void report_sclk(struct psa2 *b)
+{
+    for (int64_t k = b->spi.k; k < b->spi.k + HALF_BYTE; k++)
+        trace_set(&b->trace, PSA2_LINE_SCLK, !(k & 1), edge_ns(b, k));
+}
+
+/* Mode 0: data change on the falling edge before the rising one that samples them. */
+static void report_accel(struct psa2 *b, uint8_t mosi)
+{
+    const struct psa2_spi *s = &b->spi;
+    report_bits(b, PSA2_LINE_DIN, mosi, s->k - 1);
+    if (s->at + 1u == s->x.count) trace_set(&b->trace, PSA2_LINE_DIN, false, edge_ns(b, s->k + HALF_BYTE - 1));
+    for (unsigned i = 0; i < 3; i++) {
+        report_bits(b, PSA2_LINE_DOUTX + i, s->rx[i][s->at], s->k - 1);
+        trace_set(&b->trace, PSA2_LINE_DOUTX + i, spi_miso(&b->adc[i].spi), edge_ns(b, s->k + HALF_BYTE - 1));
+    }
+}
+
+/* Mode 1: data change on the rising edge. */
+static void report_temp(struct psa2 *b)
+{
+    const struct psa2_spi *s = &b->spi;
+    report_bits(b, PSA2_LINE_DINT, s->x.tx[s->at], s->k);
+    report_bits(b, PSA2_LINE_DOUTT, s->rx[3][s->at], s->k);
+    if (s->at + 1u == s->x.count) trace_set(&b->trace, PSA2_LINE_DINT, false, edge_ns(b, s->k + HALF_BYTE));
+}
+
+static void report_byte(struct psa2 *b)
+{
+    if (!trace_watched(&b->trace, accel_lines | temp_lines)) return;
+    report_sclk(b);
+    if (clocks_accel(b)) report_accel(b, b->spi.x.group == PSA2_ACCEL ? b->spi.x.tx[b->spi.at] : 0);
+    if (b->spi.x.group == PSA2_TEMP) report_temp(b);
+}
+
+static void end_xfer(struct psa2 *b, int64_t t_ns)
+{
+    b->spi.phase = PSA2_SPI_IDLE;
+    b->spi.x.done(b, t_ns);
+}
+
+static void end_byte(struct psa2 *b, int64_t t_ns)
+{
+    struct psa2_spi *s = &b->spi;
+    report_byte(b);
+    const int64_t next_ns = t_ns + s->x.gap_ns[s->at];
+    if (++s->at < s->x.count) {
+        begin_byte(b, next_ns);
+        return;
+    }
+    s->ready_ns[s->x.group] = next_ns;
+    if (s->x.group == PSA2_TEMP) arm(b, PSA2_SPI_CST_UP, t_ns + psa2_tau_ns(b, CST_TAU));
+    else arm(b, PSA2_SPI_REST, edge_ns(b, s->k + HALF_BYTE)); /* SClk is low again before CST may move */
+}
+
+static void first_fall(struct psa2 *b, int64_t t_ns)
+{
+    if (clocks_accel(b))
+        for (unsigned i = 0; i < 3; i++) spi_first(&b->adc[i].spi, t_ns);
+    if (b->spi.x.group == PSA2_TEMP) spi_first(&b->tadc.spi, t_ns);
+    if (clocks_accel(b)) arm(b, PSA2_SPI_SAMPLE_A, edge_ns(b, b->spi.k + HALF_SAMPLE_A));
+    else arm(b, PSA2_SPI_SAMPLE_T, edge_ns(b, b->spi.k + HALF_SAMPLE_T));
+}
+
+/* A burst for the temperature converter that is not gated clocks the accelerometer converters with DIn low. */
+static void sample_accel(struct psa2 *b, int64_t t_ns)
+{
+    struct psa2_spi *s = &b->spi;
+    const bool own = s->x.group == PSA2_ACCEL;
+    for (unsigned i = 0; i < 3; i++) s->rx[i][s->at] = spi_byte(&b->adc[i].spi, own ? s->x.tx[s->at] : 0, t_ns);
+    if (own) end_byte(b, t_ns);
+    else arm(b, PSA2_SPI_SAMPLE_T, edge_ns(b, s->k + HALF_SAMPLE_T));
+}
+
+static void sample_temp(struct psa2 *b, int64_t t_ns)
+{
+    b->spi.rx[3][b->spi.at] = spi_byte(&b->tadc.spi, b->spi.x.tx[b->spi.at], t_ns);
+    end_byte(b, t_ns);
+}
+
+static void cst_up(struct psa2 *b, int64_t t_ns)
+{
+    ads1256_cs_pin(&b->tadc, true, t_ns);
+    trace_set(&b->trace, PSA2_LINE_CST, true, t_ns);
+    trace_set(&b->trace, PSA2_LINE_DOUTT, false, t_ns); /* high impedance, drawn low */
+}
+
+static void on_event(void *ctx, int64_t t_ns)
+{
+    struct psa2 *b = ctx;
+    switch (b->spi.phase) {
+    case PSA2_SPI_FIRST:
+        first_fall(b, t_ns);
+        break;
+    case PSA2_SPI_SAMPLE_A:
+        sample_accel(b, t_ns);
+        break;
+    case PSA2_SPI_SAMPLE_T:
+        sample_temp(b, t_ns);
+        break;
+    case PSA2_SPI_REST:
+        end_xfer(b, t_ns);
+        break;
+    case PSA2_SPI_CST_UP:
+        cst_up(b, t_ns);
+        end_xfer(b, t_ns);
+        break;
+    case PSA2_SPI_IDLE:
+        break;
+    }
+}
+
+void psa2_spi_init(struct psa2 *b)
+{
+    b->spi.half = (struct clk){.hz = 2 * (int64_t)b->profile.sclk_hz, .div = 1};
+    sched_ev(&b->spi.ev, on_event, b);
+}
+
+void psa2_spi_stop(struct psa2 *b, int64_t t_ns)
+{
+    sched_cancel(b->sched, &b->spi.ev);
+    if (psa2_spi_busy(b) && b->spi.x.group == PSA2_TEMP) cst_up(b, t_ns);
+    b->spi.phase = PSA2_SPI_IDLE;
+}

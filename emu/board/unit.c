@@ -1,0 +1,77 @@
+#include "board/unit.h"
+
+#include "base/detmath.h"
+
+static double accel_signal(void *ctx, unsigned axis, int64_t t_ns)
+{
+    struct unit *u = ctx;
+    if (u->cfg.axis[axis].sensor == UNIT_NO_SENSOR) return 0.0;
+    double a_mps2[3];
+    unit_gravity_mps2(u, axis, t_ns, a_mps2);
+    return mems_out_v(&u->mems[axis], a_mps2, t_ns);
+}
+
+static double temp_degc(void *ctx, unsigned channel, int64_t t_ns)
+{
+    const struct unit *u = ctx;
+    (void)t_ns; /* constant until the thermal chamber comes */
+    return channel < UNIT_TEMPS ? u->cfg.temp_degc[channel] : 0.0;
+}
+
+static void on_frame(void *ctx, const struct psa2_frame *f, int64_t t_ns)
+{
+    const struct unit *u = ctx;
+    if (u->frame) u->frame(u->ctx, f, t_ns);
+}
+
+static void on_fault(void *ctx, uint16_t code, int64_t t_ns)
+{
+    const struct unit *u = ctx;
+    if (u->fault) u->fault(u->ctx, code, t_ns);
+}
+
+struct unit_cfg unit_default(const char *name)
+{
+    static const struct psa2_unit_cfg quiet = {.adc_noise_scale = 1.0, .temp_noise_scale = 1.0, .seed = 1, .serial = 1};
+    struct unit_cfg c = {.name = name, .board = quiet, .node = 5, .temp_degc = {25.0, 25.0, 25.0, 25.0}};
+    for (unsigned i = 0; i < UNIT_AXES; i++) c.board.afe[i] = afe_nominal(AFE_VOLTAGE);
+    return c;
+}
+
+void unit_init(struct unit *u, const struct unit_cfg *cfg, struct head *head, struct sched *s)
+{
+    static const char *const noise[UNIT_AXES] = {"mems.x", "mems.y", "mems.z"};
+    u->cfg = *cfg;
+    u->head = head;
+    u->ctx = NULL;
+    u->frame = NULL;
+    u->fault = NULL;
+    for (unsigned i = 0; i < UNIT_AXES; i++) {
+        const struct mems_cfg m = mems_cfg_si(&cfg->axis[i].mems, head->site.g_mps2);
+        mems_init(&u->mems[i], &m, rng_stream(cfg->board.seed, cfg->board.serial, noise[i]));
+        u->cos_alpha0[i] = det_cos(m.alpha0_rad);
+        u->sin_alpha0[i] = det_sin(m.alpha0_rad);
+    }
+    const struct psa2_io io = {
+        .ctx = u, .accel = accel_signal, .temp_degc = temp_degc, .frame = on_frame, .fault = on_fault};
+    const struct psa2_profile profile = cfg->profile ? *cfg->profile : psa2_profile_default();
+    psa2_init(&u->board, &profile, &cfg->board, &io, s);
+}
+
+/* The face turns the sensor's own axes; which of the unit's axes they are follows from its channel. */
+void unit_gravity_mps2(struct unit *u, unsigned axis, int64_t t_ns, double a_mps2[3])
+{
+    double mount[3];
+    double a[3];
+    head_gravity_mps2(u->head, t_ns, mount);
+    head_sensor_mps2(head_face(u->head, t_ns), u->cos_alpha0[axis], u->sin_alpha0[axis], mount, a);
+    for (unsigned i = 0; i < 3; i++) a_mps2[i] = a[(i + axis) % 3];
+}
+
+double unit_sensor_v(struct unit *u, unsigned axis, int64_t t_ns)
+{
+    if (u->cfg.axis[axis].sensor == UNIT_NO_SENSOR) return 0.0;
+    double a_mps2[3];
+    unit_gravity_mps2(u, axis, t_ns, a_mps2);
+    return mems_model_v(&u->mems[axis].cfg, a_mps2, t_ns);
+}

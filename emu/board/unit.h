@@ -1,0 +1,54 @@
+/* One unit of the bench: a PSA-2 board, the sensors on its three channels, and the dividing head they are mounted on.
+ *
+ * The unit wires sensors to the board (psa2_io.accel, psa2_io.temp_degc); who wants its frames sets the two callbacks. A
+ * sensor on channel X has the unit's axes (x, y, z), on Y (y, z, x), on Z (z, x, y). Several units may share a head. Owned
+ * by the caller, about 300 kB, never moved after unit_init. One thread. */
+#ifndef PSABENCH_BOARD_UNIT_H
+#define PSABENCH_BOARD_UNIT_H
+
+#include "board/psa2.h"
+#include "phys/head.h"
+#include "phys/mems.h"
+
+#define UNIT_AXES  3u
+#define UNIT_TEMPS 4u /* sensors X, Y, Z, converter board */
+
+enum unit_sensor { UNIT_NO_SENSOR, UNIT_MEMS }; /* without a sensor the channel is shorted: 0 V or 0 A */
+
+struct unit_axis_cfg {
+    enum unit_sensor sensor;
+    struct mems_g mems;
+};
+
+struct unit_cfg {
+    const char *name;                   /* kept by pointer */
+    const struct psa2_profile *profile; /* checked by the caller: psa2_profile_check(); NULL: "article" */
+    struct psa2_unit_cfg board;         /* afe, noise scales, seed, serial */
+    struct unit_axis_cfg axis[UNIT_AXES];
+    double temp_degc[UNIT_TEMPS];
+    uint8_t node; /* CAN node id, for those above */
+};
+
+struct unit {
+    struct unit_cfg cfg;
+    struct head *head;
+    struct psa2 board;
+    struct mems mems[UNIT_AXES];
+    double cos_alpha0[UNIT_AXES], sin_alpha0[UNIT_AXES];
+    void *ctx;
+    void (*frame)(void *ctx, const struct psa2_frame *f, int64_t t_ns);
+    void (*fault)(void *ctx, uint16_t code, int64_t t_ns);
+};
+
+/* A board of profile "article" at 25 degC with nominal chains, no sensor, no noise but the converters'. */
+struct unit_cfg unit_default(const char *name);
+
+void unit_init(struct unit *u, const struct unit_cfg *cfg, struct head *head, struct sched *s);
+
+/* Projections of gravity on the axes of the sensor of a channel: truth. */
+void unit_gravity_mps2(struct unit *u, unsigned axis, int64_t t_ns, double a_mps2[3]);
+
+/* Volts the sensor of a channel would give without noise: truth. */
+double unit_sensor_v(struct unit *u, unsigned axis, int64_t t_ns);
+
+#endif

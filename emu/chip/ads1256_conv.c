@@ -1,0 +1,169 @@
+#include "chip/ads1256_conv.h"
+
+static uint32_t get24(const struct ads1256 *a, enum ads1256_reg low)
+{
+    return a->value[low] | (uint32_t)a->value[low + 1] << 8 | (uint32_t)a->value[low + 2] << 16;
+}
+
+static void poke24(struct ads1256 *a, enum ads1256_reg low, uint32_t v)
+{
+    for (unsigned i = 0; i < 3; i++) reg_poke(&a->regs, low + i, (uint8_t)(v >> (8 * i)));
+}
+
+void ads1256_set_drdy(struct ads1256 *a, bool level, int64_t t_ns)
+{
+    if (level == a->drdy) return;
+    a->drdy = level;
+    reg_poke(&a->regs, ADS1256_STATUS, (uint8_t)((ads1256_value(a, ADS1256_STATUS) & ~ADS1256_STATUS_DRDY) | level));
+    a->io.drdy(a->io.ctx, level, t_ns);
+}
+
+static double pin_v(struct ads1256 *a, unsigned select, int64_t t_ns)
+{
+    const double v = a->io.ain_v(a->io.ctx, select & 8 ? ADS1256_AINCOM : select, t_ns);
+    if (!(ads1256_value(a, ADS1256_STATUS) & ADS1256_STATUS_BUFEN)) return v;
+    const double max_v = a->cfg.avdd_v - 2.0;
+    if (v >= 0.0 && v <= max_v) return v;
+    a->n.buffer_clipped++;
+    return v < 0.0 ? 0.0 : max_v;
+}
+
+/* Fraction of full scale for volts at the input of the uncalibrated path. */
+static double path_fs(const struct ads1256 *a, double vin_v)
+{
+    const double gain = (double)(1u << ads1256_pga_log2(a)) * (1.0 + a->cfg.gain_error);
+    return gain * (vin_v + a->cfg.offset_v) / (2.0 * a->cfg.vref_v);
+}
+
+static double noise_fs(struct ads1256 *a)
+{
+    const double rms_v = a->cfg.noise_scale * ads1256_noise_v(a->rate, ads1256_pga_log2(a));
+    return (double)(1u << ads1256_pga_log2(a)) * rms_v * rng_gauss(&a->noise) / (2.0 * a->cfg.vref_v);
+}
+
+static int64_t run_edge_ns(const struct ads1256 *a, int64_t tau)
+{
+    return clk_edge_ns(&a->clkin, a->start_tau + tau);
+}
+
+static int64_t ready_tau(const struct ads1256 *a, int64_t conversion)
+{
+    return ads1256_settle_tau(a->rate) + conversion * ads1256_period_tau(a->rate);
+}
+
+static void await_cell(struct ads1256 *a)
+{
+    sched_at(a->sched, &a->cell_ev, run_edge_ns(a, ads1256_cell_tau(&a->mean, a->rate, a->cell)));
+}
+
+static void await_ready(struct ads1256 *a)
+{
+    sched_at(a->sched, &a->ready_ev, run_edge_ns(a, ready_tau(a, a->ready)));
+}
+
+/* A run of conversions that began at CLKIN count start_tau: the first DRDY is t18 later. */
+static void start_run(struct ads1256 *a, int64_t start_tau)
+{
+    a->mode = ADS1256_RUNNING;
+    a->rate = a->rate_next;
+    a->start_tau = start_tau;
+    a->cell = a->ready = 0;
+    ads1256_mean_start(&a->mean, a->rate, a->cfg.cells_max);
+    await_cell(a);
+    await_ready(a);
+}
+
+void ads1256_halt(struct ads1256 *a, enum ads1256_mode mode, int64_t t_ns)
+{
+    sched_cancel(a->sched, &a->cell_ev);
+    sched_cancel(a->sched, &a->ready_ev);
+    sched_cancel(a->sched, &a->pulse_ev);
+    sched_cancel(a->sched, &a->cal_ev);
+    a->mode = mode;
+    ads1256_set_drdy(a, true, t_ns);
+}
+
+void ads1256_restart(struct ads1256 *a, int64_t t_ns)
+{
+    a->n.restarts++;
+    start_run(a, clk_count_at(&a->clkin, t_ns));
+}
+
+static void on_cell(void *ctx, int64_t t_ns)
+{
+    struct ads1256 *a = ctx;
+    const uint8_t mux = ads1256_value(a, ADS1256_MUX);
+    const double vin_v = pin_v(a, mux >> 4, t_ns) - pin_v(a, mux & 15, t_ns);
+    ads1256_mean_push(&a->mean, path_fs(a, vin_v));
+    a->cell++;
+    await_cell(a);
+}
+
+static int32_t convert(struct ads1256 *a)
+{
+    bool clipped = false;
+    const double raw = a->rate->alpha * (a->mean.out + noise_fs(a));
+    const int32_t ofc = (int32_t)(get24(a, ADS1256_OFC0) ^ 0x800000) - 0x800000;
+    const int32_t code = ads1256_code(raw, ofc, get24(a, ADS1256_FSC0), &clipped);
+    a->n.clipped += clipped;
+    return code;
+}
+
+/* The serial port's side of a new word: a read in progress goes on with the new one's bytes, each RDATAC word starts over. */
+static void offer_word(struct ads1256 *a)
+{
+    a->n.overruns += a->unread;
+    a->unread = true;
+    a->n.torn_reads += a->port == ADS1256_WORD && (a->word_left == 1 || a->word_left == 2);
+    if (a->rdatac) a->word_left = 3;
+    else if (a->port != ADS1256_WORD) a->word_left = 0;
+}
+
+static void on_ready(void *ctx, int64_t t_ns)
+{
+    struct ads1256 *a = ctx;
+    a->n.conversions++;
+    a->word = convert(a);
+    offer_word(a);
+    a->ready++;
+    if (a->rate != a->rate_next) /* DRATE changed without synchronisation: periods of the new length from here on */
+        start_run(a, a->start_tau + ready_tau(a, a->ready - 1) - ADS1256_START_TAU);
+    else await_ready(a);
+    sched_at(a->sched, &a->pulse_ev, run_edge_ns(a, ready_tau(a, a->ready) - ADS1256_PULSE_TAU));
+    ads1256_set_drdy(a, false, t_ns);
+}
+
+static void on_pulse(void *ctx, int64_t t_ns)
+{
+    ads1256_set_drdy(ctx, true, t_ns);
+}
+
+void ads1256_calibrate(struct ads1256 *a, enum ads1256_cal kind, int64_t t_ns)
+{
+    ads1256_halt(a, ADS1256_CALIBRATING, t_ns);
+    a->rate = a->rate_next;
+    a->cal = kind;
+    const int64_t end_tau = clk_count_at(&a->clkin, t_ns) + ads1256_cal_tau(a->rate, kind, ads1256_pga_log2(a));
+    a->start_tau = end_tau - ads1256_settle_tau(a->rate); /* the printed durations include the settling after it */
+    a->next_ok_ns = clk_edge_ns(&a->clkin, end_tau);
+    sched_at(a->sched, &a->cal_ev, run_edge_ns(a, 0));
+}
+
+static void on_cal(void *ctx, int64_t t_ns)
+{
+    struct ads1256 *a = ctx;
+    (void)t_ns;
+    a->n.calibrations++;
+    if (a->cal != ADS1256_SELFGCAL)
+        poke24(a, ADS1256_OFC0, (uint32_t)ads1256_cal_ofc(a->rate->alpha * (path_fs(a, 0.0) + noise_fs(a))));
+    if (a->cal != ADS1256_SELFOCAL) poke24(a, ADS1256_FSC0, ads1256_cal_fsc(a->rate, a->cfg.gain_error));
+    start_run(a, a->start_tau);
+}
+
+void ads1256_conv_init(struct ads1256 *a)
+{
+    sched_ev(&a->cell_ev, on_cell, a);
+    sched_ev(&a->ready_ev, on_ready, a);
+    sched_ev(&a->pulse_ev, on_pulse, a);
+    sched_ev(&a->cal_ev, on_cal, a);
+}

@@ -1,0 +1,268 @@
+#include "control/describe.h"
+
+static void add_count(cJSON *to, const char *name, uint64_t n)
+{
+    cJSON_AddNumberToObject(to, name, (double)n);
+}
+
+static void add_real(cJSON *to, const char *name, double v)
+{
+    cJSON_AddNumberToObject(to, name, v);
+}
+
+/* ---- commands */
+
+static const char *type_name(enum control_type t)
+{
+    static const char *const names[] = {[CONTROL_REAL] = "number",
+                                        [CONTROL_COUNT] = "integer",
+                                        [CONTROL_NAME] = "string",
+                                        [CONTROL_FACE] = "face",
+                                        [CONTROL_UNIT] = "unit"};
+    return names[t];
+}
+
+static void describe_arg(const struct control_arg *a, cJSON *list)
+{
+    cJSON *j = cJSON_CreateObject();
+    cJSON_AddStringToObject(j, "name", a->name);
+    cJSON_AddStringToObject(j, "type", type_name(a->type));
+    cJSON_AddBoolToObject(j, "optional", a->optional);
+    if (a->type == CONTROL_REAL || a->type == CONTROL_COUNT) {
+        add_real(j, "min", a->min);
+        add_real(j, "max", a->max);
+    }
+    cJSON_AddStringToObject(j, "what", a->what);
+    cJSON_AddItemToArray(list, j);
+}
+
+void describe_commands(const struct control *c, cJSON *to)
+{
+    cJSON *list = cJSON_AddArrayToObject(to, "commands");
+    for (unsigned i = 0; i < c->count; i++) {
+        const struct control_command *cmd = &c->table[i];
+        cJSON *j = cJSON_CreateObject();
+        cJSON_AddStringToObject(j, "name", cmd->name);
+        cJSON_AddStringToObject(j, "what", cmd->what);
+        cJSON *args = cJSON_AddArrayToObject(j, "args");
+        for (unsigned k = 0; k < CONTROL_ARGS_MAX && cmd->arg[k].name; k++) describe_arg(&cmd->arg[k], args);
+        cJSON_AddItemToArray(list, j);
+    }
+}
+
+/* ---- traffic */
+
+static void add_client(const struct control_client *k, cJSON *to)
+{
+    add_count(to, "delivered", k->delivered);
+    add_count(to, "taken", k->taken);
+    add_count(to, "dropped", k->dropped);
+    add_count(to, "overrun", k->overrun);
+    add_count(to, "refused", k->refused);
+}
+
+void describe_clients(const struct control_bench *b, cJSON *to)
+{
+    struct control_client k;
+    cJSON *list = cJSON_AddArrayToObject(to, "clients");
+    for (unsigned i = 0; b->client(b->ctx, i, &k); i++) {
+        cJSON *j = cJSON_CreateObject();
+        cJSON_AddStringToObject(j, "adapter", k.adapter);
+        cJSON_AddStringToObject(j, "name", k.name);
+        add_client(&k, j);
+        cJSON_AddItemToArray(list, j);
+    }
+    b->gone(b->ctx, &k);
+    add_client(&k, cJSON_AddObjectToObject(to, "gone"));
+}
+
+void describe_pace(const struct control_bench *b, cJSON *to)
+{
+    struct control_pace p = {0};
+    b->pace(b->ctx, &p);
+    cJSON *j = cJSON_AddObjectToObject(to, "pace");
+    cJSON_AddStringToObject(j, "name", p.name);
+    add_count(j, "turns", p.turns);
+    add_count(j, "late", p.late);
+    add_count(j, "slips", p.slips);
+    add_real(j, "p50_us", p.p50_us);
+    add_real(j, "p99_us", p.p99_us);
+    add_real(j, "p999_us", p.p999_us);
+    add_real(j, "max_us", p.max_us);
+    add_count(j, "frames", p.frames);
+    add_real(j, "frame_p50_us", p.frame_p50_us);
+    add_real(j, "frame_p99_us", p.frame_p99_us);
+    add_real(j, "frame_p999_us", p.frame_p999_us);
+    add_real(j, "frame_max_us", p.frame_max_us);
+}
+
+void describe_bus(const struct control_bench *b, cJSON *to, int64_t t_ns)
+{
+    const int64_t busy_ns = can_busy_ns(b->bus, t_ns);
+    cJSON *j = cJSON_AddObjectToObject(to, "bus");
+    add_count(j, "bitrate_hz", b->bus->cfg.bitrate_hz);
+    add_count(j, "data_bitrate_hz", b->bus->cfg.data_bitrate_hz);
+    add_count(j, "frames", b->bus->frames);
+    add_real(j, "load", t_ns > 0 ? (double)busy_ns / (double)t_ns : 0.0);
+}
+
+/* ---- units */
+
+void describe_units(const struct control_bench *b, cJSON *to)
+{
+    cJSON *list = cJSON_AddArrayToObject(to, "units");
+    for (unsigned i = 0; i < b->units; i++) {
+        const struct unit *u = b->unit[i];
+        cJSON *j = cJSON_CreateObject();
+        cJSON_AddStringToObject(j, "name", u->cfg.name);
+        add_count(j, "serial", u->cfg.board.serial);
+        add_count(j, "node", u->cfg.node);
+        cJSON_AddStringToObject(j, "profile", u->board.profile.name);
+        cJSON_AddBoolToObject(j, "ready", psa2_ready(&u->board));
+        cJSON_AddItemToArray(list, j);
+    }
+}
+
+static void add_ads1282(const struct ads1282_counters *k, cJSON *to)
+{
+    add_count(to, "conversions", k->conversions);
+    add_count(to, "overruns", k->overruns);
+    add_count(to, "torn_reads", k->torn_reads);
+    add_count(to, "bad_opcodes", k->bad_opcodes);
+    add_count(to, "refused", k->refused);
+    add_count(to, "gap_violations", k->gap_violations);
+    add_count(to, "restarts", k->restarts);
+    add_count(to, "clipped", k->clipped);
+    add_count(to, "realigned", k->realigned);
+}
+
+static void add_ads1256(const struct ads1256_counters *k, cJSON *to)
+{
+    add_count(to, "conversions", k->conversions);
+    add_count(to, "overruns", k->overruns);
+    add_count(to, "torn_reads", k->torn_reads);
+    add_count(to, "buffer_clipped", k->buffer_clipped);
+    add_count(to, "dropped", k->dropped);
+    add_count(to, "calibrations", k->calibrations);
+    add_count(to, "bad_opcodes", k->bad_opcodes);
+    add_count(to, "refused", k->refused);
+    add_count(to, "gap_violations", k->gap_violations);
+    add_count(to, "restarts", k->restarts);
+    add_count(to, "clipped", k->clipped);
+    add_count(to, "bad_drate", k->bad_drate);
+}
+
+static void add_regs(const struct reg_file *f, cJSON *to)
+{
+    add_count(to, "bad_register", f->bad_access);
+    add_count(to, "unmodelled_bit", f->unimp_access);
+    add_count(to, "read_only_write", f->ro_write);
+}
+
+static void add_node(const struct can_node *n, cJSON *to)
+{
+    add_count(to, "tx_frames", n->tx_frames);
+    add_count(to, "rx_frames", n->rx_frames);
+    add_count(to, "tx_overflow", n->tx_overflow);
+    add_count(to, "fd_refused", n->fd_refused);
+}
+
+void describe_unit_counters(const struct control_bench *b, unsigned unit, cJSON *to)
+{
+    static const char *const adc[] = {"adc_x", "adc_y", "adc_z"};
+    const struct psa2 *p = &b->unit[unit]->board;
+    cJSON *board = cJSON_AddObjectToObject(to, "board");
+    add_count(board, "frames", p->counters.frames);
+    add_count(board, "resets", p->counters.resets);
+    add_count(board, "requests", p->counters.requests);
+    add_count(board, "timeouts", p->counters.timeouts);
+    add_count(board, "overruns", p->counters.overruns);
+    add_count(board, "int_late", p->counters.int_late);
+    for (unsigned i = 0; i < 3; i++) {
+        cJSON *j = cJSON_AddObjectToObject(to, adc[i]);
+        add_ads1282(&p->adc[i].count, j);
+        add_regs(&p->adc[i].regs, j);
+    }
+    cJSON *temp = cJSON_AddObjectToObject(to, "adc_temp");
+    add_ads1256(&p->tadc.n, temp);
+    add_regs(&p->tadc.regs, temp);
+    if (b->node[unit]) add_node(b->node[unit], cJSON_AddObjectToObject(to, "can"));
+    cJSON *trace = cJSON_AddObjectToObject(to, "trace");
+    add_count(trace, "late", p->trace.late);
+    add_count(trace, "dropped", p->trace.dropped);
+}
+
+/* ---- truth */
+
+static void add_mems(const struct mems_g *m, cJSON *to)
+{
+    add_real(to, "u0_v", m->u0_v);
+    add_real(to, "kx_v_per_g", m->kx_v_per_g);
+    add_real(to, "ky_v_per_g", m->ky_v_per_g);
+    add_real(to, "kz_v_per_g", m->kz_v_per_g);
+    add_real(to, "kxy_v_per_g2", m->kxy_v_per_g2);
+    add_real(to, "kxx_v_per_g2", m->kxx_v_per_g2);
+    add_real(to, "kyy_v_per_g2", m->kyy_v_per_g2);
+    add_real(to, "alpha0_deg", m->alpha0_deg);
+    add_real(to, "drift_v_per_s", m->drift_v_per_s);
+    add_real(to, "noise_v_rthz", m->noise_v_rthz);
+    add_real(to, "reading_noise_v", m->reading_noise_v);
+}
+
+static void add_afe(const struct afe_cfg *a, cJSON *to)
+{
+    cJSON_AddStringToObject(to, "input", a->input == AFE_CURRENT ? "current" : "voltage");
+    add_real(to, "load_ohm", a->load_ohm);
+    add_real(to, "load_tol_ppm", a->load_tol_ppm);
+    add_real(to, "load_tc_ppm_per_k", a->load_tc_ppm_per_k);
+    add_real(to, "divider_ratio", a->divider_ratio);
+    add_real(to, "divider_tol_ppm", a->divider_tol_ppm);
+    add_real(to, "divider_tc_ppm_per_k", a->divider_tc_ppm_per_k);
+    add_real(to, "buffer_offset_v", a->buffer_offset_v);
+    add_real(to, "buffer_offset_tc_v_per_k", a->buffer_offset_tc_v_per_k);
+    add_real(to, "clip_v", a->clip_v);
+    add_real(to, "filter_hz", a->filter_hz);
+    add_real(to, "noise_v_rthz", a->noise_v_rthz);
+}
+
+static void add_unit_truth(struct unit *u, cJSON *to, int64_t t_ns)
+{
+    static const char *const axis[] = {"x", "y", "z"};
+    add_count(to, "serial", u->cfg.board.serial);
+    add_count(to, "node", u->cfg.node);
+    cJSON_AddStringToObject(to, "profile", u->board.profile.name);
+    add_real(to, "adc_noise_scale", u->cfg.board.adc_noise_scale);
+    add_real(to, "temp_noise_scale", u->cfg.board.temp_noise_scale);
+    add_real(to, "temp_adc_offset_v", u->cfg.board.temp_adc_offset_v);
+    add_real(to, "temp_adc_gain_error", u->cfg.board.temp_adc_gain_error);
+    cJSON *temps = cJSON_AddArrayToObject(to, "temp_degc");
+    for (unsigned i = 0; i < UNIT_TEMPS; i++) cJSON_AddItemToArray(temps, cJSON_CreateNumber(u->cfg.temp_degc[i]));
+    cJSON *axes = cJSON_AddObjectToObject(to, "axes");
+    for (unsigned i = 0; i < UNIT_AXES; i++) {
+        cJSON *j = cJSON_AddObjectToObject(axes, axis[i]);
+        const bool mems = u->cfg.axis[i].sensor == UNIT_MEMS;
+        cJSON_AddStringToObject(j, "sensor", mems ? "mems" : "none");
+        if (mems) add_mems(&u->cfg.axis[i].mems, j);
+        if (mems) add_real(j, "sensor_v", unit_sensor_v(u, i, t_ns));
+        add_afe(&u->cfg.board.afe[i], cJSON_AddObjectToObject(j, "afe"));
+    }
+}
+
+void describe_truth(const struct control_bench *b, cJSON *to, int64_t t_ns)
+{
+    cJSON_AddStringToObject(to, "scenario", b->scenario);
+    add_count(to, "seed", b->seed);
+    cJSON *site = cJSON_AddObjectToObject(to, "site");
+    add_real(site, "g_mps2", b->head->site.g_mps2);
+    cJSON *head = cJSON_AddObjectToObject(to, "head");
+    add_real(head, "angle_rad", head_angle_rad(b->head, t_ns));
+    add_real(head, "setting_error_arcsec_rms", b->head->cfg.setting_error_arcsec_rms);
+    add_real(head, "resolution_arcsec", b->head->cfg.resolution_arcsec);
+    add_real(head, "periodic_arcsec", b->head->cfg.periodic_arcsec);
+    add_real(head, "mount_error_arcsec_rms", b->head->cfg.mount_error_arcsec_rms);
+    add_real(head, "turn_s", b->head->cfg.turn_s);
+    cJSON *units = cJSON_AddObjectToObject(to, "units");
+    for (unsigned i = 0; i < b->units; i++) {
+        add_unit_truth(b->unit[i], cJSON_AddObjectToObject(units, b->unit[i]->cfg.name), t_ns);
+    }
+}

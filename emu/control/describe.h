@@ -1,0 +1,17 @@
+/* What the commands tell of the bench, as JSON. Reads only. */
+#ifndef PSABENCH_CONTROL_DESCRIBE_H
+#define PSABENCH_CONTROL_DESCRIBE_H
+
+#include "control/control.h"
+
+void describe_commands(const struct control *c, cJSON *to);
+void describe_clients(const struct control_bench *b, cJSON *to);
+void describe_pace(const struct control_bench *b, cJSON *to);
+void describe_bus(const struct control_bench *b, cJSON *to, int64_t t_ns);
+void describe_units(const struct control_bench *b, cJSON *to);
+void describe_unit_counters(const struct control_bench *b, unsigned unit, cJSON *to);
+
+/* Hidden parameters: the truth port alone may tell them. */
+void describe_truth(const struct control_bench *b, cJSON *to, int64_t t_ns);
+
+#endif

@@ -1,0 +1,119 @@
+#define _GNU_SOURCE /* accept4 */
+#include "link/ctl_sock.h"
+
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+struct ctl_client {
+    struct text_link io; /* first */
+    struct ctl_server *server;
+    bool due; /* a reply is */
+};
+
+enum { OUT_MAX = 1 << 20 };
+
+static void on_line(struct text_link *t, enum lines_result r, const char *line, size_t len, int64_t t_ns)
+{
+    struct ctl_client *c = (struct ctl_client *)t;
+    if (r == LINES_LINE && strspn(line, " \t\r") == len) return;
+    c->due = true;
+    c->server->line(c->server->ctx, c, r == LINES_LINE ? line : NULL, t_ns);
+}
+
+static bool on_ready(struct text_link *t)
+{
+    return !((struct ctl_client *)t)->due;
+}
+
+static void on_closed(struct text_link *t, int64_t t_ns)
+{
+    struct ctl_client *c = (struct ctl_client *)t;
+    (void)t_ns;
+    c->server->clients--;
+    c->server->gone(c->server->ctx, c);
+    t->link.gone = true;
+}
+
+static void on_release(struct link *l)
+{
+    text_link_free((struct text_link *)l);
+    free(l);
+}
+
+static const struct text_link_ops ops = {on_line, on_ready, NULL, on_closed};
+
+void ctl_reply(struct ctl_client *c, const char *line)
+{
+    c->due = false;
+    text_link_put(&c->io, line, strlen(line));
+    text_link_put(&c->io, "\n", 1);
+}
+
+static void on_connection(struct link *l, int64_t t_ns)
+{
+    struct ctl_server *s = (struct ctl_server *)l;
+    (void)t_ns;
+    const int fd = accept4(l->fd, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC);
+    if (fd < 0) return;
+    struct ctl_client *c = s->clients < CTL_CLIENTS_MAX ? calloc(1, sizeof *c) : NULL;
+    const struct text_link_cfg cfg = {
+        .fd = fd, .end = '\n', .line_max = CTL_LINE_MAX, .out_max = OUT_MAX, .out_high = OUT_MAX};
+    if (!c || !text_link_init(&c->io, &cfg, &ops)) {
+        free(c);
+        close(fd);
+        return;
+    }
+    c->server = s;
+    c->io.link.release = on_release;
+    s->clients++;
+    links_add_last(s->links, &c->io.link);
+}
+
+/* A path that nobody answers at is a leftover. 0 when it may be used. */
+static int clear_path(const struct sockaddr_un *a)
+{
+    struct stat st;
+    if (lstat(a->sun_path, &st) < 0) return 0;
+    if (!S_ISSOCK(st.st_mode)) return -EEXIST;
+    const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    if (fd < 0) return -errno;
+    const bool alive = connect(fd, (const struct sockaddr *)a, sizeof *a) == 0;
+    close(fd);
+    if (alive) return -EADDRINUSE;
+    unlink(a->sun_path);
+    return 0;
+}
+
+int ctl_listen(struct ctl_server *s, const char *path)
+{
+    struct sockaddr_un a = {.sun_family = AF_UNIX};
+    if (strlen(path) >= sizeof a.sun_path) return -ENAMETOOLONG;
+    strcpy(a.sun_path, path);
+    int err = clear_path(&a);
+    if (err) return err;
+    const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+    if (fd < 0) return -errno;
+    if (bind(fd, (struct sockaddr *)&a, sizeof a) < 0 || listen(fd, 8) < 0) {
+        err = -errno;
+        close(fd);
+        return err;
+    }
+    s->path = path;
+    s->listen = (struct link){.fd = fd, .want_read = true, .readable = on_connection};
+    links_add_last(s->links, &s->listen);
+    return 0;
+}
+
+void ctl_close(struct ctl_server *s)
+{
+    if (s->listen.fd < 0) return;
+    close(s->listen.fd);
+    unlink(s->path);
+    s->listen.fd = -1;
+    s->listen.gone = true;
+}

@@ -1,0 +1,44 @@
+#include "link/link.h"
+
+void links_add_first(struct links *ls, struct link *l)
+{
+    l->next = ls->first;
+    ls->first = l;
+}
+
+void links_add_last(struct links *ls, struct link *l)
+{
+    struct link **p = &ls->first;
+    while (*p) p = &(*p)->next;
+    l->next = NULL;
+    *p = l;
+}
+
+void links_reap(struct links *ls)
+{
+    struct link **p = &ls->first;
+    while (*p) {
+        struct link *l = *p;
+        if (!l->gone) {
+            p = &l->next;
+            continue;
+        }
+        *p = l->next;
+        if (l->release) l->release(l);
+    }
+}
+
+bool links_full(const struct links *ls)
+{
+    for (const struct link *l = ls->first; l; l = l->next) {
+        if (l->full && !l->gone) return true;
+    }
+    return false;
+}
+
+size_t links_pending(const struct links *ls)
+{
+    size_t n = 0;
+    for (const struct link *l = ls->first; l; l = l->next) n += l->gone ? 0 : l->pending;
+    return n;
+}

@@ -1,0 +1,136 @@
+#define _GNU_SOURCE /* ptsname_r, inotify */
+#include "link/pty.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <poll.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/inotify.h>
+#include <termios.h>
+#include <unistd.h>
+
+static int make_raw(int fd)
+{
+    struct termios tio;
+    if (tcgetattr(fd, &tio) < 0) return -errno;
+    cfmakeraw(&tio);
+    return tcsetattr(fd, TCSANOW, &tio) < 0 ? -errno : 0;
+}
+
+static void start_watch(struct pty *p)
+{
+    p->watch_id = inotify_add_watch(p->watch.fd, p->path, IN_OPEN | IN_CLOSE_WRITE | IN_CLOSE_NOWRITE);
+}
+
+/* Whether a program has the slave open. Without our own descriptor the kernel reports a hang-up when nobody has. */
+static bool in_use(struct pty *p)
+{
+    struct pollfd master = {.fd = p->line};
+    inotify_rm_watch(p->watch.fd, p->watch_id); /* what we do here is nobody's coming and going */
+    close(p->slave);
+    const bool used = poll(&master, 1, 0) < 1 || !(master.revents & POLLHUP);
+    p->slave = open(p->path, O_RDWR | O_NOCTTY | O_CLOEXEC);
+    if (!used) make_raw(p->slave); /* the last one to close takes the settings along */
+    if (!used) pty_discard(p);     /* what it has not read is not for the next one */
+    start_watch(p);
+    return used;
+}
+
+static void set_openers(struct pty *p, int openers, int64_t t_ns)
+{
+    const bool was = p->openers > 0;
+    p->openers = openers;
+    if (was != (openers > 0)) p->opened(p->ctx, openers > 0, t_ns);
+}
+
+/* The kernel merges equal events that follow each other, so two programs that close at once look like one: the count
+ * keeps the order of coming and going, and after each going the kernel is asked. */
+static void on_watch(struct link *l, int64_t t_ns)
+{
+    struct pty *p = (struct pty *)l;
+    _Alignas(struct inotify_event) char buf[4096];
+    const ssize_t n = read(l->fd, buf, sizeof buf);
+    bool closed = false;
+    for (ssize_t at = 0; at < n;) {
+        const struct inotify_event *e = (const struct inotify_event *)(const void *)(buf + at);
+        at += (ssize_t)(sizeof *e + e->len);
+        if (e->mask & IN_OPEN) set_openers(p, p->openers + 1, t_ns);
+        if (!(e->mask & (IN_CLOSE_WRITE | IN_CLOSE_NOWRITE))) continue;
+        closed = true;
+        if (p->openers > 0) set_openers(p, p->openers - 1, t_ns);
+    }
+    if (closed) set_openers(p, !in_use(p) ? 0 : p->openers ? p->openers : 1, t_ns);
+}
+
+/* Where a symbolic link points, "" for anything else. */
+static void points_to(const char *name, char *path, size_t cap)
+{
+    const ssize_t n = readlink(name, path, cap - 1);
+    path[n > 0 ? n : 0] = '\0';
+}
+
+/* A link to a pty is a leftover of ours; anything else is somebody's. */
+static int make_name(const char *path, const char *name)
+{
+    char old[64];
+    points_to(name, old, sizeof old);
+    if (strncmp(old, "/dev/pts/", 9) == 0) unlink(name);
+    return symlink(path, name) < 0 ? -errno : 0;
+}
+
+static int open_pair(struct pty *p)
+{
+    p->master = posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC | O_NONBLOCK);
+    if (p->master < 0) return -errno;
+    if (grantpt(p->master) < 0 || unlockpt(p->master) < 0) return -errno;
+    p->line = p->master;
+    const int err = ptsname_r(p->master, p->path, sizeof p->path);
+    if (err) return -err;
+    p->slave = open(p->path, O_RDWR | O_NOCTTY | O_CLOEXEC);
+    return p->slave < 0 ? -errno : make_raw(p->slave);
+}
+
+/* Watches who opens the slave; not fatal where inotify is not to be had. */
+static void watch(struct pty *p)
+{
+    p->watch = (struct link){.fd = inotify_init1(IN_NONBLOCK | IN_CLOEXEC), .want_read = true, .readable = on_watch};
+    if (p->watch.fd >= 0) start_watch(p);
+    if (p->watch.fd >= 0 && p->watch_id < 0) {
+        close(p->watch.fd);
+        p->watch.fd = -1;
+    }
+    if (p->watch.fd < 0) p->openers = 1;
+}
+
+int pty_open(struct pty *p, const char *name)
+{
+    *p = (struct pty){.master = -1, .slave = -1, .watch.fd = -1};
+    int err = open_pair(p);
+    if (!err && name) err = make_name(p->path, name);
+    if (err) {
+        pty_close(p);
+        return err;
+    }
+    p->name = name;
+    watch(p);
+    return 0;
+}
+
+void pty_discard(struct pty *p)
+{
+    tcflush(p->slave, TCIFLUSH);
+}
+
+void pty_close(struct pty *p)
+{
+    char now[64];
+    if (p->name) points_to(p->name, now, sizeof now);
+    if (p->name && strcmp(now, p->path) == 0) unlink(p->name); /* another emulator may have taken it over */
+    if (p->watch.fd >= 0) close(p->watch.fd);
+    if (p->slave >= 0) close(p->slave);
+    if (p->master >= 0) close(p->master);
+    p->watch.fd = p->slave = p->master = -1;
+    p->name = NULL;
+    p->watch.gone = true;
+}

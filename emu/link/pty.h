@@ -1,0 +1,33 @@
+/* A pseudo-terminal that stands for a serial port: raw, found under a link's name, and told who has it open.
+ *
+ * Our own descriptor of the slave stays open, so that the port and its settings outlive each client and the master never
+ * reads an error. Clients are counted by watching the slave's node; where that cannot be done one client is assumed. */
+#ifndef PSABENCH_LINK_PTY_H
+#define PSABENCH_LINK_PTY_H
+
+#include "link/link.h"
+
+#include <stdbool.h>
+
+struct pty {
+    struct link
+        watch; /* first: inotify on the slave's node; served before the master, so that news of a client precede its
+                          bytes */
+    int master, slave;
+    int line, watch_id; /* the master's descriptor, whoever owns it; inotify's number of the watch */
+    char path[64];      /* /dev/pts/N */
+    const char *name;   /* symbolic link to it, or NULL */
+    int openers;        /* clients that have the slave open */
+    void (*opened)(void *ctx, bool open, int64_t t_ns); /* first client came, last one left */
+    void *ctx;
+};
+
+/* Opens the pair; the caller adds the watch to the loop's links. name: symbolic link to make (an old link to a pty is
+ * replaced, anything else is refused with -EEXIST); may be
+ * NULL. 0, or -errno with nothing left behind. */
+int pty_open(struct pty *p, const char *name);
+
+void pty_discard(struct pty *p); /* what the slave has not read yet is thrown away */
+void pty_close(struct pty *p);   /* and removes the link */
+
+#endif

@@ -1,0 +1,40 @@
+#include "link/tcp_peer.h"
+
+#include <arpa/inet.h>
+#include <netinet/in.h>
+#include <stdbool.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <sys/socket.h>
+
+/* One row of /proc/net/tcp: "sl: LOCAL:PORT REMOTE:PORT ST TX:RX ...", addresses in network order as hexadecimal words. */
+static bool row_unread(const char *row, const struct sockaddr_in *peer, const struct sockaddr_in *own, long *unread)
+{
+    uint32_t local, remote;
+    unsigned local_port, remote_port, state;
+    unsigned long tx, rx;
+    if (sscanf(row, " %*u: %8x:%4x %8x:%4x %2x %8lx:%8lx", &local, &local_port, &remote, &remote_port, &state, &tx,
+               &rx) != 7) {
+        return false;
+    }
+    *unread = (long)rx;
+    return local == peer->sin_addr.s_addr && local_port == ntohs(peer->sin_port) && remote == own->sin_addr.s_addr &&
+           remote_port == ntohs(own->sin_port);
+}
+
+long tcp_peer_unread(int fd)
+{
+    struct sockaddr_in own, peer;
+    socklen_t own_len = sizeof own, peer_len = sizeof peer;
+    if (getsockname(fd, (struct sockaddr *)&own, &own_len) < 0) return -1;
+    if (getpeername(fd, (struct sockaddr *)&peer, &peer_len) < 0) return -1;
+    FILE *f = fopen("/proc/net/tcp", "re");
+    if (!f) return -1;
+    char row[256];
+    long unread = -1, found = -1;
+    while (found < 0 && fgets(row, sizeof row, f)) {
+        if (row_unread(row, &peer, &own, &unread)) found = unread;
+    }
+    fclose(f);
+    return found;
+}

@@ -1,0 +1,100 @@
+#include "trace/sampler.h"
+
+#include <string.h>
+
+static size_t min_size(size_t a, size_t b)
+{
+    return a < b ? a : b;
+}
+
+static void append(struct sampler *s, uint8_t byte, size_t n)
+{
+    while (n > 0) {
+        const size_t at = (s->head + s->len) % SAMPLER_RING;
+        const size_t run = min_size(n, SAMPLER_RING - at);
+        memset(s->ring + at, byte, run);
+        s->len += run;
+        n -= run;
+    }
+}
+
+/* Makes n samples of the present levels, as far as the ring has room. */
+static void emit(struct sampler *s, int64_t n)
+{
+    const int64_t room = (int64_t)(SAMPLER_RING - s->len);
+    const int64_t kept = n < room ? n : room;
+    if (kept > 0) {
+        append(s, s->level | s->gap, 1);
+        append(s, s->level, (size_t)kept - 1);
+        s->gap = 0;
+    }
+    if (kept < n) s->gap = SAMPLER_GAP;
+    s->dropped += (uint64_t)(n - kept);
+    s->next += n;
+}
+
+static void sample_until(struct sampler *s, int64_t t_ns)
+{
+    if (t_ns < s->clock.t0_ns) return;
+    const int64_t count = clk_count_at(&s->clock, t_ns);
+    if (count > s->next) emit(s, count - s->next);
+}
+
+static void change(void *ctx, unsigned sig, bool level, int64_t t_ns)
+{
+    struct sampler *s = ctx;
+    sample_until(s, t_ns); /* a sample at t_ns itself sees the new level */
+    for (unsigned i = 0; i < 3; i++)
+        if (s->sig[i] == sig) s->level = (uint8_t)((s->level & ~(1u << i)) | (unsigned)level << i);
+}
+
+static void advance(void *ctx, int64_t t_ns)
+{
+    sample_until(ctx, t_ns);
+}
+
+bool sampler_start(struct sampler *s, struct trace *t, const struct clk *clock)
+{
+    static const char *const name[3] = {"Int", "Data", "CLK"};
+    const struct clk own = *clock; /* may be that of the run before, in s itself */
+    memset(s, 0, offsetof(struct sampler, ring));
+    s->trace = t;
+    s->clock = own;
+    uint32_t mask = 0;
+    for (unsigned i = 0; i < 3; i++) {
+        const int sig = trace_find(t, name[i]);
+        if (sig < 0) return false;
+        s->sig[i] = (uint8_t)sig;
+        mask |= UINT32_C(1) << sig;
+    }
+    s->first = s->next = clk_count_at(&own, t->done_ns);
+    s->sink = (struct trace_sink){.mask = mask, .change = change, .advance = advance, .ctx = s};
+    trace_attach(t, &s->sink);
+    return true;
+}
+
+void sampler_stop(struct sampler *s)
+{
+    trace_detach(s->trace, &s->sink);
+}
+
+int64_t sampler_t0_ns(const struct sampler *s)
+{
+    return clk_edge_ns(&s->clock, s->first);
+}
+
+size_t sampler_take(struct sampler *s, uint8_t *buf, size_t cap)
+{
+    const size_t n = min_size(cap, s->len);
+    const size_t run = min_size(n, SAMPLER_RING - s->head);
+    memcpy(buf, s->ring + s->head, run);
+    memcpy(buf + run, s->ring, n - run);
+    s->head = (s->head + n) % SAMPLER_RING;
+    s->len -= n;
+    return n;
+}
+
+int64_t sampler_full_ns(const struct sampler *s)
+{
+    return clk_edge_ns(&s->clock, s->next + (int64_t)(SAMPLER_RING - s->len));
+}

@@ -1,0 +1,73 @@
+/* Named 1-bit signals, and who listens to them.
+ *
+ * A board asks trace_watched() before it computes an edge; without a sink nothing is computed. Edges may be reported out
+ * of order within TRACE_LAG_NS (a byte's edges are known when it ends, a frame's when it begins); sinks get them in
+ * order of time, then of report, and only real changes. One trace per unit. Fixed storage, no allocation, one thread.
+ *
+ * A listener that comes late hears the levels last reported: lines that change while nobody listens keep the level they
+ * had, until their next edge. So a board whose lines rest at fixed levels between transfers needs no catching up. */
+#ifndef PSABENCH_TRACE_TRACE_H
+#define PSABENCH_TRACE_TRACE_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#define TRACE_SIGNALS_MAX 32u
+#define TRACE_PENDING_MAX 16384u
+#define TRACE_LAG_NS      200000 /* longer than any byte or word on a board's lines */
+
+struct trace_sink {
+    uint32_t mask; /* bit i: wants signal i */
+    void (*change)(void *ctx, unsigned sig, bool level, int64_t t_ns);
+    void (*advance)(void *ctx, int64_t t_ns); /* nothing more will come before t_ns; may be NULL */
+    void *ctx;
+    struct trace_sink *next;
+};
+
+struct trace_edge {
+    int64_t t_ns;
+    uint32_t order;
+    uint8_t sig, level;
+};
+
+struct trace {
+    const char *name[TRACE_SIGNALS_MAX];
+    unsigned count;
+    uint32_t level;   /* as delivered, bit per signal */
+    uint32_t watched; /* union of the sinks' masks */
+    struct trace_sink *sinks;
+    struct trace_edge pending[TRACE_PENDING_MAX];
+    unsigned pending_count;
+    uint32_t order;
+    int64_t done_ns; /* delivered up to here */
+    uint32_t
+        late; /* edges reported behind done_ns: delivered at done_ns, counted; 0 unless a board breaks the window */
+    uint32_t dropped; /* pending was full */
+};
+
+void trace_init(struct trace *t);
+
+/* Adds a signal with its level at power-on; returns its number. The name is kept by pointer. */
+unsigned trace_add(struct trace *t, const char *name, bool level);
+
+/* Number of the signal of that name, or -1. */
+int trace_find(const struct trace *t, const char *name);
+
+void trace_attach(struct trace *t, struct trace_sink *s); /* the sink first hears the present levels, at t = done_ns */
+void trace_detach(struct trace *t,
+                  struct trace_sink *s); /* hears nothing more; harmless for one that is not attached */
+
+/* Whether anybody listens to one of the signals in mask. */
+static inline bool trace_watched(const struct trace *t, uint32_t mask)
+{
+    return (t->watched & mask) != 0;
+}
+
+/* Reports the level of a signal from t_ns on. Cheap no-op when nobody listens to it. */
+void trace_set(struct trace *t, unsigned sig, bool level, int64_t t_ns);
+
+/* Delivers everything up to and including t_ns: call with now - TRACE_LAG_NS while running (also while nobody listens, so
+ * that done_ns keeps up), with now at the end. Then tells every sink. Going back does nothing. */
+void trace_advance(struct trace *t, int64_t t_ns);
+
+#endif

@@ -1,0 +1,57 @@
+/* Writer of Value Change Dump (IEEE 1364-2005 clause 18): a trace sink that sigrok, PulseView, GTKWave and Surfer open.
+ *
+ * 1-bit wires only, no date, so that the same run gives the same bytes. Times are rounded down to the file's unit: order is
+ * kept and an edge stands less than one unit early. The unit is 10 ns unless told otherwise: a half period of CLK (250 ns)
+ * is then exact and of SClk (244.14 ns) within 4 %, no datasheet's set-up time (50 ns) collapses into one sample, and
+ * sigrok, which makes a sample of every unit, still loads 10 s in seconds (docs/waveforms.md has the figures).
+ *
+ * The caller owns the struct and the FILE. A failed write is remembered, told once, and everything after it is dropped: a
+ * full disk ends the recording, not the run. Fixed buffer, no allocation, one thread. */
+#ifndef PSABENCH_TRACE_VCD_H
+#define PSABENCH_TRACE_VCD_H
+
+#include "trace/trace.h"
+
+#include <stddef.h>
+#include <stdio.h>
+
+#define VCD_UNIT_NS 10u
+#define VCD_BUF     65536u
+
+struct vcd_cfg {
+    FILE *out;         /* open for writing; not closed here */
+    const char *scope; /* no spaces; sigrok drops it, viewers show it */
+    uint32_t unit_ns;  /* 1, 10, 100, 1000 ..., 100000000 */
+    uint32_t mask;     /* bit i: signal i; the signals must have been added before */
+};
+
+struct vcd { /* read-only outside vcd.c */
+    struct trace_sink sink;
+    struct trace *trace;
+    FILE *out;
+    int64_t unit_ns;
+    int64_t t_units;    /* last time written */
+    int64_t edge_units; /* time of the last change */
+    int64_t seen_units; /* nothing will change before this */
+    int error;          /* errno of the first write that failed */
+    bool told;
+    uint64_t changes;
+    size_t len;
+    char buf[VCD_BUF];
+};
+
+/* Writes the header and the present levels, then records every change. False, and nothing written, when unit_ns is no unit
+ * of VCD. A write that fails is reported by vcd_error(). */
+bool vcd_open(struct vcd *v, const struct vcd_cfg *cfg, struct trace *t);
+
+/* Puts all that was delivered into the file, with a closing time, so that it can be looked at while it grows. */
+void vcd_flush(struct vcd *v);
+
+/* Detaches and writes a closing time later than the last change (sigrok loses that change otherwise): t_ns, the end of the
+ * run up to which the trace has been advanced, or one unit after the change. Then flushes. */
+void vcd_close(struct vcd *v, int64_t t_ns);
+
+/* errno of the first failed write, once; 0 if there is nothing (new) to tell. */
+int vcd_error(struct vcd *v);
+
+#endif

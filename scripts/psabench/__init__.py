@@ -1,0 +1,18 @@
+"""Host side of psabench: converter boards over CAN and the line port, instruments, calibration procedures.
+
+    from psabench import open_rig
+
+    with open_rig("quiet") as rig:
+        rig.unit.register("x", 1)           # CONFIG0 of the converter of channel X
+        rig.unit.stream(100).axis("x")      # volts at the load, shape (100,)
+
+Conventions, everywhere: SI inside, the unit at the end of a name (u_v, t_s, angle_deg); voltages are at the board's
+load resistors, before its divider; g is the local gravity, coefficients are per local g; time is the bench's, seconds
+since power-on, simulated or real. Raw integers end in `frames` and `lineport`.
+
+Everything raises `errors.BenchError` or one of its kinds when the bench is at fault, `ValueError` for bad arguments.
+"""
+
+from psabench.rig import Rig, open_rig
+
+__all__ = ["Rig", "open_rig"]

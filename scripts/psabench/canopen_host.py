@@ -1,0 +1,106 @@
+"""CANopen services (NMT, SDO) over a `CanHost`. The only file that imports python-canopen.
+
+python-canopen waits for answers in threads of its own; here the answer is received where the caller waits, so that it
+also works while simulated time stands still between our own steps.
+"""
+
+from __future__ import annotations
+
+import queue
+from pathlib import Path
+from typing import Any
+
+import canopen
+from canopen.sdo.client import SdoClient
+from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
+
+from psabench.can_host import CanHost
+from psabench.errors import DeviceError, LinkError
+
+ANSWER_S = 1.0  # bench time: the controller may have to wait for a conversion before it touches a register
+
+
+class _Network(canopen.Network):
+    """python-canopen's network, sending and receiving through a CanHost."""
+
+    def __init__(self, host: CanHost) -> None:
+        super().__init__()
+        self.host = host
+        host.listeners.append(lambda m: self.notify(m.arbitration_id, m.data, m.timestamp))
+
+    def send_message(self, can_id: int, data: bytes, remote: bool = False) -> None:
+        if remote:
+            raise ValueError("no remote frames on this bus: several transports lose them")
+        self.host.send(can_id, bytes(data))
+
+
+class _Sdo(SdoClient):
+    """An SDO client that lets the bench's time pass while it waits."""
+
+    def __init__(self, node_id: int, od: canopen.ObjectDictionary, host: CanHost) -> None:
+        super().__init__(0x600 + node_id, 0x580 + node_id, od)  # type: ignore[no-untyped-call]
+        self.host = host
+
+    def request_response(self, sdo_request: bytes) -> bytes:
+        """As python-canopen's, but no answer that was already on its way (to somebody else) is taken for ours."""
+        while self.host.receive(0.0):
+            pass
+        answer: bytes = super().request_response(sdo_request)  # type: ignore[no-untyped-call]
+        return answer
+
+    def read_response(self) -> bytes:
+        responses: queue.Queue[bytes] = self.responses
+        if not self.host.pump_until(lambda: not responses.empty(), ANSWER_S):
+            raise SdoCommunicationError(f"no SDO answer within {ANSWER_S:g} s")
+        response = responses.get()
+        if response[0] == 0x80:
+            raise SdoAbortedError(int.from_bytes(response[4:8], "little"))
+        return response
+
+
+class CanopenNode:
+    """One node: objects by index and subindex, and its NMT state.
+
+    Raises DeviceError with the node's abort code, LinkError when it does not answer.
+    """
+
+    def __init__(self, host: CanHost, node_id: int, eds: Path) -> None:
+        self.host = host
+        self.node_id = node_id
+        network = _Network(host)
+        remote = canopen.RemoteNode(node_id, canopen.import_od(str(eds), node_id))
+        network.add_node(remote)
+        self._od = remote.object_dictionary
+        self._sdo = _Sdo(node_id, self._od, host)
+        self._sdo.network = network
+        network.subscribe(0x580 + node_id, self._sdo.on_response)
+
+    def names(self, index: int) -> dict[int, str]:
+        """Sub-indices of an object (without 0) and their names, from the EDS."""
+        entry = self._od[index]
+        subs = {} if isinstance(entry, canopen.objectdictionary.ODVariable) else entry.subindices
+        return {sub: str(v.name) for sub, v in subs.items() if sub}
+
+    def nmt(self, command: int) -> None:
+        """01h start, 02h stop, 80h pre-operational, 81h reset node, 82h reset communication (CiA 301)."""
+        self.host.send(0x000, bytes([command, self.node_id]))
+
+    def read(self, index: int, sub: int = 0) -> Any:
+        """Value of an object, typed as the EDS says."""
+        variable = self._od.get_variable(index, sub)
+        data = self._call(f"read {index:04X}h:{sub}", self._sdo.upload, index, sub)
+        return variable.decode_raw(data) if variable is not None else data
+
+    def write(self, index: int, sub: int, value: int | float | str) -> None:
+        variable = self._od.get_variable(index, sub)
+        if variable is None:
+            raise DeviceError(f"write {index:04X}h:{sub}", 0x06020000, "no such object in the EDS")
+        self._call(f"write {index:04X}h:{sub} = {value}", self._sdo.download, index, sub, variable.encode_raw(value))
+
+    def _call(self, what: str, transfer: Any, *args: Any) -> Any:
+        try:
+            return transfer(*args)
+        except SdoAbortedError as e:
+            raise DeviceError(f"node {self.node_id}: {what}", e.code, str(e).partition(",")[2].strip()) from e
+        except SdoCommunicationError as e:
+            raise LinkError(f"node {self.node_id}: {what}: {e}; is it powered and on this bus?") from e

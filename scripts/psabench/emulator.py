@@ -1,0 +1,156 @@
+"""Start and stop the emulator, and learn where its endpoints are.
+
+The emulator prints one `ready key=value ...` line per endpoint and `ready all` at the end; ports are chosen by the
+kernel (`socketcand:0`), so any number of emulators run side by side.
+"""
+
+from __future__ import annotations
+
+import os
+import selectors
+import signal
+import subprocess
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from types import TracebackType
+
+from psabench.errors import BadInput, BenchError
+
+START_S = 20.0  # patience for "ready all": a bare emulator needs milliseconds, one under sanitizers in a guest seconds
+STOP_S = 10.0
+
+
+def find_emulator() -> Path:
+    """Path of psa-emu: $PSA_EMU, the build tree of this checkout, or the PATH. Raises BadInput."""
+    named = os.environ.get("PSA_EMU")
+    here = Path(__file__).resolve().parents[2] / "build" / "psa-emu"
+    on_path = [Path(d) / "psa-emu" for d in os.environ.get("PATH", "").split(os.pathsep) if d]
+    for candidate in [Path(named)] if named else [here, *on_path]:
+        if os.access(candidate, os.X_OK):
+            return candidate
+    where = f"PSA_EMU={named}" if named else f"{here} or on the PATH"
+    raise BadInput(f"psa-emu: not found at {where}; `make` builds it")
+
+
+class Emulator:
+    """A running psa-emu: `with Emulator(["quiet.yaml"], cans=["socketcand:0"], pace="step") as emu: ...`.
+
+    `endpoints` holds one dict per `ready` line, e.g. {"can": "socketcand", "host": "127.0.0.1", "port": "40123"}.
+    """
+
+    def __init__(
+        self,
+        scenario: str | Path | None = None,
+        *,
+        cans: Sequence[str] = ("socketcand:0",),
+        pace: str = "step",
+        seed: int | None = None,
+        control: bool = True,
+        truth: bool = False,
+        extra: Sequence[str | Path] = (),
+    ) -> None:
+        self._dir = tempfile.TemporaryDirectory(prefix="psabench-")
+        self.directory = Path(self._dir.name)
+        self.control_path = self.directory / "control" if control else None
+        self.truth_path = self.directory / "truth" if truth else None
+        self.argv = [str(find_emulator()), *([str(scenario)] if scenario else []), "--pace", pace]
+        for can in cans:
+            self.argv += ["--can", can]
+        if seed is not None:
+            self.argv += ["--seed", str(seed)]
+        if self.control_path:
+            self.argv += ["--control", str(self.control_path)]
+        if self.truth_path:
+            self.argv += ["--truth", str(self.truth_path)]
+        self.argv += [str(x) for x in extra]
+        self.endpoints: list[dict[str, str]] = []
+        self._stderr = (self.directory / "stderr").open("w+b")
+        self._process: subprocess.Popen[bytes] | None = None
+
+    def __enter__(self) -> Emulator:
+        self._process = subprocess.Popen(
+            self.argv,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=self._stderr,
+            start_new_session=True,  # a Ctrl-C meant for the procedure must not kill the bench under it
+        )
+        try:
+            self._read_ready()
+        except BaseException:
+            self.stop()
+            raise
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, e: BaseException | None, tb: TracebackType | None) -> None:
+        self.stop()
+
+    @property
+    def pid(self) -> int:
+        assert self._process is not None
+        return self._process.pid
+
+    def signal(self, number: int) -> None:
+        """Send it a signal, if it still runs."""
+        assert self._process is not None
+        self._process.send_signal(number)
+
+    def endpoint(self, **wanted: str) -> dict[str, str]:
+        """The first endpoint with these values, e.g. endpoint(can="slcan"). Raises BenchError if there is none."""
+        for e in self.endpoints:
+            if all(e.get(k) == v for k, v in wanted.items()):
+                return e
+        raise BenchError(f"emulator has no endpoint {wanted}; it has {self.endpoints}")
+
+    def messages(self) -> str:
+        """What the emulator has written to stderr so far."""
+        self._stderr.flush()
+        return (self.directory / "stderr").read_text(errors="replace") if self.directory.exists() else ""
+
+    def wait(self, timeout_s: float) -> int:
+        """Exit status of an emulator that ends by itself (`--for`). Raises BenchError when it does not."""
+        assert self._process is not None
+        try:
+            return self._process.wait(timeout_s)
+        except subprocess.TimeoutExpired:
+            raise BenchError(f"emulator still runs after {timeout_s:g} s: {' '.join(self.argv)}") from None
+
+    def stop(self) -> int:
+        """Ends it with SIGTERM (it closes its files), by force if it hangs; returns the exit status."""
+        status = -1
+        if self._process is not None:
+            if self._process.poll() is None:
+                self._process.send_signal(signal.SIGTERM)
+            try:
+                status = self._process.wait(STOP_S)
+            except subprocess.TimeoutExpired:
+                self._process.kill()
+                status = self._process.wait()
+            if self._process.stdout:
+                self._process.stdout.close()
+        self._stderr.close()
+        self._dir.cleanup()
+        return status
+
+    def _read_ready(self) -> None:
+        assert self._process is not None
+        assert self._process.stdout is not None
+        deadline = time.monotonic() + START_S
+        text = b""
+        fd = self._process.stdout.fileno()
+        with selectors.DefaultSelector() as ready:
+            ready.register(fd, selectors.EVENT_READ)
+            while b"ready all\n" not in text:
+                if not ready.select(max(0.0, deadline - time.monotonic())):
+                    raise BenchError(f"emulator not ready after {START_S:g} s: {' '.join(self.argv)}")
+                chunk = os.read(fd, 4096)
+                if not chunk:
+                    bad_input = self._process.wait() == BadInput.exit_status
+                    words = self.messages().strip() or f"emulator ended: {' '.join(self.argv)}"
+                    raise BadInput(words) if bad_input else BenchError(words)
+                text += chunk
+        for line in text.decode().splitlines():
+            if line.startswith("ready ") and line != "ready all":
+                self.endpoints.append(dict(w.split("=", 1) for w in line.split()[1:]))

@@ -1,0 +1,38 @@
+"""What can go wrong, and the exit status each kind gives the command line.
+
+Every message says what, where, and what would be right. Bad arguments of functions are plain `ValueError`.
+"""
+
+from __future__ import annotations
+
+
+class BenchError(Exception):
+    """A device or the bench failed; the base of all others."""
+
+    exit_status = 3
+
+
+class BadInput(BenchError):
+    """The user's input (file, option, name) cannot be used."""
+
+    exit_status = 2
+
+
+class LinkError(BenchError):
+    """A link to the bench is missing, was closed, or lost something."""
+
+
+class ControlError(BenchError):
+    """The emulator's control socket refused a command; nothing has changed."""
+
+    def __init__(self, command: str, code: str, text: str) -> None:
+        super().__init__(f"{command}: {text} ({code})")
+        self.code = code
+
+
+class DeviceError(BenchError):
+    """The board refused an access: CiA 301 abort code, with the board's own words where it has any."""
+
+    def __init__(self, what: str, abort_code: int, text: str) -> None:
+        super().__init__(f"{what}: abort {abort_code:08X}h, {text}")
+        self.abort_code = abort_code

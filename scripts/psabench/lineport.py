@@ -1,0 +1,231 @@
+"""The line port: sampled bytes of INT, DATA and CLK to frames, as a bit-bang adapter or the emulator's pty gives them.
+
+A byte is one sample of the three lines, bit 0 INT, bit 1 DATA, bit 2 CLK; bit 7 says that samples were lost just before
+it. A frame lasts while INT is low; its bits are the levels of DATA where CLK has risen, least significant bit of the
+word with the lowest address first, words 4 CLK periods apart (docs/lineport.md). Time is the count of samples: sample k
+of an unbroken stream stands at t0_s + k / sample_hz.
+
+Needs numpy only. Whatever the bytes are, nothing is raised and memory stays bounded: what is no frame is counted.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+INT, DATA, CLK, GAP = 0x01, 0x02, 0x04, 0x80
+SAMPLE_HZ = 8_000_000.0
+WORDS = 4
+PAUSE_CLK = 4  # CLK periods between words (article, protocol of exchange)
+BLOCK = 1 << 20  # samples decoded at once: bounds the memory a call needs
+
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LineFormat:
+    """What the decoder must know of the board and of the adapter.
+
+    word_bits: 16, 24 or 32. sample_hz: of the adapter. period_s: nominal spacing of frames, None if it is not known
+    (then nothing counts as lost, late or early). tolerance_s: how far from that spacing a frame still is in time.
+    """
+
+    word_bits: int = 32
+    sample_hz: float = SAMPLE_HZ
+    period_s: float | None = 1e-3
+    tolerance_s: float = 20e-6
+
+    def __post_init__(self) -> None:
+        if self.word_bits not in (16, 24, 32):
+            raise ValueError(f"word_bits is {self.word_bits}; a PSA-2 sends words of 16, 24 or 32 bits")
+        if not self.sample_hz > 0:
+            raise ValueError(f"sample_hz is {self.sample_hz}; it must be positive")
+        if self.period_s is not None and not 0 <= self.tolerance_s < self.period_s / 2:
+            raise ValueError(f"tolerance_s is {self.tolerance_s}; it must be below half of period_s = {self.period_s}")
+
+    @property
+    def bits(self) -> int:
+        return WORDS * self.word_bits
+
+
+@dataclass(slots=True)
+class Counts:
+    """What came through, and what did not, since the decoder was made.
+
+    lost: frames missing by the time between two INT falls; torn: INT low without exactly the bits and pauses of a
+    frame, or with lost samples in it; late, early: frames further than tolerance_s from where the one before lets
+    expect them; gaps: places where the adapter lost samples (no time is known across them, so nothing counts as lost,
+    late or early there).
+    """
+
+    samples: int = 0
+    frames: int = 0
+    torn: int = 0
+    lost: int = 0
+    late: int = 0
+    early: int = 0
+    gaps: int = 0
+
+    def __str__(self) -> str:
+        return " ".join(f"{f.name}={getattr(self, f.name)}" for f in fields(self))
+
+
+@dataclass(frozen=True, slots=True)
+class Frames:
+    """n frames in order: first (n) and last (n) sample with INT low .. high again, words (n, 4) as sent, unsigned."""
+
+    fall: Ints
+    rise: Ints
+    words: NDArray[np.uint32]
+
+    def __len__(self) -> int:
+        return len(self.fall)
+
+    def signed(self, word_bits: int) -> NDArray[np.int32]:
+        """Words (n, 4) as two's complement of word_bits."""
+        shift = np.int32(32 - word_bits)
+        return (self.words << shift.astype(np.uint32)).view(np.int32) >> shift
+
+
+def concat(parts: Iterable[Frames]) -> Frames:
+    """One `Frames` of many."""
+    p = [_empty(), *parts]
+    return Frames(
+        np.concatenate([f.fall for f in p]), np.concatenate([f.rise for f in p]), np.concatenate([f.words for f in p])
+    )
+
+
+def _empty() -> Frames:
+    return Frames(np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, WORDS), np.uint32))
+
+
+class LineDecoder:
+    """Bytes in any pieces to frames; the pieces make no difference to the result."""
+
+    def __init__(self, fmt: LineFormat | None = None) -> None:
+        self.fmt = fmt or LineFormat()
+        self.counts = Counts()
+        self._last = 0  # sample before the block; INT low: a frame under way at the start is not taken for one
+        self._fall = -1  # INT fall of the frame under way, -1: none
+        self._clk: Ints = np.empty(0, np.int64)  # its bits so far: sample,
+        self._bit: NDArray[np.uint8] = np.empty(0, np.uint8)  # and level
+        self._gap_at = -1  # last gap
+        self._prev_fall = -1  # INT fall of the frame before, -1: none
+
+    def feed(self, data: bytes | bytearray | memoryview) -> Frames:
+        """Frames completed by these samples."""
+        x = np.frombuffer(data, np.uint8)
+        return concat(self._block(x[i : i + BLOCK]) for i in range(0, len(x), BLOCK))
+
+    def _block(self, x: NDArray[np.uint8]) -> Frames:
+        base = self.counts.samples
+        self.counts.samples += len(x)
+        before = np.concatenate(([np.uint8(self._last)], x[:-1]))
+        self._last = int(x[-1])
+        # 9 bytes of 10 are the idle line: everything below works on the few that differ from the one before
+        at = np.flatnonzero((x != before) | (x >= GAP))
+        now, changed = x[at], x[at] ^ before[at]
+        at = at.astype(np.int64) + base
+        low = (now & INT) == 0
+        fall = at[(changed & INT != 0) & low]
+        rise = at[(changed & INT != 0) & ~low]
+        up = (changed & CLK != 0) & (now & CLK != 0)
+        gaps = at[now & GAP != 0]
+        self.counts.gaps += len(gaps)
+        return self._frames(fall, rise, at[up], now[up] & DATA != 0, gaps)
+
+    def _frames(self, fall: Ints, rise: Ints, clk: Ints, bit: NDArray[np.bool_], gaps: Ints) -> Frames:
+        """Pairs INT falls with rises, over what is left of the block before, and keeps what is unfinished."""
+        gaps = np.concatenate(([self._gap_at], gaps)) if self._gap_at >= 0 else gaps
+        self._gap_at = int(gaps[-1]) if len(gaps) else -1
+        self._timing(fall, gaps)
+        clk = np.concatenate((self._clk, clk))
+        level = np.concatenate((self._bit, bit.astype(np.uint8)))
+        if self._fall >= 0:
+            fall = np.concatenate(([self._fall], fall))
+        if len(rise) and (not len(fall) or rise[0] < fall[0]):
+            rise = rise[1:]  # INT was low when the recording began
+        whole = len(rise)
+        self._keep(fall[whole:], clk, level)
+        return self._decode(fall[:whole], rise, clk, level, gaps)
+
+    def _keep(self, fall: Ints, clk: Ints, level: NDArray[np.uint8]) -> None:
+        """The frame under way. One bit too many proves it torn, so no more than that is kept."""
+        self._fall = int(fall[0]) if len(fall) else -1
+        first = int(np.searchsorted(clk, self._fall)) if len(fall) else len(clk)
+        self._clk = clk[first : first + self.fmt.bits + 1]
+        self._bit = level[first : first + self.fmt.bits + 1]
+
+    def _decode(self, fall: Ints, rise: Ints, clk: Ints, level: NDArray[np.uint8], gaps: Ints) -> Frames:
+        """Words of those INT-low intervals that hold exactly a frame; the others are torn."""
+        bits = self.fmt.bits
+        first = np.searchsorted(clk, fall)
+        good = np.searchsorted(clk, rise) - first == bits
+        good &= np.searchsorted(gaps, fall) == np.searchsorted(gaps, rise, "right")
+        index = first[good, None] + np.arange(bits)
+        steady = self._steady(clk[index])
+        good[good] = steady
+        index = index[steady]
+        sent = level[index].reshape(-1, WORDS, self.fmt.word_bits).astype(np.uint64)
+        weight = np.uint64(1) << np.arange(self.fmt.word_bits, dtype=np.uint64)
+        words = (sent * weight).sum(axis=2).astype(np.uint32)
+        self.counts.frames += len(words)
+        self.counts.torn += len(fall) - len(words)
+        return Frames(fall[good], rise[good], words)
+
+    def _steady(self, at: Ints) -> NDArray[np.bool_]:
+        """Whether the CLK rises (n, bits) stand as in a frame: every period within half a period (or one sample) of the
+        mean, every pause PAUSE_CLK longer. The mean is the frame's own, so that nothing depends on either clock's rate.
+        """
+        periods = np.ones(self.fmt.bits - 1, np.int64)
+        periods[self.fmt.word_bits - 1 :: self.fmt.word_bits] += PAUSE_CLK
+        mean = (at[:, -1] - at[:, 0]) / periods.sum()
+        error = np.abs(np.diff(at, axis=1) - mean[:, None] * periods)
+        limit = np.maximum(mean / 2, 1.0)
+        steady: NDArray[np.bool_] = (error <= limit[:, None]).all(axis=1)
+        return steady
+
+    def _timing(self, fall: Ints, gaps: Ints) -> None:
+        """Counts what is missing or out of time between INT falls, torn frames included: they were sent."""
+        if not len(fall):
+            return
+        if self._prev_fall >= 0:
+            fall = np.concatenate(([self._prev_fall], fall))
+        self._prev_fall = int(fall[-1])
+        if self.fmt.period_s is None or len(fall) < 2:
+            return
+        known = np.searchsorted(gaps, fall[:-1], "right") == np.searchsorted(gaps, fall[1:], "right")
+        spacing_s = np.diff(fall)[known] / self.fmt.sample_hz
+        steps = np.maximum(np.rint(spacing_s / self.fmt.period_s), 1)
+        off_s = spacing_s - steps * self.fmt.period_s
+        slack_s = self.fmt.tolerance_s + 1 / self.fmt.sample_hz
+        self.counts.lost += int((steps - 1).sum())
+        self.counts.late += int((off_s > slack_s).sum())
+        self.counts.early += int((off_s < -slack_s).sum())
+
+
+def open_line(path: Path) -> BinaryIO:
+    """The line port at a path (pty or file), unbuffered. Raises OSError."""
+    return os.fdopen(os.open(path, os.O_RDONLY | os.O_NOCTTY), "rb", buffering=0)
+
+
+def decode_stream(stream: BinaryIO, decoder: LineDecoder) -> Iterator[Frames]:
+    """Frames of a line port or file opened unbuffered, as they come, to its end: of the file, or of the emulator."""
+    while data := _read(stream):
+        yield decoder.feed(data)
+
+
+def _read(stream: BinaryIO) -> bytes:
+    try:
+        return stream.read(BLOCK)
+    except OSError as e:
+        if e.errno == errno.EIO:  # a pty whose other end has gone
+            return b""
+        raise

@@ -1,0 +1,62 @@
+"""What every procedure returns, so that one report serves them all."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from psabench.bench import Face, Reading
+from psabench.estimate.uncertainty import Correlation, Estimate
+
+Array = npt.NDArray[np.float64]
+
+DEG = 180.0 / math.pi
+
+
+def option(default: Any, unit: str, text: str) -> Any:
+    """A field of a parameter dataclass, with what `--help` says of it."""
+    return field(default=default, metadata={"unit": unit, "help": text})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FaceSeries:
+    """What was fitted on one face beside its fit, for plots: positions (series) or single readings (turns)."""
+
+    face: Face
+    alpha_deg: Array  # (m,)
+    u_v: Array  # (m,)
+    residual_v: Array  # (m,)
+    realisation: npt.NDArray[np.int64]  # (m,)
+    c_v: Array | None  # (5,), None when the procedure fits no series
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ProcedureResult:
+    """Estimates with their confidence, and everything a report shows."""
+
+    procedure: str
+    axis: str
+    g_mps2: float
+    readings: tuple[Reading, ...]
+    series: tuple[FaceSeries, ...]
+    estimates: tuple[Estimate, ...]
+    correlation: Correlation
+    residual_rms_v: float
+    drift: Estimate | None  # V/s; None when no drift column was fitted
+    notes: tuple[str, ...]  # warnings a reader needs to judge the numbers
+
+    def get(self, name: str) -> Estimate:
+        """The estimate of that name; raises KeyError with the names there are."""
+        for e in self.estimates:
+            if e.name == name:
+                return e
+        raise KeyError(f"{self.procedure} has no estimate {name}; it has {', '.join(e.name for e in self.estimates)}")
+
+    @property
+    def duration_s(self) -> float:
+        """Bench time from the first reading to the last."""
+        return self.readings[-1].t_s - self.readings[0].t_s if self.readings else 0.0

@@ -1,0 +1,167 @@
+"""What the Fourier procedure and the reversal share: a series of equal steps on one face, and its fit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import groupby
+
+import numpy as np
+import numpy.typing as npt
+
+from psabench.bench import Bench, Face, Reading, Watch
+from psabench.estimate import harmonics
+from psabench.estimate.uncertainty import Estimate, lack_of_fit_p
+from psabench.estimate.uncertainty import estimate as make_estimate
+from psabench.procedures.result import FaceSeries, option
+
+LACK_OF_FIT_P = 1e-3  # below this the report warns
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SeriesParams:
+    """A series of the article: 5 realisations of 80 positions, 5 deg apart (400 deg of turn)."""
+
+    axis: str = option("x", "", "channel of the board that the accelerometer is wired to: x, y or z")
+    realisations: int = option(5, "", "how often the whole series is repeated")
+    positions: int = option(80, "", "positions in one series")
+    step_deg: float = option(5.0, "deg", "turn of the head between positions")
+    readings: int = option(1, "", "readings at each position")
+    dwell_s: float = option(0.0, "s", "extra rest at each position before it is read")
+    drift: bool = option(True, "", "fit a zero signal that drifts linearly in time")
+
+    def __post_init__(self) -> None:
+        if self.axis not in ("x", "y", "z"):
+            raise ValueError(f"axis is {self.axis!r}; it must be x, y or z")
+        for name, least in (("realisations", 1), ("positions", 6), ("readings", 1)):
+            if getattr(self, name) < least:
+                raise ValueError(f"{name} is {getattr(self, name)}; it must be at least {least}")
+        if not 0.0 < abs(self.step_deg) < 180.0:
+            raise ValueError(f"step_deg is {self.step_deg}; it must lie between 0 and 180 deg, either way")
+        if self.dwell_s < 0.0:
+            raise ValueError(f"dwell_s is {self.dwell_s}; it must not be negative")
+
+
+def read_position(
+    bench: Bench,
+    watch: Watch,
+    face: Face,
+    set_deg: float,
+    p_axis: str,
+    count: int,
+    dwell_s: float,
+    realisation: int,
+) -> list[Reading]:
+    """Turn, rest, read; each reading is recorded before anything else happens."""
+    alpha_deg = bench.turn(set_deg)
+    if dwell_s > 0.0:
+        bench.wait(dwell_s)
+    start_s = bench.t_s
+    u_v = bench.read(p_axis, count)
+    each_s = (bench.t_s - start_s) / count
+    taken = []
+    for i, u in enumerate(u_v):
+        r = Reading(
+            t_s=start_s + (i + 0.5) * each_s,
+            face=face,
+            set_deg=set_deg,
+            alpha_deg=alpha_deg,
+            axis=p_axis,
+            realisation=realisation,
+            u_v=float(u),
+        )
+        watch.record(r)
+        taken.append(r)
+    return taken
+
+
+def measure_face(bench: Bench, p: SeriesParams, face: Face, watch: Watch) -> list[Reading]:
+    """All realisations on one face, eq. (16)."""
+    bench.mount(face)
+    taken: list[Reading] = []
+    with watch.progress.step(f"series, face {face.value}", p.realisations * p.positions) as done:
+        for realisation in range(p.realisations):
+            for j in range(p.positions):
+                set_deg = j * p.step_deg
+                taken += read_position(bench, watch, face, set_deg, p.axis, p.readings, p.dwell_s, realisation)
+                done()
+    return taken
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FaceFit:
+    """One face fitted: the numbers, and the series for the plots."""
+
+    fit: harmonics.HarmonicFit
+    series: FaceSeries
+    lack_of_fit_p: float | None
+
+    @property
+    def drift(self) -> Estimate:
+        """Linear drift of the zero signal, V/s."""
+        f = self.fit
+        return make_estimate(
+            "drift_v_per_s", "du0/dt", "V/s", float(f.drift_vps), float(f.sigma_v) * f.drift_unit_sd_ps, f.dof
+        )
+
+
+def fit_face(readings: Sequence[Reading], face: Face, drift: bool) -> FaceFit:
+    """Least squares over the positions of one face. Raises ValueError when they do not suffice.
+
+    Readings of one position are averaged first: taken in a row they are correlated by the converter's filter, and as
+    independent rows they would make the intervals too short.
+    """
+    at = [
+        list(g) for _, g in groupby((r for r in readings if r.face is face), key=lambda r: (r.realisation, r.set_deg))
+    ]
+    alpha_deg = np.array([np.mean([r.alpha_deg for r in g]) for g in at], dtype=np.float64)
+    u_v = np.array([np.mean([r.u_v for r in g]) for g in at], dtype=np.float64)
+    t_s = np.array([np.mean([r.t_s for r in g]) for g in at], dtype=np.float64)
+    set_deg = np.array([g[0].set_deg for g in at], dtype=np.float64)
+    try:
+        fit = harmonics.fit(np.radians(alpha_deg), u_v, t_s if drift else None)
+    except ValueError as err:
+        raise ValueError(f"face {face.value}: {err}") from err
+    parameters = u_v.size - fit.dof
+    series = FaceSeries(
+        face=face,
+        alpha_deg=alpha_deg,
+        u_v=u_v,
+        residual_v=fit.residual_v,
+        realisation=np.array([g[0].realisation for g in at], dtype=np.int64),
+        c_v=fit.c_v,
+    )
+    return FaceFit(fit=fit, series=series, lack_of_fit_p=lack_of_fit_p(fit.residual_v, set_deg, parameters))
+
+
+def fit_notes(faces: Sequence[FaceFit]) -> list[str]:
+    """Warnings that a reader needs whichever procedure the faces belong to."""
+    low = {f.series.face.value: f.lack_of_fit_p for f in faces if f.lack_of_fit_p is not None}
+    repeating = {name: p for name, p in low.items() if p < LACK_OF_FIT_P}
+    if not repeating:
+        return []
+    return [
+        f"face {', '.join(repeating)}: the residual repeats from turn to turn "
+        f"(F test, p < {max(max(repeating.values()), 1e-15):.1e}); "
+        "the model misses something that small, and the intervals are too short"
+    ]
+
+
+def pooled_sigma_v(faces: Sequence[FaceFit]) -> tuple[float, int]:
+    """Noise of one position (mean of its readings) over several faces, volts, and its degrees of freedom."""
+    dof = sum(f.fit.dof for f in faces)
+    return float(np.sqrt(sum(float((f.fit.residual_v**2).sum()) for f in faces) / dof)), dof
+
+
+def residual_rms_v(faces: Sequence[FaceFit]) -> float:
+    """Root mean square of all residuals, volts."""
+    return float(np.sqrt(np.mean(np.concatenate([f.fit.residual_v for f in faces]) ** 2)))
+
+
+def unit_cov(faces: Sequence[FaceFit]) -> npt.NDArray[np.float64]:
+    """Block diagonal of the faces' unit covariances: the faces share no reading."""
+    n = harmonics.HARMONICS
+    out = np.zeros((n * len(faces), n * len(faces)))
+    for i, f in enumerate(faces):
+        out[i * n : (i + 1) * n, i * n : (i + 1) * n] = f.fit.unit_cov
+    return out

@@ -1,0 +1,74 @@
+"""`psabench record`: all that is on the bus into a file of python-can's own formats, the stream's health counted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import can
+from can.io.generic import MessageWriter
+from can.io.logger import MESSAGE_WRITERS
+
+from psabench.can_host import CanHost, Message, WallClock
+from psabench.errors import BadInput, LinkError
+from psabench.frames import FrameCounters, FrameReader
+
+FORMATS = sorted(MESSAGE_WRITERS)  # by ending: .log candump, .blf and .asc Vector, .mf4 (with asammdf) ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Recorded:
+    """What went into the file, which is complete whatever ended the recording."""
+
+    messages: int
+    first_s: float
+    last_s: float
+    counters: FrameCounters
+    broken: str | None  # why the link ended, if it did
+
+
+def record(bus: can.BusABC, path: Path, node: int, for_s: float | None, count: int | None) -> Recorded:
+    """Record until for_s of wall time or `count` messages have passed, or Ctrl-C, or the peer has gone.
+
+    The file is closed properly in every case. Raises BadInput for an ending that python-can does not know.
+    """
+    if path.suffix not in FORMATS:
+        raise BadInput(f"{path}: ending {path.suffix or 'missing'}; python-can writes {' '.join(FORMATS)}")
+    reader = FrameReader(node)
+    stamps: list[float] = []
+    with CanHost(bus, WallClock()) as host, _writer(path) as log:
+
+        def keep(m: Message) -> None:
+            log(m)
+            stamps[1:] = [m.timestamp]
+            reader.on_message(m)
+            if len(reader) >= 4096:
+                reader.take()
+
+        host.listeners.append(keep)
+        broken = None
+        try:
+            _receive(host, for_s, count)
+        except LinkError as e:
+            broken = str(e)
+        except KeyboardInterrupt:  # the usual way to end a recording
+            broken = None
+        reader.take()
+        first_s, last_s = (stamps[0], stamps[-1]) if stamps else (0.0, 0.0)
+        return Recorded(messages=host.received, first_s=first_s, last_s=last_s, counters=reader.counters, broken=broken)
+
+
+def _writer(path: Path) -> MessageWriter:
+    try:
+        return can.Logger(str(path))
+    except OSError as e:
+        raise BadInput(f"{path}: {e.strerror}") from e
+
+
+def _receive(host: CanHost, for_s: float | None, count: int | None) -> None:
+    deadline_s = None if for_s is None else host.clock.now_s() + for_s
+    while count is None or host.received < count:
+        left_s = 0.5 if deadline_s is None else min(0.5, deadline_s - host.clock.now_s())
+        if left_s <= 0.0:
+            return
+        host.receive(left_s)

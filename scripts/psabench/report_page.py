@@ -1,0 +1,48 @@
+"""The frame of report.html: style for light, dark and print; `@BODY@` is where the sections go."""
+
+PAGE = """<!doctype html>
+<html lang=en><head><meta charset=utf-8><meta name=viewport content="width=device-width, initial-scale=1">
+<title>Accelerometer calibration</title>
+<style>
+:root { color-scheme: light dark; --ground:#fbfcfd; --card:#ffffff; --ink:#1d2733; --muted:#5b6875;
+  --grid:#dfe4ea; --line:#d3dae2;
+  --s1:#1f6fb4; --s2:#c4572b; --s3:#2f8f5b; --s4:#8a5cc2; --good:#217a4b; --bad:#b3261e; }
+@media (prefers-color-scheme: dark) { :root { --ground:#12171d; --card:#1a2129; --ink:#e4e9ef;
+  --muted:#97a4b2; --grid:#2c3641;
+  --line:#34404d; --s1:#62aef0; --s2:#f08a5d; --s3:#5cc48d; --s4:#b795ee; --good:#5cc48d; --bad:#ff8a80; } }
+* { box-sizing: border-box; }
+body { margin: 0 auto; padding: 2rem 1.2rem 4rem; max-width: 70rem; background: var(--ground); color:
+  var(--ink);
+  font: 15px/1.5 system-ui, "Segoe UI", "DejaVu Sans", sans-serif; }
+h1 { font-size: 1.7rem; margin: 0; letter-spacing: -.01em; } h2 { font-size: 1.15rem; margin: 0 0 .6rem; }
+section { background: var(--card); border: 1px solid var(--line); border-radius: 8px; padding: 1.1rem 1.3rem;
+  margin: 1.2rem 0; }
+.facts, .small, figcaption, .notes, .method { color: var(--muted); } .facts b { color: var(--ink);
+  font-weight: 600; }
+.small, figcaption { font-size: .85rem; } .facts { margin: .2rem 0 .8rem; }
+.verdict { border-left: 4px solid var(--muted); padding: .5rem .9rem; background: var(--card); font-size:
+  1.05rem; }
+.verdict.good { border-color: var(--good); } .verdict.bad { border-color: var(--bad); }
+.scroll { overflow-x: auto; } table { border-collapse: collapse; font-size: .92rem; }
+th, td { padding: .28rem .55rem; text-align: left; border-bottom: 1px solid var(--grid); vertical-align:
+  baseline; }
+thead th { color: var(--muted); font-weight: 500; font-size: .85rem; } tbody th { font-weight: 500;
+  white-space: nowrap; }
+.num { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; } .unit, .si, .ci { color:
+  var(--muted); }
+.si { font-size: .85em; } .ci { font-size: .8em; white-space: nowrap; font-variant-numeric: tabular-nums; }
+.cmp td { font-variant-numeric: tabular-nums; } .same { font-weight: 650; color: var(--good); } .other {
+  font-weight: 650; }
+.flag { color: var(--s2); font-weight: 600; } .same.flag { color: var(--s2); } .bad { color: var(--bad);
+  font-weight: 650; }
+.off .num { color: var(--muted); } .mark { font-size: .85rem; white-space: nowrap; }
+.est thead th:not(:first-child) { text-align: right; } .est thead th:nth-child(4) { text-align: left; } .none
+  { color: var(--muted); }
+figure { margin: 1rem 0 0; } figure svg { width: 100%; height: auto; max-width: 52rem; display: block; }
+details { margin-top: .8rem; } summary { cursor: pointer; color: var(--muted); } .notes { font-size: .9rem; }
+sub { font-size: .72em; line-height: 0; }
+@media print { body { max-width: none; } section { break-inside: avoid; } }
+</style></head><body>
+@BODY@
+</body></html>
+"""

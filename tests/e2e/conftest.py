@@ -1,0 +1,82 @@
+"""The same bench over each transport: one emulator per test, reached the way a user would reach it."""
+
+from __future__ import annotations
+
+import logging
+import re
+import signal
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+from psabench.can_host import CanHost, StepClock, WallClock, open_bus
+from psabench.control import Control
+from psabench.device import Psa2
+from psabench.emulator import Emulator
+from rig import ADAPTERS, BENCH, HOST, PATIENCE_S, SLC, SLC0, VCAN, MakeRig, Rig, bus_spec, need
+
+logging.getLogger("can").setLevel(logging.ERROR)  # a warning for every message that a read has cut in two
+
+BOOT_UP = 0x705, b"\0"
+TRANSPORTS = [
+    pytest.param("socketcand", marks=HOST),
+    pytest.param("slcan", marks=HOST),
+    pytest.param("vcan", marks=VCAN),
+    pytest.param("slc0", marks=SLC),
+]
+
+
+@pytest.fixture(params=TRANSPORTS)
+def transport(request: pytest.FixtureRequest) -> str:
+    name = str(request.param)
+    need(name)
+    return name
+
+
+@pytest.fixture
+def make_rig() -> Iterator[MakeRig]:
+    """make_rig(transport, scenario, pace="step", extra=[...]) -> Rig; everything is closed at the end of the test."""
+    with ExitStack() as stack:
+
+        def make(
+            transport: str,
+            scenario: str | Path = BENCH,
+            *,
+            pace: str = "step",
+            seed: int | None = None,
+            extra: Sequence[str | Path] = (),
+        ) -> Rig:
+            if transport == "slc0":
+                return _rig_outside(stack)
+            emulator = Emulator(scenario, cans=[ADAPTERS[transport]], pace=pace, seed=seed, truth=True, extra=extra)
+            stack.enter_context(emulator)
+            stack.callback(_end, emulator)
+            assert emulator.control_path is not None
+            spec = bus_spec(emulator.endpoints[0])
+            host = stack.enter_context(CanHost(open_bus(spec), WallClock()))
+            control = stack.enter_context(Control(emulator.control_path))
+            if pace == "step":
+                host.clock = StepClock(control)
+            return Rig(spec=spec, host=host, unit=Psa2(host), running=emulator, port=control)
+
+        yield make
+
+
+def _end(emulator: Emulator) -> None:
+    """End it as a user would, however the test went, and see that no sanitizer has anything to say."""
+    emulator.signal(signal.SIGTERM)
+    emulator.wait(PATIENCE_S)
+    said = emulator.messages()
+    assert not re.search(r"Sanitizer|runtime error:|assert", said, re.IGNORECASE), said
+
+
+def _rig_outside(stack: ExitStack) -> Rig:
+    """The bench of tests/uml/slc0, as it is after Res: one emulator serves all tests there."""
+    host = stack.enter_context(CanHost(open_bus(SLC0), WallClock()))
+    unit = Psa2(host)
+    booted: list[bool] = []
+    host.listeners.append(lambda m: booted.append((m.arbitration_id, bytes(m.data)) == BOOT_UP))
+    unit.reset()
+    assert host.pump_until(lambda: any(booted), PATIENCE_S), "no boot-up message from the bench outside"
+    return Rig(spec=SLC0, host=host, unit=unit)

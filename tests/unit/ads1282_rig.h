@@ -1,0 +1,147 @@
+/* One ADS1281/ADS1282, its clock, its input and a bus master, for the tests of the chip at its pins. */
+#ifndef PSABENCH_TESTS_ADS1282_RIG_H
+#define PSABENCH_TESTS_ADS1282_RIG_H
+
+#include "rig.h"
+
+#include "chip/ads1282.h"
+
+#include <math.h>
+#include <string.h>
+
+#define MCLK_HZ   4096000
+#define BIT_TCLK  4 /* SCLK 1.024 MHz */
+#define T_DR_1000 258436
+
+static inline void hex_is(uint32_t got, uint32_t want)
+{
+    if (got != want) fail_msg("got %08X, want %08X", (unsigned)got, (unsigned)want);
+}
+
+static inline void near(double got, double want, double tolerance)
+{
+    if (!(fabs(got - want) <= tolerance)) fail_msg("got %.17g, want %.17g within %g", got, want, tolerance);
+}
+
+/* One chip, its clock, and a bus master that counts tCLK. */
+struct rig {
+    struct sched s;
+    struct ads1282 a;
+    struct clk clk;
+    double v, ramp_v_per_s; /* input: v + ramp t */
+    int64_t tclk;           /* the master's time */
+    int gap_tclk;           /* from the last rise of a byte to the first of the next */
+    bool by_bits;
+    unsigned falls, rises, asked_mux, samples;
+    int64_t fall_ns, rise_ns, first_sample_ns, last_sample_ns;
+};
+
+static inline double input(void *ctx, unsigned mux, int64_t t_ns)
+{
+    struct rig *r = ctx;
+    assert_true(t_ns >= r->last_sample_ns && t_ns <= r->s.now_ns);
+    if (r->samples++ == 0) r->first_sample_ns = t_ns;
+    r->last_sample_ns = t_ns;
+    r->asked_mux = mux;
+    return r->v + r->ramp_v_per_s * (double)t_ns * 1e-9;
+}
+
+static inline void drdy(void *ctx, bool level, int64_t t_ns)
+{
+    struct rig *r = ctx;
+    assert_int_equal(level, ads1282_drdy(&r->a));
+    if (level) r->rises++, r->rise_ns = t_ns;
+    else r->falls++, r->fall_ns = t_ns;
+}
+
+static const struct ads1282_cfg quiet = {ADS1282_PART_1282, MCLK_HZ, 5.0, 0.0, false};
+
+static inline void unpowered(struct rig *r, const struct ads1282_cfg *cfg, uint64_t seed)
+{
+    memset(r, 0, sizeof *r);
+    sched_init(&r->s);
+    r->clk = (struct clk){.hz = cfg->clk_hz, .div = 1};
+    r->gap_tclk = 24;
+    const struct ads1282_io io = {r, input, drdy};
+    ads1282_init(&r->a, cfg, &io, &r->s, rng_stream(seed, 1, "adc"));
+}
+
+static inline void powered(struct rig *r, const struct ads1282_cfg *cfg)
+{
+    unpowered(r, cfg, 1);
+    ads1282_power_up(&r->a, 0);
+}
+
+static inline int64_t at_tclk(struct rig *r, int64_t tclk)
+{
+    r->tclk = tclk;
+    const int64_t t_ns = clk_edge_ns(&r->clk, tclk);
+    sched_run_until(&r->s, t_ns);
+    return t_ns;
+}
+
+/* To the next DRDY fall; 0 when there is none within 300 ms. */
+static inline int64_t to_fall(struct rig *r)
+{
+    const unsigned falls = r->falls;
+    const int64_t limit_ns = r->s.now_ns + 300000000;
+    while (r->falls == falls && sched_next_ns(&r->s) <= limit_ns) sched_run_until(&r->s, sched_next_ns(&r->s));
+    if (r->falls == falls) sched_run_until(&r->s, limit_ns);
+    r->tclk = clk_count_at(&r->clk, r->s.now_ns);
+    return r->falls == falls ? 0 : r->fall_ns;
+}
+
+/* One byte in SPI mode 0, its first rise a gap after the previous byte's last. */
+static inline uint8_t byte(struct rig *r, uint8_t mosi)
+{
+    const int64_t rise = r->tclk + r->gap_tclk;
+    uint8_t miso = 0;
+    for (int i = 0; i < 8 && r->by_bits; i++) {
+        const int64_t t_ns = at_tclk(r, rise + i * BIT_TCLK);
+        miso = (uint8_t)((miso << 1) | spi_miso(&r->a.spi));
+        spi_sample(&r->a.spi, (mosi >> (7 - i)) & 1, t_ns);
+        if (i == 0) spi_first(&r->a.spi, at_tclk(r, rise + BIT_TCLK / 2));
+    }
+    if (r->by_bits) return miso;
+    spi_first(&r->a.spi, at_tclk(r, rise + BIT_TCLK / 2));
+    return spi_byte(&r->a.spi, mosi, at_tclk(r, rise + 7 * BIT_TCLK));
+}
+
+static inline void send(struct rig *r, unsigned n, const uint8_t *bytes)
+{
+    for (unsigned i = 0; i < n; i++) byte(r, bytes[i]);
+}
+
+#define SEND(r, ...) send(r, sizeof((uint8_t[]){__VA_ARGS__}), (const uint8_t[]){__VA_ARGS__})
+
+static inline uint32_t read_bytes(struct rig *r, unsigned n)
+{
+    uint32_t word = 0;
+    while (n-- > 0) word = (word << 8) | byte(r, 0);
+    return word;
+}
+
+static inline uint8_t rreg(struct rig *r, uint8_t addr)
+{
+    SEND(r, (uint8_t)(0x20 | addr), 0x00);
+    return byte(r, 0);
+}
+
+static inline void wreg(struct rig *r, uint8_t addr, uint8_t value)
+{
+    SEND(r, (uint8_t)(0x40 | addr), 0x00, value);
+}
+
+/* Word of a settled input. */
+static inline uint32_t settled_word(struct rig *r)
+{
+    for (int i = 0; i < 64; i++) to_fall(r);
+    return read_bytes(r, 4);
+}
+
+static inline double fraction(uint32_t word)
+{
+    return (double)((int64_t)(int32_t)word) * 0x1p-31;
+}
+
+#endif

@@ -1,0 +1,56 @@
+/* Reads proto/profiles/NAME.yaml for the tests: the subset those files use ("key: value", "[a, b]", "- item", "#"). */
+#ifndef PSABENCH_TESTS_PSA2_PROFILES_H
+#define PSABENCH_TESTS_PSA2_PROFILES_H
+
+#include "rig.h"
+
+#include "board/psa2_profile.h"
+
+#include <string.h>
+
+static inline char *psa2_trim(char *s)
+{
+    while (*s == ' ') s++;
+    size_t n = strlen(s);
+    while (n && (s[n - 1] == ' ' || s[n - 1] == '\n')) s[--n] = '\0';
+    return s;
+}
+
+static inline void psa2_set(struct psa2_profile *p, const char *key, unsigned index, char *text)
+{
+    char why[200];
+    if (!psa2_profile_set(p, key, index, psa2_trim(text), why, sizeof why)) fail_msg("%s", why);
+}
+
+static inline struct psa2_profile psa2_profile_file(const char *name)
+{
+    char path[100];
+    char line[200];
+    char key[40] = "";
+    unsigned item = 0;
+    struct psa2_profile p;
+    memset(&p, 0, sizeof p);
+    (void)snprintf(path, sizeof path, "proto/profiles/%s.yaml", name);
+    FILE *f = fopen(path, "r");
+    if (!f) fail_msg("cannot open %s: run the tests from the top of the repository", path);
+    while (fgets(line, sizeof line, f)) {
+        line[strcspn(line, "#")] = '\0';
+        char *text = psa2_trim(line);
+        char *colon = strchr(text, ':');
+        if (strncmp(text, "- ", 2) == 0) {
+            psa2_set(&p, key, item++, text + 2);
+        } else if (colon) {
+            *colon = '\0';
+            (void)snprintf(key, sizeof key, "%s", text);
+            item = 0;
+            char *value = psa2_trim(colon + 1);
+            if (value[0] == '[')
+                for (char *e = strtok(value, "[],"); e; e = strtok(NULL, "[],")) psa2_set(&p, key, item++, e);
+            else if (value[0]) psa2_set(&p, key, 0, value);
+        }
+    }
+    (void)fclose(f);
+    return p;
+}
+
+#endif

@@ -1,0 +1,113 @@
+/* Analog chain: each part by itself against hand arithmetic, then the filter and its noise. */
+#include "rig.h"
+
+#include "board/afe.h"
+
+#include <math.h>
+
+static void near(double got, double want, double tol)
+{
+    if (!(fabs(got - want) <= tol)) fail_msg("got %.15g, want %.15g within %g", got, want, tol);
+}
+
+/* Nominal: 1 kohm load, divider 8, so 10 mA -> 10 V -> 1.25 V. */
+static void static_transfer(void **state)
+{
+    (void)state;
+    struct afe_cfg i = afe_nominal(AFE_CURRENT);
+    const struct afe_cfg v = afe_nominal(AFE_VOLTAGE);
+    struct afe_cfg load_tol = i, load_tc = i, div_tol = i, div_tc = i, offset = v, offset_tc = v;
+    load_tol.load_tol_ppm = 100;
+    load_tc.load_tc_ppm_per_k = 5;
+    div_tol.divider_tol_ppm = -200;
+    div_tc.divider_tc_ppm_per_k = 2;
+    offset.buffer_offset_v = 8e-3;
+    offset_tc.buffer_offset_tc_v_per_k = 1e-6;
+    const struct {
+        const struct afe_cfg *cfg;
+        double signal, degc, volts;
+    } rows[] = {
+        {&i, 10e-3, 25, 1.25},
+        {&i, -10e-3, 25, -1.25},
+        {&i, 0, 25, 0},
+        {&v, 2.5, 25, 0.3125},
+        {&v, 2.5, 60, 0.3125},
+        {&i, 20e-3, 25, 10.5 / 8},
+        {&i, -20e-3, 25, -10.5 / 8},
+        {&load_tol, 8e-3, 25, 1.0001},
+        {&load_tc, 8e-3, 45, 1.0001},
+        {&load_tc, 8e-3, 5, 0.9999},
+        {&div_tol, 8e-3, 25, 1.0 / 0.9998},
+        {&div_tc, 8e-3, 75, 1.0 / 1.0001},
+        {&offset, 0, 25, 1e-3},
+        {&offset_tc, 0, 33, 1e-6},
+        {&offset, 10.499, 25, 10.5 / 8},
+    };
+    for (size_t k = 0; k < COUNT(rows); k++)
+        near(afe_static_v(rows[k].cfg, rows[k].signal, rows[k].degc), rows[k].volts, 1e-15);
+}
+
+/* A step of 8 V through 1 kHz: 1 - exp(-2 pi f t) of it, whatever the steps of time. */
+static void one_pole_is_exact_at_any_pace(void **state)
+{
+    (void)state;
+    const int64_t paces_ns[] = {31250, 7812, 125000, 1000};
+    struct afe_cfg cfg = afe_nominal(AFE_VOLTAGE);
+    cfg.filter_hz = 1000.0;
+    for (size_t p = 0; p < COUNT(paces_ns); p++) {
+        struct afe a;
+        afe_init(&a, &cfg, rng_stream(1, 1, "afe.x"));
+        near(afe_out_v(&a, 0.0, 25, 0), 0.0, 0.0);
+        for (int64_t k = 1; k <= 20; k++) {
+            const int64_t t_ns = k * paces_ns[p];
+            near(afe_out_v(&a, 8.0, 25, t_ns), 1.0 - exp(-6.283185307179586e-6 * (double)t_ns), 1e-12);
+            near(afe_out_v(&a, 8.0, 25, t_ns), a.state_v, 0.0); /* the same instant again */
+        }
+    }
+}
+
+static void without_a_filter_the_chain_has_no_memory(void **state)
+{
+    (void)state;
+    struct afe_cfg cfg = afe_nominal(AFE_VOLTAGE);
+    cfg.filter_hz = 0.0;
+    struct afe a;
+    afe_init(&a, &cfg, rng_stream(1, 1, "afe.x"));
+    (void)afe_out_v(&a, 0.0, 25, 0);
+    near(afe_out_v(&a, 8.0, 25, 1), 1.0, 0.0);
+}
+
+/* 1 uV/rtHz at the load, no filter: 1e-6 sqrt(1 / (2 * 31.25 us)) = 126.5 uV, / 8 at the converter. With one pole at f the
+ * variance falls by (1 - k) / (1 + k), k = exp(-2 pi f dt). */
+static void noise_has_its_density(void **state)
+{
+    (void)state;
+    enum { N = 40000 };
+    const double filters_hz[] = {0.0, 1000.0};
+    for (size_t i = 0; i < 2; i++) {
+        struct afe_cfg cfg = afe_nominal(AFE_VOLTAGE);
+        cfg.noise_v_rthz = 1e-6;
+        cfg.filter_hz = filters_hz[i];
+        struct afe a;
+        afe_init(&a, &cfg, rng_stream(1, 1, "afe.x"));
+        double sum2 = 0.0;
+        for (int64_t k = 0; k < N; k++) {
+            const double v = afe_out_v(&a, 0.0, 25, k * 31250);
+            sum2 += v * v;
+        }
+        const double k = filters_hz[i] > 0.0 ? exp(-6.283185307179586 * filters_hz[i] * 31.25e-6) : 0.0;
+        const double want = 126.491e-6 / 8.0 * sqrt((1.0 - k) / (1.0 + k));
+        near(sqrt(sum2 / N), want, 0.03 * want);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(static_transfer),
+        cmocka_unit_test(one_pole_is_exact_at_any_pace),
+        cmocka_unit_test(without_a_filter_the_chain_has_no_memory),
+        cmocka_unit_test(noise_has_its_density),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,66 @@
+#include "rig.h"
+
+#include "base/bits.h"
+#include "base/clk.h"
+
+static void edges_are_exact_after_an_hour(void **state)
+{
+    (void)state;
+    const struct {
+        struct clk clk;
+        int64_t k, t_ns;
+    } row[] = {
+        {{0, 4096000, 1}, 1, 244},                                 /* 244.140625 ns */
+        {{0, 4096000, 1}, INT64_C(4096000) * 3600, 3600000000000}, /* an hour: adding 244 would be 2.1 s short */
+        {{0, 4096000, 3}, 4096000, 3000000000},                    /* 4.096 MHz / 3: 3 s exactly */
+        {{0, 4096000, 3}, 1, 732},                                 /* 732.42 ns */
+        {{500, 2000000, 1}, 148, 74500},                           /* the INT low of the default profile */
+        {{0, 7680000, 1}, INT64_C(7680000) * 86400 * 365, INT64_C(86400) * 365 * 1000000000},
+    };
+    for (size_t i = 0; i < COUNT(row); i++) assert_int_equal(clk_edge_ns(&row[i].clk, row[i].k), row[i].t_ns);
+}
+
+static void count_at_finds_the_first_edge_not_before(void **state)
+{
+    (void)state;
+    const struct clk c = {.t0_ns = 7, .hz = 4096000, .div = 3};
+    for (int64_t k = 0; k < 5000; k++) {
+        const int64_t t_ns = clk_edge_ns(&c, k);
+        assert_int_equal(clk_count_at(&c, t_ns), k);
+        assert_int_equal(clk_count_at(&c, t_ns + 1), k + 1);
+    }
+}
+
+static void rounding_and_sign_extension_keep_their_signs(void **state)
+{
+    (void)state;
+    const struct {
+        uint32_t v;
+        unsigned bits;
+        int32_t want;
+    } ext[] = {
+        {0x800000, 24, -8388608}, {0x7FFFFF, 24, 8388607},     {0xFFFFFF, 24, -1},
+        {0xFF000001, 24, 1},      {0x80000000, 32, INT32_MIN}, {1, 1, -1},
+    };
+    for (size_t i = 0; i < COUNT(ext); i++) assert_int_equal(bits_sign_extend(ext[i].v, ext[i].bits), ext[i].want);
+    const struct {
+        int64_t v;
+        unsigned shift;
+        int64_t want;
+    } rnd[] = {
+        {5, 1, 3}, {-5, 1, -2}, {-6, 2, -1}, {-7, 2, -2}, {7, 0, 7}, {-7, 0, -7}, {6, 2, 2}, {-1, 4, 0}, {-9, 4, -1},
+    };
+    for (size_t i = 0; i < COUNT(rnd); i++) assert_int_equal(bits_round_shift(rnd[i].v, rnd[i].shift), rnd[i].want);
+    assert_int_equal(bits_clip(8388608, 24), 8388607);
+    assert_int_equal(bits_clip(-8388609, 24), -8388608);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(edges_are_exact_after_an_hour),
+        cmocka_unit_test(count_at_finds_the_first_edge_not_before),
+        cmocka_unit_test(rounding_and_sign_extension_keep_their_signs),
+    };
+    return cmocka_run_group_tests_name("clk", tests, NULL, NULL);
+}

@@ -1,0 +1,312 @@
+#include "rig.h"
+
+#include "app/bench.h"
+#include "control/control.h"
+
+#include <string.h>
+
+static const char scenario_text[] =
+    "seed: 7\n"
+    "head: {resolution_arcsec: 0, turn_s: 2}\n"
+    "units:\n"
+    "  - {name: a, node: 5, serial: 17, axes: {x: {sensor: mems, u0_v: 2.5, kx_v_per_g: 1.0, alpha0_deg: 0.1121}}}\n"
+    "  - {name: b, node: 7, serial: 18}\n";
+
+static struct bench *bench;
+static struct control_bench view;
+static struct control control, truth;
+static struct {
+    int runs, quits;
+    int64_t for_ns;
+    uint64_t after_tx;
+    bool refuse;
+} asked;
+
+static bool on_run(void *ctx, int64_t for_ns, uint64_t after_tx, char *why)
+{
+    (void)ctx;
+    if (asked.refuse) snprintf(why, CONTROL_WHY_MAX, "not now");
+    asked.runs++;
+    asked.for_ns = for_ns;
+    asked.after_tx = after_tx;
+    return !asked.refuse;
+}
+
+static void on_quit(void *ctx)
+{
+    (void)ctx;
+    asked.quits++;
+}
+
+static bool on_vcd_flush(void *ctx, char *why)
+{
+    (void)ctx;
+    snprintf(why, CONTROL_WHY_MAX, "no recording");
+    return false;
+}
+
+static uint64_t on_can_rx(void *ctx)
+{
+    (void)ctx;
+    return 42;
+}
+
+static bool on_client(void *ctx, unsigned i, struct control_client *out)
+{
+    (void)ctx;
+    *out = (struct control_client){.adapter = "socketcand", .name = "can0", .delivered = 42, .refused = 1};
+    return i == 0;
+}
+
+static void on_gone(void *ctx, struct control_client *out)
+{
+    (void)ctx;
+    *out = (struct control_client){.delivered = 3};
+}
+
+static void on_pace(void *ctx, struct control_pace *out)
+{
+    (void)ctx;
+    *out = (struct control_pace){.name = "step", .turns = 9};
+}
+
+static int fresh(void **state)
+{
+    static struct scenario s;
+    char why[256];
+    (void)state;
+    assert_true(scenario_parse("test.yaml", scenario_text, strlen(scenario_text), &s, why, sizeof why));
+    bench_init(bench, &s, 0);
+    bench_power_up(bench);
+    memset(&asked, 0, sizeof asked);
+    view = (struct control_bench){.head = &bench->head,
+                                  .bus = &bench->bus,
+                                  .units = 2,
+                                  .seed = 7,
+                                  .scenario = "test.yaml",
+                                  .unit = {&bench->unit[0], &bench->unit[1]},
+                                  .run = on_run,
+                                  .quit = on_quit,
+                                  .vcd_flush = on_vcd_flush,
+                                  .can_rx = on_can_rx,
+                                  .client = on_client,
+                                  .gone = on_gone,
+                                  .pace = on_pace};
+    control_init(&control, control_commands, control_command_count, &view);
+    control_init(&truth, control_truth, control_truth_count, &view);
+    return 0;
+}
+
+static const char *say(const char *line)
+{
+    return control_line(&control, line, bench->sched.now_ns);
+}
+
+/* The reply has this text in it. */
+static void assert_says(const char *line, const char *want)
+{
+    const char *reply = say(line);
+    assert_non_null(reply);
+    if (!strstr(reply, want)) fail_msg("%s\n  gave %s\n  want %s", line, reply, want);
+}
+
+static void a_reply_has_id_time_and_barrier(void **state)
+{
+    (void)state;
+    sched_run_until(&bench->sched, 1500000000);
+    assert_string_equal(
+        say("{\"id\":1,\"cmd\":\"time\"}"),
+        "{\"id\":1,\"ok\":true,\"t_ns\":1500000000,\"can_rx\":42,\"result\":{\"t_s\":1.5,\"pace\":\"step\"}}");
+    assert_says("{\"cmd\":\"time\",\"id\":\"any JSON\"}", "{\"id\":\"any JSON\",\"ok\":true");
+    assert_says("{\"cmd\":\"time\"}", "{\"id\":null,\"ok\":true");
+    assert_says("{\"cmd\":\"time\",\"id\":[1,{\"x\":2}]}", "{\"id\":[1,{\"x\":2}],\"ok\":true");
+}
+
+static const struct {
+    const char *line, *code, *text;
+} refusals[] = {
+    {"", "syntax", "not a JSON object"},
+    {"garbage", "syntax", "not a JSON object"},
+    {"[1,2]", "syntax", "not a JSON object"},
+    {"{\"id\":1", "syntax", "not a JSON object"},
+    {"{\"id\":1}", "syntax", "cmd: a command's name is wanted"},
+    {"{\"cmd\":5}", "syntax", "cmd: a command's name is wanted"},
+    {"{\"cmd\":\"time\",\"ards\":{}}", "syntax", "\\\"ards\\\": unknown member"},
+    {"{\"cmd\":\"time\",\"args\":[1]}", "syntax", "args: an object is wanted"},
+    {"{\"cmd\":\"fly\"}", "command", "\\\"fly\\\": unknown command; help lists them"},
+    {"{\"cmd\":\"time\",\"args\":{\"x\":1}}", "argument", "no argument \\\"x\\\"; it takes none"},
+    {"{\"cmd\":\"head.turn\",\"args\":{\"angle\":1}}", "argument", "no argument \\\"angle\\\"; it takes angle_deg"},
+    {"{\"cmd\":\"head.turn\"}", "argument", "angle_deg is missing: degrees on the head's scale"},
+    {"{\"cmd\":\"head.turn\",\"args\":{\"angle_deg\":\"5\"}}", "type", "angle_deg: a number is wanted"},
+    {"{\"cmd\":\"head.turn\",\"args\":{\"angle_deg\":3600.5}}", "range", "angle_deg: 3600.5 is outside -3600 ... 3600"},
+    {"{\"cmd\":\"head.mount\",\"args\":{\"face\":\"up\"}}", "range", "direct, reversed, side or side_reversed"},
+    {"{\"cmd\":\"head.mount\",\"args\":{\"face\":2}}", "type", "face: a string is wanted"},
+    {"{\"cmd\":\"run\",\"args\":{\"for_s\":-0.1}}", "range", "for_s: -0.1 is outside 0 ... 86400"},
+    {"{\"cmd\":\"run\",\"args\":{\"for_s\":1,\"after_tx\":1.5}}", "type", "after_tx: 1.5 is not an integer"},
+    {"{\"cmd\":\"unit.reset\"}", "argument", "unit is missing: there are 2 units"},
+    {"{\"cmd\":\"unit.reset\",\"args\":{\"unit\":\"c\"}}", "range", "no unit \\\"c\\\"; there is a, b"},
+    {"{\"cmd\":\"counters\",\"args\":{\"unit\":5}}", "type", "unit: a string is wanted"},
+    {"{\"cmd\":\"vcd.flush\"}", "state", "no recording"},
+    {"{\"cmd\":\"truth\"}", "command", "unknown command"}, /* not on this port */
+};
+
+static void bad_commands_are_refused_in_words_and_change_nothing(void **state)
+{
+    (void)state;
+    for (size_t i = 0; i < COUNT(refusals); i++) {
+        char want[64];
+        snprintf(want, sizeof want, "\"error\":{\"code\":\"%s\"", refusals[i].code);
+        assert_says(refusals[i].line, want);
+        assert_says(refusals[i].line, refusals[i].text);
+        assert_says(refusals[i].line, "\"ok\":false");
+    }
+    assert_int_equal(control.refused, 3 * COUNT(refusals));
+    assert_int_equal(asked.runs + asked.quits, 0);
+    assert_true(head_at_rest(&bench->head, 0));
+    assert_int_equal(bench->head.face, HEAD_DIRECT);
+    assert_int_equal(bench->unit[0].board.counters.resets, 0);
+}
+
+static void an_overlong_line_is_refused(void **state)
+{
+    (void)state;
+    assert_non_null(strstr(control_line(&control, NULL, 0), "\"code\":\"syntax\""));
+}
+
+static void run_is_answered_when_it_is_over(void **state)
+{
+    (void)state;
+    assert_null(say("{\"id\":9,\"cmd\":\"run\",\"args\":{\"for_s\":0.01,\"after_tx\":3}}"));
+    assert_int_equal(asked.for_ns, 10000000);
+    assert_int_equal(asked.after_tx, 3);
+    assert_says("{\"id\":10,\"cmd\":\"run\",\"args\":{\"for_s\":1}}", "another run is under way");
+    assert_int_equal(asked.runs, 1);
+    assert_string_equal(control_run_done(&control, 10000000),
+                        "{\"id\":9,\"ok\":true,\"t_ns\":10000000,\"can_rx\":42,\"result\":{}}");
+    assert_null(say("{\"id\":11,\"cmd\":\"run\",\"args\":{\"for_s\":0}}"));
+    control_run_forget(&control);
+    asked.refuse = true;
+    assert_says("{\"id\":12,\"cmd\":\"run\",\"args\":{\"for_s\":1}}", "{\"code\":\"state\",\"text\":\"not now\"}");
+}
+
+static void the_head_turns_reads_and_takes_its_time(void **state)
+{
+    (void)state;
+    assert_says("{\"cmd\":\"head.turn\",\"args\":{\"angle_deg\":90}}", "\"at_rest\":false,\"rest_in_s\":2}");
+    assert_says("{\"cmd\":\"head.turn\",\"args\":{\"angle_deg\":0}}", "the head is turning, at rest in 2.000 s");
+    assert_says("{\"cmd\":\"head.mount\",\"args\":{\"face\":\"side\"}}", "the head is turning");
+    sched_run_until(&bench->sched, 2000000000);
+    assert_says("{\"cmd\":\"head.read\"}", "\"face\":\"direct\",\"at_rest\":true,\"rest_in_s\":0}");
+    cJSON *j = cJSON_Parse(say("{\"cmd\":\"head.read\"}"));
+    const cJSON *angle = cJSON_GetObjectItem(cJSON_GetObjectItem(j, "result"), "angle_deg");
+    assert_true(angle->valuedouble > 89.999999 && angle->valuedouble < 90.000001);
+    cJSON_Delete(j);
+    assert_says("{\"cmd\":\"head.mount\",\"args\":{\"face\":\"side_reversed\"}}", "\"face\":\"side_reversed\"");
+}
+
+static void a_unit_is_reset_by_name(void **state)
+{
+    (void)state;
+    assert_says("{\"cmd\":\"unit.reset\",\"args\":{\"unit\":\"b\"}}", "\"ok\":true");
+    sched_run_until(&bench->sched, 1000000000);
+    assert_int_equal(bench->unit[0].board.counters.resets, 0);
+    assert_int_equal(bench->unit[1].board.counters.resets, 1);
+    assert_says("{\"cmd\":\"counters\",\"args\":{\"unit\":\"b\"}}", "\"resets\":1");
+    assert_says("{\"cmd\":\"counters\",\"args\":{\"unit\":\"a\"}}", "\"resets\":0");
+}
+
+static void counters_frames_and_units_tell_what_they_promise(void **state)
+{
+    (void)state;
+    assert_says("{\"cmd\":\"frames\"}", "{\"adapter\":\"socketcand\",\"name\":\"can0\",\"delivered\":42");
+    assert_says("{\"cmd\":\"frames\"}", "\"gone\":{\"delivered\":3");
+    assert_says("{\"cmd\":\"counters\"}", "\"pace\":{\"name\":\"step\",\"turns\":9");
+    assert_says("{\"cmd\":\"counters\"}", "\"bitrate_hz\":1000000");
+    assert_says("{\"cmd\":\"units\"}",
+                "{\"name\":\"a\",\"serial\":17,\"node\":5,\"profile\":\"article\",\"ready\":false}");
+    assert_says("{\"cmd\":\"quit\"}", "\"ok\":true");
+    assert_int_equal(asked.quits, 1);
+}
+
+static void help_lists_every_command_and_argument(void **state)
+{
+    (void)state;
+    const char *help = say("{\"cmd\":\"help\"}");
+    for (unsigned i = 0; i < control_command_count; i++) {
+        char want[64];
+        snprintf(want, sizeof want, "{\"name\":\"%s\",\"what\":", control_commands[i].name);
+        assert_non_null(strstr(help, want));
+        assert_true(control_commands[i].what[strlen(control_commands[i].what) - 1] == '.');
+    }
+    assert_non_null(
+        strstr(help, "{\"name\":\"angle_deg\",\"type\":\"number\",\"optional\":false,\"min\":-3600,\"max\":3600"));
+    char line[1024];
+    unsigned lines = 0;
+    while (control_markdown(control_commands, control_command_count, lines, line, sizeof line)) lines++;
+    assert_int_equal(lines, control_command_count + 2);
+}
+
+/* Whether the page, a file of the repository, has this line. */
+static bool page_has(const char *line)
+{
+    char got[2048];
+    FILE *page = fopen("docs/emulator.md", "r");
+    if (!page) skip(); /* not run in the root of the repository */
+    bool found = false;
+    while (!found && fgets(got, sizeof got, page)) {
+        got[strcspn(got, "\n")] = '\0';
+        found = strcmp(got, line) == 0;
+    }
+    fclose(page);
+    return found;
+}
+
+static void the_page_shows_the_same_table(void **state)
+{
+    (void)state;
+    char line[1024];
+    for (unsigned i = 0; control_markdown(control_commands, control_command_count, i, line, sizeof line); i++) {
+        if (!page_has(line)) fail_msg("docs/emulator.md lacks (psa-emu --list-commands):\n%s", line);
+    }
+    for (unsigned i = 0; control_markdown(control_truth, control_truth_count, i, line, sizeof line); i++) {
+        if (!page_has(line)) fail_msg("docs/emulator.md lacks (psa-emu --list-commands):\n%s", line);
+    }
+}
+
+static void hidden_parameters_are_told_on_the_truth_port_alone(void **state)
+{
+    (void)state;
+    static const char *const hidden[] = {"u0_v", "alpha0_deg", "kx_v_per_g", "load_tol_ppm", "angle_rad"};
+    static const char *const open[] = {"help", "time", "frames", "counters", "units", "head.read"};
+    for (size_t i = 0; i < COUNT(open); i++) {
+        char line[64];
+        snprintf(line, sizeof line, "{\"cmd\":\"%s\"}", open[i]);
+        const char *reply = say(line);
+        for (size_t k = 0; k < COUNT(hidden); k++) assert_null(strstr(reply, hidden[k]));
+    }
+    const char *told = control_line(&truth, "{\"cmd\":\"truth\"}", 0);
+    for (size_t k = 0; k < COUNT(hidden); k++) assert_non_null(strstr(told, hidden[k]));
+    assert_non_null(strstr(told, "\"alpha0_deg\":0.1121"));
+    assert_non_null(strstr(told, "\"seed\":7"));
+    assert_non_null(strstr(control_line(&truth, "{\"cmd\":\"quit\"}", 0), "unknown command"));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup(a_reply_has_id_time_and_barrier, fresh),
+        cmocka_unit_test_setup(bad_commands_are_refused_in_words_and_change_nothing, fresh),
+        cmocka_unit_test_setup(an_overlong_line_is_refused, fresh),
+        cmocka_unit_test_setup(run_is_answered_when_it_is_over, fresh),
+        cmocka_unit_test_setup(the_head_turns_reads_and_takes_its_time, fresh),
+        cmocka_unit_test_setup(a_unit_is_reset_by_name, fresh),
+        cmocka_unit_test_setup(counters_frames_and_units_tell_what_they_promise, fresh),
+        cmocka_unit_test_setup(help_lists_every_command_and_argument, fresh),
+        cmocka_unit_test(the_page_shows_the_same_table),
+        cmocka_unit_test_setup(hidden_parameters_are_told_on_the_truth_port_alone, fresh),
+    };
+    bench = malloc(sizeof *bench);
+    const int failed = cmocka_run_group_tests(tests, NULL, NULL);
+    free(bench);
+    return failed;
+}

@@ -1,0 +1,146 @@
+#include "rig.h"
+
+#include "app/options.h"
+
+#include <string.h>
+
+static struct options o;
+static char why[512];
+
+/* Splits at blanks. */
+static bool parse(const char *line)
+{
+    static char copy[512];
+    char *argv[64] = {"psa-emu"};
+    int argc = 1;
+    snprintf(copy, sizeof copy, "%s", line);
+    for (char *w = strtok(copy, " "); w; w = strtok(NULL, " ")) argv[argc++] = w;
+    return options_parse(argc, argv, &o, why, sizeof why);
+}
+
+static void without_options_a_bench_for_socketcand_in_real_time(void **state)
+{
+    (void)state;
+    assert_true(parse(""));
+    assert_int_equal(o.action, OPTIONS_RUN);
+    assert_int_equal(o.pace, PACE_WALL);
+    assert_int_equal(o.can_count, 1);
+    assert_int_equal(o.can[0].kind, OPTIONS_SOCKETCAND);
+    assert_int_equal(o.can[0].port, 29536);
+    assert_true(o.for_ns == INT64_MAX && !o.scenario && !o.seed_given && o.line_hz == 8000000 && o.vcd_unit_ns == 10);
+}
+
+static void every_option_reaches_its_field(void **state)
+{
+    (void)state;
+    assert_true(
+        parse("--can socketcand:0 quiet --can slcan:/tmp/x --can slcan --can socketcan:vcan0 --pace step --for 300ms "
+              "--seed 18446744073709551615 --vcd a.vcd --vcd-unit 100 --line b --line-hz 1000 --control c --truth d "
+              "--unit u --bitrate 500000 --data-bitrate 0 --epoch 1.5 --start --quiet"));
+    assert_string_equal(o.scenario, "quiet");
+    assert_int_equal(o.can_count, 4);
+    assert_int_equal(o.can[0].port, 0);
+    assert_string_equal(o.can[1].arg, "/tmp/x");
+    assert_null(o.can[2].arg);
+    assert_int_equal(o.can[3].kind, OPTIONS_SOCKETCAN);
+    assert_string_equal(o.can[3].arg, "vcan0");
+    assert_int_equal(o.pace, PACE_STEP);
+    assert_true(o.for_ns == 300000000 && o.seed_given && o.seed == UINT64_MAX && o.epoch_ns == 1500000000);
+    assert_true(o.bitrate_given && o.bitrate_hz == 500000 && o.data_bitrate_given && o.data_bitrate_hz == 0);
+    assert_true(o.vcd_unit_ns == 100 && o.line_hz == 1000 && o.start && o.quiet && !o.wait_client);
+    assert_string_equal(o.vcd, "a.vcd");
+    assert_string_equal(o.line, "b");
+    assert_string_equal(o.control, "c");
+    assert_string_equal(o.truth, "d");
+    assert_string_equal(o.unit, "u");
+}
+
+static void none_and_the_end_of_options_are_understood(void **state)
+{
+    (void)state;
+    assert_true(parse("--can none --pace free --wait-client -- stream"));
+    assert_true(o.can_count == 0 && o.wait_client && o.pace == PACE_FREE);
+    assert_string_equal(o.scenario, "stream");
+    assert_true(parse("--list-scenarios"));
+    assert_int_equal(o.action, OPTIONS_LIST_SCENARIOS);
+    assert_true(parse("--help"));
+    assert_int_equal(o.action, OPTIONS_HELP);
+}
+
+static const struct {
+    const char *line, *why;
+} bad[] = {
+    {"--fly", "--fly: unknown option"},
+    {"--help=yes", "--help=yes: unknown option or unwanted argument"},
+    {"--seed", "--seed: an argument is missing"},
+    {"--seed -1", "--seed -1: an integer from 0"},
+    {"--seed 18446744073709551616", "--seed 18446744073709551616: an integer"},
+    {"--seed 1x", "--seed 1x: an integer"},
+    {"--pace slow", "--pace slow: wall, step or free is wanted"},
+    {"--pace step", "--pace step: needs --control PATH"},
+    {"--pace step --control c --wait-client", "--wait-client: in step pace"},
+    {"--for 3parsec", "--for 3parsec: a time is wanted"},
+    {"--for -1s", "--for -1s: a time is wanted"},
+    {"--for nan", "--for nan: a time is wanted"},
+    {"--for 1e7s", "--for 1e7s: a time is wanted, as 300ms, 10s or 2min, up to 1e6 s"},
+    {"--can", "--can: an argument is missing"},
+    {"--can can0", "--can can0: socketcand[:PORT], slcan[:LINK], socketcan:IFACE or none is wanted"},
+    {"--can socketcan", "--can socketcan: socketcand[:PORT]"},
+    {"--can socketcan:", "--can socketcan:: socketcand[:PORT]"},
+    {"--can socketcand:65536", "--can socketcand:65536: \"65536\" is no port"},
+    {"--can socketcand:http", "--can socketcand:http: \"http\" is no port"},
+    {"--bitrate 9999", "--bitrate 9999: 0 or 10000"},
+    {"--data-bitrate 1e6", "--data-bitrate 1e6: 0 or 10000"},
+    {"--vcd-unit 20", "--vcd-unit 20: 1, 10, 100"},
+    {"--vcd-unit 0", "--vcd-unit 0: 1, 10, 100"},
+    {"--line-hz 999", "--line-hz 999: 1000 to"},
+    {"--epoch -1", "--epoch -1: seconds are wanted"},
+    {"a b", "b: one scenario is enough, a was given before"},
+};
+
+static void what_cannot_be_used_is_refused_in_one_line(void **state)
+{
+    (void)state;
+    for (size_t i = 0; i < COUNT(bad); i++) {
+        if (parse(bad[i].line)) fail_msg("accepted: %s", bad[i].line);
+        if (strncmp(why, bad[i].why, strlen(bad[i].why)) != 0) fail_msg("gave %s\nwant %s", why, bad[i].why);
+        assert_null(strchr(why, '\n'));
+    }
+    const char *nine =
+        "--can slcan --can slcan --can slcan --can slcan --can slcan --can slcan --can slcan --can slcan --can slcan";
+    assert_false(parse(nine));
+    assert_string_equal(why, "--can slcan: up to 8 adapters");
+}
+
+static void durations_have_units(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *text;
+        int64_t ns;
+    } rows[] = {
+        {"0", 0},   {"2", 2000000000},      {"2.5s", 2500000000},  {"300ms", 300000000}, {"7us", 7000},
+        {"9ns", 9}, {"2min", 120000000000}, {"1h", 3600000000000}, {"0.1s", 100000000},  {"1e6", 1000000000000000},
+    };
+    for (size_t i = 0; i < COUNT(rows); i++) {
+        int64_t ns = -1;
+        assert_true(options_duration(rows[i].text, &ns));
+        assert_int_equal(ns, rows[i].ns);
+    }
+    int64_t ns = 5;
+    assert_false(options_duration("1 s", &ns));
+    assert_false(options_duration("", &ns));
+    assert_int_equal(ns, 5);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(without_options_a_bench_for_socketcand_in_real_time),
+        cmocka_unit_test(every_option_reaches_its_field),
+        cmocka_unit_test(none_and_the_end_of_options_are_understood),
+        cmocka_unit_test(what_cannot_be_used_is_refused_in_one_line),
+        cmocka_unit_test(durations_have_units),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,179 @@
+/* Board profiles: the arithmetic of INT, what is refused and in which words, and the shipped files. */
+#include "psa2_profiles.h"
+
+#include <string.h>
+
+static void shipped_profiles_run_and_have_these_times(void **state)
+{
+    (void)state;
+    const struct {
+        const char *name;
+        unsigned clks;
+        int64_t int_low_ns;
+        unsigned steps;
+    } rows[] = {
+        {"article", 148, 74000, 6}, {"intent", 148, 74000, 5}, {"ungated", 148, 74000, 6}, {"w24", 108, 79101, 6},
+        {"w16", 76, 74218, 6},      {"lab32", 148, 74000, 6},  {"psa1", 148, 74000, 6},
+    };
+    for (size_t i = 0; i < COUNT(rows); i++) {
+        const struct psa2_profile p = psa2_profile_file(rows[i].name);
+        char why[300] = "";
+        assert_string_equal(p.name, rows[i].name);
+        if (!psa2_profile_check(&p, why, sizeof why)) fail_msg("%s: %s", rows[i].name, why);
+        assert_int_equal(psa2_frame_clks(&p), rows[i].clks);
+        assert_int_equal(psa2_int_low_ns(&p), rows[i].int_low_ns);
+        assert_int_equal(p.setup_count, rows[i].steps);
+        assert_int_equal(psa2_profile_period_ns(&p), 1000000);
+    }
+}
+
+static void the_default_is_the_file_article(void **state)
+{
+    (void)state;
+    const struct psa2_profile want = psa2_profile_default();
+    const struct psa2_profile got = psa2_profile_file("article");
+    for (unsigned i = 0; i < psa2_field_count; i++) {
+        const struct psa2_field *f = &psa2_fields[i];
+        const size_t size = f->type == PSA2_FIELD_STRING  ? strlen(want.name) + 1
+                            : f->type == PSA2_FIELD_REAL  ? sizeof(double)
+                            : f->type == PSA2_FIELD_BOOL  ? sizeof(bool)
+                            : f->type == PSA2_FIELD_WORDS ? sizeof want.word
+                            : f->type == PSA2_FIELD_SETUP ? 0
+                                                          : sizeof(unsigned);
+        if (memcmp((const char *)&want + f->offset, (const char *)&got + f->offset, size) != 0)
+            fail_msg("%s differs", f->key);
+    }
+    assert_int_equal(got.setup_count, want.setup_count);
+    for (unsigned i = 0; i < want.setup_count; i++) {
+        assert_int_equal(got.setup[i].on, want.setup[i].on);
+        assert_int_equal(got.setup[i].action, want.setup[i].action);
+        assert_int_equal(got.setup[i].count, want.setup[i].count);
+        assert_memory_equal(got.setup[i].bytes, want.setup[i].bytes, sizeof want.setup[i].bytes);
+    }
+}
+
+/* From "article", with these fields changed: the sentence. */
+static void what_a_board_cannot_run_is_refused_in_words(void **state)
+{
+    (void)state;
+    const struct {
+        const char *set[3][2];
+        const char *why;
+    } rows[] = {
+        {{{"lead_in_clk", "7"}},
+         "INT low = (7 + 4*32 + 3*4) CLK / 2.000 MHz = 73.500 us < 74 us: use lead_in_clk >= 8 or line_div >= 2"},
+        {{{"line_hz", "2048000"}, {"lead_in_clk", "0"}},
+         "INT low = (0 + 4*32 + 3*4) CLK / 2.048 MHz = 68.359 us < 74 us: use lead_in_clk >= 12 or line_div >= 2"},
+        {{{"word_bits", "16"}, {"code_bits", "16"}},
+         "INT low = (8 + 4*16 + 3*4) CLK / 2.000 MHz = 42.000 us < 74 us: use lead_in_clk >= 72 or line_div >= 2"},
+        {{{"word_bits", "24"}},
+         "INT low = (8 + 4*24 + 3*4) CLK / 2.000 MHz = 58.000 us < 74 us: use lead_in_clk >= 40 or line_div >= 2"},
+        {{{"word_bits", "16"}}, "code_bits = 24 do not fit into word_bits = 16: use code_bits <= 16 or longer words"},
+        {{{"word_bits", "20"}}, "word_bits = 20: use 16, 24 or 32"},
+        {{{"code_bits", "32"}}, "code_bits = 32 but only read_bits = 24 are read: use read_bits >= 32"},
+        {{{"sclk_hz", "2048000"}}, "sclk_hz = 2048000 > temp_clkin_hz / 4 = 1920000: use a slower SClk"},
+        {{{"fclk_hz", "1500000"}}, "sclk_hz = 1024000 > fclk_hz / 2 = 750000: use a slower SClk"},
+        {{{"sclk_hz", "200000"}}, "sclk_hz = 200000 < fclk_hz / 16 = 256000: use a faster SClk"},
+        {{{"adc_pga", "3"}}, "adc_pga = 3: use 1, 2, 4, 8, 16, 32 or 64"},
+        {{{"adc_is_1281", "true"}}, "adc_pga = 2: the ADS1281 has no gain stage, use 1 or adc_is_1281: false"},
+        {{{"line_div", "10"}}, "a word lasts 32 CLK / 0.200 MHz = 160.000 us > 150 us: use a faster CLK"},
+        {{{"word", "Y"}}, "word: each of X, Y, Z, T must be sent once"},
+        {{{"setup", "DRD_A write_A 41 00 51"}},
+         "setup: CONFIG0 = 51h is not modelled: use pulse sync (bit 7 = 0), DR 000 to 100, FILTR 10"},
+        {{{"setup", "DRD_A write_A 41 00 D6"}},
+         "setup: CONFIG0 = D6h is not modelled: use pulse sync (bit 7 = 0), DR 000 to 100, FILTR 10"},
+        {{{"setup", "DRD_A write_A 41 00 6E"}},
+         "setup: CONFIG0 = 6Eh is not modelled: use pulse sync (bit 7 = 0), DR 000 to 100, FILTR 10"},
+        {{{"setup", "DRD_A write_A 41 00 66"}, {"line_div", "4"}},
+         "reading 24 bits at 1.024 MHz (27.390 us) and INT low (296.000 us) make 323.390 us > data period 250.000 us: "
+         "use a faster sclk_hz or CLK, or a lower data rate in setup"},
+    };
+    for (size_t i = 0; i < COUNT(rows); i++) {
+        struct psa2_profile p = psa2_profile_default();
+        char why[300] = "";
+        for (int k = 0; k < 3 && rows[i].set[k][0]; k++)
+            if (!psa2_profile_set(&p, rows[i].set[k][0], 0, rows[i].set[k][1], why, sizeof why)) fail_msg("%s", why);
+        if (psa2_profile_check(&p, why, sizeof why)) fail_msg("row %zu passed", i);
+        assert_string_equal(why, rows[i].why);
+    }
+}
+
+static void texts_that_are_no_values_leave_the_profile_alone(void **state)
+{
+    (void)state;
+    const struct {
+        const char *key;
+        unsigned index;
+        const char *text, *why;
+    } rows[] = {
+        {"colour", 0, "red",
+         "colour: unknown key; known here: name, fclk_hz, temp_clkin_hz, sclk_hz, line_hz, line_div, word_bits, "
+         "lead_in_clk, word, code_bits, read_bits, gate_sclk, temp_channels, adc_is_1281, adc_vref_v, adc_pga, "
+         "temp_vref_v, temp_sensor_a_per_k, temp_load_ohm, setup"},
+        {"word_bits", 0, "thirty", "word_bits: \"thirty\" is not an integer of 16 .. 32"},
+        {"word_bits", 0, "-24", "word_bits: \"-24\" is not an integer of 16 .. 32"},
+        {"word_bits", 0, "33", "word_bits: \"33\" is not an integer of 16 .. 32"},
+        {"adc_vref_v", 0, "nan", "adc_vref_v: \"nan\" is not a number of 0.5 .. 5.5"},
+        {"adc_vref_v", 0, "5 V", "adc_vref_v: \"5 V\" is not a number of 0.5 .. 5.5"},
+        {"gate_sclk", 0, "yes", "gate_sclk: \"yes\" is not true or false"},
+        {"name", 0, "", "name: \"\" is not 1 to 31 characters"},
+        {"name", 0, "a-name-of-more-than-thirty-one-characters",
+         "name: \"a-name-of-more-than-thirty-one-character\" is not 1 to 31 characters"},
+        {"word", 4, "X", "word: more than 4 elements"},
+        {"word", 0, "XY", "word: \"XY\" is not one of X, Y, Z, T"},
+        {"setup", 16, "DRD_T sync_T", "setup: more than 16 elements"},
+        {"setup", 0, "DRD_A write_A",
+         "setup: \"DRD_A write_A\" is not like \"DRD_A write_A 41 00 56\" or \"DRD_T sync_T\""},
+        {"setup", 0, "DRD_A write_A 100",
+         "setup: \"DRD_A write_A 100\" is not like \"DRD_A write_A 41 00 56\" or \"DRD_T sync_T\""},
+        {"setup", 0, "DRD_A sync_A 00",
+         "setup: \"DRD_A sync_A 00\" is not like \"DRD_A write_A 41 00 56\" or \"DRD_T sync_T\""},
+        {"setup", 0, "DRD_B sync_A",
+         "setup: \"DRD_B sync_A\" is not like \"DRD_A write_A 41 00 56\" or \"DRD_T sync_T\""},
+        {"setup", 0, "DRD_A write_A 1 2 3 4 5 6 7 8 9",
+         "setup: \"DRD_A write_A 1 2 3 4 5 6 7 8 9\" is not like \"DRD_A write_A 41 00 56\" or \"DRD_T sync_T\""},
+    };
+    for (size_t i = 0; i < COUNT(rows); i++) {
+        struct psa2_profile p;
+        struct psa2_profile before;
+        memset(&p, 0x5A, sizeof p);
+        memcpy(&before, &p, sizeof p);
+        char why[400] = "";
+        assert_false(psa2_profile_set(&p, rows[i].key, rows[i].index, rows[i].text, why, sizeof why));
+        assert_string_equal(why, rows[i].why);
+        assert_memory_equal(&p, &before, sizeof p);
+    }
+}
+
+/* CONFIG0 as the set-up writes it -> data period. */
+static void the_data_period_follows_config0(void **state)
+{
+    (void)state;
+    const struct {
+        const char *step;
+        int64_t period_ns;
+    } rows[] = {
+        {"DRD_A write_A 41 00 46", 4000000}, {"DRD_A write_A 41 00 4E", 2000000}, {"DRD_A write_A 41 00 56", 1000000},
+        {"DRD_A write_A 41 00 5E", 500000},  {"DRD_A write_A 41 00 66", 250000},  {"DRD_A write_A 41 00 51", 31250},
+        {"DRD_A write_A 42 00 09", 1000000}, {"DRD_T write_T 41 00 66", 1000000},
+    };
+    for (size_t i = 0; i < COUNT(rows); i++) {
+        struct psa2_profile p = psa2_profile_default();
+        char why[100];
+        assert_true(psa2_profile_set(&p, "setup", 0, rows[i].step, why, sizeof why));
+        assert_int_equal(p.setup_count, 1);
+        assert_int_equal(psa2_profile_period_ns(&p), rows[i].period_ns);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(shipped_profiles_run_and_have_these_times),
+        cmocka_unit_test(the_default_is_the_file_article),
+        cmocka_unit_test(what_a_board_cannot_run_is_refused_in_words),
+        cmocka_unit_test(texts_that_are_no_values_leave_the_profile_alone),
+        cmocka_unit_test(the_data_period_follows_config0),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,209 @@
+#include "rig.h"
+
+#include "base/rng.h"
+#include "trace/trace.h"
+
+#include <string.h>
+
+#define HEARD_MAX 4096
+
+struct heard {
+    unsigned sig;
+    bool level;
+    int64_t t_ns;
+};
+
+struct ear { /* a sink that writes down what it hears */
+    struct trace_sink sink;
+    struct heard heard[HEARD_MAX];
+    int count;
+    int64_t advanced_ns;
+};
+
+static struct trace trace;
+static struct ear ear, other;
+
+static void hear(void *ctx, unsigned sig, bool level, int64_t t_ns)
+{
+    struct ear *e = ctx;
+    assert_true(e->count < HEARD_MAX);
+    e->heard[e->count++] = (struct heard){sig, level, t_ns};
+}
+
+static void hear_advance(void *ctx, int64_t t_ns)
+{
+    ((struct ear *)ctx)->advanced_ns = t_ns;
+}
+
+static void listen(struct ear *e, uint32_t mask)
+{
+    *e = (struct ear){.sink = {.mask = mask, .change = hear, .advance = hear_advance, .ctx = e}};
+    trace_attach(&trace, &e->sink);
+}
+
+static int fresh(void **state)
+{
+    (void)state;
+    trace_init(&trace);
+    trace_add(&trace, "Int", true);
+    trace_add(&trace, "Data", false);
+    trace_add(&trace, "CLK", false);
+    return 0;
+}
+
+static void assert_heard(const struct ear *e, const struct heard *want, int count)
+{
+    assert_int_equal(e->count, count);
+    for (int i = 0; i < count; i++) {
+        assert_int_equal(e->heard[i].t_ns, want[i].t_ns);
+        assert_int_equal(e->heard[i].sig, want[i].sig);
+        assert_int_equal(e->heard[i].level, want[i].level);
+    }
+}
+
+static void signals_are_found_by_name(void **state)
+{
+    (void)state;
+    assert_int_equal(trace_find(&trace, "CLK"), 2);
+    assert_int_equal(trace_find(&trace, "Int"), 0);
+    assert_int_equal(trace_find(&trace, "clk"), -1);
+}
+
+static void edges_come_in_order_of_time_then_of_report(void **state)
+{
+    (void)state;
+    listen(&ear, 7);
+    ear.count = 0;
+    trace_set(&trace, 2, true, 300);
+    trace_set(&trace, 1, true, 100);
+    trace_set(&trace, 0, false, 300); /* reported after CLK at the same instant */
+    trace_set(&trace, 2, false, 200); /* low already then: no change */
+    trace_advance(&trace, 99);
+    assert_int_equal(ear.count, 0);
+    trace_advance(&trace, 300);
+    const struct heard want[] = {{1, true, 100}, {2, true, 300}, {0, false, 300}};
+    assert_heard(&ear, want, COUNT(want));
+    assert_int_equal(ear.advanced_ns, 300);
+    assert_int_equal(trace.late, 0);
+}
+
+static void only_real_changes_are_told(void **state)
+{
+    (void)state;
+    listen(&ear, 7);
+    ear.count = 0;
+    for (int i = 0; i < 10; i++) trace_set(&trace, 1, i >= 5, 10 * i);
+    trace_advance(&trace, 1000);
+    const struct heard want[] = {{1, true, 50}};
+    assert_heard(&ear, want, COUNT(want));
+}
+
+static void a_sink_first_hears_the_levels_and_only_its_own_signals(void **state)
+{
+    (void)state;
+    trace_set(&trace, 1, true, 40); /* nobody listens: kept as the level, nothing pending */
+    assert_int_equal(trace.pending_count, 0);
+    trace_advance(&trace, 500);
+    listen(&ear, 3);
+    const struct heard want[] = {{0, true, 500}, {1, true, 500}};
+    assert_heard(&ear, want, COUNT(want));
+    trace_set(&trace, 2, true, 600);
+    trace_advance(&trace, 700);
+    assert_int_equal(ear.count, 2);
+    listen(&other, 4);
+    const struct heard late[] = {{2, true, 700}};
+    assert_heard(&other, late, COUNT(late));
+}
+
+static void nobody_listening_costs_no_work_and_detaching_keeps_the_levels(void **state)
+{
+    (void)state;
+    assert_false(trace_watched(&trace, ~0u));
+    listen(&ear, 1);
+    listen(&other, 6);
+    assert_true(trace_watched(&trace, 4));
+    trace_set(&trace, 2, true, 800);
+    trace_detach(&trace, &other.sink);
+    trace_detach(&trace, &other.sink); /* twice is harmless */
+    assert_false(trace_watched(&trace, 6));
+    trace_set(&trace, 2, false, 850); /* nobody's, but an edge of the same line is still on its way */
+    trace_set(&trace, 0, false, 900);
+    trace_detach(&trace, &ear.sink);
+    assert_int_equal(trace.pending_count, 0);
+    assert_int_equal(trace.level, 0); /* Int and CLK fell, though nobody heard it */
+    assert_int_equal(ear.count, 1);
+}
+
+static void an_edge_behind_the_window_is_counted_and_told_now(void **state)
+{
+    (void)state;
+    listen(&ear, 7);
+    trace_advance(&trace, 1000);
+    ear.count = 0;
+    trace_set(&trace, 1, true, 999);
+    trace_advance(&trace, 1100);
+    const struct heard want[] = {{1, true, 1000}};
+    assert_heard(&ear, want, COUNT(want));
+    assert_int_equal(trace.late, 1);
+}
+
+static void a_full_window_drops_and_counts(void **state)
+{
+    (void)state;
+    listen(&ear, 7);
+    for (unsigned i = 0; i < TRACE_PENDING_MAX + 3; i++) trace_set(&trace, 1, true, 10);
+    assert_int_equal(trace.dropped, 3);
+    trace_advance(&trace, 10);
+    assert_int_equal(trace.pending_count, 0);
+}
+
+/* Random reports within a window against the definition: stable sort by time, then filter. */
+static void random_reports_come_out_sorted(void **state)
+{
+    (void)state;
+
+    struct rng rng = rng_stream(rig_seed(11), 1, "test");
+    static struct heard in[2000];
+    bool level[3] = {true, false, false};
+    listen(&ear, 7);
+    ear.count = 0;
+    for (int i = 0; i < 2000; i++) {
+        const int64_t base_ns = 20 * i;
+        in[i] =
+            (struct heard){(unsigned)(rng_u64(&rng) % 3), rng_u64(&rng) & 1, base_ns + (int64_t)(rng_u64(&rng) % 500)};
+        trace_set(&trace, in[i].sig, in[i].level, in[i].t_ns);
+        trace_advance(&trace, base_ns);
+    }
+    trace_advance(&trace, INT64_C(1000000));
+    for (int i = 1; i < 2000; i++) { /* insertion sort is stable */
+        const struct heard e = in[i];
+        int j = i;
+        for (; j > 0 && in[j - 1].t_ns > e.t_ns; j--) in[j] = in[j - 1];
+        in[j] = e;
+    }
+    int n = 0;
+    for (int i = 0; i < 2000; i++) {
+        if (level[in[i].sig] == in[i].level) continue;
+        level[in[i].sig] = in[i].level;
+        assert_true(n < ear.count);
+        assert_heard(&(struct ear){.heard = {ear.heard[n]}, .count = 1}, &in[i], 1);
+        n++;
+    }
+    assert_int_equal(n, ear.count);
+    assert_int_equal(trace.late, 0);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup(signals_are_found_by_name, fresh),
+        cmocka_unit_test_setup(edges_come_in_order_of_time_then_of_report, fresh),
+        cmocka_unit_test_setup(only_real_changes_are_told, fresh),
+        cmocka_unit_test_setup(a_sink_first_hears_the_levels_and_only_its_own_signals, fresh),
+        cmocka_unit_test_setup(nobody_listening_costs_no_work_and_detaching_keeps_the_levels, fresh),
+        cmocka_unit_test_setup(an_edge_behind_the_window_is_counted_and_told_now, fresh),
+        cmocka_unit_test_setup(a_full_window_drops_and_counts, fresh),
+        cmocka_unit_test_setup(random_reports_come_out_sorted, fresh),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

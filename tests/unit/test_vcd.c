@@ -1,0 +1,180 @@
+#include "rig.h"
+
+#include "trace/vcd.h"
+
+#include <errno.h>
+#include <string.h>
+
+static struct trace trace;
+static struct vcd vcd;
+static char text[1 << 20];
+
+static int fresh(void **state)
+{
+    (void)state;
+    trace_init(&trace);
+    trace_add(&trace, "Int", true);
+    trace_add(&trace, "CLK", false);
+    return 0;
+}
+
+static FILE *open_vcd(uint32_t unit_ns)
+{
+    FILE *f = tmpfile();
+    assert_non_null(f);
+    const struct vcd_cfg cfg = {.out = f, .scope = "unit1", .unit_ns = unit_ns, .mask = 3};
+    assert_true(vcd_open(&vcd, &cfg, &trace));
+    return f;
+}
+
+static const char *read_back(FILE *f)
+{
+    rewind(f);
+    const size_t n = fread(text, 1, sizeof text - 1, f);
+    text[n] = '\0';
+    return text;
+}
+
+#define HEADER(unit)                                                                                                   \
+    "$version psabench $end\n$timescale " unit " $end\n$scope module unit1 $end\n$var wire 1 ! Int $end\n"             \
+    "$var wire 1 \" CLK $end\n$upscope $end\n$enddefinitions $end\n"
+
+static void the_file_is_what_ieee_1364_says_and_ends_after_the_last_edge(void **state)
+{
+    (void)state;
+    FILE *f = open_vcd(10);
+    trace_set(&trace, 0, false, 1000);
+    trace_set(&trace, 1, true, 1250);
+    trace_set(&trace, 1, false, 1500);
+    trace_set(&trace, 0, true, 1500);
+    trace_advance(&trace, 1500);
+    vcd_close(&vcd, 1500); /* the run ended on the edge itself */
+    assert_string_equal(read_back(f), HEADER("10 ns") "#0\n$dumpvars\n1!\n0\"\n$end\n"
+                                                      "#100\n0!\n#125\n1\"\n#150\n0\"\n1!\n#151\n");
+    assert_int_equal(vcd_error(&vcd), 0);
+    assert_int_equal(vcd.changes, 4);
+    fclose(f);
+}
+
+static void times_are_rounded_down_to_the_unit(void **state)
+{
+    (void)state;
+    const struct {
+        uint32_t unit_ns;
+        const char *name;
+        int64_t t_ns, units;
+    } row[] = {
+        {1, "1 ns", 244, 244},           {10, "10 ns", 244, 24},
+        {10, "10 ns", 249, 24},          {10, "10 ns", 250, 25},
+        {100, "100 ns", 99, 0},          {1000, "1 us", 74000, 74},
+        {1000000, "1 ms", 63090000, 63}, {10, "10 ns", INT64_C(3600000000000), INT64_C(360000000000)}, /* an hour */
+    };
+    for (size_t i = 0; i < COUNT(row); i++) {
+        fresh(NULL);
+        FILE *f = open_vcd(row[i].unit_ns);
+        trace_set(&trace, 1, true, row[i].t_ns);
+        trace_advance(&trace, row[i].t_ns);
+        vcd_close(&vcd, row[i].t_ns);
+        char want[64], scale[64];
+        snprintf(want, sizeof want, "%s%lld\n1\"\n#%lld\n", row[i].units ? "#" : "", (long long)row[i].units,
+                 (long long)row[i].units + 1);
+        snprintf(scale, sizeof scale, "$timescale %s $end\n", row[i].name);
+        read_back(f);
+        assert_non_null(strstr(text, row[i].units ? want : "$end\n1\"\n#1\n"));
+        assert_non_null(strstr(text, scale));
+        fclose(f);
+    }
+}
+
+static void a_unit_that_vcd_does_not_know_is_refused(void **state)
+{
+    (void)state;
+    const uint32_t unit[] = {0, 2, 25, 50, 250, 1000000000};
+    for (size_t i = 0; i < COUNT(unit); i++) {
+        const struct vcd_cfg cfg = {.out = stdout, .scope = "x", .unit_ns = unit[i], .mask = 3};
+        assert_false(vcd_open(&vcd, &cfg, &trace));
+        assert_null(trace.sinks);
+    }
+}
+
+static void a_late_start_begins_at_its_own_time(void **state)
+{
+    (void)state;
+    trace_set(&trace, 1, true, 100);
+    trace_advance(&trace, 5000);
+    FILE *f = open_vcd(10);
+    vcd_close(&vcd, 6000);
+    assert_string_equal(read_back(f), HEADER("10 ns") "#500\n$dumpvars\n1!\n1\"\n$end\n#600\n");
+    fclose(f);
+}
+
+static void a_flushed_file_can_be_looked_at_while_it_grows(void **state)
+{
+    (void)state;
+    FILE *f = open_vcd(10);
+    trace_set(&trace, 1, true, 100);
+    trace_advance(&trace, 400);
+    vcd_flush(&vcd);
+    assert_non_null(strstr(read_back(f), "#10\n1\"\n#40\n"));
+    trace_set(&trace, 1, false, 400);
+    trace_advance(&trace, 400);
+    vcd_flush(&vcd);
+    vcd_close(&vcd, 400);
+    assert_non_null(strstr(read_back(f), "#10\n1\"\n#40\n0\"\n#41\n"));
+    fclose(f);
+}
+
+/* More than the buffer holds: every line arrives, whole and in order. */
+static void long_recordings_survive_the_buffer(void **state)
+{
+    (void)state;
+    FILE *f = open_vcd(1);
+    for (int i = 1; i <= 30000; i++) {
+        trace_set(&trace, 1, i & 1, 10 * i);
+        trace_advance(&trace, 10 * i);
+    }
+    vcd_close(&vcd, 400000);
+    const char *p = strstr(read_back(f), "$end\n#10\n");
+    assert_non_null(p);
+    p += 5;
+    for (int i = 1; i <= 30000; i++) {
+        char want[32];
+        const int n = snprintf(want, sizeof want, "#%d\n%d\"\n", 10 * i, i & 1);
+        assert_memory_equal(p, want, (size_t)n);
+        p += n;
+    }
+    assert_string_equal(p, "#400000\n");
+    fclose(f);
+}
+
+static void a_full_disk_is_told_once_and_stops_nothing(void **state)
+{
+    (void)state;
+    FILE *f = fopen("/dev/full", "w");
+    if (!f) skip();
+    const struct vcd_cfg cfg = {.out = f, .scope = "unit1", .unit_ns = 10, .mask = 3};
+    assert_true(vcd_open(&vcd, &cfg, &trace));
+    for (int i = 1; i <= 30000; i++) {
+        trace_set(&trace, 1, i & 1, 10 * i);
+        trace_advance(&trace, 10 * i);
+    }
+    assert_int_equal(vcd_error(&vcd), ENOSPC);
+    assert_int_equal(vcd_error(&vcd), 0);
+    vcd_close(&vcd, 400000);
+    assert_int_equal(vcd_error(&vcd), 0);
+    fclose(f);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup(the_file_is_what_ieee_1364_says_and_ends_after_the_last_edge, fresh),
+        cmocka_unit_test(times_are_rounded_down_to_the_unit),
+        cmocka_unit_test_setup(a_unit_that_vcd_does_not_know_is_refused, fresh),
+        cmocka_unit_test_setup(a_late_start_begins_at_its_own_time, fresh),
+        cmocka_unit_test_setup(a_flushed_file_can_be_looked_at_while_it_grows, fresh),
+        cmocka_unit_test_setup(long_recordings_survive_the_buffer, fresh),
+        cmocka_unit_test_setup(a_full_disk_is_told_once_and_stops_nothing, fresh),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,201 @@
+#include "rig.h"
+
+#include "app/profile_yaml.h"
+#include "app/scenario_yaml.h"
+
+#include <string.h>
+#include <unistd.h>
+
+static struct scenario s;
+static char why[1024];
+
+static bool parse(const char *text)
+{
+    why[0] = '\0';
+    return scenario_parse("dir/s.yaml", text, strlen(text), &s, why, sizeof why);
+}
+
+static void a_scenario_without_more_than_a_unit_has_sound_defaults(void **state)
+{
+    (void)state;
+    if (!parse("units: [{}]\n")) fail_msg("%s", why);
+    assert_int_equal(s.seed, 1);
+    assert_int_equal(s.bus.bitrate_hz, 1000000);
+    assert_int_equal(s.unit_count, 1);
+    assert_string_equal(s.units[0].name, "a");
+    assert_int_equal(s.units[0].cfg.node, 5);
+    assert_string_equal(s.units[0].profile.name, "article");
+    assert_int_equal(s.units[0].cfg.axis[0].sensor, UNIT_NO_SENSOR);
+    assert_false(s.start);
+}
+
+static void every_key_reaches_its_field(void **state)
+{
+    (void)state;
+    const bool ok =
+        parse("seed: 18446744073709551615\n"
+              "start: true\n"
+              "bus: {bitrate_hz: 500000, data_bitrate_hz: 2000000}\n"
+              "site: {g_mps2: 9.7803}\n"
+              "head: {resolution_arcsec: 1, setting_error_arcsec_rms: 2, periodic_arcsec: 3, periodic_order: 4,\n"
+              "       mount_error_arcsec_rms: 5, turn_s: 6}\n"
+              "units:\n"
+              "  - name: left\n"
+              "    node: 9\n"
+              "    serial: 77\n"
+              "    frame_form: 2\n"
+              "    temp_degc: [1, 2, 3, 4]\n"
+              "    adc_noise_scale: 0.5\n"
+              "    profile_set: {word_bits: 24, line_hz: 4096000, line_div: 3, word: [T, Z, Y, X]}\n"
+              "    axes:\n"
+              "      y: {sensor: mems, u0_v: -0.25, kxy_v_per_g2: 1e-3, alpha0_deg: 0.1121,\n"
+              "          afe: {input: current, load_ohm: 999, load_tol_ppm: -12}}\n");
+    if (!ok) fail_msg("%s", why);
+    assert_true(s.seed == UINT64_MAX && s.start);
+    assert_int_equal(s.bus.bitrate_hz, 500000);
+    assert_int_equal(s.bus.data_bitrate_hz, 2000000);
+    assert_true(s.site.g_mps2 == 9.7803);
+    assert_true(s.head.resolution_arcsec == 1 && s.head.setting_error_arcsec_rms == 2 && s.head.periodic_arcsec == 3);
+    assert_true(s.head.periodic_order == 4 && s.head.mount_error_arcsec_rms == 5 && s.head.turn_s == 6);
+    const struct scenario_unit *u = &s.units[0];
+    assert_string_equal(u->name, "left");
+    assert_int_equal(u->cfg.node, 9);
+    assert_int_equal(u->cfg.board.serial, 77);
+    assert_int_equal(u->frame_form, 2);
+    assert_true(u->cfg.temp_degc[0] == 1 && u->cfg.temp_degc[3] == 4);
+    assert_true(u->cfg.board.adc_noise_scale == 0.5 && u->cfg.board.temp_noise_scale == 1);
+    assert_int_equal(u->profile.word_bits, 24);
+    assert_int_equal(u->profile.word[0], PSA2_WORD_T);
+    assert_int_equal(u->cfg.axis[1].sensor, UNIT_MEMS);
+    assert_true(u->cfg.axis[1].mems.u0_v == -0.25 && u->cfg.axis[1].mems.kxy_v_per_g2 == 1e-3);
+    assert_true(u->cfg.axis[1].mems.alpha0_deg == 0.1121);
+    assert_int_equal(u->cfg.board.afe[1].input, AFE_CURRENT);
+    assert_true(u->cfg.board.afe[1].load_ohm == 999 && u->cfg.board.afe[1].load_tol_ppm == -12);
+    assert_true(u->cfg.board.afe[0].load_ohm == 1000); /* the other axes keep the nominal chain */
+}
+
+static const struct {
+    const char *text, *why; /* the whole line, or its beginning */
+} bad[] = {
+    {"", "dir/s.yaml:1: empty: a mapping `key: value` is wanted"},
+    {"- 1\n", "dir/s.yaml:1: a mapping `key: value` is wanted"},
+    {"units: [{}]\nseed: -1\n", "dir/s.yaml:2: seed: \"-1\" is not an integer of 0 or more"},
+    {"units: [{}]\nseed: [1]\n", "dir/s.yaml:2: seed: one value of up to 128 characters is wanted"},
+    {"units: [{}]\nsead: 1\n", "dir/s.yaml:2: sead: unknown key; known here: seed, start, bus, site, head, units"},
+    {"seed: 1\nseed: 2\nunits: [{}]\n", "dir/s.yaml:2: seed: comes twice"},
+    {"seed: 1\n", "dir/s.yaml:1: units: at least one unit is wanted"},
+    {"units: 5\n", "dir/s.yaml:1: units: a sequence of units is wanted"},
+    {"units: [5]\n", "dir/s.yaml:1: units.a: a mapping `key: value` is wanted"},
+    {"units: [{}]\nstart: yes\n", "dir/s.yaml:2: start: \"yes\": true or false is wanted"},
+    {"bus:\n  bitrate_hz: 2e6\n", "dir/s.yaml:2: bus.bitrate_hz: \"2e6\" is not an integer of 0 or more"},
+    {"bus:\n  bitrate_hz: 1000001\n", "dir/s.yaml:2: bus.bitrate_hz: 1000001 is outside 0 ... 1000000"},
+    {"bus: {bitrate_hz: 9999}\nunits: [{}]\n", "dir/s.yaml:1: bus.bitrate_hz: 9999 is below 10000; 0 is a bus"},
+    {"units:\n  - name: a\n    node: 0\n", "dir/s.yaml:3: units.a.node: 0 is outside 1 ... 127"},
+    {"units:\n  - {name: a}\n  - {name: a}\n", "dir/s.yaml:3: units.a.name: \"a\" is taken by another unit"},
+    {"units:\n  - {node: 5}\n  - {node: 5}\n", "dir/s.yaml:3: units.b.node: 5 is taken by unit a; each needs its own"},
+    {"units:\n  - {serial: 2}\n  - {}\n", "dir/s.yaml:3: units.b.serial: 2 is taken by unit a; each needs its own"},
+    {"units: [{name: \"a b\"}]\n", "dir/s.yaml:1: units.a b.name: \"a b\": letters, digits and _ are wanted"},
+    {"units: [{board: psd1}]\n", "dir/s.yaml:1: units.a.board: psa2 or psa1 is wanted"},
+    {"units: [{profile: nope}]\n", "dir/s.yaml:1: units.a.profile: nope: no such file in proto/profiles"},
+    {"units: [{profile: ./nope.yaml}]\n", "dir/s.yaml:1: units.a.profile: dir/./nope.yaml: no such file"},
+    {"units:\n- profile_set:\n    word_bits: 20\n",
+     "dir/s.yaml:3: units.a.profile_set: word_bits = 20: use 16, 24 or 32"},
+    {"units:\n- profile_set: {lead_in_clk: 0}\n",
+     "dir/s.yaml:2: units.a.profile_set: INT low"}, /* INT low would be 70 us */
+    {"units:\n- profile_set: {word: [X, Y, Z]}\n", "dir/s.yaml:2: units.a.profile_set.word: 3 elements; 4 are wanted"},
+    {"units:\n- profile_set:\n    wrod: [X, Y, Z, T]\n",
+     "dir/s.yaml:3: units.a.profile_set.wrod: unknown key; known here: name, fclk_hz, temp_clkin_hz, "},
+    {"units: [{profile_set: 5}]\n", "dir/s.yaml:1: units.a.profile_set: a mapping `key: value` is wanted"},
+    {"units: [{profile_set: {word_bits: 24, word_bits: 32}}]\n",
+     "dir/s.yaml:1: units.a.profile_set.word_bits: comes twice"},
+    {"units: [{profile_set: {word_bits: 32}, nod: 5}]\n", "dir/s.yaml:1: units.a.nod: unknown key"},
+    {"units: [{temp_degc: [1, 2]}]\n", "dir/s.yaml:1: units.a.temp_degc: one value or four"},
+    {"units: [{temp_degc: 200}]\n", "dir/s.yaml:1: units.a.temp_degc: 200 is outside -60 ... 125"},
+    {"units:\n  - axes:\n      x:\n        sensor: gyro\n",
+     "dir/s.yaml:4: units.a.axes.x.sensor: mems or none is wanted"},
+    {"units:\n  - axes:\n      x:\n        u0_v: 2,5\n", "dir/s.yaml:4: units.a.axes.x.u0_v: \"2,5\" is not a number"},
+    {"units:\n  - axes:\n      x:\n        u0_v: nan\n", "dir/s.yaml:4: units.a.axes.x.u0_v: \"nan\" is not a number"},
+    {"units: [{axes: {w: {}}}]\n", "dir/s.yaml:1: units.a.axes.w: unknown key; known here: x, y, z"},
+    {"units: [{axes: {x: {afe: {input: tube}}}}]\n",
+     "dir/s.yaml:1: units.a.axes.x.afe.input: current or voltage is wanted"},
+    {"units: [{}, {}, {}, {}, {}, {}, {}, {}, {}]\n", "dir/s.yaml:1: units: up to 8 are wanted"},
+    {"units: [{}\n", "dir/s.yaml:2: not YAML: "},
+    {"a: b: c\n", "dir/s.yaml:1: not YAML: "},
+    {"seed: \t\n\t- x", "dir/s.yaml:"},
+    {"seed: \"1\\0\"\nunits: [{}]\n", "dir/s.yaml:1: seed: one value"}, /* a NUL would hide what follows */
+};
+
+static void what_is_wrong_is_told_with_file_line_key_and_remedy(void **state)
+{
+    (void)state;
+    for (size_t i = 0; i < COUNT(bad); i++) {
+        if (parse(bad[i].text)) fail_msg("accepted:\n%s", bad[i].text);
+        if (strncmp(why, bad[i].why, strlen(bad[i].why)) != 0)
+            fail_msg("%s\n  gave %s\n  want %s", bad[i].text, why, bad[i].why);
+        assert_null(strchr(why, '\n'));
+    }
+}
+
+static void a_profile_named_after_its_change_is_refused(void **state)
+{
+    (void)state;
+    assert_false(parse("units: [{profile_set: {name: x}, profile: article}]\n"));
+    assert_non_null(strstr(why, "stands after profile_set"));
+}
+
+static void cut_off_anywhere_a_scenario_is_refused_or_sound(void **state)
+{
+    (void)state;
+    static const char text[] =
+        "seed: 3\nhead: {turn_s: 2}\nunits:\n  - {name: q, axes: {x: {sensor: mems, u0_v: 2.5}}}\n";
+    for (size_t n = 0; n < sizeof text - 1; n++) {
+        why[0] = '\0';
+        const bool ok = scenario_parse("cut", text, n, &s, why, sizeof why);
+        assert_true(ok ? s.unit_count == 1 : strlen(why) > 0);
+    }
+}
+
+/* The files that are shipped; the tests run in the root of the repository. */
+static void the_shipped_scenarios_and_profiles_load(void **state)
+{
+    (void)state;
+    static const char *const scenarios[] = {"calibrate", "quiet", "stream", "fast", "multi"};
+    static const char *const profiles[] = {"article", "intent", "ungated", "w24", "w16", "lab32", "psa1"};
+    if (access("proto/scenarios", R_OK) != 0) skip();
+    for (size_t i = 0; i < COUNT(scenarios); i++) {
+        if (!scenario_load(scenarios[i], &s, why, sizeof why)) fail_msg("%s", why);
+    }
+    for (size_t i = 0; i < COUNT(profiles); i++) {
+        char path[FIND_PATH_MAX];
+        struct psa2_profile p;
+        assert_true(find_proto("profiles", profiles[i], NULL, path, why, sizeof why));
+        if (!profile_yaml_load(path, &p, why, sizeof why)) fail_msg("%s", why);
+        assert_string_equal(p.name, profiles[i]);
+    }
+    assert_true(scenario_load("fast", &s, why, sizeof why));
+    assert_int_equal(psa2_profile_period_ns(&s.units[0].profile), 250000);
+}
+
+static void a_missing_scenario_is_told_in_one_line(void **state)
+{
+    (void)state;
+    assert_false(scenario_load("nope", &s, why, sizeof why));
+    assert_string_equal(why, "nope: no such file in proto/scenarios; a path, or a name from there, is wanted: "
+                             "calibrate, fast, multi, quiet, stream");
+    assert_false(scenario_load("./nope.yaml", &s, why, sizeof why));
+    assert_string_equal(why, "./nope.yaml: no such file, or not readable");
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_scenario_without_more_than_a_unit_has_sound_defaults),
+        cmocka_unit_test(every_key_reaches_its_field),
+        cmocka_unit_test(what_is_wrong_is_told_with_file_line_key_and_remedy),
+        cmocka_unit_test(a_profile_named_after_its_change_is_refused),
+        cmocka_unit_test(cut_off_anywhere_a_scenario_is_refused_or_sound),
+        cmocka_unit_test(the_shipped_scenarios_and_profiles_load),
+        cmocka_unit_test(a_missing_scenario_is_told_in_one_line),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,161 @@
+#!/usr/bin/env python3
+"""Who may include whom, and how large things may get: the shape of emu/, enforced by `make lint`.
+
+Usage: check_includes.py [ROOT]. Prints one line per breach and exits 1, or one line of figures and exits 0.
+"""
+
+import re
+import statistics
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+# folder of emu/ -> folders it may include besides itself; gen is generated from proto/
+MAY_INCLUDE = {
+    "base": set(),
+    "trace": {"base"},
+    "phys": {"base"},
+    "chip": {"base"},
+    "canopen": {"base"},
+    "gen": {"base", "canopen"},
+    "board": {"base", "chip", "phys", "trace", "canopen", "gen"},
+    "link": {"base"},
+    "control": {"base", "trace", "chip", "board", "phys", "canopen"},
+    "app": {"base", "trace", "chip", "board", "phys", "canopen", "gen", "link", "control"},
+}
+# C11 without the headers of clocks, signals, locales, threads and jumps: those are the operating system's business.
+C_HEADERS = set(
+    "assert complex ctype errno fenv float inttypes iso646 limits math stdalign stdarg stdbool stddef stdint "
+    "stdio stdlib stdnoreturn string tgmath".split()
+)
+OS_FOLDERS = {"link", "app"}
+LIBRARIES = {"cjson/cJSON.h": {"control", "app"}, "cJSON.h": {"control", "app"}, "yaml.h": {"app"}}
+
+FUNCTION_REASON, FUNCTION_MAX, FUNCTION_MEDIAN = 40, 70, 15  # lines, braces included
+SOURCE_MAX, HEADER_MAX = 500, 150  # lines
+REASON = re.compile(r"\blong:", re.IGNORECASE)  # in the comment above the function: "// Long: one row per opcode."
+INCLUDE = re.compile(r'\s*#\s*include\s+([<"])([^>"]+)[>"]')
+
+
+@dataclass(frozen=True)
+class Function:
+    """One function definition; lines counted from its opening brace to its closing one, both included."""
+
+    path: Path
+    line: int
+    name: str
+    length: int
+    has_reason: bool
+
+
+def functions(path: Path, text: list[str]) -> Iterator[Function]:
+    """Find function bodies: in our format a brace alone in the first column opens nothing else."""
+    start: int | None = None
+    for number, line in enumerate(text):
+        if line == "{":
+            start = number
+        elif line == "}" and start is not None:
+            head = (
+                start - 1
+            )  # up to the line after the last blank, closing or preprocessor one: signature, then comment
+            while head > 0 and text[head] and not text[head].startswith(("}", "#", "/*")):
+                head -= 1
+            above = text[head:start]
+            signature = " ".join(line for line in above if not line.startswith("//"))
+            name = re.search(r"(\w+)\s*\(", signature)
+            yield Function(
+                path,
+                start,
+                name.group(1) if name else "?",
+                number - start + 1,
+                any(line.startswith("//") and REASON.search(line) for line in above),
+            )
+            start = None
+
+
+def part_number(stem: str) -> str:
+    """ads1282_filter -> ads1282; empty for what is not named after a part."""
+    first = stem.split("_")[0]
+    return first if re.search(r"\d{3}", first) else ""
+
+
+def include_breach(path: Path, folder: str, bracket: str, target: str) -> str:
+    """What is wrong with this include, or nothing."""
+    if bracket == "<":
+        if target in LIBRARIES:
+            return (
+                "" if folder in LIBRARIES[target] else f"<{target}> belongs in {', '.join(sorted(LIBRARIES[target]))}"
+            )
+        if target.removesuffix(".h") in C_HEADERS or folder in OS_FOLDERS:
+            return ""
+        return f"<{target}> is an operating system's header: only {' and '.join(sorted(OS_FOLDERS))} may have those"
+    where, _, file = target.rpartition("/")
+    if folder == "gen" and not where:
+        return ""
+    if where not in MAY_INCLUDE:
+        return f'"{target}" must be written from the include root, as "base/sched.h"'
+    if where != folder and where not in MAY_INCLUDE[folder]:
+        return f'{folder} may not include {where} ("{target}")'
+    mine, theirs = part_number(path.stem), part_number(Path(file).stem)
+    if where == folder == "chip" and mine and theirs and mine != theirs:
+        return f'a chip never includes another chip ("{target}")'
+    return ""
+
+
+def check_file(path: Path, folder: str) -> tuple[list[str], list[Function]]:
+    """All breaches of one file, and its functions."""
+    text = path.read_text(encoding="utf-8").splitlines()
+    found: list[str] = []
+    includes = [(n, m.group(1), m.group(2)) for n, line in enumerate(text, 1) if (m := INCLUDE.match(line))]
+    for number, bracket, target in includes:
+        if breach := include_breach(path, folder, bracket, target):
+            found.append(f"{path}:{number}: {breach}")
+    own = f"{folder}/{path.stem}.h"
+    if folder == "gen":
+        return found, []
+    if path.suffix == ".c" and path.with_suffix(".h").exists() and (not includes or includes[0][2] != own):
+        found.append(f'{path}:1: the first include must be the own header, "{own}"')
+    limit = HEADER_MAX if path.suffix == ".h" else SOURCE_MAX
+    if len(text) > limit:
+        found.append(f"{path}:{limit + 1}: {len(text)} lines, at most {limit}")
+    bodies = list(functions(path, text))
+    for f in bodies:
+        if f.length > FUNCTION_MAX:
+            found.append(f"{path}:{f.line}: {f.name}() has {f.length} lines, at most {FUNCTION_MAX}")
+        elif f.length > FUNCTION_REASON and not f.has_reason:
+            found.append(f'{path}:{f.line}: {f.name}() has {f.length} lines: say why above it, "// Long: ..."')
+    return found, bodies
+
+
+def main(root: Path) -> int:
+    breaches: list[str] = []
+    bodies: list[Function] = []
+    files = 0
+    for folder in MAY_INCLUDE:
+        where = root / "build/gen" if folder == "gen" else root / "emu" / folder
+        for path in sorted([*where.glob("*.c"), *where.glob("*.h")]):
+            found, its = check_file(path, folder)
+            breaches += found
+            bodies += its
+            files += 1
+    strangers = {p.parent.name for p in (root / "emu").glob("*/*.[ch]")} - set(MAY_INCLUDE)
+    breaches += [f"emu/{name}: a folder that is not in the include table" for name in sorted(strangers)]
+    median = statistics.median([f.length for f in bodies] or [0])
+    if median > FUNCTION_MEDIAN:
+        breaches.append(f"emu: the median function has {median:g} lines, at most {FUNCTION_MEDIAN}")
+    for line in breaches:
+        print(line)
+    longest = max(bodies, key=lambda f: f.length, default=None)
+    with_reason = sorted(f"{f.name} {f.length}" for f in bodies if f.length > FUNCTION_REASON)
+    print(
+        f"includes and sizes: {files} files, {len(bodies)} functions, median {median:g} lines"
+        + (f", longest {longest.name}() {longest.length}" if longest else "")
+        + (f"; past {FUNCTION_REASON} lines: {', '.join(with_reason)}" if with_reason else "")
+        + (f"; {len(breaches)} breaches" if breaches else "")
+    )
+    return 1 if breaches else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path()))

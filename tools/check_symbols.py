@@ -1,0 +1,73 @@
+#!/usr/bin/env python3
+"""What the compiled core must not contain: mutable globals, allocation, output, clocks, inexact libm functions.
+
+Usage: check_symbols.py OBJECT_ROOT (build/obj). Reads every object below emu/ but those of link and app, which may do
+all this. Two compilers or machines give equal bytes only while no result depends on a libm whose last digit is its own.
+"""
+
+import subprocess
+import sys
+from pathlib import Path
+
+FREE_FOLDERS = {"link", "app"}
+ALLOCATOR_FOLDERS = {"control"}  # through cJSON
+LIBM = (
+    "sin cos tan asin acos atan atan2 sinh cosh tanh asinh acosh atanh exp exp2 expm1 "
+    "log log2 log10 log1p pow cbrt hypot erf erfc tgamma"
+)
+FORBIDDEN = {
+    **{
+        name + suffix: "differs between machines: use base/detmath.h"
+        for name in (*LIBM.split(), "sincos")
+        for suffix in ("", "f", "l")
+    },
+    **dict.fromkeys("malloc calloc realloc free strdup aligned_alloc".split(), "allocates"),
+    **dict.fromkeys(
+        "printf fprintf vprintf vfprintf puts putchar fputs perror __printf_chk __fprintf_chk".split(), "prints"
+    ),
+    **dict.fromkeys(
+        "time clock clock_gettime gettimeofday nanosleep usleep".split(), "reads a clock: time is an argument"
+    ),
+    **dict.fromkeys("rand srand random srandom drand48 getrandom".split(), "is not ours to seed: use base/rng.h"),
+    **dict.fromkeys("exit _exit abort getenv".split(), "is for emu/app to decide"),
+}
+
+
+def undefined(objects: Path) -> list[str]:
+    out = subprocess.run(["nm", "-u", "--format=posix", objects], capture_output=True, text=True, check=True).stdout
+    return [line.split()[0].split("@")[0] for line in out.splitlines()]
+
+
+def mutable(objects: Path) -> list[str]:
+    """Names of data objects in writable sections; .data.rel.ro is constant after loading."""
+    out = subprocess.run(["objdump", "-t", objects], capture_output=True, text=True, check=True).stdout
+    names = []
+    for line in out.splitlines():
+        fields = line.split()
+        section = next((f for f in fields if f in {"*COM*"} or f.startswith((".data", ".bss", ".tbss", ".tdata"))), "")
+        is_object = " O " in line[:30] or section == "*COM*"
+        if is_object and section and not section.startswith(".data.rel.ro"):
+            names.append(fields[-1])
+    return names
+
+
+def main(root: Path) -> int:
+    breaches = []
+    objects = sorted(root.glob("emu/*/*.o"))
+    for path in objects:
+        folder = path.parent.name
+        if folder in FREE_FOLDERS:
+            continue
+        source = f"emu/{folder}/{path.stem}.c"
+        breaches += [f"{source}: mutable global {name}" for name in mutable(path)]
+        for name in undefined(path):
+            if name in FORBIDDEN and not (folder in ALLOCATOR_FOLDERS and FORBIDDEN[name] == "allocates"):
+                breaches.append(f"{source}: calls {name}(), which {FORBIDDEN[name]}")
+    for line in breaches:
+        print(line)
+    print(f"symbols: {len(objects)} objects, {len(breaches)} breaches")
+    return 1 if breaches or not objects else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(Path(sys.argv[1] if len(sys.argv) > 1 else "build/obj")))
