@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,6 +16,7 @@ from psabench.can_host import CanHost, Message, WallClock
 from psabench.errors import BadInput, LinkError
 from psabench.frames import FrameCounters, FrameReader
 
+LOOK_S = 0.2  # real time between looks whether Ctrl-C was pressed
 FORMATS = sorted(MESSAGE_WRITERS)  # by ending: .log candump, .blf and .asc Vector, .mf4 (with asammdf) ...
 
 
@@ -30,16 +34,20 @@ class Recorded:
 def record(bus: can.BusABC, path: Path, node: int, for_s: float | None, count: int | None) -> Recorded:
     """Record until for_s of wall time or `count` messages have passed, or Ctrl-C, or the peer has gone.
 
-    The file is closed properly in every case. Raises BadInput for an ending that python-can does not know.
+    Call it on the main thread. The file is closed properly in every case, and holds just the messages that are counted.
+    Raises BadInput for an ending that python-can does not know.
     """
     if path.suffix not in FORMATS:
         raise BadInput(f"{path}: ending {path.suffix or 'missing'}; python-can writes {' '.join(FORMATS)}")
     reader = FrameReader(node)
-    stamps: list[float] = []
-    with CanHost(bus, WallClock()) as host, _writer(path) as log:
+    stamps: list[float] = []  # of the first and the last message
+    messages = 0
+    with _ctrl_c_noted() as pressed, CanHost(bus, WallClock()) as host, _writer(path) as log:
 
         def keep(m: Message) -> None:
+            nonlocal messages
             log(m)
+            messages += 1
             stamps[1:] = [m.timestamp]
             reader.on_message(m)
             if len(reader) >= 4096:
@@ -48,14 +56,23 @@ def record(bus: can.BusABC, path: Path, node: int, for_s: float | None, count: i
         host.listeners.append(keep)
         broken = None
         try:
-            _receive(host, for_s, count)
+            _receive(host, for_s, count, pressed)
         except LinkError as e:
             broken = str(e)
-        except KeyboardInterrupt:  # the usual way to end a recording
-            broken = None
         reader.take()
         first_s, last_s = (stamps[0], stamps[-1]) if stamps else (0.0, 0.0)
-        return Recorded(messages=host.received, first_s=first_s, last_s=last_s, counters=reader.counters, broken=broken)
+        return Recorded(messages=messages, first_s=first_s, last_s=last_s, counters=reader.counters, broken=broken)
+
+
+@contextmanager
+def _ctrl_c_noted() -> Iterator[Callable[[], bool]]:
+    """Ctrl-C is the usual way to end a recording; it takes effect between two messages, never inside one."""
+    pressed: list[int] = []
+    before = signal.signal(signal.SIGINT, lambda number, _: pressed.append(number))
+    try:
+        yield lambda: bool(pressed)
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def _writer(path: Path) -> MessageWriter:
@@ -65,10 +82,10 @@ def _writer(path: Path) -> MessageWriter:
         raise BadInput(f"{path}: {e.strerror}") from e
 
 
-def _receive(host: CanHost, for_s: float | None, count: int | None) -> None:
+def _receive(host: CanHost, for_s: float | None, count: int | None, stop: Callable[[], bool]) -> None:
     deadline_s = None if for_s is None else host.clock.now_s() + for_s
-    while count is None or host.received < count:
-        left_s = 0.5 if deadline_s is None else min(0.5, deadline_s - host.clock.now_s())
+    while not stop() and (count is None or host.received < count):
+        left_s = LOOK_S if deadline_s is None else min(LOOK_S, deadline_s - host.clock.now_s())
         if left_s <= 0.0:
             return
         host.receive(left_s)

@@ -246,6 +246,7 @@ def test_a_recording_is_complete_whatever_ends_it(make_rig: MakeRig, tmp_path: P
     with psabench("record", "--can", rig.spec, log) as record:
         try:
             until(lambda: len(rig.clients()) == 2 and rig.clients()[1]["delivered"] > 500, "the recording to run")
+            until(log.exists, "the recording's file")
             if how == "Ctrl-C":
                 record.send_signal(signal.SIGINT)
             elif how == "emulator ends":
