@@ -1,0 +1,153 @@
+/* libpsabench: converter chips and boards, register by register and edge by edge, for somebody else's program.
+ *
+ * A driver under test is linked or shimmed against a part on a simulated bench: the program moves the pins or exchanges
+ * SPI bytes, lets simulated time pass, and gives the input voltages. Nothing happens between calls, and the same calls
+ * give the same answers on every machine.
+ *
+ *     psabench *b = psabench_new(1);
+ *     psabench_part *adc = psabench_part_new(b, "ads1256", "adc", "vref_v=2.5 noise_scale=0");
+ *     psabench_set_volts(adc, 0, 1.0);                        // AIN0
+ *     psabench_run_until_level(adc, psabench_pin(adc, "DRDY"), 0, 1000000000);
+ *     psabench_set(adc, psabench_pin(adc, "CS"), 0);
+ *     psabench_spi(adc, (uint8_t[]){0x01}, NULL, 1);           // RDATA
+ *     psabench_run_for(b, 7000);                               // t6
+ *     psabench_spi(adc, NULL, word, 3);                        // 24 bits
+ *
+ * Time: int64_t nanoseconds since the bench was made. It moves only in psabench_run_*() and psabench_spi(); callbacks come
+ * from in there (and from psabench_set()), and must not call functions that move time.
+ * Levels: 0 or 1, the level on the wire (DRDY and CS are active low: 0 is active).
+ * Errors: functions that can fail return NULL or a negative enum psabench_error; psabench_error_text() has the reason in
+ * one line: what, where, what would be right. Nothing is printed, nothing exits.
+ * Memory: psabench_new() and psabench_part_new() allocate, nothing else does. Threads: a bench belongs to one at a time;
+ * different benches share nothing. */
+#ifndef PSABENCH_H
+#define PSABENCH_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Programs built against one ABI number run with every library of the same number: it is that of the shared library
+ * (libpsabench.so.N). Functions are added without a new number; nothing is changed or removed without one. */
+#define PSABENCH_ABI 0
+
+#if defined(__GNUC__)
+#define PSABENCH_API __attribute__((visibility("default")))
+#else
+#define PSABENCH_API
+#endif
+
+PSABENCH_API int psabench_abi(void);             /* PSABENCH_ABI of the library that is running */
+PSABENCH_API const char *psabench_version(void); /* "0.1.0" */
+
+typedef struct psabench psabench;           /* a bench: simulated time and the parts on it */
+typedef struct psabench_part psabench_part; /* a chip or a board on a bench; freed with it */
+
+enum psabench_error {
+    PSABENCH_OK = 0,
+    PSABENCH_BAD_ARGUMENT = -1, /* no such pin, input, register, option; a level that is not 0 or 1; time that runs back */
+    PSABENCH_NOT_HERE = -2,     /* this part has nothing of the kind: SPI of a board, frames of a chip */
+    PSABENCH_REFUSED = -3,      /* the part refuses: a board that is busy, a value its chip does not take */
+    PSABENCH_TIMEOUT = -4,      /* it did not happen within the time given */
+    PSABENCH_SYSTEM = -5        /* file, memory */
+};
+
+/* ---- The bench ---- */
+
+/* Every noise source draws from a stream of its own, made from the seed and the part's name. NULL: no memory. */
+PSABENCH_API psabench *psabench_new(uint64_t seed);
+PSABENCH_API void psabench_free(psabench *b); /* with its parts; closes the recording; NULL is allowed */
+PSABENCH_API const char *psabench_error_text(const psabench *b); /* of the latest failure on this bench; "" if none */
+
+PSABENCH_API int64_t psabench_now_ns(const psabench *b);
+PSABENCH_API int64_t psabench_next_ns(const psabench *b); /* when something will happen by itself; INT64_MAX: never */
+PSABENCH_API int psabench_run_until(psabench *b, int64_t t_ns);
+PSABENCH_API int psabench_run_for(psabench *b, int64_t dt_ns);
+
+/* Records the pins of the parts that are on the bench (VCD, 1 ns) from now until psabench_vcd_close(), psabench_free() or
+ * the next call. The picture of what a driver did, for GTKWave, PulseView, sigrok-cli. */
+PSABENCH_API int psabench_vcd(psabench *b, const char *path);
+PSABENCH_API int psabench_vcd_close(psabench *b);
+
+/* ---- Parts ---- */
+
+/* Parts: "ads1281" "ads1282" "ads1255" "ads1256" "psa2". name: for the recording and the noise streams, unique on the
+ * bench. options: "key=value key=value"; psabench_options() lists them; NULL or "": all default. The part has its supplies
+ * and clock from now on; what it does after power-up begins at once. NULL: psabench_error_text(b) says why. */
+PSABENCH_API psabench_part *psabench_part_new(psabench *b, const char *part, const char *name, const char *options);
+
+/* One line an option: "key=default  what it is, unit, range". NULL: no such part. psabench_parts(): their names, a space
+ * between two. */
+PSABENCH_API const char *psabench_options(const char *part);
+PSABENCH_API const char *psabench_parts(void);
+
+PSABENCH_API psabench *psabench_of(const psabench_part *p); /* the bench it is on */
+PSABENCH_API const char *psabench_part_name(const psabench_part *p);
+
+/* ---- Pins ---- */
+
+/* Names as in the data sheet or the article: DRDY DOUT SCLK DIN CS SYNC RESET ...; psabench_pin_name(p, 0), 1, ... lists
+ * them up to NULL. psabench_pin(): number, or PSABENCH_BAD_ARGUMENT. */
+PSABENCH_API int psabench_pin(const psabench_part *p, const char *name);
+PSABENCH_API const char *psabench_pin_name(const psabench_part *p, int pin);
+PSABENCH_API int psabench_pin_is_input(const psabench_part *p, int pin); /* of the part: the program may set it */
+
+PSABENCH_API int psabench_set(psabench_part *p, int pin, int level); /* now */
+PSABENCH_API int psabench_get(const psabench_part *p, int pin);      /* now: 0, 1 or an error */
+
+/* Called at each change of an output pin, at its own instant; fn NULL: no more. One watcher a pin. */
+typedef void psabench_watch_fn(void *ctx, psabench_part *p, int pin, int level, int64_t t_ns);
+PSABENCH_API int psabench_watch(psabench_part *p, int pin, psabench_watch_fn *fn, void *ctx);
+
+/* Lets time pass until an output pin has the level, at once if it has it now; PSABENCH_TIMEOUT after timeout_ns. */
+PSABENCH_API int psabench_run_until_level(psabench_part *p, int pin, int level, int64_t timeout_ns);
+
+/* ---- Inputs ---- */
+
+/* Input of a part, volts (PSA-2 with a current input: amperes), at t_ns: never earlier than the last call for the same
+ * input, perhaps up to a data period ago (ADS128x). Numbers: ads1255/1256: 0..7 AIN0..7, 8 AINCOM, to AGND;
+ * ads1281/1282: 0 AIN1, 1 AIN2, differential; psa2: 0..2 sensors X, Y, Z. */
+typedef double psabench_input_fn(void *ctx, psabench_part *p, int input, int64_t t_ns);
+PSABENCH_API int psabench_set_input(psabench_part *p, psabench_input_fn *fn, void *ctx);
+PSABENCH_API int psabench_set_volts(psabench_part *p, int input, double volts); /* constant from now on */
+
+/* ---- SPI bytes ---- */
+
+/* Exchanges n bytes at the part's SCLK frequency (option and psabench_spi_clock(); psabench_set() moves CS): time passes,
+ * eight periods a byte. tx NULL: zeros; rx NULL: not kept. The same state as the pins: both may be mixed at byte
+ * boundaries. gap_ns: between the bytes, for parts that want one. */
+PSABENCH_API int psabench_spi(psabench_part *p, const uint8_t *tx, uint8_t *rx, size_t n);
+PSABENCH_API int psabench_spi_clock(psabench_part *p, uint32_t sclk_hz, int64_t gap_ns);
+
+/* ---- Inside, for tests: no side effects ---- */
+
+PSABENCH_API int psabench_peek(const psabench_part *p, unsigned address); /* register, 0..255, or an error */
+/* Counters of what the part did, suffered and refused: name of number i, NULL behind the last. */
+PSABENCH_API const char *psabench_counter(const psabench_part *p, int i, uint64_t *value);
+
+/* ---- Frames of a board ---- */
+
+struct psabench_frame {
+    uint32_t size; /* of this struct, set by the library: fields are only added at the end */
+    uint32_t seq;
+    int64_t t_sample_ns, t_int_fall_ns, t_int_rise_ns;
+    int32_t code[3]; /* X, Y, Z: 24 bits, sign-extended */
+    uint32_t word[4];
+    uint16_t temp_code;
+    uint8_t temp_channel, status;
+};
+typedef void psabench_frame_fn(void *ctx, psabench_part *p, const struct psabench_frame *f);
+PSABENCH_API int psabench_on_frame(psabench_part *p, psabench_frame_fn *fn, void *ctx);
+
+/* Register of a board's converter through the board's own controller, as its host would: group 0..2 X, Y, Z, 3
+ * temperature. Time passes (at most timeout_ns). Reading returns 0..255. Writing to 0, 1 or 2 goes to all three. */
+PSABENCH_API int psabench_board_read(psabench_part *p, unsigned group, unsigned address, int64_t timeout_ns);
+PSABENCH_API int psabench_board_write(psabench_part *p, unsigned group, unsigned address, uint8_t value, int64_t timeout_ns);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
