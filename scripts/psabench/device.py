@@ -12,7 +12,8 @@ from psabench.can_host import CanHost
 from psabench.canopen_host import CanopenNode
 from psabench.errors import LinkError
 from psabench.frames import Form, FrameReader, Frames
-from psabench.protocol_files import DBC_NODE, message, proto_file
+from psabench.places import proto_file
+from psabench.protocol_files import DBC_NODE, message
 from psabench.signals import layout
 
 NMT_START, NMT_STOP, NMT_PREOP, NMT_RESET_NODE, NMT_RESET_COMMUNICATION = 0x01, 0x02, 0x80, 0x81, 0x82

@@ -17,21 +17,10 @@ from pathlib import Path
 from types import TracebackType
 
 from psabench.errors import BadInput, BenchError
+from psabench.places import find_emulator
 
 START_S = 20.0  # patience for "ready all": a bare emulator needs milliseconds, one under sanitizers in a guest seconds
 STOP_S = 10.0
-
-
-def find_emulator() -> Path:
-    """Path of psa-emu: $PSA_EMU, the build tree of this checkout, or the PATH. Raises BadInput."""
-    named = os.environ.get("PSA_EMU")
-    here = Path(__file__).resolve().parents[2] / "build" / "psa-emu"
-    on_path = [Path(d) / "psa-emu" for d in os.environ.get("PATH", "").split(os.pathsep) if d]
-    for candidate in [Path(named)] if named else [here, *on_path]:
-        if os.access(candidate, os.X_OK):
-            return candidate
-    where = f"PSA_EMU={named}" if named else f"{here} or on the PATH"
-    raise BadInput(f"psa-emu: not found at {where}; `make` builds it")
 
 
 class Emulator:

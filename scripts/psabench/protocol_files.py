@@ -1,31 +1,13 @@
-"""Where the protocol's files are: the DBC and the EDS that are generated from proto/psabench.yaml.
-
-In a checkout they lie in proto/; after `make install` in PREFIX/share/psabench/proto; $PSABENCH_PROTO overrides both.
-"""
+"""The DBC that is generated from proto/psabench.yaml, read once."""
 
 from __future__ import annotations
 
-import os
-import sys
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import cantools
 
-from psabench.errors import BadInput
-
-
-def proto_file(name: str) -> Path:
-    """Path of a file of proto/. Raises BadInput when it is nowhere."""
-    named = os.environ.get("PSABENCH_PROTO")
-    checkout = Path(__file__).resolve().parents[2] / "proto"
-    installed = Path(sys.prefix) / "share" / "psabench" / "proto"
-    places = [Path(named)] if named else [checkout, installed]
-    for place in places:
-        if (place / name).is_file():
-            return place / name
-    raise BadInput(f"{name}: not in {' or '.join(str(p) for p in places)}; PSABENCH_PROTO names another folder")
+from psabench.places import proto_file
 
 
 @cache

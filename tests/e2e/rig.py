@@ -17,7 +17,8 @@ import pytest
 from psabench.can_host import CanHost
 from psabench.control import Control
 from psabench.device import Psa2
-from psabench.emulator import Emulator, find_emulator
+from psabench.emulator import Emulator
+from psabench.places import find_emulator
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]

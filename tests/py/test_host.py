@@ -16,8 +16,9 @@ import pytest
 from psabench import can_host, emulator
 from psabench.can_host import CanHost, StepClock, WallClock, open_bus
 from psabench.control import Control
-from psabench.emulator import Emulator, find_emulator
+from psabench.emulator import Emulator
 from psabench.errors import BadInput, BenchError, ControlError, LinkError
+from psabench.places import find_emulator
 
 IDLE = {"clients": [{"taken": 3}], "gone": {"taken": 4}}
 
