@@ -1,0 +1,170 @@
+/* How fast the emulator's core is: one PSA-2 of the article's profile, 1000 frames of simulated time a second.
+ *
+ *     bench_core CASE [FRAMES]    prints: CASE frames=N edges=M ns=T hash=H
+ *
+ * The clock runs from the first frame after the set-up on. Under callgrind take the difference of two counts of frames:
+ * the set-up is the same in both. The hash is over the words of all frames: a faster core says the same. */
+#include "board/psa2.h"
+#include "trace/vcd.h"
+
+#include <inttypes.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#define STEP_NS  100000 /* as the loop of the emulator: the trace lags behind */
+#define TAPE_MAX 65536u
+#define FRAME_NS 1000000
+
+struct bench {
+    struct sched s;
+    struct psa2 b;
+    struct trace_sink sink;
+    struct vcd vcd;
+    uint64_t frames, edges, hash;
+    struct trace_edge tape[TAPE_MAX]; /* edges of some frames, for the VCD writer alone */
+    unsigned tape_len;
+};
+
+static double accel(void *ctx, unsigned axis, int64_t t_ns)
+{
+    static const double volts[3] = {2.4882, -7.0, 9.9};
+    (void)ctx;
+    (void)t_ns;
+    return volts[axis];
+}
+
+static double degc(void *ctx, unsigned channel, int64_t t_ns)
+{
+    (void)ctx;
+    (void)channel;
+    (void)t_ns;
+    return 25.0;
+}
+
+static void frame(void *ctx, const struct psa2_frame *f, int64_t t_ns)
+{
+    struct bench *n = ctx;
+    (void)t_ns;
+    n->frames++;
+    for (unsigned w = 0; w < PSA2_WORDS; w++) n->hash = (n->hash ^ f->word[w]) * UINT64_C(0x100000001B3);
+}
+
+static void count(void *ctx, unsigned sig, bool level, int64_t t_ns)
+{
+    (void)sig;
+    (void)level;
+    (void)t_ns;
+    ((struct bench *)ctx)->edges++;
+}
+
+static void to_tape(void *ctx, unsigned sig, bool level, int64_t t_ns)
+{
+    struct bench *n = ctx;
+    if (n->tape_len == TAPE_MAX) return;
+    n->tape[n->tape_len++] = (struct trace_edge){.t_ns = t_ns, .sig = (uint8_t)sig, .level = level};
+}
+
+static int64_t clock_ns(void)
+{
+    struct timespec t;
+    (void)clock_gettime(CLOCK_MONOTONIC, &t);
+    return (int64_t)t.tv_sec * NS_PER_S + t.tv_nsec;
+}
+
+static void watch(struct bench *n)
+{
+    n->sink = (struct trace_sink){.mask = (UINT32_C(1) << PSA2_LINES) - 1, .change = count, .ctx = n};
+    trace_attach(&n->b.trace, &n->sink);
+}
+
+/* The whole board with a recording of all its lines. */
+static void record(struct bench *n)
+{
+    FILE *out = fopen("/dev/null", "w");
+    if (!out) abort();
+    const struct vcd_cfg cfg = {
+        .out = out, .scope = "psa2", .unit_ns = VCD_UNIT_NS, .mask = (UINT32_C(1) << PSA2_LINES) - 1};
+    (void)vcd_open(&n->vcd, &cfg, &n->b.trace);
+}
+
+static void run_frames(struct bench *n, uint64_t frames)
+{
+    const uint64_t end = n->frames + frames;
+    while (n->frames < end) {
+        sched_run_until(&n->s, n->s.now_ns + STEP_NS);
+        trace_advance(&n->b.trace, n->s.now_ns - TRACE_LAG_NS);
+    }
+}
+
+/* 100 frames on tape, then the writer. */
+static void tape_then_record(struct bench *n)
+{
+    struct trace_sink sink = {.mask = (UINT32_C(1) << PSA2_LINES) - 1, .change = to_tape, .ctx = n};
+    trace_attach(&n->b.trace, &sink);
+    run_frames(n, 100);
+    trace_detach(&n->b.trace, &sink);
+    record(n);
+}
+
+static void replay(struct bench *n, uint64_t frames)
+{
+    for (uint64_t f = 0; f < frames; f += 100, n->frames += 100)
+        for (unsigned i = 0; i < n->tape_len; i++) {
+            const struct trace_edge *e = &n->tape[i];
+            n->vcd.sink.change(n->vcd.sink.ctx, e->sig, e->level != 0, e->t_ns + (int64_t)f * FRAME_NS);
+        }
+}
+
+static const struct bench_case {
+    const char *name;
+    void (*before)(struct bench *n);
+    void (*run)(struct bench *n, uint64_t frames);
+} cases[] = {
+    {"frames", NULL, run_frames},          /* nobody watches, bit-exact decimation chain */
+    {"frames-watched", watch, run_frames}, /* all lines, a watcher that counts */
+    {"frames-vcd", record, run_frames},    /* all lines into a VCD */
+    {"vcd", tape_then_record, replay},     /* the VCD writer alone, fed with the edges of frames */
+};
+
+static void power_up(struct bench *n)
+{
+    const struct psa2_io io = {.ctx = n, .accel = accel, .temp_degc = degc, .frame = frame};
+    const struct psa2_profile p = psa2_profile_default();
+    struct psa2_unit_cfg u = {.adc_noise_scale = 1.0, .temp_noise_scale = 1.0, .seed = 1, .serial = 1};
+    for (unsigned i = 0; i < 3; i++) u.afe[i] = afe_nominal(AFE_VOLTAGE);
+    memset(n, 0, sizeof *n);
+    sched_init(&n->s);
+    psa2_init(&n->b, &p, &u, &io, &n->s);
+    psa2_power_up(&n->b, 0);
+    run_frames(n, 1);
+}
+
+static void run_case(const struct bench_case *c, uint64_t frames)
+{
+    static struct bench n;
+    power_up(&n);
+    if (c->before) c->before(&n);
+    n.edges = 0;
+    const uint64_t first = n.frames;
+    const int64_t t0_ns = clock_ns();
+    c->run(&n, frames);
+    const int64_t t_ns = clock_ns() - t0_ns;
+    if (n.vcd.out) n.edges = n.vcd.changes;
+    printf("%s frames=%" PRIu64 " edges=%" PRIu64 " ns=%" PRId64 " hash=%016" PRIx64 "\n", c->name, n.frames - first,
+           n.edges, t_ns, n.hash);
+}
+
+int main(int argc, char **argv)
+{
+    const uint64_t frames = argc > 2 ? strtoull(argv[2], NULL, 10) : 10000;
+    for (size_t i = 0; argc > 1 && i < sizeof cases / sizeof *cases; i++) {
+        if (strcmp(argv[1], cases[i].name) != 0) continue;
+        run_case(&cases[i], frames);
+        return 0;
+    }
+    (void)fprintf(stderr, "usage: bench_core CASE [FRAMES]; cases:");
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) (void)fprintf(stderr, " %s", cases[i].name);
+    (void)fprintf(stderr, "\n");
+    return 2;
+}
