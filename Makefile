@@ -50,7 +50,7 @@ C_FILES   = $(sort $(wildcard emu/*/*.[ch] tests/*/*.[ch]))
 
 .SECONDARY:
 .DELETE_ON_ERROR:
-.PHONY: all setup run test check pytest san builds e2e e2e-san e2e-vcan e2e-slc0 uml soak fuzz fuzz-each lint format golden docs install uninstall clean help lock
+.PHONY: all setup run test check pytest san builds e2e e2e-san e2e-vcan e2e-slc0 uml soak fuzz fuzz-each lint format golden docs install uninstall wheel clean help lock
 
 ## all: the emulator, build/psa-emu (make CC=clang and make SAN=address,undefined build beside it, in build-clang and build-san)
 all: $(if $(MAIN),$(BUILD)/psa-emu,$(LIB_OBJ))
@@ -178,6 +178,10 @@ install: all
 uninstall:
 	rm -f $(DESTDIR)$(PREFIX)/bin/psa-emu
 	rm -rf $(DESTDIR)$(PREFIX)/share/psabench $(patsubst decoders/%/pd.py,$(DESTDIR)$(PREFIX)/$(SIGROK)/%,$(wildcard decoders/*/pd.py))
+
+## wheel: build/dist/psabench-*.whl, the Python package with emulator, library and data files in it
+wheel: all
+	.venv/bin/uv build -q --wheel --no-build-isolation --offline --python $(PY) -o build/dist
 
 ## compile_commands.json: how each file is compiled, for editors and clang-tidy
 compile_commands.json: Makefile $(SRC) $(GEN_SRC)
