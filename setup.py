@@ -1,0 +1,70 @@
+"""Puts the compiled half into the wheel: what `make install` installs lies in psabench/bundle (docs/library.md).
+
+An editable install compiles nothing: it finds the emulator and the library in build/ of its checkout.
+"""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+from setuptools import Distribution, setup
+from setuptools.command.bdist_wheel import bdist_wheel
+from setuptools.command.build_py import build_py
+
+ROOT = Path(__file__).resolve().parent
+SCRATCH = ROOT / "build" / "wheel"  # build/ itself holds the emulator's objects
+# For linking, with paths of this machine in them: who compiles against the library installs it with make.
+NOT_IN_THE_WHEEL = ["lib/*.a", "lib/pkgconfig", "lib/*.so", "share/libsigrokdecode"]
+
+
+class BuildPy(build_py):
+    """The Python files, and beside them the bundle."""
+
+    def run(self) -> None:
+        super().run()
+        if not self.editable_mode:
+            install(Path(self.build_lib).resolve() / "psabench" / "bundle")
+
+
+class BdistWheel(bdist_wheel):
+    """Any Python 3 on this platform: the library is reached through ctypes."""
+
+    def get_tag(self) -> tuple[str, str, str]:
+        return "py3", "none", super().get_tag()[2]
+
+
+class BinaryDistribution(Distribution):
+    """Says that there are binaries, though setuptools compiles none of them."""
+
+    def has_ext_modules(self) -> bool:
+        return True
+
+
+def install(bundle: Path) -> None:
+    # A make that called us must not pass its flags on.
+    env = {k: v for k, v in os.environ.items() if k not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL", "DESTDIR")}
+    jobs = f"-j{os.cpu_count() or 1}"
+    subprocess.run(
+        ["make", "--no-print-directory", jobs, f"PY={sys.executable}", "DESTDIR=", f"PREFIX={bundle}", "install"],
+        cwd=ROOT,
+        env=env,
+        check=True,
+    )
+    for pattern in NOT_IN_THE_WHEEL:
+        for path in bundle.glob(pattern):
+            shutil.rmtree(path) if path.is_dir() else path.unlink()
+    for binary in [*bundle.glob("bin/*"), *bundle.glob("lib/*.so.*")]:
+        subprocess.run(["strip", "--strip-unneeded", binary], check=True)  # debug information names our folders
+
+
+if __name__ == "__main__":
+    # A wheel is a zip: the same time for all files makes the same wheel of the same sources.
+    os.environ.setdefault("SOURCE_DATE_EPOCH", "1577836800")
+    shutil.rmtree(SCRATCH, ignore_errors=True)  # setuptools would pack what an earlier version left there
+    setup(
+        distclass=BinaryDistribution,
+        cmdclass={"build_py": BuildPy, "bdist_wheel": BdistWheel},
+        options={"build": {"build_base": str(SCRATCH)}},
+    )
