@@ -103,18 +103,35 @@ static void stage(const struct ads1282_fir *fir, unsigned shift, int64_t *line, 
     memmove(line, line + fresh, (fir->taps - 1) * sizeof *line);
 }
 
-int64_t ads1282_filter_period(struct ads1282_filter *f, const int64_t block[ADS1282_BLOCKS])
+void ads1282_filter_sinc(struct ads1282_filter *f, const int64_t block[ADS1282_BLOCKS], int64_t out[ADS1282_BLOCKS])
 {
     const struct ads1282_fir sinc = {f->sinc_tap, ADS1282_SINC_TAPS, 1, 4 * log2_of(f->sinc_ratio)};
+    memcpy(f->sinc + ADS1282_SINC_TAPS - 1, block, ADS1282_BLOCKS * sizeof *block);
+    stage(&sinc, sinc.scale_log2, f->sinc, 32, out);
+}
+
+/* The data period's sinc outputs stand behind the past in f->fir1. */
+static int64_t fir_stages(struct ads1282_filter *f)
+{
     const struct ads1282_fir *fir = ads1282_fir[f->phase];
     int64_t out;
-    memcpy(f->sinc + ADS1282_SINC_TAPS - 1, block, ADS1282_BLOCKS * sizeof *block);
-    stage(&sinc, sinc.scale_log2, f->sinc, 32, f->fir1 + fir[0].taps - 1);
     stage(&fir[0], fir_shift[0], f->fir1, 32, f->fir2 + fir[1].taps - 1);
     stage(&fir[1], fir_shift[1], f->fir2, 16, f->fir3 + fir[2].taps - 1);
     stage(&fir[2], fir_shift[2], f->fir3, 8, f->fir4 + fir[3].taps - 1);
     stage(&fir[3], fir_shift[3], f->fir4, 2, &out);
     return out;
+}
+
+int64_t ads1282_filter_fir(struct ads1282_filter *f, const int64_t sinc[ADS1282_BLOCKS])
+{
+    memcpy(f->fir1 + ads1282_fir[f->phase][0].taps - 1, sinc, ADS1282_BLOCKS * sizeof *sinc);
+    return fir_stages(f);
+}
+
+int64_t ads1282_filter_period(struct ads1282_filter *f, const int64_t block[ADS1282_BLOCKS])
+{
+    ads1282_filter_sinc(f, block, f->fir1 + ads1282_fir[f->phase][0].taps - 1);
+    return fir_stages(f);
 }
 
 int64_t ads1282_correct(int64_t y_lsb, int32_t ofc, uint32_t fsc)

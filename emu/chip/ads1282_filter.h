@@ -42,6 +42,11 @@ void ads1282_filter_clear(struct ads1282_filter *f);
  * on the last 1971 (linear) or 1963 (minimum phase) blocks, those given here included. */
 int64_t ads1282_filter_period(struct ads1282_filter *f, const int64_t block[ADS1282_BLOCKS]);
 
+/* Its two halves, one in place of the other and not mixed with it: the sinc alone (the sinc-only mode), 32 outputs of full
+ * scale 2^34; and the FIR stages alone, from 32 sinc outputs got elsewhere (the bit-true modulator). */
+void ads1282_filter_sinc(struct ads1282_filter *f, const int64_t block[ADS1282_BLOCKS], int64_t out[ADS1282_BLOCKS]);
+int64_t ads1282_filter_fir(struct ads1282_filter *f, const int64_t sinc[ADS1282_BLOCKS]);
+
 /* Output rms for white input blocks of unit rms, both in units of full scale: sqrt of the sum of squares of the composite
  * impulse response of the exact chain. */
 double ads1282_filter_noise_gain(const struct ads1282_filter *f);
