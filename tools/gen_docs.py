@@ -23,6 +23,7 @@ import re
 import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -46,12 +47,13 @@ class FidelityError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Fact:
-    """A row of facts.yaml; rows is the number of printed rows it stands for."""
+    """A row of facts.yaml; rows is the number of printed rows it stands for; analog: a digital model cannot know."""
 
     id: str
     fact: str
     value: str
     rows: int
+    analog: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,13 +86,17 @@ def read_yaml(path: Path) -> Any:
         raise FidelityError(f"{path.name}: {' '.join(str(e).split())}") from None
 
 
+@cache
 def load_facts(path: Path = CHIPS / "facts.yaml") -> list[Section]:
     """All sections of facts.yaml."""
     return [
         Section(
             s["section"],
             s["title"],
-            tuple(Fact(f["id"], f["fact"], f.get("value", ""), f.get("rows", 1)) for f in s["facts"]),
+            tuple(
+                Fact(f["id"], f["fact"], f.get("value", ""), f.get("rows", 1), f.get("analog", False))
+                for f in s["facts"]
+            ),
         )
         for s in read_yaml(path)
     ]
@@ -144,7 +150,7 @@ def parse_row(item: Any, facts: dict[str, Fact]) -> Row:
         raise FidelityError("a row is a mapping: {id: ..., state: ..., grade: ..., tests: [...]}")
     if unknown := set(item) - KEYS:
         raise FidelityError(f"unknown {', '.join(sorted(unknown))}; there are {', '.join(sorted(KEYS))}")
-    known = facts.get(words(item, "id"), Fact("", "", "", 1))
+    known = facts.get(words(item, "id"), Fact("", "", "", 1, False))
     row = Row(
         id=words(item, "id"),
         fact=words(item, "fact") or known.fact,
