@@ -18,6 +18,10 @@ class BadInput(BenchError):
     exit_status = 2
 
 
+class TimeOut(BenchError):
+    """It did not happen within the time given."""
+
+
 class LinkError(BenchError):
     """A link to the bench is missing, was closed, or lost something."""
 

@@ -1,0 +1,321 @@
+"""Converter chips and boards in this process, register by register and edge by edge: for drivers under test.
+
+    from psabench.chips import Bench, ads1256_volts
+
+    with Bench(seed=1) as bench:
+        adc = bench.part("ads1256", vref_v=2.5)
+        adc.set_volts(0, 1.25)                       # AIN0
+        adc.run_until_level("DRDY", 0)               # its self-calibration after power-up
+        adc.pins["CS"].set(0)
+        adc.spi(b"\\x01")                             # RDATA
+        bench.run_for(7e-6)                          # t6
+        code = int.from_bytes(adc.spi(bytes(3)), "big", signed=True)
+        print(ads1256_volts(code, vref_v=2.5))
+
+Simulated time stands still between calls: it moves in `run_for`, `run_until_ns`, `run_until_level`, `spi`, `board_read`
+and `board_write`. Functions given to `watch`, `input` and `on_frame` are called from in there and must not call these;
+what they raise comes out of the call that moved time. Durations are float seconds and end in _s, instants are whole
+nanoseconds since the bench was made and end in _ns. The same calls give the same answers on every machine.
+
+`psabench.errors`: BadInput for what does not exist (part, option, pin, register), TimeOut, BenchError for the rest.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from os import PathLike, fspath
+from types import TracebackType
+from typing import Any
+
+from psabench.clib import FRAME, INPUT, WATCH, FrameStruct, library
+from psabench.errors import BadInput, BenchError, TimeOut
+
+NEVER_NS = 2**63 - 1
+SLICE_NS = 100_000_000  # time runs in slices of this length, so that Ctrl-C and what callbacks raise come out soon
+BAD_ARGUMENT, NOT_HERE, REFUSED, TIMEOUT, SYSTEM = -1, -2, -3, -4, -5  # enum psabench_error
+ERRORS = {BAD_ARGUMENT: BadInput, NOT_HERE: BadInput, REFUSED: BenchError, TIMEOUT: TimeOut, SYSTEM: BenchError}
+
+
+def parts() -> tuple[str, ...]:
+    """The parts there are: "ads1256", "ads1282", "psa2", ..."""
+    return tuple(library().parts().decode().split())
+
+
+def options(part: str) -> str:
+    """What `Bench.part` takes for it: a line "key=default  meaning, unit, range" for each option."""
+    text = library().options(part.encode())
+    if text is None:
+        raise BadInput(f"{part}: no such part; there are {', '.join(parts())}")
+    return str(text.decode())
+
+
+def ads1256_volts(code: int, *, vref_v: float = 2.5, gain: int = 1) -> float:
+    """Volts between the selected inputs for a code of an ADS1255/1256: full scale, 2 VREF / gain, is 2^23."""
+    return code * 2 * vref_v / (gain * 2**23)
+
+
+def ads1282_volts(word: int, *, vref_v: float = 5.0, gain: int = 1) -> float:
+    """Volts for a 32-bit word of an ADS1281/1282 behind its FIR filter: full scale, VREF / (2 gain), is 2^31."""
+    return word * vref_v / (2 * gain * 2**31)
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """What a board sent in one of its frames."""
+
+    seq: int
+    t_sample_ns: int
+    t_int_fall_ns: int
+    t_int_rise_ns: int
+    code: tuple[int, ...]  # X, Y, Z: 24 bits, sign-extended
+    word: tuple[int, ...]  # as they went over the Data line
+    temp_code: int
+    temp_channel: int
+    status: int
+
+
+class Bench:
+    """Simulated time and the parts on it. Every noise source draws from a stream of its own, made from the seed."""
+
+    def __init__(self, seed: int = 1) -> None:
+        self.raised: BaseException | None = None  # by the first callback that raised within the running call
+        self._handle: int | None = None
+        self._lib = library()
+        self._handle = self._lib.new(seed)
+        self._parts: list[Part] = []  # C calls what they hold
+        if self._handle is None:
+            raise BenchError("no memory for a bench")
+
+    def __enter__(self) -> Bench:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, e: BaseException | None, tb: TracebackType | None) -> None:
+        self.close()
+
+    def __del__(self) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Frees the bench with its parts and ends the recording; they cannot be used any more. Twice is allowed."""
+        handle, self._handle = self._handle, None
+        if handle:
+            self._lib.free(handle)
+
+    @property
+    def now_ns(self) -> int:
+        """Simulated nanoseconds since the bench was made."""
+        return int(self._lib.now_ns(self.live()))
+
+    @property
+    def next_ns(self) -> int | None:
+        """When something will happen by itself; None: never."""
+        t_ns = int(self._lib.next_ns(self.live()))
+        return None if t_ns == NEVER_NS else t_ns
+
+    def run_for(self, dt_s: float) -> None:
+        """Lets time pass, to the nearest nanosecond."""
+        self.run_until_ns(self.now_ns + round(dt_s * 1e9))
+
+    def run_until_ns(self, t_ns: int) -> None:
+        """Lets time pass until an instant; BadInput when it is over already."""
+        handle = self.live()
+        while (slice_ns := self.now_ns + SLICE_NS) < t_ns:
+            self.done(self._lib.run_until(handle, slice_ns))
+        self.done(self._lib.run_until(handle, t_ns))
+
+    def part(self, part: str, *, name: str | None = None, **options: float | str | bool) -> Part:
+        """Puts a part on the bench, with supplies and clock. `options(part)` lists its options; name: for the
+        recording and the noise streams, unique on the bench, the part's own by default."""
+        words = " ".join(f"{key}={_option(value)}" for key, value in options.items())
+        handle = self._lib.part_new(self.live(), part.encode(), (name or part).encode(), words.encode())
+        self.done(0 if handle else BAD_ARGUMENT)
+        new = Part(self, handle)
+        self._parts.append(new)
+        return new
+
+    def vcd(self, path: str | PathLike[str]) -> None:
+        """Records the pins of the parts on the bench from now on (VCD, 1 ns), until `vcd_close` or the next call."""
+        self.done(self._lib.vcd(self.live(), fspath(path).encode()))
+
+    def vcd_close(self) -> None:
+        """Ends the recording; the file is complete."""
+        self.done(self._lib.vcd_close(self.live()))
+
+    # For Part and Pin.
+
+    def live(self) -> int:
+        """The handle, while there is one."""
+        if self._handle is None:
+            raise BenchError("the bench is closed")
+        return self._handle
+
+    def done(self, result: int, *, allow: int = 0) -> int:
+        """What every call ends with: raise what a callback raised, then what the library says (one code is allowed)."""
+        if self.raised is not None:
+            e, self.raised = self.raised, None
+            raise e
+        if result < 0 and result != allow:
+            raise ERRORS.get(result, BenchError)(self._error_text())
+        return result
+
+    def _error_text(self) -> str:
+        return str(self._lib.error_text(self.live()).decode(errors="replace"))
+
+
+class Pin:
+    """A pin of a part, named as in its data sheet. Levels are those on the wire: DRDY and CS are active at 0."""
+
+    def __init__(self, part: Part, number: int, name: str) -> None:
+        self._part, self._bench = part, part.bench
+        self._get, self._set = library().get, library().set
+        self.number, self.name = number, name
+        self.is_input = library().pin_is_input(part.live(), number) == 1  # of the part: the program sets it
+
+    def __repr__(self) -> str:
+        return f"<{'input' if self.is_input else 'output'} {self._part.name}.{self.name}>"
+
+    @property
+    def level(self) -> int:
+        """0 or 1, now."""
+        return self._bench.done(self._get(self._part.live(), self.number))
+
+    def set(self, level: int) -> None:
+        """Drives an input of the part, now."""
+        self._bench.done(self._set(self._part.live(), self.number, level))
+
+    def watch(self, fn: Callable[[int, int], None] | None) -> None:
+        """Calls fn(level, t_ns) at each change of an output, at its own instant. None: no more; one watcher a pin."""
+        self._part.install("watch", WATCH, fn and (lambda _ctx, _part, _pin, *args: fn(*args)), self.number)
+
+
+class _Pins(dict[str, Pin]):
+    def __init__(self, part: Part) -> None:
+        names = iter(lambda: library().pin_name(part.live(), len(self)), None)
+        for name in names:
+            self[name.decode()] = Pin(part, len(self), name.decode())
+        self._part = part.name
+
+    def __missing__(self, name: str) -> Pin:
+        raise BadInput(f"{self._part}: no pin {name}; there are {' '.join(self)}")
+
+
+class Part:
+    """A chip or a board on a bench; made by `Bench.part`."""
+
+    def __init__(self, bench: Bench, handle: int) -> None:
+        self.bench, self._lib, self._handle = bench, library(), handle
+        self._callbacks: dict[tuple[str, tuple[int, ...]], object] = {}  # C knows only their addresses: kept alive here
+        self.name = str(self._lib.part_name(handle).decode())
+        self.pins: Mapping[str, Pin] = _Pins(self)
+
+    def __repr__(self) -> str:
+        return f"<part {self.name}>"
+
+    # Inputs
+
+    def set_volts(self, input: int, volts: float) -> None:
+        """A constant voltage at an input from now on. Numbers: ads1255/1256 0..7 AIN0..AIN7, 8 AINCOM, to AGND;
+        ads1281/1282 0 AIN1, 1 AIN2, differential; psa2 0..2 sensors X, Y, Z (with a current input amperes)."""
+        self.bench.done(self._lib.set_volts(self.live(), input, volts))
+
+    def set_input(self, fn: Callable[[int, int], float] | None) -> None:
+        """Inputs come from fn(input, t_ns) -> volts, asked at the instants of sampling: for one input never earlier
+        than before, perhaps up to a data period ago. None: no more."""
+        self.install("set_input", INPUT, fn and (lambda _ctx, _part, *args: float(fn(*args))))
+
+    # SPI
+
+    def spi(self, tx: bytes | bytearray) -> bytes:
+        """Exchanges bytes at the part's SCLK frequency (`spi_clock`); time passes. CS is a pin like others."""
+        n = len(tx)
+        rx = ctypes.create_string_buffer(n)
+        self.bench.done(self._lib.spi(self.live(), bytes(tx), rx, n))
+        return rx.raw
+
+    def spi_clock(self, sclk_hz: int, gap_s: float = 0.0) -> None:
+        """Frequency of SCLK from now on, and the pause between two bytes of one exchange."""
+        self.bench.done(self._lib.spi_clock(self.live(), sclk_hz, round(gap_s * 1e9)))
+
+    # Waiting
+
+    def run_until_level(self, pin: str, level: int, timeout_s: float = 10.0) -> None:
+        """Lets time pass until an output pin has the level, at once if it has it now. TimeOut after timeout_s."""
+        number = self.pins[pin].number
+        end_ns = self.bench.now_ns + round(timeout_s * 1e9)
+        while (left_ns := end_ns - self.bench.now_ns) > SLICE_NS:
+            result = self._lib.run_until_level(self.live(), number, level, SLICE_NS)
+            if self.bench.done(result, allow=TIMEOUT) != TIMEOUT:
+                return
+        if self.bench.done(self._lib.run_until_level(self.live(), number, level, left_ns), allow=TIMEOUT) == TIMEOUT:
+            raise TimeOut(f"{self.name}: {pin} is not {level} after {timeout_s:g} s")
+
+    # Inside
+
+    def peek(self, address: int) -> int:
+        """A register, 0..255, without the side effects of reading it over SPI."""
+        return self.bench.done(self._lib.peek(self.live(), address))
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """What the part did, suffered and refused so far."""
+        handle, value, found = self.live(), ctypes.c_uint64(), dict[str, int]()
+        while name := self._lib.counter(handle, len(found), value):
+            found[name.decode()] = value.value
+        return found
+
+    # Boards
+
+    def on_frame(self, fn: Callable[[Frame], None] | None) -> None:
+        """Calls fn(frame) at each frame a board sends. None: no more."""
+        self.install("on_frame", FRAME, fn and (lambda _ctx, _part, f: fn(_frame(f.contents))))
+
+    def board_read(self, group: int, address: int, timeout_s: float = 1.0) -> int:
+        """A register of a board's converter, through the board's controller. group: 0..2 X, Y, Z; 3 temperature."""
+        return self.bench.done(self._lib.board_read(self.live(), group, address, round(timeout_s * 1e9)))
+
+    def board_write(self, group: int, address: int, value: int, timeout_s: float = 1.0) -> None:
+        """The same, writing 0..255. Groups 0, 1 and 2 are written together."""
+        self.bench.done(self._lib.board_write(self.live(), group, address, value, round(timeout_s * 1e9)))
+
+    # For Bench and Pin.
+
+    def live(self) -> int:
+        """The handle, while there is one."""
+        self.bench.live()
+        return self._handle
+
+    def install(self, function: str, kind: Any, fn: Callable[..., Any] | None, *where: int) -> None:
+        """Hands fn to the library as its callback of a kind; NULL for None."""
+        callback = kind(self._guarded(fn)) if fn else kind()
+        self.bench.done(getattr(self._lib, function)(self.live(), *where, callback, None))
+        self._callbacks[function, where] = callback
+
+    def _guarded(self, fn: Callable[..., Any]) -> Callable[..., Any]:
+        def call(*args: Any) -> Any:
+            try:
+                return 0.0 if self.bench.raised else fn(*args)
+            except BaseException as e:  # C cannot pass it on: Bench.done raises it when the call is over
+                self.bench.raised = e
+                return 0.0
+
+        return call
+
+
+def _frame(f: FrameStruct) -> Frame:
+    return Frame(
+        f.seq,
+        f.t_sample_ns,
+        f.t_int_fall_ns,
+        f.t_int_rise_ns,
+        tuple(f.code),
+        tuple(f.word),
+        f.temp_code,
+        f.temp_channel,
+        f.status,
+    )
+
+
+def _option(value: float | str | bool) -> str:
+    return str(int(value)) if isinstance(value, bool) else str(value)

@@ -1,0 +1,110 @@
+"""libpsabench as ctypes sees it: found, checked and declared here, used by `chips` only. The header is its manual."""
+
+from __future__ import annotations
+
+import ctypes as c
+from functools import cache
+from typing import Any
+
+from psabench.errors import BadInput
+from psabench.places import find_library
+
+ABI = 0  # PSABENCH_ABI of the header that PROTOTYPES was written from
+NAME = f"libpsabench.so.{ABI}"
+
+WATCH = c.CFUNCTYPE(None, c.c_void_p, c.c_void_p, c.c_int, c.c_int, c.c_int64)
+INPUT = c.CFUNCTYPE(c.c_double, c.c_void_p, c.c_void_p, c.c_int, c.c_int64)
+
+
+class FrameStruct(c.Structure):
+    """struct psabench_frame."""
+
+    _fields_ = [
+        ("size", c.c_uint32),
+        ("seq", c.c_uint32),
+        ("t_sample_ns", c.c_int64),
+        ("t_int_fall_ns", c.c_int64),
+        ("t_int_rise_ns", c.c_int64),
+        ("code", c.c_int32 * 3),
+        ("word", c.c_uint32 * 4),
+        ("temp_code", c.c_uint16),
+        ("temp_channel", c.c_uint8),
+        ("status", c.c_uint8),
+    ]
+
+
+FRAME = c.CFUNCTYPE(None, c.c_void_p, c.c_void_p, c.POINTER(FrameStruct))
+
+_INT, _LEVEL, _TIME, _TEXT, _PTR = c.c_int, c.c_int, c.c_int64, c.c_char_p, c.c_void_p
+
+# Function without its psabench_: what it returns, what it takes.
+PROTOTYPES: dict[str, tuple[Any, ...]] = {
+    "abi": (_INT,),
+    "version": (_TEXT,),
+    "new": (_PTR, c.c_uint64),
+    "free": (None, _PTR),
+    "error_text": (_TEXT, _PTR),
+    "now_ns": (_TIME, _PTR),
+    "next_ns": (_TIME, _PTR),
+    "run_until": (_INT, _PTR, _TIME),
+    "run_for": (_INT, _PTR, _TIME),
+    "vcd": (_INT, _PTR, _TEXT),
+    "vcd_close": (_INT, _PTR),
+    "part_new": (_PTR, _PTR, _TEXT, _TEXT, _TEXT),
+    "options": (_TEXT, _TEXT),
+    "parts": (_TEXT,),
+    "of": (_PTR, _PTR),
+    "part_name": (_TEXT, _PTR),
+    "pin": (_INT, _PTR, _TEXT),
+    "pin_name": (_TEXT, _PTR, _INT),
+    "pin_is_input": (_INT, _PTR, _INT),
+    "set": (_INT, _PTR, _INT, _LEVEL),
+    "get": (_INT, _PTR, _INT),
+    "watch": (_INT, _PTR, _INT, WATCH, _PTR),
+    "run_until_level": (_INT, _PTR, _INT, _LEVEL, _TIME),
+    "set_input": (_INT, _PTR, INPUT, _PTR),
+    "set_volts": (_INT, _PTR, _INT, c.c_double),
+    "spi": (_INT, _PTR, _TEXT, _PTR, c.c_size_t),
+    "spi_clock": (_INT, _PTR, c.c_uint32, _TIME),
+    "peek": (_INT, _PTR, c.c_uint),
+    "counter": (_TEXT, _PTR, _INT, c.POINTER(c.c_uint64)),
+    "on_frame": (_INT, _PTR, FRAME, _PTR),
+    "board_read": (_INT, _PTR, c.c_uint, c.c_uint, _TIME),
+    "board_write": (_INT, _PTR, c.c_uint, c.c_uint, c.c_uint8, _TIME),
+}
+
+
+class Library:
+    """The functions of the header, each under its name without psabench_, with their C types checked by ctypes."""
+
+    def __init__(self, path: str) -> None:
+        self.path = path
+        try:
+            so = c.CDLL(path)
+        except OSError as e:
+            raise BadInput(f"{path}: not a library that can be loaded ({e}); PSABENCH_LIB names another") from None
+        try:
+            abi = int(so.psabench_abi())
+            if abi != ABI:
+                raise BadInput(f"{path}: speaks ABI {abi}, this psabench speaks {ABI}; PSABENCH_LIB names another")
+            for name, (result, *arguments) in PROTOTYPES.items():
+                function = getattr(so, f"psabench_{name}")
+                function.restype, function.argtypes = result, arguments
+                setattr(self, name, function)
+        except AttributeError as e:
+            raise BadInput(f"{path}: older than this psabench ({e}); PSABENCH_LIB names another") from None
+
+    def __getattr__(self, name: str) -> Any:  # for the type checker: __init__ has set them all
+        raise AttributeError(name)
+
+
+@cache
+def library() -> Library:
+    """The library of this process, loaded at the first use. Raises BadInput when it is nowhere or of another ABI."""
+    path = find_library(NAME)
+    if path is None:
+        try:
+            return Library(NAME)
+        except BadInput:
+            raise BadInput(f"{NAME}: not in this package, its checkout or the system; `make` builds it") from None
+    return Library(str(path))
