@@ -26,7 +26,10 @@ WORDS = 4
 PAUSE_CLK = 4  # CLK periods between words (article, protocol of exchange)
 BLOCK = 1 << 20  # samples decoded at once: bounds the memory a call needs
 
+IDLE_8 = np.uint64(INT * 0x0101_0101_0101_0101)  # eight samples of the line at rest
+
 Ints = NDArray[np.int64]
+Samples = NDArray[np.uint8]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -115,31 +118,34 @@ class LineDecoder:
         self._last = 0  # sample before the block; INT low: a frame under way at the start is not taken for one
         self._fall = -1  # INT fall of the frame under way, -1: none
         self._clk: Ints = np.empty(0, np.int64)  # its bits so far: sample,
-        self._bit: NDArray[np.uint8] = np.empty(0, np.uint8)  # and level
+        self._bit: NDArray[np.bool_] = np.empty(0, np.bool_)  # and level
         self._gap_at = -1  # last gap
         self._prev_fall = -1  # INT fall of the frame before, -1: none
 
     def feed(self, data: bytes | bytearray | memoryview) -> Frames:
         """Frames completed by these samples."""
         x = np.frombuffer(data, np.uint8)
-        return concat(self._block(x[i : i + BLOCK]) for i in range(0, len(x), BLOCK))
+        return concat([self._block(x[i : i + BLOCK]) for i in range(0, len(x), BLOCK)])
 
-    def _block(self, x: NDArray[np.uint8]) -> Frames:
+    def _block(self, x: Samples) -> Frames:
         base = self.counts.samples
         self.counts.samples += len(x)
-        before = np.concatenate(([np.uint8(self._last)], x[:-1]))
+        y, eight = _busy(x, self._last)
+        before = np.concatenate(([np.uint8(self._last)], y[:-1]))
         self._last = int(x[-1])
-        # 9 bytes of 10 are the idle line: everything below works on the few that differ from the one before
-        at = np.flatnonzero((x != before) | (x >= GAP))
-        now, changed = x[at], x[at] ^ before[at]
-        at = at.astype(np.int64) + base
-        low = (now & INT) == 0
-        fall = at[(changed & INT != 0) & low]
-        rise = at[(changed & INT != 0) & ~low]
-        up = (changed & CLK != 0) & (now & CLK != 0)
-        gaps = at[now & GAP != 0]
+
+        def sample(k: Ints) -> Ints:
+            at: Ints = base + (eight[k >> 3] << 3) + (k & 7)
+            return at
+
+        int_level = y & INT
+        turned = np.flatnonzero(int_level != before & INT)
+        low = int_level[turned] == 0
+        up = np.flatnonzero(y & CLK > before & CLK)
+        gaps = sample(np.flatnonzero(y >= GAP) if y.max(initial=0) >= GAP else np.empty(0, np.int64))
         self.counts.gaps += len(gaps)
-        return self._frames(fall, rise, at[up], now[up] & DATA != 0, gaps)
+        turned_at = sample(turned)
+        return self._frames(turned_at[low], turned_at[~low], sample(up), y[up] & DATA != 0, gaps)
 
     def _frames(self, fall: Ints, rise: Ints, clk: Ints, bit: NDArray[np.bool_], gaps: Ints) -> Frames:
         """Pairs INT falls with rises, over what is left of the block before, and keeps what is unfinished."""
@@ -147,7 +153,7 @@ class LineDecoder:
         self._gap_at = int(gaps[-1]) if len(gaps) else -1
         self._timing(fall, gaps)
         clk = np.concatenate((self._clk, clk))
-        level = np.concatenate((self._bit, bit.astype(np.uint8)))
+        level = np.concatenate((self._bit, bit))
         if self._fall >= 0:
             fall = np.concatenate(([self._fall], fall))
         if len(rise) and (not len(fall) or rise[0] < fall[0]):
@@ -156,14 +162,14 @@ class LineDecoder:
         self._keep(fall[whole:], clk, level)
         return self._decode(fall[:whole], rise, clk, level, gaps)
 
-    def _keep(self, fall: Ints, clk: Ints, level: NDArray[np.uint8]) -> None:
+    def _keep(self, fall: Ints, clk: Ints, level: NDArray[np.bool_]) -> None:
         """The frame under way. One bit too many proves it torn, so no more than that is kept."""
         self._fall = int(fall[0]) if len(fall) else -1
         first = int(np.searchsorted(clk, self._fall)) if len(fall) else len(clk)
         self._clk = clk[first : first + self.fmt.bits + 1]
         self._bit = level[first : first + self.fmt.bits + 1]
 
-    def _decode(self, fall: Ints, rise: Ints, clk: Ints, level: NDArray[np.uint8], gaps: Ints) -> Frames:
+    def _decode(self, fall: Ints, rise: Ints, clk: Ints, level: NDArray[np.bool_], gaps: Ints) -> Frames:
         """Words of those INT-low intervals that hold exactly a frame; the others are torn."""
         bits = self.fmt.bits
         first = np.searchsorted(clk, fall)
@@ -172,25 +178,24 @@ class LineDecoder:
         index = first[good, None] + np.arange(bits)
         steady = self._steady(clk[index])
         good[good] = steady
-        index = index[steady]
-        sent = level[index].reshape(-1, WORDS, self.fmt.word_bits).astype(np.uint64)
-        weight = np.uint64(1) << np.arange(self.fmt.word_bits, dtype=np.uint64)
-        words = (sent * weight).sum(axis=2).astype(np.uint32)
+        sent = np.packbits(level[index[steady]], axis=1, bitorder="little").reshape(-1, WORDS, self.fmt.word_bits // 8)
+        words = np.zeros((len(sent), WORDS, 4), np.uint8)
+        words[:, :, : sent.shape[2]] = sent
         self.counts.frames += len(words)
         self.counts.torn += len(fall) - len(words)
-        return Frames(fall[good], rise[good], words)
+        return Frames(fall[good], rise[good], words.view("<u4")[:, :, 0].astype(np.uint32))
 
     def _steady(self, at: Ints) -> NDArray[np.bool_]:
         """Whether the CLK rises (n, bits) stand as in a frame: every period within half a period (or one sample) of the
         mean, every pause PAUSE_CLK longer. The mean is the frame's own, so that nothing depends on either clock's rate.
         """
-        periods = np.ones(self.fmt.bits - 1, np.int64)
-        periods[self.fmt.word_bits - 1 :: self.fmt.word_bits] += PAUSE_CLK
-        mean = (at[:, -1] - at[:, 0]) / periods.sum()
-        error = np.abs(np.diff(at, axis=1) - mean[:, None] * periods)
+        mean = (at[:, -1] - at[:, 0]) / (self.fmt.bits - 1 + (WORDS - 1) * PAUSE_CLK)
         limit = np.maximum(mean / 2, 1.0)
-        steady: NDArray[np.bool_] = (error <= limit[:, None]).all(axis=1)
-        return steady
+        period = np.diff(at, axis=1)
+        first_pause = self.fmt.word_bits - 1
+        pause = period[:, first_pause :: self.fmt.word_bits].copy()
+        period[:, first_pause :: self.fmt.word_bits] = period[:, :1]
+        return _all_near(period, mean, limit) & _all_near(pause, mean * (1 + PAUSE_CLK), limit)
 
     def _timing(self, fall: Ints, gaps: Ints) -> None:
         """Counts what is missing or out of time between INT falls, torn frames included: they were sent."""
@@ -209,6 +214,30 @@ class LineDecoder:
         self.counts.lost += int((steps - 1).sum())
         self.counts.late += int((off_s > slack_s).sum())
         self.counts.early += int((off_s < -slack_s).sum())
+
+
+def _busy(x: Samples, before: int) -> tuple[Samples, Ints]:
+    """The samples in which anything may happen, eight by eight, and which eights of x they are.
+
+    9 samples of 10 are the line at rest. An eight at rest that follows one that is not, or `before`, is kept too: so
+    the sample before any kept one has the level of the kept one before it, and neighbours tell every change.
+    """
+    whole = len(x) & ~7
+    eights = x[:whole].view(np.uint64)
+    busy = eights != IDLE_8
+    keep = busy.copy()
+    keep[1:] |= busy[:-1]
+    keep[:1] |= before != INT
+    index = np.flatnonzero(keep)
+    return np.concatenate((eights[index].view(np.uint8), x[whole:])), np.append(index, whole >> 3)
+
+
+def _all_near(values: Ints, want: NDArray[np.float64], limit: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Whether all values (n, m) of a row are within limit (n) of want (n)."""
+    near: NDArray[np.bool_] = (np.abs(values.min(axis=1) - want) <= limit) & (
+        np.abs(values.max(axis=1) - want) <= limit
+    )
+    return near
 
 
 def open_line(path: Path) -> BinaryIO:

@@ -6,11 +6,13 @@ import io
 import itertools
 from collections.abc import Sequence
 from dataclasses import asdict
+from unittest import mock
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from psabench import lineport
 from psabench.lineport import CLK, DATA, GAP, INT, Counts, Frames, LineDecoder, LineFormat, concat, decode_stream
 
 PERIOD = 8000  # samples from frame to frame: 1 ms at 8 MHz
@@ -92,10 +94,13 @@ def spacing(spacing_s: float, period_s: float) -> tuple[float, int]:
     return spacing_s - steps * period_s, steps
 
 
-def in_pieces(data: bytes, cuts: Sequence[int], fmt: LineFormat) -> tuple[Frames, Counts]:
+def in_pieces(data: bytes, cuts: Sequence[int], fmt: LineFormat, block: int = lineport.BLOCK) -> tuple[Frames, Counts]:
+    """As decoded in these pieces, each block by block; a memoryview keeps the pieces at any alignment."""
     d = LineDecoder(fmt)
+    view = memoryview(data)
     edges = [0, *sorted(c % (len(data) + 1) for c in cuts), len(data)]
-    return concat([d.feed(data[a:b]) for a, b in itertools.pairwise(edges)]), d.counts
+    with mock.patch.object(lineport, "BLOCK", block):
+        return concat([d.feed(view[a:b]) for a, b in itertools.pairwise(edges)]), d.counts
 
 
 def assert_same(got: Frames, want: list[tuple[int, int, list[int]]]) -> None:
@@ -131,6 +136,7 @@ pieces = st.one_of(
     st.binary(max_size=300),
     st.integers(1, 3000).map(idle),
     st.builds(lambda n: bytes(n), st.integers(1, 300)),  # INT stuck low
+    st.builds(lambda n, b: idle(n) + bytes([b]) + idle(8), st.integers(0, 40), st.integers(0, 255)),  # a lone sample
     st.builds(lambda n: bytes([0, CLK]) * n, st.integers(1, 300)),  # and CLK running
     st.builds(
         lambda w, cut, flip: bytes(b ^ (flip if i == cut else 0) for i, b in enumerate(lines(w, word_bits=16))),
@@ -145,11 +151,17 @@ pieces = st.one_of(
 
 
 @settings(deadline=None, max_examples=300)
-@given(st.lists(pieces, max_size=12), st.lists(st.integers(0, 10**6), max_size=8))
-def test_arbitrary_bytes_in_arbitrary_pieces_read_as_the_definition_says(parts: list[bytes], cuts: list[int]) -> None:
+@given(
+    st.lists(pieces, max_size=12),
+    st.lists(st.integers(0, 10**6), max_size=8),
+    st.sampled_from((5, 64, 100, 1003, lineport.BLOCK)),
+)
+def test_arbitrary_bytes_in_arbitrary_pieces_read_as_the_definition_says(
+    parts: list[bytes], cuts: list[int], block: int
+) -> None:
     data = b"".join(parts)
     fmt = LineFormat(word_bits=16, period_s=100e-6, tolerance_s=5e-6)
-    got, counts = in_pieces(data, cuts, fmt)
+    got, counts = in_pieces(data, cuts, fmt, block)
     want, want_counts = slow(data, fmt)
     assert_same(got, want)
     assert asdict(counts) == asdict(want_counts)
@@ -175,6 +187,7 @@ NO_BITS = bytes([0]) * 600 + idle(1)
         (train([F, F[:250] + bytes([F[250] | GAP]) + F[251:], F]), {"frames": 2, "torn": 1, "gaps": 1}),
         (train([F, F[:160] + F[176:], F]), {"frames": 2, "torn": 1}),  # all bits, but no pause after the first word
         (train([F, F[:170] + bytes(16) + F[170:], F]), {"frames": 2, "torn": 1}),  # a pause of 8 CLK periods
+        (train([F, F[:48] + bytes(4) + F[48:], F]), {"frames": 2, "torn": 1}),  # one CLK period of two inside a word
         (train([F, F[:592] + bytes([0, 0, CLK, CLK]) + F[592:], F]), {"frames": 2, "torn": 1}),  # one bit too many
         (train([F, F[:592] + bytes([F[592] | GAP]) + F[593:], F]), {"frames": 2, "torn": 1, "gaps": 1}),
         (idle(10**6), {}),
