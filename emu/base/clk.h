@@ -34,4 +34,31 @@ static inline int64_t clk_count_at(const struct clk *c, int64_t t_ns)
     return k;
 }
 
+/* Edge after edge without a division, each equal to clk_edge_ns(). t_ns is the instant of the present one. */
+struct clk_walk {
+    int64_t t_ns;
+    int64_t rest; /* of t_ns, in 1/hz ns: 0 .. hz - 1 */
+    int64_t hz, step_ns, step_rest;
+};
+
+/* At edge k of the clock, to go on in steps of `every` edges. */
+static inline struct clk_walk clk_walk(const struct clk *c, int64_t k, int64_t every)
+{
+    const int64_t step = every * c->div;
+    return (struct clk_walk){.t_ns = clk_edge_ns(c, k),
+                             .rest = k * c->div % c->hz * 1000000000 % c->hz,
+                             .hz = c->hz,
+                             .step_ns = clk_span_ns(c->hz, step),
+                             .step_rest = step % c->hz * 1000000000 % c->hz};
+}
+
+static inline void clk_walk_on(struct clk_walk *w)
+{
+    w->t_ns += w->step_ns;
+    w->rest += w->step_rest;
+    if (w->rest < w->hz) return;
+    w->rest -= w->hz;
+    w->t_ns++;
+}
+
 #endif

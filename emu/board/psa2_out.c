@@ -40,19 +40,25 @@ static void pack_words(const struct psa2_profile *p, struct psa2_frame *f)
         f->word[i] = p->word[i] == PSA2_WORD_T ? temp_word(p, f) : code_word(p, f->raw[p->word[i]]);
 }
 
+#define CLK  (UINT32_C(1) << PSA2_LINE_CLK)
+#define DATA (UINT32_C(1) << PSA2_LINE_DATA)
+
 /* Edges of one word up to an instant: DATA changes where CLK falls, CLK runs only while bits are sent. */
 static void report_word(struct psa2 *b, unsigned w, int64_t until_ns)
 {
+    struct trace_step step[3 * 32 + 1], *p = step;
+    struct clk_walk at = clk_walk(&b->out.half, b->out.k0 + word_half(b, w), 1);
+    const uint32_t word = b->out.f.word[w];
     for (unsigned bit = 0; bit < b->profile.word_bits; bit++) {
-        const int64_t fall = word_half(b, w) + 2 * (int64_t)bit;
-        if (edge_ns(b, fall) > until_ns) return;
-        trace_set(&b->trace, PSA2_LINE_DATA, b->out.f.word[w] >> bit & 1, edge_ns(b, fall));
-        if (edge_ns(b, fall + 1) > until_ns) return;
-        trace_set(&b->trace, PSA2_LINE_CLK, true, edge_ns(b, fall + 1));
-        if (edge_ns(b, fall + 2) > until_ns) return;
-        trace_set(&b->trace, PSA2_LINE_CLK, false, edge_ns(b, fall + 2));
+        *p++ = (struct trace_step){at.t_ns, DATA, (word >> bit & 1) << PSA2_LINE_DATA};
+        clk_walk_on(&at);
+        *p++ = (struct trace_step){at.t_ns, CLK, CLK};
+        clk_walk_on(&at);
+        *p++ = (struct trace_step){at.t_ns, CLK, 0};
     }
-    trace_set(&b->trace, PSA2_LINE_DATA, false, edge_ns(b, word_half(b, w) + 2 * (int64_t)b->profile.word_bits));
+    *p++ = (struct trace_step){at.t_ns, DATA, 0};
+    while (p > step && p[-1].t_ns > until_ns) p--;
+    trace_steps(&b->trace, step, (unsigned)(p - step));
 }
 
 /* Runs only while the line is watched: at INT fall, then at the end of each word but the last. */

@@ -104,45 +104,49 @@ int64_t psa2_spi_span_ns(const struct psa2 *b, const struct psa2_xfer *x, int64_
     return span_ns + (x->group == PSA2_TEMP ? psa2_tau_ns(b, CST_TAU) : periods_ns(b->profile.sclk_hz, 1));
 }
 
-/* Bits of a byte on one line; first_k is the half period at which bit 7 appears. */
-static void report_bits(struct psa2 *b, enum psa2_line line, uint8_t byte, int64_t first_k)
-{
-    for (int i = 0; i < 8; i++) trace_set(&b->trace, line, byte >> (7 - i) & 1, edge_ns(b, first_k + 2 * i));
-}
-
-static void report_sclk(struct psa2 *b)
-{
-    for (int64_t k = b->spi.k; k < b->spi.k + HALF_BYTE; k++)
-        trace_set(&b->trace, PSA2_LINE_SCLK, !(k & 1), edge_ns(b, k));
-}
-
-/* Mode 0: data change on the falling edge before the rising one that samples them. */
-static void report_accel(struct psa2 *b, uint8_t mosi)
+/* Data lines before bit i (0 is the MSB) is sampled; 8: after the byte. */
+static uint32_t accel_level(const struct psa2 *b, unsigned i)
 {
     const struct psa2_spi *s = &b->spi;
-    report_bits(b, PSA2_LINE_DIN, mosi, s->k - 1);
-    if (s->at + 1u == s->x.count) trace_set(&b->trace, PSA2_LINE_DIN, false, edge_ns(b, s->k + HALF_BYTE - 1));
-    for (unsigned i = 0; i < 3; i++) {
-        report_bits(b, PSA2_LINE_DOUTX + i, s->rx[i][s->at], s->k - 1);
-        trace_set(&b->trace, PSA2_LINE_DOUTX + i, spi_miso(&b->adc[i].spi), edge_ns(b, s->k + HALF_BYTE - 1));
+    const unsigned shift = i < 8 ? 7 - i : 0;
+    const bool last = s->at + 1u == s->x.count;
+    const uint8_t mosi = s->x.group == PSA2_ACCEL && !(i == 8 && last) ? s->x.tx[s->at] : 0;
+    uint32_t level = (mosi >> shift & 1u) << PSA2_LINE_DIN;
+    for (unsigned axis = 0; axis < 3; axis++) {
+        const unsigned miso = i < 8 ? s->rx[axis][s->at] >> shift & 1u : spi_miso(&b->adc[axis].spi);
+        level |= miso << (PSA2_LINE_DOUTX + axis);
     }
+    return level;
 }
 
-/* Mode 1: data change on the rising edge. */
-static void report_temp(struct psa2 *b)
+static uint32_t temp_level(const struct psa2 *b, unsigned i)
 {
     const struct psa2_spi *s = &b->spi;
-    report_bits(b, PSA2_LINE_DINT, s->x.tx[s->at], s->k);
-    report_bits(b, PSA2_LINE_DOUTT, s->rx[3][s->at], s->k);
-    if (s->at + 1u == s->x.count) trace_set(&b->trace, PSA2_LINE_DINT, false, edge_ns(b, s->k + HALF_BYTE));
+    return (s->x.tx[s->at] >> (7 - i) & 1u) << PSA2_LINE_DINT | (s->rx[3][s->at] >> (7 - i) & 1u) << PSA2_LINE_DOUTT;
 }
 
+/* The byte that has ended. Accelerometers, mode 0: data change on the falling edge before the rising one that samples them;
+ * temperature, mode 1: on the rising edge. */
 static void report_byte(struct psa2 *b)
 {
+    const struct psa2_spi *s = &b->spi;
     if (!trace_watched(&b->trace, accel_lines | temp_lines)) return;
-    report_sclk(b);
-    if (clocks_accel(b)) report_accel(b, b->spi.x.group == PSA2_ACCEL ? b->spi.x.tx[b->spi.at] : 0);
-    if (b->spi.x.group == PSA2_TEMP) report_temp(b);
+    const bool temp = s->x.group == PSA2_TEMP;
+    const uint32_t sclk = UINT32_C(1) << PSA2_LINE_SCLK;
+    const uint32_t on_fall = clocks_accel(b) ? accel_lines & ~sclk : 0;
+    const uint32_t on_rise = temp ? temp_lines & ~sclk : 0;
+    struct trace_step step[HALF_BYTE + 2], *p = step;
+    struct clk_walk at = clk_walk(&s->half, s->k - 1, 1);
+    *p++ = (struct trace_step){at.t_ns, on_fall, on_fall ? accel_level(b, 0) : 0};
+    for (unsigned i = 0; i < 8; i++) {
+        clk_walk_on(&at);
+        *p++ = (struct trace_step){at.t_ns, sclk | on_rise, sclk | (on_rise ? temp_level(b, i) : 0)};
+        clk_walk_on(&at);
+        *p++ = (struct trace_step){at.t_ns, sclk | on_fall, on_fall ? accel_level(b, i + 1) : 0};
+    }
+    clk_walk_on(&at);
+    if (temp && s->at + 1u == s->x.count) *p++ = (struct trace_step){at.t_ns, UINT32_C(1) << PSA2_LINE_DINT, 0};
+    trace_steps(&b->trace, step, (unsigned)(p - step));
 }
 
 static void end_xfer(struct psa2 *b, int64_t t_ns)

@@ -40,12 +40,15 @@ static void sample_until(struct sampler *s, int64_t t_ns)
     if (count > s->next) emit(s, count - s->next);
 }
 
-static void change(void *ctx, unsigned sig, bool level, int64_t t_ns)
+static void steps(void *ctx, const struct trace_step *step, unsigned n)
 {
     struct sampler *s = ctx;
-    sample_until(s, t_ns); /* a sample at t_ns itself sees the new level */
-    for (unsigned i = 0; i < 3; i++)
-        if (s->sig[i] == sig) s->level = (uint8_t)((s->level & ~(1u << i)) | (unsigned)level << i);
+    for (const struct trace_step *const end = step + n; step < end; step++) {
+        if (!(step->lines & s->sink.mask)) continue;
+        sample_until(s, step->t_ns); /* a sample at t_ns itself sees the new level */
+        s->level = 0;
+        for (unsigned i = 0; i < 3; i++) s->level |= (uint8_t)((step->level >> s->sig[i] & 1) << i);
+    }
 }
 
 static void advance(void *ctx, int64_t t_ns)
@@ -68,7 +71,7 @@ bool sampler_start(struct sampler *s, struct trace *t, const struct clk *clock)
         mask |= UINT32_C(1) << sig;
     }
     s->first = s->next = clk_count_at(&own, t->done_ns);
-    s->sink = (struct trace_sink){.mask = mask, .change = change, .advance = advance, .ctx = s};
+    s->sink = (struct trace_sink){.mask = mask, .steps = steps, .advance = advance, .ctx = s};
     trace_attach(t, &s->sink);
     return true;
 }

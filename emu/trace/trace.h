@@ -16,18 +16,19 @@
 #define TRACE_PENDING_MAX 16384u
 #define TRACE_LAG_NS      200000 /* longer than any byte or word on a board's lines */
 
+/* From t_ns on the signals in the mask `lines` have these levels. Bit per signal; at one instant in order of their numbers. */
+struct trace_step {
+    int64_t t_ns;
+    uint32_t lines, level;
+};
+
 struct trace_sink {
     uint32_t mask; /* bit i: wants signal i */
-    void (*change)(void *ctx, unsigned sig, bool level, int64_t t_ns);
+    /* n steps in order of time. `lines` are real changes, of all signals: look at those in the mask. */
+    void (*steps)(void *ctx, const struct trace_step *s, unsigned n);
     void (*advance)(void *ctx, int64_t t_ns); /* nothing more will come before t_ns; may be NULL */
     void *ctx;
     struct trace_sink *next;
-};
-
-struct trace_edge {
-    int64_t t_ns;
-    uint32_t order;
-    uint8_t sig, level;
 };
 
 struct trace {
@@ -36,13 +37,11 @@ struct trace {
     uint32_t level;   /* as delivered, bit per signal */
     uint32_t watched; /* union of the sinks' masks */
     struct trace_sink *sinks;
-    struct trace_edge pending[TRACE_PENDING_MAX];
-    unsigned pending_count;
-    uint32_t order;
-    int64_t done_ns; /* delivered up to here */
-    uint32_t
-        late; /* edges reported behind done_ns: delivered at done_ns, counted; 0 unless a board breaks the window */
-    uint32_t dropped; /* pending was full */
+    struct trace_step pending[TRACE_PENDING_MAX]; /* in order of time, then of report, from pending[first] on */
+    unsigned first, pending_count;
+    int64_t done_ns;  /* delivered up to here */
+    uint32_t late;    /* reports behind done_ns: delivered at done_ns, counted; 0 unless a board breaks the window */
+    uint32_t dropped; /* reports that found pending full */
 };
 
 void trace_init(struct trace *t);
@@ -65,6 +64,13 @@ static inline bool trace_watched(const struct trace *t, uint32_t mask)
 
 /* Reports the level of a signal from t_ns on. Cheap no-op when nobody listens to it. */
 void trace_set(struct trace *t, unsigned sig, bool level, int64_t t_ns);
+
+/* The same for n steps, which are in order of time: a byte, a word. */
+void trace_steps(struct trace *t, const struct trace_step *s, unsigned n);
+
+/* Calls a function for each change that a sink was given, one signal at a time: for sinks that need no speed. */
+typedef void trace_change_fn(void *ctx, unsigned sig, bool level, int64_t t_ns);
+void trace_each(const struct trace_step *s, unsigned n, uint32_t mask, trace_change_fn *change, void *ctx);
 
 /* Delivers everything up to and including t_ns: call with now - TRACE_LAG_NS while running (also while nobody listens, so
  * that done_ns keeps up), with now at the end. Then tells every sink. Going back does nothing. */

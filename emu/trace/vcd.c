@@ -3,7 +3,8 @@
 #include <errno.h>
 #include <string.h>
 
-#define LINE_MAX_LEN 32u /* '#', 20 digits, newline, level, code, newline */
+#define STEP_MAX_LEN (sizeof((struct vcd *)0)->prefix + 5u + 3u * TRACE_SIGNALS_MAX) /* time; level, code, newline */
+#define CHUNK        10000 /* units: the digits above them are formatted once for all times of a chunk */
 
 static char code_of(unsigned sig)
 {
@@ -44,18 +45,69 @@ static void put_time(struct vcd *v, int64_t t_units)
     v->t_units = t_units;
 }
 
+/* "#" and the digits above the lowest four of all times in the chunk that begins here. */
+static void begin_chunk(struct vcd *v, int64_t t_units)
+{
+    char digits[20];
+    unsigned n = 0;
+    for (int64_t high = t_units / CHUNK; high > 0; high /= 10) digits[n++] = (char)('0' + high % 10);
+    v->chunk_units = t_units - t_units % CHUNK;
+    v->prefix_len = n + 1;
+    v->prefix[0] = '#';
+    for (unsigned i = 0; i < n; i++) v->prefix[1 + i] = digits[n - 1 - i];
+}
+
+/* Times of 10000 units and more; returns the end of the line. */
+static char *time_line(struct vcd *v, char *p, int64_t t_units)
+{
+    if (t_units - v->chunk_units >= CHUNK) begin_chunk(v, t_units);
+    const unsigned low = (unsigned)(t_units - v->chunk_units);
+    memcpy(p, v->prefix, sizeof v->prefix);
+    p += v->prefix_len;
+    p[0] = (char)('0' + low / 1000);
+    p[1] = (char)('0' + low / 100 % 10);
+    p[2] = (char)('0' + low / 10 % 10);
+    p[3] = (char)('0' + low % 10);
+    p[4] = '\n';
+    return p + 5;
+}
+
+static char *level_lines(char *p, uint32_t lines, uint32_t level)
+{
+    for (; lines; lines &= lines - 1) {
+        const unsigned sig = (unsigned)__builtin_ctz(lines);
+        *p++ = (char)('0' + (level >> sig & 1));
+        *p++ = code_of(sig);
+        *p++ = '\n';
+    }
+    return p;
+}
+
 /* The path of every edge. */
-static void change(void *ctx, unsigned sig, bool level, int64_t t_ns)
+static void step(struct vcd *v, const struct trace_step *s, uint32_t lines)
+{
+    if (VCD_BUF - v->len < STEP_MAX_LEN) write_out(v);
+    const int64_t t_units = s->t_ns / v->unit_ns;
+    char *p = v->buf + v->len;
+    if (t_units != v->t_units && t_units < CHUNK) {
+        put_time(v, t_units);
+        p = v->buf + v->len;
+    } else if (t_units != v->t_units) {
+        p = time_line(v, p, t_units);
+    }
+    char *const end = level_lines(p, lines, s->level);
+    v->changes += (uint64_t)(end - p) / 3;
+    v->len = (size_t)(end - v->buf);
+    v->t_units = v->edge_units = t_units;
+}
+
+static void steps(void *ctx, const struct trace_step *s, unsigned n)
 {
     struct vcd *v = ctx;
-    if (VCD_BUF - v->len < LINE_MAX_LEN) write_out(v);
-    const int64_t t_units = t_ns / v->unit_ns;
-    if (t_units != v->t_units) put_time(v, t_units);
-    v->buf[v->len++] = level ? '1' : '0';
-    v->buf[v->len++] = code_of(sig);
-    v->buf[v->len++] = '\n';
-    v->edge_units = t_units;
-    v->changes++;
+    for (const struct trace_step *const end = s + n; s < end; s++) {
+        const uint32_t lines = s->lines & v->sink.mask;
+        if (lines) step(v, s, lines);
+    }
 }
 
 static void advance(void *ctx, int64_t t_ns)
@@ -107,7 +159,7 @@ bool vcd_open(struct vcd *v, const struct vcd_cfg *cfg, struct trace *t)
     v->seen_units = t->done_ns / v->unit_ns;
     put_time(v, v->seen_units);
     put(v, "$dumpvars\n");
-    v->sink = (struct trace_sink){.mask = cfg->mask, .change = change, .advance = advance, .ctx = v};
+    v->sink = (struct trace_sink){.mask = cfg->mask, .steps = steps, .advance = advance, .ctx = v};
     trace_attach(t, &v->sink); /* tells the levels */
     put(v, "$end\n");
     v->changes = 0;

@@ -30,10 +30,13 @@ struct vcd { /* read-only outside vcd.c */
     struct trace *trace;
     FILE *out;
     int64_t unit_ns;
-    int64_t t_units;    /* last time written */
-    int64_t edge_units; /* time of the last change */
-    int64_t seen_units; /* nothing will change before this */
-    int error;          /* errno of the first write that failed */
+    int64_t t_units;     /* last time written */
+    int64_t edge_units;  /* time of the last change */
+    int64_t seen_units;  /* nothing will change before this */
+    int64_t chunk_units; /* times from here on have the digits in prefix ... */
+    unsigned prefix_len;
+    char prefix[24]; /* ... and four more */
+    int error;       /* errno of the first write that failed */
     bool told;
     uint64_t changes;
     size_t len;

@@ -22,7 +22,7 @@ struct bench {
     struct trace_sink sink;
     struct vcd vcd;
     uint64_t frames, edges, hash;
-    struct trace_edge tape[TAPE_MAX]; /* edges of some frames, for the VCD writer alone */
+    struct trace_step tape[TAPE_MAX]; /* edges of some frames, for the VCD writer alone */
     unsigned tape_len;
 };
 
@@ -50,19 +50,17 @@ static void frame(void *ctx, const struct psa2_frame *f, int64_t t_ns)
     for (unsigned w = 0; w < PSA2_WORDS; w++) n->hash = (n->hash ^ f->word[w]) * UINT64_C(0x100000001B3);
 }
 
-static void count(void *ctx, unsigned sig, bool level, int64_t t_ns)
+static void count(void *ctx, const struct trace_step *s, unsigned n)
 {
-    (void)sig;
-    (void)level;
-    (void)t_ns;
-    ((struct bench *)ctx)->edges++;
+    struct bench *b = ctx;
+    for (; n > 0; n--, s++)
+        for (uint32_t left = s->lines; left; left &= left - 1) b->edges++;
 }
 
-static void to_tape(void *ctx, unsigned sig, bool level, int64_t t_ns)
+static void to_tape(void *ctx, const struct trace_step *s, unsigned n)
 {
-    struct bench *n = ctx;
-    if (n->tape_len == TAPE_MAX) return;
-    n->tape[n->tape_len++] = (struct trace_edge){.t_ns = t_ns, .sig = (uint8_t)sig, .level = level};
+    struct bench *b = ctx;
+    for (; n > 0 && b->tape_len < TAPE_MAX; n--) b->tape[b->tape_len++] = *s++;
 }
 
 static int64_t clock_ns(void)
@@ -74,7 +72,7 @@ static int64_t clock_ns(void)
 
 static void watch(struct bench *n)
 {
-    n->sink = (struct trace_sink){.mask = (UINT32_C(1) << PSA2_LINES) - 1, .change = count, .ctx = n};
+    n->sink = (struct trace_sink){.mask = (UINT32_C(1) << PSA2_LINES) - 1, .steps = count, .ctx = n};
     trace_attach(&n->b.trace, &n->sink);
 }
 
@@ -100,7 +98,7 @@ static void run_frames(struct bench *n, uint64_t frames)
 /* 100 frames on tape, then the writer. */
 static void tape_then_record(struct bench *n)
 {
-    struct trace_sink sink = {.mask = (UINT32_C(1) << PSA2_LINES) - 1, .change = to_tape, .ctx = n};
+    struct trace_sink sink = {.mask = (UINT32_C(1) << PSA2_LINES) - 1, .steps = to_tape, .ctx = n};
     trace_attach(&n->b.trace, &sink);
     run_frames(n, 100);
     trace_detach(&n->b.trace, &sink);
@@ -109,11 +107,10 @@ static void tape_then_record(struct bench *n)
 
 static void replay(struct bench *n, uint64_t frames)
 {
-    for (uint64_t f = 0; f < frames; f += 100, n->frames += 100)
-        for (unsigned i = 0; i < n->tape_len; i++) {
-            const struct trace_edge *e = &n->tape[i];
-            n->vcd.sink.change(n->vcd.sink.ctx, e->sig, e->level != 0, e->t_ns + (int64_t)f * FRAME_NS);
-        }
+    for (uint64_t f = 0; f < frames; f += 100, n->frames += 100) {
+        n->vcd.sink.steps(n->vcd.sink.ctx, n->tape, n->tape_len);
+        for (unsigned i = 0; i < n->tape_len; i++) n->tape[i].t_ns += INT64_C(100) * FRAME_NS;
+    }
 }
 
 static const struct bench_case {

@@ -72,6 +72,11 @@ static inline void rig_change(void *ctx, unsigned sig, bool level, int64_t t_ns)
     if (r->edges < RIG_EDGES) r->edge[r->edges++] = (struct rig_edge){t_ns, (uint8_t)sig, level};
 }
 
+static inline void rig_steps(void *ctx, const struct trace_step *s, unsigned n)
+{
+    trace_each(s, n, UINT32_MAX, rig_change, ctx);
+}
+
 static inline struct psa2_unit_cfg rig_unit(double noise_scale)
 {
     struct psa2_unit_cfg u = {.adc_noise_scale = noise_scale, .temp_noise_scale = noise_scale, .seed = 7, .serial = 3};
@@ -91,7 +96,7 @@ static inline void rig_init(struct rig *r, const struct psa2_profile *p, double 
     for (int i = 0; i < 4; i++) r->degc[i] = 25.0;
     sched_init(&r->s);
     psa2_init(&r->b, p, &u, &io, &r->s);
-    r->sink = (struct trace_sink){.mask = 0xFFFF, .change = rig_change, .ctx = r};
+    r->sink = (struct trace_sink){.mask = 0xFFFF, .steps = rig_steps, .ctx = r};
 }
 
 static inline void rig_run(struct rig *r, int64_t ns)

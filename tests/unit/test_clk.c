@@ -31,6 +31,23 @@ static void count_at_finds_the_first_edge_not_before(void **state)
     }
 }
 
+static void a_walk_meets_every_edge(void **state)
+{
+    (void)state;
+    const struct clk clocks[] = {{0, 4096000, 1},  {7, 4096000, 3},   {0, 2000000, 1},
+                                 {-3, 7680000, 2}, {0, 999999937, 1}, {0, 1, 1}};
+    const int64_t starts[] = {0, 1, 12345, INT64_C(4096000) * 3600};
+    const int64_t steps[] = {1, 2, 128, 4096};
+    for (size_t c = 0; c < COUNT(clocks); c++)
+        for (size_t s = 0; s < COUNT(starts); s++)
+            for (size_t e = 0; e < COUNT(steps); e++) {
+                if (clocks[c].hz == 1 && s == 3) continue; /* beyond what 64 bits of ns hold */
+                struct clk_walk w = clk_walk(&clocks[c], starts[s], steps[e]);
+                for (int64_t i = 0; i < 5000; i++, clk_walk_on(&w))
+                    assert_int_equal(w.t_ns, clk_edge_ns(&clocks[c], starts[s] + i * steps[e]));
+            }
+}
+
 static void rounding_and_sign_extension_keep_their_signs(void **state)
 {
     (void)state;
@@ -60,6 +77,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(edges_are_exact_after_an_hour),
         cmocka_unit_test(count_at_finds_the_first_edge_not_before),
+        cmocka_unit_test(a_walk_meets_every_edge),
         cmocka_unit_test(rounding_and_sign_extension_keep_their_signs),
     };
     return cmocka_run_group_tests_name("clk", tests, NULL, NULL);

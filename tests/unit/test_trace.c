@@ -30,6 +30,11 @@ static void hear(void *ctx, unsigned sig, bool level, int64_t t_ns)
     e->heard[e->count++] = (struct heard){sig, level, t_ns};
 }
 
+static void hear_steps(void *ctx, const struct trace_step *s, unsigned n)
+{
+    trace_each(s, n, ((struct ear *)ctx)->sink.mask, hear, ctx);
+}
+
 static void hear_advance(void *ctx, int64_t t_ns)
 {
     ((struct ear *)ctx)->advanced_ns = t_ns;
@@ -37,7 +42,7 @@ static void hear_advance(void *ctx, int64_t t_ns)
 
 static void listen(struct ear *e, uint32_t mask)
 {
-    *e = (struct ear){.sink = {.mask = mask, .change = hear, .advance = hear_advance, .ctx = e}};
+    *e = (struct ear){.sink = {.mask = mask, .steps = hear_steps, .advance = hear_advance, .ctx = e}};
     trace_attach(&trace, &e->sink);
 }
 
@@ -157,6 +162,57 @@ static void a_full_window_drops_and_counts(void **state)
     assert_int_equal(trace.pending_count, 0);
 }
 
+/* A batch is what its edges one by one are: at one instant in order of the signals' numbers, none that changes nothing. */
+static void steps_of_several_signals(void **state)
+{
+    (void)state;
+    listen(&ear, 7);
+    ear.count = 0;
+    trace_set(&trace, 1, true, 150); /* falls between the steps */
+    const struct trace_step steps[] = {{100, 6, 4}, {200, 7, 3}, {200, 4, 4}, {300, 6, 6}};
+    trace_steps(&trace, steps, COUNT(steps));
+    trace_steps(&trace, steps, 0);
+    trace_advance(&trace, 250);
+    const struct heard want[] = {{2, true, 100}, {1, true, 150}, {2, false, 200}, {2, true, 200}};
+    assert_heard(&ear, want, COUNT(want));
+    assert_int_equal(trace.pending_count, 1);
+    trace_advance(&trace, 300);
+    assert_int_equal(ear.count, 4);
+}
+
+static void late_steps_are_told_now(void **state)
+{
+    (void)state;
+    listen(&ear, 7);
+    trace_advance(&trace, 1000);
+    ear.count = 0;
+    trace_steps(&trace, (struct trace_step[]){{999, 4, 4}, {1001, 4, 0}}, 2);
+    trace_advance(&trace, 1100);
+    const struct heard want[] = {{2, true, 1000}, {2, false, 1001}};
+    assert_heard(&ear, want, COUNT(want));
+    assert_int_equal(trace.late, 1);
+}
+
+/* More reports than fit, never all pending at once: what waits moves to the front of its array. */
+static void a_long_run_fits(void **state)
+{
+    (void)state;
+    listen(&ear, 7);
+    int64_t t_ns = 0;
+    for (unsigned i = 0; i < 3 * TRACE_PENDING_MAX / 8; i++, t_ns += 8) {
+        struct trace_step steps[8];
+        for (int k = 0; k < 8; k++) steps[k] = (struct trace_step){t_ns + k, 2, k % 2 ? 2 : 0};
+        trace_steps(&trace, steps, 8);
+        ear.count = 0;
+        trace_advance(&trace, t_ns - 4); /* some always wait */
+        for (int k = 1; k < ear.count; k++) assert_int_equal(ear.heard[k].t_ns, ear.heard[k - 1].t_ns + 1);
+    }
+    trace_advance(&trace, t_ns);
+    assert_int_equal(trace.dropped, 0);
+    assert_int_equal(trace.late, 0);
+    assert_int_equal(trace.pending_count, 0);
+}
+
 /* Random reports within a window against the definition: stable sort by time, then filter. */
 static void random_reports_come_out_sorted(void **state)
 {
@@ -203,6 +259,9 @@ int main(void)
         cmocka_unit_test_setup(nobody_listening_costs_no_work_and_detaching_keeps_the_levels, fresh),
         cmocka_unit_test_setup(an_edge_behind_the_window_is_counted_and_told_now, fresh),
         cmocka_unit_test_setup(a_full_window_drops_and_counts, fresh),
+        cmocka_unit_test_setup(steps_of_several_signals, fresh),
+        cmocka_unit_test_setup(late_steps_are_told_now, fresh),
+        cmocka_unit_test_setup(a_long_run_fits, fresh),
         cmocka_unit_test_setup(random_reports_come_out_sorted, fresh),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -86,6 +86,28 @@ static void times_are_rounded_down_to_the_unit(void **state)
     }
 }
 
+/* Every count of digits, both sides of each place where one carries, as printf writes them. */
+static void times_have_the_digits_that_printf_gives(void **state)
+{
+    (void)state;
+    static char want[1 << 16];
+    size_t n = 0;
+    FILE *f = open_vcd(1);
+    bool level = false;
+    for (int64_t ten = 10; ten <= INT64_C(100000000000000000); ten *= 10) {
+        for (int64_t t = ten - 2; t <= ten + 20002; t += t < ten + 1 ? 1 : 3333) {
+            level = !level;
+            trace_set(&trace, 1, level, t);
+            trace_advance(&trace, t);
+            n += (size_t)snprintf(want + n, sizeof want - n, "#%lld\n%d\"\n", (long long)t, level);
+        }
+        if (ten == 10) ten = 10000; /* small times would run into one another */
+    }
+    vcd_close(&vcd, trace.done_ns);
+    assert_non_null(strstr(read_back(f), want));
+    fclose(f);
+}
+
 static void a_unit_that_vcd_does_not_know_is_refused(void **state)
 {
     (void)state;
@@ -170,6 +192,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(the_file_is_what_ieee_1364_says_and_ends_after_the_last_edge, fresh),
         cmocka_unit_test(times_are_rounded_down_to_the_unit),
+        cmocka_unit_test_setup(times_have_the_digits_that_printf_gives, fresh),
         cmocka_unit_test_setup(a_unit_that_vcd_does_not_know_is_refused, fresh),
         cmocka_unit_test_setup(a_late_start_begins_at_its_own_time, fresh),
         cmocka_unit_test_setup(a_flushed_file_can_be_looked_at_while_it_grows, fresh),
