@@ -1,8 +1,13 @@
-#include "chip/ads1256_conv.h"
+#include "chip/ads1256_parts.h"
 
 static uint32_t get24(const struct ads1256 *a, enum ads1256_reg low)
 {
     return a->value[low] | (uint32_t)a->value[low + 1] << 8 | (uint32_t)a->value[low + 2] << 16;
+}
+
+static int32_t get_ofc(const struct ads1256 *a)
+{
+    return (int32_t)(get24(a, ADS1256_OFC0) ^ 0x800000) - 0x800000;
 }
 
 static void poke24(struct ads1256 *a, enum ads1256_reg low, uint32_t v)
@@ -16,16 +21,6 @@ void ads1256_set_drdy(struct ads1256 *a, bool level, int64_t t_ns)
     a->drdy = level;
     reg_poke(&a->regs, ADS1256_STATUS, (uint8_t)((ads1256_value(a, ADS1256_STATUS) & ~ADS1256_STATUS_DRDY) | level));
     a->io.drdy(a->io.ctx, level, t_ns);
-}
-
-static double pin_v(struct ads1256 *a, unsigned select, int64_t t_ns)
-{
-    const double v = a->io.ain_v(a->io.ctx, select & 8 ? ADS1256_AINCOM : select, t_ns);
-    if (!(ads1256_value(a, ADS1256_STATUS) & ADS1256_STATUS_BUFEN)) return v;
-    const double max_v = a->cfg.avdd_v - 2.0;
-    if (v >= 0.0 && v <= max_v) return v;
-    a->n.buffer_clipped++;
-    return v < 0.0 ? 0.0 : max_v;
 }
 
 /* Fraction of full scale for volts at the input of the uncalibrated path. */
@@ -73,28 +68,45 @@ static void start_run(struct ads1256 *a, int64_t start_tau)
     await_ready(a);
 }
 
-void ads1256_halt(struct ads1256 *a, enum ads1256_mode mode, int64_t t_ns)
+/* DRATE changed without synchronisation: periods of the new length from the DRDY at CLKIN count ready on. The sinc5 goes
+ * on with what it holds; only the mean begins anew. */
+static void change_rate(struct ads1256 *a, int64_t ready)
+{
+    a->rate = a->rate_next;
+    a->start_tau = ready - ADS1256_START_TAU;
+    a->ready = 0;
+    a->cell = ads1256_mean_change(&a->mean, a->rate, a->cfg.cells_max);
+    await_cell(a);
+    await_ready(a);
+}
+
+void ads1256_freeze(struct ads1256 *a, enum ads1256_mode mode)
 {
     sched_cancel(a->sched, &a->cell_ev);
     sched_cancel(a->sched, &a->ready_ev);
     sched_cancel(a->sched, &a->pulse_ev);
     sched_cancel(a->sched, &a->cal_ev);
+    a->updating = false;
     a->mode = mode;
+}
+
+void ads1256_halt(struct ads1256 *a, enum ads1256_mode mode, int64_t t_ns)
+{
+    ads1256_freeze(a, mode);
     ads1256_set_drdy(a, true, t_ns);
 }
 
-void ads1256_restart(struct ads1256 *a, int64_t t_ns)
+void ads1256_restart(struct ads1256 *a, int64_t extra_tau, int64_t t_ns)
 {
+    ads1256_halt(a, ADS1256_RUNNING, t_ns);
     a->n.restarts++;
-    start_run(a, clk_count_at(&a->clkin, t_ns));
+    start_run(a, clk_count_at(&a->clkin, t_ns) + extra_tau);
 }
 
 static void on_cell(void *ctx, int64_t t_ns)
 {
     struct ads1256 *a = ctx;
-    const uint8_t mux = ads1256_value(a, ADS1256_MUX);
-    const double vin_v = pin_v(a, mux >> 4, t_ns) - pin_v(a, mux & 15, t_ns);
-    ads1256_mean_push(&a->mean, path_fs(a, vin_v));
+    ads1256_mean_push(&a->mean, path_fs(a, ads1256_input_v(a, t_ns)));
     a->cell++;
     await_cell(a);
 }
@@ -103,8 +115,7 @@ static int32_t convert(struct ads1256 *a)
 {
     bool clipped = false;
     const double raw = a->rate->alpha * (a->mean.out + noise_fs(a));
-    const int32_t ofc = (int32_t)(get24(a, ADS1256_OFC0) ^ 0x800000) - 0x800000;
-    const int32_t code = ads1256_code(raw, ofc, get24(a, ADS1256_FSC0), &clipped);
+    const int32_t code = ads1256_code(raw, get_ofc(a), get24(a, ADS1256_FSC0), &clipped);
     a->n.clipped += clipped;
     return code;
 }
@@ -123,11 +134,11 @@ static void on_ready(void *ctx, int64_t t_ns)
 {
     struct ads1256 *a = ctx;
     a->n.conversions++;
+    a->updating = false;
     a->word = convert(a);
     offer_word(a);
     a->ready++;
-    if (a->rate != a->rate_next) /* DRATE changed without synchronisation: periods of the new length from here on */
-        start_run(a, a->start_tau + ready_tau(a, a->ready - 1) - ADS1256_START_TAU);
+    if (a->rate != a->rate_next) change_rate(a, a->start_tau + ready_tau(a, a->ready - 1));
     else await_ready(a);
     sched_at(a->sched, &a->pulse_ev, run_edge_ns(a, ready_tau(a, a->ready) - ADS1256_PULSE_TAU));
     ads1256_set_drdy(a, false, t_ns);
@@ -135,29 +146,72 @@ static void on_ready(void *ctx, int64_t t_ns)
 
 static void on_pulse(void *ctx, int64_t t_ns)
 {
-    ads1256_set_drdy(ctx, true, t_ns);
+    struct ads1256 *a = ctx;
+    a->updating = true;
+    ads1256_set_drdy(a, true, t_ns);
+}
+
+/* A system calibration takes one word of the pins; its last cell lies where the settling of the run after it begins. The
+ * shortest printed duration leaves 52 tau before its first one. */
+static void measure_pins(struct ads1256 *a)
+{
+    ads1256_mean_start(&a->mean, a->rate, a->cfg.cells_max);
+    a->cell = 0;
+    a->start_tau -= ads1256_settle_tau(a->rate);
+    await_cell(a);
+    a->start_tau += ads1256_settle_tau(a->rate);
 }
 
 void ads1256_calibrate(struct ads1256 *a, enum ads1256_cal kind, int64_t t_ns)
 {
+    a->cal = kind;
+    a->cal_due = !a->sync || a->mode == ADS1256_STANDBY;
+    if (a->cal_due) { /* the filter is held: at the rise of SYNC/PDWN, at WAKEUP (E0) */
+        if (a->mode != ADS1256_STANDBY) ads1256_halt(a, ADS1256_SYNC_LOW, t_ns);
+        return;
+    }
     ads1256_halt(a, ADS1256_CALIBRATING, t_ns);
     a->rate = a->rate_next;
-    a->cal = kind;
     const int64_t end_tau = clk_count_at(&a->clkin, t_ns) + ads1256_cal_tau(a->rate, kind, ads1256_pga_log2(a));
     a->start_tau = end_tau - ads1256_settle_tau(a->rate); /* the printed durations include the settling after it */
     a->next_ok_ns = clk_edge_ns(&a->clkin, end_tau);
     sched_at(a->sched, &a->cal_ev, run_edge_ns(a, 0));
+    if (kind == ADS1256_SYSOCAL || kind == ADS1256_SYSGCAL) measure_pins(a);
+}
+
+static void store_ofc(struct ads1256 *a, double raw)
+{
+    bool clamped = false;
+    poke24(a, ADS1256_OFC0, (uint32_t)ads1256_cal_ofc(raw, &clamped));
+    a->n.cal_clamped += clamped;
+}
+
+static void store_fsc(struct ads1256 *a, double raw)
+{
+    bool clamped = false;
+    poke24(a, ADS1256_FSC0, ads1256_cal_fsc(a->rate, raw, &clamped));
+    a->n.cal_clamped += clamped;
+}
+
+/* What a calibration measures, by kind. The self-gain calibration is without noise (E0). */
+static void store_result(struct ads1256 *a)
+{
+    const double alpha = a->rate->alpha;
+    if (a->cal == ADS1256_SYSOCAL) store_ofc(a, alpha * (a->mean.out + noise_fs(a)));
+    else if (a->cal != ADS1256_SELFGCAL && a->cal != ADS1256_SYSGCAL)
+        store_ofc(a, alpha * (path_fs(a, 0.0) + noise_fs(a)));
+    if (a->cal == ADS1256_SYSGCAL) store_fsc(a, alpha * (a->mean.out + noise_fs(a)) - get_ofc(a));
+    else if (a->cal == ADS1256_SELFCAL || a->cal == ADS1256_SELFGCAL) store_fsc(a, alpha * (1.0 + a->cfg.gain_error));
 }
 
 static void on_cal(void *ctx, int64_t t_ns)
 {
     struct ads1256 *a = ctx;
-    (void)t_ns;
     a->n.calibrations++;
-    if (a->cal != ADS1256_SELFGCAL)
-        poke24(a, ADS1256_OFC0, (uint32_t)ads1256_cal_ofc(a->rate->alpha * (path_fs(a, 0.0) + noise_fs(a))));
-    if (a->cal != ADS1256_SELFOCAL) poke24(a, ADS1256_FSC0, ads1256_cal_fsc(a->rate, a->cfg.gain_error));
-    start_run(a, a->start_tau);
+    store_result(a);
+    sched_cancel(a->sched, &a->cell_ev);
+    if (a->sync) start_run(a, a->start_tau);
+    else ads1256_halt(a, ADS1256_SYNC_LOW, t_ns);
 }
 
 void ads1256_conv_init(struct ads1256 *a)

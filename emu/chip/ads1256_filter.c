@@ -61,11 +61,12 @@ static int64_t tau_of_us(uint32_t us)
     return ((int64_t)us * 768 + 50) / 100; /* at 7.68 MHz */
 }
 
-/* SELFOCAL is 0.32 ms (2458 tau) and two data periods in every printed row. */
+/* SELFOCAL and SYSOCAL are 0.32 ms (2458 tau) and two data periods in every printed row; SYSGCAL is SELFGCAL at PGA 1. */
 int64_t ads1256_cal_tau(const struct ads1256_rate *r, enum ads1256_cal kind, unsigned gain_log2)
 {
-    const unsigned column = gain_log2 < ADS1256_CAL_GAINS ? gain_log2 : ADS1256_CAL_GAINS - 1;
-    if (kind == ADS1256_SELFOCAL) return 2458 + 2 * ads1256_period_tau(r);
+    const unsigned last = ADS1256_CAL_GAINS - 1;
+    const unsigned column = kind == ADS1256_SYSGCAL ? 0 : gain_log2 < last ? gain_log2 : last;
+    if (kind == ADS1256_SELFOCAL || kind == ADS1256_SYSOCAL) return 2458 + 2 * ads1256_period_tau(r);
     return tau_of_us(kind == ADS1256_SELFCAL ? r->selfcal_us[column] : r->selfgcal_us[column]);
 }
 
@@ -84,6 +85,16 @@ void ads1256_mean_start(struct ads1256_mean *m, const struct ads1256_rate *r, un
     };
 }
 
+/* Four cells of the sinc5 have gone by when the mean of a run begins; a mean without it has only its latest look. */
+int64_t ads1256_mean_change(struct ads1256_mean *m, const struct ads1256_rate *r, unsigned cells_max)
+{
+    const struct ads1256_mean was = *m;
+    ads1256_mean_start(m, r, cells_max);
+    for (unsigned i = 0; i < 5; i++) m->tap[i] = was.tap[was.sinc5 ? i : 0];
+    m->filled = 4;
+    return m->sinc5 ? 4 : 0;
+}
+
 /* Five boxcars of one word each, seen at the middle of five cells: the quartic B-spline at half-integers. Its response
  * differs from the sinc5 by the aliases only, below 0.2 % up to the -3 dB point of the fastest rate. */
 static double spline(const double tap[5])
@@ -98,6 +109,8 @@ void ads1256_mean_push(struct ads1256_mean *m, double x)
         m->tap[0] = x;
         if (m->filled < 5 && ++m->filled < 5) return;
         x = spline(m->tap);
+    } else {
+        m->tap[0] = x;
     }
     m->sum += x;
     if (++m->words < m->cells) return;
@@ -124,17 +137,20 @@ int32_t ads1256_code(double raw, int32_t ofc, uint32_t fsc, bool *clipped)
     return code < 0.0 ? -8388608 : 8388607;
 }
 
-static double limited(double v, double min, double max)
+static double limited(double v, double min, double max, bool *clamped)
 {
-    return v < min ? min : v > max ? max : v;
+    if (v >= min && v <= max) return v;
+    *clamped = true;
+    return v < min ? min : max;
 }
 
-int32_t ads1256_cal_ofc(double raw_zero)
+int32_t ads1256_cal_ofc(double raw_zero, bool *clamped)
 {
-    return (int32_t)limited(nearbyint(raw_zero), -8388608.0, 8388607.0);
+    return (int32_t)limited(nearbyint(raw_zero), -8388608.0, 8388607.0, clamped);
 }
 
-uint32_t ads1256_cal_fsc(const struct ads1256_rate *r, double gain_error)
+/* 0/0 cannot be: alpha and the ideal FSC are no zeros, and a span of zero gives the upper end. */
+uint32_t ads1256_cal_fsc(const struct ads1256_rate *r, double raw_span, bool *clamped)
 {
-    return (uint32_t)limited(nearbyint(r->fsc_ideal / (1.0 + gain_error)), 0.0, 16777215.0);
+    return (uint32_t)limited(nearbyint((double)r->alpha * r->fsc_ideal / raw_span), 0.0, 16777215.0, clamped);
 }

@@ -32,7 +32,7 @@ struct ads1256_rate {
     double noise_uv[ADS1256_GAINS]; /* rms, input-referred, buffer off, VREF 2.5 V */
 };
 
-enum ads1256_cal { ADS1256_SELFCAL, ADS1256_SELFOCAL, ADS1256_SELFGCAL };
+enum ads1256_cal { ADS1256_SELFCAL, ADS1256_SELFOCAL, ADS1256_SELFGCAL, ADS1256_SYSOCAL, ADS1256_SYSGCAL };
 
 /* In falling order of rate. */
 extern const struct ads1256_rate ads1256_rates[ADS1256_RATES];
@@ -64,6 +64,9 @@ struct ads1256_mean {
 /* Starts afresh at rate r. cells_max limits the looks at the input where the sinc5 is not computed; 0: no limit. */
 void ads1256_mean_start(struct ads1256_mean *m, const struct ads1256_rate *r, unsigned cells_max);
 
+/* Goes over to rate r between two conversions, with the sinc5 as it stands. Returns the number of the run's next cell. */
+int64_t ads1256_mean_change(struct ads1256_mean *m, const struct ads1256_rate *r, unsigned cells_max);
+
 /* Takes the cell x; a complete mean goes to m->out. */
 void ads1256_mean_push(struct ads1256_mean *m, double x);
 
@@ -74,8 +77,9 @@ int64_t ads1256_cell_tau(const struct ads1256_mean *m, const struct ads1256_rate
 /* clip24((raw - OFC) * FSC / K), rounded to nearest; *clipped is set, never cleared. */
 int32_t ads1256_code(double raw, int32_t ofc, uint32_t fsc, bool *clipped);
 
-/* What a calibration stores: OFC for the raw of a shorted input, FSC for a path whose gain is 1 + gain_error. */
-int32_t ads1256_cal_ofc(double raw_zero);
-uint32_t ads1256_cal_fsc(const struct ads1256_rate *r, double gain_error);
+/* What a calibration stores: OFC the raw of zero, FSC what makes full scale of the raw of full scale less OFC. Both stop at
+ * the ends of their 24 bits; *clamped is set, never cleared. */
+int32_t ads1256_cal_ofc(double raw_zero, bool *clamped);
+uint32_t ads1256_cal_fsc(const struct ads1256_rate *r, double raw_span, bool *clamped);
 
 #endif

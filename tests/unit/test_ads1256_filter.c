@@ -131,13 +131,29 @@ static void code_arithmetic(void **state)
 static void calibration_arithmetic(void **state)
 {
     (void)state;
+    bool clamped = false;
     for (unsigned i = 0; i < ADS1256_RATES; i++)
-        assert_int_equal(ads1256_cal_fsc(&ads1256_rates[i], 0.0), ads1256_rates[i].fsc_ideal);
-    assert_int_equal(ads1256_cal_fsc(&ads1256_rates[0], 0.01), 4455929); /* 4500488 / 1.01 */
-    assert_int_equal(ads1256_cal_fsc(&ads1256_rates[0], -0.9), 0xFFFFFF);
-    assert_int_equal(ads1256_cal_ofc(-12.4), -12);
-    assert_int_equal(ads1256_cal_ofc(1e9), 0x7FFFFF);
-    assert_int_equal(ads1256_cal_ofc(-1e9), -0x800000);
+        assert_int_equal(ads1256_cal_fsc(&ads1256_rates[i], ads1256_rates[i].alpha, &clamped),
+                         ads1256_rates[i].fsc_ideal);
+    assert_int_equal(ads1256_cal_fsc(&ads1256_rates[0], 1.01 * 0x400000, &clamped), 4455929); /* 4500488 / 1.01 */
+    assert_int_equal(ads1256_cal_ofc(-12.4, &clamped), -12);
+    assert_int_equal(ads1256_cal_ofc(8388607.0, &clamped), 0x7FFFFF);
+    assert_int_equal(ads1256_cal_ofc(-8388608.0, &clamped), -0x800000);
+    assert_false(clamped);
+    static const struct {
+        double span;
+        uint32_t fsc;
+    } ends[] = {{0.1 * 0x400000, 0xFFFFFF}, {0.0, 0xFFFFFF}, {-1.0, 0}, {-1e9, 0}};
+    for (unsigned i = 0; i < COUNT(ends); i++) {
+        clamped = false;
+        assert_int_equal(ads1256_cal_fsc(&ads1256_rates[0], ends[i].span, &clamped), ends[i].fsc);
+        assert_true(clamped);
+    }
+    for (int sign = -1; sign <= 1; sign += 2) {
+        clamped = false;
+        assert_int_equal(ads1256_cal_ofc(sign * 1e9, &clamped), sign > 0 ? 0x7FFFFF : -0x800000);
+        assert_true(clamped);
+    }
 }
 
 /* Sources 2.3, sinc5 and mean: |H| in clock terms. */
