@@ -68,7 +68,7 @@ static void unlink_ev(struct sched *s, struct sched_ev *e)
 
 void sched_init(struct sched *s)
 {
-    *s = (struct sched){0};
+    *s = (struct sched){.until_ns = -1};
 }
 
 void sched_ev(struct sched_ev *e, sched_fn *fn, void *ctx)
@@ -106,8 +106,17 @@ static void count_at_once(struct sched *s)
     assert(s->at_once <= SCHED_AT_ONCE_MAX);
 }
 
+bool sched_go_on(struct sched *s, int64_t t_ns)
+{
+    if (t_ns > s->until_ns || (s->root && s->root->due_ns <= t_ns)) return false;
+    if (s->now_ns < t_ns) s->now_ns = t_ns;
+    count_at_once(s);
+    return true;
+}
+
 void sched_run_until(struct sched *s, int64_t until_ns)
 {
+    s->until_ns = until_ns;
     while (s->root && s->root->due_ns <= until_ns) {
         struct sched_ev *e = s->root;
         unlink_ev(s, e);
@@ -116,4 +125,5 @@ void sched_run_until(struct sched *s, int64_t until_ns)
         e->fn(e->ctx, e->due_ns);
     }
     if (s->now_ns < until_ns) s->now_ns = until_ns;
+    s->until_ns = -1;
 }

@@ -25,7 +25,8 @@ struct sched_ev {
 };
 
 struct sched {
-    int64_t now_ns; /* read-only outside sched.c */
+    int64_t now_ns;   /* read-only outside sched.c */
+    int64_t until_ns; /* of the run under way; before now_ns outside of one */
     uint64_t seq;
     uint32_t at_once;
     int64_t at_once_ns;
@@ -42,6 +43,10 @@ void sched_at(struct sched *s, struct sched_ev *e, int64_t t_ns);
 
 /* Disarms; harmless for an idle event. */
 void sched_cancel(struct sched *s, struct sched_ev *e);
+
+/* For an event's function that would arm its event for t_ns as the last thing it does: if nothing else comes before, and the
+ * run reaches that far, time moves on to t_ns and the function may go on there itself. False: arm the event. */
+bool sched_go_on(struct sched *s, int64_t t_ns);
 
 /* Due time of the next event, SCHED_NEVER when there is none. */
 int64_t sched_next_ns(const struct sched *s);

@@ -211,12 +211,17 @@ static void sample_due(struct psa2 *b, int64_t t_ns)
 
 void psa2_arm_patience(struct psa2 *b, int64_t t_ns)
 {
-    sched_at(b->sched, &b->patience, t_ns + PSA2_PATIENCE_NS + ads1282_settle_ns(&b->adc[0]));
+    b->patience_ns = t_ns + PSA2_PATIENCE_NS + ads1282_settle_ns(&b->adc[0]);
+    if (!b->patience.queued || b->patience.due_ns > b->patience_ns) sched_at(b->sched, &b->patience, b->patience_ns);
 }
 
 static void out_of_patience(void *ctx, int64_t t_ns)
 {
     struct psa2 *b = ctx;
+    if (t_ns < b->patience_ns) {
+        sched_at(b->sched, &b->patience, b->patience_ns);
+        return;
+    }
     b->counters.timeouts++;
     if (!b->fault_told && b->io.fault) b->io.fault(b->io.ctx, PSA2_FAULT_ACCEL_PORT, t_ns);
     b->fault_told = true;

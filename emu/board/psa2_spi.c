@@ -62,11 +62,12 @@ static bool clocks_accel(const struct psa2 *b)
     return b->spi.x.group == PSA2_ACCEL || !b->profile.gate_sclk;
 }
 
-/* The next event of the byte under way. */
+/* The next instant of the byte under way. */
 static void arm(struct psa2 *b, enum psa2_spi_phase phase, int64_t t_ns)
 {
     b->spi.phase = phase;
-    sched_at(b->sched, &b->spi.ev, t_ns);
+    b->spi.due_ns = t_ns;
+    if (!b->spi.stepping) sched_at(b->sched, &b->spi.ev, t_ns);
 }
 
 static void begin_byte(struct psa2 *b, int64_t not_before_ns)
@@ -201,29 +202,28 @@ static void cst_up(struct psa2 *b, int64_t t_ns)
     trace_set(&b->trace, PSA2_LINE_DOUTT, false, t_ns); /* high impedance, drawn low */
 }
 
+static void rest(struct psa2 *b, int64_t t_ns)
+{
+    if (b->spi.phase == PSA2_SPI_CST_UP) cst_up(b, t_ns);
+    end_xfer(b, t_ns);
+}
+
+/* A burst between which nothing else happens takes one event. */
 static void on_event(void *ctx, int64_t t_ns)
 {
+    static void (*const step[])(struct psa2 * b, int64_t t_ns) = {[PSA2_SPI_FIRST] = first_fall,
+                                                                  [PSA2_SPI_SAMPLE_A] = sample_accel,
+                                                                  [PSA2_SPI_SAMPLE_T] = sample_temp,
+                                                                  [PSA2_SPI_REST] = rest,
+                                                                  [PSA2_SPI_CST_UP] = rest};
     struct psa2 *b = ctx;
-    switch (b->spi.phase) {
-    case PSA2_SPI_FIRST:
-        first_fall(b, t_ns);
-        break;
-    case PSA2_SPI_SAMPLE_A:
-        sample_accel(b, t_ns);
-        break;
-    case PSA2_SPI_SAMPLE_T:
-        sample_temp(b, t_ns);
-        break;
-    case PSA2_SPI_REST:
-        end_xfer(b, t_ns);
-        break;
-    case PSA2_SPI_CST_UP:
-        cst_up(b, t_ns);
-        end_xfer(b, t_ns);
-        break;
-    case PSA2_SPI_IDLE:
-        break;
-    }
+    struct psa2_spi *s = &b->spi;
+    s->due_ns = t_ns;
+    s->stepping = true;
+    do step[s->phase](b, s->due_ns);
+    while (s->phase != PSA2_SPI_IDLE && sched_go_on(b->sched, s->due_ns));
+    s->stepping = false;
+    if (s->phase != PSA2_SPI_IDLE) sched_at(b->sched, &s->ev, s->due_ns);
 }
 
 void psa2_spi_init(struct psa2 *b)

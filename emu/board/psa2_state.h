@@ -25,7 +25,7 @@ enum psa2_spi_phase {
     PSA2_SPI_CST_UP
 };
 
-/* Serial port engine: SClk edges from a count of half periods, two events a byte. */
+/* Serial port engine: SClk edges from a count of half periods, two instants a byte. */
 struct psa2_spi {
     struct clk half; /* edge k: rising for even k, falling for odd */
     struct psa2_xfer x;
@@ -35,6 +35,8 @@ struct psa2_spi {
     int64_t k;           /* its first rising edge */
     int64_t free_k;      /* no rising edge before this one */
     int64_t ready_ns[2]; /* per group: gap after its last burst is over */
+    int64_t due_ns;      /* of the phase */
+    bool stepping;       /* inside the event: it arms itself when it can go no further */
     struct sched_ev ev;
 };
 
@@ -109,9 +111,10 @@ struct psa2 {
     struct sched_ev res_up, patience;
     bool fault_told; /* no DRD_A has come since the fault */
     bool drd_a_seen;
-    int64_t drd_a_ns;  /* last fall */
-    int64_t period_ns; /* of DRD_A as CONFIG0 stands */
-    uint32_t seq;      /* of the next DRD_A */
+    int64_t drd_a_ns;    /* last fall */
+    int64_t period_ns;   /* of DRD_A as CONFIG0 stands */
+    int64_t patience_ns; /* no DRD_A until then is a fault; `patience` may be due earlier and then waits on */
+    uint32_t seq;        /* of the next DRD_A */
     struct psa2_request *request;
     struct psa2_frame latest; /* last complete reading, whether it was sent or not; t_int_* as sent last */
 };

@@ -365,6 +365,23 @@ static void a_slower_rate_is_awaited_longer(void **state)
     assert_int_equal(rig.faults + rig.b.counters.timeouts, 0);
 }
 
+/* From 250 to 4000 SPS: the 352 ms that were to be waited become 100 + 15.77 ms. */
+static void a_faster_rate_is_awaited_shorter(void **state)
+{
+    (void)state;
+    rig_up(&rig, "article", 1.0);
+    struct psa2_request q = {.group = PSA2_ACCEL, .op = PSA2_WRITE_REG, .addr = 1, .value = 0x46};
+    assert_int_equal(rig_request(&rig, &q), PSA2_OK);
+    rig_run(&rig, 300000000);
+    q.value = 0x66;
+    assert_int_equal(rig_request(&rig, &q), PSA2_OK);
+    ads1282_reset_pin(&rig.b.adc[0], false, rig.s.now_ns);
+    rig_run(&rig, 114000000 + rig.answered_ns - rig.s.now_ns);
+    assert_int_equal(rig.faults, 0);
+    rig_run(&rig, 4000000);
+    assert_int_equal(rig.faults, 1);
+}
+
 /* INT low for 296 us at 4000 SPS: DRD_A comes each 250 us, so every second frame finds the line busy and is dropped. */
 static void a_frame_that_finds_int_low_is_dropped_and_counted(void **state)
 {
@@ -618,6 +635,7 @@ int main(void)
         cmocka_unit_test(a_new_gain_is_marked_until_it_has_settled),
         cmocka_unit_test(a_restart_settles_a_new_gain),
         cmocka_unit_test(a_slower_rate_is_awaited_longer),
+        cmocka_unit_test(a_faster_rate_is_awaited_shorter),
         cmocka_unit_test(a_frame_that_finds_int_low_is_dropped_and_counted),
         cmocka_unit_test(a_read_that_is_not_over_at_drd_a_is_an_overrun),
         cmocka_unit_test(a_silent_converter_is_a_time_out_and_a_fault),

@@ -107,6 +107,52 @@ static void random_schedules_come_out_in_total_order(void **state)
     }
 }
 
+/* Four events with periods of 3, 4, 6 and 7 ns: ties, and stretches in which one of them is alone. */
+static bool going_on;
+
+static void tick(void *ctx, int64_t t_ns)
+{
+    static const int64_t period_ns[] = {3, 4, 6, 7};
+    struct sched_ev *e = ctx;
+    do {
+        assert_int_equal(rig.s.now_ns, t_ns);
+        record(e, t_ns);
+        t_ns += t_ns % 50 < 40 ? 1 : period_ns[e - rig.ev];
+    } while (going_on && sched_go_on(&rig.s, t_ns));
+    sched_at(&rig.s, e, t_ns);
+}
+
+static void run_ticks(bool go_on)
+{
+    fresh(NULL);
+    going_on = go_on;
+    for (int i = 0; i < 4; i++) {
+        sched_ev(&rig.ev[i], tick, &rig.ev[i]);
+        sched_at(&rig.s, &rig.ev[i], 10 * i);
+    }
+    for (int64_t t_ns = 0; t_ns <= 400; t_ns += 17) {
+        sched_run_until(&rig.s, t_ns);
+        assert_int_equal(rig.s.now_ns, t_ns);
+        for (int i = 0; i < 4; i++) assert_true(rig.ev[i].queued && rig.ev[i].due_ns > t_ns);
+    }
+}
+
+static void going_on_is_what_arming_does(void **state)
+{
+    (void)state;
+    static struct rig armed;
+    run_ticks(false);
+    armed = rig;
+    run_ticks(true);
+    assert_int_equal(rig.ran, armed.ran);
+    assert_true(rig.ran > 400);
+    for (int i = 0; i < rig.ran; i++) {
+        assert_int_equal(rig.order[i], armed.order[i]);
+        assert_int_equal(rig.at_ns[i], armed.at_ns[i]);
+    }
+    assert_false(sched_go_on(&rig.s, rig.s.now_ns)); /* outside a run nothing moves */
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -114,6 +160,7 @@ int main(void)
         cmocka_unit_test_setup(rearming_moves_and_cancelling_an_idle_event_is_harmless, fresh),
         cmocka_unit_test_setup(the_past_is_clamped_to_now, fresh),
         cmocka_unit_test_setup(an_event_due_exactly_at_the_limit_runs, fresh),
+        cmocka_unit_test_setup(going_on_is_what_arming_does, fresh),
         cmocka_unit_test_setup(random_schedules_come_out_in_total_order, fresh),
     };
     return cmocka_run_group_tests_name("sched", tests, NULL, NULL);
