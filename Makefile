@@ -5,8 +5,10 @@ ifeq ($(origin CC),default)
 CC := gcc
 endif
 AR        ?= ar
+OBJCOPY   ?= objcopy
 PKGCONFIG ?= pkg-config
 PREFIX    ?= /usr/local
+LIBDIR    ?= $(PREFIX)/lib
 CFLAGS    ?= -O2 -g
 SAN       ?=#                         address,undefined
 WERROR    ?=#                         1: a warning is an error, as in make test
@@ -14,11 +16,15 @@ BUILD     ?= build$(if $(filter clang%,$(notdir $(CC))),-clang)$(if $(SAN),-san)
 FUZZ_S    ?= 20
 SAN_E2E   := $(wildcard tests/e2e/test_bad_*.py) $(patsubst %,tests/e2e/test_%.py,unit tools canopen)
 # Build a part only, say DIRS='base chip' TESTS=test_ads1282 while the rest does not compile.
-DIRS      ?= base trace phys chip canopen board link control app
+DIRS      ?= base trace phys chip canopen board link control app api
 TESTS     ?= $(basename $(notdir $(sort $(wildcard tests/unit/test_*.c))))
 
-# What correctness needs stands before the user's CFLAGS. -ffp-contract=off: the same bytes on every machine.
-STD   := -std=c11 -ffp-contract=off
+VERSION := $(shell sed -n 's/^version = "\(.*\)"/\1/p' pyproject.toml)
+ABI     := $(shell sed -n 's/^\#define PSABENCH_ABI \([0-9]*\)/\1/p' emu/api/psabench.h)
+
+# What correctness needs stands before the user's CFLAGS. -ffp-contract=off: the same bytes on every machine. All objects are
+# fit for the shared library: -fPIC with hidden symbols costs the emulator nothing that can be measured.
+STD   := -std=c11 -ffp-contract=off -fPIC -fvisibility=hidden -DPSABENCH_VERSION=$(VERSION)
 WARN  := -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wundef -Wstrict-prototypes -Wmissing-prototypes $(if $(WERROR),-Werror)
 SANFL := $(if $(SAN),-fsanitize=$(SAN) -fno-sanitize-recover=all -fno-omit-frame-pointer)
 INC   := -Iemu -Ibuild $(shell $(PKGCONFIG) --cflags libcjson yaml-0.1 2>/dev/null)
@@ -44,20 +50,50 @@ SRC      := $(sort $(foreach d,$(DIRS),$(wildcard emu/$(d)/*.c)))
 MAIN     := $(filter emu/app/main.c,$(SRC))
 OBJ      := $(patsubst %.c,$(BUILD)/obj/%.o,$(SRC) $(GEN_SRC))
 LIB_OBJ  := $(filter-out $(BUILD)/obj/emu/app/main.o,$(OBJ))
+API_OBJ  := $(filter $(BUILD)/obj/emu/api/%,$(OBJ))
+CORE_OBJ := $(filter-out $(API_OBJ) $(BUILD)/obj/emu/app/% $(BUILD)/obj/emu/link/% $(BUILD)/obj/emu/control/%,$(OBJ))
+LIB_SO   := $(BUILD)/libpsabench.so.$(ABI)
+LIB_ALL  := $(if $(API_OBJ),$(LIB_SO) $(BUILD)/libpsabench.so $(BUILD)/libpsabench.a $(BUILD)/psabench.pc)
 TEST_BIN := $(addprefix $(BUILD)/tests/,$(TESTS))
 FUZZ_BIN := $(patsubst tests/fuzz/%.c,$(BUILD)/fuzz/%,$(sort $(wildcard tests/fuzz/fuzz_*.c)))
 C_FILES   = $(sort $(wildcard emu/*/*.[ch] tests/*/*.[ch]))
 
 .SECONDARY:
 .DELETE_ON_ERROR:
-.PHONY: all setup run test check pytest san builds e2e e2e-san e2e-vcan e2e-slc0 uml soak fuzz fuzz-each lint format golden docs install uninstall wheel clean help lock
+.PHONY: all lib setup run test check pytest san builds e2e e2e-san e2e-vcan e2e-slc0 uml soak fuzz fuzz-each lint format golden docs install uninstall wheel clean help lock
 
 ## all: the emulator, build/psa-emu (make CC=clang and make SAN=address,undefined build beside it, in build-clang and build-san)
-all: $(if $(MAIN),$(BUILD)/psa-emu,$(LIB_OBJ))
+all: $(if $(MAIN),$(BUILD)/psa-emu,$(LIB_OBJ)) lib
 
-$(BUILD)/psa-emu: $(OBJ)
+## lib: libpsabench, shared and static, and its pkg-config file; the header is emu/api/psabench.h
+lib: $(LIB_ALL)
+
+$(BUILD)/psa-emu: $(filter-out $(API_OBJ),$(OBJ))
 	$(call say,LINK,$@)
-	$(Q)$(LINK) -o $@ $(OBJ) $(LIBS)
+	$(Q)$(LINK) -o $@ $^ $(LIBS)
+
+# One object of what the interface needs of the core, with no name but psabench_* to be seen: also in the static library.
+$(BUILD)/lib/psabench.o: $(API_OBJ) $(CORE_OBJ)
+	@mkdir -p $(@D)
+	$(call say,LD -r,$@)
+	$(Q)rm -f $(@D)/core.a && $(AR) rcs $(@D)/core.a $(CORE_OBJ)
+	$(Q)$(LD) -r -o $@ $(API_OBJ) $(@D)/core.a && $(OBJCOPY) --localize-hidden $@
+
+$(LIB_SO): $(BUILD)/lib/psabench.o
+	$(call say,LINK,$@)
+	$(Q)$(LINK) -shared -Wl,-soname,$(@F) -o $@ $< -lm
+
+$(BUILD)/libpsabench.so: $(LIB_SO)
+	$(Q)ln -sf $(<F) $@
+
+$(BUILD)/libpsabench.a: $(BUILD)/lib/psabench.o
+	$(Q)rm -f $@ && $(AR) rcs $@ $<
+
+$(BUILD)/psabench.pc: emu/api/psabench.pc.in pyproject.toml Makefile FORCE
+	$(Q)sed -e 's|@PREFIX@|$(PREFIX)|; s|@LIBDIR@|$(LIBDIR)|; s|@VERSION@|$(VERSION)|' $< > $@.new
+	$(Q)cmp -s $@.new $@ && rm $@.new || mv $@.new $@
+
+FORCE:
 
 $(BUILD)/obj/%.o: %.c Makefile
 	@mkdir -p $(@D)
@@ -145,10 +181,13 @@ fuzz:
 fuzz-each: $(FUZZ_BIN)
 	@for f in $(FUZZ_BIN); do echo "$$f"; $$f -max_total_time=$(FUZZ_S) -print_final_stats=1 || exit 1; done
 
+$(filter $(BUILD)/fuzz/fuzz_ads1282_%,$(FUZZ_BIN)): $(BUILD)/obj/tests/fuzz/ads1282_world.o
+$(filter $(BUILD)/fuzz/fuzz_ads1256_%,$(FUZZ_BIN)): $(BUILD)/obj/tests/fuzz/ads1256_world.o
+
 $(BUILD)/fuzz/%: $(BUILD)/obj/tests/fuzz/%.o $(LIB_OBJ)
 	@mkdir -p $(@D)
 	$(call say,LINK,$@)
-	$(Q)$(LINK) -fsanitize=fuzzer -o $@ $< $(LIB_OBJ) $(LIBS)
+	$(Q)$(LINK) -fsanitize=fuzzer -o $@ $(filter %.o,$^) $(LIBS)
 
 ## lint: formatting, warnings of gcc and clang, clang-tidy, include table and sizes, ruff, strict mypy
 lint: all
@@ -166,9 +205,14 @@ docs: all
 
 SIGROK := share/libsigrokdecode/decoders
 
-## install: psa-emu, protocol files, sigrok decoders (where sigrok looks, too) and sessions under $(DESTDIR)$(PREFIX)
+## install: psa-emu, libpsabench, protocol files, sigrok decoders (where sigrok looks, too) and sessions under $(DESTDIR)$(PREFIX)
 install: all
 	install -D -m 755 $(BUILD)/psa-emu $(DESTDIR)$(PREFIX)/bin/psa-emu
+	install -D -m 644 emu/api/psabench.h $(DESTDIR)$(PREFIX)/include/psabench.h
+	install -D -m 755 $(LIB_SO) $(DESTDIR)$(LIBDIR)/$(notdir $(LIB_SO))
+	ln -sf $(notdir $(LIB_SO)) $(DESTDIR)$(LIBDIR)/libpsabench.so
+	install -m 644 $(BUILD)/libpsabench.a $(DESTDIR)$(LIBDIR)/libpsabench.a
+	install -D -m 644 $(BUILD)/psabench.pc $(DESTDIR)$(LIBDIR)/pkgconfig/psabench.pc
 	for f in $$(find -L proto decoders share -type f ! -name '*.pyc'); do \
 	    install -D -m 644 $$f $(DESTDIR)$(PREFIX)/share/psabench/$$f || exit 1; done
 	cd decoders && for f in $$(find -L * -type f ! -name '*.pyc'); do \
@@ -176,7 +220,8 @@ install: all
 
 ## uninstall: what install put there
 uninstall:
-	rm -f $(DESTDIR)$(PREFIX)/bin/psa-emu
+	rm -f $(DESTDIR)$(PREFIX)/bin/psa-emu $(DESTDIR)$(PREFIX)/include/psabench.h $(DESTDIR)$(LIBDIR)/pkgconfig/psabench.pc \
+	    $(addprefix $(DESTDIR)$(LIBDIR)/libpsabench.,a so so.$(ABI))
 	rm -rf $(DESTDIR)$(PREFIX)/share/psabench $(patsubst decoders/%/pd.py,$(DESTDIR)$(PREFIX)/$(SIGROK)/%,$(wildcard decoders/*/pd.py))
 
 ## wheel: build/dist/psabench-*.whl, the Python package with emulator, library and data files in it

@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 FREE_FOLDERS = {"link", "app"}
-ALLOCATOR_FOLDERS = {"control"}  # through cJSON
+ALLOCATOR_FOLDERS = {"control", "api"}  # through cJSON; the library's benches and parts
 LIBM = (
     "sin cos tan asin acos atan atan2 sinh cosh tanh asinh acosh atanh exp exp2 expm1 "
     "log log2 log10 log1p pow cbrt hypot erf erfc tgamma"
