@@ -13,10 +13,10 @@ static const struct reg_file *file_of(const struct psa2 *b, enum psa2_group grou
     return group == PSA2_ACCEL ? &b->adc[0].regs : &b->tadc.regs;
 }
 
-/* Codes a part reserves or the model lacks, beyond the bits of its register table. */
+/* Codes a part reserves, and modes that KPSA cannot read. */
 static bool accel_takes(const struct psa2 *b, uint8_t addr, uint8_t value)
 {
-    if (addr == ADS1282_CONFIG0) return (value >> 3 & 7) <= 4 && (value & 3) == 2; /* DR; FILTR sinc + FIR */
+    if (addr == ADS1282_CONFIG0) return ads1282_models(value);
     if (addr == ADS1282_CONFIG1 && !b->profile.adc_is_1281) return (value & 7) != 7 && (value >> 4 & 7) <= 4;
     return true;
 }

@@ -14,7 +14,7 @@ static uint8_t out_byte(const struct ads1282 *a)
     return (uint8_t)(a->out >> (56 - 8 * a->out_index));
 }
 
-static void clear_output(struct ads1282 *a)
+void ads1282_serial_clear(struct ads1282 *a)
 {
     a->out = 0;
     a->word_out = a->unread = false;
@@ -26,10 +26,15 @@ static unsigned bits_clocked(const struct ads1282 *a)
     return done ? done : a->in_byte;
 }
 
-static bool read_under_way(const struct ads1282 *a, int64_t t_ns)
+bool ads1282_serial_under_way(const struct ads1282 *a)
 {
     const unsigned n = bits_clocked(a);
-    return a->word_out && n > 0 && n < 32 && t_ns - a->sclk_ns < clk_span_ns(a->clk.hz, READ_REST_TCLK);
+    return a->word_out && n > 0 && n < 32;
+}
+
+static bool read_under_way(const struct ads1282 *a, int64_t t_ns)
+{
+    return ads1282_serial_under_way(a) && t_ns - a->sclk_ns < clk_span_ns(a->clk.hz, READ_REST_TCLK);
 }
 
 /* The output register takes a word, read or not: there is no lock. A read under way goes on at its bit in the new word
@@ -52,16 +57,14 @@ void ads1282_serial_deliver(struct ads1282 *a, uint32_t word, int64_t t_ns)
 
 /* ---- Commands ---- */
 
-static void op_none(struct ads1282 *a, int64_t t_ns)
+static void op_ofscal(struct ads1282 *a, int64_t t_ns)
 {
-    (void)a;
-    (void)t_ns;
+    ads1282_calibrate(a, false, t_ns);
 }
 
-static void op_absent(struct ads1282 *a, int64_t t_ns)
+static void op_gancal(struct ads1282 *a, int64_t t_ns)
 {
-    (void)t_ns;
-    a->count.refused++;
+    ads1282_calibrate(a, true, t_ns);
 }
 
 static void op_rdatac(struct ads1282 *a, int64_t t_ns)
@@ -74,14 +77,14 @@ static void op_sdatac(struct ads1282 *a, int64_t t_ns)
 {
     (void)t_ns;
     a->rdatac = a->rdata_due = false;
-    clear_output(a);
+    ads1282_serial_clear(a);
 }
 
 /* The word of the next conversion end is the answer. */
 static void op_rdata(struct ads1282 *a, int64_t t_ns)
 {
     a->rdata_due = true;
-    clear_output(a);
+    ads1282_serial_clear(a);
     ads1282_set_drdy(a, true, t_ns);
 }
 
@@ -108,8 +111,8 @@ struct ads1282_opcode {
 
 // clang-format off
 static const struct ads1282_opcode opcodes[] = {
-    {0xFE, 0x00, ALWAYS,                   0, op_none},   /* WAKEUP: also the natural no-operation */
-    {0xFE, 0x02, 0,                        0, op_absent}, /* STANDBY */
+    {0xFE, 0x00, ALWAYS,                   0, ads1282_wakeup},  /* WAKEUP: also the natural no-operation */
+    {0xFE, 0x02, 0,                        0, ads1282_standby}, /* STANDBY */
     {0xFE, 0x04, 0,                        0, ads1282_sync},   /* SYNC: on the 8th SCLK rise, p. 21 */
     {0xFE, 0x06, ALWAYS,                   0, ads1282_reset},  /* RESET */
     {0xFF, 0x10, 0,                        0, op_rdatac}, /* RDATAC */
@@ -117,8 +120,8 @@ static const struct ads1282_opcode opcodes[] = {
     {0xFF, 0x12, NEEDS_SDATAC,             0, op_rdata},  /* RDATA */
     {0xE0, 0x20, NEEDS_SDATAC | TWO_BYTES, 0, op_rreg},   /* RREG */
     {0xE0, 0x40, TWO_BYTES,                1, op_wreg},   /* WREG: no footnote 4 */
-    {0xFF, 0x60, 0,                        0, op_absent}, /* OFSCAL */
-    {0xFF, 0x61, 0,                        0, op_absent}, /* GANCAL */
+    {0xFF, 0x60, 0,                        0, op_ofscal}, /* OFSCAL */
+    {0xFF, 0x61, 0,                        0, op_gancal}, /* GANCAL */
 };
 // clang-format on
 
@@ -184,9 +187,19 @@ static uint8_t next_out(struct ads1282 *a)
     return out_byte(a);
 }
 
+/* Came too soon for a strict part. */
+static void lose_byte(struct ads1282 *a)
+{
+    a->lost = false;
+    a->op = NULL;
+    a->count.refused++;
+}
+
 static void take_byte(struct ads1282 *a, uint8_t byte, int64_t t_ns)
 {
-    if (!a->op) opcode_byte(a, byte, t_ns);
+    if (a->cfg.pin_mode) return; /* commands do nothing */
+    if (a->lost) lose_byte(a);
+    else if (!a->op) opcode_byte(a, byte, t_ns);
     else if (a->op_stage == ADS1282_COUNT) count_byte(a, byte, t_ns);
     else if (a->op_stage != ADS1282_READ) data_byte(a, byte, t_ns);
 }
@@ -206,28 +219,44 @@ static uint8_t on_byte(void *chip, uint8_t mosi, int64_t t_ns)
     return next_out(a);
 }
 
-/* First SCLK fall of a byte. A gap is taken from it to the last rise, which is long by the clock's high time. */
-static void on_first(void *chip, int64_t t_ns)
+/* t_ns: the byte's first SCLK rise where it is known, else its fall, which is later by the clock's high time. */
+void ads1282_serial_gap(struct ads1282 *a, int64_t t_ns)
 {
-    struct ads1282 *a = chip;
-    if (!a->alive) return;
-    if (a->gap_matters && t_ns - a->rise_ns < a->gap_ns) a->count.gap_violations++;
-    a->sclk_ns = t_ns;
-    a->in_byte = true;
+    const bool matters = a->gap_matters && !(a->cfg.wreg_gap_free && a->op && a->op->skip);
     a->gap_matters = false;
+    if (!matters || t_ns - a->rise_ns >= a->gap_ns) return;
+    a->count.gap_violations++;
+    a->lost = a->cfg.strict_gap;
+}
+
+void ads1282_serial_fall(struct ads1282 *a, int64_t t_ns)
+{
+    a->sclk_ns = t_ns;
     a->rest_periods = 0;
+    a->count.late_reads += a->updating && ads1282_serial_under_way(a);
     if (!a->word_out) return;
     a->unread = false;
     ads1282_set_drdy(a, true, t_ns);
 }
 
+/* First SCLK fall of a byte. */
+static void on_first(void *chip, int64_t t_ns)
+{
+    struct ads1282 *a = chip;
+    if (!a->alive) return;
+    ads1282_serial_gap(a, t_ns);
+    a->in_byte = true;
+    ads1282_serial_fall(a, t_ns);
+}
+
 /* Interface time-out, counted in data periods without SCLK. */
 void ads1282_serial_period(struct ads1282 *a)
 {
+    if (a->pin.sclk) a->rest_periods = 0; /* only rest at low counts */
     if (a->rest_periods >= REST_PERIODS || ++a->rest_periods < REST_PERIODS) return;
     a->count.realigned += a->op || a->spi.bits;
     a->op = NULL;
-    a->in_byte = false;
+    a->in_byte = a->lost = false;
     spi_realign(&a->spi);
 }
 
@@ -235,9 +264,10 @@ void ads1282_serial_reset(struct ads1282 *a)
 {
     a->op = NULL;
     a->rdatac = true; /* M85 */
-    a->rdata_due = a->in_byte = a->gap_matters = false;
+    a->rdata_due = a->in_byte = a->gap_matters = a->lost = false;
+    a->pin.dout_held = false;
     a->rest_periods = 0;
-    clear_output(a);
+    ads1282_serial_clear(a);
     spi_realign(&a->spi);
     spi_load(&a->spi, 0);
 }

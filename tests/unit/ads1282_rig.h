@@ -54,7 +54,7 @@ static inline void drdy(void *ctx, bool level, int64_t t_ns)
     else r->falls++, r->fall_ns = t_ns;
 }
 
-static const struct ads1282_cfg quiet = {ADS1282_PART_1282, MCLK_HZ, 5.0, 0.0, false};
+static const struct ads1282_cfg quiet = {.part = ADS1282_PART_1282, .clk_hz = MCLK_HZ, .vref_v = 5.0};
 
 static inline void unpowered(struct rig *r, const struct ads1282_cfg *cfg, uint64_t seed)
 {
@@ -62,7 +62,7 @@ static inline void unpowered(struct rig *r, const struct ads1282_cfg *cfg, uint6
     sched_init(&r->s);
     r->clk = (struct clk){.hz = cfg->clk_hz, .div = 1};
     r->gap_tclk = 24;
-    const struct ads1282_io io = {r, input, drdy};
+    const struct ads1282_io io = {.ctx = r, .vin_v = input, .drdy = drdy};
     ads1282_init(&r->a, cfg, &io, &r->s, rng_stream(seed, 1, "adc"));
 }
 
