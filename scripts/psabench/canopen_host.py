@@ -18,6 +18,8 @@ from psabench.can_host import CanHost
 from psabench.errors import DeviceError, LinkError
 
 ANSWER_S = 1.0  # bench time: the controller may have to wait for a conversion before it touches a register
+# Command specifiers, bits 7..5 of the first byte (CiA 301, 7.2.4.3): begins a transfer, and its answers or an abort.
+INITIATE, ABORT = {0x20: 0x60, 0x40: 0x40}, 0x80
 
 
 class _Network(canopen.Network):
@@ -40,22 +42,40 @@ class _Sdo(SdoClient):
     def __init__(self, node_id: int, od: canopen.ObjectDictionary, host: CanHost) -> None:
         super().__init__(0x600 + node_id, 0x580 + node_id, od)  # type: ignore[no-untyped-call]
         self.host = host
+        self._request = b""
+        self._object = b""  # index and sub-index of the transfer under way, as on the wire
 
     def request_response(self, sdo_request: bytes) -> bytes:
         """As python-canopen's, but no answer that was already on its way (to somebody else) is taken for ours."""
         while self.host.receive(0.0):
             pass
+        self._request = bytes(sdo_request)
+        if self._request[0] & 0xE0 in INITIATE:
+            self._object = self._request[1:4]
         answer: bytes = super().request_response(sdo_request)  # type: ignore[no-untyped-call]
         return answer
 
     def read_response(self) -> bytes:
+        """The answer to our request: what a client before us asked for may come first, when its time stood still."""
         responses: queue.Queue[bytes] = self.responses
-        if not self.host.pump_until(lambda: not responses.empty(), ANSWER_S):
-            raise SdoCommunicationError(f"no SDO answer within {ANSWER_S:g} s")
-        response = responses.get()
-        if response[0] == 0x80:
+        deadline_s = self.host.clock.now_s() + ANSWER_S
+        while True:
+            if not self.host.pump_until(lambda: not responses.empty(), deadline_s - self.host.clock.now_s()):
+                raise SdoCommunicationError(f"no SDO answer within {ANSWER_S:g} s")
+            response = responses.get()
+            if self._is_ours(response):
+                break
+        if response[0] == ABORT:
             raise SdoAbortedError(int.from_bytes(response[4:8], "little"))
         return response
+
+    def _is_ours(self, response: bytes) -> bool:
+        """Whether it can answer our request: of its kind, and of its object where the answer names one."""
+        specifier = response[0] & 0xE0
+        begun = INITIATE.get(self._request[0] & 0xE0)
+        if specifier in (ABORT, begun):
+            return response[1:4] == self._object
+        return begun is None and specifier not in INITIATE.values()
 
 
 class CanopenNode:

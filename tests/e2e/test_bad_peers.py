@@ -280,3 +280,14 @@ def test_a_host_that_left_frames_behind_does_not_count_for_the_next_one(make_rig
             host.advance(0.1)
             assert host.received >= 190 * k
         assert Psa2(host).register("x", 1) == 0x56
+
+
+@HOST
+def test_what_a_host_that_left_had_asked_for_is_not_the_next_ones_answer(make_rig: MakeRig) -> None:
+    """In step pace its request is carried out only when the next one lets time pass."""
+    rig = make_rig("socketcand")
+    rig.unit.wait_ready()
+    with talker(rig.emulator) as s:
+        s.sendall(b"< send 605 8 40 1 22 3 0 0 0 0 >")  # the whole word of Z
+        until(lambda: rig.clients()[1]["taken"] == 1, "its request to be taken")
+    assert rig.unit.register("x", 1) == 0x56

@@ -15,10 +15,11 @@ import can
 import pytest
 from psabench import can_host, emulator
 from psabench.can_host import CanHost, StepClock, WallClock, open_bus
+from psabench.canopen_host import CanopenNode
 from psabench.control import Control
 from psabench.emulator import Emulator
-from psabench.errors import BadInput, BenchError, ControlError, LinkError
-from psabench.places import find_emulator
+from psabench.errors import BadInput, BenchError, ControlError, DeviceError, LinkError
+from psabench.places import find_emulator, proto_file
 
 IDLE = {"clients": [{"taken": 3}], "gone": {"taken": 4}}
 
@@ -184,6 +185,52 @@ def test_a_bus_that_breaks_is_a_broken_link() -> None:
         pytest.raises(LinkError, match=r"^CAN: gone; the emulator or adapter has gone away$"),
     ):
         host.receive(0.1)
+
+
+# ---- SDO
+
+OLD = [
+    pytest.param(0x585, "43 01 22 03 2A 00 00 00", id="another object's value"),
+    pytest.param(0x585, "60 20 20 00 00 00 00 00", id="a write's acknowledgement"),
+    pytest.param(0x585, "80 01 22 03 00 00 04 05", id="another transfer's time-out"),
+    pytest.param(0x585, "00 61 62 63 64 65 66 67", id="a segment"),
+    pytest.param(0x586, "4F 01 10 00 2A 00 00 00", id="another node's value"),
+]
+
+
+class Server(FakeBus):
+    """After each request come the frames that the test wants."""
+
+    def __init__(self, *answers: Sequence[tuple[int, str]]) -> None:
+        super().__init__()
+        self._answers = list(answers)
+
+    def send(self, msg: can.Message, timeout: float | None = None) -> None:
+        super().send(msg, timeout)
+        for can_id, data in self._answers.pop(0):
+            self.waiting.append(can.Message(arbitration_id=can_id, is_extended_id=False, data=bytes.fromhex(data)))
+
+
+@pytest.mark.parametrize(("can_id", "data"), OLD)
+def test_an_answer_to_somebody_who_has_gone_is_not_taken_for_ours(can_id: int, data: str) -> None:
+    bus = Server([(can_id, data), (0x585, "4F 01 10 00 05 00 00 00")])
+    with CanHost(bus, WallClock()) as host:
+        assert CanopenNode(host, 5, proto_file("psa2.eds")).read(0x1001) == 5
+    assert len(bus.sent) == 1
+
+
+def test_an_abort_of_our_transfer_is_a_refusal() -> None:
+    bus = Server([(0x585, "80 01 22 03 00 00 04 05"), (0x585, "80 01 10 00 01 00 02 06")])
+    with CanHost(bus, WallClock()) as host, pytest.raises(DeviceError) as refused:
+        CanopenNode(host, 5, proto_file("psa2.eds")).read(0x1001)
+    assert refused.value.abort_code == 0x06020001
+
+
+def test_an_old_answer_between_the_segments_of_a_string_is_left_out() -> None:
+    old = (0x585, "43 01 22 03 2A 00 00 00")
+    bus = Server([(0x585, "41 08 10 00 05 00 00 00")], [old, (0x585, "05 50 53 41 2D 32 00 00")])
+    with CanHost(bus, WallClock()) as host:
+        assert CanopenNode(host, 5, proto_file("psa2.eds")).read(0x1008) == "PSA-2"
 
 
 # ---- opening a bus
