@@ -14,6 +14,7 @@ SAN       ?=#                         address,undefined
 WERROR    ?=#                         1: a warning is an error, as in make test
 BUILD     ?= build$(if $(filter clang%,$(notdir $(CC))),-clang)$(if $(SAN),-san)
 FUZZ_S    ?= 20
+BENCH_S   ?= 180#                      seconds of measuring; 60 for a quick look
 SAN_E2E   := $(wildcard tests/e2e/test_bad_*.py) $(patsubst %,tests/e2e/test_%.py,unit tools canopen)
 # Build a part only, say DIRS='base chip' TESTS=test_ads1282 while the rest does not compile.
 DIRS      ?= base trace phys chip canopen board link control app api
@@ -39,7 +40,7 @@ say = $(if $(V),,@echo '  $(1)	$(2)')
 
 # build/gen/gen.mk is made from proto/psabench.yaml before anything is compiled and names the generated sources in GEN_SRC.
 PY     := .venv/bin/python
-NO_GEN := setup run test clean help uninstall lock
+NO_GEN := setup run test bench clean help uninstall lock
 ifneq ($(wildcard proto/psabench.yaml),)
 ifneq ($(if $(MAKECMDGOALS),$(filter-out $(NO_GEN),$(MAKECMDGOALS)),all),)
 include build/gen/gen.mk
@@ -56,11 +57,12 @@ LIB_SO   := $(BUILD)/libpsabench.so.$(ABI)
 LIB_ALL  := $(if $(API_OBJ),$(LIB_SO) $(BUILD)/libpsabench.so $(BUILD)/libpsabench.a $(BUILD)/psabench.pc)
 TEST_BIN := $(addprefix $(BUILD)/tests/,$(TESTS))
 FUZZ_BIN := $(patsubst tests/fuzz/%.c,$(BUILD)/fuzz/%,$(sort $(wildcard tests/fuzz/fuzz_*.c)))
+BENCH_BIN := $(patsubst tests/bench/%.c,$(BUILD)/bench/%,$(sort $(wildcard tests/bench/*.c)))
 C_FILES   = $(sort $(wildcard emu/*/*.[ch] tests/*/*.[ch]))
 
 .SECONDARY:
 .DELETE_ON_ERROR:
-.PHONY: all lib setup run test check pytest san builds e2e e2e-san e2e-vcan e2e-slc0 uml soak fuzz fuzz-each lint format golden docs install uninstall wheel clean help lock
+.PHONY: all lib setup run test bench bench-bin check pytest san builds e2e e2e-san e2e-vcan e2e-slc0 uml soak fuzz fuzz-each lint format golden docs install uninstall wheel clean help lock
 
 ## all: the emulator, build/psa-emu (make CC=clang and make SAN=address,undefined build beside it, in build-clang and build-san)
 all: $(if $(MAIN),$(BUILD)/psa-emu,$(LIB_OBJ)) lib
@@ -105,6 +107,11 @@ $(BUILD)/tests/%: $(BUILD)/obj/tests/unit/%.o $(LIB_OBJ)
 	$(call say,LINK,$@)
 	$(Q)$(LINK) -o $@ $< $(LIB_OBJ) $(LIBS) -lcmocka
 
+$(BUILD)/bench/%: $(BUILD)/obj/tests/bench/%.o $(LIB_OBJ)
+	@mkdir -p $(@D)
+	$(call say,LINK,$@)
+	$(Q)$(LINK) -o $@ $< $(LIB_OBJ) $(LIBS)
+
 build/gen/gen.mk: proto/psabench.yaml tools/gen_proto.py | $(PY)
 	@mkdir -p $(@D)
 	$(PY) tools/gen_proto.py --out $(@D)
@@ -128,6 +135,14 @@ test:
 	@tools/setup test
 	@python3 tools/test_all.py
 
+## bench: speed beside Verilog models of the same board (Icarus, Verilator) and against the targets, into docs/performance.md
+bench:
+	@tools/setup bench
+	@$(MAKE) --no-print-directory bench-bin
+	@BENCH_CC='$(CC)' BENCH_CFLAGS='$(CFLAGS)' $(PY) -m tests.bench.run --seconds $(BENCH_S)
+
+bench-bin: all $(BENCH_BIN)
+
 ## check: the C unit tests (one: make check TESTS=test_sched)
 check: $(TEST_BIN)
 	@rc=0; for t in $(TEST_BIN); do echo "$$t"; $$t || rc=1; done; exit $$rc
@@ -137,7 +152,7 @@ san:
 	@$(MAKE) --no-print-directory SAN=address,undefined check
 
 ## pytest: the Python tests, golden traces included
-pytest: all
+pytest: bench-bin
 	$(PY) -m pytest $(wildcard tests/py tests/golden)
 
 ## builds: the emulator as clang and -O0 make it, and under sanitizers, which must all do the same
@@ -247,4 +262,5 @@ clean:
 help:
 	@sed -n 's/^## \([a-z_.0-9-]*\): \(.*\)/  \1|\2/p' Makefile | while IFS='|' read -r t d; do printf '%-24s %s\n' "$$t" "$$d"; done
 
+-include $(BENCH_BIN:$(BUILD)/bench/%=$(BUILD)/obj/tests/bench/%.d)
 -include $(OBJ:.o=.d) $(TEST_BIN:$(BUILD)/tests/%=$(BUILD)/obj/tests/unit/%.d)

@@ -1,0 +1,198 @@
+"""Results of `make bench` as the tables and the picture of docs/performance.md: pure functions of result.json."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+from xml.sax.saxutils import escape
+
+Result = dict[str, Any]
+FRAME_HZ = 1000  # of the board: so many frames are one second of it
+PEER = "verilator"
+
+ENGINES = {  # of the first table and of the picture
+    "icarus": "Icarus Verilog",
+    "verilator-timing": "Verilator `--timing`",
+    "verilator": "Verilator, hand-written C++ driver",
+    "frames-watched": "psabench, all lines watched",
+    "frames-direct-watched": "psabench, all lines watched, no decimation chain",
+}
+UNWATCHED = {
+    "frames-direct": "no decimation chain (`ADS1282_CHAIN_DIRECT`)",
+    "frames": "bit-exact decimation chain, three channels (the default)",
+    "frames-modulator": "bit-true modulator before it (`ADS1282_CHAIN_MODULATOR`)",
+}
+OTHERS = {
+    "vcd": "VCD writer alone, fed with the edges of frames",
+    "frames-vcd": "whole board, all lines into a VCD",
+    "decode": "host: line port at 8 MHz to words (`psabench.lineport`)",
+    "can": "CAN: psa-emu in free pace, socketcand, a client that only counts",
+    "spi": "libpsabench from C: SPI bytes of an ADS1256's registers",
+    "readings": "libpsabench from C: bytes of readings at each DRDY, 30 kSPS",
+    "chips-spi": "psabench.chips from Python: SPI bytes of the same registers, 13 a call",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """What issue or design promise: value(result) must be at least (or at most) limit. why: said when it is missed."""
+
+    what: str
+    at_least: bool
+    limit: float
+    value: Callable[[Result], float | None]
+    why: str = ""
+
+
+def rate(name: str, per: float = 1.0) -> Callable[[Result], float | None]:
+    """Median rate of a case in units of `per`."""
+    return lambda r: r["cases"][name]["per_s"] / per if name in r["cases"] else None
+
+
+def of(name: str, key: str) -> Callable[[Result], float | None]:
+    return lambda r: r["cases"].get(name, {}).get(key)
+
+
+TARGETS = (
+    Target("all lines watched, times Verilator's hand-driven model", True, 6, of("frames-watched", "times_peer")),
+    Target("all lines watched, instructions an edge", False, 34, of("frames-watched", "instructions_per_edge")),
+    Target("all lines watched, times real time", True, 700, rate("frames-watched", FRAME_HZ)),
+    Target("not watched, no decimation chain, times real time", True, 5000, rate("frames-direct", FRAME_HZ)),
+    Target("not watched, bit-exact chain, times real time", True, 300, rate("frames", FRAME_HZ)),
+    Target("the same, as a stretch", True, 1000, rate("frames", FRAME_HZ)),
+    Target("VCD, million edges a second", True, 40, of("vcd", "medges_per_s")),
+    Target("decoding the line port, frames a second", True, 300_000, rate("decode")),
+    Target("emulator ready to serve, ms after start", False, 50, of("start", "ms")),
+)
+
+
+def figure(x: float | None) -> str:
+    """Three digits, thousands apart: 1,230,000; 12.3; 0.0123."""
+    if x is None:
+        return ""
+    if x == 0:
+        return "0"
+    digits = 2 - math.floor(math.log10(abs(x)))
+    return f"{round(x, digits):,.{max(digits, 0)}f}"
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def engines(r: Result) -> str:
+    rows = []
+    for name, label in ENGINES.items():
+        if c := r["cases"].get(name):
+            per_edge = c.get("instructions_per_edge")
+            cells = (c["per_s"], c["times_peer"], c["per_s"] / FRAME_HZ, c.get("edges_per_unit"))
+            rows.append([label, *map(figure, (*cells, c.get("instructions_per_unit"), per_edge))])
+    head = "engine|frames/s|times the peer|times real time|edges a frame|instructions a frame|an edge"
+    return table(head.split("|"), rows)
+
+
+def unwatched(r: Result) -> str:
+    rows = []
+    for name, label in UNWATCHED.items():
+        if c := r["cases"].get(name):
+            rows.append([label, *map(figure, (c["per_s"], c["per_s"] / FRAME_HZ, c.get("instructions_per_unit")))])
+    return table(["converters", "frames/s", "times real time", "instructions a frame"], rows)
+
+
+def others(r: Result) -> str:
+    rows = []
+    for name, label in OTHERS.items():
+        if c := r["cases"].get(name):
+            edges = c.get("medges_per_s")
+            rows.append([label, f"{figure(c['per_s'])} {c['unit']}/s", f"{figure(edges)} Medge/s" if edges else ""])
+    if start := r["cases"].get("start"):
+        rows.append(["psa-emu from spawning to `ready all`, scenario `calibrate`", f"{figure(start['ms'])} ms", ""])
+    return table(["what", "median", ""], rows)
+
+
+def targets(r: Result) -> str:
+    rows = []
+    for t in TARGETS:
+        value = t.value(r)
+        if value is None:
+            verdict = "not measured"
+        elif value >= t.limit if t.at_least else value <= t.limit:
+            verdict = "reached"
+        else:
+            share = value / t.limit - 1
+            verdict = f"missed by {abs(share):.0%}" + (f": {t.why}" if t.why else "")
+        rows.append([t.what, ("≥ " if t.at_least else "≤ ") + figure(t.limit), figure(value), verdict])
+    return table(["target", "wanted", "measured", ""], rows)
+
+
+def machine(r: Result) -> str:
+    m = r["machine"]
+    return (
+        f"{m['cores']} cores, {m['arch']}; {m['cc']} with `{m['cflags']}`, {m['verilator']} with g++ {m['cxx']} and "
+        f"`{m['peer_cflags']}`, {m['icarus']}, Python {m['python']}, NumPy {m['numpy']}, {m['valgrind']}. "
+        f"Medians of {r['rounds']} rounds; each round runs every row once, ratios are taken within a round."
+    )
+
+
+SECTIONS: dict[str, Callable[[Result], str]] = {
+    "machine": machine,
+    "targets": targets,
+    "engines": engines,
+    "unwatched": unwatched,
+    "others": others,
+}
+
+
+def fill(page: str, r: Result) -> str:
+    """The page with what stands between its markers written anew. ValueError if a marker is missing."""
+    for name, make in SECTIONS.items():
+        begin, end = f"<!-- bench:{name} -->\n", "<!-- bench:end -->"
+        before, found, rest = page.partition(begin)
+        _, closed, after = rest.partition(end)
+        if not found or not closed:
+            raise ValueError(f"docs/performance.md: no `{begin.strip()}` ... `{end}`")
+        page = f"{before}{begin}{make(r)}\n{end}{after}"
+    return page
+
+
+BAR_X, BAR_W, ROW_H, TOP = 330, 560, 30, 52
+STYLE = """svg{font:12px ui-monospace,SFMono-Regular,Menlo,Consolas,"DejaVu Sans Mono",monospace}
+.card{fill:#fff;stroke:#d0d7de}.name{fill:#1f2328}.head{fill:#1f2328;font-weight:600}.note{fill:#59636e}.grid{stroke:#d0d7de}
+.peer{fill:#afb8c1}.ours{fill:#0969da}
+@media(prefers-color-scheme:dark){
+.card{fill:#0d1117;stroke:#3d444d}.name,.head{fill:#f0f6fc}.note{fill:#9198a1}.grid{stroke:#3d444d}
+.peer{fill:#57606a}.ours{fill:#58a6ff}}"""
+
+
+def picture(r: Result) -> str:
+    """Frames a second of the engines and of the unwatched board, as bars on a logarithmic scale from 1 k."""
+    bars = [(name, label) for name, label in (ENGINES | UNWATCHED).items() if name in r["cases"]]
+    top = max(r["cases"][name]["per_s"] for name, _ in bars)
+    decades = math.ceil(math.log10(top)) - 3
+    height = TOP + ROW_H * len(bars) + 34
+    title = "PSA-2 frames a second, one core"
+    out = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 1000 {height}" width="1000" height="{height}">',
+        f"<title>{title}</title>\n<style>\n{STYLE}\n</style>",
+        f'<rect class="card" x=".5" y=".5" width="999" height="{height - 1}" rx="6"/>',
+        f'<text class="head" x="14" y="26">{title}</text>',
+    ]
+    for d in range(decades + 1):
+        x = BAR_X + BAR_W * d / decades
+        label = f"{10**d} k" if d < 3 else f"{10 ** (d - 3)} M"
+        out.append(f'<line class="grid" x1="{x:g}" x2="{x:g}" y1="40" y2="{height - 26}"/>')
+        out.append(f'<text class="note" x="{x:g}" y="{height - 10}" text-anchor="middle">{label}</text>')
+    for i, (name, label) in enumerate(bars):
+        per_s = r["cases"][name]["per_s"]
+        width = BAR_W * max(math.log10(per_s) - 3, 0.005) / decades
+        y = TOP + ROW_H * i
+        shown = label.partition(" (")[0].replace("`", "")
+        shown = shown if name in ENGINES else f"not watched: {shown.partition(',')[0]}"
+        kind = "ours" if name.startswith("frames") else "peer"
+        out.append(f'<text class="name" x="14" y="{y + 13}">{escape(shown)}</text>')
+        out.append(f'<rect class="{kind}" x="{BAR_X}" y="{y}" width="{width:.1f}" height="18"/>')
+        out.append(f'<text class="note" x="{BAR_X + width + 6:.1f}" y="{y + 13}">{figure(per_s)}</text>')
+    return "\n".join([*out, "</svg>"]) + "\n"

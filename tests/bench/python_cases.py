@@ -1,0 +1,122 @@
+"""What `make bench` measures in Python, each in a process of its own: python -m tests.bench.python_cases CASE COUNT.
+
+Prints CASE key=value ... ns=T like bench_core.
+"""
+
+from __future__ import annotations
+
+import random
+import socket
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+
+from psabench.lineport import BLOCK, CLK, DATA, INT, LineDecoder
+from psabench.places import find_emulator
+
+SAMPLES = 8000  # of a frame period: 8 MHz, 1 ms
+
+
+def _sampled(words: list[int], phase: float) -> bytes:
+    """A frame of the article's profile (2 MHz CLK, 8 lead-in, 4 x 32 bits, pauses of 4) at 8 MHz, then idle."""
+    samples = bytearray([INT]) * SAMPLES
+    for k in range(4 * 148):
+        clk = (k + phase) / 4
+        word, bit = divmod(int(clk) - 8, 36)
+        sending = clk >= 8 and bit < 32
+        samples[k + 50] = (DATA * (words[word] >> bit & 1) | CLK * (clk % 1 >= 0.5)) if sending else 0
+    return bytes(samples)
+
+
+def decode(count: int) -> str:
+    """Bytes of the line port in memory to words, block by block as they are read."""
+    rng = random.Random(1)
+    once = b"".join(_sampled([rng.getrandbits(32) for _ in range(4)], rng.random()) for _ in range(1000))
+    blocks = [once[i : i + BLOCK] for i in range(0, len(once), BLOCK)]
+    decoder = LineDecoder()
+    began_ns = time.perf_counter_ns()
+    while decoder.counts.frames < count:
+        for block in blocks:
+            decoder.feed(block)
+    ns = time.perf_counter_ns() - began_ns
+    c = decoder.counts
+    if c.torn or c.lost or c.late or c.early or c.gaps:
+        raise RuntimeError(f"decode: frames that were whole are not: {c}")
+    return f"frames={c.frames} samples={c.samples} ns={ns}"
+
+
+def start(count: int) -> str:
+    """From spawning the emulator to `ready all`; the median of count starts."""
+    command = [str(find_emulator()), "calibrate", "--can", "socketcand:0", "--quiet"]
+    took_ns = []
+    for _ in range(count):
+        began_ns = time.perf_counter_ns()
+        with subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE) as p:
+            assert p.stdout is not None
+            for line in p.stdout:
+                if line == b"ready all\n":
+                    took_ns.append(time.perf_counter_ns() - began_ns)
+                    break
+            p.terminate()
+    if len(took_ns) != count:
+        raise RuntimeError("start: the emulator did not come up")
+    return f"starts={count} ns={int(statistics.median(took_ns))}"
+
+
+def can(count: int) -> str:
+    """CAN frames of the stream, one sample in two, through socketcand to a client that reads as fast as it can."""
+    command = [str(find_emulator()), "stream", "--seed", "1", "--pace", "free", "--wait-client", "--quiet"]
+    command += ["--can", "socketcand:0", "--for", f"{max(count // 2000, 1)}s"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as p:
+        assert p.stdout is not None
+        port = int(p.stdout.readline().partition("port=")[2])
+        with socket.create_connection(("127.0.0.1", port)) as s:
+            s.settimeout(60)
+            _expect(s, b"< hi >")
+            began_ns = time.perf_counter_ns()
+            for command_line, answer in ((b"< open can0 >", b"< ok >"), (b"< rawmode >", b"< ok >")):
+                s.sendall(command_line)
+                _expect(s, answer)
+            frames, tail = 0, b""
+            while data := s.recv(1 << 18):
+                data = tail + data
+                frames += data.count(b"< frame ")
+                tail = data[-7:]  # shorter than what is counted: nothing counts twice
+        ns = time.perf_counter_ns() - began_ns
+    return f"frames={frames} ns={ns}"
+
+
+def _expect(s: socket.socket, answer: bytes) -> None:
+    got = b""
+    while not got.endswith(b">"):
+        got += s.recv(len(answer) - len(got) if len(got) < len(answer) else 1)
+    if got != answer:
+        raise RuntimeError(f"socketcand: {got!r} instead of {answer!r}")
+
+
+def chips_spi(count: int) -> str:
+    """Bytes through psabench.chips: all registers of an ADS1256, 13 bytes a call."""
+    from psabench.chips import Bench
+
+    with Bench(seed=1) as bench:
+        adc = bench.part("ads1256")
+        adc.run_until_level("DRDY", 0)
+        adc.spi_clock(1_000_000, 7e-6)
+        adc.pins["CS"].set(0)
+        request = bytes([0x10, 0x0A, *bytes(11)])
+        want = adc.spi(request)
+        began_ns = time.perf_counter_ns()
+        for _ in range(max(count // len(request), 1)):
+            got = adc.spi(request)
+        ns = time.perf_counter_ns() - began_ns
+    if got[3:] != want[3:]:  # STATUS holds DRDY
+        raise RuntimeError(f"chips-spi: registers {got.hex()}, at first {want.hex()}")
+    return f"bytes={max(count // len(request), 1) * len(request)} ns={ns}"
+
+
+CASES: dict[str, Callable[[int], str]] = {"decode": decode, "start": start, "can": can, "chips-spi": chips_spi}
+
+if __name__ == "__main__":
+    print(sys.argv[1], CASES[sys.argv[1]](int(sys.argv[2])))

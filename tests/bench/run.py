@@ -1,0 +1,125 @@
+"""`make bench`: the emulator beside HDL simulators of the same board, and what else has a target of speed.
+
+Everything is measured in the same run, interleaved, round after round; medians go into build/bench/result.json, and
+from there into docs/performance.md and its picture. `--page-only` writes these from the last result.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import platform
+import statistics
+import subprocess
+import sys
+
+import numpy
+
+from tests.bench import cases, page, peers
+from tests.bench.cases import ROOT, Case
+
+OUT = ROOT / "build/bench"
+PAGE = ROOT / "docs/performance.md"
+PICTURE = ROOT / "docs/img/performance.svg"
+PEER = page.PEER
+
+
+def say(text: str) -> None:
+    print(f"bench: {text}", flush=True)
+
+
+def first_line(*command: str) -> str:
+    p = subprocess.run(command, capture_output=True, text=True, check=False)
+    return (p.stdout or p.stderr).partition("\n")[0].strip()
+
+
+def machine() -> dict[str, str | int]:
+    """What the figures depend on, and nothing that tells whose machine it is."""
+    return {
+        "cores": os.cpu_count() or 1,
+        "arch": platform.machine(),
+        "cc": " ".join(first_line(os.environ.get("BENCH_CC", "gcc"), "--version").split()[:1])
+        + " "
+        + first_line(os.environ.get("BENCH_CC", "gcc"), "-dumpfullversion", "-dumpversion"),
+        "cflags": os.environ.get("BENCH_CFLAGS", "-O2 -g"),
+        "cxx": first_line("g++", "-dumpfullversion", "-dumpversion"),
+        "peer_cflags": peers.CFLAGS,
+        "verilator": " ".join(first_line("verilator", "--version").split()[:2]),
+        "icarus": "Icarus " + first_line("vvp", "-V").partition("version ")[2].split()[0],
+        "valgrind": first_line("valgrind", "--version"),
+        "python": platform.python_version(),
+        "numpy": numpy.__version__,
+    }
+
+
+def summary(measured: list[Case], rounds: int) -> page.Result:
+    peer = next(c for c in measured if c.name == PEER)
+    rows = {}
+    for c in measured:
+        row: dict[str, object] = {
+            "unit": c.unit,
+            "count": c.count,
+            "per_s": statistics.median(c.rates),
+            "rates": c.rates,
+            "edges_per_unit": c.edges_per_unit,
+            "instructions_per_unit": c.instructions_per_unit,
+            "ms": statistics.median(c.ns) / 1e6,
+        }
+        if c.unit == "frames":
+            row["times_peer"] = statistics.median(a / b for a, b in zip(c.rates, peer.rates, strict=True))
+        if c.edges_per_unit:
+            row["medges_per_s"] = statistics.median(c.rates) * c.edges_per_unit / 1e6
+            if c.instructions_per_unit:
+                row["instructions_per_edge"] = c.instructions_per_unit / c.edges_per_unit
+        rows[c.name] = row
+    return {"machine": machine(), "rounds": rounds, "cases": rows}
+
+
+def bench(seconds: float) -> page.Result:
+    """Build, prove, calibrate, measure; about so many seconds of measuring."""
+    OUT.mkdir(parents=True, exist_ok=True)
+    words = OUT / "words.hex"
+    board = peers.run([OUT / "bench_words", words, str(peers.ROWS)])
+    say("building the Verilog models (Icarus, Verilator)")
+    made = peers.build(OUT, words)
+    peers.prove(made, board)
+    say(f"the models send the words of the emulated board, edge for edge: {board.partition(chr(10))[0]}")
+    todo = cases.all_cases(OUT, made)
+    for case in todo:
+        say(f"instructions: {case.name}") if case.under_callgrind else None
+        cases.count_instructions(case)
+    rounds = 7 if seconds >= 120 else 5
+    for case in todo:
+        cases.calibrate(case, seconds / rounds / len(todo))
+    for n in range(rounds):
+        for case in todo:
+            cases.measure(case)
+        done = ", ".join(f"{c.name} {page.figure(c.rates[-1])}" for c in todo)
+        say(f"round {n + 1} of {rounds}, units/s: {done}")
+    return summary(todo, rounds)
+
+
+def main(argv: list[str]) -> int:
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--seconds", type=float, default=180.0, help="of measuring, about (default 180)")
+    parser.add_argument("--no-page", action="store_true", help="leave docs/performance.md as it is")
+    parser.add_argument("--page-only", action="store_true", help="write it from the last result")
+    args = parser.parse_args(argv)
+    result_file = OUT / "result.json"
+    if not args.page_only:
+        result_file.unlink(missing_ok=True)
+        result_file.parent.mkdir(parents=True, exist_ok=True)
+        result = bench(args.seconds)
+        result_file.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    result = json.loads(result_file.read_text(encoding="utf-8"))
+    print("\n" + "\n\n".join(make(result) for make in page.SECTIONS.values()))
+    if not args.no_page:
+        PAGE.write_text(page.fill(PAGE.read_text(encoding="utf-8"), result), encoding="utf-8")
+        PICTURE.write_text(page.picture(result), encoding="utf-8")
+        say(f"{PAGE.relative_to(ROOT)}, {PICTURE.relative_to(ROOT)} and {result_file.relative_to(ROOT)} written")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
