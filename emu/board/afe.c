@@ -17,14 +17,25 @@ struct afe_cfg afe_nominal(enum afe_input input)
         .input = input, .load_ohm = 1000.0, .divider_ratio = 8.0, .clip_v = 10.5, .filter_hz = 10e3};
 }
 
-void afe_init(struct afe *a, const struct afe_cfg *cfg, struct rng noise)
-{
-    *a = (struct afe){.cfg = *cfg, .noise = noise, .t_ns = -1};
-}
-
 static double with_ppm(double nominal, double tol_ppm, double tc_ppm_per_k, double dt_k)
 {
     return nominal * (1.0 + 1e-6 * (tol_ppm + tc_ppm_per_k * dt_k));
+}
+
+static struct afe_scale scale_at(const struct afe_cfg *c, double degc)
+{
+    const double dt_k = degc - NOMINAL_DEGC;
+    const bool current = c->input == AFE_CURRENT;
+    return (struct afe_scale){.degc = degc,
+                              .load =
+                                  current ? with_ppm(c->load_ohm, c->load_tol_ppm, c->load_tc_ppm_per_k, dt_k) : 1.0,
+                              .drift_v = c->buffer_offset_tc_v_per_k * dt_k,
+                              .divider = with_ppm(c->divider_ratio, c->divider_tol_ppm, c->divider_tc_ppm_per_k, dt_k)};
+}
+
+void afe_init(struct afe *a, const struct afe_cfg *cfg, struct rng noise)
+{
+    *a = (struct afe){.cfg = *cfg, .scale = scale_at(cfg, NOMINAL_DEGC), .noise = noise, .t_ns = -1};
 }
 
 static double clip(double v, double limit_v)
@@ -32,23 +43,16 @@ static double clip(double v, double limit_v)
     return v > limit_v ? limit_v : v < -limit_v ? -limit_v : v;
 }
 
-/* Current -> load -> buffer. */
-static double load_v(const struct afe_cfg *c, double signal, double dt_k)
+/* Signal -> load, if it is a current -> buffer. */
+static double load_v(const struct afe_cfg *c, const struct afe_scale *s, double signal)
 {
-    const double v =
-        c->input == AFE_CURRENT ? signal * with_ppm(c->load_ohm, c->load_tol_ppm, c->load_tc_ppm_per_k, dt_k) : signal;
-    return clip(v + c->buffer_offset_v + c->buffer_offset_tc_v_per_k * dt_k, c->clip_v);
-}
-
-static double divide_v(const struct afe_cfg *c, double v, double dt_k)
-{
-    return v / with_ppm(c->divider_ratio, c->divider_tol_ppm, c->divider_tc_ppm_per_k, dt_k);
+    return clip(signal * s->load + c->buffer_offset_v + s->drift_v, c->clip_v);
 }
 
 double afe_static_v(const struct afe_cfg *cfg, double signal, double temp_degc)
 {
-    const double dt_k = temp_degc - NOMINAL_DEGC;
-    return divide_v(cfg, load_v(cfg, signal, dt_k), dt_k);
+    const struct afe_scale s = scale_at(cfg, temp_degc);
+    return load_v(cfg, &s, signal) / s.divider;
 }
 
 /* Constants of a step of dt: they change only when the converter changes its pace. */
@@ -68,10 +72,10 @@ double afe_out_v(struct afe *a, double signal, double temp_degc, int64_t t_ns)
     const int64_t dt_ns = first ? FIRST_PULL_NS : t_ns - a->t_ns;
     if (dt_ns <= 0) return a->state_v;
     if (llabs(dt_ns - a->dt_ns) > SAME_DT_NS) retune(a, dt_ns);
-    const double dt_k = temp_degc - NOMINAL_DEGC;
-    double v = load_v(&a->cfg, signal, dt_k);
+    if (temp_degc != a->scale.degc) a->scale = scale_at(&a->cfg, temp_degc);
+    double v = load_v(&a->cfg, &a->scale, signal);
     if (a->noise_v > 0.0) v += a->noise_v * rng_gauss(&a->noise);
-    v = divide_v(&a->cfg, v, dt_k);
+    v /= a->scale.divider;
     a->state_v = first ? v : v + (a->state_v - v) * a->keep; /* at power-on the filter has long been settled */
     a->t_ns = t_ns;
     return a->state_v;

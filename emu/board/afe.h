@@ -24,8 +24,17 @@ struct afe_cfg {
     double noise_v_rthz; /* white, at the load, one-sided density */
 };
 
+/* What the temperature does to the chain. */
+struct afe_scale {
+    double degc;    /* at which it is so */
+    double load;    /* V per unit of the signal: ohm, or 1 */
+    double drift_v; /* of the buffer's offset */
+    double divider;
+};
+
 struct afe {
     struct afe_cfg cfg;
+    struct afe_scale scale;
     struct rng noise;
     double state_v; /* filter */
     int64_t t_ns;   /* of the state; -1 before the first call */

@@ -83,31 +83,64 @@ double ads1282_filter_noise_gain(const struct ads1282_filter *f)
     return f->noise_gain;
 }
 
-/* Sum of tap[i] * newest[-i]; two sums, for the processor's multiplier takes them side by side. */
-static int64_t dot(const int32_t *tap, unsigned taps, const int64_t *newest)
-{
-    int64_t even = 0;
-    int64_t odd = 0;
-    for (; taps >= 2; taps -= 2, tap += 2, newest -= 2) {
-        even += tap[0] * newest[0];
-        odd += tap[1] * newest[-1];
-    }
-    return even + odd + (taps ? tap[0] * newest[0] : 0);
-}
+/* The stages run over one data period. A line holds the taps - 1 newest samples of the past and then the new ones; x points
+ * at the newest sample of an output. Sums of integers, in whatever order is cheap. */
 
-/* One stage over one data period: line holds taps - 1 samples of the past and then `fresh` new ones. */
-static void stage(const struct ads1282_fir *fir, unsigned shift, int64_t *line, unsigned fresh, int64_t *out)
+static void forget(int64_t *line, unsigned fresh, unsigned taps)
 {
-    for (unsigned end = fir->decim; end <= fresh; end += fir->decim)
-        *out++ = bits_round_shift(dot(fir->tap, fir->taps, &line[fir->taps + end - 2]), shift);
-    memmove(line, line + fresh, (fir->taps - 1) * sizeof *line);
+    memmove(line, line + fresh, (taps - 1) * sizeof *line);
 }
 
 void ads1282_filter_sinc(struct ads1282_filter *f, const int64_t block[ADS1282_BLOCKS], int64_t out[ADS1282_BLOCKS])
 {
-    const struct ads1282_fir sinc = {f->sinc_tap, ADS1282_SINC_TAPS, 1, 4 * log2_of(f->sinc_ratio)};
+    const int64_t t0 = f->sinc_tap[0], t1 = f->sinc_tap[1], t2 = f->sinc_tap[2], t3 = f->sinc_tap[3],
+                  t4 = f->sinc_tap[4];
+    const unsigned shift = 4 * log2_of(f->sinc_ratio);
+    const int64_t *x = f->sinc + ADS1282_SINC_TAPS - 1;
     memcpy(f->sinc + ADS1282_SINC_TAPS - 1, block, ADS1282_BLOCKS * sizeof *block);
-    stage(&sinc, sinc.scale_log2, f->sinc, 32, out);
+    for (unsigned n = 0; n < 32; n++, x++)
+        out[n] = bits_round_shift(t0 * x[0] + t1 * x[-1] + t2 * x[-2] + t3 * x[-3] + t4 * x[-4], shift);
+    forget(f->sinc, 32, ADS1282_SINC_TAPS);
+}
+
+/* Half-band: symmetric, every second tap zero but the middle one. */
+static void stage_1(const struct ads1282_fir *fir, int64_t *line, int64_t *out)
+{
+    const int64_t t0 = fir->tap[0], t2 = fir->tap[2], t4 = fir->tap[4], t5 = fir->tap[5];
+    const int64_t *x = line + 11;
+    for (unsigned n = 0; n < 16; n++, x += 2) {
+        const int64_t sum = t0 * (x[0] + x[-10]) + t2 * (x[-2] + x[-8]) + t4 * (x[-4] + x[-6]) + t5 * x[-5];
+        out[n] = bits_round_shift(sum, fir_shift[0]);
+    }
+    forget(line, 32, 11);
+}
+
+static void stage_2(const struct ads1282_fir *fir, int64_t *line, int64_t *out)
+{
+    const int64_t t0 = fir->tap[0], t2 = fir->tap[2], t4 = fir->tap[4], t6 = fir->tap[6], t7 = fir->tap[7];
+    const int64_t *x = line + 15;
+    for (unsigned n = 0; n < 8; n++, x += 2) {
+        const int64_t sum =
+            t0 * (x[0] + x[-14]) + t2 * (x[-2] + x[-12]) + t4 * (x[-4] + x[-10]) + t6 * (x[-6] + x[-8]) + t7 * x[-7];
+        out[n] = bits_round_shift(sum, fir_shift[1]);
+    }
+    forget(line, 16, 15);
+}
+
+static int64_t dot(const int32_t *tap, unsigned taps, const int64_t *x)
+{
+    int64_t sum = 0;
+    for (; taps >= 4; taps -= 4, tap += 4, x -= 4)
+        sum += tap[0] * x[0] + tap[1] * x[-1] + tap[2] * x[-2] + tap[3] * x[-3];
+    for (; taps > 0; taps--) sum += *tap++ * *x--;
+    return sum;
+}
+
+static void stage(const struct ads1282_fir *fir, unsigned shift, int64_t *line, unsigned fresh, int64_t *out)
+{
+    for (unsigned end = fir->decim; end <= fresh; end += fir->decim)
+        *out++ = bits_round_shift(dot(fir->tap, fir->taps, &line[fir->taps + end - 2]), shift);
+    forget(line, fresh, fir->taps);
 }
 
 /* The data period's sinc outputs stand behind the past in f->fir1. */
@@ -115,8 +148,8 @@ static int64_t fir_stages(struct ads1282_filter *f)
 {
     const struct ads1282_fir *fir = ads1282_fir[f->phase];
     int64_t out;
-    stage(&fir[0], fir_shift[0], f->fir1, 32, f->fir2 + fir[1].taps - 1);
-    stage(&fir[1], fir_shift[1], f->fir2, 16, f->fir3 + fir[2].taps - 1);
+    stage_1(&fir[0], f->fir1, f->fir2 + fir[1].taps - 1);
+    stage_2(&fir[1], f->fir2, f->fir3 + fir[2].taps - 1);
     stage(&fir[2], fir_shift[2], f->fir3, 8, f->fir4 + fir[3].taps - 1);
     stage(&fir[3], fir_shift[3], f->fir4, 2, &out);
     return out;

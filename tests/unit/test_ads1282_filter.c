@@ -1,6 +1,7 @@
 /* Signal path of the ADS1281/ADS1282 against a sinc at the modulator rate and the published properties (sources 1.7, 1.8). */
 #include "rig.h"
 
+#include "base/bits.h"
 #include "base/rng.h"
 #include "chip/ads1282_filter.h"
 
@@ -161,6 +162,57 @@ static void decimation_chain_is_the_composite(void **state)
                 }
             }
         }
+    }
+}
+
+/* ---- Plain convolution ---- */
+
+/* All of a run at once, each output by the definition: taps one by one, rounded to nearest. Returns how many. */
+static unsigned convolve_all(const int32_t *tap, unsigned taps, unsigned decim, unsigned shift, const int64_t *in,
+                             unsigned n, int64_t *out)
+{
+    for (unsigned k = 0; k < n / decim; k++) {
+        int64_t sum = 0;
+        for (unsigned i = 0; i < taps && i <= (k + 1) * decim - 1; i++) sum += tap[i] * in[(k + 1) * decim - 1 - i];
+        out[k] = bits_round_shift(sum, shift);
+    }
+    return n / decim;
+}
+
+static int64_t random_block(struct rng *r, int kind)
+{
+    static const int64_t max = (int64_t)(ADS1282_SATURATION * (double)BLOCK_FS);
+    const uint64_t u = rng_u64(r);
+    if (kind == 0) return (int64_t)(u % (uint64_t)(2 * max + 1)) - max;
+    if (kind == 1) return u & 1 ? max : -max; /* slams between the ends */
+    return kind == 2 ? max : (int64_t)(u % 5) - 2;
+}
+
+static void each_word_is_the_plain_convolution(void **state)
+{
+    (void)state;
+    enum { PERIODS = 100, BLOCKS = PERIODS * 32 };
+    static const unsigned shift[ADS1282_FIR_STAGES] = {9, 23, 28, 30};
+    static int64_t line[2][BLOCKS], block[BLOCKS];
+    struct rng r = rng_stream(rig_seed(1), 0, "plain");
+    for (unsigned row = 0; row < 4 * 2 * COUNT(ratios); row++) {
+        const unsigned ratio = ratios[row / 8];
+        const enum ads1282_phase phase = row & 1 ? ADS1282_MINIMUM : ADS1282_LINEAR;
+        static struct ads1282_filter f;
+        int32_t sinc[ADS1282_SINC_TAPS];
+        ads1282_sinc_taps(ratio, sinc);
+        for (unsigned i = 0; i < BLOCKS; i++) block[i] = random_block(&r, (int)(row / 2 % 4));
+        unsigned log2_ratio = 3;
+        while (1u << log2_ratio < ratio) log2_ratio++;
+        unsigned n = convolve_all(sinc, ADS1282_SINC_TAPS, 1, 4 * log2_ratio, block, BLOCKS, line[0]);
+        for (unsigned s = 0; s < ADS1282_FIR_STAGES; s++) {
+            const struct ads1282_fir *fir = &ads1282_fir[phase][s];
+            n = convolve_all(fir->tap, fir->taps, fir->decim, shift[s], line[s & 1], n, line[!(s & 1)]);
+        }
+        assert_int_equal(n, PERIODS);
+        ads1282_filter_init(&f, ratio, phase);
+        for (unsigned p = 0; p < PERIODS; p++)
+            assert_int_equal(ads1282_filter_period(&f, block + (size_t)32 * p), line[0][p]);
     }
 }
 
@@ -430,6 +482,7 @@ int main(void)
         cmocka_unit_test(sinc_weights_sum_to_the_fourth_power),
         cmocka_unit_test(coefficients_are_the_published_ones),
         cmocka_unit_test(decimation_chain_is_the_composite),
+        cmocka_unit_test(each_word_is_the_plain_convolution),
         cmocka_unit_test(frequency_response_has_the_tabulated_properties),
         cmocka_unit_test(holding_a_block_droops_by_two_thousandths_of_a_decibel),
         cmocka_unit_test(delay_at_dc_is_31_and_5_data_periods),

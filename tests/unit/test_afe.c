@@ -101,12 +101,32 @@ static void noise_has_its_density(void **state)
     }
 }
 
+/* Without filter and noise each sample is the static transfer at the temperature of its own instant. */
+static void temperature_acts_at_once(void **state)
+{
+    (void)state;
+    const enum afe_input inputs[] = {AFE_CURRENT, AFE_VOLTAGE};
+    const double degc[] = {25.0, 60.0, 60.0, -40.0, 25.0};
+    for (size_t k = 0; k < COUNT(inputs); k++) {
+        struct afe_cfg c = afe_nominal(inputs[k]);
+        c.filter_hz = 0.0;
+        c.load_tc_ppm_per_k = 5.0;
+        c.divider_tc_ppm_per_k = -3.0;
+        c.buffer_offset_tc_v_per_k = 1e-6;
+        const double signal = inputs[k] == AFE_CURRENT ? 0.004 : 4.0;
+        struct afe a;
+        afe_init(&a, &c, rng_stream(1, 1, "afe"));
+        for (size_t i = 0; i < COUNT(degc); i++)
+            assert_true(afe_out_v(&a, signal, degc[i], 1000 * (int64_t)i) == afe_static_v(&c, signal, degc[i]));
+        assert_true(afe_static_v(&c, signal, 60.0) != afe_static_v(&c, signal, 25.0));
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(static_transfer),
-        cmocka_unit_test(one_pole_is_exact_at_any_pace),
-        cmocka_unit_test(without_a_filter_the_chain_has_no_memory),
+        cmocka_unit_test(temperature_acts_at_once),      cmocka_unit_test(static_transfer),
+        cmocka_unit_test(one_pole_is_exact_at_any_pace), cmocka_unit_test(without_a_filter_the_chain_has_no_memory),
         cmocka_unit_test(noise_has_its_density),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
