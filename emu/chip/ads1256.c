@@ -60,6 +60,7 @@ void ads1256_reset_chip(struct ads1256 *a, enum ads1256_mode mode, uint8_t keep,
     a->unread = false;
     a->cal = ADS1256_SELFCAL;
     a->cal_due = true;
+    a->next_ok_ns = 0;
     ads1256_port_idle(a);
     ads1256_pins_release(a, t_ns);
 }

@@ -50,11 +50,12 @@ static bool too_long(const struct ads1256 *a, int64_t span_ns, int64_t periods)
 }
 
 /* An SCLK that stops in the middle of a byte: counted, and a strict chip forgets the byte and its command (E0). */
-static void judge_slow(struct ads1256 *a, bool slow, int64_t t_ns)
+static bool stopped(struct ads1256 *a, bool slow, int64_t t_ns)
 {
-    if (!a->spi.bits || !out_of_bounds(a, slow)) return;
+    if (!a->pins.open || !out_of_bounds(a, slow)) return false;
     ads1256_port_drop(a);
     ads1256_pins_release(a, t_ns);
+    return true;
 }
 
 static void rise(struct ads1256 *a, int64_t t_ns)
@@ -63,8 +64,9 @@ static void rise(struct ads1256 *a, int64_t t_ns)
     const int64_t low_ns = t_ns - p->fall_ns;
     const int64_t period_ns = t_ns - p->rise_ns;
     p->rise_ns = t_ns;
+    p->lost = false;
     if (a->cs || ads1256_deaf(a)) return;
-    judge_slow(a, too_long(a, period_ns, T1_PERIODS), t_ns);
+    stopped(a, too_long(a, period_ns, T1_PERIODS), t_ns);
     p->lost = out_of_bounds(a, period_ns < ads1256_tau_ns(a, T1_TAU) || low_ns < T2_NS);
     if (low_ns < ads1256_tau_ns(a, T13_TAU)) p->pattern = 0;
     if (p->lost) return;
@@ -111,7 +113,7 @@ static void fall(struct ads1256 *a, int64_t t_ns)
         ads1256_go(a, t_ns);
         return;
     }
-    judge_slow(a, too_long(a, high_ns, T2H_PERIODS), t_ns);
+    if (stopped(a, too_long(a, high_ns, T2H_PERIODS), t_ns)) return;
     if (out_of_bounds(a, high_ns < T2_NS) || p->lost) return;
     if (!p->open) spi_first(&a->spi, t_ns); /* CS fell while SCLK was high */
     spi_sample(&a->spi, taken_bit(a, t_ns), t_ns);

@@ -29,6 +29,7 @@ typedef void op_fn(struct ads1256 *a, uint8_t opcode, int64_t t_ns);
 static void leave_standby(struct ads1256 *a, int64_t t_ns)
 {
     if (a->cal_due || !a->sync) {
+        ads1256_freeze(a, ADS1256_SYNC_LOW);
         ads1256_go(a, t_ns);
         return;
     }
@@ -276,6 +277,7 @@ static void judge_read(struct ads1256 *a, int64_t t_ns)
 static void on_first(void *chip, int64_t t_ns)
 {
     struct ads1256 *a = chip;
+    spi_load(&a->spi, ADS1256_DOUT_IDLE);
     if (a->cs || ads1256_deaf(a)) return;
     a->first_ns = t_ns;
     a->first_drdy = a->drdy;

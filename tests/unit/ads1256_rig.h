@@ -1,4 +1,4 @@
-/* One ADS1256 for the tests: on a 7.68 MHz clock, CS low, powered up at 0, SCLK 1.92 MHz. */
+/* One ADS1256 for the tests: on a 7.68 MHz clock, CS low, powered up at 0, SCLK 1.9 MHz. */
 #ifndef PSABENCH_TESTS_ADS1256_RIG_H
 #define PSABENCH_TESTS_ADS1256_RIG_H
 
@@ -20,9 +20,13 @@ struct rig {
         bool level;
     } edge[EDGES_MAX];
     unsigned edges;
+    double ohm[9]; /* behind them, for chips that look at it */
+    unsigned gpio_calls, dout_calls;
+    bool gpio[4], dout;
 };
 
-enum { BYTE_NS = 4200, FIRST_NS = 260, T6_NS = 6600, T11_NS = 3200 };
+/* A byte: SCLK rises after FIRST_NS and then every SCLK_NS, falls HIGH_NS later; its last fall is at BYTE_NS. */
+enum { BYTE_NS = 4200, FIRST_NS = 260, SCLK_NS = 525, HIGH_NS = 265, T6_NS = 6600, T11_NS = 3200 };
 
 static inline double ain_v(void *ctx, unsigned ain, int64_t t_ns)
 {
@@ -38,14 +42,19 @@ static inline void on_drdy(void *ctx, bool level, int64_t t_ns)
 
 static const struct ads1256_cfg quiet = {.clkin_hz = 7680000, .vref_v = 2.5};
 
-static inline void power_up(struct rig *r, const struct ads1256_cfg *cfg, uint64_t seed)
+static inline void power_up_io(struct rig *r, const struct ads1256_cfg *cfg, struct ads1256_io io, uint64_t seed)
 {
     memset(r, 0, sizeof *r);
     sched_init(&r->s);
-    const struct ads1256_io io = {.ctx = r, .ain_v = ain_v, .drdy = on_drdy};
+    io.ctx = r;
     ads1256_init(&r->a, cfg, &io, &r->s, rng_stream(seed, 1, "adc.t"));
     ads1256_power_up(&r->a, 0);
     ads1256_cs_pin(&r->a, false, 0);
+}
+
+static inline void power_up(struct rig *r, const struct ads1256_cfg *cfg, uint64_t seed)
+{
+    power_up_io(r, cfg, (struct ads1256_io){.ain_v = ain_v, .drdy = on_drdy}, seed);
 }
 
 static inline void wait_ns(struct rig *r, int64_t ns)
