@@ -197,7 +197,7 @@ static void on_due(void *ctx, int64_t t_ns)
     sched_at(a->sched, &a->due, due_ns(a, a->period));
     ads1282_serial_period(a);
     if (!a->delivers) return;
-    a->updating = false;
+    a->update_ns = INT64_MAX;
     const int64_t y = a->result[(uint64_t)(p + a->lag) % ADS1282_RESULTS];
     const bool settled = p >= a->timing.settle;
     if (a->special) {
@@ -212,7 +212,7 @@ static void on_due(void *ctx, int64_t t_ns)
 static void on_pulse(void *ctx, int64_t t_ns)
 {
     struct ads1282 *a = ctx;
-    a->updating = true;
+    a->update_ns = t_ns;
     ads1282_set_drdy(a, true, t_ns);
 }
 
@@ -238,7 +238,8 @@ static void restart_at(struct ads1282 *a, int64_t edge, int64_t t_ns)
     sched_cancel(a->sched, &a->pulse);
     sched_cancel(a->sched, &a->watch);
     ads1282_set_drdy(a, true, t_ns);
-    a->updating = a->in_phase = false;
+    a->in_phase = false;
+    a->update_ns = INT64_MAX;
     a->cal.kind = ADS1282_CAL_NONE;
     choose_special(a);
     if (!a->running) a->last_lsb = 0;

@@ -43,6 +43,7 @@ static void rise(struct ads1282 *a, int64_t t_ns)
     if (!a->alive) return;
     if (a->spi.bits == 0) ads1282_serial_gap(a, t_ns);
     p->dout_held = spi_miso(&a->spi);
+    a->sclk_ns = t_ns;
     spi_sample(&a->spi, p->din, t_ns);
 }
 

@@ -231,9 +231,8 @@ void ads1282_serial_gap(struct ads1282 *a, int64_t t_ns)
 
 void ads1282_serial_fall(struct ads1282 *a, int64_t t_ns)
 {
-    a->sclk_ns = t_ns;
     a->rest_periods = 0;
-    a->count.late_reads += a->updating && ads1282_serial_under_way(a);
+    a->count.late_reads += t_ns > a->update_ns && ads1282_serial_under_way(a);
     if (!a->word_out) return;
     a->unread = false;
     ads1282_set_drdy(a, true, t_ns);
@@ -245,6 +244,7 @@ static void on_first(void *chip, int64_t t_ns)
     struct ads1282 *a = chip;
     if (!a->alive) return;
     ads1282_serial_gap(a, t_ns);
+    a->sclk_ns = t_ns;
     a->in_byte = true;
     ads1282_serial_fall(a, t_ns);
 }

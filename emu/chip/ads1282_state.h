@@ -56,7 +56,6 @@ struct ads1282 {
     /* serial column */
     bool rdatac, rdata_due; /* read mode; an RDATA waits for its word */
     bool word_out, unread;  /* a word is in the output register; none of it has been clocked out */
-    bool updating;          /* the word is about to be replaced: less than 4 tCLK */
     bool in_byte, gap_matters;
     bool lost; /* the byte under way came too soon (strict_gap) */
     uint8_t op_byte, reg_addr, regs_left;
@@ -66,6 +65,7 @@ struct ads1282 {
     uint64_t out; /* output register: the word below `out_phase` leading bits already gone */
     unsigned out_index, out_phase;
     int64_t sclk_ns, rise_ns, gap_ns; /* last SCLK edge heard of; last rising edge; 24 tCLK */
+    int64_t update_ns;                /* 4 tCLK before the word is replaced, once that has come; else INT64_MAX */
     unsigned rest_periods;            /* since SCLK last moved */
 
     /* converter column */

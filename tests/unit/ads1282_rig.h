@@ -31,9 +31,10 @@ struct rig {
     double v, ramp_v_per_s; /* input: v + ramp t */
     int64_t tclk;           /* the master's time */
     int gap_tclk;           /* from the last rise of a byte to the first of the next */
-    bool by_bits;
-    unsigned falls, rises, asked_mux, samples;
-    int64_t fall_ns, rise_ns, first_sample_ns, last_sample_ns;
+    enum { BYTES, BITS, PINS } bus;
+    unsigned falls, rises, asked_mux, samples, mflags, clocks;
+    int64_t fall_ns, rise_ns, first_sample_ns, last_sample_ns, mflag_ns;
+    bool mflag;
 };
 
 static inline double input(void *ctx, unsigned mux, int64_t t_ns)
@@ -52,6 +53,16 @@ static inline void drdy(void *ctx, bool level, int64_t t_ns)
     assert_int_equal(level, ads1282_drdy(&r->a));
     if (level) r->rises++, r->rise_ns = t_ns;
     else r->falls++, r->fall_ns = t_ns;
+}
+
+static inline void mflag(void *ctx, bool level, int64_t t_ns)
+{
+    struct rig *r = ctx;
+    assert_int_not_equal(level, r->mflag);
+    assert_int_equal(t_ns, r->s.now_ns);
+    r->mflag = level;
+    r->mflags++;
+    r->mflag_ns = t_ns;
 }
 
 static const struct ads1282_cfg quiet = {.part = ADS1282_PART_1282, .clk_hz = MCLK_HZ, .vref_v = 5.0};
@@ -76,7 +87,7 @@ static inline int64_t at_tclk(struct rig *r, int64_t tclk)
 {
     r->tclk = tclk;
     const int64_t t_ns = clk_edge_ns(&r->clk, tclk);
-    sched_run_until(&r->s, t_ns);
+    if (t_ns > r->s.now_ns) sched_run_until(&r->s, t_ns); /* a byte by pins ends 2 tCLK after its last rise */
     return t_ns;
 }
 
@@ -91,18 +102,39 @@ static inline int64_t to_fall(struct rig *r)
     return r->falls == falls ? 0 : r->fall_ns;
 }
 
-/* One byte in SPI mode 0, its first rise a gap after the previous byte's last. */
-static inline uint8_t byte(struct rig *r, uint8_t mosi)
+/* Eight bits by the pins: DIN moves with SCLK's fall, DOUT is looked at before its rise. */
+static inline uint8_t byte_by_pins(struct rig *r, uint8_t mosi, int64_t rise)
 {
-    const int64_t rise = r->tclk + r->gap_tclk;
     uint8_t miso = 0;
-    for (int i = 0; i < 8 && r->by_bits; i++) {
+    for (int i = 0; i < 8; i++) {
+        ads1282_din_pin(&r->a, (mosi >> (7 - i)) & 1, at_tclk(r, rise + i * BIT_TCLK - BIT_TCLK / 2));
+        const int64_t t_ns = at_tclk(r, rise + i * BIT_TCLK);
+        miso = (uint8_t)((miso << 1) | ads1282_dout(&r->a));
+        ads1282_sclk_pin(&r->a, true, t_ns);
+        ads1282_sclk_pin(&r->a, false, at_tclk(r, rise + i * BIT_TCLK + BIT_TCLK / 2));
+    }
+    r->tclk -= BIT_TCLK / 2; /* gaps count from the last rise */
+    return miso;
+}
+
+static inline uint8_t byte_by_bits(struct rig *r, uint8_t mosi, int64_t rise)
+{
+    uint8_t miso = 0;
+    for (int i = 0; i < 8; i++) {
         const int64_t t_ns = at_tclk(r, rise + i * BIT_TCLK);
         miso = (uint8_t)((miso << 1) | spi_miso(&r->a.spi));
         spi_sample(&r->a.spi, (mosi >> (7 - i)) & 1, t_ns);
         if (i == 0) spi_first(&r->a.spi, at_tclk(r, rise + BIT_TCLK / 2));
     }
-    if (r->by_bits) return miso;
+    return miso;
+}
+
+/* One byte in SPI mode 0, its first rise a gap after the previous byte's last. */
+static inline uint8_t byte(struct rig *r, uint8_t mosi)
+{
+    const int64_t rise = r->tclk + r->gap_tclk;
+    if (r->bus == PINS) return byte_by_pins(r, mosi, rise);
+    if (r->bus == BITS) return byte_by_bits(r, mosi, rise);
     spi_first(&r->a.spi, at_tclk(r, rise + BIT_TCLK / 2));
     return spi_byte(&r->a.spi, mosi, at_tclk(r, rise + 7 * BIT_TCLK));
 }

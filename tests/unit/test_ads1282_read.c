@@ -229,42 +229,13 @@ static void registers_read_in_rdatac_are_refused_and_data_win(void **state)
     assert_int_equal(r.a.count.refused, 1);
 }
 
-/* Random traffic, once by bytes and once by bits. Bytes keep clear of conversion ends: there only bits can tell where. */
-static void a_byte_bus_and_a_bit_bus_see_the_same_chip(void **state)
-{
-    (void)state;
-    static const uint8_t likely[] = {0x00, 0x11, 0x10, 0x12, 0x21, 0x41, 0x56, 0x52, 0x04, 0x06, 0x2A, 0x48, 0x02};
-    const uint64_t seed = rig_seed(5);
-    static uint8_t out[2][6000];
-    struct rig r[2];
-    for (int bits = 0; bits < 2; bits++) {
-        struct rng g = rng_stream(seed, 0, "bus");
-        powered(&r[bits], &quiet);
-        r[bits].by_bits = bits;
-        r[bits].ramp_v_per_s = 1.0;
-        for (unsigned i = 0; i < sizeof out[0]; i++) {
-            const uint64_t u = rng_u64(&g);
-            if (u % 7 == 0) at_tclk(&r[bits], r[bits].tclk + (int64_t)(u >> 8) % 3000);
-            if (u % 1009 == 0) to_fall(&r[bits]);
-            if (sched_next_ns(&r[bits].s) < r[bits].s.now_ns + 30000) at_tclk(&r[bits], r[bits].tclk + 200);
-            out[bits][i] = byte(&r[bits], u % 5 ? likely[(u >> 32) % sizeof likely] : (uint8_t)(u >> 40));
-        }
-    }
-    assert_memory_equal(out[0], out[1], sizeof out[0]);
-    assert_int_equal(r[0].falls, r[1].falls);
-    assert_int_equal(r[0].rise_ns, r[1].rise_ns);
-    assert_memory_equal(r[0].a.reg_value, r[1].a.reg_value, ADS1282_REGS);
-    assert_memory_equal(&r[0].a.count, &r[1].a.count, sizeof r[0].a.count); /* uint32_t only: no padding */
-    assert_true(r[0].a.count.conversions > 20);
-}
-
 static void a_stray_clock_garbles_commands_until_sclk_rests_64_periods(void **state)
 {
     (void)state;
     for (int periods = 63; periods <= 64; periods++) {
         struct rig r;
         powered(&r, &quiet);
-        r.by_bits = true;
+        r.bus = BITS;
         r.v = 1.1;
         const uint32_t word = settled_word(&r);
         spi_sample(&r.a.spi, true, r.s.now_ns);
@@ -308,7 +279,6 @@ int main(void)
         cmocka_unit_test(writing_while_data_are_shifted_out_disturbs_neither),
         cmocka_unit_test(sdatac_silences_dout_and_rdata_asks_for_one_word),
         cmocka_unit_test(registers_read_in_rdatac_are_refused_and_data_win),
-        cmocka_unit_test(a_byte_bus_and_a_bit_bus_see_the_same_chip),
         cmocka_unit_test(a_stray_clock_garbles_commands_until_sclk_rests_64_periods),
         cmocka_unit_test(a_half_command_is_dropped_after_64_periods),
     };
