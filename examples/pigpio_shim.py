@@ -39,7 +39,7 @@ class Pi:
         return self.pins[gpio].level if gpio in self.pins else 0
 
     def spi_open(self, spi_channel: int, baud: int, spi_flags: int = 0) -> int:
-        self.chip.spi_clock(baud)
+        self.chip.spi_clock(baud, gap_s=1 / baud)  # a Pi's SPI pauses for a clock between bytes
         return 0
 
     def spi_xfer(self, handle: int, data: list[int]) -> tuple[int, bytearray]:

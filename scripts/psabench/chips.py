@@ -178,7 +178,7 @@ class Pin:
 
     @property
     def level(self) -> int:
-        """0 or 1, now."""
+        """0 or 1, now. BadInput for the lines of psa2 that carry bits: watch or record them."""
         return self._bench.done(self._get(self._part.live(), self.number))
 
     def set(self, level: int) -> None:
@@ -186,7 +186,8 @@ class Pin:
         self._bench.done(self._set(self._part.live(), self.number, level))
 
     def watch(self, fn: Callable[[int, int], None] | None) -> None:
-        """Calls fn(level, t_ns) at each change of an output, at its own instant. None: no more; one watcher a pin."""
+        """Calls fn(level, t_ns) at each change of an output, at its own instant (lines of psa2 up to 0.2 ms later, in
+        order of time). None: no more; one watcher a pin."""
         self._part.install("watch", WATCH, fn and (lambda _ctx, _part, _pin, *args: fn(*args)), self.number)
 
 
@@ -216,13 +217,14 @@ class Part:
     # Inputs
 
     def set_volts(self, input: int, volts: float) -> None:
-        """A constant voltage at an input from now on. Numbers: ads1255/1256 0..7 AIN0..AIN7, 8 AINCOM, to AGND;
-        ads1281/1282 0 AIN1, 1 AIN2, differential; psa2 0..2 sensors X, Y, Z (with a current input amperes)."""
+        """A constant voltage at an input from now on. Numbers: ads1256 0..7 AIN0..AIN7, 8 AINCOM, to AGND; ads1255 0,
+        1, 8; ads1282 0 AIN1, 1 AIN2, differential; ads1281 0; psa2 0..2 sensors X, Y, Z (with a current input amperes),
+        3..6 the temperatures of these sensors and of the board, degC."""
         self.bench.done(self._lib.set_volts(self.live(), input, volts))
 
     def set_input(self, fn: Callable[[int, int], float] | None) -> None:
         """Inputs come from fn(input, t_ns) -> volts, asked at the instants of sampling: for one input never earlier
-        than before, perhaps up to a data period ago. None: no more."""
+        than before, perhaps up to a data period ago. None: constants again."""
         self.install("set_input", INPUT, fn and (lambda _ctx, _part, *args: float(fn(*args))))
 
     # SPI
@@ -235,7 +237,7 @@ class Part:
         return rx.raw
 
     def spi_clock(self, sclk_hz: int, gap_s: float = 0.0) -> None:
-        """Frequency of SCLK from now on, and the pause between two bytes of one exchange."""
+        """Frequency of SCLK from now on, and the pause between two bytes of an exchange."""
         self.bench.done(self._lib.spi_clock(self.live(), sclk_hz, round(gap_s * 1e9)))
 
     # Waiting
@@ -254,7 +256,7 @@ class Part:
     # Inside
 
     def peek(self, address: int) -> int:
-        """A register, 0..255, without the side effects of reading it over SPI."""
+        """A register, 0..255, without the side effects of reading it over SPI. psa2: 256 * group + address."""
         return self.bench.done(self._lib.peek(self.live(), address))
 
     @property
