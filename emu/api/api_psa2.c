@@ -1,5 +1,6 @@
-#include "api/api.h"
+#include "api/api_psa2.h"
 
+#include "api/api.h"
 #include "board/psa2.h"
 
 #include <stdio.h>
@@ -75,7 +76,7 @@ static const struct {
     {"w24", "lead_in_clk", "0", 0},
 };
 
-static bool load_profile(unsigned number, struct psa2_profile *p, char *why, size_t cap)
+bool api_psa2_profile(unsigned number, struct psa2_profile *p, char *why, size_t cap)
 {
     const char *name = PROFILES;
     while (number-- > 0) name = strchr(name, '|') + 1;
@@ -260,7 +261,7 @@ static bool open_psa2(struct psabench_part *p, char *why, size_t cap)
 {
     struct part_psa2 *s = self(p);
     struct psa2_profile profile;
-    if (!load_profile(s->profile, &profile, why, cap)) return false;
+    if (!api_psa2_profile(s->profile, &profile, why, cap)) return false;
     const uint64_t serial = api_serial(p);
     struct psa2_unit_cfg unit = {.adc_noise_scale = s->noise_scale,
                                  .temp_noise_scale = s->temp_noise_scale,

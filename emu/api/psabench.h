@@ -1,4 +1,5 @@
 /* libpsabench: converter chips and boards, register by register and edge by edge, for somebody else's program.
+ * (docs/library.md is the way in, with examples; this is the manual.)
  *
  * A driver under test is linked or shimmed against a part on a simulated bench: the program moves the pins or exchanges
  * SPI bytes, lets simulated time pass, and gives the input voltages. Nothing happens between calls, and the same calls
@@ -13,13 +14,17 @@
  *     psabench_run_for(b, 7000);                               // t6
  *     psabench_spi(adc, NULL, word, 3);                        // 24 bits
  *
- * Time: int64_t nanoseconds since the bench was made. It moves only in psabench_run_*() and psabench_spi(); callbacks come
- * from in there (and from psabench_set()), and must not call functions that move time.
+ * Time: int64_t nanoseconds since the bench was made. It moves only in psabench_run_*(), psabench_spi() and
+ * psabench_board_*(). Callbacks come from in there, from psabench_set() and from the functions that change an input; they
+ * get PSABENCH_BAD_ARGUMENT from whatever would move time, make or record, and psabench_free() does nothing there. They may
+ * read everything and set pins, but an input or frame callback and a watcher of a board not those of its own part.
  * Levels: 0 or 1, the level on the wire (DRDY and CS are active low: 0 is active).
  * Errors: functions that can fail return NULL or a negative enum psabench_error; psabench_error_text() has the reason in
- * one line: what, where, what would be right. Nothing is printed, nothing exits.
- * Memory: psabench_new() and psabench_part_new() allocate, nothing else does. Threads: a bench belongs to one at a time;
- * different benches share nothing. */
+ * one line: what, where, what would be right. NULL for a bench or a part is such an error. Nothing is printed, nothing
+ * exits. Where the program under test errs against the part (a gap too short, a word lost, a reserved code) nothing fails:
+ * the part does what it does and psabench_counter() counts it.
+ * Memory: psabench_new(), psabench_part_new() and a recording allocate, nothing else does. Threads: a bench belongs to one
+ * at a time; different benches share nothing. */
 #ifndef PSABENCH_H
 #define PSABENCH_H
 
@@ -48,11 +53,13 @@ typedef struct psabench_part psabench_part; /* a chip or a board on a bench; fre
 
 enum psabench_error {
     PSABENCH_OK = 0,
-    PSABENCH_BAD_ARGUMENT = -1, /* no such pin, input, register, option; a level that is not 0 or 1; time that runs back */
-    PSABENCH_NOT_HERE = -2,     /* this part has nothing of the kind: SPI of a board, frames of a chip */
-    PSABENCH_REFUSED = -3,      /* the part refuses: a board that is busy, a value its chip does not take */
-    PSABENCH_TIMEOUT = -4,      /* it did not happen within the time given */
-    PSABENCH_SYSTEM = -5        /* file, memory */
+    PSABENCH_BAD_ARGUMENT =
+        -1,                 /* no such pin, input, register, option; a level that is not 0 or 1; time that runs back;
+                                   not allowed from a callback */
+    PSABENCH_NOT_HERE = -2, /* this part has nothing of the kind: SPI of a board, frames of a chip */
+    PSABENCH_REFUSED = -3,  /* a board refuses to write a register: read-only, or a value its chip does not take */
+    PSABENCH_TIMEOUT = -4,  /* it did not happen within the time given */
+    PSABENCH_SYSTEM = -5    /* file, memory */
 };
 
 /* ---- The bench ---- */
@@ -64,19 +71,21 @@ PSABENCH_API const char *psabench_error_text(const psabench *b); /* of the lates
 
 PSABENCH_API int64_t psabench_now_ns(const psabench *b);
 PSABENCH_API int64_t psabench_next_ns(const psabench *b); /* when something will happen by itself; INT64_MAX: never */
-PSABENCH_API int psabench_run_until(psabench *b, int64_t t_ns);
+PSABENCH_API int psabench_run_until(psabench *b, int64_t t_ns); /* from psabench_now_ns() up to 2^60: 36 years */
 PSABENCH_API int psabench_run_for(psabench *b, int64_t dt_ns);
 
-/* Records the pins of the parts that are on the bench (VCD, 1 ns) from now until psabench_vcd_close(), psabench_free() or
- * the next call. The picture of what a driver did, for GTKWave, PulseView, sigrok-cli. */
+/* Records the pins of the parts that are on the bench (VCD, 1 ns, a scope named after each part) from now until
+ * psabench_vcd_close(), psabench_free() or the next call. The picture of what a driver did, for GTKWave, PulseView,
+ * sigrok-cli. A write that failed on the way (disk full) is told by psabench_vcd_close(). */
 PSABENCH_API int psabench_vcd(psabench *b, const char *path);
-PSABENCH_API int psabench_vcd_close(psabench *b);
+PSABENCH_API int psabench_vcd_close(psabench *b); /* PSABENCH_OK too when there is no recording */
 
 /* ---- Parts ---- */
 
 /* Parts: "ads1281" "ads1282" "ads1255" "ads1256" "psa2". name: for the recording and the noise streams, unique on the
- * bench. options: "key=value key=value"; psabench_options() lists them; NULL or "": all default. The part has its supplies
- * and clock from now on; what it does after power-up begins at once. NULL: psabench_error_text(b) says why. */
+ * bench, 1 to 31 of A-Z a-z 0-9 _ - . options: "key=value key=value"; psabench_options() lists them; NULL or "": all
+ * default. The part has its supplies and clock from now on; what it does after power-up begins at once.
+ * NULL: psabench_error_text(b) says why. */
 PSABENCH_API psabench_part *psabench_part_new(psabench *b, const char *part, const char *name, const char *options);
 
 /* One line an option: "key=default  what it is, unit, range". NULL: no such part. psabench_parts(): their names, a space
@@ -89,16 +98,26 @@ PSABENCH_API const char *psabench_part_name(const psabench_part *p);
 
 /* ---- Pins ---- */
 
-/* Names as in the data sheet or the article: DRDY DOUT SCLK DIN CS SYNC RESET ...; psabench_pin_name(p, 0), 1, ... lists
- * them up to NULL. psabench_pin(): number, or PSABENCH_BAD_ARGUMENT. */
+/* psabench_pin_name(p, 0), 1, ... lists them up to NULL. psabench_pin(): number, or PSABENCH_BAD_ARGUMENT.
+ *   ads1281, ads1282   DRDY DOUT SCLK DIN SYNC RESET PWDN MFLAG; M0 M1 MCLK (modulator output mode);
+ *                      ads1281 with pin_mode=1: DR0 DR1 PHS HPF CSYNC
+ *   ads1255, ads1256   DRDY DOUT SCLK DIN CS SYNC RESET D0 D1; ads1256: D2 D3. SYNC is SYNC/PDWN. D0.. are both input and
+ *                      output. As CLKOUT D0 reads 0: counter clkout_hz has the frequency
+ *   psa2               the article's lines SYNC_A SClk DRD_A DIn DOutX DOutY DOutZ SYNC_T CST DRD_T DInT DOutT Res Data CLK
+ *                      Int, all outputs; a 0 set on Res starts the board's own reset pulse
+ * Inputs that nobody has set: SCLK, DIN, the SYNC of the ads128x and D0.. low; CS, RESET, PWDN, the SYNC of the ads125x
+ * high. DOUT of the ads125x reads 0 in high impedance. */
 PSABENCH_API int psabench_pin(const psabench_part *p, const char *name);
 PSABENCH_API const char *psabench_pin_name(const psabench_part *p, int pin);
 PSABENCH_API int psabench_pin_is_input(const psabench_part *p, int pin); /* of the part: the program may set it */
 
-PSABENCH_API int psabench_set(psabench_part *p, int pin, int level); /* now */
-PSABENCH_API int psabench_get(const psabench_part *p, int pin);      /* now: 0, 1 or an error */
+/* Now. Of psa2 the lines that carry bits (SClk, DIn.., DOut.., Data, CLK) are known only when their burst is over:
+ * PSABENCH_NOT_HERE, watch or record them. */
+PSABENCH_API int psabench_set(psabench_part *p, int pin, int level);
+PSABENCH_API int psabench_get(const psabench_part *p, int pin); /* 0, 1 or an error */
 
-/* Called at each change of an output pin, at its own instant; fn NULL: no more. One watcher a pin. */
+/* Called at each change of an output pin, at its own instant; fn NULL: no more. One watcher a pin. A line of psa2 is told
+ * up to 0.2 ms late, with its own t_ns and in order of time with the other lines of the board. */
 typedef void psabench_watch_fn(void *ctx, psabench_part *p, int pin, int level, int64_t t_ns);
 PSABENCH_API int psabench_watch(psabench_part *p, int pin, psabench_watch_fn *fn, void *ctx);
 
@@ -108,23 +127,27 @@ PSABENCH_API int psabench_run_until_level(psabench_part *p, int pin, int level, 
 /* ---- Inputs ---- */
 
 /* Input of a part, volts (PSA-2 with a current input: amperes), at t_ns: never earlier than the last call for the same
- * input, perhaps up to a data period ago (ADS128x). Numbers: ads1255/1256: 0..7 AIN0..7, 8 AINCOM, to AGND;
- * ads1281/1282: 0 AIN1, 1 AIN2, differential; psa2: 0..2 sensors X, Y, Z. */
+ * input, perhaps up to a data period ago (ADS128x). Numbers: ads1256: 0..7 AIN0..7, 8 AINCOM, to AGND; ads1255: 0, 1, 8;
+ * ads1282: 0 AIN1, 1 AIN2, differential; ads1281: 0; psa2: 0..2 sensors X, Y, Z, and, only for psabench_set_volts(), 3..6
+ * the temperatures of sensors X, Y, Z and of the board, degC. All are 0 V at first. What is no number counts as 0. */
 typedef double psabench_input_fn(void *ctx, psabench_part *p, int input, int64_t t_ns);
-PSABENCH_API int psabench_set_input(psabench_part *p, psabench_input_fn *fn, void *ctx);
-PSABENCH_API int psabench_set_volts(psabench_part *p, int input, double volts); /* constant from now on */
+PSABENCH_API int psabench_set_input(psabench_part *p, psabench_input_fn *fn,
+                                    void *ctx);                                 /* all inputs; NULL: constants */
+PSABENCH_API int psabench_set_volts(psabench_part *p, int input, double volts); /* this one constant from now on */
 
 /* ---- SPI bytes ---- */
 
-/* Exchanges n bytes at the part's SCLK frequency (option and psabench_spi_clock(); psabench_set() moves CS): time passes,
- * eight periods a byte. tx NULL: zeros; rx NULL: not kept. The same state as the pins: both may be mixed at byte
- * boundaries. gap_ns: between the bytes, for parts that want one. */
+/* Exchanges n bytes on SCLK, DIN and DOUT in the part's own mode (ads128x 0, ads125x 1), MSB first, at its SCLK frequency
+ * (option sclk_hz, psabench_spi_clock()); psabench_set() moves CS. Time passes, eight periods a byte, and gap_ns after each
+ * byte but the last. It begins and ends with SCLK low. tx NULL: zeros; rx NULL: not kept. It moves the pins as
+ * psabench_set() would: both may be mixed at byte boundaries. */
 PSABENCH_API int psabench_spi(psabench_part *p, const uint8_t *tx, uint8_t *rx, size_t n);
 PSABENCH_API int psabench_spi_clock(psabench_part *p, uint32_t sclk_hz, int64_t gap_ns);
 
 /* ---- Inside, for tests: no side effects ---- */
 
-PSABENCH_API int psabench_peek(const psabench_part *p, unsigned address); /* register, 0..255, or an error */
+/* Register, 0..255, or an error. psa2: 256 * group + address, groups as in psabench_board_read(). */
+PSABENCH_API int psabench_peek(const psabench_part *p, unsigned address);
 /* Counters of what the part did, suffered and refused: name of number i, NULL behind the last. */
 PSABENCH_API const char *psabench_counter(const psabench_part *p, int i, uint64_t *value);
 
@@ -143,9 +166,11 @@ typedef void psabench_frame_fn(void *ctx, psabench_part *p, const struct psabenc
 PSABENCH_API int psabench_on_frame(psabench_part *p, psabench_frame_fn *fn, void *ctx);
 
 /* Register of a board's converter through the board's own controller, as its host would: group 0..2 X, Y, Z, 3
- * temperature. Time passes (at most timeout_ns). Reading returns 0..255. Writing to 0, 1 or 2 goes to all three. */
+ * temperature. Time passes, at most timeout_ns: the set-up after power-up (psa2: 127 ms) is waited for, too. Reading returns
+ * 0..255. Writing to 0, 1 or 2 goes to all three. */
 PSABENCH_API int psabench_board_read(psabench_part *p, unsigned group, unsigned address, int64_t timeout_ns);
-PSABENCH_API int psabench_board_write(psabench_part *p, unsigned group, unsigned address, uint8_t value, int64_t timeout_ns);
+PSABENCH_API int psabench_board_write(psabench_part *p, unsigned group, unsigned address, uint8_t value,
+                                      int64_t timeout_ns);
 
 #ifdef __cplusplus
 }

@@ -1,0 +1,585 @@
+/* libpsabench: options, errors, time, pins, inputs and noise, as the header promises them. */
+#include "api_rig.h"
+
+#include "api/api.h"
+
+#include <math.h>
+
+/* ---- parts and options ---- */
+
+static void the_list_of_parts_is_the_table(void **state)
+{
+    (void)state;
+    char list[200] = "";
+    for (unsigned i = 0; i < api_kind_count; i++) {
+        if (i) strcat(list, " ");
+        strcat(list, api_kinds[i]->name);
+        assert_non_null(psabench_options(api_kinds[i]->name));
+    }
+    assert_string_equal(psabench_parts(), list);
+    assert_null(psabench_options("ads1299"));
+    assert_null(psabench_options(NULL));
+}
+
+static bool makes(const char *kind, const char *options, char *why, size_t cap)
+{
+    psabench *b = psabench_new(1);
+    psabench_part *p = psabench_part_new(b, kind, "u", options);
+    if (p) run(b, MS);
+    (void)snprintf(why, cap, "%s", psabench_error_text(b));
+    psabench_free(b);
+    return p != NULL;
+}
+
+static void expect(const struct api_kind *k, const struct api_option *o, double value, bool good_value)
+{
+    char options[100];
+    char why[500];
+    (void)snprintf(options, sizeof options, o->type == API_UINT ? "%s=%.0f" : "%s=%.9g", o->key, value);
+    if (strstr(options, "e+")) return; /* the language of options has no plus */
+    if (makes(k->name, options, why, sizeof why) != good_value) fail_msg("%s %s: %s", k->name, options, why);
+    if (!good_value && !strstr(why, o->key)) fail_msg("%s", why);
+}
+
+static void every_option_takes_its_default_and_range_and_no_more(void **state)
+{
+    (void)state;
+    char text[200];
+    char why[500];
+    for (unsigned i = 0; i < api_kind_count; i++) {
+        const struct api_kind *k = api_kinds[i];
+        for (unsigned j = 0; j < k->option_count; j++) {
+            const struct api_option *o = &k->options[j];
+            (void)snprintf(text, sizeof text, "%s=%s", o->key, o->standard);
+            if (!makes(k->name, text, why, sizeof why)) fail_msg("%s %s: %s", k->name, text, why);
+            strcat(text, "  "); /* as psabench_options() has it, at the beginning of a line */
+            const char *line = strstr(k->options_text, text);
+            if (!line || (line > k->options_text && line[-1] != '\n')) fail_msg("%s: no line %s", k->name, text);
+            if (o->type == API_BOOL || o->type == API_CHOICE) continue;
+            const double step = o->type == API_UINT ? 1.0 : (o->max - o->min) * 1e-3;
+            expect(k, o, o->min, true);
+            expect(k, o, o->max, true);
+            expect(k, o, o->min - step, false);
+            expect(k, o, o->max + step, false);
+        }
+    }
+}
+
+static void every_choice_can_be_made(void **state)
+{
+    (void)state;
+    char words[200];
+    char text[300];
+    char why[500];
+    for (unsigned i = 0; i < api_kind_count; i++)
+        for (unsigned j = 0; j < api_kinds[i]->option_count; j++) {
+            const struct api_option *o = &api_kinds[i]->options[j];
+            if (o->type != API_CHOICE) continue;
+            (void)snprintf(words, sizeof words, "%s", o->choices);
+            unsigned count = 0;
+            for (char *word = strtok(words, "|"); word; word = strtok(NULL, "|"), count++) {
+                (void)snprintf(text, sizeof text, "%s=%s", o->key, word);
+                if (!makes(api_kinds[i]->name, text, why, sizeof why)) fail_msg("%s: %s", text, why);
+            }
+            assert_true(o->min == 0.0 && o->max == count - 1.0);
+        }
+}
+
+static void what_is_wrong_with_options_is_said(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *options, *says;
+    } rows[] = {
+        {"vref_v", "write key=value"},
+        {"vref=2.5", "no option vref of ads1256: there are clkin_hz"},
+        {"noise_scale=1 =5", "no option  of"},
+        {"vref_v=", "use a number from 0.5 to 5.5"},
+        {"vref_v=2,5", "use a number"},
+        {"vref_v=nan", "use a number"},
+        {"vref_v=inf", "use a number"},
+        {"vref_v=0x2", "use a number"},
+        {"vref_v=2.5V", "use a number"},
+        {"vref_v=2.5.0", "use a number"},
+        {"vref_v=--2", "use a number"},
+        {"vref_v=2e", "use a number"},
+        {"vref_v=2e99", "use a number"},
+        {"vref_v=2e999999999999999999999", "use a number"},
+        {"vref_v=2.50000000000000000", "use a number"}, /* more digits than are exact */
+        {"clkin_hz=7680000.5", "use a whole number from 100000 to 10000000"},
+        {"strict_cs=yes", "use 0 or 1"},
+        {"start=later", "use one of at_once|clock|crystal"},
+        {"start=at_once|clock", "use one of"},
+        {"start=at", "use one of"},
+        {"a_key_that_is_longer_than_any_key_of_ours=1", "up to 31 characters"},
+        {"vref_v=22222222222222222222222222222222222222222222222222222222222222222222", "values up to 63"},
+    };
+    char why[500];
+    for (size_t i = 0; i < COUNT(rows); i++) {
+        if (makes("ads1256", rows[i].options, why, sizeof why)) fail_msg("%s was taken", rows[i].options);
+        if (!strstr(why, rows[i].says)) fail_msg("%s: got %s, want %s", rows[i].options, why, rows[i].says);
+        assert_memory_equal(why, "u: ", 3);
+    }
+    static const char *const taken[] = {NULL,
+                                        "",
+                                        "  ",
+                                        " vref_v=2.5 ",
+                                        "vref_v=25e-1",
+                                        "vref_v=.25e1",
+                                        "vref_v=2.",
+                                        "offset_v=-1e-3",
+                                        "vref_v=1 vref_v=2",
+                                        "source_ohm=1e9"};
+    for (size_t i = 0; i < COUNT(taken); i++)
+        if (!makes("ads1256", taken[i], why, sizeof why)) fail_msg("%s: %s", taken[i], why);
+}
+
+static void names_are_short_words_and_unique(void **state)
+{
+    (void)state;
+    psabench *b = psabench_new(1);
+    static const char *const bad[] = {NULL, "", "a b", "a$b", "a\n", "n234567890123456789012345678901234567890"};
+    for (size_t i = 0; i < COUNT(bad); i++) {
+        assert_null(psabench_part_new(b, "ads1256", bad[i], NULL));
+        assert_non_null(strstr(psabench_error_text(b), "use 1 to 31 of the characters"));
+    }
+    psabench_part *p = part(b, "ads1256", "n123456789.123456789-12345678_0", NULL);
+    assert_string_equal(psabench_part_name(p), "n123456789.123456789-12345678_0");
+    assert_ptr_equal(psabench_of(p), b);
+    assert_null(psabench_part_new(b, "psa2", "n123456789.123456789-12345678_0", NULL));
+    assert_null(psabench_part_new(b, "psa3", "x", NULL));
+    assert_non_null(strstr(psabench_error_text(b), "no part psa3: there are "));
+    assert_null(psabench_part_new(b, NULL, "x", NULL));
+    psabench_free(b);
+}
+
+/* ---- errors ---- */
+
+static void null_is_an_error_and_no_crash(void **state)
+{
+    (void)state;
+    uint8_t byte = 0;
+    const int results[] = {
+        psabench_run_until(NULL, 0),
+        psabench_run_for(NULL, 0),
+        psabench_vcd(NULL, "x"),
+        psabench_vcd_close(NULL),
+        psabench_pin(NULL, "CS"),
+        psabench_pin_is_input(NULL, 0),
+        psabench_set(NULL, 0, 0),
+        psabench_get(NULL, 0),
+        psabench_watch(NULL, 0, NULL, NULL),
+        psabench_run_until_level(NULL, 0, 0, 0),
+        psabench_set_input(NULL, NULL, NULL),
+        psabench_set_volts(NULL, 0, 0.0),
+        psabench_spi(NULL, &byte, &byte, 1),
+        psabench_spi_clock(NULL, 1000, 0),
+        psabench_peek(NULL, 0),
+        psabench_on_frame(NULL, NULL, NULL),
+        psabench_board_read(NULL, 0, 0, 0),
+        psabench_board_write(NULL, 0, 0, 0, 0),
+        (int)psabench_now_ns(NULL),
+    };
+    for (size_t i = 0; i < COUNT(results); i++)
+        if (results[i] != PSABENCH_BAD_ARGUMENT) fail_msg("row %zu: %d", i, results[i]);
+    psabench_free(NULL);
+    assert_true(psabench_next_ns(NULL) == INT64_MAX);
+    assert_non_null(psabench_error_text(NULL));
+    assert_null(psabench_of(NULL));
+    assert_null(psabench_part_name(NULL));
+    assert_null(psabench_pin_name(NULL, 0));
+    assert_null(psabench_counter(NULL, 0, NULL));
+    assert_null(psabench_part_new(NULL, "ads1256", "x", NULL));
+}
+
+static void bad_arguments_are_refused_and_named(void **state)
+{
+    (void)state;
+    psabench *b = psabench_new(1);
+    psabench_part *p = part(b, "ads1256", "u", NULL);
+    run(b, MS);
+    assert_string_equal(psabench_error_text(b), "");
+#define REFUSED(call, want, text)                                                                                      \
+    do {                                                                                                               \
+        const int got = call;                                                                                          \
+        if (got != (want) || !strstr(psabench_error_text(b), text))                                                    \
+            fail_msg(#call ": got %d %s", got, psabench_error_text(b));                                                \
+    } while (0)
+    const int drdy = pin(p, "DRDY");
+    const int cs = pin(p, "CS");
+    REFUSED(psabench_pin(p, "cs"), -1, "u: no pin cs of ads1256");
+    REFUSED(psabench_pin(p, NULL), -1, "no pin");
+    REFUSED(psabench_pin_is_input(p, 11), -1, "u: no pin number 11: 0 to 10");
+    REFUSED(psabench_get(p, -1), -1, "no pin number -1");
+    REFUSED(psabench_set(p, 99, 0), -1, "no pin number 99");
+    REFUSED(psabench_set(p, drdy, 0), -1, "u: DRDY = 0: it is an output");
+    REFUSED(psabench_set(p, cs, 2), -1, "CS = 2: a level is 0 or 1");
+    REFUSED(psabench_set(p, cs, -1), -1, "a level is 0 or 1");
+    REFUSED(psabench_watch(p, cs, NULL, NULL), -1, "CS is an input");
+    REFUSED(psabench_watch(p, 11, NULL, NULL), -1, "no pin number");
+    REFUSED(psabench_run_until_level(p, drdy, 2, 0), -1, "a level is 0 or 1");
+    REFUSED(psabench_run_until_level(p, drdy, 0, -1), -1, "a span >= 0");
+    REFUSED(psabench_run_until_level(p, drdy, 0, INT64_MAX), -1, "within");
+    REFUSED(psabench_run_until_level(p, 11, 0, 0), -1, "no pin number");
+    REFUSED(psabench_run_until(b, MS - 1), -1, "it is 1000000 ns now");
+    REFUSED(psabench_run_until(b, INT64_MAX), -1, "time goes up to");
+    REFUSED(psabench_run_for(b, -1), -1, "a span of -1 ns");
+    REFUSED(psabench_run_for(b, INT64_MAX), -1, "a span of");
+    REFUSED(psabench_set_volts(p, 9, 0.0), -1, "u: no input 9");
+    REFUSED(psabench_set_volts(p, -1, 0.0), -1, "no input -1");
+    REFUSED(psabench_set_volts(p, 0, (double)NAN), -1, "not a number of volts");
+    REFUSED(psabench_set_volts(p, 0, (double)INFINITY), -1, "not a number of volts");
+    REFUSED(psabench_spi_clock(p, 0, 0), -1, "SCLK of 0 Hz");
+    REFUSED(psabench_spi_clock(p, 50000001, 0), -1, "use 1 to 50000000 Hz");
+    REFUSED(psabench_spi_clock(p, 1000000, -1), -1, "-1 ns between bytes");
+    REFUSED(psabench_peek(p, 11), -1, "no register 00Bh");
+    REFUSED(psabench_on_frame(p, NULL, NULL), PSABENCH_NOT_HERE, "ads1256 has no frames");
+    REFUSED(psabench_board_read(p, 0, 0, 0), PSABENCH_NOT_HERE, "ads1256 is no board");
+    REFUSED(psabench_board_write(p, 0, 0, 0, 0), PSABENCH_NOT_HERE, "ads1256 is no board");
+    REFUSED(psabench_vcd(b, NULL), -1, "no path");
+    REFUSED(psabench_vcd(b, "/there/is/no/such/folder/x.vcd"), PSABENCH_SYSTEM, "/there/is/no/such/folder/x.vcd: ");
+    good(b, psabench_spi_clock(p, 1, 0));
+    REFUSED(psabench_spi(p, NULL, NULL, SIZE_MAX), -1, "bytes would take longer");
+    set(p, "SCLK", 1);
+    REFUSED(psabench_spi(p, NULL, NULL, 1), -1, "SCLK is high");
+    assert_true(psabench_now_ns(b) == MS); /* nothing of this moved time */
+    assert_null(psabench_pin_name(p, 11));
+    assert_null(psabench_pin_name(p, -1));
+    assert_null(psabench_counter(p, 10000, NULL));
+    assert_null(psabench_counter(p, -1, NULL));
+    psabench_free(b);
+}
+
+/* ---- time ---- */
+
+static void time_moves_as_told_and_no_further(void **state)
+{
+    (void)state;
+    psabench *b = psabench_new(1);
+    assert_true(psabench_now_ns(b) == 0 && psabench_next_ns(b) == INT64_MAX);
+    run(b, 0);
+    run(b, 5);
+    good(b, psabench_run_until(b, 5));
+    assert_true(psabench_now_ns(b) == 5);
+    psabench_part *p = part(b, "ads1256", "u", "start=at_once");
+    const int64_t next_ns = psabench_next_ns(b);
+    assert_true(next_ns > 5 && next_ns < INT64_MAX);
+    assert_int_equal(psabench_run_until_level(p, pin(p, "DRDY"), 0, 1000), PSABENCH_TIMEOUT);
+    assert_true(psabench_now_ns(b) == 1005);
+    until(p, "DRDY", 0);
+    const int64_t fell_ns = psabench_now_ns(b);
+    until(p, "DRDY", 0); /* at once */
+    assert_true(psabench_now_ns(b) == fell_ns);
+    assert_int_equal(psabench_run_until_level(p, pin(p, "CS"), 0, 10), PSABENCH_TIMEOUT);
+    assert_true(psabench_now_ns(b) == fell_ns + 10);
+    good(b, psabench_run_until_level(p, pin(p, "CS"), 1, 0));
+    psabench_free(b);
+}
+
+struct seen {
+    psabench_part *p;
+    int pin;
+    unsigned count, wrong;
+    int64_t t_ns[100];
+    int level[100];
+};
+
+static void note(void *ctx, psabench_part *p, int number, int level, int64_t t_ns)
+{
+    struct seen *s = ctx;
+    s->wrong +=
+        p != s->p || number != s->pin || psabench_get(p, number) != level || psabench_now_ns(psabench_of(p)) != t_ns;
+    if (s->count < COUNT(s->t_ns)) s->t_ns[s->count] = t_ns, s->level[s->count] = level;
+    s->count++;
+}
+
+static void a_watcher_hears_each_change_at_its_instant(void **state)
+{
+    (void)state;
+    psabench *b = psabench_new(1);
+    psabench_part *p = part(b, "ads1256", "u", "start=at_once");
+    struct seen s = {.p = p, .pin = pin(p, "DRDY")};
+    until(p, "DRDY", 0);
+    const int64_t first_ns = psabench_now_ns(b);
+    good(b, psabench_watch(p, s.pin, note, &s));
+    run(b, 10 * 33334); /* ten words at 30 kSPS */
+    assert_int_equal(s.wrong, 0);
+    assert_int_equal(s.count, 20); /* unread: up 16 tau before each fall */
+    for (unsigned i = 0; i < s.count; i++) {
+        assert_int_equal(s.level[i], !(i & 1));
+        const int64_t tau = (i / 2 + 1) * 256 - (s.level[i] ? 16 : 0);
+        const int64_t want_ns = first_ns + tau * S / 7680000;
+        if (s.t_ns[i] < want_ns || s.t_ns[i] > want_ns + 1) fail_msg("change %u at %" PRId64, i, s.t_ns[i]);
+    }
+    good(b, psabench_watch(p, s.pin, NULL, NULL));
+    run(b, MS);
+    assert_int_equal(s.count, 20);
+    psabench_free(b);
+}
+
+/* What a callback tries and what it gets: everything that moves time, makes or records is refused, the rest works. */
+struct callback {
+    psabench_part *p, *other;
+    unsigned calls, wrong;
+    int set_own, set_other;
+};
+
+static void try_all(struct callback *c)
+{
+    psabench *b = psabench_of(c->p);
+    uint8_t byte;
+    const int results[] = {
+        psabench_run_for(b, 1),
+        psabench_run_until(b, psabench_now_ns(b) + 1),
+        psabench_run_until_level(c->p, 0, 1, 1),
+        psabench_spi(c->other, NULL, &byte, 1),
+        psabench_vcd(b, "/tmp/never"),
+        psabench_vcd_close(b),
+    };
+    for (size_t i = 0; i < COUNT(results); i++) c->wrong += results[i] != PSABENCH_BAD_ARGUMENT;
+    c->wrong += psabench_part_new(b, "ads1256", "late", NULL) != NULL;
+    c->wrong += psabench_get(c->p, 0) < 0 || psabench_peek(c->p, 0) < 0;
+    psabench_free(b); /* does nothing here */
+    c->set_own = psabench_set(c->p, pin(c->p, "SYNC"), 1);
+    c->set_other = psabench_set(c->other, pin(c->other, "SYNC"), (int)(c->calls & 1));
+    c->calls++;
+}
+
+static void in_watch(void *ctx, psabench_part *p, int number, int level, int64_t t_ns)
+{
+    (void)p;
+    (void)number;
+    (void)level;
+    (void)t_ns;
+    try_all(ctx);
+}
+
+static double in_input(void *ctx, psabench_part *p, int input, int64_t t_ns)
+{
+    (void)t_ns;
+    struct callback *c = ctx;
+    try_all(c);
+    c->wrong += psabench_set_volts(p, input, 1.0) != PSABENCH_BAD_ARGUMENT;
+    c->wrong += psabench_set_input(p, NULL, NULL) != PSABENCH_BAD_ARGUMENT;
+    return 0.5;
+}
+
+static void callbacks_may_look_and_set_pins_but_not_move_time(void **state)
+{
+    (void)state;
+    psabench *b = psabench_new(1);
+    struct callback c = {.p = part(b, "ads1256", "u", "start=at_once"),
+                         .other = part(b, "ads1256", "v", "start=at_once")};
+    run(b, MS);
+    good(b, psabench_watch(c.p, pin(c.p, "DRDY"), in_watch, &c));
+    run(b, MS);
+    assert_true(c.calls > 10);
+    assert_int_equal(c.wrong, 0);
+    assert_int_equal(c.set_own, PSABENCH_OK);
+    assert_int_equal(c.set_other, PSABENCH_OK);
+    assert_true(counter(c.other, "restarts") > 10);
+    good(b, psabench_watch(c.p, pin(c.p, "DRDY"), NULL, NULL));
+    c.calls = 0;
+    good(b, psabench_set_input(c.p, in_input, &c));
+    run(b, MS);
+    assert_true(c.calls > 10);
+    assert_int_equal(c.wrong, 0);
+    assert_int_equal(c.set_own, PSABENCH_BAD_ARGUMENT); /* it waits for the volts */
+    assert_int_equal(c.set_other, PSABENCH_OK);
+    psabench_free(b);
+}
+
+/* D1 as an output follows its register; a watcher that answers each change with another must come to an end. */
+static void answer(void *ctx, psabench_part *p, int number, int level, int64_t t_ns)
+{
+    (void)p;
+    (void)number;
+    (void)t_ns;
+    psabench_part **parts = ctx;
+    for (int i = 0; i < 2; i++) (void)psabench_set(parts[i], pin(parts[i], "D1"), !level);
+}
+
+static void watchers_that_answer_each_other_for_ever_are_stopped(void **state)
+{
+    (void)state;
+    psabench *b = psabench_new(1);
+    psabench_part *parts[2] = {part(b, "ads1256", "u", NULL), part(b, "ads1256", "v", NULL)};
+    for (int i = 0; i < 2; i++) good(b, psabench_watch(parts[i], pin(parts[i], "D1"), answer, parts));
+    set(parts[0], "D1", 1);
+    assert_non_null(strstr(psabench_error_text(b), "D1 set from callbacks of psabench_set()"));
+    psabench_free(b);
+}
+
+/* ---- inputs and noise ---- */
+
+/* A word that saw nothing but the present inputs; at 3750 SPS one conversion is enough. */
+static int32_t rdata(psabench_part *p)
+{
+    static const uint8_t command = 0x01;
+    uint8_t word[3];
+    psabench *b = psabench_of(p);
+    run(b, MS);
+    until(p, "DRDY", 1);
+    until(p, "DRDY", 0);
+    set(p, "CS", 0);
+    good(b, psabench_spi(p, &command, NULL, 1));
+    run(b, 7000);
+    good(b, psabench_spi(p, NULL, word, 3));
+    run(b, 2000);
+    set(p, "CS", 1);
+    return code24(word);
+}
+
+static void wreg(psabench_part *p, uint8_t address, uint8_t value)
+{
+    const uint8_t bytes[] = {(uint8_t)(0x50 | address), 0, value};
+    set(p, "CS", 0);
+    good(psabench_of(p), psabench_spi(p, bytes, NULL, sizeof bytes));
+    run(psabench_of(p), 2000);
+    set(p, "CS", 1);
+}
+
+/* Calibrated, at 3750 SPS, whose full scale is that of the rate it was calibrated at. */
+static psabench_part *slow(psabench *b, const char *kind, const char *name, const char *options)
+{
+    psabench_part *p = part(b, kind, name, options);
+    until(p, "DRDY", 0);
+    wreg(p, 3, 0xC0);
+    return p;
+}
+
+struct source {
+    int64_t last_ns[9];
+    unsigned calls[9], wrong;
+};
+
+static double ramp(void *ctx, psabench_part *p, int input, int64_t t_ns)
+{
+    struct source *s = ctx;
+    if (input < 0 || input > 8) {
+        s->wrong++;
+        return 0.0;
+    }
+    s->wrong += t_ns < s->last_ns[input] || t_ns > psabench_now_ns(psabench_of(p));
+    s->last_ns[input] = t_ns;
+    s->calls[input]++;
+    return input == 2 ? 1.25 : input == 8 ? (double)NAN : input == 3 ? 2e6 : 0.25;
+}
+
+static void inputs_are_volts_by_number_or_by_function(void **state)
+{
+    (void)state;
+    psabench *b = psabench_new(1);
+    psabench_part *p = slow(b, "ads1256", "u", "noise_scale=0 start=at_once");
+    struct source s = {.wrong = 0};
+    assert_true(rdata(p) == 0);
+    good(b, psabench_set_volts(p, 0, 1.0));
+    good(b, psabench_set_volts(p, 1, 0.5));
+    assert_int_equal(rdata(p), 838861); /* 0.5 V of 5 V */
+    good(b, psabench_set_input(p, ramp, &s));
+    assert_int_equal(rdata(p), 0); /* 0.25 V on both */
+    good(b, psabench_set_volts(p, 0, 0.5));
+    const unsigned calls = s.calls[0];
+    assert_int_equal(rdata(p), 419430); /* AIN0 constant again, AIN1 not; 419430.4 */
+    assert_int_equal(s.calls[0], calls);
+    wreg(p, 1, 0x28); /* AIN2 against AINCOM, which is no number and counts as 0 V */
+    assert_int_equal(rdata(p), 2097152);
+    wreg(p, 1, 0x38); /* 2 MV */
+    assert_int_equal(rdata(p), 0x7FFFFF);
+    assert_true(s.calls[1] > 1 && s.calls[2] > 1 && s.calls[8] > 1 && s.calls[7] == 0);
+    assert_int_equal(s.wrong, 0);
+    good(b, psabench_set_input(p, NULL, NULL));
+    wreg(p, 1, 0x01);
+    assert_int_equal(rdata(p), 0); /* the constants, which were set last: 0.5 V and 0.5 V */
+    psabench_free(b);
+}
+
+static void noise_depends_on_seed_and_name_only(void **state)
+{
+    (void)state;
+    static const struct {
+        uint64_t seed;
+        const char *name;
+        bool beside; /* another part on the bench */
+    } rows[] = {{1, "u", false}, {1, "u", true}, {1, "v", false}, {2, "u", false}};
+    int32_t code[COUNT(rows)][8];
+    for (size_t i = 0; i < COUNT(rows); i++) {
+        psabench *b = psabench_new(rows[i].seed);
+        if (rows[i].beside) (void)part(b, "ads1256", "beside", NULL);
+        psabench_part *p = slow(b, "ads1256", rows[i].name, NULL);
+        for (int k = 0; k < 8; k++) code[i][k] = rdata(p);
+        psabench_free(b);
+    }
+    assert_memory_equal(code[0], code[1], sizeof code[0]);
+    assert_memory_not_equal(code[0], code[2], sizeof code[0]);
+    assert_memory_not_equal(code[0], code[3], sizeof code[0]);
+}
+
+static void an_ads1255_has_fewer_inputs_and_pins(void **state)
+{
+    (void)state;
+    psabench *b = psabench_new(1);
+    psabench_part *p = part(b, "ads1255", "u", "noise_scale=0 start=at_once");
+    static const bool has[9] = {true, true, [8] = true};
+    for (int i = 0; i < 9; i++) assert_int_equal(psabench_set_volts(p, i, 1.0) == PSABENCH_OK, has[i]);
+    assert_int_equal(psabench_pin(p, "D2"), PSABENCH_BAD_ARGUMENT);
+    wreg(p, 1, 0x28); /* AIN2 is not there */
+    (void)rdata(p);
+    assert_true(counter(p, "bad_mux") > 0);
+    psabench_free(b);
+}
+
+/* ---- pins that are both ---- */
+
+static void gpio_is_driven_by_whom_its_direction_says(void **state)
+{
+    (void)state;
+    psabench *b = psabench_new(1);
+    psabench_part *p = part(b, "ads1256", "u", "start=at_once");
+    struct seen s = {.p = p, .pin = pin(p, "D1")};
+    until(p, "DRDY", 0);
+    good(b, psabench_watch(p, s.pin, note, &s));
+    assert_int_equal(psabench_pin_is_input(p, s.pin), 1);
+    set(p, "D1", 1);
+    assert_int_equal(get(p, "D1"), 1);
+    assert_int_equal(psabench_peek(p, 4), 0xE2);
+    wreg(p, 4, 0xD0); /* D1 an output, low; the 1 outside does not matter */
+    assert_int_equal(get(p, "D1"), 0);
+    wreg(p, 4, 0xD2);
+    assert_int_equal(get(p, "D1"), 1);
+    assert_int_equal(s.count, 3);
+    assert_int_equal(s.wrong, 0);
+    assert_int_equal(get(p, "D0"), 0); /* CLKOUT */
+    assert_int_equal(counter(p, "clkout_hz"), 7680000);
+    psabench_free(b);
+}
+
+static void the_version_is_of_this_build(void **state)
+{
+    (void)state;
+    assert_int_equal(psabench_abi(), PSABENCH_ABI);
+    assert_true(strspn(psabench_version(), "0123456789.") == strlen(psabench_version()));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_list_of_parts_is_the_table),
+        cmocka_unit_test(every_option_takes_its_default_and_range_and_no_more),
+        cmocka_unit_test(every_choice_can_be_made),
+        cmocka_unit_test(what_is_wrong_with_options_is_said),
+        cmocka_unit_test(names_are_short_words_and_unique),
+        cmocka_unit_test(null_is_an_error_and_no_crash),
+        cmocka_unit_test(bad_arguments_are_refused_and_named),
+        cmocka_unit_test(time_moves_as_told_and_no_further),
+        cmocka_unit_test(a_watcher_hears_each_change_at_its_instant),
+        cmocka_unit_test(callbacks_may_look_and_set_pins_but_not_move_time),
+        cmocka_unit_test(watchers_that_answer_each_other_for_ever_are_stopped),
+        cmocka_unit_test(inputs_are_volts_by_number_or_by_function),
+        cmocka_unit_test(noise_depends_on_seed_and_name_only),
+        cmocka_unit_test(an_ads1255_has_fewer_inputs_and_pins),
+        cmocka_unit_test(gpio_is_driven_by_whom_its_direction_says),
+        cmocka_unit_test(the_version_is_of_this_build),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
