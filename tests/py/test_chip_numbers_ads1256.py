@@ -110,11 +110,11 @@ NOISE_UV = {  # DRATE: gains 1 .. 64; sources 2.8
 
 @pytest.mark.parametrize(("drate", "gain_code"), [(0xF0, 0), (0xF0, 6), (0xA1, 3), (0x82, 0), (0x03, 6)])
 def test_noise_is_the_published_one(drate: int, gain_code: int) -> None:
-    count, total = 20, 0.0
+    count, total = 60, 0.0
     want_v = NOISE_UV[drate][gain_code] * 1e-6
     lsb_v = 5.0 / 2**gain_code / 2**23
-    for seed in range(1, SEEDS + 1):
-        with Ads1256(seed=seed, cells_max=1) as s:
+    for seed in range(SEEDS):
+        with Ads1256(seed=100 * drate + seed, cells_max=1) as s:
             s.adc.set_volts(0, 2.5)
             s.adc.set_volts(1, 2.5)
             s.adc.run_until_level("DRDY", 0)
