@@ -151,17 +151,6 @@ static void on_pulse(void *ctx, int64_t t_ns)
     ads1256_set_drdy(a, true, t_ns);
 }
 
-/* A system calibration takes one word of the pins; its last cell lies where the settling of the run after it begins. The
- * shortest printed duration leaves 52 tau before its first one. */
-static void measure_pins(struct ads1256 *a)
-{
-    ads1256_mean_start(&a->mean, a->rate, a->cfg.cells_max);
-    a->cell = 0;
-    a->start_tau -= ads1256_settle_tau(a->rate);
-    await_cell(a);
-    a->start_tau += ads1256_settle_tau(a->rate);
-}
-
 void ads1256_calibrate(struct ads1256 *a, enum ads1256_cal kind, int64_t t_ns)
 {
     a->cal = kind;
@@ -173,10 +162,16 @@ void ads1256_calibrate(struct ads1256 *a, enum ads1256_cal kind, int64_t t_ns)
     ads1256_halt(a, ADS1256_CALIBRATING, t_ns);
     a->rate = a->rate_next;
     const int64_t end_tau = clk_count_at(&a->clkin, t_ns) + ads1256_cal_tau(a->rate, kind, ads1256_pga_log2(a));
-    a->start_tau = end_tau - ads1256_settle_tau(a->rate); /* the printed durations include the settling after it */
+    const int64_t settle_tau = ads1256_settle_tau(a->rate);
+    /* The printed durations include the settling of the run that follows. Before it lies the measurement: a system
+     * calibration takes one word of the pins, whose first cell is 52 tau after the command in the shortest of them. */
+    a->start_tau = end_tau - 2 * settle_tau;
     a->next_ok_ns = clk_edge_ns(&a->clkin, end_tau);
-    sched_at(a->sched, &a->cal_ev, run_edge_ns(a, 0));
-    if (kind == ADS1256_SYSOCAL || kind == ADS1256_SYSGCAL) measure_pins(a);
+    sched_at(a->sched, &a->cal_ev, run_edge_ns(a, settle_tau));
+    if (kind != ADS1256_SYSOCAL && kind != ADS1256_SYSGCAL) return;
+    ads1256_mean_start(&a->mean, a->rate, a->cfg.cells_max);
+    a->cell = 0;
+    await_cell(a);
 }
 
 static void store_ofc(struct ads1256 *a, double raw)
@@ -210,7 +205,7 @@ static void on_cal(void *ctx, int64_t t_ns)
     a->n.calibrations++;
     store_result(a);
     sched_cancel(a->sched, &a->cell_ev);
-    if (a->sync) start_run(a, a->start_tau);
+    if (a->sync) start_run(a, a->start_tau + ads1256_settle_tau(a->rate));
     else ads1256_halt(a, ADS1256_SYNC_LOW, t_ns);
 }
 
