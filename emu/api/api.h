@@ -18,6 +18,7 @@ enum { API_PINS_MAX = 32, API_INPUTS_MAX = 9, API_NAME = 32, API_ERROR = 400, AP
 
 #define API_NO_PIN      255u
 #define API_TIME_MAX_NS (INT64_C(1) << 60) /* 36 years */
+#define API_STEP_NS     50000
 #define API_VOLTS_MAX   1e6
 
 enum api_dir { API_IN, API_OUT, API_BOTH };

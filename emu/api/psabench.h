@@ -117,7 +117,7 @@ PSABENCH_API int psabench_set(psabench_part *p, int pin, int level);
 PSABENCH_API int psabench_get(const psabench_part *p, int pin); /* 0, 1 or an error */
 
 /* Called at each change of an output pin, at its own instant; fn NULL: no more. One watcher a pin. A line of psa2 is told
- * up to 0.2 ms late, with its own t_ns and in order of time with the other lines of the board. */
+ * up to 0.25 ms late, with its own t_ns and in order of time with the other lines of the board. */
 typedef void psabench_watch_fn(void *ctx, psabench_part *p, int pin, int level, int64_t t_ns);
 PSABENCH_API int psabench_watch(psabench_part *p, int pin, psabench_watch_fn *fn, void *ctx);
 
