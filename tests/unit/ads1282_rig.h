@@ -28,9 +28,10 @@ struct rig {
     struct sched s;
     struct ads1282 a;
     struct clk clk;
-    double v, ramp_v_per_s; /* input: v + ramp t */
-    int64_t tclk;           /* the master's time */
-    int gap_tclk;           /* from the last rise of a byte to the first of the next */
+    double v, ramp_v_per_s; /* input: v + ramp t + sine */
+    double sine_v, sine_hz;
+    int64_t tclk; /* the master's time */
+    int gap_tclk; /* from the last rise of a byte to the first of the next */
     enum { BYTES, BITS, PINS } bus;
     unsigned falls, rises, asked_mux, samples, mflags, clocks;
     int64_t fall_ns, rise_ns, first_sample_ns, last_sample_ns, mflag_ns;
@@ -44,7 +45,9 @@ static inline double input(void *ctx, unsigned mux, int64_t t_ns)
     if (r->samples++ == 0) r->first_sample_ns = t_ns;
     r->last_sample_ns = t_ns;
     r->asked_mux = mux;
-    return r->v + r->ramp_v_per_s * (double)t_ns * 1e-9;
+    const double t_s = (double)t_ns * 1e-9;
+    const double sine_v = r->sine_v ? r->sine_v * sin(6.283185307179586 * r->sine_hz * t_s) : 0.0;
+    return r->v + r->ramp_v_per_s * t_s + sine_v;
 }
 
 static inline void drdy(void *ctx, bool level, int64_t t_ns)
@@ -67,14 +70,22 @@ static inline void mflag(void *ctx, bool level, int64_t t_ns)
 
 static const struct ads1282_cfg quiet = {.part = ADS1282_PART_1282, .clk_hz = MCLK_HZ, .vref_v = 5.0};
 
-static inline void unpowered(struct rig *r, const struct ads1282_cfg *cfg, uint64_t seed)
+/* io: what beyond input and DRDY is connected. */
+static inline void wired(struct rig *r, const struct ads1282_cfg *cfg, uint64_t seed, struct ads1282_io io)
 {
     memset(r, 0, sizeof *r);
     sched_init(&r->s);
     r->clk = (struct clk){.hz = cfg->clk_hz, .div = 1};
     r->gap_tclk = 24;
-    const struct ads1282_io io = {.ctx = r, .vin_v = input, .drdy = drdy};
+    io.ctx = r;
+    io.vin_v = input;
+    io.drdy = drdy;
     ads1282_init(&r->a, cfg, &io, &r->s, rng_stream(seed, 1, "adc"));
+}
+
+static inline void unpowered(struct rig *r, const struct ads1282_cfg *cfg, uint64_t seed)
+{
+    wired(r, cfg, seed, (struct ads1282_io){0});
 }
 
 static inline void powered(struct rig *r, const struct ads1282_cfg *cfg)
