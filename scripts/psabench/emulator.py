@@ -10,6 +10,7 @@ import os
 import selectors
 import signal
 import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Sequence
@@ -17,7 +18,7 @@ from pathlib import Path
 from types import TracebackType
 
 from psabench.errors import BadInput, BenchError
-from psabench.places import find_emulator
+from psabench.places import executable, find_emulator, own_emulators
 
 START_S = 20.0  # patience for "ready all": a bare emulator needs milliseconds, one under sanitizers in a guest seconds
 STOP_S = 10.0
@@ -143,3 +144,12 @@ class Emulator:
         for line in text.decode().splitlines():
             if line.startswith("ready ") and line != "ready all":
                 self.endpoints.append(dict(w.split("=", 1) for w in line.split()[1:]))
+
+
+def main() -> int:
+    """The command psa-emu of an installed package: becomes the emulator of the bundle or the checkout."""
+    for path in own_emulators():
+        if executable(path):
+            os.execv(path, ["psa-emu", *sys.argv[1:]])
+    print(f"psa-emu: not found at {' or '.join(map(str, own_emulators()))}; `make` builds it", file=sys.stderr)
+    return BadInput.exit_status

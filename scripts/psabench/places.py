@@ -18,11 +18,20 @@ BUNDLE = PACKAGE / "bundle"
 CHECKOUT = PACKAGE.parents[1]
 
 
+def own_emulators() -> list[Path]:
+    """Where psa-emu of this very package would be: in the bundle, in the build tree of the checkout."""
+    return [BUNDLE / "bin" / "psa-emu", CHECKOUT / "build" / "psa-emu"]
+
+
+def executable(path: Path) -> bool:
+    """Is it a file that this user may run?"""
+    return path.is_file() and os.access(path, os.X_OK)
+
+
 def find_emulator() -> Path:
     """Path of psa-emu: $PSA_EMU, the bundle, the build tree of this checkout, or the PATH. Raises BadInput."""
     on_path = [Path(d) / "psa-emu" for d in os.environ.get("PATH", "").split(os.pathsep) if d]
-    ours = [BUNDLE / "bin" / "psa-emu", CHECKOUT / "build" / "psa-emu"]
-    return _find("psa-emu", "PSA_EMU", ours, on_path, lambda p: p.is_file() and os.access(p, os.X_OK))
+    return _find("psa-emu", "PSA_EMU", own_emulators(), on_path, executable)
 
 
 def find_library(name: str) -> Path | None:

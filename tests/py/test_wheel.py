@@ -83,6 +83,11 @@ def test_the_command_runs_a_procedure_on_its_own_emulator(programs: Path, tmp_pa
     assert (tmp_path / "build/run/report.html").is_file()
 
 
+def test_the_emulator_is_a_command_too(programs: Path, tmp_path: Path) -> None:
+    said = run([programs / "psa-emu", "quiet", "--pace", "free", "--for", "5ms"], tmp_path, timeout_s=30)
+    assert said.splitlines()[-1] == "ready all"
+
+
 def test_python_uses_its_own_emulator_library_and_files(programs: Path, tmp_path: Path) -> None:
     script = (
         "import psabench.chips as c, psabench.clib as l, psabench.places as p\n"
