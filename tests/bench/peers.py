@@ -17,6 +17,7 @@ HERE = Path(__file__).resolve().parent
 MODEL = [HERE / "verilog" / name for name in ("psa2.v", "kpsa.v", "adc_port.v")]
 BENCH = HERE / "verilog/psa2_tb.v"
 DRIVER = HERE / "verilog/psa2_drive.cpp"
+NAMES = ("icarus", "verilator-timing", "verilator")
 ROWS = 512  # frames in the file of words; psa2_tb.v has the same number
 
 # AVX-512 is left out because valgrind 3.19 cannot run it; without it the driver is as fast (docs/performance.md).
