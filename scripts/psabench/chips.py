@@ -116,7 +116,11 @@ class Bench:
 
     def run_for(self, dt_s: float) -> None:
         """Lets time pass, to the nearest nanosecond."""
-        self.run_until_ns(self.now_ns + round(dt_s * 1e9))
+        dt_ns = round(dt_s * 1e9)
+        if dt_ns > SLICE_NS:
+            self.run_until_ns(self.now_ns + dt_ns)
+        else:
+            self.done(self._lib.run_for(self.live(), dt_ns))
 
     def run_until_ns(self, t_ns: int) -> None:
         """Lets time pass until an instant; BadInput when it is over already."""

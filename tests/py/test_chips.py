@@ -212,6 +212,8 @@ def test_time_moves_only_when_it_is_told_to(bench: Bench) -> None:
     assert bench.next_ns is not None
     with pytest.raises(BadInput, match="1999999 ns"):
         bench.run_until_ns(1_999_999)
+    with pytest.raises(BadInput, match="-1 ns"):
+        bench.run_for(-1e-9)
     assert bench.now_ns == 2_000_000
 
 
