@@ -156,12 +156,14 @@ san:
 pytest: bench-bin
 	$(PY) -m pytest $(wildcard tests/py tests/golden)
 
-## builds: the emulator as clang and -O0 make it, and under sanitizers, which must all do the same
+## builds: the emulator and its library as clang, -O0 and -O3 make them, and under sanitizers, which must all do the same
 builds:
 	@$(MAKE) --no-print-directory CC=clang all
 	@$(MAKE) --no-print-directory CFLAGS='-O0 -g' BUILD=build-O0 all
 	@$(MAKE) --no-print-directory SAN=address,undefined all
 	@$(MAKE) --no-print-directory CC=clang SAN=address,undefined all
+	@$(MAKE) --no-print-directory CFLAGS='-O3 -g' BUILD=build-O3 lib
+	@$(MAKE) --no-print-directory CC=clang CFLAGS='-O0 -g' BUILD=build-clang-O0 lib
 
 ## e2e: the end-to-end suite over the transports of the host (socketcand, slcan on a pty)
 e2e: all
