@@ -4,12 +4,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-const struct api_kind *const api_kinds[] = {&api_ads1255, &api_ads1256, &api_psa2};
+const struct api_kind *const api_kinds[] = {&api_ads1281, &api_ads1282, &api_ads1255, &api_ads1256, &api_psa2};
 const unsigned api_kind_count = sizeof api_kinds / sizeof *api_kinds;
 
 const char *psabench_parts(void)
 {
-    return "ads1255 ads1256 psa2"; /* a test holds it against api_kinds */
+    return "ads1281 ads1282 ads1255 ads1256 psa2"; /* a test holds it against api_kinds */
 }
 
 static const struct api_kind *find_kind(const char *name)
