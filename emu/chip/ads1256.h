@@ -65,7 +65,7 @@ struct ads1256 {
     uint8_t before[ADS1256_REGS]; /* registers before the WREG in progress */
     uint8_t word_left;            /* bytes of the word not yet shifted out, 3..0 */
     bool in_word;                 /* the present byte shifted out one of them */
-    bool rdatac, awaiting_data, garbled, first_drdy;
+    bool rdatac, after_sdatac, awaiting_data, garbled, first_drdy;
     int64_t first_ns;   /* first SCLK edge of the present byte */
     int64_t command_ns; /* end of the latest byte */
     int64_t next_ok_ns; /* no command before (t11) */

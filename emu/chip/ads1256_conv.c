@@ -134,7 +134,7 @@ static void on_ready(void *ctx, int64_t t_ns)
 {
     struct ads1256 *a = ctx;
     a->n.conversions++;
-    a->updating = false;
+    a->updating = a->after_sdatac = false;
     a->word = convert(a);
     offer_word(a);
     a->ready++;
@@ -150,6 +150,17 @@ static void on_pulse(void *ctx, int64_t t_ns)
     a->updating = true;
     ads1256_set_drdy(a, true, t_ns);
 }
+
+/* What a calibration measures: the signal at the pins or shorted inputs and VREF; what it stores. */
+static const struct {
+    bool pins, ofc, fsc;
+} steps[] = {
+    [ADS1256_SELFCAL] = {.ofc = true, .fsc = true},
+    [ADS1256_SELFOCAL] = {.ofc = true},
+    [ADS1256_SELFGCAL] = {.fsc = true},
+    [ADS1256_SYSOCAL] = {.pins = true, .ofc = true},
+    [ADS1256_SYSGCAL] = {.pins = true, .fsc = true},
+};
 
 void ads1256_calibrate(struct ads1256 *a, enum ads1256_cal kind, int64_t t_ns)
 {
@@ -168,7 +179,7 @@ void ads1256_calibrate(struct ads1256 *a, enum ads1256_cal kind, int64_t t_ns)
     a->start_tau = end_tau - 2 * settle_tau;
     a->next_ok_ns = clk_edge_ns(&a->clkin, end_tau);
     sched_at(a->sched, &a->cal_ev, run_edge_ns(a, settle_tau));
-    if (kind != ADS1256_SYSOCAL && kind != ADS1256_SYSGCAL) return;
+    if (!steps[kind].pins) return;
     ads1256_mean_start(&a->mean, a->rate, a->cfg.cells_max);
     a->cell = 0;
     await_cell(a);
@@ -188,15 +199,14 @@ static void store_fsc(struct ads1256 *a, double raw)
     a->n.cal_clamped += clamped;
 }
 
-/* What a calibration measures, by kind. The self-gain calibration is without noise (E0). */
+/* The self-gain calibration is without noise (E0). */
 static void store_result(struct ads1256 *a)
 {
     const double alpha = a->rate->alpha;
-    if (a->cal == ADS1256_SYSOCAL) store_ofc(a, alpha * (a->mean.out + noise_fs(a)));
-    else if (a->cal != ADS1256_SELFGCAL && a->cal != ADS1256_SYSGCAL)
-        store_ofc(a, alpha * (path_fs(a, 0.0) + noise_fs(a)));
-    if (a->cal == ADS1256_SYSGCAL) store_fsc(a, alpha * (a->mean.out + noise_fs(a)) - get_ofc(a));
-    else if (a->cal == ADS1256_SELFCAL || a->cal == ADS1256_SELFGCAL) store_fsc(a, alpha * (1.0 + a->cfg.gain_error));
+    const bool pins = steps[a->cal].pins;
+    if (steps[a->cal].ofc) store_ofc(a, alpha * ((pins ? a->mean.out : path_fs(a, 0.0)) + noise_fs(a)));
+    if (!steps[a->cal].fsc) return;
+    store_fsc(a, pins ? alpha * (a->mean.out + noise_fs(a)) - get_ofc(a) : alpha * (1.0 + a->cfg.gain_error));
 }
 
 static void on_cal(void *ctx, int64_t t_ns)

@@ -8,7 +8,7 @@ enum { T6_TAU = 50, T11_TAU = 4, T11_LONG_TAU = 24 };
 void ads1256_port_idle(struct ads1256 *a)
 {
     a->port = ADS1256_OPCODE;
-    a->rdatac = a->awaiting_data = a->garbled = false;
+    a->rdatac = a->awaiting_data = a->garbled = a->after_sdatac = false;
     a->word_left = 0;
 }
 
@@ -65,6 +65,7 @@ static void op_sdatac(struct ads1256 *a, uint8_t opcode, int64_t t_ns)
     (void)opcode;
     (void)t_ns;
     a->rdatac = false;
+    a->after_sdatac = true;
     a->port = ADS1256_OPCODE;
 }
 
@@ -145,7 +146,8 @@ typedef void port_fn(struct ads1256 *a, uint8_t mosi, int64_t t_ns);
 static bool too_early(struct ads1256 *a, const struct op *op)
 {
     const bool early = a->first_ns < a->next_ok_ns;
-    a->n.gap_violations += early;
+    a->n.gap_violations += early || (a->after_sdatac && a->first_drdy); /* to wait for DRDY after SDATAC (M80) */
+    a->after_sdatac = false;
     return early && a->cfg.strict_bus && op->run != op_reset;
 }
 

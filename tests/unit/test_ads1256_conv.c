@@ -140,6 +140,22 @@ static void codes_follow_the_formula_at_every_gain(void **state)
     }
 }
 
+/* Full scale is twice the reference. */
+static void codes_scale_with_the_reference(void **state)
+{
+    (void)state;
+    static const double vref_v[] = {0.5, 2.048, 2.5, 2.6};
+    for (unsigned i = 0; i < COUNT(vref_v); i++) {
+        struct ads1256_cfg cfg = quiet;
+        cfg.vref_v = vref_v[i];
+        struct rig r;
+        rig_up(&r, &cfg);
+        r.v[0] = 0.3;
+        set_rate(&r, 0x82);
+        near(rdata(&r), 0.3 / (2 * vref_v[i]) * 8388608, 4);
+    }
+}
+
 static void fsc_kept_from_another_rate_is_a_gross_gain_error(void **state)
 {
     (void)state;
@@ -371,6 +387,7 @@ int main(void)
         cmocka_unit_test(unsynchronised_channel_change_mixes_the_running_word),
         cmocka_unit_test(undefined_rate_codes_are_stored_and_keep_the_rate),
         cmocka_unit_test(codes_follow_the_formula_at_every_gain),
+        cmocka_unit_test(codes_scale_with_the_reference),
         cmocka_unit_test(fsc_kept_from_another_rate_is_a_gross_gain_error),
         cmocka_unit_test(self_calibration_takes_away_offset_and_gain_error),
         cmocka_unit_test(offset_and_gain_calibrations_touch_their_own_registers_only),

@@ -142,6 +142,75 @@ static void rdatac_outlives_chip_select_and_offers_a_word_anew(void **state)
     assert_int_equal(r.a.n.dropped, 1);
 }
 
+static void rdatac_ends_with_chip_select_when_strict(void **state)
+{
+    (void)state;
+    struct ads1256_cfg cfg = quiet;
+    cfg.strict_cs = true;
+    for (unsigned bytes = 0; bytes < 4; bytes++) {
+        struct rig r;
+        rig_up(&r, &cfg);
+        r.v[0] = 1.0;
+        set_rate(&r, 0x82);
+        xfer(&r, 0x03);
+        wait_ns(&r, T6_NS);
+        for (unsigned i = 0; i < bytes; i++) xfer(&r, 0);
+        ads1256_cs_pin(&r.a, true, r.s.now_ns + 2000);
+        ads1256_cs_pin(&r.a, false, r.s.now_ns + 3000);
+        await_fall(&r);
+        assert_int_equal(read_word(&r), 0);
+        assert_int_equal(rreg(&r, ADS1256_DRATE), 0x82);
+        assert_int_equal(r.a.n.dropped, bytes == 1 || bytes == 2);
+    }
+}
+
+/* A byte of the word that begins in the 16 tau before an update: counted, and garbled when strict. */
+static void reads_in_the_update_window_are_counted(void **state)
+{
+    (void)state;
+    for (unsigned row = 0; row < 6; row++) {
+        const bool strict = row & 1;
+        const int64_t before_tau = (int64_t[]){17, 15, 0}[row / 2]; /* first edge before the update */
+        struct ads1256_cfg cfg = quiet;
+        cfg.strict_bus = strict;
+        struct rig r;
+        rig_up(&r, &cfg);
+        r.v[0] = 1.0; /* 199999h */
+        set_rate(&r, 0x92);
+        await_fall(&r);
+        const int64_t next_ns = r.s.now_ns + tau_ns(256 * 60);
+        wait_ns(&r, tau_ns(256 * 60) - 20000);
+        xfer(&r, 0x01);
+        const int64_t first_ns = next_ns - tau_ns(before_tau);
+        wait_ns(&r, first_ns - FIRST_NS - r.s.now_ns + 1);
+        const bool inside = before_tau == 15;
+        assert_int_equal(xfer(&r, 0), inside && strict ? 0xFF : 0x19);
+        assert_int_equal(r.a.n.window_reads, inside);
+    }
+}
+
+/* After SDATAC the next command waits for DRDY: counted if it comes while DRDY is still high. */
+static void command_after_sdatac_waits_for_drdy(void **state)
+{
+    (void)state;
+    for (unsigned waits = 0; waits < 2; waits++) {
+        struct rig r;
+        rig_up(&r, &quiet);
+        set_rate(&r, 0x92);
+        xfer(&r, 0x03);
+        wait_ns(&r, T6_NS);
+        xfer(&r, 0);
+        xfer(&r, 0);
+        command(&r, 0x0F); /* with the last byte of the word */
+        assert_true(ads1256_drdy(&r.a));
+        if (waits) await_fall(&r);
+        rreg(&r, ADS1256_DRATE);
+        assert_int_equal(r.a.n.gap_violations, !waits);
+        rreg(&r, ADS1256_DRATE);
+        assert_int_equal(r.a.n.gap_violations, !waits);
+    }
+}
+
 static void only_the_first_word_of_a_hasty_rdatac_is_garbled(void **state)
 {
     (void)state;
@@ -246,6 +315,9 @@ int main(void)
         cmocka_unit_test(rdatac_gives_a_word_at_each_fall_until_an_embedded_sdatac),
         cmocka_unit_test(sdatac_alone_ends_the_mode_and_the_word),
         cmocka_unit_test(rdatac_outlives_chip_select_and_offers_a_word_anew),
+        cmocka_unit_test(rdatac_ends_with_chip_select_when_strict),
+        cmocka_unit_test(reads_in_the_update_window_are_counted),
+        cmocka_unit_test(command_after_sdatac_waits_for_drdy),
         cmocka_unit_test(only_the_first_word_of_a_hasty_rdatac_is_garbled),
         cmocka_unit_test(reset_command_is_obeyed_inside_an_rdatac_read),
         cmocka_unit_test(a_read_across_an_update_is_torn_and_counted),
