@@ -3,8 +3,9 @@
  *     bench_words FILE [FRAMES]
  *
  * FILE gets a line a frame: conversion words X, Y, Z and the temperature word, in hex. Standard output gets what came of
- * them on the lines, in the order of psa2.v: "frames N checksum H", then "line I edges M". SClk counts only while CST is
- * high: the temperature port, which the models lack, uses the same wire. */
+ * them on the lines, in the order of psa2.v: "frames N checksum H", then "line I edges M when W", with W the sum of when:
+ * for Data, CLK and Int in half periods of CLK since Int fell, for DOutX/Y/Z in levels of SClk since DRD_A fell. SClk
+ * counts only while CST is high: the temperature port, which the models lack, uses the same wire. */
 #include "board/psa2.h"
 
 #include <inttypes.h>
@@ -30,6 +31,10 @@ struct words {
     struct trace_sink sink;
     bool level[PSA2_LINES];
     bool counting;
+    int64_t t_ns, t_int_fall_ns;
+    uint32_t changed;     /* lines that have changed at t_ns */
+    uint64_t sclk_levels; /* since DRD_A fell */
+    uint64_t when[PSA2_LINES];
     uint64_t edges[PSA2_LINES];
     uint32_t row[ROWS_MAX][ROW_WORDS];
     unsigned frames, rested; /* frames sent, frames whose DOUT lines have come to rest */
@@ -63,17 +68,50 @@ static void frame(void *ctx, const struct psa2_frame *f, int64_t t_ns)
     for (unsigned i = 0; i < PSA2_WORDS; i++) w->checksum = w->checksum * 31 + f->word[i];
 }
 
+/* Half periods, which are no whole number of ns for every profile's clock. */
+static uint64_t halves(const struct words *w, int64_t dt_ns)
+{
+    const int64_t hz = 2 * (int64_t)w->b.profile.line_hz / w->b.profile.line_div;
+    return (uint64_t)((dt_ns * hz + NS_PER_S / 2) / NS_PER_S);
+}
+
+static void rested(struct words *w)
+{
+    if (w->rested == ROWS_MAX) return;
+    for (unsigned i = 0; i < 3; i++) w->row[w->rested][i] |= w->level[PSA2_LINE_DOUTX + i] ? REST_BIT : 0;
+    w->rested++;
+}
+
+static void edge(struct words *w, unsigned sig)
+{
+    const bool sclk = sig == PSA2_LINE_SCLK, out = sig >= PSA2_LINE_DATA && sig <= PSA2_LINE_INT;
+    if (!w->counting || (sclk && !w->level[PSA2_LINE_CST])) return;
+    if (sig == PSA2_LINE_DRD_A && !w->level[sig]) w->sclk_levels = 0;
+    if (sig == PSA2_LINE_INT && !w->level[sig]) {
+        w->t_int_fall_ns = w->t_ns;
+        rested(w);
+    }
+    w->edges[sig]++;
+    w->sclk_levels += sclk;
+    if (out) w->when[sig] += halves(w, w->t_ns - w->t_int_fall_ns);
+    if (sig >= PSA2_LINE_DOUTX && sig <= PSA2_LINE_DOUTZ) w->when[sig] += w->sclk_levels;
+}
+
+/* All that has changed at an instant, in the order of the lines. */
+static void instant_over(struct words *w)
+{
+    for (unsigned i = 0; i < PSA2_LINES; i++)
+        if (w->changed >> i & 1) edge(w, i);
+    w->changed = 0;
+}
+
 static void change(void *ctx, unsigned sig, bool level, int64_t t_ns)
 {
     struct words *w = ctx;
-    (void)t_ns;
+    if (t_ns != w->t_ns) instant_over(w);
+    w->t_ns = t_ns;
     w->level[sig] = level;
-    if (!w->counting) return;
-    if (sig == PSA2_LINE_SCLK && !w->level[PSA2_LINE_CST]) return;
-    w->edges[sig]++;
-    if (sig != PSA2_LINE_INT || level || w->rested == ROWS_MAX) return;
-    for (unsigned i = 0; i < 3; i++) w->row[w->rested][i] |= w->level[PSA2_LINE_DOUTX + i] ? REST_BIT : 0;
-    w->rested++;
+    w->changed |= UINT32_C(1) << sig;
 }
 
 static void steps(void *ctx, const struct trace_step *s, unsigned n)
@@ -112,9 +150,11 @@ static void run(struct words *w, unsigned frames)
     trace_attach(&w->b.trace, &w->sink);
     do frame_over(w);
     while (w->level[PSA2_LINE_DOUTX] || w->level[PSA2_LINE_DOUTY] || w->level[PSA2_LINE_DOUTZ]);
+    instant_over(w);
     w->counting = true; /* the models, too, begin with their lines low */
     while (w->frames < frames) step(w);
     trace_advance(&w->b.trace, w->s.now_ns);
+    instant_over(w);
 }
 
 static bool write_rows(const struct words *w, const char *path)
@@ -143,6 +183,7 @@ int main(int argc, char **argv)
         return 3;
     }
     printf("frames %u checksum %08" PRIx32 "\n", w.frames, w.checksum);
-    for (unsigned i = 0; i < LINES; i++) printf("line %u edges %" PRIu64 "\n", i, w.edges[order[i]]);
+    for (unsigned i = 0; i < LINES; i++)
+        printf("line %u edges %" PRIu64 " when %" PRIu64 "\n", i, w.edges[order[i]], w.when[order[i]]);
     return 0;
 }

@@ -1,8 +1,8 @@
 """The Verilog models of a PSA-2 frame: built with Icarus and Verilator, and proved to do what the emulated board does.
 
 A peer is worth a comparison only if it computes the same thing: the words of 512 frames of the emulated board are
-played through each model, and the checksum of the words taken from the lines and the number of edges of each line must
-be the board's own.
+played through each model, and the checksum of the words taken from the lines, and number and instants (in periods of
+the clocks) of the edges of each line must be the board's own.
 """
 
 from __future__ import annotations
@@ -87,14 +87,14 @@ def _driven(out: Path, words: Path) -> Peer:
 
 
 def facts(output: str) -> dict[str, str]:
-    """frames, checksum, and the edges of each line, of a model's or the board's output."""
+    """frames, checksum, and number and instants of the edges of each line, of a model's or the board's output."""
     found: dict[str, str] = {}
     for line in output.splitlines():
         w = line.split()
         if w[:1] == ["frames"]:
             found |= {"frames": w[1], "checksum": w[3]}
         if w[:1] == ["line"]:
-            found[f"edges of line {w[1]}"] = w[3]
+            found |= {f"edges of line {w[1]}": w[3], f"instants of line {w[1]}": w[5]}
     return found
 
 
@@ -104,5 +104,5 @@ def prove(peers: dict[str, Peer], board: str) -> None:
     for peer in peers.values():
         got = facts(run(peer.command(ROWS, check=True)))
         wrong = [f"{k}: {got.get(k)}, the board has {v}" for k, v in want.items() if got.get(k) != v]
-        if len(want) != 11 or wrong:
+        if len(want) != 20 or wrong:
             raise RuntimeError(f"{peer.name} does not do what the board does: {'; '.join(wrong) or want}")

@@ -90,7 +90,7 @@ def test_what_is_measured_in_python_runs(case: str, count: int, says: str) -> No
     assert cases.parse(done.stdout)["ns"] > 0
 
 
-BOARD = "frames 512 checksum 0badcafe\n" + "".join(f"line {i} edges {i * 7}\n" for i in range(9))
+BOARD = "frames 512 checksum 0badcafe\n" + "".join(f"line {i} edges {i * 7} when {i}\n" for i in range(9))
 
 
 def echo(text: str) -> peers.Peer:
@@ -100,7 +100,12 @@ def echo(text: str) -> peers.Peer:
 
 def test_a_model_that_does_something_else_is_no_peer() -> None:
     peers.prove({"echo": echo(BOARD)}, BOARD)
-    for wrong in (BOARD.replace("0badcafe", "0badcaff"), BOARD.replace("line 3 edges 21", "line 3 edges 22"), ""):
+    for wrong in (
+        BOARD.replace("0badcafe", "0badcaff"),
+        BOARD.replace("edges 21", "edges 22"),
+        BOARD.replace("when 3", "when 4"),
+        "",
+    ):
         with pytest.raises(RuntimeError, match="echo does not do what the board does"):
             peers.prove({"echo": echo(wrong)}, BOARD)
     with pytest.raises(RuntimeError, match="echo"):

@@ -1,6 +1,7 @@
 // Hand-written driver of psa2.v under Verilator: the peer of `make bench`. No simulated time and no idle clock at all: it
 // steps from edge to edge, counts what changes and hands the next words over, and nothing else.
-// Usage: psa2_drive WORDS FRAMES [check]. Prints "frames N checksum H edges E ns T"; with check the edges of each line.
+// Usage: psa2_drive WORDS FRAMES [check]. Prints "frames N checksum H edges E ns T"; with check the number and instants of
+// the edges of each line as bench_words does.
 #include "Vpsa2.h"
 #include "verilated.h"
 
@@ -11,7 +12,8 @@
 #include <cstring>
 #include <vector>
 
-namespace {
+namespace
+{
 
 enum { SCLK, DRD_A, DIN, DOUTX, DOUTY, DOUTZ, DATA, CLK, INT, LINES };
 constexpr int SPI_CLKS = 25, LINE_CLKS = 149; // one to start, then the 24 of a read and the 148 of a frame
@@ -21,17 +23,25 @@ struct Row {
 };
 
 // What a logic analyser and the receiver of the frame make of the lines.
-template <bool check> class Watcher {
+template <bool check> class Watcher
+{
   public:
-    explicit Watcher(uint32_t lines) : before_(lines) {}
+    explicit Watcher(uint32_t lines) : before_(lines)
+    {
+    }
 
     void see(uint32_t lines)
     {
         const uint32_t changed = lines ^ before_;
         before_ = lines;
         edges_ += static_cast<uint64_t>(__builtin_popcount(changed));
-        if (check)
-            for (int i = 0; i < LINES; i++) line_[i] += changed >> i & 1;
+        if (check) account(lines, changed);
+    }
+
+    // One more half period of line_clk.
+    void tick()
+    {
+        if (check) halves_++;
     }
 
     // After a rise of line_clk, the only time a bit can be taken.
@@ -42,7 +52,20 @@ template <bool check> class Watcher {
         if (++bits_ % 32 == 0) sum_ = sum_ * 31 + word_;
     }
 
-    uint64_t edges_ = 0, line_[LINES] = {};
+    void account(uint32_t lines, uint32_t changed)
+    {
+        if (changed & ~lines & 1 << INT) halves_ = 0;
+        if (changed & ~lines & 1 << DRD_A) sclk_levels_ = 0;
+        sclk_levels_ += changed >> SCLK & 1;
+        for (int i = 0; i < LINES; i++) {
+            if (!(changed >> i & 1)) continue;
+            line_[i]++;
+            if (i >= DATA) when_[i] += halves_;
+            else if (i >= DOUTX) when_[i] += sclk_levels_;
+        }
+    }
+
+    uint64_t edges_ = 0, line_[LINES] = {}, when_[LINES] = {}, halves_ = 0, sclk_levels_ = 0;
     uint32_t before_, word_ = 0, bits_ = 0, sum_ = 0;
 };
 
@@ -81,10 +104,12 @@ template <bool check> void frame(Vpsa2 &top, Watcher<check> &w, const Row &r)
     for (int i = 0; i < LINE_CLKS; i++) {
         top.line_clk = 1;
         top.eval();
+        w.tick();
         w.see(top.lines);
         w.take(top.lines);
         top.line_clk = 0;
         top.eval();
+        w.tick();
         w.see(top.lines);
     }
 }
@@ -102,7 +127,8 @@ template <bool check> void run(Vpsa2 &top, const std::vector<Row> &rows, uint64_
     std::printf("frames %llu checksum %08x edges %llu ns %lld\n", static_cast<unsigned long long>(frames), w.sum_,
                 static_cast<unsigned long long>(w.edges_), static_cast<long long>(took.count()));
     for (int i = 0; check && i < LINES; i++)
-        std::printf("line %d edges %llu\n", i, static_cast<unsigned long long>(w.line_[i]));
+        std::printf("line %d edges %llu when %llu\n", i, static_cast<unsigned long long>(w.line_[i]),
+                    static_cast<unsigned long long>(w.when_[i]));
 }
 
 } // namespace

@@ -1,5 +1,5 @@
 // Test bench of psa2.v with the board's real times: a frame a millisecond, the clocks run only while something is to be done.
-// Prints frames and checksum and, with CHECK, the edges of each line. For Icarus and for Verilator --timing.
+// Prints frames and checksum and, with CHECK, number and instants of the edges of each line as bench_words does. For Icarus and for Verilator --timing.
 `timescale 1ns / 1ps
 module psa2_tb;
     parameter CHECK = 0;
@@ -33,17 +33,28 @@ module psa2_tb;
     always @(posedge int_n) if ($time > 0) frames = frames + 1;
 
     // ---- edges, a counter a line
-    integer    count[0:8];
-    integer    i;
+    integer      count[0:8];
+    integer      when[0:8];
+    integer      sclk_levels = 0;  // since DRD_A fell
+    real         int_fall_ns = 0.0;
+    integer      i;
     generate
         if (CHECK != 0) begin : edges
             reg [8:0] was;
             initial begin
-                for (i = 0; i < 9; i = i + 1) count[i] = 0;
+                for (i = 0; i < 9; i = i + 1) {count[i], when[i]} = 0;
                 #1 was = lines;
                 forever begin
                     @(lines);
-                    for (i = 0; i < 9; i = i + 1) if (lines[i] != was[i]) count[i] = count[i] + 1;
+                    if (lines[8] < was[8]) int_fall_ns = $realtime;
+                    if (lines[1] < was[1]) sclk_levels = 0;
+                    if (lines[0] != was[0]) sclk_levels = sclk_levels + 1;
+                    for (i = 0; i < 9; i = i + 1)
+                        if (lines[i] != was[i]) begin
+                            count[i] = count[i] + 1;
+                            if (i >= 6) when[i] = when[i] + $rtoi(($realtime - int_fall_ns) / LINE_HALF_NS + 0.5);
+                            else if (i >= 3) when[i] = when[i] + sclk_levels;
+                        end
                     was = lines;
                 end
             end
@@ -79,7 +90,7 @@ module psa2_tb;
             #REST_NS;
         end
         $display("frames %0d checksum %h", frames, sum);
-        if (CHECK != 0) for (i = 0; i < 9; i = i + 1) $display("line %0d edges %0d", i, count[i]);
+        if (CHECK != 0) for (i = 0; i < 9; i = i + 1) $display("line %0d edges %0d when %0d", i, count[i], when[i]);
         $finish;
     end
 endmodule
