@@ -28,6 +28,8 @@ int api_fail(psabench *b, int code, const char *format, ...)
     va_start(args, format);
     (void)vsnprintf(b->error, sizeof b->error, format, args);
     va_end(args);
+    for (char *c = b->error; *c; c++) /* one line, whatever words of the caller's are quoted in it */
+        if ((unsigned char)*c < ' ') *c = '?';
     return code;
 }
 

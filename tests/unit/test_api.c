@@ -209,6 +209,7 @@ static void bad_arguments_are_refused_and_named(void **state)
     const int cs = pin(p, "CS");
     REFUSED(psabench_pin(p, "cs"), -1, "u: no pin cs of ads1256");
     REFUSED(psabench_pin(p, NULL), -1, "no pin");
+    REFUSED(psabench_pin(p, "C\nS"), -1, "no pin C?S of"); /* one line, whatever is quoted */
     REFUSED(psabench_pin_is_input(p, 11), -1, "u: no pin number 11: 0 to 10");
     REFUSED(psabench_get(p, -1), -1, "no pin number -1");
     REFUSED(psabench_set(p, 99, 0), -1, "no pin number 99");
