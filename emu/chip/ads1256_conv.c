@@ -214,7 +214,6 @@ static void on_cal(void *ctx, int64_t t_ns)
     struct ads1256 *a = ctx;
     a->n.calibrations++;
     store_result(a);
-    sched_cancel(a->sched, &a->cell_ev);
     if (a->sync) start_run(a, a->start_tau + ads1256_settle_tau(a->rate));
     else ads1256_halt(a, ADS1256_SYNC_LOW, t_ns);
 }

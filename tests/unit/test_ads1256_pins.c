@@ -307,6 +307,7 @@ static void cs_may_fall_with_sclk(void **state)
     ads1256_cs_pin(&r.a, false, r.s.now_ns);
     ads1256_sclk_pin(&r.a, false, r.s.now_ns);
     assert_int_equal(r.a.spi.bits, 1);
+    assert_int_equal(r.a.first_ns, r.s.now_ns); /* the byte's first edge */
 }
 
 /* One of the other pins moves between two bytes. SYNC/PDWN does not stay low long enough to power down: a chip that stops in

@@ -273,7 +273,12 @@ static void power_down_from_anywhere_and_back(void **state)
     assert_int_equal(r.a.mode, ADS1256_SYNC_LOW);
     wait_ns(&r, 600000);
     assert_int_equal(r.a.mode, ADS1256_OFF);
-    assert_int_equal(r.a.n.power_downs, 2);
+    ads1256_sync_pin(&r.a, true, r.s.now_ns);
+    wait_ns(&r, 100000);
+    ads1256_sync_pin(&r.a, false, r.s.now_ns); /* and sooner than the clock is there */
+    wait_ns(&r, 1200000);
+    assert_int_equal(r.a.mode, ADS1256_OFF);
+    assert_int_equal(r.a.n.power_downs, 3);
     ads1256_reset_pin(&r.a, false, r.s.now_ns);
     ads1256_reset_pin(&r.a, true, r.s.now_ns + 10000); /* a reset without a clock: calibrates when it is back */
     ads1256_sync_pin(&r.a, true, r.s.now_ns);
@@ -314,9 +319,12 @@ static void resets_while_sync_is_low_calibrate_at_its_rise(void **state)
     struct rig r;
     rig_up(&r, &quiet);
     set_rate(&r, 0x92);
+    xfer(&r, 0xF0);
     ads1256_sync_pin(&r.a, false, r.s.now_ns);
-    command(&r, 0xFE);
+    command(&r, 0xFE); /* counted: it comes before the DRDY of F0h */
     assert_int_equal(reg_peek(&r.a.regs, ADS1256_DRATE), 0xF0);
+    rreg(&r, ADS1256_DRATE); /* not counted: that DRDY will not come */
+    assert_int_equal(r.a.n.gap_violations, 1);
     wait_ns(&r, 100000);
     assert_int_equal(r.a.n.calibrations, 2);
     ads1256_sync_pin(&r.a, true, r.s.now_ns);
