@@ -1,5 +1,7 @@
 #include "api/api.h"
 
+#include "base/text.h"
+
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -28,8 +30,7 @@ int api_fail(psabench *b, int code, const char *format, ...)
     va_start(args, format);
     (void)vsnprintf(b->error, sizeof b->error, format, args);
     va_end(args);
-    for (char *c = b->error; *c; c++) /* one line, whatever words of the caller's are quoted in it */
-        if ((unsigned char)*c < ' ') *c = '?';
+    text_one_line(b->error);
     return code;
 }
 

@@ -1,6 +1,7 @@
 #define _GNU_SOURCE /* getopt_long */
 #include "app/options.h"
 
+#include "base/text.h"
 #include "link/socketcand_tcp.h"
 
 #include <errno.h>
@@ -56,6 +57,7 @@ __attribute__((format(printf, 3, 4))) static bool fail(char *why, size_t cap, co
     va_start(ap, format);
     vsnprintf(why, cap, format, ap);
     va_end(ap);
+    text_one_line(why);
     return false;
 }
 

@@ -1,5 +1,7 @@
 #include "app/ports.h"
 
+#include "base/text.h"
+
 #include <errno.h>
 #include <inttypes.h>
 #include <stdarg.h>
@@ -12,6 +14,7 @@ __attribute__((format(printf, 3, 4))) static bool fail(char *why, size_t cap, co
     va_start(ap, format);
     vsnprintf(why, cap, format, ap);
     va_end(ap);
+    text_one_line(why);
     return false;
 }
 

@@ -1,5 +1,7 @@
 #include "app/yaml_file.h"
 
+#include "base/text.h"
+
 #include <errno.h>
 #include <math.h>
 #include <stdarg.h>
@@ -15,6 +17,7 @@ bool yaml_file_fail(struct yaml_file *f, const yaml_node_t *node, const char *ke
     va_start(ap, format);
     if (n >= 0 && (size_t)n < f->cap) vsnprintf(f->why + n, f->cap - (size_t)n, format, ap);
     va_end(ap);
+    text_one_line(f->why);
     return false;
 }
 

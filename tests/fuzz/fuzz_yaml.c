@@ -11,6 +11,6 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     char why[512] = "";
     const bool ok = scenario_parse("fuzz", (const char *)data, size, &s, why, sizeof why);
     assert(ok ? s.unit_count > 0 : strncmp(why, "fuzz:", 5) == 0 || strchr(why, '/'));
-    assert(strlen(why) < sizeof why);
+    assert(strlen(why) < sizeof why && !strchr(why, '\n'));
     return 0;
 }

@@ -142,6 +142,7 @@ static void names_are_short_words_and_unique(void **state)
     for (size_t i = 0; i < COUNT(bad); i++) {
         assert_null(psabench_part_new(b, "ads1256", bad[i], NULL));
         assert_non_null(strstr(psabench_error_text(b), "use 1 to 31 of the characters"));
+        assert_null(strchr(psabench_error_text(b), '\n'));
     }
     psabench_part *p = part(b, "ads1256", "n123456789.123456789-12345678_0", NULL);
     assert_string_equal(psabench_part_name(p), "n123456789.123456789-12345678_0");

@@ -96,6 +96,7 @@ static const struct {
     {"--line-hz 999", "--line-hz 999: 1000 to"},
     {"--epoch -1", "--epoch -1: seconds are wanted"},
     {"a b", "b: one scenario is enough, a was given before"},
+    {"a b\nc", "b?c: one scenario is enough, a was given before"}, /* a message is one line */
 };
 
 static void what_cannot_be_used_is_refused_in_one_line(void **state)

@@ -81,6 +81,7 @@ static const struct {
     {"- 1\n", "dir/s.yaml:1: a mapping `key: value` is wanted"},
     {"units: [{}]\nseed: -1\n", "dir/s.yaml:2: seed: \"-1\" is not an integer of 0 or more"},
     {"units: [{}]\nseed: [1]\n", "dir/s.yaml:2: seed: one value of up to 128 characters is wanted"},
+    {"units: [{}]\nseed: \"1\\n2\"\n", "dir/s.yaml:2: seed: \"1?2\" is not an integer of 0 or more"},
     {"units: [{}]\nsead: 1\n", "dir/s.yaml:2: sead: unknown key; known here: seed, start, bus, site, head, units"},
     {"seed: 1\nseed: 2\nunits: [{}]\n", "dir/s.yaml:2: seed: comes twice"},
     {"seed: 1\n", "dir/s.yaml:1: units: at least one unit is wanted"},
