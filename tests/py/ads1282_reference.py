@@ -111,3 +111,20 @@ def response(ratio: int, phase: str, f: float) -> complex:
     """Gain at f for an input that the chip looks at once a block; phase as of the newest block of a word."""
     h = weights(ratio, phase)
     return complex(np.sum(h * np.exp(-2j * np.pi * f / BLOCKS * np.arange(len(h)))))
+
+
+def hold(ratio: int, f: float) -> float:
+    """What holding the input over a block does to the sinc, as a factor: 1 at DC, 0.0020 dB down at 0.375."""
+    x = np.pi * f / (BLOCKS * ratio)
+    sinc = (np.sin(ratio * x) / (ratio * np.sin(x))) ** 5
+    held = np.array(sinc_weights(ratio)) / ratio**5
+    return float(abs(np.sum(held * np.exp(-2j * np.pi * f / BLOCKS * np.arange(5)))) / abs(sinc))
+
+
+def corner(ratio: int, phase: str) -> float:
+    """Frequency at which the gain is 1 / sqrt 2."""
+    low, high = 0.40, 0.43
+    while high - low > 1e-9:
+        middle = (low + high) / 2
+        low, high = (middle, high) if abs(response(ratio, phase, middle)) > 0.5**0.5 else (low, middle)
+    return low
