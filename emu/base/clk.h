@@ -5,6 +5,7 @@
 #ifndef PSABENCH_BASE_CLK_H
 #define PSABENCH_BASE_CLK_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 struct clk {
@@ -24,41 +25,50 @@ static inline int64_t clk_edge_ns(const struct clk *c, int64_t k)
     return c->t0_ns + clk_span_ns(c->hz, k * c->div);
 }
 
-/* First edge at or after t_ns (t_ns >= t0_ns). */
+/* First edge at or after t_ns (t_ns >= t0_ns). The count before it is floor(dt hz / 10^9 / div); that edge itself counts
+ * when its exact instant is not before dt. */
 static inline int64_t clk_count_at(const struct clk *c, int64_t t_ns)
 {
-    const int64_t dt_ns = t_ns - c->t0_ns;
-    const int64_t counts = dt_ns / 1000000000 * c->hz + dt_ns % 1000000000 * c->hz / 1000000000;
-    int64_t k = counts / c->div;
-    while (clk_edge_ns(c, k) < t_ns) k++;
-    return k;
+    const int64_t s = (t_ns - c->t0_ns) / 1000000000;
+    const int64_t rest_ns = (t_ns - c->t0_ns) % 1000000000;
+    const int64_t counts = s * c->hz + rest_ns * c->hz / 1000000000;
+    const int64_t k = c->div == 1 ? counts : counts / c->div;
+    return k + ((k * c->div - s * c->hz) * 1000000000 < rest_ns * c->hz);
 }
 
-/* Edge after edge without a division, each equal to clk_edge_ns(). t_ns is the instant of the present one. */
-struct clk_walk {
-    int64_t t_ns;
-    int64_t rest; /* of t_ns, in 1/hz ns: 0 .. hz - 1 */
-    int64_t hz, step_ns, step_rest;
+/* An edge and what its instant was rounded by: from here on steps need no division. */
+struct clk_pos {
+    int64_t k, t_ns; /* t_ns as clk_edge_ns() gives it */
+    int64_t rest;    /* beyond t_ns, in 1/hz ns: 0 .. hz - 1 */
 };
 
-/* At edge k of the clock, to go on in steps of `every` edges. */
-static inline struct clk_walk clk_walk(const struct clk *c, int64_t k, int64_t every)
+/* A way of k edges. */
+struct clk_step {
+    int64_t k, ns, rest, hz;
+};
+
+static inline struct clk_step clk_step(const struct clk *c, int64_t k)
 {
-    const int64_t step = every * c->div;
-    return (struct clk_walk){.t_ns = clk_edge_ns(c, k),
-                             .rest = k * c->div % c->hz * 1000000000 % c->hz,
-                             .hz = c->hz,
-                             .step_ns = clk_span_ns(c->hz, step),
-                             .step_rest = step % c->hz * 1000000000 % c->hz};
+    const int64_t counts = k * c->div;
+    return (struct clk_step){k, clk_span_ns(c->hz, counts), counts % c->hz * 1000000000 % c->hz, c->hz};
 }
 
-static inline void clk_walk_on(struct clk_walk *w)
+static inline struct clk_pos clk_pos(const struct clk *c, int64_t k)
 {
-    w->t_ns += w->step_ns;
-    w->rest += w->step_rest;
-    if (w->rest < w->hz) return;
-    w->rest -= w->hz;
-    w->t_ns++;
+    const struct clk_step s = clk_step(c, k);
+    return (struct clk_pos){k, c->t0_ns + s.ns, s.rest};
+}
+
+static inline struct clk_pos clk_on(struct clk_pos p, const struct clk_step *s)
+{
+    p.k += s->k;
+    p.t_ns += s->ns;
+    p.rest += s->rest;
+    if (p.rest >= s->hz) {
+        p.rest -= s->hz;
+        p.t_ns++;
+    }
+    return p;
 }
 
 #endif

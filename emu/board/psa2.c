@@ -299,7 +299,8 @@ static void init_accel(struct psa2 *b)
     const struct ads1282_cfg cfg = {.part = b->profile.adc_is_1281 ? ADS1282_PART_1281 : ADS1282_PART_1282,
                                     .clk_hz = b->profile.fclk_hz,
                                     .vref_v = b->profile.adc_vref_v,
-                                    .noise_scale = b->unit.adc_noise_scale};
+                                    .noise_scale = b->unit.adc_noise_scale,
+                                    .chain = b->unit.adc_chain};
     for (unsigned i = 0; i < 3; i++) {
         b->port[i] = (struct psa2_port){b, i};
         const struct ads1282_io io = {.ctx = &b->port[i], .vin_v = accel_vin_v, .drdy = accel_drdy};

@@ -106,6 +106,7 @@ struct psa2_counters {
 struct psa2_unit_cfg {
     struct afe_cfg afe[3];
     double adc_noise_scale, temp_noise_scale; /* 1 published, 0 none */
+    enum ads1282_chain adc_chain;             /* 0: ADS1282_CHAIN_EXACT */
     double temp_adc_offset_v, temp_adc_gain_error;
     uint64_t seed;
     uint32_t serial;

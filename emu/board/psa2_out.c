@@ -12,7 +12,7 @@ static int64_t word_half(const struct psa2 *b, unsigned w)
 
 static int64_t edge_ns(const struct psa2 *b, int64_t half)
 {
-    return clk_edge_ns(&b->out.half, b->out.k0 + half);
+    return clk_edge_ns(&b->out.half, b->out.start.k + half);
 }
 
 static uint32_t low_bits(uint32_t v, unsigned bits)
@@ -46,19 +46,22 @@ static void pack_words(const struct psa2_profile *p, struct psa2_frame *f)
 /* Edges of one word up to an instant: DATA changes where CLK falls, CLK runs only while bits are sent. */
 static void report_word(struct psa2 *b, unsigned w, int64_t until_ns)
 {
-    struct trace_step step[3 * 32 + 1], *p = step;
-    struct clk_walk at = clk_walk(&b->out.half, b->out.k0 + word_half(b, w), 1);
+    struct trace_step *const step = trace_room(&b->trace, 3 * 32 + 1), *p = step;
+    if (!step) return;
+    const struct clk_step one = b->out.one;
+    struct clk_pos at = clk_pos(&b->out.half, b->out.start.k + word_half(b, w));
     const uint32_t word = b->out.f.word[w];
+    const uint32_t changes = word ^ word << 1; /* DATA rests low before the first bit */
     for (unsigned bit = 0; bit < b->profile.word_bits; bit++) {
-        *p++ = (struct trace_step){at.t_ns, DATA, (word >> bit & 1) << PSA2_LINE_DATA};
-        clk_walk_on(&at);
+        if (changes >> bit & 1) *p++ = (struct trace_step){at.t_ns, DATA, (word >> bit & 1) << PSA2_LINE_DATA};
+        at = clk_on(at, &one);
         *p++ = (struct trace_step){at.t_ns, CLK, CLK};
-        clk_walk_on(&at);
+        at = clk_on(at, &one);
         *p++ = (struct trace_step){at.t_ns, CLK, 0};
     }
     *p++ = (struct trace_step){at.t_ns, DATA, 0};
     while (p > step && p[-1].t_ns > until_ns) p--;
-    trace_steps(&b->trace, step, (unsigned)(p - step));
+    trace_commit(&b->trace, (unsigned)(p - step));
 }
 
 /* Runs only while the line is watched: at INT fall, then at the end of each word but the last. */
@@ -66,12 +69,14 @@ static void word_event(void *ctx, int64_t t_ns)
 {
     struct psa2 *b = ctx;
     struct psa2_out *o = &b->out;
-    if (o->watched_words < 0) trace_set(&b->trace, PSA2_LINE_INT, false, t_ns);
-    else report_word(b, (unsigned)o->watched_words, t_ns);
-    o->watched_words++;
-    if ((unsigned)o->watched_words + 1 >= PSA2_WORDS) return;
-    sched_at(b->sched, &o->word,
-             edge_ns(b, word_half(b, (unsigned)o->watched_words) + 2 * (int64_t)b->profile.word_bits));
+    do {
+        if (o->watched_words < 0) trace_set(&b->trace, PSA2_LINE_INT, false, t_ns);
+        else report_word(b, (unsigned)o->watched_words, t_ns);
+        o->watched_words++;
+        if ((unsigned)o->watched_words + 1 >= PSA2_WORDS) return;
+        t_ns = edge_ns(b, word_half(b, (unsigned)o->watched_words) + 2 * (int64_t)b->profile.word_bits);
+    } while (sched_go_on(b->sched, t_ns));
+    sched_at(b->sched, &o->word, t_ns);
 }
 
 /* The rest of a watched frame, up to now, and idle lines. */
@@ -82,9 +87,7 @@ static void finish_watched(struct psa2 *b, int64_t t_ns)
     if (o->watched_words < 0) return;
     for (unsigned w = (unsigned)o->watched_words; w < PSA2_WORDS; w++)
         if (edge_ns(b, word_half(b, w)) <= t_ns) report_word(b, w, t_ns);
-    trace_set(&b->trace, PSA2_LINE_DATA, false, t_ns);
-    trace_set(&b->trace, PSA2_LINE_CLK, false, t_ns);
-    trace_set(&b->trace, PSA2_LINE_INT, true, t_ns);
+    trace_steps(&b->trace, &(struct trace_step){t_ns, out_lines, UINT32_C(1) << PSA2_LINE_INT}, 1);
     o->watched_words = -1;
 }
 
@@ -100,6 +103,8 @@ static void int_rise(void *ctx, int64_t t_ns)
 void psa2_out_init(struct psa2 *b)
 {
     b->out.half = (struct clk){.hz = 2 * (int64_t)b->profile.line_hz, .div = b->profile.line_div};
+    b->out.one = clk_step(&b->out.half, 1);
+    b->out.frame = clk_step(&b->out.half, 2 * (int64_t)psa2_frame_clks(&b->profile));
     b->out.watched_words = -1;
     sched_ev(&b->out.rise, int_rise, b);
     sched_ev(&b->out.word, word_event, b);
@@ -113,11 +118,10 @@ void psa2_out_start(struct psa2 *b, const struct psa2_frame *f, int64_t t_ns)
         return;
     }
     o->busy = true;
-    o->k0 = clk_count_at(&o->half, t_ns);
-    o->k0 += o->k0 & 1;
+    o->start = clk_pos(&o->half, (clk_count_at(&o->half, t_ns) + 1) / 2 * 2);
     o->f = *f;
-    o->f.t_int_fall_ns = edge_ns(b, 0);
-    o->f.t_int_rise_ns = edge_ns(b, 2 * (int64_t)psa2_frame_clks(&b->profile));
+    o->f.t_int_fall_ns = o->start.t_ns;
+    o->f.t_int_rise_ns = clk_on(o->start, &o->frame).t_ns;
     pack_words(&b->profile, &o->f);
     b->latest = o->f;
     sched_at(b->sched, &o->rise, o->f.t_int_rise_ns);

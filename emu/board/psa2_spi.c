@@ -52,9 +52,10 @@ bool psa2_spi_busy(const struct psa2 *b)
     return b->spi.phase != PSA2_SPI_IDLE;
 }
 
-static int64_t edge_ns(const struct psa2 *b, int64_t k)
+/* From the first rising edge of the byte under way. */
+static int64_t after_ns(const struct psa2_spi *s, const struct clk_step *way)
 {
-    return clk_edge_ns(&b->spi.half, k);
+    return clk_on(s->first, way).t_ns;
 }
 
 static bool clocks_accel(const struct psa2 *b)
@@ -73,11 +74,13 @@ static void arm(struct psa2 *b, enum psa2_spi_phase phase, int64_t t_ns)
 static void begin_byte(struct psa2 *b, int64_t not_before_ns)
 {
     struct psa2_spi *s = &b->spi;
-    s->k = clk_count_at(&s->half, not_before_ns);
-    if (s->k < s->free_k) s->k = s->free_k;
-    s->k += s->k & 1;
-    s->free_k = s->k + HALF_BYTE;
-    arm(b, PSA2_SPI_FIRST, edge_ns(b, s->k + HALF_FIRST_FALL));
+    if (not_before_ns > s->free.t_ns) {
+        const int64_t k = clk_count_at(&s->half, not_before_ns);
+        s->free = clk_pos(&s->half, k + (k & 1));
+    }
+    s->first = s->free;
+    s->free = clk_on(s->first, &s->byte);
+    arm(b, PSA2_SPI_FIRST, after_ns(s, &s->fall));
 }
 
 void psa2_spi_start(struct psa2 *b, const struct psa2_xfer *x, int64_t t_ns)
@@ -92,7 +95,7 @@ void psa2_spi_start(struct psa2 *b, const struct psa2_xfer *x, int64_t t_ns)
         ads1256_cs_pin(&b->tadc, false, t_ns);
     }
     /* One SClk period first: DOut is valid within 100 ns of DRD_A, DIn needs its set-up. */
-    const int64_t lead_ns = edge_ns(b, clk_count_at(&s->half, t_ns) + 2);
+    const int64_t lead_ns = clk_edge_ns(&s->half, clk_count_at(&s->half, t_ns) + 2);
     begin_byte(b, lead_ns > s->ready_ns[x->group] ? lead_ns : s->ready_ns[x->group]);
 }
 
@@ -105,25 +108,35 @@ int64_t psa2_spi_span_ns(const struct psa2 *b, const struct psa2_xfer *x, int64_
     return span_ns + (x->group == PSA2_TEMP ? psa2_tau_ns(b, CST_TAU) : periods_ns(b->profile.sclk_hz, 1));
 }
 
-/* Data lines before bit i (0 is the MSB) is sampled; 8: after the byte. */
-static uint32_t accel_level(const struct psa2 *b, unsigned i)
+/* Bit `shift` of up to four bytes, side by side. */
+static uint32_t bit_of_each(uint32_t bytes, unsigned shift)
 {
-    const struct psa2_spi *s = &b->spi;
-    const unsigned shift = i < 8 ? 7 - i : 0;
-    const bool last = s->at + 1u == s->x.count;
-    const uint8_t mosi = s->x.group == PSA2_ACCEL && !(i == 8 && last) ? s->x.tx[s->at] : 0;
-    uint32_t level = (mosi >> shift & 1u) << PSA2_LINE_DIN;
-    for (unsigned axis = 0; axis < 3; axis++) {
-        const unsigned miso = i < 8 ? s->rx[axis][s->at] >> shift & 1u : spi_miso(&b->adc[axis].spi);
-        level |= miso << (PSA2_LINE_DOUTX + axis);
-    }
-    return level;
+    const uint32_t v = bytes >> shift & 0x01010101;
+    return (v | v >> 7 | v >> 14 | v >> 21) & 0xF;
 }
 
-static uint32_t temp_level(const struct psa2 *b, unsigned i)
+/* Bytes of lines whose numbers follow on one another, the first in the low byte. */
+_Static_assert(PSA2_LINE_DOUTX == PSA2_LINE_DIN + 1 && PSA2_LINE_DOUTZ == PSA2_LINE_DIN + 3, "DIn, DOutX, Y, Z");
+_Static_assert(PSA2_LINE_DOUTT == PSA2_LINE_DINT + 1, "DInT, DOutT");
+
+static uint32_t accel_bytes(const struct psa2_spi *s)
 {
-    const struct psa2_spi *s = &b->spi;
-    return (s->x.tx[s->at] >> (7 - i) & 1u) << PSA2_LINE_DINT | (s->rx[3][s->at] >> (7 - i) & 1u) << PSA2_LINE_DOUTT;
+    const uint32_t mosi = s->x.group == PSA2_ACCEL ? s->x.tx[s->at] : 0;
+    return mosi | (uint32_t)s->rx[0][s->at] << 8 | (uint32_t)s->rx[1][s->at] << 16 | (uint32_t)s->rx[2][s->at] << 24;
+}
+
+static uint32_t temp_bytes(const struct psa2_spi *s)
+{
+    return s->x.tx[s->at] | (uint32_t)s->rx[3][s->at] << 8;
+}
+
+/* After the byte: DIn keeps its last bit up to the next byte and rests low after the last, DOut shows what comes next. */
+static uint32_t accel_after(const struct psa2 *b)
+{
+    const bool last = b->spi.at + 1u == b->spi.x.count;
+    uint32_t level = last ? 0 : (accel_bytes(&b->spi) & 1) << PSA2_LINE_DIN;
+    for (unsigned i = 0; i < 3; i++) level |= (uint32_t)spi_miso(&b->adc[i].spi) << (PSA2_LINE_DOUTX + i);
+    return level;
 }
 
 /* The byte that has ended. Accelerometers, mode 0: data change on the falling edge before the rising one that samples them;
@@ -136,18 +149,23 @@ static void report_byte(struct psa2 *b)
     const uint32_t sclk = UINT32_C(1) << PSA2_LINE_SCLK;
     const uint32_t on_fall = clocks_accel(b) ? accel_lines & ~sclk : 0;
     const uint32_t on_rise = temp ? temp_lines & ~sclk : 0;
-    struct trace_step step[HALF_BYTE + 2], *p = step;
-    struct clk_walk at = clk_walk(&s->half, s->k - 1, 1);
-    *p++ = (struct trace_step){at.t_ns, on_fall, on_fall ? accel_level(b, 0) : 0};
-    for (unsigned i = 0; i < 8; i++) {
-        clk_walk_on(&at);
-        *p++ = (struct trace_step){at.t_ns, sclk | on_rise, sclk | (on_rise ? temp_level(b, i) : 0)};
-        clk_walk_on(&at);
-        *p++ = (struct trace_step){at.t_ns, sclk | on_fall, on_fall ? accel_level(b, i + 1) : 0};
+    const uint32_t accel = accel_bytes(s), temps = temp_bytes(s);
+    struct trace_step *const step = trace_room(&b->trace, HALF_BYTE + 2), *p = step;
+    if (!step) return;
+    const struct clk_step one = s->one;
+    struct clk_pos at = clk_pos(&s->half, s->first.k - 1);
+    *p++ = (struct trace_step){at.t_ns, on_fall, bit_of_each(accel, 7) << PSA2_LINE_DIN};
+    for (int shift = 7; shift >= 0; shift--) {
+        at = clk_on(at, &one);
+        *p++ =
+            (struct trace_step){at.t_ns, sclk | on_rise, sclk | bit_of_each(temps, (unsigned)shift) << PSA2_LINE_DINT};
+        at = clk_on(at, &one);
+        *p++ = (struct trace_step){at.t_ns, sclk | on_fall,
+                                   shift ? bit_of_each(accel, (unsigned)shift - 1) << PSA2_LINE_DIN : accel_after(b)};
     }
-    clk_walk_on(&at);
+    at = clk_on(at, &one);
     if (temp && s->at + 1u == s->x.count) *p++ = (struct trace_step){at.t_ns, UINT32_C(1) << PSA2_LINE_DINT, 0};
-    trace_steps(&b->trace, step, (unsigned)(p - step));
+    trace_commit(&b->trace, (unsigned)(p - step));
 }
 
 static void end_xfer(struct psa2 *b, int64_t t_ns)
@@ -167,7 +185,7 @@ static void end_byte(struct psa2 *b, int64_t t_ns)
     }
     s->ready_ns[s->x.group] = next_ns;
     if (s->x.group == PSA2_TEMP) arm(b, PSA2_SPI_CST_UP, t_ns + psa2_tau_ns(b, CST_TAU));
-    else arm(b, PSA2_SPI_REST, edge_ns(b, s->k + HALF_BYTE)); /* SClk is low again before CST may move */
+    else arm(b, PSA2_SPI_REST, after_ns(s, &s->byte)); /* SClk is low again before CST may move */
 }
 
 static void first_fall(struct psa2 *b, int64_t t_ns)
@@ -175,8 +193,8 @@ static void first_fall(struct psa2 *b, int64_t t_ns)
     if (clocks_accel(b))
         for (unsigned i = 0; i < 3; i++) spi_first(&b->adc[i].spi, t_ns);
     if (b->spi.x.group == PSA2_TEMP) spi_first(&b->tadc.spi, t_ns);
-    if (clocks_accel(b)) arm(b, PSA2_SPI_SAMPLE_A, edge_ns(b, b->spi.k + HALF_SAMPLE_A));
-    else arm(b, PSA2_SPI_SAMPLE_T, edge_ns(b, b->spi.k + HALF_SAMPLE_T));
+    if (clocks_accel(b)) arm(b, PSA2_SPI_SAMPLE_A, after_ns(&b->spi, &b->spi.sample_a));
+    else arm(b, PSA2_SPI_SAMPLE_T, after_ns(&b->spi, &b->spi.sample_t));
 }
 
 /* A burst for the temperature converter that is not gated clocks the accelerometer converters with DIn low. */
@@ -186,7 +204,7 @@ static void sample_accel(struct psa2 *b, int64_t t_ns)
     const bool own = s->x.group == PSA2_ACCEL;
     for (unsigned i = 0; i < 3; i++) s->rx[i][s->at] = spi_byte(&b->adc[i].spi, own ? s->x.tx[s->at] : 0, t_ns);
     if (own) end_byte(b, t_ns);
-    else arm(b, PSA2_SPI_SAMPLE_T, edge_ns(b, s->k + HALF_SAMPLE_T));
+    else arm(b, PSA2_SPI_SAMPLE_T, after_ns(s, &s->sample_t));
 }
 
 static void sample_temp(struct psa2 *b, int64_t t_ns)
@@ -228,7 +246,13 @@ static void on_event(void *ctx, int64_t t_ns)
 
 void psa2_spi_init(struct psa2 *b)
 {
-    b->spi.half = (struct clk){.hz = 2 * (int64_t)b->profile.sclk_hz, .div = 1};
+    struct psa2_spi *s = &b->spi;
+    s->half = (struct clk){.hz = 2 * (int64_t)b->profile.sclk_hz, .div = 1};
+    s->one = clk_step(&s->half, 1);
+    s->fall = clk_step(&s->half, HALF_FIRST_FALL);
+    s->sample_a = clk_step(&s->half, HALF_SAMPLE_A);
+    s->sample_t = clk_step(&s->half, HALF_SAMPLE_T);
+    s->byte = clk_step(&s->half, HALF_BYTE);
     sched_ev(&b->spi.ev, on_event, b);
 }
 

@@ -27,16 +27,17 @@ enum psa2_spi_phase {
 
 /* Serial port engine: SClk edges from a count of half periods, two instants a byte. */
 struct psa2_spi {
-    struct clk half; /* edge k: rising for even k, falling for odd */
+    struct clk half;                                     /* edge k: rising for even k, falling for odd */
+    struct clk_step one, fall, sample_a, sample_t, byte; /* from the first rising edge of a byte to its others */
     struct psa2_xfer x;
     uint8_t rx[4][PSA2_XFER_MAX]; /* X, Y, Z, T */
     enum psa2_spi_phase phase;
-    uint8_t at;          /* byte under way */
-    int64_t k;           /* its first rising edge */
-    int64_t free_k;      /* no rising edge before this one */
-    int64_t ready_ns[2]; /* per group: gap after its last burst is over */
-    int64_t due_ns;      /* of the phase */
-    bool stepping;       /* inside the event: it arms itself when it can go no further */
+    uint8_t at;           /* byte under way */
+    struct clk_pos first; /* its first rising edge */
+    struct clk_pos free;  /* no rising edge before this one */
+    int64_t ready_ns[2];  /* per group: gap after its last burst is over */
+    int64_t due_ns;       /* of the phase */
+    bool stepping;        /* inside the event: it arms itself when it can go no further */
     struct sched_ev ev;
 };
 
@@ -66,8 +67,9 @@ struct psa2_temp {
 
 /* Output line: the frame under way. */
 struct psa2_out {
-    struct clk half; /* edge k: falling CLK for even k, rising for odd */
-    int64_t k0;      /* INT falls */
+    struct clk half;            /* edge k: falling CLK for even k, rising for odd */
+    struct clk_step one, frame; /* a half period; INT low */
+    struct clk_pos start;       /* INT falls */
     bool busy;
     int watched_words; /* words reported to the trace; -1: INT fall not yet reported */
     struct psa2_frame f;

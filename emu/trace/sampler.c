@@ -46,8 +46,9 @@ static void steps(void *ctx, const struct trace_step *step, unsigned n)
     for (const struct trace_step *const end = step + n; step < end; step++) {
         if (!(step->lines & s->sink.mask)) continue;
         sample_until(s, step->t_ns); /* a sample at t_ns itself sees the new level */
-        s->level = 0;
-        for (unsigned i = 0; i < 3; i++) s->level |= (uint8_t)((step->level >> s->sig[i] & 1) << i);
+        for (unsigned i = 0; i < 3; i++)
+            if (step->lines >> s->sig[i] & 1)
+                s->level = (uint8_t)((s->level & ~(1u << i)) | (step->level >> s->sig[i] & 1) << i);
     }
 }
 

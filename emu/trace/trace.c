@@ -3,31 +3,38 @@
 #include <assert.h>
 #include <string.h>
 
-/* Of n reports keeps, in place, what really changes; returns how many are left. */
-static unsigned filter(struct trace *t, struct trace_step *s, unsigned n)
+/* Leaves of n reports what really changes. */
+static void filter(struct trace *t, struct trace_step *s, unsigned n)
 {
     uint32_t level = t->level;
-    struct trace_step *kept = s;
     for (const struct trace_step *const end = s + n; s < end; s++) {
-        const uint32_t changed = (level ^ s->level) & s->lines;
-        if (!changed) continue;
-        level ^= changed;
-        *kept++ = (struct trace_step){s->t_ns, changed, level};
+        s->lines &= level ^ s->level;
+        level ^= s->lines;
     }
     t->level = level;
-    return (unsigned)(kept - (s - n));
+}
+
+/* How many of n steps come up to t_ns. */
+static unsigned count_until(const struct trace_step *s, unsigned n, int64_t t_ns)
+{
+    unsigned from = 0;
+    while (from < n) {
+        const unsigned middle = from + (n - from) / 2;
+        if (s[middle].t_ns <= t_ns) from = middle + 1;
+        else n = middle;
+    }
+    return from;
 }
 
 static void deliver_until(struct trace *t, int64_t t_ns)
 {
     struct trace_step *const due = t->pending + t->first;
-    unsigned n = 0;
-    while (n < t->pending_count && due[n].t_ns <= t_ns) n++;
+    const unsigned n = count_until(due, t->pending_count, t_ns);
     t->pending_count -= n;
     t->first = t->pending_count > 0 ? t->first + n : 0;
-    const unsigned kept = filter(t, due, n);
-    if (kept == 0) return;
-    for (const struct trace_sink *s = t->sinks; s; s = s->next) s->steps(s->ctx, due, kept);
+    if (n == 0) return;
+    filter(t, due, n);
+    for (const struct trace_sink *s = t->sinks; s; s = s->next) s->steps(s->ctx, due, n);
 }
 
 static void watch_again(struct trace *t)
@@ -79,48 +86,39 @@ void trace_detach(struct trace *t, struct trace_sink *s)
     if (!t->sinks) deliver_until(t, INT64_MAX); /* to nobody: the levels stay right for the next listener */
 }
 
-/* Room for n more reports at the end: what waits moves down when the end of the array is reached. */
-static bool make_room(struct trace *t, unsigned n)
+struct trace_step *trace_room(struct trace *t, unsigned n)
 {
-    if (t->first + t->pending_count + n <= TRACE_PENDING_MAX) return true;
-    memmove(t->pending, t->pending + t->first, t->pending_count * sizeof *t->pending);
-    t->first = 0;
-    return t->pending_count + n <= TRACE_PENDING_MAX;
+    if (t->first + t->pending_count + n > TRACE_PENDING_MAX) {
+        memmove(t->pending, t->pending + t->first, t->pending_count * sizeof *t->pending);
+        t->first = 0;
+    }
+    if (t->pending_count + n <= TRACE_PENDING_MAX) return t->pending + t->first + t->pending_count;
+    t->dropped += n;
+    return NULL;
 }
 
-/* Reports are nearly in order: an insertion sort. */
-static void insert(struct trace *t, const struct trace_step *s)
+/* Reports are nearly in order: an insertion sort that ends with the first new step that comes after all old ones. */
+void trace_commit(struct trace *t, unsigned n)
 {
     struct trace_step *const first = t->pending + t->first;
-    struct trace_step *at = first + t->pending_count++;
-    for (; at > first && at[-1].t_ns > s->t_ns; at--) at[0] = at[-1];
-    *at = *s;
+    struct trace_step *s = first + t->pending_count;
+    const int64_t last_ns = s > first ? s[-1].t_ns : t->done_ns;
+    t->pending_count += n;
+    for (const struct trace_step *const end = s + n; s < end && s->t_ns < last_ns; s++) {
+        struct trace_step e = *s, *at = s;
+        t->late += e.t_ns < t->done_ns;
+        if (e.t_ns < t->done_ns) e.t_ns = t->done_ns;
+        for (; at > first && at[-1].t_ns > e.t_ns; at--) at[0] = at[-1];
+        *at = e;
+    }
 }
 
 void trace_steps(struct trace *t, const struct trace_step *s, unsigned n)
 {
-    if (n == 0 || !make_room(t, n)) {
-        t->dropped += n;
-        return;
-    }
-    const unsigned end = t->first + t->pending_count;
-    if (s->t_ns >= t->done_ns && (t->pending_count == 0 || t->pending[end - 1].t_ns <= s->t_ns)) {
-        memcpy(t->pending + end, s, n * sizeof *s);
-        t->pending_count += n;
-        return;
-    }
-    for (; n > 0; n--, s++) {
-        const bool late = s->t_ns < t->done_ns;
-        t->late += late;
-        insert(t, &(struct trace_step){late ? t->done_ns : s->t_ns, s->lines, s->level});
-    }
-}
-
-void trace_set(struct trace *t, unsigned sig, bool level, int64_t t_ns)
-{
-    const uint32_t bit = UINT32_C(1) << sig;
-    if (!(t->watched & bit) && t->pending_count == 0) t->level = level ? t->level | bit : t->level & ~bit;
-    else trace_steps(t, &(struct trace_step){t_ns, bit, level ? bit : 0}, 1);
+    struct trace_step *room = trace_room(t, n);
+    if (!room) return;
+    memcpy(room, s, n * sizeof *s);
+    trace_commit(t, n);
 }
 
 void trace_each(const struct trace_step *s, unsigned n, uint32_t mask, trace_change_fn *change, void *ctx)

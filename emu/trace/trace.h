@@ -16,7 +16,8 @@
 #define TRACE_PENDING_MAX 16384u
 #define TRACE_LAG_NS      200000 /* longer than any byte or word on a board's lines */
 
-/* From t_ns on the signals in the mask `lines` have these levels. Bit per signal; at one instant in order of their numbers. */
+/* From t_ns on the signals in the mask `lines` have these levels. Bit per signal; at one instant in order of their
+ * numbers. Bits of `level` outside the mask mean nothing. */
 struct trace_step {
     int64_t t_ns;
     uint32_t lines, level;
@@ -24,7 +25,7 @@ struct trace_step {
 
 struct trace_sink {
     uint32_t mask; /* bit i: wants signal i */
-    /* n steps in order of time. `lines` are real changes, of all signals: look at those in the mask. */
+    /* n steps in order of time. `lines` are real changes, perhaps none, of all signals: look at those in the mask. */
     void (*steps)(void *ctx, const struct trace_step *s, unsigned n);
     void (*advance)(void *ctx, int64_t t_ns); /* nothing more will come before t_ns; may be NULL */
     void *ctx;
@@ -62,11 +63,22 @@ static inline bool trace_watched(const struct trace *t, uint32_t mask)
     return (t->watched & mask) != 0;
 }
 
-/* Reports the level of a signal from t_ns on. Cheap no-op when nobody listens to it. */
-void trace_set(struct trace *t, unsigned sig, bool level, int64_t t_ns);
-
-/* The same for n steps, which are in order of time: a byte, a word. */
+/* Reports n steps that are in order of time: the edges of a byte, a word. */
 void trace_steps(struct trace *t, const struct trace_step *s, unsigned n);
+
+/* The same without a copy: room for up to n steps to be filled in order of time, then how many there are. NULL, and
+ * nothing to commit, when pending is full. */
+struct trace_step *trace_room(struct trace *t, unsigned n);
+void trace_commit(struct trace *t, unsigned n);
+
+/* Reports the level of a signal from t_ns on. Cheap when nobody listens to it. */
+static inline void trace_set(struct trace *t, unsigned sig, bool level, int64_t t_ns)
+{
+    const uint32_t bit = UINT32_C(1) << sig;
+    const uint32_t bits = (uint32_t)level << sig;
+    if (!(t->watched & bit) && t->pending_count == 0) t->level = (t->level & ~bit) | bits;
+    else trace_steps(t, &(struct trace_step){t_ns, bit, bits}, 1);
+}
 
 /* Calls a function for each change that a sink was given, one signal at a time: for sinks that need no speed. */
 typedef void trace_change_fn(void *ctx, unsigned sig, bool level, int64_t t_ns);

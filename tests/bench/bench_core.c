@@ -12,7 +12,7 @@
 #include <string.h>
 #include <time.h>
 
-#define STEP_NS  100000 /* as the loop of the emulator: the trace lags behind */
+#define STEP_NS  1000000 /* the trace is advanced once a frame */
 #define TAPE_MAX 65536u
 #define FRAME_NS 1000000
 
@@ -52,9 +52,10 @@ static void frame(void *ctx, const struct psa2_frame *f, int64_t t_ns)
 
 static void count(void *ctx, const struct trace_step *s, unsigned n)
 {
-    struct bench *b = ctx;
+    uint64_t edges = 0;
     for (; n > 0; n--, s++)
-        for (uint32_t left = s->lines; left; left &= left - 1) b->edges++;
+        for (uint32_t left = s->lines; left; left &= left - 1) edges++;
+    ((struct bench *)ctx)->edges += edges;
 }
 
 static void to_tape(void *ctx, const struct trace_step *s, unsigned n)
@@ -115,20 +116,25 @@ static void replay(struct bench *n, uint64_t frames)
 
 static const struct bench_case {
     const char *name;
+    enum ads1282_chain chain;
     void (*before)(struct bench *n);
     void (*run)(struct bench *n, uint64_t frames);
 } cases[] = {
-    {"frames", NULL, run_frames},          /* nobody watches, bit-exact decimation chain */
-    {"frames-watched", watch, run_frames}, /* all lines, a watcher that counts */
-    {"frames-vcd", record, run_frames},    /* all lines into a VCD */
-    {"vcd", tape_then_record, replay},     /* the VCD writer alone, fed with the edges of frames */
+    {"frames", ADS1282_CHAIN_EXACT, NULL, run_frames},               /* nobody watches, bit-exact decimation chain */
+    {"frames-direct", ADS1282_CHAIN_DIRECT, NULL, run_frames},       /* without the chain */
+    {"frames-modulator", ADS1282_CHAIN_MODULATOR, NULL, run_frames}, /* with a bit-true modulator, too */
+    {"frames-watched", ADS1282_CHAIN_EXACT, watch, run_frames},      /* all lines, a watcher that counts */
+    {"frames-watched-direct", ADS1282_CHAIN_DIRECT, watch, run_frames},
+    {"frames-vcd", ADS1282_CHAIN_DIRECT, record, run_frames}, /* all lines into a VCD */
+    {"vcd", ADS1282_CHAIN_DIRECT, tape_then_record, replay},  /* the VCD writer alone, fed with the edges of frames */
 };
 
-static void power_up(struct bench *n)
+static void power_up(struct bench *n, enum ads1282_chain chain)
 {
     const struct psa2_io io = {.ctx = n, .accel = accel, .temp_degc = degc, .frame = frame};
     const struct psa2_profile p = psa2_profile_default();
-    struct psa2_unit_cfg u = {.adc_noise_scale = 1.0, .temp_noise_scale = 1.0, .seed = 1, .serial = 1};
+    struct psa2_unit_cfg u = {
+        .adc_noise_scale = 1.0, .temp_noise_scale = 1.0, .adc_chain = chain, .seed = 1, .serial = 1};
     for (unsigned i = 0; i < 3; i++) u.afe[i] = afe_nominal(AFE_VOLTAGE);
     memset(n, 0, sizeof *n);
     sched_init(&n->s);
@@ -140,7 +146,7 @@ static void power_up(struct bench *n)
 static void run_case(const struct bench_case *c, uint64_t frames)
 {
     static struct bench n;
-    power_up(&n);
+    power_up(&n, c->chain);
     if (c->before) c->before(&n);
     n.edges = 0;
     const uint64_t first = n.frames;

@@ -2,6 +2,7 @@
 
 #include "base/bits.h"
 #include "base/clk.h"
+#include "base/rng.h"
 
 static void edges_are_exact_after_an_hour(void **state)
 {
@@ -31,7 +32,26 @@ static void count_at_finds_the_first_edge_not_before(void **state)
     }
 }
 
-static void a_walk_meets_every_edge(void **state)
+/* The definition, at and around edges that are and that are not whole nanoseconds, near and far. */
+static void count_at_is_the_first_edge_of_any_clock(void **state)
+{
+    (void)state;
+    const struct clk clocks[] = {{0, 4096000, 1},   {7, 4096000, 3},    {0, 2000000, 1}, {0, 7680000, 7},
+                                 {0, 999999937, 1}, {3, 1000000000, 1}, {0, 1, 1}};
+    struct rng r = rng_stream(rig_seed(1), 0, "clk");
+    for (size_t i = 0; i < COUNT(clocks); i++)
+        for (int n = 0; n < 20000; n++) {
+            const struct clk *c = &clocks[i];
+            const int64_t t_ns = c->t0_ns + (int64_t)(rng_u64(&r) % (n % 2 ? 10000 : UINT64_C(100000000000000)));
+            const int64_t at_ns = n % 3 ? t_ns : clk_edge_ns(c, clk_count_at(c, t_ns)) + n % 9 / 3 - 1;
+            if (at_ns < c->t0_ns) continue;
+            const int64_t k = clk_count_at(c, at_ns);
+            assert_true(clk_edge_ns(c, k) >= at_ns);
+            assert_true(k == 0 || clk_edge_ns(c, k - 1) < at_ns);
+        }
+}
+
+static void steps_meet_every_edge(void **state)
 {
     (void)state;
     const struct clk clocks[] = {{0, 4096000, 1},  {7, 4096000, 3},   {0, 2000000, 1},
@@ -42,9 +62,12 @@ static void a_walk_meets_every_edge(void **state)
         for (size_t s = 0; s < COUNT(starts); s++)
             for (size_t e = 0; e < COUNT(steps); e++) {
                 if (clocks[c].hz == 1 && s == 3) continue; /* beyond what 64 bits of ns hold */
-                struct clk_walk w = clk_walk(&clocks[c], starts[s], steps[e]);
-                for (int64_t i = 0; i < 5000; i++, clk_walk_on(&w))
-                    assert_int_equal(w.t_ns, clk_edge_ns(&clocks[c], starts[s] + i * steps[e]));
+                struct clk_pos p = clk_pos(&clocks[c], starts[s]);
+                const struct clk_step step = clk_step(&clocks[c], steps[e]);
+                for (int64_t k = starts[s]; k < starts[s] + 5000 * steps[e]; k += steps[e], p = clk_on(p, &step)) {
+                    assert_int_equal(p.k, k);
+                    assert_int_equal(p.t_ns, clk_edge_ns(&clocks[c], k));
+                }
             }
 }
 
@@ -77,7 +100,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(edges_are_exact_after_an_hour),
         cmocka_unit_test(count_at_finds_the_first_edge_not_before),
-        cmocka_unit_test(a_walk_meets_every_edge),
+        cmocka_unit_test(count_at_is_the_first_edge_of_any_clock),
+        cmocka_unit_test(steps_meet_every_edge),
         cmocka_unit_test(rounding_and_sign_extension_keep_their_signs),
     };
     return cmocka_run_group_tests_name("clk", tests, NULL, NULL);

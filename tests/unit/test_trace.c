@@ -158,6 +158,8 @@ static void a_full_window_drops_and_counts(void **state)
     listen(&ear, 7);
     for (unsigned i = 0; i < TRACE_PENDING_MAX + 3; i++) trace_set(&trace, 1, true, 10);
     assert_int_equal(trace.dropped, 3);
+    assert_null(trace_room(&trace, 2));
+    assert_int_equal(trace.dropped, 5);
     trace_advance(&trace, 10);
     assert_int_equal(trace.pending_count, 0);
 }
