@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from psabench import chips, clib
+from psabench import chips, clib, places
 from psabench.chips import Bench, Frame, Part, ads1256_volts, ads1282_volts
 from psabench.errors import BadInput, BenchError, TimeOut
 from psabench.vcd import read_vcd
@@ -133,6 +133,7 @@ def test_a_library_that_lacks_a_function_is_refused(tmp_path: Path) -> None:
 
 def test_the_environment_names_one_library_and_no_other(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("PSABENCH_LIB", "/nowhere/libpsabench.so.0")
+    monkeypatch.setattr(places, "CHECKOUT", tmp_path)  # nor is one there
     with pytest.raises(BadInput, match=r"not found at PSABENCH_LIB=/nowhere/libpsabench.so.0; `make` builds it"):
         clib.library.__wrapped__()
     text = tmp_path / "text"
