@@ -41,6 +41,12 @@ static bool bit_true(const struct ads1282 *a)
     return a->cfg.chain == ADS1282_CHAIN_MODULATOR || ads1282_bits_only(a);
 }
 
+/* Samples are those of the modulator's clock, not of sinc blocks or data periods. */
+static bool at_modulator_rate(const struct ads1282 *a)
+{
+    return bit_true(a) || (ads1282_sinc_only(a) && a->cfg.chain == ADS1282_CHAIN_EXACT);
+}
+
 static unsigned log2_of(unsigned power_of_two)
 {
     unsigned n = 0;
@@ -107,16 +113,21 @@ static void sample_fir(struct ads1282 *a, int64_t until_ns)
     }
 }
 
+/* The sinc alone passes what a held block would lose: each clock of the modulator is sampled. N^5 times full scale needs
+ * up to 70 bits: the sample is taken in two parts. */
 static void sample_sinc(struct ads1282 *a, int64_t until_ns)
 {
-    const unsigned shift = 4 * log2_of(a->filter.sinc_ratio) + 4; /* word of full scale 2^30 */
+    enum { LOW = 14 };
+    const unsigned shift = 5 * log2_of(a->cic.ratio) + 4 - LOW; /* word of full scale 2^30 */
     while (a->next_ns <= until_ns) {
-        const unsigned k = (unsigned)a->index;
-        a->sinc[k % ADS1282_BLOCKS] = noisy_input(a);
+        int64_t high, low;
+        const int64_t x = noisy_input(a);
+        const int64_t x_high = bits_round_shift(x, LOW);
         advance(a);
-        int64_t y = 0;
-        for (unsigned j = 0; j < ADS1282_SINC_TAPS; j++) y += a->filter.sinc_tap[j] * a->sinc[(k - j) % ADS1282_BLOCKS];
-        a->result[k % ADS1282_RESULTS] = bits_round_shift(y, shift);
+        (void)ads1282_cic_take(&a->cic_low, x - x_high * (1 << LOW), &low);
+        if (!ads1282_cic_take(&a->cic, x_high, &high)) continue;
+        const unsigned k = (unsigned)a->block++;
+        a->result[k % ADS1282_RESULTS] = bits_round_shift(high + bits_round_shift(low, LOW), shift);
     }
 }
 
@@ -231,7 +242,7 @@ static void time_samples(struct ads1282 *a)
     const int64_t n = ads1282_sinc_ratio(a);
     t->step_tclk = 4 * n;
     t->origin_tclk = block_origin_tclk(a);
-    if (bit_true(a)) {
+    if (at_modulator_rate(a)) {
         t->step_tclk = 4;
         t->origin_tclk += ads1282_sinc_only(a) ? 2 - 2 * n : 2 + 2 * n; /* the first clock of block 0, or of block 1 */
         if (ads1282_bits_only(a)) t->origin_tclk = 4;
@@ -261,13 +272,23 @@ void ads1282_chain_configure(struct ads1282 *a)
     a->direct_gain = (ads1282_sinc_only(a) ? 1.0 : fir_dc(a->filter.phase).gain) / 16.0;
 }
 
-/* Root of the sum of squares of the sinc's weights of held blocks, of DC gain 1. */
-static double sinc_noise_gain(const struct ads1282_filter *f)
+/* n over 9. */
+static double choose9(double n)
 {
-    double power = 0.0;
-    const double n2 = (double)f->sinc_ratio * f->sinc_ratio;
-    for (int j = 0; j < ADS1282_SINC_TAPS; j++) power += (double)f->sinc_tap[j] * f->sinc_tap[j] / (n2 * n2 * n2 * n2);
-    return sqrt(power);
+    double c = 1.0;
+    for (int i = 0; i < 9; i++) c *= (n - i) / (9 - i);
+    return c;
+}
+
+/* Root of the sum of squares of the sinc's impulse response of DC gain 1, times sqrt(N). The sum is the middle coefficient
+ * of the tenth power of 1 + z + .. + z^(N-1). */
+static double sinc_noise_gain(double n)
+{
+    static const double choose10[5] = {1, -10, 45, -120, 210};
+    double sum = 0.0;
+    for (int j = 0; j < 5; j++)
+        if (5 * (n - 1) - j * n >= 0) sum += choose10[j] * choose9(5 * (n - 1) - j * n + 9);
+    return sqrt(sum / (n * n * n * n * n * n * n * n * n));
 }
 
 /* From the rms that the published figure means behind the FIR, in LSB of 2^-34 full scale, to that of one draw: the noise
@@ -275,9 +296,10 @@ static double sinc_noise_gain(const struct ads1282_filter *f)
 double ads1282_chain_noise_lsb(const struct ads1282 *a, double output_lsb)
 {
     const double block_lsb = output_lsb / ads1282_filter_noise_gain(&a->filter);
-    if (bit_true(a)) return block_lsb / DRAW_SD * sqrt((double)a->filter.sinc_ratio);
+    const double n = a->filter.sinc_ratio;
+    if (at_modulator_rate(a)) return block_lsb / DRAW_SD * sqrt(n);
     if (a->cfg.chain != ADS1282_CHAIN_DIRECT) return block_lsb / DRAW_SD;
-    return (ads1282_sinc_only(a) ? block_lsb * sinc_noise_gain(&a->filter) : output_lsb) / 16.0;
+    return (ads1282_sinc_only(a) ? block_lsb * sinc_noise_gain(n) : output_lsb) / 16.0;
 }
 
 /* ---- Restart ---- */
@@ -295,6 +317,7 @@ void ads1282_chain_restart(struct ads1282 *a)
     ads1282_filter_clear(&a->filter);
     ads1282_mod_clear(&a->mod);
     ads1282_cic_init(&a->cic, ads1282_sinc_ratio(a));
+    a->cic_low = a->cic;
     memset(a->sinc, 0, sizeof a->sinc);
     memset(a->result, 0, sizeof a->result);
     const struct ads1282_timing *t = &a->timing;

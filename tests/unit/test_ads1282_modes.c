@@ -68,8 +68,8 @@ static void sinc_words_are_right_justified_and_not_clipped(void **state)
     }
 }
 
-/* A step between two blocks runs through the five weights of the sinc: with everything before it 0, word m has their
- * sum up to m. */
+/* A step between two blocks runs through the sinc: with everything before it 0, word m is its step response after m + 1
+ * blocks, whole after five. */
 static void a_step_passes_the_sinc_in_five_words(void **state)
 {
     (void)state;
@@ -79,15 +79,15 @@ static void a_step_passes_the_sinc_in_five_words(void **state)
         wreg(&r, 1, (uint8_t)(0x41 | sinc_rates[k].dr << 3));
         for (int i = 0; i < 10; i++) to_fall(&r);
         const int64_t step = 4 * (int64_t)sinc_rates[k].n;
-        at_tclk(&r, r.tclk + 2); /* middles of blocks lie 2 N + 264 tCLK before words: a step here is between two */
+        const int64_t latency = 264 % step; /* words come 264 tCLK behind their last block */
+        at_tclk(&r, r.tclk + step - latency);
         ads1282_sample_until(&r.a, r.s.now_ns);
         r.v = 1.25;
         int32_t tap[ADS1282_SINC_TAPS];
         ads1282_sinc_taps(sinc_rates[k].n, tap);
         int64_t sum = 0;
         const double n4 = pow(sinc_rates[k].n, 4);
-        const int late = (int)((264 + 2 * sinc_rates[k].n - 2) / step);
-        for (int m = -late; m < 8; m++) {
+        for (int m = -1 - (int)(264 / step); m < 8; m++) {
             to_fall(&r);
             if (m >= 0 && m < ADS1282_SINC_TAPS) sum += tap[m];
             hex_is((uint32_t)(r.a.out >> 32), (uint32_t)llround(0x1p29 * (double)sum / n4));

@@ -147,6 +147,53 @@ static void minus_3_db_lies_at_0_413_of_the_data_rate(void **state)
     near(sine_db(ADS1282_CHAIN_MODULATOR, 3, 1, corner[1]), -3.0, 0.05);
 }
 
+/* Sources 1.8: |sin(pi N f/fMOD) / (N sin(pi f/fMOD))|^5, -3 dB at 0.2038 of its rate; no held block droops here. */
+static void the_sinc_alone_has_its_formula_and_minus_3_db_at_0_2038(void **state)
+{
+    (void)state;
+    static const double f[] = {0.02, 0.1, 0.2038, 0.35, 0.48};
+    for (unsigned k = 0; k < 2 * 5 * COUNT(f); k++) {
+        struct rig r;
+        struct ads1282_cfg cfg = quiet;
+        const unsigned dr = k / 2 % 5;
+        const double n = 128 >> dr;
+        cfg.chain = k % 2 ? ADS1282_CHAIN_MODULATOR : ADS1282_CHAIN_EXACT;
+        if (cfg.chain == ADS1282_CHAIN_MODULATOR && n < 32) continue; /* the bits' own noise is loud there */
+        powered(&r, &cfg);
+        wreg(&r, 1, (uint8_t)(0x41 | dr << 3));
+        r.sine_v = 2.0;
+        r.sine_hz = f[k / 10] * (8000 << dr);
+        static double word[400];
+        for (unsigned p = 0; p < COUNT(word); p++) {
+            to_fall(&r);
+            word[p] = (double)(int32_t)(uint32_t)(r.a.out >> 32) * 0x1p-30 * 2.5 / 2.0;
+        }
+        const double x = PI * f[k / 10] / n;
+        const double want = pow(sin(n * x) / (n * sin(x)), 5);
+        near(cabs(gain_of(word, 8, COUNT(word), f[k / 10])), want,
+             k % 2 ? 1e-5 : 3e-6); /* instants are rounded to a nanosecond */
+        if (k / 10 == 2) near(20.0 * log10(want), -3.01, 0.06);
+    }
+}
+
+/* Sources 1.8, D p. 16. The sampled instants are whole clocks apart: a sine there is a constant. */
+static void images_at_the_modulators_rate_are_not_attenuated(void **state)
+{
+    (void)state;
+    for (int chain = ADS1282_CHAIN_EXACT; chain <= ADS1282_CHAIN_MODULATOR; chain++) {
+        double word[2];
+        for (int image = 0; image < 2; image++) {
+            struct rig r;
+            chip_up(&r, (enum ads1282_chain)chain, 4, 0);
+            r.sine_v = 1.0;
+            r.sine_hz = 100.0 + image * 1024000.0;
+            word[image] = fraction(settled_word(&r));
+        }
+        near(fabs(word[1]), fabs(word[0]), 0.003); /* instants are rounded to a nanosecond: 6 mrad of 1 MHz */
+        assert_true(fabs(word[0]) > 0.01);
+    }
+}
+
 static void what_lies_above_half_the_data_rate_is_gone(void **state)
 {
     (void)state;
@@ -205,6 +252,8 @@ int main(void)
         cmocka_unit_test(words_of_a_sine_have_the_response_of_the_coefficients_to_1e_9),
         cmocka_unit_test(the_sinc_at_the_modulators_rate_has_its_formula_to_1e_9),
         cmocka_unit_test(minus_3_db_lies_at_0_413_of_the_data_rate),
+        cmocka_unit_test(the_sinc_alone_has_its_formula_and_minus_3_db_at_0_2038),
+        cmocka_unit_test(images_at_the_modulators_rate_are_not_attenuated),
         cmocka_unit_test(what_lies_above_half_the_data_rate_is_gone),
         cmocka_unit_test(words_are_30_80_and_5_data_periods_old),
         cmocka_unit_test(first_drdy_after_sync_comes_at_t_dr_to_one_tclk),
