@@ -107,6 +107,7 @@ def main(argv: list[str]) -> int:
     parser.add_argument("--page-only", action="store_true", help="write it from the last result")
     args = parser.parse_args(argv)
     result_file = OUT / "result.json"
+    os.environ["PYTHONPATH"] = str(ROOT / "scripts")  # what is measured is this checkout
     if not args.page_only:
         result_file.unlink(missing_ok=True)
         result_file.parent.mkdir(parents=True, exist_ok=True)
@@ -122,4 +123,7 @@ def main(argv: list[str]) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    try:
+        sys.exit(main(sys.argv[1:]))
+    except (RuntimeError, OSError) as e:
+        sys.exit(f"bench: {e}")
