@@ -339,7 +339,7 @@ static void same_seed_same_words_in_every_chain_with_any_compiler(void **state)
 {
     (void)state;
     static const uint64_t want[3] = {UINT64_C(0x9904672CE23F7505), UINT64_C(0x81F068BC9F4726A8),
-                                     UINT64_C(0xA0BC565C763835D0)};
+                                     UINT64_C(0x5241E429ED5A6BF9)};
     for (int chain = ADS1282_CHAIN_EXACT; chain <= ADS1282_CHAIN_DIRECT; chain++) {
         uint64_t hash = UINT64_C(0xCBF29CE484222325); /* FNV-1a */
         static const uint8_t modes[] = {0x52, 0x56, 0x63, 0x41, 0x59, 0x61, 0xE6};
