@@ -9,6 +9,7 @@ from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 
+import numpy as np
 import pytest
 from chip_bench import Ads1282, Clock, Recording, no_complaints
 
@@ -341,3 +342,171 @@ def test_figures_scale_with_the_clock(tmp_path: Path) -> None:
                 clk.complaint(f"{hz} Hz: pulse", r.nth_ns("DRDY", 1, falls[0]), falls[1], DRDY_PULSE),
             ]
         )
+
+
+def strobe(s: Ads1282, *widths_ns: int) -> None:
+    """SCLK high, low, high, low ... for these times."""
+    for n, width_ns in enumerate(widths_ns):
+        s.pin("SCLK", 1 - n % 2)
+        s.wait_ns(width_ns)
+
+
+LIMITS = [  # counter, SCLK high and low in turn, breaches; tCLK is 244.14 ns
+    ("limit_sclk_period", (250, 239) * 8, 0),  # 2 tCLK are 488.3 ns
+    ("limit_sclk_period", (247, 240) * 8, 7),
+    ("limit_sclk_period", (1950, 1950) * 8, 0),  # 16 tCLK are 3906 ns
+    ("limit_sclk_period", (1960, 1960) * 8, 7),
+    ("limit_sclk_width", (196, 300) * 8, 0),  # 0.8 tCLK are 195.3 ns
+    ("limit_sclk_width", (194, 300) * 8, 8),
+    ("limit_sclk_width", (300, 194) * 8, 7),
+    ("limit_sclk_width", (2441, 300) * 8, 0),  # 10 tCLK are 2441.4 ns
+    ("limit_sclk_width", (2443, 300) * 8, 8),
+]
+
+
+@pytest.mark.parametrize(("counter", "widths_ns", "breaches"), LIMITS)
+def test_limits_of_sclk_are_counted(counter: str, widths_ns: tuple[int, ...], breaches: int, tmp_path: Path) -> None:
+    with ready(tmp_path / "a.vcd") as s:
+        s.wait_ns(300_000)
+        before = s.adc.counters[counter]
+        strobe(s, *widths_ns)
+        assert s.adc.counters[counter] - before == breaches
+
+
+@pytest.mark.parametrize(
+    ("setup_ns", "hold_ns", "counter"), [(50, 50, ""), (49, 50, "din_setup"), (50, 49, "din_hold")]
+)
+def test_set_up_and_hold_of_din_are_counted(setup_ns: int, hold_ns: int, counter: str, tmp_path: Path) -> None:
+    with ready(tmp_path / "a.vcd") as s:
+        s.wait_ns(300_000)
+        before = s.adc.counters
+        s.pin("DIN", 1)
+        s.wait_ns(setup_ns)
+        s.pin("SCLK", 1)
+        s.wait_ns(hold_ns)
+        s.pin("DIN", 0)
+        after = s.adc.counters
+    found = {name for name in ("din_setup", "din_hold") if after[f"limit_{name}"] > before[f"limit_{name}"]}
+    assert found == ({counter} if counter else set())
+
+
+@pytest.mark.parametrize(
+    ("pin", "width_ns", "counter"),
+    [
+        ("SYNC", 489, ""),
+        ("SYNC", 487, "sync_width"),
+        ("RESET", 489, ""),
+        ("RESET", 487, "reset_width"),
+    ],
+)
+def test_pulses_below_2_clocks_are_counted(pin: str, width_ns: int, counter: str, tmp_path: Path) -> None:
+    with ready(tmp_path / "a.vcd") as s:
+        s.bench.run_until_ns(100_000_100)  # 41 ns before an edge of CLK and more behind one
+        s.pulse(pin, 1 if pin == "SYNC" else 0, width_ns)
+        after = s.adc.counters
+    found = {name for name in ("sync_width", "reset_width") if after[f"limit_{name}"]}
+    assert found == ({counter} if counter else set())
+
+
+@pytest.mark.parametrize(("away_ns", "counted"), [(31, 0), (29, 1)])
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_sync_within_30_ns_of_a_clock_edge_is_counted(away_ns: int, counted: int, sign: int, tmp_path: Path) -> None:
+    with ready(tmp_path / "a.vcd") as s:
+        s.bench.run_until_ns(100_000_000 + sign * away_ns)  # 409600 clocks
+        s.pin("SYNC", 1)
+        assert s.adc.counters["limit_sync_keepout"] == counted
+
+
+def test_a_read_in_the_last_4_clocks_is_late_and_tears(tmp_path: Path) -> None:
+    """24 bits before, 8 behind the fall of DRDY: the upper bits are the old word's, the lower ones the new word's."""
+    with ready(tmp_path / "a.vcd") as s:
+        s.adc.set_volts(0, 1.0)
+        s.words(70)
+        s.adc.set_volts(0, -1.0)
+        old = s.words(1)[0]
+        s.fall()
+        plain = s.now_ns
+        s.bench.run_until_ns(plain + 1_000_000 - 24_500)
+        s.adc.spi_clock(1_000_000)
+        before = s.adc.counters["torn_reads"]
+        torn = s.word()
+        assert s.adc.counters["torn_reads"] == before + 1
+        assert s.adc.counters["late_reads"] >= 1
+        s.adc.spi_clock(1_000_000, 6e-6)
+        s.words(1)
+        r = s.recording()
+    begin_ns = r.nth_ns("SCLK", 1, plain)
+    fall_ns = r.nth_ns("DRDY", 0, begin_ns)
+    bits_before = len([t for t in r.edges_ns("SCLK", 1) if begin_ns <= t <= fall_ns])
+    assert 23 <= bits_before <= 25
+    assert old != torn
+
+
+def test_modulator_bits_come_at_a_quarter_of_the_clock_and_decode_to_the_input(tmp_path: Path) -> None:
+    """3 M0[n-2] - 6 M0[n-3] + 4 M0[n-4] + 9 (M1[n] - 2 M1[n-1] + M1[n-2]) with bits +-1; 1.7-modulator."""
+    means = []
+    for part in (0.0, 0.3, -0.7):
+        with ready(tmp_path / "a.vcd") as s:
+            s.write(1, config0(2, filtr=0))
+            s.adc.set_volts(0, 2.5 * part)
+            s.wait_ns(8_000_000)
+            r = s.recording()
+        rises = r.edges_ns("MCLK", 1)[-4100:-100]
+        assert len(rises) == 4000
+        no_complaints(CLK.complaint("MCLK", a, b, 4) for a, b in pairwise(rises))
+        m0, m1 = (2 * r.vcd.wires[pin].at(np.array(rises) + 244).astype(int) - 1 for pin in ("M0", "M1"))
+        y = 3 * m0[2:-2] - 6 * m0[1:-3] + 4 * m0[:-4] + 9 * (m1[4:] - 2 * m1[3:-1] + m1[2:-2])
+        means.append(float(y.mean()))
+    assert means[0] == pytest.approx(0.0, abs=2e-3)
+    assert means[1] / 0.3 == pytest.approx(means[2] / -0.7, rel=1e-2)
+    assert 0.5 < means[1] / 0.3 <= 1.0
+
+
+def test_mflag_shows_an_input_at_or_beyond_full_scale(tmp_path: Path) -> None:
+    with ready(tmp_path / "a.vcd") as s:
+        for volts, flag in ((2.49, 0), (2.51, 1), (-2.49, 0), (-2.51, 1), (0.0, 0)):
+            s.adc.set_volts(0, volts)
+            begin_ns = s.now_ns
+            s.wait_ns(1_000_000)
+            assert s.adc.pins["MFLAG"].level == flag, f"{volts} V"
+        r = s.recording()
+    assert len(r.edges_ns("MFLAG", 1)) == 2
+    assert r.level("MFLAG", begin_ns + 100_000) == 0
+
+
+@pytest.mark.parametrize("code", range(4))
+def test_pin_mode_takes_the_rate_from_its_pins(code: int, tmp_path: Path) -> None:
+    """1.1-pinmode-rates: 00 250, 01 500, 10 1000, 11 2000 SPS; synchronised by the pin."""
+    with Ads1282(tmp_path / "a.vcd", "ads1281", noise_scale=0, pin_mode=True, power_up_tclk=0) as s:
+        s.pin("DR0", code & 1)
+        s.pin("DR1", code >> 1)
+        s.wait_ns(1_000_000)
+        start_ns = s.pulse("SYNC", 1, PULSE_NS) - PULSE_NS
+        s.fall()
+        s.fall()
+        r = s.recording()
+    falls = [t for t in r.edges_ns("DRDY", 0) if t > start_ns]
+    no_complaints(
+        [
+            CLK.complaint("t_DR", start_ns, falls[0], T_DR[code]),
+            CLK.complaint("period", falls[0], falls[1], PERIOD[code]),
+        ]
+    )
+
+
+@pytest.mark.parametrize("chain", ["modulator", "direct"])
+def test_other_chains_have_the_same_times(chain: str, tmp_path: Path) -> None:
+    with Ads1282(tmp_path / "a.vcd", chain=chain, power_up_tclk=0) as s:
+        s.write(1, config0(3, phase=1))
+        start_ns = s.pulse("SYNC", 1, PULSE_NS) - PULSE_NS
+        for _ in range(3):
+            s.fall()
+        r = s.recording()
+    falls = [t for t in r.edges_ns("DRDY", 0) if t > start_ns]
+    no_complaints(
+        [
+            CLK.complaint("t_DR", start_ns, falls[0], T_DR[3]),
+            CLK.complaint("period", falls[0], falls[1], PERIOD[3]),
+            CLK.complaint("pulse", r.nth_ns("DRDY", 1, falls[1]), falls[2], DRDY_PULSE),
+        ]
+    )
