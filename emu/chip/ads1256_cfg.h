@@ -85,7 +85,7 @@ struct ads1256_counters {
     uint32_t window_reads;    /* bytes of a word that began in the 16 tau before an update */
     uint32_t clipped;         /* codes at either end */
     uint32_t buffer_clipped;  /* looks at an input outside the range of the buffer */
-    uint32_t range_exceeded;  /* looks at an input outside AGND - 0.1 V .. AVDD + 0.1 V */
+    uint32_t range_exceeded;  /* looks at a pair of inputs of which one is outside AGND - 0.1 V .. AVDD + 0.1 V */
     uint32_t bad_mux;         /* looks at an input that an ADS1255 does not have */
     uint32_t cal_clamped;     /* calibrations whose OFC or FSC did not fit into 24 bits */
     uint32_t bad_opcodes;     /* bytes that are no command */

@@ -83,6 +83,8 @@ void ads1256_mean_start(struct ads1256_mean *m, const struct ads1256_rate *r, un
         .cells = !sinc5 && cells_max && cells > cells_max ? cells_max : cells,
         .sinc5 = sinc5,
     };
+    const int64_t period = ads1256_period_tau(r);
+    m->half_tau = period % (2 * (int64_t)m->cells) ? 0 : period / (2 * (int64_t)m->cells);
 }
 
 /* Four cells of the sinc5 have gone by when the mean of a run begins; a mean without it has only its latest look. */
@@ -123,6 +125,7 @@ int64_t ads1256_cell_tau(const struct ads1256_mean *m, const struct ads1256_rate
 {
     /* A sinc5 run begins four cells earlier than a plain mean of the same centre begins, less half of that. */
     const int64_t lead = ADS1256_START_TAU - (m->sinc5 ? 4 : 2) * ADS1256_WORD_TAU;
+    if (m->half_tau) return lead + (2 * i + 1) * m->half_tau; /* the same without division */
     const int64_t period = ads1256_period_tau(r);
     const int64_t n = i / m->cells;
     const int64_t in_period = i % m->cells;

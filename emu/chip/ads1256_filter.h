@@ -52,11 +52,12 @@ double ads1256_noise_v(const struct ads1256_rate *r, unsigned gain_log2);
 
 /* Mean of a conversion in progress. */
 struct ads1256_mean {
-    unsigned cells;  /* in one conversion */
-    bool sinc5;      /* cells pass through the sinc5 first */
-    double tap[5];   /* newest first */
-    unsigned filled; /* taps that hold cells of this run, 0..5 */
-    unsigned words;  /* in the sum, 0 .. cells-1 */
+    unsigned cells;   /* in one conversion */
+    int64_t half_tau; /* half a cell; 0: no whole number of tau */
+    bool sinc5;       /* cells pass through the sinc5 first */
+    double tap[5];    /* newest first */
+    unsigned filled;  /* taps that hold cells of this run, 0..5 */
+    unsigned words;   /* in the sum, 0 .. cells-1 */
     double sum;
     double out; /* the latest complete mean */
 };

@@ -201,6 +201,26 @@ static void response_is_the_printed_one(void **state)
     }
 }
 
+/* B-spline of unit knots by the recursion of Cox and de Boor: what `degree` + 1 boxcars of length 1 make. */
+static double b_spline(unsigned degree, double x)
+{
+    if (degree == 0) return x >= 0.0 && x < 1.0;
+    return (x * b_spline(degree - 1, x) + (degree + 1.0 - x) * b_spline(degree - 1, x - 1.0)) / degree;
+}
+
+/* One look at 1 among looks at 0: the taps are the sinc5 in time, five boxcars seen at the middle of each word. */
+static void sinc5_is_five_boxcars(void **state)
+{
+    (void)state;
+    struct ads1256_mean m;
+    ads1256_mean_start(&m, &ads1256_rates[0], 0);
+    for (int i = 0; i < 5; i++) ads1256_mean_push(&m, 0.0);
+    for (int i = 0; i < 7; i++) {
+        ads1256_mean_push(&m, i == 0);
+        near(m.out, b_spline(4, i + 0.5), 1e-15);
+    }
+}
+
 static void minus_3_db_where_printed(void **state)
 {
     (void)state;
@@ -283,6 +303,7 @@ int main(void)
         cmocka_unit_test(code_arithmetic),
         cmocka_unit_test(calibration_arithmetic),
         cmocka_unit_test(response_is_the_printed_one),
+        cmocka_unit_test(sinc5_is_five_boxcars),
         cmocka_unit_test(minus_3_db_where_printed),
         cmocka_unit_test(mains_hum_vanishes_at_the_rates_meant_for_it),
         cmocka_unit_test(delay_of_a_ramp_is_that_of_the_filter),
