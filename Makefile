@@ -95,6 +95,8 @@ $(BUILD)/psabench.pc: emu/api/psabench.pc.in pyproject.toml Makefile FORCE
 	$(Q)sed -e 's|@PREFIX@|$(PREFIX)|; s|@LIBDIR@|$(LIBDIR)|; s|@VERSION@|$(VERSION)|' $< > $@.new
 	$(Q)cmp -s $@.new $@ && rm $@.new || mv $@.new $@
 
+# In a line of its own: .SECONDARY above would leave a target alone that waits for a file that is never there.
+.PHONY: FORCE
 FORCE:
 
 $(BUILD)/obj/%.o: %.c Makefile

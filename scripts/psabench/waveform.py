@@ -1,7 +1,8 @@
 """Pictures of a VCD excerpt as SVG: what a logic analyser would show, for README and docs.
 
 `python -m psabench.waveform RUN.vcd frame OUT.svg` draws the first whole frame on INT, DATA and CLK;
-`... setup OUT.svg` draws each transfer of the set-up after Res. Same input, same bytes; light and dark pages.
+`... setup OUT.svg` draws each transfer of the set-up after Res; `... rdata OUT.svg` the first RDATA that an ADS1256 of
+the library was asked for. Same input, same bytes; light and dark pages.
 """
 
 from __future__ import annotations
@@ -271,12 +272,33 @@ def setup_picture(vcd: Vcd) -> str:
     return render(vcd, (panel,), "Set-up after Res: each step at its data-ready event, bytes in order of sending")
 
 
+def rdata_picture(vcd: Vcd) -> str:
+    """The first RDATA of an ADS1256 in a recording of the library: command, t6, 24 bits. Raises ValueError."""
+    rows = ("DRDY", "CS", "SCLK", "DIN", "DOUT")
+    _need(vcd, set(rows))
+    falls = vcd.wires["SCLK"].edges_ns(0)  # mode 1: sampled where SCLK falls
+    cs = vcd.wires["CS"]
+    for start, end in zip(cs.edges_ns(0).tolist(), cs.edges_ns(1).tolist(), strict=False):
+        at = falls[(falls > start) & (falls <= end)].tolist()
+        sent = spi_bytes(vcd, "DIN", at)
+        if len(sent) != 4 or sent[0].text != "01":
+            continue
+        word = spi_bytes(vcd, "DOUT", at)[1:]
+        code = int("".join(t.text for t in word), 16)
+        signed = code - (code >> 23 << 24)
+        margin = (end - start) // 30
+        tags = [Tag("DIN", sent[0].start_ns, sent[0].end_ns, "01 RDATA"), *word]
+        section = Section(start - 2 * margin, end + margin, start)
+        return render(vcd, (Panel(rows, (section,), tags),), f"RDATA at t = {start / 1e6:.3f} ms: code {signed}")
+    raise ValueError("no RDATA of four bytes in it")
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Command line; 2 for bad input, with one line that says what would be right."""
     args = list(sys.argv[1:] if argv is None else argv)
-    pictures = {"frame": frame_picture, "setup": setup_picture}
+    pictures = {"frame": frame_picture, "setup": setup_picture, "rdata": rdata_picture}
     if len(args) != 3 or args[1] not in pictures:
-        print("usage: python -m psabench.waveform RUN.vcd frame|setup OUT.svg", file=sys.stderr)
+        print("usage: python -m psabench.waveform RUN.vcd frame|setup|rdata OUT.svg", file=sys.stderr)
         return 2
     try:
         svg = pictures[args[1]](read_vcd(Path(args[0])))
