@@ -30,25 +30,6 @@ struct rng rng_stream(uint64_t seed, uint64_t unit, const char *source)
     return r;
 }
 
-static uint64_t rotl(uint64_t x, int k)
-{
-    return (x << k) | (x >> (64 - k));
-}
-
-uint64_t rng_u64(struct rng *r)
-{
-    uint64_t *s = r->s;
-    const uint64_t out = rotl(s[1] * 5, 7) * 9;
-    const uint64_t t = s[1] << 17;
-    s[2] ^= s[0];
-    s[3] ^= s[1];
-    s[1] ^= s[2];
-    s[0] ^= s[3];
-    s[2] ^= t;
-    s[3] = rotl(s[3], 45);
-    return out;
-}
-
 double rng_uniform(struct rng *r)
 {
     return ((double)(rng_u64(r) >> 12) + 0.5) * 0x1p-52;

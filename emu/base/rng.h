@@ -15,7 +15,25 @@ struct rng {
 /* The stream of one noise source: unit is the unit's serial number, source a short constant name ("adc.x", "mems"). */
 struct rng rng_stream(uint64_t seed, uint64_t unit, const char *source);
 
-uint64_t rng_u64(struct rng *r);
+static inline uint64_t rng_rotl(uint64_t x, int k)
+{
+    return (x << k) | (x >> (64 - k));
+}
+
+static inline uint64_t rng_u64(struct rng *r)
+{
+    uint64_t *s = r->s;
+    const uint64_t out = rng_rotl(s[1] * 5, 7) * 9;
+    const uint64_t t = s[1] << 17;
+    s[2] ^= s[0];
+    s[3] ^= s[1];
+    s[1] ^= s[2];
+    s[0] ^= s[3];
+    s[2] ^= t;
+    s[3] = rng_rotl(s[3], 45);
+    return out;
+}
+
 double rng_uniform(struct rng *r); /* open interval (0, 1), 53 bits */
 double rng_gauss(struct rng *r);   /* mean 0, standard deviation 1 */
 

@@ -57,13 +57,17 @@ static unsigned log2_of(unsigned power_of_two)
 /* ---- Input ---- */
 
 /* Volts, as a number of full scale 2^34, to the modulator, which saturates. Rounds to nearest without a call into libm. */
-static int64_t saturate(struct ads1282 *a, double x)
+static int64_t saturated(double x)
 {
     const double max = ADS1282_SATURATION * (double)FS_LSB;
     if (!(x < max)) x = max; /* not a number saturates too */
     if (x < -max) x = -max;
-    a->last_lsb = (int64_t)(x + 0x1p36 + 0.5) - (INT64_C(1) << 36);
-    return a->last_lsb;
+    return (int64_t)(x + 0x1p36 + 0.5) - (INT64_C(1) << 36);
+}
+
+static int64_t saturate(struct ads1282 *a, double x)
+{
+    return a->last_lsb = saturated(x);
 }
 
 /* Zero mean, unit rms after division by DRAW_SD. Four uniforms are enough: the chain averages more than 50 blocks, which
@@ -78,7 +82,7 @@ static double draw(struct rng *r)
 
 static double input_v(const struct ads1282 *a)
 {
-    return a->mux == 2 || a->mux > 4 ? 0.0 : a->io.vin_v(a->io.ctx, a->mux, a->next_ns);
+    return a->mux == 2 || a->mux > 4 ? 0.0 : a->io.vin_v(a->io.ctx, a->mux, a->next.t_ns);
 }
 
 static int64_t noisy_input(struct ads1282 *a)
@@ -88,27 +92,40 @@ static int64_t noisy_input(struct ads1282 *a)
     return saturate(a, x);
 }
 
-/* To the next sample: the instant stays that of an exact CLK edge (clk_edge_ns), without its divisions. */
+/* To the next sample. */
 static void advance(struct ads1282 *a)
 {
     a->index++;
-    a->next_ns += a->step_ns;
-    a->next_rem += a->step_rem;
-    if (a->next_rem < a->clk.hz) return;
-    a->next_rem -= a->clk.hz;
-    a->next_ns++;
+    a->next = clk_on(a->next, &a->step);
 }
 
 /* ---- Ideal modulator, sinc by held blocks ---- */
 
+/* As noisy_input(), for n samples whose volts are known: the generator's state stays in registers. */
+static void modulate(struct ads1282 *a, const double *vin_v, unsigned n, int64_t *lsb)
+{
+    const double lsb_per_v = a->lsb_per_v, noise_lsb = a->noise_lsb;
+    struct rng noise = a->noise;
+    for (unsigned i = 0; i < n; i++) {
+        double x = vin_v[i] * lsb_per_v;
+        if (noise_lsb > 0.0) x += noise_lsb * draw(&noise);
+        lsb[i] = saturated(x);
+    }
+    a->noise = noise;
+    a->last_lsb = lsb[n - 1];
+}
+
+/* Blocks up to the end of their data period at a time. */
 static void sample_fir(struct ads1282 *a, int64_t until_ns)
 {
-    while (a->next_ns <= until_ns) {
+    while (a->next.t_ns <= until_ns) {
         const unsigned slot = (unsigned)(a->index % ADS1282_BLOCKS);
         const unsigned period = (unsigned)(a->index / ADS1282_BLOCKS);
-        a->sinc[slot] = noisy_input(a);
-        advance(a);
-        if (slot == ADS1282_BLOCKS - 1)
+        double vin_v[ADS1282_BLOCKS];
+        unsigned n = 0;
+        for (; slot + n < ADS1282_BLOCKS && a->next.t_ns <= until_ns; advance(a)) vin_v[n++] = input_v(a);
+        modulate(a, vin_v, n, a->sinc + slot);
+        if (slot + n == ADS1282_BLOCKS)
             a->result[period % ADS1282_RESULTS] = ads1282_filter_period(&a->filter, a->sinc);
     }
 }
@@ -119,7 +136,7 @@ static void sample_sinc(struct ads1282 *a, int64_t until_ns)
 {
     enum { LOW = 14 };
     const unsigned shift = 5 * log2_of(a->cic.ratio) + 4 - LOW; /* word of full scale 2^30 */
-    while (a->next_ns <= until_ns) {
+    while (a->next.t_ns <= until_ns) {
         int64_t high, low;
         const int64_t x = noisy_input(a);
         const int64_t x_high = bits_round_shift(x, LOW);
@@ -154,7 +171,7 @@ static void take_sinc(struct ads1282 *a, int64_t lsb)
 
 static void sample_bit_true(struct ads1282 *a, int64_t until_ns)
 {
-    while (a->next_ns <= until_ns) {
+    while (a->next.t_ns <= until_ns) {
         const bool decoded = a->index >= ADS1282_MOD_DELAY;
         int64_t y;
         ads1282_mod_step(&a->mod, noisy_input(a));
@@ -166,8 +183,8 @@ static void sample_bit_true(struct ads1282 *a, int64_t until_ns)
 
 static void sample_bits(struct ads1282 *a, int64_t until_ns)
 {
-    while (a->next_ns <= until_ns) {
-        const int64_t t_ns = a->next_ns;
+    while (a->next.t_ns <= until_ns) {
+        const int64_t t_ns = a->next.t_ns;
         ads1282_mod_step(&a->mod, noisy_input(a));
         advance(a);
         if (a->io.modulator) a->io.modulator(a->io.ctx, a->mod.m0 & 1, a->mod.m1 & 1, t_ns);
@@ -217,7 +234,7 @@ static int64_t direct_delay_tclk(const struct ads1282 *a)
 
 static void sample_direct(struct ads1282 *a, int64_t until_ns)
 {
-    while (a->next_ns <= until_ns) {
+    while (a->next.t_ns <= until_ns) {
         const unsigned k = (unsigned)a->index;
         double y = (double)saturate(a, input_v(a) * a->lsb_per_v) * a->direct_gain;
         if (a->noise_lsb > 0.0) y += a->noise_lsb * rng_gauss(&a->noise);
@@ -321,12 +338,8 @@ void ads1282_chain_restart(struct ads1282 *a)
     memset(a->sinc, 0, sizeof a->sinc);
     memset(a->result, 0, sizeof a->result);
     const struct ads1282_timing *t = &a->timing;
-    const int64_t hz = a->clk.hz;
     a->index = first_index(a);
     a->block = !ads1282_sinc_only(a);
-    const int64_t count = a->sync_count + t->origin_tclk + a->index * t->step_tclk;
-    a->next_ns = clk_edge_ns(&a->clk, count);
-    a->next_rem = count % hz * 1000000000 % hz;
-    a->step_ns = clk_span_ns(hz, t->step_tclk);
-    a->step_rem = t->step_tclk % hz * 1000000000 % hz;
+    a->next = clk_pos(&a->clk, a->sync_count + t->origin_tclk + a->index * t->step_tclk);
+    a->step = clk_step(&a->clk, t->step_tclk);
 }

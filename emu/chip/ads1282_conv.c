@@ -98,6 +98,7 @@ void ads1282_set_drdy(struct ads1282 *a, bool level, int64_t t_ns)
     if (a->drdy == level) return;
     a->drdy = level;
     a->pin.drdy_ns = t_ns;
+    if (level) sched_cancel(a->sched, &a->pulse); /* nothing is left for it to do */
     if (a->io.drdy) a->io.drdy(a->io.ctx, level, t_ns);
 }
 
@@ -121,11 +122,6 @@ void ads1282_tell_mflag(struct ads1282 *a, int64_t t_ns)
 static int64_t due_tclk(const struct ads1282 *a, int64_t p)
 {
     return a->timing.first_tclk + p * a->timing.period_tclk;
-}
-
-static int64_t due_ns(const struct ads1282 *a, int64_t p)
-{
-    return clk_edge_ns(&a->clk, a->sync_count + due_tclk(a, p));
 }
 
 static uint32_t get24(const struct ads1282 *a, unsigned low_byte)
@@ -155,7 +151,8 @@ static uint32_t fir_word(struct ads1282 *a, int64_t y)
 static void announce(struct ads1282 *a, uint32_t word, int64_t t_ns)
 {
     ads1282_serial_deliver(a, word, t_ns);
-    sched_at(a->sched, &a->pulse, clk_edge_ns(&a->clk, a->sync_count + due_tclk(a, a->period) - ADS1282_PULSE_TCLK));
+    a->update_ns = clk_on(a->ended, &a->pulse_step).t_ns;
+    sched_at(a->sched, &a->pulse, a->update_ns);
     ads1282_set_drdy(a, false, t_ns);
 }
 
@@ -194,7 +191,8 @@ static void on_due(void *ctx, int64_t t_ns)
     struct ads1282 *a = ctx;
     a->sample(a, t_ns);
     const int64_t p = a->period++;
-    sched_at(a->sched, &a->due, due_ns(a, a->period));
+    if (p > 0) a->ended = clk_on(a->ended, &a->period_step);
+    sched_at(a->sched, &a->due, clk_on(a->ended, &a->period_step).t_ns);
     ads1282_serial_period(a);
     if (!a->delivers) return;
     a->update_ns = INT64_MAX;
@@ -211,9 +209,7 @@ static void on_due(void *ctx, int64_t t_ns)
 
 static void on_pulse(void *ctx, int64_t t_ns)
 {
-    struct ads1282 *a = ctx;
-    a->update_ns = t_ns;
-    ads1282_set_drdy(a, true, t_ns);
+    ads1282_set_drdy(ctx, true, t_ns);
 }
 
 /* An input sample is due and somebody watches MFLAG or the modulator. */
@@ -222,7 +218,7 @@ static void on_watch(void *ctx, int64_t t_ns)
     struct ads1282 *a = ctx;
     a->sample(a, t_ns);
     ads1282_tell_mflag(a, t_ns);
-    sched_at(a->sched, &a->watch, a->next_ns);
+    sched_at(a->sched, &a->watch, a->next.t_ns);
 }
 
 void ads1282_sample_until(struct ads1282 *a, int64_t t_ns)
@@ -247,11 +243,14 @@ static void restart_at(struct ads1282 *a, int64_t edge, int64_t t_ns)
     if (!a->alive) return;
     a->sync_count = edge;
     a->period = 0;
-    sched_at(a->sched, &a->due, due_ns(a, 0));
+    a->ended = clk_pos(&a->clk, edge + due_tclk(a, 0));
+    a->period_step = clk_step(&a->clk, a->timing.period_tclk);
+    a->pulse_step = clk_step(&a->clk, a->timing.period_tclk - ADS1282_PULSE_TCLK);
+    sched_at(a->sched, &a->due, a->ended.t_ns);
     if (!a->running) return;
     ads1282_hpf_clear(&a->hpf);
     ads1282_chain_restart(a);
-    if ((a->io.mflag || (a->io.modulator && ads1282_bits_only(a)))) sched_at(a->sched, &a->watch, a->next_ns);
+    if ((a->io.mflag || (a->io.modulator && ads1282_bits_only(a)))) sched_at(a->sched, &a->watch, a->next.t_ns);
 }
 
 void ads1282_restart(struct ads1282 *a, int64_t t_ns)

@@ -34,7 +34,7 @@ bool ads1282_serial_under_way(const struct ads1282 *a)
 
 static bool read_under_way(const struct ads1282 *a, int64_t t_ns)
 {
-    return ads1282_serial_under_way(a) && t_ns - a->sclk_ns < clk_span_ns(a->clk.hz, READ_REST_TCLK);
+    return ads1282_serial_under_way(a) && t_ns - a->sclk_ns < a->rest_ns;
 }
 
 /* The output register takes a word, read or not: there is no lock. A read under way goes on at its bit in the new word
@@ -199,6 +199,7 @@ static void take_byte(struct ads1282 *a, uint8_t byte, int64_t t_ns)
 {
     if (a->cfg.pin_mode) return; /* commands do nothing */
     if (a->lost) lose_byte(a);
+    else if (!a->op && byte == 0 && !a->standby) return; /* WAKEUP of a part that is awake: what a read clocks in */
     else if (!a->op) opcode_byte(a, byte, t_ns);
     else if (a->op_stage == ADS1282_COUNT) count_byte(a, byte, t_ns);
     else if (a->op_stage != ADS1282_READ) data_byte(a, byte, t_ns);
@@ -275,5 +276,6 @@ void ads1282_serial_reset(struct ads1282 *a)
 void ads1282_serial_init(struct ads1282 *a)
 {
     a->gap_ns = clk_span_ns(a->clk.hz, GAP_TCLK);
+    a->rest_ns = clk_span_ns(a->clk.hz, READ_REST_TCLK);
     spi_init(&a->spi, on_byte, on_first, a);
 }

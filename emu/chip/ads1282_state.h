@@ -64,9 +64,10 @@ struct ads1282 {
     struct spi spi;
     uint64_t out; /* output register: the word below `out_phase` leading bits already gone */
     unsigned out_index, out_phase;
-    int64_t sclk_ns, rise_ns, gap_ns; /* last SCLK edge heard of; last rising edge; 24 tCLK */
-    int64_t update_ns;                /* 4 tCLK before the word is replaced, once that has come; else INT64_MAX */
-    unsigned rest_periods;            /* since SCLK last moved */
+    int64_t sclk_ns, rise_ns; /* last SCLK edge heard of; last rising edge */
+    int64_t gap_ns, rest_ns;  /* 24 tCLK; how long a read may pause */
+    int64_t update_ns;        /* 4 tCLK before the word is replaced; INT64_MAX: not known to be */
+    unsigned rest_periods;    /* since SCLK last moved */
 
     /* converter column */
     bool running;  /* the modulator runs */
@@ -90,16 +91,18 @@ struct ads1282 {
     int64_t sync_count;                                  /* CLK edge at which modulator and filter were restarted */
     int64_t period;                                      /* data periods ended since the restart */
     int64_t index;                                       /* next input sample */
-    int64_t next_ns;                                     /* its instant, with next_rem / clk.hz beyond it */
-    int64_t next_rem, step_ns, step_rem;
-    int64_t block; /* next sinc block to complete */
+    struct clk_pos next;                                 /* its instant */
+    struct clk_step step;                                /* from input sample to input sample */
+    int64_t block;                                       /* next sinc block to complete */
     int64_t sinc[ADS1282_BLOCKS];
     int64_t result[ADS1282_RESULTS]; /* of data period p at p: filter output, full scale 2^30 */
     int64_t last_lsb;                /* newest input sample, full scale 2^34 */
     double lsb_per_v, noise_lsb, direct_gain;
-    struct sched_ev due, pulse; /* DRDY falls; DRDY rises 4 tCLK earlier if nobody read */
-    struct sched_ev wake;       /* end of the internal reset */
-    struct sched_ev watch;      /* next input sample, where MFLAG or the modulator's bits are looked at */
+    struct clk_pos ended;                    /* end of data period `period` - 1, at first of period 0 */
+    struct clk_step period_step, pulse_step; /* from there to the next end; to 4 tCLK before it */
+    struct sched_ev due, pulse;              /* DRDY falls; DRDY rises 4 tCLK earlier if nobody read */
+    struct sched_ev wake;                    /* end of the internal reset */
+    struct sched_ev watch;                   /* next input sample, where MFLAG or the modulator's bits are looked at */
 };
 
 #endif
