@@ -181,4 +181,4 @@ def test_the_picture_has_a_bar_for_each_engine() -> None:
     r = result(frames={"unit": "frames", "per_s": 2.5e6, "times_peer": 25.0, "ms": 1.0})
     svg = ET.fromstring(page.picture(r))
     bars = [float(e.get("width", "0")) for e in svg if e.get("class") in ("peer", "ours")]
-    assert bars == [pytest.approx(560 * 2 / 4, abs=0.1), pytest.approx(560 * 3.39794 / 4, abs=0.1)]
+    assert bars == [pytest.approx(page.BAR_W * decades / 4, abs=0.1) for decades in (2, 3.39794)]
