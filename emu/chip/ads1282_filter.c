@@ -147,7 +147,7 @@ static void stage(const struct ads1282_fir *fir, unsigned shift, int64_t *line, 
 static int64_t fir_stages(struct ads1282_filter *f)
 {
     const struct ads1282_fir *fir = ads1282_fir[f->phase];
-    int64_t out;
+    int64_t out = 0;
     stage_1(&fir[0], f->fir1, f->fir2 + fir[1].taps - 1);
     stage_2(&fir[1], f->fir2, f->fir3 + fir[2].taps - 1);
     stage(&fir[2], fir_shift[2], f->fir3, 8, f->fir4 + fir[3].taps - 1);

@@ -32,7 +32,7 @@ struct rig {
     double sine_v, sine_hz;
     int64_t tclk; /* the master's time */
     int gap_tclk; /* from the last rise of a byte to the first of the next */
-    enum { BYTES, BITS, PINS } bus;
+    enum bus { BYTES, BITS, PINS } bus;
     unsigned falls, rises, asked_mux, samples, mflags, clocks;
     int64_t fall_ns, rise_ns, first_sample_ns, last_sample_ns, mflag_ns;
     bool mflag;
@@ -46,7 +46,7 @@ static inline double input(void *ctx, unsigned mux, int64_t t_ns)
     r->last_sample_ns = t_ns;
     r->asked_mux = mux;
     const double t_s = (double)t_ns * 1e-9;
-    const double sine_v = r->sine_v ? r->sine_v * sin(6.283185307179586 * r->sine_hz * t_s) : 0.0;
+    const double sine_v = r->sine_v != 0.0 ? r->sine_v * sin(6.283185307179586 * r->sine_hz * t_s) : 0.0;
     return r->v + r->ramp_v_per_s * t_s + sine_v;
 }
 

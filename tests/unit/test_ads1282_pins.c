@@ -85,7 +85,7 @@ static void bytes_bits_and_pins_drive_the_same_chip(void **state)
         cfg.part = strict & 4 ? ADS1282_PART_1281 : ADS1282_PART_1282;
         for (int bus = BYTES; bus <= PINS; bus++) {
             powered(&r[bus], &cfg);
-            r[bus].bus = bus;
+            r[bus].bus = (enum bus)bus;
             random_traffic(&r[bus], seed + strict, out[bus], BYTES_EACH);
         }
         assert_memory_equal(out[BYTES], out[BITS], BYTES_EACH);
