@@ -17,20 +17,18 @@ typedef void sched_fn(void *ctx, int64_t t_ns); /* t_ns is the instant the event
 /* One event. Zero it or call sched_ev() before first use; read-only outside sched.c afterwards. */
 struct sched_ev {
     int64_t due_ns;
-    uint64_t seq; /* breaks ties: the earlier scheduled goes first */
     sched_fn *fn;
     void *ctx;
-    struct sched_ev *child, *sibling, *prev; /* pairing heap */
+    struct sched_ev *next, *prev; /* in order of due time, then of scheduling */
     bool queued;
 };
 
 struct sched {
     int64_t now_ns;   /* read-only outside sched.c */
     int64_t until_ns; /* of the run under way; before now_ns outside of one */
-    uint64_t seq;
     uint32_t at_once;
     int64_t at_once_ns;
-    struct sched_ev *root;
+    struct sched_ev *first, *last;
 };
 
 void sched_init(struct sched *s);
