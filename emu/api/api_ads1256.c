@@ -177,8 +177,8 @@ static uint64_t clkout_hz(const struct psabench_part *p)
     return ads1256_clkout_hz(cchip(p));
 }
 
-#define N(field) API_COUNTER("", part_ads1256, chip.n, field)
-#define R(field) API_COUNTER("", part_ads1256, chip.regs, field)
+#define N(field) API_COUNTER(#field, part_ads1256, chip.n.field)
+#define R(field) API_COUNTER(#field, part_ads1256, chip.regs.field)
 static const struct api_counter counters[] = {
     N(conversions),
     N(calibrations),
@@ -207,13 +207,11 @@ static const struct api_counter counters[] = {
 #undef N
 #undef R
 
-#define KIND(part_name, part_pins, part_inputs)                                                                        \
-    {                                                                                                                  \
-        .name = part_name, .size = sizeof(struct part_ads1256), .options = options,                                    \
-        .option_count = sizeof options / sizeof *options, .options_text = OPTIONS(API_OPTION_TEXT), .pins = pins,      \
-        .pin_count = part_pins, .counters = counters, .counter_count = sizeof counters / sizeof *counters,             \
-        .inputs = part_inputs, .fn_inputs = part_inputs, .spi = API_SPI_MODE1, .open = open_ads1256, .peek = peek,     \
-    }
+#define COMMON                                                                                                         \
+    .size = sizeof(struct part_ads1256), .options = options, .option_count = sizeof options / sizeof *options,         \
+    .options_text = OPTIONS(API_OPTION_TEXT), .pins = pins, .counters = counters,                                      \
+    .counter_count = sizeof counters / sizeof *counters, .spi = API_SPI_MODE1, .open = open_ads1256, .peek = peek
 
-const struct api_kind api_ads1255 = KIND("ads1255", PINS_1255, 0x103);
-const struct api_kind api_ads1256 = KIND("ads1256", PINS, 0x1FF);
+const struct api_kind api_ads1255 = {COMMON, .name = "ads1255", .pin_count = PINS_1255, .inputs = 0x103,
+                                     .fn_inputs = 0x103};
+const struct api_kind api_ads1256 = {COMMON, .name = "ads1256", .pin_count = PINS, .inputs = 0x1FF, .fn_inputs = 0x1FF};

@@ -221,9 +221,9 @@ static int peek(const struct psabench_part *p, unsigned address)
     return address < f->count && f->map[address].name ? reg_peek(f, address) : -1;
 }
 
-#define N(field) API_COUNTER("", part_ads1282, chip.count, field)
-#define L(field) API_COUNTER("limit_", part_ads1282, chip.limit, field)
-#define R(field) API_COUNTER("", part_ads1282, chip.regs, field)
+#define N(field) API_COUNTER(#field, part_ads1282, chip.count.field)
+#define L(field) API_COUNTER("limit_" #field, part_ads1282, chip.limit.field)
+#define R(field) API_COUNTER(#field, part_ads1282, chip.regs.field)
 static const struct api_counter counters[] = {
     N(conversions),    N(overruns),   N(torn_reads), N(late_reads),   N(bad_opcodes),  N(refused),
     N(gap_violations), N(restarts),   N(clipped),    N(realigned),    N(calibrations), L(sclk_period),
@@ -234,14 +234,24 @@ static const struct api_counter counters[] = {
 #undef L
 #undef R
 
-#define KIND(part_name, list, text, part_pins, part_inputs)                                                            \
-    {                                                                                                                  \
-        .name = part_name, .size = sizeof(struct part_ads1282), .options = list,                                       \
-        .option_count = sizeof list / sizeof *list, .options_text = text, .pins = pins, .pin_count = part_pins,        \
-        .counters = counters, .counter_count = sizeof counters / sizeof *counters, .inputs = part_inputs,              \
-        .fn_inputs = part_inputs, .spi = API_SPI_MODE0, .open = open_ads1282, .before_input = before_input,            \
-        .peek = peek,                                                                                                  \
-    }
+#define COMMON                                                                                                         \
+    .size = sizeof(struct part_ads1282), .pins = pins, .counters = counters,                                           \
+    .counter_count = sizeof counters / sizeof *counters, .spi = API_SPI_MODE0, .open = open_ads1282,                   \
+    .before_input = before_input, .peek = peek
 
-const struct api_kind api_ads1281 = KIND("ads1281", options_1281, OPTIONS_1281(API_OPTION_TEXT), PINS, 0x1);
-const struct api_kind api_ads1282 = KIND("ads1282", options_1282, OPTIONS(API_OPTION_TEXT), PINS_1282, 0x3);
+const struct api_kind api_ads1281 = {COMMON,
+                                     .name = "ads1281",
+                                     .options = options_1281,
+                                     .option_count = sizeof options_1281 / sizeof *options_1281,
+                                     .options_text = OPTIONS_1281(API_OPTION_TEXT),
+                                     .pin_count = PINS,
+                                     .inputs = 0x1,
+                                     .fn_inputs = 0x1};
+const struct api_kind api_ads1282 = {COMMON,
+                                     .name = "ads1282",
+                                     .options = options_1282,
+                                     .option_count = sizeof options_1282 / sizeof *options_1282,
+                                     .options_text = OPTIONS(API_OPTION_TEXT),
+                                     .pin_count = PINS_1282,
+                                     .inputs = 0x3,
+                                     .fn_inputs = 0x3};

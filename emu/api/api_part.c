@@ -4,8 +4,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-const struct api_kind *const api_kinds[] = {&api_ads1281, &api_ads1282, &api_ads1255, &api_ads1256, &api_psa2};
-const unsigned api_kind_count = sizeof api_kinds / sizeof *api_kinds;
+enum { KINDS = 5 };
+
+const struct api_kind *const api_kinds[KINDS] = {&api_ads1281, &api_ads1282, &api_ads1255, &api_ads1256, &api_psa2};
+const unsigned api_kind_count = KINDS;
 
 const char *psabench_parts(void)
 {

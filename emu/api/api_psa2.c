@@ -159,22 +159,22 @@ static void set_res(struct psabench_part *p, unsigned arg, bool level, int64_t t
 }
 
 static const struct api_pin pins[PSA2_LINES] = {
-    [PSA2_LINE_SYNC_A] = {"SYNC_A", API_OUT, .get = get_sync_a},
-    [PSA2_LINE_SCLK] = {"SClk", API_OUT},
-    [PSA2_LINE_DRD_A] = {"DRD_A", API_OUT, .get = get_drd_a},
-    [PSA2_LINE_DIN] = {"DIn", API_OUT},
-    [PSA2_LINE_DOUTX] = {"DOutX", API_OUT},
-    [PSA2_LINE_DOUTY] = {"DOutY", API_OUT},
-    [PSA2_LINE_DOUTZ] = {"DOutZ", API_OUT},
-    [PSA2_LINE_SYNC_T] = {"SYNC_T", API_OUT, .get = get_sync_t},
-    [PSA2_LINE_CST] = {"CST", API_OUT, .get = get_cst},
-    [PSA2_LINE_DRD_T] = {"DRD_T", API_OUT, .get = get_drd_t},
-    [PSA2_LINE_DINT] = {"DInT", API_OUT},
-    [PSA2_LINE_DOUTT] = {"DOutT", API_OUT},
-    [PSA2_LINE_RES] = {"Res", API_BOTH, .set = set_res, .get = get_res},
-    [PSA2_LINE_DATA] = {"Data", API_OUT},
-    [PSA2_LINE_CLK] = {"CLK", API_OUT},
-    [PSA2_LINE_INT] = {"Int", API_OUT, .get = get_int},
+    [PSA2_LINE_SYNC_A] = {.name = "SYNC_A", .dir = API_OUT, .get = get_sync_a},
+    [PSA2_LINE_SCLK] = {.name = "SClk", .dir = API_OUT},
+    [PSA2_LINE_DRD_A] = {.name = "DRD_A", .dir = API_OUT, .get = get_drd_a},
+    [PSA2_LINE_DIN] = {.name = "DIn", .dir = API_OUT},
+    [PSA2_LINE_DOUTX] = {.name = "DOutX", .dir = API_OUT},
+    [PSA2_LINE_DOUTY] = {.name = "DOutY", .dir = API_OUT},
+    [PSA2_LINE_DOUTZ] = {.name = "DOutZ", .dir = API_OUT},
+    [PSA2_LINE_SYNC_T] = {.name = "SYNC_T", .dir = API_OUT, .get = get_sync_t},
+    [PSA2_LINE_CST] = {.name = "CST", .dir = API_OUT, .get = get_cst},
+    [PSA2_LINE_DRD_T] = {.name = "DRD_T", .dir = API_OUT, .get = get_drd_t},
+    [PSA2_LINE_DINT] = {.name = "DInT", .dir = API_OUT},
+    [PSA2_LINE_DOUTT] = {.name = "DOutT", .dir = API_OUT},
+    [PSA2_LINE_RES] = {.name = "Res", .dir = API_BOTH, .set = set_res, .get = get_res},
+    [PSA2_LINE_DATA] = {.name = "Data", .dir = API_OUT},
+    [PSA2_LINE_CLK] = {.name = "CLK", .dir = API_OUT},
+    [PSA2_LINE_INT] = {.name = "Int", .dir = API_OUT, .get = get_int},
 };
 
 static void on_edge(void *ctx, unsigned sig, bool level, int64_t t_ns)
@@ -398,10 +398,14 @@ int psabench_on_frame(psabench_part *p, psabench_frame_fn *fn, void *ctx)
 }
 
 static const struct api_counter counters[] = {
-    API_COUNTER("", part_psa2, board.counters, frames),     API_COUNTER("", part_psa2, board.counters, resets),
-    API_COUNTER("", part_psa2, board.counters, requests),   API_COUNTER("", part_psa2, board.counters, timeouts),
-    API_COUNTER("", part_psa2, board.counters, overruns),   API_COUNTER("", part_psa2, board.counters, int_late),
-    API_COUNTER("edges_", part_psa2, board.trace, dropped), API_COUNTER("edges_", part_psa2, board.trace, late),
+    API_COUNTER("frames", part_psa2, board.counters.frames),
+    API_COUNTER("resets", part_psa2, board.counters.resets),
+    API_COUNTER("requests", part_psa2, board.counters.requests),
+    API_COUNTER("timeouts", part_psa2, board.counters.timeouts),
+    API_COUNTER("overruns", part_psa2, board.counters.overruns),
+    API_COUNTER("int_late", part_psa2, board.counters.int_late),
+    API_COUNTER("edges_dropped", part_psa2, board.trace.dropped),
+    API_COUNTER("edges_late", part_psa2, board.trace.late),
 };
 
 const struct api_kind api_psa2 = {

@@ -39,6 +39,8 @@ def check_includes(root: Path, files: dict[str, str]) -> subprocess.CompletedPro
         ("emu/base/a.c", (body(8) + "\n") * 3 + "// Long: one row per opcode.\n" + body(70)),
         ("emu/base/a.c", "//\n" * 500),
         ("emu/base/a.h", "//\n" * 150),
+        ("emu/api/psabench.h", "//\n" * 250),
+        ("emu/api/a.c", '#include "board/psa2.h"\n#include "trace/trace.h"\n'),
     ],
 )
 def test_what_is_allowed_passes(tmp_path: Path, file: str, text: str) -> None:
@@ -70,6 +72,10 @@ def test_what_is_allowed_passes(tmp_path: Path, file: str, text: str) -> None:
         ("emu/base/a.c", "// Long: of another one.\n" + body(3) + "\n" + body(41), "say why"),
         ("emu/base/a.c", "//\n" * 501, "501 lines, at most 500"),
         ("emu/base/a.h", "//\n" * 151, "151 lines, at most 150"),
+        ("emu/api/psabench.h", "//\n" * 251, "251 lines, at most 250"),
+        ("emu/api/a.h", "//\n" * 151, "151 lines, at most 150"),
+        ("emu/api/a.c", "#include <unistd.h>\n", "operating system's header"),
+        ("emu/api/a.c", '#include "app/loop.h"\n', "api may not include app"),
         ("emu/base/a.c", body(16) * 9, "the median function has 16 lines"),
     ],
 )
