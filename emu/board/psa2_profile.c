@@ -177,7 +177,7 @@ static bool check_mode(const struct psa2_profile *p, char *why, size_t cap)
 {
     const uint8_t config0 = config0_of(p);
     return ads1282_models(config0) ||
-           no(why, cap, "setup: CONFIG0 = %02Xh is not modelled: use pulse sync (bit 7 = 0), DR 000 to 100, FILTR 10",
+           no(why, cap, "setup: KPSA cannot read CONFIG0 = %02Xh: use pulse sync (bit 7 = 0), DR 000 to 100, FILTR 10",
               config0);
 }
 

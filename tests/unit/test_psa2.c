@@ -239,8 +239,8 @@ static void what_the_converters_do_not_take_is_refused(void **state)
         {PSA2_ACCEL, PSA2_WRITE_REG, 0x20, 0, PSA2_NO_SUCH_REG},
         {PSA2_ACCEL, PSA2_WRITE_REG, 0x00, 0, PSA2_READ_ONLY},
         {PSA2_ACCEL, PSA2_WRITE_REG, 0x01, 0x7E, PSA2_BAD_VALUE}, /* DR 111 */
-        {PSA2_ACCEL, PSA2_WRITE_REG, 0x01, 0xD6, PSA2_BAD_VALUE}, /* continuous sync is not modelled */
-        {PSA2_ACCEL, PSA2_WRITE_REG, 0x01, 0x55, PSA2_BAD_VALUE}, /* nor sinc alone */
+        {PSA2_ACCEL, PSA2_WRITE_REG, 0x01, 0xD6, PSA2_BAD_VALUE}, /* continuous sync: words that are no data */
+        {PSA2_ACCEL, PSA2_WRITE_REG, 0x01, 0x55, PSA2_BAD_VALUE}, /* sinc alone: faster than KPSA reads */
         {PSA2_ACCEL, PSA2_WRITE_REG, 0x02, 0x0F, PSA2_BAD_VALUE}, /* PGA 111 */
         {PSA2_TEMP, PSA2_READ_REG, 0x0B, 0, PSA2_NO_SUCH_REG},
         {PSA2_TEMP, PSA2_WRITE_REG, 0x03, 0x20, PSA2_BAD_VALUE},
