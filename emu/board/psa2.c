@@ -140,34 +140,39 @@ static uint8_t status_of(struct psa2 *b, const struct psa2_frame *f)
 
 static void read_done(struct psa2 *b, int64_t t_ns)
 {
-    struct psa2_frame f = {.seq = b->sample.seq, .t_sample_ns = b->sample.t_ns};
+    struct psa2_frame *f = &b->latest; /* in place: copies of what has just been written are slow */
+    f->seq = b->sample.seq;
+    f->t_sample_ns = b->sample.t_ns;
     for (unsigned i = 0; i < 3; i++) {
-        for (unsigned n = 0; n < b->profile.read_bits / 8; n++) f.raw[i] |= (uint32_t)b->spi.rx[i][n] << (24 - 8 * n);
-        f.code[i] = bits_sign_extend(f.raw[i] >> 8, 24);
+        const uint8_t *rx = b->spi.rx[i]; /* 0 beyond what was read */
+        f->raw[i] = (uint32_t)rx[0] << 24 | (uint32_t)rx[1] << 16 | (uint32_t)rx[2] << 8 | rx[3];
+        f->code[i] = bits_sign_extend(f->raw[i] >> 8, 24);
     }
-    f.temp_code = b->temp.code;
-    f.temp_channel = b->temp.code_channel;
-    f.status = status_of(b, &f);
+    f->temp_code = b->temp.code;
+    f->temp_channel = b->temp.code_channel;
+    f->status = status_of(b, f);
+    for (unsigned i = 0; i < PSA2_WORDS; i++) f->word[i] = 0; /* until it is sent */
     b->sample.reading = b->sample.overrun = b->temp.fresh = false;
     if (b->sample.unsettled) b->sample.unsettled--;
-    f.t_int_fall_ns = b->latest.t_int_fall_ns;
-    f.t_int_rise_ns = b->latest.t_int_rise_ns;
-    b->latest = f;
-    if (b->stream) psa2_out_start(b, &f, t_ns);
+    if (b->stream) psa2_out_start(b, t_ns);
     psa2_service(b, t_ns);
 }
 
 static void read_start(struct psa2 *b, int64_t t_ns)
 {
-    static const uint8_t zeros[4] = {0}; /* DIn low: WAKEUP, harmless */
-    struct psa2_xfer x = psa2_xfer_accel(b, zeros, b->profile.read_bits / 8);
-    for (unsigned i = 0; i + 1 < x.count; i++) x.gap_ns[i] = 0;
-    x.done = read_done;
     b->sample.due = false;
     b->sample.reading = true;
     b->sample.seq = b->sample.due_seq;
     b->sample.t_ns = b->sample.due_ns;
-    psa2_spi_start(b, &x, t_ns);
+    psa2_spi_start(b, &b->read, t_ns);
+}
+
+static void init_read(struct psa2 *b)
+{
+    static const uint8_t zeros[4] = {0}; /* DIn low: WAKEUP, harmless */
+    b->read = psa2_xfer_accel(b, zeros, b->profile.read_bits / 8);
+    for (unsigned i = 0; i + 1 < b->read.count; i++) b->read.gap_ns[i] = 0;
+    b->read.done = read_done;
 }
 
 bool psa2_flowing(const struct psa2 *b, int64_t t_ns)
@@ -345,6 +350,7 @@ void psa2_init(struct psa2 *b, const struct psa2_profile *p, const struct psa2_u
     sched_ev(&b->res_up, res_up, b);
     sched_ev(&b->patience, out_of_patience, b);
     psa2_spi_init(b);
+    init_read(b);
     psa2_temp_init(b);
     psa2_out_init(b);
     init_accel(b);

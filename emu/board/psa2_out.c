@@ -110,22 +110,22 @@ void psa2_out_init(struct psa2 *b)
     sched_ev(&b->out.word, word_event, b);
 }
 
-void psa2_out_start(struct psa2 *b, const struct psa2_frame *f, int64_t t_ns)
+void psa2_out_start(struct psa2 *b, int64_t t_ns)
 {
     struct psa2_out *o = &b->out;
+    struct psa2_frame *f = &b->latest;
     if (o->busy) {
         b->counters.int_late++;
         return;
     }
     o->busy = true;
     o->start = clk_pos(&o->half, (clk_count_at(&o->half, t_ns) + 1) / 2 * 2);
+    f->t_int_fall_ns = o->start.t_ns;
+    f->t_int_rise_ns = clk_on(o->start, &o->frame).t_ns;
+    pack_words(&b->profile, f);
+    sched_at(b->sched, &o->rise, f->t_int_rise_ns);
+    if (trace_watched(&b->trace, out_lines)) sched_at(b->sched, &o->word, f->t_int_fall_ns);
     o->f = *f;
-    o->f.t_int_fall_ns = o->start.t_ns;
-    o->f.t_int_rise_ns = clk_on(o->start, &o->frame).t_ns;
-    pack_words(&b->profile, &o->f);
-    b->latest = o->f;
-    sched_at(b->sched, &o->rise, o->f.t_int_rise_ns);
-    if (trace_watched(&b->trace, out_lines)) sched_at(b->sched, &o->word, o->f.t_int_fall_ns);
 }
 
 void psa2_out_stop(struct psa2 *b, int64_t t_ns)

@@ -45,6 +45,6 @@ void psa2_request_fail(struct psa2 *b, enum psa2_group group, bool all, int64_t 
 /* psa2_out.c */
 void psa2_out_init(struct psa2 *b);
 void psa2_out_stop(struct psa2 *b, int64_t t_ns);
-void psa2_out_start(struct psa2 *b, const struct psa2_frame *f, int64_t t_ns); /* dropped and counted if INT is low */
+void psa2_out_start(struct psa2 *b, int64_t t_ns); /* sends b->latest; dropped and counted if INT is low */
 
 #endif

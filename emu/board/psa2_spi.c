@@ -74,12 +74,12 @@ static void arm(struct psa2 *b, enum psa2_spi_phase phase, int64_t t_ns)
 static void begin_byte(struct psa2 *b, int64_t not_before_ns)
 {
     struct psa2_spi *s = &b->spi;
-    if (not_before_ns > s->free.t_ns) {
+    struct clk_pos first = clk_on(s->first, &s->byte); /* no sooner than after the byte before */
+    if (not_before_ns > first.t_ns) {
         const int64_t k = clk_count_at(&s->half, not_before_ns);
-        s->free = clk_pos(&s->half, k + (k & 1));
+        first = clk_pos(&s->half, k + (k & 1));
     }
-    s->first = s->free;
-    s->free = clk_on(s->first, &s->byte);
+    s->first = first;
     arm(b, PSA2_SPI_FIRST, after_ns(s, &s->fall));
 }
 

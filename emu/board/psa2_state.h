@@ -34,7 +34,6 @@ struct psa2_spi {
     enum psa2_spi_phase phase;
     uint8_t at;           /* byte under way */
     struct clk_pos first; /* its first rising edge */
-    struct clk_pos free;  /* no rising edge before this one */
     int64_t ready_ns[2];  /* per group: gap after its last burst is over */
     int64_t due_ns;       /* of the phase */
     bool stepping;        /* inside the event: it arms itself when it can go no further */
@@ -106,6 +105,7 @@ struct psa2 {
     unsigned step; /* of the set-up */
     bool stream;
     struct psa2_spi spi;
+    struct psa2_xfer read; /* of the three codes */
     struct psa2_pulse pulse;
     struct psa2_temp temp;
     struct psa2_out out;
