@@ -55,16 +55,56 @@ def of(name: str, key: str) -> Callable[[Result], float | None]:
     return lambda r: r["cases"].get(name, {}).get(key)
 
 
+def watching(r: Result) -> float | None:
+    """Instructions an edge that watching adds to an unwatched board."""
+    plain, watched = (r["cases"].get(name) for name in ("frames-direct", "frames-watched-direct"))
+    if not plain or not watched or not plain.get("instructions_per_unit"):
+        return None
+    return float((watched["instructions_per_unit"] - plain["instructions_per_unit"]) / watched["edges_per_unit"])
+
+
 LINES = "all lines watched, no decimation chain"
+WHY_LINES = (
+    "the target is a prototype's that made lines from ready words; here four converters answer byte by byte, "
+    "draw their noise and keep their registers"
+)
+WHY_CHAIN = "the decimation chain of three converters, which the models lack, takes the larger part"
+WHY_STRETCH = (
+    "the inputs of three channels are computed at every step of the sinc filter, with noise and in double precision, "
+    "and the FIR is exact in 64 bits without vector instructions of one machine"
+)
+WHY_DIRECT = (
+    "it would want a frame computed in one stroke; here its bytes go through the state machines of the chips, "
+    "and each conversion has its data-ready event, noise and analog chain"
+)
 TARGETS = (
-    Target(f"{LINES}, times Verilator's hand-driven model", True, 6, of("frames-watched-direct", "times_peer")),
-    Target(f"{LINES}, instructions an edge", False, 34, of("frames-watched-direct", "instructions_per_edge")),
-    Target(f"{LINES}, times real time", True, 700, rate("frames-watched-direct", FRAME_HZ)),
-    Target("all lines watched, bit-exact chain too, times Verilator", True, 6, of("frames-watched", "times_peer")),
-    Target("all lines watched, bit-exact chain too, times real time", True, 700, rate("frames-watched", FRAME_HZ)),
-    Target("not watched, no decimation chain, times real time", True, 5000, rate("frames-direct", FRAME_HZ)),
+    Target(
+        f"{LINES}, times Verilator's hand-driven model", True, 6, of("frames-watched-direct", "times_peer"), WHY_LINES
+    ),
+    Target(
+        f"{LINES}, instructions an edge", False, 34, of("frames-watched-direct", "instructions_per_edge"), WHY_LINES
+    ),
+    Target("of these, what watching adds to the unwatched board", False, 34, watching),
+    Target(f"{LINES}, times real time", True, 700, rate("frames-watched-direct", FRAME_HZ), WHY_LINES),
+    Target(
+        "all lines watched, bit-exact chain too, times Verilator",
+        True,
+        6,
+        of("frames-watched", "times_peer"),
+        WHY_CHAIN,
+    ),
+    Target(
+        "all lines watched, bit-exact chain too, times real time",
+        True,
+        700,
+        rate("frames-watched", FRAME_HZ),
+        WHY_CHAIN,
+    ),
+    Target(
+        "not watched, no decimation chain, times real time", True, 5000, rate("frames-direct", FRAME_HZ), WHY_DIRECT
+    ),
     Target("not watched, bit-exact chain, times real time", True, 300, rate("frames", FRAME_HZ)),
-    Target("the same, as a stretch", True, 1000, rate("frames", FRAME_HZ)),
+    Target("the same, as a stretch", True, 1000, rate("frames", FRAME_HZ), WHY_STRETCH),
     Target("VCD, million edges a second", True, 40, of("vcd", "medges_per_s")),
     Target("decoding the line port, frames a second", True, 300_000, rate("decode")),
     Target("emulator ready to serve, ms after start", False, 50, of("start", "ms")),
@@ -117,7 +157,7 @@ def others(r: Result) -> str:
 
 
 def targets(r: Result) -> str:
-    rows = []
+    rows, reasons = [], []
     for t in TARGETS:
         value = t.value(r)
         if value is None:
@@ -125,10 +165,13 @@ def targets(r: Result) -> str:
         elif value >= t.limit if t.at_least else value <= t.limit:
             verdict = "reached"
         else:
-            share = value / t.limit - 1
-            verdict = f"missed by {abs(share):.0%}" + (f": {t.why}" if t.why else "")
+            verdict = f"missed by {abs(value / t.limit - 1):.0%}"
+            if t.why:
+                reasons += [t.why] if t.why not in reasons else []
+                verdict += f" ({'abcdef'[reasons.index(t.why)]})"
         rows.append([t.what, ("≥ " if t.at_least else "≤ ") + figure(t.limit), figure(value), verdict])
-    return table(["target", "wanted", "measured", ""], rows)
+    told = "".join(f"\n\n({'abcdef'[i]}) {why[0].upper()}{why[1:]}." for i, why in enumerate(reasons))
+    return table(["target", "wanted", "measured", ""], rows) + told
 
 
 def machine(r: Result) -> str:

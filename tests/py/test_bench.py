@@ -160,9 +160,10 @@ def test_a_target_is_reached_or_missed_or_not_measured() -> None:
     }
     rows = page.targets(result(**{"frames-watched-direct": watched})).splitlines()[2:]
     assert rows[0].endswith("| ≥ 6.00 | 8.00 | reached |")
-    assert "| ≤ 34.0 | 51.0 | missed by 50%" in rows[1]
-    assert rows[2].endswith("| ≥ 700 | 800 | reached |")
-    assert rows[5].endswith("| ≥ 5,000 |  | not measured |")
+    assert rows[1].endswith("| ≤ 34.0 | 51.0 | missed by 50% (a) |")
+    assert rows[-1] == f"(a) {page.WHY_LINES[0].upper()}{page.WHY_LINES[1:]}."
+    assert rows[3].endswith("| ≥ 700 | 800 | reached |")
+    assert rows[6].endswith("| ≥ 5,000 |  | not measured |")
     assert page.targets(result(start={"unit": "starts", "ms": 51.0})).splitlines()[-1].endswith("missed by 2% |")
 
 
