@@ -70,8 +70,8 @@ WHY_LINES = (
 )
 WHY_CHAIN = "the decimation chain of three converters, which the models lack, takes the larger part"
 WHY_STRETCH = (
-    "the inputs of three channels are computed at every step of the sinc filter, with noise and in double precision, "
-    "and the FIR is exact in 64 bits without vector instructions of one machine"
+    "more than half of the instructions are not the filters' but their input's: 32 samples of sensor and analog chain, "
+    "with noise, for each reading of each channel"
 )
 WHY_DIRECT = (
     "it would want a frame computed in one stroke; here its bytes go through the state machines of the chips, "
