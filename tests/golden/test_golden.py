@@ -1,4 +1,4 @@
-"""The emulator's lines against the traces of manifest.toml; GOLDEN=rewrite (`make golden`) writes them anew.
+"""The lines of emulator and chips against the traces of manifest.toml; GOLDEN=rewrite (`make golden`) writes them anew.
 
 Both sides are cut to the manifest's lines and window. A failure names instant, line, want and got.
 """
@@ -13,6 +13,7 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from chip_scenes import SCENES
 from psabench.vcd import Vcd, parse_vcd, read_vcd
 
 HERE = Path(__file__).resolve().parent
@@ -26,10 +27,11 @@ class Trace:
     """One row of the manifest."""
 
     name: str
-    command: str
     signals: list[str]
     window_us: list[int]
     see: str
+    command: str = ""  # of build/psa-emu; or
+    scene: str = ""  # of chip_scenes.py
 
     @property
     def file(self) -> Path:
@@ -37,10 +39,21 @@ class Trace:
 
     def excerpt(self, vcd: Vcd) -> str:
         start_us, end_us = self.window_us
-        return vcd.window(self.signals, start_us * 1000, end_us * 1000)
+        text = vcd.window(self.signals, start_us * 1000, end_us * 1000)
+        return (
+            text.replace("$scope module psa2", f"$scope module {self.scene.partition('_')[0]}") if self.scene else text
+        )
+
+    def record(self, scratch: Path) -> Vcd:
+        return play(self.scene, scratch) if self.scene else record(self.command, scratch)
 
 
 TRACES = [Trace(**row) for row in tomllib.loads((HERE / "manifest.toml").read_text(encoding="utf-8"))["trace"]]
+
+
+def test_every_scene_has_its_row() -> None:
+    assert {t.scene for t in TRACES if t.scene} == set(SCENES)
+    assert [t.name for t in TRACES if bool(t.scene) == bool(t.command)] == []
 
 
 def first_difference(want: Vcd, got: Vcd) -> str:
@@ -75,6 +88,13 @@ def record(command: str, scratch: Path) -> Vcd:
     return read_vcd(vcd)
 
 
+def play(scene: str, scratch: Path) -> Vcd:
+    """The recording of a chip that is driven through a scene."""
+    vcd = scratch / f"{scene}.vcd"
+    SCENES[scene](vcd)
+    return read_vcd(vcd)
+
+
 @pytest.fixture(scope="session")
 def scratch(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("golden")
@@ -84,7 +104,7 @@ def scratch(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_lines_do_what_the_golden_trace_shows(trace: Trace, scratch: Path) -> None:
     if not EMU.exists():
         pytest.fail("build/psa-emu is not there; make builds it")
-    got = trace.excerpt(record(trace.command, scratch))
+    got = trace.excerpt(trace.record(scratch))
     if os.environ.get("GOLDEN") == "rewrite":
         trace.file.write_text(got, encoding="ascii")
     want = trace.file.read_text(encoding="ascii")
