@@ -88,6 +88,29 @@ static void any_coefficient_is_the_recursion_to_the_last_bit(void **state)
     }
 }
 
+/* The state itself, with 128-bit products: one rounding to nearest a word. */
+static void the_state_is_rounded_to_nearest_once_a_word(void **state)
+{
+    (void)state;
+    __extension__ typedef __int128 wide;
+    struct rng g = rng_stream(rig_seed(13), 0, "hpf");
+    for (int k = 0; k < 300; k++) {
+        const uint16_t hpf = k == 0 ? 0xFFFF : (uint16_t)rng_u64(&g);
+        const int64_t d = (INT64_C(1) << 32) - (int64_t)(65536 - hpf) * (65536 - hpf);
+        struct ads1282_hpf h;
+        ads1282_hpf_clear(&h);
+        for (int n = 0; n < 100; n++) {
+            const struct ads1282_hpf was = h;
+            const int64_t x = (int64_t)(rng_u64(&g) >> 30) - (INT64_C(1) << 33);
+            (void)ads1282_hpf_step(&h, x, hpf);
+            const wide half = (wide)1 << 32;
+            const wide product = (wide)was.y * d + half;
+            const wide floor = (product - (product % (2 * half) + 2 * half) % (2 * half)) / (2 * half);
+            assert_int_equal(h.y, was.y + (x - was.x) * (131072 - hpf) * 8 - (int64_t)floor);
+        }
+    }
+}
+
 static void a_constant_dies_away_to_exactly_zero(void **state)
 {
     (void)state;
@@ -109,6 +132,7 @@ int main(void)
         cmocka_unit_test(minus_3_db_lies_at_the_corners_of_the_table),
         cmocka_unit_test(the_pole_at_the_reset_value_is_0_987596),
         cmocka_unit_test(any_coefficient_is_the_recursion_to_the_last_bit),
+        cmocka_unit_test(the_state_is_rounded_to_nearest_once_a_word),
         cmocka_unit_test(a_constant_dies_away_to_exactly_zero),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -182,6 +182,22 @@ static void the_published_formula_recovers_the_input_from_the_bits(void **state)
     }
 }
 
+/* The rate is the filter's: reserved codes of it do not stop the modulator. */
+static void modulator_output_needs_no_rate(void **state)
+{
+    (void)state;
+    for (unsigned dr = 0; dr < 8; dr++) {
+        static struct bits b;
+        memset(&b, 0, sizeof b);
+        wired(&b.r, &quiet, 1, (struct ads1282_io){.modulator = on_bits});
+        ads1282_power_up(&b.r.a, 0);
+        wreg(&b.r, 1, (uint8_t)(0x40 | dr << 3));
+        at_tclk(&b.r, b.r.tclk + 400);
+        assert_int_equal(b.n, 100);
+        assert_int_equal(b.r.a.count.refused, 0);
+    }
+}
+
 static void nobody_looking_no_bits_are_computed(void **state)
 {
     (void)state;
@@ -240,6 +256,29 @@ static void a_new_high_pass_coefficient_acts_at_once_and_a_restart_forgets(void 
     ads1282_sync_pin(&r.a, true, r.s.now_ns);
     to_fall(&r);
     near(fraction(read_bytes(&r, 4)), 0.4 * 1.0000287, 1e-6); /* all of the step since the restart */
+}
+
+/* Through the high-pass the first words after a restart depend on all that came before them. */
+static void a_restart_forgets_everything_in_every_chain(void **state)
+{
+    (void)state;
+    for (int chain = ADS1282_CHAIN_EXACT; chain <= ADS1282_CHAIN_DIRECT; chain++) {
+        struct rig r;
+        struct ads1282_cfg cfg = quiet;
+        cfg.chain = (enum ads1282_chain)chain;
+        powered(&r, &cfg);
+        r.v = 1.7;
+        wreg(&r, 1, 0x63);
+        uint32_t word[2][20];
+        for (int again = 0; again < 2; again++) {
+            for (unsigned i = 0; i < COUNT(word[0]); i++) {
+                to_fall(&r);
+                word[again][i] = read_bytes(&r, 4);
+            }
+            ads1282_sync_pin(&r.a, true, r.s.now_ns);
+        }
+        assert_memory_equal(word[0], word[1], sizeof word[0]);
+    }
 }
 
 /* ---- Continuous synchronisation ---- */
@@ -360,6 +399,22 @@ static void calibration_makes_offset_zero_and_full_scale_full(void **state)
         near(fraction(read_bytes(&r, 4)), 1.0, 2.5e-7);                       /* a count of FSC */
         assert_int_equal(r.a.count.calibrations, 2);
     }
+}
+
+/* In SDATAC SCLK does not raise DRDY: the opcode does, and the fall says that it is done. */
+static void a_calibration_raises_drdy_until_it_is_done(void **state)
+{
+    (void)state;
+    struct rig r;
+    powered(&r, &quiet);
+    SEND(&r, 0x11);
+    const int64_t fall_ns = to_fall(&r);
+    byte(&r, 0x00);
+    assert_false(ads1282_drdy(&r.a));
+    byte(&r, 0x60);
+    assert_true(ads1282_drdy(&r.a));
+    assert_int_equal(to_fall(&r), fall_ns + 16 * 1000000);
+    assert_int_equal(r.a.count.conversions, 1 + 1); /* the readings between are no words */
 }
 
 /* Whether OFC and FSC act while calibrating is not known: both readings, after a first calibration of the same input. */
@@ -658,13 +713,16 @@ int main(void)
         cmocka_unit_test(a_step_passes_the_sinc_in_five_words),
         cmocka_unit_test(modulator_bits_come_each_4_tclk_and_without_drdy),
         cmocka_unit_test(the_published_formula_recovers_the_input_from_the_bits),
+        cmocka_unit_test(modulator_output_needs_no_rate),
         cmocka_unit_test(nobody_looking_no_bits_are_computed),
         cmocka_unit_test(the_high_pass_at_reset_decays_like_the_measured_unit),
         cmocka_unit_test(a_new_high_pass_coefficient_acts_at_once_and_a_restart_forgets),
+        cmocka_unit_test(a_restart_forgets_everything_in_every_chain),
         cmocka_unit_test(continuous_sync_pulses_drdy_with_zeros_until_settled),
         cmocka_unit_test(only_a_sync_out_of_step_restarts),
         cmocka_unit_test(a_sync_that_drifts_keeps_dout_at_zero_for_ever),
         cmocka_unit_test(calibration_makes_offset_zero_and_full_scale_full),
+        cmocka_unit_test(a_calibration_raises_drdy_until_it_is_done),
         cmocka_unit_test(a_second_calibration_shows_whether_registers_act),
         cmocka_unit_test(calibration_limits),
         cmocka_unit_test(calibration_averages_sixteen_readings),
