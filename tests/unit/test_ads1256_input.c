@@ -139,10 +139,14 @@ static void pins_beyond_the_supplies_are_counted(void **state)
     for (unsigned i = 0; i < COUNT(rows); i++) {
         struct rig r;
         up(&r, &quiet);
-        r.v[0] = rows[i].v;
-        await_fall(&r);
-        await_fall(&r);
-        assert_int_equal(r.a.n.range_exceeded > 0, rows[i].counted);
+        for (unsigned ain = 0; ain < 2; ain++) {
+            const uint32_t before = r.a.n.range_exceeded;
+            r.v[ain] = rows[i].v;
+            await_fall(&r);
+            await_fall(&r);
+            assert_int_equal(r.a.n.range_exceeded > before, rows[i].counted);
+            r.v[ain] = 0.0;
+        }
     }
 }
 
@@ -154,6 +158,7 @@ static void ads1255_has_two_inputs_and_aincom(void **state)
     struct rig r;
     up(&r, &cfg);
     for (unsigned i = 0; i < 9; i++) r.v[i] = 0.25 * (i + 1);
+    for (unsigned i = 2; i < 8; i++) r.ohm[i] = 1e5; /* nobody's */
     for (unsigned p = 0; p < 16; p++) {
         for (unsigned n = 0; n < 16; n++) {
             const uint32_t before = r.a.n.bad_mux;
@@ -257,6 +262,19 @@ static void clkout_on_d0_and_its_division(void **state)
     assert_int_equal(r.gpio_calls, 2);
 }
 
+/* D0 shows its output as soon as CLKOUT is off. */
+static void d0_is_told_when_clkout_goes_off(void **state)
+{
+    (void)state;
+    struct rig r;
+    up(&r, &quiet);
+    wreg(&r, ADS1256_IO, 0xE1);
+    assert_int_equal(r.gpio_calls, 0);
+    wreg(&r, ADS1256_ADCON, 0x00);
+    assert_int_equal(r.gpio_calls, 1);
+    assert_true(r.gpio[0] && ads1256_gpio(&r.a, 0));
+}
+
 /* D2 and D3 do not exist: their bits are stored and do nothing (SBAS288 p. 23). */
 static void ads1255_has_d0_and_d1(void **state)
 {
@@ -289,6 +307,7 @@ int main(void)
         cmocka_unit_test(gpio_pins_follow_dir_and_dio),
         cmocka_unit_test(gpio_outputs_are_told_on_changes_only),
         cmocka_unit_test(clkout_on_d0_and_its_division),
+        cmocka_unit_test(d0_is_told_when_clkout_goes_off),
         cmocka_unit_test(ads1255_has_d0_and_d1),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -310,6 +310,46 @@ static void cs_may_fall_with_sclk(void **state)
     assert_int_equal(r.a.first_ns, r.s.now_ns); /* the byte's first edge */
 }
 
+/* With CS high nothing on the bus is judged, and nothing of what was before lives on. */
+static void cs_high_forgets_the_bus(void **state)
+{
+    (void)state;
+    struct ads1256_cfg cfg = quiet;
+    cfg.strict_bus = true;
+    struct rig r;
+    up(&r, &cfg);
+    pulse(&r, 260, 200);
+    pulse(&r, 260, 260); /* too soon, not seen */
+    assert_int_equal(r.a.n.sclk_violations, 1);
+    ads1256_cs_pin(&r.a, true, r.s.now_ns);
+    for (unsigned i = 0; i < 10; i++) {
+        pulse(&r, 100, 10);
+        ads1256_din_pin(&r.a, i & 1, r.s.now_ns);
+        wait_ns(&r, 10);
+    }
+    ads1256_sclk_pin(&r.a, true, r.s.now_ns);
+    wait_ns(&r, 600);
+    ads1256_cs_pin(&r.a, false, r.s.now_ns);
+    ads1256_sclk_pin(&r.a, false, r.s.now_ns);
+    assert_int_equal(r.a.spi.bits, 1);
+    assert_int_equal(r.a.n.sclk_violations + r.a.n.din_violations, 1);
+}
+
+static void cs_high_leaves_no_event_behind(void **state)
+{
+    (void)state;
+    struct rig r;
+    up(&r, &quiet);
+    command(&r, 0xFD); /* standby: nothing else is due */
+    pin_xfer(&r, 0x15);
+    pin_xfer(&r, 0x00);
+    wait_ns(&r, T6_NS);
+    pin_xfer(&r, 0);
+    assert_true(sched_next_ns(&r.s) != SCHED_NEVER); /* high impedance in 8 tau */
+    ads1256_cs_pin(&r.a, true, r.s.now_ns);
+    assert_int_equal(sched_next_ns(&r.s), SCHED_NEVER);
+}
+
 /* One of the other pins moves between two bytes. SYNC/PDWN does not stay low long enough to power down: a chip that stops in
  * the middle of a byte is where pins know more than bytes. */
 static void move_pins(struct ads1256 *a, uint64_t x, int64_t t_ns)
@@ -386,6 +426,8 @@ int main(void)
         cmocka_unit_test(reset_pattern_within_its_limits_resets),
         cmocka_unit_test(reset_pattern_begins_anew_and_needs_cs),
         cmocka_unit_test(cs_may_fall_with_sclk),
+        cmocka_unit_test(cs_high_forgets_the_bus),
+        cmocka_unit_test(cs_high_leaves_no_event_behind),
         cmocka_unit_test(pins_and_bytes_drive_the_same_chip),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -257,6 +257,25 @@ static void power_down_keeps_the_registers(void **state)
     }
 }
 
+/* The supply goes and comes while SYNC/PDWN is low: nothing of the power-down is left. */
+static void power_up_ends_a_power_down(void **state)
+{
+    (void)state;
+    struct rig r;
+    rig_up(&r, &quiet);
+    ads1256_sync_pin(&r.a, false, r.s.now_ns);
+    wait_ns(&r, 1000000);
+    assert_int_equal(r.a.mode, ADS1256_OFF);
+    ads1256_power_up(&r.a, r.s.now_ns);
+    assert_int_equal(r.a.mode, ADS1256_SYNC_LOW);
+    wait_ns(&r, 1000000);
+    ads1256_sync_pin(&r.a, true, r.s.now_ns);
+    const int64_t from_ns = r.s.now_ns;
+    near((double)(await_fall(&r) - from_ns) * 1e-3, 596.0, 0.2);
+    wait_ns(&r, 2000000); /* no clock starts a second time */
+    assert_int_equal(r.a.n.restarts, 0);
+}
+
 static void power_down_from_anywhere_and_back(void **state)
 {
     (void)state;
@@ -403,6 +422,7 @@ int main(void)
         cmocka_unit_test(standby_and_sync_where_there_is_nothing_to_stop),
         cmocka_unit_test(sclk_interrupts_standby_when_strict),
         cmocka_unit_test(power_down_keeps_the_registers),
+        cmocka_unit_test(power_up_ends_a_power_down),
         cmocka_unit_test(power_down_from_anywhere_and_back),
         cmocka_unit_test(calibrations_wait_for_the_converter),
         cmocka_unit_test(resets_while_sync_is_low_calibrate_at_its_rise),
