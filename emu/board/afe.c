@@ -4,7 +4,6 @@
 #include "base/sched.h"
 
 #include <math.h>
-#include <stdlib.h>
 
 #define NOMINAL_DEGC  25.0  /* tolerances are those at this temperature */
 #define SAME_DT_NS    1     /* steps of a clock that is no whole number of ns differ by this */
@@ -35,7 +34,7 @@ static struct afe_scale scale_at(const struct afe_cfg *c, double degc)
 
 void afe_init(struct afe *a, const struct afe_cfg *cfg, struct rng noise)
 {
-    *a = (struct afe){.cfg = *cfg, .scale = scale_at(cfg, NOMINAL_DEGC), .noise = noise, .t_ns = -1};
+    *a = (struct afe){.cfg = *cfg, .scale = scale_at(cfg, NOMINAL_DEGC), .noise = noise, .t_ns = -1, .dt_ns = -10};
 }
 
 static double clip(double v, double limit_v)
@@ -65,18 +64,40 @@ static void retune(struct afe *a, int64_t dt_ns)
     a->noise_v = a->cfg.noise_v_rthz > 0.0 ? a->cfg.noise_v_rthz * sqrt(1.0 / (2.0 * dt_s)) : 0.0;
 }
 
+static bool same_step(const struct afe *a, int64_t dt_ns)
+{
+    return dt_ns >= a->dt_ns - SAME_DT_NS && dt_ns <= a->dt_ns + SAME_DT_NS;
+}
+
 /* One pole, exact for an input that is held over the step: s <- x + (s - x) exp(-2 pi f dt). */
-double afe_out_v(struct afe *a, double signal, double temp_degc, int64_t t_ns)
+static double filtered_v(struct afe *a, double v, int64_t t_ns)
+{
+    a->state_v = v + (a->state_v - v) * a->keep;
+    a->t_ns = t_ns;
+    return a->state_v;
+}
+
+/* The first sample, a new step or temperature, noise. */
+static double any_out_v(struct afe *a, double signal, double temp_degc, int64_t t_ns)
 {
     const bool first = a->t_ns < 0;
     const int64_t dt_ns = first ? FIRST_PULL_NS : t_ns - a->t_ns;
     if (dt_ns <= 0) return a->state_v;
-    if (llabs(dt_ns - a->dt_ns) > SAME_DT_NS) retune(a, dt_ns);
+    if (!same_step(a, dt_ns)) retune(a, dt_ns);
     if (temp_degc != a->scale.degc) a->scale = scale_at(&a->cfg, temp_degc);
     double v = load_v(&a->cfg, &a->scale, signal);
     if (a->noise_v > 0.0) v += a->noise_v * rng_gauss(&a->noise);
     v /= a->scale.divider;
-    a->state_v = first ? v : v + (a->state_v - v) * a->keep; /* at power-on the filter has long been settled */
+    if (first) a->state_v = v; /* at power-on the filter has long been settled */
+    if (!first) return filtered_v(a, v, t_ns);
     a->t_ns = t_ns;
     return a->state_v;
+}
+
+double afe_out_v(struct afe *a, double signal, double temp_degc, int64_t t_ns)
+{
+    const int64_t dt_ns = t_ns - a->t_ns;
+    const bool usual = dt_ns > 0 && same_step(a, dt_ns) && temp_degc == a->scale.degc && !(a->noise_v > 0.0);
+    if (!usual) return any_out_v(a, signal, temp_degc, t_ns);
+    return filtered_v(a, load_v(&a->cfg, &a->scale, signal) / a->scale.divider, t_ns);
 }

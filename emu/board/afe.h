@@ -38,7 +38,7 @@ struct afe {
     struct rng noise;
     double state_v; /* filter */
     int64_t t_ns;   /* of the state; -1 before the first call */
-    int64_t dt_ns;  /* step for which the two constants hold */
+    int64_t dt_ns;  /* step for which the two constants hold; negative before the first call */
     double keep;    /* what remains of the filter's state after a step */
     double noise_v; /* rms of one step's noise at the load */
 };

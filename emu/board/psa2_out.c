@@ -53,7 +53,8 @@ static void report_word(struct psa2 *b, unsigned w, int64_t until_ns)
     const uint32_t word = b->out.f.word[w];
     const uint32_t changes = word ^ word << 1; /* DATA rests low before the first bit */
     for (unsigned bit = 0; bit < b->profile.word_bits; bit++) {
-        if (changes >> bit & 1) *p++ = (struct trace_step){at.t_ns, DATA, (word >> bit & 1) << PSA2_LINE_DATA};
+        *p = (struct trace_step){at.t_ns, DATA, (word >> bit & 1) << PSA2_LINE_DATA};
+        p += changes >> bit & 1; /* no branch: data cannot be predicted */
         at = clk_on(at, &one);
         *p++ = (struct trace_step){at.t_ns, CLK, CLK};
         at = clk_on(at, &one);

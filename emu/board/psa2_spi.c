@@ -157,8 +157,8 @@ static void report_byte(struct psa2 *b)
     *p++ = (struct trace_step){at.t_ns, on_fall, bit_of_each(accel, 7) << PSA2_LINE_DIN};
     for (int shift = 7; shift >= 0; shift--) {
         at = clk_on(at, &one);
-        *p++ =
-            (struct trace_step){at.t_ns, sclk | on_rise, sclk | bit_of_each(temps, (unsigned)shift) << PSA2_LINE_DINT};
+        const uint32_t data = temp ? bit_of_each(temps, (unsigned)shift) << PSA2_LINE_DINT : 0;
+        *p++ = (struct trace_step){at.t_ns, sclk | on_rise, sclk | data};
         at = clk_on(at, &one);
         *p++ = (struct trace_step){at.t_ns, sclk | on_fall,
                                    shift ? bit_of_each(accel, (unsigned)shift - 1) << PSA2_LINE_DIN : accel_after(b)};

@@ -50,11 +50,20 @@ static void frame(void *ctx, const struct psa2_frame *f, int64_t t_ns)
     for (unsigned w = 0; w < PSA2_WORDS; w++) n->hash = (n->hash ^ f->word[w]) * UINT64_C(0x100000001B3);
 }
 
+static uint32_t bits_set(uint32_t v)
+{
+    v -= v >> 1 & 0x55555555;
+    v = (v & 0x33333333) + (v >> 2 & 0x33333333);
+    return ((v + (v >> 4)) & 0x0F0F0F0F) * 0x01010101 >> 24;
+}
+
 static void count(void *ctx, const struct trace_step *s, unsigned n)
 {
     uint64_t edges = 0;
-    for (; n > 0; n--, s++)
-        for (uint32_t left = s->lines; left; left &= left - 1) edges++;
+    for (unsigned i = 0; i < n; i++) {
+        const uint32_t lines = s[i].lines; /* mostly one, where reads are more, seldom none */
+        edges += lines & (lines - 1) ? bits_set(lines) : lines != 0;
+    }
     ((struct bench *)ctx)->edges += edges;
 }
 
