@@ -47,13 +47,17 @@ class FidelityError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Fact:
-    """A row of facts.yaml; rows is the number of printed rows it stands for; analog: a digital model cannot know."""
+    """A row of facts.yaml; rows is the number of printed rows it stands for.
+
+    analog: a digital model cannot know; measured: to be read off a recording.
+    """
 
     id: str
     fact: str
     value: str
     rows: int
     analog: bool
+    measured: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,7 +154,7 @@ def parse_row(item: Any, facts: dict[str, Fact]) -> Row:
         raise FidelityError("a row is a mapping: {id: ..., state: ..., grade: ..., tests: [...]}")
     if unknown := set(item) - KEYS:
         raise FidelityError(f"unknown {', '.join(sorted(unknown))}; there are {', '.join(sorted(KEYS))}")
-    known = facts.get(words(item, "id"), Fact("", "", "", 1, False))
+    known = facts.get(words(item, "id"), Fact("", "", "", 1, False, False))
     row = Row(
         id=words(item, "id"),
         fact=words(item, "fact") or known.fact,

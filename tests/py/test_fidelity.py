@@ -112,6 +112,14 @@ def test_a_fact_is_absent_only_if_it_is_analog(chip: str) -> None:
     assert " ".join(sorted((absent & known) - analog)) == ""
 
 
+@pytest.mark.parametrize("chip", CHIPS)
+def test_every_timing_figure_is_measured_in_a_recording(chip: str) -> None:
+    row_of = {i: row for row in rows_of(chip) for i in (row.id, *row.also)}
+    timed = [f.id for s in gen_docs.sections_of(chip, gen_docs.load_facts()) for f in s.facts if f.measured]
+    assert len(timed) > 25
+    assert " ".join(i for i in timed if not any(t.startswith("test_chip_timing_") for t in row_of[i].tests)) == ""
+
+
 def test_the_pages_are_up_to_date(capsys: pytest.CaptureFixture[str]) -> None:
     assert gen_docs.main(["--check"]) == 0, capsys.readouterr().err
 
