@@ -3,12 +3,12 @@
 
 /* ---- The same chip, however it is driven ---- */
 
-/* Waits until nothing happens during the next byte: where inside a byte a conversion ends, only bits can tell. False: the
+/* Waits until nothing happens during the next byte and 4 tCLK after it: where inside a byte a conversion ends, only bits can tell. False: the
  * sinc's words come faster than bytes. */
 static bool clear_of_conversions(struct rig *r)
 {
     for (int i = 0; i < 200; i++) {
-        if (sched_next_ns(&r->s) > clk_edge_ns(&r->clk, r->tclk + r->gap_tclk + 8 * BIT_TCLK)) return true;
+        if (sched_next_ns(&r->s) > clk_edge_ns(&r->clk, r->tclk + r->gap_tclk + 10 * BIT_TCLK)) return true;
         const int64_t next = clk_count_at(&r->clk, sched_next_ns(&r->s));
         at_tclk(r, next > r->tclk + 24 ? next : r->tclk + 24); /* a gap is clearly too short or clearly not */
     }
@@ -76,6 +76,8 @@ static void bytes_bits_and_pins_drive_the_same_chip(void **state)
     static uint8_t out[3][BYTES_EACH];
     static struct rig r[3];
     const uint64_t seed = rig_seed(5);
+    unsigned conversions = 0;
+    unsigned restarts = 0;
     for (unsigned strict = 0; strict < 8; strict++) {
         struct ads1282_cfg cfg = quiet;
         cfg.strict_sdatac = strict & 1;
@@ -92,9 +94,10 @@ static void bytes_bits_and_pins_drive_the_same_chip(void **state)
         assert_memory_equal(out[BYTES], out[PINS], BYTES_EACH);
         assert_same_chip(&r[BYTES], &r[BITS]);
         assert_same_chip(&r[BYTES], &r[PINS]);
-        assert_true(r[0].a.count.conversions > 10);
-        assert_true(strict & 1 || r[0].a.count.restarts > 10);
+        conversions += r[0].a.count.conversions;
+        restarts += r[0].a.count.restarts;
     }
+    assert_true(conversions > 100 && restarts > 100); /* there was something to see */
 }
 
 /* ---- DOUT ---- */
