@@ -98,7 +98,7 @@ def load_facts(path: Path = CHIPS / "facts.yaml") -> list[Section]:
             s["section"],
             s["title"],
             tuple(
-                Fact(f["id"], f["fact"], f.get("value", ""), f.get("rows", 1), f.get("analog", False))
+                Fact(f["id"], f["fact"], f.get("value", ""), f.get("rows", 1), "analog" in f, "measured" in f)
                 for f in s["facts"]
             ),
         )
