@@ -22,12 +22,15 @@ static void end(struct text_link *t, int64_t t_ns)
 /* Hands over lines until there are no more or the owner takes no more. */
 static void take_lines(struct text_link *t, int64_t t_ns)
 {
+    if (t->taking) return;
+    t->taking = true;
     while (t->in_pos < t->in_len && !t->ended && (!t->ops->ready || t->ops->ready(t))) {
         size_t used;
         const enum lines_result r = lines_feed(&t->lines, t->in + t->in_pos, t->in_len - t->in_pos, &used);
         t->in_pos += used;
         if (r != LINES_MORE) t->ops->line(t, r, t->lines.buf, t->lines.len, t_ns);
     }
+    t->taking = false;
     if (t->in_pos == t->in_len && t->eof) end(t, t_ns);
 }
 

@@ -34,9 +34,10 @@ struct text_link {
     struct lines lines;
     struct outbuf out;
     size_t out_high;
-    bool hold;  /* output is kept back */
-    bool eof;   /* the peer sends no more */
-    bool ended; /* closed() has been called */
+    bool hold;   /* output is kept back */
+    bool taking; /* lines are being handed over: an owner that flushes meanwhile is not handed the next one */
+    bool eof;    /* the peer sends no more */
+    bool ended;  /* closed() has been called */
     char in[4096];
     size_t in_pos, in_len;
 };

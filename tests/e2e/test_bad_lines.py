@@ -92,6 +92,19 @@ def test_words_before_the_handshake_are_refused(make_rig: MakeRig) -> None:
 
 
 @HOST
+def test_a_handshake_in_one_piece_is_taken_word_by_word(make_rig: MakeRig) -> None:
+    rig = make_rig("socketcand")
+    with talker(rig.emulator, words=()) as s:
+        got = ask(s, b"< open can0 >< rawmode >< rawmode >< send 7F0 1 1 >")
+        assert got.startswith(b"< ok >< ok >< error ")
+        assert got.count(b"< error ") == 1
+        assert b"rawmode already" in got
+        clients = rig.clients()
+        assert len(clients) == 2
+        assert clients[1]["taken"] == 1
+
+
+@HOST
 def test_garbage_on_every_port_leaves_the_unit_working(make_rig: MakeRig) -> None:
     print(f"TEST_SEED={SEED}")
     rng = random.Random(SEED)
