@@ -42,15 +42,18 @@ struct clk_pos {
     int64_t rest;    /* beyond t_ns, in 1/hz ns: 0 .. hz - 1 */
 };
 
-/* A way of k edges. */
+/* A way of k edges; back, if k is negative. rest is never negative. */
 struct clk_step {
     int64_t k, ns, rest, hz;
 };
 
 static inline struct clk_step clk_step(const struct clk *c, int64_t k)
 {
-    const int64_t counts = k * c->div;
-    return (struct clk_step){k, clk_span_ns(c->hz, counts), counts % c->hz * 1000000000 % c->hz, c->hz};
+    const int64_t counts = (k < 0 ? -k : k) * c->div;
+    const int64_t ns = clk_span_ns(c->hz, counts);
+    const int64_t rest = counts % c->hz * 1000000000 % c->hz;
+    if (k >= 0) return (struct clk_step){k, ns, rest, c->hz};
+    return (struct clk_step){k, -ns - (rest > 0), rest > 0 ? c->hz - rest : 0, c->hz};
 }
 
 static inline struct clk_pos clk_pos(const struct clk *c, int64_t k)

@@ -4,17 +4,6 @@
 
 static const uint32_t out_lines = 1u << PSA2_LINE_INT | 1u << PSA2_LINE_DATA | 1u << PSA2_LINE_CLK;
 
-/* Half periods of CLK from INT fall to the falling grid edge at which word w begins. */
-static int64_t word_half(const struct psa2 *b, unsigned w)
-{
-    return 2 * ((int64_t)b->profile.lead_in_clk + w * (int64_t)(b->profile.word_bits + PSA2_GAP_CLK));
-}
-
-static int64_t edge_ns(const struct psa2 *b, int64_t half)
-{
-    return clk_edge_ns(&b->out.half, b->out.start.k + half);
-}
-
 static uint32_t low_bits(uint32_t v, unsigned bits)
 {
     return bits == 32 ? v : v & ((UINT32_C(1) << bits) - 1);
@@ -43,14 +32,16 @@ static void pack_words(const struct psa2_profile *p, struct psa2_frame *f)
 #define CLK  (UINT32_C(1) << PSA2_LINE_CLK)
 #define DATA (UINT32_C(1) << PSA2_LINE_DATA)
 
-/* Edges of one word up to an instant: DATA changes where CLK falls, CLK runs only while bits are sent. */
-static void report_word(struct psa2 *b, unsigned w, int64_t until_ns)
+/* Edges of the next word up to an instant: DATA changes where CLK falls, CLK runs only while bits are sent. */
+static void report_word(struct psa2 *b, int64_t until_ns)
 {
+    struct psa2_out *o = &b->out;
+    const uint32_t word = o->f.word[o->watched_words++];
+    const struct clk_step one = o->one;
+    struct clk_pos at = o->at;
+    o->at = clk_on(o->at, &o->word_gap);
     struct trace_step *const step = trace_room(&b->trace, 3 * 32 + 1), *p = step;
     if (!step) return;
-    const struct clk_step one = b->out.one;
-    struct clk_pos at = clk_pos(&b->out.half, b->out.start.k + word_half(b, w));
-    const uint32_t word = b->out.f.word[w];
     const uint32_t changes = word ^ word << 1; /* DATA rests low before the first bit */
     for (unsigned bit = 0; bit < b->profile.word_bits; bit++) {
         *p = (struct trace_step){at.t_ns, DATA, (word >> bit & 1) << PSA2_LINE_DATA};
@@ -65,17 +56,24 @@ static void report_word(struct psa2 *b, unsigned w, int64_t until_ns)
     trace_commit(&b->trace, (unsigned)(p - step));
 }
 
+static void report_int(struct psa2 *b, int64_t t_ns)
+{
+    struct psa2_out *o = &b->out;
+    trace_set(&b->trace, PSA2_LINE_INT, false, t_ns);
+    o->watched_words = 0;
+    o->at = clk_on(o->start, &o->lead);
+}
+
 /* Runs only while the line is watched: at INT fall, then at the end of each word but the last. */
 static void word_event(void *ctx, int64_t t_ns)
 {
     struct psa2 *b = ctx;
     struct psa2_out *o = &b->out;
     do {
-        if (o->watched_words < 0) trace_set(&b->trace, PSA2_LINE_INT, false, t_ns);
-        else report_word(b, (unsigned)o->watched_words, t_ns);
-        o->watched_words++;
+        if (o->watched_words < 0) report_int(b, t_ns);
+        else report_word(b, t_ns);
         if ((unsigned)o->watched_words + 1 >= PSA2_WORDS) return;
-        t_ns = edge_ns(b, word_half(b, (unsigned)o->watched_words) + 2 * (int64_t)b->profile.word_bits);
+        t_ns = clk_on(o->at, &o->bits).t_ns;
     } while (sched_go_on(b->sched, t_ns));
     sched_at(b->sched, &o->word, t_ns);
 }
@@ -86,8 +84,7 @@ static void finish_watched(struct psa2 *b, int64_t t_ns)
     struct psa2_out *o = &b->out;
     sched_cancel(b->sched, &o->word);
     if (o->watched_words < 0) return;
-    for (unsigned w = (unsigned)o->watched_words; w < PSA2_WORDS; w++)
-        if (edge_ns(b, word_half(b, w)) <= t_ns) report_word(b, w, t_ns);
+    while ((unsigned)o->watched_words < PSA2_WORDS && o->at.t_ns <= t_ns) report_word(b, t_ns);
     trace_steps(&b->trace, &(struct trace_step){t_ns, out_lines, UINT32_C(1) << PSA2_LINE_INT}, 1);
     o->watched_words = -1;
 }
@@ -103,12 +100,16 @@ static void int_rise(void *ctx, int64_t t_ns)
 
 void psa2_out_init(struct psa2 *b)
 {
-    b->out.half = (struct clk){.hz = 2 * (int64_t)b->profile.line_hz, .div = b->profile.line_div};
-    b->out.one = clk_step(&b->out.half, 1);
-    b->out.frame = clk_step(&b->out.half, 2 * (int64_t)psa2_frame_clks(&b->profile));
-    b->out.watched_words = -1;
-    sched_ev(&b->out.rise, int_rise, b);
-    sched_ev(&b->out.word, word_event, b);
+    struct psa2_out *o = &b->out;
+    o->half = (struct clk){.hz = 2 * (int64_t)b->profile.line_hz, .div = b->profile.line_div};
+    o->one = clk_step(&o->half, 1);
+    o->lead = clk_step(&o->half, 2 * (int64_t)b->profile.lead_in_clk);
+    o->bits = clk_step(&o->half, 2 * (int64_t)b->profile.word_bits);
+    o->word_gap = clk_step(&o->half, 2 * (int64_t)(b->profile.word_bits + PSA2_GAP_CLK));
+    o->frame = clk_step(&o->half, 2 * (int64_t)psa2_frame_clks(&b->profile));
+    o->watched_words = -1;
+    sched_ev(&o->rise, int_rise, b);
+    sched_ev(&o->word, word_event, b);
 }
 
 void psa2_out_start(struct psa2 *b, int64_t t_ns)

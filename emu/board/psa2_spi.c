@@ -153,7 +153,7 @@ static void report_byte(struct psa2 *b)
     struct trace_step *const step = trace_room(&b->trace, HALF_BYTE + 2), *p = step;
     if (!step) return;
     const struct clk_step one = s->one;
-    struct clk_pos at = clk_pos(&s->half, s->first.k - 1);
+    struct clk_pos at = clk_on(s->first, &s->back);
     *p++ = (struct trace_step){at.t_ns, on_fall, bit_of_each(accel, 7) << PSA2_LINE_DIN};
     for (int shift = 7; shift >= 0; shift--) {
         at = clk_on(at, &one);
@@ -249,6 +249,7 @@ void psa2_spi_init(struct psa2 *b)
     struct psa2_spi *s = &b->spi;
     s->half = (struct clk){.hz = 2 * (int64_t)b->profile.sclk_hz, .div = 1};
     s->one = clk_step(&s->half, 1);
+    s->back = clk_step(&s->half, -1);
     s->fall = clk_step(&s->half, HALF_FIRST_FALL);
     s->sample_a = clk_step(&s->half, HALF_SAMPLE_A);
     s->sample_t = clk_step(&s->half, HALF_SAMPLE_T);

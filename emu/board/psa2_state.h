@@ -27,8 +27,8 @@ enum psa2_spi_phase {
 
 /* Serial port engine: SClk edges from a count of half periods, two instants a byte. */
 struct psa2_spi {
-    struct clk half;                                     /* edge k: rising for even k, falling for odd */
-    struct clk_step one, fall, sample_a, sample_t, byte; /* from the first rising edge of a byte to its others */
+    struct clk half;                                           /* edge k: rising for even k, falling for odd */
+    struct clk_step one, back, fall, sample_a, sample_t, byte; /* from the first rising edge of a byte to others */
     struct psa2_xfer x;
     uint8_t rx[4][PSA2_XFER_MAX]; /* X, Y, Z, T */
     enum psa2_spi_phase phase;
@@ -66,9 +66,11 @@ struct psa2_temp {
 
 /* Output line: the frame under way. */
 struct psa2_out {
-    struct clk half;            /* edge k: falling CLK for even k, rising for odd */
-    struct clk_step one, frame; /* a half period; INT low */
-    struct clk_pos start;       /* INT falls */
+    struct clk half;                      /* edge k: falling CLK for even k, rising for odd */
+    struct clk_step one, frame;           /* a half period; INT low */
+    struct clk_step lead, bits, word_gap; /* before the first word; a word without and with the gap after it */
+    struct clk_pos start;                 /* INT falls */
+    struct clk_pos at;                    /* watched: the word that is reported next begins */
     bool busy;
     int watched_words; /* words reported to the trace; -1: INT fall not yet reported */
     struct psa2_frame f;

@@ -8,8 +8,9 @@ static void filter(struct trace *t, struct trace_step *s, unsigned n)
 {
     uint32_t level = t->level;
     for (const struct trace_step *const end = s + n; s < end; s++) {
-        s->lines &= level ^ s->level;
-        level ^= s->lines;
+        const uint32_t lines = s->lines;
+        s->lines = (level ^ s->level) & lines;
+        level = (level & ~lines) + (s->level & lines); /* two steps long where the xor would be three: it is a chain */
     }
     t->level = level;
 }
@@ -117,7 +118,7 @@ void trace_steps(struct trace *t, const struct trace_step *s, unsigned n)
 {
     struct trace_step *room = trace_room(t, n);
     if (!room) return;
-    memcpy(room, s, n * sizeof *s);
+    for (unsigned i = 0; i < n; i++) room[i] = s[i];
     trace_commit(t, n);
 }
 

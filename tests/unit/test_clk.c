@@ -68,6 +68,11 @@ static void steps_meet_every_edge(void **state)
                     assert_int_equal(p.k, k);
                     assert_int_equal(p.t_ns, clk_edge_ns(&clocks[c], k));
                 }
+                const struct clk_step back = clk_step(&clocks[c], -steps[e]);
+                for (int n = 0; n < 5000; n++) p = clk_on(p, &back);
+                assert_int_equal(p.k, starts[s]);
+                assert_int_equal(p.t_ns, clk_edge_ns(&clocks[c], starts[s]));
+                assert_int_equal(p.rest, clk_pos(&clocks[c], starts[s]).rest);
             }
 }
 
