@@ -105,6 +105,7 @@ static void what_is_wrong_with_options_is_said(void **state)
         {"vref_v=2e", "use a number"},
         {"vref_v=2e99", "use a number"},
         {"vref_v=2e999999999999999999999", "use a number"},
+        {"offset_v=1e-30", "use a number"},             /* its power of ten is not exact */
         {"vref_v=2.50000000000000000", "use a number"}, /* more digits than are exact */
         {"clkin_hz=7680000.5", "use a whole number from 100000 to 10000000"},
         {"strict_cs=yes", "use 0 or 1"},
@@ -301,6 +302,10 @@ static void a_watcher_hears_each_change_at_its_instant(void **state)
     psabench *b = psabench_new(1);
     psabench_part *p = part(b, "ads1256", "u", "start=at_once");
     struct seen s = {.p = p, .pin = pin(p, "DRDY")};
+    good(b, psabench_watch(p, s.pin, note, &s));
+    run(b, 1000);
+    assert_int_equal(s.count, 0); /* high it was and is: no change */
+    good(b, psabench_watch(p, s.pin, NULL, NULL));
     until(p, "DRDY", 0);
     const int64_t first_ns = psabench_now_ns(b);
     good(b, psabench_watch(p, s.pin, note, &s));
@@ -465,7 +470,7 @@ static double ramp(void *ctx, psabench_part *p, int input, int64_t t_ns)
     s->wrong += t_ns < s->last_ns[input] || t_ns > psabench_now_ns(psabench_of(p));
     s->last_ns[input] = t_ns;
     s->calls[input]++;
-    return input == 2 ? 1.25 : input == 8 ? (double)NAN : input == 3 ? 2e6 : 0.25;
+    return input == 2 ? 1.25 : input == 8 ? (double)NAN : input == 3 ? 2e6 : input == 4 ? 3e6 : 0.25;
 }
 
 static void inputs_are_volts_by_number_or_by_function(void **state)
@@ -488,6 +493,8 @@ static void inputs_are_volts_by_number_or_by_function(void **state)
     assert_int_equal(rdata(p), 2097152);
     wreg(p, 1, 0x38); /* 2 MV */
     assert_int_equal(rdata(p), 0x7FFFFF);
+    wreg(p, 1, 0x34); /* 2 MV and 3 MV count as 1 MV */
+    assert_int_equal(rdata(p), 0);
     assert_true(s.calls[1] > 1 && s.calls[2] > 1 && s.calls[8] > 1 && s.calls[7] == 0);
     assert_int_equal(s.wrong, 0);
     good(b, psabench_set_input(p, NULL, NULL));

@@ -81,17 +81,41 @@ static void a_step_begins_when_it_is_made(void **state)
     assert_true(fabs(v[0] - v[1]) > 0.1 && fabs(v[1] - v[2]) > 0.1);
 }
 
-static void chains_agree_about_a_constant(void **state)
+static uint32_t next_word(psabench_part *p)
+{
+    uint8_t b[4];
+    until(p, "DRDY", 1);
+    until(p, "DRDY", 0);
+    run(psabench_of(p), 1000);
+    good(psabench_of(p), psabench_spi(p, NULL, b, 4));
+    return (uint32_t)b[0] << 24 | (uint32_t)b[1] << 16 | (uint32_t)b[2] << 8 | b[3];
+}
+
+static void chains_agree_about_a_constant_and_differ_as_they_say(void **state)
 {
     (void)state;
-    static const char *const options[] = {"power_up_tclk=0 noise_scale=0 chain=exact",
-                                          "power_up_tclk=0 noise_scale=0 chain=modulator",
-                                          "power_up_tclk=0 noise_scale=0 chain=direct"};
-    for (size_t i = 0; i < COUNT(options); i++) {
+    static const struct {
+        const char *options;
+        bool restless, abrupt; /* quantisation noise; a step has nothing between its ends */
+    } rows[] = {{"power_up_tclk=0 noise_scale=0 chain=exact", false, false},
+                {"power_up_tclk=0 noise_scale=0 chain=modulator", true, false},
+                {"power_up_tclk=0 noise_scale=0 chain=direct", false, true}};
+    for (size_t i = 0; i < COUNT(rows); i++) {
+        unsigned changes = 0;
+        unsigned between = 0;
         psabench *b = psabench_new(1);
-        psabench_part *p = part(b, "ads1282", "u", options[i]);
+        psabench_part *p = part(b, "ads1282", "u", rows[i].options);
         good(b, psabench_set_volts(p, 0, 1.0));
         is_near(settled_v(p), 1.0, 2e-4);
+        const uint32_t one = next_word(p);
+        for (int k = 0; k < 20; k++) changes += next_word(p) != one;
+        good(b, psabench_set_volts(p, 0, 0.0));
+        for (int k = 0; k < 70; k++) {
+            const uint32_t word = next_word(p);
+            between += word > one / 10 && word < one / 10 * 9;
+        }
+        assert_int_equal(changes > 0, rows[i].restless);
+        assert_int_equal(between == 0, rows[i].abrupt);
         psabench_free(b);
     }
 }
@@ -195,6 +219,14 @@ static void mode_pins_set_the_rate_without_registers(void **state)
     set(p, "DR1", 1);
     set(p, "PHS", 1);
     is_near(settled_v(p), 1.0, 3e-4);
+    good(b, psabench_set_volts(p, 0, 0.0));
+    run(b, 12 * MS); /* minimum phase: 5 ms of delay; with linear phase nothing would have come yet */
+    assert_true((int32_t)next_word(p) < 400000000);
+    good(b, psabench_set_volts(p, 0, 1.0));
+    is_near(settled_v(p), 1.0, 3e-4);
+    set(p, "HPF", 1);
+    run(b, 3 * S);
+    is_near(settled_v(p), 0.0, 1e-3);
     psabench_free(b);
     b = psabench_new(1);
     p = part(b, "ads1281", "u", "power_up_tclk=0");
@@ -210,7 +242,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(each_input_reaches_its_place_in_the_multiplexer),
         cmocka_unit_test(a_step_begins_when_it_is_made),
-        cmocka_unit_test(chains_agree_about_a_constant),
+        cmocka_unit_test(chains_agree_about_a_constant_and_differ_as_they_say),
         cmocka_unit_test(mflag_says_over_range),
         cmocka_unit_test(power_down_and_reset_begin_anew),
         cmocka_unit_test(modulator_pins_carry_the_input),

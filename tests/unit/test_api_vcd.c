@@ -1,6 +1,11 @@
 /* libpsabench: recordings of several parts, chips and boards, read back. */
 #include "api_rig.h"
 
+#include "api/api.h"
+
+#include <signal.h>
+#include <sys/resource.h>
+
 static unsigned count(const struct rig_vcd *v, const char *name)
 {
     unsigned n = 0;
@@ -27,6 +32,7 @@ static void every_part_has_a_scope_and_every_pin_its_changes(void **state)
     run(b, 2 * MS);
     good(b, psabench_vcd_close(b));
     good(b, psabench_vcd_close(b));
+    assert_true(p->recorded == 0 && q->recorded == 0); /* else it would go on in memory */
     rig_vcd_read(&v);
     assert_true(v.start_ns == 20000 && v.end_ns == psabench_now_ns(b));
     assert_int_equal(count(&v, "left.CS"), 1);
@@ -108,6 +114,28 @@ static void a_full_disk_is_told_when_the_recording_ends(void **state)
     psabench_free(b);
 }
 
+/* The disk was full for a while only: the file has a hole. */
+static void a_write_that_failed_on_the_way_is_told_too(void **state)
+{
+    (void)state;
+    static struct rig_vcd v;
+    struct rlimit was;
+    psabench *b = psabench_new(1);
+    (void)part(b, "ads1256", "u", "start=at_once");
+    rig_vcd_path(&v);
+    assert_int_equal(getrlimit(RLIMIT_FSIZE, &was), 0);
+    const struct rlimit small = {.rlim_cur = 8192, .rlim_max = was.rlim_max};
+    void (*handler)(int) = signal(SIGXFSZ, SIG_IGN);
+    good(b, psabench_vcd(b, v.path));
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &small), 0);
+    run(b, 100 * MS);
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &was), 0);
+    assert_int_equal(psabench_vcd_close(b), PSABENCH_SYSTEM);
+    (void)signal(SIGXFSZ, handler);
+    psabench_free(b);
+    (void)unlink(v.path);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -115,6 +143,7 @@ int main(void)
         cmocka_unit_test(a_board_and_a_chip_share_a_recording),
         cmocka_unit_test(a_recording_does_not_change_what_happens),
         cmocka_unit_test(a_full_disk_is_told_when_the_recording_ends),
+        cmocka_unit_test(a_write_that_failed_on_the_way_is_told_too),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
