@@ -75,8 +75,8 @@ void ads1282_din_pin(struct ads1282 *a, bool level, int64_t t_ns)
     a->limit.din_hold += t_ns - p->sclk_rise_ns < DIN_HOLD_NS;
 }
 
+/* Without power and in reset the shift register holds zeros. */
 bool ads1282_dout(const struct ads1282 *a)
 {
-    if (!a->alive) return false;
     return a->pin.sclk ? a->pin.dout_held : spi_miso(&a->spi);
 }

@@ -126,9 +126,9 @@ static void the_same_level_again_is_no_edge(void **state)
     (void)state;
     struct rig r;
     powered(&r, &quiet);
-    for (int i = 0; i < 9; i++) ads1282_sclk_pin(&r.a, true, at_tclk(&r, r.tclk + 2));
+    for (int i = 0; i < 5; i++) ads1282_sclk_pin(&r.a, true, at_tclk(&r, r.tclk + 2));
     assert_int_equal(r.a.spi.bits, 1);
-    for (int i = 0; i < 9; i++) ads1282_sclk_pin(&r.a, false, at_tclk(&r, r.tclk + 2));
+    for (int i = 0; i < 5; i++) ads1282_sclk_pin(&r.a, false, at_tclk(&r, r.tclk + 2));
     assert_int_equal(r.a.spi.bits, 1);
 }
 
@@ -396,6 +396,23 @@ static void gaps_count_from_rise_to_rise(void **state)
     }
 }
 
+static void a_lost_byte_takes_its_command_with_it(void **state)
+{
+    (void)state;
+    struct rig r;
+    struct ads1282_cfg cfg = quiet;
+    cfg.strict_gap = true;
+    powered(&r, &cfg);
+    byte(&r, 0x43);
+    r.gap_tclk = 10;
+    byte(&r, 0x00);
+    r.gap_tclk = 30;
+    SEND(&r, 0x11); /* an opcode again, not the byte of a WREG */
+    assert_false(r.a.rdatac);
+    hex_is(reg_peek(&r.a.regs, ADS1282_HPF0), 0x32);
+    assert_int_equal(r.a.count.refused, 1);
+}
+
 /* ---- Interface time-out ---- */
 
 static void sclk_must_rest_low_for_64_periods(void **state)
@@ -462,6 +479,7 @@ int main(void)
         cmocka_unit_test(a_sync_rise_within_30_ns_of_clk_is_counted_and_strictly_one_clk_late),
         cmocka_unit_test(a_strict_part_misses_a_sync_after_a_brief_low),
         cmocka_unit_test(gaps_count_from_rise_to_rise),
+        cmocka_unit_test(a_lost_byte_takes_its_command_with_it),
         cmocka_unit_test(sclk_must_rest_low_for_64_periods),
         cmocka_unit_test(the_time_out_also_runs_while_the_converter_stands_still),
     };
