@@ -76,7 +76,7 @@ static void to_tape(void *ctx, const struct trace_step *s, unsigned n)
 static int64_t clock_ns(void)
 {
     struct timespec t;
-    (void)clock_gettime(CLOCK_MONOTONIC, &t);
+    (void)clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t); /* whatever else the machine is busy with */
     return (int64_t)t.tv_sec * NS_PER_S + t.tv_nsec;
 }
 

@@ -105,7 +105,7 @@ static void open_lib(struct lib *l)
 static int64_t clock_ns(void)
 {
     struct timespec t;
-    (void)clock_gettime(CLOCK_MONOTONIC, &t);
+    (void)clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t); /* whatever else the machine is busy with */
     return (int64_t)t.tv_sec * 1000000000 + t.tv_nsec;
 }
 

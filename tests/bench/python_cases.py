@@ -36,11 +36,11 @@ def decode(count: int) -> str:
     once = b"".join(_sampled([rng.getrandbits(32) for _ in range(4)], rng.random()) for _ in range(1000))
     blocks = [once[i : i + BLOCK] for i in range(0, len(once), BLOCK)]
     decoder = LineDecoder()
-    began_ns = time.perf_counter_ns()
+    began_ns = time.process_time_ns()
     while decoder.counts.frames < count:
         for block in blocks:
             decoder.feed(block)
-    ns = time.perf_counter_ns() - began_ns
+    ns = time.process_time_ns() - began_ns
     c = decoder.counts
     if c.torn or c.lost or c.late or c.early or c.gaps:
         raise RuntimeError(f"decode: frames that were whole are not: {c}")
@@ -107,10 +107,10 @@ def chips_spi(count: int) -> str:
         adc.pins["CS"].set(0)
         request = bytes([0x10, 0x0A, *bytes(11)])
         want = adc.spi(request)
-        began_ns = time.perf_counter_ns()
+        began_ns = time.process_time_ns()
         for _ in range(max(count // len(request), 1)):
             got = adc.spi(request)
-        ns = time.perf_counter_ns() - began_ns
+        ns = time.process_time_ns() - began_ns
     if got[3:] != want[3:]:  # STATUS holds DRDY
         raise RuntimeError(f"chips-spi: registers {got.hex()}, at first {want.hex()}")
     return f"bytes={max(count // len(request), 1) * len(request)} ns={ns}"
