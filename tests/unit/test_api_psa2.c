@@ -255,6 +255,9 @@ static void a_request_given_up_does_no_harm(void **state)
     assert_int_equal(psabench_board_read(p, 0, 4, 1), PSABENCH_TIMEOUT);
     assert_int_equal(psabench_board_read(p, 0, 3, 1), PSABENCH_TIMEOUT);
     assert_int_equal(psabench_board_read(p, 0, 3, S), 0x32);
+    until(p, "DRD_A", 1);
+    until(p, "DRD_A", 0);
+    run(b, 5000); /* the controller is reading: the request waits */
     assert_int_equal(psabench_board_write(p, 0, 5, 0x12, 1), PSABENCH_TIMEOUT);
     assert_int_equal(psabench_board_read(p, 0, 3, S), 0x32); /* waits for the write, which is carried out */
     assert_int_equal(psabench_peek(p, 5), 0x12);
