@@ -71,15 +71,17 @@ static void arm(struct psa2 *b, enum psa2_spi_phase phase, int64_t t_ns)
     if (!b->spi.stepping) sched_at(b->sched, &b->spi.ev, t_ns);
 }
 
-static void begin_byte(struct psa2 *b, int64_t not_before_ns)
+/* The first edge at or after t_ns that is not inside the byte before, from whose end on no division is needed. */
+static struct clk_pos edge_at(const struct psa2_spi *s, int64_t t_ns)
+{
+    const struct clk_pos after = clk_on(s->first, &s->byte);
+    return t_ns <= after.t_ns ? after : clk_pos(&s->half, clk_count_at(&s->half, t_ns));
+}
+
+static void begin_byte(struct psa2 *b, struct clk_pos from)
 {
     struct psa2_spi *s = &b->spi;
-    struct clk_pos first = clk_on(s->first, &s->byte); /* no sooner than after the byte before */
-    if (not_before_ns > first.t_ns) {
-        const int64_t k = clk_count_at(&s->half, not_before_ns);
-        first = clk_pos(&s->half, k + (k & 1));
-    }
-    s->first = first;
+    s->first = from.k & 1 ? clk_on(from, &s->one) : from;
     arm(b, PSA2_SPI_FIRST, after_ns(s, &s->fall));
 }
 
@@ -95,8 +97,8 @@ void psa2_spi_start(struct psa2 *b, const struct psa2_xfer *x, int64_t t_ns)
         ads1256_cs_pin(&b->tadc, false, t_ns);
     }
     /* One SClk period first: DOut is valid within 100 ns of DRD_A, DIn needs its set-up. */
-    const int64_t lead_ns = clk_edge_ns(&s->half, clk_count_at(&s->half, t_ns) + 2);
-    begin_byte(b, lead_ns > s->ready_ns[x->group] ? lead_ns : s->ready_ns[x->group]);
+    const struct clk_pos lead = clk_on(edge_at(s, t_ns), &s->period);
+    begin_byte(b, s->ready_ns[x->group] > lead.t_ns ? edge_at(s, s->ready_ns[x->group]) : lead);
 }
 
 int64_t psa2_spi_span_ns(const struct psa2 *b, const struct psa2_xfer *x, int64_t t_ns)
@@ -180,7 +182,7 @@ static void end_byte(struct psa2 *b, int64_t t_ns)
     report_byte(b);
     const int64_t next_ns = t_ns + s->x.gap_ns[s->at];
     if (++s->at < s->x.count) {
-        begin_byte(b, next_ns);
+        begin_byte(b, edge_at(s, next_ns));
         return;
     }
     s->ready_ns[s->x.group] = next_ns;
@@ -250,6 +252,7 @@ void psa2_spi_init(struct psa2 *b)
     s->half = (struct clk){.hz = 2 * (int64_t)b->profile.sclk_hz, .div = 1};
     s->one = clk_step(&s->half, 1);
     s->back = clk_step(&s->half, -1);
+    s->period = clk_step(&s->half, 2);
     s->fall = clk_step(&s->half, HALF_FIRST_FALL);
     s->sample_a = clk_step(&s->half, HALF_SAMPLE_A);
     s->sample_t = clk_step(&s->half, HALF_SAMPLE_T);

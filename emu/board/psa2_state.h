@@ -27,8 +27,9 @@ enum psa2_spi_phase {
 
 /* Serial port engine: SClk edges from a count of half periods, two instants a byte. */
 struct psa2_spi {
-    struct clk half;                                           /* edge k: rising for even k, falling for odd */
-    struct clk_step one, back, fall, sample_a, sample_t, byte; /* from the first rising edge of a byte to others */
+    struct clk half;                                /* edge k: rising for even k, falling for odd */
+    struct clk_step one, back, period;              /* half periods: 1, -1, 2 */
+    struct clk_step fall, sample_a, sample_t, byte; /* from the first rising edge of a byte to others */
     struct psa2_xfer x;
     uint8_t rx[4][PSA2_XFER_MAX]; /* X, Y, Z, T */
     enum psa2_spi_phase phase;

@@ -47,6 +47,8 @@ static void time_periods(struct ads1282 *a)
     t->first_tclk = sinc ? sinc_settle_tclk(a) : 251 * n / 2 + FIR_LATENCY_TCLK;
     t->period_tclk = sinc ? 4 * n : 128 * n;
     t->settle = sinc ? 0 : FIR_SETTLE_PERIODS;
+    t->period_ns = clk_span_ns(a->clk.hz, t->period_tclk);
+    t->settle_ns = clk_span_ns(a->clk.hz, t->first_tclk + t->settle * t->period_tclk);
 }
 
 /* Pin mode: the pins in the places of their fields of CONFIG0. */
@@ -308,12 +310,12 @@ static bool has_words(const struct ads1282 *a)
 
 int64_t ads1282_settle_ns(const struct ads1282 *a)
 {
-    return has_words(a) ? clk_span_ns(a->clk.hz, due_tclk(a, a->timing.settle)) : 0;
+    return has_words(a) ? a->timing.settle_ns : 0;
 }
 
 int64_t ads1282_period_ns(const struct ads1282 *a)
 {
-    return has_words(a) ? clk_span_ns(a->clk.hz, a->timing.period_tclk) : 0;
+    return has_words(a) ? a->timing.period_ns : 0;
 }
 
 void ads1282_conv_init(struct ads1282 *a)

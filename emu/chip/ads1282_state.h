@@ -32,11 +32,12 @@ struct ads1282_pins {
 
 /* When things happen, in tCLK; of the present mode. */
 struct ads1282_timing {
-    int64_t first_tclk;  /* restart to the end of data period 0 */
-    int64_t period_tclk; /* data period */
-    int64_t settle;      /* data periods that end unsettled */
-    int64_t origin_tclk; /* restart to input sample 0 */
-    int64_t step_tclk;   /* input sample to input sample */
+    int64_t first_tclk;           /* restart to the end of data period 0 */
+    int64_t period_tclk;          /* data period */
+    int64_t settle;               /* data periods that end unsettled */
+    int64_t period_ns, settle_ns; /* rounded down: data period, restart to the first settled end */
+    int64_t origin_tclk;          /* restart to input sample 0 */
+    int64_t step_tclk;            /* input sample to input sample */
 };
 
 struct ads1282 {
