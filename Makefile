@@ -58,7 +58,7 @@ LIB_ALL  := $(if $(API_OBJ),$(LIB_SO) $(BUILD)/libpsabench.so $(BUILD)/libpsaben
 TEST_BIN := $(addprefix $(BUILD)/tests/,$(TESTS))
 FUZZ_BIN := $(patsubst tests/fuzz/%.c,$(BUILD)/fuzz/%,$(sort $(wildcard tests/fuzz/fuzz_*.c)))
 BENCH_BIN := $(patsubst tests/bench/%.c,$(BUILD)/bench/%,$(sort $(wildcard tests/bench/*.c)))
-C_FILES   = $(sort $(wildcard emu/*/*.[ch] tests/*/*.[ch]))
+C_FILES   = $(sort $(wildcard emu/*/*.[ch] tests/*/*.[ch] examples/*.c))
 
 .SECONDARY:
 .DELETE_ON_ERROR:
