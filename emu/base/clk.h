@@ -25,17 +25,6 @@ static inline int64_t clk_edge_ns(const struct clk *c, int64_t k)
     return c->t0_ns + clk_span_ns(c->hz, k * c->div);
 }
 
-/* First edge at or after t_ns (t_ns >= t0_ns). The count before it is floor(dt hz / 10^9 / div); that edge itself counts
- * when its exact instant is not before dt. */
-static inline int64_t clk_count_at(const struct clk *c, int64_t t_ns)
-{
-    const int64_t s = (t_ns - c->t0_ns) / 1000000000;
-    const int64_t rest_ns = (t_ns - c->t0_ns) % 1000000000;
-    const int64_t counts = s * c->hz + rest_ns * c->hz / 1000000000;
-    const int64_t k = c->div == 1 ? counts : counts / c->div;
-    return k + ((k * c->div - s * c->hz) * 1000000000 < rest_ns * c->hz);
-}
-
 /* An edge and what its instant was rounded by: from here on steps need no division. */
 struct clk_pos {
     int64_t k, t_ns; /* t_ns as clk_edge_ns() gives it */
@@ -60,6 +49,24 @@ static inline struct clk_pos clk_pos(const struct clk *c, int64_t k)
 {
     const struct clk_step s = clk_step(c, k);
     return (struct clk_pos){k, c->t0_ns + s.ns, s.rest};
+}
+
+/* First edge at or after t_ns (t_ns >= t0_ns). Edge floor(dt hz / 10^9 / div) is at or before; it is the one when its exact
+ * instant is not before dt, else the next is. Counted from the second that has begun: one division that is not by 10^9. */
+static inline struct clk_pos clk_pos_at(const struct clk *c, int64_t t_ns)
+{
+    const int64_t s = (t_ns - c->t0_ns) / 1000000000;
+    const int64_t rest_ns = (t_ns - c->t0_ns) % 1000000000;
+    const int64_t before = s * c->hz + rest_ns * c->hz / 1000000000;
+    int64_t k = c->div == 1 ? before : before / c->div;
+    k += (k * c->div - s * c->hz) * 1000000000 < rest_ns * c->hz;
+    const int64_t exact = (k * c->div - s * c->hz) * 1000000000; /* in 1/hz ns from that second on */
+    return (struct clk_pos){k, c->t0_ns + s * 1000000000 + exact / c->hz, exact % c->hz};
+}
+
+static inline int64_t clk_count_at(const struct clk *c, int64_t t_ns)
+{
+    return clk_pos_at(c, t_ns).k;
 }
 
 static inline struct clk_pos clk_on(struct clk_pos p, const struct clk_step *s)

@@ -121,7 +121,8 @@ void psa2_out_start(struct psa2 *b, int64_t t_ns)
         return;
     }
     o->busy = true;
-    o->start = clk_pos(&o->half, (clk_count_at(&o->half, t_ns) + 1) / 2 * 2);
+    o->start = clk_pos_at(&o->half, t_ns);
+    if (o->start.k & 1) o->start = clk_on(o->start, &o->one);
     f->t_int_fall_ns = o->start.t_ns;
     f->t_int_rise_ns = clk_on(o->start, &o->frame).t_ns;
     pack_words(&b->profile, f);

@@ -75,7 +75,7 @@ static void arm(struct psa2 *b, enum psa2_spi_phase phase, int64_t t_ns)
 static struct clk_pos edge_at(const struct psa2_spi *s, int64_t t_ns)
 {
     const struct clk_pos after = clk_on(s->first, &s->byte);
-    return t_ns <= after.t_ns ? after : clk_pos(&s->half, clk_count_at(&s->half, t_ns));
+    return t_ns <= after.t_ns ? after : clk_pos_at(&s->half, t_ns);
 }
 
 static void begin_byte(struct psa2 *b, struct clk_pos from)

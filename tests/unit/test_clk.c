@@ -48,6 +48,9 @@ static void count_at_is_the_first_edge_of_any_clock(void **state)
             const int64_t k = clk_count_at(c, at_ns);
             assert_true(clk_edge_ns(c, k) >= at_ns);
             assert_true(k == 0 || clk_edge_ns(c, k - 1) < at_ns);
+            const struct clk_pos p = clk_pos_at(c, at_ns);
+            const struct clk_pos want = clk_pos(c, k);
+            assert_true(p.k == want.k && p.t_ns == want.t_ns && p.rest == want.rest);
         }
 }
 
