@@ -8,7 +8,10 @@
 
 enum { EXIT_DONE = 0, EXIT_INPUT = 2, EXIT_MACHINE = 3, EXIT_INT = 130 };
 
-#define VERSION "0.1.0"
+/* PSABENCH_VERSION comes from pyproject.toml by way of the Makefile. */
+#define TEXT_OF(x) #x
+#define TEXT(x)    TEXT_OF(x)
+#define VERSION    TEXT(PSABENCH_VERSION)
 
 static int complain(int status, const char *why)
 {

@@ -1,5 +1,8 @@
 #include "control/describe.h"
 
+#include <stddef.h>
+#include <string.h>
+
 static void add_count(cJSON *to, const char *name, uint64_t n)
 {
     cJSON_AddNumberToObject(to, name, (double)n);
@@ -123,41 +126,56 @@ void describe_units(const struct control_bench *b, cJSON *to)
     }
 }
 
-static void add_ads1282(const struct ads1282_counters *k, cJSON *to)
+/* A counter by name: each is a uint32_t somewhere in a struct. */
+struct counter {
+    const char *name;
+    size_t offset;
+};
+
+#define COUNTER(type, field)                                                                                           \
+    {                                                                                                                  \
+#field, offsetof(struct type, field)                                                                           \
+    }
+
+// clang-format off
+static const struct counter ads1282_counters[] = {
+#define N(field) COUNTER(ads1282_counters, field)
+    N(conversions), N(overruns), N(torn_reads), N(late_reads), N(bad_opcodes), N(refused), N(gap_violations), N(restarts),
+    N(clipped), N(realigned), N(calibrations),
+#undef N
+};
+
+static const struct counter ads1256_counters[] = {
+#define N(field) COUNTER(ads1256_counters, field)
+    N(conversions), N(overruns), N(torn_reads), N(window_reads), N(clipped), N(buffer_clipped), N(range_exceeded), N(bad_mux),
+    N(calibrations), N(cal_clamped), N(restarts), N(power_downs), N(bad_opcodes), N(refused), N(bad_drate), N(gap_violations),
+    N(dropped),
+#undef N
+};
+
+static const struct counter reg_counters[] = {
+    {"bad_register",    offsetof(struct reg_file, bad_access)},
+    {"unmodelled_bit",  offsetof(struct reg_file, unimp_access)},
+    {"read_only_write", offsetof(struct reg_file, ro_write)},
+};
+
+static const struct counter board_counters[] = {
+#define N(field) COUNTER(psa2_counters, field)
+    N(frames), N(resets), N(requests), N(timeouts), N(overruns), N(int_late),
+#undef N
+};
+// clang-format on
+
+static void add_counters(const struct counter *row, size_t rows, const void *of, cJSON *to)
 {
-    add_count(to, "conversions", k->conversions);
-    add_count(to, "overruns", k->overruns);
-    add_count(to, "torn_reads", k->torn_reads);
-    add_count(to, "bad_opcodes", k->bad_opcodes);
-    add_count(to, "refused", k->refused);
-    add_count(to, "gap_violations", k->gap_violations);
-    add_count(to, "restarts", k->restarts);
-    add_count(to, "clipped", k->clipped);
-    add_count(to, "realigned", k->realigned);
+    for (; rows > 0; rows--, row++) {
+        uint32_t n;
+        memcpy(&n, (const char *)of + row->offset, sizeof n);
+        add_count(to, row->name, n);
+    }
 }
 
-static void add_ads1256(const struct ads1256_counters *k, cJSON *to)
-{
-    add_count(to, "conversions", k->conversions);
-    add_count(to, "overruns", k->overruns);
-    add_count(to, "torn_reads", k->torn_reads);
-    add_count(to, "buffer_clipped", k->buffer_clipped);
-    add_count(to, "dropped", k->dropped);
-    add_count(to, "calibrations", k->calibrations);
-    add_count(to, "bad_opcodes", k->bad_opcodes);
-    add_count(to, "refused", k->refused);
-    add_count(to, "gap_violations", k->gap_violations);
-    add_count(to, "restarts", k->restarts);
-    add_count(to, "clipped", k->clipped);
-    add_count(to, "bad_drate", k->bad_drate);
-}
-
-static void add_regs(const struct reg_file *f, cJSON *to)
-{
-    add_count(to, "bad_register", f->bad_access);
-    add_count(to, "unmodelled_bit", f->unimp_access);
-    add_count(to, "read_only_write", f->ro_write);
-}
+#define ADD_COUNTERS(table, of, to) add_counters(table, sizeof(table) / sizeof *(table), of, to)
 
 static void add_node(const struct can_node *n, cJSON *to)
 {
@@ -171,21 +189,15 @@ void describe_unit_counters(const struct control_bench *b, unsigned unit, cJSON 
 {
     static const char *const adc[] = {"adc_x", "adc_y", "adc_z"};
     const struct psa2 *p = &b->unit[unit]->board;
-    cJSON *board = cJSON_AddObjectToObject(to, "board");
-    add_count(board, "frames", p->counters.frames);
-    add_count(board, "resets", p->counters.resets);
-    add_count(board, "requests", p->counters.requests);
-    add_count(board, "timeouts", p->counters.timeouts);
-    add_count(board, "overruns", p->counters.overruns);
-    add_count(board, "int_late", p->counters.int_late);
+    ADD_COUNTERS(board_counters, &p->counters, cJSON_AddObjectToObject(to, "board"));
     for (unsigned i = 0; i < 3; i++) {
         cJSON *j = cJSON_AddObjectToObject(to, adc[i]);
-        add_ads1282(&p->adc[i].count, j);
-        add_regs(&p->adc[i].regs, j);
+        ADD_COUNTERS(ads1282_counters, &p->adc[i].count, j);
+        ADD_COUNTERS(reg_counters, &p->adc[i].regs, j);
     }
     cJSON *temp = cJSON_AddObjectToObject(to, "adc_temp");
-    add_ads1256(&p->tadc.n, temp);
-    add_regs(&p->tadc.regs, temp);
+    ADD_COUNTERS(ads1256_counters, &p->tadc.n, temp);
+    ADD_COUNTERS(reg_counters, &p->tadc.regs, temp);
     if (b->node[unit]) add_node(b->node[unit], cJSON_AddObjectToObject(to, "can"));
     cJSON *trace = cJSON_AddObjectToObject(to, "trace");
     add_count(trace, "late", p->trace.late);
