@@ -15,7 +15,7 @@ import os
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,9 @@ PAUSE_CLK = 4  # CLK periods between words (article, protocol of exchange)
 BLOCK = 1 << 20  # samples decoded at once: bounds the memory a call needs
 
 IDLE_8 = np.uint64(INT * 0x0101_0101_0101_0101)  # eight samples of the line at rest
+ROW = 32  # samples that are skipped together: four eights, the bytes of a uint32 of flags
 
+T = TypeVar("T", bound=np.generic)
 Ints = NDArray[np.int64]
 Samples = NDArray[np.uint8]
 
@@ -130,12 +132,13 @@ class LineDecoder:
     def _block(self, x: Samples) -> Frames:
         base = self.counts.samples
         self.counts.samples += len(x)
-        y, eight = _busy(x, self._last)
+        y, left_out = _busy(x, self._last)
+        left_out += base
         before = np.concatenate(([np.uint8(self._last)], y[:-1]))
         self._last = int(x[-1])
 
         def sample(k: Ints) -> Ints:
-            at: Ints = base + (eight[k >> 3] << 3) + (k & 7)
+            at: Ints = k + left_out[k // ROW]
             return at
 
         int_level = y & INT
@@ -152,8 +155,8 @@ class LineDecoder:
         gaps = np.concatenate(([self._gap_at], gaps)) if self._gap_at >= 0 else gaps
         self._gap_at = int(gaps[-1]) if len(gaps) else -1
         self._timing(fall, gaps)
-        clk = np.concatenate((self._clk, clk))
-        level = np.concatenate((self._bit, bit))
+        clk = np.concatenate((self._clk, clk)) if len(self._clk) else clk
+        level = np.concatenate((self._bit, bit)) if len(self._bit) else bit
         if self._fall >= 0:
             fall = np.concatenate(([self._fall], fall))
         if len(rise) and (not len(fall) or rise[0] < fall[0]):
@@ -175,10 +178,10 @@ class LineDecoder:
         first = np.searchsorted(clk, fall)
         good = np.searchsorted(clk, rise) - first == bits
         good &= np.searchsorted(gaps, fall) == np.searchsorted(gaps, rise, "right")
-        index = first[good, None] + np.arange(bits)
-        steady = self._steady(clk[index])
+        steady = self._steady(_rows(clk, first[good], bits))
+        sent_bits = _rows(level, first[good], bits)[steady]
         good[good] = steady
-        sent = np.packbits(level[index[steady]], axis=1, bitorder="little").reshape(-1, WORDS, self.fmt.word_bits // 8)
+        sent = np.packbits(sent_bits, axis=1, bitorder="little").reshape(-1, WORDS, self.fmt.word_bits // 8)
         words = np.zeros((len(sent), WORDS, 4), np.uint8)
         words[:, :, : sent.shape[2]] = sent
         self.counts.frames += len(words)
@@ -217,19 +220,29 @@ class LineDecoder:
 
 
 def _busy(x: Samples, before: int) -> tuple[Samples, Ints]:
-    """The samples in which anything may happen, eight by eight, and which eights of x they are.
+    """The samples in which anything may happen, row by row, and how many are left out before each of these rows.
 
-    9 samples of 10 are the line at rest. An eight at rest that follows one that is not, or `before`, is kept too: so
-    the sample before any kept one has the level of the kept one before it, and neighbours tell every change.
+    9 samples of 10 are the line at rest. A row at rest that follows one that is not, or `before`, is kept too: so the
+    sample before any kept one has the level of the kept one before it, and neighbours tell every change.
     """
-    whole = len(x) & ~7
-    eights = x[:whole].view(np.uint64)
-    busy = eights != IDLE_8
+    whole = len(x) - len(x) % ROW
+    busy = (x[:whole].view(np.uint64) != IDLE_8).view(np.uint32) != 0
     keep = busy.copy()
     keep[1:] |= busy[:-1]
     keep[:1] |= before != INT
-    index = np.flatnonzero(keep)
-    return np.concatenate((eights[index].view(np.uint8), x[whole:])), np.append(index, whole >> 3)
+    rows = np.flatnonzero(keep)
+    y = np.concatenate((x[:whole].reshape(-1, ROW)[rows].reshape(-1), x[whole:]))
+    rows = np.append(rows, whole // ROW)
+    return y, ROW * (rows - np.arange(len(rows)))
+
+
+def _rows(values: NDArray[T], first: Ints, n: int) -> NDArray[T]:
+    """n values from each of these places on; a view, not a copy, if one row begins where the one before ends."""
+    if len(first) and (np.diff(first) == n).all():
+        whole: NDArray[T] = values[first[0] : first[-1] + n].reshape(-1, n)
+        return whole
+    rows: NDArray[T] = values[first[:, None] + np.arange(n)]
+    return rows
 
 
 def _all_near(values: Ints, want: NDArray[np.float64], limit: NDArray[np.float64]) -> NDArray[np.bool_]:

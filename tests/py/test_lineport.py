@@ -204,6 +204,17 @@ def test_what_is_counted(data: bytes, want: dict[str, int]) -> None:
         assert len(got) == want.get("frames", 0)
 
 
+@pytest.mark.parametrize("cut_at_rise", [False, True])
+def test_int_may_rise_at_any_place_of_a_row_or_piece(cut_at_rise: bool) -> None:
+    low = F[: F.index(INT)]
+    for before in range(1, 2 * lineport.ROW):
+        data = idle(before) + low + idle(300) + low + idle(300)
+        rise = before + len(low)
+        got, counts = in_pieces(data, [rise] if cut_at_rise else [], LineFormat(period_s=None))
+        assert got.rise.tolist() == [rise, rise + 300 + len(low)]
+        assert (counts.frames, counts.torn) == (2, 0)
+
+
 def test_words_are_twos_complement_of_their_width() -> None:
     raw = [[0x8000, 0x7FFF, 0xFFFF, 1]]
     f = Frames(np.zeros(1, np.int64), np.ones(1, np.int64), np.array(raw, np.uint32))
