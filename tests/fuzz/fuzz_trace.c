@@ -40,7 +40,7 @@ static void hear(void *ctx, unsigned sig, bool level, int64_t t_ns)
 static void steps(void *ctx, const struct trace_step *s, unsigned n)
 {
     struct ear *e = ctx;
-    for (unsigned i = 0; i < n; i++) assert(s[i].lines && (i == 0 || s[i].t_ns >= s[i - 1].t_ns));
+    for (unsigned i = 0; i < n; i++) assert(i == 0 || s[i].t_ns >= s[i - 1].t_ns);
     trace_each(s, n, e->sink.mask, hear, e);
 }
 
