@@ -68,7 +68,7 @@ WHY_LINES = (
     "the target is a prototype's that made lines from ready words; here four converters answer byte by byte, "
     "draw their noise and keep their registers"
 )
-WHY_CHAIN = "the decimation chain of three converters, which the models lack, takes the larger part"
+WHY_CHAIN = "the decimation chain of three converters, which the models lack, takes about half of it"
 WHY_STRETCH = (
     "more than half of the instructions are not the filters' but their input's: 32 samples of sensor and analog chain, "
     "with noise, for each reading of each channel"
