@@ -66,6 +66,7 @@ struct ads1256 {
     uint8_t word_left;            /* bytes of the word not yet shifted out, 3..0 */
     bool in_word;                 /* the present byte shifted out one of them */
     bool rdatac, after_sdatac, awaiting_data, garbled, first_drdy;
+    bool early;         /* the present byte began before next_ok_ns */
     int64_t first_ns;   /* first SCLK edge of the present byte */
     int64_t command_ns; /* end of the latest byte */
     int64_t next_ok_ns; /* no command before (t11) */

@@ -145,10 +145,9 @@ typedef void port_fn(struct ads1256 *a, uint8_t mosi, int64_t t_ns);
 /* A strict chip loses a command that comes too early, unless it is RESET (E0). */
 static bool too_early(struct ads1256 *a, const struct op *op)
 {
-    const bool early = a->first_ns < a->next_ok_ns;
-    a->n.gap_violations += early || (a->after_sdatac && a->first_drdy); /* to wait for DRDY after SDATAC (M80) */
+    a->n.gap_violations += a->early || (a->after_sdatac && a->first_drdy); /* to wait for DRDY after SDATAC (M80) */
     a->after_sdatac = false;
-    return early && a->cfg.strict_bus && op->run != op_reset;
+    return a->early && a->cfg.strict_bus && op->run != op_reset;
 }
 
 static void on_opcode(struct ads1256 *a, uint8_t mosi, int64_t t_ns)
@@ -283,6 +282,7 @@ static void on_first(void *chip, int64_t t_ns)
     if (a->cs || ads1256_deaf(a)) return;
     a->first_ns = t_ns;
     a->first_drdy = a->drdy;
+    a->early = t_ns < a->next_ok_ns; /* before the byte itself ends standby, from where on the next one has to wait */
     if (a->mode == ADS1256_STANDBY && a->cfg.strict_bus) leave_standby(a, t_ns); /* any SCLK interrupts it */
     judge_read(a, t_ns);
     spi_load(&a->spi, out_byte(a));

@@ -222,6 +222,28 @@ static void sclk_interrupts_standby_when_strict(void **state)
     }
 }
 
+/* The byte that ends standby is not too early for itself, the next one is. */
+static void wakeup_from_standby_is_no_early_command(void **state)
+{
+    (void)state;
+    for (unsigned strict = 0; strict < 2; strict++) {
+        struct ads1256_cfg cfg = quiet;
+        cfg.strict_bus = strict;
+        struct rig r;
+        rig_up(&r, &cfg);
+        command(&r, 0xFD);
+        const uint32_t restarts = r.a.n.restarts;
+        command(&r, 0x00);
+        assert_int_equal(r.a.mode, ADS1256_RUNNING);
+        assert_int_equal(r.a.n.restarts, restarts + 1);
+        assert_int_equal(r.a.n.gap_violations, 0);
+        assert_int_equal(r.a.n.dropped, 0);
+        command(&r, 0x01);
+        assert_int_equal(r.a.n.gap_violations, 1);
+        assert_int_equal(r.a.n.dropped, strict);
+    }
+}
+
 /* More than 20 periods low: all stops, registers and GPIO outputs stay; after the rise the clock starts, then t18. */
 static void power_down_keeps_the_registers(void **state)
 {
@@ -421,6 +443,7 @@ int main(void)
         cmocka_unit_test(commands_before_the_drdy_after_standby_are_counted),
         cmocka_unit_test(standby_and_sync_where_there_is_nothing_to_stop),
         cmocka_unit_test(sclk_interrupts_standby_when_strict),
+        cmocka_unit_test(wakeup_from_standby_is_no_early_command),
         cmocka_unit_test(power_down_keeps_the_registers),
         cmocka_unit_test(power_up_ends_a_power_down),
         cmocka_unit_test(power_down_from_anywhere_and_back),
