@@ -176,7 +176,8 @@ static void on_modulator(void *ctx, bool m0, bool m1, int64_t t_ns)
     s->m0 = m0;
     s->m1 = m1;
     s->mclk = true;
-    sched_at(&s->part.bench->sched, &s->mclk_fall, t_ns + clk_span_ns(s->clk_hz, 2));
+    const struct clk *clk = &s->chip.clk;
+    sched_at(&s->part.bench->sched, &s->mclk_fall, clk_edge_ns(clk, clk_count_at(clk, t_ns) + 2));
 }
 
 static void on_mclk_fall(void *ctx, int64_t t_ns)

@@ -1,5 +1,6 @@
 /* libpsabench: what only the ADS1281 and ADS1282 have: two inputs, MFLAG, PWDN, modulator pins, mode pins, chains. */
 #include "api_rig.h"
+#include "base/clk.h"
 
 #include <math.h>
 
@@ -202,6 +203,30 @@ static void modulator_pins_carry_the_input(void **state)
             0.05); /* full scale is 2/3 of the bits' range; ends of the window: 0.03 */
 }
 
+static void is_a_clk_edge(void *ctx, psabench_part *p, int pin, int level, int64_t t_ns)
+{
+    static const struct clk clk = {.hz = 4096000, .div = 1};
+    (void)p;
+    (void)pin;
+    (void)level;
+    assert_int_equal(t_ns, clk_edge_ns(&clk, clk_count_at(&clk, t_ns)));
+    ++*(unsigned *)ctx;
+}
+
+/* MCLK is CLK/4: both its edges are CLK's, to the nanosecond. */
+static void mclk_moves_with_clk(void **state)
+{
+    (void)state;
+    psabench *b = psabench_new(1);
+    psabench_part *p = part(b, "ads1281", "u", "power_up_tclk=0 noise_scale=0");
+    sdatac_wreg(p, 1, 0x50);
+    unsigned edges = 0;
+    good(b, psabench_watch(p, psabench_pin(p, "MCLK"), is_a_clk_edge, &edges));
+    run(b, MS);
+    assert_in_range(edges, 2046, 2050);
+    psabench_free(b);
+}
+
 /* DR[1:0] 01: 500 words/s. */
 static void mode_pins_set_the_rate_without_registers(void **state)
 {
@@ -246,6 +271,7 @@ int main(void)
         cmocka_unit_test(mflag_says_over_range),
         cmocka_unit_test(power_down_and_reset_begin_anew),
         cmocka_unit_test(modulator_pins_carry_the_input),
+        cmocka_unit_test(mclk_moves_with_clk),
         cmocka_unit_test(mode_pins_set_the_rate_without_registers),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
