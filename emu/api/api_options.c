@@ -45,6 +45,7 @@ static bool parse_number(const char *s, double *v)
     s = take_digits(s + minus, &digits, &decimals);
     if (s && *s == 'e') {
         minus_exponent = s[1] == '-';
+        if (strchr(s, '.')) return false; /* a whole number of tens */
         s = take_digits(s + 1 + minus_exponent, &exponent, &none);
     }
     if (!s || *s || exponent > 99) return false;

@@ -105,6 +105,7 @@ static void what_is_wrong_with_options_is_said(void **state)
         {"vref_v=2e", "use a number"},
         {"vref_v=2e99", "use a number"},
         {"vref_v=2e999999999999999999999", "use a number"},
+        {"offset_v=1e-1.5", "use a number"},
         {"offset_v=1e-30", "use a number"},             /* its power of ten is not exact */
         {"vref_v=2.50000000000000000", "use a number"}, /* more digits than are exact */
         {"clkin_hz=7680000.5", "use a whole number from 100000 to 10000000"},
