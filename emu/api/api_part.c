@@ -1,6 +1,7 @@
 #include "api/api.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -64,7 +65,8 @@ static int check_name(psabench *b, const char *name)
                         name ? name : "(NULL)", API_NAME - 1);
     for (const struct psabench_part *p = b->parts; p; p = p->next)
         if (strcmp(p->name, name) == 0)
-            return api_fail(b, PSABENCH_BAD_ARGUMENT, "name %s: there is such a part on this bench already", name);
+            return api_fail(b, PSABENCH_BAD_ARGUMENT, "name %s: a part on this bench has it already, use another",
+                            name);
     return PSABENCH_OK;
 }
 
@@ -121,13 +123,21 @@ const char *psabench_part_name(const psabench_part *p)
 
 /* ---- pins ---- */
 
+static int no_such_pin(const psabench_part *p, const char *name)
+{
+    char list[API_WHY] = "";
+    size_t len = 0;
+    for (unsigned i = 0; i < p->kind->pin_count && len < sizeof list; i++)
+        len += (size_t)snprintf(list + len, sizeof list - len, " %s", p->kind->pins[i].name);
+    return api_fail(p->bench, PSABENCH_BAD_ARGUMENT, "%s: no pin %.40s of %s: there are%s", p->name,
+                    name ? name : "(NULL)", p->kind->name, list);
+}
+
 int psabench_pin(const psabench_part *p, const char *name)
 {
     if (!p) return PSABENCH_BAD_ARGUMENT;
     const unsigned pin = name ? api_find_pin(p->kind, name) : API_NO_PIN;
-    if (pin != API_NO_PIN) return (int)pin;
-    return api_fail(p->bench, PSABENCH_BAD_ARGUMENT, "%s: no pin %.40s of %s", p->name, name ? name : "(NULL)",
-                    p->kind->name);
+    return pin != API_NO_PIN ? (int)pin : no_such_pin(p, name);
 }
 
 static const struct api_pin *pin_of(const psabench_part *p, int pin)
@@ -290,11 +300,20 @@ int psabench_set_input(psabench_part *p, psabench_input_fn *fn, void *ctx)
     return PSABENCH_OK;
 }
 
+static int no_such_input(const psabench_part *p, int input)
+{
+    char list[API_WHY] = "";
+    size_t len = 0;
+    for (unsigned i = 0; i < API_INPUTS_MAX && len < sizeof list; i++)
+        if (p->kind->inputs >> i & 1) len += (size_t)snprintf(list + len, sizeof list - len, " %u", i);
+    return api_fail(p->bench, PSABENCH_BAD_ARGUMENT, "%s: no input %d of %s: there are%s", p->name, input,
+                    p->kind->name, list);
+}
+
 int psabench_set_volts(psabench_part *p, int input, double volts)
 {
     if (!p) return PSABENCH_BAD_ARGUMENT;
-    if (input < 0 || input >= API_INPUTS_MAX || !(p->kind->inputs >> input & 1))
-        return api_fail(p->bench, PSABENCH_BAD_ARGUMENT, "%s: no input %d of %s", p->name, input, p->kind->name);
+    if (input < 0 || input >= API_INPUTS_MAX || !(p->kind->inputs >> input & 1)) return no_such_input(p, input);
     if (!(volts >= -API_VOLTS_MAX && volts <= API_VOLTS_MAX))
         return api_fail(p->bench, PSABENCH_BAD_ARGUMENT, "%s: input %d: not a number of volts", p->name, input);
     const int bad = before_input(p, "psabench_set_volts()");

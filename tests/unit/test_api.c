@@ -210,7 +210,8 @@ static void bad_arguments_are_refused_and_named(void **state)
     } while (0)
     const int drdy = pin(p, "DRDY");
     const int cs = pin(p, "CS");
-    REFUSED(psabench_pin(p, "cs"), -1, "u: no pin cs of ads1256");
+    REFUSED(psabench_pin(p, "cs"), -1,
+            "u: no pin cs of ads1256: there are DRDY DOUT SCLK DIN CS SYNC RESET D0 D1 D2 D3");
     REFUSED(psabench_pin(p, NULL), -1, "no pin");
     REFUSED(psabench_pin(p, "C\nS"), -1, "no pin C?S of"); /* one line, whatever is quoted */
     REFUSED(psabench_pin_is_input(p, 11), -1, "u: no pin number 11: 0 to 10");
@@ -229,7 +230,7 @@ static void bad_arguments_are_refused_and_named(void **state)
     REFUSED(psabench_run_until(b, INT64_MAX), -1, "time goes up to");
     REFUSED(psabench_run_for(b, -1), -1, "a span of -1 ns");
     REFUSED(psabench_run_for(b, INT64_MAX), -1, "a span of");
-    REFUSED(psabench_set_volts(p, 9, 0.0), -1, "u: no input 9");
+    REFUSED(psabench_set_volts(p, 9, 0.0), -1, "u: no input 9 of ads1256: there are 0 1 2 3 4 5 6 7 8");
     REFUSED(psabench_set_volts(p, -1, 0.0), -1, "no input -1");
     REFUSED(psabench_set_volts(p, 0, (double)NAN), -1, "not a number of volts");
     REFUSED(psabench_set_volts(p, 0, (double)INFINITY), -1, "not a number of volts");
