@@ -1,6 +1,8 @@
-"""An ADS1282 that watches a 5 Hz sine: 32 bits at each fall of DRDY, every edge recorded for PulseView or GTKWave."""
+"""An ADS1282 that watches a 5 Hz sine: 32 bits at each fall of DRDY. With the name of a file every edge is recorded
+for PulseView or GTKWave: python read_ads1282.py run.vcd"""
 
 import math
+import sys
 
 from psabench.chips import Bench, ads1282_volts
 
@@ -13,7 +15,8 @@ def sine_v(number: int, t_ns: int) -> float:
 with Bench(seed=1) as bench:
     adc = bench.part("ads1282", vref_v=5.0)
     adc.set_input(sine_v)
-    bench.vcd("build/ads1282.vcd")
+    if len(sys.argv) > 1:
+        bench.vcd(sys.argv[1])
     print(f"CONFIG0 {adc.peek(1):02X}h: 1000 words a second, FIR filter")
     for n in range(100):
         adc.run_until_level("DRDY", 0)  # after a reset the chip is in RDATAC: the word is there

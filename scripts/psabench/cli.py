@@ -28,7 +28,7 @@ The host's end of the bench: talks to a converter board over CAN or the line por
 TOP_EPILOG = """\
 a first hour:
   psabench run all                  calibrate an accelerometer on an emulator started for it; build/run/report.html
-  build/psa-emu stream &            a board on the bus, 1000 frames a second, until Ctrl-C
+  psa-emu stream &                  a board on the bus, 1000 frames a second, until Ctrl-C
   psabench record run.log --can socketcand:127.0.0.1:29536 --for 10
   psabench decode run.log --out run.csv   volts against time
 
