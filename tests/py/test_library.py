@@ -12,6 +12,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+from psabench.chips import Bench, parts
 from psabench.vcd import read_vcd
 from psabench.waveform import rdata_picture
 
@@ -109,6 +110,13 @@ def test_an_example_is_built_and_runs_against_the_installation(
     assert "V" in out
     shown = PAGE.read_text()
     assert out in shown, f"docs/library.md shows another output than\n{out}"
+
+
+@pytest.mark.parametrize("part", parts())
+def test_the_page_explains_every_counter(part: str) -> None:
+    told = set(re.findall(r"`(\w+)`", PAGE.read_text().split("\n## Counters\n")[1].split("\n## ")[0]))
+    with Bench() as bench:
+        assert sorted(set(bench.part(part).counters) - told) == []
 
 
 @pytest.mark.parametrize("cxx", ["g++", "clang++"])
