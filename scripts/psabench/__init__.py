@@ -13,6 +13,18 @@ since power-on, simulated or real. Raw integers end in `frames` and `lineport`.
 Everything raises `errors.BenchError` or one of its kinds when the bench is at fault, `ValueError` for bad arguments.
 """
 
-from psabench.rig import Rig, open_rig
+from typing import TYPE_CHECKING
 
 __all__ = ["Rig", "open_rig"]
+
+if TYPE_CHECKING:
+    from psabench.rig import Rig, open_rig
+else:
+
+    def __getattr__(name: str) -> object:
+        """Loaded when asked for: `psa-emu` and `psabench.chips` start at once, without NumPy and python-can."""
+        if name not in __all__:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        from psabench import rig
+
+        return getattr(rig, name)

@@ -7,6 +7,7 @@ import gc
 import itertools
 import re
 import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -462,3 +463,10 @@ def test_a_board_sends_frames_and_answers_for_its_converters() -> None:
     assert y == pytest.approx(-2 * z, rel=1e-3)
     assert last.t_sample_ns < last.t_int_fall_ns < last.t_int_rise_ns <= last.t_sample_ns + 1_000_000
     assert len(last.word) == 4
+
+
+def test_chips_and_the_emulators_command_start_without_the_heavy_packages() -> None:
+    """Loading NumPy and python-can for them would make an installed psa-emu start in a third of a second."""
+    code = "import sys, psabench.chips, psabench.emulator; print({'numpy', 'can', 'scipy', 'yaml'} & set(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
+    assert done.stdout.strip() == "set()"
