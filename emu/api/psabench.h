@@ -105,8 +105,8 @@ PSABENCH_API const char *psabench_part_name(const psabench_part *p);
  *                      output. As CLKOUT D0 reads 0: counter clkout_hz has the frequency
  *   psa2               the article's lines SYNC_A SClk DRD_A DIn DOutX DOutY DOutZ SYNC_T CST DRD_T DInT DOutT Res Data CLK
  *                      Int, all outputs; a 0 set on Res starts the board's own reset pulse
- * Inputs that nobody has set: SCLK, DIN, the SYNC of the ads128x and D0.. low; CS, RESET, PWDN, the SYNC of the ads125x
- * high. DOUT of the ads125x reads 0 in high impedance. */
+ * Inputs that nobody has set: SCLK, DIN, the SYNC and mode pins of the ads128x and D0.. low; CS, RESET, PWDN, the SYNC of
+ * the ads125x high. DOUT of the ads125x reads 0 in high impedance. */
 PSABENCH_API int psabench_pin(const psabench_part *p, const char *name);
 PSABENCH_API const char *psabench_pin_name(const psabench_part *p, int pin);
 PSABENCH_API int psabench_pin_is_input(const psabench_part *p, int pin); /* of the part: the program may set it */

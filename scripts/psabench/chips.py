@@ -57,7 +57,7 @@ def ads1256_volts(code: int, *, vref_v: float = 2.5, gain: int = 1) -> float:
 
 
 def ads1282_volts(word: int, *, vref_v: float = 5.0, gain: int = 1) -> float:
-    """Volts for a 32-bit word of an ADS1281/1282 behind its FIR filter: full scale, VREF / (2 gain), is 2^31."""
+    """Volts for a signed 32-bit word of an ADS1281/1282 behind its FIR filter: full scale, VREF / (2 gain), is 2^31."""
     return word * vref_v / (2 * gain * 2**31)
 
 
