@@ -56,13 +56,14 @@ CORE_OBJ := $(filter-out $(API_OBJ) $(BUILD)/obj/emu/app/% $(BUILD)/obj/emu/link
 LIB_SO   := $(BUILD)/libpsabench.so.$(ABI)
 LIB_ALL  := $(if $(API_OBJ),$(LIB_SO) $(BUILD)/libpsabench.so $(BUILD)/libpsabench.a $(BUILD)/psabench.pc)
 TEST_BIN := $(addprefix $(BUILD)/tests/,$(TESTS))
-FUZZ_BIN := $(patsubst tests/fuzz/%.c,$(BUILD)/fuzz/%,$(sort $(wildcard tests/fuzz/fuzz_*.c)))
+FUZZ      ?= *#                        one fuzz target, without its fuzz_
+FUZZ_BIN := $(patsubst tests/fuzz/%.c,$(BUILD)/fuzz/%,$(sort $(wildcard tests/fuzz/fuzz_$(strip $(FUZZ)).c)))
 BENCH_BIN := $(patsubst tests/bench/%.c,$(BUILD)/bench/%,$(sort $(wildcard tests/bench/*.c)))
 C_FILES   = $(sort $(wildcard emu/*/*.[ch] tests/*/*.[ch] examples/*.c))
 
 .SECONDARY:
 .DELETE_ON_ERROR:
-.PHONY: all lib setup run test bench bench-bin check pytest san builds e2e e2e-san e2e-vcan e2e-slc0 uml soak fuzz fuzz-each lint format golden docs install uninstall wheel clean help lock
+.PHONY: all lib setup run test bench bench-bin check pytest san builds e2e e2e-san e2e-vcan e2e-slc0 uml soak fuzz fuzz-check fuzz-each lint format golden docs install uninstall wheel clean help lock
 
 ## all: the emulator, build/psa-emu (make CC=clang and make SAN=address,undefined build beside it, in build-clang and build-san)
 all: $(if $(MAIN),$(BUILD)/psa-emu,$(LIB_OBJ)) lib
@@ -194,12 +195,18 @@ soak: all
 	$(PY) -m pytest tests/e2e -m "host and soak"
 	tests/uml/native --timeout 1200 tests/uml/job_e2e.sh -m "vcan and soak"
 
-## fuzz: each tests/fuzz/fuzz_*.c for FUZZ_S seconds (libFuzzer, sanitizers)
+FUZZ_MAKE := $(MAKE) --no-print-directory CC=clang SAN=address,undefined,fuzzer-no-link BUILD=build-fuzz
+
+## fuzz: each tests/fuzz/fuzz_*.c for FUZZ_S seconds (libFuzzer, sanitizers; one: make fuzz FUZZ=psa2 FUZZ_S=3600)
 fuzz:
-	@$(MAKE) --no-print-directory CC=clang SAN=address,undefined,fuzzer-no-link BUILD=build-fuzz fuzz-each
+	@$(FUZZ_MAKE) fuzz-each
+
+## fuzz-check: the files that fuzzing has found so far, then some thousand inputs for each target, the same each time
+fuzz-check:
+	@$(FUZZ_MAKE) FUZZ_S=check fuzz-each
 
 fuzz-each: $(FUZZ_BIN)
-	@for f in $(FUZZ_BIN); do echo "$$f"; $$f -max_total_time=$(FUZZ_S) -print_final_stats=1 || exit 1; done
+	@tests/fuzz/run $(FUZZ_S) $(FUZZ_BIN)
 
 $(filter $(BUILD)/fuzz/fuzz_ads1282_%,$(FUZZ_BIN)): $(BUILD)/obj/tests/fuzz/ads1282_world.o
 $(filter $(BUILD)/fuzz/fuzz_ads1256_%,$(FUZZ_BIN)): $(BUILD)/obj/tests/fuzz/ads1256_world.o

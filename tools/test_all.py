@@ -29,6 +29,7 @@ STEPS: list[tuple[str, list[str], float]] = [
     ("C tests, clang", [*STRICT, "CC=clang", "check"], 300),
     ("C tests, gcc, sanitizers", [*STRICT, SANITIZED, "check"], 600),
     ("C tests, clang, sanitizers", [*STRICT, "CC=clang", SANITIZED, "check"], 600),
+    ("fuzz targets, a short run", [*STRICT, "fuzz-check"], 900),
     ("other builds of the emulator", [*STRICT, "builds"], 600),
     ("Python tests and golden traces", [*MAKE, "pytest"], 900),
     ("end to end on the host", [*MAKE, "e2e"], 600),

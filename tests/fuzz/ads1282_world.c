@@ -142,13 +142,13 @@ static uint8_t xfer_pins(struct w1282 *w, uint8_t mosi, int64_t half_ns)
 /* Whether the moment is one at which bytes and pins are the same; waits for it for a while. */
 static bool moment(struct w1282 *w, int64_t half_ns)
 {
-    const int64_t since_ns = w->s.now_ns - w->a.rise_ns;
-    if (since_ns < w->a.gap_ns && since_ns + 2 * half_ns >= w->a.gap_ns) wait_ns(w, 2 * half_ns);
-    for (unsigned i = 0; sched_next_ns(&w->s) <= w->s.now_ns + 16 * half_ns; i++) {
-        if (i == POSTPONED_MAX) return false;
-        sched_run_until(&w->s, sched_next_ns(&w->s));
+    for (unsigned i = 0; i < POSTPONED_MAX; i++) {
+        const int64_t since_ns = w->s.now_ns - w->a.rise_ns, next_ns = sched_next_ns(&w->s);
+        if (since_ns < w->a.gap_ns && since_ns + 2 * half_ns >= w->a.gap_ns) wait_ns(w, 2 * half_ns);
+        else if (next_ns <= w->s.now_ns + 16 * half_ns) sched_run_until(&w->s, next_ns);
+        else return true;
     }
-    return true;
+    return false;
 }
 
 static void send(struct w1282 *w, uint8_t mosi, int64_t gap_ns, int64_t half_ns)

@@ -63,17 +63,21 @@ static void refused(void *ctx, const char *name, const char *why)
 
 /* ---- what the node sends ---- */
 
+static bool was_asked(const struct world *w, const uint8_t object[3])
+{
+    for (uint64_t i = w->sdo_requests; i-- > 0;)
+        if (memcmp(object, w->asked[i], 3) == 0) return true;
+    return false;
+}
+
+/* An answer names an object that somebody has named, a segment none; what is out of place may be aborted without one. */
 static void heard_sdo(struct world *w, const struct can_msg *m)
 {
-    assert(m->len == 8);
     const uint8_t specifier = m->data[0] >> 5;
     w->sdo_answers++;
-    assert(specifier <= 4);
-    if (specifier < 2) return; /* a segment names no object */
-    for (uint64_t i = w->sdo_requests; i-- > 0;)
-        if (memcmp(m->data + 1, w->asked[i], 3) == 0) return;
-    if (specifier == 4 && bits_get_le(m->data + 1, 3) == 0) return; /* a segment where no transfer has ever begun */
-    assert(!"an answer about an object that nobody has named");
+    assert(m->len == 8 && specifier <= 4);
+    const bool nameless = specifier < 2 || (specifier == 4 && bits_get_le(m->data + 1, 3) == 0);
+    assert(nameless || was_asked(w, m->data + 1));
 }
 
 static bool known_state(uint8_t state)
