@@ -37,12 +37,18 @@ static void leave_standby(struct ads1256 *a, int64_t t_ns)
     a->next_ok_ns = clk_edge_ns(&a->clkin, a->start_tau + ads1256_settle_tau(a->rate));
 }
 
+/* WAKEUP acts at the first SCLK edge of its byte. A byte slower than the settling time acts at its end: the words that came
+ * meanwhile would lie in the past (E0). */
+static int64_t wakeup_ns(const struct ads1256 *a, int64_t t_ns)
+{
+    return a->first_ns + ads1256_settle_ns(a) > t_ns ? a->first_ns : t_ns;
+}
+
 static void op_wakeup(struct ads1256 *a, uint8_t opcode, int64_t t_ns)
 {
     (void)opcode;
-    (void)t_ns;
-    if (a->mode == ADS1256_SYNC_WAIT) ads1256_restart(a, 0, a->first_ns);
-    else if (a->mode == ADS1256_STANDBY) leave_standby(a, a->first_ns);
+    if (a->mode == ADS1256_SYNC_WAIT) ads1256_restart(a, 0, wakeup_ns(a, t_ns));
+    else if (a->mode == ADS1256_STANDBY) leave_standby(a, wakeup_ns(a, t_ns));
 }
 
 static void op_rdata(struct ads1256 *a, uint8_t opcode, int64_t t_ns)

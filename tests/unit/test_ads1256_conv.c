@@ -63,6 +63,20 @@ static void sync_command_restarts_at_the_first_edge_of_wakeup(void **state)
     assert_int_equal(r.a.n.gap_violations, 0);
 }
 
+static void a_wakeup_slower_than_the_settling_time_restarts_at_its_end(void **state)
+{
+    (void)state;
+    struct rig r;
+    rig_up(&r, &quiet); /* 30000 words/s: 0.21 ms */
+    command(&r, 0xFC);
+    spi_first(&r.a.spi, r.s.now_ns);
+    wait_ns(&r, 2000000);
+    spi_byte(&r.a.spi, 0x00, r.s.now_ns);
+    const int64_t k = clk_count_at(&r.a.clkin, r.s.now_ns);
+    assert_int_equal(await_fall(&r), clk_edge_ns(&r.a.clkin, k + 1382 + 256));
+    assert_int_equal(await_fall(&r), clk_edge_ns(&r.a.clkin, k + 1382 + 2 * 256));
+}
+
 static void word_after_a_synchronised_channel_change_is_settled(void **state)
 {
     (void)state;
@@ -383,6 +397,7 @@ int main(void)
         cmocka_unit_test(first_word_after_t18_then_periodic_at_every_rate),
         cmocka_unit_test(unread_words_give_a_pulse_of_16_tau),
         cmocka_unit_test(sync_command_restarts_at_the_first_edge_of_wakeup),
+        cmocka_unit_test(a_wakeup_slower_than_the_settling_time_restarts_at_its_end),
         cmocka_unit_test(word_after_a_synchronised_channel_change_is_settled),
         cmocka_unit_test(unsynchronised_channel_change_mixes_the_running_word),
         cmocka_unit_test(undefined_rate_codes_are_stored_and_keep_the_rate),
