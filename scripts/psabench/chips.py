@@ -13,9 +13,10 @@
         print(ads1256_volts(code, vref_v=2.5))
 
 Simulated time stands still between calls: it moves in `run_for`, `run_until_ns`, `run_until_level`, `spi`, `board_read`
-and `board_write`. Functions given to `watch`, `input` and `on_frame` are called from in there and must not call these;
-what they raise comes out of the call that moved time. Durations are float seconds and end in _s, instants are whole
-nanoseconds since the bench was made and end in _ns. The same calls give the same answers on every machine.
+and `board_write`. Functions given to `watch`, `set_input` and `on_frame` are called from in there and must not call
+these or `close`; what they raise comes out of the call that moved time. Durations are float seconds and end in _s,
+instants are whole nanoseconds since the bench was made and end in _ns. The same calls give the same answers on every
+machine.
 
 `psabench.errors`: BadInput for what does not exist (part, option, pin, register), TimeOut, BenchError for the rest.
 """
@@ -81,6 +82,7 @@ class Bench:
 
     def __init__(self, seed: int = 1) -> None:
         self.raised: BaseException | None = None  # by the first callback that raised within the running call
+        self.inside = 0  # callbacks that are running
         self._handle: int | None = None
         self._lib = library()
         self._handle = self._lib.new(seed)
@@ -99,6 +101,8 @@ class Bench:
 
     def close(self) -> None:
         """Frees the bench with its parts and ends the recording; they cannot be used any more. Twice is allowed."""
+        if self.inside:  # the library would go on with what it no longer has
+            raise BenchError("close() from a callback: a bench is closed between calls")
         handle, self._handle = self._handle, None
         if handle:
             self._lib.free(handle)
@@ -300,11 +304,14 @@ class Part:
 
     def _guarded(self, fn: Callable[..., Any]) -> Callable[..., Any]:
         def call(*args: Any) -> Any:
+            self.bench.inside += 1
             try:
                 return 0.0 if self.bench.raised else fn(*args)
             except BaseException as e:  # C cannot pass it on: Bench.done raises it when the call is over
                 self.bench.raised = e
                 return 0.0
+            finally:
+                self.bench.inside -= 1
 
         return call
 

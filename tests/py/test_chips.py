@@ -321,6 +321,14 @@ def test_a_callback_cannot_move_time(adc: Part) -> None:
         adc.bench.run_for(1e-3)
 
 
+def test_a_callback_cannot_close_the_bench(bench: Bench, adc: Part) -> None:
+    adc.pins["DRDY"].watch(lambda level, t_ns: bench.close())
+    with pytest.raises(BenchError, match="from a callback"):
+        bench.run_for(0.01)
+    adc.pins["DRDY"].watch(None)
+    assert adc.pins["DRDY"].level in (0, 1)
+
+
 def test_an_input_that_is_no_number_is_a_type_error(adc: Part) -> None:
     adc.set_input(lambda number, t_ns: "one volt")  # type: ignore[arg-type,return-value]
     with pytest.raises(ValueError, match="one volt"):
