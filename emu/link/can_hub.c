@@ -1,13 +1,27 @@
 #include "link/can_hub.h"
 
-void can_hub_restart(struct can_client *c)
+static void start_counters(struct can_client *c)
 {
     c->delivered = c->taken = c->dropped = c->overrun = 0;
 }
 
+static void keep_counters(struct can_hub *h, const struct can_client *c)
+{
+    h->gone.delivered += c->delivered;
+    h->gone.taken += c->taken;
+    h->gone.dropped += c->dropped;
+    h->gone.overrun += c->overrun;
+}
+
+void can_hub_restart(struct can_hub *h, struct can_client *c)
+{
+    keep_counters(h, c);
+    start_counters(c);
+}
+
 void can_hub_up(struct can_hub *h, struct can_client *c)
 {
-    can_hub_restart(c);
+    start_counters(c);
     c->node.name = c->name;
     c->up = true;
     c->leaving = false;
@@ -27,10 +41,7 @@ void can_hub_down(struct can_hub *h, struct can_client *c)
         *p = c->next;
         break;
     }
-    h->gone.delivered += c->delivered;
-    h->gone.taken += c->taken;
-    h->gone.dropped += c->dropped;
-    h->gone.overrun += c->overrun;
+    keep_counters(h, c);
     h->gone.refused += c->refused;
     c->refused = 0;
     c->up = false;

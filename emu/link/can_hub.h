@@ -38,8 +38,8 @@ struct can_hub {
 /* Attaches the client: its node's rx, sent, fd, order and ctx and its adapter and name have been filled in. */
 void can_hub_up(struct can_hub *h, struct can_client *c);
 
-/* The client starts anew without having left the bus: its counters begin at zero. */
-void can_hub_restart(struct can_client *c);
+/* The client starts anew without having left the bus: its counters begin at zero, what they were is added to the gone. */
+void can_hub_restart(struct can_hub *h, struct can_client *c);
 
 /* Detaches it; its counters are added to those of the gone. Frames of its still queued are dropped. */
 void can_hub_down(struct can_hub *h, struct can_client *c);

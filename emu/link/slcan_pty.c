@@ -61,7 +61,7 @@ static bool cmd_open(struct slcan_pty *s, const char *arg, int64_t t_ns)
     s->open = true;
     s->closing = s->can.leaving = s->lost_told = false;
     s->status = 0;
-    if (s->can.up) can_hub_restart(&s->can);
+    if (s->can.up) can_hub_restart(s->hub, &s->can);
     else can_hub_up(s->hub, &s->can);
     return true;
 }

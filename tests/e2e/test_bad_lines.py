@@ -186,6 +186,23 @@ def test_a_bad_slcan_line_is_answered_by_bel_and_counted(make_rig: MakeRig, line
 
 
 @HOST
+def test_frames_of_a_program_that_opens_again_before_they_are_out_stay_counted(make_rig: MakeRig) -> None:
+    """In step pace they wait for time, and the next host's barrier counts all that were ever taken."""
+    rig = make_rig("socketcand", extra=("--can", "slcan"))
+
+    def taken() -> int:
+        frames = rig.control.call("frames").result
+        return sum(int(c["taken"]) for c in [*frames["clients"], frames["gone"]])
+
+    before = taken()
+    with serial(rig) as say:
+        assert say(b"O\r") == b"\r"
+        assert say(b"t1230\r") == b"z\r"
+        assert say(b"C\r") == say(b"O\r") == b"\r"
+        assert taken() == before + 1
+
+
+@HOST
 def test_a_line_begun_by_one_program_is_not_ended_by_the_next(make_rig: MakeRig) -> None:
     rig = make_rig("socketcand", pace="wall", extra=("--can", "slcan"))
     with serial(rig) as say:
