@@ -41,7 +41,10 @@ static bool read_under_way(const struct ads1282 *a, int64_t t_ns)
  * (the exact tear is M50); else the word begins at bit 31, wherever the shifter's byte stands. */
 void ads1282_serial_deliver(struct ads1282 *a, uint32_t word, int64_t t_ns)
 {
-    if (!a->rdatac && !a->rdata_due) return;
+    if (!a->rdatac && !a->rdata_due) { /* the word of an RDATA, once read, answers SCLK no more */
+        a->word_out = a->word_out && (a->unread || read_under_way(a, t_ns));
+        return;
+    }
     a->count.overruns += a->unread;
     if (read_under_way(a, t_ns)) {
         a->count.torn_reads++;

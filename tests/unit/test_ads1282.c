@@ -81,6 +81,7 @@ static const struct {
     {"WAKEUP", CONT, 1, {0x00}, 0, 0, 0, 0x52, true, NOTHING},
     {"WAKEUP, other code", STOP, 1, {0x01}, 0, 0, 0, 0x52, false, NOTHING},
     {"WAKEUP", STRICT, 1, {0x00}, 0, 0, 0, 0x52, true, NOTHING},
+    {"WAKEUP, other code", STRICT, 1, {0x01}, 0, 0, 0, 0x52, true, NOTHING},
     {"STANDBY", CONT, 1, {0x02}, 0, 0, 0, 0x52, true, STANDBY},
     {"STANDBY, other code", STOP, 1, {0x03}, 0, 0, 0, 0x52, false, STANDBY},
     {"STANDBY", STRICT, 1, {0x02}, 1, 0, 0, 0x52, true, NOTHING},

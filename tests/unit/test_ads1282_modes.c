@@ -417,6 +417,38 @@ static void a_calibration_raises_drdy_until_it_is_done(void **state)
     assert_int_equal(r.a.count.conversions, 1 + 1); /* the readings between are no words */
 }
 
+/* A word that nobody has read when a calibration begins is gone. */
+static void a_calibration_forgets_the_word(void **state)
+{
+    (void)state;
+    struct rig r;
+    powered(&r, &quiet);
+    r.v = 1.0;
+    to_fall(&r);
+    byte(&r, 0x60); /* shifts out its first byte */
+    hex_is(read_bytes(&r, 4), 0);
+    assert_int_equal(r.a.count.overruns, 0);
+}
+
+/* In SDATAC SCLK raises DRDY for the word of an RDATA, read whole or in part, and for no other. */
+static void sclk_raises_drdy_for_the_word_asked_for_only(void **state)
+{
+    (void)state;
+    for (unsigned bytes = 3; bytes <= 4; bytes++) {
+        struct rig r;
+        powered(&r, &quiet);
+        SEND(&r, 0x11, 0x12);
+        to_fall(&r);
+        to_fall(&r); /* still there */
+        (void)byte(&r, 0);
+        assert_true(ads1282_drdy(&r.a));
+        read_bytes(&r, bytes - 1);
+        to_fall(&r);
+        (void)byte(&r, 0);
+        assert_false(ads1282_drdy(&r.a));
+    }
+}
+
 /* Whether OFC and FSC act while calibrating is not known: both readings, after a first calibration of the same input. */
 static void a_second_calibration_shows_whether_registers_act(void **state)
 {
@@ -723,6 +755,8 @@ int main(void)
         cmocka_unit_test(a_sync_that_drifts_keeps_dout_at_zero_for_ever),
         cmocka_unit_test(calibration_makes_offset_zero_and_full_scale_full),
         cmocka_unit_test(a_calibration_raises_drdy_until_it_is_done),
+        cmocka_unit_test(a_calibration_forgets_the_word),
+        cmocka_unit_test(sclk_raises_drdy_for_the_word_asked_for_only),
         cmocka_unit_test(a_second_calibration_shows_whether_registers_act),
         cmocka_unit_test(calibration_limits),
         cmocka_unit_test(calibration_averages_sixteen_readings),
