@@ -24,7 +24,7 @@ SANITIZED = "SAN=address,undefined"
 # name, command, seconds it may take: so many that only what hangs is ended, on a busy machine, too
 STEPS: list[tuple[str, list[str], float]] = [
     ("build", [*STRICT, "all"], 600),
-    ("lint", [*MAKE, "lint"], 600),
+    ("lint", [*MAKE, "lint"], 1200),
     ("C tests, gcc", [*STRICT, "check"], 600),
     ("C tests, clang", [*STRICT, "CC=clang", "check"], 600),
     ("C tests, gcc, sanitizers", [*STRICT, SANITIZED, "check"], 1200),
