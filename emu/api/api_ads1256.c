@@ -38,7 +38,7 @@ static const struct ads1256 *cchip(const struct psabench_part *p)
     X("gain_error", API_REAL, part_ads1256, gain_error, "0", -0.5, 0.5, NULL,                                          \
       "relative gain error of the uncalibrated path, likewise")                                                        \
     X("source_ohm", API_REAL, part_ads1256, source_ohm, "0", 0, 1e9, NULL,                                             \
-      "resistance behind each input, ohm, that the sensor-detect currents meet")                                       \
+      "resistance behind each input, ohm: sensor-detect currents meet it, an input without buffer loads it")           \
     X("cells_max", API_UINT, part_ads1256, cells_max, "0", 0, 65535, NULL,                                             \
       "looks at the input per conversion at 500 SPS and below; 0: one a millisecond")                                  \
     X("strict_timing", API_BOOL, part_ads1256, strict_timing, "0", 0, 1, NULL,                                         \
