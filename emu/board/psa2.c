@@ -172,6 +172,7 @@ static void init_read(struct psa2 *b)
     static const uint8_t zeros[4] = {0}; /* DIn low: WAKEUP, harmless */
     b->read = psa2_xfer_accel(b, zeros, b->profile.read_bits / 8);
     for (unsigned i = 0; i + 1 < b->read.count; i++) b->read.gap_ns[i] = 0;
+    b->read.zeros = true;
     b->read.done = read_done;
 }
 

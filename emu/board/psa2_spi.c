@@ -133,20 +133,25 @@ static uint32_t temp_bytes(const struct psa2_spi *s)
 }
 
 /* After the byte: DIn keeps its last bit up to the next byte and rests low after the last, DOut shows what comes next. */
-static uint32_t accel_after(const struct psa2 *b)
+static uint32_t accel_after(const struct psa2_spi *s, uint32_t next)
 {
-    const bool last = b->spi.at + 1u == b->spi.x.count;
-    uint32_t level = last ? 0 : (accel_bytes(&b->spi) & 1) << PSA2_LINE_DIN;
-    for (unsigned i = 0; i < 3; i++) level |= (uint32_t)spi_miso(&b->adc[i].spi) << (PSA2_LINE_DOUTX + i);
+    const bool last = s->at + 1u == s->x.count;
+    return (last ? 0 : (accel_bytes(s) & 1) << PSA2_LINE_DIN) | next << PSA2_LINE_DOUTX;
+}
+
+/* DOutX, Y, Z as they stand. */
+static uint32_t dout_now(const struct psa2 *b)
+{
+    uint32_t level = 0;
+    for (unsigned i = 0; i < 3; i++) level |= (uint32_t)spi_miso(&b->adc[i].spi) << i;
     return level;
 }
 
 /* The byte that has ended. Accelerometers, mode 0: data change on the falling edge before the rising one that samples them;
- * temperature, mode 1: on the rising edge. */
-static void report_byte(struct psa2 *b)
+ * temperature, mode 1: on the rising edge. next: DOutX, Y, Z after it. */
+static void report_byte(struct psa2 *b, uint32_t next)
 {
     const struct psa2_spi *s = &b->spi;
-    if (!trace_watched(&b->trace, accel_lines | temp_lines)) return;
     const bool temp = s->x.group == PSA2_TEMP;
     const uint32_t sclk = UINT32_C(1) << PSA2_LINE_SCLK;
     const uint32_t on_fall = clocks_accel(b) ? accel_lines & ~sclk : 0;
@@ -163,7 +168,8 @@ static void report_byte(struct psa2 *b)
         *p++ = (struct trace_step){at.t_ns, sclk | on_rise, sclk | data};
         at = clk_on(at, &one);
         *p++ = (struct trace_step){at.t_ns, sclk | on_fall,
-                                   shift ? bit_of_each(accel, (unsigned)shift - 1) << PSA2_LINE_DIN : accel_after(b)};
+                                   shift ? bit_of_each(accel, (unsigned)shift - 1) << PSA2_LINE_DIN
+                                         : accel_after(s, next)};
     }
     at = clk_on(at, &one);
     if (temp && s->at + 1u == s->x.count) *p++ = (struct trace_step){at.t_ns, UINT32_C(1) << PSA2_LINE_DINT, 0};
@@ -179,7 +185,7 @@ static void end_xfer(struct psa2 *b, int64_t t_ns)
 static void end_byte(struct psa2 *b, int64_t t_ns)
 {
     struct psa2_spi *s = &b->spi;
-    report_byte(b);
+    if (trace_watched(&b->trace, accel_lines | temp_lines)) report_byte(b, dout_now(b));
     const int64_t next_ns = t_ns + s->x.gap_ns[s->at];
     if (++s->at < s->x.count) {
         begin_byte(b, edge_at(s, next_ns));
@@ -190,11 +196,40 @@ static void end_byte(struct psa2 *b, int64_t t_ns)
     else arm(b, PSA2_SPI_REST, after_ns(s, &s->byte)); /* SClk is low again before CST may move */
 }
 
+/* On to the last byte of a read whose bytes are known; what is reported ends with the byte before. */
+static void pass_bytes(struct psa2 *b)
+{
+    struct psa2_spi *s = &b->spi;
+    for (; s->at + 1u < s->x.count; s->at++, s->first = clk_on(s->first, &s->byte)) {
+        if (!trace_watched(&b->trace, accel_lines)) continue;
+        uint32_t next = 0;
+        for (unsigned i = 0; i < 3; i++) next |= (uint32_t)s->rx[i][s->at + 1] >> 7 << i;
+        report_byte(b, next);
+    }
+}
+
+/* The read whose first byte has just begun, at one go: nothing else happens before its end, and all the converters do is
+ * shift. */
+static bool read_at_once(struct psa2 *b)
+{
+    struct psa2_spi *s = &b->spi;
+    if (!s->x.zeros || s->at > 0) return false;
+    for (unsigned i = 0; i < 3; i++)
+        if (!ads1282_only_shifts(&b->adc[i])) return false;
+    const int64_t end_ns = after_ns(s, &s->read);
+    if (!sched_go_on(b->sched, end_ns)) return false;
+    for (unsigned i = 0; i < 3; i++) ads1282_shift(&b->adc[i], s->rx[i], s->x.count, end_ns);
+    pass_bytes(b);
+    end_byte(b, end_ns);
+    return true;
+}
+
 static void first_fall(struct psa2 *b, int64_t t_ns)
 {
     if (clocks_accel(b))
         for (unsigned i = 0; i < 3; i++) spi_first(&b->adc[i].spi, t_ns);
     if (b->spi.x.group == PSA2_TEMP) spi_first(&b->tadc.spi, t_ns);
+    if (read_at_once(b)) return;
     if (clocks_accel(b)) arm(b, PSA2_SPI_SAMPLE_A, after_ns(&b->spi, &b->spi.sample_a));
     else arm(b, PSA2_SPI_SAMPLE_T, after_ns(&b->spi, &b->spi.sample_t));
 }
@@ -257,6 +292,7 @@ void psa2_spi_init(struct psa2 *b)
     s->sample_a = clk_step(&s->half, HALF_SAMPLE_A);
     s->sample_t = clk_step(&s->half, HALF_SAMPLE_T);
     s->byte = clk_step(&s->half, HALF_BYTE);
+    s->read = clk_step(&s->half, HALF_BYTE * (b->profile.read_bits / 8 - 1) + HALF_SAMPLE_A);
     sched_ev(&b->spi.ev, on_event, b);
 }
 

@@ -11,6 +11,7 @@ struct psa2;
 struct psa2_xfer {
     enum psa2_group group;
     uint8_t count;
+    bool zeros; /* a read: nothing but zeros to the accelerometers' converters, byte after byte */
     uint8_t tx[PSA2_XFER_MAX];
     int32_t gap_ns[PSA2_XFER_MAX];
     void (*done)(struct psa2 *b, int64_t t_ns); /* SClk rests (accelerometers), CST high again (temperature) */
@@ -30,6 +31,7 @@ struct psa2_spi {
     struct clk half;                                /* edge k: rising for even k, falling for odd */
     struct clk_step one, back, period;              /* half periods: 1, -1, 2 */
     struct clk_step fall, sample_a, sample_t, byte; /* from the first rising edge of a byte to others */
+    struct clk_step read;                           /* from there to the end of a read */
     struct psa2_xfer x;
     uint8_t rx[4][PSA2_XFER_MAX]; /* X, Y, Z, T */
     enum psa2_spi_phase phase;

@@ -46,6 +46,12 @@ bool ads1282_mflag(const struct ads1282 *a); /* the newest input sample was at o
  * bit by bit (mode 0: spi_miso and spi_sample at each rising edge, spi_first after the first of each byte). The state is
  * the same; only the pins show the limits of struct ads1282_limits. */
 
+/* For a bus that reads a word at one go, nothing being due before its end: whether bytes of zeros only shift the output
+ * register out, asked after spi_first() of the first; if so, n of them in place of spi_byte() and of the other
+ * spi_first(), the last ended at t_ns. */
+bool ads1282_only_shifts(const struct ads1282 *a);
+void ads1282_shift(struct ads1282 *a, uint8_t *out, unsigned n, int64_t t_ns);
+
 /* ---- For the owner ---- */
 
 /* Samples the input up to and including t_ns. For a caller about to change the input abruptly: it is otherwise sampled,

@@ -253,6 +253,25 @@ static void on_first(void *chip, int64_t t_ns)
     ads1282_serial_fall(a, t_ns);
 }
 
+/* No command under way nor, a zero being WAKEUP, to come. Nothing can be late: the 4 tCLK are shorter than a byte. */
+bool ads1282_only_shifts(const struct ads1282 *a)
+{
+    return a->alive && !a->op && !a->lost && !a->standby && a->spi.bits == 0;
+}
+
+void ads1282_shift(struct ads1282 *a, uint8_t *out, unsigned n, int64_t t_ns)
+{
+    for (unsigned i = 0; i < n; i++) {
+        out[i] = a->spi.out;
+        if (a->out_index < 8) a->out_index++;
+        a->spi.out = out_byte(a);
+    }
+    a->spi.sent = out[n - 1];
+    a->spi.in = 0;
+    a->rise_ns = a->sclk_ns = t_ns;
+    a->in_byte = false;
+}
+
 /* Interface time-out, counted in data periods without SCLK. */
 void ads1282_serial_period(struct ads1282 *a)
 {

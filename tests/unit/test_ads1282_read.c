@@ -264,6 +264,77 @@ static void a_half_command_is_dropped_after_64_periods(void **state)
     }
 }
 
+/* ---- A word at one go ---- */
+
+/* n zeros without a gap; at one go where the rig's master may. Returns how often it could. */
+static unsigned read_zeros(struct rig *r, uint8_t *out, unsigned n, bool at_once)
+{
+    const int64_t first = r->tclk + r->gap_tclk;
+    const int64_t end_ns = clk_edge_ns(&r->clk, first + (8 * n - 1) * BIT_TCLK);
+    spi_first(&r->a.spi, at_tclk(r, first + BIT_TCLK / 2));
+    if (at_once && sched_next_ns(&r->s) > end_ns && ads1282_only_shifts(&r->a)) {
+        ads1282_shift(&r->a, out, n, at_tclk(r, first + (8 * n - 1) * BIT_TCLK));
+        assert_int_equal(r->s.now_ns, end_ns);
+        return 1;
+    }
+    for (unsigned i = 0; i < n; i++) {
+        if (i > 0) spi_first(&r->a.spi, at_tclk(r, first + 8 * i * BIT_TCLK + BIT_TCLK / 2));
+        out[i] = spi_byte(&r->a.spi, 0, at_tclk(r, first + (8 * i + 7) * BIT_TCLK));
+    }
+    return 0;
+}
+
+/* Whatever the chip is in the middle of: a command, a lost byte, a byte out of step, STANDBY, reset. */
+static void before_the_read(struct rig *r, uint64_t u)
+{
+    static const uint8_t bytes[] = {0x11, 0x10, 0x12, 0x21, 0x43, 0x00, 0x20, 0x53};
+    static const int gaps[] = {24, 30, 4};
+    r->gap_tclk = gaps[(u >> 16) % COUNT(gaps)];
+    if (u % 3 == 0) byte(r, bytes[(u >> 8) % sizeof bytes]);
+    if (u % 5 == 0) at_tclk(r, r->tclk + (int64_t)(u >> 32) % 5000);
+    if (u % 41 == 0) spi_sample(&r->a.spi, u >> 20 & 1, at_tclk(r, r->tclk + 30));
+    if (u % 211 == 0) at_tclk(r, r->tclk + 64 * 4096);
+    if (u % 997 == 0) byte(r, 0x02);
+    if (u % 1009 == 0) ads1282_reset_pin(&r->a, false, at_tclk(r, r->tclk + 30));
+    else if (u % 29 == 0) ads1282_reset_pin(&r->a, true, at_tclk(r, r->tclk + 30));
+}
+
+static void a_read_at_one_go_is_one_by_bytes(void **state)
+{
+    (void)state;
+    static struct rig r[2];
+    const uint64_t seed = rig_seed(7);
+    unsigned at_once[2] = {0};
+    for (unsigned strict = 0; strict < 2; strict++) {
+        struct ads1282_cfg cfg = quiet;
+        struct rng g = rng_stream(seed, strict, "bus");
+        cfg.strict_gap = strict;
+        for (unsigned i = 0; i < 2; i++) {
+            powered(&r[i], &cfg);
+            r[i].ramp_v_per_s = 1.0;
+        }
+        for (unsigned n = 0; n < 8000; n++) {
+            uint8_t out[2][6];
+            const uint64_t u = rng_u64(&g);
+            const unsigned bytes = 1 + (unsigned)(u >> 50) % 6;
+            for (unsigned i = 0; i < 2; i++) {
+                before_the_read(&r[i], u);
+                at_once[i] += read_zeros(&r[i], out[i], bytes, i);
+            }
+            assert_memory_equal(out[0], out[1], bytes);
+            const struct ads1282 *const x = &r[0].a, *const y = &r[1].a;
+            assert_true(x->rise_ns == y->rise_ns && x->sclk_ns == y->sclk_ns && x->in_byte == y->in_byte);
+            assert_true(x->spi.sent == y->spi.sent && x->out_index == y->out_index);
+            assert_int_equal(r[0].rises, r[1].rises);
+            assert_int_equal(r[0].rise_ns, r[1].rise_ns);
+            assert_memory_equal(&r[0].a.count, &r[1].a.count, sizeof r[0].a.count);
+        }
+        assert_memory_equal(r[0].a.reg_value, r[1].a.reg_value, ADS1282_REGS);
+        assert_true(r[0].a.count.conversions > 100 && r[0].a.count.torn_reads > 0);
+    }
+    assert_true(at_once[1] > 1000);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -281,6 +352,7 @@ int main(void)
         cmocka_unit_test(registers_read_in_rdatac_are_refused_and_data_win),
         cmocka_unit_test(a_stray_clock_garbles_commands_until_sclk_rests_64_periods),
         cmocka_unit_test(a_half_command_is_dropped_after_64_periods),
+        cmocka_unit_test(a_read_at_one_go_is_one_by_bytes),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
