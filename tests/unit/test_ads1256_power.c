@@ -285,11 +285,13 @@ static void power_up_ends_a_power_down(void **state)
     (void)state;
     struct rig r;
     rig_up(&r, &quiet);
+    wreg(&r, ADS1256_ADCON, 0x63);
     ads1256_sync_pin(&r.a, false, r.s.now_ns);
     wait_ns(&r, 1000000);
     assert_int_equal(r.a.mode, ADS1256_OFF);
     ads1256_power_up(&r.a, r.s.now_ns);
     assert_int_equal(r.a.mode, ADS1256_SYNC_LOW);
+    assert_int_equal(reg_peek(&r.a.regs, ADS1256_ADCON), 0x20); /* CLK too */
     wait_ns(&r, 1000000);
     ads1256_sync_pin(&r.a, true, r.s.now_ns);
     const int64_t from_ns = r.s.now_ns;

@@ -136,6 +136,10 @@ static void rdatac_outlives_chip_select_and_offers_a_word_anew(void **state)
     assert_int_equal(read_word(&r), 1677721);
     assert_int_equal(r.a.n.dropped, 1);
     ads1256_cs_pin(&r.a, true, r.s.now_ns + 2000);
+    ads1256_cs_pin(&r.a, false, r.s.now_ns + 3000);
+    wait_ns(&r, 3000);
+    assert_int_equal(xfer(&r, 0), ADS1256_DOUT_IDLE); /* but not one that has been read */
+    ads1256_cs_pin(&r.a, true, r.s.now_ns + 2000);
     await_fall(&r);
     ads1256_cs_pin(&r.a, false, r.s.now_ns);
     assert_int_equal(read_word(&r), 1677721);
