@@ -17,7 +17,7 @@ from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 from psabench.can_host import CanHost
 from psabench.errors import DeviceError, LinkError
 
-ANSWER_S = 1.0  # bench time: the controller may have to wait for a conversion before it touches a register
+ANSWER_S = 5.0  # bench time: the controller may wait for a conversion, and in wall pace the machine may be busy
 # Command specifiers, bits 7..5 of the first byte (CiA 301, 7.2.4.3): begins a transfer, and its answers or an abort.
 INITIATE, ABORT = {0x20: 0x60, 0x40: 0x40}, 0x80
 
