@@ -20,8 +20,10 @@ double det_log(double x)
     const double f = m - 1.0;
     const double s = f / (2.0 + f);
     const double z = s * s;
+    static const double odd[] = {1.0 / 23, 1.0 / 21, 1.0 / 19, 1.0 / 17, 1.0 / 15, 1.0 / 13,
+                                 1.0 / 11, 1.0 / 9,  1.0 / 7,  1.0 / 5,  1.0 / 3};
     double sum = 0.0;
-    for (int n = 23; n >= 3; n -= 2) sum = (sum + 1.0 / n) * z;
+    for (unsigned i = 0; i < sizeof odd / sizeof *odd; i++) sum = (sum + odd[i]) * z;
     return (double)k * LN2_HI + (2.0 * s + (2.0 * s * sum + (double)k * LN2_LO));
 }
 

@@ -37,11 +37,11 @@ double rng_uniform(struct rng *r)
 
 static double ratio(const double *num, const double *den, double x)
 {
-    double n = num[7];
-    double d = den[6];
-    for (int i = 6; i >= 0; i--) n = n * x + num[i];
-    for (int i = 5; i >= 0; i--) d = d * x + den[i];
-    return n / (d * x + 1.0);
+    const double n =
+        ((((((num[7] * x + num[6]) * x + num[5]) * x + num[4]) * x + num[3]) * x + num[2]) * x + num[1]) * x + num[0];
+    const double d =
+        ((((((den[6] * x + den[5]) * x + den[4]) * x + den[3]) * x + den[2]) * x + den[1]) * x + den[0]) * x + 1.0;
+    return n / d;
 }
 
 /* AS 241 PPND16, relative error about 1e-16. Denominators lack their constant term 1. */
