@@ -42,7 +42,7 @@ static void report_word(struct psa2 *b, int64_t until_ns)
     o->at = clk_on(o->at, &o->word_gap);
     struct trace_step *const step = trace_room(&b->trace, 3 * 32 + 1), *p = step;
     if (!step) return;
-    const uint32_t changes = word ^ word << 1; /* DATA rests low before the first bit */
+    const uint64_t changes = word ^ (uint64_t)word << 1; /* DATA rests low before the first bit and after the last */
     for (unsigned bit = 0; bit < b->profile.word_bits; bit++) {
         *p = (struct trace_step){at.t_ns, DATA, (word >> bit & 1) << PSA2_LINE_DATA};
         p += changes >> bit & 1; /* no branch: data cannot be predicted */
@@ -51,7 +51,11 @@ static void report_word(struct psa2 *b, int64_t until_ns)
         at = clk_on(at, &one);
         *p++ = (struct trace_step){at.t_ns, CLK, 0};
     }
-    *p++ = (struct trace_step){at.t_ns, DATA, 0};
+    *p++ = (struct trace_step){at.t_ns, changes >> b->profile.word_bits & 1 ? DATA : 0, 0};
+    if (at.t_ns <= until_ns) {
+        trace_commit_run(&b->trace, (unsigned)(p - step), CLK | DATA);
+        return;
+    }
     while (p > step && p[-1].t_ns > until_ns) p--;
     trace_commit(&b->trace, (unsigned)(p - step));
 }

@@ -4,7 +4,7 @@
 #include <string.h>
 
 /* Leaves of n reports what really changes. */
-static void filter(struct trace *t, struct trace_step *s, unsigned n)
+static void filter(struct trace *t, struct trace_step *s, uint64_t n)
 {
     uint32_t level = t->level;
     for (const struct trace_step *const end = s + n; s < end; s++) {
@@ -13,6 +13,27 @@ static void filter(struct trace *t, struct trace_step *s, unsigned n)
         level = (level & ~lines) + (s->level & lines); /* two steps long where the xor would be three: it is a chain */
     }
     t->level = level;
+}
+
+/* The same for the n oldest of those pending; runs need no look at each step. */
+static void filter_due(struct trace *t, struct trace_step *s, unsigned n)
+{
+    uint64_t at = t->gone;
+    unsigned k = 0;
+    t->gone += n;
+    for (; k < t->runs && t->run[k].at + t->run[k].n <= t->gone; k++) {
+        const struct trace_run *r = &t->run[k];
+        filter(t, s, r->at - at);
+        s += r->at - at;
+        at = r->at;
+        if (t->level & r->lines) continue; /* with what follows */
+        s += r->n;
+        at += r->n;
+    }
+    filter(t, s, t->gone - at);
+    k += k < t->runs && t->run[k].at < t->gone; /* only begun */
+    t->runs -= k;
+    if (k > 0 && t->runs > 0) memmove(t->run, t->run + k, t->runs * sizeof *t->run);
 }
 
 /* How many of n steps come up to t_ns. */
@@ -34,7 +55,7 @@ static void deliver_until(struct trace *t, int64_t t_ns)
     t->pending_count -= n;
     t->first = t->pending_count > 0 ? t->first + n : 0;
     if (n == 0) return;
-    filter(t, due, n);
+    filter_due(t, due, n);
     for (const struct trace_sink *s = t->sinks; s; s = s->next) s->steps(s->ctx, due, n);
 }
 
@@ -111,7 +132,18 @@ void trace_commit(struct trace *t, unsigned n)
         if (e.t_ns < t->done_ns) e.t_ns = t->done_ns;
         for (; at > first && at[-1].t_ns > e.t_ns; at--) at[0] = at[-1];
         *at = e;
+        const uint64_t place = t->gone + (uint64_t)(at - first);
+        while (t->runs > 0 && t->run[t->runs - 1].at + t->run[t->runs - 1].n > place) t->runs--;
     }
+}
+
+void trace_commit_run(struct trace *t, unsigned n, uint32_t lines)
+{
+    const struct trace_step *const s = t->pending + t->first + t->pending_count;
+    const bool in_order = n > 0 && s->t_ns >= (t->pending_count > 0 ? s[-1].t_ns : t->done_ns);
+    const struct trace_run run = {t->gone + t->pending_count, n, lines};
+    trace_commit(t, n);
+    if (in_order && t->runs < TRACE_RUNS_MAX) t->run[t->runs++] = run;
 }
 
 void trace_steps(struct trace *t, const struct trace_step *s, unsigned n)

@@ -14,6 +14,7 @@
 
 #define TRACE_SIGNALS_MAX 32u
 #define TRACE_PENDING_MAX 16384u
+#define TRACE_RUNS_MAX    64u
 #define TRACE_LAG_NS      200000 /* longer than any byte or word on a board's lines */
 
 /* From t_ns on the signals in the mask `lines` have these levels. Bit per signal; at one instant in order of their
@@ -21,6 +22,13 @@
 struct trace_step {
     int64_t t_ns;
     uint32_t lines, level;
+};
+
+/* Steps in a row whose `lines` are just what changes, provided that all these lines are low before; they are after. */
+struct trace_run {
+    uint64_t at; /* number of the first, counted since trace_init() */
+    unsigned n;
+    uint32_t lines;
 };
 
 struct trace_sink {
@@ -40,6 +48,10 @@ struct trace {
     struct trace_sink *sinks;
     struct trace_step pending[TRACE_PENDING_MAX]; /* in order of time, then of report, from pending[first] on */
     unsigned first, pending_count;
+    uint64_t gone; /* steps delivered */
+    struct trace_run
+        run[TRACE_RUNS_MAX]; /* of steps pending that need no look at each; one may be forgotten at any time */
+    unsigned runs;
     int64_t done_ns;  /* delivered up to here */
     uint32_t late;    /* reports behind done_ns: delivered at done_ns, counted; 0 unless a board breaks the window */
     uint32_t dropped; /* reports that found pending full */
@@ -70,6 +82,9 @@ void trace_steps(struct trace *t, const struct trace_step *s, unsigned n);
  * nothing to commit, when pending is full. */
 struct trace_step *trace_room(struct trace *t, unsigned n);
 void trace_commit(struct trace *t, unsigned n);
+
+/* As trace_commit() for steps that are a run of these lines. Delivered faster. */
+void trace_commit_run(struct trace *t, unsigned n, uint32_t lines);
 
 /* Reports the level of a signal from t_ns on. Cheap when nobody listens to it. */
 static inline void trace_set(struct trace *t, unsigned sig, bool level, int64_t t_ns)

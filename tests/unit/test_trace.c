@@ -251,6 +251,50 @@ static void random_reports_come_out_sorted(void **state)
     assert_int_equal(trace.late, 0);
 }
 
+/* n pulses on line 2, line 1 up meanwhile: a run if both were low. */
+static void report_pulses(struct trace *t, bool as_run, int64_t t_ns, unsigned n)
+{
+    struct trace_step *const s = trace_room(t, 2 * n + 2);
+    for (unsigned i = 0; i < 2 * n; i++) s[i + 1] = (struct trace_step){t_ns + 5 * i, 4, i % 2 ? 0 : 4};
+    s[0] = (struct trace_step){t_ns, 2, 2};
+    s[2 * n + 1] = (struct trace_step){t_ns + 10 * n, 2, 0};
+    if (as_run) trace_commit_run(t, 2 * n + 2, 6);
+    else trace_commit(t, 2 * n + 2);
+}
+
+static void runs_are_what_their_steps_are(void **state)
+{
+    (void)state;
+    static struct trace two[2];
+    static struct ear heard[2];
+    struct rng g = rng_stream(rig_seed(3), 0, "runs");
+    uint64_t whole = 0;
+    for (int i = 0; i < 2; i++) {
+        trace_init(&two[i]);
+        for (int k = 0; k < 3; k++) trace_add(&two[i], "line", false);
+        heard[i] = (struct ear){.sink = {.mask = 7, .steps = hear_steps, .ctx = &heard[i]}};
+        trace_attach(&two[i], &heard[i].sink);
+    }
+    for (int n = 0; n < 20000; n++) {
+        const uint64_t u = rng_u64(&g);
+        const int64_t now_ns = 100 * n;
+        heard[0].count = heard[1].count = 0;
+        for (int i = 0; i < 2; i++) {
+            if (u % 3) report_pulses(&two[i], i, now_ns - (int64_t)(u >> 8) % 3 * 60, 1 + (unsigned)(u >> 16) % 12);
+            if (u % 5 == 0)
+                trace_set(&two[i], u >> 24 & 3 ? 0 : (unsigned)(u >> 26) % 3, u >> 30 & 1,
+                          now_ns + (int64_t)(u >> 32) % 90);
+            if (u % 7 < 3) trace_advance(&two[i], now_ns - 150 + (int64_t)(u >> 40) % 200);
+        }
+        whole += two[1].runs;
+        for (unsigned k = 0; k < two[1].runs; k++) assert_true(two[1].run[k].at >= two[1].gone);
+        assert_heard(&heard[1], heard[0].heard, heard[0].count);
+        assert_int_equal(two[0].level, two[1].level);
+    }
+    assert_int_equal(two[0].runs, 0);
+    assert_true(whole > 1000);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -265,6 +309,7 @@ int main(void)
         cmocka_unit_test_setup(late_steps_are_told_now, fresh),
         cmocka_unit_test_setup(a_long_run_fits, fresh),
         cmocka_unit_test_setup(random_reports_come_out_sorted, fresh),
+        cmocka_unit_test(runs_are_what_their_steps_are),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
