@@ -228,7 +228,7 @@ class Part:
         """A constant voltage at an input from now on. Numbers: ads1256 0..7 AIN0..AIN7, 8 AINCOM, to AGND; ads1255 0,
         1, 8; ads1282 0 AIN1, 1 AIN2, differential; ads1281 0; psa2 0..2 sensors X, Y, Z (with a current input amperes),
         3..6 the temperatures of these sensors and of the board, degC."""
-        self.bench.done(self._lib.set_volts(self.live(), input, volts))
+        self.bench.done(self._lib.set_volts(self.live(), _word("input", input), volts))
 
     def set_input(self, fn: Callable[[int, int], float] | None) -> None:
         """Inputs come from fn(input, t_ns) -> volts, asked at the instants of sampling: for one input never earlier
@@ -246,7 +246,7 @@ class Part:
 
     def spi_clock(self, sclk_hz: int, gap_s: float = 0.0) -> None:
         """Frequency of SCLK from now on, and the pause between two bytes of an exchange."""
-        self.bench.done(self._lib.spi_clock(self.live(), sclk_hz, round(gap_s * 1e9)))
+        self.bench.done(self._lib.spi_clock(self.live(), _word("sclk_hz", sclk_hz), round(gap_s * 1e9)))
 
     # Waiting
 
@@ -265,7 +265,7 @@ class Part:
 
     def peek(self, address: int) -> int:
         """A register, 0..255, without the side effects of reading it over SPI. psa2: 256 * group + address."""
-        return self.bench.done(self._lib.peek(self.live(), address))
+        return self.bench.done(self._lib.peek(self.live(), _word("address", address)))
 
     @property
     def counters(self) -> dict[str, int]:
@@ -283,11 +283,13 @@ class Part:
 
     def board_read(self, group: int, address: int, timeout_s: float = 1.0) -> int:
         """A register of a board's converter, through the board's controller. group: 0..2 X, Y, Z; 3 temperature."""
-        return self.bench.done(self._lib.board_read(self.live(), group, address, round(timeout_s * 1e9)))
+        where = _word("group", group), _word("address", address)
+        return self.bench.done(self._lib.board_read(self.live(), *where, round(timeout_s * 1e9)))
 
     def board_write(self, group: int, address: int, value: int, timeout_s: float = 1.0) -> None:
         """The same, writing 0..255. Groups 0, 1 and 2 are written together."""
-        self.bench.done(self._lib.board_write(self.live(), group, address, value, round(timeout_s * 1e9)))
+        what = _word("group", group), _word("address", address), _word("value", value, 8)
+        self.bench.done(self._lib.board_write(self.live(), *what, round(timeout_s * 1e9)))
 
     # For Bench and Pin.
 
@@ -328,6 +330,13 @@ def _frame(f: FrameStruct) -> Frame:
         f.temp_channel,
         f.status,
     )
+
+
+def _word(what: str, value: int, bits: int = 32) -> int:
+    """The number, if it fits into an unsigned word; ctypes would cut it without a word."""
+    if not isinstance(value, int) or not 0 <= value < 1 << bits:
+        raise BadInput(f"{what} {value!r}: must be a whole number, 0 to {(1 << bits) - 1}")
+    return value
 
 
 def _option(value: float | str | bool) -> str:

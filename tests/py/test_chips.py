@@ -172,6 +172,20 @@ def test_registers_are_written_over_spi_and_peeked_at(adc: Part) -> None:
         adc.peek(0x0B)
 
 
+@pytest.mark.parametrize("number", [-1, 1 << 32, 2**40 + 1, "AIN0"])
+def test_numbers_that_c_would_cut_are_refused(adc: Part, number: int) -> None:
+    calls: dict[str, Callable[[], object]] = {
+        "address": lambda: adc.peek(number),
+        "input": lambda: adc.set_volts(number, 1.0),
+        "sclk_hz": lambda: adc.spi_clock(number),
+        "group": lambda: adc.board_read(number, 0),
+        "value": lambda: adc.board_write(0, 0, number),
+    }
+    for what, call in calls.items():
+        with pytest.raises(BadInput, match=rf"^{what} {number!r}: must be a whole number, 0 to "):
+            call()
+
+
 def test_pins_moved_one_by_one_do_what_bytes_do(adc: Part) -> None:
     def exchange(byte: int) -> int:
         got = 0
