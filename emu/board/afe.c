@@ -94,10 +94,41 @@ static double any_out_v(struct afe *a, double signal, double temp_degc, int64_t 
     return a->state_v;
 }
 
-double afe_out_v(struct afe *a, double signal, double temp_degc, int64_t t_ns)
+/* A step and a temperature like the last, no noise: the constants hold. */
+static bool usual(const struct afe *a, double temp_degc, int64_t t_ns)
 {
     const int64_t dt_ns = t_ns - a->t_ns;
-    const bool usual = dt_ns > 0 && same_step(a, dt_ns) && temp_degc == a->scale.degc && !(a->noise_v > 0.0);
-    if (!usual) return any_out_v(a, signal, temp_degc, t_ns);
+    return dt_ns > 0 && same_step(a, dt_ns) && temp_degc == a->scale.degc && !(a->noise_v > 0.0);
+}
+
+double afe_out_v(struct afe *a, double signal, double temp_degc, int64_t t_ns)
+{
+    if (!usual(a, temp_degc, t_ns)) return any_out_v(a, signal, temp_degc, t_ns);
     return filtered_v(a, load_v(&a->cfg, &a->scale, signal) / a->scale.divider, t_ns);
+}
+
+/* Usual steps from the first on; returns how many. A copy of the chain, which no store into the row can change. */
+static unsigned usual_row(struct afe *a, double *row, const int64_t *t_ns, unsigned n)
+{
+    struct afe own = *a;
+    unsigned i = 0;
+    do {
+        row[i] = filtered_v(&own, load_v(&own.cfg, &own.scale, row[i]) / own.scale.divider, t_ns[i]);
+        i++;
+    } while (i < n && t_ns[i] > own.t_ns && same_step(&own, t_ns[i] - own.t_ns));
+    a->state_v = own.state_v;
+    a->t_ns = own.t_ns;
+    return i;
+}
+
+void afe_out_row_v(struct afe *a, double *signal_to_v, double temp_degc, const int64_t *t_ns, unsigned n)
+{
+    for (unsigned i = 0; i < n;) {
+        if (usual(a, temp_degc, t_ns[i])) {
+            i += usual_row(a, signal_to_v + i, t_ns + i, n - i);
+        } else {
+            signal_to_v[i] = any_out_v(a, signal_to_v[i], temp_degc, t_ns[i]);
+            i++;
+        }
+    }
 }

@@ -55,4 +55,7 @@ double afe_static_v(const struct afe_cfg *cfg, double signal, double temp_degc);
  * noise included. The filter takes the signal as held since the last call. */
 double afe_out_v(struct afe *a, double signal, double temp_degc, int64_t t_ns);
 
+/* The same for n samples in a row, in place: signals in, volts out. */
+void afe_out_row_v(struct afe *a, double *signal_to_v, double temp_degc, const int64_t *t_ns, unsigned n);
+
 #endif

@@ -277,6 +277,15 @@ static double accel_vin_v(void *ctx, unsigned mux, int64_t t_ns)
     return afe_out_v(&b->afe[port->axis], signal, b->board_degc, t_ns);
 }
 
+static void accel_vin_row_v(void *ctx, unsigned mux, const int64_t *t_ns, unsigned n, double *vin_v)
+{
+    const struct psa2_port *port = ctx;
+    struct psa2 *b = port->b;
+    const bool connected = mux == 0 || mux == 3;
+    for (unsigned i = 0; i < n; i++) vin_v[i] = connected ? b->io.accel(b->io.ctx, port->axis, t_ns[i]) : 0.0;
+    if (connected) afe_out_row_v(&b->afe[port->axis], vin_v, b->board_degc, t_ns, n);
+}
+
 /* ---- life ---- */
 
 static void init_trace(struct psa2 *b)
@@ -309,7 +318,8 @@ static void init_accel(struct psa2 *b)
                                     .chain = b->unit.adc_chain};
     for (unsigned i = 0; i < 3; i++) {
         b->port[i] = (struct psa2_port){b, i};
-        const struct ads1282_io io = {.ctx = &b->port[i], .vin_v = accel_vin_v, .drdy = accel_drdy};
+        const struct ads1282_io io = {
+            .ctx = &b->port[i], .vin_v = accel_vin_v, .vin_row_v = accel_vin_row_v, .drdy = accel_drdy};
         ads1282_init(&b->adc[i], &cfg, &io, b->sched, rng_stream(b->unit.seed, b->unit.serial, adc_noise[i]));
         afe_init(&b->afe[i], &b->unit.afe[i], rng_stream(b->unit.seed, b->unit.serial, afe_noise[i]));
     }

@@ -85,6 +85,16 @@ static double input_v(const struct ads1282 *a)
     return a->mux == 2 || a->mux > 4 ? 0.0 : a->io.vin_v(a->io.ctx, a->mux, a->next.t_ns);
 }
 
+static void input_row_v(const struct ads1282 *a, const int64_t *t_ns, unsigned n, double *vin_v)
+{
+    const bool shorted = a->mux == 2 || a->mux > 4;
+    if (a->io.vin_row_v && !shorted) {
+        a->io.vin_row_v(a->io.ctx, a->mux, t_ns, n, vin_v);
+        return;
+    }
+    for (unsigned i = 0; i < n; i++) vin_v[i] = shorted ? 0.0 : a->io.vin_v(a->io.ctx, a->mux, t_ns[i]);
+}
+
 static int64_t noisy_input(struct ads1282 *a)
 {
     double x = input_v(a) * a->lsb_per_v;
@@ -121,9 +131,11 @@ static void sample_fir(struct ads1282 *a, int64_t until_ns)
     while (a->next.t_ns <= until_ns) {
         const unsigned slot = (unsigned)(a->index % ADS1282_BLOCKS);
         const unsigned period = (unsigned)(a->index / ADS1282_BLOCKS);
+        int64_t t_ns[ADS1282_BLOCKS];
         double vin_v[ADS1282_BLOCKS];
         unsigned n = 0;
-        for (; slot + n < ADS1282_BLOCKS && a->next.t_ns <= until_ns; advance(a)) vin_v[n++] = input_v(a);
+        for (; slot + n < ADS1282_BLOCKS && a->next.t_ns <= until_ns; advance(a)) t_ns[n++] = a->next.t_ns;
+        input_row_v(a, t_ns, n, vin_v);
         modulate(a, vin_v, n, a->sinc + slot);
         if (slot + n == ADS1282_BLOCKS)
             a->result[period % ADS1282_RESULTS] = ads1282_filter_period(&a->filter, a->sinc);

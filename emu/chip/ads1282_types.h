@@ -64,6 +64,8 @@ struct ads1282_io {
     /* Differential input of multiplexer code mux (0 AIN1, 1 AIN2, 3 both, 4 AINN2 short; code 2 is shorted inside), volts,
      * at t_ns: up to one data period ago, never earlier than the last call. */
     double (*vin_v)(void *ctx, unsigned mux, int64_t t_ns);
+    /* The same for n samples in a row, if that is cheaper; may be NULL. */
+    void (*vin_row_v)(void *ctx, unsigned mux, const int64_t *t_ns, unsigned n, double *vin_v);
     void (*drdy)(void *ctx, bool level, int64_t t_ns);  /* DRDY pin, active low; called on changes only */
     void (*mflag)(void *ctx, bool level, int64_t t_ns); /* MFLAG pin likewise; costs an event for each input sample */
     /* Pins M0 and M1 at each MCLK (CLK/4) while CONFIG0 FILTR = 00; not given: the bits are not computed. */

@@ -122,12 +122,46 @@ static void temperature_acts_at_once(void **state)
     }
 }
 
+/* Rows of any length, steps that are now the usual ones and now not, none at all among them, changes of temperature. */
+static void a_row_is_its_samples_one_by_one(void **state)
+{
+    (void)state;
+    struct rng g = rng_stream(rig_seed(4), 0, "rows");
+    for (int noisy = 0; noisy < 2; noisy++) {
+        struct afe_cfg c = afe_nominal(AFE_CURRENT);
+        c.divider_tc_ppm_per_k = -300.0;
+        c.buffer_offset_v = 1e-3;
+        c.buffer_offset_tc_v_per_k = 1e-5;
+        c.noise_v_rthz = noisy ? 1e-6 : 0.0;
+        struct afe one, row;
+        afe_init(&one, &c, rng_stream(1, 1, "afe"));
+        afe_init(&row, &c, rng_stream(1, 1, "afe"));
+        int64_t last_ns = 0;
+        for (unsigned n = 0; n < 3000; n++) {
+            int64_t t_ns[32];
+            double v[32], want[32];
+            const uint64_t u = rng_u64(&g);
+            const unsigned count = 1 + (unsigned)u % 32;
+            const double degc = u >> 8 & 3 ? 25.0 : 30.0;
+            for (unsigned i = 0; i < count; i++) {
+                const uint64_t w = rng_u64(&g);
+                last_ns += w % 20 ? 31250 + (int64_t)(w >> 8) % 2 : (int64_t)(w >> 8) % 3 * 7000;
+                t_ns[i] = last_ns;
+                v[i] = 0.024 * ((double)(w >> 40) / (double)(1 << 24) - 0.5); /* clips now and then */
+                want[i] = afe_out_v(&one, v[i], degc, last_ns);
+            }
+            afe_out_row_v(&row, v, degc, t_ns, count);
+            assert_memory_equal(v, want, count * sizeof *v);
+        }
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(temperature_acts_at_once),      cmocka_unit_test(static_transfer),
         cmocka_unit_test(one_pole_is_exact_at_any_pace), cmocka_unit_test(without_a_filter_the_chain_has_no_memory),
-        cmocka_unit_test(noise_has_its_density),
+        cmocka_unit_test(noise_has_its_density),         cmocka_unit_test(a_row_is_its_samples_one_by_one),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
