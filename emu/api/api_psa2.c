@@ -10,7 +10,7 @@ enum { TEMPS = 4, TEMP_INPUT = 3 /* inputs 3..6: temperatures */ };
 
 struct part_psa2 {
     struct psabench_part part;
-    unsigned profile, input;
+    unsigned profile, chain, input;
     double noise_scale, temp_noise_scale, temp_degc;
     struct psa2 board;
     struct trace_sink sink[2]; /* one is attached, the other takes over when the lines heeded change */
@@ -37,6 +37,8 @@ static const struct part_psa2 *cself(const struct psabench_part *p)
 
 #define OPTIONS(X)                                                                                                     \
     X("profile", API_CHOICE, part_psa2, profile, "article", 0, 6, PROFILES, "board profile, proto/profiles")           \
+    X("chain", API_CHOICE, part_psa2, chain, "exact", 0, 2, "exact|modulator|direct",                                  \
+      "of the accelerometer converters, as that of an ads1282")                                                        \
     X("noise_scale", API_REAL, part_psa2, noise_scale, "1", 0, 1000, NULL,                                             \
       "noise of the accelerometer converters, 1: published, 0: none")                                                  \
     X("temp_noise_scale", API_REAL, part_psa2, temp_noise_scale, "1", 0, 1000, NULL,                                   \
@@ -266,6 +268,7 @@ static bool open_psa2(struct psabench_part *p, char *why, size_t cap)
     struct psa2_unit_cfg unit = {.adc_noise_scale = s->noise_scale,
                                  .temp_noise_scale = s->temp_noise_scale,
                                  .seed = p->bench->seed,
+                                 .adc_chain = (enum ads1282_chain)s->chain,
                                  .serial = (uint32_t)(serial ^ serial >> 32)};
     for (unsigned i = 0; i < 3; i++) unit.afe[i] = afe_nominal(s->input == 0 ? AFE_VOLTAGE : AFE_CURRENT);
     for (unsigned i = 0; i < TEMPS; i++) p->volts[TEMP_INPUT + i] = s->temp_degc;

@@ -220,6 +220,19 @@ static bool load_temps(struct yaml_file *f, yaml_node_t *node, void *section)
     return true;
 }
 
+static bool load_adc_chain(struct yaml_file *f, yaml_node_t *node, void *section)
+{
+    static const char *const chains[] = {
+        [ADS1282_CHAIN_EXACT] = "exact", [ADS1282_CHAIN_MODULATOR] = "modulator", [ADS1282_CHAIN_DIRECT] = "direct"};
+    const char *text = yaml_file_scalar(node);
+    for (unsigned i = 0; text && i < COUNT(chains); i++) {
+        if (strcmp(text, chains[i]) != 0) continue;
+        ((struct scenario_unit *)section)->cfg.board.adc_chain = (enum ads1282_chain)i;
+        return true;
+    }
+    return yaml_file_fail(f, node, "adc_chain", "exact, modulator or direct is wanted");
+}
+
 #define UNIT(m) offsetof(struct scenario_unit, m)
 
 // clang-format off
@@ -233,6 +246,7 @@ static const struct yaml_field unit_fields[] = {
     {"frame_form",          YAML_U8, UNIT(frame_form), 0, 3, NULL},
     {"axes",                YAML_CUSTOM, 0, 0, 0, load_axes},
     {"temp_degc",           YAML_CUSTOM, 0, 0, 0, load_temps},
+    {"adc_chain",           YAML_CUSTOM, 0, 0, 0, load_adc_chain},
     {"adc_noise_scale",     YAML_REAL, UNIT(cfg.board.adc_noise_scale), 0, 1000, NULL},
     {"temp_noise_scale",    YAML_REAL, UNIT(cfg.board.temp_noise_scale), 0, 1000, NULL},
     {"temp_adc_offset_v",   YAML_REAL, UNIT(cfg.board.temp_adc_offset_v), -0.1, 0.1, NULL},

@@ -338,6 +338,28 @@ static void a_step_is_felt_from_its_instant_on(void **state)
     assert_true(code[0] > code[1] + 100000); /* on the slope of the filter's answer */
 }
 
+/* A step tells the chains apart: the direct one has no slope. */
+static void the_chain_is_a_choice(void **state)
+{
+    (void)state;
+    static const char *const options[] = {"noise_scale=0 chain=exact", "noise_scale=0 chain=direct"};
+    int slope[2] = {0, 0};
+    for (int k = 0; k < 2; k++) {
+        struct frames s = {.count = 0};
+        psabench *b = psabench_new(1);
+        psabench_part *p = part(b, "psa2", "u", options[k]);
+        good(b, psabench_on_frame(p, on_frame, &s));
+        run(b, 300 * MS);
+        good(b, psabench_set_volts(p, 0, 2.5));
+        for (int i = 0; i < 12; i++) {
+            until(p, "Int", 0), until(p, "Int", 1);
+            slope[k] += s.last.code[0] > 1000 && s.last.code[0] < 2000000;
+        }
+        psabench_free(b);
+    }
+    assert_true(slope[0] > 0 && slope[1] == 0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -345,6 +367,7 @@ int main(void)
         cmocka_unit_test(each_field_of_a_profile_is_that_of_its_file),
         cmocka_unit_test(the_lines_carry_the_words_of_the_frame),
         cmocka_unit_test(a_step_is_felt_from_its_instant_on),
+        cmocka_unit_test(the_chain_is_a_choice),
         cmocka_unit_test(int_can_be_waited_for_unwatched),
         cmocka_unit_test(levels_asked_are_levels_told),
         cmocka_unit_test(registers_are_reached_through_the_controller),

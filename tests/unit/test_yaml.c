@@ -46,6 +46,7 @@ static void every_key_reaches_its_field(void **state)
               "    frame_form: 2\n"
               "    temp_degc: [1, 2, 3, 4]\n"
               "    adc_noise_scale: 0.5\n"
+              "    adc_chain: direct\n"
               "    profile_set: {word_bits: 24, line_hz: 4096000, line_div: 3, word: [T, Z, Y, X]}\n"
               "    axes:\n"
               "      y: {sensor: mems, u0_v: -0.25, kxy_v_per_g2: 1e-3, alpha0_deg: 0.1121,\n"
@@ -64,6 +65,7 @@ static void every_key_reaches_its_field(void **state)
     assert_int_equal(u->frame_form, 2);
     assert_true(u->cfg.temp_degc[0] == 1 && u->cfg.temp_degc[3] == 4);
     assert_true(u->cfg.board.adc_noise_scale == 0.5 && u->cfg.board.temp_noise_scale == 1);
+    assert_int_equal(u->cfg.board.adc_chain, ADS1282_CHAIN_DIRECT);
     assert_int_equal(u->profile.word_bits, 24);
     assert_int_equal(u->profile.word[0], PSA2_WORD_T);
     assert_int_equal(u->cfg.axis[1].sensor, UNIT_MEMS);
@@ -117,6 +119,7 @@ static const struct {
     {"units:\n  - axes:\n      x:\n        u0_v: 2,5\n", "dir/s.yaml:4: units.a.axes.x.u0_v: \"2,5\" is not a number"},
     {"units:\n  - axes:\n      x:\n        u0_v: nan\n", "dir/s.yaml:4: units.a.axes.x.u0_v: \"nan\" is not a number"},
     {"units: [{axes: {w: {}}}]\n", "dir/s.yaml:1: units.a.axes.w: unknown key; known here: x, y, z"},
+    {"units: [{adc_chain: sinc}]\n", "dir/s.yaml:1: units.a.adc_chain: exact, modulator or direct is wanted"},
     {"units: [{axes: {x: {afe: {input: tube}}}}]\n",
      "dir/s.yaml:1: units.a.axes.x.afe.input: current or voltage is wanted"},
     {"units: [{}, {}, {}, {}, {}, {}, {}, {}, {}]\n", "dir/s.yaml:1: units: up to 8 are wanted"},
