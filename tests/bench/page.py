@@ -20,9 +20,9 @@ ENGINES = {  # of the first table and of the picture
     "frames-watched-direct": "psabench, all lines watched, no decimation chain",
 }
 UNWATCHED = {
-    "frames-direct": "no decimation chain (`ADS1282_CHAIN_DIRECT`)",
+    "frames-direct": "no decimation chain (`adc_chain: direct`)",
     "frames": "bit-exact decimation chain, three channels (the default)",
-    "frames-modulator": "bit-true modulator before it (`ADS1282_CHAIN_MODULATOR`)",
+    "frames-modulator": "bit-true modulator before it (`adc_chain: modulator`)",
 }
 OTHERS = {
     "vcd": "VCD writer alone, fed with the edges of frames",
@@ -65,8 +65,8 @@ def watching(r: Result) -> float | None:
 
 LINES = "all lines watched, no decimation chain"
 WHY_LINES = (
-    "the target is a prototype's that made lines from ready words; here four converters answer byte by byte, "
-    "draw their noise and keep their registers"
+    "the target is a prototype's that made lines from ready words; here four converters keep their registers and draw "
+    "their noise, and of the instructions about eleven an edge are the counting listener's own"
 )
 WHY_CHAIN = "the decimation chain of three converters, which the models lack, takes about half of it"
 WHY_STRETCH = (
@@ -74,8 +74,8 @@ WHY_STRETCH = (
     "with noise, for each reading of each channel"
 )
 WHY_DIRECT = (
-    "it would want a frame computed in one stroke; here its bytes go through the state machines of the chips, "
-    "and each conversion has its data-ready event, noise and analog chain"
+    "a frame is not computed in one stroke: each of its three conversions has its data-ready event, its Gaussian draw "
+    "and its analog chain, and these wait for one another more than they compute"
 )
 TARGETS = (
     Target(
