@@ -164,18 +164,28 @@ static bool moment(struct w1256 *w, int64_t half_ns)
     return true;
 }
 
+/* Zeros in a row that the chip has taken. An edge lost to a strict chip is a bit that it has not shifted, and an SCLK that
+ * stopped offers it a half read word anew. */
+static void note_quiet(struct w1256 *w, uint8_t mosi, const struct ads1256_counters *before)
+{
+    const bool whole = !w->a.cfg.strict_bus || w->a.n.sclk_violations == before->sclk_violations;
+    const bool counts = whole && mosi == 0 && w->a.n.conversions == w->quiet_word;
+    w->quiet = counts ? w->quiet + 1 : 0;
+    w->quiet_word = w->a.n.conversions;
+}
+
 static void send(struct w1256 *w, uint8_t mosi, int64_t gap_ns, int64_t half_ns)
 {
     wait_ns(w, gap_ns);
     if (twin(w) && !moment(w, half_ns)) return;
     const bool by_pins = w->drive == W1256_PINS || w->drive == W1256_TWIN_PINS;
-    const uint32_t before = w->a.n.conversions;
+    const struct ads1256_counters before = w->a.n;
     const uint8_t miso = by_pins ? xfer_pins(w, mosi, half_ns) : xfer_bytes(w, mosi, half_ns);
     if (twin(w)) wait_ns(w, clk_span_ns(w->a.clkin.hz, HIZ_TAU)); /* an event of the pins alone */
-    mix(w, w->a.n.conversions == before ? miso : 0);
-    w->quiet = mosi || w->a.n.conversions != w->quiet_word ? 0 : w->quiet + 1;
-    w->quiet_word = w->a.n.conversions;
+    mix(w, w->a.n.conversions == before.conversions ? miso : 0);
+    note_quiet(w, mosi, &before);
     assert(w->quiet <= BEHIND_ALL || miso == ADS1256_DOUT_IDLE); /* no read past the word */
+    assert(!w->a.cs || miso == ADS1256_DOUT_IDLE);
 }
 
 /* SCLK from 1.92 MHz down, T6 and T11 kept or not. */
@@ -243,7 +253,9 @@ static void op_reset(struct w1256 *w, struct script *s)
 
 static void op_cs(struct w1256 *w, struct script *s)
 {
-    ads1256_cs_pin(&w->a, script_byte(s) & 1, w->s.now_ns);
+    const bool level = script_byte(s) & 1;
+    if (level != w->a.cs) w->quiet = 0; /* in RDATAC a half read word is offered anew (M50) */
+    ads1256_cs_pin(&w->a, level, w->s.now_ns);
 }
 
 static void op_gpio(struct w1256 *w, struct script *s)

@@ -21,7 +21,7 @@ struct w1256 {
     uint32_t conversions;                 /* as counted at the last fall */
     uint64_t trail;                       /* of all changes of outputs: equal worlds have equal trails */
     struct ads1256_counters seen;
-    unsigned quiet;      /* bytes of zeros since the word changed last */
+    unsigned quiet;      /* bytes of zeros that the chip took since its word or CS changed last */
     uint32_t quiet_word; /* its number */
 };
 

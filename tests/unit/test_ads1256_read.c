@@ -131,6 +131,7 @@ static void rdatac_outlives_chip_select_and_offers_a_word_anew(void **state)
     wait_ns(&r, T6_NS);
     assert_int_equal(xfer(&r, 0), 0x19);
     ads1256_cs_pin(&r.a, true, r.s.now_ns + 2000);
+    for (unsigned i = 0; i < 5; i++) assert_int_equal(xfer(&r, 0), ADS1256_DOUT_IDLE); /* for others on the bus */
     ads1256_cs_pin(&r.a, false, r.s.now_ns + 3000);
     wait_ns(&r, 3000);
     assert_int_equal(read_word(&r), 1677721);
