@@ -73,12 +73,12 @@ static bool cmd_listen(struct slcan_pty *s, const char *arg, int64_t t_ns)
     return true;
 }
 
-/* A client that sent and closed: its frames still go out, then it leaves the bus (on_flush). */
+/* A client that sent and closed: its frames still go out, then it leaves the bus (on_flush), also when it closes again. */
 static bool cmd_close(struct slcan_pty *s, const char *arg, int64_t t_ns)
 {
     (void)t_ns;
     if (*arg) return false;
-    s->closing = s->can.leaving = s->open;
+    if (s->open) s->closing = s->can.leaving = true;
     s->open = false;
     return true;
 }

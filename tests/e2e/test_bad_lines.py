@@ -186,6 +186,20 @@ def test_a_bad_slcan_line_is_answered_by_bel_and_counted(make_rig: MakeRig, line
 
 
 @HOST
+def test_a_channel_that_is_closed_twice_leaves_the_bus_when_its_frame_is_out(make_rig: MakeRig) -> None:
+    """In step pace the frame waits for time, and the channel for the frame."""
+    rig = make_rig("socketcand", extra=("--can", "slcan"))
+    with serial(rig) as say:
+        assert say(b"O\r") == b"\r"
+        assert say(b"t1230\r") == b"z\r"
+        assert say(b"C\r") == say(b"C\r") == b"\r"
+        assert [c["adapter"] for c in rig.clients()] == ["socketcand", "slcan"]
+        rig.host.advance(0.1)
+        until(lambda: len(rig.clients()) == 1, "the channel to leave the bus")
+    assert rig.control.call("frames").result["gone"]["taken"] == 1
+
+
+@HOST
 def test_frames_of_a_program_that_opens_again_before_they_are_out_stay_counted(make_rig: MakeRig) -> None:
     """In step pace they wait for time, and the next host's barrier counts all that were ever taken."""
     rig = make_rig("socketcand", extra=("--can", "slcan"))
