@@ -10,8 +10,6 @@
 #ifndef PSABENCH_VERSION
 #error "the Makefile takes PSABENCH_VERSION from pyproject.toml"
 #endif
-#define TEXT_OF(x)  #x
-#define TEXT(macro) TEXT_OF(macro)
 
 int psabench_abi(void)
 {
@@ -20,7 +18,7 @@ int psabench_abi(void)
 
 const char *psabench_version(void)
 {
-    return TEXT(PSABENCH_VERSION);
+    return TEXT_OF(PSABENCH_VERSION);
 }
 
 int api_fail(psabench *b, int code, const char *format, ...)

@@ -2,6 +2,7 @@
 #include "app/list.h"
 #include "app/options.h"
 #include "app/service.h"
+#include "base/text.h"
 
 #include <signal.h>
 #include <stdlib.h>
@@ -9,9 +10,7 @@
 enum { EXIT_DONE = 0, EXIT_INPUT = 2, EXIT_MACHINE = 3, EXIT_INT = 130 };
 
 /* PSABENCH_VERSION comes from pyproject.toml by way of the Makefile. */
-#define TEXT_OF(x) #x
-#define TEXT(x)    TEXT_OF(x)
-#define VERSION    TEXT(PSABENCH_VERSION)
+#define VERSION TEXT_OF(PSABENCH_VERSION)
 
 static int complain(int status, const char *why)
 {
