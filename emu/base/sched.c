@@ -79,13 +79,18 @@ bool sched_go_on(struct sched *s, int64_t t_ns)
 void sched_run_until(struct sched *s, int64_t until_ns)
 {
     s->until_ns = until_ns;
-    while (s->first && s->first->due_ns <= until_ns) {
+    while (s->first && s->first->due_ns <= s->until_ns) {
         struct sched_ev *e = s->first;
         take_out(s, e);
         s->now_ns = e->due_ns;
         count_at_once(s);
         e->fn(e->ctx, e->due_ns);
     }
-    if (s->now_ns < until_ns) s->now_ns = until_ns;
+    if (s->now_ns < s->until_ns) s->now_ns = s->until_ns;
     s->until_ns = -1;
+}
+
+void sched_stop(struct sched *s)
+{
+    if (s->until_ns > s->now_ns) s->until_ns = s->now_ns;
 }

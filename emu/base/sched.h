@@ -52,4 +52,8 @@ int64_t sched_next_ns(const struct sched *s);
 /* Runs everything due up to and including until_ns, in order, then leaves now at until_ns. */
 void sched_run_until(struct sched *s, int64_t until_ns);
 
+/* From within an event: the run under way ends at the present instant, as if it had been asked for until now. What else is
+ * due at this instant still runs. Outside of a run nothing happens. */
+void sched_stop(struct sched *s);
+
 #endif

@@ -153,6 +153,35 @@ static void going_on_is_what_arming_does(void **state)
     assert_false(sched_go_on(&rig.s, rig.s.now_ns)); /* outside a run nothing moves */
 }
 
+static void stop(void *ctx, int64_t t_ns)
+{
+    record(ctx, t_ns);
+    sched_stop(&rig.s);
+    assert_false(sched_go_on(&rig.s, t_ns + 1));
+}
+
+static void a_run_that_is_stopped_ends_as_if_asked_for_that_instant(void **state)
+{
+    (void)state;
+    sched_stop(&rig.s); /* outside a run: not remembered */
+    for (int i = 0; i < 5; i++) sched_at(&rig.s, &rig.ev[i], i < 4 ? 10 + 10 * (i > 0) : 21);
+    sched_ev(&rig.ev[5], stop, &rig.ev[5]);
+    sched_at(&rig.s, &rig.ev[5], 15);
+    sched_run_until(&rig.s, 100);
+    assert_int_equal(rig.s.now_ns, 15);
+    assert_int_equal(rig.ran, 2);
+    sched_at(&rig.s, &rig.ev[5], 20);
+    sched_at(&rig.s, &rig.ev[6], 20);
+    sched_run_until(&rig.s, 100);
+    assert_int_equal(rig.s.now_ns, 20);
+    assert_int_equal(rig.ran, 7); /* 1, 2, 3, then the one that stops, then one more of 20 ns */
+    assert_int_equal(rig.order[6], 6);
+    assert_true(rig.ev[4].queued);
+    sched_run_until(&rig.s, 100);
+    assert_int_equal(rig.s.now_ns, 100);
+    assert_int_equal(rig.ran, 8);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -161,6 +190,7 @@ int main(void)
         cmocka_unit_test_setup(the_past_is_clamped_to_now, fresh),
         cmocka_unit_test_setup(an_event_due_exactly_at_the_limit_runs, fresh),
         cmocka_unit_test_setup(going_on_is_what_arming_does, fresh),
+        cmocka_unit_test_setup(a_run_that_is_stopped_ends_as_if_asked_for_that_instant, fresh),
         cmocka_unit_test_setup(random_schedules_come_out_in_total_order, fresh),
     };
     return cmocka_run_group_tests_name("sched", tests, NULL, NULL);
