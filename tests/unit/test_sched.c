@@ -164,6 +164,7 @@ static void a_run_that_is_stopped_ends_as_if_asked_for_that_instant(void **state
 {
     (void)state;
     sched_stop(&rig.s); /* outside a run: not remembered */
+    assert_false(sched_go_on(&rig.s, 0));
     for (int i = 0; i < 5; i++) sched_at(&rig.s, &rig.ev[i], i < 4 ? 10 + 10 * (i > 0) : 21);
     sched_ev(&rig.ev[5], stop, &rig.ev[5]);
     sched_at(&rig.s, &rig.ev[5], 15);
