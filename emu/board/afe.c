@@ -3,7 +3,9 @@
 #include "base/detmath.h"
 #include "base/sched.h"
 
+#include <assert.h>
 #include <math.h>
+#include <stddef.h>
 
 #define NOMINAL_DEGC  25.0  /* tolerances are those at this temperature */
 #define SAME_DT_NS    1     /* steps of a clock that is no whole number of ns differ by this */
@@ -77,15 +79,15 @@ static double filtered_v(struct afe *a, double v, int64_t t_ns)
     return a->state_v;
 }
 
-/* The first sample, a new step or temperature, noise. */
-static double any_out_v(struct afe *a, double signal, double temp_degc, int64_t t_ns)
+/* The first sample, a new step or temperature, noise. ripple_v comes through the buffer. */
+static double step_v(struct afe *a, double signal, double ripple_v, double temp_degc, int64_t t_ns)
 {
     const bool first = a->t_ns < 0;
     const int64_t dt_ns = first ? FIRST_PULL_NS : t_ns - a->t_ns;
     if (dt_ns <= 0) return a->state_v;
     if (!same_step(a, dt_ns)) retune(a, dt_ns);
     if (temp_degc != a->scale.degc) a->scale = scale_at(&a->cfg, temp_degc);
-    double v = load_v(&a->cfg, &a->scale, signal);
+    double v = load_v(&a->cfg, &a->scale, signal) + ripple_v;
     if (a->noise_v > 0.0) v += a->noise_v * rng_gauss(&a->noise);
     v /= a->scale.divider;
     if (first) a->state_v = v; /* at power-on the filter has long been settled */
@@ -94,11 +96,83 @@ static double any_out_v(struct afe *a, double signal, double temp_degc, int64_t 
     return a->state_v;
 }
 
-/* A step and a temperature like the last, no noise: the constants hold. */
+/* ---- faults */
+
+void afe_fault_add(struct afe *a, struct afe_fault *f)
+{
+    struct afe_fault **at = &a->faults;
+    assert(f->kind < AFE_FAULTS);
+    while (*at) at = &(*at)->next;
+    f->next = NULL;
+    *at = f;
+}
+
+void afe_fault_remove(struct afe *a, struct afe_fault *f)
+{
+    struct afe_fault **at = &a->faults;
+    while (*at && *at != f) at = &(*at)->next;
+    if (*at) *at = f->next;
+}
+
+/* What the faults make of the chain at one instant. */
+struct faulty {
+    double signal;
+    double ripple_v;
+    double reference; /* relative to what it should be */
+};
+
+static void load_open(const struct afe *a, const struct afe_fault *f, double for_s, struct faulty *out)
+{
+    const double limit = 2.0 * a->cfg.clip_v / a->scale.load;
+    (void)f;
+    (void)for_s;
+    out->signal = out->signal < 0.0 ? -limit : limit;
+}
+
+static void load_short(const struct afe *a, const struct afe_fault *f, double for_s, struct faulty *out)
+{
+    (void)a;
+    (void)f;
+    (void)for_s;
+    out->signal = 0.0;
+}
+
+static void reference(const struct afe *a, const struct afe_fault *f, double for_s, struct faulty *out)
+{
+    (void)a;
+    out->reference *= 1.0 + f->value + f->rate_per_s * for_s;
+}
+
+static void ripple(const struct afe *a, const struct afe_fault *f, double for_s, struct faulty *out)
+{
+    const double turns = f->frequency_hz * for_s;
+    (void)a;
+    out->ripple_v += f->value * det_sin(TWO_PI * (turns - floor(turns)));
+}
+
+static struct faulty faulty(const struct afe *a, double signal, int64_t t_ns)
+{
+    static void (*const effect[AFE_FAULTS])(const struct afe *, const struct afe_fault *, double, struct faulty *) = {
+        [AFE_LOAD_OPEN] = load_open, [AFE_LOAD_SHORT] = load_short, [AFE_REFERENCE] = reference, [AFE_RIPPLE] = ripple};
+    struct faulty out = {.signal = signal, .reference = 1.0};
+    for (const struct afe_fault *f = a->faults; f; f = f->next) {
+        if (t_ns >= f->from_ns) effect[f->kind](a, f, (double)(t_ns - f->from_ns) / (double)NS_PER_S, &out);
+    }
+    return out;
+}
+
+static double any_out_v(struct afe *a, double signal, double temp_degc, int64_t t_ns)
+{
+    if (!a->faults) return step_v(a, signal, 0.0, temp_degc, t_ns);
+    const struct faulty f = faulty(a, signal, t_ns);
+    return step_v(a, f.signal, f.ripple_v, temp_degc, t_ns) / f.reference;
+}
+
+/* A step and a temperature like the last, no noise, no fault: the constants hold. */
 static bool usual(const struct afe *a, double temp_degc, int64_t t_ns)
 {
     const int64_t dt_ns = t_ns - a->t_ns;
-    return dt_ns > 0 && same_step(a, dt_ns) && temp_degc == a->scale.degc && !(a->noise_v > 0.0);
+    return dt_ns > 0 && same_step(a, dt_ns) && temp_degc == a->scale.degc && !(a->noise_v > 0.0) && !a->faults;
 }
 
 double afe_out_v(struct afe *a, double signal, double temp_degc, int64_t t_ns)

@@ -24,6 +24,25 @@ struct afe_cfg {
     double noise_v_rthz; /* white, at the load, one-sided density */
 };
 
+/* What goes wrong in the chain. The reference is that of the channel's converter: a code is volts over it, so that a
+ * reference too high is an input too low. An open load drives the buffer to the limit the current points at, a zero
+ * current to the positive one (the buffer's bias current, E0). */
+enum afe_fault_kind {
+    AFE_LOAD_OPEN,
+    AFE_LOAD_SHORT,
+    AFE_REFERENCE, /* value: relative error; rate_per_s: its growth from from_ns on */
+    AFE_RIPPLE,    /* value: amplitude at the load, V; frequency_hz; phase 0 at from_ns */
+    AFE_FAULTS
+};
+
+/* One fault, of whoever brings it about, linked in while it lasts. */
+struct afe_fault {
+    enum afe_fault_kind kind;
+    double value, rate_per_s, frequency_hz;
+    int64_t from_ns;
+    struct afe_fault *next;
+};
+
 /* What the temperature does to the chain. */
 struct afe_scale {
     double degc;    /* at which it is so */
@@ -41,9 +60,14 @@ struct afe {
     int64_t dt_ns;  /* step for which the two constants hold; negative before the first call */
     double keep;    /* what remains of the filter's state after a step */
     double noise_v; /* rms of one step's noise at the load */
+    struct afe_fault *faults;
 };
 
 void afe_init(struct afe *a, const struct afe_cfg *cfg, struct rng noise);
+
+/* Links in as the last; the fault is filled in by the caller. Removing what is not there is harmless. */
+void afe_fault_add(struct afe *a, struct afe_fault *f);
+void afe_fault_remove(struct afe *a, struct afe_fault *f);
 
 /* Ideal chain, all tolerances and errors zero: 1 kohm (10 V at 10 mA), 1 : 8, 10 kHz, clipping at 10.5 V. */
 struct afe_cfg afe_nominal(enum afe_input input);

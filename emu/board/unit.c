@@ -2,13 +2,16 @@
 
 #include "base/detmath.h"
 
+#include <stddef.h>
+
 static double accel_signal(void *ctx, unsigned axis, int64_t t_ns)
 {
     struct unit *u = ctx;
     if (u->cfg.axis[axis].sensor == UNIT_NO_SENSOR) return 0.0;
     double a_mps2[3];
     unit_gravity_mps2(u, axis, t_ns, a_mps2);
-    return mems_out_v(&u->mems[axis], a_mps2, t_ns);
+    const double out_v = mems_out_v(&u->mems[axis], a_mps2, t_ns);
+    return u->sensor_faults[axis] ? sensor_fault_out(u->sensor_faults[axis], out_v, t_ns) : out_v;
 }
 
 static double temp_degc(void *ctx, unsigned channel, int64_t t_ns)
@@ -47,6 +50,7 @@ void unit_init(struct unit *u, const struct unit_cfg *cfg, struct head *head, st
     u->frame = NULL;
     u->fault = NULL;
     for (unsigned i = 0; i < UNIT_AXES; i++) {
+        u->sensor_faults[i] = NULL;
         const struct mems_cfg m = mems_cfg_si(&cfg->axis[i].mems, head->site.g_mps2);
         mems_init(&u->mems[i], &m, rng_stream(cfg->board.seed, cfg->board.serial, noise[i]));
         u->cos_alpha0[i] = det_cos(m.alpha0_rad);

@@ -9,6 +9,7 @@
 #include "board/psa2.h"
 #include "phys/head.h"
 #include "phys/mems.h"
+#include "phys/sensor_fault.h"
 
 #define UNIT_AXES  3u
 #define UNIT_TEMPS 4u /* sensors X, Y, Z, converter board */
@@ -34,6 +35,7 @@ struct unit {
     struct head *head;
     struct psa2 board;
     struct mems mems[UNIT_AXES];
+    struct sensor_fault *sensor_faults[UNIT_AXES]; /* psa2_sample_until() before each change */
     double cos_alpha0[UNIT_AXES], sin_alpha0[UNIT_AXES];
     void *ctx;
     void (*frame)(void *ctx, const struct psa2_frame *f, int64_t t_ns);

@@ -156,12 +156,80 @@ static void a_row_is_its_samples_one_by_one(void **state)
     }
 }
 
+/* 2 V or 2 mA into the nominal chain, no filter; each fault from 1 s on. 10.5 V is the limit of the buffer, 8 the divider. */
+static void each_fault_changes_the_chain_as_it_says(void **state)
+{
+    (void)state;
+    const struct {
+        enum afe_input input;
+        enum afe_fault_kind kind;
+        double value, rate_per_s, frequency_hz, signal;
+        int64_t t_ns;
+        double volts;
+    } rows[] = {
+        {AFE_CURRENT, AFE_LOAD_OPEN, 0, 0, 0, 2e-3, 999999999, 0.25}, /* not yet */
+        {AFE_CURRENT, AFE_LOAD_OPEN, 0, 0, 0, 2e-3, 1000000000, 10.5 / 8},
+        {AFE_CURRENT, AFE_LOAD_OPEN, 0, 0, 0, -2e-3, 1000000000, -10.5 / 8},
+        {AFE_CURRENT, AFE_LOAD_OPEN, 0, 0, 0, 0, 1000000000, 10.5 / 8},
+        {AFE_CURRENT, AFE_LOAD_SHORT, 0, 0, 0, 2e-3, 1000000000, 0},
+        {AFE_VOLTAGE, AFE_REFERENCE, 0.25, 0, 0, 2, 9000000000, 0.2},
+        {AFE_VOLTAGE, AFE_REFERENCE, 0, 0.125, 0, 2, 3000000000, 0.2}, /* after 2 s */
+        {AFE_VOLTAGE, AFE_RIPPLE, 0.5, 0, 50, 2, 1000000000, 0.25},
+        {AFE_VOLTAGE, AFE_RIPPLE, 0.5, 0, 50, 2, 1005000000, 2.5 / 8}, /* a quarter of 20 ms */
+        {AFE_VOLTAGE, AFE_RIPPLE, 0.5, 0, 50, 2, 3015000000, 1.5 / 8},
+    };
+    for (size_t k = 0; k < COUNT(rows); k++) {
+        struct afe_fault f = {.kind = rows[k].kind,
+                              .value = rows[k].value,
+                              .rate_per_s = rows[k].rate_per_s,
+                              .frequency_hz = rows[k].frequency_hz,
+                              .from_ns = 1000000000};
+        struct afe_cfg cfg = afe_nominal(rows[k].input);
+        struct afe a;
+        cfg.filter_hz = 0.0;
+        afe_init(&a, &cfg, rng_stream(1, 1, "afe.x"));
+        afe_fault_add(&a, &f);
+        double row[] = {rows[k].signal, rows[k].signal};
+        const int64_t t_ns[] = {rows[k].t_ns - 31250, rows[k].t_ns};
+        near(afe_out_v(&a, rows[k].signal, 25, rows[k].t_ns), rows[k].volts, 1e-12);
+        afe_init(&a, &cfg, rng_stream(1, 1, "afe.x"));
+        afe_fault_add(&a, &f);
+        afe_out_row_v(&a, row, 25, t_ns, 2);
+        near(row[1], rows[k].volts, 1e-12);
+        afe_fault_remove(&a, &f);
+        afe_fault_remove(&a, &f);
+        near(afe_out_v(&a, rows[k].signal, 25, rows[k].t_ns + 31250), afe_static_v(&cfg, rows[k].signal, 25), 1e-15);
+    }
+}
+
+static void faults_of_a_chain_add_up(void **state)
+{
+    (void)state;
+    struct afe_fault low = {.kind = AFE_REFERENCE, .value = 0.25}, again = {.kind = AFE_REFERENCE, .value = 0.6};
+    struct afe_fault ripple = {.kind = AFE_RIPPLE, .value = 8.0, .frequency_hz = 1.0};
+    struct afe_cfg cfg = afe_nominal(AFE_VOLTAGE);
+    struct afe a;
+    cfg.filter_hz = 0.0;
+    afe_init(&a, &cfg, rng_stream(1, 1, "afe.x"));
+    afe_fault_add(&a, &low);
+    afe_fault_add(&a, &ripple);
+    afe_fault_add(&a, &again);
+    near(afe_out_v(&a, 8.0, 25, 250000000), 1.0, 1e-12); /* (8 + 8) / 8 / 1.25 / 1.6 */
+    afe_fault_remove(&a, &ripple);
+    near(afe_out_v(&a, 8.0, 25, 260000000), 0.5, 1e-12);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(temperature_acts_at_once),      cmocka_unit_test(static_transfer),
-        cmocka_unit_test(one_pole_is_exact_at_any_pace), cmocka_unit_test(without_a_filter_the_chain_has_no_memory),
-        cmocka_unit_test(noise_has_its_density),         cmocka_unit_test(a_row_is_its_samples_one_by_one),
+        cmocka_unit_test(temperature_acts_at_once),
+        cmocka_unit_test(static_transfer),
+        cmocka_unit_test(one_pole_is_exact_at_any_pace),
+        cmocka_unit_test(without_a_filter_the_chain_has_no_memory),
+        cmocka_unit_test(noise_has_its_density),
+        cmocka_unit_test(a_row_is_its_samples_one_by_one),
+        cmocka_unit_test(each_fault_changes_the_chain_as_it_says),
+        cmocka_unit_test(faults_of_a_chain_add_up),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
