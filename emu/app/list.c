@@ -67,12 +67,12 @@ bool list_scenarios(FILE *out, char *why, size_t cap)
 
 void list_commands(FILE *out)
 {
-    char line[1024];
-    for (unsigned i = 0; control_markdown(control_commands, control_command_count, i, line, sizeof line); i++) {
+    char line[2048];
+    for (unsigned i = 0; control_markdown(control_tables, i, line, sizeof line); i++) {
         fprintf(out, "%s\n", line);
     }
     fprintf(out, "\n");
-    for (unsigned i = 0; control_markdown(control_truth, control_truth_count, i, line, sizeof line); i++) {
+    for (unsigned i = 0; control_markdown(control_truth_tables, i, line, sizeof line); i++) {
         fprintf(out, "%s\n", line);
     }
 }

@@ -102,7 +102,8 @@ static void make_view(struct service *s)
     struct bench *b = s->bench;
     s->view = (struct control_bench){.ctx = s,
                                      .head = &b->head,
-                                     .bus = &b->bus,
+                                     .bus = {&b->bus},
+                                     .buses = 1,
                                      .units = b->scenario.unit_count,
                                      .seed = b->scenario.seed,
                                      .scenario = b->scenario.path,
@@ -115,6 +116,7 @@ static void make_view(struct service *s)
                                      .pace = do_pace};
     for (unsigned i = 0; i < s->view.units; i++) {
         s->view.unit[i] = &b->unit[i];
+        s->view.unit_name[i] = b->unit[i].cfg.name;
         s->view.node[i] = &b->can[i].node.stream;
     }
 }
@@ -212,8 +214,8 @@ bool service_open(struct service *s, struct bench *b, const struct options *o, c
     b->ctx = s;
     pace_init(&s->pace, o->pace);
     make_view(s);
-    control_init(&s->control, control_commands, control_command_count, &s->view);
-    control_init(&s->truth, control_truth, control_truth_count, &s->view);
+    control_init(&s->control, control_tables, &s->view);
+    control_init(&s->truth, control_truth_tables, &s->view);
     s->ports.hub.say = say;
     s->ports.control = (struct ctl_server){.line = on_control_line, .gone = on_control_gone, .ctx = s};
     s->ports.truth = (struct ctl_server){.line = on_truth_line, .gone = on_truth_gone, .ctx = s};

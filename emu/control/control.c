@@ -1,141 +1,86 @@
 #include "control/control.h"
 
-#include <math.h>
+#include "control/args.h"
+#include "control/commands.h"
+
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 
-void control_init(struct control *c, const struct control_command *table, unsigned count,
-                  const struct control_bench *bench)
+const struct control_table *const control_tables[] = {&commands_bench, &commands_head, NULL};
+const struct control_table *const control_truth_tables[] = {&commands_truth, NULL};
+
+void control_init(struct control *c, const struct control_table *const *tables, const struct control_bench *bench)
 {
-    *c = (struct control){.table = table, .count = count, .bench = bench};
+    *c = (struct control){.tables = tables, .bench = bench};
 }
 
 enum control_outcome control_refuse(struct control *c, const char *code, const char *format, ...)
 {
     va_list ap;
     va_start(ap, format);
-    vsnprintf(c->why, sizeof c->why, format, ap);
+    vsnprintf(c->refusal.why, sizeof c->refusal.why, format, ap);
     va_end(ap);
-    c->code = code;
+    c->refusal.code = code;
     return CONTROL_REFUSED;
 }
 
-/* ---- arguments */
-
-static unsigned arg_count(const struct control_command *cmd)
+void control_settle_inputs(const struct control_bench *b, int64_t t_ns)
 {
-    unsigned n = 0;
-    while (n < CONTROL_ARGS_MAX && cmd->arg[n].name) n++;
-    return n;
+    for (unsigned i = 0; i < b->units; i++) psa2_sample_until(&b->unit[i]->board, t_ns);
 }
 
-static enum control_outcome parse_real(struct control *c, const struct control_arg *a, const cJSON *j,
-                                       struct control_value *v)
+/* ---- the rows */
+
+const struct control_command *control_row(const struct control_table *const *tables, unsigned i)
 {
-    if (!cJSON_IsNumber(j)) return control_refuse(c, "type", "%s: a number is wanted", a->name);
-    if (!(j->valuedouble >= a->min && j->valuedouble <= a->max)) {
-        return control_refuse(c, "range", "%s: %.10g is outside %.10g ... %.10g", a->name, j->valuedouble, a->min,
-                              a->max);
-    }
-    v->real = j->valuedouble;
-    return CONTROL_DONE;
-}
-
-static enum control_outcome parse_count(struct control *c, const struct control_arg *a, const cJSON *j,
-                                        struct control_value *v)
-{
-    if (parse_real(c, a, j, v) == CONTROL_REFUSED) return CONTROL_REFUSED;
-    if (v->real != floor(v->real)) return control_refuse(c, "type", "%s: %.10g is not an integer", a->name, v->real);
-    v->count = (uint64_t)v->real;
-    return CONTROL_DONE;
-}
-
-static enum control_outcome parse_name(struct control *c, const struct control_arg *a, const cJSON *j,
-                                       struct control_value *v)
-{
-    if (!cJSON_IsString(j)) return control_refuse(c, "type", "%s: a string is wanted", a->name);
-    v->name = j->valuestring;
-    return CONTROL_DONE;
-}
-
-static enum control_outcome parse_face(struct control *c, const struct control_arg *a, const cJSON *j,
-                                       struct control_value *v)
-{
-    if (parse_name(c, a, j, v) == CONTROL_REFUSED) return CONTROL_REFUSED;
-    const int face = head_face_by_name(v->name);
-    if (face < 0) {
-        return control_refuse(c, "range", "%s: \"%.40s\" is no face: direct, reversed, side or side_reversed", a->name,
-                              v->name);
-    }
-    v->face = (enum head_face)face;
-    return CONTROL_DONE;
-}
-
-static enum control_outcome parse_unit(struct control *c, const struct control_arg *a, const cJSON *j,
-                                       struct control_value *v)
-{
-    if (parse_name(c, a, j, v) == CONTROL_REFUSED) return CONTROL_REFUSED;
-    char names[160] = "";
-    for (unsigned i = 0; i < c->bench->units; i++) {
-        const char *name = c->bench->unit[i]->cfg.name;
-        v->unit = i;
-        if (strcmp(name, v->name) == 0) return CONTROL_DONE;
-        const size_t at = strlen(names);
-        snprintf(names + at, sizeof names - at, "%s%s", at ? ", " : "", name);
-    }
-    return control_refuse(c, "range", "%s: no unit \"%.40s\"; there is %s", a->name, v->name, names);
-}
-
-typedef enum control_outcome parse_fn(struct control *, const struct control_arg *, const cJSON *,
-                                      struct control_value *);
-
-static const struct {
-    const char *name;
-    parse_fn *parse;
-} types[] = {
-    [CONTROL_REAL] = {"number", parse_real}, [CONTROL_COUNT] = {"integer", parse_count},
-    [CONTROL_NAME] = {"string", parse_name}, [CONTROL_FACE] = {"face", parse_face},
-    [CONTROL_UNIT] = {"unit", parse_unit},
-};
-
-static const struct control_arg *find_arg(const struct control_command *cmd, const char *name)
-{
-    for (unsigned i = 0; i < arg_count(cmd); i++) {
-        if (strcmp(cmd->arg[i].name, name) == 0) return &cmd->arg[i];
+    for (; *tables; i -= (*tables)->count, tables++) {
+        if (i < (*tables)->count) return &(*tables)->row[i];
     }
     return NULL;
 }
 
-static enum control_outcome refuse_unknown_arg(struct control *c, const struct control_command *cmd, const char *name)
+const struct control_command *control_find(const struct control_table *const *tables, const char *name)
 {
-    char known[128] = "";
-    for (unsigned i = 0; i < arg_count(cmd); i++) {
-        const size_t at = strlen(known);
-        snprintf(known + at, sizeof known - at, "%s%s", at ? ", " : "", cmd->arg[i].name);
+    const struct control_command *row;
+    for (unsigned i = 0; (row = control_row(tables, i)); i++) {
+        if (strcmp(row->name, name) == 0) return row;
     }
-    return control_refuse(c, "argument", "no argument \"%.40s\"; it takes %s", name, known[0] ? known : "none");
+    return NULL;
 }
 
-static enum control_outcome parse_args(struct control *c, const struct control_command *cmd, const cJSON *args,
-                                       struct control_value *v)
+/* ---- carrying out */
+
+enum control_outcome control_do(struct control *c, const struct control_command *row, const struct control_value *v,
+                                cJSON *result, int64_t t_ns)
 {
-    if (args && !cJSON_IsObject(args)) return control_refuse(c, "syntax", "args: an object is wanted");
-    const cJSON *j;
-    cJSON_ArrayForEach(j, args)
-    {
-        const struct control_arg *a = find_arg(cmd, j->string);
-        if (!a) return refuse_unknown_arg(c, cmd, j->string);
-        struct control_value *value = &v[a - cmd->arg];
-        if (types[a->type].parse(c, a, j, value) == CONTROL_REFUSED) return CONTROL_REFUSED;
-        value->given = true;
+    const enum control_outcome outcome = row->run(c, v, result, t_ns);
+    if (outcome == CONTROL_DONE && row->changes && c->bench->journal) {
+        cJSON *args = control_args_json(row, v);
+        c->bench->journal(c->bench->ctx, row, args, t_ns);
+        cJSON_Delete(args);
     }
-    for (unsigned i = 0; i < arg_count(cmd); i++) {
-        if (!v[i].given && !cmd->arg[i].optional) {
-            return control_refuse(c, "argument", "%s is missing: %s", cmd->arg[i].name, cmd->arg[i].what);
-        }
-    }
-    return CONTROL_DONE;
+    return outcome;
+}
+
+enum control_outcome control_call(struct control *c, const char *cmd, const cJSON *args, cJSON *result, int64_t t_ns)
+{
+    struct control_value v[CONTROL_ARGS_MAX];
+    const struct control_command *row = control_find(c->tables, cmd);
+    if (!row) return control_refuse(c, "command", "\"%.40s\": unknown command; help lists them", cmd);
+    if (!control_args(c->bench, row, args, v, &c->refusal)) return CONTROL_REFUSED;
+    return control_do(c, row, v, result, t_ns);
+}
+
+bool control_check(const struct control_bench *b, const char *cmd, const cJSON *args, char *why)
+{
+    struct control_value v[CONTROL_ARGS_MAX];
+    struct control_refusal refusal;
+    const struct control_command *row = control_find(control_tables, cmd);
+    if (row && control_args(b, row, args, v, &refusal)) return true;
+    if (row) snprintf(why, CONTROL_WHY_MAX, "%s", refusal.why);
+    else snprintf(why, CONTROL_WHY_MAX, "\"%.40s\": unknown command", cmd);
+    return false;
 }
 
 /* ---- replies */
@@ -148,6 +93,17 @@ static const char *print(struct control *c, cJSON *reply)
     return c->reply;
 }
 
+/* What has been delivered to each CAN client so far: the barrier of a host that drives several. */
+static void add_rx(const struct control *c, cJSON *reply)
+{
+    struct control_client k;
+    cJSON_AddNumberToObject(reply, "can_rx", (double)c->bench->can_rx(c->bench->ctx));
+    cJSON *list = cJSON_AddArrayToObject(reply, "rx");
+    for (unsigned i = 0; c->bench->client(c->bench->ctx, i, &k); i++) {
+        cJSON_AddItemToArray(list, cJSON_CreateNumber((double)k.delivered));
+    }
+}
+
 /* Takes over id and result. */
 static const char *reply_with(struct control *c, cJSON *id, bool ok, cJSON *result, int64_t t_ns)
 {
@@ -155,7 +111,7 @@ static const char *reply_with(struct control *c, cJSON *id, bool ok, cJSON *resu
     cJSON_AddItemToObject(reply, "id", id ? id : cJSON_CreateNull());
     cJSON_AddBoolToObject(reply, "ok", ok);
     cJSON_AddNumberToObject(reply, "t_ns", (double)t_ns);
-    cJSON_AddNumberToObject(reply, "can_rx", (double)c->bench->can_rx(c->bench->ctx));
+    add_rx(c, reply);
     if (ok) {
         cJSON_AddItemToObject(reply, "result", result ? result : cJSON_CreateObject());
         return print(c, reply);
@@ -163,8 +119,8 @@ static const char *reply_with(struct control *c, cJSON *id, bool ok, cJSON *resu
     cJSON_Delete(result);
     c->refused++;
     cJSON *error = cJSON_AddObjectToObject(reply, "error");
-    cJSON_AddStringToObject(error, "code", c->code);
-    cJSON_AddStringToObject(error, "text", c->why);
+    cJSON_AddStringToObject(error, "code", c->refusal.code);
+    cJSON_AddStringToObject(error, "text", c->refusal.why);
     return print(c, reply);
 }
 
@@ -185,17 +141,8 @@ void control_run_forget(struct control *c)
 
 /* ---- one line */
 
-static const struct control_command *find_command(const struct control *c, const char *name)
-{
-    for (unsigned i = 0; i < c->count; i++) {
-        if (strcmp(c->table[i].name, name) == 0) return &c->table[i];
-    }
-    return NULL;
-}
-
 static enum control_outcome dispatch(struct control *c, const cJSON *request, cJSON *result, int64_t t_ns)
 {
-    struct control_value v[CONTROL_ARGS_MAX] = {{0}};
     if (!cJSON_IsObject(request)) {
         return control_refuse(c, "syntax",
                               "not a JSON object: one {\"id\":1,\"cmd\":\"help\"} a line, up to 4095 bytes");
@@ -209,11 +156,7 @@ static enum control_outcome dispatch(struct control *c, const cJSON *request, cJ
     }
     const cJSON *name = cJSON_GetObjectItemCaseSensitive(request, "cmd");
     if (!cJSON_IsString(name)) return control_refuse(c, "syntax", "cmd: a command's name is wanted; help lists them");
-    const struct control_command *cmd = find_command(c, name->valuestring);
-    if (!cmd) return control_refuse(c, "command", "\"%.40s\": unknown command; help lists them", name->valuestring);
-    const cJSON *args = cJSON_GetObjectItemCaseSensitive(request, "args");
-    if (parse_args(c, cmd, args, v) == CONTROL_REFUSED) return CONTROL_REFUSED;
-    return cmd->run(c, v, result, t_ns);
+    return control_call(c, name->valuestring, cJSON_GetObjectItemCaseSensitive(request, "args"), result, t_ns);
 }
 
 const char *control_line(struct control *c, const char *line, int64_t t_ns)
@@ -229,34 +172,4 @@ const char *control_line(struct control *c, const char *line, int64_t t_ns)
     c->run_id = id;
     c->waiting = true;
     return NULL;
-}
-
-/* ---- the table for people */
-
-static size_t markdown_args(const struct control_command *cmd, char *out, size_t cap)
-{
-    size_t at = 0;
-    out[0] = '\0';
-    for (unsigned i = 0; i < arg_count(cmd) && at < cap; i++) {
-        const struct control_arg *a = &cmd->arg[i];
-        at += (size_t)snprintf(out + at, cap - at, "%s`%s`%s %s", i ? "; " : "", a->name,
-                               a->optional ? " (optional)" : "", a->what);
-        if ((a->type == CONTROL_REAL || a->type == CONTROL_COUNT) && at < cap) {
-            at += (size_t)snprintf(out + at, cap - at, ", %.10g to %.10g", a->min, a->max);
-        }
-    }
-    return at;
-}
-
-bool control_markdown(const struct control_command *table, unsigned count, unsigned line, char *out, size_t cap)
-{
-    char args[512];
-    if (line == 0) snprintf(out, cap, "| command | what it does | arguments |");
-    if (line == 1) snprintf(out, cap, "|---|---|---|");
-    if (line < 2) return true;
-    if (line - 2 >= count) return false;
-    const struct control_command *cmd = &table[line - 2];
-    snprintf(out, cap, "| `%s` | %s | %s |", cmd->name, cmd->what,
-             markdown_args(cmd, args, sizeof args) ? args : "none");
-    return true;
 }

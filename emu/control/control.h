@@ -1,43 +1,64 @@
 /* The command table and its JSON form: one object a line in, one object a line out.
  *
  *   {"id":1,"cmd":"head.turn","args":{"angle_deg":5}}
- *   {"id":1,"ok":true,"t_ns":20000000,"can_rx":12,"result":{...}}
- *   {"id":1,"ok":false,"t_ns":20000000,"can_rx":12,"error":{"code":"range","text":"..."}}
+ *   {"id":1,"ok":true,"t_ns":20000000,"can_rx":12,"rx":[12],"result":{...}}
+ *   {"id":1,"ok":false,"t_ns":20000000,"can_rx":12,"rx":[12],"error":{"code":"range","text":"..."}}
  *
- * Every command is a row {name, arguments with unit and range, one sentence, handler}; help, the refusals and
- * docs/emulator.md come from the same rows. Arguments are checked before a handler runs: a refused command changes nothing.
- * The bench is reached through struct control_bench; the application fills it in and moves the time. One thread. */
+ * Every command is a row {name, one sentence, arguments with unit and range, handler}; JSON, SCPI, help, the refusals and the
+ * pages of the manual come from the same rows. Arguments are checked before a handler runs: a refused command changes
+ * nothing. The bench is reached through struct control_bench; the application fills it in and moves the time. One thread. */
 #ifndef PSABENCH_CONTROL_CONTROL_H
 #define PSABENCH_CONTROL_CONTROL_H
 
-#include "base/can.h"
-#include "board/unit.h"
-#include "phys/head.h"
+#include "control/view.h"
 
 #include <cjson/cJSON.h>
 
-#define CONTROL_ARGS_MAX  4u
-#define CONTROL_UNITS_MAX 16u
-#define CONTROL_REPLY_MAX 65536u
-#define CONTROL_WHY_MAX   256u
+#define CONTROL_ARGS_MAX  8u
+#define CONTROL_REALS_MAX 32u
+#define CONTROL_SCPI_MAX  6u
+#define CONTROL_REPLY_MAX 524288u /* counters of 64 units */
 
-enum control_type { CONTROL_REAL, CONTROL_COUNT, CONTROL_NAME, CONTROL_FACE, CONTROL_UNIT };
-
-struct control_arg {
-    const char *name; /* with its unit, angle_deg */
-    enum control_type type;
-    bool optional;
-    double min, max; /* of numbers, both included */
-    const char *what;
+enum control_type {
+    CONTROL_REAL,
+    CONTROL_COUNT,
+    CONTROL_BOOL,
+    CONTROL_NAME, /* 1 to 31 printable characters without spaces: of an event, a fault point */
+    CONTROL_TEXT, /* up to 1023 bytes: a path */
+    CONTROL_CHOICE,
+    CONTROL_UNIT, /* name of a unit of the bench */
+    CONTROL_REALS /* 1 to CONTROL_REALS_MAX numbers */
 };
 
 struct control_value {
     bool given;
     double real;
     uint64_t count;
-    const char *name;
-    enum head_face face;
-    unsigned unit; /* index into the bench's units */
+    bool on;
+    const char *text; /* NAME, TEXT, CHOICE: the word itself */
+    unsigned choice;  /* index into choices */
+    unsigned unit;    /* index into the bench's units */
+    double reals[CONTROL_REALS_MAX];
+    unsigned n; /* of reals */
+};
+
+struct control_arg {
+    const char *name; /* ends in its unit, angle_deg */
+    enum control_type type;
+    bool optional;
+    const char *unit; /* of numbers: "deg", "deg/s", "s", "degC", "K/min", "V", "Hz", ...; NULL: none */
+    double min, max;  /* of numbers, both included */
+    const char *what;
+    const char *const *choices; /* CHOICE: up to NULL */
+    double def;                 /* what SCPI's DEFault stands for */
+    /* Narrows min and max to what this bench's instrument can; v are the arguments before this one. NULL: as they are. */
+    void (*limits)(const struct control_bench *b, const struct control_value *v, double *min, double *max);
+};
+
+/* A way to say the row in SCPI: capitals are the short form, # a numeric suffix, [] may be left out, ? asks. Suffixes are the
+ * first arguments of the row, parameters the further ones. `result` names the fields of the result that a query prints. */
+struct control_scpi {
+    const char *header, *result;
 };
 
 enum control_outcome { CONTROL_DONE, CONTROL_LATER, CONTROL_REFUSED };
@@ -50,65 +71,35 @@ struct control_command {
     struct control_arg arg[CONTROL_ARGS_MAX]; /* up to the first without a name */
     /* v: the arguments in the order of arg. Adds to result; CONTROL_REFUSED after control_refuse(). */
     enum control_outcome (*run)(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns);
+    bool changes; /* the bench's future: goes into the journal when it is done */
+    struct control_scpi scpi[CONTROL_SCPI_MAX];
 };
 
-/* One client of a CAN adapter, or the sum of those who left. */
-struct control_client {
-    const char *adapter, *name;
-    uint64_t delivered, taken, dropped, overrun, refused;
+struct control_table {
+    const struct control_command *row;
+    unsigned count;
 };
 
-/* Lateness of the wall pace. */
-struct control_pace {
-    const char *name; /* wall, step, free */
-    uint64_t turns, late, slips;
-    double p50_us, p99_us, p999_us, max_us; /* of events */
-    uint64_t frames;
-    double frame_p50_us, frame_p99_us, frame_p999_us, frame_max_us; /* of frames handed to the kernel */
-};
+extern const struct control_table *const control_tables[];       /* of the control socket, up to NULL */
+extern const struct control_table *const control_truth_tables[]; /* of the truth port */
 
-/* What the commands may reach. Callbacks get ctx. */
-struct control_bench {
-    void *ctx;
-    struct head *head;
-    struct can_bus *bus;
-    struct unit *unit[CONTROL_UNITS_MAX];
-    struct can_node *node[CONTROL_UNITS_MAX]; /* of the unit on the bus; may be NULL */
-    unsigned units;
-    uint64_t seed;
-    const char *scenario;
-
-    /* Time is to move by for_ns once after_tx frames of clients have been taken; control_run_done() is called then. False
-     * with a sentence in why when it cannot. */
-    bool (*run)(void *ctx, int64_t for_ns, uint64_t after_tx, char *why);
-    void (*quit)(void *ctx);
-    bool (*vcd_flush)(void *ctx, char *why);
-    uint64_t (*can_rx)(void *ctx); /* frames delivered to the client that has been on the bus longest */
-    bool (*client)(void *ctx, unsigned i,
-                   struct control_client *out); /* i-th in order of coming; false past the last */
-    void (*gone)(void *ctx, struct control_client *out);
-    void (*pace)(void *ctx, struct control_pace *out);
+struct control_refusal {
+    const char *code; /* syntax, command, argument, type, range, state, machine */
+    char why[CONTROL_WHY_MAX];
 };
 
 struct control {
-    const struct control_command *table;
-    unsigned count;
+    const struct control_table *const *tables;
     const struct control_bench *bench;
-    const char *code; /* of the last refusal */
-    char why[CONTROL_WHY_MAX];
-    uint32_t commands, refused; /* since init */
-    bool waiting;               /* a run is under way */
+    struct control_refusal refusal; /* the latest */
+    uint32_t commands, refused;     /* lines since init */
+    void *client;                   /* who sent the line: the application sets it before control_line() */
+    bool waiting;                   /* a run is under way */
     cJSON *run_id;
     char reply[CONTROL_REPLY_MAX];
 };
 
-extern const struct control_command control_commands[]; /* of the control socket */
-extern const unsigned control_command_count;
-extern const struct control_command control_truth[]; /* of the truth port */
-extern const unsigned control_truth_count;
-
-void control_init(struct control *c, const struct control_command *table, unsigned count,
-                  const struct control_bench *bench);
+void control_init(struct control *c, const struct control_table *const *tables, const struct control_bench *bench);
 
 /* Carries out one line (NULL: it was too long). The reply, valid until the next call, or NULL: it comes later, from
  * control_run_done(). */
@@ -119,11 +110,33 @@ const char *control_run_done(struct control *c, int64_t t_ns);
 
 void control_run_forget(struct control *c); /* who asked has gone */
 
+/* ---- a command without a line: scenarios, SCPI, the journal */
+
+/* The i-th row of the tables; NULL past the last. */
+const struct control_command *control_row(const struct control_table *const *tables, unsigned i);
+const struct control_command *control_find(const struct control_table *const *tables, const char *name);
+unsigned control_arg_count(const struct control_command *row);
+
+/* Fills v[CONTROL_ARGS_MAX] from a JSON object (NULL: no arguments); strings stay the object's. False with the refusal. Of
+ * the bench it needs unit_name; ranges that depend on the instruments are checked when lab is there. */
+bool control_args(const struct control_bench *b, const struct control_command *row, const cJSON *args,
+                  struct control_value v[CONTROL_ARGS_MAX], struct control_refusal *why);
+
+/* The one way to carry out a command: runs the handler and, when it is done, tells the journal. */
+enum control_outcome control_do(struct control *c, const struct control_command *row, const struct control_value *v,
+                                cJSON *result, int64_t t_ns);
+
+/* Both, by name; the refusal stands in c. */
+enum control_outcome control_call(struct control *c, const char *cmd, const cJSON *args, cJSON *result, int64_t t_ns);
+
+/* Whether control_call() would get as far as the handler; does nothing. False with the reason in why[CONTROL_WHY_MAX]. */
+bool control_check(const struct control_bench *b, const char *cmd, const cJSON *args, char *why);
+
 /* For handlers: remembers why; returns CONTROL_REFUSED. */
 __attribute__((format(printf, 3, 4))) enum control_outcome control_refuse(struct control *c, const char *code,
                                                                           const char *format, ...);
 
 /* The table as Markdown, for docs/emulator.md and --list-commands: next line into out, false at the end. */
-bool control_markdown(const struct control_command *table, unsigned count, unsigned line, char *out, size_t cap);
+bool control_markdown(const struct control_table *const *tables, unsigned line, char *out, size_t cap);
 
 #endif

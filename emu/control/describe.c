@@ -1,5 +1,7 @@
 #include "control/describe.h"
 
+#include "control/args.h"
+
 #include <stddef.h>
 #include <string.h>
 
@@ -15,25 +17,20 @@ static void add_real(cJSON *to, const char *name, double v)
 
 /* ---- commands */
 
-static const char *type_name(enum control_type t)
-{
-    static const char *const names[] = {[CONTROL_REAL] = "number",
-                                        [CONTROL_COUNT] = "integer",
-                                        [CONTROL_NAME] = "string",
-                                        [CONTROL_FACE] = "face",
-                                        [CONTROL_UNIT] = "unit"};
-    return names[t];
-}
-
 static void describe_arg(const struct control_arg *a, cJSON *list)
 {
     cJSON *j = cJSON_CreateObject();
     cJSON_AddStringToObject(j, "name", a->name);
-    cJSON_AddStringToObject(j, "type", type_name(a->type));
+    cJSON_AddStringToObject(j, "type", control_type_name(a->type));
     cJSON_AddBoolToObject(j, "optional", a->optional);
-    if (a->type == CONTROL_REAL || a->type == CONTROL_COUNT) {
+    if (control_type_numeric(a->type)) {
         add_real(j, "min", a->min);
         add_real(j, "max", a->max);
+    }
+    if (a->unit) cJSON_AddStringToObject(j, "unit", a->unit);
+    cJSON *choices = a->choices ? cJSON_AddArrayToObject(j, "choices") : NULL;
+    for (unsigned i = 0; choices && a->choices[i]; i++) {
+        cJSON_AddItemToArray(choices, cJSON_CreateString(a->choices[i]));
     }
     cJSON_AddStringToObject(j, "what", a->what);
     cJSON_AddItemToArray(list, j);
@@ -42,13 +39,17 @@ static void describe_arg(const struct control_arg *a, cJSON *list)
 void describe_commands(const struct control *c, cJSON *to)
 {
     cJSON *list = cJSON_AddArrayToObject(to, "commands");
-    for (unsigned i = 0; i < c->count; i++) {
-        const struct control_command *cmd = &c->table[i];
+    const struct control_command *row;
+    for (unsigned i = 0; (row = control_row(c->tables, i)); i++) {
         cJSON *j = cJSON_CreateObject();
-        cJSON_AddStringToObject(j, "name", cmd->name);
-        cJSON_AddStringToObject(j, "what", cmd->what);
+        cJSON_AddStringToObject(j, "name", row->name);
+        cJSON_AddStringToObject(j, "what", row->what);
         cJSON *args = cJSON_AddArrayToObject(j, "args");
-        for (unsigned k = 0; k < CONTROL_ARGS_MAX && cmd->arg[k].name; k++) describe_arg(&cmd->arg[k], args);
+        for (unsigned k = 0; k < control_arg_count(row); k++) describe_arg(&row->arg[k], args);
+        cJSON *scpi = row->scpi[0].header ? cJSON_AddArrayToObject(j, "scpi") : NULL;
+        for (unsigned k = 0; k < CONTROL_SCPI_MAX && row->scpi[k].header; k++) {
+            cJSON_AddItemToArray(scpi, cJSON_CreateString(row->scpi[k].header));
+        }
         cJSON_AddItemToArray(list, j);
     }
 }
@@ -99,14 +100,25 @@ void describe_pace(const struct control_bench *b, cJSON *to)
     add_real(j, "frame_max_us", p.frame_max_us);
 }
 
+static void add_bus(const struct can_bus *bus, cJSON *j, int64_t t_ns)
+{
+    const int64_t busy_ns = can_busy_ns(bus, t_ns);
+    add_count(j, "bitrate_hz", bus->cfg.bitrate_hz);
+    add_count(j, "data_bitrate_hz", bus->cfg.data_bitrate_hz);
+    add_count(j, "frames", bus->frames);
+    add_real(j, "load", t_ns > 0 ? (double)busy_ns / (double)t_ns : 0.0);
+}
+
 void describe_bus(const struct control_bench *b, cJSON *to, int64_t t_ns)
 {
-    const int64_t busy_ns = can_busy_ns(b->bus, t_ns);
-    cJSON *j = cJSON_AddObjectToObject(to, "bus");
-    add_count(j, "bitrate_hz", b->bus->cfg.bitrate_hz);
-    add_count(j, "data_bitrate_hz", b->bus->cfg.data_bitrate_hz);
-    add_count(j, "frames", b->bus->frames);
-    add_real(j, "load", t_ns > 0 ? (double)busy_ns / (double)t_ns : 0.0);
+    add_bus(b->bus[0], cJSON_AddObjectToObject(to, "bus"), t_ns);
+    if (b->buses < 2) return;
+    cJSON *list = cJSON_AddArrayToObject(to, "buses");
+    for (unsigned i = 0; i < b->buses; i++) {
+        cJSON *j = cJSON_CreateObject();
+        add_bus(b->bus[i], j, t_ns);
+        cJSON_AddItemToArray(list, j);
+    }
 }
 
 /* ---- units */

@@ -74,8 +74,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     if (!bench) {
         bench = make_bench();
         view = (struct control_bench){.head = &bench->head,
-                                      .bus = &bench->bus,
+                                      .bus = {&bench->bus},
+                                      .buses = 1,
                                       .unit = {&bench->unit[0]},
+                                      .unit_name = {"a"},
                                       .units = 1,
                                       .scenario = "fuzz",
                                       .run = on_run,
@@ -85,7 +87,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
                                       .client = on_client,
                                       .gone = on_gone,
                                       .pace = on_pace};
-        control_init(&control, control_commands, control_command_count, &view);
+        control_init(&control, control_tables, &view);
     }
     const size_t n = size < sizeof line ? size : sizeof line - 1;
     memcpy(line, data, n);

@@ -80,11 +80,13 @@ static int fresh(void **state)
     bench_power_up(bench);
     memset(&asked, 0, sizeof asked);
     view = (struct control_bench){.head = &bench->head,
-                                  .bus = &bench->bus,
+                                  .bus = {&bench->bus},
+                                  .buses = 1,
                                   .units = 2,
                                   .seed = 7,
                                   .scenario = "test.yaml",
                                   .unit = {&bench->unit[0], &bench->unit[1]},
+                                  .unit_name = {"a", "b"},
                                   .run = on_run,
                                   .quit = on_quit,
                                   .vcd_flush = on_vcd_flush,
@@ -92,8 +94,8 @@ static int fresh(void **state)
                                   .client = on_client,
                                   .gone = on_gone,
                                   .pace = on_pace};
-    control_init(&control, control_commands, control_command_count, &view);
-    control_init(&truth, control_truth, control_truth_count, &view);
+    control_init(&control, control_tables, &view);
+    control_init(&truth, control_truth_tables, &view);
     return 0;
 }
 
@@ -114,9 +116,9 @@ static void a_reply_has_id_time_and_barrier(void **state)
 {
     (void)state;
     sched_run_until(&bench->sched, 1500000000);
-    assert_string_equal(
-        say("{\"id\":1,\"cmd\":\"time\"}"),
-        "{\"id\":1,\"ok\":true,\"t_ns\":1500000000,\"can_rx\":42,\"result\":{\"t_s\":1.5,\"pace\":\"step\"}}");
+    assert_string_equal(say("{\"id\":1,\"cmd\":\"time\"}"),
+                        "{\"id\":1,\"ok\":true,\"t_ns\":1500000000,\"can_rx\":42,\"rx\":[42],\"result\":{"
+                        "\"t_s\":1.5,\"pace\":\"step\"}}");
     assert_says("{\"cmd\":\"time\",\"id\":\"any JSON\"}", "{\"id\":\"any JSON\",\"ok\":true");
     assert_says("{\"cmd\":\"time\"}", "{\"id\":null,\"ok\":true");
     assert_says("{\"cmd\":\"time\",\"id\":[1,{\"x\":2}]}", "{\"id\":[1,{\"x\":2}],\"ok\":true");
@@ -139,7 +141,8 @@ static const struct {
     {"{\"cmd\":\"head.turn\"}", "argument", "angle_deg is missing: degrees on the head's scale"},
     {"{\"cmd\":\"head.turn\",\"args\":{\"angle_deg\":\"5\"}}", "type", "angle_deg: a number is wanted"},
     {"{\"cmd\":\"head.turn\",\"args\":{\"angle_deg\":3600.5}}", "range", "angle_deg: 3600.5 is outside -3600 ... 3600"},
-    {"{\"cmd\":\"head.mount\",\"args\":{\"face\":\"up\"}}", "range", "direct, reversed, side or side_reversed"},
+    {"{\"cmd\":\"head.mount\",\"args\":{\"face\":\"up\"}}", "range",
+     "is none of direct, reversed, side, side_reversed"},
     {"{\"cmd\":\"head.mount\",\"args\":{\"face\":2}}", "type", "face: a string is wanted"},
     {"{\"cmd\":\"run\",\"args\":{\"for_s\":-0.1}}", "range", "for_s: -0.1 is outside 0 ... 86400"},
     {"{\"cmd\":\"run\",\"args\":{\"for_s\":1,\"after_tx\":1.5}}", "type", "after_tx: 1.5 is not an integer"},
@@ -182,7 +185,7 @@ static void run_is_answered_when_it_is_over(void **state)
     assert_says("{\"id\":10,\"cmd\":\"run\",\"args\":{\"for_s\":1}}", "another run is under way");
     assert_int_equal(asked.runs, 1);
     assert_string_equal(control_run_done(&control, 10000000),
-                        "{\"id\":9,\"ok\":true,\"t_ns\":10000000,\"can_rx\":42,\"result\":{}}");
+                        "{\"id\":9,\"ok\":true,\"t_ns\":10000000,\"can_rx\":42,\"rx\":[42],\"result\":{}}");
     assert_null(say("{\"id\":11,\"cmd\":\"run\",\"args\":{\"for_s\":0}}"));
     control_run_forget(&control);
     asked.refuse = true;
@@ -232,18 +235,20 @@ static void help_lists_every_command_and_argument(void **state)
 {
     (void)state;
     const char *help = say("{\"cmd\":\"help\"}");
-    for (unsigned i = 0; i < control_command_count; i++) {
+    const struct control_command *row;
+    unsigned count = 0;
+    for (; (row = control_row(control_tables, count)); count++) {
         char want[64];
-        snprintf(want, sizeof want, "{\"name\":\"%s\",\"what\":", control_commands[i].name);
+        snprintf(want, sizeof want, "{\"name\":\"%s\",\"what\":", row->name);
         assert_non_null(strstr(help, want));
-        assert_true(control_commands[i].what[strlen(control_commands[i].what) - 1] == '.');
+        assert_true(row->what[strlen(row->what) - 1] == '.');
     }
     assert_non_null(
         strstr(help, "{\"name\":\"angle_deg\",\"type\":\"number\",\"optional\":false,\"min\":-3600,\"max\":3600"));
-    char line[1024];
+    char line[2048];
     unsigned lines = 0;
-    while (control_markdown(control_commands, control_command_count, lines, line, sizeof line)) lines++;
-    assert_int_equal(lines, control_command_count + 2);
+    while (control_markdown(control_tables, lines, line, sizeof line)) lines++;
+    assert_int_equal(lines, count + 2);
 }
 
 /* Whether the page, a file of the repository, has this line. */
@@ -264,11 +269,11 @@ static bool page_has(const char *line)
 static void the_page_shows_the_same_table(void **state)
 {
     (void)state;
-    char line[1024];
-    for (unsigned i = 0; control_markdown(control_commands, control_command_count, i, line, sizeof line); i++) {
+    char line[2048];
+    for (unsigned i = 0; control_markdown(control_tables, i, line, sizeof line); i++) {
         if (!page_has(line)) fail_msg("docs/emulator.md lacks (psa-emu --list-commands):\n%s", line);
     }
-    for (unsigned i = 0; control_markdown(control_truth, control_truth_count, i, line, sizeof line); i++) {
+    for (unsigned i = 0; control_markdown(control_truth_tables, i, line, sizeof line); i++) {
         if (!page_has(line)) fail_msg("docs/emulator.md lacks (psa-emu --list-commands):\n%s", line);
     }
 }

@@ -1,0 +1,17 @@
+/* Arguments of commands, for the other files of control: their types by name, values as JSON, and the ranges in force. */
+#ifndef PSABENCH_CONTROL_ARGS_H
+#define PSABENCH_CONTROL_ARGS_H
+
+#include "control/control.h"
+
+const char *control_type_name(enum control_type type);
+bool control_type_numeric(enum control_type type); /* has a range, perhaps a unit */
+
+/* The arguments that were given, as they would be sent. The caller deletes it. */
+cJSON *control_args_json(const struct control_command *row, const struct control_value *v);
+
+/* The range of an argument on this bench; v: the arguments before it. */
+void control_arg_limits(const struct control_bench *b, const struct control_arg *a, const struct control_value *v,
+                        double *min, double *max);
+
+#endif

@@ -1,0 +1,114 @@
+/* Commands of the bench as a whole: what an operator may do. No hidden parameter is told here. */
+#include "control/commands.h"
+#include "control/describe.h"
+
+#include <math.h>
+
+static enum control_outcome do_help(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+{
+    (void)v;
+    (void)t_ns;
+    describe_commands(c, result);
+    return CONTROL_DONE;
+}
+
+static enum control_outcome do_time(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+{
+    struct control_pace p = {0};
+    (void)v;
+    c->bench->pace(c->bench->ctx, &p);
+    cJSON_AddNumberToObject(result, "t_s", (double)t_ns * 1e-9);
+    cJSON_AddStringToObject(result, "pace", p.name);
+    return CONTROL_DONE;
+}
+
+static enum control_outcome do_run(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+{
+    (void)result;
+    (void)t_ns;
+    if (c->waiting) return control_refuse(c, "state", "another run is under way");
+    const int64_t for_ns = (int64_t)nearbyint(v[0].real * 1e9);
+    if (c->bench->run(c->bench->ctx, for_ns, v[1].count, c->refusal.why)) return CONTROL_LATER;
+    c->refusal.code = "state";
+    return CONTROL_REFUSED;
+}
+
+static enum control_outcome do_units(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+{
+    (void)v;
+    (void)t_ns;
+    describe_units(c->bench, result);
+    return CONTROL_DONE;
+}
+
+static enum control_outcome do_unit_reset(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+{
+    (void)result;
+    if (!v[0].given && c->bench->units != 1) {
+        return control_refuse(c, "argument", "unit is missing: there are %u units", c->bench->units);
+    }
+    psa2_reset(&c->bench->unit[v[0].unit]->board, t_ns);
+    return CONTROL_DONE;
+}
+
+static enum control_outcome do_frames(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+{
+    (void)v;
+    (void)t_ns;
+    describe_clients(c->bench, result);
+    return CONTROL_DONE;
+}
+
+static enum control_outcome do_counters(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+{
+    if (v[0].given) {
+        describe_unit_counters(c->bench, v[0].unit, result);
+        return CONTROL_DONE;
+    }
+    describe_pace(c->bench, result);
+    describe_bus(c->bench, result, t_ns);
+    describe_clients(c->bench, result);
+    cJSON *control = cJSON_AddObjectToObject(result, "control");
+    cJSON_AddNumberToObject(control, "commands", c->commands);
+    cJSON_AddNumberToObject(control, "refused", c->refused);
+    cJSON *units = cJSON_AddObjectToObject(result, "units");
+    for (unsigned i = 0; i < c->bench->units; i++) {
+        describe_unit_counters(c->bench, i, cJSON_AddObjectToObject(units, c->bench->unit[i]->cfg.name));
+    }
+    return CONTROL_DONE;
+}
+
+static enum control_outcome do_vcd_flush(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+{
+    (void)v;
+    (void)result;
+    (void)t_ns;
+    c->refusal.code = "state";
+    return c->bench->vcd_flush(c->bench->ctx, c->refusal.why) ? CONTROL_DONE : CONTROL_REFUSED;
+}
+
+static enum control_outcome do_quit(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+{
+    (void)v;
+    (void)result;
+    (void)t_ns;
+    c->bench->quit(c->bench->ctx);
+    return CONTROL_DONE;
+}
+
+// clang-format off
+static const struct control_command rows[] = {
+    {"help", "Lists the commands with their arguments.", {{0}}, .run = do_help},
+    {"time", "Tells the simulated time and the pace.", {{0}}, .run = do_time},
+    {"run", "Moves the time in step pace; the answer comes when everything due has run and all output is with the kernel.",
+     {{"for_s", CONTROL_REAL, false, "s", 0, 86400, .what = "simulated seconds"},
+      {"after_tx", CONTROL_COUNT, true, NULL, 0, CONTROL_COUNT_MAX, .what = "start once this many frames have been taken from CAN clients"}}, .run = do_run},
+    {"frames", "Counts the CAN frames of each client: delivered to it, taken from it, dropped, lost in the kernel, refused.", {{0}}, .run = do_frames},
+    {"counters", "Tells the counters of pace, bus, clients and units; with a unit, that unit's alone.", {CONTROL_UNIT_ARG(true)}, .run = do_counters},
+    {"units", "Lists the units: name, serial number, CAN node, board profile.", {{0}}, .run = do_units},
+    {"unit.reset", "Pulses Res of a unit.", {CONTROL_UNIT_ARG(true)}, .run = do_unit_reset, .changes = true},
+    {"vcd.flush", "Writes to the VCD file what has been recorded so far, with a closing time.", {{0}}, .run = do_vcd_flush},
+    {"quit", "Ends the emulator as SIGTERM does.", {{0}}, .run = do_quit},
+};
+// clang-format on
+const struct control_table commands_bench = {rows, sizeof rows / sizeof *rows};

@@ -1,0 +1,53 @@
+/* Commands of the dividing head. */
+#include "control/commands.h"
+
+static const char *const faces[] = {"direct", "reversed", "side", "side_reversed", NULL}; /* order of enum head_face */
+
+static void add_head(const struct head *h, cJSON *result, int64_t t_ns)
+{
+    const bool rest = head_at_rest(h, t_ns);
+    cJSON_AddNumberToObject(result, "angle_deg", head_read_deg(h, t_ns));
+    cJSON_AddStringToObject(result, "face", head_face_name(h->face));
+    cJSON_AddBoolToObject(result, "at_rest", rest);
+    cJSON_AddNumberToObject(result, "rest_in_s", rest ? 0.0 : (double)(head_rest_ns(h) - t_ns) * 1e-9);
+}
+
+static enum control_outcome do_turn(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+{
+    if (!head_at_rest(c->bench->head, t_ns)) {
+        return control_refuse(c, "state", "the head is turning, at rest in %.3f s",
+                              (double)(head_rest_ns(c->bench->head) - t_ns) * 1e-9);
+    }
+    control_settle_inputs(c->bench, t_ns);
+    head_turn(c->bench->head, v[0].real, t_ns);
+    add_head(c->bench->head, result, t_ns);
+    return CONTROL_DONE;
+}
+
+static enum control_outcome do_mount(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+{
+    if (!head_at_rest(c->bench->head, t_ns)) return control_refuse(c, "state", "the head is turning");
+    control_settle_inputs(c->bench, t_ns);
+    head_mount(c->bench->head, (enum head_face)v[0].choice, t_ns);
+    add_head(c->bench->head, result, t_ns);
+    return CONTROL_DONE;
+}
+
+static enum control_outcome do_read(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+{
+    (void)v;
+    add_head(c->bench->head, result, t_ns);
+    return CONTROL_DONE;
+}
+
+// clang-format off
+static const struct control_command rows[] = {
+    {"head.turn", "Turns the dividing head; it takes the scenario's turn_s.",
+     {{"angle_deg", CONTROL_REAL, false, "deg", -3600, 3600, .what = "degrees on the head's scale"}}, .run = do_turn, .changes = true, .scpi = {{"ANGLe", NULL}}},
+    {"head.mount", "Puts the units on the head's mount with another face.",
+     {{"face", CONTROL_CHOICE, .what = "how the units sit on the mount", .choices = faces}}, .run = do_mount, .changes = true, .scpi = {{"FACE", NULL}}},
+    {"head.read", "Reads the head's scale.", {{0}}, .run = do_read,
+     .scpi = {{"ANGLe?", "angle_deg"}, {"FACE?", "face"}, {"REST?", "at_rest"}}},
+};
+// clang-format on
+const struct control_table commands_head = {rows, sizeof rows / sizeof *rows};

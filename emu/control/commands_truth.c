@@ -1,0 +1,27 @@
+/* Commands of the truth port: hidden parameters, for graders alone. */
+#include "control/commands.h"
+#include "control/describe.h"
+
+static enum control_outcome do_help(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+{
+    (void)v;
+    (void)t_ns;
+    describe_commands(c, result);
+    return CONTROL_DONE;
+}
+
+static enum control_outcome do_truth(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+{
+    (void)v;
+    describe_truth(c->bench, result, t_ns);
+    return CONTROL_DONE;
+}
+
+static const struct control_command rows[] = {
+    {"help", "Lists the commands with their arguments.", {{0}}, .run = do_help},
+    {"truth",
+     "Tells the hidden parameters of the bench: for graders, after the estimate is made.",
+     {{0}},
+     .run = do_truth},
+};
+const struct control_table commands_truth = {rows, sizeof rows / sizeof *rows};

@@ -1,0 +1,57 @@
+/* What the commands may reach of the bench. The application fills it in; callbacks get ctx. */
+#ifndef PSABENCH_CONTROL_VIEW_H
+#define PSABENCH_CONTROL_VIEW_H
+
+#include "base/can.h"
+#include "board/unit.h"
+#include "phys/head.h"
+
+#define CONTROL_UNITS_MAX 64u
+#define CONTROL_BUSES_MAX 8u
+#define CONTROL_WHY_MAX   256u
+
+/* One client of a CAN adapter, or the sum of those who left. */
+struct control_client {
+    const char *adapter, *name;
+    uint64_t delivered, taken, dropped, overrun, refused;
+};
+
+/* Lateness of the wall pace. */
+struct control_pace {
+    const char *name; /* wall, step, free */
+    uint64_t turns, late, slips;
+    double p50_us, p99_us, p999_us, max_us; /* of events */
+    uint64_t frames;
+    double frame_p50_us, frame_p99_us, frame_p999_us, frame_max_us; /* of frames handed to the kernel */
+};
+
+struct control_command;
+struct cJSON;
+
+struct control_bench {
+    void *ctx;
+    struct head *head;
+    struct can_bus *bus[CONTROL_BUSES_MAX];
+    unsigned buses;
+    struct unit *unit[CONTROL_UNITS_MAX];
+    const char *unit_name[CONTROL_UNITS_MAX];
+    struct can_node *node[CONTROL_UNITS_MAX]; /* of the unit on the bus; may be NULL */
+    unsigned units;
+    uint64_t seed;
+    const char *scenario;
+
+    /* Time is to move by for_ns once after_tx frames of clients have been taken; control_run_done() is called then. False
+     * with a sentence in why when it cannot. */
+    bool (*run)(void *ctx, int64_t for_ns, uint64_t after_tx, char *why);
+    void (*quit)(void *ctx);
+    bool (*vcd_flush)(void *ctx, char *why);
+    uint64_t (*can_rx)(void *ctx); /* frames delivered to the client that has been on the bus longest */
+    bool (*client)(void *ctx, unsigned i,
+                   struct control_client *out); /* i-th in order of coming; false past the last */
+    void (*gone)(void *ctx, struct control_client *out);
+    void (*pace)(void *ctx, struct control_pace *out);
+    /* A command that changes the bench's future was carried out; args as it was given. May be NULL. */
+    void (*journal)(void *ctx, const struct control_command *row, const struct cJSON *args, int64_t t_ns);
+};
+
+#endif
