@@ -67,7 +67,7 @@ bool list_scenarios(FILE *out, char *why, size_t cap)
 
 void list_commands(FILE *out)
 {
-    char line[2048];
+    char line[8704];
     for (unsigned i = 0; control_markdown(control_tables, i, line, sizeof line); i++) {
         fprintf(out, "%s\n", line);
     }

@@ -248,7 +248,7 @@ bool control_args(const struct control_bench *b, const struct control_command *r
         if (!v[i].given && !a->optional) return refuse(why, "argument", "%s is missing: %s", a->name, a->what);
         if (!within_limits(&(struct target){b, a, why}, v, &v[i])) return false;
     }
-    return true;
+    return !row->check || row->check(b, v, why);
 }
 
 /* ---- the table for people */
@@ -279,7 +279,7 @@ static const char *markdown_args(const struct control_command *row, char *out, s
 
 bool control_markdown(const struct control_table *const *tables, unsigned line, char *out, size_t cap)
 {
-    char args[1024];
+    char args[8192];
     if (line == 0) snprintf(out, cap, "| command | what it does | arguments |");
     if (line == 1) snprintf(out, cap, "|---|---|---|");
     if (line < 2) return true;

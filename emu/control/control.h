@@ -14,7 +14,7 @@
 
 #include <cjson/cJSON.h>
 
-#define CONTROL_ARGS_MAX  8u
+#define CONTROL_ARGS_MAX  48u /* fault.add: the values of every kind of fault */
 #define CONTROL_REALS_MAX 32u
 #define CONTROL_SCPI_MAX  6u
 #define CONTROL_REPLY_MAX 524288u /* counters of 64 units */
@@ -64,6 +64,7 @@ struct control_scpi {
 enum control_outcome { CONTROL_DONE, CONTROL_LATER, CONTROL_REFUSED };
 
 struct control;
+struct control_refusal;
 
 struct control_command {
     const char *name;
@@ -73,6 +74,8 @@ struct control_command {
     enum control_outcome (*run)(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns);
     bool changes; /* the bench's future: goes into the journal when it is done */
     struct control_scpi scpi[CONTROL_SCPI_MAX];
+    /* What the arguments do not say one by one; does nothing. False with the refusal. NULL: nothing more. */
+    bool (*check)(const struct control_bench *b, const struct control_value *v, struct control_refusal *why);
 };
 
 struct control_table {
