@@ -35,6 +35,20 @@ void can_detach(struct can_bus *b, struct can_node *n)
     n->queued = 0;
 }
 
+void can_replace(struct can_bus *b, struct can_node *n, struct can_node *by)
+{
+    *by = *n;
+    for (struct can_node **at = &b->nodes; *at; at = &(*at)->next) {
+        if (*at != n) continue;
+        *at = by;
+        break;
+    }
+    if (b->next_rx == n) b->next_rx = by;
+    if (b->sender == n) b->sender = by;
+    n->next = NULL;
+    n->queued = 0;
+}
+
 bool can_valid(const struct can_msg *m)
 {
     const bool is_fd = m->flags & CAN_FD;

@@ -88,6 +88,9 @@ void can_bus_init(struct can_bus *b, const struct can_bus_cfg *cfg, struct sched
 void can_attach(struct can_bus *b, struct can_node *n);
 void can_detach(struct can_bus *b, struct can_node *n); /* drops what it had queued; a frame on the wire is finished */
 
+/* `by` stands where n stood, with all that n was, its waiting frames and the one on the wire included; n is off the bus. */
+void can_replace(struct can_bus *b, struct can_node *n, struct can_node *by);
+
 /* Queues a copy. CAN_FULL: counted in tx_overflow; CAN_NO_FD: FD frame on a classic bus; CAN_BAD: no such length or id. */
 enum can_result can_send(struct can_bus *b, struct can_node *n, const struct can_msg *m, int64_t t_ns);
 

@@ -1,5 +1,15 @@
 #include "link/can_hub.h"
 
+#include <stdio.h>
+#include <stdlib.h>
+
+static const char ghostly[] = "ghost"; /* adapter of a ghost */
+
+static void tell(const struct can_hub *h, const struct can_client *c, enum can_hub_deed deed, const struct can_msg *m)
+{
+    if (h->tap.deed) h->tap.deed(h->tap.ctx, h, c, deed, m);
+}
+
 static void start_counters(struct can_client *c)
 {
     c->delivered = c->taken = c->dropped = c->overrun = 0;
@@ -29,23 +39,83 @@ void can_hub_up(struct can_hub *h, struct can_client *c)
     struct can_client **p = &h->clients;
     while (*p) p = &(*p)->next;
     *p = c;
-    h->clients_seen++;
+    c->number = ++h->clients_seen;
     can_attach(h->bus, &c->node);
+    tell(h, c, CAN_HUB_CAME, NULL);
+}
+
+/* by: who takes its place in the list, or NULL. */
+static void unlist(struct can_hub *h, struct can_client *c, struct can_client *by)
+{
+    for (struct can_client **p = &h->clients; *p; p = &(*p)->next) {
+        if (*p != c) continue;
+        *p = by ? by : c->next;
+        break;
+    }
 }
 
 void can_hub_down(struct can_hub *h, struct can_client *c)
 {
     if (!c->up) return;
-    for (struct can_client **p = &h->clients; *p; p = &(*p)->next) {
-        if (*p != c) continue;
-        *p = c->next;
-        break;
-    }
+    unlist(h, c, NULL);
     keep_counters(h, c);
     h->gone.refused += c->refused;
     c->refused = 0;
     c->up = false;
     can_detach(h->bus, &c->node);
+    tell(h, c, CAN_HUB_WENT, NULL);
+}
+
+/* ---- ghosts */
+
+static void silence(struct can_client *g)
+{
+    g->adapter = ghostly;
+    g->leaving = true;
+    g->node.name = g->name;
+    g->node.rx = NULL;
+    g->node.sent = NULL;
+    g->node.ctx = NULL;
+}
+
+bool can_hub_haunt(struct can_hub *h, struct can_client *c)
+{
+    struct can_client *g = c->up ? malloc(sizeof *g) : NULL;
+    if (!g) {
+        can_hub_down(h, c);
+        return false;
+    }
+    *g = *c;
+    unlist(h, c, g);
+    can_replace(h->bus, &c->node, &g->node);
+    silence(g);
+    c->up = false;
+    c->refused = 0;
+    return true;
+}
+
+struct can_client *can_hub_ghost(struct can_hub *h, uint32_t number, const char *name, bool fd)
+{
+    struct can_client *g = calloc(1, sizeof *g);
+    if (!g) return NULL;
+    snprintf(g->name, sizeof g->name, "%.31s", name);
+    g->node.order = CAN_ORDER_FIFO;
+    g->node.fd = fd;
+    silence(g);
+    h->clients_seen = number - 1;
+    can_hub_up(h, g);
+    g->leaving = true;
+    return g;
+}
+
+void can_hub_sweep(struct can_hub *h, bool all)
+{
+    for (struct can_client *c = h->clients, *next; c; c = next) {
+        next = c->next;
+        if (c->adapter != ghostly || (c->node.queued > 0 && !all)) continue;
+        can_hub_down(h, c);
+        free(c);
+    }
 }
 
 bool can_hub_send(struct can_hub *h, struct can_client *c, const struct can_msg *m, int64_t t_ns)
@@ -56,5 +126,6 @@ bool can_hub_send(struct can_hub *h, struct can_client *c, const struct can_msg 
     }
     c->taken++;
     h->taken++;
+    tell(h, c, CAN_HUB_SENT, m);
     return true;
 }

@@ -7,7 +7,10 @@
 #include "base/can.h"
 #include "link/link.h"
 
+struct can_hub;
+
 struct can_client {
+    uint32_t number;     /* of its coming to the hub, from 1 */
     const char *adapter; /* socketcand, slcan, socketcan */
     char name[32];       /* channel the client opened, or interface */
     struct can_node node;
@@ -21,6 +24,15 @@ struct can_client {
     struct can_client *next; /* in order of coming up */
 };
 
+/* What a client did to the bus: a journal of these makes the same bus again. */
+enum can_hub_deed { CAN_HUB_CAME, CAN_HUB_WENT, CAN_HUB_SENT };
+
+struct can_hub_tap {
+    void (*deed)(void *ctx, const struct can_hub *h, const struct can_client *c, enum can_hub_deed deed,
+                 const struct can_msg *m); /* m: the frame that was queued; NULL: nobody listens */
+    void *ctx;
+};
+
 struct can_hub {
     struct can_bus *bus;
     struct links *links;
@@ -28,9 +40,10 @@ struct can_hub {
     int64_t epoch_ns; /* added to the simulated time in time stamps */
     void (*say)(void *ctx, const char *text); /* one line for the log: a peer came, went, lost something */
     void *say_ctx;
+    struct can_hub_tap tap;
     /* read-only outside can_hub.c */
-    struct can_client *clients;
-    struct can_client gone; /* counters of those who left */
+    struct can_client *clients; /* ghosts among them: `leaving`, nobody behind them */
+    struct can_client gone;     /* counters of those who left */
     uint64_t taken;
     uint32_t clients_seen;
 };
@@ -43,6 +56,16 @@ void can_hub_restart(struct can_hub *h, struct can_client *c);
 
 /* Detaches it; its counters are added to those of the gone. Frames of its still queued are dropped. */
 void can_hub_down(struct can_hub *h, struct can_client *c);
+
+/* The client's place on the bus, with what it has queued, is taken by a ghost, which leaves when its frames are out; the
+ * client itself is down. False when there is no memory: then it is down and its frames are dropped. */
+bool can_hub_haunt(struct can_hub *h, struct can_client *c);
+
+/* A ghost from the start: a client of a run that is done again. NULL when there is no memory. */
+struct can_client *can_hub_ghost(struct can_hub *h, uint32_t number, const char *name, bool fd);
+
+/* Ghosts with nothing left to send leave; all: every ghost, with what it has queued. */
+void can_hub_sweep(struct can_hub *h, bool all);
 
 /* Queues a frame of the client's; false: refused, and counted. */
 bool can_hub_send(struct can_hub *h, struct can_client *c, const struct can_msg *m, int64_t t_ns);
