@@ -18,11 +18,12 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 from psabench import report_plots
-from psabench.bench import Bench, Face
 from psabench.estimate import harmonics, model
 from psabench.estimate.model import Array, Sensor
+from psabench.face import Face
 from psabench.grading import Section
 from psabench.procedures.fourier import FourierParams, fourier
+from psabench.procedures.head_bench import HeadBench
 from psabench.procedures.reversal import ReversalParams, reversal
 
 ARTICLE = Sensor(
@@ -66,7 +67,7 @@ class Readings:
         return cast(Array, level_v[0] + self._noise_v * self._rng.standard_normal(readings))
 
 
-def bench(noise_v: float, seed: int, sensor: Sensor = ARTICLE) -> Bench:
+def bench(noise_v: float, seed: int, sensor: Sensor = ARTICLE) -> HeadBench:
     return Readings(sensor, noise_v, seed)
 
 

@@ -1,10 +1,10 @@
 """Host side of psabench: converter boards over CAN and the line port, instruments, calibration procedures.
 
-    from psabench import open_rig
+    from psabench import Bench
 
-    with open_rig("quiet") as rig:
-        rig.unit.register("x", 1)           # CONFIG0 of the converter of channel X
-        rig.unit.stream(100).axis("x")      # volts at the load, shape (100,)
+    with Bench.start("quiet") as bench:
+        bench.unit.register("x", 1)           # CONFIG0 of the converter of channel X
+        bench.unit.stream(100).axis("x")      # volts at the load, shape (100,)
 
 Conventions, everywhere: SI inside, the unit at the end of a name (u_v, t_s, angle_deg); voltages are at the board's
 load resistors, before its divider; g is the local gravity, coefficients are per local g; time is the bench's, seconds
@@ -15,9 +15,10 @@ Everything raises `errors.BenchError` or one of its kinds when the bench is at f
 
 from typing import TYPE_CHECKING
 
-__all__ = ["Rig", "open_rig"]
+__all__ = ["Bench", "Rig", "open_rig"]
 
 if TYPE_CHECKING:
+    from psabench.bench import Bench
     from psabench.rig import Rig, open_rig
 else:
 
@@ -25,6 +26,6 @@ else:
         """Loaded when asked for: `psa-emu` and `psabench.chips` start at once, without NumPy and python-can."""
         if name not in __all__:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        from psabench import rig
+        from psabench import bench, rig
 
-        return getattr(rig, name)
+        return getattr(bench if name == "Bench" else rig, name)

@@ -1,108 +1,406 @@
-"""What a procedure may ask of a bench, and nothing else.
+"""A bench ready for use: boards, instruments, probe and faults of an emulator, or of a laboratory with a real one.
 
-A procedure is written against `Bench`; the same procedure then runs on the emulator over CAN, on a real
-dividing head and on the in-memory bench of the tests. Angles are degrees here because the head's scale is
-(estimators take radians), voltages are volts at the load resistor, before the board's divider.
+    from psabench import Bench
 
-Gravity on the sensor axes, per face. `a` is the projection of gravity (an axis that points down reads +g),
-`th = alpha + alpha0`, alpha the head angle and alpha0 the mounting error about the head axis. Every face is a
-turn of the sensor about its own Ox, so Ox, and with it a_x and alpha0, stay where they were:
+    with Bench.start("calibrate") as bench:     # an emulator of ours; its time moves only when we say so
+        bench.head.turn(90.0)                   # over SCPI
+        bench.unit.stream(100).axis("x")        # over CAN: volts at the load, shape (100,)
+        bench.run_until("DRD_A", count=3)
 
-    face            a_x          a_y          a_z
-    DIRECT          -g sin th    -g cos th     0             article, eq. (12)
-    REVERSED        -g sin th    +g cos th     0             180 deg about Ox
-    SIDE            -g sin th     0           -g cos th      90 deg about Ox: Oz stands where Oy stood
-    SIDE_REVERSED   -g sin th     0           +g cos th      90 deg the other way: SIDE turned by 180 deg
+`Bench.connect` takes what is there, by address: any bus of python-can, instruments at VISA addresses, and the control
+socket where the bench is an emulator. Boards are reached over CAN and instruments over SCPI alone, so a script that
+uses nothing else runs on a real bench. What only an emulator can do (step pace, faults, snapshots, the truth) goes
+through its control socket and raises BenchError, saying so, where there is none.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass, field
-from enum import Enum
-from typing import Protocol
+import os
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any, TypeVar
 
-import numpy as np
-import numpy.typing as npt
+from psabench.can_host import QUANTUM_S, CanHost, StepClock, WallClock, open_bus
+from psabench.control import Control, Reply
+from psabench.device import Psa2
+from psabench.emulator import Emulator, Forked
+from psabench.errors import BadInput, BenchError, ControlError, TimeOut
+from psabench.faults import Fault, Faults
+from psabench.instruments import KINDS, Chamber, Head, Instrument, Supply, Table, open_instrument, visa_address
+from psabench.probe import Probe
+from psabench.protocol_files import DBC_NODE
+
+NS = 1_000_000_000
+SLICE_NS = NS  # long runs go in slices of simulated time, so that Ctrl-C is heard
+NONE = "none"  # as the CAN specification: no bus
+
+Kind = TypeVar("Kind", bound=Instrument)
 
 
-class Face(Enum):
-    """How the sensor sits in its mount; see the table of the module."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Status:
+    """How the bench stands; None: the bench has no such instrument, or no control socket."""
 
-    DIRECT = "direct"
-    REVERSED = "reversed"
-    SIDE = "side"
-    SIDE_REVERSED = "side_reversed"
+    time_s: float
+    pace: str  # wall, step, free; real: no emulator
+    angle_deg: float | None  # of the table's outermost axis, as its readout shows it
+    rate_dps: float | None
+    temp_degc: float | None  # of the chamber's air
+    frames: int  # CAN frames that this program has received
+    late: int | None  # events that the emulator ran late
+    lost: int  # samples missing between the frames received
 
 
-class Bench(Protocol):
-    """A dividing head with an accelerometer on it, wired to one axis of a converter board."""
+class Bench:
+    """A bench, made with `start`, `connect`, `restore` or `fork`; leaving its context closes everything."""
 
-    g_mps2: float  # local gravity; only used to print SI, the estimates are in V per local g
+    def __init__(
+        self,
+        *,
+        cans: Sequence[str | None] = (),
+        control: Path | None = None,
+        truth: Path | None = None,
+        scpi: Mapping[str, str] | None = None,
+        node: int | None = None,
+        emulator: Emulator | Forked | None = None,
+    ) -> None:
+        """See `connect`; `emulator` is ended when the bench is closed."""
+        self.emulator = emulator
+        self.truth_path = truth
+        self.addresses = dict(scpi or {})
+        self._open: dict[str, Instrument] = {}
+        with ExitStack() as stack:
+            if emulator is not None:
+                stack.callback(emulator.stop)
+            self._control = stack.enter_context(Control(control)) if control else None
+            self._hosts = [stack.enter_context(CanHost(open_bus(c), WallClock())) for c in cans]
+            self._stack = stack.pop_all()
+        try:
+            self.pace = "real" if self._control is None else str(self._control.call("time").result["pace"])
+            self._clock = self._make_clock()
+            for host in self._hosts:
+                host.clock = self._clock
+            self.units: dict[str, Psa2] = self._find_units(node)
+            self.faults = Faults(self)
+            self.probe = Probe(self)
+        except BaseException:
+            self.close()
+            raise
+
+    # ---- making one
+
+    @classmethod
+    def start(
+        cls,
+        scenario: str | Path = "calibrate",
+        *,
+        pace: str = "step",
+        seed: int | None = None,
+        can: str = "socketcand:0",
+        node: int | None = None,
+        extra: Sequence[str | Path] = (),
+    ) -> Bench:
+        """Start an emulator with a scenario (name or file) and connect to all that it has.
+
+        pace: "step" (time moves when we wait, as fast as it can) or "wall" (real time). can: psa-emu's own --can.
+        extra: further arguments of psa-emu. Raises BadInput or BenchError with the emulator's own words.
+        """
+        emulator = Emulator(scenario, cans=[can], pace=pace, seed=seed, truth=True, extra=extra)
+        return cls._of(emulator, node)
+
+    @classmethod
+    def restore(cls, path: str | Path, *, pace: str = "step", can: str = "socketcand:0") -> Bench:
+        """Start an emulator from a snapshot. Raises BadInput for a file that is damaged or of another version."""
+        emulator = Emulator(cans=[can], pace=pace, truth=True, extra=["--restore", path])
+        return cls._of(emulator, None)
+
+    @classmethod
+    def _of(cls, emulator: Emulator, node: int | None) -> Bench:
+        emulator.__enter__()
+        return cls(
+            cans=bus_specs(emulator.endpoints),
+            control=emulator.control_path,
+            truth=emulator.truth_path,
+            scpi=scpi_addresses(emulator.endpoints),
+            node=node,
+            emulator=emulator,
+        )
+
+    @classmethod
+    def connect(
+        cls,
+        can: str | Sequence[str] | None = None,
+        *,
+        control: str | Path | None = None,
+        truth: str | Path | None = None,
+        scpi: Mapping[str, str] | None = None,
+        node: int | None = None,
+    ) -> Bench:
+        """Connect to a bench that is there, real or emulated.
+
+        can: bus of python-can (see `can_host.open_bus`), several, or "none"; None: python-can's own configuration.
+        control, truth: sockets of an emulator. scpi: VISA addresses by instrument, {"head": "TCPIP::...::SOCKET"}.
+        node: CANopen node of the unit (5); with a control socket the emulator tells which units there are.
+        """
+        unknown = set(scpi or {}) - set(KINDS)
+        if unknown:
+            raise BadInput(f"scpi: no such instrument: {', '.join(sorted(unknown))}; there are {', '.join(KINDS)}")
+        many: Sequence[str | None] = [can] if can is None or isinstance(can, str) else can
+        return cls(
+            cans=[c for c in many if c != NONE],
+            control=Path(control) if control else None,
+            truth=Path(truth) if truth else None,
+            scpi=scpi,
+            node=node,
+        )
+
+    def fork(self, *, can: str = "socketcand:0") -> Bench:
+        """A second bench that goes on from this very instant: the emulator forks, the copy gets doors of its own."""
+        emulator = Forked(self.control, can=can)
+        return Bench(
+            cans=bus_specs(emulator.endpoints),
+            control=emulator.control_path,
+            truth=emulator.truth_path,
+            scpi=scpi_addresses(emulator.endpoints),
+            emulator=emulator,
+        )
+
+    def close(self) -> None:
+        """Close all connections and end the emulator if it is ours."""
+        for instrument in self._open.values():
+            with suppress(Exception):  # one that has gone must not keep the others open
+                instrument.close()
+        self._open.clear()
+        self._stack.close()
+
+    def __enter__(self) -> Bench:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, e: BaseException | None, tb: TracebackType | None) -> None:
+        self.close()
+
+    # ---- what there is
 
     @property
-    def t_s(self) -> float:
-        """Bench time, s: simulated or wall, monotonic."""
-        ...
+    def control(self) -> Control:
+        """The emulator's control socket. Raises BenchError on a bench without one."""
+        if self._control is None:
+            raise BenchError("this bench has no control socket: a real one has none, psa-emu has with --control")
+        return self._control
 
-    def turn(self, angle_deg: float) -> float:
-        """Set the head and return its own readout, deg (setting error and resolution are the head's)."""
-        ...
+    @property
+    def host(self) -> CanHost:
+        """This program's end of the first bus."""
+        if not self._hosts:
+            raise BenchError("this bench was connected without a CAN bus")
+        return self._hosts[0]
 
-    def mount(self, face: Face) -> None:
-        """Put the sensor into its mount with this face."""
-        ...
+    @property
+    def unit(self) -> Psa2:
+        """The first unit."""
+        for unit in self.units.values():
+            return unit
+        raise BenchError("this bench has no unit on a bus that was connected")
 
-    def read(self, axis: str, readings: int) -> npt.NDArray[np.float64]:
-        """Settled readings of `axis` ("x", "y" or "z"), volts at the load, shape (readings,)."""
-        ...
+    @property
+    def head(self) -> Head:
+        return self._instrument("head", Head)
+
+    @property
+    def table(self) -> Table:
+        return self._instrument("table", Table)
+
+    @property
+    def chamber(self) -> Chamber:
+        return self._instrument("chamber", Chamber)
+
+    @property
+    def supply(self) -> Supply:
+        return self._instrument("supply", Supply)
+
+    def _instrument(self, name: str, kind: type[Kind]) -> Kind:
+        """Opened when first asked for. Raises BenchError that says why there is none."""
+        if name not in self.addresses:
+            raise BenchError(f"this bench has no {name}: {self._why_absent(name)}")
+        if name not in self._open:
+            self._open[name] = open_instrument(name, self.addresses[name], kind, self.wait)
+        found = self._open[name]
+        assert isinstance(found, kind)
+        return found
+
+    def _why_absent(self, name: str) -> str:
+        if self.emulator is not None:
+            return f"the scenario has no section {name}"
+        return f"no address was given for it, as in scpi={{{name!r}: 'TCPIP::192.0.2.7::5025::SOCKET'}}"
+
+    def _make_clock(self) -> WallClock | StepClock:
+        if self._control is not None and self.pace == "step":
+            return StepClock(self._control, self._hosts)
+        return WallClock(self._hosts)
+
+    def _find_units(self, node: int | None) -> dict[str, Psa2]:
+        """By name, as the emulator tells them; a real bench has one, "a"."""
+        if not self._hosts:
+            return {}
+        if self._control is None or node is not None:
+            return {"a": Psa2(self._hosts[0], DBC_NODE if node is None else node)}
+        units = self._control.call("units").result["units"]
+        return {u["name"]: Psa2(self._host_of(u), int(u["node"])) for u in units}
+
+    def _host_of(self, unit: Mapping[str, Any]) -> CanHost:
+        """The host on the unit's bus; with one host, that."""
+        channel = unit.get("bus")
+        for host in self._hosts:
+            if channel is not None and host.bus.channel_info.endswith(str(channel)):
+                return host
+        return self._hosts[0]
+
+    # ---- time
+
+    @property
+    def time_s(self) -> float:
+        """Time of the bench, s: simulated since power-on in step pace, else this machine's."""
+        return self._clock.now_s()
 
     def wait(self, dwell_s: float) -> None:
-        """Let the bench's time pass."""
-        ...
+        """Let the bench's time pass, receiving meanwhile: simulated time in step pace, else real time."""
+        if isinstance(self._clock, StepClock):
+            self.run_for(dwell_s)
+        elif self._hosts:
+            self._hosts[0].advance(dwell_s)
+        else:
+            time.sleep(max(0.0, dwell_s))
 
+    def run_for(self, dwell_s: float) -> None:
+        """Move simulated time; in wall pace it goes by itself and this waits for it."""
+        if not isinstance(self._clock, StepClock):
+            self.wait(dwell_s)
+            return
+        left_ns = round(dwell_s * NS)
+        while left_ns > 0:
+            slice_ns = min(left_ns, SLICE_NS)
+            self._clock.command(None, "run", for_s=slice_ns / NS)
+            left_ns -= slice_ns
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Reading:
-    """One voltage, with everything needed to estimate from it later."""
+    def step(self, count: int = 1) -> float:
+        """To the count-th next whole millisecond of simulated time: the beat of a control loop; returns time_s."""
+        period_ns = round(QUANTUM_S * NS)
+        now_ns = round(self.time_s * NS)
+        self.run_for(((now_ns // period_ns + count) * period_ns - now_ns) / NS)
+        return self.time_s
 
-    t_s: float
-    face: Face
-    set_deg: float  # what the head was asked for
-    alpha_deg: float  # what the head answered; this is what the estimator uses
-    axis: str
-    realisation: int  # 0-based repetition of the whole series
-    u_v: float  # at the load
+    def run_until(self, event: str, count: int = 1, *, unit: str | None = None, limit_s: float = 60.0) -> float:
+        """To the very instant of the count-th such event of a unit (the first unit); returns time_s.
 
+        In step pace time stands still there; in wall pace this returns soon after it. Events: "DRD_A", "INT_FALL", ...;
+        see docs/program.md. Raises TimeOut when it has not come within limit_s of the bench's time.
+        """
+        args: dict[str, object] = {"event": event, "count": count, "limit_s": limit_s}
+        if unit is not None:
+            args["unit"] = unit
+        if isinstance(self._clock, StepClock):
+            reply = self._clock.command(None, "run.until", **args)
+        else:
+            reply = self._watch(event, count, unit, limit_s)
+        if not reply.result.get("reached", True):
+            raise TimeOut(f"{event}: {reply.result.get('seen', 0)} of {count} came within {limit_s:g} s")
+        return self.time_s
 
-class Progress(Protocol):
-    """Where a procedure tells how far it is. The command line draws a bar, the tests count."""
+    def _watch(self, event: str, count: int, unit: str | None, limit_s: float) -> Reply:
+        """`run_until` where time moves by itself: events as they come, on a connection of their own."""
+        seen = 0
+        deadline_s = time.monotonic() + limit_s
+        with Control(self.control.path) as watcher:
+            reply = watcher.call("subscribe", what="events")
+            first = unit or next(iter(self.units), None)
+            while seen < count and (left_s := deadline_s - time.monotonic()) > 0.0:
+                self.wait(0.0)
+                came = watcher.next_event(min(left_s, 0.01))
+                seen += came is not None and came["event"] == event and came.get("unit", first) == first
+        return Reply(t_ns=reply.t_ns, can_rx=0, rx=(), result={"reached": seen >= count, "seen": seen})
 
-    def step(self, name: str, total: int) -> AbstractContextManager[Callable[[], None]]:
-        """Enter a step of `total` equal parts; the value entered is called once per part done."""
-        ...
-
-
-class Silent:
-    """A `Progress` that says nothing."""
+    # ---- looking
 
     @contextmanager
-    def step(self, name: str, total: int) -> Iterator[Callable[[], None]]:
-        yield lambda: None
+    def trace(self, path: str | Path, unit: str | None = None) -> Iterator[Path]:
+        """Record the lines of a unit (the first) as VCD while the block runs; yields the path."""
+        self.probe.start(path, unit)
+        try:
+            yield Path(path)
+        finally:
+            self.probe.stop()
+
+    def status(self) -> Status:
+        """How the bench stands, for a status bar or a log."""
+        table = self._maybe("table.read", axis=1)
+        chamber = self._maybe("chamber.read")
+        counters = self._maybe("counters")
+        return Status(
+            time_s=self.time_s,
+            pace=self.pace,
+            angle_deg=table.get("angle_deg"),
+            rate_dps=table.get("rate_dps"),
+            temp_degc=chamber.get("temp_degc"),
+            frames=sum(h.received for h in self._hosts),
+            late=counters.get("pace", {}).get("late"),
+            lost=sum(u.frames.counters.lost for u in self.units.values()),
+        )
+
+    def _maybe(self, command: str, **args: object) -> dict[str, Any]:
+        """The result of a command; empty where the bench has no such thing."""
+        if self._control is None:
+            return {}
+        with suppress(ControlError):
+            return self._control.call(command, **args).result
+        return {}
+
+    # ---- what graders read
+
+    def truth(self) -> dict[str, Any]:
+        """The hidden parameters of the bench: for graders alone, after the estimate is made."""
+        return self._ask_truth("truth")
+
+    def truth_state(self, unit: str | None = None) -> dict[str, Any]:
+        """True angles, specific force, rate, temperatures and supply of this instant: for graders alone."""
+        return self._ask_truth("truth.state", **({} if unit is None else {"unit": unit}))
+
+    def _ask_truth(self, command: str, **args: object) -> dict[str, Any]:
+        if self.truth_path is None:
+            raise BenchError("this bench has no truth port: a real one has none, psa-emu has with --truth")
+        with Control(self.truth_path) as port:
+            return port.call(command, **args).result
+
+    # ---- faults, snapshots
+
+    def fault(self, kind: str, point: str, **args: object) -> Fault:
+        """Plan a fault: bench.fault("stuck", "a.line.INT", at_s=0.1, for_s=0.01). See `Faults.add`."""
+        return self.faults.add(kind, point, **args)
+
+    def snapshot(self, path: str | Path) -> Path:
+        """Save the whole bench at this instant; `restore` goes on from there. Raises ControlError."""
+        self.control.call("snapshot", path=os.path.abspath(path))
+        return Path(path)
 
 
-def _drop(_: Reading) -> None:
-    """Nobody wants the readings as they come."""
+def bus_specs(endpoints: Sequence[Mapping[str, str]]) -> list[str]:
+    """How python-can opens the CAN endpoints of an emulator (its `ready` lines)."""
+    return [bus_spec(e) for e in endpoints if "can" in e]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Watch:
-    """Who follows a run: progress, and a callback that gets each reading as soon as it exists.
+def bus_spec(endpoint: Mapping[str, str]) -> str:
+    """How python-can opens one CAN endpoint of an emulator."""
+    kind = endpoint["can"]
+    if kind == "socketcand":
+        return f"socketcand:{endpoint['host']}:{endpoint['port']}"
+    if kind == "slcan":
+        return f"slcan:{endpoint['pty']}"
+    return f"socketcan:{endpoint['channel']},fd=true,receive_own_messages=false"
 
-    After Ctrl-C (`KeyboardInterrupt` goes through the procedure untouched) whatever `record` got is all there
-    is, so it writes through: `recording.CsvRecorder` does.
-    """
 
-    progress: Progress = field(default_factory=Silent)
-    record: Callable[[Reading], None] = _drop
+def scpi_addresses(endpoints: Sequence[Mapping[str, str]]) -> dict[str, str]:
+    """VISA addresses of an emulator's instruments, by name."""
+    return {e["scpi"]: visa_address(e) for e in endpoints if "scpi" in e}

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import socket
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from types import TracebackType
 from typing import Any, Protocol
@@ -18,12 +18,13 @@ from typing import Any, Protocol
 import can
 from can.interfaces.socketcan import SocketcanBus
 
-from psabench.control import Control
+from psabench.control import Control, Reply
 from psabench.errors import BadInput, LinkError
 
 BARRIER_S = 10.0  # patience for a frame that the emulator says it has sent
 GREETING_S = 10.0  # patience for the first words of a socketcand server
 LOOK_S = 0.2  # real time between looks whether a silent link is still there
+OTHERS_S = 0.005  # real time between looks at the other buses
 QUANTUM_S = 0.001  # step of simulated time while waiting for an answer
 SO_RCVBUFFORCE, RCVBUF = 33, 4 << 20  # asm-generic/socket.h; bytes
 
@@ -44,7 +45,10 @@ class Clock(Protocol):
 
 
 class WallClock:
-    """Real time: a real bench, or an emulator in wall pace."""
+    """Real time: a real bench, or an emulator in wall pace. others: hosts of further buses, received from as well."""
+
+    def __init__(self, others: Sequence[CanHost] = ()) -> None:
+        self._others = others
 
     def now_s(self) -> float:
         return time.monotonic()
@@ -52,32 +56,59 @@ class WallClock:
     def advance(self, host: CanHost, dwell_s: float) -> None:
         deadline = time.monotonic() + dwell_s
         while (left := deadline - time.monotonic()) > 0.0:
-            host.receive(left)
+            host.receive(min(left, OTHERS_S) if self._others else left)
+            for other in self._others:
+                while other is not host and other.receive(0.0):
+                    pass
 
 
 class StepClock:
-    """Simulated time of an emulator in step pace, moved through its control socket."""
+    """Simulated time of an emulator in step pace, moved through its control socket.
 
-    def __init__(self, control: Control) -> None:
+    hosts: all that this program has on the buses, in the order of their opening and the last to have come. Without
+    them it is the clock of one host, which has been on the bus longest.
+    """
+
+    def __init__(self, control: Control, hosts: Sequence[CanHost] = ()) -> None:
         self._control = control
+        self._hosts = list(hosts)
         first = control.call("frames")
         self._t_ns = first.t_ns
-        self._base_rx = first.can_rx  # frames sent before this host was there
         clients = [*first.result["clients"], first.result["gone"]]
         self._base_tx = sum(int(c["taken"]) for c in clients)
+        self._first = max(0, len(first.rx) - len(self._hosts))  # place of the first of ours among all clients
+        self._base_rx = self._delivered(first)  # frames sent before these hosts were there
 
     def now_s(self) -> float:
         return self._t_ns * 1e-9
 
     def advance(self, host: CanHost, dwell_s: float) -> None:
+        self.command(host, "run", for_s=dwell_s)
+
+    def command(self, host: CanHost | None, name: str, **args: object) -> Reply:
+        """A command that moves time, `run` or `run.until`; returns when every frame of that time has come."""
+        hosts = self._hosts or ([] if host is None else [host])
         # after_tx: what we have sent takes another way than this command, and must not be overtaken by it
-        reply = self._control.call("run", for_s=dwell_s, after_tx=self._base_tx + host.sent)
+        after_tx = self._base_tx + sum(h.sent for h in hosts)
+        reply = self._control.call(name, **args, after_tx=after_tx)
         self._t_ns = reply.t_ns
-        while (missing := reply.can_rx - self._base_rx - host.received) > 0:
-            if not host.receive(BARRIER_S):
-                raise LinkError(f"CAN: {missing} frames that the emulator has sent did not arrive in {BARRIER_S:g} s")
-        while host.shared and host.receive(0.0):
-            pass  # frames of others were counted for the emulator's; all of its own are with our kernel by now
+        for h, delivered, base in zip(hosts, self._delivered(reply), self._base_rx, strict=False):
+            _receive_all(h, delivered - base)
+        return reply
+
+    def _delivered(self, reply: Reply) -> list[int]:
+        """Frames handed to each of our hosts so far."""
+        mine = reply.rx[self._first : self._first + len(self._hosts)] if self._hosts else ()
+        return list(mine) or [reply.can_rx]
+
+
+def _receive_all(host: CanHost, sent: int) -> None:
+    """Receive until the host has all frames that the emulator has sent it."""
+    while (missing := sent - host.received) > 0:
+        if not host.receive(BARRIER_S):
+            raise LinkError(f"CAN: {missing} frames that the emulator has sent did not arrive in {BARRIER_S:g} s")
+    while host.shared and host.receive(0.0):
+        pass  # frames of others were counted for the emulator's; all of its own are with our kernel by now
 
 
 class CanHost:

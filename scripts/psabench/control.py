@@ -1,9 +1,10 @@
-"""Client of the emulator's control socket: one JSON object a line, one reply each."""
+"""Client of the control socket: one JSON object a line, one reply each, and what was subscribed between them."""
 
 from __future__ import annotations
 
 import json
 import socket
+from collections import deque
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -12,6 +13,7 @@ from typing import Any
 from psabench.errors import ControlError, LinkError
 
 REPLY_S = 600.0  # a long `run` in step pace answers when it is done
+EVENTS_KEPT = 100_000  # of subscriptions, until somebody takes them; older ones go first
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -19,17 +21,21 @@ class Reply:
     """What a command answered."""
 
     t_ns: int  # simulated time
-    can_rx: int  # CAN frames handed to this host's kind of client since the start: the barrier of step pace
+    can_rx: int  # CAN frames handed to the client that has been on the bus longest: the barrier of step pace
+    rx: tuple[int, ...]  # the same for each client, in the order of their coming
     result: dict[str, Any]
 
 
 class Control:
     """`with Control(path) as ctl: ctl.call("run", for_s=0.1)`.
 
-    Raises LinkError when the emulator is not there or goes away, ControlError when it refuses a command.
+    Raises LinkError when the emulator is not there or goes away, ControlError when it refuses a command. A call that
+    Ctrl-C has interrupted leaves the connection usable: its reply is passed over when it comes.
     """
 
     def __init__(self, path: Path) -> None:
+        self.path = path
+        self.events: deque[dict[str, Any]] = deque(maxlen=EVENTS_KEPT)  # of `subscribe`, as they came
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         self._socket.settimeout(REPLY_S)
         try:
@@ -37,7 +43,7 @@ class Control:
         except OSError as e:
             self._socket.close()
             raise LinkError(f"control socket {path}: {e.strerror}; is psa-emu running with --control?") from e
-        self._lines = self._socket.makefile("rb")
+        self._bytes = bytearray()  # of a line that is not all there yet
         self._id = 0
 
     def __enter__(self) -> Control:
@@ -47,7 +53,6 @@ class Control:
         self.close()
 
     def close(self) -> None:
-        self._lines.close()
         self._socket.close()
 
     def call(self, command: str, /, **args: object) -> Reply:
@@ -56,22 +61,63 @@ class Control:
         request = {"id": self._id, "cmd": command, "args": args}
         try:
             self._socket.sendall(json.dumps(request).encode() + b"\n")
-            line = self._lines.readline()
         except OSError as e:
             raise LinkError(f"control socket: {command}: {e}") from e
-        if not line:
-            raise LinkError(f"control socket: the emulator closed it during {command}")
-        try:
-            return self._parse(command, json.loads(line))
-        except (ValueError, KeyError, TypeError, AttributeError) as e:
-            raise LinkError(f"control socket: {command}: what came back is no reply: {line[:80]!r}") from e
+        while True:
+            line = self._line(command, REPLY_S)
+            try:
+                answer = json.loads(line)
+                if "event" in answer:
+                    self.events.append(answer)
+                elif not self._is_of_old(answer):
+                    return self._parse(command, answer)
+            except (ValueError, KeyError, TypeError, AttributeError) as e:
+                raise LinkError(f"control socket: {command}: what came back is no reply: {line[:80]!r}") from e
+
+    def next_event(self, timeout_s: float) -> dict[str, Any] | None:
+        """The next line of a subscription; None when none comes within timeout_s of real time."""
+        if not self.events:
+            try:
+                self.events.append(json.loads(self._line("subscription", timeout_s)))
+            except TimeoutError:
+                return None
+        return self.events.popleft()
+
+    def _line(self, command: str, timeout_s: float) -> bytes:
+        """Raises TimeoutError, only for a subscription."""
+        self._socket.settimeout(timeout_s)
+        while b"\n" not in self._bytes:
+            try:
+                more = self._socket.recv(65536)
+            except TimeoutError:
+                if timeout_s < REPLY_S:
+                    raise
+                raise LinkError(f"control socket: {command}: no reply in {REPLY_S:g} s") from None
+            except OSError as e:
+                raise LinkError(f"control socket: {command}: {e}") from e
+            if not more:
+                raise LinkError(f"control socket: the emulator closed it during {command}")
+            self._bytes += more
+        line, _, rest = bytes(self._bytes).partition(b"\n")
+        self._bytes = bytearray(rest)
+        return line
+
+    def _is_of_old(self, answer: dict[str, Any]) -> bool:
+        """Whether it answers a call before this one, which Ctrl-C has interrupted."""
+        number = answer.get("id")
+        return isinstance(number, int) and number < self._id
 
     def _parse(self, command: str, reply: dict[str, Any]) -> Reply:
         if reply.get("id") != self._id:
             raise LinkError(f"control socket: {command}: reply to request {reply.get('id')}, expected {self._id}")
         if not reply["ok"]:
             raise ControlError(command, reply["error"]["code"], reply["error"]["text"])
-        return Reply(t_ns=reply["t_ns"], can_rx=reply.get("can_rx", 0), result=reply.get("result") or {})
+        return Reply(
+            t_ns=reply["t_ns"],
+            can_rx=reply.get("can_rx", 0),
+            rx=tuple(reply.get("rx", ())),
+            result=reply.get("result") or {},
+        )
 
 
 def read_truth(path: Path) -> dict[str, Any]:

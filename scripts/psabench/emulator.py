@@ -17,6 +17,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
 
+from psabench.control import Control
 from psabench.errors import BadInput, BenchError
 from psabench.places import executable, find_emulator, own_emulators
 
@@ -39,6 +40,7 @@ class Emulator:
         seed: int | None = None,
         control: bool = True,
         truth: bool = False,
+        scpi: bool = False,
         extra: Sequence[str | Path] = (),
     ) -> None:
         self._dir = tempfile.TemporaryDirectory(prefix="psabench-")
@@ -54,6 +56,8 @@ class Emulator:
             self.argv += ["--control", str(self.control_path)]
         if self.truth_path:
             self.argv += ["--truth", str(self.truth_path)]
+        if scpi:
+            self.argv += ["--scpi", "all:0"]
         self.argv += [str(x) for x in extra]
         self.endpoints: list[dict[str, str]] = []
         self._stderr = (self.directory / "stderr").open("w+b")
@@ -144,6 +148,34 @@ class Emulator:
         for line in text.decode().splitlines():
             if line.startswith("ready ") and line != "ready all":
                 self.endpoints.append(dict(w.split("=", 1) for w in line.split()[1:]))
+
+
+class Forked:
+    """A copy of a running emulator, made by its `fork` command: a process of its own, with doors of its own."""
+
+    def __init__(self, parent: Control, *, can: str = "socketcand:0") -> None:
+        self._dir = tempfile.TemporaryDirectory(prefix="psabench-")
+        self.directory = Path(self._dir.name)
+        self.control_path = self.directory / "control"
+        self.truth_path = self.directory / "truth"
+        try:
+            made = parent.call("fork", control=str(self.control_path), can=can, truth=str(self.truth_path))
+        except BaseException:
+            self._dir.cleanup()
+            raise
+        self.pid = int(made.result["pid"])
+        self.endpoints: list[dict[str, str]] = [{k: str(v) for k, v in e.items()} for e in made.result["endpoints"]]
+
+    def stop(self) -> int:
+        """Ends it with `quit`; 0, or -1 when it had gone."""
+        try:
+            with Control(self.control_path) as control:
+                control.call("quit")
+        except BenchError:
+            return -1
+        finally:
+            self._dir.cleanup()
+        return 0
 
 
 def main() -> int:

@@ -34,6 +34,14 @@ class ControlError(BenchError):
         self.code = code
 
 
+class InstrumentError(BenchError):
+    """An instrument refused a command: number and text of its error queue (SCPI 1999, chapter 21)."""
+
+    def __init__(self, instrument: str, command: str, number: int, text: str) -> None:
+        super().__init__(f"{instrument}: {command}: {text} ({number})")
+        self.number = number
+
+
 class DeviceError(BenchError):
     """The board refused an access: CiA 301 abort code, with the board's own words where it has any."""
 

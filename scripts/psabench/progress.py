@@ -13,7 +13,7 @@ REDRAW_S = 0.1
 
 
 class Bar:
-    """A `psabench.bench.Progress` for people."""
+    """A `procedures.head_bench.Progress` for people."""
 
     def __init__(self, stream: TextIO | None = None) -> None:
         self._stream = stream or sys.stderr

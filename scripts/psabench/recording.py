@@ -9,7 +9,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import IO
 
-from psabench.bench import Face, Reading
+from psabench.face import Face
+from psabench.procedures.head_bench import Reading
 
 COLUMNS = ("t_s", "face", "set_deg", "alpha_deg", "axis", "realisation", "u_v")
 

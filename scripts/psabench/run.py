@@ -14,11 +14,11 @@ from pathlib import Path
 from typing import Any
 
 from psabench import report
-from psabench.bench import Progress, Watch
 from psabench.control import read_truth
 from psabench.errors import BadInput
 from psabench.grading import Section
 from psabench.procedures import PROCEDURES, Procedure
+from psabench.procedures.head_bench import Progress, Watch
 from psabench.procedures.result import ProcedureResult
 from psabench.protocol_files import DBC_NODE
 from psabench.recording import CsvRecorder

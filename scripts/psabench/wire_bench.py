@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from psabench.bench import Face
 from psabench.control import Control
 from psabench.device import SETTLE_PERIODS, Psa2
+from psabench.face import Face
 
 G_MPS2 = 9.80665  # standard gravity (CGPM 1901); the site's own value is the user's to give
 

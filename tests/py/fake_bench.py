@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
-from psabench.bench import Face
+from psabench.face import Face
 
 DEFAULT_SEED = 20080924  # the day the article was received
 SEED = int(os.environ.get("TEST_SEED", DEFAULT_SEED))

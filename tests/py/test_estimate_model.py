@@ -9,9 +9,9 @@ import pytest
 from fake_bench import seeded
 from hypothesis import given
 from hypothesis import strategies as st
-from psabench.bench import Face
 from psabench.estimate import model
 from psabench.estimate.model import Array, Sensor
+from psabench.face import Face
 
 ARTICLE = Sensor(u0_v=2.50, alpha0_rad=np.radians(0.1121), kx_v_per_g=1.0, ky_v_per_g=0.0098, kxy_v_per_g2=0.0010)
 

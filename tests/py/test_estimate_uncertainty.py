@@ -10,9 +10,9 @@ import math
 import numpy as np
 import pytest
 from fake_bench import seeded
-from psabench.bench import Face
 from psabench.estimate import harmonics, model, uncertainty
 from psabench.estimate.model import Array, Sensor
+from psabench.face import Face
 
 ALPHA_RAD = np.tile(np.radians(5.0 * np.arange(80)), 5)  # 5 realisations x 80 positions
 T_S = np.arange(400.0)

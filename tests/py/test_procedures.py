@@ -11,10 +11,11 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from fake_bench import DEFAULT_SEED, SEED, FakeBench, seeded
-from psabench.bench import Bench, Face, Reading, Watch
 from psabench.estimate.model import Sensor
+from psabench.face import Face
 from psabench.procedures import PROCEDURES
 from psabench.procedures.fourier import FourierParams, estimate_fourier, expected_fourier, fourier
+from psabench.procedures.head_bench import HeadBench, Reading, Watch
 from psabench.procedures.result import ProcedureResult
 from psabench.procedures.reversal import ReversalParams, estimate_reversal, expected_reversal, reversal
 from psabench.procedures.turns import TurnsParams, estimate_turns, expected_turns, turns
@@ -80,7 +81,7 @@ def test_gravity_on_the_axes_is_the_table_of_the_bench_module(
 )
 def test_without_noise_every_measured_number_is_what_was_to_be_expected(
     s: Sensor,
-    run: Callable[[Bench, object], ProcedureResult],
+    run: Callable[[HeadBench, object], ProcedureResult],
     params: object,
     expected: Callable[[Sensor], dict[str, float]],
 ) -> None:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from psabench.bench import Face
+from psabench.face import Face
 
 Array = npt.NDArray[np.float64]
 

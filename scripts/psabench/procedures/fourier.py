@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from psabench.bench import Bench, Face, Reading, Watch
 from psabench.estimate import model
 from psabench.estimate.uncertainty import (
     Estimate,
@@ -23,6 +22,8 @@ from psabench.estimate.uncertainty import (
     not_identifiable,
     propagate,
 )
+from psabench.face import Face
+from psabench.procedures.head_bench import HeadBench, Reading, Watch
 from psabench.procedures.result import DEG, ProcedureResult, option
 from psabench.procedures.series import (
     FaceFit,
@@ -67,7 +68,7 @@ _MEASURED = (
 _COEFFICIENTS = tuple((f"c{i}_v", f"C_{i}", "V", 1.0) for i in range(5))
 
 
-def fourier(bench: Bench, p: FourierParams, watch: Watch | None = None) -> FourierResult:
+def fourier(bench: HeadBench, p: FourierParams, watch: Watch | None = None) -> FourierResult:
     """Measure p.realisations x p.positions on the direct face and estimate by eqs (14)-(18).
 
     Raises ValueError when the readings do not suffice, and lets through what the bench raises and

@@ -14,9 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from psabench.bench import Bench, Face, Reading, Watch
 from psabench.estimate import model
 from psabench.estimate.uncertainty import Correlation, Estimate, correlation, estimate, propagate
+from psabench.face import Face
+from psabench.procedures.head_bench import HeadBench, Reading, Watch
 from psabench.procedures.result import DEG, ProcedureResult, option
 from psabench.procedures.series import (
     FaceFit,
@@ -68,7 +69,7 @@ class ReversalResult(ProcedureResult):
         return abs(quad.value) + quad.ci_half
 
 
-def reversal(bench: Bench, p: ReversalParams, watch: Watch | None = None) -> ReversalResult:
+def reversal(bench: HeadBench, p: ReversalParams, watch: Watch | None = None) -> ReversalResult:
     """Measure the faces one after the other and estimate. Errors and Ctrl-C as in `fourier`."""
     readings: list[Reading] = []
     for face in (*_UPRIGHT, *(_SIDE if p.side else ())):

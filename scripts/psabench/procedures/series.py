@@ -9,10 +9,11 @@ from itertools import groupby
 import numpy as np
 import numpy.typing as npt
 
-from psabench.bench import Bench, Face, Reading, Watch
 from psabench.estimate import harmonics
 from psabench.estimate.uncertainty import Estimate, lack_of_fit_p
 from psabench.estimate.uncertainty import estimate as make_estimate
+from psabench.face import Face
+from psabench.procedures.head_bench import HeadBench, Reading, Watch
 from psabench.procedures.result import FaceSeries, option
 
 LACK_OF_FIT_P = 1e-3  # below this the report warns
@@ -43,7 +44,7 @@ class SeriesParams:
 
 
 def read_position(
-    bench: Bench,
+    bench: HeadBench,
     watch: Watch,
     face: Face,
     set_deg: float,
@@ -75,7 +76,7 @@ def read_position(
     return taken
 
 
-def measure_face(bench: Bench, p: SeriesParams, face: Face, watch: Watch) -> list[Reading]:
+def measure_face(bench: HeadBench, p: SeriesParams, face: Face, watch: Watch) -> list[Reading]:
     """All realisations on one face, eq. (16)."""
     bench.mount(face)
     taken: list[Reading] = []

@@ -14,9 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from psabench.bench import Bench, Face, Reading, Watch
 from psabench.estimate import model
 from psabench.estimate.uncertainty import Correlation, Estimate, estimate, not_identifiable
+from psabench.face import Face
+from psabench.procedures.head_bench import HeadBench, Reading, Watch
 from psabench.procedures.result import FaceSeries, ProcedureResult, option
 from psabench.procedures.series import read_position
 
@@ -75,7 +76,7 @@ class TurnsResult(ProcedureResult):
     """Result of `turns`."""
 
 
-def turns(bench: Bench, p: TurnsParams, watch: Watch | None = None) -> TurnsResult:
+def turns(bench: HeadBench, p: TurnsParams, watch: Watch | None = None) -> TurnsResult:
     """Measure the six positions p.realisations times and estimate. Errors and Ctrl-C as in `fourier`."""
     watch = watch or Watch()
     readings: list[Reading] = []

@@ -1,0 +1,38 @@
+"""The probe: levels of a unit's lines now, and recordings of them as VCD. Through the control socket."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from psabench.bench import Bench
+
+
+class Probe:
+    """Of an emulated bench; a real one wants a logic analyser. Raises BenchError there, ControlError when refused."""
+
+    def __init__(self, bench: Bench) -> None:
+        self._bench = bench
+
+    def lines(self, unit: str | None = None) -> dict[str, int]:
+        """Level of each line of a unit (the first) at this instant."""
+        levels = self._bench.control.call("lines", **_unit(unit)).result["lines"]
+        return {str(name): int(level) for name, level in levels.items()}
+
+    def start(self, path: str | Path, unit: str | None = None) -> None:
+        """Record the lines of a unit (the first) into a VCD file from now on."""
+        self._bench.control.call("vcd.start", path=os.path.abspath(path), **_unit(unit))
+
+    def stop(self) -> None:
+        """End the recording; the file gets its closing time."""
+        self._bench.control.call("vcd.stop")
+
+    def flush(self) -> None:
+        """Write what has been recorded so far, with a closing time; the recording goes on."""
+        self._bench.control.call("vcd.flush")
+
+
+def _unit(name: str | None) -> dict[str, object]:
+    return {} if name is None else {"unit": name}
