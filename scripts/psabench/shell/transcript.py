@@ -1,0 +1,60 @@
+"""What was said in a session, as a script that does it again at the same simulated instants."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+HEADER = "# A session of psabench shell. Again: psabench run script FILE"
+
+
+@dataclass(frozen=True, slots=True)
+class Said:
+    """A line; t_ns: simulated time when it was given, None where nobody tells it; wrong: why it was refused."""
+
+    line: str
+    t_ns: int | None
+    wrong: str = ""
+
+
+@dataclass(slots=True)
+class Transcript:
+    """start: the `start` line that brings up the same bench; "": the script is told where its bench is."""
+
+    start: str
+    lockstep: bool  # time moved only when a line said so: no instants need to be written down
+    said: list[Said] = field(default_factory=list)
+
+    def add(self, line: str, t_ns: int | None, wrong: str = "") -> None:
+        self.said.append(Said(line, t_ns, wrong))
+
+    def script(self) -> str:
+        """The session as a script. What was refused stands in comments."""
+        lines = [HEADER, *([self.start] if self.start else [])]
+        for said in self.said:
+            if said.wrong:
+                lines.append(f"# {said.line}   refused: {' '.join(said.wrong.split())}")
+                continue
+            if not self.lockstep and said.t_ns is not None and not said.line.startswith("at "):
+                lines.append(f"at {seconds(said.t_ns)}")
+            lines.append(said.line)
+        return "\n".join(_without_repeats(lines)) + "\n"
+
+
+def seconds(t_ns: int) -> str:
+    """Exact to the nanosecond, without zeros at the end."""
+    text = f"{t_ns // 10**9}.{t_ns % 10**9:09d}".rstrip("0")
+    return text + "0" if text.endswith(".") else text
+
+
+def _without_repeats(lines: Sequence[str]) -> list[str]:
+    """`at` lines that follow one of the same instant say nothing."""
+    kept: list[str] = []
+    at = ""
+    for line in lines:
+        if line.startswith("at "):
+            if line == at:
+                continue
+            at = line
+        kept.append(line)
+    return kept

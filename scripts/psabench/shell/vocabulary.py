@@ -1,0 +1,138 @@
+"""What may be said: the commands, from the bench's own table and from the shell's, with their arguments."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Any
+
+
+class Kind(Enum):
+    """What an argument is."""
+
+    REAL = "number"
+    COUNT = "integer"
+    BOOL = "on or off"
+    TEXT = "text"
+    CHOICE = "choice"
+    REALS = "numbers"
+    REST = "the rest of the line"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Arg:
+    """One argument; low and high, both included, are of numbers."""
+
+    name: str
+    kind: Kind = Kind.TEXT
+    unit: str = ""
+    optional: bool = False
+    low: float = -math.inf
+    high: float = math.inf
+    choices: tuple[str, ...] = ()
+    strict: bool = True  # nothing but one of the choices; False: they are offered, the bench decides
+    what: str = ""
+
+    @property
+    def range(self) -> str:
+        """ "deg/s, -100 to 100": unit and range, or the choices; "" if there is nothing to say."""
+        if self.choices:
+            return ", ".join(self.choices)
+        limits = "" if math.isinf(self.low) and math.isinf(self.high) else f"{self.low:.10g} to {self.high:.10g}"
+        return ", ".join(x for x in (self.unit, limits) if x)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Command:
+    """wire: its name in the bench's table; "": the shell's own."""
+
+    name: str
+    what: str
+    args: tuple[Arg, ...] = ()
+    wire: str = ""
+
+    def arg(self, name: str) -> Arg | None:
+        return next((a for a in self.args if a.name == name), None)
+
+    @property
+    def usage(self) -> str:
+        """`table.rate axis rate_dps [limit_s]`."""
+        return " ".join([self.name, *(f"[{a.name}]" if a.optional else a.name for a in self.args)])
+
+
+@dataclass(frozen=True, slots=True)
+class Vocabulary:
+    """All commands by name, and the objects that are not here: name and why."""
+
+    commands: Mapping[str, Command]
+    absent: Mapping[str, str] = field(default_factory=dict)
+
+    def nearest(self, name: str) -> list[str]:
+        """Up to three names that somebody may have meant."""
+        near = difflib.get_close_matches(name, self.commands, 3, 0.6)
+        return near or [c for c in self.commands if name and name in c.split(".")][:3]
+
+
+OBJECTS: Mapping[str, str] = {
+    "dut": "the device: registers, stream, counters, over CAN",
+    "table": "the rate table",
+    "head": "the dividing head",
+    "chamber": "the thermal chamber",
+    "supply": "the power supply",
+    "probe": "the lines of a board: levels, VCD",
+    "faults": "faults: kinds, points, add, list, clear",
+    "can": "CAN frames as they are",
+    "scpi": "SCPI lines as they are",
+    "bench": "the bench as a whole: counters, units, snapshot",
+}
+
+# Names of the bench's table that an object of the shell has; others keep theirs.
+_NAMES = {name: f"bench.{name}" for name in ("counters", "frames", "quit", "snapshot", "fork", "units")} | {
+    "lines": "probe.lines",
+    "unit.reset": "bench.reset",
+}
+_PREFIXES = {"vcd.": "probe.", "fault.": "faults."}
+# The shell's own commands stand for these, or they make no sense here: the status bar subscribes.
+_HIDDEN = {"help", "run", "run.until", "time", "subscribe", "unsubscribe"}
+_KINDS = {"number": Kind.REAL, "integer": Kind.COUNT, "boolean": Kind.BOOL, "bool": Kind.BOOL, "numbers": Kind.REALS}
+
+
+def shell_name(wire: str) -> str:
+    """What the shell calls a command of the bench's table."""
+    for prefix, mine in _PREFIXES.items():
+        if wire.startswith(prefix):
+            return mine + wire.removeprefix(prefix)
+    return _NAMES.get(wire, wire)
+
+
+def from_help(rows: Iterable[Mapping[str, Any]], choices: Mapping[tuple[str, str], tuple[str, ...]]) -> list[Command]:
+    """Commands from the reply to `help`. choices: what this bench has for an argument: its units, fault points."""
+    commands = []
+    for row in rows:
+        wire = str(row["name"])
+        if wire in _HIDDEN:
+            continue
+        args = tuple(_arg(a, choices.get((wire, str(a["name"])), ()), choices) for a in row["args"])
+        commands.append(Command(name=shell_name(wire), what=str(row["what"]), args=args, wire=wire))
+    return commands
+
+
+def _arg(row: Mapping[str, Any], here: tuple[str, ...], choices: Mapping[tuple[str, str], tuple[str, ...]]) -> Arg:
+    kind = _KINDS.get(str(row["type"]), Kind.TEXT)
+    named = tuple(str(c) for c in row.get("choices", ())) or (
+        choices.get(("", "unit"), ()) if row["type"] == "unit" else ()
+    )
+    return Arg(
+        name=str(row["name"]),
+        kind=Kind.CHOICE if named and kind is Kind.TEXT else kind,
+        unit=str(row.get("unit") or ""),
+        optional=bool(row.get("optional")),
+        low=float(row["min"]) if "min" in row else -math.inf,
+        high=float(row["max"]) if "max" in row else math.inf,
+        choices=named or here,
+        strict=bool(named),
+        what=str(row.get("what", "")),
+    )
