@@ -5,11 +5,12 @@
  * number of bits including stuffing (canbits.h), and at the end of frame every other node receives it; the interframe
  * space follows. Frames sent at one instant all take part in the arbitration of that instant. A bus whose bit rate is 0
  * is ideal: frames pass at once in the order of sending, yet each in its own event, so that a receiver that answers does
- * not recurse. Nodes are owned by their owners and linked in; nothing allocates. Not modelled: errors on the wire
- * (acknowledge, bus-off, overload frames); a frame that nobody receives passes. */
+ * not recurse. Nodes are owned by their owners and linked in; nothing allocates. Errors come only as faults (can_fault.h);
+ * a frame that nobody receives passes. */
 #ifndef PSABENCH_BASE_CAN_H
 #define PSABENCH_BASE_CAN_H
 
+#include "base/can_fault.h"
 #include "base/sched.h"
 
 #include <stdbool.h>
@@ -47,9 +48,12 @@ struct can_node {
     bool fd; /* takes part in FD traffic; a classic node is not given FD frames and counts them */
     /* End of somebody else's frame; may be NULL. */
     void (*rx)(void *ctx, const struct can_msg *m, int64_t t_ns);
-    void (*sent)(void *ctx, const struct can_msg *m, int64_t t_ns); /* end of frame of one's own; may be NULL */
+    void (*sent)(void *ctx, const struct can_msg *m, int64_t t_ns);  /* end of frame of one's own; may be NULL */
+    void (*error)(void *ctx, const struct can_msg *m, int64_t t_ns); /* an error frame has passed; may be NULL */
+    void (*state)(void *ctx, enum can_state s, int64_t t_ns);        /* its controller's; may be NULL */
+    struct can_node *of; /* the node whose controller it shares as a second queue; NULL: it has its own */
     void *ctx;
-    /* read-only outside can.c */
+    /* read-only outside can*.c */
     uint32_t tx_frames, rx_frames, tx_overflow;
     uint32_t fd_refused; /* FD frames it could not send or was not given */
     struct can_waiting queue[CAN_QUEUE_MAX];

@@ -17,7 +17,7 @@
 static void pulse_edge(struct psa2 *b, bool level, int64_t t_ns)
 {
     if (b->pulse.group == PSA2_TEMP) {
-        trace_set(&b->trace, PSA2_LINE_SYNC_T, level, t_ns);
+        psa2_line(b, PSA2_LINE_SYNC_T, level, t_ns);
         ads1256_sync_pin(&b->tadc, level, t_ns);
         return;
     }
@@ -33,6 +33,7 @@ static void pulse_event(void *ctx, int64_t t_ns)
     const bool temp = p->group == PSA2_TEMP;
     p->active = !p->active;
     pulse_edge(b, p->active != temp, t_ns);
+    if (p->active != temp) psa2_tell(b, temp ? PSA2_EV_SYNC_T : PSA2_EV_SYNC_A, t_ns);
     if (p->active) {
         sched_at(b->sched, &p->ev, t_ns + (temp ? psa2_tau_ns(b, SYNC_T_TAU) : psa2_tclk_ns(b, SYNC_A_TCLK)));
         return;
@@ -78,6 +79,7 @@ static bool port_free(const struct psa2 *b)
 static void enter_run(struct psa2 *b, int64_t t_ns)
 {
     b->mode = PSA2_RUN;
+    psa2_tell(b, PSA2_EV_SETUP_DONE, t_ns);
     psa2_arm_patience(b, t_ns);
     psa2_service(b, t_ns);
 }
@@ -254,15 +256,18 @@ static void accel_drdy(void *ctx, bool level, int64_t t_ns)
     struct psa2 *b = port->b;
     if (!level) trace_set(&b->trace, PSA2_LINE_DOUTX + port->axis, spi_miso(&b->adc[port->axis].spi), t_ns);
     if (port->axis != 0) return;
-    trace_set(&b->trace, PSA2_LINE_DRD_A, level, t_ns);
-    if (!level) drd_a_fell(b, t_ns);
+    psa2_line(b, PSA2_LINE_DRD_A, level, t_ns);
+    if (level || b->mode == PSA2_OFF) return;
+    psa2_tell(b, PSA2_EV_DRD_A, t_ns);
+    drd_a_fell(b, t_ns);
 }
 
 static void temp_drdy(void *ctx, bool level, int64_t t_ns)
 {
     struct psa2 *b = ctx;
-    trace_set(&b->trace, PSA2_LINE_DRD_T, level, t_ns);
-    if (level) return;
+    psa2_line(b, PSA2_LINE_DRD_T, level, t_ns);
+    if (level || b->mode == PSA2_OFF) return;
+    psa2_tell(b, PSA2_EV_DRD_T, t_ns);
     if (b->mode == PSA2_SETUP) setup_event(b, PSA2_ON_DRD_T, t_ns);
     else if (b->mode == PSA2_RUN) psa2_temp_ready(b, t_ns);
 }
@@ -292,7 +297,7 @@ static void init_trace(struct psa2 *b)
 {
     static const struct {
         const char *name;
-        bool level; /* without power or at rest */
+        bool level; /* before the first power-up and at rest */
     } lines[PSA2_LINES] = {
         [PSA2_LINE_SYNC_A] = {"SYNC_A", false}, [PSA2_LINE_SCLK] = {"SClk", false},
         [PSA2_LINE_DRD_A] = {"DRD_A", true},    [PSA2_LINE_DIN] = {"DIn", false},
@@ -305,6 +310,7 @@ static void init_trace(struct psa2 *b)
     };
     trace_init(&b->trace);
     for (unsigned i = 0; i < PSA2_LINES; i++) (void)trace_add(&b->trace, lines[i].name, lines[i].level);
+    b->idle_lines = b->trace.level;
 }
 
 static void init_accel(struct psa2 *b)
@@ -368,10 +374,9 @@ void psa2_init(struct psa2 *b, const struct psa2_profile *p, const struct psa2_u
     init_temp(b);
 }
 
-/* Res falls: everything under way ends, the lines go idle, the controller forgets. */
-static void enter_reset(struct psa2 *b, int64_t t_ns)
+/* Everything under way ends, the lines go idle, the controller forgets. */
+static void stop_all(struct psa2 *b, int64_t t_ns)
 {
-    b->mode = PSA2_IN_RESET;
     b->step = 0;
     b->seq = 0;
     b->drd_a_seen = b->fault_told = false;
@@ -382,11 +387,27 @@ static void enter_reset(struct psa2 *b, int64_t t_ns)
     psa2_temp_restart(b);
     pulse_stop(b, t_ns);
     res_pin(b, false, t_ns);
+}
+
+static void enter_reset(struct psa2 *b, int64_t t_ns)
+{
+    b->mode = PSA2_IN_RESET;
+    stop_all(b, t_ns);
     sched_at(b->sched, &b->res_up, t_ns + RES_LOW_NS);
+}
+
+/* After a power-down: the lines that rest high rise. */
+static void light_up(struct psa2 *b, int64_t t_ns)
+{
+    const uint32_t all = (UINT32_C(1) << PSA2_LINES) - 1;
+    b->dark = false;
+    trace_steps(&b->trace, &(struct trace_step){t_ns, all, b->idle_lines}, 1);
 }
 
 void psa2_power_up(struct psa2 *b, int64_t t_ns)
 {
+    psa2_tell(b, PSA2_EV_POWER_UP, t_ns);
+    if (b->dark) light_up(b, t_ns);
     enter_reset(b, t_ns);
     for (unsigned i = 0; i < 3; i++) ads1282_power_up(&b->adc[i], t_ns);
     ads1256_power_up(&b->tadc, t_ns);
@@ -397,7 +418,30 @@ void psa2_reset(struct psa2 *b, int64_t t_ns)
     if (b->mode == PSA2_OFF) return;
     b->counters.resets++;
     enter_reset(b, t_ns);
+    psa2_tell(b, PSA2_EV_RES, t_ns);
     psa2_request_fail(b, PSA2_ACCEL, true, t_ns);
+}
+
+void psa2_power_down(struct psa2 *b, int64_t t_ns)
+{
+    if (b->mode == PSA2_OFF) return;
+    b->mode = PSA2_OFF; /* from here on every line is low */
+    b->dark = true;
+    sched_cancel(b->sched, &b->res_up);
+    stop_all(b, t_ns);
+    for (unsigned i = 0; i < 3; i++) ads1282_power_off(&b->adc[i], t_ns);
+    ads1256_power_off(&b->tadc, t_ns);
+    trace_steps(&b->trace, &(struct trace_step){t_ns, (UINT32_C(1) << PSA2_LINES) - 1, 0}, 1);
+    b->stream = true;
+    b->latest = (struct psa2_frame){0};
+    psa2_tell(b, PSA2_EV_RES, t_ns);
+    psa2_tell(b, PSA2_EV_POWER_DOWN, t_ns);
+    psa2_request_fail(b, PSA2_ACCEL, true, t_ns);
+}
+
+void psa2_fault_set(struct psa2 *b, const struct psa2_controller_fault *f)
+{
+    b->wrong = *f;
 }
 
 bool psa2_ready(const struct psa2 *b)

@@ -10,6 +10,7 @@
 #include "base/clk.h"
 #include "base/sched.h"
 #include "board/afe.h"
+#include "board/psa2_event.h"
 #include "board/psa2_profile.h"
 #include "chip/ads1256.h"
 #include "chip/ads1282.h"
@@ -95,6 +96,9 @@ struct psa2_io {
     double (*temp_degc)(void *ctx, unsigned channel, int64_t t_ns);     /* at X, Y, Z sensor and converter board (3) */
     void (*frame)(void *ctx, const struct psa2_frame *f, int64_t t_ns); /* INT has risen; may be NULL */
     void (*fault)(void *ctx, uint16_t code, int64_t t_ns);              /* enum psa2_fault; may be NULL */
+    /* Told when the line has moved and the board has not yet acted on it; may be NULL. Take note, or arm an event for t_ns,
+     * which comes before the board's next step: nothing of the board's may be called from inside. */
+    void (*event)(void *ctx, enum psa2_event e, int64_t t_ns);
 };
 
 struct psa2_counters {
@@ -116,8 +120,15 @@ struct psa2_unit_cfg {
 
 void psa2_init(struct psa2 *b, const struct psa2_profile *p, const struct psa2_unit_cfg *u, const struct psa2_io *io,
                struct sched *s);
-void psa2_power_up(struct psa2 *b, int64_t t_ns);     /* supplies good: chips power up, Res released, set-up begins */
-void psa2_reset(struct psa2 *b, int64_t t_ns);        /* a pulse on Res */
+void psa2_power_up(struct psa2 *b, int64_t t_ns); /* supplies good: chips power up, Res released, set-up begins */
+void psa2_reset(struct psa2 *b, int64_t t_ns);    /* a pulse on Res */
+
+/* The supply fails, in the middle of whatever goes on: all lines fall, a frame under way ends there, converters and
+ * controller forget everything but the counters. psa2_power_up() begins anew. Without power it does nothing. */
+void psa2_power_down(struct psa2 *b, int64_t t_ns);
+
+/* From now on; all false: none. Outlives resets and power. */
+void psa2_fault_set(struct psa2 *b, const struct psa2_controller_fault *f);
 bool psa2_ready(const struct psa2 *b);                /* the set-up has been carried out */
 void psa2_stream(struct psa2 *b, bool on);            /* frames on the line and to io.frame; on after power-up */
 void psa2_sample_until(struct psa2 *b, int64_t t_ns); /* the converters take their inputs up to now */

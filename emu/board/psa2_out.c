@@ -89,7 +89,8 @@ static void finish_watched(struct psa2 *b, int64_t t_ns)
     sched_cancel(b->sched, &o->word);
     if (o->watched_words < 0) return;
     while ((unsigned)o->watched_words < PSA2_WORDS && o->at.t_ns <= t_ns) report_word(b, t_ns);
-    trace_steps(&b->trace, &(struct trace_step){t_ns, out_lines, UINT32_C(1) << PSA2_LINE_INT}, 1);
+    const uint32_t idle = b->mode == PSA2_OFF ? 0 : UINT32_C(1) << PSA2_LINE_INT;
+    trace_steps(&b->trace, &(struct trace_step){t_ns, out_lines, idle}, 1);
     o->watched_words = -1;
 }
 
@@ -99,7 +100,13 @@ static void int_rise(void *ctx, int64_t t_ns)
     finish_watched(b, t_ns);
     b->out.busy = false;
     b->counters.frames++;
+    psa2_tell(b, PSA2_EV_INT_RISE, t_ns);
     if (b->io.frame) b->io.frame(b->io.ctx, &b->out.f, t_ns);
+}
+
+static void int_fall(void *ctx, int64_t t_ns)
+{
+    psa2_tell(ctx, PSA2_EV_INT_FALL, t_ns);
 }
 
 void psa2_out_init(struct psa2 *b)
@@ -114,6 +121,7 @@ void psa2_out_init(struct psa2 *b)
     o->watched_words = -1;
     sched_ev(&o->rise, int_rise, b);
     sched_ev(&o->word, word_event, b);
+    sched_ev(&o->fall, int_fall, b);
 }
 
 void psa2_out_start(struct psa2 *b, int64_t t_ns)
@@ -132,6 +140,7 @@ void psa2_out_start(struct psa2 *b, int64_t t_ns)
     pack_words(&b->profile, f);
     sched_at(b->sched, &o->rise, f->t_int_rise_ns);
     if (trace_watched(&b->trace, out_lines)) sched_at(b->sched, &o->word, f->t_int_fall_ns);
+    if (b->io.event) sched_at(b->sched, &o->fall, f->t_int_fall_ns);
     o->f = *f;
 }
 
@@ -139,5 +148,6 @@ void psa2_out_stop(struct psa2 *b, int64_t t_ns)
 {
     finish_watched(b, t_ns);
     sched_cancel(b->sched, &b->out.rise);
+    sched_cancel(b->sched, &b->out.fall);
     b->out.busy = false;
 }

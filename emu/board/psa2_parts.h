@@ -10,6 +10,17 @@
 /* psa2.c: carries out what is due on an idle serial port: the read, then a request, then the temperature scan. */
 void psa2_service(struct psa2 *b, int64_t t_ns);
 
+static inline void psa2_tell(const struct psa2 *b, enum psa2_event e, int64_t t_ns)
+{
+    if (b->io.event) b->io.event(b->io.ctx, e, t_ns);
+}
+
+/* A line that follows the controller or a converter: without power all are low. */
+static inline void psa2_line(struct psa2 *b, enum psa2_line line, bool level, int64_t t_ns)
+{
+    trace_set(&b->trace, line, level && b->mode != PSA2_OFF, t_ns);
+}
+
 /* Whether span_ns from now on end before the next DRD_A, or no period is long enough for them, or no data come. */
 bool psa2_window(const struct psa2 *b, int64_t span_ns, int64_t t_ns);
 bool psa2_flowing(const struct psa2 *b, int64_t t_ns); /* DRD_A came within the last two periods */

@@ -253,7 +253,7 @@ static void sample_temp(struct psa2 *b, int64_t t_ns)
 static void cst_up(struct psa2 *b, int64_t t_ns)
 {
     ads1256_cs_pin(&b->tadc, true, t_ns);
-    trace_set(&b->trace, PSA2_LINE_CST, true, t_ns);
+    psa2_line(b, PSA2_LINE_CST, true, t_ns);
     trace_set(&b->trace, PSA2_LINE_DOUTT, false, t_ns); /* high impedance, drawn low */
 }
 

@@ -77,7 +77,7 @@ struct psa2_out {
     bool busy;
     int watched_words; /* words reported to the trace; -1: INT fall not yet reported */
     struct psa2_frame f;
-    struct sched_ev rise, word;
+    struct sched_ev rise, word, fall; /* fall: only for io.event */
 };
 
 /* Accelerometer side: what DRD_A brought and what is being read. */
@@ -98,7 +98,8 @@ struct psa2 {
     struct psa2_unit_cfg unit;
     struct psa2_io io;
     struct sched *sched;
-    struct trace trace; /* lines numbered by enum psa2_line */
+    struct trace trace;  /* lines numbered by enum psa2_line */
+    uint32_t idle_lines; /* levels at rest */
     struct ads1282 adc[3];
     struct ads1256 tadc;
     struct afe afe[3];
@@ -107,7 +108,9 @@ struct psa2 {
     struct psa2_counters counters;
 
     enum psa2_mode mode;
+    bool dark;     /* the lines lie low since a power-down */
     unsigned step; /* of the set-up */
+    struct psa2_controller_fault wrong;
     bool stream;
     struct psa2_spi spi;
     struct psa2_xfer read; /* of the three codes */

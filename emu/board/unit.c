@@ -33,6 +33,38 @@ static void on_fault(void *ctx, uint16_t code, int64_t t_ns)
     if (u->fault) u->fault(u->ctx, code, t_ns);
 }
 
+/* A listener may end its own or another's listening: the cursor lives in the unit, where unit_unlisten() sees it. */
+static void on_event(void *ctx, enum psa2_event e, int64_t t_ns)
+{
+    struct unit *u = ctx;
+    u->told_next = u->listeners;
+    while (u->told_next) {
+        struct unit_listener *l = u->told_next;
+        u->told_next = l->next;
+        l->fn(l->ctx, e, t_ns);
+    }
+}
+
+void unit_listen(struct unit *u, struct unit_listener *l)
+{
+    struct unit_listener **at = &u->listeners;
+    while (*at) at = &(*at)->next;
+    l->next = NULL;
+    *at = l;
+    u->board.io.event = on_event;
+}
+
+void unit_unlisten(struct unit *u, struct unit_listener *l)
+{
+    struct unit_listener **at = &u->listeners;
+    while (*at && *at != l) at = &(*at)->next;
+    if (!*at) return;
+    if (u->told_next == l) u->told_next = l->next;
+    *at = l->next;
+    l->next = NULL;
+    if (!u->listeners) u->board.io.event = NULL;
+}
+
 struct unit_cfg unit_default(const char *name)
 {
     static const struct psa2_unit_cfg quiet = {.adc_noise_scale = 1.0, .temp_noise_scale = 1.0, .seed = 1, .serial = 1};
@@ -49,6 +81,7 @@ void unit_init(struct unit *u, const struct unit_cfg *cfg, struct head *head, st
     u->ctx = NULL;
     u->frame = NULL;
     u->fault = NULL;
+    u->listeners = u->told_next = NULL;
     for (unsigned i = 0; i < UNIT_AXES; i++) {
         u->sensor_faults[i] = NULL;
         const struct mems_cfg m = mems_cfg_si(&cfg->axis[i].mems, head->site.g_mps2);

@@ -30,6 +30,13 @@ struct unit_cfg {
     uint8_t node; /* CAN node id, for those above */
 };
 
+/* Who wants to hear of the board's events. Owned by the listener. */
+struct unit_listener {
+    void (*fn)(void *ctx, enum psa2_event e, int64_t t_ns); /* as psa2_io.event; it may end any listening */
+    void *ctx;
+    struct unit_listener *next;
+};
+
 struct unit {
     struct unit_cfg cfg;
     struct head *head;
@@ -40,12 +47,19 @@ struct unit {
     void *ctx;
     void (*frame)(void *ctx, const struct psa2_frame *f, int64_t t_ns);
     void (*fault)(void *ctx, uint16_t code, int64_t t_ns);
+    struct unit_listener *listeners; /* in order of coming */
+    struct unit_listener *told_next; /* cursor of the event under way */
 };
 
 /* A board of profile "article" at 25 degC with nominal chains, no sensor, no noise but the converters'. */
 struct unit_cfg unit_default(const char *name);
 
 void unit_init(struct unit *u, const struct unit_cfg *cfg, struct head *head, struct sched *s);
+
+/* From the next event on, after those who listen already; the board computes events only while somebody listens. A frame
+ * that is about to begin may begin untold. */
+void unit_listen(struct unit *u, struct unit_listener *l);
+void unit_unlisten(struct unit *u, struct unit_listener *l); /* harmless for one that does not listen */
 
 /* Projections of gravity on the axes of the sensor of a channel: truth. */
 void unit_gravity_mps2(struct unit *u, unsigned axis, int64_t t_ns, double a_mps2[3]);

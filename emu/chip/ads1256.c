@@ -124,6 +124,14 @@ void ads1256_power_up(struct ads1256 *a, int64_t t_ns)
     else sched_at(a->sched, &a->start_ev, t_ns + start_ns(a));
 }
 
+void ads1256_power_off(struct ads1256 *a, int64_t t_ns)
+{
+    sched_cancel(a->sched, &a->power_down_ev);
+    sched_cancel(a->sched, &a->start_ev);
+    a->powered_down = false;
+    ads1256_reset_chip(a, ADS1256_OFF, 0, t_ns);
+}
+
 /* Counts a pulse shorter than t16. */
 static void judge_low(struct ads1256 *a, int64_t t_ns)
 {

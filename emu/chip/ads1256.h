@@ -14,6 +14,7 @@
 #include "base/sched.h"
 #include "base/spi.h"
 #include "chip/ads1256_cfg.h"
+#include "chip/ads1256_fault.h"
 #include "chip/ads1256_filter.h"
 
 #include <stdbool.h>
@@ -93,6 +94,9 @@ void ads1256_init(struct ads1256 *a, const struct ads1256_cfg *cfg, const struct
 /* Supplies are good: after the time of cfg.start registers to default, self-calibration at default settings, then DRDY
  * falls. */
 void ads1256_power_up(struct ads1256 *a, int64_t t_ns);
+
+/* They fail: everything is forgotten but the counters. */
+void ads1256_power_off(struct ads1256 *a, int64_t t_ns);
 
 void ads1256_reset_pin(struct ads1256 *a, bool level, int64_t t_ns); /* active low */
 void ads1256_sync_pin(struct ads1256 *a, bool level, int64_t t_ns);  /* SYNC/PDWN: restart on the rising edge */

@@ -94,6 +94,12 @@ void ads1282_power_up(struct ads1282 *a, int64_t t_ns)
     power_changed(a, t_ns);
 }
 
+void ads1282_power_off(struct ads1282 *a, int64_t t_ns)
+{
+    a->powered = false;
+    power_changed(a, t_ns);
+}
+
 void ads1282_pwdn_pin(struct ads1282 *a, bool level, int64_t t_ns)
 {
     if (level == a->pin.pwdn) return;

@@ -11,6 +11,7 @@
 
 #include "base/rng.h"
 #include "base/sched.h"
+#include "chip/ads1282_fault.h"
 #include "chip/ads1282_state.h"
 #include "chip/ads1282_types.h"
 
@@ -22,6 +23,9 @@ void ads1282_init(struct ads1282 *a, const struct ads1282_cfg *cfg, const struct
 
 /* Supplies and clock are good at t_ns: registers to default, RDATAC, first settled DRDY after cfg.power_up_tclk and t_DR. */
 void ads1282_power_up(struct ads1282 *a, int64_t t_ns);
+
+/* They fail: everything is forgotten but the counters, DRDY and DOUT mean nothing. */
+void ads1282_power_off(struct ads1282 *a, int64_t t_ns);
 
 /* ---- Input pins. The same level again changes nothing. ---- */
 

@@ -48,15 +48,26 @@ static unsigned count_until(const struct trace_step *s, unsigned n, int64_t t_ns
     return from;
 }
 
+void trace_emit(const struct trace *t, const struct trace_step *s, unsigned n)
+{
+    for (const struct trace_sink *k = t->sinks; k; k = k->next) k->steps(k->ctx, s, n);
+}
+
 static void deliver_until(struct trace *t, int64_t t_ns)
 {
     struct trace_step *const due = t->pending + t->first;
     const unsigned n = count_until(due, t->pending_count, t_ns);
     t->pending_count -= n;
     t->first = t->pending_count > 0 ? t->first + n : 0;
+    if (t->filter) {
+        const uint32_t before = t->level;
+        if (n > 0) filter_due(t, due, n);
+        t->filter->steps(t->filter->ctx, before, due, n, t_ns);
+        return;
+    }
     if (n == 0) return;
     filter_due(t, due, n);
-    for (const struct trace_sink *s = t->sinks; s; s = s->next) s->steps(s->ctx, due, n);
+    trace_emit(t, due, n);
 }
 
 static void watch_again(struct trace *t)
@@ -95,7 +106,10 @@ void trace_attach(struct trace *t, struct trace_sink *s)
     s->next = NULL;
     *end = s;
     watch_again(t);
-    s->steps(s->ctx, &(struct trace_step){t->done_ns, (uint32_t)((UINT64_C(1) << t->count) - 1), t->level}, 1);
+    s->steps(s->ctx,
+             &(struct trace_step){t->done_ns, (uint32_t)((UINT64_C(1) << t->count) - 1),
+                                  t->filter ? t->filter->level : t->level},
+             1);
 }
 
 void trace_detach(struct trace *t, struct trace_sink *s)

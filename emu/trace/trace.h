@@ -40,12 +40,21 @@ struct trace_sink {
     struct trace_sink *next;
 };
 
+/* Stands between the trace and its sinks: line_fault.h. */
+struct trace_filter {
+    /* All steps up to and including until_ns, real changes from the levels `before`; hands on what trace_emit() is given. */
+    void (*steps)(void *ctx, uint32_t before, const struct trace_step *s, unsigned n, int64_t until_ns);
+    uint32_t level; /* as the sinks know them */
+    void *ctx;
+};
+
 struct trace {
     const char *name[TRACE_SIGNALS_MAX];
     unsigned count;
     uint32_t level;   /* as delivered, bit per signal */
     uint32_t watched; /* union of the sinks' masks */
     struct trace_sink *sinks;
+    struct trace_filter *filter;                  /* or NULL */
     struct trace_step pending[TRACE_PENDING_MAX]; /* in order of time, then of report, from pending[first] on */
     unsigned first, pending_count;
     uint64_t gone; /* steps delivered */
@@ -74,6 +83,9 @@ static inline bool trace_watched(const struct trace *t, uint32_t mask)
 {
     return (t->watched & mask) != 0;
 }
+
+/* For a filter: steps as they go to the sinks. */
+void trace_emit(const struct trace *t, const struct trace_step *s, unsigned n);
 
 /* Reports n steps that are in order of time: the edges of a byte, a word. */
 void trace_steps(struct trace *t, const struct trace_step *s, unsigned n);
