@@ -40,6 +40,8 @@ enum psa2_line {
     PSA2_LINES
 };
 
+const char *psa2_line_name(enum psa2_line line); /* as in the trace: "Int" */
+
 /* Bits of psa2_frame.status, and of the T word above channel and code. */
 enum psa2_status {
     PSA2_ST_SETTLED = 1, /* the converters had settled */
