@@ -312,8 +312,10 @@ def _manager() -> Any:
 def _knock(name: str, address: str) -> None:
     """Make sure that somebody listens at a socket: PyVISA-py takes a refused connection for an open one."""
     words = address.split("::")
-    if len(words) != 4 or words[3].upper() != "SOCKET" or not words[2].isdecimal():
+    if len(words) != 4 or words[3].upper() != "SOCKET":
         return
+    if not words[2].isdecimal():
+        raise ValueError(f"{words[2]!r} is no port")
     try:
         socket.create_connection((words[1], int(words[2])), CONNECT_S).close()
     except (OSError, OverflowError) as e:
