@@ -123,6 +123,29 @@ def test_a_control_socket_that_is_not_there_is_named(tmp_path: Path) -> None:
         Control(tmp_path / "no/control")
 
 
+def test_what_was_subscribed_stands_between_replies_and_waits(tmp_path: Path) -> None:
+    news = b'{"event": "DRD_A", "unit": "a", "t_ns": 1}\n'
+    with control(tmp_path, news + b'{"id": 1, "ok": true, "t_ns": 2}\n' + news[:9], news[9:]) as (port, _):
+        assert port.call("time").t_ns == 2
+        assert [e["t_ns"] for e in port.events] == [1]
+        assert port.next_event(10.0) == {"event": "DRD_A", "unit": "a", "t_ns": 1}
+        assert port.next_event(0.01) is None  # half a line has come
+        with pytest.raises(LinkError, match="closed it during time"):
+            port.call("time")  # the other half, and the end
+        assert len(port.events) == 1
+
+
+def test_the_reply_to_a_call_that_was_interrupted_is_passed_over(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with control(tmp_path, {"t_ns": 1}, {"t_ns": 2}) as (port, _):
+        with monkeypatch.context() as m:
+            m.setattr(port, "_line", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
+            with pytest.raises(KeyboardInterrupt):
+                port.call("run", for_s=1.0)
+        assert port.call("time").t_ns == 2
+
+
 # ---- clocks
 
 
@@ -164,6 +187,29 @@ def test_on_a_shared_interface_frames_of_others_do_not_hold_ours_back(tmp_path: 
         host.shared = True
         host.advance(0.001)
     assert host.received == 3
+
+
+def test_a_step_waits_for_each_bus_of_ours_and_for_nobody_elses(tmp_path: Path) -> None:
+    buses = FakeBus([frame(1), frame(2)]), FakeBus([frame(3), frame(4)])
+    replies = ({"rx": [5, 7, 9], "result": IDLE}, {"rx": [9, 8, 10]}, {"rx": [9, 9, 11, 3]})
+    with (
+        control(tmp_path, *replies) as (port, fake),
+        CanHost(buses[0], WallClock()) as a,
+        CanHost(buses[1], a.clock) as b,
+    ):
+        clock = StepClock(port, [a, b])  # the second and the third client; the first is somebody else's
+        b.send(0x605, b"")
+        clock.command(None, "run", for_s=0.1)
+        assert (a.received, b.received) == (1, 1)
+        clock.advance(a, 0.1)
+        assert (a.received, b.received) == (2, 2)
+    assert [r["args"]["after_tx"] for r in fake.requests[1:]] == [3 + 4 + 1] * 2
+
+
+def test_in_real_time_the_other_buses_are_received_from_as_well() -> None:
+    with CanHost(FakeBus(), WallClock()) as a, CanHost(FakeBus([frame(1), frame(2)]), WallClock()) as b:
+        WallClock([a, b]).advance(a, 0.02)
+        assert b.received == 2
 
 
 def test_in_real_time_a_wait_is_spent_receiving() -> None:
