@@ -82,6 +82,19 @@ double head_angle_rad(const struct head *h, int64_t t_ns)
     return mount_angle_rad(h, t_ns) + (t_ns < h->face_ns ? h->mount_before_rad : h->mount_rad);
 }
 
+struct motion_state head_motion(const struct head *h, int64_t t_ns)
+{
+    struct motion_state s = {.angle_rad = head_angle_rad(h, t_ns)};
+    if (t_ns < h->end_ns && t_ns >= h->start_ns) {
+        const double turn_s = (double)(h->end_ns - h->start_ns) / (double)NS_PER_S;
+        const double way_rad = h->to_rad - h->from_rad;
+        const double x = (double)(t_ns - h->start_ns) / (double)(h->end_ns - h->start_ns);
+        s.rate_radps = way_rad * 6.0 * x * (1.0 - x) / turn_s;
+        s.accel_radps2 = way_rad * (6.0 - 12.0 * x) / (turn_s * turn_s);
+    }
+    return s;
+}
+
 /* The scale carries its own periodic error: it shows what the operator set, off by the setting error. */
 double head_read_deg(const struct head *h, int64_t t_ns)
 {
@@ -116,11 +129,12 @@ struct face_axis {
 static const struct {
     const char *name;
     struct face_axis y, z;
+    double quarters; /* the rotation */
 } faces[HEAD_FACES] = {
-    [HEAD_DIRECT] = {"direct", {1, 1.0}, {2, 1.0}},
-    [HEAD_REVERSED] = {"reversed", {1, -1.0}, {2, -1.0}},
-    [HEAD_SIDE] = {"side", {2, -1.0}, {1, 1.0}},
-    [HEAD_SIDE_REVERSED] = {"side_reversed", {2, 1.0}, {1, -1.0}},
+    [HEAD_DIRECT] = {"direct", {1, 1.0}, {2, 1.0}, 0.0},
+    [HEAD_REVERSED] = {"reversed", {1, -1.0}, {2, -1.0}, 2.0},
+    [HEAD_SIDE] = {"side", {2, -1.0}, {1, 1.0}, -1.0},
+    [HEAD_SIDE_REVERSED] = {"side_reversed", {2, 1.0}, {1, -1.0}, 1.0},
 };
 
 void head_sensor_mps2(enum head_face face, double cos_alpha0, double sin_alpha0, const double a_m_mps2[3],
@@ -132,6 +146,11 @@ void head_sensor_mps2(enum head_face face, double cos_alpha0, double sin_alpha0,
     a_s_mps2[0] = tilted[0];
     a_s_mps2[1] = faces[face].y.sense * tilted[faces[face].y.along];
     a_s_mps2[2] = faces[face].z.sense * tilted[faces[face].z.along];
+}
+
+double head_face_rad(enum head_face face)
+{
+    return faces[face].quarters * HEAD_QUARTER_RAD;
 }
 
 const char *head_face_name(enum head_face face)

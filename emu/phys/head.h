@@ -9,13 +9,13 @@
 #define PSABENCH_PHYS_HEAD_H
 
 #include "base/rng.h"
+#include "phys/earth.h"
+#include "phys/motion.h"
 
 #include <stdbool.h>
 #include <stdint.h>
 
-struct site {
-    double g_mps2; /* local gravity */
-};
+#define HEAD_QUARTER_RAD 1.5707963267948966
 
 enum head_face {
     HEAD_DIRECT,        /* sensor axes = mount axes */
@@ -64,6 +64,9 @@ int64_t head_rest_ns(const struct head *h); /* when the present turn ends or the
 /* True angle of the mount, the unit's tilt of mounting included: the bench's truth. */
 double head_angle_rad(const struct head *h, int64_t t_ns);
 
+/* The same with rate and acceleration. */
+struct motion_state head_motion(const struct head *h, int64_t t_ns);
+
 /* What the operator reads off the scale, degrees, at the resolution of the scale. */
 double head_read_deg(const struct head *h, int64_t t_ns);
 
@@ -73,6 +76,9 @@ void head_gravity_mps2(struct head *h, int64_t t_ns, double a_m_mps2[3]);
 /* Projections on the axes of a sensor that was set with error alpha0 (given by cosine and sine) and mounted with the face. */
 void head_sensor_mps2(enum head_face face, double cos_alpha0, double sin_alpha0, const double a_m_mps2[3],
                       double a_s_mps2[3]);
+
+/* Angle about Ox by which a face turns the unit: 0, 180, -90 and +90 deg. */
+double head_face_rad(enum head_face face);
 
 /* "direct", "reversed", "side", "side_reversed"; NULL and -1 for none. */
 const char *head_face_name(enum head_face face);

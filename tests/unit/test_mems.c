@@ -101,7 +101,7 @@ static void reading_noise_is_what_the_wire_shows(void **state)
     static struct head h;
     struct sched s;
     sched_init(&s);
-    head_init(&h, &(struct head_cfg){0}, &(struct site){G}, rng_stream(1, 0, "head"));
+    head_init(&h, &(struct head_cfg){0}, &(struct site){.g_mps2 = G}, rng_stream(1, 0, "head"));
     struct unit_cfg cfg = unit_default("u");
     cfg.board.adc_noise_scale = 0.0;
     cfg.axis[0] = (struct unit_axis_cfg){UNIT_MEMS, {.reading_noise_v = 1e-3}};

@@ -1,0 +1,72 @@
+/* Thermal chamber, and the bodies in it.
+ *
+ * The air goes to its set point at a constant ramp and stays there. A body follows it through two lags: its case follows the
+ * air, its sensing element follows the case,
+ *
+ *   tau_case case' = air - case,   tau_element element' = case - element,
+ *
+ * both in closed form over the straight pieces of the air's course: temperatures are functions of the instant, whoever asks
+ * how often. A command touches every body, which is why bodies are put in. Plain structs, one thread; commands in order of
+ * time; an instant before the latest command gets what held at the command. */
+#ifndef PSABENCH_PHYS_CHAMBER_H
+#define PSABENCH_PHYS_CHAMBER_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+struct chamber_cfg {
+    bool present;
+    double start_degc; /* of air and bodies: set point at power-on */
+    double min_degc, max_degc;
+    double heating_max_k_per_min, cooling_max_k_per_min;
+    double ramp_k_per_min;                         /* at power-on; the air takes the lesser of ramp and limit */
+    double tau_case_s, tau_element_s;              /* of bodies that do not give their own; 0: no lag */
+    double readout_offset_k, readout_resolution_k; /* of the chamber's thermometer in the air; 0: none */
+};
+
+enum chamber_result { CHAMBER_OK, CHAMBER_OUT_OF_RANGE };
+
+/* Something in the chamber; embedded in its owner, not to be moved after chamber_put_in(). */
+struct chamber_body {
+    double tau_case_s, tau_element_s;
+    double case_degc, element_degc;         /* at the chamber's latest command */
+    double case_end_degc, element_end_degc; /* at the end of its ramp */
+    struct chamber_body *next;
+};
+
+struct chamber {
+    struct chamber_cfg cfg;
+    double ramp_k_per_min;
+    double set_degc;
+    int64_t from_ns;   /* of the latest command */
+    double from_degc;  /* of the air, then */
+    double slope_kps;  /* of the air, until it is at the set point */
+    double duration_s; /* of the ramp */
+    struct chamber_body *bodies;
+};
+
+/* The chamber of the quartz article: -60..+85 degC (docs/instruments.md); not present. */
+struct chamber_cfg chamber_default(void);
+
+void chamber_init(struct chamber *c, const struct chamber_cfg *cfg);
+
+/* In equilibrium with the air at power-on; before the first command. Lags not above 0: the chamber's own. */
+void chamber_put_in(struct chamber *c, struct chamber_body *b, double tau_case_s, double tau_element_s);
+
+/* New set point, reached with the present ramp. */
+enum chamber_result chamber_set(struct chamber *c, double degc, int64_t t_ns);
+
+/* New ramp, above 0 and up to the greater of the two limits; one that is under way goes on with it. */
+enum chamber_result chamber_ramp(struct chamber *c, double k_per_min, int64_t t_ns);
+
+double chamber_ramp_max_k_per_min(const struct chamber *c);
+
+double chamber_air_degc(const struct chamber *c, int64_t t_ns);   /* truth */
+double chamber_shown_degc(const struct chamber *c, int64_t t_ns); /* by its thermometer */
+bool chamber_stable(const struct chamber *c, int64_t t_ns);       /* the air is at the set point */
+int64_t chamber_stable_ns(const struct chamber *c);               /* since or from when */
+
+double chamber_case_degc(const struct chamber *c, const struct chamber_body *b, int64_t t_ns);
+double chamber_element_degc(const struct chamber *c, const struct chamber_body *b, int64_t t_ns);
+
+#endif

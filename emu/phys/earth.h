@@ -1,0 +1,29 @@
+/* The Earth under the bench: normal gravity and the Earth's rate, WGS 84 (sources 5.1).
+ *
+ * Frames: n is north-east-down at the site; l is the bench's level frame: x towards azimuth_rad, z down, y to the right of x.
+ * Pure functions. */
+#ifndef PSABENCH_PHYS_EARTH_H
+#define PSABENCH_PHYS_EARTH_H
+
+#include <stdbool.h>
+
+#define EARTH_RATE_RADPS 7.292115e-5 /* 15.041067 deg/h */
+
+struct site {
+    double g_mps2; /* local gravity, along the plumb line: the Earth's own centrifugal part is in it */
+    double latitude_rad, longitude_rad, height_m;
+    double azimuth_rad; /* of the bench's x axis from north, clockwise seen from above */
+    bool placed;        /* the place is given: the Earth turns. Else it stands still and g_mps2 is all there is */
+};
+
+/* Gravity of the level ellipsoid at a geodetic latitude and a height above it: Somigliana's formula, and the series in h to
+ * second order, which is within 1e-8 of the closed form up to 3 km and within 1e-7 up to 8 km. */
+double earth_gravity_mps2(double latitude_rad, double height_m);
+
+/* A placed site with its normal gravity. */
+struct site earth_site(double latitude_rad, double longitude_rad, double height_m, double azimuth_rad);
+
+/* Rate of the Earth relative to inertial space, in n: zero for a site that is not placed. */
+void earth_rate_n(const struct site *s, double w_ie_n_radps[3]);
+
+#endif

@@ -1,0 +1,111 @@
+#include "phys/lab.h"
+
+#include <string.h>
+
+struct lab_cfg lab_default(void)
+{
+    return (struct lab_cfg){
+        .site = {.g_mps2 = 9.81},
+        .table = table_default(0),
+        .chamber = chamber_default(),
+        .supply = supply_default(),
+    };
+}
+
+void lab_init(struct lab *l, const struct lab_cfg *cfg, uint64_t seed)
+{
+    *l = (struct lab){.site = cfg->site};
+    head_init(&l->head, &cfg->head, &cfg->site, rng_stream(seed, 0, "head"));
+    table_init(&l->table, &cfg->table, &cfg->site, seed);
+    chamber_init(&l->chamber, &cfg->chamber);
+    supply_init(&l->supply, &cfg->supply);
+    pose_start(&l->bench, &cfg->site);
+}
+
+static bool is_zero(const double v[3])
+{
+    return v[0] == 0.0 && v[1] == 0.0 && v[2] == 0.0;
+}
+
+/* How the case stands in the mount: the face of the head, then the misalignment. */
+static struct pose case_in_mount(const struct lab *l, const struct lab_seat *seat, int64_t t_ns)
+{
+    struct pose p;
+    pose_start(&p, &(struct site){0});
+    if (seat->on == LAB_HEAD) pose_turn(&p, POSE_X, head_face_rad(head_face(&l->head, t_ns)), 0.0, 0.0);
+    pose_tilt(&p, seat->misalignment_rad);
+    return p;
+}
+
+static void head_pose(const struct lab *l, int64_t t_ns, struct pose *p)
+{
+    const struct motion_state s = head_motion(&l->head, t_ns);
+    *p = l->bench;
+    pose_turn(p, POSE_X, -HEAD_QUARTER_RAD, 0.0, 0.0); /* x ahead, y up, z to the right: gravity of head.h at angle 0 */
+    pose_turn(p, POSE_Z, s.angle_rad, s.rate_radps, s.accel_radps2);
+}
+
+/* In the mount's axes, at r_m from the instrument's centre. */
+static void mount_feels(struct lab *l, enum lab_mount on, const double r_m[3], int64_t t_ns, struct felt *out)
+{
+    struct pose turned;
+    const struct pose *p = &l->bench;
+    if (on == LAB_TABLE) p = table_pose(&l->table, t_ns);
+    if (on == LAB_HEAD) {
+        head_pose(l, t_ns, &turned);
+        p = &turned;
+    }
+    pose_force_mps2(p, l->site.g_mps2, r_m, out->f_mps2);
+    memcpy(out->w_radps, p->w_ib_b_radps, sizeof out->w_radps);
+}
+
+void lab_feel(struct lab *l, const struct lab_seat *seat, const double at_m[3], int64_t t_ns, struct felt *out)
+{
+    const struct pose in_mount = case_in_mount(l, seat, t_ns);
+    double r_m[3];
+    pose_out_of(&in_mount, at_m, r_m);
+    for (unsigned k = 0; k < 3; k++) r_m[k] += seat->lever_m[k];
+    mount_feels(l, seat->on, r_m, t_ns, out);
+    pose_into(&in_mount, out->f_mps2, out->f_mps2);
+    pose_into(&in_mount, out->w_radps, out->w_radps);
+}
+
+void lab_sensor_mps2(struct lab *l, const struct lab_seat *seat, const double at_m[3], double cos_alpha0,
+                     double sin_alpha0, int64_t t_ns, double a_mps2[3])
+{
+    double mount[3];
+    const bool on_head = seat->on == LAB_HEAD;
+    const bool square = is_zero(seat->misalignment_rad);
+    if (on_head && square && is_zero(at_m) && is_zero(seat->lever_m)) {
+        head_gravity_mps2(&l->head, t_ns, mount);
+    } else {
+        const struct pose in_mount = case_in_mount(l, seat, t_ns);
+        struct felt felt;
+        double r_m[3];
+        pose_out_of(&in_mount, at_m, r_m);
+        for (unsigned k = 0; k < 3; k++) r_m[k] += seat->lever_m[k];
+        mount_feels(l, seat->on, r_m, t_ns, &felt);
+        for (unsigned k = 0; k < 3; k++) mount[k] = -felt.f_mps2[k];
+    }
+    head_sensor_mps2(on_head ? head_face(&l->head, t_ns) : HEAD_DIRECT, cos_alpha0, sin_alpha0, mount, a_mps2);
+    if (square) return;
+    struct pose askew;
+    pose_start(&askew, &(struct site){0});
+    pose_tilt(&askew, seat->misalignment_rad);
+    pose_into(&askew, a_mps2, a_mps2);
+}
+
+static const char *const mounts[] = {[LAB_HEAD] = "head", [LAB_TABLE] = "table", [LAB_FIXED] = "fixed"};
+
+const char *lab_mount_name(enum lab_mount on)
+{
+    return (unsigned)on < sizeof mounts / sizeof *mounts ? mounts[on] : NULL;
+}
+
+int lab_mount_by_name(const char *name)
+{
+    for (unsigned i = 0; i < sizeof mounts / sizeof *mounts; i++) {
+        if (strcmp(mounts[i], name) == 0) return (int)i;
+    }
+    return -1;
+}
