@@ -141,13 +141,15 @@ static uint8_t xfer_pins(struct w1282 *w, uint8_t mosi, int64_t half_ns)
     return miso;
 }
 
-/* Whether the moment is one at which bytes and pins are the same; waits for it for a while. */
+/* Whether the moment is one at which bytes and pins are the same; waits for it for a while. Late reads are counted by
+ * SCLK falls, of which a byte shows the first alone: no byte in the last 4 tCLK before an update. */
 static bool moment(struct w1282 *w, int64_t half_ns)
 {
     for (unsigned i = 0; i < POSTPONED_MAX; i++) {
         const int64_t since_ns = w->s.now_ns - w->a.rise_ns, next_ns = sched_next_ns(&w->s);
+        const int64_t end_ns = w->s.now_ns + 16 * half_ns;
         if (since_ns < w->a.gap_ns && since_ns + 2 * half_ns >= w->a.gap_ns) wait_ns(w, 2 * half_ns);
-        else if (next_ns <= w->s.now_ns + 16 * half_ns) sched_run_until(&w->s, next_ns);
+        else if (next_ns <= end_ns || w->a.update_ns <= end_ns) sched_run_until(&w->s, next_ns);
         else return true;
     }
     return false;
