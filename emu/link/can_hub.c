@@ -108,13 +108,17 @@ struct can_client *can_hub_ghost(struct can_hub *h, uint32_t number, const char 
     return g;
 }
 
+void can_hub_dismiss(struct can_hub *h, struct can_client *ghost)
+{
+    can_hub_down(h, ghost);
+    free(ghost);
+}
+
 void can_hub_sweep(struct can_hub *h, bool all)
 {
     for (struct can_client *c = h->clients, *next; c; c = next) {
         next = c->next;
-        if (c->adapter != ghostly || (c->node.queued > 0 && !all)) continue;
-        can_hub_down(h, c);
-        free(c);
+        if (c->adapter == ghostly && (c->node.queued == 0 || all)) can_hub_dismiss(h, c);
     }
 }
 

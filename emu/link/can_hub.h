@@ -64,6 +64,9 @@ bool can_hub_haunt(struct can_hub *h, struct can_client *c);
 /* A ghost from the start: a client of a run that is done again. NULL when there is no memory. */
 struct can_client *can_hub_ghost(struct can_hub *h, uint32_t number, const char *name, bool fd);
 
+/* A ghost leaves at once, with what it has queued; it is freed. */
+void can_hub_dismiss(struct can_hub *h, struct can_client *ghost);
+
 /* Ghosts with nothing left to send leave; all: every ghost, with what it has queued. */
 void can_hub_sweep(struct can_hub *h, bool all);
 
