@@ -213,7 +213,7 @@ void control_arg_limits(const struct control_bench *b, const struct control_arg 
 {
     *min = a->min;
     *max = a->max;
-    if (a->limits && b->head) a->limits(b, v, min, max);
+    if (a->limits && b->lab) a->limits(b, v, min, max);
 }
 
 /* What only this bench's instruments can tell; the arguments before this one are good. */

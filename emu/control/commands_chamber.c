@@ -1,0 +1,91 @@
+/* Commands of the thermal chamber. */
+#include "control/commands.h"
+
+static bool has_chamber(const struct control_bench *b)
+{
+    return b->lab && b->lab->chamber.cfg.present;
+}
+
+static void temp_limits(const struct control_bench *b, const struct control_value *v, double *min, double *max)
+{
+    (void)v;
+    if (!has_chamber(b)) return;
+    *min = b->lab->chamber.cfg.min_degc;
+    *max = b->lab->chamber.cfg.max_degc;
+}
+
+static void ramp_limits(const struct control_bench *b, const struct control_value *v, double *min, double *max)
+{
+    (void)v;
+    (void)min;
+    if (has_chamber(b)) *max = chamber_ramp_max_k_per_min(&b->lab->chamber);
+}
+
+static enum control_outcome answer(struct control *c, cJSON *result, int64_t t_ns)
+{
+    const struct chamber *k = &c->bench->lab->chamber;
+    const bool stable = chamber_stable(k, t_ns);
+    cJSON_AddNumberToObject(result, "temp_degc", chamber_shown_degc(k, t_ns));
+    cJSON_AddNumberToObject(result, "set_degc", k->set_degc);
+    cJSON_AddNumberToObject(result, "ramp_k_per_min", k->ramp_k_per_min);
+    cJSON_AddBoolToObject(result, "stable", stable);
+    cJSON_AddNumberToObject(result, "stable_in_s", stable ? 0.0 : (double)(chamber_stable_ns(k) - t_ns) * 1e-9);
+    return CONTROL_DONE;
+}
+
+static enum control_outcome no_chamber(struct control *c)
+{
+    return control_refuse(c, "state", "there is no thermal chamber in this scenario");
+}
+
+static enum control_outcome do_set(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+{
+    if (!has_chamber(c->bench)) return no_chamber(c);
+    control_settle_inputs(c->bench, t_ns);
+    if (chamber_set(&c->bench->lab->chamber, v[0].real, t_ns) == CHAMBER_OK) return answer(c, result, t_ns);
+    return control_refuse(c, "range", "temp_degc: %.10g is not what the chamber can", v[0].real);
+}
+
+static enum control_outcome do_ramp(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+{
+    if (!has_chamber(c->bench)) return no_chamber(c);
+    control_settle_inputs(c->bench, t_ns);
+    if (chamber_ramp(&c->bench->lab->chamber, v[0].real, t_ns) == CHAMBER_OK) return answer(c, result, t_ns);
+    return control_refuse(c, "range", "ramp_k_per_min: %.10g is not what the chamber can: above 0, up to %.10g K/min",
+                          v[0].real, chamber_ramp_max_k_per_min(&c->bench->lab->chamber));
+}
+
+static enum control_outcome do_read(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+{
+    (void)v;
+    return has_chamber(c->bench) ? answer(c, result, t_ns) : no_chamber(c);
+}
+
+/* The chamber limits its ramp by itself; to be told the greater limit is to be free of it. */
+static enum control_outcome do_reset(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+{
+    (void)v;
+    if (!has_chamber(c->bench)) return no_chamber(c);
+    struct chamber *k = &c->bench->lab->chamber;
+    const double most = chamber_ramp_max_k_per_min(k), ramp = k->cfg.ramp_k_per_min;
+    control_settle_inputs(c->bench, t_ns);
+    chamber_ramp(k, ramp > 0 && ramp < most ? ramp : most, t_ns);
+    chamber_set(k, k->cfg.start_degc, t_ns);
+    return answer(c, result, t_ns);
+}
+
+// clang-format off
+static const struct control_command rows[] = {
+    {"chamber.set", "Gives the air of the chamber a new set point, to be reached with the present ramp.",
+     {{"temp_degc", CONTROL_REAL, false, "degC", -200, 300, .what = "set point", .def = 25, .limits = temp_limits}},
+     .run = do_set, .changes = true, .scpi = {{"TEMPerature", NULL}}},
+    {"chamber.ramp", "Limits how fast the air changes.",
+     {{"ramp_k_per_min", CONTROL_REAL, false, "K/min", 1e-6, 1000, .what = "ramp, both ways", .def = 1, .limits = ramp_limits}},
+     .run = do_ramp, .changes = true, .scpi = {{"RAMP", NULL}}},
+    {"chamber.read", "Reads the chamber: air by its thermometer, set point, ramp, whether the air is there and in how many seconds.", {{0}},
+     .run = do_read, .scpi = {{"TEMPerature?", "temp_degc"}, {"TEMPerature:SETPoint?", "set_degc"}, {"RAMP?", "ramp_k_per_min"},
+                              {"STABle?", "stable"}}},
+    {"chamber.reset", "Back to set point and ramp of power-on.", {{0}}, .run = do_reset, .changes = true, .scpi = {{"*RST", NULL}}},
+};
+// clang-format on
+const struct control_table commands_chamber = {rows, sizeof rows / sizeof *rows};

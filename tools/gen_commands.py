@@ -1,0 +1,61 @@
+#!/usr/bin/env python3
+"""The tables of commands in docs/emulator.md and of SCPI headers in docs/scpi.md, as the emulator prints them.
+
+Usage:
+    gen_commands.py           write what stands between the marks NAME:begin and NAME:end of the pages
+    gen_commands.py --check   exit 1 and name the pages that are out of date
+
+Needs build/psa-emu, or the one that $PSA_EMU names.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+# page -> option that prints its tables -> their marks in the order of printing
+PAGES = {
+    "emulator.md": ("--list-commands", ("commands", "truth")),
+    "scpi.md": ("--list-scpi", ("common", "head", "table", "chamber", "supply")),
+}
+
+
+def tables(option: str) -> list[str]:
+    """What the emulator prints, split at its empty lines."""
+    emulator = os.environ.get("PSA_EMU", str(ROOT / "build/psa-emu"))
+    out = subprocess.run([emulator, option], capture_output=True, text=True, check=True).stdout
+    return out.strip().split("\n\n")
+
+
+def spliced(text: str, mark: str, table: str) -> str:
+    """The page with the table between its marks."""
+    between = re.compile(rf"(<!-- {mark}:begin -->\n).*?(<!-- {mark}:end -->)", re.DOTALL)
+    new, count = between.subn(lambda m: f"{m[1]}{table}\n{m[2]}", text)
+    if count != 1:
+        raise SystemExit(f"gen_commands: {mark}:begin ... {mark}:end stands {count} times in the page; once is wanted")
+    return new
+
+
+def main(check: bool) -> int:
+    stale = []
+    for name, (option, marks) in PAGES.items():
+        page = ROOT / "docs" / name
+        was = text = page.read_text(encoding="utf-8")
+        for mark, table in zip(marks, tables(option), strict=True):
+            text = spliced(text, mark, table)
+        if text == was:
+            continue
+        stale.append(f"docs/{name}")
+        if not check:
+            page.write_text(text, encoding="utf-8")
+    if check and stale:
+        print(f"gen_commands: out of date (make docs): {', '.join(stale)}")
+    return int(check and bool(stale))
+
+
+if __name__ == "__main__":
+    sys.exit(main("--check" in sys.argv[1:]))
