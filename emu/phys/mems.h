@@ -4,13 +4,18 @@
  *
  * a = projection of gravity on the sensor's axes (an axis pointing down has a = +g, sources instruments 2.1), m/s^2. The last
  * three terms are ours. n is white noise of a one-sided density: each pull draws one value for the interval since the pull
- * before it, so that what the converter's filter passes does not depend on how often it looks. Plain struct, one thread. */
+ * before it, so that what the converter's filter passes does not depend on how often it looks. Zero and scale follow the
+ * temperature of the element, slow noise is added (noise.h), and the output stays within its limits and is a multiple of its
+ * quantum: each only where its parameters are not zero. Plain struct, one thread. */
 #ifndef PSABENCH_PHYS_MEMS_H
 #define PSABENCH_PHYS_MEMS_H
 
 #include "base/rng.h"
+#include "phys/noise.h"
 
 #include <stdint.h>
+
+#define MEMS_REFERENCE_DEGC 25.0 /* at which u0 and k are given */
 
 /* As a data sheet, a scenario and the article give it: per g. The unit's truth. */
 struct mems_g {
@@ -21,6 +26,10 @@ struct mems_g {
     double drift_v_per_s;   /* linear, from t = 0 of the bench */
     double noise_v_rthz;    /* one-sided white density; 0: take reading_noise_v */
     double reading_noise_v; /* wanted rms of one settled reading at 1000 SPS, minimum phase: mems_density_v_rthz() */
+    double u0_tc_v_per_k;   /* of the zero, from the reference temperature */
+    double k_tc_ppm_per_k;  /* of all k */
+    double bias_instability_v, walk_v_rts, quantum_v; /* noise.h */
+    double low_v, high_v;                             /* limits of the output; both 0: none */
 };
 
 /* The same in SI. */
@@ -31,10 +40,15 @@ struct mems_cfg {
     double alpha0_rad;
     double drift_v_per_s;
     double noise_v_rthz;
+    double u0_tc_v_per_k, k_tc_per_k;
+    struct noise_cfg slow;
+    double low_v, high_v;
 };
 
 struct mems {
     struct mems_cfg cfg;
+    double temp_degc; /* of the element: its owner keeps it up; the reference temperature from mems_init() on */
+    struct noise slow;
     struct rng noise;
     double held_v; /* noise of the present pull: a second look at the same instant sees the same */
     int64_t t_ns;  /* of the last pull; -1 before the first */
@@ -53,8 +67,11 @@ double mems_density_v_rthz(double reading_noise_v, double data_hz);
 
 void mems_init(struct mems *m, const struct mems_cfg *cfg, struct rng noise);
 
-/* Model without noise, pure: volts at acceleration a_mps2 and time t_ns. */
+/* Model at the reference temperature, without noise and limits, pure: volts at acceleration a_mps2 and time t_ns. */
 double mems_model_v(const struct mems_cfg *cfg, const double a_mps2[3], int64_t t_ns);
+
+/* The same at the temperature of the element, within the limits of the output: what it would give without noise. */
+double mems_true_v(const struct mems *m, const double a_mps2[3], int64_t t_ns);
 
 /* Output voltage; t_ns never earlier than the last call. */
 double mems_out_v(struct mems *m, const double a_mps2[3], int64_t t_ns);
