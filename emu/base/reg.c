@@ -43,3 +43,13 @@ void reg_poke(struct reg_file *f, unsigned addr, uint8_t v)
     assert(!is_hole(f, addr));
     f->value[addr] = v;
 }
+
+bool reg_flip(struct reg_file *f, unsigned addr, uint8_t mask, int64_t t_ns)
+{
+    if (is_hole(f, addr)) return false;
+    const struct reg_spec *r = &f->map[addr];
+    const uint8_t was = f->value[addr];
+    f->value[addr] = was ^ mask;
+    if (r->on_write) r->on_write(f->chip, was, f->value[addr], t_ns);
+    return true;
+}

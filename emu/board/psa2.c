@@ -32,8 +32,8 @@ static void pulse_event(void *ctx, int64_t t_ns)
     struct psa2_pulse *p = &b->pulse;
     const bool temp = p->group == PSA2_TEMP;
     p->active = !p->active;
-    pulse_edge(b, p->active != temp, t_ns);
-    if (p->active != temp) psa2_tell(b, temp ? PSA2_EV_SYNC_T : PSA2_EV_SYNC_A, t_ns);
+    if (!p->skipped) pulse_edge(b, p->active != temp, t_ns);
+    if (!p->skipped && p->active != temp) psa2_tell(b, temp ? PSA2_EV_SYNC_T : PSA2_EV_SYNC_A, t_ns);
     if (p->active) {
         sched_at(b->sched, &p->ev, t_ns + (temp ? psa2_tau_ns(b, SYNC_T_TAU) : psa2_tclk_ns(b, SYNC_A_TCLK)));
         return;
@@ -50,6 +50,7 @@ void psa2_pulse(struct psa2 *b, enum psa2_group group, void (*done)(struct psa2 
     const int64_t k = clk_count_at(&half, t_ns + 1);
     b->pulse.busy = true;
     b->pulse.active = false;
+    b->pulse.skipped = group == PSA2_TEMP && b->wrong.skip_sync_t;
     b->pulse.group = group;
     b->pulse.done = done;
     sched_at(b->sched, &b->pulse.ev, clk_edge_ns(&half, k | 1));
@@ -95,6 +96,19 @@ static void setup_gain(struct psa2 *b, int64_t t_ns)
     psa2_spi_start(b, &x, t_ns);
 }
 
+/* The step that is due; the wrong way: the last of its event's in place of the first. */
+static const struct psa2_setup_step *setup_step(const struct psa2 *b)
+{
+    const struct psa2_setup_step *const all = b->profile.setup, *due = &all[b->step];
+    if (!b->reversed) return due;
+    int before = 0;
+    for (unsigned i = 0; i < b->step; i++) before += all[i].on == due->on;
+    const struct psa2_setup_step *s = all + b->profile.setup_count;
+    do before -= (--s)->on == due->on;
+    while (before >= 0);
+    return s;
+}
+
 /* DRD_A is awaited all the time, anew after each step: a new CONFIG0 means another settling time. */
 static void await_step(struct psa2 *b, int64_t t_ns)
 {
@@ -115,7 +129,7 @@ static void setup_done(struct psa2 *b, int64_t t_ns)
 static void setup_event(struct psa2 *b, enum psa2_setup_event on, int64_t t_ns)
 {
     if (b->step >= b->profile.setup_count || !port_free(b)) return;
-    const struct psa2_setup_step *s = &b->profile.setup[b->step];
+    const struct psa2_setup_step *s = setup_step(b);
     if (s->on != on) return;
     if (on == PSA2_ON_DRD_T) psa2_temp_heard(b);
     if (s->action == PSA2_SYNC_A || s->action == PSA2_SYNC_T) {
@@ -140,11 +154,8 @@ static uint8_t status_of(struct psa2 *b, const struct psa2_frame *f)
     return status;
 }
 
-static void read_done(struct psa2 *b, int64_t t_ns)
+static void take_codes(struct psa2 *b, struct psa2_frame *f)
 {
-    struct psa2_frame *f = &b->latest; /* in place: copies of what has just been written are slow */
-    f->seq = b->sample.seq;
-    f->t_sample_ns = b->sample.t_ns;
     for (unsigned i = 0; i < 3; i++) {
         const uint8_t *rx = b->spi.rx[i]; /* 0 beyond what was read */
         f->raw[i] = (uint32_t)rx[0] << 24 | (uint32_t)rx[1] << 16 | (uint32_t)rx[2] << 8 | rx[3];
@@ -152,6 +163,14 @@ static void read_done(struct psa2 *b, int64_t t_ns)
     }
     f->temp_code = b->temp.code;
     f->temp_channel = b->temp.code_channel;
+}
+
+static void read_done(struct psa2 *b, int64_t t_ns)
+{
+    struct psa2_frame *f = &b->latest; /* in place: copies of what has just been written are slow */
+    f->seq = b->sample.seq;
+    f->t_sample_ns = b->sample.t_ns;
+    if (!b->wrong.frozen_words) take_codes(b, f);
     f->status = status_of(b, f);
     for (unsigned i = 0; i < PSA2_WORDS; i++) f->word[i] = 0; /* until it is sent */
     b->sample.reading = b->sample.overrun = b->temp.fresh = false;
@@ -313,6 +332,7 @@ const char *psa2_line_name(enum psa2_line line)
 static void init_trace(struct psa2 *b)
 {
     trace_init(&b->trace);
+    line_faults_init(&b->line, &b->trace);
     for (unsigned i = 0; i < PSA2_LINES; i++) (void)trace_add(&b->trace, lines[i].name, lines[i].level);
     b->idle_lines = b->trace.level;
 }
@@ -351,6 +371,7 @@ static void res_up(void *ctx, int64_t t_ns)
 {
     struct psa2 *b = ctx;
     b->mode = PSA2_SETUP;
+    b->reversed = b->wrong.wrong_setup_order;
     res_pin(b, true, t_ns);
     await_step(b, t_ns);
 }

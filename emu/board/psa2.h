@@ -14,6 +14,7 @@
 #include "board/psa2_profile.h"
 #include "chip/ads1256.h"
 #include "chip/ads1282.h"
+#include "trace/line_fault.h"
 #include "trace/trace.h"
 
 #include <stdbool.h>

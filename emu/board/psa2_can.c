@@ -141,6 +141,12 @@ void psa2_can_power_up(struct psa2_can *c, int64_t t_ns)
 void psa2_can_power_down(struct psa2_can *c)
 {
     co_node_power_down(&c->node);
+    psa2_can_defaults(c);
+    c->refusal[0] = c->remark[0] = '\0';
+    c->latest = (struct psa2_frame){0};
+    c->checked_period_ns = 0;
+    c->fits = true;
+    c->drop_ns = -PSA2_CAN_CALM_NS;
 }
 
 /* ---- a real board ---- */

@@ -89,7 +89,7 @@ void psa2_can_init(struct psa2_can *c, const struct psa2_can_cfg *cfg, const str
 
 /* Attaches to the bus and boots; the board is powered up by its owner. */
 void psa2_can_power_up(struct psa2_can *c, int64_t t_ns);
-void psa2_can_power_down(struct psa2_can *c);
+void psa2_can_power_down(struct psa2_can *c); /* leaves the bus and forgets everything but the counters */
 
 /* Callbacks of the board: ctx is the struct psa2_can. */
 void psa2_can_frame(void *ctx, const struct psa2_frame *f, int64_t t_ns);

@@ -48,6 +48,7 @@ enum psa2_mode { PSA2_OFF, PSA2_IN_RESET, PSA2_SETUP, PSA2_RUN };
 /* A pulse on SYNC_A (up and down) or SYNC_T (down and up). */
 struct psa2_pulse {
     bool busy, active; /* active: the pin is away from its idle level */
+    bool skipped;      /* a fault: the pin does not move */
     enum psa2_group group;
     void (*done)(struct psa2 *b, int64_t t_ns);
     struct sched_ev ev;
@@ -98,8 +99,9 @@ struct psa2 {
     struct psa2_unit_cfg unit;
     struct psa2_io io;
     struct sched *sched;
-    struct trace trace;  /* lines numbered by enum psa2_line */
-    uint32_t idle_lines; /* levels at rest */
+    struct trace trace;      /* lines numbered by enum psa2_line */
+    struct line_faults line; /* line_fault_add(&b->line, ...): by whoever injects them */
+    uint32_t idle_lines;     /* levels at rest */
     struct ads1282 adc[3];
     struct ads1256 tadc;
     struct afe afe[3];
@@ -111,6 +113,7 @@ struct psa2 {
     bool dark;     /* the lines lie low since a power-down */
     unsigned step; /* of the set-up */
     struct psa2_controller_fault wrong;
+    bool reversed; /* the present set-up goes the wrong way */
     bool stream;
     struct psa2_spi spi;
     struct psa2_xfer read; /* of the three codes */

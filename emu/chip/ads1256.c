@@ -165,6 +165,7 @@ static void sync_falls(struct ads1256 *a, int64_t t_ns)
 void ads1256_sync_pin(struct ads1256 *a, bool level, int64_t t_ns)
 {
     if (level == a->sync) return;
+    if (a->fault.lost_sync && !level) return;
     a->sync = level;
     if (!level) {
         sync_falls(a, t_ns);
@@ -191,7 +192,7 @@ void ads1256_cs_pin(struct ads1256 *a, bool level, int64_t t_ns)
 
 bool ads1256_drdy(const struct ads1256 *a)
 {
-    return a->drdy;
+    return a->fault.drdy ? a->fault.drdy == ADS1256_STUCK_HIGH : a->drdy;
 }
 
 int64_t ads1256_settle_ns(const struct ads1256 *a)

@@ -47,6 +47,7 @@ struct ads1256_pins {
 struct ads1256 {
     struct ads1256_cfg cfg;
     struct ads1256_io io;
+    struct ads1256_fault fault;
     struct sched *sched;
     struct rng noise;
     struct clk clkin;

@@ -20,7 +20,7 @@ void ads1256_set_drdy(struct ads1256 *a, bool level, int64_t t_ns)
     if (level == a->drdy) return;
     a->drdy = level;
     reg_poke(&a->regs, ADS1256_STATUS, (uint8_t)((ads1256_value(a, ADS1256_STATUS) & ~ADS1256_STATUS_DRDY) | level));
-    a->io.drdy(a->io.ctx, level, t_ns);
+    if (!a->fault.drdy) a->io.drdy(a->io.ctx, level, t_ns);
 }
 
 /* Fraction of full scale for volts at the input of the uncalibrated path. */
@@ -130,6 +130,11 @@ static void offer_word(struct ads1256 *a)
     else if (a->port != ADS1256_WORD) a->word_left = 0;
 }
 
+static void await_pulse(struct ads1256 *a)
+{
+    sched_at(a->sched, &a->pulse_ev, run_edge_ns(a, ready_tau(a, a->ready) - ADS1256_PULSE_TAU));
+}
+
 static void on_ready(void *ctx, int64_t t_ns)
 {
     struct ads1256 *a = ctx;
@@ -140,7 +145,7 @@ static void on_ready(void *ctx, int64_t t_ns)
     a->ready++;
     if (a->rate != a->rate_next) change_rate(a, a->start_tau + ready_tau(a, a->ready - 1));
     else await_ready(a);
-    sched_at(a->sched, &a->pulse_ev, run_edge_ns(a, ready_tau(a, a->ready) - ADS1256_PULSE_TAU));
+    await_pulse(a);
     ads1256_set_drdy(a, false, t_ns);
 }
 
@@ -216,6 +221,15 @@ static void on_cal(void *ctx, int64_t t_ns)
     store_result(a);
     if (a->sync) start_run(a, a->start_tau + ads1256_settle_tau(a->rate));
     else ads1256_halt(a, ADS1256_SYNC_LOW, t_ns);
+}
+
+/* Counts of the clock go on, their instants are new ones from here on. */
+void ads1256_retime(struct ads1256 *a)
+{
+    if (a->cell_ev.queued) await_cell(a);
+    if (a->ready_ev.queued) await_ready(a);
+    if (a->pulse_ev.queued) await_pulse(a);
+    if (a->cal_ev.queued) sched_at(a->sched, &a->cal_ev, run_edge_ns(a, ads1256_settle_tau(a->rate)));
 }
 
 void ads1256_conv_init(struct ads1256 *a)

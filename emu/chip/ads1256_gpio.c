@@ -78,5 +78,5 @@ uint32_t ads1256_clkout_hz(const struct ads1256 *a)
 {
     static const uint8_t div[] = {0, 1, 2, 4};
     const unsigned code = (ads1256_value(a, ADS1256_ADCON) & ADS1256_ADCON_CLK) >> 5;
-    return div[code] && a->mode != ADS1256_OFF ? a->cfg.clkin_hz / div[code] : 0;
+    return div[code] && a->mode != ADS1256_OFF ? (uint32_t)(a->clkin.hz / div[code]) : 0;
 }

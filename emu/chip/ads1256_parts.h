@@ -33,6 +33,13 @@ static inline bool ads1256_deaf(const struct ads1256 *a)
     return a->mode == ADS1256_OFF || a->mode == ADS1256_IN_RESET;
 }
 
+/* What DOUT makes of a byte. */
+static inline uint8_t ads1256_on_wire(const struct ads1256 *a, uint8_t byte)
+{
+    if (!a->fault.dout) return byte;
+    return a->fault.dout == ADS1256_STUCK_HIGH ? 0xFF : 0x00;
+}
+
 static inline void ads1256_refuse(struct ads1256 *a, uint8_t opcode)
 {
     a->n.refused++;
@@ -57,6 +64,7 @@ bool ads1256_has_output(const struct ads1256 *a); /* the next byte comes from a 
 /* ---- ads1256_pins.c ---- */
 
 void ads1256_pins_init(struct ads1256 *a);
+void ads1256_pins_refresh(struct ads1256 *a, int64_t t_ns); /* DOUT has got stuck, or free */
 void ads1256_pins_release(struct ads1256 *a, int64_t t_ns); /* DOUT to high impedance, the bits realigned */
 
 /* ---- ads1256_gpio.c ---- */
@@ -72,6 +80,7 @@ double ads1256_input_v(struct ads1256 *a, int64_t t_ns);
 /* ---- ads1256_conv.c ---- */
 
 void ads1256_conv_init(struct ads1256 *a);
+void ads1256_retime(struct ads1256 *a); /* the clock's rate has changed */
 
 /* Moves the pin and the DRDY bit of STATUS. */
 void ads1256_set_drdy(struct ads1256 *a, bool level, int64_t t_ns);

@@ -13,6 +13,7 @@ static const struct {
 static void set_dout(struct ads1256 *a, bool driven, bool level, int64_t t_ns)
 {
     a->pins.driven = driven;
+    if (a->fault.dout) level = a->fault.dout == ADS1256_STUCK_HIGH;
     if (level == a->pins.dout) return;
     a->pins.dout = level;
     if (a->io.dout) a->io.dout(a->io.ctx, level, t_ns);
@@ -21,6 +22,11 @@ static void set_dout(struct ads1256 *a, bool driven, bool level, int64_t t_ns)
 static void on_hiz(void *ctx, int64_t t_ns)
 {
     set_dout(ctx, false, ADS1256_DOUT_IDLE, t_ns);
+}
+
+void ads1256_pins_refresh(struct ads1256 *a, int64_t t_ns)
+{
+    set_dout(a, a->pins.driven, a->pins.driven && spi_miso(&a->spi), t_ns);
 }
 
 void ads1256_pins_init(struct ads1256 *a)

@@ -91,6 +91,7 @@ static void op_calibrate(struct ads1256 *a, uint8_t opcode, int64_t t_ns)
 
 static void op_sync(struct ads1256 *a, uint8_t opcode, int64_t t_ns)
 {
+    if (a->fault.lost_sync) return;
     if (a->mode == ADS1256_RUNNING) ads1256_halt(a, ADS1256_SYNC_WAIT, t_ns);
     else if (a->mode == ADS1256_CALIBRATING || a->mode == ADS1256_STANDBY) ads1256_refuse(a, opcode);
 }
@@ -256,13 +257,13 @@ static uint8_t on_byte(void *chip, uint8_t mosi, int64_t t_ns)
 {
     static port_fn *const ports[ADS1256_PORTS] = {on_opcode, on_count, on_write, on_read, on_word};
     struct ads1256 *a = chip;
-    if (a->cs || ads1256_deaf(a)) return ADS1256_DOUT_IDLE;
+    if (a->cs || ads1256_deaf(a)) return ads1256_on_wire(a, ADS1256_DOUT_IDLE);
     a->in_word = a->word_left && a->port != ADS1256_READ;
     if (a->in_word) shift_word(a, t_ns);
     ports[a->port](a, mosi, t_ns);
     a->garbled = a->garbled && a->port != ADS1256_OPCODE;
     a->command_ns = t_ns;
-    return out_byte(a);
+    return ads1256_on_wire(a, out_byte(a));
 }
 
 /* What may go wrong with a byte that begins now: t6, and the update of the word it comes from. */
@@ -284,14 +285,14 @@ static void judge_read(struct ads1256 *a, int64_t t_ns)
 static void on_first(void *chip, int64_t t_ns)
 {
     struct ads1256 *a = chip;
-    spi_load(&a->spi, ADS1256_DOUT_IDLE);
+    spi_load(&a->spi, ads1256_on_wire(a, ADS1256_DOUT_IDLE));
     if (a->cs || ads1256_deaf(a)) return;
     a->first_ns = t_ns;
     a->first_drdy = a->drdy;
     a->early = t_ns < a->next_ok_ns; /* before the byte itself ends standby, from where on the next one has to wait */
     if (a->mode == ADS1256_STANDBY && a->cfg.strict_bus) leave_standby(a, t_ns); /* any SCLK interrupts it */
     judge_read(a, t_ns);
-    spi_load(&a->spi, out_byte(a));
+    spi_load(&a->spi, ads1256_on_wire(a, out_byte(a)));
 }
 
 void ads1256_serial_init(struct ads1256 *a)

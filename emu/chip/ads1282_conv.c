@@ -101,7 +101,7 @@ void ads1282_set_drdy(struct ads1282 *a, bool level, int64_t t_ns)
     a->drdy = level;
     a->pin.drdy_ns = t_ns;
     if (level) sched_cancel(a->sched, &a->pulse); /* nothing is left for it to do */
-    if (a->io.drdy) a->io.drdy(a->io.ctx, level, t_ns);
+    if (a->io.drdy && !a->fault.drdy) a->io.drdy(a->io.ctx, level, t_ns);
 }
 
 /* M70: high while the input is at or beyond full scale. Here: its newest sample. */
@@ -269,7 +269,7 @@ static bool in_phase(const struct ads1282 *a, int64_t edge)
 
 void ads1282_sync(struct ads1282 *a, int64_t t_ns)
 {
-    if (!a->running) return;
+    if (!a->running || a->fault.lost_sync) return;
     int64_t edge = clk_count_at(&a->clk, t_ns);
     if (a->cfg.strict_sync && clk_edge_ns(&a->clk, edge) - t_ns < SYNC_KEEPOUT_NS) edge++;
     if (continuous(a) && a->in_phase && in_phase(a, edge)) return;
@@ -291,11 +291,28 @@ void ads1282_calibrate(struct ads1282 *a, bool gain, int64_t t_ns)
     ads1282_set_drdy(a, true, t_ns);
 }
 
+/* Counts of the clock go on, their instants are new ones from here on. */
+void ads1282_retime(struct ads1282 *a)
+{
+    time_periods(a);
+    if (!a->due.queued) return;
+    a->ended = clk_pos(&a->clk, a->ended.k);
+    a->period_step = clk_step(&a->clk, a->timing.period_tclk);
+    a->pulse_step = clk_step(&a->clk, a->timing.period_tclk - ADS1282_PULSE_TCLK);
+    sched_at(a->sched, &a->due, a->period == 0 ? a->ended.t_ns : clk_on(a->ended, &a->period_step).t_ns);
+    if (a->update_ns != INT64_MAX) a->update_ns = clk_on(a->ended, &a->pulse_step).t_ns;
+    if (a->pulse.queued) sched_at(a->sched, &a->pulse, a->update_ns);
+    if (!a->running) return;
+    a->next = clk_pos(&a->clk, a->next.k);
+    a->step = clk_step(&a->clk, a->timing.step_tclk);
+    if (a->watch.queued) sched_at(a->sched, &a->watch, a->next.t_ns);
+}
+
 /* ---- For the owner ---- */
 
 bool ads1282_drdy(const struct ads1282 *a)
 {
-    return a->drdy;
+    return a->fault.drdy ? a->fault.drdy == ADS1282_STUCK_HIGH : a->drdy;
 }
 
 bool ads1282_running(const struct ads1282 *a)

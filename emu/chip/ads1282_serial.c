@@ -14,6 +14,18 @@ static uint8_t out_byte(const struct ads1282 *a)
     return (uint8_t)(a->out >> (56 - 8 * a->out_index));
 }
 
+/* What DOUT makes of a byte. */
+static uint8_t on_wire(const struct ads1282 *a, uint8_t byte)
+{
+    if (!a->fault.dout) return byte;
+    return a->fault.dout == ADS1282_STUCK_HIGH ? 0xFF : 0x00;
+}
+
+void ads1282_serial_stuck(struct ads1282 *a)
+{
+    spi_load(&a->spi, on_wire(a, a->spi.out));
+}
+
 void ads1282_serial_clear(struct ads1282 *a)
 {
     a->out = 0;
@@ -55,7 +67,7 @@ void ads1282_serial_deliver(struct ads1282 *a, uint32_t word, int64_t t_ns)
     a->out = (uint64_t)word << (32 - a->out_phase);
     a->rdata_due = false;
     a->word_out = a->unread = true;
-    spi_load(&a->spi, out_byte(a));
+    spi_load(&a->spi, on_wire(a, out_byte(a)));
 }
 
 /* ---- Commands ---- */
@@ -212,7 +224,7 @@ static void take_byte(struct ads1282 *a, uint8_t byte, int64_t t_ns)
 static uint8_t on_byte(void *chip, uint8_t mosi, int64_t t_ns)
 {
     struct ads1282 *a = chip;
-    if (!a->alive) return 0;
+    if (!a->alive) return on_wire(a, 0);
     const bool command = a->op || mosi > 0x01;
     a->rise_ns = a->sclk_ns = t_ns;
     a->in_byte = false;
@@ -220,7 +232,7 @@ static uint8_t on_byte(void *chip, uint8_t mosi, int64_t t_ns)
     if (a->out_index < 8) a->out_index++;
     take_byte(a, mosi, t_ns);
     a->gap_matters = command;
-    return next_out(a);
+    return on_wire(a, next_out(a));
 }
 
 /* t_ns: the byte's first SCLK rise where it is known, else its fall, which is later by the clock's high time. */
@@ -256,7 +268,7 @@ static void on_first(void *chip, int64_t t_ns)
 /* No command under way nor, a zero being WAKEUP, to come. Nothing can be late: the 4 tCLK are shorter than a byte. */
 bool ads1282_only_shifts(const struct ads1282 *a)
 {
-    return a->alive && !a->op && !a->lost && !a->standby && a->spi.bits == 0;
+    return a->alive && !a->op && !a->lost && !a->standby && !a->fault.dout && a->spi.bits == 0;
 }
 
 void ads1282_shift(struct ads1282 *a, uint8_t *out, unsigned n, int64_t t_ns)
@@ -292,12 +304,17 @@ void ads1282_serial_reset(struct ads1282 *a)
     a->rest_periods = 0;
     ads1282_serial_clear(a);
     spi_realign(&a->spi);
-    spi_load(&a->spi, 0);
+    spi_load(&a->spi, on_wire(a, 0));
+}
+
+void ads1282_serial_times(struct ads1282 *a)
+{
+    a->gap_ns = clk_span_ns(a->clk.hz, GAP_TCLK);
+    a->rest_ns = clk_span_ns(a->clk.hz, READ_REST_TCLK);
 }
 
 void ads1282_serial_init(struct ads1282 *a)
 {
-    a->gap_ns = clk_span_ns(a->clk.hz, GAP_TCLK);
-    a->rest_ns = clk_span_ns(a->clk.hz, READ_REST_TCLK);
+    ads1282_serial_times(a);
     spi_init(&a->spi, on_byte, on_first, a);
 }

@@ -12,6 +12,8 @@
 
 void ads1282_serial_init(struct ads1282 *a);
 void ads1282_serial_reset(struct ads1282 *a); /* RDATAC, no command under way, DOUT low */
+void ads1282_serial_times(struct ads1282 *a); /* the clock's rate has changed */
+void ads1282_serial_stuck(struct ads1282 *a); /* DOUT has got stuck, in mid-byte too */
 void ads1282_serial_clear(struct ads1282 *a); /* no word in the output register */
 void ads1282_serial_deliver(struct ads1282 *a, uint32_t word, int64_t t_ns); /* a conversion has ended */
 void ads1282_serial_period(struct ads1282 *a); /* a data period has ended, settled or not: interface time-out */
@@ -28,6 +30,7 @@ void ads1282_restart(struct ads1282 *a, int64_t t_ns); /* clears the filter, sta
 void ads1282_sync(struct ads1282 *a, int64_t t_ns);    /* SYNC: opcode or pin */
 void ads1282_calibrate(struct ads1282 *a, bool gain, int64_t t_ns);
 void ads1282_set_drdy(struct ads1282 *a, bool level, int64_t t_ns);
+void ads1282_retime(struct ads1282 *a); /* the clock's rate has changed */
 void ads1282_tell_mflag(struct ads1282 *a, int64_t t_ns);
 
 /* ---- Converter column: ads1282_chain.c ---- */

@@ -9,6 +9,7 @@
 #include "base/spi.h"
 #include "chip/ads1282_cal.h"
 #include "chip/ads1282_cic.h"
+#include "chip/ads1282_fault.h"
 #include "chip/ads1282_filter.h"
 #include "chip/ads1282_hpf.h"
 #include "chip/ads1282_mod.h"
@@ -43,6 +44,7 @@ struct ads1282_timing {
 struct ads1282 {
     struct ads1282_cfg cfg;
     struct ads1282_io io;
+    struct ads1282_fault fault;
     struct sched *sched;
     struct ads1282_counters count;
     struct ads1282_limits limit;

@@ -1,0 +1,198 @@
+#include "trace/line_fault.h"
+
+#include "base/detmath.h"
+
+#include <assert.h>
+#include <string.h>
+
+#define NEVER INT64_MAX
+#define ROOM  128u /* steps handed on at a time */
+
+struct out {
+    struct trace_step step[ROOM];
+    unsigned n;
+};
+
+static uint32_t bit_of(const struct line_fault_slot *s)
+{
+    return UINT32_C(1) << s->f.line;
+}
+
+/* ---- one fault ---- */
+
+static int64_t noise_gap_ns(struct line_fault *f)
+{
+    const double gap_ns = -det_log(rng_uniform(&f->rng)) * 1e9 / f->rate_hz;
+    return gap_ns < 1.0 ? 1 : gap_ns > 1e15 ? INT64_C(1000000000000000) : (int64_t)gap_ns;
+}
+
+/* When it next does something of itself. */
+static int64_t due_ns(const struct line_fault_slot *s)
+{
+    if (s->id == 0) return NEVER;
+    if (!s->began) return s->f.from_ns;
+    return s->next_ns < s->f.until_ns ? s->next_ns : s->f.until_ns;
+}
+
+static void begin(struct line_fault_slot *s, int64_t t_ns)
+{
+    s->began = true;
+    s->next_ns = NEVER;
+    if (s->f.kind == LINE_NOISE) s->next_ns = t_ns + noise_gap_ns(&s->f);
+    if (s->f.kind != LINE_GLITCH) return;
+    s->flip = true;
+    s->next_ns = t_ns + s->f.width_ns;
+}
+
+static void turn(struct line_fault_slot *s, int64_t t_ns)
+{
+    s->flip = !s->flip;
+    if (s->flip) s->next_ns = t_ns + s->f.width_ns;
+    else s->next_ns = s->f.kind == LINE_NOISE ? t_ns + noise_gap_ns(&s->f) : NEVER;
+    if (!s->flip && s->f.kind == LINE_GLITCH) s->id = 0;
+}
+
+static void run(struct line_fault_slot *s, int64_t t_ns)
+{
+    if (!s->began) begin(s, t_ns);
+    else if (t_ns >= s->f.until_ns) s->id = 0;
+    else turn(s, t_ns);
+}
+
+/* A step of the board's: frames begin, pulses are counted. */
+static void look(struct line_fault_slot *s, const struct trace_step *step)
+{
+    if (s->id == 0 || !s->began) return;
+    const bool missing = s->f.kind == LINE_MISSING_PULSE;
+    if (!missing && s->f.kind != LINE_EXTRA_PULSE) return;
+    if (step->lines & ~step->level & UINT32_C(1) << s->f.frame_line) s->pulses = 0;
+    if (!(step->lines & bit_of(s))) return;
+    const bool rise = step->level & bit_of(s);
+    s->pulses += rise;
+    const bool mine = s->pulses == s->f.pulse;
+    if (missing) s->flip = mine && rise;
+    else if (mine && !rise) s->next_ns = step->t_ns + s->f.width_ns;
+}
+
+/* ---- all faults of a trace ---- */
+
+static uint32_t shown(const struct line_faults *l)
+{
+    uint32_t level = l->level, high = 0, low = 0;
+    for (const struct line_fault_slot *s = l->slot; s < l->slot + LINE_FAULTS_MAX; s++) {
+        if (s->id == 0 || !s->began) continue;
+        if (s->flip || s->f.kind == LINE_INVERTED) level ^= bit_of(s);
+        if (s->f.kind == LINE_STUCK_HIGH) high |= bit_of(s);
+        if (s->f.kind == LINE_STUCK_LOW) low |= bit_of(s);
+    }
+    return (level | high) & ~low;
+}
+
+static void flush(const struct line_faults *l, struct out *o)
+{
+    if (o->n > 0) trace_emit(l->trace, o->step, o->n);
+    o->n = 0;
+}
+
+static void show(struct line_faults *l, struct out *o, int64_t t_ns)
+{
+    const uint32_t level = shown(l);
+    const uint32_t lines = level ^ l->filter.level;
+    if (!lines) return;
+    if (o->n == ROOM) flush(l, o);
+    o->step[o->n++] = (struct trace_step){t_ns, lines, level};
+    l->filter.level = level;
+}
+
+static int64_t next_due_ns(const struct line_faults *l)
+{
+    int64_t next_ns = NEVER;
+    for (const struct line_fault_slot *s = l->slot; s < l->slot + LINE_FAULTS_MAX; s++)
+        if (due_ns(s) < next_ns) next_ns = due_ns(s);
+    return next_ns;
+}
+
+/* What the faults do of themselves up to and including t_ns; shown but for what happens at t_ns itself, where steps may
+ * follow: a level that changes and changes back at one instant has not changed. */
+static void run_until(struct line_faults *l, struct out *o, int64_t t_ns)
+{
+    for (int64_t at_ns; (at_ns = next_due_ns(l)) <= t_ns;) {
+        for (struct line_fault_slot *s = l->slot; s < l->slot + LINE_FAULTS_MAX; s++)
+            if (due_ns(s) == at_ns) run(s, at_ns);
+        if (at_ns < t_ns) show(l, o, at_ns < l->done_ns ? l->done_ns : at_ns);
+    }
+}
+
+static void take(struct line_faults *l, const struct trace_step *step)
+{
+    l->level = (l->level & ~step->lines) | (step->level & step->lines);
+    for (struct line_fault_slot *s = l->slot; s < l->slot + LINE_FAULTS_MAX; s++) look(s, step);
+}
+
+static bool any(const struct line_faults *l)
+{
+    for (unsigned i = 0; i < LINE_FAULTS_MAX; i++)
+        if (l->slot[i].id) return true;
+    return false;
+}
+
+static void on_steps(void *ctx, uint32_t before, const struct trace_step *s, unsigned n, int64_t until_ns)
+{
+    struct line_faults *l = ctx;
+    struct out o = {.n = 0};
+    if (until_ns == INT64_MAX) until_ns = n > 0 ? s[n - 1].t_ns : l->done_ns; /* nobody listens any more */
+    if (until_ns < l->done_ns) until_ns = l->done_ns;
+    l->level = before; /* lines that nobody listens to move without a step */
+    for (const struct trace_step *const end = s + n; s < end;) {
+        const int64_t t_ns = s->t_ns;
+        run_until(l, &o, t_ns);
+        do take(l, s++);
+        while (s < end && s->t_ns == t_ns);
+        show(l, &o, t_ns);
+    }
+    run_until(l, &o, until_ns);
+    show(l, &o, until_ns);
+    flush(l, &o);
+    l->done_ns = until_ns;
+    if (!any(l)) l->trace->filter = NULL;
+}
+
+/* ---- for the owner ---- */
+
+void line_faults_init(struct line_faults *l, struct trace *t)
+{
+    memset(l, 0, sizeof *l);
+    l->trace = t;
+    l->filter = (struct trace_filter){.steps = on_steps, .ctx = l};
+}
+
+static struct line_fault_slot *slot_of(struct line_faults *l, uint32_t id)
+{
+    for (unsigned i = 0; i < LINE_FAULTS_MAX; i++)
+        if (l->slot[i].id == id) return &l->slot[i];
+    return NULL;
+}
+
+uint32_t line_fault_add(struct line_faults *l, const struct line_fault *f)
+{
+    struct line_fault_slot *s = slot_of(l, 0);
+    assert(f->line < l->trace->count && f->frame_line < l->trace->count && f->from_ns < f->until_ns);
+    assert(f->width_ns > 0 || (f->kind != LINE_GLITCH && f->kind != LINE_EXTRA_PULSE && f->kind != LINE_NOISE));
+    assert(f->kind != LINE_NOISE || (f->rate_hz > 0.0 && f->rate_hz < 1e9));
+    if (!s) return 0;
+    if (!l->trace->filter) {
+        l->level = l->filter.level = l->trace->level;
+        l->done_ns = l->trace->done_ns;
+        l->trace->filter = &l->filter;
+    }
+    *s = (struct line_fault_slot){.f = *f, .id = ++l->last_id, .next_ns = NEVER};
+    return s->id;
+}
+
+void line_fault_end(struct line_faults *l, uint32_t id, int64_t t_ns)
+{
+    struct line_fault_slot *s = id ? slot_of(l, id) : NULL;
+    if (!s) return;
+    if (t_ns < s->f.until_ns) s->f.until_ns = t_ns;
+    if (!s->began && s->f.until_ns <= s->f.from_ns) s->id = 0;
+}
