@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
 REPLY_S = 10.0  # patience for an answer, real time
 CONNECT_S = 5.0
-POLL_S = 0.1  # bench time between looks at something that moves
 REST_LIMIT_S = 3600.0  # patience for it, bench time
 
 Wait = Callable[[float], None]
@@ -35,6 +34,8 @@ Wait = Callable[[float], None]
 
 class Instrument:
     """What all of them have: identity, raw commands, the error queue. `wait` lets the bench's time pass."""
+
+    poll_s = 0.1  # bench time between looks at something that moves
 
     def __init__(self, name: str, address: str, resource: MessageBasedResource, wait: Wait) -> None:
         self.name = name
@@ -83,8 +84,8 @@ class Instrument:
         while not done():
             if waited_s >= limit_s:
                 raise TimeOut(f"{self.name}: {what} not reached in {limit_s:g} s")
-            self._wait(POLL_S)
-            waited_s += POLL_S
+            self._wait(self.poll_s)
+            waited_s += self.poll_s
 
     def _ask(self, message: str, command: str) -> str:
         from pyvisa.constants import StatusCode
@@ -207,6 +208,8 @@ class Table(Instrument):
 
 class Chamber(Instrument):
     """A thermal chamber: air at a temperature, changed at a ramp."""
+
+    poll_s = 1.0
 
     def set(self, temp_degc: float, *, wait: bool = False, limit_s: float = 24 * 3600.0) -> None:
         """New set-point; with wait, returns when the chamber calls its air stable there."""

@@ -136,7 +136,7 @@ def test_the_head_returns_its_scale_when_it_stands_still() -> None:
         assert isinstance(head, Head)
         assert head.turn(90.0) == 90.0001
     assert wire.told == ["ANGL 90.0", "SYST:ERR?", "REST?", "REST?", "REST?", "ANGL?"]
-    assert waits == [instruments.POLL_S] * 2  # time of the bench passes between the looks, and only there
+    assert waits == [Head.poll_s] * 2  # time of the bench passes between the looks, and only there
 
 
 def test_a_face_is_a_word() -> None:
@@ -162,7 +162,7 @@ def test_a_chamber_is_waited_for() -> None:
         assert isinstance(chamber, Chamber)
         chamber.set(85.0, wait=True)
     assert wire.commands == ["TEMP 85.0", "STAB?", "STAB?"]
-    assert len(waits) == 1
+    assert waits == [Chamber.poll_s]
 
 
 def test_a_refusal_has_number_and_text_and_empties_the_queue() -> None:
