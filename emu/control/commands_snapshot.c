@@ -1,0 +1,38 @@
+/* Commands that save the bench or double it. */
+#include "control/commands.h"
+
+static enum control_outcome refuse_without(struct control *c)
+{
+    return control_refuse(c, "state", "this bench cannot be saved or doubled");
+}
+
+static enum control_outcome do_snapshot(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+{
+    (void)t_ns;
+    if (!c->bench->snapshot) return refuse_without(c);
+    c->refusal.code = "state";
+    return c->bench->snapshot(c->bench->ctx, v[0].text, result, c->refusal.why) ? CONTROL_DONE : CONTROL_REFUSED;
+}
+
+static enum control_outcome do_fork(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+{
+    (void)t_ns;
+    if (!c->bench->fork) return refuse_without(c);
+    const struct control_fork f = {.control = v[0].text,
+                                   .can = v[1].given ? v[1].text : "none",
+                                   .truth = v[2].given ? v[2].text : NULL};
+    c->refusal.code = "machine";
+    return c->bench->fork(c->bench->ctx, &f, result, c->refusal.why) ? CONTROL_DONE : CONTROL_REFUSED;
+}
+
+// clang-format off
+static const struct control_command rows[] = {
+    {"snapshot", "Saves the bench as it is now to a file, for psa-emu --restore.",
+     {{"path", CONTROL_TEXT, .what = "file to write; one of that name is replaced"}}, .run = do_snapshot},
+    {"fork", "Doubles the emulator: a second process goes on from this instant, with endpoints of its own; ends with its own quit.",
+     {{"control", CONTROL_TEXT, .what = "path of its control socket"},
+      {"can", CONTROL_TEXT, true, .what = "its CAN adapters as for --can, with spaces between them (none)"},
+      {"truth", CONTROL_TEXT, true, .what = "path of its truth port (none)"}}, .run = do_fork},
+};
+// clang-format on
+const struct control_table commands_snapshot = {rows, sizeof rows / sizeof *rows};
