@@ -19,6 +19,7 @@ from psabench.lineport import LineFormat
 from psabench.procedures import PROCEDURES
 from psabench.progress import Bar
 from psabench.protocol_files import DBC_NODE
+from psabench.shell import command_line
 from psabench.wire_bench import G_MPS2
 
 ABOUT = """\
@@ -31,6 +32,7 @@ a first hour:
   psa-emu stream &                  a board on the bus, 1000 frames a second, until Ctrl-C
   psabench record run.log --can socketcand:127.0.0.1:29536 --for 10
   psabench decode run.log --out run.csv   volts against time
+  psabench shell                    registers, instruments and faults at the keyboard
 
 psabench COMMAND --help says more. Exit status: 0 done and within limits, 1 done and out of limits, 2 bad input,
 3 the bench or a link failed, 130 ended by Ctrl-C.
@@ -73,7 +75,7 @@ Counters stand on stderr at the end: frames, lost, torn (CAN); also late, early,
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Entry point of the command."""
-    args = _parser().parse_args(argv)
+    args = _parser().parse_args(command_line.words(list(sys.argv[1:] if argv is None else argv)))
     for library in ("can", "canopen"):  # what goes wrong there is raised as well, and told in one line
         logging.getLogger(library).setLevel(logging.CRITICAL)
     handler: Callable[[argparse.Namespace], int] = args.handler
@@ -103,6 +105,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_run(commands)
     _add_record(commands)
     _add_decode(commands)
+    command_line.add(commands, _Help, CAN_HELP, node_id)
     return top
 
 

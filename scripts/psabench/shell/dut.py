@@ -1,0 +1,184 @@
+"""What the shell can do with the device: registers with their fields, stream, objects, state. Over CAN alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from psabench.bench import Bench
+from psabench.device import REGISTERS, Psa2
+from psabench.frames import Form
+from psabench.shell import registers
+from psabench.shell.row import Args, Handler, Row, number
+from psabench.shell.vocabulary import Arg, Command, Kind
+from psabench.shell.words import Wrong
+
+if TYPE_CHECKING:
+    from psabench.shell.session import Session
+
+CONVERTERS = tuple(REGISTERS)
+
+
+def here(bench: Bench) -> bool:
+    """Whether there is a device: a unit on a bus that was opened."""
+    return bool(bench.units)
+
+
+def _unit_names(psa: Psa2, converter: str) -> dict[int, str]:
+    """Addresses and names of a converter's registers, from the EDS."""
+    return {sub - 1: name for sub, name in psa.node.names(REGISTERS[converter]).items()}
+
+
+def _address(session: Session, args: Args) -> tuple[str, int, str]:
+    converter, wanted = str(args["converter"]), str(args["register"])
+    names = _unit_names(session.dut, converter)
+    for address, name in names.items():
+        if wanted.upper() == name or wanted.upper() == f"{address:02X}H":
+            return converter, address, name
+    raise Wrong(f"register: {wanted!r}; converter {converter} has {', '.join(names.values())}, or an address as 01h")
+
+
+def _register_row(session: Session, converter: str, address: int, name: str) -> dict[str, Any]:
+    value = session.dut.register(converter, address)
+    return {
+        "address": f"{address:02X}h",
+        "register": name,
+        "value": f"{value:02X}h",
+        "fields": registers.explain(converter, name, value),
+    }
+
+
+def _registers(session: Session, args: Args) -> Mapping[str, Any]:
+    converter = str(args.get("converter", "x"))
+    names = _unit_names(session.dut, converter)
+    return {"registers": [_register_row(session, converter, a, n) for a, n in names.items()]}
+
+
+def _register(session: Session, args: Args) -> Mapping[str, Any]:
+    return _register_row(session, *_address(session, args))
+
+
+def _write(session: Session, args: Args) -> Mapping[str, Any]:
+    converter, address, name = _address(session, args)
+    text = str(args["value"])
+    before = session.dut.register(converter, address) if "=" in text else 0
+    session.dut.write_register(converter, address, registers.changed(converter, name, before, text))
+    return _register_row(session, converter, address, name)
+
+
+def _opcode(session: Session, args: Args) -> Mapping[str, Any]:
+    session.dut.opcode(str(args["group"]), int(number(args, "code")))
+    return {}
+
+
+def _read_object(session: Session, args: Args) -> Mapping[str, Any]:
+    value = session.dut.node.read(int(number(args, "index")), int(number(args, "sub")))
+    return {"value": value.hex() if isinstance(value, bytes) else value}
+
+
+def _write_object(session: Session, args: Args) -> Mapping[str, Any]:
+    text = str(args["value"])
+    value: int | float | str = text
+    for kind in (lambda t: int(t, 0), float):
+        try:
+            value = kind(text)
+            break
+        except ValueError:
+            continue
+    try:
+        session.dut.node.write(int(number(args, "index")), int(number(args, "sub")), value)
+    except (TypeError, ValueError, AttributeError) as e:  # python-canopen cannot make the object's type of it
+        raise Wrong(f"value: {text!r}: {e}") from e
+    return {}
+
+
+def _stream(session: Session, args: Args) -> Mapping[str, Any]:
+    frames = session.dut.stream(int(number(args, "count", 100)))
+    rows = []
+    for axis in "xyz":
+        u_v = frames.axis(axis)
+        rows.append(
+            {
+                "axis": axis,
+                "mean_v": float(u_v.mean()),
+                "std_v": float(u_v.std()),
+                "min_v": u_v.min(),
+                "max_v": u_v.max(),
+            }
+        )
+    rows = [{k: v if isinstance(v, str) else float(v) for k, v in row.items()} for row in rows]
+    return {
+        "frames": len(frames),
+        "settled": bool(np.all(frames.settled)),
+        "clipped": bool(np.any(frames.clipped)),
+        "lost": session.dut.frames.counters.lost,
+        "axes": rows,
+    }
+
+
+def _form(session: Session, args: Args) -> Mapping[str, Any]:
+    if "form" in args:
+        session.dut.form = Form[str(args["form"]).upper()]
+    return {"form": session.dut.form.name.lower()}
+
+
+def _use(session: Session, args: Args) -> Mapping[str, Any]:
+    name = str(args.get("unit", session.dut_name))
+    if name not in session.bench.units:
+        raise Wrong(f"unit: {name!r}; there is {', '.join(session.bench.units)}")
+    session.dut_name = name
+    return {"unit": name, "node": session.dut.node.node_id}
+
+
+def _simple(call: Callable[[Psa2], object]) -> Handler:
+    def run(session: Session, _: Args) -> Mapping[str, Any]:
+        call(session.dut)
+        return {}
+
+    return run
+
+
+# ---- the table
+
+_CONVERTER = Arg(name="converter", kind=Kind.CHOICE, choices=CONVERTERS, what="x, y, z: accelerometers; t: temperature")
+_REGISTER = Arg(name="register", what="name, as CONFIG0, or address, as 01h")
+_VALUE = Arg(name="value", what="a byte (56h), or fields (DR=3,PHASE=0)")
+_GROUP = Arg(name="group", kind=Kind.CHOICE, choices=("accel", "temp"), what="which converters")
+_CODE = Arg(name="code", kind=Kind.COUNT, low=0, high=255, what="the byte, as 04h: SYNC")
+_COUNT = Arg(name="count", kind=Kind.COUNT, optional=True, low=1, high=1e6, what="samples, 100 without it")
+_FORM = Arg(
+    name="form", kind=Kind.CHOICE, optional=True, choices=tuple(f.name.lower() for f in Form), what="frame form"
+)
+_INDEX = Arg(name="index", kind=Kind.COUNT, low=0, high=0xFFFF, what="of the object, as 2030h")
+_SUB = Arg(name="sub", kind=Kind.COUNT, low=0, high=255, what="sub-index")
+_UNIT = Arg(name="unit", optional=True, what="name of a unit of the scenario")
+_ANY = Arg(name="value", what="number or text")
+
+
+def _row(name: str, what: str, run: Handler, *args: Arg) -> Row:
+    return Row(Command(name=f"dut.{name}", what=what, args=args), run, here)
+
+
+ROWS: tuple[Row, ...] = (
+    _row("use", "Tells or chooses which unit dut is.", _use, _UNIT),
+    _row(
+        "ready", "Waits until the set-up after Res is over and frames are settled.", _simple(lambda d: d.wait_ready())
+    ),
+    _row(
+        "registers", "Shows the registers of a converter, fields named.", _registers, replace(_CONVERTER, optional=True)
+    ),
+    _row("register", "Reads one register.", _register, _CONVERTER, _REGISTER),
+    _row("write", "Writes one register; x, y and z are written together.", _write, _CONVERTER, _REGISTER, _VALUE),
+    _row("opcode", "Sends a command byte to the converters.", _opcode, _GROUP, _CODE),
+    _row("stream", "Takes samples and tells their mean and spread, volts at the loads.", _stream, _COUNT),
+    _row("start", "Starts the stream of frames.", _simple(Psa2.start)),
+    _row("stop", "Stops it.", _simple(Psa2.stop)),
+    _row("reset", "Pulses Res: NMT reset node.", _simple(Psa2.reset)),
+    _row("form", "Tells or sets how a sample travels.", _form, _FORM),
+    _row("counters", "Tells the counters of the device, object 2030h.", lambda s, _: s.dut.counters()),
+    _row("object", "Reads an object of the dictionary.", _read_object, _INDEX, replace(_SUB, optional=True)),
+    _row("set", "Writes an object of the dictionary.", _write_object, _INDEX, _SUB, _ANY),
+)

@@ -1,0 +1,137 @@
+"""A session: a bench, what may be said to it, and what has been said. Prints nothing; terminal and script do."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import Any
+
+from psabench.bench import Bench
+from psabench.device import Psa2
+from psabench.errors import BenchError, ControlError
+from psabench.instruments import KINDS
+from psabench.shell import own
+from psabench.shell.grammar import Call, parse
+from psabench.shell.transcript import Transcript
+from psabench.shell.vocabulary import Command, Vocabulary, from_help
+from psabench.shell.words import Wrong
+
+# The bench understood these codes of a refusal to mean: the line is wrong. Others: not now, not here.
+WRONG_CODES = {"syntax", "command", "argument", "type", "range"}
+PATHS = {"path"}  # arguments that name files of this machine, relative to where we are
+NO_CONTROL = "it wants the control socket of an emulator (--connect PATH); this bench has none"
+NO_CAN = "it wants a bus (--can SPEC, as socketcand:127.0.0.1:29536); this bench was opened without one"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outcome:
+    """What a line came to. failed: an expectation that did not hold; the bench is well."""
+
+    call: Call
+    result: Mapping[str, Any]
+    t_ns: int | None  # simulated time afterwards; None: nobody tells it
+    failed: str = ""
+
+
+@dataclass(slots=True)
+class Session:
+    """bench: open, and closed by who opened it. start: the line that brings up the same bench again; "": none."""
+
+    bench: Bench
+    start: str = ""
+    vocabulary: Vocabulary = field(init=False)
+    transcript: Transcript = field(init=False)
+    latest: Mapping[str, Any] = field(default_factory=dict)  # result that `expect` looks at
+    dut_name: str = ""
+    tick: Callable[[], None] = lambda: None  # called now and then while time passes
+
+    def __post_init__(self) -> None:
+        self.transcript = Transcript(self.start, lockstep=self.bench.pace == "step")
+        self.dut_name = next(iter(self.bench.units), "")
+        self.vocabulary = learn(self.bench)
+
+    @property
+    def dut(self) -> Psa2:
+        """The unit that `dut` stands for."""
+        return self.bench.units[self.dut_name]
+
+    def now_ns(self) -> int | None:
+        """Simulated time; None on a bench that does not tell it."""
+        if self.bench.pace == "real":
+            return None
+        if self.bench.pace == "step":
+            return round(self.bench.time_s * 1e9)
+        return self.bench.control.call("time").t_ns
+
+    def do(self, line: str) -> Outcome | None:
+        """Carry out one line; None for a blank or a comment.
+
+        Raises Wrong for a line that cannot be understood or carried out as it stands, other BenchErrors for what
+        the bench refuses now or for a link that fails. Whatever happens is in the transcript.
+        """
+        t_ns = self.now_ns()
+        try:
+            call = parse(line, self.vocabulary)
+            if call is None:
+                return None
+            outcome = self._carry_out(call)
+        except BenchError as e:
+            self.transcript.add(line.strip(), t_ns, str(e))
+            raise
+        if call.command.name not in own.UNSAID:
+            self.transcript.add(line.strip(), t_ns)
+        return outcome
+
+    def _carry_out(self, call: Call) -> Outcome:
+        mine = own.HANDLERS.get(call.command.name)
+        result = mine(self, call.args) if mine else self._ask(call)
+        failed = str(result.get("failed", "")) if call.command.name == "expect" else ""
+        if result and call.command.name not in own.UNSAID and call.command.name != "expect":
+            self.latest = result
+        return Outcome(call=call, result=result, t_ns=self.now_ns(), failed=failed)
+
+    def _ask(self, call: Call) -> Mapping[str, Any]:
+        args = {k: os.path.abspath(str(v)) if k in PATHS else v for k, v in call.args.items()}
+        try:
+            return self.bench.control.call(call.command.wire, **args).result
+        except ControlError as e:
+            if e.code in WRONG_CODES:
+                raise Wrong(str(e)) from e
+            raise
+
+
+def learn(bench: Bench) -> Vocabulary:
+    """What may be said to this bench, and which objects it has not."""
+    mine = [row.command for row in own.ROWS if row.here(bench)]
+    theirs = _of_table(bench) if bench.pace != "real" else []
+    commands: dict[str, Command] = {c.name: c for c in [*theirs, *mine]}
+    things = {name.split(".")[0] for name in commands}
+    why = {name: _why_absent(bench, name) for name in ("dut", "can", "scpi", *KINDS, "probe", "faults", "bench")}
+    return Vocabulary(commands, {name: reason for name, reason in why.items() if name not in things})
+
+
+def _of_table(bench: Bench) -> list[Command]:
+    choices: dict[tuple[str, str], tuple[str, ...]] = {}
+    with suppress(ControlError):
+        units = bench.control.call("units").result["units"]
+        choices["", "unit"] = tuple(str(u["name"]) for u in units)
+    with suppress(ControlError):
+        choices["fault.add", "kind"] = tuple(str(k["name"]) for k in bench.faults.kinds())
+        choices["fault.add", "point"] = tuple(str(p["point"]) for p in bench.faults.points())
+    return from_help(bench.control.call("help").result["commands"], choices)
+
+
+def _why_absent(bench: Bench, name: str) -> str:
+    if name in ("dut", "can"):
+        return NO_CAN
+    if name == "scpi":
+        return "no instrument has an address (--scpi table=TCPIP::192.0.2.7::5025::SOCKET)"
+    if bench.pace != "real":
+        return "this emulator has no commands for it"
+    if name in KINDS:
+        return (
+            f"{NO_CONTROL}; an instrument with an address (--scpi {name}=VISA-ADDRESS) is reached by scpi.send {name}"
+        )
+    return NO_CONTROL
