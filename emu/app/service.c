@@ -114,6 +114,8 @@ static void make_view(struct service *s)
                                      .client = do_client,
                                      .gone = do_gone,
                                      .pace = do_pace};
+    s->view.faults = &s->faults;
+    fault_init(&s->faults, &s->view, &b->sched);
     for (unsigned i = 0; i < s->view.units; i++) {
         s->view.unit[i] = &b->unit[i];
         s->view.unit_name[i] = b->unit[i].cfg.name;

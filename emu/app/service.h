@@ -6,6 +6,7 @@
 #include "app/loop.h"
 #include "app/ports.h"
 #include "control/control.h"
+#include "control/fault.h"
 
 struct service {
     const struct options *o;
@@ -14,6 +15,7 @@ struct service {
     struct pace pace;
     struct loop loop;
     struct control_bench view; /* what the commands may reach */
+    struct fault_engine faults;
     struct control control, truth;
     struct ctl_client *runner; /* who waits for the answer to `run` */
     bool vcd_failed;           /* the recording is not complete, and it was told */

@@ -1,0 +1,224 @@
+/* Commands of faults: what there is, what is wrong now, and what is to go wrong. */
+#include "control/args.h"
+#include "control/commands.h"
+#include "control/fault_parts.h"
+
+#include <string.h>
+
+static const char *const levels[] = {"low", "high", NULL};
+enum { ADD, CLEAR, LIST, KINDS, POINTS, COMMANDS };
+static const struct control_command rows[COMMANDS];
+
+const char *fault_arg_name(enum fault_arg arg)
+{
+    return rows[ADD].arg[arg].name;
+}
+
+const char *fault_arg_what(enum fault_arg arg)
+{
+    return rows[ADD].arg[arg].what;
+}
+
+static bool check_add(const struct control_bench *b, const struct control_value *v, struct control_refusal *why)
+{
+    struct fault f;
+    return fault_make(b, v, &f, why);
+}
+
+static enum control_outcome do_add(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+{
+    struct fault_engine *e = c->bench->faults;
+    struct fault f;
+    if (!e) return control_refuse(c, "state", "no faults on this bench");
+    if (!fault_make(c->bench, v, &f, &c->refusal)) return CONTROL_REFUSED;
+    if (v[FAULT_AT_S].given && f.at_ns < t_ns) {
+        return control_refuse(c, "range", "at_s: %.10g is over, it is %.10g s now", v[FAULT_AT_S].real,
+                              (double)t_ns * 1e-9);
+    }
+    const uint32_t id = fault_add(e, &f, t_ns);
+    if (id == 0) {
+        return control_refuse(c, "state", "%u faults are waiting or active: fault.clear makes room", FAULTS_MAX);
+    }
+    cJSON_AddNumberToObject(result, "id", id);
+    return CONTROL_DONE;
+}
+
+static enum control_outcome do_clear(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+{
+    struct fault_engine *e = c->bench->faults;
+    unsigned cleared = 0;
+    if (!e) return control_refuse(c, "state", "no faults on this bench");
+    if (v[0].given && !fault_find(e, (uint32_t)v[0].count)) {
+        return control_refuse(c, "range", "id: no fault %llu; fault.list has them", (unsigned long long)v[0].count);
+    }
+    for (unsigned i = 0; i < FAULTS_MAX; i++) {
+        struct fault *f = &e->fault[i];
+        if (f->id == 0 || (v[0].given && f->id != v[0].count)) continue;
+        fault_clear(e, f, t_ns);
+        cleared++;
+    }
+    cJSON_AddNumberToObject(result, "cleared", cleared);
+    return CONTROL_DONE;
+}
+
+/* ---- what there is */
+
+static void add_arg(cJSON *to, enum fault_arg arg, bool optional)
+{
+    const struct control_arg *a = &rows[ADD].arg[arg];
+    cJSON *j = cJSON_CreateObject();
+    cJSON_AddItemToArray(to, j);
+    cJSON_AddStringToObject(j, "name", a->name);
+    cJSON_AddStringToObject(j, "type", control_type_name(a->type));
+    cJSON_AddBoolToObject(j, "optional", optional);
+    if (a->unit) cJSON_AddStringToObject(j, "unit", a->unit);
+    if (control_type_numeric(a->type)) {
+        cJSON_AddNumberToObject(j, "min", a->min);
+        cJSON_AddNumberToObject(j, "max", a->max);
+    }
+    if (a->choices) cJSON_AddItemToObject(j, "choices", cJSON_CreateStringArray(levels, 2));
+    cJSON_AddStringToObject(j, "what", a->what);
+}
+
+static void add_kind(cJSON *to, const struct fault_kind *k)
+{
+    cJSON *j = cJSON_CreateObject();
+    cJSON_AddItemToArray(to, j);
+    cJSON_AddStringToObject(j, "kind", k->name);
+    cJSON_AddStringToObject(j, "what", k->what);
+    cJSON_AddStringToObject(j, "seen", k->seen);
+    cJSON_AddBoolToObject(j, "once", k->once);
+    cJSON *places = cJSON_AddArrayToObject(j, "points");
+    for (unsigned i = 0; i < FAULT_PLACES; i++) {
+        if (k->places & FAULT_BIT(i)) {
+            cJSON_AddItemToArray(places, cJSON_CreateString(fault_place_name((enum fault_place)i)));
+        }
+    }
+    cJSON *args = cJSON_AddArrayToObject(j, "args");
+    for (unsigned i = 0; i < FAULT_ARGS; i++) {
+        if ((k->need | k->may) & FAULT_BIT(i)) add_arg(args, (enum fault_arg)i, !(k->need & FAULT_BIT(i)));
+    }
+}
+
+static enum control_outcome do_kinds(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+{
+    cJSON *kinds = cJSON_AddArrayToObject(result, "kinds");
+    const struct fault_kind *k;
+    (void)c;
+    (void)v;
+    (void)t_ns;
+    for (unsigned i = 0; (k = fault_kind(i)) != NULL; i++) add_kind(kinds, k);
+    return CONTROL_DONE;
+}
+
+static enum control_outcome do_points(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+{
+    cJSON *points = cJSON_AddArrayToObject(result, "points");
+    struct fault_point p;
+    char name[FAULT_POINT_MAX];
+    const struct fault_kind *k = v[0].given ? fault_kind_find(v[0].text) : NULL;
+    (void)t_ns;
+    if (v[0].given && !k) return control_refuse(c, "range", "kind: no \"%.40s\"; fault.kinds lists them", v[0].text);
+    for (unsigned n = 0; fault_point(c->bench, n, &p, name); n++) {
+        if (!k || k->places & FAULT_BIT(p.place)) cJSON_AddItemToArray(points, cJSON_CreateString(name));
+    }
+    return CONTROL_DONE;
+}
+
+/* ---- what is wrong */
+
+static void add_value(cJSON *to, const struct fault *f, enum fault_arg arg)
+{
+    const struct control_arg *a = &rows[ADD].arg[arg];
+    if (!fault_given(f, arg)) return;
+    if (a->choices) cJSON_AddStringToObject(to, a->name, a->choices[(unsigned)f->value[arg]]);
+    else cJSON_AddNumberToObject(to, a->name, f->value[arg]);
+}
+
+static void fault_describe(const struct fault *f, cJSON *to)
+{
+    cJSON_AddNumberToObject(to, "id", f->id);
+    cJSON_AddStringToObject(to, "kind", f->kind->name);
+    cJSON_AddStringToObject(to, "point", f->name);
+    cJSON_AddStringToObject(to, "state", fault_state_name(f->state));
+    add_value(to, f, FAULT_AT_S);
+    if (f->trigger.after != FAULT_NO_EVENT) {
+        cJSON_AddStringToObject(to, "after", psa2_event_name((enum psa2_event)f->trigger.after));
+        cJSON_AddNumberToObject(to, "count", f->trigger.count);
+        if (f->trigger.since != FAULT_NO_EVENT) {
+            cJSON_AddStringToObject(to, "since", psa2_event_name((enum psa2_event)f->trigger.since));
+        }
+        cJSON_AddStringToObject(to, "unit", f->engine->bench->unit_name[f->unit]);
+    }
+    for (unsigned i = FAULT_DELAY_S; i < FAULT_ARGS; i++) add_value(to, f, (enum fault_arg)i);
+    const bool begun = f->state == FAULT_ACTIVE || f->state == FAULT_OVER || f->state == FAULT_VOID;
+    if (begun) cJSON_AddNumberToObject(to, "began_s", (double)f->began_ns * 1e-9);
+    if (begun && f->state != FAULT_ACTIVE) cJSON_AddNumberToObject(to, "ended_s", (double)f->ended_ns * 1e-9);
+}
+
+static enum control_outcome do_list(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+{
+    const struct fault_engine *e = c->bench->faults;
+    cJSON *faults = cJSON_AddArrayToObject(result, "faults");
+    const struct fault *next;
+    (void)v;
+    (void)t_ns;
+    for (uint32_t last = 0; e; last = next->id) { /* in order of their coming */
+        next = NULL;
+        for (unsigned i = 0; i < FAULTS_MAX; i++) {
+            const struct fault *f = &e->fault[i];
+            if (f->id > last && (!next || f->id < next->id)) next = f;
+        }
+        if (!next) break;
+        cJSON *j = cJSON_CreateObject();
+        fault_describe(next, j);
+        cJSON_AddItemToArray(faults, j);
+    }
+    return CONTROL_DONE;
+}
+
+// clang-format off
+#define TIME_MAX_S 1e6
+static const struct control_command rows[COMMANDS] = {
+    [ADD] = {"fault.add", "Brings about a fault now, at an instant or after an event; what it takes besides is told by fault.kinds.", {
+     [FAULT_KIND] = {"kind", CONTROL_NAME, .what = "what goes wrong: a name of fault.kinds"},
+     [FAULT_POINT] = {"point", CONTROL_NAME, .what = "where: a name of fault.points"},
+     [FAULT_AT_S] = {"at_s", CONTROL_REAL, true, "s", 0, TIME_MAX_S, "simulated instant; without it: now. With after: events count from then on"},
+     [FAULT_AFTER] = {"after", CONTROL_NAME, true, .what = "event of a board that brings it about: RES, SETUP_DONE, SYNC_A, SYNC_T, DRD_A, DRD_T, INT_FALL, INT_RISE, POWER_DOWN or POWER_UP"},
+     [FAULT_COUNT] = {"count", CONTROL_COUNT, true, NULL, 1, 1e9, "which of these events; without it the first"},
+     [FAULT_SINCE] = {"since", CONTROL_NAME, true, .what = "event that starts the count anew"},
+     [FAULT_UNIT] = {"unit", CONTROL_UNIT, true, .what = "whose events; without it those of the point's unit"},
+     [FAULT_DELAY_S] = {"delay_s", CONTROL_REAL, true, "s", 0, 1000, "from the event to the fault"},
+     [FAULT_FOR_S] = {"for_s", CONTROL_REAL, true, "s", 0, TIME_MAX_S, "how long it lasts; 0 or without it: until fault.clear"},
+     [FAULT_OUT_V] = {"out_v", CONTROL_REAL, true, "V", -15, 15, "output of the sensor (one with current output: at its load)"},
+     [FAULT_BIAS_V] = {"bias_v", CONTROL_REAL, true, "V", -15, 15, "added to the output of the sensor"},
+     [FAULT_DRIFT_V_PER_S] = {"drift_v_per_s", CONTROL_REAL, true, "V/s", -1000, 1000, "by which the output of the sensor grows"},
+     [FAULT_SCALE_PPM] = {"scale_ppm", CONTROL_REAL, true, "ppm", -1e7, 1e7, "error of the sensor's scale factor; -1000000: deaf"},
+     [FAULT_RMS_V] = {"rms_v", CONTROL_REAL, true, "V", 1e-9, 10, "noise of a settled reading at 1000 SPS"},
+     [FAULT_LOW_V] = {"low_v", CONTROL_REAL, true, "V", -15, 15, "least output of the sensor"},
+     [FAULT_HIGH_V] = {"high_v", CONTROL_REAL, true, "V", -15, 15, "greatest output of the sensor"},
+     [FAULT_REFERENCE_PPM] = {"reference_ppm", CONTROL_REAL, true, "ppm", -500000, 1e6, "error of the converter's reference"},
+     [FAULT_DRIFT_PPM_PER_S] = {"drift_ppm_per_s", CONTROL_REAL, true, "ppm/s", 0, 1e6, "by which that error grows"},
+     [FAULT_AMPLITUDE_V] = {"amplitude_v", CONTROL_REAL, true, "V", 1e-6, 10, "of the ripple at the load"},
+     [FAULT_FREQUENCY_HZ] = {"frequency_hz", CONTROL_REAL, true, "Hz", 0.1, 100, "of the ripple; more would not pass the filter at 250 SPS"},
+     [FAULT_LEVEL] = {"level", CONTROL_CHOICE, true, .what = "at which it stays", .choices = levels},
+     [FAULT_REGISTER] = {"register", CONTROL_COUNT, true, NULL, 0, 31, "number of the register in the chip"},
+     [FAULT_MASK] = {"mask", CONTROL_COUNT, true, NULL, 1, 255, "bits that are inverted"},
+     [FAULT_CLOCK_PPM] = {"clock_ppm", CONTROL_REAL, true, "ppm", -FAULT_PPM_MAX, FAULT_PPM_MAX, "error of the chip's clock; negative: slow"},
+     [FAULT_WIDTH_NS] = {"width_ns", CONTROL_COUNT, true, "ns", 1, 1e9, "of the pulse"},
+     [FAULT_PULSE] = {"pulse", CONTROL_COUNT, true, NULL, 1, 128, "number of the pulse in the frame, from 1"},
+     [FAULT_RATE_HZ] = {"rate_hz", CONTROL_REAL, true, "Hz", 0.001, 1e6, "pulses a second, on average"},
+     [FAULT_PROBABILITY] = {"probability", CONTROL_REAL, true, NULL, 1e-6, 1, "that a frame is hit; without it 1"},
+     [FAULT_FRAMES] = {"frames", CONTROL_COUNT, true, NULL, 1, 1e9, "that are hit, then no more; without it all"},
+     [FAULT_ID] = {"can_id", CONTROL_COUNT, true, NULL, 0, 536870911, "identifier of the frames; without it any"},
+     [FAULT_ID_MASK] = {"can_id_mask", CONTROL_COUNT, true, NULL, 0, 536870911, "bits of the identifier that are compared; without it all"},
+     [FAULT_HOLD_S] = {"hold_s", CONTROL_REAL, true, "s", 0, 10, "by which a frame is held back"},
+     [FAULT_DROP_V] = {"drop_v", CONTROL_REAL, true, "V", 1e-3, 100, "by which the supply falls"},
+     }, .run = do_add, .changes = true, .check = check_add},
+    [CLEAR] = {"fault.clear", "Lifts a fault, or all of them, and forgets it.", {{"id", CONTROL_COUNT, true, NULL, 1, 4294967295.0, "what fault.add told"}}, .run = do_clear, .changes = true},
+    [LIST] = {"fault.list", "Lists the faults: waiting, listening for their event, active, over, or void (the point was gone).", {{0}}, .run = do_list},
+    [KINDS] = {"fault.kinds", "Lists the kinds of faults: what they do, how a host sees them, where they can be and what they take.", {{0}}, .run = do_kinds},
+    [POINTS] = {"fault.points", "Lists the points of the bench at which faults can be.", {{"kind", CONTROL_NAME, true, .what = "only those for this kind"}}, .run = do_points},
+};
+// clang-format on
+const struct control_table commands_fault = {rows, sizeof rows / sizeof *rows};

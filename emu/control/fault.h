@@ -1,0 +1,170 @@
+/* Faults: what goes wrong where, when and for how long.
+ *
+ * A kind of fault is a row of a table (fault_tables): its layer, the places it can happen at, the arguments it takes, and
+ * how it is brought about and lifted. A fault is a kind at a point, `a.sensor.x`, begun at an instant of simulated time or
+ * by an event of a board, and lifted after a time or by command. Random ones draw from rng_stream(seed, id, "fault").
+ * What a point does not support is refused with the reason. Several faults may be at one point. One thread; owned by the
+ * application, never moved after fault_init(). */
+#ifndef PSABENCH_CONTROL_FAULT_H
+#define PSABENCH_CONTROL_FAULT_H
+
+#include "base/can_fault.h"
+#include "control/control.h"
+#include "control/fault_trigger.h"
+#include "trace/line_fault.h"
+
+#define FAULTS_MAX      64u
+#define FAULT_POINT_MAX 32u /* bytes of a point's name */
+
+/* Arguments of fault.add, in the order of its row. The values after FAULT_FOR_S belong to the kinds. */
+enum fault_arg {
+    FAULT_KIND,
+    FAULT_POINT,
+    FAULT_AT_S,
+    FAULT_AFTER,
+    FAULT_COUNT,
+    FAULT_SINCE,
+    FAULT_UNIT,
+    FAULT_DELAY_S,
+    FAULT_FOR_S,
+    FAULT_OUT_V,
+    FAULT_BIAS_V,
+    FAULT_DRIFT_V_PER_S,
+    FAULT_SCALE_PPM,
+    FAULT_RMS_V,
+    FAULT_LOW_V,
+    FAULT_HIGH_V,
+    FAULT_REFERENCE_PPM,
+    FAULT_DRIFT_PPM_PER_S,
+    FAULT_AMPLITUDE_V,
+    FAULT_FREQUENCY_HZ,
+    FAULT_LEVEL,    /* 0 low, 1 high */
+    FAULT_REGISTER, /* number in the chip */
+    FAULT_MASK,
+    FAULT_CLOCK_PPM,
+    FAULT_WIDTH_NS,
+    FAULT_PULSE,
+    FAULT_RATE_HZ,
+    FAULT_PROBABILITY,
+    FAULT_FRAMES,
+    FAULT_ID,
+    FAULT_ID_MASK,
+    FAULT_HOLD_S,
+    FAULT_DROP_V,
+    FAULT_ARGS
+};
+
+enum fault_place {
+    FAULT_AT_SENSOR, /* a.sensor.x */
+    FAULT_AT_AFE,    /* a.afe.x */
+    FAULT_AT_ADC,    /* a.adc.x */
+    FAULT_AT_TADC,   /* a.tadc */
+    FAULT_AT_KPSA,   /* a.kpsa */
+    FAULT_AT_LINE,   /* a.line.Int */
+    FAULT_AT_NODE,   /* a.can */
+    FAULT_AT_BUS,    /* bus.can0 */
+    FAULT_AT_CLIENT, /* client.1, in order of coming */
+    FAULT_AT_SUPPLY, /* supply */
+    FAULT_PLACES
+};
+
+struct fault_point {
+    enum fault_place place;
+    unsigned unit, index; /* index: axis, line, bus or client, from 0 */
+};
+
+enum fault_state {
+    FAULT_WAITING,   /* for its instant */
+    FAULT_LISTENING, /* for its event */
+    FAULT_ACTIVE,
+    FAULT_OVER,
+    FAULT_VOID /* when it was due, its point was no longer there */
+};
+
+struct fault_engine;
+
+union fault_body {
+    struct sensor_fault sensor;
+    struct afe_fault afe;
+    uint32_t line; /* number among the faults of the unit's lines */
+    struct can_fault can;
+};
+
+struct fault {
+    uint32_t id; /* from 1; 0: the place is free */
+    const struct fault_kind *kind;
+    struct fault_point point;
+    char name[FAULT_POINT_MAX]; /* of the point */
+    double value[FAULT_ARGS];
+    uint64_t given; /* bit of enum fault_arg: the value was given */
+    enum fault_state state;
+    int64_t at_ns, delay_ns, for_ns; /* for_ns 0: until it is cleared */
+    unsigned unit;                   /* whose events count */
+    struct fault_trigger trigger;    /* after FAULT_NO_EVENT: by time alone */
+    int64_t began_ns, ended_ns;
+    union fault_body as; /* what hangs in the bench while it is active */
+    struct rng random;
+    struct fault_engine *engine;
+    struct unit_listener listener;
+    struct sched_ev ev;
+};
+
+struct fault_kind {
+    const char *name;   /* layer.name */
+    const char *what;   /* one sentence */
+    const char *seen;   /* how a host sees it, one sentence */
+    unsigned variant;   /* which of its layer's, for apply */
+    uint64_t places;    /* bits of enum fault_place */
+    uint64_t need, may; /* bits of enum fault_arg: the values it must be given, those it may */
+    uint64_t nonzero;   /* values that would change nothing if they were 0 */
+    bool once;          /* over as soon as it is done */
+    /* What its places do not say of this point or these values: false with the reason in why. NULL: it always fits. */
+    bool (*fits)(const struct control_bench *b, const struct fault *f, char *why);
+    bool (*apply)(struct fault *f, int64_t t_ns); /* false: the point is no longer there, or has no room */
+    void (*lift)(struct fault *f, int64_t t_ns);  /* it is no longer ACTIVE; NULL for those that are over at once */
+};
+
+struct fault_table {
+    const struct fault_kind *kind;
+    unsigned count;
+};
+
+struct fault_engine {
+    const struct control_bench *bench;
+    struct sched *sched;
+    struct fault fault[FAULTS_MAX];
+    struct line_faults lines[CONTROL_UNITS_MAX];
+    uint32_t last_id;
+    void (*changed)(void *ctx, const struct fault *f, int64_t t_ns); /* it began or ended; may be NULL */
+    void *ctx;
+};
+
+extern const struct fault_table *const fault_tables[]; /* up to NULL */
+
+void fault_init(struct fault_engine *e, const struct control_bench *bench, struct sched *s);
+
+/* The i-th kind; NULL past the last. */
+const struct fault_kind *fault_kind(unsigned i);
+const struct fault_kind *fault_kind_find(const char *name);
+const char *fault_state_name(enum fault_state state);
+
+/* The n-th point of a bench with its name; false past the last. */
+bool fault_point(const struct control_bench *b, unsigned n, struct fault_point *p, char name[FAULT_POINT_MAX]);
+const char *fault_place_name(enum fault_place place); /* as its points are named: "UNIT.sensor.x|y|z" */
+bool fault_point_find(const struct control_bench *b, const char *text, struct fault_point *p,
+                      char name[FAULT_POINT_MAX]);
+
+/* Fills in a fault from the arguments of fault.add. False with the reason. Ranges have been checked. */
+bool fault_make(const struct control_bench *b, const struct control_value *v, struct fault *out,
+                struct control_refusal *why);
+
+/* Whether a kind may be at a point; false with the reason in why[CONTROL_WHY_MAX]. */
+bool fault_fits(const struct control_bench *b, const struct fault *f, char *why);
+
+/* Takes over a fault that fault_make() made, now. Its id, or 0 if FAULTS_MAX are waiting or active. */
+uint32_t fault_add(struct fault_engine *e, const struct fault *f, int64_t t_ns);
+
+struct fault *fault_find(struct fault_engine *e, uint32_t id);
+void fault_clear(struct fault_engine *e, struct fault *f, int64_t t_ns); /* lifts it and forgets it */
+
+#endif

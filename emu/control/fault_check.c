@@ -1,0 +1,163 @@
+/* Which faults are refused, and why: the kind, the point, the values, the instant. */
+#include "control/fault_parts.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+const struct fault_table *const fault_tables[] = {&fault_sensor,     &fault_analog, &fault_chip,
+                                                  &fault_controller, &fault_line,   NULL};
+
+const struct fault_kind *fault_kind(unsigned i)
+{
+    for (unsigned t = 0; fault_tables[t]; t++) {
+        if (i < fault_tables[t]->count) return &fault_tables[t]->kind[i];
+        i -= fault_tables[t]->count;
+    }
+    return NULL;
+}
+
+const struct fault_kind *fault_kind_find(const char *name)
+{
+    const struct fault_kind *k;
+    for (unsigned i = 0; (k = fault_kind(i)) != NULL; i++) {
+        if (strcmp(k->name, name) == 0) return k;
+    }
+    return NULL;
+}
+
+__attribute__((format(printf, 3, 4))) static bool refuse(struct control_refusal *r, const char *code,
+                                                         const char *format, ...)
+{
+    va_list ap;
+    va_start(ap, format);
+    vsnprintf(r->why, sizeof r->why, format, ap);
+    va_end(ap);
+    r->code = code;
+    return false;
+}
+
+static void join(char *out, size_t cap, const char *word)
+{
+    const size_t at = strlen(out);
+    snprintf(out + at, cap - at, "%s%s", at ? ", " : "", word);
+}
+
+/* ---- kind and point */
+
+static bool find_kind(const char *name, const struct fault_kind **kind, struct control_refusal *why)
+{
+    char known[160] = "";
+    const struct fault_kind *k;
+    *kind = fault_kind_find(name);
+    if (*kind) return true;
+    const char *dot = strchr(name, '.');
+    const size_t layer = dot ? (size_t)(dot - name) + 1 : 0;
+    for (unsigned i = 0; (k = fault_kind(i)) != NULL; i++) {
+        if (layer && strncmp(k->name, name, layer) == 0) join(known, sizeof known, k->name);
+    }
+    if (!known[0]) return refuse(why, "range", "kind: no \"%.40s\"; fault.kinds lists them", name);
+    return refuse(why, "range", "kind: no \"%.40s\"; there is %s", name, known);
+}
+
+static bool find_point(const struct control_bench *b, const char *text, struct fault *f, struct control_refusal *why)
+{
+    if (fault_point_find(b, text, &f->point, f->name)) return true;
+    return refuse(why, "range", "point: no \"%.40s\" on this bench; fault.points lists them", text);
+}
+
+bool fault_fits(const struct control_bench *b, const struct fault *f, char *why)
+{
+    char places[120] = "";
+    if (f->kind->places & FAULT_BIT(f->point.place)) return !f->kind->fits || f->kind->fits(b, f, why);
+    for (unsigned i = 0; i < FAULT_PLACES; i++) {
+        if (f->kind->places & FAULT_BIT(i)) join(places, sizeof places, fault_place_name((enum fault_place)i));
+    }
+    snprintf(why, CONTROL_WHY_MAX, "%s: not on %s, which is %s; it works on %s", f->kind->name, f->name,
+             fault_place_what(f->point.place), places);
+    return false;
+}
+
+/* ---- values */
+
+bool fault_values_fit(const struct fault *f, struct control_refusal *why)
+{
+    const struct fault_kind *k = f->kind;
+    for (unsigned i = FAULT_FOR_S + 1; i < FAULT_ARGS; i++) {
+        const char *name = fault_arg_name((enum fault_arg)i);
+        const bool given = fault_given(f, (enum fault_arg)i);
+        if (given && !((k->need | k->may) & FAULT_BIT(i))) {
+            return refuse(why, "argument", "%s: %s takes no such value", name, k->name);
+        }
+        if (!given && (k->need & FAULT_BIT(i))) {
+            return refuse(why, "argument", "%s is missing: %s", name, fault_arg_what((enum fault_arg)i));
+        }
+        if (given && (k->nonzero & FAULT_BIT(i)) && f->value[i] == 0.0) {
+            return refuse(why, "range", "%s: 0 would change nothing", name);
+        }
+    }
+    return !k->once || !fault_given(f, FAULT_FOR_S) ||
+           refuse(why, "argument", "for_s: %s is over as soon as it is done", k->name);
+}
+
+/* ---- when */
+
+static bool find_event(const struct control_value *v, const char *arg, int *event, struct control_refusal *why)
+{
+    char known[160] = "";
+    *event = v->given ? psa2_event_find(v->text) : FAULT_NO_EVENT;
+    if (!v->given || *event != FAULT_NO_EVENT) return true;
+    for (int e = 0; e < PSA2_EVENTS; e++) join(known, sizeof known, psa2_event_name((enum psa2_event)e));
+    return refuse(why, "range", "%s: no event \"%.40s\"; there is %s", arg, v->text, known);
+}
+
+static bool has_unit(enum fault_place place)
+{
+    return place != FAULT_AT_BUS && place != FAULT_AT_CLIENT && place != FAULT_AT_SUPPLY;
+}
+
+static bool set_trigger(const struct control_bench *b, const struct control_value *v, struct fault *f,
+                        struct control_refusal *why)
+{
+    static const enum fault_arg of_events[] = {FAULT_COUNT, FAULT_SINCE, FAULT_UNIT, FAULT_DELAY_S};
+    int after, since;
+    if (!find_event(&v[FAULT_AFTER], "after", &after, why) || !find_event(&v[FAULT_SINCE], "since", &since, why)) {
+        return false;
+    }
+    for (unsigned i = 0; after == FAULT_NO_EVENT && i < sizeof of_events / sizeof *of_events; i++) {
+        const char *name = fault_arg_name(of_events[i]);
+        if (v[of_events[i]].given) return refuse(why, "argument", "%s: only with after, an event's name", name);
+    }
+    if (after != FAULT_NO_EVENT && after == since) return refuse(why, "range", "since: is after itself");
+    f->trigger = fault_trigger(after, since, v[FAULT_COUNT].given ? (unsigned)v[FAULT_COUNT].count : 1);
+    f->unit = v[FAULT_UNIT].given ? v[FAULT_UNIT].unit : f->point.unit;
+    if (after == FAULT_NO_EVENT || v[FAULT_UNIT].given || has_unit(f->point.place) || b->units == 1) return true;
+    return refuse(why, "argument", "unit is missing: whose events count");
+}
+
+static int64_t ns(double s)
+{
+    return (int64_t)nearbyint(s * (double)NS_PER_S);
+}
+
+bool fault_make(const struct control_bench *b, const struct control_value *v, struct fault *out,
+                struct control_refusal *why)
+{
+    memset(out, 0, sizeof *out);
+    for (unsigned i = 0; i < FAULT_ARGS; i++) {
+        if (!v[i].given) continue;
+        out->given |= FAULT_BIT(i);
+        out->value[i] = i == FAULT_LEVEL ? (double)v[i].choice : v[i].real;
+    }
+    out->at_ns = ns(out->value[FAULT_AT_S]);
+    out->delay_ns = ns(out->value[FAULT_DELAY_S]);
+    out->for_ns = ns(out->value[FAULT_FOR_S]);
+    if (!find_kind(v[FAULT_KIND].text, &out->kind, why) || !find_point(b, v[FAULT_POINT].text, out, why)) return false;
+    if (!set_trigger(b, v, out, why)) return false;
+    why->code = "point";
+    if (!(out->kind->places & FAULT_BIT(out->point.place))) return fault_fits(b, out, why->why);
+    if (!fault_values_fit(out, why)) return false;
+    why->code = "point";
+    return fault_fits(b, out, why->why);
+}

@@ -1,0 +1,32 @@
+/* What the files of the fault engine share. Not for others. */
+#ifndef PSABENCH_CONTROL_FAULT_PARTS_H
+#define PSABENCH_CONTROL_FAULT_PARTS_H
+
+#include "control/fault.h"
+
+#define FAULT_BIT(i)  (UINT64_C(1) << (i))
+#define FAULT_PPM_MAX 500000.0 /* of a chip's clock */
+
+extern const struct fault_table fault_sensor, fault_analog, fault_chip, fault_controller, fault_line, fault_link;
+
+static inline bool fault_given(const struct fault *f, enum fault_arg arg)
+{
+    return (f->given & FAULT_BIT(arg)) != 0;
+}
+
+static inline struct unit *fault_unit(const struct fault *f)
+{
+    return f->engine->bench->unit[f->point.unit];
+}
+
+/* fault_point.c: "the output of a sensor" */
+const char *fault_place_what(enum fault_place place);
+
+/* commands_fault.c: of the arguments of fault.add. */
+const char *fault_arg_name(enum fault_arg arg);
+const char *fault_arg_what(enum fault_arg arg);
+
+/* fault_check.c: whether the values are those of its kind; false with the refusal. */
+bool fault_values_fit(const struct fault *f, struct control_refusal *why);
+
+#endif

@@ -1,0 +1,150 @@
+/* Faults of sensors and of the analog chains behind them. */
+#include "control/fault_parts.h"
+
+#include <math.h>
+#include <stdio.h>
+
+/* The inputs up to now belong to the chain as it was. */
+static struct unit *settled_unit(struct fault *f, int64_t t_ns)
+{
+    struct unit *u = fault_unit(f);
+    psa2_sample_until(&u->board, t_ns);
+    return u;
+}
+
+/* ---- sensors */
+
+/* Volts in the arguments are volts at the load: a sensor with current output gives the current that makes them. */
+static double signal_per_v(const struct unit *u, unsigned axis)
+{
+    const struct afe_cfg *afe = &u->cfg.board.afe[axis];
+    return afe->input == AFE_CURRENT ? 1.0 / afe->load_ohm : 1.0;
+}
+
+static bool has_sensor(const struct control_bench *b, const struct fault *f, char *why)
+{
+    const struct unit *u = b->unit[f->point.unit];
+    if (!u || u->cfg.axis[f->point.index].sensor != UNIT_NO_SENSOR) return true;
+    snprintf(why, CONTROL_WHY_MAX, "%s: the channel has no sensor", f->name);
+    return false;
+}
+
+static bool has_limits(const struct control_bench *b, const struct fault *f, char *why)
+{
+    if (!has_sensor(b, f, why)) return false;
+    if (!fault_given(f, FAULT_LOW_V) && !fault_given(f, FAULT_HIGH_V)) {
+        snprintf(why, CONTROL_WHY_MAX, "low_v or high_v is missing: where the output stops");
+        return false;
+    }
+    if (!fault_given(f, FAULT_LOW_V) || !fault_given(f, FAULT_HIGH_V)) return true;
+    if (f->value[FAULT_LOW_V] < f->value[FAULT_HIGH_V]) return true;
+    snprintf(why, CONTROL_WHY_MAX, "low_v: %.10g is not below high_v, %.10g", f->value[FAULT_LOW_V],
+             f->value[FAULT_HIGH_V]);
+    return false;
+}
+
+static double volts(const struct fault *f, enum fault_arg arg, double otherwise)
+{
+    return fault_given(f, arg) ? f->value[arg] * signal_per_v(fault_unit(f), f->point.index) : otherwise;
+}
+
+/* Value and upper value of each kind, by enum sensor_fault_kind. */
+static bool apply_sensor(struct fault *f, int64_t t_ns)
+{
+    const double infinite = (double)INFINITY;
+    const double values[SENSOR_FAULTS][2] = {
+        [SENSOR_STUCK] = {volts(f, FAULT_OUT_V, (double)NAN)},
+        [SENSOR_BIAS] = {volts(f, FAULT_BIAS_V, 0.0)},
+        [SENSOR_DRIFT] = {volts(f, FAULT_DRIFT_V_PER_S, 0.0)},
+        [SENSOR_SCALE] = {f->value[FAULT_SCALE_PPM] * 1e-6},
+        [SENSOR_NOISE] = {mems_density_v_rthz(volts(f, FAULT_RMS_V, 0.0), 1000.0)},
+        [SENSOR_SATURATION] = {volts(f, FAULT_LOW_V, -infinite), volts(f, FAULT_HIGH_V, infinite)},
+    };
+    const unsigned k = f->kind->variant;
+    struct unit *u = settled_unit(f, t_ns);
+    f->as.sensor = (struct sensor_fault){.kind = (enum sensor_fault_kind)k,
+                                         .value = values[k][0],
+                                         .value_high = values[k][1],
+                                         .zero = u->mems[f->point.index].cfg.u0_v,
+                                         .from_ns = t_ns,
+                                         .noise = f->random};
+    sensor_fault_add(&u->sensor_faults[f->point.index], &f->as.sensor);
+    return true;
+}
+
+static void lift_sensor(struct fault *f, int64_t t_ns)
+{
+    struct unit *u = settled_unit(f, t_ns);
+    sensor_fault_remove(&u->sensor_faults[f->point.index], &f->as.sensor);
+}
+
+// clang-format off
+#define SENSOR(v) .variant = v, .places = FAULT_BIT(FAULT_AT_SENSOR), .apply = apply_sensor, .lift = lift_sensor
+static const struct fault_kind sensor[] = {
+    {"sensor.stuck", "The output stays at out_v, or at what it is at that instant.", "the codes of the axis stand still but for the converter's noise, whatever the head does",
+     SENSOR(SENSOR_STUCK), .may = FAULT_BIT(FAULT_OUT_V), .fits = has_sensor},
+    {"sensor.bias", "bias_v is added to the output.", "the codes of the axis step and stay there",
+     SENSOR(SENSOR_BIAS), .need = FAULT_BIT(FAULT_BIAS_V), .nonzero = FAULT_BIT(FAULT_BIAS_V), .fits = has_sensor},
+    {"sensor.drift", "The output runs away.", "the codes of the axis have a slope",
+     SENSOR(SENSOR_DRIFT), .need = FAULT_BIT(FAULT_DRIFT_V_PER_S), .nonzero = FAULT_BIT(FAULT_DRIFT_V_PER_S), .fits = has_sensor},
+    {"sensor.scale", "The deviation of the output from its zero is wrong by scale_ppm.", "the codes of the axis are wrong in proportion to what the axis feels",
+     SENSOR(SENSOR_SCALE), .need = FAULT_BIT(FAULT_SCALE_PPM), .nonzero = FAULT_BIT(FAULT_SCALE_PPM), .fits = has_sensor},
+    {"sensor.noise", "White noise is added; it gives a settled reading at 1000 SPS the rms rms_v.", "the codes of the axis scatter more",
+     SENSOR(SENSOR_NOISE), .need = FAULT_BIT(FAULT_RMS_V), .fits = has_sensor},
+    {"sensor.saturation", "The output does not leave low_v ... high_v.", "the codes of the axis stop at a limit that is not the converter's",
+     SENSOR(SENSOR_SATURATION), .may = FAULT_BIT(FAULT_LOW_V) | FAULT_BIT(FAULT_HIGH_V), .fits = has_limits},
+};
+// clang-format on
+const struct fault_table fault_sensor = {sensor, sizeof sensor / sizeof *sensor};
+
+/* ---- analog chain */
+
+static bool has_load(const struct control_bench *b, const struct fault *f, char *why)
+{
+    const struct unit *u = b->unit[f->point.unit];
+    if (!u || u->cfg.board.afe[f->point.index].input == AFE_CURRENT) return true;
+    snprintf(why, CONTROL_WHY_MAX, "%s: no load resistor in the chain of a sensor with voltage output", f->name);
+    return false;
+}
+
+static bool has_error(const struct control_bench *b, const struct fault *f, char *why)
+{
+    (void)b;
+    if (f->value[FAULT_REFERENCE_PPM] != 0.0 || f->value[FAULT_DRIFT_PPM_PER_S] != 0.0) return true;
+    snprintf(why, CONTROL_WHY_MAX, "reference_ppm or drift_ppm_per_s is missing, or both are 0");
+    return false;
+}
+
+static bool apply_afe(struct fault *f, int64_t t_ns)
+{
+    const bool ripple = f->kind->variant == AFE_RIPPLE;
+    struct unit *u = settled_unit(f, t_ns);
+    f->as.afe = (struct afe_fault){.kind = (enum afe_fault_kind)f->kind->variant,
+                                   .value = ripple ? f->value[FAULT_AMPLITUDE_V] : f->value[FAULT_REFERENCE_PPM] * 1e-6,
+                                   .rate_per_s = f->value[FAULT_DRIFT_PPM_PER_S] * 1e-6,
+                                   .frequency_hz = f->value[FAULT_FREQUENCY_HZ],
+                                   .from_ns = t_ns};
+    afe_fault_add(&u->board.afe[f->point.index], &f->as.afe);
+    return true;
+}
+
+static void lift_afe(struct fault *f, int64_t t_ns)
+{
+    struct unit *u = settled_unit(f, t_ns);
+    afe_fault_remove(&u->board.afe[f->point.index], &f->as.afe);
+}
+
+// clang-format off
+#define CHAIN(v) .variant = v, .places = FAULT_BIT(FAULT_AT_AFE), .apply = apply_afe, .lift = lift_afe
+static const struct fault_kind analog[] = {
+    {"analog.load_open", "The load resistor of a current-output sensor is open: the buffer goes to its limit.", "the codes of the axis stand at the limit, status CLIP",
+     CHAIN(AFE_LOAD_OPEN), .fits = has_load},
+    {"analog.load_short", "The load resistor of a current-output sensor is shorted: no volts.", "the codes of the axis stand near 0, whatever the head does",
+     CHAIN(AFE_LOAD_SHORT), .fits = has_load},
+    {"analog.reference", "The converter's reference is wrong by reference_ppm and runs away by drift_ppm_per_s.", "the codes of the axis are too small in proportion, offset and all",
+     CHAIN(AFE_REFERENCE), .may = FAULT_BIT(FAULT_REFERENCE_PPM) | FAULT_BIT(FAULT_DRIFT_PPM_PER_S), .fits = has_error},
+    {"analog.ripple", "A sine of the supply comes through the buffer, amplitude at the load.", "the codes of the axis carry a line at frequency_hz",
+     CHAIN(AFE_RIPPLE), .need = FAULT_BIT(FAULT_AMPLITUDE_V) | FAULT_BIT(FAULT_FREQUENCY_HZ)},
+};
+// clang-format on
+const struct fault_table fault_analog = {analog, sizeof analog / sizeof *analog};
