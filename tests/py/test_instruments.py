@@ -166,7 +166,12 @@ def test_a_chamber_is_waited_for() -> None:
 
 
 def test_a_refusal_has_number_and_text_and_empties_the_queue() -> None:
-    errors = ['-222,"Data out of range;VOLT 99: 0 ... 36"', '-113,"Undefined header"', NO_ERROR]
+    errors = [
+        '-222,"Data out of range;VOLT 99: 0 ... 36"',
+        '-113,"Undefined header"',
+        '-350,"Queue overflow"',
+        NO_ERROR,
+    ]
     with instrument("supply", {"SYST:ERR?": errors}) as (supply, wire, _):
         assert isinstance(supply, Supply)
         with pytest.raises(
