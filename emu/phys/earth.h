@@ -16,8 +16,8 @@ struct site {
     bool placed;        /* the place is given: the Earth turns. Else it stands still and g_mps2 is all there is */
 };
 
-/* Gravity of the level ellipsoid at a geodetic latitude and a height above it: Somigliana's formula, and the series in h to
- * second order, which is within 1e-8 of the closed form up to 3 km and within 1e-7 up to 8 km. */
+/* Magnitude of the gravity of the level ellipsoid at a geodetic latitude and a height above it, in closed form. On the
+ * ellipsoid it is Somigliana's formula with the published constants, to 1e-10. */
 double earth_gravity_mps2(double latitude_rad, double height_m);
 
 /* A placed site with its normal gravity. */
