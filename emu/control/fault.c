@@ -1,5 +1,5 @@
 /* The life of a fault: it waits for its instant, then for its event, begins, lasts, and ends. */
-#include "control/fault_parts.h"
+#include "control/fault.h"
 
 #include <assert.h>
 #include <string.h>

@@ -9,69 +9,12 @@
 #define PSABENCH_CONTROL_FAULT_H
 
 #include "base/can_fault.h"
-#include "control/control.h"
+#include "control/fault_args.h"
+#include "control/fault_point.h"
 #include "control/fault_trigger.h"
 #include "trace/line_fault.h"
 
-#define FAULTS_MAX      64u
-#define FAULT_POINT_MAX 32u /* bytes of a point's name */
-
-/* Arguments of fault.add, in the order of its row. The values after FAULT_FOR_S belong to the kinds. */
-enum fault_arg {
-    FAULT_KIND,
-    FAULT_POINT,
-    FAULT_AT_S,
-    FAULT_AFTER,
-    FAULT_COUNT,
-    FAULT_SINCE,
-    FAULT_UNIT,
-    FAULT_DELAY_S,
-    FAULT_FOR_S,
-    FAULT_OUT_V,
-    FAULT_BIAS_V,
-    FAULT_DRIFT_V_PER_S,
-    FAULT_SCALE_PPM,
-    FAULT_RMS_V,
-    FAULT_LOW_V,
-    FAULT_HIGH_V,
-    FAULT_REFERENCE_PPM,
-    FAULT_DRIFT_PPM_PER_S,
-    FAULT_AMPLITUDE_V,
-    FAULT_FREQUENCY_HZ,
-    FAULT_LEVEL,    /* 0 low, 1 high */
-    FAULT_REGISTER, /* number in the chip */
-    FAULT_MASK,
-    FAULT_CLOCK_PPM,
-    FAULT_WIDTH_NS,
-    FAULT_PULSE,
-    FAULT_RATE_HZ,
-    FAULT_PROBABILITY,
-    FAULT_FRAMES,
-    FAULT_ID,
-    FAULT_ID_MASK,
-    FAULT_HOLD_S,
-    FAULT_DROP_V,
-    FAULT_ARGS
-};
-
-enum fault_place {
-    FAULT_AT_SENSOR, /* a.sensor.x */
-    FAULT_AT_AFE,    /* a.afe.x */
-    FAULT_AT_ADC,    /* a.adc.x */
-    FAULT_AT_TADC,   /* a.tadc */
-    FAULT_AT_KPSA,   /* a.kpsa */
-    FAULT_AT_LINE,   /* a.line.Int */
-    FAULT_AT_NODE,   /* a.can */
-    FAULT_AT_BUS,    /* bus.can0 */
-    FAULT_AT_CLIENT, /* client.1, in order of coming */
-    FAULT_AT_SUPPLY, /* supply */
-    FAULT_PLACES
-};
-
-struct fault_point {
-    enum fault_place place;
-    unsigned unit, index; /* index: axis, line, bus or client, from 0 */
-};
+#define FAULTS_MAX 64u
 
 enum fault_state {
     FAULT_WAITING,   /* for its instant */
@@ -147,12 +90,6 @@ void fault_init(struct fault_engine *e, const struct control_bench *bench, struc
 const struct fault_kind *fault_kind(unsigned i);
 const struct fault_kind *fault_kind_find(const char *name);
 const char *fault_state_name(enum fault_state state);
-
-/* The n-th point of a bench with its name; false past the last. */
-bool fault_point(const struct control_bench *b, unsigned n, struct fault_point *p, char name[FAULT_POINT_MAX]);
-const char *fault_place_name(enum fault_place place); /* as its points are named: "UNIT.sensor.x|y|z" */
-bool fault_point_find(const struct control_bench *b, const char *text, struct fault_point *p,
-                      char name[FAULT_POINT_MAX]);
 
 /* Fills in a fault from the arguments of fault.add. False with the reason. Ranges have been checked. */
 bool fault_make(const struct control_bench *b, const struct control_value *v, struct fault *out,

@@ -19,9 +19,6 @@ static inline struct unit *fault_unit(const struct fault *f)
     return f->engine->bench->unit[f->point.unit];
 }
 
-/* fault_point.c: "the output of a sensor" */
-const char *fault_place_what(enum fault_place place);
-
 /* commands_fault.c: of the arguments of fault.add. */
 const char *fault_arg_name(enum fault_arg arg);
 const char *fault_arg_what(enum fault_arg arg);

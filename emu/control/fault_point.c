@@ -1,5 +1,4 @@
-/* Points of a bench at which faults can be: their names, in the order in which fault.points lists them. */
-#include "control/fault_parts.h"
+#include "control/fault_point.h"
 
 #include <ctype.h>
 #include <stdio.h>

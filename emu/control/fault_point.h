@@ -1,0 +1,37 @@
+/* Where on a bench faults can be: points by name, in the order in which fault.points lists them. */
+#ifndef PSABENCH_CONTROL_FAULT_POINT_H
+#define PSABENCH_CONTROL_FAULT_POINT_H
+
+#include "control/control.h"
+
+#define FAULT_POINT_MAX 32u /* bytes of a point's name */
+
+enum fault_place {
+    FAULT_AT_SENSOR, /* a.sensor.x */
+    FAULT_AT_AFE,    /* a.afe.x */
+    FAULT_AT_ADC,    /* a.adc.x */
+    FAULT_AT_TADC,   /* a.tadc */
+    FAULT_AT_KPSA,   /* a.kpsa */
+    FAULT_AT_LINE,   /* a.line.Int */
+    FAULT_AT_NODE,   /* a.can */
+    FAULT_AT_BUS,    /* bus.can0 */
+    FAULT_AT_CLIENT, /* client.1, in order of coming */
+    FAULT_AT_SUPPLY, /* supply */
+    FAULT_PLACES
+};
+
+struct fault_point {
+    enum fault_place place;
+    unsigned unit, index; /* index: axis, line, bus or client, from 0 */
+};
+
+/* The n-th point of a bench with its name; false past the last. */
+bool fault_point(const struct control_bench *b, unsigned n, struct fault_point *p, char name[FAULT_POINT_MAX]);
+const char *fault_place_name(enum fault_place place); /* as its points are named: "UNIT.sensor.x|y|z" */
+bool fault_point_find(const struct control_bench *b, const char *text, struct fault_point *p,
+                      char name[FAULT_POINT_MAX]);
+
+/* "the output of a sensor" */
+const char *fault_place_what(enum fault_place place);
+
+#endif
