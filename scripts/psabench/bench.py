@@ -377,7 +377,7 @@ class Bench:
     # ---- faults, snapshots
 
     def fault(self, kind: str, point: str, **args: object) -> Fault:
-        """Plan a fault: bench.fault("stuck", "a.line.INT", at_s=0.1, for_s=0.01). See `Faults.add`."""
+        """Plan a fault: bench.fault("sensor.bias", "a.sensor.x", bias_v=0.1, at_s=0.5). See `Faults.add`."""
         return self.faults.add(kind, point, **args)
 
     def snapshot(self, path: str | Path) -> Path:

@@ -1,7 +1,7 @@
 """Faults of an emulated bench: what can break, where, and when. Through the control socket.
 
-    bench.faults.add("stuck_high", "a.line.INT", at_s=0.1, for_s=0.01)
-    with bench.fault("drop", "bus.can0", after="DRD_A", count=3, since="SYNC_A"):
+    bench.faults.add("sensor.drift", "a.sensor.x", drift_v_per_s=0.01, at_s=0.1, for_s=10.0)
+    with bench.fault("sensor.bias", "a.sensor.x", bias_v=0.1, after="DRD_A", count=3, since="SYNC_A"):
         ...
 
 docs/faults.md has every kind with its arguments, and which points support it.
@@ -31,7 +31,7 @@ class Fault:
         self.faults.clear(self.id)
 
     def state(self) -> dict[str, Any]:
-        """Its row of `faults.list`; empty when it is over and forgotten."""
+        """Its row of `faults.list`; empty when it was cleared."""
         return next((row for row in self.faults.list() if row["id"] == self.id), {})
 
     def __enter__(self) -> Fault:
@@ -49,12 +49,13 @@ class Faults:
         self._bench = bench
 
     def kinds(self) -> list[dict[str, Any]]:
-        """All kinds: name, layer, what it does, arguments with unit and range."""
+        """All kinds: "kind", "what" it does, how it is "seen", "points" that support it, "args" with unit and range."""
         return list(self._bench.control.call("fault.kinds").result["kinds"])
 
-    def points(self) -> list[dict[str, Any]]:
-        """All points of this bench, with the kinds that each supports."""
-        return list(self._bench.control.call("fault.points").result["points"])
+    def points(self, kind: str | None = None) -> list[str]:
+        """All points of this bench; with a kind, those that support it."""
+        args = {} if kind is None else {"kind": kind}
+        return [str(p) for p in self._bench.control.call("fault.points", **args).result["points"]]
 
     def add(self, kind: str, point: str, **args: object) -> Fault:
         """Plan a fault at a point.
@@ -69,6 +70,6 @@ class Faults:
         """The faults planned, on and over."""
         return list(self._bench.control.call("fault.list").result["faults"])
 
-    def clear(self, number: int) -> None:
-        """Lift or forget the fault with this id."""
-        self._bench.control.call("fault.clear", id=number)
+    def clear(self, number: int | None = None) -> None:
+        """Lift and forget the fault with this id, or all of them."""
+        self._bench.control.call("fault.clear", **({} if number is None else {"id": number}))
