@@ -20,8 +20,8 @@ static bool run_slice(struct loop *l, int64_t until_ns)
     const int64_t from_ns = next_ns > now_ns ? next_ns : now_ns;
     const int64_t to_ns = from_ns >= until_ns ? until_ns : min_ns(until_ns, from_ns + PACE_SLICE_NS);
     sched_run_until(l->sched, to_ns);
-    l->moved(l->ctx, to_ns);
-    return to_ns == until_ns;
+    l->moved(l->ctx, l->sched->now_ns);
+    return l->sched->now_ns == until_ns;
 }
 
 /* Wall pace: everything due by now, instant by instant, so that each one's lateness is known. */
@@ -167,6 +167,13 @@ bool loop_step(struct loop *l, int64_t for_ns, uint64_t after_taken)
     l->until_ns = l->sched->now_ns + for_ns;
     l->after_taken = after_taken;
     return true;
+}
+
+void loop_stop_step(struct loop *l)
+{
+    if (l->run != LOOP_RUNNING) return;
+    sched_stop(l->sched);
+    l->until_ns = l->sched->now_ns;
 }
 
 void loop_cancel_step(struct loop *l)

@@ -12,7 +12,7 @@
 
 #include <signal.h>
 
-#define LOOP_LINKS_MAX 96u
+#define LOOP_LINKS_MAX 256u
 
 struct loop {
     struct sched *sched;
@@ -40,6 +40,9 @@ void loop_drain(struct loop *l, int patience_ms);
 
 /* Step pace: time is to move by for_ns once after_taken frames of clients have been taken. False: a run is under way. */
 bool loop_step(struct loop *l, int64_t for_ns, uint64_t after_taken);
+
+/* From within an event: the run ends at the present instant, and is over when its output is with the kernel. */
+void loop_stop_step(struct loop *l);
 
 void loop_cancel_step(struct loop *l); /* who asked has gone: stop where we are */
 
