@@ -3,6 +3,7 @@
 #include "app/find.h"
 #include "app/profile_yaml.h"
 #include "control/control.h"
+#include "control/scpi.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -74,5 +75,20 @@ void list_commands(FILE *out)
     fprintf(out, "\n");
     for (unsigned i = 0; control_markdown(control_truth_tables, i, line, sizeof line); i++) {
         fprintf(out, "%s\n", line);
+    }
+}
+
+static void list_headers(FILE *out, const struct scpi_kind *kind)
+{
+    char line[2048];
+    for (unsigned i = 0; scpi_markdown(kind, i, line, sizeof line); i++) fprintf(out, "%s\n", line);
+}
+
+void list_scpi(FILE *out)
+{
+    list_headers(out, NULL);
+    for (const struct scpi_kind *k = scpi_kinds; k->name; k++) {
+        fprintf(out, "\n");
+        list_headers(out, k);
     }
 }

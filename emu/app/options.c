@@ -29,6 +29,9 @@ static const char help[] =
     "  --bitrate HZ             of the bus, instead of the scenario's; 0: frames take no time\n"
     "  --data-bitrate HZ        of FD frames with bit rate switch; 0: no FD on the bus\n"
     "  --epoch SECONDS          added to the time stamps that clients see\n"
+    "  --scpi WHAT[:PORT]       an instrument on 127.0.0.1 in SCPI: head, table, chamber, supply, or all that the\n"
+    "                           scenario has; without a port a free one\n"
+    "  --scpi WHAT:pty[:LINK]   the same on a pseudo-terminal; --scpi may be given several times\n"
     "  --control PATH           Unix socket for commands, one JSON object a line\n"
     "  --truth PATH             Unix socket that tells the hidden parameters, for graders\n"
     "  --unit NAME              unit whose lines --vcd and --line show (default: the first)\n"
@@ -41,6 +44,7 @@ static const char help[] =
     "  --list-scenarios         names for SCENARIO, and what each is\n"
     "  --list-profiles          board profiles with their clocks and frame, and what each is\n"
     "  --list-commands          commands of the control socket and the truth port\n"
+    "  --list-scpi              headers of the instruments\n"
     "  --help, --version\n"
     "\n"
     "On stdout: one line `ready key=value ...` for each endpoint, then `ready all`. Exit status: 0 done, 2 bad input,\n"
@@ -126,6 +130,29 @@ static bool set_can(struct target *t, const char *arg)
                     arg);
     }
     o->can_count++;
+    return true;
+}
+
+/* head:5025 or head:pty:LINK. */
+static bool set_scpi(struct target *t, const char *arg)
+{
+    struct options *o = t->o;
+    if (o->scpi_count == OPTIONS_SCPI_MAX)
+        return fail(t->why, t->cap, "--scpi %s: up to %u instruments", arg, OPTIONS_SCPI_MAX);
+    struct options_scpi *i = &o->scpi[o->scpi_count++];
+    const size_t len = strcspn(arg, ":");
+    const char *rest = arg[len] ? arg + len + 1 : "0";
+    uint64_t port = 0;
+    *i = (struct options_scpi){.arg = arg, .pty = strcmp(rest, "pty") == 0 || strncmp(rest, "pty:", 4) == 0};
+    snprintf(i->kind, sizeof i->kind, "%.*s", (int)len, arg);
+    if (len == 0 || len >= sizeof i->kind)
+        return fail(t->why, t->cap, "--scpi %s: head, table, chamber, supply or all is wanted", arg);
+    if (i->pty && rest[3] && rest[4]) i->link = rest + 4;
+    if (!i->pty && !parse_u64(rest, 65535, &port)) {
+        return fail(t->why, t->cap, "--scpi %s: \"%s\" is neither pty[:LINK] nor a port, 0 to 65535 (0: a free one)",
+                    arg, rest);
+    }
+    i->port = (uint16_t)port;
     return true;
 }
 
@@ -222,6 +249,8 @@ static bool set_profiles(struct target *t, const char *arg) { (void)arg; t->o->a
 static bool set_scenarios(struct target *t, const char *arg) { (void)arg; t->o->action = OPTIONS_LIST_SCENARIOS; return true; }
 static bool set_commands(struct target *t, const char *arg) { (void)arg; t->o->action = OPTIONS_LIST_COMMANDS; return true; }
 
+static bool set_list_scpi(struct target *t, const char *arg) { (void)arg; t->o->action = OPTIONS_LIST_SCPI; return true; }
+
 static const struct {
     const char *name;
     int has_arg;
@@ -238,6 +267,7 @@ static const struct {
     {"quiet", no_argument, set_quiet},             {"help", no_argument, set_help},
     {"version", no_argument, set_version},         {"list-profiles", no_argument, set_profiles},
     {"list-scenarios", no_argument, set_scenarios}, {"list-commands", no_argument, set_commands},
+    {"scpi", required_argument, set_scpi},         {"list-scpi", no_argument, set_list_scpi},
 };
 // clang-format on
 #define ROWS (sizeof rows / sizeof *rows)

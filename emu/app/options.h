@@ -8,7 +8,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define OPTIONS_CAN_MAX 8u
+#define OPTIONS_CAN_MAX  8u
+#define OPTIONS_SCPI_MAX 8u
 
 enum options_can_kind { OPTIONS_SOCKETCAND, OPTIONS_SLCAN, OPTIONS_SOCKETCAN };
 
@@ -18,13 +19,22 @@ struct options_can {
     uint16_t port;   /* socketcand; 0: a free one */
 };
 
+struct options_scpi {
+    const char *arg; /* as given */
+    char kind[12];   /* head, table, chamber, supply, all: whoever opens it looks */
+    bool pty;
+    const char *link; /* of the pty; may be NULL */
+    uint16_t port;    /* 0: a free one */
+};
+
 enum options_action {
     OPTIONS_RUN,
     OPTIONS_HELP,
     OPTIONS_VERSION,
     OPTIONS_LIST_PROFILES,
     OPTIONS_LIST_SCENARIOS,
-    OPTIONS_LIST_COMMANDS
+    OPTIONS_LIST_COMMANDS,
+    OPTIONS_LIST_SCPI
 };
 
 struct options {
@@ -33,6 +43,8 @@ struct options {
     struct options_can can[OPTIONS_CAN_MAX];
     unsigned can_count; /* none given: socketcand on its usual port */
     bool can_given;
+    struct options_scpi scpi[OPTIONS_SCPI_MAX];
+    unsigned scpi_count;
     enum pace_kind pace;
     int64_t for_ns; /* end of the run; INT64_MAX: none */
     bool seed_given;

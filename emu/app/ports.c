@@ -144,12 +144,13 @@ bool ports_open(struct ports *p, struct bench *b, const struct options *o, char 
 {
     p->control.listen.fd = p->truth.listen.fd = -1;
     p->control.links = p->truth.links = &p->links;
+    p->scpi.links = &p->links;
     p->hub.bus = &b->bus;
     p->hub.links = &p->links;
     p->hub.lossless = o->pace != PACE_WALL;
     p->hub.epoch_ns = o->epoch_ns;
     return open_can(p, o, why, cap) && open_line(p, b, o, why, cap) && open_vcd(p, b, o, why, cap) &&
-           open_socket(&p->control, "control", o->control, why, cap) &&
+           instruments_open(&p->scpi, o, why, cap) && open_socket(&p->control, "control", o->control, why, cap) &&
            open_socket(&p->truth, "truth", o->truth, why, cap);
 }
 
@@ -175,6 +176,7 @@ void ports_ready(const struct ports *p, const struct options *o, FILE *out)
         snprintf(what, sizeof what, "line=sampled hz=%" PRId64, o->line_hz);
         ready_pty(out, what, &p->line->pty);
     }
+    instruments_ready(&p->scpi, out);
     if (o->vcd) fprintf(out, "ready vcd=%s\n", o->vcd);
     if (o->control) fprintf(out, "ready control=%s\n", o->control);
     if (o->truth) fprintf(out, "ready truth=%s\n", o->truth);
@@ -193,11 +195,13 @@ void ports_close(struct ports *p)
 {
     for (unsigned i = 0; i < p->can_count; i++) close_can(p->can[i]);
     if (p->line) line_pty_close(p->line);
+    instruments_close(&p->scpi);
     ctl_close(&p->control);
     ctl_close(&p->truth);
     for (struct link *l = p->links.first; l; l = l->next) l->gone = true;
     links_reap(&p->links);
     for (unsigned i = 0; i < p->can_count; i++) free(p->can[i]);
+    instruments_free(&p->scpi);
     free(p->line);
     if (p->vcd) fclose(p->vcd);
     *p = (struct ports){.control.listen.fd = -1, .truth.listen.fd = -1};

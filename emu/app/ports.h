@@ -3,6 +3,7 @@
 #define PSABENCH_APP_PORTS_H
 
 #include "app/bench.h"
+#include "app/instruments.h"
 #include "app/options.h"
 #include "link/can_hub.h"
 #include "link/ctl_sock.h"
@@ -26,6 +27,7 @@ struct ports {
     struct ports_can *can[OPTIONS_CAN_MAX];
     unsigned can_count;
     struct line_pty *line;
+    struct instruments scpi;          /* control and sched are filled in by the caller */
     struct ctl_server control, truth; /* callbacks are filled in by the caller */
     FILE *vcd;
 };

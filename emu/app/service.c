@@ -128,7 +128,9 @@ static void make_view(struct service *s)
 static void on_control_line(void *ctx, struct ctl_client *c, const char *line, int64_t t_ns)
 {
     struct service *s = ctx;
+    s->control.client = c;
     const char *reply = control_line(&s->control, line, t_ns);
+    instruments_look(&s->ports.scpi, t_ns);
     if (reply) ctl_reply(c, reply);
     else s->runner = c;
 }
@@ -219,6 +221,8 @@ bool service_open(struct service *s, struct bench *b, const struct options *o, c
     control_init(&s->control, control_tables, &s->view);
     control_init(&s->truth, control_truth_tables, &s->view);
     s->ports.hub.say = say;
+    s->ports.scpi.control = &s->control;
+    s->ports.scpi.sched = &b->sched;
     s->ports.control = (struct ctl_server){.line = on_control_line, .gone = on_control_gone, .ctx = s};
     s->ports.truth = (struct ctl_server){.line = on_truth_line, .gone = on_truth_gone, .ctx = s};
     s->loop = (struct loop){.sched = &b->sched,

@@ -1,0 +1,156 @@
+#include "app/instruments.h"
+
+#include "base/text.h"
+
+#include <errno.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+
+__attribute__((format(printf, 3, 4))) static bool fail(char *why, size_t cap, const char *format, ...)
+{
+    va_list ap;
+    va_start(ap, format);
+    vsnprintf(why, cap, format, ap);
+    va_end(ap);
+    text_one_line(why);
+    return false;
+}
+
+/* ---- sessions */
+
+struct session {
+    struct scpi scpi; /* first */
+    struct instruments *all;
+    struct scpi_peer *peer;
+};
+
+static void on_reply(void *ctx, const char *text, size_t n)
+{
+    scpi_port_reply(((struct session *)ctx)->peer, text, n);
+}
+
+static void *on_opened(void *ctx, struct scpi_peer *peer)
+{
+    const struct instrument *i = ctx;
+    struct session *s = calloc(1, sizeof *s);
+    if (!s) return NULL;
+    s->all = i->all;
+    s->peer = peer;
+    s->scpi.kind = i->kind;
+    s->scpi.control = i->all->control;
+    s->scpi.sched = i->all->sched;
+    s->scpi.reply = on_reply;
+    s->scpi.ctx = s;
+    scpi_open(&s->scpi);
+    s->scpi.next = i->all->sessions;
+    i->all->sessions = &s->scpi;
+    return s;
+}
+
+static void on_closed(void *ctx)
+{
+    struct session *s = ctx;
+    struct scpi **p = &s->all->sessions;
+    while (*p != &s->scpi) p = &(*p)->next;
+    *p = s->scpi.next;
+    scpi_close(&s->scpi);
+    free(s);
+}
+
+static void on_line(void *ctx, const char *line, size_t len, int64_t t_ns)
+{
+    struct session *s = ctx;
+    scpi_line(&s->scpi, line, len, t_ns);
+    instruments_look(s->all, t_ns);
+}
+
+static bool on_busy(const void *ctx)
+{
+    return scpi_busy(&((const struct session *)ctx)->scpi);
+}
+
+void instruments_look(struct instruments *all, int64_t t_ns)
+{
+    for (struct scpi *s = all->sessions; s; s = s->next) scpi_look(s, t_ns);
+}
+
+/* ---- addresses */
+
+static bool open_port(struct instruments *all, const struct scpi_kind *kind, const struct options_scpi *o,
+                      unsigned offset, bool many, char *why, size_t cap)
+{
+    if (all->count == INSTRUMENTS_MAX) return fail(why, cap, "--scpi %s: up to %u addresses", o->arg, INSTRUMENTS_MAX);
+    struct instrument *i = calloc(1, sizeof *i);
+    if (!i) return fail(why, cap, "--scpi %s: no memory", o->arg);
+    i->all = all;
+    i->kind = kind;
+    i->port = (struct scpi_port){
+        .links = all->links, .opened = on_opened, .line = on_line, .busy = on_busy, .closed = on_closed, .ctx = i};
+    if (many && o->link) snprintf(i->link, sizeof i->link, "%s.%s", o->link, kind->name);
+    const char *name = many && o->link ? i->link : o->link;
+    const uint16_t port = o->port ? (uint16_t)(o->port + offset) : 0;
+    const int err = o->pty ? scpi_port_pty(&i->port, name) : scpi_port_tcp(&i->port, port);
+    if (!err) {
+        all->port[all->count++] = i;
+        return true;
+    }
+    free(i);
+    if (err == -EADDRINUSE)
+        return fail(why, cap, "--scpi %s: port %u is taken on 127.0.0.1; another one, or 0, is wanted", o->arg, port);
+    if (err == -EEXIST)
+        return fail(why, cap, "--scpi %s: %s exists and is no symbolic link to a pty; another name is wanted", o->arg,
+                    name);
+    return fail(why, cap, "--scpi %s: %s", o->arg, strerror(-err));
+}
+
+/* `all` are those that the scenario has, each at an offset of its own whatever else there is. */
+static bool open_all(struct instruments *all, const struct options_scpi *o, char *why, size_t cap)
+{
+    for (unsigned k = 0; scpi_kinds[k].name; k++) {
+        if (!scpi_kinds[k].present(all->control->bench)) continue;
+        if (!open_port(all, &scpi_kinds[k], o, k, true, why, cap)) return false;
+    }
+    return true;
+}
+
+static bool open_one(struct instruments *all, const struct options_scpi *o, char *why, size_t cap)
+{
+    if (strcmp(o->kind, "all") == 0) return open_all(all, o, why, cap);
+    const struct scpi_kind *kind = scpi_kind(o->kind);
+    if (!kind) return fail(why, cap, "--scpi %s: head, table, chamber, supply or all is wanted", o->arg);
+    if (!kind->present(all->control->bench))
+        return fail(why, cap, "--scpi %s: the scenario has no %s", o->arg, kind->name);
+    return open_port(all, kind, o, 0, false, why, cap);
+}
+
+bool instruments_open(struct instruments *all, const struct options *o, char *why, size_t cap)
+{
+    for (unsigned i = 0; i < o->scpi_count; i++) {
+        if (!open_one(all, &o->scpi[i], why, cap)) return false;
+    }
+    return true;
+}
+
+void instruments_ready(const struct instruments *all, FILE *out)
+{
+    for (unsigned k = 0; k < all->count; k++) {
+        const struct instrument *i = all->port[k];
+        const struct pty *pty = &i->port.pty;
+        if (!i->port.terminal) fprintf(out, "ready scpi=%s host=127.0.0.1 port=%u\n", i->kind->name, i->port.port);
+        else
+            fprintf(out, "ready scpi=%s pty=%s%s%s\n", i->kind->name, pty->path, pty->name ? " link=" : "",
+                    pty->name ? pty->name : "");
+    }
+}
+
+void instruments_close(struct instruments *all)
+{
+    for (unsigned k = 0; k < all->count; k++) scpi_port_close(&all->port[k]->port);
+}
+
+void instruments_free(struct instruments *all)
+{
+    for (unsigned k = 0; k < all->count; k++) free(all->port[k]);
+    all->count = 0;
+}

@@ -1,0 +1,43 @@
+/* The SCPI instruments of a running emulator: an address for each, a session for each client. */
+#ifndef PSABENCH_APP_INSTRUMENTS_H
+#define PSABENCH_APP_INSTRUMENTS_H
+
+#include "app/options.h"
+#include "control/scpi.h"
+#include "link/scpi_port.h"
+
+#include <stdio.h>
+
+#define INSTRUMENTS_MAX 16u
+
+struct instrument {
+    struct scpi_port port; /* first */
+    struct instruments *all;
+    const struct scpi_kind *kind;
+    char link[128]; /* symbolic link of a pty of --scpi all */
+};
+
+struct instruments {
+    struct links *links;
+    struct control *control;
+    struct sched *sched;
+    struct instrument *port[INSTRUMENTS_MAX];
+    unsigned count;
+    struct scpi *sessions;
+};
+
+/* Opens what the options ask for; links, control and sched are filled in before. False with one line in why; what was opened
+ * is closed by instruments_close() in either case. */
+bool instruments_open(struct instruments *all, const struct options *o, char *why, size_t cap);
+
+/* One `ready scpi=...` line for each. */
+void instruments_ready(const struct instruments *all, FILE *out);
+
+/* After anything that may have changed the bench: conditions of all sessions. */
+void instruments_look(struct instruments *all, int64_t t_ns);
+
+/* In two steps: first the ports, then, when the loop's links have been reaped, their storage. */
+void instruments_close(struct instruments *all);
+void instruments_free(struct instruments *all);
+
+#endif
