@@ -1,0 +1,453 @@
+/* The fault engine: when faults begin and end, what is refused, and that what is accepted reaches the part it is for. */
+#include "rig.h"
+
+#include "control/fault.h"
+
+#include <math.h>
+#include <string.h>
+
+#define MS INT64_C(1000000)
+
+enum { UNITS = 2, EVENTS_MAX = 4096, CHANGES_MAX = 64 };
+
+struct heard {
+    enum psa2_event e;
+    int64_t t_ns;
+};
+
+struct change {
+    uint32_t id;
+    enum fault_state state;
+    int64_t t_ns;
+};
+
+static struct {
+    struct sched s;
+    struct can_bus bus;
+    struct head head;
+    struct unit unit[UNITS];
+    struct can_node node[UNITS], program;
+    struct control_bench view;
+    struct fault_engine engine;
+    struct control control;
+    struct unit_listener listener;
+    struct heard heard[EVENTS_MAX];
+    unsigned events;
+    struct change change[CHANGES_MAX];
+    unsigned changes;
+    struct psa2_frame frame; /* latest of unit a */
+    unsigned frames;
+} r;
+
+static void on_event(void *ctx, enum psa2_event e, int64_t t_ns)
+{
+    (void)ctx;
+    if (r.events < EVENTS_MAX) r.heard[r.events++] = (struct heard){e, t_ns};
+}
+
+static void on_change(void *ctx, const struct fault *f, int64_t t_ns)
+{
+    (void)ctx;
+    assert_true(r.changes < CHANGES_MAX);
+    r.change[r.changes++] = (struct change){f->id, f->state, t_ns};
+}
+
+static void on_frame(void *ctx, const struct psa2_frame *f, int64_t t_ns)
+{
+    (void)ctx;
+    (void)t_ns;
+    r.frame = *f;
+    r.frames++;
+}
+
+static bool on_client(void *ctx, unsigned i, struct control_client *out)
+{
+    (void)ctx;
+    *out = (struct control_client){.adapter = "socketcand", .name = "can0"};
+    return i == 0;
+}
+
+static struct can_node *on_client_node(void *ctx, unsigned i)
+{
+    (void)ctx;
+    return i == 0 ? &r.program : NULL;
+}
+
+static void init_unit(unsigned i)
+{
+    static const char *const name[UNITS] = {"a", "b"};
+    struct unit_cfg cfg = unit_default(name[i]);
+    cfg.axis[0].sensor = UNIT_MEMS;
+    cfg.axis[0].mems = (struct mems_g){.u0_v = 2.5, .kx_v_per_g = 1.0};
+    cfg.board.adc_noise_scale = cfg.board.temp_noise_scale = 0.0;
+    cfg.board.serial = i + 1;
+    if (i == 1) cfg.board.afe[0] = afe_nominal(AFE_CURRENT);
+    unit_init(&r.unit[i], &cfg, &r.head, &r.s);
+    r.node[i] = (struct can_node){.name = name[i]};
+    can_attach(&r.bus, &r.node[i]);
+    r.view.unit[i] = &r.unit[i];
+    r.view.unit_name[i] = name[i];
+    r.view.node[i] = &r.node[i];
+}
+
+static int fresh(void **state)
+{
+    const struct head_cfg head = {0};
+    const struct site site = {.g_mps2 = 9.81};
+    (void)state;
+    memset(&r, 0, sizeof r);
+    sched_init(&r.s);
+    can_bus_init(&r.bus, &(struct can_bus_cfg){.bitrate_hz = 1000000}, &r.s);
+    head_init(&r.head, &head, &site, rng_stream(1, 0, "head"));
+    r.view = (struct control_bench){.head = &r.head,
+                                    .bus = {&r.bus},
+                                    .bus_name = {"can0"},
+                                    .buses = 1,
+                                    .units = UNITS,
+                                    .seed = 7,
+                                    .faults = &r.engine,
+                                    .client = on_client,
+                                    .client_node = on_client_node};
+    for (unsigned i = 0; i < UNITS; i++) init_unit(i);
+    r.program.name = "program";
+    can_attach(&r.bus, &r.program);
+    fault_init(&r.engine, &r.view, &r.s);
+    r.engine.changed = on_change;
+    control_init(&r.control, control_tables, &r.view);
+    r.unit[0].frame = on_frame;
+    r.listener.fn = on_event;
+    unit_listen(&r.unit[0], &r.listener);
+    for (unsigned i = 0; i < UNITS; i++) psa2_power_up(&r.unit[i].board, 0);
+    return 0;
+}
+
+static void run_to(int64_t t_ns)
+{
+    sched_run_until(&r.s, t_ns);
+}
+
+/* The number that fault.add gives; 0: refused, the reason stands in the control. Single quotes for double ones. */
+static uint32_t add(const char *args)
+{
+    char json[512];
+    snprintf(json, sizeof json, "%s", args);
+    for (char *s = json; *s; s++) *s = *s == '\'' ? '"' : *s;
+    cJSON *j = cJSON_Parse(json);
+    cJSON *result = cJSON_CreateObject();
+    assert_non_null(j);
+    const enum control_outcome done = control_call(&r.control, "fault.add", j, result, r.s.now_ns);
+    const uint32_t id =
+        done == CONTROL_DONE ? (uint32_t)cJSON_GetObjectItemCaseSensitive(result, "id")->valuedouble : 0;
+    cJSON_Delete(result);
+    cJSON_Delete(j);
+    return id;
+}
+
+/* The n-th event of a kind that comes after t_ns. */
+static int64_t nth_ns(enum psa2_event e, unsigned n, int64_t after_ns)
+{
+    for (unsigned i = 0; i < r.events; i++) {
+        if (r.heard[i].e == e && r.heard[i].t_ns > after_ns && --n == 0) return r.heard[i].t_ns;
+    }
+    fail_msg("no such event");
+    return 0;
+}
+
+static void assert_change(unsigned i, uint32_t id, enum fault_state state, int64_t t_ns)
+{
+    assert_true(i < r.changes);
+    assert_int_equal(r.change[i].id, id);
+    assert_int_equal(r.change[i].state, state);
+    assert_int_equal(r.change[i].t_ns, t_ns);
+}
+
+/* ---- when */
+
+static void a_trigger_counts_anew_from_each_event_it_counts_from(void **state)
+{
+    (void)state;
+    const struct {
+        int after, since;
+        unsigned count;
+        const char *events; /* a letter each, a = 0 */
+        int at;             /* index of the one that it is; -1: none */
+    } rows[] = {
+        {1, FAULT_NO_EVENT, 1, "aab", 2},  {1, FAULT_NO_EVENT, 3, "babab", 4},
+        {1, FAULT_NO_EVENT, 3, "bab", -1}, {1, 0, 1, "bbab", 3},
+        {1, 0, 3, "bbbabb", -1},           {1, 0, 3, "abbabbb", 6},
+        {1, 0, 2, "abcabcbcbb", 6},        {0, FAULT_NO_EVENT, 2, "cbaca", 4},
+    };
+    for (size_t k = 0; k < COUNT(rows); k++) {
+        struct fault_trigger t = fault_trigger(rows[k].after, rows[k].since, rows[k].count);
+        int at = -1;
+        for (int i = 0; at < 0 && rows[k].events[i]; i++) {
+            if (fault_trigger_event(&t, rows[k].events[i] - 'a')) at = i;
+        }
+        if (at != rows[k].at) fail_msg("row %zu: at %d, want %d", k, at, rows[k].at);
+    }
+}
+
+static void a_fault_begins_and_ends_at_its_instants(void **state)
+{
+    (void)state;
+    const uint32_t id = add("{'kind':'sensor.bias','point':'a.sensor.x','bias_v':1,'at_s':0.25,'for_s':0.05}");
+    run_to(400 * MS);
+    assert_int_equal(id, 1);
+    assert_int_equal(r.changes, 2);
+    assert_change(0, id, FAULT_ACTIVE, 250 * MS);
+    assert_change(1, id, FAULT_OVER, 300 * MS);
+    assert_null(r.unit[0].sensor_faults[0]);
+}
+
+static void without_an_instant_it_begins_now_and_lasts_until_it_is_cleared(void **state)
+{
+    (void)state;
+    run_to(100 * MS);
+    const uint32_t id = add("{'kind':'sensor.bias','point':'b.sensor.x','bias_v':1}");
+    run_to(900 * MS);
+    assert_change(0, id, FAULT_ACTIVE, 100 * MS);
+    assert_non_null(r.unit[1].sensor_faults[0]);
+    fault_clear(&r.engine, fault_find(&r.engine, id), r.s.now_ns);
+    assert_change(1, id, FAULT_OVER, 900 * MS);
+    assert_null(r.unit[1].sensor_faults[0]);
+    assert_null(fault_find(&r.engine, id));
+}
+
+/* The article's set-up has one SYNC_A; the third DRD_A after it. */
+static void a_fault_begins_with_the_event_it_waits_for(void **state)
+{
+    (void)state;
+    const uint32_t now = add("{'kind':'sensor.bias','point':'a.sensor.x','bias_v':1,'after':'DRD_A','count':3,"
+                             "'since':'SYNC_A','for_s':0.01}");
+    const uint32_t later =
+        add("{'kind':'controller.frozen_words','point':'a.kpsa','after':'INT_FALL','delay_s':30e-6}");
+    assert_true(now && later);
+    run_to(400 * MS);
+    const int64_t sync_ns = nth_ns(PSA2_EV_SYNC_A, 1, 0);
+    const int64_t third_ns = nth_ns(PSA2_EV_DRD_A, 3, sync_ns);
+    assert_change(0, later, FAULT_ACTIVE, nth_ns(PSA2_EV_INT_FALL, 1, 0) + 30000);
+    assert_change(1, now, FAULT_ACTIVE, third_ns);
+    assert_change(2, now, FAULT_OVER, third_ns + 10 * MS);
+    assert_int_equal(r.changes, 3);
+}
+
+static void events_count_from_the_instant_on(void **state)
+{
+    (void)state;
+    const uint32_t id =
+        add("{'kind':'sensor.bias','point':'a.sensor.x','bias_v':1,'at_s':0.3,'after':'DRD_A','count':2}");
+    run_to(400 * MS);
+    assert_change(0, id, FAULT_ACTIVE, nth_ns(PSA2_EV_DRD_A, 2, 300 * MS));
+}
+
+/* The events are those of the other unit, which is reset at 200 ms. */
+static void events_may_be_those_of_another_unit(void **state)
+{
+    (void)state;
+    const uint32_t id =
+        add("{'kind':'sensor.bias','point':'a.sensor.x','bias_v':1,'after':'RES','count':1,'unit':'b'}");
+    run_to(200 * MS);
+    assert_int_equal(r.changes, 0);
+    psa2_reset(&r.unit[0].board, r.s.now_ns);
+    run_to(201 * MS);
+    assert_int_equal(r.changes, 0);
+    psa2_reset(&r.unit[1].board, r.s.now_ns);
+    run_to(202 * MS);
+    assert_change(0, id, FAULT_ACTIVE, 201 * MS);
+    assert_null(r.unit[1].listeners);
+}
+
+static void a_fault_that_waits_or_listens_can_be_cleared(void **state)
+{
+    (void)state;
+    add("{'kind':'sensor.bias','point':'a.sensor.x','bias_v':1,'at_s':0.3}");
+    add("{'kind':'sensor.bias','point':'b.sensor.x','bias_v':1,'after':'DRD_A'}");
+    assert_non_null(r.unit[1].listeners);
+    for (uint32_t id = 1; id <= 2; id++) fault_clear(&r.engine, fault_find(&r.engine, id), r.s.now_ns);
+    assert_null(r.unit[1].listeners);
+    run_to(500 * MS);
+    assert_int_equal(r.changes, 0);
+}
+
+static void places_are_used_again_but_not_those_of_living_faults(void **state)
+{
+    (void)state;
+    for (unsigned i = 0; i < FAULTS_MAX; i++) {
+        assert_int_equal(add("{'kind':'sensor.bias','point':'a.sensor.x','bias_v':1,'at_s':0.01,'for_s':0.01}"), i + 1);
+    }
+    assert_int_equal(add("{'kind':'sensor.bias','point':'a.sensor.x','bias_v':1}"), 0);
+    assert_non_null(strstr(r.control.refusal.why, "64 faults are waiting or active"));
+    r.engine.changed = NULL;
+    run_to(30 * MS);
+    assert_null(r.unit[0].sensor_faults[0]);
+    assert_int_equal(add("{'kind':'sensor.bias','point':'a.sensor.x','bias_v':1}"), FAULTS_MAX + 1);
+    assert_null(fault_find(&r.engine, 1));
+    assert_non_null(fault_find(&r.engine, 2));
+}
+
+/* ---- what is refused */
+
+static void what_does_not_fit_is_refused_with_the_reason(void **state)
+{
+    (void)state;
+    const struct {
+        const char *args, *why;
+    } rows[] = {
+        {"{'kind':'sensor.bia','point':'a.sensor.x'}", "there is sensor.stuck, sensor.bias"},
+        {"{'kind':'bias','point':'a.sensor.x'}", "fault.kinds lists them"},
+        {"{'kind':'sensor.bias','point':'c.sensor.x','bias_v':1}", "fault.points lists them"},
+        {"{'kind':'sensor.bias','point':'a.line.INT','bias_v':1}",
+         "not on a.line.Int, which is a line of a board; it works on UNIT.sensor.x|y|z"},
+        {"{'kind':'sensor.bias','point':'a.sensor.x'}", "bias_v is missing"},
+        {"{'kind':'sensor.bias','point':'a.sensor.x','bias_v':0}", "0 would change nothing"},
+        {"{'kind':'sensor.bias','point':'a.sensor.x','bias_v':16}", "outside -15 ... 15 V"},
+        {"{'kind':'sensor.bias','point':'a.sensor.x','bias_v':1,'rms_v':1}", "rms_v: sensor.bias takes no such value"},
+        {"{'kind':'sensor.bias','point':'a.sensor.y','bias_v':1}", "a.sensor.y: the channel has no sensor"},
+        {"{'kind':'sensor.saturation','point':'a.sensor.x'}", "low_v or high_v is missing"},
+        {"{'kind':'sensor.saturation','point':'a.sensor.x','low_v':2,'high_v':2}", "is not below high_v"},
+        {"{'kind':'analog.load_open','point':'a.afe.x'}", "no load resistor"},
+        {"{'kind':'analog.reference','point':'a.afe.x'}", "reference_ppm or drift_ppm_per_s is missing"},
+        {"{'kind':'chip.drdy_stuck','point':'a.adc.y','level':'low'}", "a.adc.x has it"},
+        {"{'kind':'chip.drdy_stuck','point':'a.adc.x','level':'middle'}", "none of low, high"},
+        {"{'kind':'chip.flip','point':'a.adc.x','register':11,'mask':1}", "a.adc.x has 0 to 10"},
+        {"{'kind':'chip.flip','point':'a.adc.x','register':1,'mask':1,'for_s':1}", "is over as soon as it is done"},
+        {"{'kind':'line.missing_pulse','point':'a.line.Int','pulse':1}", "the line CLK does"},
+        {"{'kind':'line.missing_pulse','point':'a.line.CLK','pulse':129}", "outside 1 ... 128"},
+        {"{'kind':'sensor.bias','point':'a.sensor.x','bias_v':1,'after':'DRDY'}",
+         "no event \"DRDY\"; there is RES, SETUP_DONE"},
+        {"{'kind':'sensor.bias','point':'a.sensor.x','bias_v':1,'count':2}", "only with after"},
+        {"{'kind':'sensor.bias','point':'a.sensor.x','bias_v':1,'after':'DRD_A','since':'DRD_A'}", "is after itself"},
+        {"{'kind':'sensor.bias','point':'a.sensor.x','bias_v':1,'at_s':0.001}",
+         "at_s: 0.001 is over, it is 0.002 s now"},
+    };
+    run_to(2 * MS);
+    for (size_t k = 0; k < COUNT(rows); k++) {
+        if (add(rows[k].args)) fail_msg("%s was accepted", rows[k].args);
+        if (!strstr(r.control.refusal.why, rows[k].why)) fail_msg("%s: %s", rows[k].args, r.control.refusal.why);
+    }
+    assert_int_equal(r.engine.last_id, 0);
+}
+
+/* No kind at any point without either a fit or a sentence. */
+static void every_kind_at_every_point_fits_or_says_why_not(void **state)
+{
+    (void)state;
+    const struct fault_kind *kind;
+    unsigned fit = 0, refused = 0;
+    for (unsigned i = 0; (kind = fault_kind(i)) != NULL; i++) {
+        struct fault f = {.kind = kind};
+        unsigned of_kind = 0;
+        for (unsigned a = 0; a < FAULT_ARGS; a++) {
+            f.value[a] = 1.0;
+            f.given |= kind->need & UINT64_C(1) << a;
+        }
+        for (unsigned n = 0; fault_point(&r.view, n, &f.point, f.name); n++) {
+            char why[CONTROL_WHY_MAX] = "";
+            if (fault_fits(&r.view, &f, why)) of_kind++;
+            else if (strlen(why) < 20) fail_msg("%s at %s: \"%s\"", kind->name, f.name, why);
+            else refused++;
+        }
+        fit += of_kind;
+        if (of_kind == 0 && strcmp(kind->name, "sensor.saturation") != 0) fail_msg("%s fits nowhere", kind->name);
+    }
+    assert_true(fit > 40 && refused > 400);
+}
+
+static void points_have_names_of_their_own(void **state)
+{
+    (void)state;
+    struct fault_point p;
+    char name[FAULT_POINT_MAX], found[FAULT_POINT_MAX];
+    unsigned n = 0;
+    for (; fault_point(&r.view, n, &p, name); n++) {
+        struct fault_point q;
+        assert_true(fault_point_find(&r.view, name, &q, found));
+        if (p.place != q.place || p.unit != q.unit || p.index != q.index) fail_msg("%s is %s", name, found);
+    }
+    assert_int_equal(n, UNITS * (9 + 16 + 3) + 1 + 1 + 1);
+    assert_true(fault_point_find(&r.view, "b.line.CLK", &p, name));
+    assert_int_equal(p.unit, 1);
+    assert_int_equal(p.index, PSA2_LINE_CLK);
+    assert_true(fault_point_find(&r.view, "a.line.INT", &p, name));
+    assert_string_equal(name, "a.line.Int");
+    assert_false(fault_point_find(&r.view, "a.line.IN", &p, name));
+    assert_false(fault_point_find(&r.view, "A.LINE.INT ", &p, name));
+}
+
+/* ---- what reaches the parts */
+
+/* 2.5 V at rest (the x axis is horizontal); a bias of 1 V makes 3.5 V: 10 V are 2^23 codes. */
+static void a_bias_is_in_the_codes(void **state)
+{
+    (void)state;
+    run_to(400 * MS);
+    const double before_v = (double)r.frame.code[0] * 10.0 / 8388608.0;
+    add("{'kind':'sensor.bias','point':'a.sensor.x','bias_v':1}");
+    run_to(600 * MS);
+    const double after_v = (double)r.frame.code[0] * 10.0 / 8388608.0;
+    if (fabs(after_v - before_v - 1.0) > 1e-3) fail_msg("%g V became %g V", before_v, after_v);
+}
+
+/* Volts of the arguments are volts at the load. */
+static void volts_of_a_current_sensor_are_those_at_its_load(void **state)
+{
+    (void)state;
+    add("{'kind':'sensor.stuck','point':'b.sensor.x','out_v':5}");
+    const double signal = sensor_fault_out(r.unit[1].sensor_faults[0], 0.0, 1);
+    if (fabs(signal - 5e-3) > 1e-15) fail_msg("%g A", signal);
+}
+
+/* Two faults of one chip are active at once; the first to end leaves the other. */
+static void faults_of_a_chip_add_up(void **state)
+{
+    (void)state;
+    run_to(400 * MS);
+    add("{'kind':'chip.dout_dead','point':'a.adc.y','level':'high','for_s':0.1}");
+    add("{'kind':'chip.dout_dead','point':'a.adc.z','level':'low','for_s':0.2}");
+    add("{'kind':'controller.frozen_words','point':'a.kpsa','at_s':0.45,'for_s':0.1}");
+    run_to(440 * MS);
+    assert_int_equal(r.frame.code[1], -1);
+    assert_int_equal(r.frame.code[2], 0);
+    run_to(540 * MS);
+    assert_int_equal(r.frame.code[1], -1); /* frozen, though the pin is well again */
+    run_to(590 * MS);
+    assert_int_not_equal(r.frame.code[1], -1);
+    assert_int_equal(r.changes, 5);
+}
+
+/* Same number, same noise; another number, another one. */
+static void random_faults_are_seeded_by_their_number(void **state)
+{
+    double out[3];
+    for (int i = 0; i < 3; i++) {
+        fresh(state);
+        if (i == 2) add("{'kind':'controller.frozen_words','point':'b.kpsa'}");
+        assert_int_equal(add("{'kind':'sensor.noise','point':'a.sensor.x','rms_v':0.1}"), i == 2 ? 2 : 1);
+        out[i] = sensor_fault_out(r.unit[0].sensor_faults[0], 0.0, 1);
+    }
+    assert_true(out[0] == out[1]);
+    assert_true(out[0] != out[2]);
+}
+
+int main(void)
+{
+#define TEST(name) cmocka_unit_test_setup(name, fresh)
+    const struct CMUnitTest tests[] = {
+        TEST(a_trigger_counts_anew_from_each_event_it_counts_from),
+        TEST(a_fault_begins_and_ends_at_its_instants),
+        TEST(without_an_instant_it_begins_now_and_lasts_until_it_is_cleared),
+        TEST(a_fault_begins_with_the_event_it_waits_for),
+        TEST(events_count_from_the_instant_on),
+        TEST(events_may_be_those_of_another_unit),
+        TEST(a_fault_that_waits_or_listens_can_be_cleared),
+        TEST(places_are_used_again_but_not_those_of_living_faults),
+        TEST(what_does_not_fit_is_refused_with_the_reason),
+        TEST(every_kind_at_every_point_fits_or_says_why_not),
+        TEST(points_have_names_of_their_own),
+        TEST(a_bias_is_in_the_codes),
+        TEST(volts_of_a_current_sensor_are_those_at_its_load),
+        TEST(faults_of_a_chip_add_up),
+        TEST(random_faults_are_seeded_by_their_number),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
