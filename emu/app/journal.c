@@ -270,7 +270,7 @@ static bool read_kind(const cJSON *json, struct journal_entry *e)
         return false;
     *(unit ? &e->unit : &e->bus) = (unsigned)place;
     *(unit ? &e->watch : &e->client) = (uint32_t)n;
-    if (!unit && !n) return false;
+    if (!unit && n == 0) return false;
     return e->kind == JOURNAL_CAME ? read_came(json, e) : e->kind != JOURNAL_FRAME || read_sent(json, e);
 }
 
