@@ -166,12 +166,18 @@ static int64_t first_change_ns(const struct supply *s, bool fed, int64_t lo_ns, 
     return hi_ns;
 }
 
-/* Start of the quarter of the ripple after t_ns. Quarters hold every turn of the sine alone. */
+static int64_t quarter_ns(const struct supply *s, double quarters)
+{
+    return s->ripple_ns + (int64_t)nearbyint(quarters / (4.0 * s->ripple_hz) * (double)NS_PER_S);
+}
+
+/* Start of the quarter of the ripple after t_ns. Quarters hold every turn of the sine alone. A start that was rounded down
+ * counts itself as the next once more. */
 static int64_t quarter_after_ns(const struct supply *s, int64_t t_ns)
 {
     const double quarters = floor(4.0 * s->ripple_hz * ((double)(t_ns - s->ripple_ns) / (double)NS_PER_S)) + 1.0;
-    const int64_t next_ns = s->ripple_ns + (int64_t)nearbyint(quarters / (4.0 * s->ripple_hz) * (double)NS_PER_S);
-    return next_ns > t_ns ? next_ns : t_ns + 1;
+    const int64_t next_ns = quarter_ns(s, quarters);
+    return next_ns > t_ns ? next_ns : quarter_ns(s, quarters + 1.0);
 }
 
 /* Slope of line and sine together, V/s. */

@@ -1,0 +1,148 @@
+/* Thermal chamber: ramps, limits, and bodies that follow. tests/py/test_physics.py integrates the lags by itself. */
+#include "rig.h"
+
+#include "base/sched.h"
+#include "phys/chamber.h"
+
+#include <math.h>
+
+static int64_t ns(double t_s)
+{
+    return (int64_t)nearbyint(t_s * 1e9);
+}
+
+static void near(double got, double want, double tol)
+{
+    if (!(fabs(got - want) <= tol)) fail_msg("got %.15g, want %.15g within %g", got, want, tol);
+}
+
+static struct chamber up(double tau_case_s, double tau_element_s)
+{
+    struct chamber c;
+    struct chamber_cfg cfg = chamber_default();
+    cfg.present = true;
+    cfg.tau_case_s = tau_case_s;
+    cfg.tau_element_s = tau_element_s;
+    chamber_init(&c, &cfg);
+    return c;
+}
+
+/* 1 K/min at power-on; heating up to 5, cooling up to 3. */
+static void the_air_goes_straight_to_its_set_point(void **state)
+{
+    (void)state;
+    struct chamber c = up(0, 0);
+    assert_true(chamber_stable(&c, 0));
+    assert_int_equal(chamber_set(&c, 85.0, ns(60)), CHAMBER_OK);
+    near(chamber_air_degc(&c, ns(60)), 25.0, 0.0);
+    near(chamber_air_degc(&c, ns(1860)), 55.0, 1e-12);
+    assert_int_equal(chamber_stable_ns(&c), ns(3660));
+    assert_false(chamber_stable(&c, ns(3659)));
+    near(chamber_air_degc(&c, ns(1e6)), 85.0, 0.0);
+}
+
+static void the_lesser_of_ramp_and_limit_holds(void **state)
+{
+    (void)state;
+    struct chamber c = up(0, 0);
+    near(chamber_ramp_max_k_per_min(&c), 5.0, 0.0);
+    assert_int_equal(chamber_ramp(&c, 5.0, 0), CHAMBER_OK);
+    assert_int_equal(chamber_set(&c, 85.0, 0), CHAMBER_OK);
+    near(chamber_air_degc(&c, ns(120)), 35.0, 1e-12);
+    assert_int_equal(chamber_set(&c, -60.0, ns(120)), CHAMBER_OK);
+    near(chamber_air_degc(&c, ns(240)), 29.0, 1e-12);
+    assert_int_equal(chamber_ramp(&c, 1.5, ns(240)), CHAMBER_OK); /* goes on slower */
+    near(chamber_air_degc(&c, ns(360)), 26.0, 1e-12);
+}
+
+static void what_is_out_of_range_is_refused_and_changes_nothing(void **state)
+{
+    (void)state;
+    struct chamber c = up(0, 0);
+    assert_int_equal(chamber_set(&c, 50.0, 0), CHAMBER_OK);
+    const double bad_degc[] = {85.1, -60.1, NAN, INFINITY};
+    for (size_t i = 0; i < COUNT(bad_degc); i++) {
+        assert_int_equal(chamber_set(&c, bad_degc[i], ns(60)), CHAMBER_OUT_OF_RANGE);
+    }
+    const double bad_ramp[] = {0.0, -1.0, 5.1, NAN};
+    for (size_t i = 0; i < COUNT(bad_ramp); i++) {
+        assert_int_equal(chamber_ramp(&c, bad_ramp[i], ns(60)), CHAMBER_OUT_OF_RANGE);
+    }
+    near(chamber_air_degc(&c, ns(120)), 27.0, 1e-12);
+    near(c.set_degc, 50.0, 0.0);
+}
+
+static void the_thermometer_has_an_offset_and_steps(void **state)
+{
+    (void)state;
+    struct chamber_cfg cfg = chamber_default();
+    cfg.readout_offset_k = 0.33;
+    cfg.readout_resolution_k = 0.5;
+    struct chamber c;
+    chamber_init(&c, &cfg);
+    near(chamber_shown_degc(&c, 0), 25.5, 0.0);
+    near(chamber_air_degc(&c, 0), 25.0, 0.0);
+}
+
+/* After a step that is as good as one, a single lag is 1 - exp(-t/tau); two equal ones are 1 - (1 + t/tau) exp(-t/tau). */
+static void lags_answer_a_step(void **state)
+{
+    (void)state;
+    struct chamber c = up(100.0, 100.0);
+    c.cfg.heating_max_k_per_min = c.ramp_k_per_min = 6e7; /* 10 K in 10 us */
+    struct chamber_body two;
+    struct chamber_body element_only;
+    chamber_put_in(&c, &two, 0, 0);
+    chamber_put_in(&c, &element_only, 1e-9, 50.0);
+    assert_int_equal(chamber_set(&c, 35.0, 0), CHAMBER_OK);
+    near(chamber_case_degc(&c, &two, ns(100)), 35.0 - 10.0 * exp(-1.0), 1e-6);
+    near(chamber_element_degc(&c, &two, ns(100)), 35.0 - 20.0 * exp(-1.0), 1e-6);
+    near(chamber_case_degc(&c, &element_only, ns(100)), 35.0, 1e-6);
+    near(chamber_element_degc(&c, &element_only, ns(100)), 35.0 - 10.0 * exp(-2.0), 1e-6);
+    near(chamber_element_degc(&c, &two, ns(1e7)), 35.0, 1e-12);
+}
+
+static void without_lags_the_body_is_as_warm_as_the_air(void **state)
+{
+    (void)state;
+    struct chamber c = up(0, 0);
+    struct chamber_body b;
+    chamber_put_in(&c, &b, 0, 0);
+    assert_int_equal(chamber_set(&c, 85.0, 0), CHAMBER_OK);
+    near(chamber_case_degc(&c, &b, ns(600)), 35.0, 1e-12);
+    near(chamber_element_degc(&c, &b, ns(600)), 35.0, 1e-12);
+}
+
+/* Commands that change nothing may come as often as they like. */
+static void temperatures_do_not_depend_on_how_often_the_course_is_cut(void **state)
+{
+    (void)state;
+    struct chamber a = up(180.0, 360.0);
+    struct chamber b = up(180.0, 360.0);
+    struct chamber_body in_a;
+    struct chamber_body in_b;
+    chamber_put_in(&a, &in_a, 0, 0);
+    chamber_put_in(&b, &in_b, 0, 0);
+    assert_int_equal(chamber_set(&a, 85.0, 0), CHAMBER_OK);
+    assert_int_equal(chamber_set(&b, 85.0, 0), CHAMBER_OK);
+    for (int i = 1; i <= 5000; i++) {
+        assert_int_equal(chamber_set(&b, 85.0, ns(i)), CHAMBER_OK);
+        near(chamber_air_degc(&b, ns(i)), chamber_air_degc(&a, ns(i)), 1e-9);
+        near(chamber_case_degc(&b, &in_b, ns(i)), chamber_case_degc(&a, &in_a, ns(i)), 1e-9);
+        near(chamber_element_degc(&b, &in_b, ns(i)), chamber_element_degc(&a, &in_a, ns(i)), 1e-9);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_air_goes_straight_to_its_set_point),
+        cmocka_unit_test(the_lesser_of_ramp_and_limit_holds),
+        cmocka_unit_test(what_is_out_of_range_is_refused_and_changes_nothing),
+        cmocka_unit_test(the_thermometer_has_an_offset_and_steps),
+        cmocka_unit_test(lags_answer_a_step),
+        cmocka_unit_test(without_lags_the_body_is_as_warm_as_the_air),
+        cmocka_unit_test(temperatures_do_not_depend_on_how_often_the_course_is_cut),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
