@@ -87,7 +87,7 @@ static enum control_outcome do_reset(struct control *c, const struct control_val
     if (!has_supply(c->bench)) return no_supply(c);
     struct supply *s = &c->bench->lab->supply;
     control_settle_inputs(c->bench, t_ns);
-    supply_ripple(s, s->cfg.ripple_v, s->cfg.ripple_hz, t_ns);
+    supply_ripple(s, s->cfg.ripple_v, s->cfg.ripple_hz > 0 ? s->cfg.ripple_hz : s->cfg.ripple_max_hz, t_ns);
     supply_set(s, s->cfg.volt_v, t_ns);
     supply_output(s, true, t_ns);
     return answer(c, SUPPLY_OK, result, t_ns);
@@ -102,7 +102,7 @@ static const struct control_command rows[] = {
      .run = do_output, .changes = true, .scpi = {{"OUTPut", NULL}}},
     {"supply.ripple", "Puts a sine on the voltage.",
      {{"amplitude_v", CONTROL_REAL, false, "V", 0, 1000, .what = "from the middle; 0: none", .limits = ripple_limits},
-      {"frequency_hz", CONTROL_REAL, false, "Hz", 0, 1e6, .what = "of the sine", .limits = frequency_limits}},
+      {"frequency_hz", CONTROL_REAL, false, "Hz", 1e-3, 1e6, .what = "of the sine", .def = 100, .limits = frequency_limits}},
      .run = do_ripple, .changes = true, .scpi = {{"RIPPle", NULL}}},
     {"supply.read", "Reads the supply: voltage as set and as measured at its output, output on or off, ripple.", {{0}}, .run = do_read,
      .scpi = {{"VOLTage?", "volt_v"}, {"MEASure:VOLTage?", "measured_v"}, {"OUTPut?", "on"}, {"RIPPle?", "ripple_v,ripple_hz"}}},
