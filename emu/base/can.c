@@ -1,5 +1,6 @@
 #include "base/can.h"
 
+#include "base/can_parts.h"
 #include "base/canbits.h"
 
 #include <assert.h>
@@ -16,6 +17,10 @@ void can_bus_init(struct can_bus *b, const struct can_bus_cfg *cfg, struct sched
 void can_attach(struct can_bus *b, struct can_node *n)
 {
     n->queued = 0;
+    n->silent = false;
+    n->tec = n->rec = 0;
+    n->now = CAN_ACTIVE;
+    n->bus = b;
     n->next = NULL;
     struct can_node **at = &b->nodes;
     while (*at) at = &(*at)->next;
@@ -26,12 +31,14 @@ void can_detach(struct can_bus *b, struct can_node *n)
 {
     if (b->next_rx == n) b->next_rx = n->next;
     if (b->sender == n) b->sender = NULL;
+    if (b->odd) can_odd_detach(b, n);
     for (struct can_node **at = &b->nodes; *at; at = &(*at)->next) {
         if (*at != n) continue;
         *at = n->next;
         break;
     }
     n->next = NULL;
+    n->bus = NULL;
     n->queued = 0;
 }
 
@@ -129,11 +136,11 @@ static bool goes_before(const struct can_bus *b, const struct can_waiting *x, co
     return x_id != y_id ? x_id < y_id : x->number < y->number;
 }
 
-static struct can_node *winner(const struct can_bus *b, unsigned *slot)
+struct can_node *can_winner(const struct can_bus *b, unsigned *slot)
 {
     struct can_node *best = NULL;
     for (struct can_node *n = b->nodes; n; n = n->next) {
-        if (n->queued == 0) continue;
+        if (n->queued == 0 || n->silent) continue;
         const unsigned i = b->cfg.bitrate_hz ? offered(n) : 0;
         if (best && !goes_before(b, &n->queue[i], &best->queue[*slot])) continue;
         best = n;
@@ -145,25 +152,33 @@ static struct can_node *winner(const struct can_bus *b, unsigned *slot)
 static void arbitrate(struct can_bus *b, int64_t t_ns)
 {
     unsigned slot = 0;
-    struct can_node *n = winner(b, &slot);
+    struct can_node *n = can_winner(b, &slot);
+    if (b->odd && can_odd_wait(b, &n, &slot, t_ns)) return;
     b->phase = n ? CAN_FRAME : CAN_IDLE;
     if (!n) return;
     b->sender = n;
     b->wire = n->queue[slot].m;
     b->start_ns = t_ns;
+    if (b->odd && can_odd_start(b, slot, t_ns)) return;
     n->queued--;
     memmove(&n->queue[slot], &n->queue[slot + 1], (n->queued - slot) * sizeof n->queue[0]);
     sched_at(b->sched, &b->step, t_ns + can_frame_ns(&b->cfg, &b->wire) - ifs_ns(&b->cfg));
 }
 
-static void give(struct can_bus *b, struct can_node *n, int64_t t_ns)
+void can_give(struct can_node *n, const struct can_msg *m, int64_t t_ns)
 {
-    if (b->wire.flags & CAN_FD && !n->fd) {
+    if (m->flags & CAN_FD && !n->fd) {
         n->fd_refused++;
         return;
     }
     n->rx_frames++;
-    if (n->rx) n->rx(n->ctx, &b->wire, t_ns);
+    if (n->rx) n->rx(n->ctx, m, t_ns);
+}
+
+void can_start_ifs(struct can_bus *b, int64_t t_ns)
+{
+    b->phase = CAN_IFS;
+    sched_at(b->sched, &b->step, t_ns + ifs_ns(&b->cfg));
 }
 
 /* A callback may attach and detach nodes, its own included: the cursor lives in the bus, where can_detach() sees it. */
@@ -171,8 +186,11 @@ static void end_of_frame(struct can_bus *b, int64_t t_ns)
 {
     struct can_node *sender = b->sender;
     b->frames++;
-    b->phase = CAN_IFS;
-    sched_at(b->sched, &b->step, t_ns + ifs_ns(&b->cfg));
+    can_start_ifs(b, t_ns);
+    if (b->odd) {
+        can_odd_end(b, t_ns);
+        return;
+    }
     if (sender) {
         sender->tx_frames++;
         if (sender->sent) sender->sent(sender->ctx, &b->wire, t_ns);
@@ -181,7 +199,7 @@ static void end_of_frame(struct can_bus *b, int64_t t_ns)
     while (b->next_rx) {
         struct can_node *n = b->next_rx;
         b->next_rx = n->next;
-        if (n != sender) give(b, n, t_ns);
+        if (n != sender) can_give(n, &b->wire, t_ns);
     }
     b->sender = NULL;
 }
@@ -194,13 +212,18 @@ static void step(void *ctx, int64_t t_ns)
         end_of_frame(b, t_ns);
         return;
     }
+    if (b->phase == CAN_ERROR_FRAME) {
+        can_odd_error(b, t_ns);
+        return;
+    }
     if (b->phase == CAN_IFS) b->busy_ns += t_ns - b->start_ns;
+    if (b->odd && b->phase == CAN_IFS) can_odd_recessive(b, t_ns);
     arbitrate(b, t_ns);
 }
 
 int64_t can_busy_ns(const struct can_bus *b, int64_t t_ns)
 {
-    const bool in_use = b->phase == CAN_FRAME || b->phase == CAN_IFS;
+    const bool in_use = b->phase == CAN_FRAME || b->phase == CAN_ERROR_FRAME || b->phase == CAN_IFS;
     return b->busy_ns + (in_use ? t_ns - b->start_ns : 0);
 }
 

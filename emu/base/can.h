@@ -36,6 +36,7 @@ struct can_msg {
 
 struct can_waiting {
     uint64_t number; /* order of can_send() on the whole bus */
+    bool repeat;     /* has been received: the sender missed it */
     struct can_msg m;
 };
 
@@ -58,7 +59,15 @@ struct can_node {
     uint32_t fd_refused; /* FD frames it could not send or was not given */
     struct can_waiting queue[CAN_QUEUE_MAX];
     unsigned queued;
+    bool silent; /* off the bus: neither sends nor receives */
+    struct can_bus *bus;
     struct can_node *next;
+    /* of the controller, where `of` is NULL */
+    uint16_t tec, rec; /* error counters */
+    enum can_state now;
+    unsigned off_left;   /* times 11 recessive bits before it is back */
+    int64_t off_idle_ns; /* since when the bus is idle for it; -1: it is not */
+    struct sched_ev back;
 };
 
 struct can_bus_cfg {
@@ -66,7 +75,15 @@ struct can_bus_cfg {
     uint32_t data_bitrate_hz; /* data phase of FD frames with BRS; 0: a classic bus, FD frames are refused */
 };
 
-enum can_phase { CAN_IDLE, CAN_ARBITRATION, CAN_FRAME, CAN_IFS };
+enum can_phase { CAN_IDLE, CAN_ARBITRATION, CAN_FRAME, CAN_ERROR_FRAME, CAN_IFS };
+
+struct can_held {         /* a frame that a fault keeps back */
+    struct can_fault *by; /* NULL: free */
+    struct can_node *from, *to;
+    uint64_t number; /* order of keeping */
+    int64_t due_ns;
+    struct can_msg m;
+};
 
 /* Read-only outside can.c. */
 struct can_bus {
@@ -78,6 +95,13 @@ struct can_bus {
     struct can_node *sender;  /* of the frame on the wire; NULL if it has left */
     struct can_node *next_rx; /* cursor of the delivery under way */
     struct can_msg wire;
+    bool repeat; /* of the frame on the wire */
+    bool odd;    /* faults, error counts or nodes off the bus are to be minded: can_fault.c */
+    struct can_fault *faults;
+    struct can_node *tired; /* error-passive sender of the last frame: waits 8 bits more */
+    struct can_held held[CAN_HELD_MAX];
+    uint64_t held_number;
+    uint32_t error_frames;
     int64_t start_ns; /* start of the frame on the wire */
     int64_t busy_ns;  /* of finished frames with their interframe space, since power-on */
     uint64_t frames, number;

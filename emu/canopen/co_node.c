@@ -16,6 +16,7 @@ enum {
 };
 enum { NMT_START = 1, NMT_STOP = 2, NMT_PRE_OPERATIONAL = 128, NMT_RESET_NODE = 129, NMT_RESET_COMM = 130 };
 enum { ERROR_REGISTER = 0x1001, ERROR_HISTORY = 0x1003, HEARTBEAT_TIME = 0x1017 };
+enum { EMCY_PASSIVE = 0x8120, EMCY_RECOVERED = 0x8140, EMCY_CAN_REGISTER = 0x11 /* generic, communication */ };
 enum { TPDO_FIRST = 0x1800, TPDO_LAST = TPDO_FIRST + (int)CO_TPDO_MAX - 1, NS_PER_MS = 1000000, NS_PER_US = 1000 };
 
 static void send(struct co_node *n, uint32_t id, const uint8_t *data, uint8_t len, int64_t t_ns)
@@ -107,6 +108,19 @@ void co_node_error_end(struct co_node *n, uint16_t code, int64_t t_ns)
     if (!e) return;
     *e = (struct co_error){0};
     if (co_node_error_register(n) == 0) send_emcy(n, 0, 0, t_ns);
+}
+
+/* CiA 301, table 26. While the controller is off the bus the messages wait in its queue. */
+static void controller_state(void *ctx, enum can_state s, int64_t t_ns)
+{
+    struct co_node *n = ctx;
+    if (s == CAN_PASSIVE) co_node_error(n, EMCY_PASSIVE, EMCY_CAN_REGISTER, 3, t_ns);
+    if (s == CAN_BUS_OFF) n->was_off = true;
+    if (s != CAN_ACTIVE) return;
+    if (n->was_off) co_node_error(n, EMCY_RECOVERED, EMCY_CAN_REGISTER, 3, t_ns);
+    n->was_off = false;
+    co_node_error_end(n, EMCY_PASSIVE, t_ns);
+    co_node_error_end(n, EMCY_RECOVERED, t_ns);
 }
 
 /* ---- objects ---- */
@@ -269,7 +283,8 @@ void co_node_init(struct co_node *n, const struct co_node_cfg *cfg, const struct
     co_sdo_init(&n->sdo, cfg->od, &sdo, sched);
     n->services =
         (struct can_node){.name = cfg->name, .order = CAN_ORDER_PRIORITY, .fd = true, .rx = receive, .ctx = n};
-    n->stream = (struct can_node){.name = cfg->name, .order = CAN_ORDER_FIFO, .fd = true, .ctx = n};
+    n->services.state = controller_state;
+    n->stream = (struct can_node){.name = cfg->name, .order = CAN_ORDER_FIFO, .fd = true, .of = &n->services, .ctx = n};
 }
 
 void co_node_power_up(struct co_node *n, int64_t t_ns)
@@ -283,7 +298,7 @@ void co_node_power_down(struct co_node *n)
 {
     co_sdo_reset(&n->sdo);
     sched_cancel(n->sched, &n->heartbeat);
-    can_detach(n->bus, &n->services);
-    can_detach(n->bus, &n->stream);
+    can_unplug(n->bus, &n->services, n->sched->now_ns);
+    can_unplug(n->bus, &n->stream, n->sched->now_ns);
     n->state = CO_INITIALISING;
 }

@@ -66,6 +66,7 @@ struct co_node {
     struct co_error error[CO_ERRORS_MAX];
     uint32_t history[CO_HISTORY]; /* latest first */
     unsigned history_count;
+    bool was_off; /* the controller has been off the bus */
     uint32_t syncs, malformed, pdo_inhibited;
     uint32_t pdo_lost; /* due at a SYNC, but the backlog was full */
 };
