@@ -28,8 +28,8 @@ ABI     := $(shell sed -n 's/^\#define PSABENCH_ABI \([0-9]*\)/\1/p' emu/api/psa
 STD   := -std=c11 -ffp-contract=off -fPIC -fvisibility=hidden -DPSABENCH_VERSION=$(VERSION)
 WARN  := -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wundef -Wstrict-prototypes -Wmissing-prototypes $(if $(WERROR),-Werror)
 SANFL := $(if $(SAN),-fsanitize=$(SAN) -fno-sanitize-recover=all -fno-omit-frame-pointer)
-INC   := -Iemu -Ibuild $(shell $(PKGCONFIG) --cflags libcjson yaml-0.1 2>/dev/null)
-LIBS  := $(shell $(PKGCONFIG) --libs libcjson yaml-0.1 2>/dev/null) -lm
+INC   := -Iemu -Ibuild $(shell $(PKGCONFIG) --cflags libcjson libfyaml 2>/dev/null)
+LIBS  := $(shell $(PKGCONFIG) --libs libcjson libfyaml 2>/dev/null) -lm
 FLAGS   = $(STD) $(WARN) $(INC) $(CPPFLAGS)
 COMPILE = $(CC) $(FLAGS) $(SANFL) $(CFLAGS)
 LINK    = $(CC) $(SANFL) $(CFLAGS) $(LDFLAGS)

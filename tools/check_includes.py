@@ -31,7 +31,7 @@ C_HEADERS = set(
     "stdio stdlib stdnoreturn string tgmath".split()
 )
 OS_FOLDERS = {"link", "app"}
-LIBRARIES = {"cjson/cJSON.h": {"control", "app"}, "cJSON.h": {"control", "app"}, "yaml.h": {"app"}}
+LIBRARIES = {"cjson/cJSON.h": {"control", "app"}, "cJSON.h": {"control", "app"}, "libfyaml.h": {"app"}}
 
 FUNCTION_REASON, FUNCTION_MAX, FUNCTION_MEDIAN = 40, 70, 15  # lines, braces included
 SOURCE_MAX, HEADER_MAX = 500, 150  # lines

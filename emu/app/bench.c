@@ -33,36 +33,45 @@ static void on_start(void *ctx, int64_t t_ns)
         struct can_msg m = {.id = 0x600u + u->cfg.node, .len = 8};
         const uint8_t write[] = {SDO_WRITE_U8, OBJECT_FRAME_FORM & 0xFF, OBJECT_FRAME_FORM >> 8, 0, u->frame_form};
         memcpy(m.data, write, sizeof write);
-        if (u->frame_form) can_send(&b->bus, &b->starter.node, &m, t_ns);
+        if (u->frame_form) can_send(&b->bus[u->bus], &b->starter.node[u->bus], &m, t_ns);
     }
     const struct can_msg start = {.id = 0, .len = 2, .data = {NMT_START, 0}};
-    if (b->scenario.start) can_send(&b->bus, &b->starter.node, &start, t_ns);
+    for (unsigned i = 0; b->scenario.start && i < b->buses; i++)
+        can_send(&b->bus[i], &b->starter.node[i], &start, t_ns);
 }
 
 static void init_unit(struct bench *b, unsigned i)
 {
     const struct scenario_unit *u = &b->scenario.units[i];
-    unit_init(&b->unit[i], &u->cfg, &b->head, &b->sched);
+    memset(&b->unit[i], 0, sizeof b->unit[i]);
+    memset(&b->can[i], 0, sizeof b->can[i]);
+    unit_init(&b->unit[i], &u->cfg, &b->lab, &b->sched);
     const struct psa2_can_cfg cfg = {.name = u->name, .node_id = u->cfg.node, .refused = on_refused, .ctx = b};
     const struct psa2_can_port port = psa2_can_port(&b->unit[i].board);
-    psa2_can_init(&b->can[i], &cfg, &port, &b->bus, &b->sched);
+    psa2_can_init(&b->can[i], &cfg, &port, &b->bus[u->bus], &b->sched);
     b->unit[i].frame = psa2_can_frame;
     b->unit[i].fault = psa2_can_fault;
     b->unit[i].ctx = &b->can[i];
 }
 
+static void init_bus(struct bench *b, unsigned i)
+{
+    can_bus_init(&b->bus[i], &b->scenario.bus[i].cfg, &b->sched);
+    b->starter.node[i] = (struct can_node){.name = "bench", .order = CAN_ORDER_FIFO, .fd = true};
+    b->monitor[i] = (struct can_node){.name = "monitor", .fd = true, .rx = on_monitor, .ctx = b};
+}
+
 void bench_init(struct bench *b, const struct scenario *s, unsigned watched)
 {
-    memset(b, 0, sizeof *b);
+    memset(b, 0, offsetof(struct bench, unit));
     b->scenario = *s;
     b->watched = watched;
     scenario_bind(&b->scenario);
     sched_init(&b->sched);
-    can_bus_init(&b->bus, &s->bus, &b->sched);
-    head_init(&b->head, &s->head, &s->site, rng_stream(s->seed, 0, "head"));
+    b->buses = s->bus_count;
+    for (unsigned i = 0; i < b->buses; i++) init_bus(b, i);
+    lab_init(&b->lab, &b->scenario.lab, s->seed);
     for (unsigned i = 0; i < s->unit_count; i++) init_unit(b, i);
-    b->starter.node = (struct can_node){.name = "bench", .order = CAN_ORDER_FIFO, .fd = true};
-    b->monitor = (struct can_node){.name = "monitor", .fd = true, .rx = on_monitor, .ctx = b};
     sched_ev(&b->starter.ev, on_start, b);
 }
 
@@ -79,8 +88,10 @@ bool bench_record(struct bench *b, FILE *out, uint32_t unit_ns)
 
 void bench_power_up(struct bench *b)
 {
-    can_attach(&b->bus, &b->monitor);
-    can_attach(&b->bus, &b->starter.node);
+    for (unsigned i = 0; i < b->buses; i++) {
+        can_attach(&b->bus[i], &b->monitor[i]);
+        can_attach(&b->bus[i], &b->starter.node[i]);
+    }
     for (unsigned i = 0; i < b->scenario.unit_count; i++) {
         psa2_power_up(&b->unit[i].board, 0);
         psa2_can_power_up(&b->can[i], 0);

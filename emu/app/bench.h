@@ -1,4 +1,4 @@
-/* What stands on the bench: head, units, bus, and who watches the lines. Assembled from a scenario; no OS, no clock. */
+/* What stands on the bench: instruments, units, buses, and who watches the lines. Assembled from a scenario; no OS, no clock. */
 #ifndef PSABENCH_APP_BENCH_H
 #define PSABENCH_APP_BENCH_H
 
@@ -7,20 +7,19 @@
 #include "trace/sampler.h"
 #include "trace/vcd.h"
 
-/* The bench's own node on the bus: writes the scenario's frame forms (SDO to 2020h) and starts the units (NMT). */
+/* The bench's own node on each bus: writes the scenario's frame forms (SDO to 2020h) and starts the units (NMT). */
 struct bench_starter {
-    struct can_node node;
+    struct can_node node[SCENARIO_BUSES_MAX];
     struct sched_ev ev;
 };
 
 struct bench {
     struct scenario scenario;
     struct sched sched;
-    struct can_bus bus;
-    struct head head;
-    struct unit unit[SCENARIO_UNITS_MAX];
-    struct psa2_can can[SCENARIO_UNITS_MAX];
-    struct can_node monitor;                                            /* hears every frame */
+    struct can_bus bus[SCENARIO_BUSES_MAX];
+    unsigned buses;
+    struct lab lab;
+    struct can_node monitor[SCENARIO_BUSES_MAX];                        /* hear every frame */
     void (*on_frame)(void *ctx, const struct can_msg *m, int64_t t_ns); /* of the monitor; may be NULL */
     void (*on_refused)(void *ctx, const char *unit, const char *why);   /* frame form; may be NULL */
     void *ctx;
@@ -29,6 +28,9 @@ struct bench {
     bool recording;
     struct vcd vcd;
     struct sampler sampler;
+    /* last, and only those that the scenario has are written: 20 MB of address space, 0.3 MB a unit in use */
+    struct unit unit[SCENARIO_UNITS_MAX];
+    struct psa2_can can[SCENARIO_UNITS_MAX];
 };
 
 /* The scenario is copied. Megabytes: take it from the heap; it never moves afterwards. */

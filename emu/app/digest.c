@@ -80,7 +80,7 @@ void digest_bench(const struct bench *b, const struct journal *j, char hex[SHA25
     struct sha256 s;
     sha256_init(&s);
     add(&s, (uint64_t)b->sched.now_ns);
-    add_bus(&s, &b->bus, j->tap[0].traffic);
+    for (unsigned i = 0; i < b->buses; i++) add_bus(&s, &b->bus[i], j->tap[i].traffic);
     for (unsigned i = 0; i < b->scenario.unit_count; i++) add_unit(&s, b, i);
     sha256_hex(&s, hex);
 }

@@ -4,8 +4,10 @@
 #include "app/service.h"
 #include "base/text.h"
 
+#include <errno.h>
 #include <signal.h>
 #include <stdlib.h>
+#include <string.h>
 
 enum { EXIT_DONE = 0, EXIT_INPUT = 2, EXIT_MACHINE = 3, EXIT_INT = 130 };
 
@@ -21,9 +23,32 @@ static int complain(int status, const char *why)
 static void override(struct scenario *s, const struct options *o)
 {
     if (o->seed_given) s->seed = o->seed;
-    if (o->bitrate_given) s->bus.bitrate_hz = o->bitrate_hz;
-    if (o->data_bitrate_given) s->bus.data_bitrate_hz = o->data_bitrate_hz;
+    for (unsigned i = 0; i < s->bus_count; i++) {
+        if (o->bitrate_given) s->bus[i].cfg.bitrate_hz = o->bitrate_hz;
+        if (o->data_bitrate_given) s->bus[i].cfg.data_bitrate_hz = o->data_bitrate_hz;
+    }
     if (o->start) s->start = true;
+}
+
+/* The scenario with every key, to a file or, for NULL, to stdout. */
+static bool write_resolved(const struct scenario *s, const char *path)
+{
+    cJSON *j = scenario_dump(s);
+    char *text = cJSON_Print(j);
+    FILE *out = path ? fopen(path, "wbe") : stdout;
+    bool ok = text && out && fprintf(out, "%s\n", text) >= 0;
+    if (out) ok = (path ? fclose(out) : fflush(out)) == 0 && ok;
+    cJSON_free(text);
+    cJSON_Delete(j);
+    return ok;
+}
+
+static int dump(const struct options *o, struct scenario *s)
+{
+    char why[1024];
+    if (!scenario_load(o->scenario ? o->scenario : "calibrate", s, why, sizeof why)) return complain(EXIT_INPUT, why);
+    override(s, o);
+    return write_resolved(s, NULL) ? EXIT_DONE : complain(EXIT_MACHINE, "--dump: stdout cannot be written");
 }
 
 static int run(const struct options *o, struct scenario *scenario, struct bench *bench, struct service *service)
@@ -32,6 +57,10 @@ static int run(const struct options *o, struct scenario *scenario, struct bench 
     if (!scenario_load(o->scenario ? o->scenario : "calibrate", scenario, why, sizeof why))
         return complain(EXIT_INPUT, why);
     override(scenario, o);
+    if (o->resolved && !write_resolved(scenario, o->resolved)) {
+        snprintf(why, sizeof why, "--resolved %s: %s", o->resolved, strerror(errno));
+        return complain(EXIT_MACHINE, why);
+    }
     const int watched = o->unit ? bench_find_unit(scenario, o->unit) : 0;
     if (watched < 0) {
         snprintf(why, sizeof why, "--unit %s: %s has no unit of that name", o->unit, scenario->path);
@@ -59,12 +88,14 @@ int main(int argc, char *argv[])
         return complain(EXIT_MACHINE, why);
     if (o.action == OPTIONS_LIST_SCENARIOS && !list_scenarios(stdout, why, sizeof why))
         return complain(EXIT_MACHINE, why);
-    if (o.action != OPTIONS_RUN) return EXIT_DONE;
+    if (o.action == OPTIONS_LIST_KEYS) scenario_keys(stdout);
+    if (o.action != OPTIONS_RUN && o.action != OPTIONS_DUMP) return EXIT_DONE;
     struct scenario *scenario = malloc(sizeof *scenario);
     struct bench *bench = malloc(sizeof *bench);
     struct service *service = malloc(sizeof *service);
-    const int status =
-        scenario && bench && service ? run(&o, scenario, bench, service) : complain(EXIT_MACHINE, "no memory");
+    const int status = !scenario || !bench || !service ? complain(EXIT_MACHINE, "no memory")
+                       : o.action == OPTIONS_DUMP      ? dump(&o, scenario)
+                                                       : run(&o, scenario, bench, service);
     free(service);
     free(bench);
     free(scenario);

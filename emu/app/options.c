@@ -17,10 +17,12 @@ static const char help[] =
     "\n"
     "SCENARIO is a YAML file or the name of one in proto/scenarios (default: calibrate).\n"
     "\n"
-    "  --can socketcand[:PORT]  socketcand protocol on 127.0.0.1 (default, port 29536; 0 takes a free one)\n"
-    "  --can slcan[:LINK]       slcan on a pseudo-terminal, LINK is made a symbolic link to it\n"
-    "  --can socketcan:IFACE    an interface of the kernel: vcan0, can0\n"
-    "                           --can may be given several times: all are on one bus; --can none: no adapter\n"
+    "  --can [BUS=]KIND         an adapter on the bus of that name (default: the first), of the kind\n"
+    "        socketcand[:PORT]  socketcand protocol on 127.0.0.1 (default, port 29536; 0 takes a free one)\n"
+    "        slcan[:LINK]       slcan on a pseudo-terminal, LINK is made a symbolic link to it\n"
+    "        socketcan:IFACE    an interface of the kernel: vcan0, can0\n"
+    "                           --can may be given several times; socketcand without BUS= serves every bus by the\n"
+    "                           name that a client opens; --can none: no adapter\n"
     "  --pace wall|step|free    real time (default), only when the control socket says so, as fast as it goes\n"
     "  --for TIME               end after this much simulated time: 300ms, 10s, 2min; a bare number is seconds\n"
     "  --wait-client            time begins when the first CAN client is there\n"
@@ -41,8 +43,11 @@ static const char help[] =
     "                           symbolic link to it; -: none\n"
     "  --line-hz HZ             its samples a second (default 8000000)\n"
     "  --quiet                  no counters on stderr at the end\n"
+    "  --dump                   print the scenario with every key as JSON, which is a scenario again; do not run it\n"
+    "  --resolved FILE          write the same to a file and run\n"
     "  --list-scenarios         names for SCENARIO, and what each is\n"
     "  --list-profiles          board profiles with their clocks and frame, and what each is\n"
+    "  --list-keys              keys of a scenario with unit, range and default\n"
     "  --list-commands          commands of the control socket and the truth port\n"
     "  --list-scpi              headers of the instruments\n"
     "  --help, --version\n"
@@ -102,6 +107,14 @@ struct target {
     size_t cap;
 };
 
+/* Length of "can1=" at the beginning; 0: there is none. */
+static size_t bus_prefix(const char *arg)
+{
+    const size_t n = strcspn(arg, "=:");
+    return arg[n] == '=' && n > 0 ? n + 1 : 0;
+}
+
+// Long: one kind of adapter after the other.
 static bool set_can(struct target *t, const char *arg)
 {
     struct options *o = t->o;
@@ -110,20 +123,22 @@ static bool set_can(struct target *t, const char *arg)
     if (o->can_count == OPTIONS_CAN_MAX)
         return fail(t->why, t->cap, "--can %s: up to %u adapters", arg, OPTIONS_CAN_MAX);
     struct options_can *c = &o->can[o->can_count];
-    const char *colon = strchr(arg, ':');
-    const size_t len = colon ? (size_t)(colon - arg) : strlen(arg);
+    const char *kind = arg + bus_prefix(arg);
+    const char *colon = strchr(kind, ':');
+    const size_t len = colon ? (size_t)(colon - kind) : strlen(kind);
     const char *rest = colon && colon[1] ? colon + 1 : NULL;
     uint64_t port = SOCKETCAND_PORT;
     *c = (struct options_can){.arg = rest};
-    if (len == 10 && strncmp(arg, "socketcand", 10) == 0) {
+    if (kind > arg) snprintf(c->bus, sizeof c->bus, "%.*s", (int)(kind - arg) - 1, arg);
+    if (len == 10 && strncmp(kind, "socketcand", 10) == 0) {
         c->kind = OPTIONS_SOCKETCAND;
         if (rest && !parse_u64(rest, 65535, &port)) {
             return fail(t->why, t->cap, "--can %s: \"%s\" is no port, 0 to 65535 (0: a free one)", arg, rest);
         }
         c->port = (uint16_t)port;
-    } else if (len == 5 && strncmp(arg, "slcan", 5) == 0) {
+    } else if (len == 5 && strncmp(kind, "slcan", 5) == 0) {
         c->kind = OPTIONS_SLCAN;
-    } else if (len == 9 && strncmp(arg, "socketcan", 9) == 0 && rest) {
+    } else if (len == 9 && strncmp(kind, "socketcan", 9) == 0 && rest) {
         c->kind = OPTIONS_SOCKETCAN;
     } else {
         return fail(t->why, t->cap, "--can %s: socketcand[:PORT], slcan[:LINK], socketcan:IFACE or none is wanted",
@@ -247,6 +262,9 @@ static bool set_help(struct target *t, const char *arg)    { (void)arg; t->o->ac
 static bool set_version(struct target *t, const char *arg) { (void)arg; t->o->action = OPTIONS_VERSION; return true; }
 static bool set_profiles(struct target *t, const char *arg) { (void)arg; t->o->action = OPTIONS_LIST_PROFILES; return true; }
 static bool set_scenarios(struct target *t, const char *arg) { (void)arg; t->o->action = OPTIONS_LIST_SCENARIOS; return true; }
+static bool set_keys(struct target *t, const char *arg) { (void)arg; t->o->action = OPTIONS_LIST_KEYS; return true; }
+static bool set_dump(struct target *t, const char *arg) { (void)arg; t->o->action = OPTIONS_DUMP; return true; }
+static bool set_resolved(struct target *t, const char *arg) { return set_path(t, "resolved", arg, &t->o->resolved); }
 static bool set_commands(struct target *t, const char *arg) { (void)arg; t->o->action = OPTIONS_LIST_COMMANDS; return true; }
 
 static bool set_list_scpi(struct target *t, const char *arg) { (void)arg; t->o->action = OPTIONS_LIST_SCPI; return true; }
@@ -266,6 +284,8 @@ static const struct {
     {"wait-client", no_argument, set_wait},        {"start", no_argument, set_start},
     {"quiet", no_argument, set_quiet},             {"help", no_argument, set_help},
     {"version", no_argument, set_version},         {"list-profiles", no_argument, set_profiles},
+    {"list-keys", no_argument, set_keys},           {"dump", no_argument, set_dump},
+    {"resolved", required_argument, set_resolved},
     {"list-scenarios", no_argument, set_scenarios}, {"list-commands", no_argument, set_commands},
     {"scpi", required_argument, set_scpi},         {"list-scpi", no_argument, set_list_scpi},
 };

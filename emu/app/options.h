@@ -15,6 +15,7 @@ enum options_can_kind { OPTIONS_SOCKETCAND, OPTIONS_SLCAN, OPTIONS_SOCKETCAN };
 
 struct options_can {
     enum options_can_kind kind;
+    char bus[16];    /* "": socketcand every bus, by the name that a client opens; others the first */
     const char *arg; /* slcan: link or NULL; socketcan: interface */
     uint16_t port;   /* socketcand; 0: a free one */
 };
@@ -34,7 +35,9 @@ enum options_action {
     OPTIONS_LIST_PROFILES,
     OPTIONS_LIST_SCENARIOS,
     OPTIONS_LIST_COMMANDS,
-    OPTIONS_LIST_SCPI
+    OPTIONS_LIST_SCPI,
+    OPTIONS_LIST_KEYS,
+    OPTIONS_DUMP
 };
 
 struct options {
@@ -55,6 +58,7 @@ struct options {
     const char *line; /* line port: symbolic link, "-" without one; NULL: no line port */
     int64_t line_hz;
     const char *control, *truth; /* paths of Unix sockets */
+    const char *resolved;        /* file for the scenario with every key; NULL: none */
     bool bitrate_given, data_bitrate_given;
     uint32_t bitrate_hz, data_bitrate_hz;
     int64_t epoch_ns; /* added to time stamps */

@@ -20,9 +20,10 @@ __attribute__((format(printf, 3, 4))) static bool fail(char *why, size_t cap, co
 
 /* ---- CAN */
 
-static bool open_socketcand(struct ports *p, struct ports_can *c, const struct options_can *o, char *why, size_t cap)
+static bool open_socketcand(struct can_hub *hub, struct ports_can *c, const struct options_can *o, char *why,
+                            size_t cap)
 {
-    const int err = socketcand_listen(&c->socketcand, &p->hub, o->port);
+    const int err = socketcand_listen(&c->socketcand, hub, c->hubs, o->port);
     if (!err) return true;
     if (err == -EADDRINUSE) {
         return fail(why, cap,
@@ -32,9 +33,9 @@ static bool open_socketcand(struct ports *p, struct ports_can *c, const struct o
     return fail(why, cap, "--can socketcand:%u: %s", o->port, strerror(-err));
 }
 
-static bool open_slcan(struct ports *p, struct ports_can *c, const struct options_can *o, char *why, size_t cap)
+static bool open_slcan(struct can_hub *hub, struct ports_can *c, const struct options_can *o, char *why, size_t cap)
 {
-    const int err = slcan_pty_open(&c->slcan, &p->hub, o->arg);
+    const int err = slcan_pty_open(&c->slcan, hub, o->arg);
     if (!err) return true;
     if (err == -EEXIST)
         return fail(why, cap, "--can slcan:%s: exists and is no symbolic link to a pty; another name is wanted",
@@ -42,9 +43,9 @@ static bool open_slcan(struct ports *p, struct ports_can *c, const struct option
     return fail(why, cap, "--can slcan%s%s: %s", o->arg ? ":" : "", o->arg ? o->arg : "", strerror(-err));
 }
 
-static bool open_socketcan(struct ports *p, struct ports_can *c, const struct options_can *o, char *why, size_t cap)
+static bool open_socketcan(struct can_hub *hub, struct ports_can *c, const struct options_can *o, char *why, size_t cap)
 {
-    const int err = socketcan_open(&c->socketcan, &p->hub, o->arg);
+    const int err = socketcan_open(&c->socketcan, hub, o->arg);
     if (!err) return true;
     if (err == -ENODEV) {
         return fail(why, cap,
@@ -60,16 +61,38 @@ static bool open_socketcan(struct ports *p, struct ports_can *c, const struct op
     return fail(why, cap, "--can socketcan:%s: %s", o->arg, strerror(-err));
 }
 
+/* The hub of a bus, the first of all for no name; NULL: there is no such bus. */
+static struct can_hub *hub_of(struct ports *p, const char *bus)
+{
+    for (unsigned i = 0; i < p->hubs; i++)
+        if (!bus[0] || strcmp(p->hub[i].name, bus) == 0) return &p->hub[i];
+    return NULL;
+}
+
+static void tell_buses(const struct ports *p, const char *bus, char *why, size_t cap)
+{
+    fail(why, cap, "--can %s=...: no such bus; there is", bus);
+    for (unsigned i = 0; i < p->hubs; i++) {
+        const size_t at = strlen(why);
+        snprintf(why + at, cap - at, "%s %s", i ? "," : "", p->hub[i].name);
+    }
+}
+
 static bool open_can(struct ports *p, const struct options *o, char *why, size_t cap)
 {
-    typedef bool open_fn(struct ports *, struct ports_can *, const struct options_can *, char *, size_t);
+    typedef bool open_fn(struct can_hub *, struct ports_can *, const struct options_can *, char *, size_t);
     static open_fn *const open[] = {
         [OPTIONS_SOCKETCAND] = open_socketcand, [OPTIONS_SLCAN] = open_slcan, [OPTIONS_SOCKETCAN] = open_socketcan};
     for (unsigned i = 0; i < o->can_count; i++) {
         struct ports_can *c = calloc(1, sizeof *c);
         if (!c) return fail(why, cap, "--can: no memory");
+        struct can_hub *hub = hub_of(p, o->can[i].bus);
         c->kind = o->can[i].kind;
-        if (!open[c->kind](p, c, &o->can[i], why, cap)) {
+        const bool all = c->kind == OPTIONS_SOCKETCAND && !o->can[i].bus[0];
+        c->hubs = all ? p->hubs : 1;
+        c->bus = p->hubs > 1 && hub && !all ? hub->name : NULL;
+        if (!hub) tell_buses(p, o->can[i].bus, why, cap);
+        if (!hub || !open[c->kind](hub, c, &o->can[i], why, cap)) {
             free(c);
             return false;
         }
@@ -107,7 +130,7 @@ static bool open_line(struct ports *p, struct bench *b, const struct options *o,
     if (!o->line) return true;
     const char *name = strcmp(o->line, "-") == 0 ? NULL : o->line;
     const struct line_source source = {b,         line_start,   line_stop,
-                                       line_take, line_waiting, p->hub.lossless ? SAMPLER_RING / 2 : 0};
+                                       line_take, line_waiting, p->hub[0].lossless ? SAMPLER_RING / 2 : 0};
     b->sampler.clock = (struct clk){.hz = o->line_hz, .div = 1};
     p->line = calloc(1, sizeof *p->line);
     const int err = p->line ? line_pty_open(p->line, &p->links, &source, name) : -ENOMEM;
@@ -145,18 +168,25 @@ bool ports_open(struct ports *p, struct bench *b, const struct options *o, char 
     p->control.listen.fd = p->truth.listen.fd = -1;
     p->control.links = p->truth.links = &p->links;
     p->scpi.links = &p->links;
-    p->hub.bus = &b->bus;
-    p->hub.links = &p->links;
-    p->hub.lossless = o->pace != PACE_WALL;
-    p->hub.epoch_ns = o->epoch_ns;
+    p->hubs = b->buses;
+    for (unsigned i = 0; i < p->hubs; i++) {
+        struct can_hub *h = &p->hub[i];
+        h->name = b->scenario.bus[i].name;
+        h->bus = &b->bus[i];
+        h->links = &p->links;
+        h->comings = &p->comings;
+        h->lossless = o->pace != PACE_WALL;
+        h->epoch_ns = o->epoch_ns;
+    }
     return open_can(p, o, why, cap) && open_line(p, b, o, why, cap) && open_vcd(p, b, o, why, cap) &&
            instruments_open(&p->scpi, o, why, cap) && open_socket(&p->control, "control", o->control, why, cap) &&
            open_socket(&p->truth, "truth", o->truth, why, cap);
 }
 
-static void ready_pty(FILE *out, const char *what, const struct pty *pty)
+static void ready_pty(FILE *out, const char *what, const struct pty *pty, const char *bus)
 {
-    fprintf(out, "ready %s pty=%s%s%s\n", what, pty->path, pty->name ? " link=" : "", pty->name ? pty->name : "");
+    fprintf(out, "ready %s pty=%s%s%s%s%s\n", what, pty->path, pty->name ? " link=" : "", pty->name ? pty->name : "",
+            bus ? " bus=" : "", bus ? bus : "");
 }
 
 void ports_ready(const struct ports *p, const struct options *o, FILE *out)
@@ -164,17 +194,18 @@ void ports_ready(const struct ports *p, const struct options *o, FILE *out)
     for (unsigned i = 0; i < p->can_count; i++) {
         const struct ports_can *c = p->can[i];
         if (c->kind == OPTIONS_SOCKETCAND)
-            fprintf(out, "ready can=socketcand host=127.0.0.1 port=%u\n", c->socketcand.port);
-        if (c->kind == OPTIONS_SLCAN) ready_pty(out, "can=slcan", &c->slcan.pty);
+            fprintf(out, "ready can=socketcand host=127.0.0.1 port=%u%s%s\n", c->socketcand.port, c->bus ? " bus=" : "",
+                    c->bus ? c->bus : "");
+        if (c->kind == OPTIONS_SLCAN) ready_pty(out, "can=slcan", &c->slcan.pty, c->bus);
         if (c->kind == OPTIONS_SOCKETCAN) {
-            fprintf(out, "ready can=socketcan channel=%s fd=%s\n", c->socketcan.can.name,
-                    c->socketcan.can.node.fd ? "true" : "false");
+            fprintf(out, "ready can=socketcan channel=%s fd=%s%s%s\n", c->socketcan.can.name,
+                    c->socketcan.can.node.fd ? "true" : "false", c->bus ? " bus=" : "", c->bus ? c->bus : "");
         }
     }
     if (p->line) {
         char what[64];
         snprintf(what, sizeof what, "line=sampled hz=%" PRId64, o->line_hz);
-        ready_pty(out, what, &p->line->pty);
+        ready_pty(out, what, &p->line->pty, NULL);
     }
     instruments_ready(&p->scpi, out);
     if (o->vcd) fprintf(out, "ready vcd=%s\n", o->vcd);

@@ -14,6 +14,8 @@
 
 struct ports_can {
     enum options_can_kind kind;
+    const char *bus; /* its bus where there are several; NULL: all of them, or the only one */
+    unsigned hubs;   /* socketcand: how many it serves */
     union {
         struct socketcand_server socketcand;
         struct slcan_pty slcan;
@@ -23,7 +25,9 @@ struct ports_can {
 
 struct ports {
     struct links links;
-    struct can_hub hub;
+    struct can_hub hub[SCENARIO_BUSES_MAX]; /* one a bus */
+    unsigned hubs;
+    uint32_t comings; /* clients of all hubs so far */
     struct ports_can *can[OPTIONS_CAN_MAX];
     unsigned can_count;
     struct line_pty *line;
@@ -32,7 +36,7 @@ struct ports {
     FILE *vcd;
 };
 
-/* Opens what the options ask for; links and hub of p are set up first with bench, epoch and say. False with one line in
+/* Opens what the options ask for; links and hubs of p are set up first with bench, epoch and say. False with one line in
  * why: what, where, what would be right. ports_close() in either case. */
 bool ports_open(struct ports *p, struct bench *b, const struct options *o, char *why, size_t cap);
 

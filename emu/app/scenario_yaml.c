@@ -1,363 +1,299 @@
 #include "app/scenario_yaml.h"
 
-#include "app/profile_yaml.h"
-#include "app/yaml_file.h"
+#include "app/scenario_fields.h"
+#include "base/text.h"
+#include "control/exact.h"
 
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
-#define COUNT(a) (sizeof(a) / sizeof *(a))
+#define VERSION TEXT_OF(PSABENCH_VERSION) /* of pyproject.toml, by way of the Makefile */
 
-/* ---- leaves: tables only */
+#define SCENARIO(m) offsetof(struct scenario, m)
 
-#define BUS(m)  offsetof(struct can_bus_cfg, m)
-#define HEAD(m) offsetof(struct head_cfg, m)
-#define AFE(m)  offsetof(struct afe_cfg, m)
-#define MEMS(m) offsetof(struct mems_g, m)
+/* ---- buses */
 
-// clang-format off
-static const struct yaml_field bus_fields[] = {
-    {"bitrate_hz",      YAML_U32, BUS(bitrate_hz),      0, 1e6, NULL},
-    {"data_bitrate_hz", YAML_U32, BUS(data_bitrate_hz), 0, 8e6, NULL},
-};
-static const struct yaml_field site_fields[] = {
-    {"g_mps2", YAML_REAL, offsetof(struct site, g_mps2), 0, 20, NULL},
-};
-static const struct yaml_field head_fields[] = {
-    {"resolution_arcsec",        YAML_REAL, HEAD(resolution_arcsec),        0, 3600, NULL},
-    {"setting_error_arcsec_rms", YAML_REAL, HEAD(setting_error_arcsec_rms), 0, 3600, NULL},
-    {"periodic_arcsec",          YAML_REAL, HEAD(periodic_arcsec),          0, 3600, NULL},
-    {"periodic_order",           YAML_U32,  HEAD(periodic_order),           0, 3600, NULL},
-    {"mount_error_arcsec_rms",   YAML_REAL, HEAD(mount_error_arcsec_rms),   0, 3600, NULL},
-    {"turn_s",                   YAML_REAL, HEAD(turn_s),                   0, 3600, NULL},
-};
-
-static bool load_input(struct yaml_file *f, yaml_node_t *node, void *section);
-
-static const struct yaml_field afe_fields[] = {
-    {"input",                    YAML_CUSTOM, 0, 0, 0, load_input},
-    {"load_ohm",                 YAML_REAL, AFE(load_ohm),                 1, 1e6, NULL},
-    {"load_tol_ppm",             YAML_REAL, AFE(load_tol_ppm),             -1e5, 1e5, NULL},
-    {"load_tc_ppm_per_k",        YAML_REAL, AFE(load_tc_ppm_per_k),        -1e4, 1e4, NULL},
-    {"divider_ratio",            YAML_REAL, AFE(divider_ratio),            1, 1000, NULL},
-    {"divider_tol_ppm",          YAML_REAL, AFE(divider_tol_ppm),          -1e5, 1e5, NULL},
-    {"divider_tc_ppm_per_k",     YAML_REAL, AFE(divider_tc_ppm_per_k),     -1e4, 1e4, NULL},
-    {"buffer_offset_v",          YAML_REAL, AFE(buffer_offset_v),          -1, 1, NULL},
-    {"buffer_offset_tc_v_per_k", YAML_REAL, AFE(buffer_offset_tc_v_per_k), -1e-2, 1e-2, NULL},
-    {"clip_v",                   YAML_REAL, AFE(clip_v),                   0.1, 100, NULL},
-    {"filter_hz",                YAML_REAL, AFE(filter_hz),                0, 1e6, NULL},
-    {"noise_v_rthz",             YAML_REAL, AFE(noise_v_rthz),             0, 1e-2, NULL},
-};
-static const struct yaml_field mems_fields[] = {
-    {"u0_v",            YAML_REAL, MEMS(u0_v),            -10, 10, NULL},
-    {"kx_v_per_g",      YAML_REAL, MEMS(kx_v_per_g),      -10, 10, NULL},
-    {"ky_v_per_g",      YAML_REAL, MEMS(ky_v_per_g),      -10, 10, NULL},
-    {"kz_v_per_g",      YAML_REAL, MEMS(kz_v_per_g),      -10, 10, NULL},
-    {"kxy_v_per_g2",    YAML_REAL, MEMS(kxy_v_per_g2),    -1, 1, NULL},
-    {"kxx_v_per_g2",    YAML_REAL, MEMS(kxx_v_per_g2),    -1, 1, NULL},
-    {"kyy_v_per_g2",    YAML_REAL, MEMS(kyy_v_per_g2),    -1, 1, NULL},
-    {"alpha0_deg",      YAML_REAL, MEMS(alpha0_deg),      -10, 10, NULL},
-    {"drift_v_per_s",   YAML_REAL, MEMS(drift_v_per_s),   -1, 1, NULL},
-    {"noise_v_rthz",    YAML_REAL, MEMS(noise_v_rthz),    0, 1, NULL},
-    {"reading_noise_v", YAML_REAL, MEMS(reading_noise_v), 0, 1, NULL},
-};
-// clang-format on
-
-static bool load_input(struct yaml_file *f, yaml_node_t *node, void *section)
+static bool check_rate(struct yaml_file *f, const struct yaml_node *node, const struct scenario_bus *b)
 {
-    struct afe_cfg *a = section;
-    const char *text = yaml_file_scalar(node);
-    const bool current = text && strcmp(text, "current") == 0;
-    if (!current && (!text || strcmp(text, "voltage") != 0)) {
-        return yaml_file_fail(f, node, "input", "current or voltage is wanted");
-    }
-    a->input = current ? AFE_CURRENT : AFE_VOLTAGE;
-    return true;
+    if (!b->cfg.bitrate_hz || b->cfg.bitrate_hz >= 10000) return true;
+    const struct yaml_node *at = yaml_get(node, "bitrate_hz");
+    return yaml_file_fail(f, at ? at : node, "bitrate_hz", "%u is below 10000; 0 is a bus on which frames take no time",
+                          b->cfg.bitrate_hz);
 }
 
-/* ---- an axis: sensor, its parameters, its chain */
-
-struct axis {
-    struct unit_axis_cfg *sensor;
-    struct afe_cfg *afe;
-};
-
-static bool load_sensor(struct yaml_file *f, yaml_node_t *node, void *section)
+static bool load_bus(struct yaml_file *f, const struct yaml_node *node, void *section)
 {
-    struct axis *a = section;
-    const char *text = yaml_file_scalar(node);
-    const bool mems = text && strcmp(text, "mems") == 0;
-    if (!mems && (!text || strcmp(text, "none") != 0))
-        return yaml_file_fail(f, node, "sensor", "mems or none is wanted");
-    a->sensor->sensor = mems ? UNIT_MEMS : UNIT_NO_SENSOR;
-    return true;
-}
-
-static bool load_afe(struct yaml_file *f, yaml_node_t *node, void *section)
-{
-    return yaml_file_section(f, node, "afe", afe_fields, COUNT(afe_fields), ((struct axis *)section)->afe);
-}
-
-/* The keys of the sensor stand beside `sensor` and `afe`: one table made of both. */
-static bool load_axis(struct yaml_file *f, yaml_node_t *node, const char *name, struct unit_cfg *u, unsigned axis)
-{
-    struct axis a = {&u->axis[axis], &u->board.afe[axis]};
-    struct {
-        struct axis axis; /* first: what load_sensor and load_afe get */
-        struct mems_g mems;
-    } section = {a, u->axis[axis].mems};
-    struct yaml_field fields[2 + COUNT(mems_fields)] = {
-        {.key = "sensor", .type = YAML_CUSTOM, .load = load_sensor},
-        {.key = "afe", .type = YAML_CUSTOM, .load = load_afe},
-    };
-    for (size_t i = 0; i < COUNT(mems_fields); i++) {
-        fields[2 + i] = mems_fields[i];
-        fields[2 + i].offset += (size_t)((char *)&section.mems - (char *)&section);
-    }
-    if (!yaml_file_section(f, node, name, fields, COUNT(fields), &section)) return false;
-    u->axis[axis].mems = section.mems;
-    return true;
-}
-
-static bool load_axis_x(struct yaml_file *f, yaml_node_t *node, void *u)
-{
-    return load_axis(f, node, "x", u, 0);
-}
-
-static bool load_axis_y(struct yaml_file *f, yaml_node_t *node, void *u)
-{
-    return load_axis(f, node, "y", u, 1);
-}
-
-static bool load_axis_z(struct yaml_file *f, yaml_node_t *node, void *u)
-{
-    return load_axis(f, node, "z", u, 2);
-}
-
-static const struct yaml_field axes_fields[] = {
-    {.key = "x", .type = YAML_CUSTOM, .load = load_axis_x},
-    {.key = "y", .type = YAML_CUSTOM, .load = load_axis_y},
-    {.key = "z", .type = YAML_CUSTOM, .load = load_axis_z},
-};
-
-/* ---- a unit */
-
-static bool load_axes(struct yaml_file *f, yaml_node_t *node, void *section)
-{
-    struct scenario_unit *u = section;
-    return yaml_file_section(f, node, "axes", axes_fields, COUNT(axes_fields), &u->cfg);
-}
-
-static bool load_profile_named(struct yaml_file *f, const yaml_node_t *node, const char *name, struct scenario_unit *u)
-{
-    char path[FIND_PATH_MAX], why[400];
-    if (!find_proto("profiles", name, f->path, path, why, sizeof why))
-        return yaml_file_fail(f, node, "profile", "%s", why);
-    return profile_yaml_load(path, &u->profile, f->why, f->cap);
-}
-
-static bool load_profile(struct yaml_file *f, yaml_node_t *node, void *section)
-{
-    const char *name = yaml_file_scalar(node);
-    struct scenario_unit *u = section;
-    if (!name) return yaml_file_fail(f, node, "profile", "a name of proto/profiles or a path is wanted");
-    if (u->profile_changed)
-        return yaml_file_fail(f, node, "profile", "stands after profile_set, which changes it; name it before");
-    u->profile_named = true;
-    return load_profile_named(f, node, name, u);
-}
-
-/* board: psa1 is the same board with its own profile. */
-static bool load_board(struct yaml_file *f, yaml_node_t *node, void *section)
-{
-    struct scenario_unit *u = section;
-    const char *name = yaml_file_scalar(node);
-    const bool psa1 = name && strcmp(name, "psa1") == 0;
-    if (!psa1 && (!name || strcmp(name, "psa2") != 0))
-        return yaml_file_fail(f, node, "board", "psa2 or psa1 is wanted");
-    snprintf(u->board_name, sizeof u->board_name, "%s", name);
-    if (!psa1 || u->profile_named) return true;
-    if (u->profile_changed)
-        return yaml_file_fail(f, node, "board", "stands after profile_set, which changes its profile; name it before");
-    return load_profile_named(f, node, "psa1", u);
-}
-
-/* Fields that differ from the profile, which must have been named before. */
-static bool load_profile_set(struct yaml_file *f, yaml_node_t *node, void *section)
-{
-    struct scenario_unit *u = section;
-    const size_t outer = strlen(f->where);
-    u->profile_changed = true;
-    if (node->type != YAML_MAPPING_NODE)
-        return yaml_file_fail(f, node, "profile_set", "a mapping `key: value` is wanted");
-    snprintf(f->where + outer, sizeof f->where - outer, "profile_set.");
-    if (!profile_yaml_fields(f, node, &u->profile)) return false;
-    snprintf(f->where + outer, sizeof f->where - outer, "profile_set: "); /* a whole sentence follows */
-    if (!profile_yaml_check(f, node, &u->profile)) return false;
-    f->where[outer] = '\0';
-    return true;
-}
-
-static const struct yaml_field temp_field = {"temp_degc", YAML_REAL, 0, -60, 125, NULL};
-
-/* One value for all, or those of X, Y, Z and the board. */
-static bool load_temps(struct yaml_file *f, yaml_node_t *node, void *section)
-{
-    struct scenario_unit *u = section;
-    double one = 0;
-    if (node->type != YAML_SEQUENCE_NODE) {
-        if (!yaml_file_value(f, node, &temp_field, &one)) return false;
-        for (unsigned i = 0; i < UNIT_TEMPS; i++) u->cfg.temp_degc[i] = one;
-        return true;
-    }
-    const yaml_node_item_t *items = node->data.sequence.items.start;
-    if (node->data.sequence.items.top - items != UNIT_TEMPS) {
-        return yaml_file_fail(f, node, "temp_degc", "one value or four, of X, Y, Z and the board, are wanted");
-    }
-    for (unsigned i = 0; i < UNIT_TEMPS; i++) {
-        if (!yaml_file_value(f, yaml_file_node(f, items[i]), &temp_field, &u->cfg.temp_degc[i])) return false;
-    }
-    return true;
-}
-
-static bool load_adc_chain(struct yaml_file *f, yaml_node_t *node, void *section)
-{
-    static const char *const chains[] = {
-        [ADS1282_CHAIN_EXACT] = "exact", [ADS1282_CHAIN_MODULATOR] = "modulator", [ADS1282_CHAIN_DIRECT] = "direct"};
-    const char *text = yaml_file_scalar(node);
-    for (unsigned i = 0; text && i < COUNT(chains); i++) {
-        if (strcmp(text, chains[i]) != 0) continue;
-        ((struct scenario_unit *)section)->cfg.board.adc_chain = (enum ads1282_chain)i;
-        return true;
-    }
-    return yaml_file_fail(f, node, "adc_chain", "exact, modulator or direct is wanted");
-}
-
-#define UNIT(m) offsetof(struct scenario_unit, m)
-
-// clang-format off
-static const struct yaml_field unit_fields[] = {
-    {"name",                YAML_TEXT, UNIT(name), 0, 32, NULL},
-    {"board",               YAML_CUSTOM, 0, 0, 0, load_board},
-    {"profile",             YAML_CUSTOM, 0, 0, 0, load_profile},
-    {"profile_set",         YAML_CUSTOM, 0, 0, 0, load_profile_set},
-    {"node",                YAML_U8, UNIT(cfg.node), 1, 127, NULL},
-    {"serial",              YAML_U32, UNIT(cfg.board.serial), 1, 4294967295.0, NULL},
-    {"frame_form",          YAML_U8, UNIT(frame_form), 0, 3, NULL},
-    {"axes",                YAML_CUSTOM, 0, 0, 0, load_axes},
-    {"temp_degc",           YAML_CUSTOM, 0, 0, 0, load_temps},
-    {"adc_chain",           YAML_CUSTOM, 0, 0, 0, load_adc_chain},
-    {"adc_noise_scale",     YAML_REAL, UNIT(cfg.board.adc_noise_scale), 0, 1000, NULL},
-    {"temp_noise_scale",    YAML_REAL, UNIT(cfg.board.temp_noise_scale), 0, 1000, NULL},
-    {"temp_adc_offset_v",   YAML_REAL, UNIT(cfg.board.temp_adc_offset_v), -0.1, 0.1, NULL},
-    {"temp_adc_gain_error", YAML_REAL, UNIT(cfg.board.temp_adc_gain_error), -0.1, 0.1, NULL},
-};
-// clang-format on
-
-/* A name and a number that no other unit of the scenario has. */
-static bool check_unit(struct yaml_file *f, const yaml_node_t *node, const struct scenario *s,
-                       const struct scenario_unit *u)
-{
-    for (const char *p = u->name; *p; p++) {
-        const bool plain =
-            (*p >= 'a' && *p <= 'z') || (*p >= 'A' && *p <= 'Z') || (*p >= '0' && *p <= '9') || *p == '_';
-        if (!plain) return yaml_file_fail(f, node, "name", "\"%s\": letters, digits and _ are wanted", u->name);
-    }
-    for (const struct scenario_unit *other = s->units; other < u; other++) {
-        if (strcmp(other->name, u->name) == 0)
-            return yaml_file_fail(f, node, "name", "\"%s\" is taken by another unit", u->name);
-        if (other->cfg.node == u->cfg.node) {
-            return yaml_file_fail(f, node, "node", "%u is taken by unit %s; each needs its own", u->cfg.node,
-                                  other->name);
-        }
-        if (other->cfg.board.serial == u->cfg.board.serial) {
-            return yaml_file_fail(f, node, "serial", "%u is taken by unit %s; each needs its own", u->cfg.board.serial,
-                                  other->name);
-        }
-    }
-    return true;
-}
-
-/* The unit's name as the messages need it before it is loaded. */
-static const char *name_in(struct yaml_file *f, const yaml_node_t *node, const char *otherwise)
-{
-    const yaml_node_pair_t *end = node->type == YAML_MAPPING_NODE ? node->data.mapping.pairs.top : NULL;
-    for (const yaml_node_pair_t *p = end ? node->data.mapping.pairs.start : NULL; p < end; p++) {
-        const char *key = yaml_file_scalar(yaml_file_node(f, p->key));
-        const char *name = yaml_file_scalar(yaml_file_node(f, p->value));
-        if (key && name && strcmp(key, "name") == 0) return name;
-    }
-    return otherwise;
-}
-
-static bool load_unit(struct yaml_file *f, yaml_node_t *node, struct scenario *s)
-{
-    char where[40];
-    if (s->unit_count == SCENARIO_UNITS_MAX)
-        return yaml_file_fail(f, node, "units", "up to %u are wanted", SCENARIO_UNITS_MAX);
-    const unsigned i = s->unit_count;
-    struct scenario_unit *u = &s->units[i];
-    *u = (struct scenario_unit){.board_name = "psa2", .profile = psa2_profile_default(), .cfg = unit_default(NULL)};
-    snprintf(u->name, sizeof u->name, "%c", 'a' + (int)i);
-    u->cfg.node = (uint8_t)(5 + i);
-    u->cfg.board.serial = i + 1;
-    snprintf(where, sizeof where, "units.%.31s", name_in(f, node, u->name));
-    if (!yaml_file_section(f, node, where, unit_fields, COUNT(unit_fields), u)) return false;
-    snprintf(f->where, sizeof f->where, "%s.", where);
-    if (!check_unit(f, node, s, u)) return false;
+    struct scenario *s = section;
+    if (!yaml_load(f, node, "bus", &scenario_bus_fields, &s->bus[0].cfg)) return false;
+    snprintf(f->where, sizeof f->where, "bus.");
+    if (!check_rate(f, node, &s->bus[0])) return false;
     f->where[0] = '\0';
-    s->unit_count++;
     return true;
+}
+
+static bool check_bus(struct yaml_file *f, const struct yaml_node *node, const struct scenario *s, unsigned i)
+{
+    const char *name = s->bus[i].name;
+    static const char letters[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_";
+    if (name[strspn(name, letters)])
+        return yaml_file_fail(f, node, "name", "\"%s\": letters, digits and _ are wanted", name);
+    for (unsigned k = 0; k < i; k++)
+        if (strcmp(s->bus[k].name, name) == 0)
+            return yaml_file_fail(f, node, "name", "\"%s\" is taken by another bus", name);
+    return check_rate(f, node, &s->bus[i]);
+}
+
+static bool load_buses(struct yaml_file *f, const struct yaml_node *node, struct scenario *s)
+{
+    if (node->kind != YAML_SEQUENCE || !node->first)
+        return yaml_file_fail(f, node, "buses", "a sequence of buses is wanted");
+    s->bus_count = 0;
+    for (const struct yaml_item *i = node->first; i; i = i->next) {
+        char where[40];
+        const unsigned n = s->bus_count;
+        if (n == SCENARIO_BUSES_MAX) return yaml_file_fail(f, i->value, "buses", "up to %u", SCENARIO_BUSES_MAX);
+        s->bus[n] = (struct scenario_bus){.cfg = {.bitrate_hz = 1000000, .data_bitrate_hz = 5000000}};
+        snprintf(s->bus[n].name, sizeof s->bus[n].name, "can%u", n);
+        snprintf(where, sizeof where, "buses.%s", s->bus[n].name);
+        if (!yaml_load(f, i->value, where, &scenario_buses_fields, &s->bus[n])) return false;
+        snprintf(f->where, sizeof f->where, "%s.", where);
+        if (!check_bus(f, i->value, s, n)) return false;
+        f->where[0] = '\0';
+        s->bus_count++;
+    }
+    return true;
+}
+
+/* The buses are known before the units that name them are read. */
+static bool buses_are_loaded(struct yaml_file *f, const struct yaml_node *node, void *section)
+{
+    (void)section;
+    if (!yaml_get(f->root, "bus")) return true;
+    return yaml_file_fail(f, node, "buses", "stands beside bus, which is short for one; one of the two is wanted");
+}
+
+static void dump_buses(const struct yaml_field *d, const void *section, cJSON *to)
+{
+    const struct scenario *s = section;
+    cJSON *list = cJSON_AddArrayToObject(to, d->key);
+    for (unsigned i = 0; i < s->bus_count; i++) {
+        cJSON *j = cJSON_CreateObject();
+        yaml_dump(&scenario_buses_fields, &s->bus[i], j);
+        cJSON_AddItemToArray(list, j);
+    }
+}
+
+/* ---- units and their spread */
+
+static bool load_units(struct yaml_file *f, const struct yaml_node *node, void *section)
+{
+    return scenario_load_units(f, node, section);
+}
+
+static void dump_units(const struct yaml_field *d, const void *section, cJSON *to)
+{
+    const struct scenario *s = section;
+    cJSON *list = cJSON_AddArrayToObject(to, d->key);
+    for (unsigned i = 0; i < s->unit_count; i++) {
+        cJSON *j = cJSON_CreateObject();
+        yaml_dump(&scenario_unit_fields, &s->units[i], j);
+        cJSON_AddItemToArray(list, j);
+    }
+}
+
+enum { SPREAD_ROWS = 64 };
+
+/* The rows of numbers, each from 0 to the width of its range: deviations. */
+static size_t deviations(const struct yaml_fields *t, struct yaml_field *out)
+{
+    size_t n = 0, offset;
+    for (const struct yaml_field *d; (d = yaml_row(t, n, &offset)) && n < SPREAD_ROWS; n++) {
+        out[n] = *d;
+        out[n].offset += offset;
+        out[n].min = 0;
+        out[n].max = d->max - d->min;
+    }
+    return n;
+}
+
+static bool load_spread(struct yaml_file *f, const struct yaml_node *node, void *section)
+{
+    struct scenario *s = section;
+    struct yaml_field afe[SPREAD_ROWS], rows[SPREAD_ROWS + 1];
+    const struct yaml_fields afe_fields = {afe, deviations(&scenario_afe_numbers, afe)};
+    const size_t n = deviations(&scenario_mems_fields, rows);
+    rows[n] = (struct yaml_field){
+        .key = "afe", .type = YAML_SECTION, .offset = offsetof(struct scenario_spread, afe), .sub = &afe_fields};
+    const struct yaml_fields all = {rows, n + 1};
+    return yaml_load(f, node, "spread", &all, &s->spread);
+}
+
+static void dump_spread(const struct yaml_field *d, const void *section, cJSON *to)
+{
+    yaml_dump(&scenario_spread_fields, &((const struct scenario *)section)->spread,
+              cJSON_AddObjectToObject(to, d->key));
+}
+
+// clang-format off
+static const struct yaml_field spread_afe_rows[] = {
+    {.type = YAML_INLINE, .sub = &scenario_afe_numbers},
+};
+static const struct yaml_fields spread_afe_fields = YAML_FIELDS(spread_afe_rows);
+static const struct yaml_field spread_rows[] = {
+    {.type = YAML_INLINE, .offset = offsetof(struct scenario_spread, mems), .sub = &scenario_mems_fields},
+    {.key = "afe", .type = YAML_SECTION, .offset = offsetof(struct scenario_spread, afe), .sub = &spread_afe_fields, .what = "of the analog chain"},
+};
+const struct yaml_fields scenario_spread_fields = YAML_FIELDS(spread_rows);
+// clang-format on
+
+/* ---- timeline and faults */
+
+static bool print_args(struct yaml_file *f, const struct yaml_node *node, cJSON *args, struct scenario_event *e)
+{
+    char *line = exact_line(args);
+    const bool fits = line && strlen(line) < sizeof e->args;
+    if (fits) snprintf(e->args, sizeof e->args, "%s", line);
+    free(line);
+    cJSON_Delete(args);
+    return fits || yaml_file_fail(f, node, NULL, "arguments of up to %u characters are wanted", SCENARIO_ARGS_MAX - 1);
+}
+
+static bool load_args(struct yaml_file *f, const struct yaml_node *node, void *section)
+{
+    if (node->kind != YAML_MAPPING) return yaml_file_fail(f, node, "args", "a mapping `name: value` is wanted");
+    cJSON *args = yaml_json(f, node);
+    return args && print_args(f, node, args, section);
+}
+
+static void dump_args(const struct yaml_field *d, const void *section, cJSON *to)
+{
+    cJSON_AddRawToObject(to, d->key, ((const struct scenario_event *)section)->args);
+}
+
+// clang-format off
+static const struct yaml_field event_rows[] = {
+    {.key = "at_s", .type = YAML_REAL, .offset = offsetof(struct scenario_event, at_s), .max = 1e6, .what = "simulated time since power-on"},
+    {.key = "cmd",  .type = YAML_TEXT, .offset = offsetof(struct scenario_event, cmd), .max = 32, .what = "a command of the control socket"},
+    {.key = "args", .type = YAML_CUSTOM, .load = load_args, .dump = dump_args, .what = "its arguments, a mapping"},
+};
+const struct yaml_fields scenario_event_fields = YAML_FIELDS(event_rows);
+// clang-format on
+
+static struct scenario_event *new_event(struct yaml_file *f, const struct yaml_node *node, const char *list,
+                                        struct scenario_events *events)
+{
+    if (events->count == SCENARIO_EVENTS_MAX) {
+        yaml_file_fail(f, node, list, "up to %u entries are wanted", SCENARIO_EVENTS_MAX);
+        return NULL;
+    }
+    struct scenario_event *e = &events->event[events->count];
+    *e = (struct scenario_event){.args = "{}", .line = node->line, .column = node->column};
+    return e;
+}
+
+static bool load_timeline(struct yaml_file *f, const struct yaml_node *node, void *section)
+{
+    struct scenario_events *t = &((struct scenario *)section)->timeline;
+    if (node->kind != YAML_SEQUENCE) return yaml_file_fail(f, node, "timeline", "a sequence of commands is wanted");
+    for (const struct yaml_item *i = node->first; i; i = i->next) {
+        char where[32];
+        struct scenario_event *e = new_event(f, i->value, "timeline", t);
+        snprintf(where, sizeof where, "timeline[%u]", t->count);
+        if (!e || !yaml_load(f, i->value, where, &scenario_event_fields, e)) return false;
+        if (!e->cmd[0]) return yaml_file_fail(f, i->value, where, "cmd is missing: a command is wanted");
+        t->count++;
+    }
+    return true;
+}
+
+static bool load_faults(struct yaml_file *f, const struct yaml_node *node, void *section)
+{
+    struct scenario_events *t = &((struct scenario *)section)->faults;
+    if (node->kind != YAML_SEQUENCE) return yaml_file_fail(f, node, "faults", "a sequence of faults is wanted");
+    for (const struct yaml_item *i = node->first; i; i = i->next) {
+        struct scenario_event *e = new_event(f, i->value, "faults", t);
+        if (!e) return false;
+        if (i->value->kind != YAML_MAPPING)
+            return yaml_file_fail(f, i->value, "faults", "a mapping with the arguments of fault.add is wanted");
+        snprintf(e->cmd, sizeof e->cmd, "fault.add");
+        cJSON *args = yaml_json(f, i->value);
+        if (!args || !print_args(f, i->value, args, e)) return false;
+        t->count++;
+    }
+    return true;
+}
+
+static void dump_timeline(const struct yaml_field *d, const void *section, cJSON *to)
+{
+    const struct scenario_events *t = &((const struct scenario *)section)->timeline;
+    cJSON *list = cJSON_AddArrayToObject(to, d->key);
+    for (unsigned i = 0; i < t->count; i++) {
+        cJSON *j = cJSON_CreateObject();
+        yaml_dump(&scenario_event_fields, &t->event[i], j);
+        cJSON_AddItemToArray(list, j);
+    }
+}
+
+static void dump_faults(const struct yaml_field *d, const void *section, cJSON *to)
+{
+    const struct scenario_events *t = &((const struct scenario *)section)->faults;
+    cJSON *list = cJSON_AddArrayToObject(to, d->key);
+    for (unsigned i = 0; i < t->count; i++) cJSON_AddItemToArray(list, cJSON_CreateRaw(t->event[i].args));
 }
 
 /* ---- the whole */
 
-static bool load_bus(struct yaml_file *f, yaml_node_t *node, void *section)
+static bool load_version(struct yaml_file *f, const struct yaml_node *node, void *section)
 {
-    struct scenario *s = section;
-    return yaml_file_section(f, node, "bus", bus_fields, COUNT(bus_fields), &s->bus);
+    (void)section;
+    return yaml_scalar(node) || yaml_file_fail(f, node, "version", "a word is wanted");
 }
 
-static bool load_site(struct yaml_file *f, yaml_node_t *node, void *section)
+static void dump_version(const struct yaml_field *d, const void *section, cJSON *to)
 {
-    struct scenario *s = section;
-    return yaml_file_section(f, node, "site", site_fields, COUNT(site_fields), &s->site);
+    (void)section;
+    cJSON_AddStringToObject(to, d->key, VERSION);
 }
 
-static bool load_head(struct yaml_file *f, yaml_node_t *node, void *section)
-{
-    struct scenario *s = section;
-    return yaml_file_section(f, node, "head", head_fields, COUNT(head_fields), &s->head);
-}
-
-static bool load_units(struct yaml_file *f, yaml_node_t *node, void *section)
-{
-    if (node->type != YAML_SEQUENCE_NODE) return yaml_file_fail(f, node, "units", "a sequence of units is wanted");
-    for (yaml_node_item_t *i = node->data.sequence.items.start; i < node->data.sequence.items.top; i++) {
-        if (!load_unit(f, yaml_file_node(f, *i), section)) return false;
-    }
-    return true;
-}
-
-static const struct yaml_field scenario_fields[] = {
-    {.key = "seed", .type = YAML_U64, .offset = offsetof(struct scenario, seed)},
-    {.key = "start", .type = YAML_BOOL, .offset = offsetof(struct scenario, start)},
-    {.key = "bus", .type = YAML_CUSTOM, .load = load_bus},
-    {.key = "site", .type = YAML_CUSTOM, .load = load_site},
-    {.key = "head", .type = YAML_CUSTOM, .load = load_head},
-    {.key = "units", .type = YAML_CUSTOM, .load = load_units},
+// clang-format off
+static const struct yaml_field scenario_rows[] = {
+    {.key = "version", .type = YAML_CUSTOM, .load = load_version, .dump = dump_version, .what = "of the program that wrote the file; not looked at"},
+    {.key = "seed",  .type = YAML_U64, .offset = SCENARIO(seed), .max = 18446744073709551615.0, .what = "of all noise; each unit and source has its own stream"},
+    {.key = "start", .type = YAML_BOOL, .offset = SCENARIO(start), .what = "the bench's own node writes the frame forms and starts the units, 1 ms after power-on"},
+    {.key = "bus",   .type = YAML_CUSTOM, .load = load_bus, .what = "short for one bus, `can0`"},
+    {.key = "buses", .type = YAML_CUSTOM, .load = buses_are_loaded, .dump = dump_buses, .what = "a sequence of up to 8 buses"},
+    {.key = "site",  .type = YAML_CUSTOM, .load = scenario_load_site, .dump = scenario_dump_site, .what = "where the bench stands"},
+    {.key = "head",  .type = YAML_SECTION, .offset = SCENARIO(lab.head), .sub = &scenario_head_fields, .what = "the dividing head"},
+    {.key = "table", .type = YAML_CUSTOM, .load = scenario_load_table, .dump = scenario_dump_table, .what = "the rate table; without it there is none"},
+    {.key = "chamber", .type = YAML_SECTION, .offset = SCENARIO(lab.chamber), .sub = &scenario_chamber_fields, .present = SCENARIO(lab.chamber.present), .what = "the thermal chamber; without it there is none"},
+    {.key = "supply", .type = YAML_SECTION, .offset = SCENARIO(lab.supply), .sub = &scenario_supply_fields, .present = SCENARIO(lab.supply.present), .what = "the power supply; without it the boards are always fed"},
+    {.key = "spread", .type = YAML_CUSTOM, .load = load_spread, .dump = dump_spread, .what = "production spread: standard deviations of what differs from unit to unit"},
+    {.key = "units", .type = YAML_CUSTOM, .load = load_units, .dump = dump_units, .what = "a sequence of up to 64 units"},
+    {.key = "timeline", .type = YAML_CUSTOM, .load = load_timeline, .dump = dump_timeline, .what = "a sequence of commands that the bench gives itself, each at its time"},
+    {.key = "faults", .type = YAML_CUSTOM, .load = load_faults, .dump = dump_faults, .what = "a sequence of faults: the arguments of fault.add, given before power-on"},
 };
+const struct yaml_fields scenario_fields = YAML_FIELDS(scenario_rows);
+// clang-format on
+
+void scenario_default(struct scenario *s, const char *path)
+{
+    memset(s, 0, sizeof *s);
+    s->seed = 1;
+    s->bus_count = 1;
+    s->bus[0] = (struct scenario_bus){.name = "can0", .cfg = {.bitrate_hz = 1000000, .data_bitrate_hz = 5000000}};
+    s->lab = lab_default();
+    s->site.g_mps2 = s->lab.site.g_mps2;
+    snprintf(s->path, sizeof s->path, "%s", path);
+}
 
 static bool load(struct yaml_file *f, struct scenario *s)
 {
-    *s = (struct scenario){
-        .seed = 1, .bus = {.bitrate_hz = 1000000, .data_bitrate_hz = 5000000}, .site = {.g_mps2 = 9.81}};
-    snprintf(s->path, sizeof s->path, "%s", f->path);
-    if (!yaml_file_section(f, yaml_file_root(f), "", scenario_fields, COUNT(scenario_fields), s)) return false;
-    if (s->bus.bitrate_hz && s->bus.bitrate_hz < 10000) {
-        return yaml_file_fail(f, NULL, "bus.bitrate_hz", "%u is below 10000; 0 is a bus on which frames take no time",
-                              s->bus.bitrate_hz);
-    }
+    const struct yaml_node *buses = yaml_get(f->root, "buses");
+    scenario_default(s, f->path);
+    if (buses && !load_buses(f, buses, s)) return false;
+    if (!yaml_load(f, f->root, "", &scenario_fields, s)) return false;
+    if (!scenario_check_lab(f, f->root, &s->lab) || !scenario_check_seats(f, f->root, s)) return false;
     return s->unit_count > 0 || yaml_file_fail(f, NULL, "units", "at least one unit is wanted");
 }
 
@@ -380,12 +316,9 @@ bool scenario_load(const char *name, struct scenario *s, char *why, size_t cap)
     return ok;
 }
 
-void scenario_bind(struct scenario *s)
+cJSON *scenario_dump(const struct scenario *s)
 {
-    for (unsigned i = 0; i < s->unit_count; i++) {
-        struct scenario_unit *u = &s->units[i];
-        u->cfg.name = u->name;
-        u->cfg.profile = &u->profile;
-        u->cfg.board.seed = s->seed;
-    }
+    cJSON *j = cJSON_CreateObject();
+    yaml_dump(&scenario_fields, s, j);
+    return j;
 }

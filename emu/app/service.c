@@ -47,10 +47,22 @@ static bool do_vcd_flush(void *ctx, char *why)
     return s->bench->recording;
 }
 
+/* The client of any bus that came next after `came`; NULL: the last. */
+static const struct can_client *client_after(const struct ports *p, uint32_t came)
+{
+    const struct can_client *next = NULL;
+    for (unsigned i = 0; i < p->hubs; i++) {
+        for (const struct can_client *c = p->hub[i].clients; c; c = c->next)
+            if (c->came > came && (!next || c->came < next->came)) next = c;
+    }
+    return next;
+}
+
 static uint64_t do_can_rx(void *ctx)
 {
-    const struct can_client *c = ((struct service *)ctx)->ports.hub.clients;
-    while (c && c->leaving) c = c->next;
+    const struct ports *p = &((struct service *)ctx)->ports;
+    const struct can_client *c = client_after(p, 0);
+    while (c && c->leaving) c = client_after(p, c->came);
     return c ? c->delivered : 0;
 }
 
@@ -67,15 +79,30 @@ static void put_client(const struct can_client *c, struct control_client *out)
 
 static bool do_client(void *ctx, unsigned i, struct control_client *out)
 {
-    const struct can_client *c = ((struct service *)ctx)->ports.hub.clients;
-    while (c && i--) c = c->next;
+    const struct ports *p = &((struct service *)ctx)->ports;
+    const struct can_client *c = client_after(p, 0);
+    while (c && i--) c = client_after(p, c->came);
     if (c) put_client(c, out);
     return c != NULL;
 }
 
+static void sum_gone(const struct ports *p, struct control_client *out)
+{
+    struct can_client sum = {.adapter = NULL};
+    for (unsigned i = 0; i < p->hubs; i++) {
+        const struct can_client *gone = &p->hub[i].gone;
+        sum.delivered += gone->delivered;
+        sum.taken += gone->taken;
+        sum.dropped += gone->dropped;
+        sum.overrun += gone->overrun;
+        sum.refused += gone->refused;
+    }
+    put_client(&sum, out);
+}
+
 static void do_gone(void *ctx, struct control_client *out)
 {
-    put_client(&((struct service *)ctx)->ports.hub.gone, out);
+    sum_gone(&((struct service *)ctx)->ports, out);
 }
 
 static void do_pace(void *ctx, struct control_pace *out)
@@ -101,9 +128,8 @@ static void make_view(struct service *s)
 {
     struct bench *b = s->bench;
     s->view = (struct control_bench){.ctx = s,
-                                     .head = &b->head,
-                                     .bus = {&b->bus},
-                                     .buses = 1,
+                                     .head = &b->lab.head,
+                                     .buses = b->buses,
                                      .units = b->scenario.unit_count,
                                      .seed = b->scenario.seed,
                                      .scenario = b->scenario.path,
@@ -116,6 +142,10 @@ static void make_view(struct service *s)
                                      .pace = do_pace};
     s->view.faults = &s->faults;
     fault_init(&s->faults, &s->view, &b->sched);
+    for (unsigned i = 0; i < b->buses; i++) {
+        s->view.bus[i] = &b->bus[i];
+        s->view.bus_name[i] = b->scenario.bus[i].name;
+    }
     for (unsigned i = 0; i < s->view.units; i++) {
         s->view.unit[i] = &b->unit[i];
         s->view.unit_name[i] = b->unit[i].cfg.name;
@@ -161,7 +191,7 @@ static void on_truth_gone(void *ctx, struct ctl_client *c)
 static bool may_start(void *ctx)
 {
     const struct service *s = ctx;
-    return !s->o->wait_client || s->ports.hub.clients_seen > 0;
+    return !s->o->wait_client || s->ports.comings > 0;
 }
 
 static void tell_vcd_error(struct service *s, const char *what_now)
@@ -189,7 +219,10 @@ static void run_done(void *ctx)
 
 static uint64_t taken(void *ctx)
 {
-    return ((struct service *)ctx)->ports.hub.taken;
+    const struct ports *p = &((struct service *)ctx)->ports;
+    uint64_t sum = 0;
+    for (unsigned i = 0; i < p->hubs; i++) sum += p->hub[i].taken;
+    return sum;
 }
 
 /* Lateness of a frame: real time now against the instant its end stands on the bus. */
@@ -220,7 +253,7 @@ bool service_open(struct service *s, struct bench *b, const struct options *o, c
     make_view(s);
     control_init(&s->control, control_tables, &s->view);
     control_init(&s->truth, control_truth_tables, &s->view);
-    s->ports.hub.say = say;
+    for (unsigned i = 0; i < SCENARIO_BUSES_MAX; i++) s->ports.hub[i].say = say;
     s->ports.scpi.control = &s->control;
     s->ports.scpi.sched = &b->sched;
     s->ports.control = (struct ctl_server){.line = on_control_line, .gone = on_control_gone, .ctx = s};
@@ -258,10 +291,11 @@ int service_run(struct service *s)
 
 static void tell_counters(const struct service *s)
 {
-    const struct can_client *c = s->ports.hub.clients;
+    uint64_t frames = 0;
+    for (unsigned i = 0; i < s->bench->buses; i++) frames += s->bench->bus[i].frames;
     const struct pace *p = &s->pace;
     fprintf(stderr, "psa-emu: %.6f s simulated in %s pace, %" PRIu64 " frames on the bus\n",
-            (double)s->bench->sched.now_ns * 1e-9, pace_name(p->kind), s->bench->bus.frames);
+            (double)s->bench->sched.now_ns * 1e-9, pace_name(p->kind), frames);
     if (p->kind == PACE_WALL) {
         fprintf(
             stderr,
@@ -270,17 +304,18 @@ static void tell_counters(const struct service *s)
             pace_hist_us(&p->frames, 0.5), pace_hist_us(&p->frames, 0.99), pace_hist_us(&p->frames, 0.999),
             (double)p->frames.max_ns * 1e-3, p->late, p->slips);
     }
-    for (; c; c = c->next) {
+    for (const struct can_client *c = client_after(&s->ports, 0); c; c = client_after(&s->ports, c->came)) {
         fprintf(stderr,
                 "psa-emu: %s %s: delivered %" PRIu64 ", taken %" PRIu64 ", dropped %" PRIu64 ", overrun %" PRIu64
                 ", refused %" PRIu64 "\n",
                 c->adapter, c->name, c->delivered, c->taken, c->dropped, c->overrun, c->refused);
     }
-    c = &s->ports.hub.gone;
+    struct control_client gone;
+    sum_gone(&s->ports, &gone);
     fprintf(stderr,
             "psa-emu: clients gone: delivered %" PRIu64 ", taken %" PRIu64 ", dropped %" PRIu64 ", refused %" PRIu64
             "\n",
-            c->delivered, c->taken, c->dropped, c->refused);
+            gone.delivered, gone.taken, gone.dropped, gone.refused);
 }
 
 void service_close(struct service *s)

@@ -14,11 +14,14 @@ static double accel_signal(void *ctx, unsigned axis, int64_t t_ns)
     return u->sensor_faults[axis] ? sensor_fault_out(u->sensor_faults[axis], out_v, t_ns) : out_v;
 }
 
+/* In the chamber the board is as warm as the case, the thermometers of the sensors as their elements. */
 static double temp_degc(void *ctx, unsigned channel, int64_t t_ns)
 {
     const struct unit *u = ctx;
-    (void)t_ns; /* constant until the thermal chamber comes */
-    return channel < UNIT_TEMPS ? u->cfg.temp_degc[channel] : 0.0;
+    const struct chamber *c = &u->lab->chamber;
+    if (channel >= UNIT_TEMPS) return 0.0;
+    if (!c->cfg.present) return u->cfg.temp_degc[channel];
+    return channel < UNIT_AXES ? chamber_element_degc(c, &u->body, t_ns) : chamber_case_degc(c, &u->body, t_ns);
 }
 
 static void on_frame(void *ctx, const struct psa2_frame *f, int64_t t_ns)
@@ -73,35 +76,35 @@ struct unit_cfg unit_default(const char *name)
     return c;
 }
 
-void unit_init(struct unit *u, const struct unit_cfg *cfg, struct head *head, struct sched *s)
+void unit_init(struct unit *u, const struct unit_cfg *cfg, struct lab *lab, struct sched *s)
 {
     static const char *const noise[UNIT_AXES] = {"mems.x", "mems.y", "mems.z"};
     u->cfg = *cfg;
-    u->head = head;
+    u->lab = lab;
     u->ctx = NULL;
     u->frame = NULL;
     u->fault = NULL;
     u->listeners = u->told_next = NULL;
     for (unsigned i = 0; i < UNIT_AXES; i++) {
         u->sensor_faults[i] = NULL;
-        const struct mems_cfg m = mems_cfg_si(&cfg->axis[i].mems, head->site.g_mps2);
+        const struct mems_cfg m = mems_cfg_si(&cfg->axis[i].mems, lab->site.g_mps2);
         mems_init(&u->mems[i], &m, rng_stream(cfg->board.seed, cfg->board.serial, noise[i]));
         u->cos_alpha0[i] = det_cos(m.alpha0_rad);
         u->sin_alpha0[i] = det_sin(m.alpha0_rad);
     }
+    chamber_put_in(&lab->chamber, &u->body, cfg->tau_case_s, cfg->tau_element_s);
     const struct psa2_io io = {
         .ctx = u, .accel = accel_signal, .temp_degc = temp_degc, .frame = on_frame, .fault = on_fault};
     const struct psa2_profile profile = cfg->profile ? *cfg->profile : psa2_profile_default();
     psa2_init(&u->board, &profile, &cfg->board, &io, s);
 }
 
-/* The face turns the sensor's own axes; which of the unit's axes they are follows from its channel. */
+/* The face turns the sensor's own axes; which of the unit's axes they are follows from its channel. The sensor is where it is
+ * in the unit: at_m stays in the case's axes. */
 void unit_gravity_mps2(struct unit *u, unsigned axis, int64_t t_ns, double a_mps2[3])
 {
-    double mount[3];
     double a[3];
-    head_gravity_mps2(u->head, t_ns, mount);
-    head_sensor_mps2(head_face(u->head, t_ns), u->cos_alpha0[axis], u->sin_alpha0[axis], mount, a);
+    lab_sensor_mps2(u->lab, &u->cfg.seat, u->cfg.axis[axis].at_m, u->cos_alpha0[axis], u->sin_alpha0[axis], t_ns, a);
     for (unsigned i = 0; i < 3; i++) a_mps2[i] = a[(i + axis) % 3];
 }
 

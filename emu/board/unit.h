@@ -1,13 +1,13 @@
-/* One unit of the bench: a PSA-2 board, the sensors on its three channels, and the dividing head they are mounted on.
+/* One unit of the bench: a PSA-2 board, the sensors on its three channels, and its seat on an instrument of the lab.
  *
  * The unit wires sensors to the board (psa2_io.accel, psa2_io.temp_degc); who wants its frames sets the two callbacks. A
- * sensor on channel X has the unit's axes (x, y, z), on Y (y, z, x), on Z (z, x, y). Several units may share a head. Owned
+ * sensor on channel X has the unit's axes (x, y, z), on Y (y, z, x), on Z (z, x, y). Several units share a lab. Owned
  * by the caller, about 300 kB, never moved after unit_init. One thread. */
 #ifndef PSABENCH_BOARD_UNIT_H
 #define PSABENCH_BOARD_UNIT_H
 
 #include "board/psa2.h"
-#include "phys/head.h"
+#include "phys/lab.h"
 #include "phys/mems.h"
 #include "phys/sensor_fault.h"
 
@@ -19,6 +19,7 @@ enum unit_sensor { UNIT_NO_SENSOR, UNIT_MEMS }; /* without a sensor the channel 
 struct unit_axis_cfg {
     enum unit_sensor sensor;
     struct mems_g mems;
+    double at_m[3]; /* where it is in the unit, its case's axes */
 };
 
 struct unit_cfg {
@@ -26,7 +27,9 @@ struct unit_cfg {
     const struct psa2_profile *profile; /* checked by the caller: psa2_profile_check(); NULL: "article" */
     struct psa2_unit_cfg board;         /* afe, noise scales, seed, serial */
     struct unit_axis_cfg axis[UNIT_AXES];
-    double temp_degc[UNIT_TEMPS];
+    double temp_degc[UNIT_TEMPS];     /* where the lab has no chamber */
+    double tau_case_s, tau_element_s; /* in the chamber; 0: the chamber's own */
+    struct lab_seat seat;
     uint8_t node; /* CAN node id, for those above */
 };
 
@@ -39,7 +42,8 @@ struct unit_listener {
 
 struct unit {
     struct unit_cfg cfg;
-    struct head *head;
+    struct lab *lab;
+    struct chamber_body body;
     struct psa2 board;
     struct mems mems[UNIT_AXES];
     struct sensor_fault *sensor_faults[UNIT_AXES]; /* psa2_sample_until() before each change */
@@ -54,14 +58,14 @@ struct unit {
 /* A board of profile "article" at 25 degC with nominal chains, no sensor, no noise but the converters'. */
 struct unit_cfg unit_default(const char *name);
 
-void unit_init(struct unit *u, const struct unit_cfg *cfg, struct head *head, struct sched *s);
+void unit_init(struct unit *u, const struct unit_cfg *cfg, struct lab *lab, struct sched *s);
 
 /* From the next event on, after those who listen already; the board computes events only while somebody listens. A frame
  * that is about to begin may begin untold. */
 void unit_listen(struct unit *u, struct unit_listener *l);
 void unit_unlisten(struct unit *u, struct unit_listener *l); /* harmless for one that does not listen */
 
-/* Projections of gravity on the axes of the sensor of a channel: truth. */
+/* What the sensor of a channel measures, a = -f on its own axes: at rest the projections of gravity. Truth. */
 void unit_gravity_mps2(struct unit *u, unsigned axis, int64_t t_ns, double a_mps2[3]);
 
 /* Volts the sensor of a channel would give without noise: truth. */

@@ -40,6 +40,7 @@ void can_hub_up(struct can_hub *h, struct can_client *c)
     while (*p) p = &(*p)->next;
     *p = c;
     c->number = ++h->clients_seen;
+    c->came = h->comings ? ++*h->comings : c->number;
     can_attach(h->bus, &c->node);
     tell(h, c, CAN_HUB_CAME, NULL);
 }

@@ -11,6 +11,7 @@ struct can_hub;
 
 struct can_client {
     uint32_t number;     /* of its coming to the hub, from 1 */
+    uint32_t came;       /* the same over all hubs of the bench */
     const char *adapter; /* socketcand, slcan, socketcan */
     char name[32];       /* channel the client opened, or interface */
     struct can_node node;
@@ -34,10 +35,12 @@ struct can_hub_tap {
 };
 
 struct can_hub {
+    const char *name; /* of the bus, where there are several; may be NULL */
     struct can_bus *bus;
     struct links *links;
-    bool lossless;    /* step and free pace: output is kept and time waits; wall pace: a slow client loses frames */
-    int64_t epoch_ns; /* added to the simulated time in time stamps */
+    uint32_t *comings; /* counts who came to any hub of the bench; NULL: this one is alone */
+    bool lossless;     /* step and free pace: output is kept and time waits; wall pace: a slow client loses frames */
+    int64_t epoch_ns;  /* added to the simulated time in time stamps */
     void (*say)(void *ctx, const char *text); /* one line for the log: a peer came, went, lost something */
     void *say_ctx;
     struct can_hub_tap tap;

@@ -21,6 +21,7 @@ struct client {
     struct text_link io; /* first */
     struct can_client can;
     struct socketcand_server *server;
+    struct can_hub *hub; /* of the bus it has opened; before that the first */
     enum phase phase;
     unsigned held; /* hold periods so far */
     uint64_t lost; /* frames dropped since the client was last told */
@@ -32,19 +33,19 @@ enum { OUT_MAX = 4 << 20, OUT_HIGH = 1 << 20, SNDBUF = 256 << 10 };
 
 static size_t pad_of(const struct client *c)
 {
-    return c->server->hub->lossless ? SOCKETCAND_PAD : 0;
+    return c->hub->lossless ? SOCKETCAND_PAD : 0;
 }
 
 static int64_t stamp(const struct client *c, int64_t t_ns)
 {
-    return t_ns + c->server->hub->epoch_ns;
+    return t_ns + c->hub->epoch_ns;
 }
 
 static void say(const struct client *c, const char *what)
 {
     char line[160];
     snprintf(line, sizeof line, "socketcand: client %s: %s", c->can.name[0] ? c->can.name : "(no channel)", what);
-    c->server->hub->say(c->server->hub->say_ctx, line);
+    c->hub->say(c->hub->say_ctx, line);
 }
 
 /* Before rawmode a client compares answers for equality: no padding. */
@@ -101,12 +102,29 @@ static void release_hold(struct client *c)
     c->io.hold = false;
 }
 
+/* With several buses the channel is the name of one. */
+static bool choose_bus(struct client *c, const char *channel, int64_t t_ns)
+{
+    const struct socketcand_server *s = c->server;
+    char text[160] = "no such bus; there are";
+    for (unsigned i = 0; i < s->hubs; i++) {
+        c->hub = &s->hub[i];
+        if (s->hubs == 1 || strcmp(s->hub[i].name, channel) == 0) return true;
+        const size_t at = strlen(text);
+        snprintf(text + at, sizeof text - at, "%s %s", i ? "," : "", s->hub[i].name);
+    }
+    c->hub = s->hub;
+    refuse(c, text, t_ns);
+    return false;
+}
+
 static void do_open(struct client *c, const struct socketcand_msg *m, int64_t t_ns)
 {
     if (c->phase != PHASE_HELLO) {
         refuse(c, "a channel is open already", t_ns);
         return;
     }
+    if (!choose_bus(c, m->channel, t_ns)) return;
     memcpy(c->can.name, m->channel, sizeof c->can.name);
     c->phase = PHASE_OPEN;
     answer(c, "< ok >");
@@ -124,7 +142,7 @@ static void do_rawmode(struct client *c, int64_t t_ns)
     c->phase = PHASE_HOLD;
     c->io.hold = true;
     c->io.link.timer_ms = SOCKETCAND_HOLD_MS;
-    can_hub_up(c->server->hub, &c->can);
+    can_hub_up(c->hub, &c->can);
     say(c, "connected");
 }
 
@@ -134,7 +152,7 @@ static void do_send(struct client *c, const struct can_msg *m, int64_t t_ns)
         refuse(c, "send before open CHANNEL and rawmode", t_ns);
         return;
     }
-    can_hub_send(c->server->hub, &c->can, m, t_ns);
+    can_hub_send(c->hub, &c->can, m, t_ns);
 }
 
 static void on_line(struct text_link *t, enum lines_result r, const char *line, size_t len, int64_t t_ns)
@@ -185,7 +203,7 @@ static void leave(struct client *c)
     if (c->can.up) {
         if (c->can.node.queued) return; /* frames of a client that sent and left still go out */
         say(c, "gone");
-        can_hub_down(c->server->hub, &c->can);
+        can_hub_down(c->hub, &c->can);
     }
     c->server->clients--;
     c->io.link.gone = true;
@@ -234,7 +252,7 @@ static void on_timer(struct link *l, int64_t t_ns)
 static void on_release(struct link *l)
 {
     struct client *c = (struct client *)l;
-    can_hub_down(c->server->hub, &c->can);
+    can_hub_down(c->hub, &c->can);
     text_link_free(&c->io);
     free(c);
 }
@@ -251,6 +269,7 @@ static struct client *client_new(struct socketcand_server *s, int fd)
         return NULL;
     }
     c->server = s;
+    c->hub = s->hub;
     c->io.link.flush = on_flush;
     c->io.link.timer = on_timer;
     c->io.link.release = on_release;
@@ -280,7 +299,7 @@ static void on_connection(struct link *l, int64_t t_ns)
     c->io.link.flush(&c->io.link, t_ns);
 }
 
-int socketcand_listen(struct socketcand_server *s, struct can_hub *hub, uint16_t port)
+int socketcand_listen(struct socketcand_server *s, struct can_hub *hub, unsigned hubs, uint16_t port)
 {
     const int on = 1;
     struct sockaddr_in a = {.sin_family = AF_INET, .sin_port = htons(port), .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
@@ -294,7 +313,7 @@ int socketcand_listen(struct socketcand_server *s, struct can_hub *hub, uint16_t
         close(fd);
         return -err;
     }
-    *s = (struct socketcand_server){.hub = hub, .port = ntohs(a.sin_port)};
+    *s = (struct socketcand_server){.hub = hub, .hubs = hubs, .port = ntohs(a.sin_port)};
     s->listen = (struct link){.fd = fd, .want_read = true, .readable = on_connection};
     links_add_first(hub->links, &s->listen);
     return 0;

@@ -19,13 +19,14 @@
 
 struct socketcand_server {
     struct link listen;
-    struct can_hub *hub;
-    uint16_t port;    /* bound */
-    uint32_t clients; /* connected */
+    struct can_hub *hub; /* the buses, `hubs` in a row */
+    unsigned hubs;       /* one: `open` takes any name; several: the name of a bus */
+    uint16_t port;       /* bound */
+    uint32_t clients;    /* connected */
 };
 
 /* Binds and listens; port 0 takes a free one. 0, or -errno. The server must not move afterwards. */
-int socketcand_listen(struct socketcand_server *s, struct can_hub *hub, uint16_t port);
+int socketcand_listen(struct socketcand_server *s, struct can_hub *hub, unsigned hubs, uint16_t port);
 
 void socketcand_close(struct socketcand_server *s); /* no new clients; those connected go with their links */
 

@@ -73,8 +73,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     char line[4096];
     if (!bench) {
         bench = make_bench();
-        view = (struct control_bench){.head = &bench->head,
-                                      .bus = {&bench->bus},
+        view = (struct control_bench){.head = &bench->lab.head,
+                                      .bus = {&bench->bus[0]},
                                       .buses = 1,
                                       .unit = {&bench->unit[0]},
                                       .unit_name = {"a"},

@@ -248,7 +248,7 @@ static void open_ports(struct world *w)
     can_attach(&w->bus, &w->host);
     w->hub = (struct can_hub){.bus = &w->bus, .links = &w->links, .say = say};
     w->control = (struct ctl_server){.links = &w->links, .line = on_line, .gone = on_gone, .ctx = w};
-    if (socketcand_listen(&w->socketcand, &w->hub, 0)) abort();
+    if (socketcand_listen(&w->socketcand, &w->hub, 1, 0)) abort();
     if (slcan_pty_open(&w->slcan, &w->hub, NULL)) abort();
     if (ctl_listen(&w->control, control_path())) abort();
     for (unsigned i = 0; i < PEERS_MAX; i++) w->peer[i].fd = -1;

@@ -79,8 +79,8 @@ static int fresh(void **state)
     bench_init(bench, &s, 0);
     bench_power_up(bench);
     memset(&asked, 0, sizeof asked);
-    view = (struct control_bench){.head = &bench->head,
-                                  .bus = {&bench->bus},
+    view = (struct control_bench){.head = &bench->lab.head,
+                                  .bus = {&bench->bus[0]},
                                   .buses = 1,
                                   .units = 2,
                                   .seed = 7,
@@ -165,8 +165,8 @@ static void bad_commands_are_refused_in_words_and_change_nothing(void **state)
     }
     assert_int_equal(control.refused, 3 * COUNT(refusals));
     assert_int_equal(asked.runs + asked.quits, 0);
-    assert_true(head_at_rest(&bench->head, 0));
-    assert_int_equal(bench->head.face, HEAD_DIRECT);
+    assert_true(head_at_rest(&bench->lab.head, 0));
+    assert_int_equal(bench->lab.head.face, HEAD_DIRECT);
     assert_int_equal(bench->unit[0].board.counters.resets, 0);
 }
 

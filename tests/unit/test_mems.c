@@ -98,13 +98,15 @@ static void reading_noise_is_what_the_wire_shows(void **state)
 {
     (void)state;
     static struct unit u;
-    static struct head h;
+    static struct lab h;
     struct sched s;
     sched_init(&s);
-    head_init(&h, &(struct head_cfg){0}, &(struct site){.g_mps2 = G}, rng_stream(1, 0, "head"));
+    struct lab_cfg lab = lab_default();
+    lab.site.g_mps2 = G;
+    lab_init(&h, &lab, 1);
     struct unit_cfg cfg = unit_default("u");
     cfg.board.adc_noise_scale = 0.0;
-    cfg.axis[0] = (struct unit_axis_cfg){UNIT_MEMS, {.reading_noise_v = 1e-3}};
+    cfg.axis[0] = (struct unit_axis_cfg){.sensor = UNIT_MEMS, .mems = {.reading_noise_v = 1e-3}};
     unit_init(&u, &cfg, &h, &s);
     struct readings r = {0};
     u.ctx = &r;

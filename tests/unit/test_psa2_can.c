@@ -738,9 +738,11 @@ static struct rig *real_up(void)
     static struct psa2_profile profile;
     profile = psa2_profile_default();
     cfg.profile = &profile;
-    static struct head head;
-    head_init(&head, &(struct head_cfg){.turn_s = 1.0}, &(struct site){.g_mps2 = 9.80665}, rng_stream(1, 0, "head"));
-    unit_init(&real, &cfg, &head, &r->s);
+    static struct lab lab;
+    struct lab_cfg lab_cfg = lab_default();
+    lab_cfg.head.turn_s = 1.0;
+    lab_init(&lab, &lab_cfg, 1);
+    unit_init(&real, &cfg, &lab, &r->s);
     real.ctx = &r->can;
     real.frame = psa2_can_frame;
     real.fault = psa2_can_fault;

@@ -20,7 +20,7 @@ static void a_scenario_without_more_than_a_unit_has_sound_defaults(void **state)
     (void)state;
     if (!parse("units: [{}]\n")) fail_msg("%s", why);
     assert_int_equal(s.seed, 1);
-    assert_int_equal(s.bus.bitrate_hz, 1000000);
+    assert_int_equal(s.bus[0].cfg.bitrate_hz, 1000000);
     assert_int_equal(s.unit_count, 1);
     assert_string_equal(s.units[0].name, "a");
     assert_int_equal(s.units[0].cfg.node, 5);
@@ -53,11 +53,12 @@ static void every_key_reaches_its_field(void **state)
               "          afe: {input: current, load_ohm: 999, load_tol_ppm: -12}}\n");
     if (!ok) fail_msg("%s", why);
     assert_true(s.seed == UINT64_MAX && s.start);
-    assert_int_equal(s.bus.bitrate_hz, 500000);
-    assert_int_equal(s.bus.data_bitrate_hz, 2000000);
+    assert_int_equal(s.bus[0].cfg.bitrate_hz, 500000);
+    assert_int_equal(s.bus[0].cfg.data_bitrate_hz, 2000000);
     assert_true(s.site.g_mps2 == 9.7803);
-    assert_true(s.head.resolution_arcsec == 1 && s.head.setting_error_arcsec_rms == 2 && s.head.periodic_arcsec == 3);
-    assert_true(s.head.periodic_order == 4 && s.head.mount_error_arcsec_rms == 5 && s.head.turn_s == 6);
+    assert_true(s.lab.head.resolution_arcsec == 1 && s.lab.head.setting_error_arcsec_rms == 2 &&
+                s.lab.head.periodic_arcsec == 3);
+    assert_true(s.lab.head.periodic_order == 4 && s.lab.head.mount_error_arcsec_rms == 5 && s.lab.head.turn_s == 6);
     const struct scenario_unit *u = &s.units[0];
     assert_string_equal(u->name, "left");
     assert_int_equal(u->cfg.node, 9);
@@ -79,54 +80,95 @@ static void every_key_reaches_its_field(void **state)
 static const struct {
     const char *text, *why; /* the whole line, or its beginning */
 } bad[] = {
-    {"", "dir/s.yaml:1: empty: a mapping `key: value` is wanted"},
-    {"- 1\n", "dir/s.yaml:1: a mapping `key: value` is wanted"},
-    {"units: [{}]\nseed: -1\n", "dir/s.yaml:2: seed: \"-1\" is not an integer of 0 or more"},
-    {"units: [{}]\nseed: [1]\n", "dir/s.yaml:2: seed: one value of up to 128 characters is wanted"},
-    {"units: [{}]\nseed: \"1\\n2\"\n", "dir/s.yaml:2: seed: \"1?2\" is not an integer of 0 or more"},
-    {"units: [{}]\nsead: 1\n", "dir/s.yaml:2: sead: unknown key; known here: seed, start, bus, site, head, units"},
-    {"seed: 1\nseed: 2\nunits: [{}]\n", "dir/s.yaml:2: seed: comes twice"},
-    {"seed: 1\n", "dir/s.yaml:1: units: at least one unit is wanted"},
-    {"units: 5\n", "dir/s.yaml:1: units: a sequence of units is wanted"},
-    {"units: [5]\n", "dir/s.yaml:1: units.a: a mapping `key: value` is wanted"},
-    {"units: [{}]\nstart: yes\n", "dir/s.yaml:2: start: \"yes\": true or false is wanted"},
-    {"bus:\n  bitrate_hz: 2e6\n", "dir/s.yaml:2: bus.bitrate_hz: \"2e6\" is not an integer of 0 or more"},
-    {"bus:\n  bitrate_hz: 1000001\n", "dir/s.yaml:2: bus.bitrate_hz: 1000001 is outside 0 ... 1000000"},
-    {"bus: {bitrate_hz: 9999}\nunits: [{}]\n", "dir/s.yaml:1: bus.bitrate_hz: 9999 is below 10000; 0 is a bus"},
-    {"units:\n  - name: a\n    node: 0\n", "dir/s.yaml:3: units.a.node: 0 is outside 1 ... 127"},
-    {"units:\n  - {name: a}\n  - {name: a}\n", "dir/s.yaml:3: units.a.name: \"a\" is taken by another unit"},
-    {"units:\n  - {node: 5}\n  - {node: 5}\n", "dir/s.yaml:3: units.b.node: 5 is taken by unit a; each needs its own"},
-    {"units:\n  - {serial: 2}\n  - {}\n", "dir/s.yaml:3: units.b.serial: 2 is taken by unit a; each needs its own"},
-    {"units: [{name: \"a b\"}]\n", "dir/s.yaml:1: units.a b.name: \"a b\": letters, digits and _ are wanted"},
-    {"units: [{board: psd1}]\n", "dir/s.yaml:1: units.a.board: psa2 or psa1 is wanted"},
-    {"units: [{profile: nope}]\n", "dir/s.yaml:1: units.a.profile: nope: no such file in proto/profiles"},
-    {"units: [{profile: ./nope.yaml}]\n", "dir/s.yaml:1: units.a.profile: dir/./nope.yaml: no such file"},
+    {"", "dir/s.yaml:1:1: empty: a mapping `key: value` is wanted"},
+    {"- 1\n", "dir/s.yaml:1:1: a mapping `key: value` is wanted"},
+    {"units: [{}]\nseed: -1\n", "dir/s.yaml:2:7: seed: \"-1\" is not an integer of 0 or more"},
+    {"units: [{}]\nseed: [1]\n", "dir/s.yaml:2:7: seed: one value of up to 256 characters is wanted"},
+    {"units: [{}]\nseed: \"1\\n2\"\n", "dir/s.yaml:2:7: seed: \"1?2\" is not an integer of 0 or more"},
+    {"units: [{}]\nsead: 1\n",
+     "dir/s.yaml:2:1: sead: unknown key; nearest: seed; known here: version, seed, start, bus, buses, "},
+    {"seed: 1\nseed: 2\nunits: [{}]\n", "dir/s.yaml:2:1: seed: comes twice"},
+    {"seed: 1\n", "dir/s.yaml:1:1: units: at least one unit is wanted"},
+    {"units: 5\n", "dir/s.yaml:1:8: units: a sequence of units is wanted"},
+    {"units: [5]\n", "dir/s.yaml:1:9: units.a: a mapping `key: value` is wanted"},
+    {"units: [{}]\nstart: yes\n", "dir/s.yaml:2:8: start: \"yes\": true or false is wanted"},
+    {"bus:\n  bitrate_hz: 2e6\n", "dir/s.yaml:2:15: bus.bitrate_hz: \"2e6\" is not an integer of 0 or more"},
+    {"bus:\n  bitrate_hz: 1000001\n", "dir/s.yaml:2:15: bus.bitrate_hz: 1000001 is outside 0 ... 1000000"},
+    {"bus: {bitrate_hz: 9999}\nunits: [{}]\n", "dir/s.yaml:1:19: bus.bitrate_hz: 9999 is below 10000; 0 is a bus"},
+    {"units:\n  - name: a\n    node: 0\n", "dir/s.yaml:3:11: units.a.node: 0 is outside 1 ... 127"},
+    {"units:\n  - {name: a}\n  - {name: a}\n", "dir/s.yaml:3:12: units.a.name: \"a\" is taken by another unit"},
+    {"units:\n  - {node: 5}\n  - {node: 5}\n",
+     "dir/s.yaml:3:12: units.b.node: 5 is taken by unit a; each needs its own"},
+    {"units:\n  - {serial: 2}\n  - {}\n", "dir/s.yaml:3:5: units.b.serial: 2 is taken by unit a; each needs its own"},
+    {"units: [{name: \"a b\"}]\n", "dir/s.yaml:1:16: units.a b.name: \"a b\": letters, digits and _ are wanted"},
+    {"units: [{board: psd1}]\n", "dir/s.yaml:1:17: units.a.board: psa2 or psa1 is wanted"},
+    {"units: [{profile: nope}]\n", "dir/s.yaml:1:19: units.a.profile: nope: no such file in proto/profiles"},
+    {"units: [{profile: ./nope.yaml}]\n", "dir/s.yaml:1:19: units.a.profile: dir/./nope.yaml: no such file"},
     {"units:\n- profile_set:\n    word_bits: 20\n",
-     "dir/s.yaml:3: units.a.profile_set: word_bits = 20: use 16, 24 or 32"},
+     "dir/s.yaml:3:5: units.a.profile_set: word_bits = 20: use 16, 24 or 32"},
     {"units:\n- profile_set: {lead_in_clk: 0}\n",
-     "dir/s.yaml:2: units.a.profile_set: INT low"}, /* INT low would be 70 us */
-    {"units:\n- profile_set: {word: [X, Y, Z]}\n", "dir/s.yaml:2: units.a.profile_set.word: 3 elements; 4 are wanted"},
-    {"units:\n- profile_set:\n    wrod: [X, Y, Z, T]\n",
-     "dir/s.yaml:3: units.a.profile_set.wrod: unknown key; known here: name, fclk_hz, temp_clkin_hz, "},
-    {"units: [{profile_set: 5}]\n", "dir/s.yaml:1: units.a.profile_set: a mapping `key: value` is wanted"},
+     "dir/s.yaml:2:16: units.a.profile_set: INT low"}, /* INT low would be 70 us */
+    {"units:\n- profile_set: {word: [X, Y, Z]}\n",
+     "dir/s.yaml:2:23: units.a.profile_set.word: 3 elements; 4 are wanted"},
+    {"units:\n- profile_set:\n    wrod: [X, Y, Z, T]\n", "dir/s.yaml:3:5: units.a.profile_set.wrod: unknown key; "
+                                                         "nearest: word; known here: name, fclk_hz, temp_clkin_hz, "},
+    {"units: [{profile_set: 5}]\n", "dir/s.yaml:1:23: units.a.profile_set: a mapping `key: value` is wanted"},
     {"units: [{profile_set: {word_bits: 24, word_bits: 32}}]\n",
-     "dir/s.yaml:1: units.a.profile_set.word_bits: comes twice"},
-    {"units: [{profile_set: {word_bits: 32}, nod: 5}]\n", "dir/s.yaml:1: units.a.nod: unknown key"},
-    {"units: [{temp_degc: [1, 2]}]\n", "dir/s.yaml:1: units.a.temp_degc: one value or four"},
-    {"units: [{temp_degc: 200}]\n", "dir/s.yaml:1: units.a.temp_degc: 200 is outside -60 ... 125"},
+     "dir/s.yaml:1:39: units.a.profile_set.word_bits: comes twice"},
+    {"units: [{profile_set: {word_bits: 32}, nod: 5}]\n", "dir/s.yaml:1:40: units.a.nod: unknown key; nearest: node; "},
+    {"units: [{temp_degc: [1, 2]}]\n", "dir/s.yaml:1:21: units.a.temp_degc: one value or a list of 4 numbers"},
+    {"units: [{temp_degc: 200}]\n", "dir/s.yaml:1:21: units.a.temp_degc: 200 is outside -60 ... 125"},
     {"units:\n  - axes:\n      x:\n        sensor: gyro\n",
-     "dir/s.yaml:4: units.a.axes.x.sensor: mems or none is wanted"},
-    {"units:\n  - axes:\n      x:\n        u0_v: 2,5\n", "dir/s.yaml:4: units.a.axes.x.u0_v: \"2,5\" is not a number"},
-    {"units:\n  - axes:\n      x:\n        u0_v: nan\n", "dir/s.yaml:4: units.a.axes.x.u0_v: \"nan\" is not a number"},
-    {"units: [{axes: {w: {}}}]\n", "dir/s.yaml:1: units.a.axes.w: unknown key; known here: x, y, z"},
-    {"units: [{adc_chain: sinc}]\n", "dir/s.yaml:1: units.a.adc_chain: exact, modulator or direct is wanted"},
+     "dir/s.yaml:4:17: units.a.axes.x.sensor: none or mems is wanted"},
+    {"units:\n  - axes:\n      x:\n        u0_v: 2,5\n",
+     "dir/s.yaml:4:15: units.a.axes.x.u0_v: \"2,5\" is not a number"},
+    {"units:\n  - axes:\n      x:\n        u0_v: nan\n",
+     "dir/s.yaml:4:15: units.a.axes.x.u0_v: \"nan\" is not a number"},
+    {"units: [{axes: {w: {}}}]\n", "dir/s.yaml:1:17: units.a.axes.w: unknown key; known here: x, y, z"},
+    {"units: [{adc_chain: sinc}]\n", "dir/s.yaml:1:21: units.a.adc_chain: exact, modulator or direct is wanted"},
     {"units: [{axes: {x: {afe: {input: tube}}}}]\n",
-     "dir/s.yaml:1: units.a.axes.x.afe.input: current or voltage is wanted"},
-    {"units: [{}, {}, {}, {}, {}, {}, {}, {}, {}]\n", "dir/s.yaml:1: units: up to 8 are wanted"},
-    {"units: [{}\n", "dir/s.yaml:2: not YAML: "},
-    {"a: b: c\n", "dir/s.yaml:1: not YAML: "},
+     "dir/s.yaml:1:34: units.a.axes.x.afe.input: current or voltage is wanted"},
+    {"units: [{count: 65}]\n", "dir/s.yaml:1:17: units.u%02u.count: 65 is outside 1 ... 64"},
+    {"units: [{count: 60, node: 1}, {count: 5, name: v%u, node: 61, serial: 61}]\n",
+     "dir/s.yaml:1:31: units.v%u.count: up to 64 units in all are wanted"},
+    {"units: [{}\n", "dir/s.yaml:2:1: not YAML: "},
+    {"a: b: c\n", "dir/s.yaml:1:5: not YAML: "},
     {"seed: \t\n\t- x", "dir/s.yaml:"},
-    {"seed: \"1\\0\"\nunits: [{}]\n", "dir/s.yaml:1: seed: one value"}, /* a NUL would hide what follows */
+    {"seed: \"1\\0\"\nunits: [{}]\n", "dir/s.yaml:1:7: seed: one value"}, /* a NUL would hide what follows */
+    {"units: [{}]\nhead: {turn: 2}\n",
+     "dir/s.yaml:2:8: head.turn: unknown key; nearest: turn_s (its unit is part of the name); known here: "},
+    {"units: [{adc_chain: modulater}]\n",
+     "dir/s.yaml:1:21: units.a.adc_chain: exact, modulator or direct is wanted; nearest: modulator"},
+    {"units: [{count: 2, name: u}]\n", "dir/s.yaml:1:26: units.u.name: \"u\": with count a number stands in it"},
+    {"units: [{count: 2, name: u%d}]\n", "dir/s.yaml:1:26: units.u%d.name: \"u%d\": with count"},
+    {"units: [{count: 2, name: \"%u%u\"}]\n", "dir/s.yaml:1:26: units.%u%u.name: \"%u%u\": with count"},
+    {"units: [{count: 10, node: 120}]\n", "dir/s.yaml:1:27: units.u%02u.node: 128 is outside 1 ... 127"},
+    {"units: [{count: 2, serial: 4294967295}]\n", "dir/s.yaml:1:28: units.u%02u.serial: counts beyond"},
+    {"units: [{bus: can1}]\n", "dir/s.yaml:1:15: units.a.bus: no bus \"can1\"; nearest: can0; there is can0"},
+    {"bus: {}\nbuses: [{}]\nunits: [{}]\n", "dir/s.yaml:2:8: buses: stands beside bus"},
+    {"buses: [{}, {name: can0}]\nunits: [{}]\n", "dir/s.yaml:1:13: buses.can1.name: \"can0\" is taken by another bus"},
+    {"buses: []\nunits: [{}]\n", "dir/s.yaml:1:8: buses: a sequence of buses is wanted"},
+    {"site: {longitude_deg: 30}\nunits: [{}]\n", "dir/s.yaml:1:23: site: longitude_deg without latitude_deg"},
+    {"site: {latitude_deg: 91}\nunits: [{}]\n", "dir/s.yaml:1:22: site.latitude_deg: 91 is outside -90 ... 90"},
+    {"table: {axes: 4}\nunits: [{}]\n", "dir/s.yaml:1:15: table.axes: 4 is outside 1 ... 3"},
+    {"table: {axes: [{along: w}]}\nunits: [{}]\n", "dir/s.yaml:1:24: table.axes[0].along: x, y or z is wanted"},
+    {"table: {axes: [{angle_min_deg: 5}]}\nunits: [{}]\n",
+     "dir/s.yaml:1:16: table.axes: angle_min_deg 5 is not below"},
+    {"units: [{on: table}]\n", "dir/s.yaml:1:8: units: a stands on the table, and there is none"},
+    {"units: [{lever_arm_m: 1}]\n", "dir/s.yaml:1:23: units.a.lever_arm_m: a list of 3 numbers are wanted"},
+    {"chamber: {start_degc: 90}\nunits: [{}]\n",
+     "dir/s.yaml:1:23: chamber.start_degc: 90 is outside min_degc -60 ... max_degc 85"},
+    {"supply: {volt_v: 16}\nunits: [{}]\n", "dir/s.yaml:1:18: supply.volt_v: 16 is above volt_max_v 15"},
+    {"spread: {u0_v: -1}\nunits: [{}]\n", "dir/s.yaml:1:16: spread.u0_v: -1 is outside 0 ... 20"},
+    {"spread: {afe: {input: current}}\nunits: [{}]\n", "dir/s.yaml:1:16: spread.afe.input: unknown key"},
+    {"timeline: [{at_s: 1}]\nunits: [{}]\n", "dir/s.yaml:1:12: timeline[0]: cmd is missing"},
+    {"timeline: [{at_s: -1, cmd: x}]\nunits: [{}]\n", "dir/s.yaml:1:19: timeline[0].at_s: -1 is outside 0 ... 1000000"},
+    {"timeline: [{cmd: x, args: {a: 1, a: 2}}]\nunits: [{}]\n", "dir/s.yaml:1:34: timeline[0].a: comes twice"},
+    {"timeline: [{cmd: x, args: {a: [[[[[1]]]]]}}]\nunits: [{}]\n", "dir/s.yaml:1:35: timeline[0].args: nested deeper"},
+    {"faults: [1]\nunits: [{}]\n", "dir/s.yaml:1:10: faults: a mapping with the arguments of fault.add"},
+    {"seed: 1\n---\nseed: 2\n", "dir/s.yaml:3:1: a second document"},
+    {"seed: *x\n", "dir/s.yaml:1:7: *x: no such anchor"},
+    {"a: &x [*x]\n", "dir/s.yaml:1:8: *x: no such anchor"},
 };
 
 static void what_is_wrong_is_told_with_file_line_key_and_remedy(void **state)

@@ -1,0 +1,43 @@
+/* The tables of the scenario's keys, one for each mapping: loader, dump and reference read them. */
+#ifndef PSABENCH_APP_SCENARIO_FIELDS_H
+#define PSABENCH_APP_SCENARIO_FIELDS_H
+
+#include "app/scenario_yaml.h"
+#include "app/yaml_fields.h"
+
+extern const struct yaml_fields scenario_bus_fields;           /* of struct can_bus_cfg: the key `bus` */
+extern const struct yaml_fields scenario_buses_fields;         /* of struct scenario_bus: an element of `buses` */
+extern const struct yaml_fields scenario_site_fields;          /* of struct scenario_site */
+extern const struct yaml_fields scenario_head_fields;          /* of struct head_cfg */
+extern const struct yaml_fields scenario_table_fields;         /* of struct table_cfg */
+extern const struct yaml_fields scenario_axis_of_table_fields; /* of struct table_axis_cfg */
+extern const struct yaml_fields scenario_chamber_fields;       /* of struct chamber_cfg */
+extern const struct yaml_fields scenario_supply_fields;        /* of struct supply_cfg */
+extern const struct yaml_fields scenario_spread_fields;        /* of struct scenario_spread */
+extern const struct yaml_fields scenario_afe_fields;           /* of struct afe_cfg */
+extern const struct yaml_fields scenario_afe_numbers;          /* its numbers alone */
+extern const struct yaml_fields scenario_mems_fields;          /* of struct mems_g */
+extern const struct yaml_fields scenario_unit_fields;          /* of struct scenario_unit */
+extern const struct yaml_fields scenario_axis_fields;          /* of struct scenario_unit: its channel X */
+extern const struct yaml_fields scenario_event_fields;         /* of struct scenario_event */
+extern const struct yaml_fields scenario_fields;               /* of struct scenario */
+
+void scenario_default(struct scenario *s, const char *path);
+struct scenario_unit scenario_unit_default(unsigned i); /* of the i-th unit */
+
+/* For the rows of struct scenario. */
+bool scenario_load_site(struct yaml_file *f, const struct yaml_node *node, void *section);
+void scenario_dump_site(const struct yaml_field *d, const void *section, cJSON *to);
+bool scenario_load_table(struct yaml_file *f, const struct yaml_node *node, void *section);
+void scenario_dump_table(const struct yaml_field *d, const void *section, cJSON *to);
+
+struct site scenario_site(const struct scenario_site *s);
+
+/* What stands in more than one key. */
+bool scenario_check_lab(struct yaml_file *f, const struct yaml_node *root, const struct lab_cfg *lab);
+bool scenario_check_seats(struct yaml_file *f, const struct yaml_node *root, const struct scenario *s);
+
+/* An element of `units`, which may be several units. */
+bool scenario_load_units(struct yaml_file *f, const struct yaml_node *node, struct scenario *s);
+
+#endif
