@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from psabench.shell.vocabulary import Arg, Command, Kind, Vocabulary, from_help
+from psabench.shell.vocabulary import Arg, Command, Kind, Vocabulary, from_help, with_kinds
 
 ROWS: list[dict[str, Any]] = [
     {"name": "help", "what": "Lists the commands.", "args": []},
@@ -60,10 +60,30 @@ ROWS: list[dict[str, Any]] = [
             {"name": "kind", "type": "name", "what": "see faults.kinds"},
             {"name": "point", "type": "name", "what": "see faults.points"},
             {"name": "at_s", "type": "number", "unit": "s", "min": 0, "max": 86400, "optional": True, "what": "when"},
+            {"name": "bias_v", "type": "number", "unit": "V", "min": -15, "max": 15, "optional": True, "what": "added"},
+            {"name": "mask", "type": "integer", "min": 1, "max": 255, "optional": True, "what": "bits"},
         ],
     },
 ]
-CHOICES = {("", "unit"): ("a", "b"), ("fault.add", "kind"): ("stuck", "dropped")}
+CHOICES = {("", "unit"): ("a", "b")}
+KINDS: list[dict[str, Any]] = [
+    {"kind": "stuck", "what": "Stands still.", "points": ["UNIT.sensor.x|y|z", "UNIT.line.NAME"], "args": []},
+    {
+        "kind": "bias",
+        "what": "Adds.",
+        "points": ["UNIT.sensor.x|y|z"],
+        "args": [
+            {"name": "bias_v", "type": "number", "unit": "V", "min": -15, "max": 15, "optional": False, "what": "added"}
+        ],
+    },
+    {
+        "kind": "lost",
+        "what": "Loses.",
+        "points": ["bus.NAME", "supply"],
+        "args": [{"name": "mask", "type": "integer", "min": 1, "max": 255, "optional": True, "what": "bits"}],
+    },
+]
+POINTS = ["a.sensor.x", "a.sensor.z", "a.line.INT", "bus.can0", "supply"]
 OWN = [
     Command(
         name="wait", what="Lets time pass.", args=(Arg(name="for_s", kind=Kind.REAL, unit="s", low=0, high=86400),)
@@ -81,4 +101,5 @@ OWN = [
 
 def vocabulary() -> Vocabulary:
     commands = [*from_help(ROWS, CHOICES), *OWN]
+    commands = [with_kinds(c, KINDS, POINTS) if c.name == "faults.add" else c for c in commands]
     return Vocabulary({c.name: c for c in commands}, {"chamber": "the scenario has no chamber"})

@@ -32,6 +32,8 @@ RIGHT: list[tuple[str, str, dict[str, object]]] = [
     ("probe.lines", "probe.lines", {}),
     ("faults.add stuck a.sensor.x at_s=63ms", "faults.add", {"kind": "stuck", "point": "a.sensor.x", "at_s": 0.063}),
     ("faults.add new_kind a.x", "faults.add", {"kind": "new_kind", "point": "a.x"}),  # the bench decides
+    ("faults.add bias a.sensor.x 10mV", "faults.add", {"kind": "bias", "point": "a.sensor.x", "bias_v": 0.01}),
+    ("faults.add point=b.adc.x kind=stuck", "faults.add", {"kind": "stuck", "point": "b.adc.x"}),
     ("wait 5ms", "wait", {"for_s": 0.005}),
     ('scpi.send table X "a b";*OPC? # x', "scpi.send", {"instrument": "table", "line": 'X "a b";*OPC? # x'}),
 ]  # fmt: skip
@@ -57,6 +59,8 @@ WRONG: list[tuple[str, int, str]] = [
     ("table.profile 1 0,101", 17, "times_s: 101 is out of range"),
     ("supply.output maybe", 15, "on: 'maybe'; on or off is right"),
     ("probe.start run.vcd c", 21, "unit: 'c'; there is a, b"),
+    ("faults.add bias a.sensor.x", 27, "bias_v is missing: added, V, -15 to 15; usage: faults.add"),
+    ("faults.add stuck a.sensor.x bias_v=1", 29, "has no argument bias_v; it takes kind, point, at_s"),
     ('probe.start "run', 13, "a quote is not closed"),
     ("scpi.send tabel *IDN?", 11, "did you mean table?"),
     ("scpi.send table", 16, "line is missing"),

@@ -27,8 +27,9 @@ def candidates(before: str, vocabulary: Vocabulary) -> list[Candidate]:
     command = vocabulary.commands.get(words[0])
     if command is None:
         return []
+    command = command.variant(_done(words, before))
     last = "" if before[-1:].isspace() else words[-1]
-    return list(_values(command, words[1 : len(words) - bool(last)], last))
+    return list(_values(command, _done(words, before), last))
 
 
 def argument(before: str, vocabulary: Vocabulary) -> tuple[Command, Arg | None] | None:
@@ -39,10 +40,16 @@ def argument(before: str, vocabulary: Vocabulary) -> tuple[Command, Arg | None] 
         return None
     if len(words) == 1 and not before[-1:].isspace():
         return command, None
+    command = command.variant(_done(words, before))
     last = "" if before[-1:].isspace() else words[-1]
-    free = _free(command, words[1 : len(words) - bool(last)])
+    free = _free(command, _done(words, before))
     named = command.arg(last.split("=")[0]) if "=" in last else None
     return command, named or (free[0] if free else None)
+
+
+def _done(words: list[str], before: str) -> list[str]:
+    """The words after the command's name that are complete."""
+    return words[1:] if before[-1:].isspace() else words[1:-1]
 
 
 def _names(prefix: str, vocabulary: Vocabulary) -> Iterator[Candidate]:

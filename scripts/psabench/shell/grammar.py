@@ -45,6 +45,7 @@ def parse(line: str, vocabulary: Vocabulary) -> Call | None:
         return None
     if command is None:
         raise unknown(words[0], vocabulary)
+    command = command.variant([w.raw for w in words[1:]])
     return Call(command, _arguments(command, words[1:], len(line)))
 
 

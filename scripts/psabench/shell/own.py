@@ -18,7 +18,7 @@ from psabench.shell import dut
 from psabench.shell.expect import USAGE, Expectation
 from psabench.shell.grammar import describe
 from psabench.shell.row import Args, Handler, Row, number
-from psabench.shell.vocabulary import OBJECTS, Arg, Command, Kind
+from psabench.shell.vocabulary import EVENTS, OBJECTS, Arg, Command, Kind
 from psabench.shell.words import Wrong
 
 if TYPE_CHECKING:
@@ -173,7 +173,7 @@ def _with_scpi(bench: Bench) -> bool:
 
 _FOR = Arg(name="for_s", kind=Kind.REAL, unit="s", low=0, high=86400, what="of the bench's time")
 _AT = Arg(name="t_s", kind=Kind.REAL, unit="s", low=0, high=1e9, what="simulated time since power-on")
-_EVENT = Arg(name="event", what="DRD_A, SYNC_A, INT_FALL, ...: docs/program.md lists them")
+_EVENT = Arg(name="event", choices=EVENTS, strict=False, what="of a board")
 _COUNT = Arg(name="count", kind=Kind.COUNT, optional=True, low=1, high=1e9, what="how many of them")
 _UNIT = Arg(name="unit", optional=True, what="the first without it")
 _LIMIT = Arg(

@@ -15,7 +15,7 @@ from psabench.instruments import KINDS
 from psabench.shell import own
 from psabench.shell.grammar import Call, parse
 from psabench.shell.transcript import Transcript
-from psabench.shell.vocabulary import Command, Vocabulary, from_help
+from psabench.shell.vocabulary import EVENTS, Command, Vocabulary, from_help, with_kinds
 from psabench.shell.words import Wrong
 
 # The bench understood these codes of a refusal to mean: the line is wrong. Others: not now, not here.
@@ -117,10 +117,14 @@ def _of_table(bench: Bench) -> list[Command]:
     with suppress(ControlError):
         units = bench.control.call("units").result["units"]
         choices["", "unit"] = tuple(str(u["name"]) for u in units)
-    with suppress(ControlError):
-        choices["fault.add", "kind"] = tuple(str(k["name"]) for k in bench.faults.kinds())
-        choices["fault.add", "point"] = tuple(str(p["point"]) for p in bench.faults.points())
-    return from_help(bench.control.call("help").result["commands"], choices)
+    for arg in ("after", "since"):
+        choices["fault.add", arg] = EVENTS
+    commands = from_help(bench.control.call("help").result["commands"], choices)
+    if any(c.name == "faults.add" for c in commands):
+        kinds = bench.control.call("fault.kinds").result["kinds"]
+        points = bench.control.call("fault.points").result["points"]
+        commands = [with_kinds(c, kinds, points) if c.name == "faults.add" else c for c in commands]
+    return commands
 
 
 def _why_absent(bench: Bench, name: str) -> str:

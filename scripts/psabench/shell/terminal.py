@@ -13,6 +13,7 @@ from typing import Any
 
 from prompt_toolkit import PromptSession
 from prompt_toolkit.auto_suggest import AutoSuggestFromHistory
+from prompt_toolkit.buffer import Buffer
 from prompt_toolkit.completion import CompleteEvent, Completer, Completion
 from prompt_toolkit.document import Document
 from prompt_toolkit.history import FileHistory, History
@@ -104,6 +105,11 @@ class Terminal:
                 return 0
             self._one(line)
 
+    @property
+    def buffer(self) -> Buffer:
+        """The line that is being edited."""
+        return self._prompt.default_buffer
+
     def as_line(self, typed: str) -> str:
         """What is typed in this mode as a line of the shell."""
         if self.mode == "can":
@@ -191,7 +197,7 @@ class Terminal:
 
     def _bar(self) -> str:
         status = self._watch.text()
-        typed = self._prompt.default_buffer.document.text_before_cursor
+        typed = self.buffer.document.text_before_cursor
         found = argument(typed, self.session.vocabulary) if self.mode == MAIN else None
         if found is None:
             return status

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import Any
 
@@ -47,15 +47,28 @@ class Arg:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Command:
-    """wire: its name in the bench's table; "": the shell's own."""
+    """wire: its name in the bench's table; "": the shell's own.
+
+    variants: what it is for a value of its first argument: each kind of fault takes arguments of its own.
+    """
 
     name: str
     what: str
     args: tuple[Arg, ...] = ()
     wire: str = ""
+    variants: Mapping[str, Command] = field(default_factory=dict)
 
     def arg(self, name: str) -> Arg | None:
         return next((a for a in self.args if a.name == name), None)
+
+    def variant(self, words: Sequence[str]) -> Command:
+        """The command that these words, raw and without its name, choose."""
+        if not self.variants:
+            return self
+        first = self.args[0].name
+        named = next((w.partition("=")[2] for w in words if w.startswith(f"{first}=")), None)
+        plain = next((w for w in words[:1] if "=" not in w), "")
+        return self.variants.get(plain if named is None else named, self)
 
     @property
     def usage(self) -> str:
@@ -88,6 +101,9 @@ OBJECTS: Mapping[str, str] = {
     "scpi": "SCPI lines as they are",
     "bench": "the bench as a whole: counters, units, snapshot",
 }
+
+# Events of a board, as emu/board/psa2_event.c names them; offered, the bench decides.
+EVENTS = ("RES", "SETUP_DONE", "SYNC_A", "SYNC_T", "DRD_A", "DRD_T", "INT_FALL", "INT_RISE", "POWER_DOWN", "POWER_UP")
 
 # Names of the bench's table that an object of the shell has; others keep theirs.
 _NAMES = {name: f"bench.{name}" for name in ("counters", "frames", "quit", "snapshot", "fork", "units")} | {
@@ -135,4 +151,29 @@ def _arg(row: Mapping[str, Any], here: tuple[str, ...], choices: Mapping[tuple[s
         choices=named or here,
         strict=bool(named),
         what=str(row.get("what", "")),
+    )
+
+
+def with_kinds(add: Command, kinds: Sequence[Mapping[str, Any]], points: Sequence[str]) -> Command:
+    """`faults.add` with a variant for each kind of fault: its own points and arguments, needed or not."""
+    kind, point, *others = add.args
+    of_kinds = {a["name"] for k in kinds for a in k["args"]}
+    common = [a for a in others if a.name not in of_kinds]
+    names = tuple(str(k["kind"]) for k in kinds)
+    kind = replace(kind, choices=names, strict=False)
+    variants = {}
+    for k in kinds:
+        here = tuple(p for p in points if any(_is_at(p, place) for place in k["points"]))
+        own = [_arg(a, (), {}) for a in k["args"]]
+        needed, optional = [a for a in own if not a.optional], [a for a in own if a.optional]
+        args = (kind, replace(point, choices=here, strict=False), *needed, *common, *optional)
+        variants[str(k["kind"])] = replace(add, what=str(k["what"]), args=args)
+    return replace(add, args=(kind, replace(point, choices=tuple(points), strict=False), *others), variants=variants)
+
+
+def _is_at(point: str, place: str) -> bool:
+    """Whether a point is one of those of a place: a.sensor.y of UNIT.sensor.x|y|z."""
+    steps, wanted = point.split("."), place.split(".")
+    return len(steps) == len(wanted) and all(
+        w in ("UNIT", "NAME", "N") or s in w.split("|") for s, w in zip(steps, wanted, strict=True)
     )
