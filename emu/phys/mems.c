@@ -91,5 +91,5 @@ double mems_out_v(struct mems *m, const double a_mps2[3], int64_t t_ns)
     double u_v = warm_v(m, a_mps2, t_ns);
     if (m->cfg.noise_v_rthz > 0.0) u_v += noise_v(m, t_ns);
     if (m->slow.moves) u_v += noise_slow_u(&m->slow, t_ns);
-    return noise_quantise_u(&m->slow, limited_v(&m->cfg, u_v));
+    return limited_v(&m->cfg, noise_quantise_u(&m->slow, u_v));
 }

@@ -104,6 +104,7 @@ static void the_output_stays_within_its_limits(void **state)
     near(mems_true_v(&m, (const double[3]){30.0, 0.0, 0.0}, 0), 4.8, 0.0);
     near(mems_true_v(&m, (const double[3]){-30.0, 0.0, 0.0}, 0), 0.2, 0.0);
     near(mems_out_v(&m, (const double[3]){6.0, 0.0, 0.0}, 0), 3.0, 0.0);
+    near(mems_out_v(&m, (const double[3]){30.0, 0.0, 0.0}, 0), 4.8, 0.0);
 }
 
 int main(void)
