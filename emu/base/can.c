@@ -52,6 +52,7 @@ void can_replace(struct can_bus *b, struct can_node *n, struct can_node *by)
     }
     if (b->next_rx == n) b->next_rx = by;
     if (b->sender == n) b->sender = by;
+    if (b->odd) can_odd_replace(b, n, by);
     n->next = NULL;
     n->queued = 0;
 }

@@ -461,3 +461,22 @@ void can_odd_detach(struct can_bus *b, struct can_node *n)
         if (h->from == n) h->from = NULL;
     }
 }
+
+void can_odd_replace(struct can_bus *b, struct can_node *n, struct can_node *by)
+{
+    if (n->back.queued) {
+        const int64_t due_ns = n->back.due_ns;
+        sched_cancel(b->sched, &n->back);
+        sched_ev(&by->back, come_back, by);
+        sched_at(b->sched, &by->back, due_ns);
+    }
+    if (b->tired == n) b->tired = by;
+    for (struct can_fault *f = b->faults; f; f = f->next) {
+        if (f->from == n) f->from = by;
+        if (f->to == n) f->to = by;
+    }
+    for (struct can_held *h = b->held; h < b->held + CAN_HELD_MAX; h++) {
+        if (h->from == n) h->from = by;
+        if (h->to == n) h->to = by;
+    }
+}

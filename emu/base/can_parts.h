@@ -16,5 +16,6 @@ void can_odd_end(struct can_bus *b, int64_t t_ns);                  /* of a fram
 void can_odd_error(struct can_bus *b, int64_t t_ns);                /* end of an error frame's delimiter */
 void can_odd_recessive(struct can_bus *b, int64_t t_ns);            /* end of an interframe space */
 void can_odd_detach(struct can_bus *b, struct can_node *n);
+void can_odd_replace(struct can_bus *b, struct can_node *n, struct can_node *by);
 
 #endif

@@ -12,7 +12,7 @@ static void tell(const struct can_hub *h, const struct can_client *c, enum can_h
 
 static void start_counters(struct can_client *c)
 {
-    c->delivered = c->taken = c->dropped = c->overrun = 0;
+    c->delivered = c->kept = c->taken = c->dropped = c->overrun = 0;
 }
 
 static void keep_counters(struct can_hub *h, const struct can_client *c)
@@ -41,6 +41,7 @@ void can_hub_up(struct can_hub *h, struct can_client *c)
     *p = c;
     c->number = ++h->clients_seen;
     c->came = h->comings ? ++*h->comings : c->number;
+    can_hub_stall(c, false); /* a fault of whoever was here before */
     can_attach(h->bus, &c->node);
     tell(h, c, CAN_HUB_CAME, NULL);
 }
@@ -64,6 +65,7 @@ void can_hub_down(struct can_hub *h, struct can_client *c)
     c->refused = 0;
     c->up = false;
     can_detach(h->bus, &c->node);
+    can_fault_forget(h->bus, &c->node);
     tell(h, c, CAN_HUB_WENT, NULL);
 }
 
@@ -76,6 +78,10 @@ static void silence(struct can_client *g)
     g->node.name = g->name;
     g->node.rx = NULL;
     g->node.sent = NULL;
+    g->node.error = NULL;
+    g->node.state = NULL;
+    g->stalled = false;
+    g->stall = NULL;
     g->node.ctx = NULL;
 }
 
@@ -121,6 +127,17 @@ void can_hub_sweep(struct can_hub *h, bool all)
         next = c->next;
         if (c->adapter == ghostly && (c->node.queued == 0 || all)) can_hub_dismiss(h, c);
     }
+}
+
+void can_hub_stall(struct can_client *c, bool on)
+{
+    if (c->stalled == on) return;
+    c->stalled = on;
+    if (!on) {
+        c->delivered += c->kept;
+        c->kept = 0;
+    }
+    if (c->stall) c->stall(c);
 }
 
 bool can_hub_send(struct can_hub *h, struct can_client *c, const struct can_msg *m, int64_t t_ns)

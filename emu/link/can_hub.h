@@ -15,14 +15,17 @@ struct can_client {
     const char *adapter; /* socketcand, slcan, socketcan */
     char name[32];       /* channel the client opened, or interface */
     struct can_node node;
-    bool up;                 /* takes part in the bus */
-    bool leaving;            /* its program has gone, frames of its still wait for the bus */
-    uint64_t delivered;      /* frames handed to its output since it came up: the barrier of step pace */
-    uint64_t taken;          /* frames of its that were queued for the bus */
-    uint64_t dropped;        /* frames lost because it read too slowly (wall pace only) */
-    uint64_t overrun;        /* frames of its that the kernel lost before we read them (SocketCAN) */
-    uint64_t refused;        /* messages that were no frame, or one that the bus or the link cannot carry */
-    struct can_client *next; /* in order of coming up */
+    bool up;                             /* takes part in the bus */
+    bool leaving;                        /* its program has gone, frames of its still wait for the bus */
+    bool stalled;                        /* a fault: its output is kept back, as if it did not read */
+    void (*stall)(struct can_client *c); /* stalled has changed; may be NULL */
+    uint64_t kept;                       /* frames in its output since it stalled: delivered when it goes on */
+    uint64_t delivered;                  /* frames handed to its output since it came up: the barrier of step pace */
+    uint64_t taken;                      /* frames of its that were queued for the bus */
+    uint64_t dropped;                    /* frames lost because it read too slowly (wall pace, or stalled) */
+    uint64_t overrun;                    /* frames of its that the kernel lost before we read them (SocketCAN) */
+    uint64_t refused;                    /* messages that were no frame, or one that the bus or the link cannot carry */
+    struct can_client *next;             /* in order of coming up */
 };
 
 /* What a client did to the bus: a journal of these makes the same bus again. */
@@ -75,6 +78,16 @@ void can_hub_sweep(struct can_hub *h, bool all);
 
 /* Queues a frame of the client's; false: refused, and counted. */
 bool can_hub_send(struct can_hub *h, struct can_client *c, const struct can_msg *m, int64_t t_ns);
+
+/* The client's program stalls, or goes on: what comes for it is kept, as long as there is room, and time does not wait. */
+void can_hub_stall(struct can_client *c, bool on);
+
+/* A frame has been put into the client's output. */
+static inline void can_hub_delivered(struct can_client *c)
+{
+    if (c->stalled) c->kept++;
+    else c->delivered++;
+}
 
 /* Whether another frame of the client's would find room. */
 static inline bool can_hub_room(const struct can_client *c)

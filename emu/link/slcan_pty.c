@@ -8,7 +8,7 @@
 #include <string.h>
 
 enum { OUT_MAX = 4 << 20, OUT_HIGH = 1 << 18 };
-enum { STATUS_RX_FULL = 0x01, STATUS_OVERRUN = 0x08 };
+enum { STATUS_RX_FULL = 0x01, STATUS_OVERRUN = 0x08, STATUS_PASSIVE = 0x20, STATUS_BUS_ERROR = 0x80 };
 
 static const uint32_t bitrate_hz[] = {10000, 20000, 50000, 100000, 125000, 250000, 500000, 800000, 1000000};
 
@@ -41,13 +41,26 @@ static void on_frame(void *ctx, const struct can_msg *m, int64_t t_ns)
     n += put_stamp(s, t_ns, line + n);
     line[n++] = '\r';
     if (text_link_put(&s->io, line, n)) {
-        s->can.delivered++;
+        can_hub_delivered(&s->can);
         return;
     }
     s->can.dropped++;
     s->status |= STATUS_RX_FULL | STATUS_OVERRUN;
     if (!s->lost_told) say(s, "slcan: the client reads too slowly, frames are being dropped");
     s->lost_told = true;
+}
+
+static void on_error(void *ctx, const struct can_msg *m, int64_t t_ns)
+{
+    struct slcan_pty *s = ctx;
+    (void)t_ns;
+    s->status |= m->id & CAN_CLASS_PROTOCOL ? STATUS_BUS_ERROR : STATUS_PASSIVE;
+}
+
+static void on_stall(struct can_client *can)
+{
+    struct slcan_pty *s = can->node.ctx;
+    text_link_stall(&s->io, can->stalled);
 }
 
 /* ---- commands: true is acknowledged with CR, false refused with BEL */
@@ -238,7 +251,8 @@ int slcan_pty_open(struct slcan_pty *s, struct can_hub *hub, const char *name)
     s->io.link.flush = on_flush;
     s->can.adapter = "slcan";
     snprintf(s->can.name, sizeof s->can.name, "%.31s", s->pty.path);
-    s->can.node = (struct can_node){.order = CAN_ORDER_FIFO, .fd = true, .rx = on_frame, .ctx = s};
+    s->can.node = (struct can_node){.order = CAN_ORDER_FIFO, .fd = true, .rx = on_frame, .error = on_error, .ctx = s};
+    s->can.stall = on_stall;
     links_add_first(hub->links, &s->io.link);
     links_add_first(hub->links, &s->pty.watch);
     return 0;

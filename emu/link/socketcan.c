@@ -28,6 +28,7 @@ static struct canfd_frame to_kernel(const struct can_msg *m)
     struct canfd_frame f = {.can_id = m->id, .len = m->len};
     if (m->flags & CAN_EXT) f.can_id |= CAN_EFF_FLAG;
     if (m->flags & CAN_RTR) f.can_id |= CAN_RTR_FLAG;
+    if (m->flags & CAN_ERROR) f.can_id |= CAN_ERR_FLAG;
     if (m->flags & CAN_BRS) f.flags |= CANFD_BRS;
     if (!(m->flags & CAN_RTR)) memcpy(f.data, m->data, m->len);
     return f;
@@ -50,8 +51,8 @@ static struct can_msg from_kernel(const struct canfd_frame *f, bool fd)
 
 static void refresh(struct socketcan *s)
 {
-    s->link.pending = s->len;
-    s->link.full = s->len > SOCKETCAN_QUEUE / 2;
+    s->link.pending = s->can.stalled ? 0 : s->len;
+    s->link.full = s->link.pending > SOCKETCAN_QUEUE / 2;
 }
 
 static void on_frame(void *ctx, const struct can_msg *m, int64_t t_ns)
@@ -60,13 +61,27 @@ static void on_frame(void *ctx, const struct can_msg *m, int64_t t_ns)
     (void)t_ns;
     if (s->len < SOCKETCAN_QUEUE) {
         s->queue[(s->head + s->len++) % SOCKETCAN_QUEUE] = *m;
-        s->can.delivered++;
+        can_hub_delivered(&s->can);
     } else {
         if (!s->lost_told) say(s, "the interface does not take the frames, they are being dropped");
         s->lost_told = true;
         s->can.dropped++;
     }
     refresh(s);
+}
+
+/* Only to an interface that cannot take it for a frame to send. */
+static void on_error(void *ctx, const struct can_msg *m, int64_t t_ns)
+{
+    struct socketcan *s = ctx;
+    (void)t_ns;
+    if (s->virtual && s->len < SOCKETCAN_QUEUE) s->queue[(s->head + s->len++) % SOCKETCAN_QUEUE] = *m;
+    refresh(s);
+}
+
+static void on_stall(struct can_client *can)
+{
+    refresh(can->node.ctx);
 }
 
 /* One frame to the kernel. 0 gone, else errno. */
@@ -88,8 +103,10 @@ static void lose(struct socketcan *s, int err)
 {
     if (!s->down_told) say(s, strerror(err));
     s->down_told = true;
-    s->can.delivered--;
-    s->can.dropped++;
+    if (!(s->queue[s->head].flags & CAN_ERROR)) {
+        s->can.delivered--;
+        s->can.dropped++;
+    }
     pop(s);
 }
 
@@ -99,7 +116,7 @@ static void on_flush(struct link *l, int64_t t_ns)
     (void)t_ns;
     l->want_write = false;
     l->want_read = can_hub_room(&s->can);
-    while (s->len) {
+    while (s->len && !s->can.stalled) {
         const int err = write_one(s, &s->queue[s->head]);
         if (err == EAGAIN) l->want_write = true;
         if (err == ENOBUFS) l->timer_ms = RETRY_MS; /* a full transmit queue does not signal POLLOUT */
@@ -195,7 +212,10 @@ int socketcan_open(struct socketcan *s, struct can_hub *hub, const char *interfa
     s->link = (struct link){.fd = fd, .want_read = true, .readable = on_readable, .flush = on_flush, .timer = on_timer};
     s->can.adapter = "socketcan";
     strcpy(s->can.name, interface);
-    s->can.node = (struct can_node){.order = CAN_ORDER_FIFO, .fd = fd_frames, .rx = on_frame, .ctx = s};
+    s->can.node =
+        (struct can_node){.order = CAN_ORDER_FIFO, .fd = fd_frames, .rx = on_frame, .error = on_error, .ctx = s};
+    s->can.stall = on_stall;
+    s->virtual = strncmp(interface, "vcan", 4) == 0 || strncmp(interface, "vxcan", 5) == 0;
     can_hub_up(hub, &s->can);
     links_add_first(hub->links, &s->link);
     return 0;

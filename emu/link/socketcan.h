@@ -18,6 +18,7 @@ struct socketcan {
     unsigned head, len;
     uint32_t rxq_ovfl; /* the kernel's counter of frames it lost before we read them */
     bool lost_told, down_told;
+    bool virtual; /* by its name, vcan or vxcan: error frames are shown there; a real one would send them */
 };
 
 /* 0, or -errno: -EAFNOSUPPORT the kernel has no CAN, -ENODEV no such interface, -ENETDOWN it is down. */

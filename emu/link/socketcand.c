@@ -141,6 +141,14 @@ const char *socketcand_strerror(enum socketcand_err err)
     return text[err];
 }
 
+const char *socketcand_class(uint32_t class)
+{
+    if (class & CAN_CLASS_BUS_OFF) return "this node is off the bus";
+    if (class & CAN_CLASS_RESTARTED) return "this node is back from bus-off";
+    if (class & CAN_CLASS_PROTOCOL) return "an error frame on the bus";
+    return "the state of this node's controller has changed";
+}
+
 /* Appends text; false when it does not fit. */
 static bool put(char **p, const char *end, const char *text, size_t len)
 {

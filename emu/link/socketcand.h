@@ -35,6 +35,8 @@ enum socketcand_err {
 #define SOCKETCAND_LOST    UINT32_C(0x20000004) /* CAN_ERR_CRTL: frames for this client were dropped */
 #define SOCKETCAND_REFUSED UINT32_C(0x20000008) /* CAN_ERR_PROT: a message of this client was refused */
 
+#define SOCKETCAND_ERROR_FLAG UINT32_C(0x20000000) /* with the classes of can_node.error */
+
 struct socketcand_msg {
     enum socketcand_verb verb;
     char channel[SOCKETCAND_CHANNEL_MAX]; /* open */
@@ -43,6 +45,9 @@ struct socketcand_msg {
 
 /* msg is everything before the closing '>'; blanks around '<' are tolerated. out is untouched on error. */
 enum socketcand_err socketcand_decode(const char *msg, size_t len, struct socketcand_msg *out);
+
+/* Words for an error class of the bus. */
+const char *socketcand_class(uint32_t class);
 
 /* What is wrong and what would be right, without '<' and '>'. */
 const char *socketcand_strerror(enum socketcand_err err);

@@ -86,11 +86,27 @@ static void on_frame(void *ctx, const struct can_msg *m, int64_t t_ns)
     if (c->lost && outbuf_pending(&c->io.out) < OUT_HIGH) tell_lost(c, t_ns);
     const size_t n = socketcand_frame(m, stamp(c, t_ns), pad_of(c), msg, sizeof msg);
     if (n && !c->lost && text_link_put(&c->io, msg, n)) {
-        c->can.delivered++;
+        can_hub_delivered(&c->can);
     } else if (n) {
         if (!c->lost++) say(c, "reads too slowly, frames are being dropped");
         c->can.dropped++;
     }
+}
+
+/* An error frame of the bus, or news of the client's own controller. */
+static void on_error(void *ctx, const struct can_msg *m, int64_t t_ns)
+{
+    struct client *c = ctx;
+    char text[80];
+    if (c->phase == PHASE_LEAVING) return;
+    snprintf(text, sizeof text, "%s, TEC %u REC %u", socketcand_class(m->id), m->data[6], m->data[7]);
+    tell_error(c, SOCKETCAND_ERROR_FLAG | m->id, text, t_ns);
+}
+
+static void on_stall(struct can_client *can)
+{
+    struct client *c = can->node.ctx;
+    text_link_stall(&c->io, can->stalled);
 }
 
 /* ---- client to bus */
@@ -274,7 +290,8 @@ static struct client *client_new(struct socketcand_server *s, int fd)
     c->io.link.timer = on_timer;
     c->io.link.release = on_release;
     c->can.adapter = "socketcand";
-    c->can.node = (struct can_node){.order = CAN_ORDER_FIFO, .rx = on_frame, .ctx = c};
+    c->can.node = (struct can_node){.order = CAN_ORDER_FIFO, .rx = on_frame, .error = on_error, .ctx = c};
+    c->can.stall = on_stall;
     return c;
 }
 

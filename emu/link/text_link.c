@@ -6,7 +6,7 @@
 
 static void refresh(struct text_link *t)
 {
-    t->link.pending = outbuf_pending(&t->out);
+    t->link.pending = t->stall ? 0 : outbuf_pending(&t->out);
     t->link.full = t->link.pending > t->out_high;
     t->link.want_write = t->link.pending > 0 && !t->hold;
     t->link.want_read = t->in_pos == t->in_len && !t->eof;
@@ -53,7 +53,7 @@ void text_link_flush(struct link *l, int64_t t_ns)
     struct text_link *t = (struct text_link *)l;
     if (t->ended) return;
     if (t->in_pos < t->in_len) take_lines(t, t_ns);
-    if (!t->hold && outbuf_pending(&t->out) && outbuf_flush(&t->out, l->fd) < 0) {
+    if (!t->hold && !t->stall && outbuf_pending(&t->out) && outbuf_flush(&t->out, l->fd) < 0) {
         outbuf_clear(&t->out); /* nobody will read it; what the peer had sent before is still taken */
         t->eof = true;
         if (t->in_pos == t->in_len) end(t, t_ns);
@@ -89,6 +89,12 @@ bool text_link_put(struct text_link *t, const char *text, size_t n)
     const bool fits = outbuf_put(&t->out, text, n);
     refresh(t);
     return fits;
+}
+
+void text_link_stall(struct text_link *t, bool on)
+{
+    t->stall = on;
+    refresh(t);
 }
 
 void text_link_forget_output(struct text_link *t)

@@ -35,6 +35,7 @@ struct text_link {
     struct outbuf out;
     size_t out_high;
     bool hold;   /* output is kept back */
+    bool stall;  /* likewise, and nobody is to wait for it */
     bool taking; /* lines are being handed over: an owner that flushes meanwhile is not handed the next one */
     bool eof;    /* the peer sends no more */
     bool ended;  /* closed() has been called */
@@ -52,6 +53,7 @@ void text_link_flush(struct link *l, int64_t t_ns);
 /* The whole message or nothing: false when the buffer is full. */
 bool text_link_put(struct text_link *t, const char *text, size_t n);
 
+void text_link_stall(struct text_link *t, bool on);
 void text_link_forget_output(struct text_link *t);
 void text_link_forget(struct text_link *t); /* drops a partial line and all output: another peer sits at the pty */
 
