@@ -3,13 +3,12 @@
 #include "app/options.h"
 #include "app/service.h"
 #include "base/text.h"
+#include "control/exact.h"
 
 #include <errno.h>
 #include <signal.h>
 #include <stdlib.h>
 #include <string.h>
-
-enum { EXIT_DONE = 0, EXIT_INPUT = 2, EXIT_MACHINE = 3, EXIT_INT = 130 };
 
 /* PSABENCH_VERSION comes from pyproject.toml by way of the Makefile. */
 #define VERSION TEXT_OF(PSABENCH_VERSION)
@@ -46,56 +45,88 @@ static bool write_resolved(const struct scenario *s, const char *path)
 static int dump(const struct options *o, struct scenario *s)
 {
     char why[1024];
-    if (!scenario_load(o->scenario ? o->scenario : "calibrate", s, why, sizeof why)) return complain(EXIT_INPUT, why);
+    if (!scenario_load(o->scenario ? o->scenario : "calibrate", s, why, sizeof why))
+        return complain(SERVICE_INPUT, why);
     override(s, o);
-    return write_resolved(s, NULL) ? EXIT_DONE : complain(EXIT_MACHINE, "--dump: stdout cannot be written");
+    return write_resolved(s, NULL) ? SERVICE_DONE : complain(SERVICE_MACHINE, "--dump: stdout cannot be written");
 }
 
-static int run(const struct options *o, struct scenario *scenario, struct bench *bench, struct service *service)
+/* The scenario with every key as one line, its numbers to the last bit. The caller free()s it. */
+static char *resolved_line(const struct scenario *s)
+{
+    cJSON *j = scenario_dump(s);
+    char *line = exact_line(j);
+    cJSON_Delete(j);
+    return line;
+}
+
+static bool load(const struct options *o, const struct snapshot *from, struct scenario *s, char *why, size_t cap)
+{
+    if (from) return scenario_parse(o->restore, from->scenario, from->scenario_len, s, why, cap);
+    return scenario_load(o->scenario ? o->scenario : "calibrate", s, why, cap);
+}
+
+static int run(const struct options *o, const struct snapshot *from, struct scenario *scenario, struct bench *bench,
+               struct service *service)
 {
     char why[1024];
-    if (!scenario_load(o->scenario ? o->scenario : "calibrate", scenario, why, sizeof why))
-        return complain(EXIT_INPUT, why);
+    if (!load(o, from, scenario, why, sizeof why)) return complain(SERVICE_INPUT, why);
     override(scenario, o);
     if (o->resolved && !write_resolved(scenario, o->resolved)) {
         snprintf(why, sizeof why, "--resolved %s: %s", o->resolved, strerror(errno));
-        return complain(EXIT_MACHINE, why);
+        return complain(SERVICE_MACHINE, why);
     }
     const int watched = o->unit ? bench_find_unit(scenario, o->unit) : 0;
     if (watched < 0) {
         snprintf(why, sizeof why, "--unit %s: %s has no unit of that name", o->unit, scenario->path);
-        return complain(EXIT_INPUT, why);
+        return complain(SERVICE_INPUT, why);
     }
+    char *line = resolved_line(scenario);
+    if (!line) return complain(SERVICE_MACHINE, "no memory");
     bench_init(bench, scenario, (unsigned)watched);
-    const bool open = service_open(service, bench, o, why, sizeof why);
+    const struct service_origin origin = {.scenario = line, .snapshot = from};
+    const bool open = service_open(service, bench, o, &origin, why, sizeof why);
     const int signal_number = open ? service_run(service) : 0;
+    const bool refused = service->refused;
     service_close(service);
-    if (!open) return complain(EXIT_MACHINE, why);
-    if (signal_number == SIGINT) return EXIT_INT;
-    return service->vcd_failed ? EXIT_MACHINE : EXIT_DONE;
+    free(line);
+    if (!open) return complain(refused ? SERVICE_INPUT : SERVICE_MACHINE, why);
+    if (signal_number == SIGINT) return SERVICE_INT;
+    return service->vcd_failed ? SERVICE_MACHINE : SERVICE_DONE;
+}
+
+static int restore(const struct options *o, struct scenario *scenario, struct bench *bench, struct service *service)
+{
+    char why[1024];
+    struct snapshot from;
+    if (!snapshot_load(o->restore, &from, why, sizeof why)) return complain(SERVICE_INPUT, why);
+    const int status = run(o, &from, scenario, bench, service);
+    snapshot_free(&from);
+    return status;
 }
 
 int main(int argc, char *argv[])
 {
     struct options o;
     char why[1024];
-    if (!options_parse(argc, argv, &o, why, sizeof why)) return complain(EXIT_INPUT, why);
+    if (!options_parse(argc, argv, &o, why, sizeof why)) return complain(SERVICE_INPUT, why);
     if (o.action == OPTIONS_HELP) return fputs(options_help(), stdout) < 0;
     if (o.action == OPTIONS_VERSION) return puts("psa-emu " VERSION) < 0;
     if (o.action == OPTIONS_LIST_COMMANDS) list_commands(stdout);
     if (o.action == OPTIONS_LIST_SCPI) list_scpi(stdout);
     if (o.action == OPTIONS_LIST_PROFILES && !list_profiles(stdout, why, sizeof why))
-        return complain(EXIT_MACHINE, why);
+        return complain(SERVICE_MACHINE, why);
     if (o.action == OPTIONS_LIST_SCENARIOS && !list_scenarios(stdout, why, sizeof why))
-        return complain(EXIT_MACHINE, why);
+        return complain(SERVICE_MACHINE, why);
     if (o.action == OPTIONS_LIST_KEYS) scenario_keys(stdout);
-    if (o.action != OPTIONS_RUN && o.action != OPTIONS_DUMP) return EXIT_DONE;
+    if (o.action != OPTIONS_RUN && o.action != OPTIONS_DUMP) return SERVICE_DONE;
     struct scenario *scenario = malloc(sizeof *scenario);
     struct bench *bench = malloc(sizeof *bench);
     struct service *service = malloc(sizeof *service);
-    const int status = !scenario || !bench || !service ? complain(EXIT_MACHINE, "no memory")
+    const int status = !scenario || !bench || !service ? complain(SERVICE_MACHINE, "no memory")
                        : o.action == OPTIONS_DUMP      ? dump(&o, scenario)
-                                                       : run(&o, scenario, bench, service);
+                       : o.restore                     ? restore(&o, scenario, bench, service)
+                                                       : run(&o, NULL, scenario, bench, service);
     free(service);
     free(bench);
     free(scenario);

@@ -36,6 +36,9 @@ static const char help[] =
     "  --scpi WHAT:pty[:LINK]   the same on a pseudo-terminal; --scpi may be given several times\n"
     "  --control PATH           Unix socket for commands, one JSON object a line\n"
     "  --truth PATH             Unix socket that tells the hidden parameters, for graders\n"
+    "  --restore FILE           go on where a snapshot was taken, instead of a SCENARIO\n"
+    "  --truth-log FILE         write the true state of every unit as lines of JSON, for graders\n"
+    "  --truth-every TIME       a line each that often (default 10ms)\n"
     "  --unit NAME              unit whose lines --vcd and --line show (default: the first)\n"
     "  --vcd FILE               record the lines as VCD\n"
     "  --vcd-unit NS            time unit of the VCD (default 10)\n"
@@ -171,6 +174,23 @@ static bool set_scpi(struct target *t, const char *arg)
     return true;
 }
 
+bool options_cans(struct options *o, char *text, char *why, size_t cap)
+{
+    struct target t = {o, why, cap};
+    char *rest = NULL;
+    o->can_count = 0;
+    for (const char *one = strtok_r(text, " ", &rest); one; one = strtok_r(NULL, " ", &rest)) {
+        if (!set_can(&t, one)) return false;
+    }
+    return true;
+}
+
+static bool set_truth_every(struct target *t, const char *arg)
+{
+    if (options_duration(arg, &t->o->truth_every_ns) && t->o->truth_every_ns >= 1000) return true;
+    return fail(t->why, t->cap, "--truth-every %s: a time of 1us or more is wanted, as 10ms", arg);
+}
+
 static bool set_pace(struct target *t, const char *arg)
 {
     for (int k = PACE_WALL; k <= PACE_FREE; k++) {
@@ -252,6 +272,8 @@ static bool set_path(struct target *t, const char *name, const char *arg, const 
 // clang-format off
 static bool set_control(struct target *t, const char *arg) { return set_path(t, "control", arg, &t->o->control); }
 static bool set_truth(struct target *t, const char *arg)   { return set_path(t, "truth", arg, &t->o->truth); }
+static bool set_restore(struct target *t, const char *arg) { return set_path(t, "restore", arg, &t->o->restore); }
+static bool set_truth_log(struct target *t, const char *arg) { return set_path(t, "truth-log", arg, &t->o->truth_log); }
 static bool set_unit(struct target *t, const char *arg)    { return set_path(t, "unit", arg, &t->o->unit); }
 static bool set_vcd(struct target *t, const char *arg)     { return set_path(t, "vcd", arg, &t->o->vcd); }
 static bool set_line(struct target *t, const char *arg)    { return set_path(t, "line", arg, &t->o->line); }
@@ -281,6 +303,8 @@ static const struct {
     {"truth", required_argument, set_truth},       {"unit", required_argument, set_unit},
     {"vcd", required_argument, set_vcd},           {"vcd-unit", required_argument, set_vcd_unit},
     {"line", required_argument, set_line},         {"line-hz", required_argument, set_line_hz},
+    {"restore", required_argument, set_restore},   {"truth-log", required_argument, set_truth_log},
+    {"truth-every", required_argument, set_truth_every},
     {"wait-client", no_argument, set_wait},        {"start", no_argument, set_start},
     {"quiet", no_argument, set_quiet},             {"help", no_argument, set_help},
     {"version", no_argument, set_version},         {"list-profiles", no_argument, set_profiles},
@@ -325,7 +349,8 @@ static bool parse_all(struct target *t, int argc, char *const argv[])
 
 bool options_parse(int argc, char *const argv[], struct options *o, char *why, size_t cap)
 {
-    *o = (struct options){.pace = PACE_WALL, .for_ns = INT64_MAX, .vcd_unit_ns = 10, .line_hz = 8000000};
+    *o = (struct options){
+        .pace = PACE_WALL, .for_ns = INT64_MAX, .vcd_unit_ns = 10, .line_hz = 8000000, .truth_every_ns = 10000000};
     struct target t = {o, why, cap};
     if (!parse_all(&t, argc, argv)) return false;
     if (o->pace == PACE_STEP && !o->control) {
@@ -333,6 +358,9 @@ bool options_parse(int argc, char *const argv[], struct options *o, char *why, s
     }
     if (o->wait_client && o->pace == PACE_STEP) {
         return fail(why, cap, "--wait-client: in step pace time waits for the control socket anyway");
+    }
+    if (o->restore && (o->scenario || o->seed_given || o->bitrate_given || o->data_bitrate_given || o->start)) {
+        return fail(why, cap, "--restore %s: scenario, seed, bit rates and start are the snapshot's", o->restore);
     }
     if (!o->can_given)
         o->can[o->can_count++] = (struct options_can){.kind = OPTIONS_SOCKETCAND, .port = SOCKETCAND_PORT};

@@ -58,7 +58,10 @@ struct options {
     const char *line; /* line port: symbolic link, "-" without one; NULL: no line port */
     int64_t line_hz;
     const char *control, *truth; /* paths of Unix sockets */
-    const char *resolved;        /* file for the scenario with every key; NULL: none */
+    const char *restore;         /* a snapshot instead of a scenario */
+    const char *truth_log;       /* file; NULL: none */
+    int64_t truth_every_ns;
+    const char *resolved; /* file for the scenario with every key; NULL: none */
     bool bitrate_given, data_bitrate_given;
     uint32_t bitrate_hz, data_bitrate_hz;
     int64_t epoch_ns; /* added to time stamps */
@@ -69,6 +72,10 @@ struct options {
 
 /* argv[0] is skipped; the strings stay the caller's. False with one line in why: what, where, what would be right. */
 bool options_parse(int argc, char *const argv[], struct options *o, char *why, size_t cap);
+
+/* Instead of the adapters that o has: those of a text with spaces between them, each as --can would have it. The text
+ * is cut up and stays the caller's. False with one line in why. */
+bool options_cans(struct options *o, char *text, char *why, size_t cap);
 
 /* The text of --help. */
 const char *options_help(void);

@@ -163,7 +163,7 @@ static bool open_vcd(struct ports *p, struct bench *b, const struct options *o, 
     return bench_record(b, p->vcd, o->vcd_unit_ns) || fail(why, cap, "--vcd-unit %u: no unit of VCD", o->vcd_unit_ns);
 }
 
-bool ports_open(struct ports *p, struct bench *b, const struct options *o, char *why, size_t cap)
+void ports_init(struct ports *p, struct bench *b, const struct options *o)
 {
     p->control.listen.fd = p->truth.listen.fd = -1;
     p->control.links = p->truth.links = &p->links;
@@ -178,6 +178,10 @@ bool ports_open(struct ports *p, struct bench *b, const struct options *o, char 
         h->lossless = o->pace != PACE_WALL;
         h->epoch_ns = o->epoch_ns;
     }
+}
+
+bool ports_open(struct ports *p, struct bench *b, const struct options *o, char *why, size_t cap)
+{
     return open_can(p, o, why, cap) && open_line(p, b, o, why, cap) && open_vcd(p, b, o, why, cap) &&
            instruments_open(&p->scpi, o, why, cap) && open_socket(&p->control, "control", o->control, why, cap) &&
            open_socket(&p->truth, "truth", o->truth, why, cap);
@@ -222,7 +226,7 @@ static void close_can(struct ports_can *c)
     if (c->kind == OPTIONS_SOCKETCAN) socketcan_close(&c->socketcan);
 }
 
-void ports_close(struct ports *p)
+static void close_all(struct ports *p)
 {
     for (unsigned i = 0; i < p->can_count; i++) close_can(p->can[i]);
     if (p->line) line_pty_close(p->line);
@@ -235,5 +239,24 @@ void ports_close(struct ports *p)
     instruments_free(&p->scpi);
     free(p->line);
     if (p->vcd) fclose(p->vcd);
+    p->can_count = 0;
+    p->line = NULL;
+    p->vcd = NULL;
+}
+
+void ports_close(struct ports *p)
+{
+    close_all(p);
     *p = (struct ports){.control.listen.fd = -1, .truth.listen.fd = -1};
+}
+
+void ports_abandon(struct ports *p)
+{
+    for (unsigned i = 0; i < p->can_count; i++) {
+        if (p->can[i]->kind == OPTIONS_SLCAN) p->can[i]->slcan.pty.name = NULL;
+    }
+    for (unsigned i = 0; i < p->scpi.count; i++) p->scpi.port[i]->port.pty.name = NULL;
+    if (p->line) p->line->pty.name = NULL;
+    p->control.path = p->truth.path = "";
+    close_all(p);
 }

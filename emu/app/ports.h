@@ -38,11 +38,15 @@ struct ports {
 
 /* Opens what the options ask for; links and hubs of p are set up first with bench, epoch and say. False with one line in
  * why: what, where, what would be right. ports_close() in either case. */
+void ports_init(struct ports *p, struct bench *b, const struct options *o); /* the hubs; nothing is opened yet */
 bool ports_open(struct ports *p, struct bench *b, const struct options *o, char *why, size_t cap);
 
 /* Prints one `ready key=value ...` line for each endpoint, then `ready all`. */
 void ports_ready(const struct ports *p, const struct options *o, FILE *out);
 
 void ports_close(struct ports *p);
+
+/* In the child of a fork: closes all, but leaves the names of sockets and links to the parent, and the hubs as they are. */
+void ports_abandon(struct ports *p);
 
 #endif

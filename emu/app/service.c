@@ -1,6 +1,9 @@
 #define _GNU_SOURCE /* sigaction */
 #include "app/service.h"
 
+#include "app/fork.h"
+
+#include <errno.h>
 #include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
@@ -37,6 +40,11 @@ static bool do_run(void *ctx, int64_t for_ns, uint64_t after_tx, char *why)
 static void do_quit(void *ctx)
 {
     ((struct service *)ctx)->loop.quit = true;
+}
+
+static bool do_fork(void *ctx, const struct control_fork *f, cJSON *result, char *why)
+{
+    return fork_service(ctx, f, result, why);
 }
 
 static bool do_vcd_flush(void *ctx, char *why)
@@ -135,6 +143,9 @@ static void make_view(struct service *s)
                                      .scenario = b->scenario.path,
                                      .run = do_run,
                                      .quit = do_quit,
+                                     .snapshot = service_snapshot,
+                                     .fork = do_fork,
+                                     .journal = service_journal,
                                      .vcd_flush = do_vcd_flush,
                                      .can_rx = do_can_rx,
                                      .client = do_client,
@@ -191,7 +202,7 @@ static void on_truth_gone(void *ctx, struct ctl_client *c)
 static bool may_start(void *ctx)
 {
     const struct service *s = ctx;
-    return !s->o->wait_client || s->ports.comings > 0;
+    return !s->o->wait_client || s->ports.comings > s->comings;
 }
 
 static void tell_vcd_error(struct service *s, const char *what_now)
@@ -207,6 +218,8 @@ static void moved(void *ctx, int64_t now_ns)
     struct service *s = ctx;
     (void)now_ns;
     bench_follow(s->bench);
+    journal_moved(&s->journal);
+    service_sweep(s, false);
     if (s->bench->recording) tell_vcd_error(s, "the recording ends here, the run goes on");
 }
 
@@ -241,7 +254,7 @@ static void on_refused(void *ctx, const char *unit, const char *why)
 
 /* ---- life */
 
-bool service_open(struct service *s, struct bench *b, const struct options *o, char *why, size_t cap)
+static void init(struct service *s, struct bench *b, const struct options *o)
 {
     memset(s, 0, sizeof *s);
     s->o = o;
@@ -267,7 +280,33 @@ bool service_open(struct service *s, struct bench *b, const struct options *o, c
                             .run_done = run_done,
                             .taken = taken,
                             .ctx = s};
-    return ports_open(&s->ports, b, o, why, cap);
+    ports_init(&s->ports, b, o);
+    service_follow(s);
+}
+
+static bool open_truth_log(struct service *s, char *why, size_t cap)
+{
+    if (!s->o->truth_log) return true;
+    FILE *out = fopen(s->o->truth_log, "wbe");
+    if (out) truth_log_open(&s->truth_log, out, s->o->truth_every_ns, &s->truth, &s->bench->sched);
+    else snprintf(why, cap, "--truth-log %s: %s", s->o->truth_log, strerror(errno));
+    return out != NULL;
+}
+
+bool service_open(struct service *s, struct bench *b, const struct options *o, const struct service_origin *from,
+                  char *why, size_t cap)
+{
+    init(s, b, o);
+    s->scenario = from->scenario;
+    s->refused = from->snapshot && !service_restore(s, from->snapshot, why, cap);
+    return !s->refused && ports_open(&s->ports, b, o, why, cap) && open_truth_log(s, why, cap);
+}
+
+static int run_and_drain(struct service *s)
+{
+    loop_run(&s->loop, &stop_signal);
+    if (!stop_signal) loop_drain(&s->loop, DRAIN_MS);
+    return stop_signal;
 }
 
 int service_run(struct service *s)
@@ -282,11 +321,10 @@ int service_run(struct service *s)
     sigaction(SIGINT, &on_stop, NULL);
     sigaction(SIGTERM, &on_stop, NULL);
     sigaction(SIGPIPE, &ignore, NULL);
-    bench_power_up(s->bench);
+    sigaction(SIGCHLD, &ignore, NULL); /* forked benches go their own way */
+    if (!s->powered) bench_power_up(s->bench);
     ports_ready(&s->ports, s->o, stdout);
-    loop_run(&s->loop, &stop_signal);
-    if (!stop_signal) loop_drain(&s->loop, DRAIN_MS);
-    return stop_signal;
+    return run_and_drain(s);
 }
 
 static void tell_counters(const struct service *s)
@@ -324,6 +362,21 @@ void service_close(struct service *s)
     bench_finish(s->bench);
     if (recorded) tell_vcd_error(s, "the recording is not complete");
     if (s->loop.started && !s->o->quiet) tell_counters(s);
+    if (!truth_log_close(&s->truth_log)) {
+        fprintf(stderr, "psa-emu: --truth-log %s: is not complete\n", s->o->truth_log);
+        s->vcd_failed = true;
+    }
+    service_sweep(s, true);
     ports_close(&s->ports);
     control_run_forget(&s->control);
+    journal_free(&s->journal);
+}
+
+int service_live(struct service *s)
+{
+    stop_signal = 0;
+    s->loop.quit = false;
+    const int signal_number = run_and_drain(s);
+    service_close(s);
+    return signal_number == SIGINT ? SERVICE_INT : s->vcd_failed ? SERVICE_MACHINE : SERVICE_DONE;
 }

@@ -5,8 +5,13 @@
 #include "app/bench.h"
 #include "app/loop.h"
 #include "app/ports.h"
+#include "app/snapshot.h"
+#include "app/truth_log.h"
 #include "control/control.h"
 #include "control/fault.h"
+
+/* Exit statuses of the process. */
+enum { SERVICE_DONE = 0, SERVICE_INPUT = 2, SERVICE_MACHINE = 3, SERVICE_INT = 130 };
 
 struct service {
     const struct options *o;
@@ -19,15 +24,45 @@ struct service {
     struct control control, truth;
     struct ctl_client *runner; /* who waits for the answer to `run` */
     bool vcd_failed;           /* the recording is not complete, and it was told */
+    struct journal journal;
+    const char *scenario; /* resolved, one line of JSON */
+    bool powered;         /* the bench comes from a snapshot */
+    bool refused;         /* which cannot be done again */
+    uint32_t comings;     /* CAN clients that came before time began: of the snapshot */
+    struct truth_log truth_log;
+};
+
+/* Where the bench comes from. */
+struct service_origin {
+    const char *scenario;            /* resolved, one line of JSON; kept by pointer */
+    const struct snapshot *snapshot; /* NULL: from power-on */
 };
 
 /* Opens everything. False with one line in why. The struct must not move; service_close() in either case. */
-bool service_open(struct service *s, struct bench *b, const struct options *o, char *why, size_t cap);
+bool service_open(struct service *s, struct bench *b, const struct options *o, const struct service_origin *from,
+                  char *why, size_t cap);
 
 /* Runs until the end or a signal; returns the signal's number or 0. */
 int service_run(struct service *s);
 
 /* Ends recordings, tells the counters on stderr, removes links and sockets. */
 void service_close(struct service *s);
+
+/* The rest of the life of a child: until its end or a signal, then closed; the exit status of the process. */
+int service_live(struct service *s);
+
+/* ---- saving and doubling, for service.c and fork.c */
+
+/* Callbacks of the commands. */
+bool service_snapshot(void *ctx, const char *path, cJSON *result, char *why);
+void service_journal(void *ctx, const struct control_command *row, const cJSON *args, int64_t t_ns);
+
+void service_follow(struct service *s); /* the journal begins */
+bool service_restore(struct service *s, const struct snapshot *from, char *why, size_t cap);
+void service_sweep(struct service *s, bool all); /* ghosts */
+
+/* In the child of a fork, whose descriptors lead nowhere: everything of the parent's is closed but the bench. */
+void service_abandon(struct service *s);
+bool service_reopen(struct service *s, const struct options *o, char *why, size_t cap);
 
 #endif

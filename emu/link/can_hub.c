@@ -101,6 +101,14 @@ bool can_hub_haunt(struct can_hub *h, struct can_client *c)
     return true;
 }
 
+void can_hub_haunt_all(struct can_hub *h)
+{
+    for (struct can_client *c = h->clients, *next; c; c = next) {
+        next = c->next;
+        if (c->adapter != ghostly) can_hub_haunt(h, c);
+    }
+}
+
 struct can_client *can_hub_ghost(struct can_hub *h, uint32_t number, const char *name, bool fd)
 {
     struct can_client *g = calloc(1, sizeof *g);

@@ -67,6 +67,8 @@ void can_hub_down(struct can_hub *h, struct can_client *c);
  * client itself is down. False when there is no memory: then it is down and its frames are dropped. */
 bool can_hub_haunt(struct can_hub *h, struct can_client *c);
 
+void can_hub_haunt_all(struct can_hub *h); /* whoever is no ghost yet */
+
 /* A ghost from the start: a client of a run that is done again. NULL when there is no memory. */
 struct can_client *can_hub_ghost(struct can_hub *h, uint32_t number, const char *name, bool fd);
 

@@ -1,0 +1,149 @@
+#define _GNU_SOURCE /* pipe2 */
+#include "app/fork.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { TOLD_MAX = 8192, FD_STDERR = 2 };
+
+static const char failure[] = "fail ";
+
+/* ---- the child */
+
+/* Every descriptor of the parent but stderr and `keep` leads nowhere from now on: what the parent's links and files do when
+ * they are closed reaches nobody. */
+static bool cut_off(int keep)
+{
+    const int null = open("/dev/null", O_RDWR | O_CLOEXEC);
+    DIR *open_fds = opendir("/proc/self/fd");
+    if (null < 0 || !open_fds) return false;
+    for (const struct dirent *e; (e = readdir(open_fds));) {
+        const int fd = atoi(e->d_name);
+        if (e->d_name[0] == '.' || fd == FD_STDERR || fd == keep || fd == null || fd == dirfd(open_fds)) continue;
+        if (dup2(null, fd) < 0) return false;
+    }
+    closedir(open_fds);
+    close(null);
+    return true;
+}
+
+static bool take_over(struct service *s, const struct options *o, int told, char *why, size_t cap)
+{
+    if (!cut_off(told)) {
+        snprintf(why, cap, "/dev/null or /proc: %s", strerror(errno));
+        return false;
+    }
+    service_abandon(s);
+    return service_reopen(s, o, why, cap);
+}
+
+static _Noreturn void live(struct service *s, const struct options *o, int told)
+{
+    char why[1024];
+    FILE *out = fdopen(told, "w");
+    if (!out) _exit(SERVICE_MACHINE);
+    if (!take_over(s, o, told, why, sizeof why)) {
+        fprintf(out, "%s%s\n", failure, why);
+        fflush(out);
+        _exit(SERVICE_MACHINE);
+    }
+    ports_ready(&s->ports, o, out);
+    fclose(out);
+    exit(service_live(s));
+}
+
+/* ---- the parent */
+
+/* All that the child says until it closes its end. */
+static size_t read_all(int fd, char *text, size_t cap)
+{
+    size_t len = 0;
+    for (ssize_t n; len + 1 < cap; len += (size_t)n) {
+        n = read(fd, text + len, cap - 1 - len);
+        if (n < 0 && errno == EINTR) n = 0;
+        else if (n <= 0) break;
+    }
+    text[len] = '\0';
+    return len;
+}
+
+/* ready key=value key=value: an object. */
+static void add_endpoint(cJSON *endpoints, char *line)
+{
+    char *rest = NULL;
+    cJSON *e = cJSON_CreateObject();
+    for (char *word = strtok_r(line, " ", &rest); word; word = strtok_r(NULL, " ", &rest)) {
+        char *value = strchr(word, '=');
+        if (!value) continue;
+        *value = '\0';
+        cJSON_AddStringToObject(e, word, value + 1);
+    }
+    if (e->child) cJSON_AddItemToArray(endpoints, e);
+    else cJSON_Delete(e);
+}
+
+static bool tell(pid_t pid, char *text, cJSON *result, char *why)
+{
+    char *rest = NULL;
+    if (strncmp(text, failure, sizeof failure - 1) == 0 || !strstr(text, "ready all\n")) {
+        text[strcspn(text, "\n")] = '\0';
+        snprintf(why, CONTROL_WHY_MAX, "%.240s", text[0] ? text + sizeof failure - 1 : "the child ended at once");
+        return false;
+    }
+    cJSON_AddNumberToObject(result, "pid", pid);
+    cJSON *endpoints = cJSON_AddArrayToObject(result, "endpoints");
+    for (char *line = strtok_r(text, "\n", &rest); line; line = strtok_r(NULL, "\n", &rest)) {
+        add_endpoint(endpoints, line);
+    }
+    return true;
+}
+
+/* What the child will have open. */
+struct wanted {
+    struct options o;
+    char can[1024];
+};
+
+static bool want(struct wanted *w, const struct options *parent, const struct control_fork *f, char *why)
+{
+    struct options *o = &w->o;
+    *o = *parent;
+    o->restore = o->vcd = o->line = o->truth_log = o->resolved = NULL;
+    o->control = f->control;
+    o->truth = f->truth;
+    o->wait_client = false;
+    for (unsigned i = 0; i < o->scpi_count; i++) { /* the parent's ports and links are taken */
+        o->scpi[i].port = 0;
+        o->scpi[i].link = NULL;
+    }
+    snprintf(w->can, sizeof w->can, "%s", f->can);
+    return options_cans(o, w->can, why, CONTROL_WHY_MAX);
+}
+
+bool fork_service(struct service *s, const struct control_fork *f, cJSON *result, char *why)
+{
+    char text[TOLD_MAX];
+    int told[2];
+    struct wanted *w = malloc(sizeof *w);
+    why[0] = '\0';
+    if (!w || !want(w, s->o, f, why) || pipe2(told, O_CLOEXEC) < 0) {
+        if (!why[0]) snprintf(why, CONTROL_WHY_MAX, "%s", strerror(errno));
+        free(w);
+        return false;
+    }
+    fflush(NULL); /* or both would write what waits */
+    const pid_t pid = fork();
+    if (pid == 0) live(s, &w->o, told[1]); /* w is the child's as long as it lives */
+    const int err = errno;
+    free(w);
+    close(told[1]);
+    if (pid > 0) read_all(told[0], text, sizeof text);
+    close(told[0]);
+    if (pid > 0) return tell(pid, text, result, why);
+    snprintf(why, CONTROL_WHY_MAX, "fork: %s", strerror(err));
+    return false;
+}
