@@ -229,6 +229,7 @@ format:
 docs: all
 	$(PY) tools/gen_proto.py
 	$(if $(wildcard tools/gen_docs.py),$(PY) tools/gen_docs.py)
+	$(PY) tools/gen_commands.py
 
 SIGROK := share/libsigrokdecode/decoders
 

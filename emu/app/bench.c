@@ -75,15 +75,21 @@ void bench_init(struct bench *b, const struct scenario *s, unsigned watched)
     sched_ev(&b->starter.ev, on_start, b);
 }
 
-bool bench_record(struct bench *b, FILE *out, uint32_t unit_ns)
+bool bench_record(struct bench *b, unsigned unit, FILE *out, uint32_t unit_ns)
 {
-    struct unit *u = &b->unit[b->watched];
+    struct unit *u = &b->unit[unit];
     const struct vcd_cfg cfg = {.out = out,
                                 .scope = "psa2", /* whatever the unit's name: share/psa2.gtkw opens it */
                                 .unit_ns = unit_ns,
                                 .mask = (UINT32_C(1) << PSA2_LINES) - 1};
     b->recording = vcd_open(&b->vcd, &cfg, &u->board.trace);
     return b->recording;
+}
+
+void bench_record_end(struct bench *b)
+{
+    vcd_close(&b->vcd, b->sched.now_ns - TRACE_LAG_NS);
+    b->recording = false;
 }
 
 void bench_power_up(struct bench *b)

@@ -160,7 +160,8 @@ static bool open_vcd(struct ports *p, struct bench *b, const struct options *o, 
     if (!o->vcd) return true;
     p->vcd = fopen(o->vcd, "wbe");
     if (!p->vcd) return fail(why, cap, "--vcd %s: %s", o->vcd, strerror(errno));
-    return bench_record(b, p->vcd, o->vcd_unit_ns) || fail(why, cap, "--vcd-unit %u: no unit of VCD", o->vcd_unit_ns);
+    return bench_record(b, b->watched, p->vcd, o->vcd_unit_ns) ||
+           fail(why, cap, "--vcd-unit %u: no unit of VCD", o->vcd_unit_ns);
 }
 
 void ports_init(struct ports *p, struct bench *b, const struct options *o)

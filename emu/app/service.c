@@ -25,6 +25,14 @@ static void say(void *ctx, const char *text)
 
 /* ---- what the commands may do */
 
+static void tell_vcd_error(struct service *s, const char *what_now)
+{
+    const int err = vcd_error(&s->bench->vcd);
+    if (!err) return;
+    fprintf(stderr, "psa-emu: VCD file %s: %s; %s\n", s->vcd_path, strerror(err), what_now);
+    s->vcd_failed = true;
+}
+
 static bool do_run(void *ctx, int64_t for_ns, uint64_t after_tx, char *why)
 {
     struct service *s = ctx;
@@ -35,6 +43,17 @@ static bool do_run(void *ctx, int64_t for_ns, uint64_t after_tx, char *why)
     if (loop_step(&s->loop, for_ns, after_tx)) return true;
     snprintf(why, CONTROL_WHY_MAX, "another run is under way");
     return false;
+}
+
+static void do_run_stop(void *ctx)
+{
+    loop_stop_step(&((struct service *)ctx)->loop);
+}
+
+static void do_push(void *ctx, void *client, const char *line)
+{
+    (void)ctx;
+    ctl_push(client, line);
 }
 
 static void do_quit(void *ctx)
@@ -51,8 +70,39 @@ static bool do_vcd_flush(void *ctx, char *why)
 {
     struct service *s = ctx;
     if (s->bench->recording) vcd_flush(&s->bench->vcd);
-    else snprintf(why, CONTROL_WHY_MAX, "nothing is being recorded; --vcd FILE is wanted");
+    else snprintf(why, CONTROL_WHY_MAX, "nothing is being recorded; --vcd FILE or vcd.start is wanted");
     return s->bench->recording;
+}
+
+static bool do_vcd_start(void *ctx, const char *path, unsigned unit, char *why)
+{
+    struct service *s = ctx;
+    if (s->bench->recording) {
+        snprintf(why, CONTROL_WHY_MAX, "a recording goes on already; vcd.stop ends it");
+        return false;
+    }
+    FILE *file = fopen(path, "wbe");
+    if (!file) {
+        snprintf(why, CONTROL_WHY_MAX, "%.200s: %s", path, strerror(errno));
+        return false;
+    }
+    s->ports.vcd = file;
+    snprintf(s->vcd_path, sizeof s->vcd_path, "%s", path);
+    return bench_record(s->bench, unit, file, s->o->vcd_unit_ns);
+}
+
+static bool do_vcd_stop(void *ctx, char *why)
+{
+    struct service *s = ctx;
+    if (!s->bench->recording) {
+        snprintf(why, CONTROL_WHY_MAX, "nothing is being recorded");
+        return false;
+    }
+    bench_record_end(s->bench);
+    tell_vcd_error(s, "the recording is not complete");
+    fclose(s->ports.vcd);
+    s->ports.vcd = NULL;
+    return true;
 }
 
 /* The client of any bus that came next after `came`; NULL: the last. */
@@ -85,13 +135,38 @@ static void put_client(const struct can_client *c, struct control_client *out)
                                    .refused = c->refused};
 }
 
+/* The i-th in order of coming. */
+static const struct can_client *client_at(const struct service *s, unsigned i)
+{
+    const struct can_client *c = client_after(&s->ports, 0);
+    while (c && i--) c = client_after(&s->ports, c->came);
+    return c;
+}
+
 static bool do_client(void *ctx, unsigned i, struct control_client *out)
 {
-    const struct ports *p = &((struct service *)ctx)->ports;
-    const struct can_client *c = client_after(p, 0);
-    while (c && i--) c = client_after(p, c->came);
+    const struct can_client *c = client_at(ctx, i);
     if (c) put_client(c, out);
     return c != NULL;
+}
+
+static struct can_node *do_client_node(void *ctx, unsigned i)
+{
+    const struct can_client *c = client_at(ctx, i);
+    return c ? &((struct can_client *)c)->node : NULL;
+}
+
+static bool do_stall(void *ctx, const struct can_node *node, bool on)
+{
+    const struct ports *p = &((struct service *)ctx)->ports;
+    for (unsigned i = 0; i < p->hubs; i++) {
+        for (struct can_client *c = p->hub[i].clients; c; c = c->next) {
+            if (&c->node != node) continue;
+            can_hub_stall(c, on);
+            return true;
+        }
+    }
+    return false;
 }
 
 static void sum_gone(const struct ports *p, struct control_client *out)
@@ -136,19 +211,26 @@ static void make_view(struct service *s)
 {
     struct bench *b = s->bench;
     s->view = (struct control_bench){.ctx = s,
-                                     .head = &b->lab.head,
+                                     .lab = &b->lab,
+                                     .sched = &b->sched,
                                      .buses = b->buses,
                                      .units = b->scenario.unit_count,
                                      .seed = b->scenario.seed,
                                      .scenario = b->scenario.path,
                                      .run = do_run,
+                                     .run_stop = do_run_stop,
+                                     .push = do_push,
                                      .quit = do_quit,
                                      .snapshot = service_snapshot,
                                      .fork = do_fork,
                                      .journal = service_journal,
                                      .vcd_flush = do_vcd_flush,
+                                     .vcd_start = do_vcd_start,
+                                     .vcd_stop = do_vcd_stop,
                                      .can_rx = do_can_rx,
                                      .client = do_client,
+                                     .client_node = do_client_node,
+                                     .stall = do_stall,
                                      .gone = do_gone,
                                      .pace = do_pace};
     s->view.faults = &s->faults;
@@ -179,6 +261,7 @@ static void on_control_line(void *ctx, struct ctl_client *c, const char *line, i
 static void on_control_gone(void *ctx, struct ctl_client *c)
 {
     struct service *s = ctx;
+    control_gone(&s->control, c);
     if (s->runner != c) return;
     s->runner = NULL;
     control_run_forget(&s->control);
@@ -203,14 +286,6 @@ static bool may_start(void *ctx)
 {
     const struct service *s = ctx;
     return !s->o->wait_client || s->ports.comings > s->comings;
-}
-
-static void tell_vcd_error(struct service *s, const char *what_now)
-{
-    const int err = vcd_error(&s->bench->vcd);
-    if (!err) return;
-    fprintf(stderr, "psa-emu: --vcd %s: %s; %s\n", s->o->vcd, strerror(err), what_now);
-    s->vcd_failed = true;
 }
 
 static void moved(void *ctx, int64_t now_ns)
@@ -264,6 +339,7 @@ static void init(struct service *s, struct bench *b, const struct options *o)
     b->ctx = s;
     pace_init(&s->pace, o->pace);
     make_view(s);
+    snprintf(s->vcd_path, sizeof s->vcd_path, "%s", o->vcd ? o->vcd : "");
     control_init(&s->control, control_tables, &s->view);
     control_init(&s->truth, control_truth_tables, &s->view);
     for (unsigned i = 0; i < SCENARIO_BUSES_MAX; i++) s->ports.hub[i].say = say;

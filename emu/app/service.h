@@ -23,6 +23,7 @@ struct service {
     struct fault_engine faults;
     struct control control, truth;
     struct ctl_client *runner; /* who waits for the answer to `run` */
+    char vcd_path[1024];       /* of the recording, --vcd or vcd.start */
     bool vcd_failed;           /* the recording is not complete, and it was told */
     struct journal journal;
     const char *scenario; /* resolved, one line of JSON */

@@ -78,15 +78,6 @@ static enum control_outcome do_counters(struct control *c, const struct control_
     return CONTROL_DONE;
 }
 
-static enum control_outcome do_vcd_flush(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
-{
-    (void)v;
-    (void)result;
-    (void)t_ns;
-    c->refusal.code = "state";
-    return c->bench->vcd_flush(c->bench->ctx, c->refusal.why) ? CONTROL_DONE : CONTROL_REFUSED;
-}
-
 static enum control_outcome do_quit(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
 {
     (void)v;
@@ -107,7 +98,6 @@ static const struct control_command rows[] = {
     {"counters", "Tells the counters of pace, bus, clients and units; with a unit, that unit's alone.", {CONTROL_UNIT_ARG(true)}, .run = do_counters},
     {"units", "Lists the units: name, serial number, CAN node, board profile.", {{0}}, .run = do_units},
     {"unit.reset", "Pulses Res of a unit.", {CONTROL_UNIT_ARG(true)}, .run = do_unit_reset, .changes = true},
-    {"vcd.flush", "Writes to the VCD file what has been recorded so far, with a closing time.", {{0}}, .run = do_vcd_flush},
     {"quit", "Ends the emulator as SIGTERM does.", {{0}}, .run = do_quit},
 };
 // clang-format on

@@ -14,29 +14,29 @@ static void add_head(const struct head *h, cJSON *result, int64_t t_ns)
 
 static enum control_outcome do_turn(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
 {
-    if (!head_at_rest(c->bench->head, t_ns)) {
+    if (!head_at_rest(&c->bench->lab->head, t_ns)) {
         return control_refuse(c, "state", "the head is turning, at rest in %.3f s",
-                              (double)(head_rest_ns(c->bench->head) - t_ns) * 1e-9);
+                              (double)(head_rest_ns(&c->bench->lab->head) - t_ns) * 1e-9);
     }
     control_settle_inputs(c->bench, t_ns);
-    head_turn(c->bench->head, v[0].real, t_ns);
-    add_head(c->bench->head, result, t_ns);
+    head_turn(&c->bench->lab->head, v[0].real, t_ns);
+    add_head(&c->bench->lab->head, result, t_ns);
     return CONTROL_DONE;
 }
 
 static enum control_outcome do_mount(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
 {
-    if (!head_at_rest(c->bench->head, t_ns)) return control_refuse(c, "state", "the head is turning");
+    if (!head_at_rest(&c->bench->lab->head, t_ns)) return control_refuse(c, "state", "the head is turning");
     control_settle_inputs(c->bench, t_ns);
-    head_mount(c->bench->head, (enum head_face)v[0].choice, t_ns);
-    add_head(c->bench->head, result, t_ns);
+    head_mount(&c->bench->lab->head, (enum head_face)v[0].choice, t_ns);
+    add_head(&c->bench->lab->head, result, t_ns);
     return CONTROL_DONE;
 }
 
 static enum control_outcome do_read(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
 {
     (void)v;
-    add_head(c->bench->head, result, t_ns);
+    add_head(&c->bench->lab->head, result, t_ns);
     return CONTROL_DONE;
 }
 

@@ -18,9 +18,8 @@ static enum control_outcome do_fork(struct control *c, const struct control_valu
 {
     (void)t_ns;
     if (!c->bench->fork) return refuse_without(c);
-    const struct control_fork f = {.control = v[0].text,
-                                   .can = v[1].given ? v[1].text : "none",
-                                   .truth = v[2].given ? v[2].text : NULL};
+    const struct control_fork f = {
+        .control = v[0].text, .can = v[1].given ? v[1].text : "none", .truth = v[2].given ? v[2].text : NULL};
     c->refusal.code = "machine";
     return c->bench->fork(c->bench->ctx, &f, result, c->refusal.why) ? CONTROL_DONE : CONTROL_REFUSED;
 }

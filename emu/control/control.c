@@ -7,9 +7,9 @@
 #include <stdio.h>
 #include <string.h>
 
-const struct control_table *const control_tables[] = {
-    &commands_bench,  &commands_head,  &commands_table,    &commands_chamber,
-    &commands_supply, &commands_fault, &commands_snapshot, NULL};
+const struct control_table *const control_tables[] = {&commands_bench,   &commands_head,     &commands_table,
+                                                      &commands_chamber, &commands_supply,   &commands_watch,
+                                                      &commands_fault,   &commands_snapshot, NULL};
 const struct control_table *const control_truth_tables[] = {&commands_truth, NULL};
 
 void control_init(struct control *c, const struct control_table *const *tables, const struct control_bench *bench)
@@ -128,14 +128,18 @@ static const char *reply_with(struct control *c, cJSON *id, bool ok, cJSON *resu
 
 const char *control_run_done(struct control *c, int64_t t_ns)
 {
-    cJSON *id = c->run_id;
+    cJSON *id = c->run_id, *result = cJSON_CreateObject();
     c->run_id = NULL;
     c->waiting = false;
-    return reply_with(c, id, true, NULL, t_ns);
+    const struct control_until until = control_watch_end(c);
+    if (until.active) cJSON_AddBoolToObject(result, "reached", until.reached);
+    if (until.active) cJSON_AddNumberToObject(result, "seen", (double)until.seen);
+    return reply_with(c, id, true, result, t_ns);
 }
 
 void control_run_forget(struct control *c)
 {
+    (void)control_watch_end(c);
     cJSON_Delete(c->run_id);
     c->run_id = NULL;
     c->waiting = false;

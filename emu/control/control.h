@@ -10,7 +10,7 @@
 #ifndef PSABENCH_CONTROL_CONTROL_H
 #define PSABENCH_CONTROL_CONTROL_H
 
-#include "control/view.h"
+#include "control/watch.h"
 
 #include <cjson/cJSON.h>
 
@@ -99,6 +99,7 @@ struct control {
     void *client;                   /* who sent the line: the application sets it before control_line() */
     bool waiting;                   /* a run is under way */
     cJSON *run_id;
+    struct control_watch watch;
     char reply[CONTROL_REPLY_MAX];
 };
 

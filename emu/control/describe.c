@@ -216,77 +216,23 @@ void describe_unit_counters(const struct control_bench *b, unsigned unit, cJSON 
     add_count(trace, "dropped", p->trace.dropped);
 }
 
-/* ---- truth */
+/* ---- at a glance */
 
-static void add_mems(const struct mems_g *m, cJSON *to)
+void describe_status(const struct control_bench *b, cJSON *to, int64_t t_ns)
 {
-    add_real(to, "u0_v", m->u0_v);
-    add_real(to, "kx_v_per_g", m->kx_v_per_g);
-    add_real(to, "ky_v_per_g", m->ky_v_per_g);
-    add_real(to, "kz_v_per_g", m->kz_v_per_g);
-    add_real(to, "kxy_v_per_g2", m->kxy_v_per_g2);
-    add_real(to, "kxx_v_per_g2", m->kxx_v_per_g2);
-    add_real(to, "kyy_v_per_g2", m->kyy_v_per_g2);
-    add_real(to, "alpha0_deg", m->alpha0_deg);
-    add_real(to, "drift_v_per_s", m->drift_v_per_s);
-    add_real(to, "noise_v_rthz", m->noise_v_rthz);
-    add_real(to, "reading_noise_v", m->reading_noise_v);
-}
-
-static void add_afe(const struct afe_cfg *a, cJSON *to)
-{
-    cJSON_AddStringToObject(to, "input", a->input == AFE_CURRENT ? "current" : "voltage");
-    add_real(to, "load_ohm", a->load_ohm);
-    add_real(to, "load_tol_ppm", a->load_tol_ppm);
-    add_real(to, "load_tc_ppm_per_k", a->load_tc_ppm_per_k);
-    add_real(to, "divider_ratio", a->divider_ratio);
-    add_real(to, "divider_tol_ppm", a->divider_tol_ppm);
-    add_real(to, "divider_tc_ppm_per_k", a->divider_tc_ppm_per_k);
-    add_real(to, "buffer_offset_v", a->buffer_offset_v);
-    add_real(to, "buffer_offset_tc_v_per_k", a->buffer_offset_tc_v_per_k);
-    add_real(to, "clip_v", a->clip_v);
-    add_real(to, "filter_hz", a->filter_hz);
-    add_real(to, "noise_v_rthz", a->noise_v_rthz);
-}
-
-static void add_unit_truth(struct unit *u, cJSON *to, int64_t t_ns)
-{
-    static const char *const axis[] = {"x", "y", "z"};
-    add_count(to, "serial", u->cfg.board.serial);
-    add_count(to, "node", u->cfg.node);
-    cJSON_AddStringToObject(to, "profile", u->board.profile.name);
-    add_real(to, "adc_noise_scale", u->cfg.board.adc_noise_scale);
-    add_real(to, "temp_noise_scale", u->cfg.board.temp_noise_scale);
-    add_real(to, "temp_adc_offset_v", u->cfg.board.temp_adc_offset_v);
-    add_real(to, "temp_adc_gain_error", u->cfg.board.temp_adc_gain_error);
-    cJSON *temps = cJSON_AddArrayToObject(to, "temp_degc");
-    for (unsigned i = 0; i < UNIT_TEMPS; i++) cJSON_AddItemToArray(temps, cJSON_CreateNumber(u->cfg.temp_degc[i]));
-    cJSON *axes = cJSON_AddObjectToObject(to, "axes");
-    for (unsigned i = 0; i < UNIT_AXES; i++) {
-        cJSON *j = cJSON_AddObjectToObject(axes, axis[i]);
-        const bool mems = u->cfg.axis[i].sensor == UNIT_MEMS;
-        cJSON_AddStringToObject(j, "sensor", mems ? "mems" : "none");
-        if (mems) add_mems(&u->cfg.axis[i].mems, j);
-        if (mems) add_real(j, "sensor_v", unit_sensor_v(u, i, t_ns));
-        add_afe(&u->cfg.board.afe[i], cJSON_AddObjectToObject(j, "afe"));
+    struct control_pace p = {0};
+    uint64_t frames = 0;
+    b->pace(b->ctx, &p);
+    for (unsigned i = 0; i < b->buses; i++) frames += b->bus[i]->frames;
+    cJSON_AddStringToObject(to, "pace", p.name);
+    add_count(to, "frames", frames);
+    add_count(to, "late", p.late);
+    add_real(to, "head_deg", head_read_deg(&b->lab->head, t_ns));
+    if (b->lab->table.cfg.axes) {
+        const struct table_reading r = table_read(&b->lab->table, 0, t_ns);
+        add_real(to, "angle_deg", r.angle_deg);
+        add_real(to, "rate_dps", r.rate_dps);
     }
-}
-
-void describe_truth(const struct control_bench *b, cJSON *to, int64_t t_ns)
-{
-    cJSON_AddStringToObject(to, "scenario", b->scenario);
-    add_count(to, "seed", b->seed);
-    cJSON *site = cJSON_AddObjectToObject(to, "site");
-    add_real(site, "g_mps2", b->head->site.g_mps2);
-    cJSON *head = cJSON_AddObjectToObject(to, "head");
-    add_real(head, "angle_rad", head_angle_rad(b->head, t_ns));
-    add_real(head, "setting_error_arcsec_rms", b->head->cfg.setting_error_arcsec_rms);
-    add_real(head, "resolution_arcsec", b->head->cfg.resolution_arcsec);
-    add_real(head, "periodic_arcsec", b->head->cfg.periodic_arcsec);
-    add_real(head, "mount_error_arcsec_rms", b->head->cfg.mount_error_arcsec_rms);
-    add_real(head, "turn_s", b->head->cfg.turn_s);
-    cJSON *units = cJSON_AddObjectToObject(to, "units");
-    for (unsigned i = 0; i < b->units; i++) {
-        add_unit_truth(b->unit[i], cJSON_AddObjectToObject(units, b->unit[i]->cfg.name), t_ns);
-    }
+    if (b->lab->chamber.cfg.present) add_real(to, "temp_degc", chamber_shown_degc(&b->lab->chamber, t_ns));
+    if (b->lab->supply.cfg.present) add_real(to, "supply_v", supply_shown_v(&b->lab->supply, t_ns));
 }

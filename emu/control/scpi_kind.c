@@ -14,18 +14,18 @@ static uint16_t no_condition(const struct control_bench *b, int64_t t_ns)
 
 static bool head_present(const struct control_bench *b)
 {
-    return b->head != NULL;
+    return b->lab != NULL;
 }
 
 static int64_t head_over_ns(const struct control_bench *b, int64_t t_ns)
 {
     (void)t_ns;
-    return head_rest_ns(b->head);
+    return head_rest_ns(&b->lab->head);
 }
 
 static uint16_t head_operation(const struct control_bench *b, int64_t t_ns)
 {
-    return head_at_rest(b->head, t_ns) ? 0 : SCPI_OPER_SETTLING;
+    return head_at_rest(&b->lab->head, t_ns) ? 0 : SCPI_OPER_SETTLING;
 }
 
 /* ---- rate table */

@@ -36,8 +36,7 @@ struct control_fork {
 
 struct control_bench {
     void *ctx;
-    struct head *head;
-    struct lab *lab; /* the instruments; NULL: a head alone */
+    struct lab *lab;
     struct can_bus *bus[CONTROL_BUSES_MAX];
     const char *bus_name[CONTROL_BUSES_MAX]; /* NULL: can0, can1, ... */
     unsigned buses;
@@ -45,6 +44,7 @@ struct control_bench {
     const char *unit_name[CONTROL_UNITS_MAX];
     struct can_node *node[CONTROL_UNITS_MAX]; /* of the unit on the bus; may be NULL */
     unsigned units;
+    struct sched *sched;
     uint64_t seed;
     const char *scenario;
     struct fault_engine *faults; /* NULL: no commands of faults */
@@ -52,19 +52,25 @@ struct control_bench {
     /* Time is to move by for_ns once after_tx frames of clients have been taken; control_run_done() is called then. False
      * with a sentence in why when it cannot. */
     bool (*run)(void *ctx, int64_t for_ns, uint64_t after_tx, char *why);
+    void (*run_stop)(void *ctx); /* from within an event: the run ends at this instant */
     void (*quit)(void *ctx);
+    /* A line for a client of the control socket that is no reply. NULL: there are no subscriptions. */
+    void (*push)(void *ctx, void *client, const char *line);
     /* Save the bench, double it. False with a sentence in why. NULL: it cannot. */
     bool (*snapshot)(void *ctx, const char *path, struct cJSON *result, char *why);
     bool (*fork)(void *ctx, const struct control_fork *f, struct cJSON *result, char *why);
     /* The supply was told something else: its next brown-out has to be asked for anew. May be NULL. */
     void (*supply_changed)(void *ctx, int64_t t_ns);
     bool (*vcd_flush)(void *ctx, char *why);
+    bool (*vcd_start)(void *ctx, const char *path, unsigned unit, char *why); /* NULL: it cannot */
+    bool (*vcd_stop)(void *ctx, char *why);
     uint64_t (*can_rx)(void *ctx); /* frames delivered to the client that has been on the bus longest */
     bool (*client)(void *ctx, unsigned i,
                    struct control_client *out); /* i-th in order of coming; false past the last */
     void (*gone)(void *ctx, struct control_client *out);
     struct can_node *(*client_node)(void *ctx, unsigned i); /* of the i-th client, as above; NULL past the last */
-    void (*stall)(void *ctx, unsigned client, bool on);     /* its program reads nothing; may be NULL */
+    bool (*stall)(void *ctx, const struct can_node *client,
+                  bool on); /* its program reads nothing; false: it has gone */
     void (*pace)(void *ctx, struct control_pace *out);
     /* A command that changes the bench's future was carried out; args as it was given. May be NULL. */
     void (*journal)(void *ctx, const struct control_command *row, const struct cJSON *args, int64_t t_ns);

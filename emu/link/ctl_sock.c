@@ -54,6 +54,14 @@ void ctl_reply(struct ctl_client *c, const char *line)
     text_link_put(&c->io, "\n", 1);
 }
 
+void ctl_push(struct ctl_client *c, const char *line)
+{
+    const size_t n = strlen(line);
+    if (outbuf_pending(&c->io.out) + n + 1 > OUT_MAX) return;
+    text_link_put(&c->io, line, n);
+    text_link_put(&c->io, "\n", 1);
+}
+
 static void on_connection(struct link *l, int64_t t_ns)
 {
     struct ctl_server *s = (struct ctl_server *)l;

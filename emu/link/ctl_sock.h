@@ -31,4 +31,7 @@ void ctl_close(struct ctl_server *s); /* and removes the path */
 /* Sends one line (without its LF). */
 void ctl_reply(struct ctl_client *c, const char *line);
 
+/* A line that is no reply; lost when the client is a megabyte behind. */
+void ctl_push(struct ctl_client *c, const char *line);
+
 #endif

@@ -73,7 +73,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     char line[4096];
     if (!bench) {
         bench = make_bench();
-        view = (struct control_bench){.head = &bench->lab.head,
+        view = (struct control_bench){.lab = &bench->lab,
                                       .bus = {&bench->bus[0]},
                                       .buses = 1,
                                       .unit = {&bench->unit[0]},

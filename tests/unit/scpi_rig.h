@@ -66,7 +66,7 @@ static inline void scpi_rig_init(struct scpi_rig *r, const char *kind)
     cfg.supply.readout_resolution_v = 0;
     sched_init(&r->sched);
     lab_init(&r->lab, &cfg, 1);
-    r->bench = (struct control_bench){.head = &r->lab.head, .lab = &r->lab};
+    r->bench = (struct control_bench){.lab = &r->lab};
     control_init(&r->control, control_tables, &r->bench);
     scpi_rig_session(r, &r->scpi, kind);
 }

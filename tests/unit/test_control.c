@@ -79,7 +79,7 @@ static int fresh(void **state)
     bench_init(bench, &s, 0);
     bench_power_up(bench);
     memset(&asked, 0, sizeof asked);
-    view = (struct control_bench){.head = &bench->lab.head,
+    view = (struct control_bench){.lab = &bench->lab,
                                   .bus = {&bench->bus[0]},
                                   .buses = 1,
                                   .units = 2,

@@ -24,7 +24,7 @@ struct change {
 static struct {
     struct sched s;
     struct can_bus bus;
-    struct head head;
+    struct lab lab;
     struct unit unit[UNITS];
     struct can_node node[UNITS], program;
     struct control_bench view;
@@ -82,7 +82,7 @@ static void init_unit(unsigned i)
     cfg.board.adc_noise_scale = cfg.board.temp_noise_scale = 0.0;
     cfg.board.serial = i + 1;
     if (i == 1) cfg.board.afe[0] = afe_nominal(AFE_CURRENT);
-    unit_init(&r.unit[i], &cfg, &r.head, &r.s);
+    unit_init(&r.unit[i], &cfg, &r.lab, &r.s);
     r.node[i] = (struct can_node){.name = name[i]};
     can_attach(&r.bus, &r.node[i]);
     r.view.unit[i] = &r.unit[i];
@@ -92,14 +92,13 @@ static void init_unit(unsigned i)
 
 static int fresh(void **state)
 {
-    const struct head_cfg head = {0};
-    const struct site site = {.g_mps2 = 9.81};
+    const struct lab_cfg lab = lab_default();
     (void)state;
     memset(&r, 0, sizeof r);
     sched_init(&r.s);
     can_bus_init(&r.bus, &(struct can_bus_cfg){.bitrate_hz = 1000000}, &r.s);
-    head_init(&r.head, &head, &site, rng_stream(1, 0, "head"));
-    r.view = (struct control_bench){.head = &r.head,
+    lab_init(&r.lab, &lab, 1);
+    r.view = (struct control_bench){.lab = &r.lab,
                                     .bus = {&r.bus},
                                     .bus_name = {"can0"},
                                     .buses = 1,

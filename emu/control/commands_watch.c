@@ -1,0 +1,106 @@
+/* Commands that look on: events, levels, recordings. */
+#include "control/commands.h"
+
+#include <math.h>
+
+static enum control_outcome from_bench(struct control *c, bool done)
+{
+    if (done) return CONTROL_DONE;
+    c->refusal.code = "state";
+    return CONTROL_REFUSED;
+}
+
+static enum control_outcome do_until(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+{
+    (void)result;
+    (void)t_ns;
+    const struct control_bench *b = c->bench;
+    const uint64_t count = v[2].given ? v[2].count : 1;
+    const double limit_s = v[3].given ? v[3].real : 60.0;
+    if (c->waiting) return control_refuse(c, "state", "another run is under way");
+    if (!b->units) return control_refuse(c, "state", "there is no unit");
+    if (!b->run(b->ctx, (int64_t)nearbyint(limit_s * 1e9), v[4].count, c->refusal.why)) return from_bench(c, false);
+    control_watch_until(c, (enum psa2_event)v[0].choice, v[1].unit, count);
+    return CONTROL_LATER;
+}
+
+static enum control_outcome do_subscribe(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+{
+    (void)result;
+    const double every_s = v[1].given ? v[1].real : 0.1;
+    if (!c->bench->push) return control_refuse(c, "state", "nothing can be subscribed here");
+    if (control_subscribe(c, c->client, (enum control_topic)v[0].choice, (int64_t)nearbyint(every_s * 1e9), t_ns)) {
+        return CONTROL_DONE;
+    }
+    return control_refuse(c, "state", "there are %u subscriptions already", CONTROL_SUBS_MAX);
+}
+
+static enum control_outcome do_unsubscribe(struct control *c, const struct control_value *v, cJSON *result,
+                                           int64_t t_ns)
+{
+    (void)result;
+    (void)t_ns;
+    if (v[0].given) control_unsubscribe(c, c->client, (enum control_topic)v[0].choice);
+    else control_gone(c, c->client);
+    return CONTROL_DONE;
+}
+
+static enum control_outcome do_lines(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+{
+    if (!c->bench->units) return control_refuse(c, "state", "there is no unit");
+    const uint32_t level = control_lines(c, v[0].unit, t_ns);
+    cJSON *lines = cJSON_AddObjectToObject(result, "lines");
+    for (unsigned i = 0; i < PSA2_LINES; i++) {
+        cJSON_AddNumberToObject(lines, psa2_line_name((enum psa2_line)i), level >> i & 1);
+    }
+    return CONTROL_DONE;
+}
+
+static enum control_outcome do_vcd_start(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+{
+    const struct control_bench *b = c->bench;
+    (void)result;
+    (void)t_ns;
+    if (!b->vcd_start || !b->units) return control_refuse(c, "state", "nothing can be recorded here");
+    return from_bench(c, b->vcd_start(b->ctx, v[0].text, v[1].unit, c->refusal.why));
+}
+
+static enum control_outcome do_vcd_stop(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+{
+    (void)v;
+    (void)result;
+    (void)t_ns;
+    if (!c->bench->vcd_stop) return control_refuse(c, "state", "nothing is being recorded");
+    return from_bench(c, c->bench->vcd_stop(c->bench->ctx, c->refusal.why));
+}
+
+static enum control_outcome do_vcd_flush(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+{
+    (void)v;
+    (void)result;
+    (void)t_ns;
+    return from_bench(c, c->bench->vcd_flush(c->bench->ctx, c->refusal.why));
+}
+
+// clang-format off
+#define FIRST_UNIT {"unit", CONTROL_UNIT, true, .what = "name of a unit; else the first"}
+
+static const struct control_command rows[] = {
+    {"run.until", "As run, but ends at the instant of an event of a board; tells whether it was reached and how many were seen.",
+     {{"event", CONTROL_CHOICE, .what = "of the board", .choices = control_events}, FIRST_UNIT,
+      {"count", CONTROL_COUNT, true, NULL, 1, CONTROL_COUNT_MAX, .what = "of such events from now on; else 1", .def = 1},
+      {"limit_s", CONTROL_REAL, true, "s", 0, 86400, .what = "give up after this; else 60", .def = 60},
+      {"after_tx", CONTROL_COUNT, true, NULL, 0, CONTROL_COUNT_MAX, .what = "as of run"}}, .run = do_until},
+    {"subscribe", "From now on this client gets a line for each event, fault or status.",
+     {{"what", CONTROL_CHOICE, .what = "kind of lines", .choices = control_topics},
+      {"every_s", CONTROL_REAL, true, "s", 1e-3, 3600, .what = "simulated time between lines of status; else 0.1", .def = 0.1}}, .run = do_subscribe},
+    {"unsubscribe", "Ends subscriptions of this client: of one kind, or all.",
+     {{"what", CONTROL_CHOICE, true, .what = "kind of lines", .choices = control_topics}}, .run = do_unsubscribe},
+    {"lines", "Tells the levels of a unit's lines now; with a fault on a line, those of 0.2 ms ago.", {FIRST_UNIT}, .run = do_lines},
+    {"vcd.start", "Records the lines of a unit into a VCD file from now on.",
+     {{"path", CONTROL_TEXT, .what = "file to write; one of that name is replaced"}, FIRST_UNIT}, .run = do_vcd_start},
+    {"vcd.stop", "Ends the recording, 0.2 ms before now: later edges are not all known.", {{0}}, .run = do_vcd_stop},
+    {"vcd.flush", "Writes to the VCD file what has been recorded so far, with a closing time.", {{0}}, .run = do_vcd_flush},
+};
+// clang-format on
+const struct control_table commands_watch = {rows, sizeof rows / sizeof *rows};

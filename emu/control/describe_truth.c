@@ -1,0 +1,133 @@
+#include "control/describe.h"
+
+static void add_count(cJSON *to, const char *name, uint64_t n)
+{
+    cJSON_AddNumberToObject(to, name, (double)n);
+}
+
+static void add_real(cJSON *to, const char *name, double v)
+{
+    cJSON_AddNumberToObject(to, name, v);
+}
+
+/* ---- parameters */
+
+static void add_mems(const struct mems_g *m, cJSON *to)
+{
+    add_real(to, "u0_v", m->u0_v);
+    add_real(to, "kx_v_per_g", m->kx_v_per_g);
+    add_real(to, "ky_v_per_g", m->ky_v_per_g);
+    add_real(to, "kz_v_per_g", m->kz_v_per_g);
+    add_real(to, "kxy_v_per_g2", m->kxy_v_per_g2);
+    add_real(to, "kxx_v_per_g2", m->kxx_v_per_g2);
+    add_real(to, "kyy_v_per_g2", m->kyy_v_per_g2);
+    add_real(to, "alpha0_deg", m->alpha0_deg);
+    add_real(to, "drift_v_per_s", m->drift_v_per_s);
+    add_real(to, "noise_v_rthz", m->noise_v_rthz);
+    add_real(to, "reading_noise_v", m->reading_noise_v);
+}
+
+static void add_afe(const struct afe_cfg *a, cJSON *to)
+{
+    cJSON_AddStringToObject(to, "input", a->input == AFE_CURRENT ? "current" : "voltage");
+    add_real(to, "load_ohm", a->load_ohm);
+    add_real(to, "load_tol_ppm", a->load_tol_ppm);
+    add_real(to, "load_tc_ppm_per_k", a->load_tc_ppm_per_k);
+    add_real(to, "divider_ratio", a->divider_ratio);
+    add_real(to, "divider_tol_ppm", a->divider_tol_ppm);
+    add_real(to, "divider_tc_ppm_per_k", a->divider_tc_ppm_per_k);
+    add_real(to, "buffer_offset_v", a->buffer_offset_v);
+    add_real(to, "buffer_offset_tc_v_per_k", a->buffer_offset_tc_v_per_k);
+    add_real(to, "clip_v", a->clip_v);
+    add_real(to, "filter_hz", a->filter_hz);
+    add_real(to, "noise_v_rthz", a->noise_v_rthz);
+}
+
+static void add_unit_truth(struct unit *u, cJSON *to, int64_t t_ns)
+{
+    static const char *const axis[] = {"x", "y", "z"};
+    add_count(to, "serial", u->cfg.board.serial);
+    add_count(to, "node", u->cfg.node);
+    cJSON_AddStringToObject(to, "profile", u->board.profile.name);
+    add_real(to, "adc_noise_scale", u->cfg.board.adc_noise_scale);
+    add_real(to, "temp_noise_scale", u->cfg.board.temp_noise_scale);
+    add_real(to, "temp_adc_offset_v", u->cfg.board.temp_adc_offset_v);
+    add_real(to, "temp_adc_gain_error", u->cfg.board.temp_adc_gain_error);
+    cJSON *temps = cJSON_AddArrayToObject(to, "temp_degc");
+    for (unsigned i = 0; i < UNIT_TEMPS; i++) cJSON_AddItemToArray(temps, cJSON_CreateNumber(u->cfg.temp_degc[i]));
+    cJSON *axes = cJSON_AddObjectToObject(to, "axes");
+    for (unsigned i = 0; i < UNIT_AXES; i++) {
+        cJSON *j = cJSON_AddObjectToObject(axes, axis[i]);
+        const bool mems = u->cfg.axis[i].sensor == UNIT_MEMS;
+        cJSON_AddStringToObject(j, "sensor", mems ? "mems" : "none");
+        if (mems) add_mems(&u->cfg.axis[i].mems, j);
+        if (mems) add_real(j, "sensor_v", unit_sensor_v(u, i, t_ns));
+        add_afe(&u->cfg.board.afe[i], cJSON_AddObjectToObject(j, "afe"));
+    }
+}
+
+void describe_truth(const struct control_bench *b, cJSON *to, int64_t t_ns)
+{
+    cJSON_AddStringToObject(to, "scenario", b->scenario);
+    add_count(to, "seed", b->seed);
+    cJSON *site = cJSON_AddObjectToObject(to, "site");
+    add_real(site, "g_mps2", b->lab->head.site.g_mps2);
+    cJSON *head = cJSON_AddObjectToObject(to, "head");
+    add_real(head, "angle_rad", head_angle_rad(&b->lab->head, t_ns));
+    add_real(head, "setting_error_arcsec_rms", b->lab->head.cfg.setting_error_arcsec_rms);
+    add_real(head, "resolution_arcsec", b->lab->head.cfg.resolution_arcsec);
+    add_real(head, "periodic_arcsec", b->lab->head.cfg.periodic_arcsec);
+    add_real(head, "mount_error_arcsec_rms", b->lab->head.cfg.mount_error_arcsec_rms);
+    add_real(head, "turn_s", b->lab->head.cfg.turn_s);
+    cJSON *units = cJSON_AddObjectToObject(to, "units");
+    for (unsigned i = 0; i < b->units; i++) {
+        add_unit_truth(b->unit[i], cJSON_AddObjectToObject(units, b->unit[i]->cfg.name), t_ns);
+    }
+}
+
+/* ---- state */
+
+static const double deg_of_rad = 57.295779513082320877;
+
+static void add_table(const struct lab *l, cJSON *to, int64_t t_ns)
+{
+    cJSON *list = cJSON_AddArrayToObject(to, "table");
+    for (unsigned i = 0; i < l->table.cfg.axes; i++) {
+        const struct motion_state s = table_axis(&l->table, i, t_ns);
+        cJSON *j = cJSON_CreateObject();
+        add_real(j, "angle_deg", s.angle_rad * deg_of_rad);
+        add_real(j, "rate_dps", s.rate_radps * deg_of_rad);
+        add_real(j, "accel_dps2", s.accel_radps2 * deg_of_rad);
+        cJSON_AddItemToArray(list, j);
+    }
+}
+
+/* At the unit's origin, in the axes of its case. */
+static void add_unit_state(struct unit *u, cJSON *to, int64_t t_ns)
+{
+    static const double origin_m[3];
+    struct felt felt;
+    const struct chamber *k = &u->lab->chamber;
+    lab_feel(u->lab, &u->cfg.seat, origin_m, t_ns, &felt);
+    cJSON_AddStringToObject(to, "name", u->cfg.name);
+    cJSON_AddItemToObject(to, "f_mps2", cJSON_CreateDoubleArray(felt.f_mps2, 3));
+    cJSON_AddItemToObject(to, "w_radps", cJSON_CreateDoubleArray(felt.w_radps, 3));
+    if (k->cfg.present) add_real(to, "case_degc", chamber_case_degc(k, &u->body, t_ns));
+    if (k->cfg.present) add_real(to, "element_degc", chamber_element_degc(k, &u->body, t_ns));
+    if (!k->cfg.present) cJSON_AddItemToObject(to, "temp_degc", cJSON_CreateDoubleArray(u->cfg.temp_degc, UNIT_TEMPS));
+    cJSON *sensors = cJSON_AddArrayToObject(to, "sensor_v");
+    for (unsigned i = 0; i < UNIT_AXES; i++) {
+        cJSON_AddItemToArray(sensors, cJSON_CreateNumber(unit_sensor_v(u, i, t_ns)));
+    }
+}
+
+void describe_state(const struct control_bench *b, unsigned unit, cJSON *to, int64_t t_ns)
+{
+    cJSON *head = cJSON_AddObjectToObject(to, "head");
+    add_real(head, "angle_deg", head_angle_rad(&b->lab->head, t_ns) * deg_of_rad);
+    cJSON_AddStringToObject(head, "face", head_face_name(head_face(&b->lab->head, t_ns)));
+    add_table(b->lab, to, t_ns);
+    if (b->lab->chamber.cfg.present) add_real(to, "air_degc", chamber_air_degc(&b->lab->chamber, t_ns));
+    if (b->lab->supply.cfg.present) add_real(to, "supply_v", supply_volts(&b->lab->supply, t_ns));
+    if (b->units) add_unit_state(b->unit[unit], cJSON_AddObjectToObject(to, "unit"), t_ns);
+}

@@ -1,0 +1,171 @@
+#include "control/watch.h"
+
+#include "control/control.h"
+#include "control/describe.h"
+
+#include <string.h>
+
+const char *const control_events[] = {"RES",      "SETUP_DONE", "SYNC_A",     "SYNC_T",   "DRD_A", "DRD_T",
+                                      "INT_FALL", "INT_RISE",   "POWER_DOWN", "POWER_UP", NULL};
+_Static_assert(sizeof control_events / sizeof *control_events == PSA2_EVENTS + 1, "one name for each event");
+
+const char *const control_topics[] = {"status", "events", "faults", NULL};
+_Static_assert(sizeof control_topics / sizeof *control_topics == CONTROL_TOPICS + 1, "one name for each topic");
+
+enum { PUSH_MAX = 2048 };
+
+static void push(const struct control_sub *s, const cJSON *event)
+{
+    char line[PUSH_MAX];
+    const struct control_bench *b = s->control->bench;
+    /* cJSON_PrintPreallocated() has the type of a tree it changes; it does not change it. */
+    if (cJSON_PrintPreallocated((cJSON *)(uintptr_t)event, line, sizeof line, 0)) b->push(b->ctx, s->client, line);
+}
+
+void control_tell(struct control *c, enum control_topic topic, cJSON *event)
+{
+    for (unsigned i = 0; i < CONTROL_SUBS_MAX; i++) {
+        const struct control_sub *s = &c->watch.sub[i];
+        if (s->control && s->topic == topic) push(s, event);
+    }
+    cJSON_Delete(event);
+}
+
+static bool anybody(const struct control *c, enum control_topic topic)
+{
+    for (unsigned i = 0; i < CONTROL_SUBS_MAX; i++) {
+        if (c->watch.sub[i].control && c->watch.sub[i].topic == topic) return true;
+    }
+    return false;
+}
+
+/* ---- the boards' events */
+
+static void on_event(void *ctx, enum psa2_event e, int64_t t_ns)
+{
+    const struct control_ear *ear = ctx;
+    struct control *c = ear->control;
+    struct control_until *u = &c->watch.until;
+    if (anybody(c, CONTROL_EVENTS)) {
+        cJSON *event = cJSON_CreateObject();
+        cJSON_AddStringToObject(event, "event", control_events[e]);
+        cJSON_AddStringToObject(event, "unit", c->bench->unit_name[ear->unit]);
+        cJSON_AddNumberToObject(event, "t_ns", (double)t_ns);
+        control_tell(c, CONTROL_EVENTS, event);
+    }
+    if (!u->active || u->reached || e != u->event || ear->unit != u->unit) return;
+    u->reached = ++u->seen == u->count;
+    if (u->reached) c->bench->run_stop(c->bench->ctx);
+}
+
+/* Listens as long as somebody wants to know. */
+static void refresh_ears(struct control *c)
+{
+    struct control_watch *w = &c->watch;
+    const bool wanted = w->until.active || anybody(c, CONTROL_EVENTS);
+    if (wanted == w->listening) return;
+    w->listening = wanted;
+    for (unsigned i = 0; i < c->bench->units; i++) {
+        struct control_ear *ear = &w->ear[i];
+        if (!wanted) {
+            unit_unlisten(c->bench->unit[i], &ear->listener);
+            continue;
+        }
+        *ear = (struct control_ear){.listener = {.fn = on_event, .ctx = ear}, .control = c, .unit = i};
+        unit_listen(c->bench->unit[i], &ear->listener);
+    }
+}
+
+void control_watch_until(struct control *c, enum psa2_event event, unsigned unit, uint64_t count)
+{
+    c->watch.until = (struct control_until){.active = true, .event = event, .unit = unit, .count = count};
+    refresh_ears(c);
+}
+
+struct control_until control_watch_end(struct control *c)
+{
+    const struct control_until was = c->watch.until;
+    c->watch.until = (struct control_until){0};
+    refresh_ears(c);
+    return was;
+}
+
+/* ---- subscriptions */
+
+static void on_status(void *ctx, int64_t t_ns)
+{
+    struct control_sub *s = ctx;
+    cJSON *event = cJSON_CreateObject();
+    cJSON_AddStringToObject(event, "event", "status");
+    cJSON_AddNumberToObject(event, "t_ns", (double)t_ns);
+    describe_status(s->control->bench, event, t_ns);
+    push(s, event);
+    cJSON_Delete(event);
+    sched_at(s->control->bench->sched, &s->ev, t_ns + s->every_ns);
+}
+
+static struct control_sub *find(struct control *c, const void *client, enum control_topic topic)
+{
+    struct control_sub *room = NULL;
+    for (unsigned i = 0; i < CONTROL_SUBS_MAX; i++) {
+        struct control_sub *s = &c->watch.sub[i];
+        if (s->control && s->client == client && s->topic == topic) return s;
+        if (!s->control && !room) room = s;
+    }
+    return room;
+}
+
+bool control_subscribe(struct control *c, void *client, enum control_topic topic, int64_t every_ns, int64_t t_ns)
+{
+    struct control_sub *s = find(c, client, topic);
+    if (!s) return false;
+    if (!s->control) {
+        *s = (struct control_sub){.control = c, .client = client, .topic = topic};
+        sched_ev(&s->ev, on_status, s);
+    }
+    s->every_ns = every_ns;
+    if (topic == CONTROL_STATUS) sched_at(c->bench->sched, &s->ev, t_ns + every_ns);
+    refresh_ears(c);
+    return true;
+}
+
+void control_unsubscribe(struct control *c, void *client, enum control_topic topic)
+{
+    struct control_sub *s = find(c, client, topic);
+    if (!s || !s->control) return;
+    sched_cancel(c->bench->sched, &s->ev);
+    s->control = NULL;
+    refresh_ears(c);
+}
+
+void control_gone(struct control *c, void *client)
+{
+    for (int topic = 0; topic < CONTROL_TOPICS; topic++) control_unsubscribe(c, client, (enum control_topic)topic);
+}
+
+/* ---- lines */
+
+static void ignore_steps(void *ctx, const struct trace_step *s, unsigned n)
+{
+    (void)ctx;
+    (void)s;
+    (void)n;
+}
+
+uint32_t control_lines(struct control *c, unsigned unit, int64_t t_ns)
+{
+    struct trace *t = &c->bench->unit[unit]->board.trace;
+    struct control_watch *w = &c->watch;
+    if (!w->probing[unit]) {
+        w->probing[unit] = true;
+        w->probe[unit] = (struct trace_sink){.mask = (UINT32_C(1) << PSA2_LINES) - 1, .steps = ignore_steps};
+        trace_attach(t, &w->probe[unit]);
+    }
+    if (t->filter) return t->filter->level; /* a faulty line is known as far as it was delivered: TRACE_LAG_NS ago */
+    uint32_t level = t->level;
+    for (unsigned i = t->first; i < t->first + t->pending_count && t->pending[i].t_ns <= t_ns; i++) {
+        const struct trace_step *s = &t->pending[i];
+        level = (level & ~s->lines) | (s->level & s->lines);
+    }
+    return level;
+}

@@ -1,0 +1,74 @@
+/* What happens on the bench, told as it happens: `run.until` waits for an event of a board, subscribers get a line for each.
+ *
+ *   {"event":"DRD_A","unit":"a","t_ns":20000000}
+ *   {"event":"status","t_ns":20000000,"pace":"wall",...}
+ *   {"event":"fault","t_ns":20000000,"id":1,"kind":"line.stuck","point":"a.line.INT","state":"active"}
+ *
+ * Boards compute events only while somebody listens; listening changes nothing else. One thread. */
+#ifndef PSABENCH_CONTROL_WATCH_H
+#define PSABENCH_CONTROL_WATCH_H
+
+#include "base/sched.h"
+#include "control/view.h"
+
+#define CONTROL_SUBS_MAX 32u
+
+struct control;
+
+/* The names of the boards' events, in the order of enum psa2_event, up to NULL. */
+extern const char *const control_events[];
+
+enum control_topic { CONTROL_STATUS, CONTROL_EVENTS, CONTROL_FAULTS, CONTROL_TOPICS };
+
+extern const char *const control_topics[]; /* their names, up to NULL */
+
+struct control_sub {
+    struct control *control; /* NULL: free */
+    void *client;
+    enum control_topic topic;
+    int64_t every_ns; /* of status */
+    struct sched_ev ev;
+};
+
+struct control_ear {
+    struct unit_listener listener;
+    struct control *control;
+    unsigned unit;
+};
+
+struct control_until {
+    bool active, reached;
+    enum psa2_event event;
+    unsigned unit;
+    uint64_t count, seen;
+};
+
+struct control_watch { /* read-only outside watch.c */
+    struct control_sub sub[CONTROL_SUBS_MAX];
+    struct control_ear ear[CONTROL_UNITS_MAX];
+    bool listening;
+    struct control_until until;
+    struct trace_sink probe[CONTROL_UNITS_MAX]; /* keeps the lines of a unit alive once somebody has looked at them */
+    bool probing[CONTROL_UNITS_MAX];
+};
+
+/* run.until: the bench's run_stop() is called at the very instant of the count-th event from now on. */
+void control_watch_until(struct control *c, enum psa2_event event, unsigned unit, uint64_t count);
+
+/* The run is over: what came, and nobody waits any more. */
+struct control_until control_watch_end(struct control *c);
+
+/* False: there is no room, or the client has that topic already and its interval was changed instead (true). */
+bool control_subscribe(struct control *c, void *client, enum control_topic topic, int64_t every_ns, int64_t t_ns);
+void control_unsubscribe(struct control *c, void *client, enum control_topic topic);
+
+/* A fault began or ended; its members (id, kind, point, state) are added to the event, which is taken over. */
+void control_tell(struct control *c, enum control_topic topic, struct cJSON *event);
+
+/* The client has gone: its subscriptions and its run with it. */
+void control_gone(struct control *c, void *client);
+
+/* Levels of a unit's lines now, bit per line. From the first call on they are watched: what went on then may be missed. */
+uint32_t control_lines(struct control *c, unsigned unit, int64_t t_ns);
+
+#endif
