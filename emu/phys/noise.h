@@ -1,14 +1,14 @@
-/* Slow noise of a sensor, in the sensor's unit u (V, A, rad/s): the terms of IEEE Std 952, each with its Allan deviation over
- * an averaging time tau (sources 5.4).
+/* Slow noise of a sensor, in the sensor's unit u (V, A, rad/s): terms of IEEE Std 952, each with its Allan deviation over an
+ * averaging time tau (sources 5.4).
  *
- *   bias instability B    sqrt(2 ln 2 / pi) B = 0.664 B     flicker, PSD B^2 / (2 pi f), two-sided
+ *   bias instability B    sqrt(2 ln 2 / pi) B = 0.664 B     flicker, two-sided PSD B^2 / (2 pi f)
  *   random walk K         K sqrt(tau / 3)
  *   ramp R                R tau / sqrt(2)
- *   quantum q             q sqrt(n) / (tau sqrt(12))-like   the output is a multiple of q
  *
- * White noise is the sensor's own (mems.h), since it depends on how long one look at the sensor takes; these do not. Flicker is
- * a sum of Gauss-Markov processes whose times lie a factor of 5 apart, flat within 1 % from 1 s to 5000 s. Walk and flicker
- * move in steps of 10 ms counted from t = 0, so that nobody changes them by looking. Plain struct, one thread. */
+ * and the quantum of the output, which adds q^2 / 12 to each look if there is noise to cover a step. White noise is the
+ * sensor's own (mems.h): it depends on how long a look takes; these do not. Flicker is a sum of Gauss-Markov processes whose
+ * times lie a factor of 5 apart, flat within 3 % from 1 s to 300 s. Walk and flicker move in steps of 10 ms counted from
+ * t = 0, so that nobody changes them by looking. Plain struct, one thread. */
 #ifndef PSABENCH_PHYS_NOISE_H
 #define PSABENCH_PHYS_NOISE_H
 

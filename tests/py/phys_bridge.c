@@ -182,6 +182,7 @@ EXPORT void bridge_noise(const double terms[5], uint64_t seed, int64_t dt_ns, un
     const double still[3] = {0.0, 0.0, 0.0};
     struct mems m;
     mems_init(&m, &c, rng_stream(seed, 1, "mems.x"));
+    (void)mems_out_v(&m, still, 0); /* the first look is taken as one of a converter's block */
     for (unsigned i = 0; i < n; i++) out[i] = mems_out_v(&m, still, (int64_t)(i + 1) * dt_ns);
 }
 
@@ -192,4 +193,44 @@ EXPORT void bridge_slow(const double terms[3], uint64_t seed, int64_t dt_ns, uns
     struct noise noise;
     noise_init(&noise, &c, rng_stream(seed, 1, "slow"));
     for (unsigned i = 0; i < n; i++) out[i] = noise_slow_u(&noise, (int64_t)(i + 1) * dt_ns);
+}
+
+EXPORT struct supply *bridge_supply(double slew_v_per_s)
+{
+    struct supply *s = malloc(sizeof *s);
+    struct supply_cfg c = supply_default();
+    c.present = true;
+    c.slew_v_per_s = slew_v_per_s;
+    if (s) supply_init(s, &c);
+    return s;
+}
+
+EXPORT void bridge_supply_free(struct supply *s)
+{
+    free(s);
+}
+
+EXPORT int bridge_supply_set(struct supply *s, double volt_v, int64_t t_ns)
+{
+    return (int)supply_set(s, volt_v, t_ns);
+}
+
+EXPORT int bridge_supply_ripple(struct supply *s, double amplitude_v, double hz, int64_t t_ns)
+{
+    return (int)supply_ripple(s, amplitude_v, hz, t_ns);
+}
+
+EXPORT int bridge_supply_dip(struct supply *s, double drop_v, int64_t from_ns, int64_t for_ns)
+{
+    return (int)supply_dip(s, drop_v, from_ns, for_ns, 0);
+}
+
+EXPORT double bridge_supply_volts(const struct supply *s, int64_t t_ns)
+{
+    return supply_volts(s, t_ns);
+}
+
+EXPORT int64_t bridge_supply_next(const struct supply *s, int fed, int64_t from_ns)
+{
+    return supply_next_ns(s, fed != 0, from_ns);
 }

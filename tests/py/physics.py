@@ -39,6 +39,13 @@ SIGNATURES: dict[str, tuple[object, list[object]]] = {
     "oven_set": (ctypes.c_int, [LAB, ctypes.c_double, T_NS]),
     "oven_ramp": (ctypes.c_int, [LAB, ctypes.c_double, T_NS]),
     "oven_degc": (None, [LAB, T_NS, DOUBLES]),
+    "supply": (LAB, [ctypes.c_double]),
+    "supply_free": (None, [LAB]),
+    "supply_set": (ctypes.c_int, [LAB, ctypes.c_double, T_NS]),
+    "supply_ripple": (ctypes.c_int, [LAB, ctypes.c_double, ctypes.c_double, T_NS]),
+    "supply_dip": (ctypes.c_int, [LAB, ctypes.c_double, T_NS, T_NS]),
+    "supply_volts": (ctypes.c_double, [LAB, T_NS]),
+    "supply_next": (T_NS, [LAB, ctypes.c_int, T_NS]),
     "noise": (None, [DOUBLES, ctypes.c_uint64, T_NS, ctypes.c_uint, DOUBLES]),
     "slow": (None, [DOUBLES, ctypes.c_uint64, T_NS, ctypes.c_uint, DOUBLES]),
 }
