@@ -15,17 +15,16 @@ Everything raises `errors.BenchError` or one of its kinds when the bench is at f
 
 from typing import TYPE_CHECKING
 
-__all__ = ["Bench", "Rig", "open_rig"]
+__all__ = ["Bench"]
 
 if TYPE_CHECKING:
     from psabench.bench import Bench
-    from psabench.rig import Rig, open_rig
 else:
 
     def __getattr__(name: str) -> object:
         """Loaded when asked for: `psa-emu` and `psabench.chips` start at once, without NumPy and python-can."""
         if name not in __all__:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        from psabench import bench, rig
+        from psabench import bench
 
-        return getattr(bench if name == "Bench" else rig, name)
+        return getattr(bench, name)

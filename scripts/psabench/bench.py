@@ -109,13 +109,13 @@ class Bench:
         pace: "step" (time moves when we wait, as fast as it can) or "wall" (real time). can: psa-emu's own --can.
         extra: further arguments of psa-emu. Raises BadInput or BenchError with the emulator's own words.
         """
-        emulator = Emulator(scenario, cans=[can], pace=pace, seed=seed, truth=True, extra=extra)
+        emulator = Emulator(scenario, cans=[can], pace=pace, seed=seed, truth=True, scpi=True, extra=extra)
         return cls._of(emulator, node)
 
     @classmethod
     def restore(cls, path: str | Path, *, pace: str = "step", can: str = "socketcand:0") -> Bench:
         """Start an emulator from a snapshot. Raises BadInput for a file that is damaged or of another version."""
-        emulator = Emulator(cans=[can], pace=pace, truth=True, extra=["--restore", path])
+        emulator = Emulator(cans=[can], pace=pace, truth=True, scpi=True, extra=["--restore", path])
         return cls._of(emulator, None)
 
     @classmethod

@@ -15,6 +15,7 @@ from typing import Any
 from psabench import decode, grading, record, report, run
 from psabench.can_host import open_bus
 from psabench.errors import BadInput, BenchError
+from psabench.instruments import EXAMPLES
 from psabench.lineport import LineFormat
 from psabench.procedures import PROCEDURES
 from psabench.progress import Bar
@@ -47,7 +48,7 @@ examples:
   psabench run all                        every procedure, quiet and realistic, on an emulator started for it
   psabench run reversal --realisations 2  a shorter reversal
   psabench run fourier --scenario my.yaml --average 32
-  psabench run turns --can socketcand:127.0.0.1:29536 --control /tmp/psa.ctl   against a bench that is already there
+  psabench run turns --can slcan:/dev/ttyACM0 --head TCPIP::192.0.2.7::5025::SOCKET   on the bench at these addresses
 
 Ctrl-C ends a run; the readings taken so far stay in OUT/PROCEDURE-CONDITION.csv. Exit status 1: something measured
 misses the truth by more than its limits.
@@ -128,8 +129,9 @@ def _add_run(commands: Any) -> None:
     p.add_argument("--condition", choices=[*run.CONDITIONS, "both"], default="both", help="which reading (%(default)s)")
     p.add_argument("--scenario", type=Path, help="scenario for the emulator, instead of the conditions' own")
     p.add_argument("--can", help=CAN_HELP)
-    p.add_argument("--control", type=Path, help="control socket of a bench that is already there")
-    p.add_argument("--truth", type=Path, help="truth socket of that bench, asked after the run to grade it")
+    p.add_argument("--head", metavar="VISA-ADDRESS", help=f"the dividing head, real or emulated: {EXAMPLES}")
+    p.add_argument("--control", type=Path, help="control socket of an emulator in step pace, to move its time")
+    p.add_argument("--truth", type=Path, help="truth socket of an emulator, asked after the run to grade it")
     p.add_argument("--node", type=node_id, default=DBC_NODE, help="CANopen node of the unit (%(default)s)")
     p.add_argument("--average", type=natural, help="samples in a reading; 0: whole 32-bit words by SDO")
     p.add_argument("--gravity", type=positive, metavar="M/S2", help=f"local g, m/s^2 (the scenario's, else {G_MPS2})")
@@ -251,6 +253,7 @@ def _run(args: argparse.Namespace) -> int:
         out=args.out,
         conditions=list(run.CONDITIONS) if args.condition == "both" else [args.condition],
         can=args.can,
+        head=args.head,
         control=args.control,
         truth=args.truth,
         scenario=args.scenario,

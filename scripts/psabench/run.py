@@ -1,28 +1,28 @@
 """`psabench run`: procedures over the wire, graded and reported.
 
 Without --can it starts the emulator itself, once per reading of the article: quiet (the reading in which the printed
-figures can be reproduced) and realistic (what the same procedure finds with honest noise). With --can it runs against
-whatever is there.
+figures can be reproduced) and realistic (what the same procedure finds with honest noise). With --can and --head
+it runs against whatever is there.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager, ExitStack
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from psabench import report
-from psabench.control import read_truth
+from psabench.bench import Bench
 from psabench.errors import BadInput
 from psabench.grading import Section
+from psabench.instruments import EXAMPLES
 from psabench.procedures import PROCEDURES, Procedure
 from psabench.procedures.head_bench import Progress, Watch
 from psabench.procedures.result import ProcedureResult
 from psabench.protocol_files import DBC_NODE
 from psabench.recording import CsvRecorder
-from psabench.rig import Rig, connect, open_rig
 from psabench.wire_bench import G_MPS2, WireBench
 
 SITE_G_MPS2 = 9.8094  # of the scenarios that the conditions use: an operator knows the gravity of the laboratory
@@ -80,7 +80,8 @@ class RunOptions:
     out: Path
     conditions: Sequence[str] = ("quiet", "realistic")
     can: str | None = None  # python-can spec of a bench that is already there
-    control: Path | None = None
+    head: str | None = None  # VISA address of that bench's dividing head
+    control: Path | None = None  # of an emulator in step pace: moves its time
     truth: Path | None = None
     scenario: Path | None = None  # instead of the conditions' own
     node: int = DBC_NODE
@@ -103,7 +104,7 @@ def run(options: RunOptions, progress: Progress) -> tuple[Path, list[Section]]:
 
 
 def _conditions(options: RunOptions) -> list[Condition]:
-    if options.can or options.scenario:
+    if options.can or options.head or options.scenario:
         average = 16 if options.average is None else options.average
         return [Condition(label="", scenario=str(options.scenario or ""), average=average, about="", g_mps2=G_MPS2)]
     return [CONDITIONS[c] for c in options.conditions]
@@ -115,20 +116,23 @@ def _one(procedure: Procedure, condition: Condition, options: RunOptions, progre
     g_mps2 = condition.g_mps2 if options.g_mps2 is None else options.g_mps2
     stem = "-".join(x for x in (procedure.name, condition.label) if x)
     with ExitStack() as stack:
-        rig = stack.enter_context(_rig(condition, options))
-        bench = WireBench(rig.unit, rig.control, average=average, g_mps2=g_mps2)
+        bench = stack.enter_context(_bench(condition, options))
+        on_head = WireBench(bench.unit, bench.head, average=average, g_mps2=g_mps2)
         recorder = stack.enter_context(CsvRecorder(options.out / f"{stem}.csv"))
-        result = procedure.run(bench, params, Watch(progress=progress, record=recorder))
-        truth = _axis_truth(read_truth(rig.truth_path), params.axis) if rig.truth_path else None
+        result = procedure.run(on_head, params, Watch(progress=progress, record=recorder))
+        truth = _axis_truth(bench.truth(), params.axis) if bench.truth_path else None
     return Section(label=condition.label, result=result, truth=truth, allowance=allowance(result, average))
 
 
-def _rig(condition: Condition, options: RunOptions) -> AbstractContextManager[Rig]:
-    if options.can:
-        return connect(options.can, options.control, options.truth, options.node)
+def _bench(condition: Condition, options: RunOptions) -> Bench:
+    if options.can or options.head:
+        if options.head is None:
+            raise BadInput(f"--head is missing: the VISA address of the dividing head, such as {EXAMPLES}")
+        there = {"head": options.head}
+        return Bench.connect(options.can, scpi=there, control=options.control, truth=options.truth, node=options.node)
     scenario = options.scenario or condition.scenario
     pace = "wall" if options.real_time else "step"
-    return open_rig(scenario, pace=pace, seed=options.seed, node=options.node)
+    return Bench.start(scenario, pace=pace, seed=options.seed, node=options.node)
 
 
 def make_params(procedure: Procedure, given: Mapping[str, Any]) -> Any:
@@ -147,6 +151,7 @@ def _axis_truth(truth: Mapping[str, Any], axis: str) -> Mapping[str, float]:
 
 
 def _facts(options: RunOptions) -> dict[str, str]:
-    where = options.can or str(options.scenario or ", ".join(CONDITIONS[c].scenario for c in options.conditions))
+    there = " ".join(x for x in (options.can, options.head) if x)
+    where = there or str(options.scenario or ", ".join(CONDITIONS[c].scenario for c in options.conditions))
     seed = "of the scenario" if options.seed is None else str(options.seed)
     return {"bench": where, "seed": seed, "pace": "real time" if options.real_time else "simulated time"}

@@ -1,28 +1,28 @@
-"""The bench of the procedures over the wire: the board over CAN, the dividing head over the control socket."""
+"""The bench of the procedures over the wire: the board over CAN, the dividing head over SCPI."""
 
 from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
 
-from psabench.control import Control
 from psabench.device import SETTLE_PERIODS, Psa2
 from psabench.face import Face
+from psabench.instruments import Head
 
 G_MPS2 = 9.80665  # standard gravity (CGPM 1901); the site's own value is the user's to give
 
 
 class WireBench:
-    """A `psabench.bench.Bench`.
+    """A `procedures.head_bench.HeadBench` of a unit and the head that it is mounted on.
 
     average: settled samples in one reading, from the stream of 24-bit codes; 0: one whole 32-bit conversion word by
     SDO, for boards whose profile reads 32 bits.
     """
 
-    def __init__(self, unit: Psa2, control: Control, *, average: int = 1, g_mps2: float = G_MPS2) -> None:
+    def __init__(self, unit: Psa2, head: Head, *, average: int = 1, g_mps2: float = G_MPS2) -> None:
         self.g_mps2 = g_mps2
         self._unit = unit
-        self._control = control
+        self._head = head
         self._average = average
         unit.wait_ready()
         self._period_s = 1.0 / unit.data_hz
@@ -34,22 +34,17 @@ class WireBench:
         return self._unit.host.clock.now_s()
 
     def turn(self, angle_deg: float) -> float:
-        """Head to angle_deg; the time it takes to get there passes."""
-        moved = self._control.call("head.turn", angle_deg=angle_deg).result
-        return self._rest(float(moved["rest_in_s"]))
+        """Head to angle_deg; the time it takes to get there passes. Returns its scale, deg."""
+        return self._rested(self._head.turn(angle_deg))
 
     def mount(self, face: Face) -> None:
         """Put the unit on the head's mount with this face."""
-        moved = self._control.call("head.mount", face=face.value).result
-        self._rest(float(moved["rest_in_s"]))
+        self._rested(self._head.mount(face))
 
-    def _rest(self, rest_in_s: float) -> float:
-        """Wait until the head stands still; its scale, deg."""
-        while rest_in_s > 0.0:
-            self.wait(rest_in_s)
-            rest_in_s = float(self._control.call("head.read").result["rest_in_s"])
+    def _rested(self, scale_deg: float) -> float:
+        """The head has come to rest just now: the filters settle from here."""
         self._settled_at_s = self.t_s + self._settle_s
-        return float(self._control.call("head.read").result["angle_deg"])
+        return scale_deg
 
     def wait(self, dwell_s: float) -> None:
         if dwell_s > 0.0:

@@ -7,13 +7,15 @@ import os
 import socket
 import subprocess
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
 import pytest
+from psabench.bench import bus_spec as bus_spec  # for the tests that take it from here
+from psabench.bench import bus_specs, scpi_addresses
 from psabench.can_host import CanHost
 from psabench.control import Control
 from psabench.device import Psa2
@@ -82,14 +84,11 @@ class Rig:
         return clients
 
 
-def bus_spec(endpoint: Mapping[str, str]) -> str:
-    """How python-can opens a CAN endpoint of the emulator."""
-    kind = endpoint["can"]
-    if kind == "socketcand":
-        return f"socketcand:{endpoint['host']}:{endpoint['port']}"
-    if kind == "slcan":
-        return f"slcan:{endpoint['pty']}"
-    return f"socketcan:{endpoint['channel']},fd=true,receive_own_messages=false"
+def addresses(emulator: Emulator) -> tuple[str, ...]:
+    """Where an emulator's bus, head and control socket are, as options of `psabench run`."""
+    can = bus_specs(emulator.endpoints)[0]
+    head = scpi_addresses(emulator.endpoints)["head"]
+    return "--can", can, "--head", head, "--control", str(emulator.control_path)
 
 
 def tool_env(spec: str) -> dict[str, str]:

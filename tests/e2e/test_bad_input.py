@@ -186,10 +186,16 @@ def test_a_full_disk_ends_the_trace_and_not_the_run(for_time: str) -> None:
     ("args", "status", "says"),
     [
         ("run frobnicate", 2, "no such procedure; turns, fourier, reversal or all"),
-        ("run fourier --can socketcand:127.0.0.1:{port}", 2, "--control is missing"),
+        ("run fourier --can socketcand:127.0.0.1:{port}", 2, "--head is missing: the VISA address"),
         ("run fourier --positions 1 --condition quiet --out {dir}", 2, "fourier: "),
         ("run fourier --scenario {dir}/no.yaml --out {dir}", 2, "no.yaml: no such file"),
-        ("run fourier --can socketcand:127.0.0.1:{port} --control {dir}/no --out {dir}", 3, "is psa-emu running"),
+        (
+            "run fourier --can socketcand:127.0.0.1:{port} --head {head} --control {dir}/no --out {dir}",
+            3,
+            "is psa-emu running",
+        ),
+        ("run fourier --can socketcand:127.0.0.1:{port} --head {head} --out {dir}", 3, "is the instrument switched on"),
+        ("run fourier --can socketcand:127.0.0.1:{port} --head lab7 --out {dir}", 2, "expected a VISA address"),
         ("record --can socketcand:127.0.0.1:{dead} {dir}/x.log", 3, "Connection refused; is psa-emu running there?"),
         ("record --can socketcand:127.0.0.1 {dir}/x.log", 2, "expected socketcand:HOST:PORT"),
         ("record --can frobnicate:x {dir}/x.log", 2, "frobnicate"),
@@ -213,6 +219,7 @@ def test_a_command_that_cannot_be_carried_out_is_refused_in_one_line(
             "file": tmp_path / "bad.log",
             "port": rig.emulator.endpoints[0]["port"],
             "dead": unused.getsockname()[1],
+            "head": f"TCPIP::127.0.0.1::{unused.getsockname()[1]}::SOCKET",
         }
         with psabench(*args.format(**names).split()) as command:
             try:

@@ -19,7 +19,7 @@ from psabench.device import Psa2
 from psabench.emulator import Emulator
 from psabench.recording import load_csv
 from psabench.vcd import read_vcd
-from rig import HOST, PATIENCE_S, MakeRig, one_line, psabench, talker, until
+from rig import HOST, PATIENCE_S, MakeRig, addresses, one_line, psabench, talker, until
 
 # ---- who vanishes, does not read, or sends too much
 
@@ -197,9 +197,9 @@ def test_ctrl_c_in_a_calibration_keeps_its_readings_and_ends_its_emulator(tmp_pa
 
 @HOST
 def test_a_bench_that_was_interrupted_can_be_used_again(make_rig: MakeRig, tmp_path: Path) -> None:
-    rig = make_rig("socketcand", "quiet")
+    rig = make_rig("socketcand", "quiet", extra=["--scpi", "head:0"])
     rig.host.close()
-    there = ("--can", rig.spec, "--control", str(rig.emulator.control_path), "--average", "0", "--out", tmp_path)
+    there: tuple[str | Path, ...] = (*addresses(rig.emulator), "--average", "0", "--out", tmp_path)
     with psabench("run", "fourier", *there, "--realisations", "500") as first:
         try:
             until(lambda: rows(tmp_path / "fourier.csv") > 30, "some readings")
@@ -218,9 +218,9 @@ def test_a_bench_that_was_interrupted_can_be_used_again(make_rig: MakeRig, tmp_p
 
 @HOST
 def test_an_emulator_that_dies_in_a_calibration_is_told_in_one_line(make_rig: MakeRig, tmp_path: Path) -> None:
-    rig = make_rig("socketcand", "quiet")
+    rig = make_rig("socketcand", "quiet", extra=["--scpi", "head:0"])
     rig.host.close()
-    there = ("--can", rig.spec, "--control", str(rig.emulator.control_path), "--average", "0", "--out", tmp_path)
+    there: tuple[str | Path, ...] = (*addresses(rig.emulator), "--average", "0", "--out", tmp_path)
     with psabench("run", "fourier", *there, "--realisations", "500") as run:
         try:
             until(lambda: rows(tmp_path / "fourier.csv") > 30, "some readings")

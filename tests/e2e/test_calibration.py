@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from psabench import open_rig
+from psabench import Bench
 from psabench.estimate.uncertainty import Estimate
 from psabench.grading import ARTICLE, as_printed
 from psabench.procedures.fourier import FourierParams, estimate_fourier, fourier
@@ -96,9 +96,9 @@ def test_realistic_reversal_finds_alpha0_and_ky(report: Found) -> None:
 def run_once(tmp_path: Path, seed: int, noise_v: float, params: FourierParams | ReversalParams) -> ProcedureResult:
     scenario = tmp_path / f"{seed}.yaml"
     scenario.write_text(SCENARIO.format(seed=seed, noise_v=noise_v))
-    with open_rig(scenario) as rig:
-        bench = WireBench(rig.unit, rig.control, average=0 if isinstance(params, FourierParams) else 1)
-        return fourier(bench, params) if isinstance(params, FourierParams) else reversal(bench, params)
+    with Bench.start(scenario) as bench:
+        on_head = WireBench(bench.unit, bench.head, average=0 if isinstance(params, FourierParams) else 1)
+        return fourier(on_head, params) if isinstance(params, FourierParams) else reversal(on_head, params)
 
 
 def alpha0(result: ProcedureResult) -> Estimate:

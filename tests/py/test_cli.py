@@ -17,7 +17,7 @@ MISTAKES: list[tuple[str, str]] = [
     ("run turns --positions 80", "--positions: turns has no such parameter; it has --axis"),
     ("run all --axis w", "turns: axis is 'w'; it must be x, y or z"),
     ("run turns --out /dev/null/x", "/dev/null/x: "),
-    ("run turns --can socketcand:127.0.0.1:1", "--control is missing"),
+    ("run turns --can socketcand:127.0.0.1:1", "--head is missing"),
     ("decode nothing.log", "nothing.log: no such file"),
     ("decode README.md", "README.md: ending .md; python-can reads"),
     ("decode --line nothing.bin", "nothing.bin: no such file"),

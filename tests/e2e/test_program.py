@@ -1,0 +1,172 @@
+"""`psabench.Bench`: the same script over every transport and with every address; time that moves only when told."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import astuple
+from pathlib import Path
+
+import pytest
+from psabench import Bench
+from psabench.emulator import Emulator
+from psabench.errors import BadInput, BenchError, ControlError, InstrumentError
+from psabench.face import Face
+from psabench.procedures.head_bench import Reading
+from psabench.procedures.result import ProcedureResult
+from psabench.procedures.turns import TurnsParams, turns
+from psabench.wire_bench import WireBench
+from rig import ADAPTERS, BENCH, HOST, PATIENCE_S, addresses, over, psabench
+
+EVERY = over("socketcand", "slcan", "vcan")
+SHORT = TurnsParams(readings=2)
+
+
+def calibrate(bench: Bench) -> ProcedureResult:
+    """The script: it knows a unit and a head, and nothing of how they are reached."""
+    return turns(WireBench(bench.unit, bench.head, average=4), SHORT)
+
+
+def exactly(readings: tuple[Reading, ...]) -> list[tuple[object, ...]]:
+    return [astuple(r) for r in readings]
+
+
+@pytest.fixture
+def bench() -> Iterator[Bench]:
+    with Bench.start(BENCH) as b:
+        yield b
+
+
+# ---- the same script everywhere
+
+
+@EVERY
+def test_in_lockstep_a_calibration_is_the_same_to_the_bit_over_every_transport(transport: str) -> None:
+    with Bench.start("calibrate", can="socketcand:0") as b:
+        want = calibrate(b)
+    with Bench.start("calibrate", can=ADAPTERS[transport]) as b:
+        got = calibrate(b)
+    assert exactly(got.readings) == exactly(want.readings)
+    assert [e.value for e in got.estimates] == [e.value for e in want.estimates]
+
+
+@EVERY
+def test_in_real_time_the_same_script_finds_the_same_sensor(transport: str) -> None:
+    with Bench.start(BENCH, pace="wall", can=ADAPTERS[transport]) as b:
+        got = calibrate(b)
+        truth = next(iter(b.truth()["units"].values()))["axes"]["x"]
+    for name in ("u0_v", "kx_v_per_g"):
+        assert got.get(name).value == pytest.approx(truth[name], abs=2e-3), name
+
+
+@HOST
+def test_instruments_on_a_pty_are_the_instruments_on_tcp() -> None:
+    with Bench.start("calibrate") as b:
+        want = calibrate(b)
+    extra = ["--scpi", "head:pty"]
+    with Emulator("calibrate", pace="step", extra=extra) as emulator:
+        e = emulator.endpoint(scpi="head")
+        head = f"ASRL{e['pty']}::INSTR"
+        can = emulator.endpoint(can="socketcand")
+        spec = f"socketcand:{can['host']}:{can['port']}"
+        with Bench.connect(spec, control=emulator.control_path, scpi={"head": head}) as b:
+            got = calibrate(b)
+    assert exactly(got.readings) == exactly(want.readings)
+
+
+@HOST
+def test_the_command_runs_on_a_bench_by_its_addresses(tmp_path: Path) -> None:
+    with Emulator(BENCH, pace="step", truth=True, scpi=True) as emulator:
+        where = addresses(emulator)
+        truth = ("--truth", str(emulator.truth_path))
+        with psabench("run", "turns", *where, *truth, "--average", "4", "--out", tmp_path) as run:
+            out, err = run.communicate(timeout=PATIENCE_S)
+    assert run.returncode == 0, out + err
+    section = json.loads((tmp_path / "result.json").read_text())["sections"][0]
+    assert section["procedure"] == "turns"
+    assert "within their limits of the truth" in out
+
+
+# ---- what is not there says why
+
+
+@HOST
+def test_a_bench_without_emulator_says_what_it_has_not() -> None:
+    with (
+        Emulator(BENCH, pace="wall") as emulator,
+        Bench.connect(f"socketcand:127.0.0.1:{emulator.endpoint(can='socketcand')['port']}") as b,
+    ):
+        b.unit.wait_ready()
+        assert b.unit.register("x", 1) == 0x56
+        assert b.pace == "real"
+        assert (b.status().late, b.status().temp_degc) == (None, None)
+        for name in ("head", "table", "chamber", "supply"):
+            with pytest.raises(BenchError, match=f"this bench has no {name}: no address was given for it"):
+                getattr(b, name)
+        for what in (lambda: b.faults.list(), lambda: b.probe.lines(), lambda: b.snapshot("x"), lambda: b.fork()):
+            with pytest.raises(BenchError, match="a real one has none, psa-emu has with --control"):
+                what()
+        with pytest.raises(BenchError, match="no truth port"):
+            b.truth()
+
+
+@HOST
+def test_an_address_for_what_is_no_instrument_is_bad_input() -> None:
+    with pytest.raises(BadInput, match="no such instrument: oven; there are head, table, chamber, supply"):
+        Bench.connect("none", scpi={"oven": "TCPIP::127.0.0.1::1::SOCKET"})
+
+
+@HOST
+def test_a_bench_without_bus_has_no_unit() -> None:
+    with Emulator(BENCH, pace="step") as emulator, Bench.connect("none", control=emulator.control_path) as b:
+        assert b.units == {}
+        b.run_for(0.5)
+        assert b.time_s == 0.5
+        with pytest.raises(BenchError, match="no unit"):
+            _ = b.unit
+        with pytest.raises(BenchError, match="without a CAN bus"):
+            _ = b.host
+
+
+@HOST
+def test_what_the_head_refuses_is_raised_where_it_was_asked(bench: Bench) -> None:
+    with pytest.raises(InstrumentError, match="head: ANGL 1000000") as refused:
+        bench.head.turn(1e6)
+    assert refused.value.number == -222
+    assert bench.head.turn(30.0) == pytest.approx(30.0, abs=1e-12)
+    assert bench.head.mount(Face.REVERSED) == bench.head.angle_deg
+    assert bench.head.face is Face.REVERSED
+    assert bench.head.identity.startswith("psabench,")
+
+
+# ---- time
+
+
+@HOST
+def test_two_units_on_one_bus_are_two_objects() -> None:
+    with Bench.start("multi") as b:
+        assert list(b.units) == ["a", "b"]
+        assert b.units["a"].node.node_id != b.units["b"].node.node_id
+        for unit in b.units.values():
+            unit.wait_ready()
+            assert len(unit.stream(5)) == 5
+
+
+# ---- looking, breaking, saving
+
+
+@HOST
+def test_a_fault_is_added_seen_and_cleared(bench: Bench) -> None:
+    bench.unit.wait_ready()
+    assert {"kind", "what", "points", "args"} <= set(bench.faults.kinds()[0])
+    assert "a.sensor.x" in bench.faults.points("sensor.bias")
+    assert "a.sensor.x" in bench.faults.points()
+    clean = bench.unit.stream(20).axis("x")
+    with bench.fault("sensor.bias", "a.sensor.x", bias_v=0.1) as fault:
+        bench.wait(0.1)
+        assert fault.state()["kind"] == "sensor.bias"
+        assert bench.unit.stream(20).axis("x").mean() - clean.mean() == pytest.approx(0.1, abs=1e-3)
+    bench.wait(0.1)
+    assert bench.unit.stream(20).axis("x").mean() == pytest.approx(clean.mean(), abs=1e-6)
+    with pytest.raises(ControlError, match="DRD"):
+        bench.fault("sensor.bias", "a.line.DRD_A", bias_v=0.1)
