@@ -48,6 +48,7 @@ struct ads1256 {
     struct ads1256_cfg cfg;
     struct ads1256_io io;
     struct ads1256_fault fault;
+    void (*tell_drdy)(void *ctx, bool level, int64_t t_ns); /* io.drdy, which tells nobody while DRDY is stuck */
     struct sched *sched;
     struct rng noise;
     struct clk clkin;

@@ -101,7 +101,7 @@ void ads1282_set_drdy(struct ads1282 *a, bool level, int64_t t_ns)
     a->drdy = level;
     a->pin.drdy_ns = t_ns;
     if (level) sched_cancel(a->sched, &a->pulse); /* nothing is left for it to do */
-    if (a->io.drdy && !a->fault.drdy) a->io.drdy(a->io.ctx, level, t_ns);
+    if (a->io.drdy) a->io.drdy(a->io.ctx, level, t_ns);
 }
 
 /* M70: high while the input is at or beyond full scale. Here: its newest sample. */

@@ -1,6 +1,7 @@
 #include "chip/ads1282_serial.h"
 
 #include <assert.h>
+#include <stddef.h>
 
 /* From the next edge on, which keeps its instant and its number. */
 static void set_clock(struct ads1282 *a, int64_t hz, int64_t t_ns)
@@ -19,9 +20,10 @@ void ads1282_fault(struct ads1282 *a, const struct ads1282_fault *f, int64_t t_n
     assert(f->clock_ppm >= -500000 && f->clock_ppm <= 500000);
     const bool drdy = ads1282_drdy(a);
     a->fault = *f;
+    a->io.drdy = f->drdy ? NULL : a->tell_drdy;
     set_clock(a, a->cfg.clk_hz + (int64_t)a->cfg.clk_hz * f->clock_ppm / 1000000, t_ns);
     ads1282_serial_stuck(a);
-    if (ads1282_drdy(a) != drdy && a->io.drdy) a->io.drdy(a->io.ctx, !drdy, t_ns);
+    if (ads1282_drdy(a) != drdy && a->tell_drdy) a->tell_drdy(a->io.ctx, !drdy, t_ns);
 }
 
 bool ads1282_flip(struct ads1282 *a, unsigned reg, uint8_t mask, int64_t t_ns)

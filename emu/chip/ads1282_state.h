@@ -45,6 +45,7 @@ struct ads1282 {
     struct ads1282_cfg cfg;
     struct ads1282_io io;
     struct ads1282_fault fault;
+    void (*tell_drdy)(void *ctx, bool level, int64_t t_ns); /* io.drdy, which is NULL while DRDY is stuck */
     struct sched *sched;
     struct ads1282_counters count;
     struct ads1282_limits limit;
