@@ -6,8 +6,8 @@
 #include <stdio.h>
 #include <string.h>
 
-const struct fault_table *const fault_tables[] = {&fault_sensor,     &fault_analog, &fault_chip,
-                                                  &fault_controller, &fault_line,   NULL};
+const struct fault_table *const fault_tables[] = {&fault_sensor, &fault_analog, &fault_chip,   &fault_controller,
+                                                  &fault_line,   &fault_link,   &fault_supply, NULL};
 
 const struct fault_kind *fault_kind(unsigned i)
 {
@@ -84,10 +84,10 @@ bool fault_fits(const struct control_bench *b, const struct fault *f, char *why)
 bool fault_values_fit(const struct fault *f, struct control_refusal *why)
 {
     const struct fault_kind *k = f->kind;
-    for (unsigned i = FAULT_FOR_S + 1; i < FAULT_ARGS; i++) {
+    for (unsigned i = FAULT_FOR_S; i < FAULT_ARGS; i++) {
         const char *name = fault_arg_name((enum fault_arg)i);
         const bool given = fault_given(f, (enum fault_arg)i);
-        if (given && !((k->need | k->may) & FAULT_BIT(i))) {
+        if (given && i != FAULT_FOR_S && !((k->need | k->may) & FAULT_BIT(i))) {
             return refuse(why, "argument", "%s: %s takes no such value", name, k->name);
         }
         if (!given && (k->need & FAULT_BIT(i))) {

@@ -7,7 +7,8 @@
 #define FAULT_BIT(i)  (UINT64_C(1) << (i))
 #define FAULT_PPM_MAX 500000.0 /* of a chip's clock */
 
-extern const struct fault_table fault_sensor, fault_analog, fault_chip, fault_controller, fault_line, fault_link;
+extern const struct fault_table fault_sensor, fault_analog, fault_chip, fault_controller, fault_line, fault_link,
+    fault_supply;
 
 static inline bool fault_given(const struct fault *f, enum fault_arg arg)
 {

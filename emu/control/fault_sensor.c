@@ -48,12 +48,20 @@ static double volts(const struct fault *f, enum fault_arg arg, double otherwise)
     return fault_given(f, arg) ? f->value[arg] * signal_per_v(fault_unit(f), f->point.index) : otherwise;
 }
 
+static double output_now(const struct fault *f, int64_t t_ns)
+{
+    struct unit *u = fault_unit(f);
+    const unsigned axis = f->point.index;
+    return sensor_fault_out(u->sensor_faults[axis], unit_sensor_v(u, axis, t_ns), t_ns);
+}
+
 /* Value and upper value of each kind, by enum sensor_fault_kind. */
 static bool apply_sensor(struct fault *f, int64_t t_ns)
 {
     const double infinite = (double)INFINITY;
+    struct unit *u = settled_unit(f, t_ns);
     const double values[SENSOR_FAULTS][2] = {
-        [SENSOR_STUCK] = {volts(f, FAULT_OUT_V, (double)NAN)},
+        [SENSOR_STUCK] = {volts(f, FAULT_OUT_V, output_now(f, t_ns))},
         [SENSOR_BIAS] = {volts(f, FAULT_BIAS_V, 0.0)},
         [SENSOR_DRIFT] = {volts(f, FAULT_DRIFT_V_PER_S, 0.0)},
         [SENSOR_SCALE] = {f->value[FAULT_SCALE_PPM] * 1e-6},
@@ -61,7 +69,6 @@ static bool apply_sensor(struct fault *f, int64_t t_ns)
         [SENSOR_SATURATION] = {volts(f, FAULT_LOW_V, -infinite), volts(f, FAULT_HIGH_V, infinite)},
     };
     const unsigned k = f->kind->variant;
-    struct unit *u = settled_unit(f, t_ns);
     f->as.sensor = (struct sensor_fault){.kind = (enum sensor_fault_kind)k,
                                          .value = values[k][0],
                                          .value_high = values[k][1],

@@ -26,10 +26,9 @@ void sensor_fault_remove(struct sensor_fault **list, struct sensor_fault *f)
 
 static double stuck(struct sensor_fault *f, double out, int64_t t_ns)
 {
-    if (!isnan(f->value)) return f->value;
-    if (f->held_ns < 0) f->held = out;
-    f->held_ns = t_ns;
-    return f->held;
+    (void)out;
+    (void)t_ns;
+    return f->value;
 }
 
 static double bias(struct sensor_fault *f, double out, int64_t t_ns)

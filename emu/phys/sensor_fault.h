@@ -1,8 +1,8 @@
 /* What goes wrong in a sensor: a list of faults, each working on the output of those added before it.
  *
  * The output is volts or amperes, as the sensor gives it, and so are the values. A fault is a plain struct of whoever
- * brings it about, linked in while it lasts; an empty list costs one comparison. Pure but for the noise's stream and the
- * value a stuck output was caught at. One thread. */
+ * brings it about, linked in while it lasts; an empty list costs one comparison. Pure but for the noise's stream. One
+ * thread. */
 #ifndef PSABENCH_PHYS_SENSOR_FAULT_H
 #define PSABENCH_PHYS_SENSOR_FAULT_H
 
@@ -12,7 +12,7 @@
 #include <stdint.h>
 
 enum sensor_fault_kind {
-    SENSOR_STUCK,      /* the output stays at value; at what it is at from_ns if value is NaN */
+    SENSOR_STUCK,      /* the output stays at value */
     SENSOR_BIAS,       /* value is added */
     SENSOR_DRIFT,      /* value per second is added, from from_ns on */
     SENSOR_SCALE,      /* the deviation from zero becomes (1 + value) times as large */
@@ -28,7 +28,7 @@ struct sensor_fault {
     int64_t from_ns; /* before it the sensor is well */
     struct rng noise;
     /* read-only outside sensor_fault.c */
-    double held;     /* noise of the present pull, or what a stuck output was caught at */
+    double held;     /* noise of the present pull */
     int64_t held_ns; /* of held; negative before the first pull */
     struct sensor_fault *next;
 };

@@ -127,6 +127,13 @@ enum supply_result supply_dip(struct supply *s, double deep_v, int64_t from_ns, 
     return SUPPLY_TOO_MANY_DIPS;
 }
 
+void supply_dip_end(struct supply *s, int64_t from_ns, int64_t t_ns)
+{
+    for (unsigned i = 0; i < SUPPLY_DIPS_MAX; i++) {
+        if (s->dip[i].from_ns == from_ns && s->dip[i].to_ns > t_ns) s->dip[i].to_ns = t_ns;
+    }
+}
+
 /* ---- crossings: between changes of the output and edges of dips the volts are a line and a sine. Between the instants at
  * which such a sum may turn it is monotone, and there the crossing is found by halving, to the nanosecond. */
 

@@ -92,7 +92,8 @@ static void init_unit(unsigned i)
 
 static int fresh(void **state)
 {
-    const struct lab_cfg lab = lab_default();
+    struct lab_cfg lab = lab_default();
+    lab.supply.present = true;
     (void)state;
     memset(&r, 0, sizeof r);
     sched_init(&r.s);
@@ -312,6 +313,13 @@ static void what_does_not_fit_is_refused_with_the_reason(void **state)
         {"{'kind':'chip.flip','point':'a.adc.x','register':1,'mask':1,'for_s':1}", "is over as soon as it is done"},
         {"{'kind':'line.missing_pulse','point':'a.line.Int','pulse':1}", "the line CLK does"},
         {"{'kind':'line.missing_pulse','point':'a.line.CLK','pulse':129}", "outside 1 ... 128"},
+        {"{'kind':'supply.brownout','point':'supply','drop_v':5}", "for_s is missing"},
+        {"{'kind':'supply.brownout','point':'supply','drop_v':2,'for_s':1}",
+         "not below the threshold of the boards, 9 V"},
+        {"{'kind':'supply.brownout','point':'a.can','drop_v':5,'for_s':1}", "which is the CAN node of a board"},
+        {"{'kind':'link.delay','point':'bus.can0'}", "hold_s is missing"},
+        {"{'kind':'link.stall','point':'client.2'}", "fault.points lists them"},
+        {"{'kind':'link.error_frame','point':'client.1'}", "it works on UNIT.can, bus.NAME"},
         {"{'kind':'sensor.bias','point':'a.sensor.x','bias_v':1,'after':'DRDY'}",
          "no event \"DRDY\"; there is RES, SETUP_DONE"},
         {"{'kind':'sensor.bias','point':'a.sensor.x','bias_v':1,'count':2}", "only with after"},
@@ -337,7 +345,7 @@ static void every_kind_at_every_point_fits_or_says_why_not(void **state)
         struct fault f = {.kind = kind};
         unsigned of_kind = 0;
         for (unsigned a = 0; a < FAULT_ARGS; a++) {
-            f.value[a] = 1.0;
+            f.value[a] = a == FAULT_DROP_V ? 10.0 : 1.0;
             f.given |= kind->need & UINT64_C(1) << a;
         }
         for (unsigned n = 0; fault_point(&r.view, n, &f.point, f.name); n++) {
