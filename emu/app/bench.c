@@ -61,6 +61,58 @@ static void init_bus(struct bench *b, unsigned i)
     b->monitor[i] = (struct can_node){.name = "monitor", .fd = true, .rx = on_monitor, .ctx = b};
 }
 
+/* ---- supply */
+
+static void switch_units(struct bench *b, bool on, int64_t t_ns)
+{
+    b->fed = on;
+    b->brownouts += !on;
+    for (unsigned i = 0; i < b->scenario.unit_count; i++) {
+        if (on) {
+            psa2_power_up(&b->unit[i].board, t_ns);
+            psa2_can_power_up(&b->can[i], t_ns);
+        } else {
+            psa2_power_down(&b->unit[i].board, t_ns);
+            psa2_can_power_down(&b->can[i]);
+        }
+    }
+}
+
+void bench_supply_changed(struct bench *b, int64_t t_ns)
+{
+    const bool feeds = supply_feeds(&b->lab.supply, b->fed, t_ns);
+    if (feeds != b->fed) switch_units(b, feeds, t_ns);
+    const int64_t next_ns = supply_next_ns(&b->lab.supply, b->fed, t_ns);
+    if (next_ns == INT64_MAX) sched_cancel(&b->sched, &b->power);
+    else sched_at(&b->sched, &b->power, next_ns);
+}
+
+static void on_power(void *ctx, int64_t t_ns)
+{
+    bench_supply_changed(ctx, t_ns);
+}
+
+/* ---- */
+
+void bench_view(struct bench *b, struct control_bench *v)
+{
+    v->lab = &b->lab;
+    v->sched = &b->sched;
+    v->buses = b->buses;
+    v->units = b->scenario.unit_count;
+    v->seed = b->scenario.seed;
+    v->scenario = b->scenario.path;
+    for (unsigned i = 0; i < b->buses; i++) {
+        v->bus[i] = &b->bus[i];
+        v->bus_name[i] = b->scenario.bus[i].name;
+    }
+    for (unsigned i = 0; i < v->units; i++) {
+        v->unit[i] = &b->unit[i];
+        v->unit_name[i] = b->unit[i].cfg.name;
+        v->node[i] = &b->can[i].node.stream;
+    }
+}
+
 void bench_init(struct bench *b, const struct scenario *s, unsigned watched)
 {
     memset(b, 0, offsetof(struct bench, unit));
@@ -73,6 +125,7 @@ void bench_init(struct bench *b, const struct scenario *s, unsigned watched)
     lab_init(&b->lab, &b->scenario.lab, s->seed);
     for (unsigned i = 0; i < s->unit_count; i++) init_unit(b, i);
     sched_ev(&b->starter.ev, on_start, b);
+    sched_ev(&b->power, on_power, b);
 }
 
 bool bench_record(struct bench *b, unsigned unit, FILE *out, uint32_t unit_ns)
@@ -98,10 +151,7 @@ void bench_power_up(struct bench *b)
         can_attach(&b->bus[i], &b->monitor[i]);
         can_attach(&b->bus[i], &b->starter.node[i]);
     }
-    for (unsigned i = 0; i < b->scenario.unit_count; i++) {
-        psa2_power_up(&b->unit[i].board, 0);
-        psa2_can_power_up(&b->can[i], 0);
-    }
+    bench_supply_changed(b, 0);
     sched_at(&b->sched, &b->starter.ev, START_NS);
 }
 

@@ -4,6 +4,7 @@
 
 #include "app/scenario_yaml.h"
 #include "board/psa2_can.h"
+#include "control/view.h"
 #include "trace/sampler.h"
 #include "trace/vcd.h"
 
@@ -19,6 +20,9 @@ struct bench {
     struct can_bus bus[SCENARIO_BUSES_MAX];
     unsigned buses;
     struct lab lab;
+    bool fed;                                                           /* the supply feeds the boards */
+    uint32_t brownouts;                                                 /* times that it ceased to */
+    struct sched_ev power;                                              /* the next change of that */
     struct can_node monitor[SCENARIO_BUSES_MAX];                        /* hear every frame */
     void (*on_frame)(void *ctx, const struct can_msg *m, int64_t t_ns); /* of the monitor; may be NULL */
     void (*on_refused)(void *ctx, const char *unit, const char *why);   /* frame form; may be NULL */
@@ -46,6 +50,12 @@ bool bench_record(struct bench *b, unsigned unit, FILE *out, uint32_t unit_ns);
 void bench_record_end(struct bench *b);
 
 void bench_power_up(struct bench *b);
+
+/* The supply was told something: boards go off and on now, and at the instants that follow from it. */
+void bench_supply_changed(struct bench *b, int64_t t_ns);
+
+/* What commands may reach of it, as far as the bench knows: the callbacks are left as they are. */
+void bench_view(struct bench *b, struct control_bench *v);
 
 /* After time has moved: lines follow their watchers. */
 void bench_follow(struct bench *b);

@@ -42,12 +42,14 @@ static bool write_resolved(const struct scenario *s, const char *path)
     return ok;
 }
 
-static int dump(const struct options *o, struct scenario *s)
+static int dump(const struct options *o, struct scenario *s, struct bench *bench)
 {
     char why[1024];
     if (!scenario_load(o->scenario ? o->scenario : "calibrate", s, why, sizeof why))
         return complain(SERVICE_INPUT, why);
     override(s, o);
+    bench_init(bench, s, 0);
+    if (!timeline_check(bench, why, sizeof why)) return complain(SERVICE_INPUT, why);
     return write_resolved(s, NULL) ? SERVICE_DONE : complain(SERVICE_MACHINE, "--dump: stdout cannot be written");
 }
 
@@ -72,6 +74,8 @@ static int run(const struct options *o, const struct snapshot *from, struct scen
     char why[1024];
     if (!load(o, from, scenario, why, sizeof why)) return complain(SERVICE_INPUT, why);
     override(scenario, o);
+    bench_init(bench, scenario, 0);
+    if (!timeline_check(bench, why, sizeof why)) return complain(SERVICE_INPUT, why);
     if (o->resolved && !write_resolved(scenario, o->resolved)) {
         snprintf(why, sizeof why, "--resolved %s: %s", o->resolved, strerror(errno));
         return complain(SERVICE_MACHINE, why);
@@ -83,7 +87,7 @@ static int run(const struct options *o, const struct snapshot *from, struct scen
     }
     char *line = resolved_line(scenario);
     if (!line) return complain(SERVICE_MACHINE, "no memory");
-    bench_init(bench, scenario, (unsigned)watched);
+    bench->watched = (unsigned)watched;
     const struct service_origin origin = {.scenario = line, .snapshot = from};
     const bool open = service_open(service, bench, o, &origin, why, sizeof why);
     const int signal_number = open ? service_run(service) : 0;
@@ -124,7 +128,7 @@ int main(int argc, char *argv[])
     struct bench *bench = malloc(sizeof *bench);
     struct service *service = malloc(sizeof *service);
     const int status = !scenario || !bench || !service ? complain(SERVICE_MACHINE, "no memory")
-                       : o.action == OPTIONS_DUMP      ? dump(&o, scenario)
+                       : o.action == OPTIONS_DUMP      ? dump(&o, scenario, bench)
                        : o.restore                     ? restore(&o, scenario, bench, service)
                                                        : run(&o, NULL, scenario, bench, service);
     free(service);

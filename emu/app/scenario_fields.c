@@ -31,6 +31,13 @@ static const struct yaml_field mems_rows[] = {
     ROW(drift_v_per_s,   -1, 1,   "linear drift of the output from power-on"),
     ROW(noise_v_rthz,    0, 1,    "white noise, one-sided density; 0: reading_noise_v counts"),
     ROW(reading_noise_v, 0, 1,    "white noise, rms of one settled reading at 1000 SPS"),
+    ROW(u0_tc_v_per_k,   -1, 1,   "temperature coefficient of the output without acceleration, from 25 °C"),
+    ROW(k_tc_ppm_per_k,  -1e5, 1e5, "temperature coefficient of the sensitivities"),
+    ROW(bias_instability_v, 0, 1, "flicker, B of IEEE Std 952"),
+    ROW(walk_v_rts,      0, 1,    "random walk, K of IEEE Std 952"),
+    ROW(quantum_v,       0, 1,    "the output is a multiple of it; 0: none"),
+    ROW(low_v,           -15, 15, "lowest output; low_v and high_v both 0: no limits"),
+    ROW(high_v,          -15, 15, "highest output"),
 #undef ROW
 };
 const struct yaml_fields scenario_mems_fields = YAML_FIELDS(mems_rows);

@@ -207,19 +207,19 @@ static void do_pace(void *ctx, struct control_pace *out)
                                  .frame_max_us = (double)f->max_ns * 1e-3};
 }
 
+static void do_supply_changed(void *ctx, int64_t t_ns)
+{
+    bench_supply_changed(((struct service *)ctx)->bench, t_ns);
+}
+
 static void make_view(struct service *s)
 {
     struct bench *b = s->bench;
     s->view = (struct control_bench){.ctx = s,
-                                     .lab = &b->lab,
-                                     .sched = &b->sched,
-                                     .buses = b->buses,
-                                     .units = b->scenario.unit_count,
-                                     .seed = b->scenario.seed,
-                                     .scenario = b->scenario.path,
                                      .run = do_run,
                                      .run_stop = do_run_stop,
                                      .push = do_push,
+                                     .supply_changed = do_supply_changed,
                                      .quit = do_quit,
                                      .snapshot = service_snapshot,
                                      .fork = do_fork,
@@ -233,17 +233,9 @@ static void make_view(struct service *s)
                                      .stall = do_stall,
                                      .gone = do_gone,
                                      .pace = do_pace};
+    bench_view(b, &s->view);
     s->view.faults = &s->faults;
     fault_init(&s->faults, &s->view, &b->sched);
-    for (unsigned i = 0; i < b->buses; i++) {
-        s->view.bus[i] = &b->bus[i];
-        s->view.bus_name[i] = b->scenario.bus[i].name;
-    }
-    for (unsigned i = 0; i < s->view.units; i++) {
-        s->view.unit[i] = &b->unit[i];
-        s->view.unit_name[i] = b->unit[i].cfg.name;
-        s->view.node[i] = &b->can[i].node.stream;
-    }
 }
 
 /* ---- the two sockets */
@@ -385,6 +377,13 @@ static int run_and_drain(struct service *s)
     return stop_signal;
 }
 
+void service_power_up(struct service *s)
+{
+    bench_power_up(s->bench);
+    s->timeline.say = say;
+    timeline_start(&s->timeline, s->bench, &s->view);
+}
+
 int service_run(struct service *s)
 {
     sigset_t blocked;
@@ -398,7 +397,7 @@ int service_run(struct service *s)
     sigaction(SIGTERM, &on_stop, NULL);
     sigaction(SIGPIPE, &ignore, NULL);
     sigaction(SIGCHLD, &ignore, NULL); /* forked benches go their own way */
-    if (!s->powered) bench_power_up(s->bench);
+    if (!s->powered) service_power_up(s);
     ports_ready(&s->ports, s->o, stdout);
     return run_and_drain(s);
 }

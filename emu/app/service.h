@@ -6,6 +6,7 @@
 #include "app/loop.h"
 #include "app/ports.h"
 #include "app/snapshot.h"
+#include "app/timeline.h"
 #include "app/truth_log.h"
 #include "control/control.h"
 #include "control/fault.h"
@@ -22,6 +23,7 @@ struct service {
     struct control_bench view; /* what the commands may reach */
     struct fault_engine faults;
     struct control control, truth;
+    struct timeline timeline;
     struct ctl_client *runner; /* who waits for the answer to `run` */
     char vcd_path[1024];       /* of the recording, --vcd or vcd.start */
     bool vcd_failed;           /* the recording is not complete, and it was told */
@@ -58,7 +60,8 @@ int service_live(struct service *s);
 bool service_snapshot(void *ctx, const char *path, cJSON *result, char *why);
 void service_journal(void *ctx, const struct control_command *row, const cJSON *args, int64_t t_ns);
 
-void service_follow(struct service *s); /* the journal begins */
+void service_power_up(struct service *s); /* bench, faults and timeline of the scenario */
+void service_follow(struct service *s);   /* the journal begins */
 bool service_restore(struct service *s, const struct snapshot *from, char *why, size_t cap);
 void service_sweep(struct service *s, bool all); /* ghosts */
 

@@ -31,7 +31,7 @@ bool service_restore(struct service *s, const struct snapshot *from, char *why, 
         .bench = s->bench, .journal = &s->journal, .buses = s->ports.hubs, .control = &s->control};
     char what[640];
     for (unsigned i = 0; i < w.buses; i++) w.hub[i] = &s->ports.hub[i];
-    bench_power_up(s->bench);
+    service_power_up(s);
     s->powered = true;
     if (!snapshot_replay(from, &w, what, sizeof what)) {
         snprintf(why, cap, "%s: %s", s->o->restore, what);

@@ -4,16 +4,6 @@
 
 #include <stddef.h>
 
-static double accel_signal(void *ctx, unsigned axis, int64_t t_ns)
-{
-    struct unit *u = ctx;
-    if (u->cfg.axis[axis].sensor == UNIT_NO_SENSOR) return 0.0;
-    double a_mps2[3];
-    unit_gravity_mps2(u, axis, t_ns, a_mps2);
-    const double out_v = mems_out_v(&u->mems[axis], a_mps2, t_ns);
-    return u->sensor_faults[axis] ? sensor_fault_out(u->sensor_faults[axis], out_v, t_ns) : out_v;
-}
-
 /* In the chamber the board is as warm as the case, the thermometers of the sensors as their elements. */
 static double temp_degc(void *ctx, unsigned channel, int64_t t_ns)
 {
@@ -22,6 +12,24 @@ static double temp_degc(void *ctx, unsigned channel, int64_t t_ns)
     if (channel >= UNIT_TEMPS) return 0.0;
     if (!c->cfg.present) return u->cfg.temp_degc[channel];
     return channel < UNIT_AXES ? chamber_element_degc(c, &u->body, t_ns) : chamber_case_degc(c, &u->body, t_ns);
+}
+
+/* Of the sensor's element, where the sensor minds it. */
+static void warm(struct unit *u, unsigned axis, int64_t t_ns)
+{
+    struct mems *m = &u->mems[axis];
+    if (m->cfg.u0_tc_v_per_k != 0.0 || m->cfg.k_tc_per_k != 0.0) m->temp_degc = temp_degc(u, axis, t_ns);
+}
+
+static double accel_signal(void *ctx, unsigned axis, int64_t t_ns)
+{
+    struct unit *u = ctx;
+    if (u->cfg.axis[axis].sensor == UNIT_NO_SENSOR) return 0.0;
+    double a_mps2[3];
+    unit_gravity_mps2(u, axis, t_ns, a_mps2);
+    warm(u, axis, t_ns);
+    const double out_v = mems_out_v(&u->mems[axis], a_mps2, t_ns);
+    return u->sensor_faults[axis] ? sensor_fault_out(u->sensor_faults[axis], out_v, t_ns) : out_v;
 }
 
 static void on_frame(void *ctx, const struct psa2_frame *f, int64_t t_ns)
@@ -113,5 +121,6 @@ double unit_sensor_v(struct unit *u, unsigned axis, int64_t t_ns)
     if (u->cfg.axis[axis].sensor == UNIT_NO_SENSOR) return 0.0;
     double a_mps2[3];
     unit_gravity_mps2(u, axis, t_ns, a_mps2);
-    return mems_model_v(&u->mems[axis].cfg, a_mps2, t_ns);
+    warm(u, axis, t_ns);
+    return mems_true_v(&u->mems[axis], a_mps2, t_ns);
 }

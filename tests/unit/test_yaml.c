@@ -152,8 +152,7 @@ static const struct {
     {"site: {latitude_deg: 91}\nunits: [{}]\n", "dir/s.yaml:1:22: site.latitude_deg: 91 is outside -90 ... 90"},
     {"table: {axes: 4}\nunits: [{}]\n", "dir/s.yaml:1:15: table.axes: 4 is outside 1 ... 3"},
     {"table: {axes: [{along: w}]}\nunits: [{}]\n", "dir/s.yaml:1:24: table.axes[0].along: x, y or z is wanted"},
-    {"table: {axes: [{angle_min_deg: 5}]}\nunits: [{}]\n",
-     "dir/s.yaml:1:16: table.axes: angle_min_deg 5 is not below"},
+    {"table: {axes: [{angle_min_deg: 5}]}\nunits: [{}]\n", "dir/s.yaml:1:16: table.axes: angle_min_deg 5 is not below"},
     {"units: [{on: table}]\n", "dir/s.yaml:1:8: units: a stands on the table, and there is none"},
     {"units: [{lever_arm_m: 1}]\n", "dir/s.yaml:1:23: units.a.lever_arm_m: a list of 3 numbers are wanted"},
     {"chamber: {start_degc: 90}\nunits: [{}]\n",
@@ -205,7 +204,9 @@ static void cut_off_anywhere_a_scenario_is_refused_or_sound(void **state)
 static void the_shipped_scenarios_and_profiles_load(void **state)
 {
     (void)state;
-    static const char *const scenarios[] = {"calibrate", "quiet", "stream", "fast", "multi"};
+    static const char *const scenarios[] = {"calibrate", "quiet",         "stream",        "fast",
+                                            "multi",     "brownout",      "chamber_sweep", "faults",
+                                            "fleet64",   "six_positions", "table_rate"};
     static const char *const profiles[] = {"article", "intent", "ungated", "w24", "w16", "lab32", "psa1"};
     if (access("proto/scenarios", R_OK) != 0) skip();
     for (size_t i = 0; i < COUNT(scenarios); i++) {
@@ -227,7 +228,8 @@ static void a_missing_scenario_is_told_in_one_line(void **state)
     (void)state;
     assert_false(scenario_load("nope", &s, why, sizeof why));
     assert_string_equal(why, "nope: no such file in proto/scenarios; a path, or a name from there, is wanted: "
-                             "calibrate, fast, multi, quiet, stream");
+                             "brownout, calibrate, chamber_sweep, fast, faults, fleet64, multi, quiet, six_positions, "
+                             "stream, table_rate");
     assert_false(scenario_load("./nope.yaml", &s, why, sizeof why));
     assert_string_equal(why, "./nope.yaml: no such file, or not readable");
 }
