@@ -25,6 +25,13 @@ static void add_mems(const struct mems_g *m, cJSON *to)
     add_real(to, "drift_v_per_s", m->drift_v_per_s);
     add_real(to, "noise_v_rthz", m->noise_v_rthz);
     add_real(to, "reading_noise_v", m->reading_noise_v);
+    add_real(to, "u0_tc_v_per_k", m->u0_tc_v_per_k);
+    add_real(to, "k_tc_ppm_per_k", m->k_tc_ppm_per_k);
+    add_real(to, "bias_instability_v", m->bias_instability_v);
+    add_real(to, "walk_v_rts", m->walk_v_rts);
+    add_real(to, "quantum_v", m->quantum_v);
+    add_real(to, "low_v", m->low_v);
+    add_real(to, "high_v", m->high_v);
 }
 
 static void add_afe(const struct afe_cfg *a, cJSON *to)
