@@ -31,15 +31,6 @@ static const struct yaml_field mems_rows[] = {
     ROW(drift_v_per_s,   -1, 1,   "linear drift of the output from power-on"),
     ROW(noise_v_rthz,    0, 1,    "white noise, one-sided density; 0: reading_noise_v counts"),
     ROW(reading_noise_v, 0, 1,    "white noise, rms of one settled reading at 1000 SPS"),
-<<<<<<< worktree
-    ROW(u0_tc_v_per_k,   -0.1, 0.1, "temperature coefficient of u0_v, from 25 °C"),
-    ROW(k_tc_ppm_per_k,  -1e4, 1e4, "temperature coefficient of all sensitivities, from 25 °C"),
-    ROW(bias_instability_v, 0, 1, "flicker: its Allan deviation is 0.664 of this"),
-    ROW(walk_v_rts,      0, 1,    "random walk, volts per square root of a second"),
-    ROW(quantum_v,       0, 1,    "the output is a multiple of it; 0: of nothing"),
-    ROW(low_v,           -100, 100, "lowest output; with high_v 0: no limits"),
-    ROW(high_v,          -100, 100, "highest output"),
-=======
     ROW(u0_tc_v_per_k,   -1, 1,   "temperature coefficient of the output without acceleration, from 25 °C"),
     ROW(k_tc_ppm_per_k,  -1e5, 1e5, "temperature coefficient of the sensitivities"),
     ROW(bias_instability_v, 0, 1, "flicker, B of IEEE Std 952"),
@@ -47,7 +38,6 @@ static const struct yaml_field mems_rows[] = {
     ROW(quantum_v,       0, 1,    "the output is a multiple of it; 0: none"),
     ROW(low_v,           -15, 15, "lowest output; low_v and high_v both 0: no limits"),
     ROW(high_v,          -15, 15, "highest output"),
->>>>>>> S
 #undef ROW
 };
 const struct yaml_fields scenario_mems_fields = YAML_FIELDS(mems_rows);

@@ -4,29 +4,6 @@
 
 #include <stddef.h>
 
-<<<<<<< worktree
-static double temp_degc(void *ctx, unsigned channel, int64_t t_ns);
-
-/* The sensor with its element as warm as it is, if that makes a difference to it. */
-static struct mems *warmed(struct unit *u, unsigned axis, int64_t t_ns)
-{
-    struct mems *m = &u->mems[axis];
-    if (m->cfg.u0_tc_v_per_k != 0.0 || m->cfg.k_tc_per_k != 0.0) m->temp_degc = temp_degc(u, axis, t_ns);
-    return m;
-}
-
-static double accel_signal(void *ctx, unsigned axis, int64_t t_ns)
-{
-    struct unit *u = ctx;
-    if (u->cfg.axis[axis].sensor == UNIT_NO_SENSOR) return 0.0;
-    double a_mps2[3];
-    unit_gravity_mps2(u, axis, t_ns, a_mps2);
-    const double out_v = mems_out_v(warmed(u, axis, t_ns), a_mps2, t_ns);
-    return u->sensor_faults[axis] ? sensor_fault_out(u->sensor_faults[axis], out_v, t_ns) : out_v;
-}
-
-=======
->>>>>>> S
 /* In the chamber the board is as warm as the case, the thermometers of the sensors as their elements. */
 static double temp_degc(void *ctx, unsigned channel, int64_t t_ns)
 {
@@ -144,10 +121,6 @@ double unit_sensor_v(struct unit *u, unsigned axis, int64_t t_ns)
     if (u->cfg.axis[axis].sensor == UNIT_NO_SENSOR) return 0.0;
     double a_mps2[3];
     unit_gravity_mps2(u, axis, t_ns, a_mps2);
-<<<<<<< worktree
-    return mems_true_v(warmed(u, axis, t_ns), a_mps2, t_ns);
-=======
     warm(u, axis, t_ns);
     return mems_true_v(&u->mems[axis], a_mps2, t_ns);
->>>>>>> S
 }
