@@ -236,6 +236,8 @@ static void make_view(struct service *s)
     bench_view(b, &s->view);
     s->view.faults = &s->faults;
     fault_init(&s->faults, &s->view, &b->sched);
+    s->faults.changed = control_fault_changed;
+    s->faults.ctx = &s->control;
 }
 
 /* ---- the two sockets */

@@ -2,6 +2,7 @@
 
 #include "control/control.h"
 #include "control/describe.h"
+#include "control/fault.h"
 
 #include <string.h>
 
@@ -37,6 +38,20 @@ static bool anybody(const struct control *c, enum control_topic topic)
         if (c->watch.sub[i].control && c->watch.sub[i].topic == topic) return true;
     }
     return false;
+}
+
+void control_fault_changed(void *ctx, const struct fault *f, int64_t t_ns)
+{
+    struct control *c = ctx;
+    if (!anybody(c, CONTROL_FAULTS)) return;
+    cJSON *event = cJSON_CreateObject();
+    cJSON_AddStringToObject(event, "event", "fault");
+    cJSON_AddNumberToObject(event, "t_ns", (double)t_ns);
+    cJSON_AddNumberToObject(event, "id", f->id);
+    cJSON_AddStringToObject(event, "kind", f->kind->name);
+    cJSON_AddStringToObject(event, "point", f->name);
+    cJSON_AddStringToObject(event, "state", fault_state_name(f->state));
+    control_tell(c, CONTROL_FAULTS, event);
 }
 
 /* ---- the boards' events */

@@ -20,6 +20,13 @@ static struct {
     int64_t for_ns;
     uint64_t after_tx;
     bool refuse;
+    int stops;
+    int64_t stop_ns;
+    unsigned pushes;
+    void *to;
+    char pushed[2048]; /* the latest line */
+    char path[64];
+    unsigned unit;
 } asked;
 
 static bool on_run(void *ctx, int64_t for_ns, uint64_t after_tx, char *why)
@@ -30,6 +37,46 @@ static bool on_run(void *ctx, int64_t for_ns, uint64_t after_tx, char *why)
     asked.for_ns = for_ns;
     asked.after_tx = after_tx;
     return !asked.refuse;
+}
+
+static void on_run_stop(void *ctx)
+{
+    (void)ctx;
+    asked.stops++;
+    asked.stop_ns = bench->sched.now_ns;
+}
+
+static void on_push(void *ctx, void *client, const char *line)
+{
+    (void)ctx;
+    asked.pushes++;
+    asked.to = client;
+    snprintf(asked.pushed, sizeof asked.pushed, "%s", line);
+}
+
+static bool on_vcd_start(void *ctx, const char *path, unsigned unit, char *why)
+{
+    (void)ctx;
+    snprintf(asked.path, sizeof asked.path, "%s", path);
+    snprintf(why, CONTROL_WHY_MAX, "no room");
+    asked.unit = unit;
+    return !asked.refuse;
+}
+
+static bool on_vcd_stop(void *ctx, char *why)
+{
+    (void)ctx;
+    (void)why;
+    return true;
+}
+
+static void on_journal(void *ctx, const struct control_command *row, const struct cJSON *args, int64_t t_ns)
+{
+    (void)ctx;
+    char *text = cJSON_PrintUnformatted(args);
+    snprintf(asked.pushed, sizeof asked.pushed, "%s %s %lld", row->name, text, (long long)t_ns);
+    cJSON_free(text);
+    asked.pushes++;
 }
 
 static void on_quit(void *ctx)
@@ -88,6 +135,11 @@ static int fresh(void **state)
                                   .unit = {&bench->unit[0], &bench->unit[1]},
                                   .unit_name = {"a", "b"},
                                   .run = on_run,
+                                  .run_stop = on_run_stop,
+                                  .push = on_push,
+                                  .vcd_start = on_vcd_start,
+                                  .vcd_stop = on_vcd_stop,
+                                  .sched = &bench->sched,
                                   .quit = on_quit,
                                   .vcd_flush = on_vcd_flush,
                                   .can_rx = on_can_rx,
@@ -190,6 +242,162 @@ static void run_is_answered_when_it_is_over(void **state)
     control_run_forget(&control);
     asked.refuse = true;
     assert_says("{\"id\":12,\"cmd\":\"run\",\"args\":{\"for_s\":1}}", "{\"code\":\"state\",\"text\":\"not now\"}");
+}
+
+static void run_until_ends_at_the_very_event(void **state)
+{
+    (void)state;
+    int64_t first_ns;
+    assert_null(say("{\"id\":1,\"cmd\":\"run.until\",\"args\":{\"event\":\"DRD_A\",\"unit\":\"b\",\"limit_s\":2}}"));
+    assert_int_equal(asked.for_ns, 2000000000);
+    assert_says("{\"cmd\":\"run\",\"args\":{\"for_s\":1}}", "another run is under way");
+    sched_run_until(&bench->sched, 2000000000);
+    assert_int_equal(asked.stops, 1);
+    first_ns = asked.stop_ns;
+    assert_true(first_ns > 0 && first_ns < 2000000000);
+    assert_non_null(strstr(control_run_done(&control, 0), "\"result\":{\"reached\":true,\"seen\":1}"));
+    assert_null(say("{\"cmd\":\"run.until\",\"args\":{\"event\":\"DRD_A\",\"count\":1000000}}"));
+    assert_int_equal(asked.for_ns, 60000000000);
+    sched_run_until(&bench->sched, 2010000000);
+    const char *reply = control_run_done(&control, 0);
+    assert_non_null(strstr(reply, "\"reached\":false,\"seen\":"));
+    assert_null(strstr(reply, "\"seen\":0"));
+    assert_null(bench->unit[0].listeners); /* nobody listens any more */
+    assert_int_equal(asked.stops, 1);
+    asked.refuse = true;
+    assert_says("{\"cmd\":\"run.until\",\"args\":{\"event\":\"RES\"}}", "not now");
+    assert_null(bench->unit[0].listeners);
+    assert_says("{\"cmd\":\"run.until\",\"args\":{\"event\":\"FLY\"}}", "is none of RES, SETUP_DONE, SYNC_A");
+}
+
+static void names_of_events_are_the_boards_own(void **state)
+{
+    (void)state;
+    for (int e = 0; e < PSA2_EVENTS; e++) {
+        assert_string_equal(control_events[e], psa2_event_name((enum psa2_event)e));
+    }
+}
+
+static void subscribers_are_told_of_events_and_status(void **state)
+{
+    (void)state;
+    int me, other;
+    control.client = &me;
+    assert_says("{\"cmd\":\"subscribe\",\"args\":{\"what\":\"events\"}}", "\"ok\":true");
+    sched_run_until(&bench->sched, 1);
+    assert_string_equal(asked.pushed, "");
+    say("{\"cmd\":\"unit.reset\",\"args\":{\"unit\":\"b\"}}");
+    sched_run_until(&bench->sched, 1000);
+    assert_string_equal(asked.pushed, "{\"event\":\"RES\",\"unit\":\"b\",\"t_ns\":1}");
+    assert_ptr_equal(asked.to, &me);
+    say("{\"cmd\":\"unsubscribe\"}");
+    assert_null(bench->unit[1].listeners);
+    asked.pushes = 0;
+    control.client = &other;
+    assert_says("{\"cmd\":\"subscribe\",\"args\":{\"what\":\"status\",\"every_s\":0.05}}", "\"ok\":true");
+    sched_run_until(&bench->sched, 200000000);
+    assert_int_equal(asked.pushes, 3);
+    assert_non_null(strstr(asked.pushed, "{\"event\":\"status\",\"t_ns\":150001000,\"pace\":\"step\",\"frames\":"));
+    assert_ptr_equal(asked.to, &other);
+    control_gone(&control, &other);
+    sched_run_until(&bench->sched, 400000000);
+    assert_int_equal(asked.pushes, 3);
+}
+
+static void levels_are_those_of_now(void **state)
+{
+    (void)state;
+    assert_says("{\"cmd\":\"lines\"}", "{\"lines\":{\"SYNC_A\":0,");
+    for (int64_t t_ns = 0; t_ns <= 500000000; t_ns += 1000000) {
+        sched_run_until(&bench->sched, t_ns);
+        bench_follow(bench);
+    }
+    assert_says("{\"cmd\":\"lines\"}", "\"Res\":1");
+    say("{\"cmd\":\"unit.reset\",\"args\":{\"unit\":\"a\"}}");
+    assert_says("{\"cmd\":\"lines\"}", "\"Res\":0");
+    assert_says("{\"cmd\":\"lines\",\"args\":{\"unit\":\"b\"}}", "\"Res\":1");
+}
+
+static void recordings_go_to_the_bench(void **state)
+{
+    (void)state;
+    assert_says("{\"cmd\":\"vcd.start\",\"args\":{\"path\":\"x.vcd\",\"unit\":\"b\"}}", "\"ok\":true");
+    assert_string_equal(asked.path, "x.vcd");
+    assert_int_equal(asked.unit, 1);
+    assert_says("{\"cmd\":\"vcd.stop\"}", "\"ok\":true");
+    asked.refuse = true;
+    assert_says("{\"cmd\":\"vcd.start\",\"args\":{\"path\":\"x.vcd\"}}", "\"text\":\"no room\"");
+    assert_says("{\"cmd\":\"vcd.start\",\"args\":{\"path\":\"\"}}", "path: is empty");
+}
+
+static void what_changes_the_bench_goes_into_the_journal(void **state)
+{
+    (void)state;
+    view.journal = on_journal;
+    say("{\"cmd\":\"head.turn\",\"args\":{\"angle_deg\":90}}");
+    assert_string_equal(asked.pushed, "head.turn {\"angle_deg\":90} 0");
+    say("{\"cmd\":\"head.turn\",\"args\":{\"angle_deg\":9}}"); /* refused: it is turning */
+    say("{\"cmd\":\"head.read\"}");
+    assert_int_equal(asked.pushes, 1);
+    sched_run_until(&bench->sched, 2000000000);
+    say("{\"cmd\":\"head.mount\",\"args\":{\"face\":\"side\"}}");
+    assert_string_equal(asked.pushed, "head.mount {\"face\":\"side\"} 2000000000");
+}
+
+static bool check(const char *cmd, const char *args, char *why)
+{
+    cJSON *j = cJSON_Parse(args);
+    const bool good = control_check(&view, cmd, j, why);
+    cJSON_Delete(j);
+    return good;
+}
+
+static void a_command_can_be_checked_without_being_carried_out(void **state)
+{
+    (void)state;
+    char why[CONTROL_WHY_MAX];
+    assert_true(check("head.turn", "{\"angle_deg\":90}", why));
+    assert_false(check("head.turn", "{\"angle_deg\":4000}", why));
+    assert_string_equal(why, "angle_deg: 4000 is outside -3600 ... 3600 deg");
+    assert_false(check("head.fly", "{}", why));
+    assert_string_equal(why, "\"head.fly\": unknown command");
+    assert_true(check("unit.reset", "{\"unit\":\"b\"}", why));
+    assert_false(check("unit.reset", "{\"unit\":\"c\"}", why));
+    assert_true(check("table.profile", "{\"axis\":1,\"times_s\":[0,1],\"rates_dps\":[1,2]}", why));
+    assert_false(check("table.profile", "{\"axis\":1,\"times_s\":[],\"rates_dps\":[1]}", why));
+    assert_false(check("table.profile", "{\"axis\":1,\"times_s\":[\"0\"],\"rates_dps\":[1]}", why));
+    assert_false(check("supply.output", "{\"on\":1}", why));
+    assert_string_equal(why, "on: true or false is wanted");
+    assert_false(check("run.until", "{\"event\":\"DRD_A\",\"event\":\"RES\"}", why));
+    assert_string_equal(why, "event is given twice");
+    assert_true(head_at_rest(&bench->lab.head, 0));
+}
+
+static void instruments_that_are_not_there_are_refused(void **state)
+{
+    (void)state;
+    assert_says("{\"cmd\":\"table.read\",\"args\":{\"axis\":1}}", "there is no rate table in this scenario");
+    assert_says("{\"cmd\":\"chamber.read\"}", "there is no thermal chamber in this scenario");
+    assert_says("{\"cmd\":\"supply.read\"}", "there is no supply in this scenario");
+    assert_says("{\"cmd\":\"supply.reset\"}", "\"code\":\"state\"");
+}
+
+static void the_true_state_is_told_on_the_truth_port(void **state)
+{
+    (void)state;
+    say("{\"cmd\":\"head.turn\",\"args\":{\"angle_deg\":90}}");
+    sched_run_until(&bench->sched, 2000000000);
+    cJSON *j = cJSON_Parse(control_line(&truth, "{\"cmd\":\"truth.state\"}", 2000000000));
+    const cJSON *result = cJSON_GetObjectItem(j, "result"), *unit = cJSON_GetObjectItem(result, "unit");
+    const cJSON *f = cJSON_GetObjectItem(unit, "f_mps2");
+    const double angle_deg = cJSON_GetObjectItem(cJSON_GetObjectItem(result, "head"), "angle_deg")->valuedouble;
+    assert_true(angle_deg > 89.999 && angle_deg < 90.001);
+    assert_true(cJSON_GetArrayItem(f, 0)->valuedouble > 9.8 && cJSON_GetArrayItem(f, 0)->valuedouble < 9.82);
+    assert_string_equal(cJSON_GetObjectItem(unit, "name")->valuestring, "a");
+    assert_int_equal(cJSON_GetArraySize(cJSON_GetObjectItem(unit, "w_radps")), 3);
+    assert_int_equal(cJSON_GetArraySize(cJSON_GetObjectItem(unit, "sensor_v")), 3);
+    cJSON_Delete(j);
+    assert_says("{\"cmd\":\"truth.state\"}", "unknown command"); /* not on this port */
 }
 
 static void the_head_turns_reads_and_takes_its_time(void **state)
@@ -303,6 +511,15 @@ int main(void)
         cmocka_unit_test_setup(bad_commands_are_refused_in_words_and_change_nothing, fresh),
         cmocka_unit_test_setup(an_overlong_line_is_refused, fresh),
         cmocka_unit_test_setup(run_is_answered_when_it_is_over, fresh),
+        cmocka_unit_test_setup(run_until_ends_at_the_very_event, fresh),
+        cmocka_unit_test(names_of_events_are_the_boards_own),
+        cmocka_unit_test_setup(subscribers_are_told_of_events_and_status, fresh),
+        cmocka_unit_test_setup(levels_are_those_of_now, fresh),
+        cmocka_unit_test_setup(recordings_go_to_the_bench, fresh),
+        cmocka_unit_test_setup(what_changes_the_bench_goes_into_the_journal, fresh),
+        cmocka_unit_test_setup(a_command_can_be_checked_without_being_carried_out, fresh),
+        cmocka_unit_test_setup(instruments_that_are_not_there_are_refused, fresh),
+        cmocka_unit_test_setup(the_true_state_is_told_on_the_truth_port, fresh),
         cmocka_unit_test_setup(the_head_turns_reads_and_takes_its_time, fresh),
         cmocka_unit_test_setup(a_unit_is_reset_by_name, fresh),
         cmocka_unit_test_setup(counters_frames_and_units_tell_what_they_promise, fresh),
