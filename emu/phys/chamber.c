@@ -193,7 +193,8 @@ enum chamber_result chamber_set(struct chamber *c, double degc, int64_t t_ns)
 
 enum chamber_result chamber_ramp(struct chamber *c, double k_per_min, int64_t t_ns)
 {
-    if (!(k_per_min > 0.0 && k_per_min <= chamber_ramp_max_k_per_min(c))) return CHAMBER_OUT_OF_RANGE;
+    if (!(k_per_min >= CHAMBER_RAMP_MIN_K_PER_MIN && k_per_min <= chamber_ramp_max_k_per_min(c)))
+        return CHAMBER_OUT_OF_RANGE;
     c->ramp_k_per_min = k_per_min;
     plan(c, c->set_degc, t_ns);
     return CHAMBER_OK;

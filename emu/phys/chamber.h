@@ -24,6 +24,8 @@ struct chamber_cfg {
     double readout_offset_k, readout_resolution_k; /* of the chamber's thermometer in the air; 0: none */
 };
 
+#define CHAMBER_RAMP_MIN_K_PER_MIN 0.001
+
 enum chamber_result { CHAMBER_OK, CHAMBER_OUT_OF_RANGE };
 
 /* Something in the chamber; embedded in its owner, not to be moved after chamber_put_in(). */
@@ -56,7 +58,7 @@ void chamber_put_in(struct chamber *c, struct chamber_body *b, double tau_case_s
 /* New set point, reached with the present ramp. */
 enum chamber_result chamber_set(struct chamber *c, double degc, int64_t t_ns);
 
-/* New ramp, above 0 and up to the greater of the two limits; one that is under way goes on with it. */
+/* New ramp, from CHAMBER_RAMP_MIN_K_PER_MIN up to the greater of the two limits; one that is under way goes on with it. */
 enum chamber_result chamber_ramp(struct chamber *c, double k_per_min, int64_t t_ns);
 
 double chamber_ramp_max_k_per_min(const struct chamber *c);

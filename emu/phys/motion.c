@@ -7,6 +7,8 @@
 #include <math.h>
 
 #define TURN_RAD   6.283185307179586
+#define FAR_RAD    1e9  /* further than any table is sent */
+#define FAR_S      9e9  /* 285 years: past it the nanoseconds of an int64_t end */
 #define ROUNDING_S 1e-9 /* a ramp that ends when the next begins may be later by this */
 
 /* ---- evaluation */
@@ -56,7 +58,9 @@ struct motion_state motion_at(const struct motion *m, int64_t t_ns)
 int64_t motion_rest_ns(const struct motion *m)
 {
     const struct motion_plan *p = &m->plan[m->latest];
-    return p->ends ? p->start_ns + (int64_t)ceil(p->piece[p->count - 1].t_s * (double)NS_PER_S) : INT64_MAX;
+    const double end_s = p->piece[p->count - 1].t_s;
+    if (!p->ends || end_s + (double)p->start_ns / (double)NS_PER_S > FAR_S) return INT64_MAX;
+    return p->start_ns + (int64_t)ceil(end_s * (double)NS_PER_S);
 }
 
 bool motion_at_rest(const struct motion *m, int64_t t_ns)
@@ -169,13 +173,14 @@ void motion_init(struct motion *m, const struct motion_limits *limits)
 
 static bool within(const struct motion_limits *l, double angle_rad)
 {
-    return !l->bounded || (angle_rad >= l->min_rad && angle_rad <= l->max_rad);
+    if (!l->bounded) return fabs(angle_rad) <= FAR_RAD;
+    return angle_rad >= l->min_rad && angle_rad <= l->max_rad;
 }
 
 enum motion_result motion_position(struct motion *m, double angle_rad, double rate_radps, int64_t t_ns)
 {
     const double cap = rate_radps != 0.0 ? fabs(rate_radps) : m->limits.rate_radps;
-    if (cap > m->limits.rate_radps) return MOTION_RATE_LIMIT;
+    if (!(cap <= m->limits.rate_radps)) return MOTION_RATE_LIMIT;
     if (!within(&m->limits, angle_rad)) return MOTION_ANGLE_LIMIT;
     struct draft d = draft_from(m, MOTION_POSITION, t_ns);
     move_to(&d, angle_rad, cap);
@@ -185,7 +190,7 @@ enum motion_result motion_position(struct motion *m, double angle_rad, double ra
 
 enum motion_result motion_rate(struct motion *m, double rate_radps, int64_t t_ns)
 {
-    if (fabs(rate_radps) > m->limits.rate_radps) return MOTION_RATE_LIMIT;
+    if (!(fabs(rate_radps) <= m->limits.rate_radps)) return MOTION_RATE_LIMIT;
     struct draft d = draft_from(m, MOTION_RATE, t_ns);
     if (!m->limits.bounded || rate_radps == 0.0) ramp_to(&d, rate_radps);
     go_on(&d, &m->limits, rate_radps);

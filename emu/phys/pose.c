@@ -6,7 +6,7 @@
 #include <string.h>
 
 #define TURN_RAD     6.283185307179586
-#define REDUCE_ABOVE 1000.0 /* rad: a table that has been turning for days; the sine is exact to 1e6 */
+#define REDUCE_ABOVE 1000.0 /* rad: a table that has been turning for long; det_sin() takes up to 1e6 */
 
 void pose_start(struct pose *p, const struct site *site)
 {
@@ -31,7 +31,7 @@ void pose_turn(struct pose *p, enum pose_axis axis, double angle_rad, double rat
     const unsigned j = (k + 2) % 3;
     double *w = p->w_ib_b_radps;
     double *dw = p->dw_ib_b_radps2;
-    if (fabs(angle_rad) > REDUCE_ABOVE) angle_rad -= TURN_RAD * floor(angle_rad / TURN_RAD + 0.5);
+    if (fabs(angle_rad) > REDUCE_ABOVE) angle_rad = fmod(angle_rad, TURN_RAD); /* exact */
     if (angle_rad != 0.0) {
         const double c = det_cos(angle_rad);
         const double s = det_sin(angle_rad);

@@ -25,8 +25,9 @@ void supply_init(struct supply *s, const struct supply_cfg *cfg)
                          .on = true,
                          .set_v = cfg->volt_v,
                          .from_v = cfg->volt_v,
-                         .ripple_v = cfg->ripple_v,
+                         .ripple_v = cfg->ripple_hz >= SUPPLY_RIPPLE_MIN_HZ ? cfg->ripple_v : 0.0,
                          .ripple_hz = cfg->ripple_hz};
+    if (s->cfg.slew_v_per_s > 0.0) s->cfg.slew_v_per_s = fmax(s->cfg.slew_v_per_s, SUPPLY_SLEW_MIN_VPS);
 }
 
 /* ---- the volts */
@@ -109,7 +110,7 @@ void supply_output(struct supply *s, bool on, int64_t t_ns)
 enum supply_result supply_ripple(struct supply *s, double amplitude_v, double frequency_hz, int64_t t_ns)
 {
     if (!(amplitude_v >= 0.0 && amplitude_v <= s->cfg.ripple_max_v)) return SUPPLY_OUT_OF_RANGE;
-    if (!(frequency_hz > 0.0 && frequency_hz <= s->cfg.ripple_max_hz)) return SUPPLY_OUT_OF_RANGE;
+    if (!(frequency_hz >= SUPPLY_RIPPLE_MIN_HZ && frequency_hz <= s->cfg.ripple_max_hz)) return SUPPLY_OUT_OF_RANGE;
     s->ripple_v = amplitude_v;
     s->ripple_hz = frequency_hz;
     s->ripple_ns = t_ns;
@@ -121,7 +122,8 @@ enum supply_result supply_dip(struct supply *s, double deep_v, int64_t from_ns, 
     if (!(deep_v > 0.0 && deep_v <= s->cfg.volt_max_v) || from_ns < t_ns || for_ns <= 0) return SUPPLY_OUT_OF_RANGE;
     for (unsigned i = 0; i < SUPPLY_DIPS_MAX; i++) {
         if (s->dip[i].to_ns > t_ns) continue;
-        s->dip[i] = (struct supply_dip){from_ns, from_ns + for_ns, deep_v};
+        const int64_t to_ns = for_ns < INT64_MAX - from_ns ? from_ns + for_ns : INT64_MAX;
+        s->dip[i] = (struct supply_dip){from_ns, to_ns, deep_v};
         return SUPPLY_OK;
     }
     return SUPPLY_TOO_MANY_DIPS;

@@ -10,7 +10,9 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#define SUPPLY_DIPS_MAX 8u
+#define SUPPLY_DIPS_MAX      8u
+#define SUPPLY_RIPPLE_MIN_HZ 0.001 /* slower is no ripple */
+#define SUPPLY_SLEW_MIN_VPS  1e-6
 
 struct supply_cfg {
     bool present;  /* else everything is always fed */

@@ -147,10 +147,27 @@ static void what_exceeds_a_limit_is_refused_and_changes_nothing(void **state)
     assert_int_equal(motion_profile(&m, nan_s, steep, 1, ns(0.2)), MOTION_BAD_PROFILE);
     assert_int_equal(motion_profile(&m, falling, steep, 2, ns(0.2)), MOTION_BAD_PROFILE);
     assert_int_equal(motion_profile(&m, t, steep, 0, ns(0.2)), MOTION_BAD_PROFILE);
+    assert_int_equal(motion_position(&m, NAN, 0.0, ns(0.2)), MOTION_ANGLE_LIMIT);
+    assert_int_equal(motion_position(&m, 1.0, NAN, ns(0.2)), MOTION_RATE_LIMIT);
+    assert_int_equal(motion_rate(&m, NAN, ns(0.2)), MOTION_RATE_LIMIT);
+    assert_int_equal(motion_sine(&m, NAN, 1.0, ns(0.2)), MOTION_BAD_SINE);
     const struct motion_state is = motion_at(&m, ns(0.3));
     near(is.angle_rad, was.angle_rad, 0.0);
     near(is.rate_radps, was.rate_radps, 0.0);
     for (int i = MOTION_OK; i <= MOTION_NO_AXIS; i++) assert_non_null(motion_result_text((enum motion_result)i));
+}
+
+/* A way of 30 million years ends at no instant that can be told; a turn beyond counting is refused. */
+static void what_lies_beyond_the_nanoseconds_is_never(void **state)
+{
+    (void)state;
+    struct motion m = axis(&limits);
+    assert_int_equal(motion_position(&m, 1.1e9, 0.0, 0), MOTION_ANGLE_LIMIT);
+    assert_int_equal(motion_position(&m, 1e9, 1e-6, 0), MOTION_OK);
+    assert_true(motion_rest_ns(&m) == INT64_MAX);
+    near(motion_at(&m, ns(86400)).angle_rad, 0.0864, 1e-9);
+    motion_stop(&m, ns(86400));
+    assert_true(motion_rest_ns(&m) < ns(86401));
 }
 
 static void random_command(struct motion *m, struct rng *r, int64_t t_ns)
@@ -224,6 +241,7 @@ int main(void)
         cmocka_unit_test(a_profile_is_rates_with_ramps),
         cmocka_unit_test(a_sine_starts_at_rest_at_its_lowest_point),
         cmocka_unit_test(what_exceeds_a_limit_is_refused_and_changes_nothing),
+        cmocka_unit_test(what_lies_beyond_the_nanoseconds_is_never),
         cmocka_unit_test(angle_and_rate_are_continuous_and_within_limits),
         cmocka_unit_test(the_past_is_remembered),
     };

@@ -103,6 +103,23 @@ static void what_is_out_of_range_is_refused(void **state)
     assert_int_equal(supply_dip(&s, 0.1, 30, 10, 20), SUPPLY_OK); /* the old ones are over */
 }
 
+/* A ripple of 0 Hz is none; an output that slews for years does so. */
+static void figures_of_a_scenario_may_be_extreme(void **state)
+{
+    (void)state;
+    struct supply s;
+    struct supply_cfg c = supply_default();
+    c.present = true;
+    c.ripple_v = 5.0;
+    c.slew_v_per_s = 1e-300;
+    supply_init(&s, &c);
+    near(supply_volts(&s, ns(1)), 12.0, 0.0);
+    assert_true(supply_next_ns(&s, true, 0) == INT64_MAX);
+    supply_output(&s, false, ns(1));
+    near(supply_volts(&s, ns(2)), 12.0, 2e-6);
+    assert_true(llabs(supply_next_ns(&s, true, ns(2)) - ns(3e6 + 1)) < ns(1e-3));
+}
+
 static void the_voltmeter_has_steps(void **state)
 {
     (void)state;
@@ -155,6 +172,7 @@ int main(void)
         cmocka_unit_test(a_slewing_output_crosses_where_the_line_does),
         cmocka_unit_test(a_dip_is_felt_from_its_first_to_its_last_nanosecond),
         cmocka_unit_test(what_is_out_of_range_is_refused),
+        cmocka_unit_test(figures_of_a_scenario_may_be_extreme),
         cmocka_unit_test(the_voltmeter_has_steps),
         cmocka_unit_test(random_courses_change_where_they_are_said_to),
     };
