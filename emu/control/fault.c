@@ -27,7 +27,7 @@ static void end(struct fault *f, enum fault_state state, int64_t t_ns)
 {
     f->state = state;
     f->ended_ns = t_ns;
-    if (state == FAULT_OVER && f->kind->lift) f->kind->lift(f, t_ns);
+    if (state == FAULT_OVER && !f->kind->once) f->kind->lift(f, t_ns);
     tell(f, t_ns);
 }
 
