@@ -123,6 +123,13 @@ void describe_bus(const struct control_bench *b, cJSON *to, int64_t t_ns)
 
 /* ---- units */
 
+static void add_bus_name(const struct control_bench *b, const struct can_node *node, cJSON *to)
+{
+    for (unsigned i = 0; node && i < b->buses; i++) {
+        if (b->bus[i] == node->bus && b->bus_name[i]) cJSON_AddStringToObject(to, "bus", b->bus_name[i]);
+    }
+}
+
 void describe_units(const struct control_bench *b, cJSON *to)
 {
     cJSON *list = cJSON_AddArrayToObject(to, "units");
@@ -132,6 +139,7 @@ void describe_units(const struct control_bench *b, cJSON *to)
         cJSON_AddStringToObject(j, "name", u->cfg.name);
         add_count(j, "serial", u->cfg.board.serial);
         add_count(j, "node", u->cfg.node);
+        add_bus_name(b, b->node[i], j);
         cJSON_AddStringToObject(j, "profile", u->board.profile.name);
         cJSON_AddBoolToObject(j, "ready", psa2_ready(&u->board));
         cJSON_AddItemToArray(list, j);

@@ -37,6 +37,7 @@ from psabench.protocol_files import DBC_NODE
 NS = 1_000_000_000
 SLICE_NS = NS  # long runs go in slices of simulated time, so that Ctrl-C is heard
 NONE = "none"  # as the CAN specification: no bus
+FIRST = "can0"  # name of a bus that has no other
 
 Kind = TypeVar("Kind", bound=Instrument)
 
@@ -61,14 +62,14 @@ class Bench:
     def __init__(
         self,
         *,
-        cans: Sequence[str | None] = (),
+        cans: Mapping[str, str | None],
         control: Path | None = None,
         truth: Path | None = None,
         scpi: Mapping[str, str] | None = None,
         node: int | None = None,
         emulator: Emulator | Forked | None = None,
     ) -> None:
-        """See `connect`; `emulator` is ended when the bench is closed."""
+        """See `connect`; cans: by name of the bus. `emulator` is ended when the bench is closed."""
         self.emulator = emulator
         self.truth_path = truth
         self.addresses = dict(scpi or {})
@@ -77,12 +78,12 @@ class Bench:
             if emulator is not None:
                 stack.callback(emulator.stop)
             self._control = stack.enter_context(Control(control)) if control else None
-            self._hosts = [stack.enter_context(CanHost(open_bus(c), WallClock())) for c in cans]
+            self.hosts = {n: stack.enter_context(CanHost(open_bus(c), WallClock())) for n, c in cans.items()}
             self._stack = stack.pop_all()
         try:
             self.pace = "real" if self._control is None else str(self._control.call("time").result["pace"])
             self._clock = self._make_clock()
-            for host in self._hosts:
+            for host in self.hosts.values():
                 host.clock = self._clock
             self.units: dict[str, Psa2] = self._find_units(node)
             self.faults = Faults(self)
@@ -121,8 +122,13 @@ class Bench:
     @classmethod
     def _of(cls, emulator: Emulator, node: int | None) -> Bench:
         emulator.__enter__()
+        try:
+            cans = emulator_buses(emulator.endpoints, emulator.control_path)
+        except BaseException:
+            emulator.stop()
+            raise
         return cls(
-            cans=bus_specs(emulator.endpoints),
+            cans=cans,
             control=emulator.control_path,
             truth=emulator.truth_path,
             scpi=scpi_addresses(emulator.endpoints),
@@ -133,7 +139,7 @@ class Bench:
     @classmethod
     def connect(
         cls,
-        can: str | Sequence[str] | None = None,
+        can: str | Mapping[str, str] | None = None,
         *,
         control: str | Path | None = None,
         truth: str | Path | None = None,
@@ -142,16 +148,19 @@ class Bench:
     ) -> Bench:
         """Connect to a bench that is there, real or emulated.
 
-        can: bus of python-can (see `can_host.open_bus`), several, or "none"; None: python-can's own configuration.
+        can: bus of python-can (see `can_host.open_bus`), several by the names of the buses, {"can0": ..., "can1": ...},
+        or "none"; None: python-can's own configuration.
         control, truth: sockets of an emulator. scpi: VISA addresses by instrument, {"head": "TCPIP::...::SOCKET"}.
         node: CANopen node of the unit (5); with a control socket the emulator tells which units there are.
         """
         unknown = set(scpi or {}) - set(KINDS)
         if unknown:
             raise BadInput(f"scpi: no such instrument: {', '.join(sorted(unknown))}; there are {', '.join(KINDS)}")
-        many: Sequence[str | None] = [can] if can is None or isinstance(can, str) else can
+        one: Mapping[str, str | None] = (
+            {} if can == NONE else {FIRST: can} if can is None or isinstance(can, str) else can
+        )
         return cls(
-            cans=[c for c in many if c != NONE],
+            cans=one,
             control=Path(control) if control else None,
             truth=Path(truth) if truth else None,
             scpi=scpi,
@@ -162,7 +171,7 @@ class Bench:
         """A second bench that goes on from this very instant: the emulator forks, the copy gets doors of its own."""
         emulator = Forked(self.control, can=can)
         return Bench(
-            cans=bus_specs(emulator.endpoints),
+            cans=emulator_buses(emulator.endpoints, emulator.control_path),
             control=emulator.control_path,
             truth=emulator.truth_path,
             scpi=scpi_addresses(emulator.endpoints),
@@ -194,10 +203,10 @@ class Bench:
 
     @property
     def host(self) -> CanHost:
-        """This program's end of the first bus."""
-        if not self._hosts:
-            raise BenchError("this bench was connected without a CAN bus")
-        return self._hosts[0]
+        """This program's end of the first bus; `hosts` has all by name."""
+        for host in self.hosts.values():
+            return host
+        raise BenchError("this bench was connected without a CAN bus")
 
     @property
     def unit(self) -> Psa2:
@@ -238,26 +247,21 @@ class Bench:
         return f"no address was given for it, as in scpi={{{name!r}: 'TCPIP::192.0.2.7::5025::SOCKET'}}"
 
     def _make_clock(self) -> WallClock | StepClock:
+        hosts = list(self.hosts.values())
         if self._control is not None and self.pace == "step":
-            return StepClock(self._control, self._hosts)
-        return WallClock(self._hosts)
+            return StepClock(self._control, hosts)
+        return WallClock(hosts if len(hosts) > 1 else ())
 
     def _find_units(self, node: int | None) -> dict[str, Psa2]:
-        """By name, as the emulator tells them; a real bench has one, "a"."""
-        if not self._hosts:
+        """By name, as the emulator tells them, if their bus is connected; a real bench has one, "a"."""
+        if not self.hosts:
             return {}
         if self._control is None or node is not None:
-            return {"a": Psa2(self._hosts[0], DBC_NODE if node is None else node)}
+            return {"a": Psa2(self.host, DBC_NODE if node is None else node)}
         units = self._control.call("units").result["units"]
-        return {u["name"]: Psa2(self._host_of(u), int(u["node"])) for u in units}
-
-    def _host_of(self, unit: Mapping[str, Any]) -> CanHost:
-        """The host on the unit's bus; with one host, that."""
-        channel = unit.get("bus")
-        for host in self._hosts:
-            if channel is not None and host.bus.channel_info.endswith(str(channel)):
-                return host
-        return self._hosts[0]
+        one_bus = len({u.get("bus") for u in units}) == 1
+        hosts = {u["name"]: self.host if one_bus else self.hosts.get(u["bus"]) for u in units}
+        return {u["name"]: Psa2(host, int(u["node"])) for u in units if (host := hosts[u["name"]])}
 
     # ---- time
 
@@ -270,8 +274,8 @@ class Bench:
         """Let the bench's time pass, receiving meanwhile: simulated time in step pace, else real time."""
         if isinstance(self._clock, StepClock):
             self.run_for(dwell_s)
-        elif self._hosts:
-            self._hosts[0].advance(dwell_s)
+        elif self.hosts:
+            self.host.advance(dwell_s)
         else:
             time.sleep(max(0.0, dwell_s))
 
@@ -345,7 +349,7 @@ class Bench:
             angle_deg=table.get("angle_deg"),
             rate_dps=table.get("rate_dps"),
             temp_degc=chamber.get("temp_degc"),
-            frames=sum(h.received for h in self._hosts),
+            frames=sum(h.received for h in self.hosts.values()),
             late=counters.get("pace", {}).get("late"),
             lost=sum(u.frames.counters.lost for u in self.units.values()),
         )
@@ -386,16 +390,25 @@ class Bench:
         return Path(path)
 
 
-def bus_specs(endpoints: Sequence[Mapping[str, str]]) -> list[str]:
-    """How python-can opens the CAN endpoints of an emulator (its `ready` lines)."""
-    return [bus_spec(e) for e in endpoints if "can" in e]
+def emulator_buses(endpoints: Sequence[Mapping[str, str]], control: Path | None) -> dict[str, str | None]:
+    """How python-can opens the buses of an emulator that units are on, by name, through its `ready` endpoints."""
+    with ExitStack() as stack:
+        units = stack.enter_context(Control(control)).call("units").result["units"] if control else []
+    buses = list(dict.fromkeys(u.get("bus", FIRST) for u in units)) or [FIRST]
+    found: dict[str, str | None] = {}
+    for e in (e for e in endpoints if "can" in e):
+        # a socketcand without a bus of its own serves them all, by the name that a client opens
+        serves = [e["bus"]] if "bus" in e else buses if e["can"] == "socketcand" else buses[:1]
+        for bus in serves:
+            found.setdefault(bus, bus_spec(e, bus if len(buses) > 1 else None))
+    return found
 
 
-def bus_spec(endpoint: Mapping[str, str]) -> str:
-    """How python-can opens one CAN endpoint of an emulator."""
+def bus_spec(endpoint: Mapping[str, str], bus: str | None = None) -> str:
+    """How python-can opens a CAN endpoint of an emulator; bus: its name there, for a server of several."""
     kind = endpoint["can"]
     if kind == "socketcand":
-        return f"socketcand:{endpoint['host']}:{endpoint['port']}"
+        return f"socketcand:{endpoint['host']}:{endpoint['port']}" + (f",channel={bus}" if bus else "")
     if kind == "slcan":
         return f"slcan:{endpoint['pty']}"
     return f"socketcan:{endpoint['channel']},fd=true,receive_own_messages=false"

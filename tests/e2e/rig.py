@@ -15,7 +15,7 @@ from typing import Any, Protocol
 
 import pytest
 from psabench.bench import bus_spec as bus_spec  # for the tests that take it from here
-from psabench.bench import bus_specs, scpi_addresses
+from psabench.bench import scpi_addresses
 from psabench.can_host import CanHost
 from psabench.control import Control
 from psabench.device import Psa2
@@ -86,7 +86,7 @@ class Rig:
 
 def addresses(emulator: Emulator) -> tuple[str, ...]:
     """Where an emulator's bus, head and control socket are, as options of `psabench run`."""
-    can = bus_specs(emulator.endpoints)[0]
+    can = bus_spec(emulator.endpoint(can="socketcand"))
     head = scpi_addresses(emulator.endpoints)["head"]
     return "--can", can, "--head", head, "--control", str(emulator.control_path)
 

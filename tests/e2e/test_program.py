@@ -7,10 +7,12 @@ from collections.abc import Iterator
 from dataclasses import astuple
 from pathlib import Path
 
+import numpy as np
 import pytest
 from psabench import Bench
+from psabench.bench import NS
 from psabench.emulator import Emulator
-from psabench.errors import BadInput, BenchError, ControlError, InstrumentError
+from psabench.errors import BadInput, BenchError, ControlError, InstrumentError, TimeOut
 from psabench.face import Face
 from psabench.procedures.head_bench import Reading
 from psabench.procedures.result import ProcedureResult
@@ -143,6 +145,43 @@ def test_what_the_head_refuses_is_raised_where_it_was_asked(bench: Bench) -> Non
 
 
 @HOST
+def test_time_moves_only_when_the_host_says_so(bench: Bench) -> None:
+    assert bench.time_s == 0.0
+    bench.run_for(2.25)  # in slices, of which nobody sees anything
+    assert bench.time_s == 2.25
+    assert bench.control.call("time").t_ns == round(2.25 * NS)
+    bench.head.turn(10.0)
+    bench.probe.lines()
+    assert bench.control.call("time").t_ns == round(2.25 * NS)
+    bench.wait(0.0004)
+    assert bench.step() == pytest.approx(2.251, abs=1e-12)
+    assert bench.step(3) == pytest.approx(2.254, abs=1e-12)
+
+
+@HOST
+def test_a_run_ends_at_the_very_event(bench: Bench) -> None:
+    bench.unit.wait_ready()
+    bench.probe.lines()  # edges are made for who looks: from the next frame on
+    first_s = bench.run_until("DRD_A")
+    assert bench.run_until("DRD_A", count=5) - first_s == pytest.approx(5e-3, abs=2e-9)
+    assert bench.run_until("INT_FALL", unit="a") > first_s
+    assert bench.probe.lines()["Int"] == 0
+    with pytest.raises(TimeOut, match=r"POWER_DOWN: 0 of 1 came within 0\.01 s"):
+        bench.run_until("POWER_DOWN", limit_s=0.01)
+    with pytest.raises(ControlError, match="NO_SUCH"):
+        bench.run_until("NO_SUCH")
+
+
+@HOST
+def test_in_real_time_an_event_is_waited_for() -> None:
+    with Bench.start(BENCH, pace="wall") as b:
+        b.unit.wait_ready()
+        b.run_until("DRD_A", count=3, limit_s=PATIENCE_S)
+        with pytest.raises(TimeOut, match="POWER_DOWN: 0 of 1"):
+            b.run_until("POWER_DOWN", limit_s=0.05)
+
+
+@HOST
 def test_two_units_on_one_bus_are_two_objects() -> None:
     with Bench.start("multi") as b:
         assert list(b.units) == ["a", "b"]
@@ -153,6 +192,29 @@ def test_two_units_on_one_bus_are_two_objects() -> None:
 
 
 # ---- looking, breaking, saving
+
+
+@HOST
+def test_a_trace_holds_what_happened_meanwhile(bench: Bench, tmp_path: Path) -> None:
+    bench.unit.wait_ready()
+    with bench.trace(tmp_path / "run.vcd") as path:
+        bench.run_for(0.01)
+    text = path.read_text()
+    assert "$var wire 1" in text
+    assert "Int" in text
+    before = len(text)
+    bench.run_for(0.01)
+    assert len(path.read_text()) == before
+    with pytest.raises(ControlError):
+        bench.probe.stop()
+
+
+@HOST
+def test_the_truth_of_an_instant_is_told_to_graders(bench: Bench) -> None:
+    bench.head.turn(90.0)
+    state = bench.truth_state()["unit"]
+    assert state["f_mps2"] == pytest.approx(bench.truth_state("a")["unit"]["f_mps2"])
+    assert np.linalg.norm(state["f_mps2"]) == pytest.approx(bench.truth()["site"]["g_mps2"], rel=1e-9)
 
 
 @HOST
@@ -170,3 +232,29 @@ def test_a_fault_is_added_seen_and_cleared(bench: Bench) -> None:
     assert bench.unit.stream(20).axis("x").mean() == pytest.approx(clean.mean(), abs=1e-6)
     with pytest.raises(ControlError, match="DRD"):
         bench.fault("sensor.bias", "a.line.DRD_A", bias_v=0.1)
+
+
+@HOST
+def test_a_snapshot_and_a_fork_go_on_as_the_bench_itself(bench: Bench, tmp_path: Path) -> None:
+    bench.unit.wait_ready()
+    bench.head.turn(37.0)
+    bench.snapshot(tmp_path / "now.psa")
+    with bench.fork() as twin, Bench.restore(tmp_path / "now.psa") as again:
+        want = bench.unit.stream(50)
+        for other in (twin, again):
+            assert other.time_s < bench.time_s
+            assert other.head.angle_deg == bench.head.angle_deg
+            got = other.unit.stream(50)
+            assert np.array_equal(got.u_v, want.u_v)
+            assert np.array_equal(got.t_sample_s, want.t_sample_s)
+        twin.head.turn(0.0)
+        assert bench.head.angle_deg == 37.0
+
+
+@HOST
+def test_a_damaged_snapshot_is_refused_in_one_line(bench: Bench, tmp_path: Path) -> None:
+    path = bench.snapshot(tmp_path / "now.psa")
+    path.write_bytes(path.read_bytes()[:-100])
+    with pytest.raises(BadInput, match=r"now\.psa") as refused:
+        Bench.restore(path)
+    assert str(refused.value).count("\n") == 0
