@@ -14,11 +14,14 @@ import time
 from collections.abc import Mapping, Sequence
 from fcntl import ioctl
 from types import TracebackType
+from typing import Self
 
 import pytest
 from rig import PATIENCE_S
 
 ESCAPES = re.compile(r"\x1b(\[[0-9;?]*[A-Za-z]|[()][A-Z0-9]|[=>78])")
+
+WHERE, HERE = b"\x1b[6n", b"\x1b[1;1R"  # a program asks where the cursor is, and draws its lower rows when it knows
 
 
 class Terminal:
@@ -30,17 +33,27 @@ class Terminal:
         self._master, slave = pty.openpty()
         ioctl(slave, termios.TIOCSWINSZ, struct.pack("HHHH", 40, 120, 0, 0))
         self._process = subprocess.Popen(
-            argv, env={**env, "TERM": "xterm"}, stdin=slave, stdout=slave, stderr=slave, start_new_session=True
+            argv,
+            env={**env, "TERM": "xterm"},
+            stdin=slave,
+            stdout=slave,
+            stderr=slave,
+            start_new_session=True,
+            preexec_fn=lambda: ioctl(0, termios.TIOCSCTTY, 0),  # its Ctrl-C is a signal
         )
         os.close(slave)
 
-    def __enter__(self) -> Terminal:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, e: BaseException | None, tb: TracebackType | None) -> None:
         self._process.kill()
         self._process.wait()
         os.close(self._master)
+
+    @property
+    def pid(self) -> int:
+        return self._process.pid
 
     def wait_for(self, pattern: str, patience_s: float = PATIENCE_S) -> re.Match[str]:
         """Until the pattern has been drawn since the last match."""
@@ -70,6 +83,8 @@ class Terminal:
                 chunk = os.read(self._master, 65536)
             if not chunk:
                 return False
+            for _ in range(chunk.count(WHERE)):
+                os.write(self._master, HERE)
             self._raw += chunk.decode(errors="replace")
             self.text = ESCAPES.sub(" ", self._raw)
         return True

@@ -31,7 +31,7 @@ RIGHT: list[tuple[str, str, dict[str, object]]] = [
     ("probe.start path='a b'", "probe.start", {"path": "a b"}),
     ("probe.lines", "probe.lines", {}),
     ("faults.add stuck a.sensor.x at_s=63ms", "faults.add", {"kind": "stuck", "point": "a.sensor.x", "at_s": 0.063}),
-    ("faults.add new_kind a.x", "faults.add", {"kind": "new_kind", "point": "a.x"}),  # the bench decides
+    ("faults.add stuck z.sensor.x", "faults.add", {"kind": "stuck", "point": "z.sensor.x"}),  # the bench decides
     ("faults.add bias a.sensor.x 10mV", "faults.add", {"kind": "bias", "point": "a.sensor.x", "bias_v": 0.01}),
     ("faults.add point=b.adc.x kind=stuck", "faults.add", {"kind": "stuck", "point": "b.adc.x"}),
     ("wait 5ms", "wait", {"for_s": 0.005}),
@@ -60,6 +60,7 @@ WRONG: list[tuple[str, int, str]] = [
     ("supply.output maybe", 15, "on: 'maybe'; on or off is right"),
     ("probe.start run.vcd c", 21, "unit: 'c'; there is a, b"),
     ("faults.add bias a.sensor.x", 27, "bias_v is missing: added, V, -15 to 15; usage: faults.add"),
+    ("faults.add stack a.sensor.x", 12, "kind: 'stack'; did you mean stuck? there is stuck, bias, lost"),
     ("faults.add stuck a.sensor.x bias_v=1", 29, "has no argument bias_v; it takes kind, point, at_s"),
     ('probe.start "run', 13, "a quote is not closed"),
     ("scpi.send tabel *IDN?", 11, "did you mean table?"),

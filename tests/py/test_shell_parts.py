@@ -73,10 +73,18 @@ def test_a_result_as_text() -> None:
         "  bb    16",
     ]
     assert render.text({}) == ""
+    assert render.text({"kinds": [{"kind": "bias", "args": [{"name": "bias_v", "unit": "V"}]}]}).splitlines() == [
+        "kinds",
+        "  kind  args",
+        "  bias  bias_v",
+    ]
+    long = render.text({"points": [f"a.line.{n}" for n in range(20)]}).splitlines()
+    assert len(long) == 2
+    assert all(len(line) < 120 for line in long)
     assert render.text({"a": {"b": 1.0 / 3.0}}).splitlines() == ["a", "  b  0.333333333"]
 
 
-RESULT = {"angle_deg": 30.004, "at_rest": True, "face": "side", "clients": [{"lost": 3}], "none": {}}
+RESULT = {"angle_deg": 30.004, "at_rest": True, "face": "side", "clients": [{"lost": 3}], "none": {}, "value": "56h"}
 HELD = [
     "angle_deg = 30 +- 0.01",
     "angle_deg > 30",
@@ -87,14 +95,16 @@ HELD = [
     'face = "side"',
     "clients.0.lost = 3",
     "clients.0.lost < 10h",
+    "value = 56h",
+    "value > 55h",
 ]
 FAILED = [
     ("angle_deg = 30", "angle_deg is 30.004, expected = 30"),
-    ("angle_deg = 30 +- 0.001", "expected = 30.0 +- 0.001"),
+    ("angle_deg = 30 +- 0.001", "expected = 30 +- 0.001"),
     ("angle_deg < 30", "expected < 30"),
-    ("at_rest = 1 +- 2", "at_rest is True"),
+    ("at_rest = 1 +- 2", "at_rest is true"),
     ("face > 3", "face is side"),
-    ("angel_deg = 3", "the latest result has no angel_deg; it has angle_deg, at_rest, face, clients, none"),
+    ("angel_deg = 3", "the latest result has no angel_deg; it has angle_deg, at_rest, face, clients, none, value"),
     ("clients.1.lost = 3", "the latest result has no 1 there"),
 ]
 

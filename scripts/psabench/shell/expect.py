@@ -50,6 +50,7 @@ class Expectation:
         """What does not hold; "" if all is well. A result without the field fails as well."""
         try:
             got = look(result, self.path)
+            got = literal(got) if isinstance(got, str) else got  # 56h of a register is a number here as well
         except KeyError as e:
             return f"{self.path}: {e.args[0]}"
         if self.within is not None:
@@ -60,8 +61,8 @@ class Expectation:
             held = _OPS[self.op](got, self.value)
         if held:
             return ""
-        wanted = f"{self.op} {self.value}" + (f" +- {self.within:g}" if self.within is not None else "")
-        return f"{self.path} is {got}, expected {wanted}"
+        wanted = f"{self.op} {_shown(self.value)}" + (f" +- {self.within:g}" if self.within is not None else "")
+        return f"{self.path} is {_shown(got)}, expected {wanted}"
 
 
 def literal(text: str) -> float | bool | str:
@@ -91,3 +92,9 @@ def look(result: Any, path: str) -> Any:
 
 def _is_number(x: object) -> bool:
     return isinstance(x, int | float) and not isinstance(x, bool)
+
+
+def _shown(x: object) -> str:
+    if isinstance(x, bool):
+        return "true" if x else "false"
+    return f"{x:.12g}" if isinstance(x, int | float) else str(x)

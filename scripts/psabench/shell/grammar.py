@@ -13,6 +13,7 @@ from psabench.shell.vocabulary import Arg, Command, Kind, Vocabulary
 from psabench.shell.words import Word, Wrong, quote, split
 
 Value = float | int | bool | str | list[float]
+LISTED = 12  # choices that are told when one of them may have been meant
 _NAMED = re.compile(r"([a-z][a-z0-9_]*)=")
 _BOOLS = {"on": True, "true": True, "yes": True, "1": True, "off": False, "false": False, "no": False, "0": False}
 
@@ -127,7 +128,8 @@ def value(a: Arg, word: Word) -> Value:
     if a.choices and a.strict and word.text not in a.choices:
         near = difflib.get_close_matches(word.text, a.choices, 1)
         hint = f"did you mean {near[0]}? " if near else ""
-        raise Wrong(f"{a.name}: {word.text!r}; {hint}there is {', '.join(a.choices)}", word.column)
+        known = f"there is {', '.join(a.choices)}" if len(a.choices) <= LISTED or not near else "Tab lists them"
+        raise Wrong(f"{a.name}: {word.text!r}; {hint}{known}", word.column)
     return word.text
 
 

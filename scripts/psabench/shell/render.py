@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Mapping
 from typing import Any
+
+WIDTH = 100  # of a value in a line
 
 
 def text(result: Mapping[str, Any]) -> str:
@@ -15,7 +18,10 @@ def _lines(result: Mapping[str, Any], indent: str) -> list[str]:
     lines: list[str] = []
     simple = {k: v for k, v in result.items() if not _nested(v)}
     width = max((len(k) for k in simple), default=0)
-    lines += [f"{indent}{k:{width}}  {scalar(v)}" for k, v in simple.items()]
+    for k, v in simple.items():
+        first, *more = textwrap.wrap(scalar(v), WIDTH) or [""]
+        lines.append(f"{indent}{k:{width}}  {first}".rstrip())
+        lines += [f"{indent}{'':{width}}  {rest}" for rest in more]
     for k, v in result.items():
         if isinstance(v, Mapping) and v:
             inner = _lines(v, indent + "  ")
@@ -39,8 +45,8 @@ def scalar(v: Any) -> str:
         return "true" if v else "false"
     if isinstance(v, float):
         return f"{v:.9g}"
-    if isinstance(v, Mapping):
-        return ", ".join(f"{k} {scalar(x)}" for k, x in v.items())
+    if isinstance(v, Mapping):  # of a row that is known by its name, the name is enough here
+        return str(v["name"]) if "name" in v else ", ".join(f"{k} {scalar(x)}" for k, x in v.items())
     if isinstance(v, list):
         return " ".join(scalar(x) for x in v)
     return "" if v is None else str(v)

@@ -160,7 +160,7 @@ def with_kinds(add: Command, kinds: Sequence[Mapping[str, Any]], points: Sequenc
     of_kinds = {a["name"] for k in kinds for a in k["args"]}
     common = [a for a in others if a.name not in of_kinds]
     names = tuple(str(k["kind"]) for k in kinds)
-    kind = replace(kind, choices=names, strict=False)
+    kind = replace(kind, kind=Kind.CHOICE, choices=names, strict=True)
     variants = {}
     for k in kinds:
         here = tuple(p for p in points if any(_is_at(p, place) for place in k["points"]))
