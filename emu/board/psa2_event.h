@@ -26,7 +26,7 @@ int psa2_event_find(const char *name);
 
 /* What the controller KPSA does wrong, while it does. */
 struct psa2_controller_fault {
-    bool skip_sync_t; /* never a pulse on SYNC_T: the channels of the scan mix in the filter, the set-up goes on */
+    bool skip_sync_t;       /* never a pulse on SYNC_T: temperature words come every data period, settled or not */
     bool wrong_setup_order; /* the set-up's steps of each data-ready event in reverse order; from the next Res on */
     bool frozen_words;      /* the codes of the frame before, over and over; number and time go on */
 };
