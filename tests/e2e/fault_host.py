@@ -22,13 +22,18 @@ Floats = NDArray[np.float64]
 VOLTS = 10.0 / 2**23  # a code, protocol page
 STAMP_S, STAMPS = 4e-6, 1 << 16  # TSTAMP of PSA2_ZT
 PERIOD_S = 1e-3
+XY, ZT, EMCY, HEARTBEAT = 0x180, 0x280, 0x080, 0x700  # identifiers of node 0
 ACCEL_PORT, TEMP_PORT = 0xFF01, 0xFF02  # EMCY codes
 SETTLE_S = 0.08  # 63 data periods and some
 SETUP_S = 0.26  # from Res to settled frames, four temperature channels included
 
 
-def signed(value: int, bits: int) -> int:
-    return value - (1 << bits) if value >> (bits - 1) else value
+def number(data: bytes) -> int:
+    return int.from_bytes(data, "little")
+
+
+def signed(data: bytes) -> int:
+    return int.from_bytes(data, "little", signed=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,26 +140,22 @@ class Host:
         return self.seen(unit)
 
     def seen(self, unit: str) -> Seen:
+        """What has come since the last `watch` began."""
         node = self.node[unit]
-        s = Seen([], [], [], 0, [m for m in self._kept if m.is_error_frame], 0, "")
-        mine = [m for m in self._kept if not m.is_error_frame]
-        boots = 0
-        for m in mine:
-            d = bytes(m.data)
-            number = lambda a, b, d=d: int.from_bytes(d[a:b], "little")  # noqa: E731
-            if m.arbitration_id == 0x180 + node:
-                s.xy.append((m.timestamp, number(6, 8), signed(number(0, 3), 24), signed(number(3, 6), 24)))
-            elif m.arbitration_id == 0x280 + node:
-                s.zt.append((m.timestamp, signed(number(0, 3), 24), signed(number(3, 5), 16), d[5], number(6, 8)))
-            elif m.arbitration_id == 0x080 + node:
-                s.emcy.append(number(0, 2))
-            elif m.arbitration_id == 0x700 + node and d == b"\0":
-                boots += 1
-        own = [(m.arbitration_id, bytes(m.data)) for m in mine if m.arbitration_id & 0x7F == node]
-        repeated = sum(a == b for a, b in pairwise(own))
-        letters = {0x180 + node: "x", 0x280 + node: "z"}
-        halves = "".join(letters.get(m.arbitration_id, "") for m in mine)
-        return Seen(s.xy, s.zt, s.emcy, boots, s.errors, repeated, halves)
+        mine = [
+            (m.timestamp, m.arbitration_id - node, bytes(m.data))
+            for m in self._kept
+            if not m.is_error_frame and m.arbitration_id & 0x7F == node
+        ]
+        return Seen(
+            xy=[(t, number(d[6:8]), signed(d[0:3]), signed(d[3:6])) for t, i, d in mine if i == XY],
+            zt=[(t, signed(d[0:3]), signed(d[3:5]), d[5], number(d[6:8])) for t, i, d in mine if i == ZT],
+            emcy=[number(d[0:2]) for _, i, d in mine if i == EMCY],
+            boots=sum(i == HEARTBEAT and d == b"\0" for _, i, d in mine),
+            errors=[m for m in self._kept if m.is_error_frame],
+            repeated=sum(a[1:] == b[1:] for a, b in pairwise(mine)),
+            halves="".join({XY: "x", ZT: "z"}.get(i, "") for _, i, _ in mine),
+        )
 
     def turn(self, angle_deg: float) -> None:
         self.control.call("head.turn", angle_deg=angle_deg)
