@@ -21,6 +21,20 @@ static bool fail(const struct scenario *s, const struct scenario_event *e, const
     return false;
 }
 
+/* An instrument's commands want the instrument: the section of the scenario that is missing, or NULL. */
+static const char *missing(const struct scenario *s, const char *cmd)
+{
+    const struct {
+        const char *prefix, *section;
+        bool there;
+    } rows[] = {{"table.", "table", s->lab.table.axes > 0},
+                {"chamber.", "chamber", s->lab.chamber.present},
+                {"supply.", "supply", s->lab.supply.present}};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
+        if (!rows[i].there && strncmp(cmd, rows[i].prefix, strlen(rows[i].prefix)) == 0) return rows[i].section;
+    return NULL;
+}
+
 static bool check_event(const struct scenario *s, const struct control_bench *view, const struct scenario_event *e,
                         const char *what, char *why, size_t cap)
 {
@@ -32,6 +46,9 @@ static bool check_event(const struct scenario *s, const struct control_bench *vi
         return fail(s, e, what, text, why, cap);
     }
     if (!row->changes) return fail(s, e, what, "changes nothing on the bench; a command that does is wanted", why, cap);
+    const char *section = missing(s, e->cmd);
+    if (section) snprintf(text, sizeof text, "there is none on this bench: a section %s is wanted", section);
+    if (section) return fail(s, e, what, text, why, cap);
     cJSON *args = cJSON_Parse(e->args);
     const bool ok = control_check(view, e->cmd, args, text);
     cJSON_Delete(args);

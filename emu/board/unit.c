@@ -14,11 +14,17 @@ static double temp_degc(void *ctx, unsigned channel, int64_t t_ns)
     return channel < UNIT_AXES ? chamber_element_degc(c, &u->body, t_ns) : chamber_case_degc(c, &u->body, t_ns);
 }
 
-/* Of the sensor's element, where the sensor minds it. */
+enum { WARM_STEP_NS = 10000000 }; /* no element warms by a millikelvin in so long */
+
+/* Of the sensor's element, where the sensor minds it; as it was at the latest whole step, whoever looks how often. */
 static void warm(struct unit *u, unsigned axis, int64_t t_ns)
 {
     struct mems *m = &u->mems[axis];
-    if (m->cfg.u0_tc_v_per_k != 0.0 || m->cfg.k_tc_per_k != 0.0) m->temp_degc = temp_degc(u, axis, t_ns);
+    if (m->cfg.u0_tc_v_per_k == 0.0 && m->cfg.k_tc_per_k == 0.0) return;
+    const int64_t step = t_ns / WARM_STEP_NS;
+    if (step == u->warm_step[axis]) return;
+    u->warm_step[axis] = step;
+    m->temp_degc = temp_degc(u, axis, step * WARM_STEP_NS);
 }
 
 static double accel_signal(void *ctx, unsigned axis, int64_t t_ns)
@@ -95,6 +101,7 @@ void unit_init(struct unit *u, const struct unit_cfg *cfg, struct lab *lab, stru
     u->listeners = u->told_next = NULL;
     for (unsigned i = 0; i < UNIT_AXES; i++) {
         u->sensor_faults[i] = NULL;
+        u->warm_step[i] = -1;
         const struct mems_cfg m = mems_cfg_si(&cfg->axis[i].mems, lab->site.g_mps2);
         mems_init(&u->mems[i], &m, rng_stream(cfg->board.seed, cfg->board.serial, noise[i]));
         u->cos_alpha0[i] = det_cos(m.alpha0_rad);

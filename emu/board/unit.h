@@ -44,6 +44,7 @@ struct unit {
     struct unit_cfg cfg;
     struct lab *lab;
     struct chamber_body body;
+    int64_t warm_step[UNIT_AXES]; /* at which the sensor's temperature was taken */
     struct psa2 board;
     struct mems mems[UNIT_AXES];
     struct sensor_fault *sensor_faults[UNIT_AXES]; /* psa2_sample_until() before each change */
