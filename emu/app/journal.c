@@ -102,8 +102,8 @@ static void on_deed(void *ctx, const struct can_hub *h, const struct can_client 
     (void)h;
     if (deed == CAN_HUB_CAME) {
         plain(c->name, text, sizeof c->name);
-        add(j, now_ns(j), "\"bus\":%u,\"came\":%" PRIu32 ",\"name\":\"%s\",\"fd\":%s}\n", tap->bus, c->number, text,
-            c->node.fd ? "true" : "false");
+        add(j, now_ns(j), "\"bus\":%u,\"came\":%" PRIu32 ",\"heir_of\":%" PRIu32 ",\"name\":\"%s\",\"fd\":%s}\n",
+            tap->bus, c->number, c->heir_of, text, c->node.fd ? "true" : "false");
     } else if (deed == CAN_HUB_WENT) {
         add(j, now_ns(j), "\"bus\":%u,\"went\":%" PRIu32 "}\n", tap->bus, c->number);
     } else {
@@ -232,9 +232,12 @@ static bool read_frame(const char *text, struct can_msg *m)
 
 static bool read_came(const cJSON *json, struct journal_entry *e)
 {
+    double heir_of;
     const cJSON *name = cJSON_GetObjectItemCaseSensitive(json, "name");
     const cJSON *fd = cJSON_GetObjectItemCaseSensitive(json, "fd");
     if (!cJSON_IsString(name) || !cJSON_IsBool(fd)) return false;
+    if (!get_count(json, "heir_of", UINT32_MAX, &heir_of)) return false;
+    e->heir_of = (uint32_t)heir_of;
     snprintf(e->name, sizeof e->name, "%.31s", name->valuestring);
     e->fd = cJSON_IsTrue(fd);
     return true;

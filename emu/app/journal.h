@@ -1,6 +1,6 @@
 /* What came into a bench from outside, each with its instant: with the scenario it makes the same bench again.
  *
- *     {"t":1000,"bus":0,"came":1,"name":"can0","fd":false}     a program is on the bus, the first one
+ *     {"t":1000,"bus":0,"came":1,"heir_of":0,"name":"can0","fd":false}     a program is on the bus, the first one
  *     {"t":2500,"bus":0,"from":1,"frame":"605#4018100100000000"}     it sent a frame (can-utils' notation; ## for FD)
  *     {"t":2500,"ran":true,"cmd":"head.turn","args":{"angle_deg":90}}     a command that changes the bench was carried out
  *     {"t":9000,"bus":0,"went":1}     the program has left
@@ -65,7 +65,7 @@ struct journal_entry {
     int64_t t_ns;
     bool ran;
     unsigned bus, unit;
-    uint32_t client, watch;
+    uint32_t client, heir_of, watch; /* heir_of: whose place, and frames that wait, it took over; 0: nobody's */
     bool fd;
     char name[32];
     struct can_msg m;

@@ -289,6 +289,7 @@ static void moved(void *ctx, int64_t now_ns)
     bench_follow(s->bench);
     journal_moved(&s->journal);
     service_sweep(s, false);
+    snapshot_let_go(&s->ears, s->bench);
     if (s->bench->recording) tell_vcd_error(s, "the recording ends here, the run goes on");
 }
 

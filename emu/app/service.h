@@ -33,6 +33,7 @@ struct service {
     bool refused;         /* which cannot be done again */
     uint32_t comings;     /* CAN clients that came before time began: of the snapshot */
     struct truth_log truth_log;
+    struct snapshot_ears ears;
 };
 
 /* Where the bench comes from. */

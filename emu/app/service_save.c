@@ -28,7 +28,7 @@ void service_follow(struct service *s)
 bool service_restore(struct service *s, const struct snapshot *from, char *why, size_t cap)
 {
     struct snapshot_world w = {
-        .bench = s->bench, .journal = &s->journal, .buses = s->ports.hubs, .control = &s->control};
+        .bench = s->bench, .journal = &s->journal, .buses = s->ports.hubs, .control = &s->control, .ears = &s->ears};
     char what[640];
     for (unsigned i = 0; i < w.buses; i++) w.hub[i] = &s->ports.hub[i];
     service_power_up(s);
@@ -53,6 +53,10 @@ void service_abandon(struct service *s)
 {
     struct bench *b = s->bench;
     for (unsigned i = 0; i < s->ports.hubs; i++) can_hub_haunt_all(&s->ports.hub[i]);
+    snapshot_listen(&s->ears, b);
+    for (unsigned i = 0; i < CONTROL_SUBS_MAX; i++) {
+        if (s->control.watch.sub[i].control) control_gone(&s->control, s->control.watch.sub[i].client);
+    }
     if (b->recording) vcd_close(&b->vcd, b->sched.now_ns);
     b->recording = false;
     truth_log_close(&s->truth_log);

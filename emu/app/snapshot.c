@@ -268,7 +268,6 @@ void snapshot_free(struct snapshot *s)
 
 struct replay {
     const struct snapshot_world *w;
-    struct trace_sink ear[CONTROL_UNITS_MAX]; /* in the place of whoever listened to a unit's lines */
     char why[WHY_MAX];
 };
 
@@ -277,6 +276,30 @@ static void on_steps(void *ctx, const struct trace_step *s, unsigned n)
     (void)ctx;
     (void)s;
     (void)n;
+}
+
+static void hang(struct snapshot_ears *e, struct bench *b, unsigned unit, uint32_t mask)
+{
+    struct trace *t = &b->unit[unit].board.trace;
+    struct trace_sink *ear = &e->ear[unit];
+    trace_detach(t, ear);
+    *ear = (struct trace_sink){.mask = mask, .steps = on_steps};
+    if (mask) trace_attach(t, ear);
+    e->on = true;
+}
+
+void snapshot_listen(struct snapshot_ears *e, struct bench *b)
+{
+    for (unsigned i = 0; i < b->scenario.unit_count; i++) {
+        const uint32_t watched = b->unit[i].board.trace.watched;
+        if (watched) hang(e, b, i, watched);
+    }
+}
+
+void snapshot_let_go(struct snapshot_ears *e, struct bench *b)
+{
+    for (unsigned i = 0; i < b->scenario.unit_count && e->on; i++) trace_detach(&b->unit[i].board.trace, &e->ear[i]);
+    e->on = false;
 }
 
 static void run_to(const struct snapshot_world *w, int64_t t_ns)
@@ -298,6 +321,14 @@ static struct can_client *find_client(const struct can_hub *h, uint32_t number)
     return c;
 }
 
+static bool do_came(struct replay *r, struct can_hub *h, const struct journal_entry *e)
+{
+    struct can_client *before = e->heir_of ? find_client(h, e->heir_of) : NULL;
+    if (e->heir_of && !before) return fail(r->why, WHY_MAX, "program %" PRIu32 " is not on the bus", e->heir_of);
+    if (before) before->vacant = true;
+    return can_hub_ghost(h, e->client, e->name, e->fd) || fail(r->why, WHY_MAX, "no memory");
+}
+
 static bool do_client(struct replay *r, const struct journal_entry *e)
 {
     if (e->bus >= r->w->buses) return fail(r->why, WHY_MAX, "there is no bus %u", e->bus);
@@ -306,8 +337,7 @@ static bool do_client(struct replay *r, const struct journal_entry *e)
     if (!c != (e->kind == JOURNAL_CAME)) {
         return fail(r->why, WHY_MAX, "program %" PRIu32 " %s on the bus", e->client, c ? "is already" : "is not");
     }
-    if (e->kind == JOURNAL_CAME)
-        return can_hub_ghost(h, e->client, e->name, e->fd) || fail(r->why, WHY_MAX, "no memory");
+    if (e->kind == JOURNAL_CAME) return do_came(r, h, e);
     if (e->kind == JOURNAL_WENT) can_hub_dismiss(h, c);
     else if (!can_hub_send(h, c, &e->m, e->t_ns)) return fail(r->why, WHY_MAX, "the bus does not take the frame");
     return true;
@@ -328,11 +358,7 @@ static bool do_watch(struct replay *r, const struct journal_entry *e)
 {
     struct bench *b = r->w->bench;
     if (e->unit >= b->scenario.unit_count) return fail(r->why, WHY_MAX, "there is no unit %u", e->unit);
-    struct trace_sink *ear = &r->ear[e->unit];
-    struct trace *t = &b->unit[e->unit].board.trace;
-    trace_detach(t, ear);
-    *ear = (struct trace_sink){.mask = e->watch, .steps = on_steps};
-    if (e->watch) trace_attach(t, ear);
+    hang(r->w->ears, b, e->unit, e->watch);
     return true;
 }
 
@@ -362,20 +388,14 @@ static bool do_all(struct replay *r, const struct snapshot *s)
 
 bool snapshot_replay(const struct snapshot *s, const struct snapshot_world *w, char *why, size_t cap)
 {
-    struct replay *r = calloc(1, sizeof *r);
+    struct replay r = {.w = w};
     char state[SHA256_HEX];
-    if (!r) return fail(why, cap, "no memory");
-    r->w = w;
-    bool good = do_all(r, s);
-    if (!good) fail(why, cap, "cannot be done again: %s", r->why);
-    if (good) journal_watchers(w->journal);
-    for (unsigned i = 0; i < w->bench->scenario.unit_count; i++)
-        trace_detach(&w->bench->unit[i].board.trace, &r->ear[i]);
-    free(r);
+    bool good = do_all(&r, s) || fail(why, cap, "cannot be done again: %s", r.why);
+    journal_watchers(w->journal);
     digest_bench(w->bench, w->journal, state);
     if (good && strcmp(state, s->state) != 0) {
         good = fail(why, cap, "makes another bench than the one it was taken of: another build or machine wrote it");
     }
-    for (unsigned i = 0; i < w->buses && good; i++) can_hub_sweep(w->hub[i], false);
+    for (unsigned i = 0; i < w->buses && good; i++) can_hub_vacate(w->hub[i]);
     return good;
 }

@@ -29,31 +29,66 @@ void can_hub_restart(struct can_hub *h, struct can_client *c)
     start_counters(c);
 }
 
-void can_hub_up(struct can_hub *h, struct can_client *c)
-{
-    start_counters(c);
-    c->node.name = c->name;
-    c->up = true;
-    c->leaving = false;
-    c->next = NULL;
-    struct can_client **p = &h->clients;
-    while (*p) p = &(*p)->next;
-    *p = c;
-    c->number = ++h->clients_seen;
-    c->came = h->comings ? ++*h->comings : c->number;
-    can_hub_stall(c, false); /* a fault of whoever was here before */
-    can_attach(h->bus, &c->node);
-    tell(h, c, CAN_HUB_CAME, NULL);
-}
-
 /* by: who takes its place in the list, or NULL. */
 static void unlist(struct can_hub *h, struct can_client *c, struct can_client *by)
 {
     for (struct can_client **p = &h->clients; *p; p = &(*p)->next) {
         if (*p != c) continue;
         *p = by ? by : c->next;
+        if (by) by->next = c->next;
         break;
     }
+}
+
+/* The first place that is free for who comes next, or NULL. */
+static struct can_client *vacancy(const struct can_hub *h)
+{
+    struct can_client *g = h->clients;
+    while (g && !g->vacant) g = g->next;
+    return g;
+}
+
+/* On the bus the client is what the ghost was, but calls are its own. */
+static void inherit(struct can_hub *h, struct can_client *g, struct can_client *c)
+{
+    const struct can_node own = c->node;
+    can_replace(h->bus, &g->node, &c->node);
+    c->node.order = own.order;
+    c->node.fd = own.fd;
+    c->node.rx = own.rx;
+    c->node.sent = own.sent;
+    c->node.error = own.error;
+    c->node.state = own.state;
+    c->node.ctx = own.ctx;
+    unlist(h, g, c);
+    keep_counters(h, g);
+    h->gone.refused += g->refused;
+    free(g);
+}
+
+static void append(struct can_hub *h, struct can_client *c)
+{
+    struct can_client **p = &h->clients;
+    while (*p) p = &(*p)->next;
+    c->next = NULL;
+    *p = c;
+    can_attach(h->bus, &c->node);
+}
+
+void can_hub_up(struct can_hub *h, struct can_client *c)
+{
+    struct can_client *place = vacancy(h);
+    start_counters(c);
+    c->heir_of = place ? place->number : 0;
+    if (place) inherit(h, place, c);
+    else append(h, c);
+    c->node.name = c->name;
+    c->up = true;
+    c->leaving = c->vacant = false;
+    c->number = ++h->clients_seen;
+    c->came = h->comings ? ++*h->comings : c->number;
+    can_hub_stall(c, false); /* a fault of whoever was here before */
+    tell(h, c, CAN_HUB_CAME, NULL);
 }
 
 void can_hub_down(struct can_hub *h, struct can_client *c)
@@ -96,6 +131,7 @@ bool can_hub_haunt(struct can_hub *h, struct can_client *c)
     unlist(h, c, g);
     can_replace(h->bus, &c->node, &g->node);
     silence(g);
+    g->vacant = true;
     c->up = false;
     c->refused = 0;
     return true;
@@ -133,8 +169,14 @@ void can_hub_sweep(struct can_hub *h, bool all)
 {
     for (struct can_client *c = h->clients, *next; c; c = next) {
         next = c->next;
+        c->vacant = false;
         if (c->adapter == ghostly && (c->node.queued == 0 || all)) can_hub_dismiss(h, c);
     }
+}
+
+void can_hub_vacate(struct can_hub *h)
+{
+    for (struct can_client *c = h->clients; c; c = c->next) c->vacant = c->adapter == ghostly;
 }
 
 void can_hub_stall(struct can_client *c, bool on)

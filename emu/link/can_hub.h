@@ -16,6 +16,8 @@ struct can_client {
     char name[32];       /* channel the client opened, or interface */
     struct can_node node;
     bool up;                             /* takes part in the bus */
+    bool vacant;                         /* a ghost whose place goes to who comes next */
+    uint32_t heir_of;                    /* number of the ghost whose place it took; 0: it came to a place of its own */
     bool leaving;                        /* its program has gone, frames of its still wait for the bus */
     bool stalled;                        /* a fault: its output is kept back, as if it did not read */
     void (*stall)(struct can_client *c); /* stalled has changed; may be NULL */
@@ -63,8 +65,8 @@ void can_hub_restart(struct can_hub *h, struct can_client *c);
 /* Detaches it; its counters are added to those of the gone. Frames of its still queued are dropped. */
 void can_hub_down(struct can_hub *h, struct can_client *c);
 
-/* The client's place on the bus, with what it has queued, is taken by a ghost, which leaves when its frames are out; the
- * client itself is down. False when there is no memory: then it is down and its frames are dropped. */
+/* The client's place on the bus, with what it has queued, is taken by a ghost, which leaves when its frames are out, or gives
+ * its place to who comes before time moves; the client itself is down. False when there is no memory: then it is down and its frames are dropped. */
 bool can_hub_haunt(struct can_hub *h, struct can_client *c);
 
 void can_hub_haunt_all(struct can_hub *h); /* whoever is no ghost yet */
@@ -75,7 +77,10 @@ struct can_client *can_hub_ghost(struct can_hub *h, uint32_t number, const char 
 /* A ghost leaves at once, with what it has queued; it is freed. */
 void can_hub_dismiss(struct can_hub *h, struct can_client *ghost);
 
-/* Ghosts with nothing left to send leave; all: every ghost, with what it has queued. */
+/* The places of all ghosts are free: who comes next takes the first, frames that wait and all, and then the next one. */
+void can_hub_vacate(struct can_hub *h);
+
+/* Time has moved: ghosts keep their places. Ghosts with nothing left to send leave; all: every ghost, with what it has queued. */
 void can_hub_sweep(struct can_hub *h, bool all);
 
 /* Queues a frame of the client's; false: refused, and counted. */
