@@ -132,7 +132,9 @@ def _bench(condition: Condition, options: RunOptions) -> Bench:
         return Bench.connect(options.can, scpi=there, control=options.control, truth=options.truth, node=options.node)
     scenario = options.scenario or condition.scenario
     pace = "wall" if options.real_time else "step"
-    return Bench.start(scenario, pace=pace, seed=options.seed, node=options.node)
+    resolved = options.out / ("-".join(x for x in ("scenario", condition.label) if x) + ".json")
+    extra = ["--resolved", resolved]  # every key with its value, and the seed: the run can be repeated from it
+    return Bench.start(scenario, pace=pace, seed=options.seed, node=options.node, extra=extra)
 
 
 def make_params(procedure: Procedure, given: Mapping[str, Any]) -> Any:

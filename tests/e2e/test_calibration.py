@@ -69,6 +69,8 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Found:
     page = (out / "report.html").read_text()
     assert "within their limits of the truth" in page
     assert len(list(out.glob("*.csv"))) == 6
+    for label in ("quiet", "realistic"):
+        assert json.loads((out / f"scenario-{label}.json").read_text())["units"]
     sections = json.loads((out / "result.json").read_text())["sections"]
     return {(s["procedure"], s["label"]): {e["name"]: e for e in s["estimates"]} for s in sections}
 
