@@ -258,3 +258,21 @@ def test_a_damaged_snapshot_is_refused_in_one_line(bench: Bench, tmp_path: Path)
     with pytest.raises(BadInput, match=r"now\.psa") as refused:
         Bench.restore(path)
     assert str(refused.value).count("\n") == 0
+
+
+@HOST
+def test_units_on_several_buses_are_all_there_and_in_step() -> None:
+    """Every unit of the fleet answers on its own bus, and a run returns when the frames of all buses are here."""
+    with Bench.start("fleet64") as b:
+        assert (len(b.units), len(b.hosts)) == (64, 8)
+        first, *_, last = b.units.values()
+        assert first.host is not last.host
+        first.wait_ready()
+        before = [h.received for h in b.hosts.values()]
+        b.run_for(0.1)
+        came = [h.received - n for h, n in zip(b.hosts.values(), before, strict=True)]
+        delivered = b.control.call("frames").result["clients"]
+        assert [h.received for h in b.hosts.values()] == [c["delivered"] for c in delivered]
+        assert min(came[1:]) > 100
+        u_v = [u.stream(5).axis("x").mean() for u in (first, last)]
+        assert u_v[0] != u_v[1]
