@@ -69,7 +69,8 @@ static void add_unit(struct sha256 *s, const struct bench *b, unsigned i)
     add_board(s, &u->board);
     for (unsigned k = 0; k < UNIT_AXES; k++) {
         add_noise(s, &u->mems[k].noise);
-        add_real(s, unit_sensor_v(u, k, b->sched.now_ns));
+        add_noise(s, &u->quartz[k].noise);
+        add_real(s, unit_sensor_out(u, k, b->sched.now_ns));
     }
     add(s, (uint64_t)n->tx_frames << 32 | n->rx_frames);
     add(s, (uint64_t)n->tx_overflow << 32 | n->queued);

@@ -42,6 +42,30 @@ static const struct yaml_field mems_rows[] = {
 };
 const struct yaml_fields scenario_mems_fields = YAML_FIELDS(mems_rows);
 
+#define QUARTZ(m) offsetof(struct quartz_g, m)
+static const struct yaml_field quartz_rows[] = {
+#define ROW(name, lo, hi, words) {.key = #name, .type = YAML_REAL, .offset = QUARTZ(name), .min = lo, .max = hi, .what = words}
+    ROW(scale_a_per_g,      -1, 1,      "current for one g at 30 °C"),
+    ROW(scale_tc_ppm_per_k, -1e4, 1e4,  "its temperature coefficient"),
+    ROW(zero_ug,            -1e6, 1e6,  "zero signal at 30 °C but for the curve, millionths of g"),
+    ROW(curve_ug,           -1e6, 1e6,  "greatest deviation of the zero signal over temperature, hot side"),
+    ROW(curve_centre_degc,  -100, 200,  "where the deviation changes sign"),
+    ROW(curve_width_k,      1, 1000,    "from there to the greatest deviation"),
+    ROW(slope_ug_per_k,     -1e4, 1e4,  "linear part of the zero signal over temperature"),
+    ROW(play_k,             0, 100,     "half the width of the hysteresis over temperature"),
+    ROW(gradient_ug_per_k,  -1e4, 1e4,  "zero signal by the case being warmer than the element"),
+    ROW(tilt_y_mrad,        -100, 100,  "input axis towards the sensor's y"),
+    ROW(tilt_z_mrad,        -100, 100,  "input axis towards the sensor's z"),
+    ROW(square_ug_per_g2,   -1e5, 1e5,  "square of the acceleration"),
+    ROW(alpha0_deg,         -10, 10,    "error of setting: adds to the angle of the head"),
+    ROW(natural_hz,         0, 1e5,     "natural frequency of the loop; 0: answers at once"),
+    ROW(damping,            0, 0.999,   "its damping ratio"),
+    ROW(noise_a_rthz,       0, 1,       "white noise, one-sided density"),
+    ROW(limit_a,            0, 10,      "largest current of either sign; 0: none"),
+#undef ROW
+};
+const struct yaml_fields scenario_quartz_fields = YAML_FIELDS(quartz_rows);
+
 static const struct yaml_field afe_numbers[] = {
 #define ROW(name, lo, hi, words) {.key = #name, .type = YAML_REAL, .offset = AFE(name), .min = lo, .max = hi, .what = words}
     ROW(load_ohm,                 1, 1e6,      "load resistor of a current"),

@@ -17,6 +17,7 @@ extern const struct yaml_fields scenario_spread_fields;        /* of struct scen
 extern const struct yaml_fields scenario_afe_fields;           /* of struct afe_cfg */
 extern const struct yaml_fields scenario_afe_numbers;          /* its numbers alone */
 extern const struct yaml_fields scenario_mems_fields;          /* of struct mems_g */
+extern const struct yaml_fields scenario_quartz_fields;        /* of struct quartz_g */
 extern const struct yaml_fields scenario_unit_fields;          /* of struct scenario_unit */
 extern const struct yaml_fields scenario_axis_fields;          /* of struct scenario_unit: its channel X */
 extern const struct yaml_fields scenario_event_fields;         /* of struct scenario_event */

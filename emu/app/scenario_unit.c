@@ -89,11 +89,13 @@ static bool load_count(struct yaml_file *f, const struct yaml_node *node, void *
 }
 
 // clang-format off
-static const char *const sensors[] = {[UNIT_NO_SENSOR] = "none", [UNIT_MEMS] = "mems", NULL};
+static const char *const sensors[] = {[UNIT_NO_SENSOR] = "none", [UNIT_MEMS] = "mems", [UNIT_QUARTZ] = "quartz", NULL};
 #define AXIS(i)                                                                                                        \
     {.key = "sensor", .type = YAML_CHOICE, .offset = UNIT(cfg.axis[i].sensor), .choices = sensors,                     \
      .what = "`none`: the channel is shorted"},                                                                        \
     {.type = YAML_INLINE, .offset = UNIT(cfg.axis[i].mems), .sub = &scenario_mems_fields},                             \
+    {.key = "quartz", .type = YAML_SECTION, .offset = UNIT(cfg.axis[i].quartz), .sub = &scenario_quartz_fields,        \
+     .present = UNIT(cfg.axis[i].quartz_given), .what = "parameters of a quartz sensor; its afe.input is current"},    \
     {.key = "at_m", .type = YAML_REALS, .offset = UNIT(cfg.axis[i].at_m), .count = 3, .min = -10, .max = 10,           \
      .what = "where the sensor is in the unit, its case's x, y, z"},                                                   \
     {.key = "afe", .type = YAML_SECTION, .offset = UNIT(cfg.board.afe[i]), .sub = &scenario_afe_fields,                \
@@ -156,11 +158,24 @@ static bool plain(const char *name)
 }
 
 /* A name, a node and a number that no other unit of the scenario has. */
+/* A quartz sensor's amperes must not be taken for volts. */
+static bool check_inputs(struct yaml_file *f, const struct yaml_node *node, const struct scenario_unit *u)
+{
+    for (unsigned i = 0; i < UNIT_AXES; i++) {
+        if (u->cfg.axis[i].sensor == UNIT_QUARTZ && u->cfg.board.afe[i].input != AFE_CURRENT) {
+            return yaml_file_fail(f, at(node, "axes"), "axes",
+                                  "%c: a quartz sensor gives a current: afe: {input: current}", "xyz"[i]);
+        }
+    }
+    return true;
+}
+
 static bool check_unit(struct yaml_file *f, const struct yaml_node *node, const struct scenario *s,
                        const struct scenario_unit *u)
 {
     if (!plain(u->name))
         return yaml_file_fail(f, at(node, "name"), "name", "\"%s\": letters, digits and _ are wanted", u->name);
+    if (!check_inputs(f, node, u)) return false;
     for (const struct scenario_unit *other = s->units; other < s->units + s->unit_count; other++) {
         if (strcmp(other->name, u->name) == 0)
             return yaml_file_fail(f, at(node, "name"), "name", "\"%s\" is taken by another unit", u->name);

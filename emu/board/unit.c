@@ -4,6 +4,8 @@
 
 #include <stddef.h>
 
+#define RAD_PER_DEG 0.017453292519943295
+
 /* In the chamber the board is as warm as the case, the thermometers of the sensors as their elements. */
 static double temp_degc(void *ctx, unsigned channel, int64_t t_ns)
 {
@@ -16,15 +18,21 @@ static double temp_degc(void *ctx, unsigned channel, int64_t t_ns)
 
 enum { WARM_STEP_NS = 10000000 }; /* no element warms by a millikelvin in so long */
 
-/* Of the sensor's element, where the sensor minds it; as it was at the latest whole step, whoever looks how often. */
+/* Of the sensor's element, where the sensor minds it; as it was at the latest whole step, whoever looks how often. Without a
+ * chamber a quartz's case is as warm as its element. */
 static void warm(struct unit *u, unsigned axis, int64_t t_ns)
 {
     struct mems *m = &u->mems[axis];
-    if (m->cfg.u0_tc_v_per_k == 0.0 && m->cfg.k_tc_per_k == 0.0) return;
+    struct quartz *q = &u->quartz[axis];
+    const struct chamber *c = &u->lab->chamber;
+    const bool quartz = u->cfg.axis[axis].sensor == UNIT_QUARTZ;
     const int64_t step = t_ns / WARM_STEP_NS;
+    if (!quartz && m->cfg.u0_tc_v_per_k == 0.0 && m->cfg.k_tc_per_k == 0.0) return;
     if (step == u->warm_step[axis]) return;
     u->warm_step[axis] = step;
-    m->temp_degc = temp_degc(u, axis, step * WARM_STEP_NS);
+    const double element_degc = temp_degc(u, axis, step * WARM_STEP_NS);
+    m->temp_degc = q->element_degc = element_degc;
+    q->case_degc = c->cfg.present ? chamber_case_degc(c, &u->body, step * WARM_STEP_NS) : element_degc;
 }
 
 static double accel_signal(void *ctx, unsigned axis, int64_t t_ns)
@@ -34,8 +42,9 @@ static double accel_signal(void *ctx, unsigned axis, int64_t t_ns)
     double a_mps2[3];
     unit_gravity_mps2(u, axis, t_ns, a_mps2);
     warm(u, axis, t_ns);
-    const double out_v = mems_out_v(&u->mems[axis], a_mps2, t_ns);
-    return u->sensor_faults[axis] ? sensor_fault_out(u->sensor_faults[axis], out_v, t_ns) : out_v;
+    const double out = u->cfg.axis[axis].sensor == UNIT_QUARTZ ? quartz_out_a(&u->quartz[axis], a_mps2, t_ns)
+                                                               : mems_out_v(&u->mems[axis], a_mps2, t_ns);
+    return u->sensor_faults[axis] ? sensor_fault_out(u->sensor_faults[axis], out, t_ns) : out;
 }
 
 static void on_frame(void *ctx, const struct psa2_frame *f, int64_t t_ns)
@@ -86,13 +95,17 @@ struct unit_cfg unit_default(const char *name)
 {
     static const struct psa2_unit_cfg quiet = {.adc_noise_scale = 1.0, .temp_noise_scale = 1.0, .seed = 1, .serial = 1};
     struct unit_cfg c = {.name = name, .board = quiet, .node = 5, .temp_degc = {25.0, 25.0, 25.0, 25.0}};
-    for (unsigned i = 0; i < UNIT_AXES; i++) c.board.afe[i] = afe_nominal(AFE_VOLTAGE);
+    for (unsigned i = 0; i < UNIT_AXES; i++) {
+        c.board.afe[i] = afe_nominal(AFE_VOLTAGE);
+        c.axis[i].quartz = quartz_default();
+    }
     return c;
 }
 
 void unit_init(struct unit *u, const struct unit_cfg *cfg, struct lab *lab, struct sched *s)
 {
     static const char *const noise[UNIT_AXES] = {"mems.x", "mems.y", "mems.z"};
+    static const char *const quartz_noise[UNIT_AXES] = {"quartz.x", "quartz.y", "quartz.z"};
     u->cfg = *cfg;
     u->lab = lab;
     u->ctx = NULL;
@@ -104,8 +117,12 @@ void unit_init(struct unit *u, const struct unit_cfg *cfg, struct lab *lab, stru
         u->warm_step[i] = -1;
         const struct mems_cfg m = mems_cfg_si(&cfg->axis[i].mems, lab->site.g_mps2);
         mems_init(&u->mems[i], &m, rng_stream(cfg->board.seed, cfg->board.serial, noise[i]));
-        u->cos_alpha0[i] = det_cos(m.alpha0_rad);
-        u->sin_alpha0[i] = det_sin(m.alpha0_rad);
+        quartz_init(&u->quartz[i], &cfg->axis[i].quartz, lab->site.g_mps2,
+                    rng_stream(cfg->board.seed, cfg->board.serial, quartz_noise[i]));
+        const bool quartz = cfg->axis[i].sensor == UNIT_QUARTZ;
+        const double alpha0_rad = quartz ? cfg->axis[i].quartz.alpha0_deg * RAD_PER_DEG : m.alpha0_rad;
+        u->cos_alpha0[i] = det_cos(alpha0_rad);
+        u->sin_alpha0[i] = det_sin(alpha0_rad);
     }
     chamber_put_in(&lab->chamber, &u->body, cfg->tau_case_s, cfg->tau_element_s);
     const struct psa2_io io = {
@@ -123,11 +140,12 @@ void unit_gravity_mps2(struct unit *u, unsigned axis, int64_t t_ns, double a_mps
     for (unsigned i = 0; i < 3; i++) a_mps2[i] = a[(i + axis) % 3];
 }
 
-double unit_sensor_v(struct unit *u, unsigned axis, int64_t t_ns)
+double unit_sensor_out(struct unit *u, unsigned axis, int64_t t_ns)
 {
     if (u->cfg.axis[axis].sensor == UNIT_NO_SENSOR) return 0.0;
     double a_mps2[3];
     unit_gravity_mps2(u, axis, t_ns, a_mps2);
     warm(u, axis, t_ns);
+    if (u->cfg.axis[axis].sensor == UNIT_QUARTZ) return quartz_true_a(&u->quartz[axis], a_mps2);
     return mems_true_v(&u->mems[axis], a_mps2, t_ns);
 }

@@ -9,17 +9,21 @@
 #include "board/psa2.h"
 #include "phys/lab.h"
 #include "phys/mems.h"
+#include "phys/quartz.h"
 #include "phys/sensor_fault.h"
 
 #define UNIT_AXES  3u
 #define UNIT_TEMPS 4u /* sensors X, Y, Z, converter board */
 
-enum unit_sensor { UNIT_NO_SENSOR, UNIT_MEMS }; /* without a sensor the channel is shorted: 0 V or 0 A */
+/* Without a sensor the channel is shorted: 0 V or 0 A. Quartz gives a current: afe.input has to be current. */
+enum unit_sensor { UNIT_NO_SENSOR, UNIT_MEMS, UNIT_QUARTZ };
 
 struct unit_axis_cfg {
     enum unit_sensor sensor;
     struct mems_g mems;
-    double at_m[3]; /* where it is in the unit, its case's axes */
+    struct quartz_g quartz;
+    bool quartz_given; /* the scenario says something of it */
+    double at_m[3];    /* where it is in the unit, its case's axes */
 };
 
 struct unit_cfg {
@@ -47,6 +51,7 @@ struct unit {
     int64_t warm_step[UNIT_AXES]; /* at which the sensor's temperature was taken */
     struct psa2 board;
     struct mems mems[UNIT_AXES];
+    struct quartz quartz[UNIT_AXES];
     struct sensor_fault *sensor_faults[UNIT_AXES]; /* psa2_sample_until() before each change */
     double cos_alpha0[UNIT_AXES], sin_alpha0[UNIT_AXES];
     void *ctx;
@@ -69,7 +74,7 @@ void unit_unlisten(struct unit *u, struct unit_listener *l); /* harmless for one
 /* What the sensor of a channel measures, a = -f on its own axes: at rest the projections of gravity. Truth. */
 void unit_gravity_mps2(struct unit *u, unsigned axis, int64_t t_ns, double a_mps2[3]);
 
-/* Volts the sensor of a channel would give without noise: truth. */
-double unit_sensor_v(struct unit *u, unsigned axis, int64_t t_ns);
+/* What the sensor of a channel would give without noise: volts, or amperes if it is a quartz. Truth. */
+double unit_sensor_out(struct unit *u, unsigned axis, int64_t t_ns);
 
 #endif

@@ -34,6 +34,27 @@ static void add_mems(const struct mems_g *m, cJSON *to)
     add_real(to, "high_v", m->high_v);
 }
 
+static void add_quartz(const struct quartz_g *q, cJSON *to)
+{
+    add_real(to, "scale_a_per_g", q->scale_a_per_g);
+    add_real(to, "scale_tc_ppm_per_k", q->scale_tc_ppm_per_k);
+    add_real(to, "zero_ug", q->zero_ug);
+    add_real(to, "curve_ug", q->curve_ug);
+    add_real(to, "curve_centre_degc", q->curve_centre_degc);
+    add_real(to, "curve_width_k", q->curve_width_k);
+    add_real(to, "slope_ug_per_k", q->slope_ug_per_k);
+    add_real(to, "play_k", q->play_k);
+    add_real(to, "gradient_ug_per_k", q->gradient_ug_per_k);
+    add_real(to, "tilt_y_mrad", q->tilt_y_mrad);
+    add_real(to, "tilt_z_mrad", q->tilt_z_mrad);
+    add_real(to, "square_ug_per_g2", q->square_ug_per_g2);
+    add_real(to, "alpha0_deg", q->alpha0_deg);
+    add_real(to, "natural_hz", q->natural_hz);
+    add_real(to, "damping", q->damping);
+    add_real(to, "noise_a_rthz", q->noise_a_rthz);
+    add_real(to, "limit_a", q->limit_a);
+}
+
 static void add_afe(const struct afe_cfg *a, cJSON *to)
 {
     cJSON_AddStringToObject(to, "input", a->input == AFE_CURRENT ? "current" : "voltage");
@@ -65,10 +86,13 @@ static void add_unit_truth(struct unit *u, cJSON *to, int64_t t_ns)
     cJSON *axes = cJSON_AddObjectToObject(to, "axes");
     for (unsigned i = 0; i < UNIT_AXES; i++) {
         cJSON *j = cJSON_AddObjectToObject(axes, axis[i]);
-        const bool mems = u->cfg.axis[i].sensor == UNIT_MEMS;
-        cJSON_AddStringToObject(j, "sensor", mems ? "mems" : "none");
-        if (mems) add_mems(&u->cfg.axis[i].mems, j);
-        if (mems) add_real(j, "sensor_v", unit_sensor_v(u, i, t_ns));
+        static const char *const names[] = {[UNIT_NO_SENSOR] = "none", [UNIT_MEMS] = "mems", [UNIT_QUARTZ] = "quartz"};
+        const enum unit_sensor sensor = u->cfg.axis[i].sensor;
+        cJSON_AddStringToObject(j, "sensor", names[sensor]);
+        if (sensor == UNIT_MEMS) add_mems(&u->cfg.axis[i].mems, j);
+        if (sensor == UNIT_MEMS) add_real(j, "sensor_v", unit_sensor_out(u, i, t_ns));
+        if (sensor == UNIT_QUARTZ) add_quartz(&u->cfg.axis[i].quartz, cJSON_AddObjectToObject(j, "quartz"));
+        if (sensor == UNIT_QUARTZ) add_real(j, "sensor_a", unit_sensor_out(u, i, t_ns));
         add_afe(&u->cfg.board.afe[i], cJSON_AddObjectToObject(j, "afe"));
     }
 }
@@ -122,9 +146,13 @@ static void add_unit_state(struct unit *u, cJSON *to, int64_t t_ns)
     if (k->cfg.present) add_real(to, "case_degc", chamber_case_degc(k, &u->body, t_ns));
     if (k->cfg.present) add_real(to, "element_degc", chamber_element_degc(k, &u->body, t_ns));
     if (!k->cfg.present) cJSON_AddItemToObject(to, "temp_degc", cJSON_CreateDoubleArray(u->cfg.temp_degc, UNIT_TEMPS));
-    cJSON *sensors = cJSON_AddArrayToObject(to, "sensor_v");
+    cJSON *volts = cJSON_AddArrayToObject(to, "sensor_v");
+    cJSON *amperes = cJSON_AddArrayToObject(to, "sensor_a");
     for (unsigned i = 0; i < UNIT_AXES; i++) {
-        cJSON_AddItemToArray(sensors, cJSON_CreateNumber(unit_sensor_v(u, i, t_ns)));
+        const double out = unit_sensor_out(u, i, t_ns);
+        const bool current = u->cfg.axis[i].sensor == UNIT_QUARTZ;
+        cJSON_AddItemToArray(volts, cJSON_CreateNumber(current ? 0.0 : out));
+        cJSON_AddItemToArray(amperes, cJSON_CreateNumber(current ? out : 0.0));
     }
 }
 

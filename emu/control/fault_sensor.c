@@ -52,7 +52,7 @@ static double output_now(const struct fault *f, int64_t t_ns)
 {
     struct unit *u = fault_unit(f);
     const unsigned axis = f->point.index;
-    return sensor_fault_out(u->sensor_faults[axis], unit_sensor_v(u, axis, t_ns), t_ns);
+    return sensor_fault_out(u->sensor_faults[axis], unit_sensor_out(u, axis, t_ns), t_ns);
 }
 
 /* Value and upper value of each kind, by enum sensor_fault_kind. */

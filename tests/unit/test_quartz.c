@@ -2,6 +2,7 @@
 #include "rig.h"
 
 #include "base/sched.h"
+#include "board/unit.h"
 #include "phys/quartz.h"
 
 #include <math.h>
@@ -115,14 +116,49 @@ static void noise_of_a_look_follows_its_interval(void **state)
     }
 }
 
+static void keep_code(void *ctx, const struct psa2_frame *f, int64_t t_ns)
+{
+    (void)t_ns;
+    *(int32_t *)ctx = f->code[0];
+}
+
+/* 1 g at 48 degC: current, 1 kohm, 1 : 8, 1.25 V for 2^23 codes. The zero signal and the scale are those of the element. */
+static void a_board_reads_its_current(void **state)
+{
+    (void)state;
+    static struct unit u;
+    static struct lab lab;
+    struct sched s;
+    int32_t code = 0;
+    sched_init(&s);
+    struct lab_cfg laboratory = lab_default();
+    laboratory.site.g_mps2 = G;
+    laboratory.chamber.present = true;
+    laboratory.chamber.start_degc = 48.0;
+    lab_init(&lab, &laboratory, 1);
+    head_turn(&lab.head, 270.0, 0); /* x down */
+    struct unit_cfg cfg = unit_default("u");
+    cfg.board.adc_noise_scale = 0.0;
+    cfg.board.afe[0] = afe_nominal(AFE_CURRENT);
+    cfg.axis[0].sensor = UNIT_QUARTZ;
+    cfg.axis[0].quartz =
+        (struct quartz_g){.scale_a_per_g = 1.28e-3, .slope_ug_per_k = 1000.0, .scale_tc_ppm_per_k = 500};
+    unit_init(&u, &cfg, &lab, &s);
+    u.ctx = &code;
+    u.frame = keep_code;
+    psa2_power_up(&u.board, 0);
+    sched_run_until(&s, NS_PER_S / 2);
+    near(unit_sensor_out(&u, 0, NS_PER_S / 2), 1.28e-3 * 1.009 * 1.018, 1e-15);
+    near((double)code * 1.25 / 8388608.0, 1.28e-3 * 1.009 * 1.018 * 1000.0 / 8.0,
+         3.4e-5); /* 2e-4: the FIR filter's own gain is 1.00017 */
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(each_term_of_the_model),
-        cmocka_unit_test(a_case_warmer_than_the_element_shifts_the_zero),
-        cmocka_unit_test(the_play_makes_a_loop),
-        cmocka_unit_test(a_step_is_answered_as_an_oscillator_does),
-        cmocka_unit_test(noise_of_a_look_follows_its_interval),
+        cmocka_unit_test(each_term_of_the_model),    cmocka_unit_test(a_case_warmer_than_the_element_shifts_the_zero),
+        cmocka_unit_test(the_play_makes_a_loop),     cmocka_unit_test(a_step_is_answered_as_an_oscillator_does),
+        cmocka_unit_test(a_board_reads_its_current), cmocka_unit_test(noise_of_a_look_follows_its_interval),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
