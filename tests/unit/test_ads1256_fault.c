@@ -104,14 +104,24 @@ static void a_wire_that_breaks_in_a_pulse_ends_it(void **state)
     near((double)(await_fall(r) - at_ns), (double)ads1256_settle_ns(&r->a), 200.0);
 }
 
+/* As far off as before, by the new clock. */
+static void assert_moved(const struct rig *r, const struct sched_ev *ev, int64_t was_ns, double slow)
+{
+    assert_true(ev->queued);
+    near((double)(ev->due_ns - r->s.now_ns), (double)(was_ns - r->s.now_ns) * slow, 200.0);
+}
+
 static void a_slow_clock_stretches_what_comes(void **state)
 {
     (void)state;
     struct rig *r = up();
     const int64_t first_ns = await_fall(r);
     wait_ns(r, PERIOD_100_NS / 2);
+    const int64_t cell_ns = r->a.cell_ev.due_ns, pulse_ns = r->a.pulse_ev.due_ns;
     set(r, (struct ads1256_fault){.clock_ppm = -1000});
     const double slow = 7680000.0 / (7680000 - 7680);
+    assert_moved(r, &r->a.cell_ev, cell_ns, slow);
+    assert_moved(r, &r->a.pulse_ev, pulse_ns, slow);
     const int64_t second_ns = await_fall(r);
     near((double)(second_ns - first_ns), PERIOD_100_NS / 2 * (1.0 + slow), 200.0);
     int64_t last_ns = second_ns;
@@ -132,8 +142,9 @@ static void the_clock_may_change_in_a_calibration(void **state)
     const int64_t from_ns = r->s.now_ns;
     const int64_t cal_ns = await_fall(r) - from_ns;
     xfer(r, 0xF0);
-    const int64_t at_ns = r->s.now_ns;
+    const int64_t at_ns = r->s.now_ns, stored_ns = r->a.cal_ev.due_ns;
     set(r, (struct ads1256_fault){.clock_ppm = -100000});
+    assert_moved(r, &r->a.cal_ev, stored_ns, 1.0 / 0.9);
     near((double)(await_fall(r) - at_ns), (double)cal_ns / 0.9, 2000.0);
 }
 

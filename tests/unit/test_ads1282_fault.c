@@ -116,8 +116,13 @@ static void a_slow_clock_stretches_what_comes_and_nothing_that_was(void **state)
     sched_run_until(&r->s, at_ns);
     set(r, (struct ads1282_fault){.clock_ppm = -1000});
     assert_int_equal(r->a.clk.hz, 4091904);
+    assert_in_range(at_ns - r->last_sample_ns, 0,
+                    31249); /* the input up to now by the old clock, 32 samples a period */
+    assert_in_range(r->a.next.t_ns - at_ns, 1, 31250 + 32);
+    assert_int_equal(r->a.next.t_ns, clk_edge_ns(&r->a.clk, r->a.next.k));
     assert_int_equal(ads1282_period_ns(&r->a), clk_span_ns(4091904, 4096));
     const int64_t second_ns = to_fall(r);
+    near((double)(second_ns - r->rise_ns), 4.0 / 4091904.0 * 1e9, 1.0); /* nobody has read */
     near((double)(second_ns - first_ns), PERIOD_NS / 2 + PERIOD_NS / 2 * 4096000.0 / 4091904.0, 2.0);
     int64_t last_ns = second_ns;
     for (int i = 0; i < 1000; i++) last_ns = to_fall(r);
@@ -136,9 +141,12 @@ static void a_fast_clock_keeps_its_rate_through_restarts_and_power(void **state)
     (void)state;
     struct rig *r = &rig;
     powered(r, &quiet);
-    sched_run_until(&r->s, 5000000);
-    set(r, (struct ads1282_fault){.clock_ppm = 500000}); /* before the first word */
+    sched_run_until(&r->s, 500000);
+    const int64_t due_ns = r->a.due.due_ns;
+    set(r, (struct ads1282_fault){.clock_ppm = 500000}); /* in data period 0 */
+    near((double)(r->a.due.due_ns - r->s.now_ns), (double)(due_ns - r->s.now_ns) / 1.5, 300.0);
     const int64_t first_ns = to_fall(r);
+    near((double)(first_ns - 500000), ((double)T_DR_1000 / 4.096e6 * 1e9 - 500000.0) / 1.5, 300.0);
     near((double)(to_fall(r) - first_ns), PERIOD_NS / 1.5, 2.0);
     ads1282_sync_pin(&r->a, true, r->s.now_ns);
     const int64_t sync_ns = r->s.now_ns;

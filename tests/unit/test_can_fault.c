@@ -278,6 +278,21 @@ static void two_frames_change_places(void **state)
     can_fault_remove(&r->bus, &f, r->s.now_ns);
 }
 
+static void frames_change_places_two_by_two(void **state)
+{
+    (void)state;
+    static const uint32_t want[] = {0x101, 0x100, 0x103, 0x102};
+    struct bench *r = up(500000);
+    struct can_fault f = fault(CAN_FAULT_REORDER);
+    can_fault_add(&r->bus, &f);
+    for (uint32_t i = 0; i < 5; i++) send(r, &r->a, 0x100 + i);
+    run(r, 10000000);
+    assert_int_equal(count(r, 'B', 'r'), 4);
+    for (unsigned i = 0; i < 4; i++) assert_int_equal(entry(r, 'B', 'r', i)->m.id, want[i]);
+    can_fault_remove(&r->bus, &f, r->s.now_ns);
+    assert_int_equal(count(r, 'B', 'r'), 5);
+}
+
 static void a_changed_frame_differs_in_one_bit(void **state)
 {
     (void)state;
@@ -504,6 +519,28 @@ static void an_ideal_bus_has_no_error_frames_but_bus_off(void **state)
     can_fault_remove(&r->bus, &f, r->s.now_ns);
 }
 
+static void off_now(void *ctx, int64_t t_ns)
+{
+    struct bench *r = ctx;
+    assert_int_equal(r->bus.phase, CAN_FRAME);
+    can_bus_off(&r->bus, &r->a.node, t_ns);
+}
+
+/* The frame is out before it can break, and gives nothing back to a controller that has left. */
+static void on_an_ideal_bus_bus_off_comes_after_the_frame(void **state)
+{
+    (void)state;
+    struct bench *r = up(0);
+    struct sched_ev ev;
+    sched_ev(&ev, off_now, r);
+    send(r, &r->a, 0x100);
+    sched_at(&r->s, &ev, r->s.now_ns);
+    run(r, 1000);
+    assert_int_equal(count(r, 'B', 'r'), 1);
+    assert_int_equal(r->a.node.now, CAN_BUS_OFF);
+    assert_int_equal(r->a.node.tec, 256);
+}
+
 static void a_node_that_leaves_takes_its_faults_along(void **state)
 {
     (void)state;
@@ -539,6 +576,7 @@ int main(void)
         cmocka_unit_test(what_a_removed_fault_holds_is_received),
         cmocka_unit_test(frames_that_find_no_room_to_wait_are_counted),
         cmocka_unit_test(two_frames_change_places),
+        cmocka_unit_test(frames_change_places_two_by_two),
         cmocka_unit_test(a_changed_frame_differs_in_one_bit),
         cmocka_unit_test(a_probability_hits_its_share_and_a_seed_the_same_frames),
         cmocka_unit_test(a_destroyed_frame_is_sent_again),
@@ -549,6 +587,7 @@ int main(void)
         cmocka_unit_test(a_sender_that_goes_off_the_bus_breaks_its_frame),
         cmocka_unit_test(a_sender_without_power_breaks_its_frame),
         cmocka_unit_test(an_ideal_bus_has_no_error_frames_but_bus_off),
+        cmocka_unit_test(on_an_ideal_bus_bus_off_comes_after_the_frame),
         cmocka_unit_test(a_node_that_leaves_takes_its_faults_along),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

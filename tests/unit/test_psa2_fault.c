@@ -137,6 +137,8 @@ static void assert_dark(void)
     assert_int_equal(rig.b.trace.level, 0);
     assert_true(sched_next_ns(&rig.s) == SCHED_NEVER); /* nothing goes on */
     assert_false(psa2_ready(&rig.b));
+    assert_int_equal(rig.b.tadc.mode, ADS1256_OFF);
+    for (int i = 0; i < 3; i++) assert_false(rig.b.adc[i].alive);
 }
 
 /* At one instant a line changes once. */
@@ -249,6 +251,25 @@ static void power_may_fail_at_any_instant(void **state)
     }
 }
 
+static void power_may_fail_in_reset_and_before_a_frame_begins(void **state)
+{
+    (void)state;
+    init(true, true);
+    psa2_power_up(&rig.b, 0);
+    up_to(5000); /* Res is low */
+    psa2_power_down(&rig.b, rig.s.now_ns);
+    assert_dark();
+    up_to(1000000);
+    assert_dark();
+    psa2_power_up(&rig.b, rig.s.now_ns);
+    await_frames(2);
+    while (!rig.b.out.fall.queued) sched_run_until(&rig.s, sched_next_ns(&rig.s));
+    const unsigned falls = events(PSA2_EV_INT_FALL);
+    psa2_power_down(&rig.b, rig.s.now_ns); /* between the read and the edge of the line's clock */
+    assert_dark();
+    assert_int_equal(events(PSA2_EV_INT_FALL), falls);
+}
+
 /* ---- the controller */
 
 static void without_sync_t_the_pin_rests_and_the_scan_goes_on(void **state)
@@ -356,6 +377,7 @@ int main(void)
         cmocka_unit_test(after_power_up_all_begins_anew),
         cmocka_unit_test(a_request_under_way_ends_with_the_power),
         cmocka_unit_test(power_may_fail_at_any_instant),
+        cmocka_unit_test(power_may_fail_in_reset_and_before_a_frame_begins),
         cmocka_unit_test(without_sync_t_the_pin_rests_and_the_scan_goes_on),
         cmocka_unit_test(without_sync_t_nothing_waits_for_the_filter),
         cmocka_unit_test(the_wrong_way_round_the_last_step_comes_first),
