@@ -20,6 +20,7 @@ ROOT = Path(__file__).resolve().parents[1]
 # page -> option that prints its tables -> their marks in the order of printing
 PAGES = {
     "emulator.md": ("--list-commands", ("commands", "truth")),
+    "faults.md": ("--list-faults", ("kinds", "matrix")),
     "scpi.md": ("--list-scpi", ("common", "head", "table", "chamber", "supply")),
 }
 

@@ -3,6 +3,7 @@
 #include "app/find.h"
 #include "app/profile_yaml.h"
 #include "control/control.h"
+#include "control/fault.h"
 #include "control/scpi.h"
 
 #include <stdlib.h>
@@ -91,4 +92,12 @@ void list_scpi(FILE *out)
         fprintf(out, "\n");
         list_headers(out, k);
     }
+}
+
+void list_faults(FILE *out)
+{
+    char line[2048];
+    for (unsigned i = 0; fault_markdown(i, line, sizeof line); i++) fprintf(out, "%s\n", line);
+    fprintf(out, "\n");
+    for (unsigned i = 0; fault_markdown_matrix(i, line, sizeof line); i++) fprintf(out, "%s\n", line);
 }

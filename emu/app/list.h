@@ -15,5 +15,6 @@ bool list_scenarios(FILE *out, char *why, size_t cap);
 /* The command tables as Markdown. */
 void list_commands(FILE *out);
 void list_scpi(FILE *out);
+void list_faults(FILE *out);
 
 #endif

@@ -118,6 +118,7 @@ int main(int argc, char *argv[])
     if (o.action == OPTIONS_VERSION) return puts("psa-emu " VERSION) < 0;
     if (o.action == OPTIONS_LIST_COMMANDS) list_commands(stdout);
     if (o.action == OPTIONS_LIST_SCPI) list_scpi(stdout);
+    if (o.action == OPTIONS_LIST_FAULTS) list_faults(stdout);
     if (o.action == OPTIONS_LIST_PROFILES && !list_profiles(stdout, why, sizeof why))
         return complain(SERVICE_MACHINE, why);
     if (o.action == OPTIONS_LIST_SCENARIOS && !list_scenarios(stdout, why, sizeof why))

@@ -53,6 +53,7 @@ static const char help[] =
     "  --list-keys              keys of a scenario with unit, range and default\n"
     "  --list-commands          commands of the control socket and the truth port\n"
     "  --list-scpi              headers of the instruments\n"
+    "  --list-faults            kinds of faults, and which can be where\n"
     "  --help, --version\n"
     "\n"
     "On stdout: one line `ready key=value ...` for each endpoint, then `ready all`. Exit status: 0 done, 2 bad input,\n"
@@ -290,6 +291,7 @@ static bool set_resolved(struct target *t, const char *arg) { return set_path(t,
 static bool set_commands(struct target *t, const char *arg) { (void)arg; t->o->action = OPTIONS_LIST_COMMANDS; return true; }
 
 static bool set_list_scpi(struct target *t, const char *arg) { (void)arg; t->o->action = OPTIONS_LIST_SCPI; return true; }
+static bool set_list_faults(struct target *t, const char *arg) { (void)arg; t->o->action = OPTIONS_LIST_FAULTS; return true; }
 
 static const struct {
     const char *name;
@@ -312,6 +314,7 @@ static const struct {
     {"resolved", required_argument, set_resolved},
     {"list-scenarios", no_argument, set_scenarios}, {"list-commands", no_argument, set_commands},
     {"scpi", required_argument, set_scpi},         {"list-scpi", no_argument, set_list_scpi},
+    {"list-faults", no_argument, set_list_faults},
 };
 // clang-format on
 #define ROWS (sizeof rows / sizeof *rows)

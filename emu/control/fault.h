@@ -57,6 +57,7 @@ struct fault_kind {
     const char *name;   /* layer.name */
     const char *what;   /* one sentence */
     const char *seen;   /* how a host sees it, one sentence */
+    const char *unless; /* what `fits` refuses, for the page; NULL: nothing */
     unsigned variant;   /* which of its layer's, for apply */
     uint64_t places;    /* bits of enum fault_place */
     uint64_t need, may; /* bits of enum fault_arg: the values it must be given, those it may */
@@ -98,6 +99,10 @@ bool fault_make(const struct control_bench *b, const struct control_value *v, st
 
 /* Whether a kind may be at a point; false with the reason in why[CONTROL_WHY_MAX]. */
 bool fault_fits(const struct control_bench *b, const struct fault *f, char *why);
+
+/* The kinds as Markdown, and which can be where, for docs/faults.md and --list-faults: next line into out, false at the end. */
+bool fault_markdown(unsigned line, char *out, size_t cap);
+bool fault_markdown_matrix(unsigned line, char *out, size_t cap);
 
 /* Takes over a fault that fault_make() made, now. Its id, or 0 if FAULTS_MAX are waiting or active. */
 uint32_t fault_add(struct fault_engine *e, const struct fault *f, int64_t t_ns);

@@ -95,16 +95,16 @@ static bool has_register(const struct control_bench *b, const struct fault *f, c
 #define CHIP(v) .variant = v, .places = FAULT_BIT(FAULT_AT_ADC) | FAULT_BIT(FAULT_AT_TADC), .apply = apply_chip, .lift = refresh_chip
 static const struct fault_kind chip[] = {
     {"chip.drdy_stuck", "The data-ready pin stays at level; inside, conversions go on.", "no frames and EMCY FF01h (adc.x), no new temperatures and EMCY FF02h (tadc)",
-     CHIP(DRDY_STUCK), .need = FAULT_BIT(FAULT_LEVEL), .fits = has_drdy},
+     CHIP(DRDY_STUCK), .need = FAULT_BIT(FAULT_LEVEL), .unless = "adc.y, adc.z: DRD_A is the pin of converter X alone", .fits = has_drdy},
     {"chip.dout_dead", "The data pin stays at level.", "all ones or all zeros in the words of that chip",
      CHIP(DOUT_DEAD), .need = FAULT_BIT(FAULT_LEVEL)},
-    {"chip.lost_sync", "The chip does not hear SYNC, neither pin nor command.", "after a pulse on SYNC the chip goes on in its old phase: data-ready, or the updates of DOut, are off",
+    {"chip.lost_sync", "The chip does not hear SYNC, neither pin nor command.", "after a pulse on SYNC the chip goes on in its old phase: no gap in the frames (adc.x), another answer to a step than the other axes (adc.y, adc.z), temperature codes every 10.00 ms (tadc)",
      CHIP(LOST_SYNC)},
-    {"chip.clock", "The clock of the chip is off by clock_ppm (negative: slow).", "the data rate of the chip is off by as much; against the others its words slip",
+    {"chip.clock", "The clock of the chip is off by clock_ppm (negative: slow).", "the data rate is off by as much (adc.x, tadc), or the axis answers to a step in another time than the others (adc.y, adc.z)",
      CHIP(SLOW_CLOCK), .need = FAULT_BIT(FAULT_CLOCK_PPM), .nonzero = FAULT_BIT(FAULT_CLOCK_PPM)},
     {"chip.flip", "Bits of a register are inverted, once.", "the register reads otherwise, and the chip does what it now says",
      .places = FAULT_BIT(FAULT_AT_ADC) | FAULT_BIT(FAULT_AT_TADC), .need = FAULT_BIT(FAULT_REGISTER) | FAULT_BIT(FAULT_MASK),
-     .once = true, .fits = has_register, .apply = flip},
+     .once = true, .unless = "no such register", .fits = has_register, .apply = flip},
 };
 // clang-format on
 const struct fault_table fault_chip = {chip, sizeof chip / sizeof *chip};
@@ -136,7 +136,7 @@ static bool apply_controller(struct fault *f, int64_t t_ns)
 // clang-format off
 #define KPSA(v) .variant = v, .places = FAULT_BIT(FAULT_AT_KPSA), .apply = apply_controller, .lift = refresh_controller
 static const struct fault_kind controller[] = {
-    {"controller.skip_sync_t", "KPSA gives no pulse on SYNC_T.", "SYNC_T rests, and the temperature codes mix two channels",
+    {"controller.skip_sync_t", "KPSA gives no pulse on SYNC_T.", "SYNC_T rests; temperature codes come every 10.00 ms at 100 SPS instead of every 10.25 ms",
      KPSA(SKIP_SYNC_T)},
     {"controller.setup_order", "KPSA carries out the steps of the set-up in reverse order, from the next Res on.", "after Res the registers of the converters differ from those of the article",
      KPSA(SETUP_ORDER)},

@@ -58,9 +58,9 @@ static const struct fault_kind line[] = {
     {"line.glitch", "One pulse of width_ns, the other way round.", "a pulse of that width where none belongs",
      LINE(LINE_GLITCH), .need = FAULT_BIT(FAULT_WIDTH_NS), .once = true},
     {"line.missing_pulse", "The pulse of that number is missing in each frame.", "one clock less in a frame; its bits are shifted from there on",
-     LINE(LINE_MISSING_PULSE), .need = FAULT_BIT(FAULT_PULSE), .fits = has_pulse},
+     LINE(LINE_MISSING_PULSE), .need = FAULT_BIT(FAULT_PULSE), .unless = "any line but CLK: no pulses that are counted in a frame; more pulses than a frame has", .fits = has_pulse},
     {"line.extra_pulse", "A pulse of width_ns follows the pulse of that number in each frame.", "one clock more in a frame; its bits are shifted from there on",
-     LINE(LINE_EXTRA_PULSE), .need = FAULT_BIT(FAULT_PULSE) | FAULT_BIT(FAULT_WIDTH_NS), .fits = has_pulse},
+     LINE(LINE_EXTRA_PULSE), .need = FAULT_BIT(FAULT_PULSE) | FAULT_BIT(FAULT_WIDTH_NS), .unless = "any line but CLK: no pulses that are counted in a frame; more pulses than a frame has", .fits = has_pulse},
     {"line.noise", "Pulses of width_ns at random, rate_hz of them a second.", "pulses of that width at no place of the protocol",
      LINE(LINE_NOISE), .need = FAULT_BIT(FAULT_RATE_HZ) | FAULT_BIT(FAULT_WIDTH_NS)},
 };

@@ -69,10 +69,11 @@ static bool apply_sensor(struct fault *f, int64_t t_ns)
         [SENSOR_SATURATION] = {volts(f, FAULT_LOW_V, -infinite), volts(f, FAULT_HIGH_V, infinite)},
     };
     const unsigned k = f->kind->variant;
+    const bool mems = u->cfg.axis[f->point.index].sensor == UNIT_MEMS; /* others are about 0 without acceleration */
     f->as.sensor = (struct sensor_fault){.kind = (enum sensor_fault_kind)k,
                                          .value = values[k][0],
                                          .value_high = values[k][1],
-                                         .zero = u->mems[f->point.index].cfg.u0_v,
+                                         .zero = mems ? u->mems[f->point.index].cfg.u0_v : 0.0,
                                          .from_ns = t_ns,
                                          .noise = f->random};
     sensor_fault_add(&u->sensor_faults[f->point.index], &f->as.sensor);
@@ -89,17 +90,17 @@ static void lift_sensor(struct fault *f, int64_t t_ns)
 #define SENSOR(v) .variant = v, .places = FAULT_BIT(FAULT_AT_SENSOR), .apply = apply_sensor, .lift = lift_sensor
 static const struct fault_kind sensor[] = {
     {"sensor.stuck", "The output stays at out_v, or at what it is at that instant.", "the codes of the axis stand still but for the converter's noise, whatever the head does",
-     SENSOR(SENSOR_STUCK), .may = FAULT_BIT(FAULT_OUT_V), .fits = has_sensor},
+     SENSOR(SENSOR_STUCK), .may = FAULT_BIT(FAULT_OUT_V), .unless = "the channel has no sensor", .fits = has_sensor},
     {"sensor.bias", "bias_v is added to the output.", "the codes of the axis step and stay there",
-     SENSOR(SENSOR_BIAS), .need = FAULT_BIT(FAULT_BIAS_V), .nonzero = FAULT_BIT(FAULT_BIAS_V), .fits = has_sensor},
+     SENSOR(SENSOR_BIAS), .need = FAULT_BIT(FAULT_BIAS_V), .nonzero = FAULT_BIT(FAULT_BIAS_V), .unless = "the channel has no sensor", .fits = has_sensor},
     {"sensor.drift", "The output runs away.", "the codes of the axis have a slope",
-     SENSOR(SENSOR_DRIFT), .need = FAULT_BIT(FAULT_DRIFT_V_PER_S), .nonzero = FAULT_BIT(FAULT_DRIFT_V_PER_S), .fits = has_sensor},
+     SENSOR(SENSOR_DRIFT), .need = FAULT_BIT(FAULT_DRIFT_V_PER_S), .nonzero = FAULT_BIT(FAULT_DRIFT_V_PER_S), .unless = "the channel has no sensor", .fits = has_sensor},
     {"sensor.scale", "The deviation of the output from its zero is wrong by scale_ppm.", "the codes of the axis are wrong in proportion to what the axis feels",
-     SENSOR(SENSOR_SCALE), .need = FAULT_BIT(FAULT_SCALE_PPM), .nonzero = FAULT_BIT(FAULT_SCALE_PPM), .fits = has_sensor},
+     SENSOR(SENSOR_SCALE), .need = FAULT_BIT(FAULT_SCALE_PPM), .nonzero = FAULT_BIT(FAULT_SCALE_PPM), .unless = "the channel has no sensor", .fits = has_sensor},
     {"sensor.noise", "White noise is added; it gives a settled reading at 1000 SPS the rms rms_v.", "the codes of the axis scatter more",
-     SENSOR(SENSOR_NOISE), .need = FAULT_BIT(FAULT_RMS_V), .fits = has_sensor},
+     SENSOR(SENSOR_NOISE), .need = FAULT_BIT(FAULT_RMS_V), .unless = "the channel has no sensor", .fits = has_sensor},
     {"sensor.saturation", "The output does not leave low_v ... high_v.", "the codes of the axis stop at a limit that is not the converter's",
-     SENSOR(SENSOR_SATURATION), .may = FAULT_BIT(FAULT_LOW_V) | FAULT_BIT(FAULT_HIGH_V), .fits = has_limits},
+     SENSOR(SENSOR_SATURATION), .may = FAULT_BIT(FAULT_LOW_V) | FAULT_BIT(FAULT_HIGH_V), .unless = "the channel has no sensor; low_v is not below high_v", .fits = has_limits},
 };
 // clang-format on
 const struct fault_table fault_sensor = {sensor, sizeof sensor / sizeof *sensor};
@@ -145,11 +146,11 @@ static void lift_afe(struct fault *f, int64_t t_ns)
 #define CHAIN(v) .variant = v, .places = FAULT_BIT(FAULT_AT_AFE), .apply = apply_afe, .lift = lift_afe
 static const struct fault_kind analog[] = {
     {"analog.load_open", "The load resistor of a current-output sensor is open: the buffer goes to its limit.", "the codes of the axis stand at the limit, status CLIP",
-     CHAIN(AFE_LOAD_OPEN), .fits = has_load},
+     CHAIN(AFE_LOAD_OPEN), .unless = "the sensor has voltage output: no load resistor", .fits = has_load},
     {"analog.load_short", "The load resistor of a current-output sensor is shorted: no volts.", "the codes of the axis stand near 0, whatever the head does",
-     CHAIN(AFE_LOAD_SHORT), .fits = has_load},
+     CHAIN(AFE_LOAD_SHORT), .unless = "the sensor has voltage output: no load resistor", .fits = has_load},
     {"analog.reference", "The converter's reference is wrong by reference_ppm and runs away by drift_ppm_per_s.", "the codes of the axis are too small in proportion, offset and all",
-     CHAIN(AFE_REFERENCE), .may = FAULT_BIT(FAULT_REFERENCE_PPM) | FAULT_BIT(FAULT_DRIFT_PPM_PER_S), .fits = has_error},
+     CHAIN(AFE_REFERENCE), .may = FAULT_BIT(FAULT_REFERENCE_PPM) | FAULT_BIT(FAULT_DRIFT_PPM_PER_S), .unless = "both values are 0", .fits = has_error},
     {"analog.ripple", "A sine of the supply comes through the buffer, amplitude at the load.", "the codes of the axis carry a line at frequency_hz",
      CHAIN(AFE_RIPPLE), .need = FAULT_BIT(FAULT_AMPLITUDE_V) | FAULT_BIT(FAULT_FREQUENCY_HZ)},
 };

@@ -539,6 +539,8 @@ def test_no_kind_is_left_out() -> None:
 def test_at_every_point_it_is_refused_or_seen(kind: str) -> None:
     seen = 0
     with fault_host(SCENARIO) as host:
+        host.turn(30.0)  # every axis feels something
+        host.bus.advance(SETTLE_S)
         for unit in host.node:
             assert host.watch(unit, 0.02).complaints() == []
         for point in host.call("fault.points")["points"]:
