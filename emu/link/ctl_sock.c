@@ -2,6 +2,8 @@
 #include "link/ctl_sock.h"
 
 #include <errno.h>
+#include <inttypes.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
@@ -12,10 +14,12 @@
 struct ctl_client {
     struct text_link io; /* first */
     struct ctl_server *server;
-    bool due; /* a reply is */
+    bool due;      /* a reply is */
+    bool pushed;   /* lines that are no replies wait: nobody waits for those */
+    uint64_t lost; /* of them, since the client was last told */
 };
 
-enum { OUT_MAX = 1 << 20 };
+enum { OUT_MAX = 1 << 20, PUSH_HIGH = OUT_MAX / 2 };
 
 static void on_line(struct text_link *t, enum lines_result r, const char *line, size_t len, int64_t t_ns)
 {
@@ -54,12 +58,36 @@ void ctl_reply(struct ctl_client *c, const char *line)
     text_link_put(&c->io, "\n", 1);
 }
 
+/* Time stands still for a client that is slow to take its replies, not for one that is slow to take the news. */
+static void let_run(struct ctl_client *c)
+{
+    if (!c->pushed) return;
+    c->io.link.pending = 0;
+    c->io.link.full = false;
+}
+
 void ctl_push(struct ctl_client *c, const char *line)
 {
-    const size_t n = strlen(line);
-    if (outbuf_pending(&c->io.out) + n + 1 > OUT_MAX) return;
-    text_link_put(&c->io, line, n);
+    char told[64];
+    if (outbuf_pending(&c->io.out) > PUSH_HIGH) {
+        c->lost++;
+        return;
+    }
+    c->pushed = true;
+    const int n = c->lost ? snprintf(told, sizeof told, "{\"event\":\"lost\",\"lines\":%" PRIu64 "}\n", c->lost) : 0;
+    text_link_put(&c->io, told, (size_t)n);
+    c->lost = 0;
+    text_link_put(&c->io, line, strlen(line));
     text_link_put(&c->io, "\n", 1);
+    let_run(c);
+}
+
+static void on_flush(struct link *l, int64_t t_ns)
+{
+    struct ctl_client *c = (struct ctl_client *)l;
+    text_link_flush(l, t_ns);
+    if (!outbuf_pending(&c->io.out)) c->pushed = false;
+    let_run(c);
 }
 
 static void on_connection(struct link *l, int64_t t_ns)
@@ -78,6 +106,7 @@ static void on_connection(struct link *l, int64_t t_ns)
     }
     c->server = s;
     c->io.link.release = on_release;
+    c->io.link.flush = on_flush;
     s->clients++;
     links_add_last(s->links, &c->io.link);
 }
