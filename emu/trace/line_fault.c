@@ -146,9 +146,8 @@ static void on_steps(void *ctx, uint32_t before, const struct trace_step *s, uns
     for (const struct trace_step *const end = s + n; s < end;) {
         const int64_t t_ns = s->t_ns;
         run_until(l, &o, t_ns);
-        do take(l, s++);
-        while (s < end && s->t_ns == t_ns);
-        show(l, &o, t_ns);
+        take(l, s++);
+        show(l, &o, t_ns); /* step by step, as without a filter: when it is put in and taken out leaves no trace */
     }
     run_until(l, &o, until_ns);
     show(l, &o, until_ns);

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import re
 import select
@@ -19,7 +20,7 @@ from psabench.can_host import CanHost, StepClock, WallClock, open_bus
 from psabench.control import Control
 from psabench.emulator import Emulator
 from psabench.record import record
-from rig import BENCH, PATIENCE_S, ROOT, bus_spec, psa_emu, talker, tool_env, unread, until
+from rig import BENCH, HERE, PATIENCE_S, ROOT, bus_spec, psa_emu, talker, tool_env, unread, until
 
 pytestmark = pytest.mark.host
 
@@ -202,3 +203,56 @@ def test_frames_are_the_same_whether_somebody_watches_the_lines_or_not(tmp_path:
     record_step(tmp_path / "watched.log", extra=("--vcd", tmp_path / "lines.vcd", "--line", "-"))
     assert (tmp_path / "lines.vcd").stat().st_size > 100_000
     assert (tmp_path / "alone.log").read_bytes() == (tmp_path / "watched.log").read_bytes()
+
+
+# ---- lines, frames and truth of one run
+
+MOVING = HERE / "moving.yaml"  # instruments, ripple, noise and faults, all at once
+MOVING_S = 0.4
+
+
+def run_and_hash(folder: Path, pace: str) -> str:
+    """SHA-256 of VCD, CAN log and truth log of a run from power-on, whoever moves the time."""
+    vcd, log, truth = folder / f"{pace}.vcd", folder / f"{pace}.log", folder / f"{pace}.truth"
+    extra: list[str | Path] = ["--vcd", vcd, "--truth-log", truth, "--truth-every", "2ms"]
+    if pace != "step":
+        extra += ["--wait-client", "--for", f"{MOVING_S}s"]
+    with Emulator(MOVING, pace=pace, control=pace == "step", extra=extra) as emulator:
+        if pace == "step":
+            assert emulator.control_path is not None
+            bus = open_bus(bus_spec(emulator.endpoints[0]))
+            with (
+                can.Logger(log) as logger,
+                CanHost(bus, WallClock()) as host,
+                Control(emulator.control_path) as control,
+            ):
+                host.listeners.append(logger)
+                host.clock = StepClock(control)
+                for share in (0.01, 0.4, 0.12, 0.47):
+                    host.advance(share * MOVING_S)
+                control.call("quit")
+            assert emulator.wait(PATIENCE_S) == 0
+        else:
+            record(open_bus(bus_spec(emulator.endpoints[0])), log, 5, PATIENCE_S, 250)
+            assert emulator.wait(PATIENCE_S) == 0
+    frames = log.read_bytes().splitlines(keepends=True)[:250]
+    assert len(frames) == 250
+    assert truth.read_bytes().count(b"\n") == 2 * round(MOVING_S / 2e-3 + 1)
+    assert vcd.stat().st_size > 500_000
+    return hashlib.sha256(vcd.read_bytes() + b"".join(frames) + truth.read_bytes()).hexdigest()
+
+
+def test_lines_frames_and_truth_are_the_same_at_every_pace(tmp_path: Path) -> None:
+    assert run_and_hash(tmp_path, "free") == run_and_hash(tmp_path, "step") == run_and_hash(tmp_path, "wall")
+
+
+@pytest.mark.parametrize("build", ["build-clang", "build-O0", "build-san", "build-clang-san"])
+def test_lines_frames_and_truth_are_the_same_from_every_build(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, build: str
+) -> None:
+    if not (ROOT / build / "psa-emu").exists():
+        pytest.skip(f"{build}/psa-emu is not built; `make builds` makes it")
+    monkeypatch.setenv("PSA_EMU", str(ROOT / "build" / "psa-emu"))
+    want = run_and_hash(tmp_path, "free")
+    monkeypatch.setenv("PSA_EMU", str(ROOT / build / "psa-emu"))
+    assert run_and_hash(tmp_path, "free") == want
