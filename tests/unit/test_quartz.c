@@ -36,6 +36,10 @@ static void each_term_of_the_model(void **state)
         {{.scale_a_per_g = 1e-3, .tilt_y_mrad = 2}, {0, 0.5, 1}, 30, 1e-6},
         {{.scale_a_per_g = 1e-3, .square_ug_per_g2 = 30}, {-2, 0, 0}, 30, -2e-3 + 120e-9},
         {{.scale_a_per_g = 1e-3, .limit_a = 1.5e-3}, {2, 0, 0}, 30, 1.5e-3},
+        {{.scale_a_per_g = 1e-3, .curve_ug = 300, .curve_centre_degc = 10, .curve_width_k = 25},
+         {0, 0, 0},
+         60,
+         600e-9 * 0.22313016014842982},
         {{.scale_a_per_g = 1e-3, .curve_ug = 300, .curve_centre_degc = 10, .curve_width_k = 50}, {0, 0, 0}, 60, 300e-9},
         {{.scale_a_per_g = 1e-3, .curve_ug = 300, .curve_centre_degc = 10, .curve_width_k = 50},
          {0, 0, 0},
@@ -86,6 +90,8 @@ static void a_step_is_answered_as_an_oscillator_does(void **state)
         struct quartz q = up(&cfg);
         double peak = 0.0;
         near(quartz_out_a(&q, (const double[3]){0}, 0), 0.0, 0.0);
+        struct quartz resting = up(&cfg);
+        near(quartz_out_a(&resting, (const double[3]){G, 0, 0}, 0), 1e-3, 1e-18); /* it has been where it is */
         for (int64_t t_ns = steps_ns[k]; t_ns < 10000000; t_ns += steps_ns[k]) {
             const double t_s = (double)t_ns * 1e-9;
             const double want = 1.0 - exp(-zw * t_s) * (cos(wd * t_s) + 0.7 / sqrt(0.51) * sin(wd * t_s));
