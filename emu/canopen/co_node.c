@@ -299,6 +299,6 @@ void co_node_power_down(struct co_node *n)
     co_sdo_reset(&n->sdo);
     sched_cancel(n->sched, &n->heartbeat);
     can_unplug(n->bus, &n->services, n->sched->now_ns);
-    can_unplug(n->bus, &n->stream, n->sched->now_ns);
+    can_detach(n->bus, &n->stream); /* of the same controller */
     n->state = CO_INITIALISING;
 }

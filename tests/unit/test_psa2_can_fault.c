@@ -194,6 +194,8 @@ static void an_error_passive_unit_says_so_and_when_it_is_over(void **state)
 {
     (void)state;
     struct bench *r = up();
+    can_bus_off(&r->bus, &r->can.node.services, r->s.now_ns);
+    run(r, 20000000);
     struct can_fault f = {.kind = CAN_FAULT_ERROR,
                           .from = &r->can.node.services,
                           .probability = 1.0,
@@ -203,6 +205,8 @@ static void an_error_passive_unit_says_so_and_when_it_is_over(void **state)
     can_fault_add(&r->bus, &f);
     run(r, 100000000);
     assert_int_equal(r->bus.error_frames, 18);
+    for (unsigned i = from; i < r->count; i++) /* that was long ago */
+        assert_false(r->seen[i].m.id == 0x80 + NODE && r->seen[i].m.data[0] == 0x40);
     const unsigned passive = emcy(r, PSA2_EMCY_CAN_PASSIVE, from), over = emcy(r, 0, passive);
     assert_true(over > passive + 10); /* a frame that passes gives back one of 16 */
     assert_true(errors(r, from) >= 18);
