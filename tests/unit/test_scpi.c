@@ -381,8 +381,11 @@ static void motion_shows_in_the_operation_register(void **state)
     SAYS("STAT:OPER:COND?;:*STB?", "2"); /* no colon before a common command */
     assert_int_equal(error(), -102);
     SAYS("*STB?", "128");
+    SAYS("STAT:OPER?;OPER?;OPER:COND?", "2;0;2"); /* told once, though it goes on */
     run_s(2);
     SAYS("STAT:OPER:COND?", "0");
+    say("ANGL 9");
+    run_s(2);
     SAYS("STAT:OPER?;OPER?", "2;0"); /* it had begun; reading clears */
     say("STAT:PRES");
     SAYS("STAT:OPER:ENAB?", "0");
@@ -458,6 +461,22 @@ static void a_table_turns_and_stops(void **state)
     say("*RST");
     run_s(1);
     SAYS("AXIS1:RATE?;REST?", "0;1");
+}
+
+static void a_wait_follows_what_others_make_of_the_motion(void **state)
+{
+    (void)state;
+    static struct scpi other;
+    scpi_rig_session(&rig, &other, "table");
+    SAYS("AXIS1:POS 90,30;*OPC?", ""); /* 3 s */
+    run_s(1);
+    scpi_rig_say(&rig, &other, "AXIS1:POS 180,30"); /* further, 6 s in all */
+    run_s(3);
+    assert_string_equal(rig.said, "");
+    scpi_rig_say(&rig, &other, "AXIS1:STOP"); /* sooner */
+    scpi_look(&rig.scpi, rig.sched.now_ns);
+    run_s(0.1);
+    assert_string_equal(rig.said, "1");
 }
 
 static void a_table_swings_and_runs_profiles(void **state)
@@ -579,6 +598,7 @@ int main(void)
         cmocka_unit_test_setup(limits_are_asked_with_the_settings_name, head),
         cmocka_unit_test_setup(limits_of_a_table_are_its_axes_own, table),
         cmocka_unit_test_setup(a_table_turns_and_stops, table),
+        cmocka_unit_test_setup(a_wait_follows_what_others_make_of_the_motion, table),
         cmocka_unit_test_setup(a_table_swings_and_runs_profiles, table),
         cmocka_unit_test_setup(a_chamber_goes_to_its_set_point, chamber),
         cmocka_unit_test_setup(a_supply_is_set_switched_and_measured, supply),
