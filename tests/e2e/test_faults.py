@@ -372,6 +372,21 @@ def brownout(c: Case) -> None:
     assert again.seq()[0] < 5, "numbers begin anew"
 
 
+def test_a_brownout_breaks_a_frame_off() -> None:
+    """Int is low for 74 us in each frame but the last, in which the supply fails 30 us after its fall."""
+    with fault_host(SCENARIO) as host:
+        path = host.emulator.directory / "lines.vcd"
+        host.call("vcd.start", path=str(path), unit="a")
+        host.add("supply.brownout", "supply", drop_v=6, for_s=0.02, after="INT_FALL", count=3, delay_s=30e-6, unit="a")
+        host.bus.advance(0.01)
+        host.call("vcd.stop")
+        line = read_vcd(path).wires["Int"]
+        last_clk_ns = int(read_vcd(path).wires["CLK"].edges_ns(1)[-1])
+    falls = line.edges_ns(0)
+    assert len(falls) == 3
+    near(last_clk_ns - float(falls[2]), 30e3, 500)
+
+
 # ---- lines: what a recording breaks of the rules
 
 
