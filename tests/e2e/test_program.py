@@ -18,7 +18,7 @@ from psabench.procedures.head_bench import Reading
 from psabench.procedures.result import ProcedureResult
 from psabench.procedures.turns import TurnsParams, turns
 from psabench.wire_bench import WireBench
-from rig import ADAPTERS, BENCH, HOST, PATIENCE_S, addresses, over, psabench
+from rig import ADAPTERS, BENCH, HOST, PATIENCE_S, addresses, over, psabench, until
 
 EVERY = over("socketcand", "slcan", "vcan")
 SHORT = TurnsParams(readings=2)
@@ -189,6 +189,7 @@ def test_two_units_on_one_bus_are_two_objects() -> None:
         for unit in b.units.values():
             unit.wait_ready()
             assert len(unit.stream(5)) == 5
+        assert [b.truth_state(name)["unit"]["name"] for name in b.units] == ["a", "b"]
 
 
 # ---- looking, breaking, saving
@@ -249,6 +250,10 @@ def test_a_snapshot_and_a_fork_go_on_as_the_bench_itself(bench: Bench, tmp_path:
             assert np.array_equal(got.t_sample_s, want.t_sample_s)
         twin.head.turn(0.0)
         assert bench.head.angle_deg == 37.0
+        assert twin.emulator is not None
+        process = Path(f"/proc/{twin.emulator.pid}")
+        assert process.exists()
+    until(lambda: not process.exists(), "the end of the fork")
 
 
 @HOST
@@ -265,8 +270,8 @@ def test_units_on_several_buses_are_all_there_and_in_step() -> None:
     """Every unit of the fleet answers on its own bus, and a run returns when the frames of all buses are here."""
     with Bench.start("fleet64") as b:
         assert (len(b.units), len(b.hosts)) == (64, 8)
-        first, *_, last = b.units.values()
-        assert first.host is not last.host
+        first, last = b.units["a1"], b.units["h1"]  # the same node, each on its bus
+        assert first.node.node_id == last.node.node_id
         first.wait_ready()
         before = [h.received for h in b.hosts.values()]
         b.run_for(0.1)

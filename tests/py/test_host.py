@@ -14,6 +14,7 @@ from typing import Any
 import can
 import pytest
 from psabench import can_host, emulator
+from psabench.bench import emulator_buses
 from psabench.can_host import CanHost, StepClock, WallClock, open_bus
 from psabench.canopen_host import CanopenNode
 from psabench.control import Control
@@ -144,6 +145,27 @@ def test_the_reply_to_a_call_that_was_interrupted_is_passed_over(
             with pytest.raises(KeyboardInterrupt):
                 port.call("run", for_s=1.0)
         assert port.call("time").t_ns == 2
+
+
+def test_each_bus_with_units_is_opened_where_it_is_served(tmp_path: Path) -> None:
+    units = {"units": [{"name": n, "bus": bus} for n, bus in (("a", "can1"), ("b", "can0"), ("c", "can1"))]}
+    slcan = {"can": "slcan", "pty": "/dev/pts/7"}
+    server = {"can": "socketcand", "host": "127.0.0.1", "port": "1"}
+    cases: list[tuple[list[dict[str, str]], dict[str, str]]] = [
+        ([slcan | {"bus": "can0"}], {"can0": "slcan:/dev/pts/7"}),
+        ([slcan], {"can1": "slcan:/dev/pts/7"}),  # the first of them
+        ([server], {b: f"socketcand:127.0.0.1:1,channel={b}" for b in ("can1", "can0")}),
+        (
+            [{"scpi": "head"}, slcan | {"bus": "can0"}, server],
+            {"can0": "slcan:/dev/pts/7", "can1": "socketcand:127.0.0.1:1,channel=can1"},
+        ),
+        ([{"control": "x"}], {}),
+    ]
+    for k, (endpoints, want) in enumerate(cases):
+        path = tmp_path / str(k)
+        with closing(FakeControl(path, [{"result": units}])):
+            assert emulator_buses(endpoints, path) == want
+    assert emulator_buses([server], None) == {"can0": "socketcand:127.0.0.1:1"}
 
 
 # ---- clocks
