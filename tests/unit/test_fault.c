@@ -272,8 +272,10 @@ static void a_fault_that_waits_or_listens_can_be_cleared(void **state)
 static void places_are_used_again_but_not_those_of_living_faults(void **state)
 {
     (void)state;
-    for (unsigned i = 0; i < FAULTS_MAX; i++) {
-        assert_int_equal(add("{'kind':'sensor.bias','point':'a.sensor.x','bias_v':1,'at_s':0.01,'for_s':0.01}"), i + 1);
+    for (unsigned i = 0; i < FAULTS_MAX; i++) { /* the third is over first */
+        const char *args = i == 2 ? "{'kind':'sensor.bias','point':'a.sensor.x','bias_v':1,'at_s':0.01,'for_s':0.005}"
+                                  : "{'kind':'sensor.bias','point':'a.sensor.x','bias_v':1,'at_s':0.01,'for_s':0.01}";
+        assert_int_equal(add(args), i + 1);
     }
     assert_int_equal(add("{'kind':'sensor.bias','point':'a.sensor.x','bias_v':1}"), 0);
     assert_non_null(strstr(r.control.refusal.why, "64 faults are waiting or active"));
@@ -281,8 +283,8 @@ static void places_are_used_again_but_not_those_of_living_faults(void **state)
     run_to(30 * MS);
     assert_null(r.unit[0].sensor_faults[0]);
     assert_int_equal(add("{'kind':'sensor.bias','point':'a.sensor.x','bias_v':1}"), FAULTS_MAX + 1);
-    assert_null(fault_find(&r.engine, 1));
-    assert_non_null(fault_find(&r.engine, 2));
+    assert_null(fault_find(&r.engine, 3));
+    assert_non_null(fault_find(&r.engine, 1));
 }
 
 /* ---- what is refused */
@@ -404,22 +406,37 @@ static void volts_of_a_current_sensor_are_those_at_its_load(void **state)
     if (fabs(signal - 5e-3) > 1e-15) fail_msg("%g A", signal);
 }
 
-/* Two faults of one chip are active at once; the first to end leaves the other. */
+/* Each chip has its own faults; those of one add up, and the first to end leaves the other. */
 static void faults_of_a_chip_add_up(void **state)
 {
     (void)state;
     run_to(400 * MS);
-    add("{'kind':'chip.dout_dead','point':'a.adc.y','level':'high','for_s':0.1}");
+    add("{'kind':'chip.dout_dead','point':'a.adc.x','level':'high','for_s':0.1}");
     add("{'kind':'chip.dout_dead','point':'a.adc.z','level':'low','for_s':0.2}");
+    add("{'kind':'chip.lost_sync','point':'a.adc.x','at_s':0.41}");
     add("{'kind':'controller.frozen_words','point':'a.kpsa','at_s':0.45,'for_s':0.1}");
     run_to(440 * MS);
-    assert_int_equal(r.frame.code[1], -1);
+    assert_int_equal(r.frame.code[0], -1);
     assert_int_equal(r.frame.code[2], 0);
     run_to(540 * MS);
-    assert_int_equal(r.frame.code[1], -1); /* frozen, though the pin is well again */
+    assert_int_equal(r.frame.code[0], -1); /* frozen, though the pin is well again */
+    assert_true(r.unit[0].board.adc[0].fault.lost_sync);
     run_to(590 * MS);
-    assert_int_not_equal(r.frame.code[1], -1);
-    assert_int_equal(r.changes, 5);
+    assert_true(r.frame.code[0] > 2000000);
+    assert_int_equal(r.changes, 6);
+}
+
+static void what_is_over_at_once_needs_no_lifting(void **state)
+{
+    (void)state;
+    run_to(400 * MS);
+    const uint32_t flip = add("{'kind':'chip.flip','point':'a.adc.y','register':2,'mask':1}");
+    const uint32_t glitch = add("{'kind':'line.glitch','point':'a.line.Int','width_ns':100,'at_s':0.41}");
+    run_to(420 * MS);
+    assert_change(0, flip, FAULT_ACTIVE, 400 * MS);
+    assert_change(1, flip, FAULT_OVER, 400 * MS);
+    assert_change(2, glitch, FAULT_ACTIVE, 410 * MS);
+    assert_change(3, glitch, FAULT_OVER, 410 * MS);
 }
 
 /* Same number, same noise; another number, another one. */
@@ -454,6 +471,7 @@ int main(void)
         TEST(a_bias_is_in_the_codes),
         TEST(volts_of_a_current_sensor_are_those_at_its_load),
         TEST(faults_of_a_chip_add_up),
+        TEST(what_is_over_at_once_needs_no_lifting),
         TEST(random_faults_are_seeded_by_their_number),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
