@@ -32,6 +32,7 @@ class ControlError(BenchError):
     def __init__(self, command: str, code: str, text: str) -> None:
         super().__init__(f"{command}: {text} ({code})")
         self.code = code
+        self.text = text
 
 
 class InstrumentError(BenchError):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 from pathlib import Path
 from typing import Any
@@ -113,6 +114,17 @@ def test_ctrl_c_ends_the_command_and_not_the_shell(env: dict[str, str], pace: st
         t.say("head.read", r"angle_deg +12")
         t.type("exit\r")
         assert t.wait_end() == 0
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_ends_the_shell_and_its_emulator(env: dict[str, str], number: signal.Signals) -> None:
+    with keyboard(env, "quiet", "--pace", "step") as t:
+        t.wait_for(r"psa> ")
+        emulators = children(t.pid)
+        assert emulators
+        os.kill(t.pid, number)
+        assert t.wait_end() == 128 + number
+    until(lambda: not any(Path(f"/proc/{p}").exists() for p in emulators), "the end of the emulator")
 
 
 def test_modes_for_can_and_scpi(env: dict[str, str]) -> None:
@@ -238,7 +250,7 @@ def test_a_device_without_a_control_socket(env: dict[str, str], make_rig: MakeRi
     assert done.returncode == 0, done.stderr
     assert objects(done.stdout)[3]["result"]["frames"] == 10
     assert "t_s" not in objects(done.stdout)[0]  # nobody tells the simulated time
-    for thing in ("head.turn 5", "table.rate 1 5", "chamber.set 20", "supply.set 5", "faults.list", "probe.lines"):
+    for thing in ("head.turn 5", "faults.list"):
         done = shell(env, "shell", "--can", rig.spec, "--command", thing)
         assert done.returncode == 2
         assert f"{thing.split('.')[0]} is not here: it wants the control socket of an emulator" in done.stderr

@@ -60,6 +60,15 @@ ROWS: list[dict[str, Any]] = [
             {"name": "kind", "type": "name", "what": "see faults.kinds"},
             {"name": "point", "type": "name", "what": "see faults.points"},
             {"name": "at_s", "type": "number", "unit": "s", "min": 0, "max": 86400, "optional": True, "what": "when"},
+            {
+                "name": "for_s",
+                "type": "number",
+                "unit": "s",
+                "min": 0,
+                "max": 100,
+                "optional": True,
+                "what": "how long",
+            },
             {"name": "bias_v", "type": "number", "unit": "V", "min": -15, "max": 15, "optional": True, "what": "added"},
             {"name": "mask", "type": "integer", "min": 1, "max": 255, "optional": True, "what": "bits"},
         ],
@@ -80,7 +89,18 @@ KINDS: list[dict[str, Any]] = [
         "kind": "lost",
         "what": "Loses.",
         "points": ["bus.NAME", "supply"],
-        "args": [{"name": "mask", "type": "integer", "min": 1, "max": 255, "optional": True, "what": "bits"}],
+        "args": [
+            {
+                "name": "for_s",
+                "type": "number",
+                "unit": "s",
+                "min": 0,
+                "max": 10,
+                "optional": False,
+                "what": "how long",
+            },
+            {"name": "mask", "type": "integer", "min": 1, "max": 255, "optional": True, "what": "bits"},
+        ],
     },
 ]
 POINTS = ["a.sensor.x", "a.sensor.z", "a.line.INT", "bus.can0", "supply"]

@@ -61,7 +61,7 @@ WRONG: list[tuple[str, int, str]] = [
     ("probe.start run.vcd c", 21, "unit: 'c'; there is a, b"),
     ("faults.add bias a.sensor.x", 27, "bias_v is missing: added, V, -15 to 15; usage: faults.add"),
     ("faults.add stack a.sensor.x", 12, "kind: 'stack'; did you mean stuck? there is stuck, bias, lost"),
-    ("faults.add stuck a.sensor.x bias_v=1", 29, "has no argument bias_v; it takes kind, point, at_s"),
+    ("faults.add stuck a.sensor.x bias_v=1", 29, "has no argument bias_v; it takes kind, point, at_s, for_s"),
     ('probe.start "run', 13, "a quote is not closed"),
     ("scpi.send tabel *IDN?", 11, "did you mean table?"),
     ("scpi.send table", 16, "line is missing"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import signal
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -105,6 +106,8 @@ def _shell(args: argparse.Namespace) -> int:
     if typed and args.json:
         raise BadInput("--json: for --command and pipes; at a terminal the shell talks to people")
     opening = _opening(args, "wall" if typed else "step")
+    for number in (signal.SIGTERM, signal.SIGHUP):  # Ctrl-C ends a command; these end the shell, and its emulator
+        signal.signal(number, _leave)
     with opening.open() as bench:
         session = Session(bench, opening.start)
         if typed:
@@ -113,6 +116,10 @@ def _shell(args: argparse.Namespace) -> int:
             return Terminal(session).run()
         voice = Voice(_say, json=args.json)
         return run_lines(session, args.command, voice) if args.command else run_stream(session, sys.stdin, voice)
+
+
+def _leave(number: int, _: object) -> None:
+    sys.exit(128 + number)
 
 
 def _script(args: argparse.Namespace) -> int:

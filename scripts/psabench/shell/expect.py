@@ -49,7 +49,7 @@ class Expectation:
     def failure(self, result: Mapping[str, Any]) -> str:
         """What does not hold; "" if all is well. A result without the field fails as well."""
         try:
-            got = look(result, self.path)
+            got: Any = look(result, self.path)
             got = literal(got) if isinstance(got, str) else got  # 56h of a register is a number here as well
         except KeyError as e:
             return f"{self.path}: {e.args[0]}"

@@ -49,7 +49,7 @@ def scalar(v: Any) -> str:
         return str(v["name"]) if "name" in v else ", ".join(f"{k} {scalar(x)}" for k, x in v.items())
     if isinstance(v, list):
         return " ".join(scalar(x) for x in v)
-    return "" if v is None else str(v)
+    return "-" if v is None else str(v)
 
 
 def _nested(v: Any) -> bool:

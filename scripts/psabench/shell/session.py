@@ -106,10 +106,25 @@ def learn(bench: Bench) -> Vocabulary:
     """What may be said to this bench, and which objects it has not."""
     mine = [row.command for row in own.ROWS if row.here(bench)]
     theirs = _of_table(bench) if bench.pace != "real" else []
-    commands: dict[str, Command] = {c.name: c for c in [*theirs, *mine]}
+    missing = _not_in_scenario(bench) if theirs else {}
+    commands: dict[str, Command] = {c.name: c for c in [*theirs, *mine] if c.name.split(".")[0] not in missing}
     things = {name.split(".")[0] for name in commands}
-    why = {name: _why_absent(bench, name) for name in ("dut", "can", "scpi", *KINDS, "probe", "faults", "bench")}
+    why = {
+        name: _why_absent(bench, name) for name in ("dut", "can", "scpi", *KINDS, "probe", "faults", "bench")
+    } | missing
     return Vocabulary(commands, {name: reason for name, reason in why.items() if name not in things})
+
+
+def _not_in_scenario(bench: Bench) -> dict[str, str]:
+    """Instruments that this emulator's scenario has not, and its own words for it."""
+    reasons = {}
+    for name in KINDS:
+        try:
+            bench.control.call(f"{name}.read", **({"axis": 1} if name == "table" else {}))
+        except ControlError as e:
+            if e.code == "state":
+                reasons[name] = e.text
+    return reasons
 
 
 def _of_table(bench: Bench) -> list[Command]:

@@ -105,6 +105,9 @@ OBJECTS: Mapping[str, str] = {
 # Events of a board, as emu/board/psa2_event.c names them; offered, the bench decides.
 EVENTS = ("RES", "SETUP_DONE", "SYNC_A", "SYNC_T", "DRD_A", "DRD_T", "INT_FALL", "INT_RISE", "POWER_DOWN", "POWER_UP")
 
+# Arguments of a fault of any kind: when it comes, and for how long.
+WHEN = ("at_s", "after", "count", "since", "unit", "delay_s", "for_s")
+
 # Names of the bench's table that an object of the shell has; others keep theirs.
 _NAMES = {name: f"bench.{name}" for name in ("counters", "frames", "quit", "snapshot", "fork", "units")} | {
     "lines": "probe.lines",
@@ -157,14 +160,13 @@ def _arg(row: Mapping[str, Any], here: tuple[str, ...], choices: Mapping[tuple[s
 def with_kinds(add: Command, kinds: Sequence[Mapping[str, Any]], points: Sequence[str]) -> Command:
     """`faults.add` with a variant for each kind of fault: its own points and arguments, needed or not."""
     kind, point, *others = add.args
-    of_kinds = {a["name"] for k in kinds for a in k["args"]}
-    common = [a for a in others if a.name not in of_kinds]
     names = tuple(str(k["kind"]) for k in kinds)
     kind = replace(kind, kind=Kind.CHOICE, choices=names, strict=True)
     variants = {}
     for k in kinds:
         here = tuple(p for p in points if any(_is_at(p, place) for place in k["points"]))
         own = [_arg(a, (), {}) for a in k["args"]]
+        common = [a for a in others if a.name in WHEN and a.name not in {o.name for o in own}]
         needed, optional = [a for a in own if not a.optional], [a for a in own if a.optional]
         args = (kind, replace(point, choices=here, strict=False), *needed, *common, *optional)
         variants[str(k["kind"])] = replace(add, what=str(k["what"]), args=args)
