@@ -15,7 +15,7 @@ WERROR    ?=#                         1: a warning is an error, as in make test
 BUILD     ?= build$(if $(filter clang%,$(notdir $(CC))),-clang)$(if $(SAN),-san)
 FUZZ_S    ?= 20
 BENCH_S   ?= 180#                      seconds of measuring; 60 for a quick look
-SAN_E2E   := $(wildcard tests/e2e/test_bad_*.py) $(patsubst %,tests/e2e/test_%.py,unit tools canopen)
+SAN_E2E   := $(wildcard tests/e2e/test_bad_*.py) $(patsubst %,tests/e2e/test_%.py,unit tools canopen faults_random)
 # Build a part only, say DIRS='base chip' TESTS=test_ads1282 while the rest does not compile.
 DIRS      ?= base trace phys chip canopen board link control app api
 TESTS     ?= $(basename $(notdir $(sort $(wildcard tests/unit/test_*.c))))
