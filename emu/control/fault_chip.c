@@ -92,7 +92,7 @@ static bool has_register(const struct control_bench *b, const struct fault *f, c
 }
 
 // clang-format off
-#define CHIP(v) .variant = v, .places = FAULT_BIT(FAULT_AT_ADC) | FAULT_BIT(FAULT_AT_TADC), .apply = apply_chip, .lift = refresh_chip
+#define CHIP(v) .variant = (v), .places = FAULT_BIT(FAULT_AT_ADC) | FAULT_BIT(FAULT_AT_TADC), .apply = apply_chip, .lift = refresh_chip
 static const struct fault_kind chip[] = {
     {"chip.drdy_stuck", "The data-ready pin stays at level; inside, conversions go on.", "no frames and EMCY FF01h (adc.x), no new temperatures and EMCY FF02h (tadc)",
      CHIP(DRDY_STUCK), .need = FAULT_BIT(FAULT_LEVEL), .unless = "adc.y, adc.z: DRD_A is the pin of converter X alone", .fits = has_drdy},
@@ -134,7 +134,7 @@ static bool apply_controller(struct fault *f, int64_t t_ns)
 }
 
 // clang-format off
-#define KPSA(v) .variant = v, .places = FAULT_BIT(FAULT_AT_KPSA), .apply = apply_controller, .lift = refresh_controller
+#define KPSA(v) .variant = (v), .places = FAULT_BIT(FAULT_AT_KPSA), .apply = apply_controller, .lift = refresh_controller
 static const struct fault_kind controller[] = {
     {"controller.skip_sync_t", "KPSA gives no pulse on SYNC_T.", "SYNC_T rests; temperature codes come every 10.00 ms at 100 SPS instead of every 10.25 ms",
      KPSA(SKIP_SYNC_T)},

@@ -49,7 +49,7 @@ static bool has_pulse(const struct control_bench *b, const struct fault *f, char
 }
 
 // clang-format off
-#define LINE(v) .variant = v, .places = FAULT_BIT(FAULT_AT_LINE), .apply = apply_line, .lift = lift_line
+#define LINE(v) .variant = (v), .places = FAULT_BIT(FAULT_AT_LINE), .apply = apply_line, .lift = lift_line
 static const struct fault_kind line[] = {
     {"line.stuck", "The line stays at level.", "no edge on it",
      LINE(LINE_STUCK_LOW), .need = FAULT_BIT(FAULT_LEVEL)},

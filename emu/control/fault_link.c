@@ -63,7 +63,7 @@ static bool bus_off(struct fault *f, int64_t t_ns)
 {
     struct can_bus *bus;
     struct can_node *node;
-    if (!find(f, &bus, &node)) return false;
+    if (!find(f, &bus, &node) || !node) return false;
     can_bus_off(bus, node->of ? node->of : node, t_ns);
     return true;
 }
@@ -98,7 +98,7 @@ static bool has_bits(const struct control_bench *b, const struct fault *f, char 
 #define ANY_FRAME AT(NODE) | AT(BUS) | AT(CLIENT)
 #define WHICH     FAULT_BIT(FAULT_PROBABILITY) | FAULT_BIT(FAULT_FRAMES) | FAULT_BIT(FAULT_ID) | FAULT_BIT(FAULT_ID_MASK)
 #define HOLD      FAULT_BIT(FAULT_HOLD_S)
-#define FRAMES(v) .variant = v, .apply = apply_frames, .lift = lift_frames
+#define FRAMES(v) .variant = (v), .apply = apply_frames, .lift = lift_frames
 
 // clang-format off
 static const struct fault_kind link[] = {

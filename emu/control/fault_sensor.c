@@ -87,7 +87,7 @@ static void lift_sensor(struct fault *f, int64_t t_ns)
 }
 
 // clang-format off
-#define SENSOR(v) .variant = v, .places = FAULT_BIT(FAULT_AT_SENSOR), .apply = apply_sensor, .lift = lift_sensor
+#define SENSOR(v) .variant = (v), .places = FAULT_BIT(FAULT_AT_SENSOR), .apply = apply_sensor, .lift = lift_sensor
 static const struct fault_kind sensor[] = {
     {"sensor.stuck", "The output stays at out_v, or at what it is at that instant.", "the codes of the axis stand still but for the converter's noise, whatever the head does",
      SENSOR(SENSOR_STUCK), .may = FAULT_BIT(FAULT_OUT_V), .unless = "the channel has no sensor", .fits = has_sensor},
@@ -143,7 +143,7 @@ static void lift_afe(struct fault *f, int64_t t_ns)
 }
 
 // clang-format off
-#define CHAIN(v) .variant = v, .places = FAULT_BIT(FAULT_AT_AFE), .apply = apply_afe, .lift = lift_afe
+#define CHAIN(v) .variant = (v), .places = FAULT_BIT(FAULT_AT_AFE), .apply = apply_afe, .lift = lift_afe
 static const struct fault_kind analog[] = {
     {"analog.load_open", "The load resistor of a current-output sensor is open: the buffer goes to its limit.", "the codes of the axis stand at the limit, status CLIP",
      CHAIN(AFE_LOAD_OPEN), .unless = "the sensor has voltage output: no load resistor", .fits = has_load},
