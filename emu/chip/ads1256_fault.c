@@ -1,3 +1,5 @@
+#include "chip/ads1256_fault.h"
+
 #include "chip/ads1256_parts.h"
 
 #include <assert.h>

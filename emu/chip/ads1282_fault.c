@@ -1,3 +1,5 @@
+#include "chip/ads1282_fault.h"
+
 #include "chip/ads1282_serial.h"
 
 #include <assert.h>
