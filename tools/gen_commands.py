@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""The tables of commands in docs/emulator.md and of SCPI headers in docs/scpi.md, as the emulator prints them.
+"""The tables of commands in docs/emulator.md, of SCPI headers in docs/scpi.md and of keys in docs/scenarios.md, as the
+emulator prints them.
 
 Usage:
     gen_commands.py           write what stands between the marks NAME:begin and NAME:end of the pages
@@ -21,6 +22,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PAGES = {
     "emulator.md": ("--list-commands", ("commands", "truth")),
     "faults.md": ("--list-faults", ("kinds", "matrix")),
+    "scenarios.md": ("--list-keys", ("keys",)),
     "scpi.md": ("--list-scpi", ("common", "head", "table", "chamber", "supply")),
 }
 
@@ -46,7 +48,8 @@ def main(check: bool) -> int:
     for name, (option, marks) in PAGES.items():
         page = ROOT / "docs" / name
         was = text = page.read_text(encoding="utf-8")
-        for mark, table in zip(marks, tables(option), strict=True):
+        printed = tables(option)
+        for mark, table in zip(marks, printed if len(marks) > 1 else ["\n\n".join(printed)], strict=True):
             text = spliced(text, mark, table)
         if text == was:
             continue

@@ -51,7 +51,7 @@ static bool list(FILE *out, const char *proto_folder, char *why, size_t cap)
         snprintf(path, sizeof path, "%s/%s.yaml", folder, names[i]);
         first_comment(path, comment, sizeof comment);
         if (profiles) list_profile(out, path, comment);
-        else fprintf(out, "%-10s %s\n", names[i], comment);
+        else fprintf(out, "%-13s %s\n", names[i], comment);
     }
     free(names);
     return true;

@@ -193,10 +193,23 @@ static bool build(struct yaml_file *f, struct fy_parser *p, struct fy_diag *diag
     return ok;
 }
 
+/* The library takes a NUL for the end: what follows would go unread. */
+static bool check_nul(struct yaml_file *f, const char *text, size_t len)
+{
+    struct yaml_node at = {.line = 1, .column = 1};
+    const char *nul = memchr(text, 0, len);
+    for (const char *p = text; nul && p < nul; p++) {
+        at.column = *p == '\n' ? 1 : at.column + 1;
+        at.line += *p == '\n';
+    }
+    return !nul || yaml_file_fail(f, &at, NULL, "not YAML: a NUL byte");
+}
+
 bool yaml_file_parse(struct yaml_file *f, const char *path, const char *text, size_t len, char *why, size_t cap)
 {
     struct fy_diag_cfg diag_cfg;
     *f = (struct yaml_file){.path = path, .why = why, .cap = cap};
+    if (!check_nul(f, text, len)) return false;
     fy_diag_cfg_default(&diag_cfg);
     diag_cfg.fp = NULL;
     struct fy_diag *diag = fy_diag_create(&diag_cfg);

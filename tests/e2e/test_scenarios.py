@@ -90,6 +90,12 @@ def test_entries_are_checked_against_the_commands_when_the_scenario_is_read(
         assert says in one_line(refused.stderr, "psa-emu"), refused.stderr
 
 
+def test_the_page_of_keys_is_what_the_emulator_prints() -> None:
+    page = (ROOT / "docs/scenarios.md").read_text(encoding="utf-8")
+    between = page.split("<!-- keys:begin -->\n")[1].split("<!-- keys:end -->")[0]
+    assert between.strip() == psa_emu("--list-keys").stdout.strip(), "make docs writes it"
+
+
 # ---- what each promises
 
 
