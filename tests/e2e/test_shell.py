@@ -146,6 +146,17 @@ def test_modes_for_can_and_scpi(env: dict[str, str]) -> None:
         t.leave()
 
 
+def test_python_with_the_bench_in_it(env: dict[str, str]) -> None:
+    with keyboard(env, "quiet", "--pace", "step") as t:
+        t.wait_for(r"psa> ")
+        t.say("python", r"bench: psabench\.Bench", r"In .*1.*: ")
+        t.say("bench.head.turn(17.0)", r"17\.0", r"In .*2.*: ")
+        t.type(CTRL_D)
+        t.wait_for(r"psa> ")
+        t.say("head.read", r"angle_deg +17")
+        t.leave()
+
+
 # ---- scripts, pipes
 
 

@@ -178,6 +178,7 @@ class Terminal:
 
         config = Config()
         config.TerminalInteractiveShell.banner1 = "bench: psabench.Bench; dut: Psa2. Not in the transcript.\n"
+        config.TerminalInteractiveShell.confirm_exit = False
         names: dict[str, Any] = {"bench": self.session.bench}
         if self.session.bench.units:
             names["dut"] = self.session.dut
