@@ -17,12 +17,12 @@ from psabench.can_host import CanHost, StepClock, WallClock, open_bus
 from psabench.control import Control
 from psabench.emulator import Emulator
 from psabench.errors import BadInput, ControlError
-from rig import BENCH, PATIENCE_S, SEED, bus_spec, one_line, psa_emu, until
+from rig import BENCH, HERE, PATIENCE_S, SEED, bus_spec, one_line, psa_emu, until
 
 pytestmark = pytest.mark.host
 
 NOISY = "stream"
-INSTANTS = 100  # at which a bench is saved
+INSTANTS = 100  # at which a busy bench is saved
 SPAN_NS = 12_000_000  # of simulated time that is compared after each
 SETUP_NS = 270_000_000  # of a board: a fifth of the deeds come before it is over
 TRACE_LAG_NS = 200_000  # emu/trace/trace.h
@@ -90,7 +90,7 @@ def deeds(seed: int, count: int) -> list[tuple[int, Deed]]:
             d.control.call("head.turn", angle_deg=angle_deg)
 
     def reset(d: Desk, _: float) -> None:
-        d.control.call("unit.reset")
+        d.control.call("unit.reset", unit="a")
 
     def start(d: Desk, _: float) -> None:
         d.host.send(0x000, bytes([1, 0]))
@@ -149,14 +149,17 @@ def go_on(d: Desk, plan: list[tuple[int, Deed]], until_ns: int) -> None:
     d.run(max(0, until_ns - d.t_ns))
 
 
-def test_what_is_restored_at_any_instant_goes_on_as_the_original_did(tmp_path: Path) -> None:
-    """Lines, frames and truth after each of INSTANTS snapshots, with a host that does the same again."""
-    plan = deeds(SEED, INSTANTS + 40)
+@pytest.mark.parametrize(("scenario", "instants"), [(NOISY, INSTANTS), (HERE / "moving.yaml", INSTANTS // 4)])
+def test_what_is_restored_at_any_instant_goes_on_as_the_original_did(
+    tmp_path: Path, scenario: str | Path, instants: int
+) -> None:
+    """Lines, frames and truth after each of so many snapshots, with a host that does the same again."""
+    plan = deeds(SEED, instants + 40)
     saved: list[int] = []
-    with Emulator(NOISY, extra=watching(tmp_path, "original")) as emulator, at(emulator) as original:
+    with Emulator(scenario, extra=watching(tmp_path, "original")) as emulator, at(emulator) as original:
         for i, (wait_ns, deed) in enumerate(plan):
             original.run(wait_ns)
-            if i < INSTANTS:
+            if i < instants:
                 original.control.call("snapshot", path=str(tmp_path / f"{i}.snapshot"))
                 saved.append(original.t_ns)
             deed(original)
