@@ -19,7 +19,7 @@ static const struct yaml_field buses_rows[] = {
 const struct yaml_fields scenario_buses_fields = YAML_FIELDS(buses_rows);
 
 static const struct yaml_field mems_rows[] = {
-#define ROW(name, lo, hi, words) {.key = #name, .type = YAML_REAL, .offset = MEMS(name), .min = lo, .max = hi, .what = words}
+#define ROW(name, lo, hi, words) {.key = #name, .type = YAML_REAL, .offset = MEMS(name), .min = (lo), .max = (hi), .what = (words)}
     ROW(u0_v,            -10, 10, "output without acceleration"),
     ROW(kx_v_per_g,      -10, 10, "sensitivity along the axis"),
     ROW(ky_v_per_g,      -10, 10, "sensitivity across, second axis"),
@@ -44,7 +44,7 @@ const struct yaml_fields scenario_mems_fields = YAML_FIELDS(mems_rows);
 
 #define QUARTZ(m) offsetof(struct quartz_g, m)
 static const struct yaml_field quartz_rows[] = {
-#define ROW(name, lo, hi, words) {.key = #name, .type = YAML_REAL, .offset = QUARTZ(name), .min = lo, .max = hi, .what = words}
+#define ROW(name, lo, hi, words) {.key = #name, .type = YAML_REAL, .offset = QUARTZ(name), .min = (lo), .max = (hi), .what = (words)}
     ROW(scale_a_per_g,      -1, 1,      "current for one g at 30 °C"),
     ROW(scale_tc_ppm_per_k, -1e4, 1e4,  "its temperature coefficient"),
     ROW(zero_ug,            -1e6, 1e6,  "zero signal at 30 °C but for the curve, millionths of g"),
@@ -67,7 +67,7 @@ static const struct yaml_field quartz_rows[] = {
 const struct yaml_fields scenario_quartz_fields = YAML_FIELDS(quartz_rows);
 
 static const struct yaml_field afe_numbers[] = {
-#define ROW(name, lo, hi, words) {.key = #name, .type = YAML_REAL, .offset = AFE(name), .min = lo, .max = hi, .what = words}
+#define ROW(name, lo, hi, words) {.key = #name, .type = YAML_REAL, .offset = AFE(name), .min = (lo), .max = (hi), .what = (words)}
     ROW(load_ohm,                 1, 1e6,      "load resistor of a current"),
     ROW(load_tol_ppm,             -1e5, 1e5,   "its deviation"),
     ROW(load_tc_ppm_per_k,        -1e4, 1e4,   "its temperature coefficient, from 25 °C"),
