@@ -193,23 +193,26 @@ static bool build(struct yaml_file *f, struct fy_parser *p, struct fy_diag *diag
     return ok;
 }
 
-/* The library takes a NUL for the end: what follows would go unread. */
-static bool check_nul(struct yaml_file *f, const char *text, size_t len)
+/* What libfyaml 0.7.12 must not see: a NUL is the end to it, what follows would go unread; some directives, lines that
+ * begin with %, keep it busy for ever. Nobody needs either. */
+static bool check_bytes(struct yaml_file *f, const char *text, size_t len)
 {
     struct yaml_node at = {.line = 1, .column = 1};
-    const char *nul = memchr(text, 0, len);
-    for (const char *p = text; nul && p < nul; p++) {
-        at.column = *p == '\n' ? 1 : at.column + 1;
-        at.line += *p == '\n';
+    for (size_t i = 0; i < len; i++) {
+        if (text[i] == '\0') return yaml_file_fail(f, &at, NULL, "not YAML: a NUL byte");
+        if (text[i] == '%' && at.column == 1) return yaml_file_fail(f, &at, NULL, "a directive: there are none here");
+        const bool ends = text[i] == '\n' || text[i] == '\r';
+        at.column = ends ? 1 : at.column + 1;
+        at.line += text[i] == '\n';
     }
-    return !nul || yaml_file_fail(f, &at, NULL, "not YAML: a NUL byte");
+    return true;
 }
 
 bool yaml_file_parse(struct yaml_file *f, const char *path, const char *text, size_t len, char *why, size_t cap)
 {
     struct fy_diag_cfg diag_cfg;
     *f = (struct yaml_file){.path = path, .why = why, .cap = cap};
-    if (!check_nul(f, text, len)) return false;
+    if (!check_bytes(f, text, len)) return false;
     fy_diag_cfg_default(&diag_cfg);
     diag_cfg.fp = NULL;
     struct fy_diag *diag = fy_diag_create(&diag_cfg);

@@ -5,6 +5,21 @@
 
 #include <string.h>
 
+/* Whole stacks, so that a leak is known by who made it. */
+const char *__asan_default_options(void);
+const char *__asan_default_options(void)
+{
+    return "fast_unwind_on_malloc=0";
+}
+
+/* libfyaml 0.7.12 loses a list of its own when it joins the lines of a scalar of very many lines. Once a scenario, at the start
+ * of a program. */
+const char *__lsan_default_suppressions(void);
+const char *__lsan_default_suppressions(void)
+{
+    return "leak:fy_atom_iter_chunk_next";
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     static struct scenario s;

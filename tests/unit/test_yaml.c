@@ -167,6 +167,7 @@ static const struct {
     {"timeline: [{cmd: x, args: {a: [[[[[1]]]]]}}]\nunits: [{}]\n", "dir/s.yaml:1:35: timeline[0].args: nested deeper"},
     {"faults: [1]\nunits: [{}]\n", "dir/s.yaml:1:10: faults: a mapping with the arguments of fault.add"},
     {"seed: 1\n---\nseed: 2\n", "dir/s.yaml:3:1: a second document"},
+    {"%YAML 1.2\n---\nunits: [{}]\n", "dir/s.yaml:1:1: a directive: there are none here"},
     {"seed: *x\n", "dir/s.yaml:1:7: *x: no such anchor"},
     {"a: &x [*x]\n", "dir/s.yaml:1:8: *x: no such anchor"},
 };
