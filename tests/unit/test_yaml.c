@@ -236,6 +236,26 @@ static void a_missing_scenario_is_told_in_one_line(void **state)
     assert_string_equal(why, "./nope.yaml: no such file, or not readable");
 }
 
+static void a_dump_has_every_bit_of_a_number_and_every_unit_of_a_count(void **state)
+{
+    (void)state;
+    static struct scenario again;
+    if (!parse("seed: 18446744073709551615\nsite: {g_mps2: 9.8066500000000012}\nbuses: [{}, {name: b}]\n"
+               "units: [&u {count: 3, bus: b, lever_arm_m: [0.1, -0.30000000000000004, 1e-300]}]\n"))
+        fail_msg("%s", why);
+    cJSON *j = scenario_dump(&s);
+    char *text = cJSON_Print(j);
+    if (!scenario_parse("dump", text, strlen(text), &again, why, sizeof why)) fail_msg("%s", why);
+    assert_true(again.seed == UINT64_MAX && again.site.g_mps2 == s.site.g_mps2);
+    assert_int_equal(again.unit_count, 3);
+    assert_string_equal(again.units[2].name, "u03");
+    assert_int_equal(again.units[2].bus, 1);
+    assert_int_equal(again.units[2].cfg.node, 7);
+    for (unsigned k = 0; k < 3; k++) assert_true(again.units[1].cfg.seat.lever_m[k] == s.units[0].cfg.seat.lever_m[k]);
+    cJSON_free(text);
+    cJSON_Delete(j);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -246,6 +266,7 @@ int main(void)
         cmocka_unit_test(cut_off_anywhere_a_scenario_is_refused_or_sound),
         cmocka_unit_test(the_shipped_scenarios_and_profiles_load),
         cmocka_unit_test(a_missing_scenario_is_told_in_one_line),
+        cmocka_unit_test(a_dump_has_every_bit_of_a_number_and_every_unit_of_a_count),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
