@@ -128,6 +128,7 @@ static void put_client(const struct can_client *c, struct control_client *out)
 {
     *out = (struct control_client){.adapter = c->adapter,
                                    .name = c->name,
+                                   .came = c->came,
                                    .delivered = c->delivered,
                                    .taken = c->taken,
                                    .dropped = c->dropped,

@@ -3,6 +3,7 @@
 #include "control/args.h"
 #include "control/commands.h"
 
+#include <inttypes.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
@@ -95,14 +96,16 @@ static const char *print(struct control *c, cJSON *reply)
     return c->reply;
 }
 
-/* What has been delivered to each CAN client so far: the barrier of a host that drives several. */
+/* What has been delivered to each CAN client so far, by its number: the barrier of a host that drives several. */
 static void add_rx(const struct control *c, cJSON *reply)
 {
     struct control_client k;
+    char number[16];
     cJSON_AddNumberToObject(reply, "can_rx", (double)c->bench->can_rx(c->bench->ctx));
-    cJSON *list = cJSON_AddArrayToObject(reply, "rx");
+    cJSON *rx = cJSON_AddObjectToObject(reply, "rx");
     for (unsigned i = 0; c->bench->client(c->bench->ctx, i, &k); i++) {
-        cJSON_AddItemToArray(list, cJSON_CreateNumber((double)k.delivered));
+        snprintf(number, sizeof number, "%" PRIu32, k.came);
+        cJSON_AddNumberToObject(rx, number, (double)k.delivered);
     }
 }
 

@@ -1,8 +1,8 @@
 /* The command table and its JSON form: one object a line in, one object a line out.
  *
  *   {"id":1,"cmd":"head.turn","args":{"angle_deg":5}}
- *   {"id":1,"ok":true,"t_ns":20000000,"can_rx":12,"rx":[12],"result":{...}}
- *   {"id":1,"ok":false,"t_ns":20000000,"can_rx":12,"rx":[12],"error":{"code":"range","text":"..."}}
+ *   {"id":1,"ok":true,"t_ns":20000000,"can_rx":12,"rx":{"1":12},"result":{...}}
+ *   {"id":1,"ok":false,"t_ns":20000000,"can_rx":12,"rx":{"1":12},"error":{"code":"range","text":"..."}}
  *
  * Every command is a row {name, one sentence, arguments with unit and range, handler}; JSON, SCPI, help, the refusals and the
  * pages of the manual come from the same rows. Arguments are checked before a handler runs: a refused command changes

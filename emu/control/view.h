@@ -13,6 +13,7 @@
 /* One client of a CAN adapter, or the sum of those who left. */
 struct control_client {
     const char *adapter, *name;
+    uint32_t came; /* its number, in order of coming, for ever */
     uint64_t delivered, taken, dropped, overrun, refused;
 };
 

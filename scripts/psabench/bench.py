@@ -325,7 +325,7 @@ class Bench:
                 self.wait(0.0)
                 came = watcher.next_event(min(left_s, 0.01))
                 seen += came is not None and came["event"] == event and came.get("unit", first) == first
-        return Reply(t_ns=reply.t_ns, can_rx=0, rx=(), result={"reached": seen >= count, "seen": seen})
+        return Reply(t_ns=reply.t_ns, can_rx=0, rx={}, result={"reached": seen >= count, "seen": seen})
 
     # ---- looking
 

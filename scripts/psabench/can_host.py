@@ -76,7 +76,7 @@ class StepClock:
         self._t_ns = first.t_ns
         clients = [*first.result["clients"], first.result["gone"]]
         self._base_tx = sum(int(c["taken"]) for c in clients)
-        self._first = max(0, len(first.rx) - len(self._hosts))  # place of the first of ours among all clients
+        self._mine = sorted(first.rx)[-len(self._hosts) :] if self._hosts else []  # they came last
         self._base_rx = self._delivered(first)  # frames sent before these hosts were there
 
     def now_s(self) -> float:
@@ -98,8 +98,7 @@ class StepClock:
 
     def _delivered(self, reply: Reply) -> list[int]:
         """Frames handed to each of our hosts so far."""
-        mine = reply.rx[self._first : self._first + len(self._hosts)] if self._hosts else ()
-        return list(mine) or [reply.can_rx]
+        return [reply.rx.get(client, 0) for client in self._mine] or [reply.can_rx]
 
 
 def _receive_all(host: CanHost, sent: int) -> None:

@@ -22,7 +22,7 @@ class Reply:
 
     t_ns: int  # simulated time
     can_rx: int  # CAN frames handed to the client that has been on the bus longest: the barrier of step pace
-    rx: tuple[int, ...]  # the same for each client, in the order of their coming
+    rx: dict[int, int]  # the same for each client, by its number in the order of coming
     result: dict[str, Any]
 
 
@@ -115,7 +115,7 @@ class Control:
         return Reply(
             t_ns=reply["t_ns"],
             can_rx=reply.get("can_rx", 0),
-            rx=tuple(reply.get("rx", ())),
+            rx={int(client): int(frames) for client, frames in reply.get("rx", {}).items()},
             result=reply.get("result") or {},
         )
 

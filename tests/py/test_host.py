@@ -213,7 +213,11 @@ def test_on_a_shared_interface_frames_of_others_do_not_hold_ours_back(tmp_path: 
 
 def test_a_step_waits_for_each_bus_of_ours_and_for_nobody_elses(tmp_path: Path) -> None:
     buses = FakeBus([frame(1), frame(2)]), FakeBus([frame(3), frame(4)])
-    replies = ({"rx": [5, 7, 9], "result": IDLE}, {"rx": [9, 8, 10]}, {"rx": [9, 9, 11, 3]})
+    replies = (
+        {"rx": {"1": 5, "2": 7, "10": 9}, "result": IDLE},
+        {"rx": {"1": 9, "2": 8, "10": 10}},
+        {"rx": {"2": 9, "10": 11, "11": 3}},  # the first has gone
+    )
     with (
         control(tmp_path, *replies) as (port, fake),
         CanHost(buses[0], WallClock()) as a,

@@ -101,7 +101,7 @@ static uint64_t on_can_rx(void *ctx)
 static bool on_client(void *ctx, unsigned i, struct control_client *out)
 {
     (void)ctx;
-    *out = (struct control_client){.adapter = "socketcand", .name = "can0", .delivered = 42, .refused = 1};
+    *out = (struct control_client){.adapter = "socketcand", .name = "can0", .came = 3, .delivered = 42, .refused = 1};
     return i == 0;
 }
 
@@ -169,7 +169,7 @@ static void a_reply_has_id_time_and_barrier(void **state)
     (void)state;
     sched_run_until(&bench->sched, 1500000000);
     assert_string_equal(say("{\"id\":1,\"cmd\":\"time\"}"),
-                        "{\"id\":1,\"ok\":true,\"t_ns\":1500000000,\"can_rx\":42,\"rx\":[42],\"result\":{"
+                        "{\"id\":1,\"ok\":true,\"t_ns\":1500000000,\"can_rx\":42,\"rx\":{\"3\":42},\"result\":{"
                         "\"t_s\":1.5,\"pace\":\"step\"}}");
     assert_says("{\"cmd\":\"time\",\"id\":\"any JSON\"}", "{\"id\":\"any JSON\",\"ok\":true");
     assert_says("{\"cmd\":\"time\"}", "{\"id\":null,\"ok\":true");
@@ -237,7 +237,7 @@ static void run_is_answered_when_it_is_over(void **state)
     assert_says("{\"id\":10,\"cmd\":\"run\",\"args\":{\"for_s\":1}}", "another run is under way");
     assert_int_equal(asked.runs, 1);
     assert_string_equal(control_run_done(&control, 10000000),
-                        "{\"id\":9,\"ok\":true,\"t_ns\":10000000,\"can_rx\":42,\"rx\":[42],\"result\":{}}");
+                        "{\"id\":9,\"ok\":true,\"t_ns\":10000000,\"can_rx\":42,\"rx\":{\"3\":42},\"result\":{}}");
     assert_null(say("{\"id\":11,\"cmd\":\"run\",\"args\":{\"for_s\":0}}"));
     control_run_forget(&control);
     asked.refuse = true;
