@@ -179,7 +179,7 @@ def test_a_full_disk_ends_the_trace_and_not_the_run(for_time: str) -> None:
     """5 ms fit into the buffer: the loss shows only when the file is closed."""
     done = psa_emu(BENCH, "--can", "none", "--pace", "free", "--for", for_time, "--vcd", "/dev/full", "--quiet")
     assert done.returncode == 3
-    assert "--vcd /dev/full: No space left on device" in one_line(done.stderr, "psa-emu")
+    assert "VCD file /dev/full: No space left on device" in one_line(done.stderr, "psa-emu")
 
 
 # ---- the host's own command line
