@@ -1,21 +1,10 @@
 #include "app/instruments.h"
 
-#include "base/text.h"
+#include "app/why.h"
 
 #include <errno.h>
-#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
-
-__attribute__((format(printf, 3, 4))) static bool fail(char *why, size_t cap, const char *format, ...)
-{
-    va_list ap;
-    va_start(ap, format);
-    vsnprintf(why, cap, format, ap);
-    va_end(ap);
-    text_one_line(why);
-    return false;
-}
 
 /* ---- sessions */
 
@@ -80,9 +69,10 @@ void instruments_look(struct instruments *all, int64_t t_ns)
 static bool open_port(struct instruments *all, const struct scpi_kind *kind, const struct options_scpi *o,
                       unsigned offset, bool many, char *why, size_t cap)
 {
-    if (all->count == INSTRUMENTS_MAX) return fail(why, cap, "--scpi %s: up to %u addresses", o->arg, INSTRUMENTS_MAX);
+    if (all->count == INSTRUMENTS_MAX)
+        return why_fail(why, cap, "--scpi %s: up to %u addresses", o->arg, INSTRUMENTS_MAX);
     struct instrument *i = calloc(1, sizeof *i);
-    if (!i) return fail(why, cap, "--scpi %s: no memory", o->arg);
+    if (!i) return why_fail(why, cap, "--scpi %s: no memory", o->arg);
     i->all = all;
     i->kind = kind;
     i->port = (struct scpi_port){
@@ -97,11 +87,12 @@ static bool open_port(struct instruments *all, const struct scpi_kind *kind, con
     }
     free(i);
     if (err == -EADDRINUSE)
-        return fail(why, cap, "--scpi %s: port %u is taken on 127.0.0.1; another one, or 0, is wanted", o->arg, port);
+        return why_fail(why, cap, "--scpi %s: port %u is taken on 127.0.0.1; another one, or 0, is wanted", o->arg,
+                        port);
     if (err == -EEXIST)
-        return fail(why, cap, "--scpi %s: %s exists and is no symbolic link to a pty; another name is wanted", o->arg,
-                    name);
-    return fail(why, cap, "--scpi %s: %s", o->arg, strerror(-err));
+        return why_fail(why, cap, "--scpi %s: %s exists and is no symbolic link to a pty; another name is wanted",
+                        o->arg, name);
+    return why_fail(why, cap, "--scpi %s: %s", o->arg, strerror(-err));
 }
 
 /* `all` are those that the scenario has, each at an offset of its own whatever else there is. */
@@ -118,9 +109,9 @@ static bool open_one(struct instruments *all, const struct options_scpi *o, char
 {
     if (strcmp(o->kind, "all") == 0) return open_all(all, o, why, cap);
     const struct scpi_kind *kind = scpi_kind(o->kind);
-    if (!kind) return fail(why, cap, "--scpi %s: head, table, chamber, supply or all is wanted", o->arg);
+    if (!kind) return why_fail(why, cap, "--scpi %s: head, table, chamber, supply or all is wanted", o->arg);
     if (!kind->present(all->control->bench))
-        return fail(why, cap, "--scpi %s: the scenario has no %s", o->arg, kind->name);
+        return why_fail(why, cap, "--scpi %s: the scenario has no %s", o->arg, kind->name);
     return open_port(all, kind, o, 0, false, why, cap);
 }
 

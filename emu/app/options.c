@@ -1,13 +1,12 @@
 #define _GNU_SOURCE /* getopt_long */
 #include "app/options.h"
 
-#include "base/text.h"
+#include "app/why.h"
 #include "link/socketcand_tcp.h"
 
 #include <errno.h>
 #include <getopt.h>
 #include <math.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -64,16 +63,6 @@ const char *options_help(void)
     return help;
 }
 
-__attribute__((format(printf, 3, 4))) static bool fail(char *why, size_t cap, const char *format, ...)
-{
-    va_list ap;
-    va_start(ap, format);
-    vsnprintf(why, cap, format, ap);
-    va_end(ap);
-    text_one_line(why);
-    return false;
-}
-
 static bool parse_u64(const char *text, uint64_t max, uint64_t *v)
 {
     char *end;
@@ -125,7 +114,7 @@ static bool set_can(struct target *t, const char *arg)
     o->can_given = true;
     if (strcmp(arg, "none") == 0) return true;
     if (o->can_count == OPTIONS_CAN_MAX)
-        return fail(t->why, t->cap, "--can %s: up to %u adapters", arg, OPTIONS_CAN_MAX);
+        return why_fail(t->why, t->cap, "--can %s: up to %u adapters", arg, OPTIONS_CAN_MAX);
     struct options_can *c = &o->can[o->can_count];
     const char *kind = arg + bus_prefix(arg);
     const char *colon = strchr(kind, ':');
@@ -137,7 +126,7 @@ static bool set_can(struct target *t, const char *arg)
     if (len == 10 && strncmp(kind, "socketcand", 10) == 0) {
         c->kind = OPTIONS_SOCKETCAND;
         if (rest && !parse_u64(rest, 65535, &port)) {
-            return fail(t->why, t->cap, "--can %s: \"%s\" is no port, 0 to 65535 (0: a free one)", arg, rest);
+            return why_fail(t->why, t->cap, "--can %s: \"%s\" is no port, 0 to 65535 (0: a free one)", arg, rest);
         }
         c->port = (uint16_t)port;
     } else if (len == 5 && strncmp(kind, "slcan", 5) == 0) {
@@ -145,8 +134,8 @@ static bool set_can(struct target *t, const char *arg)
     } else if (len == 9 && strncmp(kind, "socketcan", 9) == 0 && rest) {
         c->kind = OPTIONS_SOCKETCAN;
     } else {
-        return fail(t->why, t->cap, "--can %s: socketcand[:PORT], slcan[:LINK], socketcan:IFACE or none is wanted",
-                    arg);
+        return why_fail(t->why, t->cap, "--can %s: socketcand[:PORT], slcan[:LINK], socketcan:IFACE or none is wanted",
+                        arg);
     }
     o->can_count++;
     return true;
@@ -157,7 +146,7 @@ static bool set_scpi(struct target *t, const char *arg)
 {
     struct options *o = t->o;
     if (o->scpi_count == OPTIONS_SCPI_MAX)
-        return fail(t->why, t->cap, "--scpi %s: up to %u instruments", arg, OPTIONS_SCPI_MAX);
+        return why_fail(t->why, t->cap, "--scpi %s: up to %u instruments", arg, OPTIONS_SCPI_MAX);
     struct options_scpi *i = &o->scpi[o->scpi_count++];
     const size_t len = strcspn(arg, ":");
     const char *rest = arg[len] ? arg + len + 1 : "0";
@@ -165,11 +154,11 @@ static bool set_scpi(struct target *t, const char *arg)
     *i = (struct options_scpi){.arg = arg, .pty = strcmp(rest, "pty") == 0 || strncmp(rest, "pty:", 4) == 0};
     snprintf(i->kind, sizeof i->kind, "%.*s", (int)len, arg);
     if (len == 0 || len >= sizeof i->kind)
-        return fail(t->why, t->cap, "--scpi %s: head, table, chamber, supply or all is wanted", arg);
+        return why_fail(t->why, t->cap, "--scpi %s: head, table, chamber, supply or all is wanted", arg);
     if (i->pty && rest[3] && rest[4]) i->link = rest + 4;
     if (!i->pty && !parse_u64(rest, 65535, &port)) {
-        return fail(t->why, t->cap, "--scpi %s: \"%s\" is neither pty[:LINK] nor a port, 0 to 65535 (0: a free one)",
-                    arg, rest);
+        return why_fail(t->why, t->cap,
+                        "--scpi %s: \"%s\" is neither pty[:LINK] nor a port, 0 to 65535 (0: a free one)", arg, rest);
     }
     i->port = (uint16_t)port;
     return true;
@@ -189,7 +178,7 @@ bool options_cans(struct options *o, char *text, char *why, size_t cap)
 static bool set_truth_every(struct target *t, const char *arg)
 {
     if (options_duration(arg, &t->o->truth_every_ns) && t->o->truth_every_ns >= 1000) return true;
-    return fail(t->why, t->cap, "--truth-every %s: a time of 1us or more is wanted, as 10ms", arg);
+    return why_fail(t->why, t->cap, "--truth-every %s: a time of 1us or more is wanted, as 10ms", arg);
 }
 
 static bool set_pace(struct target *t, const char *arg)
@@ -198,26 +187,26 @@ static bool set_pace(struct target *t, const char *arg)
         t->o->pace = (enum pace_kind)k;
         if (strcmp(arg, pace_name(t->o->pace)) == 0) return true;
     }
-    return fail(t->why, t->cap, "--pace %s: wall, step or free is wanted", arg);
+    return why_fail(t->why, t->cap, "--pace %s: wall, step or free is wanted", arg);
 }
 
 static bool set_for(struct target *t, const char *arg)
 {
     if (options_duration(arg, &t->o->for_ns)) return true;
-    return fail(t->why, t->cap, "--for %s: a time is wanted, as 300ms, 10s or 2min, up to 1e6 s", arg);
+    return why_fail(t->why, t->cap, "--for %s: a time is wanted, as 300ms, 10s or 2min, up to 1e6 s", arg);
 }
 
 static bool set_seed(struct target *t, const char *arg)
 {
     t->o->seed_given = parse_u64(arg, UINT64_MAX, &t->o->seed);
-    return t->o->seed_given || fail(t->why, t->cap, "--seed %s: an integer from 0 to 2^64 - 1 is wanted", arg);
+    return t->o->seed_given || why_fail(t->why, t->cap, "--seed %s: an integer from 0 to 2^64 - 1 is wanted", arg);
 }
 
 static bool set_rate(struct target *t, const char *arg, const char *name, uint32_t *hz, bool *given)
 {
     uint64_t v;
     *given = parse_u64(arg, 8000000, &v) && (v == 0 || v >= 10000);
-    if (!*given) return fail(t->why, t->cap, "--%s %s: 0 or 10000 to 8000000 bit/s is wanted", name, arg);
+    if (!*given) return why_fail(t->why, t->cap, "--%s %s: 0 or 10000 to 8000000 bit/s is wanted", name, arg);
     *hz = (uint32_t)v;
     return true;
 }
@@ -237,7 +226,7 @@ static bool set_epoch(struct target *t, const char *arg)
     char *end;
     const double s = strtod(arg, &end);
     if (end == arg || *end || !(s >= 0 && s <= 9e9)) {
-        return fail(t->why, t->cap, "--epoch %s: seconds are wanted, 0 to 9e9 (date +%%s gives today's)", arg);
+        return why_fail(t->why, t->cap, "--epoch %s: seconds are wanted, 0 to 9e9 (date +%%s gives today's)", arg);
     }
     t->o->epoch_ns = (int64_t)nearbyint(s) * 1000000000 + (int64_t)nearbyint((s - nearbyint(s)) * 1e9);
     return true;
@@ -248,7 +237,7 @@ static bool set_vcd_unit(struct target *t, const char *arg)
     uint64_t v;
     bool power = parse_u64(arg, 100000000, &v) && v > 0;
     for (uint64_t x = power ? v : 1; x > 1; x /= 10) power = power && x % 10 == 0;
-    if (!power) return fail(t->why, t->cap, "--vcd-unit %s: 1, 10, 100 ... 100000000 ns is wanted", arg);
+    if (!power) return why_fail(t->why, t->cap, "--vcd-unit %s: 1, 10, 100 ... 100000000 ns is wanted", arg);
     t->o->vcd_unit_ns = (uint32_t)v;
     return true;
 }
@@ -257,7 +246,7 @@ static bool set_line_hz(struct target *t, const char *arg)
 {
     uint64_t v;
     if (!parse_u64(arg, 100000000, &v) || v < 1000) {
-        return fail(t->why, t->cap, "--line-hz %s: 1000 to 100000000 samples a second are wanted", arg);
+        return why_fail(t->why, t->cap, "--line-hz %s: 1000 to 100000000 samples a second are wanted", arg);
     }
     t->o->line_hz = (int64_t)v;
     return true;
@@ -265,7 +254,7 @@ static bool set_line_hz(struct target *t, const char *arg)
 
 static bool set_path(struct target *t, const char *name, const char *arg, const char **path)
 {
-    if (!*arg) return fail(t->why, t->cap, "--%s: a path is wanted", name);
+    if (!*arg) return why_fail(t->why, t->cap, "--%s: a path is wanted", name);
     *path = arg;
     return true;
 }
@@ -322,14 +311,14 @@ static const struct {
 static bool set_scenario(struct target *t, const char *arg)
 {
     if (t->o->scenario)
-        return fail(t->why, t->cap, "%s: one scenario is enough, %s was given before", arg, t->o->scenario);
+        return why_fail(t->why, t->cap, "%s: one scenario is enough, %s was given before", arg, t->o->scenario);
     return set_path(t, "SCENARIO", arg, &t->o->scenario);
 }
 
 static bool unknown(struct target *t, const char *word, int c)
 {
-    if (c == ':') return fail(t->why, t->cap, "%s: an argument is missing (psa-emu --help)", word);
-    return fail(t->why, t->cap, "%s: unknown option or unwanted argument (psa-emu --help)", word);
+    if (c == ':') return why_fail(t->why, t->cap, "%s: an argument is missing (psa-emu --help)", word);
+    return why_fail(t->why, t->cap, "%s: unknown option or unwanted argument (psa-emu --help)", word);
 }
 
 static bool parse_all(struct target *t, int argc, char *const argv[])
@@ -357,13 +346,13 @@ bool options_parse(int argc, char *const argv[], struct options *o, char *why, s
     struct target t = {o, why, cap};
     if (!parse_all(&t, argc, argv)) return false;
     if (o->pace == PACE_STEP && !o->control) {
-        return fail(why, cap, "--pace step: needs --control PATH, by which time is moved");
+        return why_fail(why, cap, "--pace step: needs --control PATH, by which time is moved");
     }
     if (o->wait_client && o->pace == PACE_STEP) {
-        return fail(why, cap, "--wait-client: in step pace time waits for the control socket anyway");
+        return why_fail(why, cap, "--wait-client: in step pace time waits for the control socket anyway");
     }
     if (o->restore && (o->scenario || o->seed_given || o->bitrate_given || o->data_bitrate_given || o->start)) {
-        return fail(why, cap, "--restore %s: scenario, seed, bit rates and start are the snapshot's", o->restore);
+        return why_fail(why, cap, "--restore %s: scenario, seed, bit rates and start are the snapshot's", o->restore);
     }
     if (!o->can_given)
         o->can[o->can_count++] = (struct options_can){.kind = OPTIONS_SOCKETCAND, .port = SOCKETCAND_PORT};

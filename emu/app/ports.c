@@ -1,22 +1,11 @@
 #include "app/ports.h"
 
-#include "base/text.h"
+#include "app/why.h"
 
 #include <errno.h>
 #include <inttypes.h>
-#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
-
-__attribute__((format(printf, 3, 4))) static bool fail(char *why, size_t cap, const char *format, ...)
-{
-    va_list ap;
-    va_start(ap, format);
-    vsnprintf(why, cap, format, ap);
-    va_end(ap);
-    text_one_line(why);
-    return false;
-}
 
 /* ---- CAN */
 
@@ -26,11 +15,12 @@ static bool open_socketcand(struct can_hub *hub, struct ports_can *c, const stru
     const int err = socketcand_listen(&c->socketcand, hub, c->hubs, o->port);
     if (!err) return true;
     if (err == -EADDRINUSE) {
-        return fail(why, cap,
-                    "--can socketcand:%u: the port is taken on 127.0.0.1; another one, or 0 for a free one, is wanted",
-                    o->port);
+        return why_fail(
+            why, cap,
+            "--can socketcand:%u: the port is taken on 127.0.0.1; another one, or 0 for a free one, is wanted",
+            o->port);
     }
-    return fail(why, cap, "--can socketcand:%u: %s", o->port, strerror(-err));
+    return why_fail(why, cap, "--can socketcand:%u: %s", o->port, strerror(-err));
 }
 
 static bool open_slcan(struct can_hub *hub, struct ports_can *c, const struct options_can *o, char *why, size_t cap)
@@ -38,9 +28,9 @@ static bool open_slcan(struct can_hub *hub, struct ports_can *c, const struct op
     const int err = slcan_pty_open(&c->slcan, hub, o->arg);
     if (!err) return true;
     if (err == -EEXIST)
-        return fail(why, cap, "--can slcan:%s: exists and is no symbolic link to a pty; another name is wanted",
-                    o->arg);
-    return fail(why, cap, "--can slcan%s%s: %s", o->arg ? ":" : "", o->arg ? o->arg : "", strerror(-err));
+        return why_fail(why, cap, "--can slcan:%s: exists and is no symbolic link to a pty; another name is wanted",
+                        o->arg);
+    return why_fail(why, cap, "--can slcan%s%s: %s", o->arg ? ":" : "", o->arg ? o->arg : "", strerror(-err));
 }
 
 static bool open_socketcan(struct can_hub *hub, struct ports_can *c, const struct options_can *o, char *why, size_t cap)
@@ -48,17 +38,17 @@ static bool open_socketcan(struct can_hub *hub, struct ports_can *c, const struc
     const int err = socketcan_open(&c->socketcan, hub, o->arg);
     if (!err) return true;
     if (err == -ENODEV) {
-        return fail(why, cap,
-                    "--can socketcan:%s: no such interface; as root: ip link add %s type vcan && ip link set %s up",
-                    o->arg, o->arg, o->arg);
+        return why_fail(why, cap,
+                        "--can socketcan:%s: no such interface; as root: ip link add %s type vcan && ip link set %s up",
+                        o->arg, o->arg, o->arg);
     }
     if (err == -ENETDOWN)
-        return fail(why, cap, "--can socketcan:%s: is down; as root: ip link set %s up", o->arg, o->arg);
+        return why_fail(why, cap, "--can socketcan:%s: is down; as root: ip link set %s up", o->arg, o->arg);
     if (err == -EAFNOSUPPORT || err == -EPROTONOSUPPORT) {
-        return fail(why, cap, "--can socketcan:%s: this kernel has no CAN; --can socketcand and --can slcan need none",
-                    o->arg);
+        return why_fail(
+            why, cap, "--can socketcan:%s: this kernel has no CAN; --can socketcand and --can slcan need none", o->arg);
     }
-    return fail(why, cap, "--can socketcan:%s: %s", o->arg, strerror(-err));
+    return why_fail(why, cap, "--can socketcan:%s: %s", o->arg, strerror(-err));
 }
 
 /* The hub of a bus, the first of all for no name; NULL: there is no such bus. */
@@ -71,7 +61,7 @@ static struct can_hub *hub_of(struct ports *p, const char *bus)
 
 static void tell_buses(const struct ports *p, const char *bus, char *why, size_t cap)
 {
-    fail(why, cap, "--can %s=...: no such bus; there is", bus);
+    why_fail(why, cap, "--can %s=...: no such bus; there is", bus);
     for (unsigned i = 0; i < p->hubs; i++) {
         const size_t at = strlen(why);
         snprintf(why + at, cap - at, "%s %s", i ? "," : "", p->hub[i].name);
@@ -85,7 +75,7 @@ static bool open_can(struct ports *p, const struct options *o, char *why, size_t
         [OPTIONS_SOCKETCAND] = open_socketcand, [OPTIONS_SLCAN] = open_slcan, [OPTIONS_SOCKETCAN] = open_socketcan};
     for (unsigned i = 0; i < o->can_count; i++) {
         struct ports_can *c = calloc(1, sizeof *c);
-        if (!c) return fail(why, cap, "--can: no memory");
+        if (!c) return why_fail(why, cap, "--can: no memory");
         struct can_hub *hub = hub_of(p, o->can[i].bus);
         c->kind = o->can[i].kind;
         const bool all = c->kind == OPTIONS_SOCKETCAND && !o->can[i].bus[0];
@@ -138,8 +128,9 @@ static bool open_line(struct ports *p, struct bench *b, const struct options *o,
     free(p->line);
     p->line = NULL;
     if (err == -EEXIST)
-        return fail(why, cap, "--line %s: exists and is no symbolic link to a pty; another name is wanted", o->line);
-    return fail(why, cap, "--line %s: %s", o->line, strerror(-err));
+        return why_fail(why, cap, "--line %s: exists and is no symbolic link to a pty; another name is wanted",
+                        o->line);
+    return why_fail(why, cap, "--line %s: %s", o->line, strerror(-err));
 }
 
 /* ---- sockets and file */
@@ -149,19 +140,21 @@ static bool open_socket(struct ctl_server *s, const char *option, const char *pa
     if (!path) return true;
     const int err = ctl_listen(s, path);
     if (!err) return true;
-    if (err == -EADDRINUSE) return fail(why, cap, "--%s %s: another process listens there", option, path);
-    if (err == -EEXIST) return fail(why, cap, "--%s %s: exists and is no socket; another path is wanted", option, path);
-    if (err == -ENAMETOOLONG) return fail(why, cap, "--%s %s: a path of a socket has up to 107 bytes", option, path);
-    return fail(why, cap, "--%s %s: %s", option, path, strerror(-err));
+    if (err == -EADDRINUSE) return why_fail(why, cap, "--%s %s: another process listens there", option, path);
+    if (err == -EEXIST)
+        return why_fail(why, cap, "--%s %s: exists and is no socket; another path is wanted", option, path);
+    if (err == -ENAMETOOLONG)
+        return why_fail(why, cap, "--%s %s: a path of a socket has up to 107 bytes", option, path);
+    return why_fail(why, cap, "--%s %s: %s", option, path, strerror(-err));
 }
 
 static bool open_vcd(struct ports *p, struct bench *b, const struct options *o, char *why, size_t cap)
 {
     if (!o->vcd) return true;
     p->vcd = fopen(o->vcd, "wbe");
-    if (!p->vcd) return fail(why, cap, "--vcd %s: %s", o->vcd, strerror(errno));
+    if (!p->vcd) return why_fail(why, cap, "--vcd %s: %s", o->vcd, strerror(errno));
     return bench_record(b, b->watched, p->vcd, o->vcd_unit_ns) ||
-           fail(why, cap, "--vcd-unit %u: no unit of VCD", o->vcd_unit_ns);
+           why_fail(why, cap, "--vcd-unit %u: no unit of VCD", o->vcd_unit_ns);
 }
 
 void ports_init(struct ports *p, struct bench *b, const struct options *o)

@@ -2,11 +2,11 @@
 #include "app/snapshot.h"
 
 #include "app/pace.h"
+#include "app/why.h"
 #include "base/text.h"
 
 #include <errno.h>
 #include <inttypes.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -15,16 +15,6 @@
 #define VERSION TEXT_OF(PSABENCH_VERSION)
 
 enum { WHY_MAX = 512 };
-
-__attribute__((format(printf, 3, 4))) static bool fail(char *why, size_t cap, const char *format, ...)
-{
-    va_list ap;
-    va_start(ap, format);
-    vsnprintf(why, cap, format, ap);
-    va_end(ap);
-    text_one_line(why);
-    return false;
-}
 
 /* ---- writing */
 
@@ -82,20 +72,20 @@ bool snapshot_write(const char *path, struct journal *j, const char *scenario, c
 {
     char part[1100];
     journal_watchers(j);
-    if (j->lost) return fail(why, cap, "%s: %s", path, j->lost);
+    if (j->lost) return why_fail(why, cap, "%s: %s", path, j->lost);
     if (strchr(scenario, '\n') || strlen(scenario) > SNAPSHOT_SCENARIO_MAX)
-        return fail(why, cap, "%s: the scenario is not one line of up to 8 MiB", path);
+        return why_fail(why, cap, "%s: the scenario is not one line of up to 8 MiB", path);
     if ((size_t)snprintf(part, sizeof part, "%s.%ld.part", path, (long)getpid()) >= sizeof part)
-        return fail(why, cap, "%.80s...: the path is too long", path);
+        return why_fail(why, cap, "%.80s...: the path is too long", path);
     struct writer w = {.out = fopen(part, "wbe")};
-    if (!w.out) return fail(why, cap, "%s: %s", path, strerror(errno));
+    if (!w.out) return why_fail(why, cap, "%s: %s", path, strerror(errno));
     put_all(&w, j, scenario);
     w.failed |= fflush(w.out) != 0 || fsync(fileno(w.out)) < 0;
     const int err = errno;
     w.failed |= fclose(w.out) != 0;
     if (!w.failed && rename(part, path) == 0) return true;
     unlink(part);
-    return fail(why, cap, "%s: %s", path, strerror(w.failed ? err : errno));
+    return why_fail(why, cap, "%s: %s", path, strerror(w.failed ? err : errno));
 }
 
 /* ---- reading */
@@ -126,10 +116,10 @@ static bool check_head(const char *line, size_t n, char *why, size_t cap)
     bool good = true;
     if (!cJSON_IsString(what) || strcmp(what->valuestring, "snapshot") != 0 || !cJSON_IsNumber(format) ||
         !cJSON_IsString(version)) {
-        good = fail(why, cap, "is no snapshot of psa-emu");
+        good = why_fail(why, cap, "is no snapshot of psa-emu");
     } else if (format->valuedouble != SNAPSHOT_FORMAT || strcmp(version->valuestring, VERSION) != 0) {
-        good = fail(why, cap, "was written by version %.40s, this is %s: only the same one can do the run again",
-                    version->valuestring, VERSION);
+        good = why_fail(why, cap, "was written by version %.40s, this is %s: only the same one can do the run again",
+                        version->valuestring, VERSION);
     }
     cJSON_Delete(j);
     return good;
@@ -177,14 +167,14 @@ static bool check_journal(struct snapshot *s, struct reader *r, char *why, size_
     int64_t last_ns = 0;
     for (uint64_t i = 0; i < s->entries; i++) {
         struct journal_entry e;
-        if (!next_line(r, &line, &n)) return fail(why, cap, "has fewer entries than it says");
-        if (!journal_read(line, n, &e, what, sizeof what)) return fail(why, cap, "line %u: %s", r->line - 1, what);
+        if (!next_line(r, &line, &n)) return why_fail(why, cap, "has fewer entries than it says");
+        if (!journal_read(line, n, &e, what, sizeof what)) return why_fail(why, cap, "line %u: %s", r->line - 1, what);
         const int64_t t_ns = e.t_ns;
         journal_release(&e);
-        if (t_ns < last_ns || t_ns > s->end_ns) return fail(why, cap, "line %u: time goes back", r->line - 1);
+        if (t_ns < last_ns || t_ns > s->end_ns) return why_fail(why, cap, "line %u: time goes back", r->line - 1);
         last_ns = t_ns;
     }
-    return r->at == r->end || fail(why, cap, "has more entries than it says");
+    return r->at == r->end || why_fail(why, cap, "has more entries than it says");
 }
 
 static bool parse(struct snapshot *s, size_t len, char *why, size_t cap)
@@ -192,18 +182,18 @@ static bool parse(struct snapshot *s, size_t len, char *why, size_t cap)
     const char *line;
     size_t n;
     struct reader r = {.at = s->text, .end = s->text + len, .line = 1};
-    if (!next_line(&r, &line, &n)) return fail(why, cap, "is no snapshot of psa-emu");
+    if (!next_line(&r, &line, &n)) return why_fail(why, cap, "is no snapshot of psa-emu");
     if (!check_head(line, n, why, cap)) return false;
     const char *end = check_sum(s->text, len);
-    if (!end) return fail(why, cap, "is damaged: its SHA-256 is not the one it ends with");
+    if (!end) return why_fail(why, cap, "is damaged: its SHA-256 is not the one it ends with");
     r.end = end;
     if (!next_line(&r, &s->scenario, &s->scenario_len) || s->scenario_len > SNAPSHOT_SCENARIO_MAX)
-        return fail(why, cap, "has no scenario");
+        return why_fail(why, cap, "has no scenario");
     s->text[s->scenario + s->scenario_len - s->text] = '\0';
     s->journal = r.at;
     const char *last = end - 1; /* the LF before the sum */
     while (last > r.at && last[-1] != '\n') last--;
-    if (last < r.at || !read_end(last, (size_t)(end - last), s)) return fail(why, cap, "has no end");
+    if (last < r.at || !read_end(last, (size_t)(end - last), s)) return why_fail(why, cap, "has no end");
     r.end = last;
     s->journal_len = (size_t)(last - s->journal);
     return check_journal(s, &r, why, cap);
@@ -222,7 +212,7 @@ static char *read_file(const char *path, size_t *len, char *why, size_t cap)
 {
     FILE *in = fopen(path, "rbe");
     if (!in) {
-        fail(why, cap, "%s: %s", path, strerror(errno));
+        why_fail(why, cap, "%s: %s", path, strerror(errno));
         return NULL;
     }
     size_t room = 1 << 16;
@@ -243,7 +233,7 @@ static char *read_file(const char *path, size_t *len, char *why, size_t cap)
         return text;
     }
     free(text);
-    fail(why, cap, bad ? "%s: cannot be read" : "%s: is larger than a snapshot can be", path);
+    why_fail(why, cap, bad ? "%s: cannot be read" : "%s: is larger than a snapshot can be", path);
     return NULL;
 }
 
@@ -255,7 +245,7 @@ bool snapshot_load(const char *path, struct snapshot *s, char *why, size_t cap)
     char *text = read_file(path, &len, why, cap);
     if (!text) return false;
     if (snapshot_parse(text, len, s, what, sizeof what)) return true;
-    return fail(why, cap, "%s: %s", path, what);
+    return why_fail(why, cap, "%s: %s", path, what);
 }
 
 void snapshot_free(struct snapshot *s)
@@ -324,22 +314,22 @@ static struct can_client *find_client(const struct can_hub *h, uint32_t number)
 static bool do_came(struct replay *r, struct can_hub *h, const struct journal_entry *e)
 {
     struct can_client *before = e->heir_of ? find_client(h, e->heir_of) : NULL;
-    if (e->heir_of && !before) return fail(r->why, WHY_MAX, "program %" PRIu32 " is not on the bus", e->heir_of);
+    if (e->heir_of && !before) return why_fail(r->why, WHY_MAX, "program %" PRIu32 " is not on the bus", e->heir_of);
     if (before) before->vacant = true;
-    return can_hub_ghost(h, e->client, e->name, e->fd) || fail(r->why, WHY_MAX, "no memory");
+    return can_hub_ghost(h, e->client, e->name, e->fd) || why_fail(r->why, WHY_MAX, "no memory");
 }
 
 static bool do_client(struct replay *r, const struct journal_entry *e)
 {
-    if (e->bus >= r->w->buses) return fail(r->why, WHY_MAX, "there is no bus %u", e->bus);
+    if (e->bus >= r->w->buses) return why_fail(r->why, WHY_MAX, "there is no bus %u", e->bus);
     struct can_hub *h = r->w->hub[e->bus];
     struct can_client *c = find_client(h, e->client);
     if (!c != (e->kind == JOURNAL_CAME)) {
-        return fail(r->why, WHY_MAX, "program %" PRIu32 " %s on the bus", e->client, c ? "is already" : "is not");
+        return why_fail(r->why, WHY_MAX, "program %" PRIu32 " %s on the bus", e->client, c ? "is already" : "is not");
     }
     if (e->kind == JOURNAL_CAME) return do_came(r, h, e);
     if (e->kind == JOURNAL_WENT) can_hub_dismiss(h, c);
-    else if (!can_hub_send(h, c, &e->m, e->t_ns)) return fail(r->why, WHY_MAX, "the bus does not take the frame");
+    else if (!can_hub_send(h, c, &e->m, e->t_ns)) return why_fail(r->why, WHY_MAX, "the bus does not take the frame");
     return true;
 }
 
@@ -347,17 +337,18 @@ static bool do_command(struct replay *r, const struct journal_entry *e)
 {
     struct control *c = r->w->control;
     const struct control_command *row = control_find(c->tables, e->cmd);
-    if (!row || !row->changes) return fail(r->why, WHY_MAX, "\"%.40s\" is no command that changes a bench", e->cmd);
+    if (!row || !row->changes) return why_fail(r->why, WHY_MAX, "\"%.40s\" is no command that changes a bench", e->cmd);
     cJSON *result = cJSON_CreateObject();
     const enum control_outcome outcome = control_call(c, e->cmd, e->args, result, e->t_ns);
     cJSON_Delete(result);
-    return outcome == CONTROL_DONE || fail(r->why, WHY_MAX, "%s: %s", e->cmd, c->refusal.why);
+    if (outcome == (e->refused ? CONTROL_REFUSED : CONTROL_DONE)) return true;
+    return why_fail(r->why, WHY_MAX, "%s: %s", e->cmd, e->refused ? "is carried out this time" : c->refusal.why);
 }
 
 static bool do_watch(struct replay *r, const struct journal_entry *e)
 {
     struct bench *b = r->w->bench;
-    if (e->unit >= b->scenario.unit_count) return fail(r->why, WHY_MAX, "there is no unit %u", e->unit);
+    if (e->unit >= b->scenario.unit_count) return why_fail(r->why, WHY_MAX, "there is no unit %u", e->unit);
     hang(r->w->ears, b, e->unit, e->watch);
     return true;
 }
@@ -390,11 +381,12 @@ bool snapshot_replay(const struct snapshot *s, const struct snapshot_world *w, c
 {
     struct replay r = {.w = w};
     char state[SHA256_HEX];
-    bool good = do_all(&r, s) || fail(why, cap, "cannot be done again: %s", r.why);
+    bool good = do_all(&r, s) || why_fail(why, cap, "cannot be done again: %s", r.why);
     journal_watchers(w->journal);
     digest_bench(w->bench, w->journal, state);
     if (good && strcmp(state, s->state) != 0) {
-        good = fail(why, cap, "makes another bench than the one it was taken of: another build or machine wrote it");
+        good =
+            why_fail(why, cap, "makes another bench than the one it was taken of: another build or machine wrote it");
     }
     for (unsigned i = 0; i < w->buses && good; i++) can_hub_vacate(w->hub[i]);
     return good;

@@ -8,8 +8,7 @@
 
 enum { NAME_MAX_BYTES = 31, TEXT_MAX_BYTES = 1023 };
 
-__attribute__((format(printf, 3, 4))) static bool refuse(struct control_refusal *r, const char *code,
-                                                         const char *format, ...)
+bool control_refuse_in(struct control_refusal *r, const char *code, const char *format, ...)
 {
     va_list ap;
     va_start(ap, format);
@@ -38,13 +37,13 @@ static bool in_range(const struct target *t, double x, double min, double max)
 {
     const char *unit = t->arg->unit;
     if (x >= min && x <= max) return true;
-    return refuse(t->why, "range", "%s: %.10g is outside %.10g ... %.10g%s%s", t->arg->name, x, min, max,
-                  unit ? " " : "", unit ? unit : "");
+    return control_refuse_in(t->why, "range", "%s: %.10g is outside %.10g ... %.10g%s%s", t->arg->name, x, min, max,
+                             unit ? " " : "", unit ? unit : "");
 }
 
 static bool parse_real(const struct target *t, const cJSON *j, struct control_value *v)
 {
-    if (!cJSON_IsNumber(j)) return refuse(t->why, "type", "%s: a number is wanted", t->arg->name);
+    if (!cJSON_IsNumber(j)) return control_refuse_in(t->why, "type", "%s: a number is wanted", t->arg->name);
     v->real = j->valuedouble;
     return in_range(t, v->real, t->arg->min, t->arg->max);
 }
@@ -52,25 +51,26 @@ static bool parse_real(const struct target *t, const cJSON *j, struct control_va
 static bool parse_count(const struct target *t, const cJSON *j, struct control_value *v)
 {
     if (!parse_real(t, j, v)) return false;
-    if (v->real != floor(v->real)) return refuse(t->why, "type", "%s: %.10g is not an integer", t->arg->name, v->real);
+    if (v->real != floor(v->real))
+        return control_refuse_in(t->why, "type", "%s: %.10g is not an integer", t->arg->name, v->real);
     v->count = (uint64_t)v->real;
     return true;
 }
 
 static bool parse_bool(const struct target *t, const cJSON *j, struct control_value *v)
 {
-    if (!cJSON_IsBool(j)) return refuse(t->why, "type", "%s: true or false is wanted", t->arg->name);
+    if (!cJSON_IsBool(j)) return control_refuse_in(t->why, "type", "%s: true or false is wanted", t->arg->name);
     v->on = cJSON_IsTrue(j);
     return true;
 }
 
 static bool parse_text(const struct target *t, const cJSON *j, struct control_value *v)
 {
-    if (!cJSON_IsString(j)) return refuse(t->why, "type", "%s: a string is wanted", t->arg->name);
+    if (!cJSON_IsString(j)) return control_refuse_in(t->why, "type", "%s: a string is wanted", t->arg->name);
     v->text = j->valuestring;
     if (strlen(v->text) > TEXT_MAX_BYTES)
-        return refuse(t->why, "range", "%s: longer than %d bytes", t->arg->name, TEXT_MAX_BYTES);
-    return *v->text || refuse(t->why, "range", "%s: is empty", t->arg->name);
+        return control_refuse_in(t->why, "range", "%s: longer than %d bytes", t->arg->name, TEXT_MAX_BYTES);
+    return *v->text || control_refuse_in(t->why, "range", "%s: is empty", t->arg->name);
 }
 
 static bool parse_name(const struct target *t, const cJSON *j, struct control_value *v)
@@ -78,8 +78,9 @@ static bool parse_name(const struct target *t, const cJSON *j, struct control_va
     if (!parse_text(t, j, v)) return false;
     bool good = strlen(v->text) <= NAME_MAX_BYTES;
     for (const char *s = v->text; *s; s++) good = good && *s > ' ' && *s <= '~';
-    return good || refuse(t->why, "range", "%s: \"%.40s\" is no name: up to %d printable characters without spaces",
-                          t->arg->name, v->text, NAME_MAX_BYTES);
+    return good ||
+           control_refuse_in(t->why, "range", "%s: \"%.40s\" is no name: up to %d printable characters without spaces",
+                             t->arg->name, v->text, NAME_MAX_BYTES);
 }
 
 static size_t join(char *out, size_t cap, size_t at, const char *word)
@@ -101,7 +102,7 @@ static bool parse_choice(const struct target *t, const cJSON *j, struct control_
         }
         at = join(words, sizeof words, at, word);
     }
-    return refuse(t->why, "range", "%s: \"%.40s\" is none of %s", t->arg->name, v->text, words);
+    return control_refuse_in(t->why, "range", "%s: \"%.40s\" is none of %s", t->arg->name, v->text, words);
 }
 
 static bool parse_unit(const struct target *t, const cJSON *j, struct control_value *v)
@@ -114,23 +115,25 @@ static bool parse_unit(const struct target *t, const cJSON *j, struct control_va
         at = join(names, sizeof names, at, t->bench->unit_name[v->unit]);
     }
     v->unit = 0;
-    return refuse(t->why, "range", "%s: no unit \"%.40s\"; there is %s", t->arg->name, v->text, names);
+    return control_refuse_in(t->why, "range", "%s: no unit \"%.40s\"; there is %s", t->arg->name, v->text, names);
 }
 
 static bool parse_reals(const struct target *t, const cJSON *j, struct control_value *v)
 {
     const cJSON *item;
-    if (!cJSON_IsArray(j)) return refuse(t->why, "type", "%s: a list of numbers is wanted", t->arg->name);
+    if (!cJSON_IsArray(j)) return control_refuse_in(t->why, "type", "%s: a list of numbers is wanted", t->arg->name);
     v->n = 0;
     cJSON_ArrayForEach(item, j)
     {
         if (v->n == CONTROL_REALS_MAX)
-            return refuse(t->why, "range", "%s: more than %u numbers", t->arg->name, CONTROL_REALS_MAX);
-        if (!cJSON_IsNumber(item)) return refuse(t->why, "type", "%s: a list of numbers is wanted", t->arg->name);
+            return control_refuse_in(t->why, "range", "%s: more than %u numbers", t->arg->name, CONTROL_REALS_MAX);
+        if (!cJSON_IsNumber(item))
+            return control_refuse_in(t->why, "type", "%s: a list of numbers is wanted", t->arg->name);
         if (!in_range(t, item->valuedouble, t->arg->min, t->arg->max)) return false;
         v->reals[v->n++] = item->valuedouble;
     }
-    return v->n > 0 || refuse(t->why, "range", "%s: 1 to %u numbers are wanted", t->arg->name, CONTROL_REALS_MAX);
+    return v->n > 0 ||
+           control_refuse_in(t->why, "range", "%s: 1 to %u numbers are wanted", t->arg->name, CONTROL_REALS_MAX);
 }
 
 /* ---- and back */
@@ -205,7 +208,7 @@ static bool refuse_unknown(struct control_refusal *why, const struct control_com
     char known[160] = "";
     size_t at = 0;
     for (unsigned i = 0; i < control_arg_count(row); i++) at = join(known, sizeof known, at, row->arg[i].name);
-    return refuse(why, "argument", "no argument \"%.40s\"; it takes %s", name, at ? known : "none");
+    return control_refuse_in(why, "argument", "no argument \"%.40s\"; it takes %s", name, at ? known : "none");
 }
 
 void control_arg_limits(const struct control_bench *b, const struct control_arg *a, const struct control_value *v,
@@ -232,20 +235,21 @@ bool control_args(const struct control_bench *b, const struct control_command *r
                   struct control_value v[CONTROL_ARGS_MAX], struct control_refusal *why)
 {
     memset(v, 0, CONTROL_ARGS_MAX * sizeof *v);
-    if (args && !cJSON_IsObject(args)) return refuse(why, "syntax", "args: an object is wanted");
+    if (args && !cJSON_IsObject(args)) return control_refuse_in(why, "syntax", "args: an object is wanted");
     const cJSON *j;
     cJSON_ArrayForEach(j, args)
     {
         const struct control_arg *a = find_arg(row, j->string);
         if (!a) return refuse_unknown(why, row, j->string);
         struct control_value *value = &v[a - row->arg];
-        if (value->given) return refuse(why, "argument", "%s is given twice", a->name);
+        if (value->given) return control_refuse_in(why, "argument", "%s is given twice", a->name);
         if (!types[a->type].parse(&(struct target){b, a, why}, j, value)) return false;
         value->given = true;
     }
     for (unsigned i = 0; i < control_arg_count(row); i++) {
         const struct control_arg *a = &row->arg[i];
-        if (!v[i].given && !a->optional) return refuse(why, "argument", "%s is missing: %s", a->name, a->what);
+        if (!v[i].given && !a->optional)
+            return control_refuse_in(why, "argument", "%s is missing: %s", a->name, a->what);
         if (!within_limits(&(struct target){b, a, why}, v, &v[i])) return false;
     }
     return !row->check || row->check(b, v, why);

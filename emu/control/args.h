@@ -7,6 +7,10 @@
 const char *control_type_name(enum control_type type);
 bool control_type_numeric(enum control_type type); /* has a range, perhaps a unit */
 
+/* Writes down a refusal and returns false. */
+__attribute__((format(printf, 3, 4))) bool control_refuse_in(struct control_refusal *r, const char *code,
+                                                             const char *format, ...);
+
 /* The arguments that were given, as they would be sent. The caller deletes it. */
 cJSON *control_args_json(const struct control_command *row, const struct control_value *v);
 

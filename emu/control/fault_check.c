@@ -1,8 +1,9 @@
 /* Which faults are refused, and why: the kind, the point, the values, the instant. */
 #include "control/fault_parts.h"
 
+#include "control/args.h"
+
 #include <math.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -27,17 +28,6 @@ const struct fault_kind *fault_kind_find(const char *name)
     return NULL;
 }
 
-__attribute__((format(printf, 3, 4))) static bool refuse(struct control_refusal *r, const char *code,
-                                                         const char *format, ...)
-{
-    va_list ap;
-    va_start(ap, format);
-    vsnprintf(r->why, sizeof r->why, format, ap);
-    va_end(ap);
-    r->code = code;
-    return false;
-}
-
 static void join(char *out, size_t cap, const char *word)
 {
     const size_t at = strlen(out);
@@ -57,14 +47,14 @@ static bool find_kind(const char *name, const struct fault_kind **kind, struct c
     for (unsigned i = 0; (k = fault_kind(i)) != NULL; i++) {
         if (layer && strncmp(k->name, name, layer) == 0) join(known, sizeof known, k->name);
     }
-    if (!known[0]) return refuse(why, "range", "kind: no \"%.40s\"; fault.kinds lists them", name);
-    return refuse(why, "range", "kind: no \"%.40s\"; there is %s", name, known);
+    if (!known[0]) return control_refuse_in(why, "range", "kind: no \"%.40s\"; fault.kinds lists them", name);
+    return control_refuse_in(why, "range", "kind: no \"%.40s\"; there is %s", name, known);
 }
 
 static bool find_point(const struct control_bench *b, const char *text, struct fault *f, struct control_refusal *why)
 {
     if (fault_point_find(b, text, &f->point, f->name)) return true;
-    return refuse(why, "range", "point: no \"%.40s\" on this bench; fault.points lists them", text);
+    return control_refuse_in(why, "range", "point: no \"%.40s\" on this bench; fault.points lists them", text);
 }
 
 bool fault_fits(const struct control_bench *b, const struct fault *f, char *why)
@@ -88,17 +78,17 @@ bool fault_values_fit(const struct fault *f, struct control_refusal *why)
         const char *name = fault_arg_name((enum fault_arg)i);
         const bool given = fault_given(f, (enum fault_arg)i);
         if (given && i != FAULT_FOR_S && !((k->need | k->may) & FAULT_BIT(i))) {
-            return refuse(why, "argument", "%s: %s takes no such value", name, k->name);
+            return control_refuse_in(why, "argument", "%s: %s takes no such value", name, k->name);
         }
         if (!given && (k->need & FAULT_BIT(i))) {
-            return refuse(why, "argument", "%s is missing: %s", name, fault_arg_what((enum fault_arg)i));
+            return control_refuse_in(why, "argument", "%s is missing: %s", name, fault_arg_what((enum fault_arg)i));
         }
         if (given && (k->nonzero & FAULT_BIT(i)) && f->value[i] == 0.0) {
-            return refuse(why, "range", "%s: 0 would change nothing", name);
+            return control_refuse_in(why, "range", "%s: 0 would change nothing", name);
         }
     }
     return !k->once || !fault_given(f, FAULT_FOR_S) ||
-           refuse(why, "argument", "for_s: %s is over as soon as it is done", k->name);
+           control_refuse_in(why, "argument", "for_s: %s is over as soon as it is done", k->name);
 }
 
 /* ---- when */
@@ -109,7 +99,7 @@ static bool find_event(const struct control_value *v, const char *arg, int *even
     *event = v->given ? psa2_event_find(v->text) : FAULT_NO_EVENT;
     if (!v->given || *event != FAULT_NO_EVENT) return true;
     for (int e = 0; e < PSA2_EVENTS; e++) join(known, sizeof known, psa2_event_name((enum psa2_event)e));
-    return refuse(why, "range", "%s: no event \"%.40s\"; there is %s", arg, v->text, known);
+    return control_refuse_in(why, "range", "%s: no event \"%.40s\"; there is %s", arg, v->text, known);
 }
 
 static bool has_unit(enum fault_place place)
@@ -127,13 +117,14 @@ static bool set_trigger(const struct control_bench *b, const struct control_valu
     }
     for (unsigned i = 0; after == FAULT_NO_EVENT && i < sizeof of_events / sizeof *of_events; i++) {
         const char *name = fault_arg_name(of_events[i]);
-        if (v[of_events[i]].given) return refuse(why, "argument", "%s: only with after, an event's name", name);
+        if (v[of_events[i]].given)
+            return control_refuse_in(why, "argument", "%s: only with after, an event's name", name);
     }
-    if (after != FAULT_NO_EVENT && after == since) return refuse(why, "range", "since: is after itself");
+    if (after != FAULT_NO_EVENT && after == since) return control_refuse_in(why, "range", "since: is after itself");
     f->trigger = fault_trigger(after, since, v[FAULT_COUNT].given ? (unsigned)v[FAULT_COUNT].count : 1);
     f->unit = v[FAULT_UNIT].given ? v[FAULT_UNIT].unit : f->point.unit;
     if (after == FAULT_NO_EVENT || v[FAULT_UNIT].given || has_unit(f->point.place) || b->units == 1) return true;
-    return refuse(why, "argument", "unit is missing: whose events count");
+    return control_refuse_in(why, "argument", "unit is missing: whose events count");
 }
 
 static int64_t ns(double s)

@@ -1,7 +1,8 @@
 #define _GNU_SOURCE /* accept4 */
 #include "link/scpi_port.h"
 
-#include <arpa/inet.h>
+#include "link/tcp_listen.h"
+
 #include <errno.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
@@ -113,20 +114,10 @@ static void on_connection(struct link *l, int64_t t_ns)
 
 int scpi_port_tcp(struct scpi_port *p, uint16_t port)
 {
-    const int on = 1;
-    struct sockaddr_in a = {.sin_family = AF_INET, .sin_port = htons(port), .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
-    socklen_t len = sizeof a;
     p->pty = (struct pty){.master = -1, .slave = -1, .watch.fd = -1};
-    const int fd = socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
-    if (fd < 0) return -errno;
-    setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
-    if (bind(fd, (struct sockaddr *)&a, len) < 0 || listen(fd, 16) < 0 ||
-        getsockname(fd, (struct sockaddr *)&a, &len) < 0) {
-        const int err = errno;
-        close(fd);
-        return -err;
-    }
-    p->port = ntohs(a.sin_port);
+    const int fd = tcp_listen(&port);
+    if (fd < 0) return fd;
+    p->port = port;
     p->listen = (struct link){.fd = fd, .want_read = true, .readable = on_connection};
     links_add_first(p->links, &p->listen);
     return 0;

@@ -2,10 +2,10 @@
 #include "link/socketcand_tcp.h"
 
 #include "link/socketcand.h"
+#include "link/tcp_listen.h"
 #include "link/tcp_peer.h"
 #include "link/text_link.h"
 
-#include <arpa/inet.h>
 #include <errno.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
@@ -318,19 +318,9 @@ static void on_connection(struct link *l, int64_t t_ns)
 
 int socketcand_listen(struct socketcand_server *s, struct can_hub *hub, unsigned hubs, uint16_t port)
 {
-    const int on = 1;
-    struct sockaddr_in a = {.sin_family = AF_INET, .sin_port = htons(port), .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
-    socklen_t len = sizeof a;
-    const int fd = socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
-    if (fd < 0) return -errno;
-    setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
-    if (bind(fd, (struct sockaddr *)&a, len) < 0 || listen(fd, 16) < 0 ||
-        getsockname(fd, (struct sockaddr *)&a, &len) < 0) {
-        const int err = errno;
-        close(fd);
-        return -err;
-    }
-    *s = (struct socketcand_server){.hub = hub, .hubs = hubs, .port = ntohs(a.sin_port)};
+    const int fd = tcp_listen(&port);
+    if (fd < 0) return fd;
+    *s = (struct socketcand_server){.hub = hub, .hubs = hubs, .port = port};
     s->listen = (struct link){.fd = fd, .want_read = true, .readable = on_connection};
     links_add_first(hub->links, &s->listen);
     return 0;
