@@ -20,7 +20,7 @@ class FakeControl:
 
     def call(self, command: str, /, **args: object) -> Reply:
         self.calls.append((command, args))
-        return Reply(t_ns=self.bench.t_ns, can_rx=0, rx=(), result=self._result(command, args))
+        return Reply(t_ns=self.bench.t_ns, can_rx=0, rx={}, result=self._result(command, args))
 
     def _result(self, command: str, args: dict[str, object]) -> dict[str, Any]:
         if command == "help":
