@@ -13,7 +13,6 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
 
-from psabench import report_plots
 from psabench.grading import (
     ARTICLE,
     LIMIT_CI,
@@ -115,6 +114,8 @@ def _beside(section: Section, name: str, printed: str) -> str:
 
 
 def _alpha0(sections: Sequence[Section]) -> str:
+    from psabench import report_plots  # matplotlib takes a second: the shell and --help do without
+
     figure = report_plots.alpha0_figure(sections)
     if figure is None:
         return ""
@@ -127,6 +128,8 @@ def _alpha0(sections: Sequence[Section]) -> str:
 
 
 def _section(section: Section, ident: str) -> str:
+    from psabench import report_plots
+
     r = section.result
     pictures = [f"<figure>{report_plots.svg(report_plots.turn_figure(section), ident + 'turn')}</figure>"]
     if r.procedure == "fourier":

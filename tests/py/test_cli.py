@@ -118,3 +118,10 @@ def test_a_reader_that_has_seen_enough_is_no_error() -> None:
         assert p.wait(60) == 0
     assert "Traceback" not in words
     assert "Broken pipe" not in words
+
+
+def test_help_and_the_shell_do_without_the_libraries_of_the_report() -> None:
+    """Each takes a second to import."""
+    told = "import sys, psabench.cli; print(sorted({'matplotlib', 'scipy', 'IPython'} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", told], capture_output=True, text=True, check=True, timeout=60)
+    assert done.stdout == "[]\n"

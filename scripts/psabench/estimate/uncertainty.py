@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
-from scipy.special import stdtrit
 
 Array = npt.NDArray[np.float64]
 
@@ -43,6 +42,8 @@ class Correlation:
 
 def t_quantile(dof: int, confidence: float = CONFIDENCE) -> float:
     """Two-sided Student quantile: the half width of the interval in standard deviations."""
+    from scipy.special import stdtrit  # slow to import: the shell and --help do without
+
     return float(stdtrit(dof, 0.5 + confidence / 2))
 
 
