@@ -1,6 +1,8 @@
 #define _GNU_SOURCE /* pipe2 */
 #include "app/fork.h"
 
+#include "app/endpoints.h"
+
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -71,34 +73,15 @@ static size_t read_all(int fd, char *text, size_t cap)
     return len;
 }
 
-/* ready key=value key=value: an object. */
-static void add_endpoint(cJSON *endpoints, char *line)
-{
-    char *rest = NULL;
-    cJSON *e = cJSON_CreateObject();
-    for (char *word = strtok_r(line, " ", &rest); word; word = strtok_r(NULL, " ", &rest)) {
-        char *value = strchr(word, '=');
-        if (!value) continue;
-        *value = '\0';
-        cJSON_AddStringToObject(e, word, value + 1);
-    }
-    if (e->child) cJSON_AddItemToArray(endpoints, e);
-    else cJSON_Delete(e);
-}
-
 static bool tell(pid_t pid, char *text, cJSON *result, char *why)
 {
-    char *rest = NULL;
     if (strncmp(text, failure, sizeof failure - 1) == 0 || !strstr(text, "ready all\n")) {
         text[strcspn(text, "\n")] = '\0';
         snprintf(why, CONTROL_WHY_MAX, "%.240s", text[0] ? text + sizeof failure - 1 : "the child ended at once");
         return false;
     }
     cJSON_AddNumberToObject(result, "pid", pid);
-    cJSON *endpoints = cJSON_AddArrayToObject(result, "endpoints");
-    for (char *line = strtok_r(text, "\n", &rest); line; line = strtok_r(NULL, "\n", &rest)) {
-        add_endpoint(endpoints, line);
-    }
+    endpoints_add(result, text);
     return true;
 }
 

@@ -1,6 +1,7 @@
 #define _GNU_SOURCE /* sigaction */
 #include "app/service.h"
 
+#include "app/endpoints.h"
 #include "app/fork.h"
 
 #include <errno.h>
@@ -64,6 +65,12 @@ static void do_quit(void *ctx)
 static bool do_fork(void *ctx, const struct control_fork *f, cJSON *result, char *why)
 {
     return fork_service(ctx, f, result, why);
+}
+
+static bool do_endpoints(void *ctx, cJSON *result)
+{
+    const struct service *s = ctx;
+    return endpoints_tell(&s->ports, s->o, result);
 }
 
 static bool do_vcd_flush(void *ctx, char *why)
@@ -224,6 +231,7 @@ static void make_view(struct service *s)
                                      .quit = do_quit,
                                      .snapshot = service_snapshot,
                                      .fork = do_fork,
+                                     .endpoints = do_endpoints,
                                      .journal = service_journal,
                                      .vcd_flush = do_vcd_flush,
                                      .vcd_start = do_vcd_start,

@@ -78,6 +78,15 @@ static enum control_outcome do_counters(struct control *c, const struct control_
     return CONTROL_DONE;
 }
 
+static enum control_outcome do_endpoints(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+{
+    (void)v;
+    (void)t_ns;
+    if (!c->bench->endpoints) return control_refuse(c, "state", "this bench has no endpoints");
+    if (!c->bench->endpoints(c->bench->ctx, result)) return control_refuse(c, "machine", "no memory");
+    return CONTROL_DONE;
+}
+
 static enum control_outcome do_quit(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
 {
     (void)v;
@@ -97,6 +106,7 @@ static const struct control_command rows[] = {
     {"frames", "Counts the CAN frames of each client: delivered to it, taken from it, dropped, lost in the kernel, refused.", {{0}}, .run = do_frames},
     {"counters", "Tells the counters of pace, bus, clients and units; with a unit, that unit's alone.", {CONTROL_UNIT_ARG(true)}, .run = do_counters},
     {"units", "Lists the units: name, serial number, CAN node, board profile.", {{0}}, .run = do_units},
+    {"endpoints", "Tells where programs connect, as the ready lines do: CAN adapters, instruments, line port, sockets.", {{0}}, .run = do_endpoints},
     {"unit.reset", "Pulses Res of a unit.", {CONTROL_UNIT_ARG(true)}, .run = do_unit_reset, .changes = true},
     {"quit", "Ends the emulator as SIGTERM does.", {{0}}, .run = do_quit},
 };

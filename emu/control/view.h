@@ -60,6 +60,8 @@ struct control_bench {
     /* Save the bench, double it. False with a sentence in why. NULL: it cannot. */
     bool (*snapshot)(void *ctx, const char *path, struct cJSON *result, char *why);
     bool (*fork)(void *ctx, const struct control_fork *f, struct cJSON *result, char *why);
+    /* Adds "endpoints": where programs connect. False without memory. NULL: nobody can. */
+    bool (*endpoints)(void *ctx, struct cJSON *result);
     /* The supply was told something else: its next brown-out has to be asked for anew. May be NULL. */
     void (*supply_changed)(void *ctx, int64_t t_ns);
     bool (*vcd_flush)(void *ctx, char *why);

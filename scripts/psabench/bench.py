@@ -7,10 +7,10 @@
         bench.unit.stream(100).axis("x")        # over CAN: volts at the load, shape (100,)
         bench.run_until("DRD_A", count=3)
 
-`Bench.connect` takes what is there, by address: any bus of python-can, instruments at VISA addresses, and the control
-socket where the bench is an emulator. Boards are reached over CAN and instruments over SCPI alone, so a script that
-uses nothing else runs on a real bench. What only an emulator can do (step pace, faults, snapshots, the truth) goes
-through its control socket and raises BenchError, saying so, where there is none.
+`Bench.connect` takes what is there, by address: any bus of python-can, instruments at VISA addresses, or the control
+socket where the bench is an emulator, which tells its addresses. Boards are reached over CAN and instruments over SCPI
+alone, so a script that uses nothing else runs on a real bench. What only an emulator can do (step pace, faults,
+snapshots, the truth) goes through its control socket and raises BenchError, saying so, where there is none.
 """
 
 from __future__ import annotations
@@ -149,21 +149,25 @@ class Bench:
         """Connect to a bench that is there, real or emulated.
 
         can: bus of python-can (see `can_host.open_bus`), several by the names of the buses, {"can0": ..., "can1": ...},
-        or "none"; None: python-can's own configuration.
-        control, truth: sockets of an emulator. scpi: VISA addresses by instrument, {"head": "TCPIP::...::SOCKET"}.
+        or "none"; None: what the emulator behind `control` tells, without one python-can's own configuration.
+        control, truth: sockets of an emulator. scpi: VISA addresses by instrument, {"head": "TCPIP::...::SOCKET"};
+        for the others the emulator's own, if it has any.
         node: CANopen node of the unit (5); with a control socket the emulator tells which units there are.
         """
         unknown = set(scpi or {}) - set(KINDS)
         if unknown:
             raise BadInput(f"scpi: no such instrument: {', '.join(sorted(unknown))}; there are {', '.join(KINDS)}")
-        one: Mapping[str, str | None] = (
-            {} if can == NONE else {FIRST: can} if can is None or isinstance(can, str) else can
-        )
+        told = _endpoints(Path(control)) if control else []
+        one: Mapping[str, str | None]
+        if can is None and control:
+            one = emulator_buses(sorted(told, key=_ease), Path(control))
+        else:
+            one = {} if can == NONE else {FIRST: can} if can is None or isinstance(can, str) else can
         return cls(
             cans=one,
             control=Path(control) if control else None,
             truth=Path(truth) if truth else None,
-            scpi=scpi,
+            scpi=scpi_addresses(told) | dict(scpi or {}),
             node=node,
         )
 
@@ -244,6 +248,8 @@ class Bench:
     def _why_absent(self, name: str) -> str:
         if self.emulator is not None:
             return f"the scenario has no section {name}"
+        if self._control is not None:
+            return f"psa-emu was started without --scpi {name}, and no address was given"
         return f"no address was given for it, as in scpi={{{name!r}: 'TCPIP::192.0.2.7::5025::SOCKET'}}"
 
     def _make_clock(self) -> WallClock | StepClock:
@@ -388,6 +394,17 @@ class Bench:
         """Save the whole bench at this instant; `restore` goes on from there. Raises ControlError."""
         self.control.call("snapshot", path=os.path.abspath(path))
         return Path(path)
+
+
+def _endpoints(control: Path) -> list[dict[str, str]]:
+    """Those of an emulator that is there. Raises LinkError."""
+    with Control(control) as c:
+        return [{k: str(v) for k, v in e.items()} for e in c.call("endpoints").result["endpoints"]]
+
+
+def _ease(endpoint: Mapping[str, str]) -> int:
+    """Adapters that more than one program may open come first: a pseudo-terminal has room for one."""
+    return ("socketcand", "socketcan", "slcan").index(endpoint["can"]) if "can" in endpoint else -1
 
 
 def emulator_buses(endpoints: Sequence[Mapping[str, str]], control: Path | None) -> dict[str, str | None]:

@@ -130,7 +130,7 @@ def _add_run(commands: Any) -> None:
     p.add_argument("--scenario", type=Path, help="scenario for the emulator, instead of the conditions' own")
     p.add_argument("--can", help=CAN_HELP)
     p.add_argument("--head", metavar="VISA-ADDRESS", help=f"the dividing head, real or emulated: {EXAMPLES}")
-    p.add_argument("--control", type=Path, help="control socket of an emulator in step pace, to move its time")
+    p.add_argument("--control", type=Path, help="control socket of an emulator: tells CAN and head, moves time")
     p.add_argument("--truth", type=Path, help="truth socket of an emulator, asked after the run to grade it")
     p.add_argument("--node", type=node_id, default=DBC_NODE, help="CANopen node of the unit (%(default)s)")
     p.add_argument("--average", type=natural, help="samples in a reading; 0: whole 32-bit words by SDO")

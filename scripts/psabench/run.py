@@ -1,8 +1,8 @@
 """`psabench run`: procedures over the wire, graded and reported.
 
 Without --can it starts the emulator itself, once per reading of the article: quiet (the reading in which the printed
-figures can be reproduced) and realistic (what the same procedure finds with honest noise). With --can and --head
-it runs against whatever is there.
+figures can be reproduced) and realistic (what the same procedure finds with honest noise). With --can and --head, or
+the --control of an emulator, it runs against what is there.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ class RunOptions:
     conditions: Sequence[str] = ("quiet", "realistic")
     can: str | None = None  # python-can spec of a bench that is already there
     head: str | None = None  # VISA address of that bench's dividing head
-    control: Path | None = None  # of an emulator in step pace: moves its time
+    control: Path | None = None  # of an emulator: moves its time, and tells can and head
     truth: Path | None = None
     scenario: Path | None = None  # instead of the conditions' own
     node: int = DBC_NODE
@@ -104,7 +104,7 @@ def run(options: RunOptions, progress: Progress) -> tuple[Path, list[Section]]:
 
 
 def _conditions(options: RunOptions) -> list[Condition]:
-    if options.can or options.head or options.scenario:
+    if _there(options) or options.scenario:
         average = 16 if options.average is None else options.average
         return [Condition(label="", scenario=str(options.scenario or ""), average=average, about="", g_mps2=G_MPS2)]
     return [CONDITIONS[c] for c in options.conditions]
@@ -124,11 +124,16 @@ def _one(procedure: Procedure, condition: Condition, options: RunOptions, progre
     return Section(label=condition.label, result=result, truth=truth, allowance=allowance(result, average))
 
 
+def _there(options: RunOptions) -> bool:
+    """Whether the bench is there already; else an emulator is started."""
+    return bool(options.can or options.head or options.control)
+
+
 def _bench(condition: Condition, options: RunOptions) -> Bench:
-    if options.can or options.head:
-        if options.head is None:
+    if _there(options):
+        if not options.head and not options.control:
             raise BadInput(f"--head is missing: the VISA address of the dividing head, such as {EXAMPLES}")
-        there = {"head": options.head}
+        there = {"head": options.head} if options.head else {}
         return Bench.connect(options.can, scpi=there, control=options.control, truth=options.truth, node=options.node)
     scenario = options.scenario or condition.scenario
     pace = "wall" if options.real_time else "step"
@@ -156,7 +161,7 @@ def _axis_truth(truth: Mapping[str, Any], axis: str) -> Mapping[str, float]:
 
 
 def _facts(options: RunOptions) -> dict[str, str]:
-    there = " ".join(x for x in (options.can, options.head) if x)
+    there = " ".join(str(x) for x in (options.can, options.head, options.control) if x)
     where = there or str(options.scenario or ", ".join(CONDITIONS[c].scenario for c in options.conditions))
     seed = "of the scenario" if options.seed is None else str(options.seed)
     return {"bench": where, "seed": seed, "pace": "real time" if options.real_time else "simulated time"}

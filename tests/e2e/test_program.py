@@ -89,6 +89,28 @@ def test_the_command_runs_on_a_bench_by_its_addresses(tmp_path: Path) -> None:
     assert "within their limits of the truth" in out
 
 
+@HOST
+def test_the_control_socket_of_an_emulator_tells_its_addresses(tmp_path: Path) -> None:
+    with Emulator(BENCH, cans=["slcan", "socketcand:0"], pace="step", scpi=True) as emulator:
+        port = emulator.endpoint(can="socketcand")["port"]
+        with Bench.connect(control=emulator.control_path) as b:
+            assert b.host.bus.channel_info.endswith(f"127.0.0.1:{port}")  # the pty has room for one: left to others
+            b.unit.wait_ready()
+            assert b.head.turn(30.0) == pytest.approx(30.0, abs=0.01)
+        with psabench("run", "turns", "--control", emulator.control_path, "--average", "4", "--out", tmp_path) as run:
+            out, err = run.communicate(timeout=PATIENCE_S)
+    assert run.returncode == 0, out + err
+    assert "report: " in out
+
+
+@HOST
+def test_an_emulator_without_an_instrument_says_so() -> None:
+    with Emulator(BENCH, cans=["none"]) as emulator, Bench.connect(control=emulator.control_path) as b:
+        assert b.hosts == {}
+        with pytest.raises(BenchError, match="psa-emu was started without --scpi head, and no address was given"):
+            _ = b.head
+
+
 # ---- what is not there says why
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from psabench.emulator import Emulator
 from psabench.places import find_emulator
 from rig import HOST, PATIENCE_S, PSABENCH, MakeRig, until
 from terminal import Terminal
@@ -243,15 +244,23 @@ def test_an_emulator_that_is_there(env: dict[str, str], make_rig: MakeRig) -> No
     rig = make_rig("socketcand")
     control = rig.emulator.control_path
     assert control is not None
-    done = shell(env, "shell", "--connect", control, "--command", "head.turn 7", "--command", "dut.ready")
+    lines = ("--command", "head.turn 7", "--command", "dut.ready")
+    done = shell(env, "shell", "--connect", control, "--can", "none", *lines)
     assert done.returncode == 2
     assert "dut is not here: it wants a bus (--can SPEC" in done.stderr
     assert rig.control.call("head.read").result["angle_deg"] == pytest.approx(0.0)  # checked before anything is done
-    done = shell(
-        env, "shell", "--connect", control, "--can", rig.spec, "--command", "head.turn 7", "--command", "dut.use"
-    )
+    done = shell(env, "shell", "--connect", control, "--can", rig.spec, *lines)
     assert done.returncode == 0, done.stderr
     assert rig.control.call("head.read").result["angle_deg"] == pytest.approx(7.0, abs=0.01)
+
+
+def test_the_control_socket_alone_tells_where_the_rest_is(env: dict[str, str]) -> None:
+    with Emulator("quiet", scpi=True) as emulator:
+        there = ("shell", "--connect", str(emulator.control_path))
+        lines = ("dut.ready", "head.turn 7", "scpi.send head ANGLE?", "expect answer = 7", "bench.endpoints")
+        done = shell(env, *there, "--json", *(a for line in lines for a in ("--command", line)))
+        assert done.returncode == 0, done.stdout + done.stderr
+        assert objects(done.stdout)[-1]["result"]["endpoints"] == emulator.endpoints
 
 
 def test_a_device_without_a_control_socket(env: dict[str, str], make_rig: MakeRig) -> None:

@@ -79,6 +79,13 @@ static void on_journal(void *ctx, const struct control_command *row, const struc
     asked.pushes++;
 }
 
+static bool on_endpoints(void *ctx, struct cJSON *result)
+{
+    (void)ctx;
+    if (!asked.refuse) cJSON_AddArrayToObject(result, "endpoints");
+    return !asked.refuse;
+}
+
 static void on_quit(void *ctx)
 {
     (void)ctx;
@@ -140,6 +147,7 @@ static int fresh(void **state)
                                   .vcd_start = on_vcd_start,
                                   .vcd_stop = on_vcd_stop,
                                   .sched = &bench->sched,
+                                  .endpoints = on_endpoints,
                                   .quit = on_quit,
                                   .vcd_flush = on_vcd_flush,
                                   .can_rx = on_can_rx,
@@ -486,11 +494,21 @@ static void the_page_shows_the_same_table(void **state)
     }
 }
 
+static void endpoints_are_told_by_the_bench(void **state)
+{
+    (void)state;
+    assert_says("{\"cmd\":\"endpoints\"}", "\"result\":{\"endpoints\":[]}");
+    asked.refuse = true;
+    assert_says("{\"cmd\":\"endpoints\"}", "{\"code\":\"machine\",\"text\":\"no memory\"}");
+    view.endpoints = NULL;
+    assert_says("{\"cmd\":\"endpoints\"}", "{\"code\":\"state\",\"text\":\"this bench has no endpoints\"}");
+}
+
 static void hidden_parameters_are_told_on_the_truth_port_alone(void **state)
 {
     (void)state;
     static const char *const hidden[] = {"u0_v", "alpha0_deg", "kx_v_per_g", "load_tol_ppm", "angle_rad"};
-    static const char *const open[] = {"help", "time", "frames", "counters", "units", "head.read"};
+    static const char *const open[] = {"help", "time", "frames", "counters", "units", "endpoints", "head.read"};
     for (size_t i = 0; i < COUNT(open); i++) {
         char line[64];
         snprintf(line, sizeof line, "{\"cmd\":\"%s\"}", open[i]);
@@ -525,6 +543,7 @@ int main(void)
         cmocka_unit_test_setup(counters_frames_and_units_tell_what_they_promise, fresh),
         cmocka_unit_test_setup(help_lists_every_command_and_argument, fresh),
         cmocka_unit_test(the_page_shows_the_same_table),
+        cmocka_unit_test_setup(endpoints_are_told_by_the_bench, fresh),
         cmocka_unit_test_setup(hidden_parameters_are_told_on_the_truth_port_alone, fresh),
     };
     bench = malloc(sizeof *bench);

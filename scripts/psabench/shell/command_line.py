@@ -18,7 +18,7 @@ SHELL_EPILOG = """\
 examples:
   psabench shell                                  an emulator with the scenario calibrate, in real time
   psabench shell quiet --pace step --seed 3       time moves when a line says so; the same lines give the same results
-  psabench shell --connect /tmp/psa.ctl --can socketcand:127.0.0.1:29536    an emulator that is there
+  psabench shell --connect /tmp/psa.ctl           an emulator that is there; it tells where its bus and instruments are
   psabench shell --can slcan:/dev/ttyACM0         a real device: registers, stream, can>
   psabench shell quiet --json --command 'head.turn 30' --command head.read
 
@@ -30,7 +30,7 @@ SCRIPT_EPILOG = """\
 examples:
   psabench run script session.psa                 what `save` wrote, or a hand; build servers read the exit status
   psabench run script session.psa --scenario my.yaml --json
-  psabench run script session.psa --control /tmp/psa.ctl --can socketcand:127.0.0.1:29536
+  psabench run script session.psa --control /tmp/psa.ctl     on an emulator that is there
 
 Exit status: 0 done and every `expect` held, 1 one did not hold, 2 a line is wrong (told with file, line and column
 before anything is done), 3 the bench refused or a link failed.

@@ -62,7 +62,8 @@ class Opening:
             raise BadInput(
                 f"{self.scenario}: a scenario is for an emulator that is started; --connect and --can find one"
             )
-        return Bench.connect(self.can or NONE, control=self.connect, scpi=self.scpi, node=self.node)
+        can = self.can or (None if self.connect else NONE)  # an emulator tells its own
+        return Bench.connect(can, control=self.connect, scpi=self.scpi, node=self.node)
 
     def of_script(self, first: str) -> Opening:
         """As the first line of a script says, unless the bench is there already. Raises Wrong."""

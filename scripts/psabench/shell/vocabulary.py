@@ -109,7 +109,8 @@ EVENTS = ("RES", "SETUP_DONE", "SYNC_A", "SYNC_T", "DRD_A", "DRD_T", "INT_FALL",
 WHEN = ("at_s", "after", "count", "since", "unit", "delay_s", "for_s")
 
 # Names of the bench's table that an object of the shell has; others keep theirs.
-_NAMES = {name: f"bench.{name}" for name in ("counters", "frames", "quit", "snapshot", "fork", "units")} | {
+_BENCH = ("counters", "endpoints", "frames", "quit", "snapshot", "fork", "units")
+_NAMES = {name: f"bench.{name}" for name in _BENCH} | {
     "lines": "probe.lines",
     "unit.reset": "bench.reset",
 }
