@@ -60,7 +60,7 @@ __attribute__((format(printf, 3, 4))) static void add(struct journal *j, int64_t
     va_start(ap, format);
     const int n = vsnprintf(line + at, sizeof line - (size_t)at, format, ap);
     va_end(ap);
-    put(j, line, (size_t)(at + n));
+    put(j, line, (size_t)at + (size_t)n);
     j->last_ns = t_ns;
     j->ran = false;
 }
@@ -140,7 +140,7 @@ void journal_follow(struct journal *j, struct can_hub *h, unsigned bus)
     can_attach(h->bus, &tap->ear);
 }
 
-void journal_command(struct journal *j, const struct control_command *row, const cJSON *args)
+void journal_command(struct journal *j, const struct control_command *row, const cJSON *args, bool done)
 {
     if (j->bench->sched.until_ns >= 0) return; /* inside a run: timeline and faults of the scenario */
     cJSON *copy = cJSON_Duplicate(args, true);
@@ -150,7 +150,7 @@ void journal_command(struct journal *j, const struct control_command *row, const
     if (!text) j->lost = "no memory for the journal";
     else if (n + 128 > JOURNAL_LINE_MAX) j->lost = "a command was longer than a line of the journal (8 KiB)";
     else {
-        add(j, now_ns(j), "\"cmd\":\"%s\",\"args\":", row->name);
+        add(j, now_ns(j), "%s\"cmd\":\"%s\",\"args\":", done ? "" : "\"refused\":true,", row->name);
         put(j, text, n);
         put(j, "}\n", 2);
     }
@@ -255,6 +255,7 @@ static bool read_command(const cJSON *json, struct journal_entry *e)
     e->args = cJSON_GetObjectItemCaseSensitive(json, "args");
     if (!cJSON_IsString(cmd) || !cJSON_IsObject(e->args)) return false;
     e->cmd = cmd->valuestring;
+    e->refused = cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(json, "refused"));
     return true;
 }
 

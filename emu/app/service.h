@@ -59,7 +59,7 @@ int service_live(struct service *s);
 
 /* Callbacks of the commands. */
 bool service_snapshot(void *ctx, const char *path, cJSON *result, char *why);
-void service_journal(void *ctx, const struct control_command *row, const cJSON *args, int64_t t_ns);
+void service_journal(void *ctx, const struct control_command *row, const cJSON *args, bool done, int64_t t_ns);
 
 void service_power_up(struct service *s); /* bench, faults and timeline of the scenario */
 void service_follow(struct service *s);   /* the journal begins */

@@ -3,11 +3,11 @@
 #include <inttypes.h>
 #include <string.h>
 
-void service_journal(void *ctx, const struct control_command *row, const cJSON *args, int64_t t_ns)
+void service_journal(void *ctx, const struct control_command *row, const cJSON *args, bool done, int64_t t_ns)
 {
     struct service *s = ctx;
     (void)t_ns; /* the journal asks the scheduler */
-    journal_command(&s->journal, row, args);
+    journal_command(&s->journal, row, args, done);
 }
 
 bool service_snapshot(void *ctx, const char *path, cJSON *result, char *why)

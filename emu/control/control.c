@@ -58,9 +58,10 @@ enum control_outcome control_do(struct control *c, const struct control_command 
                                 cJSON *result, int64_t t_ns)
 {
     const enum control_outcome outcome = row->run(c, v, result, t_ns);
-    if (outcome == CONTROL_DONE && row->changes && c->bench->journal) {
+    /* Refused by its handler, too: converters may have taken their inputs by then, which moves their noise. */
+    if (outcome != CONTROL_LATER && row->changes && c->bench->journal) {
         cJSON *args = control_args_json(row, v);
-        c->bench->journal(c->bench->ctx, row, args, t_ns);
+        c->bench->journal(c->bench->ctx, row, args, outcome == CONTROL_DONE, t_ns);
         cJSON_Delete(args);
     }
     return outcome;

@@ -72,7 +72,7 @@ struct control_command {
     struct control_arg arg[CONTROL_ARGS_MAX]; /* up to the first without a name */
     /* v: the arguments in the order of arg. Adds to result; CONTROL_REFUSED after control_refuse(). */
     enum control_outcome (*run)(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns);
-    bool changes; /* the bench's future: goes into the journal when it is done */
+    bool changes; /* the bench's future: goes into the journal */
     struct control_scpi scpi[CONTROL_SCPI_MAX];
     /* What the arguments do not say one by one; does nothing. False with the refusal. NULL: nothing more. */
     bool (*check)(const struct control_bench *b, const struct control_value *v, struct control_refusal *why);
@@ -126,7 +126,7 @@ unsigned control_arg_count(const struct control_command *row);
 bool control_args(const struct control_bench *b, const struct control_command *row, const cJSON *args,
                   struct control_value v[CONTROL_ARGS_MAX], struct control_refusal *why);
 
-/* The one way to carry out a command: runs the handler and, when it is done, tells the journal. */
+/* The one way to carry out a command: runs the handler and tells the journal. */
 enum control_outcome control_do(struct control *c, const struct control_command *row, const struct control_value *v,
                                 cJSON *result, int64_t t_ns);
 

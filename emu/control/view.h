@@ -76,7 +76,7 @@ struct control_bench {
                   bool on); /* its program reads nothing; false: it has gone */
     void (*pace)(void *ctx, struct control_pace *out);
     /* A command that changes the bench's future was carried out; args as it was given. May be NULL. */
-    void (*journal)(void *ctx, const struct control_command *row, const struct cJSON *args, int64_t t_ns);
+    void (*journal)(void *ctx, const struct control_command *row, const struct cJSON *args, bool done, int64_t t_ns);
 };
 
 #endif

@@ -193,6 +193,21 @@ def test_a_restored_bench_can_be_saved_again(tmp_path: Path) -> None:
         assert d.t_ns == 100_000_000
 
 
+def test_the_order_of_two_programs_at_one_instant_is_kept(tmp_path: Path) -> None:
+    """The first one's frame is on the wire, at the instant at which the second one sends a frame that would win."""
+    snapshot = tmp_path / "snapshot"
+    with Emulator(BENCH) as emulator, at(emulator) as first, at(emulator) as second:
+        first.run(5_000_000)
+        clock = StepClock(first.control, [first.host, second.host])
+        first.host.send(0x605, bytes([0x40, 0x18, 0x10, 1, 0, 0, 0, 0]))
+        clock.command(None, "run", for_s=0)
+        second.host.send(0x080, b"")
+        clock.command(None, "run", for_s=1e-3)
+        first.control.call("snapshot", path=str(snapshot))
+    with Emulator(extra=("--restore", snapshot)) as emulator, at(emulator) as d:
+        assert d.t_ns == 6_000_000
+
+
 def seal(text: str) -> str:
     """A snapshot's text with the sum that fits."""
     return text + json.dumps({"sha256": hashlib.sha256(text.encode()).hexdigest()}, separators=(",", ":")) + "\n"

@@ -70,11 +70,12 @@ static bool on_vcd_stop(void *ctx, char *why)
     return true;
 }
 
-static void on_journal(void *ctx, const struct control_command *row, const struct cJSON *args, int64_t t_ns)
+static void on_journal(void *ctx, const struct control_command *row, const struct cJSON *args, bool done, int64_t t_ns)
 {
     (void)ctx;
     char *text = cJSON_PrintUnformatted(args);
-    snprintf(asked.pushed, sizeof asked.pushed, "%s %s %lld", row->name, text, (long long)t_ns);
+    snprintf(asked.pushed, sizeof asked.pushed, "%s%s %s %lld", done ? "" : "refused ", row->name, text,
+             (long long)t_ns);
     cJSON_free(text);
     asked.pushes++;
 }
@@ -344,9 +345,11 @@ static void what_changes_the_bench_goes_into_the_journal(void **state)
     view.journal = on_journal;
     say("{\"cmd\":\"head.turn\",\"args\":{\"angle_deg\":90}}");
     assert_string_equal(asked.pushed, "head.turn {\"angle_deg\":90} 0");
-    say("{\"cmd\":\"head.turn\",\"args\":{\"angle_deg\":9}}"); /* refused: it is turning */
+    say("{\"cmd\":\"head.turn\",\"args\":{\"angle_deg\":9}}"); /* it is turning */
+    assert_string_equal(asked.pushed, "refused head.turn {\"angle_deg\":9} 0");
+    say("{\"cmd\":\"head.turn\",\"args\":{\"angle_deg\":4000}}"); /* does not get as far as the handler */
     say("{\"cmd\":\"head.read\"}");
-    assert_int_equal(asked.pushes, 1);
+    assert_int_equal(asked.pushes, 2);
     sched_run_until(&bench->sched, 2000000000);
     say("{\"cmd\":\"head.mount\",\"args\":{\"face\":\"side\"}}");
     assert_string_equal(asked.pushed, "head.mount {\"face\":\"side\"} 2000000000");
