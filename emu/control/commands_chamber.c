@@ -17,8 +17,9 @@ static void temp_limits(const struct control_bench *b, const struct control_valu
 static void ramp_limits(const struct control_bench *b, const struct control_value *v, double *min, double *max)
 {
     (void)v;
-    (void)min;
-    if (has_chamber(b)) *max = chamber_ramp_max_k_per_min(&b->lab->chamber);
+    if (!has_chamber(b)) return;
+    *min = CHAMBER_RAMP_MIN_K_PER_MIN;
+    *max = chamber_ramp_max_k_per_min(&b->lab->chamber);
 }
 
 static enum control_outcome answer(struct control *c, cJSON *result, int64_t t_ns)

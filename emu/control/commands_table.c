@@ -1,6 +1,8 @@
 /* Commands of the rate table. Axes count from 1, the outermost, as on its panel. */
 #include "control/commands.h"
 
+#include <math.h>
+
 static bool has_table(const struct control_bench *b)
 {
     return b->lab && b->lab->table.cfg.axes > 0;
@@ -35,8 +37,9 @@ static void angle_limits(const struct control_bench *b, const struct control_val
 {
     const struct table_axis_cfg *a = axis_of(b, v);
     if (!a || (a->angle_min_deg >= 0 && a->angle_max_deg <= 0)) return; /* both 0: without end */
-    *min = a->angle_min_deg;
-    *max = a->angle_max_deg;
+    const double offset_deg = table_offset_deg(&b->lab->table, (unsigned)v[0].count - 1);
+    *min = nearbyint((a->angle_min_deg + offset_deg) * 1e9) * 1e-9; /* as one would type it */
+    *max = nearbyint((a->angle_max_deg + offset_deg) * 1e9) * 1e-9;
 }
 
 /* ---- commands */
@@ -57,66 +60,77 @@ static enum control_outcome no_table(struct control *c)
     return control_refuse(c, "state", "there is no rate table in this scenario");
 }
 
-static enum control_outcome answer(struct control *c, enum motion_result r, const struct control_value *v,
-                                   cJSON *result, int64_t t_ns)
+static enum control_outcome refuse(struct control *c, enum motion_result r, const struct control_value *v)
 {
-    if (r == MOTION_OK) {
-        add_axis(c, v, result, t_ns);
-        return CONTROL_DONE;
-    }
     const struct table_axis_cfg *a = axis_of(c->bench, v);
     return control_refuse(c, "range", "axis %u: %s; it has up to %.6g deg/s and %.6g deg/s^2", (unsigned)v[0].count,
                           motion_result_text(r), a ? a->rate_max_dps : 0.0, a ? a->accel_max_dps2 : 0.0);
 }
 
-/* Index of the axis; what was before the command is sampled before it. */
-static unsigned begin(struct control *c, const struct control_value *v, int64_t t_ns)
+/* Motions are tried on a copy, so that one that is refused leaves no trace; what was before the command is sampled before
+ * the copy takes the table's place. */
+static enum control_outcome take(struct control *c, const struct table *tried, enum motion_result r,
+                                 const struct control_value *v, cJSON *result, int64_t t_ns)
 {
+    if (r != MOTION_OK) return refuse(c, r, v);
     control_settle_inputs(c->bench, t_ns);
+    c->bench->lab->table = *tried;
+    add_axis(c, v, result, t_ns);
+    return CONTROL_DONE;
+}
+
+static unsigned axis_index(const struct control_value *v)
+{
     return (unsigned)v[0].count - 1;
 }
 
 static enum control_outcome do_position(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
 {
     if (!has_table(c->bench)) return no_table(c);
-    const unsigned axis = begin(c, v, t_ns);
-    return answer(c, table_position(&c->bench->lab->table, axis, v[1].real, v[2].real, t_ns), v, result, t_ns);
+    struct table t = c->bench->lab->table;
+    const enum motion_result r = table_position(&t, axis_index(v), v[1].real, v[2].real, t_ns);
+    return take(c, &t, r, v, result, t_ns);
 }
 
 static enum control_outcome do_rate(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
 {
     if (!has_table(c->bench)) return no_table(c);
-    const unsigned axis = begin(c, v, t_ns);
-    return answer(c, table_rate(&c->bench->lab->table, axis, v[1].real, t_ns), v, result, t_ns);
+    struct table t = c->bench->lab->table;
+    const enum motion_result r = table_rate(&t, axis_index(v), v[1].real, t_ns);
+    return take(c, &t, r, v, result, t_ns);
 }
 
 static enum control_outcome do_sine(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
 {
     if (!has_table(c->bench)) return no_table(c);
-    const unsigned axis = begin(c, v, t_ns);
-    return answer(c, table_sine(&c->bench->lab->table, axis, v[1].real, v[2].real, t_ns), v, result, t_ns);
+    struct table t = c->bench->lab->table;
+    const enum motion_result r = table_sine(&t, axis_index(v), v[1].real, v[2].real, t_ns);
+    return take(c, &t, r, v, result, t_ns);
 }
 
 static enum control_outcome do_profile(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
 {
     if (!has_table(c->bench)) return no_table(c);
     if (v[1].n != v[2].n) return control_refuse(c, "range", "%u times and %u rates; as many of each", v[1].n, v[2].n);
-    const unsigned axis = begin(c, v, t_ns);
-    return answer(c, table_profile(&c->bench->lab->table, axis, v[1].reals, v[2].reals, v[1].n, t_ns), v, result, t_ns);
+    struct table t = c->bench->lab->table;
+    const enum motion_result r = table_profile(&t, axis_index(v), v[1].reals, v[2].reals, v[1].n, t_ns);
+    return take(c, &t, r, v, result, t_ns);
 }
 
 static enum control_outcome do_stop(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
 {
     if (!has_table(c->bench)) return no_table(c);
-    const unsigned axis = begin(c, v, t_ns);
-    return answer(c, table_stop(&c->bench->lab->table, axis, t_ns), v, result, t_ns);
+    struct table t = c->bench->lab->table;
+    const enum motion_result r = table_stop(&t, axis_index(v), t_ns);
+    return take(c, &t, r, v, result, t_ns);
 }
 
 static enum control_outcome do_zero(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
 {
     if (!has_table(c->bench)) return no_table(c);
-    const unsigned axis = begin(c, v, t_ns);
-    return answer(c, table_zero(&c->bench->lab->table, axis, v[1].real, t_ns), v, result, t_ns);
+    struct table t = c->bench->lab->table;
+    const enum motion_result r = table_zero(&t, axis_index(v), v[1].real, t_ns);
+    return take(c, &t, r, v, result, t_ns);
 }
 
 static enum control_outcome do_read(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)

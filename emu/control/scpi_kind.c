@@ -3,6 +3,8 @@
 
 #include <string.h>
 
+#define FAR_S 4e9 /* with as much before it the nanoseconds still fit an int64_t */
+
 static uint16_t no_condition(const struct control_bench *b, int64_t t_ns)
 {
     (void)b;
@@ -40,7 +42,8 @@ static int64_t axis_over_ns(const struct motion *m)
 {
     const struct motion_plan *p = &m->plan[m->latest];
     if (p->ends) return motion_rest_ns(m);
-    return p->start_ns + (int64_t)(p->piece[p->count - 1].t_s * 1e9) + 1;
+    const double over_s = p->piece[p->count - 1].t_s;
+    return over_s < FAR_S ? p->start_ns + (int64_t)(over_s * 1e9) + 1 : INT64_MAX;
 }
 
 static int64_t table_over_ns(const struct control_bench *b, int64_t t_ns)

@@ -9,6 +9,9 @@
 
 #define RAD_PER_DEG    0.017453292519943295
 #define RAD_PER_ARCSEC (RAD_PER_DEG / 3600.0)
+#define TURN_RAD       6.283185307179586
+#define WHOLE_ABOVE    1000.0 /* rad */
+#define ROUNDING_RAD   1e-9   /* by which a limit may be missed that was given as the readout shows it */
 
 /* Of the kind of a one-axis iXBlue EVO 30 L; figures E0 (docs/instruments.md). */
 static const struct table_axis_cfg precise = {
@@ -52,6 +55,21 @@ static double offset_rad(const struct table *t, unsigned axis)
     return t->cfg.axis[axis].readout_zero_arcsec * RAD_PER_ARCSEC + t->set_zero_rad[axis];
 }
 
+double table_offset_deg(const struct table *t, unsigned axis)
+{
+    return offset_rad(t, axis) / RAD_PER_DEG;
+}
+
+/* The axis's angle for one of the readout. */
+static double axis_rad(const struct table *t, unsigned axis, double shown_deg)
+{
+    const struct motion_limits *l = &t->axis[axis].limits;
+    const double angle_rad = shown_deg * RAD_PER_DEG - offset_rad(t, axis);
+    if (l->bounded && fabs(angle_rad - l->min_rad) < ROUNDING_RAD) return l->min_rad;
+    if (l->bounded && fabs(angle_rad - l->max_rad) < ROUNDING_RAD) return l->max_rad;
+    return angle_rad;
+}
+
 static enum motion_result moved(struct table *t, enum motion_result r)
 {
     t->cached_to_ns = -1;
@@ -61,8 +79,7 @@ static enum motion_result moved(struct table *t, enum motion_result r)
 enum motion_result table_position(struct table *t, unsigned axis, double angle_deg, double rate_dps, int64_t t_ns)
 {
     if (axis >= t->cfg.axes) return MOTION_NO_AXIS;
-    const double angle_rad = angle_deg * RAD_PER_DEG - offset_rad(t, axis);
-    return moved(t, motion_position(&t->axis[axis], angle_rad, rate_dps * RAD_PER_DEG, t_ns));
+    return moved(t, motion_position(&t->axis[axis], axis_rad(t, axis, angle_deg), rate_dps * RAD_PER_DEG, t_ns));
 }
 
 enum motion_result table_rate(struct table *t, unsigned axis, double rate_dps, int64_t t_ns)
@@ -152,13 +169,15 @@ struct motion_state table_axis(const struct table *t, unsigned axis, int64_t t_n
     return motion_at(&t->axis[axis], t_ns);
 }
 
-/* The cone: turns about the two axes across by w cos(n angle + phase) and w sin(n angle + phase). */
+/* The cone: turns about the two axes across by w cos(n angle + phase) and w sin(n angle + phase). det_sin() takes up to 1e6
+ * rad: whole turns are taken off a table that has been turning for long. */
 static void wobble(struct pose *p, const struct table_axis_cfg *c, const struct motion_state *s)
 {
     const double w_rad = c->wobble_arcsec * RAD_PER_ARCSEC;
     if (w_rad == 0.0) return;
     const double n = c->wobble_order ? (double)c->wobble_order : 1.0;
-    const double phase_rad = n * s->angle_rad + c->wobble_phase_deg * RAD_PER_DEG;
+    const double sum_rad = n * s->angle_rad + c->wobble_phase_deg * RAD_PER_DEG;
+    const double phase_rad = fabs(sum_rad) > WHOLE_ABOVE ? fmod(sum_rad, TURN_RAD) : sum_rad;
     const double cos_rad = w_rad * det_cos(phase_rad);
     const double sin_rad = w_rad * det_sin(phase_rad);
     const double rate = n * s->rate_radps;

@@ -64,6 +64,9 @@ enum motion_result table_profile(struct table *t, unsigned axis, const double *t
 enum motion_result table_sine(struct table *t, unsigned axis, double amplitude_deg, double frequency_hz, int64_t t_ns);
 enum motion_result table_stop(struct table *t, unsigned axis, int64_t t_ns);
 
+/* What the readout, without noise and delay, shows above the true angle. */
+double table_offset_deg(const struct table *t, unsigned axis);
+
 /* From now on the readout, without noise, shows angle_deg where the axis is. */
 enum motion_result table_zero(struct table *t, unsigned axis, double angle_deg, int64_t t_ns);
 

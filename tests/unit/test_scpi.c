@@ -444,6 +444,40 @@ static void limits_of_a_table_are_its_axes_own(void **state)
     assert_int_equal(error(), -114);
 }
 
+/* Limits are asked and told as the readout shows them. */
+static void limits_of_an_axis_follow_its_readout(void **state)
+{
+    (void)state;
+    struct table *t = &rig.lab.table;
+    t->cfg.axis[0].angle_min_deg = -100;
+    t->cfg.axis[0].angle_max_deg = 100;
+    const struct table_cfg cfg = t->cfg;
+    table_init(t, &cfg, &rig.lab.site, 1);
+    say("AXIS1:ZERO 90");
+    SAYS("AXIS1:POS? MAX;POS? MIN", "190;-10");
+    SAYS("AXIS1:POS 150,30;*OPC?", "");
+    run_s(10);
+    SAYS("AXIS1:POS?", "150");
+    say("AXIS1:POS MAX;POS MIN");
+    assert_int_equal(error(), 0);
+    say("AXIS1:POS -11");
+    SAYS("SYST:ERR?", "-222,\"Data out of range;angle_deg: -11 is outside -10 ... 190 deg\"");
+}
+
+/* An axis that would take longer than there is time never gets there. */
+static void what_is_never_over_is_waited_for(void **state)
+{
+    (void)state;
+    struct table *t = &rig.lab.table;
+    t->cfg.axis[0].rate_max_dps = 1e5;
+    t->cfg.axis[0].accel_max_dps2 = 1e-6;
+    const struct table_cfg cfg = t->cfg;
+    table_init(t, &cfg, &rig.lab.site, 1);
+    SAYS("AXIS1:RATE 1E5;*OPC?", "");
+    run_s(10);
+    assert_string_equal(rig.said, "");
+}
+
 static void a_table_turns_and_stops(void **state)
 {
     (void)state;
@@ -597,6 +631,8 @@ int main(void)
         cmocka_unit_test_setup(faces_have_short_forms_where_they_are_unique, head),
         cmocka_unit_test_setup(limits_are_asked_with_the_settings_name, head),
         cmocka_unit_test_setup(limits_of_a_table_are_its_axes_own, table),
+        cmocka_unit_test_setup(limits_of_an_axis_follow_its_readout, table),
+        cmocka_unit_test_setup(what_is_never_over_is_waited_for, table),
         cmocka_unit_test_setup(a_table_turns_and_stops, table),
         cmocka_unit_test_setup(a_wait_follows_what_others_make_of_the_motion, table),
         cmocka_unit_test_setup(a_table_swings_and_runs_profiles, table),

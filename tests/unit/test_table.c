@@ -145,6 +145,38 @@ static void nonorthogonal_axes_are_off_by_their_angle(void **state)
     near(p->C_nb[1][2], -60.0 * RAD_PER_ARCSEC, 1e-11); /* of z along y */
 }
 
+/* Days at the highest rate, and a cone of many turns in one. */
+static void a_table_may_turn_for_long(void **state)
+{
+    (void)state;
+    struct table_cfg c = exact(1);
+    c.axis[0].wobble_arcsec = 1.0;
+    c.axis[0].wobble_order = 3600;
+    struct table t = up(&c);
+    assert_int_equal(table_rate(&t, 0, 1000.0, 0), MOTION_OK);
+    const struct pose *p = table_pose(&t, 100 * 86400 * NS_PER_S);
+    near(p->C_nb[2][2], 1.0, 1e-9);
+    near(p->w_ib_b_radps[2] / RAD_PER_DEG, 1000.0, 0.1);
+}
+
+/* An axis from -100 to +100 deg whose readout was told to show 90 deg at 0. */
+static void limits_are_those_of_the_axis_wherever_its_readout_is(void **state)
+{
+    (void)state;
+    struct table_cfg c = exact(1);
+    c.axis[0].angle_min_deg = -100.0;
+    c.axis[0].angle_max_deg = 100.0;
+    c.axis[0].readout_zero_arcsec = 720.0;
+    struct table t = up(&c);
+    assert_int_equal(table_zero(&t, 0, 90.0, 0), MOTION_OK);
+    near(table_offset_deg(&t, 0), 90.0, 1e-12);
+    assert_int_equal(table_position(&t, 0, 190.0, 0.0, 0), MOTION_OK);
+    near(table_axis(&t, 0, 100 * NS_PER_S).angle_rad / RAD_PER_DEG, 100.0, 1e-12);
+    assert_int_equal(table_position(&t, 0, -10.0, 0.0, 100 * NS_PER_S), MOTION_OK);
+    assert_int_equal(table_position(&t, 0, 190.001, 0.0, 200 * NS_PER_S), MOTION_ANGLE_LIMIT);
+    assert_int_equal(table_position(&t, 0, -10.001, 0.0, 200 * NS_PER_S), MOTION_ANGLE_LIMIT);
+}
+
 static void a_table_has_the_axes_it_has(void **state)
 {
     (void)state;
@@ -171,6 +203,8 @@ int main(void)
         cmocka_unit_test(noise_of_the_readout_is_a_function_of_the_instant),
         cmocka_unit_test(wobble_is_a_cone),
         cmocka_unit_test(nonorthogonal_axes_are_off_by_their_angle),
+        cmocka_unit_test(a_table_may_turn_for_long),
+        cmocka_unit_test(limits_are_those_of_the_axis_wherever_its_readout_is),
         cmocka_unit_test(a_table_has_the_axes_it_has),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
