@@ -71,6 +71,11 @@ bool fault_fits(const struct control_bench *b, const struct fault *f, char *why)
 
 /* ---- values */
 
+static int64_t ns(double s)
+{
+    return (int64_t)nearbyint(s * (double)NS_PER_S);
+}
+
 bool fault_values_fit(const struct fault *f, struct control_refusal *why)
 {
     const struct fault_kind *k = f->kind;
@@ -85,6 +90,9 @@ bool fault_values_fit(const struct fault *f, struct control_refusal *why)
         }
         if (given && (k->nonzero & FAULT_BIT(i)) && f->value[i] == 0.0) {
             return control_refuse_in(why, "range", "%s: 0 would change nothing", name);
+        }
+        if ((i == FAULT_FOR_S || i == FAULT_HOLD_S) && f->value[i] > 0.0 && ns(f->value[i]) == 0) {
+            return control_refuse_in(why, "range", "%s: %.10g: less than a nanosecond", name, f->value[i]);
         }
     }
     return !k->once || !fault_given(f, FAULT_FOR_S) ||
@@ -125,11 +133,6 @@ static bool set_trigger(const struct control_bench *b, const struct control_valu
     f->unit = v[FAULT_UNIT].given ? v[FAULT_UNIT].unit : f->point.unit;
     if (after == FAULT_NO_EVENT || v[FAULT_UNIT].given || has_unit(f->point.place) || b->units == 1) return true;
     return control_refuse_in(why, "argument", "unit is missing: whose events count");
-}
-
-static int64_t ns(double s)
-{
-    return (int64_t)nearbyint(s * (double)NS_PER_S);
 }
 
 bool fault_make(const struct control_bench *b, const struct control_value *v, struct fault *out,

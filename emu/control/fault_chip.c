@@ -82,6 +82,16 @@ static bool has_drdy(const struct control_bench *b, const struct fault *f, char 
     return false;
 }
 
+/* A clock is off by whole ppm. */
+static bool has_ppm(const struct control_bench *b, const struct fault *f, char *why)
+{
+    (void)b;
+    const double ppm = f->value[FAULT_CLOCK_PPM];
+    if (ppm == nearbyint(ppm)) return true;
+    snprintf(why, CONTROL_WHY_MAX, "clock_ppm: %.10g: whole ppm are wanted", ppm);
+    return false;
+}
+
 static bool has_register(const struct control_bench *b, const struct fault *f, char *why)
 {
     (void)b;
@@ -101,7 +111,7 @@ static const struct fault_kind chip[] = {
     {"chip.lost_sync", "The chip does not hear SYNC, neither pin nor command.", "after a pulse on SYNC the chip goes on in its old phase: no gap in the frames (adc.x), another answer to a step than the other axes (adc.y, adc.z), temperature codes every 10.00 ms (tadc)",
      CHIP(LOST_SYNC)},
     {"chip.clock", "The clock of the chip is off by clock_ppm (negative: slow).", "the data rate is off by as much (adc.x, tadc), or the axis answers to a step in another time than the others (adc.y, adc.z)",
-     CHIP(SLOW_CLOCK), .need = FAULT_BIT(FAULT_CLOCK_PPM), .nonzero = FAULT_BIT(FAULT_CLOCK_PPM)},
+     CHIP(SLOW_CLOCK), .need = FAULT_BIT(FAULT_CLOCK_PPM), .nonzero = FAULT_BIT(FAULT_CLOCK_PPM), .unless = "clock_ppm is no whole number", .fits = has_ppm},
     {"chip.flip", "Bits of a register are inverted, once.", "the register reads otherwise, and the chip does what it now says",
      .places = FAULT_BIT(FAULT_AT_ADC) | FAULT_BIT(FAULT_AT_TADC), .need = FAULT_BIT(FAULT_REGISTER) | FAULT_BIT(FAULT_MASK),
      .once = true, .unless = "no such register", .fits = has_register, .apply = flip},

@@ -1,6 +1,7 @@
 /* Faults of the links: what befalls frames on a bus, from a board, and on their way to a program (base/can_fault.h). */
 #include "control/fault_parts.h"
 
+#include <math.h>
 #include <stdio.h>
 
 enum { BUS_OFF, STALL };
@@ -47,7 +48,7 @@ static bool apply_frames(struct fault *f, int64_t t_ns)
                                    .mask = id_mask(f),
                                    .probability = fault_given(f, FAULT_PROBABILITY) ? f->value[FAULT_PROBABILITY] : 1.0,
                                    .limit = (uint32_t)f->value[FAULT_FRAMES],
-                                   .delay_ns = (int64_t)(f->value[FAULT_HOLD_S] * (double)NS_PER_S + 0.5),
+                                   .delay_ns = (int64_t)nearbyint(f->value[FAULT_HOLD_S] * (double)NS_PER_S),
                                    .rng = f->random};
     can_fault_add(bus, &f->as.can);
     return true;

@@ -20,6 +20,8 @@ static bool reaches_brownout(const struct control_bench *b, const struct fault *
 static bool dip(struct fault *f, int64_t t_ns)
 {
     const struct control_bench *b = f->engine->bench;
+    char why[CONTROL_WHY_MAX];
+    if (!reaches_brownout(b, f, why)) return false; /* it has been set higher meanwhile */
     if (supply_dip(&b->lab->supply, f->value[FAULT_DROP_V], t_ns, f->for_ns, t_ns) != SUPPLY_OK) return false;
     if (b->supply_changed) b->supply_changed(b->ctx, t_ns);
     return true;
@@ -29,7 +31,7 @@ static bool dip(struct fault *f, int64_t t_ns)
 static void lift_dip(struct fault *f, int64_t t_ns)
 {
     const struct control_bench *b = f->engine->bench;
-    supply_dip_end(&b->lab->supply, f->began_ns, t_ns);
+    supply_dip_end(&b->lab->supply, f->value[FAULT_DROP_V], f->began_ns, f->for_ns, t_ns);
     if (b->supply_changed) b->supply_changed(b->ctx, t_ns);
 }
 

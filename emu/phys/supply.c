@@ -117,22 +117,31 @@ enum supply_result supply_ripple(struct supply *s, double amplitude_v, double fr
     return SUPPLY_OK;
 }
 
+static int64_t dip_end_ns(int64_t from_ns, int64_t for_ns)
+{
+    return for_ns < INT64_MAX - from_ns ? from_ns + for_ns : INT64_MAX;
+}
+
 enum supply_result supply_dip(struct supply *s, double deep_v, int64_t from_ns, int64_t for_ns, int64_t t_ns)
 {
-    if (!(deep_v > 0.0 && deep_v <= s->cfg.volt_max_v) || from_ns < t_ns || for_ns <= 0) return SUPPLY_OUT_OF_RANGE;
+    if (!(deep_v > 0.0) || from_ns < t_ns || for_ns <= 0) return SUPPLY_OUT_OF_RANGE;
     for (unsigned i = 0; i < SUPPLY_DIPS_MAX; i++) {
         if (s->dip[i].to_ns > t_ns) continue;
-        const int64_t to_ns = for_ns < INT64_MAX - from_ns ? from_ns + for_ns : INT64_MAX;
-        s->dip[i] = (struct supply_dip){from_ns, to_ns, deep_v};
+        s->dip[i] = (struct supply_dip){from_ns, dip_end_ns(from_ns, for_ns), deep_v};
         return SUPPLY_OK;
     }
     return SUPPLY_TOO_MANY_DIPS;
 }
 
-void supply_dip_end(struct supply *s, int64_t from_ns, int64_t t_ns)
+/* Of two that are alike one ends, whichever. */
+void supply_dip_end(struct supply *s, double deep_v, int64_t from_ns, int64_t for_ns, int64_t t_ns)
 {
-    for (unsigned i = 0; i < SUPPLY_DIPS_MAX; i++) {
-        if (s->dip[i].from_ns == from_ns && s->dip[i].to_ns > t_ns) s->dip[i].to_ns = t_ns;
+    const int64_t to_ns = dip_end_ns(from_ns, for_ns);
+    for (unsigned i = 0; i < SUPPLY_DIPS_MAX && to_ns > t_ns; i++) {
+        struct supply_dip *d = &s->dip[i];
+        if (d->from_ns != from_ns || d->to_ns != to_ns || d->drop_v < deep_v || d->drop_v > deep_v) continue;
+        d->to_ns = t_ns;
+        return;
     }
 }
 

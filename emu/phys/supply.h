@@ -57,11 +57,11 @@ enum supply_result supply_set(struct supply *s, double volt_v, int64_t t_ns);
 void supply_output(struct supply *s, bool on, int64_t t_ns);
 enum supply_result supply_ripple(struct supply *s, double amplitude_v, double frequency_hz, int64_t t_ns);
 
-/* A dip from from_ns (not before t_ns, which is now) for for_ns. */
+/* A dip from from_ns (not before t_ns, which is now) for for_ns; it may be deeper than the supply is high. */
 enum supply_result supply_dip(struct supply *s, double drop_v, int64_t from_ns, int64_t for_ns, int64_t t_ns);
 
-/* Dips that began at from_ns end now. */
-void supply_dip_end(struct supply *s, int64_t from_ns, int64_t t_ns);
+/* The dip that was so given ends now; harmless if it is over. */
+void supply_dip_end(struct supply *s, double drop_v, int64_t from_ns, int64_t for_ns, int64_t t_ns);
 
 double supply_volts(const struct supply *s, int64_t t_ns);   /* truth */
 double supply_shown_v(const struct supply *s, int64_t t_ns); /* by its voltmeter */

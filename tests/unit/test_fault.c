@@ -318,6 +318,10 @@ static void what_does_not_fit_is_refused_with_the_reason(void **state)
         {"{'kind':'supply.brownout','point':'supply','drop_v':5}", "for_s is missing"},
         {"{'kind':'supply.brownout','point':'supply','drop_v':2,'for_s':1}",
          "not below the threshold of the boards, 9 V"},
+        {"{'kind':'chip.clock','point':'a.adc.x','clock_ppm':0.4}", "whole ppm"},
+        {"{'kind':'sensor.bias','point':'a.sensor.x','bias_v':1,'for_s':1e-10}",
+         "for_s: 1e-10: less than a nanosecond"},
+        {"{'kind':'link.delay','point':'bus.can0','hold_s':1e-10}", "hold_s: 1e-10: less than a nanosecond"},
         {"{'kind':'supply.brownout','point':'a.can','drop_v':5,'for_s':1}", "which is the CAN node of a board"},
         {"{'kind':'link.delay','point':'bus.can0'}", "hold_s is missing"},
         {"{'kind':'link.stall','point':'client.2'}", "fault.points lists them"},
@@ -426,6 +430,22 @@ static void faults_of_a_chip_add_up(void **state)
     assert_int_equal(r.changes, 6);
 }
 
+/* Two that begin together end apart; one for which the supply is too high by then does nothing, and says so. */
+static void brownouts_are_those_that_were_asked_for(void **state)
+{
+    (void)state;
+    add("{'kind':'supply.brownout','point':'supply','drop_v':5,'for_s':0.01,'at_s':0.1}");
+    add("{'kind':'supply.brownout','point':'supply','drop_v':50,'for_s':0.1,'at_s':0.1}");
+    const uint32_t late = add("{'kind':'supply.brownout','point':'supply','drop_v':4,'for_s':0.1,'at_s':0.3}");
+    run_to(120 * MS);
+    assert_true(supply_volts(&r.lab.supply, 120 * MS) == 0.0);
+    run_to(201 * MS);
+    assert_true(supply_volts(&r.lab.supply, 201 * MS) == 12.0);
+    supply_set(&r.lab.supply, 15.0, 201 * MS);
+    run_to(301 * MS);
+    assert_change(4, late, FAULT_VOID, 300 * MS);
+}
+
 static void what_is_over_at_once_needs_no_lifting(void **state)
 {
     (void)state;
@@ -437,6 +457,32 @@ static void what_is_over_at_once_needs_no_lifting(void **state)
     assert_change(1, flip, FAULT_OVER, 400 * MS);
     assert_change(2, glitch, FAULT_ACTIVE, 410 * MS);
     assert_change(3, glitch, FAULT_OVER, 410 * MS);
+}
+
+static void refused(const char *cmd, const char *args)
+{
+    cJSON *j = cJSON_Parse(args), *result = cJSON_CreateObject();
+    assert_non_null(j);
+    assert_int_equal(control_call(&r.control, cmd, j, result, r.s.now_ns), CONTROL_REFUSED);
+    cJSON_Delete(result);
+    cJSON_Delete(j);
+}
+
+/* When a sensor was last looked at decides about its noise: what is refused must not look. */
+static void a_refused_command_leaves_no_trace(void **state)
+{
+    (void)state;
+    r.lab.chamber.cfg = chamber_default();
+    r.lab.chamber.cfg.present = true;
+    const struct table_cfg cfg = table_default(1);
+    table_init(&r.lab.table, &cfg, &r.lab.site, 1);
+    run_to(400 * MS + 12345);
+    const int64_t looked_ns = r.unit[0].mems[0].t_ns;
+    assert_true(looked_ns < r.s.now_ns);
+    refused("table.sine", "{\"axis\":1,\"amplitude_deg\":100,\"frequency_hz\":10}");
+    refused("table.profile", "{\"axis\":1,\"times_s\":[1,0],\"rates_dps\":[1,2]}");
+    refused("chamber.ramp", "{\"ramp_k_per_min\":0.0001}");
+    assert_int_equal(r.unit[0].mems[0].t_ns, looked_ns);
 }
 
 /* Same number, same noise; another number, another one. */
@@ -466,6 +512,8 @@ int main(void)
         TEST(a_fault_that_waits_or_listens_can_be_cleared),
         TEST(places_are_used_again_but_not_those_of_living_faults),
         TEST(what_does_not_fit_is_refused_with_the_reason),
+        TEST(brownouts_are_those_that_were_asked_for),
+        TEST(a_refused_command_leaves_no_trace),
         TEST(every_kind_at_every_point_fits_or_says_why_not),
         TEST(points_have_names_of_their_own),
         TEST(a_bias_is_in_the_codes),

@@ -84,6 +84,24 @@ static void a_dip_is_felt_from_its_first_to_its_last_nanosecond(void **state)
     assert_int_equal(supply_next_ns(&s, false, 550), 600);
 }
 
+/* Two that begin together: each ends by itself. One may be deeper than the supply is high. */
+static void dips_that_begin_together_end_apart(void **state)
+{
+    (void)state;
+    struct supply s = up(0);
+    assert_int_equal(supply_dip(&s, 4.0, 500, 100, 0), SUPPLY_OK);
+    assert_int_equal(supply_dip(&s, 5.0, 500, 900, 0), SUPPLY_OK);
+    assert_int_equal(supply_dip(&s, 5.0, 500, 900, 0), SUPPLY_OK);
+    supply_dip_end(&s, 4.0, 500, 100, 600); /* over already: nothing */
+    near(supply_volts(&s, 600), 2.0, 0.0);
+    supply_dip_end(&s, 5.0, 500, 900, 700);
+    near(supply_volts(&s, 700), 7.0, 0.0);
+    supply_dip_end(&s, 5.0, 500, 900, 800);
+    near(supply_volts(&s, 800), 12.0, 0.0);
+    assert_int_equal(supply_dip(&s, 50.0, 900, 100, 800), SUPPLY_OK);
+    near(supply_volts(&s, 900), 0.0, 0.0);
+}
+
 static void what_is_out_of_range_is_refused(void **state)
 {
     (void)state;
@@ -171,6 +189,7 @@ int main(void)
         cmocka_unit_test(the_output_goes_off_and_on_with_hysteresis),
         cmocka_unit_test(a_slewing_output_crosses_where_the_line_does),
         cmocka_unit_test(a_dip_is_felt_from_its_first_to_its_last_nanosecond),
+        cmocka_unit_test(dips_that_begin_together_end_apart),
         cmocka_unit_test(what_is_out_of_range_is_refused),
         cmocka_unit_test(figures_of_a_scenario_may_be_extreme),
         cmocka_unit_test(the_voltmeter_has_steps),
