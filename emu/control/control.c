@@ -163,6 +163,9 @@ static enum control_outcome dispatch(struct control *c, const cJSON *request, cJ
         if (strcmp(j->string, "id") != 0 && strcmp(j->string, "cmd") != 0 && strcmp(j->string, "args") != 0) {
             return control_refuse(c, "syntax", "\"%.40s\": unknown member; a command has id, cmd and args", j->string);
         }
+        if (cJSON_GetObjectItemCaseSensitive(request, j->string) != j) {
+            return control_refuse(c, "syntax", "%s is given twice", j->string);
+        }
     }
     const cJSON *name = cJSON_GetObjectItemCaseSensitive(request, "cmd");
     if (!cJSON_IsString(name)) return control_refuse(c, "syntax", "cmd: a command's name is wanted; help lists them");
@@ -171,7 +174,7 @@ static enum control_outcome dispatch(struct control *c, const cJSON *request, cJ
 
 const char *control_line(struct control *c, const char *line, int64_t t_ns)
 {
-    cJSON *request = line ? cJSON_Parse(line) : NULL;
+    cJSON *request = line ? cJSON_ParseWithOpts(line, NULL, true) : NULL; /* true: and nothing behind it */
     cJSON *result = cJSON_CreateObject();
     cJSON *id = cJSON_DetachItemFromObjectCaseSensitive(request, "id");
     c->commands++;

@@ -192,6 +192,8 @@ static const struct {
     {"garbage", "syntax", "not a JSON object"},
     {"[1,2]", "syntax", "not a JSON object"},
     {"{\"id\":1", "syntax", "not a JSON object"},
+    {"{\"cmd\":\"time\"} {\"cmd\":\"quit\"}", "syntax", "not a JSON object"},
+    {"{\"cmd\":\"time\",\"cmd\":\"quit\"}", "syntax", "cmd is given twice"},
     {"{\"id\":1}", "syntax", "cmd: a command's name is wanted"},
     {"{\"cmd\":5}", "syntax", "cmd: a command's name is wanted"},
     {"{\"cmd\":\"time\",\"ards\":{}}", "syntax", "\\\"ards\\\": unknown member"},
