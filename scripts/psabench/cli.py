@@ -76,7 +76,11 @@ Counters stand on stderr at the end: frames, lost, torn (CAN); also late, early,
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Entry point of the command."""
-    args = _parser().parse_args(command_line.words(list(sys.argv[1:] if argv is None else argv)))
+    words = command_line.words(list(sys.argv[1:] if argv is None else argv))
+    if not words:
+        _parser().print_help(sys.stderr)
+        return BadInput.exit_status
+    args = _parser().parse_args(words)
     for library in ("can", "canopen"):  # what goes wrong there is raised as well, and told in one line
         logging.getLogger(library).setLevel(logging.CRITICAL)
     handler: Callable[[argparse.Namespace], int] = args.handler

@@ -120,6 +120,13 @@ def test_a_reader_that_has_seen_enough_is_no_error() -> None:
     assert "Broken pipe" not in words
 
 
+def test_without_a_command_help_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main([]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert "a first hour:" in err
+
+
 def test_help_and_the_shell_do_without_the_libraries_of_the_report() -> None:
     """Each takes a second to import."""
     told = "import sys, psabench.cli; print(sorted({'matplotlib', 'scipy', 'IPython'} & set(sys.modules)))"

@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 
 import pytest
-from psabench.errors import BadInput, BenchError, ControlError
+from psabench.errors import BadInput, BenchError, ControlError, DeviceError
 from psabench.shell import status
 from psabench.shell.opening import Opening, addresses
 from psabench.shell.script import Voice, run_file, run_lines, run_stream
@@ -117,7 +117,7 @@ def test_a_wrong_line_is_found_before_anything_is_done(tmp_path: Path) -> None:
 def test_what_the_bench_refuses_ends_a_script_with_3_and_its_place(tmp_path: Path) -> None:
     with pytest.raises(BenchError) as e:
         run_lines(Session(fake()[1]), ["bench.counters", "head.turn 5"], Voice(print), tmp_path / "x.psa")
-    assert str(e.value) == f"{tmp_path}/x.psa:1: counters: not now (state)"
+    assert str(e.value) == f"{tmp_path}/x.psa:1: bench.counters: not now"
     assert e.value.exit_status == 3
 
 
@@ -145,7 +145,7 @@ def test_an_error_in_json_has_its_status() -> None:
     assert json.loads(said[0]) == {
         "line": "bench.counters",
         "ok": False,
-        "error": {"status": 3, "text": "counters: not now (state)"},
+        "error": {"status": 3, "text": "bench.counters: not now"},
     }
 
 
@@ -209,3 +209,26 @@ def test_the_refusal_of_an_argument_is_a_wrong_line(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(bench.control, "call", refuse)
     with pytest.raises(Wrong, match="outside 0"):
         session.do("head.turn 5")
+
+
+def test_a_refusal_has_the_names_of_the_shell(monkeypatch: pytest.MonkeyPatch) -> None:
+    bench, it = fake()
+    session = Session(it)
+
+    def refuse(command: str, /, **args: object) -> None:
+        raise ControlError(command, "state", "a recording goes on; vcd.start began it")
+
+    monkeypatch.setattr(bench.control, "call", refuse)
+    with pytest.raises(BenchError, match=r"^probe\.start: a recording goes on; probe\.start began it$"):
+        session.do("probe.start x.vcd")
+
+
+def test_a_board_that_is_being_set_up_points_to_dut_ready(monkeypatch: pytest.MonkeyPatch) -> None:
+    session = Session(fake()[1])
+
+    def refuse(_: Session, __: object) -> None:
+        raise DeviceError("node 5: read 2000h:2", 0x08000022, "not in this state")
+
+    monkeypatch.setattr(Session, "_result", refuse)
+    with pytest.raises(BenchError, match=r"not in this state; while the board is being set up: dut\.ready waits"):
+        session.do("head.read")

@@ -10,7 +10,7 @@ from typing import Any
 
 from psabench.bench import Bench
 from psabench.device import Psa2
-from psabench.errors import BenchError, ControlError
+from psabench.errors import BenchError, ControlError, DeviceError
 from psabench.instruments import KINDS
 from psabench.shell import own
 from psabench.shell.grammar import Call, parse
@@ -20,6 +20,7 @@ from psabench.shell.words import Wrong
 
 # The bench understood these codes of a refusal to mean: the line is wrong. Others: not now, not here.
 WRONG_CODES = {"syntax", "command", "argument", "type", "range"}
+NOT_NOW = 0x08000022  # CiA 301: the state of the device does not allow it
 PATHS = {"path"}  # arguments that name files of this machine, relative to where we are
 NO_CONTROL = "it wants the control socket of an emulator (--connect PATH); this bench has none"
 NO_CAN = "it wants a bus (--can SPEC, as socketcand:127.0.0.1:29536); this bench was opened without one"
@@ -85,21 +86,26 @@ class Session:
         return outcome
 
     def _carry_out(self, call: Call) -> Outcome:
-        mine = own.HANDLERS.get(call.command.name)
-        result = mine(self, call.args) if mine else self._ask(call)
+        try:
+            result = self._result(call)
+        except ControlError as e:
+            text = self.vocabulary.in_shell(f"{call.command.name}: {e.text}")
+            raise (Wrong(text) if e.code in WRONG_CODES else BenchError(text)) from e
+        except DeviceError as e:
+            if e.abort_code != NOT_NOW:
+                raise
+            raise BenchError(f"{e}; while the board is being set up: dut.ready waits for the end") from e
         failed = str(result.get("failed", "")) if call.command.name == "expect" else ""
         if result and call.command.name not in own.UNSAID and call.command.name != "expect":
             self.latest = result
         return Outcome(call=call, result=result, t_ns=self.now_ns(), failed=failed)
 
-    def _ask(self, call: Call) -> Mapping[str, Any]:
+    def _result(self, call: Call) -> Mapping[str, Any]:
+        mine = own.HANDLERS.get(call.command.name)
+        if mine:
+            return mine(self, call.args)
         args = {k: os.path.abspath(str(v)) if k in PATHS else v for k, v in call.args.items()}
-        try:
-            return self.bench.control.call(call.command.wire, **args).result
-        except ControlError as e:
-            if e.code in WRONG_CODES:
-                raise Wrong(str(e)) from e
-            raise
+        return self.bench.control.call(call.command.wire, **args).result
 
 
 def learn(bench: Bench) -> Vocabulary:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
@@ -82,6 +83,13 @@ class Vocabulary:
 
     commands: Mapping[str, Command]
     absent: Mapping[str, str] = field(default_factory=dict)
+
+    def in_shell(self, text: str) -> str:
+        """The bench's words, with its commands under the names that they have here: faults.points, not fault.points."""
+        wires = {c.wire: c.name for c in self.commands.values() if "." in c.wire and c.wire != c.name}
+        for wire, name in wires.items():
+            text = re.sub(rf"(?<![\w.]){re.escape(wire)}(?!\w)", name, text)
+        return text
 
     def nearest(self, name: str) -> list[str]:
         """Up to three names that somebody may have meant."""
