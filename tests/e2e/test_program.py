@@ -97,6 +97,7 @@ def test_the_control_socket_of_an_emulator_tells_its_addresses(tmp_path: Path) -
             assert b.host.bus.channel_info.endswith(f"127.0.0.1:{port}")  # the pty has room for one: left to others
             b.unit.wait_ready()
             assert b.head.turn(30.0) == pytest.approx(30.0, abs=0.01)
+        assert emulator.control_path
         with psabench("run", "turns", "--control", emulator.control_path, "--average", "4", "--out", tmp_path) as run:
             out, err = run.communicate(timeout=PATIENCE_S)
     assert run.returncode == 0, out + err
