@@ -39,9 +39,11 @@ psabench COMMAND --help says more. Exit status: 0 done and within limits, 1 done
 3 the bench or a link failed, 130 ended by Ctrl-C.
 """
 
-CAN_HELP = """\
+BUS_HELP = """\
 the bus: INTERFACE:CHANNEL[,key=value...] of python-can. Examples: socketcand:127.0.0.1:29536, slcan:/dev/pts/7,
-socketcan:vcan0,fd=true. Without it python-can's own configuration is used ($CAN_INTERFACE, $CAN_CHANNEL, ~/.canrc)"""
+socketcan:vcan0,fd=true"""
+CAN_HELP = f"""\
+{BUS_HELP}. Without it python-can's own configuration is used ($CAN_INTERFACE, $CAN_CHANNEL, ~/.canrc)"""
 
 RUN_EPILOG = """\
 examples:
@@ -110,7 +112,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_run(commands)
     _add_record(commands)
     _add_decode(commands)
-    command_line.add(commands, _Help, CAN_HELP, node_id)
+    command_line.add(commands, _Help, BUS_HELP, node_id)
     return top
 
 
@@ -132,7 +134,7 @@ def _add_run(commands: Any) -> None:
     p.add_argument("--out", type=Path, default=Path("build/run"), help="folder of the report (%(default)s)")
     p.add_argument("--condition", choices=[*run.CONDITIONS, "both"], default="both", help="which reading (%(default)s)")
     p.add_argument("--scenario", type=Path, help="scenario for the emulator, instead of the conditions' own")
-    p.add_argument("--can", help=CAN_HELP)
+    p.add_argument("--can", help=f"{BUS_HELP}. Without it --control tells; with --head alone python-can's own")
     p.add_argument("--head", metavar="VISA-ADDRESS", help=f"the dividing head, real or emulated: {EXAMPLES}")
     p.add_argument("--control", type=Path, help="control socket of an emulator: tells CAN and head, moves time")
     p.add_argument("--truth", type=Path, help="truth socket of an emulator, asked after the run to grade it")

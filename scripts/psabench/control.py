@@ -62,7 +62,7 @@ class Control:
         try:
             self._socket.sendall(json.dumps(request).encode() + b"\n")
         except OSError as e:
-            raise LinkError(f"control socket: {command}: {e}") from e
+            raise LinkError(f"control socket: {command}: the emulator has gone ({e.strerror or e})") from e
         while True:
             line = self._line(command, REPLY_S)
             try:

@@ -261,6 +261,9 @@ def test_the_control_socket_alone_tells_where_the_rest_is(env: dict[str, str]) -
         done = shell(env, *there, "--json", *(a for line in lines for a in ("--command", line)))
         assert done.returncode == 0, done.stdout + done.stderr
         assert objects(done.stdout)[-1]["result"]["endpoints"] == emulator.endpoints
+        done = shell(env, *there, "--command", "bench.quit")
+        assert (done.returncode, done.stderr) == (0, "")
+        assert emulator.wait(PATIENCE_S) == 0
 
 
 def test_a_device_without_a_control_socket(env: dict[str, str], make_rig: MakeRig) -> None:

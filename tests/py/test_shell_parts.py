@@ -88,6 +88,8 @@ RESULT = {"angle_deg": 30.004, "at_rest": True, "face": "side", "clients": [{"lo
 HELD = [
     "angle_deg = 30 +- 0.01",
     "angle_deg > 30",
+    "angle_deg = 30 +- 0.01  # about",
+    'face = "side"  # as mounted',
     "angle_deg <= 30.004",
     "angle_deg != 31",
     "at_rest = true",

@@ -37,7 +37,7 @@ before anything is done), 3 the bench refused or a link failed.
 """
 
 
-def add(commands: Any, formatter: Any, can_help: str, node: Callable[[str], int]) -> None:
+def add(commands: Any, formatter: Any, bus_help: str, node: Callable[[str], int]) -> None:
     """Both commands to the parsers of `psabench`."""
     shell = commands.add_parser(
         "shell",
@@ -53,7 +53,7 @@ def add(commands: Any, formatter: Any, can_help: str, node: Callable[[str], int]
         "--command", action="append", metavar="LINE", help="carry out this line and end; may be repeated"
     )
     shell.add_argument("--connect", type=Path, metavar="CONTROL", help="control socket of an emulator that is there")
-    _add_common(shell, can_help, node)
+    _add_common(shell, bus_help, node)
 
     script = commands.add_parser(
         "run script",
@@ -67,12 +67,12 @@ def add(commands: Any, formatter: Any, can_help: str, node: Callable[[str], int]
     script.add_argument("--scenario", help="instead of that of the script")
     script.add_argument("--pace", choices=["wall", "step"], help="instead of that of the script")
     script.add_argument("--control", dest="connect", type=Path, help="control socket of an emulator that is there")
-    _add_common(script, can_help, node)
+    _add_common(script, bus_help, node)
 
 
-def _add_common(p: argparse.ArgumentParser, can_help: str, node: Callable[[str], int]) -> None:
+def _add_common(p: argparse.ArgumentParser, bus_help: str, node: Callable[[str], int]) -> None:
     p.add_argument("--seed", type=int, help="of the emulator's noise, instead of the scenario's")
-    p.add_argument("--can", help=can_help)
+    p.add_argument("--can", help=f"{bus_help}; without it that of an emulator: there, or started")
     p.add_argument(
         "--scpi",
         action="append",

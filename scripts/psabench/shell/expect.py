@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from psabench.shell.words import Wrong
+from psabench.shell.words import Wrong, split
 
 _FORM = re.compile(r"(?P<path>\S+)\s+(?P<op>=|!=|<=|>=|<|>)\s+(?P<value>.+?)(?:\s+\+-\s+(?P<within>\S+))?\s*")
 _OPS: Mapping[str, Callable[[Any, Any], bool]] = {
@@ -34,7 +34,8 @@ class Expectation:
     @classmethod
     def parse(cls, text: str) -> Expectation:
         """Raises Wrong."""
-        m = _FORM.fullmatch(text)
+        said = split(text)
+        m = _FORM.fullmatch(text[: said[-1].end] if said else "")  # without a comment
         if not m:
             raise Wrong(f"expect {text}: expected {USAGE}")
         value = literal(m["value"])

@@ -21,6 +21,7 @@ from psabench.shell.words import Wrong
 # The bench understood these codes of a refusal to mean: the line is wrong. Others: not now, not here.
 WRONG_CODES = {"syntax", "command", "argument", "type", "range"}
 NOT_NOW = 0x08000022  # CiA 301: the state of the device does not allow it
+QUIT = "quit"
 PATHS = {"path"}  # arguments that name files of this machine, relative to where we are
 NO_CONTROL = "it wants the control socket of an emulator (--connect PATH); this bench has none"
 NO_CAN = "it wants a bus (--can SPEC, as socketcand:127.0.0.1:29536); this bench was opened without one"
@@ -98,7 +99,8 @@ class Session:
         failed = str(result.get("failed", "")) if call.command.name == "expect" else ""
         if result and call.command.name not in own.UNSAID and call.command.name != "expect":
             self.latest = result
-        return Outcome(call=call, result=result, t_ns=self.now_ns(), failed=failed)
+        t_ns = None if call.command.wire == QUIT else self.now_ns()  # nobody is there to tell it
+        return Outcome(call=call, result=result, t_ns=t_ns, failed=failed)
 
     def _result(self, call: Call) -> Mapping[str, Any]:
         mine = own.HANDLERS.get(call.command.name)
