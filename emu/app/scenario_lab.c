@@ -11,7 +11,7 @@
 
 // clang-format off
 static const struct yaml_field site_rows[] = {
-    {.key = "g_mps2",        .type = YAML_REAL, .offset = SITE(g_mps2), .max = 20, .what = "local gravity; with a latitude and without this key: normal gravity of the place"},
+    {.key = "g_mps2",        .type = YAML_REAL, .offset = SITE(g_mps2), .min = 0.001, .max = 20, .what = "local gravity; with a latitude and without this key: normal gravity of the place"},
     {.key = "latitude_deg",  .type = YAML_REAL, .offset = SITE(latitude_deg), .min = -90, .max = 90, .what = "geodetic; without it the Earth does not turn"},
     {.key = "longitude_deg", .type = YAML_REAL, .offset = SITE(longitude_deg), .min = -180, .max = 360, .what = "east"},
     {.key = "height_m",      .type = YAML_REAL, .offset = SITE(height_m), .min = -500, .max = 9000, .what = "above the ellipsoid"},

@@ -150,6 +150,8 @@ static const struct {
     {"buses: [{}, {name: can0}]\nunits: [{}]\n", "dir/s.yaml:1:13: buses.can1.name: \"can0\" is taken by another bus"},
     {"buses: []\nunits: [{}]\n", "dir/s.yaml:1:8: buses: a sequence of buses is wanted"},
     {"site: {longitude_deg: 30}\nunits: [{}]\n", "dir/s.yaml:1:23: site: longitude_deg without latitude_deg"},
+    {"site: {g_mps2: 0}\nunits: [{}]\n",
+     "dir/s.yaml:1:16: site.g_mps2: 0 is outside 0.001 ... 20"}, /* per g of what? */
     {"site: {latitude_deg: 91}\nunits: [{}]\n", "dir/s.yaml:1:22: site.latitude_deg: 91 is outside -90 ... 90"},
     {"table: {axes: 4}\nunits: [{}]\n", "dir/s.yaml:1:15: table.axes: 4 is outside 1 ... 3"},
     {"table: {axes: [{along: w}]}\nunits: [{}]\n", "dir/s.yaml:1:24: table.axes[0].along: x, y or z is wanted"},
