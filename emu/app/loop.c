@@ -164,7 +164,7 @@ bool loop_step(struct loop *l, int64_t for_ns, uint64_t after_taken)
 {
     if (l->run != LOOP_IDLE) return false;
     l->run = LOOP_ARMED;
-    l->until_ns = l->sched->now_ns + for_ns;
+    l->until_ns = min_ns(l->sched->now_ns + for_ns, l->end_ns);
     l->after_taken = after_taken;
     return true;
 }
@@ -181,13 +181,19 @@ void loop_cancel_step(struct loop *l)
     l->run = LOOP_IDLE;
 }
 
+/* At the end, and nobody waits for an answer. */
+static bool over(const struct loop *l)
+{
+    return l->sched->now_ns >= l->end_ns && l->run != LOOP_RUNNING;
+}
+
 void loop_run(struct loop *l, const volatile sig_atomic_t *stop)
 {
     sigset_t open;
     sigprocmask(SIG_SETMASK, NULL, &open);
     sigdelset(&open, SIGINT);
     sigdelset(&open, SIGTERM);
-    while (!l->quit && !*stop && l->sched->now_ns < l->end_ns) {
+    while (!l->quit && !*stop && !over(l)) {
         const bool armed = l->run == LOOP_ARMED;
         if (!armed) advance(l);
         flush_all(l);
@@ -196,6 +202,7 @@ void loop_run(struct loop *l, const volatile sig_atomic_t *stop)
             l->run_done(l->ctx);
             flush_all(l);
         }
+        if (over(l)) break;
         wait_and_serve(l, &open);
         if (armed) advance(l);
     }

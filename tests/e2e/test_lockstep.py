@@ -119,3 +119,12 @@ def test_a_script_that_drives_everything_gets_the_same_bytes_under_load(tmp_path
     with load():
         for run in range(1, RUNS):
             assert script(tmp_path) == want, f"run {run}"
+
+
+def test_a_run_that_comes_to_the_end_is_answered_and_ends_the_emulator() -> None:
+    with Emulator("quiet", cans=["none"], extra=["--for", "100ms"]) as emulator:
+        assert emulator.control_path is not None
+        with Control(emulator.control_path) as control:
+            assert control.call("run", for_s=0.03).t_ns == 30_000_000
+            assert control.call("run", for_s=5.0).t_ns == 100_000_000
+            assert emulator.wait(PATIENCE_S) == 0
