@@ -10,6 +10,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #define VERSION TEXT_OF(PSABENCH_VERSION)
@@ -77,6 +78,9 @@ bool snapshot_write(const char *path, struct journal *j, const char *scenario, c
         return why_fail(why, cap, "%s: the scenario is not one line of up to 8 MiB", path);
     if ((size_t)snprintf(part, sizeof part, "%s.%ld.part", path, (long)getpid()) >= sizeof part)
         return why_fail(why, cap, "%.80s...: the path is too long", path);
+    struct stat there; /* a device or a pipe would be replaced, too */
+    if (lstat(path, &there) == 0 && !S_ISREG(there.st_mode) && !S_ISDIR(there.st_mode))
+        return why_fail(why, cap, "%s: is there and is no file", path);
     struct writer w = {.out = fopen(part, "wbe")};
     if (!w.out) return why_fail(why, cap, "%s: %s", path, strerror(errno));
     put_all(&w, j, scenario);

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import random
 import re
 from collections.abc import Callable, Iterator
@@ -267,6 +268,22 @@ def test_a_snapshot_that_cannot_be_written_is_refused_and_leaves_nothing(tmp_pat
                 d.control.call("snapshot", path=str(path))
         d.run(1_000_000)
     assert not list(tmp_path.glob("**/*"))
+
+
+def test_a_snapshot_replaces_files_and_nothing_else(tmp_path: Path) -> None:
+    pipe, link, file = tmp_path / "pipe", tmp_path / "link", tmp_path / "file"
+    os.mkfifo(pipe)
+    file.write_text("old")
+    link.symlink_to(file)
+    with Emulator(BENCH) as emulator, at(emulator) as d:
+        for path in (pipe, link):
+            with pytest.raises(ControlError, match="is there and is no file"):
+                d.control.call("snapshot", path=str(path))
+        assert pipe.is_fifo()
+        assert link.is_symlink()
+        assert file.read_text() == "old"
+        d.control.call("snapshot", path=str(file))
+    assert file.read_text().startswith('{"psabench":"snapshot"')
 
 
 def test_restore_takes_nothing_that_the_snapshot_fixes(tmp_path: Path) -> None:
