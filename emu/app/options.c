@@ -24,6 +24,7 @@ static const char help[] =
     "                           name that a client opens; --can none: no adapter\n"
     "  --pace wall|step|free    real time (default), only when the control socket says so, as fast as it goes\n"
     "  --for TIME               end after this much simulated time: 300ms, 10s, 2min; a bare number is seconds\n"
+    "  --until-eof              end when standard input does: with the program that holds its other end\n"
     "  --wait-client            time begins when the first CAN client is there\n"
     "  --seed N                 of all noise, instead of the scenario's\n"
     "  --start                  units stream at once, without an NMT start command\n"
@@ -268,6 +269,7 @@ static bool set_unit(struct target *t, const char *arg)    { return set_path(t, 
 static bool set_vcd(struct target *t, const char *arg)     { return set_path(t, "vcd", arg, &t->o->vcd); }
 static bool set_line(struct target *t, const char *arg)    { return set_path(t, "line", arg, &t->o->line); }
 static bool set_wait(struct target *t, const char *arg)    { (void)arg; return t->o->wait_client = true; }
+static bool set_until_eof(struct target *t, const char *arg) { (void)arg; return t->o->until_eof = true; }
 static bool set_start(struct target *t, const char *arg)   { (void)arg; return t->o->start = true; }
 static bool set_quiet(struct target *t, const char *arg)   { (void)arg; return t->o->quiet = true; }
 static bool set_help(struct target *t, const char *arg)    { (void)arg; t->o->action = OPTIONS_HELP; return true; }
@@ -296,6 +298,7 @@ static const struct {
     {"line", required_argument, set_line},         {"line-hz", required_argument, set_line_hz},
     {"restore", required_argument, set_restore},   {"truth-log", required_argument, set_truth_log},
     {"truth-every", required_argument, set_truth_every},
+    {"until-eof", no_argument, set_until_eof},
     {"wait-client", no_argument, set_wait},        {"start", no_argument, set_start},
     {"quiet", no_argument, set_quiet},             {"help", no_argument, set_help},
     {"version", no_argument, set_version},         {"list-profiles", no_argument, set_profiles},

@@ -67,6 +67,7 @@ struct options {
     uint32_t bitrate_hz, data_bitrate_hz;
     int64_t epoch_ns; /* added to time stamps */
     bool wait_client; /* time begins with the first CAN client */
+    bool until_eof;   /* end with standard input */
     bool start;       /* units start operational, without waiting for NMT */
     bool quiet;       /* no counters on stderr at the end */
 };

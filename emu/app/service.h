@@ -34,6 +34,7 @@ struct service {
     uint32_t comings;     /* CAN clients that came before time began: of the snapshot */
     struct truth_log truth_log;
     struct snapshot_ears ears;
+    struct link input; /* --until-eof */
 };
 
 /* Where the bench comes from. */

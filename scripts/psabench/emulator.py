@@ -47,7 +47,7 @@ class Emulator:
         self.directory = Path(self._dir.name)
         self.control_path = self.directory / "control" if control else None
         self.truth_path = self.directory / "truth" if truth else None
-        self.argv = [str(find_emulator()), *([str(scenario)] if scenario else []), "--pace", pace]
+        self.argv = [str(find_emulator()), *([str(scenario)] if scenario else []), "--pace", pace, "--until-eof"]
         for can in cans:
             self.argv += ["--can", can]
         if seed is not None:
@@ -66,7 +66,7 @@ class Emulator:
     def __enter__(self) -> Emulator:
         self._process = subprocess.Popen(
             self.argv,
-            stdin=subprocess.DEVNULL,
+            stdin=subprocess.PIPE,  # never written: its end is ours, however that comes
             stdout=subprocess.PIPE,
             stderr=self._stderr,
             start_new_session=True,  # a Ctrl-C meant for the procedure must not kill the bench under it
@@ -122,8 +122,9 @@ class Emulator:
             except subprocess.TimeoutExpired:
                 self._process.kill()
                 status = self._process.wait()
-            if self._process.stdout:
-                self._process.stdout.close()
+            for pipe in (self._process.stdin, self._process.stdout):
+                if pipe:
+                    pipe.close()
         self._stderr.close()
         self._dir.cleanup()
         return status

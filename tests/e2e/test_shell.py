@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 from pathlib import Path
@@ -156,6 +157,18 @@ def test_python_with_the_bench_in_it(env: dict[str, str]) -> None:
         t.wait_for(r"psa> ")
         t.say("head.read", r"angle_deg +17")
         t.leave()
+
+
+def test_a_shell_that_is_killed_leaves_no_emulator(env: dict[str, str]) -> None:
+    with keyboard(env, "quiet", "--pace", "step") as t:
+        t.wait_for(r"psa> ")
+        (emulator,) = children(t.pid)
+        argv = Path(f"/proc/{emulator}/cmdline").read_bytes().decode().split("\0")
+        control = Path(argv[argv.index("--control") + 1])
+        assert control.is_socket()
+        os.kill(t.pid, signal.SIGKILL)
+        until(lambda: not control.exists(), "the end of the emulator, which takes its socket with it")
+    shutil.rmtree(control.parent)
 
 
 # ---- scripts, pipes

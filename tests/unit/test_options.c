@@ -36,7 +36,7 @@ static void every_option_reaches_its_field(void **state)
     assert_true(
         parse("--can socketcand:0 quiet --can slcan:/tmp/x --can slcan --can socketcan:vcan0 --pace step --for 300ms "
               "--seed 18446744073709551615 --vcd a.vcd --vcd-unit 100 --line b --line-hz 1000 --control c --truth d "
-              "--unit u --bitrate 500000 --data-bitrate 0 --epoch 1.5 --start --quiet"));
+              "--unit u --bitrate 500000 --data-bitrate 0 --epoch 1.5 --start --quiet --until-eof"));
     assert_string_equal(o.scenario, "quiet");
     assert_int_equal(o.can_count, 4);
     assert_int_equal(o.can[0].port, 0);
@@ -47,7 +47,7 @@ static void every_option_reaches_its_field(void **state)
     assert_int_equal(o.pace, PACE_STEP);
     assert_true(o.for_ns == 300000000 && o.seed_given && o.seed == UINT64_MAX && o.epoch_ns == 1500000000);
     assert_true(o.bitrate_given && o.bitrate_hz == 500000 && o.data_bitrate_given && o.data_bitrate_hz == 0);
-    assert_true(o.vcd_unit_ns == 100 && o.line_hz == 1000 && o.start && o.quiet && !o.wait_client);
+    assert_true(o.vcd_unit_ns == 100 && o.line_hz == 1000 && o.start && o.quiet && o.until_eof && !o.wait_client);
     assert_string_equal(o.vcd, "a.vcd");
     assert_string_equal(o.line, "b");
     assert_string_equal(o.control, "c");
