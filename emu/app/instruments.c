@@ -108,11 +108,20 @@ static bool open_all(struct instruments *all, const struct options_scpi *o, char
 static bool open_one(struct instruments *all, const struct options_scpi *o, char *why, size_t cap)
 {
     if (strcmp(o->kind, "all") == 0) return open_all(all, o, why, cap);
-    const struct scpi_kind *kind = scpi_kind(o->kind);
-    if (!kind) return why_fail(why, cap, "--scpi %s: head, table, chamber, supply or all is wanted", o->arg);
-    if (!kind->present(all->control->bench))
-        return why_fail(why, cap, "--scpi %s: the scenario has no %s", o->arg, kind->name);
-    return open_port(all, kind, o, 0, false, why, cap);
+    return open_port(all, scpi_kind(o->kind), o, 0, false, why, cap);
+}
+
+bool instruments_check(const struct instruments *all, const struct options *o, char *why, size_t cap)
+{
+    for (unsigned i = 0; i < o->scpi_count; i++) {
+        const struct options_scpi *s = &o->scpi[i];
+        const struct scpi_kind *kind = scpi_kind(s->kind);
+        if (strcmp(s->kind, "all") == 0) continue;
+        if (!kind) return why_fail(why, cap, "--scpi %s: head, table, chamber, supply or all is wanted", s->arg);
+        if (!kind->present(all->control->bench))
+            return why_fail(why, cap, "--scpi %s: the scenario has no %s", s->arg, kind->name);
+    }
+    return true;
 }
 
 bool instruments_open(struct instruments *all, const struct options *o, char *why, size_t cap)

@@ -26,7 +26,10 @@ struct instruments {
     struct scpi *sessions;
 };
 
-/* Opens what the options ask for; links, control and sched are filled in before. False with one line in why; what was opened
+/* Whether the bench has the instruments that the options name; nothing is opened. False with one line in why. */
+bool instruments_check(const struct instruments *all, const struct options *o, char *why, size_t cap);
+
+/* Opens what the options ask for, checked; links, control and sched are filled in before. False with one line in why; what was opened
  * is closed by instruments_close() in either case. */
 bool instruments_open(struct instruments *all, const struct options *o, char *why, size_t cap);
 

@@ -59,13 +59,14 @@ static struct can_hub *hub_of(struct ports *p, const char *bus)
     return NULL;
 }
 
-static void tell_buses(const struct ports *p, const char *bus, char *why, size_t cap)
+static bool fail_bus(const struct ports *p, const char *bus, char *why, size_t cap)
 {
     why_fail(why, cap, "--can %s=...: no such bus; there is", bus);
     for (unsigned i = 0; i < p->hubs; i++) {
         const size_t at = strlen(why);
         snprintf(why + at, cap - at, "%s %s", i ? "," : "", p->hub[i].name);
     }
+    return false;
 }
 
 static bool open_can(struct ports *p, const struct options *o, char *why, size_t cap)
@@ -80,9 +81,8 @@ static bool open_can(struct ports *p, const struct options *o, char *why, size_t
         c->kind = o->can[i].kind;
         const bool all = c->kind == OPTIONS_SOCKETCAND && !o->can[i].bus[0];
         c->hubs = all ? p->hubs : 1;
-        c->bus = p->hubs > 1 && hub && !all ? hub->name : NULL;
-        if (!hub) tell_buses(p, o->can[i].bus, why, cap);
-        if (!hub || !open[c->kind](hub, c, &o->can[i], why, cap)) {
+        c->bus = p->hubs > 1 && !all ? hub->name : NULL;
+        if (!open[c->kind](hub, c, &o->can[i], why, cap)) {
             free(c);
             return false;
         }
@@ -172,6 +172,14 @@ void ports_init(struct ports *p, struct bench *b, const struct options *o)
         h->lossless = o->pace != PACE_WALL;
         h->epoch_ns = o->epoch_ns;
     }
+}
+
+bool ports_check(struct ports *p, const struct options *o, char *why, size_t cap)
+{
+    for (unsigned i = 0; i < o->can_count; i++) {
+        if (!hub_of(p, o->can[i].bus)) return fail_bus(p, o->can[i].bus, why, cap);
+    }
+    return instruments_check(&p->scpi, o, why, cap);
 }
 
 bool ports_open(struct ports *p, struct bench *b, const struct options *o, char *why, size_t cap)

@@ -36,7 +36,10 @@ struct ports {
     FILE *vcd;
 };
 
-/* Opens what the options ask for; links and hubs of p are set up first with bench, epoch and say. False with one line in
+/* Whether the bench has the buses and instruments that the options name; nothing is opened. False with one line in why. */
+bool ports_check(struct ports *p, const struct options *o, char *why, size_t cap);
+
+/* Opens what the options ask for, checked; links and hubs of p are set up first with bench, epoch and say. False with one line in
  * why: what, where, what would be right. ports_close() in either case. */
 void ports_init(struct ports *p, struct bench *b, const struct options *o); /* the hubs; nothing is opened yet */
 bool ports_open(struct ports *p, struct bench *b, const struct options *o, char *why, size_t cap);

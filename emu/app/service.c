@@ -379,7 +379,8 @@ bool service_open(struct service *s, struct bench *b, const struct options *o, c
 {
     init(s, b, o);
     s->scenario = from->scenario;
-    s->refused = from->snapshot && !service_restore(s, from->snapshot, why, cap);
+    s->refused =
+        (from->snapshot && !service_restore(s, from->snapshot, why, cap)) || !ports_check(&s->ports, o, why, cap);
     if (o->until_eof) until_eof(&s->input, &s->ports.links, &s->loop.quit);
     return !s->refused && ports_open(&s->ports, b, o, why, cap) && open_truth_log(s, why, cap);
 }

@@ -30,7 +30,7 @@ struct service {
     struct journal journal;
     const char *scenario; /* resolved, one line of JSON */
     bool powered;         /* the bench comes from a snapshot */
-    bool refused;         /* which cannot be done again */
+    bool refused;         /* bad input: a snapshot that cannot be done again, a bus or instrument that is not there */
     uint32_t comings;     /* CAN clients that came before time began: of the snapshot */
     struct truth_log truth_log;
     struct snapshot_ears ears;

@@ -13,7 +13,7 @@ import pytest
 import pyvisa
 from psabench.control import Control
 from psabench.emulator import Emulator
-from psabench.errors import BenchError, ControlError
+from psabench.errors import BadInput, ControlError
 from psabench.vcd import read_vcd
 from pyvisa.resources import MessageBasedResource
 from rig import HOST, PATIENCE_S, until
@@ -295,14 +295,14 @@ def answered(lab: Lab) -> bool:
     ],
 )
 def test_a_wrong_option_is_one_line(tmp_path: Path, given: str, want: str) -> None:
-    with pytest.raises(BenchError) as failed, opened(tmp_path, extra=["--scpi", given]):
+    with pytest.raises(BadInput) as failed, opened(tmp_path, extra=["--scpi", given]):
         pass
     assert want in str(failed.value)
 
 
 def test_an_instrument_that_the_scenario_lacks_is_refused(tmp_path: Path) -> None:
     with (
-        pytest.raises(BenchError, match="the scenario has no table"),
+        pytest.raises(BadInput, match="the scenario has no table"),
         Emulator("quiet", cans=["none"], extra=["--scpi", "table"]),
     ):
         pass
