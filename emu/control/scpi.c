@@ -5,7 +5,6 @@
 
 #include <stdarg.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 /* ---- the response */
@@ -55,11 +54,10 @@ static size_t format_text(const char *text, char *out, size_t cap)
     return n;
 }
 
-/* Few digits where they are enough, else all that it takes to read the same number again. */
+/* As many digits as always survive the way through a double: 30 degrees are 30, not 29.999999999999996. */
 static size_t format_number(double x, char *out, size_t cap)
 {
-    const size_t n = (size_t)snprintf(out, cap, "%.15g", x);
-    return strtod(out, NULL) == x ? n : (size_t)snprintf(out, cap, "%.17g", x);
+    return (size_t)snprintf(out, cap, "%.15g", x);
 }
 
 static size_t format_item(const cJSON *j, char *out, size_t cap)

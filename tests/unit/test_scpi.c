@@ -401,6 +401,14 @@ static void a_turning_head_refuses_with_a_conflict(void **state)
     SAYS("REST?", "0");
 }
 
+static void an_angle_reads_as_it_was_set(void **state)
+{
+    (void)state;
+    say("ANGL 30");
+    run_s(3);
+    SAYS("ANGL?", "30"); /* not 29.999999999999996, which the way through radians makes of it */
+}
+
 static void faces_have_short_forms_where_they_are_unique(void **state)
 {
     (void)state;
@@ -628,6 +636,7 @@ int main(void)
         cmocka_unit_test_setup(a_closed_session_waits_no_more, head),
         cmocka_unit_test_setup(motion_shows_in_the_operation_register, head),
         cmocka_unit_test_setup(a_turning_head_refuses_with_a_conflict, head),
+        cmocka_unit_test_setup(an_angle_reads_as_it_was_set, head),
         cmocka_unit_test_setup(faces_have_short_forms_where_they_are_unique, head),
         cmocka_unit_test_setup(limits_are_asked_with_the_settings_name, head),
         cmocka_unit_test_setup(limits_of_a_table_are_its_axes_own, table),
