@@ -556,7 +556,7 @@ static void a_chamber_goes_to_its_set_point(void **state)
     assert_string_equal(rig.said, "1");
     SAYS("TEMP?;STAB?;STAT:QUES:COND?", "35;1;0");
     say("TEMP 300 K");
-    SAYS("TEMP:SETP?", "26.850000000000023");
+    SAYS("TEMP:SETP?", "26.85");
     say("TEMP 100");
     SAYS("SYST:ERR?", "-222,\"Data out of range;temp_degc: 100 is outside -60 ... 85 degC\"");
     say("RAMP 6");
