@@ -137,6 +137,7 @@ static void put_client(const struct can_client *c, struct control_client *out)
     *out = (struct control_client){.adapter = c->adapter,
                                    .name = c->name,
                                    .came = c->came,
+                                   .place = c->place,
                                    .delivered = c->delivered,
                                    .taken = c->taken,
                                    .dropped = c->dropped,
@@ -159,9 +160,11 @@ static bool do_client(void *ctx, unsigned i, struct control_client *out)
     return c != NULL;
 }
 
-static struct can_node *do_client_node(void *ctx, unsigned i)
+static struct can_node *do_client_node(void *ctx, uint32_t place)
 {
-    const struct can_client *c = client_at(ctx, i);
+    const struct service *s = ctx;
+    const struct can_client *c = client_after(&s->ports, 0);
+    while (c && c->place != place) c = client_after(&s->ports, c->came);
     return c ? &((struct can_client *)c)->node : NULL;
 }
 

@@ -36,7 +36,12 @@ struct target {
 static bool in_range(const struct target *t, double x, double min, double max)
 {
     const char *unit = t->arg->unit;
-    if (x >= min && x <= max) return true;
+    const double least = t->arg->least;
+    if (x >= min && x <= max && !(x != 0.0 && fabs(x) < least)) return true;
+    if (least > 0.0) {
+        return control_refuse_in(t->why, "range", "%s: %.10g is outside %.10g ... %.10g and %.10g ... %.10g%s%s",
+                                 t->arg->name, x, min, -least, least, max, unit ? " " : "", unit ? unit : "");
+    }
     return control_refuse_in(t->why, "range", "%s: %.10g is outside %.10g ... %.10g%s%s", t->arg->name, x, min, max,
                              unit ? " " : "", unit ? unit : "");
 }
@@ -261,8 +266,13 @@ static size_t markdown_arg(const struct control_arg *a, char *out, size_t cap)
 {
     size_t at = (size_t)snprintf(out, cap, "`%s`%s %s", a->name, a->optional ? " (optional)" : "", a->what);
     if (types[a->type].numeric && at < cap) {
-        at += (size_t)snprintf(out + at, cap - at, ", %.10g to %.10g%s%s", a->min, a->max, a->unit ? " " : "",
-                               a->unit ? a->unit : "");
+        at += (size_t)snprintf(out + at, cap - at, ", %.10g to ", a->min);
+        if (a->least > 0.0 && at < cap) {
+            at += (size_t)snprintf(out + at, cap - at, "%.10g and %.10g to ", -a->least, a->least);
+        }
+        if (at < cap) {
+            at += (size_t)snprintf(out + at, cap - at, "%.10g%s%s", a->max, a->unit ? " " : "", a->unit ? a->unit : "");
+        }
     }
     for (unsigned i = 0; a->choices && a->choices[i] && at < cap; i++) {
         at += (size_t)snprintf(out + at, cap - at, "%s%s", i ? ", " : ": ", a->choices[i]);

@@ -75,6 +75,7 @@ static void add_arg(cJSON *to, enum fault_arg arg, bool optional)
     if (control_type_numeric(a->type)) {
         cJSON_AddNumberToObject(j, "min", a->min);
         cJSON_AddNumberToObject(j, "max", a->max);
+        if (a->least > 0.0) cJSON_AddNumberToObject(j, "least", a->least);
     }
     if (a->choices) cJSON_AddItemToObject(j, "choices", cJSON_CreateStringArray(levels, 2));
     cJSON_AddStringToObject(j, "what", a->what);
@@ -191,15 +192,15 @@ static const struct control_command rows[COMMANDS] = {
      [FAULT_DELAY_S] = {"delay_s", CONTROL_REAL, true, "s", 0, 1000, .what = "from the event to the fault"},
      [FAULT_FOR_S] = {"for_s", CONTROL_REAL, true, "s", 0, TIME_MAX_S, .what = "how long it lasts; 0 or without it: until fault.clear"},
      [FAULT_OUT_V] = {"out_v", CONTROL_REAL, true, "V", -15, 15, .what = "output of the sensor (one with current output: at its load)"},
-     [FAULT_BIAS_V] = {"bias_v", CONTROL_REAL, true, "V", -15, 15, .what = "added to the output of the sensor"},
-     [FAULT_DRIFT_V_PER_S] = {"drift_v_per_s", CONTROL_REAL, true, "V/s", -1000, 1000, .what = "by which the output of the sensor grows"},
-     [FAULT_SCALE_PPM] = {"scale_ppm", CONTROL_REAL, true, "ppm", -1e7, 1e7, .what = "error of the sensor's scale factor; -1000000: deaf"},
-     [FAULT_RMS_V] = {"rms_v", CONTROL_REAL, true, "V", 1e-9, 10, .what = "noise of a settled reading at 1000 SPS"},
+     [FAULT_BIAS_V] = {"bias_v", CONTROL_REAL, true, "V", -15, 15, .what = "added to the output of the sensor", .least = FAULT_LEAST_V},
+     [FAULT_DRIFT_V_PER_S] = {"drift_v_per_s", CONTROL_REAL, true, "V/s", -1000, 1000, .what = "by which the output of the sensor grows", .least = FAULT_LEAST_V},
+     [FAULT_SCALE_PPM] = {"scale_ppm", CONTROL_REAL, true, "ppm", -1e7, 1e7, .what = "error of the sensor's scale factor; -1000000: deaf", .least = FAULT_LEAST_PPM},
+     [FAULT_RMS_V] = {"rms_v", CONTROL_REAL, true, "V", FAULT_LEAST_V, 10, .what = "noise of a settled reading at 1000 SPS"},
      [FAULT_LOW_V] = {"low_v", CONTROL_REAL, true, "V", -15, 15, .what = "least output of the sensor"},
      [FAULT_HIGH_V] = {"high_v", CONTROL_REAL, true, "V", -15, 15, .what = "greatest output of the sensor"},
-     [FAULT_REFERENCE_PPM] = {"reference_ppm", CONTROL_REAL, true, "ppm", -500000, 1e6, .what = "error of the converter's reference"},
-     [FAULT_DRIFT_PPM_PER_S] = {"drift_ppm_per_s", CONTROL_REAL, true, "ppm/s", 0, 1e6, .what = "by which that error grows"},
-     [FAULT_AMPLITUDE_V] = {"amplitude_v", CONTROL_REAL, true, "V", 1e-6, 10, .what = "of the ripple at the load"},
+     [FAULT_REFERENCE_PPM] = {"reference_ppm", CONTROL_REAL, true, "ppm", -500000, 1e6, .what = "error of the converter's reference", .least = FAULT_LEAST_PPM},
+     [FAULT_DRIFT_PPM_PER_S] = {"drift_ppm_per_s", CONTROL_REAL, true, "ppm/s", FAULT_LEAST_PPM, 1e6, .what = "by which that error grows"},
+     [FAULT_AMPLITUDE_V] = {"amplitude_v", CONTROL_REAL, true, "V", FAULT_LEAST_V, 10, .what = "of the ripple at the load"},
      [FAULT_FREQUENCY_HZ] = {"frequency_hz", CONTROL_REAL, true, "Hz", 0.1, 100, .what = "of the ripple; more would not pass the filter at 250 SPS"},
      [FAULT_LEVEL] = {"level", CONTROL_CHOICE, true, .what = "at which it stays", .choices = levels},
      [FAULT_REGISTER] = {"register", CONTROL_COUNT, true, NULL, 0, 31, .what = "number of the register in the chip"},

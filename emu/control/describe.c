@@ -26,6 +26,7 @@ static void describe_arg(const struct control_arg *a, cJSON *list)
     if (control_type_numeric(a->type)) {
         add_real(j, "min", a->min);
         add_real(j, "max", a->max);
+        if (a->least > 0.0) add_real(j, "least", a->least);
     }
     if (a->unit) cJSON_AddStringToObject(j, "unit", a->unit);
     cJSON *choices = a->choices ? cJSON_AddArrayToObject(j, "choices") : NULL;
@@ -73,6 +74,7 @@ void describe_clients(const struct control_bench *b, cJSON *to)
         cJSON *j = cJSON_CreateObject();
         cJSON_AddStringToObject(j, "adapter", k.adapter);
         cJSON_AddStringToObject(j, "name", k.name);
+        add_count(j, "came", k.came);
         add_client(&k, j);
         cJSON_AddItemToArray(list, j);
     }

@@ -67,6 +67,7 @@ static bool apply_chip(struct fault *f, int64_t t_ns)
 static bool flip(struct fault *f, int64_t t_ns)
 {
     struct psa2 *b = &fault_unit(f)->board;
+    if (b->mode == PSA2_OFF) return false; /* registers without power hold nothing */
     const unsigned reg = (unsigned)f->value[FAULT_REGISTER];
     const uint8_t mask = (uint8_t)f->value[FAULT_MASK];
     if (f->point.place == FAULT_AT_ADC) return ads1282_flip(&b->adc[f->point.index], reg, mask, t_ns);

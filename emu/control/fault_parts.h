@@ -7,6 +7,10 @@
 #define FAULT_BIT(i)  (UINT64_C(1) << (i))
 #define FAULT_PPM_MAX 500000.0 /* of a chip's clock */
 
+/* What is less changes no code: one is 10 V / 2^23 = 1.19 uV at the load, or more by the tolerances of the chain. */
+#define FAULT_LEAST_V   2e-6
+#define FAULT_LEAST_PPM 1.0
+
 extern const struct fault_table fault_sensor, fault_analog, fault_chip, fault_controller, fault_line, fault_link,
     fault_supply;
 

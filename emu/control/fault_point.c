@@ -1,6 +1,7 @@
 #include "control/fault_point.h"
 
 #include <ctype.h>
+#include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -90,8 +91,10 @@ bool fault_point(const struct control_bench *b, unsigned n, struct fault_point *
     n -= b->buses;
     const unsigned programs = clients(b);
     if (n < programs) {
-        *p = (struct fault_point){.place = FAULT_AT_CLIENT, .index = n};
-        snprintf(name, FAULT_POINT_MAX, "client.%u", n + 1);
+        struct control_client c = {0};
+        (void)b->client(b->ctx, n, &c);
+        *p = (struct fault_point){.place = FAULT_AT_CLIENT, .index = c.place};
+        snprintf(name, FAULT_POINT_MAX, "client.%" PRIu32, c.came);
         return true;
     }
     snprintf(name, FAULT_POINT_MAX, "supply");

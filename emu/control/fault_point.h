@@ -15,14 +15,14 @@ enum fault_place {
     FAULT_AT_LINE,   /* a.line.Int */
     FAULT_AT_NODE,   /* a.can */
     FAULT_AT_BUS,    /* bus.can0 */
-    FAULT_AT_CLIENT, /* client.1, in order of coming */
+    FAULT_AT_CLIENT, /* client.1, by struct control_client.came */
     FAULT_AT_SUPPLY, /* supply */
     FAULT_PLACES
 };
 
 struct fault_point {
     enum fault_place place;
-    unsigned unit, index; /* index: axis, line, bus or client, from 0 */
+    unsigned unit, index; /* index: axis, line or bus, from 0; of a client its control_client.place */
 };
 
 /* The n-th point of a bench with its name; false past the last. */

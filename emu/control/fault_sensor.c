@@ -29,6 +29,30 @@ static bool has_sensor(const struct control_bench *b, const struct fault *f, cha
     return false;
 }
 
+/* The channel's converter takes no more, whatever the buffer's limit is. */
+#define CONVERTER_V 10.0 /* full scale, at the load */
+
+static bool passes(const struct control_bench *b, const struct fault *f, enum fault_arg limit, char *why)
+{
+    const struct unit *u = b->unit[f->point.unit];
+    const double most_v = u ? fmin(u->cfg.board.afe[f->point.index].clip_v, CONVERTER_V) : CONVERTER_V;
+    if (!fault_given(f, limit) || fabs(f->value[limit]) < most_v) return true;
+    snprintf(why, CONTROL_WHY_MAX, "%s: %.10g: the chain passes %.10g ... %.10g V, nobody would see this limit",
+             fault_arg_name(limit), f->value[limit], -most_v, most_v);
+    return false;
+}
+
+/* What has grown to next to nothing when it ends was never seen. */
+static bool grows(const struct control_bench *b, const struct fault *f, char *why)
+{
+    const double end_v = fabs(f->value[FAULT_DRIFT_V_PER_S]) * (double)f->for_ns / (double)NS_PER_S;
+    if (!has_sensor(b, f, why)) return false;
+    if (f->for_ns == 0 || end_v >= FAULT_LEAST_V) return true;
+    snprintf(why, CONTROL_WHY_MAX, "drift_v_per_s: %.10g: in %.10g s it comes to %.10g V, less than %.10g V, a code",
+             f->value[FAULT_DRIFT_V_PER_S], f->value[FAULT_FOR_S], end_v, FAULT_LEAST_V);
+    return false;
+}
+
 static bool has_limits(const struct control_bench *b, const struct fault *f, char *why)
 {
     if (!has_sensor(b, f, why)) return false;
@@ -36,6 +60,7 @@ static bool has_limits(const struct control_bench *b, const struct fault *f, cha
         snprintf(why, CONTROL_WHY_MAX, "low_v or high_v is missing: where the output stops");
         return false;
     }
+    if (!passes(b, f, FAULT_LOW_V, why) || !passes(b, f, FAULT_HIGH_V, why)) return false;
     if (!fault_given(f, FAULT_LOW_V) || !fault_given(f, FAULT_HIGH_V)) return true;
     if (f->value[FAULT_LOW_V] < f->value[FAULT_HIGH_V]) return true;
     snprintf(why, CONTROL_WHY_MAX, "low_v: %.10g is not below high_v, %.10g", f->value[FAULT_LOW_V],
@@ -94,13 +119,13 @@ static const struct fault_kind sensor[] = {
     {"sensor.bias", "bias_v is added to the output.", "the codes of the axis step and stay there",
      SENSOR(SENSOR_BIAS), .need = FAULT_BIT(FAULT_BIAS_V), .nonzero = FAULT_BIT(FAULT_BIAS_V), .unless = "the channel has no sensor", .fits = has_sensor},
     {"sensor.drift", "The output runs away.", "the codes of the axis have a slope",
-     SENSOR(SENSOR_DRIFT), .need = FAULT_BIT(FAULT_DRIFT_V_PER_S), .nonzero = FAULT_BIT(FAULT_DRIFT_V_PER_S), .unless = "the channel has no sensor", .fits = has_sensor},
+     SENSOR(SENSOR_DRIFT), .need = FAULT_BIT(FAULT_DRIFT_V_PER_S), .nonzero = FAULT_BIT(FAULT_DRIFT_V_PER_S), .unless = "the channel has no sensor; it ends before it has come to 2 uV", .fits = grows},
     {"sensor.scale", "The deviation of the output from its zero is wrong by scale_ppm.", "the codes of the axis are wrong in proportion to what the axis feels",
      SENSOR(SENSOR_SCALE), .need = FAULT_BIT(FAULT_SCALE_PPM), .nonzero = FAULT_BIT(FAULT_SCALE_PPM), .unless = "the channel has no sensor", .fits = has_sensor},
     {"sensor.noise", "White noise is added; it gives a settled reading at 1000 SPS the rms rms_v.", "the codes of the axis scatter more",
      SENSOR(SENSOR_NOISE), .need = FAULT_BIT(FAULT_RMS_V), .unless = "the channel has no sensor", .fits = has_sensor},
     {"sensor.saturation", "The output does not leave low_v ... high_v.", "the codes of the axis stop at a limit that is not the converter's",
-     SENSOR(SENSOR_SATURATION), .may = FAULT_BIT(FAULT_LOW_V) | FAULT_BIT(FAULT_HIGH_V), .unless = "the channel has no sensor; low_v is not below high_v", .fits = has_limits},
+     SENSOR(SENSOR_SATURATION), .may = FAULT_BIT(FAULT_LOW_V) | FAULT_BIT(FAULT_HIGH_V), .unless = "the channel has no sensor; low_v is not below high_v; a limit is beyond what the chain passes", .fits = has_limits},
 };
 // clang-format on
 const struct fault_table fault_sensor = {sensor, sizeof sensor / sizeof *sensor};
@@ -118,8 +143,15 @@ static bool has_load(const struct control_bench *b, const struct fault *f, char 
 static bool has_error(const struct control_bench *b, const struct fault *f, char *why)
 {
     (void)b;
-    if (f->value[FAULT_REFERENCE_PPM] != 0.0 || f->value[FAULT_DRIFT_PPM_PER_S] != 0.0) return true;
-    snprintf(why, CONTROL_WHY_MAX, "reference_ppm or drift_ppm_per_s is missing, or both are 0");
+    const double grown_ppm = f->value[FAULT_DRIFT_PPM_PER_S] * (double)f->for_ns / (double)NS_PER_S;
+    if (f->value[FAULT_REFERENCE_PPM] != 0.0) return true;
+    if (f->value[FAULT_DRIFT_PPM_PER_S] == 0.0) {
+        snprintf(why, CONTROL_WHY_MAX, "reference_ppm or drift_ppm_per_s is missing, or reference_ppm is 0");
+        return false;
+    }
+    if (f->for_ns == 0 || grown_ppm >= FAULT_LEAST_PPM) return true;
+    snprintf(why, CONTROL_WHY_MAX, "drift_ppm_per_s: %.10g: in %.10g s it comes to %.10g ppm, less than %.10g ppm",
+             f->value[FAULT_DRIFT_PPM_PER_S], f->value[FAULT_FOR_S], grown_ppm, FAULT_LEAST_PPM);
     return false;
 }
 
@@ -150,7 +182,7 @@ static const struct fault_kind analog[] = {
     {"analog.load_short", "The load resistor of a current-output sensor is shorted: no volts.", "the codes of the axis stand near 0, whatever the head does",
      CHAIN(AFE_LOAD_SHORT), .unless = "the sensor has voltage output: no load resistor", .fits = has_load},
     {"analog.reference", "The converter's reference is wrong by reference_ppm and runs away by drift_ppm_per_s.", "the codes of the axis are too small in proportion, offset and all",
-     CHAIN(AFE_REFERENCE), .may = FAULT_BIT(FAULT_REFERENCE_PPM) | FAULT_BIT(FAULT_DRIFT_PPM_PER_S), .unless = "both values are 0", .fits = has_error},
+     CHAIN(AFE_REFERENCE), .may = FAULT_BIT(FAULT_REFERENCE_PPM) | FAULT_BIT(FAULT_DRIFT_PPM_PER_S), .unless = "neither is given; a drift ends before it has come to 1 ppm", .fits = has_error},
     {"analog.ripple", "A sine of the supply comes through the buffer, amplitude at the load.", "the codes of the axis carry a line at frequency_hz",
      CHAIN(AFE_RIPPLE), .need = FAULT_BIT(FAULT_AMPLITUDE_V) | FAULT_BIT(FAULT_FREQUENCY_HZ)},
 };

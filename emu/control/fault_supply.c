@@ -3,6 +3,8 @@
 
 #include <stdio.h>
 
+_Static_assert(SUPPLY_DIPS_MAX >= FAULTS_MAX, "each brown-out that was accepted has room in the supply");
+
 static bool reaches_brownout(const struct control_bench *b, const struct fault *f, char *why)
 {
     const struct supply *s = b->lab ? &b->lab->supply : NULL;

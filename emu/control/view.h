@@ -13,7 +13,8 @@
 /* One client of a CAN adapter, or the sum of those who left. */
 struct control_client {
     const char *adapter, *name;
-    uint32_t came; /* its number, in order of coming, for ever */
+    uint32_t came;  /* its number, in order of coming, for ever */
+    uint32_t place; /* came of the first at its place on the bus: another than its own if it took over from a ghost */
     uint64_t delivered, taken, dropped, overrun, refused;
 };
 
@@ -71,7 +72,7 @@ struct control_bench {
     bool (*client)(void *ctx, unsigned i,
                    struct control_client *out); /* i-th in order of coming; false past the last */
     void (*gone)(void *ctx, struct control_client *out);
-    struct can_node *(*client_node)(void *ctx, unsigned i); /* of the i-th client, as above; NULL past the last */
+    struct can_node *(*client_node)(void *ctx, uint32_t place); /* of the client there; NULL: it has left */
     bool (*stall)(void *ctx, const struct can_node *client,
                   bool on); /* its program reads nothing; false: it has gone */
     void (*pace)(void *ctx, struct control_pace *out);

@@ -60,6 +60,7 @@ static void inherit(struct can_hub *h, struct can_client *g, struct can_client *
     c->node.error = own.error;
     c->node.state = own.state;
     c->node.ctx = own.ctx;
+    c->place = g->place;
     unlist(h, g, c);
     keep_counters(h, g);
     h->gone.refused += g->refused;
@@ -87,6 +88,7 @@ void can_hub_up(struct can_hub *h, struct can_client *c)
     c->leaving = c->vacant = false;
     c->number = ++h->clients_seen;
     c->came = h->comings ? ++*h->comings : c->number;
+    if (!place) c->place = c->came;
     can_hub_stall(c, false); /* a fault of whoever was here before */
     tell(h, c, CAN_HUB_CAME, NULL);
 }

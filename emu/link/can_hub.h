@@ -12,6 +12,7 @@ struct can_hub;
 struct can_client {
     uint32_t number;     /* of its coming to the hub, from 1 */
     uint32_t came;       /* the same over all hubs of the bench */
+    uint32_t place;      /* came of the first at its place on the bus, whose heirs took it over one after the other */
     const char *adapter; /* socketcand, slcan, socketcan */
     char name[32];       /* channel the client opened, or interface */
     struct can_node node;

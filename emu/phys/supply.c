@@ -65,7 +65,7 @@ static double ripple_v(const struct supply *s, int64_t t_ns)
 static double drop_v(const struct supply *s, int64_t t_ns)
 {
     double sum_v = 0.0;
-    for (unsigned i = 0; i < SUPPLY_DIPS_MAX; i++) {
+    for (unsigned i = 0; i < s->dips; i++) {
         if (t_ns >= s->dip[i].from_ns && t_ns < s->dip[i].to_ns) sum_v += s->dip[i].drop_v;
     }
     return sum_v;
@@ -128,6 +128,7 @@ enum supply_result supply_dip(struct supply *s, double deep_v, int64_t from_ns, 
     for (unsigned i = 0; i < SUPPLY_DIPS_MAX; i++) {
         if (s->dip[i].to_ns > t_ns) continue;
         s->dip[i] = (struct supply_dip){from_ns, dip_end_ns(from_ns, for_ns), deep_v};
+        if (i == s->dips) s->dips++;
         return SUPPLY_OK;
     }
     return SUPPLY_TOO_MANY_DIPS;
@@ -137,7 +138,7 @@ enum supply_result supply_dip(struct supply *s, double deep_v, int64_t from_ns, 
 void supply_dip_end(struct supply *s, double deep_v, int64_t from_ns, int64_t for_ns, int64_t t_ns)
 {
     const int64_t to_ns = dip_end_ns(from_ns, for_ns);
-    for (unsigned i = 0; i < SUPPLY_DIPS_MAX && to_ns > t_ns; i++) {
+    for (unsigned i = 0; i < s->dips && to_ns > t_ns; i++) {
         struct supply_dip *d = &s->dip[i];
         if (d->from_ns != from_ns || d->to_ns != to_ns || d->drop_v < deep_v || d->drop_v > deep_v) continue;
         d->to_ns = t_ns;
@@ -162,7 +163,7 @@ static int64_t next_break_ns(const struct supply *s, int64_t t_ns)
     const int64_t slewed = slewed_ns(s);
     if (s->from_ns > t_ns) next_ns = s->from_ns;
     if (slewed > t_ns && slewed < next_ns) next_ns = slewed;
-    for (unsigned i = 0; i < SUPPLY_DIPS_MAX; i++) {
+    for (unsigned i = 0; i < s->dips; i++) {
         if (s->dip[i].from_ns > t_ns && s->dip[i].from_ns < next_ns) next_ns = s->dip[i].from_ns;
         if (s->dip[i].to_ns > t_ns && s->dip[i].to_ns < next_ns) next_ns = s->dip[i].to_ns;
     }

@@ -10,7 +10,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#define SUPPLY_DIPS_MAX      8u
+#define SUPPLY_DIPS_MAX      64u
 #define SUPPLY_RIPPLE_MIN_HZ 0.001 /* slower is no ripple */
 #define SUPPLY_SLEW_MIN_VPS  1e-6
 
@@ -45,6 +45,7 @@ struct supply {
     int64_t ripple_ns; /* phase 0 */
     int64_t from_ns;   /* of the latest change of the output */
     double from_v;     /* without ripple and dips, then */
+    unsigned dips;     /* places of dip that have been in use */
     struct supply_dip dip[SUPPLY_DIPS_MAX];
 };
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,9 +24,12 @@ from fault_host import (
     fault_host,
 )
 from fault_lines import breaches
+from psabench.can_host import open_bus
+from psabench.control import Control
+from psabench.emulator import Emulator
 from psabench.errors import ControlError
 from psabench.vcd import read_vcd
-from rig import HERE
+from rig import HERE, bus_spec
 
 pytestmark = pytest.mark.host
 
@@ -493,8 +497,8 @@ ACCEPTED = {
     "line": r"[ab]\.line\..*",
     "link.error_frame": r"[ab]\.can|bus\.can0",
     "link.bus_off": r"[ab]\.can",
-    "link.stall": r"client\.1",
-    "link": r"[ab]\.can|bus\.can0|client\.1",
+    "link.stall": r"client\.\d+",
+    "link": r"[ab]\.can|bus\.can0|client\.\d+",
     "supply": r"supply",
 }
 
@@ -539,6 +543,29 @@ def accepted(c: Case) -> bool:
     assert len(str(why)) > 30, "a refusal gives the reason"
     assert not c.host.call("fault.list")["faults"], "and changes nothing"
     return False
+
+
+def test_a_program_keeps_its_number_when_an_older_one_leaves() -> None:
+    with Emulator(SCENARIO, pace="step") as emulator, Control(emulator.control_path or Path()) as control:
+        older, younger = (open_bus(bus_spec(emulator.endpoints[0])) for _ in range(2))
+
+        def programs() -> list[int]:
+            return [c["came"] for c in control.call("frames").result["clients"]]
+
+        assert programs() == [1, 2]
+        assert control.call("fault.points", kind="link.stall").result["points"] == ["client.1", "client.2"]
+        waits = control.call("fault.add", kind="link.drop", point="client.1", at_s=0.5).result["id"]
+        older.shutdown()
+        for _ in range(100):  # until the emulator has seen it go
+            if control.call("run", for_s=0.001).rx.keys() == {2}:
+                break
+        assert programs() == [2]
+        assert control.call("fault.points", kind="link.stall").result["points"] == ["client.2"]
+        control.call("fault.add", kind="link.drop", point="client.2")
+        control.call("run", for_s=1.0)
+        states = {f["id"]: (f["point"], f["state"]) for f in control.call("fault.list").result["faults"]}
+        assert states == {waits: ("client.1", "void"), waits + 1: ("client.2", "active")}
+        younger.shutdown()
 
 
 def kinds_told() -> list[str]:

@@ -66,13 +66,17 @@ static struct can_client *nth_client(struct world *w, unsigned i)
 static bool client(void *ctx, unsigned i, struct control_client *out)
 {
     const struct can_client *c = nth_client(ctx, i);
-    if (c) *out = (struct control_client){.adapter = c->adapter, .name = c->name, .taken = c->taken};
+    if (c) {
+        *out = (struct control_client){
+            .adapter = c->adapter, .name = c->name, .came = c->came, .place = c->place, .taken = c->taken};
+    }
     return c != NULL;
 }
 
-static struct can_node *client_node(void *ctx, unsigned i)
+static struct can_node *client_node(void *ctx, uint32_t place)
 {
-    struct can_client *c = nth_client(ctx, i);
+    struct can_client *c = ((struct world *)ctx)->hub.clients;
+    while (c && c->place != place) c = c->next;
     return c ? &c->node : NULL;
 }
 

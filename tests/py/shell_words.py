@@ -82,7 +82,16 @@ KINDS: list[dict[str, Any]] = [
         "what": "Adds.",
         "points": ["UNIT.sensor.x|y|z"],
         "args": [
-            {"name": "bias_v", "type": "number", "unit": "V", "min": -15, "max": 15, "optional": False, "what": "added"}
+            {
+                "name": "bias_v",
+                "type": "number",
+                "unit": "V",
+                "min": -15,
+                "max": 15,
+                "least": 2e-6,
+                "optional": False,
+                "what": "added",
+            }
         ],
     },
     {

@@ -442,7 +442,7 @@ static void a_unit_is_reset_by_name(void **state)
 static void counters_frames_and_units_tell_what_they_promise(void **state)
 {
     (void)state;
-    assert_says("{\"cmd\":\"frames\"}", "{\"adapter\":\"socketcand\",\"name\":\"can0\",\"delivered\":42");
+    assert_says("{\"cmd\":\"frames\"}", "{\"adapter\":\"socketcand\",\"name\":\"can0\",\"came\":3,\"delivered\":42");
     assert_says("{\"cmd\":\"frames\"}", "\"gone\":{\"delivered\":3");
     assert_says("{\"cmd\":\"counters\"}", "\"pace\":{\"name\":\"step\",\"turns\":9");
     assert_says("{\"cmd\":\"counters\"}", "\"bitrate_hz\":1000000");

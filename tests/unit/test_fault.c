@@ -8,7 +8,7 @@
 
 #define MS INT64_C(1000000)
 
-enum { UNITS = 2, EVENTS_MAX = 4096, CHANGES_MAX = 64 };
+enum { UNITS = 2, PROGRAMS = 2, EVENTS_MAX = 4096, CHANGES_MAX = 64 };
 
 struct heard {
     enum psa2_event e;
@@ -26,7 +26,8 @@ static struct {
     struct can_bus bus;
     struct lab lab;
     struct unit unit[UNITS];
-    struct can_node node[UNITS], program;
+    struct can_node node[UNITS], program[PROGRAMS];
+    uint32_t came[PROGRAMS + 1]; /* who is on the bus, up to 0 */
     struct control_bench view;
     struct fault_engine engine;
     struct control control;
@@ -63,14 +64,17 @@ static void on_frame(void *ctx, const struct psa2_frame *f, int64_t t_ns)
 static bool on_client(void *ctx, unsigned i, struct control_client *out)
 {
     (void)ctx;
-    *out = (struct control_client){.adapter = "socketcand", .name = "can0"};
-    return i == 0;
+    *out = (struct control_client){.adapter = "socketcand", .name = "can0", .came = r.came[i], .place = r.came[i]};
+    return r.came[i] != 0;
 }
 
-static struct can_node *on_client_node(void *ctx, unsigned i)
+static struct can_node *on_client_node(void *ctx, uint32_t place)
 {
     (void)ctx;
-    return i == 0 ? &r.program : NULL;
+    for (unsigned i = 0; r.came[i]; i++) {
+        if (r.came[i] == place) return &r.program[place - 1];
+    }
+    return NULL;
 }
 
 static void init_unit(unsigned i)
@@ -82,6 +86,7 @@ static void init_unit(unsigned i)
     cfg.board.adc_noise_scale = cfg.board.temp_noise_scale = 0.0;
     cfg.board.serial = i + 1;
     if (i == 1) cfg.board.afe[0] = afe_nominal(AFE_CURRENT);
+    if (i == 1) cfg.board.afe[0].clip_v = 5.0;
     unit_init(&r.unit[i], &cfg, &r.lab, &r.s);
     r.node[i] = (struct can_node){.name = name[i]};
     can_attach(&r.bus, &r.node[i]);
@@ -109,8 +114,9 @@ static int fresh(void **state)
                                     .client = on_client,
                                     .client_node = on_client_node};
     for (unsigned i = 0; i < UNITS; i++) init_unit(i);
-    r.program.name = "program";
-    can_attach(&r.bus, &r.program);
+    r.program[0].name = "program";
+    can_attach(&r.bus, &r.program[0]);
+    r.came[0] = 1;
     fault_init(&r.engine, &r.view, &r.s);
     r.engine.changed = on_change;
     control_init(&r.control, control_tables, &r.view);
@@ -287,6 +293,28 @@ static void places_are_used_again_but_not_those_of_living_faults(void **state)
     assert_non_null(fault_find(&r.engine, 1));
 }
 
+/* The second program keeps its number, and its faults, when the first leaves. */
+static void a_program_keeps_its_number_when_an_older_one_leaves(void **state)
+{
+    struct fault_point p;
+    char name[FAULT_POINT_MAX];
+    (void)state;
+    can_attach(&r.bus, &r.program[1]);
+    r.came[1] = 2;
+    const uint32_t first = add("{'kind':'link.drop','point':'client.1','at_s':0.1}");
+    const uint32_t second = add("{'kind':'link.drop','point':'client.2','at_s':0.1}");
+    assert_true(first && second);
+    can_detach(&r.bus, &r.program[0]);
+    r.came[0] = 2;
+    r.came[1] = 0;
+    assert_true(fault_point_find(&r.view, "client.2", &p, name));
+    assert_false(fault_point_find(&r.view, "client.1", &p, name));
+    run_to(200 * MS);
+    assert_int_equal(fault_find(&r.engine, first)->state, FAULT_VOID);
+    assert_int_equal(fault_find(&r.engine, second)->state, FAULT_ACTIVE);
+    assert_ptr_equal(fault_find(&r.engine, second)->as.can.to, &r.program[1]);
+}
+
 /* ---- what is refused */
 
 static void what_does_not_fit_is_refused_with_the_reason(void **state)
@@ -302,7 +330,7 @@ static void what_does_not_fit_is_refused_with_the_reason(void **state)
          "not on a.line.Int, which is a line of a board; it works on UNIT.sensor.x|y|z"},
         {"{'kind':'sensor.bias','point':'a.sensor.x'}", "bias_v is missing"},
         {"{'kind':'sensor.bias','point':'a.sensor.x','bias_v':0}", "0 would change nothing"},
-        {"{'kind':'sensor.bias','point':'a.sensor.x','bias_v':16}", "outside -15 ... 15 V"},
+        {"{'kind':'sensor.bias','point':'a.sensor.x','bias_v':16}", "outside -15 ... -2e-06 and 2e-06 ... 15 V"},
         {"{'kind':'sensor.bias','point':'a.sensor.x','bias_v':1,'rms_v':1}", "rms_v: sensor.bias takes no such value"},
         {"{'kind':'sensor.bias','point':'a.sensor.y','bias_v':1}", "a.sensor.y: the channel has no sensor"},
         {"{'kind':'sensor.saturation','point':'a.sensor.x'}", "low_v or high_v is missing"},
@@ -319,6 +347,24 @@ static void what_does_not_fit_is_refused_with_the_reason(void **state)
         {"{'kind':'supply.brownout','point':'supply','drop_v':2,'for_s':1}",
          "not below the threshold of the boards, 9 V"},
         {"{'kind':'chip.clock','point':'a.adc.x','clock_ppm':0.4}", "whole ppm"},
+        {"{'kind':'sensor.bias','point':'a.sensor.x','bias_v':-1e-6}",
+         "bias_v: -1e-06 is outside -15 ... -2e-06 and 2e-06 ... 15 V"},
+        {"{'kind':'sensor.drift','point':'a.sensor.x','drift_v_per_s':1e-6}",
+         "outside -1000 ... -2e-06 and 2e-06 ... 1000 V/s"},
+        {"{'kind':'sensor.drift','point':'a.sensor.x','drift_v_per_s':0.001,'for_s':0.001}",
+         "in 0.001 s it comes to 1e-06 V, less than 2e-06 V"},
+        {"{'kind':'sensor.scale','point':'a.sensor.x','scale_ppm':-0.9}",
+         "outside -10000000 ... -1 and 1 ... 10000000"},
+        {"{'kind':'sensor.noise','point':'a.sensor.x','rms_v':1e-6}", "outside 2e-06 ... 10 V"},
+        {"{'kind':'sensor.saturation','point':'a.sensor.x','high_v':10}", "high_v: 10: the chain passes -10 ... 10 V"},
+        {"{'kind':'sensor.saturation','point':'a.sensor.x','low_v':-12,'high_v':3}", "low_v: -12: the chain passes"},
+        {"{'kind':'sensor.saturation','point':'b.sensor.x','high_v':6}", "high_v: 6: the chain passes -5 ... 5 V"},
+        {"{'kind':'analog.reference','point':'a.afe.x','reference_ppm':0.5}",
+         "outside -500000 ... -1 and 1 ... 1000000"},
+        {"{'kind':'analog.reference','point':'a.afe.x','drift_ppm_per_s':0.5}", "outside 1 ... 1000000 ppm/s"},
+        {"{'kind':'analog.reference','point':'a.afe.x','drift_ppm_per_s':5,'for_s':0.1}",
+         "in 0.1 s it comes to 0.5 ppm, less than 1 ppm"},
+        {"{'kind':'analog.ripple','point':'a.afe.x','amplitude_v':1e-6,'frequency_hz':1}", "outside 2e-06 ... 10 V"},
         {"{'kind':'sensor.bias','point':'a.sensor.x','bias_v':1,'for_s':1e-10}",
          "for_s: 1e-10: less than a nanosecond"},
         {"{'kind':'link.delay','point':'bus.can0','hold_s':1e-10}", "hold_s: 1e-10: less than a nanosecond"},
@@ -446,6 +492,49 @@ static void brownouts_are_those_that_were_asked_for(void **state)
     assert_change(4, late, FAULT_VOID, 300 * MS);
 }
 
+/* As many as there can be faults: none is accepted and then void for want of room. */
+static void any_number_of_brownouts_may_be_under_way_at_once(void **state)
+{
+    (void)state;
+    r.engine.changed = NULL;
+    for (unsigned i = 0; i < FAULTS_MAX; i++) {
+        assert_int_equal(add("{'kind':'supply.brownout','point':'supply','drop_v':5,'for_s':0.1,'at_s':0.1}"), i + 1);
+    }
+    run_to(150 * MS);
+    for (uint32_t id = 1; id <= FAULTS_MAX; id++) {
+        if (fault_find(&r.engine, id)->state != FAULT_ACTIVE) fail_msg("%u of them are under way", id - 1);
+    }
+    run_to(201 * MS);
+    assert_true(supply_volts(&r.lab.supply, 201 * MS) == 12.0);
+}
+
+/* Registers without power hold nothing. */
+static void a_flip_in_a_board_without_power_is_void(void **state)
+{
+    static const char *const args[] = {"{'kind':'chip.flip','point':'b.adc.z','register':2,'mask':1}",
+                                       "{'kind':'chip.flip','point':'b.tadc','register':2,'mask':1}"};
+    (void)state;
+    run_to(400 * MS);
+    psa2_power_down(&r.unit[1].board, r.s.now_ns);
+    for (size_t i = 0; i < COUNT(args); i++) {
+        const uint32_t id = add(args[i]);
+        assert_true(id != 0);
+        assert_int_equal(fault_find(&r.engine, id)->state, FAULT_VOID);
+    }
+}
+
+/* Two microvolts at the load are more than a code of 1.19 uV: of all codes of a quiet channel none stays. */
+static void the_least_bias_is_seen(void **state)
+{
+    (void)state;
+    run_to(400 * MS);
+    const int32_t before = r.frame.code[0];
+    assert_true(add("{'kind':'sensor.bias','point':'a.sensor.x','bias_v':2e-6}") != 0);
+    run_to(600 * MS);
+    assert_true(r.frame.code[0] > before);
+    assert_true(r.frame.code[0] <= before + 2);
+}
+
 static void what_is_over_at_once_needs_no_lifting(void **state)
 {
     (void)state;
@@ -511,6 +600,10 @@ int main(void)
         TEST(events_may_be_those_of_another_unit),
         TEST(a_fault_that_waits_or_listens_can_be_cleared),
         TEST(places_are_used_again_but_not_those_of_living_faults),
+        TEST(a_program_keeps_its_number_when_an_older_one_leaves),
+        TEST(any_number_of_brownouts_may_be_under_way_at_once),
+        TEST(a_flip_in_a_board_without_power_is_void),
+        TEST(the_least_bias_is_seen),
         TEST(what_does_not_fit_is_refused_with_the_reason),
         TEST(brownouts_are_those_that_were_asked_for),
         TEST(a_refused_command_leaves_no_trace),

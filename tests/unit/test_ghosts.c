@@ -177,6 +177,8 @@ static void who_comes_next_takes_the_place_of_a_ghost(void **state)
     assert_int_equal(again.heir_of, 1);
     assert_int_equal(again.number, 3);
     assert_int_equal(other.heir_of, 0);
+    assert_int_equal(again.place, 1); /* a's */
+    assert_int_equal(other.place, other.came);
     assert_false(again.leaving);
     assert_ptr_equal(rig.hub.clients, &again); /* before b, as a was */
     assert_ptr_equal(again.next, &rig.b);

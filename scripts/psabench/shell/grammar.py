@@ -135,7 +135,7 @@ def value(a: Arg, word: Word) -> Value:
 
 def _number(a: Arg, text: str) -> float:
     x = units.number(text, a.unit)
-    if not (a.low <= x <= a.high) or math.isinf(x):
+    if not (a.low <= x <= a.high) or math.isinf(x) or 0 < abs(x) < a.least:
         raise ValueError(f"{x:.10g} is out of range")
     return x
 

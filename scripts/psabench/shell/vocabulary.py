@@ -33,6 +33,7 @@ class Arg:
     optional: bool = False
     low: float = -math.inf
     high: float = math.inf
+    least: float = 0.0  # magnitude of what is not 0 and changes anything
     choices: tuple[str, ...] = ()
     strict: bool = True  # nothing but one of the choices; False: they are offered, the bench decides
     what: str = ""
@@ -43,6 +44,8 @@ class Arg:
         if self.choices:
             return ", ".join(self.choices)
         limits = "" if math.isinf(self.low) and math.isinf(self.high) else f"{self.low:.10g} to {self.high:.10g}"
+        if self.least:
+            limits = f"{self.low:.10g} to {-self.least:.10g} and {self.least:.10g} to {self.high:.10g}"
         return ", ".join(x for x in (self.unit, limits) if x)
 
 
@@ -160,6 +163,7 @@ def _arg(row: Mapping[str, Any], here: tuple[str, ...], choices: Mapping[tuple[s
         optional=bool(row.get("optional")),
         low=float(row["min"]) if "min" in row else -math.inf,
         high=float(row["max"]) if "max" in row else math.inf,
+        least=float(row.get("least", 0.0)),
         choices=named or here,
         strict=bool(named),
         what=str(row.get("what", "")),
