@@ -3,6 +3,8 @@
 
 #include <stdio.h>
 
+_Static_assert(LINE_FAULTS_MAX >= FAULTS_MAX, "each fault of a line that was accepted has room on its board");
+
 static struct line_faults *lines(struct fault *f)
 {
     struct line_faults *l = &f->engine->lines[f->point.unit];

@@ -9,7 +9,7 @@
 #include "base/rng.h"
 #include "trace/trace.h"
 
-#define LINE_FAULTS_MAX 16u
+#define LINE_FAULTS_MAX 64u /* of one board: as many as the fault engine keeps */
 
 enum line_fault_kind {
     LINE_STUCK_HIGH,
