@@ -329,9 +329,17 @@ const char *psa2_line_name(enum psa2_line line)
     return lines[line].name;
 }
 
+static void wake(void *ctx, uint32_t mask)
+{
+    const uint32_t out_lines = 1u << PSA2_LINE_INT | 1u << PSA2_LINE_DATA | 1u << PSA2_LINE_CLK;
+    struct psa2 *b = ctx;
+    if (mask & out_lines) psa2_out_wake(b, b->sched->now_ns);
+}
+
 static void init_trace(struct psa2 *b)
 {
     trace_init(&b->trace);
+    b->trace.source = (struct trace_source){.wake = wake, .ctx = b};
     line_faults_init(&b->line, &b->trace);
     for (unsigned i = 0; i < PSA2_LINES; i++) (void)trace_add(&b->trace, lines[i].name, lines[i].level);
     b->idle_lines = b->trace.level;

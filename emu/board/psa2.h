@@ -3,7 +3,8 @@
  * After Res the controller sets the converters up as its profile says, then reads the three codes at each DRD_A, scans
  * the temperature channels, and sends four words on Int/Data/CLK (article section 5). The host of the bench reaches the
  * registers only through the controller: psa2_submit(). Plain struct owned by the caller, one thread, no allocation.
- * Lines are reported to the trace only while watched; words, times and counters are the same either way. */
+ * Edges are reported to the trace only while watched, unwatched lines only where they come to rest: a late listener is told
+ * true levels. Words, times and counters are the same either way. */
 #ifndef PSABENCH_BOARD_PSA2_H
 #define PSABENCH_BOARD_PSA2_H
 

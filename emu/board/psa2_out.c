@@ -60,6 +60,12 @@ static void report_word(struct psa2 *b, int64_t until_ns)
     trace_commit(&b->trace, (unsigned)(p - step));
 }
 
+static void skip_word(struct psa2_out *o)
+{
+    o->watched_words++;
+    o->at = clk_on(o->at, &o->word_gap);
+}
+
 static void report_int(struct psa2 *b, int64_t t_ns)
 {
     struct psa2_out *o = &b->out;
@@ -80,6 +86,27 @@ static void word_event(void *ctx, int64_t t_ns)
         t_ns = clk_on(o->at, &o->bits).t_ns;
     } while (sched_go_on(b->sched, t_ns));
     sched_at(b->sched, &o->word, t_ns);
+}
+
+/* The frame under way, unwatched so far: its edges up to now as far as the trace still takes them, then as if it had been
+ * watched from the beginning. */
+void psa2_out_wake(struct psa2 *b, int64_t t_ns)
+{
+    struct psa2_out *o = &b->out;
+    if (!o->busy || o->watched_words >= 0 || o->word.queued) return;
+    int64_t next_ns = o->f.t_int_fall_ns;
+    if (next_ns <= t_ns) {
+        const int64_t known_ns = b->trace.done_ns;
+        if (next_ns < known_ns) trace_set(&b->trace, PSA2_LINE_INT, false, known_ns); /* a level, no edge */
+        else trace_steps(&b->trace, &(struct trace_step){next_ns, UINT32_C(1) << PSA2_LINE_INT, 0}, 1);
+        o->watched_words = 0;
+        o->at = clk_on(o->start, &o->lead);
+        while ((unsigned)o->watched_words < PSA2_WORDS && o->at.t_ns < known_ns) skip_word(o);
+        while ((unsigned)o->watched_words + 1 < PSA2_WORDS && (next_ns = clk_on(o->at, &o->bits).t_ns) <= t_ns)
+            report_word(b, t_ns);
+        if ((unsigned)o->watched_words + 1 >= PSA2_WORDS) return; /* the last word is int_rise()'s */
+    }
+    sched_at(b->sched, &o->word, next_ns);
 }
 
 /* The rest of a watched frame, up to now, and idle lines. */

@@ -56,6 +56,7 @@ void psa2_request_fail(struct psa2 *b, enum psa2_group group, bool all, int64_t 
 /* psa2_out.c */
 void psa2_out_init(struct psa2 *b);
 void psa2_out_stop(struct psa2 *b, int64_t t_ns);
+void psa2_out_wake(struct psa2 *b, int64_t t_ns);  /* somebody is about to watch the frame under way */
 void psa2_out_start(struct psa2 *b, int64_t t_ns); /* sends b->latest; dropped and counted if INT is low */
 
 #endif

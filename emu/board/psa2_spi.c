@@ -176,6 +176,23 @@ static void report_byte(struct psa2 *b, uint32_t next)
     trace_commit(&b->trace, (unsigned)(p - step));
 }
 
+/* The same byte unwatched: only where the lines come to rest, for whoever looks later. */
+static void keep_levels(struct psa2 *b, int64_t t_ns)
+{
+    const struct psa2_spi *s = &b->spi;
+    const bool last = s->at + 1u == s->x.count;
+    uint32_t lines = UINT32_C(1) << PSA2_LINE_SCLK, level = 0;
+    if (clocks_accel(b)) {
+        lines |= accel_lines;
+        level |= accel_after(s, dout_now(b));
+    }
+    if (s->x.group == PSA2_TEMP) {
+        lines |= temp_lines;
+        level |= (temp_bytes(s) >> 8 & 1) << PSA2_LINE_DOUTT | (last ? 0 : temp_bytes(s) & 1) << PSA2_LINE_DINT;
+    }
+    trace_put(&b->trace, lines, level, t_ns);
+}
+
 static void end_xfer(struct psa2 *b, int64_t t_ns)
 {
     b->spi.phase = PSA2_SPI_IDLE;
@@ -186,6 +203,7 @@ static void end_byte(struct psa2 *b, int64_t t_ns)
 {
     struct psa2_spi *s = &b->spi;
     if (trace_watched(&b->trace, accel_lines | temp_lines)) report_byte(b, dout_now(b));
+    else keep_levels(b, t_ns);
     const int64_t next_ns = t_ns + s->x.gap_ns[s->at];
     if (++s->at < s->x.count) {
         begin_byte(b, edge_at(s, next_ns));

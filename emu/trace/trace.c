@@ -98,6 +98,7 @@ int trace_find(const struct trace *t, const char *name)
 
 void trace_attach(struct trace *t, struct trace_sink *s)
 {
+    if (t->source.wake) t->source.wake(t->source.ctx, s->mask);
     struct trace_sink **end = &t->sinks;
     while (*end) {
         assert(*end != s);

@@ -4,8 +4,8 @@
  * of order within TRACE_LAG_NS (a byte's edges are known when it ends, a frame's when it begins); sinks get them in
  * order of time, then of report, and only real changes. One trace per unit. Fixed storage, no allocation, one thread.
  *
- * A listener that comes late hears the levels last reported: lines that change while nobody listens keep the level they
- * had, until their next edge. So a board whose lines rest at fixed levels between transfers needs no catching up. */
+ * A listener that comes late hears the levels last reported, and what the board's `wake` adds. So a board that computes no
+ * edges for nobody still reports where its lines come to rest (trace_put() costs little), and wakes what is under way. */
 #ifndef PSABENCH_TRACE_TRACE_H
 #define PSABENCH_TRACE_TRACE_H
 
@@ -48,6 +48,12 @@ struct trace_filter {
     void *ctx;
 };
 
+/* Of a board that keeps things to itself while nobody listens. */
+struct trace_source {
+    void (*wake)(void *ctx, uint32_t mask); /* somebody is about to listen to these signals: report what is under way */
+    void *ctx;
+};
+
 struct trace {
     const char *name[TRACE_SIGNALS_MAX];
     unsigned count;
@@ -55,6 +61,7 @@ struct trace {
     uint32_t watched; /* union of the sinks' masks */
     struct trace_sink *sinks;
     struct trace_filter *filter;                  /* or NULL */
+    struct trace_source source;                   /* after trace_init(), by the board; wake may stay NULL */
     struct trace_step pending[TRACE_PENDING_MAX]; /* in order of time, then of report, from pending[first] on */
     unsigned first, pending_count;
     uint64_t gone; /* steps delivered */
@@ -74,7 +81,8 @@ unsigned trace_add(struct trace *t, const char *name, bool level);
 /* Number of the signal of that name, or -1. */
 int trace_find(const struct trace *t, const char *name);
 
-void trace_attach(struct trace *t, struct trace_sink *s); /* the sink first hears the present levels, at t = done_ns */
+/* Wakes the source, then the sink first hears the present levels, at t = done_ns. */
+void trace_attach(struct trace *t, struct trace_sink *s);
 void trace_detach(struct trace *t,
                   struct trace_sink *s); /* hears nothing more; harmless for one that is not attached */
 
@@ -98,13 +106,16 @@ void trace_commit(struct trace *t, unsigned n);
 /* As trace_commit() for steps that are a run of these lines. Delivered faster. */
 void trace_commit_run(struct trace *t, unsigned n, uint32_t lines);
 
-/* Reports the level of a signal from t_ns on. Cheap when nobody listens to it. */
+/* Reports the levels of the signals in the mask `lines` from t_ns on. Cheap when nobody listens to them. */
+static inline void trace_put(struct trace *t, uint32_t lines, uint32_t level, int64_t t_ns)
+{
+    if (!(t->watched & lines) && t->pending_count == 0) t->level = (t->level & ~lines) | (level & lines);
+    else trace_steps(t, &(struct trace_step){t_ns, lines, level}, 1);
+}
+
 static inline void trace_set(struct trace *t, unsigned sig, bool level, int64_t t_ns)
 {
-    const uint32_t bit = UINT32_C(1) << sig;
-    const uint32_t bits = (uint32_t)level << sig;
-    if (!(t->watched & bit) && t->pending_count == 0) t->level = (t->level & ~bit) | bits;
-    else trace_steps(t, &(struct trace_step){t_ns, bit, bits}, 1);
+    trace_put(t, UINT32_C(1) << sig, (uint32_t)level << sig, t_ns);
 }
 
 /* Calls a function for each change that a sink was given, one signal at a time: for sinks that need no speed. */
