@@ -401,6 +401,24 @@ static void a_turning_head_refuses_with_a_conflict(void **state)
     SAYS("REST?", "0");
 }
 
+/* The head has no row for *RST. IEEE 488.2, 10.32.1: it leaves status, enables and error queue alone, and ends an *OPC. */
+static void a_reset_leaves_a_head_where_it_is(void **state)
+{
+    (void)state;
+    say("*CLS;*ESE 36;*SRE 32;FACE SIDE;FLY"); /* the error of FLY stays in the queue */
+    run_s(3);
+    say("ANGL 45");
+    run_s(1);
+    say("*OPC;*RST");
+    SAYS("REST?;*ESE?;*SRE?;SYST:ERR:COUN?;*STB?", "0;36;32;1;116"); /* still turning; 4 + 16 + 32 + 64 */
+    run_s(2);
+    SAYS("REST?;ANGL?;FACE?", "1;45;SIDE");
+    SAYS("*ESR?", "32"); /* the command error; no bit 0 */
+    SAYS("SYST:ERR?", "-113,\"Undefined header;FLY\"");
+    say("*RST");
+    SAYS("ANGL?;FACE?;SYST:ERR:COUN?", "45;SIDE;0");
+}
+
 static void an_angle_reads_as_it_was_set(void **state)
 {
     (void)state;
@@ -636,6 +654,7 @@ int main(void)
         cmocka_unit_test_setup(a_closed_session_waits_no_more, head),
         cmocka_unit_test_setup(motion_shows_in_the_operation_register, head),
         cmocka_unit_test_setup(a_turning_head_refuses_with_a_conflict, head),
+        cmocka_unit_test_setup(a_reset_leaves_a_head_where_it_is, head),
         cmocka_unit_test_setup(an_angle_reads_as_it_was_set, head),
         cmocka_unit_test_setup(faces_have_short_forms_where_they_are_unique, head),
         cmocka_unit_test_setup(limits_are_asked_with_the_settings_name, head),
