@@ -416,7 +416,8 @@ def test_the_arguments_are_what_was_asked_for(program: Path, tmp_path: Path) -> 
     write(program, f'echo "$@" > {tmp_path}/args; echo ready all')
     with Emulator("quiet", cans=["none"], pace="free", seed=7, control=False, extra=("--for", "1s")) as emu:
         assert emu.wait(10.0) == 0
-    assert (tmp_path / "args").read_text().split() == "quiet --pace free --until-eof --can none --seed 7 --for 1s".split()
+    wanted = "quiet --pace free --until-eof --can none --seed 7 --for 1s"
+    assert (tmp_path / "args").read_text().split() == wanted.split()
 
 
 def test_what_the_emulator_complains_of_is_the_message(program: Path) -> None:
