@@ -256,7 +256,8 @@ static void lift(struct world *w)
     const unsigned frames = w->frames, got = w->got;
     run(w, UP_NS);
     assert(psa2_ready(&w->b) && w->frames > frames + 40 && w->got > got + 2 * 40);
-    assert(w->can.node.services.now == CAN_ACTIVE && w->host.now == CAN_ACTIVE);
+    /* The board's counters began anew with its power; the host's fall by what it sends, and it has sent little. */
+    assert(w->can.node.services.now == CAN_ACTIVE && w->host.now != CAN_BUS_OFF);
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
