@@ -140,8 +140,8 @@ static void on_steps(void *ctx, uint32_t before, const struct trace_step *s, uns
 {
     struct line_faults *l = ctx;
     struct out o = {.n = 0};
-    if (until_ns == INT64_MAX) until_ns = n > 0 ? s[n - 1].t_ns : l->done_ns; /* nobody listens any more */
-    if (until_ns < l->done_ns) until_ns = l->done_ns;
+    /* Nobody listens any more: what is told before its time is taken in, but a new listener hears from done_ns on. */
+    if (until_ns == INT64_MAX || until_ns < l->done_ns) until_ns = l->done_ns;
     l->level = before; /* lines that nobody listens to move without a step */
     for (const struct trace_step *const end = s + n; s < end;) {
         const int64_t t_ns = s->t_ns;

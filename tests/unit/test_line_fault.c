@@ -288,6 +288,27 @@ static void as_many_faults_as_there_is_room_for_and_no_more(void **state)
     line_fault_end(&r->l, 3, 2000);                                   /* harmless */
 }
 
+/* What was told ahead of its time goes to nobody; the time of a new listener begins where the trace is. */
+static void who_listens_again_hears_times_in_order(void **state)
+{
+    (void)state;
+    struct bench *r = up();
+    const struct line_fault f = fault(LINE_INVERTED, OTHER);
+    const uint32_t id = line_fault_add(&r->l, &f);
+    trace_advance(&r->t, 1000);
+    trace_set(&r->t, CLK, true, 9000);
+    trace_detach(&r->t, &r->sink);
+    trace_attach(&r->t, &r->sink);
+    line_fault_end(&r->l, id, 3000);
+    r->n = 0;
+    trace_advance(&r->t, 2000);
+    assert_int_equal(r->n, 0);
+    trace_set(&r->t, INT, false, 4000);
+    trace_advance(&r->t, 5000);
+    assert_change(r, OTHER, 0, false, 3000);
+    assert_change(r, INT, 0, false, 4000);
+}
+
 static void a_fault_that_ends_before_it_begins_is_none(void **state)
 {
     (void)state;
@@ -327,6 +348,7 @@ int main(void)
         cmocka_unit_test(noise_has_its_rate_and_width_and_a_seed_the_same_pulses),
         cmocka_unit_test(who_listens_late_hears_the_faulty_levels),
         cmocka_unit_test(as_many_faults_as_there_is_room_for_and_no_more),
+        cmocka_unit_test(who_listens_again_hears_times_in_order),
         cmocka_unit_test(a_fault_that_ends_before_it_begins_is_none),
         cmocka_unit_test(nothing_is_lost_of_a_long_row),
     };
