@@ -10,7 +10,7 @@ enum { WORDS_MAX = 16, BYTES_MAX = 1024 };
 
 static void check(const struct options *o)
 {
-    assert(o->can_count <= OPTIONS_CAN_MAX && o->action <= OPTIONS_SCPI_MAX);
+    assert(o->can_count <= OPTIONS_CAN_MAX && o->action <= OPTIONS_DUMP);
     assert(o->pace == PACE_WALL || o->pace == PACE_STEP || o->pace == PACE_FREE);
     assert(o->for_ns >= 0 && o->vcd_unit_ns > 0 && o->line_hz > 0);
     assert(o->pace != PACE_STEP || o->control);
