@@ -16,7 +16,7 @@ static double temp_degc(void *ctx, unsigned channel, int64_t t_ns)
     return channel < UNIT_AXES ? chamber_element_degc(c, &u->body, t_ns) : chamber_case_degc(c, &u->body, t_ns);
 }
 
-enum { WARM_STEP_NS = 10000000 }; /* no element warms by a millikelvin in so long */
+enum { WARM_STEP_NS = 10000000 }; /* 10 mK at most in a chamber of 60 K/min, without any lag */
 
 /* Of the sensor's element, where the sensor minds it; as it was at the latest whole step, whoever looks how often. Without a
  * chamber a quartz's case is as warm as its element. */

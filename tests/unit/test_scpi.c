@@ -1,4 +1,5 @@
 /* SCPI: standard syntax, standard error numbers, IEEE 488.2 status, and the instruments of the bench behind it. */
+#include "page.h"
 #include "rig.h"
 #include "scpi_rig.h"
 
@@ -606,20 +607,6 @@ static void a_supply_is_set_switched_and_measured(void **state)
 
 /* ---- the page */
 
-static bool page_has(const char *line)
-{
-    char got[2048];
-    FILE *page = fopen("docs/scpi.md", "r");
-    if (!page) skip(); /* not run in the root of the repository */
-    bool found = false;
-    while (!found && fgets(got, sizeof got, page)) {
-        got[strcspn(got, "\n")] = '\0';
-        found = strcmp(got, line) == 0;
-    }
-    fclose(page);
-    return found;
-}
-
 static void the_page_shows_every_header(void **state)
 {
     (void)state;
@@ -627,7 +614,7 @@ static void the_page_shows_every_header(void **state)
     for (int k = -1; k < 0 || scpi_kinds[k].name; k++) {
         const struct scpi_kind *kind = k < 0 ? NULL : &scpi_kinds[k];
         for (unsigned i = 0; scpi_markdown(kind, i, line, sizeof line); i++) {
-            if (!page_has(line)) fail_msg("docs/scpi.md lacks (make docs):\n%s", line);
+            if (!page_has("docs/scpi.md", line)) fail_msg("docs/scpi.md lacks (make docs):\n%s", line);
         }
     }
 }

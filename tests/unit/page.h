@@ -1,0 +1,25 @@
+/* Pages of the documentation that repeat a table of the program. */
+#ifndef PSABENCH_TESTS_PAGE_H
+#define PSABENCH_TESTS_PAGE_H
+
+#include "rig.h"
+
+#include <stdio.h>
+#include <string.h>
+
+/* Whether the page, a file of the repository, has this line. */
+static inline bool page_has(const char *path, const char *line)
+{
+    char got[2048];
+    FILE *page = fopen(path, "r");
+    if (!page) skip(); /* not run in the root of the repository */
+    bool found = false;
+    while (!found && fgets(got, sizeof got, page)) {
+        got[strcspn(got, "\n")] = '\0';
+        found = strcmp(got, line) == 0;
+    }
+    fclose(page);
+    return found;
+}
+
+#endif
