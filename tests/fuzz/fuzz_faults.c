@@ -2,6 +2,7 @@
  * power that fails, at any time and on top of one another. Watchers hear real changes in order; nothing hangs; once all is
  * lifted and the power has been off and on again, board, stream and bus are as good as new. */
 #include "fuzz.h"
+#include "listener.h"
 
 #include "board/psa2_can.h"
 
@@ -21,10 +22,8 @@ struct world {
     struct ads1282_fault adc[3];
     struct ads1256_fault tadc;
     struct psa2_controller_fault kpsa;
-    struct trace_sink sink;
+    struct listener ear;
     bool attached, powered;
-    uint32_t level, known;
-    int64_t edge_ns;
     unsigned frames, events, got;
 };
 
@@ -75,23 +74,6 @@ static void on_error(void *ctx, const struct can_msg *m, int64_t t_ns)
     (void)ctx;
     (void)t_ns;
     assert(m->flags == CAN_ERROR && m->len == 8);
-}
-
-static void on_change(void *ctx, unsigned sig, bool level, int64_t t_ns)
-{
-    struct world *w = ctx;
-    const uint32_t bit = UINT32_C(1) << sig;
-    assert(sig < PSA2_LINES && t_ns >= w->edge_ns);
-    assert(!(w->known & bit) || level != ((w->level & bit) != 0));
-    w->edge_ns = t_ns;
-    w->known |= bit;
-    w->level = level ? w->level | bit : w->level & ~bit;
-}
-
-static void on_steps(void *ctx, const struct trace_step *s, unsigned n)
-{
-    struct world *w = ctx;
-    trace_each(s, n, w->sink.mask, on_change, w);
 }
 
 /* ---- operations */
@@ -222,10 +204,10 @@ static void op(struct world *w, struct script *s)
         talk(w, s);
         return;
     case 7:
-        if (w->attached) trace_detach(&w->b.trace, &w->sink);
-        else w->known = 0;
+        if (w->attached) trace_detach(&w->b.trace, &w->ear.sink);
+        else w->ear.known = 0;
         w->attached = !w->attached;
-        if (w->attached) trace_attach(&w->b.trace, &w->sink);
+        if (w->attached) trace_attach(&w->b.trace, &w->ear.sink);
         return;
     case 8:
         w->b.io.event = b & 0x80 ? on_event : NULL;
@@ -276,7 +258,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     const struct psa2_can_port port = psa2_can_port(&w.b);
     psa2_can_init(&w.can, &(struct psa2_can_cfg){.name = "a", .node_id = NODE}, &port, &w.bus, &w.s);
     w.host = (struct can_node){.name = "host", .rx = on_rx, .error = on_error, .ctx = &w};
-    w.sink = (struct trace_sink){.mask = LINE_MASK, .steps = on_steps, .ctx = &w};
+    w.ear.sink = (struct trace_sink){.mask = LINE_MASK, .steps = listener_steps, .ctx = &w.ear};
     can_attach(&w.bus, &w.host);
     power(&w, true);
     run(&w, script_byte(&s) & 1 ? 130000000 : 1000000); /* in the set-up, or beyond */

@@ -1,6 +1,7 @@
 /* Two PSA-2 boards, the same script of requests, resets, streams and time: the lines of one are watched now and then, of the
  * other never. Frames and answers are the same, and each is what the header promises. */
 #include "fuzz.h"
+#include "listener.h"
 
 #include "base/clk.h"
 #include "board/psa2.h"
@@ -20,10 +21,9 @@ struct world {
     bool waiting, submitting; /* for done(); inside psa2_submit() */
     bool clean;               /* KPSA's rules alone reached the converters: registers are what it was told */
     uint64_t trail;           /* of frames and answers */
-    struct trace_sink sink;
+    struct listener ear;
     bool attached;
-    uint32_t level, known; /* of the lines, as the sink was told */
-    int64_t edge_ns, next_ns;
+    int64_t next_ns;
     struct psa2_counters seen;
 };
 
@@ -85,24 +85,6 @@ static void on_done(void *ctx, struct psa2_request *r, enum psa2_result result, 
     for (unsigned i = 0; i < 3; i++) mix(w, r->answer[i]);
     for (unsigned i = 0; i < 3 && r->group == PSA2_ACCEL && w->clean; i++)
         assert(r->answer[i] == reg_peek(&w->b.adc[i].regs, r->addr));
-}
-
-static void on_change(void *ctx, unsigned sig, bool level, int64_t t_ns)
-{
-    struct world *w = ctx;
-    const uint32_t bit = UINT32_C(1) << sig;
-    assert(sig < PSA2_LINES && t_ns >= w->edge_ns);
-    assert(!(w->known & bit) || level != ((w->level & bit) != 0));
-    w->edge_ns = t_ns;
-    w->known |= bit;
-    w->level = level ? w->level | bit : w->level & ~bit;
-}
-
-static void on_steps(void *ctx, const struct trace_step *s, unsigned n)
-{
-    struct world *w = ctx;
-    for (unsigned i = 1; i < n; i++) assert(s[i].t_ns >= s[i - 1].t_ns);
-    trace_each(s, n, w->sink.mask, on_change, w);
 }
 
 /* ---- operations ---- */
@@ -185,12 +167,12 @@ static void op_input(struct world *w, struct script *s)
 static void op_watch(struct world *w, struct script *s)
 {
     const uint32_t mask = script_byte(s) & 1 ? 0xFFFF : script_byte(s) * UINT32_C(0x0101);
-    if (!w->sink.steps) return;
-    trace_detach(&w->b.trace, &w->sink);
-    w->known = 0;
-    w->edge_ns = 0;
-    w->sink.mask = mask;
-    if (mask) trace_attach(&w->b.trace, &w->sink);
+    if (!w->ear.sink.steps) return;
+    trace_detach(&w->b.trace, &w->ear.sink);
+    w->ear.known = 0;
+    w->ear.edge_ns = 0;
+    w->ear.sink.mask = mask;
+    if (mask) trace_attach(&w->b.trace, &w->ear.sink);
 }
 
 static void step(struct world *w, struct script *s)
@@ -214,7 +196,7 @@ static void power_up(struct world *w, bool watched)
     w->clean = true;
     sched_init(&w->s);
     psa2_init(&w->b, &p, &u, &io, &w->s);
-    w->sink = (struct trace_sink){.steps = watched ? on_steps : NULL, .ctx = w};
+    w->ear.sink = (struct trace_sink){.steps = watched ? listener_steps : NULL, .ctx = &w->ear};
     psa2_power_up(&w->b, 0);
 }
 
