@@ -2,11 +2,14 @@
 
 #include "control/exact.h"
 
+#include <assert.h>
 #include <inttypes.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+#define LINES_MAX 9007199254740991.0 /* as a mask: what a number of JSON holds exactly, 53 lines */
 
 enum { FIRST_CAP = 1 << 16 };
 
@@ -160,10 +163,11 @@ void journal_command(struct journal *j, const struct control_command *row, const
 void journal_watchers(struct journal *j)
 {
     for (unsigned i = 0; i < j->bench->scenario.unit_count; i++) {
-        const uint32_t watched = j->bench->unit[i].board.trace.watched;
+        const uint64_t watched = j->bench->unit[i].board.trace.watched;
         if (watched == j->watched[i]) continue;
+        assert((double)watched <= LINES_MAX);
         j->watched[i] = watched;
-        add(j, j->moved_ns, "\"unit\":%u,\"watch\":%" PRIu32 "}\n", i, watched);
+        add(j, j->moved_ns, "\"unit\":%u,\"watch\":%" PRIu64 "}\n", i, watched);
     }
 }
 
@@ -269,11 +273,12 @@ static bool read_kind(const cJSON *json, struct journal_entry *e)
     }
     if (e->kind == JOURNAL_COMMAND) return read_command(json, e);
     const bool unit = e->kind == JOURNAL_WATCH;
-    if (!get_count(json, member[e->kind], UINT32_MAX, &n)) return false;
+    if (!get_count(json, member[e->kind], unit ? LINES_MAX : UINT32_MAX, &n)) return false;
     if (!get_count(json, unit ? "unit" : "bus", unit ? CONTROL_UNITS_MAX - 1 : CONTROL_BUSES_MAX - 1, &place))
         return false;
     *(unit ? &e->unit : &e->bus) = (unsigned)place;
-    *(unit ? &e->watch : &e->client) = (uint32_t)n;
+    if (unit) e->watch = (uint64_t)n;
+    else e->client = (uint32_t)n;
     if (!unit && n == 0) return false;
     return e->kind == JOURNAL_CAME ? read_came(json, e) : e->kind != JOURNAL_FRAME || read_sent(json, e);
 }

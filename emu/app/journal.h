@@ -38,7 +38,7 @@ struct journal {
     int64_t last_ns;  /* of the last entry */
     int64_t moved_ns; /* time stood still here since it last moved */
     bool ran;         /* what is due at last_ns has run since the last entry */
-    uint32_t watched[CONTROL_UNITS_MAX];
+    uint64_t watched[CONTROL_UNITS_MAX];
     struct journal_tap tap[CONTROL_BUSES_MAX];
 };
 
@@ -67,7 +67,8 @@ struct journal_entry {
     int64_t t_ns;
     bool ran;
     unsigned bus, unit;
-    uint32_t client, heir_of, watch; /* heir_of: whose place, and frames that wait, it took over; 0: nobody's */
+    uint32_t client, heir_of; /* heir_of: whose place, and frames that wait, it took over; 0: nobody's */
+    uint64_t watch;
     bool fd;
     char name[32];
     struct can_msg m;

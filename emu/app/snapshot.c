@@ -272,7 +272,7 @@ static void on_steps(void *ctx, const struct trace_step *s, unsigned n)
     (void)n;
 }
 
-static void hang(struct snapshot_ears *e, struct bench *b, unsigned unit, uint32_t mask)
+static void hang(struct snapshot_ears *e, struct bench *b, unsigned unit, uint64_t mask)
 {
     struct trace *t = &b->unit[unit].board.trace;
     struct trace_sink *ear = &e->ear[unit];
@@ -285,7 +285,7 @@ static void hang(struct snapshot_ears *e, struct bench *b, unsigned unit, uint32
 void snapshot_listen(struct snapshot_ears *e, struct bench *b)
 {
     for (unsigned i = 0; i < b->scenario.unit_count; i++) {
-        const uint32_t watched = b->unit[i].board.trace.watched;
+        const uint64_t watched = b->unit[i].board.trace.watched;
         if (watched) hang(e, b, i, watched);
     }
 }

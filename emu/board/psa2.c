@@ -329,7 +329,7 @@ const char *psa2_line_name(enum psa2_line line)
     return lines[line].name;
 }
 
-static void wake(void *ctx, uint32_t mask)
+static void wake(void *ctx, uint64_t mask)
 {
     const uint32_t out_lines = 1u << PSA2_LINE_INT | 1u << PSA2_LINE_DATA | 1u << PSA2_LINE_CLK;
     struct psa2 *b = ctx;

@@ -101,7 +101,7 @@ struct psa2 {
     struct sched *sched;
     struct trace trace;      /* lines numbered by enum psa2_line */
     struct line_faults line; /* line_fault_add(&b->line, ...): by whoever injects them */
-    uint32_t idle_lines;     /* levels at rest */
+    uint64_t idle_lines;     /* levels at rest */
     struct ads1282 adc[3];
     struct ads1256 tadc;
     struct afe afe[3];

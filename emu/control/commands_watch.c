@@ -48,10 +48,10 @@ static enum control_outcome do_unsubscribe(struct control *c, const struct contr
 static enum control_outcome do_lines(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
 {
     if (!c->bench->units) return control_refuse(c, "state", "there is no unit");
-    const uint32_t level = control_lines(c, v[0].unit, t_ns);
+    const uint64_t level = control_lines(c, v[0].unit, t_ns);
     cJSON *lines = cJSON_AddObjectToObject(result, "lines");
     for (unsigned i = 0; i < PSA2_LINES; i++) {
-        cJSON_AddNumberToObject(lines, psa2_line_name((enum psa2_line)i), level >> i & 1);
+        cJSON_AddNumberToObject(lines, psa2_line_name((enum psa2_line)i), (double)(level >> i & 1));
     }
     return CONTROL_DONE;
 }

@@ -167,7 +167,7 @@ static void ignore_steps(void *ctx, const struct trace_step *s, unsigned n)
     (void)n;
 }
 
-uint32_t control_lines(struct control *c, unsigned unit, int64_t t_ns)
+uint64_t control_lines(struct control *c, unsigned unit, int64_t t_ns)
 {
     struct trace *t = &c->bench->unit[unit]->board.trace;
     struct control_watch *w = &c->watch;
@@ -177,7 +177,7 @@ uint32_t control_lines(struct control *c, unsigned unit, int64_t t_ns)
         trace_attach(t, &w->probe[unit]);
     }
     if (t->filter) return t->filter->level; /* a faulty line is known as far as it was delivered: TRACE_LAG_NS ago */
-    uint32_t level = t->level;
+    uint64_t level = t->level;
     for (unsigned i = t->first; i < t->first + t->pending_count && t->pending[i].t_ns <= t_ns; i++) {
         const struct trace_step *s = &t->pending[i];
         level = (level & ~s->lines) | (s->level & s->lines);

@@ -73,6 +73,6 @@ void control_fault_changed(void *ctx, const struct fault *f, int64_t t_ns);
 void control_gone(struct control *c, void *client);
 
 /* Levels of a unit's lines now, bit per line. From the first call on they are watched: what went on then may be missed. */
-uint32_t control_lines(struct control *c, unsigned unit, int64_t t_ns);
+uint64_t control_lines(struct control *c, unsigned unit, int64_t t_ns);
 
 #endif

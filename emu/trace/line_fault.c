@@ -13,9 +13,9 @@ struct out {
     unsigned n;
 };
 
-static uint32_t bit_of(const struct line_fault_slot *s)
+static uint64_t bit_of(const struct line_fault_slot *s)
 {
-    return UINT32_C(1) << s->f.line;
+    return TRACE_BIT(s->f.line);
 }
 
 /* ---- one fault ---- */
@@ -65,9 +65,9 @@ static void look(struct line_fault_slot *s, const struct trace_step *step)
     if (s->id == 0 || !s->began) return;
     const bool missing = s->f.kind == LINE_MISSING_PULSE;
     if (!missing && s->f.kind != LINE_EXTRA_PULSE) return;
-    if (step->lines & ~step->level & UINT32_C(1) << s->f.frame_line) s->pulses = 0;
+    if (step->lines & ~step->level & TRACE_BIT(s->f.frame_line)) s->pulses = 0;
     if (!(step->lines & bit_of(s))) return;
-    const bool rise = step->level & bit_of(s);
+    const bool rise = (step->level & bit_of(s)) != 0;
     s->pulses += rise;
     const bool mine = s->pulses == s->f.pulse;
     if (missing) s->flip = mine && rise;
@@ -76,9 +76,9 @@ static void look(struct line_fault_slot *s, const struct trace_step *step)
 
 /* ---- all faults of a trace ---- */
 
-static uint32_t shown(const struct line_faults *l)
+static uint64_t shown(const struct line_faults *l)
 {
-    uint32_t level = l->level, high = 0, low = 0;
+    uint64_t level = l->level, high = 0, low = 0;
     for (const struct line_fault_slot *s = l->slot; s < l->slot + LINE_FAULTS_MAX; s++) {
         if (s->id == 0 || !s->began) continue;
         if (s->flip || s->f.kind == LINE_INVERTED) level ^= bit_of(s);
@@ -96,8 +96,8 @@ static void flush(const struct line_faults *l, struct out *o)
 
 static void show(struct line_faults *l, struct out *o, int64_t t_ns)
 {
-    const uint32_t level = shown(l);
-    const uint32_t lines = level ^ l->filter.level;
+    const uint64_t level = shown(l);
+    const uint64_t lines = level ^ l->filter.level;
     if (!lines) return;
     if (o->n == ROOM) flush(l, o);
     o->step[o->n++] = (struct trace_step){t_ns, lines, level};
@@ -136,7 +136,7 @@ static bool any(const struct line_faults *l)
     return false;
 }
 
-static void on_steps(void *ctx, uint32_t before, const struct trace_step *s, unsigned n, int64_t until_ns)
+static void on_steps(void *ctx, uint64_t before, const struct trace_step *s, unsigned n, int64_t until_ns)
 {
     struct line_faults *l = ctx;
     struct out o = {.n = 0};

@@ -46,7 +46,7 @@ struct line_faults {
     struct trace_filter filter;
     struct line_fault_slot slot[LINE_FAULTS_MAX];
     uint32_t last_id;
-    uint32_t level; /* true levels up to done_ns; those shown are filter.level */
+    uint64_t level; /* true levels up to done_ns; those shown are filter.level */
     int64_t done_ns;
 };
 

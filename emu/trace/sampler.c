@@ -64,12 +64,12 @@ bool sampler_start(struct sampler *s, struct trace *t, const struct clk *clock)
     memset(s, 0, offsetof(struct sampler, ring));
     s->trace = t;
     s->clock = own;
-    uint32_t mask = 0;
+    uint64_t mask = 0;
     for (unsigned i = 0; i < 3; i++) {
         const int sig = trace_find(t, name[i]);
         if (sig < 0) return false;
         s->sig[i] = (uint8_t)sig;
-        mask |= UINT32_C(1) << sig;
+        mask |= TRACE_BIT(sig);
     }
     s->first = s->next = clk_count_at(&own, t->done_ns);
     s->sink = (struct trace_sink){.mask = mask, .steps = steps, .advance = advance, .ctx = s};

@@ -6,9 +6,9 @@
 /* Leaves of n reports what really changes. */
 static void filter(struct trace *t, struct trace_step *s, uint64_t n)
 {
-    uint32_t level = t->level;
+    uint64_t level = t->level;
     for (const struct trace_step *const end = s + n; s < end; s++) {
-        const uint32_t lines = s->lines;
+        const uint64_t lines = s->lines;
         s->lines = (level ^ s->level) & lines;
         level = (level & ~lines) + (s->level & lines); /* two steps long where the xor would be three: it is a chain */
     }
@@ -60,7 +60,7 @@ static void deliver_until(struct trace *t, int64_t t_ns)
     t->pending_count -= n;
     t->first = t->pending_count > 0 ? t->first + n : 0;
     if (t->filter) {
-        const uint32_t before = t->level;
+        const uint64_t before = t->level;
         if (n > 0) filter_due(t, due, n);
         t->filter->steps(t->filter->ctx, before, due, n, t_ns);
         return;
@@ -85,7 +85,7 @@ unsigned trace_add(struct trace *t, const char *name, bool level)
 {
     assert(t->count < TRACE_SIGNALS_MAX);
     t->name[t->count] = name;
-    t->level |= (uint32_t)level << t->count;
+    t->level |= (uint64_t)level << t->count;
     return t->count++;
 }
 
@@ -107,9 +107,7 @@ void trace_attach(struct trace *t, struct trace_sink *s)
     s->next = NULL;
     *end = s;
     watch_again(t);
-    s->steps(s->ctx,
-             &(struct trace_step){t->done_ns, (uint32_t)((UINT64_C(1) << t->count) - 1),
-                                  t->filter ? t->filter->level : t->level},
+    s->steps(s->ctx, &(struct trace_step){t->done_ns, TRACE_FIRST(t->count), t->filter ? t->filter->level : t->level},
              1);
 }
 
@@ -152,7 +150,7 @@ void trace_commit(struct trace *t, unsigned n)
     }
 }
 
-void trace_commit_run(struct trace *t, unsigned n, uint32_t lines)
+void trace_commit_run(struct trace *t, unsigned n, uint64_t lines)
 {
     const struct trace_step *const s = t->pending + t->first + t->pending_count;
     const bool in_order = n > 0 && s->t_ns >= (t->pending_count > 0 ? s[-1].t_ns : t->done_ns);
@@ -169,11 +167,11 @@ void trace_steps(struct trace *t, const struct trace_step *s, unsigned n)
     trace_commit(t, n);
 }
 
-void trace_each(const struct trace_step *s, unsigned n, uint32_t mask, trace_change_fn *change, void *ctx)
+void trace_each(const struct trace_step *s, unsigned n, uint64_t mask, trace_change_fn *change, void *ctx)
 {
     for (; n > 0; n--, s++)
-        for (uint32_t left = s->lines & mask; left; left &= left - 1) {
-            const unsigned sig = (unsigned)__builtin_ctz(left);
+        for (uint64_t left = s->lines & mask; left; left &= left - 1) {
+            const unsigned sig = (unsigned)__builtin_ctzll(left);
             change(ctx, sig, (s->level >> sig & 1) != 0, s->t_ns);
         }
 }

@@ -12,27 +12,30 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#define TRACE_SIGNALS_MAX 32u
+#define TRACE_SIGNALS_MAX 64u
 #define TRACE_PENDING_MAX 16384u
 #define TRACE_RUNS_MAX    64u
 #define TRACE_LAG_NS      200000 /* longer than any byte or word on a board's lines */
+
+#define TRACE_BIT(sig) (UINT64_C(1) << (sig))
+#define TRACE_FIRST(n) ((n) < 64 ? TRACE_BIT((n) % 64) - 1 : UINT64_MAX) /* mask of signals 0 .. n-1 */
 
 /* From t_ns on the signals in the mask `lines` have these levels. Bit per signal; at one instant in order of their
  * numbers. Bits of `level` outside the mask mean nothing. */
 struct trace_step {
     int64_t t_ns;
-    uint32_t lines, level;
+    uint64_t lines, level;
 };
 
 /* Steps in a row whose `lines` are just what changes, provided that all these lines are low before; they are after. */
 struct trace_run {
     uint64_t at; /* number of the first, counted since trace_init() */
     unsigned n;
-    uint32_t lines;
+    uint64_t lines;
 };
 
 struct trace_sink {
-    uint32_t mask; /* bit i: wants signal i */
+    uint64_t mask; /* bit i: wants signal i */
     /* n steps in order of time. `lines` are real changes, perhaps none, of all signals: look at those in the mask. */
     void (*steps)(void *ctx, const struct trace_step *s, unsigned n);
     void (*advance)(void *ctx, int64_t t_ns); /* nothing more will come before t_ns; may be NULL */
@@ -43,22 +46,22 @@ struct trace_sink {
 /* Stands between the trace and its sinks: line_fault.h. */
 struct trace_filter {
     /* All steps up to and including until_ns, real changes from the levels `before`; hands on what trace_emit() is given. */
-    void (*steps)(void *ctx, uint32_t before, const struct trace_step *s, unsigned n, int64_t until_ns);
-    uint32_t level; /* as the sinks know them */
+    void (*steps)(void *ctx, uint64_t before, const struct trace_step *s, unsigned n, int64_t until_ns);
+    uint64_t level; /* as the sinks know them */
     void *ctx;
 };
 
 /* Of a board that keeps things to itself while nobody listens. */
 struct trace_source {
-    void (*wake)(void *ctx, uint32_t mask); /* somebody is about to listen to these signals: report what is under way */
+    void (*wake)(void *ctx, uint64_t mask); /* somebody is about to listen to these signals: report what is under way */
     void *ctx;
 };
 
 struct trace {
     const char *name[TRACE_SIGNALS_MAX];
     unsigned count;
-    uint32_t level;   /* as delivered, bit per signal */
-    uint32_t watched; /* union of the sinks' masks */
+    uint64_t level;   /* as delivered, bit per signal */
+    uint64_t watched; /* union of the sinks' masks */
     struct trace_sink *sinks;
     struct trace_filter *filter;                  /* or NULL */
     struct trace_source source;                   /* after trace_init(), by the board; wake may stay NULL */
@@ -87,7 +90,7 @@ void trace_detach(struct trace *t,
                   struct trace_sink *s); /* hears nothing more; harmless for one that is not attached */
 
 /* Whether anybody listens to one of the signals in mask. */
-static inline bool trace_watched(const struct trace *t, uint32_t mask)
+static inline bool trace_watched(const struct trace *t, uint64_t mask)
 {
     return (t->watched & mask) != 0;
 }
@@ -104,10 +107,10 @@ struct trace_step *trace_room(struct trace *t, unsigned n);
 void trace_commit(struct trace *t, unsigned n);
 
 /* As trace_commit() for steps that are a run of these lines. Delivered faster. */
-void trace_commit_run(struct trace *t, unsigned n, uint32_t lines);
+void trace_commit_run(struct trace *t, unsigned n, uint64_t lines);
 
 /* Reports the levels of the signals in the mask `lines` from t_ns on. Cheap when nobody listens to them. */
-static inline void trace_put(struct trace *t, uint32_t lines, uint32_t level, int64_t t_ns)
+static inline void trace_put(struct trace *t, uint64_t lines, uint64_t level, int64_t t_ns)
 {
     if (!(t->watched & lines) && t->pending_count == 0) t->level = (t->level & ~lines) | (level & lines);
     else trace_steps(t, &(struct trace_step){t_ns, lines, level}, 1);
@@ -115,12 +118,12 @@ static inline void trace_put(struct trace *t, uint32_t lines, uint32_t level, in
 
 static inline void trace_set(struct trace *t, unsigned sig, bool level, int64_t t_ns)
 {
-    trace_put(t, UINT32_C(1) << sig, (uint32_t)level << sig, t_ns);
+    trace_put(t, TRACE_BIT(sig), (uint64_t)level << sig, t_ns);
 }
 
 /* Calls a function for each change that a sink was given, one signal at a time: for sinks that need no speed. */
 typedef void trace_change_fn(void *ctx, unsigned sig, bool level, int64_t t_ns);
-void trace_each(const struct trace_step *s, unsigned n, uint32_t mask, trace_change_fn *change, void *ctx);
+void trace_each(const struct trace_step *s, unsigned n, uint64_t mask, trace_change_fn *change, void *ctx);
 
 /* Delivers everything up to and including t_ns: call with now - TRACE_LAG_NS while running (also while nobody listens, so
  * that done_ns keeps up), with now at the end. Then tells every sink. Going back does nothing. */

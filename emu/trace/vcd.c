@@ -72,10 +72,10 @@ static char *time_line(struct vcd *v, char *p, int64_t t_units)
     return p + 5;
 }
 
-static char *level_lines(char *p, uint32_t lines, uint32_t level)
+static char *level_lines(char *p, uint64_t lines, uint64_t level)
 {
     for (; lines; lines &= lines - 1) {
-        const unsigned sig = (unsigned)__builtin_ctz(lines);
+        const unsigned sig = (unsigned)__builtin_ctzll(lines);
         *p++ = (char)('0' + (level >> sig & 1));
         *p++ = code_of(sig);
         *p++ = '\n';
@@ -84,7 +84,7 @@ static char *level_lines(char *p, uint32_t lines, uint32_t level)
 }
 
 /* The path of every edge. */
-static void step(struct vcd *v, const struct trace_step *s, uint32_t lines)
+static void step(struct vcd *v, const struct trace_step *s, uint64_t lines)
 {
     if (VCD_BUF - v->len < STEP_MAX_LEN) write_out(v);
     const int64_t t_units = s->t_ns / v->unit_ns;
@@ -105,7 +105,7 @@ static void steps(void *ctx, const struct trace_step *s, unsigned n)
 {
     struct vcd *v = ctx;
     for (const struct trace_step *const end = s + n; s < end; s++) {
-        const uint32_t lines = s->lines & v->sink.mask;
+        const uint64_t lines = s->lines & v->sink.mask;
         if (lines) step(v, s, lines);
     }
 }
@@ -131,7 +131,7 @@ static bool put_timescale(struct vcd *v, uint32_t unit_ns)
     return false;
 }
 
-static void put_names(struct vcd *v, const char *scope, uint32_t mask)
+static void put_names(struct vcd *v, const char *scope, uint64_t mask)
 {
     put(v, "$scope module ");
     put(v, scope);

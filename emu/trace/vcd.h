@@ -22,7 +22,7 @@ struct vcd_cfg {
     FILE *out;         /* open for writing; not closed here */
     const char *scope; /* no spaces; sigrok drops it, viewers show it */
     uint32_t unit_ns;  /* 1, 10, 100, 1000 ..., 100000000 */
-    uint32_t mask;     /* bit i: signal i; the signals must have been added before */
+    uint64_t mask;     /* bit i: signal i; the signals must have been added before */
 };
 
 struct vcd { /* read-only outside vcd.c */

@@ -50,18 +50,18 @@ static void frame(void *ctx, const struct psa2_frame *f, int64_t t_ns)
     for (unsigned w = 0; w < PSA2_WORDS; w++) n->hash = (n->hash ^ f->word[w]) * UINT64_C(0x100000001B3);
 }
 
-static uint32_t bits_set(uint32_t v)
+static uint64_t bits_set(uint64_t v)
 {
-    v -= v >> 1 & 0x55555555;
-    v = (v & 0x33333333) + (v >> 2 & 0x33333333);
-    return ((v + (v >> 4)) & 0x0F0F0F0F) * 0x01010101 >> 24;
+    v -= v >> 1 & UINT64_C(0x5555555555555555);
+    v = (v & UINT64_C(0x3333333333333333)) + (v >> 2 & UINT64_C(0x3333333333333333));
+    return ((v + (v >> 4)) & UINT64_C(0x0F0F0F0F0F0F0F0F)) * UINT64_C(0x0101010101010101) >> 56;
 }
 
 static void count(void *ctx, const struct trace_step *s, unsigned n)
 {
     uint64_t edges = 0;
     for (unsigned i = 0; i < n; i++) {
-        const uint32_t lines = s[i].lines; /* mostly one, where reads are more, seldom none */
+        const uint64_t lines = s[i].lines; /* mostly one, where reads are more, seldom none */
         edges += lines & (lines - 1) ? bits_set(lines) : lines != 0;
     }
     ((struct bench *)ctx)->edges += edges;

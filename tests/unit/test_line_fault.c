@@ -19,7 +19,7 @@ struct bench {
     struct trace_sink sink;
     struct seen seen[SEEN_MAX];
     unsigned n;
-    uint32_t level; /* as heard */
+    uint64_t level; /* as heard */
     int64_t last_ns;
 };
 
@@ -30,11 +30,11 @@ static void on_steps(void *ctx, const struct trace_step *s, unsigned n)
     struct bench *r = ctx;
     for (; n > 0; n--, s++) {
         assert_true(s->t_ns >= r->last_ns); /* in order of time */
-        assert_true(s->lines == 7 ||
+        assert_true(s->lines == TRACE_FIRST(r->t.count) ||
                     ((r->level ^ s->level) & s->lines) == s->lines); /* real changes, but for the first news */
         r->last_ns = s->t_ns;
         r->level = (r->level & ~s->lines) | (s->level & s->lines);
-        for (unsigned sig = 0; sig < 3; sig++)
+        for (unsigned sig = 0; sig < r->t.count; sig++)
             if (s->lines >> sig & 1 && r->n < SEEN_MAX)
                 r->seen[r->n++] = (struct seen){s->t_ns, sig, s->level >> sig & 1};
     }
@@ -322,6 +322,31 @@ static void a_fault_that_ends_before_it_begins_is_none(void **state)
     assert_null(r->t.filter);
 }
 
+/* A line and a frame's line above the first 32. */
+static void high_lines_have_faults_too(void **state)
+{
+    (void)state;
+    struct bench *r = up();
+    trace_detach(&r->t, &r->sink);
+    for (unsigned i = r->t.count; i < 40; i++) (void)trace_add(&r->t, "line", i == 38);
+    r->sink.mask = TRACE_FIRST(40);
+    trace_attach(&r->t, &r->sink);
+    r->n = 0;
+    struct line_fault f = fault(LINE_MISSING_PULSE, 39);
+    f.frame_line = 38;
+    f.pulse = 2;
+    (void)line_fault_add(&r->l, &f);
+    trace_set(&r->t, 38, false, 1000);
+    for (int i = 0; i < 4; i++) {
+        trace_set(&r->t, 39, true, 1100 + 100 * i);
+        trace_set(&r->t, 39, false, 1150 + 100 * i);
+    }
+    trace_advance(&r->t, 3000);
+    assert_int_equal(count(r, 38), 1);
+    assert_int_equal(count(r, 39), 6);
+    assert_change(r, 39, 2, true, 1300);
+}
+
 /* More changes than are handed on at a time. */
 static void nothing_is_lost_of_a_long_row(void **state)
 {
@@ -350,6 +375,7 @@ int main(void)
         cmocka_unit_test(as_many_faults_as_there_is_room_for_and_no_more),
         cmocka_unit_test(who_listens_again_hears_times_in_order),
         cmocka_unit_test(a_fault_that_ends_before_it_begins_is_none),
+        cmocka_unit_test(high_lines_have_faults_too),
         cmocka_unit_test(nothing_is_lost_of_a_long_row),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

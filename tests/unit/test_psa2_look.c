@@ -10,10 +10,10 @@
 static struct rig watched, fresh;
 
 /* As the command `lines` takes them: what was delivered and what is due. */
-static uint32_t levels(const struct rig *r)
+static uint64_t levels(const struct rig *r)
 {
     const struct trace *t = &r->b.trace;
-    uint32_t level = t->level;
+    uint64_t level = t->level;
     for (unsigned i = t->first; i < t->first + t->pending_count && t->pending[i].t_ns <= r->s.now_ns; i++) {
         level = (level & ~t->pending[i].lines) | (t->pending[i].level & t->pending[i].lines);
     }
@@ -41,22 +41,22 @@ static void both_run(int64_t ns)
     rig_run(&fresh, ns);
 }
 
-static void same_levels(const char *profile, uint32_t lines)
+static void same_levels(const char *profile, uint64_t lines)
 {
-    const uint32_t want = levels(&watched) & lines, got = levels(&fresh) & lines;
+    const uint64_t want = levels(&watched) & lines, got = levels(&fresh) & lines;
     for (unsigned i = 0; i < PSA2_LINES; i++) {
         if ((want ^ got) >> i & 1) {
             fail_msg("%s: at %lld ns %s is %u, told %u", profile, (long long)watched.s.now_ns,
-                     psa2_line_name((enum psa2_line)i), want >> i & 1, got >> i & 1);
+                     psa2_line_name((enum psa2_line)i), (unsigned)(want >> i & 1), (unsigned)(got >> i & 1));
         }
     }
 }
 
 /* All lines but those that a byte just ended still moves, within a period of SClk. */
-static uint32_t settled(void)
+static uint64_t settled(void)
 {
     const struct trace *t = &watched.b.trace;
-    uint32_t lines = ALL_LINES;
+    uint64_t lines = ALL_LINES;
     for (unsigned i = t->first; i < t->first + t->pending_count; i++) {
         if (t->pending[i].t_ns > watched.s.now_ns) lines &= ~t->pending[i].lines;
     }
@@ -109,7 +109,7 @@ static void a_late_look_tells_what_an_early_one_knows(void **state)
             for (int us = 0; i % 10 == 0 && us < 2000 && !in_burst(); us++) both_run(1000);
             in_frames += watched.b.out.busy;
             in_bursts += in_burst();
-            for (unsigned k = 0; k < PSA2_LINES; k++) high[k] += levels(&watched) >> k & 1;
+            for (unsigned k = 0; k < PSA2_LINES; k++) high[k] += (unsigned)(levels(&watched) >> k & 1);
             look(&rng, profiles[p]);
             watched.edges = 0;
         }

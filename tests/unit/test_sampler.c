@@ -122,7 +122,7 @@ static void nothing_is_watched_once_stopped_and_what_waits_stays(void **state)
     assert_true(sampler_start(&sampler, &trace, &mhz8));
     trace_advance(&trace, 250);
     sampler_stop(&sampler);
-    assert_false(trace_watched(&trace, ~0u));
+    assert_false(trace_watched(&trace, UINT64_MAX));
     const uint8_t want[] = {I, I};
     assert_bytes(want, sizeof want);
 }

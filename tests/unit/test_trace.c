@@ -40,7 +40,7 @@ static void hear_advance(void *ctx, int64_t t_ns)
     ((struct ear *)ctx)->advanced_ns = t_ns;
 }
 
-static void listen(struct ear *e, uint32_t mask)
+static void listen(struct ear *e, uint64_t mask)
 {
     *e = (struct ear){.sink = {.mask = mask, .steps = hear_steps, .advance = hear_advance, .ctx = e}};
     trace_attach(&trace, &e->sink);
@@ -123,7 +123,7 @@ static void a_sink_first_hears_the_levels_and_only_its_own_signals(void **state)
 static void nobody_listening_costs_no_work_and_detaching_keeps_the_levels(void **state)
 {
     (void)state;
-    assert_false(trace_watched(&trace, ~0u));
+    assert_false(trace_watched(&trace, UINT64_MAX));
     listen(&ear, 1);
     listen(&other, 6);
     assert_true(trace_watched(&trace, 4));
@@ -295,6 +295,28 @@ static void runs_are_what_their_steps_are(void **state)
     assert_true(whole > 1000);
 }
 
+/* The highest signals are as good as the lowest. */
+static void all_signals_are_delivered(void **state)
+{
+    (void)state;
+    static const unsigned look[] = {31, 32, 33, 62, 63};
+    trace_init(&trace);
+    for (unsigned i = 0; i < TRACE_SIGNALS_MAX; i++) assert_int_equal(trace_add(&trace, "line", i == 40), i);
+    listen(&ear, TRACE_FIRST(64));
+    assert_int_equal(ear.count, 64); /* the levels */
+    for (unsigned i = 0; i < 64; i++) assert_int_equal(ear.heard[i].level, i == 40);
+    ear.count = 0;
+    for (unsigned i = 0; i < COUNT(look); i++) trace_set(&trace, look[i], true, 10 * i);
+    trace_set(&trace, 40, false, 100);
+    trace_advance(&trace, 100);
+    assert_int_equal(ear.count, COUNT(look) + 1);
+    for (unsigned i = 0; i < COUNT(look); i++) assert_int_equal(ear.heard[i].sig, look[i]);
+    assert_int_equal(ear.heard[COUNT(look)].sig, 40);
+    assert_true(trace.level == (TRACE_BIT(31) | TRACE_BIT(32) | TRACE_BIT(33) | TRACE_BIT(62) | TRACE_BIT(63)));
+    assert_true(trace_watched(&trace, TRACE_BIT(63)));
+    assert_true(TRACE_FIRST(34) == UINT64_C(0x3FFFFFFFF) && TRACE_FIRST(1) == 1);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -310,6 +332,7 @@ int main(void)
         cmocka_unit_test_setup(a_long_run_fits, fresh),
         cmocka_unit_test_setup(random_reports_come_out_sorted, fresh),
         cmocka_unit_test(runs_are_what_their_steps_are),
+        cmocka_unit_test(all_signals_are_delivered),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -56,6 +56,26 @@ static void the_file_is_what_ieee_1364_says_and_ends_after_the_last_edge(void **
     fclose(f);
 }
 
+static void sixty_four_lines_have_codes_of_their_own(void **state)
+{
+    (void)state;
+    trace_init(&trace);
+    for (unsigned i = 0; i < TRACE_SIGNALS_MAX; i++) (void)trace_add(&trace, i == 63 ? "last" : "line", false);
+    FILE *f = tmpfile();
+    assert_non_null(f);
+    const struct vcd_cfg cfg = {
+        .out = f, .scope = "unit1", .unit_ns = 10, .mask = TRACE_BIT(0) | TRACE_BIT(33) | TRACE_BIT(63)};
+    assert_true(vcd_open(&vcd, &cfg, &trace));
+    trace_set(&trace, 63, true, 1000);
+    trace_set(&trace, 33, true, 1010);
+    trace_advance(&trace, 1500);
+    vcd_close(&vcd, 1500);
+    const char *const got = read_back(f);
+    assert_non_null(strstr(got, "$var wire 1 B line $end\n$var wire 1 ` last $end\n"));
+    assert_non_null(strstr(got, "#0\n$dumpvars\n0!\n0B\n0`\n$end\n#100\n1`\n#101\n1B\n#150\n"));
+    fclose(f);
+}
+
 static void times_are_rounded_down_to_the_unit(void **state)
 {
     (void)state;
@@ -191,6 +211,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(the_file_is_what_ieee_1364_says_and_ends_after_the_last_edge, fresh),
+        cmocka_unit_test_setup(sixty_four_lines_have_codes_of_their_own, fresh),
         cmocka_unit_test(times_are_rounded_down_to_the_unit),
         cmocka_unit_test_setup(times_have_the_digits_that_printf_gives, fresh),
         cmocka_unit_test_setup(a_unit_that_vcd_does_not_know_is_refused, fresh),
