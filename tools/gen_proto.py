@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Everything that follows from proto/psabench.yaml and proto/<board>.yaml, the single source of CAN messages and objects.
+"""Everything that follows from proto/psabench.yaml and proto/<board>.yaml, the source of CAN messages and objects.
 
 Usage:
     gen_proto.py            write proto/psabench.dbc, an EDS and a protocol page a device, which are kept in git
@@ -438,8 +438,18 @@ def od_row(p: Protocol, e: Entry) -> str:
     return "    {" + ", ".join(cells) + f"}}, /* {e.name} */"
 
 
+def c_entries(o: Object) -> list[Entry]:
+    """The entries as the SDO server is to judge them: a cycle on the bus is for the board to refuse, not for a table."""
+    if o.index != BUS:
+        return list(o.entries)
+    named = {e.sub: e for e in o.entries}
+    nothing = replace(o.entries[1], name="nothing", comment="")
+    cycles = [replace(named.get(a + 1, nothing), sub=a + 1, access="rw") for a in BUS_REGISTERS]
+    return [o.entries[0], *cycles]
+
+
 def od_source(p: Protocol) -> str:
-    rows = [od_row(p, e) for o in p.objects for e in o.entries]
+    rows = [od_row(p, e) for o in p.objects for e in c_entries(o)]
     lines = [f"/* {p.generated} */", f'#include "gen/{p.key}_od.h"', "", "#include <stddef.h>", "",
              "static const struct co_entry entry[] = {", *rows, "};", "",
              f"const struct co_od {p.key}_od = {{entry, sizeof entry / sizeof entry[0]}};", ""]  # fmt: skip
@@ -471,7 +481,8 @@ def od_header(p: Protocol) -> str:
     key, upper = p.key, p.key.upper()
     guard = f"PSABENCH_GEN_{upper}_OD_H"
     include = "co_device" if key in BOARDS else "co_od"
-    out = [f"/* Object dictionary of a {p.device['name']} unit; {p.generated} */", f"#ifndef {guard}", f"#define {guard}", "",
+    what = f"/* Object dictionary of a {p.device['name']} unit; {p.generated} */"
+    out = [what, f"#ifndef {guard}", f"#define {guard}", "",
            f'#include "canopen/{include}.h"', ""]  # fmt: skip
     out += enum(f"{key}_od_index", [f"{upper}_OD_{o.const} = 0x{o.index:04X}" for o in p.objects if o.const])
     if p.forms:

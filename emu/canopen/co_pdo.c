@@ -51,6 +51,16 @@ static bool valid(const struct co_pdo *p)
     return p->selected && !p->off;
 }
 
+void co_pdo_switch_off(struct co_node *n, unsigned mask)
+{
+    for (unsigned k = 0; k < n->cfg.tpdos; k++) n->pdo[k].off = n->pdo[k].off || (mask >> k & 1u);
+}
+
+bool co_pdo_flows(const struct co_node *n, unsigned k)
+{
+    return valid(&n->pdo[k]) && n->pdo[k].type > TYPE_SYNC_MAX;
+}
+
 bool co_pdo_room(const struct co_node *n, unsigned frames)
 {
     return n->stream.queued + frames <= CO_PDO_BACKLOG;

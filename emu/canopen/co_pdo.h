@@ -34,6 +34,12 @@ void co_pdo_reset(struct co_node *n);
 /* Which TPDOs the application feeds: bit k is TPDO k + 1. */
 void co_pdo_select(struct co_node *n, unsigned mask);
 
+/* As the host does by bit 31 of the COB-ID: those of the mask, from now to the next reset. */
+void co_pdo_switch_off(struct co_node *n, unsigned mask);
+
+/* Whether TPDO k would be sent each time content is offered, inhibit time aside. */
+bool co_pdo_flows(const struct co_node *n, unsigned k);
+
 /* New content of TPDO k in m->data, len and flags; the identifier is filled in. Only in operational is anything sent. */
 enum co_pdo_result co_pdo_offer(struct co_node *n, unsigned k, struct can_msg *m, int64_t t_ns);
 

@@ -1,0 +1,379 @@
+#include "board/node.h"
+
+#include "base/canbits.h"
+
+#include <assert.h>
+#include <stdio.h>
+#include <string.h>
+
+/* Objects of proto/unit.yaml and of every device; a test holds the numbers against the generated tables. */
+enum {
+    IDENTITY = 0x1018,
+    BUS = 0x2002,
+    COUNTERS = 0x2030,
+    REFUSAL = 0x2031,
+    REMARK = 0x2040,
+    STROBE_NS = 0x2051,
+};
+enum { CAN_OVERRUN = 0x8110, STREAM_REFUSED = 0xFF03, SOURCE_STREAM = 3, REG_COMM = 0x11, REG_DEVICE = 0x81 };
+
+double board_node_default(const struct board_node *n, uint16_t index, uint8_t sub)
+{
+    uint32_t abort = CO_OK;
+    const struct co_entry *e = co_find(n->type->device->od, index, sub, &abort);
+    return e ? e->value : 0.0;
+}
+
+/* ---- bus cycles ---- */
+
+static const struct {
+    uint32_t abort;
+    const char *why;
+} refusals[] = {
+    [BOARD_CYCLE_OK] = {CO_OK, ""},
+    [BOARD_CYCLE_NO_ADDRESS] = {CO_AB_NO_SUB, "nothing answers at this address"},
+    [BOARD_CYCLE_READ_ONLY] = {CO_AB_READ_ONLY, "this register is read-only"},
+    [BOARD_CYCLE_WRITE_ONLY] = {CO_AB_WRITE_ONLY, "this register is write-only"},
+    [BOARD_CYCLE_NOT_READY] = {CO_AB_STATE, "too early: no word waits there"},
+    [BOARD_CYCLE_TOO_SHORT] = {CO_AB_VALUE, "the strobe is shorter than the board needs"},
+    [BOARD_CYCLE_BUSY] = {CO_AB_STATE, "another cycle is under way"},
+    [BOARD_CYCLE_BAD_VALUE] = {CO_AB_VALUE, "the register does not take this value"},
+    [BOARD_CYCLE_OFF] = {CO_AB_STATE, "the board has no power, or is in reset"},
+};
+
+uint32_t board_node_abort_of(enum board_cycle_result r)
+{
+    assert((size_t)r < sizeof refusals / sizeof refusals[0]);
+    return refusals[r].abort;
+}
+
+static void tell_refusal(struct board_node *n, const struct board_cycle *c, enum board_cycle_result r)
+{
+    char strobe[32] = "as the profile has it";
+    const char *name = n->type->board->bus->name(c->address);
+    if (c->strobe_ns > 0) (void)snprintf(strobe, sizeof strobe, "%lld ns", (long long)c->strobe_ns);
+    (void)snprintf(n->refusal, sizeof n->refusal, "refused: %s address %u (%s), strobe %s: %s",
+                   c->write ? "write to" : "read of", c->address, name ? name : "nothing", strobe, refusals[r].why);
+    n->cycles_refused++;
+}
+
+/* Here OFF means that the cycle was cut. */
+static void cycle_done(void *ctx, struct board_cycle *c, enum board_cycle_result r, int64_t t_ns)
+{
+    struct board_node *n = ctx;
+    n->cycle_busy = false;
+    if (r == BOARD_CYCLE_OK) n->cycles++;
+    else tell_refusal(n, c, r);
+    const uint32_t abort = r == BOARD_CYCLE_OFF ? CO_AB_TRANSFER : board_node_abort_of(r);
+    const struct co_value v = {.number = c->data};
+    co_sdo_answer(&n->node.sdo, n->ticket, abort, &v, t_ns);
+}
+
+static uint32_t submit(struct board_node *n, bool write, uint8_t address, uint16_t data, int64_t t_ns)
+{
+    struct board_cycle c = {
+        .write = write, .address = address, .data = data, .strobe_ns = n->strobe_ns, .done = cycle_done, .ctx = n};
+    enum board_cycle_result r = BOARD_CYCLE_BUSY; /* of a client that has given up; the board still has it */
+    if (!n->cycle_busy) {
+        n->cycle = c;
+        n->ticket = n->node.sdo.ticket;
+        n->cycle_busy = true;
+        r = n->type->board->bus->submit(n->board, &n->cycle, t_ns);
+        if (r == BOARD_CYCLE_OK) return CO_PENDING;
+        n->cycle_busy = false;
+    }
+    tell_refusal(n, &c, r);
+    return board_node_abort_of(r);
+}
+
+static uint32_t read_bus(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
+{
+    (void)v;
+    return submit(n, false, (uint8_t)(e->sub - 1), 0, t_ns);
+}
+
+static uint32_t write_bus(struct board_node *n, const struct co_entry *e, const struct co_value *v, int64_t t_ns)
+{
+    return submit(n, true, (uint8_t)(e->sub - 1), (uint16_t)v->number, t_ns);
+}
+
+static uint32_t read_strobe(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
+{
+    (void)e;
+    (void)t_ns;
+    v->number = n->strobe_ns;
+    return CO_OK;
+}
+
+static uint32_t write_strobe(struct board_node *n, const struct co_entry *e, const struct co_value *v, int64_t t_ns)
+{
+    (void)e;
+    (void)t_ns;
+    n->strobe_ns = (uint32_t)v->number;
+    return CO_OK;
+}
+
+/* ---- counters and identity ---- */
+
+static const struct board_part *controller(const struct board_node *n)
+{
+    return &n->type->board->parts[0];
+}
+
+static const struct board_counter *counter_named(const struct board_node *n, const char *name)
+{
+    const struct board_part *p = controller(n);
+    for (unsigned i = 0; i < p->counter_count; i++) {
+        if (strcmp(p->counters[i].name, name) == 0) return &p->counters[i];
+    }
+    return NULL;
+}
+
+static uint32_t board_counter_value(const struct board_node *n, unsigned i)
+{
+    const struct board_counter *c = counter_named(n, n->type->device->counters[i]);
+    uint32_t value = 0;
+    memcpy(&value, (const char *)n->board + controller(n)->offset + c->offset, sizeof value);
+    return value;
+}
+
+static uint8_t at_most_255(unsigned n)
+{
+    return (uint8_t)(n < 255 ? n : 255);
+}
+
+/* The first sub-indices of 2030h, in the order of proto/unit.yaml. */
+static uint32_t read_counter(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
+{
+    enum { LOAD = 3 };
+    const struct co_device *d = n->type->device;
+    const uint32_t value[] = {0,
+                              n->readings,
+                              n->dropped + n->node.pdo_lost,
+                              0,
+                              at_most_255(n->node.services.tec),
+                              at_most_255(n->node.services.rec),
+                              n->node.pdo_inhibited,
+                              n->node.syncs,
+                              n->node.sdo.aborts,
+                              n->node.malformed + n->node.sdo.malformed,
+                              n->cycles,
+                              n->cycles_refused};
+    assert(d->counter_sub == sizeof value / sizeof value[0]);
+    if (e->sub >= d->counter_sub) v->number = board_counter_value(n, (unsigned)e->sub - d->counter_sub);
+    else v->number = e->sub == LOAD ? (double)can_load_since(&n->load, n->bus, t_ns) : value[e->sub];
+    return CO_OK;
+}
+
+static uint32_t read_serial(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
+{
+    (void)e;
+    (void)t_ns;
+    v->number = n->type->serial(n->board);
+    return CO_OK;
+}
+
+/* ---- whether the bus can carry the stream ---- */
+
+/* Bit k: TPDO k + 1 goes with each reading; those that wait for SYNC have the host's pace. */
+static unsigned flowing(const struct board_node *n)
+{
+    unsigned mask = 0;
+    for (unsigned k = 0; k < n->type->device->tpdos; k++) mask |= (unsigned)co_pdo_flows(&n->node, k) << k;
+    return mask;
+}
+
+static bool fits(const struct board_node *n, unsigned tpdos, int64_t period_ns, char why[BOARD_NODE_TEXT])
+{
+    int64_t need_ns = 0;
+    unsigned frames = 0;
+    for (unsigned k = 0; k < n->type->device->tpdos; k++) {
+        if (!(tpdos >> k & 1u)) continue;
+        frames++;
+        need_ns += can_bits_ns(can_bits_worst(0, n->type->device->tpdo_len[k]), &n->bus->cfg);
+    }
+    return can_load_fits(&n->bus->cfg, "a reading", frames, need_ns, period_ns, why, BOARD_NODE_TEXT);
+}
+
+/* ---- texts ---- */
+
+static uint32_t read_text(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
+{
+    (void)t_ns;
+    char stands[BOARD_NODE_TEXT];
+    const char *text = e->index == REFUSAL ? n->refusal : n->remark;
+    if (e->index == REFUSAL && !fits(n, n->fit_tpdos, n->fit_period_ns, stands)) text = stands;
+    v->len = (uint16_t)strlen(text);
+    memcpy(v->text, text, (size_t)v->len + 1);
+    return CO_OK;
+}
+
+static uint32_t write_remark(struct board_node *n, const struct co_entry *e, const struct co_value *v, int64_t t_ns)
+{
+    (void)e;
+    (void)t_ns;
+    const size_t len = v->len < BOARD_NODE_REMARK ? v->len : BOARD_NODE_REMARK;
+    memcpy(n->remark, v->text, len);
+    n->remark[len] = '\0';
+    return CO_OK;
+}
+
+/* ---- which function answers for an object ---- */
+
+static const struct board_object common[] = {
+    {IDENTITY, read_serial, NULL}, {BUS, read_bus, write_bus},        {COUNTERS, read_counter, NULL},
+    {REFUSAL, read_text, NULL},    {REMARK, read_text, write_remark}, {STROBE_NS, read_strobe, write_strobe},
+};
+
+static const struct board_object *find(const struct board_object *objects, size_t count, uint16_t index)
+{
+    for (size_t i = 0; i < count; i++) {
+        if (objects[i].index == index) return &objects[i];
+    }
+    return NULL;
+}
+
+/* The board's own come first: it may answer for a common object itself. */
+static const struct board_object *handler(const struct board_node *n, uint16_t index)
+{
+    const struct board_object *own = find(n->type->objects, n->type->object_count, index);
+    return own ? own : find(common, sizeof common / sizeof common[0], index);
+}
+
+static uint32_t on_read(void *ctx, const struct co_entry *e, struct co_value *v, int64_t t_ns)
+{
+    struct board_node *n = ctx;
+    const struct board_object *o = handler(n, e->index);
+    return o && o->read ? o->read(n, e, v, t_ns) : CO_AB_NO_OBJECT;
+}
+
+static uint32_t on_write(void *ctx, const struct co_entry *e, const struct co_value *v, int64_t t_ns)
+{
+    struct board_node *n = ctx;
+    const struct board_object *o = handler(n, e->index);
+    return o && o->write ? o->write(n, e, v, t_ns) : CO_AB_NO_OBJECT;
+}
+
+/* ---- stream ---- */
+
+/* Tells only changes. */
+static void judge(struct board_node *n, int64_t t_ns)
+{
+    char why[BOARD_NODE_TEXT];
+    const int64_t period_ns = n->type->period_ns ? n->type->period_ns(n->board) : 0;
+    const unsigned tpdos = flowing(n);
+    if (period_ns == n->fit_period_ns && tpdos == n->fit_tpdos) return;
+    const bool fitted = n->fits;
+    n->fit_period_ns = period_ns;
+    n->fit_tpdos = tpdos;
+    n->fits = fits(n, tpdos, period_ns, why);
+    if (n->fits) {
+        co_node_error_end(&n->node, STREAM_REFUSED, t_ns);
+        return;
+    }
+    if (fitted && n->cfg.refused) n->cfg.refused(n->cfg.ctx, n->cfg.name, why);
+    co_node_error(&n->node, STREAM_REFUSED, REG_DEVICE, SOURCE_STREAM, t_ns);
+}
+
+static void lost(struct board_node *n, int64_t t_ns)
+{
+    n->dropped++;
+    n->drop_ns = t_ns;
+    co_node_error(&n->node, CAN_OVERRUN, REG_COMM, SOURCE_STREAM, t_ns);
+}
+
+void board_node_stream(struct board_node *n, unsigned first, struct can_msg *m, unsigned frames, int64_t t_ns)
+{
+    n->readings++;
+    if (n->node.state != CO_OPERATIONAL) return;
+    judge(n, t_ns);
+    if (!n->fits) {
+        n->dropped++;
+        return;
+    }
+    if (!co_pdo_room(&n->node, frames)) { /* a reading is sent whole or not at all */
+        lost(n, t_ns);
+        return;
+    }
+    for (unsigned i = 0; i < frames; i++) (void)co_pdo_offer(&n->node, first + i, &m[i], t_ns);
+    if (t_ns - n->drop_ns >= BOARD_NODE_CALM_NS) co_node_error_end(&n->node, CAN_OVERRUN, t_ns);
+}
+
+/* ---- what the node tells, life ---- */
+
+static void defaults(struct board_node *n)
+{
+    n->strobe_ns = (uint32_t)board_node_default(n, STROBE_NS, 0);
+    n->refusal[0] = '\0';
+    if (n->type->defaults) n->type->defaults(n);
+}
+
+/* Not judged yet: no period is negative. */
+static void unjudge(struct board_node *n)
+{
+    n->fit_period_ns = -1;
+    n->fits = true;
+}
+
+static void on_event(void *ctx, enum co_event ev, int64_t t_ns)
+{
+    struct board_node *n = ctx;
+    if (ev == CO_EV_RESET_NODE) {
+        defaults(n);
+        n->type->board->reset(n->board, t_ns);
+    }
+    if (ev != CO_EV_STATE) {
+        co_pdo_select(&n->node, (1u << n->type->device->tpdos) - 1u);
+        co_pdo_switch_off(&n->node, n->type->device->tpdo_off);
+        unjudge(n);
+    }
+    if (ev != CO_EV_STATE || n->node.state != CO_OPERATIONAL) return;
+    judge(n, t_ns);
+    if (n->type->started) n->type->started(n, t_ns);
+}
+
+static void on_sync(void *ctx, int64_t t_ns)
+{
+    struct board_node *n = ctx;
+    if (n->type->sync) n->type->sync(n, t_ns);
+}
+
+void board_node_init(struct board_node *n, const struct board_node_type *type, const struct board_can_cfg *cfg,
+                     void *board, struct can_bus *bus, struct sched *s)
+{
+    const struct co_device *d = type->device;
+    memset(n, 0, sizeof *n);
+    n->type = type;
+    n->cfg = *cfg;
+    n->board = board;
+    n->bus = bus;
+    n->drop_ns = -BOARD_NODE_CALM_NS;
+    for (unsigned i = 0; i < d->counter_count; i++) assert(counter_named(n, d->counters[i]));
+    const struct co_node_cfg node = {.name = cfg->name, .id = cfg->node_id, .od = d->od, .tpdos = d->tpdos};
+    const struct co_node_io io = {n, on_read, on_write, on_event, on_sync};
+    co_node_init(&n->node, &node, &io, bus, s);
+    unjudge(n);
+    defaults(n);
+}
+
+void board_node_power_up(void *can, int64_t t_ns)
+{
+    struct board_node *n = can;
+    co_node_power_up(&n->node, t_ns);
+}
+
+/* Forgets everything but the counters. */
+void board_node_power_down(void *can)
+{
+    struct board_node *n = can;
+    co_node_power_down(&n->node);
+    defaults(n);
+    n->remark[0] = '\0';
+    n->drop_ns = -BOARD_NODE_CALM_NS;
+}
+
+struct co_node *board_node_co(void *can)
+{
+    struct board_node *n = can;
+    return &n->node;
+}

@@ -1,0 +1,93 @@
+/* A board's unit on CAN, as all boards but PSA-2 have it (docs/protocol_<board>.md): ties a board to a CANopen-shaped node.
+ *
+ * What every unit has is answered here: identity, counters (2030h, the board's own from board_part[0]), the parallel bus
+ * as objects (2002h: sub-index = address + 1, answered when the cycle is done; strobe length 2051h), the last refusal in
+ * words (2031h), a remark (2040h); the stream is judged against the bus before it flows. The rest of proto/<board>.yaml a
+ * board answers by a table of handlers. Owned by the caller, never moved after init, one thread, no allocation. A board's
+ * <board>_can.c, in the order of proto/<board>.yaml:
+ *
+ *     struct psd1_can { struct board_node node; ...settings of its own... };     // the node first
+ *     static const struct board_object objects[] = {{PSD1_OD_CODES, read_codes, NULL}, ...};
+ *     static const struct board_node_type type = {.board = &psd1_board, .device = &psd1_device, .objects = objects,
+ *                                                 .object_count = 7, .serial = serial_of, .period_ns = period_of};
+ *     const struct board_can psd1_can = {.size = sizeof(struct psd1_can), .init = init, .power_up = board_node_power_up,
+ *                                        .power_down = board_node_power_down, .node = board_node_co};
+ *     static void init(void *can, const struct board_can_cfg *cfg, void *board, struct can_bus *bus, struct sched *s)
+ *     {   board_node_init(can, &type, cfg, board, bus, s);  ((struct psd1 *)board)->reading = on_reading; ... }
+ *
+ * and when a reading is complete board_node_stream(&can->node, PSD1_CYCLE_TPDO, m, 1, t_ns).                         */
+#ifndef PSABENCH_BOARD_NODE_H
+#define PSABENCH_BOARD_NODE_H
+
+#include "board/board.h"
+#include "board/can_load.h"
+#include "canopen/co_device.h"
+#include "canopen/co_node.h"
+
+#define BOARD_NODE_TEXT    200u     /* characters of object 2031h */
+#define BOARD_NODE_REMARK  64u      /* of object 2040h */
+#define BOARD_NODE_CALM_NS NS_PER_S /* without a loss: the condition CAN overrun ends */
+
+struct board_node;
+
+/* Which functions answer for an object, all its sub-indices; NULL: cannot. Rights, type and limits of the entry have been
+ * checked. CO_OK, an abort code, or CO_PENDING: then co_sdo_answer() with the ticket node.sdo.ticket had. */
+struct board_object {
+    uint16_t index;
+    uint32_t (*read)(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns);
+    uint32_t (*write)(struct board_node *n, const struct co_entry *e, const struct co_value *v, int64_t t_ns);
+};
+
+struct board_node_type {
+    const struct board_type *board;
+    const struct co_device *device;
+    const struct board_object *objects;
+    unsigned object_count;
+    uint32_t (*serial)(const void *board);
+    int64_t (*period_ns)(const void *board);             /* of the stream as it is set now; NULL: not judged */
+    void (*defaults)(struct board_node *n);              /* settings of its own, also at init; or NULL */
+    void (*sync)(struct board_node *n, int64_t t_ns);    /* SYNC came; or NULL */
+    void (*started)(struct board_node *n, int64_t t_ns); /* the node became operational; or NULL */
+};
+
+/* Read-only outside board/node.c. */
+struct board_node {
+    const struct board_node_type *type;
+    struct board_can_cfg cfg;
+    void *board;
+    struct can_bus *bus;
+    struct co_node node;
+    /* stream */
+    int64_t fit_period_ns; /* fits holds for this period and these TPDOs */
+    unsigned fit_tpdos;
+    bool fits; /* false: the stream stands, EMCY FF03h is active */
+    uint32_t readings, dropped;
+    int64_t drop_ns; /* last */
+    /* bus cycle under way */
+    struct board_cycle cycle;
+    bool cycle_busy;
+    uint32_t ticket, cycles, cycles_refused;
+    uint32_t strobe_ns; /* 2051h */
+    struct can_load_mark load;
+    char refusal[BOARD_NODE_TEXT], remark[BOARD_NODE_REMARK + 1];
+};
+
+/* Asserts that the board has every counter of its device. */
+void board_node_init(struct board_node *n, const struct board_node_type *type, const struct board_can_cfg *cfg,
+                     void *board, struct can_bus *bus, struct sched *s);
+
+/* For struct board_can; can: a struct that begins with the node. */
+void board_node_power_up(void *can, int64_t t_ns);
+void board_node_power_down(void *can);
+struct co_node *board_node_co(void *can);
+
+/* A reading: m[i] (data and len) goes as TPDO first + i, all or none. Counted also where nothing is sent. */
+void board_node_stream(struct board_node *n, unsigned first, struct can_msg *m, unsigned frames, int64_t t_ns);
+
+/* SDO abort code of a refused cycle: sources can 3.3. */
+uint32_t board_node_abort_of(enum board_cycle_result r);
+
+/* Default of an entry as proto/<board>.yaml has it. */
+double board_node_default(const struct board_node *n, uint16_t index, uint8_t sub);
+
+#endif
