@@ -46,6 +46,7 @@ RATES_HZ = (250, 500, 1000, 2000, 4000)
 # What every device has from psabench.yaml: messages of its own under its name, and objects.
 SERVICES = ("EMCY", "SDO_TX", "SDO_RX", "HEARTBEAT")
 COMMON_OBJECTS_END, REMARK = 0x1800, 0x2040
+HIGHEST = "Highest sub-index supported"
 BUS, BUS_REGISTERS = 0x2002, range(16)  # sub-index = address + 1: A3..A0
 
 
@@ -156,7 +157,7 @@ def read_message(m: dict[str, Any]) -> Message:
 
 def record(index: int, name: str, subs: list[dict[str, Any]], **more: Any) -> Object:
     """An object with sub-indices: sub 0 holds their number unless the source says otherwise."""
-    first = {"name": "Highest sub-index supported", "type": "UNSIGNED8", "access": "const", "value": len(subs)}
+    first = {"name": HIGHEST, "type": "UNSIGNED8", "access": "const", "value": len(subs)}
     first.update(more.pop("sub0", {}))
     entries = [Entry(index=index, sub=k, **s) for k, s in enumerate([first, *subs])]
     return Object(index=index, name=name, entries=tuple(entries), var=False, **more)
@@ -246,8 +247,8 @@ def unit_messages(source: dict[str, Any], key: str, base: Protocol) -> list[Mess
 
 def bus_object(rows: list[dict[str, Any]]) -> Object:
     """2002h: the registers on the parallel bus; sub-index = address + 1, nothing where the bus has nothing."""
-    first = {"name": "Highest sub-index supported", "type": "UNSIGNED8", "access": "const"}
-    entries, address = [], 0
+    entries: list[Entry] = []
+    address = 0
     for r in rows:
         address = r.get("address", address)
         if address not in BUS_REGISTERS or (entries and address < entries[-1].sub):
@@ -255,7 +256,8 @@ def bus_object(rows: list[dict[str, Any]]) -> Object:
         row = {"type": "UNSIGNED16", "access": "rw", **{k: v for k, v in r.items() if k != "address"}}
         entries.append(Entry(index=BUS, sub=address + 1, **row))
         address += 1
-    top = Entry(index=BUS, sub=0, value=entries[-1].sub, **first)
+    highest = entries[-1].sub
+    top = Entry(index=BUS, sub=0, name=HIGHEST, type="UNSIGNED8", access="const", value=highest)
     about = "sub-index = address + 1; a read is a read cycle, a write a write cycle with the strobe of 2051h"
     return Object(index=BUS, name="Bus", entries=(top, *entries), var=False, const="BUS", comment=about)
 
@@ -439,7 +441,7 @@ def od_row(p: Protocol, e: Entry) -> str:
 
 
 def c_entries(o: Object) -> list[Entry]:
-    """The entries as the SDO server is to judge them: a cycle on the bus is for the board to refuse, not for a table."""
+    """The entries as the SDO server judges them: a cycle on the bus is for the board to refuse, not for a table."""
     if o.index != BUS:
         return list(o.entries)
     named = {e.sub: e for e in o.entries}
