@@ -176,11 +176,18 @@ void trace_each(const struct trace_step *s, unsigned n, uint64_t mask, trace_cha
         }
 }
 
-void trace_advance(struct trace *t, int64_t t_ns)
+static void advance(struct trace *t, int64_t t_ns)
 {
     deliver_until(t, t_ns);
     if (t_ns <= t->done_ns) return;
     t->done_ns = t_ns;
     for (const struct trace_sink *s = t->sinks; s; s = s->next)
         if (s->advance) s->advance(s->ctx, t_ns);
+}
+
+void trace_advance(struct trace *t, int64_t t_ns)
+{
+    if (t->source.report && t_ns > t->done_ns)
+        for (int64_t known_ns; (known_ns = t->source.report(t->source.ctx, t_ns)) < t_ns;) advance(t, known_ns);
+    advance(t, t_ns);
 }

@@ -54,6 +54,8 @@ struct trace_filter {
 /* Of a board that keeps things to itself while nobody listens. */
 struct trace_source {
     void (*wake)(void *ctx, uint64_t mask); /* somebody is about to listen to these signals: report what is under way */
+    /* For lines that move all the time: report them up to t_ns, or as far as there is room; returns how far. May be NULL. */
+    int64_t (*report)(void *ctx, int64_t t_ns);
     void *ctx;
 };
 
