@@ -304,7 +304,6 @@ void board_node_stream(struct board_node *n, unsigned first, struct can_msg *m, 
 static void defaults(struct board_node *n)
 {
     n->strobe_ns = (uint32_t)board_node_default(n, STROBE_NS, 0);
-    n->refusal[0] = '\0';
     if (n->type->defaults) n->type->defaults(n);
 }
 
@@ -321,6 +320,7 @@ static void on_event(void *ctx, enum co_event ev, int64_t t_ns)
     if (ev == CO_EV_RESET_NODE) {
         defaults(n);
         n->type->board->reset(n->board, t_ns);
+        n->refusal[0] = '\0'; /* a cycle that it has cut is of no interest any more */
     }
     if (ev != CO_EV_STATE) {
         co_pdo_select(&n->node, (1u << n->type->device->tpdos) - 1u);
@@ -368,7 +368,7 @@ void board_node_power_down(void *can)
     struct board_node *n = can;
     co_node_power_down(&n->node);
     defaults(n);
-    n->remark[0] = '\0';
+    n->refusal[0] = n->remark[0] = '\0';
     n->drop_ns = -BOARD_NODE_CALM_NS;
 }
 

@@ -435,6 +435,37 @@ static void counters_of_the_board_are_found_by_their_names(void **state)
     }
 }
 
+/* In whatever order the board has them. */
+static void the_order_of_the_board_s_counters_does_not_matter(void **state)
+{
+    (void)state;
+    static const char *const names[] = {"one", "two", "three"};
+    static struct co_device d;
+    d = psd1_device;
+    d.counters = names;
+    d.counter_count = 3;
+    struct rig *r = rig_of_device(&d, 1000000);
+    for (unsigned i = 0; i < 3; i++) r->board.counter[i] = 10 + i; /* three, two, one */
+    for (unsigned i = 0; i < 3; i++) {
+        const struct co_entry e = {.index = PSD1_OD_COUNTERS, .sub = (uint8_t)(d.counter_sub + i)};
+        struct co_value v = {0};
+        assert_int_equal(r->can.node.io.read(r->can.node.io.ctx, &e, &v, 0), CO_OK);
+        assert_int_equal((int)v.number, 12 - (int)i);
+    }
+}
+
+static void error_counters_read_255_at_most(void **state)
+{
+    (void)state;
+    struct rig *r = rig_up();
+    r->can.node.services.tec = 300;
+    r->can.node.services.rec = 17;
+    assert_int_equal(upload(r, PSD1_OD_COUNTERS, TEC), 255);
+    r->can.node.services.rec = 17; /* a frame that passes counts it down */
+    const uint32_t rec = upload(r, PSD1_OD_COUNTERS, REC);
+    assert_in_range(rec, 16, 17);
+}
+
 /* The numbers that node.c knows stand in every device's table. */
 static void every_device_has_the_common_objects(void **state)
 {
@@ -474,16 +505,20 @@ static void reset_node_resets_the_board_and_its_settings(void **state)
     const unsigned before = r->defaults;
     assert_int_equal(before, 1);
     write_u32(r, PSD1_OD_STROBE_NS, 0, 77);
+    r->board.accept = BOARD_CYCLE_NOT_READY;
+    assert_int_equal(upload(r, PSD1_OD_BUS, 1), 0x08000022);
+    r->board.accept = BOARD_CYCLE_OK;
     ask(r, 0x40, PSD1_OD_BUS, 1, 0); /* a cycle is under way */
     nmt(r, 130);
     assert_int_equal(r->board.resets, 0);
     assert_int_equal(upload(r, PSD1_OD_STROBE_NS, 0), 77);
-    ask(r, 0x40, PSD1_OD_BUS, 1, 0);
+    assert_string_not_equal(upload_text(r, PSD1_OD_REFUSAL), "");
     nmt(r, 129);
     assert_int_equal(r->board.resets, 1);
     assert_int_equal(r->defaults, before + 1);
     assert_null(seen_id(r, 0x580 + NODE)); /* communication began anew: no answer to what was asked before */
     assert_int_equal(upload(r, PSD1_OD_STROBE_NS, 0), 0);
+    assert_string_equal(upload_text(r, PSD1_OD_REFUSAL), "");
 }
 
 static void power_forgets_the_remark(void **state)
@@ -571,6 +606,10 @@ static void a_stream_that_does_not_fit_stands_and_says_why(void **state)
     assert_int_equal(count_id(r, 0x180 + NODE), 0);
     assert_int_equal(upload(r, PSD1_OD_COUNTERS, DROPPED), 5);
     assert_string_equal(upload_text(r, PSD1_OD_REFUSAL), r->told + sizeof "unit " - 1);
+    nmt(r, 130);
+    nmt(r, 1); /* told anew after a reset of communication */
+    assert_int_equal(bits_get_le(seen_id(r, 0x80 + NODE)->data, 2), PSD1_EMCY_STREAM_REFUSED);
+    assert_int_equal(r->refusals, 2);
     r->board.period_ns = 1080000;
     r->count = 0;
     readings(r, 3);
@@ -578,7 +617,7 @@ static void a_stream_that_does_not_fit_stands_and_says_why(void **state)
     assert_int_equal(count_id(r, 0x180 + NODE), 3);
     assert_int_equal(bits_get_le(seen_id(r, 0x80 + NODE)->data, 2), 0);
     assert_string_equal(upload_text(r, PSD1_OD_REFUSAL), "");
-    assert_int_equal(r->refusals, 1);
+    assert_int_equal(r->refusals, 2);
 }
 
 static void a_stream_at_the_pace_of_sync_is_not_judged(void **state)
@@ -654,6 +693,8 @@ int main(void)
         cmocka_unit_test(who_gives_up_a_cycle_finds_the_bus_busy_until_it_ends),
         cmocka_unit_test(a_cycle_that_never_ends_times_out_and_hangs_nothing),
         cmocka_unit_test(counters_of_the_board_are_found_by_their_names),
+        cmocka_unit_test(the_order_of_the_board_s_counters_does_not_matter),
+        cmocka_unit_test(error_counters_read_255_at_most),
         cmocka_unit_test(every_device_has_the_common_objects),
         cmocka_unit_test(objects_of_the_board_s_own_go_to_its_handlers),
         cmocka_unit_test(reset_node_resets_the_board_and_its_settings),
