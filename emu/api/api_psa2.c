@@ -265,15 +265,16 @@ static bool open_psa2(struct psabench_part *p, char *why, size_t cap)
     struct psa2_profile profile;
     if (!api_psa2_profile(s->profile, &profile, why, cap)) return false;
     const uint64_t serial = api_serial(p);
-    struct psa2_unit_cfg unit = {.adc_noise_scale = s->noise_scale,
-                                 .temp_noise_scale = s->temp_noise_scale,
-                                 .seed = p->bench->seed,
-                                 .adc_chain = (enum ads1282_chain)s->chain,
-                                 .serial = (uint32_t)(serial ^ serial >> 32)};
+    struct board_cfg unit = {.adc_noise_scale = s->noise_scale,
+                             .temp_noise_scale = s->temp_noise_scale,
+                             .seed = p->bench->seed,
+                             .adc_chain = (enum ads1282_chain)s->chain,
+                             .serial = (uint32_t)(serial ^ serial >> 32)};
     for (unsigned i = 0; i < 3; i++) unit.afe[i] = afe_nominal(s->input == 0 ? AFE_VOLTAGE : AFE_CURRENT);
     for (unsigned i = 0; i < TEMPS; i++) p->volts[TEMP_INPUT + i] = s->temp_degc;
-    const struct psa2_io io = {.ctx = p, .accel = accel, .temp_degc = temp_degc, .frame = on_frame};
+    const struct board_io io = {.ctx = p, .accel = accel, .temp_degc = temp_degc};
     psa2_init(&s->board, &profile, &unit, &io, &p->bench->sched);
+    psa2_attach(&s->board, &(struct psa2_host){.ctx = p, .frame = on_frame});
     psa2_power_up(&s->board, now_ns(p));
     return true;
 }

@@ -44,14 +44,9 @@ static void init_unit(struct bench *b, unsigned i)
 {
     const struct scenario_unit *u = &b->scenario.units[i];
     memset(&b->unit[i], 0, sizeof b->unit[i]);
-    memset(&b->can[i], 0, sizeof b->can[i]);
     unit_init(&b->unit[i], &u->cfg, &b->lab, &b->sched);
-    const struct psa2_can_cfg cfg = {.name = u->name, .node_id = u->cfg.node, .refused = on_refused, .ctx = b};
-    const struct psa2_can_port port = psa2_can_port(&b->unit[i].board);
-    psa2_can_init(&b->can[i], &cfg, &port, &b->bus[u->bus], &b->sched);
-    b->unit[i].frame = psa2_can_frame;
-    b->unit[i].fault = psa2_can_fault;
-    b->unit[i].ctx = &b->can[i];
+    const struct board_can_cfg cfg = {.name = u->name, .node_id = u->cfg.node, .refused = on_refused, .ctx = b};
+    unit_connect(&b->unit[i], &cfg, &b->bus[u->bus], &b->sched);
 }
 
 static void init_bus(struct bench *b, unsigned i)
@@ -68,13 +63,8 @@ static void switch_units(struct bench *b, bool on, int64_t t_ns)
     b->fed = on;
     b->brownouts += !on;
     for (unsigned i = 0; i < b->scenario.unit_count; i++) {
-        if (on) {
-            psa2_power_up(&b->unit[i].board, t_ns);
-            psa2_can_power_up(&b->can[i], t_ns);
-        } else {
-            psa2_power_down(&b->unit[i].board, t_ns);
-            psa2_can_power_down(&b->can[i]);
-        }
+        if (on) unit_power_up(&b->unit[i], t_ns);
+        else unit_power_down(&b->unit[i], t_ns);
     }
 }
 
@@ -109,7 +99,7 @@ void bench_view(struct bench *b, struct control_bench *v)
     for (unsigned i = 0; i < v->units; i++) {
         v->unit[i] = &b->unit[i];
         v->unit_name[i] = b->unit[i].cfg.name;
-        v->node[i] = &b->can[i].node.stream;
+        v->node[i] = unit_node(&b->unit[i]);
     }
 }
 
@@ -132,10 +122,10 @@ bool bench_record(struct bench *b, unsigned unit, FILE *out, uint32_t unit_ns)
 {
     struct unit *u = &b->unit[unit];
     const struct vcd_cfg cfg = {.out = out,
-                                .scope = "psa2", /* whatever the unit's name: share/psa2.gtkw opens it */
+                                .scope = u->type->name, /* whatever the unit's name: share/psa2.gtkw opens it */
                                 .unit_ns = unit_ns,
-                                .mask = (UINT32_C(1) << PSA2_LINES) - 1};
-    b->recording = vcd_open(&b->vcd, &cfg, &u->board.trace);
+                                .mask = TRACE_FIRST(u->type->line_count)};
+    b->recording = vcd_open(&b->vcd, &cfg, unit_trace(u));
     return b->recording;
 }
 
@@ -158,13 +148,13 @@ void bench_power_up(struct bench *b)
 void bench_follow(struct bench *b)
 {
     for (unsigned i = 0; i < b->scenario.unit_count; i++) {
-        trace_advance(&b->unit[i].board.trace, b->sched.now_ns - TRACE_LAG_NS);
+        trace_advance(unit_trace(&b->unit[i]), b->sched.now_ns - TRACE_LAG_NS);
     }
 }
 
 void bench_finish(struct bench *b)
 {
-    for (unsigned i = 0; i < b->scenario.unit_count; i++) trace_advance(&b->unit[i].board.trace, b->sched.now_ns);
+    for (unsigned i = 0; i < b->scenario.unit_count; i++) trace_advance(unit_trace(&b->unit[i]), b->sched.now_ns);
     if (b->recording) vcd_close(&b->vcd, b->sched.now_ns);
     b->recording = false;
 }

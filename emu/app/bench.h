@@ -3,7 +3,6 @@
 #define PSABENCH_APP_BENCH_H
 
 #include "app/scenario_yaml.h"
-#include "board/psa2_can.h"
 #include "control/view.h"
 #include "trace/sampler.h"
 #include "trace/vcd.h"
@@ -34,7 +33,6 @@ struct bench {
     struct sampler sampler;
     /* last, and only those that the scenario has are written: 20 MB of address space, 0.3 MB a unit in use */
     struct unit unit[SCENARIO_UNITS_MAX];
-    struct psa2_can can[SCENARIO_UNITS_MAX];
 };
 
 /* The scenario is copied. Megabytes: take it from the heap; it never moves afterwards. */

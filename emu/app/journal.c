@@ -163,7 +163,7 @@ void journal_command(struct journal *j, const struct control_command *row, const
 void journal_watchers(struct journal *j)
 {
     for (unsigned i = 0; i < j->bench->scenario.unit_count; i++) {
-        const uint64_t watched = j->bench->unit[i].board.trace.watched;
+        const uint64_t watched = unit_trace(&j->bench->unit[i])->watched;
         if (watched == j->watched[i]) continue;
         assert((double)watched <= LINES_MAX);
         j->watched[i] = watched;

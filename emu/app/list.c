@@ -28,14 +28,15 @@ static void first_comment(const char *path, char *text, size_t cap)
 static void list_profile(FILE *out, const char *path, const char *comment)
 {
     char why[512];
-    struct psa2_profile p;
-    if (!profile_yaml_load(path, &p, why, sizeof why)) {
+    const struct board_type *type = NULL;
+    union board_profile_store p;
+    if (!profile_yaml_load(path, &type, &p, why, sizeof why)) {
         fprintf(out, "%s\n", why);
         return;
     }
-    fprintf(out, "%-10s %s, %u bit words, CLK %.6g MHz, INT low %.3f us, a frame every %.3f us\n", p.name,
-            p.adc_is_1281 ? "ADS1281" : "ADS1282", p.word_bits, (double)p.line_hz / p.line_div * 1e-6,
-            (double)psa2_int_low_ns(&p) * 1e-3, (double)psa2_profile_period_ns(&p) * 1e-3);
+    char about[256];
+    type->about(&p, about, sizeof about);
+    fprintf(out, "%-10s %s: %s\n", board_profile_name(type, &p), type->title, about);
     if (*comment) fprintf(out, "           %s\n", comment);
 }
 

@@ -97,7 +97,7 @@ static bool line_start(void *ctx, int64_t t_ns)
 {
     struct bench *b = ctx;
     (void)t_ns;
-    return sampler_start(&b->sampler, &b->unit[b->watched].board.trace, &b->sampler.clock);
+    return sampler_start(&b->sampler, unit_trace(&b->unit[b->watched]), &b->sampler.clock);
 }
 
 static void line_stop(void *ctx)

@@ -5,78 +5,90 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { WHY = 512 };
+enum { WHY = 512, FIELDS_MAX = 256 };
+
+/* A mapping under way. */
+struct fill {
+    const struct board_type *type;
+    void *profile;
+    bool seen[FIELDS_MAX];
+};
 
 static bool set(struct yaml_file *f, const struct yaml_node *node, const char *key, unsigned index,
-                struct psa2_profile *p)
+                const struct fill *fill)
 {
     char why[WHY];
+    const struct board_type *t = fill->type;
     const char *text = yaml_scalar(node);
     if (!text) return yaml_file_fail(f, node, key, "one value of up to %u characters is wanted", YAML_FILE_TEXT);
-    if (psa2_profile_set(p, key, index, text, why, sizeof why)) return true;
+    if (board_field_set(t->fields, t->field_count, fill->profile, key, index, text, why, sizeof why)) return true;
     /* The setter names the key itself; the line is ours to add. */
     return yaml_file_fail(f, node, NULL, "%s", why);
 }
 
-static bool set_sequence(struct yaml_file *f, const struct yaml_node *node, const struct psa2_field *field,
-                         struct psa2_profile *p)
+static bool set_sequence(struct yaml_file *f, const struct yaml_node *node, const struct board_field *field,
+                         const struct fill *fill)
 {
     unsigned index = 0;
     for (const struct yaml_item *i = node->first; i; i = i->next)
-        if (!set(f, i->value, field->key, index++, p)) return false;
-    if (field->type == PSA2_FIELD_WORDS && index != PSA2_WORDS)
-        return yaml_file_fail(f, node, field->key, "%u elements; %u are wanted", index, PSA2_WORDS);
+        if (!set(f, i->value, field->key, index++, fill)) return false;
+    if (field->count && index != field->count)
+        return yaml_file_fail(f, node, field->key, "%u elements; %u are wanted", index, field->count);
     return index > 0 || yaml_file_fail(f, node, field->key, "at least one element is wanted");
-}
-
-static const struct psa2_field *find(const char *key)
-{
-    for (unsigned i = 0; i < psa2_field_count; i++)
-        if (strcmp(psa2_fields[i].key, key) == 0) return &psa2_fields[i];
-    return NULL;
 }
 
 static const char *key_at(const void *ctx, size_t i)
 {
-    (void)ctx;
-    return i < psa2_field_count ? psa2_fields[i].key : NULL;
+    const struct board_type *t = ctx;
+    return i < t->field_count ? t->fields[i].key : NULL;
 }
 
-static bool fail_unknown(struct yaml_file *f, const struct yaml_node *key_node, const char *key)
+static bool fail_unknown(struct yaml_file *f, const struct yaml_node *key_node, const char *key,
+                         const struct board_type *t)
 {
     char known[400] = "";
-    for (size_t i = 0; i < psa2_field_count; i++) {
+    for (size_t i = 0; i < t->field_count; i++) {
         const size_t at = strlen(known);
-        snprintf(known + at, sizeof known - at, "%s%s", at ? ", " : "", psa2_fields[i].key);
+        snprintf(known + at, sizeof known - at, "%s%s", at ? ", " : "", t->fields[i].key);
     }
-    const char *near = yaml_nearest(key, key_at, NULL);
+    const char *near = yaml_nearest(key, key_at, t);
     return yaml_file_fail(f, key_node, key, "unknown key; %s%s%sknown here: %s", near ? "nearest: " : "",
                           near ? near : "", near ? "; " : "", known);
 }
 
-static bool load_pair(struct yaml_file *f, const struct yaml_item *pair, struct psa2_profile *p, uint64_t *seen)
+static bool load_pair(struct yaml_file *f, const struct yaml_item *pair, struct fill *fill)
 {
     const char *key = yaml_scalar(pair->key);
     if (!key) return yaml_file_fail(f, pair->key, NULL, "a key is one word");
-    const struct psa2_field *field = find(key);
-    if (!field) return fail_unknown(f, pair->key, key);
-    const uint64_t bit = UINT64_C(1) << (field - psa2_fields);
-    if (*seen & bit) return yaml_file_fail(f, pair->key, key, "comes twice");
-    *seen |= bit;
-    const bool list = field->type == PSA2_FIELD_WORDS || field->type == PSA2_FIELD_SETUP;
-    if (!list) return set(f, pair->value, key, 0, p);
+    const struct board_field *field = board_field_find(fill->type->fields, fill->type->field_count, key);
+    if (!field) return fail_unknown(f, pair->key, key, fill->type);
+    bool *seen = &fill->seen[field - fill->type->fields];
+    if (*seen) return yaml_file_fail(f, pair->key, key, "comes twice");
+    *seen = true;
+    if (!board_field_is_list(field)) return set(f, pair->value, key, 0, fill);
     if (pair->value->kind != YAML_SEQUENCE)
         return yaml_file_fail(f, pair->value, key, "a sequence is wanted: %s", field->what);
-    return set_sequence(f, pair->value, field, p);
+    return set_sequence(f, pair->value, field, fill);
 }
 
-bool profile_yaml_fields(struct yaml_file *f, const struct yaml_node *mapping, struct psa2_profile *p)
+/* Of a file, whose key `board` is not the profile's; of a mapping in a scenario, if not. */
+static bool load_fields(struct yaml_file *f, const struct yaml_node *mapping, const struct board_type *type,
+                        void *profile, bool file)
 {
-    uint64_t seen = 0;
+    struct fill fill = {.type = type, .profile = profile};
     if (mapping->kind != YAML_MAPPING) return yaml_file_fail(f, mapping, NULL, "a mapping `key: value` is wanted");
-    for (const struct yaml_item *i = mapping->first; i; i = i->next)
-        if (!load_pair(f, i, p, &seen)) return false;
+    for (const struct yaml_item *i = mapping->first; i; i = i->next) {
+        const char *key = yaml_scalar(i->key);
+        if (file && key && strcmp(key, "board") == 0) continue;
+        if (!load_pair(f, i, &fill)) return false;
+    }
     return true;
+}
+
+bool profile_yaml_fields(struct yaml_file *f, const struct yaml_node *mapping, const struct board_type *type,
+                         void *profile)
+{
+    return load_fields(f, mapping, type, profile, false);
 }
 
 /* Node of the key that a sentence of the check begins with, or the mapping: so that the message has its line. */
@@ -90,82 +102,102 @@ static const struct yaml_node *blame(const struct yaml_node *mapping, const char
     return mapping;
 }
 
-bool profile_yaml_check(struct yaml_file *f, const struct yaml_node *mapping, const struct psa2_profile *p)
+bool profile_yaml_check(struct yaml_file *f, const struct yaml_node *mapping, const struct board_type *type,
+                        const void *profile)
 {
     char why[WHY];
-    if (psa2_profile_check(p, why, sizeof why)) return true;
+    if (type->profile_check(profile, why, sizeof why)) return true;
     return yaml_file_fail(f, blame(mapping, why), NULL, "%s", why);
 }
 
-bool profile_yaml_load(const char *path, struct psa2_profile *p, char *why, size_t cap)
+/* The type that a file names, which is *type if that is not NULL. */
+static bool find_type(struct yaml_file *f, const struct board_type **type)
+{
+    const struct yaml_node *node = f->root->kind == YAML_MAPPING ? yaml_get(f->root, "board") : NULL;
+    const char *name = node ? yaml_scalar(node) : board_types[0]->name;
+    const struct board_type *found = name ? board_find(name) : NULL;
+    if (!found) {
+        char known[80] = "";
+        for (unsigned i = 0; board_types[i]; i++) {
+            const size_t at = strlen(known);
+            snprintf(known + at, sizeof known - at, "%s%s", at ? ", " : "", board_types[i]->name);
+        }
+        return yaml_file_fail(f, node, "board", "no such type; there is %s", known);
+    }
+    if (*type && found != *type) {
+        return yaml_file_fail(f, node, NULL, "this is a profile of %s (board: %s), one of %s is wanted", found->title,
+                              found->name, (*type)->title);
+    }
+    *type = found;
+    return true;
+}
+
+bool profile_yaml_load(const char *path, const struct board_type **type, union board_profile_store *p, char *why,
+                       size_t cap)
 {
     struct yaml_file f;
     if (!yaml_file_open(&f, path, why, cap)) return false;
-    *p = psa2_profile_default();
-    const bool ok = profile_yaml_fields(&f, f.root, p) && profile_yaml_check(&f, f.root, p);
+    bool ok = find_type(&f, type);
+    if (ok) {
+        memset(p, 0, sizeof *p);
+        (*type)->profile_default(p);
+        ok = load_fields(&f, f.root, *type, p, true) && profile_yaml_check(&f, f.root, *type, p);
+    }
     yaml_file_close(&f);
     return ok;
 }
 
 /* ---- the way back */
 
-static cJSON *words_of(const struct psa2_profile *p)
+static cJSON *number_of(const void *at)
 {
-    static const char *const names[] = {
-        [PSA2_WORD_X] = "X", [PSA2_WORD_Y] = "Y", [PSA2_WORD_Z] = "Z", [PSA2_WORD_T] = "T"};
-    cJSON *list = cJSON_CreateArray();
-    for (unsigned i = 0; i < PSA2_WORDS; i++) cJSON_AddItemToArray(list, cJSON_CreateString(names[p->word[i]]));
-    return list;
-}
-
-/* "DRD_A write_A 41 00 56", as psa2_profile_set() reads it. */
-static cJSON *setup_of(const struct psa2_profile *p)
-{
-    static const char *const on[] = {[PSA2_ON_DRD_A] = "DRD_A", [PSA2_ON_DRD_T] = "DRD_T"};
-    static const char *const action[] = {
-        [PSA2_WRITE_A] = "write_A", [PSA2_WRITE_T] = "write_T", [PSA2_SYNC_A] = "sync_A", [PSA2_SYNC_T] = "sync_T"};
-    cJSON *list = cJSON_CreateArray();
-    for (unsigned i = 0; i < p->setup_count; i++) {
-        const struct psa2_setup_step *s = &p->setup[i];
-        char text[64];
-        int at = snprintf(text, sizeof text, "%s %s", on[s->on], action[s->action]);
-        for (unsigned k = 0; k < s->count; k++)
-            at += snprintf(text + at, sizeof text - (size_t)at, " %02X", s->bytes[k]);
-        cJSON_AddItemToArray(list, cJSON_CreateString(text));
-    }
-    return list;
-}
-
-cJSON *profile_dump_field(const struct psa2_profile *p, const struct psa2_field *d)
-{
-    const void *at = (const char *)p + d->offset;
     char digits[EXACT_MAX];
+    double v;
+    memcpy(&v, at, sizeof v);
+    exact_number(v, digits);
+    return cJSON_CreateRaw(digits);
+}
+
+static cJSON *list_of(const struct board_field *d, const void *profile)
+{
+    char text[128];
+    cJSON *list = cJSON_CreateArray();
+    for (unsigned i = 0; d->type == BOARD_FIELD_REALS && i < d->count; i++)
+        cJSON_AddItemToArray(list, number_of((const char *)profile + d->offset + i * sizeof(double)));
+    for (unsigned i = 0; d->type == BOARD_FIELD_LIST && d->text(profile, i, text, sizeof text); i++)
+        cJSON_AddItemToArray(list, cJSON_CreateString(text));
+    return list;
+}
+
+cJSON *profile_dump_field(const struct board_field *d, const void *profile)
+{
+    const void *at = (const char *)profile + d->offset;
     unsigned integer;
-    double real;
+    int choice;
     switch (d->type) {
-    case PSA2_FIELD_STRING:
+    case BOARD_FIELD_STRING:
         return cJSON_CreateString(at);
-    case PSA2_FIELD_UINT:
+    case BOARD_FIELD_UINT:
         memcpy(&integer, at, sizeof integer);
         return cJSON_CreateNumber(integer);
-    case PSA2_FIELD_REAL:
-        memcpy(&real, at, sizeof real);
-        exact_number(real, digits);
-        return cJSON_CreateRaw(digits);
-    case PSA2_FIELD_BOOL:
+    case BOARD_FIELD_REAL:
+        return number_of(at);
+    case BOARD_FIELD_BOOL:
         return cJSON_CreateBool(*(const bool *)at);
-    case PSA2_FIELD_WORDS:
-        return words_of(p);
-    case PSA2_FIELD_SETUP:
+    case BOARD_FIELD_CHOICE:
+        memcpy(&choice, at, sizeof choice);
+        return cJSON_CreateString(d->choices[choice]);
+    case BOARD_FIELD_REALS:
+    case BOARD_FIELD_LIST:
         break;
     }
-    return setup_of(p);
+    return list_of(d, profile);
 }
 
-cJSON *profile_dump(const struct psa2_profile *p)
+cJSON *profile_dump(const struct board_type *type, const void *profile)
 {
     cJSON *j = cJSON_CreateObject();
-    for (unsigned i = 0; i < psa2_field_count; i++)
-        cJSON_AddItemToObject(j, psa2_fields[i].key, profile_dump_field(p, &psa2_fields[i]));
+    for (unsigned i = 0; i < type->field_count; i++)
+        cJSON_AddItemToObject(j, type->fields[i].key, profile_dump_field(&type->fields[i], profile));
     return j;
 }

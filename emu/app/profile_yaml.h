@@ -1,23 +1,29 @@
-/* Board profiles from YAML: proto/profiles/NAME.yaml, field by field through psa2_profile_set(), then checked. */
+/* Board profiles from YAML: proto/profiles/NAME.yaml, field by field through board_field_set(), then checked.
+ *
+ * A file says of which type of board it is: `board: psd1`; without that key it is a PSA-2. */
 #ifndef PSABENCH_APP_PROFILE_YAML_H
 #define PSABENCH_APP_PROFILE_YAML_H
 
 #include "app/yaml_file.h"
-#include "board/psa2_profile.h"
+#include "board/boards.h"
 
 #include <cjson/cJSON.h>
 
-/* False with one line in why: file:line:column: key: what is wrong, what would be right. */
-bool profile_yaml_load(const char *path, struct psa2_profile *p, char *why, size_t cap);
+/* The type's default, then what the file says. *type: the one that is wanted, NULL for any; the file's afterwards. False with
+ * one line in why: path:line:column: what is wrong, what is known. */
+bool profile_yaml_load(const char *path, const struct board_type **type, union board_profile_store *p, char *why,
+                       size_t cap);
 
-/* The same fields in a mapping of another file (a scenario that changes a profile), and the check of the whole. */
-bool profile_yaml_fields(struct yaml_file *f, const struct yaml_node *mapping, struct psa2_profile *p);
-bool profile_yaml_check(struct yaml_file *f, const struct yaml_node *mapping, const struct psa2_profile *p);
+/* The same in two steps, of a mapping in a file that is open: its keys into the profile, and whether a board can run it. */
+bool profile_yaml_fields(struct yaml_file *f, const struct yaml_node *mapping, const struct board_type *type,
+                         void *profile);
+bool profile_yaml_check(struct yaml_file *f, const struct yaml_node *mapping, const struct board_type *type,
+                        const void *profile);
 
-/* Every field, as a mapping that profile_yaml_fields() reads. */
-cJSON *profile_dump(const struct psa2_profile *p);
+/* Every field by its key, as YAML takes it again. */
+cJSON *profile_dump(const struct board_type *type, const void *profile);
 
-/* One field of it. */
-cJSON *profile_dump_field(const struct psa2_profile *p, const struct psa2_field *d);
+/* One of them. */
+cJSON *profile_dump_field(const struct board_field *d, const void *profile);
 
 #endif

@@ -24,7 +24,10 @@ extern const struct yaml_fields scenario_event_fields;         /* of struct scen
 extern const struct yaml_fields scenario_fields;               /* of struct scenario */
 
 void scenario_default(struct scenario *s, const char *path);
-struct scenario_unit scenario_unit_default(unsigned i); /* of the i-th unit */
+struct scenario_unit scenario_unit_default(unsigned i); /* of the i-th unit, with the first of the boards */
+void scenario_unit_board(struct scenario_unit *u, const struct board_name *name); /* with another; sets its defaults */
+
+void scenario_dump_unit(const struct scenario_unit *u, cJSON *to); /* the keys that its board has */
 
 /* For the rows of struct scenario. */
 bool scenario_load_site(struct yaml_file *f, const struct yaml_node *node, void *section);

@@ -86,24 +86,51 @@ static void print_chapter(FILE *out, const struct chapter *c, const struct scena
     fprintf(out, "\n");
 }
 
-static void print_profile(FILE *out)
+static void print_profile_range(FILE *out, const struct board_field *d)
 {
-    const struct psa2_profile p = psa2_profile_default();
-    fprintf(out, "### `units[].profile_set`, and a file of proto/profiles\n\nThe board. The defaults are those of "
-                 "`article`.\n\n| key | kind, unit | range | default | meaning |\n|---|---|---|---|---|\n");
-    static const char *const kinds[] = {"text", "integer", "number", "boolean", "list", "list"};
-    for (unsigned i = 0; i < psa2_field_count; i++) {
-        const struct psa2_field *d = &psa2_fields[i];
-        const bool number = d->type == PSA2_FIELD_UINT || d->type == PSA2_FIELD_REAL;
+    const bool number = d->type == BOARD_FIELD_UINT || d->type == BOARD_FIELD_REAL || d->type == BOARD_FIELD_REALS;
+    if (number) fprintf(out, "%.10g to %.10g", d->min, d->max);
+    for (unsigned i = 0; d->type == BOARD_FIELD_CHOICE && d->choices[i]; i++)
+        fprintf(out, "%s`%s`", i ? ", " : "", d->choices[i]);
+}
+
+static void print_profile(FILE *out, const struct board_type *t)
+{
+    static const char *const kinds[] = {
+        [BOARD_FIELD_STRING] = "text",  [BOARD_FIELD_UINT] = "integer",    [BOARD_FIELD_REAL] = "number",
+        [BOARD_FIELD_BOOL] = "boolean", [BOARD_FIELD_CHOICE] = "one word", [BOARD_FIELD_REALS] = "list",
+        [BOARD_FIELD_LIST] = "list"};
+    union board_profile_store p;
+    memset(&p, 0, sizeof p);
+    t->profile_default(&p);
+    fprintf(out,
+            "### %s: `units[].profile_set`, and a file of proto/profiles\n\nThe board. The defaults are those of "
+            "`%s`.\n\n| key | kind, unit | range | default | meaning |\n|---|---|---|---|---|\n",
+            t->title, t->profile_name);
+    for (unsigned i = 0; i < t->field_count; i++) {
+        const struct board_field *d = &t->fields[i];
         const char *unit = yaml_unit(d->key);
-        cJSON *j = profile_dump_field(&p, d);
+        cJSON *j = profile_dump_field(d, &p);
         char *text = cJSON_PrintUnformatted(j);
         fprintf(out, "| `%s` | %s%s%s | ", d->key, kinds[d->type], *unit ? ", " : "", unit);
-        if (number) fprintf(out, "%.10g to %.10g", d->min, d->max);
+        print_profile_range(out, d);
         fprintf(out, " | %s | %s |\n", text ? text : "", d->what);
         cJSON_free(text);
         cJSON_Delete(j);
     }
+    fprintf(out, "\n");
+}
+
+/* What `board` may say, and what follows from it. */
+static void print_boards(FILE *out)
+{
+    fprintf(out,
+            "### Boards\n\nWhat `units[].board` may say; a unit without it is a PSA-2. `profile` names another "
+            "profile of the same board.\n\n| `board` | board | profile | `node` of the first |\n|---|---|---|---|\n");
+    for (const struct board_name *n = board_names; n->name; n++)
+        fprintf(out, "| `%s` | %s | `%s` | %u |\n", n->name, n->type->title,
+                n->profile ? n->profile : n->type->profile_name, n->type->node);
+    fprintf(out, "\n");
 }
 
 void scenario_keys(FILE *out)
@@ -114,6 +141,7 @@ void scenario_keys(FILE *out)
     s->lab.table = table_default(1);
     s->units[0] = scenario_unit_default(0);
     for (size_t i = 0; i < sizeof chapters / sizeof *chapters; i++) print_chapter(out, &chapters[i], s);
-    print_profile(out);
+    print_boards(out);
+    for (unsigned i = 0; board_types[i]; i++) print_profile(out, board_types[i]);
     free(s);
 }

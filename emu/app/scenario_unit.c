@@ -9,59 +9,70 @@
 
 #define UNIT(m) offsetof(struct scenario_unit, m)
 
-/* ---- board and profile */
+/* ---- board and profile: they decide what the other keys default to, so they are read first, wherever they stand */
 
-static bool load_profile_named(struct yaml_file *f, const struct yaml_node *node, const char *name,
-                               struct scenario_unit *u)
+static bool fail_board(struct yaml_file *f, const struct yaml_node *node)
+{
+    char known[160] = "";
+    for (const struct board_name *n = board_names; n->name; n++) {
+        const size_t at = strlen(known);
+        snprintf(known + at, sizeof known - at, "%s%s", !at ? "" : n[1].name ? ", " : " or ", n->name);
+    }
+    return yaml_file_fail(f, node, "board", "%s is wanted", known);
+}
+
+static bool find_profile(struct yaml_file *f, const struct yaml_node *node, const char *name, struct scenario_unit *u)
 {
     char path[FIND_PATH_MAX], why[400];
+    const struct board_type *type = u->board->type;
     if (!find_proto("profiles", name, f->path, path, why, sizeof why))
         return yaml_file_fail(f, node, "profile", "%s", why);
-    return profile_yaml_load(path, &u->profile, f->why, f->cap);
+    return profile_yaml_load(path, &type, &u->profile, f->why, f->cap);
 }
 
-static bool load_profile(struct yaml_file *f, const struct yaml_node *node, void *section)
+/* A unit of the type that its mapping names, the i-th of it, with its profile; the type's defaults for the rest. */
+static bool begin_unit(struct yaml_file *f, const struct yaml_node *node, const struct scenario *s,
+                       struct scenario_unit *u)
 {
-    const char *name = yaml_scalar(node);
-    struct scenario_unit *u = section;
-    if (!name) return yaml_file_fail(f, node, "profile", "a name of proto/profiles or a path is wanted");
-    if (u->profile_changed)
-        return yaml_file_fail(f, node, "profile", "stands after profile_set, which changes it; name it before");
-    u->profile_named = true;
-    return load_profile_named(f, node, name, u);
+    const struct yaml_node *board = yaml_get(node, "board"), *profile = yaml_get(node, "profile");
+    const char *name = board ? yaml_scalar(board) : board_names[0].name;
+    const struct board_name *found = name ? board_name_find(name) : NULL;
+    if (!found) return fail_board(f, board);
+    scenario_unit_board(u, found);
+    unsigned before = 0;
+    for (unsigned i = 0; i < s->unit_count; i++) before += s->units[i].cfg.type == found->type;
+    u->cfg.node = (uint8_t)(u->cfg.node + before);
+    if (!profile) return !found->profile || find_profile(f, node, found->profile, u);
+    name = yaml_scalar(profile);
+    if (!name) return yaml_file_fail(f, profile, "profile", "a name of proto/profiles or a path is wanted");
+    return find_profile(f, profile, name, u);
 }
 
-/* board: psa1 is the same board with its own profile. */
-static bool load_board(struct yaml_file *f, const struct yaml_node *node, void *section)
+/* begin_unit() has. */
+static bool loaded(struct yaml_file *f, const struct yaml_node *node, void *section)
 {
-    struct scenario_unit *u = section;
-    const char *name = yaml_scalar(node);
-    const bool psa1 = name && strcmp(name, "psa1") == 0;
-    if (!psa1 && (!name || strcmp(name, "psa2") != 0))
-        return yaml_file_fail(f, node, "board", "psa2 or psa1 is wanted");
-    snprintf(u->board_name, sizeof u->board_name, "%s", name);
-    if (!psa1 || u->profile_named) return true;
-    if (u->profile_changed)
-        return yaml_file_fail(f, node, "board", "stands after profile_set, which changes its profile; name it before");
-    return load_profile_named(f, node, "psa1", u);
+    (void)f;
+    (void)node;
+    (void)section;
+    return true;
 }
 
 static void dump_board(const struct yaml_field *d, const void *section, cJSON *to)
 {
-    cJSON_AddStringToObject(to, d->key, ((const struct scenario_unit *)section)->board_name);
+    cJSON_AddStringToObject(to, d->key, ((const struct scenario_unit *)section)->board->name);
 }
 
-/* Fields that differ from the profile, which must have been named before. */
+/* Fields that differ from the profile. */
 static bool load_profile_set(struct yaml_file *f, const struct yaml_node *node, void *section)
 {
     struct scenario_unit *u = section;
+    const struct board_type *type = u->board->type;
     const size_t outer = strlen(f->where);
-    u->profile_changed = true;
     if (node->kind != YAML_MAPPING) return yaml_file_fail(f, node, "profile_set", "a mapping `key: value` is wanted");
     snprintf(f->where + outer, sizeof f->where - outer, "profile_set.");
-    if (!profile_yaml_fields(f, node, &u->profile)) return false;
+    if (!profile_yaml_fields(f, node, type, &u->profile)) return false;
     snprintf(f->where + outer, sizeof f->where - outer, "profile_set: "); /* a whole sentence follows */
-    if (!profile_yaml_check(f, node, &u->profile)) return false;
+    if (!profile_yaml_check(f, node, type, &u->profile)) return false;
     f->where[outer] = '\0';
     return true;
 }
@@ -69,7 +80,8 @@ static bool load_profile_set(struct yaml_file *f, const struct yaml_node *node, 
 /* Every field: the dump needs no other file. */
 static void dump_profile_set(const struct yaml_field *d, const void *section, cJSON *to)
 {
-    cJSON_AddItemToObject(to, d->key, profile_dump(&((const struct scenario_unit *)section)->profile));
+    const struct scenario_unit *u = section;
+    cJSON_AddItemToObject(to, d->key, profile_dump(u->board->type, &u->profile));
 }
 
 /* ---- the tables */
@@ -119,9 +131,9 @@ static const char *const chains[] = {
 static const struct yaml_field unit_rows[] = {
     {.key = "name",   .type = YAML_TEXT, .offset = UNIT(name), .max = 32, .what = "letters, digits and _; with `count` a number stands in it, `%02u`"},
     {.key = "count",  .type = YAML_CUSTOM, .min = 1, .max = SCENARIO_UNITS_MAX, .load = load_count, .what = "so many units, alike but for name, node and serial, which count up"},
-    {.key = "board",  .type = YAML_CUSTOM, .load = load_board, .dump = dump_board, .what = "`psa2` or `psa1`, the same board with profile `psa1`"},
-    {.key = "profile", .type = YAML_CUSTOM, .load = load_profile, .what = "name in proto/profiles, or a path, relative to the scenario"},
-    {.key = "profile_set", .type = YAML_CUSTOM, .load = load_profile_set, .dump = dump_profile_set, .what = "fields of the profile that differ; stands after `profile`"},
+    {.key = "board",  .type = YAML_CUSTOM, .load = loaded, .dump = dump_board, .what = "type of the board, or a name of one of its profiles: see below"},
+    {.key = "profile", .type = YAML_CUSTOM, .load = loaded, .what = "name in proto/profiles, or a path, relative to the scenario"},
+    {.key = "profile_set", .type = YAML_CUSTOM, .load = load_profile_set, .dump = dump_profile_set, .what = "fields of the profile that differ"},
     {.key = "bus",    .type = YAML_TEXT, .offset = UNIT(bus_name), .max = 16, .what = "name of its bus; the first if it is not given"},
     {.key = "node",   .type = YAML_U8, .offset = UNIT(cfg.node), .min = 1, .max = 127, .what = "CANopen node id; each its own on a bus"},
     {.key = "serial", .type = YAML_U32, .offset = UNIT(cfg.board.serial), .min = 1, .max = 4294967295.0, .what = "serial number; each its own, its noise and its spread are drawn by it"},
@@ -157,7 +169,45 @@ static bool plain(const char *name)
     return name[strspn(name, "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_")] == '\0';
 }
 
-/* A name, a node and a number that no other unit of the scenario has. */
+/* Keys of settings that not every board has. */
+static const struct {
+    const char *key;
+    uint32_t knob; /* 0: frame_form */
+} some_have[] = {
+    {"frame_form", 0},
+    {"adc_chain", BOARD_KNOB_CHAIN},
+    {"temp_noise_scale", BOARD_KNOB_TEMP_NOISE},
+    {"temp_adc_offset_v", BOARD_KNOB_TEMP_ADC},
+    {"temp_adc_gain_error", BOARD_KNOB_TEMP_ADC},
+};
+enum { SOME_HAVE = sizeof some_have / sizeof *some_have };
+
+static bool has_key(const struct board_type *t, unsigned i)
+{
+    return some_have[i].knob ? t->knobs & some_have[i].knob : t->frame_forms > 0;
+}
+
+static bool check_keys(struct yaml_file *f, const struct yaml_node *node, const struct scenario_unit *u)
+{
+    const struct board_type *t = u->cfg.type;
+    for (unsigned i = 0; i < SOME_HAVE; i++) {
+        const struct yaml_node *value = yaml_get(node, some_have[i].key);
+        if (value && !has_key(t, i))
+            return yaml_file_fail(f, value, some_have[i].key, "a %s has no such setting", t->title);
+    }
+    if (u->frame_form && u->frame_form >= t->frame_forms)
+        return yaml_file_fail(f, yaml_get(node, "frame_form"), "frame_form", "%u: a %s has 0 to %u", u->frame_form,
+                              t->title, t->frame_forms - 1);
+    return true;
+}
+
+void scenario_dump_unit(const struct scenario_unit *u, cJSON *to)
+{
+    yaml_dump(&scenario_unit_fields, u, to);
+    for (unsigned i = 0; i < SOME_HAVE; i++)
+        if (!has_key(u->cfg.type, i)) cJSON_DeleteItemFromObject(to, some_have[i].key);
+}
+
 /* A quartz sensor's amperes must not be taken for volts. */
 static bool check_inputs(struct yaml_file *f, const struct yaml_node *node, const struct scenario_unit *u)
 {
@@ -170,6 +220,7 @@ static bool check_inputs(struct yaml_file *f, const struct yaml_node *node, cons
     return true;
 }
 
+/* A name, a node and a number that no other unit of the scenario has. */
 static bool check_unit(struct yaml_file *f, const struct yaml_node *node, const struct scenario *s,
                        const struct scenario_unit *u)
 {
@@ -227,12 +278,19 @@ static bool number_name(const char *pattern, unsigned n, char *name, size_t cap)
 
 struct scenario_unit scenario_unit_default(unsigned i)
 {
-    struct scenario_unit u = {.board_name = "psa2", .profile = psa2_profile_default(), .cfg = unit_default(NULL)};
+    struct scenario_unit u = {.cfg = unit_default(NULL)};
     if (i < 26) snprintf(u.name, sizeof u.name, "%c", 'a' + (int)i);
     else snprintf(u.name, sizeof u.name, "u%02u", i + 1);
-    u.cfg.node = (uint8_t)(5 + i);
     u.cfg.board.serial = i + 1;
+    scenario_unit_board(&u, &board_names[0]);
     return u;
+}
+
+void scenario_unit_board(struct scenario_unit *u, const struct board_name *name)
+{
+    u->board = name;
+    unit_cfg_type(&u->cfg, name->type);
+    name->type->profile_default(&u->profile);
 }
 
 /* The k-th of the units that an entry stands for. */
@@ -265,9 +323,12 @@ static bool load_entry(struct yaml_file *f, const struct yaml_node *node, struct
     const char *named = yaml_scalar(yaml_get(node, "name"));
     if (yaml_get(node, "count")) snprintf(e.unit.name, sizeof e.unit.name, "u%%02u");
     snprintf(where, sizeof where, "units.%.31s", named ? named : e.unit.name);
+    snprintf(f->where, sizeof f->where, "%s.", where);
+    if (!begin_unit(f, node, s, &e.unit)) return false;
+    f->where[0] = '\0';
     if (!yaml_load(f, node, where, &scenario_unit_fields, &e)) return false;
     snprintf(f->where, sizeof f->where, "%s.", where);
-    if (!find_bus(f, node, s, &e.unit)) return false;
+    if (!check_keys(f, node, &e.unit) || !find_bus(f, node, s, &e.unit)) return false;
     for (unsigned k = 0; k < (e.count ? e.count : 1); k++)
         if (!place_unit(f, node, &e, k, s)) return false;
     f->where[0] = '\0';

@@ -97,7 +97,7 @@ static void dump_units(const struct yaml_field *d, const void *section, cJSON *t
     cJSON *list = cJSON_AddArrayToObject(to, d->key);
     for (unsigned i = 0; i < s->unit_count; i++) {
         cJSON *j = cJSON_CreateObject();
-        yaml_dump(&scenario_unit_fields, &s->units[i], j);
+        scenario_dump_unit(&s->units[i], j);
         cJSON_AddItemToArray(list, j);
     }
 }

@@ -41,9 +41,8 @@ struct scenario_site {
 
 struct scenario_unit {
     char name[32];
-    char board_name[8]; /* psa2 or psa1 */
-    struct psa2_profile profile;
-    bool profile_named, profile_changed; /* while loading */
+    const struct board_name *board; /* as the key says: of one type, several names */
+    union board_profile_store profile;
     struct unit_cfg cfg; /* name and profile point into this struct once it is in its place: scenario_bind() */
     double misalignment_arcsec[3]; /* to cfg.seat by scenario_bind() */
     char bus_name[16];

@@ -274,7 +274,7 @@ static void on_steps(void *ctx, const struct trace_step *s, unsigned n)
 
 static void hang(struct snapshot_ears *e, struct bench *b, unsigned unit, uint64_t mask)
 {
-    struct trace *t = &b->unit[unit].board.trace;
+    struct trace *t = unit_trace(&b->unit[unit]);
     struct trace_sink *ear = &e->ear[unit];
     trace_detach(t, ear);
     *ear = (struct trace_sink){.mask = mask, .steps = on_steps};
@@ -285,14 +285,14 @@ static void hang(struct snapshot_ears *e, struct bench *b, unsigned unit, uint64
 void snapshot_listen(struct snapshot_ears *e, struct bench *b)
 {
     for (unsigned i = 0; i < b->scenario.unit_count; i++) {
-        const uint64_t watched = b->unit[i].board.trace.watched;
+        const uint64_t watched = unit_trace(&b->unit[i])->watched;
         if (watched) hang(e, b, i, watched);
     }
 }
 
 void snapshot_let_go(struct snapshot_ears *e, struct bench *b)
 {
-    for (unsigned i = 0; i < b->scenario.unit_count && e->on; i++) trace_detach(&b->unit[i].board.trace, &e->ear[i]);
+    for (unsigned i = 0; i < b->scenario.unit_count && e->on; i++) trace_detach(unit_trace(&b->unit[i]), &e->ear[i]);
     e->on = false;
 }
 

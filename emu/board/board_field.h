@@ -19,7 +19,7 @@ struct board_field {
     const char *key; /* YAML key, unit in its name */
     enum board_field_type type;
     size_t offset;
-    double min, max;            /* of numbers */
+    double min, max;            /* of numbers, and of characters of a string; LIST: most elements in max */
     const char *what;           /* one sentence, source and grade at its end */
     unsigned count;             /* REALS; LIST: 0, or how many are wanted */
     const char *const *choices; /* CHOICE: up to NULL */
@@ -34,6 +34,12 @@ struct board_field {
 bool board_field_set(const struct board_field *fields, unsigned n, void *profile, const char *key, unsigned index,
                      const char *text, char *why, size_t cap);
 
+/* Whether all numbers are in their ranges and there is a name; else a sentence in why that begins with the key. */
+bool board_field_check(const struct board_field *fields, unsigned n, const void *profile, char *why, size_t cap);
+
 const struct board_field *board_field_find(const struct board_field *fields, unsigned n, const char *key);
+
+bool board_field_is_list(const struct board_field *f);      /* a sequence in YAML */
+unsigned board_field_elements(const struct board_field *f); /* the most it takes; 1 for a scalar */
 
 #endif

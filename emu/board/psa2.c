@@ -250,7 +250,7 @@ static void out_of_patience(void *ctx, int64_t t_ns)
         return;
     }
     b->counters.timeouts++;
-    if (!b->fault_told && b->io.fault) b->io.fault(b->io.ctx, PSA2_FAULT_ACCEL_PORT, t_ns);
+    if (!b->fault_told && b->host.fault) b->host.fault(b->host.ctx, PSA2_FAULT_ACCEL_PORT, t_ns);
     b->fault_told = true;
     psa2_request_fail(b, PSA2_ACCEL, false, t_ns);
     psa2_service(b, t_ns);
@@ -312,10 +312,7 @@ static void accel_vin_row_v(void *ctx, unsigned mux, const int64_t *t_ns, unsign
 
 /* ---- life ---- */
 
-static const struct {
-    const char *name;
-    bool level; /* before the first power-up and at rest */
-} lines[PSA2_LINES] = {
+const struct board_line psa2_lines[PSA2_LINES] = {
     [PSA2_LINE_SYNC_A] = {"SYNC_A", false}, [PSA2_LINE_SCLK] = {"SClk", false},    [PSA2_LINE_DRD_A] = {"DRD_A", true},
     [PSA2_LINE_DIN] = {"DIn", false},       [PSA2_LINE_DOUTX] = {"DOutX", false},  [PSA2_LINE_DOUTY] = {"DOutY", false},
     [PSA2_LINE_DOUTZ] = {"DOutZ", false},   [PSA2_LINE_SYNC_T] = {"SYNC_T", true}, [PSA2_LINE_CST] = {"CST", true},
@@ -326,7 +323,7 @@ static const struct {
 
 const char *psa2_line_name(enum psa2_line line)
 {
-    return lines[line].name;
+    return psa2_lines[line].name;
 }
 
 static void wake(void *ctx, uint64_t mask)
@@ -341,7 +338,7 @@ static void init_trace(struct psa2 *b)
     trace_init(&b->trace);
     b->trace.source = (struct trace_source){.wake = wake, .ctx = b};
     line_faults_init(&b->line, &b->trace);
-    for (unsigned i = 0; i < PSA2_LINES; i++) (void)trace_add(&b->trace, lines[i].name, lines[i].level);
+    for (unsigned i = 0; i < PSA2_LINES; i++) (void)trace_add(&b->trace, psa2_lines[i].name, psa2_lines[i].level);
     b->idle_lines = b->trace.level;
 }
 
@@ -352,14 +349,14 @@ static void init_accel(struct psa2 *b)
     const struct ads1282_cfg cfg = {.part = b->profile.adc_is_1281 ? ADS1282_PART_1281 : ADS1282_PART_1282,
                                     .clk_hz = b->profile.fclk_hz,
                                     .vref_v = b->profile.adc_vref_v,
-                                    .noise_scale = b->unit.adc_noise_scale,
-                                    .chain = b->unit.adc_chain};
+                                    .noise_scale = b->cfg.adc_noise_scale,
+                                    .chain = b->cfg.adc_chain};
     for (unsigned i = 0; i < 3; i++) {
         b->port[i] = (struct psa2_port){b, i};
         const struct ads1282_io io = {
             .ctx = &b->port[i], .vin_v = accel_vin_v, .vin_row_v = accel_vin_row_v, .drdy = accel_drdy};
-        ads1282_init(&b->adc[i], &cfg, &io, b->sched, rng_stream(b->unit.seed, b->unit.serial, adc_noise[i]));
-        afe_init(&b->afe[i], &b->unit.afe[i], rng_stream(b->unit.seed, b->unit.serial, afe_noise[i]));
+        ads1282_init(&b->adc[i], &cfg, &io, b->sched, rng_stream(b->cfg.seed, b->cfg.serial, adc_noise[i]));
+        afe_init(&b->afe[i], &b->cfg.afe[i], rng_stream(b->cfg.seed, b->cfg.serial, afe_noise[i]));
     }
 }
 
@@ -367,12 +364,12 @@ static void init_temp(struct psa2 *b)
 {
     const struct ads1256_cfg cfg = {.clkin_hz = b->profile.temp_clkin_hz,
                                     .vref_v = b->profile.temp_vref_v,
-                                    .noise_scale = b->unit.temp_noise_scale,
-                                    .offset_v = b->unit.temp_adc_offset_v,
-                                    .gain_error = b->unit.temp_adc_gain_error,
+                                    .noise_scale = b->cfg.temp_noise_scale,
+                                    .offset_v = b->cfg.temp_adc_offset_v,
+                                    .gain_error = b->cfg.temp_adc_gain_error,
                                     .strict_timing = true};
     const struct ads1256_io io = {.ctx = b, .ain_v = psa2_temp_ain_v, .drdy = temp_drdy};
-    ads1256_init(&b->tadc, &cfg, &io, b->sched, rng_stream(b->unit.seed, b->unit.serial, "adc.t"));
+    ads1256_init(&b->tadc, &cfg, &io, b->sched, rng_stream(b->cfg.seed, b->cfg.serial, "adc.t"));
 }
 
 static void res_up(void *ctx, int64_t t_ns)
@@ -384,13 +381,13 @@ static void res_up(void *ctx, int64_t t_ns)
     await_step(b, t_ns);
 }
 
-void psa2_init(struct psa2 *b, const struct psa2_profile *p, const struct psa2_unit_cfg *u, const struct psa2_io *io,
+void psa2_init(struct psa2 *b, const struct psa2_profile *p, const struct board_cfg *cfg, const struct board_io *io,
                struct sched *s)
 {
     assert(io->accel && io->temp_degc);
     memset(b, 0, sizeof *b); /* nothing of an earlier life, above all no time of it */
     b->profile = *p;
-    b->unit = *u;
+    b->cfg = *cfg;
     b->io = *io;
     b->sched = s;
     b->stream = true;
@@ -470,6 +467,16 @@ void psa2_power_down(struct psa2 *b, int64_t t_ns)
     psa2_tell(b, PSA2_EV_RES, t_ns);
     psa2_tell(b, PSA2_EV_POWER_DOWN, t_ns);
     psa2_request_fail(b, PSA2_ACCEL, true, t_ns);
+}
+
+void psa2_attach(struct psa2 *b, const struct psa2_host *h)
+{
+    b->host = *h;
+}
+
+void psa2_listen(struct psa2 *b, bool on)
+{
+    b->heard = on && b->io.event;
 }
 
 void psa2_fault_set(struct psa2 *b, const struct psa2_controller_fault *f)

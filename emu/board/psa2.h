@@ -11,6 +11,8 @@
 #include "base/clk.h"
 #include "base/sched.h"
 #include "board/afe.h"
+#include "board/board_cfg.h"
+#include "board/board_part.h"
 #include "board/psa2_event.h"
 #include "board/psa2_profile.h"
 #include "chip/ads1256.h"
@@ -42,6 +44,7 @@ enum psa2_line {
     PSA2_LINES
 };
 
+extern const struct board_line psa2_lines[PSA2_LINES];
 const char *psa2_line_name(enum psa2_line line); /* as in the trace: "Int" */
 
 /* Bits of psa2_frame.status, and of the T word above channel and code. */
@@ -65,7 +68,7 @@ struct psa2_frame {
     uint32_t word[PSA2_WORDS]; /* as sent, in order */
 };
 
-/* EMCY codes of io.fault: told once, again only after data-ready has come. */
+/* EMCY codes of psa2_host.fault: told once, again only after data-ready has come. */
 enum psa2_fault {
     PSA2_FAULT_ACCEL_PORT = 0xFF01, /* no DRD_A for 100 ms beyond the settling time */
     PSA2_FAULT_TEMP_PORT = 0xFF02   /* no DRD_T likewise */
@@ -92,17 +95,11 @@ struct psa2_request {
     void *ctx;
 };
 
-struct psa2_io {
+/* Who takes what the board gives: its CAN side, a test. */
+struct psa2_host {
     void *ctx;
-    /* Sensor output, A or V by the channel's afe_cfg.input; t_ns up to a data period ago, never earlier than the axis's
-     * last call. Whoever changes the physics abruptly calls psa2_sample_until() first. */
-    double (*accel)(void *ctx, unsigned axis, int64_t t_ns);
-    double (*temp_degc)(void *ctx, unsigned channel, int64_t t_ns);     /* at X, Y, Z sensor and converter board (3) */
     void (*frame)(void *ctx, const struct psa2_frame *f, int64_t t_ns); /* INT has risen; may be NULL */
     void (*fault)(void *ctx, uint16_t code, int64_t t_ns);              /* enum psa2_fault; may be NULL */
-    /* Told when the line has moved and the board has not yet acted on it; may be NULL. Take note, or arm an event for t_ns,
-     * which comes before the board's next step: nothing of the board's may be called from inside. */
-    void (*event)(void *ctx, enum psa2_event e, int64_t t_ns);
 };
 
 struct psa2_counters {
@@ -111,19 +108,15 @@ struct psa2_counters {
     uint32_t int_late; /* a frame was dropped because INT was still low */
 };
 
-struct psa2_unit_cfg {
-    struct afe_cfg afe[3];
-    double adc_noise_scale, temp_noise_scale; /* 1 published, 0 none */
-    enum ads1282_chain adc_chain;             /* 0: ADS1282_CHAIN_EXACT */
-    double temp_adc_offset_v, temp_adc_gain_error;
-    uint64_t seed;
-    uint32_t serial;
-};
-
 #include "board/psa2_state.h" /* struct psa2, read-only outside the board's own files */
 
-void psa2_init(struct psa2 *b, const struct psa2_profile *p, const struct psa2_unit_cfg *u, const struct psa2_io *io,
+/* io->accel and io->temp_degc have to be there. io->event, if it is: told when the line has moved and the board has not yet
+ * acted on it, a number of enum psa2_event. Take note, or arm an event for t_ns, which comes before the board's next step:
+ * nothing of the board's may be called from inside. */
+void psa2_init(struct psa2 *b, const struct psa2_profile *p, const struct board_cfg *cfg, const struct board_io *io,
                struct sched *s);
+void psa2_attach(struct psa2 *b, const struct psa2_host *h); /* from the next frame on; nobody after psa2_init() */
+void psa2_listen(struct psa2 *b, bool on); /* io->event is told; a frame that is about to begin may begin untold */
 void psa2_power_up(struct psa2 *b, int64_t t_ns); /* supplies good: chips power up, Res released, set-up begins */
 void psa2_reset(struct psa2 *b, int64_t t_ns);    /* a pulse on Res */
 
@@ -134,7 +127,7 @@ void psa2_power_down(struct psa2 *b, int64_t t_ns);
 /* From now on; all false: none. Outlives resets and power. */
 void psa2_fault_set(struct psa2 *b, const struct psa2_controller_fault *f);
 bool psa2_ready(const struct psa2 *b);                /* the set-up has been carried out */
-void psa2_stream(struct psa2 *b, bool on);            /* frames on the line and to io.frame; on after power-up */
+void psa2_stream(struct psa2 *b, bool on);            /* frames on the line and to the host; on after power-up */
 void psa2_sample_until(struct psa2 *b, int64_t t_ns); /* the converters take their inputs up to now */
 
 /* Queues one request; PSA2_OK means done() will be called later (never from inside), anything else that it will not.

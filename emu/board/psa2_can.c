@@ -118,7 +118,7 @@ void psa2_can_fault(void *ctx, uint16_t code, int64_t t_ns)
 
 /* ---- life ---- */
 
-void psa2_can_init(struct psa2_can *c, const struct psa2_can_cfg *cfg, const struct psa2_can_port *port,
+void psa2_can_init(struct psa2_can *c, const struct board_can_cfg *cfg, const struct psa2_can_port *port,
                    struct can_bus *bus, struct sched *s)
 {
     memset(c, 0, sizeof *c);
@@ -167,7 +167,7 @@ static void board_info(void *ctx, struct psa2_can_info *out)
     out->counters = b->counters;
     out->period_ns = ads1282_period_ns(&b->adc[0]);
     out->fclk_hz = b->profile.fclk_hz;
-    out->serial = b->unit.serial;
+    out->serial = b->cfg.serial;
     out->word_bits = b->profile.word_bits;
 }
 

@@ -5,14 +5,17 @@
  * abort 08000022h, EMCY FF03h and the sentence in object 2031h. Owned by the caller, never moved after init, one thread,
  * no allocation. Use:
  *
- *     struct psa2_can_port port = psa2_can_port(&unit.board);
- *     psa2_can_init(&can, &(struct psa2_can_cfg){.name = "a", .node_id = 5}, &port, &bus, &sched);
- *     unit.frame = psa2_can_frame; unit.fault = psa2_can_fault; unit.ctx = &can;
- *     psa2_can_power_up(&can, t_ns);                                                                              */
+ *     struct psa2_can_port port = psa2_can_port(&board);
+ *     psa2_can_init(&can, &(struct board_can_cfg){.name = "a", .node_id = 5}, &port, &bus, &sched);
+ *     psa2_attach(&board, &(struct psa2_host){&can, psa2_can_frame, psa2_can_fault});
+ *     psa2_can_power_up(&can, t_ns);
+ *
+ * On a bench psa2_board.c does it. */
 #ifndef PSABENCH_BOARD_PSA2_CAN_H
 #define PSABENCH_BOARD_PSA2_CAN_H
 
 #include "base/can.h"
+#include "board/board_can.h"
 #include "board/psa2.h"
 #include "canopen/co_node.h"
 #include "gen/psa2_od.h"
@@ -20,14 +23,6 @@
 #define PSA2_CAN_TEXT    200u /* characters of the refusal, object 2031h */
 #define PSA2_CAN_REMARK  64u
 #define PSA2_CAN_CALM_NS NS_PER_S /* without a loss: the condition CAN overrun ends */
-
-struct psa2_can_cfg {
-    const char *name; /* kept by pointer */
-    uint8_t node_id;  /* 1..127 */
-    /* Told once for each text that object 2031h takes on, with the unit's name; NULL: nobody listens. */
-    void (*refused)(void *ctx, const char *name, const char *why);
-    void *ctx;
-};
 
 /* What the board is now. */
 struct psa2_can_info {
@@ -57,7 +52,7 @@ struct psa2_can_settings {
 
 /* Read-only outside board/psa2_can*.c. */
 struct psa2_can {
-    struct psa2_can_cfg cfg;
+    struct board_can_cfg cfg;
     struct psa2_can_port port;
     struct can_bus *bus;
     struct co_node node;
@@ -84,7 +79,7 @@ struct psa2_can {
 
 struct psa2_can_port psa2_can_port(struct psa2 *b);
 
-void psa2_can_init(struct psa2_can *c, const struct psa2_can_cfg *cfg, const struct psa2_can_port *port,
+void psa2_can_init(struct psa2_can *c, const struct board_can_cfg *cfg, const struct psa2_can_port *port,
                    struct can_bus *bus, struct sched *s);
 
 /* Attaches to the bus and boots; the board is powered up by its owner. */

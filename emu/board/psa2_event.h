@@ -18,6 +18,8 @@ enum psa2_event {
     PSA2_EVENTS
 };
 
+extern const char *const psa2_events[PSA2_EVENTS];
+
 /* As in the list above without its prefix: "DRD_A". NULL: no such event. */
 const char *psa2_event_name(enum psa2_event e);
 

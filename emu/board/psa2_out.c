@@ -128,7 +128,7 @@ static void int_rise(void *ctx, int64_t t_ns)
     b->out.busy = false;
     b->counters.frames++;
     psa2_tell(b, PSA2_EV_INT_RISE, t_ns);
-    if (b->io.frame) b->io.frame(b->io.ctx, &b->out.f, t_ns);
+    if (b->host.frame) b->host.frame(b->host.ctx, &b->out.f, t_ns);
 }
 
 static void int_fall(void *ctx, int64_t t_ns)
@@ -167,7 +167,7 @@ void psa2_out_start(struct psa2 *b, int64_t t_ns)
     pack_words(&b->profile, f);
     sched_at(b->sched, &o->rise, f->t_int_rise_ns);
     if (trace_watched(&b->trace, out_lines)) sched_at(b->sched, &o->word, f->t_int_fall_ns);
-    if (b->io.event) sched_at(b->sched, &o->fall, f->t_int_fall_ns);
+    if (b->heard) sched_at(b->sched, &o->fall, f->t_int_fall_ns);
     o->f = *f;
 }
 

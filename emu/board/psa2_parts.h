@@ -12,7 +12,7 @@ void psa2_service(struct psa2 *b, int64_t t_ns);
 
 static inline void psa2_tell(const struct psa2 *b, enum psa2_event e, int64_t t_ns)
 {
-    if (b->io.event) b->io.event(b->io.ctx, e, t_ns);
+    if (b->heard) b->io.event(b->io.ctx, e, t_ns);
 }
 
 /* A line that follows the controller or a converter: without power all are low. */

@@ -1,6 +1,7 @@
 #include "board/psa2_profile.h"
 
 #include "base/clk.h"
+#include "board/psa2_profile_parts.h"
 #include "chip/ads1282.h"
 
 #include <stdarg.h>
@@ -8,32 +9,35 @@
 #include <string.h>
 
 #define OFF(member) offsetof(struct psa2_profile, member)
+#define ROW(name, kind, lo, hi, words)                                                                                 \
+    {.key = #name, .type = BOARD_FIELD_##kind, .offset = OFF(name), .min = (lo), .max = (hi), .what = (words)}
 
 // clang-format off
-const struct psa2_field psa2_fields[] = {
-    {"name",               PSA2_FIELD_STRING, OFF(name), 1, 31, "Name of the profile."},
-    {"fclk_hz",            PSA2_FIELD_UINT, OFF(fclk_hz), 1e6, 4.096e6, "Crystal GOCh, clock of the accelerometer converters."},
-    {"temp_clkin_hz",      PSA2_FIELD_UINT, OFF(temp_clkin_hz), 1e5, 1e7, "Clock of the temperature converter."},
-    {"sclk_hz",            PSA2_FIELD_UINT, OFF(sclk_hz), 64e3, 2.048e6, "SClk of both serial ports."},
-    {"line_hz",            PSA2_FIELD_UINT, OFF(line_hz), 1e5, 1e9, "The output CLK is line_hz / line_div."},
-    {"line_div",           PSA2_FIELD_UINT, OFF(line_div), 1, 65536, "Divider of the output CLK."},
-    {"word_bits",          PSA2_FIELD_UINT, OFF(word_bits), 16, 32, "Bits of an output word: 16, 24 or 32."},
-    {"lead_in_clk",        PSA2_FIELD_UINT, OFF(lead_in_clk), 0, 255, "CLK periods from the fall of INT to the first bit."},
-    {"word",               PSA2_FIELD_WORDS, OFF(word), 0, 3, "Order of the words X, Y, Z, T, lowest address first."},
-    {"code_bits",          PSA2_FIELD_UINT, OFF(code_bits), 16, 32, "Significant bits of a code in its word: 16, 24 or 32."},
-    {"read_bits",          PSA2_FIELD_UINT, OFF(read_bits), 24, 32, "SClk pulses of one accelerometer read: 24 or 32."},
-    {"gate_sclk",          PSA2_FIELD_BOOL, OFF(gate_sclk), 0, 1, "SClk reaches only the group addressed."},
-    {"temp_channels",      PSA2_FIELD_UINT, OFF(temp_channels), 0, 8, "Temperature inputs scanned in turn; 0: none."},
-    {"adc_is_1281",        PSA2_FIELD_BOOL, OFF(adc_is_1281), 0, 1, "ADS1281 (no gain stage) instead of ADS1282."},
-    {"adc_vref_v",         PSA2_FIELD_REAL, OFF(adc_vref_v), 0.5, 5.5, "Reference of the accelerometer converters."},
-    {"adc_pga",            PSA2_FIELD_UINT, OFF(adc_pga), 1, 64, "Gain written to CONFIG1 after the article's set-up; 1: not written."},
-    {"temp_vref_v",        PSA2_FIELD_REAL, OFF(temp_vref_v), 0.5, 5.5, "Reference of the temperature converter."},
-    {"temp_sensor_a_per_k", PSA2_FIELD_REAL, OFF(temp_sensor_a_per_k), 0, 1e-3, "Current of a temperature sensor per kelvin of absolute temperature."},
-    {"temp_load_ohm",      PSA2_FIELD_REAL, OFF(temp_load_ohm), 0, 1e6, "Load resistor RTD of a temperature sensor."},
-    {"setup",              PSA2_FIELD_SETUP, OFF(setup), 1, PSA2_SETUP_MAX, "Transfers after Res, each on its data-ready event."},
+const struct board_field psa2_fields[PSA2_FIELDS] = {
+    ROW(name, STRING, 1, 31, "Name of the profile."),
+    ROW(fclk_hz, UINT, 1e6, 4.096e6, "Crystal GOCh, clock of the accelerometer converters."),
+    ROW(temp_clkin_hz, UINT, 1e5, 1e7, "Clock of the temperature converter."),
+    ROW(sclk_hz, UINT, 64e3, 2.048e6, "SClk of both serial ports."),
+    ROW(line_hz, UINT, 1e5, 1e9, "The output CLK is line_hz / line_div."),
+    ROW(line_div, UINT, 1, 65536, "Divider of the output CLK."),
+    ROW(word_bits, UINT, 16, 32, "Bits of an output word: 16, 24 or 32."),
+    ROW(lead_in_clk, UINT, 0, 255, "CLK periods from the fall of INT to the first bit."),
+    {.key = "word", .type = BOARD_FIELD_LIST, .offset = OFF(word), .min = 0, .max = 3, .what = "Order of the words X, Y, Z, T, lowest address first.",
+     .count = PSA2_WORDS, .like = "one of X, Y, Z, T", .parse = psa2_parse_word, .text = psa2_word_text},
+    ROW(code_bits, UINT, 16, 32, "Significant bits of a code in its word: 16, 24 or 32."),
+    ROW(read_bits, UINT, 24, 32, "SClk pulses of one accelerometer read: 24 or 32."),
+    ROW(gate_sclk, BOOL, 0, 1, "SClk reaches only the group addressed."),
+    ROW(temp_channels, UINT, 0, 8, "Temperature inputs scanned in turn; 0: none."),
+    ROW(adc_is_1281, BOOL, 0, 1, "ADS1281 (no gain stage) instead of ADS1282."),
+    ROW(adc_vref_v, REAL, 0.5, 5.5, "Reference of the accelerometer converters."),
+    ROW(adc_pga, UINT, 1, 64, "Gain written to CONFIG1 after the article's set-up; 1: not written."),
+    ROW(temp_vref_v, REAL, 0.5, 5.5, "Reference of the temperature converter."),
+    ROW(temp_sensor_a_per_k, REAL, 0, 1e-3, "Current of a temperature sensor per kelvin of absolute temperature."),
+    ROW(temp_load_ohm, REAL, 0, 1e6, "Load resistor RTD of a temperature sensor."),
+    {.key = "setup", .type = BOARD_FIELD_LIST, .offset = OFF(setup), .min = 1, .max = PSA2_SETUP_MAX, .what = "Transfers after Res, each on its data-ready event.",
+     .like = "like \"DRD_A write_A 41 00 56\" or \"DRD_T sync_T\"", .parse = psa2_parse_step, .text = psa2_step_text},
 };
 // clang-format on
-const unsigned psa2_field_count = sizeof psa2_fields / sizeof *psa2_fields;
 
 struct psa2_profile psa2_profile_default(void)
 {
@@ -111,32 +115,6 @@ static bool no(char *why, size_t cap, const char *format, ...)
     if (cap > 0) (void)vsnprintf(why, cap, format, args);
     va_end(args);
     return false;
-}
-
-static double field_number(const struct psa2_profile *p, const struct psa2_field *f)
-{
-    const void *at = (const char *)p + f->offset;
-    unsigned u;
-    double d;
-    if (f->type == PSA2_FIELD_REAL) {
-        memcpy(&d, at, sizeof d);
-        return d;
-    }
-    memcpy(&u, at, sizeof u);
-    return u;
-}
-
-static bool check_ranges(const struct psa2_profile *p, char *why, size_t cap)
-{
-    if (!p->name[0]) return no(why, cap, "name is empty: give the profile a name of 1 to 31 characters");
-    for (unsigned i = 0; i < psa2_field_count; i++) {
-        const struct psa2_field *f = &psa2_fields[i];
-        if (f->type != PSA2_FIELD_UINT && f->type != PSA2_FIELD_REAL) continue;
-        const double v = field_number(p, f);
-        if (!(v >= f->min && v <= f->max))
-            return no(why, cap, "%s = %.10g is outside %.10g .. %.10g", f->key, v, f->min, f->max);
-    }
-    return true;
 }
 
 static bool is_width(unsigned bits)
@@ -244,7 +222,7 @@ static bool check_times(const struct psa2_profile *p, char *why, size_t cap)
 
 bool psa2_profile_check(const struct psa2_profile *p, char *why, size_t cap)
 {
-    return check_ranges(p, why, cap) && check_words(p, why, cap) && check_setup(p, why, cap) &&
-           check_mode(p, why, cap) && check_sclk(p, why, cap) && check_gain(p, why, cap) &&
+    return board_field_check(psa2_fields, PSA2_FIELDS, p, why, cap) && check_words(p, why, cap) &&
+           check_setup(p, why, cap) && check_mode(p, why, cap) && check_sclk(p, why, cap) && check_gain(p, why, cap) &&
            check_int_low(p, why, cap) && check_times(p, why, cap);
 }

@@ -1,13 +1,13 @@
 /* What is soldered, programmed or assumed on a PSA-2 (or PSA-1) board: one plain struct per board profile.
  *
- * Filled by emu/app/profile_yaml.c from proto/profiles/NAME.yaml through the field table below, and checked by
+ * Filled by emu/app/profile_yaml.c from proto/profiles/NAME.yaml through the field table below (board_field.h), and checked by
  * psa2_profile_check() before a board may use it. Everything the article leaves open is here (design: open questions),
  * each with its evidence grade in docs/boards/psa2.md. Pure. */
 #ifndef PSABENCH_BOARD_PSA2_PROFILE_H
 #define PSABENCH_BOARD_PSA2_PROFILE_H
 
-#include <stdbool.h>
-#include <stddef.h>
+#include "board/board_field.h"
+
 #include <stdint.h>
 
 #define PSA2_WORDS          4u
@@ -56,31 +56,13 @@ struct psa2_profile {
     unsigned setup_count;
 };
 
-/* A field of the profile as the loader, the help and the docs see it. */
-enum psa2_field_type {
-    PSA2_FIELD_STRING,
-    PSA2_FIELD_UINT,
-    PSA2_FIELD_REAL,
-    PSA2_FIELD_BOOL,
-    PSA2_FIELD_WORDS,
-    PSA2_FIELD_SETUP
-};
-struct psa2_field {
-    const char *key; /* YAML key, unit in its name */
-    enum psa2_field_type type;
-    size_t offset;
-    double min, max;  /* of numbers */
-    const char *what; /* one sentence */
-};
-extern const struct psa2_field psa2_fields[];
-extern const unsigned psa2_field_count;
+#define PSA2_FIELDS 20u
+extern const struct board_field psa2_fields[PSA2_FIELDS];
 
 /* The profile "article" of the design document. */
 struct psa2_profile psa2_profile_default(void);
 
-/* Sets one field from its text, as YAML, the command line and tests have it. index is the element of a sequence (word:
- * "X" ... "T"; setup: "DRD_A write_A 41 00 56", "DRD_T sync_T"), 0 for a scalar; element 0 of setup empties the list first.
- * False, with a sentence in why and *p untouched, if the key is unknown or the text is not such a value. */
+/* board_field_set() of this table. Elements: of word "X" ... "T", of setup "DRD_A write_A 41 00 56", "DRD_T sync_T". */
 bool psa2_profile_set(struct psa2_profile *p, const char *key, unsigned index, const char *text, char *why, size_t cap);
 
 /* CLK periods of INT low: lead-in + words + gaps. */

@@ -78,7 +78,7 @@ struct psa2_out {
     bool busy;
     int watched_words; /* words reported to the trace; -1: INT fall not yet reported */
     struct psa2_frame f;
-    struct sched_ev rise, word, fall; /* fall: only for io.event */
+    struct sched_ev rise, word, fall; /* fall: only while heard */
 };
 
 /* Accelerometer side: what DRD_A brought and what is being read. */
@@ -96,8 +96,10 @@ struct psa2_port { /* which converter a callback came from */
 
 struct psa2 {
     struct psa2_profile profile;
-    struct psa2_unit_cfg unit;
-    struct psa2_io io;
+    struct board_cfg cfg;
+    struct board_io io;
+    struct psa2_host host;
+    bool heard; /* somebody listens to io.event */
     struct sched *sched;
     struct trace trace;      /* lines numbered by enum psa2_line */
     struct line_faults line; /* line_fault_add(&b->line, ...): by whoever injects them */

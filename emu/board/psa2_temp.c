@@ -25,7 +25,7 @@ static void out_of_patience(void *ctx, int64_t t_ns)
 {
     struct psa2 *b = ctx;
     b->counters.timeouts++;
-    if (!b->temp.fault_told && b->io.fault) b->io.fault(b->io.ctx, PSA2_FAULT_TEMP_PORT, t_ns);
+    if (!b->temp.fault_told && b->host.fault) b->host.fault(b->host.ctx, PSA2_FAULT_TEMP_PORT, t_ns);
     b->temp.fault_told = true;
     b->temp.hold = false;
     b->temp.stage = PSA2_SCAN_MUX;

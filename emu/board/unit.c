@@ -1,8 +1,10 @@
 #include "board/unit.h"
 
 #include "base/detmath.h"
+#include "canopen/co_node.h"
 
-#include <stddef.h>
+#include <stdio.h>
+#include <string.h>
 
 #define RAD_PER_DEG 0.017453292519943295
 
@@ -47,27 +49,25 @@ static double accel_signal(void *ctx, unsigned axis, int64_t t_ns)
     return u->sensor_faults[axis] ? sensor_fault_out(u->sensor_faults[axis], out, t_ns) : out;
 }
 
-static void on_frame(void *ctx, const struct psa2_frame *f, int64_t t_ns)
+/* Of the case, wherever in it. */
+static void rate_radps(void *ctx, int64_t t_ns, double w_ib_b[3])
 {
+    static const double origin_m[3] = {0.0, 0.0, 0.0};
     const struct unit *u = ctx;
-    if (u->frame) u->frame(u->ctx, f, t_ns);
-}
-
-static void on_fault(void *ctx, uint16_t code, int64_t t_ns)
-{
-    const struct unit *u = ctx;
-    if (u->fault) u->fault(u->ctx, code, t_ns);
+    struct felt felt;
+    lab_feel(u->lab, &u->cfg.seat, origin_m, t_ns, &felt);
+    for (unsigned i = 0; i < 3; i++) w_ib_b[i] = felt.w_radps[i];
 }
 
 /* A listener may end its own or another's listening: the cursor lives in the unit, where unit_unlisten() sees it. */
-static void on_event(void *ctx, enum psa2_event e, int64_t t_ns)
+static void on_event(void *ctx, unsigned event, int64_t t_ns)
 {
     struct unit *u = ctx;
     u->told_next = u->listeners;
     while (u->told_next) {
         struct unit_listener *l = u->told_next;
         u->told_next = l->next;
-        l->fn(l->ctx, e, t_ns);
+        l->fn(l->ctx, event, t_ns);
     }
 }
 
@@ -77,7 +77,7 @@ void unit_listen(struct unit *u, struct unit_listener *l)
     while (*at) at = &(*at)->next;
     l->next = NULL;
     *at = l;
-    u->board.io.event = on_event;
+    u->type->listen(u->board, true);
 }
 
 void unit_unlisten(struct unit *u, struct unit_listener *l)
@@ -88,18 +88,41 @@ void unit_unlisten(struct unit *u, struct unit_listener *l)
     if (u->told_next == l) u->told_next = l->next;
     *at = l->next;
     l->next = NULL;
-    if (!u->listeners) u->board.io.event = NULL;
+    if (!u->listeners) u->type->listen(u->board, false);
 }
 
 struct unit_cfg unit_default(const char *name)
 {
-    static const struct psa2_unit_cfg quiet = {.adc_noise_scale = 1.0, .temp_noise_scale = 1.0, .seed = 1, .serial = 1};
-    struct unit_cfg c = {.name = name, .board = quiet, .node = 5, .temp_degc = {25.0, 25.0, 25.0, 25.0}};
-    for (unsigned i = 0; i < UNIT_AXES; i++) {
-        c.board.afe[i] = afe_nominal(AFE_VOLTAGE);
-        c.axis[i].quartz = quartz_default();
-    }
+    static const struct board_cfg quiet = {.adc_noise_scale = 1.0, .temp_noise_scale = 1.0, .seed = 1, .serial = 1};
+    struct unit_cfg c = {.name = name, .board = quiet, .temp_degc = {25.0, 25.0, 25.0, 25.0}};
+    for (unsigned i = 0; i < UNIT_AXES; i++) c.axis[i].quartz = quartz_default();
+    unit_cfg_type(&c, board_types[0]);
     return c;
+}
+
+void unit_cfg_type(struct unit_cfg *cfg, const struct board_type *type)
+{
+    cfg->type = type;
+    cfg->profile = NULL;
+    cfg->node = type->node;
+    for (unsigned i = 0; i < UNIT_AXES; i++) cfg->board.afe[i] = afe_nominal(AFE_VOLTAGE);
+    if (type->cfg_default) type->cfg_default(&cfg->board);
+}
+
+/* A copy of its own for the board; its name stays here. */
+static void init_board(struct unit *u, struct sched *s)
+{
+    const struct board_io io = {
+        .ctx = u, .accel = accel_signal, .temp_degc = temp_degc, .rate_radps = rate_radps, .event = on_event};
+    union board_profile_store defaults;
+    const void *profile = u->cfg.profile;
+    if (!profile) {
+        memset(&defaults, 0, sizeof defaults);
+        u->type->profile_default(&defaults);
+        profile = &defaults;
+    }
+    snprintf(u->profile, sizeof u->profile, "%s", board_profile_name(u->type, profile));
+    u->type->init(u->board, profile, &u->cfg.board, &io, s);
 }
 
 void unit_init(struct unit *u, const struct unit_cfg *cfg, struct lab *lab, struct sched *s)
@@ -108,9 +131,9 @@ void unit_init(struct unit *u, const struct unit_cfg *cfg, struct lab *lab, stru
     static const char *const quartz_noise[UNIT_AXES] = {"quartz.x", "quartz.y", "quartz.z"};
     u->cfg = *cfg;
     u->lab = lab;
-    u->ctx = NULL;
-    u->frame = NULL;
-    u->fault = NULL;
+    u->type = cfg->type;
+    u->board = &u->store;
+    u->can = NULL;
     u->listeners = u->told_next = NULL;
     for (unsigned i = 0; i < UNIT_AXES; i++) {
         u->sensor_faults[i] = NULL;
@@ -125,10 +148,40 @@ void unit_init(struct unit *u, const struct unit_cfg *cfg, struct lab *lab, stru
         u->sin_alpha0[i] = det_sin(alpha0_rad);
     }
     chamber_put_in(&lab->chamber, &u->body, cfg->tau_case_s, cfg->tau_element_s);
-    const struct psa2_io io = {
-        .ctx = u, .accel = accel_signal, .temp_degc = temp_degc, .frame = on_frame, .fault = on_fault};
-    const struct psa2_profile profile = cfg->profile ? *cfg->profile : psa2_profile_default();
-    psa2_init(&u->board, &profile, &cfg->board, &io, s);
+    init_board(u, s);
+}
+
+void unit_connect(struct unit *u, const struct board_can_cfg *cfg, struct can_bus *bus, struct sched *s)
+{
+    u->can = &u->can_store;
+    u->type->can->init(u->can, cfg, u->board, bus, s);
+}
+
+void unit_power_up(struct unit *u, int64_t t_ns)
+{
+    u->type->power_up(u->board, t_ns);
+    if (u->can) u->type->can->power_up(u->can, t_ns);
+}
+
+void unit_power_down(struct unit *u, int64_t t_ns)
+{
+    u->type->power_down(u->board, t_ns);
+    if (u->can) u->type->can->power_down(u->can);
+}
+
+void unit_sample_until(struct unit *u, int64_t t_ns)
+{
+    u->type->sample_until(u->board, t_ns);
+}
+
+struct trace *unit_trace(const struct unit *u)
+{
+    return u->type->trace(u->board);
+}
+
+struct can_node *unit_node(const struct unit *u)
+{
+    return u->can ? &u->type->can->node(u->can)->stream : NULL;
 }
 
 /* The face turns the sensor's own axes; which of the unit's axes they are follows from its channel. The sensor is where it is

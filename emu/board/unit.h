@@ -1,18 +1,18 @@
-/* One unit of the bench: a PSA-2 board, the sensors on its three channels, and its seat on an instrument of the lab.
+/* One unit of the bench: a board of any type, the sensors on its three channels, and its seat on an instrument of the lab.
  *
- * The unit wires sensors to the board (psa2_io.accel, psa2_io.temp_degc); who wants its frames sets the two callbacks. A
+ * The unit wires sensors to the board (board_io) and, if asked, the board's CAN side to a bus. A
  * sensor on channel X has the unit's axes (x, y, z), on Y (y, z, x), on Z (z, x, y). Several units share a lab. Owned
  * by the caller, about 300 kB, never moved after unit_init. One thread. */
 #ifndef PSABENCH_BOARD_UNIT_H
 #define PSABENCH_BOARD_UNIT_H
 
-#include "board/psa2.h"
+#include "board/boards.h"
 #include "phys/lab.h"
 #include "phys/mems.h"
 #include "phys/quartz.h"
 #include "phys/sensor_fault.h"
 
-#define UNIT_AXES  3u
+#define UNIT_AXES  BOARD_AXES
 #define UNIT_TEMPS 4u /* sensors X, Y, Z, converter board */
 
 /* Without a sensor the channel is shorted: 0 V or 0 A. Quartz gives a current: afe.input has to be current. */
@@ -27,9 +27,10 @@ struct unit_axis_cfg {
 };
 
 struct unit_cfg {
-    const char *name;                   /* kept by pointer */
-    const struct psa2_profile *profile; /* checked by the caller: psa2_profile_check(); NULL: "article" */
-    struct psa2_unit_cfg board;         /* afe, noise scales, seed, serial */
+    const char *name; /* kept by pointer */
+    const struct board_type *type;
+    const void *profile;    /* of the type, checked by the caller; NULL: the type's default */
+    struct board_cfg board; /* afe, noise scales, seed, serial */
     struct unit_axis_cfg axis[UNIT_AXES];
     double temp_degc[UNIT_TEMPS];     /* where the lab has no chamber */
     double tau_case_s, tau_element_s; /* in the chamber; 0: the chamber's own */
@@ -39,7 +40,7 @@ struct unit_cfg {
 
 /* Who wants to hear of the board's events. Owned by the listener. */
 struct unit_listener {
-    void (*fn)(void *ctx, enum psa2_event e, int64_t t_ns); /* as psa2_io.event; it may end any listening */
+    void (*fn)(void *ctx, unsigned event, int64_t t_ns); /* as board_io.event; it may end any listening */
     void *ctx;
     struct unit_listener *next;
 };
@@ -49,22 +50,36 @@ struct unit {
     struct lab *lab;
     struct chamber_body body;
     int64_t warm_step[UNIT_AXES]; /* at which the sensor's temperature was taken */
-    struct psa2 board;
+    const struct board_type *type;
+    void *board;      /* in store, of the type */
+    void *can;        /* in can_store; NULL: on no bus */
+    char profile[32]; /* its name */
     struct mems mems[UNIT_AXES];
     struct quartz quartz[UNIT_AXES];
-    struct sensor_fault *sensor_faults[UNIT_AXES]; /* psa2_sample_until() before each change */
+    struct sensor_fault *sensor_faults[UNIT_AXES]; /* unit_sample_until() before each change */
     double cos_alpha0[UNIT_AXES], sin_alpha0[UNIT_AXES];
-    void *ctx;
-    void (*frame)(void *ctx, const struct psa2_frame *f, int64_t t_ns);
-    void (*fault)(void *ctx, uint16_t code, int64_t t_ns);
     struct unit_listener *listeners; /* in order of coming */
     struct unit_listener *told_next; /* cursor of the event under way */
+    union board_store store;
+    union board_can_store can_store;
 };
 
-/* A board of profile "article" at 25 degC with nominal chains, no sensor, no noise but the converters'. */
+/* A PSA-2 of profile "article" at 25 degC with nominal chains, no sensor, no noise but the converters'. */
 struct unit_cfg unit_default(const char *name);
 
+/* Makes it one of another type: profile, analog chains and node id are the type's defaults. */
+void unit_cfg_type(struct unit_cfg *cfg, const struct board_type *type);
+
 void unit_init(struct unit *u, const struct unit_cfg *cfg, struct lab *lab, struct sched *s);
+
+/* Once, before power-up: the board has a node on the bus from then on. */
+void unit_connect(struct unit *u, const struct board_can_cfg *cfg, struct can_bus *bus, struct sched *s);
+
+void unit_power_up(struct unit *u, int64_t t_ns); /* board, then its node */
+void unit_power_down(struct unit *u, int64_t t_ns);
+void unit_sample_until(struct unit *u, int64_t t_ns); /* before the physics change abruptly */
+struct trace *unit_trace(const struct unit *u);
+struct can_node *unit_node(const struct unit *u); /* NULL: on no bus */
 
 /* From the next event on, after those who listen already; the board computes events only while somebody listens. A frame
  * that is about to begin may begin untold. */

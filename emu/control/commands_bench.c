@@ -47,7 +47,8 @@ static enum control_outcome do_unit_reset(struct control *c, const struct contro
     if (!v[0].given && c->bench->units != 1) {
         return control_refuse(c, "argument", "unit is missing: there are %u units", c->bench->units);
     }
-    psa2_reset(&c->bench->unit[v[0].unit]->board, t_ns);
+    const struct unit *u = c->bench->unit[v[0].unit];
+    u->type->reset(u->board, t_ns);
     return CONTROL_DONE;
 }
 

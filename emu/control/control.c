@@ -30,7 +30,7 @@ enum control_outcome control_refuse(struct control *c, const char *code, const c
 
 void control_settle_inputs(const struct control_bench *b, int64_t t_ns)
 {
-    for (unsigned i = 0; i < b->units; i++) psa2_sample_until(&b->unit[i]->board, t_ns);
+    for (unsigned i = 0; i < b->units; i++) unit_sample_until(b->unit[i], t_ns);
 }
 
 /* ---- the rows */

@@ -142,8 +142,8 @@ void describe_units(const struct control_bench *b, cJSON *to)
         add_count(j, "serial", u->cfg.board.serial);
         add_count(j, "node", u->cfg.node);
         add_bus_name(b, b->node[i], j);
-        cJSON_AddStringToObject(j, "profile", u->board.profile.name);
-        cJSON_AddBoolToObject(j, "ready", psa2_ready(&u->board));
+        cJSON_AddStringToObject(j, "profile", u->profile);
+        cJSON_AddBoolToObject(j, "ready", u->type->ready(u->board));
         cJSON_AddItemToArray(list, j);
     }
 }
@@ -210,7 +210,7 @@ static void add_node(const struct can_node *n, cJSON *to)
 void describe_unit_counters(const struct control_bench *b, unsigned unit, cJSON *to)
 {
     static const char *const adc[] = {"adc_x", "adc_y", "adc_z"};
-    const struct psa2 *p = &b->unit[unit]->board;
+    const struct psa2 *p = b->unit[unit]->board;
     ADD_COUNTERS(board_counters, &p->counters, cJSON_AddObjectToObject(to, "board"));
     for (unsigned i = 0; i < 3; i++) {
         cJSON *j = cJSON_AddObjectToObject(to, adc[i]);

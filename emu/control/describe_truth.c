@@ -76,7 +76,7 @@ static void add_unit_truth(struct unit *u, cJSON *to, int64_t t_ns)
     static const char *const axis[] = {"x", "y", "z"};
     add_count(to, "serial", u->cfg.board.serial);
     add_count(to, "node", u->cfg.node);
-    cJSON_AddStringToObject(to, "profile", u->board.profile.name);
+    cJSON_AddStringToObject(to, "profile", u->profile);
     add_real(to, "adc_noise_scale", u->cfg.board.adc_noise_scale);
     add_real(to, "temp_noise_scale", u->cfg.board.temp_noise_scale);
     add_real(to, "temp_adc_offset_v", u->cfg.board.temp_adc_offset_v);

@@ -46,7 +46,7 @@ static void begin(struct fault *f, int64_t t_ns)
 
 /* Called by the board in the middle of what it does: the fault begins in an event of its own, at the same instant if there
  * is no delay. */
-static void on_event(void *ctx, enum psa2_event event, int64_t t_ns)
+static void on_event(void *ctx, unsigned event, int64_t t_ns)
 {
     struct fault *f = ctx;
     if (f->ev.queued || !fault_trigger_event(&f->trigger, (int)event)) return;

@@ -27,6 +27,11 @@ static bool here(const struct fault *f, const struct fault *other)
            other->point.index == f->point.index;
 }
 
+static struct psa2 *board_of(const struct fault *f)
+{
+    return fault_unit(f)->board;
+}
+
 static void set_accel(struct fault *f, const struct sum *s, int64_t t_ns)
 {
     static const enum ads1282_stuck stuck[] = {ADS1282_STUCK_LOW, ADS1282_STUCK_HIGH};
@@ -34,7 +39,7 @@ static void set_accel(struct fault *f, const struct sum *s, int64_t t_ns)
                                       .dout = s->dout ? stuck[s->dout_high] : ADS1282_FREE,
                                       .lost_sync = s->lost_sync,
                                       .clock_ppm = (int32_t)nearbyint(s->ppm)};
-    ads1282_fault(&fault_unit(f)->board.adc[f->point.index], &all, t_ns);
+    ads1282_fault(&board_of(f)->adc[f->point.index], &all, t_ns);
 }
 
 static void set_temp(struct fault *f, const struct sum *s, int64_t t_ns)
@@ -44,7 +49,7 @@ static void set_temp(struct fault *f, const struct sum *s, int64_t t_ns)
                                       .dout = s->dout ? stuck[s->dout_high] : ADS1256_FREE,
                                       .lost_sync = s->lost_sync,
                                       .clock_ppm = (int32_t)nearbyint(s->ppm)};
-    ads1256_fault(&fault_unit(f)->board.tadc, &all, t_ns);
+    ads1256_fault(&board_of(f)->tadc, &all, t_ns);
 }
 
 static void refresh_chip(struct fault *f, int64_t t_ns)
@@ -66,7 +71,7 @@ static bool apply_chip(struct fault *f, int64_t t_ns)
 
 static bool flip(struct fault *f, int64_t t_ns)
 {
-    struct psa2 *b = &fault_unit(f)->board;
+    struct psa2 *b = board_of(f);
     if (b->mode == PSA2_OFF) return false; /* registers without power hold nothing */
     const unsigned reg = (unsigned)f->value[FAULT_REGISTER];
     const uint8_t mask = (uint8_t)f->value[FAULT_MASK];
@@ -135,7 +140,7 @@ static void refresh_controller(struct fault *f, int64_t t_ns)
         all.wrong_setup_order |= other->kind->variant == SETUP_ORDER;
         all.frozen_words |= other->kind->variant == FROZEN_WORDS;
     }
-    psa2_fault_set(&fault_unit(f)->board, &all);
+    psa2_fault_set(board_of(f), &all);
 }
 
 static bool apply_controller(struct fault *f, int64_t t_ns)

@@ -8,7 +8,7 @@ _Static_assert(LINE_FAULTS_MAX >= FAULTS_MAX, "each fault of a line that was acc
 static struct line_faults *lines(struct fault *f)
 {
     struct line_faults *l = &f->engine->lines[f->point.unit];
-    if (!l->trace) line_faults_init(l, &fault_unit(f)->board.trace);
+    if (!l->trace) line_faults_init(l, unit_trace(fault_unit(f)));
     return l;
 }
 
@@ -39,7 +39,7 @@ static void lift_line(struct fault *f, int64_t t_ns)
 static bool has_pulse(const struct control_bench *b, const struct fault *f, char *why)
 {
     const struct unit *u = b->unit[f->point.unit];
-    const unsigned pulses = u ? PSA2_WORDS * u->board.profile.word_bits : PSA2_WORDS * 32u;
+    const unsigned pulses = u ? PSA2_WORDS * ((const struct psa2 *)u->board)->profile.word_bits : PSA2_WORDS * 32u;
     if (f->point.index != PSA2_LINE_CLK) {
         snprintf(why, CONTROL_WHY_MAX, "%s: %s carries no pulses that are counted in a frame; the line CLK does",
                  f->kind->name, f->name);

@@ -56,7 +56,7 @@ void control_fault_changed(void *ctx, const struct fault *f, int64_t t_ns)
 
 /* ---- the boards' events */
 
-static void on_event(void *ctx, enum psa2_event e, int64_t t_ns)
+static void on_event(void *ctx, unsigned e, int64_t t_ns)
 {
     const struct control_ear *ear = ctx;
     struct control *c = ear->control;
@@ -169,11 +169,11 @@ static void ignore_steps(void *ctx, const struct trace_step *s, unsigned n)
 
 uint64_t control_lines(struct control *c, unsigned unit, int64_t t_ns)
 {
-    struct trace *t = &c->bench->unit[unit]->board.trace;
+    struct trace *t = unit_trace(c->bench->unit[unit]);
     struct control_watch *w = &c->watch;
     if (!w->probing[unit]) {
         w->probing[unit] = true;
-        w->probe[unit] = (struct trace_sink){.mask = (UINT32_C(1) << PSA2_LINES) - 1, .steps = ignore_steps};
+        w->probe[unit] = (struct trace_sink){.mask = TRACE_FIRST(PSA2_LINES), .steps = ignore_steps};
         trace_attach(t, &w->probe[unit]);
     }
     if (t->filter) return t->filter->level; /* a faulty line is known as far as it was delivered: TRACE_LAG_NS ago */

@@ -140,14 +140,14 @@ static const struct bench_case {
 
 static void power_up(struct bench *n, enum ads1282_chain chain)
 {
-    const struct psa2_io io = {.ctx = n, .accel = accel, .temp_degc = degc, .frame = frame};
+    const struct board_io io = {.ctx = n, .accel = accel, .temp_degc = degc};
     const struct psa2_profile p = psa2_profile_default();
-    struct psa2_unit_cfg u = {
-        .adc_noise_scale = 1.0, .temp_noise_scale = 1.0, .adc_chain = chain, .seed = 1, .serial = 1};
+    struct board_cfg u = {.adc_noise_scale = 1.0, .temp_noise_scale = 1.0, .adc_chain = chain, .seed = 1, .serial = 1};
     for (unsigned i = 0; i < 3; i++) u.afe[i] = afe_nominal(AFE_VOLTAGE);
     memset(n, 0, sizeof *n);
     sched_init(&n->s);
     psa2_init(&n->b, &p, &u, &io, &n->s);
+    psa2_attach(&n->b, &(struct psa2_host){.ctx = n, .frame = frame});
     psa2_power_up(&n->b, 0);
     run_frames(n, 1);
 }

@@ -199,7 +199,7 @@ static void power_up(struct world *w, uint8_t choice)
     w->host = (struct can_node){.name = "host", .fd = true, .rx = hear, .ctx = w};
     can_attach(&w->bus, &w->host);
     const struct psa2_can_port port = {w, submit, reset, info};
-    const struct psa2_can_cfg cfg = {.name = "unit", .node_id = NODE, .refused = refused, .ctx = w};
+    const struct board_can_cfg cfg = {.name = "unit", .node_id = NODE, .refused = refused, .ctx = w};
     psa2_can_init(&w->can, &cfg, &port, &w->bus, &w->s);
     psa2_can_power_up(&w->can, 0);
 }

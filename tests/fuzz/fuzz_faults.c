@@ -55,10 +55,10 @@ static void on_fault(void *ctx, uint16_t code, int64_t t_ns)
     psa2_can_fault(&w->can, code, t_ns);
 }
 
-static void on_event(void *ctx, enum psa2_event e, int64_t t_ns)
+static void on_event(void *ctx, unsigned e, int64_t t_ns)
 {
     struct world *w = ctx;
-    assert(e < PSA2_EVENTS && psa2_event_name(e) && t_ns == w->s.now_ns);
+    assert(e < PSA2_EVENTS && psa2_event_name((enum psa2_event)e) && t_ns == w->s.now_ns);
     w->events++;
 }
 
@@ -210,7 +210,8 @@ static void op(struct world *w, struct script *s)
         if (w->attached) trace_attach(&w->b.trace, &w->ear.sink);
         return;
     case 8:
-        w->b.io.event = b & 0x80 ? on_event : NULL;
+        w->b.io.event = on_event;
+        psa2_listen(&w->b, b & 0x80);
         return;
     case 9:
         psa2_reset(&w->b, w->s.now_ns);
@@ -247,16 +248,17 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     static struct world w;
     struct script s = script_of(data, size);
     const struct psa2_profile profile = psa2_profile_default();
-    const struct psa2_io io = {.ctx = &w, .accel = accel, .temp_degc = degc, .frame = on_frame, .fault = on_fault};
-    struct psa2_unit_cfg unit = {.adc_noise_scale = 1.0, .temp_noise_scale = 1.0, .seed = 1, .serial = 1};
+    const struct board_io io = {.ctx = &w, .accel = accel, .temp_degc = degc};
+    struct board_cfg unit = {.adc_noise_scale = 1.0, .temp_noise_scale = 1.0, .seed = 1, .serial = 1};
     unit.adc_chain = (enum ads1282_chain)(script_byte(&s) % 3);
     for (unsigned i = 0; i < 3; i++) unit.afe[i] = afe_nominal(AFE_VOLTAGE);
     memset(&w, 0, sizeof w);
     sched_init(&w.s);
     psa2_init(&w.b, &profile, &unit, &io, &w.s);
+    psa2_attach(&w.b, &(struct psa2_host){.ctx = &w, .frame = on_frame, .fault = on_fault});
     can_bus_init(&w.bus, &(struct can_bus_cfg){.bitrate_hz = script_byte(&s) & 1 ? 1000000 : 500000}, &w.s);
     const struct psa2_can_port port = psa2_can_port(&w.b);
-    psa2_can_init(&w.can, &(struct psa2_can_cfg){.name = "a", .node_id = NODE}, &port, &w.bus, &w.s);
+    psa2_can_init(&w.can, &(struct board_can_cfg){.name = "a", .node_id = NODE}, &port, &w.bus, &w.s);
     w.host = (struct can_node){.name = "host", .rx = on_rx, .error = on_error, .ctx = &w};
     w.ear.sink = (struct trace_sink){.mask = LINE_MASK, .steps = listener_steps, .ctx = &w.ear};
     can_attach(&w.bus, &w.host);

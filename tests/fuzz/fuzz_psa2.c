@@ -189,13 +189,14 @@ static void step(struct world *w, struct script *s)
 static void power_up(struct world *w, bool watched)
 {
     const struct psa2_profile p = psa2_profile_default();
-    const struct psa2_io io = {.ctx = w, .accel = accel, .temp_degc = degc, .frame = on_frame, .fault = on_fault};
-    struct psa2_unit_cfg u = {.adc_noise_scale = 1.0, .temp_noise_scale = 1.0, .seed = 7, .serial = 3};
+    const struct board_io io = {.ctx = w, .accel = accel, .temp_degc = degc};
+    struct board_cfg u = {.adc_noise_scale = 1.0, .temp_noise_scale = 1.0, .seed = 7, .serial = 3};
     for (unsigned i = 0; i < 3; i++) u.afe[i] = afe_nominal(AFE_VOLTAGE);
     memset(w, 0, sizeof *w);
     w->clean = true;
     sched_init(&w->s);
     psa2_init(&w->b, &p, &u, &io, &w->s);
+    psa2_attach(&w->b, &(struct psa2_host){.ctx = w, .frame = on_frame, .fault = on_fault});
     w->ear.sink = (struct trace_sink){.steps = watched ? listener_steps : NULL, .ctx = &w->ear};
     psa2_power_up(&w->b, 0);
 }

@@ -77,9 +77,9 @@ static inline void rig_steps(void *ctx, const struct trace_step *s, unsigned n)
     trace_each(s, n, UINT32_MAX, rig_change, ctx);
 }
 
-static inline struct psa2_unit_cfg rig_unit(double noise_scale)
+static inline struct board_cfg rig_unit(double noise_scale)
 {
-    struct psa2_unit_cfg u = {.adc_noise_scale = noise_scale, .temp_noise_scale = noise_scale, .seed = 7, .serial = 3};
+    struct board_cfg u = {.adc_noise_scale = noise_scale, .temp_noise_scale = noise_scale, .seed = 7, .serial = 3};
     for (int i = 0; i < 3; i++) u.afe[i] = afe_nominal(AFE_VOLTAGE);
     return u;
 }
@@ -87,15 +87,15 @@ static inline struct psa2_unit_cfg rig_unit(double noise_scale)
 /* Off; rig_power() or psa2_power_up() switches it on. */
 static inline void rig_init(struct rig *r, const struct psa2_profile *p, double noise_scale)
 {
-    const struct psa2_io io = {
-        .ctx = r, .accel = rig_accel, .temp_degc = rig_degc, .frame = rig_frame, .fault = rig_fault};
-    const struct psa2_unit_cfg u = rig_unit(noise_scale);
+    const struct board_io io = {.ctx = r, .accel = rig_accel, .temp_degc = rig_degc};
+    const struct board_cfg u = rig_unit(noise_scale);
     char why[300];
     if (!psa2_profile_check(p, why, sizeof why)) fail_msg("%s", why);
     memset(r, 0, sizeof *r);
     for (int i = 0; i < 4; i++) r->degc[i] = 25.0;
     sched_init(&r->s);
     psa2_init(&r->b, p, &u, &io, &r->s);
+    psa2_attach(&r->b, &(struct psa2_host){.ctx = r, .frame = rig_frame, .fault = rig_fault});
     r->sink = (struct trace_sink){.mask = 0xFFFF, .steps = rig_steps, .ctx = r};
 }
 

@@ -231,7 +231,7 @@ static void bad_commands_are_refused_in_words_and_change_nothing(void **state)
     assert_int_equal(asked.runs + asked.quits, 0);
     assert_true(head_at_rest(&bench->lab.head, 0));
     assert_int_equal(bench->lab.head.face, HEAD_DIRECT);
-    assert_int_equal(bench->unit[0].board.counters.resets, 0);
+    assert_int_equal(((const struct psa2 *)bench->unit[0].board)->counters.resets, 0);
 }
 
 static void an_overlong_line_is_refused(void **state)
@@ -434,8 +434,8 @@ static void a_unit_is_reset_by_name(void **state)
     (void)state;
     assert_says("{\"cmd\":\"unit.reset\",\"args\":{\"unit\":\"b\"}}", "\"ok\":true");
     sched_run_until(&bench->sched, 1000000000);
-    assert_int_equal(bench->unit[0].board.counters.resets, 0);
-    assert_int_equal(bench->unit[1].board.counters.resets, 1);
+    assert_int_equal(((const struct psa2 *)bench->unit[0].board)->counters.resets, 0);
+    assert_int_equal(((const struct psa2 *)bench->unit[1].board)->counters.resets, 1);
     assert_says("{\"cmd\":\"counters\",\"args\":{\"unit\":\"b\"}}", "\"resets\":1");
     assert_says("{\"cmd\":\"counters\",\"args\":{\"unit\":\"a\"}}", "\"resets\":0");
 }

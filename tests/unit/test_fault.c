@@ -120,10 +120,10 @@ static int fresh(void **state)
     fault_init(&r.engine, &r.view, &r.s);
     r.engine.changed = on_change;
     control_init(&r.control, control_tables, &r.view);
-    r.unit[0].frame = on_frame;
+    psa2_attach(r.unit[0].board, &(struct psa2_host){.frame = on_frame});
     r.listener.fn = on_event;
     unit_listen(&r.unit[0], &r.listener);
-    for (unsigned i = 0; i < UNITS; i++) psa2_power_up(&r.unit[i].board, 0);
+    for (unsigned i = 0; i < UNITS; i++) psa2_power_up(r.unit[i].board, 0);
     return 0;
 }
 
@@ -254,10 +254,10 @@ static void events_may_be_those_of_another_unit(void **state)
         add("{'kind':'sensor.bias','point':'a.sensor.x','bias_v':1,'after':'RES','count':1,'unit':'b'}");
     run_to(200 * MS);
     assert_int_equal(r.changes, 0);
-    psa2_reset(&r.unit[0].board, r.s.now_ns);
+    psa2_reset(r.unit[0].board, r.s.now_ns);
     run_to(201 * MS);
     assert_int_equal(r.changes, 0);
-    psa2_reset(&r.unit[1].board, r.s.now_ns);
+    psa2_reset(r.unit[1].board, r.s.now_ns);
     run_to(202 * MS);
     assert_change(0, id, FAULT_ACTIVE, 201 * MS);
     assert_null(r.unit[1].listeners);
@@ -470,7 +470,7 @@ static void faults_of_a_chip_add_up(void **state)
     assert_int_equal(r.frame.code[2], 0);
     run_to(540 * MS);
     assert_int_equal(r.frame.code[0], -1); /* frozen, though the pin is well again */
-    assert_true(r.unit[0].board.adc[0].fault.lost_sync);
+    assert_true(((struct psa2 *)r.unit[0].board)->adc[0].fault.lost_sync);
     run_to(590 * MS);
     assert_true(r.frame.code[0] > 2000000);
     assert_int_equal(r.changes, 6);
@@ -515,7 +515,7 @@ static void a_flip_in_a_board_without_power_is_void(void **state)
                                        "{'kind':'chip.flip','point':'b.tadc','register':2,'mask':1}"};
     (void)state;
     run_to(400 * MS);
-    psa2_power_down(&r.unit[1].board, r.s.now_ns);
+    psa2_power_down(r.unit[1].board, r.s.now_ns);
     for (size_t i = 0; i < COUNT(args); i++) {
         const uint32_t id = add(args[i]);
         assert_true(id != 0);

@@ -556,10 +556,12 @@ static void a_board_may_be_initialised_again(void **state)
     first = rig.frame[0];
     rig_run(&rig, 5300000); /* in the middle of things */
     const struct psa2_profile p = rig.b.profile;
-    const struct psa2_unit_cfg u = rig.b.unit;
-    const struct psa2_io io = rig.b.io;
+    const struct board_cfg u = rig.b.cfg;
+    const struct board_io io = rig.b.io;
+    const struct psa2_host host = rig.b.host;
     sched_init(&rig.s);
     psa2_init(&rig.b, &p, &u, &io, &rig.s);
+    psa2_attach(&rig.b, &host);
     psa2_power_up(&rig.b, 0);
     rig.frames = 0;
     rig_run(&rig, 192000000);

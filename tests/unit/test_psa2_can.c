@@ -108,7 +108,7 @@ static void join_bus(struct rig *r, const struct psa2_can_port *port, uint32_t b
     can_bus_init(&r->bus, &bus, &r->s);
     r->host = (struct can_node){.name = "host", .fd = true, .rx = on_rx, .ctx = r};
     can_attach(&r->bus, &r->host);
-    const struct psa2_can_cfg cfg = {.name = "unit", .node_id = NODE, .refused = on_refused, .ctx = r};
+    const struct board_can_cfg cfg = {.name = "unit", .node_id = NODE, .refused = on_refused, .ctx = r};
     psa2_can_init(&r->can, &cfg, port, &r->bus, &r->s);
 }
 
@@ -704,7 +704,7 @@ static void two_units_share_a_bus_by_their_identifiers(void **state)
     struct rig *r = rig_up(1000000, 0, 1000);
     static struct psa2_can other;
     const struct psa2_can_port port = {r, fake_submit, fake_reset, fake_info};
-    const struct psa2_can_cfg cfg = {.name = "other", .node_id = 7};
+    const struct board_can_cfg cfg = {.name = "other", .node_id = 7};
     psa2_can_init(&other, &cfg, &port, &r->bus, &r->s);
     psa2_can_power_up(&other, r->s.now_ns);
     settle(r);
@@ -732,7 +732,7 @@ static struct rig *real_up(void)
     struct rig *r = &rig;
     memset(r, 0, sizeof *r);
     memset(&real, 0, sizeof real);
-    const struct psa2_can_port port = psa2_can_port(&real.board);
+    const struct psa2_can_port port = psa2_can_port(&real.store.psa2);
     join_bus(r, &port, 1000000, 0);
     struct unit_cfg cfg = unit_default("unit");
     static struct psa2_profile profile;
@@ -743,10 +743,8 @@ static struct rig *real_up(void)
     lab_cfg.head.turn_s = 1.0;
     lab_init(&lab, &lab_cfg, 1);
     unit_init(&real, &cfg, &lab, &r->s);
-    real.ctx = &r->can;
-    real.frame = psa2_can_frame;
-    real.fault = psa2_can_fault;
-    psa2_power_up(&real.board, 0);
+    psa2_attach(real.board, &(struct psa2_host){&r->can, psa2_can_frame, psa2_can_fault});
+    psa2_power_up(real.board, 0);
     psa2_can_power_up(&r->can, 0);
     return r;
 }
@@ -756,7 +754,7 @@ static void the_article_s_set_up_is_read_back_through_can(void **state)
     (void)state;
     struct rig *r = real_up();
     sched_run_until(&r->s, 2 * NS_PER_S);
-    assert_true(psa2_ready(&real.board));
+    assert_true(psa2_ready(real.board));
     assert_int_equal(upload(r, 0x2000, 2) & 0xFF, 0x56); /* CONFIG0 */
     assert_int_equal(upload(r, 0x2004, 2) & 0xFF, 0x56);
     assert_int_equal(write_u8(r, 0x2003, 4, 0x77), 0); /* HPF0 through Y */

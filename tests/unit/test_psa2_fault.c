@@ -13,11 +13,11 @@ static struct rig rig;
 static struct told told[EVENTS_MAX];
 static unsigned tolds;
 
-static void on_event(void *ctx, enum psa2_event e, int64_t t_ns)
+static void on_event(void *ctx, unsigned e, int64_t t_ns)
 {
     (void)ctx;
     assert_int_equal(t_ns, rig.s.now_ns); /* at the very instant */
-    if (tolds < EVENTS_MAX) told[tolds++] = (struct told){e, t_ns};
+    if (tolds < EVENTS_MAX) told[tolds++] = (struct told){(enum psa2_event)e, t_ns};
 }
 
 static void init(bool watched, bool events)
@@ -25,7 +25,8 @@ static void init(bool watched, bool events)
     const struct psa2_profile p = psa2_profile_file("article");
     rig_init(&rig, &p, 1.0);
     tolds = 0;
-    if (events) rig.b.io.event = on_event;
+    rig.b.io.event = on_event;
+    psa2_listen(&rig.b, events);
     if (watched) trace_attach(&rig.b.trace, &rig.sink);
     rig.edges = 0; /* without the levels at the beginning */
 }

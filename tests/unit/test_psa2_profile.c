@@ -32,13 +32,14 @@ static void the_default_is_the_file_article(void **state)
     (void)state;
     const struct psa2_profile want = psa2_profile_default();
     const struct psa2_profile got = psa2_profile_file("article");
-    for (unsigned i = 0; i < psa2_field_count; i++) {
-        const struct psa2_field *f = &psa2_fields[i];
-        const size_t size = f->type == PSA2_FIELD_STRING  ? strlen(want.name) + 1
-                            : f->type == PSA2_FIELD_REAL  ? sizeof(double)
-                            : f->type == PSA2_FIELD_BOOL  ? sizeof(bool)
-                            : f->type == PSA2_FIELD_WORDS ? sizeof want.word
-                            : f->type == PSA2_FIELD_SETUP ? 0
+    for (unsigned i = 0; i < PSA2_FIELDS; i++) {
+        const struct board_field *f = &psa2_fields[i];
+        const bool words = strcmp(f->key, "word") == 0;
+        const size_t size = f->type == BOARD_FIELD_STRING ? strlen(want.name) + 1
+                            : f->type == BOARD_FIELD_REAL ? sizeof(double)
+                            : f->type == BOARD_FIELD_BOOL ? sizeof(bool)
+                            : words                       ? sizeof want.word
+                            : f->type == BOARD_FIELD_LIST ? 0
                                                           : sizeof(unsigned);
         if (memcmp((const char *)&want + f->offset, (const char *)&got + f->offset, size) != 0)
             fail_msg("%s differs", f->key);

@@ -1,0 +1,33 @@
+#include "board/boards.h"
+
+#include "board/psa2_board.h"
+
+#include <string.h>
+
+const struct board_type *const board_types[] = {&psa2_board, NULL};
+
+const struct board_name board_names[] = {
+    {"psa2", &psa2_board, NULL},
+    {"psa1", &psa2_board, "psa1"},
+    {NULL, NULL, NULL},
+};
+
+const struct board_type *board_find(const char *name)
+{
+    for (unsigned i = 0; board_types[i]; i++)
+        if (strcmp(board_types[i]->name, name) == 0) return board_types[i];
+    return NULL;
+}
+
+const struct board_name *board_name_find(const char *name)
+{
+    for (const struct board_name *n = board_names; n->name; n++)
+        if (strcmp(n->name, name) == 0) return n;
+    return NULL;
+}
+
+const char *board_profile_name(const struct board_type *type, const void *profile)
+{
+    const struct board_field *f = board_field_find(type->fields, type->field_count, "name");
+    return f ? (const char *)profile + f->offset : type->profile_name;
+}

@@ -1,0 +1,36 @@
+/* Every type of board there is, their other names, and room for any of them. */
+#ifndef PSABENCH_BOARD_BOARDS_H
+#define PSABENCH_BOARD_BOARDS_H
+
+#include "board/board.h"
+#include "board/psa2_can.h"
+
+extern const struct board_type *const board_types[]; /* up to NULL */
+
+/* A name that a scenario may use: a type's own, or another for one of its profiles. */
+struct board_name {
+    const char *name;
+    const struct board_type *type;
+    const char *profile; /* in proto/profiles; NULL: the type's default */
+};
+extern const struct board_name board_names[]; /* up to a NULL name; the types' own first */
+
+const struct board_type *board_find(const char *name); /* a type by its own name; NULL: none */
+const struct board_name *board_name_find(const char *name);
+
+/* The profile's field "name". */
+const char *board_profile_name(const struct board_type *type, const void *profile);
+
+union board_store {
+    struct psa2 psa2;
+};
+
+union board_can_store {
+    struct psa2_can psa2;
+};
+
+union board_profile_store {
+    struct psa2_profile psa2;
+};
+
+#endif
