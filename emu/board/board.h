@@ -18,9 +18,12 @@
 
 /* Faults of a controller, kinds controller.*: bits of board_type.wrongs. */
 enum board_wrong {
-    BOARD_WRONG_SKIP_SYNC_T = 1, /* PSA-2: never a pulse on SYNC_T */
-    BOARD_WRONG_SETUP_ORDER = 2, /* PSA-2: the set-up's steps in reverse order, from the next Res on */
-    BOARD_WRONG_FROZEN_WORDS = 4 /* the words of the frame (cycle, period) before, over and over */
+    BOARD_WRONG_SKIP_SYNC_T = 1,  /* PSA-2: never a pulse on SYNC_T */
+    BOARD_WRONG_SETUP_ORDER = 2,  /* PSA-2: the set-up's steps in reverse order, from the next Res on */
+    BOARD_WRONG_FROZEN_WORDS = 4, /* the words of the frame (cycle, period) before, over and over */
+    BOARD_WRONG_CAPACITOR = 8,    /* PMKA: the capacitor of integrator X has lost 30 % */
+    BOARD_WRONG_STUCK_RESET = 16, /* PMKA: the positive reset of integrator X never ends */
+    BOARD_WRONG_STUCK_KEY = 32    /* PMKA: the key of K never closes */
 };
 
 /* Parts of board_cfg that not every board has: bits of board_type.knobs. */
