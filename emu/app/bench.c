@@ -44,6 +44,7 @@ static void init_unit(struct bench *b, unsigned i)
 {
     const struct scenario_unit *u = &b->scenario.units[i];
     memset(&b->unit[i], 0, sizeof b->unit[i]);
+    b->cycle[i] = (struct bench_cycle){.busy = false};
     unit_init(&b->unit[i], &u->cfg, &b->lab, &b->sched);
     const struct board_can_cfg cfg = {.name = u->name, .node_id = u->cfg.node, .refused = on_refused, .ctx = b};
     unit_connect(&b->unit[i], &cfg, &b->bus[u->bus], &b->sched);
@@ -80,6 +81,34 @@ void bench_supply_changed(struct bench *b, int64_t t_ns)
 static void on_power(void *ctx, int64_t t_ns)
 {
     bench_supply_changed(ctx, t_ns);
+}
+
+/* ---- parallel buses */
+
+static void cycle_done(void *ctx, struct board_cycle *c, enum board_cycle_result r, int64_t t_ns)
+{
+    struct bench_cycle *b = ctx;
+    b->busy = false;
+    if (b->done) b->done(b->ctx, c, r, t_ns);
+}
+
+enum board_cycle_result bench_cycle(struct bench *b, unsigned unit, const struct bench_cycle *c, int64_t t_ns)
+{
+    struct bench_cycle *own = &b->cycle[unit];
+    const struct unit *u = &b->unit[unit];
+    if (b->on_cycle) b->on_cycle(b->ctx, unit, &c->cycle);
+    if (own->busy) return BOARD_CYCLE_BUSY;
+    *own = *c;
+    own->cycle.done = cycle_done;
+    own->cycle.ctx = own;
+    const enum board_cycle_result r = u->type->bus->submit(u->board, &own->cycle, t_ns);
+    own->busy = r == BOARD_CYCLE_OK;
+    return r;
+}
+
+void bench_cycle_forget(struct bench *b, unsigned unit)
+{
+    b->cycle[unit].done = NULL;
 }
 
 /* ---- */

@@ -103,6 +103,7 @@ static bool want(struct wanted *w, const struct options *parent, const struct co
         o->scpi[i].port = 0;
         o->scpi[i].link = NULL;
     }
+    for (unsigned i = 0; i < o->bus_count; i++) o->bus[i].link = NULL;
     snprintf(w->can, sizeof w->can, "%s", f->can);
     return options_cans(o, w->can, why, CONTROL_WHY_MAX);
 }

@@ -160,6 +160,13 @@ void journal_command(struct journal *j, const struct control_command *row, const
     free(text);
 }
 
+void journal_cycle(struct journal *j, unsigned unit, const struct board_cycle *c)
+{
+    if (j->bench->sched.until_ns >= 0) return; /* inside a run: done again by itself */
+    add(j, now_ns(j), "\"unit\":%u,\"cycle\":%u,\"write\":%s,\"data\":%u,\"strobe_ns\":%" PRId64 "}\n", unit,
+        c->address, c->write ? "true" : "false", c->data, c->strobe_ns);
+}
+
 void journal_watchers(struct journal *j)
 {
     for (unsigned i = 0; i < j->bench->scenario.unit_count; i++) {
@@ -263,22 +270,37 @@ static bool read_command(const cJSON *json, struct journal_entry *e)
     return true;
 }
 
+static bool read_cycle(const cJSON *json, struct journal_entry *e)
+{
+    double data, strobe_ns;
+    const cJSON *write = cJSON_GetObjectItemCaseSensitive(json, "write");
+    if (!cJSON_IsBool(write)) return false;
+    if (!get_count(json, "data", UINT16_MAX, &data) || !get_count(json, "strobe_ns", 1e15, &strobe_ns)) return false;
+    e->cycle.write = cJSON_IsTrue(write);
+    e->cycle.data = (uint16_t)data;
+    e->cycle.strobe_ns = (int64_t)strobe_ns;
+    return true;
+}
+
 /* What kind a line is of, by the member that only it has; where its number goes. */
 static bool read_kind(const cJSON *json, struct journal_entry *e)
 {
-    static const char *const member[] = {"came", "went", "from", "cmd", "watch"};
+    static const char *const member[] = {"came", "went", "from", "cmd", "watch", "cycle"};
     double n = 0, place = 0;
-    for (e->kind = JOURNAL_CAME; e->kind < JOURNAL_WATCH; e->kind++) {
+    for (e->kind = JOURNAL_CAME; e->kind < JOURNAL_CYCLE; e->kind++) {
         if (cJSON_HasObjectItem(json, member[e->kind])) break;
     }
     if (e->kind == JOURNAL_COMMAND) return read_command(json, e);
-    const bool unit = e->kind == JOURNAL_WATCH;
-    if (!get_count(json, member[e->kind], unit ? LINES_MAX : UINT32_MAX, &n)) return false;
+    static const double most[] = {UINT32_MAX, UINT32_MAX, UINT32_MAX, 0, LINES_MAX, UINT8_MAX};
+    const bool unit = e->kind == JOURNAL_WATCH || e->kind == JOURNAL_CYCLE;
+    if (!get_count(json, member[e->kind], most[e->kind], &n)) return false;
     if (!get_count(json, unit ? "unit" : "bus", unit ? CONTROL_UNITS_MAX - 1 : CONTROL_BUSES_MAX - 1, &place))
         return false;
     *(unit ? &e->unit : &e->bus) = (unsigned)place;
-    if (unit) e->watch = (uint64_t)n;
+    if (e->kind == JOURNAL_WATCH) e->watch = (uint64_t)n;
+    else if (e->kind == JOURNAL_CYCLE) e->cycle.address = (uint8_t)n;
     else e->client = (uint32_t)n;
+    if (e->kind == JOURNAL_CYCLE) return read_cycle(json, e);
     if (!unit && n == 0) return false;
     return e->kind == JOURNAL_CAME ? read_came(json, e) : e->kind != JOURNAL_FRAME || read_sent(json, e);
 }

@@ -5,6 +5,7 @@
  *     {"t":2500,"ran":true,"cmd":"head.turn","args":{"angle_deg":90}}     a command that changes the bench was carried out
  *     {"t":2500,"refused":true,"cmd":"supply.set",...}     one was refused on the spot: even that moves noise
  *     {"t":9000,"bus":0,"went":1}     the program has left
+ *     {"t":2500,"unit":0,"cycle":3,"write":true,"data":9029,"strobe_ns":800}     one on the bus of a unit, at address 3
  *     {"t":9000,"unit":0,"watch":16383}     somebody listens to these lines of a unit (0: nobody)
  *
  * An entry comes after everything that was due before its instant; with "ran", also after everything due at it. Nothing
@@ -52,6 +53,9 @@ void journal_follow(struct journal *j, struct can_hub *h, unsigned bus);
  * left out. */
 void journal_command(struct journal *j, const struct control_command *row, const cJSON *args, bool done);
 
+/* A cycle came to the bus of a unit, not by a command. */
+void journal_cycle(struct journal *j, unsigned unit, const struct board_cycle *c);
+
 /* Time has moved: call after each run of the scheduler, before anything else comes in. */
 void journal_moved(struct journal *j);
 
@@ -60,7 +64,7 @@ void journal_watchers(struct journal *j);
 
 /* ---- reading */
 
-enum journal_kind { JOURNAL_CAME, JOURNAL_WENT, JOURNAL_FRAME, JOURNAL_COMMAND, JOURNAL_WATCH };
+enum journal_kind { JOURNAL_CAME, JOURNAL_WENT, JOURNAL_FRAME, JOURNAL_COMMAND, JOURNAL_WATCH, JOURNAL_CYCLE };
 
 struct journal_entry {
     enum journal_kind kind;
@@ -72,6 +76,7 @@ struct journal_entry {
     bool fd;
     char name[32];
     struct can_msg m;
+    struct board_cycle cycle;
     bool refused;    /* the command */
     const char *cmd; /* stays json's, as args */
     const cJSON *args;

@@ -12,7 +12,7 @@
 #include <string.h>
 
 static const char help[] =
-    "psa-emu [options] [SCENARIO]: a bench of PSA-2 converter boards on a CAN bus, in software\n"
+    "psa-emu [options] [SCENARIO]: a bench of accelerometer converter boards on a CAN bus, in software\n"
     "\n"
     "SCENARIO is a YAML file or the name of one in proto/scenarios (default: calibrate).\n"
     "\n"
@@ -42,9 +42,12 @@ static const char help[] =
     "  --unit NAME              unit whose lines --vcd and --line show (default: the first)\n"
     "  --vcd FILE               record the lines as VCD\n"
     "  --vcd-unit NS            time unit of the VCD (default 10)\n"
-    "  --line LINK              line port: INT, DATA and CLK as sampled bytes on a pseudo-terminal, LINK is made a\n"
-    "                           symbolic link to it; -: none\n"
+    "  --line LINK              line port: lines of a board (PSA-2: INT, DATA and CLK) as sampled bytes on a\n"
+    "                           pseudo-terminal, LINK is made a symbolic link to it; -: none\n"
     "  --line-hz HZ             its samples a second (default 8000000)\n"
+    "  --bus-port [UNIT:]LINK   parallel bus of a unit (default: the first that has one), cycles as lines of text on "
+    "a\n"
+    "                           pseudo-terminal; LINK as above; may be given several times\n"
     "  --quiet                  no counters on stderr at the end\n"
     "  --dump                   print the scenario with every key as JSON, which is a scenario again; do not run it\n"
     "  --resolved FILE          write the same to a file and run\n"
@@ -253,6 +256,24 @@ static bool set_line_hz(struct target *t, const char *arg)
     return true;
 }
 
+/* a:LINK or LINK: names of units are plain. */
+static bool set_bus_port(struct target *t, const char *arg)
+{
+    static const char plain[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_";
+    struct options *o = t->o;
+    if (o->bus_count == OPTIONS_BUS_MAX)
+        return why_fail(t->why, t->cap, "--bus-port %s: up to %u bus ports", arg, OPTIONS_BUS_MAX);
+    struct options_bus *b = &o->bus[o->bus_count++];
+    const size_t len = strspn(arg, plain);
+    const bool named = len > 0 && arg[len] == ':';
+    const char *link = named ? arg + len + 1 : arg;
+    *b = (struct options_bus){.arg = arg, .link = strcmp(link, "-") == 0 ? NULL : link};
+    if (!*link || (named && len >= sizeof b->unit))
+        return why_fail(t->why, t->cap, "--bus-port %s: [UNIT:]LINK is wanted, LINK a path or -", arg);
+    if (named) snprintf(b->unit, sizeof b->unit, "%.*s", (int)len, arg);
+    return true;
+}
+
 static bool set_path(struct target *t, const char *name, const char *arg, const char **path)
 {
     if (!*arg) return why_fail(t->why, t->cap, "--%s: a path is wanted", name);
@@ -296,6 +317,7 @@ static const struct {
     {"truth", required_argument, set_truth},       {"unit", required_argument, set_unit},
     {"vcd", required_argument, set_vcd},           {"vcd-unit", required_argument, set_vcd_unit},
     {"line", required_argument, set_line},         {"line-hz", required_argument, set_line_hz},
+    {"bus-port", required_argument, set_bus_port},
     {"restore", required_argument, set_restore},   {"truth-log", required_argument, set_truth_log},
     {"truth-every", required_argument, set_truth_every},
     {"until-eof", no_argument, set_until_eof},

@@ -10,6 +10,7 @@
 
 #define OPTIONS_CAN_MAX  8u
 #define OPTIONS_SCPI_MAX 8u
+#define OPTIONS_BUS_MAX  8u
 
 enum options_can_kind { OPTIONS_SOCKETCAND, OPTIONS_SLCAN, OPTIONS_SOCKETCAN };
 
@@ -26,6 +27,12 @@ struct options_scpi {
     bool pty;
     const char *link; /* of the pty; may be NULL */
     uint16_t port;    /* 0: a free one */
+};
+
+struct options_bus {
+    const char *arg;  /* as given */
+    char unit[32];    /* "": the first that has a bus */
+    const char *link; /* symbolic link; NULL: none */
 };
 
 enum options_action {
@@ -49,6 +56,8 @@ struct options {
     bool can_given;
     struct options_scpi scpi[OPTIONS_SCPI_MAX];
     unsigned scpi_count;
+    struct options_bus bus[OPTIONS_BUS_MAX];
+    unsigned bus_count;
     enum pace_kind pace;
     int64_t for_ns; /* end of the run; INT64_MAX: none */
     bool seed_given;

@@ -97,7 +97,8 @@ static bool line_start(void *ctx, int64_t t_ns)
 {
     struct bench *b = ctx;
     (void)t_ns;
-    return sampler_start(&b->sampler, unit_trace(&b->unit[b->watched]), &b->sampler.clock);
+    const struct unit *u = &b->unit[b->watched];
+    return sampler_start(&b->sampler, unit_trace(u), u->type->port_lines, &b->sampler.clock);
 }
 
 static void line_stop(void *ctx)
@@ -174,17 +175,18 @@ void ports_init(struct ports *p, struct bench *b, const struct options *o)
     }
 }
 
-bool ports_check(struct ports *p, const struct options *o, char *why, size_t cap)
+bool ports_check(struct ports *p, const struct bench *b, const struct options *o, char *why, size_t cap)
 {
     for (unsigned i = 0; i < o->can_count; i++) {
         if (!hub_of(p, o->can[i].bus)) return fail_bus(p, o->can[i].bus, why, cap);
     }
-    return instruments_check(&p->scpi, o, why, cap);
+    return instruments_check(&p->scpi, o, why, cap) && bus_ports_check(b, o, why, cap);
 }
 
 bool ports_open(struct ports *p, struct bench *b, const struct options *o, char *why, size_t cap)
 {
-    return open_can(p, o, why, cap) && open_line(p, b, o, why, cap) && open_vcd(p, b, o, why, cap) &&
+    return open_can(p, o, why, cap) && open_line(p, b, o, why, cap) &&
+           bus_ports_open(&p->bus, &p->links, b, o, why, cap) && open_vcd(p, b, o, why, cap) &&
            instruments_open(&p->scpi, o, why, cap) && open_socket(&p->control, "control", o->control, why, cap) &&
            open_socket(&p->truth, "truth", o->truth, why, cap);
 }
@@ -213,6 +215,7 @@ void ports_ready(const struct ports *p, const struct options *o, FILE *out)
         snprintf(what, sizeof what, "line=sampled hz=%" PRId64, o->line_hz);
         ready_pty(out, what, &p->line->pty, NULL);
     }
+    bus_ports_ready(&p->bus, out);
     instruments_ready(&p->scpi, out);
     if (o->vcd) fprintf(out, "ready vcd=%s\n", o->vcd);
     if (o->control) fprintf(out, "ready control=%s\n", o->control);
@@ -232,12 +235,14 @@ static void close_all(struct ports *p)
 {
     for (unsigned i = 0; i < p->can_count; i++) close_can(p->can[i]);
     if (p->line) line_pty_close(p->line);
+    bus_ports_close(&p->bus);
     instruments_close(&p->scpi);
     ctl_close(&p->control);
     ctl_close(&p->truth);
     for (struct link *l = p->links.first; l; l = l->next) l->gone = true;
     links_reap(&p->links);
     for (unsigned i = 0; i < p->can_count; i++) free(p->can[i]);
+    bus_ports_free(&p->bus);
     instruments_free(&p->scpi);
     free(p->line);
     if (p->vcd) fclose(p->vcd);
@@ -259,6 +264,7 @@ void ports_abandon(struct ports *p)
     }
     for (unsigned i = 0; i < p->scpi.count; i++) p->scpi.port[i]->port.pty.name = NULL;
     if (p->line) p->line->pty.name = NULL;
+    bus_ports_abandon(&p->bus);
     p->control.path = p->truth.path = "";
     close_all(p);
 }

@@ -1,8 +1,9 @@
-/* The endpoints of a running emulator: CAN adapters, line port, control socket, truth port, VCD file. */
+/* The endpoints of a running emulator: CAN adapters, line and bus ports, control socket, truth port, VCD file. */
 #ifndef PSABENCH_APP_PORTS_H
 #define PSABENCH_APP_PORTS_H
 
 #include "app/bench.h"
+#include "app/bus_ports.h"
 #include "app/instruments.h"
 #include "app/options.h"
 #include "link/can_hub.h"
@@ -31,13 +32,14 @@ struct ports {
     struct ports_can *can[OPTIONS_CAN_MAX];
     unsigned can_count;
     struct line_pty *line;
+    struct bus_ports bus;
     struct instruments scpi;          /* control and sched are filled in by the caller */
     struct ctl_server control, truth; /* callbacks are filled in by the caller */
     FILE *vcd;
 };
 
 /* Whether the bench has the buses and instruments that the options name; nothing is opened. False with one line in why. */
-bool ports_check(struct ports *p, const struct options *o, char *why, size_t cap);
+bool ports_check(struct ports *p, const struct bench *b, const struct options *o, char *why, size_t cap);
 
 /* Opens what the options ask for, checked; links and hubs of p are set up first with bench, epoch and say. False with one line in
  * why: what, where, what would be right. ports_close() in either case. */

@@ -335,6 +335,11 @@ static void on_refused(void *ctx, const char *unit, const char *why)
     fprintf(stderr, "psa-emu: unit %s: %s\n", unit, why);
 }
 
+static void on_cycle(void *ctx, unsigned unit, const struct board_cycle *c)
+{
+    journal_cycle(&((struct service *)ctx)->journal, unit, c);
+}
+
 /* ---- life */
 
 static void init(struct service *s, struct bench *b, const struct options *o)
@@ -343,6 +348,7 @@ static void init(struct service *s, struct bench *b, const struct options *o)
     s->o = o;
     s->bench = b;
     b->on_frame = on_frame;
+    b->on_cycle = on_cycle;
     b->on_refused = on_refused;
     b->ctx = s;
     pace_init(&s->pace, o->pace);
@@ -383,7 +389,7 @@ bool service_open(struct service *s, struct bench *b, const struct options *o, c
     init(s, b, o);
     s->scenario = from->scenario;
     s->refused =
-        (from->snapshot && !service_restore(s, from->snapshot, why, cap)) || !ports_check(&s->ports, o, why, cap);
+        (from->snapshot && !service_restore(s, from->snapshot, why, cap)) || !ports_check(&s->ports, b, o, why, cap);
     if (o->until_eof) until_eof(&s->input, &s->ports.links, &s->loop.quit);
     return !s->refused && ports_open(&s->ports, b, o, why, cap) && open_truth_log(s, why, cap);
 }

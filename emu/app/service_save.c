@@ -69,5 +69,5 @@ void service_abandon(struct service *s)
 bool service_reopen(struct service *s, const struct options *o, char *why, size_t cap)
 {
     s->o = o;
-    return ports_check(&s->ports, o, why, cap) && ports_open(&s->ports, s->bench, o, why, cap);
+    return ports_check(&s->ports, s->bench, o, why, cap) && ports_open(&s->ports, s->bench, o, why, cap);
 }

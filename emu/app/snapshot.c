@@ -357,11 +357,21 @@ static bool do_watch(struct replay *r, const struct journal_entry *e)
     return true;
 }
 
+static bool do_cycle(struct replay *r, const struct journal_entry *e)
+{
+    struct bench *b = r->w->bench;
+    if (e->unit >= b->scenario.unit_count) return why_fail(r->why, WHY_MAX, "there is no unit %u", e->unit);
+    if (!b->unit[e->unit].type->bus) return why_fail(r->why, WHY_MAX, "unit %u has no bus", e->unit);
+    (void)bench_cycle(b, e->unit, &(struct bench_cycle){.cycle = e->cycle}, e->t_ns); /* refused again, if it was */
+    return true;
+}
+
 static bool do_entry(struct replay *r, const struct journal_entry *e)
 {
     struct sched *s = &r->w->bench->sched;
     if (e->t_ns > s->now_ns || e->ran) run_to(r->w, e->t_ns);
     if (e->kind == JOURNAL_COMMAND) return do_command(r, e);
+    if (e->kind == JOURNAL_CYCLE) return do_cycle(r, e);
     return e->kind == JOURNAL_WATCH ? do_watch(r, e) : do_client(r, e);
 }
 

@@ -5,8 +5,6 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* One cycle on the parallel bus by which the navigation computer reads a board (PSD-1, PMKA, PIK). Owned by the caller
- * until done() has been called. */
 enum board_cycle_result {
     BOARD_CYCLE_OK,
     BOARD_CYCLE_NO_ADDRESS, /* nothing answers at this address */
@@ -18,6 +16,12 @@ enum board_cycle_result {
     BOARD_CYCLE_BAD_VALUE,
     BOARD_CYCLE_OFF /* no power, or cut by a reset */
 };
+
+/* One word for programs, "not-ready"; "ok" for BOARD_CYCLE_OK. */
+const char *board_cycle_word(enum board_cycle_result r);
+
+/* One cycle on the parallel bus by which the navigation computer reads a board (PSD-1, PMKA, PIK). Owned by the caller
+ * until done() has been called. */
 struct board_cycle {
     bool write;
     uint8_t address;   /* A3..A0 */

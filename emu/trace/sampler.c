@@ -46,7 +46,7 @@ static void steps(void *ctx, const struct trace_step *step, unsigned n)
     for (const struct trace_step *const end = step + n; step < end; step++) {
         if (!(step->lines & s->sink.mask)) continue;
         sample_until(s, step->t_ns); /* a sample at t_ns itself sees the new level */
-        for (unsigned i = 0; i < 3; i++)
+        for (unsigned i = 0; i < s->lines; i++)
             if (step->lines >> s->sig[i] & 1)
                 s->level = (uint8_t)((s->level & ~(1u << i)) | (step->level >> s->sig[i] & 1) << i);
     }
@@ -57,17 +57,17 @@ static void advance(void *ctx, int64_t t_ns)
     sample_until(ctx, t_ns);
 }
 
-bool sampler_start(struct sampler *s, struct trace *t, const struct clk *clock)
+bool sampler_start(struct sampler *s, struct trace *t, const char *const *names, const struct clk *clock)
 {
-    static const char *const name[3] = {"Int", "Data", "CLK"};
     const struct clk own = *clock; /* may be that of the run before, in s itself */
     memset(s, 0, offsetof(struct sampler, ring));
     s->trace = t;
     s->clock = own;
     uint64_t mask = 0;
-    for (unsigned i = 0; i < 3; i++) {
-        const int sig = trace_find(t, name[i]);
-        if (sig < 0) return false;
+    for (unsigned i = 0; names[i]; i++) {
+        const int sig = trace_find(t, names[i]);
+        if (sig < 0 || i == SAMPLER_LINES) return false;
+        s->lines = i + 1;
         s->sig[i] = (uint8_t)sig;
         mask |= TRACE_BIT(sig);
     }

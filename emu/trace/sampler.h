@@ -1,5 +1,5 @@
-/* The line port's sampler: a trace sink that turns the levels of Int, Data and CLK into sampled bytes, the way a bit-bang
- * adapter captures three lines with its own clock.
+/* The line port's sampler: a trace sink that turns the levels of up to seven lines into sampled bytes, the way a bit-bang
+ * adapter captures them with its own clock. Which lines, says the board: of PSA-2 they are Int, Data and CLK.
  *
  * Sample k is the levels at clk_edge_ns(clock, k), levels valid from that instant on. Between edges the bytes are one
  * memset. They wait in a bounded ring for whoever reads; a reader that is too slow loses the newest samples, which are
@@ -16,31 +16,28 @@
 #define SAMPLER_HZ   8000000    /* 4 samples a period of a 2 MHz CLK */
 #define SAMPLER_RING (1u << 20) /* bytes: 131 ms at 8 MHz; a power of two */
 
-enum sampler_bit { /* of a sampled byte; the others are 0 */
-                   SAMPLER_INT = 0x01,
-                   SAMPLER_DATA = 0x02,
-                   SAMPLER_CLK = 0x04,
-                   SAMPLER_GAP = 0x80 /* samples were lost before this one */
-};
+#define SAMPLER_LINES 7u    /* bits 0 to 6 of a byte, as many as there are; the others are 0 */
+#define SAMPLER_GAP   0x80u /* samples were lost before this one */
 
 struct sampler { /* read-only outside sampler.c */
     struct trace_sink sink;
     struct trace *trace;
     struct clk clock;
-    uint8_t sig[3];   /* of Int, Data, CLK: numbers in the trace */
-    uint8_t level;    /* now */
-    uint8_t gap;      /* SAMPLER_GAP: mark the next byte */
-    int64_t first;    /* count of the clock at the first sample */
-    int64_t next;     /* count of the first sample not yet made */
-    uint64_t dropped; /* samples that found the ring full */
-    size_t head, len; /* oldest byte, bytes waiting */
+    unsigned lines;
+    uint8_t sig[SAMPLER_LINES]; /* their numbers in the trace */
+    uint8_t level;              /* now */
+    uint8_t gap;                /* SAMPLER_GAP: mark the next byte */
+    int64_t first;              /* count of the clock at the first sample */
+    int64_t next;               /* count of the first sample not yet made */
+    uint64_t dropped;           /* samples that found the ring full */
+    size_t head, len;           /* oldest byte, bytes waiting */
     uint8_t ring[SAMPLER_RING];
 };
 
-/* Starts sampling at the first clock edge at or after the trace's done_ns (the clock's t0_ns must not be later), with an
- * empty ring. False when the trace has no signals Int, Data and CLK. A sampler that was stopped may be started again, with
+/* Starts sampling the lines of these names, up to NULL, at the first clock edge at or after the trace's done_ns (the clock's
+ * t0_ns must not be later), with an empty ring. False when the trace has no such lines. A sampler that was stopped may be started again, with
  * &s->clock for the same clock. */
-bool sampler_start(struct sampler *s, struct trace *t, const struct clk *clock);
+bool sampler_start(struct sampler *s, struct trace *t, const char *const *names, const struct clk *clock);
 
 /* Detaches; what waits can still be taken. */
 void sampler_stop(struct sampler *s);

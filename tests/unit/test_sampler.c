@@ -5,9 +5,11 @@
 
 #include <string.h>
 
-#define I SAMPLER_INT
-#define D SAMPLER_DATA
-#define C SAMPLER_CLK
+#define I 1
+#define D 2
+#define C 4
+
+static const char *const names[] = {"Int", "Data", "CLK", NULL};
 
 static struct trace trace;
 static struct sampler sampler;
@@ -35,7 +37,7 @@ static void assert_bytes(const uint8_t *want, size_t n)
 static void a_sample_is_the_level_valid_from_its_instant_on(void **state)
 {
     (void)state;
-    assert_true(sampler_start(&sampler, &trace, &mhz8));
+    assert_true(sampler_start(&sampler, &trace, names, &mhz8));
     trace_set(&trace, 3, false, 250); /* exactly sample 2 */
     trace_set(&trace, 1, true, 251);  /* just after it */
     trace_set(&trace, 2, true, 500);
@@ -51,7 +53,7 @@ static void a_sample_is_the_level_valid_from_its_instant_on(void **state)
 static void pulses_between_two_samples_are_not_seen(void **state)
 {
     (void)state;
-    assert_true(sampler_start(&sampler, &trace, &mhz8));
+    assert_true(sampler_start(&sampler, &trace, names, &mhz8));
     trace_set(&trace, 2, true, 130);
     trace_set(&trace, 2, false, 249);
     trace_advance(&trace, 375);
@@ -74,7 +76,7 @@ static void the_first_sample_has_a_known_instant(void **state)
     for (size_t i = 0; i < COUNT(row); i++) {
         fresh(NULL);
         trace_advance(&trace, row[i].start_ns);
-        assert_true(sampler_start(&sampler, &trace, &row[i].clock));
+        assert_true(sampler_start(&sampler, &trace, names, &row[i].clock));
         assert_int_equal(sampler_t0_ns(&sampler), row[i].t0_ns);
         trace_set(&trace, 3, false, row[i].t0_ns + 1);
         trace_advance(&trace, row[i].t0_ns + 1);
@@ -86,7 +88,7 @@ static void the_first_sample_has_a_known_instant(void **state)
 static void a_slow_reader_loses_the_newest_samples_and_can_see_it(void **state)
 {
     (void)state;
-    assert_true(sampler_start(&sampler, &trace, &mhz8));
+    assert_true(sampler_start(&sampler, &trace, names, &mhz8));
     assert_int_equal(sampler_full_ns(&sampler), (int64_t)SAMPLER_RING * 125);
     trace_advance(&trace, sampler_full_ns(&sampler));
     assert_int_equal(sampler.dropped, 0);
@@ -111,15 +113,35 @@ static void a_trace_without_the_lines_is_refused(void **state)
     trace_init(&trace);
     trace_add(&trace, "Int", true);
     trace_add(&trace, "CLK", false);
-    assert_false(sampler_start(&sampler, &trace, &mhz8));
+    assert_false(sampler_start(&sampler, &trace, names, &mhz8));
     assert_null(trace.sinks);
+    sampler_stop(&sampler);
+}
+
+/* As many as a byte has bits beside the gap's. */
+static void a_board_chooses_up_to_seven_lines(void **state)
+{
+    static const char *const eight[] = {"a", "b", "c", "d", "e", "f", "g", "h", NULL};
+    static const char *const back[] = {"g", "f", "e", "d", "c", "b", "a", NULL};
+    static const uint8_t want[] = {0x2A, 0x6A, 0x68};
+    (void)state;
+    trace_init(&trace);
+    for (unsigned i = 0; i < 8; i++) trace_add(&trace, eight[i], i % 2);
+    assert_false(sampler_start(&sampler, &trace, eight, &mhz8));
+    assert_null(trace.sinks);
+    assert_true(sampler_start(&sampler, &trace, back, &mhz8));
+    trace_set(&trace, 0, true, 125);  /* a: bit 6 */
+    trace_set(&trace, 7, false, 125); /* not ours */
+    trace_set(&trace, 5, false, 250); /* f: bit 1 */
+    trace_advance(&trace, 375);
+    assert_bytes(want, sizeof want);
     sampler_stop(&sampler);
 }
 
 static void nothing_is_watched_once_stopped_and_what_waits_stays(void **state)
 {
     (void)state;
-    assert_true(sampler_start(&sampler, &trace, &mhz8));
+    assert_true(sampler_start(&sampler, &trace, names, &mhz8));
     trace_advance(&trace, 250);
     sampler_stop(&sampler);
     assert_false(trace_watched(&trace, UINT64_MAX));
@@ -130,12 +152,12 @@ static void nothing_is_watched_once_stopped_and_what_waits_stays(void **state)
 static void a_new_reader_starts_afresh_on_the_same_clock(void **state)
 {
     (void)state;
-    assert_true(sampler_start(&sampler, &trace, &mhz8));
+    assert_true(sampler_start(&sampler, &trace, names, &mhz8));
     trace_advance(&trace, sampler_full_ns(&sampler) + 125);
     assert_int_equal(sampler.dropped, 1);
     sampler_stop(&sampler);
     trace_advance(&trace, 1000000000);
-    assert_true(sampler_start(&sampler, &trace, &sampler.clock));
+    assert_true(sampler_start(&sampler, &trace, names, &sampler.clock));
     assert_int_equal(sampler_t0_ns(&sampler), 1000000000);
     assert_int_equal(sampler.dropped, 0);
     trace_advance(&trace, 1000000126);
@@ -151,7 +173,7 @@ static void random_edges_equal_the_definition(void **state)
     struct rng rng = rng_stream(rig_seed(5), 2, "test");
     const struct clk clock = {.t0_ns = 17, .hz = 7372800, .div = 1};
     trace_advance(&trace, 20);
-    assert_true(sampler_start(&sampler, &trace, &clock));
+    assert_true(sampler_start(&sampler, &trace, names, &clock));
     static uint8_t got[400000], want[400000];
     static const uint8_t bit[4] = {0, D, C, I};
     uint8_t level = I;
@@ -181,6 +203,7 @@ int main(void)
         cmocka_unit_test(the_first_sample_has_a_known_instant),
         cmocka_unit_test_setup(a_slow_reader_loses_the_newest_samples_and_can_see_it, fresh),
         cmocka_unit_test(a_trace_without_the_lines_is_refused),
+        cmocka_unit_test(a_board_chooses_up_to_seven_lines),
         cmocka_unit_test_setup(nothing_is_watched_once_stopped_and_what_waits_stays, fresh),
         cmocka_unit_test_setup(a_new_reader_starts_afresh_on_the_same_clock, fresh),
         cmocka_unit_test_setup(random_edges_equal_the_definition, fresh),
