@@ -26,13 +26,14 @@ from typing import Any, TypeVar
 
 from psabench.can_host import QUANTUM_S, CanHost, StepClock, WallClock, open_bus
 from psabench.control import Control, Reply
-from psabench.device import Psa2
+from psabench.devices import Psa2, identify, of_board
 from psabench.emulator import Emulator, Forked
 from psabench.errors import BadInput, BenchError, ControlError, TimeOut
 from psabench.faults import Fault, Faults
 from psabench.instruments import KINDS, Chamber, Head, Instrument, Supply, Table, open_instrument, visa_address
 from psabench.probe import Probe
 from psabench.protocol_files import DBC_NODE
+from psabench.unit import Unit
 
 NS = 1_000_000_000
 SLICE_NS = NS  # long runs go in slices of simulated time, so that Ctrl-C is heard
@@ -40,6 +41,7 @@ NONE = "none"  # as the CAN specification: no bus
 FIRST = "can0"  # name of a bus that has no other
 
 Kind = TypeVar("Kind", bound=Instrument)
+Board = TypeVar("Board", bound=Unit)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,7 +87,7 @@ class Bench:
             self._clock = self._make_clock()
             for host in self.hosts.values():
                 host.clock = self._clock
-            self.units: dict[str, Psa2] = self._find_units(node)
+            self.units: dict[str, Unit] = self._find_units(node)
             self.faults = Faults(self)
             self.probe = Probe(self)
         except BaseException:
@@ -214,10 +216,20 @@ class Bench:
 
     @property
     def unit(self) -> Psa2:
-        """The first unit."""
-        for unit in self.units.values():
-            return unit
-        raise BenchError("this bench has no unit on a bus that was connected")
+        """The first PSA-2; other boards: `board`, or `units` by name."""
+        return self.board(Psa2)
+
+    def board(self, kind: type[Board], name: str | None = None) -> Board:
+        """The first unit with such a board, `bench.board(Psd1)`, or the one of that name if it has."""
+        if not self.units:
+            raise BenchError("this bench has no unit on a bus that was connected")
+        if name is not None and name not in self.units:
+            raise BenchError(f"this bench has no unit {name}; there is {', '.join(self.units)}")
+        for unit in self.units.values() if name is None else [self.units[name]]:
+            if isinstance(unit, kind):
+                return unit
+        what = ", ".join(f"{n}: {u.title}" for n, u in self.units.items())
+        raise BenchError(f"this bench has no {kind.title} {'' if name is None else f'called {name}'}; there is {what}")
 
     @property
     def head(self) -> Head:
@@ -258,16 +270,25 @@ class Bench:
             return StepClock(self._control, hosts)
         return WallClock(hosts if len(hosts) > 1 else ())
 
-    def _find_units(self, node: int | None) -> dict[str, Psa2]:
-        """By name, as the emulator tells them, if their bus is connected; a real bench has one, "a"."""
+    def _find_units(self, node: int | None) -> dict[str, Unit]:
+        """By name, as the emulator tells them, if their bus is connected; a real bench has one, "a", which says itself
+        what it is."""
         if not self.hosts:
             return {}
-        if self._control is None or node is not None:
-            return {"a": Psa2(self.host, DBC_NODE if node is None else node)}
+        if self._control is None:
+            at = DBC_NODE if node is None else node
+            return {"a": identify(self.host, at)(self.host, at)}
         units = self._control.call("units").result["units"]
+        if node is not None:
+            board = next((u.get("board", "psa2") for u in units if int(u["node"]) == node), "psa2")
+            return {"a": of_board(board)(self.host, node)}
         one_bus = len({u.get("bus") for u in units}) == 1
         hosts = {u["name"]: self.host if one_bus else self.hosts.get(u["bus"]) for u in units}
-        return {u["name"]: Psa2(host, int(u["node"])) for u in units if (host := hosts[u["name"]])}
+        return {
+            u["name"]: of_board(u.get("board", "psa2"))(host, int(u["node"]))
+            for u in units
+            if (host := hosts[u["name"]])
+        }
 
     # ---- time
 

@@ -39,9 +39,10 @@ class _Network(canopen.Network):
 class _Sdo(SdoClient):
     """An SDO client that lets the bench's time pass while it waits."""
 
-    def __init__(self, node_id: int, od: canopen.ObjectDictionary, host: CanHost) -> None:
+    def __init__(self, node_id: int, od: canopen.ObjectDictionary, host: CanHost, patience_s: float) -> None:
         super().__init__(0x600 + node_id, 0x580 + node_id, od)  # type: ignore[no-untyped-call]
         self.host = host
+        self.patience_s = patience_s
         self._request = b""
         self._object = b""  # index and sub-index of the transfer under way, as on the wire
 
@@ -58,10 +59,10 @@ class _Sdo(SdoClient):
     def read_response(self) -> bytes:
         """The answer to our request: what a client before us asked for may come first, when its time stood still."""
         responses: queue.Queue[bytes] = self.responses
-        deadline_s = self.host.clock.now_s() + ANSWER_S
+        deadline_s = self.host.clock.now_s() + self.patience_s
         while True:
             if not self.host.pump_until(lambda: not responses.empty(), deadline_s - self.host.clock.now_s()):
-                raise SdoCommunicationError(f"no SDO answer within {ANSWER_S:g} s")
+                raise SdoCommunicationError(f"no SDO answer within {self.patience_s:g} s")
             response = responses.get()
             if self._is_ours(response):
                 break
@@ -84,16 +85,21 @@ class CanopenNode:
     Raises DeviceError with the node's abort code, LinkError when it does not answer.
     """
 
-    def __init__(self, host: CanHost, node_id: int, eds: Path) -> None:
+    def __init__(self, host: CanHost, node_id: int, eds: Path, *, patience_s: float = ANSWER_S) -> None:
+        """patience_s: bench time for an answer."""
         self.host = host
         self.node_id = node_id
         network = _Network(host)
         remote = canopen.RemoteNode(node_id, canopen.import_od(str(eds), node_id))
         network.add_node(remote)
         self._od = remote.object_dictionary
-        self._sdo = _Sdo(node_id, self._od, host)
+        self._sdo = _Sdo(node_id, self._od, host, patience_s)
         self._sdo.network = network
         network.subscribe(0x580 + node_id, self._sdo.on_response)
+
+    def has(self, index: int) -> bool:
+        """Whether the EDS has the object."""
+        return index in self._od
 
     def names(self, index: int) -> dict[int, str]:
         """Sub-indices of an object (without 0) and their names, from the EDS."""
@@ -116,6 +122,15 @@ class CanopenNode:
         if variable is None:
             raise DeviceError(f"write {index:04X}h:{sub}", 0x06020000, "no such object in the EDS")
         self._call(f"write {index:04X}h:{sub} = {value}", self._sdo.download, index, sub, variable.encode_raw(value))
+
+    def read_raw(self, index: int, sub: int) -> bytes:
+        """Bytes of an object, also of a sub-index that is not in the EDS: whether it is there the node says."""
+        return bytes(self._call(f"read {index:04X}h:{sub}", self._sdo.upload, index, sub))
+
+    def write_raw(self, index: int, sub: int, data: bytes) -> None:
+        """Bytes to an object, as `read_raw`."""
+        what = f"write {index:04X}h:{sub} = {int.from_bytes(data, 'little'):X}h"
+        self._call(what, self._sdo.download, index, sub, data)
 
     def _call(self, what: str, transfer: Any, *args: Any) -> Any:
         try:

@@ -48,4 +48,10 @@ class DeviceError(BenchError):
 
     def __init__(self, what: str, abort_code: int, text: str) -> None:
         super().__init__(f"{what}: abort {abort_code:08X}h, {text}")
+        self.what = what
         self.abort_code = abort_code
+        self.text = text
+
+
+class CycleRefused(DeviceError):
+    """The board refused a cycle on its parallel bus, or did not finish it; the text is the board's (object 2031h)."""

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from psabench import Bench
 from psabench.bench import NS
+from psabench.devices import Psa2
 from psabench.emulator import Emulator
 from psabench.errors import BadInput, BenchError, ControlError, InstrumentError, TimeOut
 from psabench.face import Face
@@ -292,7 +293,7 @@ def test_units_on_several_buses_are_all_there_and_in_step() -> None:
     """Every unit of the fleet answers on its own bus, and a run returns when the frames of all buses are here."""
     with Bench.start("fleet64") as b:
         assert (len(b.units), len(b.hosts)) == (64, 8)
-        first, last = b.units["a1"], b.units["h1"]  # the same node, each on its bus
+        first, last = b.board(Psa2, "a1"), b.board(Psa2, "h1")  # the same node, each on its bus
         assert first.node.node_id == last.node.node_id
         first.wait_ready()
         before = [h.received for h in b.hosts.values()]

@@ -140,7 +140,7 @@ def test_multi_has_two_units_each_with_its_own_sensor() -> None:
         b.units["b"].wait_ready()
         b.head.turn(90.0)
         b.wait(0.2)
-        x = {name: float(u.stream(100).axis("x").mean()) for name, u in b.units.items()}
+        x = {name: float(b.board(Psa2, name).stream(100).axis("x").mean()) for name in b.units}
     assert x["a"] == pytest.approx(1.5, abs=0.005)
     assert x["b"] == pytest.approx(2.48 - 1.004, abs=0.005)
 

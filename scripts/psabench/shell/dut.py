@@ -9,17 +9,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from psabench.bench import Bench
-from psabench.device import REGISTERS, Psa2
-from psabench.frames import Form
+from psabench.devices import Psa2
+from psabench.errors import CycleRefused
+from psabench.frames import Form, Frames
+from psabench.readings import Readings
 from psabench.shell import registers
 from psabench.shell.row import Args, Handler, Row, number
 from psabench.shell.vocabulary import Arg, Command, Kind
 from psabench.shell.words import Wrong
+from psabench.unit import BANKS, Unit
 
 if TYPE_CHECKING:
     from psabench.shell.session import Session
 
-CONVERTERS = tuple(REGISTERS)
+CONVERTERS = tuple(BANKS)
+BUS = "bus"  # the board's parallel bus: a read is a cycle, which the board may refuse
 
 
 def here(bench: Bench) -> bool:
@@ -27,16 +31,26 @@ def here(bench: Bench) -> bool:
     return bool(bench.units)
 
 
-def _unit_names(psa: Psa2, converter: str) -> dict[int, str]:
-    """Addresses and names of a converter's registers, from the EDS."""
-    return {sub - 1: name for sub, name in psa.node.names(REGISTERS[converter]).items()}
+def _unit_names(dut: Unit, converter: str) -> dict[int, str]:
+    """Addresses and names of a converter's or the bus's registers, from the EDS."""
+    try:
+        return dut.registers(converter)
+    except ValueError as e:
+        raise Wrong(f"converter: {e}") from e
+
+
+def _psa2(session: Session) -> Psa2:
+    """The unit, for what only a PSA-2 has."""
+    if isinstance(session.dut, Psa2):
+        return session.dut
+    raise Wrong(f"{session.dut_name} is a {session.dut.title}: only a PSA-2 has this")
 
 
 def _address(session: Session, args: Args) -> tuple[str, int, str]:
     converter, wanted = str(args["converter"]), str(args["register"])
     names = _unit_names(session.dut, converter)
     for address, name in names.items():
-        if wanted.upper() == name or wanted.upper() == f"{address:02X}H":
+        if wanted.upper() == name.upper() or wanted.upper() == f"{address:02X}H":
             return converter, address, name
     raise Wrong(f"register: {wanted!r}; converter {converter} has {', '.join(names.values())}, or an address as 01h")
 
@@ -46,15 +60,23 @@ def _register_row(session: Session, converter: str, address: int, name: str) -> 
     return {
         "address": f"{address:02X}h",
         "register": name,
-        "value": f"{value:02X}h",
-        "fields": registers.explain(converter, name, value),
+        "value": f"{value:04X}h" if converter == BUS else f"{value:02X}h",
+        "fields": "" if converter == BUS else registers.explain(converter, name, value),
     }
 
 
+def _row_or_refusal(session: Session, converter: str, address: int, name: str) -> dict[str, Any]:
+    """In a list of all of them a cycle that the board refuses now is one of the things to see."""
+    try:
+        return _register_row(session, converter, address, name)
+    except CycleRefused as e:
+        return {"address": f"{address:02X}h", "register": name, "value": "-", "fields": e.text}
+
+
 def _registers(session: Session, args: Args) -> Mapping[str, Any]:
-    converter = str(args.get("converter", "x"))
+    converter = str(args.get("converter", next(iter(session.dut.banks), BUS)))
     names = _unit_names(session.dut, converter)
-    return {"registers": [_register_row(session, converter, a, n) for a, n in names.items()]}
+    return {"registers": [_row_or_refusal(session, converter, a, n) for a, n in names.items()]}
 
 
 def _register(session: Session, args: Args) -> Mapping[str, Any]:
@@ -64,13 +86,16 @@ def _register(session: Session, args: Args) -> Mapping[str, Any]:
 def _write(session: Session, args: Args) -> Mapping[str, Any]:
     converter, address, name = _address(session, args)
     text = str(args["value"])
+    if converter == BUS:
+        session.dut.write_register(converter, address, registers.word(name, text))
+        return {}
     before = session.dut.register(converter, address) if "=" in text else 0
     session.dut.write_register(converter, address, registers.changed(converter, name, before, text))
     return _register_row(session, converter, address, name)
 
 
 def _opcode(session: Session, args: Args) -> Mapping[str, Any]:
-    session.dut.opcode(str(args["group"]), int(number(args, "code")))
+    _psa2(session).opcode(str(args["group"]), int(number(args, "code")))
     return {}
 
 
@@ -96,7 +121,28 @@ def _write_object(session: Session, args: Args) -> Mapping[str, Any]:
 
 
 def _stream(session: Session, args: Args) -> Mapping[str, Any]:
-    frames = session.dut.stream(int(number(args, "count", 100)))
+    taken = session.dut.stream(int(number(args, "count", 100)))
+    lost = session.dut.frames.counters.lost
+    return _of_frames(taken, lost) if isinstance(taken, Frames) else _of_readings(taken, lost)
+
+
+def _of_readings(taken: Readings, lost: int) -> Mapping[str, Any]:
+    """Mean and spread of each column."""
+    rows = [
+        {
+            "signal": name,
+            "unit": taken.units[name],
+            "mean": float(column.mean()),
+            "std": float(column.std()),
+            "min": float(column.min()),
+            "max": float(column.max()),
+        }
+        for name, column in taken.columns.items()
+    ]
+    return {"frames": len(taken), "lost": lost, "signals": rows}
+
+
+def _of_frames(frames: Frames, lost: int) -> Mapping[str, Any]:
     rows = []
     for axis in "xyz":
         u_v = frames.axis(axis)
@@ -114,15 +160,15 @@ def _stream(session: Session, args: Args) -> Mapping[str, Any]:
         "frames": len(frames),
         "settled": bool(np.all(frames.settled)),
         "clipped": bool(np.any(frames.clipped)),
-        "lost": session.dut.frames.counters.lost,
+        "lost": lost,
         "axes": rows,
     }
 
 
 def _form(session: Session, args: Args) -> Mapping[str, Any]:
     if "form" in args:
-        session.dut.form = Form[str(args["form"]).upper()]
-    return {"form": session.dut.form.name.lower()}
+        _psa2(session).form = Form[str(args["form"]).upper()]
+    return {"form": _psa2(session).form.name.lower()}
 
 
 def _use(session: Session, args: Args) -> Mapping[str, Any]:
@@ -133,7 +179,7 @@ def _use(session: Session, args: Args) -> Mapping[str, Any]:
     return {"unit": name, "node": session.dut.node.node_id}
 
 
-def _simple(call: Callable[[Psa2], object]) -> Handler:
+def _simple(call: Callable[[Unit], object]) -> Handler:
     def run(session: Session, _: Args) -> Mapping[str, Any]:
         call(session.dut)
         return {}
@@ -143,7 +189,12 @@ def _simple(call: Callable[[Psa2], object]) -> Handler:
 
 # ---- the table
 
-_CONVERTER = Arg(name="converter", kind=Kind.CHOICE, choices=CONVERTERS, what="x, y, z: accelerometers; t: temperature")
+_CONVERTER = Arg(
+    name="converter",
+    kind=Kind.CHOICE,
+    choices=CONVERTERS,
+    what="x, y, z: accelerometers; t: temperature; bus: cycles on the board's parallel bus",
+)
 _REGISTER = Arg(name="register", what="name, as CONFIG0, or address, as 01h")
 _VALUE = Arg(name="value", what="a byte (56h), or fields (DR=3,PHASE=0)")
 _GROUP = Arg(name="group", kind=Kind.CHOICE, choices=("accel", "temp"), what="which converters")
@@ -174,9 +225,9 @@ ROWS: tuple[Row, ...] = (
     _row("write", "Writes one register; x, y and z are written together.", _write, _CONVERTER, _REGISTER, _VALUE),
     _row("opcode", "Sends a command byte to the converters.", _opcode, _GROUP, _CODE),
     _row("stream", "Takes samples and tells their mean and spread, volts at the loads.", _stream, _COUNT),
-    _row("start", "Starts the stream of frames.", _simple(Psa2.start)),
-    _row("stop", "Stops it.", _simple(Psa2.stop)),
-    _row("reset", "Pulses Res: NMT reset node.", _simple(Psa2.reset)),
+    _row("start", "Starts the stream of frames.", _simple(Unit.start)),
+    _row("stop", "Stops it.", _simple(Unit.stop)),
+    _row("reset", "Pulses Res: NMT reset node.", _simple(Unit.reset)),
     _row("form", "Tells or sets how a sample travels.", _form, _FORM),
     _row("counters", "Tells the counters of the device, object 2030h.", lambda s, _: s.dut.counters()),
     _row("object", "Reads an object of the dictionary.", _read_object, _INDEX, replace(_SUB, optional=True)),

@@ -13,7 +13,7 @@ from psabench.bench import NS, Bench
 from psabench.can_host import Message
 from psabench.errors import BadInput, BenchError
 from psabench.instruments import KINDS, Instrument
-from psabench.protocol_files import DBC_NODE, database
+from psabench.protocol_files import message_name
 from psabench.shell import dut
 from psabench.shell.expect import USAGE, Expectation
 from psabench.shell.grammar import describe
@@ -84,16 +84,15 @@ def _listen(session: Session, args: Args) -> Mapping[str, Any]:
         pass_time(session, number(args, "for_s", LISTEN_S))
     finally:
         host.listeners.remove(heard.append)
-    rows = [_frame_row(m, session.dut.node.node_id) for m in heard[:SHOWN]]
+    boards = {u.node.node_id: u.board for u in session.bench.units.values() if u.host is host}
+    rows = [_frame_row(m, boards) for m in heard[:SHOWN]]
     return {"frames": rows, **({"more": len(heard) - SHOWN} if len(heard) > SHOWN else {})}
 
 
-def _frame_row(m: Message, node: int) -> dict[str, Any]:
+def _frame_row(m: Message, boards: Mapping[int, str]) -> dict[str, Any]:
     if m.is_error_frame:
         return {"t_s": m.timestamp, "id": "error", "data": bytes(m.data).hex().upper(), "name": ""}
-    name = ""
-    for candidate in (m.arbitration_id, m.arbitration_id - node + DBC_NODE):
-        name = name or next((x.name for x in database().messages if x.frame_id == candidate), "")
+    name = message_name(m.arbitration_id, boards)
     return {"t_s": m.timestamp, "id": f"{m.arbitration_id:03X}", "data": bytes(m.data).hex().upper(), "name": name}
 
 

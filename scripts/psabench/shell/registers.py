@@ -111,6 +111,14 @@ def _byte(name: str, text: str) -> int:
     return n
 
 
+def word(name: str, text: str) -> int:
+    """A word for a register on a bus: a number up to FFFFh. Raises Wrong."""
+    n = _number(text)
+    if n is None or n > 0xFFFF:
+        raise Wrong(f"{name}: {text!r}; a word is wanted (A55Ah, 0xA55A, 42330)")
+    return n
+
+
 def _number(text: str) -> int | None:
     if m := re.fullmatch(r"0x([0-9A-Fa-f]+)|([0-9A-Fa-f]+)h", text):
         return int(m[1] or m[2], 16)

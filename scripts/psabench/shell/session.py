@@ -9,14 +9,14 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from psabench.bench import Bench
-from psabench.device import Psa2
-from psabench.errors import BenchError, ControlError, DeviceError
+from psabench.errors import BenchError, ControlError, CycleRefused, DeviceError
 from psabench.instruments import KINDS
 from psabench.shell import own
 from psabench.shell.grammar import Call, parse
 from psabench.shell.transcript import Transcript
 from psabench.shell.vocabulary import EVENTS, Command, Vocabulary, from_help, with_kinds
 from psabench.shell.words import Wrong
+from psabench.unit import Unit
 
 # The bench understood these codes of a refusal to mean: the line is wrong. Others: not now, not here.
 WRONG_CODES = {"syntax", "command", "argument", "type", "range"}
@@ -55,7 +55,7 @@ class Session:
         self.vocabulary = learn(self.bench)
 
     @property
-    def dut(self) -> Psa2:
+    def dut(self) -> Unit:
         """The unit that `dut` stands for."""
         return self.bench.units[self.dut_name]
 
@@ -93,7 +93,7 @@ class Session:
             text = self.vocabulary.in_shell(f"{call.command.name}: {e.text}")
             raise (Wrong(text) if e.code in WRONG_CODES else BenchError(text)) from e
         except DeviceError as e:
-            if e.abort_code != NOT_NOW:
+            if e.abort_code != NOT_NOW or isinstance(e, CycleRefused):
                 raise
             raise BenchError(f"{e}; while the board is being set up: dut.ready waits for the end") from e
         failed = str(result.get("failed", "")) if call.command.name == "expect" else ""

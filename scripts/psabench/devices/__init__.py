@@ -1,0 +1,41 @@
+"""A class for each board, and which of them is at a node."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from psabench.can_host import CanHost
+from psabench.canopen_host import CanopenNode
+from psabench.devices.pik import Pik
+from psabench.devices.pmka import Pmka
+from psabench.devices.psa2 import Psa2
+from psabench.devices.psd1 import Psd1
+from psabench.errors import LinkError
+from psabench.places import proto_file
+from psabench.unit import NAME, Unit
+
+__all__ = ["BOARDS", "Pik", "Pmka", "Psa2", "Psd1", "identify", "of_board"]
+
+BOARDS: Mapping[str, type[Unit]] = {"psa2": Psa2, "psd1": Psd1, "pmka": Pmka, "pik": Pik}
+ALIASES: Mapping[str, str] = {"psa1": "psa2", "pik5": "pik", "pik6": "pik"}  # the same board, another profile
+NAME_S = 1.0  # bench time for the answer to object 1008h: a unit that is there answers at once
+
+
+def of_board(board: str) -> type[Unit]:
+    """The class of a board as the emulator calls it. Raises ValueError for one that this package does not know."""
+    known = BOARDS.get(ALIASES.get(board, board))
+    if known is None:
+        raise ValueError(f"no such board: {board}; there are {', '.join(BOARDS)}")
+    return known
+
+
+def identify(host: CanHost, node_id: int) -> type[Unit]:
+    """The class of the unit at a node, from its name (object 1008h); PSA-2 where nobody answers, or the name is new."""
+    listeners = list(host.listeners)
+    try:
+        title = str(CanopenNode(host, node_id, proto_file("psa2.eds"), patience_s=NAME_S).read(NAME))
+    except LinkError:
+        return Psa2
+    finally:
+        host.listeners[:] = listeners
+    return next((kind for kind in BOARDS.values() if kind.title == title), Psa2)

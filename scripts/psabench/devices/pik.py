@@ -1,0 +1,14 @@
+"""A PIK unit (PIK-5, PIK-6) over CAN: its pulse counters. Written from docs/protocol_pik.md."""
+
+from __future__ import annotations
+
+from psabench.readings import ReadingLayout
+from psabench.unit import BusUnit
+
+
+class Pik(BusUnit):
+    """One unit on the bus."""
+
+    board = "pik"
+    title = "PIK"
+    layout = ReadingLayout(board="pik", messages=("PIK_COUNTS",), counter="SEQ")
