@@ -17,8 +17,8 @@ module kpsa (
 );
     localparam [4:0] LEAD_IN = 5'd8, GAP = 5'd4;  // profile article
 
-    // ---- read: SClk runs from the fall of spi_clk that finds DRD_A low, for 24 periods
-    reg        reading = 1'b0;
+    // ---- read: a rise of spi_clk finds DRD_A low, and from the next one on SClk runs for 24 whole periods
+    reg        ready = 1'b0, reading = 1'b0;
     reg        filled = 1'b0;  // changes with each complete read
     reg [4:0]  bits = 5'd0;
     reg [23:0] x = 24'd0, y = 24'd0, z = 24'd0;
@@ -26,20 +26,22 @@ module kpsa (
     assign sclk = spi_clk & reading;
     assign din = 1'b0;  // no commands while reading
 
-    always @(posedge spi_clk)
+    always @(posedge spi_clk) begin
+        ready <= !drd_a && !reading;
         if (reading) begin
             x <= {x[22:0], doutx};
             y <= {y[22:0], douty};
             z <= {z[22:0], doutz};
             bits <= bits + 5'd1;
-        end else bits <= 5'd0;
+        end else begin
+            if (bits == 5'd24) filled <= !filled;
+            bits <= 5'd0;
+        end
+    end
 
     always @(negedge spi_clk)
-        if (!reading) reading <= !drd_a;
-        else if (bits == 5'd24) begin
-            reading <= 1'b0;
-            filled <= !filled;
-        end
+        if (!reading) reading <= ready;
+        else if (bits == 5'd24) reading <= 1'b0;
 
     // ---- send: everything changes on falling edges of line_clk, a bit is taken on the rising one
     reg        emptied = 1'b0;  // follows filled: equal, nothing to send

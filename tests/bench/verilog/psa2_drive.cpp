@@ -15,7 +15,7 @@ namespace
 {
 
 enum { SCLK, DRD_A, DIN, DOUTX, DOUTY, DOUTZ, DATA, CLK, INT, LINES };
-constexpr int SPI_CLKS = 25, LINE_CLKS = 149; // one to start, then the 24 of a read and the 148 of a frame
+constexpr int SPI_CLKS = 26, LINE_CLKS = 149; // one to start, the 24 of a read, one that ends it; the 148 of a frame
 
 struct Row {
     uint32_t x, y, z, t;

@@ -6,7 +6,7 @@ module psa2_tb;
     parameter ROWS = 512;  // of the input file: words X, Y, Z, T of a frame on a line
 
     localparam real SPI_HALF_NS = 488.28125, LINE_HALF_NS = 250.0, PERIOD_NS = 1000000.0;
-    localparam real REST_NS = PERIOD_NS - 50 * SPI_HALF_NS - 298 * LINE_HALF_NS;
+    localparam real REST_NS = PERIOD_NS - 52 * SPI_HALF_NS - 298 * LINE_HALF_NS;
 
     reg        conv = 1'b0, spi_clk = 1'b0, line_clk = 1'b0;
     reg [31:0] word_x = 32'd0, word_y = 32'd0, word_z = 32'd0, word_t = 32'd0;
@@ -78,7 +78,7 @@ module psa2_tb;
             word_z = rows[row + 2];
             word_t = rows[row + 3];
             conv = 1'b1;
-            repeat (25) begin
+            repeat (26) begin
                 #SPI_HALF_NS spi_clk = 1'b1;
                 conv = 1'b0;
                 #SPI_HALF_NS spi_clk = 1'b0;

@@ -1,0 +1,115 @@
+"""Every edge of the boards' lines beside Verilog models of tests/bench/verilog, simulated by Icarus.
+
+The models were written from the article and the pages of the boards, the one of PSD-1 by somebody who had not read the
+C. They are given only what a controller cannot know: when conversions end, the words, and what the host does. TEST_SEED
+repeats a run.
+"""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+from psabench.can_host import CanHost, Message, StepClock, open_bus
+from psabench.control import Control
+from psabench.emulator import Emulator
+from psabench.vcd import Vcd, Wire, read_vcd
+from verilog_bench import Edges, difference, drawn, recorded, seed_of_test, simulate
+
+pytestmark = pytest.mark.skipif(not shutil.which("iverilog"), reason="iverilog is not installed")
+
+PSA2_MODEL = ("psa2", "kpsa", "adc_port")
+PSA2_LINES = ("SClk", "DRD_A", "DIn", "DOutX", "DOutY", "DOutZ", "Data", "CLK", "Int")  # bits 0.. of psa2.v
+PSA2_FRAMES, STARTS = 1000, 5
+XY, ZT = 0x185, 0x285  # CAN identifiers of node 5
+
+
+@dataclass(frozen=True, slots=True)
+class Psa2Frame:
+    """What goes into a frame: end of its conversions, their 32-bit words as far as they are shifted out, word T."""
+
+    conv_ns: int
+    words: tuple[int, int, int]
+    word_t: int
+    int_rise_ns: int
+
+
+def record_psa2(vcd: Path, rng: np.random.Generator) -> list[list[Message]]:
+    """Frames after several Res at odd instants, so that DRD_A meets the clocks at any phase; messages of each run."""
+    runs: list[list[Message]] = []
+    extra = ["--start", "--vcd", vcd, "--vcd-unit", "1"]
+    with Emulator(pace="step", seed=int(rng.integers(2**31)), extra=extra) as emu:
+        can = emu.endpoint(can="socketcand")
+        with (
+            Control(emu.directory / "control") as control,
+            CanHost(open_bus(f"socketcand:{can['host']}:{can['port']}"), StepClock(control)) as host,
+        ):
+            host.listeners.append(lambda m: runs[-1].append(m))
+            for _ in range(STARTS):
+                runs.append([])
+                host.advance(0.1895 + 0.001 * (PSA2_FRAMES / STARTS + 2))
+                runs.append([])  # on the way to Res
+                host.advance(int(rng.integers(1_000_000)) * 1e-9)
+                control.call("unit.reset")
+    return runs[::2]
+
+
+def pairs(messages: list[Message]) -> list[tuple[bytes, bytes]]:
+    """XY and ZT of each frame since Res, from the one with number 0 on."""
+    data = [(m.arbitration_id, bytes(m.data)) for m in messages if m.arbitration_id in (XY, ZT)]
+    first = next(i for i, (identifier, d) in enumerate(data) if identifier == XY and d[6:8] == b"\0\0")
+    sent = data[first:]
+    assert [identifier for identifier, _ in sent] == [XY, ZT] * (len(sent) // 2) + [XY] * (len(sent) % 2)
+    return [(xy, zt) for (_, xy), (_, zt) in zip(sent[::2], sent[1::2], strict=False)]
+
+
+def psa2_frames(vcd: Vcd, messages: list[list[Message]]) -> list[list[Psa2Frame]]:
+    """The whole frames of each run, put together from CAN; times, and the bit that no frame shows, from the lines."""
+    resets = [*vcd.wires["Res"].edges_ns(1).tolist(), vcd.end_ns]
+    int_, drd_a = vcd.wires["Int"], vcd.wires["DRD_A"]
+    found = []
+    for start_ns, end_ns, sent in zip(resets, resets[1:], messages, strict=False):
+        falls, rises = (t[(t > start_ns) & (t < end_ns)] for t in (int_.edges_ns(0), int_.edges_ns(1)))
+        frames = []
+        for fall, rise, (xy, zt) in zip(falls, rises, pairs(sent), strict=False):
+            conv_ns = int(drd_a.edges_ns(0)[drd_a.edges_ns(0) < fall][-1])
+            codes = [int.from_bytes(b, "little") for b in (xy[0:3], xy[3:6], zt[0:3])]
+            rest = [int(vcd.wires[line].at(int(fall))) for line in ("DOutX", "DOutY", "DOutZ")]
+            x, y, z = (code << 8 | bit << 7 for code, bit in zip(codes, rest, strict=True))
+            word_t = int.from_bytes(zt[3:5], "little") | (zt[5] >> 4) << 16 | (zt[5] & 15) << 20
+            frames.append(Psa2Frame(conv_ns, (x, y, z), word_t, int(rise)))
+        found.append(frames)
+    return found
+
+
+def of_accelerometers(vcd: Vcd, line: str) -> Edges:
+    """Edges of a line; SClk without the bursts of the temperature converter, which are not in the model."""
+    edges = recorded(vcd.wires[line])
+    cst: Wire = vcd.wires["CST"]
+    return edges if line != "SClk" else edges.where(cst.at(edges.t_ns) == 1)
+
+
+def test_a_thousand_frames_of_psa_2_have_the_edges_of_the_verilog_model(tmp_path: Path) -> None:
+    rng = np.random.default_rng(seed_of_test())
+    path = tmp_path / "psa2.vcd"
+    messages = record_psa2(path, rng)
+    vcd = read_vcd(path)
+    runs = psa2_frames(vcd, messages)
+    frames = [f for run in runs for f in run]
+    assert len(runs) == STARTS
+    assert len(frames) >= PSA2_FRAMES
+    assert len({f.conv_ns * 2048 % 1_000_000 for f in (run[0] for run in runs)}) > 1  # DRD_A against SClk
+    rows = (f"{f.conv_ns} {f.words[0]:x} {f.words[1]:x} {f.words[2]:x} {f.word_t:x}\n" for f in frames)
+    end_ns = frames[-1].int_rise_ns + 1000
+    edges = drawn(simulate(tmp_path, "psa2_edges_tb", PSA2_MODEL, end_ns, frames="".join(rows)), PSA2_LINES)
+    wrong = []
+    for run in runs:
+        within = (run[0].conv_ns, run[-1].int_rise_ns + 100)  # from where on DOut is known to the model
+        for line in PSA2_LINES:
+            ours, theirs = (e.between(*within) for e in (of_accelerometers(vcd, line), edges[line]))
+            assert len(ours.t_ns) > len(run) or line == "DIn" or line.startswith("DOut")
+            wrong.append(difference(line, ours, theirs))
+    assert "\n".join(w for w in wrong if w) == ""
