@@ -1,13 +1,15 @@
 #include "board/boards.h"
 
+#include "board/pmka_board.h"
 #include "board/psa2_board.h"
 
 #include <string.h>
 
-const struct board_type *const board_types[] = {&psa2_board, NULL};
+const struct board_type *const board_types[] = {&psa2_board, &pmka_board, NULL};
 
 const struct board_name board_names[] = {
     {"psa2", &psa2_board, NULL},
+    {"pmka", &pmka_board, NULL},
     {"psa1", &psa2_board, "psa1"},
     {NULL, NULL, NULL},
 };

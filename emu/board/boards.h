@@ -3,6 +3,8 @@
 #define PSABENCH_BOARD_BOARDS_H
 
 #include "board/board.h"
+#include "board/pmka.h"
+#include "board/pmka_can.h"
 #include "board/psa2_can.h"
 
 extern const struct board_type *const board_types[]; /* up to NULL */
@@ -23,14 +25,17 @@ const char *board_profile_name(const struct board_type *type, const void *profil
 
 union board_store {
     struct psa2 psa2;
+    struct pmka pmka;
 };
 
 union board_can_store {
     struct psa2_can psa2;
+    struct pmka_can pmka;
 };
 
 union board_profile_store {
     struct psa2_profile psa2;
+    struct pmka_profile pmka;
 };
 
 #endif

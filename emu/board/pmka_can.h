@@ -1,0 +1,14 @@
+/* A PMKA unit on CAN (docs/protocol_pmka.md; the mapping is ours, E0): the readings as a pair of PDOs, all else by the
+ * parallel bus, object 2002h. */
+#ifndef PSABENCH_BOARD_PMKA_CAN_H
+#define PSABENCH_BOARD_PMKA_CAN_H
+
+#include "board/node.h"
+
+struct pmka_can {
+    struct board_node node;
+};
+
+extern const struct board_can pmka_can;
+
+#endif
