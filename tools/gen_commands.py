@@ -21,7 +21,7 @@ ROOT = Path(__file__).resolve().parents[1]
 # page -> option that prints its tables -> their marks in the order of printing
 PAGES = {
     "emulator.md": ("--list-commands", ("commands", "truth")),
-    "faults.md": ("--list-faults", ("kinds", "matrix")),
+    "faults.md": ("--list-faults", ("kinds", "matrix", "boards", "events")),
     "scenarios.md": ("--list-keys", ("keys",)),
     "scpi.md": ("--list-scpi", ("common", "head", "table", "chamber", "supply")),
 }

@@ -101,4 +101,8 @@ void list_faults(FILE *out)
     for (unsigned i = 0; fault_markdown(i, line, sizeof line); i++) fprintf(out, "%s\n", line);
     fprintf(out, "\n");
     for (unsigned i = 0; fault_markdown_matrix(i, line, sizeof line); i++) fprintf(out, "%s\n", line);
+    fprintf(out, "\n");
+    for (unsigned i = 0; fault_markdown_boards(i, line, sizeof line); i++) fprintf(out, "%s\n", line);
+    fprintf(out, "\n");
+    for (unsigned i = 0; fault_markdown_events(i, line, sizeof line); i++) fprintf(out, "%s\n", line);
 }

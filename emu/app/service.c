@@ -58,6 +58,12 @@ static void do_push(void *ctx, void *client, const char *line)
     ctl_push(client, line);
 }
 
+static void do_reply(void *ctx, void *client, const char *line)
+{
+    (void)ctx;
+    ctl_reply(client, line);
+}
+
 static void do_quit(void *ctx)
 {
     ((struct service *)ctx)->loop.quit = true;
@@ -205,6 +211,7 @@ static void do_pace(void *ctx, struct control_pace *out)
     const struct pace *p = &((struct service *)ctx)->pace;
     const struct pace_hist *e = &p->events, *f = &p->frames;
     *out = (struct control_pace){.name = pace_name(p->kind),
+                                 .by_step = p->kind == PACE_STEP,
                                  .turns = p->turns,
                                  .late = p->late,
                                  .slips = p->slips,
@@ -231,6 +238,7 @@ static void make_view(struct service *s)
                                      .run = do_run,
                                      .run_stop = do_run_stop,
                                      .push = do_push,
+                                     .reply = do_reply,
                                      .supply_changed = do_supply_changed,
                                      .quit = do_quit,
                                      .snapshot = service_snapshot,
@@ -262,13 +270,14 @@ static void on_control_line(void *ctx, struct ctl_client *c, const char *line, i
     const char *reply = control_line(&s->control, line, t_ns);
     instruments_look(&s->ports.scpi, t_ns);
     if (reply) ctl_reply(c, reply);
-    else s->runner = c;
+    else if (s->control.waiting) s->runner = c;
 }
 
 static void on_control_gone(void *ctx, struct ctl_client *c)
 {
     struct service *s = ctx;
     control_gone(&s->control, c);
+    control_cycles_forget(&s->control, c);
     if (s->runner != c) return;
     s->runner = NULL;
     control_run_forget(&s->control);

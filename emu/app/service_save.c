@@ -61,6 +61,7 @@ void service_abandon(struct service *s)
     b->recording = false;
     truth_log_close(&s->truth_log);
     s->runner = NULL;
+    control_cycles_forget(&s->control, NULL);
     control_run_forget(&s->control);
     loop_cancel_step(&s->loop);
     ports_abandon(&s->ports);

@@ -55,8 +55,13 @@ struct board_type {
     /* what is on it */
     const struct board_line *lines;
     unsigned line_count;
-    const char *const *port_lines; /* bits 0.. of the line port's byte, up to 7 names, then NULL */
-    unsigned frame_line;           /* whose falls begin a frame */
+    const char *const *port_lines;         /* bits 0.. of the line port's byte, up to 7 names, then NULL */
+    unsigned frame_line;                   /* whose falls begin a frame */
+    unsigned pulse_line;                   /* whose pulses have their number in a frame */
+    unsigned (*pulses)(const void *board); /* how many of them; NULL: no line has such pulses */
+    /* what a fault of a sensor must come to, to be seen */
+    double (*code_v)(const void *board); /* a code at the load, V (of an integrator: a count in a second); NULL: 2 uV */
+    double range_v;                      /* full scale at the load; 0: 10 V */
     const char *const *events;
     unsigned event_count;
     const struct board_part *parts; /* [0] is the controller */

@@ -123,6 +123,11 @@ static const struct board_part parts[PARTS] = {
                    .flip = tadc_flip},
 };
 
+static unsigned pulses(const void *board)
+{
+    return PSA2_WORDS * ((const struct psa2 *)board)->profile.word_bits;
+}
+
 static void wrong(void *board, uint32_t wrongs)
 {
     const struct psa2_controller_fault f = {.skip_sync_t = wrongs & BOARD_WRONG_SKIP_SYNC_T,
@@ -280,6 +285,8 @@ const struct board_type psa2_board = {
     .line_count = PSA2_LINES,
     .port_lines = port_lines,
     .frame_line = PSA2_LINE_INT,
+    .pulse_line = PSA2_LINE_CLK,
+    .pulses = pulses,
     .events = psa2_events,
     .event_count = PSA2_EVENTS,
     .parts = parts,

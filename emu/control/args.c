@@ -1,6 +1,8 @@
 /* Arguments of commands: from JSON to values and back, and how the manual shows them. */
 #include "control/args.h"
 
+#include "control/events.h"
+
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -175,9 +177,16 @@ static const struct {
     [CONTROL_NAME] = {"string", parse_name, string, false},
     [CONTROL_TEXT] = {"string", parse_text, string, false},
     [CONTROL_CHOICE] = {"choice", parse_choice, string, false},
+    [CONTROL_EVENT] = {"choice", parse_name, string, false},
     [CONTROL_UNIT] = {"unit", parse_unit, string, false},
     [CONTROL_REALS] = {"numbers", parse_reals, numbers, true},
 };
+
+const char *control_choice(const struct control_arg *a, unsigned i)
+{
+    if (a->type == CONTROL_EVENT) return control_event(i);
+    return a->choices ? a->choices[i] : NULL;
+}
 
 const char *control_type_name(enum control_type type)
 {
@@ -274,8 +283,9 @@ static size_t markdown_arg(const struct control_arg *a, char *out, size_t cap)
             at += (size_t)snprintf(out + at, cap - at, "%.10g%s%s", a->max, a->unit ? " " : "", a->unit ? a->unit : "");
         }
     }
-    for (unsigned i = 0; a->choices && a->choices[i] && at < cap; i++) {
-        at += (size_t)snprintf(out + at, cap - at, "%s%s", i ? ", " : ": ", a->choices[i]);
+    const char *word;
+    for (unsigned i = 0; (word = control_choice(a, i)) && at < cap; i++) {
+        at += (size_t)snprintf(out + at, cap - at, "%s%s", i ? ", " : ": ", word);
     }
     return at;
 }

@@ -7,6 +7,9 @@
 const char *control_type_name(enum control_type type);
 bool control_type_numeric(enum control_type type); /* has a range, perhaps a unit */
 
+/* The i-th word that an argument takes, asked for in order; NULL past the last, and where any will do. */
+const char *control_choice(const struct control_arg *a, unsigned i);
+
 /* Writes down a refusal and returns false. */
 __attribute__((format(printf, 3, 4))) bool control_refuse_in(struct control_refusal *r, const char *code,
                                                              const char *format, ...);

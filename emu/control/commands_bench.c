@@ -106,9 +106,9 @@ static const struct control_command rows[] = {
       {"after_tx", CONTROL_COUNT, true, NULL, 0, CONTROL_COUNT_MAX, .what = "start once this many frames have been taken from CAN clients"}}, .run = do_run},
     {"frames", "Counts the CAN frames of each client, with its number in order of coming (came): delivered to it, taken from it, dropped, lost in the kernel, refused.", {{0}}, .run = do_frames},
     {"counters", "Tells the counters of pace, bus, clients and units; with a unit, that unit's alone.", {CONTROL_UNIT_ARG(true)}, .run = do_counters},
-    {"units", "Lists the units: name, serial number, CAN node, board profile.", {{0}}, .run = do_units},
+    {"units", "Lists the units: name, type of board, serial number, CAN node, board profile.", {{0}}, .run = do_units},
     {"endpoints", "Tells where programs connect, as the ready lines do: CAN adapters, instruments, line port, sockets.", {{0}}, .run = do_endpoints},
-    {"unit.reset", "Pulses Res of a unit.", {CONTROL_UNIT_ARG(true)}, .run = do_unit_reset, .changes = true},
+    {"unit.reset", "Resets a unit, on PSA-2 by a pulse on Res.", {CONTROL_UNIT_ARG(true)}, .run = do_unit_reset, .changes = true},
     {"quit", "Ends the emulator as SIGTERM does.", {{0}}, .run = do_quit},
 };
 // clang-format on

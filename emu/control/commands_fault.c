@@ -81,8 +81,9 @@ static void add_arg(cJSON *to, enum fault_arg arg, bool optional)
     cJSON_AddStringToObject(j, "what", a->what);
 }
 
-static void add_kind(cJSON *to, const struct fault_kind *k)
+static void add_kind(cJSON *to, const struct fault_kind *k, const struct fault_types *types)
 {
+    char name[FAULT_POINT_MAX];
     cJSON *j = cJSON_CreateObject();
     cJSON_AddItemToArray(to, j);
     cJSON_AddStringToObject(j, "kind", k->name);
@@ -90,10 +91,9 @@ static void add_kind(cJSON *to, const struct fault_kind *k)
     cJSON_AddStringToObject(j, "seen", k->seen);
     cJSON_AddBoolToObject(j, "once", k->once);
     cJSON *places = cJSON_AddArrayToObject(j, "points");
-    for (unsigned i = 0; i < FAULT_PLACES; i++) {
-        if (k->places & FAULT_BIT(i)) {
-            cJSON_AddItemToArray(places, cJSON_CreateString(fault_place_name((enum fault_place)i)));
-        }
+    for (unsigned p = 0; p < FAULT_PLACES; p++) {
+        for (unsigned i = 0; k->places & FAULT_BIT(p) && fault_place_name(types, (enum fault_place)p, i, name); i++)
+            cJSON_AddItemToArray(places, cJSON_CreateString(name));
     }
     cJSON *args = cJSON_AddArrayToObject(j, "args");
     for (unsigned i = 0; i < FAULT_ARGS; i++) {
@@ -105,10 +105,10 @@ static enum control_outcome do_kinds(struct control *c, const struct control_val
 {
     cJSON *kinds = cJSON_AddArrayToObject(result, "kinds");
     const struct fault_kind *k;
-    (void)c;
+    const struct fault_types types = fault_types_of(c->bench);
     (void)v;
     (void)t_ns;
-    for (unsigned i = 0; (k = fault_kind(i)) != NULL; i++) add_kind(kinds, k);
+    for (unsigned i = 0; (k = fault_kind(i)) != NULL; i++) add_kind(kinds, k, &types);
     return CONTROL_DONE;
 }
 
@@ -136,6 +136,16 @@ static void add_value(cJSON *to, const struct fault *f, enum fault_arg arg)
     else cJSON_AddNumberToObject(to, a->name, f->value[arg]);
 }
 
+static void add_trigger(cJSON *to, const struct fault *f)
+{
+    const struct control_bench *b = f->engine->bench;
+    const char *const *events = b->unit[f->unit]->type->events;
+    cJSON_AddStringToObject(to, "after", events[f->trigger.after]);
+    cJSON_AddNumberToObject(to, "count", f->trigger.count);
+    if (f->trigger.since != FAULT_NO_EVENT) cJSON_AddStringToObject(to, "since", events[f->trigger.since]);
+    cJSON_AddStringToObject(to, "unit", b->unit_name[f->unit]);
+}
+
 static void fault_describe(const struct fault *f, cJSON *to)
 {
     cJSON_AddNumberToObject(to, "id", f->id);
@@ -143,14 +153,7 @@ static void fault_describe(const struct fault *f, cJSON *to)
     cJSON_AddStringToObject(to, "point", f->name);
     cJSON_AddStringToObject(to, "state", fault_state_name(f->state));
     add_value(to, f, FAULT_AT_S);
-    if (f->trigger.after != FAULT_NO_EVENT) {
-        cJSON_AddStringToObject(to, "after", psa2_event_name((enum psa2_event)f->trigger.after));
-        cJSON_AddNumberToObject(to, "count", f->trigger.count);
-        if (f->trigger.since != FAULT_NO_EVENT) {
-            cJSON_AddStringToObject(to, "since", psa2_event_name((enum psa2_event)f->trigger.since));
-        }
-        cJSON_AddStringToObject(to, "unit", f->engine->bench->unit_name[f->unit]);
-    }
+    if (f->trigger.after != FAULT_NO_EVENT) add_trigger(to, f);
     for (unsigned i = FAULT_DELAY_S; i < FAULT_ARGS; i++) add_value(to, f, (enum fault_arg)i);
     const bool begun = f->state == FAULT_ACTIVE || f->state == FAULT_OVER || f->state == FAULT_VOID;
     if (begun) cJSON_AddNumberToObject(to, "began_s", (double)f->began_ns * 1e-9);
@@ -185,9 +188,9 @@ static const struct control_command rows[COMMANDS] = {
      [FAULT_KIND] = {"kind", CONTROL_NAME, .what = "what goes wrong: a name of fault.kinds"},
      [FAULT_POINT] = {"point", CONTROL_NAME, .what = "where: a name of fault.points"},
      [FAULT_AT_S] = {"at_s", CONTROL_REAL, true, "s", 0, TIME_MAX_S, .what = "simulated instant; without it: now. With after: events count from then on"},
-     [FAULT_AFTER] = {"after", CONTROL_NAME, true, .what = "event of a board that brings it about: RES, SETUP_DONE, SYNC_A, SYNC_T, DRD_A, DRD_T, INT_FALL, INT_RISE, POWER_DOWN or POWER_UP"},
+     [FAULT_AFTER] = {"after", CONTROL_EVENT, true, .what = "event of a board that brings it about, one that this board has"},
      [FAULT_COUNT] = {"count", CONTROL_COUNT, true, NULL, 1, 1e9, .what = "which of these events; without it the first"},
-     [FAULT_SINCE] = {"since", CONTROL_NAME, true, .what = "event that starts the count anew"},
+     [FAULT_SINCE] = {"since", CONTROL_EVENT, true, .what = "event that starts the count anew"},
      [FAULT_UNIT] = {"unit", CONTROL_UNIT, true, .what = "whose events; without it those of the point's unit"},
      [FAULT_DELAY_S] = {"delay_s", CONTROL_REAL, true, "s", 0, 1000, .what = "from the event to the fault"},
      [FAULT_FOR_S] = {"for_s", CONTROL_REAL, true, "s", 0, TIME_MAX_S, .what = "how long it lasts; 0 or without it: until fault.clear"},

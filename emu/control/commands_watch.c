@@ -1,5 +1,6 @@
 /* Commands that look on: events, levels, recordings. */
 #include "control/commands.h"
+#include "control/events.h"
 
 #include <math.h>
 
@@ -10,6 +11,12 @@ static enum control_outcome from_bench(struct control *c, bool done)
     return CONTROL_REFUSED;
 }
 
+static bool check_until(const struct control_bench *b, const struct control_value *v, struct control_refusal *why)
+{
+    unsigned event;
+    return control_event_find(b, v[1].unit, "event", v[0].text, &event, why);
+}
+
 static enum control_outcome do_until(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
 {
     (void)result;
@@ -17,10 +24,11 @@ static enum control_outcome do_until(struct control *c, const struct control_val
     const struct control_bench *b = c->bench;
     const uint64_t count = v[2].given ? v[2].count : 1;
     const double limit_s = v[3].given ? v[3].real : 60.0;
+    unsigned event;
     if (c->waiting) return control_refuse(c, "state", "another run is under way");
-    if (!b->units) return control_refuse(c, "state", "there is no unit");
+    if (!control_event_find(b, v[1].unit, "event", v[0].text, &event, &c->refusal)) return CONTROL_REFUSED;
     if (!b->run(b->ctx, (int64_t)nearbyint(limit_s * 1e9), v[4].count, c->refusal.why)) return from_bench(c, false);
-    control_watch_until(c, (enum psa2_event)v[0].choice, v[1].unit, count);
+    control_watch_until(c, event, v[1].unit, count);
     return CONTROL_LATER;
 }
 
@@ -50,8 +58,9 @@ static enum control_outcome do_lines(struct control *c, const struct control_val
     if (!c->bench->units) return control_refuse(c, "state", "there is no unit");
     const uint64_t level = control_lines(c, v[0].unit, t_ns);
     cJSON *lines = cJSON_AddObjectToObject(result, "lines");
-    for (unsigned i = 0; i < PSA2_LINES; i++) {
-        cJSON_AddNumberToObject(lines, psa2_line_name((enum psa2_line)i), (double)(level >> i & 1));
+    const struct board_type *type = c->bench->unit[v[0].unit]->type;
+    for (unsigned i = 0; i < type->line_count; i++) {
+        cJSON_AddNumberToObject(lines, type->lines[i].name, (double)(level >> i & 1));
     }
     return CONTROL_DONE;
 }
@@ -87,10 +96,10 @@ static enum control_outcome do_vcd_flush(struct control *c, const struct control
 
 static const struct control_command rows[] = {
     {"run.until", "As run, but ends at the instant of an event of a board; tells whether it was reached and how many were seen.",
-     {{"event", CONTROL_CHOICE, .what = "of the board", .choices = control_events}, FIRST_UNIT,
+     {{"event", CONTROL_EVENT, .what = "of the board, one that it has"}, FIRST_UNIT,
       {"count", CONTROL_COUNT, true, NULL, 1, CONTROL_COUNT_MAX, .what = "of such events from now on; else 1", .def = 1},
       {"limit_s", CONTROL_REAL, true, "s", 0, 86400, .what = "give up after this; else 60", .def = 60},
-      {"after_tx", CONTROL_COUNT, true, NULL, 0, CONTROL_COUNT_MAX, .what = "as of run"}}, .run = do_until},
+      {"after_tx", CONTROL_COUNT, true, NULL, 0, CONTROL_COUNT_MAX, .what = "as of run"}}, .run = do_until, .check = check_until},
     {"subscribe", "From now on this client gets a line for each event, fault or status.",
      {{"what", CONTROL_CHOICE, .what = "kind of lines", .choices = control_topics},
       {"every_s", CONTROL_REAL, true, "s", 1e-3, 3600, .what = "simulated time between lines of status; else 0.1", .def = 0.1}}, .run = do_subscribe},

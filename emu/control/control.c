@@ -8,9 +8,9 @@
 #include <stdio.h>
 #include <string.h>
 
-const struct control_table *const control_tables[] = {&commands_bench,   &commands_head,     &commands_table,
-                                                      &commands_chamber, &commands_supply,   &commands_watch,
-                                                      &commands_fault,   &commands_snapshot, NULL};
+const struct control_table *const control_tables[] = {
+    &commands_bench, &commands_head,  &commands_table,    &commands_chamber, &commands_supply,
+    &commands_watch, &commands_fault, &commands_snapshot, &commands_bus,     NULL};
 const struct control_table *const control_truth_tables[] = {&commands_truth, NULL};
 
 void control_init(struct control *c, const struct control_table *const *tables, const struct control_bench *bench)
@@ -59,9 +59,9 @@ enum control_outcome control_do(struct control *c, const struct control_command 
 {
     const enum control_outcome outcome = row->run(c, v, result, t_ns);
     /* Refused by its handler, too: converters may have taken their inputs by then, which moves their noise. */
-    if (outcome != CONTROL_LATER && row->changes && c->bench->journal) {
+    if (row->changes && c->bench->journal) {
         cJSON *args = control_args_json(row, v);
-        c->bench->journal(c->bench->ctx, row, args, outcome == CONTROL_DONE, t_ns);
+        c->bench->journal(c->bench->ctx, row, args, outcome != CONTROL_REFUSED, t_ns);
         cJSON_Delete(args);
     }
     return outcome;
@@ -130,12 +130,57 @@ static const char *reply_with(struct control *c, cJSON *id, bool ok, cJSON *resu
     return print(c, reply);
 }
 
+bool control_by_step(const struct control_bench *b)
+{
+    struct control_pace p = {0};
+    b->pace(b->ctx, &p);
+    return p.by_step;
+}
+
+/* The reply to a cycle that is over, or was given up; its place is free then if it is over. */
+static const char *reply_cycle(struct control *c, struct control_cycle *k, cJSON *id, int64_t t_ns)
+{
+    cJSON *result = cJSON_CreateObject();
+    const enum control_outcome outcome = control_cycle_result(c, k, result);
+    k->client = NULL;
+    k->id = NULL;
+    if (k->over) k->control = NULL;
+    return reply_with(c, id, outcome == CONTROL_DONE, result, t_ns);
+}
+
+void control_cycle_over(struct control *c, struct control_cycle *k, int64_t t_ns)
+{
+    if (c->waiting && c->running == k) {
+        c->bench->run_stop(c->bench->ctx); /* answered with the run */
+    } else if (k->client) {
+        void *client = k->client;
+        c->bench->reply(c->bench->ctx, client, reply_cycle(c, k, k->id, t_ns));
+    } else {
+        k->control = NULL;
+    }
+}
+
+void control_cycles_forget(struct control *c, const void *client)
+{
+    for (unsigned i = 0; i < CONTROL_CYCLES_MAX; i++) {
+        struct control_cycle *k = &c->cycle[i];
+        if (!k->control || (client && k->client != client)) continue;
+        cJSON_Delete(k->id);
+        k->id = NULL;
+        k->client = NULL;
+    }
+}
+
 const char *control_run_done(struct control *c, int64_t t_ns)
 {
-    cJSON *id = c->run_id, *result = cJSON_CreateObject();
+    cJSON *id = c->run_id;
+    struct control_cycle *cycle = c->running;
     c->run_id = NULL;
+    c->running = NULL;
     c->waiting = false;
     const struct control_until until = control_watch_end(c);
+    if (cycle) return reply_cycle(c, cycle, id, t_ns);
+    cJSON *result = cJSON_CreateObject();
     if (until.active) cJSON_AddBoolToObject(result, "reached", until.reached);
     if (until.active) cJSON_AddNumberToObject(result, "seen", (double)until.seen);
     return reply_with(c, id, true, result, t_ns);
@@ -146,6 +191,7 @@ void control_run_forget(struct control *c)
     (void)control_watch_end(c);
     cJSON_Delete(c->run_id);
     c->run_id = NULL;
+    c->running = NULL;
     c->waiting = false;
 }
 
@@ -178,11 +224,17 @@ const char *control_line(struct control *c, const char *line, int64_t t_ns)
     cJSON *result = cJSON_CreateObject();
     cJSON *id = cJSON_DetachItemFromObjectCaseSensitive(request, "id");
     c->commands++;
+    c->started = NULL;
     const enum control_outcome outcome = dispatch(c, request, result, t_ns);
     cJSON_Delete(request);
     if (outcome != CONTROL_LATER) return reply_with(c, id, outcome == CONTROL_DONE, result, t_ns);
     cJSON_Delete(result);
+    if (c->started && !control_by_step(c->bench)) {
+        c->started->id = id; /* control_cycle_over() answers */
+        return NULL;
+    }
     c->run_id = id;
+    c->running = c->started;
     c->waiting = true;
     return NULL;
 }

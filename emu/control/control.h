@@ -14,20 +14,22 @@
 
 #include <cjson/cJSON.h>
 
-#define CONTROL_ARGS_MAX  48u /* fault.add: the values of every kind of fault */
-#define CONTROL_REALS_MAX 32u
-#define CONTROL_SCPI_MAX  6u
-#define CONTROL_REPLY_MAX 524288u /* counters of 64 units */
+#define CONTROL_ARGS_MAX   48u /* fault.add: the values of every kind of fault */
+#define CONTROL_REALS_MAX  32u
+#define CONTROL_SCPI_MAX   6u
+#define CONTROL_REPLY_MAX  524288u /* counters of 64 units */
+#define CONTROL_CYCLES_MAX 64u
 
 enum control_type {
     CONTROL_REAL,
     CONTROL_COUNT,
     CONTROL_BOOL,
-    CONTROL_NAME, /* 1 to 31 printable characters without spaces: of an event, a fault point */
+    CONTROL_NAME, /* 1 to 31 printable characters without spaces: of a fault point */
     CONTROL_TEXT, /* up to 1023 bytes: a path */
     CONTROL_CHOICE,
-    CONTROL_UNIT, /* name of a unit of the bench */
-    CONTROL_REALS /* 1 to CONTROL_REALS_MAX numbers */
+    CONTROL_EVENT, /* of a board: which it has, tells control_event_find() */
+    CONTROL_UNIT,  /* name of a unit of the bench */
+    CONTROL_REALS  /* 1 to CONTROL_REALS_MAX numbers */
 };
 
 struct control_value {
@@ -35,7 +37,7 @@ struct control_value {
     double real;
     uint64_t count;
     bool on;
-    const char *text; /* NAME, TEXT, CHOICE: the word itself */
+    const char *text; /* NAME, TEXT, CHOICE, EVENT: the word itself */
     unsigned choice;  /* index into choices */
     unsigned unit;    /* index into the bench's units */
     double reals[CONTROL_REALS_MAX];
@@ -92,6 +94,18 @@ struct control_refusal {
     char why[CONTROL_WHY_MAX];
 };
 
+/* A cycle on the parallel bus of a board, bus.read or bus.write, until it is over. */
+struct control_cycle {
+    struct control *control; /* NULL: free */
+    void *client;            /* who waits for the answer; NULL: nobody */
+    cJSON *id;
+    unsigned unit;
+    struct board_cycle cycle;
+    bool over;
+    enum board_cycle_result result;
+    int64_t ended_ns;
+};
+
 struct control {
     const struct control_table *const *tables;
     const struct control_bench *bench;
@@ -100,6 +114,9 @@ struct control {
     void *client;                   /* who sent the line: the application sets it before control_line() */
     bool waiting;                   /* a run is under way */
     cJSON *run_id;
+    struct control_cycle cycle[CONTROL_CYCLES_MAX];
+    struct control_cycle *started; /* by the line that is being carried out */
+    struct control_cycle *running; /* for which a run is under way; NULL: it is for itself */
     struct control_watch watch;
     char reply[CONTROL_REPLY_MAX];
 };
@@ -107,13 +124,14 @@ struct control {
 void control_init(struct control *c, const struct control_table *const *tables, const struct control_bench *bench);
 
 /* Carries out one line (NULL: it was too long). The reply, valid until the next call, or NULL: it comes later, from
- * control_run_done(). */
+ * control_run_done(), or through control_bench.reply() if no run was asked for. */
 const char *control_line(struct control *c, const char *line, int64_t t_ns);
 
 /* The reply to the run that has ended. */
 const char *control_run_done(struct control *c, int64_t t_ns);
 
-void control_run_forget(struct control *c); /* who asked has gone */
+void control_run_forget(struct control *c);                        /* who asked has gone */
+void control_cycles_forget(struct control *c, const void *client); /* likewise; NULL: all have */
 
 /* ---- a command without a line: scenarios, SCPI, the journal */
 

@@ -2,7 +2,6 @@
 
 #include "control/args.h"
 
-#include <stddef.h>
 #include <string.h>
 
 static void add_count(cJSON *to, const char *name, uint64_t n)
@@ -29,10 +28,9 @@ static void describe_arg(const struct control_arg *a, cJSON *list)
         if (a->least > 0.0) add_real(j, "least", a->least);
     }
     if (a->unit) cJSON_AddStringToObject(j, "unit", a->unit);
-    cJSON *choices = a->choices ? cJSON_AddArrayToObject(j, "choices") : NULL;
-    for (unsigned i = 0; choices && a->choices[i]; i++) {
-        cJSON_AddItemToArray(choices, cJSON_CreateString(a->choices[i]));
-    }
+    const char *word = control_choice(a, 0);
+    cJSON *choices = word ? cJSON_AddArrayToObject(j, "choices") : NULL;
+    for (unsigned i = 1; word; word = control_choice(a, i++)) cJSON_AddItemToArray(choices, cJSON_CreateString(word));
     cJSON_AddStringToObject(j, "what", a->what);
     cJSON_AddItemToArray(list, j);
 }
@@ -139,6 +137,7 @@ void describe_units(const struct control_bench *b, cJSON *to)
         const struct unit *u = b->unit[i];
         cJSON *j = cJSON_CreateObject();
         cJSON_AddStringToObject(j, "name", u->cfg.name);
+        cJSON_AddStringToObject(j, "board", u->type->name);
         add_count(j, "serial", u->cfg.board.serial);
         add_count(j, "node", u->cfg.node);
         add_bus_name(b, b->node[i], j);
@@ -148,56 +147,14 @@ void describe_units(const struct control_bench *b, cJSON *to)
     }
 }
 
-/* A counter by name: each is a uint32_t somewhere in a struct. */
-struct counter {
-    const char *name;
-    size_t offset;
-};
-
-#define COUNTER(type, field)                                                                                           \
-    {                                                                                                                  \
-#field, offsetof(struct type, field)                                                                           \
-    }
-
-// clang-format off
-static const struct counter ads1282_counters[] = {
-#define N(field) COUNTER(ads1282_counters, field)
-    N(conversions), N(overruns), N(torn_reads), N(late_reads), N(bad_opcodes), N(refused), N(gap_violations), N(restarts),
-    N(clipped), N(realigned), N(calibrations),
-#undef N
-};
-
-static const struct counter ads1256_counters[] = {
-#define N(field) COUNTER(ads1256_counters, field)
-    N(conversions), N(overruns), N(torn_reads), N(window_reads), N(clipped), N(buffer_clipped), N(range_exceeded), N(bad_mux),
-    N(calibrations), N(cal_clamped), N(restarts), N(power_downs), N(bad_opcodes), N(refused), N(bad_drate), N(gap_violations),
-    N(dropped),
-#undef N
-};
-
-static const struct counter reg_counters[] = {
-    {"bad_register",    offsetof(struct reg_file, bad_access)},
-    {"unmodelled_bit",  offsetof(struct reg_file, unimp_access)},
-    {"read_only_write", offsetof(struct reg_file, ro_write)},
-};
-
-static const struct counter board_counters[] = {
-#define N(field) COUNTER(psa2_counters, field)
-    N(frames), N(resets), N(requests), N(timeouts), N(overruns), N(int_late),
-#undef N
-};
-// clang-format on
-
-static void add_counters(const struct counter *row, size_t rows, const void *of, cJSON *to)
+static void add_counters(const struct board_part *p, const char *board, cJSON *to)
 {
-    for (; rows > 0; rows--, row++) {
+    for (unsigned i = 0; i < p->counter_count; i++) {
         uint32_t n;
-        memcpy(&n, (const char *)of + row->offset, sizeof n);
-        add_count(to, row->name, n);
+        memcpy(&n, board + p->offset + p->counters[i].offset, sizeof n);
+        add_count(to, p->counters[i].name, n);
     }
 }
-
-#define ADD_COUNTERS(table, of, to) add_counters(table, sizeof(table) / sizeof *(table), of, to)
 
 static void add_node(const struct can_node *n, cJSON *to)
 {
@@ -209,21 +166,16 @@ static void add_node(const struct can_node *n, cJSON *to)
 
 void describe_unit_counters(const struct control_bench *b, unsigned unit, cJSON *to)
 {
-    static const char *const adc[] = {"adc_x", "adc_y", "adc_z"};
-    const struct psa2 *p = b->unit[unit]->board;
-    ADD_COUNTERS(board_counters, &p->counters, cJSON_AddObjectToObject(to, "board"));
-    for (unsigned i = 0; i < 3; i++) {
-        cJSON *j = cJSON_AddObjectToObject(to, adc[i]);
-        ADD_COUNTERS(ads1282_counters, &p->adc[i].count, j);
-        ADD_COUNTERS(reg_counters, &p->adc[i].regs, j);
+    const struct unit *u = b->unit[unit];
+    const struct trace *t = unit_trace(b->unit[unit]);
+    for (unsigned i = 0; i < u->type->part_count; i++) {
+        const struct board_part *p = &u->type->parts[i];
+        add_counters(p, u->board, cJSON_AddObjectToObject(to, p->label));
     }
-    cJSON *temp = cJSON_AddObjectToObject(to, "adc_temp");
-    ADD_COUNTERS(ads1256_counters, &p->tadc.n, temp);
-    ADD_COUNTERS(reg_counters, &p->tadc.regs, temp);
     if (b->node[unit]) add_node(b->node[unit], cJSON_AddObjectToObject(to, "can"));
     cJSON *trace = cJSON_AddObjectToObject(to, "trace");
-    add_count(trace, "late", p->trace.late);
-    add_count(trace, "dropped", p->trace.dropped);
+    add_count(trace, "late", t->late);
+    add_count(trace, "dropped", t->dropped);
 }
 
 /* ---- at a glance */

@@ -71,30 +71,47 @@ static void add_afe(const struct afe_cfg *a, cJSON *to)
     add_real(to, "noise_v_rthz", a->noise_v_rthz);
 }
 
+static void put_hidden(void *ctx, const char *name, double value)
+{
+    add_real(ctx, name, value);
+}
+
+/* Of boards that heed them. */
+static void add_knobs(const struct unit *u, cJSON *to)
+{
+    const struct board_cfg *c = &u->cfg.board;
+    const uint32_t knobs = u->type->knobs;
+    add_real(to, "adc_noise_scale", c->adc_noise_scale);
+    if (knobs & BOARD_KNOB_TEMP_NOISE) add_real(to, "temp_noise_scale", c->temp_noise_scale);
+    if (knobs & BOARD_KNOB_TEMP_ADC) add_real(to, "temp_adc_offset_v", c->temp_adc_offset_v);
+    if (knobs & BOARD_KNOB_TEMP_ADC) add_real(to, "temp_adc_gain_error", c->temp_adc_gain_error);
+}
+
+static void add_axis(struct unit *u, unsigned i, cJSON *to, int64_t t_ns)
+{
+    static const char *const names[] = {[UNIT_NO_SENSOR] = "none", [UNIT_MEMS] = "mems", [UNIT_QUARTZ] = "quartz"};
+    const enum unit_sensor sensor = u->cfg.axis[i].sensor;
+    cJSON_AddStringToObject(to, "sensor", names[sensor]);
+    if (sensor == UNIT_MEMS) add_mems(&u->cfg.axis[i].mems, to);
+    if (sensor == UNIT_MEMS) add_real(to, "sensor_v", unit_sensor_out(u, i, t_ns));
+    if (sensor == UNIT_QUARTZ) add_quartz(&u->cfg.axis[i].quartz, cJSON_AddObjectToObject(to, "quartz"));
+    if (sensor == UNIT_QUARTZ) add_real(to, "sensor_a", unit_sensor_out(u, i, t_ns));
+    add_afe(&u->cfg.board.afe[i], cJSON_AddObjectToObject(to, "afe"));
+}
+
 static void add_unit_truth(struct unit *u, cJSON *to, int64_t t_ns)
 {
     static const char *const axis[] = {"x", "y", "z"};
+    cJSON_AddStringToObject(to, "board", u->type->name);
     add_count(to, "serial", u->cfg.board.serial);
     add_count(to, "node", u->cfg.node);
     cJSON_AddStringToObject(to, "profile", u->profile);
-    add_real(to, "adc_noise_scale", u->cfg.board.adc_noise_scale);
-    add_real(to, "temp_noise_scale", u->cfg.board.temp_noise_scale);
-    add_real(to, "temp_adc_offset_v", u->cfg.board.temp_adc_offset_v);
-    add_real(to, "temp_adc_gain_error", u->cfg.board.temp_adc_gain_error);
+    add_knobs(u, to);
+    if (u->type->truth) u->type->truth(u->board, put_hidden, cJSON_AddObjectToObject(to, "specimen"));
     cJSON *temps = cJSON_AddArrayToObject(to, "temp_degc");
     for (unsigned i = 0; i < UNIT_TEMPS; i++) cJSON_AddItemToArray(temps, cJSON_CreateNumber(u->cfg.temp_degc[i]));
     cJSON *axes = cJSON_AddObjectToObject(to, "axes");
-    for (unsigned i = 0; i < UNIT_AXES; i++) {
-        cJSON *j = cJSON_AddObjectToObject(axes, axis[i]);
-        static const char *const names[] = {[UNIT_NO_SENSOR] = "none", [UNIT_MEMS] = "mems", [UNIT_QUARTZ] = "quartz"};
-        const enum unit_sensor sensor = u->cfg.axis[i].sensor;
-        cJSON_AddStringToObject(j, "sensor", names[sensor]);
-        if (sensor == UNIT_MEMS) add_mems(&u->cfg.axis[i].mems, j);
-        if (sensor == UNIT_MEMS) add_real(j, "sensor_v", unit_sensor_out(u, i, t_ns));
-        if (sensor == UNIT_QUARTZ) add_quartz(&u->cfg.axis[i].quartz, cJSON_AddObjectToObject(j, "quartz"));
-        if (sensor == UNIT_QUARTZ) add_real(j, "sensor_a", unit_sensor_out(u, i, t_ns));
-        add_afe(&u->cfg.board.afe[i], cJSON_AddObjectToObject(j, "afe"));
-    }
+    for (unsigned i = 0; i < UNIT_AXES; i++) add_axis(u, i, cJSON_AddObjectToObject(axes, axis[i]), t_ns);
 }
 
 void describe_truth(const struct control_bench *b, cJSON *to, int64_t t_ns)

@@ -62,6 +62,7 @@ struct fault_kind {
     uint64_t places;    /* bits of enum fault_place */
     uint64_t need, may; /* bits of enum fault_arg: the values it must be given, those it may */
     uint64_t nonzero;   /* values that would change nothing if they were 0 */
+    const char *lacks;  /* of chips and controllers: why a board has it not, where its table gives no reason */
     bool once;          /* over as soon as it is done */
     /* What its places do not say of this point or these values: false with the reason in why. NULL: it always fits. */
     bool (*fits)(const struct control_bench *b, const struct fault *f, char *why);
@@ -78,7 +79,6 @@ struct fault_engine {
     const struct control_bench *bench;
     struct sched *sched;
     struct fault fault[FAULTS_MAX];
-    struct line_faults lines[CONTROL_UNITS_MAX];
     uint32_t last_id;
     void (*changed)(void *ctx, const struct fault *f, int64_t t_ns); /* it began or ended; may be NULL */
     void *ctx;
@@ -103,6 +103,10 @@ bool fault_fits(const struct control_bench *b, const struct fault *f, char *why)
 /* The kinds as Markdown, and which can be where, for docs/faults.md and --list-faults: next line into out, false at the end. */
 bool fault_markdown(unsigned line, char *out, size_t cap);
 bool fault_markdown_matrix(unsigned line, char *out, size_t cap);
+
+/* The same of each type of board: the kinds that its chips and its controller have, and its events. */
+bool fault_markdown_boards(unsigned line, char *out, size_t cap);
+bool fault_markdown_events(unsigned line, char *out, size_t cap);
 
 /* Takes over a fault that fault_make() made, now. Its id, or 0 if FAULTS_MAX are waiting or active. */
 uint32_t fault_add(struct fault_engine *e, const struct fault *f, int64_t t_ns);

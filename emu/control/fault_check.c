@@ -2,6 +2,7 @@
 #include "control/fault_parts.h"
 
 #include "control/args.h"
+#include "control/events.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -57,13 +58,29 @@ static bool find_point(const struct control_bench *b, const char *text, struct f
     return control_refuse_in(why, "range", "point: no \"%.40s\" on this bench; fault.points lists them", text);
 }
 
+static bool has_unit(enum fault_place place)
+{
+    return place != FAULT_AT_BUS && place != FAULT_AT_CLIENT && place != FAULT_AT_SUPPLY;
+}
+
+/* Where a kind works, in the names of the board that the point is on, or of the boards that there are. */
+static void join_places(const struct control_bench *b, const struct fault *f, char *out, size_t cap)
+{
+    char name[FAULT_POINT_MAX];
+    const bool on_board = has_unit(f->point.place);
+    const struct fault_types t = on_board ? fault_type_of(b->unit[f->point.unit]->type) : fault_types_of(b);
+    for (unsigned p = 0; p < FAULT_PLACES; p++) {
+        for (unsigned i = 0; f->kind->places & FAULT_BIT(p) && fault_place_name(&t, (enum fault_place)p, i, name); i++)
+            join(out, cap, name);
+    }
+}
+
 bool fault_fits(const struct control_bench *b, const struct fault *f, char *why)
 {
     char places[120] = "";
     if (f->kind->places & FAULT_BIT(f->point.place)) return !f->kind->fits || f->kind->fits(b, f, why);
-    for (unsigned i = 0; i < FAULT_PLACES; i++) {
-        if (f->kind->places & FAULT_BIT(i)) join(places, sizeof places, fault_place_name((enum fault_place)i));
-    }
+    join_places(b, f, places, sizeof places);
+    if (!places[0]) snprintf(places, sizeof places, "other boards");
     snprintf(why, CONTROL_WHY_MAX, "%s: not on %s, which is %s; it works on %s", f->kind->name, f->name,
              fault_place_what(f->point.place), places);
     return false;
@@ -101,18 +118,15 @@ bool fault_values_fit(const struct fault *f, struct control_refusal *why)
 
 /* ---- when */
 
-static bool find_event(const struct control_value *v, const char *arg, int *event, struct control_refusal *why)
+static bool find_event(const struct control_bench *b, unsigned unit, const struct control_value *v, const char *arg,
+                       int *event, struct control_refusal *why)
 {
-    char known[160] = "";
-    *event = v->given ? psa2_event_find(v->text) : FAULT_NO_EVENT;
-    if (!v->given || *event != FAULT_NO_EVENT) return true;
-    for (int e = 0; e < PSA2_EVENTS; e++) join(known, sizeof known, psa2_event_name((enum psa2_event)e));
-    return control_refuse_in(why, "range", "%s: no event \"%.40s\"; there is %s", arg, v->text, known);
-}
-
-static bool has_unit(enum fault_place place)
-{
-    return place != FAULT_AT_BUS && place != FAULT_AT_CLIENT && place != FAULT_AT_SUPPLY;
+    unsigned number;
+    *event = FAULT_NO_EVENT;
+    if (!v->given) return true;
+    if (!control_event_find(b, unit, arg, v->text, &number, why)) return false;
+    *event = (int)number;
+    return true;
 }
 
 static bool set_trigger(const struct control_bench *b, const struct control_value *v, struct fault *f,
@@ -120,19 +134,21 @@ static bool set_trigger(const struct control_bench *b, const struct control_valu
 {
     static const enum fault_arg of_events[] = {FAULT_COUNT, FAULT_SINCE, FAULT_UNIT, FAULT_DELAY_S};
     int after, since;
-    if (!find_event(&v[FAULT_AFTER], "after", &after, why) || !find_event(&v[FAULT_SINCE], "since", &since, why)) {
-        return false;
-    }
-    for (unsigned i = 0; after == FAULT_NO_EVENT && i < sizeof of_events / sizeof *of_events; i++) {
+    f->trigger.after = FAULT_NO_EVENT;
+    f->unit = v[FAULT_UNIT].given ? v[FAULT_UNIT].unit : f->point.unit;
+    for (unsigned i = 0; !v[FAULT_AFTER].given && i < sizeof of_events / sizeof *of_events; i++) {
         const char *name = fault_arg_name(of_events[i]);
         if (v[of_events[i]].given)
             return control_refuse_in(why, "argument", "%s: only with after, an event's name", name);
     }
-    if (after != FAULT_NO_EVENT && after == since) return control_refuse_in(why, "range", "since: is after itself");
+    if (!v[FAULT_AFTER].given) return true;
+    if (!v[FAULT_UNIT].given && !has_unit(f->point.place) && b->units != 1)
+        return control_refuse_in(why, "argument", "unit is missing: whose events count");
+    if (!find_event(b, f->unit, &v[FAULT_AFTER], "after", &after, why)) return false;
+    if (!find_event(b, f->unit, &v[FAULT_SINCE], "since", &since, why)) return false;
+    if (after == since) return control_refuse_in(why, "range", "since: is after itself");
     f->trigger = fault_trigger(after, since, v[FAULT_COUNT].given ? (unsigned)v[FAULT_COUNT].count : 1);
-    f->unit = v[FAULT_UNIT].given ? v[FAULT_UNIT].unit : f->point.unit;
-    if (after == FAULT_NO_EVENT || v[FAULT_UNIT].given || has_unit(f->point.place) || b->units == 1) return true;
-    return control_refuse_in(why, "argument", "unit is missing: whose events count");
+    return true;
 }
 
 bool fault_make(const struct control_bench *b, const struct control_value *v, struct fault *out,

@@ -5,11 +5,10 @@
 
 _Static_assert(LINE_FAULTS_MAX >= FAULTS_MAX, "each fault of a line that was accepted has room on its board");
 
-static struct line_faults *lines(struct fault *f)
+static struct line_faults *lines(const struct fault *f)
 {
-    struct line_faults *l = &f->engine->lines[f->point.unit];
-    if (!l->trace) line_faults_init(l, unit_trace(fault_unit(f)));
-    return l;
+    const struct unit *u = fault_unit(f);
+    return u->type->line(u->board);
 }
 
 static bool apply_line(struct fault *f, int64_t t_ns)
@@ -23,7 +22,7 @@ static bool apply_line(struct fault *f, int64_t t_ns)
                                     .until_ns = lasts && f->for_ns > 0 ? t_ns + f->for_ns : INT64_MAX,
                                     .width_ns = (int64_t)f->value[FAULT_WIDTH_NS],
                                     .pulse = (unsigned)f->value[FAULT_PULSE],
-                                    .frame_line = PSA2_LINE_INT,
+                                    .frame_line = fault_unit(f)->type->frame_line,
                                     .rate_hz = f->value[FAULT_RATE_HZ],
                                     .rng = f->random};
     f->as.line = line_fault_add(lines(f), &what);
@@ -35,14 +34,15 @@ static void lift_line(struct fault *f, int64_t t_ns)
     line_fault_end(lines(f), f->as.line, t_ns);
 }
 
-/* Only CLK has pulses with a place in the frame. */
+/* Only one line has pulses with a place in the frame. */
 static bool has_pulse(const struct control_bench *b, const struct fault *f, char *why)
 {
     const struct unit *u = b->unit[f->point.unit];
-    const unsigned pulses = u ? PSA2_WORDS * ((const struct psa2 *)u->board)->profile.word_bits : PSA2_WORDS * 32u;
-    if (f->point.index != PSA2_LINE_CLK) {
-        snprintf(why, CONTROL_WHY_MAX, "%s: %s carries no pulses that are counted in a frame; the line CLK does",
-                 f->kind->name, f->name);
+    const struct board_type *t = u->type;
+    const unsigned pulses = t->pulses ? t->pulses(u->board) : 0;
+    if (pulses == 0 || f->point.index != t->pulse_line) {
+        snprintf(why, CONTROL_WHY_MAX, "%s: %s carries no pulses that are counted in a frame; %s%s does", f->kind->name,
+                 f->name, pulses ? "the line " : "no line of a ", pulses ? t->lines[t->pulse_line].name : t->title);
         return false;
     }
     if (f->value[FAULT_PULSE] <= pulses) return true;
@@ -60,9 +60,9 @@ static const struct fault_kind line[] = {
     {"line.glitch", "One pulse of width_ns, the other way round.", "a pulse of that width where none belongs",
      LINE(LINE_GLITCH), .need = FAULT_BIT(FAULT_WIDTH_NS), .once = true},
     {"line.missing_pulse", "The pulse of that number is missing in each frame.", "one clock less in a frame; its bits are shifted from there on",
-     LINE(LINE_MISSING_PULSE), .need = FAULT_BIT(FAULT_PULSE), .unless = "any line but CLK: no pulses that are counted in a frame; more pulses than a frame has", .fits = has_pulse},
+     LINE(LINE_MISSING_PULSE), .need = FAULT_BIT(FAULT_PULSE), .unless = "any line but the one whose pulses a frame counts (CLK, SCLK); more pulses than a frame has", .fits = has_pulse},
     {"line.extra_pulse", "A pulse of width_ns follows the pulse of that number in each frame.", "one clock more in a frame; its bits are shifted from there on",
-     LINE(LINE_EXTRA_PULSE), .need = FAULT_BIT(FAULT_PULSE) | FAULT_BIT(FAULT_WIDTH_NS), .unless = "any line but CLK: no pulses that are counted in a frame; more pulses than a frame has", .fits = has_pulse},
+     LINE(LINE_EXTRA_PULSE), .need = FAULT_BIT(FAULT_PULSE) | FAULT_BIT(FAULT_WIDTH_NS), .unless = "any line but the one whose pulses a frame counts (CLK, SCLK); more pulses than a frame has", .fits = has_pulse},
     {"line.noise", "Pulses of width_ns at random, rate_hz of them a second.", "pulses of that width at no place of the protocol",
      LINE(LINE_NOISE), .need = FAULT_BIT(FAULT_RATE_HZ) | FAULT_BIT(FAULT_WIDTH_NS)},
 };

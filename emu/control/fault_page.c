@@ -1,5 +1,7 @@
-/* The page of faults: kinds with what they take, and the matrix of kinds and places. */
+/* The page of faults: kinds with what they take, the matrix of kinds and places, and what each type of board has. */
 #include "control/fault_parts.h"
+
+#include "board/boards.h"
 
 #include <stdarg.h>
 #include <stdio.h>
@@ -47,7 +49,7 @@ bool fault_markdown(unsigned line, char *out, size_t cap)
 static void add_place(struct text *t, enum fault_place place)
 {
     add(t, " `");
-    for (const char *s = fault_place_name(place); *s; s++) add(t, *s == '|' ? "\\|" : "%c", *s);
+    for (const char *s = fault_place_any(place); *s; s++) add(t, *s == '|' ? "\\|" : "%c", *s);
     add(t, "` |");
 }
 
@@ -65,5 +67,58 @@ bool fault_markdown_matrix(unsigned line, char *out, size_t cap)
         else if (!(k->places & FAULT_BIT(i))) add(&t, " refused |");
         else add(&t, k->fits ? " seen, or refused (above) |" : " seen |");
     }
+    return true;
+}
+
+/* The n-th part with a fault point of any type of board. */
+static const struct board_part *part_at(unsigned n, const struct board_type **type)
+{
+    for (const struct board_type *const *t = board_types; *t; t++) {
+        for (unsigned i = 0; i < (*t)->part_count; i++) {
+            *type = *t;
+            if ((*t)->parts[i].name && n-- == 0) return &(*t)->parts[i];
+        }
+    }
+    return NULL;
+}
+
+static bool has(const struct board_type *t, const struct board_part *p, const struct fault_kind *k)
+{
+    if (p == t->parts) return k->places & FAULT_BIT(FAULT_AT_CONTROLLER) && t->wrongs & k->variant;
+    if (!(k->places & FAULT_BIT(FAULT_AT_CHIP))) return false;
+    return k->once ? p->registers > 0 : (p->faults & k->variant) != 0;
+}
+
+bool fault_markdown_boards(unsigned line, char *out, size_t cap)
+{
+    struct text t = {.out = out, .cap = cap};
+    const struct board_type *type;
+    const struct fault_kind *k;
+    if (line == 0) add(&t, "| board | point | kinds it has | why not the others |");
+    if (line == 1) add(&t, "|---|---|---|---|");
+    if (line < 2) return true;
+    const struct board_part *p = part_at(line - 2, &type);
+    if (!p) return false;
+    add(&t, "| %s | `UNIT.%s` |", type->title, p->name);
+    for (unsigned i = 0; (k = fault_kind(i)) != NULL; i++) {
+        if (has(type, p, k)) add(&t, " `%s`", k->name);
+    }
+    if (p->registers) add(&t, " (registers 0 to %u)", p->registers - 1);
+    add(&t, " | %s |", p->unless ? p->unless : "");
+    return true;
+}
+
+bool fault_markdown_events(unsigned line, char *out, size_t cap)
+{
+    struct text t = {.out = out, .cap = cap};
+    if (line == 0) add(&t, "| board | events |");
+    if (line == 1) add(&t, "|---|---|");
+    if (line < 2) return true;
+    const struct board_type *const *type = board_types;
+    for (unsigned left = line - 2; *type && left > 0; left--) type++;
+    if (!*type) return false;
+    add(&t, "| %s |", (*type)->title);
+    for (unsigned i = 0; i < (*type)->event_count; i++) add(&t, "%s `%s`", i ? "," : "", (*type)->events[i]);
+    add(&t, " |");
     return true;
 }

@@ -7,7 +7,8 @@
 #define FAULT_BIT(i)  (UINT64_C(1) << (i))
 #define FAULT_PPM_MAX 500000.0 /* of a chip's clock */
 
-/* What is less changes no code: one is 10 V / 2^23 = 1.19 uV at the load, or more by the tolerances of the chain. */
+/* What is less changes no code of any board: one of PSA-2 is 10 V / 2^23 = 1.19 uV at the load, or more by the tolerances of
+ * the chain. Boards of coarser codes want more: board_type.code_v. */
 #define FAULT_LEAST_V   2e-6
 #define FAULT_LEAST_PPM 1.0
 

@@ -24,18 +24,50 @@ static double signal_per_v(const struct unit *u, unsigned axis)
 static bool has_sensor(const struct control_bench *b, const struct fault *f, char *why)
 {
     const struct unit *u = b->unit[f->point.unit];
-    if (!u || u->cfg.axis[f->point.index].sensor != UNIT_NO_SENSOR) return true;
+    if (u->cfg.axis[f->point.index].sensor != UNIT_NO_SENSOR) return true;
     snprintf(why, CONTROL_WHY_MAX, "%s: the channel has no sensor", f->name);
     return false;
 }
 
-/* The channel's converter takes no more, whatever the buffer's limit is. */
-#define CONVERTER_V 10.0 /* full scale, at the load */
+static double range_v(const struct board_type *t)
+{
+    return t->range_v > 0.0 ? t->range_v : 10.0;
+}
+
+/* What a board tells apart: less is refused. */
+static double least_v(const struct unit *u)
+{
+    return u->type->code_v ? fmax(FAULT_LEAST_V, u->type->code_v(u->board)) : FAULT_LEAST_V;
+}
+
+static double least_ppm(const struct unit *u)
+{
+    return u->type->code_v ? fmax(FAULT_LEAST_PPM, least_v(u) / range_v(u->type) * 1e6) : FAULT_LEAST_PPM;
+}
+
+static bool at_least(const struct fault *f, enum fault_arg arg, double least, const char *unit, char *why)
+{
+    if (fabs(f->value[arg]) >= least) return true;
+    snprintf(why, CONTROL_WHY_MAX, "%s: %.10g: a code of this board is %.4g %s, nobody would see less",
+             fault_arg_name(arg), f->value[arg], least, unit);
+    return false;
+}
+
+static bool seen_volts(const struct control_bench *b, const struct fault *f, char *why)
+{
+    const enum fault_arg arg = fault_given(f, FAULT_BIAS_V) ? FAULT_BIAS_V : FAULT_RMS_V;
+    return has_sensor(b, f, why) && at_least(f, arg, least_v(b->unit[f->point.unit]), "V", why);
+}
+
+static bool seen_scale(const struct control_bench *b, const struct fault *f, char *why)
+{
+    return has_sensor(b, f, why) && at_least(f, FAULT_SCALE_PPM, least_ppm(b->unit[f->point.unit]), "ppm", why);
+}
 
 static bool passes(const struct control_bench *b, const struct fault *f, enum fault_arg limit, char *why)
 {
     const struct unit *u = b->unit[f->point.unit];
-    const double most_v = u ? fmin(u->cfg.board.afe[f->point.index].clip_v, CONVERTER_V) : CONVERTER_V;
+    const double most_v = fmin(u->cfg.board.afe[f->point.index].clip_v, range_v(u->type)); /* buffer, converter */
     if (!fault_given(f, limit) || fabs(f->value[limit]) < most_v) return true;
     snprintf(why, CONTROL_WHY_MAX, "%s: %.10g: the chain passes %.10g ... %.10g V, nobody would see this limit",
              fault_arg_name(limit), f->value[limit], -most_v, most_v);
@@ -45,11 +77,12 @@ static bool passes(const struct control_bench *b, const struct fault *f, enum fa
 /* What has grown to next to nothing when it ends was never seen. */
 static bool grows(const struct control_bench *b, const struct fault *f, char *why)
 {
+    const double least = least_v(b->unit[f->point.unit]);
     const double end_v = fabs(f->value[FAULT_DRIFT_V_PER_S]) * (double)f->for_ns / (double)NS_PER_S;
     if (!has_sensor(b, f, why)) return false;
-    if (f->for_ns == 0 || end_v >= FAULT_LEAST_V) return true;
-    snprintf(why, CONTROL_WHY_MAX, "drift_v_per_s: %.10g: in %.10g s it comes to %.10g V, less than %.10g V, a code",
-             f->value[FAULT_DRIFT_V_PER_S], f->value[FAULT_FOR_S], end_v, FAULT_LEAST_V);
+    if (f->for_ns == 0 || end_v >= least) return true;
+    snprintf(why, CONTROL_WHY_MAX, "drift_v_per_s: %.10g: in %.10g s it comes to %.10g V, less than %.4g V, a code",
+             f->value[FAULT_DRIFT_V_PER_S], f->value[FAULT_FOR_S], end_v, least);
     return false;
 }
 
@@ -117,13 +150,13 @@ static const struct fault_kind sensor[] = {
     {"sensor.stuck", "The output stays at out_v, or at what it is at that instant.", "the codes of the axis stand still but for the converter's noise, whatever the head does",
      SENSOR(SENSOR_STUCK), .may = FAULT_BIT(FAULT_OUT_V), .unless = "the channel has no sensor", .fits = has_sensor},
     {"sensor.bias", "bias_v is added to the output.", "the codes of the axis step and stay there",
-     SENSOR(SENSOR_BIAS), .need = FAULT_BIT(FAULT_BIAS_V), .nonzero = FAULT_BIT(FAULT_BIAS_V), .unless = "the channel has no sensor", .fits = has_sensor},
+     SENSOR(SENSOR_BIAS), .need = FAULT_BIT(FAULT_BIAS_V), .nonzero = FAULT_BIT(FAULT_BIAS_V), .unless = "the channel has no sensor; it is less than a code of the board", .fits = seen_volts},
     {"sensor.drift", "The output runs away.", "the codes of the axis have a slope",
-     SENSOR(SENSOR_DRIFT), .need = FAULT_BIT(FAULT_DRIFT_V_PER_S), .nonzero = FAULT_BIT(FAULT_DRIFT_V_PER_S), .unless = "the channel has no sensor; it ends before it has come to 2 uV", .fits = grows},
+     SENSOR(SENSOR_DRIFT), .need = FAULT_BIT(FAULT_DRIFT_V_PER_S), .nonzero = FAULT_BIT(FAULT_DRIFT_V_PER_S), .unless = "the channel has no sensor; it ends before it has come to a code", .fits = grows},
     {"sensor.scale", "The deviation of the output from its zero is wrong by scale_ppm.", "the codes of the axis are wrong in proportion to what the axis feels",
-     SENSOR(SENSOR_SCALE), .need = FAULT_BIT(FAULT_SCALE_PPM), .nonzero = FAULT_BIT(FAULT_SCALE_PPM), .unless = "the channel has no sensor", .fits = has_sensor},
+     SENSOR(SENSOR_SCALE), .need = FAULT_BIT(FAULT_SCALE_PPM), .nonzero = FAULT_BIT(FAULT_SCALE_PPM), .unless = "the channel has no sensor; it is less than a code of the board", .fits = seen_scale},
     {"sensor.noise", "White noise is added; it gives a settled reading at 1000 SPS the rms rms_v.", "the codes of the axis scatter more",
-     SENSOR(SENSOR_NOISE), .need = FAULT_BIT(FAULT_RMS_V), .unless = "the channel has no sensor", .fits = has_sensor},
+     SENSOR(SENSOR_NOISE), .need = FAULT_BIT(FAULT_RMS_V), .unless = "the channel has no sensor; it is less than a code of the board", .fits = seen_volts},
     {"sensor.saturation", "The output does not leave low_v ... high_v.", "the codes of the axis stop at a limit that is not the converter's",
      SENSOR(SENSOR_SATURATION), .may = FAULT_BIT(FAULT_LOW_V) | FAULT_BIT(FAULT_HIGH_V), .unless = "the channel has no sensor; low_v is not below high_v; a limit is beyond what the chain passes", .fits = has_limits},
 };
@@ -135,24 +168,30 @@ const struct fault_table fault_sensor = {sensor, sizeof sensor / sizeof *sensor}
 static bool has_load(const struct control_bench *b, const struct fault *f, char *why)
 {
     const struct unit *u = b->unit[f->point.unit];
-    if (!u || u->cfg.board.afe[f->point.index].input == AFE_CURRENT) return true;
+    if (u->cfg.board.afe[f->point.index].input == AFE_CURRENT) return true;
     snprintf(why, CONTROL_WHY_MAX, "%s: no load resistor in the chain of a sensor with voltage output", f->name);
     return false;
 }
 
 static bool has_error(const struct control_bench *b, const struct fault *f, char *why)
 {
-    (void)b;
+    const double least = least_ppm(b->unit[f->point.unit]);
     const double grown_ppm = f->value[FAULT_DRIFT_PPM_PER_S] * (double)f->for_ns / (double)NS_PER_S;
-    if (f->value[FAULT_REFERENCE_PPM] != 0.0) return true;
-    if (f->value[FAULT_DRIFT_PPM_PER_S] == 0.0) {
+    const bool drifts = f->value[FAULT_DRIFT_PPM_PER_S] != 0.0;
+    if (f->value[FAULT_REFERENCE_PPM] == 0.0 && !drifts) {
         snprintf(why, CONTROL_WHY_MAX, "reference_ppm or drift_ppm_per_s is missing, or reference_ppm is 0");
         return false;
     }
-    if (f->for_ns == 0 || grown_ppm >= FAULT_LEAST_PPM) return true;
-    snprintf(why, CONTROL_WHY_MAX, "drift_ppm_per_s: %.10g: in %.10g s it comes to %.10g ppm, less than %.10g ppm",
-             f->value[FAULT_DRIFT_PPM_PER_S], f->value[FAULT_FOR_S], grown_ppm, FAULT_LEAST_PPM);
+    if (!drifts) return at_least(f, FAULT_REFERENCE_PPM, least, "ppm", why);
+    if (f->value[FAULT_REFERENCE_PPM] != 0.0 || f->for_ns == 0 || grown_ppm >= least) return true;
+    snprintf(why, CONTROL_WHY_MAX, "drift_ppm_per_s: %.10g: in %.10g s it comes to %.10g ppm, less than %.4g ppm",
+             f->value[FAULT_DRIFT_PPM_PER_S], f->value[FAULT_FOR_S], grown_ppm, least);
     return false;
+}
+
+static bool ripples(const struct control_bench *b, const struct fault *f, char *why)
+{
+    return at_least(f, FAULT_AMPLITUDE_V, least_v(b->unit[f->point.unit]), "V", why);
 }
 
 static bool apply_afe(struct fault *f, int64_t t_ns)
@@ -182,9 +221,9 @@ static const struct fault_kind analog[] = {
     {"analog.load_short", "The load resistor of a current-output sensor is shorted: no volts.", "the codes of the axis stand near 0, whatever the head does",
      CHAIN(AFE_LOAD_SHORT), .unless = "the sensor has voltage output: no load resistor", .fits = has_load},
     {"analog.reference", "The converter's reference is wrong by reference_ppm and runs away by drift_ppm_per_s.", "the codes of the axis are too small in proportion, offset and all",
-     CHAIN(AFE_REFERENCE), .may = FAULT_BIT(FAULT_REFERENCE_PPM) | FAULT_BIT(FAULT_DRIFT_PPM_PER_S), .unless = "neither is given; a drift ends before it has come to 1 ppm", .fits = has_error},
+     CHAIN(AFE_REFERENCE), .may = FAULT_BIT(FAULT_REFERENCE_PPM) | FAULT_BIT(FAULT_DRIFT_PPM_PER_S), .unless = "neither is given; the error is less than a code of the board, or a drift ends before it has come to one", .fits = has_error},
     {"analog.ripple", "A sine of the supply comes through the buffer, amplitude at the load.", "the codes of the axis carry a line at frequency_hz",
-     CHAIN(AFE_RIPPLE), .need = FAULT_BIT(FAULT_AMPLITUDE_V) | FAULT_BIT(FAULT_FREQUENCY_HZ)},
+     CHAIN(AFE_RIPPLE), .need = FAULT_BIT(FAULT_AMPLITUDE_V) | FAULT_BIT(FAULT_FREQUENCY_HZ), .unless = "it is less than a code of the board", .fits = ripples},
 };
 // clang-format on
 const struct fault_table fault_analog = {analog, sizeof analog / sizeof *analog};

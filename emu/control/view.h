@@ -21,6 +21,7 @@ struct control_client {
 /* Lateness of the wall pace. */
 struct control_pace {
     const char *name; /* wall, step, free */
+    bool by_step;     /* time moves only when told */
     uint64_t turns, late, slips;
     double p50_us, p99_us, p999_us, max_us; /* of events */
     uint64_t frames;
@@ -58,6 +59,7 @@ struct control_bench {
     void (*quit)(void *ctx);
     /* A line for a client of the control socket that is no reply. NULL: there are no subscriptions. */
     void (*push)(void *ctx, void *client, const char *line);
+    void (*reply)(void *ctx, void *client, const char *line); /* one that is due, at any time but from control_line() */
     /* Save the bench, double it. False with a sentence in why. NULL: it cannot. */
     bool (*snapshot)(void *ctx, const char *path, struct cJSON *result, char *why);
     bool (*fork)(void *ctx, const struct control_fork *f, struct cJSON *result, char *why);

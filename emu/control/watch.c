@@ -6,10 +6,6 @@
 
 #include <string.h>
 
-const char *const control_events[] = {"RES",      "SETUP_DONE", "SYNC_A",     "SYNC_T",   "DRD_A", "DRD_T",
-                                      "INT_FALL", "INT_RISE",   "POWER_DOWN", "POWER_UP", NULL};
-_Static_assert(sizeof control_events / sizeof *control_events == PSA2_EVENTS + 1, "one name for each event");
-
 const char *const control_topics[] = {"status", "events", "faults", NULL};
 _Static_assert(sizeof control_topics / sizeof *control_topics == CONTROL_TOPICS + 1, "one name for each topic");
 
@@ -63,7 +59,7 @@ static void on_event(void *ctx, unsigned e, int64_t t_ns)
     struct control_until *u = &c->watch.until;
     if (anybody(c, CONTROL_EVENTS)) {
         cJSON *event = cJSON_CreateObject();
-        cJSON_AddStringToObject(event, "event", control_events[e]);
+        cJSON_AddStringToObject(event, "event", c->bench->unit[ear->unit]->type->events[e]);
         cJSON_AddStringToObject(event, "unit", c->bench->unit_name[ear->unit]);
         cJSON_AddNumberToObject(event, "t_ns", (double)t_ns);
         control_tell(c, CONTROL_EVENTS, event);
@@ -91,7 +87,7 @@ static void refresh_ears(struct control *c)
     }
 }
 
-void control_watch_until(struct control *c, enum psa2_event event, unsigned unit, uint64_t count)
+void control_watch_until(struct control *c, unsigned event, unsigned unit, uint64_t count)
 {
     c->watch.until = (struct control_until){.active = true, .event = event, .unit = unit, .count = count};
     refresh_ears(c);
@@ -173,7 +169,7 @@ uint64_t control_lines(struct control *c, unsigned unit, int64_t t_ns)
     struct control_watch *w = &c->watch;
     if (!w->probing[unit]) {
         w->probing[unit] = true;
-        w->probe[unit] = (struct trace_sink){.mask = TRACE_FIRST(PSA2_LINES), .steps = ignore_steps};
+        w->probe[unit] = (struct trace_sink){.mask = TRACE_FIRST(t->count), .steps = ignore_steps};
         trace_attach(t, &w->probe[unit]);
     }
     if (t->filter) return t->filter->level; /* a faulty line is known as far as it was delivered: TRACE_LAG_NS ago */

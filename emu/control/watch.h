@@ -15,9 +15,6 @@
 
 struct control;
 
-/* The names of the boards' events, in the order of enum psa2_event, up to NULL. */
-extern const char *const control_events[];
-
 enum control_topic { CONTROL_STATUS, CONTROL_EVENTS, CONTROL_FAULTS, CONTROL_TOPICS };
 
 extern const char *const control_topics[]; /* their names, up to NULL */
@@ -38,8 +35,7 @@ struct control_ear {
 
 struct control_until {
     bool active, reached;
-    enum psa2_event event;
-    unsigned unit;
+    unsigned event, unit; /* event: number in the list of the unit's board */
     uint64_t count, seen;
 };
 
@@ -53,7 +49,7 @@ struct control_watch { /* read-only outside watch.c */
 };
 
 /* run.until: the bench's run_stop() is called at the very instant of the count-th event from now on. */
-void control_watch_until(struct control *c, enum psa2_event event, unsigned unit, uint64_t count);
+void control_watch_until(struct control *c, unsigned event, unsigned unit, uint64_t count);
 
 /* The run is over: what came, and nobody waits any more. */
 struct control_until control_watch_end(struct control *c);

@@ -3,6 +3,7 @@
 
 #include "app/bench.h"
 #include "control/control.h"
+#include "control/events.h"
 
 #include <string.h>
 
@@ -279,15 +280,35 @@ static void run_until_ends_at_the_very_event(void **state)
     asked.refuse = true;
     assert_says("{\"cmd\":\"run.until\",\"args\":{\"event\":\"RES\"}}", "not now");
     assert_null(bench->unit[0].listeners);
-    assert_says("{\"cmd\":\"run.until\",\"args\":{\"event\":\"FLY\"}}", "is none of RES, SETUP_DONE, SYNC_A");
+    assert_says("{\"cmd\":\"run.until\",\"args\":{\"event\":\"FLY\"}}",
+                "event: no event \\\"FLY\\\" on a, a PSA-2; there is RES, SETUP_DONE, SYNC_A");
 }
 
+static unsigned in_union(const char *name)
+{
+    unsigned times = 0;
+    const char *other;
+    for (unsigned i = 0; (other = control_event(i)); i++) times += strcmp(other, name) == 0;
+    return times;
+}
+
+/* Each name of each type of board, once. */
 static void names_of_events_are_the_boards_own(void **state)
 {
     (void)state;
-    for (int e = 0; e < PSA2_EVENTS; e++) {
-        assert_string_equal(control_events[e], psa2_event_name((enum psa2_event)e));
+    unsigned names = 0;
+    for (const struct board_type *const *t = board_types; *t; t++) {
+        for (unsigned e = 0; e < (*t)->event_count; e++) assert_int_equal(in_union((*t)->events[e]), 1);
+        names += (*t)->event_count;
     }
+    unsigned all = 0;
+    while (control_event(all)) all++;
+    assert_true(all > 0 && all <= names);
+    char list[4096];
+    for (unsigned line = 0; control_markdown(control_tables, line, list, sizeof list); line++) {
+        if (strstr(list, "`run.until`")) break;
+    }
+    for (unsigned i = 0; i < all; i++) assert_non_null(strstr(list, control_event(i)));
 }
 
 static void subscribers_are_told_of_events_and_status(void **state)
@@ -448,7 +469,7 @@ static void counters_frames_and_units_tell_what_they_promise(void **state)
     assert_says("{\"cmd\":\"counters\"}", "\"pace\":{\"name\":\"step\",\"turns\":9");
     assert_says("{\"cmd\":\"counters\"}", "\"bitrate_hz\":1000000");
     assert_says("{\"cmd\":\"units\"}",
-                "{\"name\":\"a\",\"serial\":17,\"node\":5,\"profile\":\"article\",\"ready\":false}");
+                "{\"name\":\"a\",\"board\":\"psa2\",\"serial\":17,\"node\":5,\"profile\":\"article\",\"ready\":false}");
     assert_says("{\"cmd\":\"quit\"}", "\"ok\":true");
     assert_int_equal(asked.quits, 1);
 }

@@ -1,0 +1,220 @@
+/* A board that is none of the real ones, for what the commands and faults do with any board's table: three chips in two
+ * groups, a controller that can freeze, two lines, events TICK and TOCK, a bus with four addresses. */
+#ifndef PSABENCH_TESTS_FAKE_BOARD_H
+#define PSABENCH_TESTS_FAKE_BOARD_H
+
+#include "board/unit.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#define FAKE_STROBE_NS 800 /* where the host gives none; half of it is too short */
+#define FAKE_PULSES    8u
+#define FAKE_CODE_V    1e-3
+
+enum { FAKE_CTL, FAKE_CONV_A, FAKE_CONV_B, FAKE_ROM, FAKE_PARTS };
+
+struct fake_chip {
+    uint32_t conversions, lost;
+    struct board_chip_fault fault;
+    unsigned flipped;
+};
+
+struct fake_board {
+    struct sched *sched;
+    struct trace trace;
+    struct line_faults line;
+    struct afe afe[BOARD_AXES];
+    bool on, listened;
+    uint32_t cycles, wrongs, resets;
+    int64_t sampled_ns;
+    struct fake_chip chip[FAKE_PARTS - 1];
+    struct board_cycle *cycle;
+    uint16_t word[4];
+    bool waits; /* a word, at address 0 */
+    struct sched_ev end;
+};
+
+static void fake_end(void *ctx, int64_t t_ns)
+{
+    struct fake_board *b = ctx;
+    struct board_cycle *c = b->cycle;
+    b->cycle = NULL;
+    if (c->write) b->word[c->address] = c->data;
+    else c->data = b->word[c->address];
+    c->done(c->ctx, c, c->address == 0 && !b->waits ? BOARD_CYCLE_NOT_READY : BOARD_CYCLE_OK, t_ns);
+}
+
+/* 0: read alone, not before its word waits; 1: written alone; 2: both, but not 13; 3: both. */
+static enum board_cycle_result fake_submit(void *board, struct board_cycle *c, int64_t t_ns)
+{
+    struct fake_board *b = board;
+    const int64_t strobe_ns = c->strobe_ns ? c->strobe_ns : FAKE_STROBE_NS;
+    b->cycles++;
+    if (!b->on) return BOARD_CYCLE_OFF;
+    if (b->cycle) return BOARD_CYCLE_BUSY;
+    if (c->address > 3) return BOARD_CYCLE_NO_ADDRESS;
+    if (strobe_ns <= FAKE_STROBE_NS / 2) return BOARD_CYCLE_TOO_SHORT;
+    if (c->write && c->address == 0) return BOARD_CYCLE_READ_ONLY;
+    if (!c->write && c->address == 1) return BOARD_CYCLE_WRITE_ONLY;
+    if (c->write && c->address == 2 && c->data == 13) return BOARD_CYCLE_BAD_VALUE;
+    b->cycle = c;
+    sched_at(b->sched, &b->end, t_ns + strobe_ns);
+    return BOARD_CYCLE_OK;
+}
+
+static const char *fake_name(unsigned address)
+{
+    static const char *const name[] = {"word", "command", "level", NULL};
+    return address < 4 ? name[address] : NULL;
+}
+
+static void fake_reset(void *board, int64_t t_ns)
+{
+    struct fake_board *b = board;
+    struct board_cycle *c = b->cycle;
+    b->resets++;
+    b->cycle = NULL;
+    sched_cancel(b->sched, &b->end);
+    if (c) c->done(c->ctx, c, BOARD_CYCLE_OFF, t_ns);
+}
+
+static bool fake_ready(const void *board)
+{
+    return ((const struct fake_board *)board)->on;
+}
+
+static void fake_sample(void *board, int64_t t_ns)
+{
+    ((struct fake_board *)board)->sampled_ns = t_ns;
+}
+
+static void fake_wrong(void *board, uint32_t wrongs)
+{
+    ((struct fake_board *)board)->wrongs = wrongs;
+}
+
+static void fake_listen(void *board, bool on)
+{
+    ((struct fake_board *)board)->listened = on;
+}
+
+static struct trace *fake_trace(void *board)
+{
+    return &((struct fake_board *)board)->trace;
+}
+
+static struct line_faults *fake_line(void *board)
+{
+    return &((struct fake_board *)board)->line;
+}
+
+static struct afe *fake_afe(void *board, unsigned axis)
+{
+    return &((struct fake_board *)board)->afe[axis];
+}
+
+static void fake_truth(const void *board, board_truth_fn *put, void *ctx)
+{
+    (void)board;
+    put(ctx, "capacitor_error_ppm", 250.0);
+}
+
+static void fake_chip_fault(void *board, unsigned part, const struct board_chip_fault *f, int64_t t_ns)
+{
+    (void)t_ns;
+    ((struct fake_board *)board)->chip[part - 1].fault = *f;
+}
+
+static bool fake_flip(void *board, unsigned part, unsigned reg, uint8_t mask, int64_t t_ns)
+{
+    struct fake_board *b = board;
+    (void)t_ns;
+    if (b->on) b->chip[part - 1].flipped = 256 * reg + mask;
+    return b->on;
+}
+
+static unsigned fake_pulses(const void *board)
+{
+    (void)board;
+    return FAKE_PULSES;
+}
+
+static double fake_code_v(const void *board)
+{
+    (void)board;
+    return FAKE_CODE_V;
+}
+
+static const struct board_line fake_lines[] = {{"BEAT", true}, {"CK", false}};
+static const char *const fake_events[] = {"TICK", "TOCK"};
+static const struct board_counter fake_ctl_counters[] = {{"cycles", offsetof(struct fake_board, cycles)}};
+static const struct board_counter fake_chip_counters[] = {{"conversions", offsetof(struct fake_chip, conversions)},
+                                                          {"lost", offsetof(struct fake_chip, lost)}};
+#define FAKE_CHIP(nr)                                                                                                  \
+    .offset = offsetof(struct fake_board, chip) + (nr) * sizeof(struct fake_chip), .counters = fake_chip_counters,     \
+    .counter_count = 2
+static const struct board_part fake_parts[FAKE_PARTS] = {
+    [FAKE_CTL] = {.name = "ctl", .label = "board", .counters = fake_ctl_counters, .counter_count = 1},
+    [FAKE_CONV_A] = {.name = "conv.a",
+                     .label = "conv_a",
+                     FAKE_CHIP(0),
+                     .faults = BOARD_FAULT_DRDY | BOARD_FAULT_DOUT | BOARD_FAULT_CLOCK,
+                     .unless = "it runs on its own",
+                     .registers = 3,
+                     .fault = fake_chip_fault,
+                     .flip = fake_flip},
+    [FAKE_CONV_B] =
+        {.name = "conv.b", .label = "conv_b", FAKE_CHIP(1), .faults = BOARD_FAULT_DOUT, .fault = fake_chip_fault},
+    [FAKE_ROM] = {.name = "rom", .label = "memory", FAKE_CHIP(2)},
+};
+static const struct board_bus fake_bus = {.submit = fake_submit, .addresses = 4, .name = fake_name};
+
+static const struct board_type fake_type = {
+    .name = "fake",
+    .title = "FAKE-1",
+    .size = sizeof(struct fake_board),
+    .lines = fake_lines,
+    .line_count = 2,
+    .frame_line = 0,
+    .pulse_line = 1,
+    .pulses = fake_pulses,
+    .code_v = fake_code_v,
+    .range_v = 5.0,
+    .events = fake_events,
+    .event_count = 2,
+    .parts = fake_parts,
+    .part_count = FAKE_PARTS,
+    .wrongs = BOARD_WRONG_FROZEN_WORDS,
+    .bus = &fake_bus,
+    .reset = fake_reset,
+    .ready = fake_ready,
+    .sample_until = fake_sample,
+    .wrong = fake_wrong,
+    .listen = fake_listen,
+    .trace = fake_trace,
+    .line = fake_line,
+    .afe = fake_afe,
+    .truth = fake_truth,
+};
+
+/* A unit around it; what the commands ask of a unit. Not to be moved. */
+static inline void fake_unit(struct unit *u, struct fake_board *b, const char *name, struct lab *lab, struct sched *s)
+{
+    memset(b, 0, sizeof *b);
+    b->sched = s;
+    b->on = true;
+    sched_ev(&b->end, fake_end, b);
+    trace_init(&b->trace);
+    for (unsigned i = 0; i < fake_type.line_count; i++) trace_add(&b->trace, fake_lines[i].name, fake_lines[i].level);
+    line_faults_init(&b->line, &b->trace);
+    u->cfg = unit_default(name);
+    u->cfg.type = &fake_type;
+    for (unsigned i = 0; i < UNIT_AXES; i++) u->cfg.axis[i].sensor = UNIT_MEMS;
+    u->lab = lab;
+    u->type = &fake_type;
+    u->board = b;
+    snprintf(u->profile, sizeof u->profile, "usual");
+}
+
+#endif
