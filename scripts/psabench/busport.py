@@ -5,7 +5,7 @@
         port.read(3).data          # a read cycle at address 3
         port.write(15, 0x0003)     # a write cycle
 
-Lines as docs/busport.md has them: `R 3` is answered by `R 03 8000 t=1234567`, what is refused by `E not-ready R 00 t=...`.
+Lines as docs/busport.md has them: `R 3` is answered by `R 3 8000 t=1234567`, or refused by `E not-ready R 3 t=...`.
 Answers come in the order of the lines, so that many can be on their way: `ask` and `answer`.
 """
 

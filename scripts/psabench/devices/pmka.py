@@ -11,4 +11,4 @@ class Pmka(BusUnit):
 
     board = "pmka"
     title = "PMKA"
-    layout = ReadingLayout(board="pmka", messages=("PMKA_CODES",))
+    layout = ReadingLayout(board="pmka", messages=("PMKA_CODES", "PMKA_STATE"), counter="SEQ")
