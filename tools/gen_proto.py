@@ -37,6 +37,7 @@ TYPES: dict[str, tuple[int, float, float]] = {
     "REAL32": (0x08, -3.4e38, 3.4e38),
     "VISIBLE_STRING": (0x09, 0, 64),
     "INTEGER24": (0x10, -(2**23), 2**23 - 1),
+    "UNSIGNED24": (0x16, 0, 2**24 - 1),
 }
 PDO_VALID_NO_RTR = 0x40000000
 PDO_INVALID_NO_RTR = 0xC0000000
