@@ -1,6 +1,7 @@
 """The protocol's files against their source and against the tools that read them."""
 
 import configparser
+import re
 import subprocess
 import sys
 from importlib import util
@@ -38,6 +39,10 @@ def load_database() -> cantools.database.can.Database:
 
 gen_proto = load_generator()
 PROTOCOL = gen_proto.load()
+PROTOCOLS = gen_proto.load_all()
+UNITS = PROTOCOLS[1:]
+EACH = pytest.mark.parametrize("protocol", PROTOCOLS, ids=lambda p: p.key)
+EACH_UNIT = pytest.mark.parametrize("protocol", UNITS, ids=lambda p: p.key)
 XY = load_database().get_message_by_name("PSA2_XY")
 
 
@@ -49,6 +54,14 @@ def db() -> cantools.database.can.Database:
 @pytest.fixture(scope="module")
 def od() -> Any:
     return canopen.import_od(str(EDS), PROTOCOL.device["node"])
+
+
+def eds(protocol: Any) -> Path:
+    return ROOT / f"proto/{protocol.key}.eds"
+
+
+def od_of(protocol: Any) -> Any:
+    return canopen.import_od(str(eds(protocol)), protocol.device["node"])
 
 
 def test_files_in_git_are_up_to_date() -> None:
@@ -64,7 +77,7 @@ def test_check_names_a_file_that_differs(tmp_path: Path, monkeypatch: pytest.Mon
 
 def test_c_tables_are_the_same_twice() -> None:
     """No date, no dictionary order: the same source gives the same bytes."""
-    assert gen_proto.c_files(PROTOCOL) == gen_proto.c_files(gen_proto.load())
+    assert gen_proto.c_files(PROTOCOLS) == gen_proto.c_files(gen_proto.load_all())
 
 
 def test_identifiers_of_node_5(db: cantools.database.can.Database) -> None:
@@ -73,20 +86,74 @@ def test_identifiers_of_node_5(db: cantools.database.can.Database) -> None:
         "NMT": 0x000, "SYNC": 0x080, "EMCY": 0x085, "PSA2_XY": 0x185, "PSA2_FRAME": 0x205, "PSA2_ZT": 0x285,
         "PSA2_FAST": 0x385, "PSA2_BLOCK": 0x485, "SDO_TX": 0x585, "SDO_RX": 0x605, "HEARTBEAT": 0x705,
     }  # fmt: skip
-    assert {m.name: m.frame_id for m in db.messages} == want
+    others = tuple(f"{p.nodes[0]}_" for p in UNITS)
+    mine = [m for m in db.messages if not m.name.startswith(others)]
+    assert {m.name: m.frame_id for m in mine} == want
     assert {m.name for m in db.messages if m.is_fd} == {"PSA2_FRAME", "PSA2_BLOCK"}
-    assert {m.name: m.length for m in db.messages if m.length != 8} == {
+    assert {m.name: m.length for m in mine if m.length != 8} == {
         "NMT": 2, "SYNC": 1, "HEARTBEAT": 1, "PSA2_FRAME": 16, "PSA2_BLOCK": 64,
     }  # fmt: skip
 
 
-def test_no_identifier_of_one_node_is_another_s() -> None:
+def test_devices_have_their_default_nodes() -> None:
+    """Sources can 3.3."""
+    assert {p.key: p.device["node"] for p in PROTOCOLS} == {"psa2": 5, "psd1": 6, "pmka": 7, "pik": 8}
+    assert len({p.device["product_code"] for p in PROTOCOLS}) == len(PROTOCOLS)
+
+
+@EACH_UNIT
+def test_services_of_a_unit_stand_where_the_predefined_connection_set_has_them(
+    protocol: Any, db: cantools.database.can.Database
+) -> None:
+    node, name = protocol.device["node"], protocol.nodes[0]
+    services = {"EMCY": (0x80, 8), "SDO_TX": (0x580, 8), "SDO_RX": (0x600, 8), "HEARTBEAT": (0x700, 1)}
+    for service, (base, length) in services.items():
+        m = db.get_message_by_name(f"{name}_{service}")
+        assert (m.frame_id, m.length) == (base + node, length)
+        assert m.senders == (["HOST"] if service == "SDO_RX" else [name])
+        assert {r for s in m.signals for r in s.receivers} == ({name} if service == "SDO_RX" else {"HOST"})
+        assert [s.name for s in m.signals] == [s.name for s in db.get_message_by_name(service).signals]
+
+
+def test_everybody_hears_network_management(db: cantools.database.can.Database) -> None:
+    for name in ("NMT", "SYNC"):
+        assert set(db.get_message_by_name(name).signals[0].receivers) == {p.nodes[0] for p in PROTOCOLS}
+
+
+@EACH
+def test_no_identifier_of_one_node_is_another_s(protocol: Any) -> None:
     """For any two nodes; a PSA-2 uses its own RPDO1 identifier, which a node without RPDOs leaves free."""
-    bases = [m.id - PROTOCOL.device["node"] for m in PROTOCOL.messages if m.node]
+    bases = [m.id - protocol.device["node"] for m in protocol.messages if m.node]
     used = [base + node for base in bases for node in range(1, 128)]
     assert len(used) == len(set(used))
     fixed = [m.id for m in PROTOCOL.messages if not m.node]
     assert not set(used) & set(fixed)
+
+
+@EACH_UNIT
+def test_every_message_of_a_unit_decodes_to_what_was_encoded(protocol: Any, db: cantools.database.can.Database) -> None:
+    """At both ends of each signal's range; no two signals share a bit."""
+    for source in protocol.messages:
+        m = db.get_message_by_name(source.name)
+        bits = [s.start + k for s in source.signals for k in range(s.bits)]
+        assert len(bits) == len(set(bits)), source.name
+        assert max(bits) < 8 * source.len
+        for end in (0, 1):
+            raw = {s.name: s.raw_range[end] for s in source.signals}
+            data = m.encode(raw, scaling=False)
+            assert m.decode(data, scaling=False, decode_choices=False) == raw
+            for s in source.signals:
+                assert m.decode(data, decode_choices=False)[s.name] == pytest.approx(raw[s.name] * s.scale)
+
+
+@EACH_UNIT
+def test_names_and_ids_of_a_unit_s_own_messages(protocol: Any) -> None:
+    tpdos = {t["message"]: t["cob"] for t in protocol.tpdos}
+    own = {m.name: m for m in protocol.messages if m.name in tpdos}
+    assert set(own) == set(tpdos)
+    for name, cob in tpdos.items():
+        assert name.startswith(f"{protocol.nodes[0]}_")
+        assert own[name].id == cob + protocol.device["node"]
 
 
 @given(st.integers(-(2**23), 2**23 - 1), st.integers(-(2**23), 2**23 - 1), st.integers(0, 65535))
@@ -102,7 +169,7 @@ def test_codes_survive_the_volts(x: int, y: int, seq: int) -> None:
 def test_scales_and_units(db: cantools.database.can.Database) -> None:
     for m in db.messages:
         for s in m.signals:
-            if s.name[0] in "XYZ" and m.name != "PSA2_FAST":
+            if m.name.startswith("PSA2_") and s.name[0] in "XYZ" and m.name != "PSA2_FAST":
                 assert (s.scale, s.unit) == (VOLT_PER_LSB, "V")
     fast = db.get_message_by_name("PSA2_FAST").get_signal_by_name("X")
     assert (fast.length, fast.scale, fast.is_signed) == (21, 8 * VOLT_PER_LSB, True)
@@ -119,14 +186,85 @@ def test_every_signal_and_message_is_explained(db: cantools.database.can.Databas
     assert [f"{m.name}.{s.name}" for m in db.messages for s in m.signals if not s.comment] == []
 
 
-def test_eds_has_every_entry_of_the_source(od: Any) -> None:
-    for o in PROTOCOL.objects:
+@EACH
+def test_eds_has_every_entry_of_the_source(protocol: Any) -> None:
+    od = od_of(protocol)
+    for o in protocol.objects:
         for e in o.entries:
             entry = od[o.index] if o.var else od[o.index][e.sub]
             assert entry.data_type == gen_proto.TYPES[e.type][0], hex(o.index)
             assert entry.access_type == e.access, hex(o.index)
             assert entry.pdo_mappable == e.map
-    assert set(od) == {o.index for o in PROTOCOL.objects}
+    assert set(od) == {o.index for o in protocol.objects}
+    assert od[0x1008].default == protocol.device["name"]
+
+
+@EACH_UNIT
+def test_a_unit_has_the_objects_of_every_unit(protocol: Any) -> None:
+    """As the host's classes use them, and with its counters at the end of 2030h."""
+    od = od_of(protocol)
+    assert {0x1001, 0x1008, 0x1018, 0x2002, 0x2030, 0x2031, 0x2040, 0x2051} <= set(od)
+    common = [v.name for sub, v in od[0x2030].items() if 0 < sub < 12]
+    assert common == [
+        "Readings", "Dropped", "Bus load", "Transmit errors", "Receive errors", "PDOs inhibited", "SYNCs",
+        "Requests refused", "Malformed requests", "Bus cycles", "Bus cycles refused",
+    ]  # fmt: skip
+    assert len(od[0x2030]) == 12 + len(protocol.counters)
+    assert od[0x2030][0].default == 11 + len(protocol.counters)
+    assert od[0x1014].default == 0x80 + protocol.device["node"]
+    names = [v.name for sub, v in od[0x2030].items() if sub]
+    assert len(set(names)) == len(names), "the host tells counters by name"
+
+
+@EACH_UNIT
+def test_the_bus_of_a_unit_has_its_registers_at_their_addresses(protocol: Any) -> None:
+    bus = od_of(protocol)[0x2002]
+    registers = {sub: v for sub, v in bus.items() if sub}
+    assert bus[0].default == max(registers) <= 16
+    assert all(v.data_type == gen_proto.TYPES["UNSIGNED16"][0] for v in registers.values())
+    assert len({v.name for v in registers.values()}) == len(registers)
+
+
+@EACH_UNIT
+def test_the_sdo_server_lets_every_cycle_through_to_the_board(protocol: Any) -> None:
+    """Who may do what is for the board to refuse: all 16 addresses, both ways."""
+    rows = re.findall(r"\{0x2002, (\d+), (\w+), (\w+)", gen_proto.od_source(protocol))
+    assert [(int(sub), kind, access) for sub, kind, access in rows] == [
+        (0, "CO_UNSIGNED8", "CO_CONST"), *((k, "CO_UNSIGNED16", "CO_RW") for k in range(1, 17)),
+    ]  # fmt: skip
+
+
+@EACH_UNIT
+def test_the_c_tables_of_a_unit_say_what_its_source_says(protocol: Any) -> None:
+    text = gen_proto.od_source(protocol)
+    assert f"counter[] = {{{', '.join(f'{chr(34)}{c}{chr(34)}' for c in protocol.counters)}}}" in text
+    off = sum(1 << k for k, t in enumerate(protocol.tpdos) if t.get("off"))
+    assert f".tpdo_off = {off}u," in text
+    assert f".counter_count = {len(protocol.counters)}," in text
+    assert ".counter_sub = 12," in text
+
+
+def test_an_optional_tpdo_is_off_in_the_eds() -> None:
+    on, off = ({"message": "M", "cob": 0x180, "off": o} for o in (False, True))
+    for t, cob in ((on, 0x40000180), (off, 0xC0000180)):
+        assert gen_proto.tpdo_objects([t], [])[0].entries[1].value == cob
+
+
+BUS_ROW = {"name": "X", "access": "ro"}
+
+
+@pytest.mark.parametrize(
+    "rows", [[{**BUS_ROW, "address": 16}], [BUS_ROW, {**BUS_ROW, "address": 0}], [{**BUS_ROW, "address": -1}]]
+)
+def test_an_address_that_the_bus_has_not_is_refused(rows: list[dict[str, Any]]) -> None:
+    with pytest.raises(ValueError, match="bus: X: address"):
+        gen_proto.bus_object(rows)
+
+
+def test_addresses_of_the_bus_may_leave_gaps() -> None:
+    o = gen_proto.bus_object([BUS_ROW, {**BUS_ROW, "name": "Y", "address": 5}, {"name": "Z"}])
+    assert [(e.sub, e.name, e.access) for e in o.entries[1:]] == [(1, "X", "ro"), (6, "Y", "ro"), (7, "Z", "rw")]
+    assert o.entries[0].value == 7
 
 
 def test_eds_values_that_name_the_node(od: Any) -> None:
@@ -138,22 +276,25 @@ def test_eds_values_that_name_the_node(od: Any) -> None:
     ]  # fmt: skip
 
 
-def test_eds_sections_are_complete() -> None:
+@EACH
+def test_eds_sections_are_complete(protocol: Any) -> None:
     """CiA 306-1: the three lists name every object once, and each object has its section."""
-    eds = configparser.ConfigParser(strict=True)
-    eds.optionxform = str  # type: ignore[assignment, method-assign]
-    eds.read(EDS)
+    sheet = configparser.ConfigParser(strict=True)
+    sheet.optionxform = str  # type: ignore[assignment, method-assign]
+    sheet.read(eds(protocol))
     listed = []
     for name in ("MandatoryObjects", "OptionalObjects", "ManufacturerObjects"):
-        section = eds[name]
+        section = sheet[name]
         listed += [int(section[str(k)], 16) for k in range(1, int(section["SupportedObjects"]) + 1)]
-    assert sorted(listed) == [o.index for o in PROTOCOL.objects]
-    assert all(eds.has_section(f"{index:X}") for index in listed)
+    assert sorted(listed) == [o.index for o in protocol.objects]
+    assert all(sheet.has_section(f"{index:X}") for index in listed)
 
 
-def test_mappings_lay_out_their_messages(od: Any, db: cantools.database.can.Database) -> None:
+@EACH
+def test_mappings_lay_out_their_messages(protocol: Any, db: cantools.database.can.Database) -> None:
     """Bits of 1A00h.. add up to the message, and stand where the DBC has its signals."""
-    for k, tpdo in enumerate(PROTOCOL.tpdos):
+    od = od_of(protocol)
+    for k, tpdo in enumerate(protocol.tpdos):
         entries = [od[0x1A00 + k][sub + 1].default for sub in range(od[0x1A00 + k][0].default)]
         message = db.get_message_by_name(tpdo["message"])
         if not entries:
@@ -177,20 +318,27 @@ def test_worst_case_of_the_page_is_that_of_the_facts(message: str, least_us: int
     assert round(nominal + data / 5) == worst_us
 
 
-def test_page_has_every_message_object_and_code() -> None:
-    page = (ROOT / "docs/protocol.md").read_text()
-    assert "<!-- messages -->" not in page
-    for m in PROTOCOL.messages:
+@EACH
+def test_page_has_every_message_object_and_code(protocol: Any) -> None:
+    page = (ROOT / "docs" / ("protocol.md" if protocol.key == "psa2" else f"protocol_{protocol.key}.md")).read_text()
+    for left in ("messages", "load", "objects", "emcy", "about"):
+        assert f"<!-- {left} -->" not in page
+    assert not re.search(r"\{(name|key|KEY|node)\}", page)
+    for m in protocol.messages:
         assert f"### {m.name}" in page
-    for o in PROTOCOL.objects:
+    for o in protocol.objects:
         assert f"| {o.index:04X}h |" in page
-    assert "108.0 % **refused**" in page
+    for e in protocol.emcy:
+        assert f"| {e['code']:04X}h |" in page
+    for e in (e for o in protocol.objects for e in o.entries if e.comment):
+        assert e.comment in page
+    assert ("108.0 % **refused**" in page) == (protocol.key == "psa2")
 
 
 def test_generated_c_compiles_without_a_warning(tmp_path: Path) -> None:
-    for name, text in gen_proto.c_files(PROTOCOL).items():
+    for name, text in gen_proto.c_files(PROTOCOLS).items():
         (tmp_path / "gen").mkdir(exist_ok=True)
         (tmp_path / "gen" / name).write_text(text)
     flags = "-std=c11 -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Werror -fsyntax-only".split()
-    for name in ("psabench_can.c", "psa2_od.c"):
+    for name in ("psabench_can.c", *(f"{p.key}_od.c" for p in PROTOCOLS)):
         subprocess.run(["cc", *flags, f"-I{ROOT}/emu", f"-I{tmp_path}", str(tmp_path / "gen" / name)], check=True)
