@@ -5,10 +5,10 @@
 #include <math.h>
 
 #define BURN_OUT_A 4.5e-6
-/* A source behind AIN charges this capacitor through this switch in half a sampling period: what the printed tables of
- * resistances without capacitor leave of 16 and of 20 bits at gain 1 (sources 3.6). */
-#define CAP_F      5.91e-12
-#define SWITCH_OHM 11200.0
+/* A source behind AIN charges this capacitor through this switch in half a sampling period: the printed resistances that cost
+ * no more than 16 bits are linear in that time, with this slope and intercept (sources 3.6). */
+#define CAP_F      6.06e-12
+#define SWITCH_OHM 7000.0
 #define AIN2_OHM   44000.0 /* AD7712: divider of AIN2 to VBIAS */
 #define HIGH_LEVEL 4.0     /* which divides by this */
 

@@ -89,12 +89,23 @@ void ad7712_end_read(struct ad7712 *a, int64_t t_ns)
     ad7712_show(a, false, false, t_ns + ad7712_tau_ns(a, HIZ_TAU), t_ns);
 }
 
+static void on_load(void *ctx, int64_t t_ns)
+{
+    struct ad7712 *a = ctx;
+    if (a->port.load_coef) *ad7712_coef(a) = a->port.load;
+    else ad7712_load_control(a, a->port.load, t_ns);
+}
+
 void ad7712_begin_write(struct ad7712 *a, int64_t t_ns)
 {
     struct ad7712_port *p = &a->port;
     if (!p->rfs) {
         a->n.refused++;
         return;
+    }
+    if (a->load_ev.queued) { /* the write before was cut short, but it was one */
+        sched_cancel(a->sched, &a->load_ev);
+        on_load(a, t_ns);
     }
     p->reading = p->garbled = p->clocked = false;
     p->writing = true;
@@ -134,7 +145,7 @@ void ad7712_clock_rise(struct ad7712 *a, int64_t t_ns)
 
 void ad7712_word_over(struct ad7712 *a, int64_t fall_ns)
 {
-    if (a->port.source != AD7712_FROM_WORD) return;
+    if (a->port.source != AD7712_FROM_WORD || !a->unread) return;
     ad7712_word_read(a);
     if (!a->drdy) sched_at(a->sched, &a->rise_ev, fall_ns + delay_ns(a, a->cfg.drdy_rise_ns, 1));
 }
@@ -185,13 +196,6 @@ void ad7712_clock_fall(struct ad7712 *a, int64_t t_ns)
     const bool late = p->sdata_ns <= p->rise_ns && t_ns - p->sdata_ns < ad7712_tau_ns(a, DATA_TAU);
     judge(a, !p->mode && late, &a->n.sdata_violations);
     shift_in(a, t_ns);
-}
-
-static void on_load(void *ctx, int64_t t_ns)
-{
-    struct ad7712 *a = ctx;
-    if (a->port.load_coef) *ad7712_coef(a) = a->port.load;
-    else ad7712_load_control(a, a->port.load, t_ns);
 }
 
 static void on_sdata(void *ctx, int64_t t_ns)

@@ -1,0 +1,562 @@
+/* Frames of the AD7712's serial port: order and edges, rules of DRDY, A0, RFS and TFS, limits, self-clocking (sources 3.1, 3.4). */
+#include "ad7712_rig.h"
+
+#define FAST AD7712_CONTROL(0, 0, 0, 1, 0, 19)
+
+static void up(struct rig *r, const struct ad7712_cfg *cfg, uint32_t control)
+{
+    power_up(r, cfg);
+    r->v[0] = 0.7;
+    write_control(r, control);
+    await_fall(r);
+    r->sdata.n = r->sclk.n = 0;
+}
+
+/* The first bit is there before any SCLK, at most 4 tau after RFS; the next at most 2 tau + 20 ns after the fall; none changes
+ * with the rise; high impedance after RFS. */
+static void data_change_with_rfs_and_the_falls_of_sclk(void **state)
+{
+    (void)state;
+    struct rig r;
+    up(&r, &quiet, FAST);
+    const uint32_t word = r.a.word;
+    a0(&r, true);
+    const int64_t rfs_ns = r.s.now_ns;
+    assert_false(ad7712_sdata_driven(&r.a, rfs_ns));
+    rfs(&r, false);
+    assert_false(ad7712_sdata_driven(&r.a, rfs_ns + 299));
+    assert_true(ad7712_sdata_driven(&r.a, rfs_ns + 300));
+    assert_int_equal(ad7712_sdata(&r.a, rfs_ns + 300), word >> 23);
+    wait_ns(&r, FIRST_NS);
+    for (unsigned i = 0; i < 24; i++) {
+        const int64_t rise_ns = r.s.now_ns;
+        assert_int_equal(pulse(&r), word >> (23 - i) & 1);
+        const int64_t fall_ns = r.s.now_ns;
+        assert_int_equal(fall_ns - rise_ns, HIGH_NS);
+        assert_int_equal(ad7712_sdata(&r.a, fall_ns + 99), word >> (23 - i) & 1);
+        assert_int_equal(ad7712_sdata(&r.a, fall_ns + 100), i < 23 ? word >> (22 - i) & 1 : 0);
+        wait_ns(&r, SCLK_NS - HIGH_NS);
+    }
+    rfs(&r, true);
+    const int64_t up_ns = r.s.now_ns;
+    assert_true(ad7712_sdata_driven(&r.a, up_ns + 199));
+    assert_false(ad7712_sdata_driven(&r.a, up_ns + 200));
+    for (unsigned i = 0; i < r.sdata.n; i++) assert_true((r.sdata.e[i].t_ns - rfs_ns - 300) % 100 == 0);
+    assert_int_equal(breaches(&r), 0);
+}
+
+/* Delays are the owner's. */
+static void delays_can_be_set(void **state)
+{
+    (void)state;
+    struct rig r;
+    struct ad7712_cfg cfg = quiet;
+    cfg.rfs_access_ns = 390;
+    cfg.bit_access_ns = 210;
+    cfg.drdy_rise_ns = 55;
+    up(&r, &cfg, FAST);
+    a0(&r, true);
+    const int64_t rfs_ns = r.s.now_ns;
+    rfs(&r, false);
+    assert_false(ad7712_sdata_driven(&r.a, rfs_ns + 389));
+    assert_true(ad7712_sdata_driven(&r.a, rfs_ns + 390));
+    wait_ns(&r, FIRST_NS);
+    const bool first = pulse(&r);
+    assert_int_equal(ad7712_sdata(&r.a, r.s.now_ns + 209), first);
+    assert_int_equal(ad7712_sdata(&r.a, r.s.now_ns + 210), r.a.word >> 22 & 1);
+    wait_ns(&r, 400);
+    pulses(&r, 23);
+    wait_ns(&r, LAST_NS);
+    assert_int_equal(r.drdy.e[r.drdy.n - 1].t_ns, r.a.port.fall_ns + 55);
+}
+
+/* DRDY rises tau after the last fall of a whole word of 16 or 24 bits, not after one bit less, and not after control words. */
+static void drdy_rises_with_the_last_bit_of_a_word(void **state)
+{
+    (void)state;
+    static const struct {
+        uint32_t wl;
+        unsigned bits;
+    } rows[] = {{0, 16}, {AD7712_CTL_WL, 24}};
+    for (unsigned i = 0; i < COUNT(rows); i++) {
+        struct rig r;
+        up(&r, &quiet, (FAST & ~AD7712_CTL_WL) | rows[i].wl);
+        a0(&r, true);
+        rfs(&r, false);
+        wait_ns(&r, FIRST_NS);
+        pulses(&r, rows[i].bits - 1);
+        wait_ns(&r, SCLK_NS - HIGH_NS);
+        assert_false(ad7712_drdy(&r.a));
+        pulse(&r);
+        wait_ns(&r, 99);
+        assert_false(ad7712_drdy(&r.a));
+        wait_ns(&r, 1);
+        assert_true(ad7712_drdy(&r.a));
+        assert_false(r.a.unread);
+        wait_ns(&r, 300);
+        assert_int_equal(pulses(&r, 4), 0); /* after the last bit: low, counted */
+        assert_int_equal(r.a.n.over_reads, 4);
+        rfs(&r, true);
+        const int64_t next_ns = await_fall(&r); /* a new word, as if nothing had been */
+        read_frame(&r, false, rows[i].bits);
+        assert_int_equal(r.a.n.blocked_reads, 1);
+        read_frame(&r, false, 24);
+        assert_true(r.s.now_ns - next_ns < 100000);
+        assert_int_equal(r.drdy.n, 4);
+    }
+}
+
+/* The rule of the waiting word: with A0 low the first read gives the data, the next the control register. */
+static void a_waiting_word_comes_before_the_control_register(void **state)
+{
+    (void)state;
+    struct rig r;
+    up(&r, &quiet, FAST);
+    const uint32_t word = r.a.word;
+    assert_int_equal(read_frame(&r, false, 24), word);
+    assert_int_equal(r.a.n.blocked_reads, 1);
+    assert_true(ad7712_drdy(&r.a));
+    assert_int_equal(read_frame(&r, false, 24), FAST);
+    assert_int_equal(read_frame(&r, false, 24), FAST);
+    assert_int_equal(r.a.n.blocked_reads, 1);
+    await_fall(&r);
+    write_control(&r, FAST | AD7712_CTL_BO); /* writes are not held up */
+    assert_int_equal(r.a.control, FAST | AD7712_CTL_BO);
+    assert_int_equal(read_frame(&r, true, 24), word);
+    assert_int_equal(read_frame(&r, false, 24), FAST | AD7712_CTL_BO);
+    /* Also half read: the rest of the word is still to come. */
+    await_fall(&r);
+    read_frame(&r, true, 8);
+    assert_int_equal(read_frame(&r, false, 24), word);
+    assert_int_equal(read_frame(&r, false, 24), FAST | AD7712_CTL_BO);
+}
+
+/* While RFS is low the output register stays; the conversion that ends then is lost and counted, DRDY does not move. */
+static void words_that_come_while_rfs_is_low_are_lost(void **state)
+{
+    (void)state;
+    for (unsigned read_first = 0; read_first < 2; read_first++) {
+        struct rig r;
+        up(&r, &quiet, FAST);
+        const uint32_t word = r.a.word;
+        r.v[0] = -0.7;
+        a0(&r, true);
+        rfs(&r, false);
+        wait_ns(&r, FIRST_NS);
+        uint32_t got = 0;
+        if (read_first) got = pulses(&r, 24);
+        wait_ns(&r, 5 * 19 * MOD_NS);
+        assert_int_equal(r.a.n.lost_words, 5);
+        assert_int_equal(r.a.n.conversions, 1);
+        assert_int_equal(r.a.n.overruns, 0);
+        assert_int_equal(r.drdy.n, read_first ? 2 : 1);
+        if (!read_first) got = pulses(&r, 24);
+        assert_int_equal(got, word);
+        wait_ns(&r, LAST_NS);
+        rfs(&r, true);
+        await_fall(&r);
+        near(read_frame(&r, true, 24), 8388608 * (1.0 - 0.28), 2);
+    }
+}
+
+/* RFS may go high between the bytes of a word; the read goes on where it was. A new word in between begins anew: torn. */
+static void rfs_may_rise_between_bytes(void **state)
+{
+    (void)state;
+    struct rig r;
+    up(&r, &quiet, FAST);
+    const uint32_t word = r.a.word;
+    uint32_t got = 0;
+    for (unsigned i = 0; i < 3; i++) got = got << 8 | read_frame(&r, true, 8);
+    assert_int_equal(got, word);
+    assert_true(ad7712_drdy(&r.a));
+    await_fall(&r);
+    assert_int_equal(read_frame(&r, true, 8), word >> 16);
+    r.v[0] = -1.0;
+    for (unsigned i = 0; i < 4; i++) await_fall(&r);
+    assert_int_equal(r.a.n.torn_reads, 1);
+    assert_int_equal(read_frame(&r, true, 24), r.a.word);
+    assert_int_equal(breaches(&r), 0);
+}
+
+/* A frame of the other kind, or A0, gives up the rest of an interrupted read. */
+static void what_ends_an_interrupted_read(void **state)
+{
+    (void)state;
+    for (unsigned by_write = 0; by_write < 2; by_write++) {
+        struct rig r;
+        up(&r, &quiet, FAST);
+        read_frame(&r, true, 8);
+        if (by_write) write_control(&r, FAST);
+        else a0(&r, false);
+        assert_int_equal(read_frame(&r, true, 24), r.a.word);
+    }
+}
+
+static void reads_while_drdy_is_high(void **state)
+{
+    (void)state;
+    for (unsigned strict = 0; strict < 2; strict++) {
+        struct rig r;
+        struct ad7712_cfg cfg = quiet;
+        cfg.strict_drdy = strict;
+        up(&r, &cfg, FAST);
+        const uint32_t word = read_frame(&r, true, 24);
+        assert_int_equal(word, r.a.word);
+        assert_int_equal(r.a.n.stale_reads, 0);
+        assert_int_equal(read_frame(&r, true, 24), strict ? 0xFFFFFF : word); /* the old word again */
+        assert_int_equal(r.a.n.stale_reads, 1);
+        assert_int_equal(read_frame(&r, false, 24), FAST); /* the control word has no DRDY */
+        assert_int_equal(r.a.n.stale_reads, 1);
+        await_fall(&r);
+        wait_until(&r, r.s.now_ns + 19 * MOD_NS - 45000); /* in the pulse before the next word */
+        assert_true(ad7712_drdy(&r.a));
+        assert_int_equal(read_frame(&r, true, 24), strict ? 0xFFFFFF : word);
+        assert_int_equal(r.a.n.stale_reads, 2);
+        assert_true(ad7712_drdy(&r.a));
+        await_fall(&r);
+    }
+}
+
+/* Less than 24 bits change nothing; more are ignored; with A0 high there is nothing to write but in the coefficient modes. */
+static void writes_are_of_24_bits(void **state)
+{
+    (void)state;
+    struct rig r;
+    up(&r, &quiet, FAST);
+    write_frame(&r, false, 0x7FFFFF, 23);
+    assert_int_equal(r.a.control, FAST);
+    assert_int_equal(r.a.n.dropped, 1);
+    write_frame(&r, false, 0, 0);
+    assert_int_equal(r.a.n.dropped, 2);
+    a0(&r, false);
+    tfs(&r, false);
+    write_bits(&r, FAST | AD7712_CTL_BO, 24);
+    write_bits(&r, 0x5, 3);
+    wait_ns(&r, LAST_NS);
+    tfs(&r, true);
+    assert_int_equal(r.a.control, FAST | AD7712_CTL_BO);
+    assert_int_equal(r.a.n.over_writes, 3);
+    write_frame(&r, true, 0x123456, 24);
+    assert_int_equal(r.a.n.refused, 1);
+    assert_int_equal(r.a.control, FAST | AD7712_CTL_BO);
+    assert_int_equal(r.a.zero[0], AD7712_ZERO_IDEAL);
+    assert_int_equal(r.a.full[0], AD7712_FULL_IDEAL);
+    assert_int_equal(r.a.n.dropped, 2);
+    assert_int_equal(breaches(&r), 0);
+}
+
+/* The word acts 4 tau after the last fall of SCLK, not before, whether TFS is still low or not. */
+static void a_write_acts_4_tau_after_its_last_bit(void **state)
+{
+    (void)state;
+    struct rig r;
+    up(&r, &quiet, FAST);
+    a0(&r, false);
+    tfs(&r, false);
+    write_bits(&r, FAST | AD7712_CTL_BO, 24);
+    wait_ns(&r, 399);
+    assert_int_equal(r.a.control, FAST);
+    wait_ns(&r, 1);
+    assert_int_equal(r.a.control, FAST | AD7712_CTL_BO);
+}
+
+static void rfs_and_tfs_together_are_refused(void **state)
+{
+    (void)state;
+    struct rig r;
+    up(&r, &quiet, FAST);
+    a0(&r, true);
+    rfs(&r, false);
+    tfs(&r, false); /* the read goes on */
+    wait_ns(&r, FIRST_NS);
+    assert_int_equal(pulses(&r, 24), r.a.word);
+    tfs(&r, true);
+    rfs(&r, true);
+    assert_int_equal(r.a.n.refused, 1);
+    wait_ns(&r, 1000);
+    a0(&r, false);
+    tfs(&r, false);
+    rfs(&r, false); /* so does the write */
+    write_bits(&r, FAST | AD7712_CTL_BO, 24);
+    assert_false(ad7712_sdata_driven(&r.a, r.s.now_ns));
+    rfs(&r, true);
+    wait_ns(&r, LAST_NS);
+    tfs(&r, true);
+    assert_int_equal(r.a.n.refused, 2);
+    assert_int_equal(r.a.control, FAST | AD7712_CTL_BO);
+}
+
+/* TFS tied to A0: writes go to the control register, reads give the data. */
+static void tfs_tied_to_a0(void **state)
+{
+    (void)state;
+    struct rig r;
+    power_up(&r, &quiet);
+    r.v[0] = 0.7;
+    a0(&r, true);
+    ad7712_a0_pin(&r.a, false, r.s.now_ns);
+    tfs(&r, false);
+    write_bits(&r, FAST, 24);
+    wait_ns(&r, LAST_NS);
+    tfs(&r, true);
+    ad7712_a0_pin(&r.a, true, r.s.now_ns);
+    assert_int_equal(r.a.control, FAST);
+    await_fall(&r);
+    rfs(&r, false);
+    wait_ns(&r, FIRST_NS);
+    near(pulses(&r, 24), 8388608 * 1.28, 2);
+    assert_int_equal(breaches(&r) + r.a.n.refused, 0);
+}
+
+/* ---- limits: at the limit nothing, one ns beyond one count; lenient what was meant, strict ones and lost writes ---- */
+
+struct read_limit {
+    const char *name;
+    int64_t a0_ns, low_ns, high_ns, last_ns; /* A0 to RFS; SCLK low and high of each pulse; last fall to RFS */
+    uint32_t a0, sclk, frame;                /* counted */
+};
+
+static void limits_of_a_read(void **state)
+{
+    (void)state;
+    static const struct read_limit rows[] = {
+        {"typical", 400, 400, 400, 500, 0, 0, 0},     {"A0 min", 200, 400, 400, 500, 0, 0, 0},
+        {"A0 late", 199, 400, 400, 500, 1, 0, 0},     {"period min", 400, 250, 250, 500, 0, 0, 0},
+        {"fast", 400, 249, 250, 500, 0, 15, 0},       {"high min", 400, 400, 200, 500, 0, 0, 0},
+        {"high short", 400, 400, 199, 500, 0, 16, 0}, {"low min", 400, 200, 400, 500, 0, 0, 0},
+        {"low short", 400, 199, 400, 500, 0, 15, 0},  {"RFS min", 400, 400, 400, 10, 0, 0, 0},
+        {"RFS early", 400, 400, 400, 9, 0, 0, 1},
+    };
+    for (unsigned i = 0; i < COUNT(rows); i++) {
+        for (unsigned strict = 0; strict < 2; strict++) {
+            struct rig r;
+            struct ad7712_cfg cfg = quiet;
+            cfg.strict_timing = strict;
+            up(&r, &cfg, FAST & ~AD7712_CTL_WL);
+            ad7712_a0_pin(&r.a, true, r.s.now_ns);
+            wait_ns(&r, rows[i].a0_ns);
+            rfs(&r, false);
+            wait_ns(&r, FIRST_NS);
+            uint32_t got = 0;
+            for (unsigned k = 0; k < 16; k++) {
+                if (k) wait_ns(&r, rows[i].low_ns);
+                ad7712_sclk_pin(&r.a, true, r.s.now_ns);
+                got = got << 1 | ad7712_sdata(&r.a, r.s.now_ns);
+                wait_ns(&r, rows[i].high_ns);
+                ad7712_sclk_pin(&r.a, false, r.s.now_ns);
+            }
+            wait_ns(&r, rows[i].last_ns);
+            rfs(&r, true);
+            const struct ad7712_counters *n = &r.a.n;
+            if (n->a0_violations != rows[i].a0 || n->sclk_violations != rows[i].sclk ||
+                n->frame_violations != rows[i].frame)
+                fail_msg("%s: %u %u %u", rows[i].name, n->a0_violations, n->sclk_violations, n->frame_violations);
+            if (strict && rows[i].a0) assert_int_equal(got, 0xFFFF);
+            else if (strict && rows[i].sclk) assert_int_equal(got & 0x3FFF, 0x3FFF);
+            else assert_int_equal(got, r.a.word >> 8);
+        }
+    }
+}
+
+struct write_limit {
+    const char *name;
+    int64_t setup_ns, high_ns, hold_ns, last_ns; /* data to rise, high, rise to change, last fall to TFS */
+    uint32_t sdata, sclk, frame;
+};
+
+static void limits_of_a_write(void **state)
+{
+    (void)state;
+    static const struct write_limit rows[] = {
+        {"typical", 400, 400, 400, 500, 0, 0, 0},  {"set-up 0", 0, 400, 400, 500, 0, 0, 0},
+        {"set-up min", 0, 200, 200, 500, 0, 0, 0}, {"set-up short", 0, 199, 199, 500, 24, 24, 0},
+        {"hold min", 400, 400, 30, 500, 0, 0, 0},  {"hold short", 400, 400, 29, 500, 24, 0, 0},
+        {"TFS min", 400, 400, 400, 400, 0, 0, 0},  {"TFS early", 400, 400, 400, 399, 0, 0, 1},
+    };
+    const uint32_t word =
+        AD7712_CONTROL(6, 5, 0, 1, 0, 0x2AA) | 0x6000; /* with the other one its changes are each bit's */
+    for (unsigned i = 0; i < COUNT(rows); i++) {
+        for (unsigned strict = 0; strict < 2; strict++) {
+            struct rig r;
+            struct ad7712_cfg cfg = quiet;
+            cfg.strict_timing = strict;
+            power_up(&r, &cfg);
+            a0(&r, false);
+            tfs(&r, false);
+            for (unsigned k = 0; k < 24; k++) {
+                const bool bit = word >> (23 - k) & 1;
+                ad7712_sdata_pin(&r.a, !bit, r.s.now_ns); /* so that each bit is a change at its time */
+                wait_ns(&r, 600 - rows[i].setup_ns);
+                ad7712_sdata_pin(&r.a, bit, r.s.now_ns);
+                wait_ns(&r, rows[i].setup_ns);
+                ad7712_sclk_pin(&r.a, true, r.s.now_ns);
+                wait_ns(&r, rows[i].hold_ns);
+                if (rows[i].hold_ns < rows[i].high_ns) ad7712_sdata_pin(&r.a, !bit, r.s.now_ns);
+                wait_ns(&r, rows[i].high_ns - rows[i].hold_ns);
+                ad7712_sclk_pin(&r.a, false, r.s.now_ns);
+            }
+            wait_ns(&r, rows[i].last_ns);
+            tfs(&r, true);
+            wait_ns(&r, 1000);
+            const struct ad7712_counters *n = &r.a.n;
+            if (n->sdata_violations != rows[i].sdata || n->sclk_violations != rows[i].sclk ||
+                n->frame_violations != rows[i].frame)
+                fail_msg("%s: %u %u %u", rows[i].name, n->sdata_violations, n->sclk_violations, n->frame_violations);
+            const bool lost = strict && breaches(&r);
+            assert_int_equal(r.a.control, lost ? AD7712_CTL_RESET : word);
+            assert_int_equal(n->dropped, lost);
+        }
+    }
+}
+
+static void a0_must_not_move_inside_a_frame(void **state)
+{
+    (void)state;
+    for (unsigned strict = 0; strict < 2; strict++) {
+        struct rig r;
+        struct ad7712_cfg cfg = quiet;
+        cfg.strict_timing = strict;
+        up(&r, &cfg, FAST);
+        a0(&r, true);
+        rfs(&r, false);
+        wait_ns(&r, FIRST_NS);
+        const uint32_t first = pulses(&r, 12);
+        ad7712_a0_pin(&r.a, false, r.s.now_ns); /* the frame's source stays */
+        wait_ns(&r, 400);
+        const uint32_t got = first << 12 | pulses(&r, 12);
+        assert_int_equal(got, strict ? (r.a.word & 0xFFF000) | (r.a.word & 0x800) | 0x7FF : r.a.word);
+        assert_int_equal(r.a.n.a0_violations, 1);
+        wait_ns(&r, LAST_NS);
+        rfs(&r, true);
+    }
+}
+
+/* Pulses outside of frames, and an SCLK that is high when the frame begins, shift nothing. */
+static void pulses_outside_of_frames_do_nothing(void **state)
+{
+    (void)state;
+    struct rig r;
+    up(&r, &quiet, FAST);
+    pulses(&r, 7);
+    wait_ns(&r, 400);
+    ad7712_sclk_pin(&r.a, true, r.s.now_ns);
+    a0(&r, true);
+    rfs(&r, false);
+    wait_ns(&r, 400);
+    ad7712_sclk_pin(&r.a, false, r.s.now_ns);
+    wait_ns(&r, 400);
+    assert_int_equal(pulses(&r, 24), r.a.word);
+    assert_int_equal(r.a.n.over_reads + r.a.n.over_writes, 0);
+}
+
+/* ---- self-clocking ---- */
+
+/* 24 (16) falls and rises: the first fall 4 tau after RFS, low 3/2 tau, high 1/2; data valid at the rises. */
+static void self_clocking_reads(void **state)
+{
+    (void)state;
+    static const unsigned widths[] = {16, 24};
+    for (unsigned w = 0; w < 2; w++) {
+        struct rig r;
+        up(&r, &quiet, widths[w] == 24 ? FAST : FAST & ~AD7712_CTL_WL);
+        ad7712_mode_pin(&r.a, true, r.s.now_ns);
+        assert_true(ad7712_sclk(&r.a));
+        a0(&r, true);
+        const int64_t rfs_ns = r.s.now_ns;
+        rfs(&r, false);
+        wait_ns(&r, 10000);
+        assert_int_equal(r.sclk.n, 2 * widths[w]);
+        uint32_t got = 0;
+        for (unsigned i = 0; i < r.sclk.n; i++) {
+            assert_int_equal(r.sclk.e[i].level, i % 2);
+            assert_int_equal(r.sclk.e[i].t_ns, rfs_ns + 400 + i / 2 * 200 + (i % 2 ? 150 : 0));
+            if (i % 2 == 0) continue;
+            bool level = false; /* of SDATA at the rise */
+            for (unsigned k = 0; k < r.sdata.n; k++) {
+                if (r.sdata.e[k].t_ns <= r.sclk.e[i].t_ns) level = r.sdata.e[k].level;
+            }
+            got = got << 1 | level;
+        }
+        assert_int_equal(got, r.a.word >> (24 - widths[w]));
+        assert_true(ad7712_drdy(&r.a));
+        assert_true(ad7712_sclk(&r.a));
+        ad7712_sclk_pin(&r.a, true, r.s.now_ns); /* the host's SCLK is not looked at */
+        ad7712_sclk_pin(&r.a, false, r.s.now_ns);
+        assert_int_equal(r.a.n.over_reads + breaches(&r), 0);
+        rfs(&r, true);
+    }
+}
+
+static void self_clocking_writes(void **state)
+{
+    (void)state;
+    struct rig r;
+    up(&r, &quiet, FAST);
+    ad7712_mode_pin(&r.a, true, r.s.now_ns);
+    a0(&r, false);
+    const uint32_t word = FAST | AD7712_CTL_BO;
+    tfs(&r, false);
+    for (unsigned i = 0; i < 24; i++) {
+        while (ad7712_sclk(&r.a)) wait_ns(&r, 10); /* falls: a new bit, taken with the rise */
+        ad7712_sdata_pin(&r.a, word >> (23 - i) & 1, r.s.now_ns);
+        while (!ad7712_sclk(&r.a)) wait_ns(&r, 10);
+    }
+    wait_ns(&r, 1000);
+    tfs(&r, true);
+    assert_int_equal(r.a.control, word);
+    assert_int_equal(r.sclk.n, 48);
+    assert_int_equal(r.a.n.dropped + r.a.n.over_writes + breaches(&r), 0);
+}
+
+/* RFS high stops it at once, and what is left of the word is read in the next frame; a change of MODE ends the frame. */
+static void a_cut_self_clocked_frame(void **state)
+{
+    (void)state;
+    struct rig r;
+    up(&r, &quiet, FAST);
+    ad7712_mode_pin(&r.a, true, r.s.now_ns);
+    a0(&r, true);
+    rfs(&r, false);
+    wait_ns(&r, 400 + 5 * 200 + 100); /* in the sixth low */
+    rfs(&r, true);
+    assert_true(ad7712_sclk(&r.a));
+    const unsigned n = r.sclk.n;
+    wait_ns(&r, 5000);
+    assert_int_equal(r.sclk.n, n);
+    assert_false(ad7712_drdy(&r.a));
+    rfs(&r, false);
+    wait_ns(&r, 2000);
+    ad7712_mode_pin(&r.a, false, r.s.now_ns);
+    assert_false(ad7712_sdata_driven(&r.a, r.s.now_ns));
+    assert_true(ad7712_sclk(&r.a));
+    wait_ns(&r, 5000);
+    rfs(&r, true);
+    assert_int_equal(read_frame(&r, true, 24), r.a.word);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(data_change_with_rfs_and_the_falls_of_sclk),
+        cmocka_unit_test(delays_can_be_set),
+        cmocka_unit_test(drdy_rises_with_the_last_bit_of_a_word),
+        cmocka_unit_test(a_waiting_word_comes_before_the_control_register),
+        cmocka_unit_test(words_that_come_while_rfs_is_low_are_lost),
+        cmocka_unit_test(rfs_may_rise_between_bytes),
+        cmocka_unit_test(what_ends_an_interrupted_read),
+        cmocka_unit_test(reads_while_drdy_is_high),
+        cmocka_unit_test(writes_are_of_24_bits),
+        cmocka_unit_test(a_write_acts_4_tau_after_its_last_bit),
+        cmocka_unit_test(rfs_and_tfs_together_are_refused),
+        cmocka_unit_test(tfs_tied_to_a0),
+        cmocka_unit_test(limits_of_a_read),
+        cmocka_unit_test(limits_of_a_write),
+        cmocka_unit_test(a0_must_not_move_inside_a_frame),
+        cmocka_unit_test(pulses_outside_of_frames_do_nothing),
+        cmocka_unit_test(self_clocking_reads),
+        cmocka_unit_test(self_clocking_writes),
+        cmocka_unit_test(a_cut_self_clocked_frame),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
