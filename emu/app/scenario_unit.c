@@ -4,6 +4,7 @@
 #include "app/profile_yaml.h"
 
 #include <inttypes.h>
+#include <limits.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -27,7 +28,9 @@ static bool find_profile(struct yaml_file *f, const struct yaml_node *node, cons
     const struct board_type *type = u->board->type;
     if (!find_proto("profiles", name, f->path, path, why, sizeof why))
         return yaml_file_fail(f, node, "profile", "%s", why);
-    return profile_yaml_load(path, &type, &u->profile, f->why, f->cap);
+    if (!profile_yaml_load(path, &type, &u->profile, f->why, f->cap)) return false;
+    if (type->cfg_profiled) type->cfg_profiled(&u->cfg.board, &u->profile);
+    return true;
 }
 
 /* A unit of the type that its mapping names, the i-th of it, with its profile; the type's defaults for the rest. */
@@ -135,7 +138,7 @@ static const struct yaml_field unit_rows[] = {
     {.key = "profile", .type = YAML_CUSTOM, .load = loaded, .what = "name in proto/profiles, or a path, relative to the scenario"},
     {.key = "profile_set", .type = YAML_CUSTOM, .load = load_profile_set, .dump = dump_profile_set, .what = "fields of the profile that differ"},
     {.key = "bus",    .type = YAML_TEXT, .offset = UNIT(bus_name), .max = 16, .what = "name of its bus; the first if it is not given"},
-    {.key = "node",   .type = YAML_U8, .offset = UNIT(cfg.node), .min = 1, .max = 127, .what = "CANopen node id; each its own on a bus"},
+    {.key = "node",   .type = YAML_U8, .offset = UNIT(cfg.node), .min = 1, .max = 127, .what = "CANopen node id; each its own on a bus; the default is the board's, or the next that is free"},
     {.key = "serial", .type = YAML_U32, .offset = UNIT(cfg.board.serial), .min = 1, .max = 4294967295.0, .what = "serial number; each its own, its noise and its spread are drawn by it"},
     {.key = "frame_form", .type = YAML_U8, .offset = UNIT(frame_form), .max = 3, .what = "0 pair, 1 fast, 2 FD frame, 3 FD block; written to object 2020h at the start"},
     {.key = "spread", .type = YAML_BOOL, .offset = UNIT(spread), .what = "its parameters are drawn from the scenario's `spread`"},
@@ -248,6 +251,17 @@ static const char *bus_at(const void *ctx, size_t i)
     return i < s->bus_count ? s->bus[i].name : NULL;
 }
 
+/* Who has been given no node and finds his type's taken, has the next one that is free. */
+static void find_node(const struct yaml_node *node, const struct scenario *s, struct scenario_unit *u)
+{
+    if (yaml_get(node, "node") || yaml_get(node, "count")) return;
+    for (unsigned i = 0; i < s->unit_count && u->cfg.node < 127; i++) {
+        if (s->units[i].bus != u->bus || s->units[i].cfg.node != u->cfg.node) continue;
+        u->cfg.node++;
+        i = UINT_MAX; /* from the first on again */
+    }
+}
+
 static bool find_bus(struct yaml_file *f, const struct yaml_node *node, const struct scenario *s,
                      struct scenario_unit *u)
 {
@@ -329,6 +343,7 @@ static bool load_entry(struct yaml_file *f, const struct yaml_node *node, struct
     if (!yaml_load(f, node, where, &scenario_unit_fields, &e)) return false;
     snprintf(f->where, sizeof f->where, "%s.", where);
     if (!check_keys(f, node, &e.unit) || !find_bus(f, node, s, &e.unit)) return false;
+    find_node(node, s, &e.unit);
     for (unsigned k = 0; k < (e.count ? e.count : 1); k++)
         if (!place_unit(f, node, &e, k, s)) return false;
     f->where[0] = '\0';

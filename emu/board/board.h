@@ -45,13 +45,14 @@ struct board_type {
     const char *profile_name; /* default file in proto/profiles */
     void (*profile_default)(void *profile);
     bool (*profile_check)(const void *profile, char *why,
-                          size_t cap);                         /* false: a sentence that begins with the field */
-    void (*about)(const void *profile, char *out, size_t cap); /* a line for lists of profiles */
-    void (*cfg_default)(struct board_cfg *cfg);                /* its usual analog chain; may be NULL */
-    uint32_t knobs;                                            /* enum board_knob: what else of board_cfg it heeds */
-    uint8_t node;                                              /* default node id on CAN */
-    uint8_t frame_forms;                                       /* values of object 2020h; 0: it has no such object */
-    int64_t (*period_ns)(const void *profile);                 /* of its frames (cycles, readings) */
+                          size_t cap);                                /* false: a sentence that begins with the field */
+    void (*about)(const void *profile, char *out, size_t cap);        /* a line for lists of profiles */
+    void (*cfg_default)(struct board_cfg *cfg);                       /* its usual analog chain; may be NULL */
+    void (*cfg_profiled)(struct board_cfg *cfg, const void *profile); /* after it, what the profile says; may be NULL */
+    uint32_t knobs;                            /* enum board_knob: what else of board_cfg it heeds */
+    uint8_t node;                              /* default node id on CAN */
+    uint8_t frame_forms;                       /* values of object 2020h; 0: it has no such object */
+    int64_t (*period_ns)(const void *profile); /* of its frames (cycles, readings) */
     /* what is on it */
     const struct board_line *lines;
     unsigned line_count;

@@ -1,16 +1,20 @@
 #include "board/boards.h"
 
+#include "board/pik_board.h"
 #include "board/pmka_board.h"
 #include "board/psa2_board.h"
 
 #include <string.h>
 
-const struct board_type *const board_types[] = {&psa2_board, &pmka_board, NULL};
+const struct board_type *const board_types[] = {&psa2_board, &pmka_board, &pik_board, NULL};
 
 const struct board_name board_names[] = {
     {"psa2", &psa2_board, NULL},
     {"pmka", &pmka_board, NULL},
+    {"pik", &pik_board, NULL},
     {"psa1", &psa2_board, "psa1"},
+    {"pik5", &pik_board, "pik5"},
+    {"pik6", &pik_board, "pik6"},
     {NULL, NULL, NULL},
 };
 

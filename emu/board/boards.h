@@ -3,6 +3,8 @@
 #define PSABENCH_BOARD_BOARDS_H
 
 #include "board/board.h"
+#include "board/pik.h"
+#include "board/pik_can.h"
 #include "board/pmka.h"
 #include "board/pmka_can.h"
 #include "board/psa2_can.h"
@@ -26,16 +28,19 @@ const char *board_profile_name(const struct board_type *type, const void *profil
 union board_store {
     struct psa2 psa2;
     struct pmka pmka;
+    struct pik pik;
 };
 
 union board_can_store {
     struct psa2_can psa2;
     struct pmka_can pmka;
+    struct pik_can pik;
 };
 
 union board_profile_store {
     struct psa2_profile psa2;
     struct pmka_profile pmka;
+    struct pik_profile pik;
 };
 
 #endif

@@ -1,0 +1,329 @@
+#include "board/pik_parts.h"
+
+#include <math.h>
+#include <string.h>
+
+#define WARM_NS      INT64_C(10000000) /* between looks at the temperature, rounded up to looks at the input */
+#define BOARD_SENSOR 3u                /* temperature channel of the board itself */
+
+const struct board_line pik_lines[PIK_LINES] = {
+    [PIK_LINE_CLK] = {"CLK", false}, [PIK_LINE_LATCH] = {"LATCH", true}, [PIK_LINE_CS] = {"CS", true},
+    [PIK_LINE_RW] = {"RW", true},    [PIK_LINE_FXP] = {"FXP", false},    [PIK_LINE_FXN] = {"FXN", false},
+    [PIK_LINE_FYP] = {"FYP", false}, [PIK_LINE_FYN] = {"FYN", false},    [PIK_LINE_FZP] = {"FZP", false},
+    [PIK_LINE_FZN] = {"FZN", false},
+};
+const char *const pik_events[PIK_EVENTS] = {
+    [PIK_EV_RES] = "RES",
+    [PIK_EV_LATCH] = "LATCH",
+    [PIK_EV_FX] = "FX",
+    [PIK_EV_FY] = "FY",
+    [PIK_EV_FZ] = "FZ",
+    [PIK_EV_SATURATED] = "SATURATED",
+    [PIK_EV_POWER_DOWN] = "POWER_DOWN",
+    [PIK_EV_POWER_UP] = "POWER_UP",
+};
+
+/* ---- time ---- */
+
+int64_t pik_tick_at(const struct pik *b, int64_t t_ns)
+{
+    return b->first_tick + clk_count_at(&b->clk, t_ns + 1) - 1;
+}
+
+int64_t pik_tick_ns(const struct pik *b, int64_t tick)
+{
+    return clk_edge_ns(&b->clk, tick - b->first_tick);
+}
+
+static void set_clock(struct pik *b, int64_t tick, int64_t t_ns)
+{
+    b->clk = (struct clk){.t0_ns = t_ns, .hz = pik_tick_hz(b), .div = 1000};
+    b->first_tick = tick;
+}
+
+static int64_t look_ticks(const struct pik *b)
+{
+    return (int64_t)b->profile.look_clk * b->profile.grid;
+}
+
+/* ---- converters ---- */
+
+uint64_t pik_count_plus(const struct pik_channel *c)
+{
+    return c->plus_from + (c->stuck ? 0 : c->axis.plus);
+}
+
+uint64_t pik_count_minus(const struct pik_channel *c)
+{
+    return c->minus_from + (c->stuck ? 0 : c->axis.minus);
+}
+
+static bool each_pulse(const struct pik *b)
+{
+    return b->heard || trace_watched(&b->trace, PIK_PULSE_LINES);
+}
+
+/* The order of channels at one instant is that of their numbers, as everywhere. */
+void pik_advance(struct pik *b, int64_t tick)
+{
+    const bool each = each_pulse(b);
+    for (unsigned i = 0; i < PIK_AXES; i++) {
+        struct pik_axis *a = &b->channel[i].axis;
+        for (int64_t next; each && (next = pik_axis_next(a)) <= tick;) {
+            pik_axis_advance(a, next);
+            const int64_t t_ns = pik_tick_ns(b, next);
+            if (trace_watched(&b->trace, PIK_PULSE_LINES)) pik_lines_pulse(b, i, t_ns);
+            pik_tell(b, (enum pik_event)(PIK_EV_FX + i), t_ns);
+        }
+        pik_axis_advance(a, tick);
+    }
+}
+
+struct pik_axis pik_axis_now(const struct pik *b, unsigned axis, int64_t t_ns)
+{
+    struct pik_axis a = b->channel[axis].axis;
+    if (b->on) pik_axis_advance(&a, pik_tick_at(b, t_ns));
+    return a;
+}
+
+/* ---- looks at the input ---- */
+
+/* Mean until the next look: what is seen, and half of what it has changed by since the last, if that was a pace ago. */
+static double expected_v(const struct pik *b, const struct pik_channel *c, double seen_v, int64_t tick)
+{
+    const bool steady = !b->abrupt && b->looks > 0 && tick - b->last_look_tick == look_ticks(b);
+    return steady ? seen_v + 0.5 * (seen_v - c->seen_v) : seen_v;
+}
+
+static double noise_v(const struct pik *b, struct pik_channel *c, int64_t ticks)
+{
+    const double v_rthz = b->profile.noise_v_rthz * b->cfg.adc_noise_scale;
+    if (!(v_rthz > 0.0)) return 0.0;
+    const double span_s = (double)ticks * 1000.0 / (double)b->clk.hz;
+    return v_rthz * sqrt(0.5 / span_s) * rng_gauss(&c->noise);
+}
+
+/* What is beyond twice the strongest reference moves the integrator to its rail as well; charges stay within 64 bits. */
+static double limited_v(const struct pik *b, double v)
+{
+    const double limit_v = 2.0 * b->profile.clock_hz / pik_profile_k_hz_per_v(&b->profile);
+    return v > limit_v ? limit_v : v < -limit_v ? -limit_v : v;
+}
+
+static int64_t rounded(double x)
+{
+    return (int64_t)floor(x + 0.5);
+}
+
+static struct pik_drive driven(const struct pik_channel *c, double v)
+{
+    struct pik_drive d = c->drive;
+    const int64_t lost = rounded(v * c->lost_per_volt), least = PIK_PULSE / 256;
+    d.per_tick = rounded(v * c->per_volt);
+    d.plus = d.plus + lost > least ? d.plus + lost : least;
+    d.minus = d.minus - lost > least ? d.minus - lost : least;
+    return d;
+}
+
+static void keep_counters(struct pik_channel *c)
+{
+    c->plus = (uint32_t)c->axis.plus;
+    c->minus = (uint32_t)c->axis.minus;
+    c->saturated_looks = c->axis.saturated;
+    c->opposed = c->axis.opposed;
+    c->lost = (uint32_t)(c->axis.lost / PIK_PULSE);
+}
+
+/* Whether it could not keep up since the last look. */
+static bool look_at(struct pik *b, unsigned i, int64_t tick, int64_t t_ns)
+{
+    struct pik_channel *c = &b->channel[i];
+    const double signal = b->io.accel(b->io.ctx, i, t_ns);
+    const double seen_v = afe_out_v(&c->afe, signal, b->degc, t_ns);
+    const double v = expected_v(b, c, seen_v, tick) + c->zero_v + noise_v(b, c, b->look_tick - tick);
+    const struct pik_drive d = driven(c, limited_v(b, v));
+    const uint32_t before = c->axis.saturated;
+    pik_axis_look(&c->axis, tick, &d);
+    c->seen_v = seen_v;
+    keep_counters(c);
+    const bool saturated = c->axis.saturated != before;
+    c->saturated |= saturated;
+    return saturated;
+}
+
+static void tell_saturation(struct pik *b, bool now, int64_t t_ns)
+{
+    if (now) b->saturated_ns = t_ns;
+    if (now == b->saturated) return;
+    if (!now && (double)(t_ns - b->saturated_ns) < b->profile.saturated_ms * 1e6) return;
+    b->saturated = now;
+    if (now) pik_tell(b, PIK_EV_SATURATED, t_ns);
+    if (b->host.saturated) b->host.saturated(b->host.ctx, now, t_ns);
+}
+
+/* By the pace, or at once after a step of the input. */
+static void look(void *ctx, int64_t t_ns)
+{
+    struct pik *b = ctx;
+    const int64_t tick = pik_tick_at(b, t_ns), pace = look_ticks(b);
+    const int64_t warm_looks = WARM_NS / (pik_tick_ns(b, tick + pace) - t_ns) + 1;
+    const bool paced = tick >= b->look_tick;
+    bool saturated = false;
+    pik_advance(b, tick);
+    if (paced) {
+        if (b->looks % warm_looks == 0) pik_warm(b, b->io.temp_degc(b->io.ctx, BOARD_SENSOR, t_ns));
+        b->look_tick += pace;
+    }
+    for (unsigned i = 0; i < PIK_AXES; i++) saturated |= look_at(b, i, tick, t_ns);
+    b->looks += paced;
+    b->abrupt = !paced; /* what it sees until then it saw for no whole pace */
+    b->last_look_tick = tick;
+    tell_saturation(b, saturated, t_ns);
+    sched_at(b->sched, &b->look, pik_tick_ns(b, b->look_tick));
+    pik_arm_pulse(b, b->trace.watched);
+}
+
+void pik_abrupt(struct pik *b, int64_t t_ns)
+{
+    if (!b->on) return;
+    const int64_t next = pik_tick_at(b, t_ns) + 1;
+    b->abrupt = true;
+    if (next < b->look_tick) sched_at(b->sched, &b->look, pik_tick_ns(b, next));
+}
+
+/* ---- life ---- */
+
+static void init_channel(struct pik *b, unsigned i)
+{
+    static const char *const afe_noise[PIK_AXES] = {"afe.x", "afe.y", "afe.z"};
+    static const char *const noise[PIK_AXES] = {"pik.x", "pik.y", "pik.z"};
+    struct pik_channel *c = &b->channel[i];
+    afe_init(&c->afe, &b->cfg.afe[i], rng_stream(b->cfg.seed, b->cfg.serial, afe_noise[i]));
+    c->noise = rng_stream(b->cfg.seed, b->cfg.serial, noise[i]);
+}
+
+void pik_init(struct pik *b, const struct pik_profile *p, const struct board_cfg *cfg, const struct board_io *io,
+              struct sched *s)
+{
+    memset(b, 0, sizeof *b);
+    b->profile = *p;
+    b->cfg = *cfg;
+    b->io = *io;
+    b->sched = s;
+    b->specimen = pik_specimen_draw(p, cfg->seed, cfg->serial);
+    set_clock(b, 0, 0);
+    pik_warm(b, 25.0);
+    for (unsigned i = 0; i < PIK_AXES; i++) init_channel(b, i);
+    sched_ev(&b->look, look, b);
+    pik_lines_init(b);
+    pik_latch_init(b);
+    pik_bus_init(b);
+}
+
+void pik_attach(struct pik *b, const struct pik_host *host)
+{
+    b->host = *host;
+}
+
+void pik_power_up(struct pik *b, int64_t t_ns)
+{
+    if (b->on) return;
+    b->on = true;
+    set_clock(b, 0, t_ns);
+    for (unsigned i = 0; i < PIK_AXES; i++) {
+        struct pik_channel *c = &b->channel[i];
+        const struct pik_axis was = c->axis;
+        c->axis = pik_axis_at(0, &c->drive);
+        c->axis.plus = was.plus; /* counters of the bench outlive the power */
+        c->axis.minus = was.minus;
+        c->axis.saturated = was.saturated;
+        c->axis.opposed = was.opposed;
+        c->axis.lost = was.lost;
+        c->shown_tick = -1;
+    }
+    b->look_tick = b->last_look_tick = b->looks = 0;
+    b->abrupt = true;
+    b->clk_shown_tick = 0;
+    pik_lines_rest(b, true, t_ns);
+    pik_tell(b, PIK_EV_POWER_UP, t_ns);
+    sched_at(b->sched, &b->look, t_ns);
+    pik_latch_restart(b, t_ns);
+}
+
+void pik_power_down(struct pik *b, int64_t t_ns)
+{
+    if (!b->on) return;
+    pik_advance(b, pik_tick_at(b, t_ns));
+    for (unsigned i = 0; i < PIK_AXES; i++) keep_counters(&b->channel[i]);
+    pik_lines_clock(b, t_ns);
+    b->on = false;
+    b->any = b->saturated = false;
+    sched_cancel(b->sched, &b->look);
+    sched_cancel(b->sched, &b->latch);
+    sched_cancel(b->sched, &b->latch_end);
+    sched_cancel(b->sched, &b->pulse);
+    pik_bus_cut(b, t_ns);
+    pik_lines_rest(b, false, t_ns);
+    pik_tell(b, PIK_EV_POWER_DOWN, t_ns);
+}
+
+void pik_reset(struct pik *b, int64_t t_ns)
+{
+    if (!b->on) return;
+    b->counters.resets++;
+    pik_advance(b, pik_tick_at(b, t_ns));
+    pik_bus_cut(b, t_ns);
+    pik_tell(b, PIK_EV_RES, t_ns);
+    pik_latch_restart(b, t_ns);
+}
+
+void pik_listen(struct pik *b, bool on)
+{
+    b->heard = on;
+    if (b->on) pik_arm_pulse(b, b->trace.watched);
+}
+
+/* ---- faults ---- */
+
+void pik_clock(struct pik *b, int32_t ppm, int64_t t_ns)
+{
+    if (ppm == b->clock_fault_ppm) return;
+    if (!b->on) {
+        b->clock_fault_ppm = ppm;
+        pik_warm(b, b->degc);
+        return;
+    }
+    const int64_t tick = pik_tick_at(b, t_ns);
+    pik_advance(b, tick);
+    pik_lines_clock(b, t_ns);
+    const int64_t tick_ns = pik_tick_ns(b, tick);
+    b->clock_fault_ppm = ppm;
+    set_clock(b, tick, tick_ns);
+    pik_warm(b, b->degc);
+    pik_abrupt(b, t_ns);
+    if (b->look_tick <= tick + 1) sched_at(b->sched, &b->look, pik_tick_ns(b, b->look_tick));
+    pik_arm_pulse(b, b->trace.watched);
+}
+
+void pik_stick(struct pik *b, unsigned axis, const struct board_chip_fault *f, int64_t t_ns)
+{
+    struct pik_channel *c = &b->channel[axis];
+    if (b->on) pik_advance(b, pik_tick_at(b, t_ns));
+    const uint64_t plus = pik_count_plus(c), minus = pik_count_minus(c);
+    c->stuck = f->dout_stuck;
+    c->stuck_level = f->dout_level;
+    c->plus_from = plus - (c->stuck ? 0 : c->axis.plus);
+    c->minus_from = minus - (c->stuck ? 0 : c->axis.minus);
+    pik_lines_stuck(b, axis, t_ns);
+}
+
+bool pik_flip(struct pik *b, unsigned axis, unsigned reg, uint8_t mask, int64_t t_ns)
+{
+    struct pik_channel *c = &b->channel[axis];
+    if (!b->on) return false;
+    pik_advance(b, pik_tick_at(b, t_ns));
+    const uint64_t bits = (uint64_t)mask << (8 * (reg & 1));
+    const uint64_t was = reg < 2 ? pik_count_plus(c) : pik_count_minus(c);
+    *(reg < 2 ? &c->plus_from : &c->minus_from) += (was ^ bits) - was;
+    return true;
+}

@@ -1,0 +1,60 @@
+/* State of the board: included by board/pik.h, read-only outside the board's files. */
+#ifndef PSABENCH_BOARD_PIK_STATE_H
+#define PSABENCH_BOARD_PIK_STATE_H
+
+/* What a specimen differs by from its profile: relative errors in ppm at 25 degC and per K. */
+struct pik_specimen {
+    double uref_ppm, uref_tc, clock_ppm;
+    double ratio_ppm[PIK_AXES], ratio_tc[PIK_AXES], asymmetry_ppm[PIK_AXES], c_pct[PIK_AXES];
+    double zero_v[PIK_AXES], zero_tc[PIK_AXES];
+};
+
+struct pik_channel {
+    struct afe afe;
+    struct pik_axis axis;
+    struct rng noise;
+    double seen_v;                  /* at the last look */
+    struct pik_drive drive;         /* for no input, at this temperature */
+    double per_volt;                /* charge of a tick for a volt */
+    double zero_v;                  /* drift, likewise */
+    double lost_per_volt;           /* charge that a reset loses because it takes the input off */
+    uint64_t plus_from, minus_from; /* the counters: this beside the converter's pulses; all, while the pin is stuck */
+    bool stuck, stuck_level;
+    int64_t shown_tick;                                   /* begin of the last pulse that the trace has */
+    bool saturated;                                       /* since the reading before */
+    uint32_t plus, minus, saturated_looks, opposed, lost; /* counters, as of the last look */
+};
+
+struct pik {
+    struct pik_profile profile;
+    struct board_cfg cfg;
+    struct board_io io;
+    struct pik_host host;
+    struct sched *sched;
+    struct trace trace;
+    struct line_faults line;
+    struct pik_specimen specimen;
+    struct pik_channel channel[PIK_AXES];
+    struct pik_counters counters;
+    bool on, heard, frozen;
+    int32_t clock_fault_ppm;
+    /* time: tick first_tick lies at edge 0 of clk */
+    struct clk clk;
+    int64_t first_tick;
+    int64_t look_tick, last_look_tick; /* next and last by the pace */
+    int64_t looks;                     /* since power-up */
+    bool abrupt;                       /* the input may have stepped since the last look */
+    double degc;
+    struct sched_ev look, latch, latch_end, pulse, cycle_end; /* pulse: only while somebody wants each */
+    /* saturation as it is told */
+    bool saturated;
+    int64_t saturated_ns;
+    /* registers */
+    struct pik_reading latched;
+    bool any; /* latched since power-up or reset */
+    unsigned period_100us;
+    struct board_cycle *cycle; /* under way */
+    int64_t clk_shown_tick;    /* next rise of CLK that the trace has not got */
+};
+
+#endif
