@@ -297,7 +297,7 @@ def test_temperature_converter_commands_and_words(tmp_path: Path) -> None:
 
 def test_sigrok_finds_every_decoder_whichever_it_loads_first(tmp_path: Path) -> None:
     shipped = {p.parent.name for p in ROOT.glob("decoders/*/pd.py")}
-    assert shipped == {"ads1256", "ads128x", "psa2frame"}
+    assert shipped == {"ads1256", "ads128x", "psa2frame", "psd1cycle"}
     assert not [p for p in (ROOT / "decoders").rglob("*") if p.is_symlink()], "a link does not survive every copy"
     shutil.copytree(ROOT / "decoders", tmp_path / "copy")
     run = subprocess.run(

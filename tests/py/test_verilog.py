@@ -40,7 +40,7 @@ class Psa2Frame:
 def record_psa2(vcd: Path, rng: np.random.Generator) -> list[list[Message]]:
     """Frames after several Res at odd instants, so that DRD_A meets the clocks at any phase; messages of each run."""
     runs: list[list[Message]] = []
-    extra = ["--start", "--vcd", vcd, "--vcd-unit", "1"]
+    extra: list[str | Path] = ["--start", "--vcd", vcd, "--vcd-unit", "1"]
     with Emulator(pace="step", seed=int(rng.integers(2**31)), extra=extra) as emu:
         can = emu.endpoint(can="socketcand")
         with (
