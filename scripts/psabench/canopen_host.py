@@ -101,6 +101,10 @@ class CanopenNode:
         """Whether the EDS has the object."""
         return index in self._od
 
+    def title(self, index: int) -> str:
+        """Name of an object, from the EDS."""
+        return str(self._od[index].name)
+
     def names(self, index: int) -> dict[int, str]:
         """Sub-indices of an object (without 0) and their names, from the EDS."""
         entry = self._od[index]

@@ -22,7 +22,7 @@ from psabench.signals import Floats
 class ReadingLayout:
     """What one reading of a board is on the bus.
 
-    messages: names in the DBC, in the order in which the board sends them. counter: the signal that rises by one with
+    messages: names in the DBC, in the order in which the board sends them. counter: the column that rises by one with
     each reading and wraps; stamp: its instant; overrun: 1 where the board lost something before it. "": none.
     """
 
@@ -35,7 +35,10 @@ class ReadingLayout:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Readings:
-    """n readings: columns by the names of their signals, in the units of `units` ("": a code or a count)."""
+    """n readings: columns in the units of `units` ("": a code or a count), by the names of their signals.
+
+    A name that an earlier message of the reading has already is preceded by that of its own, "PIK_TOTALS.X".
+    """
 
     t_rx_s: Floats  # (n,) when the (last) CAN message of each arrived, in the time of the transport
     t_sample_s: Floats  # (n,) the board's own time stamp, unwrapped, s; NaN where it sends none
@@ -61,6 +64,17 @@ class Readings:
         )
 
 
+def _columns(messages: tuple[str, ...]) -> list[dict[str, signals.Signal]]:
+    """The signals of each message under the names of their columns."""
+    taken: set[str] = set()
+    out = []
+    for name in messages:
+        at = signals.layout(message(name))
+        out.append({s if s not in taken else f"{name}.{s}": place for s, place in at.items()})
+        taken |= set(at)
+    return out
+
+
 class ReadingReader:
     """Collects the readings of one node; append `reader.on_message` to the listeners of a CanHost."""
 
@@ -69,7 +83,7 @@ class ReadingReader:
         self.counters = FrameCounters()
         shift = node_id - dbc_node(layout.board)
         self._place = {int(message(name).frame_id) + shift: k for k, name in enumerate(layout.messages)}
-        self._at = [dict(signals.layout(message(name))) for name in layout.messages]
+        self._at = _columns(layout.messages)
         self._begun: list[bytes] = []  # messages of the reading under way
         self._seen = False
         self._kept: list[list[bytes]] = []
@@ -116,17 +130,17 @@ class ReadingReader:
         t_sample_s = np.full(len(kept), np.nan)
         for k, name in enumerate(self.layout.messages):
             bits = signals.payload([r[k] for r in kept], int(message(name).length))
-            for signal, at in self._at[k].items():
-                columns[signal] = signals.physical(bits, at)
-                units[signal] = at.unit
-                if kept and signal == self.layout.counter:
+            for column, at in self._at[k].items():
+                columns[column] = signals.physical(bits, at)
+                units[column] = at.unit
+                if kept and column == self.layout.counter:
                     self._count_gaps(signals.raw(bits, at), at.bits)
-                if kept and signal == self.layout.stamp:
+                if kept and column == self.layout.stamp:
                     unwrapped = signals.unwrap(signals.raw(bits, at), at.bits, self._stamp)
                     self._stamp = int(unwrapped[-1])
                     t_sample_s = unwrapped.astype(np.float64) * at.scale
         self.counters.frames += len(kept)
-        if self.layout.overrun:
+        if self.layout.overrun in columns:
             self.counters.overruns += int(columns[self.layout.overrun].sum())
         return Readings(t_rx_s=np.array(t_s), t_sample_s=t_sample_s, columns=columns, units=units)
 

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import ClassVar
 
 from psabench.can_host import CanHost
@@ -21,6 +22,7 @@ NMT_START, NMT_STOP, NMT_PREOP, NMT_RESET_NODE, NMT_RESET_COMMUNICATION = 0x01, 
 # Objects that are registers, by what they are called here; sub-index = address + 1.
 BANKS: Mapping[str, int] = {"x": 0x2000, "y": 0x2003, "z": 0x2004, "t": 0x2001, "bus": 0x2002}
 ERROR_REGISTER, NAME, IDENTITY = 0x1001, 0x1008, 0x1018
+TPDO_OFF = 0x80000000  # bit 31 of 1800h..:1
 COUNTERS, REFUSAL, STROBE_NS = 0x2030, 0x2031, 0x2051
 
 
@@ -159,6 +161,24 @@ class BusUnit(Unit):
     """A board of which a reading is a row of signals."""
 
     frames: ReadingReader
+
+    def also(self, *messages: str) -> None:
+        """Switch on messages that are off by default; they belong to each reading from now on, until a reset.
+
+        Raises ValueError for one that the board has not.
+        """
+        tpdos = {
+            self.node.title(0x1800 + k).partition(":")[0]: 0x1800 + k for k in range(8) if self.node.has(0x1800 + k)
+        }
+        for name in messages:
+            if name not in tpdos:
+                raise ValueError(f"{name!r}; a {self.title} sends {', '.join(tpdos)}")
+            self.node.write(tpdos[name], 1, int(self.node.read(tpdos[name], 1)) & ~TPDO_OFF)
+        wanted = {*self.frames.layout.messages, *messages}
+        self.host.listeners.remove(self.frames.on_message)
+        in_order = tuple(name for name in tpdos if name in wanted)
+        self.frames = ReadingReader(replace(self.frames.layout, messages=in_order), self.node.node_id)
+        self.host.listeners.append(self.frames.on_message)
 
     def stream(self, count: int, patience_s: float = 5.0) -> Readings:
         """The next `count` readings; the stream runs only meanwhile. Raises LinkError when fewer come in patience_s."""

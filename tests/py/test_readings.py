@@ -37,28 +37,53 @@ def two(seq: int, node: int = 7) -> list[can.Message]:
 
 @pytest.mark.parametrize("layout", LAYOUTS, ids=lambda layout: layout.board)
 def test_every_signal_of_a_board_comes_back(layout: ReadingLayout) -> None:
-    """In the units of the DBC, for any values, at any node."""
+    """In the units of the DBC, for any values, at any node; a name that is taken has its message's before it."""
     rng = random.Random(seed())
-    every = [s for name in layout.messages for s in message(name).signals]
-    assert len({s.name for s in every}) == len(every), "a column for each signal"
-    sent: list[dict[str, int]] = []
+    sent: dict[str, list[float]] = {}
     reader = ReadingReader(layout, 42)
     for k in range(50):
-        low = {s.name: -(1 << s.length - 1) if s.is_signed else 0 for s in every}
-        raw = {s.name: rng.randrange(low[s.name], low[s.name] + (1 << s.length)) for s in every}
-        sent.append(raw)
-        for m in reading(layout, raw, 42, k * 0.5):
-            reader.on_message(m)
+        seen: set[str] = set()
+        for name in layout.messages:
+            raw = {}
+            for s in message(name).signals:
+                low = -(1 << s.length - 1) if s.is_signed else 0
+                raw[s.name] = rng.randrange(low, low + (1 << s.length))
+                column = s.name if s.name not in seen else f"{name}.{s.name}"
+                sent.setdefault(column, []).append(raw[s.name] * float(s.scale) + float(s.offset))
+            seen |= set(raw)
+            reader.on_message(can_message(name, raw, layout.board, 42, k * 0.5))
     assert len(reader) == 50
     taken = reader.take()
     assert len(reader) == 0
-    assert set(taken.columns) == {s.name for s in every}
-    for s in every:
-        want = np.array([raw[s.name] for raw in sent]) * float(s.scale) + float(s.offset)
-        assert np.array_equal(taken[s.name], want), s.name
-        assert taken.units[s.name] == (s.unit or "")
+    assert set(taken.columns) == set(taken.units) == set(sent)
+    for column, values in sent.items():
+        assert np.array_equal(taken[column], values), column
     assert np.array_equal(taken.t_rx_s, np.arange(50) * 0.5)
     assert reader.counters.torn == 0
+
+
+def test_columns_have_the_units_of_the_dbc() -> None:
+    units = ReadingReader(TWO, 7).take().units
+    assert (units["X"], units["SEQ"], units["T"]) == ("V", "", "degC")
+
+
+def test_instants_go_on_over_a_wrap_and_from_one_take_to_the_next() -> None:
+    layout = ReadingLayout(board="pik", messages=("PIK_TOTAL_Z",), stamp="TSTAMP")
+    reader = ReadingReader(layout, 8)
+    t_sample_s = []
+    for us in (2**32 - 200, 2**32 - 100, 0, 100):
+        reader.on_message(can_message("PIK_TOTAL_Z", {"TSTAMP": us}, "pik", 8))
+        t_sample_s.append(float(reader.take().t_sample_s[0]))
+    assert np.diff(t_sample_s) == pytest.approx([1e-4] * 3)
+
+
+def test_overruns_that_the_board_tells_are_counted() -> None:
+    layout = ReadingLayout(board="psd1", messages=("PSD1_CYCLE",), overrun="OVERRUN")
+    reader = ReadingReader(layout, 6)
+    for overrun in (0, 1, 1, 0):
+        reader.on_message(can_message("PSD1_CYCLE", {"OVERRUN": overrun}, "psd1", 6))
+    reader.take()
+    assert reader.counters.overruns == 2
 
 
 @pytest.mark.parametrize("layout", LAYOUTS, ids=lambda layout: layout.board)

@@ -11,4 +11,6 @@ class Pik(BusUnit):
 
     board = "pik"
     title = "PIK"
-    layout = ReadingLayout(board="pik", messages=("PIK_COUNTS",), counter="SEQ")
+    layout = ReadingLayout(
+        board="pik", messages=("PIK_COUNTS", "PIK_TOTALS", "PIK_TOTAL_Z"), counter="SEQ", stamp="TSTAMP"
+    )

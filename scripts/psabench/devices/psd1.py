@@ -11,8 +11,9 @@ class Psd1(BusUnit):
 
     unit.stream(100)["X"]      # words of converter X
     unit.bus_read(3)           # a read cycle at address 3
+    unit.also("PSD1_TIME")     # from now on readings have their instants: PSD1_GYRO, PSD1_RATE likewise
     """
 
     board = "psd1"
     title = "PSD-1"
-    layout = ReadingLayout(board="psd1", messages=("PSD1_CYCLE",), counter="CNT")
+    layout = ReadingLayout(board="psd1", messages=("PSD1_CYCLE",), counter="CNT", stamp="TSTAMP", overrun="OVERRUN")
