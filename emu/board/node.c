@@ -41,6 +41,11 @@ static const struct {
     [BOARD_CYCLE_OFF] = {CO_AB_STATE, "the board has no power, or is in reset"},
 };
 
+void board_node_refuse(struct board_node *n, const char *why)
+{
+    (void)snprintf(n->refusal, sizeof n->refusal, "refused: %s", why);
+}
+
 uint32_t board_node_abort_of(enum board_cycle_result r)
 {
     assert((size_t)r < sizeof refusals / sizeof refusals[0]);
@@ -297,6 +302,13 @@ void board_node_stream(struct board_node *n, unsigned first, struct can_msg *m, 
     }
     for (unsigned i = 0; i < frames; i++) (void)co_pdo_offer(&n->node, first + i, &m[i], t_ns);
     if (t_ns - n->drop_ns >= BOARD_NODE_CALM_NS) co_node_error_end(&n->node, CAN_OVERRUN, t_ns);
+}
+
+void board_node_say(struct board_node *n, const char *why)
+{
+    if (strcmp(n->refusal, why) == 0) return;
+    (void)snprintf(n->refusal, sizeof n->refusal, "%s", why);
+    if (n->cfg.refused) n->cfg.refused(n->cfg.ctx, n->cfg.name, n->refusal);
 }
 
 /* ---- what the node tells, life ---- */

@@ -84,6 +84,12 @@ struct co_node *board_node_co(void *can);
 /* A reading: m[i] (data and len) goes as TPDO first + i, all or none. Counted also where nothing is sent. */
 void board_node_stream(struct board_node *n, unsigned first, struct can_msg *m, unsigned frames, int64_t t_ns);
 
+/* A setting of the board's own was refused: the sentence becomes object 2031h, and the bench hears it once. */
+void board_node_say(struct board_node *n, const char *why);
+
+/* A setting of the board's own was refused: object 2031h says why. */
+void board_node_refuse(struct board_node *n, const char *why);
+
 /* SDO abort code of a refused cycle: sources can 3.3. */
 uint32_t board_node_abort_of(enum board_cycle_result r);
 
