@@ -36,8 +36,8 @@ static void list_profile(FILE *out, const char *path, const char *comment)
     }
     char about[256];
     type->about(&p, about, sizeof about);
-    fprintf(out, "%-10s %s: %s\n", board_profile_name(type, &p), type->title, about);
-    if (*comment) fprintf(out, "           %s\n", comment);
+    fprintf(out, "%-12s %s: %s\n", board_profile_name(type, &p), type->title, about);
+    if (*comment) fprintf(out, "             %s\n", comment);
 }
 
 static bool list(FILE *out, const char *proto_folder, char *why, size_t cap)

@@ -101,7 +101,14 @@ static const struct {
      "dir/s.yaml:3:12: units.b.node: 5 is taken by unit a; each needs its own"},
     {"units:\n  - {serial: 2}\n  - {}\n", "dir/s.yaml:3:5: units.b.serial: 2 is taken by unit a; each needs its own"},
     {"units: [{name: \"a b\"}]\n", "dir/s.yaml:1:16: units.a b.name: \"a b\": letters, digits and _ are wanted"},
-    {"units: [{board: psd1}]\n", "dir/s.yaml:1:17: units.a.board: psa2 or psa1 is wanted"},
+    {"units: [{board: psa3}]\n", "dir/s.yaml:1:17: units.a.board: psa2, "},
+    {"units: [{board: []}]\n", "dir/s.yaml:1:17: units.a.board: psa2, "},
+    {"units: [{adc_chain: exact, board: pmka}]\n", "dir/s.yaml:1:21: units.a.adc_chain: a PMKA has no such setting"},
+    {"units: [{board: pmka, temp_adc_offset_v: 0}]\n",
+     "dir/s.yaml:1:42: units.a.temp_adc_offset_v: a PMKA has no such setting"},
+    {"units: [{board: pmka, frame_form: 0}]\n", "dir/s.yaml:1:35: units.a.frame_form: a PMKA has no such setting"},
+    {"units: [{board: pmka, profile_set: {word_bits: 24}}]\n",
+     "dir/s.yaml:1:37: units.a.profile_set.word_bits: unknown key; "},
     {"units: [{profile: nope}]\n", "dir/s.yaml:1:19: units.a.profile: nope: no such file in proto/profiles"},
     {"units: [{profile: ./nope.yaml}]\n", "dir/s.yaml:1:19: units.a.profile: dir/./nope.yaml: no such file"},
     {"units:\n- profile_set:\n    word_bits: 20\n",
@@ -203,6 +210,27 @@ static void the_order_of_keys_means_nothing(void **state)
     assert_int_equal(s.units[0].profile.psa2.lead_in_clk, 50);
 }
 
+/* Nodes of the boards' own, the next that is free where one is taken; analog chains of the boards' own. */
+static void each_board_brings_its_defaults(void **state)
+{
+    static const unsigned node[] = {5, 6, 7, 8, 9, 40};
+    (void)state;
+    if (!parse("units: [{}, {}, {board: pmka}, {board: psa1}, {board: pmka}, {board: pmka, node: 40}]\n"))
+        fail_msg("%s", why);
+    for (unsigned i = 0; i < COUNT(node); i++) assert_int_equal(s.units[i].cfg.node, node[i]);
+    assert_string_equal(s.units[2].cfg.type->name, "pmka");
+    assert_string_equal(s.units[3].cfg.type->name, "psa2");
+    const struct afe_cfg pmka = s.units[2].cfg.board.afe[0];
+    assert_true(pmka.divider_ratio == 1 && s.units[3].cfg.board.afe[0].divider_ratio == 8);
+    if (!parse("units: [{axes: {x: {afe: {load_ohm: 999}}}, node: 9, board: pmka}]\n")) fail_msg("%s", why);
+    assert_true(s.units[0].cfg.board.afe[0].load_ohm == 999);
+    assert_true(s.units[0].cfg.board.afe[0].divider_ratio == 1);
+    assert_int_equal(s.units[0].cfg.node, 9);
+    if (!parse("buses: [{}, {}]\nunits: [{}, {bus: can1}, {bus: can1, board: psa1}]\n")) fail_msg("%s", why);
+    assert_int_equal(s.units[1].cfg.node, 6); /* as ever: the second of its type */
+    assert_int_equal(s.units[2].cfg.node, 7);
+}
+
 static void cut_off_anywhere_a_scenario_is_refused_or_sound(void **state)
 {
     (void)state;
@@ -277,6 +305,7 @@ int main(void)
         cmocka_unit_test(every_key_reaches_its_field),
         cmocka_unit_test(what_is_wrong_is_told_with_file_line_key_and_remedy),
         cmocka_unit_test(the_order_of_keys_means_nothing),
+        cmocka_unit_test(each_board_brings_its_defaults),
         cmocka_unit_test(cut_off_anywhere_a_scenario_is_refused_or_sound),
         cmocka_unit_test(the_shipped_scenarios_and_profiles_load),
         cmocka_unit_test(a_missing_scenario_is_told_in_one_line),
