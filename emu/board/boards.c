@@ -3,19 +3,17 @@
 #include "board/pik_board.h"
 #include "board/pmka_board.h"
 #include "board/psa2_board.h"
+#include "board/psd1_board.h"
 
 #include <string.h>
 
-const struct board_type *const board_types[] = {&psa2_board, &pmka_board, &pik_board, NULL};
+const struct board_type *const board_types[] = {&psa2_board, &psd1_board, &pmka_board, &pik_board, NULL};
 
 const struct board_name board_names[] = {
-    {"psa2", &psa2_board, NULL},
-    {"pmka", &pmka_board, NULL},
-    {"pik", &pik_board, NULL},
-    {"psa1", &psa2_board, "psa1"},
-    {"pik5", &pik_board, "pik5"},
-    {"pik6", &pik_board, "pik6"},
-    {NULL, NULL, NULL},
+    {"psa2", &psa2_board, NULL},   {"psd1", &psd1_board, NULL},
+    {"pmka", &pmka_board, NULL},   {"pik", &pik_board, NULL},
+    {"psa1", &psa2_board, "psa1"}, {"pik5", &pik_board, "pik5"},
+    {"pik6", &pik_board, "pik6"},  {NULL, NULL, NULL},
 };
 
 const struct board_type *board_find(const char *name)

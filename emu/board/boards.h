@@ -8,6 +8,8 @@
 #include "board/pmka.h"
 #include "board/pmka_can.h"
 #include "board/psa2_can.h"
+#include "board/psd1.h"
+#include "board/psd1_can.h"
 
 extern const struct board_type *const board_types[]; /* up to NULL */
 
@@ -27,18 +29,21 @@ const char *board_profile_name(const struct board_type *type, const void *profil
 
 union board_store {
     struct psa2 psa2;
+    struct psd1 psd1;
     struct pmka pmka;
     struct pik pik;
 };
 
 union board_can_store {
     struct psa2_can psa2;
+    struct psd1_can psd1;
     struct pmka_can pmka;
     struct pik_can pik;
 };
 
 union board_profile_store {
     struct psa2_profile psa2;
+    struct psd1_profile psd1;
     struct pmka_profile pmka;
     struct pik_profile pik;
 };

@@ -127,7 +127,7 @@ static void out_of_patience(void *ctx, int64_t t_ns)
         return;
     }
     b->counters.timeouts++;
-    if (!b->fault_told && b->fault) b->fault(b->ctx, PSD1_FAULT_DR, t_ns);
+    if (!b->fault_told && b->host.fault) b->host.fault(b->host.ctx, PSD1_FAULT_DR, t_ns);
     b->fault_told = true;
     psd1_job_patience(b, t_ns);
 }
@@ -143,7 +143,7 @@ static void dr_fell(struct psd1 *b, int64_t t_ns)
     b->dr_ns = t_ns;
     refresh_degc(b, t_ns);
     psd1_arm_patience(b, t_ns);
-    if (b->fault_told && b->fault) b->fault(b->ctx, 0, t_ns);
+    if (b->fault_told && b->host.fault) b->host.fault(b->host.ctx, 0, t_ns);
     b->fault_told = false;
     psd1_tell(b, PSD1_EV_DR, t_ns);
     psd1_job_dr(b, t_ns);
@@ -182,10 +182,7 @@ static double vin_v(void *ctx, unsigned channel, int64_t t_ns)
 /* ---- life ---- */
 
 // clang-format off
-static const struct {
-    const char *name;
-    bool level;
-} lines[PSD1_LINES] = {
+const struct board_line psd1_lines[PSD1_LINES] = {
     {"A0", false}, {"INT0", false}, {"FL1", true}, {"FL2", false}, {"DR", true}, {"RFX", true}, {"RFY", true}, {"RFZ", true},
     {"TFS", true}, {"SCLK", false}, {"SDAT", false}, {"CLK_1M25", false}, {"CS", true}, {"RW", true},
     {"AB0", false}, {"AB1", false}, {"AB2", false}, {"AB3", false},
@@ -194,20 +191,26 @@ static const struct {
 };
 // clang-format on
 
-const char *psd1_line_name(enum psd1_line line)
-{
-    return lines[line].name;
-}
-
-bool psd1_line_rest(enum psd1_line line)
-{
-    return lines[line].level;
-}
+const char *const psd1_events[PSD1_EVENTS] = {
+    [PSD1_EV_RES] = "RES",
+    [PSD1_EV_SETUP_DONE] = "SETUP_DONE",
+    [PSD1_EV_DR] = "DR",
+    [PSD1_EV_A0] = "A0",
+    [PSD1_EV_RFX] = "RFX",
+    [PSD1_EV_RFY] = "RFY",
+    [PSD1_EV_RFZ] = "RFZ",
+    [PSD1_EV_FL2] = "FL2",
+    [PSD1_EV_STROBE] = "STROBE",
+    [PSD1_EV_CYCLE] = "CYCLE",
+    [PSD1_EV_UC] = "UC",
+    [PSD1_EV_POWER_DOWN] = "POWER_DOWN",
+    [PSD1_EV_POWER_UP] = "POWER_UP",
+};
 
 static uint64_t rest_levels(const struct psd1 *b)
 {
     uint64_t level = b->profile.fl2 == PSD1_ACTIVE_LOW ? PSD1_BIT(FL2) : 0;
-    for (unsigned i = 0; i < PSD1_LINES; i++) level |= (uint64_t)lines[i].level << i;
+    for (unsigned i = 0; i < PSD1_LINES; i++) level |= (uint64_t)psd1_lines[i].level << i;
     return level;
 }
 
@@ -216,7 +219,7 @@ static void init_trace(struct psd1 *b)
     trace_init(&b->trace);
     line_faults_init(&b->line, &b->trace);
     const uint64_t level = rest_levels(b);
-    for (unsigned i = 0; i < PSD1_LINES; i++) (void)trace_add(&b->trace, lines[i].name, level >> i & 1);
+    for (unsigned i = 0; i < PSD1_LINES; i++) (void)trace_add(&b->trace, psd1_lines[i].name, level >> i & 1);
     psd1_wave_init(b);
 }
 
@@ -277,6 +280,11 @@ void psd1_init(struct psd1 *b, const struct psd1_profile *p, const struct board_
     psd1_job_init(b);
     psd1_aux_init(b);
     refresh_degc(b, s->now_ns);
+}
+
+void psd1_attach(struct psd1 *b, const struct psd1_host *host)
+{
+    b->host = *host;
 }
 
 /* Everything under way ends, the lines that the controller drives go to rest, it forgets. */

@@ -16,6 +16,7 @@
 #include "board/afe.h"
 #include "board/board_bus.h"
 #include "board/board_cfg.h"
+#include "board/board_part.h"
 #include "board/psd1_profile.h"
 #include "board/psd1_rk.h"
 #include "chip/ad7712.h"
@@ -113,7 +114,7 @@ struct psd1_cycle {
     uint8_t status;  /* enum psd1_cycle_status */
 };
 
-/* EMCY code of io.fault: told once, again only after DR has come. */
+/* EMCY code of psd1_host.fault: told once, again only after DR has come. */
 #define PSD1_FAULT_DR 0xFF01 /* no DR for 100 ms beyond the settling time */
 
 /* Commands of register COMMAND, and what the CAN side asks for. Those with an axis have it in the low bits. */
@@ -137,6 +138,13 @@ struct psd1_request {
     void *ctx;
 };
 
+/* Who hears of what the board does; any may be NULL. */
+struct psd1_host {
+    void *ctx;
+    void (*cycle)(void *ctx, const struct psd1_cycle *c, int64_t t_ns);
+    void (*fault)(void *ctx, uint16_t code, int64_t t_ns); /* PSD1_FAULT_DR; 0: DR is back */
+};
+
 struct psd1_counters {
     uint32_t cycles, resets, commands, timeouts;
     uint32_t late;                   /* strobes that began later than late_ns after FL2 */
@@ -152,6 +160,7 @@ struct psd1_counters {
 
 void psd1_init(struct psd1 *b, const struct psd1_profile *p, const struct board_cfg *cfg, const struct board_io *io,
                struct sched *s);
+void psd1_attach(struct psd1 *b, const struct psd1_host *host);
 void psd1_power_up(struct psd1 *b, int64_t t_ns);
 void psd1_power_down(struct psd1 *b, int64_t t_ns);
 void psd1_reset(struct psd1 *b, int64_t t_ns);
@@ -167,7 +176,8 @@ enum board_cycle_result psd1_request(struct psd1 *b, struct psd1_request *r, con
 void psd1_flags(struct psd1 *b, bool int0, bool fl1, int64_t t_ns);
 
 const char *psd1_register_name(unsigned address); /* NULL: none */
-const char *psd1_line_name(enum psd1_line line);
-bool psd1_line_rest(enum psd1_line line); /* its level at rest, FL2 active high */
+
+extern const struct board_line psd1_lines[PSD1_LINES]; /* at rest, FL2 active high */
+extern const char *const psd1_events[PSD1_EVENTS];
 
 #endif

@@ -111,7 +111,7 @@ static int64_t cycle_end(struct psd1 *b, int64_t t_ns)
     b->latest = *c;
     b->phase = PSD1_IDLE;
     psd1_tell(b, PSD1_EV_CYCLE, t_ns);
-    if (b->cycle_done) b->cycle_done(b->ctx, &b->latest, t_ns);
+    if (b->host.cycle) b->host.cycle(b->host.ctx, &b->latest, t_ns);
     psd1_try_start(b, t_ns);
     return b->due_ns;
 }

@@ -106,10 +106,8 @@ struct psd1 {
     struct psd1_profile profile;
     struct board_cfg unit;
     struct board_io io;
-    bool told;                                                               /* somebody wants io.event */
-    void *ctx;                                                               /* of the two below; set by the CAN side */
-    void (*cycle_done)(void *ctx, const struct psd1_cycle *c, int64_t t_ns); /* may be NULL */
-    void (*fault)(void *ctx, uint16_t code, int64_t t_ns);                   /* PSD1_FAULT_DR; 0: DR is back; or NULL */
+    bool told; /* somebody wants io.event */
+    struct psd1_host host;
     struct sched *sched;
     struct trace trace;
     struct line_faults line;
