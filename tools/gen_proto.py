@@ -182,10 +182,10 @@ def read_object(o: dict[str, Any], source: dict[str, Any]) -> Object:
 
 
 def tpdo_objects(tpdos: list[dict[str, Any]], forms: list[dict[str, Any]]) -> list[Object]:
-    """1800h.. and 1A00h..; valid by default: those of frame form 0, or all that are not off."""
+    """1800h.. and 1A00h..; valid by default: those of frame form 0, or all that are not optional."""
     out = []
     for k, t in enumerate(tpdos):
-        valid = t["message"] in forms[0]["messages"] if forms else not t.get("off", False)
+        valid = t["message"] in forms[0]["messages"] if forms else not t.get("optional", False)
         switch = "; the frame form sets and clears bit 31" if forms else ""
         cob = t["cob"] + (PDO_VALID_NO_RTR if valid else PDO_INVALID_NO_RTR)
         u32 = {"type": "UNSIGNED32", "access": "const"}
@@ -288,6 +288,9 @@ def load_unit(key: str, base: Protocol) -> Protocol:
     path = ROOT / f"proto/{key}.yaml"
     source = yaml.safe_load(path.read_text())
     objects = unit_objects(source, base) + tpdo_objects(source["tpdos"], source.get("forms", []))
+    for t in source["tpdos"]:
+        if unknown := set(t) - {"message", "cob", "map", "optional"}:
+            raise ValueError(f"{path.name}: TPDO {t['message']}: no such key: {unknown}")
     indices = [o.index for o in objects]
     if len(set(indices)) != len(indices):
         raise ValueError(f"{path.name}: an object stands twice")
@@ -465,7 +468,7 @@ def device_source(p: Protocol) -> list[str]:
     if any(m.fd for m in p.messages):
         raise ValueError(f"{p.source}: an FD message; canopen/co_device.h knows classic frames only")
     tpdos = ", ".join(str(length[t["message"]]) for t in p.tpdos)
-    off = sum(1 << k for k, t in enumerate(p.tpdos) if t.get("off", False))
+    off = sum(1 << k for k, t in enumerate(p.tpdos) if t.get("optional", False))
     counters = next(o for o in p.objects if o.const == "COUNTERS")
     own_sub = len(counters.entries) - len(p.counters)
     lines = [f"static const uint8_t tpdo_len[] = {{{tpdos}}};",

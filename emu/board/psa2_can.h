@@ -16,6 +16,7 @@
 
 #include "base/can.h"
 #include "board/board_can.h"
+#include "board/can_load.h"
 #include "board/psa2.h"
 #include "canopen/co_node.h"
 #include "gen/psa2_od.h"
@@ -74,7 +75,7 @@ struct psa2_can {
     uint32_t ticket, syncs_missed;
     /* text objects, load mark */
     char refusal[PSA2_CAN_TEXT], remark[PSA2_CAN_REMARK + 1];
-    int64_t load_mark_ns, load_mark_busy_ns;
+    struct can_load_mark load;
 };
 
 struct psa2_can_port psa2_can_port(struct psa2 *b);

@@ -1,4 +1,5 @@
 #include "base/canbits.h"
+#include "board/can_load.h"
 #include "board/psa2_can_parts.h"
 #include "gen/psabench_can.h"
 
@@ -31,18 +32,6 @@ static void say_needs_fd(unsigned form, char why[PSA2_CAN_TEXT])
                    forms[form].name);
 }
 
-static void say_too_much(const struct can_bus_cfg *bus, unsigned form, int64_t need_ns, int64_t have_ns,
-                         char why[PSA2_CAN_TEXT])
-{
-    const struct form *f = &forms[form];
-    (void)snprintf(
-        why, PSA2_CAN_TEXT,
-        "refused: form %u (%s) is %u frame%s, at worst %.3f us at %lu bit/s, and due every %.3f us (%.0f /s): "
-        "%.1f %% of the bus",
-        form, f->name, f->frames, f->frames > 1 ? "s" : "", 1e-3 * (double)need_ns, (unsigned long)bus->bitrate_hz,
-        1e-3 * (double)have_ns, 1e9 / (double)have_ns, 100.0 * (double)need_ns / (double)have_ns);
-}
-
 /* How often a form is due; with samples on SYNC the host sets the pace, and an overrun is told when it happens. */
 static int64_t due_ns(const struct psa2_can_settings *set, int64_t period_ns)
 {
@@ -58,11 +47,9 @@ bool psa2_can_fit(const struct can_bus_cfg *bus, const struct psa2_can_settings 
         say_needs_fd(set->form, why);
         return false;
     }
-    const int64_t need_ns = worst_ns(f, bus);
-    const int64_t have_ns = due_ns(set, period_ns);
-    if (have_ns <= 0 || need_ns <= have_ns) return true;
-    say_too_much(bus, set->form, need_ns, have_ns, why);
-    return false;
+    char what[32];
+    (void)snprintf(what, sizeof what, "form %u (%s)", set->form, f->name);
+    return can_load_fits(bus, what, f->frames, worst_ns(f, bus), due_ns(set, period_ns), why, PSA2_CAN_TEXT);
 }
 
 /* fDATA = fCLK / (16384 >> DR) in the FIR modes (sources 1.8); other modes and DR 5..7 the board refuses. */

@@ -149,16 +149,6 @@ static uint32_t write_opcode(struct psa2_can *c, const struct co_entry *e, const
 
 /* ---- counters and identity ---- */
 
-static int64_t load_permille(struct psa2_can *c, int64_t t_ns)
-{
-    const int64_t busy_ns = can_busy_ns(c->bus, t_ns);
-    const int64_t span_ns = t_ns - c->load_mark_ns;
-    const int64_t used_ns = busy_ns - c->load_mark_busy_ns;
-    c->load_mark_ns = t_ns;
-    c->load_mark_busy_ns = busy_ns;
-    return span_ns > 0 ? used_ns * 1000 / span_ns : 0;
-}
-
 /* Sub-indices in order; TEC, REC and state (5..7) stay 0: no errors on the wire are modelled. */
 static uint32_t read_counter(struct psa2_can *c, const struct co_entry *e, struct co_value *v, int64_t t_ns)
 {
@@ -180,7 +170,7 @@ static uint32_t read_counter(struct psa2_can *c, const struct co_entry *e, struc
                               c->node.sdo.aborts,
                               c->node.malformed + c->node.sdo.malformed};
     if (e->sub >= sizeof value / sizeof value[0]) return CO_AB_NO_SUB;
-    v->number = e->sub == LOAD ? (double)load_permille(c, t_ns) : (double)value[e->sub];
+    v->number = e->sub == LOAD ? (double)can_load_since(&c->load, c->bus, t_ns) : (double)value[e->sub];
     return CO_OK;
 }
 

@@ -238,14 +238,14 @@ def test_the_sdo_server_lets_every_cycle_through_to_the_board(protocol: Any) -> 
 def test_the_c_tables_of_a_unit_say_what_its_source_says(protocol: Any) -> None:
     text = gen_proto.od_source(protocol)
     assert f"counter[] = {{{', '.join(f'{chr(34)}{c}{chr(34)}' for c in protocol.counters)}}}" in text
-    off = sum(1 << k for k, t in enumerate(protocol.tpdos) if t.get("off"))
+    off = sum(1 << k for k, t in enumerate(protocol.tpdos) if t.get("optional"))
     assert f".tpdo_off = {off}u," in text
     assert f".counter_count = {len(protocol.counters)}," in text
     assert ".counter_sub = 12," in text
 
 
 def test_an_optional_tpdo_is_off_in_the_eds() -> None:
-    on, off = ({"message": "M", "cob": 0x180, "off": o} for o in (False, True))
+    on, off = ({"message": "M", "cob": 0x180, "optional": o} for o in (False, True))
     for t, cob in ((on, 0x40000180), (off, 0xC0000180)):
         assert gen_proto.tpdo_objects([t], [])[0].entries[1].value == cob
 

@@ -557,6 +557,19 @@ static void cut_frames_are_counted_and_not_answered(void **state)
     assert_int_equal(upload(r, PSD1_OD_COUNTERS, MALFORMED), 1);
 }
 
+static void a_board_says_in_words_why_it_refused_a_setting(void **state)
+{
+    (void)state;
+    struct rig *r = rig_up();
+    board_node_say(&r->can, "refused: no such gain");
+    board_node_say(&r->can, "refused: no such gain");
+    assert_string_equal(upload_text(r, PSD1_OD_REFUSAL), "refused: no such gain");
+    assert_string_equal(r->told, "unit refused: no such gain");
+    assert_int_equal(r->refusals, 1);
+    board_node_say(&r->can, "refused: no such rate");
+    assert_int_equal(r->refusals, 2);
+}
+
 /* ---- stream ---- */
 
 static void readings(struct rig *r, unsigned n)
@@ -701,6 +714,7 @@ int main(void)
         cmocka_unit_test(power_forgets_the_remark),
         cmocka_unit_test(sync_and_start_reach_the_board),
         cmocka_unit_test(cut_frames_are_counted_and_not_answered),
+        cmocka_unit_test(a_board_says_in_words_why_it_refused_a_setting),
         cmocka_unit_test(readings_flow_while_operational),
         cmocka_unit_test(a_stream_that_does_not_fit_stands_and_says_why),
         cmocka_unit_test(a_stream_at_the_pace_of_sync_is_not_judged),
