@@ -69,7 +69,6 @@ static enum control_outcome submit(struct control *c, struct control_cycle *k, i
     if (k->client && control_by_step(b) && !b->run(b->ctx, PATIENCE_NS, 0, c->refusal.why)) {
         c->refusal.code = "state";
         k->client = NULL; /* it goes its way, nobody waits */
-        c->started = NULL;
         return CONTROL_REFUSED;
     }
     return CONTROL_LATER;

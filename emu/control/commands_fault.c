@@ -206,7 +206,7 @@ static const struct control_command rows[COMMANDS] = {
      [FAULT_AMPLITUDE_V] = {"amplitude_v", CONTROL_REAL, true, "V", FAULT_LEAST_V, 10, .what = "of the ripple at the load"},
      [FAULT_FREQUENCY_HZ] = {"frequency_hz", CONTROL_REAL, true, "Hz", 0.1, 100, .what = "of the ripple; more would not pass the filter at 250 SPS"},
      [FAULT_LEVEL] = {"level", CONTROL_CHOICE, true, .what = "at which it stays", .choices = levels},
-     [FAULT_REGISTER] = {"register", CONTROL_COUNT, true, NULL, 0, 31, .what = "number of the register in the chip"},
+     [FAULT_REGISTER] = {"register", CONTROL_COUNT, true, NULL, 0, 255, .what = "number of the register in the chip"},
      [FAULT_MASK] = {"mask", CONTROL_COUNT, true, NULL, 1, 255, .what = "bits that are inverted"},
      [FAULT_CLOCK_PPM] = {"clock_ppm", CONTROL_REAL, true, "ppm", -FAULT_PPM_MAX, FAULT_PPM_MAX, .what = "error of the chip's clock; negative: slow"},
      [FAULT_WIDTH_NS] = {"width_ns", CONTROL_COUNT, true, "ns", 1, 1e9, .what = "of the pulse"},

@@ -1,5 +1,5 @@
-/* A board that is none of the real ones, for what the commands and faults do with any board's table: three chips in two
- * groups, a controller that can freeze, two lines, events TICK and TOCK, a bus with four addresses. */
+/* A board that is none of the real ones, for what the commands and faults do with any board's table: four chips, two of
+ * them a group, a controller that can freeze, three lines, events TICK and TOCK, a bus with four addresses. */
 #ifndef PSABENCH_TESTS_FAKE_BOARD_H
 #define PSABENCH_TESTS_FAKE_BOARD_H
 
@@ -12,7 +12,7 @@
 #define FAKE_PULSES    8u
 #define FAKE_CODE_V    1e-3
 
-enum { FAKE_CTL, FAKE_CONV_A, FAKE_CONV_B, FAKE_ROM, FAKE_PARTS };
+enum { FAKE_CTL, FAKE_CONV_A, FAKE_CONV_B, FAKE_ROM, FAKE_LAMP, FAKE_PARTS };
 
 struct fake_chip {
     uint32_t conversions, lost;
@@ -146,7 +146,7 @@ static double fake_code_v(const void *board)
     return FAKE_CODE_V;
 }
 
-static const struct board_line fake_lines[] = {{"BEAT", true}, {"CK", false}};
+static const struct board_line fake_lines[] = {{"BEAT", true}, {"CK", false}, {"MARK", false}};
 static const char *const fake_events[] = {"TICK", "TOCK"};
 static const struct board_counter fake_ctl_counters[] = {{"cycles", offsetof(struct fake_board, cycles)}};
 static const struct board_counter fake_chip_counters[] = {{"conversions", offsetof(struct fake_chip, conversions)},
@@ -167,6 +167,7 @@ static const struct board_part fake_parts[FAKE_PARTS] = {
     [FAKE_CONV_B] =
         {.name = "conv.b", .label = "conv_b", FAKE_CHIP(1), .faults = BOARD_FAULT_DOUT, .fault = fake_chip_fault},
     [FAKE_ROM] = {.name = "rom", .label = "memory", FAKE_CHIP(2)},
+    [FAKE_LAMP] = {.name = "lamp", .label = "lamp", FAKE_CHIP(3)},
 };
 static const struct board_bus fake_bus = {.submit = fake_submit, .addresses = 4, .name = fake_name};
 
@@ -175,7 +176,7 @@ static const struct board_type fake_type = {
     .title = "FAKE-1",
     .size = sizeof(struct fake_board),
     .lines = fake_lines,
-    .line_count = 2,
+    .line_count = 3,
     .frame_line = 0,
     .pulse_line = 1,
     .pulses = fake_pulses,

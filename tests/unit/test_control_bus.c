@@ -169,9 +169,11 @@ static void a_run_that_ends_before_the_cycle_is_refused_and_the_cycle_goes_its_w
     r.by_step = true;
     assert_null(say(&me, READ_0));
     assert_has(control_run_done(&r.control, 100), "has not come to its end");
+    assert_null(say(&me, "{'cmd':'run','args':{'for_s':1}}"));
     sched_run_until(&r.s, FAKE_STROBE_NS);
     assert_int_equal(r.stops + r.replies, 0);
     assert_null(r.control.cycle[0].control);
+    assert_has(control_run_done(&r.control, FAKE_STROBE_NS), "\"result\":{}");
     r.cannot_run = true;
     assert_has(say(&me, READ_0), "\"state\",\"text\":\"not now\"");
     assert_false(r.control.waiting);
