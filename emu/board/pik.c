@@ -279,6 +279,7 @@ void pik_reset(struct pik *b, int64_t t_ns)
 
 void pik_listen(struct pik *b, bool on)
 {
+    if (b->on) pik_advance(b, pik_tick_at(b, b->sched->now_ns)); /* what was before is told to nobody */
     b->heard = on;
     if (b->on) pik_arm_pulse(b, b->trace.watched);
 }

@@ -45,9 +45,10 @@ static double worst_ppm(const struct pik_specimen *s)
 /* A unit that would not keep the article's error does not leave the factory: its parts are selected, here brought nearer. */
 static void select_parts(struct pik_specimen *s, double limit_ppm)
 {
+    const double bound_ppm = limit_ppm * (1.0 - 2e-6 * limit_ppm); /* errors multiply, their sum is the first order */
     const double worst = worst_ppm(s);
-    if (limit_ppm <= 0.0 || worst <= limit_ppm) return;
-    const double keep = 0.999 * limit_ppm / worst; /* a product of errors is not quite their sum */
+    if (limit_ppm <= 0.0 || worst <= bound_ppm) return;
+    const double keep = bound_ppm / worst;
     s->uref_ppm *= keep;
     s->uref_tc *= keep;
     s->clock_ppm *= keep;
