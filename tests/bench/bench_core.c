@@ -1,10 +1,12 @@
-/* How fast the emulator's core is: one PSA-2 of the article's profile, 1000 frames of simulated time a second.
+/* How fast the emulator's core is: one PSA-2 of the article's profile, 1000 frames of simulated time a second, or one PSD-1
+ * with its built-in host, 1028 cycles.
  *
  *     bench_core CASE [FRAMES]    prints: CASE frames=N edges=M ns=T hash=H
  *
  * The clock runs from the first frame after the set-up on. Under callgrind take the difference of two counts of frames:
  * the set-up is the same in both. The hash is over the words of all frames: a faster core says the same. */
 #include "board/psa2.h"
+#include "board/psd1.h"
 #include "trace/vcd.h"
 
 #include <inttypes.h>
@@ -19,6 +21,8 @@
 struct bench {
     struct sched s;
     struct psa2 b;
+    struct psd1 d;
+    struct trace *trace; /* of the one that runs */
     struct trace_sink sink;
     struct vcd vcd;
     uint64_t frames, edges, hash;
@@ -48,6 +52,23 @@ static void frame(void *ctx, const struct psa2_frame *f, int64_t t_ns)
     (void)t_ns;
     n->frames++;
     for (unsigned w = 0; w < PSA2_WORDS; w++) n->hash = (n->hash ^ f->word[w]) * UINT64_C(0x100000001B3);
+}
+
+static void cycle(void *ctx, const struct psd1_cycle *c, int64_t t_ns)
+{
+    struct bench *n = ctx;
+    (void)t_ns;
+    n->frames++;
+    for (unsigned i = 0; i < 3; i++) n->hash = (n->hash ^ c->word[i]) * UINT64_C(0x100000001B3);
+}
+
+static void rate(void *ctx, int64_t t_ns, double w_radps[3])
+{
+    (void)ctx;
+    (void)t_ns;
+    w_radps[0] = 0.1;
+    w_radps[1] = -0.2;
+    w_radps[2] = 0.3;
 }
 
 static uint64_t bits_set(uint64_t v)
@@ -82,8 +103,8 @@ static int64_t clock_ns(void)
 
 static void watch(struct bench *n)
 {
-    n->sink = (struct trace_sink){.mask = (UINT32_C(1) << PSA2_LINES) - 1, .steps = count, .ctx = n};
-    trace_attach(&n->b.trace, &n->sink);
+    n->sink = (struct trace_sink){.mask = TRACE_FIRST(n->trace->count), .steps = count, .ctx = n};
+    trace_attach(n->trace, &n->sink);
 }
 
 /* The whole board with a recording of all its lines. */
@@ -101,7 +122,7 @@ static void run_frames(struct bench *n, uint64_t frames)
     const uint64_t end = n->frames + frames;
     while (n->frames < end) {
         sched_run_until(&n->s, n->s.now_ns + STEP_NS);
-        trace_advance(&n->b.trace, n->s.now_ns - TRACE_LAG_NS);
+        trace_advance(n->trace, n->s.now_ns - TRACE_LAG_NS);
     }
 }
 
@@ -123,19 +144,26 @@ static void replay(struct bench *n, uint64_t frames)
     }
 }
 
+static void power_up(struct bench *n, enum ads1282_chain chain);
+static void power_up_psd1(struct bench *n, enum ads1282_chain chain);
+
 static const struct bench_case {
     const char *name;
+    void (*power_up)(struct bench *n, enum ads1282_chain chain);
     enum ads1282_chain chain;
     void (*before)(struct bench *n);
     void (*run)(struct bench *n, uint64_t frames);
 } cases[] = {
-    {"frames", ADS1282_CHAIN_EXACT, NULL, run_frames},               /* nobody watches, bit-exact decimation chain */
-    {"frames-direct", ADS1282_CHAIN_DIRECT, NULL, run_frames},       /* without the chain */
-    {"frames-modulator", ADS1282_CHAIN_MODULATOR, NULL, run_frames}, /* with a bit-true modulator, too */
-    {"frames-watched", ADS1282_CHAIN_EXACT, watch, run_frames},      /* all lines, a watcher that counts */
-    {"frames-watched-direct", ADS1282_CHAIN_DIRECT, watch, run_frames},
-    {"frames-vcd", ADS1282_CHAIN_DIRECT, record, run_frames}, /* all lines into a VCD */
-    {"vcd", ADS1282_CHAIN_DIRECT, tape_then_record, replay},  /* the VCD writer alone, fed with the edges of frames */
+    {"frames", power_up, ADS1282_CHAIN_EXACT, NULL, run_frames}, /* nobody watches, bit-exact decimation chain */
+    {"frames-direct", power_up, ADS1282_CHAIN_DIRECT, NULL, run_frames},       /* without the chain */
+    {"frames-modulator", power_up, ADS1282_CHAIN_MODULATOR, NULL, run_frames}, /* with a bit-true modulator, too */
+    {"frames-watched", power_up, ADS1282_CHAIN_EXACT, watch, run_frames},      /* all lines, a watcher that counts */
+    {"frames-watched-direct", power_up, ADS1282_CHAIN_DIRECT, watch, run_frames},
+    {"frames-vcd", power_up, ADS1282_CHAIN_DIRECT, record, run_frames}, /* all lines into a VCD */
+    {"vcd", power_up, ADS1282_CHAIN_DIRECT, tape_then_record,
+     replay}, /* the VCD writer alone, fed with the edges of frames */
+    {"psd1-unwatched", power_up_psd1, ADS1282_CHAIN_EXACT, NULL, run_frames},
+    {"psd1-watched", power_up_psd1, ADS1282_CHAIN_EXACT, watch, run_frames}, /* all lines, 1M25 among them */
 };
 
 static void power_up(struct bench *n, enum ads1282_chain chain)
@@ -148,14 +176,34 @@ static void power_up(struct bench *n, enum ads1282_chain chain)
     sched_init(&n->s);
     psa2_init(&n->b, &p, &u, &io, &n->s);
     psa2_attach(&n->b, &(struct psa2_host){.ctx = n, .frame = frame});
+    n->trace = &n->b.trace;
     psa2_power_up(&n->b, 0);
+    run_frames(n, 1);
+}
+
+static void power_up_psd1(struct bench *n, enum ads1282_chain chain)
+{
+    const struct board_io io = {.ctx = n, .accel = accel, .temp_degc = degc, .rate_radps = rate};
+    struct board_cfg u = {.adc_noise_scale = 1.0, .temp_noise_scale = 1.0, .adc_chain = chain, .seed = 1, .serial = 1};
+    struct psd1_profile p;
+    psd1_profile_default(&p);
+    for (unsigned i = 0; i < 3; i++) {
+        u.afe[i] = afe_nominal(AFE_VOLTAGE);
+        u.afe[i].divider_ratio = 1.0;
+    }
+    memset(n, 0, sizeof *n);
+    sched_init(&n->s);
+    psd1_init(&n->d, &p, &u, &io, &n->s);
+    psd1_attach(&n->d, &(struct psd1_host){.ctx = n, .cycle = cycle});
+    n->trace = &n->d.trace;
+    psd1_power_up(&n->d, 0);
     run_frames(n, 1);
 }
 
 static void run_case(const struct bench_case *c, uint64_t frames)
 {
     static struct bench n;
-    power_up(&n, c->chain);
+    c->power_up(&n, c->chain);
     if (c->before) c->before(&n);
     n.edges = 0;
     const uint64_t first = n.frames;
