@@ -81,5 +81,6 @@ struct api_kind {
 extern const struct api_kind *const api_kinds[];
 extern const unsigned api_kind_count;
 extern const struct api_kind api_ads1281, api_ads1282, api_ads1255, api_ads1256, api_psa2;
+extern const struct api_kind api_ad7710, api_ad7711, api_ad7711a, api_ad7712;
 
 #endif

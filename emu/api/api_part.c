@@ -5,14 +5,15 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { KINDS = 5 };
+enum { KINDS = 9 };
 
-const struct api_kind *const api_kinds[KINDS] = {&api_ads1281, &api_ads1282, &api_ads1255, &api_ads1256, &api_psa2};
+const struct api_kind *const api_kinds[KINDS] = {&api_ads1281, &api_ads1282, &api_ads1255, &api_ads1256, &api_ad7710,
+                                                 &api_ad7711,  &api_ad7711a, &api_ad7712,  &api_psa2};
 const unsigned api_kind_count = KINDS;
 
 const char *psabench_parts(void)
 {
-    return "ads1281 ads1282 ads1255 ads1256 psa2"; /* a test holds it against api_kinds */
+    return "ads1281 ads1282 ads1255 ads1256 ad7710 ad7711 ad7711a ad7712 psa2"; /* a test holds it against api_kinds */
 }
 
 static const struct api_kind *find_kind(const char *name)

@@ -82,8 +82,8 @@ PSABENCH_API int psabench_vcd_close(psabench *b); /* PSABENCH_OK too when there 
 
 /* ---- Parts ---- */
 
-/* Parts: "ads1281" "ads1282" "ads1255" "ads1256" "psa2". name: for the recording and the noise streams, unique on the
- * bench, 1 to 31 of A-Z a-z 0-9 _ - . options: "key=value key=value"; psabench_options() lists them; NULL or "": all
+/* Parts: "ads1281" "ads1282" "ads1255" "ads1256" "ad7710" "ad7711" "ad7711a" "ad7712" "psa2". name: for the recording and
+ * the noise streams, unique on the bench, 1 to 31 of A-Z a-z 0-9 _ - . options: "key=value key=value"; psabench_options() lists them; NULL or "": all
  * default. The part has its supplies and clock from now on; what it does after power-up begins at once.
  * NULL: psabench_error_text(b) says why. */
 PSABENCH_API psabench_part *psabench_part_new(psabench *b, const char *part, const char *name, const char *options);
@@ -103,10 +103,12 @@ PSABENCH_API const char *psabench_part_name(const psabench_part *p);
  *                      ads1281 with pin_mode=1: DR0 DR1 PHS HPF CSYNC
  *   ads1255, ads1256   DRDY DOUT SCLK DIN CS SYNC RESET D0 D1; ads1256: D2 D3. SYNC is SYNC/PDWN. D0.. are both input and
  *                      output. As CLKOUT D0 reads 0: counter clkout_hz has the frequency
+ *   ad7710 .. ad7712   DRDY SDATA SCLK A0 RFS TFS MODE SYNC STANDBY. SDATA and, with MODE high, SCLK are both input and
+ *                      output: what is read is the level of whoever drives
  *   psa2               the article's lines SYNC_A SClk DRD_A DIn DOutX DOutY DOutZ SYNC_T CST DRD_T DInT DOutT Res Data CLK
  *                      Int, all outputs; a 0 set on Res starts the board's own reset pulse
  * Inputs that nobody has set: SCLK, DIN, the SYNC and mode pins of the ads128x and D0.. low; CS, RESET, PWDN, the SYNC of
- * the ads125x high. DOUT of the ads125x reads 0 in high impedance. */
+ * the ads125x high; of the ad771x RFS, TFS, SYNC, STANDBY high. DOUT of the ads125x reads 0 in high impedance. */
 PSABENCH_API int psabench_pin(const psabench_part *p, const char *name);
 PSABENCH_API const char *psabench_pin_name(const psabench_part *p, int pin);
 PSABENCH_API int psabench_pin_is_input(const psabench_part *p, int pin); /* of the part: the program may set it */
@@ -128,7 +130,8 @@ PSABENCH_API int psabench_run_until_level(psabench_part *p, int pin, int level, 
 
 /* Input of a part, volts (PSA-2 with a current input: amperes), at t_ns: never earlier than the last call for the same
  * input, perhaps up to a data period ago (ADS128x). Numbers: ads1256: 0..7 AIN0..7, 8 AINCOM, to AGND; ads1255: 0, 1, 8;
- * ads1282: 0 AIN1, 1 AIN2, differential; ads1281: 0; psa2: 0..2 sensors X, Y, Z, and, only for psabench_set_volts(), 3..6
+ * ads1282: 0 AIN1, 1 AIN2, differential; ads1281: 0; ad7710: 0 AIN1(+), 1 AIN1(-), 2 AIN2(+), 3 AIN2(-); ad7711: 0..2, 2 AIN2;
+ * ad7711a: 0, 1; ad7712: 0..2, 2 AIN2, to VBIAS; psa2: 0..2 sensors X, Y, Z, and, only for psabench_set_volts(), 3..6
  * the temperatures of sensors X, Y, Z and of the board, degC. All are 0 V at first. What is no number counts as 0. */
 typedef double psabench_input_fn(void *ctx, psabench_part *p, int input, int64_t t_ns);
 PSABENCH_API int psabench_set_input(psabench_part *p, psabench_input_fn *fn,

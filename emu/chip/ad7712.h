@@ -80,7 +80,7 @@ struct ad7712 {
     int64_t ready;                     /* outputs of the run so far */
     int64_t looks;                     /* of the run so far */
     struct clk_pos look, due;
-    struct clk_step look_step, due_step;
+    struct clk_step look_step, due_step, pulse_step; /* pulse: from the end of a period back */
     struct sched_ev ready_ev, pulse_ev, rise_ev, begin_ev, load_ev, sdata_ev, clock_ev;
     uint32_t word; /* output register, 24 bits */
     bool unread;

@@ -85,7 +85,7 @@ static void await_ready(struct ad7712 *a)
 {
     sched_at(a->sched, &a->ready_ev, a->due.t_ns);
     if (a->unread && phases[a->phase].use == WORD)
-        sched_at(a->sched, &a->pulse_ev, clk_edge_ns(&a->clkin, a->due.k - PULSE_TAU));
+        sched_at(a->sched, &a->pulse_ev, clk_on(a->due, &a->pulse_step).t_ns);
 }
 
 static void measure(struct ad7712 *a)
@@ -112,6 +112,7 @@ static void start_run(struct ad7712 *a, enum phase phase, int64_t start_tau)
     a->look_step = clk_step(&a->clkin, cell_tau);
     a->due = clk_pos(&a->clkin, start_tau + AD7712_SETTLE * period_tau);
     a->due_step = clk_step(&a->clkin, period_tau);
+    a->pulse_step = clk_step(&a->clkin, -PULSE_TAU);
     await_ready(a);
 }
 
@@ -242,7 +243,8 @@ void ad7712_retime(struct ad7712 *a)
     a->due = clk_pos(&a->clkin, a->due.k);
     a->due_step = clk_step(&a->clkin, a->due_step.k);
     if (a->ready_ev.queued) sched_at(a->sched, &a->ready_ev, a->due.t_ns);
-    if (a->pulse_ev.queued) sched_at(a->sched, &a->pulse_ev, clk_edge_ns(&a->clkin, a->due.k - PULSE_TAU));
+    a->pulse_step = clk_step(&a->clkin, -PULSE_TAU);
+    if (a->pulse_ev.queued) sched_at(a->sched, &a->pulse_ev, clk_on(a->due, &a->pulse_step).t_ns);
     if (a->begin_ev.queued) ad7712_restart(a, a->sched->now_ns);
 }
 

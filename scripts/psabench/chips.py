@@ -62,6 +62,15 @@ def ads1282_volts(word: int, *, vref_v: float = 5.0, gain: int = 1) -> float:
     return word * vref_v / (2 * gain * 2**31)
 
 
+def ad7712_volts(
+    code: int, *, vref_v: float = 2.5, gain: int = 1, bits: int = 24, unipolar: bool = False, high_level: bool = False
+) -> float:
+    """Volts at an input of an AD7710..AD7712 for a code of 16 or 24 bits: bipolar codes are offset binary, full scale is
+    VREF / gain. high_level: AIN2 of the AD7712, whose divider makes it four times that."""
+    full_v = vref_v * (4 if high_level else 1) / gain
+    return full_v * (code / 2**bits if unipolar else code / 2 ** (bits - 1) - 1)
+
+
 @dataclass(frozen=True, slots=True)
 class Frame:
     """What a board sent in one of its frames."""
@@ -226,8 +235,9 @@ class Part:
 
     def set_volts(self, input: int, volts: float) -> None:
         """A constant voltage at an input from now on. Numbers: ads1256 0..7 AIN0..AIN7, 8 AINCOM, to AGND; ads1255 0,
-        1, 8; ads1282 0 AIN1, 1 AIN2, differential; ads1281 0; psa2 0..2 sensors X, Y, Z (with a current input amperes),
-        3..6 the temperatures of these sensors and of the board, degC."""
+        1, 8; ads1282 0 AIN1, 1 AIN2, differential; ads1281 0; ad7710 0 AIN1(+), 1 AIN1(-), 2 AIN2(+), 3 AIN2(-); ad7711
+        0..2, 2 AIN2; ad7711a 0, 1; ad7712 0..2, 2 AIN2, to VBIAS; psa2 0..2 sensors X, Y, Z (with a current input
+        amperes), 3..6 the temperatures of these sensors and of the board, degC."""
         self.bench.done(self._lib.set_volts(self.live(), _word("input", input), volts))
 
     def set_input(self, fn: Callable[[int, int], float] | None) -> None:

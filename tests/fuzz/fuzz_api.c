@@ -57,7 +57,7 @@ static const char *text(struct script *s, char *buf, size_t cap)
 
 static void op_part(struct world *w, psabench_part *p)
 {
-    static const char *const parts[] = {"ads1281", "ads1282", "ads1255", "ads1256", "psa2", "adc"};
+    static const char *const parts[] = {"ads1281", "ads1282", "ads1255", "ads1256", "psa2", "adc", "ad7710", "ad7711a", "ad7712"};
     char options[200], name[40];
     (void)p;
     if (w->parts == PARTS_MAX) return;

@@ -71,7 +71,7 @@ def drawn(rng: random.Random, line: str) -> tuple[str, str]:
     if rng.random() < 0.6 or key in ("sclk_hz", "cells_max"):
         return key, default
     high = min(high, 2.0) if key.endswith("scale") else min(high, 1e7)
-    if key.endswith("_hz"):
+    if key.endswith(("_hz", "_ns")):
         return key, str(rng.randint(int(low), int(high)))
     return key, f"{low + (high - low) * rng.random():.6f}"
 
@@ -84,6 +84,29 @@ def spi_bytes(rng: random.Random, part: str) -> bytes:
         first = 0x50 if part.startswith("ads125") else 0x40
         return bytes((first | rng.randrange(6), rng.randrange(2), rng.randrange(256), rng.randrange(256)))
     return rng.randbytes(rng.randint(1, 6)) if kind < 0.8 else bytes(rng.randint(1, 6))
+
+
+def frame(rng: random.Random, bench: Bench, p: Part) -> str:
+    """A read or a write of an AD771x, mostly of a whole word and in time."""
+    write = rng.random() < 0.3
+    word = rng.choice((0, 1, 1, 2, 3, 4, 5, 6, 7)) << 21 | rng.randrange(8) << 18 | rng.randrange(256) << 12
+    word = (word & ~0x10000 if rng.random() < 0.9 else word) | rng.choice((19, 25, 60))
+    p.pins["A0"].set(rng.randrange(2))
+    bench.run_for(1e-6)
+    p.pins["TFS" if write else "RFS"].set(0)
+    bench.run_for(1e-6)
+    bits = ""
+    for i in range(24 if write else rng.choice((16, 24, 24, 8))):
+        if write:
+            p.pins["SDATA"].set(word >> (23 - i) & 1)
+        bench.run_for(5e-7)
+        p.pins["SCLK"].set(1)
+        bits += str(p.pins["SDATA"].level)
+        bench.run_for(5e-7)
+        p.pins["SCLK"].set(0)
+    bench.run_for(1e-6)
+    p.pins["TFS" if write else "RFS"].set(1)
+    return bits
 
 
 def pulse(rng: random.Random, bench: Bench, p: Part) -> str:
@@ -99,7 +122,7 @@ def pulse(rng: random.Random, bench: Bench, p: Part) -> str:
 
 def recover(p: Part) -> None:
     """Out of whatever holds it, to the next word."""
-    for name in ("RESET", "PWDN", "SYNC"):
+    for name in ("RESET", "PWDN", "SYNC", "STANDBY", "RFS", "TFS"):
         if name in p.pins:
             p.pins[name].set(1)
     p.pins["SCLK"].set(0)
@@ -109,13 +132,15 @@ def recover(p: Part) -> None:
 def chip_call(rng: random.Random, bench: Bench, p: Part, kind: str) -> str:
     """One thing that a driver or a bad driver does."""
     what = rng.randrange(8)
+    if what < 3 and kind.startswith("ad77"):
+        return frame(rng, bench, p)
     if what < 3:
         return p.spi(spi_bytes(rng, kind)).hex()
     if what == 3:
         return pulse(rng, bench, p)
     if what == 4:
         p.set_volts(rng.randrange(2), rng.uniform(-3, 6))
-    elif what == 5:
+    elif what == 5 and not kind.startswith("ad77"):
         p.spi_clock(rng.choice((100_000, 1_000_000, 2_000_000)), rng.choice((0.0, 7e-6)))
     elif what == 6:
         recover(p)

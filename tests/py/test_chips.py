@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 from psabench import chips, clib, places
-from psabench.chips import Bench, Frame, Part, ads1256_volts, ads1282_volts
+from psabench.chips import Bench, Frame, Part, ad7712_volts, ads1256_volts, ads1282_volts
 from psabench.errors import BadInput, BenchError, TimeOut
 from psabench.vcd import read_vcd
 
@@ -159,6 +159,10 @@ def test_codes_in_volts() -> None:
     assert ads1256_volts(-(2**23), vref_v=2.0, gain=4) == -1.0
     assert ads1282_volts(2**30, vref_v=5.0, gain=1) == 1.25
     assert ads1282_volts(-(2**31), vref_v=4.0, gain=8) == -0.25
+    assert ad7712_volts(0xC00000) == 1.25
+    assert ad7712_volts(0x0000, bits=16, gain=2) == -1.25
+    assert ad7712_volts(0x8000, bits=16, unipolar=True) == 1.25
+    assert ad7712_volts(0xA000, bits=16, high_level=True, vref_v=2.0) == 2.0
 
 
 def test_registers_are_written_over_spi_and_peeked_at(adc: Part) -> None:
@@ -361,7 +365,8 @@ def test_callbacks_outlive_the_names_they_had(adc: Part) -> None:
 
 
 def test_parts_and_their_options_tell_what_there_is(bench: Bench) -> None:
-    assert {"ads1281", "ads1282", "ads1255", "ads1256", "psa2"} == set(chips.parts())
+    assert {"ads1281", "ads1282", "ads1255", "ads1256", "psa2"} <= set(chips.parts())
+    assert {"ad7710", "ad7711", "ad7711a", "ad7712"} <= set(chips.parts())
     for part in chips.parts():
         keys = [line.split("=")[0] for line in chips.options(part).splitlines()]
         assert keys
@@ -370,7 +375,7 @@ def test_parts_and_their_options_tell_what_there_is(bench: Bench) -> None:
     assert "vref_v=" in chips.options("ads1256")
 
 
-@pytest.mark.parametrize("part", ["ads1281", "ads1282", "ads1255", "ads1256"])
+@pytest.mark.parametrize("part", ["ads1281", "ads1282", "ads1255", "ads1256", "ad7710", "ad7712"])
 def test_pins_know_their_direction_and_level(bench: Bench, part: str) -> None:
     pins = bench.part(part).pins
     assert len(pins) > 6
