@@ -62,7 +62,7 @@ struct board_type {
     unsigned (*pulses)(const void *board); /* how many of them; NULL: no line has such pulses */
     /* what a fault of a sensor must come to, to be seen */
     double (*code_v)(const void *board); /* a code at the load, V (of an integrator: a count in a second); NULL: 2 uV */
-    double range_v;                      /* full scale at the load; 0: 10 V */
+    double (*range_v)(const void *board); /* full scale at the load; NULL: 10 V */
     const char *const *events;
     unsigned event_count;
     const struct board_part *parts; /* [0] is the controller */

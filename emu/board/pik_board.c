@@ -118,6 +118,20 @@ static enum board_cycle_result submit(void *board, struct board_cycle *c, int64_
 
 static const struct board_bus bus = {.submit = submit, .addresses = PIK_REGISTERS, .name = pik_register_name};
 
+/* ---- what faults are measured by ---- */
+
+/* One pulse in a second. */
+static double code_v(const void *board)
+{
+    return pik_profile_quantum_vs(&((const struct pik *)board)->profile);
+}
+
+static double range_v(const void *board)
+{
+    const struct pik_profile *p = &((const struct pik *)board)->profile;
+    return pik_profile_limit_hz(p) * pik_profile_quantum_vs(p);
+}
+
 /* ---- life ---- */
 
 static void init(void *board, const void *profile, const struct board_cfg *cfg, const struct board_io *io,
@@ -253,6 +267,8 @@ const struct board_type pik_board = {
     .frame_line = PIK_LINE_LATCH,
     .events = pik_events,
     .event_count = PIK_EVENTS,
+    .code_v = code_v,
+    .range_v = range_v,
     .parts = parts,
     .part_count = PARTS,
     .wrongs = BOARD_WRONG_FROZEN_WORDS,

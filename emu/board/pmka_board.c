@@ -13,13 +13,22 @@ static int64_t period_ns(const void *profile)
     return ((const struct pmka_profile *)profile)->ts_ns;
 }
 
+static double ur_v(const struct pmka_profile *p)
+{
+    return p->uref_v * (0.5e-9 * p->ts_ns) / (p->rr_ohm * p->cap_f);
+}
+
+static double code_vs(const struct pmka_profile *p)
+{
+    return p->uref_v * (1e-9 * p->ts_ns) / (ur_v(p) / p->adc_range_v * 32768.0);
+}
+
 static void about(const void *profile, char *out, size_t cap)
 {
     const struct pmka_profile *p = profile;
-    const double ur_v = p->uref_v * (0.5e-9 * p->ts_ns) / (p->rr_ohm * p->cap_f);
-    const double lsb_vs = p->uref_v * (1e-9 * p->ts_ns) / (ur_v / p->adc_range_v * 32768.0);
     (void)snprintf(out, cap, "Ts %.6g ms, Ur %.4g V, %.4g uV s a code, %s rotation, beats of %u Ts", 1e-6 * p->ts_ns,
-                   ur_v, 1e6 * lsb_vs, p->rotation == PMKA_PROGRAM ? "programmed" : "autonomous", p->beat_periods);
+                   ur_v(p), 1e6 * code_vs(p), p->rotation == PMKA_PROGRAM ? "programmed" : "autonomous",
+                   p->beat_periods);
 }
 
 /* Current output on a load; no divider, and no filter: the integrator is one. */
@@ -146,6 +155,26 @@ static enum board_cycle_result submit(void *board, struct board_cycle *c, int64_
     return pmka_submit(board, c, t_ns);
 }
 
+/* ---- what faults are measured by ---- */
+
+static unsigned pulses(const void *board)
+{
+    (void)board;
+    return PMKA_INTS;
+}
+
+/* That a reset in each period balances. */
+static double range_v(const void *board)
+{
+    return ((const struct pmka *)board)->profile.uref_v;
+}
+
+/* One in a second. */
+static double code_v(const void *board)
+{
+    return code_vs(&((const struct pmka *)board)->profile);
+}
+
 /* ---- truth ---- */
 
 static const char *const who[PMKA_INTS] = {"x", "y", "z", "k"};
@@ -221,6 +250,7 @@ static void digest(const void *board, struct sha256 *s)
     board_digest_u64(s, (uint64_t)b->life << 32 | (uint64_t)b->stage);
     board_digest_u64(s, (uint64_t)b->set_ns);
     board_digest_u64(s, (uint64_t)b->next.seq << 32 | b->wrongs);
+    board_digest_u64(s, (uint64_t)b->adc_stuck << 1 | b->adc_stuck_level);
     for (unsigned i = 0; i < PMKA_INTS; i++) add_channel(s, &b->channel[i]);
     for (unsigned i = 0; i < PMKA_INTS; i++)
         board_digest_u64(s, (uint64_t)(uint16_t)b->latest.code[i] << 16 | (uint16_t)b->next.code[i]);
@@ -258,6 +288,10 @@ const struct board_type pmka_board = {
     .line_count = PMKA_LINES,
     .port_lines = port_lines,
     .frame_line = PMKA_LINE_MUX1,
+    .pulse_line = PMKA_LINE_CONV,
+    .pulses = pulses,
+    .code_v = code_v,
+    .range_v = range_v,
     .events = pmka_events,
     .event_count = PMKA_EVENTS,
     .parts = parts,

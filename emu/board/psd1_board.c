@@ -149,6 +149,24 @@ static enum board_cycle_result submit(void *board, struct board_cycle *c, int64_
     return psd1_submit(board, c, t_ns);
 }
 
+/* ---- what faults are measured by ---- */
+
+static unsigned pulses(const void *board)
+{
+    (void)board;
+    return BOARD_AXES * 16u;
+}
+
+static double range_v(const void *board)
+{
+    return psd1_profile_full_scale_v(&((const struct psd1 *)board)->profile);
+}
+
+static double code_v(const void *board)
+{
+    return range_v(board) / 32768.0;
+}
+
 /* ---- truth ---- */
 
 static void put_axis(const struct psd1 *b, unsigned i, board_truth_fn *put, void *ctx)
@@ -254,6 +272,10 @@ const struct board_type psd1_board = {
     .line_count = PSD1_LINES,
     .port_lines = port_lines,
     .frame_line = PSD1_LINE_RFX,
+    .pulse_line = PSD1_LINE_SCLK,
+    .pulses = pulses,
+    .code_v = code_v,
+    .range_v = range_v,
     .events = psd1_events,
     .event_count = PSD1_EVENTS,
     .parts = parts,

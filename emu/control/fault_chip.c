@@ -140,6 +140,12 @@ static const struct fault_kind controller[] = {
      WRONG(BOARD_WRONG_SETUP_ORDER), .unless = "no set-up of several steps", .lacks = "the controller of this board has no set-up whose order matters"},
     {"controller.frozen_words", "The controller sends the codes of the frame before, over and over.", "numbers and times of the frames go on, their codes stand still to the bit",
      WRONG(BOARD_WRONG_FROZEN_WORDS), .unless = "the controller keeps no words", .lacks = "the controller of this board keeps no words that could freeze"},
+    {"controller.capacitor", "The capacitor of integrator X has lost 30 %.", "its codes grow, and its resets jump, by 1/0.7; what is summed of them does not change but for the converter's steps",
+     WRONG(BOARD_WRONG_CAPACITOR), .unless = "no integrators that are sampled", .lacks = "this board has no integrator whose capacitor a host could tell"},
+    {"controller.stuck_reset", "The positive reset of integrator X never ends.", "the code of integrator X runs to its limit and the reading says saturated",
+     WRONG(BOARD_WRONG_STUCK_RESET), .unless = "no precision resets", .lacks = "this board has no precision reset that could stay on"},
+    {"controller.stuck_key", "The key of the spare integrator never closes.", "the axis that the spare has stands still while it does",
+     WRONG(BOARD_WRONG_STUCK_KEY), .unless = "no spare integrator", .lacks = "this board has no spare integrator with a key"},
 };
 // clang-format on
 const struct fault_table fault_controller = {controller, sizeof controller / sizeof *controller};

@@ -29,9 +29,9 @@ static bool has_sensor(const struct control_bench *b, const struct fault *f, cha
     return false;
 }
 
-static double range_v(const struct board_type *t)
+static double range_v(const struct unit *u)
 {
-    return t->range_v > 0.0 ? t->range_v : 10.0;
+    return u->type->range_v ? u->type->range_v(u->board) : 10.0;
 }
 
 /* What a board tells apart: less is refused. */
@@ -42,7 +42,7 @@ static double least_v(const struct unit *u)
 
 static double least_ppm(const struct unit *u)
 {
-    return u->type->code_v ? fmax(FAULT_LEAST_PPM, least_v(u) / range_v(u->type) * 1e6) : FAULT_LEAST_PPM;
+    return u->type->code_v ? fmax(FAULT_LEAST_PPM, least_v(u) / range_v(u) * 1e6) : FAULT_LEAST_PPM;
 }
 
 static bool at_least(const struct fault *f, enum fault_arg arg, double least, const char *unit, char *why)
@@ -67,7 +67,7 @@ static bool seen_scale(const struct control_bench *b, const struct fault *f, cha
 static bool passes(const struct control_bench *b, const struct fault *f, enum fault_arg limit, char *why)
 {
     const struct unit *u = b->unit[f->point.unit];
-    const double most_v = fmin(u->cfg.board.afe[f->point.index].clip_v, range_v(u->type)); /* buffer, converter */
+    const double most_v = fmin(u->cfg.board.afe[f->point.index].clip_v, range_v(u)); /* buffer, converter */
     if (!fault_given(f, limit) || fabs(f->value[limit]) < most_v) return true;
     snprintf(why, CONTROL_WHY_MAX, "%s: %.10g: the chain passes %.10g ... %.10g V, nobody would see this limit",
              fault_arg_name(limit), f->value[limit], -most_v, most_v);

@@ -146,6 +146,12 @@ static double fake_code_v(const void *board)
     return FAKE_CODE_V;
 }
 
+static double fake_range_v(const void *board)
+{
+    (void)board;
+    return 5.0;
+}
+
 static const struct board_line fake_lines[] = {{"BEAT", true}, {"CK", false}, {"MARK", false}};
 static const char *const fake_events[] = {"TICK", "TOCK"};
 static const struct board_counter fake_ctl_counters[] = {{"cycles", offsetof(struct fake_board, cycles)}};
@@ -181,7 +187,7 @@ static const struct board_type fake_type = {
     .pulse_line = 1,
     .pulses = fake_pulses,
     .code_v = fake_code_v,
-    .range_v = 5.0,
+    .range_v = fake_range_v,
     .events = fake_events,
     .event_count = 2,
     .parts = fake_parts,

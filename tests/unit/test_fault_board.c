@@ -247,6 +247,70 @@ static void its_events_bring_faults_about_and_end_runs(void **state)
     assert_non_null(strstr(control_run_done(&r.control, 1), "\"result\":{\"reached\":true,\"seen\":1}"));
 }
 
+/* ---- the boards there are */
+
+/* A bench of one unit of this type, each channel with a sensor. */
+static void bench_of(const struct board_type *type)
+{
+    struct unit_cfg cfg = unit_default("u");
+    unit_cfg_type(&cfg, type);
+    for (unsigned i = 0; i < UNIT_AXES; i++) cfg.axis[i].sensor = UNIT_MEMS;
+    for (unsigned i = 0; i < UNIT_AXES; i++) cfg.board.afe[i].input = AFE_CURRENT;
+    unit_init(&r.unit[1], &cfg, &r.lab, &r.s);
+    r.view.units = 1;
+    r.view.unit[0] = &r.unit[1];
+    r.view.unit_name[0] = "u";
+}
+
+/* How many points of the bench a kind fits at; elsewhere it says why not. */
+static unsigned points_for(const struct fault_kind *kind)
+{
+    struct fault f = {.kind = kind};
+    unsigned fits = 0;
+    for (unsigned a = 0; a < FAULT_ARGS; a++) f.value[a] = a == FAULT_SCALE_PPM || a == FAULT_REFERENCE_PPM ? 1e4 : 1.0;
+    f.given = kind->need;
+    if (strcmp(kind->name, "sensor.saturation") == 0) f.given |= UINT64_C(1) << FAULT_LOW_V;
+    for (unsigned n = 0; fault_point(&r.view, n, &f.point, f.name); n++) {
+        char why[CONTROL_WHY_MAX] = "";
+        if (fault_fits(&r.view, &f, why)) fits++;
+        else if (strlen(why) < 20) fail_msg("%s at %s: \"%s\"", kind->name, f.name, why);
+    }
+    return fits;
+}
+
+/* Of no board: what wants more of the bench than this one has, or bits of the bus, is in test_fault.c. */
+static void every_kind_of_chips_lines_and_sensors_fits_a_board_and_every_part_has_a_kind(void **state)
+{
+    const struct fault_kind *kind;
+    unsigned fits[64] = {0};
+    for (const struct board_type *const *t = board_types; *t; t++) {
+        fresh(state);
+        bench_of(*t);
+        for (unsigned i = 0; (kind = fault_kind(i)) != NULL; i++) {
+            const unsigned here = points_for(kind);
+            const bool any = kind->places & (UINT64_C(1) << FAULT_AT_SENSOR | UINT64_C(1) << FAULT_AT_AFE);
+            if (any && here != UNIT_AXES) fail_msg("%s fits %u axes of %s", kind->name, here, (*t)->title);
+            if (strcmp(kind->name, "line.stuck") == 0) assert_int_equal(here, (*t)->line_count);
+            if (strcmp(kind->name, "line.missing_pulse") == 0) assert_int_equal(here, (*t)->pulses ? 1 : 0);
+            fits[i] += here;
+        }
+    }
+    for (unsigned i = 0; (kind = fault_kind(i)) != NULL; i++) {
+        if (!fits[i] && strncmp(kind->name, "supply", 6) != 0 && strcmp(kind->name, "link.stall") != 0)
+            fail_msg("%s fits nowhere", kind->name);
+    }
+    const struct board_part *part;
+    for (const struct board_type *const *t = board_types; *t; t++) {
+        assert_true((*t)->wrongs != 0 && (*t)->parts[0].name);
+        for (unsigned i = 1; i < (*t)->part_count; i++) {
+            part = &(*t)->parts[i];
+            if (!part->name) continue;
+            assert_true((part->faults && part->fault) || (part->registers && part->flip));
+            if (part->faults != 15 && !part->unless) fail_msg("%s of %s: why not?", part->name, (*t)->title);
+        }
+    }
+}
+
 static void subscribers_hear_its_events_by_their_names(void **state)
 {
     int me;
@@ -288,6 +352,7 @@ int main(void)
         TEST(faults_reach_the_part_that_they_are_for),
         TEST(its_events_bring_faults_about_and_end_runs),
         TEST(subscribers_hear_its_events_by_their_names),
+        TEST(every_kind_of_chips_lines_and_sensors_fits_a_board_and_every_part_has_a_kind),
         TEST(it_tells_its_type_its_counters_its_lines_and_its_truth),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
