@@ -168,7 +168,7 @@ static void resets_that_chase_each_other_are_counted(void **state)
     struct pik_axis a = pik_axis_at(0, &d);
     pik_axis_advance(&a, 100000);
     assert_true(a.minus > 50 && a.opposed > 100);
-    assert_in_range(pik_axis_count(&a), 5, 7); /* the net count is the charge all the same: 6.25 */
+    assert_in_range(pik_axis_count(&a), 5, 7);                 /* the net count is the charge all the same: 6.25 */
     d.threshold = (int64_t)(0.7 * 0.7307 * (double)PIK_PULSE); /* the smallest capacitor of a profile's */
     a = pik_axis_at(0, &d);
     pik_axis_advance(&a, 100000);
