@@ -15,7 +15,7 @@ WERROR    ?=#                         1: a warning is an error, as in make test
 BUILD     ?= build$(if $(filter clang%,$(notdir $(CC))),-clang)$(if $(SAN),-san)
 FUZZ_S    ?= 20
 BENCH_S   ?= 180#                      seconds of measuring; 60 for a quick look
-SAN_E2E   := $(wildcard tests/e2e/test_bad_*.py) $(patsubst %,tests/e2e/test_%.py,unit tools canopen faults_random)
+SAN_E2E   := $(wildcard tests/e2e/test_bad_*.py) $(patsubst %,tests/e2e/test_%.py,unit tools canopen faults_random cycles)
 # Build a part only, say DIRS='base chip' TESTS=test_ads1282 while the rest does not compile.
 DIRS      ?= base trace phys chip canopen board link control app api
 TESTS     ?= $(basename $(notdir $(sort $(wildcard tests/unit/test_*.c))))
@@ -210,6 +210,7 @@ fuzz-each: $(FUZZ_BIN)
 
 $(filter $(BUILD)/fuzz/fuzz_ads1282_%,$(FUZZ_BIN)): $(BUILD)/obj/tests/fuzz/ads1282_world.o
 $(filter $(BUILD)/fuzz/fuzz_ads1256_%,$(FUZZ_BIN)): $(BUILD)/obj/tests/fuzz/ads1256_world.o
+$(filter $(BUILD)/fuzz/fuzz_ad7712_%,$(FUZZ_BIN)): $(BUILD)/obj/tests/fuzz/ad7712_world.o
 
 $(BUILD)/fuzz/%: $(BUILD)/obj/tests/fuzz/%.o $(LIB_OBJ)
 	@mkdir -p $(@D)
