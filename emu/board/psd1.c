@@ -136,6 +136,7 @@ static void refresh_degc(struct psd1 *b, int64_t t_ns)
 {
     b->board_degc = b->io.temp_degc(b->io.ctx, 3, t_ns);
     b->vref_scale = 1.0 + b->vref_error + b->vref_tc_per_k * (b->board_degc - 25.0);
+    b->per_vref = 1.0 / b->vref_scale;
 }
 
 static void dr_fell(struct psd1 *b, int64_t t_ns)
@@ -161,6 +162,7 @@ static void on_drdy(void *ctx, bool level, int64_t t_ns)
     const struct psd1_port *port = ctx;
     struct psd1 *b = port->b;
     b->drdy[port->axis] = level;
+    if (port->axis != 0 && b->profile.dr == PSD1_DR_X) return;
     const bool dr = dr_of(b);
     if (dr == b->dr || b->phase == PSD1_OFF) return;
     b->dr = dr;
@@ -176,7 +178,7 @@ static double vin_v(void *ctx, unsigned channel, int64_t t_ns)
     struct psd1 *b = port->b;
     if (channel + 1 != b->profile.adc_input) return 0.0;
     const double signal = b->io.accel(b->io.ctx, port->axis, t_ns);
-    return afe_out_v(&b->afe[port->axis], signal, b->board_degc, t_ns) / b->vref_scale;
+    return afe_out_v(&b->afe[port->axis], signal, b->board_degc, t_ns) * b->per_vref;
 }
 
 /* ---- life ---- */

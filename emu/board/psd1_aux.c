@@ -6,6 +6,7 @@
 
 #define RAD_PER_DEG    0.017453292519943295
 #define RAD_PER_ARCSEC (RAD_PER_DEG / 3600.0)
+#define WALK_POINTS    8u /* of the grid: the angle's random walk takes a step */
 #define CODE12(code)   ((uint16_t)((uint32_t)(code)&0xFFFu))
 
 /* To the nearest code, clipped; halves away from zero. */
@@ -46,14 +47,19 @@ static void integrate_to(struct psd1 *b, int64_t t_ns)
     g->stale = false;
 }
 
+static void walk(struct psd1_gyros *g)
+{
+    for (unsigned i = 0; i < 3; i++)
+        if (g->axis[i].arw_rad > 0.0) g->axis[i].angle_rad += g->axis[i].arw_rad * rng_gauss(&g->axis[i].noise);
+}
+
 /* Always at the points of the grid, whoever looks when. */
 static void integrate(struct psd1 *b, int64_t t_ns)
 {
     struct psd1_gyros *g = &b->gyros;
     for (; g->grid_ns <= t_ns; g->grid_ns += b->profile.gyro_grid_ns) {
         integrate_to(b, g->grid_ns);
-        for (unsigned i = 0; i < 3; i++)
-            if (g->axis[i].arw_rad > 0.0) g->axis[i].angle_rad += g->axis[i].arw_rad * rng_gauss(&g->axis[i].noise);
+        if (++g->points % WALK_POINTS == 0) walk(g);
     }
 }
 
@@ -86,6 +92,7 @@ void psd1_aux_power_up(struct psd1 *b, int64_t t_ns)
     struct psd1_gyros *g = &b->gyros;
     g->t_ns = t_ns;
     g->grid_ns = t_ns + b->profile.gyro_grid_ns;
+    g->points = 0;
     g->stale = true;
     for (unsigned i = 0; i < 3; i++) g->axis[i].angle_rad = 0.0;
 }
@@ -133,12 +140,12 @@ static void draw_gyro(const struct psd1 *b, struct psd1_gyro *g, const char *of,
 {
     const struct psd1_profile *p = &b->profile;
     struct rng r = rng_stream(b->unit.seed, b->unit.serial, of);
-    const double grid_h = 1e-9 * p->gyro_grid_ns / 3600.0;
+    const double step_h = 1e-9 * WALK_POINTS * p->gyro_grid_ns / 3600.0;
     g->bias_radps = rng_gauss(&r) * p->gyro_bias_sd_degph * RAD_PER_DEG / 3600.0;
     g->scale = 1.0 + 1e-6 * rng_gauss(&r) * p->gyro_scale_sd_ppm;
     g->rate_offset_radps = rng_gauss(&r) * p->rate_offset_sd_dps * RAD_PER_DEG;
     g->rate_scale = 1.0 + 1e-6 * rng_gauss(&r) * p->rate_scale_sd_ppm;
-    g->arw_rad = b->unit.adc_noise_scale * p->gyro_arw_deg_rth * RAD_PER_DEG * sqrt(grid_h);
+    g->arw_rad = b->unit.adc_noise_scale * p->gyro_arw_deg_rth * RAD_PER_DEG * sqrt(step_h);
     g->noise = rng_stream(b->unit.seed, b->unit.serial, noise);
 }
 

@@ -83,7 +83,7 @@ struct psd1_job {
 };
 
 struct psd1_gyro {                     /* one laser gyro and its rate sensor */
-    double bias_radps, scale, arw_rad; /* of a step of the grid */
+    double bias_radps, scale, arw_rad; /* of a step of its random walk */
     double rate_offset_radps, rate_scale;
     double angle_rad; /* up to psd1_gyros.t_ns */
     double w_radps;   /* then */
@@ -94,6 +94,7 @@ struct psd1_gyros {
     struct psd1_gyro axis[3];
     int64_t t_ns;    /* integrated up to here */
     int64_t grid_ns; /* next point of the grid */
+    uint32_t points; /* of the grid, so far */
     bool stale;      /* the rate has changed abruptly: look again */
 };
 
@@ -116,8 +117,8 @@ struct psd1 {
     struct psd1_port port[3];
     /* specimen */
     double vref_error, vref_tc_per_k, temp_offset_k[4], supply_v;
-    double vref_scale; /* of the reference at the board's temperature */
-    double board_degc; /* refreshed at each DR */
+    double vref_scale, per_vref; /* of the reference at the board's temperature; its inverse */
+    double board_degc;           /* refreshed at each DR */
     struct psd1_counters counters;
 
     int64_t t0_ns; /* power-up: 1M25 rises at t0 + 800 k */

@@ -83,22 +83,27 @@ static bool report_frame(struct psd1 *b, int64_t t_ns)
     return w->next == f->count;
 }
 
-/* Up to CLOCK_CHUNK edges of 1M25, none after t_ns. */
+/* Up to CLOCK_CHUNK edges of 1M25, none after t_ns: pulses, or the one edge that is left of a pulse. */
 static void report_clock(struct psd1 *b, int64_t t_ns)
 {
     struct psd1_wave *w = &b->wave;
     const int64_t due = (t_ns - w->clock_ns) / PSD1_HALF_NS + 1;
-    unsigned n = due < CLOCK_CHUNK ? (unsigned)due : CLOCK_CHUNK;
-    bool level = (w->clock_ns - b->t0_ns) % PSD1_PERIOD_NS == 0;
-    if (!level) n = 1; /* the rest is a run of pulses */
-    else if (n > 1) n &= ~1u;
-    struct trace_step *const p = trace_room(&b->trace, n);
+    const bool rises = (w->clock_ns - b->t0_ns) % PSD1_PERIOD_NS == 0;
+    const unsigned n = !rises || due == 1 ? 1 : (due < CLOCK_CHUNK ? (unsigned)due : CLOCK_CHUNK) & ~1u;
+    struct trace_step *const room = trace_room(&b->trace, n), *const end = room + n;
     int64_t at_ns = w->clock_ns;
-    for (unsigned i = 0; i < n && p; i++, at_ns += PSD1_HALF_NS, level = !level)
-        p[i] = (struct trace_step){at_ns, CLK, level ? CLK : 0};
-    if (p && n > 1) trace_commit_run(&b->trace, n, CLK);
-    else if (p) trace_commit(&b->trace, n);
     w->clock_ns += (int64_t)n * PSD1_HALF_NS;
+    if (!room) return;
+    if (n == 1) {
+        *room = (struct trace_step){at_ns, CLK, rises ? CLK : 0};
+        trace_commit(&b->trace, 1);
+        return;
+    }
+    for (struct trace_step *p = room; p < end; p += 2, at_ns += PSD1_PERIOD_NS) {
+        p[0] = (struct trace_step){at_ns, CLK, CLK};
+        p[1] = (struct trace_step){at_ns + PSD1_HALF_NS, CLK, 0};
+    }
+    trace_commit_run(&b->trace, n, CLK);
 }
 
 static void report_until(struct psd1 *b, int64_t t_ns)
@@ -113,9 +118,16 @@ static void report_until(struct psd1 *b, int64_t t_ns)
     w->on = w->clock_on;
 }
 
-/* A long way without trace_advance(): make room in time. */
+/* A long way without trace_advance(): room is made in time. */
 void psd1_wave_catch_up(struct psd1 *b, int64_t t_ns)
 {
+    const struct psd1_wave *w = &b->wave;
+    const int64_t piece_ns = CLOCK_CHUNK * (int64_t)PSD1_HALF_NS;
+    while (w->clock_on && t_ns - w->clock_ns > piece_ns) {
+        const int64_t to_ns = w->clock_ns + piece_ns;
+        report_until(b, to_ns);
+        trace_advance(&b->trace, to_ns - TRACE_LAG_NS);
+    }
     if (b->trace.pending_count > TRACE_PENDING_MAX / 2) trace_advance(&b->trace, t_ns - TRACE_LAG_NS);
     report_until(b, t_ns);
 }

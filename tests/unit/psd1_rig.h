@@ -37,6 +37,8 @@ struct rig {
     bool answered;
     enum board_cycle_result result;
     int64_t answered_ns;
+    struct sched_ev stopper; /* armed by a test: INT0 becomes inactive */
+    uint32_t lost_before[3]; /* conversions that the set-up left unread */
 };
 
 static inline double rig_accel(void *ctx, unsigned axis, int64_t t_ns)
@@ -92,6 +94,16 @@ static inline void rig_steps(void *ctx, const struct trace_step *s, unsigned n)
     trace_each(s, n, ((struct rig *)ctx)->sink.mask, rig_change, ctx);
 }
 
+static inline void rig_stop_int0(void *ctx, int64_t t_ns)
+{
+    psd1_flags(&((struct rig *)ctx)->b, false, true, t_ns);
+}
+
+static inline uint32_t psd1_lost_before(const struct rig *r, unsigned axis)
+{
+    return r->lost_before[axis];
+}
+
 static inline struct board_cfg rig_unit(double noise_scale)
 {
     struct board_cfg u = {.adc_noise_scale = noise_scale, .temp_noise_scale = noise_scale, .seed = 7, .serial = 3};
@@ -129,6 +141,7 @@ static inline void rig_init(struct rig *r, const struct psd1_profile *p, double 
     sched_init(&r->s);
     psd1_init(&r->b, p, &u, &io, &r->s);
     r->b.told = true;
+    sched_ev(&r->stopper, rig_stop_int0, r);
     psd1_attach(&r->b, &(struct psd1_host){.ctx = r, .cycle = rig_cycle, .fault = rig_fault});
     r->sink = (struct trace_sink){.mask = TRACE_FIRST(PSD1_LINES), .steps = rig_steps, .ctx = r};
 }
@@ -171,7 +184,8 @@ static inline void rig_up(struct rig *r, const struct psd1_profile *p)
 {
     rig_init(r, p, 0.0);
     psd1_power_up(&r->b, 0);
-    while (!r->b.ready) rig_run(r, 1000000);
+    while (!r->b.ready) sched_run_until(&r->s, sched_next_ns(&r->s));
+    for (unsigned i = 0; i < 3; i++) r->lost_before[i] = r->b.adc[i].n.overruns + r->b.adc[i].n.lost_words;
 }
 
 static inline void rig_done(void *ctx, struct board_cycle *c, enum board_cycle_result result, int64_t t_ns)

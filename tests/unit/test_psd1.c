@@ -1,0 +1,825 @@
+/* PSD-1: when a cycle begins, what its host does to it, control words, registers. */
+#include "psd1_rig.h"
+
+#include <math.h>
+
+static struct rig rig, other;
+
+enum { FAST_NS = 48400 }; /* a cycle with the built-in host: 400 + 3 x 13600 + 3 x 2400 */
+
+/* ---- set-up ---- */
+
+static void set_up_calibrates_and_cycles_follow(void **state)
+{
+    (void)state;
+    const struct psd1_profile p = rig_exact();
+    rig_up(&rig, &p);
+    /* 100 us, UC1 20 us and edges, 9 output periods, coefficients, a conversion (sources 3.2) */
+    assert_in_range(rig.event_ns[PSD1_EV_SETUP_DONE], 9 * 972800, 11 * 972800);
+    assert_int_equal(rig.events[PSD1_EV_UC], 4);
+    assert_int_equal(rig.b.uc1, 0x220013);
+    assert_int_equal(rig.b.uc2, 0x020013);
+    for (unsigned i = 0; i < 3; i++) {
+        assert_int_equal(rig.b.adc[i].control, 0x020013);
+        assert_int_equal(rig.b.adc[i].n.calibrations, 1);
+        assert_int_equal(rig.b.zero[i], AD7712_ZERO_IDEAL);
+        assert_int_equal(rig.b.full[i], AD7712_FULL_IDEAL);
+        assert_int_equal(rig.b.adc[i].n.a0_violations + rig.b.adc[i].n.sclk_violations, 0);
+        assert_int_equal(rig.b.adc[i].n.sdata_violations + rig.b.adc[i].n.frame_violations, 0);
+        assert_int_equal(rig.b.adc[i].n.dropped + rig.b.adc[i].n.refused, 0);
+    }
+    rig_run(&rig, 100 * 972800);
+    assert_in_range(rig.cycles, 100, 102);
+    for (unsigned i = 0; i < rig.cycles; i++) {
+        assert_int_equal(rig.cycle[i].seq, i);
+        assert_int_equal(rig.cycle[i].t_end_ns - rig.cycle[i].t_a0_ns, FAST_NS);
+        assert_int_equal(rig.cycle[i].word[0], 40921); /* 32768 (1 + 2.4882 / 10), rounded */
+        assert_int_equal(rig.cycle[i].word[1], 9830);
+        assert_int_equal(rig.cycle[i].word[2], 65208);
+        assert_int_equal(rig.cycle[i].status, PSD1_CY_READ);
+        if (i > 1) assert_int_equal(rig.cycle[i].t_a0_ns - rig.cycle[i - 1].t_a0_ns, 972800);
+    }
+    for (unsigned i = 0; i < 3; i++) {
+        assert_int_equal(rig.b.adc[i].n.overruns, psd1_lost_before(&rig, i));
+        assert_int_equal(rig.b.adc[i].n.stale_reads + rig.b.adc[i].n.over_reads, 0);
+    }
+    assert_int_equal(rig.b.counters.cycles, rig.cycles);
+    assert_int_equal(rig.b.counters.stretched + rig.b.counters.late + rig.b.counters.refused, 0);
+    assert_int_equal(rig.b.counters.bus_cycles, 3 * rig.cycles);
+}
+
+/* The specimen's errors go away with the calibration; what is left is a rounding of the coefficients. */
+static void calibration_takes_out_the_converters_errors(void **state)
+{
+    (void)state;
+    struct psd1_profile p = rig_exact();
+    p.adc_offset_sd_v = 5e-3;
+    p.adc_gain_sd_ppm = 20000.0;
+    rig_up(&rig, &p);
+    rig_run(&rig, 10 * 972800);
+    for (unsigned i = 0; i < 3; i++) {
+        const double want = 32768.0 * (1.0 + rig.volts[i] / 10.0);
+        assert_true(fabs(rig.cycle[5].word[i] - want) <= 1.0);
+        assert_true(rig.b.zero[i] != AD7712_ZERO_IDEAL && rig.b.full[i] != AD7712_FULL_IDEAL);
+    }
+}
+
+static void reference_error_scales_the_words(void **state)
+{
+    (void)state;
+    struct psd1_profile p = rig_exact();
+    p.vref_sd_ppm = 5000.0;
+    rig_up(&rig, &p);
+    rig_run(&rig, 10 * 972800);
+    assert_true(fabs(rig.b.vref_error) > 1e-4);
+    const double want = 32768.0 * (1.0 - 0.7 / (1.0 + rig.b.vref_error));
+    assert_true(fabs(rig.cycle[5].word[1] - want) <= 1.0);
+}
+
+/* ---- when a cycle begins ---- */
+
+/* DR falls at a multiple of 972.8 us from the converters' start, the cycle at the first rise of 1M25 strictly after. */
+static void a_cycle_begins_at_the_rise_after_dr(void **state)
+{
+    (void)state;
+    struct psd1_profile p = rig_exact();
+    p.adc_fs = 20;
+    rig_up(&rig, &p);
+    rig_run(&rig, 30000000);
+    for (unsigned i = 2; i < rig.cycles; i++) {
+        const int64_t waited_ns = rig.cycle[i].t_a0_ns - rig.cycle[i].t_dr_ns;
+        assert_int_equal(rig.cycle[i].t_a0_ns % 800, 0);
+        assert_in_range(waited_ns, 1, 800);
+    }
+}
+
+static void each_condition_alone_holds_the_cycle_back(void **state)
+{
+    (void)state;
+    const struct psd1_profile p = rig_exact();
+    for (unsigned flags = 0; flags < 4; flags++) {
+        rig_up(&rig, &p);
+        rig_await(&rig, PSD1_IDLE);
+        psd1_flags(&rig.b, flags & 1, flags & 2, rig.s.now_ns);
+        const unsigned before = rig.cycles;
+        rig_run(&rig, 20 * 972800);
+        if (flags == 3) assert_in_range(rig.cycles, before + 19, before + 21);
+        else assert_int_equal(rig.cycles, before);
+        if (flags == 3) continue;
+        assert_int_equal(rig.b.counters.lost_x, psd1_lost_before(&rig, 0));
+        psd1_flags(&rig.b, true, true, rig.s.now_ns);
+        rig_run(&rig, 972800);
+        assert_in_range(rig.cycles, before + 1, before + 2);
+        assert_int_equal(rig.cycle[before].status & PSD1_CY_OVERRUN, PSD1_CY_OVERRUN);
+        assert_in_range(rig.b.counters.lost_x, 17, 22);
+    }
+}
+
+/* A flip-flop samples what was there before the edge: a change at its very instant is one edge late. */
+static void a_change_at_the_instant_of_the_rise_is_late(void **state)
+{
+    (void)state;
+    const struct psd1_profile p = rig_exact();
+    rig_up(&rig, &p);
+    rig_await(&rig, PSD1_IDLE);
+    psd1_flags(&rig.b, false, true, rig.s.now_ns);
+    const int64_t rise_ns = rig.b.dr_ns / 800 * 800 + 800 * 1300; /* DR has fallen again by then */
+    rig_until(&rig, rise_ns);
+    assert_false(rig.b.dr);
+    const unsigned a0 = rig.events[PSD1_EV_A0];
+    psd1_flags(&rig.b, true, true, rise_ns);
+    rig_until(&rig, rise_ns + 799);
+    assert_int_equal(rig.events[PSD1_EV_A0], a0);
+    rig_until(&rig, rise_ns + 800);
+    assert_int_equal(rig.events[PSD1_EV_A0], a0 + 1);
+    /* off before the edge: no cycle; off at the edge: it begins all the same */
+    for (int64_t early_ns = 0; early_ns < 2; early_ns++) {
+        rig_up(&rig, &p);
+        rig_await(&rig, PSD1_START);
+        const int64_t due_ns = rig.b.due_ns;
+        const unsigned before = rig.events[PSD1_EV_A0];
+        if (early_ns) rig_until(&rig, due_ns - early_ns);
+        if (!early_ns) sched_at(&rig.s, &rig.stopper, due_ns);
+        else psd1_flags(&rig.b, false, true, rig.s.now_ns);
+        rig_until(&rig, due_ns + 2000);
+        assert_int_equal(rig.events[PSD1_EV_A0], before + !early_ns);
+    }
+}
+
+static void flags_do_not_stop_a_cycle_that_runs(void **state)
+{
+    (void)state;
+    const struct psd1_profile p = rig_exact();
+    rig_up(&rig, &p);
+    rig_await(&rig, PSD1_RF_RISE);
+    const unsigned before = rig.cycles;
+    psd1_flags(&rig.b, false, false, rig.s.now_ns);
+    rig_run(&rig, 3000000);
+    assert_int_equal(rig.cycles, before + 1);
+}
+
+static void dr_of_three(void **state)
+{
+    (void)state;
+    static const struct {
+        int dr;
+        const char *clock; /* which converter is slower */
+        unsigned slow;
+    } rows[] = {{PSD1_DR_X, "y", 1}, {PSD1_DR_ALL, "y", 1}, {PSD1_DR_ANY, "z", 2}};
+    for (size_t i = 0; i < COUNT(rows); i++) {
+        struct psd1_profile p = rig_exact();
+        p.dr = rows[i].dr;
+        rig_up(&rig, &p);
+        rig_run(&rig, 20 * 972800);
+        assert_in_range(rig.cycles, 19, 22);
+        const struct ad7712_fault slow = {.clock_ppm = -100000};
+        ad7712_fault(&rig.b.adc[rows[i].slow], &slow, rig.s.now_ns);
+        const unsigned before = rig.cycles;
+        rig_run(&rig, 90 * 972800);
+        const unsigned n = rig.cycles - before;
+        if (rows[i].dr == PSD1_DR_X) assert_in_range(n, 89, 91);
+        if (rows[i].dr == PSD1_DR_ALL) assert_in_range(n, 78, 83); /* nine tenths */
+        if (rows[i].dr == PSD1_DR_ANY) assert_true(n > 91);        /* whoever is first */
+    }
+}
+
+/* ---- hosts ---- */
+
+static struct psd1_profile no_host(void)
+{
+    struct psd1_profile p = rig_exact();
+    p.host_strobe_ns = 0;
+    return p;
+}
+
+/* Reads the word that waits, `after_ns` after FL2. */
+static uint16_t take(struct rig *r, int64_t after_ns)
+{
+    rig_await(r, PSD1_READY);
+    rig_until(r, r->b.fl2_ns + after_ns);
+    return rig_read(r, (uint8_t)r->b.axis);
+}
+
+static void a_host_takes_the_words_over_the_bus(void **state)
+{
+    (void)state;
+    const struct psd1_profile p = no_host();
+    rig_up(&rig, &p);
+    for (unsigned i = 0; i < 10; i++) {
+        assert_int_equal(take(&rig, 0), 40921); /* at the very instant of FL2 */
+        assert_int_equal(take(&rig, 300), 9830);
+        assert_int_equal(take(&rig, 5000), 65208);
+        rig_await(&rig, PSD1_IDLE);
+        const struct psd1_cycle *c = &rig.cycle[i];
+        assert_int_equal(rig.cycles, i + 1);
+        /* FL2 at 14000; strobe 800: its end 14800 is a fall (400 mod 800), the next is 15600 */
+        const int64_t y_ns = 400 + 13600 + 1600, z_ns = y_ns + 13600 + 1600;
+        assert_int_equal(c->t_end_ns - c->t_a0_ns, z_ns + 13600 + 6400);
+        assert_int_equal(c->status, PSD1_CY_READ);
+    }
+}
+
+/* FL2 ends with the first fall of 1M25 strictly after the strobe: rows of strobe length and when, from FL2 on. */
+static void fl2_ends_at_the_fall_after_the_strobe(void **state)
+{
+    (void)state;
+    static const struct {
+        int64_t after_ns, strobe_ns, clear_ns;
+    } rows[] = {{0, 200, 800}, {0, 799, 800}, {0, 800, 1600}, {0, 801, 1600}, {100, 700, 1600}, {799, 1600, 2400}};
+    for (size_t i = 0; i < COUNT(rows); i++) {
+        const struct psd1_profile p = no_host();
+        rig_up(&rig, &p);
+        rig_await(&rig, PSD1_READY);
+        const int64_t fl2_ns = rig.b.fl2_ns;
+        rig_until(&rig, fl2_ns + rows[i].after_ns);
+        assert_int_equal(rig_bus(&rig, false, 0, 0, rows[i].strobe_ns), BOARD_CYCLE_OK);
+        assert_int_equal(rig.answered_ns, fl2_ns + rows[i].after_ns + rows[i].strobe_ns);
+        assert_true(rig.b.fl2);
+        rig_until(&rig, fl2_ns + rows[i].clear_ns - 1);
+        assert_int_equal(rig.events[PSD1_EV_RFY], 0);
+        rig_until(&rig, fl2_ns + rows[i].clear_ns);
+        assert_int_equal(rig.events[PSD1_EV_RFY], 1);
+        assert_false(rig.b.fl2);
+    }
+}
+
+/* The strobe is what the host asks for, and what is refused leaves the word where it is. */
+static void refusals_leave_the_word(void **state)
+{
+    (void)state;
+    static const struct {
+        bool write;
+        uint8_t address;
+        uint16_t data;
+        int64_t strobe_ns;
+        enum board_cycle_result want;
+    } rows[] = {
+        {false, 1, 0, 0, BOARD_CYCLE_NOT_READY},    {false, 2, 0, 0, BOARD_CYCLE_NOT_READY},
+        {false, 0, 0, 199, BOARD_CYCLE_TOO_SHORT},  {true, 0, 1, 0, BOARD_CYCLE_READ_ONLY},
+        {true, 3, 1, 0, BOARD_CYCLE_READ_ONLY},     {true, 9, 1, 0, BOARD_CYCLE_READ_ONLY},
+        {false, 16, 0, 0, BOARD_CYCLE_NO_ADDRESS},  {true, 255, 0, 0, BOARD_CYCLE_NO_ADDRESS},
+        {true, 10, 4, 0, BOARD_CYCLE_BAD_VALUE},    {true, 11, 0xFFFF, 0, BOARD_CYCLE_BAD_VALUE},
+        {true, 12, 256, 0, BOARD_CYCLE_BAD_VALUE},  {true, 15, 4, 0, BOARD_CYCLE_BAD_VALUE},
+        {true, 14, 0, 0, BOARD_CYCLE_BAD_VALUE},    {true, 14, 5, 0, BOARD_CYCLE_BAD_VALUE},
+        {true, 14, 0x13, 0, BOARD_CYCLE_BAD_VALUE}, {true, 14, 0x23, 0, BOARD_CYCLE_BAD_VALUE},
+        {true, 14, 0x33, 0, BOARD_CYCLE_BAD_VALUE}, {true, 14, 0x130, 0, BOARD_CYCLE_BAD_VALUE},
+        {true, 14, 2, 0, BOARD_CYCLE_BAD_VALUE}, /* the word staged is 0: FS out of range */
+        {true, 15, 0, 100, BOARD_CYCLE_TOO_SHORT},
+    };
+    const struct psd1_profile p = no_host();
+    rig_up(&rig, &p);
+    rig_await(&rig, PSD1_READY);
+    unsigned refused = 0, too_short = 0;
+    for (size_t i = 0; i < COUNT(rows); i++) {
+        const enum board_cycle_result r =
+            rig_bus(&rig, rows[i].write, rows[i].address, rows[i].data, rows[i].strobe_ns);
+        if (r != rows[i].want) fail_msg("row %zu: %d, not %d", i, (int)r, (int)rows[i].want);
+        refused++;
+        too_short += r == BOARD_CYCLE_TOO_SHORT;
+        assert_int_equal(rig.b.counters.refused, refused);
+        assert_int_equal(rig.b.counters.too_short, too_short);
+        rig_run(&rig, 2000);
+        assert_true(rig.b.fl2);
+    }
+    assert_int_equal(rig_bus(&rig, false, 0, 0, 200), BOARD_CYCLE_OK);
+    assert_int_equal(rig.bus.data, 40921);
+    assert_int_equal(rig_bus(&rig, false, 0, 0, 0), BOARD_CYCLE_NOT_READY); /* it has been taken, though FL2 stands */
+}
+
+/* One cycle at a time; OFF without power and in reset, also for one under way. */
+static void the_bus_takes_one_cycle_at_a_time(void **state)
+{
+    (void)state;
+    const struct psd1_profile p = no_host();
+    rig_init(&rig, &p, 0.0);
+    assert_int_equal(rig_bus(&rig, false, 3, 0, 0), BOARD_CYCLE_OFF);
+    psd1_power_up(&rig.b, 0);
+    assert_int_equal(rig_bus(&rig, false, 3, 0, 0), BOARD_CYCLE_OFF);
+    rig_up(&rig, &p);
+    rig_await(&rig, PSD1_READY);
+    rig.bus = (struct board_cycle){.address = 3, .done = rig_done, .ctx = &rig};
+    rig.answered = false;
+    assert_int_equal(psd1_submit(&rig.b, &rig.bus, rig.s.now_ns), BOARD_CYCLE_OK);
+    struct board_cycle second = rig.bus;
+    assert_int_equal(psd1_submit(&rig.b, &second, rig.s.now_ns), BOARD_CYCLE_BUSY);
+    psd1_reset(&rig.b, rig.s.now_ns);
+    assert_true(rig.answered);
+    assert_int_equal(rig.result, BOARD_CYCLE_OFF);
+}
+
+/* While the built-in host strobes, somebody else's cycle waits; while somebody else is on the bus, the host does. */
+static void the_built_in_host_shares_the_bus(void **state)
+{
+    (void)state;
+    const struct psd1_profile p = rig_exact();
+    rig_up(&rig, &p);
+    rig_await(&rig, PSD1_STROBE_END);
+    const int64_t begin_ns = rig.s.now_ns;
+    assert_int_equal(rig_bus(&rig, false, 3, 0, 0), BOARD_CYCLE_OK);
+    assert_int_equal(rig.answered_ns, begin_ns + 1600);
+    rig_await(&rig, PSD1_STROBE_END);
+    assert_int_equal(rig_bus(&rig, false, 0, 0, 0), BOARD_CYCLE_NOT_READY); /* told when its turn comes */
+    rig_await(&rig, PSD1_READY);
+    const int64_t fl2_ns = rig.b.fl2_ns;
+    assert_int_equal(rig_bus(&rig, false, 3, 0, 3000), BOARD_CYCLE_OK);
+    rig_await(&rig, PSD1_CLEAR);
+    assert_int_equal(rig.event_ns[PSD1_EV_STROBE], fl2_ns + 3000);
+    rig_run(&rig, 972800);
+    assert_int_equal(rig.cycle[rig.cycles - 1].word[2], 65208);
+}
+
+/* Somebody else takes the word before the built-in host. */
+static void a_word_is_taken_once(void **state)
+{
+    (void)state;
+    const struct psd1_profile p = rig_exact();
+    rig_up(&rig, &p);
+    rig_await(&rig, PSD1_READY);
+    const unsigned strobes = rig.events[PSD1_EV_STROBE];
+    assert_int_equal(rig_read(&rig, 0), 40921);
+    rig_await(&rig, PSD1_RF_RISE);
+    assert_int_equal(rig.events[PSD1_EV_STROBE], strobes + 1);
+    rig_await(&rig, PSD1_IDLE);
+    assert_int_equal(rig.cycle[rig.cycles - 1].status, PSD1_CY_READ);
+}
+
+/* The cycle stretches, conversions are lost, all is counted, and it goes on as if nothing had been. */
+static void a_host_that_is_late_stretches_the_cycle(void **state)
+{
+    (void)state;
+    const struct psd1_profile p = no_host();
+    rig_up(&rig, &p);
+    (void)take(&rig, 0);
+    (void)take(&rig, 10 * 972800);
+    (void)take(&rig, 0);
+    rig_await(&rig, PSD1_START);
+    assert_int_equal(rig.cycle[0].status, PSD1_CY_READ | PSD1_CY_OVERRUN | PSD1_CY_LATE | PSD1_CY_MIXED);
+    assert_int_equal(rig.b.counters.late, 1);
+    assert_int_equal(rig.b.counters.stretched, 1);
+    /* ten conversions of X and Y have come, none of them read yet but the last; Z's word was replaced ten times */
+    assert_int_equal(rig.b.counters.lost_x, 9);
+    assert_int_equal(rig.b.counters.lost_y, 9);
+    assert_int_equal(rig.b.counters.lost_z, 10);
+    /* X's word waits: the next begins at once */
+    assert_int_equal(rig.b.due_ns - rig.cycle[0].t_end_ns, 400);
+}
+
+static void a_host_that_never_comes_hangs_nothing(void **state)
+{
+    (void)state;
+    const struct psd1_profile p = no_host();
+    rig_up(&rig, &p);
+    rig_run(&rig, 2000000000);
+    assert_int_equal(rig.cycles, 0);
+    assert_int_equal(rig.b.phase, PSD1_READY);
+    assert_int_equal(rig.faults, 0);
+    assert_in_range(rig.b.adc[0].n.overruns, 2050, 2056);
+    assert_int_equal(take(&rig, 0), 40921);
+    assert_int_equal(rig.b.counters.late, 1);
+}
+
+static void late_begins_after_late_ns(void **state)
+{
+    (void)state;
+    for (int64_t more_ns = 0; more_ns < 2; more_ns++) {
+        const struct psd1_profile p = no_host();
+        rig_up(&rig, &p);
+        rig_await(&rig, PSD1_READY);
+        rig_until(&rig, rig.b.fl2_ns + 20000 + more_ns);
+        (void)rig_read(&rig, 0);
+        assert_int_equal(rig.b.counters.late, more_ns);
+    }
+}
+
+/* ---- profile's open questions ---- */
+
+static void a0_may_fall_where_rfz_rises(void **state)
+{
+    (void)state;
+    for (int early = 0; early < 2; early++) {
+        struct psd1_profile p = no_host();
+        p.a0_release = early ? PSD1_A0_RFZ : PSD1_A0_FL2;
+        rig_up(&rig, &p);
+        rig_await(&rig, PSD1_READY);
+        rig_watch(&rig, TRACE_BIT(PSD1_LINE_A0));
+        const unsigned before = rig.b.trace.level & 1;
+        (void)take(&rig, 0);
+        (void)take(&rig, 0);
+        rig_await(&rig, PSD1_READY);
+        rig_run(&rig, 5000);
+        trace_advance(&rig.b.trace, rig.s.now_ns);
+        assert_int_equal(before, 1);
+        assert_int_equal(rig.edges, early);
+        if (early) assert_int_equal(rig.edge[0].t_ns, rig.b.fl2_ns);
+    }
+}
+
+/* ---- control words ---- */
+
+static void request_done(void *ctx, struct psd1_request *r, enum board_cycle_result result, int64_t t_ns)
+{
+    struct rig *g = ctx;
+    (void)r;
+    g->answered = true;
+    g->result = result;
+    g->answered_ns = t_ns;
+}
+
+static enum board_cycle_result command(struct rig *r, struct psd1_request *q, uint8_t code, uint32_t word)
+{
+    const char *why = NULL;
+    *q = (struct psd1_request){.command = code, .word = word, .done = request_done, .ctx = r};
+    r->answered = false;
+    const enum board_cycle_result result = psd1_request(&r->b, q, &why, r->s.now_ns);
+    assert_true((result == BOARD_CYCLE_BAD_VALUE) == (why != NULL));
+    if (result != BOARD_CYCLE_OK) return result;
+    const int64_t end_ns = r->s.now_ns + 3000000000;
+    while (!r->answered && r->s.now_ns < end_ns) sched_run_until(&r->s, sched_next_ns(&r->s));
+    assert_true(r->answered);
+    return r->result;
+}
+
+static void control_words_go_out_and_come_back(void **state)
+{
+    (void)state;
+    struct psd1_request q;
+    const struct psd1_profile p = rig_exact();
+    rig_up(&rig, &p);
+    /* gain 2, AIN2, 500 Hz: full scale +-5 V */
+    const uint32_t word = AD7712_CONTROL(AD7712_NORMAL, 1, 1, 0, 0, 39);
+    assert_int_equal(command(&rig, &q, PSD1_CMD_UC2, word), BOARD_CYCLE_OK);
+    assert_int_equal(rig.b.uc2, word);
+    for (unsigned i = 0; i < 3; i++) {
+        assert_int_equal(rig.b.adc[i].control, word);
+        assert_int_equal(command(&rig, &q, (uint8_t)(PSD1_CMD_CONTROL + i), 0), BOARD_CYCLE_OK);
+        assert_int_equal(q.word, word);
+    }
+    const unsigned before = rig.cycles;
+    rig_run(&rig, 100 * 39 * 51200);
+    assert_in_range(rig.cycles, before + 98, before + 101);
+    assert_int_equal(rig.cycle[rig.cycles - 1].word[0], 49074); /* 32768 (1 + 2.4882 / 5), coefficients of gain 1 */
+    assert_int_equal(rig.b.counters.commands, 4);
+}
+
+static void uc1_calibrates_anew(void **state)
+{
+    (void)state;
+    struct psd1_request q;
+    struct psd1_profile p = rig_exact();
+    p.adc_offset_sd_v = 1e-2;
+    rig_up(&rig, &p);
+    const uint32_t zero = rig.b.zero[0];
+    const uint32_t word = AD7712_CONTROL(AD7712_SELF_CAL, 2, 1, 0, 0, 19);
+    assert_int_equal(command(&rig, &q, PSD1_CMD_UC1, word), BOARD_CYCLE_OK);
+    assert_int_equal(rig.b.uc1, word);
+    assert_int_equal(rig.b.adc[0].n.calibrations, 2);
+    assert_true(rig.b.zero[0] != zero); /* the offset in the units of gain 4 */
+    assert_int_equal(rig.b.zero[0], rig.b.adc[0].zero[1]);
+    assert_int_equal(rig.b.full[2], rig.b.adc[2].full[1]);
+    assert_int_equal(rig.b.adc[0].control, 0x020013); /* UC2 follows */
+}
+
+static void words_that_the_cycle_cannot_live_with_are_refused(void **state)
+{
+    (void)state;
+    static const struct {
+        uint8_t command;
+        uint32_t word;
+        bool good;
+    } rows[] = {
+        {PSD1_CMD_UC2, 0x020013, true},   {PSD1_CMD_UC2, 0x028013, false}, /* WL */
+        {PSD1_CMD_UC2, 0x030013, false},                                   /* PD */
+        {PSD1_CMD_UC2, 0x020012, false},                                   /* FS 18 */
+        {PSD1_CMD_UC2, 0x0207D0, true},                                    /* FS 2000 */
+        {PSD1_CMD_UC2, 0x0207D1, false},  {PSD1_CMD_UC2, 0xA20013, true},  /* background calibration */
+        {PSD1_CMD_UC2, 0x220013, false},                                   /* a calibration */
+        {PSD1_CMD_UC2, 0xC20013, false},                                   /* coefficient */
+        {PSD1_CMD_UC1, 0x020013, false},                                   /* none */
+        {PSD1_CMD_UC1, 0x820013, true},                                    /* system offset */
+        {PSD1_CMD_UC1, 0xA20013, false},  {PSD1_CMD_UC1, 0x228013, false}, {PSD1_CMD_NONE, 0x020013, false},
+        {PSD1_CMD_CONTROL + 3, 0, false}, {PSD1_CMD_SHOW_UC1, 0, false},
+    };
+    struct psd1_request q;
+    for (size_t i = 0; i < COUNT(rows); i++) {
+        const struct psd1_profile p = rig_exact();
+        rig_up(&rig, &p);
+        const enum board_cycle_result r = command(&rig, &q, rows[i].command, rows[i].word);
+        if (r != (rows[i].good ? BOARD_CYCLE_OK : BOARD_CYCLE_BAD_VALUE)) fail_msg("row %zu: %d", i, (int)r);
+    }
+}
+
+static void commands_come_one_after_the_other_and_between_cycles(void **state)
+{
+    (void)state;
+    struct psd1_request q, second = {.command = PSD1_CMD_UC2, .word = 0x020013, .done = request_done, .ctx = &rig};
+    const char *why = NULL;
+    const struct psd1_profile p = rig_exact();
+    rig_up(&rig, &p);
+    rig_await(&rig, PSD1_RF_RISE);
+    q = (struct psd1_request){.command = PSD1_CMD_UC2, .word = 0x020013, .done = request_done, .ctx = &rig};
+    const unsigned before = rig.cycles;
+    assert_int_equal(psd1_request(&rig.b, &q, &why, rig.s.now_ns), BOARD_CYCLE_OK);
+    assert_int_equal(psd1_request(&rig.b, &second, &why, rig.s.now_ns), BOARD_CYCLE_BUSY);
+    rig_await(&rig, PSD1_TFS_FALL);
+    assert_int_equal(rig.cycles, before + 1);
+    assert_int_equal(rig.b.counters.cut, 0);
+    psd1_reset(&rig.b, rig.s.now_ns);
+    assert_int_equal(rig.result, BOARD_CYCLE_OFF);
+    assert_int_equal(psd1_request(&rig.b, &q, &why, rig.s.now_ns), BOARD_CYCLE_OFF);
+}
+
+/* Nobody reads: after a millisecond the command cuts the cycle. */
+static void a_command_does_not_wait_for_a_host_that_never_comes(void **state)
+{
+    (void)state;
+    struct psd1_request q;
+    const struct psd1_profile p = no_host();
+    rig_up(&rig, &p);
+    rig_await(&rig, PSD1_READY);
+    const int64_t asked_ns = rig.s.now_ns;
+    assert_int_equal(command(&rig, &q, PSD1_CMD_UC2, 0x020013), BOARD_CYCLE_OK);
+    assert_int_equal(rig.b.counters.cut, 1);
+    assert_in_range(rig.event_ns[PSD1_EV_UC] - asked_ns, 1000000, 1000800);
+    assert_false(rig.b.fl2);
+    assert_int_equal(take(&rig, 0), 40921);
+}
+
+/* ---- registers ---- */
+
+static void registers_of_control_words(void **state)
+{
+    (void)state;
+    const struct psd1_profile p = rig_exact();
+    rig_up(&rig, &p);
+    rig_write(&rig, PSD1_REG_UC_HIGH, 0x02);
+    rig_write(&rig, PSD1_REG_UC_LOW, 0x0027);
+    assert_int_equal(rig_read(&rig, PSD1_REG_UC_HIGH), 0x02);
+    assert_int_equal(rig_read(&rig, PSD1_REG_UC_LOW), 0x0027);
+    rig_write(&rig, PSD1_REG_COMMAND, PSD1_CMD_UC2);
+    assert_int_equal(rig_read(&rig, PSD1_REG_COMMAND), 0x8002);
+    assert_int_equal(rig_read(&rig, PSD1_REG_STATUS) & PSD1_ST_COMMAND, PSD1_ST_COMMAND);
+    assert_int_equal(rig_bus(&rig, true, PSD1_REG_COMMAND, PSD1_CMD_UC2, 0), BOARD_CYCLE_BUSY);
+    rig_run(&rig, 20000000);
+    assert_int_equal(rig_read(&rig, PSD1_REG_COMMAND), 0x0002);
+    assert_int_equal(rig.b.adc[1].control, 0x020027);
+    static const struct {
+        uint16_t command;
+        uint32_t word;
+    } shown[] = {{3, 0x220013}, {4, 0x020027}, {0x10, 0x800000}, {0x12, 0x800000}, {0x20, 0x400000}, {0x22, 0x400000}};
+    for (size_t i = 0; i < COUNT(shown); i++) {
+        rig_write(&rig, PSD1_REG_COMMAND, shown[i].command);
+        assert_int_equal(rig_read(&rig, PSD1_REG_UC_HIGH), shown[i].word >> 16);
+        assert_int_equal(rig_read(&rig, PSD1_REG_UC_LOW), shown[i].word & 0xFFFF);
+    }
+    rig_write(&rig, PSD1_REG_UC_LOW, 0);
+    rig_write(&rig, PSD1_REG_COMMAND, 0x31);
+    rig_run(&rig, 1000000);
+    assert_int_equal(rig_read(&rig, PSD1_REG_UC_LOW), 0x0027);
+    assert_int_equal(rig_read(&rig, PSD1_REG_UC_HIGH), 0x02);
+}
+
+static void status_and_flags(void **state)
+{
+    (void)state;
+    const struct psd1_profile p = no_host();
+    rig_up(&rig, &p);
+    const unsigned always = PSD1_ST_INT0 | PSD1_ST_FL1 | PSD1_ST_READY | PSD1_ST_COEF;
+    for (unsigned axis = 0; axis < 3; axis++) {
+        rig_await(&rig, PSD1_READY);
+        assert_int_equal(rig_read(&rig, PSD1_REG_STATUS), always | PSD1_ST_CYCLE | PSD1_ST_FL2 | axis << 1);
+        (void)rig_read(&rig, (uint8_t)axis);
+        rig_await(&rig, axis < 2 ? PSD1_RF_RISE : PSD1_IDLE);
+    }
+    assert_int_equal(rig_read(&rig, PSD1_REG_STATUS), always);
+    rig_write(&rig, PSD1_REG_FLAGS, 2);
+    rig_run(&rig, 2000000);
+    assert_int_equal(rig_read(&rig, PSD1_REG_STATUS), (always & ~(unsigned)PSD1_ST_INT0) | PSD1_ST_DR);
+    assert_int_equal(rig_read(&rig, PSD1_REG_FLAGS), 2);
+    rig_write(&rig, PSD1_REG_FLAGS, 3);
+    rig_await(&rig, PSD1_READY);
+    for (unsigned axis = 0; axis < 3; axis++) (void)take(&rig, 30000);
+    rig_await(&rig, PSD1_IDLE);
+    assert_int_equal(rig_read(&rig, PSD1_REG_STATUS), always | PSD1_ST_OVERRUN | PSD1_ST_LATE);
+}
+
+static void temperatures_and_service_signals(void **state)
+{
+    (void)state;
+    const struct psd1_profile p = rig_exact();
+    rig_up(&rig, &p);
+    rig.degc[0] = -40.0;
+    rig.degc[1] = 25.0;
+    rig.degc[2] = 85.03; /* 1360.48 codes */
+    rig.degc[3] = 200.0; /* beyond the code */
+    static const uint16_t code[4] = {0xD80, 0x190, 0x550, 0x7FF};
+    for (uint16_t i = 0; i < 4; i++) {
+        rig_write(&rig, PSD1_REG_TEMP, i);
+        assert_int_equal(rig_read(&rig, PSD1_REG_TEMP), i << 12 | code[i]);
+    }
+    rig.degc[3] = 30.0;
+    static const uint16_t service[4] = {2500, 1250, 0x1E0, 0xA1F};
+    for (uint16_t i = 0; i < 4; i++) {
+        rig_write(&rig, PSD1_REG_SERVICE, i);
+        assert_int_equal(rig_read(&rig, PSD1_REG_SERVICE), i << 12 | service[i]);
+    }
+}
+
+/* 10 deg/s for a second are 36000 counts of 1", latched at A0, two's complement on the bus. */
+static void gyros_count_what_they_turn(void **state)
+{
+    (void)state;
+    struct psd1_profile p = rig_exact();
+    rig_init(&rig, &p, 0.0);
+    const double deg = 3.14159265358979323846 / 180.0;
+    rig.w_radps[0] = 10.0 * deg;
+    rig.w_radps[1] = -0.5 * deg;
+    rig.w_radps[2] = 700.0 * deg;
+    psd1_power_up(&rig.b, 0);
+    rig_run(&rig, 1000000000);
+    const struct psd1_cycle *c = &rig.cycle[rig.cycles - 1];
+    const double s = 1e-9 * (double)c->t_a0_ns;
+    assert_true(fabs(c->gyro[0] - 36000.0 * s) <= 1.0);
+    assert_true(fabs(c->gyro[1] + 1800.0 * s) <= 1.0);
+    assert_int_equal(c->gyro[1], (int32_t)floor(-1800.0 * s + 1e-9));
+    assert_int_equal(c->rate[0], 500);
+    assert_int_equal(c->rate[1], -25);
+    assert_int_equal(c->rate[2], 32767);
+    rig_await(&rig, PSD1_IDLE);
+    for (unsigned i = 0; i < 3; i++) {
+        assert_int_equal(rig_read(&rig, (uint8_t)(PSD1_REG_GYRO_X + i)), (uint16_t)rig.b.latest.gyro[i]);
+        assert_int_equal(rig_read(&rig, (uint8_t)(PSD1_REG_RATE_X + i)), (uint16_t)rig.b.latest.rate[i]);
+    }
+}
+
+/* A turn of 30 deg in steps that know nothing of the grid; looking at it changes nothing. */
+static void abrupt_changes_of_the_rate_are_kept(void **state)
+{
+    (void)state;
+    struct psd1_profile p = rig_exact();
+    rig_init(&rig, &p, 0.0);
+    psd1_power_up(&rig.b, 0);
+    rig_until(&rig, 12345678);
+    psd1_sample_until(&rig.b, rig.s.now_ns);
+    rig.w_radps[2] = 0.5;
+    rig_until(&rig, 1012345678);
+    psd1_sample_until(&rig.b, rig.s.now_ns);
+    rig.w_radps[2] = 0.0;
+    rig_run(&rig, 10000000);
+    assert_true(fabs(rig.b.gyros.axis[2].angle_rad - 0.5) < 0.5 * 0.0005);
+    const int32_t counts = rig.cycle[rig.cycles - 1].gyro[2];
+    assert_true(fabs(counts - 0.5 * 180.0 / 3.14159265358979 * 3600.0) < 52.0);
+}
+
+static void specimens_differ_and_seeds_repeat(void **state)
+{
+    (void)state;
+    struct psd1_profile p;
+    psd1_profile_default(&p);
+    for (unsigned k = 0; k < 2; k++) {
+        struct rig *r = k ? &other : &rig;
+        rig_init(r, &p, 1.0);
+        psd1_power_up(&r->b, 0);
+        rig_run(r, 500000000);
+    }
+    assert_int_equal(rig.cycles, other.cycles);
+    unsigned same = 0;
+    for (unsigned i = 1; i < rig.cycles; i++) {
+        for (unsigned a = 0; a < 3; a++) assert_int_equal(rig.cycle[i].word[a], other.cycle[i].word[a]);
+        same += rig.cycle[i].word[0] == rig.cycle[i - 1].word[0];
+    }
+    assert_true(same < rig.cycles / 2); /* the noise of 1028 Hz is tens of codes */
+    assert_true(rig.b.vref_error != 0.0 && rig.b.gyros.axis[0].bias_radps != rig.b.gyros.axis[1].bias_radps);
+}
+
+/* ---- faults and life ---- */
+
+static void dr_that_never_comes_is_told(void **state)
+{
+    (void)state;
+    const struct psd1_profile p = rig_exact();
+    rig_up(&rig, &p);
+    rig_run(&rig, 10000000);
+    const struct ad7712_fault stuck = {.drdy = AD7712_STUCK_HIGH}, none = {.drdy = AD7712_FREE};
+    ad7712_fault(&rig.b.adc[0], &stuck, rig.s.now_ns);
+    rig_run(&rig, 100000000);
+    assert_int_equal(rig.faults, 0); /* 100 ms and the settling time */
+    rig_run(&rig, 20000000);
+    assert_int_equal(rig.faults, 1);
+    assert_int_equal(rig.fault[0], PSD1_FAULT_DR);
+    rig_run(&rig, 1000000000);
+    assert_int_equal(rig.faults, 1);
+    assert_int_equal(rig.b.counters.timeouts, 1);
+    struct psd1_request q;
+    assert_int_equal(command(&rig, &q, PSD1_CMD_UC2, 0x020013), BOARD_CYCLE_NOT_READY);
+    assert_int_equal(rig.b.counters.timeouts, 2);
+    const unsigned before = rig.cycles;
+    ad7712_fault(&rig.b.adc[0], &none, rig.s.now_ns);
+    rig_run(&rig, 10000000);
+    assert_int_equal(rig.faults, 2);
+    assert_int_equal(rig.fault[1], 0);
+    assert_true(rig.cycles > before + 8);
+}
+
+static void frozen_words_repeat(void **state)
+{
+    (void)state;
+    const struct psd1_profile p = rig_exact();
+    rig_up(&rig, &p);
+    rig_run(&rig, 5000000);
+    rig.b.wrongs = BOARD_WRONG_FROZEN_WORDS;
+    rig.volts[0] = 0.0;
+    rig_run(&rig, 10000000);
+    assert_int_equal(rig.cycle[rig.cycles - 1].word[0], 40921);
+    rig.b.wrongs = 0;
+    rig_run(&rig, 2000000);
+    assert_int_equal(rig.cycle[rig.cycles - 1].word[0], 32768);
+}
+
+static void limits_are_marked(void **state)
+{
+    (void)state;
+    const struct psd1_profile p = rig_exact();
+    rig_up(&rig, &p);
+    rig.volts[1] = -10.4;
+    rig_run(&rig, 10000000);
+    assert_int_equal(rig.cycle[rig.cycles - 1].word[1], 0);
+    assert_int_equal(rig.cycle[rig.cycles - 1].status, PSD1_CY_READ | PSD1_CY_CLIP);
+    rig.volts[1] = 10.4;
+    rig_run(&rig, 10000000);
+    assert_int_equal(rig.cycle[rig.cycles - 1].word[1], 0xFFFF);
+    assert_int_equal(rig.cycle[rig.cycles - 1].status, PSD1_CY_READ | PSD1_CY_CLIP);
+}
+
+/* In every phase: a reset, or the supply for a while. What was under way ends, then the board comes up again. */
+static void resets_and_power_cuts_in_every_phase(void **state)
+{
+    (void)state;
+    for (unsigned phase = PSD1_IN_RESET; phase < PSD1_PHASES; phase++) {
+        for (unsigned cut = 0; cut < 2; cut++) {
+            struct psd1_profile p = rig_exact();
+            rig_init(&rig, &p, 0.0);
+            rig_watch(&rig, TRACE_FIRST(PSD1_LINES));
+            psd1_power_up(&rig.b, 0);
+            rig_await(&rig, (enum psd1_phase)phase);
+            const bool cycle = phase >= PSD1_RF_FALL && phase <= PSD1_CLEAR;
+            if (cut) psd1_power_down(&rig.b, rig.s.now_ns);
+            else psd1_reset(&rig.b, rig.s.now_ns);
+            assert_int_equal(rig.b.counters.cut, cycle);
+            assert_int_equal(rig.b.counters.resets, !cut);
+            trace_advance(&rig.b.trace, rig.s.now_ns);
+            const uint64_t steady = ~TRACE_BIT(PSD1_LINE_CLK) & ~TRACE_BIT(PSD1_LINE_DR);
+            uint64_t rest = 0;
+            for (unsigned i = 0; i < PSD1_LINES && !cut; i++) rest |= (uint64_t)psd1_lines[i].level << i;
+            assert_true((rig.b.trace.level & steady) == (rest & steady));
+            rig.cycles = 0;
+            rig_run(&rig, 5000000);
+            if (cut) assert_int_equal(rig.cycles, 0);
+            if (cut) psd1_power_up(&rig.b, rig.s.now_ns);
+            rig_run(&rig, 20000000);
+            assert_true(rig.cycles > 4);
+            assert_int_equal(rig.cycle[0].seq, 0);
+            assert_int_equal(rig.cycle[rig.cycles - 1].word[1], 9830);
+            assert_int_equal(rig.b.trace.late + rig.b.trace.dropped, 0);
+        }
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(set_up_calibrates_and_cycles_follow),
+        cmocka_unit_test(calibration_takes_out_the_converters_errors),
+        cmocka_unit_test(reference_error_scales_the_words),
+        cmocka_unit_test(a_cycle_begins_at_the_rise_after_dr),
+        cmocka_unit_test(each_condition_alone_holds_the_cycle_back),
+        cmocka_unit_test(a_change_at_the_instant_of_the_rise_is_late),
+        cmocka_unit_test(flags_do_not_stop_a_cycle_that_runs),
+        cmocka_unit_test(dr_of_three),
+        cmocka_unit_test(a_host_takes_the_words_over_the_bus),
+        cmocka_unit_test(fl2_ends_at_the_fall_after_the_strobe),
+        cmocka_unit_test(refusals_leave_the_word),
+        cmocka_unit_test(the_bus_takes_one_cycle_at_a_time),
+        cmocka_unit_test(the_built_in_host_shares_the_bus),
+        cmocka_unit_test(a_word_is_taken_once),
+        cmocka_unit_test(a_host_that_is_late_stretches_the_cycle),
+        cmocka_unit_test(a_host_that_never_comes_hangs_nothing),
+        cmocka_unit_test(late_begins_after_late_ns),
+        cmocka_unit_test(a0_may_fall_where_rfz_rises),
+        cmocka_unit_test(control_words_go_out_and_come_back),
+        cmocka_unit_test(uc1_calibrates_anew),
+        cmocka_unit_test(words_that_the_cycle_cannot_live_with_are_refused),
+        cmocka_unit_test(commands_come_one_after_the_other_and_between_cycles),
+        cmocka_unit_test(a_command_does_not_wait_for_a_host_that_never_comes),
+        cmocka_unit_test(registers_of_control_words),
+        cmocka_unit_test(status_and_flags),
+        cmocka_unit_test(temperatures_and_service_signals),
+        cmocka_unit_test(gyros_count_what_they_turn),
+        cmocka_unit_test(abrupt_changes_of_the_rate_are_kept),
+        cmocka_unit_test(specimens_differ_and_seeds_repeat),
+        cmocka_unit_test(dr_that_never_comes_is_told),
+        cmocka_unit_test(frozen_words_repeat),
+        cmocka_unit_test(limits_are_marked),
+        cmocka_unit_test(resets_and_power_cuts_in_every_phase),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
