@@ -85,7 +85,9 @@ def test_readings_of_every_board_are_complete(rig: Rig) -> None:
 def test_messages_that_are_off_come_when_the_host_wants_them(rig: Rig) -> None:
     unit: Psd1 = unit_of(rig, "psd1")
     assert np.isnan(unit.stream(3).t_sample_s).all()
+    listeners = len(rig.host.listeners)
     unit.also("PSD1_TIME")
+    assert len(rig.host.listeners) == listeners
     readings = unit.stream(20)
     assert np.array_equal(readings["PSD1_TIME.CNT"], readings["CNT"])
     assert np.diff(readings.t_sample_s) == pytest.approx([1 / 1028.0] * 19, rel=0.02)
@@ -369,6 +371,9 @@ def test_the_shell_s_words_for_the_device_go_for_every_board() -> None:
         assert "too early" in rows["X"]["fields"]
         assert say("dut.write bus UC_LOW A55Ah") == {}
         assert say("dut.register bus UC_LOW")["value"] == "A55Ah"
+        with pytest.raises(BenchError, match="too early") as early:
+            session.do("dut.register bus X")
+        assert "dut.ready" not in str(early.value), "that is for a board that is being set up"
         say("dut.use pmka")
         stream = say("dut.stream 5")
         assert [r["signal"] for r in stream["signals"]][:4] == ["X", "Y", "Z", "K"]

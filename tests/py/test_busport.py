@@ -44,9 +44,9 @@ def port(answer: Callable[[str], str]) -> Iterator[tuple[BusPort, Board]]:
 
 
 def test_a_read_cycle() -> None:
-    with port(lambda _: "R 3 8001 t=2500000000\n") as (p, board):
-        assert p.read(3) == Cycle(write=False, address=3, data=0x8001, t_s=2.5)
-        assert board.lines == ["R 3"]
+    with port(lambda _: "R C 8001 t=2500000000\n") as (p, board):
+        assert p.read(12) == Cycle(write=False, address=12, data=0x8001, t_s=2.5)
+        assert board.lines == ["R C"]
         assert 0.0 < board.passed_s <= 0.01
 
 
@@ -102,6 +102,13 @@ def test_a_refusal_of_the_board_has_the_code_it_has_over_can(code: str) -> None:
 def test_what_is_no_answer_is_a_broken_link(line: str) -> None:
     with pytest.raises(LinkError):
         parse(line)
+
+
+def test_a_line_without_an_end_is_no_bus_port() -> None:
+    with port(lambda _: "x" * 3000) as (p, _):
+        p.ask("R 0\nR 1\nR 2")
+        with pytest.raises(LinkError, match="without an end of line"):
+            p.answer()
 
 
 def test_silence_is_told_with_the_patience() -> None:

@@ -250,6 +250,45 @@ def test_an_optional_tpdo_is_off_in_the_eds() -> None:
         assert gen_proto.tpdo_objects([t], [])[0].entries[1].value == cob
 
 
+UNIT = """
+device: {name: TEST, node: 9, vendor_id: 0, product_code: 1, revision: 1}
+messages:
+  - {name: TEST_A, id: 0x180, len: 8, comment: c, signals: [{name: X, start: 0, bits: 16, comment: c}]}
+counters: [{name: Two words}]
+"""
+
+
+def unit_of(monkeypatch: pytest.MonkeyPatch, folder: Path, more: str) -> Any:
+    (folder / "proto").mkdir()
+    (folder / "proto/test.yaml").write_text(UNIT + more)
+    monkeypatch.setattr(gen_proto, "ROOT", folder)
+    return gen_proto.load_unit("test", PROTOCOL)
+
+
+def test_the_least_that_a_unit_needs(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    unit = unit_of(monkeypatch, tmp_path, "tpdos: [{message: TEST_A, cob: 0x180}]")
+    assert unit.counters == ("two_words",)
+    assert {m.name: m.id for m in unit.messages} == {
+        "TEST_EMCY": 0x89, "TEST_A": 0x189, "TEST_SDO_TX": 0x589, "TEST_SDO_RX": 0x609, "TEST_HEARTBEAT": 0x709,
+    }  # fmt: skip
+    assert not {0x2002, 0x2051} & {o.index for o in unit.objects}, "no bus"
+    assert [e["name"] for e in unit.emcy] == [
+        "NONE", "CAN_OVERRUN", "CAN_PASSIVE", "CAN_RECOVERED", "STREAM_REFUSED",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("more", "why"),
+    [
+        ("tpdos: [{message: TEST_A, cob: 0x180, off: true}]", "TPDO TEST_A: no such key"),  # YAML reads off as False
+        ("tpdos: []\nobjects: [{index: 0x2030, name: N, type: UNSIGNED8, access: ro}]", "an object stands twice"),
+    ],
+)
+def test_a_unit_that_cannot_be_is_refused(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, more: str, why: str) -> None:
+    with pytest.raises(ValueError, match=why):
+        unit_of(monkeypatch, tmp_path, more)
+
+
 BUS_ROW = {"name": "X", "access": "ro"}
 
 
