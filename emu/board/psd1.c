@@ -318,7 +318,7 @@ void psd1_power_up(struct psd1 *b, int64_t t_ns)
     psd1_tell(b, PSD1_EV_POWER_UP, t_ns);
     b->t0_ns = t_ns;
     b->phase = PSD1_IN_RESET;
-    trace_steps(&b->trace, &(struct trace_step){t_ns, TRACE_FIRST(PSD1_LINES), rest_levels(b)}, 1);
+    trace_put(&b->trace, TRACE_FIRST(PSD1_LINES), rest_levels(b), t_ns);
     psd1_wave_power(b, true, t_ns);
     psd1_aux_power_up(b, t_ns);
     enter_reset(b, t_ns);
@@ -343,7 +343,7 @@ void psd1_power_down(struct psd1 *b, int64_t t_ns)
     b->fault_told = false;
     for (unsigned i = 0; i < 3; i++) ad7712_power_off(&b->adc[i], t_ns);
     b->dr = true;
-    trace_steps(&b->trace, &(struct trace_step){t_ns, TRACE_FIRST(PSD1_LINES), 0}, 1);
+    trace_put(&b->trace, TRACE_FIRST(PSD1_LINES), 0, t_ns);
     psd1_tell(b, PSD1_EV_RES, t_ns);
     psd1_tell(b, PSD1_EV_POWER_DOWN, t_ns);
 }
