@@ -136,40 +136,39 @@ static int16_t to_code(struct pmka *b, double out_v, bool *clipped)
 #define SH   (UINT64_C(1) << PMKA_LINE_SH)
 #define CONV (UINT64_C(1) << PMKA_LINE_CONV)
 
-/* Edges of the conversion under way, as far as they lie between what the trace still takes and t_ns. */
-static void report_conversion(struct pmka *b, int64_t t_ns)
+static void report(struct pmka *b, int64_t t_ns, uint64_t lines, uint64_t level)
 {
-    const struct trace_step step[] = {{b->sampled_ns, SH, SH},
-                                      {b->sampled_ns + b->profile.hold_ns, CONV, CONV},
-                                      {b->sampled_ns + b->profile.convert_ns, SH | CONV, 0}};
-    for (unsigned n = 0; n < 3 && step[n].t_ns <= t_ns; n++) {
-        struct trace_step s = step[n];
-        s.t_ns = later(s.t_ns, b->trace.done_ns);
-        trace_steps(&b->trace, &s, 1);
-    }
+    trace_steps(&b->trace, &(struct trace_step){later(t_ns, b->trace.done_ns), lines, level}, 1);
 }
 
-static void converted(void *ctx, int64_t t_ns)
+/* Its end is known as it begins; should the board stop before, the lines fall the sooner. */
+static void conversion_begins(void *ctx, int64_t t_ns)
 {
     struct pmka *b = ctx;
-    report_conversion(b, t_ns);
+    report(b, t_ns, CONV, CONV);
+    report(b, b->sampled_ns + b->profile.convert_ns, SH | CONV, 0);
 }
 
-static void arm_conversion(struct pmka *b)
+static void report_hold(struct pmka *b)
 {
-    sched_at(b->sched, &b->converted, b->sampled_ns + b->profile.convert_ns);
+    report(b, b->sampled_ns, SH, SH);
+    sched_at(b->sched, &b->conversion, b->sampled_ns + b->profile.hold_ns);
 }
 
 void pmka_converter_wake(struct pmka *b, int64_t t_ns)
 {
-    if (b->life == PMKA_RUNNING && t_ns < b->sampled_ns + b->profile.convert_ns && !b->converted.queued)
-        arm_conversion(b);
+    const int64_t begins_ns = b->sampled_ns + b->profile.hold_ns, ends_ns = b->sampled_ns + b->profile.convert_ns;
+    if (b->life != PMKA_RUNNING || t_ns >= ends_ns || trace_watched(&b->trace, SH | CONV)) return;
+    report_hold(b);
+    if (begins_ns > t_ns) return;
+    sched_cancel(b->sched, &b->conversion);
+    conversion_begins(b, begins_ns);
 }
 
 void pmka_converter_stop(struct pmka *b, int64_t t_ns)
 {
-    if (b->converted.queued) report_conversion(b, t_ns);
-    sched_cancel(b->sched, &b->converted);
+    sched_cancel(b->sched, &b->conversion);
+    b->sampled_ns = INT64_MIN / 2;
     pmka_line(b, PMKA_LINE_SH, false, t_ns);
     pmka_line(b, PMKA_LINE_CONV, false, t_ns);
 }
@@ -181,7 +180,7 @@ static void hold(struct pmka *b, unsigned i, int64_t t_ns)
     b->sampled_ns = t_ns;
     pmka_line(b, PMKA_LINE_MUX0, next & 1u, t_ns);
     pmka_line(b, PMKA_LINE_MUX1, next >> 1 & 1u, t_ns);
-    if (trace_watched(&b->trace, SH | CONV)) arm_conversion(b);
+    if (trace_watched(&b->trace, SH | CONV)) report_hold(b);
 }
 
 void pmka_sample(struct pmka *b, unsigned i, int64_t t_ns)
@@ -208,6 +207,7 @@ void pmka_sample(struct pmka *b, unsigned i, int64_t t_ns)
 
 void pmka_sample_init(struct pmka *b)
 {
-    sched_ev(&b->converted, converted, b);
+    sched_ev(&b->conversion, conversion_begins, b);
+    b->sampled_ns = INT64_MIN / 2; /* never */
     for (unsigned i = 0; i < PMKA_INTS; i++) sched_ev(&b->channel[i].reset_end, reset_ended, b);
 }

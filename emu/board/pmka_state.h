@@ -91,9 +91,8 @@ struct pmka {
     struct pmka_reading next, latest; /* being taken; complete */
     bool any;                         /* a reading is there */
     /* converter, for the trace */
-    bool converting;
-    int64_t sampled_ns;
-    struct sched_ev converted;
+    int64_t sampled_ns; /* last */
+    struct sched_ev conversion;
 };
 
 #endif
