@@ -12,12 +12,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import psd1_bench
 import pytest
+from numpy.typing import NDArray
 from psabench.can_host import CanHost, Message, StepClock, open_bus
 from psabench.control import Control
 from psabench.emulator import Emulator
-from psabench.vcd import Vcd, Wire, read_vcd
-from verilog_bench import Edges, difference, drawn, recorded, seed_of_test, simulate
+from psabench.vcd import Ints, Vcd, Wire, read_vcd
+from verilog_bench import Edges, between, difference, drawn, seed_of_test, simulate
 
 pytestmark = pytest.mark.skipif(not shutil.which("iverilog"), reason="iverilog is not installed")
 
@@ -85,11 +87,13 @@ def psa2_frames(vcd: Vcd, messages: list[list[Message]]) -> list[list[Psa2Frame]
     return found
 
 
-def of_accelerometers(vcd: Vcd, line: str) -> Edges:
+def of_accelerometers(vcd: Vcd, line: str, start_ns: int, end_ns: int) -> Edges:
     """Edges of a line; SClk without the bursts of the temperature converter, which are not in the model."""
-    edges = recorded(vcd.wires[line])
-    cst: Wire = vcd.wires["CST"]
-    return edges if line != "SClk" else edges.where(cst.at(edges.t_ns) == 1)
+    edges = between(vcd.wires[line], start_ns, end_ns)
+    if line != "SClk":
+        return edges
+    kept = vcd.wires["CST"].at(edges.t_ns) == 1
+    return Edges(edges.before, edges.t_ns[kept], edges.level[kept])
 
 
 def test_a_thousand_frames_of_psa_2_have_the_edges_of_the_verilog_model(tmp_path: Path) -> None:
@@ -104,12 +108,58 @@ def test_a_thousand_frames_of_psa_2_have_the_edges_of_the_verilog_model(tmp_path
     assert len({f.conv_ns * 2048 % 1_000_000 for f in (run[0] for run in runs)}) > 1  # DRD_A against SClk
     rows = (f"{f.conv_ns} {f.words[0]:x} {f.words[1]:x} {f.words[2]:x} {f.word_t:x}\n" for f in frames)
     end_ns = frames[-1].int_rise_ns + 1000
-    edges = drawn(simulate(tmp_path, "psa2_edges_tb", PSA2_MODEL, end_ns, frames="".join(rows)), PSA2_LINES)
+    wires = drawn(simulate(tmp_path, "psa2_edges_tb", PSA2_MODEL, end_ns, frames="".join(rows)), PSA2_LINES)
     wrong = []
     for run in runs:
         within = (run[0].conv_ns, run[-1].int_rise_ns + 100)  # from where on DOut is known to the model
         for line in PSA2_LINES:
-            ours, theirs = (e.between(*within) for e in (of_accelerometers(vcd, line), edges[line]))
+            ours, theirs = of_accelerometers(vcd, line, *within), between(wires[line], *within)
             assert len(ours.t_ns) > len(run) or line == "DIn" or line.startswith("DOut")
             wrong.append(difference(line, ours, theirs))
     assert "\n".join(w for w in wrong if w) == ""
+
+
+PSD1_MODEL = ("psd1", "kpsd1", "ad7712_port")
+PSD1_CYCLES = 1000
+DRDY_PULSE_TAU = 500  # DRDY is high so long before an unread word is replaced (docs/chips/ad7712.md)
+
+
+@pytest.mark.parametrize(("clock_ppm", "tau_ns", "phases"), [(0, 100, 1), (-218_750, 128, 25)])
+def test_a_thousand_cycles_of_psd_1_have_the_edges_of_the_verilog_model(
+    clock_ppm: int, tau_ns: int, phases: int, tmp_path: Path
+) -> None:
+    """Random delays, lengths and mistakes of the host. On its own clock converter X ends its words where 1M25 rises; on
+    another one, here 7.8125 MHz, at every 32 ns of a period."""
+    seed = seed_of_test()
+    prompt = [[psd1_bench.Strobe(True, 1000, 800, axis)] for axis in range(3)]  # INT0 and FL1 come with the first cycle
+    strobes = list(psd1_bench.random_strobes(np.random.default_rng(seed), PSD1_CYCLES))
+    path, words = psd1_bench.record(tmp_path, seed % 2**31, prompt + strobes, clock_ppm)
+    vcd = read_vcd(path)
+    cycles, words = psd1_bench.cycles(vcd)[1 : len(words)], words[1:]
+    assert len(cycles) == len(words) == PSD1_CYCLES
+    dr_falls = vcd.wires["DR"].edges_ns(0)
+    found = set((dr_falls[-PSD1_CYCLES:] % 800).tolist())
+    assert len(found) == phases
+    start_ns = int(dr_falls[dr_falls < cycles[0].start_ns][-1])
+    end_ns = cycles[-1].end_ns + 300
+    host = "".join(f"{int(not s.after_fl2)} {s.delay_ns} {s.length_ns} {s.address} 1\n" for row in strobes for s in row)
+    stimuli = {
+        "updates": "".join(f"{t}\n" for t in dr_falls[(dr_falls >= start_ns) & (dr_falls < end_ns)].tolist()),
+        "words": "".join(f"{x:x} {y:x} {z:x}\n" for x, y, z in words),
+        "host": host,
+    }
+    edges = simulate(tmp_path, "psd1_tb", PSD1_MODEL, end_ns + 1, {"update_ns": DRDY_PULSE_TAU * tau_ns}, **stimuli)
+    wires = drawn(edges, psd1_bench.LINES)
+    clock = np.arange(start_ns // 400 * 400 + 400, end_ns + 1, 400)  # the model's own is the test bench's
+    wires["CLK_1M25"] = Wire(np.append(start_ns // 400 * 400, clock), _levels(start_ns, clock))
+    wrong = [
+        difference(line, between(vcd.wires[line], start_ns, end_ns), between(wires[line], start_ns, end_ns))
+        for line in psd1_bench.LINES
+    ]
+    assert "\n".join(w for w in wrong if w) == ""
+    assert all(len(between(vcd.wires[n], start_ns, end_ns).t_ns) > PSD1_CYCLES for n in ("A0", "FL2", "DR", "D7", "CS"))
+
+
+def _levels(start_ns: int, clock: Ints) -> NDArray[np.uint8]:
+    """1M25 rises at even multiples of 400 ns from power-up."""
+    return (1 - np.append(start_ns // 400, clock // 400) % 2).astype(np.uint8)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import secrets
 import subprocess
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,18 +19,17 @@ PATIENCE_S = 300
 
 @dataclass(frozen=True, slots=True)
 class Edges:
-    """Changes of one line: instants in ns, and the level from each on."""
+    """What a line does in a stretch of time: level at its start, instants of the changes in ns, levels after them."""
 
+    before: int
     t_ns: Ints
     level: NDArray[np.uint8]
 
-    def between(self, start_ns: int, end_ns: int) -> Edges:
-        """Those in start < t <= end."""
-        inside = (self.t_ns > start_ns) & (self.t_ns <= end_ns)
-        return Edges(self.t_ns[inside], self.level[inside])
 
-    def where(self, kept: NDArray[np.bool_]) -> Edges:
-        return Edges(self.t_ns[kept], self.level[kept])
+def between(wire: Wire, start_ns: int, end_ns: int) -> Edges:
+    """Changes in start < t <= end."""
+    inside = (wire.t_ns > start_ns) & (wire.t_ns <= end_ns)
+    return Edges(int(wire.at(start_ns)), wire.t_ns[inside], wire.level[inside])
 
 
 def seed_of_test() -> int:
@@ -40,17 +39,19 @@ def seed_of_test() -> int:
     return seed
 
 
-def recorded(wire: Wire) -> Edges:
-    """What a line of a VCD does after its first level."""
-    return Edges(wire.t_ns[1:], wire.level[1:])
-
-
-def simulate(directory: Path, bench: str, models: Iterable[str], end_ns: int, **files: str) -> Path:
+def simulate(
+    directory: Path,
+    bench: str,
+    models: Iterable[str],
+    end_ns: int,
+    options: Mapping[str, int] | None = None,
+    **files: str,
+) -> Path:
     """Runs a test bench with these stimuli up to an instant; the file of its edges. Raises AssertionError in words."""
     program, edges = directory / f"{bench}.vvp", directory / f"{bench}.edges"
     sources = [str(MODELS / f"{name}.v") for name in (bench, *models)]
     _run(["iverilog", "-g2005", "-Wall", "-o", str(program), *sources])
-    plus = [f"+edges={edges}", f"+end={end_ns}"]
+    plus = [f"+edges={edges}", f"+end={end_ns}", *(f"+{name}={value}" for name, value in (options or {}).items())]
     for name, text in files.items():
         path = directory / f"{bench}.{name}"
         path.write_text(text, encoding="ascii")
@@ -64,8 +65,8 @@ def _run(command: list[str]) -> None:
     assert (p.returncode, p.stdout + p.stderr) == (0, ""), f"{' '.join(command)}\n{p.stdout}{p.stderr}"
 
 
-def drawn(path: Path, names: Iterable[str]) -> dict[str, Edges]:
-    """Edges of each line in a test bench's record: rows of instant and levels; the last of an instant counts."""
+def drawn(path: Path, names: Iterable[str]) -> dict[str, Wire]:
+    """Each line in a test bench's record: rows of instant and levels; the last of an instant counts."""
     rows = [(t, v) for t, v in zip(*[iter(path.read_text(encoding="ascii").split())] * 2, strict=True) if _known(v)]
     t_ns = np.array([int(t) for t, _ in rows], np.int64)
     levels = np.array([int(v, 16) for _, v in rows], np.uint64)
@@ -74,8 +75,8 @@ def drawn(path: Path, names: Iterable[str]) -> dict[str, Edges]:
     found = {}
     for i, name in enumerate(names):
         level = ((levels >> np.uint64(i)) & np.uint64(1)).astype(np.uint8)
-        at = np.flatnonzero(level[1:] != level[:-1]) + 1
-        found[name] = Edges(t_ns[at], level[at])
+        at = np.flatnonzero(np.append(True, level[1:] != level[:-1]))
+        found[name] = Wire(t_ns[at], level[at])
     return found
 
 
@@ -87,6 +88,8 @@ def _known(levels: str) -> bool:
 def difference(name: str, ours: Edges, theirs: Edges) -> str:
     """Where two edge lists part, in words; nothing if they do not."""
     n = min(len(ours.t_ns), len(theirs.t_ns))
+    if ours.before != theirs.before:
+        return f"{name}: the emulator begins with {ours.before}, Verilog with {theirs.before}"
     same = (ours.t_ns[:n] == theirs.t_ns[:n]) & (ours.level[:n] == theirs.level[:n])
     if same.all() and len(ours.t_ns) == len(theirs.t_ns):
         return ""

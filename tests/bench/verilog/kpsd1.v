@@ -27,11 +27,12 @@ module kpsd1 (
     reg  [1:0] axis = 2'd0;
     reg        read = 1'b0, seen = 1'b0;  // differ: the word has been read
     reg  [4:0] bits = 5'd0;               // shifted in
+    reg        run = 1'b0;                // SCLK is on
     wire       busy = rf_n != 3'b111;
 
     always @(negedge clk)
         if (busy) begin
-            if (bits == 5'd16) begin
+            if (bits == 5'd16 && !run) begin  // after the end of the 16th pulse
                 rf_n <= 3'b111;
                 fl2 <= 1'b1;
             end
@@ -53,7 +54,6 @@ module kpsd1 (
 
     // ---- shift register RK and its clock, which is gated while it is low
     reg  [23:0] rk = 24'd0;
-    reg         run = 1'b0;
     assign sclk = clk_3_8 & run;
 
     always @(negedge clk_3_8) run <= busy && bits != 5'd16;

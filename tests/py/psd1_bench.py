@@ -1,0 +1,146 @@
+"""A PSD-1 whose host is a test: cycles with given strobes, recorded, and what a reader needs of the recording.
+
+The host strobes over the control command `bus.read` in step pace, to the nanosecond. Times are ns of simulated time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from psabench.control import Control
+from psabench.emulator import Emulator
+from psabench.errors import ControlError
+from psabench.vcd import Vcd
+
+LINES = (
+    *("A0", "INT0", "FL1", "FL2", "DR", "RFX", "RFY", "RFZ", "TFS", "SCLK", "SDAT", "CLK_1M25", "CS", "RW"),
+    *(f"AB{i}" for i in range(4)),
+    *(f"D{i}" for i in range(16)),
+)
+HALF_NS = 400  # of 1M25
+SET_UP_S = 0.02
+
+SCENARIO = """
+seed: {seed}
+start: true
+units:
+  - name: a
+    board: psd1
+    profile_set: {{host_strobe_ns: 0}}
+    axes:
+      x: {{sensor: mems, u0_v: 2.5, kx_v_per_g: 1.0, reading_noise_v: 1.0}}
+      y: {{sensor: mems, u0_v: -4.1, kx_v_per_g: 1.0, reading_noise_v: 1.0}}
+      z: {{sensor: mems, u0_v: 0.0, kx_v_per_g: 1.0, reading_noise_v: 1.0}}
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Strobe:
+    """A read: delay after the rise of FL2, or after the strobe before; length; address; whether a word is to be had."""
+
+    after_fl2: bool
+    delay_ns: int
+    length_ns: int
+    address: int
+    good: bool = True
+
+
+def scenario(directory: Path, seed: int) -> Path:
+    path = directory / "psd1.yaml"
+    path.write_text(SCENARIO.format(seed=seed), encoding="utf-8")
+    return path
+
+
+def random_strobes(rng: np.random.Generator, cycles: int) -> Iterator[list[Strobe]]:
+    """Of each word of each cycle: mostly prompt, at times late or so late that conversions are lost; now and then a
+    strobe at another word's address first, or one more behind it, which must both change nothing."""
+    for _ in range(cycles):
+        for axis in range(3):
+            delay = int(rng.choice([rng.integers(0, 3000), rng.integers(0, 200_000), 800 * rng.integers(0, 4)]))
+            if rng.random() < 0.004:
+                delay = int(rng.integers(500_000, 2_500_000))
+            strobes = [Strobe(True, delay, int(rng.integers(200, 4000)), axis)]
+            if rng.random() < 0.1:
+                other = (axis + int(rng.integers(1, 3))) % 3
+                strobes.insert(0, Strobe(True, int(rng.integers(0, 2000)), int(rng.integers(200, 900)), other, False))
+                strobes[1] = Strobe(False, 10 + delay, strobes[1].length_ns, axis)
+            if rng.random() < 0.1:
+                wait = int(rng.integers(10, 8000))
+                strobes.append(Strobe(False, wait, int(rng.integers(200, 900)), axis, False))
+            yield strobes
+
+
+class Host:
+    """Strobes of a board in step pace."""
+
+    def __init__(self, control: Control) -> None:
+        self._control = control
+        self.now_ns = control.call("time").t_ns
+
+    def run(self, dt_ns: int) -> None:
+        if dt_ns > 0:
+            self.now_ns = self._control.call("run", for_s=dt_ns * 1e-9).t_ns
+
+    def await_event(self, event: str) -> None:
+        reply = self._control.call("run.until", event=event)
+        assert reply.result["reached"], f"no {event}"
+        self.now_ns = reply.t_ns
+
+    def read(self, s: Strobe) -> int | None:
+        """The word; None when the board refuses. It ends with the end of the strobe, refused or not."""
+        if s.after_fl2:
+            self.await_event("FL2")
+        self.run(s.delay_ns)
+        end_ns = self.now_ns + s.length_ns
+        word, args = None, {"unit": "a", "address": s.address, "strobe_ns": s.length_ns}
+        try:
+            word = int(self._control.call("bus.read", **args).result["data"])
+        except ControlError:
+            if s.good:
+                raise
+        self.now_ns = self._control.call("time").t_ns
+        self.run(end_ns - self.now_ns)
+        assert self.now_ns == end_ns, f"{s}: the strobe ended at {self.now_ns} ns, not at {end_ns}"
+        assert (word is not None) == s.good
+        return word
+
+
+def record(
+    directory: Path, seed: int, strobes: Iterable[Sequence[Strobe]], clock_ppm: int = 0
+) -> tuple[Path, list[list[int]]]:
+    """The recording at 1 ns from power-on, and the words of each cycle as the host read them."""
+    vcd, words = directory / "psd1.vcd", list[int]()
+    extra: list[str | Path] = ["--vcd", vcd, "--vcd-unit", "1"]
+    with (
+        Emulator(scenario(directory, seed), cans=["none"], pace="step", extra=extra) as emu,
+        Control(emu.directory / "control") as control,
+    ):
+        host = Host(control)
+        for i, row in enumerate(strobes):
+            if clock_ppm and i == 3:  # of converter X, after the first cycle: DR then meets the clock at any phase
+                control.call("fault.add", kind="chip.clock", point="a.adc.x", clock_ppm=clock_ppm)
+            for strobe in row:
+                word = host.read(strobe)
+                if word is not None:
+                    words.append(word)
+        host.run(1_000_000)
+    return vcd, [words[i : i + 3] for i in range(0, len(words) - len(words) % 3, 3)]
+
+
+@dataclass(frozen=True, slots=True)
+class Cycle:
+    """From the rise of A0 to its fall."""
+
+    start_ns: int
+    end_ns: int
+
+
+def cycles(vcd: Vcd) -> list[Cycle]:
+    """Whole cycles of reading: in the set-up A0 rises, too, but no word is offered."""
+    a0, fl2 = vcd.wires["A0"], vcd.wires["FL2"].edges_ns(1)
+    first = a0.edges_ns(1)[a0.edges_ns(1) < fl2[0]][-1]
+    starts, ends = (t[t >= first].tolist() for t in (a0.edges_ns(1), a0.edges_ns(0)))
+    return [Cycle(start, end) for start, end in zip(starts, ends, strict=False)]
