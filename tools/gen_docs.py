@@ -31,10 +31,10 @@ import yaml
 
 ROOT = Path(__file__).resolve().parents[1]
 CHIPS = ROOT / "docs/chips"
-PAGES = {"1": "ads1282", "2": "ads1256"}  # first figure of a section: the chip's page
+PAGES = {"1": "ads1282", "2": "ads1256", "3": "ad7712"}  # first figure of a section: the chip's page
 STATES = ("modelled", "simplified", "absent")
 BEGIN, END = "<!-- fidelity:begin -->", "<!-- fidelity:end -->"
-ROW_ID = re.compile(r"[12]\.[0-9]-[a-z0-9][a-z0-9-]*")
+ROW_ID = re.compile(r"[123]\.[0-9]-[a-z0-9][a-z0-9-]*")
 GRADE = re.compile(r"E[0-6]( M\d\d)?\b.*")
 TEST = re.compile(r"(test_\w+\.c:\w+|test_\w+\.py:test_\w+)")
 KEYS = {"id", "state", "grade", "tests", "note", "fact", "value", "also"}

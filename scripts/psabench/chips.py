@@ -65,8 +65,8 @@ def ads1282_volts(word: int, *, vref_v: float = 5.0, gain: int = 1) -> float:
 def ad7712_volts(
     code: int, *, vref_v: float = 2.5, gain: int = 1, bits: int = 24, unipolar: bool = False, high_level: bool = False
 ) -> float:
-    """Volts at an input of an AD7710..AD7712 for a code of 16 or 24 bits: bipolar codes are offset binary, full scale is
-    VREF / gain. high_level: AIN2 of the AD7712, whose divider makes it four times that."""
+    """Volts at an input of an AD7710..AD7712 for a code of 16 or 24 bits: bipolar codes are offset binary, full scale
+    is VREF / gain. high_level: AIN2 of the AD7712, whose divider makes it four times that."""
     full_v = vref_v * (4 if high_level else 1) / gain
     return full_v * (code / 2**bits if unipolar else code / 2 ** (bits - 1) - 1)
 

@@ -57,11 +57,13 @@ static const char *text(struct script *s, char *buf, size_t cap)
 
 static void op_part(struct world *w, psabench_part *p)
 {
-    static const char *const parts[] = {"ads1281", "ads1282", "ads1255", "ads1256", "psa2", "adc", "ad7710", "ad7711a", "ad7712"};
+    static const char *const parts[] = {"ads1281", "ads1282", "ads1255", "ads1256", "psa2",
+                                        "adc",     "ad7710",  "ad7711a", "ad7712"};
     char options[200], name[40];
     (void)p;
     if (w->parts == PARTS_MAX) return;
-    const char *part = parts[script_byte(w->s) % 6];
+    const uint8_t kind = script_byte(w->s);
+    const char *part = parts[kind < 192 ? kind % 6 : 6 + kind % 3];
     const char *words = text(w->s, options, sizeof options);
     psabench_part *made = psabench_part_new(w->b, part, text(w->s, name, sizeof name), words);
     if (made) w->part[w->parts++] = made;

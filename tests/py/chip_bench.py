@@ -202,6 +202,65 @@ class Ads1256(Session):
         return found
 
 
+class Ad7712(Session):
+    """AD7710 family: frames of RFS and TFS, bit by bit as the article's controller has them."""
+
+    A0_NS = 400
+    FIRST_NS = 700  # RFS to the first rise of SCLK
+    HALF_NS = 400  # of SCLK
+    LAST_NS = 500  # last fall to RFS or TFS high
+
+    def __init__(
+        self, path: Path | None = None, part: str = "ad7712", *, seed: int = 1, **options: float | str | bool
+    ) -> None:
+        super().__init__(part, path, seed=seed, **options)
+
+    def begin(self, frame: str, a0: int, a0_ns: int | None = None) -> int:
+        """A0, then RFS or TFS low; when."""
+        self.pin("A0", a0)
+        self.wait_ns(self.A0_NS if a0_ns is None else a0_ns)
+        return self.pin(frame, 0)
+
+    def end(self, frame: str) -> int:
+        self.wait_ns(self.LAST_NS)
+        at_ns = self.pin(frame, 1)
+        self.wait_ns(self.LAST_NS)
+        return at_ns
+
+    def bits(self, count: int) -> int:
+        """Pulses of SCLK; what SDATA says at their rises. Ends with the last fall."""
+        value = 0
+        for i in range(count):
+            if i:
+                self.wait_ns(self.HALF_NS)
+            self.pin("SCLK", 1)
+            value = value << 1 | self.adc.pins["SDATA"].level
+            self.wait_ns(self.HALF_NS)
+            self.pin("SCLK", 0)
+        return value
+
+    def read(self, a0: int = 1, count: int = 24) -> int:
+        self.begin("RFS", a0)
+        self.wait_ns(self.FIRST_NS)
+        value = self.bits(count)
+        self.end("RFS")
+        return value
+
+    def write(self, word: int, a0: int = 0) -> int:
+        """24 bits, data with the falls of SCLK; when the last of them fell."""
+        self.begin("TFS", a0)
+        for i in range(24):
+            self.pin("SDATA", word >> (23 - i) & 1)
+            self.wait_ns(self.HALF_NS)
+            self.pin("SCLK", 1)
+            self.wait_ns(self.HALF_NS)
+            self.pin("SCLK", 0)
+        last_ns = self.now_ns
+        self.end("TFS")
+        self.pin("SDATA", 0)
+        return last_ns
+
+
 def no_complaints(lines: Iterable[str]) -> None:
     """Fails with the first complaints there are."""
     found = [line for line in lines if line]

@@ -20,7 +20,7 @@ ROOT = Path(__file__).parents[2]
 ENV = {k: v for k, v in os.environ.items() if k not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")}
 HEADER = (ROOT / "emu/api/psabench.h").read_text()
 PAGE = ROOT / "docs/library.md"
-EXAMPLES = ("ads1256_read", "ads1282_read", "psa2_frames")
+EXAMPLES = ("ads1256_read", "ads1282_read", "ad7712_read", "psa2_frames")
 STRICT = ["-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wundef", "-Werror"]
 
 

@@ -75,8 +75,11 @@ static void a_lost_sync(void **state)
     ad7712_sync_pin(&r.a, true, r.s.now_ns);
     assert_int_equal(r.a.n.restarts, restarts);
     ad7712_sync_pin(&r.a, false, r.s.now_ns);
-    fault(&r, (struct ad7712_fault){0}); /* the wire is whole again, and low */
+    await_fall(&r);
+    const unsigned n = r.drdy.n;
+    fault(&r, (struct ad7712_fault){0}); /* the wire is whole again, and low: DRDY goes high, told once */
     assert_int_equal(r.a.state, AD7712_SYNC_LOW);
+    assert_int_equal(r.drdy.n, n + 1);
     fault(&r, (struct ad7712_fault){.lost_sync = true});
     await_fall(&r);
 }
