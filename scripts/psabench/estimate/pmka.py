@@ -3,11 +3,12 @@
     dS_i = (dN_i / Nr(s)) Sr CT(s) - dS0,     dN_i = N_i - N_(i-1) + s Nr(s),     Sr = UREF Ts          (4), (5)
     S    = Sr [sum s_j CT(s_j) + sum (N_i - N_(i-1)) CT / Nr] - m dS0                                   (7)
 
-s = 1, -1, 0: the reset of the period, Nr(s) = KADC Ur(s) its size in codes, CT(s) the correction of the ROM at the measured
-temperature. The capacitor is in Nr alone, which is measured while the integrator is out of work: with its input at ground
-each reset shows Nr itself. The zero is what its code gains meanwhile, from the first and the last code of a run: the
-roundings of all codes between them cancel. Codes of different integrators are never subtracted from each other: where an
-axis is handed over its sum goes on from increment to increment. Axes 0, 1, 2 = X, Y, Z; integrators 0..3 = X, Y, Z, K.
+s = 1, -1, 0: the reset of the period, Nr(s) = KADC Ur(s) its size in codes, CT(s) the correction of the ROM at the
+measured temperature. The capacitor is in Nr alone, which is measured while the integrator is out of work: with its input
+at ground each reset shows Nr itself. The zero is what its code gains meanwhile, from the first and the last code of a
+run: the roundings of all codes between them cancel. Codes of different integrators are never subtracted from each other:
+where an axis is handed over its sum goes on from increment to increment. Axes 0, 1, 2 = X, Y, Z; integrators 0..3 = X, Y,
+Z, K.
 """
 
 from __future__ import annotations
@@ -43,7 +44,8 @@ class Rom:
 
     def ct_at(self, integrator: int, sign: int, degc: Floats) -> Floats:
         """CT(sign), linear between the points; outside, that of the nearest one."""
-        return np.interp(degc, self.degc, self.ct[integrator, :, sign])
+        ct: Floats = np.interp(degc, self.degc, self.ct[integrator, :, sign])
+        return ct
 
     def zero_at_vs(self, integrator: int, degc: Floats) -> Floats:
         """dS0, V s per Ts."""
@@ -151,7 +153,7 @@ def _size_of_reset(steps: Floats, resets: Ints, zero: float) -> tuple[float, flo
 
 
 def calibrate(p: Periods, integrator: int) -> Calibration:
-    """Nr of both signs and the zero of an integrator from all its calibrations. Raises ValueError when one is missing."""
+    """Nr of both signs and the zero of an integrator from all its calibrations. Raises ValueError for want of one."""
     name = INTEGRATORS[integrator]
     nr_at, nr = [], []
     rough = _zero_of_runs(p, integrator, None)
@@ -171,7 +173,7 @@ def calibrate(p: Periods, integrator: int) -> Calibration:
 
 
 def _zero_of_runs(p: Periods, integrator: int, nr: tuple[Floats, Floats] | None) -> tuple[Floats, Floats]:
-    """Middle and codes per Ts of each run: last code less first, over its length. nr None: only runs without a reset."""
+    """Middle and codes per Ts of each run: last code less first, by its length. nr None: only runs without a reset."""
     at, zero = [], []
     for first, last in _resting(p, integrator, CAL_ZERO):
         resets = p.reset[first : last + 1, integrator]
@@ -208,8 +210,8 @@ def integrals_vs(
 ) -> Floats:
     """Integral of each axis since the first reading, V s, shape (n, 3), eq. (7).
 
-    calibrations: by integrator; None: from the readings themselves. The integral of row k goes to the sampling instant of
-    the integrator that has the axis; where K gives it back, to that instant.
+    calibrations: by integrator; None: from the readings themselves. The integral of row k goes to the sampling instant
+    of the integrator that has the axis; where K gives it back, to that instant.
     """
     if calibrations is None:
         calibrations = [calibrate(p, i) for i in range(len(INTEGRATORS))]
