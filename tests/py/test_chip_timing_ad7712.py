@@ -1,8 +1,8 @@
 """Every timing figure of the AD7710 family (sources 3.2, 3.4), measured in recordings of its pins.
 
 The figures are typed here from the sources; tau is a period of MCLK IN. Compared to the nanosecond where the source
-gives clock periods; a limit ("at most", "at least") is held from both sides: the chip keeps its own, and counts a driver
-that does not, one nanosecond beyond it.
+gives clock periods; a limit ("at most", "at least") is held from both sides: the chip keeps its own, and counts a
+driver that does not, one nanosecond beyond it.
 """
 
 from __future__ import annotations
