@@ -33,7 +33,7 @@ class Pmka(BusUnit):
         return head + [word(ROM_HEAD + w) for w in range(INTEGRATORS * ROM_ROW * head[2] + 1)]
 
     def autonomous(self, on: bool, *, beat: int | None = None, zero: int | None = None) -> None:
-        """Who turns the calibration: the unit itself, in beats of `beat` Ts, `zero` of them for the zero; or `command`."""
+        """Whether the unit turns the calibration itself, in beats of `beat` Ts, `zero` of them for the zero."""
         longer_first = (("BEAT", beat), ("ZERO", zero))
         if beat is not None and zero is not None and beat < self.bus_read(self._address("BEAT")):
             longer_first = (("ZERO", zero), ("BEAT", beat))

@@ -4,11 +4,11 @@
     S    = Sr [sum s_j CT(s_j) + sum (N_i - N_(i-1)) CT / Nr] - m dS0                                   (7)
 
 s = 1, -1, 0: the reset of the period, Nr(s) = KADC Ur(s) its size in codes, CT(s) the correction of the ROM at the
-measured temperature. The capacitor is in Nr alone, which is measured while the integrator is out of work: with its input
-at ground each reset shows Nr itself. The zero is what its code gains meanwhile, from the first and the last code of a
-run: the roundings of all codes between them cancel. Codes of different integrators are never subtracted from each other:
-where an axis is handed over its sum goes on from increment to increment. Axes 0, 1, 2 = X, Y, Z; integrators 0..3 = X, Y,
-Z, K.
+measured temperature. The capacitor is in Nr alone, which is measured while the integrator is out of work: with its
+input at ground each reset shows Nr itself. The zero is what its code gains meanwhile, from the first and the last code
+of a run: the roundings of all codes between them cancel. Codes of different integrators are never subtracted from each
+other: where an axis is handed over its sum goes on from increment to increment. Axes 0, 1, 2 = X, Y, Z; integrators
+0..3 = X, Y, Z, K.
 """
 
 from __future__ import annotations
@@ -49,7 +49,8 @@ class Rom:
 
     def zero_at_vs(self, integrator: int, degc: Floats) -> Floats:
         """dS0, V s per Ts."""
-        return np.interp(degc, self.degc, self.zero_vs[integrator])
+        zero_vs: Floats = np.interp(degc, self.degc, self.zero_vs[integrator])
+        return zero_vs
 
 
 def rom_of(words: Sequence[int]) -> Rom:
@@ -121,11 +122,13 @@ class Calibration:
 
     def nr_of(self, sign: int, at: Floats) -> Floats:
         """Nr(sign) at readings `at`, linear between two calibrations."""
-        return np.interp(at, self.nr_at, self.nr[:, sign])
+        nr: Floats = np.interp(at, self.nr_at, self.nr[:, sign])
+        return nr
 
     def zero_of(self, at: Floats) -> Floats:
         """Codes per Ts."""
-        return np.interp(at, self.zero_at, self.zero)
+        zero: Floats = np.interp(at, self.zero_at, self.zero)
+        return zero
 
 
 def runs(mask: npt.NDArray[np.bool_]) -> list[tuple[int, int]]:
