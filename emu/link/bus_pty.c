@@ -51,6 +51,7 @@ static void on_line(struct text_link *t, enum lines_result r, const char *line, 
     }
     p->request = request;
     p->busy = true;
+    p->orphan = false;
 }
 
 static bool on_ready(struct text_link *t)
@@ -64,14 +65,14 @@ void bus_pty_done(struct bus_pty *p, uint16_t data, int64_t t_ns)
     if (!p->busy) return;
     p->busy = false;
     p->cycles++;
-    put(p, text, bus_text_done(&p->request, data, t_ns, text));
+    if (!p->orphan) put(p, text, bus_text_done(&p->request, data, t_ns, text));
 }
 
 void bus_pty_failed(struct bus_pty *p, const char *code, int64_t t_ns)
 {
     if (!p->busy) return;
     p->busy = false;
-    refuse(p, &p->request, 2, code, t_ns);
+    if (!p->orphan) refuse(p, &p->request, 2, code, t_ns);
 }
 
 /* Nobody is there to read. */
@@ -87,6 +88,7 @@ static void on_opened(void *ctx, bool open, int64_t t_ns)
     struct bus_pty *p = ctx;
     (void)t_ns;
     if (!open) return;
+    p->orphan = p->busy;
     text_link_forget(&p->io);
     pty_discard(&p->pty);
 }

@@ -55,7 +55,8 @@ static bool op_of(struct text f, enum bus_op *op)
     static const char letter[] = {'R', 'W', '?'};
     if (f.end - f.at != 1) return false;
     for (unsigned i = 0; i < sizeof letter; i++) {
-        if ((*f.at & ~0x20) != (letter[i] & ~0x20)) continue;
+        const bool lower = *f.at >= 'a' && *f.at <= 'z';
+        if ((lower ? *f.at - 'a' + 'A' : *f.at) != letter[i]) continue;
         *op = (enum bus_op)i;
         return true;
     }

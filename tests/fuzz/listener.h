@@ -8,14 +8,14 @@
 
 struct listener {
     struct trace_sink sink;
-    uint32_t level, known; /* of the lines, as it was told; cleared by who attaches it anew */
+    uint64_t level, known; /* of the lines, as it was told; cleared by who attaches it anew */
     int64_t edge_ns;       /* last told */
 };
 
 static inline void listener_change(void *ctx, unsigned sig, bool level, int64_t t_ns)
 {
     struct listener *l = ctx;
-    const uint32_t bit = UINT32_C(1) << sig;
+    const uint64_t bit = TRACE_BIT(sig);
     assert(l->sink.mask & bit && t_ns >= l->edge_ns);
     assert(!(l->known & bit) || level != ((l->level & bit) != 0));
     l->edge_ns = t_ns;
