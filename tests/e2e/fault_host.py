@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 from psabench.can_host import CanHost, Message, StepClock, open_bus
 from psabench.control import Control
-from psabench.device import Psa2
+from psabench.devices import of_board
 from psabench.emulator import Emulator
+from psabench.unit import Unit
 from rig import bus_spec
 
 Floats = NDArray[np.float64]
@@ -114,11 +115,11 @@ class Host:
 
     def __init__(self, emulator: Emulator, control: Control, bus: CanHost) -> None:
         self.emulator, self.control, self.bus = emulator, control, bus
-        self.units: dict[str, Psa2] = {}
+        self.units: dict[str, Unit] = {}
         self.node: dict[str, int] = {}
         for unit in control.call("units").result["units"]:
             self.node[unit["name"]] = int(unit["node"])
-            self.units[unit["name"]] = Psa2(bus, int(unit["node"]))
+            self.units[unit["name"]] = of_board(unit["board"])(bus, int(unit["node"]))
         self._kept: list[Message] = []
         bus.listeners.append(self._kept.append)
         self.start()

@@ -1,0 +1,121 @@
+"""Cycles on the parallel buses of the boards by command: bus.read, bus.write of the control socket."""
+
+from __future__ import annotations
+
+import socket
+from pathlib import Path
+
+import pytest
+from psabench.control import Control
+from psabench.emulator import Emulator
+from psabench.errors import ControlError
+from rig import HERE, talker
+
+pytestmark = pytest.mark.host
+
+SCENARIO = HERE / "faults_boards.yaml"
+PMKA_MODE, PMKA_BEAT, PMKA_SEQ = 9, 11, 6  # docs/protocol_pmka.md
+PIK_LATCH = 11  # docs/protocol_pik.md
+PSD1_TEMP = 10  # docs/protocol_psd1.md
+
+
+def control_of(emulator: Emulator) -> Control:
+    return Control(emulator.control_path or Path())
+
+
+def test_in_step_pace_time_moves_by_the_strobe() -> None:
+    with Emulator(SCENARIO, pace="step") as emulator, control_of(emulator) as control:
+        now_ns = control.call("run", for_s=0.5).t_ns
+        for unit, strobe_ns in (("d", 800), ("m", 800), ("p", 1000)):  # of the profile, then of the command
+            for args, want_ns in (({}, strobe_ns), ({"strobe_ns": 2500}, 2500)):
+                reply = control.call("bus.read", unit=unit, address=PMKA_SEQ, **args)
+                assert reply.t_ns - now_ns == want_ns, unit
+                assert reply.result["ended_s"] == pytest.approx(reply.t_ns * 1e-9, abs=1e-12)
+                now_ns = reply.t_ns
+        assert control.call("bus.read", unit="m", address=PMKA_SEQ).result["name"] == "SEQ"
+        control.call("bus.write", unit="m", address=PMKA_BEAT, data=321)
+        assert control.call("bus.read", unit="m", address=PMKA_BEAT).result == pytest.approx(
+            {"name": "BEAT", "data": 321, "ended_s": control.call("time").t_ns * 1e-9}
+        )
+
+
+def test_each_refusal_has_its_code_and_is_counted() -> None:
+    with Emulator(SCENARIO, pace="step") as emulator, control_of(emulator) as control:
+        control.call("run", for_s=0.5)
+
+        def code(command: str, **args: object) -> str:
+            with pytest.raises(ControlError) as e:
+                control.call(command, **args)
+            assert len(str(e.value)) > 20, "in words"
+            return e.value.code
+
+        def refused(unit: str) -> int:
+            board = control.call("counters", unit=unit).result["board"]
+            return int(board.get("refused", board.get("cycles_refused")))
+
+        was = {unit: refused(unit) for unit in "dmp"}
+        assert code("bus.read", unit="d", address=0) == "not_ready"  # the built-in host has read it
+        assert code("bus.write", unit="d", address=0, data=1) == "read_only"
+        assert code("bus.write", unit="d", address=PSD1_TEMP, data=9) == "value"
+        assert code("bus.read", unit="d", address=PSD1_TEMP, strobe_ns=50) == "too_short"
+        assert code("bus.read", unit="m", address=15) == "address"
+        assert code("bus.write", unit="m", address=PMKA_SEQ, data=1) == "read_only"
+        assert code("bus.read", unit="m", address=10) == "write_only"
+        assert code("bus.read", unit="m", address=PMKA_SEQ, strobe_ns=50) == "too_short"
+        assert code("bus.read", unit="p", address=14) == "address"
+        assert code("bus.read", unit="p", address=PIK_LATCH) == "write_only"
+        assert code("bus.write", unit="p", address=0, data=1) == "read_only"
+        assert code("bus.read", unit="p", address=0, strobe_ns=50) == "too_short"
+        assert {unit: refused(unit) - was[unit] for unit in "dmp"} == dict.fromkeys("dmp", 4)
+        assert code("bus.read", unit="p", address=16) == "range"
+        control.call("supply.output", on=False)
+        control.call("run", for_s=0.1)
+        for unit in "dmp":
+            assert code("bus.read", unit=unit, address=3) == "off"
+
+
+def test_a_board_without_a_bus_says_so() -> None:
+    with Emulator("quiet", pace="step") as emulator, control_of(emulator) as control:
+        with pytest.raises(ControlError, match="unit: a is a PSA-2, which has no parallel bus") as e:
+            control.call("bus.read", unit="a", address=0)
+        assert e.value.code == "range"
+
+
+def test_in_real_time_the_answer_comes_by_itself() -> None:
+    """Two programs at once, at two boards; one of them goes away without waiting."""
+    with Emulator(SCENARIO, pace="wall") as emulator, control_of(emulator) as one, control_of(emulator) as two:
+        with socket.socket(socket.AF_UNIX) as rude:
+            rude.connect(str(emulator.control_path))
+            rude.sendall(b'{"cmd":"bus.read","args":{"unit":"p","address":10,"strobe_ns":900000000}}\n')
+        for n in range(20):
+            one.call("bus.write", unit="p", address=12, data=100 + n)
+            two.call("bus.write", unit="m", address=PMKA_BEAT, data=300 + n)
+            assert one.call("bus.read", unit="p", address=12).result["data"] == 100 + n
+            assert two.call("bus.read", unit="m", address=PMKA_BEAT).result["data"] == 300 + n
+
+
+def test_cycles_are_in_a_snapshot(tmp_path: Path) -> None:
+    """Those that were carried out and those that were refused: the restored bench is the same to its digest."""
+    path = tmp_path / "cycles.snapshot"
+    with Emulator(SCENARIO, pace="step") as emulator, control_of(emulator) as control, talker(emulator):
+        control.call("run", for_s=0.3)
+        control.call("bus.write", unit="m", address=PMKA_MODE, data=1)
+        control.call("bus.write", unit="p", address=PIK_LATCH, data=0)
+        with pytest.raises(ControlError):
+            control.call("bus.read", unit="m", address=15)
+        control.call("run", for_s=0.2)
+        seq = control.call("bus.read", unit="p", address=9).result["data"]
+        control.call("snapshot", path=str(path))
+    with Emulator(pace="step", extra=("--restore", path)) as emulator, control_of(emulator) as control:
+        assert control.call("bus.read", unit="m", address=PMKA_MODE).result["data"] == 1
+        assert control.call("bus.read", unit="p", address=9).result["data"] == seq
+        assert control.call("counters", unit="m").result["board"]["cycles_refused"] == 1
+
+
+def test_patience_has_an_end() -> None:
+    """A strobe of a second: the answer is there when it is over, well before anybody gives up."""
+    with Emulator(SCENARIO, pace="step") as emulator, control_of(emulator) as control:
+        control.call("run", for_s=0.3)
+        before_ns = control.call("time").t_ns
+        after_ns = control.call("bus.read", unit="p", address=10, strobe_ns=1_000_000_000).t_ns
+        assert after_ns - before_ns == 1_000_000_000
