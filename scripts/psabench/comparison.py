@@ -1,0 +1,346 @@
+"""`psabench run compare-converters`: the run, its grading against the exact integral, result.json and report.html.
+
+The truth is the specific force that the emulator wrote into its truth log, integrated here; the procedure has never
+seen it. A velocity error is what a unit's velocity misses that integral by, between two rests in the same attitude,
+where the delay of a converter's filter drops out.
+"""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from psabench.bench import Bench
+from psabench.errors import BenchError
+from psabench.procedures import compare_converters as measured
+from psabench.procedures.compare_converters import CompareParams, Figures, Track
+from psabench.procedures.head_bench import Progress
+
+Floats = npt.NDArray[np.float64]
+
+TRUTH_EVERY_S = 0.01
+G_MPS2 = 9.8094  # of the scenario's site: an operator knows the gravity of the laboratory
+MAX_LAG_S = 0.05
+AXES = "XYZ"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Article:
+    """What the article says of a generation, and what a unit may miss the integral by.
+
+    printed: texts of the article (E1), "": nothing. scale: error of the coefficient, zero_v: of the zero at the load;
+    k_source says whence the first.
+    """
+
+    printed: str
+    pulse: str
+    pulse_mps: float | None
+    scale: float
+    zero_v: float
+    k_source: str
+
+
+# Zeros are three standard deviations of the profiles and chains (E0); the article gives none. PSD-1: its converters
+# have 12 mV rms of noise at their output rate (data sheet), and self-calibration takes zero and full scale with it.
+ARTICLE: Mapping[str, Article] = {
+    "pik": Article(
+        printed="174 Hz/V within 0.15 %", pulse="60e-3", pulse_mps=60e-3, scale=1.5e-3, zero_v=6e-4, k_source="E1"
+    ),
+    "pik5": Article(
+        printed="no figures but those of PIK", pulse="", pulse_mps=None, scale=1.5e-3, zero_v=6e-4, k_source="E1"
+    ),
+    "pik6": Article(
+        printed="2000 Hz/V within 0.05 %", pulse="5e-3", pulse_mps=5e-3, scale=5e-4, zero_v=1.5e-4, k_source="E1"
+    ),
+    "pmka": Article(
+        printed="16-bit converter, Ts = 4.8 ms",
+        pulse="2.4e-5",
+        pulse_mps=2.4e-5,
+        scale=5e-4,
+        zero_v=3e-4,
+        k_source="E0",
+    ),
+    "psd1": Article(
+        printed="16-bit words of a delta-sigma converter",
+        pulse="",
+        pulse_mps=None,
+        scale=4e-3,
+        zero_v=40e-3,
+        k_source="E2",
+    ),
+    "psa1": Article(
+        printed="resolution finer by more than an order",
+        pulse="",
+        pulse_mps=None,
+        scale=5e-4,
+        zero_v=1e-3,
+        k_source="E0",
+    ),
+    "psa2": Article(
+        printed="resolution finer by more than an order",
+        pulse="",
+        pulse_mps=None,
+        scale=5e-4,
+        zero_v=1e-3,
+        k_source="E0",
+    ),
+}
+
+
+# ---- truth
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Motion:
+    """What the sensors felt: a = -f in the axes of the case, and its integral from the first instant on."""
+
+    t_s: Floats  # (n,) evenly spaced
+    a_mps2: Floats  # (n, 3)
+    v_mps: Floats  # (n, 3)
+
+    def at(self, t_s: Floats, of: Floats) -> Floats:
+        """Rows of `of` (a_mps2 or v_mps) at other instants, shape (len(t_s), 3), cubic between the points."""
+        h = self.t_s[1] - self.t_s[0]
+        k = np.clip(((t_s - self.t_s[0]) / h).astype(np.int64), 0, len(self.t_s) - 2)
+        x = ((t_s - self.t_s[k]) / h)[:, None]
+        slope = np.gradient(of, h, axis=0) if of is not self.v_mps else self.a_mps2
+        p0, p1, m0, m1 = of[k], of[k + 1], slope[k] * h, slope[k + 1] * h
+        return np.asarray(
+            (1 + 2 * x) * (1 - x) ** 2 * p0 + x * (1 - x) ** 2 * m0 + x**2 * (3 - 2 * x) * p1 + x**2 * (x - 1) * m1
+        )
+
+
+def integrate(t_s: Floats, a_mps2: Floats) -> Floats:
+    """Integral from the first instant on, shape like a: trapezoids with the correction of their ends (fourth order)."""
+    h = float(t_s[1] - t_s[0])
+    slope = np.gradient(a_mps2, h, axis=0)
+    steps = 0.5 * h * (a_mps2[1:] + a_mps2[:-1]) - h * h / 12.0 * (slope[1:] - slope[:-1])
+    return np.concatenate([np.zeros((1, a_mps2.shape[1])), np.cumsum(steps, axis=0)])
+
+
+def read_truth(path: Path, unit: str) -> Motion:
+    """From a truth log, lines of one unit. Raises BenchError for a log without it."""
+    t_s, a = [], []
+    mark = f'"unit":"{unit}",'
+    with path.open(encoding="utf-8") as lines:
+        for line in lines:
+            if mark in line[:80]:
+                state = json.loads(line)
+                t_s.append(state["t_ns"] * 1e-9)
+                a.append([-x for x in state["unit"]["f_mps2"]])
+    if len(t_s) < 3:
+        raise BenchError(f"{path}: no course of unit {unit} in the truth log")
+    t, a_mps2 = np.array(t_s), np.array(a)
+    return Motion(t_s=t, a_mps2=a_mps2, v_mps=integrate(t, a_mps2))
+
+
+# ---- grading
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Graded:
+    """A generation beside the truth."""
+
+    figures: Figures
+    article: Article
+    error_mps: Floats  # (n, 3) velocity minus truth, its lag taken out
+    end_mps: Floats  # (3,) over the whole run
+    limit_mps: Floats  # (3,) what end_mps may be
+    lag_s: float  # behind the truth: sensor, filter, period
+    swing_mps: float  # largest |error| of any axis while the table moved, drift of the rests taken out
+
+    @property
+    def within(self) -> bool:
+        return bool(np.all(np.abs(self.end_mps) <= self.limit_mps))
+
+
+def _error(track: Track, motion: Motion, lag_s: float, g_mps2: float) -> Floats:
+    v = motion.at(track.t_s - lag_s, motion.v_mps)
+    return np.asarray(track.velocity_mps(g_mps2) - (v - v[0]))
+
+
+def _lag_s(track: Track, motion: Motion, g_mps2: float) -> float:
+    """Delay that the error calls for: it goes with the acceleration; zero and scale of each axis apart."""
+    lag_s = 0.0
+    for _ in range(2):
+        error = _error(track, motion, lag_s, g_mps2)
+        a = motion.at(track.t_s - lag_s, motion.a_mps2)
+        v = motion.at(track.t_s - lag_s, motion.v_mps)
+        t = track.t_s - track.t_s[0]
+        columns = np.stack([np.ones_like(t), t, v[:, 0] - v[0, 0], a[:, 0]], axis=1)
+        lag_s -= float(np.linalg.lstsq(columns, error[:, 0], rcond=None)[0][3])
+    return float(np.clip(lag_s, -MAX_LAG_S, MAX_LAG_S))
+
+
+def grade(f: Figures, motion: Motion, p: CompareParams, g_mps2: float) -> Graded:
+    """Pure."""
+    track, article = f.track, ARTICLE[f.track.name]
+    lag_s = _lag_s(track, motion, g_mps2)
+    error = _error(track, motion, lag_s, g_mps2)
+    span_s = float(track.t_s[-1] - track.t_s[0])
+    inside = (motion.t_s >= track.t_s[0]) & (motion.t_s <= track.t_s[-1])
+    run_mps = np.trapezoid(np.abs(motion.a_mps2[inside]), motion.t_s[inside], axis=0)
+    zero_mps = article.zero_v / track.ma_v_per_g * g_mps2 * span_s
+    t = track.t_s - track.t_s[0]
+    steady = error - t[:, None] * f.drift_mps2 + _drift_of_truth(motion, track, p) * t[:, None]
+    moving = t >= p.rest_s
+    return Graded(
+        figures=f,
+        article=article,
+        error_mps=error,
+        end_mps=error[-1] - error[0],
+        limit_mps=article.scale * run_mps + zero_mps + 2.0 * track.quantum_mps(g_mps2),
+        lag_s=lag_s,
+        swing_mps=float(np.abs(steady[moving]).max(initial=0.0)),
+    )
+
+
+def _drift_of_truth(motion: Motion, track: Track, p: CompareParams) -> Floats:
+    """Mean acceleration over the first rest."""
+    rest = (motion.t_s >= track.t_s[0]) & (motion.t_s < track.t_s[0] + p.rest_s)
+    return np.asarray(motion.a_mps2[rest].mean(axis=0))
+
+
+def zero_mps2(g: Graded, motion: Motion, p: CompareParams) -> Floats:
+    """What a unit shows at rest beyond what it feels, m/s^2 of each axis."""
+    return np.asarray(g.figures.drift_mps2 - _drift_of_truth(motion, g.figures.track, p))
+
+
+# ---- the run
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Comparison:
+    """All of a run."""
+
+    graded: tuple[Graded, ...]
+    motion: Motion
+    params: CompareParams
+    g_mps2: float
+    facts: Mapping[str, str]
+
+    @property
+    def within(self) -> bool:
+        return all(g.within for g in self.graded)
+
+
+def compare(
+    out: Path, p: CompareParams, progress: Progress, *, scenario: str | Path | None = None, seed: int | None = None
+) -> Comparison:
+    """Start an emulator with the scenario, record, grade. Raises BenchError."""
+    out.mkdir(parents=True, exist_ok=True)
+    name = scenario or measured.SCENARIO
+    with tempfile.TemporaryDirectory(prefix="psabench-") as folder:
+        log = Path(folder) / "truth.jsonl"
+        extra: list[str | Path] = ["--truth-log", log, "--truth-every", f"{TRUTH_EVERY_S * 1e3:g}ms"]
+        extra += ["--resolved", out / "scenario-converters.json"]
+        with Bench.start(name, seed=seed, extra=extra) as bench:
+            tracks = measured.record(bench, p, progress)
+        motion = read_truth(log, tracks[0].name)
+    graded = tuple(grade(measured.figures(t, p, G_MPS2), motion, p, G_MPS2) for t in tracks)
+    facts = {
+        "scenario": str(name),
+        "seed": "of the scenario" if seed is None else str(seed),
+        "recorded": f"{p.seconds:g} s",
+        "g": f"{G_MPS2} m/s²",
+    }
+    return Comparison(graded=graded, motion=motion, params=p, g_mps2=G_MPS2, facts=facts)
+
+
+# ---- results as data and as text
+
+
+def _numbers(x: Floats) -> list[float | None]:
+    return [float(v) if np.isfinite(v) else None for v in x]
+
+
+def result_dict(c: Comparison) -> dict[str, object]:
+    """result.json: plain data, units in the names."""
+    rows = []
+    for g in c.graded:
+        f, track = g.figures, g.figures.track
+        rows.append(
+            {
+                "name": track.name,
+                "title": track.title,
+                "ma_v_per_g": track.ma_v_per_g,
+                "readings": len(track.t_s),
+                "quantum_mps": track.quantum_mps(c.g_mps2),
+                "printed": g.article.printed,
+                "scale_limit": g.article.scale,
+                "scale_limit_grade": g.article.k_source,
+                "zero_limit_v": g.article.zero_v,
+                "printed_quantum_mps": g.article.pulse_mps,
+                "step_seen_mps": _numbers(f.step_mps),
+                "noise_rms_mps": _numbers(f.noise_mps),
+                "zero_mps2": _numbers(zero_mps2(g, c.motion, c.params)),
+                "lag_s": g.lag_s,
+                "swing_error_mps": g.swing_mps,
+                "end_error_mps": _numbers(g.end_mps),
+                "limit_mps": _numbers(g.limit_mps),
+                "within_limits": g.within,
+                "note": track.note,
+            }
+        )
+    return {
+        "format": 1,
+        "procedure": measured.NAME,
+        "facts": dict(c.facts),
+        "within_limits": c.within,
+        "generations": rows,
+    }
+
+
+def table(c: Comparison) -> list[tuple[str, ...]]:
+    """Rows for console and page, the head first."""
+    head = ("", "printed", "quantum", "step seen", "noise at rest", "zero", "end X", "end Y", "end Z", "limit Z", "")
+    units = ("", "m/s", "m/s", "m/s", "m/s rms", "µg", "m/s", "m/s", "m/s", "m/s", "")
+    rows: list[tuple[str, ...]] = [head, units]
+    for g in c.graded:
+        f, track = g.figures, g.figures.track
+        zero = float(np.abs(zero_mps2(g, c.motion, c.params)[:2]).max()) / c.g_mps2 * 1e6
+        rows.append(
+            (
+                track.title,
+                g.article.pulse or "–",
+                f"{track.quantum_mps(c.g_mps2):.3g}",
+                f"{f.step_mps.min():.3g}" if np.isfinite(f.step_mps.min()) else "–",
+                f"{f.noise_mps.max():.2g}",
+                f"{zero:.3g}",
+                *(f"{e:+.2g}" for e in g.end_mps),
+                f"{g.limit_mps[2]:.2g}",
+                "" if g.within else "out of limits",
+            )
+        )
+    return rows
+
+
+def console_table(c: Comparison) -> str:
+    """What the terminal shows."""
+    rows = table(c)
+    width = [max(len(r[i]) for r in rows) for i in range(len(rows[0]))]
+    lines = [
+        "  ".join(x.ljust(w) if i == 0 else x.rjust(w) for i, (x, w) in enumerate(zip(r, width, strict=True)))
+        for r in rows
+    ]
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def verdict(c: Comparison) -> str:
+    """One sentence."""
+    out = [g.figures.track.title for g in c.graded if not g.within]
+    if not out:
+        return f"The velocities of all {len(c.graded)} generations lie within their limits of the exact integral."
+    return f"Out of limits: {', '.join(out)}."
+
+
+def finer(c: Comparison) -> Sequence[tuple[str, float]]:
+    """How many times finer the quantum of each generation is than that of the first."""
+    first = c.graded[0].figures.track.quantum_mps(c.g_mps2)
+    return [(g.figures.track.title, first / g.figures.track.quantum_mps(c.g_mps2)) for g in c.graded]
