@@ -54,8 +54,6 @@ def integral_vs(totals: Sequence[float] | Floats, k_hz_per_v: float) -> Floats:
     return (t - t[:1]) / k_hz_per_v
 
 
-def velocity_mps(
-    totals: Sequence[float] | Floats, *, k_hz_per_v: float, ma_v_per_g: float, g_mps2: float
-) -> Floats:
+def velocity_mps(totals: Sequence[float] | Floats, *, k_hz_per_v: float, ma_v_per_g: float, g_mps2: float) -> Floats:
     """Velocity since the first reading, m/s, shape (n,)."""
     return integral_vs(totals, k_hz_per_v) * g_mps2 / ma_v_per_g
