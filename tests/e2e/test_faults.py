@@ -573,8 +573,18 @@ def kinds_told() -> list[str]:
         return [k["kind"] for k in host.call("fault.kinds")["kinds"]]
 
 
+ELSEWHERE = ("controller.capacitor", "controller.stuck_reset", "controller.stuck_key")  # test_faults_boards.py
+
+
 def test_no_kind_is_left_out() -> None:
-    assert sorted(kinds_told()) == sorted([*DETECT])
+    assert sorted(kinds_told()) == sorted([*DETECT, *ELSEWHERE])
+
+
+@pytest.mark.parametrize("kind", ELSEWHERE)
+def test_what_other_boards_have_is_refused(kind: str) -> None:
+    with fault_host(SCENARIO, settle=False) as host:
+        for point in host.call("fault.points")["points"]:
+            assert not accepted(Case(host, kind, point)), f"{kind} at {point}"
 
 
 @pytest.mark.parametrize("kind", DETECT)
