@@ -243,6 +243,7 @@ static void sync_holds_the_filter_and_aligns_parts(void **state)
         ad7712_sync_pin(&both[i]->a, false, 30000000);
         assert_true(ad7712_drdy(&both[i]->a));
         const unsigned n = both[i]->drdy.n;
+        assert_int_equal(read_frame(both[i], false, 24), FAST); /* no word waits any more */
         wait_until(both[i], 40000050);
         assert_int_equal(both[i]->drdy.n, n);
         ad7712_sync_pin(&both[i]->a, true, 40000050); /* the next edge of CLKIN counts: 40000100 */
@@ -273,7 +274,15 @@ static void standby_stops_all_and_keeps_the_registers(void **state)
     struct rig r;
     up(&r, &quiet, FAST);
     r.a.zero[0] = 0x812345;
+    a0(&r, true);
+    rfs(&r, false);
+    wait_ns(&r, FIRST_NS);
+    pulses(&r, 5);
     ad7712_standby_pin(&r.a, false, r.s.now_ns);
+    assert_false(ad7712_sdata_driven(&r.a, r.s.now_ns));
+    rfs(&r, true);
+    wait_ns(&r, 0);
+    r.sdata.n = 0;
     assert_true(ad7712_drdy(&r.a));
     assert_int_equal(r.a.n.power_downs, 1);
     const unsigned n = r.drdy.n;
@@ -304,6 +313,11 @@ static void pd_stops_conversions_and_leaves_the_port(void **state)
     assert_int_equal(await_fall(&r), start_ns + 3 * 972800);
     assert_int_equal(r.a.n.power_downs, 1);
     assert_int_equal(read_frame(&r, true, 24), 0x800000);
+    write_control(&r, FAST | AD7712_CTL_PD); /* a calibration that ends it begins once */
+    const uint32_t restarts = r.a.n.restarts;
+    write_control(&r, FAST | 0x200000);
+    assert_int_equal(await_fall(&r), r.a.port.fall_ns + 4 * TAU_NS + 9 * 972800);
+    assert_int_equal(r.a.n.restarts, restarts + 1);
 }
 
 static void power_off_forgets_all(void **state)

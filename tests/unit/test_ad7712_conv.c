@@ -128,6 +128,22 @@ static void drdy_rises_within_a_modulator_period_of_the_write(void **state)
     }
 }
 
+/* A load at the very edge of the modulator's clock acts there and then. */
+static void a_write_that_loads_at_an_edge_acts_there(void **state)
+{
+    (void)state;
+    struct rig r;
+    power_up(&r, &quiet);
+    const int64_t origin_ns = write_at(&r, CODE(0, 50), 0);
+    await_fall(&r);
+    const int64_t frame_ns = A0_NS + 24 * SCLK_NS + 4 * TAU_NS; /* until the load */
+    const int64_t edge_ns = origin_ns + 500 * MOD_NS;
+    wait_until(&r, edge_ns - frame_ns);
+    write_control(&r, CODE(0, 51));
+    assert_int_equal(r.a.port.fall_ns + 4 * TAU_NS, edge_ns);
+    assert_int_equal(await_fall(&r), edge_ns + 3 * 51 * MOD_NS);
+}
+
 /* A conversion that would end at the very edge at which the filter is reset never is. */
 static void a_conversion_that_ends_with_the_reset_is_none(void **state)
 {
@@ -408,6 +424,7 @@ int main(void)
         cmocka_unit_test(a_word_that_is_read_pulses_nothing),
         cmocka_unit_test(what_restarts_the_filter),
         cmocka_unit_test(drdy_rises_within_a_modulator_period_of_the_write),
+        cmocka_unit_test(a_write_that_loads_at_an_edge_acts_there),
         cmocka_unit_test(a_conversion_that_ends_with_the_reset_is_none),
         cmocka_unit_test(a_step_settles_in_three_or_four_outputs),
         cmocka_unit_test(free_settling_mixes_the_channels),

@@ -98,6 +98,7 @@ static void a_clock_that_is_off(void **state)
         fault(&r, (struct ad7712_fault){.clock_ppm = rows[i]});
         const double tau_ns = 1e9 / (1e7 + 10.0 * rows[i]);
         near((double)await_fall(&r), (double)fall_ns + 200000 + 7728 * tau_ns, 2.0);
+        assert_int_equal(r.look_ns[0], fall_ns + 121600);
         near((double)r.look_ns[1], (double)fall_ns + 200000 + 1648 * tau_ns, 2.0);
         const double next_ns = (double)r.s.now_ns + 9728 * tau_ns;
         near((double)r.drdy.e[r.drdy.n - 2].t_ns, (double)r.s.now_ns - 500 * tau_ns, 2.0);

@@ -115,6 +115,7 @@ static void words_are_the_edges(void **state)
         cfg.strict_timing = s % 4 == 1;
         cfg.strict_drdy = s % 8 >= 6;
         cfg.free_settling = s % 5 == 4;
+        cfg.bit_access_ns = s % 7 == 5 ? 350 : 0;
         static struct rig p, w;
         power_up_seeded(&p, &cfg, s);
         power_up_seeded(&w, &cfg, s);

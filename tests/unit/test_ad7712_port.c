@@ -45,6 +45,56 @@ static void data_change_with_rfs_and_the_falls_of_sclk(void **state)
     assert_int_equal(breaches(&r), 0);
 }
 
+/* A bit that comes at the very fall of SCLK is there until the next one comes. */
+static void a_bit_at_the_fall_is_still_a_bit(void **state)
+{
+    (void)state;
+    struct rig r;
+    up(&r, &quiet, FAST);
+    assert_int_equal(r.a.word >> 22, 2); /* 10b */
+    a0(&r, true);
+    rfs(&r, false);
+    wait_ns(&r, 100);
+    pulse(&r); /* too early: falls 400 ns later */
+    wait_ns(&r, 400);
+    rfs(&r, true);
+    wait_ns(&r, 1000);
+    a0(&r, false);
+    a0(&r, true);
+    rfs(&r, false);
+    wait_ns(&r, 100);
+    ad7712_sclk_pin(&r.a, true, r.s.now_ns);
+    wait_ns(&r, 200);
+    ad7712_sclk_pin(&r.a, false, r.s.now_ns); /* 300 ns after RFS */
+    assert_true(ad7712_sdata(&r.a, r.s.now_ns) && ad7712_sdata(&r.a, r.s.now_ns + 99));
+    assert_false(ad7712_sdata(&r.a, r.s.now_ns + 100));
+}
+
+/* A word that comes between the last bit and the rise of DRDY keeps it low. */
+static void a_word_right_behind_a_read_keeps_drdy_low(void **state)
+{
+    (void)state;
+    struct rig r;
+    up(&r, &quiet, FAST);
+    const int64_t next_ns = r.s.now_ns + 19 * MOD_NS;
+    ad7712_a0_pin(&r.a, true, r.s.now_ns);
+    const int64_t last_fall_ns = next_ns - 50;
+    wait_until(&r, last_fall_ns - 23 * SCLK_NS - HIGH_NS - FIRST_NS);
+    rfs(&r, false);
+    wait_ns(&r, FIRST_NS);
+    const uint32_t word = r.a.word;
+    assert_int_equal(pulses(&r, 24), word);
+    assert_int_equal(r.s.now_ns, last_fall_ns);
+    wait_ns(&r, 20);
+    rfs(&r, true);
+    const unsigned n = r.drdy.n;
+    wait_ns(&r, 10000);
+    assert_int_equal(r.a.n.conversions, 2);
+    assert_int_equal(r.a.n.overruns, 0);
+    assert_true(r.a.unread && !ad7712_drdy(&r.a));
+    assert_int_equal(r.drdy.n, n);
+}
+
 /* Delays are the owner's. */
 static void delays_can_be_set(void **state)
 {
@@ -369,10 +419,11 @@ static void limits_of_a_write(void **state)
 {
     (void)state;
     static const struct write_limit rows[] = {
-        {"typical", 400, 400, 400, 500, 0, 0, 0},  {"set-up 0", 0, 400, 400, 500, 0, 0, 0},
-        {"set-up min", 0, 200, 200, 500, 0, 0, 0}, {"set-up short", 0, 199, 199, 500, 24, 24, 0},
-        {"hold min", 400, 400, 30, 500, 0, 0, 0},  {"hold short", 400, 400, 29, 500, 24, 0, 0},
-        {"TFS min", 400, 400, 400, 400, 0, 0, 0},  {"TFS early", 400, 400, 400, 399, 0, 0, 1},
+        {"typical", 400, 400, 400, 500, 0, 0, 0},    {"set-up 0", 0, 400, 400, 500, 0, 0, 0},
+        {"set-up min", 0, 200, 200, 500, 0, 0, 0},   {"set-up short", 0, 199, 199, 500, 24, 24, 0},
+        {"hold min", 400, 400, 30, 500, 0, 0, 0},    {"next bit early", 400, 400, 250, 500, 0, 0, 0},
+        {"hold short", 400, 400, 29, 500, 24, 0, 0}, {"TFS min", 400, 400, 400, 400, 0, 0, 0},
+        {"TFS early", 400, 400, 400, 399, 0, 0, 1},
     };
     const uint32_t word =
         AD7712_CONTROL(6, 5, 0, 1, 0, 0x2AA) | 0x6000; /* with the other one its changes are each bit's */
@@ -448,6 +499,16 @@ static void pulses_outside_of_frames_do_nothing(void **state)
     wait_ns(&r, 400);
     assert_int_equal(pulses(&r, 24), r.a.word);
     assert_int_equal(r.a.n.over_reads + r.a.n.over_writes, 0);
+    wait_ns(&r, LAST_NS);
+    rfs(&r, true);
+    a0(&r, false);
+    ad7712_sclk_pin(&r.a, true, r.s.now_ns);
+    wait_ns(&r, 10);
+    tfs(&r, false);
+    ad7712_sdata_pin(&r.a, true, r.s.now_ns); /* within 30 ns of a rise that took no bit */
+    wait_ns(&r, 400);
+    ad7712_sclk_pin(&r.a, false, r.s.now_ns);
+    assert_int_equal(breaches(&r), 0);
 }
 
 /* ---- self-clocking ---- */
@@ -539,6 +600,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(data_change_with_rfs_and_the_falls_of_sclk),
+        cmocka_unit_test(a_bit_at_the_fall_is_still_a_bit),
+        cmocka_unit_test(a_word_right_behind_a_read_keeps_drdy_low),
         cmocka_unit_test(delays_can_be_set),
         cmocka_unit_test(drdy_rises_with_the_last_bit_of_a_word),
         cmocka_unit_test(a_waiting_word_comes_before_the_control_register),
