@@ -138,10 +138,15 @@ def runs(mask: npt.NDArray[np.bool_]) -> list[tuple[int, int]]:
 
 
 def _resting(p: Periods, integrator: int, cal: int) -> list[tuple[int, int]]:
-    """Runs of periods in which it was calibrated so; the code before the first of them is there."""
+    """Runs of periods in which it was calibrated so; the code before the first of them is there.
+
+    Those shorter than half of the longest, where a recording begins or ends, say too little.
+    """
     mask = (p.cal == cal) & (p.serves[:, integrator] == 0)
     mask[:1] = False
-    return runs(mask)
+    found = runs(mask)
+    longest = max((last - first for first, last in found), default=0)
+    return [(first, last) for first, last in found if last - first >= longest / 2]
 
 
 def _steps(p: Periods, integrator: int, first: int, last: int) -> Floats:
