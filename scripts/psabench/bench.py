@@ -317,6 +317,11 @@ class Bench:
             self._clock.command(None, "run", for_s=slice_ns / NS)
             left_ns -= slice_ns
 
+    def catch_up(self) -> None:
+        """After a command of the control socket that moves time itself, as bus.read: receive what has come."""
+        if isinstance(self._clock, StepClock):
+            self._clock.command(None, "run", for_s=0)
+
     def step(self, count: int = 1) -> float:
         """To the count-th next whole millisecond of simulated time: the beat of a control loop; returns time_s."""
         period_ns = round(QUANTUM_S * NS)

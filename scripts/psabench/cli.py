@@ -12,14 +12,14 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from psabench import decode, grading, record, report, run
+from psabench import comparison, comparison_page, decode, grading, record, report, run
 from psabench.can_host import open_bus
 from psabench.errors import BadInput, BenchError
 from psabench.instruments import EXAMPLES
 from psabench.lineport import LineFormat
-from psabench.procedures import PROCEDURES
+from psabench.procedures import PROCEDURES, compare_converters
 from psabench.progress import Bar
-from psabench.protocol_files import DBC_NODE
+from psabench.protocol_files import BOARDS, DBC_NODE, dbc_node
 from psabench.shell import command_line
 from psabench.wire_bench import G_MPS2
 
@@ -50,6 +50,7 @@ examples:
   psabench run all                        every procedure, quiet and realistic, on an emulator started for it
   psabench run reversal --realisations 2  a shorter reversal
   psabench run fourier --scenario my.yaml --average 32
+  psabench run compare-converters         every generation of converters through one motion, beside the exact integral
   psabench run turns --can slcan:/dev/ttyACM0 --head TCPIP::192.0.2.7::5025::SOCKET   on the bench at these addresses
 
 Ctrl-C ends a run; the readings taken so far stay in OUT/PROCEDURE-CONDITION.csv. Exit status 1: something measured
@@ -161,9 +162,18 @@ def _add_record(commands: Any) -> None:
     p.set_defaults(handler=_record)
     p.add_argument("file", type=Path, help=f"its ending is its format: {' '.join(record.FORMATS)}")
     p.add_argument("--can", help=CAN_HELP)
-    p.add_argument("--node", type=node_id, default=DBC_NODE, help="node whose frames are counted (%(default)s)")
+    _add_board(p, "whose frames are counted")
     p.add_argument("--for", dest="for_s", type=positive, metavar="SECONDS", help="end after this much wall time")
     p.add_argument("--count", type=natural, help="end after this many CAN messages")
+
+
+def _add_board(p: argparse.ArgumentParser, what: str) -> None:
+    p.add_argument("--board", choices=tuple(BOARDS), default="psa2", help=f"board of the unit {what} (%(default)s)")
+    p.add_argument("--node", type=node_id, help=f"node {what} (the board's usual one)")
+
+
+def _node(args: argparse.Namespace) -> int:
+    return dbc_node(args.board) if args.node is None else int(args.node)
 
 
 def _add_decode(commands: Any) -> None:
@@ -177,7 +187,7 @@ def _add_decode(commands: Any) -> None:
     p.set_defaults(handler=_decode)
     p.add_argument("file", type=Path, help="CAN log of python-can, or samples of the line port with --line")
     p.add_argument("--out", type=Path, help="CSV file (standard output)")
-    p.add_argument("--node", type=node_id, default=DBC_NODE, help="node to decode (%(default)s)")
+    _add_board(p, "to decode")
     p.add_argument("--line", action="store_true", help="the file holds INT/DATA/CLK samples, one byte each")
     p.add_argument("--word-bits", type=int, default=32, help="word width on the line: 16, 24 or 32 (%(default)s)")
     p.add_argument("--sample-hz", type=positive, default=8e6, help="sample rate of the capture (%(default)g)")
@@ -229,6 +239,7 @@ def _list_procedures() -> None:
     for p in PROCEDURES.values():
         print(f"{p.name:10} {p.summary}")
         print(f"{'':10} {' '.join(_option(name) for name in p.params.__dataclass_fields__)}")
+    print(f"{compare_converters.NAME}  {compare_converters.SUMMARY}; not in all")
 
 
 def _option(parameter: str) -> str:
@@ -237,7 +248,7 @@ def _option(parameter: str) -> str:
 
 def _check_procedure(name: str | None, params: Mapping[str, Any]) -> None:
     """Raises BadInput for an unknown procedure, or one that does not have a parameter given."""
-    known = f"{', '.join(PROCEDURES)} or all"
+    known = f"{', '.join(PROCEDURES)}, {compare_converters.NAME} or all"
     if name is None:
         raise BadInput(f"run: which procedure? {known}; psabench run --list tells of each")
     if name not in (*PROCEDURES, "all"):
@@ -253,6 +264,8 @@ def _run(args: argparse.Namespace) -> int:
         _list_procedures()
         return 0
     params = {k.removeprefix("param_"): v for k, v in vars(args).items() if k.startswith("param_") and v is not None}
+    if args.procedure == compare_converters.NAME:
+        return _compare(args, params)
     _check_procedure(args.procedure, params)
     options = run.RunOptions(
         procedures=list(PROCEDURES) if args.procedure == "all" else [args.procedure],
@@ -279,11 +292,25 @@ def _run(args: argparse.Namespace) -> int:
     return 0 if report.within_limits(sections) else 1
 
 
+def _compare(args: argparse.Namespace, params: Mapping[str, Any]) -> int:
+    """Its units stand on one bench, their motion in the scenario: it starts an emulator and takes no addresses."""
+    given = {"--can": args.can, "--head": args.head, "--control": args.control, "--truth": args.truth}
+    for option in [*(o for o, v in given.items() if v is not None), *(_option(p) for p in params)]:
+        raise BadInput(f"{option}: {args.procedure} has no such parameter; it has --scenario, --seed, --out")
+    p = compare_converters.CompareParams()
+    c = comparison.compare(args.out, p, Bar(), scenario=args.scenario, seed=args.seed)
+    page = comparison_page.write(args.out, c)
+    print(comparison.console_table(c))
+    print(comparison.verdict(c))
+    print(f"report: {page}")
+    return 0 if c.within else 1
+
+
 def _record(args: argparse.Namespace) -> int:
-    r = record.record(open_bus(args.can), args.file, args.node, args.for_s, args.count)
+    r = record.record(open_bus(args.can), args.file, _node(args), args.for_s, args.count, args.board)
     c = r.counters
     print(f"{r.messages} messages, {r.last_s - r.first_s:.3f} s, in {args.file}")
-    print(f"frames of node {args.node}: {c.frames}, lost {c.lost}, torn {c.torn}, overruns {c.overruns}")
+    print(f"frames of node {_node(args)}: {c.frames}, lost {c.lost}, torn {c.torn}, overruns {c.overruns}")
     if r.broken:
         print(f"psabench: {r.broken}; the recording up to there is complete", file=sys.stderr)
         return 3
@@ -296,7 +323,7 @@ def _decode(args: argparse.Namespace) -> int:
             decoder = decode.decode_line(args.file, _line_format(args), out)
             print(decoder.counts, file=sys.stderr)
             return 0
-        counters = decode.decode_can(args.file, args.node, out).counters
+        counters = decode.decode_can(args.file, _node(args), out, args.board).counters
     print(f"frames {counters.frames}, lost {counters.lost}, torn {counters.torn}", file=sys.stderr)
     return 0
 

@@ -12,10 +12,12 @@ import can
 import numpy as np
 from can.io.player import MESSAGE_READERS
 
+from psabench.devices import Psa2, of_board, reader_of
 from psabench.errors import BadInput
 from psabench.frames import FrameReader, Frames
 from psabench.lineport import LineDecoder, LineFormat, decode_stream
-from psabench.protocol_files import DBC_NODE, message
+from psabench.protocol_files import dbc_node, message
+from psabench.readings import ReadingReader, Readings
 
 CHUNK = 4096  # samples decoded at once
 
@@ -24,8 +26,8 @@ SAMPLE_MESSAGES = ("PSA2_XY", "PSA2_ZT", "PSA2_FAST", "PSA2_FRAME", "PSA2_BLOCK"
 LINE_COLUMNS = ("t_int_fall_s", "t_int_rise_s", "word0", "word1", "word2", "word3")
 
 
-def decode_can(path: Path, node: int, out: IO[str]) -> FrameReader:
-    """Frames of one node from a log. Nothing is written before the first frame.
+def decode_can(path: Path, node: int, out: IO[str], board: str = "psa2") -> FrameReader | ReadingReader:
+    """Frames (of other boards: readings) of one node from a log. Nothing is written before the first.
 
     Raises BadInput for a file that cannot be read, with what was wrong and where, and for one without a frame of that
     node, with the nodes whose frames it has.
@@ -35,16 +37,16 @@ def decode_can(path: Path, node: int, out: IO[str]) -> FrameReader:
             f"{path}: ending {path.suffix or 'missing'}; python-can reads {' '.join(sorted(MESSAGE_READERS))}"
         )
     _check_there(path)
-    reader, ids = FrameReader(node), set[int]()
+    reader, ids = reader_of(board, node), set[int]()
     table = csv.writer(out, lineterminator="\n")
     begun = False
     for frames in _chunks(path, reader, ids):
         if len(frames) and not begun:
-            table.writerow(CAN_COLUMNS)
+            table.writerow(CAN_COLUMNS if isinstance(frames, Frames) else ("t_rx_s", "t_sample_s", *frames.columns))
             begun = True
-        table.writerows(_rows(frames))
+        table.writerows(_rows(frames) if isinstance(frames, Frames) else _reading_rows(frames))
     if not begun:
-        raise BadInput(f"{path}: {_no_frame(node, _senders(ids))}")
+        raise BadInput(f"{path}: {_no_frame(node, _senders(ids, board))}")
     return reader
 
 
@@ -54,9 +56,10 @@ def _no_frame(node: int, senders: set[int]) -> str:
     return f"{what} with frames: {others}"
 
 
-def _senders(ids: set[int]) -> set[int]:
-    """Nodes whose samples these identifiers announce."""
-    bases = [int(message(name).frame_id) - DBC_NODE for name in SAMPLE_MESSAGES]
+def _senders(ids: set[int], board: str) -> set[int]:
+    """Nodes whose samples these identifiers announce, if they are such boards'."""
+    names = SAMPLE_MESSAGES if of_board(board) is Psa2 else of_board(board).layout.messages
+    bases = [int(message(name).frame_id) - dbc_node(of_board(board).board) for name in names]
     return {i - base for i in ids for base in bases if 1 <= i - base <= 127}
 
 
@@ -66,7 +69,7 @@ def _check_there(path: Path) -> None:
         raise BadInput(f"{path}: no such file" if not path.exists() else f"{path}: a folder; a file is wanted")
 
 
-def _chunks(path: Path, reader: FrameReader, ids: set[int]) -> Iterator[Frames]:
+def _chunks(path: Path, reader: FrameReader | ReadingReader, ids: set[int]) -> Iterator[Frames | Readings]:
     """Frames of the reader's node, some at a time; `ids` collects the 11-bit identifiers of all data frames."""
     read = 0
     try:
@@ -96,6 +99,10 @@ def _rows(f: Frames) -> Iterable[tuple[object, ...]]:
         f.clipped.astype(int),
     ]
     return zip(*(np.asarray(c).tolist() for c in columns), strict=True)
+
+
+def _reading_rows(r: Readings) -> Iterable[tuple[object, ...]]:
+    return zip(*(c.tolist() for c in (r.t_rx_s, r.t_sample_s, *r.columns.values())), strict=True)
 
 
 def decode_line(path: Path, fmt: LineFormat, out: IO[str]) -> LineDecoder:

@@ -13,8 +13,9 @@ from can.io.generic import MessageWriter
 from can.io.logger import MESSAGE_WRITERS
 
 from psabench.can_host import CanHost, Message, WallClock
+from psabench.devices import reader_of
 from psabench.errors import BadInput, LinkError
-from psabench.frames import FrameCounters, FrameReader
+from psabench.frames import FrameCounters
 
 LOOK_S = 0.2  # real time between looks whether Ctrl-C was pressed
 FORMATS = sorted(MESSAGE_WRITERS)  # by ending: .log candump, .blf and .asc Vector, .mf4 (with asammdf) ...
@@ -31,15 +32,19 @@ class Recorded:
     broken: str | None  # why the link ended, if it did
 
 
-def record(bus: can.BusABC, path: Path, node: int, for_s: float | None, count: int | None) -> Recorded:
+def record(
+    bus: can.BusABC, path: Path, node: int, for_s: float | None, count: int | None, board: str = "psa2"
+) -> Recorded:
     """Record until for_s of wall time or `count` messages have passed, or Ctrl-C, or the peer has gone.
+
+    node, board: whose stream is counted.
 
     Call it on the main thread. The file is closed properly in every case, and holds just the messages that are counted.
     Raises BadInput for an ending that python-can does not know.
     """
     if path.suffix not in FORMATS:
         raise BadInput(f"{path}: ending {path.suffix or 'missing'}; python-can writes {' '.join(FORMATS)}")
-    reader = FrameReader(node)
+    reader = reader_of(board, node)
     stamps: list[float] = []  # of the first and the last message
     messages = 0
     with _ctrl_c_noted() as pressed, CanHost(bus, WallClock()) as host, _writer(path) as log:

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import csv
+import io
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
+import can
 import canopen
 import numpy as np
 import pytest
@@ -13,8 +17,9 @@ from psabench import Bench
 from psabench.busport import BusPort, Cycle
 from psabench.can_host import CanHost
 from psabench.control import Control
+from psabench.decode import decode_can
 from psabench.devices import BOARDS, Pik, Pmka, Psa2, Psd1
-from psabench.errors import BenchError, CycleRefused, DeviceError, LinkError
+from psabench.errors import BadInput, BenchError, CycleRefused, DeviceError, LinkError
 from psabench.places import proto_file
 from psabench.shell.session import Session
 from psabench.unit import BusUnit, Unit
@@ -386,6 +391,45 @@ def test_the_shell_s_words_for_the_device_go_for_every_board() -> None:
         ):
             with pytest.raises(BenchError, match=why):
                 session.do(line)
+
+
+@HOST
+def test_the_shell_knows_the_events_of_every_board_and_its_cycles_move_time() -> None:
+    with Bench.start(SCENARIO) as bench:
+        bench.wait(SETUP_S)
+        session = Session(bench)
+        event = session.vocabulary.commands["until"].arg("event")
+        assert event is not None
+        assert {"DRD_A", "A0", "FL2", "TAU", "LATCH"} <= set(event.choices)
+        assert session.do("until A0 unit=psd1") is not None
+        before_s = bench.time_s
+        outcome = session.do("bus.read psd1 3")
+        assert outcome is not None
+        assert outcome.result["name"] == "STATUS"
+        assert bench.time_s == pytest.approx(outcome.result["ended_s"], abs=1e-9)
+        assert bench.time_s > before_s
+
+
+@HOST
+def test_recordings_of_other_boards_are_counted_and_decoded(tmp_path: Path) -> None:
+    with Bench.start(SCENARIO, extra=("--start",)) as bench:
+        log = tmp_path / "bus.log"
+        messages: list[can.Message] = []
+        bench.host.listeners.append(messages.append)
+        bench.wait(SETUP_S + 0.5)
+    with can.Logger(str(log)) as writer:
+        for m in messages:
+            writer(m)
+    for name, least in (("psd1", 400), ("pmka", 80), ("pik", 40)):
+        kind, node = NODES[name]
+        out = io.StringIO()
+        reader = decode_can(log, node, out, kind.board)
+        assert (reader.counters.lost, reader.counters.torn) == (0, 0)
+        rows = list(csv.DictReader(io.StringIO(out.getvalue())))
+        assert len(rows) == reader.counters.frames >= least
+        assert set(rows[0]) > {"t_rx_s", "t_sample_s", kind.layout.counter, "X", "Y", "Z"}
+    with pytest.raises(BadInput, match=r"no frame of node 9; nodes with frames: .*6"):
+        decode_can(log, 9, io.StringIO(), "psd1")
 
 
 @HOST

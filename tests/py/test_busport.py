@@ -6,6 +6,7 @@ import os
 import pty
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 import pytest
 from psabench.busport import CODES, BusPort, Cycle, Who, parse
@@ -109,6 +110,13 @@ def test_a_line_without_an_end_is_no_bus_port() -> None:
         p.ask("R 0\nR 1\nR 2")
         with pytest.raises(LinkError, match="without an end of line"):
             p.answer()
+
+
+def test_the_page_has_each_code_with_the_one_over_can() -> None:
+    page = (Path(__file__).resolve().parents[2] / "docs/busport.md").read_text(encoding="utf-8")
+    for code, (abort, _) in CODES.items():
+        row = next(line for line in page.splitlines() if line.startswith("| ") and code in line.split("|")[1])
+        assert f"{abort:08X}h" in row, code
 
 
 def test_silence_is_told_with_the_patience() -> None:

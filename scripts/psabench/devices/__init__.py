@@ -11,10 +11,12 @@ from psabench.devices.pmka import Pmka
 from psabench.devices.psa2 import Psa2
 from psabench.devices.psd1 import Psd1
 from psabench.errors import LinkError
+from psabench.frames import FrameReader
 from psabench.places import proto_file
+from psabench.readings import ReadingReader
 from psabench.unit import NAME, Unit
 
-__all__ = ["BOARDS", "Pik", "Pmka", "Psa2", "Psd1", "identify", "of_board"]
+__all__ = ["BOARDS", "Pik", "Pmka", "Psa2", "Psd1", "identify", "of_board", "reader_of"]
 
 BOARDS: Mapping[str, type[Unit]] = {"psa2": Psa2, "psd1": Psd1, "pmka": Pmka, "pik": Pik}
 ALIASES: Mapping[str, str] = {"psa1": "psa2", "pik5": "pik", "pik6": "pik"}  # the same board, another profile
@@ -27,6 +29,12 @@ def of_board(board: str) -> type[Unit]:
     if known is None:
         raise ValueError(f"no such board: {board}; there are {', '.join(BOARDS)}")
     return known
+
+
+def reader_of(board: str, node_id: int) -> FrameReader | ReadingReader:
+    """What collects the frames or readings of such a board at a node, without a word to it."""
+    kind = of_board(board)
+    return FrameReader(node_id) if kind is Psa2 else ReadingReader(kind.layout, node_id)
 
 
 def identify(host: CanHost, node_id: int) -> type[Unit]:

@@ -14,7 +14,7 @@ from psabench.instruments import KINDS
 from psabench.shell import own
 from psabench.shell.grammar import Call, parse
 from psabench.shell.transcript import Transcript
-from psabench.shell.vocabulary import EVENTS, Command, Vocabulary, from_help, with_kinds
+from psabench.shell.vocabulary import EVENTS, Command, Vocabulary, from_help, with_events, with_kinds
 from psabench.shell.words import Wrong
 from psabench.unit import Unit
 
@@ -22,6 +22,7 @@ from psabench.unit import Unit
 WRONG_CODES = {"syntax", "command", "argument", "type", "range"}
 NOT_NOW = 0x08000022  # CiA 301: the state of the device does not allow it
 QUIT = "quit"
+MOVE_TIME = {"bus.read", "bus.write"}  # of the bench's own commands; to the end of the cycle
 PATHS = {"path"}  # arguments that name files of this machine, relative to where we are
 NO_CONTROL = "it wants the control socket of an emulator (--connect PATH); this bench has none"
 NO_CAN = "it wants a bus (--can SPEC, as socketcand:127.0.0.1:29536); this bench was opened without one"
@@ -107,7 +108,10 @@ class Session:
         if mine:
             return mine(self, call.args)
         args = {k: os.path.abspath(str(v)) if k in PATHS else v for k, v in call.args.items()}
-        return self.bench.control.call(call.command.wire, **args).result
+        result = self.bench.control.call(call.command.wire, **args).result
+        if call.command.wire in MOVE_TIME:
+            self.bench.catch_up()
+        return result
 
 
 def learn(bench: Bench) -> Vocabulary:
@@ -115,6 +119,8 @@ def learn(bench: Bench) -> Vocabulary:
     mine = [row.command for row in own.ROWS if row.here(bench)]
     theirs = _of_table(bench) if bench.pace != "real" else []
     missing = _not_in_scenario(bench) if theirs else {}
+    if theirs:
+        mine = [with_events(c, _events(bench)) if c.name == "until" else c for c in mine]
     commands: dict[str, Command] = {c.name: c for c in [*theirs, *mine] if c.name.split(".")[0] not in missing}
     things = {name.split(".")[0] for name in commands}
     why = {
@@ -135,13 +141,18 @@ def _not_in_scenario(bench: Bench) -> dict[str, str]:
     return reasons
 
 
+def _events(bench: Bench) -> tuple[str, ...]:
+    """Those that the boards of this bench can have: the choices of run.until."""
+    rows = {str(row["name"]): row for row in bench.control.call("help").result["commands"]}
+    args = rows["run.until"]["args"] if "run.until" in rows else []
+    return next((tuple(a["choices"]) for a in args if a["name"] == "event" and "choices" in a), EVENTS)
+
+
 def _of_table(bench: Bench) -> list[Command]:
     choices: dict[tuple[str, str], tuple[str, ...]] = {}
     with suppress(ControlError):
         units = bench.control.call("units").result["units"]
         choices["", "unit"] = tuple(str(u["name"]) for u in units)
-    for arg in ("after", "since"):
-        choices["fault.add", arg] = EVENTS
     commands = from_help(bench.control.call("help").result["commands"], choices)
     if any(c.name == "faults.add" for c in commands):
         kinds = bench.control.call("fault.kinds").result["kinds"]

@@ -102,6 +102,7 @@ class Vocabulary:
 
 OBJECTS: Mapping[str, str] = {
     "dut": "the device: registers, stream, counters, over CAN",
+    "bus": "the parallel bus of a board, cycle by cycle, by the emulator",
     "table": "the rate table",
     "head": "the dividing head",
     "chamber": "the thermal chamber",
@@ -113,7 +114,7 @@ OBJECTS: Mapping[str, str] = {
     "bench": "the bench as a whole: counters, units, snapshot",
 }
 
-# Events of a board, as emu/board/psa2_event.c names them; offered, the bench decides.
+# Events of a PSA-2, where no emulator tells those of its boards; offered, the bench decides.
 EVENTS = ("RES", "SETUP_DONE", "SYNC_A", "SYNC_T", "DRD_A", "DRD_T", "INT_FALL", "INT_RISE", "POWER_DOWN", "POWER_UP")
 
 # Arguments of a fault of any kind: when it comes, and for how long.
@@ -168,6 +169,12 @@ def _arg(row: Mapping[str, Any], here: tuple[str, ...], choices: Mapping[tuple[s
         strict=bool(named),
         what=str(row.get("what", "")),
     )
+
+
+def with_events(until: Command, events: tuple[str, ...]) -> Command:
+    """`until` with the events that there are."""
+    args = tuple(replace(a, choices=events) if a.name == "event" else a for a in until.args)
+    return replace(until, args=args)
 
 
 def with_kinds(add: Command, kinds: Sequence[Mapping[str, Any]], points: Sequence[str]) -> Command:
