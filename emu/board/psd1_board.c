@@ -225,7 +225,7 @@ static void add_gyro(struct sha256 *s, const struct psd1_gyro *g)
 static void add_registers(struct sha256 *s, const struct psd1 *b)
 {
     board_digest_u64(s, (uint64_t)b->uc1 << 32 | b->uc2);
-    board_digest_u64(s, (uint64_t)b->staged << 24 | (uint64_t)b->last_command << 8 | b->temp_channel << 4 |
+    board_digest_u64(s, (uint64_t)b->staged << 24 | (uint64_t)b->last_command << 8 | (uint64_t)b->temp_channel << 4 |
                             b->service_channel);
     for (unsigned i = 0; i < 3; i++) board_digest_u64(s, (uint64_t)b->zero[i] << 32 | b->full[i]);
     for (unsigned i = 0; i < 3; i++)

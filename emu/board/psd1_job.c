@@ -62,9 +62,8 @@ int64_t psd1_job_next(struct psd1 *b, int64_t t_ns)
         return psd1_next_rise(b, t_ns);
     case CONTROL:
         j->axis = j->request->command & PSD1_CMD_AXIS;
-        j->data_first = !b->drdy[j->axis];
-        b->phase = j->data_first ? PSD1_COEF_A0 : PSD1_COEF_FALL;
-        return j->data_first ? psd1_next_rise(b, t_ns) : psd1_next_fall(b, t_ns);
+        b->phase = PSD1_COEF_FALL;
+        return psd1_next_fall(b, t_ns + PSD1_HALF_NS); /* A0 may have fallen just now */
     default:
         return finish(b, t_ns);
     }
@@ -134,10 +133,22 @@ int64_t psd1_coef_a0(struct psd1 *b, int64_t t_ns)
     return t_ns + PSD1_HALF_NS;
 }
 
-int64_t psd1_coef_fall(struct psd1 *b, int64_t t_ns)
+/* A converter whose word waits gives that word for its control word (sources 3.4): the word goes first. */
+static bool word_waits(const struct psd1 *b)
 {
     const struct psd1_job *j = &b->job;
+    return j->at->op == CONTROL && !j->data_first && !b->drdy[j->axis];
+}
+
+int64_t psd1_coef_fall(struct psd1 *b, int64_t t_ns)
+{
+    struct psd1_job *j = &b->job;
     const struct ad7712_sclk sclk = psd1_sclk(t_ns);
+    if (word_waits(b)) {
+        j->data_first = true;
+        b->phase = PSD1_COEF_A0;
+        return psd1_next_rise(b, t_ns);
+    }
     psd1_rf(b, j->axis, false, t_ns);
     const uint32_t word = ad7712_read_word(&b->adc[j->axis], j->data_first ? 16 : 24, &sclk);
     psd1_frame_begin(b, j->data_first ? PSD1_FORM_READ16 : PSD1_FORM_READ24, word, t_ns);
