@@ -10,7 +10,9 @@
 
 #define OFF(member) offsetof(struct psa2_profile, member)
 #define ROW(name, kind, lo, hi, words)                                                                                 \
-    {.key = #name, .type = BOARD_FIELD_##kind, .offset = OFF(name), .min = (lo), .max = (hi), .what = (words)}
+    {                                                                                                                  \
+        .key = #name, .type = BOARD_FIELD_##kind, .offset = OFF(name), .min = (lo), .max = (hi), .what = (words)       \
+    }
 
 // clang-format off
 const struct board_field psa2_fields[PSA2_FIELDS] = {

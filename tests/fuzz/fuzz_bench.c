@@ -136,7 +136,7 @@ static void check_counters(struct world *w)
     for (unsigned i = 0; i < 2; i++) {
         struct seen *s = &w->seen[i];
         const struct psa2 *b = w->bench.unit[i].board;
-        const struct can_node *n = &w->bench.can[i].node.stream;
+        const struct can_node *n = unit_node(&w->bench.unit[i]);
         assert(b->counters.frames >= s->board.frames && b->counters.resets >= s->board.resets);
         assert(b->counters.requests >= s->board.requests && b->counters.timeouts >= s->board.timeouts);
         assert(b->adc[0].count.conversions >= s->conversions);
