@@ -6,6 +6,7 @@ A0, RFX, RFY, RFZ, SCLK, SDAT, FL2, CS, RW, AB, D = *range(9), 9, 13
 ANN_BIT, ANN_WORD, ANN_READ, ANN_CYCLE, ANN_WARNING = range(5)
 AXES = "XYZ"
 BITS = 16
+COEFFICIENT_BITS = 24  # read with A0 high in the set-up, for nobody
 ZERO = 0x8000  # offset binary
 
 # Limits of an AD7712 on 10 MHz, ns (external clocking, 10 MHz: one clock is 100 ns)
@@ -63,6 +64,7 @@ class Decoder(srd.Decoder):
     def reset(self):
         self.number = 0  # of the cycle, from 0 at the start of the recording
         self.words = None  # of the cycle under way; None: between cycles, or its beginning was not seen
+        self.transfers = 0  # of the cycle, coefficients included
         self.began = self.rfs = self.strobe = self.rise = self.fall = None  # samples
         self.bits = []  # (sample, level) of the transfer under way
         self.pins = ()  # as the strobe began
@@ -97,7 +99,7 @@ class Decoder(srd.Decoder):
     # ---- a cycle
 
     def cycle_begins(self, channel, pins):
-        self.words, self.began = [], self.samplenum
+        self.words, self.transfers, self.began = [], 0, self.samplenum
 
     def cycle_ends(self, channel, pins):
         if self.words is None:
@@ -117,10 +119,13 @@ class Decoder(srd.Decoder):
     def transfer_begins(self, channel, pins):
         axis = channel - RFX
         self.rfs, self.bits, self.rise, self.fall = self.samplenum, [], None, None
-        if self.words is not None and axis != len(self.words):
+        if self.words is None:
+            return
+        if axis != self.transfers:
             self.warn(self.samplenum, f"RF{AXES[axis]} out of turn", "Turn")
-        if self.words == [] and self.began is not None:
+        if self.transfers == 0:
             self.least("A0 to RFX", self.began, A0_TO_RFS)
+        self.transfers += 1
 
     def takes_bit(self, channel, pins):
         if self.rfs is None:
@@ -144,8 +149,7 @@ class Decoder(srd.Decoder):
         if start is None:  # its beginning was not seen
             return
         if len(self.bits) != BITS:
-            # 24 bits are a control word or a coefficient
-            if len(self.bits) != 24:
+            if len(self.bits) != COEFFICIENT_BITS:
                 self.warn(start, f"Torn word {name}: {len(self.bits)} bits, not {BITS}", "Torn")
             return
         self.least("SCLK to RFS", self.fall, SCLK_TO_RFS)

@@ -2,7 +2,8 @@
 
 `python -m psabench.waveform RUN.vcd frame OUT.svg` draws the first whole frame on INT, DATA and CLK;
 `... setup OUT.svg` draws each transfer of the set-up after Res; `... rdata OUT.svg` the first RDATA that an ADS1256 of
-the library was asked for. Same input, same bytes; light and dark pages.
+the library was asked for. `... cycle OUT.svg` and `... handover OUT.svg` draw the cycle of reading of a PSD-1
+(waveform_psd1.py). Same input, same bytes; light and dark pages.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from psabench.vcd import Vcd, Wire, read_vcd
 
 WIDTH, LEFT, RIGHT = 1120, 76, 18  # px: picture, column of names, margin
 ROW, HIGH, GAP = 32, 16, 22  # px: row pitch, height of a pulse, between sections
+LANE = 22  # px: pitch of intervals below the rows
 
 STYLE = """
 svg{font:11px ui-monospace,SFMono-Regular,Menlo,Consolas,"DejaVu Sans Mono",monospace}
@@ -28,6 +30,10 @@ svg{font:11px ui-monospace,SFMono-Regular,Menlo,Consolas,"DejaVu Sans Mono",mono
 @media(prefers-color-scheme:dark){
 .card{fill:#0d1117;stroke:#3d444d}.name{fill:#f0f6fc}.note{fill:#9198a1}.wave{stroke:#58a6ff}.rest{stroke:#3d444d}
 .tag{fill:#0c2d6b;stroke:#1f6feb}.word{fill:#cae8ff}.grid{stroke:#3d444d}}
+"""
+DIM_STYLE = """.dim{stroke:#bc4c00;fill:none;stroke-width:.9}.guide{stroke:#bc4c00;stroke-width:.6;stroke-dasharray:2 2}
+.dimtext{fill:#bc4c00}
+@media(prefers-color-scheme:dark){.dim,.guide{stroke:#f0883e}.dimtext{fill:#f0883e}}
 """
 
 
@@ -52,6 +58,22 @@ class Section:
 
 
 @dataclass(frozen=True, slots=True)
+class Dim:
+    """An interval below the rows, with guides from the rows of its two edges; lanes count downwards from 0."""
+
+    start_row: str
+    start_ns: int
+    end_row: str
+    end_ns: int
+    text: str  # stands after the interval's length
+    lane: int
+
+    @property
+    def label(self) -> str:
+        return f"{self.end_ns - self.start_ns:,}".replace(",", " ") + f" ns{self.text}"
+
+
+@dataclass(frozen=True, slots=True)
 class Panel:
     """Rows of lines over sections that stand side by side, each as wide as its share."""
 
@@ -59,6 +81,7 @@ class Panel:
     sections: Sequence[Section]
     tags: Sequence[Tag] = field(default=())
     shares: Sequence[float] = field(default=())
+    dims: Sequence[Dim] = field(default=())
 
 
 class _Scale:
@@ -96,6 +119,25 @@ def _tag(tag: Tag, s: _Scale, y: float) -> str:
     x0, x1 = s.x(tag.start_ns), s.x(tag.end_ns)
     box = f'<rect class="tag" x="{_n(x0)}" y="{_n(y - 14)}" width="{_n(x1 - x0)}" height="17" rx="3"/>\n'
     return box + _text((x0 + x1) / 2, y - 2, "word", tag.text)
+
+
+def _dim(dim: Dim, s: _Scale, y_rows: dict[str, float], y: float) -> str:
+    """Guides, a line with an arrow at each end, and the text where it fits: inside, or behind the end."""
+    x0, x1 = s.x(dim.start_ns), s.x(dim.end_ns)
+    out = [
+        f'<line class="guide" x1="{_n(x)}" x2="{_n(x)}" y1="{_n(y_rows[row])}" y2="{_n(y + 3)}"/>\n'
+        for row, x in ((dim.start_row, x0), (dim.end_row, x1))
+    ]
+    heads = f"M{_n(x0 + 4)} {_n(y - 3)}L{_n(x0)} {_n(y)}L{_n(x0 + 4)} {_n(y + 3)}"
+    heads += f"M{_n(x1 - 4)} {_n(y - 3)}L{_n(x1)} {_n(y)}L{_n(x1 - 4)} {_n(y + 3)}"
+    out.append(f'<path class="dim" d="M{_n(x0)} {_n(y)}H{_n(x1)}{heads if x1 - x0 > 8 else ""}"/>\n')
+    if x1 - x0 > 6.8 * len(dim.label):
+        out.append(_text((x0 + x1) / 2, y - 4, "dimtext", dim.label, "middle"))
+    elif x1 + 6.8 * len(dim.label) < s.x1 + RIGHT:
+        out.append(_text(x1 + 5, y + 4, "dimtext", dim.label))
+    else:
+        out.append(_text(x0 - 5, y + 4, "dimtext", dim.label, "end"))
+    return "".join(out)
 
 
 def _step_ns(span_ns: int, width: float) -> int:
@@ -137,6 +179,8 @@ def _panel(vcd: Vcd, panel: Panel, top: float) -> tuple[str, float]:
         y += ROW + (18 if row in tagged else 0)
         y_rows[row] = y - 8
     out = [_text(12, y_rows[row] - 3, "name", row) for row in panel.rows]
+    y_lane, lanes = y + 12, 1 + max((d.lane for d in panel.dims), default=-1)
+    y += LANE * lanes
     x = float(LEFT)
     for section, share in zip(panel.sections, shares, strict=True):
         scale = _Scale(section, x, room * share / sum(shares))
@@ -147,13 +191,15 @@ def _panel(vcd: Vcd, panel: Panel, top: float) -> tuple[str, float]:
             out.append(_wave(vcd.wires[row], scale, y_rows[row]))
         inside = [t for t in panel.tags if section.start_ns <= t.start_ns and t.end_ns <= section.end_ns]
         out += [_tag(t, scale, y_rows[t.row] - HIGH - 7) for t in inside]
+        within = [d for d in panel.dims if section.start_ns <= d.start_ns and d.end_ns <= section.end_ns]
+        out += [_dim(d, scale, y_rows, y_lane + LANE * d.lane) for d in within]
         x = scale.x1 + GAP
     return "".join(out), y + 22
 
 
 def render(vcd: Vcd, panels: Sequence[Panel], title: str) -> str:
     """The picture as SVG text. Raises ValueError when a row is not in the recording."""
-    _need(vcd, {row for p in panels for row in p.rows})
+    need(vcd, {row for p in panels for row in p.rows})
     y = 34.0
     body = [_text(12, 22, "name", title)]
     for panel in panels:
@@ -162,12 +208,12 @@ def render(vcd: Vcd, panels: Sequence[Panel], title: str) -> str:
     size = f'width="{WIDTH}" height="{_n(y)}"'
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {_n(y)}" {size} role="img">\n'
-        f"<title>{escape(title)}</title>\n<style>{STYLE}</style>\n"
+        f"<title>{escape(title)}</title>\n<style>{STYLE}{DIM_STYLE if any(p.dims for p in panels) else ''}</style>\n"
         f'<rect class="card" x=".5" y=".5" width="{WIDTH - 1}" height="{_n(y - 1)}" rx="6"/>\n{"".join(body)}</svg>\n'
     )
 
 
-def _need(vcd: Vcd, rows: set[str]) -> None:
+def need(vcd: Vcd, rows: set[str]) -> None:
     missing = sorted(rows - set(vcd.wires))
     if missing:
         raise ValueError(f"the recording has no line {', '.join(missing)}; it has {', '.join(vcd.wires)}")
@@ -204,7 +250,7 @@ def _first_frame(vcd: Vcd, bits: int) -> tuple[int, int]:
 def frame_picture(vcd: Vcd, word_bits: int = 32) -> str:
     """The first whole frame, and a closer look at the pause between its first two words. Raises ValueError."""
     rows = ("Int", "Data", "CLK")
-    _need(vcd, set(rows))
+    need(vcd, set(rows))
     fall_ns, rise_ns = _first_frame(vcd, 4 * word_bits)
     tags = frame_words(vcd, fall_ns, rise_ns, word_bits)
     margin = (rise_ns - fall_ns) // 30
@@ -250,7 +296,7 @@ def setup_picture(vcd: Vcd) -> str:
     Raises ValueError when there is no transfer, or a line is missing.
     """
     rows = ("DRD_A", "DRD_T", "SClk", "DIn", "CST", "DInT", "SYNC_T", "SYNC_A")
-    _need(vcd, set(rows))
+    need(vcd, set(rows))
     sync = {name: vcd.wires[name].t_ns[1:3].tolist() for name in ("SYNC_T", "SYNC_A")}
     until_ns = sync["SYNC_A"][0] if sync["SYNC_A"] else vcd.end_ns
     parts: list[tuple[int, int, int, float]] = []  # start, end, margin, share of the width
@@ -275,7 +321,7 @@ def setup_picture(vcd: Vcd) -> str:
 def rdata_picture(vcd: Vcd) -> str:
     """The first RDATA of an ADS1256 in a recording of the library: command, t6, 24 bits. Raises ValueError."""
     rows = ("DRDY", "CS", "SCLK", "DIN", "DOUT")
-    _need(vcd, set(rows))
+    need(vcd, set(rows))
     falls = vcd.wires["SCLK"].edges_ns(0)  # mode 1: sampled where SCLK falls
     cs = vcd.wires["CS"]
     for start, end in zip(cs.edges_ns(0).tolist(), cs.edges_ns(1).tolist(), strict=False):
@@ -296,9 +342,17 @@ def rdata_picture(vcd: Vcd) -> str:
 def main(argv: Sequence[str] | None = None) -> int:
     """Command line; 2 for bad input, with one line that says what would be right."""
     args = list(sys.argv[1:] if argv is None else argv)
-    pictures = {"frame": frame_picture, "setup": setup_picture, "rdata": rdata_picture}
+    from psabench import waveform_psd1  # which draws with what stands above
+
+    pictures = {
+        "frame": frame_picture,
+        "setup": setup_picture,
+        "rdata": rdata_picture,
+        "cycle": waveform_psd1.cycle_picture,
+        "handover": waveform_psd1.handover_picture,
+    }
     if len(args) != 3 or args[1] not in pictures:
-        print("usage: python -m psabench.waveform RUN.vcd frame|setup|rdata OUT.svg", file=sys.stderr)
+        print(f"usage: python -m psabench.waveform RUN.vcd {'|'.join(pictures)} OUT.svg", file=sys.stderr)
         return 2
     try:
         svg = pictures[args[1]](read_vcd(Path(args[0])))

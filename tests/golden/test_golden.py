@@ -32,6 +32,7 @@ class Trace:
     see: str
     command: str = ""  # of build/psa-emu; or
     scene: str = ""  # of chip_scenes.py
+    scope: str = "psa2"  # of the lines of a board
 
     @property
     def file(self) -> Path:
@@ -40,9 +41,8 @@ class Trace:
     def excerpt(self, vcd: Vcd) -> str:
         start_us, end_us = self.window_us
         text = vcd.window(self.signals, start_us * 1000, end_us * 1000)
-        return (
-            text.replace("$scope module psa2", f"$scope module {self.scene.partition('_')[0]}") if self.scene else text
-        )
+        scope = self.scene.partition("_")[0] or self.scope
+        return text.replace("$scope module psa2", f"$scope module {scope}")
 
     def record(self, scratch: Path) -> Vcd:
         return play(self.scene, scratch) if self.scene else record(self.command, scratch)

@@ -10,6 +10,7 @@ from xml.etree import ElementTree
 import pytest
 from psabench.vcd import Vcd, read_vcd
 from psabench.waveform import frame_picture, setup_picture
+from psabench.waveform_psd1 import cycle_picture, handover_picture
 
 HERE = Path(__file__).resolve().parent
 IMG = HERE.parents[1] / "docs" / "img"
@@ -20,6 +21,13 @@ IMG = HERE.parents[1] / "docs" / "img"
     [
         ("setup", setup_picture, "setup.svg", "1. 63.106 ms|41|00|56|50|00|02|50|00|04|53|00|82|6. 126.235 ms"),
         ("first_frames", frame_picture, "frame.svg", "X = |Y = |Z = |T = |pause of 4 CLK periods"),
+        ("psd1_cycle", cycle_picture, "psd1_cycle.svg", "400 ns|700 ns|800 ns|13 600 ns = 17 periods|X = |Y = |Z = "),
+        (
+            "psd1_cycle",
+            handover_picture,
+            "psd1_handover.svg",
+            "100 ns to DR|500 ns to the next|1 000 ns the host's|700 ns",
+        ),
     ],
 )
 def test_pictures_in_the_docs_show_the_golden_traces(

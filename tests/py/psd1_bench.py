@@ -109,11 +109,11 @@ class Host:
 
 
 def record(
-    directory: Path, seed: int, strobes: Iterable[Sequence[Strobe]], clock_ppm: int = 0
+    directory: Path, seed: int, strobes: Iterable[Sequence[Strobe]], clock_ppm: int = 0, unit_ns: int = 1
 ) -> tuple[Path, list[list[int]]]:
-    """The recording at 1 ns from power-on, and the words of each cycle as the host read them."""
+    """The recording from power-on, and the words of each cycle as the host read them."""
     vcd, words = directory / "psd1.vcd", list[int]()
-    extra: list[str | Path] = ["--vcd", vcd, "--vcd-unit", "1"]
+    extra: list[str | Path] = ["--vcd", vcd, "--vcd-unit", str(unit_ns)]
     with (
         Emulator(scenario(directory, seed), cans=["none"], pace="step", extra=extra) as emu,
         Control(emu.directory / "control") as control,

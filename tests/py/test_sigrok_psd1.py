@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+import psd1_bench
 import pytest
-from test_sigrok import Edge, sigrok, write
+from test_sigrok import ROOT, Edge, sigrok, write
+from verilog_bench import seed_of_test
 
 IDLE = {"A0": 0, "FL2": 0, "RFX": 1, "RFY": 1, "RFZ": 1, "SCLK": 0, "SDAT": 0, "CS": 1, "RW": 1}
 IDLE |= {f"AB{i}": 0 for i in range(4)} | {f"D{i}": 0 for i in range(16)}
@@ -100,7 +104,8 @@ def test_what_breaks_a_limit_or_the_order_is_told(name: str, tmp_path: Path) -> 
 
 
 def test_a_control_word_of_24_bits_is_no_word_of_an_axis(tmp_path: Path) -> None:
-    edges: list[Edge] = [(1000, "A0", 1), *transfer(1400, "X", 0x123456, bits=24), (60_000, "A0", 0)]
+    edges: list[Edge] = [(1000, "A0", 1), *transfer(1400, "X", 0x123456, bits=24)]
+    edges += [*transfer(30_000, "Y", 0x123456, bits=24), (60_000, "A0", 0)]
     vcd = write(tmp_path / "c.vcd", IDLE, edges, 200_000)
     assert sigrok(vcd, MUST, "psd1cycle=word:cycle:warning") == []
 
@@ -108,3 +113,21 @@ def test_a_control_word_of_24_bits_is_no_word_of_an_axis(tmp_path: Path) -> None
 def test_a_host_that_writes_is_told_as_such(tmp_path: Path) -> None:
     vcd = write(tmp_path / "c.vcd", IDLE, strobe(5000, 12, 0x1234, rw=0), 100_000)
     assert sigrok(vcd, MUST + HOST, "psd1cycle=read:warning") == ["Write 12: 1234h"]
+
+
+def test_the_shipped_sessions_name_the_lines_of_the_board() -> None:
+    pvs = (ROOT / "share/psd1.pvs").read_text()
+    gtkw = re.findall(r"^psd1\.(\w+)$", (ROOT / "share/psd1.gtkw").read_text(), re.MULTILINE)
+    assert sorted(gtkw) == sorted(psd1_bench.LINES)
+    assert re.findall(r"id=(\w+)", pvs) == ["psd1cycle"]
+    assert re.findall(r"assigned_signal_name=(\w+)", pvs) == [*list(IDLE)[:1], *list(IDLE)[2:7], "FL2", *list(IDLE)[7:]]
+    assert re.findall(r"^(\w+)..?trace_height", pvs, re.MULTILINE) == list(psd1_bench.LINES)
+
+
+def test_the_words_on_the_lines_are_those_that_the_host_reads(tmp_path: Path) -> None:
+    rows = psd1_bench.random_strobes(np.random.default_rng(seed_of_test()), 20)
+    vcd, words = psd1_bench.record(tmp_path, 1, rows, unit_ns=10)
+    seen = sigrok(vcd, f"{MUST}{HOST}:format=hex", "psd1cycle=cycle:warning")
+    seen = [text for text in seen if text != "Read before FL2"]  # the host's mistakes
+    want = [f"Cycle {n}: X={x:04X}h Y={y:04X}h Z={z:04X}h" for n, (x, y, z) in enumerate(words)]
+    assert seen == want

@@ -71,6 +71,8 @@ def test_what_is_no_recording_of_ours_is_told_with_its_place(text: str, says: st
         (["two.vcd", "setup", "b.svg"], "has no line CST, DIn, DInT"),
         (["two.vcd", "frame", "b.svg"], "has no line Data"),
         (["still.vcd", "frame", "b.svg"], "no whole frame in it"),
+        (["two.vcd", "cycle", "b.svg"], "has no line A0, CLK_1M25, CS, DR"),
+        (["cut.vcd", "handover", "b.svg"], "no whole cycle in it: FL2 does not go to 1"),
     ],
 )
 def test_the_command_says_what_is_missing(
@@ -81,6 +83,10 @@ def test_the_command_says_what_is_missing(
     Path("still.vcd").write_text(
         FILE.replace("$upscope", "$var wire 1 d Data $end\n$upscope").replace("1!\n0#\n", "1!\n0#\n0d\n")
     )
+    names = "CLK_1M25 DR A0 RFX RFY RFZ SCLK SDAT FL2 CS".split()
+    wires = "".join(f"$var wire 1 {chr(97 + i)} {name} $end\n" for i, name in enumerate(names))
+    levels = "".join(f"0{chr(97 + i)}\n" for i in range(len(names)))
+    Path("cut.vcd").write_text(f"{HEAD}{wires}$upscope $end\n$enddefinitions $end\n#5\n{levels}#9\n1c\n#30\n")
     assert waveform.main(argv) == 2
     assert says in capsys.readouterr().err
     assert not Path("b.svg").exists()
@@ -91,6 +97,15 @@ def test_the_command_draws(tmp_path: Path) -> None:
     out = tmp_path / "frame.svg"
     assert waveform.main([str(golden / "first_frames.vcd"), "frame", str(out)]) == 0
     assert out.read_text(encoding="utf-8") == waveform.frame_picture(read_vcd(golden / "first_frames.vcd"))
+
+
+def test_an_interval_is_drawn_with_its_length() -> None:
+    dims = (waveform.Dim("Int", 100, "CLK", 200, ", at most 110", 0), waveform.Dim("Int", 100, "Int", 1_250, "", 1))
+    panel = waveform.Panel(("Int", "CLK"), (waveform.Section(50, 1_300, 100),), dims=dims)
+    svg = waveform.render(parse_vcd(FILE), [panel], "")
+    assert ">100 ns, at most 110<" in svg
+    assert ">1 150 ns<" in svg
+    assert svg.count('class="guide"') == 4
 
 
 def test_sections_cut_waves_at_their_ends() -> None:
