@@ -79,9 +79,9 @@ static void a_word_right_behind_a_read_keeps_drdy_low(void **state)
     const int64_t next_ns = r.s.now_ns + 19 * MOD_NS;
     ad7712_a0_pin(&r.a, true, r.s.now_ns);
     const int64_t last_fall_ns = next_ns - 50;
-    wait_until(&r, last_fall_ns - 23 * SCLK_NS - HIGH_NS - FIRST_NS);
+    wait_until(&r, next_ns - 60000); /* before DRDY would go high for the update */
     rfs(&r, false);
-    wait_ns(&r, FIRST_NS);
+    wait_until(&r, last_fall_ns - 23 * SCLK_NS - HIGH_NS);
     const uint32_t word = r.a.word;
     assert_int_equal(pulses(&r, 24), word);
     assert_int_equal(r.s.now_ns, last_fall_ns);
