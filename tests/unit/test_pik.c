@@ -228,6 +228,13 @@ static void counters_follow_the_specimen(void **state)
         }
     }
     assert_true(fabs(pik_true_k_hz_per_v(&r.b, 0, 1, 25.0) / pik_true_k_hz_per_v(&r.b, 0, -1, 25.0) - 1.0) > 1e-4);
+    p.c_tol_pct = 5.0;
+    rig_up(&r, &p, 9);
+    for (unsigned i = 0; i < PIK_AXES; i++) {
+        const double c = 1.0 + 1e-2 * r.b.specimen.c_pct[i];
+        const double threshold = (double)r.b.channel[i].drive.threshold / (double)PIK_PULSE;
+        assert_true(fabs(c - 1.0) > 1e-3 && fabs(threshold - c * pik_profile_threshold(&p)) < 1e-9);
+    }
 }
 
 /* Switching late on both edges changes no charge; a difference changes K, an input that is taken off bends the line. */
@@ -326,6 +333,40 @@ static void clock_fault_changes_the_weight_of_a_pulse(void **state)
     pik_power_down(&r.b, r.s.now_ns);
     pik_clock(&r.b, 500, r.s.now_ns);
     assert_true(fabs(pik_true_k_hz_per_v(&r.b, 0, 1, 25.0) - 2000.0 * 1.0005) < 0.01);
+}
+
+/* Each change of pace begins at a tick that was: no time is lost between two. */
+static void a_clock_that_changes_often_loses_nothing(void **state)
+{
+    (void)state;
+    const struct pik_profile p = rig_pik6();
+    rig_up(&r, &p, 1);
+    r.input[0].v = 9.0;
+    for (int n = 1; n <= 2000; n++) {
+        rig_run_until(&r, n * INT64_C(500077));
+        pik_clock(&r.b, n % 2 ? 1 : -1, r.s.now_ns);
+    }
+    assert_true(fabs(count(&r, 0) - 18000.0 * 1.000154) <= 2.0);
+}
+
+/* A reading tells of all looks since the one before. */
+static void a_short_saturation_shows_in_one_reading(void **state)
+{
+    (void)state;
+    const struct pik_profile p = rig_pik();
+    rig_up(&r, &p, 1);
+    r.input[1].v = 1.0;
+    rig_run_until(&r, 31000000);
+    pik_abrupt(&r.b, r.s.now_ns);
+    r.input[1].v = 10.49;
+    r.b.channel[1].axis.charge = PIK_PULSE * 21 / 10; /* as a longer overload would leave it */
+    rig_run_until(&r, 33000000);
+    pik_abrupt(&r.b, r.s.now_ns);
+    r.input[1].v = -5.0;
+    rig_run_until(&r, 55000000);
+    assert_int_equal(r.reading[2].status, PIK_ST_NEW);
+    assert_int_equal(r.reading[3].status, PIK_ST_NEW | PIK_ST_SATURATED_Y);
+    assert_int_equal(r.reading[4].status, PIK_ST_NEW);
 }
 
 static void stuck_outputs_are_not_counted(void **state)
@@ -434,6 +475,8 @@ int main(void)
         cmocka_unit_test(noise_walks),
         cmocka_unit_test(saturation_is_counted_and_told),
         cmocka_unit_test(clock_fault_changes_the_weight_of_a_pulse),
+        cmocka_unit_test(a_clock_that_changes_often_loses_nothing),
+        cmocka_unit_test(a_short_saturation_shows_in_one_reading),
         cmocka_unit_test(stuck_outputs_are_not_counted),
         cmocka_unit_test(a_flipped_bit_stays_in_the_counter),
         cmocka_unit_test(frozen_words_repeat_while_time_goes_on),

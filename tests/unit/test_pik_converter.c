@@ -82,6 +82,24 @@ static void a_pulse_comes_at_the_first_tick_at_or_beyond_the_threshold(void **st
     assert_int_equal(pik_axis_count(&a), 0);
 }
 
+/* Exactly at the threshold when its reference is ready again, and no input any more. */
+static void a_waiting_pulse_needs_no_input(void **state)
+{
+    (void)state;
+    struct pik_drive d = nominal;
+    d.per_tick = PIK_PULSE / 64;
+    struct pik_axis a = pik_axis_at(0, &d);
+    pik_axis_advance(&a, 48); /* a quarter of a pulse below zero now */
+    d.per_tick = PIK_PULSE / 16;
+    pik_axis_look(&a, 48, &d);
+    d.per_tick = 0;
+    pik_axis_look(&a, 64, &d);
+    assert_true(a.charge == nominal.threshold);
+    assert_int_equal(pik_axis_next(&a), 48 + PULSE_TICKS + RECOVERY_TICKS);
+    pik_axis_advance(&a, 1000);
+    assert_int_equal(a.plus, 2);
+}
+
 static void closed_form_equals_the_definition(void **state)
 {
     (void)state;
@@ -195,6 +213,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_pulse_comes_at_the_first_tick_at_or_beyond_the_threshold),
+        cmocka_unit_test(a_waiting_pulse_needs_no_input),
         cmocka_unit_test(closed_form_equals_the_definition),
         cmocka_unit_test(count_is_the_charge_within_one_pulse),
         cmocka_unit_test(beyond_full_scale_it_saturates_and_says_so),
