@@ -82,11 +82,10 @@ void pmka_release(struct pmka *b, int64_t t_ns)
     r->tau = r->asked_tau;
     r->asked_tau = 0;
     r->age = 0;
-    r->cal = PMKA_CAL_NONE;
     b->counters.beats++;
     pmka_tell(b, PMKA_EV_TAU, t_ns);
     tau_lines(b, t_ns);
-    if (b->channel[PMKA_K].said_axis != axis_of_k(r->tau)) pmka_keys_home(b, t_ns);
+    pmka_keys_home(b, t_ns);
 }
 
 void pmka_take(struct pmka *b, int64_t t_ns)

@@ -100,6 +100,13 @@ def test_calibrations_give_reset_and_zero() -> None:
         assert c.zero.mean() == pytest.approx(zero_vs / (SR_VS / NR), abs=1.0 / ZERO)
 
 
+def test_a_zero_is_a_rate_per_ts() -> None:
+    zero_vs = 3e-5  # ten codes a Ts
+    p = est.periods_of(columns(waves(1001), zero_vs=zero_vs))
+    for i in range(4):
+        assert est.calibrate(p, i).zero == pytest.approx(zero_vs / (SR_VS / NR), abs=1.0 / ZERO)
+
+
 def test_a_zero_run_with_a_reset_in_it_is_used() -> None:
     """The one that came from work may be beyond Uc: Nr of its sign goes back into the run."""
     c = columns(waves(2100), zero_vs=4.2e-7)

@@ -162,6 +162,39 @@ static void a_reset_begins_beyond_uc_and_lasts_half_a_period(void **state)
     assert_int_equal((z->reset_from_ns - 10200000) % 4800000, 0);
 }
 
+/* Slowly, so that the threshold shows to 15 mV; both signs. */
+static void the_threshold_of_the_comparators(void **state)
+{
+    (void)state;
+    const struct pmka_profile p = rig_ideal();
+    for (int sign = -1; sign <= 1; sign += 2) {
+        rig_init(&rig, &p);
+        rig.input[1].mean_v = 0.03 * sign;
+        pmka_board.power_up(&rig.b, 0);
+        rig_readings(&rig, 280);
+        unsigned resets = 0;
+        for (unsigned k = 1; k < 280; k++) {
+            assert_int_equal(rig.reading[k].reset[1], rig.reading[k - 1].code[1] * sign > 11469 ? sign : 0);
+            resets += rig.reading[k].reset[1] != 0;
+        }
+        assert_int_equal(resets, 1);
+    }
+}
+
+/* 10 V for a period: 5.10638 V. */
+static void a_code_is_a_voltage(void **state)
+{
+    (void)state;
+    const struct pmka_profile p = rig_ideal();
+    rig_init(&rig, &p);
+    rig.input[0].mean_v = 10.0;
+    rig.input[1].mean_v = -9.99;
+    pmka_board.power_up(&rig.b, 0);
+    rig_readings(&rig, 2);
+    assert_int_equal(rig.reading[1].code[0], 16733);
+    assert_int_equal(rig.reading[1].code[1], -17064); /* 100 us later */
+}
+
 /* Nodes and weights: up to the fifth degree nothing is missing; the sixth shows that the nodes are Gauss's. */
 static void quadrature(void **state)
 {
@@ -206,6 +239,8 @@ int main(void)
         cmocka_unit_test(figures_of_the_article),
         cmocka_unit_test(sampling_instants),
         cmocka_unit_test(a_reset_begins_beyond_uc_and_lasts_half_a_period),
+        cmocka_unit_test(the_threshold_of_the_comparators),
+        cmocka_unit_test(a_code_is_a_voltage),
         cmocka_unit_test(full_scale_is_a_reset_a_period),
         cmocka_unit_test(a_random_input_is_integrated_through_many_rotations),
         cmocka_unit_test(no_hand_over_costs_more_than_its_codes),

@@ -77,6 +77,11 @@ static void a_key_that_sticks(void **state)
     }
     assert_true(served > 15);
     assert_false(rig.b.trace.level >> PMKA_LINE_KL4 & 1);
+    for (unsigned k = 15; k < 40; k++) { /* X back at work does not get what was lost */
+        const struct pmka_reading *r = &rig.reading[k];
+        if (r->serves[0] == 0 || r->reset[0] != 0) continue;
+        assert_in_range(r->code[0] - rig.reading[k - 1].code[0], 0, 3347);
+    }
     while (rig.b.channel[3].said_axis < 0) rig_run(&rig, 1000000);
     pmka_board.wrong(&rig.b, 0); /* closes again, if K is to have an axis */
     assert_true(rig.b.trace.level >> PMKA_LINE_KL4 & 1);
@@ -174,6 +179,44 @@ static void res(void **state)
     for (unsigned i = 0; i < 4; i++) assert_int_equal(r->reset[i] + r->serves[i], 0);
 }
 
+/* A precision reset that Res meets ends there: what it has drawn it has drawn. */
+static void res_cuts_a_reset(void **state)
+{
+    (void)state;
+    struct pmka_profile p = rig_ideal();
+    p.rotation = PMKA_PROGRAM;
+    up(&rig, &p, 1.0);
+    while (!rig.b.channel[0].resetting) rig_run(&rig, 100000);
+    const int16_t was = rig.b.next.code[0];
+    const int64_t t_ns = rig.b.channel[0].reset_from_ns + 1200000;
+    rig_run(&rig, t_ns - rig.s.now_ns);
+    assert_true(rig.b.trace.level >> PMKA_LINE_RP1 & 1);
+    assert_true(rig.b.channel[0].count[0] > 0);
+    const unsigned before = rig.readings;
+    pmka_board.reset(&rig.b, t_ns);
+    assert_false(rig.b.trace.level >> PMKA_LINE_RP1 & 1);
+    assert_int_equal(rig.b.channel[0].count[0], 0);
+    rig_readings(&rig, before + 2);
+    const struct pmka_reading *r = &rig.reading[rig.readings - 2];
+    assert_int_equal(r->seq, 0);
+    near(r->code[0], was + (1.0 * 11.2 - 20.0 * 1.2) * 1e-3 / 20e3 / 0.47e-6 * 3276.8, 1.5);
+    assert_int_equal(rig.reading[rig.readings - 1].reset[0], 0);
+}
+
+/* What goes wrong in the middle of a period goes wrong from there on. */
+static void a_fault_has_its_instant(void **state)
+{
+    (void)state;
+    struct pmka_profile p = rig_ideal();
+    p.rotation = PMKA_PROGRAM;
+    up(&rig, &p, 0.0);
+    rig_readings(&rig, 3);
+    sched_run_until(&rig.s, rig.reading[2].t_ns + 3600000);
+    pmka_board.wrong(&rig.b, BOARD_WRONG_STUCK_RESET);
+    rig_readings(&rig, 4);
+    near(rig.reading[3].code[0], -20.0 * 1.2e-3 / 20e3 / 0.47e-6 * 3276.8, 1.0);
+}
+
 /* The capacitors are empty and shorted until the first sampling instant. */
 static void power(void **state)
 {
@@ -216,8 +259,9 @@ static void more_than_full_scale(void **state)
         for (unsigned i = 0; i < 3; i++) assert_true(rig.reading[59].saturated[i] && rig.reading[59].clipped[i]);
         assert_false(rig.reading[59].saturated[3] || rig.reading[59].clipped[3]);
         for (unsigned a = 0; a < 3; a++) rig.input[a].mean_v = 0.0;
-        rig_readings(&rig, 70);
-        assert_true(abs(rig.reading[69].code[1]) < 11500); /* 12 V and what two resets leave of it */
+        rig_readings(&rig, 62);
+        const double left_v = 12.0 - 2 * 5.1064; /* what was beyond the limit is gone: two resets lead back */
+        near(rig.reading[61].code[1] * sign, left_v / 10 * 32768, 1800.0);
     }
 }
 
@@ -349,6 +393,25 @@ static void the_zero(void **state)
     }
 }
 
+/* The capacitor at the temperature of the period: Nr follows. */
+static void the_board_warms_up(void **state)
+{
+    (void)state;
+    struct pmka_profile p = short_beats();
+    p.cap_tc_ppm_per_k = -1000.0;
+    rig_init(&rig, &p);
+    rig.degc_per_s = 10.0;
+    pmka_board.power_up(&rig.b, 0);
+    rig_readings(&rig, 1000);
+    for (unsigned k = 900; k < 1000; k++) {
+        const struct pmka_reading *r = &rig.reading[k];
+        if (r->cal != PMKA_CAL_RESET || r->serves[3] || r->tau == 5) continue;
+        const double warmer_k = 10.0 * 1e-9 * (double)r->t_ns, nr = 16732.6 / (1.0 - 1e-3 * warmer_k);
+        near(abs(r->code[3] - rig.reading[k - 1].code[3]), nr, 5.0);
+    }
+    near(rig.b.channel[1].integrator.cap_f, 0.47e-6 * (1.0 - 1e-2 * 1e-9 * (double)rig.reading[999].t_ns), 1e-12);
+}
+
 static void the_thermometer(void **state)
 {
     (void)state;
@@ -378,6 +441,8 @@ int main(void)
         cmocka_unit_test(data_of_the_converter_that_stick),
         cmocka_unit_test(a_bit_of_the_rom),
         cmocka_unit_test(res),
+        cmocka_unit_test(res_cuts_a_reset),
+        cmocka_unit_test(a_fault_has_its_instant),
         cmocka_unit_test(power),
         cmocka_unit_test(more_than_full_scale),
         cmocka_unit_test(the_input_may_change_abruptly),
@@ -386,6 +451,7 @@ int main(void)
         cmocka_unit_test(specimens),
         cmocka_unit_test(the_zero),
         cmocka_unit_test(the_thermometer),
+        cmocka_unit_test(the_board_warms_up),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

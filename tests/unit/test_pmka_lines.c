@@ -178,6 +178,10 @@ static void a_late_look_tells_what_an_early_one_knows(void **state)
                      (unsigned long long)want);
         converting += want >> PMKA_LINE_CONV & 1;
         resetting += (want >> PMKA_LINE_RP1 & 0xFF) != 0;
+        edges = 0;
+        trace_advance(&other.b.trace, other.s.now_ns);
+        for (unsigned k = 1; k < edges; k++) /* no pulse that was over long ago */
+            assert_false(edge[k].line == edge[k - 1].line && edge[k].t_ns == edge[k - 1].t_ns);
         trace_detach(&other.b.trace, &late);
         edges = 0;
     }

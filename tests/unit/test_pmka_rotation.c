@@ -139,6 +139,22 @@ static void what_is_asked_for_twice_happens_once(void **state)
     for (unsigned k = 3; k < 10; k++) assert_int_equal(rig.reading[k].cal, PMKA_CAL_ZERO);
 }
 
+/* What is asked for with a beat is for that beat: the one that goes back to work is left in peace. */
+static void a_calibration_begins_with_its_beat(void **state)
+{
+    (void)state;
+    const struct pmka_profile p = short_beats(PMKA_PROGRAM);
+    rig_up(&rig, &p);
+    rig.input[1].mean_v = 1.0;
+    assert_true(pmka_command(&rig.b, 3, PMKA_CAL_NONE));
+    rig_readings(&rig, 10);
+    assert_true(pmka_command(&rig.b, 4, PMKA_CAL_RESET));
+    rig_readings(&rig, 14);
+    for (unsigned k = 10; k < 14; k++) assert_int_equal(rig.reading[k].reset[1], 0);
+    assert_int_equal(rig.reading[12].cal, PMKA_CAL_RESET);
+    assert_int_not_equal(rig.reading[12].reset[2], 0);
+}
+
 /* The tau5 of the rotation calibrates K as tau1 does: keys do not move between them. */
 static void no_key_moves_from_tau5_to_tau1(void **state)
 {
@@ -187,6 +203,7 @@ int main(void)
         cmocka_unit_test(each_axis_has_an_integrator_and_each_integrator_one_axis_at_most),
         cmocka_unit_test(the_computer_turns_it_by_program),
         cmocka_unit_test(what_is_asked_for_twice_happens_once),
+        cmocka_unit_test(a_calibration_begins_with_its_beat),
         cmocka_unit_test(no_key_moves_from_tau5_to_tau1),
         cmocka_unit_test(the_instant_of_a_hand_over),
     };

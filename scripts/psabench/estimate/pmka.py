@@ -227,7 +227,7 @@ def integrals_vs(
     out = np.empty((len(p), len(AXES)))
     for axis in range(len(AXES)):
         out[:, axis] = np.cumsum(np.where(p.serves == axis + 1, ds, 0.0).sum(axis=1))
-    return out - out[:1]
+    return out
 
 
 def quantum_vs(nr: float, ts_s: float, uref_v: float = UREF_V) -> float:
