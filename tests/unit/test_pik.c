@@ -359,7 +359,7 @@ static void a_short_saturation_shows_in_one_reading(void **state)
     rig_run_until(&r, 31000000);
     pik_abrupt(&r.b, r.s.now_ns);
     r.input[1].v = 10.49;
-    r.b.channel[1].axis.charge = PIK_PULSE * 21 / 10; /* as a longer overload would leave it */
+    r.b.channel[1].axis.charge = PIK_PULSE * 3; /* as a longer overload would leave it */
     rig_run_until(&r, 33000000);
     pik_abrupt(&r.b, r.s.now_ns);
     r.input[1].v = -5.0;
