@@ -134,7 +134,9 @@ static void out_of_patience(void *ctx, int64_t t_ns)
 
 static void refresh_degc(struct psd1 *b, int64_t t_ns)
 {
-    b->board_degc = b->io.temp_degc(b->io.ctx, 3, t_ns);
+    const double degc = b->io.temp_degc(b->io.ctx, 3, t_ns);
+    if (degc == b->board_degc && b->per_vref > 0.0) return;
+    b->board_degc = degc;
     b->vref_scale = 1.0 + b->vref_error + b->vref_tc_per_k * (b->board_degc - 25.0);
     b->per_vref = 1.0 / b->vref_scale;
 }
@@ -172,13 +174,23 @@ static void on_drdy(void *ctx, bool level, int64_t t_ns)
 }
 
 /* The signal is on the profile's input; the other one is not connected. The reference's error is its inverse on the input. */
-static double vin_v(void *ctx, unsigned channel, int64_t t_ns)
+static void vin_row_v(void *ctx, unsigned channel, const int64_t *t_ns, unsigned n, double *vin_v)
 {
     const struct psd1_port *port = ctx;
     struct psd1 *b = port->b;
-    if (channel + 1 != b->profile.adc_input) return 0.0;
-    const double signal = b->io.accel(b->io.ctx, port->axis, t_ns);
-    return afe_out_v(&b->afe[port->axis], signal, b->board_degc, t_ns) * b->per_vref;
+    struct afe *const afe = &b->afe[port->axis];
+    const bool connected = channel + 1 == b->profile.adc_input;
+    for (unsigned i = 0; i < n; i++) {
+        const double signal = connected ? b->io.accel(b->io.ctx, port->axis, t_ns[i]) : 0.0;
+        vin_v[i] = connected ? afe_out_v(afe, signal, b->board_degc, t_ns[i]) * b->per_vref : 0.0;
+    }
+}
+
+static double vin_v(void *ctx, unsigned channel, int64_t t_ns)
+{
+    double v = 0.0;
+    vin_row_v(ctx, channel, &t_ns, 1, &v);
+    return v;
 }
 
 /* ---- life ---- */
@@ -256,7 +268,7 @@ static void init_adc(struct psd1 *b)
     for (unsigned i = 0; i < 3; i++) {
         const struct ad7712_cfg cfg = adc_cfg(b, i);
         b->port[i] = (struct psd1_port){b, i};
-        const struct ad7712_io io = {.ctx = &b->port[i], .vin_v = vin_v, .drdy = on_drdy};
+        const struct ad7712_io io = {.ctx = &b->port[i], .vin_v = vin_v, .vin_row_v = vin_row_v, .drdy = on_drdy};
         ad7712_init(&b->adc[i], &cfg, &io, b->sched, rng_stream(b->unit.seed, b->unit.serial, adc_noise[i]));
         afe_init(&b->afe[i], &b->unit.afe[i], rng_stream(b->unit.seed, b->unit.serial, afe_noise[i]));
         b->drdy[i] = true;

@@ -26,22 +26,33 @@ static void rate(struct psd1 *b, int64_t t_ns, double w_radps[3])
     if (b->io.rate_radps) b->io.rate_radps(b->io.ctx, t_ns, w_radps);
 }
 
-/* Angle from gyros.t_ns to t_ns with the rate w at its end, by the trapezoid; after an abrupt change w holds all the way. */
-static double angle_rad(const struct psd1_gyros *g, const struct psd1_gyro *a, double w_radps, int64_t t_ns)
+/* Angle of dt_s with the rate w at its end, by the trapezoid; after an abrupt change w holds all the way. */
+static double angle_rad(const struct psd1_gyros *g, const struct psd1_gyro *a, double w_radps, double dt_s)
 {
-    const double w = a->scale * w_radps + a->bias_radps;
-    return 0.5 * ((g->stale ? w : a->w_radps) + w) * (1e-9 * (double)(t_ns - g->t_ns));
+    return 0.5 * ((g->stale ? w_radps : a->w_radps) + w_radps) * dt_s;
+}
+
+static double measured_radps(const struct psd1_gyro *a, double w_radps)
+{
+    return a->scale * w_radps + a->bias_radps;
+}
+
+static double since_s(const struct psd1_gyros *g, int64_t t_ns)
+{
+    return 1e-9 * (double)(t_ns - g->t_ns);
 }
 
 static void integrate_to(struct psd1 *b, int64_t t_ns)
 {
     struct psd1_gyros *g = &b->gyros;
+    const double dt_s = since_s(g, t_ns);
     double w_radps[3];
     rate(b, t_ns, w_radps);
     for (unsigned i = 0; i < 3; i++) {
         struct psd1_gyro *a = &g->axis[i];
-        a->angle_rad += angle_rad(g, a, w_radps[i], t_ns);
-        a->w_radps = a->scale * w_radps[i] + a->bias_radps;
+        const double w = measured_radps(a, w_radps[i]);
+        a->angle_rad += angle_rad(g, a, w, dt_s);
+        a->w_radps = w;
     }
     g->t_ns = t_ns;
     g->stale = false;
@@ -63,6 +74,12 @@ static void integrate(struct psd1 *b, int64_t t_ns)
     }
 }
 
+static int64_t whole_below(double x)
+{
+    const int64_t whole = (int64_t)x; /* towards zero; floor() is a call */
+    return whole - ((double)whole > x);
+}
+
 void psd1_aux_latch(struct psd1 *b, struct psd1_cycle *c, int64_t t_ns)
 {
     const struct psd1_gyros *g = &b->gyros;
@@ -71,10 +88,11 @@ void psd1_aux_latch(struct psd1 *b, struct psd1_cycle *c, int64_t t_ns)
     double w_radps[3];
     integrate(b, t_ns);
     rate(b, t_ns, w_radps);
+    const double dt_s = since_s(g, t_ns);
     for (unsigned i = 0; i < 3; i++) {
         const struct psd1_gyro *a = &g->axis[i];
-        const double counts = (a->angle_rad + angle_rad(g, a, w_radps[i], t_ns)) / count_rad;
-        c->gyro[i] = (int32_t)(uint32_t)(int64_t)floor(counts);
+        const double angle = a->angle_rad + angle_rad(g, a, measured_radps(a, w_radps[i]), dt_s);
+        c->gyro[i] = (int32_t)(uint32_t)whole_below(angle / count_rad);
         c->rate[i] = (int16_t)code_of(w_radps[i] * a->rate_scale + a->rate_offset_radps, code_radps, -32768, 32767);
     }
 }

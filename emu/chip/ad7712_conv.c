@@ -72,9 +72,28 @@ static double path_x(struct ad7712 *a, double v)
     return x < 0.0 ? -HEADROOM : HEADROOM; /* not a number saturates too */
 }
 
+/* Whoever gives rows has no resistance, and the part both inputs. */
+static void take_rows(struct ad7712 *a, int64_t t_ns)
+{
+    int64_t at_ns[AD7712_CELLS_MAX];
+    double v[AD7712_CELLS_MAX];
+    while (a->look.t_ns <= t_ns) {
+        unsigned n = 0;
+        for (; a->look.t_ns <= t_ns && n < AD7712_CELLS_MAX; a->look = clk_on(a->look, &a->look_step))
+            at_ns[n++] = a->look.t_ns;
+        a->io.vin_row_v(a->io.ctx, ad7712_channel(a), at_ns, n, v);
+        for (unsigned i = 0; i < n; i++) v[i] = path_x(a, v[i]);
+        ad7712_sinc3_row(&a->filter, v, n);
+    }
+}
+
 void ad7712_sample_until(struct ad7712 *a, int64_t t_ns)
 {
     if (a->state != AD7712_RUNNING || a->quiet) return;
+    if (a->io.vin_row_v && !a->io.source_ohm && a->cfg.part != AD7712_PART_7711A) {
+        take_rows(a, t_ns);
+        return;
+    }
     while (a->look.t_ns <= t_ns) {
         ad7712_sinc3_push(&a->filter, path_x(a, ad7712_input_v(a, a->look.t_ns)));
         a->look = clk_on(a->look, &a->look_step);

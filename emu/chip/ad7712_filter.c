@@ -2,6 +2,7 @@
 
 #include "base/detmath.h"
 
+#include <assert.h>
 #include <math.h>
 #include <string.h>
 
@@ -69,6 +70,7 @@ static void weigh(struct ad7712_sinc3 *f)
 
 void ad7712_sinc3_start(struct ad7712_sinc3 *f, unsigned code, unsigned cells)
 {
+    assert(cells > 0 && cells <= AD7712_CELLS_MAX);
     if (f->code != code || f->cells != cells) {
         f->code = code;
         f->cells = cells;
@@ -79,17 +81,43 @@ void ad7712_sinc3_start(struct ad7712_sinc3 *f, unsigned code, unsigned cells)
     memset(f->sum, 0, sizeof f->sum);
 }
 
-bool ad7712_sinc3_push(struct ad7712_sinc3 *f, double x)
+static void output(struct ad7712_sinc3 *f)
 {
-    for (unsigned k = 0; k < 3; k++) f->sum[k] += f->weight[k][f->i] * x;
-    if (++f->i < f->cells) return false;
     f->out = f->sum[0] + f->middle + f->oldest;
     f->middle = f->sum[1];
     f->oldest = f->oldest_next;
     f->oldest_next = f->sum[2];
     f->i = 0;
-    memset(f->sum, 0, sizeof f->sum);
+    f->sum[0] = f->sum[1] = f->sum[2] = 0.0;
+}
+
+bool ad7712_sinc3_push(struct ad7712_sinc3 *f, double x)
+{
+    for (unsigned k = 0; k < 3; k++) f->sum[k] += f->weight[k][f->i] * x;
+    if (++f->i < f->cells) return false;
+    output(f);
     return true;
+}
+
+void ad7712_sinc3_row(struct ad7712_sinc3 *f, const double *x, unsigned n)
+{
+    while (n > 0) {
+        const unsigned left = f->cells - f->i, take = n < left ? n : left;
+        const double *const w0 = f->weight[0] + f->i, *const w1 = f->weight[1] + f->i, *const w2 = f->weight[2] + f->i;
+        double sum0 = f->sum[0], sum1 = f->sum[1], sum2 = f->sum[2];
+        for (unsigned k = 0; k < take; k++) {
+            sum0 += w0[k] * x[k];
+            sum1 += w1[k] * x[k];
+            sum2 += w2[k] * x[k];
+        }
+        f->sum[0] = sum0;
+        f->sum[1] = sum1;
+        f->sum[2] = sum2;
+        f->i += take;
+        if (f->i == f->cells) output(f);
+        x += take;
+        n -= take;
+    }
 }
 
 double ad7712_sinc3_gain(const struct ad7712_sinc3 *f, double freq)

@@ -54,6 +54,9 @@ void ad7712_sinc3_start(struct ad7712_sinc3 *f, unsigned code, unsigned cells);
 /* Takes a look; true when it was the last of an output period, whose result is then in f->out. */
 bool ad7712_sinc3_push(struct ad7712_sinc3 *f, double x);
 
+/* n looks in a row, with the same result. */
+void ad7712_sinc3_row(struct ad7712_sinc3 *f, const double *x, unsigned n);
+
 /* |H| at f times the output rate: of the weights above, and of the silicon's filter. */
 double ad7712_sinc3_gain(const struct ad7712_sinc3 *f, double freq);
 double ad7712_sinc3_ideal(unsigned code, double freq);

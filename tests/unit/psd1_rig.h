@@ -23,7 +23,7 @@ struct rig {
     struct psd1 b;
     double volts[3]; /* at the sensors */
     double degc[4];
-    double w_radps[3];
+    double w_radps[3], w_radps2; /* at 0, and how much more a second later */
     struct psd1_cycle cycle[RIG_CYCLES];
     unsigned cycles;
     uint16_t fault[16];
@@ -56,8 +56,7 @@ static inline double rig_degc(void *ctx, unsigned channel, int64_t t_ns)
 static inline void rig_rate(void *ctx, int64_t t_ns, double w_radps[3])
 {
     const struct rig *r = ctx;
-    (void)t_ns;
-    for (unsigned i = 0; i < 3; i++) w_radps[i] = r->w_radps[i];
+    for (unsigned i = 0; i < 3; i++) w_radps[i] = r->w_radps[i] + r->w_radps2 * 1e-9 * (double)t_ns;
 }
 
 static inline void rig_event(void *ctx, unsigned event, int64_t t_ns)

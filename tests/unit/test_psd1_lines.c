@@ -193,9 +193,11 @@ static void coefficients_on_the_line(void **state)
     rig_watch(&rig, ALL & ~TRACE_BIT(PSD1_LINE_CLK));
     psd1_power_up(&rig.b, 0);
     rig_await(&rig, PSD1_COEF_A0);
-    const int64_t a0_ns = rig.b.due_ns;
+    const int64_t a0_ns = rig.b.due_ns, tfs_ns = rig.event_ns[PSD1_EV_UC];
     rig_run(&rig, 100000);
     trace_advance(&rig.b.trace, rig.s.now_ns);
+    assert_true(has_edge(&rig, PSD1_LINE_SDAT, true, tfs_ns)); /* C20013h: its first bit with TFS */
+    assert_true(has_edge(&rig, PSD1_LINE_SDAT, false, tfs_ns + 1900));
     assert_true(has_edge(&rig, PSD1_LINE_A0, true, a0_ns));
     for (unsigned a = 0; a < 3; a++) {
         const int64_t rf_ns = a0_ns + 400 + 20800 * a;
@@ -258,7 +260,14 @@ static void cycles_equal(const struct rig *a, const struct rig *b)
     }
 }
 
-/* Whoever comes at any instant, for whichever lines, hears from then on what one hears who was there from the beginning. */
+static void ignore(void *ctx, const struct trace_step *s, unsigned n)
+{
+    (void)ctx;
+    (void)s;
+    (void)n;
+}
+
+/* Whoever comes at any instant, for whichever lines, alone or while another listens to others, hears from then on what one hears who was there from the beginning. */
 static void late_listeners_hear_the_same(void **state)
 {
     (void)state;
@@ -280,6 +289,9 @@ static void late_listeners_hear_the_same(void **state)
         const int64_t from_ns = 9500000 + (int64_t)(rng_uniform(&rng) * 1500000.0);
         rig_init(&other, &p, 1.0);
         psd1_power_up(&other.b, 0);
+        struct trace_sink early = {.mask = masks[k / 5 % COUNT(masks)], .steps = ignore};
+        if (k % 2) rig_until(&other, from_ns - (int64_t)(rng_uniform(&rng) * 30000.0));
+        if (k % 2) trace_attach(&other.b.trace, &early);
         rig_until(&other, from_ns);
         trace_advance(&other.b.trace, from_ns);
         other.sink.mask = mask;
