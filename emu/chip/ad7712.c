@@ -1,3 +1,5 @@
+#include "chip/ad7712.h"
+
 #include "chip/ad7712_parts.h"
 
 #include <assert.h>

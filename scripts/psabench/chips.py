@@ -68,7 +68,7 @@ def ad7712_volts(
     """Volts at an input of an AD7710..AD7712 for a code of 16 or 24 bits: bipolar codes are offset binary, full scale
     is VREF / gain. high_level: AIN2 of the AD7712, whose divider makes it four times that."""
     full_v = vref_v * (4 if high_level else 1) / gain
-    return full_v * (code / 2**bits if unipolar else code / 2 ** (bits - 1) - 1)
+    return full_v * (code / (1 << bits) if unipolar else code / (1 << (bits - 1)) - 1)
 
 
 @dataclass(frozen=True, slots=True)

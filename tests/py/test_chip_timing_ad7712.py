@@ -34,7 +34,7 @@ def period_tau(code: int) -> int:
 
 def chip(path: Path, word: int = control(), **options: float | str | bool) -> Ad7712:
     """A part with a control word, its first word ready; no noise."""
-    s = Ad7712(path, "ad7712", noise_scale=0, **options)
+    s = Ad7712(path, "ad7712", seed=1, noise_scale=0, **options)
     s.write(word)
     s.fall()
     return s
@@ -148,7 +148,7 @@ def test_an_unread_word_raises_drdy_before_the_next(tmp_path: Path) -> None:
 
 def driven(path: Path, **options: float | str | bool) -> tuple[Recording, int, int, int]:
     """A read of the word FFFFFFh at the very fall of DRDY: the recording, RFS low, last fall of SCLK, RFS high."""
-    with chip(path, **options) as s:
+    with chip(path, control(), **options) as s:
         s.adc.set_volts(0, 3.0)
         s.pin("A0", 1)
         for _ in range(5):

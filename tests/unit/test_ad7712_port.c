@@ -505,7 +505,7 @@ static void pulses_outside_of_frames_do_nothing(void **state)
     ad7712_sclk_pin(&r.a, true, r.s.now_ns);
     wait_ns(&r, 10);
     tfs(&r, false);
-    ad7712_sdata_pin(&r.a, true, r.s.now_ns); /* within 30 ns of a rise that took no bit */
+    ad7712_sdata_pin(&r.a, !r.a.port.sdata, r.s.now_ns); /* within 30 ns of a rise that took no bit */
     wait_ns(&r, 400);
     ad7712_sclk_pin(&r.a, false, r.s.now_ns);
     assert_int_equal(breaches(&r), 0);
