@@ -469,6 +469,17 @@ static void control_words_go_out_and_come_back(void **state)
     assert_int_equal(rig.b.counters.commands, 4);
 }
 
+static void the_other_input_is_not_connected(void **state)
+{
+    (void)state;
+    struct psd1_request q;
+    const struct psd1_profile p = rig_exact();
+    rig_up(&rig, &p);
+    assert_int_equal(command(&rig, &q, PSD1_CMD_UC2, AD7712_CONTROL(AD7712_NORMAL, 0, 0, 0, 0, 19)), BOARD_CYCLE_OK);
+    rig_run(&rig, 10000000);
+    for (unsigned i = 0; i < 3; i++) assert_int_equal(rig.cycle[rig.cycles - 1].word[i], 32768);
+}
+
 static void uc1_calibrates_anew(void **state)
 {
     (void)state;
@@ -576,12 +587,13 @@ static void a_control_word_is_read_after_a_cut(void **state)
     (void)state;
     for (int64_t before_ns = 0; before_ns < 400; before_ns += 133) {
         struct psd1_request q;
-        const struct psd1_profile p = no_host();
+        struct psd1_profile p = no_host();
+        p.adc_fs = 200; /* no word comes meanwhile */
         rig_up(&rig, &p);
         rig_await(&rig, PSD1_READY);
         rig_until(&rig, rig.b.fl2_ns + 799 - before_ns);
-        assert_int_equal(command(&rig, &q, PSD1_CMD_CONTROL + 1, 0), BOARD_CYCLE_OK);
-        assert_int_equal(q.word, 0x020013);
+        assert_int_equal(command(&rig, &q, PSD1_CMD_CONTROL, 0), BOARD_CYCLE_OK);
+        assert_int_equal(q.word, 0x0200C8);
         assert_int_equal(rig.b.counters.cut, 1);
         for (unsigned i = 0; i < 3; i++) assert_int_equal(rig.b.adc[i].n.a0_violations, 0);
     }
@@ -862,6 +874,7 @@ int main(void)
         cmocka_unit_test(late_begins_after_late_ns),
         cmocka_unit_test(a0_may_fall_where_rfz_rises),
         cmocka_unit_test(control_words_go_out_and_come_back),
+        cmocka_unit_test(the_other_input_is_not_connected),
         cmocka_unit_test(uc1_calibrates_anew),
         cmocka_unit_test(words_that_the_cycle_cannot_live_with_are_refused),
         cmocka_unit_test(commands_come_one_after_the_other_and_between_cycles),

@@ -174,6 +174,15 @@ static void flags_of_a_cycle_on_the_wire(void **state)
     const uint32_t lost = get(PSD1_OD_COUNTERS, 20);
     assert_in_range(rig.b.counters.lost_z - lost, 0, 3);
     assert_true(lost > 10);
+    p.host_strobe_ns = 30000; /* late, and no more */
+    start(&p, 1000000);
+    operational();
+    rig_run(&rig, 30000000);
+    wire.count = 0;
+    rig_run(&rig, 10000000);
+    assert_int_equal(psabench_psd1_cycle_unpack(&w, wire.seen[0].data, 8), 0);
+    assert_int_equal(w.late, 1);
+    assert_int_equal(w.overrun + w.mixed + w.clip, 0);
 }
 
 static void control_words_by_sdo(void **state)
