@@ -135,7 +135,7 @@ def test_nr_between_two_calibrations() -> None:
 
 
 def test_figures_of_the_article() -> None:
-    """Sources 4.2: Ur 5.106 V, Nr 16733, 2.87e-6 V s and 2.34e-5 m/s a code, 0.392 m/s a reset."""
+    """Sources, instruments 4.2: Ur 5.106 V, Nr 16733, 2.87e-6 V s and 2.34e-5 m/s a code, 0.392 m/s a reset."""
     ur_v = 10.0 * TS_S / 2 / (10e3 * 0.47e-6)
     assert ur_v == pytest.approx(5.106, abs=5e-4)
     nr = ur_v / est.CODE_V

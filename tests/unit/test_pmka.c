@@ -106,7 +106,7 @@ static void full_scale_is_a_reset_a_period(void **state)
     }
 }
 
-/* Sources 4.2: Ur 5.106 V, Nr 16733, 2.87e-6 V s a code. */
+/* Sources, instruments 4.2: Ur 5.106 V, Nr 16733, 2.87e-6 V s a code. */
 static void figures_of_the_article(void **state)
 {
     (void)state;
