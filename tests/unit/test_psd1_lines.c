@@ -260,14 +260,41 @@ static void cycles_equal(const struct rig *a, const struct rig *b)
     }
 }
 
-static void ignore(void *ctx, const struct trace_step *s, unsigned n)
+static struct rig third; /* records only */
+
+/* What `got` heard from from_ns on, in the lines of its mask, is what was heard from the beginning; level: of its beginning. */
+static void heard_the_same(const struct rig *all, struct rig *got, unsigned first, int64_t from_ns, bool *level)
 {
-    (void)ctx;
-    (void)s;
-    (void)n;
+    unsigned at = first;
+    for (unsigned i = 0; i < all->edges; i++) {
+        const struct rig_edge *e = &all->edge[i];
+        if (!(got->sink.mask >> e->sig & 1) || e->t_ns <= from_ns) continue;
+        if (at >= got->edges || got->edge[at].t_ns != e->t_ns)
+            fail_msg("from %lld: %s at %lld", (long long)from_ns, psd1_lines[e->sig].name, (long long)e->t_ns);
+        unsigned j = at; /* order at one instant is free */
+        while (j < got->edges && got->edge[j].t_ns == e->t_ns && got->edge[j].sig != e->sig) j++;
+        assert_true(j < got->edges && got->edge[j].sig == e->sig && got->edge[j].level == e->level);
+        got->edge[j] = got->edge[at++];
+        if (level[e->sig] == e->level)
+            fail_msg("from %lld: %s began wrong", (long long)from_ns, psd1_lines[e->sig].name);
+        level[e->sig] = e->level;
+    }
+    assert_int_equal(at, got->edges);
 }
 
-/* Whoever comes at any instant, for whichever lines, alone or while another listens to others, hears from then on what one hears who was there from the beginning. */
+/* Attaches; the levels that it is told at once are its beginning. */
+static unsigned join(struct rig *board, struct rig *ear, uint64_t mask, bool *level)
+{
+    ear->sink = (struct trace_sink){.mask = mask, .steps = rig_steps, .ctx = ear};
+    ear->edges = 0;
+    trace_advance(&board->b.trace, board->s.now_ns);
+    trace_attach(&board->b.trace, &ear->sink);
+    for (unsigned i = 0; i < ear->edges; i++) level[ear->edge[i].sig] = ear->edge[i].level;
+    return ear->edges;
+}
+
+/* Whoever comes at any instant, for whichever lines, alone or while another listens to others, hears from then on what one
+ * hears who was there from the beginning. */
 static void late_listeners_hear_the_same(void **state)
 {
     (void)state;
@@ -284,39 +311,23 @@ static void late_listeners_hear_the_same(void **state)
     psd1_power_up(&rig.b, 0);
     rig_until(&rig, 12000000);
     trace_advance(&rig.b.trace, rig.s.now_ns);
-    for (unsigned k = 0; k < 200; k++) {
-        const uint64_t mask = masks[k % COUNT(masks)];
-        const int64_t from_ns = 9500000 + (int64_t)(rng_uniform(&rng) * 1500000.0);
+    for (unsigned k = 0; k < 300; k++) {
+        const bool inside = k % 4 < 3; /* of a cycle */
+        const int64_t from_ns =
+            (inside ? rig.cycle[0].t_a0_ns : 9500000) + (int64_t)(rng_uniform(&rng) * (inside ? 48400.0 : 1500000.0));
+        const int64_t early_ns = from_ns - (int64_t)(rng_uniform(&rng) * 10000.0);
+        bool level[2][PSD1_LINES] = {{false}};
         rig_init(&other, &p, 1.0);
         psd1_power_up(&other.b, 0);
-        struct trace_sink early = {.mask = masks[k / 5 % COUNT(masks)], .steps = ignore};
-        if (k % 2) rig_until(&other, from_ns - (int64_t)(rng_uniform(&rng) * 30000.0));
-        if (k % 2) trace_attach(&other.b.trace, &early);
+        rig_until(&other, early_ns);
+        const bool two = k & 1;
+        const unsigned before = two ? join(&other, &third, masks[k / 5 % COUNT(masks)], level[1]) : 0;
         rig_until(&other, from_ns);
-        trace_advance(&other.b.trace, from_ns);
-        other.sink.mask = mask;
-        trace_attach(&other.b.trace, &other.sink);
-        bool level[PSD1_LINES] = {false};
-        for (unsigned i = 0; i < other.edges; i++) level[other.edge[i].sig] = other.edge[i].level;
-        const unsigned first = other.edges;
+        const unsigned first = join(&other, &other, masks[k % COUNT(masks)], level[0]);
         rig_until(&other, 12000000);
         trace_advance(&other.b.trace, other.s.now_ns);
-        unsigned at = first;
-        for (unsigned i = 0; i < rig.edges; i++) {
-            const struct rig_edge *e = &rig.edge[i];
-            if (!(mask >> e->sig & 1)) continue;
-            if (e->t_ns <= from_ns) continue;
-            if (at >= other.edges || other.edge[at].t_ns != e->t_ns)
-                fail_msg("run %u from %lld: %s at %lld", k, (long long)from_ns, psd1_lines[e->sig].name,
-                         (long long)e->t_ns);
-            unsigned j = at; /* order at one instant is free */
-            while (j < other.edges && other.edge[j].t_ns == e->t_ns && other.edge[j].sig != e->sig) j++;
-            assert_true(j < other.edges && other.edge[j].sig == e->sig && other.edge[j].level == e->level);
-            other.edge[j] = other.edge[at++];
-            if (level[e->sig] == e->level) fail_msg("run %u: %s began wrong", k, psd1_lines[e->sig].name);
-            level[e->sig] = e->level;
-        }
-        assert_int_equal(at, other.edges);
+        heard_the_same(&rig, &other, first, from_ns, level[0]);
+        if (two) heard_the_same(&rig, &third, before, early_ns, level[1]);
         assert_int_equal(other.b.trace.late + other.b.trace.dropped, 0);
     }
     cycles_equal(&rig, &other);
