@@ -109,7 +109,7 @@ class Motion:
         h = self.t_s[1] - self.t_s[0]
         k = np.clip(((t_s - self.t_s[0]) / h).astype(np.int64), 0, len(self.t_s) - 2)
         x = ((t_s - self.t_s[k]) / h)[:, None]
-        slope = np.gradient(of, h, axis=0) if of is not self.v_mps else self.a_mps2
+        slope = np.gradient(of, h, axis=0, edge_order=2) if of is not self.v_mps else self.a_mps2
         p0, p1, m0, m1 = of[k], of[k + 1], slope[k] * h, slope[k + 1] * h
         return np.asarray(
             (1 + 2 * x) * (1 - x) ** 2 * p0 + x * (1 - x) ** 2 * m0 + x**2 * (3 - 2 * x) * p1 + x**2 * (x - 1) * m1
@@ -119,7 +119,7 @@ class Motion:
 def integrate(t_s: Floats, a_mps2: Floats) -> Floats:
     """Integral from the first instant on, shape like a: trapezoids with the correction of their ends (fourth order)."""
     h = float(t_s[1] - t_s[0])
-    slope = np.gradient(a_mps2, h, axis=0)
+    slope = np.gradient(a_mps2, h, axis=0, edge_order=2)
     steps = 0.5 * h * (a_mps2[1:] + a_mps2[:-1]) - h * h / 12.0 * (slope[1:] - slope[:-1])
     return np.concatenate([np.zeros((1, a_mps2.shape[1])), np.cumsum(steps, axis=0)])
 
