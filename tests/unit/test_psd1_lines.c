@@ -282,12 +282,12 @@ static void heard_the_same(const struct rig *all, struct rig *got, unsigned firs
     assert_int_equal(at, got->edges);
 }
 
-/* Attaches; the levels that it is told at once are its beginning. */
-static unsigned join(struct rig *board, struct rig *ear, uint64_t mask, bool *level)
+/* Attaches; the levels that it is told at once are its beginning, if the trace has moved on to now. */
+static unsigned join(struct rig *board, struct rig *ear, uint64_t mask, bool *level, bool now)
 {
     ear->sink = (struct trace_sink){.mask = mask, .steps = rig_steps, .ctx = ear};
     ear->edges = 0;
-    trace_advance(&board->b.trace, board->s.now_ns);
+    if (now) trace_advance(&board->b.trace, board->s.now_ns);
     trace_attach(&board->b.trace, &ear->sink);
     for (unsigned i = 0; i < ear->edges; i++) level[ear->edge[i].sig] = ear->edge[i].level;
     return ear->edges;
@@ -320,13 +320,13 @@ static void late_listeners_hear_the_same(void **state)
         rig_init(&other, &p, 1.0);
         psd1_power_up(&other.b, 0);
         rig_until(&other, early_ns);
-        const bool two = k & 1;
-        const unsigned before = two ? join(&other, &third, masks[k / 5 % COUNT(masks)], level[1]) : 0;
+        const bool two = k & 1, now = k % 8 != 7; /* else: what is heard before from_ns is not looked at */
+        const unsigned before = two ? join(&other, &third, masks[k / 5 % COUNT(masks)], level[1], true) : 0;
         rig_until(&other, from_ns);
-        const unsigned first = join(&other, &other, masks[k % COUNT(masks)], level[0]);
+        const unsigned first = join(&other, &other, masks[k % COUNT(masks)], level[0], now);
         rig_until(&other, 12000000);
         trace_advance(&other.b.trace, other.s.now_ns);
-        heard_the_same(&rig, &other, first, from_ns, level[0]);
+        if (now) heard_the_same(&rig, &other, first, from_ns, level[0]);
         if (two) heard_the_same(&rig, &third, before, early_ns, level[1]);
         assert_int_equal(other.b.trace.late + other.b.trace.dropped, 0);
     }
