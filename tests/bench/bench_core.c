@@ -107,6 +107,14 @@ static void watch(struct bench *n)
     trace_attach(n->trace, &n->sink);
 }
 
+/* What happens in a cycle, without the clock that runs all the time. */
+static void watch_but_clock(struct bench *n)
+{
+    const uint64_t clock = TRACE_BIT((unsigned)trace_find(n->trace, "CLK_1M25"));
+    n->sink = (struct trace_sink){.mask = TRACE_FIRST(n->trace->count) & ~clock, .steps = count, .ctx = n};
+    trace_attach(n->trace, &n->sink);
+}
+
 /* The whole board with a recording of all its lines. */
 static void record(struct bench *n)
 {
@@ -163,7 +171,8 @@ static const struct bench_case {
     {"vcd", power_up, ADS1282_CHAIN_DIRECT, tape_then_record,
      replay}, /* the VCD writer alone, fed with the edges of frames */
     {"psd1-unwatched", power_up_psd1, ADS1282_CHAIN_EXACT, NULL, run_frames},
-    {"psd1-watched", power_up_psd1, ADS1282_CHAIN_EXACT, watch, run_frames}, /* all lines, 1M25 among them */
+    {"psd1-cycle", power_up_psd1, ADS1282_CHAIN_EXACT, watch_but_clock, run_frames}, /* all lines but 1M25 */
+    {"psd1-watched", power_up_psd1, ADS1282_CHAIN_EXACT, watch, run_frames},         /* all lines, 1M25 among them */
 };
 
 static void power_up(struct bench *n, enum ads1282_chain chain)

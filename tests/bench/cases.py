@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
-from tests.bench.peers import Peer, run
+from tests.bench.peers import NAMES, PSD1, Peer, run
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -81,11 +81,12 @@ def has_cases(exe: Path) -> set[str]:
 
 def all_cases(bench: Path, peers: dict[str, Peer]) -> list[Case]:
     """In the order of a round."""
-    icarus, timing, driven = (peers[name] for name in ("icarus", "verilator-timing", "verilator"))
+    icarus, timing, driven, psd1 = (peers[name] for name in (*NAMES, PSD1))
     cases = [
         Case("icarus", "frames", partial(timed, icarus), 500, icarus.command, (5, 25)),
         Case("verilator-timing", "frames", partial(timed, timing), 5000, timing.command),
         Case("verilator", "frames", partial(printed, driven.command), 20000, driven.command, (1000, 3000)),
+        Case(PSD1, "frames", partial(printed, psd1.command), 1000, psd1.command, (50, 150)),
     ]
     for exe, unit in (("bench_core", "frames"), ("bench_lib", "bytes")):
         path = bench / exe

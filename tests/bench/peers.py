@@ -1,4 +1,4 @@
-"""The Verilog models of a PSA-2 frame: built with Icarus and Verilator, and proved to do what the emulated board does.
+"""The Verilog models of PSA-2's frame and PSD-1's cycle, built and proved to do what the emulated boards do.
 
 A peer is worth a comparison only if it computes the same thing: the words of 512 frames of the emulated board are
 played through each model, and the checksum of the words taken from the lines, and number and instants (in periods of
@@ -18,6 +18,10 @@ MODEL = [HERE / "verilog" / name for name in ("psa2.v", "kpsa.v", "adc_port.v")]
 BENCH = HERE / "verilog/psa2_tb.v"
 DRIVER = HERE / "verilog/psa2_drive.cpp"
 NAMES = ("icarus", "verilator-timing", "verilator")
+PSD1_MODEL = [HERE / "verilog" / name for name in ("psd1.v", "kpsd1.v", "ad7712_port.v")]
+PSD1_DRIVER = HERE / "verilog/psd1_drive.cpp"
+PSD1 = "verilator-psd1"
+PSA2_LINES, PSD1_LINES = 9, 34
 ROWS = 512  # frames in the file of words; psa2_tb.v has the same number
 
 # AVX-512 is left out because valgrind 3.19 cannot run it; without it the driver is as fast (docs/performance.md).
@@ -36,11 +40,12 @@ class Peer:
     timed: tuple[str, ...]
     checked: tuple[str, ...]
     plus: str  # how the number of frames is written on the command line
+    after: tuple[str, ...] = ()  # what comes behind it
 
     def command(self, frames: int, *, check: bool = False) -> list[str]:
         if self.plus:
             return [*(self.checked if check else self.timed), f"{self.plus}{frames}"]
-        return [*self.timed, str(frames), *(["check"] if check else [])]
+        return [*self.timed, str(frames), *self.after, *(["check"] if check else [])]
 
 
 def run(command: Sequence[str | Path], **kw: str) -> str:
@@ -52,8 +57,18 @@ def run(command: Sequence[str | Path], **kw: str) -> str:
 
 
 def build(out: Path, words: Path) -> dict[str, Peer]:
-    """All three peers, in out; built anew only if a source is newer."""
+    """All three peers of PSA-2, in out; built anew only if a source is newer."""
     return {p.name: p for p in (_icarus(out, words), _timing(out, words), _driven(out, words))}
+
+
+def build_psd1(out: Path, words: Path) -> dict[str, Peer]:
+    """The peer of PSD-1. Its clock runs all the time: it is one of the lines."""
+    exe = out / "psd1/psd1_drive"
+    if _stale(exe, [PSD1_DRIVER, *PSD1_MODEL]):
+        no_delays = "-GRFS_ACCESS_NS=0"
+        options = ["-Wall", no_delays, "--top-module", "psd1", "--Mdir", str(exe.parent), "-o", exe.name]
+        run([*VERILATOR, *options, *PSD1_MODEL, PSD1_DRIVER])
+    return {PSD1: Peer(PSD1, (str(exe), str(words)), (str(exe), str(words)), "", ("clock",))}
 
 
 def _stale(made: Path, sources: Sequence[Path]) -> bool:
@@ -98,11 +113,11 @@ def facts(output: str) -> dict[str, str]:
     return found
 
 
-def prove(peers: dict[str, Peer], board: str) -> None:
-    """RuntimeError unless each peer does with the words what the board did; board: output of bench_words."""
+def prove(peers: dict[str, Peer], board: str, lines: int = PSA2_LINES) -> None:
+    """RuntimeError unless each peer does with the words what the board did; board: output of its bench_words."""
     want = facts(board)
     for peer in peers.values():
         got = facts(run(peer.command(ROWS, check=True)))
         wrong = [f"{k}: {got.get(k)}, the board has {v}" for k, v in want.items() if got.get(k) != v]
-        if len(want) != 20 or wrong:
+        if len(want) != 2 + 2 * lines or wrong:
             raise RuntimeError(f"{peer.name} does not do what the board does: {'; '.join(wrong) or want}")

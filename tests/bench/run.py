@@ -54,11 +54,11 @@ def machine() -> dict[str, str | int]:
 
 
 def summary(measured: list[Case], rounds: int) -> page.Result:
-    peer = next(c for c in measured if c.name == PEER)
+    by_name = {c.name: c for c in measured}
     rows = {}
     for c in measured:
         if c.name in peers.NAMES:  # only the driver counts while it is timed; all three were proved to make the same
-            c.edges_per_unit = peer.edges_per_unit
+            c.edges_per_unit = by_name[PEER].edges_per_unit
         row: dict[str, object] = {
             "unit": c.unit,
             "count": c.count,
@@ -69,6 +69,7 @@ def summary(measured: list[Case], rounds: int) -> page.Result:
             "ms": statistics.median(c.ns) / 1e6,
         }
         if c.unit == "frames":
+            peer = by_name[peers.PSD1 if "psd1" in c.name else PEER]
             row["times_peer"] = statistics.median(a / b for a, b in zip(c.rates, peer.rates, strict=True))
         if c.edges_per_unit:
             row["medges_per_s"] = statistics.median(c.rates) * c.edges_per_unit / 1e6
@@ -81,13 +82,15 @@ def summary(measured: list[Case], rounds: int) -> page.Result:
 def bench(seconds: float) -> page.Result:
     """Build, prove, calibrate, measure; about so many seconds of measuring."""
     OUT.mkdir(parents=True, exist_ok=True)
-    words = OUT / "words.hex"
+    words, words_psd1 = OUT / "words.hex", OUT / "words_psd1.hex"
     board = peers.run([OUT / "bench_words", words, str(peers.ROWS)])
+    board_psd1 = peers.run([OUT / "bench_psd1_words", words_psd1, str(peers.ROWS)])
     say("building the Verilog models (Icarus, Verilator)")
-    made = peers.build(OUT, words)
+    made, made_psd1 = peers.build(OUT, words), peers.build_psd1(OUT, words_psd1)
     peers.prove(made, board)
+    peers.prove(made_psd1, board_psd1, peers.PSD1_LINES)
     say(f"the models send the words of the emulated board, edge for edge: {board.partition(chr(10))[0]}")
-    todo = cases.all_cases(OUT, made)
+    todo = cases.all_cases(OUT, made | made_psd1)
     for case in todo:
         say(f"instructions: {case.name}") if case.under_callgrind else None
         cases.count_instructions(case)

@@ -16,7 +16,8 @@ from tests.bench import cases, page, peers
 DIRECT = ("frames-direct", "frames-watched-direct", "frames-vcd")  # which has no decimation chain
 ROOT = Path(__file__).resolve().parents[2]
 FRAMES = 40
-REQUIRED = {name for name in ("vcd", "frames-vcd", *page.UNWATCHED, *page.ENGINES) if name not in peers.NAMES}
+PEERS = {*peers.NAMES, peers.PSD1}
+REQUIRED = {"vcd", "frames-vcd", *page.UNWATCHED, *page.ENGINES, *page.PSD1_ENGINES} - PEERS
 
 
 def driver(name: str) -> Path:
@@ -39,6 +40,29 @@ def test_a_watched_board_sends_what_an_unwatched_one_sends(cases_of_one_chain: t
         assert run["hash"] == unwatched["hash"]
         assert int(run["edges"]) == int(watched[0]["edges"]) > FRAMES * (48 + 256 + 4)  # SClk, CLK, DRD_A, Int
     assert printed(core, cases_of_one_chain[0], FRAMES + 1)["hash"] != unwatched["hash"]
+
+
+def test_a_watched_psd_1_reads_what_an_unwatched_one_reads() -> None:
+    core = driver("bench_core")
+    unwatched, cycle, watched = (printed(core, f"psd1-{case}", FRAMES) for case in ("unwatched", "cycle", "watched"))
+    assert unwatched["hash"] == cycle["hash"] == watched["hash"]
+    assert int(unwatched["edges"]) == 0
+    assert int(cycle["edges"]) > FRAMES * (96 + 6 + 6 + 6)  # SCLK, RFX, RFY, RFZ, FL2, CS
+    assert int(watched["edges"]) >= int(cycle["edges"]) + (FRAMES - 1) * 2432  # of 1M25
+
+
+def test_the_words_for_the_model_of_psd_1_are_those_on_its_bus(tmp_path: Path) -> None:
+    words = tmp_path / "words.hex"
+    board = peers.facts(peers.run([driver("bench_psd1_words"), words, str(FRAMES)]))
+    rows = [[int(w, 16) for w in line.split()] for line in words.read_text().splitlines()]
+    assert len(rows) == FRAMES
+    checksum = 0
+    for word in (w for row in rows for w in row):
+        checksum = (checksum * 31 + word) & 0xFFFFFFFF
+    assert board["checksum"] == f"{checksum:08x}"
+    edges = [int(board[f"edges of line {i}"]) for i in range(peers.PSD1_LINES)]
+    per_cycle = {0: 2, 3: 6, 4: 2, 5: 2, 6: 2, 7: 2, 8: 0, 9: 96, 11: 2432, 12: 6}  # A0 FL2 DR RFX.. TFS SCLK 1M25 CS
+    assert {i: edges[i] for i in per_cycle} == {i: n * FRAMES for i, n in per_cycle.items()}
 
 
 def test_every_case_of_the_board_runs() -> None:

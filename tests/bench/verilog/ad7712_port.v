@@ -9,7 +9,9 @@ module ad7712_port #(
 ) (
     input        update,  // its fall ends a conversion; while it is high, an old word is no longer offered
     input [15:0] word,    // the one that waits
-    input        rfs_n,
+    /* verilator lint_off SYNCASYNCNET */
+    input        rfs_n,   // it clocks and it resets, as in the part
+    /* verilator lint_on SYNCASYNCNET */
     input        sclk,
     output       sdata,   // low in high impedance: three parts share the wire
     output       drdy_n

@@ -53,7 +53,9 @@ module kpsd1 (
         end
 
     // ---- shift register RK and its clock, which is gated while it is low
-    reg  [23:0] rk = 24'd0;
+    /* verilator lint_off UNUSEDSIGNAL */
+    reg  [23:0] rk = 24'd0;  // 24 bits for control words, which are not written here
+    /* verilator lint_on UNUSEDSIGNAL */
     assign sclk = clk_3_8 & run;
 
     always @(negedge clk_3_8) run <= busy && bits != 5'd16;
