@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -106,6 +107,10 @@ def test_resolution_and_noise_of_a_staircase() -> None:
     assert f.step_mps[1] == np.inf
     assert f.noise_mps[2] == pytest.approx(quantum_mps / np.sqrt(12.0), rel=0.1)
     assert f.noise_mps[1] < 1e-9
+    shaken = track("psa2", m)
+    wobble = np.random.default_rng(1).normal(0.0, 1e-7, shaken.s_vs.shape)
+    f = measured.figures(replace(shaken, s_vs=shaken.s_vs + wobble), PARAMS, G_MPS2)
+    assert np.all(f.step_mps == np.inf)  # no grid, no step
 
 
 def test_truth_log_of_one_unit(tmp_path: Path) -> None:
