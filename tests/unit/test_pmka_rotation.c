@@ -6,7 +6,7 @@ static struct rig rig;
 static struct pmka_profile short_beats(enum pmka_mode mode)
 {
     struct pmka_profile p = rig_ideal();
-    p.rotation = mode;
+    p.rotation = (int)mode;
     p.beat_periods = 12;
     p.zero_periods = 5;
     return p;
