@@ -56,6 +56,7 @@ module psa2_edges_tb;
         edges = $fopen(edges_name, "w");
         #end_ns;
         $fclose(edges);
+        edges = 0;
         $finish;
     end
     initial begin

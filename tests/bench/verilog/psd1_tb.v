@@ -41,6 +41,7 @@ module psd1_tb;
         edges = $fopen(edges_name, "w");
         #end_ns;
         $fclose(edges);
+        edges = 0;
         $finish;
     end
 
