@@ -139,22 +139,23 @@ static void write_flags(struct psd1 *b, uint16_t data, int64_t t_ns)
 
 /* ---- register COMMAND ---- */
 
-/* What a command shows at once in UC_HIGH and UC_LOW; NULL: it is none of those. */
-static const uint32_t *shown(const struct psd1 *b, unsigned command)
+/* What a command shows at once in UC_HIGH and UC_LOW; false: it is none of those. */
+static bool shown(const struct psd1 *b, unsigned command, uint32_t *word)
 {
-    const unsigned axis = command & PSD1_CMD_AXIS;
-    if (command == PSD1_CMD_SHOW_UC1) return &b->uc1;
-    if (command == PSD1_CMD_SHOW_UC2) return &b->uc2;
-    if (axis > 2) return NULL;
-    if (command - axis == PSD1_CMD_ZERO) return &b->zero[axis];
-    return command - axis == PSD1_CMD_FULL ? &b->full[axis] : NULL;
+    const unsigned axis = command & PSD1_CMD_AXIS, kind = command - axis;
+    const bool uc = command == PSD1_CMD_SHOW_UC1 || command == PSD1_CMD_SHOW_UC2;
+    const bool coef = axis < 3 && (kind == PSD1_CMD_ZERO || kind == PSD1_CMD_FULL);
+    if (uc) *word = command == PSD1_CMD_SHOW_UC1 ? b->uc1 : b->uc2;
+    if (coef) *word = kind == PSD1_CMD_ZERO ? b->zero[axis] : b->full[axis];
+    return uc || coef;
 }
 
 static enum board_cycle_result check_command(const struct psd1 *b, uint16_t data)
 {
     const char *why = NULL;
+    uint32_t word;
     if (data > 255) return BOARD_CYCLE_BAD_VALUE;
-    if (shown(b, data)) return BOARD_CYCLE_OK;
+    if (shown(b, data, &word)) return BOARD_CYCLE_OK;
     return psd1_request_check(b, (uint8_t)data, b->staged, &why);
 }
 
@@ -169,13 +170,9 @@ static void own_done(void *ctx, struct psd1_request *r, enum board_cycle_result 
 static void write_command(struct psd1 *b, uint16_t data, int64_t t_ns)
 {
     const char *why = NULL;
-    const uint32_t *const word = shown(b, data);
     b->last_command = (uint8_t)data;
     b->job.failed = false;
-    if (word) {
-        b->staged = *word;
-        return;
-    }
+    if (shown(b, data, &b->staged)) return;
     b->job.own = (struct psd1_request){.command = (uint8_t)data, .word = b->staged, .done = own_done, .ctx = b};
     b->job.failed = psd1_request(b, &b->job.own, &why, t_ns) != BOARD_CYCLE_OK; /* somebody else's came meanwhile */
 }

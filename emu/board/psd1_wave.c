@@ -1,5 +1,7 @@
 /* What moves all the time or in long rows: 1M25, and SCLK and SDAT of a frame. Reported while somebody looks, from forms that
  * are laid out once: a copy with the word's bits in it, a few instructions an edge. */
+#include "board/psd1_wave.h"
+
 #include "board/psd1_parts.h"
 
 #define CLK    PSD1_BIT(CLK)
