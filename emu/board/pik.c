@@ -1,3 +1,5 @@
+#include "board/pik.h"
+
 #include "board/pik_parts.h"
 
 #include <math.h>
