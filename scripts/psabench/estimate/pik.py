@@ -39,7 +39,7 @@ def implied_scale_v_per_g(k_hz_per_v: float, sv_mps: float, g_mps2: float) -> fl
 
 
 def unwrapped(totals: Sequence[float] | Floats, bits: int = COUNTER_BITS) -> Floats:
-    """Totals of a counter that wraps, as they would be if it did not; shape (n,). Steps beyond half its range mislead."""
+    """Totals of a counter that wraps, as if it did not; shape (n,). Steps beyond half its range mislead."""
     t = np.asarray(totals, dtype=np.float64)
     if len(t) == 0:
         return t
