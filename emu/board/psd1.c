@@ -164,7 +164,6 @@ static void on_drdy(void *ctx, bool level, int64_t t_ns)
     const struct psd1_port *port = ctx;
     struct psd1 *b = port->b;
     b->drdy[port->axis] = level;
-    if (port->axis != 0 && b->profile.dr == PSD1_DR_X) return;
     const bool dr = dr_of(b);
     if (dr == b->dr || b->phase == PSD1_OFF) return;
     b->dr = dr;
@@ -268,7 +267,9 @@ static void init_adc(struct psd1 *b)
     for (unsigned i = 0; i < 3; i++) {
         const struct ad7712_cfg cfg = adc_cfg(b, i);
         b->port[i] = (struct psd1_port){b, i};
-        const struct ad7712_io io = {.ctx = &b->port[i], .vin_v = vin_v, .vin_row_v = vin_row_v, .drdy = on_drdy};
+        const bool heard = i == 0 || b->profile.dr != PSD1_DR_X; /* else its DRDY is not connected */
+        const struct ad7712_io io = {
+            .ctx = &b->port[i], .vin_v = vin_v, .vin_row_v = vin_row_v, .drdy = heard ? on_drdy : NULL};
         ad7712_init(&b->adc[i], &cfg, &io, b->sched, rng_stream(b->unit.seed, b->unit.serial, adc_noise[i]));
         afe_init(&b->afe[i], &b->unit.afe[i], rng_stream(b->unit.seed, b->unit.serial, afe_noise[i]));
         b->drdy[i] = true;

@@ -137,7 +137,7 @@ int64_t psd1_coef_a0(struct psd1 *b, int64_t t_ns)
 static bool word_waits(const struct psd1 *b)
 {
     const struct psd1_job *j = &b->job;
-    return j->at->op == CONTROL && !j->data_first && !b->drdy[j->axis];
+    return j->at->op == CONTROL && !j->data_first && !ad7712_drdy(&b->adc[j->axis]);
 }
 
 int64_t psd1_coef_fall(struct psd1 *b, int64_t t_ns)

@@ -76,7 +76,8 @@ struct ad7712_io {
     void (*vin_row_v)(void *ctx, unsigned channel, const int64_t *t_ns, unsigned n, double *vin_v);
     /* Resistance behind it, INFINITY: nothing connected. NULL: 0, loads and currents do not matter. */
     double (*source_ohm)(void *ctx, unsigned channel, int64_t t_ns);
-    void (*drdy)(void *ctx, bool level, int64_t t_ns);  /* DRDY pin, active low; called on changes only */
+    /* DRDY pin, active low; called on changes only. NULL: not connected; inside it then rises as soon as a word is taken. */
+    void (*drdy)(void *ctx, bool level, int64_t t_ns);
     void (*sdata)(void *ctx, bool level, int64_t t_ns); /* NULL, or changes of SDATA as the chip drives it */
     void (*sclk)(void *ctx, bool level, int64_t t_ns);  /* NULL, or changes of SCLK in self-clocking mode */
 };

@@ -40,7 +40,7 @@ void ad7712_set_drdy(struct ad7712 *a, bool level, int64_t t_ns)
     sched_cancel(a->sched, &a->rise_ev);
     if (level == a->drdy) return;
     a->drdy = level;
-    if (!a->fault.drdy) a->io.drdy(a->io.ctx, level, t_ns);
+    if (!a->fault.drdy && a->io.drdy) a->io.drdy(a->io.ctx, level, t_ns);
 }
 
 static void on_rise(void *ctx, int64_t t_ns)

@@ -20,7 +20,7 @@ void ad7712_fault(struct ad7712 *a, const struct ad7712_fault *f, int64_t t_ns)
     assert(f->clock_ppm >= -500000 && f->clock_ppm <= 500000);
     const bool drdy = ad7712_drdy(a), sdata = ad7712_sdata(a, t_ns);
     a->fault = *f;
-    if (ad7712_drdy(a) != drdy) a->io.drdy(a->io.ctx, !drdy, t_ns);
+    if (ad7712_drdy(a) != drdy && a->io.drdy) a->io.drdy(a->io.ctx, !drdy, t_ns);
     if (a->io.sdata && ad7712_sdata(a, t_ns) != sdata) a->io.sdata(a->io.ctx, !sdata, t_ns);
     set_clock(a, a->cfg.clkin_hz + (int64_t)a->cfg.clkin_hz * f->clock_ppm / 1000000, t_ns);
     ad7712_follow_pins(a, t_ns); /* a broken SYNC is held high by its pull-up */
