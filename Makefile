@@ -277,4 +277,5 @@ help:
 	@sed -n 's/^## \([a-z_.0-9-]*\): \(.*\)/  \1|\2/p' Makefile | while IFS='|' read -r t d; do printf '%-24s %s\n' "$$t" "$$d"; done
 
 -include $(BENCH_BIN:$(BUILD)/bench/%=$(BUILD)/obj/tests/bench/%.d)
+-include $(FUZZ_BIN:$(BUILD)/fuzz/%=$(BUILD)/obj/tests/fuzz/%.d)
 -include $(OBJ:.o=.d) $(TEST_BIN:$(BUILD)/tests/%=$(BUILD)/obj/tests/unit/%.d)
