@@ -7,9 +7,16 @@
 
 /* ---- the controller's event ---- */
 
+/* SYNC of the three converters: Res drives it, so that they are in step after it (article: synchronised; how is E0). */
+static void sync(struct psd1 *b, bool level, int64_t t_ns)
+{
+    for (unsigned i = 0; i < 3; i++) ad7712_sync_pin(&b->adc[i], level, t_ns);
+}
+
 /* Power and resets are over: the set-up begins. */
 static int64_t reset_over(struct psd1 *b, int64_t t_ns)
 {
+    sync(b, true, t_ns);
     psd1_job_setup(b);
     return psd1_job_next(b, t_ns);
 }
@@ -321,6 +328,7 @@ static void stop_all(struct psd1 *b, enum board_cycle_result why, int64_t t_ns)
 static void enter_reset(struct psd1 *b, int64_t t_ns)
 {
     stop_all(b, BOARD_CYCLE_OFF, t_ns);
+    sync(b, false, t_ns);
     psd1_due(b, PSD1_IN_RESET, t_ns + b->profile.reset_ns);
     psd1_arm_patience(b, t_ns);
 }

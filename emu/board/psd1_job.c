@@ -45,6 +45,15 @@ static int64_t finish(struct psd1 *b, int64_t t_ns)
     return b->due_ns;
 }
 
+/* A converter with an unread word gives that for its control word (sources 3.4), and no line says so: its DRDY rises before an
+ * update, DR may be another's. So the word goes first, always. */
+static int64_t word_first(struct psd1 *b, int64_t t_ns)
+{
+    b->job.data_first = true;
+    b->phase = PSD1_COEF_A0;
+    return psd1_next_rise(b, t_ns);
+}
+
 int64_t psd1_job_next(struct psd1 *b, int64_t t_ns)
 {
     struct psd1_job *j = &b->job;
@@ -62,8 +71,7 @@ int64_t psd1_job_next(struct psd1 *b, int64_t t_ns)
         return psd1_next_rise(b, t_ns);
     case CONTROL:
         j->axis = j->request->command & PSD1_CMD_AXIS;
-        b->phase = PSD1_COEF_FALL;
-        return psd1_next_fall(b, t_ns + PSD1_HALF_NS); /* A0 may have fallen just now */
+        return word_first(b, t_ns);
     default:
         return finish(b, t_ns);
     }
@@ -133,22 +141,18 @@ int64_t psd1_coef_a0(struct psd1 *b, int64_t t_ns)
     return t_ns + PSD1_HALF_NS;
 }
 
-/* A converter whose word waits gives that word for its control word (sources 3.4): the word goes first. */
-static bool word_waits(const struct psd1 *b)
+/* DR has fallen since the word was read: there is another one. */
+static bool word_came(const struct psd1 *b)
 {
     const struct psd1_job *j = &b->job;
-    return j->at->op == CONTROL && !j->data_first && !ad7712_drdy(&b->adc[j->axis]);
+    return j->at->op == CONTROL && !j->data_first && b->dr_ns >= j->word_ns;
 }
 
 int64_t psd1_coef_fall(struct psd1 *b, int64_t t_ns)
 {
     struct psd1_job *j = &b->job;
     const struct ad7712_sclk sclk = psd1_sclk(t_ns);
-    if (word_waits(b)) {
-        j->data_first = true;
-        b->phase = PSD1_COEF_A0;
-        return psd1_next_rise(b, t_ns);
-    }
+    if (word_came(b)) return word_first(b, t_ns);
     psd1_rf(b, j->axis, false, t_ns);
     const uint32_t word = ad7712_read_word(&b->adc[j->axis], j->data_first ? 16 : 24, &sclk);
     psd1_frame_begin(b, j->data_first ? PSD1_FORM_READ16 : PSD1_FORM_READ24, word, t_ns);
@@ -175,6 +179,7 @@ int64_t psd1_coef_rise(struct psd1 *b, int64_t t_ns)
     b->phase = PSD1_COEF_FALL;
     if (j->data_first) {
         j->data_first = false;
+        j->word_ns = t_ns;
         psd1_a0(b, false, t_ns);
         return t_ns + PSD1_PERIOD_NS;
     }

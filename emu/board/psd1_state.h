@@ -45,7 +45,8 @@ struct psd1_job {
     struct psd1_request own;        /* of register COMMAND */
     bool waits;                     /* for the end of the cycle */
     unsigned axis;                  /* that is being read */
-    bool data_first;                /* its waiting word must go before its control word can be read */
+    bool data_first;                /* its word is read, that its control word can be */
+    int64_t word_ns;                /* when that was over */
     bool failed;                    /* the latest of register COMMAND */
     struct sched_ev ev;             /* the end of its patience with the cycle */
 };

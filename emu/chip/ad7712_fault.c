@@ -4,6 +4,17 @@
 
 #include <assert.h>
 
+/* Its own frequency is that of the board's oscillator, whose edges have gone on meanwhile: back to them. Counts that are kept
+ * move with the number of the edge. */
+static void back_to_own(struct ad7712 *a, int64_t edge, int64_t at_ns)
+{
+    a->clkin = (struct clk){.hz = a->cfg.clkin_hz, .div = 1};
+    const int64_t shift = clk_count_at(&a->clkin, at_ns) - edge;
+    a->start_tau += shift;
+    a->look.k += shift;
+    a->due.k += shift;
+}
+
 /* From the next edge on, which keeps its instant and its number. */
 static void set_clock(struct ad7712 *a, int64_t hz, int64_t t_ns)
 {
@@ -11,7 +22,8 @@ static void set_clock(struct ad7712 *a, int64_t hz, int64_t t_ns)
     ad7712_sample_until(a, t_ns);
     const int64_t edge = clk_count_at(&a->clkin, t_ns);
     const int64_t at_ns = clk_edge_ns(&a->clkin, edge);
-    a->clkin = (struct clk){.t0_ns = at_ns - clk_span_ns(hz, edge), .hz = hz, .div = 1};
+    if (hz == a->cfg.clkin_hz) back_to_own(a, edge, at_ns);
+    else a->clkin = (struct clk){.t0_ns = at_ns - clk_span_ns(hz, edge), .hz = hz, .div = 1};
     ad7712_retime(a);
 }
 

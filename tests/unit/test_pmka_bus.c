@@ -112,6 +112,51 @@ static void the_rom_has_the_specimen(void **state)
     near(asymmetry / 4.0, 200e-6, 250e-6); /* sd of the mean 70 ppm */
 }
 
+/* Mean error of CT in the ROM of an integrator, relative; rounding hides in the mean of 14 words. */
+static double ct_error(unsigned i)
+{
+    const struct pmka_int_cfg *c = &rig.b.channel[i].integrator.cfg;
+    double sum = 0.0;
+    for (unsigned p = 0; p < 7; p++) {
+        const double degc = -40.0 + 20.0 * p, dt = degc - 25.0;
+        const double uref = rig.b.specimen.uref_v + rig.b.specimen.uref_tc_v_per_k * dt;
+        for (unsigned s = 0; s < 2; s++)
+            sum += (int16_t)rig.b.rom[6 + 3 * (7 * i + p) + s] / 4194304.0 -
+                   (pmka_int_ct(c, (enum pmka_sign)s, uref, 10.0, degc) - 1.0);
+    }
+    return sum / 14.0;
+}
+
+/* The factory measures CT with an error of the profile's size, another one in each integrator and specimen. */
+static void the_rom_has_the_factory_s_error(void **state)
+{
+    (void)state;
+    static const double sd_ppm[] = {0.2, 1.0, 0.0};
+    for (unsigned k = 0; k < COUNT(sd_ppm); k++) {
+        double sum = 0.0, sum2 = 0.0, product = 0.0;
+        const unsigned specimens = 200;
+        for (unsigned n = 0; n < specimens; n++) {
+            struct pmka_profile p = rig_profile();
+            p.rom_ct_sd_ppm = sd_ppm[k];
+            struct board_cfg cfg = rig_cfg();
+            cfg.serial = n + 1;
+            rig_init(&rig, &p);
+            const struct board_io io = {.ctx = &rig, .accel = rig_accel, .temp_degc = rig_degc, .event = rig_event};
+            pmka_board.init(&rig.b, &p, &cfg, &io, &rig.s);
+            for (unsigned i = 0; i < PMKA_INTS; i++) {
+                const double e = 1e6 * ct_error(i);
+                sum += e;
+                sum2 += e * e;
+            }
+            product += 1e12 * ct_error(0) * ct_error(1);
+        }
+        const double rms = sqrt(sum2 / (4.0 * specimens));
+        near(rms, sd_ppm[k], k == 2 ? 0.03 : 0.12 * sd_ppm[k]); /* its own sd: 2.5 % */
+        near(sum / (4.0 * specimens), 0.0, 4.0 * rms / sqrt(4.0 * specimens));
+        near(product / specimens, 0.0, 4.0 * rms * rms / sqrt(specimens));
+    }
+}
+
 static void what_is_refused(void **state)
 {
     (void)state;
@@ -240,6 +285,7 @@ int main(void)
         cmocka_unit_test(a_reading_that_nobody_took_is_told),
         cmocka_unit_test(numbers_of_resets),
         cmocka_unit_test(the_rom_has_the_specimen),
+        cmocka_unit_test(the_rom_has_the_factory_s_error),
         cmocka_unit_test(what_is_refused),
         cmocka_unit_test(strobes),
         cmocka_unit_test(a_write_acts_at_the_end_of_its_strobe),
