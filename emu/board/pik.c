@@ -5,8 +5,11 @@
 #include <math.h>
 #include <string.h>
 
-#define WARM_NS      INT64_C(10000000) /* between looks at the temperature, rounded up to looks at the input */
-#define BOARD_SENSOR 3u                /* temperature channel of the board itself */
+#define WARM_NS      INT64_C(10000000)   /* between looks at the temperature, rounded up to looks at the inputs */
+#define GAUSS        0.28867513459481287 /* of the two points from the middle, sqrt(1/12) */
+#define PIECE_PULSES 0.02
+#define PIECES_MAX   8
+#define BOARD_SENSOR 3u /* temperature channel of the board itself */
 
 const struct board_line pik_lines[PIK_LINES] = {
     [PIK_LINE_CLK] = {"CLK", false}, [PIK_LINE_LATCH] = {"LATCH", true}, [PIK_LINE_CS] = {"CS", true},
@@ -43,9 +46,46 @@ static void set_clock(struct pik *b, int64_t tick, int64_t t_ns)
     b->first_tick = tick;
 }
 
-static int64_t look_ticks(const struct pik *b)
+/* ---- inputs ---- */
+
+/* Integral from where it stands: Gauss with two points, exact for a cubic, a look at most at a time. Both points lie within, so
+ * that a step at either end is on its right side. */
+static void integrate(struct pik *b, unsigned i, int64_t t_ns)
 {
-    return (int64_t)b->profile.look_clk * b->profile.grid;
+    struct pik_channel *c = &b->channel[i];
+    const double span_ns = (double)(t_ns - b->fed_ns);
+    const int64_t within_ns = (int64_t)(span_ns * (0.5 - GAUSS));
+    const int64_t node_ns[2] = {b->fed_ns + within_ns, t_ns - 1 - within_ns};
+    double v[2];
+    for (unsigned n = 0; n < 2; n++) {
+        const double signal = b->io.accel(b->io.ctx, i, node_ns[n]);
+        v[n] = afe_out_v(&c->afe, signal, b->degc, node_ns[n]);
+    }
+    c->due_vs += 0.5 * (v[0] + v[1]) * span_ns * 1e-9;
+    c->slope_v_per_s = (v[1] - v[0]) / (2.0 * GAUSS * 1e-9 * span_ns);
+}
+
+/* What is beyond twice the strongest reference moves the integrator to its rail as well; charges stay within 64 bits. */
+static double limited_v(const struct pik *b, double v)
+{
+    const double limit_v = 2.0 * b->profile.clock_hz / b->k_hz_per_v;
+    return v > limit_v ? limit_v : v < -limit_v ? -limit_v : v;
+}
+
+static int64_t rounded(double x)
+{
+    return (int64_t)floor(x + 0.5);
+}
+
+static struct pik_drive driven(const struct pik_channel *c, double v)
+{
+    struct pik_drive d = c->drive;
+    d.per_tick = rounded(v * c->per_volt);
+    if (!(c->lost_per_volt > 0.0)) return d;
+    const int64_t lost = rounded(v * c->lost_per_volt), least = PIK_PULSE / 256;
+    d.plus = d.plus + lost > least ? d.plus + lost : least;
+    d.minus = d.minus - lost > least ? d.minus - lost : least;
+    return d;
 }
 
 /* ---- converters ---- */
@@ -60,72 +100,60 @@ uint64_t pik_count_minus(const struct pik_channel *c)
     return c->minus_from + (c->stuck ? 0 : c->axis.minus);
 }
 
-static bool each_pulse(const struct pik *b)
+/* Up to and including tick with the drive it has; a pulse is told at t_ns, when it is known, and shown where it was. */
+static void pulses(struct pik *b, unsigned i, int64_t tick, int64_t t_ns)
 {
-    return b->heard || trace_watched(&b->trace, PIK_PULSE_LINES);
+    struct pik_axis *a = &b->channel[i].axis;
+    const bool watched = trace_watched(&b->trace, PIK_PULSE_LINES), each = b->heard || watched;
+    for (int64_t next; each && (next = pik_axis_next(a)) <= tick;) {
+        pik_axis_advance(a, next);
+        const int64_t begun_ns = pik_tick_ns(b, next);
+        if (watched) pik_lines_pulse(b, i, begun_ns);
+        if (begun_ns >= b->heard_ns) pik_tell(b, (enum pik_event)(PIK_EV_FX + i), t_ns);
+    }
+    pik_axis_advance(a, tick);
+}
+
+/* Into so many pieces of one mean each that the charge is nowhere off by PIECE_PULSES within them. */
+static int64_t pieces(const struct pik *b, const struct pik_channel *c, double span_s)
+{
+    const double bend = fabs(c->slope_v_per_s) * span_s * span_s * b->k_hz_per_v / 8.0;
+    int64_t n = 1;
+    while (n < PIECES_MAX && bend > PIECE_PULSES * (double)(n * n)) n *= 2;
+    return n;
+}
+
+/* The ticks up to `tick` get all the charge that is due, as the slope has it. */
+static void convert(struct pik *b, unsigned i, int64_t tick, int64_t t_ns)
+{
+    struct pik_channel *c = &b->channel[i];
+    const int64_t from = c->axis.tick, ticks = tick - from;
+    if (ticks <= 0) return;
+    const double tick_s = 1000.0 / (double)b->clk.hz;
+    const double mean_v = c->due_vs / ((double)ticks * tick_s) + c->zero_v + c->noise_v;
+    const int64_t n = pieces(b, c, (double)ticks * tick_s);
+    for (int64_t k = 1; k <= n; k++) {
+        const int64_t begin = c->axis.tick, end = from + ticks * k / n;
+        const double off_ticks = 0.5 * (double)(begin + end - from - tick);
+        c->axis.drive = driven(c, limited_v(b, mean_v + c->slope_v_per_s * off_ticks * tick_s));
+        pulses(b, i, end, t_ns);
+    }
+    c->due_vs = 0.0;
 }
 
 /* The order of channels at one instant is that of their numbers, as everywhere. */
-void pik_advance(struct pik *b, int64_t tick)
+void pik_sample_until(struct pik *b, int64_t t_ns)
 {
-    const bool each = each_pulse(b);
+    if (!b->on) return;
+    const int64_t tick = pik_tick_at(b, t_ns);
     for (unsigned i = 0; i < PIK_AXES; i++) {
-        struct pik_axis *a = &b->channel[i].axis;
-        for (int64_t next; each && (next = pik_axis_next(a)) <= tick;) {
-            pik_axis_advance(a, next);
-            const int64_t t_ns = pik_tick_ns(b, next);
-            if (trace_watched(&b->trace, PIK_PULSE_LINES)) pik_lines_pulse(b, i, t_ns);
-            pik_tell(b, (enum pik_event)(PIK_EV_FX + i), t_ns);
-        }
-        pik_axis_advance(a, tick);
+        if (t_ns > b->fed_ns) integrate(b, i, t_ns);
+        convert(b, i, tick, t_ns);
     }
+    b->fed_ns = t_ns;
 }
 
-struct pik_axis pik_axis_now(const struct pik *b, unsigned axis, int64_t t_ns)
-{
-    struct pik_axis a = b->channel[axis].axis;
-    if (b->on) pik_axis_advance(&a, pik_tick_at(b, t_ns));
-    return a;
-}
-
-/* ---- looks at the input ---- */
-
-/* Mean until the next look: what is seen, and half of what it has changed by since the last, if that was a pace ago. */
-static double expected_v(const struct pik *b, const struct pik_channel *c, double seen_v, int64_t tick)
-{
-    const bool steady = !b->abrupt && b->looks > 0 && tick - b->last_look_tick == look_ticks(b);
-    return steady ? seen_v + 0.5 * (seen_v - c->seen_v) : seen_v;
-}
-
-static double noise_v(const struct pik *b, struct pik_channel *c, int64_t ticks)
-{
-    const double v_rthz = b->profile.noise_v_rthz * b->cfg.adc_noise_scale;
-    if (!(v_rthz > 0.0)) return 0.0;
-    const double span_s = (double)ticks * 1000.0 / (double)b->clk.hz;
-    return v_rthz * sqrt(0.5 / span_s) * rng_gauss(&c->noise);
-}
-
-/* What is beyond twice the strongest reference moves the integrator to its rail as well; charges stay within 64 bits. */
-static double limited_v(const struct pik *b, double v)
-{
-    const double limit_v = 2.0 * b->profile.clock_hz / pik_profile_k_hz_per_v(&b->profile);
-    return v > limit_v ? limit_v : v < -limit_v ? -limit_v : v;
-}
-
-static int64_t rounded(double x)
-{
-    return (int64_t)floor(x + 0.5);
-}
-
-static struct pik_drive driven(const struct pik_channel *c, double v)
-{
-    struct pik_drive d = c->drive;
-    const int64_t lost = rounded(v * c->lost_per_volt), least = PIK_PULSE / 256;
-    d.per_tick = rounded(v * c->per_volt);
-    d.plus = d.plus + lost > least ? d.plus + lost : least;
-    d.minus = d.minus - lost > least ? d.minus - lost : least;
-    return d;
-}
+/* ---- looks ---- */
 
 static void keep_counters(struct pik_channel *c)
 {
@@ -137,16 +165,10 @@ static void keep_counters(struct pik_channel *c)
 }
 
 /* Whether it could not keep up since the last look. */
-static bool look_at(struct pik *b, unsigned i, int64_t tick, int64_t t_ns)
+static bool keep_up(struct pik_channel *c)
 {
-    struct pik_channel *c = &b->channel[i];
-    const double signal = b->io.accel(b->io.ctx, i, t_ns);
-    const double seen_v = afe_out_v(&c->afe, signal, b->degc, t_ns);
-    const double v = expected_v(b, c, seen_v, tick) + c->zero_v + noise_v(b, c, b->look_tick - tick);
-    const struct pik_drive d = driven(c, limited_v(b, v));
     const uint32_t before = c->axis.saturated;
-    pik_axis_look(&c->axis, tick, &d);
-    c->seen_v = seen_v;
+    pik_axis_look(&c->axis, c->axis.tick, &c->axis.drive);
     keep_counters(c);
     const bool saturated = c->axis.saturated != before;
     c->saturated |= saturated;
@@ -163,34 +185,23 @@ static void tell_saturation(struct pik *b, bool now, int64_t t_ns)
     if (b->host.saturated) b->host.saturated(b->host.ctx, now, t_ns);
 }
 
-/* By the pace, or at once after a step of the input. */
+/* By the pace, whoever listens: what the converters come to depends on nobody. Noise is a value for each stretch between two. */
 static void look(void *ctx, int64_t t_ns)
 {
     struct pik *b = ctx;
-    const int64_t tick = pik_tick_at(b, t_ns), pace = look_ticks(b);
-    const int64_t warm_looks = WARM_NS / (pik_tick_ns(b, tick + pace) - t_ns) + 1;
-    const bool paced = tick >= b->look_tick;
+    const int64_t pace = b->profile.look_ticks;
     bool saturated = false;
-    pik_advance(b, tick);
-    if (paced) {
-        if (b->looks % warm_looks == 0) pik_warm(b, b->io.temp_degc(b->io.ctx, BOARD_SENSOR, t_ns));
-        b->look_tick += pace;
+    pik_sample_until(b, t_ns);
+    for (unsigned i = 0; i < PIK_AXES; i++) saturated |= keep_up(&b->channel[i]);
+    if (t_ns >= b->warm_ns) {
+        pik_warm(b, b->io.temp_degc(b->io.ctx, BOARD_SENSOR, t_ns));
+        b->warm_ns = t_ns + WARM_NS;
     }
-    for (unsigned i = 0; i < PIK_AXES; i++) saturated |= look_at(b, i, tick, t_ns);
-    b->looks += paced;
-    b->abrupt = !paced; /* what it sees until then it saw for no whole pace */
-    b->last_look_tick = tick;
+    for (unsigned i = 0; b->noise_v > 0.0 && i < PIK_AXES; i++)
+        b->channel[i].noise_v = b->noise_v * rng_gauss(&b->channel[i].noise);
     tell_saturation(b, saturated, t_ns);
+    b->look_tick += pace;
     sched_at(b->sched, &b->look, pik_tick_ns(b, b->look_tick));
-    pik_arm_pulse(b, b->trace.watched);
-}
-
-void pik_abrupt(struct pik *b, int64_t t_ns)
-{
-    if (!b->on) return;
-    const int64_t next = pik_tick_at(b, t_ns) + 1;
-    b->abrupt = true;
-    if (next < b->look_tick) sched_at(b->sched, &b->look, pik_tick_ns(b, next));
 }
 
 /* ---- life ---- */
@@ -241,10 +252,11 @@ void pik_power_up(struct pik *b, int64_t t_ns)
         c->axis.saturated = was.saturated;
         c->axis.opposed = was.opposed;
         c->axis.lost = was.lost;
+        c->due_vs = c->slope_v_per_s = c->noise_v = 0.0;
         c->shown_tick = -1;
     }
-    b->look_tick = b->last_look_tick = b->looks = 0;
-    b->abrupt = true;
+    b->look_tick = 0;
+    b->fed_ns = b->warm_ns = t_ns;
     b->clk_shown_tick = 0;
     pik_lines_rest(b, true, t_ns);
     pik_tell(b, PIK_EV_POWER_UP, t_ns);
@@ -255,7 +267,7 @@ void pik_power_up(struct pik *b, int64_t t_ns)
 void pik_power_down(struct pik *b, int64_t t_ns)
 {
     if (!b->on) return;
-    pik_advance(b, pik_tick_at(b, t_ns));
+    pik_sample_until(b, t_ns);
     for (unsigned i = 0; i < PIK_AXES; i++) keep_counters(&b->channel[i]);
     pik_lines_clock(b, t_ns);
     b->on = false;
@@ -263,7 +275,6 @@ void pik_power_down(struct pik *b, int64_t t_ns)
     sched_cancel(b->sched, &b->look);
     sched_cancel(b->sched, &b->latch);
     sched_cancel(b->sched, &b->latch_end);
-    sched_cancel(b->sched, &b->pulse);
     pik_bus_cut(b, t_ns);
     pik_lines_rest(b, false, t_ns);
     pik_tell(b, PIK_EV_POWER_DOWN, t_ns);
@@ -273,7 +284,7 @@ void pik_reset(struct pik *b, int64_t t_ns)
 {
     if (!b->on) return;
     b->counters.resets++;
-    pik_advance(b, pik_tick_at(b, t_ns));
+    pik_sample_until(b, t_ns);
     pik_bus_cut(b, t_ns);
     pik_tell(b, PIK_EV_RES, t_ns);
     pik_latch_restart(b, t_ns);
@@ -281,9 +292,8 @@ void pik_reset(struct pik *b, int64_t t_ns)
 
 void pik_listen(struct pik *b, bool on)
 {
-    if (b->on) pik_advance(b, pik_tick_at(b, b->sched->now_ns)); /* what was before is told to nobody */
+    if (on && !b->heard) b->heard_ns = b->sched->now_ns; /* what was before is told to nobody */
     b->heard = on;
-    if (b->on) pik_arm_pulse(b, b->trace.watched);
 }
 
 /* ---- faults ---- */
@@ -297,21 +307,19 @@ void pik_clock(struct pik *b, int32_t ppm, int64_t t_ns)
         return;
     }
     const int64_t tick = pik_tick_at(b, t_ns);
-    pik_advance(b, tick);
+    pik_sample_until(b, t_ns);
     pik_lines_clock(b, t_ns);
     const int64_t tick_ns = pik_tick_ns(b, tick);
     b->clock_fault_ppm = ppm;
     set_clock(b, tick, tick_ns);
     pik_warm(b, b->degc);
-    pik_abrupt(b, t_ns);
-    if (b->look_tick <= tick + 1) sched_at(b->sched, &b->look, pik_tick_ns(b, b->look_tick));
-    pik_arm_pulse(b, b->trace.watched);
+    sched_at(b->sched, &b->look, pik_tick_ns(b, b->look_tick));
 }
 
 void pik_stick(struct pik *b, unsigned axis, const struct board_chip_fault *f, int64_t t_ns)
 {
     struct pik_channel *c = &b->channel[axis];
-    if (b->on) pik_advance(b, pik_tick_at(b, t_ns));
+    pik_sample_until(b, t_ns);
     const uint64_t plus = pik_count_plus(c), minus = pik_count_minus(c);
     c->stuck = f->dout_stuck;
     c->stuck_level = f->dout_level;
@@ -324,7 +332,7 @@ bool pik_flip(struct pik *b, unsigned axis, unsigned reg, uint8_t mask, int64_t 
 {
     struct pik_channel *c = &b->channel[axis];
     if (!b->on) return false;
-    pik_advance(b, pik_tick_at(b, t_ns));
+    pik_sample_until(b, t_ns);
     const uint64_t bits = (uint64_t)mask << (8 * (reg & 1));
     const uint64_t was = reg < 2 ? pik_count_plus(c) : pik_count_minus(c);
     *(reg < 2 ? &c->plus_from : &c->minus_from) += (was ^ bits) - was;

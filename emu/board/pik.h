@@ -1,9 +1,10 @@
 /* PIK, PIK-5, PIK-6: three charge-balance converters, their counters, and the registers by which a computer reads them
  * (article, sections 1 and 2).
  *
- * The model looks at its inputs at a fixed pace and takes what it saw, and its slope, for the mean until the next look
- * (second order of Adams and Bashforth): causal, and what it is off by does not grow. Readings, cycles and watched lines
- * look at nothing more, so that they change nothing. Counters are latched by the board's own period, or by a strobe on the bus.
+ * The model is behind the time by less than a look: at each it integrates its inputs since the last, and decides which pulses
+ * there were. Looks come at a fixed pace, shorter than the trace's lag, whoever listens or reads, so that this changes
+ * nothing; what needs the counters at an instant between two looks takes the inputs up to it. Counters are latched by the
+ * board's own period, or by a strobe on the bus.
  * Plain struct owned by the caller, one thread, no allocation; read-only outside the board's files. */
 #ifndef PSABENCH_BOARD_PIK_H
 #define PSABENCH_BOARD_PIK_H
@@ -43,7 +44,7 @@ extern const struct board_line pik_lines[PIK_LINES];
 enum pik_event {
     PIK_EV_RES,   /* the controller is reset */
     PIK_EV_LATCH, /* the counters are latched */
-    PIK_EV_FX,    /* a pulse of channel X begins, either sign */
+    PIK_EV_FX,    /* a pulse of channel X has begun, either sign: since the last look */
     PIK_EV_FY,
     PIK_EV_FZ,
     PIK_EV_SATURATED, /* a channel can no longer keep up */
@@ -107,9 +108,9 @@ void pik_init(struct pik *b, const struct pik_profile *p, const struct board_cfg
 void pik_attach(struct pik *b, const struct pik_host *host); /* copied */
 void pik_power_up(struct pik *b, int64_t t_ns);
 void pik_power_down(struct pik *b, int64_t t_ns);
-void pik_reset(struct pik *b, int64_t t_ns);  /* counters and registers; the integrators run on */
-void pik_abrupt(struct pik *b, int64_t t_ns); /* the input may step: the board looks at once, and forgets slopes */
-void pik_listen(struct pik *b, bool on);      /* somebody wants io.event */
+void pik_reset(struct pik *b, int64_t t_ns);              /* counters and registers; the integrators run on */
+void pik_sample_until(struct pik *b, int64_t t_ns);       /* takes its inputs, and counts what they give */
+void pik_listen(struct pik *b, bool on);                  /* somebody wants io.event */
 void pik_clock(struct pik *b, int32_t ppm, int64_t t_ns); /* the generator is off by so much, beside its own error */
 void pik_stick(struct pik *b, unsigned axis, const struct board_chip_fault *f, int64_t t_ns);
 bool pik_flip(struct pik *b, unsigned axis, unsigned reg, uint8_t mask, int64_t t_ns);
@@ -121,8 +122,5 @@ int64_t pik_period_ns(const struct pik *b); /* of the readings, as the register 
 
 /* The coefficient that a channel has, Hz/V: truth. sign: of the input. */
 double pik_true_k_hz_per_v(const struct pik *b, unsigned axis, int sign, double degc);
-
-/* A channel as it is at t_ns, not before the last event. */
-struct pik_axis pik_axis_now(const struct pik *b, unsigned axis, int64_t t_ns);
 
 #endif

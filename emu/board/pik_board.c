@@ -163,7 +163,7 @@ static bool ready(const void *board)
 
 static void sample_until(void *board, int64_t t_ns)
 {
-    pik_abrupt(board, t_ns);
+    pik_sample_until(board, t_ns);
 }
 
 static void wrong(void *board, uint32_t wrongs)
@@ -217,16 +217,17 @@ static void truth(const void *board, board_truth_fn *put, void *ctx)
 static void add_channel(struct sha256 *s, const struct pik *b, unsigned i)
 {
     const struct pik_channel *c = &b->channel[i];
-    const struct pik_axis a = pik_axis_now(b, i, b->sched->now_ns); /* whoever watches may have seen further */
-    board_digest_u64(s, (uint64_t)a.charge);
-    board_digest_u64(s, (uint64_t)a.begun_tick);
-    board_digest_u64(s, a.plus);
-    board_digest_u64(s, a.minus);
-    board_digest_u64(s, (uint64_t)a.drive.per_tick);
-    board_digest_u64(s, (uint64_t)a.saturated << 32 | a.opposed);
+    const struct pik_axis *a = &c->axis;
+    board_digest_u64(s, (uint64_t)a->charge);
+    board_digest_u64(s, (uint64_t)a->begun_tick);
+    board_digest_u64(s, a->plus);
+    board_digest_u64(s, a->minus);
+    board_digest_u64(s, (uint64_t)a->drive.per_tick);
+    board_digest_u64(s, (uint64_t)a->saturated << 32 | a->opposed);
     board_digest_u64(s, c->plus_from);
     board_digest_u64(s, c->minus_from);
-    board_digest_real(s, c->seen_v);
+    board_digest_real(s, c->due_vs);
+    board_digest_real(s, c->noise_v);
     board_digest_real(s, c->afe.state_v);
     board_digest_noise(s, &c->afe.noise);
     board_digest_noise(s, &c->noise);
@@ -238,6 +239,7 @@ static void digest(const void *board, struct sha256 *s)
     const struct pik_reading *r = &b->latched;
     board_digest_u64(s, (uint64_t)b->on << 32 | (uint64_t)b->any << 1 | b->saturated);
     board_digest_u64(s, (uint64_t)b->look_tick);
+    board_digest_u64(s, (uint64_t)b->fed_ns);
     board_digest_u64(s, (uint64_t)b->counters.readings << 32 | b->counters.resets);
     board_digest_u64(s, (uint64_t)b->counters.cycles << 32 | b->counters.cycles_refused);
     board_digest_u64(s, (uint64_t)r->seq << 32 | r->status);

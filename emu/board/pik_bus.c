@@ -43,8 +43,9 @@ static uint16_t word_at(struct pik *b, unsigned address)
     return status;
 }
 
-static void clear(struct pik *b, unsigned axes)
+static void clear(struct pik *b, unsigned axes, int64_t t_ns)
 {
+    pik_sample_until(b, t_ns);
     for (unsigned i = 0; i < PIK_AXES; i++) {
         struct pik_channel *c = &b->channel[i];
         if (!(axes >> i & 1)) continue;
@@ -57,9 +58,8 @@ static void clear(struct pik *b, unsigned axes)
 
 static void write_word(struct pik *b, const struct board_cycle *c, int64_t t_ns)
 {
-    pik_advance(b, pik_tick_at(b, t_ns));
     if (c->address == PIK_REG_PERIOD) pik_set_period(b, c->data, t_ns);
-    if (c->address == PIK_REG_CLEAR) clear(b, c->data);
+    if (c->address == PIK_REG_CLEAR) clear(b, c->data, t_ns);
     if (c->address != PIK_REG_LATCH) return;
     b->counters.strobes++;
     pik_latch_now(b, t_ns);

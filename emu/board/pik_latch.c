@@ -32,7 +32,7 @@ static void take(struct pik_channel *c, struct pik_reading *r, unsigned i, bool 
 void pik_latch_now(struct pik *b, int64_t t_ns)
 {
     struct pik_reading *r = &b->latched;
-    pik_advance(b, pik_tick_at(b, t_ns));
+    pik_sample_until(b, t_ns);
     r->seq++;
     r->t_ns = t_ns;
     r->status = PIK_ST_NEW;
@@ -48,7 +48,6 @@ void pik_latch_now(struct pik *b, int64_t t_ns)
     sched_at(b->sched, &b->latch_end, t_ns + b->profile.latch_ns);
     pik_tell(b, PIK_EV_LATCH, t_ns);
     if (b->host.reading) b->host.reading(b->host.ctx, r, t_ns);
-    pik_arm_pulse(b, b->trace.watched);
 }
 
 static void latch(void *ctx, int64_t t_ns)

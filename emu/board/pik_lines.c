@@ -48,30 +48,6 @@ void pik_lines_stuck(struct pik *b, unsigned axis, int64_t t_ns)
     if (b->on) trace_put(&b->trace, STUCK_OF(axis), stuck_level(b), t_ns);
 }
 
-/* ---- pulses, one by one ---- */
-
-static void pulse(void *ctx, int64_t t_ns)
-{
-    struct pik *b = ctx;
-    pik_advance(b, pik_tick_at(b, t_ns));
-    pik_arm_pulse(b, b->trace.watched);
-}
-
-void pik_arm_pulse(struct pik *b, uint64_t watched)
-{
-    if (!b->heard && !(watched & PIK_PULSE_LINES)) {
-        sched_cancel(b->sched, &b->pulse);
-        return;
-    }
-    int64_t next = PIK_NEVER;
-    for (unsigned i = 0; i < PIK_AXES; i++) {
-        const int64_t of = pik_axis_next(&b->channel[i].axis);
-        if (of < next) next = of;
-    }
-    if (next <= b->look_tick) sched_at(b->sched, &b->pulse, pik_tick_ns(b, next)); /* beyond it the look will tell */
-    else sched_cancel(b->sched, &b->pulse);
-}
-
 /* ---- CLK ---- */
 
 /* Rises from clk_shown_tick on that come up to t_ns, each with its fall half a period later; how far it got. */
@@ -110,16 +86,14 @@ static void wake_clk(struct pik *b)
     put_from(b, BIT(PIK_LINE_CLK), false, known_ns); /* low until its next rise */
 }
 
-/* The pulses under way; those that are over already within the trace's lag are not shown. */
+/* The pulses under way at the last look; those that were over by then are not shown, those since then are at the next. */
 static void wake_pulses(struct pik *b)
 {
-    pik_advance(b, pik_tick_at(b, b->sched->now_ns));
     for (unsigned i = 0; i < PIK_AXES; i++) {
         struct pik_channel *c = &b->channel[i];
         if (pik_axis_resetting(&c->axis) && c->shown_tick != c->axis.begun_tick)
             pik_lines_pulse(b, i, pik_tick_ns(b, c->axis.begun_tick));
     }
-    pik_arm_pulse(b, UINT64_MAX);
 }
 
 static void wake(void *ctx, uint64_t mask)
@@ -136,5 +110,4 @@ void pik_lines_init(struct pik *b)
     for (unsigned i = 0; i < PIK_LINES; i++) (void)trace_add(&b->trace, pik_lines[i].name, pik_lines[i].level);
     line_faults_init(&b->line, &b->trace);
     b->trace.source = (struct trace_source){.wake = wake, .report = report, .ctx = b};
-    sched_ev(&b->pulse, pulse, b);
 }

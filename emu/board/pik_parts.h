@@ -9,7 +9,6 @@
 /* pik.c */
 int64_t pik_tick_at(const struct pik *b, int64_t t_ns); /* the last at or before */
 int64_t pik_tick_ns(const struct pik *b, int64_t tick);
-void pik_advance(struct pik *b, int64_t tick);        /* the converters up to and including it */
 uint64_t pik_count_plus(const struct pik_channel *c); /* as the counter has it */
 uint64_t pik_count_minus(const struct pik_channel *c);
 
@@ -29,8 +28,7 @@ void pik_lines_rest(struct pik *b, bool power, int64_t t_ns);
 void pik_lines_pulse(struct pik *b, unsigned axis,
                      int64_t from_ns); /* the one that has begun last, seen from then on */
 void pik_lines_stuck(struct pik *b, unsigned axis, int64_t t_ns);
-void pik_lines_clock(struct pik *b, int64_t t_ns);   /* CLK up to now: its pace will change */
-void pik_arm_pulse(struct pik *b, uint64_t watched); /* looks out for the next pulse, if somebody wants each */
+void pik_lines_clock(struct pik *b, int64_t t_ns); /* CLK up to now: its pace will change */
 
 /* pik_latch.c */
 void pik_latch_init(struct pik *b);

@@ -17,7 +17,7 @@ const struct board_field pik_fields[PIK_FIELDS] = {
     ROW(rin_ohm, REAL, 10, 1e8, "RIN, from the input to the integrator. E0."),
     ROW(clock_hz, UINT, 100, 1000000, "1/TCLK: a reset lasts one period. E0, K = Rr/(RIN UREF TCLK) is the article's."),
     ROW(grid, UINT, 1, 64, "Instants in TCLK at which a reset may begin: the control unit's faster clock. E0."),
-    ROW(recovery_ticks, UINT, 0, 1024, "Rest of a reference after its reset, in TCLK/grid: with it F at 10 V is the largest. E0."),
+    ROW(recovery_ticks, UINT, 0, 1024, "Rest of a reference after its reset, in TCLK/grid: 15 of 16 allow 3 % more than F at 10 V. E0."),
     ROW(switch_on_ns, REAL, 0, 1e6, "By which the reference comes late. E0."),
     ROW(switch_off_ns, REAL, 0, 1e6, "By which it goes late; only the difference enters the charge. E0."),
     ROW(input_off_ns, REAL, 0, 1e6, "For which a reset takes the input off; the article's does not. E0."),
@@ -25,7 +25,7 @@ const struct board_field pik_fields[PIK_FIELDS] = {
     ROW(uc_v, REAL, 0.01, 100, "Uc, either sign: where a reset begins. E0."),
     ROW(rail_v, REAL, 0.1, 200, "At which the integrator's output stays, either sign. E0."),
     ROW(ra_ohm, REAL, 1, 1e6, "Ra, load of a sensor with current output, if the scenario gives none: 0.94 and 0.98 V/g of 1.28 mA/g. E0."),
-    ROW(look_clk, UINT, 1, 100000, "TCLK periods between two looks of the model at its input. E0."),
+    ROW(look_ticks, UINT, 1, 100000, "TCLK/grid between two looks of the model at its input. E0."),
     ROW(latch_us, UINT, 0, 1000000, "Period at which the counters are latched and sent; 0: only by strobe. E0."),
     ROW(strobe_ns, UINT, 20, 1000000, "Length of a bus cycle's strobe, if the host gives none. E0."),
     ROW(strobe_min_ns, UINT, 0, 1000000, "Shortest strobe that reads or writes. E0."),
@@ -55,12 +55,12 @@ struct pik_profile pik_profile_default(void)
         .rin_ohm = 20e3,
         .clock_hz = 3480,
         .grid = 16,
-        .recovery_ticks = 16,
+        .recovery_ticks = 15,
         .c_int_nf = 56.0,
         .uc_v = 3.75,
         .rail_v = 12.0,
         .ra_ohm = 735.0,
-        .look_clk = 2,
+        .look_ticks = 10,
         .latch_us = 10000,
         .strobe_ns = 1000,
         .strobe_min_ns = 200,
@@ -144,10 +144,12 @@ static bool check_time(const struct pik_profile *p, char *why, size_t cap)
     if ((double)p->clock_hz * p->grid > 990e3)
         return no(why, cap, "grid = %u: %u instants in each of %u periods a second are more than 990000 a second",
                   p->grid, p->grid, p->clock_hz);
-    if (p->clock_hz > PIK_LOOKS_HZ_MAX * p->look_clk)
-        return no(why, cap, "look_clk = %u: more than %u looks a second at the input", p->look_clk, PIK_LOOKS_HZ_MAX);
-    if (p->look_clk > p->clock_hz / 100)
-        return no(why, cap, "look_clk = %u: less than 100 looks a second at the input", p->look_clk);
+    if (p->clock_hz * p->grid > PIK_LOOKS_HZ_MAX * (double)p->look_ticks)
+        return no(why, cap, "look_ticks = %u: more than %u looks a second at the input", p->look_ticks,
+                  PIK_LOOKS_HZ_MAX);
+    if ((p->look_ticks - 1) * tclk_ns / p->grid > PIK_LATE_NS_MAX)
+        return no(why, cap, "look_ticks = %u: a pulse would be known %.0f us late, more than %.0f us", p->look_ticks,
+                  (p->look_ticks - 1) * tclk_ns / p->grid * 1e-3, PIK_LATE_NS_MAX * 1e-3);
     if (p->switch_on_ns >= tclk_ns)
         return no(why, cap, "switch_on_ns = %g: longer than the reset, %.0f ns", p->switch_on_ns, tclk_ns);
     if (p->switch_off_ns >= tclk_ns)

@@ -12,6 +12,7 @@
 #define PIK_FIELDS       32u
 #define PIK_SPAN_K       35.0 /* either side of 25 degC: where a specimen keeps k_error_pct, E0 */
 #define PIK_LOOKS_HZ_MAX 50000
+#define PIK_LATE_NS_MAX  190000.0 /* by which a pulse may be known late: within the lag of the trace */
 
 struct pik_profile {
     char name[32];
@@ -23,8 +24,8 @@ struct pik_profile {
     double switch_on_ns, switch_off_ns, input_off_ns; /* dead times of a reset */
     /* integrator */
     double c_int_nf, uc_v, rail_v;
-    double ra_ohm;     /* load of a current sensor: its scale in V/g */
-    unsigned look_clk; /* TCLK periods between looks at the input */
+    double ra_ohm;       /* load of a current sensor: its scale in V/g */
+    unsigned look_ticks; /* between looks at the input, in TCLK / grid */
     /* reading */
     unsigned latch_us; /* 0: by strobe alone */
     unsigned strobe_ns, strobe_min_ns, latch_ns;

@@ -1,7 +1,7 @@
 /* What a specimen of the profile is off by, and what becomes of it at a temperature. */
 #include "board/pik_parts.h"
 
-#include <assert.h>
+#include <math.h>
 
 #define NOMINAL_DEGC 25.0
 #define CUT_SIGMA    3.0 /* no part is off by more */
@@ -108,6 +108,9 @@ void pik_warm(struct pik *b, double degc)
     const double dt_k = degc - NOMINAL_DEGC;
     const double k_hz_per_v = pik_profile_k_hz_per_v(p), step_v = pik_profile_step_v(p);
     b->degc = degc;
+    b->k_hz_per_v = k_hz_per_v;
+    b->noise_v = p->noise_v_rthz * b->cfg.adc_noise_scale *
+                 sqrt(0.5e-3 * (double)pik_tick_hz(b) / p->look_ticks); /* white, over a look */
     for (unsigned i = 0; i < PIK_AXES; i++) {
         struct pik_channel *c = &b->channel[i];
         const double c_int = (1.0 + 1e-2 * b->specimen.c_pct[i]) * (1.0 + 1e-6 * p->c_tc_ppm_per_k * dt_k);

@@ -13,7 +13,9 @@ struct pik_channel {
     struct afe afe;
     struct pik_axis axis;
     struct rng noise;
-    double seen_v;                  /* at the last look */
+    double due_vs;                  /* of the input, that no tick has got yet */
+    double slope_v_per_s;           /* of the input, when it was last taken */
+    double noise_v;                 /* until the next look */
     struct pik_drive drive;         /* for no input, at this temperature */
     double per_volt;                /* charge of a tick for a volt */
     double zero_v;                  /* drift, likewise */
@@ -41,11 +43,13 @@ struct pik {
     /* time: tick first_tick lies at edge 0 of clk */
     struct clk clk;
     int64_t first_tick;
-    int64_t look_tick, last_look_tick; /* next and last by the pace */
-    int64_t looks;                     /* since power-up */
-    bool abrupt;                       /* the input may have stepped since the last look */
+    int64_t look_tick; /* next */
+    int64_t fed_ns;    /* up to which the inputs have been taken */
+    int64_t warm_ns;   /* of the next look at the temperature */
+    int64_t heard_ns;  /* since when somebody hears */
     double degc;
-    struct sched_ev look, latch, latch_end, pulse, cycle_end; /* pulse: only while somebody wants each */
+    double k_hz_per_v, noise_v; /* nominal; rms of the mean from look to look */
+    struct sched_ev look, latch, latch_end, cycle_end;
     /* saturation as it is told */
     bool saturated;
     int64_t saturated_ns;

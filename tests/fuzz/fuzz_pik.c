@@ -13,7 +13,8 @@ struct world {
     struct sched s;
     struct pik b;
     double v[PIK_AXES];
-    uint64_t trail; /* of readings and answers */
+    int64_t asked_ns[PIK_AXES]; /* last */
+    uint64_t trail;             /* of readings and answers */
     struct pik_reading last;
     bool any;
     struct board_cycle cycle;
@@ -35,7 +36,8 @@ static void mix(struct world *w, uint64_t v)
 static double accel(void *ctx, unsigned axis, int64_t t_ns)
 {
     struct world *w = ctx;
-    assert(axis < PIK_AXES && t_ns == w->s.now_ns);
+    assert(axis < PIK_AXES && t_ns <= w->s.now_ns && t_ns >= w->asked_ns[axis]);
+    w->asked_ns[axis] = t_ns;
     return w->v[axis];
 }
 
@@ -114,7 +116,7 @@ static void run(struct world *w, int64_t ns)
 static void op_input(struct world *w, struct script *s)
 {
     const uint8_t axis = script_byte(s) % PIK_AXES;
-    pik_abrupt(&w->b, w->s.now_ns);
+    pik_sample_until(&w->b, w->s.now_ns);
     w->v[axis] = (double)(int8_t)script_byte(s) / 8.0;
 }
 
@@ -218,9 +220,9 @@ static struct pik_profile profile_of(struct script *s)
         p.clock_hz = 40000;
         p.c_int_nf = 4.7;
         p.uc_v = 3.9;
-        p.look_clk = 20;
     }
     p.grid = b & 2 ? 16 : 1;
+    p.look_ticks = p.grid * 175 * (p.clock_hz / 10) / 100000 + (p.clock_hz < 40000 && p.grid == 1);
     p.recovery_ticks = (b >> 2 & 3) * p.grid / 2;
     if (b & 16) p.input_off_ns = 5000.0;
     if (b & 32) p.noise_v_rthz = 1e-2;
@@ -251,9 +253,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         check(&deaf);
         assert(heard.trail == deaf.trail);
         for (unsigned i = 0; i < PIK_AXES; i++) {
-            const struct pik_axis x = pik_axis_now(&heard.b, i, heard.s.now_ns),
-                                  y = pik_axis_now(&deaf.b, i, deaf.s.now_ns);
-            assert(x.charge == y.charge && x.plus == y.plus && x.minus == y.minus && x.lost == y.lost);
+            const struct pik_axis *x = &heard.b.channel[i].axis, *y = &deaf.b.channel[i].axis;
+            assert(x->tick == y->tick && x->charge == y->charge && x->plus == y->plus && x->minus == y->minus &&
+                   x->lost == y->lost);
         }
     }
     return 0;

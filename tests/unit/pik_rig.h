@@ -19,14 +19,23 @@ struct rig_edge {
     bool level;
 };
 
-struct rig_input { /* constant, and a sine from step_ns on */
-    double v, sine_v, sine_hz;
+#define RIG_SINES 3u
+
+struct rig_sine {
+    double v, hz, turns; /* phase at 0 */
+};
+
+struct rig_input { /* a constant, and sines */
+    double v;
+    unsigned sines;
+    struct rig_sine sine[RIG_SINES];
 };
 
 struct rig {
     struct sched s;
     struct pik b;
     struct rig_input input[PIK_AXES];
+    int64_t asked_ns[PIK_AXES]; /* last */
     double degc;
     struct pik_reading reading[RIG_READINGS];
     unsigned readings;
@@ -42,25 +51,35 @@ struct rig {
     int64_t answered_ns;
 };
 
+static inline double rig_phase(const struct rig_sine *s, int64_t t_ns)
+{
+    const double turns = s->hz * (double)t_ns * 1e-9 + s->turns;
+    return RIG_TWO_PI * (turns - (double)(int64_t)turns);
+}
+
 static inline double rig_input_v(const struct rig_input *in, int64_t t_ns)
 {
-    const double turns = in->sine_hz * (double)t_ns * 1e-9;
-    return in->v + in->sine_v * det_sin(RIG_TWO_PI * (turns - (double)(int64_t)turns));
+    double v = in->v;
+    for (unsigned k = 0; k < in->sines; k++) v += in->sine[k].v * det_sin(rig_phase(&in->sine[k], t_ns));
+    return v;
 }
 
 /* From 0 to t. */
 static inline double rig_integral_vs(const struct rig_input *in, int64_t t_ns)
 {
-    const double t_s = (double)t_ns * 1e-9, turns = in->sine_hz * t_s;
-    if (in->sine_v == 0.0) return in->v * t_s;
-    const double c = det_cos(RIG_TWO_PI * (turns - (double)(int64_t)turns));
-    return in->v * t_s + in->sine_v * (1.0 - c) / (RIG_TWO_PI * in->sine_hz);
+    double vs = in->v * (double)t_ns * 1e-9;
+    for (unsigned k = 0; k < in->sines; k++) {
+        const struct rig_sine *s = &in->sine[k];
+        vs += s->v * (det_cos(rig_phase(s, 0)) - det_cos(rig_phase(s, t_ns))) / (RIG_TWO_PI * s->hz);
+    }
+    return vs;
 }
 
 static inline double rig_accel(void *ctx, unsigned axis, int64_t t_ns)
 {
-    const struct rig *r = ctx;
-    assert_int_equal(t_ns, r->s.now_ns);
+    struct rig *r = ctx;
+    assert_true(t_ns <= r->s.now_ns && t_ns >= r->asked_ns[axis]);
+    r->asked_ns[axis] = t_ns;
     return rig_input_v(&r->input[axis], t_ns);
 }
 
@@ -125,7 +144,7 @@ static inline struct pik_profile rig_pik6(void)
     p.clock_hz = 40000;
     p.c_int_nf = 4.7;
     p.uc_v = 3.9;
-    p.look_clk = 20;
+    p.look_ticks = 112;
     return p;
 }
 

@@ -18,8 +18,8 @@ static void figures_of_the_article(void **state)
     static const struct {
         unsigned clock_hz;
         double k_hz_per_v, quantum_vs, limit_hz, pulse_mps, ma_v_per_g, ra_ohm;
-    } rows[] = {{3480, 174.0, 5.747e-3, 1740.0, 60e-3, 0.939, 735.0},
-                {40000, 2000.0, 0.5e-3, 20e3, 5e-3, 0.980, 768.0}};
+    } rows[] = {{3480, 174.0, 5.747e-3, 3480.0 * 16 / 31, 60e-3, 0.939, 735.0},
+                {40000, 2000.0, 0.5e-3, 40e3 * 16 / 31, 5e-3, 0.980, 768.0}};
     for (unsigned i = 0; i < COUNT(rows); i++) {
         struct pik_profile p = pik_profile_default();
         p.clock_hz = rows[i].clock_hz;
@@ -53,8 +53,10 @@ static void bad_profiles_are_refused_in_words(void **state)
         {"c_int_nf", "39.5", NULL},
         {"rr_ohm", "3e6", "rr_ohm = 3e+06: K"},
         {"rr_ohm", "50", "rr_ohm = 50: K"},
-        {"look_clk", "35", "look_clk = 35: less than 100"},
-        {"look_clk", "34", NULL},
+        {"look_ticks", "12", "look_ticks = 12: a pulse would be known 198 us late"},
+        {"look_ticks", "11", NULL},
+        {"look_ticks", "1", "look_ticks = 1: more than 50000"},
+        {"look_ticks", "2", NULL},
         {"switch_on_ns", "300000", "switch_on_ns = 300000: longer"},
         {"switch_off_ns", "300000", "switch_off_ns = 300000: longer"},
         {"input_off_ns", "300000", "input_off_ns = 300000: longer"},
@@ -88,10 +90,10 @@ static void bad_together(void **state)
     p = pik_profile_default();
     p.clock_hz = 60000;
     p.c_int_nf = 3.3;
-    p.look_clk = 1;
+    p.look_ticks = 19;
     assert_false(pik_profile_check(&p, why, sizeof why));
-    assert_non_null(strstr(why, "look_clk = 1: more than"));
-    p.look_clk = 20;
+    assert_non_null(strstr(why, "look_ticks = 19: more than"));
+    p.look_ticks = 20;
     p.recovery_ticks = 0;
     p.latch_us = 600000;
     assert_false(pik_profile_check(&p, why, sizeof why));
