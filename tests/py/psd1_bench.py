@@ -20,7 +20,7 @@ LINES = (
     *(f"AB{i}" for i in range(4)),
     *(f"D{i}" for i in range(16)),
 )
-HALF_NS = 400  # of 1M25
+HALF_NS, PERIOD_NS = 400, 800  # of 1M25
 SET_UP_S = 0.02
 
 SCENARIO = """
@@ -39,13 +39,43 @@ units:
 
 @dataclass(frozen=True, slots=True)
 class Strobe:
-    """A read: delay after the rise of FL2, or after the strobe before; length; address; whether a word is to be had."""
+    """A read, or a write of data: delay after the rise of FL2, or after the strobe before; length; address; whether a
+    word is to be had."""
 
     after_fl2: bool
     delay_ns: int
     length_ns: int
     address: int
     good: bool = True
+    data: int | None = None
+
+
+FLAGS, BOTH = 15, 3  # its address; INT0 and FL1 active
+
+
+def random_flags(rng: np.random.Generator, before: list[Strobe]) -> list[Strobe]:
+    """Behind these strobes INT0, FL1 or both are taken away and given again, for an instant; now and then given for less
+    than a period in between; some at the instant of a rise. It is over before the next FL2, 13.6 us later at least."""
+    since_ns = HALF_NS + sum(s.delay_ns + s.length_ns for s in before)  # FL2 rises with a fall of 1M25
+    rows = [(int(rng.integers(10, 3000)), int(rng.integers(0, 3))), (int(rng.integers(10, 3000)), BOTH)]
+    if rng.random() < 0.5:
+        rows += [(int(rng.integers(10, 600)), int(rng.integers(0, 3))), (int(rng.integers(10, 3000)), BOTH)]
+    strobes = []
+    for wait_ns, data in rows:
+        length_ns = int(rng.integers(200, 900))
+        if rng.random() < 0.3:
+            length_ns = 200 + (-since_ns - wait_ns - 200) % PERIOD_NS
+        since_ns += wait_ns + length_ns
+        strobes.append(Strobe(False, wait_ns, length_ns, FLAGS, data=data))
+    return strobes
+
+
+def held_back(rng: np.random.Generator, last: Strobe) -> list[Strobe]:
+    """INT0, FL1 or both are taken away before the last word is read, and given again when conversions may have ended."""
+    off = Strobe(True, int(rng.integers(0, 3000)), int(rng.integers(200, 900)), FLAGS, data=int(rng.integers(0, 3)))
+    read = Strobe(False, 10 + last.delay_ns, last.length_ns, last.address)
+    wait_ns, length_ns = int(rng.integers(10, 3_000_000)), int(rng.integers(200, 900))
+    return [off, read, Strobe(False, wait_ns, length_ns, FLAGS, data=BOTH)]
 
 
 def scenario(directory: Path, seed: int) -> Path:
@@ -54,9 +84,10 @@ def scenario(directory: Path, seed: int) -> Path:
     return path
 
 
-def random_strobes(rng: np.random.Generator, cycles: int) -> Iterator[list[Strobe]]:
+def random_strobes(rng: np.random.Generator, cycles: int, flags: float = 0.0) -> Iterator[list[Strobe]]:
     """Of each word of each cycle: mostly prompt, at times late or so late that conversions are lost; now and then a
-    strobe at another word's address first, or one more behind it, which must both change nothing."""
+    strobe at another word's address first, or one more behind it, which must both change nothing. flags: behind so many
+    of the words INT0 and FL1 change."""
     for _ in range(cycles):
         for axis in range(3):
             delay = int(rng.choice([rng.integers(0, 3000), rng.integers(0, 200_000), 800 * rng.integers(0, 4)]))
@@ -70,6 +101,9 @@ def random_strobes(rng: np.random.Generator, cycles: int) -> Iterator[list[Strob
             if rng.random() < 0.1:
                 wait = int(rng.integers(10, 8000))
                 strobes.append(Strobe(False, wait, int(rng.integers(200, 900)), axis, False))
+            elif rng.random() < flags:
+                held = axis == 2 and len(strobes) == 1 and rng.random() < 0.5
+                strobes = held_back(rng, strobes[0]) if held else strobes + random_flags(rng, strobes)
             yield strobes
 
 
@@ -89,22 +123,25 @@ class Host:
         assert reply.result["reached"], f"no {event}"
         self.now_ns = reply.t_ns
 
-    def read(self, s: Strobe) -> int | None:
-        """The word; None when the board refuses. It ends with the end of the strobe, refused or not."""
+    def do(self, s: Strobe) -> int | None:
+        """The word; None of a write, and when the board refuses. It ends with the end of the strobe, refused or not."""
         if s.after_fl2:
             self.await_event("FL2")
         self.run(s.delay_ns)
         end_ns = self.now_ns + s.length_ns
         word, args = None, {"unit": "a", "address": s.address, "strobe_ns": s.length_ns}
         try:
-            word = int(self._control.call("bus.read", **args).result["data"])
+            if s.data is None:
+                word = int(self._control.call("bus.read", **args).result["data"])
+            else:
+                self._control.call("bus.write", **args, data=s.data)
         except ControlError:
             if s.good:
                 raise
         self.now_ns = self._control.call("time").t_ns
         self.run(end_ns - self.now_ns)
         assert self.now_ns == end_ns, f"{s}: the strobe ended at {self.now_ns} ns, not at {end_ns}"
-        assert (word is not None) == s.good
+        assert (word is not None) == (s.good and s.data is None)
         return word
 
 
@@ -123,7 +160,7 @@ def record(
             if clock_ppm and i == 3:  # of converter X, after the first cycle: DR then meets the clock at any phase
                 control.call("fault.add", kind="chip.clock", point="a.adc.x", clock_ppm=clock_ppm)
             for strobe in row:
-                word = host.read(strobe)
+                word = host.do(strobe)
                 if word is not None:
                     words.append(word)
         host.run(1_000_000)

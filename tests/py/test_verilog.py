@@ -128,11 +128,11 @@ DRDY_PULSE_TAU = 500  # DRDY is high so long before an unread word is replaced (
 def test_a_thousand_cycles_of_psd_1_have_the_edges_of_the_verilog_model(
     clock_ppm: int, tau_ns: int, phases: int, tmp_path: Path
 ) -> None:
-    """Random delays, lengths and mistakes of the host. On its own clock converter X ends its words where 1M25 rises; on
+    """Random delays, lengths and mistakes of the host, which takes INT0 and FL1 away at times. On its own clock converter X ends its words where 1M25 rises; on
     another one, here 7.8125 MHz, at every 32 ns of a period."""
     seed = seed_of_test()
     prompt = [[psd1_bench.Strobe(True, 1000, 800, axis)] for axis in range(3)]  # INT0 and FL1 come with the first cycle
-    strobes = list(psd1_bench.random_strobes(np.random.default_rng(seed), PSD1_CYCLES))
+    strobes = list(psd1_bench.random_strobes(np.random.default_rng(seed), PSD1_CYCLES, flags=0.2))
     path, words = psd1_bench.record(tmp_path, seed % 2**31, prompt + strobes, clock_ppm)
     vcd = read_vcd(path)
     cycles, words = psd1_bench.cycles(vcd)[1 : len(words)], words[1:]
@@ -142,11 +142,20 @@ def test_a_thousand_cycles_of_psd_1_have_the_edges_of_the_verilog_model(
     assert len(found) == phases
     start_ns = int(dr_falls[dr_falls < cycles[0].start_ns][-1])
     end_ns = cycles[-1].end_ns + 300
-    host = "".join(f"{int(not s.after_fl2)} {s.delay_ns} {s.length_ns} {s.address} 1\n" for row in strobes for s in row)
+    host = "".join(
+        f"{int(not s.after_fl2)} {s.delay_ns} {s.length_ns} {s.address} {int(s.data is None)} {s.data or 0}\n"
+        for row in strobes
+        for s in row
+    )
+    int0, fl1 = (vcd.wires[name] for name in ("INT0", "FL1"))
+    flags = np.unique([t for wire in (int0, fl1) for t in between(wire, start_ns, end_ns).t_ns])
+    held = sum(int(np.any((dr_falls > s) & (dr_falls < e))) for s, e in absent(int0, fl1, flags))
+    assert held > 20  # conversions end while the one or the other is away
     stimuli = {
         "updates": "".join(f"{t}\n" for t in dr_falls[(dr_falls >= start_ns) & (dr_falls < end_ns)].tolist()),
         "words": "".join(f"{x:x} {y:x} {z:x}\n" for x, y, z in words),
         "host": host,
+        "flags": "".join(f"{t} {a} {b}\n" for t, a, b in zip(flags, int0.at(flags), fl1.at(flags), strict=True)),
     }
     edges = simulate(tmp_path, "psd1_tb", PSD1_MODEL, end_ns + 1, {"update_ns": DRDY_PULSE_TAU * tau_ns}, **stimuli)
     wires = drawn(edges, psd1_bench.LINES)
@@ -158,6 +167,12 @@ def test_a_thousand_cycles_of_psd_1_have_the_edges_of_the_verilog_model(
     ]
     assert "\n".join(w for w in wrong if w) == ""
     assert all(len(between(vcd.wires[n], start_ns, end_ns).t_ns) > PSD1_CYCLES for n in ("A0", "FL2", "DR", "D7", "CS"))
+
+
+def absent(int0: Wire, fl1: Wire, changes: Ints) -> list[tuple[int, int]]:
+    """Stretches of time in which INT0 or FL1 is not active."""
+    active = (int0.at(changes) == 1) & (fl1.at(changes) == 0)
+    return [(int(s), int(e)) for s, e, on in zip(changes, changes[1:], active, strict=False) if not on]
 
 
 def _levels(start_ns: int, clock: Ints) -> NDArray[np.uint8]:
