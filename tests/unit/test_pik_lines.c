@@ -48,6 +48,31 @@ static void pulses_are_what_the_counters_count(void **state)
     }
 }
 
+/* Where a pulse rises the charge has just reached Uc, also between two looks, and at the edge of the band. */
+static void a_pulse_rises_where_the_integral_is_at_uc(void **state)
+{
+    (void)state;
+    const struct pik_profile p = rig_pik6();
+    const double uc = pik_profile_threshold(&p);
+    rig_init(&r, &p, 1);
+    trace_attach(&r.b.trace, &r.sink);
+    pik_power_up(&r.b, 0);
+    r.input[0] = (struct rig_input){.sines = 1, .sine = {{.v = 10.0, .hz = 397.0}}};
+    rig_run_until(&r, NS_PER_S);
+    int count = 0, seen = 0;
+    for (unsigned i = 0; i < r.edges; i++) {
+        const struct rig_edge *e = &r.edge[i];
+        if (!e->level || (e->sig != PIK_LINE_FXP && e->sig != PIK_LINE_FXN)) continue;
+        const int sign = e->sig == PIK_LINE_FXP ? 1 : -1;
+        const double charge = sign * (2000.0 * rig_integral_vs(&r.input[0], e->t_ns) - count);
+        if (charge < uc - 0.025 || charge > uc + 1.0 / 32.0 + 0.025)
+            fail_msg("pulse %d at %lld ns: %.3f pulses on the capacitor", seen, (long long)e->t_ns, charge);
+        count += sign;
+        seen++;
+    }
+    assert_true(seen > 10000);
+}
+
 static void clk_and_latch(void **state)
 {
     (void)state;
@@ -311,6 +336,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(pulses_are_what_the_counters_count),
+        cmocka_unit_test(a_pulse_rises_where_the_integral_is_at_uc),
         cmocka_unit_test(clk_and_latch),
         cmocka_unit_test(late_listeners_hear_true_levels),
         cmocka_unit_test(a_listener_of_some_lines_and_one_of_others),
