@@ -184,6 +184,13 @@ static inline void rig_run_until(struct rig *r, int64_t t_ns)
     }
 }
 
+/* Up minus down, now. */
+static inline double rig_count(struct rig *rig, unsigned axis)
+{
+    pik_sample_until(&rig->b, rig->s.now_ns);
+    return (double)pik_axis_count(&rig->b.channel[axis].axis);
+}
+
 static inline void rig_done(void *ctx, struct board_cycle *c, enum board_cycle_result result, int64_t t_ns)
 {
     struct rig *r = ctx;
