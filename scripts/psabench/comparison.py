@@ -35,7 +35,7 @@ class Article:
     """What the article says of a generation, and what a unit may miss the integral by.
 
     printed: texts of the article (E1), "": nothing. scale: error of the coefficient, zero_v: of the zero at the load;
-    k_source says whence the first.
+    k_source says whence the first, zero_source whence the second.
     """
 
     printed: str
@@ -44,10 +44,19 @@ class Article:
     scale: float
     zero_v: float
     k_source: str
+    zero_source: str = "E0"
 
 
-# Zeros are three standard deviations of the profiles and chains (E0); the article gives none. PSD-1: its converters
-# have 12 mV rms of noise at their output rate (data sheet), and self-calibration takes zero and full scale with it.
+# PSD-1 of profile psd1_quiet, in V at the input. Self-calibration takes zero and full scale from one word each, with that
+# word's noise (sources 3.2, 3.5): a word is off by -n0 - x (n1 - n0), x the fraction of full scale (E3).
+PSD1_FULL_SCALE_V = 10.0
+PSD1_NOISE_V = 4.0 * 13e-6  # rms of a word at 100 Hz and gain 1 (E2); four times that on AIN2 (E0)
+PSD1_CODE_V = PSD1_FULL_SCALE_V / 2**15  # a word of 16 bits is cut off, not rounded: up to a code low (E0)
+PSD1_REFERENCE = 2e-4  # standard deviation of the reference (E0)
+PSD1_SCALE = 3.0 * (PSD1_REFERENCE**2 + 2.0 * (PSD1_NOISE_V / PSD1_FULL_SCALE_V) ** 2) ** 0.5
+PSD1_ZERO_V = 3.0 * PSD1_NOISE_V + PSD1_CODE_V
+
+# Zeros are three standard deviations of the profiles and chains (E0); the article gives none.
 ARTICLE: Mapping[str, Article] = {
     "pik": Article(
         printed="174 Hz/V within 0.15 %", pulse="60e-3", pulse_mps=60e-3, scale=1.5e-3, zero_v=6e-4, k_source="E1"
@@ -70,9 +79,10 @@ ARTICLE: Mapping[str, Article] = {
         printed="16-bit words of a delta-sigma converter",
         pulse="",
         pulse_mps=None,
-        scale=4e-3,
-        zero_v=40e-3,
-        k_source="E2",
+        scale=PSD1_SCALE,
+        zero_v=PSD1_ZERO_V,
+        k_source="E0 + E3",
+        zero_source="E0 + E3",
     ),
     "psa1": Article(
         printed="resolution finer by more than an order",
