@@ -31,20 +31,23 @@ module ad7712_port #(
     // The word has gone out with the last of 16 clocks.
     always @(negedge sclk) if (!rfs_n && falls == 5'd15) taken <= fresh;
 
-    // What ends while RFS is low is lost.
+    // What ends while RFS is low is lost, and a word that is being read stays on offer.
+    reg hides = 1'b1;
+    always @(posedge update) hides <= rfs_n;
     always @(negedge update) if (rfs_n) fresh <= !taken;
+    wire hidden = update & hides;
 
     generate
         if (RFS_ACCESS_NS == 0) begin : at_once
             assign sdata = bit_now & !rfs_n;
-            assign drdy_n = !waits | update;
+            assign drdy_n = !waits | hidden;
         end else begin : delayed
             reg selected = 1'b0, bit_out = 1'b0, waited = 1'b0;
             always @(rfs_n) selected <= #RFS_ACCESS_NS !rfs_n;
             always @(bit_now) bit_out <= #BIT_ACCESS_NS bit_now;
             always @(waits) waited <= #DRDY_RISE_NS waits;
             assign sdata = bit_out & selected & !rfs_n;
-            assign drdy_n = !(waits | waited) | update;
+            assign drdy_n = !(waits | waited) | hidden;
         end
     endgenerate
 endmodule
