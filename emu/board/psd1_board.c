@@ -65,8 +65,9 @@ static bool adc_flip(void *board, unsigned part, unsigned reg, uint8_t mask, int
 }
 
 #define SOME_FAULTS (BOARD_FAULT_DOUT | BOARD_FAULT_CLOCK)
-#define NO_SYNC     "SYNC is Res's (E0): the converters begin in step, a lost one would show only after a clock that was off"
-#define DR_IS_X     NO_SYNC "; DR is the pin of converter X with the profile psd1, adc.x has it"
+#define NO_SYNC                                                                                                        \
+    "SYNC is Res's (E0): the converters begin in step, a lost one would show only after a clock that was off"
+#define DR_IS_X NO_SYNC "; DR is the pin of converter X with the profile psd1, adc.x has it"
 
 static const struct board_part parts[PARTS] = {
     [PART_KPSD] = {.name = "kpsd",

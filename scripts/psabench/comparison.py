@@ -47,8 +47,8 @@ class Article:
     zero_source: str = "E0"
 
 
-# PSD-1 of profile psd1_quiet, in V at the input. Self-calibration takes zero and full scale from one word each, with that
-# word's noise (sources 3.2, 3.5): a word is off by -n0 - x (n1 - n0), x the fraction of full scale (E3).
+# PSD-1 of profile psd1_quiet, in V at the input. Self-calibration takes zero and full scale from one word each, with
+# that word's noise (sources 3.2, 3.5): a word is off by -n0 - x (n1 - n0), x the fraction of full scale (E3).
 PSD1_FULL_SCALE_V = 10.0
 PSD1_NOISE_V = 4.0 * 13e-6  # rms of a word at 100 Hz and gain 1 (E2); four times that on AIN2 (E0)
 PSD1_CODE_V = PSD1_FULL_SCALE_V / 2**15  # a word of 16 bits is cut off, not rounded: up to a code low (E0)

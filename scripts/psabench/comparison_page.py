@@ -82,7 +82,8 @@ def _method(c: Comparison) -> str:
     rows = "".join(
         f"<li><b>{escape(g.figures.track.title)}</b>: {escape(g.article.printed)}; {escape(g.figures.track.note)}; "
         f"{g.figures.track.ma_v_per_g:.4g} V/g; its readings are {g.lag_s * 1e3:.2f} ms behind; "
-        f"limit: {g.article.scale * 1e2:.3g} % ({g.article.k_source}) and {g.article.zero_v * 1e3:.3g} mV of zero ({g.article.zero_source})</li>"
+        f"limit: {g.article.scale * 1e2:.3g} % ({g.article.k_source}) and {g.article.zero_v * 1e3:.3g} mV of zero "
+        f"({g.article.zero_source})</li>"
         for g in c.graded
     )
     return f"<section class=method><h2>How</h2><ul>{rows}</ul></section>"

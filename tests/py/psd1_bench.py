@@ -54,8 +54,8 @@ FLAGS, BOTH = 15, 3  # its address; INT0 and FL1 active
 
 
 def random_flags(rng: np.random.Generator, before: list[Strobe]) -> list[Strobe]:
-    """Behind these strobes INT0, FL1 or both are taken away and given again, for an instant; now and then given for less
-    than a period in between; some at the instant of a rise. It is over before the next FL2, 13.6 us later at least."""
+    """Behind these strobes INT0, FL1 or both are taken away and given again, for an instant; now and then given for
+    less than a period in between; some at the instant of a rise. It is over before the next FL2, 13.6 us later at least."""
     since_ns = HALF_NS + sum(s.delay_ns + s.length_ns for s in before)  # FL2 rises with a fall of 1M25
     rows = [(int(rng.integers(10, 3000)), int(rng.integers(0, 3))), (int(rng.integers(10, 3000)), BOTH)]
     if rng.random() < 0.5:
@@ -71,7 +71,7 @@ def random_flags(rng: np.random.Generator, before: list[Strobe]) -> list[Strobe]
 
 
 def held_back(rng: np.random.Generator, last: Strobe) -> list[Strobe]:
-    """INT0, FL1 or both are taken away before the last word is read, and given again when conversions may have ended."""
+    """INT0, FL1 or both are taken away before the last word is read, and given again maybe conversions later."""
     off = Strobe(True, int(rng.integers(0, 3000)), int(rng.integers(200, 900)), FLAGS, data=int(rng.integers(0, 3)))
     read = Strobe(False, 10 + last.delay_ns, last.length_ns, last.address)
     wait_ns, length_ns = int(rng.integers(10, 3_000_000)), int(rng.integers(200, 900))
