@@ -253,7 +253,7 @@ static void digest(const void *board, struct sha256 *s)
 }
 
 static const struct board_bus bus = {.submit = submit, .addresses = PSD1_REGS, .name = psd1_register_name};
-static const char *const port_lines[] = {"A0", "DR", "FL2", "SCLK", "SDAT", "CS", NULL};
+static const char *const port_lines[] = {"RFX", "RFY", "RFZ", "SCLK", "SDAT", "FL2", "CS", NULL};
 
 const struct board_type psd1_board = {
     .name = "psd1",

@@ -93,12 +93,14 @@ def cycle_picture(vcd: Vcd) -> str:
         Dim("SCLK", x.rises[0], "SCLK", x.falls[0], "", 1),
         Dim("SCLK", x.rises[1], "SCLK", x.rises[2], "", 0),
     ]
+    clock = vcd.wires["CLK_1M25"].edges_ns(1)
+    begin.append(Dim("CLK_1M25", int(clock[clock <= x.rises[1]][-1]), "SCLK", x.rises[1], " = 3/8 of a period", 2))
     if a0 - dr <= 800:
         begin.append(Dim("DR", dr, "A0", a0, " to a rise", 0))
     if first.size:
-        begin.append(Dim("RFX", x.rf_fall, "SDAT", int(first[-1]), " to the first bit, at most 400", 2))
+        begin.append(Dim("RFX", x.rf_fall, "SDAT", int(first[-1]), " to the first bit, at most 400", 3))
     if bits.size:
-        begin.append(Dim("SCLK", fall, "SDAT", int(bits[-1]), " to the next bit, at most 220", 3))
+        begin.append(Dim("SCLK", fall, "SDAT", int(bits[-1]), " to the next bit, at most 220", 4))
     title = f"PSD-1 cycle at t = {a0 / 1e6:.4f} ms: X, Y, Z one after the other, most significant bit first"
     panels = (Panel(ROWS[1:], (whole,), _words(transfers), dims=dims), Panel(ROWS[:8], (near,), dims=begin))
     return render(vcd, panels, title)
