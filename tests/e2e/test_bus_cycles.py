@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import itertools
+import json
 import socket
+import time
 from pathlib import Path
 
 import pytest
-from psabench.control import Control
+from psabench.busport import BusPort, Who
+from psabench.control import Control, Reply
 from psabench.emulator import Emulator
 from psabench.errors import ControlError
-from rig import HERE, talker
+from rig import HERE, PATIENCE_S, talker
 
 pytestmark = pytest.mark.host
 
@@ -54,7 +58,7 @@ def test_each_refusal_has_its_code_and_is_counted() -> None:
             return int(board.get("refused", board.get("cycles_refused")))
 
         was = {unit: refused(unit) for unit in "dmp"}
-        assert code("bus.read", unit="d", address=0) == "not_ready"  # the built-in host has read it
+        assert code("bus.read", unit="d", address=0) == "taken"  # by the built-in host
         assert code("bus.write", unit="d", address=0, data=1) == "read_only"
         assert code("bus.write", unit="d", address=PSD1_TEMP, data=9) == "value"
         assert code("bus.read", unit="d", address=PSD1_TEMP, strobe_ns=50) == "too_short"
@@ -81,17 +85,64 @@ def test_a_board_without_a_bus_says_so() -> None:
         assert e.value.code == "range"
 
 
+def begin_and_go(emulator: Emulator, line: bytes) -> None:
+    """Sends a command and goes away without its answer, once it is carried out: the one behind it has been answered."""
+    with socket.socket(socket.AF_UNIX) as rude:
+        rude.settimeout(PATIENCE_S)
+        rude.connect(str(emulator.control_path))
+        rude.sendall(line + b'\n{"id":2,"cmd":"time"}\n')
+        with rude.makefile("rb") as answers:
+            while json.loads(answers.readline()).get("id") != 2:
+                pass
+
+
+def until_free(control: Control, command: str, **args: object) -> tuple[Reply, int]:
+    """The answer, and how often the bus was another's before."""
+    deadline_s = time.monotonic() + PATIENCE_S
+    for refused in itertools.count():
+        try:
+            return control.call(command, **args), refused
+        except ControlError as e:
+            if e.code != "busy" or time.monotonic() > deadline_s:
+                raise
+    raise AssertionError
+
+
 def test_in_real_time_the_answer_comes_by_itself() -> None:
-    """Two programs at once, at two boards; one of them goes away without waiting."""
+    """Two programs at once, at two boards; at one of them a third has begun a cycle, and went away without waiting: it
+    is carried out, and the bus is free when it is over. How many are refused until then is up to the machine."""
     with Emulator(SCENARIO, pace="wall") as emulator, control_of(emulator) as one, control_of(emulator) as two:
-        with socket.socket(socket.AF_UNIX) as rude:
-            rude.connect(str(emulator.control_path))
-            rude.sendall(b'{"cmd":"bus.read","args":{"unit":"p","address":10,"strobe_ns":900000000}}\n')
+        begin_and_go(emulator, b'{"id":1,"cmd":"bus.read","args":{"unit":"p","address":10,"strobe_ns":500000000}}')
+        _, refused = until_free(one, "bus.write", unit="p", address=12, data=100)
         for n in range(20):
             one.call("bus.write", unit="p", address=12, data=100 + n)
             two.call("bus.write", unit="m", address=PMKA_BEAT, data=300 + n)
             assert one.call("bus.read", unit="p", address=12).result["data"] == 100 + n
             assert two.call("bus.read", unit="m", address=PMKA_BEAT).result["data"] == 300 + n
+        board = one.call("counters", unit="p").result["board"]
+        assert (board["cycles"], board["cycles_refused"]) == (1 + 1 + 2 * 20, refused)
+
+
+def test_who_comes_while_another_has_the_bus_is_refused(tmp_path: Path) -> None:
+    """A cycle from the bus port, in step pace: it is under way for as long as nobody lets time pass."""
+    link = tmp_path / "port"
+    with (
+        Emulator(SCENARIO, pace="step", extra=("--bus-port", f"p:{link}")) as emulator,
+        control_of(emulator) as control,
+    ):
+        with BusPort(link) as port:
+            port.ask("?\nR A 500000000")
+            assert isinstance(port.answer(), Who)
+            for _ in range(3):
+                with pytest.raises(ControlError, match="another cycle is under way") as e:
+                    control.call("bus.read", unit="p", address=12)
+                assert e.value.code == "busy"
+            begun_ns = control.call("time").t_ns
+            control.call("run", for_s=0.5)
+            assert port.answer().t_s == pytest.approx(begun_ns * 1e-9 + 0.5, abs=1e-9)
+            assert control.call("bus.read", unit="p", address=12).result["name"] == "PERIOD"
+        board = control.call("counters", unit="p").result["board"]
+        assert (board["cycles"], board["cycles_refused"]) == (2, 3)
 
 
 def test_cycles_are_in_a_snapshot(tmp_path: Path) -> None:
