@@ -55,6 +55,35 @@ static void an_unread_word_pulses_drdy_and_is_an_overrun(void **state)
     assert_int_equal(r.a.n.conversions, 5);
 }
 
+/* RFS low holds the register: no update comes, and DRDY announces none, if the word is being read 500 tau before. It rises
+ * with the last bit, and the next word falls in as ever. RFS at that very instant comes behind it (E0). */
+static void drdy_announces_no_update_while_rfs_is_low(void **state)
+{
+    (void)state;
+    for (int64_t late_ns = -1; late_ns <= 1; late_ns++) {
+        struct rig r;
+        power_up(&r, &quiet);
+        write_control(&r, CODE(0, 50));
+        const int64_t next_ns = await_fall(&r) + 50 * MOD_NS, announced_ns = next_ns - 500 * TAU_NS;
+        wait_until(&r, announced_ns - 1000);
+        a0(&r, true);
+        wait_until(&r, announced_ns + late_ns);
+        const unsigned n = r.drdy.n;
+        assert_int_equal(ad7712_drdy(&r.a), late_ns >= 0);
+        rfs(&r, false);
+        wait_ns(&r, FIRST_NS);
+        assert_int_equal(r.drdy.n, n);
+        pulses(&r, 24);
+        const int64_t last_ns = r.s.now_ns;
+        wait_ns(&r, LAST_NS);
+        rfs(&r, true);
+        assert_int_equal(await_fall(&r), next_ns);
+        assert_int_equal(r.drdy.e[r.drdy.n - 2].t_ns, late_ns < 0 ? last_ns + TAU_NS : announced_ns);
+        assert_int_equal(r.a.n.lost_words, 0);
+        assert_int_equal(r.a.n.stale_reads, late_ns >= 0);
+    }
+}
+
 static void a_word_that_is_read_pulses_nothing(void **state)
 {
     (void)state;
@@ -421,6 +450,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(output_rate_by_code_and_clock),
         cmocka_unit_test(an_unread_word_pulses_drdy_and_is_an_overrun),
+        cmocka_unit_test(drdy_announces_no_update_while_rfs_is_low),
         cmocka_unit_test(a_word_that_is_read_pulses_nothing),
         cmocka_unit_test(what_restarts_the_filter),
         cmocka_unit_test(drdy_rises_within_a_modulator_period_of_the_write),
