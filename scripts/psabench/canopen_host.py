@@ -101,6 +101,11 @@ class CanopenNode:
         """Whether the EDS has the object."""
         return index in self._od
 
+    def is_text(self, index: int, sub: int = 0) -> bool:
+        """Whether the EDS has it as characters."""
+        variable = self._od.get_variable(index, sub)
+        return variable is not None and variable.data_type == canopen.objectdictionary.VISIBLE_STRING
+
     def title(self, index: int) -> str:
         """Name of an object, from the EDS."""
         return str(self._od[index].name)

@@ -14,6 +14,7 @@ from typing import Any
 
 from psabench import comparison, comparison_page, decode, grading, record, report, run
 from psabench.can_host import open_bus
+from psabench.devices import ALIASES
 from psabench.errors import BadInput, BenchError
 from psabench.instruments import EXAMPLES
 from psabench.lineport import LineFormat
@@ -168,7 +169,9 @@ def _add_record(commands: Any) -> None:
 
 
 def _add_board(p: argparse.ArgumentParser, what: str) -> None:
-    p.add_argument("--board", choices=tuple(BOARDS), default="psa2", help=f"board of the unit {what} (%(default)s)")
+    names = ", ".join([*BOARDS, *ALIASES])
+    text = f"board of the unit {what}: {names} (%(default)s)"
+    p.add_argument("--board", type=board_name, metavar="BOARD", default="psa2", help=text)
     p.add_argument("--node", type=node_id, help=f"node {what} (the board's usual one)")
 
 
@@ -227,6 +230,14 @@ def positive(text: str) -> float:
     if not 0.0 < value < float("inf"):
         raise argparse.ArgumentTypeError(f"{text!r}; expected a number above 0")
     return value
+
+
+def board_name(text: str) -> str:
+    """A board; another name of it, as psa1 or pik5, is that of the board."""
+    board = ALIASES.get(text, text)
+    if board not in BOARDS:
+        raise argparse.ArgumentTypeError(f"{text!r}; expected {', '.join([*BOARDS, *ALIASES])}")
+    return board
 
 
 def node_id(text: str) -> int:
@@ -318,6 +329,8 @@ def _record(args: argparse.Namespace) -> int:
 
 
 def _decode(args: argparse.Namespace) -> int:
+    if args.line and args.board != "psa2":
+        raise BadInput(f"--line: line frames are PSA-2's; of a {args.board} a CAN log is decoded: leave --line out")
     with args.out.open("w", encoding="utf-8") if args.out else _Stdout() as out:
         if args.line:
             decoder = decode.decode_line(args.file, _line_format(args), out)

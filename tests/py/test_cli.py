@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from psabench import cli
+from psabench.protocol_files import dbc_node
 from test_lineport import lines
 
 MISTAKES: list[tuple[str, str]] = [
@@ -21,6 +22,8 @@ MISTAKES: list[tuple[str, str]] = [
     ("decode nothing.log", "nothing.log: no such file"),
     ("decode README.md", "README.md: ending .md; python-can reads"),
     ("decode --line nothing.bin", "nothing.bin: no such file"),
+    ("decode --line x.bin --board psd1 --out x.csv", "--line: line frames are PSA-2's; of a psd1 a CAN log is decoded"),
+    ("decode --line nothing.bin --board psa1", "nothing.bin: no such file"),
     ("decode --line /", "/: a folder; a file is wanted"),
     ("decode --line /dev/null --word-bits 17", "word_bits is 17; a PSA-2 sends words of 16, 24 or 32 bits"),
     ("decode --line /dev/null --out /dev/null/x.csv", "/dev/null/x.csv: "),
@@ -50,12 +53,28 @@ def test_a_mistake_gets_one_line_and_status_2(
         (cli.node_id, "0"),
         (cli.node_id, "128"),
         (cli.yes_no, "maybe"),
+        (cli.board_name, "psd9"),
     ],
 )
 def test_an_argument_out_of_range_is_refused(convert: object, text: str) -> None:
     assert callable(convert)
     with pytest.raises(argparse.ArgumentTypeError, match="expected"):
         convert(text)
+
+
+@pytest.mark.parametrize(("name", "board"), [("psa1", "psa2"), ("pik5", "pik"), ("pik6", "pik"), ("pmka", "pmka")])
+def test_another_name_of_a_board_is_taken_as_the_board(
+    name: str, board: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    node = dbc_node(board)
+    Path("bus.log").write_text("".join(f"(0.{k}) can0 {k}8{node}#0000000000000000\n" for k in (1, 2, 3)))
+    tables = []
+    for known in (name, board):
+        assert cli.main(["decode", "bus.log", "--board", known]) == 0
+        tables.append(capsys.readouterr())
+    assert tables[0] == tables[1]
+    assert "frames 1" in tables[0].err
 
 
 LOGS: list[tuple[str, str, str]] = [

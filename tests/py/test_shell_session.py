@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from psabench.errors import BadInput, BenchError, ControlError, DeviceError
@@ -231,4 +232,8 @@ def test_a_board_that_is_being_set_up_points_to_dut_ready(monkeypatch: pytest.Mo
 
     monkeypatch.setattr(Session, "_result", refuse)
     with pytest.raises(BenchError, match=r"not in this state; while the board is being set up: dut\.ready waits"):
+        session.do("head.read")
+    session.bench.units["a"] = SimpleNamespace(refusal=lambda: "refused: too early")  # type: ignore[assignment]
+    session.dut_name = "a"
+    with pytest.raises(BenchError, match=r"not in this state; in its own words \(object 2031h\): refused: too early$"):
         session.do("head.read")

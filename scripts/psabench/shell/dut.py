@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -104,18 +105,21 @@ def _read_object(session: Session, args: Args) -> Mapping[str, Any]:
     return {"value": value.hex() if isinstance(value, bytes) else value}
 
 
-def _write_object(session: Session, args: Args) -> Mapping[str, Any]:
-    text = str(args["value"])
-    value: int | float | str = text
-    for kind in (lambda t: int(t, 0), float):
-        try:
-            value = kind(text)
-            break
-        except ValueError:
-            continue
+def _object_value(text: str) -> int | float:
+    whole = registers.number(text)
+    if whole is not None:
+        return whole
     try:
-        session.dut.node.write(int(number(args, "index")), int(number(args, "sub")), value)
-    except (TypeError, ValueError, AttributeError) as e:  # python-canopen cannot make the object's type of it
+        return int(text, 0)
+    except ValueError:
+        return float(text)
+
+
+def _write_object(session: Session, args: Args) -> Mapping[str, Any]:
+    index, sub, text = int(number(args, "index")), int(number(args, "sub")), str(args["value"])
+    try:
+        session.dut.node.write(index, sub, text if session.dut.node.is_text(index, sub) else _object_value(text))
+    except (TypeError, ValueError, AttributeError, struct.error) as e:  # python-canopen cannot make its type of it
         raise Wrong(f"value: {text!r}: {e}") from e
     return {}
 
@@ -206,7 +210,7 @@ _FORM = Arg(
 _INDEX = Arg(name="index", kind=Kind.COUNT, low=0, high=0xFFFF, what="of the object, as 2030h")
 _SUB = Arg(name="sub", kind=Kind.COUNT, low=0, high=255, what="sub-index")
 _UNIT = Arg(name="unit", optional=True, what="name of a unit of the scenario")
-_ANY = Arg(name="value", what="number or text")
+_ANY = Arg(name="value", what="number (86, 56h, 0x56) or text")
 
 
 def _row(name: str, what: str, run: Handler, *args: Arg) -> Row:

@@ -90,22 +90,22 @@ def explain(converter: str, name: str, value: int) -> str:
 def changed(converter: str, name: str, value: int, text: str) -> int:
     """The register's value after `text`: a number (56h, 0x56, 86), or fields of it (`DR=3,PHASE=0`). Raises Wrong."""
     for part in text.split(","):
-        field, equals, number = part.partition("=")
+        field, equals, digits = part.partition("=")
         if not equals:
             return _byte(name, text)
         rows = {b.name: b for b in FIELDS.get((group(converter), name), ())}
         bits = rows.get(field)
         if bits is None:
             raise Wrong(f"{name} has no field {field}; it has {', '.join(rows) or 'none: write the whole byte'}")
-        n = _number(number)
+        n = number(digits)
         if n is None or n > bits.mask >> bits.shift:
-            raise Wrong(f"{name}.{field}: {number!r}; 0 to {bits.mask >> bits.shift} is right")
+            raise Wrong(f"{name}.{field}: {digits!r}; 0 to {bits.mask >> bits.shift} is right")
         value = (value & ~bits.mask) | (n << bits.shift)
     return value
 
 
 def _byte(name: str, text: str) -> int:
-    n = _number(text)
+    n = number(text)
     if n is None or n > 0xFF:
         raise Wrong(f"{name}: {text!r}; a byte is wanted (56h, 0x56, 86), or fields (DR=3,PHASE=0)")
     return n
@@ -113,13 +113,14 @@ def _byte(name: str, text: str) -> int:
 
 def word(name: str, text: str) -> int:
     """A word for a register on a bus: a number up to FFFFh. Raises Wrong."""
-    n = _number(text)
+    n = number(text)
     if n is None or n > 0xFFFF:
         raise Wrong(f"{name}: {text!r}; a word is wanted (A55Ah, 0xA55A, 42330)")
     return n
 
 
-def _number(text: str) -> int | None:
+def number(text: str) -> int | None:
+    """A whole number as the shell's lines have it: 56h, 0x56, 86. None: it is none."""
     if m := re.fullmatch(r"0x([0-9A-Fa-f]+)|([0-9A-Fa-f]+)h", text):
         return int(m[1] or m[2], 16)
     return int(text) if text.isdecimal() else None

@@ -96,12 +96,20 @@ class Session:
         except DeviceError as e:
             if e.abort_code != NOT_NOW or isinstance(e, CycleRefused):
                 raise
-            raise BenchError(f"{e}; while the board is being set up: dut.ready waits for the end") from e
+            raise BenchError(f"{e}; {self._why_not_now()}") from e
         failed = str(result.get("failed", "")) if call.command.name == "expect" else ""
         if result and call.command.name not in own.UNSAID and call.command.name != "expect":
             self.latest = result
         t_ns = None if call.command.wire == QUIT else self.now_ns()  # nobody is there to tell it
         return Outcome(call=call, result=result, t_ns=t_ns, failed=failed)
+
+    def _why_not_now(self) -> str:
+        """The board's own words (object 2031h) where it has any."""
+        with suppress(BenchError):
+            words = self.dut.refusal() if self.dut_name in self.bench.units else ""
+            if words:
+                return f"in its own words (object 2031h): {words}"
+        return "while the board is being set up: dut.ready waits for the end"
 
     def _result(self, call: Call) -> Mapping[str, Any]:
         mine = own.HANDLERS.get(call.command.name)
