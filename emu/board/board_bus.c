@@ -11,6 +11,7 @@ const char *board_cycle_word(enum board_cycle_result r)
         [BOARD_CYCLE_TOO_SHORT] = "too-short",
         [BOARD_CYCLE_BUSY] = "busy",
         [BOARD_CYCLE_BAD_VALUE] = "bad-value",
+        [BOARD_CYCLE_TAKEN] = "taken",
         [BOARD_CYCLE_OFF] = "off",
     };
     return words[r];

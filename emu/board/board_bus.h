@@ -14,8 +14,13 @@ enum board_cycle_result {
     BOARD_CYCLE_TOO_SHORT, /* the strobe is shorter than the board needs */
     BOARD_CYCLE_BUSY,      /* somebody else's cycle is under way: refused at once, to be asked again */
     BOARD_CYCLE_BAD_VALUE,
-    BOARD_CYCLE_OFF /* no power, or cut by a reset */
+    BOARD_CYCLE_TAKEN, /* too early: no word waits, and the board's built-in host takes each that comes */
+    BOARD_CYCLE_OFF    /* no power, or cut by a reset */
 };
+
+/* Why a cycle is BOARD_CYCLE_TAKEN, and the way out. */
+#define BOARD_CYCLE_TAKEN_WHY                                                                                          \
+    "too early: no word waits there; the board's built-in host takes each that comes, profile psd1_host has none"
 
 /* One word for programs, "not-ready"; "ok" for BOARD_CYCLE_OK. */
 const char *board_cycle_word(enum board_cycle_result r);

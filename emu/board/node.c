@@ -38,6 +38,7 @@ static const struct {
     [BOARD_CYCLE_TOO_SHORT] = {CO_AB_VALUE, "the strobe is shorter than the board needs"},
     [BOARD_CYCLE_BUSY] = {CO_AB_STATE, "another cycle is under way"},
     [BOARD_CYCLE_BAD_VALUE] = {CO_AB_VALUE, "the register does not take this value"},
+    [BOARD_CYCLE_TAKEN] = {CO_AB_STATE, BOARD_CYCLE_TAKEN_WHY},
     [BOARD_CYCLE_OFF] = {CO_AB_STATE, "the board has no power, or is in reset"},
 };
 

@@ -8,6 +8,7 @@
 #include <string.h>
 
 enum { SOURCE_CONVERTER = 1, REG_DEVICE = 0x81, NS_PER_US = 1000 };
+enum { SATURATED = PIK_ST_SATURATED_X | PIK_ST_SATURATED_Y | PIK_ST_SATURATED_Z };
 
 static const struct pik *pik_of(const struct board_node *n)
 {
@@ -23,10 +24,18 @@ static uint32_t read_totals(struct board_node *n, const struct co_entry *e, stru
     return CO_OK;
 }
 
+static uint32_t read_increments(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
+{
+    (void)t_ns;
+    v->number = (int16_t)pik_of(n)->latched.increment[e->sub - 1];
+    return CO_OK;
+}
+
 static uint32_t read_reading(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
 {
     const struct pik_reading *r = &pik_of(n)->latched;
-    const uint32_t value[] = {0, r->seq, (uint32_t)(r->t_ns / NS_PER_US), r->status};
+    const uint32_t value[] = {0,         r->seq,          (uint32_t)(r->t_ns / NS_PER_US),
+                              r->status, (uint8_t)r->seq, r->status & SATURATED};
     (void)t_ns;
     v->number = value[e->sub];
     return CO_OK;
@@ -46,6 +55,7 @@ static uint32_t read_plate(struct board_node *n, const struct co_entry *e, struc
 
 static const struct board_object objects[] = {
     {PIK_OD_TOTALS, read_totals, NULL},
+    {PIK_OD_INCREMENTS, read_increments, NULL},
     {PIK_OD_READING, read_reading, NULL},
     {PIK_OD_PLATE, read_plate, NULL},
 };
@@ -69,7 +79,7 @@ static void on_reading(void *ctx, const struct pik_reading *r, int64_t t_ns)
     struct can_msg m[PIK_TPDOS] = {{.len = 8}, {.len = 8}, {.len = 8}};
     for (unsigned i = 0; i < PIK_AXES; i++) put16(m[0].data + 2 * i, (uint16_t)r->increment[i]);
     m[0].data[6] = (uint8_t)r->seq;
-    m[0].data[7] = r->status & (PIK_ST_SATURATED_X | PIK_ST_SATURATED_Y | PIK_ST_SATURATED_Z);
+    m[0].data[7] = r->status & SATURATED;
     put32(m[1].data, (uint32_t)r->total[0]);
     put32(m[1].data + 4, (uint32_t)r->total[1]);
     put32(m[2].data, (uint32_t)r->total[2]);

@@ -49,6 +49,32 @@ static void on_reading(void *ctx, const struct pmka_reading *r, int64_t t_ns)
     board_node_stream(&c->node, PMKA_CODES_TPDO, m, 2, t_ns);
 }
 
+static const struct pmka_reading *latest(const struct board_node *n)
+{
+    return &((const struct pmka *)n->board)->latest;
+}
+
+static uint32_t read_code(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
+{
+    (void)t_ns;
+    v->number = latest(n)->code[e->sub - 1];
+    return CO_OK;
+}
+
+/* The bytes of the message. */
+static uint32_t read_state(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
+{
+    enum { RESETS = 2, TEMPERATURE = 6 };
+    struct can_msg m = {0};
+    (void)t_ns;
+    pack_state(latest(n), &m);
+    if (e->sub < RESETS) v->number = (uint16_t)latest(n)->seq;
+    else v->number = e->sub < TEMPERATURE ? m.data[e->sub] : latest(n)->temp_code;
+    return CO_OK;
+}
+
+static const struct board_object objects[] = {{PMKA_OD_CODES, read_code, NULL}, {PMKA_OD_STATE, read_state, NULL}};
+
 static uint32_t serial(const void *board)
 {
     return ((const struct pmka *)board)->cfg.serial;
@@ -59,8 +85,12 @@ static int64_t period_ns(const void *board)
     return ((const struct pmka *)board)->profile.ts_ns;
 }
 
-static const struct board_node_type type = {
-    .board = &pmka_board, .device = &pmka_device, .serial = serial, .period_ns = period_ns};
+static const struct board_node_type type = {.board = &pmka_board,
+                                            .device = &pmka_device,
+                                            .objects = objects,
+                                            .object_count = sizeof objects / sizeof *objects,
+                                            .serial = serial,
+                                            .period_ns = period_ns};
 
 static void init(void *can, const struct board_can_cfg *cfg, void *board, struct can_bus *bus, struct sched *s)
 {

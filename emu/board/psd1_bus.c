@@ -243,8 +243,8 @@ static enum board_cycle_result refusal(const struct psd1 *b, const struct board_
     if (c->write && !registers[c->address].write) return BOARD_CYCLE_READ_ONLY;
     if (len_ns < (int64_t)b->profile.strobe_min_ns) return BOARD_CYCLE_TOO_SHORT;
     if (c->write) return registers[c->address].check ? registers[c->address].check(b, c->data) : BOARD_CYCLE_OK;
-    const bool word = c->address <= PSD1_REG_Z;
-    return word && (!b->fl2 || b->taken || b->axis != c->address) ? BOARD_CYCLE_NOT_READY : BOARD_CYCLE_OK;
+    if (c->address > PSD1_REG_Z || (b->fl2 && !b->taken && b->axis == c->address)) return BOARD_CYCLE_OK;
+    return b->profile.host_strobe_ns > 0 ? BOARD_CYCLE_TAKEN : BOARD_CYCLE_NOT_READY;
 }
 
 static void count_refusal(struct psd1 *b, enum board_cycle_result r)

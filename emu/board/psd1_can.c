@@ -18,6 +18,16 @@ static uint32_t at_most(int64_t value, uint32_t most)
     return value < (int64_t)most ? (uint32_t)value : most;
 }
 
+static uint16_t length_of(const struct psd1_cycle *c)
+{
+    return (uint16_t)at_most((c->t_end_ns - c->t_a0_ns) / PSD1_PERIOD_NS, 65535);
+}
+
+static uint8_t waited_of(const struct psd1_cycle *c)
+{
+    return (uint8_t)at_most((c->t_a0_ns - c->t_dr_ns) / PSD1_PERIOD_NS, 255);
+}
+
 static void pack_cycle(const struct psd1_cycle *c, struct can_msg *m)
 {
     const struct psabench_psd1_cycle_t p = {
@@ -40,8 +50,8 @@ static void pack_time(const struct psd1_cycle *c, struct can_msg *m)
 {
     const struct psabench_psd1_time_t p = {
         .tstamp = (uint32_t)(c->t_a0_ns / 1000),
-        .length = (uint16_t)at_most((c->t_end_ns - c->t_a0_ns) / PSD1_PERIOD_NS, 65535),
-        .waited = (uint8_t)at_most((c->t_a0_ns - c->t_dr_ns) / PSD1_PERIOD_NS, 255),
+        .length = length_of(c),
+        .waited = waited_of(c),
         .cnt = (uint8_t)c->seq,
     };
     m->len = (uint8_t)psabench_psd1_time_pack(m->data, &p, sizeof m->data);
@@ -131,7 +141,20 @@ static uint32_t read_stored(struct board_node *n, const struct co_entry *e, stru
     if (e->index == PSD1_OD_ZERO_COEF) v->number = b->zero[axis];
     else if (e->index == PSD1_OD_FULL_COEF) v->number = b->full[axis];
     else if (e->index == PSD1_OD_GYRO) v->number = b->latest.gyro[axis];
+    else if (e->index == PSD1_OD_GYRO_LOW) v->number = (int16_t)b->latest.gyro[axis];
+    else if (e->index == PSD1_OD_RATE) v->number = b->latest.rate[axis];
     else v->number = b->latest.word[axis];
+    return CO_OK;
+}
+
+/* In the order of proto/psd1.yaml, as the messages have it. */
+static uint32_t read_cycle(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
+{
+    const struct psd1_cycle *c = &board_of(n)->latest;
+    const uint32_t value[] = {
+        0, (uint8_t)c->seq, c->status & 0x7Fu, (uint32_t)(c->t_a0_ns / 1000), length_of(c), waited_of(c), 0};
+    (void)t_ns;
+    v->number = value[e->sub];
     return CO_OK;
 }
 
@@ -139,7 +162,8 @@ static const struct board_object objects[] = {
     {PSD1_OD_UC1, read_uc, write_uc},       {PSD1_OD_UC2, read_uc, write_uc},
     {PSD1_OD_ZERO_COEF, read_stored, NULL}, {PSD1_OD_FULL_COEF, read_stored, NULL},
     {PSD1_OD_CONTROL, read_control, NULL},  {PSD1_OD_GYRO, read_stored, NULL},
-    {PSD1_OD_CODES, read_stored, NULL},
+    {PSD1_OD_CODES, read_stored, NULL},     {PSD1_OD_CYCLE, read_cycle, NULL},
+    {PSD1_OD_GYRO_LOW, read_stored, NULL},  {PSD1_OD_RATE, read_stored, NULL},
 };
 
 static uint32_t serial(const void *board)

@@ -17,6 +17,7 @@ static const struct {
     [BOARD_CYCLE_TOO_SHORT] = {"too_short", "the strobe is shorter than the board needs"},
     [BOARD_CYCLE_BUSY] = {"busy", "another cycle is under way"},
     [BOARD_CYCLE_BAD_VALUE] = {"value", "the board does not take this value"},
+    [BOARD_CYCLE_TAKEN] = {"taken", BOARD_CYCLE_TAKEN_WHY},
     [BOARD_CYCLE_OFF] = {"off", "the board has no power, or a reset cut the cycle"},
 };
 

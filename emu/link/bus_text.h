@@ -14,7 +14,7 @@
  *     I <board> <address>=<name> ... t=<ns>
  *     E <code> <R|W|?|-> <address|-> t=<ns>
  *
- * Codes of the board: no-address read-only write-only not-ready too-short busy bad-value off. Of the port: syntax (no such
+ * Codes of the board: no-address read-only write-only not-ready taken too-short busy bad-value off. Of the port: syntax (no such
  * letter, a field too few or too many), number (a field is no number or too large), overlong (more than 80 characters). */
 #ifndef PSABENCH_LINK_BUS_TEXT_H
 #define PSABENCH_LINK_BUS_TEXT_H

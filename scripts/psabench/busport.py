@@ -34,6 +34,10 @@ CODES: Mapping[str, tuple[int, str]] = {
     "read-only": (0x06010002, "this register is read-only"),
     "write-only": (0x06010001, "this register is write-only"),
     "not-ready": (0x08000022, "too early: no word waits there"),
+    "taken": (
+        0x08000022,
+        "too early: no word waits there; the board's built-in host takes each that comes, profile psd1_host has none",
+    ),
     "too-short": (0x06090030, "the strobe is shorter than the board needs"),
     "busy": (0x08000022, "another cycle is under way"),
     "bad-value": (0x06090030, "the register does not take this value"),

@@ -179,6 +179,7 @@ REFUSALS = [
     ("pik", "nothing there", lambda u: u.bus_read(14), 0x06090011, "nothing answers at this address"),
     ("pik", "nothing there to write", lambda u: u.bus_write(15, 0), 0x06090011, "write to address 15 (nothing)"),
     ("psd1_host", "a word before its time", lambda u: u.bus_read(1), 0x08000022, "too early"),
+    ("psd1", "a word of the built-in host", lambda u: u.bus_read(1), 0x08000022, "profile psd1_host"),
     ("psd1", "a strobe too short", lambda u: u.bus_read(STATUS, strobe_ns=50), 0x06090030, "strobe 50 ns"),
     ("pmka", "a strobe too short", lambda u: u.bus_read(8, strobe_ns=1), 0x06090030, "shorter than the board needs"),
     ("pik", "a strobe too short", lambda u: u.bus_read(10, strobe_ns=50), 0x06090030, "shorter than the board needs"),
@@ -276,6 +277,80 @@ def test_every_object_of_every_eds_is_there_with_its_rights(rig: Rig) -> None:
         assert e.value.abort_code == 0x06020000
 
 
+class Mapped:
+    """The TPDOs of a unit as python-canopen maps them from its EDS, and the frames that came."""
+
+    def __init__(self, unit: Unit) -> None:
+        node = unit.node.node_id
+        remote = canopen.RemoteNode(node, canopen.import_od(str(proto_file(f"{unit.board}.eds")), node))
+        canopen.Network().add_node(remote)
+        remote.tpdo.read(from_od=True)  # type: ignore[no-untyped-call]
+        self.unit, self.pdos = unit, list(remote.tpdo.values())
+        self.came = 0
+        unit.host.listeners.append(self._on_message)
+        unit.start()
+
+    def _on_message(self, m: can.Message) -> None:
+        for pdo in self.pdos:
+            if m.arbitration_id == pdo.cob_id:
+                pdo.on_message(pdo.cob_id, bytearray(m.data), m.timestamp)
+                self.came += 1
+
+    def wait(self) -> None:
+        """Until a frame of each has come."""
+        assert self.unit.host.pump_until(lambda: self.came >= len(self.pdos), 1.0)
+
+    def differing(self) -> list[str]:
+        """Objects that do not say what the latest frame has in their place."""
+        assert all(pdo.map for pdo in self.pdos)
+        values = {(v.index, v.subindex): v.raw for pdo in self.pdos for v in pdo.map}
+        return [f"{i:04X}h:{sub}" for (i, sub), v in values.items() if self.unit.node.read(i, sub) != v]
+
+
+@ONE
+def test_mapped_objects_say_what_the_frames_carried(rig: Rig) -> None:
+    """Readings that stand: the next cycle waits for its host, the next latch for its strobe."""
+    psd1: Psd1 = unit_of(rig, "psd1_host")
+    psd1.also("PSD1_TIME", "PSD1_GYRO", "PSD1_RATE")
+    mapped = Mapped(psd1)
+    psd1.bus_write(FLAGS, INT0 | FL1)
+    for axis in range(3):
+        wait_for_word(psd1, axis)
+        psd1.bus_read(axis)
+    mapped.wait()
+    assert mapped.differing() == []
+    assert psd1.node.read(0x2202, 2) & 7 == 7, "three words answered"
+    pik: Pik = unit_of(rig, "pik")
+    address = {name: a for a, name in pik.registers("bus").items()}
+    pik.bus_write(address["PERIOD"], 0)
+    mapped = Mapped(pik)
+    rig.host.advance(0.1)
+    pik.bus_write(address["LATCH"], 1)
+    mapped.wait()
+    assert mapped.differing() == []
+    assert pik.node.read(0x2201, 1) > 0, "0.2 V on X"
+
+
+@ONE
+def test_mapped_objects_of_a_pmka_say_what_its_frames_carried(rig: Rig) -> None:
+    """Its readings never stand: each object at a time when the number of the reading is that of the frames."""
+    pmka: Pmka = unit_of(rig, "pmka")
+    mapped = Mapped(pmka)
+    mapped.wait()
+    for pdo in mapped.pdos:
+        for v in pdo.map:
+            for _ in range(100):
+                seq = [mapped.pdos[1].map[0].raw]
+                seq.append(pmka.node.read(0x2202, 1))
+                value, want = pmka.node.read(v.index, v.subindex), v.raw
+                seq += [pmka.node.read(0x2202, 1), mapped.pdos[1].map[0].raw]
+                if len(set(seq)) == 1:
+                    break
+            else:
+                raise AssertionError("the reading moves on at each look")
+            assert value == want, v.name
+
+
 # ---- the bus port
 
 
@@ -308,6 +383,16 @@ def test_the_bus_port_gives_the_same_cycles(ported: tuple[Rig, BusPort]) -> None
     counters = unit.counters()
     assert counters["Strobes"] >= 7
     assert counters["Bus cycles"] == 0, "those of the CAN side alone"
+
+
+@HOST
+def test_the_bus_port_says_that_the_built_in_host_takes_the_words(make_rig: MakeRig) -> None:
+    rig = make_rig("socketcand", SCENARIO, extra=("--bus-port", "psd1:-"))
+    rig.host.advance(SETUP_S)
+    with BusPort(rig.emulator.endpoint(bus="pty")["pty"], rig.host.advance) as port:
+        e = refused(lambda: port.read(1))
+    assert e.abort_code == 0x08000022
+    assert "profile psd1_host" in str(e)
 
 
 @HOST
@@ -379,6 +464,20 @@ def test_the_shell_s_words_for_the_device_go_for_every_board() -> None:
         with pytest.raises(BenchError, match="too early") as early:
             session.do("dut.register bus X")
         assert "dut.ready" not in str(early.value), "that is for a board that is being set up"
+        say("dut.use psd1")
+        with pytest.raises(BenchError, match=r"address 0 \(X\).*too early.*profile psd1_host") as not_now:
+            session.do("dut.object 2002h 1")
+        assert "dut.ready" not in str(not_now.value)
+        for text, word in (("220014h", 0x220014), ("0x220013", 0x220013), (str(0x220014), 0x220014)):
+            assert say(f"dut.set 2042h 0 {text}") == {}
+            assert say("dut.object 2042h")["value"] == word
+        with pytest.raises(BenchError, match="abort 06090030h"):
+            session.do("dut.set 2042h 0 228013h")  # 24-bit words: the board's to refuse
+        for text in ("fish", "1FFFFFFFFh"):
+            with pytest.raises(BenchError, match=f"value: '{text}'"):
+                session.do(f"dut.set 2042h 0 {text}")
+        assert say("dut.set 2040h 0 56h") == {}
+        assert say("dut.object 2040h")["value"] == "56h", "characters stay characters"
         say("dut.use pmka")
         stream = say("dut.stream 5")
         assert [r["signal"] for r in stream["signals"]][:4] == ["X", "Y", "Z", "K"]

@@ -43,7 +43,8 @@ PROTOCOLS = gen_proto.load_all()
 UNITS = PROTOCOLS[1:]
 EACH = pytest.mark.parametrize("protocol", PROTOCOLS, ids=lambda p: p.key)
 EACH_UNIT = pytest.mark.parametrize("protocol", UNITS, ids=lambda p: p.key)
-XY = load_database().get_message_by_name("PSA2_XY")
+DATABASE = load_database()
+XY = DATABASE.get_message_by_name("PSA2_XY")
 
 
 @pytest.fixture(scope="module")
@@ -340,10 +341,39 @@ def test_mappings_lay_out_their_messages(protocol: Any, db: cantools.database.ca
             continue
         bits = [value & 0xFF for value in entries]
         assert sum(bits) == 8 * message.length
-        starts = {sum(bits[:i]) for i in range(len(bits))}
-        assert starts <= {s.start for s in message.signals}
-        for value in entries:
-            assert od[value >> 16][value >> 8 & 0xFF].pdo_mappable
+        starts = {sum(bits[:i]): od[v >> 16][v >> 8 & 0xFF] for i, v in enumerate(entries)}
+        filled = {s.start + k for s in message.signals for k in range(s.length)}
+        for start, variable in starts.items():
+            assert variable.pdo_mappable
+            fills = not filled & set(range(start, start + len(variable)))
+            assert start in {s.start for s in message.signals} or (variable.name == "Reserved" and fills)
+        assert [len(variable) for variable in starts.values()] == bits, "each object whole"
+
+
+@EACH_UNIT
+def test_every_message_of_a_unit_is_mapped(protocol: Any) -> None:
+    od = od_of(protocol)
+    assert all(od[0x1A00 + k][0].default for k in range(len(protocol.tpdos)))
+
+
+@EACH_UNIT
+@given(data=st.binary(min_size=8, max_size=8))
+def test_python_canopen_decodes_a_frame_by_the_mapping_as_cantools_does(protocol: Any, data: bytes) -> None:
+    """Each signal, found in the object that lies over it; an object that is one signal has its very value."""
+    node = canopen.RemoteNode(protocol.device["node"], od_of(protocol))
+    canopen.Network().add_node(node)
+    node.tpdo.read(from_od=True)  # type: ignore[no-untyped-call]
+    for k, tpdo in enumerate(protocol.tpdos):
+        pdo, message = node.tpdo[k + 1], DATABASE.get_message_by_name(tpdo["message"])
+        pdo.on_message(pdo.cob_id, bytearray(data), 0.0)
+        want: Any = message.decode(data, scaling=False, decode_choices=False)
+        for s in message.signals:
+            v = next(v for v in pdo.map if v.offset <= s.start < v.offset + v.length)
+            if (v.offset, v.length) == (s.start, s.length):
+                assert v.raw == want[s.name], s.name
+            else:
+                bits = v.raw >> s.start - v.offset & (1 << s.length) - 1
+                assert bits == want[s.name] & (1 << s.length) - 1, s.name
 
 
 @pytest.mark.parametrize(

@@ -311,6 +311,7 @@ static void each_refusal_has_its_code_its_words_and_is_counted(void **state)
         {BOARD_CYCLE_READ_ONLY, 0x06010002, "read-only"},
         {BOARD_CYCLE_WRITE_ONLY, 0x06010001, "write-only"},
         {BOARD_CYCLE_NOT_READY, 0x08000022, "too early"},
+        {BOARD_CYCLE_TAKEN, 0x08000022, "profile psd1_host"},
         {BOARD_CYCLE_TOO_SHORT, 0x06090030, "strobe is shorter"},
         {BOARD_CYCLE_BUSY, 0x08000022, "another cycle"},
         {BOARD_CYCLE_BAD_VALUE, 0x06090030, "value"},
