@@ -55,7 +55,7 @@ FLAGS, BOTH = 15, 3  # its address; INT0 and FL1 active
 
 def random_flags(rng: np.random.Generator, before: list[Strobe]) -> list[Strobe]:
     """Behind these strobes INT0, FL1 or both are taken away and given again, for an instant; now and then given for
-    less than a period in between; some at the instant of a rise. It is over before the next FL2, 13.6 us later at least."""
+    less than a period in between; some at the instant of a rise. Over before the next FL2, 13.6 us later at least."""
     since_ns = HALF_NS + sum(s.delay_ns + s.length_ns for s in before)  # FL2 rises with a fall of 1M25
     rows = [(int(rng.integers(10, 3000)), int(rng.integers(0, 3))), (int(rng.integers(10, 3000)), BOTH)]
     if rng.random() < 0.5:
