@@ -137,8 +137,9 @@ DRDY_PULSE_TAU = 500  # DRDY is high so long before an unread word is replaced (
 def test_a_thousand_cycles_of_psd_1_have_the_edges_of_the_verilog_model(
     clock_ppm: int, tau_ns: int, phases: int, seed: int | None, cycles: int, tmp_path: Path
 ) -> None:
-    """Random delays, lengths and mistakes of the host, which takes INT0 and FL1 away at times. On its own clock converter X
-    ends its words where 1M25 rises; on another one, here 7.8125 MHz, at every 32 ns of a period."""
+    """Random delays, lengths and mistakes of the host, which takes INT0 and FL1 away at times. On its own clock
+    converter X ends its words where 1M25 rises; on another one, here 7.8125 MHz, at every 32 ns of a period. Without a
+    seed: that of TEST_SEED, or a new one."""
     seed = seed_of_test() if seed is None else seed
     prompt = [[psd1_bench.Strobe(True, 1000, 800, axis)] for axis in range(3)]  # INT0 and FL1 come with the first cycle
     strobes = list(psd1_bench.random_strobes(np.random.default_rng(seed), cycles, flags=0.2))
