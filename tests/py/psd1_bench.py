@@ -53,13 +53,9 @@ class Strobe:
 FLAGS, BOTH = 15, 3  # its address; INT0 and FL1 active
 
 
-def random_flags(rng: np.random.Generator, before: list[Strobe]) -> list[Strobe]:
-    """Behind these strobes INT0, FL1 or both are taken away and given again, for an instant; now and then given for
-    less than a period in between; some at the instant of a rise. Over before the next FL2, 13.6 us later at least."""
+def writes(rng: np.random.Generator, before: list[Strobe], rows: list[tuple[int, int]]) -> list[Strobe]:
+    """FLAGS is written so long after the strobe before, with these data; some writes end with a rise of 1M25."""
     since_ns = HALF_NS + sum(s.delay_ns + s.length_ns for s in before)  # FL2 rises with a fall of 1M25
-    rows = [(int(rng.integers(10, 3000)), int(rng.integers(0, 3))), (int(rng.integers(10, 3000)), BOTH)]
-    if rng.random() < 0.5:
-        rows += [(int(rng.integers(10, 600)), int(rng.integers(0, 3))), (int(rng.integers(10, 3000)), BOTH)]
     strobes = []
     for wait_ns, data in rows:
         length_ns = int(rng.integers(200, 900))
@@ -70,12 +66,23 @@ def random_flags(rng: np.random.Generator, before: list[Strobe]) -> list[Strobe]
     return strobes
 
 
+def random_flags(rng: np.random.Generator, before: list[Strobe], first_ns: int = 0) -> list[Strobe]:
+    """Behind these strobes INT0, FL1 or both are taken away and given again, for an instant; now and then given for
+    about a period of 1M25 in between. Over before the next FL2, 13.6 us later at least. first_ns: they are away
+    already, and given after so long."""
+    rows = [(int(rng.integers(10, 3000)), int(rng.integers(0, 3))), (int(rng.integers(10, 3000)), BOTH)]
+    if first_ns:
+        rows = [(first_ns, BOTH)]
+    if rng.random() < 0.5:
+        rows += [(int(rng.integers(10, 300)), int(rng.integers(0, 3))), (int(rng.integers(10, 3000)), BOTH)]
+    return writes(rng, before, rows)
+
+
 def held_back(rng: np.random.Generator, last: Strobe) -> list[Strobe]:
     """INT0, FL1 or both are taken away before the last word is read, and given again maybe conversions later."""
     off = Strobe(True, int(rng.integers(0, 3000)), int(rng.integers(200, 900)), FLAGS, data=int(rng.integers(0, 3)))
-    read = Strobe(False, 10 + last.delay_ns, last.length_ns, last.address)
-    wait_ns, length_ns = int(rng.integers(10, 3_000_000)), int(rng.integers(200, 900))
-    return [off, read, Strobe(False, wait_ns, length_ns, FLAGS, data=BOTH)]
+    before = [off, Strobe(False, 10 + last.delay_ns, last.length_ns, last.address)]
+    return before + random_flags(rng, before, int(rng.integers(10, 3_000_000)))
 
 
 def scenario(directory: Path, seed: int) -> Path:
