@@ -1,6 +1,7 @@
 #include "board/pik_board.h"
 
 #include "board/board_digest.h"
+#include "board/board_life.h"
 #include "board/pik.h"
 #include "board/pik_can.h"
 
@@ -134,36 +135,12 @@ static double range_v(const void *board)
 
 /* ---- life ---- */
 
-static void init(void *board, const void *profile, const struct board_cfg *cfg, const struct board_io *io,
-                 struct sched *s)
-{
-    pik_init(board, profile, cfg, io, s);
-}
-
-static void power_up(void *board, int64_t t_ns)
-{
-    pik_power_up(board, t_ns);
-}
-
-static void power_down(void *board, int64_t t_ns)
-{
-    pik_power_down(board, t_ns);
-}
-
-static void reset(void *board, int64_t t_ns)
-{
-    pik_reset(board, t_ns);
-}
+BOARD_LIFE(pik);
 
 static bool ready(const void *board)
 {
     const struct pik *b = board;
     return b->on && (b->any || b->period_100us == 0);
-}
-
-static void sample_until(void *board, int64_t t_ns)
-{
-    pik_sample_until(board, t_ns);
 }
 
 static void wrong(void *board, uint32_t wrongs)
@@ -174,16 +151,6 @@ static void wrong(void *board, uint32_t wrongs)
 static void listen(void *board, bool on)
 {
     pik_listen(board, on);
-}
-
-static struct trace *trace(void *board)
-{
-    return &((struct pik *)board)->trace;
-}
-
-static struct line_faults *line(void *board)
-{
-    return &((struct pik *)board)->line;
 }
 
 static struct afe *afe(void *board, unsigned axis)

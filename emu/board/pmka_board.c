@@ -1,6 +1,7 @@
 #include "board/pmka_board.h"
 
 #include "board/board_digest.h"
+#include "board/board_life.h"
 #include "board/pmka.h"
 #include "board/pmka_can.h"
 
@@ -93,35 +94,11 @@ static const struct board_part parts[PARTS] = {
 
 /* ---- life ---- */
 
-static void init(void *board, const void *profile, const struct board_cfg *cfg, const struct board_io *io,
-                 struct sched *s)
-{
-    pmka_init(board, profile, cfg, io, s);
-}
-
-static void power_up(void *board, int64_t t_ns)
-{
-    pmka_power_up(board, t_ns);
-}
-
-static void power_down(void *board, int64_t t_ns)
-{
-    pmka_power_down(board, t_ns);
-}
-
-static void reset(void *board, int64_t t_ns)
-{
-    pmka_reset(board, t_ns);
-}
+BOARD_LIFE(pmka);
 
 static bool ready(const void *board)
 {
     return pmka_ready(board);
-}
-
-static void sample_until(void *board, int64_t t_ns)
-{
-    pmka_sample_until(board, t_ns);
 }
 
 static void wrong(void *board, uint32_t wrongs)
@@ -133,16 +110,6 @@ static void listen(void *board, bool on)
 {
     struct pmka *b = board;
     b->told = on && b->io.event;
-}
-
-static struct trace *trace(void *board)
-{
-    return &((struct pmka *)board)->trace;
-}
-
-static struct line_faults *line(void *board)
-{
-    return &((struct pmka *)board)->line;
 }
 
 static struct afe *afe(void *board, unsigned axis)

@@ -1,6 +1,7 @@
 #include "board/psa2_board.h"
 
 #include "board/board_digest.h"
+#include "board/board_life.h"
 #include "board/psa2_can.h"
 
 #include <stdio.h>
@@ -138,50 +139,16 @@ static void wrong(void *board, uint32_t wrongs)
 
 /* ---- life ---- */
 
-static void init(void *board, const void *profile, const struct board_cfg *cfg, const struct board_io *io,
-                 struct sched *s)
-{
-    psa2_init(board, profile, cfg, io, s);
-}
-
-static void power_up(void *board, int64_t t_ns)
-{
-    psa2_power_up(board, t_ns);
-}
-
-static void power_down(void *board, int64_t t_ns)
-{
-    psa2_power_down(board, t_ns);
-}
-
-static void reset(void *board, int64_t t_ns)
-{
-    psa2_reset(board, t_ns);
-}
+BOARD_LIFE(psa2);
 
 static bool ready(const void *board)
 {
     return psa2_ready(board);
 }
 
-static void sample_until(void *board, int64_t t_ns)
-{
-    psa2_sample_until(board, t_ns);
-}
-
 static void listen(void *board, bool on)
 {
     psa2_listen(board, on);
-}
-
-static struct trace *trace(void *board)
-{
-    return &((struct psa2 *)board)->trace;
-}
-
-static struct line_faults *line(void *board)
-{
-    return &((struct psa2 *)board)->line;
 }
 
 static struct afe *afe(void *board, unsigned axis)

@@ -1,6 +1,7 @@
 #include "board/psd1_board.h"
 
 #include "board/board_digest.h"
+#include "board/board_life.h"
 #include "board/psd1.h"
 #include "board/psd1_can.h"
 
@@ -88,35 +89,11 @@ static const struct board_part parts[PARTS] = {
 
 /* ---- life ---- */
 
-static void init(void *board, const void *profile, const struct board_cfg *cfg, const struct board_io *io,
-                 struct sched *s)
-{
-    psd1_init(board, profile, cfg, io, s);
-}
-
-static void power_up(void *board, int64_t t_ns)
-{
-    psd1_power_up(board, t_ns);
-}
-
-static void power_down(void *board, int64_t t_ns)
-{
-    psd1_power_down(board, t_ns);
-}
-
-static void reset(void *board, int64_t t_ns)
-{
-    psd1_reset(board, t_ns);
-}
+BOARD_LIFE(psd1);
 
 static bool ready(const void *board)
 {
     return ((const struct psd1 *)board)->ready;
-}
-
-static void sample_until(void *board, int64_t t_ns)
-{
-    psd1_sample_until(board, t_ns);
 }
 
 static void wrong(void *board, uint32_t wrongs)
@@ -128,16 +105,6 @@ static void listen(void *board, bool on)
 {
     struct psd1 *b = board;
     b->told = on && b->io.event;
-}
-
-static struct trace *trace(void *board)
-{
-    return &((struct psd1 *)board)->trace;
-}
-
-static struct line_faults *line(void *board)
-{
-    return &((struct psd1 *)board)->line;
 }
 
 static struct afe *afe(void *board, unsigned axis)
