@@ -6,20 +6,18 @@ docs/boards/psa2.md. docs/faults.md has the matrix that this test goes through.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 import pytest
+from fault_case import FAR_S, FaultCase, accepted, must_accept, near
 from fault_host import (
     ACCEL_PORT,
     PERIOD_S,
     SETTLE_S,
     SETUP_S,
     TEMP_PORT,
-    Host,
     Seen,
     fault_host,
 )
@@ -27,46 +25,20 @@ from fault_lines import breaches
 from psabench.can_host import open_bus
 from psabench.control import Control
 from psabench.emulator import Emulator
-from psabench.errors import ControlError
 from psabench.vcd import read_vcd
 from rig import HERE, bus_spec
 
 pytestmark = pytest.mark.host
 
 SCENARIO = HERE / "faults.yaml"
-FAR_S = 1e5  # an instant that does not come
-AXES = "xyz"
 
 
-@dataclass
-class Case:
-    """A kind at a point of a unit."""
-
-    host: Host
-    kind: str
-    point: str
-    ids: list[int] = field(default_factory=list)
-
-    @property
-    def unit(self) -> str:
-        """Of the point; those of the whole bench are looked at through the first."""
-        return self.point.split(".")[0] if self.point.split(".")[0] in self.host.node else next(iter(self.host.node))
-
-    @property
-    def axis(self) -> int:
-        return AXES.index(self.point[-1])
+class Case(FaultCase):
+    """A kind at a point of a PSA-2."""
 
     @property
     def temperature(self) -> bool:
         return self.point.endswith(".tadc")
-
-    def add(self, **args: object) -> None:
-        self.ids.append(self.host.add(self.kind, self.point, **args))
-
-    def clear(self) -> None:
-        for number in self.ids:
-            self.host.clear(number)
-        self.ids.clear()
 
     def watch(self, dwell_s: float) -> Seen:
         return self.host.watch(self.unit, dwell_s)
@@ -86,14 +58,6 @@ class Case:
             self.host.turn(angle_deg)
             volts.append(self.mean_v())
         return volts
-
-    def reset(self) -> None:
-        self.host.reset(self.unit)
-        self.host.bus.advance(SETUP_S)
-
-
-def near(got: float, want: float, tolerance: float) -> None:
-    assert abs(got - want) <= tolerance, f"{got} is not {want} within {tolerance}"
 
 
 # ---- sensors and analog chain: what the codes of the axis say
@@ -502,48 +466,6 @@ ACCEPTED = {
     "supply": r"supply",
 }
 
-# Values with which a kind is tried at a point that will refuse it.
-VALUES: dict[str, dict[str, object]] = {
-    "sensor.bias": {"bias_v": 1},
-    "sensor.drift": {"drift_v_per_s": 1},
-    "sensor.scale": {"scale_ppm": 1},
-    "sensor.noise": {"rms_v": 1},
-    "sensor.saturation": {"low_v": 1},
-    "analog.reference": {"reference_ppm": 1},
-    "analog.ripple": {"amplitude_v": 1, "frequency_hz": 1},
-    "chip.drdy_stuck": {"level": "low"},
-    "chip.dout_dead": {"level": "low"},
-    "chip.clock": {"clock_ppm": 1},
-    "chip.flip": {"register": 1, "mask": 1},
-    "line.stuck": {"level": "low"},
-    "line.glitch": {"width_ns": 1},
-    "line.missing_pulse": {"pulse": 1},
-    "line.extra_pulse": {"pulse": 1, "width_ns": 1},
-    "line.noise": {"rate_hz": 1, "width_ns": 1},
-    "link.delay": {"hold_s": 1},
-    "supply.brownout": {"drop_v": 12, "for_s": 1},
-}
-
-
-def must_accept(kind: str, point: str) -> bool:
-    pattern = ACCEPTED.get(kind) or ACCEPTED[kind.split(".")[0]]
-    return re.fullmatch(pattern, point) is not None
-
-
-def accepted(c: Case) -> bool:
-    """Whether the emulator takes it, tried for an instant that does not come."""
-    try:
-        c.add(**VALUES.get(c.kind, {}), at_s=FAR_S)
-    except ControlError as e:
-        why = e
-    else:
-        c.clear()
-        return True
-    assert why.code == "point", why
-    assert len(str(why)) > 30, "a refusal gives the reason"
-    assert not c.host.call("fault.list")["faults"], "and changes nothing"
-    return False
-
 
 def test_a_program_keeps_its_number_when_an_older_one_leaves() -> None:
     with Emulator(SCENARIO, pace="step") as emulator, Control(emulator.control_path or Path()) as control:
@@ -597,8 +519,8 @@ def test_at_every_point_it_is_refused_or_seen(kind: str) -> None:
             assert host.watch(unit, 0.02).complaints() == []
         for point in host.call("fault.points")["points"]:
             c = Case(host, kind, point)
-            assert accepted(c) == must_accept(kind, point), f"{kind} at {point}"
-            if not must_accept(kind, point):
+            assert accepted(c) == must_accept(ACCEPTED, kind, point), f"{kind} at {point}"
+            if not must_accept(ACCEPTED, kind, point):
                 continue
             DETECT[kind](c)
             seen += 1

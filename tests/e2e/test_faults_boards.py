@@ -6,19 +6,16 @@ of the same bench without the fault: a fault of a line changes that line and not
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from functools import cache
 
 import numpy as np
 import pytest
 from fault_boards import BOARDS, Board, Seen, seen
+from fault_case import VALUES, FaultCase, accepted, must_accept, near
 from fault_host import Host, fault_host
-from psabench.errors import ControlError
 from psabench.vcd import Vcd, read_vcd
 from rig import HERE
-from test_faults import FAR_S, VALUES, near
 
 pytestmark = pytest.mark.host
 
@@ -30,35 +27,14 @@ RECORD_S = 0.05
 BEFORE_NS = 200_000  # by which a recording begins before its command: what is reported late belongs to it
 
 
-@dataclass
-class Case:
-    """A kind at a point."""
+class Case(FaultCase):
+    """A kind at a point of one of the other boards."""
 
-    host: Host
-    kind: str
-    point: str
-    ids: list[int] = field(default_factory=list)
-
-    @property
-    def unit(self) -> str:
-        first = self.point.split(".")[0]
-        return first if first in self.host.node else "d"
+    setup_s = SETUP_S
 
     @property
     def board(self) -> Board:
         return BOARDS[boards(self.host)[self.unit]]
-
-    @property
-    def axis(self) -> int:
-        return "xyz".index(self.point[-1])
-
-    def add(self, **args: object) -> None:
-        self.ids.append(self.host.add(self.kind, self.point, **args))
-
-    def clear(self) -> None:
-        for number in self.ids:
-            self.host.clear(number)
-        self.ids.clear()
 
     def watch(self, dwell_s: float = LOOK_S) -> Seen:
         self.host._kept.clear()
@@ -81,10 +57,6 @@ class Case:
             volts.append(self.mean_v())
         self.host.turn(30.0)
         return volts
-
-    def reset(self) -> None:
-        self.host.reset(self.unit)
-        self.host.bus.advance(SETUP_S)
 
     def read(self, address: int) -> int:
         """A cycle on the parallel bus."""
@@ -521,34 +493,15 @@ NEEDED: dict[str, dict[str, object]] = VALUES | {
 }
 
 
-def must_accept(kind: str, point: str) -> bool:
-    pattern = ACCEPTED.get(kind) or ACCEPTED[kind.split(".")[0]]
-    return re.fullmatch(pattern, point) is not None
-
-
-def accepted(c: Case) -> bool:
-    """Whether the emulator takes it, tried for an instant that does not come."""
-    try:
-        c.add(**NEEDED.get(c.kind, {}), at_s=FAR_S)
-    except ControlError as e:
-        why = e
-    else:
-        c.clear()
-        return True
-    assert why.code == "point", why
-    assert len(str(why)) > 30, "a refusal gives the reason"
-    assert not c.host.call("fault.list")["faults"], "and changes nothing"
-    return False
-
-
 def test_each_kind_is_taken_where_it_can_be_seen_and_refused_elsewhere() -> None:
     with fault_host(SCENARIO) as host:
         points = host.call("fault.points")["points"]
         for kind in (k["kind"] for k in host.call("fault.kinds")["kinds"]):
             for point in points:
-                assert accepted(Case(host, kind, point)) == must_accept(kind, point), f"{kind} at {point}"
+                want = must_accept(ACCEPTED, kind, point)
+                assert accepted(Case(host, kind, point), NEEDED) == want, f"{kind} at {point}"
             if kind not in DETECT and kind not in DETECT_LINE:
-                assert not any(must_accept(kind, point) for point in points), f"nobody looks for {kind}"
+                assert not any(must_accept(ACCEPTED, kind, point) for point in points), f"nobody looks for {kind}"
 
 
 @pytest.mark.parametrize("kind", DETECT)
@@ -558,7 +511,7 @@ def test_what_is_taken_is_seen(kind: str) -> None:
         host.bus.advance(SETUP_S)
         for point in host.call("fault.points")["points"]:
             c = Case(host, kind, point)
-            if not must_accept(kind, point):
+            if not must_accept(ACCEPTED, kind, point):
                 continue
             DETECT[kind](c)
             c.clear()
@@ -579,7 +532,7 @@ def lines(unit: str) -> list[str]:
 @pytest.mark.parametrize("kind", DETECT_LINE)
 @pytest.mark.parametrize("unit", "dmp")
 def test_a_fault_of_a_line_is_in_the_recording_and_nowhere_else(unit: str, kind: str) -> None:
-    names = [name for name in lines(unit) if must_accept(kind, f"{unit}.line.{name}")]
+    names = [name for name in lines(unit) if must_accept(ACCEPTED, kind, f"{unit}.line.{name}")]
     for some in (names[::2], names[1::2]):  # the others stay as they are
         if some:
             DETECT_LINE[kind](unit, some)
