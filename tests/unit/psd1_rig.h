@@ -224,4 +224,43 @@ static inline void rig_write(struct rig *r, uint8_t address, uint16_t data)
     if (result != BOARD_CYCLE_OK) fail_msg("write to %u: %d", address, (int)result);
 }
 
+static inline struct psd1_profile no_host(void)
+{
+    struct psd1_profile p = rig_exact();
+    p.host_strobe_ns = 0;
+    return p;
+}
+
+/* Reads the word that waits, `after_ns` after FL2. */
+static inline uint16_t take(struct rig *r, int64_t after_ns)
+{
+    rig_await(r, PSD1_READY);
+    rig_until(r, r->b.fl2_ns + after_ns);
+    return rig_read(r, (uint8_t)r->b.axis);
+}
+
+static inline void request_done(void *ctx, struct psd1_request *r, enum board_cycle_result result, int64_t t_ns)
+{
+    struct rig *g = ctx;
+    (void)r;
+    g->answered = true;
+    g->result = result;
+    g->answered_ns = t_ns;
+}
+
+/* Asks the controller for a command and waits for its answer. */
+static inline enum board_cycle_result command(struct rig *r, struct psd1_request *q, uint8_t code, uint32_t word)
+{
+    const char *why = NULL;
+    *q = (struct psd1_request){.command = code, .word = word, .done = request_done, .ctx = r};
+    r->answered = false;
+    const enum board_cycle_result result = psd1_request(&r->b, q, &why, r->s.now_ns);
+    assert_true((result == BOARD_CYCLE_BAD_VALUE) == (why != NULL));
+    if (result != BOARD_CYCLE_OK) return result;
+    const int64_t end_ns = r->s.now_ns + 3000000000;
+    while (!r->answered && r->s.now_ns < end_ns) sched_run_until(&r->s, sched_next_ns(&r->s));
+    assert_true(r->answered);
+    return r->result;
+}
+
 #endif

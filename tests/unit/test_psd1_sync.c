@@ -75,24 +75,11 @@ static void power_brings_them_into_step(void **state)
     }
 }
 
-static void request_done(void *ctx, struct psd1_request *q, enum board_cycle_result result, int64_t t_ns)
-{
-    struct rig *r = ctx;
-    (void)q;
-    r->answered = true;
-    r->result = result;
-    r->answered_ns = t_ns;
-}
-
 static void read_back(unsigned axis, int64_t t_ns)
 {
-    struct psd1_request q = {.command = (uint8_t)(PSD1_CMD_CONTROL + axis), .done = request_done, .ctx = &rig};
-    const char *why = NULL;
+    struct psd1_request q;
     rig_until(&rig, t_ns);
-    rig.answered = false;
-    assert_int_equal(psd1_request(&rig.b, &q, &why, t_ns), BOARD_CYCLE_OK);
-    while (!rig.answered) sched_run_until(&rig.s, sched_next_ns(&rig.s));
-    assert_int_equal(rig.result, BOARD_CYCLE_OK);
+    assert_int_equal(command(&rig, &q, (uint8_t)(PSD1_CMD_CONTROL + axis), 0), BOARD_CYCLE_OK);
     if (q.word != 0x020013) fail_msg("axis %u at %lld ns: %06X", axis, (long long)t_ns, (unsigned)q.word);
 }
 
