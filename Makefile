@@ -116,7 +116,7 @@ $(BUILD)/bench/%: $(BUILD)/obj/tests/bench/%.o $(LIB_OBJ)
 	$(call say,LINK,$@)
 	$(Q)$(LINK) -o $@ $< $(LIB_OBJ) $(LIBS)
 
-build/gen/gen.mk: $(wildcard proto/*.yaml) tools/gen_proto.py | $(PY)
+build/gen/gen.mk: $(wildcard proto/*.yaml) tools/gen_proto.py $(wildcard tools/protogen/*.py) | $(PY)
 	@mkdir -p $(@D)
 	$(PY) tools/gen_proto.py --out $(@D)
 	@echo 'GEN_SRC := $$(sort $$(wildcard build/gen/*.c))' > $@

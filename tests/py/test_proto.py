@@ -5,31 +5,22 @@ import re
 import subprocess
 import sys
 from functools import cache
-from importlib import util
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import canopen
 import cantools
+import gen_proto
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from protogen import c_tables, page, source
+from protogen.model import TYPES
 
 ROOT = Path(__file__).resolve().parents[2]
 DBC = ROOT / "proto/psabench.dbc"
 EDS = ROOT / "proto/psa2.eds"
 VOLT_PER_LSB = 10 / 2**23
-
-
-def load_generator() -> ModuleType:
-    spec = util.spec_from_file_location("gen_proto", ROOT / "tools/gen_proto.py")
-    assert spec
-    assert spec.loader
-    module = util.module_from_spec(spec)
-    sys.modules["gen_proto"] = module
-    spec.loader.exec_module(module)
-    return module
 
 
 def load_database() -> cantools.database.can.Database:
@@ -38,9 +29,8 @@ def load_database() -> cantools.database.can.Database:
     return database
 
 
-gen_proto = load_generator()
-PROTOCOL = gen_proto.load()
-PROTOCOLS = gen_proto.load_all()
+PROTOCOL = source.load()
+PROTOCOLS = source.load_all()
 UNITS = PROTOCOLS[1:]
 EACH = pytest.mark.parametrize("protocol", PROTOCOLS, ids=lambda p: p.key)
 EACH_UNIT = pytest.mark.parametrize("protocol", UNITS, ids=lambda p: p.key)
@@ -79,7 +69,7 @@ def test_check_names_a_file_that_differs(tmp_path: Path, monkeypatch: pytest.Mon
 
 def test_c_tables_are_the_same_twice() -> None:
     """No date, no dictionary order: the same source gives the same bytes."""
-    assert gen_proto.c_files(PROTOCOLS) == gen_proto.c_files(gen_proto.load_all())
+    assert c_tables.c_files(PROTOCOLS) == c_tables.c_files(source.load_all())
 
 
 def test_identifiers_of_node_5(db: cantools.database.can.Database) -> None:
@@ -135,16 +125,16 @@ def test_no_identifier_of_one_node_is_another_s(protocol: Any) -> None:
 @EACH_UNIT
 def test_every_message_of_a_unit_decodes_to_what_was_encoded(protocol: Any, db: cantools.database.can.Database) -> None:
     """At both ends of each signal's range; no two signals share a bit."""
-    for source in protocol.messages:
-        m = db.get_message_by_name(source.name)
-        bits = [s.start + k for s in source.signals for k in range(s.bits)]
-        assert len(bits) == len(set(bits)), source.name
-        assert max(bits) < 8 * source.len
+    for message in protocol.messages:
+        m = db.get_message_by_name(message.name)
+        bits = [s.start + k for s in message.signals for k in range(s.bits)]
+        assert len(bits) == len(set(bits)), message.name
+        assert max(bits) < 8 * message.len
         for end in (0, 1):
-            raw = {s.name: s.raw_range[end] for s in source.signals}
+            raw = {s.name: s.raw_range[end] for s in message.signals}
             data = m.encode(raw, scaling=False)
             assert m.decode(data, scaling=False, decode_choices=False) == raw
-            for s in source.signals:
+            for s in message.signals:
                 assert m.decode(data, decode_choices=False)[s.name] == pytest.approx(raw[s.name] * s.scale)
 
 
@@ -194,7 +184,7 @@ def test_eds_has_every_entry_of_the_source(protocol: Any) -> None:
     for o in protocol.objects:
         for e in o.entries:
             entry = od[o.index] if o.var else od[o.index][e.sub]
-            assert entry.data_type == gen_proto.TYPES[e.type][0], hex(o.index)
+            assert entry.data_type == TYPES[e.type][0], hex(o.index)
             assert entry.access_type == e.access, hex(o.index)
             assert entry.pdo_mappable == e.map
     assert set(od) == {o.index for o in protocol.objects}
@@ -223,14 +213,14 @@ def test_the_bus_of_a_unit_has_its_registers_at_their_addresses(protocol: Any) -
     bus = od_of(protocol)[0x2002]
     registers = {sub: v for sub, v in bus.items() if sub}
     assert bus[0].default == max(registers) <= 16
-    assert all(v.data_type == gen_proto.TYPES["UNSIGNED16"][0] for v in registers.values())
+    assert all(v.data_type == TYPES["UNSIGNED16"][0] for v in registers.values())
     assert len({v.name for v in registers.values()}) == len(registers)
 
 
 @EACH_UNIT
 def test_the_sdo_server_lets_every_cycle_through_to_the_board(protocol: Any) -> None:
     """Who may do what is for the board to refuse: all 16 addresses, both ways."""
-    rows = re.findall(r"\{0x2002, (\d+), (\w+), (\w+)", gen_proto.od_source(protocol))
+    rows = re.findall(r"\{0x2002, (\d+), (\w+), (\w+)", c_tables.od_source(protocol))
     assert [(int(sub), kind, access) for sub, kind, access in rows] == [
         (0, "CO_UNSIGNED8", "CO_CONST"), *((k, "CO_UNSIGNED16", "CO_RW") for k in range(1, 17)),
     ]  # fmt: skip
@@ -238,7 +228,7 @@ def test_the_sdo_server_lets_every_cycle_through_to_the_board(protocol: Any) -> 
 
 @EACH_UNIT
 def test_the_c_tables_of_a_unit_say_what_its_source_says(protocol: Any) -> None:
-    text = gen_proto.od_source(protocol)
+    text = c_tables.od_source(protocol)
     assert f"counter[] = {{{', '.join(f'{chr(34)}{c}{chr(34)}' for c in protocol.counters)}}}" in text
     off = sum(1 << k for k, t in enumerate(protocol.tpdos) if t.get("optional"))
     assert f".tpdo_off = {off}u," in text
@@ -249,7 +239,7 @@ def test_the_c_tables_of_a_unit_say_what_its_source_says(protocol: Any) -> None:
 def test_an_optional_tpdo_is_off_in_the_eds() -> None:
     on, off = ({"message": "M", "cob": 0x180, "optional": o} for o in (False, True))
     for t, cob in ((on, 0x40000180), (off, 0xC0000180)):
-        assert gen_proto.tpdo_objects([t], [])[0].entries[1].value == cob
+        assert source.tpdo_objects([t], [])[0].entries[1].value == cob
 
 
 UNIT = """
@@ -263,8 +253,8 @@ counters: [{name: Two words}]
 def unit_of(monkeypatch: pytest.MonkeyPatch, folder: Path, more: str) -> Any:
     (folder / "proto").mkdir()
     (folder / "proto/test.yaml").write_text(UNIT + more)
-    monkeypatch.setattr(gen_proto, "ROOT", folder)
-    return gen_proto.load_unit("test", PROTOCOL)
+    monkeypatch.setattr(source, "ROOT", folder)
+    return source.load_unit("test", PROTOCOL)
 
 
 def test_the_least_that_a_unit_needs(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -299,11 +289,11 @@ BUS_ROW = {"name": "X", "access": "ro"}
 )
 def test_an_address_that_the_bus_has_not_is_refused(rows: list[dict[str, Any]]) -> None:
     with pytest.raises(ValueError, match="bus: X: address"):
-        gen_proto.bus_object(rows)
+        source.bus_object(rows)
 
 
 def test_addresses_of_the_bus_may_leave_gaps() -> None:
-    o = gen_proto.bus_object([BUS_ROW, {**BUS_ROW, "name": "Y", "address": 5}, {"name": "Z"}])
+    o = source.bus_object([BUS_ROW, {**BUS_ROW, "name": "Y", "address": 5}, {"name": "Z"}])
     assert [(e.sub, e.name, e.access) for e in o.entries[1:]] == [(1, "X", "ro"), (6, "Y", "ro"), (7, "Z", "rw")]
     assert o.entries[0].value == 7
 
@@ -392,7 +382,7 @@ def test_python_canopen_decodes_a_frame_by_the_mapping_as_cantools_does(protocol
 )
 def test_worst_case_of_the_page_is_that_of_the_facts(message: str, least_us: int, worst_us: int) -> None:
     """Sources can 3.1 at 1/5 Mbit/s."""
-    nominal, data = gen_proto.worst_bits(next(m for m in PROTOCOL.messages if m.name == message))
+    nominal, data = page.worst_bits(next(m for m in PROTOCOL.messages if m.name == message))
     assert least_us < nominal + data / 5 <= worst_us
     assert round(nominal + data / 5) == worst_us
 
@@ -415,7 +405,7 @@ def test_page_has_every_message_object_and_code(protocol: Any) -> None:
 
 
 def test_generated_c_compiles_without_a_warning(tmp_path: Path) -> None:
-    for name, text in gen_proto.c_files(PROTOCOLS).items():
+    for name, text in c_tables.c_files(PROTOCOLS).items():
         (tmp_path / "gen").mkdir(exist_ok=True)
         (tmp_path / "gen" / name).write_text(text)
     flags = "-std=c11 -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Werror -fsyntax-only".split()
