@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[2]
-BOARDS = ("psd1", "pmka", "pik")  # proto/<board>.yaml each; in the order of the DBC
+BOARDS = ("psd1", "pmka", "pik", "gyro")  # proto/<board>.yaml each; in the order of the DBC
 
 # CiA 301 table 44: data types by name: code, least and greatest value.
 TYPES: dict[str, tuple[int, float, float]] = {
