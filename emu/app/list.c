@@ -28,15 +28,15 @@ static void first_comment(const char *path, char *text, size_t cap)
 static void list_profile(FILE *out, const char *path, const char *comment)
 {
     char why[512];
-    const struct board_type *type = NULL;
+    const struct board_name *board;
     union board_profile_store p;
-    if (!profile_yaml_load(path, &type, &p, why, sizeof why)) {
+    if (!profile_yaml_load(path, &board, &p, why, sizeof why)) {
         fprintf(out, "%s\n", why);
         return;
     }
     char about[256];
-    type->about(&p, about, sizeof about);
-    fprintf(out, "%-12s %s: %s\n", board_profile_name(type, &p), type->title, about);
+    board->type->about(&p, about, sizeof about);
+    fprintf(out, "%-12s %s: %s\n", board_profile_name(board->type, &p), board->title, about);
     if (*comment) fprintf(out, "             %s\n", comment);
 }
 

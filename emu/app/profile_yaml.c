@@ -110,38 +110,39 @@ bool profile_yaml_check(struct yaml_file *f, const struct yaml_node *mapping, co
     return yaml_file_fail(f, blame(mapping, why), NULL, "%s", why);
 }
 
-/* The type that a file names, which is *type if that is not NULL. */
-static bool find_type(struct yaml_file *f, const struct board_type **type)
+void profile_yaml_boards(char *known, size_t cap)
 {
-    const struct yaml_node *node = f->root->kind == YAML_MAPPING ? yaml_get(f->root, "board") : NULL;
-    const char *name = node ? yaml_scalar(node) : board_types[0]->name;
-    const struct board_type *found = name ? board_find(name) : NULL;
-    if (!found) {
-        char known[80] = "";
-        for (unsigned i = 0; board_types[i]; i++) {
-            const size_t at = strlen(known);
-            snprintf(known + at, sizeof known - at, "%s%s", at ? ", " : "", board_types[i]->name);
-        }
-        return yaml_file_fail(f, node, "board", "no such type; there is %s", known);
+    known[0] = '\0';
+    for (const struct board_name *n = board_names; n->name; n++) {
+        const size_t at = strlen(known);
+        snprintf(known + at, cap - at, "%s%s", !at ? "" : n[1].name ? ", " : " or ", n->name);
     }
-    if (*type && found != *type) {
-        return yaml_file_fail(f, node, NULL, "this is a profile of %s (board: %s), one of %s is wanted", found->title,
-                              found->name, (*type)->title);
-    }
-    *type = found;
-    return true;
 }
 
-bool profile_yaml_load(const char *path, const struct board_type **type, union board_profile_store *p, char *why,
+/* The board that a file names; NULL with its line in why. */
+static const struct board_name *find_board(struct yaml_file *f)
+{
+    char known[160];
+    const struct yaml_node *node = f->root->kind == YAML_MAPPING ? yaml_get(f->root, "board") : NULL;
+    const char *name = node ? yaml_scalar(node) : board_names[0].name;
+    const struct board_name *found = name ? board_name_find(name) : NULL;
+    profile_yaml_boards(known, sizeof known);
+    if (!found) (void)yaml_file_fail(f, node, "board", "no such board; %s is wanted", known);
+    return found;
+}
+
+bool profile_yaml_load(const char *path, const struct board_name **board, union board_profile_store *p, char *why,
                        size_t cap)
 {
     struct yaml_file f;
     if (!yaml_file_open(&f, path, why, cap)) return false;
-    bool ok = find_type(&f, type);
+    *board = find_board(&f);
+    bool ok = *board != NULL;
     if (ok) {
+        const struct board_type *type = (*board)->type;
         memset(p, 0, sizeof *p);
-        (*type)->profile_default(p);
-        ok = load_fields(&f, f.root, *type, p, true) && profile_yaml_check(&f, f.root, *type, p);
+        type->profile_default(p);
+        ok = load_fields(&f, f.root, type, p, true) && profile_yaml_check(&f, f.root, type, p);
     }
     yaml_file_close(&f);
     return ok;

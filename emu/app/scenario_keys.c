@@ -124,12 +124,12 @@ static void print_profile(FILE *out, const struct board_type *t)
 /* What `board` may say, and what follows from it. */
 static void print_boards(FILE *out)
 {
-    fprintf(out,
-            "### Boards\n\nWhat `units[].board` may say; a unit without it is a PSA-2. `profile` names another "
-            "profile of the same board.\n\n| `board` | board | profile | `node` of the first |\n|---|---|---|---|\n");
+    fprintf(out, "### Boards\n\nWhat `units[].board` may say; a unit without it is a PSA-2. `profile` names another "
+                 "profile of the same board; `psa2` and `pik` take those of their other names, too.\n\n| `board` | "
+                 "board | profile | `node` of the first |\n|---|---|---|---|\n");
     for (const struct board_name *n = board_names; n->name; n++)
-        fprintf(out, "| `%s` | %s | `%s` | %u |\n", n->name, n->type->title,
-                n->profile ? n->profile : n->type->profile_name, n->type->node);
+        fprintf(out, "| `%s` | %s | `%s` | %u |\n", n->name, n->title, n->profile ? n->profile : n->type->profile_name,
+                n->type->node);
     fprintf(out, "\n");
 }
 

@@ -14,21 +14,24 @@
 
 static bool fail_board(struct yaml_file *f, const struct yaml_node *node)
 {
-    char known[160] = "";
-    for (const struct board_name *n = board_names; n->name; n++) {
-        const size_t at = strlen(known);
-        snprintf(known + at, sizeof known - at, "%s%s", !at ? "" : n[1].name ? ", " : " or ", n->name);
-    }
+    char known[160];
+    profile_yaml_boards(known, sizeof known);
     return yaml_file_fail(f, node, "board", "%s is wanted", known);
 }
 
+/* What is wrong within the profile is told with its line there, that it is another board's with the line here. */
 static bool find_profile(struct yaml_file *f, const struct yaml_node *node, const char *name, struct scenario_unit *u)
 {
     char path[FIND_PATH_MAX], why[400];
     const struct board_type *type = u->board->type;
+    const struct board_name *of;
     if (!find_proto("profiles", name, f->path, path, why, sizeof why))
         return yaml_file_fail(f, node, "profile", "%s", why);
-    if (!profile_yaml_load(path, &type, &u->profile, f->why, f->cap)) return false;
+    if (!profile_yaml_load(path, &of, &u->profile, f->why, f->cap)) return false;
+    if (!board_name_takes(u->board, of)) {
+        return yaml_file_fail(f, node, "profile", "%s is a profile of %s (board: %s), one of %s (board: %s) is wanted",
+                              name, of->title, of->name, u->board->title, u->board->name);
+    }
     if (type->cfg_profiled) type->cfg_profiled(&u->cfg.board, &u->profile);
     return true;
 }

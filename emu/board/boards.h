@@ -13,16 +13,20 @@
 
 extern const struct board_type *const board_types[]; /* up to NULL */
 
-/* A name that a scenario may use: a type's own, or another for one of its profiles. */
+/* A name that a scenario or a profile may use: a type's own, or another for one of its profiles. */
 struct board_name {
     const char *name;
     const struct board_type *type;
     const char *profile; /* in proto/profiles; NULL: the type's default */
+    const char *title;   /* "PIK-5" */
 };
 extern const struct board_name board_names[]; /* up to a NULL name; the types' own first */
 
 const struct board_type *board_find(const char *name); /* a type by its own name; NULL: none */
 const struct board_name *board_name_find(const char *name);
+
+/* Whether a board of the one name can have a profile of the other: a type's own name takes any of the type. */
+bool board_name_takes(const struct board_name *board, const struct board_name *profile);
 
 /* The profile's field "name". */
 const char *board_profile_name(const struct board_type *type, const void *profile);

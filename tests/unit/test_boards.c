@@ -79,9 +79,11 @@ static void names_lead_to_types_and_their_profiles(void **state)
         assert_non_null(own);
         assert_ptr_equal(own->type, *t);
         assert_null(own->profile);
+        assert_string_equal(own->title, (*t)->title);
     }
     for (const struct board_name *n = board_names; n->name; n++) assert_ptr_equal(board_name_find(n->name), n);
     assert_string_equal(board_name_find("psa1")->profile, "psa1");
+    assert_string_equal(board_name_find("psa1")->title, "PSA-1");
     assert_null(board_name_find("psa3"));
 }
 
@@ -103,6 +105,7 @@ static void the_default_profile_is_sound_and_the_file_that_it_names(void **state
         union board_profile_store def, file;
         char why[512], path[256], about[256] = "";
         const struct board_type *type = *t;
+        const struct board_name *board;
         memset(&def, 0, sizeof def);
         type->profile_default(&def);
         if (!type->profile_check(&def, why, sizeof why)) fail_msg("%s: %s", type->name, why);
@@ -111,7 +114,8 @@ static void the_default_profile_is_sound_and_the_file_that_it_names(void **state
         assert_true(*about && !strchr(about, '\n'));
         assert_string_equal(board_profile_name(type, &def), type->profile_name);
         snprintf(path, sizeof path, "proto/profiles/%s.yaml", type->profile_name);
-        if (!profile_yaml_load(path, &type, &file, why, sizeof why)) fail_msg("%s", why);
+        if (!profile_yaml_load(path, &board, &file, why, sizeof why)) fail_msg("%s", why);
+        assert_ptr_equal(board->type, type);
         char *one = dump_of(type, &def), *two = dump_of(type, &file);
         assert_string_equal(one, two);
         free(one);
@@ -141,21 +145,20 @@ static void a_dump_of_a_profile_is_a_profile_with_the_same_dump(void **state)
     }
 }
 
-static void a_profile_of_another_board_is_refused(void **state)
+/* A type's own name takes the profiles of all its names, another name its own alone. */
+static void a_name_takes_its_own_profiles(void **state)
 {
-    char why[512];
-    union board_profile_store p;
     (void)state;
-    for (const struct board_type *const *t = board_types; *t; t++) {
-        for (const struct board_type *const *wanted = board_types; *wanted; wanted++) {
-            const struct board_type *type = *wanted;
-            char path[256];
-            snprintf(path, sizeof path, "proto/profiles/%s.yaml", (*t)->profile_name);
-            assert_int_equal(profile_yaml_load(path, &type, &p, why, sizeof why), type == *t);
-            if (*t == *wanted) continue;
-            assert_non_null(strstr(why, (*t)->title));
-            assert_non_null(strstr(why, (*wanted)->title));
-        }
+    for (const struct board_name *of = board_names; of->name; of++) {
+        const struct board_name *board;
+        union board_profile_store p;
+        char why[512], path[256];
+        snprintf(path, sizeof path, "proto/profiles/%s.yaml", of->profile ? of->profile : of->type->profile_name);
+        if (!profile_yaml_load(path, &board, &p, why, sizeof why)) fail_msg("%s", why);
+        assert_ptr_equal(board, of);
+        for (const struct board_name *n = board_names; n->name; n++)
+            assert_int_equal(board_name_takes(n, of),
+                             n == of || (n->type == of->type && n == board_name_find(n->type->name)));
     }
 }
 
@@ -352,7 +355,7 @@ int main(void)
         cmocka_unit_test(names_lead_to_types_and_their_profiles),
         cmocka_unit_test(the_default_profile_is_sound_and_the_file_that_it_names),
         cmocka_unit_test(a_dump_of_a_profile_is_a_profile_with_the_same_dump),
-        cmocka_unit_test(a_profile_of_another_board_is_refused),
+        cmocka_unit_test(a_name_takes_its_own_profiles),
         cmocka_unit_test(the_lines_are_those_of_the_table),
         cmocka_unit_test(each_comes_up_tells_of_it_and_goes_down),
         cmocka_unit_test(the_digest_tells_states_apart_and_nothing_else),

@@ -109,6 +109,14 @@ static const struct {
     {"units: [{board: pmka, frame_form: 0}]\n", "dir/s.yaml:1:35: units.a.frame_form: a PMKA has no such setting"},
     {"units: [{board: pmka, profile_set: {word_bits: 24}}]\n",
      "dir/s.yaml:1:37: units.a.profile_set.word_bits: unknown key; "},
+    {"units: [{board: psd1, profile: pmka}]\n",
+     "dir/s.yaml:1:32: units.a.profile: pmka is a profile of PMKA (board: pmka), one of PSD-1 (board: psd1) is wanted"},
+    {"units: [{profile: pmka}]\n",
+     "dir/s.yaml:1:19: units.a.profile: pmka is a profile of PMKA (board: pmka), one of PSA-2 (board: psa2) is wanted"},
+    {"units:\n  - board: pik5\n    profile: pik6\n", "dir/s.yaml:3:14: units.a.profile: pik6 is a profile of PIK-6 "
+                                                     "(board: pik6), one of PIK-5 (board: pik5) is wanted"},
+    {"units: [{board: psa1, profile: w16}]\n",
+     "dir/s.yaml:1:32: units.a.profile: w16 is a profile of PSA-2 (board: psa2), one of PSA-1 (board: psa1) is wanted"},
     {"units: [{profile: nope}]\n", "dir/s.yaml:1:19: units.a.profile: nope: no such file in proto/profiles"},
     {"units: [{profile: ./nope.yaml}]\n", "dir/s.yaml:1:19: units.a.profile: dir/./nope.yaml: no such file"},
     {"units:\n- profile_set:\n    word_bits: 20\n",
@@ -258,11 +266,11 @@ static void the_shipped_scenarios_and_profiles_load(void **state)
     }
     for (size_t i = 0; i < COUNT(profiles); i++) {
         char path[FIND_PATH_MAX];
-        const struct board_type *type = NULL;
+        const struct board_name *board;
         union board_profile_store p;
         assert_true(find_proto("profiles", profiles[i], NULL, path, why, sizeof why));
-        if (!profile_yaml_load(path, &type, &p, why, sizeof why)) fail_msg("%s", why);
-        assert_string_equal(board_profile_name(type, &p), profiles[i]);
+        if (!profile_yaml_load(path, &board, &p, why, sizeof why)) fail_msg("%s", why);
+        assert_string_equal(board_profile_name(board->type, &p), profiles[i]);
     }
     assert_true(scenario_load("fast", &s, why, sizeof why));
     assert_int_equal(psa2_profile_period_ns(&s.units[0].profile.psa2), 250000);
