@@ -33,10 +33,11 @@ class Form(IntEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Frames:
-    """n samples. Times are NaN, temperatures and flags absent (0) where the form does not carry them."""
+    """n samples. Times are NaN, `seq` -1, temperatures and flags absent (0) where the form does not carry them."""
 
     t_rx_s: Floats  # (n,) when the (last) CAN frame arrived, in the time of the transport
     t_sample_s: Floats  # (n,) instant of the sample, s since power-on modulo the form's time stamp, unwrapped
+    seq: Ints  # (n,) frame number since Res, low 16 bits
     u_v: Floats  # (n, 3) volts at the loads of X, Y, Z (nominal scale)
     temp_code: Ints  # (n,) signed 16-bit code of temp_channel
     temp_channel: Ints  # (n,)
@@ -183,13 +184,15 @@ class FrameReader:
     def _pairs(self, xy_kept: _Kept, zt_kept: _Kept) -> Frames:
         xy, xy_at = _bits("PSA2_XY", xy_kept.data)
         zt, zt_at = _bits("PSA2_ZT", zt_kept.data)
-        self._count_gaps(signals.raw(xy, xy_at["SEQ"]), xy_at["SEQ"].bits)
+        seq = signals.raw(xy, xy_at["SEQ"])
+        self._count_gaps(seq, xy_at["SEQ"].bits)
         stamp = zt_at["TSTAMP"]
         settled, clipped = self._status(*(signals.raw(zt, zt_at[s]) for s in ("SETTLED", "CLIP", "OVERRUN")))
         u = [signals.physical(xy, xy_at["X"]), signals.physical(xy, xy_at["Y"]), signals.physical(zt, zt_at["Z"])]
         return Frames(
             t_rx_s=np.array(zt_kept.t_s),
             t_sample_s=self._times(signals.raw(zt, stamp), stamp.bits, stamp.scale),
+            seq=seq,
             u_v=np.stack(u, axis=1),
             temp_code=signals.raw(zt, zt_at["T"]),
             temp_channel=signals.raw(zt, zt_at["CHANNEL"]),
@@ -204,6 +207,7 @@ class FrameReader:
         return Frames(
             t_rx_s=np.array(kept.t_s),
             t_sample_s=np.full(n, np.nan),
+            seq=np.full(n, -1),
             u_v=np.stack([signals.physical(bits, at[s]) for s in "XYZ"], axis=1),
             temp_code=np.zeros(n, dtype=np.int64),
             temp_channel=np.zeros(n, dtype=np.int64),
@@ -217,6 +221,7 @@ class FrameReader:
         return Frames(
             t_rx_s=np.array(kept.t_s),
             t_sample_s=self._stamped(signals.raw(bits, at["TSTAMP"]), at["TSTAMP"]),
+            seq=np.full(len(kept.data), -1),
             u_v=np.stack([signals.physical(bits, at[s]) for s in "XYZ"], axis=1),
             temp_code=signals.raw(bits, at["T"]),
             temp_channel=signals.raw(bits, at["CHANNEL"]),
@@ -239,6 +244,7 @@ class FrameReader:
         return Frames(
             t_rx_s=np.repeat(np.array(kept.t_s), count),
             t_sample_s=(t0_s[:, None] + np.arange(count) * period_s).reshape(-1),
+            seq=np.full(len(t0_s) * count, -1),
             u_v=np.stack([column(s) * scale for s in "XYZ"], axis=1),
             temp_code=column("T"),
             temp_channel=status >> 4,
@@ -271,6 +277,7 @@ def _no_frames() -> Frames:
     return Frames(
         t_rx_s=none,
         t_sample_s=none,
+        seq=none_int,
         u_v=np.zeros((0, 3)),
         temp_code=none_int,
         temp_channel=none_int,

@@ -18,7 +18,7 @@ def database() -> Any:
 
 
 DBC_NODE = 5  # node of PSA-2's identifiers in the DBC; those of node n are n - 5 higher
-BOARDS = ("psa2", "psd1", "pmka", "pik")
+BOARDS = ("psa2", "psd1", "pmka", "pik", "gyro")
 HEARTBEAT_BASE = 0x700  # CiA 301, 7.3.3
 NODE_BITS = 0x7F  # of an identifier that belongs to a node
 

@@ -9,7 +9,7 @@ import can
 import pytest
 from psabench import devices, unit
 from psabench.can_host import CanHost, WallClock
-from psabench.devices import BOARDS, Pik, Pmka, Psa2, Psd1, identify, of_board
+from psabench.devices import BOARDS, Gyro, Pik, Pmka, Psa2, Psd1, identify, of_board
 from psabench.errors import CycleRefused, DeviceError
 from psabench.protocol_files import dbc_node, message_name
 from psabench.unit import Unit
@@ -88,20 +88,29 @@ def test_where_nobody_answers_it_is_a_psa_2_as_ever(monkeypatch: pytest.MonkeyPa
 
 @pytest.mark.parametrize(
     ("board", "kind"),
-    [("psa2", Psa2), ("psa1", Psa2), ("psd1", Psd1), ("pmka", Pmka), ("pik", Pik), ("pik5", Pik), ("pik6", Pik)],
+    [
+        ("psa2", Psa2),
+        ("psa1", Psa2),
+        ("psd1", Psd1),
+        ("pmka", Pmka),
+        ("pik", Pik),
+        ("pik5", Pik),
+        ("pik6", Pik),
+        ("gyro", Gyro),
+    ],
 )
 def test_boards_and_their_other_names(board: str, kind: type[Unit]) -> None:
     assert of_board(board) is kind
 
 
 def test_a_board_that_nobody_knows_is_a_bad_argument() -> None:
-    with pytest.raises(ValueError, match="no such board: psa3; there are psa2, psd1, pmka, pik"):
+    with pytest.raises(ValueError, match="no such board: psa3; there are psa2, psd1, pmka, pik, gyro"):
         of_board("psa3")
 
 
 def test_default_nodes() -> None:
-    assert {board: dbc_node(board) for board in BOARDS} == {"psa2": 5, "psd1": 6, "pmka": 7, "pik": 8}
-    assert [kind(CanHost(FakeBus(), WallClock())).node.node_id for kind in BOARDS.values()] == [5, 6, 7, 8]
+    assert {board: dbc_node(board) for board in BOARDS} == {"psa2": 5, "psd1": 6, "pmka": 7, "pik": 8, "gyro": 9}
+    assert [kind(CanHost(FakeBus(), WallClock())).node.node_id for kind in BOARDS.values()] == [5, 6, 7, 8, 9]
 
 
 def test_registers_by_the_names_of_the_eds() -> None:

@@ -54,6 +54,7 @@ def test_codes_come_back_as_volts_at_the_load(codes: list[tuple[int, int, int]])
     feed(reader, list(itertools.chain.from_iterable(pair(c, k) for k, c in enumerate(codes))))
     frames = reader.take()
     assert np.array_equal(frames.u_v, np.array(codes) * LSB_V)
+    assert np.array_equal(frames.seq, np.arange(len(codes)))
     assert frames.settled.all()
     assert reader.counters.lost == reader.counters.torn == 0
 

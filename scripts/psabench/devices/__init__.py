@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 from psabench.can_host import CanHost
 from psabench.canopen_host import CanopenNode
+from psabench.devices.gyro import Gyro
 from psabench.devices.pik import Pik
 from psabench.devices.pmka import Pmka
 from psabench.devices.psa2 import Psa2
@@ -16,9 +17,9 @@ from psabench.places import proto_file
 from psabench.readings import ReadingReader
 from psabench.unit import NAME, Unit
 
-__all__ = ["BOARDS", "Pik", "Pmka", "Psa2", "Psd1", "identify", "of_board", "reader_of"]
+__all__ = ["BOARDS", "Gyro", "Pik", "Pmka", "Psa2", "Psd1", "identify", "of_board", "reader_of"]
 
-BOARDS: Mapping[str, type[Unit]] = {"psa2": Psa2, "psd1": Psd1, "pmka": Pmka, "pik": Pik}
+BOARDS: Mapping[str, type[Unit]] = {"psa2": Psa2, "psd1": Psd1, "pmka": Pmka, "pik": Pik, "gyro": Gyro}
 ALIASES: Mapping[str, str] = {"psa1": "psa2", "pik5": "pik", "pik6": "pik"}  # the same board, another profile
 NAME_S = 1.0  # bench time for the answer to object 1008h: a unit that is there answers at once
 
