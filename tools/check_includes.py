@@ -18,6 +18,7 @@ MAY_INCLUDE = {
     "phys": {"base"},
     "chip": {"base"},
     "canopen": {"base"},
+    "nav": {"base"},
     "gen": {"base", "canopen"},
     "board": {"base", "chip", "phys", "trace", "canopen", "gen"},
     "link": {"base"},
@@ -30,12 +31,20 @@ C_HEADERS = set(
     "assert complex ctype errno fenv float inttypes iso646 limits math stdalign stdarg stdbool stddef stdint "
     "stdio stdlib stdnoreturn string tgmath".split()
 )
+CXX_HEADERS = set("algorithm array cmath cstddef cstdint cstring limits".split())  # of nav, which is C++
 OS_FOLDERS = {"link", "app"}
-LIBRARIES = {"cjson/cJSON.h": {"control", "app"}, "cJSON.h": {"control", "app"}, "libfyaml.h": {"app"}}
+LIBRARIES = {
+    "Eigen/Core": {"nav"},
+    "Eigen/Dense": {"nav"},
+    "cjson/cJSON.h": {"control", "app"},
+    "cJSON.h": {"control", "app"},
+    "libfyaml.h": {"app"},
+}
 
+KINDS = ("*.c", "*.h", "*.cpp", "*.hpp")
 FUNCTION_REASON, FUNCTION_MAX, FUNCTION_MEDIAN = 40, 70, 15  # lines, braces included
 SOURCE_MAX, HEADER_MAX = 500, 150  # lines
-HEADER_EXCEPTIONS = {"emu/api/psabench.h": 250}  # installed alone: the manual of the whole library
+HEADER_EXCEPTIONS = {"emu/api/psabench.h": 250, "emu/nav/nav.h": 250}  # installed alone: manuals of whole libraries
 REASON = re.compile(r"\blong:", re.IGNORECASE)  # in the comment above the function: "// Long: one row per opcode."
 INCLUDE = re.compile(r'\s*#\s*include\s+([<"])([^>"]+)[>"]')
 
@@ -89,7 +98,11 @@ def include_breach(path: Path, folder: str, bracket: str, target: str) -> str:
             return (
                 "" if folder in LIBRARIES[target] else f"<{target}> belongs in {', '.join(sorted(LIBRARIES[target]))}"
             )
-        if target.removesuffix(".h") in C_HEADERS or folder in OS_FOLDERS:
+        if (
+            target.removesuffix(".h") in C_HEADERS
+            or folder in OS_FOLDERS
+            or (folder == "nav" and target in CXX_HEADERS)
+        ):
             return ""
         return f"<{target}> is an operating system's header: only {' and '.join(sorted(OS_FOLDERS))} may have those"
     where, _, file = target.rpartition("/")
@@ -116,9 +129,9 @@ def check_file(path: Path, folder: str) -> tuple[list[str], list[Function]]:
     own = f"{folder}/{path.stem}.h"
     if folder == "gen":
         return found, []
-    if path.suffix == ".c" and path.with_suffix(".h").exists() and (not includes or includes[0][2] != own):
+    if path.suffix in (".c", ".cpp") and path.with_suffix(".h").exists() and (not includes or includes[0][2] != own):
         found.append(f'{path}:1: the first include must be the own header, "{own}"')
-    limit = HEADER_MAX if path.suffix == ".h" else SOURCE_MAX
+    limit = HEADER_MAX if path.suffix in (".h", ".hpp") else SOURCE_MAX
     limit = HEADER_EXCEPTIONS.get(f"emu/{own.removesuffix('.h')}{path.suffix}", limit)
     if len(text) > limit:
         found.append(f"{path}:{limit + 1}: {len(text)} lines, at most {limit}")
@@ -137,12 +150,12 @@ def main(root: Path) -> int:
     files = 0
     for folder in MAY_INCLUDE:
         where = root / "build/gen" if folder == "gen" else root / "emu" / folder
-        for path in sorted([*where.glob("*.c"), *where.glob("*.h")]):
+        for path in sorted(p for kind in KINDS for p in where.glob(kind)):
             found, its = check_file(path, folder)
             breaches += found
             bodies += its
             files += 1
-    strangers = {p.parent.name for p in (root / "emu").glob("*/*.[ch]")} - set(MAY_INCLUDE)
+    strangers = {p.parent.name for kind in KINDS for p in (root / "emu").glob(f"*/{kind}")} - set(MAY_INCLUDE)
     breaches += [f"emu/{name}: a folder that is not in the include table" for name in sorted(strangers)]
     median = statistics.median([f.length for f in bodies] or [0])
     if median > FUNCTION_MEDIAN:

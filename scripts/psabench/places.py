@@ -34,12 +34,12 @@ def find_emulator() -> Path:
     return _find("psa-emu", "PSA_EMU", own_emulators(), on_path, executable)
 
 
-def find_library(name: str) -> Path | None:
-    """Path of a shared library: $PSABENCH_LIB, the bundle, this checkout; None: the system's loader may know it."""
+def find_library(name: str, variable: str = "PSABENCH_LIB") -> Path | None:
+    """Path of a shared library: $variable, the bundle, this checkout; None: the system's loader may know it."""
     ours = [BUNDLE / "lib" / name, CHECKOUT / "build" / name]
-    if not os.environ.get("PSABENCH_LIB") and not any(p.is_file() for p in ours):
+    if not os.environ.get(variable) and not any(p.is_file() for p in ours):
         return None
-    return _find(name, "PSABENCH_LIB", ours, [], Path.is_file)
+    return _find(name, variable, ours, [], Path.is_file)
 
 
 def proto_file(name: str) -> Path:

@@ -1,0 +1,204 @@
+"""libpsabench-nav as ctypes sees it: found, checked and declared here, used by `nav` and `nav_mc`. Manual: nav.h."""
+
+from __future__ import annotations
+
+import ctypes as c
+from functools import cache
+from typing import Any
+
+from psabench.errors import BadInput
+from psabench.places import find_library
+
+ABI = 0  # NAV_ABI of the header that this was written from
+NAME = f"libpsabench-nav.so.{ABI}"
+MAX_POSITIONS = 64
+
+_D, _I, _U64 = c.c_double, c.c_int, c.c_uint64
+_DOUBLES = c.POINTER(c.c_double)
+
+
+def _doubles(*names: str) -> list[tuple[str, Any]]:
+    return [(name, _D) for name in names]
+
+
+class PositionStruct(c.Structure):
+    """struct nav_position."""
+
+    _fields_ = _doubles("s_radps", "delta_rad", "beta_rad", "gamma_rad", "t_mid_s", "window_s")
+
+
+class NoiseStruct(c.Structure):
+    """struct nav_noise."""
+
+    _fields_ = _doubles(
+        "gm_sigma_radps", "gm_tau_s", "white_radps_rts", "window_sd_radps", "angle_sd_rad", "level_sd_rad"
+    )
+
+
+class FitStruct(c.Structure):
+    """struct nav_gyrocompass_cfg."""
+
+    _fields_ = [
+        ("latitude_rad", _D),
+        ("method", _I),
+        ("simplified", _I),
+        ("ramp", _I),
+        ("noise", NoiseStruct),
+    ]
+
+
+class CompassStruct(c.Structure):
+    """struct nav_gyrocompass."""
+
+    _fields_ = [
+        *_doubles("alpha1_rad", "alpha1_sd_rad", "alpha1_half95_rad", "platform_sd_rad"),
+        *_doubles("drift1_radps", "drift1_sd_radps", "ramp_radps2", "s", "c", "quality", "geometry"),
+        ("residual_rms_radps", _D),
+        ("cov", _D * 9),
+        ("flags", c.c_uint32),
+        ("iterations", _I),
+    ]
+
+
+class AttitudeStruct(c.Structure):
+    """struct nav_attitude."""
+
+    _fields_ = _doubles("pitch_rad", "roll_rad", "gamma_bias_rad", "residual_rms_rad")
+
+
+class RestStruct(c.Structure):
+    """struct nav_rest."""
+
+    _fields_ = _doubles(
+        "latitude_rad",
+        "latitude_error_rad",
+        "alpha_rad",
+        "gamma_rad",
+        "drift1_radps",
+        "m1_per_s",
+        "torquer_scale1",
+        "beta_error_rad",
+        "gamma_error_rad",
+    )
+
+
+class HoldStruct(c.Structure):
+    """struct nav_hold."""
+
+    _fields_ = [
+        *_doubles("heading_sd_rad", "drift_sd_radps", "gm_sigma_radps", "gm_tau_s"),
+        ("gm_from_zero", _I),
+    ]
+
+
+class McStruct(c.Structure):
+    """struct nav_mc_cfg."""
+
+    _fields_ = [
+        *_doubles("latitude_rad", "latitude_error_rad", "tilt_rad"),
+        ("tilt", _I),
+        ("cardan", _I),
+        *_doubles("alpha1_rad", "drift1_radps", "gm_sigma_radps", "gm_tau_s"),
+        ("gm_from_zero", _I),
+        *_doubles("torquer_scale", "m1_per_s", "beta_sys_rad", "gamma_sys_rad", "beta_random_rad"),
+        *_doubles("gamma_random_rad", "angle_sys_rad", "angle_random_rad"),
+        ("angle_sys", _I),
+        ("random_sign", _I),
+        ("per_sample", _I),
+        *_doubles("white_radps_rts", "sample_s"),
+        ("count", _I),
+        ("angle_rad", _D * MAX_POSITIONS),
+        *_doubles("window_s", "gap_s", "slew_radps", "settle_s"),
+        ("fit", FitStruct),
+    ]
+
+
+class McOutStruct(c.Structure):
+    """struct nav_mc_out."""
+
+    _fields_ = [(name, _DOUBLES) for name in ("platform_rad", "heading_rad", "drift_radps", "alpha1_rad", "quality")]
+
+
+class McHoldStruct(c.Structure):
+    """struct nav_mc_hold_cfg."""
+
+    _fields_ = [
+        ("start", McStruct),
+        ("axis2", _I),
+        *_doubles("axis2_sd_radps", "heading_rad", "drift_error_radps", "hours", "step_s", "wait_s", "level_rad"),
+        *_doubles("latitude_error_rad", "v_east_mps", "speed_error"),
+    ]
+
+
+class McHoldOutStruct(c.Structure):
+    """struct nav_mc_hold_out."""
+
+    _fields_ = [("end_rad", _DOUBLES), ("max_rad", _DOUBLES)]
+
+
+_P = c.POINTER
+_RANGE = (_U64, _U64, _U64)
+
+# Function without its nav_: what it returns, what it takes.
+PROTOTYPES: dict[str, tuple[Any, ...]] = {
+    "abi": (_I,),
+    "version": (c.c_char_p,),
+    "status_text": (c.c_char_p, _I),
+    "flag_text": (c.c_char_p, c.c_uint32),
+    "gyrocompass": (_I, _P(PositionStruct), _I, _P(FitStruct), _P(CompassStruct)),
+    "gyrocompass_printed": (_I, _P(PositionStruct), _D, _DOUBLES, _DOUBLES),
+    "attitude_from_level": (_I, _DOUBLES, _DOUBLES, _DOUBLES, _I, _I, _P(AttitudeStruct)),
+    "alpha": (_D, _D, _D, _D, _D, _D),
+    "gamma": (_D, _D, _D, _D, _D, _D),
+    "cardan": (_I, _DOUBLES, _DOUBLES, _I, _D, _D, _DOUBLES),
+    "heading": (_D, _D, _D, _D, _D, _D),
+    "window_slope": (_I, _DOUBLES, _DOUBLES, _I, _D, _DOUBLES),
+    "rest_s_radps": (_D, _P(RestStruct), _DOUBLES),
+    "azimuth_drift": (_D, _D, _D, _D, _D, _D),
+    "azimuth_drift_sd": (_D, _D, _D, _D, _D),
+    "transport_radps": (_D, _D, _D),
+    "gm_integral_sd_rad": (_D, _D, _D, _D, _I),
+    "hold_sd_rad": (_D, _P(HoldStruct), _D),
+    "gm_window_cov": (_D, _D, _D, _D, _D, _D),
+    "mc_default": (None, _P(McStruct)),
+    "mc_closed": (_I, _P(McStruct), *_RANGE, _P(McOutStruct)),
+    "mc_samples": (_I, _P(McStruct), *_RANGE, _P(McOutStruct)),
+    "mc_hold_default": (None, _P(McHoldStruct)),
+    "mc_hold": (_I, _P(McHoldStruct), *_RANGE, _P(McHoldOutStruct)),
+}
+
+
+class NavLibrary:
+    """The functions of nav.h and nav_mc.h, each under its name without nav_, with their C types checked by ctypes."""
+
+    def __init__(self, path: str) -> None:
+        self.path = path
+        try:
+            so = c.CDLL(path)
+        except OSError as e:
+            raise BadInput(f"{path}: not a library that can be loaded ({e}); PSABENCH_NAV_LIB names another") from None
+        try:
+            abi = int(so.nav_abi())
+            if abi != ABI:
+                raise BadInput(f"{path}: speaks ABI {abi}, this psabench speaks {ABI}; PSABENCH_NAV_LIB names another")
+            for name, (result, *arguments) in PROTOTYPES.items():
+                function = getattr(so, f"nav_{name}")
+                function.restype, function.argtypes = result, arguments
+                setattr(self, name, function)
+        except AttributeError as e:
+            raise BadInput(f"{path}: older than this psabench ({e}); PSABENCH_NAV_LIB names another") from None
+
+    def __getattr__(self, name: str) -> Any:  # for the type checker: __init__ has set them all
+        raise AttributeError(name)
+
+
+@cache
+def library() -> NavLibrary:
+    """The library of this process, loaded at the first use. Raises BadInput when it is nowhere or of another ABI."""
+    path = find_library(NAME, "PSABENCH_NAV_LIB")
+    if path is None:
+        try:
+            return NavLibrary(NAME)
+        except BadInput:
+            raise BadInput(f"{NAME}: not in this package, its checkout or the system; `make` builds it") from None
+    return NavLibrary(str(path))
