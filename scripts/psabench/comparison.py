@@ -35,7 +35,8 @@ class Article:
     """What the article says of a generation, and what a unit may miss the integral by.
 
     printed: texts of the article (E1), "": nothing. scale: error of the coefficient, zero_v: of the zero at the load;
-    k_source says whence the first, zero_source whence the second.
+    k_source says whence the first, zero_source whence the second. error: of the coefficient as printed, "": nothing.
+    why: what its figures come from, where the board's page has to be known to understand them.
     """
 
     printed: str
@@ -45,6 +46,8 @@ class Article:
     zero_v: float
     k_source: str
     zero_source: str = "E0"
+    error: str = ""
+    why: str = ""
 
 
 # PSD-1 of profile psd1_quiet, in V at the input. Self-calibration takes zero and full scale from one word each, with
@@ -56,16 +59,37 @@ PSD1_REFERENCE = 2e-4  # standard deviation of the reference (E0)
 PSD1_SCALE = 3.0 * (PSD1_REFERENCE**2 + 2.0 * (PSD1_NOISE_V / PSD1_FULL_SCALE_V) ** 2) ** 0.5
 PSD1_ZERO_V = 3.0 * PSD1_NOISE_V + PSD1_CODE_V
 
+ONE_PULSE = "a level axis gives a pulse or none in the whole rest: its drift is known to a quantum over the rest"
+
 # Zeros are three standard deviations of the profiles and chains (E0); the article gives none.
 ARTICLE: Mapping[str, Article] = {
     "pik": Article(
-        printed="174 Hz/V within 0.15 %", pulse="60e-3", pulse_mps=60e-3, scale=1.5e-3, zero_v=6e-4, k_source="E1"
+        printed="174 Hz/V within 0.15 %",
+        pulse="60e-3",
+        pulse_mps=60e-3,
+        scale=1.5e-3,
+        zero_v=6e-4,
+        k_source="E1",
+        error="0.15 %",
+        why=ONE_PULSE,
     ),
     "pik5": Article(
-        printed="no figures but those of PIK", pulse="", pulse_mps=None, scale=1.5e-3, zero_v=6e-4, k_source="E1"
+        printed="no figures but those of PIK",
+        pulse="",
+        pulse_mps=None,
+        scale=1.5e-3,
+        zero_v=6e-4,
+        k_source="E1",
+        why=ONE_PULSE,
     ),
     "pik6": Article(
-        printed="2000 Hz/V within 0.05 %", pulse="5e-3", pulse_mps=5e-3, scale=5e-4, zero_v=1.5e-4, k_source="E1"
+        printed="2000 Hz/V within 0.05 %",
+        pulse="5e-3",
+        pulse_mps=5e-3,
+        scale=5e-4,
+        zero_v=1.5e-4,
+        k_source="E1",
+        error="0.05 %",
     ),
     "pmka": Article(
         printed="16-bit converter, Ts = 4.8 ms",
@@ -83,6 +107,8 @@ ARTICLE: Mapping[str, Article] = {
         zero_v=PSD1_ZERO_V,
         k_source="E0 + E3",
         zero_source="E0 + E3",
+        why=f"its drift is a zero: words are cut off, not rounded, up to a code ({PSD1_CODE_V * 1e6:.0f} µV) low, and "
+        f"self-calibration takes the zero from one word, which has {PSD1_NOISE_V * 1e6:.0f} µV rms of noise",
     ),
     "psa1": Article(
         printed="resolution finer by more than an order",
@@ -287,6 +313,7 @@ def result_dict(c: Comparison) -> dict[str, object]:
                 "scale_limit_grade": g.article.k_source,
                 "zero_limit_v": g.article.zero_v,
                 "printed_quantum_mps": g.article.pulse_mps,
+                "printed_error": g.article.error,
                 "step_seen_mps": _numbers(f.step_mps),
                 "noise_rms_mps": _numbers(f.noise_mps),
                 "zero_mps2": _numbers(zero_mps2(g, c.motion, c.params)),
@@ -296,6 +323,7 @@ def result_dict(c: Comparison) -> dict[str, object]:
                 "limit_mps": _numbers(g.limit_mps),
                 "within_limits": g.within,
                 "note": track.note,
+                "why": g.article.why,
             }
         )
     return {
@@ -307,14 +335,22 @@ def result_dict(c: Comparison) -> dict[str, object]:
     }
 
 
-def table(c: Comparison) -> list[tuple[str, ...]]:
-    """Rows for console and page, the head first."""
-    head = ("", "printed", "quantum", "step seen", "noise at rest", "zero", "end X", "end Y", "end Z", "limit Z", "")
-    units = ("", "m/s", "m/s", "m/s", "m/s rms", "µg", "m/s", "m/s", "m/s", "m/s", "")
-    rows: list[tuple[str, ...]] = [head, units]
+def drift_mps2(g: Graded, c: Comparison) -> float:
+    """What the velocity of a level axis runs up by at rest, the worse of X and Y; m/s^2."""
+    return float(np.abs(zero_mps2(g, c.motion, c.params)[:2]).max())
+
+
+Table = list[tuple[str, ...]]
+
+
+def figures_table(c: Comparison) -> Table:
+    """Resolution, noise, drift and error in motion of each generation; head and units first."""
+    rows: Table = [
+        ("", "printed", "quantum", "step seen", "noise at rest", "drift at rest", "as a zero", "largest in motion"),
+        ("", "m/s", "m/s", "m/s", "m/s rms", "mm/s a min", "µg", "m/s"),
+    ]
     for g in c.graded:
-        f, track = g.figures, g.figures.track
-        zero = float(np.abs(zero_mps2(g, c.motion, c.params)[:2]).max()) / c.g_mps2 * 1e6
+        f, track, drift = g.figures, g.figures.track, drift_mps2(g, c)
         rows.append(
             (
                 track.title,
@@ -322,24 +358,42 @@ def table(c: Comparison) -> list[tuple[str, ...]]:
                 f"{track.quantum_mps(c.g_mps2):.3g}",
                 f"{f.step_mps.min():.3g}" if np.isfinite(f.step_mps.min()) else "–",
                 f"{f.noise_mps.max():.2g}",
-                f"{zero:.3g}",
-                *(f"{e:+.2g}" for e in g.end_mps),
-                f"{g.limit_mps[2]:.2g}",
-                "" if g.within else "out of limits",
+                f"{drift * 60e3:.3g}",
+                f"{drift / c.g_mps2 * 1e6:.3g}",
+                f"{g.swing_mps:.2g}",
             )
         )
     return rows
 
 
+def errors_table(c: Comparison) -> Table:
+    """Velocity error of each axis over the run beside its limit, and the error of the coefficient as printed."""
+    rows: Table = [
+        ("", "printed", *(f"{what} {axis}" for axis in AXES for what in ("end", "limit")), "within"),
+        ("", "", *["m/s"] * 6, ""),
+    ]
+    for g in c.graded:
+        ends = (x for end, limit in zip(g.end_mps, g.limit_mps, strict=True) for x in (f"{end:+.2g}", f"{limit:.2g}"))
+        rows.append((g.figures.track.title, g.article.error or "–", *ends, "yes" if g.within else "NO"))
+    return rows
+
+
 def console_table(c: Comparison) -> str:
     """What the terminal shows."""
-    rows = table(c)
+    headed = (
+        ("velocity at rest and in motion", figures_table(c)),
+        ("velocity less the exact integral, from the first reading to the last", errors_table(c)),
+    )
+    return "\n\n".join(f"{head}\n{_aligned(rows)}" for head, rows in headed)
+
+
+def _aligned(rows: Table) -> str:
     width = [max(len(r[i]) for r in rows) for i in range(len(rows[0]))]
     lines = [
         "  ".join(x.ljust(w) if i == 0 else x.rjust(w) for i, (x, w) in enumerate(zip(r, width, strict=True)))
         for r in rows
     ]
-    return "\n".join(line.rstrip() for line in lines)
+    return "\n".join(f"  {line}".rstrip() for line in lines)
 
 
 def verdict(c: Comparison) -> str:

@@ -42,7 +42,7 @@ def html_page(c: Comparison) -> str:
     body = [
         f"<header><h1>{TITLE}</h1><p class=facts>{facts}</p></header>",
         f"<p class='verdict {'good' if c.within else 'bad'}'>{escape(comparison.verdict(c))}</p>",
-        _table(c),
+        _tables(c),
         pictures,
         _method(c),
     ]
@@ -53,29 +53,51 @@ def html_page(c: Comparison) -> str:
 
 _HEADINGS = ("Resolution, noise, error", "Velocity error", "The motion")
 _CAPTIONS = (
-    "Of each generation: the quantum that the article prints, that of its unit, the scatter of the velocity about a "
-    "line at rest, the largest error while the table moved, the error at the end of the run.",
+    "Of each generation: the quantum of its unit, in a ring where the article prints one; the scatter of the velocity "
+    "about a line at rest, the largest error while the table moved, the error at the end of the run.",
     "Velocity of each axis less the exact integral, on a scale of its own; the delay of the readings is taken out.",
     "What the accelerometers felt, from the truth log.",
 )
 
 
-def _table(c: Comparison) -> str:
-    rows = comparison.table(c)
-    head = "".join(f"<th>{escape(x)}</th>" for x in rows[0])
-    units = "".join(f"<th>{escape(x)}</th>" for x in rows[1])
+_ABOUT_FIGURES = (
+    "printed: quantum as the article has it. step seen: smallest difference between two increments on the wire, where "
+    "they lie on a grid. noise at rest: about a straight line. drift at rest: slope of that line, the worse of the "
+    "level axes, beyond what they felt; as a zero: the same in µg. largest in motion: of any axis, the drift taken off."
+)
+_ABOUT_ERRORS = (
+    "printed: error of the coefficient as the article has it. end: from the first reading to the last, at rest in the "
+    "same attitude. limit: error of the coefficient times what the axis felt, a zero of three standard deviations, two "
+    "quanta."
+)
+
+
+def _tables(c: Comparison) -> str:
+    return _table("Beside the article", comparison.figures_table(c), _ABOUT_FIGURES) + _table(
+        "Beside the exact integral", comparison.errors_table(c), _ABOUT_ERRORS
+    )
+
+
+def _table(heading: str, rows: comparison.Table, about: str) -> str:
+    """The first column is the row's head; a NO stands out."""
+    head = "".join(
+        f"<tr>{''.join(f'<th style=text-align:{side}>{escape(x)}</th>' for x, side in _sides(r))}</tr>"
+        for r in rows[:2]
+    )
     body = "".join(
         f"<tr><th>{escape(r[0])}</th>"
-        + "".join(f"<td class=num>{escape(x)}</td>" for x in r[1:-1])
-        + f"<td class='mark bad'>{escape(r[-1])}</td></tr>"
+        + "".join(f"<td class='num{' bad' if x == 'NO' else ''}'>{escape(x)}</td>" for x in r[1:])
+        + "</tr>"
         for r in rows[2:]
     )
     return (
-        "<section><h2>Beside the article</h2><div class=scroll><table class=est>"
-        f"<thead><tr>{head}</tr><tr>{units}</tr></thead><tbody>{body}</tbody></table></div>"
-        "<p class=small>printed: quantum as the article has it. step seen: smallest difference between two increments "
-        "on the wire, where they lie on a grid. end: velocity error over the run.</p></section>"
+        f"<section><h2>{heading}</h2><div class=scroll><table>"
+        f"<thead>{head}</thead><tbody>{body}</tbody></table></div><p class=small>{about}</p></section>"
     )
+
+
+def _sides(row: tuple[str, ...]) -> list[tuple[str, str]]:
+    return [(x, "left" if i == 0 else "right") for i, x in enumerate(row)]
 
 
 def _method(c: Comparison) -> str:
@@ -83,7 +105,8 @@ def _method(c: Comparison) -> str:
         f"<li><b>{escape(g.figures.track.title)}</b>: {escape(g.article.printed)}; {escape(g.figures.track.note)}; "
         f"{g.figures.track.ma_v_per_g:.4g} V/g; its readings are {g.lag_s * 1e3:.2f} ms behind; "
         f"limit: {g.article.scale * 1e2:.3g} % ({g.article.k_source}) and {g.article.zero_v * 1e3:.3g} mV of zero "
-        f"({g.article.zero_source})</li>"
+        f"({g.article.zero_source})"
+        f"{f'; {escape(g.article.why)}' if g.article.why else ''}</li>"
         for g in c.graded
     )
     return f"<section class=method><h2>How</h2><ul>{rows}</ul></section>"
@@ -105,7 +128,6 @@ def _dots(c: Comparison) -> str:
         ax = figure.subplots()
         for i, g in enumerate(c.graded):
             values = (
-                ("printed quantum", "x", plots.INK, g.article.pulse_mps),
                 ("quantum", "o", plots.SERIES[0], g.figures.track.quantum_mps(c.g_mps2)),
                 ("noise at rest", "s", plots.SERIES[2], float(g.figures.noise_mps.max())),
                 ("largest error in motion", "^", plots.SERIES[3], g.swing_mps),
@@ -114,6 +136,9 @@ def _dots(c: Comparison) -> str:
             for label, marker, colour, value in values:
                 if value:
                     ax.plot(value, -i, marker, color=colour, ms=5, label=label if i == 0 else None, ls="none")
+            if g.article.pulse_mps:  # a ring: the quantum lies in it
+                ring = ax.plot(g.article.pulse_mps, -i, "o", color=plots.INK, ls="none", ms=10, mfc="none", mew=1.0)
+                ring[0].set_label("printed quantum" if i == 0 else "_")
         ax.set_xscale("log")
         ax.set_xlabel("m/s")
         ax.set_yticks([-i for i in range(len(c.graded))], [g.figures.track.title for g in c.graded])

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from psabench import cli
 
+ROOT = Path(__file__).resolve().parents[2]
 PULSES = {"pik": 60e-3, "pik5": 60e-3, "pik6": 5e-3, "pmka": 2.4e-5}  # m/s, as the article prints them
 
 
@@ -33,7 +34,12 @@ def test_seven_units_one_motion(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert json.loads((tmp_path / "scenario-converters.json").read_text())["units"]
 
 
-def test_another_bench_is_bad_input_or_a_failure(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_another_bench_is_bad_input(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["run", "compare-converters", "--scenario", "nowhere.yaml", "--out", str(tmp_path)]) == 2
-    assert cli.main(["run", "compare-converters", "--scenario", "quiet", "--out", str(tmp_path)]) == 3
-    assert "no unit pik" in capsys.readouterr().err
+    assert cli.main(["run", "compare-converters", "--scenario", "quiet", "--out", str(tmp_path)]) == 2
+    assert "no unit pik, pik5, pik6, pmka, psd1, psa1, psa2 of" in capsys.readouterr().err
+    other = tmp_path / "other.yaml"
+    text = (ROOT / "proto/scenarios/converters.yaml").read_text(encoding="utf-8")
+    other.write_text(text.replace("board: pik5\n", "board: psa2\n"), encoding="utf-8")
+    assert cli.main(["run", "compare-converters", "--scenario", str(other), "--out", str(tmp_path)]) == 2
+    assert "no unit pik5 of the board of that name" in capsys.readouterr().err

@@ -145,9 +145,36 @@ def test_page_and_data(tmp_path: Path) -> None:
     assert data["generations"][0]["printed_quantum_mps"] == 0.06
     assert data["generations"][1]["step_seen_mps"][1] is None
     assert comparison.finer(c)[1][1] == pytest.approx(2000 / 174 * GENERATIONS["pik6"].load_ohm / 735.0)
-    rows = comparison.console_table(c).splitlines()
-    assert len(rows) == 4
-    assert rows[2].startswith("PIK ")
+    assert text.count("<h2>Beside the ") == 2
+    assert "<td class='num'></td>" not in text, "every cell of a generation says something"
+    assert all(g.article.why in text for g in both)
+
+
+def test_tables_have_resolution_noise_drift_and_the_errors_beside_their_limits() -> None:
+    m = motion()
+    good, bad = graded(track("psd1", m, zero_v=100e-6), m), graded(track("pik6", m, scale=1.0012), m)
+    c = Comparison(graded=(good, bad), motion=m, params=PARAMS, g_mps2=G_MPS2, facts={})
+    head, units, psd1, pik6 = comparison.figures_table(c)
+    zero_g = 100e-6 / GENERATIONS["psd1"].ma_v_per_g
+    column = dict(zip(head, psd1, strict=True))
+    assert float(column["as a zero"]) == pytest.approx(zero_g * 1e6, rel=0.01)
+    assert float(column["drift at rest"]) == pytest.approx(zero_g * G_MPS2 * 60e3, rel=0.01)
+    assert units[head.index("drift at rest")] == "mm/s a min"
+    assert float(column["largest in motion"]) == pytest.approx(good.swing_mps, rel=0.1)
+    assert column["printed"] == "–"
+    assert pik6[head.index("printed")] == "5e-3"
+    head, _units, psd1, pik6 = comparison.errors_table(c)
+    assert all(x for row in (head, psd1, pik6) for x in row[1:])
+    for i, axis in enumerate("XYZ"):
+        assert float(psd1[head.index(f"end {axis}")]) == pytest.approx(good.end_mps[i], rel=0.1, abs=1e-9)
+        assert float(psd1[head.index(f"limit {axis}")]) == pytest.approx(good.limit_mps[i], rel=0.1)
+    assert (psd1[-1], pik6[-1]) == ("yes", "NO")
+    assert pik6[head.index("printed")] == "0.05 %"
+    assert "<td class='num bad'>NO</td>" in comparison_page.html_page(c)
+    assert "words are cut off" in comparison_page.html_page(c)
+    lines = comparison.console_table(c).splitlines()
+    assert max(map(len, lines)) <= 100
+    assert [x.split()[0] for x in lines if x.startswith(("  PS", "  PIK"))] == ["PSD-1", "PIK-6"] * 2
 
 
 def test_every_generation_has_its_figures() -> None:

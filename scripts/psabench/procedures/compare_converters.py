@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from psabench.bench import Bench
 from psabench.devices import Pik, Pmka, Psa2, Psd1
-from psabench.errors import LinkError
+from psabench.errors import BadInput, LinkError
 from psabench.estimate import pik, pmka
 from psabench.procedures.head_bench import Progress
 from psabench.readings import Readings
@@ -53,6 +53,7 @@ class Generation:
     """A generation as its unit is called in the scenario; load_ohm: of its accelerometers, which gives Ma."""
 
     title: str
+    board: type[Unit]
     load_ohm: float
 
     @property
@@ -61,13 +62,13 @@ class Generation:
 
 
 GENERATIONS: Mapping[str, Generation] = {
-    "pik": Generation(title="PIK", load_ohm=735.0),
-    "pik5": Generation(title="PIK-5", load_ohm=735.0),
-    "pik6": Generation(title="PIK-6", load_ohm=768.0),
-    "pmka": Generation(title="PMKA", load_ohm=937.5),
-    "psd1": Generation(title="PSD-1", load_ohm=937.5),
-    "psa1": Generation(title="PSA-1", load_ohm=937.5),
-    "psa2": Generation(title="PSA-2", load_ohm=937.5),
+    "pik": Generation(title="PIK", board=Pik, load_ohm=735.0),
+    "pik5": Generation(title="PIK-5", board=Pik, load_ohm=735.0),
+    "pik6": Generation(title="PIK-6", board=Pik, load_ohm=768.0),
+    "pmka": Generation(title="PMKA", board=Pmka, load_ohm=937.5),
+    "psd1": Generation(title="PSD-1", board=Psd1, load_ohm=937.5),
+    "psa1": Generation(title="PSA-1", board=Psa2, load_ohm=937.5),
+    "psa2": Generation(title="PSA-2", board=Psa2, load_ohm=937.5),
 }
 
 
@@ -202,10 +203,16 @@ def _streaming(units: Mapping[str, Unit]) -> Iterator[None]:
 
 
 def record(bench: Bench, p: CompareParams, progress: Progress) -> tuple[Track, ...]:
-    """Record every unit of the bench through the motion. Raises LinkError where a unit is missing or lost something."""
-    missing = [name for name in GENERATIONS if name not in bench.units]
+    """Record every unit of the bench through the motion.
+
+    Raises BadInput for a bench without the units, LinkError where one of them lost something.
+    """
+    missing = [name for name, gen in GENERATIONS.items() if not isinstance(bench.units.get(name), gen.board)]
     if missing:
-        raise LinkError(f"no unit {', '.join(missing)} on the bench; the scenario is {SCENARIO}")
+        raise BadInput(
+            f"the scenario has no unit {', '.join(missing)} of the board of that name; "
+            f"copy {SCENARIO}.yaml (psa-emu --list-scenarios) and change what is around them"
+        )
     units = {name: bench.units[name] for name in GENERATIONS}
     bench.wait(max(0.0, SETTLE_S - bench.time_s))
     slices = max(1, round(p.seconds / p.slice_s))
