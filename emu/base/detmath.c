@@ -79,3 +79,30 @@ double det_cos(double x_rad)
 {
     return sin_quarter(x_rad, 1);
 }
+
+/* 0 <= t <= 1. atan t = atan c + atan((t - c)/(1 + t c)) with c the nearest quarter: |s| <= 1/8, s^19/19 is below 1e-18. */
+static double atan_unit(double t)
+{
+    static const double quarter[][2] = {{0.0, 0.0},
+                                        {0x1.f5b75f92c80ddp-3, 0x1.8ab6e3cf7afbdp-57},
+                                        {0x1.dac670561bb4fp-2, 0x1.a2b7f222f65e2p-56},
+                                        {0x1.4978fa3269ee1p-1, 0x1.2419a87f2a458p-56},
+                                        {0x1.921fb54442d18p-1, 0x1.1a62633145c07p-55}};
+    const int j = (int)(4.0 * t + 0.5);
+    const double c = 0.25 * (double)j;
+    const double s = (t - c) / (1.0 + t * c);
+    const double z = s * s;
+    double sum = 0.0;
+    for (int n = 17; n >= 3; n -= 2) sum = (1.0 / (double)n - sum) * z;
+    return quarter[j][0] + (quarter[j][1] + (s - s * sum));
+}
+
+double det_atan2(double y, double x)
+{
+    const double ax = fabs(x);
+    const double ay = fabs(y);
+    if (ax == 0.0 && ay == 0.0) return 0.0;
+    double a = ay <= ax ? atan_unit(ay / ax) : (PIO2_1 - atan_unit(ax / ay)) + PIO2_2;
+    if (x < 0.0) a = (2.0 * PIO2_1 - a) + 2.0 * PIO2_2;
+    return y < 0.0 ? -a : a;
+}

@@ -9,5 +9,6 @@ double det_log(double x);     /* natural logarithm, x > 0 finite and normal */
 double det_exp(double x);     /* -700 <= x <= 700 */
 double det_sin(double x_rad); /* |x_rad| <= 1e6: reduced by pi/2 in three parts */
 double det_cos(double x_rad);
+double det_atan2(double y, double x); /* in [-pi, pi], finite arguments; 0 if both are 0 */
 
 #endif

@@ -9,6 +9,8 @@ struct lab_cfg lab_default(void)
         .table = table_default(0),
         .chamber = chamber_default(),
         .supply = supply_default(),
+        .platform = platform_default(),
+        .vehicle = vehicle_default(),
     };
 }
 
@@ -20,6 +22,7 @@ void lab_init(struct lab *l, const struct lab_cfg *cfg, uint64_t seed)
     chamber_init(&l->chamber, &cfg->chamber);
     supply_init(&l->supply, &cfg->supply);
     pose_start(&l->bench, &cfg->site);
+    platform_init(&l->platform, &cfg->platform, &cfg->vehicle, &cfg->site, seed);
 }
 
 static bool is_zero(const double v[3])
@@ -27,11 +30,12 @@ static bool is_zero(const double v[3])
     return v[0] == 0.0 && v[1] == 0.0 && v[2] == 0.0;
 }
 
-/* How the case stands in the mount: the face of the head, then the misalignment. */
+/* How the case stands in the mount: the face of the head or the tilt of the level sensors, then the misalignment. */
 static struct pose case_in_mount(const struct lab *l, const struct lab_seat *seat, int64_t t_ns)
 {
     struct pose p;
     pose_start(&p, &(struct site){0});
+    if (seat->on == LAB_PLATFORM) p = *platform_level(&l->platform, t_ns);
     if (seat->on == LAB_HEAD) pose_turn(&p, POSE_X, head_face_rad(head_face(&l->head, t_ns)), 0.0, 0.0);
     pose_tilt(&p, seat->misalignment_rad);
     return p;
@@ -45,11 +49,27 @@ static void head_pose(const struct lab *l, int64_t t_ns, struct pose *p)
     pose_turn(p, POSE_Z, s.angle_rad, s.rate_radps, s.accel_radps2);
 }
 
+/* At the centre exactly; a lever arm adds the centripetal part, with the rate as if it were constant. */
+static void platform_feels(struct platform *platform, const double r_m[3], int64_t t_ns, struct felt *out)
+{
+    struct pose p;
+    double f_mps2[3];
+    platform_pose(platform, t_ns, &p);
+    pose_force_mps2(&p, 0.0, r_m, out->f_mps2);
+    platform_force_mps2(platform, t_ns, f_mps2);
+    for (unsigned k = 0; k < 3; k++) out->f_mps2[k] += f_mps2[k];
+    memcpy(out->w_radps, p.w_ib_b_radps, sizeof out->w_radps);
+}
+
 /* In the mount's axes, at r_m from the instrument's centre. */
 static void mount_feels(struct lab *l, enum lab_mount on, const double r_m[3], int64_t t_ns, struct felt *out)
 {
     struct pose turned;
     const struct pose *p = &l->bench;
+    if (on == LAB_PLATFORM) {
+        platform_feels(&l->platform, r_m, t_ns, out);
+        return;
+    }
     if (on == LAB_TABLE) p = table_pose(&l->table, t_ns);
     if (on == LAB_HEAD) {
         head_pose(l, t_ns, &turned);
@@ -76,8 +96,12 @@ void lab_sensor_mps2(struct lab *l, const struct lab_seat *seat, const double at
     double mount[3];
     const bool on_head = seat->on == LAB_HEAD;
     const bool square = is_zero(seat->misalignment_rad);
-    if (on_head && square && is_zero(at_m) && is_zero(seat->lever_m)) {
+    const bool central = is_zero(at_m) && is_zero(seat->lever_m);
+    if (on_head && square && central) {
         head_gravity_mps2(&l->head, t_ns, mount);
+    } else if (seat->on == LAB_PLATFORM && central) {
+        platform_force_mps2(&l->platform, t_ns, mount);
+        for (unsigned k = 0; k < 3; k++) mount[k] = -mount[k];
     } else {
         const struct pose in_mount = case_in_mount(l, seat, t_ns);
         struct felt felt;
@@ -87,6 +111,7 @@ void lab_sensor_mps2(struct lab *l, const struct lab_seat *seat, const double at
         mount_feels(l, seat->on, r_m, t_ns, &felt);
         for (unsigned k = 0; k < 3; k++) mount[k] = -felt.f_mps2[k];
     }
+    if (seat->on == LAB_PLATFORM) pose_into(platform_level(&l->platform, t_ns), mount, mount);
     head_sensor_mps2(on_head ? head_face(&l->head, t_ns) : HEAD_DIRECT, cos_alpha0, sin_alpha0, mount, a_mps2);
     if (square) return;
     struct pose askew;
@@ -95,7 +120,8 @@ void lab_sensor_mps2(struct lab *l, const struct lab_seat *seat, const double at
     pose_into(&askew, a_mps2, a_mps2);
 }
 
-static const char *const mounts[] = {[LAB_HEAD] = "head", [LAB_TABLE] = "table", [LAB_FIXED] = "fixed"};
+static const char *const mounts[] = {
+    [LAB_HEAD] = "head", [LAB_TABLE] = "table", [LAB_FIXED] = "fixed", [LAB_PLATFORM] = "platform"};
 
 const char *lab_mount_name(enum lab_mount on)
 {

@@ -1,19 +1,22 @@
 /* Everything around the boards: the Earth, the instruments, and what a unit on one of them feels.
  *
- * A unit sits on the dividing head, on the rate table or on the bench itself. Its seat says where: the lever arm from the
- * instrument's centre (where the axes meet) to the unit's origin, in the mount's axes, and how its case stands askew there.
- * Mount's axes: of the head x and y in the plane of turning, z its axis (head.h); of the table t (table.h); of the bench x
- * towards the site's azimuth and z down. Sensors get the exact specific force and inertial rate at their own point.
+ * A unit sits on the dividing head, on the rate table, on the gyro-stabilised platform or on the bench itself. Its seat says
+ * where: the lever arm from the instrument's centre (where the axes meet) to the unit's origin, in the mount's axes, and how
+ * its case stands askew there. Mount's axes: of the head x and y in the plane of turning, z its axis (head.h); of the table t
+ * (table.h); of the bench x towards the site's azimuth and z down; of the platform p (platform.h), where the case is turned by
+ * the tilt errors of the level sensors first. Sensors get the exact specific force and inertial rate at their own point; of a
+ * lever arm on the platform the centripetal part alone.
  * Plain struct, one thread; never moved once bodies are in the chamber. */
 #ifndef PSABENCH_PHYS_LAB_H
 #define PSABENCH_PHYS_LAB_H
 
 #include "phys/chamber.h"
 #include "phys/head.h"
+#include "phys/platform.h"
 #include "phys/supply.h"
 #include "phys/table.h"
 
-enum lab_mount { LAB_HEAD, LAB_TABLE, LAB_FIXED };
+enum lab_mount { LAB_HEAD, LAB_TABLE, LAB_FIXED, LAB_PLATFORM };
 
 struct lab_cfg {
     struct site site;
@@ -21,6 +24,8 @@ struct lab_cfg {
     struct table_cfg table;
     struct chamber_cfg chamber;
     struct supply_cfg supply;
+    struct platform_cfg platform;
+    struct vehicle_cfg vehicle; /* under the platform */
 };
 
 struct lab {
@@ -30,6 +35,7 @@ struct lab {
     struct chamber chamber;
     struct supply supply;
     struct pose bench;
+    struct platform platform; /* if cfg.present */
 };
 
 /* A unit's place. All zero: in the centre of the head, square. */
@@ -60,7 +66,7 @@ void lab_feel(struct lab *l, const struct lab_seat *seat, const double at_m[3], 
 void lab_sensor_mps2(struct lab *l, const struct lab_seat *seat, const double at_m[3], double cos_alpha0,
                      double sin_alpha0, int64_t t_ns, double a_mps2[3]);
 
-/* "head", "table", "fixed"; NULL and -1 for none. */
+/* "head", "table", "fixed", "platform"; NULL and -1 for none. */
 const char *lab_mount_name(enum lab_mount on);
 int lab_mount_by_name(const char *name);
 
