@@ -3,6 +3,7 @@
 #define PSABENCH_BOARD_BOARD_BUS_H
 
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 enum board_cycle_result {
@@ -18,10 +19,6 @@ enum board_cycle_result {
     BOARD_CYCLE_OFF    /* no power, or cut by a reset */
 };
 
-/* Why a cycle is BOARD_CYCLE_TAKEN, and the way out. */
-#define BOARD_CYCLE_TAKEN_WHY                                                                                          \
-    "too early: no word waits there; the board's built-in host takes each that comes, profile psd1_host has none"
-
 /* One word for programs, "not-ready"; "ok" for BOARD_CYCLE_OK. */
 const char *board_cycle_word(enum board_cycle_result r);
 
@@ -35,11 +32,27 @@ struct board_cycle {
     void (*done)(void *ctx, struct board_cycle *c, enum board_cycle_result r, int64_t t_ns);
     void *ctx;
 };
+
+/* Lengths of strobes, ns. */
+struct board_strobe {
+    int64_t own_ns, least_ns; /* where the host gives none; the shortest that the board takes */
+};
+
 struct board_bus {
     /* BOARD_CYCLE_OK: done() will be called later, never from inside; else it will not. */
     enum board_cycle_result (*submit)(void *board, struct board_cycle *c, int64_t t_ns);
     unsigned addresses;
     const char *(*name)(unsigned address); /* of what is there: "X"; NULL: nothing */
+    struct board_strobe (*strobe)(const void *board);
+    /* Of a cycle refused as BAD_VALUE or NOT_READY, what would be right, a clause: "it takes 0 to 3". May write nothing. */
+    void (*wanted)(const void *board, const struct board_cycle *c, enum board_cycle_result r, char *out, size_t cap);
 };
+
+#define BOARD_CYCLE_WHY_MAX 190u
+
+/* Why a cycle was refused, and what would be right, for a human: "read of address 0Ah (TEMP), strobe 50 ns: ...". An address is
+ * written so wherever one is: two hexadecimal digits and h. */
+void board_cycle_why(const struct board_bus *bus, const void *board, const struct board_cycle *c,
+                     enum board_cycle_result r, char out[BOARD_CYCLE_WHY_MAX]);
 
 #endif

@@ -1,5 +1,7 @@
 /* The functions of a board_type that only give a pointer its type, written once.
  *
+ * BOARD_STROBE(NAME) likewise defines strobe, of board_bus, by the profile's strobe_ns and strobe_min_ns.
+ *
  * BOARD_LIFE(NAME) at the file's top level defines init, power_up, power_down, reset, sample_until, trace and line for a board
  * whose struct is struct NAME, with members trace and line, and whose functions are NAME_init() and so on. */
 #ifndef PSABENCH_BOARD_BOARD_LIFE_H
@@ -18,6 +20,14 @@
     static struct trace *trace(void *board) { return &((struct NAME *)board)->trace; }                                 \
     static struct line_faults *line(void *board) { return &((struct NAME *)board)->line; }                             \
     _Static_assert(sizeof(struct NAME) > 0, "BOARD_LIFE(NAME) ends with a semicolon")
+
+#define BOARD_STROBE(NAME)                                                                                             \
+    static struct board_strobe strobe(const void *board)                                                               \
+    {                                                                                                                  \
+        const struct NAME *b = board;                                                                                  \
+        return (struct board_strobe){b->profile.strobe_ns, b->profile.strobe_min_ns};                                  \
+    }                                                                                                                  \
+    _Static_assert(sizeof(struct NAME) > 0, "BOARD_STROBE(NAME) ends with a semicolon")
 // clang-format on
 
 #endif

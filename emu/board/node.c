@@ -26,20 +26,17 @@ double board_node_default(const struct board_node *n, uint16_t index, uint8_t su
 
 /* ---- bus cycles ---- */
 
-static const struct {
-    uint32_t abort;
-    const char *why;
-} refusals[] = {
-    [BOARD_CYCLE_OK] = {CO_OK, ""},
-    [BOARD_CYCLE_NO_ADDRESS] = {CO_AB_NO_SUB, "nothing answers at this address"},
-    [BOARD_CYCLE_READ_ONLY] = {CO_AB_READ_ONLY, "this register is read-only"},
-    [BOARD_CYCLE_WRITE_ONLY] = {CO_AB_WRITE_ONLY, "this register is write-only"},
-    [BOARD_CYCLE_NOT_READY] = {CO_AB_STATE, "too early: no word waits there"},
-    [BOARD_CYCLE_TOO_SHORT] = {CO_AB_VALUE, "the strobe is shorter than the board needs"},
-    [BOARD_CYCLE_BUSY] = {CO_AB_STATE, "another cycle is under way"},
-    [BOARD_CYCLE_BAD_VALUE] = {CO_AB_VALUE, "the register does not take this value"},
-    [BOARD_CYCLE_TAKEN] = {CO_AB_STATE, BOARD_CYCLE_TAKEN_WHY},
-    [BOARD_CYCLE_OFF] = {CO_AB_STATE, "the board has no power, or is in reset"},
+static const uint32_t aborts[] = {
+    [BOARD_CYCLE_OK] = CO_OK,
+    [BOARD_CYCLE_NO_ADDRESS] = CO_AB_NO_SUB,
+    [BOARD_CYCLE_READ_ONLY] = CO_AB_READ_ONLY,
+    [BOARD_CYCLE_WRITE_ONLY] = CO_AB_WRITE_ONLY,
+    [BOARD_CYCLE_NOT_READY] = CO_AB_STATE,
+    [BOARD_CYCLE_TOO_SHORT] = CO_AB_VALUE,
+    [BOARD_CYCLE_BUSY] = CO_AB_STATE,
+    [BOARD_CYCLE_BAD_VALUE] = CO_AB_VALUE,
+    [BOARD_CYCLE_TAKEN] = CO_AB_STATE,
+    [BOARD_CYCLE_OFF] = CO_AB_STATE,
 };
 
 void board_node_refuse(struct board_node *n, const char *why)
@@ -49,17 +46,15 @@ void board_node_refuse(struct board_node *n, const char *why)
 
 uint32_t board_node_abort_of(enum board_cycle_result r)
 {
-    assert((size_t)r < sizeof refusals / sizeof refusals[0]);
-    return refusals[r].abort;
+    assert((size_t)r < sizeof aborts / sizeof aborts[0]);
+    return aborts[r];
 }
 
 static void tell_refusal(struct board_node *n, const struct board_cycle *c, enum board_cycle_result r)
 {
-    char strobe[32] = "as the profile has it";
-    const char *name = n->type->board->bus->name(c->address);
-    if (c->strobe_ns > 0) (void)snprintf(strobe, sizeof strobe, "%lld ns", (long long)c->strobe_ns);
-    (void)snprintf(n->refusal, sizeof n->refusal, "refused: %s address %u (%s), strobe %s: %s",
-                   c->write ? "write to" : "read of", c->address, name ? name : "nothing", strobe, refusals[r].why);
+    char why[BOARD_CYCLE_WHY_MAX];
+    board_cycle_why(n->type->board->bus, n->board, c, r, why);
+    board_node_refuse(n, why);
     n->cycles_refused++;
 }
 

@@ -117,7 +117,10 @@ static enum board_cycle_result submit(void *board, struct board_cycle *c, int64_
     return pik_submit(board, c, t_ns);
 }
 
-static const struct board_bus bus = {.submit = submit, .addresses = PIK_REGISTERS, .name = pik_register_name};
+BOARD_STROBE(pik);
+
+static const struct board_bus bus = {
+    .submit = submit, .addresses = PIK_REGISTERS, .name = pik_register_name, .strobe = strobe, .wanted = pik_wanted};
 
 /* ---- what faults are measured by ---- */
 

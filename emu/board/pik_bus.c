@@ -1,6 +1,8 @@
 /* The registers as a computer reads and writes them, one cycle at a time (E0: the article says "in binary code"). */
 #include "board/pik_parts.h"
 
+#include <stdio.h>
+
 enum { READABLE = 1, WRITABLE = 2, LATCHED = 4 };
 
 static const struct {
@@ -87,6 +89,16 @@ static bool takes(const struct pik *b, const struct board_cycle *c)
 {
     if (c->address == PIK_REG_PERIOD) return pik_period_fits(b, c->data);
     return c->address != PIK_REG_CLEAR || c->data < 1u << PIK_AXES;
+}
+
+void pik_wanted(const void *board, const struct board_cycle *c, enum board_cycle_result r, char *out, size_t cap)
+{
+    unsigned least, most;
+    pik_period_range(board, &least, &most);
+    if (r == BOARD_CYCLE_NOT_READY)
+        (void)snprintf(out, cap, "a write to LATCH (0Bh) latches, PERIOD (0Ch) does so for ever");
+    else if (c->address == PIK_REG_PERIOD) (void)snprintf(out, cap, "it takes 0 and %u to %u", least, most);
+    else (void)snprintf(out, cap, "it takes 0 to %u", (1u << PIK_AXES) - 1);
 }
 
 static enum board_cycle_result judge(const struct pik *b, const struct board_cycle *c)

@@ -85,6 +85,14 @@ bool pik_period_fits(const struct pik *b, unsigned period_100us)
            (period_100us >= 2 && pulses <= 32767.0 && period_100us * (int64_t)STEP_NS > b->profile.latch_ns);
 }
 
+void pik_period_range(const struct pik *b, unsigned *least, unsigned *most)
+{
+    const double limit = 32767.0 / (STEP_NS * 1e-9 * pik_profile_limit_hz(&b->profile));
+    *least = b->profile.latch_ns / STEP_NS < 2 ? 2 : b->profile.latch_ns / STEP_NS + 1;
+    *most = limit > 65535.0 ? 65535 : (unsigned)limit;
+    while (*most > 0 && !pik_period_fits(b, *most)) (*most)--; /* what rounding has made of it */
+}
+
 void pik_latch_init(struct pik *b)
 {
     sched_ev(&b->latch, latch, b);

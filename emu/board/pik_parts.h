@@ -36,6 +36,7 @@ void pik_latch_restart(struct pik *b, int64_t t_ns);
 void pik_latch_now(struct pik *b, int64_t t_ns);
 void pik_set_period(struct pik *b, unsigned period_100us, int64_t t_ns);
 bool pik_period_fits(const struct pik *b, unsigned period_100us);
+void pik_period_range(const struct pik *b, unsigned *least, unsigned *most); /* of those that fit, beside 0 */
 
 /* pik_bus.c */
 void pik_bus_init(struct pik *b);

@@ -233,7 +233,10 @@ static void digest(const void *board, struct sha256 *s)
     sha256_add(s, &b->counters, sizeof b->counters);
 }
 
-static const struct board_bus bus = {.submit = submit, .addresses = PMKA_ADDRESSES, .name = pmka_register_name};
+BOARD_STROBE(pmka);
+
+static const struct board_bus bus = {
+    .submit = submit, .addresses = PMKA_ADDRESSES, .name = pmka_register_name, .strobe = strobe, .wanted = pmka_wanted};
 static const char *const port_lines[] = {"KL1", "KL2", "KL3", "KL4", "SH", "MUX0", "MUX1", NULL};
 
 const struct board_type pmka_board = {

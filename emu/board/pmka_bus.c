@@ -2,8 +2,10 @@
 #include "board/pmka_parts.h"
 
 #include <stddef.h>
+#include <stdio.h>
 
 #define INDEX_ROM 0x100u /* of the ROM's first word; below: numbers of resets */
+#define BEAT_MAX  60000u
 
 enum { STATUS_FRESH = 1, STATUS_OVERRUN = 2, STATUS_SATURATED = 4, STATUS_CLIPPED = 8, STATUS_AUTONOMOUS = 16 };
 
@@ -109,7 +111,7 @@ static bool write_command(struct pmka *b, uint16_t word)
 
 static bool write_beat(struct pmka *b, uint16_t word)
 {
-    if (word < b->rotation.zero_periods + PMKA_BEAT_SPARE || word > 60000) return false;
+    if (word < b->rotation.zero_periods + PMKA_BEAT_SPARE || word > BEAT_MAX) return false;
     b->rotation.beat_periods = word;
     return true;
 }
@@ -154,6 +156,28 @@ static const struct {
 const char *pmka_register_name(unsigned address)
 {
     return address < PMKA_ADDRESSES ? registers[address].name : NULL;
+}
+
+static void wanted_value(const struct pmka *b, unsigned address, char *out, size_t cap)
+{
+    const struct pmka_rotation *r = &b->rotation;
+    bool (*const write)(struct pmka *, uint16_t) = registers[address].write;
+    if (write == write_mode) (void)snprintf(out, cap, "it takes 0 or 1");
+    if (write == write_command)
+        (void)snprintf(out, cap,
+                       "it takes in MODE 0 alone: beat 0 to %u in bits 0 to 2, calibration 0 to %d in bits 4, 5",
+                       PMKA_TAUS, PMKA_CAL_RESET);
+    if (write == write_beat) (void)snprintf(out, cap, "it takes %u to %u", r->zero_periods + PMKA_BEAT_SPARE, BEAT_MAX);
+    if (write == write_zero) (void)snprintf(out, cap, "it takes 1 to %u", r->beat_periods - PMKA_BEAT_SPARE);
+    if (write == write_index)
+        (void)snprintf(out, cap, "it takes 0 to %u and %u to %u", 2 * PMKA_INTS - 1, INDEX_ROM,
+                       INDEX_ROM + PMKA_ROM_WORDS - 1);
+}
+
+void pmka_wanted(const void *board, const struct board_cycle *c, enum board_cycle_result r, char *out, size_t cap)
+{
+    if (r == BOARD_CYCLE_BAD_VALUE) wanted_value(board, c->address, out, cap);
+    else (void)snprintf(out, cap, "STATUS (08h) has bit 0 when the first reading is there");
 }
 
 /* ---- cycles ---- */

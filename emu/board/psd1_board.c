@@ -219,7 +219,10 @@ static void digest(const void *board, struct sha256 *s)
     sha256_add(s, &b->counters, sizeof b->counters);
 }
 
-static const struct board_bus bus = {.submit = submit, .addresses = PSD1_REGS, .name = psd1_register_name};
+BOARD_STROBE(psd1);
+
+static const struct board_bus bus = {
+    .submit = submit, .addresses = PSD1_REGS, .name = psd1_register_name, .strobe = strobe, .wanted = psd1_wanted};
 static const char *const port_lines[] = {"RFX", "RFY", "RFZ", "SCLK", "SDAT", "FL2", "CS", NULL};
 
 const struct board_type psd1_board = {

@@ -1,6 +1,8 @@
 /* The bus D0..D15 with A3..A0, R/W, CS: strobes, and the registers behind the addresses. */
 #include "board/psd1_parts.h"
 
+#include <stdio.h>
+
 typedef uint16_t read_fn(struct psd1 *b, unsigned address, int64_t t_ns);
 typedef enum board_cycle_result check_fn(const struct psd1 *b, uint16_t data);
 typedef void write_fn(struct psd1 *b, uint16_t data, int64_t t_ns);
@@ -204,6 +206,22 @@ static const struct {
 const char *psd1_register_name(unsigned address)
 {
     return address < PSD1_REGS ? registers[address].name : NULL;
+}
+
+static const char *wanted_value(const struct psd1 *b, const struct board_cycle *c)
+{
+    const char *why = NULL;
+    if (registers[c->address].check == two_bits) return "it takes 0 to 3";
+    if (registers[c->address].check == eight_bits || c->data > 255) return "it takes 0 to 255";
+    (void)psd1_request_check(b, (uint8_t)c->data, b->staged, &why);
+    return why;
+}
+
+void psd1_wanted(const void *board, const struct board_cycle *c, enum board_cycle_result r, char *out, size_t cap)
+{
+    const char *const why = r == BOARD_CYCLE_BAD_VALUE ? wanted_value(board, c)
+                                                       : "STATUS (03h) has bit 0 while one does, its axis in bits 1, 2";
+    if (why) (void)snprintf(out, cap, "%s", why);
 }
 
 /* ---- strobes ---- */

@@ -6,25 +6,24 @@ enum { UNIT, ADDRESS, READ_STROBE, DATA = READ_STROBE, WRITE_STROBE };
 
 #define PATIENCE_NS (10 * NS_PER_S) /* simulated; a strobe is a second at most */
 
-static const struct {
-    const char *code, *text;
-} refusals[] = {
-    [BOARD_CYCLE_OK] = {NULL, NULL},
-    [BOARD_CYCLE_NO_ADDRESS] = {"address", "nothing answers there"},
-    [BOARD_CYCLE_READ_ONLY] = {"read_only", "nothing can be written there"},
-    [BOARD_CYCLE_WRITE_ONLY] = {"write_only", "nothing can be read there"},
-    [BOARD_CYCLE_NOT_READY] = {"not_ready", "too early: no word waits there"},
-    [BOARD_CYCLE_TOO_SHORT] = {"too_short", "the strobe is shorter than the board needs"},
-    [BOARD_CYCLE_BUSY] = {"busy", "another cycle is under way"},
-    [BOARD_CYCLE_BAD_VALUE] = {"value", "the board does not take this value"},
-    [BOARD_CYCLE_TAKEN] = {"taken", BOARD_CYCLE_TAKEN_WHY},
-    [BOARD_CYCLE_OFF] = {"off", "the board has no power, or a reset cut the cycle"},
+static const char *const codes[] = {
+    [BOARD_CYCLE_NO_ADDRESS] = "address",
+    [BOARD_CYCLE_READ_ONLY] = "read_only",
+    [BOARD_CYCLE_WRITE_ONLY] = "write_only",
+    [BOARD_CYCLE_NOT_READY] = "not_ready",
+    [BOARD_CYCLE_TOO_SHORT] = "too_short",
+    [BOARD_CYCLE_BUSY] = "busy",
+    [BOARD_CYCLE_BAD_VALUE] = "value",
+    [BOARD_CYCLE_TAKEN] = "taken",
+    [BOARD_CYCLE_OFF] = "off",
 };
 
 static enum control_outcome refuse_cycle(struct control *c, const struct control_cycle *k, enum board_cycle_result r)
 {
-    const char *unit = c->bench->unit_name[k->unit];
-    return control_refuse(c, refusals[r].code, "%s, address %u: %s", unit, k->cycle.address, refusals[r].text);
+    char why[BOARD_CYCLE_WHY_MAX];
+    const struct unit *u = c->bench->unit[k->unit];
+    board_cycle_why(u->type->bus, u->board, &k->cycle, r, why);
+    return control_refuse(c, codes[r], "%s: %s", c->bench->unit_name[k->unit], why);
 }
 
 enum control_outcome control_cycle_result(struct control *c, const struct control_cycle *k, cJSON *result)

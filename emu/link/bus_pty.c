@@ -24,7 +24,7 @@ static void say_who(struct bus_pty *p, int64_t t_ns)
     size_t n = (size_t)snprintf(text, sizeof text, "I %.16s", p->ops.board);
     for (unsigned a = 0; a < p->ops.addresses; a++) {
         const char *const name = p->ops.name(p->ops.ctx, a);
-        if (name && n + 40 < sizeof text) n += (size_t)snprintf(text + n, sizeof text - n, " %X=%.12s", a, name);
+        if (name && n + 40 < sizeof text) n += (size_t)snprintf(text + n, sizeof text - n, " %02Xh=%.11s", a, name);
     }
     n += (size_t)snprintf(text + n, sizeof text - n, " t=%" PRId64 "\n", t_ns);
     put(p, text, n);

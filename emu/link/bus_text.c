@@ -36,6 +36,13 @@ static int digit(char c)
     return 16;
 }
 
+/* An address may have the h with which answers write it. */
+static struct text without_h(struct text f)
+{
+    if (f.end - f.at > 1 && (f.end[-1] == 'h' || f.end[-1] == 'H')) f.end--;
+    return f;
+}
+
 /* A number of at most `most` digits. */
 static bool number(struct text f, int base, unsigned most, uint32_t *out)
 {
@@ -97,7 +104,7 @@ enum bus_text_err bus_text_parse(const char *line, size_t len, struct bus_reques
         const struct text f = field(&t);
         uint32_t address = 0;
         if (empty(f)) return BUS_TEXT_SYNTAX;
-        if (!number(f, 16, 2, &address)) return BUS_TEXT_NUMBER;
+        if (!number(without_h(f), 16, 2, &address)) return BUS_TEXT_NUMBER;
         out->address = (uint8_t)address;
         *fields = 2;
         enum bus_text_err err = out->op == BUS_WRITE ? parse_data(&t, out) : BUS_TEXT_OK;
@@ -117,13 +124,14 @@ static const char op_letter[] = {[BUS_READ] = 'R', [BUS_WRITE] = 'W', [BUS_WHO] 
 
 size_t bus_text_done(const struct bus_request *r, uint16_t data, int64_t t_ns, char *out)
 {
-    return (size_t)snprintf(out, BUS_TEXT_MAX, "%c %X %04X t=%" PRId64 "\n", op_letter[r->op], r->address, data, t_ns);
+    return (size_t)snprintf(out, BUS_TEXT_MAX, "%c %02Xh %04X t=%" PRId64 "\n", op_letter[r->op], r->address, data,
+                            t_ns);
 }
 
 size_t bus_text_refused(const struct bus_request *r, unsigned fields, const char *code, int64_t t_ns, char *out)
 {
-    char address[4] = "-";
-    if (fields > 1) (void)snprintf(address, sizeof address, "%X", r->address);
+    char address[8] = "-";
+    if (fields > 1) (void)snprintf(address, sizeof address, "%02Xh", r->address);
     return (size_t)snprintf(out, BUS_TEXT_MAX, "E %.32s %c %s t=%" PRId64 "\n", code, fields ? op_letter[r->op] : '-',
                             address, t_ns);
 }

@@ -2,12 +2,13 @@
  *
  * To the board (LF ends a line, a CR before it is ignored; fields are separated by blanks; letters in any case):
  *
- *     R <address> [<strobe ns>]           read cycle; address: 1 or 2 hex digits
+ *     R <address> [<strobe ns>]           read cycle; address: 1 or 2 hex digits, with or without an h
  *     W <address> <data> [<strobe ns>]    write cycle; data: 1 to 4 hex digits
  *     ?                                   who is there
  *
  * The strobe is decimal, 1 to 999999999; without it, it has the board's own length. To the host, one line for each of its
- * lines, in their order (t: simulated ns at the end of the strobe, or of the refusal):
+ * lines, in their order (t: simulated ns at the end of the strobe, or of the refusal;
+ * an address: two hex digits and h):
  *
  *     R <address> <data> t=<ns>           data: 4 hex digits
  *     W <address> <data> t=<ns>           written

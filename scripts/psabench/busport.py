@@ -5,7 +5,7 @@
         port.read(3).data          # a read cycle at address 3
         port.write(15, 0x0003)     # a write cycle
 
-Lines as docs/busport.md has them: `R 3` is answered by `R 3 8000 t=1234567`, or refused by `E not-ready R 3 t=...`.
+Lines as docs/busport.md has them: `R 3` is answered by `R 03h 8000 t=1234567`, or refused by `E not-ready R 03h t=...`.
 Answers come in the order of the lines, so that many can be on their way: `ask` and `answer`.
 """
 
@@ -43,9 +43,9 @@ CODES: Mapping[str, tuple[int, str]] = {
     "bad-value": (0x06090030, "the register does not take this value"),
     "off": (0x08000020, "the board has no power, or a reset has cut the cycle"),
 }
-CYCLE = re.compile(r"([RW]) ([0-9A-F]{1,2}) ([0-9A-F]{4}) t=(\d+)")
-WHO = re.compile(r"I (\S+)((?: [0-9A-F]{1,2}=\S+)*) t=(\d+)")
-REFUSED = re.compile(r"E (\S+) ([RW?-]) ([0-9A-F]{1,2}|-) t=(\d+)")
+CYCLE = re.compile(r"([RW]) ([0-9A-F]{1,2})h? ([0-9A-F]{4}) t=(\d+)")
+WHO = re.compile(r"I (\S+)((?: [0-9A-F]{1,2}h?=\S+)*) t=(\d+)")
+REFUSED = re.compile(r"E (\S+) ([RW?-]) ([0-9A-F]{1,2}h?|-) t=(\d+)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -195,7 +195,7 @@ def parse(line: str) -> Cycle | Who:
         return Cycle(write=m[1] == "W", address=int(m[2], 16), data=int(m[3], 16), t_s=int(m[4]) * 1e-9)
     if m := WHO.fullmatch(line):
         pairs = (pair.split("=", 1) for pair in m[2].split())
-        return Who(board=m[1], names={int(a, 16): name for a, name in pairs}, t_s=int(m[3]) * 1e-9)
+        return Who(board=m[1], names={int(a.rstrip("h"), 16): name for a, name in pairs}, t_s=int(m[3]) * 1e-9)
     if m := REFUSED.fullmatch(line):
         code, what = m[1], f"{m[2]} {m[3]} at {int(m[4]) * 1e-9:.9f} s"
         if code in CODES:

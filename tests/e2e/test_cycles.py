@@ -177,7 +177,7 @@ REFUSALS = [
     ("pmka", "a read of what is only written", lambda u: u.bus_read(10), 0x06010001, "write-only"),
     ("pik", "a read of LATCH", lambda u: u.bus_read(11), 0x06010001, "write-only"),
     ("pik", "nothing there", lambda u: u.bus_read(14), 0x06090011, "nothing answers at this address"),
-    ("pik", "nothing there to write", lambda u: u.bus_write(15, 0), 0x06090011, "write to address 15 (nothing)"),
+    ("pik", "nothing there to write", lambda u: u.bus_write(15, 0), 0x06090011, "write of 0 to address 0Fh (nothing)"),
     ("psd1_host", "a word before its time", lambda u: u.bus_read(1), 0x08000022, "too early"),
     ("psd1", "a word of the built-in host", lambda u: u.bus_read(1), 0x08000022, "profile psd1_host"),
     ("psd1", "a strobe too short", lambda u: u.bus_read(STATUS, strobe_ns=50), 0x06090030, "strobe 50 ns"),

@@ -69,6 +69,19 @@ static const char *fake_name(unsigned address)
     return address < 4 ? name[address] : NULL;
 }
 
+static struct board_strobe fake_strobe(const void *board)
+{
+    (void)board;
+    return (struct board_strobe){FAKE_STROBE_NS, FAKE_STROBE_NS / 2 + 1};
+}
+
+static void fake_wanted(const void *board, const struct board_cycle *c, enum board_cycle_result r, char *out,
+                        size_t cap)
+{
+    (void)board;
+    (void)snprintf(out, cap, r == BOARD_CYCLE_BAD_VALUE ? "it takes %u" : "wait for %u", c->address);
+}
+
 static void fake_reset(void *board, int64_t t_ns)
 {
     struct fake_board *b = board;
@@ -175,7 +188,8 @@ static const struct board_part fake_parts[FAKE_PARTS] = {
     [FAKE_ROM] = {.name = "rom", .label = "memory", FAKE_CHIP(2)},
     [FAKE_LAMP] = {.name = "lamp", .label = "lamp", FAKE_CHIP(3)},
 };
-static const struct board_bus fake_bus = {.submit = fake_submit, .addresses = 4, .name = fake_name};
+static const struct board_bus fake_bus = {
+    .submit = fake_submit, .addresses = 4, .name = fake_name, .strobe = fake_strobe, .wanted = fake_wanted};
 
 static const struct board_type fake_type = {
     .name = "fake",

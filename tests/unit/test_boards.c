@@ -348,6 +348,82 @@ static void each_address_of_a_bus_answers_or_refuses(void **state)
     }
 }
 
+/* The sentence of a refusal; those of a value name the limits, which the register takes, one more it does not. */
+static void a_refusal_says_what_would_be_right(void **state)
+{
+    static const struct {
+        const char *board;
+        struct board_cycle c;
+        const char *why;
+        uint16_t takes[2];
+    } rows[] = {
+        {"psd1",
+         {.address = 10, .strobe_ns = 199},
+         "read of address 0Ah (TEMP), strobe 199 ns: the strobe is shorter than the board needs, at least 200 ns",
+         {0}},
+        {"psd1",
+         {.address = 16},
+         "read of address 10h (nothing), strobe 800 ns: nothing answers at this address; 00h to 0Fh do",
+         {0}},
+        {"psd1",
+         {.write = true, .address = 15, .data = 4},
+         "write of 4 to address 0Fh (FLAGS), strobe 800 ns: the register does not take this value: it takes 0 to 3",
+         {0, 3}},
+        {"psd1", {.write = true, .address = 12, .data = 256}, "value: it takes 0 to 255", {0, 255}},
+        {"psd1", {.write = true, .address = 14, .data = 256}, "value: it takes 0 to 255", {0}},
+        {"psd1", {.write = true, .address = 14, .data = 255}, "value: there is no such command", {0}},
+        {"pmka", {.address = 6, .strobe_ns = 199}, "at least 200 ns", {0}},
+        {"pmka",
+         {.address = 15},
+         "address 0Fh (nothing), strobe 800 ns: nothing answers at this address; 00h to 0Eh do",
+         {0}},
+        {"pmka", {.write = true, .address = 9, .data = 2}, "value: it takes 0 or 1", {0, 1}},
+        {"pmka",
+         {.write = true, .address = 10, .data = 1},
+         "it takes in MODE 0 alone: beat 0 to 5 in bits 0 to 2, calibration 0 to 2 in bits 4, 5",
+         {0}},
+        {"pmka", {.write = true, .address = 11, .data = 125}, "value: it takes 126 to 60000", {126, 60000}},
+        {"pmka", {.write = true, .address = 12, .data = 0}, "value: it takes 1 to 194", {1, 194}},
+        {"pmka", {.write = true, .address = 13, .data = 8}, "value: it takes 0 to 7 and 256 to ", {0, 7}},
+        {"pik", {.address = 10, .strobe_ns = 1}, "at least 200 ns", {0}},
+        {"pik", {.write = true, .address = 14}, "strobe 1000 ns: nothing answers at this address; 00h to 0Dh do", {0}},
+        {"pik", {.write = true, .address = 12, .data = 1}, "value: it takes 0 and 2 to 65535", {2, 65535}},
+        {"pik", {.write = true, .address = 13, .data = 8}, "value: it takes 0 to 7", {0, 7}},
+    };
+    (void)state;
+    for (size_t i = 0; i < COUNT(rows); i++) {
+        char why[BOARD_CYCLE_WHY_MAX];
+        struct board_cycle c = rows[i].c;
+        live(board_find(rows[i].board), NS_PER_S);
+        const enum board_cycle_result r = cycle(&c);
+        board_cycle_why(w.u.type->bus, w.u.board, &c, r, why);
+        if (!strstr(why, rows[i].why)) fail_msg("\"%s\" does not say \"%s\"", why, rows[i].why);
+        for (size_t k = 0; k < 2 && rows[i].takes[1]; k++) {
+            live(w.u.type, NS_PER_S);
+            c = rows[i].c;
+            c.data = rows[i].takes[k];
+            assert_int_equal(cycle(&c), BOARD_CYCLE_OK);
+        }
+        if (!rows[i].takes[1] || rows[i].takes[1] == UINT16_MAX) continue;
+        c.data = (uint16_t)(rows[i].takes[1] + 1);
+        assert_int_equal(cycle(&c), BOARD_CYCLE_BAD_VALUE);
+    }
+}
+
+static void who_is_too_early_learns_when(void **state)
+{
+    (void)state;
+    for (const struct board_type *const *t = board_types; *t; t++) {
+        char why[BOARD_CYCLE_WHY_MAX];
+        const struct board_cycle c = {.address = 0};
+        if (!(*t)->bus) continue;
+        live(*t, 0);
+        board_cycle_why((*t)->bus, w.u.board, &c, BOARD_CYCLE_NOT_READY, why);
+        const char *const early = strstr(why, "too early: no word waits there; ");
+        assert_true(early && strstr(early, "h) ")); /* the register to look at or to write */
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -361,6 +437,8 @@ int main(void)
         cmocka_unit_test(the_digest_tells_states_apart_and_nothing_else),
         cmocka_unit_test(truth_and_wrongs_may_be_asked_at_any_time),
         cmocka_unit_test(each_address_of_a_bus_answers_or_refuses),
+        cmocka_unit_test(a_refusal_says_what_would_be_right),
+        cmocka_unit_test(who_is_too_early_learns_when),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -19,6 +19,12 @@ static void lines_are_understood_or_refused(void **state)
         {"r f\r", BUS_TEXT_OK, 2, {.op = BUS_READ, .address = 15}},
         {"  R\t0A  1600 ", BUS_TEXT_OK, 2, {.op = BUS_READ, .address = 10, .strobe_ns = 1600}},
         {"R ff 999999999", BUS_TEXT_OK, 2, {.op = BUS_READ, .address = 255, .strobe_ns = 999999999}},
+        {"R 0Ah", BUS_TEXT_OK, 2, {.op = BUS_READ, .address = 10}},
+        {"w fH 3", BUS_TEXT_OK, 2, {.op = BUS_WRITE, .address = 15, .data = 3}},
+        {"R h", BUS_TEXT_NUMBER, 1, {.op = BUS_READ}},
+        {"R 100h", BUS_TEXT_NUMBER, 1, {.op = BUS_READ}},
+        {"R 0hh", BUS_TEXT_NUMBER, 1, {.op = BUS_READ}},
+        {"W 1 1h", BUS_TEXT_NUMBER, 2, {.op = BUS_WRITE, .address = 1}},
         {"W F 0003", BUS_TEXT_OK, 2, {.op = BUS_WRITE, .address = 15, .data = 3}},
         {"w d FfFf 1", BUS_TEXT_OK, 2, {.op = BUS_WRITE, .address = 13, .data = 0xFFFF, .strobe_ns = 1}},
         {"?", BUS_TEXT_OK, 1, {.op = BUS_WHO}},
@@ -79,12 +85,12 @@ static void answers(void **state)
     char out[BUS_TEXT_MAX];
     const struct bus_request read = {.op = BUS_READ}, write = {.op = BUS_WRITE, .address = 15, .data = 3};
     const struct bus_request who = {.op = BUS_WHO};
-    assert_int_equal(bus_text_done(&read, 0x8001, 123400, out), strlen("R 0 8001 t=123400\n"));
-    assert_string_equal(out, "R 0 8001 t=123400\n");
+    assert_int_equal(bus_text_done(&read, 0x8001, 123400, out), strlen("R 00h 8001 t=123400\n"));
+    assert_string_equal(out, "R 00h 8001 t=123400\n");
     bus_text_done(&write, 3, 1, out);
-    assert_string_equal(out, "W F 0003 t=1\n");
-    assert_int_equal(bus_text_refused(&read, 2, "not-ready", 9, out), strlen("E not-ready R 0 t=9\n"));
-    assert_string_equal(out, "E not-ready R 0 t=9\n");
+    assert_string_equal(out, "W 0Fh 0003 t=1\n");
+    assert_int_equal(bus_text_refused(&read, 2, "not-ready", 9, out), strlen("E not-ready R 00h t=9\n"));
+    assert_string_equal(out, "E not-ready R 00h t=9\n");
     bus_text_refused(&write, 1, bus_text_code(BUS_TEXT_NUMBER), 9, out);
     assert_string_equal(out, "E number W - t=9\n");
     bus_text_refused(&read, 0, bus_text_code(BUS_TEXT_SYNTAX), 9, out);

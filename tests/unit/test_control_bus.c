@@ -189,11 +189,21 @@ static void a_refusal_has_the_code_of_its_reason(void **state)
     const struct {
         const char *line, *code;
     } rows[] = {
-        {"{'cmd':'bus.read','args':{'unit':'f','address':4}}", "\"address\""},
-        {"{'cmd':'bus.write','args':{'unit':'f','address':0,'data':1}}", "\"read_only\""},
+        {"{'cmd':'bus.read','args':{'unit':'f','address':4}}",
+         "\"address\",\"text\":\"f: read of address 04h (nothing), strobe 800 ns: nothing answers at this address; 00h "
+         "to "
+         "02h do\""},
+        {"{'cmd':'bus.read','args':{'unit':'f','address':10}}", "address 0Ah (nothing)"},
+        {"{'cmd':'bus.write','args':{'unit':'f','address':0,'data':1}}",
+         "\"read_only\",\"text\":\"f: write of 1 to address 00h (word), strobe 800 ns: this register is read-only\""},
         {"{'cmd':'bus.read','args':{'unit':'f','address':1}}", "\"write_only\""},
-        {"{'cmd':'bus.read','args':{'unit':'f','address':3,'strobe_ns':400}}", "\"too_short\""},
-        {"{'cmd':'bus.write','args':{'unit':'f','address':2,'data':13}}", "\"value\""},
+        {"{'cmd':'bus.read','args':{'unit':'f','address':3,'strobe_ns':400}}",
+         "\"too_short\",\"text\":\"f: read of address 03h (nothing), strobe 400 ns: the strobe is shorter than the "
+         "board "
+         "needs, at least 401 ns\""},
+        {"{'cmd':'bus.write','args':{'unit':'f','address':2,'data':13}}",
+         "\"value\",\"text\":\"f: write of 13 to address 02h (level), strobe 800 ns: the register does not take this "
+         "value: it takes 2\""},
         {"{'cmd':'bus.read','args':{'unit':'p','address':0}}", "p is a PSA-2, which has no parallel bus"},
         {"{'cmd':'bus.read','args':{'unit':'f','address':16}}", "outside 0 ... 15"},
         {"{'cmd':'bus.read','args':{'address':1}}", "unit is missing"},
@@ -210,11 +220,11 @@ static void a_refusal_has_the_code_of_its_reason(void **state)
         }
     }
     assert_int_equal(r.runs, 0);
-    assert_int_equal(r.board.cycles, 10);
+    assert_int_equal(r.board.cycles, 12);
     for (unsigned i = 0; i < CONTROL_CYCLES_MAX; i++) assert_null(r.control.cycle[i].control);
     r.board.on = false;
-    assert_has(say(&me, READ_0),
-               "\"code\":\"off\",\"text\":\"f, address 0: the board has no power, or a reset cut the cycle\"");
+    assert_has(say(&me, READ_0), "\"code\":\"off\",\"text\":\"f: read of address 00h (word), strobe 800 ns: the board "
+                                 "has no power or is in reset\"");
 }
 
 static void what_goes_wrong_later_is_told_later(void **state)
@@ -228,6 +238,7 @@ static void what_goes_wrong_later_is_told_later(void **state)
     assert_ptr_equal(r.to, &me);
     assert_has(r.replied, "\"id\":7,\"ok\":false");
     assert_has(r.replied, "\"not_ready\"");
+    assert_has(r.replied, "too early: no word waits there; wait for 0\"");
     assert_null(say(&other, READ_0));
     assert_has(say(&me, "{'cmd':'unit.reset','args':{'unit':'f'}}"), "\"ok\":true");
     assert_ptr_equal(r.to, &other);

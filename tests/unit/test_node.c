@@ -97,6 +97,12 @@ static struct rig *rig_of(struct board_node *n)
     return (struct rig *)((char *)n - offsetof(struct rig, can));
 }
 
+static struct board_strobe fake_strobe(const void *board)
+{
+    (void)board;
+    return (struct board_strobe){800, 200};
+}
+
 static void on_defaults(struct board_node *n)
 {
     rig_of(n)->defaults++;
@@ -152,7 +158,8 @@ static struct rig *rig_of_device(const struct co_device *d, uint32_t bitrate_hz)
 {
     static struct board_counter counters[COUNTERS_MAX];
     static struct board_part part;
-    static const struct board_bus bus = {.submit = fake_submit, .addresses = ADDRESSES, .name = fake_name};
+    static const struct board_bus bus = {
+        .submit = fake_submit, .addresses = ADDRESSES, .name = fake_name, .strobe = fake_strobe};
     static struct board_type board;
     static const struct board_object own[] = {{OWN_OBJECT, own_read, NULL}};
     static struct board_node_type type;
@@ -327,7 +334,7 @@ static void each_refusal_has_its_code_its_words_and_is_counted(void **state)
         assert_int_equal(answer(r), rows[i].abort);
         const char *text = upload_text(r, PSD1_OD_REFUSAL);
         assert_non_null(strstr(text, rows[i].words));
-        assert_non_null(strstr(text, "write to address 1 (Y), strobe 50 ns"));
+        assert_non_null(strstr(text, "refused: write of 7 to address 01h (Y), strobe 50 ns: "));
         assert_int_equal(upload(r, PSD1_OD_COUNTERS, CYCLES_REFUSED), i + 1);
     }
     assert_int_equal(upload(r, PSD1_OD_COUNTERS, SDO_REFUSED), sizeof rows / sizeof rows[0]);
@@ -372,7 +379,7 @@ static void a_refusal_at_the_end_of_a_cycle_is_answered_too(void **state)
     settle(r);
     assert_true(aborted(r));
     assert_int_equal(answer(r), 0x06090030);
-    assert_non_null(strstr(upload_text(r, PSD1_OD_REFUSAL), "read of address 0 (X), strobe as the profile has it"));
+    assert_non_null(strstr(upload_text(r, PSD1_OD_REFUSAL), "read of address 00h (X), strobe 800 ns"));
 }
 
 static void a_cycle_that_a_reset_cuts_says_so(void **state)
@@ -396,7 +403,7 @@ static void who_gives_up_a_cycle_finds_the_bus_busy_until_it_ends(void **state)
     struct rig *r = rig_up();
     ask(r, 0x40, PSD1_OD_BUS, 1, 0);
     assert_int_equal(upload(r, PSD1_OD_BUS, 2), 0x08000022);
-    assert_non_null(strstr(upload_text(r, PSD1_OD_REFUSAL), "address 1 (Y)"));
+    assert_non_null(strstr(upload_text(r, PSD1_OD_REFUSAL), "address 01h (Y)"));
     assert_int_equal(r->board.submits, 1);
     r->count = 0;
     fake_done(r, BOARD_CYCLE_OK, 0x1234);
