@@ -15,7 +15,7 @@ static const struct {
     [BOARD_CYCLE_WRITE_ONLY] = {"write-only", "this register is write-only"},
     [BOARD_CYCLE_NOT_READY] = {"not-ready", "too early: no word waits there"},
     [BOARD_CYCLE_TOO_SHORT] = {"too-short", "the strobe is shorter than the board needs"},
-    [BOARD_CYCLE_BUSY] = {"busy", "another cycle or command is under way, ask again when it is over"},
+    [BOARD_CYCLE_BUSY] = {"busy", "another cycle is under way, or a command; ask again when it is over"},
     [BOARD_CYCLE_BAD_VALUE] = {"bad-value", "the register does not take this value"},
     [BOARD_CYCLE_TAKEN] = {"taken", "too early: no word waits there; the board's built-in host takes each that comes, "
                                     "profile psd1_host has none"},
