@@ -1,0 +1,227 @@
+"""The store of results: one SQLite file that says of each number what it was computed from (docs/store.md).
+
+A series is a table of float32 numbers, a row a run, that its origin determines: kind, input, seed and version. Run k of
+an origin is the same whoever computes it, so a series is filled in parts, in any order, and grows when more runs are
+wanted. What is written is written whole: a part lies in the file with its checksum or not at all, whatever ends us.
+One thread of one process uses a `Store`; several processes may share the file.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import sqlite3
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from psabench.errors import BadInput
+
+FORMAT = 1  # of the tables below, the file's user_version
+APPLICATION = 0x70736162  # "psab", the file's application_id: `file` and we know what it is
+PATIENCE_S = 60.0  # for another process that writes
+CELL = np.dtype("<f4")
+
+Rows = npt.NDArray[np.float32]
+
+SCHEMA = """
+CREATE TABLE series (
+    id      INTEGER PRIMARY KEY,
+    key     TEXT NOT NULL UNIQUE, -- SHA-256 of kind, input, seed, version and columns
+    kind    TEXT NOT NULL,
+    input   TEXT NOT NULL,        -- JSON, keys sorted
+    seed    INTEGER NOT NULL,
+    version TEXT NOT NULL,
+    columns TEXT NOT NULL,        -- JSON, names with their units
+    build   TEXT NOT NULL         -- what computed it: not part of the key, since every build should give the same
+) STRICT;
+CREATE TABLE part (
+    series    INTEGER NOT NULL REFERENCES series (id) ON DELETE CASCADE,
+    first_run INTEGER NOT NULL,
+    runs      INTEGER NOT NULL,
+    sha256    BLOB NOT NULL,
+    data      BLOB NOT NULL,      -- little-endian float32, a row a run
+    PRIMARY KEY (series, first_run)
+) STRICT;
+"""
+
+
+def canonical(value: Any) -> str:
+    """JSON that is the same for the same value. Raises ValueError for a number that is not finite."""
+    return json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Origin:
+    """What determines a series."""
+
+    kind: str
+    input: Mapping[str, Any]  # of JSON's types
+    seed: int
+    version: str
+    columns: tuple[str, ...]
+
+    @cached_property
+    def key(self) -> str:
+        """SHA-256, 64 hexadecimal digits."""
+        whole = canonical([self.kind, self.input, self.seed, self.version, self.columns])
+        return hashlib.sha256(whole.encode()).hexdigest()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Part:
+    """Some runs of a series, numbered from `first_run` on; `rows` has a column for each of the origin's."""
+
+    origin: Origin
+    first_run: int
+    rows: Rows  # (runs, columns)
+
+
+class Store:
+    """An open file of results: `with Store(path) as store: ...`; made when there is none.
+
+    Raises BadInput for a file that is not a store, a newer one or a damaged one, and where it cannot be written.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._db = sqlite3.connect(path, timeout=PATIENCE_S, isolation_level=None)
+        except (OSError, sqlite3.Error) as e:
+            raise BadInput(f"{path}: cannot be opened as a store of results ({e})") from e
+        try:
+            self._prepare()
+        except BaseException:
+            self._db.close()
+            raise
+
+    def __enter__(self) -> Store:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, e: BaseException | None, tb: TracebackType | None) -> None:
+        self.close()
+
+    def close(self) -> None:
+        self._db.close()
+
+    def _prepare(self) -> None:
+        with self._transaction():
+            application = int(self._one("PRAGMA application_id"))
+            tables = int(self._one("SELECT count(*) FROM sqlite_schema"))
+            if application == 0 and tables == 0:  # a new file
+                for statement in SCHEMA.split(";\n"):
+                    self._do(statement)
+                self._do(f"PRAGMA application_id = {APPLICATION}")
+                self._do(f"PRAGMA user_version = {FORMAT}")
+            elif application != APPLICATION:
+                raise BadInput(f"{self.path}: an SQLite file of another program, not a store of results")
+            elif (found := int(self._one("PRAGMA user_version"))) != FORMAT:
+                raise BadInput(f"{self.path}: a store of format {found}; this psabench reads format {FORMAT}")
+        self._do("PRAGMA foreign_keys = ON")
+
+    # ---- what there is
+
+    def runs(self, origin: Origin) -> dict[int, int]:
+        """Parts that are there: number of runs by first run."""
+        found = self._do(
+            "SELECT first_run, runs FROM part JOIN series ON series = id WHERE key = ? ORDER BY first_run", origin.key
+        )
+        return {int(first): int(runs) for first, runs in found}
+
+    def build(self, origin: Origin) -> str | None:
+        """What computed the series, None when nothing has."""
+        found = self._do("SELECT build FROM series WHERE key = ?", origin.key).fetchone()
+        return None if found is None else str(found[0])
+
+    def rows(self, origin: Origin, runs: int) -> Rows:
+        """The first `runs` rows. Raises BadInput where some are missing or damaged."""
+        width, at, found = len(origin.columns), 0, []
+        parts = self._do(
+            "SELECT first_run, runs, sha256, data FROM part JOIN series ON series = id WHERE key = ?"
+            " ORDER BY first_run",
+            origin.key,
+        )
+        for first, count, digest, data in parts:
+            if at >= runs or first != at:
+                break
+            whole = len(data) == count * width * CELL.itemsize and hashlib.sha256(data).digest() == digest
+            if not whole:
+                raise BadInput(f"{self.path}: runs {first} to {first + count - 1} of {origin.kind} are damaged")
+            found.append(np.frombuffer(data, CELL).reshape(count, width))
+            at += count
+        if at < runs:
+            raise BadInput(f"{self.path}: {origin.kind}: {at} runs of {runs}")
+        return np.concatenate([*found, np.empty((0, width), CELL)])[:runs]
+
+    def origins(self) -> list[Origin]:
+        """Of all series, in the order in which they were begun."""
+        found = self._do("SELECT kind, input, seed, version, columns FROM series ORDER BY id")
+        return [
+            Origin(kind=kind, input=json.loads(text), seed=seed, version=version, columns=tuple(json.loads(columns)))
+            for kind, text, seed, version, columns in found
+        ]
+
+    # ---- changes, each whole or not at all
+
+    def put(self, parts: Iterable[Part], build: str = "") -> None:
+        """Add parts, all or none; one that is there already, from the same first run, is replaced."""
+        with self._transaction():
+            for part in parts:
+                self._put(part, build)
+
+    def _put(self, part: Part, build: str) -> None:
+        o = part.origin
+        if part.rows.ndim != 2 or part.rows.shape[1] != len(o.columns):
+            raise ValueError(f"{o.kind}: rows of shape {part.rows.shape} for {len(o.columns)} columns")
+        data = np.ascontiguousarray(part.rows, CELL).tobytes()
+        self._do(
+            "INSERT INTO series (key, kind, input, seed, version, columns, build) VALUES (?, ?, ?, ?, ?, ?, ?)"
+            " ON CONFLICT (key) DO NOTHING",
+            *(o.key, o.kind, canonical(o.input), o.seed, o.version, canonical(o.columns), build),
+        )
+        self._do(
+            "INSERT OR REPLACE INTO part (series, first_run, runs, sha256, data)"
+            " VALUES ((SELECT id FROM series WHERE key = ?), ?, ?, ?, ?)",
+            *(o.key, part.first_run, len(part.rows), hashlib.sha256(data).digest(), data),
+        )
+
+    def forget(self, origin: Origin) -> None:
+        """Remove a series with all its parts, if there is one."""
+        with self._transaction():
+            self._do("DELETE FROM series WHERE key = ?", origin.key)
+
+    # ---- SQLite
+
+    def _transaction(self) -> _Transaction:
+        return _Transaction(self)
+
+    def _one(self, sql: str) -> Any:
+        return self._do(sql).fetchone()[0]
+
+    def _do(self, sql: str, *values: Any) -> sqlite3.Cursor:
+        try:
+            return self._db.execute(sql, values)
+        except sqlite3.OperationalError as e:  # locked, read-only, disk full
+            raise BadInput(f"{self.path}: {e}") from e
+        except sqlite3.DatabaseError as e:
+            raise BadInput(f"{self.path}: not a store of results, or damaged ({e})") from e
+
+
+class _Transaction:
+    """All between enter and exit, or nothing; takes the right to write at once, so that it cannot be refused later."""
+
+    def __init__(self, store: Store) -> None:
+        self._do = store._do
+
+    def __enter__(self) -> None:
+        self._do("BEGIN IMMEDIATE")
+
+    def __exit__(self, kind: type[BaseException] | None, e: BaseException | None, tb: TracebackType | None) -> None:
+        self._do("COMMIT" if kind is None else "ROLLBACK")
