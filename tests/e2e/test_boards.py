@@ -104,7 +104,9 @@ def test_settings_that_a_board_has_not_are_refused(tmp_path: Path) -> None:
         path.write_text(f"units:\n  - board: {board}\n    profile: article\n")
         done = psa_emu(path, "--dump")
         assert done.returncode == 2
-        assert "article.yaml:1:1: this is a profile of PSA-2" in one_line(done.stderr, "psa-emu")
+        told = one_line(done.stderr, "psa-emu")
+        assert "s.yaml:3:14: units.a.profile: article is a profile of PSA-2 (board: psa2), one of " in told
+        assert f" (board: {board}) is wanted" in told
 
 
 # ---- snapshot and fork

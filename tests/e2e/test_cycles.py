@@ -465,7 +465,7 @@ def test_the_shell_s_words_for_the_device_go_for_every_board() -> None:
             session.do("dut.register bus X")
         assert "dut.ready" not in str(early.value), "that is for a board that is being set up"
         say("dut.use psd1")
-        with pytest.raises(BenchError, match=r"address 0 \(X\).*too early.*profile psd1_host") as not_now:
+        with pytest.raises(BenchError, match=r"address 00h \(X\).*too early.*profile psd1_host") as not_now:
             session.do("dut.object 2002h 1")
         assert "dut.ready" not in str(not_now.value)
         for text, word in (("220014h", 0x220014), ("0x220013", 0x220013), (str(0x220014), 0x220014)):
