@@ -71,12 +71,12 @@ static void solve(const struct ground *on, const struct trig *t, const double w_
     rate_radps[1] = w_radps[0] * g.cos_g + w_radps[1] * g.sin_g - w_l[0] * t->cos_a - w_l[1] * t->sin_a;
 }
 
-/* Turns on by a small angle, up to 0.1 rad: the series are good to the last bit there. */
+/* Turns on by a small angle, up to 0.1 rad: the series are good to the last bit there. Products: divisions take thrice as long. */
 static void turn_on(double *sin_x, double *cos_x, double d_rad)
 {
     const double z = d_rad * d_rad;
-    const double s = d_rad * (1.0 - z / 6.0 * (1.0 - z / 20.0 * (1.0 - z / 42.0)));
-    const double less = z / 2.0 * (1.0 - z / 12.0 * (1.0 - z / 30.0 * (1.0 - z / 56.0))); /* 1 - cos */
+    const double s = d_rad - d_rad * z * (1.0 / 6.0 - z * (1.0 / 120.0 - z * (1.0 / 5040.0)));
+    const double less = z * (0.5 - z * (1.0 / 24.0 - z * (1.0 / 720.0 - z * (1.0 / 40320.0)))); /* 1 - cos */
     const double was = *sin_x;
     *sin_x += *cos_x * s - was * less;
     *cos_x -= was * s + *cos_x * less;
@@ -94,7 +94,7 @@ static struct trig trig_at(const struct platform_node *n, double da_rad, double 
 
 static struct platform_node *node_at(struct platform *p, int64_t k)
 {
-    return &p->node[k % (int64_t)PLATFORM_HISTORY];
+    return &p->node[(uint64_t)k % PLATFORM_HISTORY];
 }
 
 static const struct vehicle_state *vehicle_state_at(struct platform *p, int64_t t_ns)
