@@ -37,6 +37,7 @@ from psabench.unit import Unit
 
 NS = 1_000_000_000
 SLICE_NS = NS  # long runs go in slices of simulated time, so that Ctrl-C is heard
+AWAY_SLICE_NS = 60 * NS  # nobody receives meanwhile: they are as short
 NONE = "none"  # as the CAN specification: no bus
 FIRST = "can0"  # name of a bus that has no other
 
@@ -75,6 +76,7 @@ class Bench:
         self.emulator = emulator
         self.truth_path = truth
         self.addresses = dict(scpi or {})
+        self._specs = dict(cans)
         self._open: dict[str, Instrument] = {}
         with ExitStack() as stack:
             if emulator is not None:
@@ -316,6 +318,27 @@ class Bench:
             slice_ns = min(left_ns, SLICE_NS)
             self._clock.command(None, "run", for_s=slice_ns / NS)
             left_ns -= slice_ns
+
+    def wait_away(self, dwell_s: float) -> None:
+        """`wait`, with the buses left in step pace: what passes on them meanwhile is not received, so hours are soon over.
+
+        What was received before is lost to whoever has not taken it; real time is spent receiving, as ever.
+        """
+        if not isinstance(self._clock, StepClock):
+            self.wait(dwell_s)
+            return
+        self._clock.command(None, "run", for_s=0)  # what we have sent has arrived
+        for host in self.hosts.values():
+            host.close()
+        left_ns = round(dwell_s * NS)
+        while left_ns > 0:
+            self.control.call("run", for_s=min(left_ns, AWAY_SLICE_NS) / NS)
+            left_ns -= AWAY_SLICE_NS
+        for name, host in self.hosts.items():
+            host.reopen(open_bus(self._specs[name]))
+        self._clock = self._make_clock()
+        for host in self.hosts.values():
+            host.clock = self._clock
 
     def catch_up(self) -> None:
         """After a command of the control socket that moves time itself, as bus.read: receive what has come."""

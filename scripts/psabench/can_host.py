@@ -133,6 +133,11 @@ class CanHost:
         with suppress(can.CanError):  # slcan says good-bye to an adapter that may have gone
             self.bus.shutdown()
 
+    def reopen(self, bus: can.BusABC) -> None:
+        """Go on with another connection after `close`; frames are counted anew."""
+        self.bus = bus
+        self.received = self.sent = 0
+
     def receive(self, timeout_s: float) -> bool:
         """Take one frame if one comes within timeout_s. Raises LinkError when the link has gone."""
         deadline_s = time.monotonic() + timeout_s
