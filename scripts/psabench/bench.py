@@ -320,7 +320,7 @@ class Bench:
             left_ns -= slice_ns
 
     def wait_away(self, dwell_s: float) -> None:
-        """`wait`, with the buses left in step pace: what passes on them meanwhile is not received, so hours are soon over.
+        """`wait`, but in step pace the buses are left: what passes on them is not received, so hours are soon over.
 
         What was received before is lost to whoever has not taken it; real time is spent receiving, as ever.
         """
