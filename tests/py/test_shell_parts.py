@@ -2,11 +2,22 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+import canopen
 import pytest
-from psabench.shell import registers, render
+from psabench.devices import Psa2, Psd1
+from psabench.frames import Form
+from psabench.places import proto_file
+from psabench.shell import dut, registers, render
+from psabench.shell.complete import candidates
 from psabench.shell.expect import Expectation
+from psabench.shell.fields import FIELDS
+from psabench.shell.grammar import describe, parse
 from psabench.shell.transcript import Transcript, seconds
+from psabench.shell.vocabulary import Command, Vocabulary
 from psabench.shell.words import Wrong
+from psabench.unit import BANKS, Unit
 
 EXPLAINED = [
     ("x", "CONFIG0", 0x56, "SYNC 0 pulse, DR 2 1000 /s, PHASE 1 minimum, FILTR 2 sinc + FIR"),
@@ -17,7 +28,24 @@ EXPLAINED = [
     ("t", "DRATE", 0x82, "DR 82h 100 /s"),
     ("t", "ADCON", 0x27, "CLK 1 fCLKIN, SDCS 0 off, PGA 7 gain 64"),
     ("x", "OFC0", 0x12, ""),
-]
+    (
+        "psd1", "STATUS", 0x0AB5,
+        "FL2 1 a word waits, AXIS 2 Z, CYCLE 0 none, INT0 1 active, FL1 1 active, DR 0 inactive, READY 1 set up, "
+        "COMMAND 0 none, COEF 1 known, OVERRUN 0 no, LATE 1 a strobe came late",
+    ),
+    ("psd1", "COMMAND", 0x8001, "RUNS 1 yes, FAILED 0 no, LATEST 01h send as UC1"),
+    ("psd1", "COMMAND", 0x4032, "RUNS 0 no, FAILED 1 yes, LATEST 32h control word Z"),
+    ("psd1", "TEMP", 0x2FF0, "CHANNEL 2 Z, CODE -16"),
+    ("psd1", "SERVICE", 0x3A1F, "CHANNEL 3 self-test, CODE 2591"),
+    ("psd1", "UC_LOW", 0x0013, ""),
+    ("psd1", "FLAGS", 0x0002, "INT0 0 inactive, FL1 1 active"),
+    ("psd1", "X", 0x8000, ""),
+    ("pmka", "RESETS", 0x0D, "X 1 positive, Y 3 negative, Z 0 none, K 0 none"),
+    ("pmka", "ROTATION", 0x24E4, "X SERVES 0 none, Y SERVES 1 X, Z SERVES 2 Y, K SERVES 3 Z, TAU 4, CAL 2 resets"),
+    ("pmka", "STATUS", 0x11, "READING 1 waits, MISSED 0 none, SATURATED 0 no, CLIPPED 0 no, AUTONOMOUS 1 yes"),
+    ("pik", "STATUS", 0x0A,
+     "SATURATED_X 0 no, SATURATED_Y 1 could not keep up, SATURATED_Z 0 no, NEW 1 latched since the last look"),
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -28,10 +56,55 @@ def test_a_register_is_told_field_by_field(converter: str, name: str, value: int
 
 
 def test_fields_do_not_overlap_and_shift_as_their_mask() -> None:
-    for rows in registers.FIELDS.values():
-        assert sum(b.mask for b in rows) == sum(b.mask for b in rows) & 0xFF
+    for (group, _), rows in FIELDS.items():
+        width = 0xFF if group in ("accel", "temp") else 0xFFFF
+        assert sum(b.mask for b in rows) == sum(b.mask for b in rows) & width
         assert all(not a.mask & b.mask for a in rows for b in rows if a is not b)
         assert all(max(b.meaning, default=0) <= b.mask >> b.shift for b in rows)
+
+
+def test_fields_are_of_registers_that_the_board_has() -> None:
+    """Names as in the EDS; what a board tells of its state is told field by field."""
+    for board in ("psd1", "pmka", "pik"):
+        od = canopen.import_od(str(proto_file(f"{board}.eds")), 1)
+        bus: Any = od[BANKS["bus"]]
+        names = {v.name for v in bus.values()}
+        mine = {name for group, name in FIELDS if group == board}
+        assert "STATUS" in mine
+        assert mine <= names
+
+
+def command(name: str) -> Command:
+    return next(row.command for row in dut.ROWS if row.command.name == name)
+
+
+def unit(kind: type[Unit], *banks: str) -> Unit:
+    it = object.__new__(kind)
+    it.banks = {name: BANKS[name] for name in banks}
+    return it
+
+
+def test_what_is_offered_is_what_the_unit_has() -> None:
+    psd1, psa2 = unit(Psd1, "bus"), unit(Psa2, "x", "y", "z", "t")
+    for name, what in (("dut.form", Form), ("dut.opcode", ("accel", "temp"))):
+        one = dut.of_unit(command(name), psd1)
+        assert one.what == "Not of a PSD-1: only a PSA-2 has this."
+        vocabulary = Vocabulary({name: one})
+        assert [c.text for c in candidates(f"{name} ", vocabulary) if "=" not in c.text] == []
+        assert describe(one.args[0]) in ("frame form", "which converters")
+        same = dut.of_unit(command(name), psa2)
+        assert same == command(name)
+        assert len(same.args[0].offers) == len(what)
+    of_bus, of_psa2 = dut.of_unit(command("dut.write"), psd1), dut.of_unit(command("dut.write"), psa2)
+    assert of_bus.args[0].offers == ("bus",)
+    assert of_psa2.args[0].offers == ("x", "y", "z", "t")
+    assert describe(of_bus.args[2]) == "a word, as A55Ah"
+    assert "fields" in describe(of_psa2.args[2])
+    # a script is read through before `dut.use` is carried out: what another unit has is no wrong line
+    call = parse("dut.write x CONFIG0 56h", Vocabulary({"dut.write": of_bus}))
+    assert call is not None
+    assert call.args["converter"] == "x"
+    assert dut.of_unit(command("dut.set"), psd1) == command("dut.set")
 
 
 CHANGED = [("56h", 0x56), ("0x56", 0x56), ("86", 0x56), ("DR=3", 0x5E), ("DR=4,PHASE=0", 0x62), ("SYNC=1", 0xD6)]

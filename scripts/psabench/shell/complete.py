@@ -89,7 +89,7 @@ def _values(command: Command, words: list[str], last: str) -> Iterator[Candidate
 
 
 def _choices(a: Arg) -> tuple[str, ...]:
-    return ("on", "off") if a.kind is Kind.BOOL else a.choices
+    return ("on", "off") if a.kind is Kind.BOOL else a.offers
 
 
 def _about(a: Arg) -> str:

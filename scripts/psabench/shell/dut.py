@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from psabench.shell.session import Session
 
 CONVERTERS = tuple(BANKS)
+A_WORD = "a word, as A55Ah"
+PSA2_ONLY = ("dut.opcode", "dut.form")
 BUS = "bus"  # the board's parallel bus: a read is a cycle, which the board may refuse
 
 
@@ -47,6 +49,17 @@ def _psa2(session: Session) -> Psa2:
     raise Wrong(f"{session.dut_name} is a {session.dut.title}: only a PSA-2 has this")
 
 
+def of_unit(command: Command, unit: Unit) -> Command:
+    """A command of `dut` as it is with this unit: of its choices those that the unit has are offered."""
+    if command.name in PSA2_ONLY and not isinstance(unit, Psa2):
+        args = tuple(replace(a, offered=()) for a in command.args)
+        return replace(command, what=f"Not of a {unit.title}: only a PSA-2 has this.", args=args)
+    banks = tuple(unit.banks)
+    narrowed = {_CONVERTER.name: {"offered": banks}} | ({_VALUE.name: {"what": A_WORD}} if banks == (BUS,) else {})
+    changes = narrowed if command.arg(_CONVERTER.name) else {}
+    return replace(command, args=tuple(replace(a, **changes.get(a.name, {})) for a in command.args))
+
+
 def _address(session: Session, args: Args) -> tuple[str, int, str]:
     converter, wanted = str(args["converter"]), str(args["register"])
     names = _unit_names(session.dut, converter)
@@ -62,7 +75,7 @@ def _register_row(session: Session, converter: str, address: int, name: str) -> 
         "address": f"{address:02X}h",
         "register": name,
         "value": f"{value:04X}h" if converter == BUS else f"{value:02X}h",
-        "fields": "" if converter == BUS else registers.explain(converter, name, value),
+        "fields": registers.explain(session.dut.board if converter == BUS else converter, name, value),
     }
 
 
@@ -179,7 +192,7 @@ def _use(session: Session, args: Args) -> Mapping[str, Any]:
     name = str(args.get("unit", session.dut_name))
     if name not in session.bench.units:
         raise Wrong(f"unit: {name!r}; there is {', '.join(session.bench.units)}")
-    session.dut_name = name
+    session.use(name)
     return {"unit": name, "node": session.dut.node.node_id}
 
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from psabench.bench import Bench
 from psabench.errors import BenchError, ControlError, CycleRefused, DeviceError
 from psabench.instruments import KINDS
-from psabench.shell import own
+from psabench.shell import dut, own
 from psabench.shell.grammar import Call, parse
 from psabench.shell.transcript import Transcript
 from psabench.shell.vocabulary import EVENTS, Command, Vocabulary, from_help, with_events, with_kinds
@@ -52,13 +52,21 @@ class Session:
 
     def __post_init__(self) -> None:
         self.transcript = Transcript(self.start, lockstep=self.bench.pace == "step")
-        self.dut_name = next(iter(self.bench.units), "")
         self.vocabulary = learn(self.bench)
+        if self.bench.units:
+            self.use(next(iter(self.bench.units)))
 
     @property
     def dut(self) -> Unit:
         """The unit that `dut` stands for."""
         return self.bench.units[self.dut_name]
+
+    def use(self, name: str) -> None:
+        """`dut` is this unit from now on, one of the bench's; what may be said to it is told accordingly."""
+        self.dut_name = name
+        mine = {r.command.name: dut.of_unit(r.command, self.dut) for r in dut.ROWS}
+        commands = {n: mine.get(n, c) for n, c in self.vocabulary.commands.items()}
+        self.vocabulary = replace(self.vocabulary, commands=commands)
 
     def now_ns(self) -> int | None:
         """Simulated time; None on a bench that does not tell it."""

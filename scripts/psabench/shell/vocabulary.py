@@ -36,13 +36,19 @@ class Arg:
     least: float = 0.0  # magnitude of what is not 0 and changes anything
     choices: tuple[str, ...] = ()
     strict: bool = True  # nothing but one of the choices; False: they are offered, the bench decides
+    offered: tuple[str, ...] | None = None  # of the choices, what is told and completed now; None: all of them
     what: str = ""
+
+    @property
+    def offers(self) -> tuple[str, ...]:
+        """Choices that are of use now."""
+        return self.choices if self.offered is None else self.offered
 
     @property
     def range(self) -> str:
         """ "deg/s, -100 to 100": unit and range, or the choices; "" if there is nothing to say."""
         if self.choices:
-            return ", ".join(self.choices)
+            return ", ".join(self.offers)
         limits = "" if math.isinf(self.low) and math.isinf(self.high) else f"{self.low:.10g} to {self.high:.10g}"
         if self.least:
             limits = f"{self.low:.10g} to {-self.least:.10g} and {self.least:.10g} to {self.high:.10g}"
