@@ -1,5 +1,6 @@
 #include "board/pik.h"
 
+#include "board/bus_lines.h"
 #include "board/pik_parts.h"
 
 #include <math.h>
@@ -15,7 +16,7 @@ const struct board_line pik_lines[PIK_LINES] = {
     [PIK_LINE_CLK] = {"CLK", false}, [PIK_LINE_LATCH] = {"LATCH", true}, [PIK_LINE_CS] = {"CS", true},
     [PIK_LINE_RW] = {"RW", true},    [PIK_LINE_FXP] = {"FXP", false},    [PIK_LINE_FXN] = {"FXN", false},
     [PIK_LINE_FYP] = {"FYP", false}, [PIK_LINE_FYN] = {"FYN", false},    [PIK_LINE_FZP] = {"FZP", false},
-    [PIK_LINE_FZN] = {"FZN", false},
+    [PIK_LINE_FZN] = {"FZN", false}, BUS_LINES_AB(PIK_LINE_AB0),         BUS_LINES_D(PIK_LINE_D0),
 };
 const char *const pik_events[PIK_EVENTS] = {
     [PIK_EV_RES] = "RES",

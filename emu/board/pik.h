@@ -37,7 +37,9 @@ enum pik_line {
     PIK_LINE_FYN,
     PIK_LINE_FZP,
     PIK_LINE_FZN,
-    PIK_LINES
+    PIK_LINE_AB0, /* of the bus cycle: A3..A0 */
+    PIK_LINE_D0 = PIK_LINE_AB0 + 4,
+    PIK_LINES = PIK_LINE_D0 + 16
 };
 extern const struct board_line pik_lines[PIK_LINES];
 

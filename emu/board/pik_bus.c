@@ -1,4 +1,5 @@
 /* The registers as a computer reads and writes them, one cycle at a time (E0: the article says "in binary code"). */
+#include "board/bus_lines.h"
 #include "board/pik_parts.h"
 
 #include <stdio.h>
@@ -67,11 +68,7 @@ static void write_word(struct pik *b, const struct board_cycle *c, int64_t t_ns)
     pik_latch_now(b, t_ns);
 }
 
-static void lines(struct pik *b, bool cs, bool rw, int64_t t_ns)
-{
-    const uint64_t both = UINT64_C(1) << PIK_LINE_CS | UINT64_C(1) << PIK_LINE_RW;
-    trace_put(&b->trace, both, (uint64_t)cs << PIK_LINE_CS | (uint64_t)rw << PIK_LINE_RW, t_ns);
-}
+static const struct bus_lines bus_lines = {PIK_LINE_CS, PIK_LINE_RW, PIK_LINE_AB0, PIK_LINE_D0};
 
 /* The strobe ends: what was read has stood on the bus, what is written is taken. */
 static void cycle_end(void *ctx, int64_t t_ns)
@@ -80,7 +77,7 @@ static void cycle_end(void *ctx, int64_t t_ns)
     struct board_cycle *c = b->cycle;
     b->cycle = NULL;
     b->counters.cycles++;
-    lines(b, true, true, t_ns);
+    bus_lines_end(&b->trace, &bus_lines, t_ns);
     if (c->write) write_word(b, c, t_ns);
     c->done(c->ctx, c, BOARD_CYCLE_OK, t_ns);
 }
@@ -123,7 +120,7 @@ enum board_cycle_result pik_submit(struct pik *b, struct board_cycle *c, int64_t
     }
     b->cycle = c;
     if (!c->write) c->data = word_at(b, c->address);
-    lines(b, false, !c->write, t_ns);
+    bus_lines_begin(&b->trace, &bus_lines, c, c->data, t_ns);
     sched_at(b->sched, &b->cycle_end, t_ns + (c->strobe_ns ? c->strobe_ns : b->profile.strobe_ns));
     return BOARD_CYCLE_OK;
 }
@@ -135,7 +132,7 @@ void pik_bus_cut(struct pik *b, int64_t t_ns)
     b->cycle = NULL;
     sched_cancel(b->sched, &b->cycle_end);
     b->counters.cycles_refused++;
-    lines(b, true, true, t_ns);
+    bus_lines_end(&b->trace, &bus_lines, t_ns);
     c->done(c->ctx, c, BOARD_CYCLE_OFF, t_ns);
 }
 

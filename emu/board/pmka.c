@@ -1,5 +1,6 @@
 #include "board/pmka.h"
 
+#include "board/bus_lines.h"
 #include "board/pmka_parts.h"
 
 #include <assert.h>
@@ -19,7 +20,8 @@ const struct board_line pmka_lines[PMKA_LINES] = {
     [PMKA_LINE_RP2] = {"RP2", false},   [PMKA_LINE_RN2] = {"RN2", false},   [PMKA_LINE_RP3] = {"RP3", false},
     [PMKA_LINE_RN3] = {"RN3", false},   [PMKA_LINE_RP4] = {"RP4", false},   [PMKA_LINE_RN4] = {"RN4", false},
     [PMKA_LINE_SH] = {"SH", false},     [PMKA_LINE_CONV] = {"CONV", false}, [PMKA_LINE_MUX0] = {"MUX0", false},
-    [PMKA_LINE_MUX1] = {"MUX1", false},
+    [PMKA_LINE_MUX1] = {"MUX1", false}, [PMKA_LINE_CS] = {"CS", true},      [PMKA_LINE_RW] = {"RW", true},
+    BUS_LINES_AB(PMKA_LINE_AB0),        BUS_LINES_D(PMKA_LINE_D0),
 };
 
 /* ---- the specimen ---- */

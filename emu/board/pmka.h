@@ -48,7 +48,11 @@ enum pmka_line {
     PMKA_LINE_CONV, /* it is being converted */
     PMKA_LINE_MUX0, /* which integrator is next */
     PMKA_LINE_MUX1,
-    PMKA_LINES
+    PMKA_LINE_CS,  /* low: strobe of a bus cycle */
+    PMKA_LINE_RW,  /* low: of a write */
+    PMKA_LINE_AB0, /* A3..A0 */
+    PMKA_LINE_D0 = PMKA_LINE_AB0 + 4,
+    PMKA_LINES = PMKA_LINE_D0 + 16
 };
 
 enum pmka_event {

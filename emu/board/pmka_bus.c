@@ -1,4 +1,5 @@
 /* Parallel bus of a PMKA: 16 addresses, one cycle at a time (docs/boards/pmka.md; ours, E0). */
+#include "board/bus_lines.h"
 #include "board/pmka_parts.h"
 
 #include <stddef.h>
@@ -195,6 +196,8 @@ static enum board_cycle_result check(const struct pmka *b, const struct board_cy
     return BOARD_CYCLE_OK;
 }
 
+static const struct bus_lines bus_lines = {PMKA_LINE_CS, PMKA_LINE_RW, PMKA_LINE_AB0, PMKA_LINE_D0};
+
 /* What a register holds is taken at the beginning of the strobe, what is written is taken over at its end. */
 enum board_cycle_result pmka_submit(struct pmka *b, struct board_cycle *c, int64_t t_ns)
 {
@@ -205,6 +208,7 @@ enum board_cycle_result pmka_submit(struct pmka *b, struct board_cycle *c, int64
     }
     b->bus.cycle = c;
     if (!c->write) b->bus.answer = registers[c->address].read(b, c->address);
+    bus_lines_begin(&b->trace, &bus_lines, c, c->write ? c->data : b->bus.answer, t_ns);
     sched_at(b->sched, &b->bus.end, t_ns + (c->strobe_ns ? c->strobe_ns : b->profile.strobe_ns));
     return BOARD_CYCLE_OK;
 }
@@ -213,6 +217,7 @@ static void finish(struct pmka *b, enum board_cycle_result r, int64_t t_ns)
 {
     struct board_cycle *c = b->bus.cycle;
     b->bus.cycle = NULL;
+    if (b->life != PMKA_OFF) bus_lines_end(&b->trace, &bus_lines, t_ns);
     if (r == BOARD_CYCLE_OK) b->counters.cycles++;
     else b->counters.cycles_refused++;
     if (c->done) c->done(c->ctx, c, r, t_ns);
