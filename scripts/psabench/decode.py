@@ -23,6 +23,7 @@ CHUNK = 4096  # samples decoded at once
 
 CAN_COLUMNS = ("t_rx_s", "t_sample_s", "x_v", "y_v", "z_v", "temp_code", "temp_channel", "settled", "clipped")
 SAMPLE_MESSAGES = ("PSA2_XY", "PSA2_ZT", "PSA2_FAST", "PSA2_FRAME", "PSA2_BLOCK")
+COUNTED = ("", "LSB", "counts", "pulses")  # units of columns that are whole numbers
 LINE_COLUMNS = ("t_int_fall_s", "t_int_rise_s", "word0", "word1", "word2", "word3")
 
 
@@ -42,7 +43,7 @@ def decode_can(path: Path, node: int, out: IO[str], board: str = "psa2") -> Fram
     begun = False
     for frames in _chunks(path, reader, ids):
         if len(frames) and not begun:
-            table.writerow(CAN_COLUMNS if isinstance(frames, Frames) else ("t_rx_s", "t_sample_s", *frames.columns))
+            table.writerow(CAN_COLUMNS if isinstance(frames, Frames) else _reading_columns(frames))
             begun = True
         table.writerows(_rows(frames) if isinstance(frames, Frames) else _reading_rows(frames))
     if not begun:
@@ -101,8 +102,14 @@ def _rows(f: Frames) -> Iterable[tuple[object, ...]]:
     return zip(*(np.asarray(c).tolist() for c in columns), strict=True)
 
 
+def _reading_columns(r: Readings) -> tuple[str, ...]:
+    """Names with their units: X_LSB, T_degC; bare where a signal is a number or a bit."""
+    return ("t_rx_s", "t_sample_s", *("_".join(filter(None, (name, r.units[name]))) for name in r.columns))
+
+
 def _reading_rows(r: Readings) -> Iterable[tuple[object, ...]]:
-    return zip(*(c.tolist() for c in (r.t_rx_s, r.t_sample_s, *r.columns.values())), strict=True)
+    columns = [c.astype(np.int64) if r.units[name] in COUNTED else c for name, c in r.columns.items()]
+    return zip(*(c.tolist() for c in (r.t_rx_s, r.t_sample_s, *columns)), strict=True)
 
 
 def decode_line(path: Path, fmt: LineFormat, out: IO[str]) -> LineDecoder:

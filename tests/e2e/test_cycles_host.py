@@ -111,14 +111,15 @@ def test_recordings_of_other_boards_are_counted_and_decoded(tmp_path: Path) -> N
     with can.Logger(str(log)) as writer:
         for m in messages:
             writer(m)
-    for name, least in (("psd1", 400), ("pmka", 80), ("pik", 40)):
+    for name, least, unit in (("psd1", 400, "LSB"), ("pmka", 80, "V"), ("pik", 40, "pulses")):
         kind, node = NODES[name]
         out = io.StringIO()
         reader = decode_can(log, node, out, kind.board)
         assert (reader.counters.lost, reader.counters.torn) == (0, 0)
         rows = list(csv.DictReader(io.StringIO(out.getvalue())))
         assert len(rows) == reader.counters.frames >= least
-        assert set(rows[0]) > {"t_rx_s", "t_sample_s", kind.layout.counter, "X", "Y", "Z"}
+        assert set(rows[0]) > {"t_rx_s", "t_sample_s", kind.layout.counter, *(f"{axis}_{unit}" for axis in "XYZ")}
+        assert all(("." in row[f"X_{unit}"]) == (unit == "V") for row in rows), "codes and counts are whole numbers"
     with pytest.raises(BadInput, match=r"no frame of node 9; nodes with frames: .*6"):
         decode_can(log, 9, io.StringIO(), "psd1")
 

@@ -6,12 +6,15 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 import can
+import numpy as np
 import pytest
 from psabench import devices, unit
 from psabench.can_host import CanHost, WallClock
 from psabench.devices import BOARDS, Gyro, Pik, Pmka, Psa2, Psd1, identify, of_board
+from psabench.devices.psd1 import volts
 from psabench.errors import CycleRefused, DeviceError
 from psabench.protocol_files import dbc_node, message_name
+from psabench.readings import Readings
 from psabench.unit import Unit
 from test_host import FakeBus
 
@@ -124,6 +127,16 @@ def test_registers_by_the_names_of_the_eds() -> None:
     with pytest.raises(ValueError, match="PSA-2 has x, y, z, t"):
         psa2.register("bus", 0)
     assert node.sent == []
+
+
+def test_words_of_a_psd1_as_volts() -> None:
+    """docs/protocol_psd1.md: U = (word - 32768) / 32768 times full scale, 10 V in the profiles."""
+    words = {"X": [0x0000, 0x8000], "Y": [0x8001, 0xFFFF], "Z": [0x4000, 0xA000], "CNT": [1, 2]}
+    columns = {k: np.array(v, dtype=np.float64) for k, v in words.items()}
+    r = Readings(t_rx_s=np.zeros(2), t_sample_s=np.zeros(2), columns=columns, units=dict.fromkeys(words, "LSB"))
+    want = np.array([[-10.0, 305.17578125e-6, -5.0], [0.0, 10.0 - 305.17578125e-6, 2.5]])
+    assert volts(r) == pytest.approx(want, rel=1e-12)
+    assert volts(r, 2.5 / 128) == pytest.approx(want / 512, rel=1e-12)
 
 
 def test_cycles_with_and_without_a_strobe() -> None:

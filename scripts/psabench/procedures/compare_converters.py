@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from psabench.bench import Bench
 from psabench.devices import Pik, Pmka, Psa2, Psd1
+from psabench.devices.psd1 import FULL_SCALE_V, OFFSET_BINARY, volts
 from psabench.errors import BadInput, LinkError
 from psabench.estimate import pik, pmka
 from psabench.procedures.head_bench import Progress
@@ -28,7 +29,6 @@ SUMMARY = "one motion to every generation of converters: resolution, noise, drif
 
 AMPERE_PER_G = 1.28e-3  # of the accelerometers, from their passport
 SETTLE_S = 4.0  # from power-on until every board of the scenario is set up
-FULL_SCALE_V, OFFSET_BINARY = 10.0, 0x8000  # words of PSD-1
 PSA2_LSB_V = 10.0 / 2**23
 PLATE = 0x2210  # of a PIK: type, K in 0.001 Hz/V
 
@@ -141,9 +141,8 @@ def _means(name: str, gen: Generation, lsb_v: float, t_s: Floats, u_v: Floats, n
 
 
 def _psd1(r: Readings, gen: Generation, name: str) -> Track:
-    u_v = np.stack([(r[axis] - OFFSET_BINARY) * (FULL_SCALE_V / OFFSET_BINARY) for axis in "XYZ"], axis=1)
     lsb_v = FULL_SCALE_V / OFFSET_BINARY
-    return _means(name, gen, lsb_v, _bench_time_s(r), u_v, "16-bit words of ±10 V, each the mean of a cycle")
+    return _means(name, gen, lsb_v, _bench_time_s(r), volts(r), "16-bit words of ±10 V, each the mean of a cycle")
 
 
 def _psa2(unit: Psa2, gen: Generation, name: str) -> Track:
