@@ -190,7 +190,7 @@ static double increment_deg(double from_deg, double step_deg, const struct vehic
 }
 
 /* The largest hidden trap (sources instruments 1.3): the encoder turns about a tilted axis. */
-static void cardan_error_is_that_of_the_facts(void **state)
+static void cardan_error_is_that_of_the_sources(void **state)
 {
     (void)state;
     static const struct {
@@ -378,7 +378,7 @@ int main(void)
         cmocka_unit_test(the_suspension_axis_is_in_the_outer_frame),
         cmocka_unit_test(a_level_vehicle_has_the_heading_in_the_gimbal_angle),
         cmocka_unit_test(block_1_gives_roll_and_pitch_by_the_gimbal_angle),
-        cmocka_unit_test(cardan_error_is_that_of_the_facts),
+        cmocka_unit_test(cardan_error_is_that_of_the_sources),
         cmocka_unit_test(force_is_gravity_in_the_axes_of_the_platform),
         cmocka_unit_test(a_lever_arm_feels_the_rate),
         cmocka_unit_test(a_flight_is_felt_on_the_platform),

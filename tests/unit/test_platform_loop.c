@@ -185,7 +185,7 @@ static struct spread noise_of_windows(double m1, double window_s, unsigned windo
 }
 
 /* 60 n sqrt(m1 dt)/T deg/h for n arcmin a sample, and the slope's 0.66, 0.23, 0.127 deg/h at 10, 20, 30 s: within 10 %. */
-static void noise_laws_are_those_of_the_facts(void **state)
+static void noise_laws_are_those_of_the_sources(void **state)
 {
     (void)state;
     static const struct {
@@ -285,7 +285,7 @@ int main(void)
         cmocka_unit_test(check_case_gives_the_three_rates),
         cmocka_unit_test(settled_loop_is_equation_9),
         cmocka_unit_test(a_torquers_scale_is_in_the_drift),
-        cmocka_unit_test(noise_laws_are_those_of_the_facts),
+        cmocka_unit_test(noise_laws_are_those_of_the_sources),
         cmocka_unit_test(a_step_dies_away_with_the_gain),
         cmocka_unit_test(the_compensation_needs_the_rate_of_the_turn),
         cmocka_unit_test(the_printed_azimuth_sign_is_unstable),

@@ -36,7 +36,7 @@ static struct vehicle_state state(const struct vehicle *v, double t_s)
     return s;
 }
 
-/* Nose by heading and pitch; right side down for a positive roll; and z_c as the facts of the gyrocompass have it. */
+/* Nose by heading and pitch; right side down for a positive roll; and z_c as sources instruments 1.3 has it. */
 static void axes_point_where_the_angles_say(void **state_)
 {
     (void)state_;
@@ -144,7 +144,8 @@ static void a_flight_feels_what_newton_says(void **state_)
     }
 }
 
-static void transport_rate_is_that_of_the_facts(void **state_)
+/* Also what it does to the felt vertical, arcmin. */
+static void transport_rate_is_that_of_the_sources(void **state_)
 {
     (void)state_;
     struct vehicle_cfg c = vehicle_default();
@@ -155,6 +156,11 @@ static void transport_rate_is_that_of_the_facts(void **state_)
     near(s.latitude_rad / RAD_PER_DEG, 50.0, 1e-9); /* along the parallel */
     near(s.w_il_l_radps[2] / DEGPH - 15.041067 * sin(s.latitude_rad), 5.36, 0.005);
     assert_false(vehicle_steady(&v, ns(3600.0)));
+    near(hypot(s.accel_l_mps2[0], s.accel_l_mps2[1]) / v.site.g_mps2 / RAD_PER_DEG * 60.0, 6.7, 0.05);
+    v = at_latitude(50.0, &c);
+    vehicle_fly(&v, 500.0 / 3.6, 0.0, 0);
+    const struct vehicle_state north = state(&v, 100.0);
+    near(hypot(north.accel_l_mps2[0], north.accel_l_mps2[1]) / v.site.g_mps2 / RAD_PER_DEG * 60.0, 5.4, 0.05);
 }
 
 /* The closed form against a fine sum through ramps and turns, a turn back and a stop. */
@@ -255,7 +261,7 @@ int main(void)
         cmocka_unit_test(axes_point_where_the_angles_say),
         cmocka_unit_test(rates_are_those_of_the_attitude),
         cmocka_unit_test(a_flight_feels_what_newton_says),
-        cmocka_unit_test(transport_rate_is_that_of_the_facts),
+        cmocka_unit_test(transport_rate_is_that_of_the_sources),
         cmocka_unit_test(latitude_is_the_integral_of_the_northern_speed),
         cmocka_unit_test(commands_never_jump),
         cmocka_unit_test(an_instant_before_a_command_gets_what_held_then),
