@@ -14,7 +14,7 @@ import cantools
 import numpy as np
 from fault_host import HEARTBEAT, Floats, Host
 from psabench.can_host import Message
-from rig import DBC
+from rig import DBC, HERE
 
 EMCY = 0x080
 TS_S, UREF_V = 4.8e-3, 10.0  # PMKA: period; a reset in each of them balances UREF
@@ -40,6 +40,34 @@ BOARDS = {
     "psd1": Board("PSD1_CYCLE", "CNT", "PSD1_CYCLE", 0x180, 256, 0.972e-3, 10.0, "kpsd"),
     "pmka": Board("PMKA_CODES", "SEQ", "PMKA_STATE", 0x280, 65536, TS_S, UREF_V, "controller"),
     "pik": Board("PIK_COUNTS", "SEQ", "PIK_COUNTS", 0x180, 256, 0.01, 10.0, "controller"),
+}
+
+# The bench of the tests: d PSD-1, m PMKA, p PIK-6.
+SCENARIO = HERE / "faults_boards.yaml"
+SETUP_S = 0.5
+# What must be accepted; everything else must be refused.
+ACCEPTED = {
+    "sensor": r"[dmp]\.sensor\.[xyz]",
+    "analog.load_open": r"[dmp]\.afe\.z",
+    "analog.load_short": r"[dmp]\.afe\.z",
+    "analog": r"[dmp]\.afe\.[xyz]",
+    "chip.drdy_stuck": r"d\.adc\.x",
+    "chip.dout_dead": r"d\.adc\.[xyz]|m\.adc|p\.conv\.[xyz]",
+    "chip.lost_sync": r"none",
+    "chip.clock": r"d\.adc\.[xyz]|p\.clock",
+    "chip.flip": r"d\.adc\.[xyz]|m\.rom|p\.conv\.[xyz]",
+    "controller.frozen_words": r"d\.kpsd|[mp]\.controller",
+    "controller.skip_sync_t": r"none",
+    "controller.setup_order": r"none",
+    "controller": r"m\.controller",
+    "line.missing_pulse": r"d\.line\.SCLK|m\.line\.CONV",
+    "line.extra_pulse": r"d\.line\.SCLK|m\.line\.CONV",
+    "line": r"[dmp]\.line\..*",
+    "link.error_frame": r"[dmp]\.can|bus\.can0",
+    "link.bus_off": r"[dmp]\.can",
+    "link.stall": r"client\.\d+",
+    "link": r"[dmp]\.can|bus\.can0|client\.\d+",
+    "supply": r"supply",
 }
 
 _database = cast(cantools.database.can.Database, cantools.database.load_file(DBC))
