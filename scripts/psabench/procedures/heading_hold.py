@@ -1,0 +1,167 @@
+"""Heading hold: after gyrocompassing the platform navigates by its gyroscope alone, drifts compensated, for hours.
+
+`hold` starts navigation from a `GyrocompassResult` and looks at the instrument from time to time. How the error grows,
+and which drift has to be compensated: docs/procedures/gyrocompass.md.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from psabench import nav
+from psabench.errors import LinkError
+from psabench.nav import DEGPH
+from psabench.procedures.gyrocompass import GyrocompassResult
+from psabench.procedures.head_bench import Progress
+from psabench.procedures.platform_bench import Compensation, Look, PlatformBench
+from psabench.procedures.result import option
+
+NAME = "heading-hold"
+SUMMARY = "gyrocompassing, then heading kept for hours with the drifts compensated"
+
+DRIFTS = ("torquer", "axis1", "none")
+EARTH_RADIUS_M = 6371e3
+LATITUDE_LIMIT_RAD = math.radians(85.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HoldParams:
+    """Parameters of `heading-hold`, besides those of `gyrocompass`."""
+
+    hours: float = option(4.0, "h", "how long heading is kept")
+    look_s: float = option(300.0, "s", "between two looks at the instrument")
+    compensate: str = option(
+        "torquer", "", f"drift of the azimuth axis: {', '.join(DRIFTS)}; axis1 is the article's trap"
+    )
+    speed_kmh: float = option(0.0, "km/h", "ground speed; 0: parked")
+    track_deg: float = option(90.0, "deg", "of the flight")
+
+    def __post_init__(self) -> None:
+        if self.compensate not in DRIFTS:
+            raise ValueError(f"compensate is {self.compensate!r}; it must be one of {', '.join(DRIFTS)}")
+        if not 0.0 < self.look_s <= self.hours * 3600.0:
+            raise ValueError(f"look_s is {self.look_s}; it must lie between 0 and hours, {self.hours:g} h")
+        if self.speed_kmh < 0.0:
+            raise ValueError(f"speed_kmh is {self.speed_kmh}; it must not be negative")
+
+    @property
+    def speed_mps(self) -> float:
+        return self.speed_kmh / 3.6
+
+    @property
+    def track_rad(self) -> float:
+        return math.radians(self.track_deg)
+
+    @property
+    def looks(self) -> int:
+        return max(1, round(self.hours * 3600.0 / self.look_s))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Held:
+    """The heading at an instant of the hold."""
+
+    t_s: float  # since navigation began
+    heading_rad: float
+    sd_rad: float  # that is to be expected of it
+    faults: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HoldResult:
+    """A hold with what it started from."""
+
+    params: HoldParams
+    start: GyrocompassResult
+    drift2_radps: float  # that was compensated
+    held: tuple[Held, ...]  # the first at its beginning
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Reasons not to trust the heading at the end."""
+        return (*self.start.doubts, *dict.fromkeys(words for h in self.held for words in h.faults))
+
+
+def hold(
+    bench: PlatformBench,
+    start: GyrocompassResult,
+    p: HoldParams,
+    progress: Progress,
+    *,
+    watch: Callable[[Held], None] = lambda _: None,
+    depart: Callable[[], None] = lambda: None,
+) -> HoldResult:
+    """Navigate from the heading that was found. watch: gets each look as it comes; depart: sets the vehicle in motion.
+
+    Raises LinkError where the platform fails.
+    """
+    first = bench.look()
+    if first.faults:
+        raise LinkError(f"{NAME}: navigation cannot begin: {'; '.join(first.faults)}")
+    azimuth_rad = _alpha(start, first)
+    drift2 = {"torquer": start.drift2_radps, "axis1": start.compass.drift1_radps, "none": 0.0}[p.compensate]
+    latitude = start.params.latitude_rad
+    _tell(bench, p, latitude)
+    bench.navigate(Compensation(azimuth_rad=azimuth_rad, drift1_radps=start.compass.drift1_radps, drift2_radps=drift2))
+    begun_s = bench.t_s
+    if p.speed_mps:
+        depart()
+    held = []
+    with progress.step("keeping heading", p.looks) as done:
+        for k in range(p.looks + 1):
+            if k:
+                bench.wait(begun_s + k * p.look_s - bench.t_s)
+                latitude = _moved(latitude, p)
+                _tell(bench, p, latitude)
+                done()
+            held.append(_held(bench.look(), azimuth_rad, begun_s, start, p, drift2))
+            watch(held[-1])
+    return HoldResult(params=p, start=start, drift2_radps=drift2, held=tuple(held))
+
+
+def _alpha(start: GyrocompassResult, look: Look) -> float:
+    """alpha of the levelled platform now, from the heading found and the encoder."""
+    a = start.attitude
+    return nav.alpha(psi_rad=start.heading_rad, q_rad=look.encoder_rad, pitch_rad=a.pitch_rad, roll_rad=a.roll_rad)
+
+
+def _held(
+    look: Look, azimuth_rad: float, begun_s: float, start: GyrocompassResult, p: HoldParams, drift2_radps: float
+) -> Held:
+    """Heading of a vehicle that stands as it stood, or flies level."""
+    a = start.attitude
+    pitch, roll = (0.0, 0.0) if p.speed_mps else (a.pitch_rad, a.roll_rad)
+    t_s = look.t_s - begun_s
+    return Held(
+        t_s=t_s,
+        heading_rad=nav.heading(azimuth_rad, look.encoder_rad, pitch_rad=pitch, roll_rad=roll),
+        sd_rad=nav.hold_sd_rad(_growth(start, drift2_radps), t_s),
+        faults=look.faults,
+    )
+
+
+def _growth(start: GyrocompassResult, drift2_radps: float) -> nav.Hold:
+    """What the error grows like if the compensation is right on average: drift and heading as they were found."""
+    p = start.params
+    gm = p.gm_sigma_degph * DEGPH
+    found_sd = start.get("drift2_degph").sd * DEGPH
+    return nav.Hold(
+        heading_sd_rad=math.radians(start.get("heading_deg").sd),
+        drift_sd_radps=math.sqrt(max(0.0, found_sd**2)),
+        gm_sigma_radps=gm,
+        gm_tau_s=max(p.gm_tau_s, 1.0),
+    )
+
+
+def _tell(bench: PlatformBench, p: HoldParams, latitude_rad: float) -> None:
+    """Of the middle of the next leg: between two looks the controller goes on with what it has."""
+    middle = _moved(latitude_rad, p, 0.5)
+    bench.moved(latitude_rad=middle, speed_mps=p.speed_mps, track_rad=p.track_rad)
+
+
+def _moved(latitude_rad: float, p: HoldParams, part: float = 1.0) -> float:
+    """Latitude after that part of a leg, over a sphere."""
+    new = latitude_rad + part * p.look_s * p.speed_mps * math.cos(p.track_rad) / EARTH_RADIUS_M
+    return max(-LATITUDE_LIMIT_RAD, min(LATITUDE_LIMIT_RAD, new))
