@@ -4,6 +4,9 @@
 ifeq ($(origin CC),default)
 CC := gcc
 endif
+ifeq ($(origin CXX),default)
+CXX := $(patsubst clang%,clang++%,$(patsubst gcc%,g++%,$(CC)))
+endif
 AR        ?= ar
 OBJCOPY   ?= objcopy
 PKGCONFIG ?= pkg-config
@@ -22,6 +25,7 @@ TESTS     ?= $(basename $(notdir $(sort $(wildcard tests/unit/test_*.c))))
 
 VERSION := $(shell sed -n 's/^version = "\(.*\)"/\1/p' pyproject.toml)
 ABI     := $(shell sed -n 's/^\#define PSABENCH_ABI \([0-9]*\)/\1/p' emu/api/psabench.h)
+NAV_ABI := $(shell sed -n 's/^\#define NAV_ABI \([0-9]*\)$$/\1/p' emu/nav/nav.h)
 
 # What correctness needs stands before the user's CFLAGS. -ffp-contract=off: the same bytes on every machine. All objects are
 # fit for the shared library: -fPIC with hidden symbols costs the emulator nothing that can be measured.
@@ -31,6 +35,13 @@ SANFL := $(if $(SAN),-fsanitize=$(SAN) -fno-sanitize-recover=all -fno-omit-frame
 INC   := -Iemu -Ibuild $(shell $(PKGCONFIG) --cflags libcjson libfyaml 2>/dev/null)
 LIBS  := $(shell $(PKGCONFIG) --libs libcjson libfyaml 2>/dev/null) -lm
 FLAGS   = $(STD) $(WARN) $(INC) $(CPPFLAGS)
+CXXFLAGS ?= $(CFLAGS)
+# C++ of emu/nav: Eigen without vectors of its own, which differ from machine to machine; no exceptions and no RTTI, so that it
+# needs no runtime of C++ and links into C.
+CXXSTD := $(patsubst -std=c11,-std=c++17,$(STD)) -fno-exceptions -fno-rtti -DEIGEN_DONT_VECTORIZE -DEIGEN_NO_MALLOC -DEIGEN_MPL2_ONLY
+CXXWARN = $(filter-out -Wstrict-prototypes -Wmissing-prototypes,$(WARN)) -Wmissing-declarations
+EIGEN  := $(patsubst -I%,-isystem %,$(shell $(PKGCONFIG) --cflags eigen3 2>/dev/null))
+CXXCOMPILE = $(CXX) $(CXXSTD) $(CXXWARN) -Iemu $(EIGEN) $(CPPFLAGS) $(SANFL) $(CXXFLAGS)
 COMPILE = $(CC) $(FLAGS) $(SANFL) $(CFLAGS)
 LINK    = $(CC) $(SANFL) $(CFLAGS) $(LDFLAGS)
 
@@ -55,11 +66,14 @@ API_OBJ  := $(filter $(BUILD)/obj/emu/api/%,$(OBJ))
 CORE_OBJ := $(filter-out $(API_OBJ) $(BUILD)/obj/emu/app/% $(BUILD)/obj/emu/link/% $(BUILD)/obj/emu/control/%,$(OBJ))
 LIB_SO   := $(BUILD)/libpsabench.so.$(ABI)
 LIB_ALL  := $(if $(API_OBJ),$(LIB_SO) $(BUILD)/libpsabench.so $(BUILD)/libpsabench.a $(BUILD)/psabench.pc)
+NAV_OBJ  := $(patsubst %.cpp,$(BUILD)/obj/%.o,$(sort $(wildcard emu/nav/*.cpp))) $(BUILD)/obj/emu/base/detmath.o
+NAV_SO   := $(BUILD)/libpsabench-nav.so.$(NAV_ABI)
+NAV_ALL  := $(NAV_SO) $(BUILD)/libpsabench-nav.so $(BUILD)/libpsabench-nav.a $(BUILD)/psabench-nav.pc
 TEST_BIN := $(addprefix $(BUILD)/tests/,$(TESTS))
 FUZZ      ?= *#                        one fuzz target, without its fuzz_
 FUZZ_BIN := $(patsubst tests/fuzz/%.c,$(BUILD)/fuzz/%,$(sort $(wildcard tests/fuzz/fuzz_$(strip $(FUZZ)).c)))
 BENCH_BIN := $(patsubst tests/bench/%.c,$(BUILD)/bench/%,$(sort $(wildcard tests/bench/*.c)))
-C_FILES   = $(sort $(wildcard emu/*/*.[ch] tests/*/*.[ch] examples/*.c))
+C_FILES   = $(sort $(wildcard emu/*/*.[ch] emu/*/*.[ch]pp tests/*/*.[ch] examples/*.c))
 
 .SECONDARY:
 .DELETE_ON_ERROR:
@@ -68,8 +82,8 @@ C_FILES   = $(sort $(wildcard emu/*/*.[ch] tests/*/*.[ch] examples/*.c))
 ## all: the emulator, build/psa-emu (make CC=clang and make SAN=address,undefined build beside it, in build-clang and build-san)
 all: $(if $(MAIN),$(BUILD)/psa-emu,$(LIB_OBJ)) lib
 
-## lib: libpsabench, shared and static, and its pkg-config file; the header is emu/api/psabench.h
-lib: $(LIB_ALL)
+## lib: libpsabench and libpsabench-nav, shared and static, and their pkg-config files; headers: emu/api/psabench.h, emu/nav/nav*.h
+lib: $(LIB_ALL) $(NAV_ALL)
 
 $(BUILD)/psa-emu: $(filter-out $(API_OBJ),$(OBJ))
 	$(call say,LINK,$@)
@@ -82,33 +96,50 @@ $(BUILD)/lib/psabench.o: $(API_OBJ) $(CORE_OBJ)
 	$(Q)rm -f $(@D)/core.a && $(AR) rcs $(@D)/core.a $(CORE_OBJ)
 	$(Q)$(LD) -r -o $@ $(API_OBJ) $(@D)/core.a && $(OBJCOPY) --localize-hidden $@
 
+$(BUILD)/lib/psabench-nav.o: $(NAV_OBJ)
+	@mkdir -p $(@D)
+	$(call say,LD -r,$@)
+	$(Q)$(LD) -r -o $@ $^ && $(OBJCOPY) --localize-hidden $@
+
 $(LIB_SO): $(BUILD)/lib/psabench.o
+$(NAV_SO): $(BUILD)/lib/psabench-nav.o
+$(LIB_SO) $(NAV_SO):
 	$(call say,LINK,$@)
-	$(Q)$(LINK) -shared -Wl,-soname,$(@F) -o $@ $< -lm
+	$(Q)$(LINK) -shared -Wl,-soname,$(@F) -o $@ $^ -lm
 
 $(BUILD)/libpsabench.so: $(LIB_SO)
-	$(Q)ln -sf $(<F) $@
+$(BUILD)/libpsabench-nav.so: $(NAV_SO)
+$(BUILD)/libpsabench.so $(BUILD)/libpsabench-nav.so:
+	$(Q)ln -sf $(^F) $@
 
-$(BUILD)/libpsabench.a: $(BUILD)/lib/psabench.o
-	$(Q)rm -f $@ && $(AR) rcs $@ $<
+$(BUILD)/libpsabench.a $(BUILD)/libpsabench-nav.a: $(BUILD)/lib%.a: $(BUILD)/lib/%.o
+	$(Q)rm -f $@ && $(AR) rcs $@ $^
 
-$(BUILD)/psabench.pc: emu/api/psabench.pc.in pyproject.toml Makefile FORCE
-	$(Q)sed -e 's|@PREFIX@|$(PREFIX)|; s|@LIBDIR@|$(LIBDIR)|; s|@VERSION@|$(VERSION)|' $< > $@.new
+$(BUILD)/psabench.pc: emu/api/psabench.pc.in
+$(BUILD)/psabench-nav.pc: emu/nav/psabench-nav.pc.in
+$(BUILD)/psabench.pc $(BUILD)/psabench-nav.pc: pyproject.toml Makefile FORCE
+	$(Q)sed -e 's|@PREFIX@|$(PREFIX)|; s|@LIBDIR@|$(LIBDIR)|; s|@VERSION@|$(VERSION)|' $(filter %.in,$^) > $@.new
 	$(Q)cmp -s $@.new $@ && rm $@.new || mv $@.new $@
 
 # In a line of its own: .SECONDARY above would leave a target alone that waits for a file that is never there.
 .PHONY: FORCE
 FORCE:
 
+$(BUILD)/obj/%.o: %.cpp Makefile
+	@mkdir -p $(@D)
+	$(call say,CXX,$@)
+	$(Q)$(CXXCOMPILE) -MMD -MP -c -o $@ $<
+
 $(BUILD)/obj/%.o: %.c Makefile
 	@mkdir -p $(@D)
 	$(call say,CC,$@)
 	$(Q)$(COMPILE) -MMD -MP -c -o $@ $<
 
+$(BUILD)/tests/test_nav: $(BUILD)/libpsabench-nav.a
 $(BUILD)/tests/%: $(BUILD)/obj/tests/unit/%.o $(LIB_OBJ)
 	@mkdir -p $(@D)
 	$(call say,LINK,$@)
-	$(Q)$(LINK) -o $@ $< $(LIB_OBJ) $(LIBS) -lcmocka
+	$(Q)$(LINK) -o $@ $< $(LIB_OBJ) $(filter %.a,$^) $(LIBS) -lcmocka
 
 $(BUILD)/obj/tests/bench/%.o: CPPFLAGS += -D_POSIX_C_SOURCE=199309L#                     clock_gettime
 $(BUILD)/bench/%: $(BUILD)/obj/tests/bench/%.o $(LIB_OBJ)
@@ -242,6 +273,11 @@ install: all
 	ln -sf $(notdir $(LIB_SO)) $(DESTDIR)$(LIBDIR)/libpsabench.so
 	install -m 644 $(BUILD)/libpsabench.a $(DESTDIR)$(LIBDIR)/libpsabench.a
 	install -D -m 644 $(BUILD)/psabench.pc $(DESTDIR)$(LIBDIR)/pkgconfig/psabench.pc
+	install -D -m 644 -t $(DESTDIR)$(PREFIX)/include/psabench/nav emu/nav/nav.h emu/nav/nav_mc.h
+	install -m 755 $(NAV_SO) $(DESTDIR)$(LIBDIR)/$(notdir $(NAV_SO))
+	ln -sf $(notdir $(NAV_SO)) $(DESTDIR)$(LIBDIR)/libpsabench-nav.so
+	install -m 644 $(BUILD)/libpsabench-nav.a $(DESTDIR)$(LIBDIR)/libpsabench-nav.a
+	install -m 644 $(BUILD)/psabench-nav.pc $(DESTDIR)$(LIBDIR)/pkgconfig/psabench-nav.pc
 	for f in $$(find -L proto decoders share -type f ! -name '*.pyc'); do \
 	    install -D -m 644 $$f $(DESTDIR)$(PREFIX)/share/psabench/$$f || exit 1; done
 	cd decoders && for f in $$(find -L * -type f ! -name '*.pyc'); do \
@@ -250,8 +286,9 @@ install: all
 ## uninstall: what install put there
 uninstall:
 	rm -f $(DESTDIR)$(PREFIX)/bin/psa-emu $(DESTDIR)$(PREFIX)/include/psabench.h $(DESTDIR)$(LIBDIR)/pkgconfig/psabench.pc \
-	    $(addprefix $(DESTDIR)$(LIBDIR)/libpsabench.,a so so.$(ABI))
-	rm -rf $(DESTDIR)$(PREFIX)/share/psabench $(patsubst decoders/%/pd.py,$(DESTDIR)$(PREFIX)/$(SIGROK)/%,$(wildcard decoders/*/pd.py))
+	    $(addprefix $(DESTDIR)$(LIBDIR)/libpsabench.,a so so.$(ABI)) $(DESTDIR)$(LIBDIR)/pkgconfig/psabench-nav.pc \
+	    $(addprefix $(DESTDIR)$(LIBDIR)/libpsabench-nav.,a so so.$(NAV_ABI))
+	rm -rf $(DESTDIR)$(PREFIX)/share/psabench $(DESTDIR)$(PREFIX)/include/psabench $(patsubst decoders/%/pd.py,$(DESTDIR)$(PREFIX)/$(SIGROK)/%,$(wildcard decoders/*/pd.py))
 
 ## wheel: build/dist/psabench-*.whl, the Python package with emulator, library and data files in it
 wheel: all
@@ -278,4 +315,4 @@ help:
 
 -include $(BENCH_BIN:$(BUILD)/bench/%=$(BUILD)/obj/tests/bench/%.d)
 -include $(FUZZ_BIN:$(BUILD)/fuzz/%=$(BUILD)/obj/tests/fuzz/%.d)
--include $(OBJ:.o=.d) $(TEST_BIN:$(BUILD)/tests/%=$(BUILD)/obj/tests/unit/%.d)
+-include $(OBJ:.o=.d) $(NAV_OBJ:.o=.d) $(TEST_BIN:$(BUILD)/tests/%=$(BUILD)/obj/tests/unit/%.d)

@@ -15,7 +15,9 @@
 extern "C" {
 #endif
 
-#define NAV_ABI           0 /* number of the shared library, libpsabench-nav.so.N; structs change only with it */
+/* Number of the shared library, libpsabench-nav.so.N; structures change only with it. */
+#define NAV_ABI 0
+
 #define NAV_API           __attribute__((visibility("default")))
 #define NAV_MAX_POSITIONS 64
 #define NAV_EARTH_RADPS   7.292115e-5 /* sources 5.1 */
@@ -81,7 +83,7 @@ struct nav_gyrocompass_cfg {
     struct nav_noise noise;
 };
 
-struct nav_gyrocompass {
+struct nav_compass {
     double alpha1_rad;        /* at position 1, (-pi, pi], on the scale of the angle readings */
     double alpha1_sd_rad;     /* of alpha1_rad so read: what a heading inherits */
     double alpha1_half95_rad; /* 1.96 times it */
@@ -98,7 +100,7 @@ struct nav_gyrocompass {
     int iterations;            /* of the constrained fit */
 };
 NAV_API int nav_gyrocompass(const struct nav_position *p, int count, const struct nav_gyrocompass_cfg *cfg,
-                            struct nav_gyrocompass *out);
+                            struct nav_compass *out);
 
 /* (18), (19) and S1 + S3 as printed: wrong, for negative tests only. Three positions. */
 NAV_API int nav_gyrocompass_printed(const struct nav_position *p, double latitude_rad, double *alpha1_rad,

@@ -100,7 +100,7 @@ class Noise:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Compass:
-    """Result of `gyrocompass`; fields as in struct nav_gyrocompass."""
+    """Result of `gyrocompass`; fields as in struct nav_compass."""
 
     alpha1_rad: float
     alpha1_sd_rad: float

@@ -48,7 +48,7 @@ class FitStruct(c.Structure):
 
 
 class CompassStruct(c.Structure):
-    """struct nav_gyrocompass."""
+    """struct nav_compass."""
 
     _fields_ = [
         *_doubles("alpha1_rad", "alpha1_sd_rad", "alpha1_half95_rad", "platform_sd_rad"),

@@ -1,0 +1,218 @@
+#include "nav/nav_fit.hpp"
+
+/* What a result is put together from; x and gain are of (s, c, drift, ramp) or, on the circle, of (alpha, drift, ramp). */
+struct solution {
+    fit_unknowns free;   /* s, c, drift, ramp */
+    fit_gain gain;       /* of alpha, drift, ramp by S/We */
+    fit_unknowns params; /* alpha, drift, ramp */
+    int iterations;
+    bool converged;
+};
+
+static bool all_finite(const struct nav_position *p, int count, const struct nav_gyrocompass_cfg *cfg)
+{
+    const struct nav_noise *n = &cfg->noise;
+    double sum = cfg->latitude_rad + n->gm_sigma_radps + n->gm_tau_s + n->white_radps_rts + n->window_sd_radps +
+                 n->angle_sd_rad + n->level_sd_rad;
+    bool finite = std::isfinite(sum);
+    for (int i = 0; i < count; i++) {
+        sum = p[i].s_radps + p[i].delta_rad + p[i].beta_rad + p[i].gamma_rad + p[i].t_mid_s + p[i].window_s;
+        finite = finite && std::isfinite(sum);
+    }
+    return finite;
+}
+
+static bool in_range(const struct nav_position *p, int count, const struct nav_gyrocompass_cfg *cfg)
+{
+    const struct nav_noise *n = &cfg->noise;
+    bool good = cfg->method >= NAV_CLOSED3 && cfg->method <= NAV_GLS_CONSTRAINED && n->gm_sigma_radps >= 0.0 &&
+                n->white_radps_rts >= 0.0 && n->window_sd_radps >= 0.0 && n->angle_sd_rad >= 0.0 &&
+                n->level_sd_rad >= 0.0;
+    good = good && (n->gm_sigma_radps == 0.0 || n->gm_tau_s > 0.0);
+    for (int i = 0; i < count; i++)
+        good = good && std::fabs(p[i].gamma_rad) < NAV_PI / 4 && std::fabs(p[i].beta_rad) < NAV_PI / 4 &&
+               std::fabs(p[i].delta_rad) < 1e4 && p[i].window_s >= 0.0;
+    return good;
+}
+
+static bool times_fit(const struct nav_position *p, int count, const struct nav_gyrocompass_cfg *cfg)
+{
+    const bool drift = cfg->noise.gm_sigma_radps > 0.0;
+    if (!drift && !cfg->ramp && cfg->noise.white_radps_rts == 0.0) return true;
+    for (int i = 0; i < count; i++) {
+        if ((drift || cfg->noise.white_radps_rts > 0.0) && p[i].window_s <= 0.0) return false;
+        if (i == 0 || (!drift && !cfg->ramp)) continue;
+        const double apart_s = p[i].t_mid_s - p[i - 1].t_mid_s;
+        if (apart_s <= 0.0 || (drift && apart_s < 0.5 * (p[i].window_s + p[i - 1].window_s) - 1e-6)) return false;
+    }
+    return true;
+}
+
+/* Are there three directions that differ? */
+static bool three_directions(const struct nav_position *p, int count)
+{
+    double seen[3];
+    int found = 0;
+    for (int i = 0; i < count && found < 3; i++) {
+        bool is_new = true;
+        for (int k = 0; k < found; k++)
+            is_new = is_new && std::fabs(nav_wrap(p[i].delta_rad - seen[k])) > 0.5 * NAV_DEG;
+        if (is_new) seen[found++] = p[i].delta_rad;
+    }
+    return found == 3;
+}
+
+static int refusal(const struct nav_position *p, int count, const struct nav_gyrocompass_cfg *cfg)
+{
+    const int least = cfg->ramp ? 4 : 3;
+    if (count < least || count > NAV_MAX_POSITIONS || (cfg->method == NAV_CLOSED3 && (count != 3 || cfg->ramp)))
+        return NAV_TOO_FEW;
+    if (!all_finite(p, count, cfg)) return NAV_NOT_FINITE;
+    if (!in_range(p, count, cfg)) return NAV_RANGE;
+    if (std::fabs(cfg->latitude_rad) > 85.0 * NAV_DEG) return NAV_LATITUDE;
+    if (!three_directions(p, count)) return NAV_COINCIDENT;
+    return times_fit(p, count, cfg) ? NAV_OK : NAV_TIMES;
+}
+
+/* (17) to (19) with the errata, for We = 1: row 1 of the inverse is s, row 2 c, and the drift the mean of what is left. */
+static bool cramer(const fit_design &rows, fit_gain *gain)
+{
+    const double c1 = rows(0, FIT_S) - rows(1, FIT_S);
+    const double c2 = rows(1, FIT_S) - rows(2, FIT_S);
+    const double d1 = rows(0, FIT_C) - rows(1, FIT_C);
+    const double d2 = rows(1, FIT_C) - rows(2, FIT_C);
+    const double det = c1 * d2 - c2 * d1;
+    if (std::fabs(det) < 1e-9) return false;
+    gain->resize(FIT_RAMP, 3);
+    gain->row(FIT_S) << d2 / det, -(d1 + d2) / det, d1 / det;  /* (f1 d2 - f2 d1)/D by S1, S2, S3 */
+    gain->row(FIT_C) << -c2 / det, (c1 + c2) / det, -c1 / det; /* (c1 f2 - c2 f1)/D */
+    const Eigen::RowVector3d third = Eigen::RowVector3d::Constant(1.0 / 3.0);
+    gain->row(FIT_DRIFT) =
+        third - rows.col(FIT_S).mean() * gain->row(FIT_S) - rows.col(FIT_C).mean() * gain->row(FIT_C);
+    return true;
+}
+
+/* alpha = atan2(s, c); its gain follows from that of s and c. */
+static void from_free(const fit_gain &free_gain, struct solution *x)
+{
+    const double s = x->free(FIT_S);
+    const double c = x->free(FIT_C);
+    const Eigen::Index unknowns = x->free.size() - 1;
+    x->gain.resize(unknowns, free_gain.cols());
+    x->gain.row(0) = (c * free_gain.row(FIT_S) - s * free_gain.row(FIT_C)) / (s * s + c * c);
+    x->gain.bottomRows(unknowns - 1) = free_gain.bottomRows(unknowns - 1);
+    x->params.resize(unknowns);
+    x->params(0) = det_atan2(s, c);
+    x->params.tail(unknowns - 1) = x->free.tail(unknowns - 1);
+}
+
+static bool solve(const fit_design &rows, const fit_square &whitener, const fit_vector &y, int method,
+                  struct solution *x)
+{
+    fit_gain free_gain;
+    if (!(method == NAV_CLOSED3 ? cramer(rows, &free_gain) : fit_gain_of(rows, whitener, &free_gain))) return false;
+    x->free = free_gain * y;
+    from_free(free_gain, x);
+    x->iterations = 0;
+    x->converged = true;
+    if (!fit_is_constrained(method)) return true;
+    double alpha = x->params(0);
+    fit_unknowns rest;
+    x->iterations = fit_on_circle(rows, whitener, y, &alpha, &rest, &x->gain);
+    if (x->iterations < 0) return false;
+    x->converged = x->iterations < 30;
+    x->params = rest;
+    x->params(0) = alpha;
+    return true;
+}
+
+/* Standard deviations and covariance by the gain, whatever the weights were: honest for every method. */
+static void spread(const struct solution *x, const fit_square &covariance, const struct nav_position *p, int count,
+                   const struct nav_gyrocompass_cfg *cfg, struct nav_compass *out)
+{
+    const double we = nav_earth_at(cfg->latitude_rad).we_radps;
+    const double variance = fit_angle_variance(&cfg->noise);
+    fit_square c = covariance;
+    for (int i = 0; i < count; i++) {
+        const double slope = det_cos(out->alpha1_rad + p[i].delta_rad);
+        c(i, i) += variance * slope * slope;
+    }
+    const fit_gain spread_gain = x->gain.lazyProduct(c);
+    const fit_small cov = spread_gain.lazyProduct(x->gain.transpose());
+    const double unit[3] = {1.0, we, we / fit_time_scale(p, count)};
+    for (int i = 0; i < 9; i++) out->cov[i] = 0.0;
+    for (Eigen::Index i = 0; i < cov.rows(); i++)
+        for (Eigen::Index j = 0; j < cov.cols(); j++) out->cov[3 * i + j] = cov(i, j) * unit[i] * unit[j];
+    out->alpha1_sd_rad = std::sqrt(cov(0, 0));
+    out->alpha1_half95_rad = 1.959963984540054 * out->alpha1_sd_rad;
+    out->drift1_sd_radps = std::sqrt(cov(1, 1)) * we;
+    const double by_first = x->gain(0, 0) * det_cos(out->alpha1_rad + p[0].delta_rad);
+    out->platform_sd_rad = std::sqrt(std::fmax(cov(0, 0) + variance * (1.0 - 2.0 * by_first), 0.0));
+}
+
+static uint32_t flags_of(const struct nav_compass *r, const struct nav_gyrocompass_cfg *cfg, bool noise, bool converged)
+{
+    uint32_t flags = 0;
+    if (r->geometry < 0.3) flags |= NAV_POOR_GEOMETRY;
+    if (r->quality > 0.01) flags |= NAV_POOR_QUALITY;
+    if (cfg->simplified) flags |= NAV_SIMPLIFIED;
+    if (!noise) flags |= NAV_NO_NOISE;
+    if (!converged) flags |= NAV_NOT_CONVERGED;
+    return flags;
+}
+
+int nav_gyrocompass(const struct nav_position *p, int count, const struct nav_gyrocompass_cfg *cfg,
+                    struct nav_compass *out)
+{
+    const int refused = refusal(p, count, cfg);
+    if (refused) return refused;
+    const double we = nav_earth_at(cfg->latitude_rad).we_radps;
+    const fit_design rows = fit_rows(p, count, cfg);
+    const fit_square covariance = fit_covariance(p, count, &cfg->noise, cfg->latitude_rad);
+    const fit_square whitener = fit_whitener(covariance, &cfg->noise, cfg->method);
+    fit_vector y(count);
+    for (int i = 0; i < count; i++) y(i) = p[i].s_radps / we;
+    struct solution x;
+    if (!solve(rows, whitener, y, cfg->method, &x)) return NAV_SINGULAR;
+    out->alpha1_rad = x.params(0);
+    out->drift1_radps = x.params(1) * we;
+    out->ramp_radps2 = cfg->ramp ? x.params(2) * we / fit_time_scale(p, count) : 0.0;
+    out->s = x.free(FIT_S);
+    out->c = x.free(FIT_C);
+    out->quality = std::fabs(std::sqrt(out->s * out->s + out->c * out->c) - 1.0);
+    out->geometry = fit_geometry(rows);
+    out->iterations = x.iterations;
+    spread(&x, covariance, p, count, cfg, out);
+    fit_unknowns full = x.free;
+    if (fit_is_constrained(cfg->method)) {
+        full(FIT_S) = det_sin(out->alpha1_rad);
+        full(FIT_C) = det_cos(out->alpha1_rad);
+        full.tail(full.size() - 2) = x.params.tail(full.size() - 2);
+    }
+    out->residual_rms_radps = std::sqrt((y - rows * full).squaredNorm() / count) * we;
+    const bool noise = covariance.trace() + fit_angle_variance(&cfg->noise) > 0.0;
+    out->flags = flags_of(out, cfg, noise, x.converged);
+    return NAV_OK;
+}
+
+int nav_gyrocompass_printed(const struct nav_position *p, double latitude_rad, double *alpha1_rad, double *drift1_radps)
+{
+    struct nav_gyrocompass_cfg cfg = {};
+    cfg.latitude_rad = latitude_rad;
+    cfg.simplified = 1;
+    const int refused = refusal(p, 3, &cfg);
+    if (refused) return refused;
+    const double we = nav_earth_at(latitude_rad).we_radps;
+    struct nav_row r[3];
+    for (int i = 0; i < 3; i++) r[i] = nav_row_of(&p[i], true);
+    const double f1 = (p[0].s_radps - p[1].s_radps) / we;
+    const double f2 = (p[1].s_radps - p[2].s_radps) / we;
+    const double c1 = r[0].a - r[1].a;
+    const double c2 = r[1].a - r[2].a;
+    const double d1 = r[0].b - r[1].b;
+    const double d2 = r[1].b - r[2].b;
+    const double det = c1 * d2 - c2 * d1;
+    *alpha1_rad = det_atan2((f1 * d1 - f2 * d2) / det, (c1 * f2 - c2 * f1) / det);
+    *drift1_radps = p[0].s_radps + p[2].s_radps;
+    return NAV_OK;
+}

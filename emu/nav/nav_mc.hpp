@@ -1,0 +1,69 @@
+/* What the Monte-Carlo models share: schedule, gain of first order, the errors of one run. */
+#ifndef PSABENCH_NAV_MC_HPP
+#define PSABENCH_NAV_MC_HPP
+
+#include "nav/nav_fit.hpp"
+#include "nav/nav_mc.h"
+#include "nav/nav_random.hpp"
+
+/* Middles and lengths of the windows, angles as increments; S, beta and gamma 0. The first window begins at t = 0. */
+void mc_schedule(const struct nav_mc_cfg *cfg, struct nav_position *p);
+int mc_refusal(const struct nav_mc_cfg *cfg, const struct nav_position *p);
+double mc_samples_per_window(const struct nav_mc_cfg *cfg);
+
+/* Gain of first order about the truth; normal, mean and angle are weighted sums, so that a run is a few products. */
+struct mc_linear {
+    int count, unknowns;
+    bool constrained;
+    double we_radps, wz_radps;
+    double inverse[FIT_MAX][FIT_MAX];            /* of rows' W rows */
+    double normal[FIT_MAX][FIT_MAX];             /* rows' W rows */
+    double weighted[FIT_MAX][NAV_MAX_POSITIONS]; /* rows' W: of an error of S/We at each position */
+    double cos_delta[NAV_MAX_POSITIONS], sin_delta[NAV_MAX_POSITIONS];
+    struct nav_position p[NAV_MAX_POSITIONS];
+};
+int mc_linear_make(const struct nav_mc_cfg *cfg, struct mc_linear *lin);
+
+/* Errors of alpha on the scale of the angles, of the drift in We, and the quality, from r = rows' W error. */
+struct mc_error {
+    double alpha_rad, drift, quality;
+};
+struct mc_error mc_solve(const struct mc_linear *lin, const double r[FIT_MAX], double cos_a, double sin_a);
+
+/* A systematic error with the sign that this run drew. */
+inline double mc_signed(const struct nav_mc_cfg *cfg, double value, struct random_stream *rnd)
+{
+    return cfg->random_sign ? value * rnd->sign() : value;
+}
+
+/* How many times the systematic error of the angle counts at position i. */
+inline double mc_angle_share(const struct nav_mc_cfg *cfg, int i)
+{
+    switch (cfg->angle_sys) {
+    case NAV_ANGLE_COMMON:
+        return 1.0;
+    case NAV_ANGLE_INCREMENT:
+        return i > 0 ? 1.0 : 0.0;
+    case NAV_ANGLE_ACCUMULATES:
+        return i;
+    default:
+        return 0.0;
+    }
+}
+
+inline double mc_tilt(const struct nav_mc_cfg *cfg, struct random_stream *rnd)
+{
+    return cfg->tilt == NAV_TILT_CORNERS ? cfg->tilt_rad * rnd->sign() : cfg->tilt_rad * (2.0 * rnd->uniform() - 1.0);
+}
+
+inline double mc_alpha1(const struct nav_mc_cfg *cfg, struct random_stream *rnd)
+{
+    return std::isnan(cfg->alpha1_rad) ? NAV_PI * (2.0 * rnd->uniform() - 1.0) : nav_wrap(cfg->alpha1_rad);
+}
+
+inline void mc_put(double *array, uint64_t k, double value)
+{
+    if (array) array[k] = value;
+}
+
+#endif

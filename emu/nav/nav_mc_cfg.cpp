@@ -1,0 +1,173 @@
+#include "nav/nav_mc.hpp"
+
+void nav_mc_default(struct nav_mc_cfg *cfg)
+{
+    *cfg = {};
+    cfg->latitude_rad = 50.0 * NAV_DEG;
+    cfg->latitude_error_rad = 0.1 * NAV_ARCMIN;
+    cfg->tilt_rad = 5.0 * NAV_DEG;
+    cfg->alpha1_rad = std::nan("");
+    cfg->drift1_radps = 25.0 * NAV_DEGPH;
+    cfg->gm_sigma_radps = 0.2 * NAV_DEGPH;
+    cfg->gm_tau_s = 1000.0;
+    cfg->m1_per_s = 1.0;
+    cfg->beta_sys_rad = cfg->gamma_sys_rad = 10.0 * NAV_ARCMIN;
+    cfg->beta_random_rad = cfg->gamma_random_rad = NAV_ARCMIN;
+    cfg->angle_sys_rad = 6.0 * NAV_ARCMIN;
+    cfg->angle_random_rad = 3.0 * NAV_ARCMIN;
+    cfg->angle_sys = NAV_ANGLE_COMMON;
+    cfg->random_sign = 1;
+    cfg->sample_s = 0.01;
+    cfg->count = 3;
+    for (int i = 0; i < cfg->count; i++) cfg->angle_rad[i] = 0.5 * NAV_PI * i;
+    cfg->window_s = cfg->gap_s = 10.0;
+    cfg->fit.latitude_rad = cfg->latitude_rad;
+    cfg->fit.method = NAV_CLOSED3;
+    cfg->fit.simplified = 1;
+    cfg->fit.noise.gm_tau_s = 1000.0;
+}
+
+void nav_mc_hold_default(struct nav_mc_hold_cfg *cfg)
+{
+    *cfg = {};
+    nav_mc_default(&cfg->start);
+    cfg->hours = 4.0;
+    cfg->step_s = 60.0;
+    cfg->wait_s = 10.0;
+}
+
+void mc_schedule(const struct nav_mc_cfg *cfg, struct nav_position *p)
+{
+    double begins_s = 0.0;
+    for (int i = 0; i < cfg->count; i++) {
+        p[i] = {};
+        p[i].delta_rad = cfg->angle_rad[i] - cfg->angle_rad[0];
+        if (i > 0) {
+            const double turn = std::fabs(cfg->angle_rad[i] - cfg->angle_rad[i - 1]);
+            begins_s += cfg->window_s + (cfg->slew_radps > 0.0 ? turn / cfg->slew_radps + cfg->settle_s : cfg->gap_s);
+        }
+        p[i].t_mid_s = begins_s + 0.5 * cfg->window_s;
+        p[i].window_s = cfg->window_s;
+    }
+}
+
+double mc_samples_per_window(const struct nav_mc_cfg *cfg)
+{
+    return std::floor(cfg->window_s / cfg->sample_s + 0.5);
+}
+
+static bool all_finite(const struct nav_mc_cfg *c)
+{
+    double sum = c->latitude_rad + c->latitude_error_rad + c->tilt_rad + c->drift1_radps + c->gm_sigma_radps +
+                 c->gm_tau_s + c->torquer_scale + c->m1_per_s + c->beta_sys_rad + c->gamma_sys_rad +
+                 c->beta_random_rad + c->gamma_random_rad + c->angle_sys_rad + c->angle_random_rad +
+                 c->white_radps_rts + c->sample_s + c->window_s + c->gap_s + c->slew_radps + c->settle_s;
+    for (int i = 0; i < c->count; i++) sum += c->angle_rad[i];
+    return std::isfinite(sum) && (std::isnan(c->alpha1_rad) || std::fabs(c->alpha1_rad) < 1e4);
+}
+
+/* Choices and signs; what the estimator refuses is left to it. */
+int mc_refusal(const struct nav_mc_cfg *c, const struct nav_position *p)
+{
+    if (c->count < 3 || c->count > NAV_MAX_POSITIONS) return NAV_TOO_FEW;
+    if (!all_finite(c)) return NAV_NOT_FINITE;
+    const bool choices = c->tilt >= 0 && c->tilt <= NAV_TILT_CORNERS && c->cardan >= 0 &&
+                         c->cardan <= NAV_CARDAN_CORRECTED && c->angle_sys >= 0 &&
+                         c->angle_sys <= NAV_ANGLE_ACCUMULATES;
+    const bool signs = c->gm_sigma_radps >= 0.0 && c->gm_tau_s > 0.0 && c->m1_per_s > 0.0 &&
+                       c->beta_random_rad >= 0.0 && c->gamma_random_rad >= 0.0 && c->angle_random_rad >= 0.0 &&
+                       c->white_radps_rts >= 0.0 && c->torquer_scale > -0.5 && std::fabs(c->tilt_rad) <= 30.0 * NAV_DEG;
+    const bool times = c->window_s > 0.0 && c->gap_s >= 0.0 && c->slew_radps >= 0.0 && c->settle_s >= 0.0 &&
+                       c->sample_s > 0.0 && c->window_s >= c->sample_s && c->window_s / c->sample_s < 1e7;
+    if (!choices || !signs || !times) return NAV_RANGE;
+    struct nav_compass unused;
+    struct nav_gyrocompass_cfg fit = c->fit;
+    fit.latitude_rad = c->latitude_rad + c->latitude_error_rad;
+    return nav_gyrocompass(p, c->count, &fit, &unused);
+}
+
+/* Fixed sizes: Eigen has the cofactors of these. */
+static bool invert(struct mc_linear *lin)
+{
+    Eigen::Matrix4d m = Eigen::Matrix4d::Identity();
+    for (int k = 0; k < lin->unknowns; k++)
+        for (int j = 0; j < lin->unknowns; j++) m(k, j) = lin->normal[k][j];
+    bool invertible = false;
+    Eigen::Matrix4d inverse;
+    m.computeInverseWithCheck(inverse, invertible, 1e-12);
+    for (int k = 0; k < lin->unknowns; k++)
+        for (int j = 0; j < lin->unknowns; j++) lin->inverse[k][j] = inverse(k, j);
+    return invertible;
+}
+
+int mc_linear_make(const struct nav_mc_cfg *cfg, struct mc_linear *lin)
+{
+    if (cfg->count < 3 || cfg->count > NAV_MAX_POSITIONS) return NAV_TOO_FEW;
+    mc_schedule(cfg, lin->p);
+    const int refused = mc_refusal(cfg, lin->p);
+    if (refused) return refused;
+    const struct nav_earth e = nav_earth_at(cfg->latitude_rad);
+    const fit_design rows = fit_rows(lin->p, cfg->count, &cfg->fit);
+    const fit_square covariance = fit_covariance(lin->p, cfg->count, &cfg->fit.noise, cfg->latitude_rad);
+    const fit_square whitener = fit_whitener(covariance, &cfg->fit.noise, cfg->fit.method);
+    const fit_design white_rows = whitener.lazyProduct(rows);
+    const fit_gain weighted = white_rows.transpose().lazyProduct(whitener);
+    const fit_small normal = weighted.lazyProduct(rows);
+    lin->count = cfg->count;
+    lin->unknowns = (int)rows.cols();
+    lin->constrained = fit_is_constrained(cfg->fit.method);
+    lin->we_radps = e.we_radps;
+    lin->wz_radps = e.wz_radps;
+    for (int k = 0; k < lin->unknowns; k++) {
+        for (int j = 0; j < lin->unknowns; j++) lin->normal[k][j] = normal(k, j);
+        for (int i = 0; i < lin->count; i++) lin->weighted[k][i] = weighted(k, i);
+    }
+    for (int i = 0; i < lin->count; i++) {
+        lin->cos_delta[i] = det_cos(lin->p[i].delta_rad);
+        lin->sin_delta[i] = det_sin(lin->p[i].delta_rad);
+    }
+    return invert(lin) ? NAV_OK : NAV_SINGULAR;
+}
+
+/* Of M x = r with M symmetric, of 2 or 3 unknowns, by cofactors. */
+static void solve_small(const double m[3][3], const double r[3], int n, double x[3])
+{
+    if (n == 2) {
+        const double det = m[0][0] * m[1][1] - m[0][1] * m[0][1];
+        x[0] = (r[0] * m[1][1] - r[1] * m[0][1]) / det;
+        x[1] = (r[1] * m[0][0] - r[0] * m[0][1]) / det;
+        return;
+    }
+    const Eigen::Matrix3d a =
+        (Eigen::Matrix3d() << m[0][0], m[0][1], m[0][2], m[0][1], m[1][1], m[1][2], m[0][2], m[1][2], m[2][2])
+            .finished();
+    const Eigen::Vector3d solved = a.inverse() * Eigen::Vector3d(r[0], r[1], r[2]);
+    for (int i = 0; i < 3; i++) x[i] = solved(i);
+}
+
+struct mc_error mc_solve(const struct mc_linear *lin, const double r[FIT_MAX], double cos_a, double sin_a)
+{
+    double x[FIT_MAX] = {0.0};
+    for (int k = 0; k < lin->unknowns; k++)
+        for (int j = 0; j < lin->unknowns; j++) x[k] += lin->inverse[k][j] * r[j];
+    struct mc_error error = {cos_a * x[FIT_S] - sin_a * x[FIT_C], x[FIT_DRIFT],
+                             std::fabs(sin_a * x[FIT_S] + cos_a * x[FIT_C])};
+    if (!lin->constrained) return error;
+    /* On the circle s and c move together: the column of alpha is cos a times that of s less sin a times that of c. */
+    const int n = lin->unknowns - 1;
+    double m[3][3];
+    double right[3];
+    double y[3];
+    for (int k = 1; k < n; k++) {
+        right[k] = r[k + 1];
+        m[0][k] = m[k][0] = cos_a * lin->normal[FIT_S][k + 1] - sin_a * lin->normal[FIT_C][k + 1];
+        for (int j = 1; j < n; j++) m[k][j] = lin->normal[k + 1][j + 1];
+    }
+    right[0] = cos_a * r[FIT_S] - sin_a * r[FIT_C];
+    m[0][0] = cos_a * cos_a * lin->normal[FIT_S][FIT_S] - 2.0 * sin_a * cos_a * lin->normal[FIT_S][FIT_C] +
+              sin_a * sin_a * lin->normal[FIT_C][FIT_C];
+    solve_small(m, right, n, y);
+    error.alpha_rad = y[0];
+    error.drift = y[1];
+    return error;
+}

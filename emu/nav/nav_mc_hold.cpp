@@ -1,0 +1,174 @@
+#include "nav/nav_mc.hpp"
+
+/* Exact step of a Gauss-Markov drift and its integral over t: both Gaussian, correlated. */
+struct gm_step {
+    double decay, integral_of_now_s; /* (1 - e^(-mu t))/mu */
+    double sd_radps, integral_by_drift_s, integral_sd_rad;
+};
+
+struct gm {
+    double drift_radps, integral_rad;
+};
+
+static struct gm_step gm_step_of(const struct nav_mc_cfg *cfg, double t_s)
+{
+    struct gm_step s = {1.0, t_s, 0.0, 0.0, 0.0};
+    if (cfg->gm_sigma_radps == 0.0) return s;
+    const double tau = cfg->gm_tau_s;
+    const double x = t_s / tau;
+    const double variance = cfg->gm_sigma_radps * cfg->gm_sigma_radps;
+    const double rise = nav_rise(x);
+    s.decay = nav_decay(x);
+    s.integral_of_now_s = tau * rise;
+    const double new_drift = variance * nav_rise(2.0 * x);
+    const double both = variance * tau * rise * rise;
+    const double from_zero = nav_gm_integral_sd_rad(cfg->gm_sigma_radps, tau, t_s, 1);
+    s.sd_radps = std::sqrt(new_drift);
+    s.integral_by_drift_s = new_drift > 0.0 ? both / new_drift : 0.0;
+    const double left = from_zero * from_zero - both * s.integral_by_drift_s;
+    s.integral_sd_rad = std::sqrt(left > 0.0 ? left : 0.0);
+    return s;
+}
+
+static void gm_go(struct gm *g, const struct gm_step *s, struct random_stream *rnd)
+{
+    if (s->sd_radps == 0.0) return;
+    const double fresh = s->sd_radps * rnd->gauss();
+    g->integral_rad +=
+        s->integral_of_now_s * g->drift_radps + s->integral_by_drift_s * fresh + s->integral_sd_rad * rnd->gauss();
+    g->drift_radps = s->decay * g->drift_radps + fresh;
+}
+
+struct hold_plan {
+    const struct nav_mc_hold_cfg *cfg;
+    struct mc_linear lin;
+    struct gm_step window, step, wait, gap[NAV_MAX_POSITIONS]; /* gap[i]: before window i */
+    uint64_t steps;
+};
+
+/* At the start of the hold: error of heading, of the compensation against the mean drift, and the random drift now. */
+struct hold_start {
+    double heading_rad, drift_radps;
+    struct gm axis2;
+};
+
+static int plan_make(const struct nav_mc_hold_cfg *cfg, struct hold_plan *plan)
+{
+    const double sum = cfg->axis2_sd_radps + cfg->heading_rad + cfg->drift_error_radps + cfg->hours + cfg->step_s +
+                       cfg->wait_s + cfg->level_rad + cfg->latitude_error_rad + cfg->v_east_mps + cfg->speed_error;
+    if (!std::isfinite(sum)) return NAV_NOT_FINITE;
+    if (cfg->axis2 < 0 || cfg->axis2 > NAV_AXIS2_FIXED || cfg->hours <= 0.0 || cfg->step_s <= 0.0 ||
+        cfg->wait_s < 0.0 || cfg->hours * 3600.0 / cfg->step_s > 1e7)
+        return NAV_RANGE;
+    plan->cfg = cfg;
+    const int refused = mc_linear_make(&cfg->start, &plan->lin);
+    if (refused) return refused;
+    const struct nav_position *p = plan->lin.p;
+    plan->steps = (uint64_t)std::ceil(cfg->hours * 3600.0 / cfg->step_s - 1e-9);
+    plan->step = gm_step_of(&cfg->start, cfg->hours * 3600.0 / (double)plan->steps);
+    plan->wait = gm_step_of(&cfg->start, cfg->wait_s);
+    plan->window = gm_step_of(&cfg->start, cfg->start.window_s);
+    for (int i = 1; i < plan->lin.count; i++)
+        plan->gap[i] = gm_step_of(&cfg->start, p[i].t_mid_s - p[i - 1].t_mid_s - cfg->start.window_s);
+    return NAV_OK;
+}
+
+static double window_mean(const struct hold_plan *plan, struct gm *g, int i, struct random_stream *rnd)
+{
+    if (i > 0) gm_go(g, &plan->gap[i], rnd);
+    g->integral_rad = 0.0;
+    gm_go(g, &plan->window, rnd);
+    return g->integral_rad / plan->cfg->start.window_s;
+}
+
+static struct gm gm_begin(const struct nav_mc_cfg *cfg, struct random_stream *rnd)
+{
+    return {cfg->gm_from_zero ? 0.0 : cfg->gm_sigma_radps * rnd->gauss(), 0.0};
+}
+
+/* What measuring the azimuth torquer in the last window leaves: the level sensors' errors through We. */
+static double axis2_level(const struct hold_plan *plan, double alpha1_rad, double beta_rad, double gamma_rad)
+{
+    const double alpha = alpha1_rad + plan->lin.p[plan->lin.count - 1].delta_rad;
+    return plan->lin.we_radps * (det_cos(alpha) * beta_rad - det_sin(alpha) * gamma_rad);
+}
+
+/* The gyrocompassing, to first order as in nav_mc_closed(), with the random drift's means drawn one after the other. */
+static struct hold_start calibrate(const struct hold_plan *plan, struct random_stream *rnd)
+{
+    const struct nav_mc_cfg *cfg = &plan->cfg->start;
+    const struct mc_linear *lin = &plan->lin;
+    const double ns = std::sqrt(cfg->per_sample ? mc_samples_per_window(cfg) : 1.0);
+    const double alpha = mc_alpha1(cfg, rnd);
+    const double angle_sys = mc_signed(cfg, cfg->angle_sys_rad, rnd);
+    const double gamma_sys = mc_signed(cfg, cfg->gamma_sys_rad, rnd);
+    const double beta_sys = mc_signed(cfg, cfg->beta_sys_rad, rnd);
+    const bool own = plan->cfg->axis2 == NAV_AXIS2_MEASURED;
+    struct gm axis1 = gm_begin(cfg, rnd);
+    struct gm axis2 = gm_begin(cfg, rnd);
+    double r[FIT_MAX] = {0.0};
+    double measured2 = 0.0;
+    for (int i = 0; i < lin->count; i++) {
+        const double drift = window_mean(plan, &axis1, i, rnd);
+        if (own) measured2 = window_mean(plan, &axis2, i, rnd);
+        const double angle = angle_sys * mc_angle_share(cfg, i) + cfg->angle_random_rad / ns * rnd->gauss();
+        const double level = lin->wz_radps * (gamma_sys + cfg->gamma_random_rad / ns * rnd->gauss());
+        const double white = cfg->white_radps_rts / std::sqrt(cfg->window_s) * rnd->gauss();
+        const double error = (drift + level + white) / lin->we_radps + det_cos(alpha + lin->p[i].delta_rad) * angle;
+        for (int k = 0; k < lin->unknowns; k++) r[k] += lin->weighted[k][i] * error;
+    }
+    const struct mc_error found = mc_solve(lin, r, det_cos(alpha), det_sin(alpha));
+    struct hold_start start = {found.alpha_rad, found.drift * lin->we_radps - cfg->torquer_scale * cfg->drift1_radps,
+                               axis1};
+    if (own) start = {found.alpha_rad, measured2 + axis2_level(plan, alpha, beta_sys, gamma_sys), axis2};
+    if (plan->cfg->axis2 == NAV_AXIS2_DIFFERS) start.drift_radps -= plan->cfg->axis2_sd_radps * rnd->gauss();
+    return start;
+}
+
+static struct hold_start begin(const struct hold_plan *plan, struct random_stream *rnd)
+{
+    if (plan->cfg->axis2 != NAV_AXIS2_FIXED) return calibrate(plan, rnd);
+    /* The sum of the article: an error that grows away from zero. */
+    return {plan->cfg->heading_rad, -plan->cfg->drift_error_radps, gm_begin(&plan->cfg->start, rnd)};
+}
+
+/* Rates that the flight adds: platform not level, latitude and ground speed of the compensation wrong. */
+static double flight_rate(const struct hold_plan *plan, struct random_stream *rnd)
+{
+    const struct nav_mc_hold_cfg *cfg = plan->cfg;
+    const double direction = 2.0 * NAV_PI * rnd->uniform();
+    const double tilted = plan->lin.we_radps * cfg->level_rad * det_cos(direction);
+    const double latitude = mc_signed(&cfg->start, plan->lin.we_radps * cfg->latitude_error_rad, rnd);
+    const double speed =
+        mc_signed(&cfg->start, nav_transport_radps(cfg->v_east_mps, cfg->start.latitude_rad) * cfg->speed_error, rnd);
+    return tilted + latitude + speed;
+}
+
+/* (alpha estimated) less alpha grows by the drift that was not compensated. */
+static void run(const struct hold_plan *plan, struct random_stream rnd, const struct nav_mc_hold_out *out, uint64_t k)
+{
+    struct hold_start start = begin(plan, &rnd);
+    const double rate = flight_rate(plan, &rnd) - start.drift_radps;
+    const double step_s = plan->cfg->hours * 3600.0 / (double)plan->steps;
+    gm_go(&start.axis2, &plan->wait, &rnd);
+    start.axis2.integral_rad = 0.0;
+    double error = start.heading_rad;
+    double most = std::fabs(error);
+    for (uint64_t n = 1; n <= plan->steps; n++) {
+        gm_go(&start.axis2, &plan->step, &rnd);
+        error = start.heading_rad + rate * step_s * (double)n + start.axis2.integral_rad;
+        if (std::fabs(error) > most) most = std::fabs(error);
+    }
+    mc_put(out->end_rad, k, error);
+    mc_put(out->max_rad, k, most);
+}
+
+int nav_mc_hold(const struct nav_mc_hold_cfg *cfg, uint64_t seed, uint64_t first_run, uint64_t runs,
+                const struct nav_mc_hold_out *out)
+{
+    struct hold_plan plan = {};
+    const int refused = plan_make(cfg, &plan);
+    if (refused) return refused;
+    for (uint64_t k = 0; k < runs; k++) run(&plan, random_run(seed, first_run + k), out, k);
+    return NAV_OK;
+}

@@ -1,0 +1,167 @@
+#include "nav/nav_mc.hpp"
+
+/* What does not change from run to run. */
+struct samples_plan {
+    const struct nav_mc_cfg *cfg;
+    struct nav_position p[NAV_MAX_POSITIONS];
+    uint64_t per_window;
+    double decay, step_sd_radps; /* of the drift over a sample */
+    double white_sd_radps;       /* of S in a sample */
+};
+
+/* One virtual instrument: what it drew for good. */
+struct instrument {
+    struct random_stream rnd;
+    double alpha1_rad, psi_rad, pitch_rad, roll_rad;
+    double angle_sys_rad, latitude_error_rad, beta_sys_rad, gamma_sys_rad;
+    double drift_radps;      /* random part, now */
+    double clock_s;          /* when it was so */
+    double first_actual_rad; /* alpha of the platform in position 1, and as the angle's zero has it */
+    double first_nominal_rad;
+};
+
+static int plan_make(const struct nav_mc_cfg *cfg, struct samples_plan *plan)
+{
+    plan->cfg = cfg;
+    if (cfg->count < 3 || cfg->count > NAV_MAX_POSITIONS) return NAV_TOO_FEW;
+    mc_schedule(cfg, plan->p);
+    const int refused = mc_refusal(cfg, plan->p);
+    if (refused) return refused;
+    plan->per_window = (uint64_t)mc_samples_per_window(cfg);
+    plan->decay = nav_decay(cfg->sample_s / cfg->gm_tau_s);
+    plan->step_sd_radps = cfg->gm_sigma_radps * std::sqrt(1.0 - plan->decay * plan->decay);
+    plan->white_sd_radps = cfg->white_radps_rts / std::sqrt(cfg->sample_s);
+    return NAV_OK;
+}
+
+static struct instrument instrument_draw(const struct nav_mc_cfg *cfg, struct random_stream rnd)
+{
+    struct instrument u = {};
+    u.rnd = rnd;
+    u.alpha1_rad = mc_alpha1(cfg, &u.rnd);
+    u.angle_sys_rad = mc_signed(cfg, cfg->angle_sys_rad, &u.rnd);
+    u.gamma_sys_rad = mc_signed(cfg, cfg->gamma_sys_rad, &u.rnd);
+    u.beta_sys_rad = mc_signed(cfg, cfg->beta_sys_rad, &u.rnd);
+    u.latitude_error_rad = mc_signed(cfg, cfg->latitude_error_rad, &u.rnd);
+    u.pitch_rad = mc_tilt(cfg, &u.rnd);
+    u.roll_rad = mc_tilt(cfg, &u.rnd);
+    if (cfg->cardan == NAV_CARDAN_ALPHA) u.psi_rad = NAV_PI * (2.0 * u.rnd.uniform() - 1.0);
+    else u.psi_rad = nav_heading(u.alpha1_rad, cfg->angle_rad[0], 0.0, u.pitch_rad, u.roll_rad);
+    if (!cfg->gm_from_zero) u.drift_radps = cfg->gm_sigma_radps * u.rnd.gauss();
+    return u;
+}
+
+static double alpha_at(const struct nav_mc_cfg *cfg, const struct instrument *u, int i, double error_rad)
+{
+    if (cfg->cardan == NAV_CARDAN_ALPHA) return u->alpha1_rad + cfg->angle_rad[i] - cfg->angle_rad[0] + error_rad;
+    return nav_alpha(u->psi_rad, cfg->angle_rad[i] + error_rad, 0.0, u->pitch_rad, u->roll_rad);
+}
+
+/* Mean of a Gaussian error drawn each sample. */
+static double mean_of_samples(struct random_stream *rnd, double sd, uint64_t count)
+{
+    double sum = 0.0;
+    if (sd > 0.0)
+        for (uint64_t k = 0; k < count; k++) sum += rnd->gauss();
+    return sd * sum / (double)count;
+}
+
+/* Mean of the random drift over a window, sample by sample; the gap before it is one exact step. */
+static double drift_mean(const struct samples_plan *plan, struct instrument *u, double begins_s)
+{
+    const struct nav_mc_cfg *cfg = plan->cfg;
+    if (cfg->gm_sigma_radps == 0.0) return 0.0;
+    const double over_gap = nav_decay((begins_s - u->clock_s) / cfg->gm_tau_s);
+    double w = over_gap * u->drift_radps;
+    if (begins_s > u->clock_s) w += cfg->gm_sigma_radps * std::sqrt(1.0 - over_gap * over_gap) * u->rnd.gauss();
+    struct random_stream rnd = u->rnd; /* a copy that the compiler may keep in registers */
+    double sum = 0.0;
+    for (uint64_t k = 0; k < plan->per_window; k++) {
+        sum += w;
+        w = plan->decay * w + plan->step_sd_radps * rnd.gauss();
+    }
+    u->rnd = rnd;
+    u->drift_radps = w;
+    u->clock_s = begins_s + cfg->window_s;
+    return sum / (double)plan->per_window;
+}
+
+/* A window in position i: settled algebra with the means of all errors, which enter S to first order. */
+static struct nav_position measure(const struct samples_plan *plan, struct instrument *u, int i)
+{
+    const struct nav_mc_cfg *cfg = plan->cfg;
+    const uint64_t draws = cfg->per_sample ? plan->per_window : 1;
+    const double angle =
+        u->angle_sys_rad * mc_angle_share(cfg, i) + mean_of_samples(&u->rnd, cfg->angle_random_rad, draws);
+    const double alpha = alpha_at(cfg, u, i, angle);
+    struct nav_position p = plan->p[i];
+    struct nav_rest at = {};
+    at.latitude_rad = cfg->latitude_rad;
+    at.latitude_error_rad = u->latitude_error_rad;
+    at.alpha_rad = alpha;
+    at.m1_per_s = cfg->m1_per_s;
+    at.torquer_scale1 = cfg->torquer_scale;
+    at.beta_error_rad = u->beta_sys_rad + mean_of_samples(&u->rnd, cfg->beta_random_rad, draws);
+    at.gamma_error_rad = u->gamma_sys_rad + mean_of_samples(&u->rnd, cfg->gamma_random_rad, draws);
+    at.gamma_rad = nav_gamma(alpha, 0.0, u->psi_rad, u->pitch_rad, u->roll_rad);
+    at.drift1_radps = cfg->drift1_radps + drift_mean(plan, u, p.t_mid_s - 0.5 * p.window_s);
+    double beta = 0.0;
+    p.s_radps = nav_rest_s_radps(&at, &beta) + mean_of_samples(&u->rnd, plan->white_sd_radps, plan->per_window);
+    p.beta_rad = beta + at.beta_error_rad;
+    p.gamma_rad = at.gamma_rad + at.gamma_error_rad;
+    if (i == 0) {
+        u->first_actual_rad = alpha;
+        u->first_nominal_rad = alpha_at(cfg, u, 0, 0.0);
+    }
+    return p;
+}
+
+/* Gimbal steps to increments of alpha, with the attitude that the level sensors tell. */
+static int correct_gimbal(const struct nav_mc_cfg *cfg, struct nav_position *p)
+{
+    double beta[NAV_MAX_POSITIONS];
+    double gamma[NAV_MAX_POSITIONS];
+    double delta[NAV_MAX_POSITIONS];
+    for (int i = 0; i < cfg->count; i++) {
+        beta[i] = p[i].beta_rad;
+        gamma[i] = p[i].gamma_rad;
+    }
+    struct nav_attitude attitude;
+    int refused = nav_attitude_from_level(cfg->angle_rad, beta, gamma, cfg->count, 1, &attitude);
+    if (refused) return refused;
+    refused = nav_cardan(cfg->angle_rad, beta, cfg->count, attitude.pitch_rad, attitude.roll_rad, delta);
+    for (int i = 0; i < cfg->count && !refused; i++) p[i].delta_rad = delta[i];
+    return refused;
+}
+
+static int run(const struct samples_plan *plan, struct random_stream rnd, const struct nav_mc_out *out, uint64_t k)
+{
+    const struct nav_mc_cfg *cfg = plan->cfg;
+    struct instrument u = instrument_draw(cfg, rnd);
+    struct nav_position p[NAV_MAX_POSITIONS];
+    for (int i = 0; i < cfg->count; i++) p[i] = measure(plan, &u, i);
+    if (cfg->cardan == NAV_CARDAN_CORRECTED) {
+        const int refused = correct_gimbal(cfg, p);
+        if (refused) return refused;
+    }
+    struct nav_gyrocompass_cfg fit = cfg->fit;
+    fit.latitude_rad = cfg->latitude_rad + u.latitude_error_rad;
+    struct nav_compass found;
+    const int refused = nav_gyrocompass(p, cfg->count, &fit, &found);
+    if (refused) return refused;
+    mc_put(out->platform_rad, k, nav_wrap(found.alpha1_rad - u.first_actual_rad));
+    mc_put(out->heading_rad, k, nav_wrap(found.alpha1_rad - u.first_nominal_rad));
+    mc_put(out->drift_radps, k, found.drift1_radps - cfg->drift1_radps);
+    mc_put(out->alpha1_rad, k, nav_wrap(u.first_actual_rad));
+    mc_put(out->quality, k, found.quality);
+    return NAV_OK;
+}
+
+int nav_mc_samples(const struct nav_mc_cfg *cfg, uint64_t seed, uint64_t first_run, uint64_t runs,
+                   const struct nav_mc_out *out)
+{
+    struct samples_plan plan;
+    int refused = plan_make(cfg, &plan);
+    for (uint64_t k = 0; k < runs && !refused; k++) refused = run(&plan, random_run(seed, first_run + k), out, k);
+    return refused;
+}

@@ -1,0 +1,147 @@
+#include "nav/nav_model.hpp"
+
+struct nav_row nav_row_of(const struct nav_position *p, bool simplified)
+{
+    const double cd = det_cos(p->delta_rad);
+    const double sd = det_sin(p->delta_rad);
+    const double cg = det_cos(p->gamma_rad);
+    if (simplified) return {cd * cg, sd * cg};
+    const double sgsb = det_sin(p->gamma_rad) * det_sin(p->beta_rad);
+    return {cd * cg - sd * sgsb, sd * cg + cd * sgsb};
+}
+
+/* x_p = cos q x_c + sin q y_c, with x_c and y_c in local level at psi = 0 (sources 7.2); its level part points to alpha, but for
+ * the share that beta turns sideways: x_p = Rz(alpha) (cos g, sin b sin g, -sin g cos b). */
+double nav_alpha(double psi_rad, double q_rad, double beta_rad, double pitch_rad, double roll_rad)
+{
+    const double cq = det_cos(q_rad);
+    const double sq = det_sin(q_rad);
+    const double cp = det_cos(pitch_rad);
+    const double sr = det_sin(roll_rad);
+    const double east = cq * det_cos(roll_rad);
+    const double north = cq * det_sin(pitch_rad) * sr + sq * cp;
+    const double up = sq * det_sin(pitch_rad) - cq * cp * sr;
+    const double cb = det_cos(beta_rad);
+    const double sg = -up / cb;
+    const double sideways = det_atan2(det_sin(beta_rad) * sg, std::sqrt(1.0 - sg * sg));
+    return nav_wrap(det_atan2(north, east) - sideways - psi_rad);
+}
+
+double nav_gamma(double alpha_rad, double beta_rad, double psi_rad, double pitch_rad, double roll_rad)
+{
+    const double st = det_sin(pitch_rad);
+    const double sr = det_sin(roll_rad);
+    const double cr = det_cos(roll_rad);
+    const double sy = det_sin(psi_rad);
+    const double cy = det_cos(psi_rad);
+    const double z_east = -sy * st * cr + cy * sr;
+    const double z_north = -cy * st * cr - sy * sr;
+    const double z_up = det_cos(pitch_rad) * cr;
+    const double sa = det_sin(alpha_rad);
+    const double ca = det_cos(alpha_rad);
+    const double x1_zc = z_east * ca + z_north * sa;
+    const double z2_zc = det_cos(beta_rad) * z_up - det_sin(beta_rad) * (-z_east * sa + z_north * ca);
+    return det_atan2(x1_zc, z2_zc);
+}
+
+double nav_heading(double alpha_rad, double q_rad, double beta_rad, double pitch_rad, double roll_rad)
+{
+    const double psi = nav_wrap(nav_alpha(0.0, q_rad, beta_rad, pitch_rad, roll_rad) - alpha_rad);
+    return psi < 0.0 ? psi + 2.0 * NAV_PI : psi;
+}
+
+double nav_cardan_2nd(double cos_q, double sin_q, double pitch_rad, double roll_rad)
+{
+    return cos_q * cos_q * pitch_rad * roll_rad + 0.5 * sin_q * cos_q * (roll_rad * roll_rad - pitch_rad * pitch_rad);
+}
+
+/* (7) at rest, solved for S = -m1 beta_n; beta is some tens of arc seconds, so four turns are many. */
+double nav_rest_s_radps(const struct nav_rest *at, double *beta_rad)
+{
+    const struct nav_earth e = nav_earth_at(at->latitude_rad);
+    const double wz_n = nav_earth_at(at->latitude_rad + at->latitude_error_rad).wz_radps;
+    const double sa = det_sin(at->alpha_rad);
+    const double ca = det_cos(at->alpha_rad);
+    const double sg = det_sin(at->gamma_rad);
+    const double cg = det_cos(at->gamma_rad);
+    const double sg_n = det_sin(at->gamma_rad + at->gamma_error_rad);
+    double s = 0.0;
+    double beta = 0.0;
+    for (int turn = 0; turn < 6; turn++) {
+        beta = -s / at->m1_per_s - at->beta_error_rad;
+        const double w_x =
+            e.we_radps * (sa * cg + ca * sg * det_sin(beta)) - e.wz_radps * det_cos(beta) * sg + at->drift1_radps;
+        s = w_x / (1.0 + at->torquer_scale1) + wz_n * det_cos(beta + at->beta_error_rad) * sg_n;
+    }
+    if (beta_rad) *beta_rad = beta;
+    return s;
+}
+
+double nav_azimuth_drift(double s_az_radps, double latitude_rad, double alpha_rad, double beta_rad, double gamma_rad)
+{
+    const struct nav_earth e = nav_earth_at(latitude_rad);
+    const double sg = det_sin(gamma_rad);
+    const double cg = det_cos(gamma_rad);
+    return s_az_radps - e.wz_radps * det_cos(beta_rad) * cg -
+           e.we_radps * (det_sin(alpha_rad) * sg - det_cos(alpha_rad) * cg * det_sin(beta_rad));
+}
+
+double nav_azimuth_drift_sd(double latitude_rad, double alpha_rad, double beta_sd_rad, double gamma_sd_rad)
+{
+    const double by_gamma = det_sin(alpha_rad) * gamma_sd_rad;
+    const double by_beta = det_cos(alpha_rad) * beta_sd_rad;
+    return std::fabs(nav_earth_at(latitude_rad).we_radps) * std::sqrt(by_gamma * by_gamma + by_beta * by_beta);
+}
+
+double nav_transport_radps(double v_east_mps, double latitude_rad)
+{
+    return v_east_mps * det_sin(latitude_rad) / det_cos(latitude_rad) / 6371000.0;
+}
+
+/* Mean over a window of e^(-mu t), with t from its middle: sinh(x)/x. */
+static double sinhc(double x)
+{
+    if (x > 0.25) return x > 700.0 ? HUGE_VAL : (det_exp(x) - det_exp(-x)) / (2.0 * x);
+    double sum = 1.0;
+    for (int n = 14; n >= 2; n -= 2) sum = 1.0 + sum * x * x / (n * (n + 1));
+    return sum;
+}
+
+double nav_gm_window_cov(double gm_sigma_radps, double gm_tau_s, double window_a_s, double window_b_s,
+                         double between_middles_s)
+{
+    const double variance = gm_sigma_radps * gm_sigma_radps;
+    const double x_a = 0.5 * window_a_s / gm_tau_s;
+    if (between_middles_s == 0.0) return x_a == 0.0 ? variance : variance * nav_ramp_up(2.0 * x_a) / (2.0 * x_a * x_a);
+    /* e^-gap sinhc sinhc: with the halves of the windows taken out of the exponent, so that nothing overflows. */
+    const double x_b = 0.5 * window_b_s / gm_tau_s;
+    const double gap = std::fabs(between_middles_s) / gm_tau_s;
+    if (x_a + x_b < 1.0) return variance * nav_decay(gap) * sinhc(x_a) * sinhc(x_b);
+    const double a = x_a < 1e-9 ? 1.0 : nav_rise(2.0 * x_a) / (2.0 * x_a);
+    const double b = x_b < 1e-9 ? 1.0 : nav_rise(2.0 * x_b) / (2.0 * x_b);
+    return variance * nav_decay(gap > x_a + x_b ? gap - x_a - x_b : 0.0) * a * b;
+}
+
+double nav_gm_from_zero_less(const struct nav_noise *n, double t_a_s, double window_a_s, double t_b_s,
+                             double window_b_s)
+{
+    const double x = (t_a_s + t_b_s) / n->gm_tau_s;
+    return n->gm_sigma_radps * n->gm_sigma_radps * nav_decay(x) * sinhc(0.5 * window_a_s / n->gm_tau_s) *
+           sinhc(0.5 * window_b_s / n->gm_tau_s);
+}
+
+double nav_gm_integral_sd_rad(double gm_sigma_radps, double gm_tau_s, double t_s, int from_zero)
+{
+    const double x = t_s / gm_tau_s;
+    const double rise = nav_rise(x);
+    const double square = 2.0 * nav_ramp_up(x) - (from_zero ? rise * rise : 0.0);
+    return gm_sigma_radps * gm_tau_s * std::sqrt(square > 0.0 ? square : 0.0);
+}
+
+double nav_hold_sd_rad(const struct nav_hold *h, double t_s)
+{
+    const double drift = h->drift_sd_radps * t_s;
+    const double gm =
+        h->gm_sigma_radps > 0.0 ? nav_gm_integral_sd_rad(h->gm_sigma_radps, h->gm_tau_s, t_s, h->gm_from_zero) : 0.0;
+    return std::sqrt(h->heading_sd_rad * h->heading_sd_rad + drift * drift + gm * gm);
+}
