@@ -25,6 +25,18 @@ static void add_unit(struct sha256 *s, const struct bench *b, unsigned i)
     board_digest_u64(s, (uint64_t)n->tx_overflow << 32 | n->queued);
 }
 
+static void add_platform(struct sha256 *s, struct platform *p, int64_t t_ns)
+{
+    struct platform_state at;
+    platform_at(p, t_ns, &at); /* truth changes nothing */
+    const double real[] = {at.alpha_rad,       at.beta_rad,        at.gamma_rad,       at.q_rad,
+                           at.drift_radps[0],  at.drift_radps[1],  at.torque_radps[0], at.torque_radps[1],
+                           p->setting.set_rad, p->setting.read_rad};
+    for (unsigned i = 0; i < sizeof real / sizeof *real; i++) board_digest_real(s, real[i]);
+    board_digest_noise(s, &p->draws);
+    board_digest_u64(s, (uint64_t)p->vehicle.commands << 1 | p->stuck);
+}
+
 void digest_bench(const struct bench *b, const struct journal *j, char hex[SHA256_HEX])
 {
     struct sha256 s;
@@ -32,5 +44,6 @@ void digest_bench(const struct bench *b, const struct journal *j, char hex[SHA25
     board_digest_u64(&s, (uint64_t)b->sched.now_ns);
     for (unsigned i = 0; i < b->buses; i++) add_bus(&s, &b->bus[i], j->tap[i].traffic);
     for (unsigned i = 0; i < b->scenario.unit_count; i++) add_unit(&s, b, i);
+    if (b->lab.platform.cfg.present) add_platform(&s, (struct platform *)&b->lab.platform, b->sched.now_ns);
     sha256_hex(&s, hex);
 }

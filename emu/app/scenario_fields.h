@@ -13,6 +13,9 @@ extern const struct yaml_fields scenario_table_fields;         /* of struct tabl
 extern const struct yaml_fields scenario_axis_of_table_fields; /* of struct table_axis_cfg */
 extern const struct yaml_fields scenario_chamber_fields;       /* of struct chamber_cfg */
 extern const struct yaml_fields scenario_supply_fields;        /* of struct supply_cfg */
+extern const struct yaml_fields scenario_platform_fields;      /* of struct platform_cfg */
+extern const struct yaml_fields scenario_vehicle_fields;       /* of struct vehicle_cfg */
+extern const struct yaml_fields scenario_sway_fields;          /* of struct vehicle_sway */
 extern const struct yaml_fields scenario_spread_fields;        /* of struct scenario_spread */
 extern const struct yaml_fields scenario_afe_fields;           /* of struct afe_cfg */
 extern const struct yaml_fields scenario_afe_numbers;          /* its numbers alone */
@@ -34,12 +37,19 @@ bool scenario_load_site(struct yaml_file *f, const struct yaml_node *node, void 
 void scenario_dump_site(const struct yaml_field *d, const void *section, cJSON *to);
 bool scenario_load_table(struct yaml_file *f, const struct yaml_node *node, void *section);
 void scenario_dump_table(const struct yaml_field *d, const void *section, cJSON *to);
+bool scenario_load_vehicle(struct yaml_file *f, const struct yaml_node *node, void *section);
+void scenario_dump_vehicle(const struct yaml_field *d, const void *section, cJSON *to);
 
 struct site scenario_site(const struct scenario_site *s);
 
 /* What stands in more than one key. */
 bool scenario_check_lab(struct yaml_file *f, const struct yaml_node *root, const struct lab_cfg *lab);
 bool scenario_check_seats(struct yaml_file *f, const struct yaml_node *root, const struct scenario *s);
+
+bool scenario_check_platform(struct yaml_file *f, const struct yaml_node *root, const struct scenario *s);
+
+/* The node of its level unit, by the name that it gives. */
+void scenario_bind_level(const struct scenario *s, struct scenario_unit *u);
 
 /* An element of `units`, which may be several units. */
 bool scenario_load_units(struct yaml_file *f, const struct yaml_node *node, struct scenario *s);

@@ -129,7 +129,8 @@ static const struct yaml_field axes_rows[] = {
 };
 static const struct yaml_fields axes_fields = YAML_FIELDS(axes_rows);
 
-static const char *const mounts[] = {[LAB_HEAD] = "head", [LAB_TABLE] = "table", [LAB_FIXED] = "fixed", NULL};
+static const char *const mounts[] = {[LAB_HEAD] = "head", [LAB_TABLE] = "table", [LAB_FIXED] = "fixed",
+                                     [LAB_PLATFORM] = "platform", NULL};
 
 static const char *const chains[] = {
     [ADS1282_CHAIN_EXACT] = "exact", [ADS1282_CHAIN_MODULATOR] = "modulator", [ADS1282_CHAIN_DIRECT] = "direct", NULL};
@@ -146,6 +147,7 @@ static const struct yaml_field unit_rows[] = {
     {.key = "frame_form", .type = YAML_U8, .offset = UNIT(frame_form), .max = 3, .what = "0 pair, 1 fast, 2 FD frame, 3 FD block; written to object 2020h at the start"},
     {.key = "spread", .type = YAML_BOOL, .offset = UNIT(spread), .what = "its parameters are drawn from the scenario's `spread`"},
     {.key = "axes",   .type = YAML_SECTION, .sub = &axes_fields, .what = "the channels `x`, `y`, `z`"},
+    {.key = "level",  .type = YAML_TEXT, .offset = UNIT(level), .max = 32, .what = "of a gyro unit: name of the PSA-2 on the platform that reads its level sensors"},
     {.key = "on",     .type = YAML_CHOICE, .offset = UNIT(cfg.seat.on), .choices = mounts, .what = "where it is mounted"},
     {.key = "lever_arm_m", .type = YAML_REALS, .offset = UNIT(cfg.seat.lever_m), .count = 3, .min = -10, .max = 10, .what = "from the instrument's centre to the unit, mount's x, y, z"},
     {.key = "misalignment_arcsec", .type = YAML_REALS, .offset = UNIT(misalignment_arcsec), .count = 3, .min = -36000, .max = 36000, .what = "of its case in the mount, about x, y, z"},
@@ -178,19 +180,24 @@ static bool plain(const char *name)
 /* Keys of settings that not every board has. */
 static const struct {
     const char *key;
-    uint32_t knob; /* 0: frame_form */
+    enum { OF_FORMS, OF_INPUTS, OF_KNOB } of;
+    uint32_t knob;
 } some_have[] = {
-    {"frame_form", 0},
-    {"adc_chain", BOARD_KNOB_CHAIN},
-    {"temp_noise_scale", BOARD_KNOB_TEMP_NOISE},
-    {"temp_adc_offset_v", BOARD_KNOB_TEMP_ADC},
-    {"temp_adc_gain_error", BOARD_KNOB_TEMP_ADC},
+    {"frame_form", OF_FORMS, 0},
+    {"axes", OF_INPUTS, 0},
+    {"adc_noise_scale", OF_INPUTS, 0},
+    {"level", OF_KNOB, BOARD_KNOB_LEVEL},
+    {"adc_chain", OF_KNOB, BOARD_KNOB_CHAIN},
+    {"temp_noise_scale", OF_KNOB, BOARD_KNOB_TEMP_NOISE},
+    {"temp_adc_offset_v", OF_KNOB, BOARD_KNOB_TEMP_ADC},
+    {"temp_adc_gain_error", OF_KNOB, BOARD_KNOB_TEMP_ADC},
 };
 enum { SOME_HAVE = sizeof some_have / sizeof *some_have };
 
 static bool has_key(const struct board_type *t, unsigned i)
 {
-    return some_have[i].knob ? t->knobs & some_have[i].knob : t->frame_forms > 0;
+    if (some_have[i].of == OF_INPUTS) return t->afe;
+    return some_have[i].of == OF_KNOB ? t->knobs & some_have[i].knob : t->frame_forms > 0;
 }
 
 static bool check_keys(struct yaml_file *f, const struct yaml_node *node, const struct scenario_unit *u)
@@ -212,6 +219,7 @@ void scenario_dump_unit(const struct scenario_unit *u, cJSON *to)
     yaml_dump(&scenario_unit_fields, u, to);
     for (unsigned i = 0; i < SOME_HAVE; i++)
         if (!has_key(u->cfg.type, i)) cJSON_DeleteItemFromObject(to, some_have[i].key);
+    if (!u->level[0]) cJSON_DeleteItemFromObject(to, "level");
 }
 
 /* A quartz sensor's amperes must not be taken for volts. */
@@ -365,9 +373,13 @@ bool scenario_check_seats(struct yaml_file *f, const struct yaml_node *root, con
 {
     for (unsigned i = 0; i < s->unit_count; i++) {
         const struct scenario_unit *u = &s->units[i];
-        if (u->cfg.seat.on != LAB_TABLE || s->lab.table.axes) continue;
-        return yaml_file_fail(f, yaml_get(root, "units"), "units",
-                              "%s stands on the table, and there is none: a section table is wanted", u->name);
+        const bool there = u->cfg.seat.on == LAB_TABLE      ? s->lab.table.axes > 0
+                           : u->cfg.seat.on == LAB_PLATFORM ? s->lab.platform.present
+                                                            : true;
+        const char *on = lab_mount_name(u->cfg.seat.on);
+        if (!there)
+            return yaml_file_fail(f, yaml_get(root, "units"), "units",
+                                  "%s stands on the %s, and there is none: a section %s is wanted", u->name, on, on);
     }
     return true;
 }

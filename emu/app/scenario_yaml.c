@@ -268,6 +268,8 @@ static const struct yaml_field scenario_rows[] = {
     {.key = "table", .type = YAML_CUSTOM, .load = scenario_load_table, .dump = scenario_dump_table, .what = "the rate table; without it there is none"},
     {.key = "chamber", .type = YAML_SECTION, .offset = SCENARIO(lab.chamber), .sub = &scenario_chamber_fields, .present = SCENARIO(lab.chamber.present), .what = "the thermal chamber; without it there is none"},
     {.key = "supply", .type = YAML_SECTION, .offset = SCENARIO(lab.supply), .sub = &scenario_supply_fields, .present = SCENARIO(lab.supply.present), .what = "the power supply; without it the boards are always fed"},
+    {.key = "platform", .type = YAML_SECTION, .offset = SCENARIO(lab.platform), .sub = &scenario_platform_fields, .present = SCENARIO(lab.platform.present), .what = "the gyro-stabilised platform; without it there is none"},
+    {.key = "vehicle", .type = YAML_CUSTOM, .load = scenario_load_vehicle, .dump = scenario_dump_vehicle, .what = "what the platform stands on"},
     {.key = "spread", .type = YAML_CUSTOM, .load = load_spread, .dump = dump_spread, .what = "production spread: standard deviations of what differs from unit to unit"},
     {.key = "units", .type = YAML_CUSTOM, .load = load_units, .dump = dump_units, .what = "a sequence of up to 64 units"},
     {.key = "timeline", .type = YAML_CUSTOM, .load = load_timeline, .dump = dump_timeline, .what = "a sequence of commands that the bench gives itself, each at its time"},
@@ -294,6 +296,7 @@ static bool load(struct yaml_file *f, struct scenario *s)
     if (buses && !load_buses(f, buses, s)) return false;
     if (!yaml_load(f, f->root, "", &scenario_fields, s)) return false;
     if (!scenario_check_lab(f, f->root, &s->lab) || !scenario_check_seats(f, f->root, s)) return false;
+    if (!scenario_check_platform(f, f->root, s)) return false;
     return s->unit_count > 0 || yaml_file_fail(f, NULL, "units", "at least one unit is wanted");
 }
 

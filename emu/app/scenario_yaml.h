@@ -46,6 +46,7 @@ struct scenario_unit {
     struct unit_cfg cfg; /* name and profile point into this struct once it is in its place: scenario_bind() */
     double misalignment_arcsec[3]; /* to cfg.seat by scenario_bind() */
     char bus_name[16];
+    char level[32];     /* of a gyro unit: the unit that reads its level sensors; "": none */
     unsigned bus;       /* index into the buses */
     uint8_t frame_form; /* written to object 2020h at the start; 0 pair, 1 fast, 2 FD frame, 3 FD block */
     bool spread;        /* parameters of its own, drawn from the production spread */

@@ -28,9 +28,10 @@ enum board_wrong {
 
 /* Parts of board_cfg that not every board has: bits of board_type.knobs. */
 enum board_knob {
-    BOARD_KNOB_CHAIN = 1,     /* adc_chain */
-    BOARD_KNOB_TEMP_ADC = 2,  /* temp_adc_offset_v, temp_adc_gain_error */
-    BOARD_KNOB_TEMP_NOISE = 4 /* temp_noise_scale */
+    BOARD_KNOB_CHAIN = 1,      /* adc_chain */
+    BOARD_KNOB_TEMP_ADC = 2,   /* temp_adc_offset_v, temp_adc_gain_error */
+    BOARD_KNOB_TEMP_NOISE = 4, /* temp_noise_scale */
+    BOARD_KNOB_LEVEL = 8       /* level_node */
 };
 
 typedef void board_truth_fn(void *ctx, const char *name, double value);
@@ -70,6 +71,8 @@ struct board_type {
     uint32_t wrongs; /* enum board_wrong */
     const struct board_can *can;
     const struct board_bus *bus; /* NULL: no parallel bus */
+    /* Of a gyro unit, enum gyro_mode: NULL, or why it is refused. NULL itself: a board without modes. */
+    const char *(*set_mode)(void *board, unsigned mode, int64_t t_ns);
     /* life */
     void (*init)(void *board, const void *profile, const struct board_cfg *cfg, const struct board_io *io,
                  struct sched *s);
@@ -83,7 +86,7 @@ struct board_type {
     void (*listen)(void *board, bool on);        /* somebody wants board_io.event, or nobody does */
     struct trace *(*trace)(void *board);
     struct line_faults *(*line)(void *board);
-    struct afe *(*afe)(void *board, unsigned axis);      /* for faults: sample_until() first */
+    struct afe *(*afe)(void *board, unsigned axis);      /* for faults: sample_until() first; NULL: no analog inputs */
     void (*digest)(const void *board, struct sha256 *s); /* of all that its future depends on */
     void (*truth)(const void *board, board_truth_fn *put,
                   void *ctx); /* hidden parameters of the specimen; may be NULL */

@@ -18,6 +18,12 @@ struct board_io {
     double (*temp_degc)(void *ctx, unsigned channel, int64_t t_ns); /* at X, Y, Z sensor and the board itself (3) */
     void (*rate_radps)(void *ctx, int64_t t_ns, double w_ib_b[3]);  /* inertial rate, axes of the unit's case */
     void (*event)(void *ctx, unsigned event, int64_t t_ns);         /* number in board_type.events; may be NULL */
+    /* Of the gyro-stabilised platform, phys/platform.h: rates for its torquers, a new setting, its angle sensor as the servo and
+     * as the encoder has it. NULL: there is none. */
+    void (*torque)(void *ctx, double u1_radps, double u2_radps, int64_t t_ns);
+    void (*reposition)(void *ctx, int64_t t_ns);
+    double (*servo_rad)(void *ctx, int64_t t_ns);
+    double (*encoder_rad)(void *ctx, int64_t t_ns);
 };
 
 /* One specimen: what differs between two boards of a profile. */
@@ -28,6 +34,7 @@ struct board_cfg {
     double temp_adc_offset_v, temp_adc_gain_error; /* PSA-2 */
     uint64_t seed;
     uint32_t serial;
+    uint8_t level_node; /* gyro unit: node of the unit that reads its level sensors; 0: none */
 };
 
 #endif

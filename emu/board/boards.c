@@ -1,5 +1,6 @@
 #include "board/boards.h"
 
+#include "board/gyro_board.h"
 #include "board/pik_board.h"
 #include "board/pmka_board.h"
 #include "board/psa2_board.h"
@@ -7,13 +8,18 @@
 
 #include <string.h>
 
-const struct board_type *const board_types[] = {&psa2_board, &psd1_board, &pmka_board, &pik_board, NULL};
+const struct board_type *const board_types[] = {&psa2_board, &psd1_board, &pmka_board, &pik_board, &gyro_board, NULL};
 
 const struct board_name board_names[] = {
-    {"psa2", &psa2_board, NULL, "PSA-2"},   {"psd1", &psd1_board, NULL, "PSD-1"},
-    {"pmka", &pmka_board, NULL, "PMKA"},    {"pik", &pik_board, NULL, "PIK"},
-    {"psa1", &psa2_board, "psa1", "PSA-1"}, {"pik5", &pik_board, "pik5", "PIK-5"},
-    {"pik6", &pik_board, "pik6", "PIK-6"},  {NULL, NULL, NULL, NULL},
+    {"psa2", &psa2_board, NULL, "PSA-2"},
+    {"psd1", &psd1_board, NULL, "PSD-1"},
+    {"pmka", &pmka_board, NULL, "PMKA"},
+    {"pik", &pik_board, NULL, "PIK"},
+    {"gyro", &gyro_board, NULL, "Gyro unit"},
+    {"psa1", &psa2_board, "psa1", "PSA-1"},
+    {"pik5", &pik_board, "pik5", "PIK-5"},
+    {"pik6", &pik_board, "pik6", "PIK-6"},
+    {NULL, NULL, NULL, NULL},
 };
 
 const struct board_type *board_find(const char *name)

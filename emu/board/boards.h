@@ -3,6 +3,8 @@
 #define PSABENCH_BOARD_BOARDS_H
 
 #include "board/board.h"
+#include "board/gyro.h"
+#include "board/gyro_can.h"
 #include "board/pik.h"
 #include "board/pik_can.h"
 #include "board/pmka.h"
@@ -36,6 +38,7 @@ union board_store {
     struct psd1 psd1;
     struct pmka pmka;
     struct pik pik;
+    struct gyro gyro;
 };
 
 union board_can_store {
@@ -43,6 +46,7 @@ union board_can_store {
     struct psd1_can psd1;
     struct pmka_can pmka;
     struct pik_can pik;
+    struct gyro_can gyro;
 };
 
 union board_profile_store {
@@ -50,6 +54,7 @@ union board_profile_store {
     struct psd1_profile psd1;
     struct pmka_profile pmka;
     struct pik_profile pik;
+    struct gyro_profile gyro;
 };
 
 #endif

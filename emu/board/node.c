@@ -346,6 +346,12 @@ static void on_sync(void *ctx, int64_t t_ns)
     if (n->type->sync) n->type->sync(n, t_ns);
 }
 
+static void on_heard(void *ctx, const struct can_msg *m, int64_t t_ns)
+{
+    struct board_node *n = ctx;
+    n->type->heard(n, m, t_ns);
+}
+
 void board_node_init(struct board_node *n, const struct board_node_type *type, const struct board_can_cfg *cfg,
                      void *board, struct can_bus *bus, struct sched *s)
 {
@@ -358,7 +364,7 @@ void board_node_init(struct board_node *n, const struct board_node_type *type, c
     n->drop_ns = -BOARD_NODE_CALM_NS;
     for (unsigned i = 0; i < d->counter_count; i++) assert(counter_named(n, d->counters[i]));
     const struct co_node_cfg node = {.name = cfg->name, .id = cfg->node_id, .od = d->od, .tpdos = d->tpdos};
-    const struct co_node_io io = {n, on_read, on_write, on_event, on_sync};
+    const struct co_node_io io = {n, on_read, on_write, on_event, on_sync, type->heard ? on_heard : NULL};
     co_node_init(&n->node, &node, &io, bus, s);
     unjudge(n);
     defaults(n);

@@ -48,6 +48,8 @@ struct board_node_type {
     void (*defaults)(struct board_node *n);              /* settings of its own, also at init; or NULL */
     void (*sync)(struct board_node *n, int64_t t_ns);    /* SYNC came; or NULL */
     void (*started)(struct board_node *n, int64_t t_ns); /* the node became operational; or NULL */
+    /* co_node_io.heard: somebody else's frame; or NULL. */
+    void (*heard)(struct board_node *n, const struct can_msg *m, int64_t t_ns);
 };
 
 /* Read-only outside board/node.c. */

@@ -128,7 +128,7 @@ void psa2_can_init(struct psa2_can *c, const struct board_can_cfg *cfg, const st
     c->fits = true;
     c->drop_ns = -PSA2_CAN_CALM_NS;
     const struct co_node_cfg node = {.name = cfg->name, .id = cfg->node_id, .od = &psa2_od, .tpdos = PSA2_TPDOS};
-    const struct co_node_io io = {c, psa2_can_read, psa2_can_write, on_event, on_sync};
+    const struct co_node_io io = {c, psa2_can_read, psa2_can_write, on_event, on_sync, NULL};
     co_node_init(&c->node, &node, &io, bus, s);
     psa2_can_defaults(c);
 }

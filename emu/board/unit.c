@@ -59,6 +59,32 @@ static void rate_radps(void *ctx, int64_t t_ns, double w_ib_b[3])
     for (unsigned i = 0; i < 3; i++) w_ib_b[i] = felt.w_radps[i];
 }
 
+/* ---- the platform, for a gyro unit */
+
+static void torque(void *ctx, double u1_radps, double u2_radps, int64_t t_ns)
+{
+    const struct unit *u = ctx;
+    (void)platform_torque(&u->lab->platform, u1_radps, u2_radps, t_ns);
+}
+
+static void reposition(void *ctx, int64_t t_ns)
+{
+    const struct unit *u = ctx;
+    platform_reposition(&u->lab->platform, t_ns);
+}
+
+static double servo_rad(void *ctx, int64_t t_ns)
+{
+    const struct unit *u = ctx;
+    return platform_servo_rad(&u->lab->platform, t_ns);
+}
+
+static double encoder_rad(void *ctx, int64_t t_ns)
+{
+    const struct unit *u = ctx;
+    return platform_encoder_rad(&u->lab->platform, t_ns);
+}
+
 /* A listener may end its own or another's listening: the cursor lives in the unit, where unit_unlisten() sees it. */
 static void on_event(void *ctx, unsigned event, int64_t t_ns)
 {
@@ -112,8 +138,14 @@ void unit_cfg_type(struct unit_cfg *cfg, const struct board_type *type)
 /* A copy of its own for the board; its name stays here. */
 static void init_board(struct unit *u, struct sched *s)
 {
-    const struct board_io io = {
+    struct board_io io = {
         .ctx = u, .accel = accel_signal, .temp_degc = temp_degc, .rate_radps = rate_radps, .event = on_event};
+    if (u->lab->platform.cfg.present) {
+        io.torque = torque;
+        io.reposition = reposition;
+        io.servo_rad = servo_rad;
+        io.encoder_rad = encoder_rad;
+    }
     union board_profile_store defaults;
     const void *profile = u->cfg.profile;
     if (!profile) {

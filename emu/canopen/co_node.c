@@ -257,7 +257,10 @@ static void receive(void *ctx, const struct can_msg *m, int64_t t_ns)
     if (m->flags & CAN_EXT || n->state == CO_INITIALISING) return;
     const bool talks = n->state != CO_STOPPED;
     const bool is_sdo = m->id == (uint32_t)ID_SDO_REQUEST + n->cfg.id;
-    if (m->id != ID_NMT && m->id != ID_SYNC && !is_sdo) return;
+    if (m->id != ID_NMT && m->id != ID_SYNC && !is_sdo) {
+        if (n->io.heard && !(m->flags & (CAN_RTR | CAN_FD))) n->io.heard(n->io.ctx, m, t_ns);
+        return;
+    }
     if (m->flags & (CAN_RTR | CAN_FD)) {
         n->malformed++;
         return;

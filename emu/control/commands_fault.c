@@ -218,6 +218,7 @@ static const struct control_command rows[COMMANDS] = {
      [FAULT_ID_MASK] = {"can_id_mask", CONTROL_COUNT, true, NULL, 0, 536870911, .what = "bits of the identifier that are compared; without it all"},
      [FAULT_HOLD_S] = {"hold_s", CONTROL_REAL, true, "s", 0, 10, .what = "by which a frame is held back"},
      [FAULT_DROP_V] = {"drop_v", CONTROL_REAL, true, "V", 1e-3, 100, .what = "by which the supply falls"},
+     [FAULT_DRIFT_DEGPH] = {"drift_degph", CONTROL_REAL, true, "deg/h", -1000, 1000, .what = "of the gyroscope, more than it had", .least = 1e-3},
      }, .run = do_add, .changes = true, .check = check_add},
     [CLEAR] = {"fault.clear", "Lifts a fault, or all of them, and forgets it.", {{"id", CONTROL_COUNT, true, NULL, 1, 4294967295.0, .what = "what fault.add told"}}, .run = do_clear, .changes = true},
     [LIST] = {"fault.list", "Lists the faults: waiting, listening for their event, active, over, or void (the point was gone).", {{0}}, .run = do_list},

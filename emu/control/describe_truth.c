@@ -150,6 +150,37 @@ static void add_table(const struct lab *l, cJSON *to, int64_t t_ns)
     }
 }
 
+static void add_pair(cJSON *to, const char *name, const double v[2], double scale)
+{
+    const double scaled[2] = {v[0] * scale, v[1] * scale};
+    cJSON_AddItemToObject(to, name, cJSON_CreateDoubleArray(scaled, 2));
+}
+
+/* Angles of platform and vehicle as in phys/platform.h; pairs: about x, about z. */
+static void add_platform(struct lab *l, cJSON *to, int64_t t_ns)
+{
+    const double degph_of_radps = deg_of_rad * 3600.0;
+    struct platform_state s;
+    struct vehicle_state v;
+    cJSON *j = cJSON_AddObjectToObject(to, "platform");
+    platform_at(&l->platform, t_ns, &s);
+    vehicle_at(&l->platform.vehicle, t_ns, &v);
+    add_real(j, "alpha_deg", s.alpha_rad * deg_of_rad);
+    add_real(j, "beta_deg", s.beta_rad * deg_of_rad);
+    add_real(j, "gamma_deg", s.gamma_rad * deg_of_rad);
+    add_real(j, "q_deg", s.q_rad * deg_of_rad);
+    add_real(j, "servo_deg", platform_servo_rad(&l->platform, t_ns) * deg_of_rad);
+    add_real(j, "encoder_deg", platform_encoder_rad(&l->platform, t_ns) * deg_of_rad);
+    add_pair(j, "drift_degph", s.drift_radps, degph_of_radps);
+    add_pair(j, "torque_degph", s.torque_radps, degph_of_radps);
+    cJSON *vehicle = cJSON_AddObjectToObject(to, "vehicle");
+    add_real(vehicle, "heading_deg", v.heading_rad * deg_of_rad);
+    add_real(vehicle, "pitch_deg", v.pitch_rad * deg_of_rad);
+    add_real(vehicle, "roll_deg", v.roll_rad * deg_of_rad);
+    add_real(vehicle, "speed_mps", v.speed_mps);
+    add_real(vehicle, "latitude_deg", v.latitude_rad * deg_of_rad);
+}
+
 /* At the unit's origin, in the axes of its case. */
 static void add_unit_state(struct unit *u, cJSON *to, int64_t t_ns)
 {
@@ -180,6 +211,7 @@ void describe_state(const struct control_bench *b, unsigned unit, cJSON *to, int
     cJSON_AddStringToObject(head, "face", head_face_name(head_face(&b->lab->head, t_ns)));
     add_table(b->lab, to, t_ns);
     if (b->lab->chamber.cfg.present) add_real(to, "air_degc", chamber_air_degc(&b->lab->chamber, t_ns));
+    if (b->lab->platform.cfg.present) add_platform(b->lab, to, t_ns);
     if (b->lab->supply.cfg.present) add_real(to, "supply_v", supply_volts(&b->lab->supply, t_ns));
     if (b->units) add_unit_state(b->unit[unit], cJSON_AddObjectToObject(to, "unit"), t_ns);
 }

@@ -37,6 +37,7 @@ enum fault_arg {
     FAULT_ID_MASK,
     FAULT_HOLD_S,
     FAULT_DROP_V,
+    FAULT_DRIFT_DEGPH,
     FAULT_ARGS
 };
 

@@ -8,8 +8,9 @@
 #include <stdio.h>
 #include <string.h>
 
-const struct fault_table *const fault_tables[] = {&fault_sensor, &fault_analog, &fault_chip,   &fault_controller,
-                                                  &fault_line,   &fault_link,   &fault_supply, NULL};
+const struct fault_table *const fault_tables[] = {&fault_sensor,     &fault_analog,   &fault_chip,
+                                                  &fault_controller, &fault_line,     &fault_link,
+                                                  &fault_supply,     &fault_platform, NULL};
 
 const struct fault_kind *fault_kind(unsigned i)
 {
@@ -60,7 +61,7 @@ static bool find_point(const struct control_bench *b, const char *text, struct f
 
 static bool has_unit(enum fault_place place)
 {
-    return place != FAULT_AT_BUS && place != FAULT_AT_CLIENT && place != FAULT_AT_SUPPLY;
+    return place < FAULT_AT_BUS;
 }
 
 /* Where a kind works, in the names of the board that the point is on, or of the boards that there are. */

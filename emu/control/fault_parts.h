@@ -13,7 +13,7 @@
 #define FAULT_LEAST_PPM 1.0
 
 extern const struct fault_table fault_sensor, fault_analog, fault_chip, fault_controller, fault_line, fault_link,
-    fault_supply;
+    fault_supply, fault_platform;
 
 static inline bool fault_given(const struct fault *f, enum fault_arg arg)
 {

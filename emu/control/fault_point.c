@@ -18,6 +18,8 @@ static const struct {
     [FAULT_AT_BUS] = {"bus.NAME", "a CAN bus"},
     [FAULT_AT_CLIENT] = {"client.N", "a program on the CAN bus"},
     [FAULT_AT_SUPPLY] = {"supply", "the power supply"},
+    [FAULT_AT_TORQUER] = {"platform.level|azimuth", "an axis of the platform"},
+    [FAULT_AT_ENCODER] = {"platform.encoder", "the angle sensor of the platform"},
 };
 
 const char *fault_place_any(enum fault_place place)
@@ -85,7 +87,7 @@ static unsigned indices(const struct board_type *t, enum fault_place place, unsi
     switch (place) {
     case FAULT_AT_SENSOR:
     case FAULT_AT_AFE:
-        return UNIT_AXES;
+        return t->afe ? UNIT_AXES : 0;
     case FAULT_AT_CHIP:
         return t->part_count - 1;
     case FAULT_AT_LINE:
@@ -124,9 +126,24 @@ static unsigned clients(const struct control_bench *b)
     return n;
 }
 
-bool fault_point(const struct control_bench *b, unsigned n, struct fault_point *p, char name[FAULT_POINT_MAX])
+static bool point_of_supply(struct fault_point *p, char *name)
 {
     *p = (struct fault_point){.place = FAULT_AT_SUPPLY};
+    snprintf(name, FAULT_POINT_MAX, "supply");
+    return true;
+}
+
+static bool point_of_platform(const struct control_bench *b, unsigned n, struct fault_point *p, char *name)
+{
+    static const char *const names[] = {[PLATFORM_LEVEL] = "level", [PLATFORM_AZIMUTH] = "azimuth", "encoder"};
+    if (!b->lab || !b->lab->platform.cfg.present || n > PLATFORM_AXES) return false;
+    *p = (struct fault_point){.place = n < PLATFORM_AXES ? FAULT_AT_TORQUER : FAULT_AT_ENCODER, .index = n};
+    snprintf(name, FAULT_POINT_MAX, "platform.%s", names[n]);
+    return true;
+}
+
+bool fault_point(const struct control_bench *b, unsigned n, struct fault_point *p, char name[FAULT_POINT_MAX])
+{
     for (unsigned i = 0; i < b->units; i++) {
         if (unit_point(b, i, &n, p, name)) return true;
     }
@@ -145,8 +162,7 @@ bool fault_point(const struct control_bench *b, unsigned n, struct fault_point *
         snprintf(name, FAULT_POINT_MAX, "client.%" PRIu32, c.came);
         return true;
     }
-    snprintf(name, FAULT_POINT_MAX, "supply");
-    return n == programs;
+    return n == programs ? point_of_supply(p, name) : point_of_platform(b, n - programs - 1, p, name);
 }
 
 static bool same_letters(const char *a, const char *b)

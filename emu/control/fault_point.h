@@ -16,6 +16,8 @@ enum fault_place {
     FAULT_AT_BUS,        /* bus.can0 */
     FAULT_AT_CLIENT,     /* client.1, by struct control_client.came */
     FAULT_AT_SUPPLY,     /* supply */
+    FAULT_AT_TORQUER,    /* platform.level, platform.azimuth: by enum platform_axis */
+    FAULT_AT_ENCODER,    /* platform.encoder */
     FAULT_PLACES
 };
 

@@ -20,7 +20,7 @@ static void every_pointer_is_there(const struct board_type *t)
     assert_true(t->period_ns && t->lines && t->line_count && t->port_lines && t->frame_line < t->line_count);
     assert_true(t->events && t->event_count && t->parts && t->part_count && t->node);
     assert_true(t->init && t->power_up && t->power_down && t->reset && t->ready && t->sample_until && t->wrong);
-    assert_true(t->listen && t->trace && t->line && t->afe && t->digest);
+    assert_true(t->listen && t->trace && t->line && t->digest);
     const struct board_can *c = t->can;
     assert_true(c && c->init && c->power_up && c->power_down && c->node);
     assert_true(c->size > 0 && c->size <= sizeof(union board_can_store));
@@ -293,7 +293,7 @@ static void truth_and_wrongs_may_be_asked_at_any_time(void **state)
         }
         (*t)->wrong(w.u.board, 0);
         sched_run_until(&w.s, w.s.now_ns + 50000000);
-        for (unsigned axis = 0; axis < BOARD_AXES; axis++) assert_non_null((*t)->afe(w.u.board, axis));
+        for (unsigned axis = 0; (*t)->afe && axis < BOARD_AXES; axis++) assert_non_null((*t)->afe(w.u.board, axis));
         unit_sample_until(&w.u, w.s.now_ns);
     }
 }

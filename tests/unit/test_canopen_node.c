@@ -81,7 +81,7 @@ static struct rig *rig_up(void)
     r->host = (struct can_node){.name = "host", .fd = true, .rx = on_rx, .ctx = r};
     can_attach(&r->bus, &r->host);
     const struct co_node_cfg cfg = {.name = "unit", .id = NODE, .od = &psa2_od, .tpdos = PSA2_TPDOS};
-    const struct co_node_io io = {r, on_read, on_write, on_event, on_sync};
+    const struct co_node_io io = {r, on_read, on_write, on_event, on_sync, NULL};
     co_node_init(&r->node, &cfg, &io, &r->bus, &r->s);
     co_node_power_up(&r->node, 0);
     co_pdo_select(&r->node, 3);

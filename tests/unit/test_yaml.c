@@ -282,8 +282,8 @@ static void a_missing_scenario_is_told_in_one_line(void **state)
     assert_false(scenario_load("nope", &s, why, sizeof why));
     assert_string_equal(
         why, "nope: no such file in proto/scenarios; a path, or a name from there, is wanted: "
-             "brownout, calibrate, chamber_sweep, converters, fast, faults, fleet64, multi, quiet, six_positions, "
-             "stream, table_rate");
+             "brownout, calibrate, chamber_sweep, converters, fast, faults, fleet64, gyrocompass, gyrocompass_ideal, "
+             "multi, quiet, six_positions, stream, table_rate");
     assert_false(scenario_load("./nope.yaml", &s, why, sizeof why));
     assert_string_equal(why, "./nope.yaml: no such file, or not readable");
 }

@@ -1,0 +1,20 @@
+/* What the files of the board share. Not for others. */
+#ifndef PSABENCH_BOARD_GYRO_PARTS_H
+#define PSABENCH_BOARD_GYRO_PARTS_H
+
+#include "board/gyro.h"
+
+static inline void gyro_tell(const struct gyro *b, enum gyro_event e, int64_t t_ns)
+{
+    if (b->told) b->io.event(b->io.ctx, e, t_ns);
+}
+
+/* gyro_run.c: the phases at this step, before the rates are computed; then the rates asked, u1 and u2. */
+void gyro_run_step(struct gyro *b, int64_t t_ns);
+void gyro_run_rates(struct gyro *b, int64_t t_ns, double u_radps[2]);
+void gyro_run_stop(struct gyro *b, enum gyro_mode mode); /* at once, in another mode */
+
+/* gyro.c */
+void gyro_condition(struct gyro *b, enum gyro_flag what, bool stands, int64_t t_ns);
+
+#endif

@@ -1,0 +1,80 @@
+/* Commands of the vehicle under the gyro-stabilised platform, and of the gyro unit's panel. */
+#include "control/commands.h"
+
+#include <string.h>
+
+static struct platform *platform_of(const struct control_bench *b)
+{
+    return b->lab && b->lab->platform.cfg.present ? &b->lab->platform : NULL;
+}
+
+static enum control_outcome no_platform(struct control *c)
+{
+    return control_refuse(c, "state", "there is no platform in this scenario, and no vehicle under it");
+}
+
+static enum control_outcome do_attitude(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+{
+    struct platform *p = platform_of(c->bench);
+    (void)result;
+    if (!p) return no_platform(c);
+    control_settle_inputs(c->bench, t_ns);
+    vehicle_attitude(platform_vehicle(p, t_ns), v[0].real, v[1].real, v[2].real, t_ns);
+    return CONTROL_DONE;
+}
+
+static enum control_outcome do_sway(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+{
+    struct platform *p = platform_of(c->bench);
+    const struct vehicle_sway sway = {
+        .pitch_arcmin = v[0].real, .pitch_s = v[1].real, .roll_arcmin = v[2].real, .roll_s = v[3].real};
+    (void)result;
+    if (!p) return no_platform(c);
+    control_settle_inputs(c->bench, t_ns);
+    vehicle_sway(platform_vehicle(p, t_ns), &sway, t_ns);
+    return CONTROL_DONE;
+}
+
+static enum control_outcome do_fly(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+{
+    struct platform *p = platform_of(c->bench);
+    (void)result;
+    if (!p) return no_platform(c);
+    control_settle_inputs(c->bench, t_ns);
+    vehicle_fly(platform_vehicle(p, t_ns), v[0].real, v[1].real, t_ns);
+    return CONTROL_DONE;
+}
+
+/* ---- the panel */
+
+static const char *const modes[] = {"off", "level", "hold", "slew", "gyrocompass", "calibrate", "navigate", NULL};
+
+static enum control_outcome do_mode(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+{
+    struct unit *u = c->bench->unit[v[0].unit];
+    (void)result;
+    if (!u->type->set_mode)
+        return control_refuse(c, "state", "%s is a %s: a gyro unit has modes", u->cfg.name, u->type->title);
+    const char *why = u->type->set_mode(u->board, v[1].choice, t_ns);
+    return why ? control_refuse(c, "state", "%s", why) : CONTROL_DONE;
+}
+
+// clang-format off
+static const struct control_command rows[] = {
+    {"vehicle.attitude", "Turns the vehicle under the platform to another mean attitude, at the scenario's rates.",
+     {{"heading_deg", CONTROL_REAL, false, "deg", -360, 360, .what = "from north, clockwise; it turns the shorter way"},
+      {"pitch_deg", CONTROL_REAL, false, "deg", -30, 30, .what = "nose up"},
+      {"roll_deg", CONTROL_REAL, false, "deg", -30, 30, .what = "right side down"}}, .run = do_attitude, .changes = true},
+    {"vehicle.sway", "Lets the vehicle sway about its mean attitude from now on; amplitudes or periods of 0 end it.",
+     {{"pitch_arcmin", CONTROL_REAL, false, "arcmin", 0, 600, .what = "amplitude of the pitch"},
+      {"pitch_s", CONTROL_REAL, false, "s", 0, 1000, .what = "its period"},
+      {"roll_arcmin", CONTROL_REAL, false, "arcmin", 0, 600, .what = "amplitude of the roll"},
+      {"roll_s", CONTROL_REAL, false, "s", 0, 1000, .what = "its period"}}, .run = do_sway, .changes = true},
+    {"vehicle.fly", "Brings the vehicle to a speed and a track, which is its heading; 0 m/s parks it.",
+     {{"speed_mps", CONTROL_REAL, false, "m/s", 0, 1000, .what = "over ground"},
+      {"track_deg", CONTROL_REAL, false, "deg", -360, 360, .what = "from north, clockwise"}}, .run = do_fly, .changes = true},
+    {"gyro.mode", "Gives a gyro unit a mode, as its object 2100h does: a panel for scenarios without a host.",
+     {CONTROL_UNIT_ARG(false), {"mode", CONTROL_CHOICE, .what = "which", .choices = modes}}, .run = do_mode, .changes = true},
+};
+// clang-format on
+const struct control_table commands_platform = {rows, sizeof rows / sizeof *rows};
