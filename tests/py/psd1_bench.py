@@ -6,7 +6,7 @@ The host strobes over the control command `bus.read` in step pace, to the nanose
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -40,7 +40,8 @@ units:
 @dataclass(frozen=True, slots=True)
 class Strobe:
     """A read, or a write of data: delay after the rise of FL2, or after the strobe before; length; address; whether a
-    word is to be had."""
+    word is to be had. before_dr_ns: it begins so long before DR falls, whatever its delay; end_ns: and ends so long
+    after the rise of 1M25 which follows that, where a cycle would begin, whatever its length."""
 
     after_fl2: bool
     delay_ns: int
@@ -48,6 +49,8 @@ class Strobe:
     address: int
     good: bool = True
     data: int | None = None
+    before_dr_ns: int | None = None
+    end_ns: int | None = None
 
 
 FLAGS, BOTH = 15, 3  # its address; INT0 and FL1 active
@@ -85,16 +88,32 @@ def held_back(rng: np.random.Generator, last: Strobe) -> list[Strobe]:
     return before + random_flags(rng, before, int(rng.integers(10, 3_000_000)))
 
 
+def coincident(rng: np.random.Generator, last: Strobe) -> list[Strobe]:
+    """As held_back, but all three conditions of a cycle hold from a fall of DR on, and the strobe that takes INT0 or
+    FL1 away, under way already, ends just where the cycle begins: mostly at the very instant, else about it."""
+    off = Strobe(True, int(rng.integers(0, 3000)), int(rng.integers(200, 900)), FLAGS, data=int(rng.integers(0, 3)))
+    read = Strobe(False, 10 + last.delay_ns, last.length_ns, last.address)
+    given = Strobe(False, 0, int(rng.integers(200, 900)), FLAGS, data=BOTH, before_dr_ns=int(rng.integers(5000, 40000)))
+    end_ns = int(rng.choice([0, 0, 0, 0, -1, 1, int(rng.integers(-300, 300))]))
+    data, before_ns = int(rng.integers(0, 3)), int(rng.integers(300, 3000))
+    away = Strobe(False, 0, 0, FLAGS, data=data, before_dr_ns=before_ns, end_ns=end_ns)
+    again = Strobe(False, int(rng.integers(10, 3000)), int(rng.integers(200, 900)), FLAGS, data=BOTH)
+    return [off, read, given, away, again]
+
+
 def scenario(directory: Path, seed: int) -> Path:
     path = directory / "psd1.yaml"
     path.write_text(SCENARIO.format(seed=seed), encoding="utf-8")
     return path
 
 
-def random_strobes(rng: np.random.Generator, cycles: int, flags: float = 0.0) -> Iterator[list[Strobe]]:
+def random_strobes(
+    rng: np.random.Generator, cycles: int, flags: float = 0.0, coincide: float = 0.0
+) -> Iterator[list[Strobe]]:
     """Of each word of each cycle: mostly prompt, at times late or so late that conversions are lost; now and then a
     strobe at another word's address first, or one more behind it, which must both change nothing. flags: behind so many
-    of the words INT0 and FL1 change."""
+    of the words INT0 and FL1 change. coincide: in so many of those cases at the instant of an edge of 1M25 that
+    matters."""
     for _ in range(cycles):
         for axis in range(3):
             delay = int(rng.choice([rng.integers(0, 3000), rng.integers(0, 200_000), 800 * rng.integers(0, 4)]))
@@ -110,7 +129,10 @@ def random_strobes(rng: np.random.Generator, cycles: int, flags: float = 0.0) ->
                 strobes.append(Strobe(False, wait, int(rng.integers(200, 900)), axis, False))
             elif rng.random() < flags:
                 held = axis == 2 and len(strobes) == 1 and rng.random() < 0.5
-                strobes = held_back(rng, strobes[0]) if held else strobes + random_flags(rng, strobes)
+                if held and coincide and rng.random() < coincide:
+                    strobes = coincident(rng, strobes[0])
+                else:
+                    strobes = held_back(rng, strobes[0]) if held else strobes + random_flags(rng, strobes)
             yield strobes
 
 
@@ -119,7 +141,9 @@ class Host:
 
     def __init__(self, control: Control) -> None:
         self._control = control
+        self._dr_ns = 0  # when DR will fall
         self.now_ns = control.call("time").t_ns
+        self._end_ns = self.now_ns  # of the strobe before
 
     def run(self, dt_ns: int) -> None:
         if dt_ns > 0:
@@ -130,12 +154,27 @@ class Host:
         assert reply.result["reached"], f"no {event}"
         self.now_ns = reply.t_ns
 
+    def timed(self, s: Strobe) -> Strobe:
+        """The same with delay and length as numbers. Words that nobody reads end in a steady row; DR falls at each."""
+        if s.before_dr_ns is None:
+            return s
+        if self._dr_ns - s.before_dr_ns <= self.now_ns:
+            self.await_event("DR")
+            before_ns = self.now_ns
+            self.await_event("DR")
+            self._dr_ns = 2 * self.now_ns - before_ns
+        begin_ns, length_ns = self._dr_ns - s.before_dr_ns, s.length_ns
+        if s.end_ns is not None:
+            length_ns = (self._dr_ns // PERIOD_NS + 1) * PERIOD_NS + s.end_ns - begin_ns
+        return replace(s, delay_ns=begin_ns - self._end_ns, length_ns=length_ns, before_dr_ns=None, end_ns=None)
+
     def do(self, s: Strobe) -> int | None:
         """The word; None of a write, and when the board refuses. It ends with the end of the strobe, refused or not."""
         if s.after_fl2:
             self.await_event("FL2")
-        self.run(s.delay_ns)
-        end_ns = self.now_ns + s.length_ns
+        begin_ns = (self.now_ns if s.after_fl2 else self._end_ns) + s.delay_ns
+        self.run(begin_ns - self.now_ns)
+        end_ns = self._end_ns = begin_ns + s.length_ns
         word, args = None, {"unit": "a", "address": s.address, "strobe_ns": s.length_ns}
         try:
             if s.data is None:
@@ -153,9 +192,15 @@ class Host:
 
 
 def record(
-    directory: Path, seed: int, strobes: Iterable[Sequence[Strobe]], clock_ppm: int = 0, unit_ns: int = 1
+    directory: Path,
+    seed: int,
+    strobes: Iterable[Sequence[Strobe]],
+    clock_ppm: int = 0,
+    unit_ns: int = 1,
+    done: list[Strobe] | None = None,
 ) -> tuple[Path, list[list[int]]]:
-    """The recording from power-on, and the words of each cycle as the host read them."""
+    """The recording from power-on, and the words of each cycle as the host read them. done: gets the strobes as they
+    were, those that wait for DR, too, with delay and length."""
     vcd, words = directory / "psd1.vcd", list[int]()
     extra: list[str | Path] = ["--vcd", vcd, "--vcd-unit", str(unit_ns)]
     with (
@@ -166,8 +211,11 @@ def record(
         for i, row in enumerate(strobes):
             if clock_ppm and i == 3:  # of converter X, after the first cycle: DR then meets the clock at any phase
                 control.call("fault.add", kind="chip.clock", point="a.adc.x", clock_ppm=clock_ppm)
-            for strobe in row:
+            for wanted in row:
+                strobe = host.timed(wanted)
                 word = host.do(strobe)
+                if done is not None:
+                    done.append(strobe)
                 if word is not None:
                     words.append(word)
         host.run(1_000_000)
