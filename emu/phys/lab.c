@@ -90,34 +90,60 @@ void lab_feel(struct lab *l, const struct lab_seat *seat, const double at_m[3], 
     pose_into(&in_mount, out->w_radps, out->w_radps);
 }
 
-void lab_sensor_mps2(struct lab *l, const struct lab_seat *seat, const double at_m[3], double cos_alpha0,
-                     double sin_alpha0, int64_t t_ns, double a_mps2[3])
+/* -f in the mount's axes, by way of the poses. */
+static void mount_senses(struct lab *l, const struct lab_seat *seat, const double at_m[3], int64_t t_ns,
+                         double mount[3])
 {
-    double mount[3];
-    const bool on_head = seat->on == LAB_HEAD;
-    const bool square = is_zero(seat->misalignment_rad);
-    const bool central = is_zero(at_m) && is_zero(seat->lever_m);
-    if (on_head && square && central) {
-        head_gravity_mps2(&l->head, t_ns, mount);
-    } else if (seat->on == LAB_PLATFORM && central) {
-        platform_force_mps2(&l->platform, t_ns, mount);
-        for (unsigned k = 0; k < 3; k++) mount[k] = -mount[k];
-    } else {
-        const struct pose in_mount = case_in_mount(l, seat, t_ns);
-        struct felt felt;
-        double r_m[3];
-        pose_out_of(&in_mount, at_m, r_m);
-        for (unsigned k = 0; k < 3; k++) r_m[k] += seat->lever_m[k];
-        mount_feels(l, seat->on, r_m, t_ns, &felt);
-        for (unsigned k = 0; k < 3; k++) mount[k] = -felt.f_mps2[k];
-    }
-    if (seat->on == LAB_PLATFORM) pose_into(platform_level(&l->platform, t_ns), mount, mount);
-    head_sensor_mps2(on_head ? head_face(&l->head, t_ns) : HEAD_DIRECT, cos_alpha0, sin_alpha0, mount, a_mps2);
-    if (square) return;
+    const struct pose in_mount = case_in_mount(l, seat, t_ns);
+    struct felt felt;
+    double r_m[3];
+    pose_out_of(&in_mount, at_m, r_m);
+    for (unsigned k = 0; k < 3; k++) r_m[k] += seat->lever_m[k];
+    mount_feels(l, seat->on, r_m, t_ns, &felt);
+    for (unsigned k = 0; k < 3; k++) mount[k] = -felt.f_mps2[k];
+}
+
+static void turn_askew(const struct lab_seat *seat, double a_mps2[3])
+{
     struct pose askew;
     pose_start(&askew, &(struct site){0});
     pose_tilt(&askew, seat->misalignment_rad);
     pose_into(&askew, a_mps2, a_mps2);
+}
+
+/* Without lever arms the platform's own arithmetic, then the turn of the level sensors' block. */
+static void sensor_on_platform(struct lab *l, const struct lab_seat *seat, const double at_m[3], double cos_alpha0,
+                               double sin_alpha0, int64_t t_ns, double a_mps2[3])
+{
+    double mount[3];
+    if (is_zero(at_m) && is_zero(seat->lever_m)) {
+        platform_force_mps2(&l->platform, t_ns, mount);
+        for (unsigned k = 0; k < 3; k++) mount[k] = -mount[k];
+    } else {
+        mount_senses(l, seat, at_m, t_ns, mount);
+    }
+    pose_into(platform_level(&l->platform, t_ns), mount, mount);
+    head_sensor_mps2(HEAD_DIRECT, cos_alpha0, sin_alpha0, mount, a_mps2);
+    if (!is_zero(seat->misalignment_rad)) turn_askew(seat, a_mps2);
+}
+
+void lab_sensor_mps2(struct lab *l, const struct lab_seat *seat, const double at_m[3], double cos_alpha0,
+                     double sin_alpha0, int64_t t_ns, double a_mps2[3])
+{
+    if (seat->on == LAB_PLATFORM) {
+        sensor_on_platform(l, seat, at_m, cos_alpha0, sin_alpha0, t_ns, a_mps2);
+        return;
+    }
+    double mount[3];
+    const bool on_head = seat->on == LAB_HEAD;
+    const bool square = is_zero(seat->misalignment_rad);
+    if (on_head && square && is_zero(at_m) && is_zero(seat->lever_m)) {
+        head_gravity_mps2(&l->head, t_ns, mount);
+    } else {
+        mount_senses(l, seat, at_m, t_ns, mount);
+    }
+    head_sensor_mps2(on_head ? head_face(&l->head, t_ns) : HEAD_DIRECT, cos_alpha0, sin_alpha0, mount, a_mps2);
+    if (!square) turn_askew(seat, a_mps2);
 }
 
 static const char *const mounts[] = {

@@ -243,6 +243,14 @@ static void force_is_gravity_in_the_axes_of_the_platform(void **state)
     near(asin(-felt.f_mps2[0] / g / cos(s.beta_rad)), s.gamma_rad + tg,
          1e-5); /* and gamma; gamma's own turn is second order */
     near(felt.w_radps[2], s.w_ip_p_radps[2], 1e-6);
+    const struct lab_seat askew = {.on = LAB_PLATFORM, .misalignment_rad = {1e-3, -2e-3, 3e-3}};
+    lab_feel(&l, &askew, origin, 0, &felt);
+    lab_sensor_mps2(&l, &askew, origin, 1.0, 0.0, 0, a);
+    for (unsigned k = 0; k < 3; k++) near(felt.f_mps2[k], -a[k], 1e-14);
+    lab_sensor_mps2(&l, &seat, origin, cos(3e-3), sin(3e-3), 0,
+                    a); /* a sensor's alpha0 is a turn about z of the block */
+    lab_feel(&l, &(struct lab_seat){.on = LAB_PLATFORM, .misalignment_rad = {0.0, 0.0, 3e-3}}, origin, 0, &felt);
+    for (unsigned k = 0; k < 3; k++) near(felt.f_mps2[k], -a[k], 1e-14);
 }
 
 static void a_lever_arm_feels_the_rate(void **state)
