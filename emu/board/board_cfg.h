@@ -18,6 +18,8 @@ struct board_io {
     double (*temp_degc)(void *ctx, unsigned channel, int64_t t_ns); /* at X, Y, Z sensor and the board itself (3) */
     void (*rate_radps)(void *ctx, int64_t t_ns, double w_ib_b[3]);  /* inertial rate, axes of the unit's case */
     void (*event)(void *ctx, unsigned event, int64_t t_ns);         /* number in board_type.events; may be NULL */
+    /* The voltage that feeds the unit, to its nominal one. NULL: the bench has no supply. */
+    double (*supply_ratio)(void *ctx, int64_t t_ns);
     /* Of the gyro-stabilised platform, phys/platform.h: rates for its torquers, a new setting, its angle sensor as the servo and
      * as the encoder has it. NULL: there is none. */
     void (*torque)(void *ctx, double u1_radps, double u2_radps, int64_t t_ns);

@@ -139,12 +139,18 @@ static uint16_t self_test(const struct psd1 *b)
     return (uint16_t)bits;
 }
 
+/* The bench's supply by way of a divider that makes the profile's voltage of its nominal one (E0). */
+static double supply_v(const struct psd1 *b, int64_t t_ns)
+{
+    return b->io.supply_ratio ? b->supply_v * b->io.supply_ratio(b->io.ctx, t_ns) : b->supply_v;
+}
+
 uint16_t psd1_aux_service(const struct psd1 *b, int64_t t_ns)
 {
     const struct psd1_profile *p = &b->profile;
     const double vref_v = p->adc_vref_v * b->vref_scale;
     const uint16_t code[4] = {
-        CODE12(code_of(b->supply_v, p->service_v_per_code, 0, 4095)),
+        CODE12(code_of(supply_v(b, t_ns), p->service_v_per_code, 0, 4095)),
         CODE12(code_of(vref_v, p->service_v_per_code, 0, 4095)),
         temp_code(b, 3, t_ns),
         self_test(b),

@@ -53,7 +53,7 @@ const struct board_field psd1_fields[PSD1_FIELDS] = {
     ROW(temp_k_per_code, REAL, 0.05, 10, "Thermometers: K of a code."),
     ROW(temp_offset_sd_k, REAL, 0, 10, "Standard deviation of their offset among specimens."),
     ROW(service_v_per_code, REAL, 1e-3, 1, "Service signals: V of a code."),
-    ROW(supply_v, REAL, 0, 10, "Nominal supply of the board as the service signal shows it."),
+    ROW(supply_v, REAL, 0, 10, "Nominal supply of the board as the service signal shows it; with a supply in the scenario, at its volt_v."),
     ROW(supply_sd_v, REAL, 0, 1, "Standard deviation of its error among specimens."),
     ROW(vref_sd_ppm, REAL, 0, 1e4, "Standard deviation of the reference's error among specimens."),
     ROW(vref_tc_sd_ppm_per_k, REAL, 0, 1000, "Likewise of its temperature coefficient."),

@@ -59,6 +59,13 @@ static void rate_radps(void *ctx, int64_t t_ns, double w_ib_b[3])
     for (unsigned i = 0; i < 3; i++) w_ib_b[i] = felt.w_radps[i];
 }
 
+/* To what the scenario has it at power-on. */
+static double supply_ratio(void *ctx, int64_t t_ns)
+{
+    const struct supply *s = &((const struct unit *)ctx)->lab->supply;
+    return s->cfg.volt_v > 0.0 ? supply_volts(s, t_ns) / s->cfg.volt_v : 0.0;
+}
+
 /* ---- the platform, for a gyro unit */
 
 static void torque(void *ctx, double u1_radps, double u2_radps, int64_t t_ns)
@@ -140,6 +147,7 @@ static void init_board(struct unit *u, struct sched *s)
 {
     struct board_io io = {
         .ctx = u, .accel = accel_signal, .temp_degc = temp_degc, .rate_radps = rate_radps, .event = on_event};
+    if (u->lab->supply.cfg.present) io.supply_ratio = supply_ratio;
     if (u->lab->platform.cfg.present) {
         io.torque = torque;
         io.reposition = reposition;

@@ -20,7 +20,7 @@ pytestmark = pytest.mark.host
 SCENARIO = HERE / "faults_boards.yaml"
 PMKA_MODE, PMKA_BEAT, PMKA_SEQ = 9, 11, 6  # docs/protocol_pmka.md
 PIK_LATCH = 11  # docs/protocol_pik.md
-PSD1_TEMP = 10  # docs/protocol_psd1.md
+PSD1_TEMP, PSD1_SERVICE = 10, 11  # docs/protocol_psd1.md
 
 
 def control_of(emulator: Emulator) -> Control:
@@ -41,6 +41,22 @@ def test_in_step_pace_time_moves_by_the_strobe() -> None:
         assert control.call("bus.read", unit="m", address=PMKA_BEAT).result == pytest.approx(
             {"name": "BEAT", "data": 321, "ended_s": control.call("time").t_ns * 1e-9}
         )
+
+
+@pytest.mark.parametrize("supply", [True, False])
+def test_psd_1_tells_the_supply(supply: bool, tmp_path: Path) -> None:
+    """Code 2500 +- 4 sd of the specimen at 12 V, 5/6 of it at 10 V; without a supply always the same."""
+    path = tmp_path / "supply.yaml"
+    path.write_text(("supply: {volt_v: 12}\n" if supply else "") + "units: [{name: d, board: psd1}]\n")
+    with Emulator(path, pace="step") as emulator, control_of(emulator) as control:
+        control.call("run", for_s=0.1)
+        nominal = control.call("bus.read", unit="d", address=PSD1_SERVICE).result["data"]
+        assert abs(nominal - 2500) <= 40
+        if supply:
+            control.call("supply.set", volt_v=10.0)
+        control.call("run", for_s=0.01)
+        now = control.call("bus.read", unit="d", address=PSD1_SERVICE).result["data"]
+        assert now == pytest.approx(nominal * 10 / 12, abs=1) if supply else now == nominal
 
 
 def test_each_refusal_has_its_code_and_is_counted() -> None:

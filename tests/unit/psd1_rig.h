@@ -23,6 +23,7 @@ struct rig {
     struct psd1 b;
     double volts[3]; /* at the sensors */
     double degc[4];
+    double supply_ratio;
     double w_radps[3], w_radps2; /* at 0, and how much more a second later */
     struct psd1_cycle cycle[RIG_CYCLES];
     unsigned cycles;
@@ -45,6 +46,12 @@ static inline double rig_accel(void *ctx, unsigned axis, int64_t t_ns)
 {
     (void)t_ns;
     return ((struct rig *)ctx)->volts[axis];
+}
+
+static inline double rig_supply_ratio(void *ctx, int64_t t_ns)
+{
+    (void)t_ns;
+    return ((struct rig *)ctx)->supply_ratio;
 }
 
 static inline double rig_degc(void *ctx, unsigned channel, int64_t t_ns)
@@ -127,13 +134,18 @@ static inline struct psd1_profile rig_exact(void)
 /* Off; psd1_power_up() switches it on. */
 static inline void rig_init(struct rig *r, const struct psd1_profile *p, double noise_scale)
 {
-    const struct board_io io = {
-        .ctx = r, .accel = rig_accel, .temp_degc = rig_degc, .rate_radps = rig_rate, .event = rig_event};
+    const struct board_io io = {.ctx = r,
+                                .accel = rig_accel,
+                                .temp_degc = rig_degc,
+                                .rate_radps = rig_rate,
+                                .supply_ratio = rig_supply_ratio,
+                                .event = rig_event};
     const struct board_cfg u = rig_unit(noise_scale);
     char why[300];
     if (!psd1_profile_check(p, why, sizeof why)) fail_msg("%s", why);
     memset(r, 0, sizeof *r);
     for (unsigned i = 0; i < 4; i++) r->degc[i] = 25.0;
+    r->supply_ratio = 1.0;
     r->volts[0] = 2.4882;
     r->volts[1] = -7.0;
     r->volts[2] = 9.9;

@@ -243,6 +243,28 @@ static void temperatures_and_service_signals(void **state)
     }
 }
 
+/* 2 mV a code, 5 V at the nominal supply; 12 bits hold 8.19 V. The reference does not mind. */
+static void the_supply_is_told_as_it_is(void **state)
+{
+    (void)state;
+    static const struct {
+        double ratio;
+        uint16_t code;
+    } rows[] = {{1.0, 2500}, {0.8, 2000}, {1.25, 3125}, {2.0, 4095}, {0.0, 0}};
+    const struct psd1_profile p = rig_exact();
+    rig_up(&rig, &p);
+    for (size_t i = 0; i < COUNT(rows); i++) {
+        rig.supply_ratio = rows[i].ratio;
+        rig_write(&rig, PSD1_REG_SERVICE, 0);
+        assert_int_equal(rig_read(&rig, PSD1_REG_SERVICE), rows[i].code);
+        rig_write(&rig, PSD1_REG_SERVICE, 1);
+        assert_int_equal(rig_read(&rig, PSD1_REG_SERVICE), 0x1000 | 1250);
+    }
+    rig.b.io.supply_ratio = NULL;
+    rig_write(&rig, PSD1_REG_SERVICE, 0);
+    assert_int_equal(rig_read(&rig, PSD1_REG_SERVICE), 2500);
+}
+
 /* 10 deg/s for a second are 36000 counts of 1", latched at A0, two's complement on the bus. */
 static void gyros_count_what_they_turn(void **state)
 {
@@ -332,6 +354,7 @@ int main(void)
         cmocka_unit_test(registers_of_control_words),
         cmocka_unit_test(status_and_flags),
         cmocka_unit_test(temperatures_and_service_signals),
+        cmocka_unit_test(the_supply_is_told_as_it_is),
         cmocka_unit_test(gyros_count_what_they_turn),
         cmocka_unit_test(abrupt_changes_of_the_rate_are_kept),
         cmocka_unit_test(specimens_differ_and_seeds_repeat),
