@@ -12,7 +12,18 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from psabench import comparison, comparison_page, decode, grading, record, report, run
+from psabench import (
+    comparison,
+    comparison_page,
+    decode,
+    grading,
+    gyro_grading,
+    gyro_page,
+    gyro_run,
+    record,
+    report,
+    run,
+)
 from psabench.can_host import open_bus
 from psabench.devices import ALIASES
 from psabench.errors import BadInput, BenchError
@@ -52,6 +63,8 @@ examples:
   psabench run reversal --realisations 2  a shorter reversal
   psabench run fourier --scenario my.yaml --average 32
   psabench run compare-converters         every generation of converters through one motion, beside the exact integral
+  psabench run gyrocompass                a gyro platform finds north, the article's way and a better one
+  psabench run heading-hold --hours 4     and keeps heading by its gyroscope
   psabench run turns --can slcan:/dev/ttyACM0 --head TCPIP::192.0.2.7::5025::SOCKET   on the bench at these addresses
 
 Ctrl-C ends a run; the readings taken so far stay in OUT/PROCEDURE-CONDITION.csv. Exit status 1: something measured
@@ -199,8 +212,9 @@ def _add_decode(commands: Any) -> None:
 def _parameters() -> dict[str, tuple[str, Callable[[str], Any]]]:
     """Fields of all procedures' parameters: help text and type, by name."""
     found: dict[str, tuple[str, Callable[[str], Any]]] = {}
-    for procedure in PROCEDURES.values():
-        for name, f in procedure.params.__dataclass_fields__.items():
+    kinds = [procedure.params for procedure in PROCEDURES.values()]
+    for params in [*kinds, *(kind for of in gyro_run.PARAMS.values() for kind in of)]:
+        for name, f in params.__dataclass_fields__.items():
             kind = type(f.default) if f.default is not None else float
             unit = f", {f.metadata['unit']}" if f.metadata["unit"] else ""
             text = f"{f.metadata['help']}{unit} ({f.default})".replace("%", "%%")
@@ -251,6 +265,9 @@ def _list_procedures() -> None:
         print(f"{p.name:10} {p.summary}")
         print(f"{'':10} {' '.join(_option(name) for name in p.params.__dataclass_fields__)}")
     print(f"{compare_converters.NAME}  {compare_converters.SUMMARY}; not in all")
+    for name, summary in gyro_run.SUMMARIES.items():
+        print(f"{name}  {summary}; not in all")
+        print(f"{'':10} {' '.join(map(_option, gyro_run.fields_of(name)))}")
 
 
 def _option(parameter: str) -> str:
@@ -259,7 +276,7 @@ def _option(parameter: str) -> str:
 
 def _check_procedure(name: str | None, params: Mapping[str, Any]) -> None:
     """Raises BadInput for an unknown procedure, or one that does not have a parameter given."""
-    known = f"{', '.join(PROCEDURES)}, {compare_converters.NAME} or all"
+    known = f"{', '.join([*PROCEDURES, compare_converters.NAME, *gyro_run.SUMMARIES])} or all"
     if name is None:
         raise BadInput(f"run: which procedure? {known}; psabench run --list tells of each")
     if name not in (*PROCEDURES, "all"):
@@ -277,6 +294,8 @@ def _run(args: argparse.Namespace) -> int:
     params = {k.removeprefix("param_"): v for k, v in vars(args).items() if k.startswith("param_") and v is not None}
     if args.procedure == compare_converters.NAME:
         return _compare(args, params)
+    if args.procedure in gyro_run.SUMMARIES:
+        return _gyro(args, params)
     _check_procedure(args.procedure, params)
     options = run.RunOptions(
         procedures=list(PROCEDURES) if args.procedure == "all" else [args.procedure],
@@ -315,6 +334,33 @@ def _compare(args: argparse.Namespace, params: Mapping[str, Any]) -> int:
     print(comparison.verdict(c))
     print(f"report: {page}")
     return 0 if c.within else 1
+
+
+def _gyro(args: argparse.Namespace, params: Mapping[str, Any]) -> int:
+    """Its platform is a unit on the bus: no dividing head, no volts to average."""
+    fields = gyro_run.fields_of(args.procedure)
+    known = ", ".join(["--can, --control, --truth, --scenario, --seed, --real-time, --out", *map(_option, fields)])
+    given = {"--head": args.head, "--average": args.average, "--gravity": args.gravity}
+    for option in [*(o for o, v in given.items() if v is not None), *(_option(p) for p in params if p not in fields)]:
+        raise BadInput(f"{option}: {args.procedure} has no such parameter; it has {known}")
+    options = gyro_run.GyroOptions(
+        procedure=args.procedure,
+        out=args.out,
+        can=args.can,
+        control=args.control,
+        truth=args.truth,
+        scenario=args.scenario,
+        seed=args.seed,
+        real_time=args.real_time,
+        params=params,
+    )
+    sections = gyro_run.run(options, Bar())
+    page = gyro_page.write(args.out, sections, gyro_run.facts(options))
+    for section in sections:
+        print(gyro_grading.console_table(section))
+    print(gyro_grading.verdict(sections))
+    print(f"report: {page}")
+    return 0 if gyro_grading.within_limits(sections) else 1
 
 
 def _record(args: argparse.Namespace) -> int:

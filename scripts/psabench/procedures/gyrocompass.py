@@ -7,7 +7,7 @@ the errata and what the article's figures are worth: docs/procedures/gyrocompass
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -46,7 +46,7 @@ OFF_LIMIT_RAD = math.radians(1.0)  # encoder against the angle asked for: beyond
 class GyrocompassParams:
     """Parameters of `gyrocompass`; the defaults are the article's reading, READINGS has the others."""
 
-    positions: str = option("0,90,180", "deg", "gimbal angles in the order of measurement, 32 at most")
+    sequence: str = option("0,90,180", "deg", "gimbal angles in the order of measurement, 32 at most")
     repeat: int = option(1, "", "times over")
     window_s: float = option(10.0, "s", "measurement in each position")
     settle_s: float = option(10.0, "s", "from the end of a turn to its window")
@@ -88,13 +88,13 @@ class GyrocompassParams:
 
     @property
     def angles_deg(self) -> tuple[float, ...]:
-        """`positions` as numbers."""
+        """`sequence` as numbers."""
         try:
-            found = tuple(float(x) for x in self.positions.split(","))
+            found = tuple(float(x) for x in self.sequence.split(","))
         except ValueError:
-            raise ValueError(f"positions is {self.positions!r}; it must be angles in degrees, as 0,90,180") from None
+            raise ValueError(f"sequence is {self.sequence!r}; it must be angles in degrees, as 0,90,180") from None
         if not all(abs(a) <= 360.0 for a in found):
-            raise ValueError(f"positions is {self.positions!r}; each must lie within +-360 deg")
+            raise ValueError(f"sequence is {self.sequence!r}; each must lie within +-360 deg")
         return found
 
     @property
@@ -117,7 +117,7 @@ class GyrocompassParams:
 READINGS: Mapping[str, Mapping[str, Any]] = {
     "article": {},
     "improved": {
-        "positions": "0,180,90,270",
+        "sequence": "0,180,90,270",
         "repeat": 6,
         "window_s": 5.0,
         "settle_s": 5.0,
@@ -158,10 +158,12 @@ def rehearse(p: GyrocompassParams) -> None:
 # ---- the run
 
 
-def measure(bench: PlatformBench, p: GyrocompassParams, progress: Progress) -> tuple[Window, ...]:
+def measure(
+    bench: PlatformBench, p: GyrocompassParams, progress: Progress, *, seen: Callable[[], None] = lambda: None
+) -> tuple[Window, ...]:
     """Level, go through the positions, calibrate: the last window is the calibration's if there is one.
 
-    Raises LinkError where the platform does not do it.
+    seen: called soon after the end of each window of the run. Raises LinkError where the platform does not do it.
     """
     bench.prepare(latitude_rad=p.latitude_rad, m1_per_s=p.m1_per_s, m2_per_s=p.m2_per_s)
     with progress.step("levelling", 1) as done:
@@ -169,7 +171,12 @@ def measure(bench: PlatformBench, p: GyrocompassParams, progress: Progress) -> t
         done()
     table = p.table
     with progress.step("gyrocompassing", len(table.sequence_deg)) as done:
-        windows = tuple(bench.measure(table, done))
+
+        def over() -> None:
+            seen()
+            done()
+
+        windows = tuple(bench.measure(table, over))
     if p.calibrate_s:
         with progress.step("calibrating the azimuth axis", 1) as done:
             windows += (bench.calibrate(p.calibrate_s, p.settle_s),)

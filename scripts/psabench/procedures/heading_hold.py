@@ -106,18 +106,23 @@ def hold(
     _tell(bench, p, latitude)
     bench.navigate(Compensation(azimuth_rad=azimuth_rad, drift1_radps=start.compass.drift1_radps, drift2_radps=drift2))
     begun_s = bench.t_s
+    held: list[Held] = []
+
+    def look() -> None:
+        level = bool(p.speed_mps and held)
+        held.append(_held(bench.look(), azimuth_rad, begun_s, start, level))
+        watch(held[-1])
+
+    look()
     if p.speed_mps:
         depart()
-    held = []
     with progress.step("keeping heading", p.looks) as done:
-        for k in range(p.looks + 1):
-            if k:
-                bench.wait(begun_s + k * p.look_s - bench.t_s)
-                latitude = _moved(latitude, p)
-                _tell(bench, p, latitude)
-                done()
-            held.append(_held(bench.look(), azimuth_rad, begun_s, start, p, drift2))
-            watch(held[-1])
+        for k in range(p.looks):
+            bench.wait(begun_s + (k + 1) * p.look_s - bench.t_s)
+            look()
+            latitude = _moved(latitude, p)
+            _tell(bench, p, latitude)
+            done()
     return HoldResult(params=p, start=start, drift2_radps=drift2, held=tuple(held))
 
 
@@ -127,30 +132,26 @@ def _alpha(start: GyrocompassResult, look: Look) -> float:
     return nav.alpha(psi_rad=start.heading_rad, q_rad=look.encoder_rad, pitch_rad=a.pitch_rad, roll_rad=a.roll_rad)
 
 
-def _held(
-    look: Look, azimuth_rad: float, begun_s: float, start: GyrocompassResult, p: HoldParams, drift2_radps: float
-) -> Held:
+def _held(look: Look, azimuth_rad: float, begun_s: float, start: GyrocompassResult, level: bool) -> Held:
     """Heading of a vehicle that stands as it stood, or flies level."""
     a = start.attitude
-    pitch, roll = (0.0, 0.0) if p.speed_mps else (a.pitch_rad, a.roll_rad)
+    pitch, roll = (0.0, 0.0) if level else (a.pitch_rad, a.roll_rad)
     t_s = look.t_s - begun_s
     return Held(
         t_s=t_s,
         heading_rad=nav.heading(azimuth_rad, look.encoder_rad, pitch_rad=pitch, roll_rad=roll),
-        sd_rad=nav.hold_sd_rad(_growth(start, drift2_radps), t_s),
+        sd_rad=nav.hold_sd_rad(_growth(start), t_s),
         faults=look.faults,
     )
 
 
-def _growth(start: GyrocompassResult, drift2_radps: float) -> nav.Hold:
-    """What the error grows like if the compensation is right on average: drift and heading as they were found."""
+def _growth(start: GyrocompassResult) -> nav.Hold:
+    """What the error grows by: the heading and the drift as they were found, and the random drift from then on."""
     p = start.params
-    gm = p.gm_sigma_degph * DEGPH
-    found_sd = start.get("drift2_degph").sd * DEGPH
     return nav.Hold(
         heading_sd_rad=math.radians(start.get("heading_deg").sd),
-        drift_sd_radps=math.sqrt(max(0.0, found_sd**2)),
-        gm_sigma_radps=gm,
+        drift_sd_radps=start.get("drift2_degph").sd * DEGPH,
+        gm_sigma_radps=p.gm_sigma_degph * DEGPH,
         gm_tau_s=max(p.gm_tau_s, 1.0),
     )
 

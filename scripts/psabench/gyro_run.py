@@ -1,0 +1,184 @@
+"""`psabench run gyrocompass` and `heading-hold`: the runs over the wire, their truth, the report.
+
+Without --can and --control each reading gets an emulator of its own with the same scenario and seed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from psabench.bench import Bench
+from psabench.devices import Gyro
+from psabench.errors import BadInput
+from psabench.gyro_grading import GyroSection, HeldTruth
+from psabench.procedures import gyrocompass, heading_hold
+from psabench.procedures.gyrocompass import GyrocompassParams, GyrocompassResult
+from psabench.procedures.head_bench import Progress
+from psabench.procedures.heading_hold import Held, HoldParams
+from psabench.procedures.result import option
+from psabench.wire_platform import WirePlatform
+
+SCENARIO = "gyrocompass"
+BOTH = "both"
+SUMMARIES: Mapping[str, str] = {
+    gyrocompass.NAME: gyrocompass.SUMMARY,
+    heading_hold.NAME: heading_hold.SUMMARY,
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReadingParams:
+    """Which reading of the article."""
+
+    reading: str = option(
+        BOTH, "", f"{', '.join(gyrocompass.READINGS)} or {BOTH}; gives the other parameters their values"
+    )
+
+    def __post_init__(self) -> None:
+        if self.reading not in (*gyrocompass.READINGS, BOTH):
+            raise ValueError(
+                f"reading is {self.reading!r}; it must be one of {', '.join(gyrocompass.READINGS)}, {BOTH}"
+            )
+
+    @property
+    def readings(self) -> tuple[str, ...]:
+        return tuple(gyrocompass.READINGS) if self.reading == BOTH else (self.reading,)
+
+
+# Parameters of each procedure, by their dataclasses.
+PARAMS: Mapping[str, tuple[type[Any], ...]] = {
+    gyrocompass.NAME: (ReadingParams, GyrocompassParams),
+    heading_hold.NAME: (ReadingParams, HoldParams, GyrocompassParams),
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GyroOptions:
+    """What the command line asked for."""
+
+    procedure: str
+    out: Path
+    can: str | None = None
+    control: Path | None = None
+    truth: Path | None = None
+    scenario: Path | None = None
+    seed: int | None = None
+    real_time: bool = False
+    params: Mapping[str, Any] = field(default_factory=dict)  # fields of the parameters, by name
+
+
+def fields_of(procedure: str) -> dict[str, Any]:
+    """All parameters of a procedure, dataclass fields by name."""
+    return {name: f for kind in PARAMS[procedure] for name, f in kind.__dataclass_fields__.items()}
+
+
+def _part(kind: type[Any], given: Mapping[str, Any]) -> dict[str, Any]:
+    return {k: v for k, v in given.items() if k in kind.__dataclass_fields__}
+
+
+def _made(kind: type[Any], procedure: str, given: Mapping[str, Any]) -> Any:
+    try:
+        return kind(**_part(kind, given))
+    except ValueError as e:
+        raise BadInput(f"{procedure}: {e}") from e
+
+
+def run(options: GyroOptions, progress: Progress) -> list[GyroSection]:
+    """Every reading that was asked for. Parameters are checked before anything starts. Raises BenchError."""
+    readings: ReadingParams = _made(ReadingParams, options.procedure, options.params)
+    given = _part(GyrocompassParams, options.params)
+    params = [(name, gyrocompass.params_of(name, given)) for name in readings.readings]
+    hold_params = _made(HoldParams, options.procedure, options.params) if _holds(options) else None
+    options.out.mkdir(parents=True, exist_ok=True)
+    return [_one(name, p, hold_params, options, progress) for name, p in params]
+
+
+def facts(options: GyroOptions) -> dict[str, str]:
+    """What the report says of the run."""
+    there = " ".join(str(x) for x in (options.can, options.control) if x)
+    return {
+        "procedure": options.procedure,
+        "bench": there or str(options.scenario or SCENARIO),
+        "seed": "of the scenario" if options.seed is None else str(options.seed),
+        "pace": "real time" if options.real_time else "simulated time",
+    }
+
+
+def _holds(options: GyroOptions) -> bool:
+    return options.procedure == heading_hold.NAME
+
+
+def _one(
+    label: str, p: GyrocompassParams, hold_params: HoldParams | None, options: GyroOptions, progress: Progress
+) -> GyroSection:
+    with _bench(options) as bench:
+        if options.scenario and not any(isinstance(u, Gyro) for u in bench.units.values()):
+            raise BadInput(f"--scenario {options.scenario}: it has no gyro unit; {SCENARIO} has one")
+        platform = WirePlatform(bench, signals=p.signals)
+        truth = _Truth(bench)
+        windows = gyrocompass.measure(platform, p, progress, seen=truth.window)
+        result = gyrocompass.estimate(windows, p)
+        section = GyroSection(label=label, result=result, truth=truth.of(result))
+        if hold_params is None or result.doubts:
+            return section  # navigation does not begin with a heading that is in doubt
+        hold = heading_hold.hold(
+            platform, result, hold_params, progress, watch=truth.look, depart=lambda: _depart(bench, hold_params)
+        )
+        return GyroSection(label=label, result=result, truth=section.truth, hold=hold, hold_truth=truth.held())
+
+
+def _bench(options: GyroOptions) -> Bench:
+    if options.can or options.control:
+        return Bench.connect(options.can, control=options.control, truth=options.truth)
+    pace = "wall" if options.real_time else "step"
+    resolved: list[str | Path] = ["--resolved", options.out / f"scenario-{SCENARIO}.json"]
+    return Bench.start(options.scenario or SCENARIO, pace=pace, seed=options.seed, extra=resolved)
+
+
+def _depart(bench: Bench, p: HoldParams) -> None:
+    """An emulated vehicle flies, level, when it is told to; a real one has a pilot."""
+    if bench.pace != "real":
+        bench.control.call("vehicle.attitude", heading_deg=p.track_deg, pitch_deg=0.0, roll_deg=0.0)
+        bench.control.call("vehicle.fly", speed_mps=p.speed_mps, track_deg=p.track_deg)
+
+
+class _Truth:
+    """What the truth port says after each window and at each look, where there is one."""
+
+    def __init__(self, bench: Bench) -> None:
+        self._bench = bench
+        self._there = bench.truth_path is not None
+        self._windows: list[Mapping[str, Any]] = []
+        self._headings: list[float] = []
+
+    def window(self) -> None:
+        if self._there:
+            self._windows.append(self._bench.truth_state())
+
+    def look(self, _: Held) -> None:
+        if self._there:
+            self._headings.append(float(self._bench.truth_state()["vehicle"]["heading_deg"]))
+
+    def held(self) -> HeldTruth | None:
+        return HeldTruth(heading_deg=tuple(self._headings)) if self._there else None
+
+    def of(self, result: GyrocompassResult) -> dict[str, float] | None:
+        """By name of the estimate: attitude at the end, drifts as means over the windows."""
+        if not self._windows:
+            return None
+        drifts = [state["platform"]["drift_degph"] for state in self._windows]
+        vehicle = self._windows[-1]["vehicle"]
+        return {
+            "heading_deg": float(vehicle["heading_deg"]) % 360.0,
+            "drift1_degph": _mean([float(d[0]) for d in drifts]),
+            "drift2_degph": _mean([float(d[1]) for d in drifts]),
+            "pitch_deg": float(vehicle["pitch_deg"]),
+            "roll_deg": float(vehicle["roll_deg"]),
+        }
+
+
+def _mean(values: Sequence[float]) -> float:
+    return sum(values) / len(values)
