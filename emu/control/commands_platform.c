@@ -1,23 +1,23 @@
 /* Commands of the vehicle under the gyro-stabilised platform, and of the gyro unit's panel. */
+#include "control/args.h"
 #include "control/commands.h"
-
-#include <string.h>
 
 static struct platform *platform_of(const struct control_bench *b)
 {
     return b->lab && b->lab->platform.cfg.present ? &b->lab->platform : NULL;
 }
 
-static enum control_outcome no_platform(struct control *c)
+static bool stands(const struct control_bench *b, const struct control_value *v, struct control_refusal *why)
 {
-    return control_refuse(c, "state", "there is no platform in this scenario, and no vehicle under it");
+    (void)v;
+    return platform_of(b) ||
+           control_refuse_in(why, "state", "there is no platform in this scenario, and no vehicle under it");
 }
 
 static enum control_outcome do_attitude(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
 {
     struct platform *p = platform_of(c->bench);
     (void)result;
-    if (!p) return no_platform(c);
     control_settle_inputs(c->bench, t_ns);
     vehicle_attitude(platform_vehicle(p, t_ns), v[0].real, v[1].real, v[2].real, t_ns);
     return CONTROL_DONE;
@@ -29,7 +29,6 @@ static enum control_outcome do_sway(struct control *c, const struct control_valu
     const struct vehicle_sway sway = {
         .pitch_arcmin = v[0].real, .pitch_s = v[1].real, .roll_arcmin = v[2].real, .roll_s = v[3].real};
     (void)result;
-    if (!p) return no_platform(c);
     control_settle_inputs(c->bench, t_ns);
     vehicle_sway(platform_vehicle(p, t_ns), &sway, t_ns);
     return CONTROL_DONE;
@@ -39,7 +38,6 @@ static enum control_outcome do_fly(struct control *c, const struct control_value
 {
     struct platform *p = platform_of(c->bench);
     (void)result;
-    if (!p) return no_platform(c);
     control_settle_inputs(c->bench, t_ns);
     vehicle_fly(platform_vehicle(p, t_ns), v[0].real, v[1].real, t_ns);
     return CONTROL_DONE;
@@ -49,12 +47,17 @@ static enum control_outcome do_fly(struct control *c, const struct control_value
 
 static const char *const modes[] = {"off", "level", "hold", "slew", "gyrocompass", "calibrate", "navigate", NULL};
 
+static bool has_modes(const struct control_bench *b, const struct control_value *v, struct control_refusal *why)
+{
+    const struct unit *u = b->unit[v[0].unit];
+    return u->type->set_mode ||
+           control_refuse_in(why, "state", "%s is a %s: a gyro unit has modes", u->cfg.name, u->type->title);
+}
+
 static enum control_outcome do_mode(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
 {
     struct unit *u = c->bench->unit[v[0].unit];
     (void)result;
-    if (!u->type->set_mode)
-        return control_refuse(c, "state", "%s is a %s: a gyro unit has modes", u->cfg.name, u->type->title);
     const char *why = u->type->set_mode(u->board, v[1].choice, t_ns);
     return why ? control_refuse(c, "state", "%s", why) : CONTROL_DONE;
 }
@@ -64,17 +67,17 @@ static const struct control_command rows[] = {
     {"vehicle.attitude", "Turns the vehicle under the platform to another mean attitude, at the scenario's rates.",
      {{"heading_deg", CONTROL_REAL, false, "deg", -360, 360, .what = "from north, clockwise; it turns the shorter way"},
       {"pitch_deg", CONTROL_REAL, false, "deg", -30, 30, .what = "nose up"},
-      {"roll_deg", CONTROL_REAL, false, "deg", -30, 30, .what = "right side down"}}, .run = do_attitude, .changes = true},
+      {"roll_deg", CONTROL_REAL, false, "deg", -30, 30, .what = "right side down"}}, .run = do_attitude, .changes = true, .check = stands},
     {"vehicle.sway", "Lets the vehicle sway about its mean attitude from now on; amplitudes or periods of 0 end it.",
      {{"pitch_arcmin", CONTROL_REAL, false, "arcmin", 0, 600, .what = "amplitude of the pitch"},
       {"pitch_s", CONTROL_REAL, false, "s", 0, 1000, .what = "its period"},
       {"roll_arcmin", CONTROL_REAL, false, "arcmin", 0, 600, .what = "amplitude of the roll"},
-      {"roll_s", CONTROL_REAL, false, "s", 0, 1000, .what = "its period"}}, .run = do_sway, .changes = true},
+      {"roll_s", CONTROL_REAL, false, "s", 0, 1000, .what = "its period"}}, .run = do_sway, .changes = true, .check = stands},
     {"vehicle.fly", "Brings the vehicle to a speed and a track, which is its heading; 0 m/s parks it.",
      {{"speed_mps", CONTROL_REAL, false, "m/s", 0, 1000, .what = "over ground"},
-      {"track_deg", CONTROL_REAL, false, "deg", -360, 360, .what = "from north, clockwise"}}, .run = do_fly, .changes = true},
+      {"track_deg", CONTROL_REAL, false, "deg", -360, 360, .what = "from north, clockwise"}}, .run = do_fly, .changes = true, .check = stands},
     {"gyro.mode", "Gives a gyro unit a mode, as its object 2100h does: a panel for scenarios without a host.",
-     {CONTROL_UNIT_ARG(false), {"mode", CONTROL_CHOICE, .what = "which", .choices = modes}}, .run = do_mode, .changes = true},
+     {CONTROL_UNIT_ARG(false), {"mode", CONTROL_CHOICE, .what = "which", .choices = modes}}, .run = do_mode, .changes = true, .check = has_modes},
 };
 // clang-format on
 const struct control_table commands_platform = {rows, sizeof rows / sizeof *rows};

@@ -26,6 +26,7 @@ NAMES = {m[1]: m[2] for m in re.finditer(r'\{"(\w+)", &(\w+)_board, ', LIST)}  #
 ALL = sorted(NAMES)
 LINE_BYTES = 190_000  # 0.1 s at 2 MHz, but for what is not known yet at its end
 SETUP_S = 0.4  # of the slowest board
+PLATFORM = "site: {latitude_deg: 50}\nplatform: {}\n"  # what a gyro unit controls
 GENTLE = "seed: 3\nhead: {turn_s: 0}\nunits:\n"
 SENSORS = (
     "axes: {x: {sensor: mems, u0_v: 0.2, kx_v_per_g: 0.5, reading_noise_v: 1.0e-4}, y: {sensor: mems, kx_v_per_g: 0.5}}"
@@ -35,7 +36,9 @@ SENSORS = (
 def scenario(folder: Path, *boards: str) -> Path:
     """One unit of each of these boards, on one bus."""
     path = folder / "boards.yaml"
-    path.write_text(GENTLE + "".join(f"  - {{name: {b}, {SENSORS}, board: {b}}}\n" for b in boards))
+    head = f"{PLATFORM}{GENTLE}" if "gyro" in boards else GENTLE
+    sensors = {b: "" if b == "gyro" else f"{SENSORS}, " for b in boards}  # it has no inputs of its own
+    path.write_text(head + "".join(f"  - {{name: {b}, {sensors[b]}board: {b}}}\n" for b in boards))
     return path
 
 
