@@ -32,6 +32,7 @@ VALUES: dict[str, dict[str, object]] = {
     "line.noise": {"rate_hz": 1, "width_ns": 1},
     "link.delay": {"hold_s": 1},
     "supply.brownout": {"drop_v": 12, "for_s": 1},
+    "platform.drift_step": {"drift_degph": 1},
 }
 
 

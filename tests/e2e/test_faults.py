@@ -495,7 +495,10 @@ def kinds_told() -> list[str]:
         return [k["kind"] for k in host.call("fault.kinds")["kinds"]]
 
 
-ELSEWHERE = ("controller.capacitor", "controller.stuck_reset", "controller.stuck_key")  # test_faults_boards.py
+ELSEWHERE = (
+    *("controller.capacitor", "controller.stuck_reset", "controller.stuck_key"),  # test_faults_boards.py
+    *("platform.torquer", "platform.drift_step", "platform.encoder_stuck"),  # test_gyro.py
+)
 
 
 def test_no_kind_is_left_out() -> None:
