@@ -44,6 +44,7 @@ static inline struct psa2_profile psa2_profile_file(const char *name)
             (void)snprintf(key, sizeof key, "%s", text);
             item = 0;
             char *value = psa2_trim(colon + 1);
+            if (strcmp(key, "board") == 0) continue; /* whose it is; not the profile's */
             if (value[0] == '[')
                 for (char *e = strtok(value, "[],"); e; e = strtok(NULL, "[],")) psa2_set(&p, key, item++, e);
             else if (value[0]) psa2_set(&p, key, 0, value);
