@@ -24,6 +24,7 @@ from psabench import (
     report,
     run,
 )
+from psabench.campaign import command as campaign_command
 from psabench.can_host import open_bus
 from psabench.devices import ALIASES
 from psabench.errors import BadInput, BenchError
@@ -46,6 +47,7 @@ a first hour:
   psabench record run.log --can socketcand:127.0.0.1:29536 --for 10
   psabench decode run.log --out run.csv   volts against time
   psabench shell                    registers, instruments and faults at the keyboard
+  psabench campaign gyrocompass     thousands of virtual gyrocompasses; build/campaign/report.html
 
 psabench COMMAND --help says more. Exit status: 0 done and within limits, 1 done and out of limits, 2 bad input,
 3 the bench or a link failed, 130 ended by Ctrl-C.
@@ -127,6 +129,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_run(commands)
     _add_record(commands)
     _add_decode(commands)
+    campaign_command.add(commands, _Help, natural)
     command_line.add(commands, _Help, BUS_HELP, node_id)
     return top
 

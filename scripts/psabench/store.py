@@ -149,13 +149,13 @@ class Store:
             origin.key,
         )
         for first, count, digest, data in parts:
-            if at >= runs or first != at:
+            if at >= runs or first > at:
                 break
             whole = len(data) == count * width * CELL.itemsize and hashlib.sha256(data).digest() == digest
             if not whole:
                 raise BadInput(f"{self.path}: runs {first} to {first + count - 1} of {origin.kind} are damaged")
-            found.append(np.frombuffer(data, CELL).reshape(count, width))
-            at += count
+            found.append(np.frombuffer(data, CELL).reshape(count, width)[at - first :])
+            at = max(at, first + count)
         if at < runs:
             raise BadInput(f"{self.path}: {origin.kind}: {at} runs of {runs}")
         return np.concatenate([*found, np.empty((0, width), CELL)])[:runs]

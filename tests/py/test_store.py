@@ -75,6 +75,13 @@ def test_a_part_grows_and_a_series_can_be_forgotten(tmp_path: Path) -> None:
         assert db.execute("SELECT count(*) FROM part").fetchone() == (1,)
 
 
+def test_parts_may_overlap(tmp_path: Path) -> None:
+    """As when a later version cuts the work in other pieces."""
+    with Store(tmp_path / "s") as store:
+        store.put([part(0, 10), part(10, 10), part(0, 15), part(15, 10), part(16, 4)])
+        assert np.array_equal(store.rows(ORIGIN, 25), rows(0, 25))
+
+
 def test_missing_and_damaged_runs_are_refused(tmp_path: Path) -> None:
     with Store(tmp_path / "s") as store:
         store.put([part(0, 10), part(20, 10)])

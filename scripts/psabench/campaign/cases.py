@@ -1,0 +1,271 @@
+"""The studies of a campaign of gyrocompassing: which set-ups are computed, and what a reader sees beside them.
+
+A study is a list of cases; a case is a set-up through a chain, so many runs of it. The article's sentence, one by one
+(readings), one source of error at a time, scans, and the hold. What must come out stands in `claims`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+
+from psabench.campaign.setup import Hold, Setup
+
+QUIET = {  # no error at all; a study of single sources adds one
+    "latitude_error_arcmin": 0.0,
+    "gm_sigma_degph": 0.0,
+    "beta_sys_arcmin": 0.0,
+    "gamma_sys_arcmin": 0.0,
+    "beta_random_arcmin": 0.0,
+    "gamma_random_arcmin": 0.0,
+    "angle_sys_arcmin": 0.0,
+    "angle_random_arcmin": 0.0,
+    "simplified": False,
+}
+# White noise drawn each 10 ms without 1/sqrt(dt), in a filter that starts at rest, makes this of 0.2 deg/h.
+SMALL_GM = {"gm_sigma_degph": 0.02, "gm_from_zero": True}
+ENCODER = {
+    "encoder": True,
+    "angle_sys": "none",
+    "angle_random_arcmin": 0.5,
+    "simplified": False,
+}  # read, instead of the set angle
+ARTICLE = {**SMALL_GM, "angle_sys": "none"}  # the reading in which the article's figures hold
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Case:
+    """A set-up with what the report calls it; `x` is where it stands on the axis of a scan."""
+
+    study: str
+    name: str
+    title: str
+    setup: Setup
+    hold: Hold | None = None
+    curve: str = ""
+    x: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Study:
+    """Cases that belong together; `axis` is the scan's, empty for a table."""
+
+    name: str
+    title: str
+    cases: Callable[[Setup], Iterator[Case]]
+    axis: str = ""
+    figure: str = "p95"  # on the vertical axis: p95 or sd of the platform's error
+    log_y: bool = False
+
+
+def _readings(base: Setup) -> Iterator[Case]:
+    rows: tuple[tuple[str, str, Mapping[str, object]], ...] = (
+        ("R0", "literal: exact Gauss-Markov drift, 6' shared by all positions", {}),
+        ("R1", "6' on the second and third position only", {"angle_sys": "increment"}),
+        ("R2", "6' adds up from step to step", {"angle_sys": "accumulates"}),
+        ("R3", "6' not counted", {"angle_sys": "none"}),
+        ("R4", "no random drift, eq. (15)", {"gm_sigma_degph": 0.0}),
+        ("R5", "random drift of 0.02 deg/h, 6' counted", SMALL_GM),
+        ("R5n", "the same, 6' not counted: the article's figures", ARTICLE),
+        ("R6", "exact drift that starts from zero", {"gm_from_zero": True}),
+        ("R7", "exact drift, windows back to back", {"gap_s": 0.0}),
+        ("R11", "random errors average out in a window, 0.02 deg/h, 6' not counted", {**ARTICLE, "per_sample": True}),
+        ("R11+", "the same, 6' counted", {**SMALL_GM, "per_sample": True}),
+        ("cardan", "0.02 deg/h, steps of the gimbal taken for steps of azimuth", {**ARTICLE, "gimbal": "uncorrected"}),
+        ("cardan fixed", "the same, corrected", {**ARTICLE, "gimbal": "corrected", "simplified": False}),
+        ("improved", "(0, 180, 90, 270) six times, 5 s each, encoder read, GLS, exact drift", _improved()),
+    )
+    for name, title, change in rows:
+        yield Case(study="readings", name=name, title=title, setup=_with(base, change))
+
+
+def _improved() -> dict[str, object]:
+    return {**ENCODER, "angles_deg": (0.0, 180.0, 90.0, 270.0) * 6, "window_s": 5.0, "gap_s": 5.0, "method": "gls"}
+
+
+def _sources(base: Setup) -> Iterator[Case]:
+    rows: tuple[tuple[str, Mapping[str, object]], ...] = (
+        ("exact random drift 0.2 deg/h", {"gm_sigma_degph": 0.2}),
+        ("exact random drift, back to back", {"gm_sigma_degph": 0.2, "gap_s": 0.0}),
+        ("random drift 0.02 deg/h", SMALL_GM),
+        ("gimbal steps uncorrected", {"gimbal": "uncorrected"}),
+        ("azimuth random 3'", {"angle_random_arcmin": 3.0}),
+        ("azimuth 6', common", {"angle_sys_arcmin": 6.0}),
+        ("azimuth 6' on increments", {"angle_sys_arcmin": 6.0, "angle_sys": "increment"}),
+        ("azimuth 6' a step", {"angle_sys_arcmin": 6.0, "angle_sys": "accumulates"}),
+        ("level sensors random 1'", {"beta_random_arcmin": 1.0, "gamma_random_arcmin": 1.0}),
+        ("gamma systematic 10'", {"gamma_sys_arcmin": 10.0}),
+        ("beta systematic 10'", {"beta_sys_arcmin": 10.0}),
+        ("latitude 0.1'", {"latitude_error_arcmin": 0.1}),
+        ("torquer scale 0.1 %", {"torquer_scale": 1e-3}),
+        ("torquer scale 1 %", {"torquer_scale": 1e-2}),
+    )
+    for title, change in rows:
+        yield Case(study="sources", name=title, title=title, setup=_with(base, {**QUIET, **change}))
+
+
+GM_CURVES: tuple[tuple[str, Mapping[str, object]], ...] = (
+    ("exact drift 0.2 deg/h", {}),
+    ("drift 0.02 deg/h", SMALL_GM),
+)
+
+
+def _step(base: Setup) -> Iterator[Case]:
+    white = {**QUIET, "white_degph_rts": 0.05 * base.window_s**0.5}  # 0.05 deg/h a window
+    curves = (
+        *GM_CURVES,
+        ("white 0.05 deg/h", white),
+        ("white, constrained fit", {**white, "method": "constrained"}),
+    )
+    for curve, change in curves:
+        for step_deg in (30, 45, 60, 75, 90, 105, 120, 135, 150):
+            angles_deg = (0.0, float(step_deg), 2.0 * step_deg)
+            yield _scan("step", curve, step_deg, _with(base, {**change, "angles_deg": angles_deg}))
+
+
+def _latitude(base: Setup) -> Iterator[Case]:
+    for curve, change in GM_CURVES:
+        for latitude_deg in (0, 15, 30, 45, 50, 60, 70, 80):
+            yield _scan("latitude", curve, latitude_deg, _with(base, {**change, "latitude_deg": float(latitude_deg)}))
+
+
+def _tilt(base: Setup) -> Iterator[Case]:
+    small: dict[str, object] = {**ARTICLE, "tilt": "corners"}
+    curves: tuple[tuple[str, Mapping[str, object]], ...] = (
+        ("azimuth set about the vertical, (14)", small),
+        ("gimbal steps uncorrected", {**small, "gimbal": "uncorrected"}),
+        ("gimbal steps corrected, (13)", {**small, "gimbal": "corrected", "simplified": False}),
+    )
+    for curve, change in curves:
+        for tilt_deg in (0, 1, 2, 3, 4, 5, 7, 10):
+            yield _scan("tilt", curve, tilt_deg, _with(base, {**change, "tilt_deg": float(tilt_deg)}))
+
+
+def _time(base: Setup) -> Iterator[Case]:
+    curves: tuple[tuple[str, Mapping[str, object]], ...] = (
+        ("exact drift, windows alone", {**ENCODER, "gap_s": 10.0}),
+        ("drift 0.02 deg/h, windows alone", {**ENCODER, **SMALL_GM, "gap_s": 10.0}),
+        # 1.9 deg/h sqrt(s) is what level noise of 0.1' a sample leaves of S by the slope of 10 s: sources 5.1
+        ("white noise only", {**QUIET, "white_degph_rts": 0.05 * 10.0**0.5}),
+    )
+    for curve, change in curves:
+        for window_s in (2, 5, 10, 20, 30, 60, 120):
+            yield _scan("time", curve, window_s, _with(base, {**change, "window_s": float(window_s)}))
+
+
+def _order(base: Setup) -> Iterator[Case]:
+    even: dict[str, object] = {**ENCODER, "method": "lsq", "window_s": 10.0, "gap_s": 10.0}
+    fast: dict[str, object] = {**even, "window_s": 5.0, "gap_s": 5.0}
+    monotone, fair = (0.0, 90.0, 180.0, 270.0), (0.0, 180.0, 90.0, 270.0)
+    rows: tuple[tuple[str, tuple[float, ...], Mapping[str, object]], ...] = (
+        ("0, 90, 180", (0.0, 90.0, 180.0), even),
+        ("0, 120, 240", (0.0, 120.0, 240.0), even),
+        ("0, 90, 180, 270", monotone, even),
+        ("the same, GLS", monotone, {**even, "method": "gls"}),
+        ("0, 180, 90, 270", fair, even),
+        ("0, 180, 180, 0, 90, 270, 270, 90", (0.0, 180.0, 180.0, 0.0, 90.0, 270.0, 270.0, 90.0), even),
+        ("six, 60 apart", tuple(60.0 * i for i in range(6)), even),
+        ("eight, 45 apart", tuple(45.0 * i for i in range(8)), even),
+        ("(0, 180, 90, 270) x4", fair * 4, even),
+        ("(0, 180, 90, 270) x6, 5 s", fair * 6, fast),
+        ("the same, GLS", fair * 6, {**fast, "method": "gls"}),
+    )
+    for i, (title, angles_deg, change) in enumerate(rows):
+        name = f"{i + 1}: {title}"
+        yield Case(study="order", name=name, title=title, setup=_with(base, {**change, "angles_deg": angles_deg}))
+
+
+def _slew(base: Setup) -> Iterator[Case]:
+    """With the time that turns take: how long a run must be for 0.1 deg at 95 %."""
+    fit: dict[str, object] = {**ENCODER, "method": "gls_constrained", "window_s": 5.0, "settle_s": 7.0}
+    for slew_dps in (9.0, 30.0):
+        for total_s in (60, 120, 180, 240, 360):
+            angles_deg = _fill((0.0, 120.0, 240.0, 120.0), total_s, 5.0, 7.0, slew_dps)
+            change = {**fit, "slew_dps": slew_dps, "angles_deg": angles_deg}
+            yield _scan("slew", f"{slew_dps:g} deg/s", total_s, _with(base, change))
+
+
+def _fill(
+    pattern: tuple[float, ...], total_s: float, window_s: float, settle_s: float, slew_dps: float
+) -> tuple[float, ...]:
+    """As many positions of the pattern, over and over, as the time allows; three at least."""
+    angles, spent_s = [pattern[0]], window_s
+    while len(angles) < 64:
+        following = pattern[len(angles) % len(pattern)]
+        spent_s += abs(following - angles[-1]) / slew_dps + settle_s + window_s
+        if spent_s > total_s and len(angles) >= 3:
+            break
+        angles.append(following)
+    return tuple(angles)
+
+
+def _hold(base: Setup) -> Iterator[Case]:
+    exact: dict[str, object] = {"angle_sys": "none"}
+    averaged: dict[str, object] = {**ARTICLE, "per_sample": True}
+    fixed = Hold(axis2="fixed")
+    flight = Hold(v_east_kmph=500.0, speed_error=0.01)
+    rows: tuple[tuple[str, Mapping[str, object], Hold], ...] = (
+        ("0.1 deg and 0.05 deg/h, nothing else", {"gm_sigma_degph": 0.0}, fixed),
+        ("the same and exact drift from zero", {"gm_from_zero": True}, fixed),
+        ("whole chain, exact drift", exact, Hold()),
+        ("whole chain, exact drift from zero", {**exact, "gm_from_zero": True}, Hold()),
+        ("article: 0.02 deg/h, 6' not counted", ARTICLE, Hold()),
+        ("article: 0.02 deg/h, 6' counted", SMALL_GM, Hold()),
+        ("R11, levelling 10' in flight", averaged, Hold(level_arcmin=10.0)),
+        ("R11, latitude off by 10'", averaged, Hold(latitude_error_arcmin=10.0)),
+        ("R11, 500 km/h east, speed off by 1 %", averaged, flight),
+        ("R11, azimuth axis' drift differs by 0.1 deg/h", averaged, Hold(axis2="differs", axis2_sd_degph=0.1)),
+        ("R11, azimuth axis' drift differs by 1 deg/h", averaged, Hold(axis2="differs", axis2_sd_degph=1.0)),
+        ("R11, azimuth axis' drift measured", averaged, Hold(axis2="measured")),
+    )
+    for title, change, hold in rows:
+        yield Case(study="hold", name=title, title=title, setup=_with(base, change), hold=hold)
+
+
+def _wire(base: Setup) -> Iterator[Case]:
+    """What the emulated chain can do as well: turns take time and are of the gimbal."""
+    turns: dict[str, object] = {"gimbal": "corrected", "slew_dps": 9.0, "settle_s": 10.0}
+    fair: dict[str, object] = {**ENCODER, **turns, "angles_deg": (0.0, 180.0, 90.0, 270.0), "method": "gls"}
+    rows: tuple[tuple[str, str, Mapping[str, object]], ...] = (
+        ("article", "article mode: 0.02 deg/h, 6' not counted, 9 deg/s between windows", {**ARTICLE, **turns}),
+        ("literal", "exact drift, 6' counted", turns),
+        ("better", "0, 180, 90, 270, encoder read, GLS, exact drift", {**fair, "window_s": 5.0, "settle_s": 5.0}),
+    )
+    for name, title, change in rows:
+        yield Case(study="wire", name=name, title=title, setup=_with(base, change))
+
+
+def _own(base: Setup) -> Iterator[Case]:
+    yield Case(study="own", name="own", title="as --set says", setup=base)
+
+
+def _scan(study: str, curve: str, x: float, setup: Setup) -> Case:
+    return Case(study=study, name=f"{curve}, {x:g}", title=curve, setup=setup, curve=curve, x=float(x))
+
+
+def _with(base: Setup, change: Mapping[str, object]) -> Setup:
+    return replace(base, **change)  # type: ignore[arg-type]  # names and types are checked by Setup
+
+
+STUDIES: Mapping[str, Study] = {
+    s.name: s
+    for s in (
+        Study(name="readings", title="The article's sentence, read in each way", cases=_readings),
+        Study(name="sources", title="One source of error at a time", cases=_sources),
+        Study(name="step", title="Error against step", cases=_step, axis="step, deg", figure="sd", log_y=True),
+        Study(name="latitude", title="Error against latitude", cases=_latitude, axis="latitude, deg", figure="sd"),
+        Study(
+            name="tilt", title="Error against tilt", cases=_tilt, axis="pitch and roll, deg", figure="sd", log_y=True
+        ),
+        Study(
+            name="time", title="Error against averaging time", cases=_time, axis="window, s", figure="sd", log_y=True
+        ),
+        Study(name="order", title="Number and order of positions", cases=_order),
+        Study(name="slew", title="Error against the time it may take", cases=_slew, axis="whole run, s"),
+        Study(name="hold", title="Heading after 4 h of hold", cases=_hold),
+        Study(name="wire", title="What goes through the wire as well", cases=_wire),
+        Study(name="own", title="As set on the command line", cases=_own),
+    )
+}
+DEFAULT_STUDIES = tuple(name for name in STUDIES if name != "own")
+WIRE_STUDIES = ("wire",)  # what the emulated chain does without --study

@@ -1,0 +1,240 @@
+"""From a set-up to the errors of its runs: three chains that must agree where they can all do it.
+
+closed: jointly Gaussian means of the windows, nanoseconds a run. samples: drift and noise sample by sample, the
+estimator at the end. emulated: an emulator, its wire and the host's procedure for every run. Run k of a seed is the
+same each time.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+
+from psabench import nav, nav_mc
+from psabench.campaign.setup import Hold, Setup, as_input
+from psabench.errors import BadInput
+from psabench.navlib import library
+from psabench.store import CELL, Origin, Part, Rows
+
+ERRORS = ("platform_error_deg", "heading_error_deg", "drift_error_degph", "quality")
+HELD = ("end_error_deg", "largest_error_deg")
+KMPH_MPS = 1.0 / 3.6
+KS_P = 0.01  # of two chains that agree, one comparison of a hundred lies below
+SECOND_ORDER_DEG = 0.003  # rms of what the closed form leaves out: products of tilts and level errors
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Chain:
+    """How runs are computed, and about how long one takes: only how work is cut depends on that."""
+
+    name: str
+    title: str
+    run_s: float  # one run, one core
+    part_runs: int  # of a part in the store: what an interrupt may cost
+    compute: Callable[[Setup, int, int, int], Rows]  # set-up, seed, first run, runs
+    holds: bool  # whether it computes the hold
+    version: Callable[[], str]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wanted:
+    """Runs that somebody should compute."""
+
+    chain: str
+    setup: Setup
+    hold: Hold | None
+    seed: int
+    first_run: int
+    runs: int
+
+    @property
+    def origin(self) -> Origin:
+        return origin(self.chain, self.setup, self.hold, self.seed)
+
+
+def origin(chain: str, setup: Setup, hold: Hold | None, seed: int) -> Origin:
+    """Of the series that these determine."""
+    return Origin(
+        kind=f"gyrocompass{'' if hold is None else ' and hold'}, {chain}",
+        input=as_input(setup, hold),
+        seed=seed,
+        version=CHAINS[chain].version(),
+        columns=ERRORS if hold is None else HELD,
+    )
+
+
+def compute(wanted: Sequence[Wanted]) -> list[Part]:
+    """The work of a worker. Raises BadInput for a set-up that its chain cannot do."""
+    return [Part(origin=w.origin, first_run=w.first_run, rows=_rows(w)) for w in wanted]
+
+
+def _rows(w: Wanted) -> Rows:
+    try:
+        return _computed(w)
+    except nav.Refused as e:  # a class that does not travel between processes
+        raise BadInput(f"{w.origin.kind}: {e}") from None
+
+
+def _computed(w: Wanted) -> Rows:
+    chain = CHAINS[w.chain]
+    if w.hold is None:
+        return chain.compute(w.setup, _seed(w), w.first_run, w.runs)
+    if not chain.holds:
+        raise BadInput(f"--chain {w.chain}: the hold is not computed by it; {', '.join(_holding())} does")
+    found = nav_mc.hold(hold_config(w.setup, w.hold), _seed(w), first_run=w.first_run, runs=w.runs)
+    return _columns(np.degrees(found.end_rad), np.degrees(found.max_rad))
+
+
+def _seed(w: Wanted) -> int:
+    """Of its own for each chain: what they share then is the set-up alone, and a comparison of two means something."""
+    return int.from_bytes(hashlib.sha256(f"{w.seed} {w.chain}".encode()).digest()[:7], "little")
+
+
+def _holding() -> list[str]:
+    return [c.name for c in CHAINS.values() if c.holds]
+
+
+# ---- the algebra of libpsabench-nav
+
+
+def config(setup: Setup) -> nav_mc.McConfig:
+    """The library's own configuration; what the estimator believes of the noise is what it is."""
+    arcmin, degph, deg = nav.ARCMIN, nav.DEGPH, math.radians
+    return nav_mc.McConfig(
+        latitude_rad=deg(setup.latitude_deg),
+        latitude_error_rad=setup.latitude_error_arcmin * arcmin,
+        tilt_rad=deg(setup.tilt_deg),
+        tilt=nav_mc.Tilt[setup.tilt.upper()],
+        cardan=nav_mc.Cardan[setup.gimbal.upper()],
+        alpha1_rad=math.nan if setup.alpha1_deg is None else deg(setup.alpha1_deg),
+        drift1_radps=setup.drift_degph * degph,
+        gm_sigma_radps=setup.gm_sigma_degph * degph,
+        gm_tau_s=setup.gm_tau_s,
+        gm_from_zero=setup.gm_from_zero,
+        torquer_scale=setup.torquer_scale,
+        beta_sys_rad=setup.beta_sys_arcmin * arcmin,
+        gamma_sys_rad=setup.gamma_sys_arcmin * arcmin,
+        beta_random_rad=setup.beta_random_arcmin * arcmin,
+        gamma_random_rad=setup.gamma_random_arcmin * arcmin,
+        angle_sys_rad=setup.angle_sys_arcmin * arcmin,
+        angle_random_rad=setup.angle_random_arcmin * arcmin,
+        angle_sys=nav_mc.AngleSys[setup.angle_sys.upper()],
+        random_sign=setup.random_sign,
+        per_sample=setup.per_sample,
+        white_radps_rts=setup.white_degph_rts * degph,
+        angles_rad=tuple(deg(a) for a in setup.angles_deg),
+        window_s=setup.window_s,
+        gap_s=setup.gap_s,
+        slew_radps=deg(setup.slew_dps),
+        settle_s=setup.settle_s,
+        method=nav.Method[setup.method.upper()],
+        simplified=setup.simplified,
+        noise=nav.Noise(
+            gm_sigma_radps=setup.gm_sigma_degph * degph,
+            gm_tau_s=setup.gm_tau_s,
+            white_radps_rts=setup.white_degph_rts * degph,
+            angle_sd_rad=setup.angle_random_arcmin * arcmin,
+            level_sd_rad=setup.gamma_random_arcmin * arcmin,
+        ),
+    )
+
+
+def hold_config(setup: Setup, hold: Hold) -> nav_mc.HoldConfig:
+    """The library's configuration of the hold."""
+    return nav_mc.HoldConfig(
+        start=config(setup),
+        axis2=nav_mc.Axis2[hold.axis2.upper()],
+        axis2_sd_radps=hold.axis2_sd_degph * nav.DEGPH,
+        heading_rad=math.radians(hold.heading_deg),
+        drift_error_radps=hold.drift_error_degph * nav.DEGPH,
+        hours=hold.hours,
+        step_s=hold.step_s,
+        wait_s=hold.wait_s,
+        level_rad=hold.level_arcmin * nav.ARCMIN,
+        latitude_error_rad=hold.latitude_error_arcmin * nav.ARCMIN,
+        v_east_mps=hold.v_east_kmph * KMPH_MPS,
+        speed_error=hold.speed_error,
+    )
+
+
+def _closed(setup: Setup, seed: int, first_run: int, runs: int) -> Rows:
+    return _errors(nav_mc.closed(config(setup), seed, first_run=first_run, runs=runs))
+
+
+def _samples(setup: Setup, seed: int, first_run: int, runs: int) -> Rows:
+    return _errors(nav_mc.samples(config(setup), seed, first_run=first_run, runs=runs))
+
+
+def _errors(e: nav_mc.Errors) -> Rows:
+    return _columns(np.degrees(e.platform_rad), np.degrees(e.heading_rad), e.drift_radps / nav.DEGPH, e.quality)
+
+
+def _columns(*columns: nav.Floats) -> Rows:
+    return np.stack(columns, axis=1).astype(CELL)
+
+
+def _emulated(setup: Setup, seed: int, first_run: int, runs: int) -> Rows:
+    from psabench.campaign import emulated  # python-can and the boards: the algebra does without
+
+    return emulated.runs(setup, seed, first_run, runs)
+
+
+# ---- what there is
+
+
+def nav_version() -> str:
+    """Of what the algebra depends on."""
+    return f"psabench-nav {library().version().decode()}"
+
+
+def versions() -> str:
+    """What two machines must have in common to compute the same."""
+    return f"psabench {version('psabench')}, {nav_version()}"
+
+
+CHAINS: Mapping[str, Chain] = {
+    c.name: c
+    for c in (
+        Chain(
+            name="closed",
+            title="closed form",
+            run_s=1e-7,
+            part_runs=1 << 18,
+            compute=_closed,
+            holds=True,
+            version=nav_version,
+        ),
+        Chain(
+            name="samples",
+            title="sample by sample",
+            run_s=2e-5,
+            part_runs=1 << 13,
+            compute=_samples,
+            holds=True,
+            version=nav_version,
+        ),
+        Chain(
+            name="emulated",
+            title="through the wire",
+            run_s=0.5,
+            part_runs=1,
+            compute=_emulated,
+            holds=False,
+            version=versions,
+        ),
+    )
+}
+
+
+def describe(setup: Setup) -> dict[str, Any]:
+    """Fields that differ from the article's error set, for people."""
+    plain = Setup()
+    names = [f.name for f in dataclasses.fields(Setup)]
+    return {n: getattr(setup, n) for n in names if getattr(setup, n) != getattr(plain, n)}

@@ -1,0 +1,221 @@
+"""`psabench campaign`: options, what is computed, what is printed."""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from psabench.campaign import runner
+from psabench.campaign.cases import DEFAULT_STUDIES, STUDIES, WIRE_STUDIES, Case
+from psabench.campaign.runner import Plan
+from psabench.campaign.setup import ANY, CHOICES, Setup, as_input, changed
+from psabench.campaign.workers import workers
+from psabench.errors import BadInput
+from psabench.navlib import library
+from psabench.procedures.head_bench import Progress
+from psabench.progress import Bar
+from psabench.store import Store
+
+if TYPE_CHECKING:
+    from psabench.campaign.page import Campaign
+
+ABOUT = "A procedure with thousands of virtual instruments, on all cores or on a Dask cluster; resumes after Ctrl-C."
+EPILOG = """\
+examples:
+  psabench campaign gyrocompass                                  20000 runs a case; build/campaign/report.html
+  psabench campaign gyrocompass --study readings --runs 1000000
+  psabench campaign gyrocompass --study step --chain samples     sample by sample, beside the closed form
+  psabench campaign gyrocompass --case article --chain emulated  200 runs, each through the wire of an emulator
+  psabench campaign gyrocompass --study own --set angles_deg=0,120,240 --set gm_sigma_degph=0.05
+  psabench campaign gyrocompass --dask tcp://192.0.2.7:8786      on the cluster of this scheduler, the same numbers
+
+Results lie in the store (docs/store.md): the same command computes only what is missing. Exit status: 0 done and within
+limits, 1 done and out of limits, 2 bad input, 3 the cluster or the bench failed, 130 ended by Ctrl-C.
+"""
+DEFAULT_RUNS = {"closed": 20000, "samples": 20000, "emulated": 200}
+REFERENCE_RUNS = (20000, 1_000_000)  # of the closed form beside another chain: as many as that has, within these
+MOST_RUNS = 100_000_000
+MOST_SEED = 2**63 - 1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Options:
+    """What the command line asked for."""
+
+    studies: Sequence[str] = ()
+    case: str | None = None
+    chain: str = "closed"
+    runs: int | None = None
+    seed: int = 1
+    settings: Sequence[str] = ()  # NAME=VALUE
+    workers: int | None = None
+    dask: str | None = None
+    store: Path | None = None
+    out: Path = Path("build/campaign")
+    fresh: bool = False
+
+
+def add(commands: Any, formatter: Any, natural: Callable[[str], int]) -> None:
+    """The command's parser."""
+    p = commands.add_parser(
+        "campaign",
+        help="a procedure with thousands of virtual instruments",
+        description=ABOUT,
+        formatter_class=formatter,
+        epilog=EPILOG,
+    )
+    p.set_defaults(handler=_main)
+    p.add_argument("procedure", choices=["gyrocompass"], help="gyrocompass")
+    p.add_argument("--list", action="store_true", help="name the studies, their cases and the settings")
+    p.add_argument("--study", action="append", default=[], help="which; may be repeated (all but own)")
+    p.add_argument("--case", help="only the cases of this name")
+    p.add_argument("--chain", choices=list(DEFAULT_RUNS), default="closed", help="how runs are computed (%(default)s)")
+    p.add_argument("--runs", type=natural, help=f"of each case ({DEFAULT_RUNS['closed']}; emulated: 200)")
+    p.add_argument("--seed", type=natural, default=1, help="of all random numbers (%(default)s)")
+    p.add_argument(
+        "--set", action="append", default=[], metavar="NAME=VALUE", help="instead of the article's error set"
+    )
+    p.add_argument("--workers", type=natural, help="processes (one a core when it is worth it); 1: none but this one")
+    p.add_argument(
+        "--dask", metavar="ADDRESS", help="Dask scheduler whose workers compute, such as tcp://192.0.2.7:8786"
+    )
+    p.add_argument("--store", type=Path, help="file of results (OUT/store.sqlite)")
+    p.add_argument("--out", type=Path, default=Path("build/campaign"), help="folder of the report (%(default)s)")
+    p.add_argument("--fresh", action="store_true", help="compute anew what the store has")
+
+
+def _main(args: argparse.Namespace) -> int:
+    if args.list:
+        _list()
+        return 0
+    from psabench.campaign import page  # matplotlib takes a second: other commands and --list do without
+
+    options = Options(
+        studies=args.study,
+        case=args.case,
+        chain=args.chain,
+        runs=args.runs,
+        seed=args.seed,
+        settings=args.set,
+        workers=args.workers,
+        dask=args.dask,
+        store=args.store,
+        out=args.out,
+        fresh=args.fresh,
+    )
+    found = campaign(options, Bar())
+    print("\n".join(page.console(found)))
+    print(page.verdict(found))
+    print(f"report: {page.write(options.out, found)}")
+    return 0 if found.within else 1
+
+
+def _list() -> None:
+    for study in STUDIES.values():
+        print(f"{study.name}: {study.title}")
+        for line in _names(list(study.cases(Setup()))):
+            print(f"  {line}")
+    print("settings, with the article's values")
+    for name, value in as_input(Setup(), None)["setup"].items():
+        choices = f" ({', '.join(CHOICES[name])})" if name in CHOICES else ""
+        print(f"  {name}={_word(value)}{choices}")
+
+
+def _names(cases: Sequence[Case]) -> list[str]:
+    """A line a case; a line a curve of a scan."""
+    curves: dict[str, list[str]] = {}
+    for case in cases:
+        told = case.name if case.title == case.name or case.study == "order" else f"{case.name}: {case.title}"
+        curves.setdefault(case.curve or told, []).append(f"{case.x:g}" if case.curve else "")
+    return [f"{name}, {' '.join(x)}" if x[0] else name for name, x in curves.items()]
+
+
+def _word(value: object) -> str:
+    if value is None or isinstance(value, bool):
+        return {None: ANY, True: "yes", False: "no"}[value]
+    return ",".join(f"{x:g}" for x in value) if isinstance(value, list) else str(value)
+
+
+def campaign(options: Options, progress: Progress) -> Campaign:
+    """Compute what is missing, and gather all that a report shows. Ctrl-C keeps what has been computed.
+
+    Raises BadInput for options that do not fit together, LinkError for a cluster that is not there.
+    """
+    from psabench.campaign import report
+
+    plans = _plans(options)
+    with Store(options.store or options.out / "store.sqlite") as store:
+        for plan in plans:
+            _fill(plan, store, options, progress)
+        return report.gather(plans, store)
+
+
+def _plans(options: Options) -> list[Plan]:
+    """The closed form beside another chain, then the chain that was asked for."""
+    runs = DEFAULT_RUNS[options.chain] if options.runs is None else options.runs
+    if not 1 <= runs <= MOST_RUNS:
+        raise BadInput(f"--runs {runs}: expected 1 to {MOST_RUNS}")
+    if options.seed > MOST_SEED:
+        raise BadInput(f"--seed {options.seed}: expected 0 to {MOST_SEED}")
+    if options.workers is not None and not 1 <= options.workers <= 1024:
+        raise BadInput(f"--workers {options.workers}: expected 1 to 1024")
+    if options.workers is not None and options.dask is not None:
+        raise BadInput("--workers: the cluster at --dask has its own number of workers")
+    cases = _cases(options)
+    plan = Plan(cases=cases, chain=options.chain, runs=runs, seed=options.seed)
+    if options.chain == "closed":
+        return [plan]
+    return [replace(plan, chain="closed", runs=min(max(runs, REFERENCE_RUNS[0]), REFERENCE_RUNS[1])), plan]
+
+
+def _cases(options: Options) -> list[Case]:
+    base = changed(Setup(), options.settings)
+    usual = WIRE_STUDIES if options.chain == "emulated" else DEFAULT_STUDIES
+    names = options.studies or (usual if options.case is None else tuple(STUDIES))
+    for name in names:
+        if name not in STUDIES:
+            raise BadInput(f"--study {name}: no such study; {', '.join(STUDIES)}")
+    cases = [c for name in dict.fromkeys(names) for c in STUDIES[name].cases(base)]
+    if options.case is not None:
+        there = ", ".join(c.name for c in cases)
+        cases = [c for c in cases if c.name == options.case]
+        if not cases:
+            raise BadInput(f"--case {options.case}: no such case; {there}")
+    if options.chain == "emulated":
+        from psabench.campaign import emulated
+
+        for c in cases:
+            if c.hold is not None:
+                raise BadInput(f"--chain emulated: {c.name}: the hold is computed by closed and samples")
+            emulated.params(c.setup)
+    return cases
+
+
+def _fill(plan: Plan, store: Store, options: Options, progress: Progress) -> None:
+    if options.fresh:
+        for case in plan.cases:
+            store.forget(plan.origin(case))
+    build = built()
+    if any(store.build(plan.origin(case)) not in (None, build) for case in plan.cases):
+        print(
+            "psabench: results in the store are of another build of libpsabench-nav; --fresh computes them anew",
+            file=sys.stderr,
+        )
+    wanted = runner.missing(plan, store)
+    if not wanted:
+        return
+    count = options.workers
+    if count is None and options.dask is None and runner.duration_s(wanted) < runner.ALONE_S:
+        count = 1  # done before a cluster would have started
+    with workers(count, options.dask) as at_work:
+        runner.run(wanted, store, at_work, progress, build)
+
+
+def built() -> str:
+    """Of the library that computes: the first 16 digits of its SHA-256."""
+    return hashlib.sha256(Path(library().path).read_bytes()).hexdigest()[:16]

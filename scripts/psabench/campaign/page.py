@@ -1,0 +1,289 @@
+"""report.html and result.json of a campaign: the article's claims, tables, pictures, and how well the chains agree."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from psabench.campaign import chains, claims, plots
+from psabench.campaign.cases import STUDIES, Case, Study
+from psabench.campaign.claims import Check, Claim, Figures, Found, HoldFigures
+from psabench.report_page import PAGE
+from psabench.store import Rows
+from psabench.whole_file import replace_file
+
+TITLE = "Gyrocompassing: a campaign"
+FORMAT = 1  # of result.json
+COLUMNS = ("platform rms", "p95", "largest", "heading rms", "p95", "≤ 0.1°", "drift rms", "p95")
+UNITS = ("deg", "deg", "deg", "deg", "deg", "%", "deg/h", "deg/h")
+HOLD_COLUMNS = ("end rms", "p95", "largest on the way, p95", "≤ 0.3°", "≤ 0.5°")
+HOLD_UNITS = ("deg", "deg", "deg", "%", "%")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Agreement:
+    """The same set-up through two chains: two-sample Kolmogorov-Smirnov of the heading errors."""
+
+    case: Case
+    chain: str
+    runs: int
+    reference_runs: int
+    statistic: float
+    p: float
+    rms_deg: float
+    reference_rms_deg: float
+    figure: str  # SVG
+
+    def same(self, of: int) -> bool:
+        """Whether the chains agree, when there are `of` comparisons.
+
+        Sample by sample sees terms of second order that the closed form leaves out: so many runs tell them apart.
+        """
+        allowed = chains.SECOND_ORDER_DEG if self.chain == "samples" else 0.0
+        return self.p > chains.KS_P / of or abs(self.rms_deg - self.reference_rms_deg) < allowed
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Campaign:
+    """All that a report shows; the rows stay in the store."""
+
+    facts: Mapping[str, str]
+    cases: Sequence[Case]
+    found: Found
+    claims: Sequence[Claim]
+    checks: Sequence[Check]
+    agreements: Sequence[Agreement]
+    distribution: str  # SVG, empty without the readings
+
+    @property
+    def within(self) -> bool:
+        return claims.within_limits(self.checks) and self.same == len(self.agreements)
+
+    @property
+    def same(self) -> int:
+        """How many comparisons find no difference."""
+        return sum(a.same(len(self.agreements)) for a in self.agreements)
+
+
+def agree(case: Case, chain: str, rows: Rows, reference: Rows) -> Agreement:
+    """Compare with the closed form; runs that gave no heading are left out."""
+    import numpy as np
+    from scipy import stats
+
+    mine, theirs = (r[np.isfinite(r[:, 1]), 1] for r in (rows, reference))
+    ks = stats.ks_2samp(mine, theirs, method="asymp")
+    both = {chains.CHAINS[chain].title: rows, chains.CHAINS["closed"].title: reference}
+    return Agreement(
+        case=case,
+        chain=chain,
+        runs=len(mine),
+        reference_runs=len(theirs),
+        statistic=float(ks.statistic),
+        p=float(ks.pvalue),
+        rms_deg=claims.Spread.of(mine).rms,
+        reference_rms_deg=claims.Spread.of(theirs).rms,
+        figure=plots.agreement(f"agreement-{chain}-{case.study}-{case.name}".replace(" ", "-"), both),
+    )
+
+
+def verdict(c: Campaign) -> str:
+    """One line."""
+    parts = []
+    if c.checks:
+        kept = sum(x.within for x in c.checks)
+        parts.append(f"{kept} of {len(c.checks)} figures lie within their limits")
+    if c.agreements:
+        parts.append(f"{c.same} of {len(c.agreements)} distributions are the closed form's")
+    return f"{'; '.join(parts) or 'no limits apply to these cases'}."
+
+
+def write(folder: Path, c: Campaign) -> Path:
+    """result.json and report.html into `folder`, each whole or not at all; returns the page. Raises OSError."""
+    folder.mkdir(parents=True, exist_ok=True)
+    data = json.dumps(result_dict(c), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    replace_file(folder / "result.json", data)
+    page = folder / "report.html"
+    replace_file(page, html_page(c))
+    return page
+
+
+def result_dict(c: Campaign) -> dict[str, Any]:
+    """For result.json. Numbers that are not finite (a case in which every run was refused) are null."""
+    return {
+        "format": FORMAT,
+        "facts": dict(c.facts),
+        "within_limits": c.within,
+        "claims": [asdict(x) for x in c.claims],
+        "checks": [_finite(asdict(x)) | {"within": x.within} for x in c.checks],
+        "agreements": [
+            _finite(
+                {
+                    "case": a.case.name,
+                    "chain": a.chain,
+                    "runs": a.runs,
+                    "reference_runs": a.reference_runs,
+                    "rms_deg": a.rms_deg,
+                    "reference_rms_deg": a.reference_rms_deg,
+                    "ks": a.statistic,
+                    "p": a.p,
+                }
+            )
+            for a in c.agreements
+        ],
+        "cases": [_case_dict(case, c.found[case.study, case.name]) for case in c.cases],
+    }
+
+
+def _case_dict(case: Case, f: Figures | HoldFigures) -> dict[str, Any]:
+    told: dict[str, Any] = {"study": case.study, "case": case.name, "title": case.title}
+    return told | {"differs": chains.describe(case.setup), "figures": _finite(asdict(f))}
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {str(k): _finite(v) for k, v in value.items()}
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+# ---- tables, for the console and the page
+
+
+def row_of(f: Figures | HoldFigures) -> list[str]:
+    """A case's figures as text, in the order of COLUMNS or HOLD_COLUMNS."""
+    if isinstance(f, HoldFigures):
+        kept = [f"{100 * share:.1f}" for share in f.within.values()]
+        return [f"{f.end.rms:.3f}", f"{f.end.p95:.3f}", f"{f.largest.p95:.3f}", *kept]
+    p, h, d = f.platform, f.heading, f.drift
+    errors = [f"{x:.4f}" if math.isfinite(x) else "–" for x in (p.rms, p.p95, p.largest, h.rms, h.p95)]
+    return [*errors, f"{100 * f.within_claim:.1f}", f"{d.rms:.3f}", f"{d.p95:.3f}"]
+
+
+def table(c: Campaign, study: Study) -> list[list[str]]:
+    """Head, units, then a row a case."""
+    cases = [case for case in c.cases if case.study == study.name]
+    hold = cases[0].hold is not None
+    head, units = (HOLD_COLUMNS, HOLD_UNITS) if hold else (COLUMNS, UNITS)
+    rows = [[_label(case), *row_of(c.found[case.study, case.name])] for case in cases]
+    return [["", *head], ["", *units], *rows]
+
+
+def _label(case: Case) -> str:
+    return f"{case.name}: {case.title}" if case.study == "readings" else case.name
+
+
+def console(c: Campaign) -> Iterator[str]:
+    """Lines of all tables, then the claims."""
+    for study in _studies(c):
+        yield study.title
+        rows = table(c, study)
+        widths = [max(len(r[i]) for r in rows) for i in range(len(rows[0]))]
+        for r in rows:
+            yield "  " + "  ".join(
+                [r[0].ljust(widths[0]), *(x.rjust(w) for x, w in zip(r[1:], widths[1:], strict=True))]
+            )
+    for a in c.agreements:
+        runs = f"{a.runs} and {a.reference_runs} runs"
+        rms = f"rms {a.rms_deg:.4f} and {a.reference_rms_deg:.4f} deg"
+        yield f"{a.case.name}, {a.chain} beside closed: {rms}, KS {a.statistic:.4f}, p {a.p:.3f} ({runs})"
+    for x in c.claims:
+        yield f"{x.says}: {x.verdict}"
+        yield f"  reading   {x.reading}"
+        yield f"  honest    {x.honest}"
+        yield f"  improved  {x.improved}"
+    for check in c.checks:
+        if not check.within:
+            yield f"out of limits: {check.what}: {check.value:.4g}, wanted {check.low:.4g} to {check.high:.4g}"
+
+
+def _studies(c: Campaign) -> list[Study]:
+    there = {case.study for case in c.cases}
+    return [s for s in STUDIES.values() if s.name in there]
+
+
+# ---- the page
+
+
+def html_page(c: Campaign) -> str:
+    """The whole page. Same input, same bytes."""
+    facts = " · ".join(f"{escape(k)} <b>{escape(v)}</b>" for k, v in c.facts.items())
+    body = [
+        f"<header><h1>{TITLE}</h1><p class=facts>{facts}</p></header>",
+        f"<p class='verdict {'good' if c.within else 'bad'}'>{escape(verdict(c))}</p>",
+        _claims(c),
+        _agreements(c),
+        _distribution(c),
+        *(_study(c, s) for s in _studies(c)),
+        _checks(c),
+    ]
+    return PAGE.replace("<title>Accelerometer calibration</title>", f"<title>{TITLE}</title>").replace(
+        "@BODY@", "\n".join(x for x in body if x)
+    )
+
+
+def _html_table(head: Sequence[Sequence[str]], rows: Sequence[Sequence[str]], numbers: bool) -> str:
+    kind = " class=num" if numbers else ""
+    heads = "".join(f"<tr>{''.join(f'<th>{escape(x)}</th>' for x in r)}</tr>" for r in head)
+    lines = "".join(
+        f"<tr><th>{escape(r[0])}</th>{''.join(f'<td{kind}>{escape(x)}</td>' for x in r[1:])}</tr>" for r in rows
+    )
+    style = "est" if numbers else "cmp"
+    return f"<div class=scroll><table class={style}><thead>{heads}</thead><tbody>{lines}</tbody></table></div>"
+
+
+def _claims(c: Campaign) -> str:
+    if not c.claims:
+        return ""
+    head = ["the article", "kindest reading", "honest", "improved", "verdict"]
+    rows = [[x.says, x.reading, x.honest, x.improved, x.verdict] for x in c.claims]
+    return f"<section><h2>The article's claims</h2>{_html_table([head], rows, numbers=False)}</section>"
+
+
+def _agreements(c: Campaign) -> str:
+    pictures = "".join(
+        f"<figure>{a.figure}<figcaption>{escape(a.case.name)}, {escape(a.chain)}: {a.runs} runs beside "
+        f"{a.reference_runs}, KS {a.statistic:.4f}, p {a.p:.3f}.</figcaption></figure>"
+        for a in c.agreements
+    )
+    return f"<section><h2>Do the chains agree?</h2>{pictures}</section>" if pictures else ""
+
+
+def _distribution(c: Campaign) -> str:
+    if not c.distribution:
+        return ""
+    return (
+        f"<section><h2>Error of heading beside the claim</h2><figure>{c.distribution}"
+        "<figcaption>R0 literal, R5n the kindest reading, R11+ with the common 6′, improved procedure.</figcaption>"
+        "</figure></section>"
+    )
+
+
+def _study(c: Campaign, study: Study) -> str:
+    rows = table(c, study)
+    return (
+        f"<section><h2>{escape(study.title)}</h2>{_html_table(rows[:2], rows[2:], numbers=True)}"
+        f"<figure>{picture(c, study)}</figure></section>"
+    )
+
+
+def picture(c: Campaign, study: Study) -> str:
+    """SVG of a study."""
+    cases = [case for case in c.cases if case.study == study.name]
+    found = {case.name: c.found[case.study, case.name] for case in cases}
+    held = {name: f for name, f in found.items() if isinstance(f, HoldFigures)}
+    compass = {name: f for name, f in found.items() if isinstance(f, Figures)}
+    if held:
+        return plots.held(cases, held)
+    return plots.scan(study, cases, compass) if study.axis else plots.bars(study.name, cases, compass)
+
+
+def _checks(c: Campaign) -> str:
+    if not c.checks:
+        return ""
+    rows = [[x.what, f"{x.value:.4g}", f"{x.low:.4g}", f"{x.high:.4g}", "" if x.within else "out"] for x in c.checks]
+    table_ = _html_table([["", "value", "from", "to", ""]], rows, numbers=True)
+    return f"<section><h2>Limits</h2>{table_}</section>"

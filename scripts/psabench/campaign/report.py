@@ -1,0 +1,58 @@
+"""From the store to what a report shows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from psabench.campaign import chains, page, plots
+from psabench.campaign.cases import STUDIES
+from psabench.campaign.chains import CHAINS
+from psabench.campaign.claims import Figures, HoldFigures, checks, claims
+from psabench.campaign.page import Campaign
+from psabench.campaign.runner import Plan
+from psabench.campaign.setup import Setup
+from psabench.store import Rows, Store
+
+SHOWN = ("R0", "R5n", "R11+", "improved")  # of the readings, in the picture of distributions
+
+
+def gather(plans: Sequence[Plan], store: Store) -> Campaign:
+    """Of plans that are complete: the last is the one asked for, one before it what it is compared with."""
+    plan = plans[-1]
+    found = {}
+    curves: dict[str, Rows] = {}
+    for case in plan.cases:
+        rows = plan.rows(store, case)
+        found[case.study, case.name] = Figures.of(rows) if case.hold is None else HoldFigures.of(rows)
+        if case.study == "readings" and case.name in SHOWN:
+            curves[case.name] = rows
+    # The limits are for the error set as it stands, and for chains that compute all of it.
+    usual = plan.chain != "emulated" and _plain(plan)
+    return Campaign(
+        facts=_facts(plan),
+        cases=plan.cases,
+        found=found,
+        claims=claims(found) if usual else [],
+        checks=checks(found) if usual else [],
+        agreements=_agreements(plans, store),
+        distribution=plots.distribution(curves) if curves else "",
+    )
+
+
+def _plain(plan: Plan) -> bool:
+    """Whether the cases are those of the article's error set, without --set."""
+    usual = [c for s in {c.study for c in plan.cases} for c in STUDIES[s].cases(Setup())]
+    return all(c in usual for c in plan.cases)
+
+
+def _agreements(plans: Sequence[Plan], store: Store) -> list[page.Agreement]:
+    if len(plans) < 2:
+        return []
+    reference, plan = plans
+    compared = [c for c in plan.cases if c.hold is None]
+    return [page.agree(c, plan.chain, plan.rows(store, c), reference.rows(store, c)) for c in compared]
+
+
+def _facts(plan: Plan) -> dict[str, str]:
+    chain = CHAINS[plan.chain]
+    return {"chain": chain.title, "runs": f"{plan.runs} a case", "seed": str(plan.seed), "code": chains.versions()}

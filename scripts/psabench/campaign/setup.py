@@ -1,0 +1,134 @@
+"""What a campaign of gyrocompassing varies: errors of the instrument, schedule of positions, estimation, and the hold.
+
+Fields are in people's units; the names say which. Defaults are the article's error set as it stands, read literally.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import types
+import typing
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from psabench.errors import BadInput
+
+CHOICES: dict[str, tuple[str, ...]] = {
+    "tilt": ("uniform", "corners"),
+    "gimbal": ("alpha", "uncorrected", "corrected"),
+    "angle_sys": ("none", "common", "increment", "accumulates"),
+    "method": ("closed3", "lsq", "constrained", "gls", "gls_constrained"),
+    "axis2": ("same", "differs", "measured", "fixed"),
+}
+
+ANY = "any"  # on the command line: drawn for each run
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Setup:
+    """A virtual instrument, where it stands, and what is done with it."""
+
+    latitude_deg: float = 50.0  # the article names none; E0
+    latitude_error_arcmin: float = 0.1
+    tilt_deg: float = 5.0  # pitch and roll of the parked vehicle
+    tilt: str = "uniform"  # within, or at the corners of, +-tilt_deg
+    alpha1_deg: float | None = None  # of the platform in position 1; none: anywhere
+    gimbal: str = "alpha"  # turns are about the vertical, as the article reads; or of the gimbal, corrected or not
+    drift_degph: float = 25.0
+    gm_sigma_degph: float = 0.2
+    gm_tau_s: float = 1000.0
+    gm_from_zero: bool = False
+    torquer_scale: float = 0.0  # relative error
+    beta_sys_arcmin: float = 10.0  # of the level sensors, all positions alike
+    gamma_sys_arcmin: float = 10.0
+    beta_random_arcmin: float = 1.0
+    gamma_random_arcmin: float = 1.0
+    angle_sys_arcmin: float = 6.0  # of the set angle
+    angle_sys: str = "common"  # how those 6' are read
+    angle_random_arcmin: float = 3.0  # of the set angle, or of the encoder's reading
+    encoder: bool = (
+        False  # through the wire: the encoder is read instead of the set angle trusted; the algebra is the same
+    )
+    random_sign: bool = False  # of systematic errors
+    per_sample: bool = False  # random errors are drawn a sample and average, instead of once a position
+    white_degph_rts: float = 0.0  # white noise of S besides, deg/h sqrt(s)
+    angles_deg: tuple[float, ...] = (0.0, 90.0, 180.0)
+    window_s: float = 10.0
+    gap_s: float = 10.0  # between windows, with slew_dps 0
+    slew_dps: float = 0.0
+    settle_s: float = 0.0
+    method: str = "closed3"
+    simplified: bool = True  # (14) for (13)
+
+    def __post_init__(self) -> None:
+        _check_choices(self)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Hold:
+    """The hold of heading that follows, with compensation of the drift that was found."""
+
+    hours: float = 4.0
+    step_s: float = 60.0  # extremes are looked for at steps
+    axis2: str = (
+        "same"  # the azimuth axis' drift: the measured axis', another, measured itself; fixed: no gyrocompassing
+    )
+    axis2_sd_degph: float = 0.0
+    heading_deg: float = 0.1  # errors with which a fixed one starts
+    drift_error_degph: float = 0.05
+    level_arcmin: float = 0.0
+    latitude_error_arcmin: float = 0.0
+    wait_s: float = 10.0  # between the last window and the hold
+    v_east_kmph: float = 0.0
+    speed_error: float = 0.0  # relative
+
+    def __post_init__(self) -> None:
+        _check_choices(self)
+
+
+def _check_choices(value: Setup | Hold) -> None:
+    for name, allowed in CHOICES.items():
+        given = getattr(value, name, allowed[0])
+        if given not in allowed:
+            raise ValueError(f"{name} is {given!r}; it must be {', '.join(allowed)}")
+
+
+def as_input(setup: Setup, hold: Hold | None) -> dict[str, Any]:
+    """For the key of a series: JSON's types only."""
+    found = {"setup": dataclasses.asdict(setup)} | ({} if hold is None else {"hold": dataclasses.asdict(hold)})
+    found["setup"]["angles_deg"] = list(setup.angles_deg)
+    return found
+
+
+def changed(setup: Setup, words: Sequence[str]) -> Setup:
+    """With NAME=VALUE of the command line. Raises BadInput for a name or a value that does not fit."""
+    kinds = typing.get_type_hints(Setup)
+    for word in words:
+        name, equals, text = word.partition("=")
+        if not equals or name not in kinds:
+            raise BadInput(f"--set {word}: expected NAME=VALUE with a name of {', '.join(kinds)}")
+        try:
+            setup = dataclasses.replace(setup, **{name: _value(text, kinds[name])})
+        except ValueError as e:
+            raise BadInput(f"--set {word}: {e}") from e
+    return setup
+
+
+def _value(text: str, kind: Any) -> Any:
+    if kind is bool:
+        if text not in ("yes", "no"):
+            raise ValueError("expected yes or no")
+        return text == "yes"
+    if isinstance(kind, types.GenericAlias):  # tuple of numbers
+        return tuple(_number(x) for x in text.split(","))
+    if text == ANY and kind == float | None:
+        return None
+    return text if kind is str else _number(text)
+
+
+def _number(text: str) -> float:
+    value = float(text)
+    if not -1e12 < value < 1e12:
+        raise ValueError(f"{text!r} is not a number of this world")
+    return value
