@@ -473,14 +473,6 @@ def allowance(result: GyrocompassResult) -> dict[str, float]:
 def _doubts(c: nav.Compass, rows: Sequence[Row], noise: nav.Noise, p: GyrocompassParams) -> tuple[str, ...]:
     """Reasons not to trust the heading."""
     found = []
-    left = float(np.sqrt(np.mean([r.residual_radps**2 for r in rows])))
-    angle = EARTH_RADPS * math.cos(p.latitude_rad) * noise.angle_sd_rad
-    expected = math.hypot(noise.gm_sigma_radps, noise.window_sd_radps, angle, EARTH_RADPS * noise.level_sd_rad)
-    if len(rows) > 3 and left > RESIDUAL_LIMIT * expected + RATE_STEP:
-        found.append(
-            f"the rates miss the model by {left / DEGPH:.3g} deg/h rms where {expected / DEGPH:.2g} is expected: "
-            "the drift jumped, the vehicle moved, or an angle is wrong"
-        )
     if Flag.POOR_QUALITY in c.flags:
         seen = math.hypot(c.s, c.c)
         cosine = seen * math.cos(p.latitude_rad)
@@ -492,6 +484,14 @@ def _doubts(c: nav.Compass, rows: Sequence[Row], noise: nav.Noise, p: Gyrocompas
         found.append(
             f"the horizontal Earth rate found is {seen:.4f} of U cos({p.latitude_deg:g} deg): {would}, "
             "or rates of different windows do not belong together"
+        )
+    left = float(np.sqrt(np.mean([r.residual_radps**2 for r in rows])))
+    angle = EARTH_RADPS * math.cos(p.latitude_rad) * noise.angle_sd_rad
+    expected = math.hypot(noise.gm_sigma_radps, noise.window_sd_radps, angle, EARTH_RADPS * noise.level_sd_rad)
+    if len(rows) > 3 and left > RESIDUAL_LIMIT * expected + RATE_STEP:
+        found.append(
+            f"the rates miss the model by {left / DEGPH:.3g} deg/h rms where {expected / DEGPH:.2g} is expected: "
+            "the drift jumped, the vehicle moved, or an angle is wrong"
         )
     if Flag.NOT_CONVERGED in c.flags:
         found.append("the constrained fit did not converge")
