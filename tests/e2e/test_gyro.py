@@ -1,4 +1,4 @@
-"""The gyro unit through the wire: its readings against the level unit's codes and the truth, runs, faults, scenarios, lines."""
+"""The gyro unit through the wire: readings against codes and truth, runs, faults, scenarios, lines."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ class Ear:
 
     def whole(self) -> Reading:
         u, a, level = (self.parts[f"GYRO_{name}"] for name in ("RATES", "ANGLES", "LEVEL"))
-        flags = Flag(sum(bool(a[f.name]) * f for f in Flag))
+        flags = Flag(sum(int(f) for f in Flag if a[str(f.name)]))
         return Reading(
             u["U1"], u["U2"], a["ENCODER"], int(a["STEP"]), Mode(a["MODE"]), Phase(a["PHASE"]), int(a["POSITION"]),
             flags, level["BETA"], level["GAMMA"], int(level["LEVEL_SEQ"]),
@@ -135,7 +135,7 @@ def test_level_angles_are_those_of_the_level_unit_s_codes() -> None:
 
 
 def test_a_run_measures_the_earth_s_rate_and_the_drift_at_each_position() -> None:
-    """S = We (sin a cos g + cos a sin g sin b) + drift (article, eq. (9)); a code of the level unit is 0.2 deg/h at m1 = 1."""
+    """S of the article's eq. (9); a code of the level unit is 0.2 deg/h at m1 = 1."""
     with gyro_bench() as (bench, gyro, ear):
         gyro.positions_deg = (0.0, 120.0, 240.0)
         gyro.set(latitude_deg=50.0, window_s=10.0)
@@ -169,7 +169,7 @@ def test_calibration_then_navigation_keep_the_heading_in_a_turn_of_the_vehicle()
         a, b, g = (np.radians(s[f"{name}_deg"]) for name in ("alpha", "beta", "gamma"))
         earth = EARTH_DEGPH * np.array([np.cos(np.radians(50.0)), np.sin(np.radians(50.0))])
         along_z = np.array([np.sin(a) * np.sin(g) - np.cos(a) * np.cos(g) * np.sin(b), np.cos(b) * np.cos(g)])
-        mean_u2 = np.mean([r.u2_degph for r in ear.windows()[0]])
+        mean_u2 = float(np.mean([r.u2_degph for r in ear.windows()[0]]))
         drift2_degph = mean_u2 - float(earth @ along_z)
         assert abs(drift2_degph - DRIFT_DEGPH) < 0.05
         gyro.set(azimuth_deg=s["alpha_deg"], drift1_degph=DRIFT_DEGPH, drift2_degph=drift2_degph)
@@ -248,7 +248,7 @@ units:
         ("site: {latitude_deg: 50}" + UNITS, "level stands on the platform, and there is none"),
         ("site: {latitude_deg: 50}\nunits: [{board: gyro}]", "a controls a platform, and there is none"),
         ("vehicle: {heading_deg: 3}\nunits: [{}]", "vehicle: stands under a platform, and there is none"),
-        ("site: {latitude_deg: 50}\nplatform: {}\nunits: [{board: gyro, level: b}, {name: b}]", "b does not sit on the"),
+        ("site: {latitude_deg: 50}\nplatform: {}\nunits: [{board: gyro, level: b}, {name: b}]", "b does not sit on"),
         ("site: {latitude_deg: 50}\nplatform: {}\nunits: [{board: gyro, level: c}]", '"c" is not the name of a PSA-2'),
         ("site: {latitude_deg: 50}\nplatform: {}\nunits: [{board: gyro}, {board: gyro}]", "it has one gyro unit"),
         ("units: [{level: b}]", "level: a PSA-2 has no such setting"),
