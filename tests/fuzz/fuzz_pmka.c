@@ -2,6 +2,7 @@
  * now and then, of the other never. Readings and answers are the same, and each is what the header promises. */
 #include "fuzz.h"
 #include "listener.h"
+#include "twin.h"
 
 #include "board/pmka.h"
 #include "board/pmka_board.h"
@@ -28,8 +29,7 @@ struct world {
 
 static void mix(struct world *w, uint64_t v)
 {
-    w->trail = (w->trail ^ v) * UINT64_C(0x9E3779B97F4A7C15);
-    w->trail ^= w->trail >> 29;
+    twin_mix(&w->trail, v);
 }
 
 /* ---- what the board calls ---- */
@@ -88,12 +88,7 @@ static void on_done(void *ctx, struct board_cycle *c, enum board_cycle_result r,
 
 static void check(struct world *w)
 {
-    uint32_t was[sizeof w->seen / sizeof(uint32_t)], now[sizeof was / sizeof was[0]];
-    memcpy(was, &w->seen, sizeof was);
-    memcpy(now, &w->b.counters, sizeof now);
-    for (unsigned i = 0; i < sizeof was / sizeof was[0]; i++) assert(now[i] >= was[i]);
-    w->seen = w->b.counters;
-    assert(w->b.trace.late == 0 && w->b.trace.dropped == 0);
+    twin_counters(&w->seen, &w->b.counters, sizeof w->seen, &w->b.trace);
     for (unsigned i = 0; i < PMKA_INTS; i++) {
         const struct pmka_channel *c = &w->b.channel[i];
         const double most_c = c->integrator.cfg.limit_v * c->integrator.cap_f / c->integrator.cap_left * 1.5;
@@ -109,12 +104,7 @@ static void check(struct world *w)
 
 static void run(struct world *w, int64_t ns)
 {
-    const int64_t end_ns = w->s.now_ns + ns;
-    while (w->s.now_ns < end_ns) {
-        const int64_t left_ns = end_ns - w->s.now_ns;
-        sched_run_until(&w->s, w->s.now_ns + (left_ns < 100000 ? left_ns : 100000));
-        trace_advance(&w->b.trace, w->s.now_ns - TRACE_LAG_NS);
-    }
+    twin_run_until(&w->s, &w->b.trace, w->s.now_ns + ns, 100000);
 }
 
 static void op_input(struct world *w, struct script *s)

@@ -2,6 +2,7 @@
  * and then, of the other never. Words, times and answers are the same, and each is what the header promises. */
 #include "fuzz.h"
 #include "listener.h"
+#include "twin.h"
 
 #include "board/board.h"
 #include "board/psd1.h"
@@ -29,8 +30,7 @@ struct world {
 
 static void mix(struct world *w, uint64_t v)
 {
-    w->trail = (w->trail ^ v) * UINT64_C(0x9E3779B97F4A7C15);
-    w->trail ^= w->trail >> 29;
+    twin_mix(&w->trail, v);
 }
 
 /* ---- what the board calls ---- */
@@ -98,12 +98,7 @@ static void on_request(void *ctx, struct psd1_request *q, enum board_cycle_resul
 
 static void check(struct world *w)
 {
-    uint32_t was[sizeof w->seen / sizeof(uint32_t)], now[sizeof was / sizeof was[0]];
-    memcpy(was, &w->seen, sizeof was);
-    memcpy(now, &w->b.counters, sizeof now);
-    for (unsigned i = 0; i < sizeof was / sizeof was[0]; i++) assert(now[i] >= was[i]);
-    w->seen = w->b.counters;
-    assert(w->b.trace.late == 0 && w->b.trace.dropped == 0);
+    twin_counters(&w->seen, &w->b.counters, sizeof w->seen, &w->b.trace);
     assert(sched_next_ns(&w->s) > w->s.now_ns);
     assert(w->b.phase != PSD1_OFF || (!w->waiting && !w->asking));
     for (unsigned i = 0; i < 3; i++) {
@@ -112,14 +107,9 @@ static void check(struct world *w)
     }
 }
 
-/* As the main loop does: the trace lags behind. */
 static void run_until(struct world *w, int64_t t_ns)
 {
-    while (w->s.now_ns < t_ns) {
-        const int64_t step_ns = t_ns - w->s.now_ns;
-        sched_run_until(&w->s, w->s.now_ns + (step_ns < 1000000 ? step_ns : 1000000));
-        trace_advance(&w->b.trace, w->s.now_ns - TRACE_LAG_NS);
-    }
+    twin_run_until(&w->s, &w->b.trace, t_ns, 1000000);
 }
 
 static void op_cycle(struct world *w, struct script *s)
@@ -281,13 +271,10 @@ static void prepare(void)
     }
 }
 
-/* All of a world but the storage of edges that nobody has reported. */
 static void restore(struct world *to, const struct world *from)
 {
-    const size_t head = offsetof(struct world, b.trace.pending), tail = head + sizeof from->b.trace.pending;
     assert(from->b.trace.pending_count == 0);
-    memcpy(to, from, head);
-    memcpy((char *)to + tail, (const char *)from + tail, sizeof *to - tail);
+    twin_restore(to, from, sizeof *to, offsetof(struct world, b.trace.pending));
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
