@@ -120,7 +120,7 @@ bool fit_gain_of(const fit_design &rows, const fit_square &whitener, fit_gain *g
 fit_design fit_jacobian(const fit_design &rows, double alpha_rad)
 {
     fit_design j(rows.rows(), rows.cols() - 1);
-    j.col(0) = rows.col(FIT_S) * det_cos(alpha_rad) - rows.col(FIT_C) * det_sin(alpha_rad);
+    j.col(0) = rows.col(FIT_S) * nav_cos(alpha_rad) - rows.col(FIT_C) * nav_sin(alpha_rad);
     j.rightCols(rows.cols() - 2) = rows.rightCols(rows.cols() - 2);
     return j;
 }
@@ -131,7 +131,7 @@ int fit_on_circle(const fit_design &rows, const fit_square &whitener, const fit_
     enum { STEPS_MAX = 30 };
     for (int step = 1; step <= STEPS_MAX; step++) {
         if (!fit_gain_of(fit_jacobian(rows, *alpha_rad), whitener, gain)) return -1;
-        const fit_vector left = y - rows.col(FIT_S) * det_sin(*alpha_rad) - rows.col(FIT_C) * det_cos(*alpha_rad);
+        const fit_vector left = y - rows.col(FIT_S) * nav_sin(*alpha_rad) - rows.col(FIT_C) * nav_cos(*alpha_rad);
         *x = *gain * left;
         const double moved = (*x)(0);
         *alpha_rad = nav_wrap(*alpha_rad + moved);

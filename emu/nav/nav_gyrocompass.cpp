@@ -134,7 +134,7 @@ static void spread(const struct solution *x, const fit_square &covariance, const
     const double variance = fit_angle_variance(&cfg->noise);
     fit_square c = covariance;
     for (int i = 0; i < count; i++) {
-        const double slope = det_cos(out->alpha1_rad + p[i].delta_rad);
+        const double slope = nav_cos(out->alpha1_rad + p[i].delta_rad);
         c(i, i) += variance * slope * slope;
     }
     const fit_gain spread_gain = x->gain.lazyProduct(c);
@@ -146,7 +146,7 @@ static void spread(const struct solution *x, const fit_square &covariance, const
     out->alpha1_sd_rad = std::sqrt(cov(0, 0));
     out->alpha1_half95_rad = 1.959963984540054 * out->alpha1_sd_rad;
     out->drift1_sd_radps = std::sqrt(cov(1, 1)) * we;
-    const double by_first = x->gain(0, 0) * det_cos(out->alpha1_rad + p[0].delta_rad);
+    const double by_first = x->gain(0, 0) * nav_cos(out->alpha1_rad + p[0].delta_rad);
     out->platform_sd_rad = std::sqrt(std::fmax(cov(0, 0) + variance * (1.0 - 2.0 * by_first), 0.0));
 }
 
@@ -185,8 +185,8 @@ int nav_gyrocompass(const struct nav_position *p, int count, const struct nav_gy
     spread(&x, covariance, p, count, cfg, out);
     fit_unknowns full = x.free;
     if (fit_is_constrained(cfg->method)) {
-        full(FIT_S) = det_sin(out->alpha1_rad);
-        full(FIT_C) = det_cos(out->alpha1_rad);
+        full(FIT_S) = nav_sin(out->alpha1_rad);
+        full(FIT_C) = nav_cos(out->alpha1_rad);
         full.tail(full.size() - 2) = x.params.tail(full.size() - 2);
     }
     out->residual_rms_radps = std::sqrt((y - rows * full).squaredNorm() / count) * we;

@@ -16,10 +16,10 @@ int nav_attitude_from_level(const double *q_rad, const double *beta_rad, const d
         if (!std::isfinite(q_rad[i] + beta + gamma_rad[i])) return NAV_NOT_FINITE;
         if (std::fabs(q_rad[i]) > 1e4 || std::fabs(gamma_rad[i]) > NAV_PI / 4 || std::fabs(beta) > NAV_PI / 4)
             return NAV_RANGE;
-        rows(i, 0) = det_cos(q_rad[i]);
-        rows(i, 1) = det_sin(q_rad[i]);
-        if (with_bias) rows(i, 2) = -det_cos(beta) * det_cos(gamma_rad[i]);
-        y(i) = -det_cos(beta) * det_sin(gamma_rad[i]);
+        rows(i, 0) = nav_cos(q_rad[i]);
+        rows(i, 1) = nav_sin(q_rad[i]);
+        if (with_bias) rows(i, 2) = -nav_cos(beta) * nav_cos(gamma_rad[i]);
+        y(i) = -nav_cos(beta) * nav_sin(gamma_rad[i]);
     }
     Eigen::ColPivHouseholderQR<decltype(rows)> qr(rows);
     qr.setThreshold(1e-3); /* directions that differ by less than some tenths of a degree do not count */

@@ -3,6 +3,7 @@
 #define PSABENCH_NAV_MATH_HPP
 
 #include <cmath>
+#include <cstdint>
 
 extern "C" {
 #include "base/detmath.h"
@@ -13,10 +14,60 @@ constexpr double NAV_DEG = NAV_PI / 180.0;
 constexpr double NAV_ARCMIN = NAV_DEG / 60.0;
 constexpr double NAV_DEGPH = NAV_DEG / 3600.0;
 
+/* Of |x| < 2^62; std::floor is a call where the processor is not known to round. */
+inline double nav_floor(double x)
+{
+    const double whole = (double)(int64_t)x;
+    return whole > x ? whole - 1.0 : whole;
+}
+
+/* (sin x - x)/x^3 and (cos x - 1 + x^2/2)/x^4 by z = x^2, |x| <= pi/4: fdlibm's polynomials (Sun 1993). */
+inline __attribute__((always_inline)) double nav_sin_poly(double z)
+{
+    return -1.66666666666666324348e-01 +
+           z * (8.33333333332248946124e-03 +
+                z * (-1.98412698298579493134e-04 +
+                     z * (2.75573137070700676789e-06 +
+                          z * (-2.50507602534068634195e-08 + z * 1.58969099521155010221e-10))));
+}
+
+inline __attribute__((always_inline)) double nav_cos_poly(double z)
+{
+    return 4.16666666666666019037e-02 +
+           z * (-1.38888888888741095749e-03 +
+                z * (2.48015872894767294178e-05 +
+                     z * (-2.75573143513906633035e-07 +
+                          z * (2.08757232129817482790e-09 + z * -1.13596475577881948265e-11))));
+}
+
+/* sin(x + quarters pi/2) of |x| <= 1e6, below 1 ulp. det_sin() divides at each term; here are products alone, for a million runs.
+ * pi/2 in three parts. */
+inline double nav_sin_quarters(double x_rad, int64_t quarters)
+{
+    const double k = nav_floor(x_rad * 0.63661977236758134308 + 0.5);
+    const double r = ((x_rad - k * 0x1.921fb54400000p+0) - k * 0x1.0b4611a600000p-34) - k * 0x1.3198a2e037073p-69;
+    const double z = r * r;
+    const int64_t q = ((int64_t)k + quarters) & 3;
+    const double half = 0.5 * z;
+    const double w = 1.0 - half;
+    const double v = q & 1 ? w + (((1.0 - w) - half) + z * z * nav_cos_poly(z)) : r + z * r * nav_sin_poly(z);
+    return q & 2 ? -v : v;
+}
+
+inline double nav_sin(double x_rad)
+{
+    return nav_sin_quarters(x_rad, 0);
+}
+
+inline double nav_cos(double x_rad)
+{
+    return nav_sin_quarters(x_rad, 1);
+}
+
 /* To (-pi, pi]. */
 inline double nav_wrap(double x_rad)
 {
-    const double w = x_rad - 2.0 * NAV_PI * std::floor((x_rad + NAV_PI) / (2.0 * NAV_PI));
+    const double w = x_rad - 2.0 * NAV_PI * nav_floor((x_rad + NAV_PI) / (2.0 * NAV_PI));
     return w <= -NAV_PI ? w + 2.0 * NAV_PI : w;
 }
 

@@ -11,24 +11,31 @@ void mc_schedule(const struct nav_mc_cfg *cfg, struct nav_position *p);
 int mc_refusal(const struct nav_mc_cfg *cfg, const struct nav_position *p);
 double mc_samples_per_window(const struct nav_mc_cfg *cfg);
 
-/* Gain of first order about the truth; normal, mean and angle are weighted sums, so that a run is a few products. */
+/* Gain of first order about the truth. Free fit: weighted is the gain itself, normal and inverse are 1. On the circle the gain
+ * hangs on alpha: weighted is rows' W, from which mc_solve() goes on. */
 struct mc_linear {
     int count, unknowns;
     bool constrained;
     double we_radps, wz_radps;
-    double inverse[FIT_MAX][FIT_MAX];            /* of rows' W rows */
-    double normal[FIT_MAX][FIT_MAX];             /* rows' W rows */
-    double weighted[FIT_MAX][NAV_MAX_POSITIONS]; /* rows' W: of an error of S/We at each position */
+    double weighted[FIT_MAX][NAV_MAX_POSITIONS]; /* of an error of S/We at each position */
+    double normal[FIT_MAX][FIT_MAX];             /* weighted rows */
+    double inverse[FIT_MAX][FIT_MAX];
     double cos_delta[NAV_MAX_POSITIONS], sin_delta[NAV_MAX_POSITIONS];
     struct nav_position p[NAV_MAX_POSITIONS];
 };
 int mc_linear_make(const struct nav_mc_cfg *cfg, struct mc_linear *lin);
 
-/* Errors of alpha on the scale of the angles, of the drift in We, and the quality, from r = rows' W error. */
+/* Errors of alpha on the scale of the angles, of the drift in We, and the quality, from r = weighted error. */
 struct mc_error {
     double alpha_rad, drift, quality;
 };
-struct mc_error mc_solve(const struct mc_linear *lin, const double r[FIT_MAX], double cos_a, double sin_a);
+struct mc_error mc_solve_on_circle(const struct mc_linear *lin, const double r[FIT_MAX], double cos_a, double sin_a);
+
+inline struct mc_error mc_solve(const struct mc_linear *lin, const double r[FIT_MAX], double cos_a, double sin_a)
+{
+    if (lin->constrained) return mc_solve_on_circle(lin, r, cos_a, sin_a);
+    return {cos_a * r[FIT_S] - sin_a * r[FIT_C], r[FIT_DRIFT], std::fabs(sin_a * r[FIT_S] + cos_a * r[FIT_C])};
+}
 
 /* A systematic error with the sign that this run drew. */
 inline double mc_signed(const struct nav_mc_cfg *cfg, double value, struct random_stream *rnd)

@@ -87,16 +87,14 @@ int mc_refusal(const struct nav_mc_cfg *c, const struct nav_position *p)
 }
 
 /* Fixed sizes: Eigen has the cofactors of these. */
-static bool invert(struct mc_linear *lin)
+static bool invert(const fit_small &normal, fit_small *inverse)
 {
     Eigen::Matrix4d m = Eigen::Matrix4d::Identity();
-    for (int k = 0; k < lin->unknowns; k++)
-        for (int j = 0; j < lin->unknowns; j++) m(k, j) = lin->normal[k][j];
+    m.topLeftCorner(normal.rows(), normal.cols()) = normal;
+    Eigen::Matrix4d all;
     bool invertible = false;
-    Eigen::Matrix4d inverse;
-    m.computeInverseWithCheck(inverse, invertible, 1e-12);
-    for (int k = 0; k < lin->unknowns; k++)
-        for (int j = 0; j < lin->unknowns; j++) lin->inverse[k][j] = inverse(k, j);
+    m.computeInverseWithCheck(all, invertible, 1e-12);
+    *inverse = all.topLeftCorner(normal.rows(), normal.cols());
     return invertible;
 }
 
@@ -111,22 +109,32 @@ int mc_linear_make(const struct nav_mc_cfg *cfg, struct mc_linear *lin)
     const fit_square covariance = fit_covariance(lin->p, cfg->count, &cfg->fit.noise, cfg->latitude_rad);
     const fit_square whitener = fit_whitener(covariance, &cfg->fit.noise, cfg->fit.method);
     const fit_design white_rows = whitener.lazyProduct(rows);
-    const fit_gain weighted = white_rows.transpose().lazyProduct(whitener);
-    const fit_small normal = weighted.lazyProduct(rows);
+    fit_gain weighted = white_rows.transpose().lazyProduct(whitener);
+    fit_small normal = weighted.lazyProduct(rows);
+    fit_small inverse;
+    if (!invert(normal, &inverse)) return NAV_SINGULAR;
     lin->count = cfg->count;
     lin->unknowns = (int)rows.cols();
     lin->constrained = fit_is_constrained(cfg->fit.method);
+    if (!lin->constrained) {
+        weighted = fit_gain(inverse.lazyProduct(weighted));
+        normal.setIdentity();
+        inverse.setIdentity();
+    }
     lin->we_radps = e.we_radps;
     lin->wz_radps = e.wz_radps;
     for (int k = 0; k < lin->unknowns; k++) {
-        for (int j = 0; j < lin->unknowns; j++) lin->normal[k][j] = normal(k, j);
+        for (int j = 0; j < lin->unknowns; j++) {
+            lin->normal[k][j] = normal(k, j);
+            lin->inverse[k][j] = inverse(k, j);
+        }
         for (int i = 0; i < lin->count; i++) lin->weighted[k][i] = weighted(k, i);
     }
     for (int i = 0; i < lin->count; i++) {
-        lin->cos_delta[i] = det_cos(lin->p[i].delta_rad);
-        lin->sin_delta[i] = det_sin(lin->p[i].delta_rad);
+        lin->cos_delta[i] = nav_cos(lin->p[i].delta_rad);
+        lin->sin_delta[i] = nav_sin(lin->p[i].delta_rad);
     }
-    return invert(lin) ? NAV_OK : NAV_SINGULAR;
+    return NAV_OK;
 }
 
 /* Of M x = r with M symmetric, of 2 or 3 unknowns, by cofactors. */
@@ -145,14 +153,13 @@ static void solve_small(const double m[3][3], const double r[3], int n, double x
     for (int i = 0; i < 3; i++) x[i] = solved(i);
 }
 
-struct mc_error mc_solve(const struct mc_linear *lin, const double r[FIT_MAX], double cos_a, double sin_a)
+struct mc_error mc_solve_on_circle(const struct mc_linear *lin, const double r[FIT_MAX], double cos_a, double sin_a)
 {
     double x[FIT_MAX] = {0.0};
     for (int k = 0; k < lin->unknowns; k++)
         for (int j = 0; j < lin->unknowns; j++) x[k] += lin->inverse[k][j] * r[j];
     struct mc_error error = {cos_a * x[FIT_S] - sin_a * x[FIT_C], x[FIT_DRIFT],
                              std::fabs(sin_a * x[FIT_S] + cos_a * x[FIT_C])};
-    if (!lin->constrained) return error;
     /* On the circle s and c move together: the column of alpha is cos a times that of s less sin a times that of c. */
     const int n = lin->unknowns - 1;
     double m[3][3];

@@ -1,46 +1,23 @@
 #include "nav/nav_mc.hpp"
 
-/* Unit vectors of 256 directions, made once a call; a run turns one of them by less than a 256th of a turn. */
-struct circle {
-    double cos[256], sin[256];
-};
+/* Runs are computed 32 at a time, one expression for all of them before the next: loops that a compiler turns into vectors. */
+constexpr int LANES = 32;
+#define INLINE __attribute__((always_inline)) static inline /* into code for a newer processor, too */
 
-static void circle_make(struct circle *c)
-{
-    for (int i = 0; i < 256; i++) {
-        c->cos[i] = det_cos(NAV_PI / 128.0 * i);
-        c->sin[i] = det_sin(NAV_PI / 128.0 * i);
-    }
-}
-
-struct direction {
-    double alpha_rad, cos, sin;
-};
-
-static inline struct direction turned(const struct circle *c, double turn /* [0, 1) */)
-{
-    const double t = turn * 256.0;
-    const int i = (int)t;
-    const double x = (t - i) * (NAV_PI / 128.0); /* up to 0.0246: x^7/5040 is below 1e-15 */
-    const double z = x * x;
-    const double sx = x * (1.0 - z * (1.0 / 6 - z * (1.0 / 120)));
-    const double cx = 1.0 - z * (0.5 - z * (1.0 / 24 - z * (1.0 / 720)));
-    const double alpha = 2.0 * NAV_PI * turn;
-    return {alpha > NAV_PI ? alpha - 2.0 * NAV_PI : alpha, c->cos[i] * cx - c->sin[i] * sx,
-            c->sin[i] * cx + c->cos[i] * sx};
-}
-
-/* The algebra that is done once: factor of the covariance of rows' W error, sums of weights, scales. */
+/* The algebra that is done once: factor of the covariance of weighted errors, sums of weights, scales. */
 struct closed_plan {
     const struct nav_mc_cfg *cfg;
     struct mc_linear lin;
-    struct circle circle;
-    double factor[FIT_MAX][FIT_MAX]; /* lower */
-    double sums[FIT_MAX];            /* of weighted, of an error that all positions share */
-    double level;                    /* gamma_sys in S/We */
+    double factor[FIT_MAX][FIT_MAX];              /* lower */
+    double sums[FIT_MAX];                         /* of weighted, of an error that all positions share */
+    double cc[FIT_MAX], cs[FIT_MAX], ss[FIT_MAX]; /* of weighted cos^2, cos sin, sin^2 of delta */
+    double share[NAV_MAX_POSITIONS];              /* of the angle's systematic error */
+    double level;                                 /* gamma_sys in S/We */
+    double beta_left_rad; /* true beta at rest, but for the level sensor's error, where (14) leaves it out */
     double angle_sd_rad;
-    double scale; /* relative error of s and c and drift, and of s and c alone */
-    double earth_scale;
+    double scale, earth; /* relative errors of s, c and drift, and of s and c where the circle makes them count */
+    double fixed_turn;   /* alpha1 in turns */
+    bool gimbal;
 };
 
 /* Of S/We but for angles: random drift, level sensors, white noise. */
@@ -79,114 +56,251 @@ static int plan_make(const struct nav_mc_cfg *cfg, struct closed_plan *plan)
     const struct mc_linear *lin = &plan->lin;
     fit_gain weighted(lin->unknowns, lin->count);
     for (int k = 0; k < lin->unknowns; k++) {
-        plan->sums[k] = 0.0;
+        plan->sums[k] = plan->cc[k] = plan->cs[k] = plan->ss[k] = 0.0;
         for (int i = 0; i < lin->count; i++) {
-            weighted(k, i) = lin->weighted[k][i];
-            plan->sums[k] += lin->weighted[k][i];
+            const double w = weighted(k, i) = lin->weighted[k][i];
+            plan->sums[k] += w;
+            plan->cc[k] += w * lin->cos_delta[i] * lin->cos_delta[i];
+            plan->cs[k] += w * lin->cos_delta[i] * lin->sin_delta[i];
+            plan->ss[k] += w * lin->sin_delta[i] * lin->sin_delta[i];
         }
     }
     const fit_gain spread = weighted.lazyProduct(random_covariance(cfg, lin));
     const fit_small covariance = spread.lazyProduct(weighted.transpose());
     factor_of(covariance, plan->factor);
-    circle_make(&plan->circle);
+    for (int i = 0; i < lin->count; i++) plan->share[i] = mc_angle_share(cfg, i);
     plan->level = lin->wz_radps * cfg->gamma_sys_rad / lin->we_radps;
+    plan->beta_left_rad = cfg->fit.simplified ? cfg->drift1_radps / cfg->m1_per_s : 0.0;
     plan->angle_sd_rad = cfg->angle_random_rad / std::sqrt(cfg->per_sample ? mc_samples_per_window(cfg) : 1.0);
     plan->scale = -cfg->torquer_scale;
-    plan->earth_scale = lin->constrained ? det_sin(cfg->latitude_rad) / det_cos(cfg->latitude_rad) : 0.0;
+    plan->earth =
+        lin->constrained ? cfg->latitude_error_rad * nav_sin(cfg->latitude_rad) / nav_cos(cfg->latitude_rad) : 0.0;
+    const double fixed = nav_wrap(std::isnan(cfg->alpha1_rad) ? 0.0 : cfg->alpha1_rad) / (2.0 * NAV_PI);
+    plan->fixed_turn = fixed < 0.0 ? fixed + 1.0 : fixed;
+    plan->gimbal = cfg->cardan == NAV_CARDAN_UNCORRECTED;
     return NAV_OK;
 }
 
-/* r += normal (scale (s, c, drift) + earth (s, c)): a scale error of S, and one of the Earth's rate. */
-static void add_scales(const struct closed_plan *plan, const struct direction *a, double earth, double r[FIT_MAX])
-{
-    const struct mc_linear *lin = &plan->lin;
-    const double x[FIT_MAX] = {(plan->scale + earth) * a->sin, (plan->scale + earth) * a->cos,
-                               plan->scale * plan->cfg->drift1_radps / lin->we_radps, 0.0};
-    for (int k = 0; k < lin->unknowns; k++)
-        for (int j = 0; j < lin->unknowns; j++) r[k] += lin->normal[k][j] * x[j];
-}
-
-struct closed_draw {
-    struct direction a;
-    double angle_sys_rad, level, earth, pitch_rad, roll_rad;
+/* What 32 runs draw and what becomes of it. */
+struct lanes {
+    double turn_a[LANES], turn_q[LANES]; /* alpha and gimbal angle in position 1, [0, 1) */
+    double cos_a[LANES], sin_a[LANES], cos_q[LANES], sin_q[LANES];
+    double pitch[LANES], roll[LANES]; /* [0, 1) until they are scaled */
+    double sign_angle[LANES], sign_gamma[LANES], sign_beta[LANES], sign_latitude[LANES];
+    double z[FIT_MAX][LANES], r[FIT_MAX][LANES];
+    double angle[NAV_MAX_POSITIONS][LANES], first[LANES];
+    double alpha[LANES], drift[LANES], quality[LANES];
 };
 
-static inline struct closed_draw draw(const struct closed_plan *plan, struct random_stream *rnd)
+/* Three numbers give the uniform draws and the signs, then come the Gaussian ones, which branch. */
+template <int COUNT, int UNKNOWNS>
+static void draw(const struct closed_plan *plan, uint64_t seed, uint64_t first_run, int n, struct lanes *x)
 {
-    const struct nav_mc_cfg *cfg = plan->cfg;
-    struct closed_draw d;
-    const double turn = rnd->uniform();
-    d.a = turned(&plan->circle, turn);
-    if (!std::isnan(cfg->alpha1_rad))
-        d.a = {nav_wrap(cfg->alpha1_rad), det_cos(cfg->alpha1_rad), det_sin(cfg->alpha1_rad)};
-    const uint64_t signs = cfg->random_sign ? rnd->bits() : 0;
-    d.angle_sys_rad = signs & 1 ? -cfg->angle_sys_rad : cfg->angle_sys_rad;
-    d.level = signs & 2 ? -plan->level : plan->level;
-    d.earth = (signs & 4 ? -plan->earth_scale : plan->earth_scale) * cfg->latitude_error_rad;
-    d.pitch_rad = d.roll_rad = 0.0;
-    if (cfg->cardan == NAV_CARDAN_UNCORRECTED) {
-        d.pitch_rad = mc_tilt(cfg, rnd);
-        d.roll_rad = mc_tilt(cfg, rnd);
+    const int count = COUNT ? COUNT : plan->lin.count;
+    const int unknowns = UNKNOWNS ? UNKNOWNS : plan->lin.unknowns;
+    const double bit52 = 0x1p-52;
+    const double bit32 = 0x1p-32;
+    for (int l = 0; l < n; l++) {
+        struct random_stream rnd = random_run(seed, first_run + (uint64_t)l);
+        const uint64_t u = rnd.bits();
+        const uint64_t v = rnd.bits();
+        const uint64_t w = rnd.bits();
+        x->turn_a[l] = (double)(int64_t)(u >> 12) * bit52;
+        x->sign_angle[l] = u & 1 ? -1.0 : 1.0;
+        x->sign_gamma[l] = u & 2 ? -1.0 : 1.0;
+        x->sign_beta[l] = u & 4 ? -1.0 : 1.0;
+        x->sign_latitude[l] = u & 8 ? -1.0 : 1.0;
+        x->turn_q[l] = (double)(int64_t)(v >> 12) * bit52;
+        x->pitch[l] = (double)(int32_t)(w >> 32) * bit32 + 0.5;
+        x->roll[l] = (double)(int32_t)w * bit32 + 0.5;
+        for (int k = 0; k < unknowns; k++) x->z[k][l] = rnd.gauss();
+        for (int i = 0; i < count; i++) x->angle[i][l] = rnd.gauss();
     }
-    return d;
 }
 
-/* Errors of the angles turn into errors of S by the slope We cos(alpha_i); the first one is returned. */
-template <int COUNT, int UNKNOWNS>
-static inline double add_angles(const struct closed_plan *plan, const struct closed_draw *d, struct random_stream *rnd,
-                                double r[FIT_MAX])
+/* cos and sin of 2 pi turn: of a quarter of the angle from the middle, fdlibm's polynomials, and doubled twice. */
+INLINE void directions(const double *turn, double *cos_out, double *sin_out)
+{
+    for (int l = 0; l < LANES; l++) {
+        const double x = 0.5 * NAV_PI * (turn[l] - 0.5);
+        const double z = x * x;
+        const double s = x + x * z * nav_sin_poly(z);
+        const double c = 1.0 - 0.5 * z + z * z * nav_cos_poly(z);
+        const double s2 = 2.0 * s * c;
+        const double c2 = 1.0 - 2.0 * s * s;
+        cos_out[l] = 2.0 * s2 * s2 - 1.0; /* the middle is half a turn: both are negated */
+        sin_out[l] = -2.0 * s2 * c2;
+    }
+}
+
+INLINE void scale_draws(const struct closed_plan *plan, struct lanes *x)
+{
+    const struct nav_mc_cfg *cfg = plan->cfg;
+    const bool corners = cfg->tilt == NAV_TILT_CORNERS;
+    for (int l = 0; l < LANES; l++) {
+        const double pitch = 2.0 * x->pitch[l] - 1.0;
+        const double roll = 2.0 * x->roll[l] - 1.0;
+        const double corner_pitch = pitch < 0.0 ? -1.0 : 1.0;
+        const double corner_roll = roll < 0.0 ? -1.0 : 1.0;
+        x->pitch[l] = cfg->tilt_rad * (corners ? corner_pitch : pitch);
+        x->roll[l] = cfg->tilt_rad * (corners ? corner_roll : roll);
+    }
+    if (!cfg->random_sign)
+        for (int l = 0; l < LANES; l++)
+            x->sign_angle[l] = x->sign_gamma[l] = x->sign_beta[l] = x->sign_latitude[l] = 1.0;
+    if (!std::isnan(cfg->alpha1_rad))
+        for (int l = 0; l < LANES; l++) x->turn_a[l] = plan->fixed_turn;
+}
+
+/* Random errors that do not hang on alpha, the level sensors' systematic ones, and what these do through tilts, gamma_i = A cos
+ * delta_i - B sin delta_i: sin(alpha_i) gamma_i of gamma's error, as rows take the cosine of a wrong gamma; cos(alpha_i) gamma_i of
+ * beta's. */
+template <int UNKNOWNS> INLINE void add_levels(const struct closed_plan *plan, struct lanes *x)
+{
+    const struct nav_mc_cfg *cfg = plan->cfg;
+    double cc[LANES];
+    double cs[LANES];
+    double ss[LANES];
+    for (int l = 0; l < LANES; l++) {
+        const double a = x->cos_q[l] * x->roll[l] - x->sin_q[l] * x->pitch[l];
+        const double b = x->sin_q[l] * x->roll[l] + x->cos_q[l] * x->pitch[l];
+        const double gamma = x->sign_gamma[l] * cfg->gamma_sys_rad;
+        const double beta = -(x->sign_beta[l] * cfg->beta_sys_rad + plan->beta_left_rad);
+        cc[l] = a * (gamma * x->sin_a[l] + beta * x->cos_a[l]);
+        cs[l] = gamma * (a * x->cos_a[l] - b * x->sin_a[l]) - beta * (b * x->cos_a[l] + a * x->sin_a[l]);
+        ss[l] = b * (beta * x->sin_a[l] - gamma * x->cos_a[l]);
+    }
+    const int unknowns = UNKNOWNS ? UNKNOWNS : plan->lin.unknowns;
+    for (int k = 0; k < unknowns; k++) {
+        for (int l = 0; l < LANES; l++)
+            x->r[k][l] = plan->sums[k] * (x->sign_gamma[l] * plan->level) + plan->cc[k] * cc[l] + plan->cs[k] * cs[l] +
+                         plan->ss[k] * ss[l];
+        for (int j = 0; j <= k; j++)
+            for (int l = 0; l < LANES; l++) x->r[k][l] += plan->factor[k][j] * x->z[j][l];
+    }
+}
+
+/* angle[i] becomes the error of the i-th angle; gimbal steps that are taken for steps of alpha add to it. */
+INLINE void angle_errors(const struct closed_plan *plan, int i, struct lanes *x)
+{
+    double *e = x->angle[i];
+    for (int l = 0; l < LANES; l++)
+        e[l] = plan->angle_sd_rad * e[l] + plan->share[i] * (x->sign_angle[l] * plan->cfg->angle_sys_rad);
+    if (i == 0)
+        for (int l = 0; l < LANES; l++) x->first[l] = e[l];
+    if (!plan->gimbal) return;
+    const double cd = plan->lin.cos_delta[i];
+    const double sd = plan->lin.sin_delta[i];
+    for (int l = 0; l < LANES; l++)
+        e[l] += nav_cardan_2nd(x->cos_q[l] * cd - x->sin_q[l] * sd, x->sin_q[l] * cd + x->cos_q[l] * sd, x->pitch[l],
+                               x->roll[l]) -
+                nav_cardan_2nd(x->cos_q[l], x->sin_q[l], x->pitch[l], x->roll[l]);
+}
+
+/* Errors of the angles turn into errors of S by the slope We cos(alpha_i). */
+template <int COUNT, int UNKNOWNS> INLINE void add_angles(const struct closed_plan *plan, struct lanes *x)
 {
     const struct mc_linear *lin = &plan->lin;
     const int count = COUNT ? COUNT : lin->count;
     const int unknowns = UNKNOWNS ? UNKNOWNS : lin->unknowns;
-    const bool gimbal = plan->cfg->cardan == NAV_CARDAN_UNCORRECTED;
-    const double first_turn = gimbal ? nav_cardan_2nd(det_cos(plan->cfg->angle_rad[0]),
-                                                      det_sin(plan->cfg->angle_rad[0]), d->pitch_rad, d->roll_rad)
-                                     : 0.0;
-    double first = 0.0;
     for (int i = 0; i < count; i++) {
-        double e = plan->angle_sd_rad * rnd->gauss() + mc_angle_share(plan->cfg, i) * d->angle_sys_rad;
-        if (i == 0) first = e;
-        if (gimbal)
-            e += nav_cardan_2nd(det_cos(plan->cfg->angle_rad[i]), det_sin(plan->cfg->angle_rad[i]), d->pitch_rad,
-                                d->roll_rad) -
-                 first_turn;
-        const double by_angle = (d->a.cos * lin->cos_delta[i] - d->a.sin * lin->sin_delta[i]) * e;
-        for (int k = 0; k < unknowns; k++) r[k] += lin->weighted[k][i] * by_angle;
+        angle_errors(plan, i, x);
+        double by_angle[LANES];
+        for (int l = 0; l < LANES; l++)
+            by_angle[l] = (x->cos_a[l] * lin->cos_delta[i] - x->sin_a[l] * lin->sin_delta[i]) * x->angle[i][l];
+        for (int k = 0; k < unknowns; k++)
+            for (int l = 0; l < LANES; l++) x->r[k][l] += lin->weighted[k][i] * by_angle[l];
     }
-    return first;
 }
 
-/* One run; COUNT and UNKNOWNS 0: as the plan says. */
-template <int COUNT, int UNKNOWNS>
-static inline void run(const struct closed_plan *plan, struct random_stream rnd, const struct nav_mc_out *out,
-                       uint64_t k)
+/* r += normal (scale (s, c, drift) + earth (s, c)): a scale error of S, and one of the Earth's rate. */
+INLINE void add_scales(const struct closed_plan *plan, struct lanes *x)
 {
     const struct mc_linear *lin = &plan->lin;
-    const int unknowns = UNKNOWNS ? UNKNOWNS : lin->unknowns;
-    const struct closed_draw d = draw(plan, &rnd);
-    double z[FIT_MAX];
-    double r[FIT_MAX];
-    for (int i = 0; i < unknowns; i++) {
-        z[i] = rnd.gauss();
-        r[i] = plan->sums[i] * d.level;
-        for (int j = 0; j <= i; j++) r[i] += plan->factor[i][j] * z[j];
-    }
-    const double first = add_angles<COUNT, UNKNOWNS>(plan, &d, &rnd, r);
-    if (plan->scale != 0.0 || d.earth != 0.0) add_scales(plan, &d.a, d.earth, r);
-    const struct mc_error error = mc_solve(lin, r, d.a.cos, d.a.sin);
-    mc_put(out->platform_rad, k, error.alpha_rad - first);
-    mc_put(out->heading_rad, k, error.alpha_rad);
-    mc_put(out->drift_radps, k, error.drift * lin->we_radps);
-    mc_put(out->alpha1_rad, k, d.a.alpha_rad);
-    mc_put(out->quality, k, error.quality);
+    if (plan->scale == 0.0 && plan->earth == 0.0) return;
+    const double drift = plan->scale * plan->cfg->drift1_radps / lin->we_radps;
+    for (int k = 0; k < lin->unknowns; k++)
+        for (int l = 0; l < LANES; l++) {
+            const double scale = plan->scale + x->sign_latitude[l] * plan->earth;
+            x->r[k][l] += scale * (lin->normal[k][FIT_S] * x->sin_a[l] + lin->normal[k][FIT_C] * x->cos_a[l]) +
+                          lin->normal[k][FIT_DRIFT] * drift;
+        }
 }
 
-template <int COUNT, int UNKNOWNS>
-static void all_runs(const struct closed_plan *plan, uint64_t seed, uint64_t first_run, uint64_t runs,
-                     const struct nav_mc_out *out)
+INLINE void solve(const struct closed_plan *plan, struct lanes *x)
 {
-    for (uint64_t k = 0; k < runs; k++) run<COUNT, UNKNOWNS>(plan, random_run(seed, first_run + k), out, k);
+    const struct mc_linear *lin = &plan->lin;
+    if (!lin->constrained) {
+        for (int l = 0; l < LANES; l++) {
+            x->alpha[l] = x->cos_a[l] * x->r[FIT_S][l] - x->sin_a[l] * x->r[FIT_C][l];
+            x->drift[l] = x->r[FIT_DRIFT][l];
+            x->quality[l] = std::fabs(x->sin_a[l] * x->r[FIT_S][l] + x->cos_a[l] * x->r[FIT_C][l]);
+        }
+        return;
+    }
+    for (int l = 0; l < LANES; l++) {
+        const double r[FIT_MAX] = {x->r[0][l], x->r[1][l], x->r[2][l], lin->unknowns > 3 ? x->r[3][l] : 0.0};
+        const struct mc_error e = mc_solve_on_circle(lin, r, x->cos_a[l], x->sin_a[l]);
+        x->alpha[l] = e.alpha_rad;
+        x->drift[l] = e.drift;
+        x->quality[l] = e.quality;
+    }
+}
+
+template <int COUNT, int UNKNOWNS> INLINE void compute(const struct closed_plan *plan, struct lanes *x)
+{
+    scale_draws(plan, x);
+    directions(x->turn_a, x->cos_a, x->sin_a);
+    directions(x->turn_q, x->cos_q, x->sin_q);
+    add_levels<UNKNOWNS>(plan, x);
+    add_angles<COUNT, UNKNOWNS>(plan, x);
+    add_scales(plan, x);
+    solve(plan, x);
+}
+
+/* The same operations in the same order for every processor, no fused ones among them: the same bytes. */
+static void compute_any(const struct closed_plan *plan, struct lanes *x)
+{
+    compute<0, 0>(plan, x);
+}
+
+static void compute_three(const struct closed_plan *plan, struct lanes *x)
+{
+    compute<3, 3>(plan, x);
+}
+
+#ifdef __x86_64__
+__attribute__((target("avx2"))) static void compute_three_avx2(const struct closed_plan *plan, struct lanes *x)
+{
+    compute<3, 3>(plan, x);
+}
+
+static bool have_avx2(void)
+{
+    return __builtin_cpu_supports("avx2") != 0;
+}
+#else
+static void compute_three_avx2(const struct closed_plan *plan, struct lanes *x)
+{
+    compute_three(plan, x);
+}
+
+static bool have_avx2(void)
+{
+    return false;
+}
+#endif
+
+static void put(const struct nav_mc_out *out, const struct closed_plan *plan, const struct lanes *x, uint64_t at, int n)
+{
+    for (int l = 0; l < n; l++) {
+        const double turn = x->turn_a[l] > 0.5 ? x->turn_a[l] - 1.0 : x->turn_a[l];
+        mc_put(out->platform_rad, at + (uint64_t)l, x->alpha[l] - x->first[l]);
+        mc_put(out->heading_rad, at + (uint64_t)l, x->alpha[l]);
+        mc_put(out->drift_radps, at + (uint64_t)l, x->drift[l] * plan->lin.we_radps);
+        mc_put(out->alpha1_rad, at + (uint64_t)l, 2.0 * NAV_PI * turn);
+        mc_put(out->quality, at + (uint64_t)l, x->quality[l]);
+    }
 }
 
 int nav_mc_closed(const struct nav_mc_cfg *cfg, uint64_t seed, uint64_t first_run, uint64_t runs,
@@ -196,6 +310,14 @@ int nav_mc_closed(const struct nav_mc_cfg *cfg, uint64_t seed, uint64_t first_ru
     const int refused = plan_make(cfg, &plan);
     if (refused) return refused;
     const bool three = plan.lin.count == 3 && plan.lin.unknowns == 3;
-    (three ? all_runs<3, 3> : all_runs<0, 0>)(&plan, seed, first_run, runs, out);
+    void (*const computed)(const struct closed_plan *, struct lanes *) =
+        three ? (have_avx2() ? compute_three_avx2 : compute_three) : compute_any;
+    struct lanes x = {};
+    for (uint64_t at = 0; at < runs; at += LANES) {
+        const int n = runs - at < LANES ? (int)(runs - at) : LANES;
+        (three ? draw<3, 3> : draw<0, 0>)(&plan, seed, first_run + at, n, &x);
+        computed(&plan, &x);
+        put(out, &plan, &x, at, n);
+    }
     return NAV_OK;
 }

@@ -90,7 +90,7 @@ static struct gm gm_begin(const struct nav_mc_cfg *cfg, struct random_stream *rn
 static double axis2_level(const struct hold_plan *plan, double alpha1_rad, double beta_rad, double gamma_rad)
 {
     const double alpha = alpha1_rad + plan->lin.p[plan->lin.count - 1].delta_rad;
-    return plan->lin.we_radps * (det_cos(alpha) * beta_rad - det_sin(alpha) * gamma_rad);
+    return plan->lin.we_radps * (nav_cos(alpha) * beta_rad - nav_sin(alpha) * gamma_rad);
 }
 
 /* The gyrocompassing, to first order as in nav_mc_closed(), with the random drift's means drawn one after the other. */
@@ -114,10 +114,10 @@ static struct hold_start calibrate(const struct hold_plan *plan, struct random_s
         const double angle = angle_sys * mc_angle_share(cfg, i) + cfg->angle_random_rad / ns * rnd->gauss();
         const double level = lin->wz_radps * (gamma_sys + cfg->gamma_random_rad / ns * rnd->gauss());
         const double white = cfg->white_radps_rts / std::sqrt(cfg->window_s) * rnd->gauss();
-        const double error = (drift + level + white) / lin->we_radps + det_cos(alpha + lin->p[i].delta_rad) * angle;
+        const double error = (drift + level + white) / lin->we_radps + nav_cos(alpha + lin->p[i].delta_rad) * angle;
         for (int k = 0; k < lin->unknowns; k++) r[k] += lin->weighted[k][i] * error;
     }
-    const struct mc_error found = mc_solve(lin, r, det_cos(alpha), det_sin(alpha));
+    const struct mc_error found = mc_solve(lin, r, nav_cos(alpha), nav_sin(alpha));
     struct hold_start start = {found.alpha_rad, found.drift * lin->we_radps - cfg->torquer_scale * cfg->drift1_radps,
                                axis1};
     if (own) start = {found.alpha_rad, measured2 + axis2_level(plan, alpha, beta_sys, gamma_sys), axis2};
@@ -137,7 +137,7 @@ static double flight_rate(const struct hold_plan *plan, struct random_stream *rn
 {
     const struct nav_mc_hold_cfg *cfg = plan->cfg;
     const double direction = 2.0 * NAV_PI * rnd->uniform();
-    const double tilted = plan->lin.we_radps * cfg->level_rad * det_cos(direction);
+    const double tilted = plan->lin.we_radps * cfg->level_rad * nav_cos(direction);
     const double latitude = mc_signed(&cfg->start, plan->lin.we_radps * cfg->latitude_error_rad, rnd);
     const double speed =
         mc_signed(&cfg->start, nav_transport_radps(cfg->v_east_mps, cfg->start.latitude_rad) * cfg->speed_error, rnd);

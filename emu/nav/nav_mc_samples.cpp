@@ -13,6 +13,7 @@ struct samples_plan {
 struct instrument {
     struct random_stream rnd;
     double alpha1_rad, psi_rad, pitch_rad, roll_rad;
+    double q1_rad; /* gimbal angle of position 1 */
     double angle_sys_rad, latitude_error_rad, beta_sys_rad, gamma_sys_rad;
     double drift_radps;      /* random part, now */
     double clock_s;          /* when it was so */
@@ -45,16 +46,17 @@ static struct instrument instrument_draw(const struct nav_mc_cfg *cfg, struct ra
     u.latitude_error_rad = mc_signed(cfg, cfg->latitude_error_rad, &u.rnd);
     u.pitch_rad = mc_tilt(cfg, &u.rnd);
     u.roll_rad = mc_tilt(cfg, &u.rnd);
-    if (cfg->cardan == NAV_CARDAN_ALPHA) u.psi_rad = NAV_PI * (2.0 * u.rnd.uniform() - 1.0);
-    else u.psi_rad = nav_heading(u.alpha1_rad, cfg->angle_rad[0], 0.0, u.pitch_rad, u.roll_rad);
+    u.q1_rad = NAV_PI * (2.0 * u.rnd.uniform() - 1.0);
+    u.psi_rad = nav_heading(u.alpha1_rad, u.q1_rad, 0.0, u.pitch_rad, u.roll_rad);
     if (!cfg->gm_from_zero) u.drift_radps = cfg->gm_sigma_radps * u.rnd.gauss();
     return u;
 }
 
 static double alpha_at(const struct nav_mc_cfg *cfg, const struct instrument *u, int i, double error_rad)
 {
-    if (cfg->cardan == NAV_CARDAN_ALPHA) return u->alpha1_rad + cfg->angle_rad[i] - cfg->angle_rad[0] + error_rad;
-    return nav_alpha(u->psi_rad, cfg->angle_rad[i] + error_rad, 0.0, u->pitch_rad, u->roll_rad);
+    const double turn = cfg->angle_rad[i] - cfg->angle_rad[0];
+    if (cfg->cardan == NAV_CARDAN_ALPHA) return u->alpha1_rad + turn + error_rad;
+    return nav_alpha(u->psi_rad, u->q1_rad + turn + error_rad, 0.0, u->pitch_rad, u->roll_rad);
 }
 
 /* Mean of a Gaussian error drawn each sample. */
@@ -75,8 +77,15 @@ static double drift_mean(const struct samples_plan *plan, struct instrument *u, 
     double w = over_gap * u->drift_radps;
     if (begins_s > u->clock_s) w += cfg->gm_sigma_radps * std::sqrt(1.0 - over_gap * over_gap) * u->rnd.gauss();
     struct random_stream rnd = u->rnd; /* a copy that the compiler may keep in registers */
+    const double two = plan->decay * plan->decay;
     double sum = 0.0;
-    for (uint64_t k = 0; k < plan->per_window; k++) {
+    for (uint64_t k = 0; k + 1 < plan->per_window; k += 2) { /* two at a time: half the waiting of one for the other */
+        const double first = plan->step_sd_radps * rnd.gauss();
+        const double second = plan->step_sd_radps * rnd.gauss();
+        sum += w + (plan->decay * w + first);
+        w = two * w + (plan->decay * first + second);
+    }
+    if (plan->per_window % 2 == 1) {
         sum += w;
         w = plan->decay * w + plan->step_sd_radps * rnd.gauss();
     }
@@ -117,19 +126,21 @@ static struct nav_position measure(const struct samples_plan *plan, struct instr
 }
 
 /* Gimbal steps to increments of alpha, with the attitude that the level sensors tell. */
-static int correct_gimbal(const struct nav_mc_cfg *cfg, struct nav_position *p)
+static int correct_gimbal(const struct nav_mc_cfg *cfg, double q1_rad, struct nav_position *p)
 {
+    double q[NAV_MAX_POSITIONS];
     double beta[NAV_MAX_POSITIONS];
     double gamma[NAV_MAX_POSITIONS];
     double delta[NAV_MAX_POSITIONS];
     for (int i = 0; i < cfg->count; i++) {
+        q[i] = q1_rad + p[i].delta_rad;
         beta[i] = p[i].beta_rad;
         gamma[i] = p[i].gamma_rad;
     }
     struct nav_attitude attitude;
-    int refused = nav_attitude_from_level(cfg->angle_rad, beta, gamma, cfg->count, 1, &attitude);
+    int refused = nav_attitude_from_level(q, beta, gamma, cfg->count, 1, &attitude);
     if (refused) return refused;
-    refused = nav_cardan(cfg->angle_rad, beta, cfg->count, attitude.pitch_rad, attitude.roll_rad, delta);
+    refused = nav_cardan(q, beta, cfg->count, attitude.pitch_rad, attitude.roll_rad, delta);
     for (int i = 0; i < cfg->count && !refused; i++) p[i].delta_rad = delta[i];
     return refused;
 }
@@ -141,7 +152,7 @@ static int run(const struct samples_plan *plan, struct random_stream rnd, const 
     struct nav_position p[NAV_MAX_POSITIONS];
     for (int i = 0; i < cfg->count; i++) p[i] = measure(plan, &u, i);
     if (cfg->cardan == NAV_CARDAN_CORRECTED) {
-        const int refused = correct_gimbal(cfg, p);
+        const int refused = correct_gimbal(cfg, u.q1_rad, p);
         if (refused) return refused;
     }
     struct nav_gyrocompass_cfg fit = cfg->fit;

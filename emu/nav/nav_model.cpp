@@ -2,11 +2,11 @@
 
 struct nav_row nav_row_of(const struct nav_position *p, bool simplified)
 {
-    const double cd = det_cos(p->delta_rad);
-    const double sd = det_sin(p->delta_rad);
-    const double cg = det_cos(p->gamma_rad);
+    const double cd = nav_cos(p->delta_rad);
+    const double sd = nav_sin(p->delta_rad);
+    const double cg = nav_cos(p->gamma_rad);
     if (simplified) return {cd * cg, sd * cg};
-    const double sgsb = det_sin(p->gamma_rad) * det_sin(p->beta_rad);
+    const double sgsb = nav_sin(p->gamma_rad) * nav_sin(p->beta_rad);
     return {cd * cg - sd * sgsb, sd * cg + cd * sgsb};
 }
 
@@ -14,33 +14,33 @@ struct nav_row nav_row_of(const struct nav_position *p, bool simplified)
  * the share that beta turns sideways: x_p = Rz(alpha) (cos g, sin b sin g, -sin g cos b). */
 double nav_alpha(double psi_rad, double q_rad, double beta_rad, double pitch_rad, double roll_rad)
 {
-    const double cq = det_cos(q_rad);
-    const double sq = det_sin(q_rad);
-    const double cp = det_cos(pitch_rad);
-    const double sr = det_sin(roll_rad);
-    const double east = cq * det_cos(roll_rad);
-    const double north = cq * det_sin(pitch_rad) * sr + sq * cp;
-    const double up = sq * det_sin(pitch_rad) - cq * cp * sr;
-    const double cb = det_cos(beta_rad);
+    const double cq = nav_cos(q_rad);
+    const double sq = nav_sin(q_rad);
+    const double cp = nav_cos(pitch_rad);
+    const double sr = nav_sin(roll_rad);
+    const double east = cq * nav_cos(roll_rad);
+    const double north = cq * nav_sin(pitch_rad) * sr + sq * cp;
+    const double up = sq * nav_sin(pitch_rad) - cq * cp * sr;
+    const double cb = nav_cos(beta_rad);
     const double sg = -up / cb;
-    const double sideways = det_atan2(det_sin(beta_rad) * sg, std::sqrt(1.0 - sg * sg));
+    const double sideways = det_atan2(nav_sin(beta_rad) * sg, std::sqrt(1.0 - sg * sg));
     return nav_wrap(det_atan2(north, east) - sideways - psi_rad);
 }
 
 double nav_gamma(double alpha_rad, double beta_rad, double psi_rad, double pitch_rad, double roll_rad)
 {
-    const double st = det_sin(pitch_rad);
-    const double sr = det_sin(roll_rad);
-    const double cr = det_cos(roll_rad);
-    const double sy = det_sin(psi_rad);
-    const double cy = det_cos(psi_rad);
+    const double st = nav_sin(pitch_rad);
+    const double sr = nav_sin(roll_rad);
+    const double cr = nav_cos(roll_rad);
+    const double sy = nav_sin(psi_rad);
+    const double cy = nav_cos(psi_rad);
     const double z_east = -sy * st * cr + cy * sr;
     const double z_north = -cy * st * cr - sy * sr;
-    const double z_up = det_cos(pitch_rad) * cr;
-    const double sa = det_sin(alpha_rad);
-    const double ca = det_cos(alpha_rad);
+    const double z_up = nav_cos(pitch_rad) * cr;
+    const double sa = nav_sin(alpha_rad);
+    const double ca = nav_cos(alpha_rad);
     const double x1_zc = z_east * ca + z_north * sa;
-    const double z2_zc = det_cos(beta_rad) * z_up - det_sin(beta_rad) * (-z_east * sa + z_north * ca);
+    const double z2_zc = nav_cos(beta_rad) * z_up - nav_sin(beta_rad) * (-z_east * sa + z_north * ca);
     return det_atan2(x1_zc, z2_zc);
 }
 
@@ -50,28 +50,26 @@ double nav_heading(double alpha_rad, double q_rad, double beta_rad, double pitch
     return psi < 0.0 ? psi + 2.0 * NAV_PI : psi;
 }
 
-double nav_cardan_2nd(double cos_q, double sin_q, double pitch_rad, double roll_rad)
-{
-    return cos_q * cos_q * pitch_rad * roll_rad + 0.5 * sin_q * cos_q * (roll_rad * roll_rad - pitch_rad * pitch_rad);
-}
-
-/* (7) at rest, solved for S = -m1 beta_n; beta is some tens of arc seconds, so four turns are many. */
+/* (7) at rest, solved for S = -m1 beta_n. beta is some tens of arc seconds and acts through sin(gamma): each turn takes off five
+ * digits or more. */
 double nav_rest_s_radps(const struct nav_rest *at, double *beta_rad)
 {
+    enum { TURNS_MAX = 50 };
     const struct nav_earth e = nav_earth_at(at->latitude_rad);
-    const double wz_n = nav_earth_at(at->latitude_rad + at->latitude_error_rad).wz_radps;
-    const double sa = det_sin(at->alpha_rad);
-    const double ca = det_cos(at->alpha_rad);
-    const double sg = det_sin(at->gamma_rad);
-    const double cg = det_cos(at->gamma_rad);
-    const double sg_n = det_sin(at->gamma_rad + at->gamma_error_rad);
+    const double wz_n = NAV_EARTH_RADPS * nav_sin(at->latitude_rad + at->latitude_error_rad);
+    const double ca_sg = nav_cos(at->alpha_rad) * nav_sin(at->gamma_rad);
+    const double sa_cg = nav_sin(at->alpha_rad) * nav_cos(at->gamma_rad);
+    const double sg = nav_sin(at->gamma_rad);
+    const double compensation = wz_n * nav_sin(at->gamma_rad + at->gamma_error_rad);
     double s = 0.0;
     double beta = 0.0;
-    for (int turn = 0; turn < 6; turn++) {
+    for (int turn = 0; turn < TURNS_MAX; turn++) {
         beta = -s / at->m1_per_s - at->beta_error_rad;
         const double w_x =
-            e.we_radps * (sa * cg + ca * sg * det_sin(beta)) - e.wz_radps * det_cos(beta) * sg + at->drift1_radps;
-        s = w_x / (1.0 + at->torquer_scale1) + wz_n * det_cos(beta + at->beta_error_rad) * sg_n;
+            e.we_radps * (sa_cg + ca_sg * nav_sin(beta)) - e.wz_radps * nav_cos(beta) * sg + at->drift1_radps;
+        const double was = s;
+        s = w_x / (1.0 + at->torquer_scale1) + compensation * nav_cos(beta + at->beta_error_rad);
+        if (std::fabs(s - was) < 1e-20) break;
     }
     if (beta_rad) *beta_rad = beta;
     return s;
@@ -80,22 +78,22 @@ double nav_rest_s_radps(const struct nav_rest *at, double *beta_rad)
 double nav_azimuth_drift(double s_az_radps, double latitude_rad, double alpha_rad, double beta_rad, double gamma_rad)
 {
     const struct nav_earth e = nav_earth_at(latitude_rad);
-    const double sg = det_sin(gamma_rad);
-    const double cg = det_cos(gamma_rad);
-    return s_az_radps - e.wz_radps * det_cos(beta_rad) * cg -
-           e.we_radps * (det_sin(alpha_rad) * sg - det_cos(alpha_rad) * cg * det_sin(beta_rad));
+    const double sg = nav_sin(gamma_rad);
+    const double cg = nav_cos(gamma_rad);
+    return s_az_radps - e.wz_radps * nav_cos(beta_rad) * cg -
+           e.we_radps * (nav_sin(alpha_rad) * sg - nav_cos(alpha_rad) * cg * nav_sin(beta_rad));
 }
 
 double nav_azimuth_drift_sd(double latitude_rad, double alpha_rad, double beta_sd_rad, double gamma_sd_rad)
 {
-    const double by_gamma = det_sin(alpha_rad) * gamma_sd_rad;
-    const double by_beta = det_cos(alpha_rad) * beta_sd_rad;
+    const double by_gamma = nav_sin(alpha_rad) * gamma_sd_rad;
+    const double by_beta = nav_cos(alpha_rad) * beta_sd_rad;
     return std::fabs(nav_earth_at(latitude_rad).we_radps) * std::sqrt(by_gamma * by_gamma + by_beta * by_beta);
 }
 
 double nav_transport_radps(double v_east_mps, double latitude_rad)
 {
-    return v_east_mps * det_sin(latitude_rad) / det_cos(latitude_rad) / 6371000.0;
+    return v_east_mps * nav_sin(latitude_rad) / nav_cos(latitude_rad) / 6371000.0;
 }
 
 /* Mean over a window of e^(-mu t), with t from its middle: sinh(x)/x. */

@@ -25,6 +25,10 @@ double nav_gm_from_zero_less(const struct nav_noise *n, double t_a_s, double win
                              double window_b_s);
 
 /* How a gimbal turned by q about a tilted z_c differs from q, to second order in the tilts. */
-double nav_cardan_2nd(double cos_q, double sin_q, double pitch_rad, double roll_rad);
+inline __attribute__((always_inline)) double nav_cardan_2nd(double cos_q, double sin_q, double pitch_rad,
+                                                            double roll_rad)
+{
+    return cos_q * cos_q * pitch_rad * roll_rad + 0.5 * sin_q * cos_q * (roll_rad * roll_rad - pitch_rad * pitch_rad);
+}
 
 #endif
