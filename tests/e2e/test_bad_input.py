@@ -192,7 +192,11 @@ def test_a_full_disk_ends_the_trace_and_not_the_run(for_time: str) -> None:
 @pytest.mark.parametrize(
     ("args", "status", "says"),
     [
-        ("run frobnicate", 2, "no such procedure; turns, fourier, reversal, compare-converters, gyrocompass, heading-hold or all"),
+        (
+            "run frobnicate",
+            2,
+            "no such procedure; turns, fourier, reversal, compare-converters, gyrocompass, heading-hold or all",
+        ),
         ("run fourier --can socketcand:127.0.0.1:{port}", 2, "--head is missing: the VISA address"),
         ("run fourier --positions 1 --condition quiet --out {dir}", 2, "fourier: "),
         ("run fourier --scenario {dir}/no.yaml --out {dir}", 2, "no.yaml: no such file"),

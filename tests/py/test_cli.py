@@ -14,7 +14,10 @@ from test_lineport import lines
 
 MISTAKES: list[tuple[str, str]] = [
     ("run", "which procedure? turns, fourier, reversal, compare-converters, gyrocompass, heading-hold or all"),
-    ("run spin", "run spin: no such procedure; turns, fourier, reversal, compare-converters, gyrocompass, heading-hold or all"),
+    (
+        "run spin",
+        "run spin: no such procedure; turns, fourier, reversal, compare-converters, gyrocompass, heading-hold or all",
+    ),
     ("run turns --positions 80", "--positions: turns has no such parameter; it has --axis"),
     ("run all --axis w", "turns: axis is 'w'; it must be x, y or z"),
     ("run turns --out /dev/null/x", "/dev/null/x: "),
