@@ -2,7 +2,6 @@
 
 /* Runs are computed 32 at a time, one expression for all of them before the next: loops that a compiler turns into vectors. */
 constexpr int LANES = 32;
-#define INLINE __attribute__((always_inline)) static inline /* into code for a newer processor, too */
 
 /* The algebra that is done once: factor of the covariance of weighted errors, sums of weights, scales. */
 struct closed_plan {
@@ -83,54 +82,38 @@ static int plan_make(const struct nav_mc_cfg *cfg, struct closed_plan *plan)
 
 /* What 32 runs draw and what becomes of it. */
 struct lanes {
+    uint64_t state[LANES];
     double turn_a[LANES], turn_q[LANES]; /* alpha and gimbal angle in position 1, [0, 1) */
     double cos_a[LANES], sin_a[LANES], cos_q[LANES], sin_q[LANES];
     double pitch[LANES], roll[LANES]; /* [0, 1) until they are scaled */
     double sign_angle[LANES], sign_gamma[LANES], sign_beta[LANES], sign_latitude[LANES];
-    double z[FIT_MAX][LANES], r[FIT_MAX][LANES];
-    double angle[NAV_MAX_POSITIONS][LANES], first[LANES];
+    double z[FIT_MAX + NAV_MAX_POSITIONS + 1][LANES]; /* Gaussian: for the unknowns, then for the angles */
+    double r[FIT_MAX][LANES], first[LANES];
     double alpha[LANES], drift[LANES], quality[LANES];
 };
 
-/* Three numbers give the uniform draws and the signs, then come the Gaussian ones, which branch. */
-template <int COUNT, int UNKNOWNS>
-static void draw(const struct closed_plan *plan, uint64_t seed, uint64_t first_run, int n, struct lanes *x)
-{
-    const int count = COUNT ? COUNT : plan->lin.count;
-    const int unknowns = UNKNOWNS ? UNKNOWNS : plan->lin.unknowns;
-    const double bit52 = 0x1p-52;
-    const double bit32 = 0x1p-32;
-    for (int l = 0; l < n; l++) {
-        struct random_stream rnd = random_run(seed, first_run + (uint64_t)l);
-        const uint64_t u = rnd.bits();
-        const uint64_t v = rnd.bits();
-        const uint64_t w = rnd.bits();
-        x->turn_a[l] = (double)(int64_t)(u >> 12) * bit52;
-        x->sign_angle[l] = u & 1 ? -1.0 : 1.0;
-        x->sign_gamma[l] = u & 2 ? -1.0 : 1.0;
-        x->sign_beta[l] = u & 4 ? -1.0 : 1.0;
-        x->sign_latitude[l] = u & 8 ? -1.0 : 1.0;
-        x->turn_q[l] = (double)(int64_t)(v >> 12) * bit52;
-        x->pitch[l] = (double)(int32_t)(w >> 32) * bit32 + 0.5;
-        x->roll[l] = (double)(int32_t)w * bit32 + 0.5;
-        for (int k = 0; k < unknowns; k++) x->z[k][l] = rnd.gauss();
-        for (int i = 0; i < count; i++) x->angle[i][l] = rnd.gauss();
-    }
-}
-
-/* cos and sin of 2 pi turn: of a quarter of the angle from the middle, fdlibm's polynomials, and doubled twice. */
-INLINE void directions(const double *turn, double *cos_out, double *sin_out)
+/* Four numbers give the uniform draws and, in the lowest bits of the first, the signs; then come the Gaussian ones. */
+INLINE void draw(int gaussians, uint64_t seed, uint64_t first_run, struct lanes *x)
 {
     for (int l = 0; l < LANES; l++) {
-        const double x = 0.5 * NAV_PI * (turn[l] - 0.5);
-        const double z = x * x;
-        const double s = x + x * z * nav_sin_poly(z);
-        const double c = 1.0 - 0.5 * z + z * z * nav_cos_poly(z);
-        const double s2 = 2.0 * s * c;
-        const double c2 = 1.0 - 2.0 * s * s;
-        cos_out[l] = 2.0 * s2 * s2 - 1.0; /* the middle is half a turn: both are negated */
-        sin_out[l] = -2.0 * s2 * c2;
+        const uint64_t start = random_run(seed, first_run + (uint64_t)l);
+        const uint64_t u = random_mix(start + RANDOM_STEP);
+        x->turn_a[l] = random_unit(u);
+        x->turn_q[l] = random_unit(random_mix(start + 2 * RANDOM_STEP));
+        x->pitch[l] = random_unit(random_mix(start + 3 * RANDOM_STEP));
+        x->roll[l] = random_unit(random_mix(start + 4 * RANDOM_STEP));
+        const uint64_t one = UINT64_C(0x3FF0000000000000); /* its sign is the bit: no branch */
+        x->sign_angle[l] = random_double_of(one | u << 63);
+        x->sign_gamma[l] = random_double_of(one | (u >> 1) << 63);
+        x->sign_beta[l] = random_double_of(one | (u >> 2) << 63);
+        x->sign_latitude[l] = random_double_of(one | (u >> 3) << 63);
+        x->state[l] = start + 4 * RANDOM_STEP;
     }
+    for (int k = 0; k < gaussians; k += 2)
+        for (int l = 0; l < LANES; l++) {
+            const uint64_t at = x->state[l] + (uint64_t)k * RANDOM_STEP;
+            random_pair(random_mix(at + RANDOM_STEP), random_mix(at + 2 * RANDOM_STEP), &x->z[k][l], &x->z[k + 1][l]);
+        }
 }
 
 INLINE void scale_draws(const struct closed_plan *plan, struct lanes *x)
@@ -180,10 +163,9 @@ template <int UNKNOWNS> INLINE void add_levels(const struct closed_plan *plan, s
     }
 }
 
-/* angle[i] becomes the error of the i-th angle; gimbal steps that are taken for steps of alpha add to it. */
-INLINE void angle_errors(const struct closed_plan *plan, int i, struct lanes *x)
+/* e becomes the error of the i-th angle; gimbal steps that are taken for steps of alpha add to it. */
+INLINE void angle_errors(const struct closed_plan *plan, int i, double *e, struct lanes *x)
 {
-    double *e = x->angle[i];
     for (int l = 0; l < LANES; l++)
         e[l] = plan->angle_sd_rad * e[l] + plan->share[i] * (x->sign_angle[l] * plan->cfg->angle_sys_rad);
     if (i == 0)
@@ -204,10 +186,11 @@ template <int COUNT, int UNKNOWNS> INLINE void add_angles(const struct closed_pl
     const int count = COUNT ? COUNT : lin->count;
     const int unknowns = UNKNOWNS ? UNKNOWNS : lin->unknowns;
     for (int i = 0; i < count; i++) {
-        angle_errors(plan, i, x);
+        double *e = x->z[unknowns + i];
+        angle_errors(plan, i, e, x);
         double by_angle[LANES];
         for (int l = 0; l < LANES; l++)
-            by_angle[l] = (x->cos_a[l] * lin->cos_delta[i] - x->sin_a[l] * lin->sin_delta[i]) * x->angle[i][l];
+            by_angle[l] = (x->cos_a[l] * lin->cos_delta[i] - x->sin_a[l] * lin->sin_delta[i]) * e[l];
         for (int k = 0; k < unknowns; k++)
             for (int l = 0; l < LANES; l++) x->r[k][l] += lin->weighted[k][i] * by_angle[l];
     }
@@ -247,77 +230,65 @@ INLINE void solve(const struct closed_plan *plan, struct lanes *x)
     }
 }
 
-template <int COUNT, int UNKNOWNS> INLINE void compute(const struct closed_plan *plan, struct lanes *x)
+/* One run a lane; COUNT and UNKNOWNS 0: as the plan says. */
+template <int COUNT, int UNKNOWNS>
+INLINE void compute(const struct closed_plan *plan, uint64_t seed, uint64_t first_run, struct lanes *x)
 {
+    draw(COUNT ? COUNT + UNKNOWNS : plan->lin.count + plan->lin.unknowns, seed, first_run, x);
     scale_draws(plan, x);
-    directions(x->turn_a, x->cos_a, x->sin_a);
-    directions(x->turn_q, x->cos_q, x->sin_q);
+    for (int l = 0; l < LANES; l++) random_direction(x->turn_a[l], &x->cos_a[l], &x->sin_a[l]);
+    for (int l = 0; l < LANES; l++) random_direction(x->turn_q[l], &x->cos_q[l], &x->sin_q[l]);
     add_levels<UNKNOWNS>(plan, x);
     add_angles<COUNT, UNKNOWNS>(plan, x);
     add_scales(plan, x);
     solve(plan, x);
 }
 
-/* The same operations in the same order for every processor, no fused ones among them: the same bytes. */
-static void compute_any(const struct closed_plan *plan, struct lanes *x)
-{
-    compute<0, 0>(plan, x);
-}
-
-static void compute_three(const struct closed_plan *plan, struct lanes *x)
-{
-    compute<3, 3>(plan, x);
-}
-
-#ifdef __x86_64__
-__attribute__((target("avx2"))) static void compute_three_avx2(const struct closed_plan *plan, struct lanes *x)
-{
-    compute<3, 3>(plan, x);
-}
-
-static bool have_avx2(void)
-{
-    return __builtin_cpu_supports("avx2") != 0;
-}
-#else
-static void compute_three_avx2(const struct closed_plan *plan, struct lanes *x)
-{
-    compute_three(plan, x);
-}
-
-static bool have_avx2(void)
-{
-    return false;
-}
-#endif
-
-static void put(const struct nav_mc_out *out, const struct closed_plan *plan, const struct lanes *x, uint64_t at, int n)
-{
-    for (int l = 0; l < n; l++) {
-        const double turn = x->turn_a[l] > 0.5 ? x->turn_a[l] - 1.0 : x->turn_a[l];
-        mc_put(out->platform_rad, at + (uint64_t)l, x->alpha[l] - x->first[l]);
-        mc_put(out->heading_rad, at + (uint64_t)l, x->alpha[l]);
-        mc_put(out->drift_radps, at + (uint64_t)l, x->drift[l] * plan->lin.we_radps);
-        mc_put(out->alpha1_rad, at + (uint64_t)l, 2.0 * NAV_PI * turn);
-        mc_put(out->quality, at + (uint64_t)l, x->quality[l]);
+#define COMPUTE(name, target, count, unknowns)                                                                         \
+    target static void name(const struct closed_plan *plan, uint64_t seed, uint64_t first_run, struct lanes *x)        \
+    {                                                                                                                  \
+        compute<count, unknowns>(plan, seed, first_run, x);                                                            \
     }
+COMPUTE(three_any, , 3, 3)
+COMPUTE(three_wide, TARGET_WIDE, 3, 3)
+COMPUTE(three_widest, TARGET_WIDEST, 3, 3)
+COMPUTE(more_any, , 0, 0)
+COMPUTE(more_wide, TARGET_WIDE, 0, 0)
+COMPUTE(more_widest, TARGET_WIDEST, 0, 0)
+
+static void put(double *array, uint64_t at, int n, const double *lane)
+{
+    if (array) memcpy(array + at, lane, (size_t)n * sizeof *array);
+}
+
+static void put_all(const struct nav_mc_out *out, const struct closed_plan *plan, struct lanes *x, uint64_t at, int n)
+{
+    put(out->heading_rad, at, n, x->alpha);
+    put(out->quality, at, n, x->quality);
+    for (int l = 0; l < LANES; l++) {
+        x->alpha[l] -= x->first[l];
+        x->drift[l] *= plan->lin.we_radps;
+        x->turn_a[l] = 2.0 * NAV_PI * (x->turn_a[l] > 0.5 ? x->turn_a[l] - 1.0 : x->turn_a[l]);
+    }
+    put(out->platform_rad, at, n, x->alpha);
+    put(out->drift_radps, at, n, x->drift);
+    put(out->alpha1_rad, at, n, x->turn_a);
 }
 
 int nav_mc_closed(const struct nav_mc_cfg *cfg, uint64_t seed, uint64_t first_run, uint64_t runs,
                   const struct nav_mc_out *out)
 {
+    static void (*const by_width[2][3])(const struct closed_plan *, uint64_t, uint64_t, struct lanes *) = {
+        {more_any, more_wide, more_widest}, {three_any, three_wide, three_widest}};
     struct closed_plan plan;
     const int refused = plan_make(cfg, &plan);
     if (refused) return refused;
-    const bool three = plan.lin.count == 3 && plan.lin.unknowns == 3;
-    void (*const computed)(const struct closed_plan *, struct lanes *) =
-        three ? (have_avx2() ? compute_three_avx2 : compute_three) : compute_any;
-    struct lanes x = {};
+    const int three = plan.lin.count == 3 && plan.lin.unknowns == 3;
+    const int width = random_width();
+    struct lanes x;
     for (uint64_t at = 0; at < runs; at += LANES) {
-        const int n = runs - at < LANES ? (int)(runs - at) : LANES;
-        (three ? draw<3, 3> : draw<0, 0>)(&plan, seed, first_run + at, n, &x);
-        computed(&plan, &x);
-        put(out, &plan, &x, at, n);
+        by_width[three][width](&plan, seed, first_run + at, &x);
+        put_all(out, &plan, &x, at, runs - at < LANES ? (int)(runs - at) : LANES);
     }
     return NAV_OK;
 }

@@ -145,8 +145,9 @@ static double flight_rate(const struct hold_plan *plan, struct random_stream *rn
 }
 
 /* (alpha estimated) less alpha grows by the drift that was not compensated. */
-static void run(const struct hold_plan *plan, struct random_stream rnd, const struct nav_mc_hold_out *out, uint64_t k)
+static void run(const struct hold_plan *plan, uint64_t start_of_stream, const struct nav_mc_hold_out *out, uint64_t k)
 {
+    struct random_stream rnd(start_of_stream);
     struct hold_start start = begin(plan, &rnd);
     const double rate = flight_rate(plan, &rnd) - start.drift_radps;
     const double step_s = plan->cfg->hours * 3600.0 / (double)plan->steps;

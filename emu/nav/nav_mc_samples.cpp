@@ -1,5 +1,7 @@
 #include "nav/nav_mc.hpp"
 
+constexpr int BLOCK = 512; /* random numbers made at once */
+
 /* What does not change from run to run. */
 struct samples_plan {
     const struct nav_mc_cfg *cfg;
@@ -35,10 +37,9 @@ static int plan_make(const struct nav_mc_cfg *cfg, struct samples_plan *plan)
     return NAV_OK;
 }
 
-static struct instrument instrument_draw(const struct nav_mc_cfg *cfg, struct random_stream rnd)
+static struct instrument instrument_draw(const struct nav_mc_cfg *cfg, uint64_t start)
 {
-    struct instrument u = {};
-    u.rnd = rnd;
+    struct instrument u = {random_stream(start), 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
     u.alpha1_rad = mc_alpha1(cfg, &u.rnd);
     u.angle_sys_rad = mc_signed(cfg, cfg->angle_sys_rad, &u.rnd);
     u.gamma_sys_rad = mc_signed(cfg, cfg->gamma_sys_rad, &u.rnd);
@@ -62,10 +63,39 @@ static double alpha_at(const struct nav_mc_cfg *cfg, const struct instrument *u,
 /* Mean of a Gaussian error drawn each sample. */
 static double mean_of_samples(struct random_stream *rnd, double sd, uint64_t count)
 {
+    if (sd == 0.0) return 0.0;
+    if (count == 1) return sd * rnd->gauss();
     double sum = 0.0;
-    if (sd > 0.0)
-        for (uint64_t k = 0; k < count; k++) sum += rnd->gauss();
+    double noise[BLOCK];
+    for (uint64_t done = 0; done < count; done += BLOCK) {
+        const int n = count - done < BLOCK ? (int)(count - done) : BLOCK;
+        rnd->state = random_fill(rnd->state, n + n % 2, noise);
+        for (int k = 0; k < n; k++) sum += noise[k];
+    }
     return sd * sum / (double)count;
+}
+
+/* Sum of n samples of the drift w, which comes back as it is after the last. Each is computed; four at a time, as noise started
+ * from zero and what is left of w, so that they need not wait for one another. */
+static double drift_sum(const struct samples_plan *plan, const double *noise, int n, double *w)
+{
+    const double rho = plan->decay;
+    const double four = rho * rho * rho * rho;
+    const double all_four = 1.0 + rho + rho * rho + rho * rho * rho;
+    double sum = 0.0;
+    int k = 0;
+    for (; k + 3 < n; k += 4) {
+        const double p1 = noise[k];
+        const double p2 = rho * p1 + noise[k + 1];
+        const double p3 = rho * p2 + noise[k + 2];
+        sum += all_four * *w + plan->step_sd_radps * (p1 + p2 + p3);
+        *w = four * *w + plan->step_sd_radps * (rho * p3 + noise[k + 3]);
+    }
+    for (; k < n; k++) {
+        sum += *w;
+        *w = rho * *w + plan->step_sd_radps * noise[k];
+    }
+    return sum;
 }
 
 /* Mean of the random drift over a window, sample by sample; the gap before it is one exact step. */
@@ -76,20 +106,14 @@ static double drift_mean(const struct samples_plan *plan, struct instrument *u, 
     const double over_gap = nav_decay((begins_s - u->clock_s) / cfg->gm_tau_s);
     double w = over_gap * u->drift_radps;
     if (begins_s > u->clock_s) w += cfg->gm_sigma_radps * std::sqrt(1.0 - over_gap * over_gap) * u->rnd.gauss();
-    struct random_stream rnd = u->rnd; /* a copy that the compiler may keep in registers */
-    const double two = plan->decay * plan->decay;
     double sum = 0.0;
-    for (uint64_t k = 0; k + 1 < plan->per_window; k += 2) { /* two at a time: half the waiting of one for the other */
-        const double first = plan->step_sd_radps * rnd.gauss();
-        const double second = plan->step_sd_radps * rnd.gauss();
-        sum += w + (plan->decay * w + first);
-        w = two * w + (plan->decay * first + second);
+    double noise[BLOCK];
+    for (uint64_t done = 0; done < plan->per_window; done += BLOCK) {
+        const uint64_t left = plan->per_window - done;
+        const int n = left < BLOCK ? (int)left : BLOCK;
+        u->rnd.state = random_fill(u->rnd.state, n + n % 2, noise);
+        sum += drift_sum(plan, noise, n, &w);
     }
-    if (plan->per_window % 2 == 1) {
-        sum += w;
-        w = plan->decay * w + plan->step_sd_radps * rnd.gauss();
-    }
-    u->rnd = rnd;
     u->drift_radps = w;
     u->clock_s = begins_s + cfg->window_s;
     return sum / (double)plan->per_window;
@@ -145,10 +169,10 @@ static int correct_gimbal(const struct nav_mc_cfg *cfg, double q1_rad, struct na
     return refused;
 }
 
-static int run(const struct samples_plan *plan, struct random_stream rnd, const struct nav_mc_out *out, uint64_t k)
+static int run(const struct samples_plan *plan, uint64_t start, const struct nav_mc_out *out, uint64_t k)
 {
     const struct nav_mc_cfg *cfg = plan->cfg;
-    struct instrument u = instrument_draw(cfg, rnd);
+    struct instrument u = instrument_draw(cfg, start);
     struct nav_position p[NAV_MAX_POSITIONS];
     for (int i = 0; i < cfg->count; i++) p[i] = measure(plan, &u, i);
     if (cfg->cardan == NAV_CARDAN_CORRECTED) {

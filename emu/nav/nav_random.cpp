@@ -1,36 +1,32 @@
 #include "nav/nav_random.hpp"
 
-/* e^x of -8 < x <= 0 by products alone: det_exp() divides, and one draw in eighty comes here. x = 16 y, |y| <= 1/2. */
-static double edge_exp(double x)
+INLINE void fill(uint64_t state, int n, double *out)
 {
-    static constexpr double inverse_factorial[] = {1.0 / 479001600, 1.0 / 39916800, 1.0 / 3628800, 1.0 / 362880,
-                                                   1.0 / 40320,     1.0 / 5040,     1.0 / 720,     1.0 / 120,
-                                                   1.0 / 24,        1.0 / 6,        0.5,           1.0};
-    const double y = x * (1.0 / 16.0);
-    double sum = 1.0 / 6227020800.0;
-    for (const double c : inverse_factorial) sum = sum * y + c;
-    double e = sum * y + 1.0;
-    for (int i = 0; i < 4; i++) e *= e;
-    return e;
+    const int half = n / 2;
+    for (int k = 0; k < half; k++) {
+        const uint64_t at = state + 2 * (uint64_t)k * RANDOM_STEP;
+        random_pair(random_mix(at + RANDOM_STEP), random_mix(at + 2 * RANDOM_STEP), &out[k], &out[half + k]);
+    }
 }
 
-double random_stream::gauss_at_edge(unsigned layer, double x)
+static void fill_any(uint64_t state, int n, double *out)
 {
-    for (;;) {
-        if (layer == 0) { /* beyond R: Marsaglia's tail */
-            double tail;
-            double y;
-            do {
-                tail = -det_log(uniform()) / ZIGGURAT_R;
-                y = -det_log(uniform());
-            } while (2.0 * y < tail * tail);
-            return x < 0.0 ? -ZIGGURAT_R - tail : ZIGGURAT_R + tail;
-        }
-        const double f = ZIGGURAT.f[layer] + uniform() * (ZIGGURAT.f[layer + 1] - ZIGGURAT.f[layer]);
-        if (f < edge_exp(-0.5 * x * x)) return x;
-        const uint64_t u = bits();
-        layer = u & 0xFF;
-        x = (double)((int64_t)u >> 11) * 0x1p-52 * ZIGGURAT.x[layer];
-        if (std::fabs(x) < ZIGGURAT.x[layer + 1]) return x;
-    }
+    fill(state, n, out);
+}
+
+TARGET_WIDE static void fill_wide(uint64_t state, int n, double *out)
+{
+    fill(state, n, out);
+}
+
+TARGET_WIDEST static void fill_widest(uint64_t state, int n, double *out)
+{
+    fill(state, n, out);
+}
+
+uint64_t random_fill(uint64_t state, int n, double *out)
+{
+    static void (*const by_width[])(uint64_t, int, double *) = {fill_any, fill_wide, fill_widest};
+    by_width[random_width()](state, n, out);
+    return state + (uint64_t)n * RANDOM_STEP;
 }

@@ -1,113 +1,145 @@
-/* Random numbers of the Monte-Carlo: one stream for each run, Gaussian by the ziggurat of Marsaglia and Tsang, 256 layers, in
- * the form of Doornik (2005); tables are made by the compiler. splitmix64 from a mixed start: a run costs nothing to begin. */
+/* Random numbers of the Monte-Carlo: number k of a stream is splitmix64's finaliser of start + k steps, so that any number of
+ * them can be made at once, and Gaussian ones come in pairs (Box and Muller 1958), without a branch. Loops over these become
+ * vectors; the operations and their order are the same for every processor. */
 #ifndef PSABENCH_NAV_RANDOM_HPP
 #define PSABENCH_NAV_RANDOM_HPP
 
 #include "nav/nav_math.hpp"
 
-#include <cstdint>
+#include <cstring>
 
-constexpr uint64_t random_mix(uint64_t z)
+/* Into code for a newer processor, too: see VECTORS. */
+#define INLINE __attribute__((always_inline)) static inline
+
+constexpr uint64_t RANDOM_STEP = UINT64_C(0x9E3779B97F4A7C15);
+
+INLINE uint64_t random_mix(uint64_t z)
 {
     z = (z ^ (z >> 30)) * UINT64_C(0xBF58476D1CE4E5B9);
     z = (z ^ (z >> 27)) * UINT64_C(0x94D049BB133111EB);
     return z ^ (z >> 31);
 }
 
-constexpr double ziggurat_log(double x) /* natural, 1e-16, for 1e-3 < x < 10: by halves and atanh */
+/* Where the stream of run k of a seed starts. */
+INLINE uint64_t random_run(uint64_t seed, uint64_t run)
 {
-    int k = 0;
-    while (x < 0.7071067811865476) {
-        x *= 2.0;
-        k--;
-    }
-    while (x > 1.4142135623730951) {
-        x *= 0.5;
-        k++;
-    }
-    const double s = (x - 1.0) / (x + 1.0);
-    double sum = 0.0;
-    for (int n = 25; n >= 1; n -= 2) sum = sum * s * s + 1.0 / n;
-    return k * 0.6931471805599453 + 2.0 * s * sum;
+    return random_mix(random_mix(seed + RANDOM_STEP) ^ (run * UINT64_C(0xD1342543DE82EF95)));
 }
 
-constexpr double ziggurat_exp(double x) /* of -8 < x <= 0 */
+INLINE double random_double_of(uint64_t bits)
 {
-    double sum = 1.0;
-    for (int n = 24; n >= 1; n--) sum = 1.0 + sum * (x / 16.0) / n;
-    for (int i = 0; i < 4; i++) sum *= sum;
-    return sum;
+    double x;
+    memcpy(&x, &bits, sizeof x);
+    return x;
 }
 
-constexpr double ziggurat_sqrt(double x)
+INLINE uint64_t random_bits_of(double x)
 {
-    double r = x > 1.0 ? x : 1.0;
-    for (int i = 0; i < 60; i++) r = 0.5 * (r + x / r);
-    return r;
+    uint64_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    return bits;
 }
 
-struct ziggurat_table {
-    double x[257]; /* edges of the layers, x[0] of the base layer with its tail, x[256] = 0 */
-    double f[257]; /* e^(-x^2/2) there */
-};
-
-constexpr double ZIGGURAT_R = 3.6541528853610088; /* where the tail begins, and the area of a layer, of 256 */
-constexpr double ZIGGURAT_V = 0.00492867323399;
-
-constexpr struct ziggurat_table ziggurat_make()
+/* [0, 1), 52 bits; by the exponent of 1: conversions of 64-bit integers are no vectors before AVX-512. */
+INLINE double random_unit(uint64_t bits)
 {
-    struct ziggurat_table t = {};
-    const double f_r = ziggurat_exp(-0.5 * ZIGGURAT_R * ZIGGURAT_R);
-    t.x[0] = ZIGGURAT_V / f_r;
-    t.f[0] = f_r;
-    t.x[1] = ZIGGURAT_R;
-    t.f[1] = f_r;
-    for (int i = 2; i < 256; i++) {
-        t.f[i] = t.f[i - 1] + ZIGGURAT_V / t.x[i - 1];
-        t.x[i] = ziggurat_sqrt(-2.0 * ziggurat_log(t.f[i]));
-    }
-    t.f[256] = 1.0;
-    return t;
+    return random_double_of((bits >> 12) | UINT64_C(0x3FF0000000000000)) - 1.0;
 }
 
-inline constexpr struct ziggurat_table ZIGGURAT = ziggurat_make();
+/* Natural logarithm of 2^-52 <= x <= 1, to 1e-13: x = 2^k m, 0.6875 <= m < 1.375, k ln 2 + 2 atanh((m - 1)/(m + 1)). The exponent is
+ * taken out by integer arithmetic alone, the number 1024 keeps it positive. */
+INLINE double random_log(double x)
+{
+    const uint64_t bits = random_bits_of(x);
+    const uint64_t biased = (bits - UINT64_C(0x3FE6000000000000) + (UINT64_C(1024) << 52)) >> 52;
+    const double k = random_double_of(biased | UINT64_C(0x4330000000000000)) - (4503599627370496.0 + 1024.0);
+    const double m = random_double_of(bits - (biased << 52) + (UINT64_C(1024) << 52));
+    const double s = (m - 1.0) / (m + 1.0);
+    const double z = s * s;
+    const double sum =
+        z *
+        (1.0 / 3 + z * (1.0 / 5 + z * (1.0 / 7 + z * (1.0 / 9 + z * (1.0 / 11 + z * (1.0 / 13 + z * (1.0 / 15)))))));
+    return k * 0.6931471805599453 + 2.0 * (s + s * sum);
+}
 
+/* cos and sin of 2 pi turn, [0, 1): of a quarter of the angle from the middle, doubled twice. */
+INLINE void random_direction(double turn, double *cos_out, double *sin_out)
+{
+    const double x = 0.5 * NAV_PI * (turn - 0.5);
+    const double z = x * x;
+    const double s = x + x * z * nav_sin_poly(z);
+    const double c = 1.0 - 0.5 * z + z * z * nav_cos_poly(z);
+    const double s2 = 2.0 * s * c;
+    const double c2 = 1.0 - 2.0 * s * s;
+    *cos_out = 2.0 * s2 * s2 - 1.0; /* the middle is half a turn: both are negated */
+    *sin_out = -2.0 * s2 * c2;
+}
+
+INLINE void random_pair(uint64_t a, uint64_t b, double *first, double *second)
+{
+    const double radius = std::sqrt(-2.0 * random_log(1.0 - random_unit(a)));
+    double c;
+    double s;
+    random_direction(random_unit(b), &c, &s);
+    *first = radius * c;
+    *second = radius * s;
+}
+
+/* n Gaussian numbers, n even and at most 1024, of the numbers after state; returns the state after them. */
+uint64_t random_fill(uint64_t state, int n, double *out);
+
+/* Numbers one by one. */
 struct random_stream {
     uint64_t state;
+    int left;
+    double store[64];
+
+    explicit random_stream(uint64_t start) : state(start), left(0)
+    {
+    }
 
     uint64_t bits()
     {
-        state += UINT64_C(0x9E3779B97F4A7C15);
+        state += RANDOM_STEP;
         return random_mix(state);
     }
 
-    double uniform() /* (0, 1) */
+    double uniform() /* [0, 1) */
     {
-        return ((double)(bits() >> 12) + 0.5) * 0x1p-52;
+        return random_unit(bits());
     }
-
-    double gauss()
-    {
-        const uint64_t u = bits();
-        const unsigned layer = u & 0xFF;
-        const double signed_unit =
-            (double)((int64_t)u >> 11) * 0x1p-52; /* [-1, 1), 53 bits, the layer's not among them */
-        const double x = signed_unit * ZIGGURAT.x[layer];
-        return std::fabs(x) < ZIGGURAT.x[layer + 1] ? x : gauss_at_edge(layer, x);
-    }
-
-    double gauss_at_edge(unsigned layer, double x); /* the one draw in a hundred that needs more */
 
     double sign()
     {
         return bits() >> 63 ? 1.0 : -1.0;
     }
+
+    double gauss()
+    {
+        if (left == 0) {
+            left = 64;
+            state = random_fill(state, left, store);
+        }
+        return store[--left];
+    }
 };
 
-/* The stream of run k of a seed. */
-inline struct random_stream random_run(uint64_t seed, uint64_t run)
+/* Which code this processor can run: the same source, compiled for vectors of 2, 4 or 8 doubles. No fused operations in any. */
+#ifdef __x86_64__
+#define TARGET_WIDE   __attribute__((target("avx2")))
+#define TARGET_WIDEST __attribute__((target("avx512f,avx512dq,avx512vl")))
+inline int random_width(void)
 {
-    return {random_mix(random_mix(seed + UINT64_C(0x9E3779B97F4A7C15)) ^ (run * UINT64_C(0xD1342543DE82EF95)))};
+    if (__builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl")) return 2;
+    return __builtin_cpu_supports("avx2") ? 1 : 0;
 }
+#else
+#define TARGET_WIDE
+#define TARGET_WIDEST
+inline int random_width(void)
+{
+    return 0;
+}
+#endif
 
 #endif
