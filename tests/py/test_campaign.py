@@ -11,6 +11,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import nullcontext
 from dataclasses import replace
 from html import escape
 from pathlib import Path
@@ -19,7 +20,7 @@ from typing import Any
 import numpy as np
 import pytest
 from psabench import cli
-from psabench.campaign import chains, claims, command, page, report, runner, workers
+from psabench.campaign import chains, claims, command, emulated, page, report, runner, workers
 from psabench.campaign.cases import STUDIES, Case
 from psabench.campaign.chains import CHAINS, Wanted
 from psabench.campaign.claims import Figures, HoldFigures
@@ -283,6 +284,7 @@ def test_each_claim_has_its_row(whole: page.Campaign) -> None:
     assert [s.split(" ")[0] for s in says] == ["error", "calibration", "90°", "averaging", "≤", "0.5°"]
     verdicts = " ".join(c.verdict for c in whole.claims)
     assert verdicts.count("not reproduced") == 1  # 90 deg is not the best step
+    assert "in 240 s with turns at 30" in whole.claims[0].improved
     assert "105 to 120° are better" in verdicts
 
 
@@ -332,6 +334,25 @@ def test_figures_of_a_table_worked_by_hand() -> None:
     none = Figures.of(np.full((2, 4), nan, CELL))
     assert (none.refused, none.within_claim) == (2, 0.0)
     assert np.isnan(none.heading.p95)
+
+
+def test_a_run_through_the_wire_without_a_heading_is_counted_as_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def never_settles(*_: object) -> None:
+        raise LinkError("the platform was not level after 60 s: it never settles")
+
+    monkeypatch.setattr("psabench.bench.Bench.start", lambda *_, **__: nullcontext())
+    monkeypatch.setattr(emulated, "WirePlatform", lambda _: None)
+    monkeypatch.setattr("psabench.procedures.gyrocompass.measure", never_settles)
+    found = command.campaign(Options(case="article", chain="emulated", runs=3, workers=1, out=tmp_path), QUIET)
+    (f,) = found.found.values()
+    assert isinstance(f, Figures)
+    assert (f.runs, f.refused) == (3, 3)
+    assert not found.within  # nothing came that could be compared
+    page.write(tmp_path, found)
+    result = json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))
+    assert result["agreements"][0]["p"] is None
 
 
 # ---- settings and options

@@ -132,9 +132,9 @@ def _latitude(base: Setup) -> Iterator[Case]:
 def _tilt(base: Setup) -> Iterator[Case]:
     small: dict[str, object] = {**ARTICLE, "tilt": "corners"}
     curves: tuple[tuple[str, Mapping[str, object]], ...] = (
-        ("azimuth set about the vertical, (14)", small),
+        ("set about the vertical", small),
         ("gimbal steps uncorrected", {**small, "gimbal": "uncorrected"}),
-        ("gimbal steps corrected, (13)", {**small, "gimbal": "corrected", "simplified": False}),
+        ("gimbal steps corrected", {**small, "gimbal": "corrected", "simplified": False}),
     )
     for curve, change in curves:
         for tilt_deg in (0, 1, 2, 3, 4, 5, 7, 10):
@@ -143,14 +143,15 @@ def _tilt(base: Setup) -> Iterator[Case]:
 
 def _time(base: Setup) -> Iterator[Case]:
     curves: tuple[tuple[str, Mapping[str, object]], ...] = (
-        ("exact drift, windows alone", {**ENCODER, "gap_s": 10.0}),
-        ("drift 0.02 deg/h, windows alone", {**ENCODER, **SMALL_GM, "gap_s": 10.0}),
-        # 1.9 deg/h sqrt(s) is what level noise of 0.1' a sample leaves of S by the slope of 10 s: sources 5.1
-        ("white noise only", {**QUIET, "white_degph_rts": 0.05 * 10.0**0.5}),
+        ("exact drift, 10 s apart", {**ENCODER, "gap_s": 10.0}),
+        ("exact drift, a window apart", ENCODER),
+        ("0.02 deg/h, 10 s apart", {**ENCODER, **SMALL_GM, "gap_s": 10.0}),
+        ("white, 0.05 deg/h in 10 s", {**QUIET, "white_degph_rts": 0.05 * 10.0**0.5}),
     )
     for curve, change in curves:
         for window_s in (2, 5, 10, 20, 30, 60, 120):
-            yield _scan("time", curve, window_s, _with(base, {**change, "window_s": float(window_s)}))
+            times = {"gap_s": float(window_s), **change, "window_s": float(window_s)}
+            yield _scan("time", curve, window_s, _with(base, times))
 
 
 def _order(base: Setup) -> Iterator[Case]:
@@ -218,8 +219,13 @@ def _hold(base: Setup) -> Iterator[Case]:
         ("R11, azimuth axis' drift differs by 1 deg/h", averaged, Hold(axis2="differs", axis2_sd_degph=1.0)),
         ("R11, azimuth axis' drift measured", averaged, Hold(axis2="measured")),
     )
-    for title, change, hold in rows:
-        yield Case(study="hold", name=title, title=title, setup=_with(base, change), hold=hold)
+    for (
+        title,
+        change,
+        hold,
+    ) in rows:  # with the signs as given, 6' of the angle and 10' of the level would cancel for hours
+        setup = _with(base, {"random_sign": True, **change})
+        yield Case(study="hold", name=title, title=title, setup=setup, hold=hold)
 
 
 def _wire(base: Setup) -> Iterator[Case]:

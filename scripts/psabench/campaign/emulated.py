@@ -6,6 +6,7 @@ own seed, from which it draws drift and errors. The truth is what this file put 
 
 from __future__ import annotations
 
+import json
 import math
 import random
 import tempfile
@@ -75,9 +76,20 @@ def check(setup: Setup) -> None:
             raise BadInput(f"--chain emulated: {reason}")
 
 
+class _Yaml12(yaml.SafeLoader):
+    """PyYAML reads `on` as true; YAML 1.2 and the emulator read a word."""
+
+
+_BOOL = "tag:yaml.org,2002:bool"
+_Yaml12.yaml_implicit_resolvers = {
+    first: [r for r in rules if r[0] != _BOOL or first in "tTfF"]
+    for first, rules in yaml.SafeLoader.yaml_implicit_resolvers.items()
+}
+
+
 def scenario(setup: Setup, at: Instrument) -> dict[str, Any]:
     """The bench for a run: the scenario of the procedure's page with the set-up's numbers."""
-    found: dict[str, Any] = yaml.safe_load(proto_file(SCENARIO).read_text(encoding="utf-8"))
+    found: dict[str, Any] = yaml.load(proto_file(SCENARIO).read_text(encoding="utf-8"), _Yaml12)
     found["seed"] = at.seed
     found["site"]["latitude_deg"] = setup.latitude_deg
     # The gimbal begins at the first position: alpha is its angle less the heading.
@@ -146,7 +158,7 @@ class _Silent:
 def _errors(setup: Setup, p: GyrocompassParams, at: Instrument) -> list[float]:
     with tempfile.TemporaryDirectory(prefix="psabench-") as folder:
         path = Path(folder) / "run.yaml"
-        path.write_text(yaml.safe_dump(scenario(setup, at)), encoding="utf-8")
+        path.write_text(json.dumps(scenario(setup, at)), encoding="utf-8")  # YAML, too
         with Bench.start(path) as bench:
             try:
                 r = gyrocompass.estimate(gyrocompass.measure(WirePlatform(bench), p, _Silent()), p)

@@ -76,15 +76,15 @@ def agree(case: Case, chain: str, rows: Rows, reference: Rows) -> Agreement:
     from scipy import stats
 
     mine, theirs = (r[np.isfinite(r[:, 1]), 1] for r in (rows, reference))
-    ks = stats.ks_2samp(mine, theirs, method="asymp")
+    ks = stats.ks_2samp(mine, theirs, method="asymp") if len(mine) and len(theirs) else None
     both = {chains.CHAINS[chain].title: rows, chains.CHAINS["closed"].title: reference}
     return Agreement(
         case=case,
         chain=chain,
         runs=len(mine),
         reference_runs=len(theirs),
-        statistic=float(ks.statistic),
-        p=float(ks.pvalue),
+        statistic=math.nan if ks is None else float(ks.statistic),
+        p=math.nan if ks is None else float(ks.pvalue),
         rms_deg=claims.Spread.of(mine).rms,
         reference_rms_deg=claims.Spread.of(theirs).rms,
         figure=plots.agreement(f"agreement-{chain}-{case.study}-{case.name}".replace(" ", "-"), both),

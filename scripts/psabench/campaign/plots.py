@@ -53,15 +53,14 @@ def scan(study: Study, cases: Sequence[Case], found: Mapping[str, Figures]) -> s
         _scale(ax, study, sorted({x for points in curves.values() for x, _ in points}))
         ax.set_xlabel(study.axis)
         ax.set_ylabel(f"error of the platform, {'rms' if study.figure == 'sd' else 'p95'}, deg")
-        ax.legend(loc="best")
+        ax.legend(loc="lower left", ncols=2, bbox_to_anchor=(0.0, 1.0))
         return style.svg(figure, study.name)
 
 
 def _scale(ax: Axes, study: Study, x: Sequence[float]) -> None:
     if study.log_y:
         ax.set_yscale("log")
-        low, high = ax.get_ylim()
-        marks = [m for d in (0.001, 0.01, 0.1, 1.0, 10.0) for m in (d, 2 * d, 5 * d) if low <= m <= high]
+        marks = _marks(*ax.get_ylim())
         ax.set_yticks(marks, [f"{m:g}" for m in marks])
         ax.yaxis.set_minor_locator(matplotlib.ticker.NullLocator())
     else:
@@ -70,6 +69,11 @@ def _scale(ax: Axes, study: Study, x: Sequence[float]) -> None:
         ax.set_xscale("log")
         ax.xaxis.set_minor_locator(matplotlib.ticker.NullLocator())
     ax.set_xticks(x, [f"{v:g}" for v in x])
+
+
+def _marks(low: float, high: float) -> list[float]:
+    """Of a logarithmic axis."""
+    return [m for k in range(-4, 2) for m in (10.0**k, 2 * 10.0**k, 5 * 10.0**k) if low <= m <= high]
 
 
 def bars(name: str, cases: Sequence[Case], found: Mapping[str, Figures]) -> str:
@@ -103,11 +107,13 @@ def _dots(
             there = [(v, -i) for i, v in enumerate(numbers) if v > 1e-7]
             ax.plot(*zip(*there, strict=True), "o", ms=5, color=colour, label=label, ls="none")
         ax.set_xscale("log")
-        ax.xaxis.set_major_formatter(matplotlib.ticker.FormatStrFormatter("%g"))
+        marks = _marks(*ax.get_xlim())
+        ax.set_xticks(marks, [f"{m:g}" for m in marks])
+        ax.xaxis.set_minor_locator(matplotlib.ticker.NullLocator())
         ax.set_yticks([-i for i in range(len(labels))], labels)
         ax.set_ylim(-len(labels) + 0.4, 0.6)
         ax.set_xlabel(f"error of {what}, deg; dashed: {' and '.join(f'{x:g}' for x in lines)}°")
-        ax.legend(loc="upper center", ncols=2, bbox_to_anchor=(0.5, 1.0 + 0.5 / (ROW * len(labels))))
+        ax.legend(loc="lower left", ncols=2, bbox_to_anchor=(0.0, 1.0))
         return style.svg(figure, name)
 
 
