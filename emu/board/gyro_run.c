@@ -166,17 +166,14 @@ static double servo_radps(struct gyro *b, int64_t t_ns)
 void gyro_run_rates(struct gyro *b, int64_t t_ns, double u_radps[2])
 {
     double turn_radps = 0.0;
-    const bool navigates = b->run.mode == GYRO_NAVIGATE;
     if (b->run.mode == GYRO_OFF) {
         u_radps[0] = u_radps[1] = 0.0;
         return;
     }
     if (b->run.phase == GYRO_SLEWING) (void)gyro_turn_at(&b->run.turn, t_ns, &turn_radps);
-    if (!b->silent) { /* else the levelling rate stays what it was */
-        u_radps[0] = gyro_law_level(b->set.m1_per_s, &b->level, b->place.up_radps, turn_radps) +
-                     (navigates ? b->set.drift1_degph * RADPS_PER_DPH : 0.0);
-    }
-    if (navigates) {
+    u_radps[0] = gyro_law_level(b->set.m1_per_s, &b->level, b->place.up_radps, turn_radps);
+    if (b->run.mode == GYRO_NAVIGATE) {
+        u_radps[0] += b->set.drift1_degph * RADPS_PER_DPH;
         u_radps[1] = gyro_law_keep(&b->level, &b->place, b->sin_a, b->cos_a) + b->set.drift2_degph * RADPS_PER_DPH;
         return;
     }
