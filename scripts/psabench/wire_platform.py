@@ -234,6 +234,8 @@ class _Tape:
         new = {**r.columns, "t_rx_s": r.t_rx_s}
         self.readings = {k: np.concatenate([self.readings[k], v]) if k in self.readings else v for k, v in new.items()}
         self._seq, self._u_v = np.concatenate([self._seq, f.seq]), np.concatenate([self._u_v, f.u_v])
+        if len(self.readings["PHASE"]) and not np.any(self.readings["PHASE"] == Phase.WINDOW):
+            self.drop(len(self.readings["PHASE"]))  # turns may take longer than the counter of the frames takes to wrap
 
     def latest(self, name: str, default: float) -> float:
         """Of the newest reading."""

@@ -169,9 +169,9 @@ def test_a_doubt_is_out_of_limits_whatever_the_truth_says() -> None:
 def test_headings_are_compared_around_north() -> None:
     bench = FakePlatform(heading_deg=359.99)
     s = section(bench)
-    error = next(g.error for g in gyro_grading.grade(s) if g.estimate.name == "heading_deg")
-    assert error is not None
-    assert abs(error) < 1e-3
+    beyond = replace(s, truth={"heading_deg": 0.01})
+    error = next(g.error for g in gyro_grading.grade(beyond) if g.estimate.name == "heading_deg")
+    assert error == pytest.approx(-0.02, abs=1e-3)
 
 
 def test_page_and_data(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import fields, replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -12,8 +13,8 @@ import pytest
 from psabench.devices import Gyro
 from psabench.devices.gyro import Phase
 from psabench.errors import LinkError
-from psabench.frames import FrameReader
-from psabench.readings import ReadingReader
+from psabench.frames import FrameReader, Frames
+from psabench.readings import ReadingReader, Readings
 from psabench.wire_platform import _ahead, _LevelScale, _Tape
 from test_frames import pair
 from test_readings import reading
@@ -26,13 +27,22 @@ def streams(first_seq: int, steps: int, phase: Any, lose: frozenset[int] = froze
     gyro, level = ReadingReader(Gyro.layout, 9), FrameReader(5)
     for k in range(steps):
         seqs = [first_seq + PER_STEP * k + j for j in range(PER_STEP)]
-        for m in itertools.chain.from_iterable(pair((1000 * k, -k, 0), q) for q in seqs if q not in lose):
+        for m in itertools.chain.from_iterable(pair((1000 * (k % 8000), -k, 0), q) for q in seqs if q not in lose):
             level.on_message(m)
         raw = {"STEP": k, "PHASE": int(phase(k)), "POSITION": 1 + (k >= 40), "LEVEL_SEQ": seqs[-1] % 2**16, "MODE": 4}
         for m in reading(Gyro.layout, raw, 9, k * 0.01):
             assert isinstance(m, can.Message)
             gyro.on_message(m)
     return SimpleNamespace(frames=gyro), SimpleNamespace(frames=level)
+
+
+def taken(r: Readings, f: Frames, first: int, last: int) -> tuple[Any, Any]:
+    """Stand-ins that have these steps of what was taken from others."""
+    one, three = slice(first, last), slice(PER_STEP * first, PER_STEP * last)
+    columns = {k: v[one] for k, v in r.columns.items()}
+    readings = Readings(t_rx_s=r.t_rx_s[one], t_sample_s=r.t_sample_s[one], columns=columns, units=r.units)
+    frames = replace(f, **{x.name: getattr(f, x.name)[three] for x in fields(f)})
+    return tuple(SimpleNamespace(frames=SimpleNamespace(take=lambda x=x: x)) for x in (readings, frames))  # type: ignore[return-value]
 
 
 def window(k: int) -> Phase:
@@ -54,6 +64,32 @@ def test_each_reading_gets_the_frames_since_the_one_before(first_seq: int) -> No
         assert np.array_equal(tape.readings["STEP"][span], np.arange(first, last))
         tape.drop(span.stop)
     assert tape.window() is None
+
+
+def test_a_turn_may_take_longer_than_the_frames_take_to_wrap() -> None:
+    steps = 12000  # three frames each: more than half a turn of the counter
+    gyro, level = streams(0, steps + 40, lambda k: Phase.WINDOW if steps <= k < steps + 20 else Phase.SLEWING)
+    tape = _Tape()
+    readings, frames = gyro.frames.take(), level.frames.take()
+    for first in range(0, steps + 40, 4000):
+        tape.add(*taken(readings, frames, first, first + 4000))
+    span = tape.window()
+    assert span is not None
+    _, y_v, missing = tape.means(span)
+    assert missing == 0
+    assert np.allclose(y_v, -10.0 / 2**23 * np.arange(steps, steps + 20), rtol=0, atol=1e-12)
+
+
+def test_a_window_right_after_another_has_all_its_frames() -> None:
+    tape = _Tape()
+    tape.add(*streams(0, 80, lambda k: Phase.WINDOW if 10 <= k < 60 else Phase.IDLE))
+    for first, last in ((10, 40), (40, 60)):  # the position changes there
+        span = tape.window()
+        assert span is not None
+        x_v, _, missing = tape.means(span)
+        assert missing == 0
+        assert np.allclose(x_v, 1000 * 10.0 / 2**23 * np.arange(first, last), rtol=0, atol=1e-12)
+        tape.drop(span.stop)
 
 
 def test_a_window_that_is_not_over_is_none_yet() -> None:

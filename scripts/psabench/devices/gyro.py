@@ -100,9 +100,8 @@ class Gyro(BusUnit):
             self._write(name, *SETTINGS[name], value)
 
     def _write(self, name: str, index: int, sub: int, value: float) -> None:
-        whole = isinstance(self.node.read(index, sub), int)
         try:
-            self.node.write(index, sub, int(value) if whole else float(value))
+            self.node.write(index, sub, value)
         except DeviceError as e:
             words = self.refusal() or e.text
             if e.abort_code in ABORT_RANGE:
