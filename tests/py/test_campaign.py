@@ -243,27 +243,15 @@ def both_chains(case: Case, runs: int = 4000) -> tuple[Rows, Rows]:
     return chains.compute([w])[0].rows, chains.compute([replace(w, chain="closed")])[0].rows
 
 
-LEVEL = replace(READINGS["R11+"], setup=replace(READINGS["R11+"].setup, tilt_deg=0.0))
-
-
-@pytest.mark.parametrize("case", [*(READINGS[n] for n in ("R0", "R2", "R5n", "R6", "cardan", "improved")), LEVEL])
-def test_closed_and_sample_by_sample_agree(case: Case) -> None:
+@pytest.mark.parametrize("name", ["R0", "R2", "R5n", "R6", "R11", "R11+", "cardan", "cardan fixed", "improved"])
+def test_closed_and_sample_by_sample_agree(name: str) -> None:
+    case = READINGS[name]
     samples, closed = both_chains(case)
     assert page.agree(case, "samples", samples, closed).p > chains.KS_P
     # Two chains that do not agree: the comparison can fail.
     other = page.agree(case, "samples", samples * np.float32(1.3), closed)
     assert other.p < chains.KS_P
     assert not other.same(1)
-
-
-def test_what_the_closed_form_leaves_out_is_small_and_seen() -> None:
-    """Where errors average out, second order in the tilts is what is left."""
-    samples, closed = both_chains(READINGS["R11"], 20000)
-    a = page.agree(READINGS["R11"], "samples", samples, closed)
-    assert a.p < 1e-6
-    assert 0.001 < a.rms_deg - a.reference_rms_deg < chains.SECOND_ORDER_DEG
-    assert a.same(1)
-    assert not replace(a, chain="emulated").same(1)
 
 
 @pytest.fixture(scope="module")

@@ -27,7 +27,6 @@ ERRORS = ("platform_error_deg", "heading_error_deg", "drift_error_degph", "quali
 HELD = ("end_error_deg", "largest_error_deg")
 KMPH_MPS = 1.0 / 3.6
 KS_P = 0.01  # of two chains that agree, one comparison of a hundred lies below
-SECOND_ORDER_DEG = 0.003  # rms of what the closed form leaves out: products of tilts and level errors
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -20,7 +20,7 @@ import numpy as np
 import yaml
 
 from psabench.bench import Bench
-from psabench.campaign.setup import Setup
+from psabench.campaign.setup import Setup, level_white_degph_rts
 from psabench.errors import BadInput, LinkError
 from psabench.nav import DEGPH
 from psabench.places import proto_file
@@ -58,13 +58,16 @@ def instrument(setup: Setup, seed: int, run: int) -> Instrument:
 
 def check(setup: Setup) -> None:
     """Raises BadInput for what an instrument cannot be told to be."""
-    plain = Setup()
+    white = level_white_degph_rts(setup.window_s)
     reasons = (
         (setup.slew_dps <= 0.0, "its turns take time: slew_dps is wanted"),
         (setup.gimbal == "alpha", "its platform turns about the gimbal: gimbal is uncorrected or corrected"),
         (setup.angle_sys in ("increment", "accumulates"), "its angle sensor has one zero: angle_sys is none or common"),
         (setup.per_sample, "its errors are drawn once a position"),
-        (setup.white_degph_rts != plain.white_degph_rts, "its noise is that of its sensors and converters"),
+        (
+            setup.white_degph_rts not in (0.0, white),
+            f"its noise is that of sensors and converters, white_degph_rts={white}, or 0",
+        ),
         (setup.random_sign, "the signs of its systematic errors are those given"),
         (
             setup.beta_sys_arcmin != setup.gamma_sys_arcmin or setup.beta_random_arcmin != setup.gamma_random_arcmin,
@@ -107,6 +110,11 @@ def scenario(setup: Setup, at: Instrument) -> dict[str, Any]:
         "angle_set_arcmin": 0.0 if setup.encoder else setup.angle_random_arcmin,
         "angle_read_arcmin": setup.angle_random_arcmin if setup.encoder else 0.0,
     }
+    if setup.white_degph_rts == 0.0:
+        level = found["units"][0]
+        level |= {"adc_noise_scale": 0, "temp_noise_scale": 0}
+        for axis in level["axes"].values():
+            axis["quartz"]["noise_a_rthz"] = 0
     found["vehicle"] = {"heading_deg": at.heading_deg, "pitch_deg": at.pitch_deg, "roll_deg": at.roll_deg}
     return found
 

@@ -40,12 +40,8 @@ class Agreement:
     figure: str  # SVG
 
     def same(self, of: int) -> bool:
-        """Whether the chains agree, when there are `of` comparisons.
-
-        Sample by sample sees terms of second order that the closed form leaves out: so many runs tell them apart.
-        """
-        allowed = chains.SECOND_ORDER_DEG if self.chain == "samples" else 0.0
-        return self.p > chains.KS_P / of or abs(self.rms_deg - self.reference_rms_deg) < allowed
+        """Whether the chains agree, when there are `of` comparisons."""
+        return self.p > chains.KS_P / of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
