@@ -19,7 +19,7 @@
     static void sample_until(void *board, int64_t t_ns) { NAME##_sample_until(board, t_ns); }                          \
     static struct trace *trace(void *board) { return &((struct NAME *)board)->trace; }                                 \
     static struct line_faults *line(void *board) { return &((struct NAME *)board)->line; }                             \
-    _Static_assert(sizeof(struct NAME) > 0, "BOARD_LIFE(NAME) ends with a semicolon")
+    struct NAME /* so that a semicolon has to follow */
 
 #define BOARD_STROBE(NAME)                                                                                             \
     static struct board_strobe strobe(const void *board)                                                               \
@@ -27,7 +27,7 @@
         const struct NAME *b = board;                                                                                  \
         return (struct board_strobe){b->profile.strobe_ns, b->profile.strobe_min_ns};                                  \
     }                                                                                                                  \
-    _Static_assert(sizeof(struct NAME) > 0, "BOARD_STROBE(NAME) ends with a semicolon")
+    struct NAME /* so that a semicolon has to follow */
 // clang-format on
 
 #endif
