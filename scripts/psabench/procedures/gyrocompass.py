@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -505,11 +505,3 @@ def _notes(c: nav.Compass, windows: Sequence[Window], p: GyrocompassParams) -> l
     if p.calibrate_s and not _good_calibration(windows, p):
         notes.append(f"the calibration does not count: {'; '.join(windows[-1].faults)}")
     return notes
-
-
-def with_params(p: GyrocompassParams, **changed: Any) -> GyrocompassParams:
-    """A copy with other values. Raises BadInput."""
-    try:
-        return replace(p, **changed)
-    except ValueError as e:
-        raise BadInput(f"{NAME}: {e}") from e
