@@ -22,9 +22,7 @@ from psabench.procedures.platform_bench import STEP_S, Floats, PlatformBench, Ta
 from psabench.procedures.result import DEG, option
 
 NAME = "gyrocompass"
-SUMMARY = (
-    "a gyro platform finds north from several positions, calibrates its drifts; the article's way and a better one"
-)
+SUMMARY = "a gyro platform finds north and its drifts from several positions, the article's way and a better one"
 
 METHODS: Mapping[str, Method] = {
     "closed3": Method.CLOSED3,
@@ -244,13 +242,9 @@ def s_of(w: Window, *, slope: bool, frozen: bool) -> float:
     s = w.levelling_radps
     rate = nav.window_slope(w.beta_rad, s, STEP_S) if slope else float(s.mean())
     if frozen and len(s) > 1:
-        turn_radps = _slope(_unwrapped(w.encoder_rad))
+        turn_radps = _slope(np.unwrap(w.encoder_rad))
         rate += turn_radps * math.sin(float(w.gamma_rad.mean()))
     return rate
-
-
-def _unwrapped(angles_rad: Floats) -> Floats:
-    return np.asarray(np.unwrap(angles_rad))
 
 
 def _slope(x: Floats) -> float:
@@ -275,7 +269,7 @@ def _trusted(w: Window, p: GyrocompassParams) -> float:
     """The gimbal angle of a window, rad."""
     if p.angles == "set":
         return w.set_rad
-    return w.set_rad + _wrapped(float(_unwrapped(w.encoder_rad).mean()) - w.set_rad)
+    return w.set_rad + _wrapped(float(np.unwrap(w.encoder_rad).mean()) - w.set_rad)
 
 
 def _wrapped(angle_rad: float) -> float:
@@ -285,7 +279,7 @@ def _wrapped(angle_rad: float) -> float:
 
 def _off(w: Window) -> str:
     """Why the encoder of a window contradicts the angle that was asked for, "": it does not."""
-    off_rad = _wrapped(float(_unwrapped(w.encoder_rad).mean()) - w.set_rad)
+    off_rad = _wrapped(float(np.unwrap(w.encoder_rad).mean()) - w.set_rad)
     if abs(off_rad) <= OFF_LIMIT_RAD:
         return ""
     shown, asked = (w.set_rad + off_rad) * DEG, w.set_rad * DEG
@@ -324,8 +318,8 @@ def estimate(windows: Sequence[Window], p: GyrocompassParams) -> GyrocompassResu
             rows, latitude_rad=p.latitude_rad, method=METHODS[p.method], simplified=p.simplified, noise=noise
         )
     except nav.Refused as e:
-        reasons = "; ".join(notes) or "all windows are good"
-        raise LinkError(f"{NAME}: no heading from {len(good)} of {len(run)} windows: {e} ({reasons})") from e
+        why = "; ".join(notes) or "all windows are good"
+        raise LinkError(f"{NAME}: no heading from {len(good)} of {len(run)} windows: {e} ({why})") from e
     psi = nav.heading(
         compass.alpha1_rad,
         float(q[0]),
