@@ -6,6 +6,7 @@ import json
 import socket
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -285,3 +286,29 @@ def _open_takes_a_bus_by_its_name(port: int) -> None:
             assert s.recv(64) == b"< hi >"
             s.sendall(b"< open " + name + b" >")
             assert answer in s.recv(256)
+
+
+def platform_after_a_turn(name: str) -> dict[str, Any]:
+    """Truth of the platform, levelled and held after a turn."""
+    with Bench.start(name) as b:
+        b.run_for(1.0)
+        b.control.call("gyro.mode", unit="gyro", mode="slew")
+        b.run_for(30.0)
+        state: dict[str, Any] = b.truth_state()["platform"]
+        return state
+
+
+def test_gyrocompass_has_the_article_s_errors() -> None:
+    """Angle sensor 6' and 3' random, level 10' and 1' random, torquers, drift 25 and 0.2 deg/h random."""
+    s = platform_after_a_turn("gyrocompass")
+    assert abs(60.0 * (s["servo_deg"] - s["q_deg"]) - 6.0) < 12.0
+    assert abs(60.0 * s["servo_deg"]) < 1.0  # it holds what its sensor shows
+    assert 4.0 < abs(60.0 * s["beta_deg"]) < 16.0
+    assert all(24.0 < d < 26.0 for d in s["drift_degph"])
+
+
+def test_gyrocompass_ideal_has_none_but_the_drift() -> None:
+    s = platform_after_a_turn("gyrocompass_ideal")
+    assert s["servo_deg"] == s["encoder_deg"] == s["q_deg"]
+    assert abs(60.0 * s["beta_deg"]) < 1.0  # the levelling rate over m1
+    assert s["drift_degph"] == [25.0, 25.0]
