@@ -35,13 +35,15 @@ SANFL := $(if $(SAN),-fsanitize=$(SAN) -fno-sanitize-recover=all -fno-omit-frame
 INC   := -Iemu -Ibuild $(shell $(PKGCONFIG) --cflags libcjson libfyaml 2>/dev/null)
 LIBS  := $(shell $(PKGCONFIG) --libs libcjson libfyaml 2>/dev/null) -lm
 FLAGS   = $(STD) $(WARN) $(INC) $(CPPFLAGS)
-CXXFLAGS ?= $(patsubst -O2,-O3,$(CFLAGS))
+CXXFLAGS ?= $(patsubst -O0,-O1,$(patsubst -O2,-O3,$(CFLAGS)))#   without optimisation Eigen asks for C++'s runtime
 # C++ of emu/nav: Eigen without vectors of its own, which differ from machine to machine; no exceptions and no RTTI, so that it
 # needs no runtime of C++ and links into C. Pairs of doubles in one register (SLP) cost gcc 12 a third of the Monte-Carlo's speed.
 CXXSTD := $(patsubst -std=c11,-std=c++17,$(STD)) -fno-exceptions -fno-rtti -fno-math-errno -fno-tree-slp-vectorize -DEIGEN_DONT_VECTORIZE -DEIGEN_NO_MALLOC -DEIGEN_MPL2_ONLY
 CXXWARN = $(filter-out -Wstrict-prototypes -Wmissing-prototypes,$(WARN)) -Wmissing-declarations
 EIGEN  := $(patsubst -I%,-isystem %,$(shell $(PKGCONFIG) --cflags eigen3 2>/dev/null))
-CXXCOMPILE = $(CXX) $(CXXSTD) $(CXXWARN) -Iemu $(EIGEN) $(CPPFLAGS) $(SANFL) $(CXXFLAGS)
+# Clang's check of function pointers in C++ asks for RTTI.
+CXXSANFL := $(SANFL) $(if $(SAN),$(if $(findstring clang,$(CXX)),-fno-sanitize=function))
+CXXCOMPILE = $(CXX) $(CXXSTD) $(CXXWARN) -Iemu $(EIGEN) $(CPPFLAGS) $(CXXSANFL) $(CXXFLAGS)
 COMPILE = $(CC) $(FLAGS) $(SANFL) $(CFLAGS)
 LINK    = $(CC) $(SANFL) $(CFLAGS) $(LDFLAGS)
 

@@ -1,5 +1,7 @@
 #include "nav/nav_fit.hpp"
 
+#include "nav/nav_qr.hpp"
+
 double fit_mean_time(const struct nav_position *p, int count)
 {
     double sum = 0.0;
@@ -113,7 +115,8 @@ bool fit_gain_of(const fit_design &rows, const fit_square &whitener, fit_gain *g
     qr.setThreshold(1e-9);
     if (qr.rank() < rows.cols()) return false;
     gain->resize(rows.cols(), rows.rows());
-    for (Eigen::Index i = 0; i < rows.rows(); i++) gain->col(i) = qr.solve(whitener.col(i));
+    for (Eigen::Index i = 0; i < rows.rows(); i++)
+        gain->col(i) = nav_qr_solve<fit_design, fit_unknowns, fit_vector>(qr, whitener.col(i));
     return true;
 }
 
