@@ -96,8 +96,8 @@ def test_only_what_is_missing_is_wanted_and_each_case_once(tmp_path: Path) -> No
 
 
 def test_a_run_is_the_same_in_every_part() -> None:
-    for chain in ("closed", "samples"):
-        wanted = Wanted(chain=chain, setup=TWO[0].setup, hold=None, seed=3, first_run=0, runs=100)
+    for chain, hold in (("closed", None), ("samples", None), ("closed", Hold())):
+        wanted = Wanted(chain=chain, setup=TWO[0].setup, hold=hold, seed=3, first_run=0, runs=100)
         (whole,) = chains.compute([wanted])
         pieces = chains.compute([replace(wanted, first_run=k, runs=25) for k in (0, 25, 50, 75)])
         assert np.array_equal(whole.rows, np.concatenate([x.rows for x in pieces]))

@@ -65,7 +65,7 @@ class Figures:
             platform=Spread.of(platform),
             heading=Spread.of(heading),
             drift=Spread.of(drift),
-            within_claim=float(np.mean(ok & (np.abs(heading) <= CLAIM_DEG))),
+            within_claim=float(np.mean(np.abs(heading) <= CLAIM_DEG)),
             quality_p99=float(np.quantile(quality[ok], 0.99)) if ok.any() else math.nan,
         )
 
