@@ -158,16 +158,9 @@ def samples(cfg: McConfig, seed: int, *, runs: int, first_run: int = 0, threads:
 def hold(cfg: HoldConfig, seed: int, *, runs: int, first_run: int = 0, threads: int = 1) -> HoldErrors:
     """Heading held for hours after a gyrocompassing. Raises Refused."""
     out = {name: np.empty(runs) for name, *_ in McHoldOutStruct._fields_}
-    struct = _hold_struct(cfg)
+    struct = hold_struct(cfg)
     _ranges(library().mc_hold, struct, McHoldOutStruct, out, (seed, first_run, runs), threads)
     return HoldErrors(**out)
-
-
-def default_struct() -> McStruct:
-    """What nav_mc_default() fills in: McConfig() in C."""
-    struct = McStruct()
-    library().mc_default(c.byref(struct))
-    return struct
 
 
 def config_struct(cfg: McConfig) -> McStruct:
@@ -186,7 +179,8 @@ def config_struct(cfg: McConfig) -> McStruct:
     return struct
 
 
-def _hold_struct(cfg: HoldConfig) -> McHoldStruct:
+def hold_struct(cfg: HoldConfig) -> McHoldStruct:
+    """The structure that the library takes."""
     struct = McHoldStruct(start=config_struct(cfg.start), axis2=int(cfg.axis2))
     for name, *_ in McHoldStruct._fields_[2:]:
         setattr(struct, name, getattr(cfg, name))
