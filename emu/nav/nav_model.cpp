@@ -10,7 +10,7 @@ struct nav_row nav_row_of(const struct nav_position *p, bool simplified)
     return {cd * cg - sd * sgsb, sd * cg + cd * sgsb};
 }
 
-/* x_p = cos q x_c + sin q y_c, with x_c and y_c in local level at psi = 0 (sources 7.2); its level part points to alpha, but for
+/* x_p = cos q x_c + sin q y_c, with x_c and y_c in local level at psi = 0 (sources instruments 1.3); its level part points to alpha, but for
  * the share that beta turns sideways: x_p = Rz(alpha) (cos g, sin b sin g, -sin g cos b). */
 double nav_alpha(double psi_rad, double q_rad, double beta_rad, double pitch_rad, double roll_rad)
 {

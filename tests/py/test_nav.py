@@ -200,7 +200,7 @@ def test_the_covariance_is_consistent(method: Method) -> None:
 
 
 def test_weights_by_the_drifts_covariance_help_as_much_as_they_should() -> None:
-    """Sources 7.5: nothing for three positions, 19 % for four in a row."""
+    """Sources instruments 1.7: nothing for three positions, 19 % for four in a row."""
     noise = Noise(gm_sigma_radps=0.2 * DEGPH, angle_sd_rad=0.5 * ARCMIN)
     for count, gain in ((3, 0.0), (4, 0.19)):
         rows = positions(50 * DEG, 0.3, np.arange(count) * 90 * DEG)
@@ -322,7 +322,7 @@ def closed_loop(
 
 
 def test_the_slope_of_a_window_obeys_its_noise_law_and_the_mean_its_own() -> None:
-    """White noise of 1' a sample, 10 s, m1 = 1: 0.66 deg/h by the slope, 0.6 by the mean (sources 7.4)."""
+    """White noise of 1' a sample, 10 s, m1 = 1: 0.66 deg/h by the slope, 0.6 by the mean (sources instruments 1.4)."""
     rng = np.random.default_rng(4)
     s_true = 30 * DEGPH
     slopes, means = [], []

@@ -34,7 +34,7 @@ static void positions_of(struct nav_position p[3], double level_error_rad)
     }
 }
 
-/* Check case (sources 7.4): latitude 50, heading 40, pitch 5, roll -4, alpha 33 deg, level sensors wrong by 10'. */
+/* Check case (sources instruments 1.4): latitude 50, heading 40, pitch 5, roll -4, alpha 33 deg, level sensors wrong by 10'. */
 static void the_check_case_gives_its_rates_and_comes_back(void **state)
 {
     (void)state;
