@@ -252,7 +252,7 @@ $(BUILD)/fuzz/%: $(BUILD)/obj/tests/fuzz/%.o $(LIB_OBJ)
 
 ## lint: formatting, warnings of gcc and clang, clang-tidy, include table and sizes, ruff, strict mypy
 lint: all
-	@FLAGS='$(FLAGS)' tools/lint
+	@FLAGS='$(FLAGS)' CXXLINT='$(CXXSTD) $(CXXWARN) -Iemu $(EIGEN)' tools/lint
 
 ## format: rewrite C and Python in the project's format
 format:

@@ -162,9 +162,9 @@ struct mc_error mc_solve_on_circle(const struct mc_linear *lin, const double r[F
                              std::fabs(sin_a * x[FIT_S] + cos_a * x[FIT_C])};
     /* On the circle s and c move together: the column of alpha is cos a times that of s less sin a times that of c. */
     const int n = lin->unknowns - 1;
-    double m[3][3];
-    double right[3];
-    double y[3];
+    double m[3][3] = {};
+    double right[3] = {};
+    double y[3] = {};
     for (int k = 1; k < n; k++) {
         right[k] = r[k + 1];
         m[0][k] = m[k][0] = cos_a * lin->normal[FIT_S][k + 1] - sin_a * lin->normal[FIT_C][k + 1];

@@ -13,12 +13,15 @@ from xml.etree import ElementTree
 
 import pytest
 from psabench.chips import Bench, parts
+from psabench.navlib import PROTOTYPES as NAV_PROTOTYPES
+from psabench.navlib import library as nav_library
 from psabench.vcd import read_vcd
 from psabench.waveform import rdata_picture
 
 ROOT = Path(__file__).parents[2]
 ENV = {k: v for k, v in os.environ.items() if k not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")}
 HEADER = (ROOT / "emu/api/psabench.h").read_text()
+NAV_HEADERS = "".join((ROOT / f"emu/nav/{name}.h").read_text() for name in ("nav", "nav_mc"))
 PAGE = ROOT / "docs/library.md"
 EXAMPLES = ("ads1256_read", "ads1282_read", "ad7712_read", "psa2_frames")
 STRICT = ["-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wundef", "-Werror"]
@@ -34,6 +37,10 @@ def run(command: Sequence[str | Path], **environment: str) -> str:
 
 def declared() -> set[str]:
     return set(re.findall(r"^PSABENCH_API [^;]*?\b(psabench_\w+)\(", HEADER, re.MULTILINE))
+
+
+def declared_of_nav() -> set[str]:
+    return set(re.findall(r"^NAV_API [^;]*?\b(nav_\w+)\(", NAV_HEADERS, re.MULTILINE))
 
 
 def defined(*nm: str | Path) -> set[str]:
@@ -75,6 +82,19 @@ def test_there_is_one_version_and_one_abi_number() -> None:
     )
 
 
+def test_the_navigation_library_exports_its_headers_and_needs_no_runtime_of_another_language() -> None:
+    assert len(declared_of_nav()) > 20
+    assert defined("-D", ROOT / "build/libpsabench-nav.so.0") == declared_of_nav()
+    assert defined(ROOT / "build/libpsabench-nav.a") == declared_of_nav()
+    assert {f"nav_{name}" for name in NAV_PROTOTYPES} == declared_of_nav()
+    dynamic = run(["readelf", "-d", ROOT / "build/libpsabench-nav.so.0"])
+    assert "Library soname: [libpsabench-nav.so.0]" in dynamic
+    assert set(re.findall(r"Shared library: \[([^]]*)\]", dynamic)) <= {"libc.so.6", "libm.so.6"}
+    version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
+    assert nav_library().version().decode() == version
+    assert f"\nVersion: {version}\n" in (ROOT / "build/psabench-nav.pc").read_text()
+
+
 # ---- an installation ----
 
 
@@ -86,9 +106,9 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return stage
 
 
-def pkg_config(stage: Path, *options: str) -> list[str]:
+def pkg_config(stage: Path, *options: str, package: str = "psabench") -> list[str]:
     out = run(
-        ["pkg-config", *options, "psabench"],
+        ["pkg-config", *options, package],
         PKG_CONFIG_PATH=str(stage / "opt/psa/lib64/pkgconfig"),
         PKG_CONFIG_SYSROOT_DIR=str(stage),
     )
@@ -112,6 +132,20 @@ def test_an_example_is_built_and_runs_against_the_installation(
     assert out in shown, f"docs/library.md shows another output than\n{out}"
 
 
+@pytest.mark.parametrize("cc", ["gcc", "clang"])
+@pytest.mark.parametrize("static", [False, True], ids=["shared", "static"])
+def test_north_is_found_by_a_c_program_against_the_installation(
+    installed: Path, tmp_path: Path, cc: str, static: bool
+) -> None:
+    program = tmp_path / "find_north"
+    options = pkg_config(installed, "--cflags", "--libs", *(["--static"] if static else []), package="psabench-nav")
+    link = ["-static"] if static else []
+    run([cc, "-std=c11", *STRICT, ROOT / "examples/find_north.c", *link, *options, "-o", program])
+    out = run([program], LD_LIBRARY_PATH=str(installed / "opt/psa/lib64"))
+    assert ("libpsabench-nav" in run(["readelf", "-d", program])) is not static
+    assert out in (ROOT / "docs/nav.md").read_text()
+
+
 @pytest.mark.parametrize("part", parts())
 def test_the_page_explains_every_counter(part: str) -> None:
     told = set(re.findall(r"`(\w+)`", PAGE.read_text().split("\n## Counters\n")[1].split("\n## ")[0]))
@@ -123,14 +157,18 @@ def test_the_page_explains_every_counter(part: str) -> None:
 def test_a_program_in_another_language_can_include_the_header(installed: Path, tmp_path: Path, cxx: str) -> None:
     source, program = tmp_path / "outside.cpp", tmp_path / "outside"
     source.write_text(
-        "#include <psabench.h>\n#include <cstdio>\n"
+        "#include <nav/nav_mc.h>\n#include <psabench.h>\n#include <cstdio>\n"
         "int main()\n{\n    psabench *b = psabench_new(1);\n"
         '    psabench_part *p = psabench_part_new(b, "ads1255", "a", "start=at_once");\n'
         '    const int done = psabench_run_until_level(p, psabench_pin(p, "DRDY"), 0, 1000000000);\n'
-        '    std::printf("%d %d %d\\n", done, psabench_peek(p, ~0u), psabench_abi() == PSABENCH_ABI);\n'
+        '    std::printf("%d %d %d\\n", done, psabench_peek(p, ~0u), psabench_abi() == PSABENCH_ABI && !nav_abi());\n'
         "    psabench_free(b);\n}\n"
     )
-    run([cxx, "-std=c++11", *STRICT, source, *pkg_config(installed, "--cflags", "--libs"), "-o", program])
+    both = [
+        *pkg_config(installed, "--cflags", "--libs"),
+        *pkg_config(installed, "--cflags", "--libs", package="psabench-nav"),
+    ]
+    run([cxx, "-std=c++11", *STRICT, source, *both, "-o", program])
     assert run([program], LD_LIBRARY_PATH=str(installed / "opt/psa/lib64")) == "0 -1 1\n"
 
 
@@ -140,8 +178,9 @@ def test_uninstall_leaves_nothing_of_it(tmp_path: Path) -> None:
     ours = [p for folder in ("include", "lib") for p in (tmp_path / "usr" / folder).rglob("*") if not p.is_dir()]
     names = {str(p.relative_to(tmp_path)) for p in ours}
     lib = "usr/lib/here/"
-    assert names == {"usr/include/psabench.h", f"{lib}pkgconfig/psabench.pc"} | {
-        f"{lib}libpsabench.{x}" for x in ("a", "so", "so.0")
+    headers = {"usr/include/psabench.h", "usr/include/psabench/nav/nav.h", "usr/include/psabench/nav/nav_mc.h"}
+    assert names == headers | {f"{lib}pkgconfig/{x}.pc" for x in ("psabench", "psabench-nav")} | {
+        f"{lib}lib{x}" for name in ("psabench", "psabench-nav") for x in (f"{name}.a", f"{name}.so", f"{name}.so.0")
     }
     assert "libdir=/usr/lib/here\n" in (tmp_path / f"{lib}pkgconfig/psabench.pc").read_text()
     run(["make", "--no-print-directory", "uninstall", *where])

@@ -41,6 +41,8 @@ def check_includes(root: Path, files: dict[str, str]) -> subprocess.CompletedPro
         ("emu/base/a.h", "//\n" * 150),
         ("emu/api/psabench.h", "//\n" * 250),
         ("emu/api/a.c", '#include "board/psa2.h"\n#include "trace/trace.h"\n'),
+        ("emu/nav/a.cpp", '#include "base/detmath.h"\n#include <Eigen/Dense>\n#include <cmath>\n'),
+        ("emu/nav/nav.h", "//\n" * 250),
     ],
 )
 def test_what_is_allowed_passes(tmp_path: Path, file: str, text: str) -> None:
@@ -76,6 +78,11 @@ def test_what_is_allowed_passes(tmp_path: Path, file: str, text: str) -> None:
         ("emu/api/a.h", "//\n" * 151, "151 lines, at most 150"),
         ("emu/api/a.c", "#include <unistd.h>\n", "operating system's header"),
         ("emu/api/a.c", '#include "app/loop.h"\n', "api may not include app"),
+        ("emu/nav/a.cpp", '#include "phys/mems.h"\n', "a.cpp:1: nav may not include phys"),
+        ("emu/nav/a.hpp", "#include <iostream>\n", "operating system's header"),
+        ("emu/phys/a.c", "#include <Eigen/Dense>\n", "belongs in nav"),
+        ("emu/nav/a.hpp", "//\n" * 151, "151 lines, at most 150"),
+        ("emu/nav/a.cpp", body(41), "f() has 41 lines: say why"),
         ("emu/base/a.c", body(16) * 9, "the median function has 16 lines"),
     ],
 )

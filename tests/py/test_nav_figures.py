@@ -1,4 +1,4 @@
-"""The figures of gyrocompassing and hold (sources instruments 1.5 to 1.8), by both Monte-Carlo models, at fixed seeds."""
+"""The figures of gyrocompassing and hold (sources instruments 1.5 to 1.8), by both Monte-Carlo models, fixed seeds."""
 
 from __future__ import annotations
 

@@ -70,9 +70,8 @@ def test_it_holds_what_is_installed_and_no_path_of_this_machine(wheel: Path) -> 
         files = {n.removeprefix("psabench/bundle/"): z.read(n) for n in z.namelist() if "/bundle/" in n}
         ours = [n for n, data in files.items() if str(ROOT).encode() in data]
     assert ours == []
-    assert {"bin/psa-emu", "lib/libpsabench.so.0", "include/psabench.h", "share/psabench/proto/psabench.dbc"} <= set(
-        files
-    )
+    libraries = {"lib/libpsabench.so.0", "lib/libpsabench-nav.so.0"}
+    assert libraries | {"bin/psa-emu", "include/psabench.h", "share/psabench/proto/psabench.dbc"} <= set(files)
     for folder in ("proto", "decoders", "share"):
         here = {p for p in (ROOT / folder).rglob("*") if p.is_file() and p.suffix != ".pyc"}
         assert {f"share/psabench/{p.relative_to(ROOT)}" for p in here} <= set(files)
@@ -92,8 +91,8 @@ def test_the_emulator_is_a_command_too(programs: Path, tmp_path: Path) -> None:
 
 def test_python_uses_its_own_emulator_library_and_files(programs: Path, tmp_path: Path) -> None:
     script = (
-        "import psabench.chips as c, psabench.clib as l, psabench.places as p\n"
-        "print(p.find_emulator(), l.library().path, p.proto_file('psabench.dbc'), sep='\\n')\n"
+        "import psabench.chips as c, psabench.clib as l, psabench.navlib as n, psabench.places as p\n"
+        "print(p.find_emulator(), l.library().path, n.library().path, p.proto_file('psabench.dbc'), sep='\\n')\n"
         "with c.Bench() as b:\n"
         "    adc = b.part('ads1256')\n"
         "    adc.run_until_level('DRDY', 0)\n"
