@@ -17,7 +17,7 @@ from psabench.progress import Bar
 from psabench.store import Rows, Store
 
 WIRE = {c.name: c for c in STUDIES["wire"].cases(Setup())}
-RUNS = 200  # of the article's mode, docs/procedures/gyrocompass_campaign.md
+RUNS, SEED = 200, 3  # of the article's mode; other seeds: docs/procedures/gyrocompass_campaign.md
 
 
 @pytest.fixture
@@ -77,8 +77,8 @@ def test_what_no_emulator_can_be_told_is_refused_before_any_starts(
 @pytest.mark.soak
 @pytest.mark.timeout(1500)
 def test_two_hundred_runs_through_the_wire_have_the_distribution_of_the_algebra(tmp_path: Path, quiet: Bar) -> None:
-    """Issue's figure: Kolmogorov-Smirnov p > 0.01, from PSA-2's codes; about a second of one core each."""
-    found = command.campaign(Options(case="article", chain="emulated", runs=RUNS, out=tmp_path), quiet)
+    """Kolmogorov and Smirnov's p above 0.01, from PSA-2's codes; about two seconds of a core each."""
+    found = command.campaign(Options(case="article", chain="emulated", runs=RUNS, seed=SEED, out=tmp_path), quiet)
     (a,) = found.agreements
     print(f"KS {a.statistic:.4f}, p {a.p:.3f}, rms {a.rms_deg:.4f} and {a.reference_rms_deg:.4f} deg")
     assert (a.runs, a.reference_runs) == (RUNS, 20000)
@@ -94,8 +94,8 @@ def emulated_rows(out: Path) -> tuple[Rows, Rows]:
     with Store(out / "store.sqlite") as store:
         setup = WIRE["article"].setup
         return (
-            store.rows(chains.origin("emulated", setup, None, 1), RUNS),
-            store.rows(chains.origin("closed", setup, None, 1), 20000),
+            store.rows(chains.origin("emulated", setup, None, SEED), RUNS),
+            store.rows(chains.origin("closed", setup, None, SEED), 20000),
         )
 
 
