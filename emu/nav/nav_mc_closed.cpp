@@ -89,7 +89,7 @@ struct lanes {
     double sign_angle[LANES], sign_gamma[LANES], sign_beta[LANES], sign_latitude[LANES];
     double z[FIT_MAX + NAV_MAX_POSITIONS + 1][LANES]; /* Gaussian: for the unknowns, then for the angles */
     double r[FIT_MAX][LANES], first[LANES];
-    double alpha[LANES], drift[LANES], quality[LANES];
+    double alpha[LANES], platform[LANES], drift[LANES], quality[LANES];
 };
 
 /* Four numbers give the uniform draws and, in the lowest bits of the first, the signs; then come the Gaussian ones. */
@@ -242,6 +242,12 @@ INLINE void compute(const struct closed_plan *plan, uint64_t seed, uint64_t firs
     add_angles<COUNT, UNKNOWNS>(plan, x);
     add_scales(plan, x);
     solve(plan, x);
+    for (int l = 0; l < LANES; l++) {
+        x->platform[l] = x->alpha[l] - x->first[l];
+        x->drift[l] *= plan->lin.we_radps;
+        const double whole = x->turn_a[l] > 0.5 ? 1.0 : 0.0;
+        x->turn_a[l] = 2.0 * NAV_PI * (x->turn_a[l] - whole); /* an angle from here on */
+    }
 }
 
 #define COMPUTE(name, target, count, unknowns)                                                                         \
@@ -261,18 +267,13 @@ static void put(double *array, uint64_t at, int n, const double *lane)
     if (array) memcpy(array + at, lane, (size_t)n * sizeof *array);
 }
 
-static void put_all(const struct nav_mc_out *out, const struct closed_plan *plan, struct lanes *x, uint64_t at, int n)
+static void put_all(const struct nav_mc_out *out, const struct lanes *x, uint64_t at, int n)
 {
+    put(out->platform_rad, at, n, x->platform);
     put(out->heading_rad, at, n, x->alpha);
-    put(out->quality, at, n, x->quality);
-    for (int l = 0; l < LANES; l++) {
-        x->alpha[l] -= x->first[l];
-        x->drift[l] *= plan->lin.we_radps;
-        x->turn_a[l] = 2.0 * NAV_PI * (x->turn_a[l] > 0.5 ? x->turn_a[l] - 1.0 : x->turn_a[l]);
-    }
-    put(out->platform_rad, at, n, x->alpha);
     put(out->drift_radps, at, n, x->drift);
     put(out->alpha1_rad, at, n, x->turn_a);
+    put(out->quality, at, n, x->quality);
 }
 
 int nav_mc_closed(const struct nav_mc_cfg *cfg, uint64_t seed, uint64_t first_run, uint64_t runs,
@@ -288,7 +289,7 @@ int nav_mc_closed(const struct nav_mc_cfg *cfg, uint64_t seed, uint64_t first_ru
     struct lanes x;
     for (uint64_t at = 0; at < runs; at += LANES) {
         by_width[three][width](&plan, seed, first_run + at, &x);
-        put_all(out, &plan, &x, at, runs - at < LANES ? (int)(runs - at) : LANES);
+        put_all(out, &x, at, runs - at < LANES ? (int)(runs - at) : LANES);
     }
     return NAV_OK;
 }

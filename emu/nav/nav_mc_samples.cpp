@@ -7,8 +7,9 @@ struct samples_plan {
     const struct nav_mc_cfg *cfg;
     struct nav_position p[NAV_MAX_POSITIONS];
     uint64_t per_window;
-    double decay, step_sd_radps; /* of the drift over a sample */
-    double white_sd_radps;       /* of S in a sample */
+    double decay, step_sd_radps;                                         /* of the drift over a sample */
+    double white_sd_radps;                                               /* of S in a sample */
+    double over_gap[NAV_MAX_POSITIONS], gap_sd_radps[NAV_MAX_POSITIONS]; /* of the drift over the gap before window i */
 };
 
 /* One virtual instrument: what it drew for good. */
@@ -18,7 +19,6 @@ struct instrument {
     double q1_rad; /* gimbal angle of position 1 */
     double angle_sys_rad, latitude_error_rad, beta_sys_rad, gamma_sys_rad;
     double drift_radps;      /* random part, now */
-    double clock_s;          /* when it was so */
     double first_actual_rad; /* alpha of the platform in position 1, and as the angle's zero has it */
     double first_nominal_rad;
 };
@@ -34,12 +34,18 @@ static int plan_make(const struct nav_mc_cfg *cfg, struct samples_plan *plan)
     plan->decay = nav_decay(cfg->sample_s / cfg->gm_tau_s);
     plan->step_sd_radps = cfg->gm_sigma_radps * std::sqrt(1.0 - plan->decay * plan->decay);
     plan->white_sd_radps = cfg->white_radps_rts / std::sqrt(cfg->sample_s);
+    plan->over_gap[0] = 1.0;
+    for (int i = 1; i < cfg->count; i++) {
+        const double gap_s = plan->p[i].t_mid_s - plan->p[i - 1].t_mid_s - cfg->window_s;
+        plan->over_gap[i] = nav_decay(gap_s > 0.0 ? gap_s / cfg->gm_tau_s : 0.0);
+        plan->gap_sd_radps[i] = cfg->gm_sigma_radps * std::sqrt(1.0 - plan->over_gap[i] * plan->over_gap[i]);
+    }
     return NAV_OK;
 }
 
 static struct instrument instrument_draw(const struct nav_mc_cfg *cfg, uint64_t start)
 {
-    struct instrument u = {random_stream(start), 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
+    struct instrument u = {random_stream(start), 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
     u.alpha1_rad = mc_alpha1(cfg, &u.rnd);
     u.angle_sys_rad = mc_signed(cfg, cfg->angle_sys_rad, &u.rnd);
     u.gamma_sys_rad = mc_signed(cfg, cfg->gamma_sys_rad, &u.rnd);
@@ -99,13 +105,12 @@ static double drift_sum(const struct samples_plan *plan, const double *noise, in
 }
 
 /* Mean of the random drift over a window, sample by sample; the gap before it is one exact step. */
-static double drift_mean(const struct samples_plan *plan, struct instrument *u, double begins_s)
+static double drift_mean(const struct samples_plan *plan, struct instrument *u, int i)
 {
     const struct nav_mc_cfg *cfg = plan->cfg;
     if (cfg->gm_sigma_radps == 0.0) return 0.0;
-    const double over_gap = nav_decay((begins_s - u->clock_s) / cfg->gm_tau_s);
-    double w = over_gap * u->drift_radps;
-    if (begins_s > u->clock_s) w += cfg->gm_sigma_radps * std::sqrt(1.0 - over_gap * over_gap) * u->rnd.gauss();
+    double w = plan->over_gap[i] * u->drift_radps;
+    if (i > 0) w += plan->gap_sd_radps[i] * u->rnd.gauss();
     double sum = 0.0;
     double noise[BLOCK];
     for (uint64_t done = 0; done < plan->per_window; done += BLOCK) {
@@ -115,7 +120,6 @@ static double drift_mean(const struct samples_plan *plan, struct instrument *u, 
         sum += drift_sum(plan, noise, n, &w);
     }
     u->drift_radps = w;
-    u->clock_s = begins_s + cfg->window_s;
     return sum / (double)plan->per_window;
 }
 
@@ -137,7 +141,7 @@ static struct nav_position measure(const struct samples_plan *plan, struct instr
     at.beta_error_rad = u->beta_sys_rad + mean_of_samples(&u->rnd, cfg->beta_random_rad, draws);
     at.gamma_error_rad = u->gamma_sys_rad + mean_of_samples(&u->rnd, cfg->gamma_random_rad, draws);
     at.gamma_rad = nav_gamma(alpha, 0.0, u->psi_rad, u->pitch_rad, u->roll_rad);
-    at.drift1_radps = cfg->drift1_radps + drift_mean(plan, u, p.t_mid_s - 0.5 * p.window_s);
+    at.drift1_radps = cfg->drift1_radps + drift_mean(plan, u, i);
     double beta = 0.0;
     p.s_radps = nav_rest_s_radps(&at, &beta) + mean_of_samples(&u->rnd, plan->white_sd_radps, plan->per_window);
     p.beta_rad = beta + at.beta_error_rad;

@@ -11,7 +11,7 @@ struct nav_earth {
 
 inline struct nav_earth nav_earth_at(double latitude_rad)
 {
-    return {NAV_EARTH_RADPS * det_cos(latitude_rad), NAV_EARTH_RADPS * det_sin(latitude_rad)};
+    return {NAV_EARTH_RADPS * nav_cos(latitude_rad), NAV_EARTH_RADPS * nav_sin(latitude_rad)};
 }
 
 /* a and b of (13), or of (14), for We = 1. */
