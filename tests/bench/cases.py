@@ -21,6 +21,16 @@ from tests.bench.peers import NAMES, PSD1, Peer, run
 ROOT = Path(__file__).resolve().parents[2]
 
 
+NUMPY = "mc-numpy"  # what the other gyrocompasses are compared with
+MONTE_CARLO = {
+    NUMPY: 2000,
+    "mc-closed": 1_000_000,
+    "mc-closed-all": 1_000_000,
+    "mc-samples": 5000,
+    "mc-samples-all": 5000,
+}
+
+
 @dataclass(slots=True)
 class Case:
     """One row: `sample(count)` measures count units of work; rates, units a second, are its results round by round."""
@@ -97,6 +107,8 @@ def all_cases(bench: Path, peers: dict[str, Peer]) -> list[Case]:
             cases.append(Case(name, unit, partial(printed, command), 2000, command))
     for name, unit, first in (("decode", "frames", 20000), ("can", "frames", 20000), ("chips-spi", "bytes", 20000)):
         cases.append(Case(name, unit, partial(printed, partial(python, name)), first))
+    for name, first in MONTE_CARLO.items():
+        cases.append(Case(name, "runs", partial(printed, partial(python, name)), first))
     cases.append(Case("start", "starts", partial(printed, partial(python, "start")), 20, fixed=True))
     return cases
 

@@ -28,7 +28,7 @@ class Found:
 
 def _signed(cfg: McConfig, value: float, rng: np.random.Generator, runs: int) -> Floats:
     signs = rng.integers(0, 2, runs) * 2.0 - 1.0 if cfg.random_sign else np.ones(runs)
-    return value * signs
+    return np.asarray(value * signs, dtype=np.float64)
 
 
 def _window(cfg: McConfig, w: Floats, rng: np.random.Generator) -> tuple[Floats, Floats]:

@@ -5,6 +5,7 @@ Prints CASE key=value ... ns=T like bench_core.
 
 from __future__ import annotations
 
+import os
 import random
 import socket
 import statistics
@@ -12,7 +13,9 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 
+import numpy as np
 from psabench.lineport import BLOCK, CLK, DATA, INT, LineDecoder
 from psabench.places import find_emulator
 
@@ -116,7 +119,79 @@ def chips_spi(count: int) -> str:
     return f"bytes={max(count // len(request), 1) * len(request)} ns={ns}"
 
 
-CASES: dict[str, Callable[[int], str]] = {"decode": decode, "start": start, "can": can, "chips-spi": chips_spi}
+MC_BATCH = 1 << 15  # runs of the closed form a call: their results stay in the cache
+
+
+def mc_numpy(count: int) -> str:
+    """Gyrocompasses of NumPy, sample by sample, all of a batch at once; one thread."""
+    from psabench.nav_mc import McConfig
+
+    from tests.bench.numpy_gyrocompass import BATCH, batch
+
+    cfg, rng = McConfig(), np.random.default_rng(1)
+    batch(cfg, 10, rng)
+    batches = max(round(count / BATCH), 1)
+    began_ns = time.process_time_ns()
+    for _ in range(batches):
+        batch(cfg, BATCH, rng)
+    return f"runs={batches * BATCH} ns={time.process_time_ns() - began_ns}"
+
+
+def _closed(first: int, batches: int) -> None:
+    from psabench.nav_mc import McConfig, closed
+
+    cfg = McConfig()
+    into = closed(cfg, 1, runs=MC_BATCH)
+    for k in range(batches):
+        closed(cfg, 1, first_run=(first + k) * MC_BATCH, runs=MC_BATCH, into=into)
+
+
+def mc_closed(count: int) -> str:
+    """The same by the closed form; one thread, CPU time."""
+    batches = max(count // MC_BATCH, 1)
+    _closed(0, 1)
+    began_ns = time.process_time_ns()
+    _closed(0, batches)
+    return f"runs={batches * MC_BATCH} ns={time.process_time_ns() - began_ns}"
+
+
+def mc_closed_all(count: int) -> str:
+    """The same, a thread a core, real time."""
+    threads = os.cpu_count() or 1
+    batches = max(count // MC_BATCH // threads, 1)
+    _closed(0, 1)
+    began_ns = time.perf_counter_ns()
+    with ThreadPoolExecutor(threads) as pool:
+        list(pool.map(lambda t: _closed(t * batches, batches), range(threads)))
+    return f"runs={threads * batches * MC_BATCH} ns={time.perf_counter_ns() - began_ns}"
+
+
+def mc_samples(count: int, threads: int = 1, clock_ns: Callable[[], int] = time.process_time_ns) -> str:
+    """The same sample by sample; one thread, CPU time."""
+    from psabench.nav_mc import McConfig, samples
+
+    samples(McConfig(), 1, runs=threads, threads=threads)
+    began_ns = clock_ns()
+    samples(McConfig(), 1, runs=count, threads=threads)
+    return f"runs={count} ns={clock_ns() - began_ns}"
+
+
+def mc_samples_all(count: int) -> str:
+    """The same, a thread a core, real time."""
+    return mc_samples(count, os.cpu_count() or 1, time.perf_counter_ns)
+
+
+CASES: dict[str, Callable[[int], str]] = {
+    "decode": decode,
+    "start": start,
+    "can": can,
+    "chips-spi": chips_spi,
+    "mc-numpy": mc_numpy,
+    "mc-closed": mc_closed,
+    "mc-closed-all": mc_closed_all,
+    "mc-samples": mc_samples,
+    "mc-samples-all": mc_samples_all,
+}
 
 if __name__ == "__main__":
     print(sys.argv[1], CASES[sys.argv[1]](int(sys.argv[2])))

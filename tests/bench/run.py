@@ -71,6 +71,10 @@ def summary(measured: list[Case], rounds: int) -> page.Result:
         if c.unit == "frames":
             peer = by_name[peers.PSD1 if "psd1" in c.name else PEER]
             row["times_peer"] = statistics.median(a / b for a, b in zip(c.rates, peer.rates, strict=True))
+        if c.unit == "runs":
+            row["times_peer"] = statistics.median(
+                a / b for a, b in zip(c.rates, by_name[cases.NUMPY].rates, strict=True)
+            )
         if c.edges_per_unit:
             row["medges_per_s"] = statistics.median(c.rates) * c.edges_per_unit / 1e6
             if c.instructions_per_unit:

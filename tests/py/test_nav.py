@@ -17,6 +17,8 @@ from psabench.nav import ARCMIN, DEGPH, EARTH_RADPS, Flag, Method, Noise, Positi
 from psabench.navlib import McHoldStruct, McStruct, library
 from scipy import stats
 
+from tests.bench import numpy_gyrocompass
+
 Floats = npt.NDArray[np.float64]
 FREE = (Method.LSQ, Method.GLS)
 FIT_ANY = (Method.LSQ, Method.CONSTRAINED, Method.GLS, Method.GLS_CONSTRAINED)
@@ -517,6 +519,17 @@ def test_the_closed_form_and_the_samples_agree(name: str) -> None:
     for field in ("heading_rad", "platform_rad", "drift_radps", "quality", "alpha1_rad"):
         p = stats.ks_2samp(getattr(few, field), getattr(many, field)).pvalue
         assert p > 0.001, f"{field}: p = {p:.2g}"
+
+
+def test_numpys_version_of_the_model_has_the_same_distribution() -> None:
+    """tests/bench/numpy_gyrocompass.py, written from the equations: what the library is timed beside."""
+    rng = np.random.default_rng(1)
+    batches = [numpy_gyrocompass.batch(R0, 1000, rng) for _ in range(4)]
+    for model, runs in ((nav_mc.closed, 200_000), (nav_mc.samples, 8000)):
+        ours = model(R0, 13, runs=runs)
+        for field in ("heading_rad", "platform_rad", "drift_radps"):
+            theirs = np.concatenate([getattr(b, field) for b in batches])
+            assert stats.ks_2samp(theirs, getattr(ours, field)).pvalue > 0.001, field
 
 
 def test_random_numbers_are_gaussian_far_into_the_tails() -> None:
