@@ -45,8 +45,9 @@ static double pair(const struct nav_position *a, const struct nav_position *b, c
 
 fit_square fit_covariance(const struct nav_position *p, int count, const struct nav_noise *noise, double latitude_rad)
 {
+    fit_square c = fit_square::Zero(count, count);
+    if (noise->gm_sigma_radps + noise->white_radps_rts + noise->window_sd_radps + noise->level_sd_rad == 0.0) return c;
     const struct nav_earth e = nav_earth_at(latitude_rad);
-    fit_square c(count, count);
     for (int i = 0; i < count; i++)
         for (int j = 0; j <= i; j++)
             c(i, j) = c(j, i) = pair(&p[i], &p[j], noise, e.wz_radps) / (e.we_radps * e.we_radps);

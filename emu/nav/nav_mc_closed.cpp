@@ -110,10 +110,8 @@ INLINE void draw(int gaussians, uint64_t seed, uint64_t first_run, struct lanes 
         x->state[l] = start + 4 * RANDOM_STEP;
     }
     for (int k = 0; k < gaussians; k += 2)
-        for (int l = 0; l < LANES; l++) {
-            const uint64_t at = x->state[l] + (uint64_t)k * RANDOM_STEP;
-            random_pair(random_mix(at + RANDOM_STEP), random_mix(at + 2 * RANDOM_STEP), &x->z[k][l], &x->z[k + 1][l]);
-        }
+        for (int l = 0; l < LANES; l++)
+            random_pair(random_mix(x->state[l] + (uint64_t)(k / 2 + 1) * RANDOM_STEP), &x->z[k][l], &x->z[k + 1][l]);
 }
 
 INLINE void scale_draws(const struct closed_plan *plan, struct lanes *x)

@@ -69,7 +69,7 @@ double nav_rest_s_radps(const struct nav_rest *at, double *beta_rad)
             e.we_radps * (sa_cg + ca_sg * nav_sin(beta)) - e.wz_radps * nav_cos(beta) * sg + at->drift1_radps;
         const double was = s;
         s = w_x / (1.0 + at->torquer_scale1) + compensation * nav_cos(beta + at->beta_error_rad);
-        if (std::fabs(s - was) < 1e-20) break;
+        if (std::fabs(s - was) < 1e-18) break; /* 2e-13 deg/h */
     }
     if (beta_rad) *beta_rad = beta;
     return s;

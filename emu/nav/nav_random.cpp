@@ -3,10 +3,8 @@
 INLINE void fill(uint64_t state, int n, double *out)
 {
     const int half = n / 2;
-    for (int k = 0; k < half; k++) {
-        const uint64_t at = state + 2 * (uint64_t)k * RANDOM_STEP;
-        random_pair(random_mix(at + RANDOM_STEP), random_mix(at + 2 * RANDOM_STEP), &out[k], &out[half + k]);
-    }
+    for (int k = 0; k < half; k++)
+        random_pair(random_mix(state + (uint64_t)(k + 1) * RANDOM_STEP), &out[k], &out[half + k]);
 }
 
 static void fill_any(uint64_t state, int n, double *out)
@@ -28,5 +26,5 @@ uint64_t random_fill(uint64_t state, int n, double *out)
 {
     static void (*const by_width[])(uint64_t, int, double *) = {fill_any, fill_wide, fill_widest};
     by_width[random_width()](state, n, out);
-    return state + (uint64_t)n * RANDOM_STEP;
+    return state + (uint64_t)(n / 2) * RANDOM_STEP;
 }

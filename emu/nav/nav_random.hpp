@@ -74,17 +74,18 @@ INLINE void random_direction(double turn, double *cos_out, double *sin_out)
     *sin_out = -2.0 * s2 * c2;
 }
 
-INLINE void random_pair(uint64_t a, uint64_t b, double *first, double *second)
+/* Two of one number: its upper 36 bits are the radius, up to 7 sigma, its lower 28 the direction. */
+INLINE void random_pair(uint64_t bits, double *first, double *second)
 {
-    const double radius = std::sqrt(-2.0 * random_log(1.0 - random_unit(a)));
+    const double radius = std::sqrt(-2.0 * random_log(1.0 - random_unit(bits >> 28 << 28)));
     double c;
     double s;
-    random_direction(random_unit(b), &c, &s);
+    random_direction(random_unit(bits << 36), &c, &s);
     *first = radius * c;
     *second = radius * s;
 }
 
-/* n Gaussian numbers, n even and at most 1024, of the numbers after state; returns the state after them. */
+/* n Gaussian numbers, n even, of the n/2 numbers after state; returns the state after them. */
 uint64_t random_fill(uint64_t state, int n, double *out);
 
 /* Numbers one by one. */
