@@ -1,13 +1,17 @@
 #include "nav/nav_mc.hpp"
 
 constexpr int BLOCK = 512; /* random numbers made at once */
+constexpr int STRETCHES = 16;
 
 /* What does not change from run to run. */
 struct samples_plan {
     const struct nav_mc_cfg *cfg;
     struct nav_position p[NAV_MAX_POSITIONS];
     uint64_t per_window;
-    double decay, step_sd_radps;                                         /* of the drift over a sample */
+    double decay, step_sd_radps;          /* of the drift over a sample */
+    double decays[BLOCK / STRETCHES + 1]; /* powers of decay, and sums of those before */
+    double decay_sums[BLOCK / STRETCHES + 1];
+    int width;                                                           /* of the processor's vectors */
     double white_sd_radps;                                               /* of S in a sample */
     double over_gap[NAV_MAX_POSITIONS], gap_sd_radps[NAV_MAX_POSITIONS]; /* of the drift over the gap before window i */
 };
@@ -32,6 +36,13 @@ static int plan_make(const struct nav_mc_cfg *cfg, struct samples_plan *plan)
     if (refused) return refused;
     plan->per_window = (uint64_t)mc_samples_per_window(cfg);
     plan->decay = nav_decay(cfg->sample_s / cfg->gm_tau_s);
+    plan->decays[0] = 1.0;
+    plan->decay_sums[0] = 0.0;
+    for (int k = 1; k <= BLOCK / STRETCHES; k++) {
+        plan->decay_sums[k] = plan->decay_sums[k - 1] + plan->decays[k - 1];
+        plan->decays[k] = plan->decays[k - 1] * plan->decay;
+    }
+    plan->width = random_width();
     plan->step_sd_radps = cfg->gm_sigma_radps * std::sqrt(1.0 - plan->decay * plan->decay);
     plan->white_sd_radps = cfg->white_radps_rts / std::sqrt(cfg->sample_s);
     plan->over_gap[0] = 1.0;
@@ -81,25 +92,59 @@ static double mean_of_samples(struct random_stream *rnd, double sd, uint64_t cou
     return sd * sum / (double)count;
 }
 
-/* Sum of n samples of the drift w, which comes back as it is after the last. Each is computed; four at a time, as noise started
- * from zero and what is left of w, so that they need not wait for one another. */
+/* Sixteen stretches of the drift at once, from zero: noise[16 k + j] is sample k of stretch j. Sums of the samples and what comes
+ * after the last. One stretch would wait for itself. */
+typedef double eight __attribute__((vector_size(8 * sizeof(double))));
+
+INLINE void stretches(const double *noise, int steps, double rho, double *sums, double *ends)
+{
+    eight w[2] = {};
+    eight s[2] = {};
+    for (int k = 0; k < steps; k++) {
+        eight z[2];
+        memcpy(z, noise + STRETCHES * k, sizeof z);
+        s[0] += w[0];
+        s[1] += w[1];
+        w[0] = rho * w[0] + z[0];
+        w[1] = rho * w[1] + z[1];
+    }
+    memcpy(sums, s, sizeof s);
+    memcpy(ends, w, sizeof w);
+}
+
+static void stretches_any(const double *noise, int steps, double rho, double *sums, double *ends)
+{
+    stretches(noise, steps, rho, sums, ends);
+}
+
+TARGET_WIDE static void stretches_wide(const double *noise, int steps, double rho, double *sums, double *ends)
+{
+    stretches(noise, steps, rho, sums, ends);
+}
+
+TARGET_WIDEST static void stretches_widest(const double *noise, int steps, double rho, double *sums, double *ends)
+{
+    stretches(noise, steps, rho, sums, ends);
+}
+
+/* Sum of n samples of the drift w, which comes back as it is after the last. Each is computed, as noise started from zero and
+ * what is left of w. */
 static double drift_sum(const struct samples_plan *plan, const double *noise, int n, double *w)
 {
-    const double rho = plan->decay;
-    const double four = rho * rho * rho * rho;
-    const double all_four = 1.0 + rho + rho * rho + rho * rho * rho;
+    static void (*const by_width[])(const double *, int, double, double *, double *) = {stretches_any, stretches_wide,
+                                                                                        stretches_widest};
+    const int steps = n / STRETCHES;
+    double sums[STRETCHES];
+    double ends[STRETCHES];
+    by_width[plan->width](noise, steps, plan->decay, sums, ends);
     double sum = 0.0;
-    int k = 0;
-    for (; k + 3 < n; k += 4) {
-        const double p1 = noise[k];
-        const double p2 = rho * p1 + noise[k + 1];
-        const double p3 = rho * p2 + noise[k + 2];
-        sum += all_four * *w + plan->step_sd_radps * (p1 + p2 + p3);
-        *w = four * *w + plan->step_sd_radps * (rho * p3 + noise[k + 3]);
+    for (int j = 0; j < STRETCHES; j++) {
+        sum += plan->decay_sums[steps] * *w + plan->step_sd_radps * sums[j];
+        *w = plan->decays[steps] * *w + plan->step_sd_radps * ends[j];
     }
-    for (; k < n; k++) {
+    for (int k = STRETCHES * steps; k < n; k++) {
         sum += *w;
-        *w = rho * *w + plan->step_sd_radps * noise[k];
+        *w = plan->decay * *w + plan->step_sd_radps * noise[k];
     }
     return sum;
 }
