@@ -15,7 +15,7 @@ from psabench import nav, nav_mc
 from psabench.errors import BadInput
 from psabench.nav import ARCMIN, DEGPH, EARTH_RADPS, Flag, Method, Noise, Position, Rest, Status
 from psabench.navlib import McHoldStruct, McStruct, library
-from scipy import stats
+from scipy import optimize, stats
 
 from tests.bench import numpy_gyrocompass
 
@@ -199,6 +199,56 @@ def test_the_covariance_is_consistent(method: Method) -> None:
     low, high = stats.chi2.ppf([0.0005, 0.9995], 2 * runs) / runs
     assert low < np.mean(nees) < high
     assert np.std(platform_errors) == pytest.approx(np.sqrt(np.mean(np.square(sds))), rel=0.1)
+
+
+def numpy_gls(rows: list[Position], latitude_rad: float, noise: Noise) -> tuple[Floats, float]:
+    """(s, c, drift) of the free weighted fit and alpha on the circle, weights with cos^2 = 1/2 for the angles."""
+    we = EARTH_RADPS * math.cos(latitude_rad)
+    a, b = [], []
+    for p in rows:
+        sgsb = math.sin(p.gamma_rad) * math.sin(p.beta_rad)
+        a.append(we * (math.cos(p.delta_rad) * math.cos(p.gamma_rad) - math.sin(p.delta_rad) * sgsb))
+        b.append(we * (math.sin(p.delta_rad) * math.cos(p.gamma_rad) + math.cos(p.delta_rad) * sgsb))
+    design, s = np.column_stack([a, b, np.full(len(a), we)]), np.array([p.s_radps for p in rows])
+    cov = simulated_cov(noise, latitude_rad, rows, 0.0)[0] + 0.5 * (we * noise.angle_sd_rad) ** 2 * np.eye(len(rows))
+    white = np.linalg.inv(np.linalg.cholesky(cov)) * we
+    free = np.linalg.lstsq(white @ design / we, white @ s / we, rcond=None)[0]
+
+    def left(x: Floats) -> Floats:
+        residual = white @ (design @ np.array([math.sin(x[0]), math.cos(x[0]), x[1]]) - s) / we
+        return np.asarray(residual, dtype=np.float64)
+
+    start = np.array([math.atan2(free[0], free[1]), free[2]])
+    return free * np.array([1, 1, we]), float(
+        optimize.least_squares(left, start, xtol=1e-15, ftol=1e-15, gtol=1e-15).x[0]
+    )
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_weighted_fits_are_those_of_numpy(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    noise = Noise(gm_sigma_radps=0.1 * DEGPH, gm_tau_s=100.0, white_radps_rts=0.2 * DEGPH,
+                  window_sd_radps=0.03 * DEGPH, angle_sd_rad=5 * ARCMIN, level_sd_rad=5 * ARCMIN)  # fmt: skip
+    alpha = rng.uniform(-np.pi, np.pi)
+    rows = positions(50 * DEG, alpha, rng.uniform(-np.pi, np.pi, 7), tilt=(3 * DEG, -4 * DEG))
+    rows = [replace(p, s_radps=p.s_radps + rng.normal() * 0.5 * DEGPH) for p in rows]
+    free, on_circle = numpy_gls(rows, 50 * DEG, noise)
+    r = nav.gyrocompass(rows, latitude_rad=50 * DEG, method=Method.GLS, noise=noise)
+    assert (r.s, r.c, r.drift1_radps / DEGPH) == pytest.approx((free[0], free[1], free[2] / DEGPH), abs=1e-5)
+    c = nav.gyrocompass(rows, latitude_rad=50 * DEG, method=Method.GLS_CONSTRAINED, noise=noise)
+    assert math.remainder(c.alpha1_rad - on_circle, 2 * math.pi) == pytest.approx(0.0, abs=1e-5)
+    assert c.quality == r.quality
+
+
+def test_an_angles_error_counts_once_for_the_heading_and_otherwise_for_the_platform() -> None:
+    """Sources instruments 1.5: 3' of each angle are 0.0395 deg of heading and 0.053 deg of the platform."""
+    found = [
+        nav.gyrocompass(positions(50 * DEG, a, np.arange(3) * 90 * DEG), latitude_rad=50 * DEG, method=Method.CLOSED3,
+                        noise=Noise(angle_sd_rad=3 * ARCMIN))
+        for a in np.arange(0, 2 * np.pi, 0.1)
+    ]  # fmt: skip
+    assert math.degrees(np.sqrt(np.mean([r.alpha1_sd_rad**2 for r in found]))) == pytest.approx(0.0395, abs=0.0003)
+    assert math.degrees(np.sqrt(np.mean([r.platform_sd_rad**2 for r in found]))) == pytest.approx(0.0530, abs=0.0003)
 
 
 def test_weights_by_the_drifts_covariance_help_as_much_as_they_should() -> None:
@@ -499,6 +549,7 @@ AGREE = {
     "gimbal uncorrected": replace(R0, gm_sigma_radps=0.02 * DEGPH, cardan=nav_mc.Cardan.UNCORRECTED),
     "gimbal corrected": replace(R0, gm_sigma_radps=0.02 * DEGPH, cardan=nav_mc.Cardan.CORRECTED),
     "corners, scale": replace(R0, tilt=nav_mc.Tilt.CORNERS, torquer_scale=1e-3),
+    "fast drift": replace(R0, gm_tau_s=25.0, gap_s=7.0, window_s=3.33),
     "white, constrained": replace(
         R0, white_radps_rts=0.15 * DEGPH, method=Method.CONSTRAINED, latitude_error_rad=10 * ARCMIN
     ),

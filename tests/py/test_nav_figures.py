@@ -102,6 +102,42 @@ def test_each_reading_has_its_figures(name: str) -> None:
     assert rms(drift(e)) == pytest.approx(drift_degph, rel=0.04)
 
 
+NOTHING = replace(
+    HONEST,
+    gm_sigma_radps=0.0,
+    latitude_error_rad=0.0,
+    beta_sys_rad=0.0,
+    gamma_sys_rad=0.0,
+    beta_random_rad=0.0,
+    gamma_random_rad=0.0,
+    angle_sys=AngleSys.NONE,
+    angle_random_rad=0.0,
+    simplified=False,
+)
+SOURCES: dict[str, tuple[McConfig, float]] = {  # one at a time, standard deviation of the platform
+    "drift": (replace(NOTHING, gm_sigma_radps=0.2 * DEGPH), 0.153),
+    "drift, back to back": (replace(NOTHING, gm_sigma_radps=0.2 * DEGPH, gap_s=0.0), 0.097),
+    "gimbals": (replace(NOTHING, cardan=Cardan.UNCORRECTED), 0.074),
+    "angle, random 3'": (replace(NOTHING, angle_random_rad=3 * ARCMIN), 0.053),
+    "6' on increments": (replace(NOTHING, angle_sys=AngleSys.INCREMENT), 0.079),
+    "6' a step": (replace(NOTHING, angle_sys=AngleSys.ACCUMULATES), 0.107),
+    "6' common": (replace(NOTHING, angle_sys=AngleSys.COMMON), 0.0),
+    "gamma and beta, random 1'": (replace(NOTHING, gamma_random_rad=ARCMIN, beta_random_rad=ARCMIN), 0.020),
+    "gamma, 10'": (replace(NOTHING, gamma_sys_rad=10 * ARCMIN), 0.006),
+    "beta, 10'": (replace(NOTHING, beta_sys_rad=10 * ARCMIN), 0.006),
+    "latitude, 0.1'": (replace(NOTHING, latitude_error_rad=0.1 * ARCMIN), 0.0001),
+    "nothing": (NOTHING, 0.0),
+}
+
+
+@BOTH
+@pytest.mark.parametrize("name", SOURCES)
+def test_each_source_alone_has_its_share(name: str, model: Model, runs: int) -> None:
+    cfg, want = SOURCES[name]
+    sd = float(np.std(of_platform(model(cfg, 15, runs=runs))))
+    assert sd == pytest.approx(want, rel=0.04, abs=0.0005 if want < 0.01 else 0.0)
+
+
 def test_a_single_run_from_zero_proves_little() -> None:
     """The article shows one run: both of its figures come out together in a third of all runs with a proper drift."""
     e = nav_mc.closed(replace(HONEST, gm_from_zero=True, angle_sys=AngleSys.NONE), 6, runs=100_000)
