@@ -549,6 +549,10 @@ AGREE = {
     "gimbal uncorrected": replace(R0, gm_sigma_radps=0.02 * DEGPH, cardan=nav_mc.Cardan.UNCORRECTED),
     "gimbal corrected": replace(R0, gm_sigma_radps=0.02 * DEGPH, cardan=nav_mc.Cardan.CORRECTED),
     "corners, scale": replace(R0, tilt=nav_mc.Tilt.CORNERS, torquer_scale=1e-3),
+    "level sensors alone": replace(
+        R0, gm_sigma_radps=0.0, angle_sys=nav_mc.AngleSys.NONE, angle_random_rad=0.0, gamma_random_rad=0.0,
+        beta_random_rad=0.0, gamma_sys_rad=5 * ARCMIN, angles_rad=tuple(np.radians([0.0, 50.0, 130.0])),
+    ),
     "fast drift": replace(R0, gm_tau_s=25.0, gap_s=7.0, window_s=3.33),
     "white, constrained": replace(
         R0, white_radps_rts=0.15 * DEGPH, method=Method.CONSTRAINED, latitude_error_rad=10 * ARCMIN
