@@ -68,6 +68,7 @@ class WirePlatform:
         )
         self._m1_per_s = self._latitude_rad = 0.0
         self._set_rad = 0.0
+        self._navigates = False  # it was told to, and nothing else since
 
     def _find_level_unit(self) -> Psa2:
         node = self.gyro.level_node
@@ -139,12 +140,17 @@ class WirePlatform:
         self.gyro.set(latitude_deg=latitude_rad * DEG, speed_mps=speed_mps, track_deg=_wrapped_deg(track_rad * DEG))
 
     def look(self) -> Look:
-        flags = self.gyro.flags
+        flags, mode = self.gyro.flags, self.gyro.mode
+        faults = [words for flag, words in FLAG_WORDS.items() if flag in flags]
+        if self._navigates and mode != Mode.NAVIGATE:
+            faults.append(
+                f"the unit left navigation, its mode is {mode.name.lower()}: reset, or without power for a while"
+            )
         return Look(
             t_s=self.t_s,
             encoder_rad=math.radians(self.gyro.encoder_deg),
             heading_rad=math.radians(self.gyro.heading_deg),
-            faults=tuple(words for flag, words in FLAG_WORDS.items() if flag in flags),
+            faults=tuple(faults),
         )
 
     # ---- a run
@@ -155,6 +161,7 @@ class WirePlatform:
         while True:
             try:
                 self.gyro.mode = mode
+                self._navigates = mode == Mode.NAVIGATE
                 return
             except BenchError as e:
                 if getattr(e, "abort_code", 0) != BUSY_ABORT or self.t_s >= deadline_s:

@@ -114,6 +114,25 @@ def test_a_fault_on_the_way_is_a_doubt() -> None:
     assert r.doubts == ("the angle sensor does not follow",)
 
 
+def test_a_parked_vehicle_does_not_turn() -> None:
+    """What a dead azimuth torquer looks like: the platform turns as the Earth does not, and no flag says so."""
+    bench = FakePlatform()
+    ordinary, begun = bench.look, start(bench)
+
+    def turning(rate_degph: float) -> HoldResult:
+        begun_s = bench.t_s
+        bench.look = lambda: _turned(ordinary(), math.radians(rate_degph) / 3600 * (bench.t_s - begun_s))  # type: ignore[method-assign]
+        return hold(bench, begun, HoldParams(hours=0.5), Silent())
+
+    (doubt,) = turning(11.5).doubts
+    assert re.match(r"the heading moved by -?0\.9\d deg in 300 s of standing", doubt)
+    assert turning(0.2).doubts == ()  # a drift that the calibration leaves
+
+
+def _turned(look: Look, by_rad: float) -> Look:
+    return replace(look, encoder_rad=look.encoder_rad + by_rad)
+
+
 @pytest.mark.parametrize(
     ("given", "why"),
     [

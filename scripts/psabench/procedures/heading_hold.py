@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from psabench import nav
 from psabench.errors import LinkError
@@ -24,6 +24,10 @@ SUMMARY = "gyrocompassing, then heading kept for hours with the drifts compensat
 DRIFTS = ("torquer", "axis1", "none")
 EARTH_RADIUS_M = 6371e3
 LATITUDE_LIMIT_RAD = math.radians(85.0)
+PARKED_SDS, PARKED_RAD = (
+    5.0,
+    math.radians(0.2),
+)  # a parked vehicle's heading may wander so far: growth of the hold, sway
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,7 +85,22 @@ class HoldResult:
     @property
     def doubts(self) -> tuple[str, ...]:
         """Reasons not to trust the heading at the end."""
-        return (*self.start.doubts, *dict.fromkeys(words for h in self.held for words in h.faults))
+        return (*self.start.doubts, *dict.fromkeys(words for h in self.held for words in h.faults), *self._wandered)
+
+    @property
+    def _wandered(self) -> tuple[str, ...]:
+        """A parked vehicle does not turn: its heading may move by what the drift leaves, no more."""
+        if self.params.speed_mps or self.params.compensate != "torquer":
+            return ()
+        growth = replace(_growth(self.start), heading_sd_rad=0.0)
+        for h in self.held[1:]:
+            moved_rad = math.remainder(h.heading_rad - self.held[0].heading_rad, math.tau)
+            if abs(moved_rad) > PARKED_SDS * nav.hold_sd_rad(growth, h.t_s) + PARKED_RAD:
+                return (
+                    f"the heading moved by {math.degrees(moved_rad):.2f} deg in {h.t_s:.0f} s of standing, more "
+                    "than the drift that was left: the vehicle was turned, or the azimuth torquer or the angle sensor failed",
+                )
+        return ()
 
 
 def hold(
