@@ -98,7 +98,7 @@ class HoldResult:
             if abs(moved_rad) > PARKED_SDS * nav.hold_sd_rad(growth, h.t_s) + PARKED_RAD:
                 return (
                     f"the heading moved by {math.degrees(moved_rad):.2f} deg in {h.t_s:.0f} s of standing, more "
-                    "than the drift that was left: the vehicle was turned, or the azimuth torquer or the angle sensor failed",
+                    "than the drift that was left: the vehicle turned, or azimuth torquer or angle sensor failed",
                 )
         return ()
 
