@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from html import escape
 from pathlib import Path
 
@@ -12,6 +11,7 @@ import numpy as np
 from psabench import comparison
 from psabench.comparison import AXES, Comparison
 from psabench.report_page import PAGE
+from psabench.whole_file import replace_file
 
 TITLE = "Five generations of converters, one motion"
 
@@ -20,16 +20,10 @@ def write(folder: Path, c: Comparison) -> Path:
     """result.json and report.html into `folder`, each whole or not at all; returns the page. Raises OSError."""
     folder.mkdir(parents=True, exist_ok=True)
     data = json.dumps(comparison.result_dict(c), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-    _replace(folder / "result.json", data)
+    replace_file(folder / "result.json", data)
     page = folder / "report.html"
-    _replace(page, html_page(c))
+    replace_file(page, html_page(c))
     return page
-
-
-def _replace(path: Path, text: str) -> None:
-    draft = path.with_name(path.name + ".part")
-    draft.write_text(text, encoding="utf-8")
-    os.replace(draft, path)
 
 
 def html_page(c: Comparison) -> str:

@@ -7,7 +7,6 @@ write(folder, [Section(label="quiet", result=r, truth=truth)], facts={"seed": "7
 from __future__ import annotations
 
 import json
-import os
 import re
 from collections.abc import Mapping, Sequence
 from html import escape
@@ -28,6 +27,7 @@ from psabench.grading import (
 )
 from psabench.procedures import PROCEDURES
 from psabench.report_page import PAGE
+from psabench.whole_file import replace_file
 
 __all__ = ["Section", "console_table", "html_page", "within_limits", "write"]
 
@@ -52,16 +52,10 @@ def write(folder: Path, sections: Sequence[Section], facts: Mapping[str, str] | 
         "article": {name: printed for name, _, _, printed in ARTICLE},
         "sections": [result_dict(s) for s in sections],
     }
-    _replace(folder / "result.json", json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+    replace_file(folder / "result.json", json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
     page = folder / "report.html"
-    _replace(page, html_page(sections, facts))
+    replace_file(page, html_page(sections, facts))
     return page
-
-
-def _replace(path: Path, text: str) -> None:
-    draft = path.with_name(path.name + ".part")
-    draft.write_text(text, encoding="utf-8")
-    os.replace(draft, path)
 
 
 def html_page(sections: Sequence[Section], facts: Mapping[str, str]) -> str:
