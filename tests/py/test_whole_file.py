@@ -44,6 +44,6 @@ def test_what_fails_half_way_leaves_the_file_as_it_was(
         monkeypatch.setattr(Path, "write_text", full)
     else:
         monkeypatch.setattr(os, "replace", refused)
-    with pytest.raises(OSError, match="denied|No space"):
+    with pytest.raises(OSError, match=r"denied|No space"):
         replace_file(page, "new")
     assert page.read_text() == "old"
