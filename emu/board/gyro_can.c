@@ -189,12 +189,27 @@ static uint32_t read_latest(struct board_node *n, const struct co_entry *e, stru
     return CO_OK;
 }
 
+static uint32_t read_clock(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
+{
+    const struct gyro *b = gyro_of(n);
+    const double value[] = {0.0, b->profile.step_ns, b->number};
+    (void)t_ns;
+    v->number = value[e->sub];
+    return CO_OK;
+}
+
 static const struct board_object objects[] = {
-    {GYRO_OD_CONTROL, read_control, write_mode},    {GYRO_OD_SLEW, read_setting, write_setting},
-    {GYRO_OD_RUN, read_setting, write_setting},     {GYRO_OD_POSITIONS, read_setting, write_setting},
-    {GYRO_OD_LOOPS, read_setting, write_setting},   {GYRO_OD_PLACE, read_setting, write_setting},
-    {GYRO_OD_HEADING, read_setting, write_setting}, {GYRO_OD_DRIFT, read_setting, write_setting},
-    {GYRO_OD_LEVEL, read_setting, write_setting},   {GYRO_OD_LATEST, read_latest, NULL},
+    {GYRO_OD_CONTROL, read_control, write_mode},
+    {GYRO_OD_SLEW, read_setting, write_setting},
+    {GYRO_OD_RUN, read_setting, write_setting},
+    {GYRO_OD_POSITIONS, read_setting, write_setting},
+    {GYRO_OD_LOOPS, read_setting, write_setting},
+    {GYRO_OD_PLACE, read_setting, write_setting},
+    {GYRO_OD_HEADING, read_setting, write_setting},
+    {GYRO_OD_DRIFT, read_setting, write_setting},
+    {GYRO_OD_LEVEL, read_setting, write_setting},
+    {GYRO_OD_CLOCK, read_clock, NULL},
+    {GYRO_OD_LATEST, read_latest, NULL},
 };
 
 static uint32_t serial(const void *board)

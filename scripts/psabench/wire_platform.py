@@ -66,6 +66,7 @@ class WirePlatform:
         self._scale = _LevelScale(
             **{n: self.gyro.get(n) for n in ("zero_x_v", "zero_y_v", "scale_x_v_per_g", "scale_y_v_per_g")}
         )
+        self.step_s = self.gyro.step_s  # of the controller, and of the readings
         self._m1_per_s = self._latitude_rad = 0.0
         self._set_rad = 0.0
         self._navigates = False  # it was told to, and nothing else since

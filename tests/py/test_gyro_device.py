@@ -53,6 +53,12 @@ def test_state_is_read_as_what_it_means() -> None:
     assert gyro.level_node == 5
 
 
+def test_the_clock_of_the_unit() -> None:
+    gyro, _ = at_node(Gyro, 9, {(0x210A, 1): 5_000_000, (0x210A, 2): 2**31 - 1})
+    assert gyro.step_s == pytest.approx(5e-3, rel=1e-12)
+    assert gyro.steps == 2**31 - 1
+
+
 class Refusing:
     """Takes the place of a node's write: refuses with an abort code."""
 

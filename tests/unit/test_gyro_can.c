@@ -198,6 +198,23 @@ static void what_cannot_be_written_is_refused_in_words(void **state)
     assert_int_equal(write_raw(GYRO_OD_CONTROL, 1, GYRO_OFF, 1), 0);
 }
 
+static void the_clock_tells_the_period_and_all_steps_since_reset(void **state)
+{
+    (void)state;
+    assert_int_equal(read_raw(GYRO_OD_CLOCK, 1), STEP_NS);
+    r.b.profile.step_ns = 5000000; /* of another profile */
+    assert_int_equal(read_raw(GYRO_OD_CLOCK, 1), 5000000);
+    r.b.profile.step_ns = STEP_NS;
+    rig_run(&r, 700.0); /* beyond 16 bits */
+    const uint32_t steps = read_raw(GYRO_OD_CLOCK, 2);
+    assert_in_range(steps, 70000, 70100);
+    assert_int_equal(steps & 0xFFFF, read_raw(GYRO_OD_LATEST, 4));
+    assert_int_equal(write_raw(GYRO_OD_CLOCK, 1, 1, 4), CO_AB_READ_ONLY);
+    send(0, 2, (const uint8_t[]){129, NODE}); /* reset node */
+    rig_run(&r, 1.0);
+    assert_in_range(read_raw(GYRO_OD_CLOCK, 2), 70, 100);
+}
+
 /* ---- readings */
 
 static void a_reading_is_three_pdos_of_one_step(void **state)
@@ -290,6 +307,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(settings_begin_as_the_dictionary_says_and_come_back_as_written, up),
         cmocka_unit_test_setup(what_cannot_be_written_is_refused_in_words, up),
+        cmocka_unit_test_setup(the_clock_tells_the_period_and_all_steps_since_reset, up),
         cmocka_unit_test_setup(a_reading_is_three_pdos_of_one_step, up),
         cmocka_unit_test_setup(a_silent_level_unit_is_an_emergency_once, up),
         cmocka_unit_test_setup(frames_of_another_node_are_not_the_level_unit_s, up),

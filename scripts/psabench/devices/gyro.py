@@ -51,6 +51,7 @@ class Flag(IntFlag):
 
 MODE, PHASE, POSITION, FLAGS = (0x2100, 1), (0x2100, 2), (0x2100, 3), (0x2100, 4)
 POSITIONS, POSITIONS_MAX, RUN_MAX = 0x2103, 32, 127
+STEP_NS, STEPS = (0x210A, 1), (0x210A, 2)
 LATEST_ENCODER, ENCODER_DEG = (0x2200, 3), 180.0 / 2**31
 
 # Settings by the names that this package gives them: object and sub-index.
@@ -151,6 +152,16 @@ class Gyro(BusUnit):
     def heading_deg(self) -> float:
         """As the unit itself has it in mode 6, of a level vehicle, 0 to 360."""
         return float(self.node.read(*HEADING))
+
+    @property
+    def step_s(self) -> float:
+        """Period of the controller's steps, and of the readings."""
+        return int(self.node.read(*STEP_NS)) * 1e-9
+
+    @property
+    def steps(self) -> int:
+        """Steps of the controller since its last reset."""
+        return int(self.node.read(*STEPS))
 
     @property
     def level_node(self) -> int:
