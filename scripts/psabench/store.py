@@ -1,9 +1,10 @@
 """The store of results: one SQLite file that says of each number what it was computed from (docs/store.md).
 
-A series is a table of float32 numbers, a row a run, that its origin determines: kind, input, seed and version. Run k of
-an origin is the same whoever computes it, so a series is filled in parts, in any order, and grows when more runs are
-wanted. What is written is written whole: a part lies in the file with its checksum or not at all, whatever ends us.
-One thread of one process uses a `Store`; several processes may share the file.
+A series is a table of float32 numbers, a row a run, that its origin determines: kind, input, seed, version and build.
+Run k of an origin is the same whoever computes it, so a series is filled in parts, in any order, and grows when more
+runs are wanted. Another build has series of its own, beside these and never mixed with them. What is written is written
+whole: a part lies in the file with its checksum or not at all, whatever ends us. One thread of one process uses a
+`Store`; several processes may share the file.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ import numpy.typing as npt
 
 from psabench.errors import BadInput
 
-FORMAT = 1  # of the tables below, the file's user_version
+FORMAT = 2  # of the tables below, the file's user_version; 1 had no build in the key
 APPLICATION = 0x70736162  # "psab", the file's application_id: `file` and we know what it is
 PATIENCE_S = 60.0  # for another process that writes
 CELL = np.dtype("<f4")
@@ -33,13 +34,13 @@ Rows = npt.NDArray[np.float32]
 SCHEMA = """
 CREATE TABLE series (
     id      INTEGER PRIMARY KEY,
-    key     TEXT NOT NULL UNIQUE, -- SHA-256 of kind, input, seed, version and columns
+    key     TEXT NOT NULL UNIQUE, -- SHA-256 of kind, input, seed, version, build and columns
     kind    TEXT NOT NULL,
     input   TEXT NOT NULL,        -- JSON, keys sorted
     seed    INTEGER NOT NULL,
     version TEXT NOT NULL,
     columns TEXT NOT NULL,        -- JSON, names with their units
-    build   TEXT NOT NULL         -- what computed it: not part of the key, since every build should give the same
+    build   TEXT NOT NULL         -- digest of the code that computed it
 ) STRICT;
 CREATE TABLE part (
     series    INTEGER NOT NULL REFERENCES series (id) ON DELETE CASCADE,
@@ -50,6 +51,8 @@ CREATE TABLE part (
     PRIMARY KEY (series, first_run)
 ) STRICT;
 """
+
+_OTHERS = "WHERE kind = ? AND input = ? AND seed = ? AND columns = ? AND key <> ?"
 
 
 def canonical(value: Any) -> str:
@@ -65,12 +68,13 @@ class Origin:
     input: Mapping[str, Any]  # of JSON's types
     seed: int
     version: str
+    build: str
     columns: tuple[str, ...]
 
     @cached_property
     def key(self) -> str:
         """SHA-256, 64 hexadecimal digits."""
-        whole = canonical([self.kind, self.input, self.seed, self.version, self.columns])
+        whole = canonical([self.kind, self.input, self.seed, self.version, self.build, self.columns])
         return hashlib.sha256(whole.encode()).hexdigest()
 
 
@@ -81,6 +85,11 @@ class Part:
     origin: Origin
     first_run: int
     rows: Rows  # (runs, columns)
+
+
+def _other(o: Origin) -> tuple[Any, ...]:
+    """What _OTHERS asks for."""
+    return o.kind, canonical(o.input), o.seed, canonical(o.columns), o.key
 
 
 class Store:
@@ -122,7 +131,10 @@ class Store:
                 self._do(f"PRAGMA user_version = {FORMAT}")
             elif application != APPLICATION:
                 raise BadInput(f"{self.path}: an SQLite file of another program, not a store of results")
-            elif (found := int(self._one("PRAGMA user_version"))) != FORMAT:
+            elif (found := int(self._one("PRAGMA user_version"))) == 1:
+                # The same tables, but a series may hold runs of several builds: kept under its old key, for nobody.
+                self._do(f"PRAGMA user_version = {FORMAT}")
+            elif found != FORMAT:
                 raise BadInput(f"{self.path}: a store of format {found}; this psabench reads format {FORMAT}")
         self._do("PRAGMA foreign_keys = ON")
 
@@ -135,10 +147,12 @@ class Store:
         )
         return {int(first): int(runs) for first, runs in found}
 
-    def build(self, origin: Origin) -> str | None:
-        """What computed the series, None when nothing has."""
-        found = self._do("SELECT build FROM series WHERE key = ?", origin.key).fetchone()
-        return None if found is None else str(found[0])
+    def others(self, origin: Origin) -> dict[str, int]:
+        """Runs of the same kind, input and seed by another build or version: their number by build."""
+        found = self._do(
+            f"SELECT build, sum(runs) FROM series JOIN part ON series = id {_OTHERS} GROUP BY build", *_other(origin)
+        )
+        return {str(build): int(runs) for build, runs in found}
 
     def rows(self, origin: Origin, runs: int) -> Rows:
         """The first `runs` rows. Raises BadInput where some are missing or damaged."""
@@ -162,21 +176,28 @@ class Store:
 
     def origins(self) -> list[Origin]:
         """Of all series, in the order in which they were begun."""
-        found = self._do("SELECT kind, input, seed, version, columns FROM series ORDER BY id")
+        found = self._do("SELECT kind, input, seed, version, build, columns FROM series ORDER BY id")
         return [
-            Origin(kind=kind, input=json.loads(text), seed=seed, version=version, columns=tuple(json.loads(columns)))
-            for kind, text, seed, version, columns in found
+            Origin(
+                kind=kind,
+                input=json.loads(text),
+                seed=seed,
+                version=version,
+                build=build,
+                columns=tuple(json.loads(columns)),
+            )
+            for kind, text, seed, version, build, columns in found
         ]
 
     # ---- changes, each whole or not at all
 
-    def put(self, parts: Iterable[Part], build: str = "") -> None:
+    def put(self, parts: Iterable[Part]) -> None:
         """Add parts, all or none; one that is there already, from the same first run, is replaced."""
         with self._transaction():
             for part in parts:
-                self._put(part, build)
+                self._put(part)
 
-    def _put(self, part: Part, build: str) -> None:
+    def _put(self, part: Part) -> None:
         o = part.origin
         if part.rows.ndim != 2 or part.rows.shape[1] != len(o.columns):
             raise ValueError(f"{o.kind}: rows of shape {part.rows.shape} for {len(o.columns)} columns")
@@ -184,7 +205,7 @@ class Store:
         self._do(
             "INSERT INTO series (key, kind, input, seed, version, columns, build) VALUES (?, ?, ?, ?, ?, ?, ?)"
             " ON CONFLICT (key) DO NOTHING",
-            *(o.key, o.kind, canonical(o.input), o.seed, o.version, canonical(o.columns), build),
+            *(o.key, o.kind, canonical(o.input), o.seed, o.version, canonical(o.columns), o.build),
         )
         self._do(
             "INSERT OR REPLACE INTO part (series, first_run, runs, sha256, data)"
@@ -196,6 +217,11 @@ class Store:
         """Remove a series with all its parts, if there is one."""
         with self._transaction():
             self._do("DELETE FROM series WHERE key = ?", origin.key)
+
+    def forget_others(self, origin: Origin) -> None:
+        """Remove what `others` counts."""
+        with self._transaction():
+            self._do(f"DELETE FROM series {_OTHERS}", *_other(origin))
 
     # ---- SQLite
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import re
@@ -20,7 +21,7 @@ from typing import Any
 import numpy as np
 import pytest
 from psabench import cli
-from psabench.campaign import chains, claims, command, emulated, page, report, runner, workers
+from psabench.campaign import builds, chains, claims, command, emulated, page, report, runner, workers
 from psabench.campaign.cases import STUDIES, Case
 from psabench.campaign.chains import CHAINS, Wanted
 from psabench.campaign.claims import Figures, HoldFigures
@@ -29,6 +30,7 @@ from psabench.campaign.runner import Plan
 from psabench.campaign.setup import Hold, Setup, changed
 from psabench.campaign.workers import Dask, ThisProcess, spread
 from psabench.errors import BadInput, BenchError, LinkError
+from psabench.navlib import NAME, library
 from psabench.progress import Bar
 from psabench.store import CELL, Rows, Store
 
@@ -199,9 +201,16 @@ def test_a_cluster_that_is_not_there_is_told_in_one_line(tmp_path: Path, monkeyp
 def test_a_cluster_with_another_psabench_is_refused(
     cluster: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    mine = chains.versions()
+    mine = workers.own_build("closed")
     monkeypatch.setattr(chains, "versions", lambda: "psabench 8")  # here, and not in the workers
-    with pytest.raises(BadInput, match=rf"its workers have {re.escape(mine)}; this is psabench 8"):
+    with pytest.raises(BadInput, match=rf"its workers have {re.escape(mine)}. This is psabench 8, build "):
+        command.campaign(Options(case="R0", dask=cluster, out=tmp_path), QUIET)
+
+
+def test_a_cluster_with_another_build_is_refused(cluster: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    mine = builds.algebra()
+    another_build(monkeypatch)
+    with pytest.raises(BadInput, match=rf"build {mine[:12]}. This is .*, build 0123456789ab$"):
         command.campaign(Options(case="R0", dask=cluster, out=tmp_path), QUIET)
 
 
@@ -417,18 +426,74 @@ def test_the_command_prints_computes_once_and_is_quiet_the_second_time(
     assert "12/12" in third.err
 
 
-def test_results_of_another_build_are_told(
+def another_build(monkeypatch: pytest.MonkeyPatch, build: str = "0123456789abcdef") -> None:
+    """As if the library had been built anew."""
+    monkeypatch.setattr(chains, "CHAINS", {n: replace(c, build=lambda: build) for n, c in CHAINS.items()})
+
+
+def test_results_of_another_build_are_told_kept_and_never_mixed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    o = Options(case="R0", runs=100, out=tmp_path)
-    command.campaign(o, QUIET)
+    few, more = (Options(case="R0", chain="samples", runs=n, workers=1, out=tmp_path) for n in (8192, 9000))
+    mine = builds.algebra()[:12]
+    command.campaign(few, QUIET)
     assert capsys.readouterr().err == ""
-    monkeypatch.setattr(command, "built", lambda: "0123456789abcdef")
-    command.campaign(o, QUIET)
-    assert "of another build of libpsabench-nav; --fresh" in capsys.readouterr().err
-    command.campaign(replace(o, fresh=True), QUIET)
-    command.campaign(o, QUIET)
+    another_build(monkeypatch)
+    command.campaign(more, QUIET)
+    err = capsys.readouterr().err
+    told = f"psabench: {tmp_path}/store.sqlite: runs of other builds than 0123456789ab"
+    assert f"{told} (8192 by {mine}) are kept, not used; --forget-others removes them\n" in err
+    p = Plan(cases=TWO[:1], chain="samples", runs=9000, seed=1)
+    with Store(tmp_path / "store.sqlite") as store:
+        assert store.runs(p.origin(TWO[0])) == {0: 8192, 8192: 808}  # all of them, not the rest alone
+        assert store.others(p.origin(TWO[0])) == {builds.algebra(): 8192}
+    command.campaign(replace(more, forget_others=True), QUIET)
+    assert f"{told} (8192 by {mine}) are removed\n" in capsys.readouterr().err
+    command.campaign(more, QUIET)
     assert capsys.readouterr().err == ""
+    monkeypatch.undo()  # the first build is back: it finds nothing of its own
+    command.campaign(few, QUIET)
+    assert "(9000 by 0123456789ab) are kept" in capsys.readouterr().err
+
+
+class Elsewhere:
+    """A worker whose library was built anew after the campaign had started."""
+
+    count = 1
+
+    def map(self, compute: Callable[[Any], Any], tasks: Iterable[Any]) -> Iterator[Any]:
+        for task in tasks:
+            yield [replace(p, origin=replace(p.origin, build="0123456789abcdef")) for p in compute(task)]
+
+
+def test_a_worker_whose_build_changed_on_the_way_ends_it(tmp_path: Path) -> None:
+    with Store(tmp_path / "s") as store:
+        with pytest.raises(BenchError, match="a worker computes with another build than this"):
+            computed(plan(runs=10), store, Elsewhere())
+        assert store.origins() == []
+
+
+def test_a_build_is_what_its_files_hold(tmp_path: Path) -> None:
+    a, b = tmp_path / "a", tmp_path / "b"
+    a.write_bytes(b"one")
+    b.write_bytes(b"two")
+    first = builds.digest([a, b])
+    assert builds.digest([b, a]) != first
+    assert builds.digest([a]) != first
+    assert builds.algebra() == hashlib.sha256(Path(library().path).read_bytes()).hexdigest()
+    assert builds.wire() not in ("", builds.algebra())
+    a.rename(tmp_path / "c")
+    assert builds.digest([tmp_path / "c", b]) == first
+    b.write_bytes(b"twO")
+    assert builds.digest([tmp_path / "c", b]) != first
+
+
+def test_a_library_that_the_loader_found_is_found_again(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Its path is a bare name then; the kernel knows the file."""
+    file = Path(library().path).resolve()
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(library(), "path", NAME)
+    assert builds._loaded().resolve() == file
 
 
 def test_the_list_names_all(capsys: pytest.CaptureFixture[str]) -> None:

@@ -19,7 +19,12 @@ from psabench.errors import BadInput
 from psabench.store import FORMAT, Origin, Part, Rows, Store
 
 ORIGIN = Origin(
-    kind="dice", input={"sides": 6, "names": ["a", "é"]}, seed=7, version="1", columns=("sum_deg", "error_deg")
+    kind="dice",
+    input={"sides": 6, "names": ["a", "é"]},
+    seed=7,
+    version="1",
+    build="b1",
+    columns=("sum_deg", "error_deg"),
 )
 
 
@@ -35,14 +40,13 @@ def part(first: int, count: int, origin: Origin = ORIGIN) -> Part:
 
 def test_rows_come_back_whatever_the_order_of_the_parts(tmp_path: Path) -> None:
     with Store(tmp_path / "new" / "s.sqlite") as store:
-        store.put([part(100, 50)], build="b1")
-        store.put([part(0, 100), part(150, 7)], build="b2")
+        store.put([part(100, 50)])
+        store.put([part(0, 100), part(150, 7)])
     with Store(tmp_path / "new" / "s.sqlite") as store:
         assert store.runs(ORIGIN) == {0: 100, 100: 50, 150: 7}
         assert np.array_equal(store.rows(ORIGIN, 157), rows(0, 157))
         assert np.array_equal(store.rows(ORIGIN, 120), rows(0, 120))
         assert store.rows(ORIGIN, 0).shape == (0, 2)
-        assert store.build(ORIGIN) == "b1"  # the one that began it
         assert store.origins() == [ORIGIN]
 
 
@@ -52,13 +56,48 @@ def test_each_part_of_an_origin_is_part_of_its_key(tmp_path: Path) -> None:
         replace(ORIGIN, input={"sides": 8}),
         replace(ORIGIN, seed=8),
         replace(ORIGIN, version="2"),
+        replace(ORIGIN, build="b2"),
         replace(ORIGIN, columns=("sum_deg", "error_rad")),
     ]
-    assert len({ORIGIN.key, *(o.key for o in others)}) == 6
+    assert len({ORIGIN.key, *(o.key for o in others)}) == 7
     assert replace(ORIGIN, input={"names": ["a", "é"], "sides": 6}).key == ORIGIN.key  # the order of keys means nothing
     with Store(tmp_path / "s") as store:
         store.put([part(0, 3)])
-        assert all(store.runs(o) == {} and store.build(o) is None for o in others)
+        assert all(store.runs(o) == {} for o in others)
+
+
+def test_builds_have_series_of_their_own(tmp_path: Path) -> None:
+    """A part of each: never rows of both in one series, whichever asks for more."""
+    b2, b3, other = replace(ORIGIN, build="b2"), replace(ORIGIN, build="b3", version="2"), replace(ORIGIN, seed=8)
+    with Store(tmp_path / "s") as store:
+        store.put([part(0, 4), replace(part(0, 2, b2), rows=rows(0, 2) + 1), part(0, 3, b3), part(0, 9, other)])
+        store.put([replace(part(2, 4, b2), rows=rows(2, 4) + 1)])
+        assert store.runs(ORIGIN) == {0: 4}
+        assert np.array_equal(store.rows(ORIGIN, 4), rows(0, 4))
+        assert np.array_equal(store.rows(b2, 6), rows(0, 6) + 1)
+        assert store.others(ORIGIN) == {"b2": 6, "b3": 3}
+        assert store.others(b2) == {"b1": 4, "b3": 3}
+        assert store.others(other) == {}
+        store.forget_others(ORIGIN)
+        assert store.origins() == [ORIGIN, other]
+        assert store.others(ORIGIN) == {}
+
+
+def test_a_store_of_format_1_is_kept_and_not_used(tmp_path: Path) -> None:
+    """Its key had no build, so that a series could hold runs of several."""
+    path = tmp_path / "s"
+    with Store(path) as store:
+        store.put([part(0, 5)])
+    with sqlite3.connect(path) as db:
+        db.execute("UPDATE series SET key = 'as format 1 made it', build = '0123456789abcdef'")
+        db.execute("PRAGMA user_version = 1")
+    with Store(path) as store:
+        assert store.runs(ORIGIN) == {}
+        assert store.others(ORIGIN) == {"0123456789abcdef": 5}
+        store.put([part(0, 2)])
+        assert np.array_equal(store.rows(ORIGIN, 2), rows(0, 2))
+    with sqlite3.connect(path) as db:
+        assert db.execute("PRAGMA user_version").fetchone() == (FORMAT,)
 
 
 def test_a_part_grows_and_a_series_can_be_forgotten(tmp_path: Path) -> None:

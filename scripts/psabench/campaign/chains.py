@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from psabench import nav, nav_mc
+from psabench.campaign import builds
 from psabench.campaign.setup import Hold, Setup, as_input
 from psabench.errors import BadInput
 from psabench.navlib import library
@@ -40,6 +41,7 @@ class Chain:
     compute: Callable[[Setup, int, int, int], Rows]  # set-up, seed, first run, runs
     holds: bool  # whether it computes the hold
     version: Callable[[], str]
+    build: Callable[[], str]  # of what computes here: digest of its files
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,6 +67,7 @@ def origin(chain: str, setup: Setup, hold: Hold | None, seed: int) -> Origin:
         input=as_input(setup, hold),
         seed=seed,
         version=CHAINS[chain].version(),
+        build=CHAINS[chain].build(),
         columns=ERRORS if hold is None else HELD,
     )
 
@@ -209,6 +212,7 @@ CHAINS: Mapping[str, Chain] = {
             compute=_closed,
             holds=True,
             version=nav_version,
+            build=builds.algebra,
         ),
         Chain(
             name="samples",
@@ -218,6 +222,7 @@ CHAINS: Mapping[str, Chain] = {
             compute=_samples,
             holds=True,
             version=nav_version,
+            build=builds.algebra,
         ),
         Chain(
             name="emulated",
@@ -227,6 +232,7 @@ CHAINS: Mapping[str, Chain] = {
             compute=_emulated,
             holds=False,
             version=versions,
+            build=builds.wire,
         ),
     )
 }

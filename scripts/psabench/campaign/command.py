@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import argparse
-import hashlib
 import sys
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from psabench.campaign import runner
+from psabench.campaign import builds, chains, runner
 from psabench.campaign.cases import DEFAULT_STUDIES, STUDIES, WIRE_STUDIES, Case
 from psabench.campaign.runner import Plan
 from psabench.campaign.setup import ANY, CHOICES, Setup, as_input, changed
 from psabench.campaign.workers import workers
 from psabench.errors import BadInput
-from psabench.navlib import library
 from psabench.procedures.head_bench import Progress
 from psabench.progress import Bar
 from psabench.store import Store
@@ -58,6 +57,7 @@ class Options:
     store: Path | None = None
     out: Path = Path("build/campaign")
     fresh: bool = False
+    forget_others: bool = False
 
 
 def add(commands: Any, formatter: Any, natural: Callable[[str], int]) -> None:
@@ -87,6 +87,7 @@ def add(commands: Any, formatter: Any, natural: Callable[[str], int]) -> None:
     p.add_argument("--store", type=Path, help="file of results (OUT/store.sqlite)")
     p.add_argument("--out", type=Path, default=Path("build/campaign"), help="folder of the report (%(default)s)")
     p.add_argument("--fresh", action="store_true", help="compute anew what the store has")
+    p.add_argument("--forget-others", action="store_true", help="remove what other builds have computed of these cases")
 
 
 def _main(args: argparse.Namespace) -> int:
@@ -107,6 +108,7 @@ def _main(args: argparse.Namespace) -> int:
         store=args.store,
         out=args.out,
         fresh=args.fresh,
+        forget_others=args.forget_others,
     )
     found = campaign(options, Bar())
     print("\n".join(page.console(found)))
@@ -200,22 +202,27 @@ def _fill(plan: Plan, store: Store, options: Options, progress: Progress) -> Non
     if options.fresh:
         for case in plan.cases:
             store.forget(plan.origin(case))
-    build = built()
-    if any(store.build(plan.origin(case)) not in (None, build) for case in plan.cases):
-        print(
-            "psabench: results in the store are of another build of libpsabench-nav; --fresh computes them anew",
-            file=sys.stderr,
-        )
+    _others(plan, store, options.forget_others)
     wanted = runner.missing(plan, store)
     if not wanted:
         return
     count = options.workers
     if count is None and options.dask is None and runner.duration_s(wanted) < runner.ALONE_S:
         count = 1  # done before a cluster would have started
-    with workers(count, options.dask) as at_work:
-        runner.run(wanted, store, at_work, progress, build)
+    with workers(count, options.dask, plan.chain) as at_work:
+        runner.run(wanted, store, at_work, progress)
 
 
-def built() -> str:
-    """Of the library that computes: the first 16 digits of its SHA-256."""
-    return hashlib.sha256(Path(library().path).read_bytes()).hexdigest()[:16]
+def _others(plan: Plan, store: Store, forget: bool) -> None:
+    """Tell, on stderr, what other builds have computed of these cases, and remove it if that is wanted."""
+    origins = {o.key: o for o in map(plan.origin, plan.cases)}.values()
+    found = Counter[str]()
+    for o in origins:
+        found.update(store.others(o))
+        if forget:
+            store.forget_others(o)
+    if found:
+        told = ", ".join(f"{runs} by {builds.short(build)}" for build, runs in sorted(found.items()))
+        what = "removed" if forget else "kept, not used; --forget-others removes them"
+        mine = builds.short(chains.CHAINS[plan.chain].build())
+        print(f"psabench: {store.path}: runs of other builds than {mine} ({told}) are {what}", file=sys.stderr)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from psabench.campaign import chains, page, plots
+from psabench.campaign import builds, chains, page, plots
 from psabench.campaign.cases import STUDIES
 from psabench.campaign.chains import CHAINS
 from psabench.campaign.claims import Figures, HoldFigures, checks, claims
@@ -55,4 +55,5 @@ def _agreements(plans: Sequence[Plan], store: Store) -> list[page.Agreement]:
 
 def _facts(plan: Plan) -> dict[str, str]:
     chain = CHAINS[plan.chain]
-    return {"chain": chain.title, "runs": f"{plan.runs} a case", "seed": str(plan.seed), "code": chains.versions()}
+    code = f"{chains.versions()}, build {builds.short(chain.build())}"
+    return {"chain": chain.title, "runs": f"{plan.runs} a case", "seed": str(plan.seed), "code": code}

@@ -13,8 +13,9 @@ from psabench.campaign import chains
 from psabench.campaign.cases import Case
 from psabench.campaign.chains import CHAINS, Wanted
 from psabench.campaign.workers import Workers, spread
+from psabench.errors import BenchError
 from psabench.procedures.head_bench import Progress
-from psabench.store import Origin, Rows, Store
+from psabench.store import Origin, Part, Rows, Store
 
 TASK_S = 0.4  # of one core: long beside the 2 ms that a Dask task costs, short beside a person's patience
 ALONE_S = 4.0  # of one core: starting a cluster takes about as long
@@ -79,12 +80,19 @@ def tasks(wanted: Sequence[Wanted]) -> Iterator[Sequence[Wanted]]:
         yield wanted[piece]
 
 
-def run(wanted: Sequence[Wanted], store: Store, workers: Workers, progress: Progress, build: str = "") -> None:
+def run(wanted: Sequence[Wanted], store: Store, workers: Workers, progress: Progress) -> None:
     """Compute and store; what is stored stays, whatever ends it."""
     if not wanted:
         return
     with progress.step(f"{CHAINS[wanted[0].chain].title}, {workers.count} at once", len(wanted)) as done:
         for parts in workers.map(chains.compute, tasks(wanted)):
-            store.put(parts, build)
+            _of_this_build(parts, wanted[0])
+            store.put(parts)
             for _ in parts:
                 done()
+
+
+def _of_this_build(parts: Sequence[Part], wanted: Wanted) -> None:
+    """A part's origin is what its worker says: where the code changed under a campaign, nobody would find it again."""
+    if any(p.origin.build != wanted.origin.build for p in parts):
+        raise BenchError("a worker computes with another build than this: it changed on the way; start again")

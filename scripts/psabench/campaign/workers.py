@@ -79,14 +79,17 @@ def cores() -> int:
     return len(os.sched_getaffinity(0))
 
 
-def workers(count: int | None = None, address: str | None = None) -> AbstractContextManager[Workers]:
+def workers(
+    count: int | None = None, address: str | None = None, chain: str = "closed"
+) -> AbstractContextManager[Workers]:
     """Workers for as long as the context lasts: those of the Dask scheduler at `address`, such as
-    tcp://192.0.2.7:8786, else `count` processes of this machine, one a core without it; 1: this process.
+    tcp://192.0.2.7:8786, else `count` processes of this machine, one a core without it; 1: this process. `chain` is
+    what they are to compute.
 
-    Raises LinkError when nothing answers at the address, BadInput when what answers has another psabench.
+    Raises LinkError when nothing answers at the address, BadInput when what answers has another build.
     """
     if address is not None:
-        return _cluster_at(address)
+        return _cluster_at(address, chain)
     count = cores() if count is None else count
     return _here() if count == 1 else _local_cluster(count)
 
@@ -123,7 +126,7 @@ def _no_interrupt_for_children() -> Iterator[None]:
 
 
 @contextmanager
-def _cluster_at(address: str) -> Iterator[Workers]:
+def _cluster_at(address: str, chain: str) -> Iterator[Workers]:
     distributed = _distributed()
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     try:
@@ -132,7 +135,7 @@ def _cluster_at(address: str) -> Iterator[Workers]:
     except (OSError, ValueError) as e:
         raise LinkError(f"--dask {address}: no Dask scheduler answers there ({e or type(e).__name__})") from e
     with client:
-        _same_psabench(client, address)
+        _same_psabench(client, address, chain)
         yield Dask(client)
 
 
@@ -143,24 +146,26 @@ async def _answer(distributed: Any, address: str) -> None:
     await comm.close()
 
 
-def own_build() -> str:
+def own_build(chain: str) -> str:
     """What a worker and we must have in common to compute the same."""
-    from psabench.campaign.chains import versions
+    from psabench.campaign import builds
+    from psabench.campaign.chains import CHAINS, versions
 
-    return versions()
+    return f"{versions()}, build {builds.short(CHAINS[chain].build())}"
 
 
-def _same_psabench(client: Any, address: str) -> None:
+def _same_psabench(client: Any, address: str, chain: str) -> None:
     try:
         client.wait_for_workers(1, timeout=CONNECT_S)
-        found: dict[str, str] = client.run(own_build)
+        found: dict[str, str] = client.run(own_build, chain)
     except TimeoutError as e:
         raise LinkError(f"--dask {address}: the scheduler has no workers") from e
     except Exception as e:
         raise BadInput(f"--dask {address}: a worker cannot compute: {type(e).__name__}: {e}") from e
-    others = sorted({version for version in found.values() if version != own_build()})
+    mine = own_build(chain)
+    others = sorted({theirs for theirs in found.values() if theirs != mine})
     if others:
-        raise BadInput(f"--dask {address}: its workers have {', '.join(others)}; this is {own_build()}")
+        raise BadInput(f"--dask {address}: its workers have {'; '.join(others)}. This is {mine}")
 
 
 def spread(weights_s: Sequence[float], task_s: float) -> list[slice]:
