@@ -9,6 +9,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from psabench.angles import wrapped_deg
 from psabench.estimate.uncertainty import Estimate
 from psabench.grading import LIMIT_CI, with_ci
 from psabench.nav import DEGPH
@@ -59,11 +60,6 @@ class GradedEstimate:
     @property
     def within(self) -> bool | None:
         return None if self.error is None else abs(self.error) <= self.limit
-
-
-def wrapped_deg(angle_deg: float) -> float:
-    """Into (-180, 180]."""
-    return 180.0 - (180.0 - angle_deg) % 360.0
 
 
 def grade(s: GyroSection) -> tuple[GradedEstimate, ...]:

@@ -1,0 +1,147 @@
+"""Heading and drifts from the windows that count: the attitude, the turns of alpha, the equations, the azimuth axis."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from psabench import nav
+from psabench.nav import ARCMIN, DEGPH, EARTH_RADPS
+from psabench.procedures.gyrocompass_params import METHODS, GyrocompassParams, noise_of
+from psabench.procedures.gyrocompass_windows import s_of, s_sd, trusted
+from psabench.procedures.platform_bench import Floats, Window
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Row:
+    """A position as it enters the equations."""
+
+    number: int
+    q_rad: float  # the angle that was trusted
+    position: nav.Position
+    residual_radps: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Fit:
+    """What the windows that count say together."""
+
+    params: GyrocompassParams
+    windows: tuple[Window, ...]  # those that count
+    rows: tuple[Row, ...]  # one of each
+    noise: nav.Noise
+    attitude: nav.Attitude
+    compass: nav.Compass
+    heading_rad: float
+
+
+def fit(windows: Sequence[Window], p: GyrocompassParams) -> Fit:
+    """Raises nav.Refused where these windows do not tell a heading."""
+    q = np.array([trusted(w, p) for w in windows])
+    attitude = _attitude(q, windows)
+    delta = _increments(q, windows, attitude, p)
+    positions, noise = _positions(windows, delta, attitude, p), noise_of(p, s_sd(windows, p.slope))
+    compass = nav.gyrocompass(
+        positions, latitude_rad=p.latitude_rad, method=METHODS[p.method], simplified=p.simplified, noise=noise
+    )
+    psi = nav.heading(
+        compass.alpha1_rad,
+        float(q[0]),
+        beta_rad=positions[0].beta_rad if p.cardan else 0.0,
+        pitch_rad=attitude.pitch_rad if p.cardan else 0.0,
+        roll_rad=attitude.roll_rad if p.cardan else 0.0,
+    )
+    rows = tuple(
+        Row(number=w.number, q_rad=float(a), position=r, residual_radps=_residual(r, compass, p))
+        for w, a, r in zip(windows, q, positions, strict=True)
+    )
+    return Fit(
+        params=p,
+        windows=tuple(windows),
+        rows=rows,
+        noise=noise,
+        attitude=attitude,
+        compass=compass,
+        heading_rad=psi,
+    )
+
+
+def _attitude(q_rad: Floats, windows: Sequence[Window]) -> nav.Attitude:
+    """Of the vehicle, with the constant error of gamma where the positions tell it."""
+    beta = np.array([w.beta_rad.mean() for w in windows])
+    gamma = np.array([w.gamma_rad.mean() for w in windows])
+    return nav.attitude_from_level(q_rad, gamma, beta, bias=True)
+
+
+def _increments(q: Floats, windows: Sequence[Window], attitude: nav.Attitude, p: GyrocompassParams) -> Floats:
+    if not p.cardan:
+        return np.asarray(q - q[0])
+    beta = np.array([w.beta_rad.mean() for w in windows])
+    return nav.cardan(q, pitch_rad=attitude.pitch_rad, roll_rad=attitude.roll_rad, beta_rad=beta)
+
+
+def _positions(
+    windows: Sequence[Window], delta: Floats, attitude: nav.Attitude, p: GyrocompassParams
+) -> list[nav.Position]:
+    bias = 0.0 if p.simplified else attitude.gamma_bias_rad
+    return [
+        nav.Position(
+            s_radps=s_of(w, slope=p.slope, frozen=p.freeze),
+            delta_rad=float(d),
+            beta_rad=float(w.beta_rad.mean()),
+            gamma_rad=float(w.gamma_rad.mean()) - bias,
+            t_mid_s=w.t_mid_s,
+            window_s=w.length_s,
+        )
+        for w, d in zip(windows, delta, strict=True)
+    ]
+
+
+def _residual(r: nav.Position, c: nav.Compass, p: GyrocompassParams) -> float:
+    """What a window's rate misses the model by, rad/s."""
+    we = EARTH_RADPS * math.cos(p.latitude_rad)
+    a = c.alpha1_rad + r.delta_rad
+    tilt = 0.0 if p.simplified else math.sin(r.gamma_rad) * math.sin(r.beta_rad)
+    return r.s_radps - we * (math.sin(a) * math.cos(r.gamma_rad) + math.cos(a) * tilt) - c.drift1_radps
+
+
+# ---- the azimuth axis
+
+
+def drift2_of(f: Fit, calibration: Sequence[Window]) -> tuple[float, float]:
+    """Drift of the azimuth axis from its torquer, rad/s, and its standard deviation against the mean drift.
+
+    Mean over all windows, those of the calibration as well, weighed by their lengths.
+    """
+    p = f.params
+    found, weight = [], []
+    deltas = [*(r.position.delta_rad for r in f.rows), *(_delta_at(w, f) for w in calibration)]
+    windows = [*f.windows, *calibration]
+    for w, delta in zip(windows, deltas, strict=True):
+        found.append(
+            nav.azimuth_drift(
+                float(w.u2_radps.mean()),
+                latitude_rad=p.latitude_rad,
+                alpha_rad=f.compass.alpha1_rad + delta,
+                beta_rad=float(w.beta_rad.mean()),
+                gamma_rad=float(w.gamma_rad.mean()) - f.attitude.gamma_bias_rad,
+            )
+        )
+        weight.append(w.length_s)
+    value = float(np.average(found, weights=weight))
+    level = nav.azimuth_drift_sd(
+        latitude_rad=p.latitude_rad,
+        alpha_rad=f.compass.alpha1_rad + math.pi / 4.0,
+        beta_sd_rad=p.level_sd_arcmin * ARCMIN,
+        gamma_sd_rad=p.level_sd_arcmin * ARCMIN,
+    )
+    return value, math.hypot(p.gm_sigma_degph * DEGPH, level / math.sqrt(len(found)))
+
+
+def _delta_at(w: Window, f: Fit) -> float:
+    """Increment of alpha of a window outside the run."""
+    q = np.array([f.rows[0].q_rad, trusted(w, f.params)])
+    return float(_increments(q, [w, w], f.attitude, f.params)[1])

@@ -1,0 +1,151 @@
+"""Parameters of the gyrocompass procedure, its two readings, and what is refused before anything moves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from psabench import nav
+from psabench.errors import BadInput
+from psabench.nav import ARCMIN, DEGPH, EARTH_RADPS, Method
+from psabench.procedures.platform_bench import STEP_S, Table
+from psabench.procedures.result import option
+
+NAME = "gyrocompass"
+
+METHODS: Mapping[str, Method] = {
+    "closed3": Method.CLOSED3,
+    "lsq": Method.LSQ,
+    "constrained": Method.CONSTRAINED,
+    "gls": Method.GLS,
+    "gls-constrained": Method.GLS_CONSTRAINED,
+}
+ANGLES = ("set", "encoder")
+SIGNALS = ("frames", "readings")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GyrocompassParams:
+    """Parameters of `gyrocompass`; the defaults are the article's reading, READINGS has the others."""
+
+    sequence: str = option("0,90,180", "deg", "gimbal angles in the order of measurement, 32 at most")
+    repeat: int = option(1, "", "times over")
+    window_s: float = option(10.0, "s", "measurement in each position")
+    settle_s: float = option(10.0, "s", "from the end of a turn to its window")
+    slew_dps: float = option(9.0, "deg/s", "rate of the turns")
+    m1_per_s: float = option(1.0, "1/s", "levelling loop")
+    m2_per_s: float = option(2.0, "1/s", "azimuth loop")
+    freeze: bool = option(False, "", "no azimuth servo in the windows")
+    latitude_deg: float = option(50.0, "deg", "as the operator gives it")
+    method: str = option("closed3", "", f"one of {', '.join(METHODS)}")
+    angles: str = option("set", "", "which angle is trusted: set or encoder")
+    cardan: bool = option(True, "", "correct the angles for the tilt of the outer axis")
+    simplified: bool = option(True, "", "eq. (14) instead of (13)")
+    slope: bool = option(False, "", "the levelling rate as a slope instead of a mean")
+    signals: str = option(
+        "frames", "", "level angles from the frames of the level unit, or from the readings of the gyro unit"
+    )
+    calibrate_s: float = option(60.0, "s", "window of the azimuth axis after the run; 0: none")
+    gm_sigma_degph: float = option(0.2, "deg/h", "random drift, from the passport")
+    gm_tau_s: float = option(1000.0, "s", "its correlation time")
+    angle_sd_arcmin: float = option(3.0, "arcmin", "error of an angle, new in each position")
+    level_sd_arcmin: float = option(1.0, "arcmin", "error of the level angles, new in each position")
+    level_zero_arcmin: float = option(10.0, "arcmin", "their constant error, for the drift's limits")
+    angle_zero_arcmin: float = option(
+        6.0, "arcmin", "of the angle sensor against the vehicle, for the heading's limits"
+    )
+    torquer_scale: float = option(1e-3, "", "error of the torquers, for the drift's limits")
+
+    def __post_init__(self) -> None:
+        for name, known in (("method", tuple(METHODS)), ("angles", ANGLES), ("signals", SIGNALS)):
+            if getattr(self, name) not in known:
+                raise ValueError(f"{name} is {getattr(self, name)!r}; it must be one of {', '.join(known)}")
+        for f in fields(self):
+            value = getattr(self, f.name)
+            if isinstance(value, float) and f.name != "latitude_deg" and not 0.0 <= value < math.inf:
+                raise ValueError(f"{f.name} is {value}; it must not be negative")
+        if self.window_s < 10 * STEP_S or self.repeat < 1:
+            raise ValueError(f"window_s is {self.window_s}, repeat {self.repeat}; at least {10 * STEP_S:g} and 1")
+        rehearse(self)
+
+    @property
+    def angles_deg(self) -> tuple[float, ...]:
+        """`sequence` as numbers."""
+        try:
+            found = tuple(float(x) for x in self.sequence.split(","))
+        except ValueError:
+            raise ValueError(f"sequence is {self.sequence!r}; it must be angles in degrees, as 0,90,180") from None
+        if not all(abs(a) <= 360.0 for a in found):
+            raise ValueError(f"sequence is {self.sequence!r}; each must lie within +-360 deg")
+        return found
+
+    @property
+    def latitude_rad(self) -> float:
+        return math.radians(self.latitude_deg)
+
+    @property
+    def table(self) -> Table:
+        return Table(
+            angles_deg=self.angles_deg,
+            repeat=self.repeat,
+            window_s=self.window_s,
+            settle_s=self.settle_s,
+            slew_dps=self.slew_dps,
+            freeze=self.freeze,
+        )
+
+
+# The article's reading: set angles trusted, closed form, (14). Ours: fast reversals, encoder read, (13), weights.
+READINGS: Mapping[str, Mapping[str, Any]] = {
+    "article": {},
+    "improved": {
+        "sequence": "0,180,90,270",
+        "repeat": 6,
+        "window_s": 5.0,
+        "settle_s": 5.0,
+        "slew_dps": 18.0,
+        "m1_per_s": 2.0,
+        "method": "gls-constrained",
+        "angles": "encoder",
+        "simplified": False,
+        "angle_sd_arcmin": 0.5,
+    },
+}
+
+
+def params_of(reading: str, given: Mapping[str, Any] | None = None) -> GyrocompassParams:
+    """The parameters of a reading, with those given in their place. Raises BadInput."""
+    if reading not in READINGS:
+        raise BadInput(f"reading is {reading!r}; it must be one of {', '.join(READINGS)}")
+    try:
+        return GyrocompassParams(**{**READINGS[reading], **(given or {})})
+    except ValueError as e:
+        raise BadInput(f"{NAME}: {e}") from e
+
+
+def rehearse(p: GyrocompassParams) -> None:
+    """Whether these positions can tell a heading at all, before anything moves. Raises BadInput with the reason."""
+    angles = np.radians(Table(angles_deg=p.angles_deg, repeat=p.repeat).sequence_deg)
+    if not abs(p.latitude_deg) <= 90.0:
+        raise BadInput(f"{NAME}: latitude_deg is {p.latitude_deg:g}; it must lie within +-90")
+    we = EARTH_RADPS * math.cos(p.latitude_rad)
+    pace_s = p.window_s + p.settle_s
+    rows = [
+        nav.Position(s_radps=we * math.sin(a), delta_rad=a - angles[0], t_mid_s=k * pace_s, window_s=p.window_s)
+        for k, a in enumerate(angles)
+    ]
+    nav.gyrocompass(rows, latitude_rad=p.latitude_rad, method=METHODS[p.method], noise=noise_of(p, 0.0))
+
+
+def noise_of(p: GyrocompassParams, window_sd_radps: float) -> nav.Noise:
+    return nav.Noise(
+        gm_sigma_radps=p.gm_sigma_degph * DEGPH,
+        gm_tau_s=max(p.gm_tau_s, STEP_S),
+        window_sd_radps=window_sd_radps,
+        angle_sd_rad=p.angle_sd_arcmin * ARCMIN,
+        level_sd_rad=p.level_sd_arcmin * ARCMIN,
+    )
