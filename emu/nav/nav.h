@@ -16,7 +16,7 @@ extern "C" {
 #endif
 
 /* Number of the shared library, libpsabench-nav.so.N; structures change only with it. */
-#define NAV_ABI 0
+#define NAV_ABI 1
 
 #define NAV_API           __attribute__((visibility("default")))
 #define NAV_MAX_POSITIONS 64
@@ -65,6 +65,9 @@ struct nav_noise {
     double window_sd_radps; /* what is drawn anew for each window and does not average */
     double angle_sd_rad;    /* each angle reading, the first included */
     double level_sd_rad;    /* each window's gamma: S errs by U sin(lat) of it */
+    /* Of the latitude that compensates gamma and stands in the cfg, one error for all windows: S errs by U cos(lat) sin(gamma) of
+     * it, which turns the heading by up to the tilt times it, and s and c by tan(lat) of it, which a constrained fit feels. */
+    double latitude_sd_rad;
 };
 
 enum nav_method {

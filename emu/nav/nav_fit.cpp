@@ -54,6 +54,15 @@ fit_square fit_covariance(const struct nav_position *p, int count, const struct 
     return c;
 }
 
+fit_vector fit_by_latitude(const fit_design &rows, const struct nav_position *p, double latitude_rad, double s,
+                           double c)
+{
+    const double tan_latitude = nav_sin(latitude_rad) / nav_cos(latitude_rad);
+    fit_vector v = tan_latitude * (s * rows.col(FIT_S) + c * rows.col(FIT_C));
+    for (Eigen::Index i = 0; i < v.size(); i++) v(i) += nav_sin(p[i].gamma_rad) * nav_cos(p[i].beta_rad);
+    return v;
+}
+
 double fit_angle_variance(const struct nav_noise *noise)
 {
     return noise->angle_sd_rad * noise->angle_sd_rad;

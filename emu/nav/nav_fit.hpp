@@ -20,7 +20,12 @@ fit_design fit_rows(const struct nav_position *p, int count, const struct nav_gy
 double fit_time_scale(const struct nav_position *p, int count);
 double fit_mean_time(const struct nav_position *p, int count);
 
-/* Covariance of S/We but for the angle readings, whose share hangs on alpha. */
+/* What S/We errs by for each rad that the latitude is wrong: sin(gamma) cos(beta) of the compensation, and tan(lat) of what is the
+ * Earth's, a s + b c. */
+fit_vector fit_by_latitude(const fit_design &rows, const struct nav_position *p, double latitude_rad, double s,
+                           double c);
+
+/* Covariance of S/We but for the angle readings and the latitude, whose shares hang on alpha. */
 fit_square fit_covariance(const struct nav_position *p, int count, const struct nav_noise *noise, double latitude_rad);
 /* Variance of S/We by angle readings at these alphas is this times cos^2. */
 double fit_angle_variance(const struct nav_noise *noise);

@@ -13,7 +13,7 @@ static bool all_finite(const struct nav_position *p, int count, const struct nav
 {
     const struct nav_noise *n = &cfg->noise;
     double sum = cfg->latitude_rad + n->gm_sigma_radps + n->gm_tau_s + n->white_radps_rts + n->window_sd_radps +
-                 n->angle_sd_rad + n->level_sd_rad;
+                 n->angle_sd_rad + n->level_sd_rad + n->latitude_sd_rad;
     bool finite = std::isfinite(sum);
     for (int i = 0; i < count; i++) {
         sum = p[i].s_radps + p[i].delta_rad + p[i].beta_rad + p[i].gamma_rad + p[i].t_mid_s + p[i].window_s;
@@ -27,7 +27,7 @@ static bool in_range(const struct nav_position *p, int count, const struct nav_g
     const struct nav_noise *n = &cfg->noise;
     bool good = cfg->method >= NAV_CLOSED3 && cfg->method <= NAV_GLS_CONSTRAINED && n->gm_sigma_radps >= 0.0 &&
                 n->white_radps_rts >= 0.0 && n->window_sd_radps >= 0.0 && n->angle_sd_rad >= 0.0 &&
-                n->level_sd_rad >= 0.0;
+                n->level_sd_rad >= 0.0 && n->latitude_sd_rad >= 0.0 && n->latitude_sd_rad < NAV_PI / 4;
     good = good && (n->gm_sigma_radps == 0.0 || n->gm_tau_s > 0.0);
     for (int i = 0; i < count; i++)
         good = good && std::fabs(p[i].gamma_rad) < NAV_PI / 4 && std::fabs(p[i].beta_rad) < NAV_PI / 4 &&
@@ -106,19 +106,43 @@ static void from_free(const fit_gain &free_gain, struct solution *x)
     x->params.tail(unknowns - 1) = x->free.tail(unknowns - 1);
 }
 
-static bool solve(const fit_design &rows, const fit_square &whitener, const fit_vector &y, int method,
-                  struct solution *x)
+/* What the rows and S of one gyrocompassing become before they are solved; covariance as fit_covariance() has it. */
+struct equations {
+    const struct nav_position *p;
+    const struct nav_gyrocompass_cfg *cfg;
+    fit_design rows;
+    fit_vector y;
+    fit_square covariance;
+};
+
+/* With the latitude's share, all windows alike, for this s and c. */
+static fit_square with_latitude(const struct equations *e, double s, double c)
 {
+    if (e->cfg->noise.latitude_sd_rad == 0.0) return e->covariance;
+    const fit_vector v = fit_by_latitude(e->rows, e->p, e->cfg->latitude_rad, s, c) * e->cfg->noise.latitude_sd_rad;
+    return e->covariance + v.lazyProduct(v.transpose());
+}
+
+/* An error of the latitude lies in the plane of the rows of s and c, gamma_i being a sine over the positions: no weights tell it
+ * from them in a free fit. On the circle they do, and there it is weighed, at the s and c that the free fit found. */
+static bool solve(const struct equations *e, struct solution *x)
+{
+    const struct nav_noise *noise = &e->cfg->noise;
+    const int method = e->cfg->method;
+    fit_square whitener = fit_whitener(e->covariance, noise, method);
     fit_gain free_gain;
-    if (!(method == NAV_CLOSED3 ? cramer(rows, &free_gain) : fit_gain_of(rows, whitener, &free_gain))) return false;
-    x->free = free_gain * y;
+    if (!(method == NAV_CLOSED3 ? cramer(e->rows, &free_gain) : fit_gain_of(e->rows, whitener, &free_gain)))
+        return false;
+    x->free = free_gain * e->y;
     from_free(free_gain, x);
     x->iterations = 0;
     x->converged = true;
     if (!fit_is_constrained(method)) return true;
     double alpha = x->params(0);
+    if (noise->latitude_sd_rad > 0.0 && fit_is_weighted(method))
+        whitener = fit_whitener(with_latitude(e, nav_sin(alpha), nav_cos(alpha)), noise, method);
     fit_unknowns rest;
-    x->iterations = fit_on_circle(rows, whitener, y, &alpha, &rest, &x->gain);
+    x->iterations = fit_on_circle(e->rows, whitener, e->y, &alpha, &rest, &x->gain);
     if (x->iterations < 0) return false;
     x->converged = x->iterations < 30;
     x->params = rest;
@@ -127,12 +151,13 @@ static bool solve(const fit_design &rows, const fit_square &whitener, const fit_
 }
 
 /* Standard deviations and covariance by the gain, whatever the weights were: honest for every method. */
-static void spread(const struct solution *x, const fit_square &covariance, const struct nav_position *p, int count,
-                   const struct nav_gyrocompass_cfg *cfg, struct nav_compass *out)
+static void spread(const struct solution *x, const struct equations *e, struct nav_compass *out)
 {
-    const double we = nav_earth_at(cfg->latitude_rad).we_radps;
-    const double variance = fit_angle_variance(&cfg->noise);
-    fit_square c = covariance;
+    const struct nav_position *p = e->p;
+    const int count = (int)e->rows.rows();
+    const double we = nav_earth_at(e->cfg->latitude_rad).we_radps;
+    const double variance = fit_angle_variance(&e->cfg->noise);
+    fit_square c = with_latitude(e, nav_sin(out->alpha1_rad), nav_cos(out->alpha1_rad));
     for (int i = 0; i < count; i++) {
         const double slope = nav_cos(out->alpha1_rad + p[i].delta_rad);
         c(i, i) += variance * slope * slope;
@@ -143,9 +168,9 @@ static void spread(const struct solution *x, const fit_square &covariance, const
     for (int i = 0; i < 9; i++) out->cov[i] = 0.0;
     for (Eigen::Index i = 0; i < cov.rows(); i++)
         for (Eigen::Index j = 0; j < cov.cols(); j++) out->cov[3 * i + j] = cov(i, j) * unit[i] * unit[j];
-    out->alpha1_sd_rad = std::sqrt(cov(0, 0));
+    out->alpha1_sd_rad = std::sqrt(std::fmax(cov(0, 0), 0.0)); /* rank one: rounding may pass zero */
     out->alpha1_half95_rad = 1.959963984540054 * out->alpha1_sd_rad;
-    out->drift1_sd_radps = std::sqrt(cov(1, 1)) * we;
+    out->drift1_sd_radps = std::sqrt(std::fmax(cov(1, 1), 0.0)) * we;
     const double by_first = x->gain(0, 0) * nav_cos(out->alpha1_rad + p[0].delta_rad);
     out->platform_sd_rad = std::sqrt(std::fmax(cov(0, 0) + variance * (1.0 - 2.0 * by_first), 0.0));
 }
@@ -167,30 +192,28 @@ int nav_gyrocompass(const struct nav_position *p, int count, const struct nav_gy
     const int refused = refusal(p, count, cfg);
     if (refused) return refused;
     const double we = nav_earth_at(cfg->latitude_rad).we_radps;
-    const fit_design rows = fit_rows(p, count, cfg);
-    const fit_square covariance = fit_covariance(p, count, &cfg->noise, cfg->latitude_rad);
-    const fit_square whitener = fit_whitener(covariance, &cfg->noise, cfg->method);
-    fit_vector y(count);
-    for (int i = 0; i < count; i++) y(i) = p[i].s_radps / we;
+    struct equations e = {p, cfg, fit_rows(p, count, cfg), fit_vector(count),
+                          fit_covariance(p, count, &cfg->noise, cfg->latitude_rad)};
+    for (int i = 0; i < count; i++) e.y(i) = p[i].s_radps / we;
     struct solution x;
-    if (!solve(rows, whitener, y, cfg->method, &x)) return NAV_SINGULAR;
+    if (!solve(&e, &x)) return NAV_SINGULAR;
     out->alpha1_rad = x.params(0);
     out->drift1_radps = x.params(1) * we;
     out->ramp_radps2 = cfg->ramp ? x.params(2) * we / fit_time_scale(p, count) : 0.0;
     out->s = x.free(FIT_S);
     out->c = x.free(FIT_C);
     out->quality = std::fabs(std::sqrt(out->s * out->s + out->c * out->c) - 1.0);
-    out->geometry = fit_geometry(rows);
+    out->geometry = fit_geometry(e.rows);
     out->iterations = x.iterations;
-    spread(&x, covariance, p, count, cfg, out);
+    spread(&x, &e, out);
     fit_unknowns full = x.free;
     if (fit_is_constrained(cfg->method)) {
         full(FIT_S) = nav_sin(out->alpha1_rad);
         full(FIT_C) = nav_cos(out->alpha1_rad);
         full.tail(full.size() - 2) = x.params.tail(full.size() - 2);
     }
-    out->residual_rms_radps = std::sqrt((y - rows * full).squaredNorm() / count) * we;
-    const bool noise = covariance.trace() + fit_angle_variance(&cfg->noise) > 0.0;
+    out->residual_rms_radps = std::sqrt((e.y - e.rows * full).squaredNorm() / count) * we;
+    const bool noise = e.covariance.trace() + fit_angle_variance(&cfg->noise) + cfg->noise.latitude_sd_rad > 0.0;
     out->flags = flags_of(out, cfg, noise, x.converged);
     return NAV_OK;
 }

@@ -104,6 +104,8 @@ int mc_linear_make(const struct nav_mc_cfg *cfg, struct mc_linear *lin)
     mc_schedule(cfg, lin->p);
     const int refused = mc_refusal(cfg, lin->p);
     if (refused) return refused;
+    /* Weights that hang on each run's tilts are not for algebra that is done once. */
+    if (cfg->fit.method == NAV_GLS_CONSTRAINED && cfg->fit.noise.latitude_sd_rad > 0.0) return NAV_RANGE;
     const struct nav_earth e = nav_earth_at(cfg->latitude_rad);
     const fit_design rows = fit_rows(lin->p, cfg->count, &cfg->fit);
     const fit_square covariance = fit_covariance(lin->p, cfg->count, &cfg->fit.noise, cfg->latitude_rad);

@@ -24,7 +24,7 @@ static fit_square random_covariance(const struct nav_mc_cfg *cfg, const struct m
 {
     const double ns = cfg->per_sample ? mc_samples_per_window(cfg) : 1.0;
     const struct nav_noise noise = {
-        cfg->gm_sigma_radps, cfg->gm_tau_s, cfg->white_radps_rts, 0.0, 0.0, cfg->gamma_random_rad / std::sqrt(ns)};
+        cfg->gm_sigma_radps, cfg->gm_tau_s, cfg->white_radps_rts, 0.0, 0.0, cfg->gamma_random_rad / std::sqrt(ns), 0.0};
     fit_square c = fit_covariance(lin->p, lin->count, &noise, cfg->latitude_rad);
     if (!cfg->gm_from_zero) return c;
     for (int i = 0; i < lin->count; i++)

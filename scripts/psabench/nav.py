@@ -96,6 +96,7 @@ class Noise:
     window_sd_radps: float = 0.0  # drawn anew for each window
     angle_sd_rad: float = 0.0  # each angle reading, the first included
     level_sd_rad: float = 0.0  # each window's gamma
+    latitude_sd_rad: float = 0.0  # of the latitude given: on a tilt it turns the heading by up to the tilt times it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

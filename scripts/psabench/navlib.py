@@ -9,7 +9,7 @@ from typing import Any
 from psabench.errors import BadInput
 from psabench.places import find_library
 
-ABI = 0  # NAV_ABI of the header that this was written from
+ABI = 1  # NAV_ABI of the header that this was written from
 NAME = f"libpsabench-nav.so.{ABI}"
 MAX_POSITIONS = 64
 
@@ -31,7 +31,13 @@ class NoiseStruct(c.Structure):
     """struct nav_noise."""
 
     _fields_ = _doubles(
-        "gm_sigma_radps", "gm_tau_s", "white_radps_rts", "window_sd_radps", "angle_sd_rad", "level_sd_rad"
+        "gm_sigma_radps",
+        "gm_tau_s",
+        "white_radps_rts",
+        "window_sd_radps",
+        "angle_sd_rad",
+        "level_sd_rad",
+        "latitude_sd_rad",
     )
 
 

@@ -84,11 +84,11 @@ def test_there_is_one_version_and_one_abi_number() -> None:
 
 def test_the_navigation_library_exports_its_headers_and_needs_no_runtime_of_another_language() -> None:
     assert len(declared_of_nav()) > 20
-    assert defined("-D", ROOT / "build/libpsabench-nav.so.0") == declared_of_nav()
+    assert defined("-D", ROOT / "build/libpsabench-nav.so.1") == declared_of_nav()
     assert defined(ROOT / "build/libpsabench-nav.a") == declared_of_nav()
     assert {f"nav_{name}" for name in NAV_PROTOTYPES} == declared_of_nav()
-    dynamic = run(["readelf", "-d", ROOT / "build/libpsabench-nav.so.0"])
-    assert "Library soname: [libpsabench-nav.so.0]" in dynamic
+    dynamic = run(["readelf", "-d", ROOT / "build/libpsabench-nav.so.1"])
+    assert "Library soname: [libpsabench-nav.so.1]" in dynamic
     assert set(re.findall(r"Shared library: \[([^]]*)\]", dynamic)) <= {"libc.so.6", "libm.so.6"}
     version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
     assert nav_library().version().decode() == version

@@ -70,7 +70,7 @@ def test_it_holds_what_is_installed_and_no_path_of_this_machine(wheel: Path) -> 
         files = {n.removeprefix("psabench/bundle/"): z.read(n) for n in z.namelist() if "/bundle/" in n}
         ours = [n for n, data in files.items() if str(ROOT).encode() in data]
     assert ours == []
-    libraries = {"lib/libpsabench.so.0", "lib/libpsabench-nav.so.0"}
+    libraries = {"lib/libpsabench.so.0", "lib/libpsabench-nav.so.1"}
     assert libraries | {"bin/psa-emu", "include/psabench.h", "share/psabench/proto/psabench.dbc"} <= set(files)
     for folder in ("proto", "decoders", "share"):
         here = {p for p in (ROOT / folder).rglob("*") if p.is_file() and p.suffix != ".pyc"}
