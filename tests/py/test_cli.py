@@ -3,22 +3,35 @@
 from __future__ import annotations
 
 import argparse
+import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
-from psabench import cli
+from psabench import arguments, cli, run_command
 from psabench.protocol_files import dbc_node
 from test_lineport import lines
 
 MISTAKES: list[tuple[str, str]] = [
-    ("run", "which procedure? turns, fourier, reversal, compare-converters, gyrocompass, heading-hold or all"),
     (
-        "run spin",
-        "run spin: no such procedure; turns, fourier, reversal, compare-converters, gyrocompass, heading-hold or all",
+        "run",
+        "run: which procedure? turns, fourier, reversal, all, compare-converters, gyrocompass, heading-hold or script",
     ),
-    ("run turns --positions 80", "--positions: turns has no such parameter; it has --axis"),
+    ("run --out turns", "run: which procedure? turns"),
+    ("run spin", "run spin: no such procedure; turns, fourier, reversal, all, compare-converters, gyrocompass, "),
+    ("run spin --positions 80", "run spin: no such procedure; turns"),
+    ("run turns --positions 80", "--positions: turns has no such parameter; it has --axis, --realisations, "),
+    ("run --positions=80 turns", "--positions: turns has no such parameter; it has --axis"),
+    ("run turns fourier", "fourier: one word too many for turns"),
+    ("run gyrocompass --node 5", "--node: gyrocompass has no such parameter; it has --reading, --sequence"),
+    ("run gyrocompass --hours 4", "--hours: gyrocompass has no such parameter"),
+    ("run heading-hold --average 16", "--average: heading-hold has no such parameter; it has --reading, --hours"),
+    ("run compare-converters --real-time", "--real-time: compare-converters has no such parameter; it has --scenario"),
+    ("run gyrocompass --window-s 0", "gyrocompass: window_s is 0.0"),
+    ("run script nothing.psa --axis x", "--axis: script has no such parameter; it has --scenario"),
+    ("record run.log --speed 3", "--speed: record has no such parameter; it has --can"),
     ("run all --axis w", "turns: axis is 'w'; it must be x, y or z"),
     ("run turns --out /dev/null/x", "/dev/null/x: "),
     ("run turns --can socketcand:127.0.0.1:1", "--head is missing"),
@@ -48,15 +61,15 @@ def test_a_mistake_gets_one_line_and_status_2(
 @pytest.mark.parametrize(
     ("convert", "text"),
     [
-        (cli.natural, "-3"),
-        (cli.natural, "x"),
-        (cli.positive, "0"),
-        (cli.positive, "nan"),
-        (cli.positive, "inf"),
-        (cli.node_id, "0"),
-        (cli.node_id, "128"),
-        (cli.yes_no, "maybe"),
-        (cli.board_name, "psd9"),
+        (arguments.natural, "-3"),
+        (arguments.natural, "x"),
+        (arguments.positive, "0"),
+        (arguments.positive, "nan"),
+        (arguments.positive, "inf"),
+        (arguments.node_id, "0"),
+        (arguments.node_id, "128"),
+        (arguments.yes_no, "maybe"),
+        (arguments.board_name, "psd9"),
     ],
 )
 def test_an_argument_out_of_range_is_refused(convert: object, text: str) -> None:
@@ -140,6 +153,101 @@ def test_a_reader_that_has_seen_enough_is_no_error() -> None:
         assert p.wait(60) == 0
     assert "Traceback" not in words
     assert "Broken pipe" not in words
+
+
+def help_of(words: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> str:
+    monkeypatch.setenv("COLUMNS", "160")
+    with pytest.raises(SystemExit) as ended:
+        cli.main([*words.split(), "--help"])
+    assert ended.value.code == 0
+    out, err = capsys.readouterr()
+    assert err == ""
+    return out
+
+
+def test_help_of_run_names_each_procedure_and_no_option_of_any(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told = help_of("run", capsys, monkeypatch)
+    for c in run_command.COMMANDS.values():
+        assert re.search(rf"^  {c.name} +{re.escape(' '.join(c.summary.split()[:6]))}", told, re.MULTILINE)
+    assert re.search(r"^  script +lines of the shell", told, re.MULTILINE)
+    assert set(re.findall(r"^  .*?(--[a-z-]+)", told, re.MULTILINE)) == {"--help", "--list"}
+
+
+@pytest.mark.parametrize("name", list(run_command.COMMANDS))
+def test_help_of_a_procedure_is_of_its_own_options_with_unit_and_default(
+    name: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    command = run_command.COMMANDS[name]
+    told = help_of(f"run {name}", capsys, monkeypatch)
+    shown = re.findall(r"^  (--[a-z0-9-]+)", told, re.MULTILINE)
+    own = [f"--{f.replace('_', '-')}" for f in command.fields]
+    assert shown == [*own, *command.common]
+    assert command.summary[1:] in told
+    for option, f in zip(own, command.fields.values(), strict=True):
+        text = " ".join(re.findall(rf"^  {option} .*\n(?:    +.*\n)*", told, re.MULTILINE)[0].split())
+        shown_default = text.rpartition("(")[2].rstrip(")").partition(";")[0]
+        value, _, unit = shown_default.partition(" ")
+        assert unit == f.metadata["unit"]
+        if f.default is None or isinstance(f.default, bool):
+            assert value == ("none" if f.default is None else "yes" if f.default else "no")
+        else:
+            assert type(f.default)(value) == f.default
+
+
+def test_defaults_of_another_reading_and_of_another_procedure_are_told(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told = help_of("run gyrocompass", capsys, monkeypatch)
+    assert "(0,90,180 deg; improved 0,180,90,270)" in told
+    assert "(2 1/s)" in told  # m2 is the same in both
+    assert "readings at each position (1; turns 16)" in help_of("run all", capsys, monkeypatch)
+
+
+@pytest.mark.parametrize("name", [*run_command.COMMANDS, "script"])
+def test_every_example_of_a_help_is_understood(
+    name: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told = help_of(f"run {name}", capsys, monkeypatch)
+    examples = re.findall(r"^  psabench (run .*?)(?:   .*)?$", told.partition("examples:")[2], re.MULTILINE)
+    assert examples
+    for example in examples:
+        args = cli.parser().parse_args(run_command.words(shlex.split(example)))
+        assert callable(args.handler)
+
+
+WORDS: list[tuple[str, str]] = [
+    ("run turns --seed 3", "run turns|--seed|3"),
+    ("run --seed 3 turns --axis y", "run turns|--seed|3|--axis|y"),
+    ("run --seed=3 turns", "run turns|--seed=3"),
+    ("run --real-time turns", "run turns|--real-time"),
+    ("run --real- turns", "run turns|--real-"),
+    ("run --out turns turns", "run turns|--out|turns"),
+    ("run --latitude-deg -50 gyrocompass", "run gyrocompass|--latitude-deg|-50"),
+    ("run turns --list", "run|--list"),
+    ("run --list", "run|--list"),
+    ("run -h turns", "run turns|-h"),
+    ("run --help", "run|--help"),
+    ("run --seed 3", "run"),
+    ("run spin --seed 3", "run|spin"),
+    ("run script a.psa --json", "run script|a.psa|--json"),
+    ("record run", "record|run"),
+    ("", ""),
+]
+
+
+@pytest.mark.parametrize(("typed", "words"), WORDS, ids=[w[0] for w in WORDS])
+def test_the_procedure_may_stand_anywhere_among_its_options(typed: str, words: str) -> None:
+    assert run_command.words(typed.split()) == [w for w in words.split("|") if w]
+
+
+def test_list_names_every_procedure_with_its_parameters(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["run", "--list"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.partition(":")[0] for line in lines[::2]] == list(run_command.COMMANDS)
+    for line, c in zip(lines[1::2], run_command.COMMANDS.values(), strict=True):
+        assert line.split() == [*(f"--{f.replace('_', '-')}" for f in c.fields), *c.common]
 
 
 def test_without_a_command_help_is_printed(capsys: pytest.CaptureFixture[str]) -> None:

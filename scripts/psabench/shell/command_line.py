@@ -84,11 +84,6 @@ def _add_common(p: argparse.ArgumentParser, bus_help: str, node: Callable[[str],
     p.add_argument("--json", action="store_true", help="one JSON object a line instead of text")
 
 
-def words(argv: list[str]) -> list[str]:
-    """`run script` is one command of two words."""
-    return ["run script", *argv[2:]] if argv[:2] == ["run", "script"] else argv
-
-
 def _opening(args: argparse.Namespace, pace: str | None) -> Opening:
     return Opening(
         scenario=args.scenario,
