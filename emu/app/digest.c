@@ -25,6 +25,18 @@ static void add_unit(struct sha256 *s, const struct bench *b, unsigned i)
     board_digest_u64(s, (uint64_t)n->tx_overflow << 32 | n->queued);
 }
 
+/* Nothing where nothing pushes. */
+static void add_push(struct sha256 *s, const struct vehicle *v)
+{
+    const struct vehicle_plan *p = &v->plan[v->commands % VEHICLE_HISTORY];
+    for (unsigned k = 0; k < sizeof p->push / sizeof *p->push; k++) {
+        if (p->push[k].amplitude == 0.0) continue;
+        board_digest_u64(s, (uint64_t)p->push[k].from_ns << 1 | k);
+        board_digest_real(s, p->push[k].amplitude);
+        board_digest_real(s, p->push[k].rate_radps);
+    }
+}
+
 static void add_platform(struct sha256 *s, struct platform *p, int64_t t_ns)
 {
     struct platform_state at;
@@ -35,6 +47,7 @@ static void add_platform(struct sha256 *s, struct platform *p, int64_t t_ns)
     for (unsigned i = 0; i < sizeof real / sizeof *real; i++) board_digest_real(s, real[i]);
     board_digest_noise(s, &p->draws);
     board_digest_u64(s, (uint64_t)p->vehicle.commands << 1 | p->stuck);
+    add_push(s, &p->vehicle);
 }
 
 void digest_bench(const struct bench *b, const struct journal *j, char hex[SHA256_HEX])

@@ -9,6 +9,7 @@
 
 // clang-format off
 static const struct yaml_field platform_rows[] = {
+    {.key = "step_ns",         .type = YAML_U32, .offset = PLATFORM(step_ns), .min = 1e6, .max = 2e7, .what = "of its integration (E1: 10 ms); torques act from its next multiple on"},
     {.key = "alpha0_deg",      .type = YAML_REAL, .offset = PLATFORM(alpha0_deg), .min = -360, .max = 360, .what = "azimuth angle alpha at power-on, counter-clockwise from above: the azimuth of y is its negative"},
     {.key = "beta0_deg",       .type = YAML_REAL, .offset = PLATFORM(beta0_deg), .min = -10, .max = 10, .what = "beta at power-on, before it is levelled"},
     {.key = "drift_degph",     .type = YAML_REALS, .offset = PLATFORM(drift_degph), .count = PLATFORM_AXES, .min = -1000, .max = 1000, .what = "systematic drift about x and about z (25: E1 about x, E0 about z)"},
@@ -31,6 +32,10 @@ static const struct yaml_field sway_rows[] = {
     {.key = "pitch_s",      .type = YAML_REAL, .offset = SWAY(pitch_s), .max = 1000, .what = "its period; 0: none"},
     {.key = "roll_arcmin",  .type = YAML_REAL, .offset = SWAY(roll_arcmin), .max = 600, .what = "amplitude of the roll about its mean"},
     {.key = "roll_s",       .type = YAML_REAL, .offset = SWAY(roll_s), .max = 1000, .what = "its period; 0: none"},
+    {.key = "east_mg",      .type = YAML_REAL, .offset = SWAY(east_mg), .max = 100, .what = "amplitude of the acceleration to the east that the level sensors feel (1 mg = 0.00980665 m/s²); 0.3 is fatal to a gyrocompass"},
+    {.key = "east_s",       .type = YAML_REAL, .offset = SWAY(east_s), .max = 1000, .what = "its period; 0: none"},
+    {.key = "north_mg",     .type = YAML_REAL, .offset = SWAY(north_mg), .max = 100, .what = "amplitude of the acceleration to the north"},
+    {.key = "north_s",      .type = YAML_REAL, .offset = SWAY(north_s), .max = 1000, .what = "its period; 0: none"},
 };
 const struct yaml_fields scenario_sway_fields = YAML_FIELDS(sway_rows);
 

@@ -1,13 +1,12 @@
 #include "board/gyro_law.h"
 
 #include "base/detmath.h"
+#include "phys/earth.h"
 
 #include <math.h>
 
 #define PI          3.141592653589793238
 #define RAD_PER_DEG 0.017453292519943295
-#define EARTH_RADPS 7.292115e-5 /* 15.041067 deg/h */
-#define EARTH_M     6371000.0
 #define ALIKE_RAD   1e-6 /* half a turn, whatever the rounding */
 
 /* ---- level ---- */
@@ -33,11 +32,12 @@ struct gyro_level gyro_level_of(double y_g, double x_g)
 struct gyro_place gyro_place_of(double latitude_deg, double speed_mps, double track_deg)
 {
     const double lat_rad = latitude_deg * RAD_PER_DEG;
-    const double east = speed_mps * det_sin(track_deg * RAD_PER_DEG) / EARTH_M;
-    const double north = speed_mps * det_cos(track_deg * RAD_PER_DEG) / EARTH_M;
+    const double east = speed_mps * det_sin(track_deg * RAD_PER_DEG) / EARTH_RADIUS_M;
+    const double north = speed_mps * det_cos(track_deg * RAD_PER_DEG) / EARTH_RADIUS_M;
     const double s = det_sin(lat_rad), c = det_cos(lat_rad);
-    return (struct gyro_place){
-        .east_radps = -north, .north_radps = EARTH_RADPS * c + east, .up_radps = EARTH_RADPS * s + east * s / c};
+    return (struct gyro_place){.east_radps = -north,
+                               .north_radps = EARTH_RATE_RADPS * c + east,
+                               .up_radps = EARTH_RATE_RADPS * s + east * s / c};
 }
 
 double gyro_law_level(double m1, const struct gyro_level *l, double up_radps, double turn_radps)

@@ -26,8 +26,14 @@ static enum control_outcome do_attitude(struct control *c, const struct control_
 static enum control_outcome do_sway(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
 {
     struct platform *p = platform_of(c->bench);
-    const struct vehicle_sway sway = {
-        .pitch_arcmin = v[0].real, .pitch_s = v[1].real, .roll_arcmin = v[2].real, .roll_s = v[3].real};
+    const struct vehicle_sway sway = {.pitch_arcmin = v[0].real,
+                                      .pitch_s = v[1].real,
+                                      .roll_arcmin = v[2].real,
+                                      .roll_s = v[3].real,
+                                      .east_mg = v[4].real,
+                                      .east_s = v[5].real,
+                                      .north_mg = v[6].real,
+                                      .north_s = v[7].real};
     (void)result;
     control_settle_inputs(c->bench, t_ns);
     vehicle_sway(platform_vehicle(p, t_ns), &sway, t_ns);
@@ -72,7 +78,11 @@ static const struct control_command rows[] = {
      {{"pitch_arcmin", CONTROL_REAL, false, "arcmin", 0, 600, .what = "amplitude of the pitch"},
       {"pitch_s", CONTROL_REAL, false, "s", 0, 1000, .what = "its period"},
       {"roll_arcmin", CONTROL_REAL, false, "arcmin", 0, 600, .what = "amplitude of the roll"},
-      {"roll_s", CONTROL_REAL, false, "s", 0, 1000, .what = "its period"}}, .run = do_sway, .changes = true, .check = stands},
+      {"roll_s", CONTROL_REAL, false, "s", 0, 1000, .what = "its period"},
+      {"east_mg", CONTROL_REAL, true, "mg", 0, 100, .what = "amplitude of the acceleration to the east"},
+      {"east_s", CONTROL_REAL, true, "s", 0, 1000, .what = "its period"},
+      {"north_mg", CONTROL_REAL, true, "mg", 0, 100, .what = "amplitude of the acceleration to the north"},
+      {"north_s", CONTROL_REAL, true, "s", 0, 1000, .what = "its period"}}, .run = do_sway, .changes = true, .check = stands},
     {"vehicle.fly", "Brings the vehicle to a speed and a track, which is its heading; 0 m/s parks it.",
      {{"speed_mps", CONTROL_REAL, false, "m/s", 0, 1000, .what = "over ground"},
       {"track_deg", CONTROL_REAL, false, "deg", -360, 360, .what = "from north, clockwise"}}, .run = do_fly, .changes = true, .check = stands},

@@ -179,6 +179,7 @@ static void add_platform(struct lab *l, cJSON *to, int64_t t_ns)
     add_real(vehicle, "roll_deg", v.roll_rad * deg_of_rad);
     add_real(vehicle, "speed_mps", v.speed_mps);
     add_real(vehicle, "latitude_deg", v.latitude_rad * deg_of_rad);
+    cJSON_AddItemToObject(vehicle, "accel_l_mps2", cJSON_CreateDoubleArray(v.accel_l_mps2, 3));
 }
 
 /* At the unit's origin, in the axes of its case. */

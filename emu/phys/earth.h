@@ -8,6 +8,7 @@
 #include <stdbool.h>
 
 #define EARTH_RATE_RADPS 7.292115e-5 /* 15.041067 deg/h */
+#define EARTH_RADIUS_M   6371008.8   /* mean radius of WGS 84: the sphere of transport rates */
 
 struct site {
     double g_mps2; /* local gravity, along the plumb line: the Earth's own centrifugal part is in it */

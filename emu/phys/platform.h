@@ -23,7 +23,7 @@ enum platform_axis { PLATFORM_LEVEL, PLATFORM_AZIMUTH, PLATFORM_AXES }; /* torqu
 
 struct platform_cfg {
     bool present;
-    int64_t step_ns; /* 1 to 20 ms; below 5 ms less than half a second back is known */
+    uint32_t step_ns; /* 1 to 20 ms; below 5 ms less than half a second back is known */
     double alpha0_deg, beta0_deg;
     double drift_degph[PLATFORM_AXES];   /* systematic, about x_p (the article's first) and z_p */
     double gm_sigma_degph, gm_tau_s;     /* Gauss-Markov drift of each axis, independent; sigma 0: none */

@@ -48,16 +48,24 @@ static struct vehicle_ramp ramp(double from, double to, double rate, int64_t t_n
 /* Whole turns are taken off by fmod(), which is exact: a sway of hours. */
 static struct value sine_at(const struct vehicle_sine *s, int64_t t_ns)
 {
-    if (s->amplitude_rad == 0.0 || s->rate_radps == 0.0) return (struct value){0.0, 0.0};
+    if (s->amplitude == 0.0 || s->rate_radps == 0.0) return (struct value){0.0, 0.0};
     const double phase_rad = fmod(s->rate_radps * since_s(s->from_ns, t_ns), TURN_RAD);
-    return (struct value){s->amplitude_rad * det_sin(phase_rad), s->amplitude_rad * s->rate_radps * det_cos(phase_rad)};
+    return (struct value){s->amplitude * det_sin(phase_rad), s->amplitude * s->rate_radps * det_cos(phase_rad)};
 }
 
-static struct vehicle_sine sine(double arcmin, double period_s, int64_t t_ns)
+static struct vehicle_sine sine(double amplitude, double period_s, int64_t t_ns)
 {
-    const bool swings = arcmin != 0.0 && period_s > 0.0;
-    return swings ? (struct vehicle_sine){t_ns, arcmin * RAD_PER_ARCMIN, TURN_RAD / period_s}
-                  : (struct vehicle_sine){t_ns, 0.0, 0.0};
+    const bool swings = amplitude != 0.0 && period_s > 0.0;
+    return swings ? (struct vehicle_sine){t_ns, amplitude, TURN_RAD / period_s} : (struct vehicle_sine){t_ns, 0.0, 0.0};
+}
+
+/* Each sine begins at its zero. */
+static void swing(struct vehicle_plan *p, const struct vehicle_sway *sway, int64_t t_ns)
+{
+    p->pitch_sway = sine(sway->pitch_arcmin * RAD_PER_ARCMIN, sway->pitch_s, t_ns);
+    p->roll_sway = sine(sway->roll_arcmin * RAD_PER_ARCMIN, sway->roll_s, t_ns);
+    p->push[0] = sine(sway->east_mg * VEHICLE_MG_MPS2, sway->east_s, t_ns);
+    p->push[1] = sine(sway->north_mg * VEHICLE_MG_MPS2, sway->north_s, t_ns);
 }
 
 /* ---- latitude */
@@ -98,7 +106,7 @@ static double latitude_rad(const struct vehicle_plan *p, int64_t t_ns)
         north_m += northwards_m(v.at, v.rate, h.at, h.rate, since_s(from_ns, to_ns));
         from_ns = to_ns;
     }
-    const double lat = p->latitude_rad + north_m / VEHICLE_EARTH_RADIUS_M;
+    const double lat = p->latitude_rad + north_m / EARTH_RADIUS_M;
     return fmin(fmax(lat, -LATITUDE_MAX_RAD), LATITUDE_MAX_RAD);
 }
 
@@ -157,10 +165,9 @@ void vehicle_init(struct vehicle *v, const struct vehicle_cfg *cfg, const struct
         .pitch_rad = at_rest(cfg->pitch_deg * RAD_PER_DEG),
         .roll_rad = at_rest(cfg->roll_deg * RAD_PER_DEG),
         .speed_mps = at_rest(0.0),
-        .pitch_sway = sine(cfg->sway.pitch_arcmin, cfg->sway.pitch_s, 0),
-        .roll_sway = sine(cfg->sway.roll_arcmin, cfg->sway.roll_s, 0),
         .latitude_rad = site->latitude_rad,
     };
+    swing(&v->plan[0], &cfg->sway, 0);
 }
 
 void vehicle_attitude(struct vehicle *v, double heading_deg, double pitch_deg, double roll_deg, int64_t t_ns)
@@ -171,7 +178,7 @@ void vehicle_attitude(struct vehicle *v, double heading_deg, double pitch_deg, d
     tilt_to(v, &p->roll_rad, ramp_at(&p->roll_rad, t_ns).at, roll_deg * RAD_PER_DEG, t_ns);
 }
 
-/* A new sine begins at its zero: the angle that the old one had goes back to the mean with the mean's own rate. */
+/* The angle that the old sine had goes back to the mean with the mean's own rate. */
 void vehicle_sway(struct vehicle *v, const struct vehicle_sway *sway, int64_t t_ns)
 {
     struct vehicle_plan *p = next_plan(v, t_ns);
@@ -179,8 +186,7 @@ void vehicle_sway(struct vehicle *v, const struct vehicle_sway *sway, int64_t t_
     const double roll_rad = ramp_at(&p->roll_rad, t_ns).at + sine_at(&p->roll_sway, t_ns).at;
     tilt_to(v, &p->pitch_rad, pitch_rad, p->pitch_rad.to, t_ns);
     tilt_to(v, &p->roll_rad, roll_rad, p->roll_rad.to, t_ns);
-    p->pitch_sway = sine(sway->pitch_arcmin, sway->pitch_s, t_ns);
-    p->roll_sway = sine(sway->roll_arcmin, sway->roll_s, t_ns);
+    swing(p, sway, t_ns);
 }
 
 void vehicle_fly(struct vehicle *v, double speed_mps, double track_deg, int64_t t_ns)
@@ -227,8 +233,8 @@ static void set_flight(struct vehicle_state *s, const struct site *site, double 
     const double sin_lat = det_sin(s->latitude_rad);
     const double cos_lat = det_cos(s->latitude_rad);
     const double v_l[3] = {s->speed_mps * sh, s->speed_mps * ch, 0.0};
-    const double east_radps = v_l[0] / VEHICLE_EARTH_RADIUS_M;
-    const double w_el[3] = {-v_l[1] / VEHICLE_EARTH_RADIUS_M, east_radps, east_radps * sin_lat / cos_lat};
+    const double east_radps = v_l[0] / EARTH_RADIUS_M;
+    const double w_el[3] = {-v_l[1] / EARTH_RADIUS_M, east_radps, east_radps * sin_lat / cos_lat};
     const double w_ie[3] = {0.0, earth_radps * cos_lat, earth_radps * sin_lat};
     double twice[3];
     for (unsigned k = 0; k < 3; k++) {
@@ -238,6 +244,14 @@ static void set_flight(struct vehicle_state *s, const struct site *site, double 
     cross(twice, v_l, s->accel_l_mps2);
     s->accel_l_mps2[0] += accel_mps2 * sh + s->speed_mps * turn_radps * ch;
     s->accel_l_mps2[1] += accel_mps2 * ch - s->speed_mps * turn_radps * sh;
+}
+
+/* Without a push not even a zero changes its sign. */
+static void add_push(const struct vehicle_plan *p, int64_t t_ns, double accel_l_mps2[3])
+{
+    for (unsigned k = 0; k < 2; k++) {
+        if (p->push[k].amplitude != 0.0) accel_l_mps2[k] += sine_at(&p->push[k], t_ns).at;
+    }
 }
 
 void vehicle_at(const struct vehicle *v, int64_t t_ns, struct vehicle_state *out)
@@ -259,6 +273,13 @@ void vehicle_at(const struct vehicle *v, int64_t t_ns, struct vehicle_state *out
     out->latitude_rad = latitude_rad(p, t_ns);
     set_attitude(out, ch, sh, rate_radps);
     set_flight(out, &v->site, ch, sh, speed.rate, heading.rate);
+    add_push(p, t_ns, out->accel_l_mps2);
+}
+
+static bool sways(const struct vehicle_plan *p)
+{
+    return p->pitch_sway.amplitude != 0.0 || p->roll_sway.amplitude != 0.0 || p->push[0].amplitude != 0.0 ||
+           p->push[1].amplitude != 0.0;
 }
 
 static bool ramp_over(const struct vehicle_ramp *r, int64_t t_ns)
@@ -269,7 +290,6 @@ static bool ramp_over(const struct vehicle_ramp *r, int64_t t_ns)
 bool vehicle_steady(const struct vehicle *v, int64_t t_ns)
 {
     const struct vehicle_plan *p = &v->plan[v->commands % VEHICLE_HISTORY];
-    return t_ns >= p->from_ns && p->pitch_sway.amplitude_rad == 0.0 && p->roll_sway.amplitude_rad == 0.0 &&
-           p->speed_mps.to == 0.0 && ramp_over(&p->speed_mps, t_ns) && ramp_over(&p->heading_rad, t_ns) &&
-           ramp_over(&p->pitch_rad, t_ns) && ramp_over(&p->roll_rad, t_ns);
+    return t_ns >= p->from_ns && !sways(p) && p->speed_mps.to == 0.0 && ramp_over(&p->speed_mps, t_ns) &&
+           ramp_over(&p->heading_rad, t_ns) && ramp_over(&p->pitch_rad, t_ns) && ramp_over(&p->roll_rad, t_ns);
 }

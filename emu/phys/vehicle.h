@@ -15,13 +15,16 @@
 #include <stdint.h>
 
 #define VEHICLE_HISTORY          4u
-#define VEHICLE_EARTH_RADIUS_M   6371008.8 /* mean radius of WGS 84: the sphere of the transport rate */
-#define VEHICLE_LATITUDE_MAX_DEG 85.0      /* a flight towards a pole goes on along this parallel */
+#define VEHICLE_MG_MPS2          9.80665e-3 /* standard gravity */
+#define VEHICLE_LATITUDE_MAX_DEG 85.0       /* a flight towards a pole goes on along this parallel */
 
-/* Of the angles about their means, a sine from the command on; a period of 0: none. */
+/* Sines from the command on; a period of 0: none. Of the angles about their means, and of the acceleration along the level axes: a
+ * push that the sensors feel. The way it makes, centimetres, is left out: it turns l by less than 0.001 deg/h. */
 struct vehicle_sway {
     double pitch_arcmin, pitch_s;
     double roll_arcmin, roll_s;
+    double east_mg, east_s; /* of standard gravity */
+    double north_mg, north_s;
 };
 
 struct vehicle_cfg {
@@ -41,14 +44,15 @@ struct vehicle_ramp {
 
 struct vehicle_sine {
     int64_t from_ns;
-    double amplitude_rad, rate_radps; /* 0: none */
+    double amplitude; /* rad or m/s^2; 0: none */
+    double rate_radps;
 };
 
 struct vehicle_plan {
     int64_t from_ns;
     struct vehicle_ramp heading_rad, pitch_rad, roll_rad, speed_mps;
-    struct vehicle_sine pitch_sway, roll_sway;
-    double latitude_rad; /* at from_ns */
+    struct vehicle_sine pitch_sway, roll_sway, push[2]; /* east, north */
+    double latitude_rad;                                /* at from_ns */
 };
 
 struct vehicle {
@@ -64,7 +68,7 @@ struct vehicle_state {
     double C_lc[3][3];      /* columns: x_c, y_c, z_c */
     double w_lc_l_radps[3]; /* the vehicle relative to l */
     double w_il_l_radps[3]; /* l relative to inertial space: Earth and transport rate */
-    double accel_l_mps2[3]; /* specific force less that of rest: dv/dt + (2 w_ie + w_el) x v */
+    double accel_l_mps2[3]; /* specific force less that of rest: dv/dt + (2 w_ie + w_el) x v + push */
 };
 
 /* Parked, level, heading north, without sway; rates of a change: 3 deg/s, 2 deg/s, 2 m/s^2 (E0). */

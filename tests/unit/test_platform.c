@@ -72,7 +72,7 @@ static struct platform lively(double beta0_deg)
     c.torquer_scale[0] = 0.01;
     c.torquer_scale[1] = -0.02;
     struct vehicle_cfg v = parked(40.0, 5.0, -4.0);
-    v.sway = (struct vehicle_sway){120.0, 2.1, 60.0, 1.3};
+    v.sway = (struct vehicle_sway){.pitch_arcmin = 120.0, .pitch_s = 2.1, .roll_arcmin = 60.0, .roll_s = 1.3};
     struct platform p = up(&c, &v);
     vehicle_fly(platform_vehicle(&p, 0), 250.0, 120.0, 0);
     vehicle_attitude(platform_vehicle(&p, 0), 120.0, -8.0, 10.0, 0);
@@ -287,6 +287,27 @@ static void a_flight_is_felt_on_the_platform(void **state)
     near(f[0], -2.0 * EARTH_RATE_RADPS * sin(50.0 * RAD_PER_DEG) * 100.0, 2e-3);
 }
 
+/* What it shows is a tilt of the vertical: 0.3 mg are 1.03 arcmin, along y of the platform as beta, along x as -gamma. 5e-6:
+ * the Earth has turned under the platform. */
+static void a_push_is_felt_on_the_platform(void **state)
+{
+    (void)state;
+    struct platform_cfg c = ideal();
+    c.alpha0_deg = 30.0;
+    const struct vehicle_cfg v = parked(0.0, 0.0, 0.0);
+    struct platform calm = up(&c, &v), p = up(&c, &v);
+    vehicle_sway(platform_vehicle(&p, 0), &(struct vehicle_sway){.north_mg = 0.3, .north_s = 20.0}, 0);
+    for (int sign = 1; sign >= -1; sign -= 2) {
+        const int64_t t_ns = ns(10.0 - 5.0 * sign);
+        double still[3], f[3];
+        platform_force_mps2(&calm, t_ns, still);
+        platform_force_mps2(&p, t_ns, f);
+        near(f[0] - still[0], sign * 0.3 * 9.80665e-3 * 0.5, 5e-6);
+        near(f[1] - still[1], sign * 0.3 * 9.80665e-3 * sqrt(0.75), 5e-6);
+        near((f[1] - still[1]) / f[2] / RAD_PER_ARCMIN, sign * 1.03 * sqrt(0.75), 0.01);
+    }
+}
+
 /* ---- grid */
 
 /* Fourth order: a slew at 9 deg/s on steps of 10 ms and on steps of 1 ms ends at the same angles. */
@@ -296,10 +317,10 @@ static void the_step_does_not_matter(void **state)
     struct platform p[2];
     for (unsigned i = 0; i < 2; i++) {
         struct platform_cfg c = ideal();
-        c.step_ns = i ? STEP_NS / 10 : STEP_NS;
+        c.step_ns = (uint32_t)(i ? STEP_NS / 10 : STEP_NS);
         c.beta0_deg = 1.0;
         struct vehicle_cfg v = parked(40.0, 5.0, -4.0);
-        v.sway = (struct vehicle_sway){10.0, 2.0, 10.0, 3.0};
+        v.sway = (struct vehicle_sway){.pitch_arcmin = 10.0, .pitch_s = 2.0, .roll_arcmin = 10.0, .roll_s = 3.0};
         p[i] = up(&c, &v);
         platform_torque(&p[i], 1e-3, 9.0 * RAD_PER_DEG, 0);
     }
@@ -390,6 +411,7 @@ int main(void)
         cmocka_unit_test(force_is_gravity_in_the_axes_of_the_platform),
         cmocka_unit_test(a_lever_arm_feels_the_rate),
         cmocka_unit_test(a_flight_is_felt_on_the_platform),
+        cmocka_unit_test(a_push_is_felt_on_the_platform),
         cmocka_unit_test(the_step_does_not_matter),
         cmocka_unit_test(nothing_depends_on_who_looks),
         cmocka_unit_test(half_a_second_back_is_what_it_was),

@@ -68,7 +68,7 @@ static void rates_are_those_of_the_attitude(void **state_)
 {
     (void)state_;
     struct vehicle_cfg c = vehicle_default();
-    c.sway = (struct vehicle_sway){300.0, 3.1, 200.0, 1.7};
+    c.sway = (struct vehicle_sway){.pitch_arcmin = 300.0, .pitch_s = 3.1, .roll_arcmin = 200.0, .roll_s = 1.7};
     struct vehicle v = at_latitude(50.0, &c);
     vehicle_attitude(&v, -170.0, 20.0, -15.0, ns(0.3));
     for (double t_s = 0.5; t_s < 20.0; t_s += 0.37) {
@@ -100,16 +100,16 @@ static double longitude_of_a_second(const struct vehicle *v, double t_s)
     double rate_radps[3];
     for (unsigned j = 0; j < 3; j++) {
         const struct vehicle_state s = state(v, t_s + 0.5 * j);
-        rate_radps[j] = s.speed_mps * sin(s.heading_rad) / (VEHICLE_EARTH_RADIUS_M * cos(s.latitude_rad));
+        rate_radps[j] = s.speed_mps * sin(s.heading_rad) / (EARTH_RADIUS_M * cos(s.latitude_rad));
     }
     return (rate_radps[0] + 4.0 * rate_radps[1] + rate_radps[2]) / 6.0;
 }
 
 static void position_i(double latitude_rad, double angle_rad, double r_m[3])
 {
-    r_m[0] = VEHICLE_EARTH_RADIUS_M * cos(latitude_rad) * cos(angle_rad);
-    r_m[1] = VEHICLE_EARTH_RADIUS_M * cos(latitude_rad) * sin(angle_rad);
-    r_m[2] = VEHICLE_EARTH_RADIUS_M * sin(latitude_rad);
+    r_m[0] = EARTH_RADIUS_M * cos(latitude_rad) * cos(angle_rad);
+    r_m[1] = EARTH_RADIUS_M * cos(latitude_rad) * sin(angle_rad);
+    r_m[2] = EARTH_RADIUS_M * sin(latitude_rad);
 }
 
 /* Position in inertial space, twice differentiated, less that of a point at rest on the Earth, whose -w^2 r is in the plumb
@@ -184,7 +184,7 @@ static void latitude_is_the_integral_of_the_northern_speed(void **state_)
         }
         if (i % 1000 == 0) near(state(&v, t_s).latitude_rad, sum_rad, 1e-11);
         const struct vehicle_state s = state(&v, t_s + 0.5 * h_s);
-        sum_rad += h_s * s.speed_mps * cos(s.heading_rad) / VEHICLE_EARTH_RADIUS_M;
+        sum_rad += h_s * s.speed_mps * cos(s.heading_rad) / EARTH_RADIUS_M;
     }
     near(state(&v, 370.0).speed_mps, 0.0, 0.0);
     assert_false(vehicle_steady(&v, ns(430.0)));
@@ -196,7 +196,7 @@ static void commands_never_jump(void **state_)
     (void)state_;
     struct rng r = rng_stream(rig_seed(5), 0, "vehicle");
     struct vehicle_cfg c = vehicle_default();
-    c.sway = (struct vehicle_sway){60.0, 2.0, 60.0, 3.0};
+    c.sway = (struct vehicle_sway){.pitch_arcmin = 60.0, .pitch_s = 2.0, .roll_arcmin = 60.0, .roll_s = 3.0};
     struct vehicle v = at_latitude(-30.0, &c);
     double t_s = 0.0;
     for (unsigned i = 0; i < 2000; i++) {
@@ -205,7 +205,7 @@ static void commands_never_jump(void **state_)
         const double a = 360.0 * rng_uniform(&r) - 180.0;
         const double b = 30.0 * rng_uniform(&r);
         if (i % 3 == 0) vehicle_attitude(&v, a, b, -b, ns(t_s));
-        if (i % 3 == 1) vehicle_sway(&v, &(struct vehicle_sway){b, 1.0 + b, 2.0 * b, 3.0 + b}, ns(t_s));
+        if (i % 3 == 1) vehicle_sway(&v, &(struct vehicle_sway){b, 1.0 + b, 2.0 * b, 3.0 + b, b, b, b, b}, ns(t_s));
         if (i % 3 == 2) vehicle_fly(&v, 10.0 * b, a, ns(t_s));
         const struct vehicle_state after = state(&v, t_s);
         near(after.latitude_rad, before.latitude_rad, 1e-14);
@@ -223,11 +223,65 @@ static void an_instant_before_a_command_gets_what_held_then(void **state_)
     vehicle_attitude(&v, 90.0, 10.0, 5.0, ns(1.0));
     const struct vehicle_state turning = state(&v, 1.9);
     vehicle_fly(&v, 100.0, 0.0, ns(2.0));
-    vehicle_sway(&v, &(struct vehicle_sway){60.0, 2.0, 0.0, 0.0}, ns(2.0));
+    vehicle_sway(&v, &(struct vehicle_sway){.pitch_arcmin = 60.0, .pitch_s = 2.0}, ns(2.0));
     near(state(&v, 1.9).heading_rad, turning.heading_rad, 0.0);
     near(state(&v, 1.9).pitch_rad, turning.pitch_rad, 0.0);
     near(state(&v, 0.5).heading_rad, 0.0, 0.0);
     near(turning.heading_rad, 0.9 * 3.0 * RAD_PER_DEG, 1e-15);
+}
+
+static struct vehicle_sway push(double east_mg, double east_s, double north_mg, double north_s)
+{
+    return (struct vehicle_sway){.east_mg = east_mg, .east_s = east_s, .north_mg = north_mg, .north_s = north_s};
+}
+
+/* Whatever the heading: along the level axes, from the command on, the same in hours, on top of what a flight feels; and it
+ * turns nothing. A new sway ends it. */
+static void a_push_is_a_sine_along_each_level_axis(void **state_)
+{
+    (void)state_;
+    struct vehicle_cfg c = vehicle_default();
+    c.heading_deg = 77.0;
+    c.pitch_deg = 5.0;
+    struct vehicle v = at_latitude(50.0, &c);
+    const struct vehicle still = v;
+    const struct vehicle_sway sway = push(0.3, 20.0, 0.5, 7.0);
+    vehicle_sway(&v, &sway, ns(2.0));
+    assert_false(vehicle_steady(&v, ns(3.0)));
+    static const double at_s[] = {1.0, 2.0, 7.0, 12.0, 13.3, 29.75, 36007.0};
+    for (unsigned i = 0; i < COUNT(at_s); i++) {
+        const double since_s = fmax(at_s[i] - 2.0, 0.0);
+        const struct vehicle_state s = state(&v, at_s[i]);
+        near(s.accel_l_mps2[0], 0.3 * 9.80665e-3 * sin(2.0 * PI * since_s / 20.0),
+             1e-13); /* 10^4 rad are known to 4e-12 */
+        near(s.accel_l_mps2[1], 0.5 * 9.80665e-3 * sin(2.0 * PI * since_s / 7.0), 1e-13);
+        near(s.accel_l_mps2[2], 0.0, 0.0);
+        assert_memory_equal(s.C_lc, state(&still, at_s[i]).C_lc, sizeof s.C_lc);
+        for (unsigned k = 0; k < 3; k++) near(s.w_lc_l_radps[k], 0.0, 0.0);
+    }
+    vehicle_sway(&v, &(struct vehicle_sway){.pitch_s = 3.0}, ns(40000.0));
+    near(state(&v, 40007.0).accel_l_mps2[0], 0.0, 0.0);
+    assert_true(vehicle_steady(&v, ns(40000.0)));
+}
+
+/* With or without a period, with or without an amplitude; at power-on as by command; in flight on top. */
+static void a_push_needs_both_its_numbers(void **state_)
+{
+    (void)state_;
+    struct vehicle_cfg c = vehicle_default();
+    c.sway = push(0.3, 0.0, 0.0, 7.0);
+    struct vehicle v = at_latitude(50.0, &c);
+    assert_true(vehicle_steady(&v, 0));
+    near(state(&v, 3.0).accel_l_mps2[0], 0.0, 0.0);
+    c.sway = push(0.0, 0.0, 0.4, 8.0);
+    v = at_latitude(50.0, &c);
+    assert_false(vehicle_steady(&v, 0));
+    near(state(&v, 2.0).accel_l_mps2[1], 0.4 * 9.80665e-3, 1e-16);
+    struct vehicle calm = at_latitude(50.0, &(struct vehicle_cfg){.turn_dps = 3.0, .tilt_dps = 2.0, .accel_mps2 = 2.0});
+    vehicle_fly(&v, 250.0, 60.0, 0);
+    vehicle_fly(&calm, 250.0, 60.0, 0);
+    near(state(&v, 50.0).accel_l_mps2[1] - state(&calm, 50.0).accel_l_mps2[1], 0.4 * 9.80665e-3, 1e-14);
+    near(state(&v, 50.0).accel_l_mps2[0], state(&calm, 50.0).accel_l_mps2[0], 0.0);
 }
 
 static void headings_go_the_shorter_way_and_poles_are_not_crossed(void **state_)
@@ -265,6 +319,8 @@ int main(void)
         cmocka_unit_test(latitude_is_the_integral_of_the_northern_speed),
         cmocka_unit_test(commands_never_jump),
         cmocka_unit_test(an_instant_before_a_command_gets_what_held_then),
+        cmocka_unit_test(a_push_is_a_sine_along_each_level_axis),
+        cmocka_unit_test(a_push_needs_both_its_numbers),
         cmocka_unit_test(headings_go_the_shorter_way_and_poles_are_not_crossed),
         cmocka_unit_test(on_an_earth_that_stands_still_a_parked_vehicle_has_no_rate),
     };
