@@ -124,6 +124,7 @@ void bench_view(struct bench *b, struct control_bench *v)
     for (unsigned i = 0; i < b->buses; i++) {
         v->bus[i] = &b->bus[i];
         v->bus_name[i] = b->scenario.bus[i].name;
+        v->host[i] = &b->starter.node[i];
     }
     for (unsigned i = 0; i < v->units; i++) {
         v->unit[i] = &b->unit[i];

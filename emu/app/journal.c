@@ -1,5 +1,6 @@
 #include "app/journal.h"
 
+#include "base/can_text.h"
 #include "control/exact.h"
 
 #include <assert.h>
@@ -73,19 +74,6 @@ static int64_t now_ns(const struct journal *j)
     return j->bench->sched.now_ns;
 }
 
-/* 123#1122, 12345678#R4, 123##1112233: candump(1). */
-static void frame_text(const struct can_msg *m, char *out, size_t cap)
-{
-    size_t at = (size_t)snprintf(out, cap, m->flags & CAN_EXT ? "%08" PRIX32 : "%03" PRIX32, m->id);
-    if (m->flags & CAN_FD) at += (size_t)snprintf(out + at, cap - at, "##%d", m->flags & CAN_BRS ? 1 : 0);
-    else at += (size_t)snprintf(out + at, cap - at, "#");
-    if (m->flags & CAN_RTR) {
-        snprintf(out + at, cap - at, "R%u", m->len);
-        return;
-    }
-    for (unsigned i = 0; i < m->len; i++) at += (size_t)snprintf(out + at, cap - at, "%02X", m->data[i]);
-}
-
 /* A name that can stand in quotes as it is. */
 static void plain(const char *name, char *out, size_t cap)
 {
@@ -110,7 +98,7 @@ static void on_deed(void *ctx, const struct can_hub *h, const struct can_client 
     } else if (deed == CAN_HUB_WENT) {
         add(j, now_ns(j), "\"bus\":%u,\"went\":%" PRIu32 "}\n", tap->bus, c->number);
     } else {
-        frame_text(m, text, sizeof text);
+        can_text_put(m, text);
         add(j, now_ns(j), "\"bus\":%u,\"from\":%" PRIu32 ",\"frame\":\"%s\"}\n", tap->bus, c->number, text);
     }
 }
@@ -204,43 +192,6 @@ static bool get_count(const cJSON *json, const char *name, double max, double *o
     return *out == (double)(int64_t)*out;
 }
 
-static int digit(char c)
-{
-    if (c >= '0' && c <= '9') return c - '0';
-    return c >= 'A' && c <= 'F' ? c - 'A' + 10 : -1;
-}
-
-static bool read_data(const char *text, struct can_msg *m)
-{
-    for (; text[0]; text += 2) {
-        if (m->len == sizeof m->data || digit(text[0]) < 0 || digit(text[1]) < 0) return false;
-        m->data[m->len++] = (uint8_t)(digit(text[0]) << 4 | digit(text[1]));
-    }
-    return true;
-}
-
-static bool read_frame(const char *text, struct can_msg *m)
-{
-    const size_t digits = strcspn(text, "#");
-    *m = (struct can_msg){.flags = digits == 8 ? CAN_EXT : 0};
-    if ((digits != 3 && digits != 8) || text[digits] != '#') return false;
-    for (size_t i = 0; i < digits; i++) {
-        if (digit(text[i]) < 0) return false;
-        m->id = m->id << 4 | (uint32_t)digit(text[i]);
-    }
-    text += digits + 1;
-    if (*text == '#') {
-        if (text[1] != '0' && text[1] != '1') return false;
-        m->flags |= text[1] == '1' ? CAN_FD | CAN_BRS : CAN_FD;
-        text += 2;
-    } else if (*text == 'R') {
-        m->flags |= CAN_RTR;
-        m->len = (uint8_t)digit(text[1]);
-        return text[1] >= '0' && text[1] <= '8' && !text[2] && can_valid(m);
-    }
-    return read_data(text, m) && can_valid(m);
-}
-
 static bool read_came(const cJSON *json, struct journal_entry *e)
 {
     double heir_of;
@@ -257,7 +208,7 @@ static bool read_came(const cJSON *json, struct journal_entry *e)
 static bool read_sent(const cJSON *json, struct journal_entry *e)
 {
     const cJSON *frame = cJSON_GetObjectItemCaseSensitive(json, "frame");
-    return cJSON_IsString(frame) && read_frame(frame->valuestring, &e->m);
+    return cJSON_IsString(frame) && can_text_get(frame->valuestring, &e->m);
 }
 
 static bool read_command(const cJSON *json, struct journal_entry *e)

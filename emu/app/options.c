@@ -20,6 +20,7 @@ static const char help[] =
     "        socketcand[:PORT]  socketcand protocol on 127.0.0.1 (default, port 29536; 0 takes a free one)\n"
     "        slcan[:LINK]       slcan on a pseudo-terminal, LINK is made a symbolic link to it\n"
     "        socketcan:IFACE    an interface of the kernel: vcan0, can0\n"
+    "        log:FILE           nobody's: all frames into a file, as candump -L writes them\n"
     "                           --can may be given several times; socketcand without BUS= serves every bus by the\n"
     "                           name that a client opens; --can none: no adapter\n"
     "  --pace wall|step|free    real time (default), only when the control socket says so, as fast as it goes\n"
@@ -137,9 +138,11 @@ static bool set_can(struct target *t, const char *arg)
         c->kind = OPTIONS_SLCAN;
     } else if (len == 9 && strncmp(kind, "socketcan", 9) == 0 && rest) {
         c->kind = OPTIONS_SOCKETCAN;
+    } else if (len == 3 && strncmp(kind, "log", 3) == 0 && rest) {
+        c->kind = OPTIONS_CAN_LOG;
     } else {
-        return why_fail(t->why, t->cap, "--can %s: socketcand[:PORT], slcan[:LINK], socketcan:IFACE or none is wanted",
-                        arg);
+        return why_fail(t->why, t->cap,
+                        "--can %s: socketcand[:PORT], slcan[:LINK], socketcan:IFACE, log:FILE or none is wanted", arg);
     }
     o->can_count++;
     return true;

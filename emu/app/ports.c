@@ -51,6 +51,12 @@ static bool open_socketcan(struct can_hub *hub, struct ports_can *c, const struc
     return why_fail(why, cap, "--can socketcan:%s: %s", o->arg, strerror(-err));
 }
 
+static bool open_log(struct can_hub *hub, struct ports_can *c, const struct options_can *o, char *why, size_t cap)
+{
+    const int err = can_log_open(&c->log, hub->bus, hub->name, o->arg, hub->epoch_ns);
+    return !err || why_fail(why, cap, "--can log:%s: %s", o->arg, strerror(-err));
+}
+
 /* The hub of a bus, the first of all for no name; NULL: there is no such bus. */
 static struct can_hub *hub_of(struct ports *p, const char *bus)
 {
@@ -72,8 +78,10 @@ static bool fail_bus(const struct ports *p, const char *bus, char *why, size_t c
 static bool open_can(struct ports *p, const struct options *o, char *why, size_t cap)
 {
     typedef bool open_fn(struct can_hub *, struct ports_can *, const struct options_can *, char *, size_t);
-    static open_fn *const open[] = {
-        [OPTIONS_SOCKETCAND] = open_socketcand, [OPTIONS_SLCAN] = open_slcan, [OPTIONS_SOCKETCAN] = open_socketcan};
+    static open_fn *const open[] = {[OPTIONS_SOCKETCAND] = open_socketcand,
+                                    [OPTIONS_SLCAN] = open_slcan,
+                                    [OPTIONS_SOCKETCAN] = open_socketcan,
+                                    [OPTIONS_CAN_LOG] = open_log};
     for (unsigned i = 0; i < o->can_count; i++) {
         struct ports_can *c = calloc(1, sizeof *c);
         if (!c) return why_fail(why, cap, "--can: no memory");
@@ -209,6 +217,8 @@ void ports_ready(const struct ports *p, const struct options *o, FILE *out)
             fprintf(out, "ready can=socketcan channel=%s fd=%s%s%s\n", c->socketcan.can.name,
                     c->socketcan.can.node.fd ? "true" : "false", c->bus ? " bus=" : "", c->bus ? c->bus : "");
         }
+        if (c->kind == OPTIONS_CAN_LOG)
+            fprintf(out, "ready can=log file=%s%s%s\n", c->log.path, c->bus ? " bus=" : "", c->bus ? c->bus : "");
     }
     if (p->line) {
         char what[64];
@@ -224,11 +234,26 @@ void ports_ready(const struct ports *p, const struct options *o, FILE *out)
     fflush(out);
 }
 
+bool ports_logs_whole(struct ports *p, void (*say)(void *ctx, const char *text))
+{
+    bool whole = true;
+    for (unsigned i = 0; i < p->can_count; i++) {
+        char text[512];
+        const int err = p->can[i]->kind == OPTIONS_CAN_LOG ? can_log_flush(&p->can[i]->log) : 0;
+        if (!err) continue;
+        snprintf(text, sizeof text, "--can log:%.400s: %s; it is not complete", p->can[i]->log.path, strerror(-err));
+        say(NULL, text);
+        whole = false;
+    }
+    return whole;
+}
+
 static void close_can(struct ports_can *c)
 {
     if (c->kind == OPTIONS_SOCKETCAND) socketcand_close(&c->socketcand);
     if (c->kind == OPTIONS_SLCAN) slcan_pty_close(&c->slcan);
     if (c->kind == OPTIONS_SOCKETCAN) socketcan_close(&c->socketcan);
+    if (c->kind == OPTIONS_CAN_LOG) can_log_close(&c->log);
 }
 
 static void close_all(struct ports *p)

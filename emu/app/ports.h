@@ -7,6 +7,7 @@
 #include "app/instruments.h"
 #include "app/options.h"
 #include "link/can_hub.h"
+#include "link/can_log.h"
 #include "link/ctl_sock.h"
 #include "link/line_pty.h"
 #include "link/slcan_pty.h"
@@ -21,6 +22,7 @@ struct ports_can {
         struct socketcand_server socketcand;
         struct slcan_pty slcan;
         struct socketcan socketcan;
+        struct can_log log;
     };
 };
 
@@ -48,6 +50,9 @@ bool ports_open(struct ports *p, struct bench *b, const struct options *o, char 
 
 /* Prints one `ready key=value ...` line for each endpoint, then `ready all`. */
 void ports_ready(const struct ports *p, const struct options *o, FILE *out);
+
+/* What the logs of frames still hold goes into their files; false when one of them is not complete, which is said. */
+bool ports_logs_whole(struct ports *p, void (*say)(void *ctx, const char *text));
 
 void ports_close(struct ports *p);
 

@@ -475,6 +475,7 @@ void service_close(struct service *s)
         s->vcd_failed = true;
     }
     service_sweep(s, true);
+    if (!ports_logs_whole(&s->ports, say)) s->vcd_failed = true;
     ports_close(&s->ports);
     control_run_forget(&s->control);
     journal_free(&s->journal);

@@ -18,6 +18,7 @@ const struct control_table *const control_tables[] = {&commands_bench,
                                                       &commands_fault,
                                                       &commands_snapshot,
                                                       &commands_bus,
+                                                      &commands_can,
                                                       NULL};
 const struct control_table *const control_truth_tables[] = {&commands_truth, NULL};
 

@@ -41,7 +41,8 @@ struct control_bench {
     void *ctx;
     struct lab *lab;
     struct can_bus *bus[CONTROL_BUSES_MAX];
-    const char *bus_name[CONTROL_BUSES_MAX]; /* NULL: can0, can1, ... */
+    const char *bus_name[CONTROL_BUSES_MAX];  /* NULL: can0, can1, ... */
+    struct can_node *host[CONTROL_BUSES_MAX]; /* who sends for the bench itself */
     unsigned buses;
     struct unit *unit[CONTROL_UNITS_MAX];
     const char *unit_name[CONTROL_UNITS_MAX];

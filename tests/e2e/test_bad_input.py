@@ -94,7 +94,7 @@ def test_a_malformed_profile_is_refused_with_the_arithmetic(
 @pytest.mark.parametrize(
     ("args", "status", "says"),
     [
-        ("--can serial", 2, "socketcand[:PORT], slcan[:LINK], socketcan:IFACE or none is wanted"),
+        ("--can serial", 2, "socketcand[:PORT], slcan[:LINK], socketcan:IFACE, log:FILE or none is wanted"),
         ("--can socketcand:70000", 2, "0 to 65535"),
         ("--can socketcan", 2, "socketcan:IFACE"),
         ("--can slcan:{file}", 3, "another name is wanted"),

@@ -34,11 +34,14 @@ static void every_option_reaches_its_field(void **state)
 {
     (void)state;
     assert_true(
-        parse("--can socketcand:0 quiet --can slcan:/tmp/x --can slcan --can socketcan:vcan0 --pace step --for 300ms "
+        parse("--can socketcand:0 quiet --can slcan:/tmp/x --can slcan --can socketcan:vcan0 --can log:x.log --pace "
+              "step --for 300ms "
               "--seed 18446744073709551615 --vcd a.vcd --vcd-unit 100 --line b --line-hz 1000 --control c --truth d "
               "--unit u --bitrate 500000 --data-bitrate 0 --epoch 1.5 --start --quiet --until-eof"));
     assert_string_equal(o.scenario, "quiet");
-    assert_int_equal(o.can_count, 4);
+    assert_int_equal(o.can_count, 5);
+    assert_int_equal(o.can[4].kind, OPTIONS_CAN_LOG);
+    assert_string_equal(o.can[4].arg, "x.log");
     assert_int_equal(o.can[0].port, 0);
     assert_string_equal(o.can[1].arg, "/tmp/x");
     assert_null(o.can[2].arg);
@@ -84,7 +87,7 @@ static const struct {
     {"--for nan", "--for nan: a time is wanted"},
     {"--for 1e7s", "--for 1e7s: a time is wanted, as 300ms, 10s or 2min, up to 1e6 s"},
     {"--can", "--can: an argument is missing"},
-    {"--can can0", "--can can0: socketcand[:PORT], slcan[:LINK], socketcan:IFACE or none is wanted"},
+    {"--can can0", "--can can0: socketcand[:PORT], slcan[:LINK], socketcan:IFACE, log:FILE or none is wanted"},
     {"--can socketcan", "--can socketcan: socketcand[:PORT]"},
     {"--can socketcan:", "--can socketcan:: socketcand[:PORT]"},
     {"--can socketcand:65536", "--can socketcand:65536: \"65536\" is no port"},

@@ -1,0 +1,55 @@
+/* Frames on the bus from the bench itself: a host's part in scenarios without one. */
+#include "control/args.h"
+#include "control/commands.h"
+
+#include "base/can_text.h"
+
+#include <string.h>
+
+enum { FRAME, BUS };
+
+/* Its number, or control_bench.buses. */
+static unsigned bus_of(const struct control_bench *b, const struct control_value *v)
+{
+    unsigned i = 0;
+    if (!v[BUS].given) return 0;
+    while (i < b->buses && (!b->bus_name[i] || strcmp(b->bus_name[i], v[BUS].text) != 0)) i++;
+    return i;
+}
+
+static bool can_be_sent(const struct control_bench *b, const struct control_value *v, struct control_refusal *why)
+{
+    struct can_msg m;
+    if (!can_text_get(v[FRAME].text, &m))
+        return control_refuse_in(
+            why, "range", "frame: \"%.140s\" is no frame; as 609#2F00210104, 12345678#R4 or 123##01122", v[FRAME].text);
+    const unsigned bus = bus_of(b, v);
+    if (bus < b->buses && b->host[bus]) return true;
+    return control_refuse_in(why, "range", "bus: there is no %s", v[BUS].given ? v[BUS].text : "bus on this bench");
+}
+
+static enum control_outcome do_send(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+{
+    const unsigned bus = bus_of(c->bench, v);
+    struct can_msg m;
+    (void)result;
+    (void)can_text_get(v[FRAME].text, &m);
+    switch (can_send(c->bench->bus[bus], c->bench->host[bus], &m, t_ns)) {
+    case CAN_OK:
+        return CONTROL_DONE;
+    case CAN_FULL:
+        return control_refuse(c, "state", "%u frames of the bench wait for the bus already", CAN_QUEUE_MAX);
+    default:
+        return control_refuse(c, "state", "the bus does not carry such a frame");
+    }
+}
+
+// clang-format off
+static const struct control_command rows[] = {
+    {"can.send", "Puts a frame on a bus as a program there would: a host's part in scenarios without one.",
+     {{"frame", CONTROL_TEXT, .what = "as cansend of can-utils takes it, capital digits: 609#2F00210104"},
+      {"bus", CONTROL_NAME, .optional = true, .what = "name of a bus of the scenario; else the first"}},
+     .run = do_send, .changes = true, .check = can_be_sent},
+};
+// clang-format on
+const struct control_table commands_can = {rows, sizeof rows / sizeof *rows};
