@@ -1,7 +1,5 @@
 #include "base/canbits.h"
 
-#include <stdbool.h>
-
 enum {
     STUFF_RUN = 5,      /* so many equal bits are followed by a bit of the other level */
     CRC15_POLY = 0x4599 /* ISO 11898-1, classic frames */
@@ -10,35 +8,34 @@ enum {
 /* CRC delimiter, ACK slot, ACK delimiter, 7 bits end of frame, interframe space: never stuffed. */
 #define TAIL_BITS (1u + 1u + 1u + 7u + CAN_IFS_BITS)
 
-/* The sender's bit stream between start of frame and CRC. */
+/* The sender's bit stream between start of frame and CRC. By value: the two chains of look-ups live in registers. */
 struct stream {
-    unsigned bits;  /* sent so far, stuff bits included */
-    unsigned run;   /* equal bits up to now */
-    unsigned level; /* of the last bit */
-    uint32_t crc;   /* over the unstuffed bits */
+    unsigned bits; /* sent so far, stuff bits included */
+    unsigned row;  /* 2 (run - 1) + level: equal bits up to now, and theirs */
+    uint32_t crc;  /* over the unstuffed bits; above its 15 bits stands what has been shifted out */
 };
 
+/* A frame begins with a bit 0 alone: there is no run before it, and of the CRC it leaves nothing. */
+static const struct stream after_start = {.bits = 1, .row = 0, .crc = 0};
+
 /* A stuff bit is due before the next bit, so that a frame form may drop the one after its last bit. */
-static void stuff_if_due(struct stream *s)
+static inline unsigned stuff_due(unsigned row)
 {
-    if (s->run < STUFF_RUN) return;
-    s->bits++;
-    s->level ^= 1u;
-    s->run = 1;
+    return row >= 2 * (STUFF_RUN - 1);
 }
 
-static void put_bit(struct stream *s, unsigned bit)
+static inline struct stream put_bit(struct stream s, unsigned bit)
 {
-    stuff_if_due(s);
-    s->run = bit == s->level ? s->run + 1 : 1;
-    s->level = bit;
-    s->bits++;
-    const uint32_t differs = 0u - ((s->crc >> 14 ^ bit) & 1u);
-    s->crc = (s->crc << 1 & 0x7FFFu) ^ (differs & CRC15_POLY);
+    const unsigned due = stuff_due(s.row);
+    const unsigned before = due ? (s.row & 1u) ^ 1u : s.row;
+    s.row = (before & 1u) == bit ? before + 2 : bit;
+    s.bits += 1 + due;
+    const uint32_t differs = 0u - ((s.crc >> 14 ^ bit) & 1u);
+    s.crc = s.crc << 1 ^ (differs & CRC15_POLY);
+    return s;
 }
 
-/* Four bits at once, what put_bit() does four times over. Row: 2 (run - 1) + level, before; entry: the row after, and bit 7 if a
- * stuff bit has come, never two. */
+/* Four bits at once, what put_bit() does four times over. Entry: the row after, and bit 7 if a stuff bit has come, never two. */
 static const uint8_t after_four[2 * STUFF_RUN][16] = {
     // clang-format off
     {0x08, 0x01, 0x00, 0x03, 0x02, 0x01, 0x00, 0x05, 0x04, 0x01, 0x00, 0x03, 0x02, 0x01, 0x00, 0x07},
@@ -57,53 +54,43 @@ static const uint8_t after_four[2 * STUFF_RUN][16] = {
 static const uint16_t crc_of[16] = {0x0000, 0x4599, 0x4EAB, 0x0B32, 0x58CF, 0x1D56, 0x1664, 0x53FD,
                                     0x7407, 0x319E, 0x3AAC, 0x7F35, 0x2CC8, 0x6951, 0x6263, 0x27FA};
 
-static void put_four(struct stream *s, unsigned four)
+static inline struct stream put_four(struct stream s, unsigned four)
 {
-    const unsigned after = after_four[2 * (s->run - 1) + s->level][four];
-    s->bits += 4 + (after >> 7);
-    s->run = (after >> 1 & 7u) + 1;
-    s->level = after & 1u;
-    s->crc = (s->crc << 4 & 0x7FFFu) ^ crc_of[(s->crc >> 11 ^ four) & 15u];
+    const unsigned after = after_four[s.row][four];
+    s.bits += 4 + (after >> 7);
+    s.row = after & 15u;
+    s.crc = s.crc << 4 ^ crc_of[(s.crc >> 11 ^ four) & 15u];
+    return s;
 }
 
-/* The first bit of a stream comes alone: there is no run before it. */
-static void put(struct stream *s, uint32_t value, unsigned bits)
+static inline struct stream put(struct stream s, uint64_t value, unsigned bits)
 {
-    for (; bits % 4 != 0; bits--) put_bit(s, (unsigned)(value >> (bits - 1)) & 1u);
-    for (; bits > 0; bits -= 4) put_four(s, (unsigned)(value >> (bits - 4)) & 15u);
+    for (; bits % 4 != 0; bits--) s = put_bit(s, (unsigned)(value >> (bits - 1)) & 1u);
+    for (; bits > 0; bits -= 4) s = put_four(s, (unsigned)(value >> (bits - 4)) & 15u);
+    return s;
 }
 
-static void put_data(struct stream *s, const struct can_msg *m)
+static inline struct stream put_data(struct stream s, const struct can_msg *m)
 {
-    for (unsigned i = 0; i < m->len; i++) put(s, m->data[i], 8);
+    for (unsigned i = 0; i < m->len; i++) s = put_four(put_four(s, m->data[i] >> 4), m->data[i] & 15u);
+    return s;
 }
 
-/* Start of frame to the bit before IDE's successor: base identifier, or base, SRR, IDE and extension. */
-static void put_id(struct stream *s, const struct can_msg *m, unsigned rtr)
+/* What follows the start of frame up to and with the last bit of arbitration, RTR or IDE: base identifier, or base, SRR, IDE and
+ * extension; then `bits` more. */
+static inline struct stream put_head(const struct can_msg *m, unsigned more, unsigned bits)
 {
-    put(s, 0, 1);
-    if (m->flags & CAN_EXT) {
-        put(s, m->id >> 18, 11);
-        put(s, 3, 2);
-        put(s, m->id & 0x3FFFFu, 18);
-        put(s, rtr, 1);
-    } else {
-        put(s, m->id, 11);
-        put(s, rtr << 1, 2);
-    }
+    if (m->flags & CAN_EXT) return put(after_start, (uint64_t)can_arbitration(m) << bits | more, 32 + bits);
+    return put(after_start, (can_arbitration(m) >> 19) << bits | more, 13 + bits);
 }
 
 static struct can_bits classic(const struct can_msg *m)
 {
-    struct stream s = {.level = 1};
-    const bool remote = m->flags & CAN_RTR;
-    put_id(&s, m, remote);
-    put(&s, 0, m->flags & CAN_EXT ? 2 : 1); /* r1, r0 */
-    put(&s, can_dlc(m->len), 4);
-    if (!remote) put_data(&s, m);
-    put(&s, s.crc, 15);
-    stuff_if_due(&s);
-    return (struct can_bits){s.bits + TAIL_BITS, 0};
+    const unsigned reserved = m->flags & CAN_EXT ? 2 : 1; /* r1, r0 */
+    struct stream s = put_head(m, can_dlc(m->len), reserved + 4);
+    if (!(m->flags & CAN_RTR)) s = put_data(s, m);
+    s = put(s, s.crc & 0x7FFFu, 15);
+    return (struct can_bits){s.bits + stuff_due(s.row) + TAIL_BITS, 0};
 }
 
 /* Stuff count (3 bits Gray code and parity), CRC, and a fixed stuff bit before the first and after every fourth of them. */
@@ -115,14 +102,10 @@ static unsigned fd_crc_bits(unsigned len)
 
 static struct can_bits fd(const struct can_msg *m)
 {
-    struct stream s = {.level = 1};
     const unsigned brs = m->flags & CAN_BRS ? 1 : 0;
-    put_id(&s, m, 0);
-    put(&s, 4 | brs, 3); /* FDF, res, BRS */
+    struct stream s = put_head(m, 4 | brs, 3); /* FDF, res, BRS */
     const unsigned arbitration = s.bits;
-    put(&s, 0, 1); /* ESI */
-    put(&s, can_dlc(m->len), 4);
-    put_data(&s, m);
+    s = put_data(put(s, can_dlc(m->len), 5), m); /* ESI 0 */
     /* No stuff bit after the last data bit: the fixed one stands there. */
     const unsigned fast = s.bits - arbitration + fd_crc_bits(m->len);
     return brs ? (struct can_bits){arbitration + TAIL_BITS, fast}
@@ -169,7 +152,7 @@ struct can_bits can_bits_worst(uint8_t flags, uint8_t len)
 
 static int64_t bits_ns(unsigned bits, uint32_t hz)
 {
-    return hz ? ((int64_t)bits * NS_PER_S + hz / 2) / hz : 0;
+    return bits != 0 && hz != 0 ? ((int64_t)bits * NS_PER_S + hz / 2) / hz : 0;
 }
 
 int64_t can_bits_ns(struct can_bits n, const struct can_bus_cfg *cfg)
