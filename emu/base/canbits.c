@@ -76,12 +76,14 @@ static inline struct stream put_data(struct stream s, const struct can_msg *m)
     return s;
 }
 
-/* What follows the start of frame up to and with the last bit of arbitration, RTR or IDE: base identifier, or base, SRR, IDE and
+/* What follows the start of frame up to the last bit of arbitration, RTR or IDE: base identifier, or base, SRR, IDE and
  * extension; then `bits` more. */
 static inline struct stream put_head(const struct can_msg *m, unsigned more, unsigned bits)
 {
-    if (m->flags & CAN_EXT) return put(after_start, (uint64_t)can_arbitration(m) << bits | more, 32 + bits);
-    return put(after_start, (can_arbitration(m) >> 19) << bits | more, 13 + bits);
+    const unsigned rtr = m->flags & CAN_RTR ? 1 : 0;
+    if (!(m->flags & CAN_EXT)) return put(after_start, (m->id << 2 | rtr << 1) << bits | more, 13 + bits);
+    const uint64_t id = (m->id >> 18) << 21 | 3u << 19 | (m->id & 0x3FFFFu) << 1 | rtr;
+    return put(after_start, id << bits | more, 32 + bits);
 }
 
 static struct can_bits classic(const struct can_msg *m)
