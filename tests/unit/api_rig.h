@@ -141,4 +141,22 @@ static inline void rig_vcd_read(struct rig_vcd *v)
     (void)unlink(v->path);
 }
 
+/* What a watcher of one pin has heard. */
+struct rig_seen {
+    psabench_part *p;
+    int pin;
+    unsigned count, wrong;
+    int64_t t_ns[100];
+    int level[100];
+};
+
+static inline void rig_note(void *ctx, psabench_part *p, int number, int level, int64_t t_ns)
+{
+    struct rig_seen *s = ctx;
+    s->wrong +=
+        p != s->p || number != s->pin || psabench_get(p, number) != level || psabench_now_ns(psabench_of(p)) != t_ns;
+    if (s->count < COUNT(s->t_ns)) s->t_ns[s->count] = t_ns, s->level[s->count] = level;
+    s->count++;
+}
+
 #endif

@@ -2,20 +2,12 @@
 #ifndef PSABENCH_TESTS_NODE_RIG_H
 #define PSABENCH_TESTS_NODE_RIG_H
 
-#include "base/bits.h"
+#include "host_wire.h"
+
 #include "board/node.h"
 #include "gen/pik_od.h"
 #include "gen/pmka_od.h"
 #include "gen/psd1_od.h"
-
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <string.h>
-
-#include <cmocka.h>
 
 enum { NODE = 6, SEEN_MAX = 1024, COUNTERS_MAX = 64, ADDRESSES = 4, OWN_OBJECT = 0x1009 };
 
@@ -131,14 +123,12 @@ static inline void on_rx(void *ctx, const struct can_msg *m, int64_t t_ns)
 
 static inline void settle(struct rig *r)
 {
-    sched_run_until(&r->s, r->s.now_ns + NS_PER_S / 200);
+    host_settle(&r->bus);
 }
 
 static inline void host_sends(struct rig *r, uint32_t id, uint8_t len, const uint8_t *data)
 {
-    struct can_msg m = {.id = id, .len = len};
-    if (data) memcpy(m.data, data, len);
-    assert_int_equal(can_send(&r->bus, &r->host, &m, r->s.now_ns), CAN_OK);
+    host_put(&r->bus, &r->host, id, len, data);
     settle(r);
 }
 
@@ -196,12 +186,9 @@ static inline struct rig *rig_up(void)
 
 static inline void ask(struct rig *r, uint8_t command, uint16_t index, uint8_t sub, uint32_t data)
 {
-    uint8_t frame[8] = {command};
-    bits_put_le(&frame[1], index, 2);
-    frame[3] = sub;
-    bits_put_le(&frame[4], data, 4);
     r->count = 0;
-    host_sends(r, 0x600 + NODE, 8, frame);
+    host_asks(&r->bus, &r->host, NODE, command, index, sub, data);
+    settle(r);
 }
 
 static inline const struct can_msg *seen_id(const struct rig *r, uint32_t id)

@@ -2,19 +2,11 @@
 #ifndef PSABENCH_TESTS_PSA2_CAN_RIG_H
 #define PSABENCH_TESTS_PSA2_CAN_RIG_H
 
-#include "base/bits.h"
+#include "host_wire.h"
+
 #include "board/psa2_can.h"
 #include "board/unit.h"
 #include "gen/psabench_can.h"
-
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <string.h>
-
-#include <cmocka.h>
 
 enum { NODE = 5, SEEN_MAX = 4096, FCLK_HZ = 4096000 };
 
@@ -88,14 +80,12 @@ static inline void on_rx(void *ctx, const struct can_msg *m, int64_t t_ns)
 
 static inline void settle(struct rig *r)
 {
-    sched_run_until(&r->s, r->s.now_ns + NS_PER_S / 200);
+    host_settle(&r->bus);
 }
 
 static inline void host_sends(struct rig *r, uint32_t id, uint8_t len, const uint8_t *data)
 {
-    struct can_msg m = {.id = id, .len = len};
-    if (data) memcpy(m.data, data, len);
-    assert_int_equal(can_send(&r->bus, &r->host, &m, r->s.now_ns), CAN_OK);
+    host_put(&r->bus, &r->host, id, len, data);
     settle(r);
 }
 
@@ -158,12 +148,9 @@ static inline void board_sends(struct rig *r, unsigned n)
 /* One request; the answer is the newest frame seen, if there is one yet. */
 static inline void ask(struct rig *r, uint8_t command, uint16_t index, uint8_t sub, uint32_t data)
 {
-    uint8_t frame[8] = {command};
-    bits_put_le(&frame[1], index, 2);
-    frame[3] = sub;
-    bits_put_le(&frame[4], data, 4);
     r->count = 0;
-    host_sends(r, 0x600 + NODE, 8, frame);
+    host_asks(&r->bus, &r->host, NODE, command, index, sub, data);
+    settle(r);
 }
 
 static inline uint32_t answer(const struct rig *r)

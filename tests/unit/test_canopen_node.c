@@ -1,15 +1,7 @@
-#include "base/bits.h"
+#include "host_wire.h"
+
 #include "canopen/co_node.h"
 #include "gen/psa2_od.h"
-
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
 
 enum { NODE = 5, SEEN_MAX = 256 };
 
@@ -91,9 +83,7 @@ static struct rig *rig_up(void)
 
 static void host_sends(struct rig *r, uint32_t id, uint8_t len, const uint8_t *data)
 {
-    struct can_msg m = {.id = id, .len = len};
-    if (data) memcpy(m.data, data, len);
-    assert_int_equal(can_send(&r->bus, &r->host, &m, r->s.now_ns), CAN_OK);
+    host_put(&r->bus, &r->host, id, len, data);
     settle(r);
 }
 
@@ -104,11 +94,8 @@ static void nmt(struct rig *r, uint8_t command, uint8_t node)
 
 static uint32_t sdo(struct rig *r, uint8_t command, uint16_t index, uint8_t sub, uint32_t data)
 {
-    uint8_t frame[8] = {command};
-    bits_put_le(&frame[1], index, 2);
-    frame[3] = sub;
-    bits_put_le(&frame[4], data, 4);
-    host_sends(r, 0x600 + NODE, 8, frame);
+    host_asks(&r->bus, &r->host, NODE, command, index, sub, data);
+    settle(r);
     const struct can_msg *m = &r->seen[r->count - 1];
     assert_int_equal(m->id, 0x580 + NODE);
     r->at = r->count;

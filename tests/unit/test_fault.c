@@ -1,172 +1,8 @@
-/* The fault engine: when faults begin and end, what is refused, and that what is accepted reaches the part it is for. */
-#include "rig.h"
-
-#include "control/fault.h"
+/* The fault engine: when faults begin and end, and what is refused. */
+#include "fault_rig.h"
 
 #include <math.h>
 #include <string.h>
-
-#define MS INT64_C(1000000)
-
-enum { UNITS = 2, PROGRAMS = 2, EVENTS_MAX = 4096, CHANGES_MAX = 64 };
-
-struct heard {
-    enum psa2_event e;
-    int64_t t_ns;
-};
-
-struct change {
-    uint32_t id;
-    enum fault_state state;
-    int64_t t_ns;
-};
-
-static struct {
-    struct sched s;
-    struct can_bus bus;
-    struct lab lab;
-    struct unit unit[UNITS];
-    struct can_node node[UNITS], program[PROGRAMS];
-    uint32_t came[PROGRAMS + 1]; /* who is on the bus, up to 0 */
-    struct control_bench view;
-    struct fault_engine engine;
-    struct control control;
-    struct unit_listener listener;
-    struct heard heard[EVENTS_MAX];
-    unsigned events;
-    struct change change[CHANGES_MAX];
-    unsigned changes;
-    struct psa2_frame frame; /* latest of unit a */
-    unsigned frames;
-} r;
-
-static void on_event(void *ctx, enum psa2_event e, int64_t t_ns)
-{
-    (void)ctx;
-    if (r.events < EVENTS_MAX) r.heard[r.events++] = (struct heard){e, t_ns};
-}
-
-static void on_change(void *ctx, const struct fault *f, int64_t t_ns)
-{
-    (void)ctx;
-    assert_true(r.changes < CHANGES_MAX);
-    r.change[r.changes++] = (struct change){f->id, f->state, t_ns};
-}
-
-static void on_frame(void *ctx, const struct psa2_frame *f, int64_t t_ns)
-{
-    (void)ctx;
-    (void)t_ns;
-    r.frame = *f;
-    r.frames++;
-}
-
-static bool on_client(void *ctx, unsigned i, struct control_client *out)
-{
-    (void)ctx;
-    *out = (struct control_client){.adapter = "socketcand", .name = "can0", .came = r.came[i], .place = r.came[i]};
-    return r.came[i] != 0;
-}
-
-static struct can_node *on_client_node(void *ctx, uint32_t place)
-{
-    (void)ctx;
-    for (unsigned i = 0; r.came[i]; i++) {
-        if (r.came[i] == place) return &r.program[place - 1];
-    }
-    return NULL;
-}
-
-static void init_unit(unsigned i)
-{
-    static const char *const name[UNITS] = {"a", "b"};
-    struct unit_cfg cfg = unit_default(name[i]);
-    cfg.axis[0].sensor = UNIT_MEMS;
-    cfg.axis[0].mems = (struct mems_g){.u0_v = 2.5, .kx_v_per_g = 1.0};
-    cfg.board.adc_noise_scale = cfg.board.temp_noise_scale = 0.0;
-    cfg.board.serial = i + 1;
-    if (i == 1) cfg.board.afe[0] = afe_nominal(AFE_CURRENT);
-    if (i == 1) cfg.board.afe[0].clip_v = 5.0;
-    unit_init(&r.unit[i], &cfg, &r.lab, &r.s);
-    r.node[i] = (struct can_node){.name = name[i]};
-    can_attach(&r.bus, &r.node[i]);
-    r.view.unit[i] = &r.unit[i];
-    r.view.unit_name[i] = name[i];
-    r.view.node[i] = &r.node[i];
-}
-
-static int fresh(void **state)
-{
-    struct lab_cfg lab = lab_default();
-    lab.supply.present = true;
-    lab.platform.present = true;
-    (void)state;
-    memset(&r, 0, sizeof r);
-    sched_init(&r.s);
-    can_bus_init(&r.bus, &(struct can_bus_cfg){.bitrate_hz = 1000000}, &r.s);
-    lab_init(&r.lab, &lab, 1);
-    r.view = (struct control_bench){.lab = &r.lab,
-                                    .bus = {&r.bus},
-                                    .bus_name = {"can0"},
-                                    .buses = 1,
-                                    .units = UNITS,
-                                    .seed = 7,
-                                    .faults = &r.engine,
-                                    .client = on_client,
-                                    .client_node = on_client_node};
-    for (unsigned i = 0; i < UNITS; i++) init_unit(i);
-    r.program[0].name = "program";
-    can_attach(&r.bus, &r.program[0]);
-    r.came[0] = 1;
-    fault_init(&r.engine, &r.view, &r.s);
-    r.engine.changed = on_change;
-    control_init(&r.control, control_tables, &r.view);
-    psa2_attach(r.unit[0].board, &(struct psa2_host){.frame = on_frame});
-    r.listener.fn = on_event;
-    unit_listen(&r.unit[0], &r.listener);
-    for (unsigned i = 0; i < UNITS; i++) psa2_power_up(r.unit[i].board, 0);
-    return 0;
-}
-
-static void run_to(int64_t t_ns)
-{
-    sched_run_until(&r.s, t_ns);
-}
-
-/* The number that fault.add gives; 0: refused, the reason stands in the control. Single quotes for double ones. */
-static uint32_t add(const char *args)
-{
-    char json[512];
-    snprintf(json, sizeof json, "%s", args);
-    for (char *s = json; *s; s++) *s = *s == '\'' ? '"' : *s;
-    cJSON *j = cJSON_Parse(json);
-    cJSON *result = cJSON_CreateObject();
-    assert_non_null(j);
-    const enum control_outcome done = control_call(&r.control, "fault.add", j, result, r.s.now_ns);
-    const uint32_t id =
-        done == CONTROL_DONE ? (uint32_t)cJSON_GetObjectItemCaseSensitive(result, "id")->valuedouble : 0;
-    cJSON_Delete(result);
-    cJSON_Delete(j);
-    return id;
-}
-
-/* The n-th event of a kind that comes after t_ns. */
-static int64_t nth_ns(enum psa2_event e, unsigned n, int64_t after_ns)
-{
-    for (unsigned i = 0; i < r.events; i++) {
-        if (r.heard[i].e == e && r.heard[i].t_ns > after_ns && --n == 0) return r.heard[i].t_ns;
-    }
-    fail_msg("no such event");
-    return 0;
-}
-
-static void assert_change(unsigned i, uint32_t id, enum fault_state state, int64_t t_ns)
-{
-    assert_true(i < r.changes);
-    assert_int_equal(r.change[i].id, id);
-    assert_int_equal(r.change[i].state, state);
-    assert_int_equal(r.change[i].t_ns, t_ns);
-}
 
 /* ---- when */
 
@@ -437,121 +273,6 @@ static void points_have_names_of_their_own(void **state)
     assert_false(fault_point_find(&r.view, "A.LINE.INT ", &p, name));
 }
 
-/* ---- what reaches the parts */
-
-/* 2.5 V at rest (the x axis is horizontal); a bias of 1 V makes 3.5 V: 10 V are 2^23 codes. */
-static void a_bias_is_in_the_codes(void **state)
-{
-    (void)state;
-    run_to(400 * MS);
-    const double before_v = (double)r.frame.code[0] * 10.0 / 8388608.0;
-    add("{'kind':'sensor.bias','point':'a.sensor.x','bias_v':1}");
-    run_to(600 * MS);
-    const double after_v = (double)r.frame.code[0] * 10.0 / 8388608.0;
-    if (fabs(after_v - before_v - 1.0) > 1e-3) fail_msg("%g V became %g V", before_v, after_v);
-}
-
-/* Volts of the arguments are volts at the load. */
-static void volts_of_a_current_sensor_are_those_at_its_load(void **state)
-{
-    (void)state;
-    add("{'kind':'sensor.stuck','point':'b.sensor.x','out_v':5}");
-    const double signal = sensor_fault_out(r.unit[1].sensor_faults[0], 0.0, 1);
-    if (fabs(signal - 5e-3) > 1e-15) fail_msg("%g A", signal);
-}
-
-/* Each chip has its own faults; those of one add up, and the first to end leaves the other. */
-static void faults_of_a_chip_add_up(void **state)
-{
-    (void)state;
-    run_to(400 * MS);
-    add("{'kind':'chip.dout_dead','point':'a.adc.x','level':'high','for_s':0.1}");
-    add("{'kind':'chip.dout_dead','point':'a.adc.z','level':'low','for_s':0.2}");
-    add("{'kind':'chip.lost_sync','point':'a.adc.x','at_s':0.41}");
-    add("{'kind':'controller.frozen_words','point':'a.kpsa','at_s':0.45,'for_s':0.1}");
-    run_to(440 * MS);
-    assert_int_equal(r.frame.code[0], -1);
-    assert_int_equal(r.frame.code[2], 0);
-    run_to(540 * MS);
-    assert_int_equal(r.frame.code[0], -1); /* frozen, though the pin is well again */
-    assert_true(((struct psa2 *)r.unit[0].board)->adc[0].fault.lost_sync);
-    run_to(590 * MS);
-    assert_true(r.frame.code[0] > 2000000);
-    assert_int_equal(r.changes, 6);
-}
-
-/* Two that begin together end apart; one for which the supply is too high by then does nothing, and says so. */
-static void brownouts_are_those_that_were_asked_for(void **state)
-{
-    (void)state;
-    add("{'kind':'supply.brownout','point':'supply','drop_v':5,'for_s':0.01,'at_s':0.1}");
-    add("{'kind':'supply.brownout','point':'supply','drop_v':50,'for_s':0.1,'at_s':0.1}");
-    const uint32_t late = add("{'kind':'supply.brownout','point':'supply','drop_v':4,'for_s':0.1,'at_s':0.3}");
-    run_to(120 * MS);
-    assert_true(supply_volts(&r.lab.supply, 120 * MS) == 0.0);
-    run_to(201 * MS);
-    assert_true(supply_volts(&r.lab.supply, 201 * MS) == 12.0);
-    supply_set(&r.lab.supply, 15.0, 201 * MS);
-    run_to(301 * MS);
-    assert_change(4, late, FAULT_VOID, 300 * MS);
-}
-
-/* As many as there can be faults: none is accepted and then void for want of room. */
-static void any_number_of_brownouts_may_be_under_way_at_once(void **state)
-{
-    (void)state;
-    r.engine.changed = NULL;
-    for (unsigned i = 0; i < FAULTS_MAX; i++) {
-        assert_int_equal(add("{'kind':'supply.brownout','point':'supply','drop_v':5,'for_s':0.1,'at_s':0.1}"), i + 1);
-    }
-    run_to(150 * MS);
-    for (uint32_t id = 1; id <= FAULTS_MAX; id++) {
-        if (fault_find(&r.engine, id)->state != FAULT_ACTIVE) fail_msg("%u of them are under way", id - 1);
-    }
-    run_to(201 * MS);
-    assert_true(supply_volts(&r.lab.supply, 201 * MS) == 12.0);
-}
-
-/* Registers without power hold nothing. */
-static void a_flip_in_a_board_without_power_is_void(void **state)
-{
-    static const char *const args[] = {"{'kind':'chip.flip','point':'b.adc.z','register':2,'mask':1}",
-                                       "{'kind':'chip.flip','point':'b.tadc','register':2,'mask':1}"};
-    (void)state;
-    run_to(400 * MS);
-    psa2_power_down(r.unit[1].board, r.s.now_ns);
-    for (size_t i = 0; i < COUNT(args); i++) {
-        const uint32_t id = add(args[i]);
-        assert_true(id != 0);
-        assert_int_equal(fault_find(&r.engine, id)->state, FAULT_VOID);
-    }
-}
-
-/* Two microvolts at the load are more than a code of 1.19 uV: of all codes of a quiet channel none stays. */
-static void the_least_bias_is_seen(void **state)
-{
-    (void)state;
-    run_to(400 * MS);
-    const int32_t before = r.frame.code[0];
-    assert_true(add("{'kind':'sensor.bias','point':'a.sensor.x','bias_v':2e-6}") != 0);
-    run_to(600 * MS);
-    assert_true(r.frame.code[0] > before);
-    assert_true(r.frame.code[0] <= before + 2);
-}
-
-static void what_is_over_at_once_needs_no_lifting(void **state)
-{
-    (void)state;
-    run_to(400 * MS);
-    const uint32_t flip = add("{'kind':'chip.flip','point':'a.adc.y','register':2,'mask':1}");
-    const uint32_t glitch = add("{'kind':'line.glitch','point':'a.line.Int','width_ns':100,'at_s':0.41}");
-    run_to(420 * MS);
-    assert_change(0, flip, FAULT_ACTIVE, 400 * MS);
-    assert_change(1, flip, FAULT_OVER, 400 * MS);
-    assert_change(2, glitch, FAULT_ACTIVE, 410 * MS);
-    assert_change(3, glitch, FAULT_OVER, 410 * MS);
-}
-
 static void refused(const char *cmd, const char *args)
 {
     cJSON *j = cJSON_Parse(args), *result = cJSON_CreateObject();
@@ -578,20 +299,6 @@ static void a_refused_command_leaves_no_trace(void **state)
     assert_int_equal(r.unit[0].mems[0].t_ns, looked_ns);
 }
 
-/* Same number, same noise; another number, another one. */
-static void random_faults_are_seeded_by_their_number(void **state)
-{
-    double out[3];
-    for (int i = 0; i < 3; i++) {
-        fresh(state);
-        if (i == 2) add("{'kind':'controller.frozen_words','point':'b.kpsa'}");
-        assert_int_equal(add("{'kind':'sensor.noise','point':'a.sensor.x','rms_v':0.1}"), i == 2 ? 2 : 1);
-        out[i] = sensor_fault_out(r.unit[0].sensor_faults[0], 0.0, 1);
-    }
-    assert_true(out[0] == out[1]);
-    assert_true(out[0] != out[2]);
-}
-
 int main(void)
 {
 #define TEST(name) cmocka_unit_test_setup(name, fresh)
@@ -605,19 +312,10 @@ int main(void)
         TEST(a_fault_that_waits_or_listens_can_be_cleared),
         TEST(places_are_used_again_but_not_those_of_living_faults),
         TEST(a_program_keeps_its_number_when_an_older_one_leaves),
-        TEST(any_number_of_brownouts_may_be_under_way_at_once),
-        TEST(a_flip_in_a_board_without_power_is_void),
-        TEST(the_least_bias_is_seen),
         TEST(what_does_not_fit_is_refused_with_the_reason),
-        TEST(brownouts_are_those_that_were_asked_for),
         TEST(a_refused_command_leaves_no_trace),
         TEST(every_kind_at_every_point_fits_or_says_why_not),
         TEST(points_have_names_of_their_own),
-        TEST(a_bias_is_in_the_codes),
-        TEST(volts_of_a_current_sensor_are_those_at_its_load),
-        TEST(faults_of_a_chip_add_up),
-        TEST(what_is_over_at_once_needs_no_lifting),
-        TEST(random_faults_are_seeded_by_their_number),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

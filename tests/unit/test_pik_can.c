@@ -1,7 +1,6 @@
 /* A PIK as its unit and the bus see it: the type's table, and what goes over CAN. */
-#include "rig.h"
+#include "host_wire.h"
 
-#include "base/bits.h"
 #include "board/boards.h"
 #include "board/pik_board.h"
 #include "board/pik_parts.h"
@@ -51,9 +50,7 @@ static void run(struct rig *rig, int64_t ns)
 
 static void host_sends(struct rig *rig, uint32_t id, uint8_t len, const uint8_t *data)
 {
-    struct can_msg m = {.id = id, .len = len};
-    memcpy(m.data, data, len);
-    assert_int_equal(can_send(&rig->bus, &rig->host, &m, rig->s.now_ns), CAN_OK);
+    host_put(&rig->bus, &rig->host, id, len, data);
     run(rig, 3000000);
 }
 

@@ -1,4 +1,5 @@
 /* PMKA on CAN: the readings in PDOs, registers and refusals by SDO, the stream judged. */
+#include "host_wire.h"
 #include "pmka_rig.h"
 
 #include "gen/pmka_od.h"
@@ -50,11 +51,9 @@ static void start(int64_t bitrate_hz)
     pmka_board.can->power_up(&wire.can, 0);
 }
 
-static void send(uint32_t id, unsigned len, const uint8_t *data)
+static void send(uint32_t id, uint8_t len, const uint8_t *data)
 {
-    struct can_msg m = {.id = id, .len = (uint8_t)len};
-    memcpy(m.data, data, len);
-    assert_int_equal(can_send(&wire.bus, &wire.host, &m, rig.s.now_ns), CAN_OK);
+    host_put(&wire.bus, &wire.host, id, len, data);
 }
 
 static void operational(void)
@@ -66,17 +65,9 @@ static void operational(void)
 /* Expedited: the abort code, or 0 and what was read. */
 static uint32_t sdo(bool write, unsigned index, unsigned sub, unsigned size, uint32_t *data)
 {
-    const uint8_t up[] = {0x40, (uint8_t)index, (uint8_t)(index >> 8), (uint8_t)sub, 0, 0, 0, 0};
-    const uint8_t down[] = {(uint8_t)(0x23 | (4 - size) << 2),
-                            (uint8_t)index,
-                            (uint8_t)(index >> 8),
-                            (uint8_t)sub,
-                            (uint8_t)*data,
-                            (uint8_t)(*data >> 8),
-                            (uint8_t)(*data >> 16),
-                            (uint8_t)(*data >> 24)};
+    const uint8_t command = write ? (uint8_t)(0x23 | (4 - size) << 2) : 0x40;
     wire.count = 0;
-    send(0x600 + NODE, 8, write ? down : up);
+    host_asks(&wire.bus, &wire.host, NODE, command, (uint16_t)index, (uint8_t)sub, write ? *data : 0);
     for (unsigned n = 0; n < 100; n++) {
         sched_run_until(&rig.s, rig.s.now_ns + 100000);
         for (unsigned k = 0; k < wire.count; k++) {

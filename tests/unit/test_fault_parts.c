@@ -1,0 +1,149 @@
+/* The fault engine: what is accepted reaches the part it is for. */
+#include "fault_rig.h"
+
+#include <math.h>
+#include <string.h>
+
+/* 2.5 V at rest (the x axis is horizontal); a bias of 1 V makes 3.5 V: 10 V are 2^23 codes. */
+static void a_bias_is_in_the_codes(void **state)
+{
+    (void)state;
+    run_to(400 * MS);
+    const double before_v = (double)r.frame.code[0] * 10.0 / 8388608.0;
+    add("{'kind':'sensor.bias','point':'a.sensor.x','bias_v':1}");
+    run_to(600 * MS);
+    const double after_v = (double)r.frame.code[0] * 10.0 / 8388608.0;
+    if (fabs(after_v - before_v - 1.0) > 1e-3) fail_msg("%g V became %g V", before_v, after_v);
+}
+
+/* Volts of the arguments are volts at the load. */
+static void volts_of_a_current_sensor_are_those_at_its_load(void **state)
+{
+    (void)state;
+    add("{'kind':'sensor.stuck','point':'b.sensor.x','out_v':5}");
+    const double signal = sensor_fault_out(r.unit[1].sensor_faults[0], 0.0, 1);
+    if (fabs(signal - 5e-3) > 1e-15) fail_msg("%g A", signal);
+}
+
+/* Each chip has its own faults; those of one add up, and the first to end leaves the other. */
+static void faults_of_a_chip_add_up(void **state)
+{
+    (void)state;
+    run_to(400 * MS);
+    add("{'kind':'chip.dout_dead','point':'a.adc.x','level':'high','for_s':0.1}");
+    add("{'kind':'chip.dout_dead','point':'a.adc.z','level':'low','for_s':0.2}");
+    add("{'kind':'chip.lost_sync','point':'a.adc.x','at_s':0.41}");
+    add("{'kind':'controller.frozen_words','point':'a.kpsa','at_s':0.45,'for_s':0.1}");
+    run_to(440 * MS);
+    assert_int_equal(r.frame.code[0], -1);
+    assert_int_equal(r.frame.code[2], 0);
+    run_to(540 * MS);
+    assert_int_equal(r.frame.code[0], -1); /* frozen, though the pin is well again */
+    assert_true(((struct psa2 *)r.unit[0].board)->adc[0].fault.lost_sync);
+    run_to(590 * MS);
+    assert_true(r.frame.code[0] > 2000000);
+    assert_int_equal(r.changes, 6);
+}
+
+/* Two that begin together end apart; one for which the supply is too high by then does nothing, and says so. */
+static void brownouts_are_those_that_were_asked_for(void **state)
+{
+    (void)state;
+    add("{'kind':'supply.brownout','point':'supply','drop_v':5,'for_s':0.01,'at_s':0.1}");
+    add("{'kind':'supply.brownout','point':'supply','drop_v':50,'for_s':0.1,'at_s':0.1}");
+    const uint32_t late = add("{'kind':'supply.brownout','point':'supply','drop_v':4,'for_s':0.1,'at_s':0.3}");
+    run_to(120 * MS);
+    assert_true(supply_volts(&r.lab.supply, 120 * MS) == 0.0);
+    run_to(201 * MS);
+    assert_true(supply_volts(&r.lab.supply, 201 * MS) == 12.0);
+    supply_set(&r.lab.supply, 15.0, 201 * MS);
+    run_to(301 * MS);
+    assert_change(4, late, FAULT_VOID, 300 * MS);
+}
+
+/* As many as there can be faults: none is accepted and then void for want of room. */
+static void any_number_of_brownouts_may_be_under_way_at_once(void **state)
+{
+    (void)state;
+    r.engine.changed = NULL;
+    for (unsigned i = 0; i < FAULTS_MAX; i++) {
+        assert_int_equal(add("{'kind':'supply.brownout','point':'supply','drop_v':5,'for_s':0.1,'at_s':0.1}"), i + 1);
+    }
+    run_to(150 * MS);
+    for (uint32_t id = 1; id <= FAULTS_MAX; id++) {
+        if (fault_find(&r.engine, id)->state != FAULT_ACTIVE) fail_msg("%u of them are under way", id - 1);
+    }
+    run_to(201 * MS);
+    assert_true(supply_volts(&r.lab.supply, 201 * MS) == 12.0);
+}
+
+/* Registers without power hold nothing. */
+static void a_flip_in_a_board_without_power_is_void(void **state)
+{
+    static const char *const args[] = {"{'kind':'chip.flip','point':'b.adc.z','register':2,'mask':1}",
+                                       "{'kind':'chip.flip','point':'b.tadc','register':2,'mask':1}"};
+    (void)state;
+    run_to(400 * MS);
+    psa2_power_down(r.unit[1].board, r.s.now_ns);
+    for (size_t i = 0; i < COUNT(args); i++) {
+        const uint32_t id = add(args[i]);
+        assert_true(id != 0);
+        assert_int_equal(fault_find(&r.engine, id)->state, FAULT_VOID);
+    }
+}
+
+/* Two microvolts at the load are more than a code of 1.19 uV: of all codes of a quiet channel none stays. */
+static void the_least_bias_is_seen(void **state)
+{
+    (void)state;
+    run_to(400 * MS);
+    const int32_t before = r.frame.code[0];
+    assert_true(add("{'kind':'sensor.bias','point':'a.sensor.x','bias_v':2e-6}") != 0);
+    run_to(600 * MS);
+    assert_true(r.frame.code[0] > before);
+    assert_true(r.frame.code[0] <= before + 2);
+}
+
+static void what_is_over_at_once_needs_no_lifting(void **state)
+{
+    (void)state;
+    run_to(400 * MS);
+    const uint32_t flip = add("{'kind':'chip.flip','point':'a.adc.y','register':2,'mask':1}");
+    const uint32_t glitch = add("{'kind':'line.glitch','point':'a.line.Int','width_ns':100,'at_s':0.41}");
+    run_to(420 * MS);
+    assert_change(0, flip, FAULT_ACTIVE, 400 * MS);
+    assert_change(1, flip, FAULT_OVER, 400 * MS);
+    assert_change(2, glitch, FAULT_ACTIVE, 410 * MS);
+    assert_change(3, glitch, FAULT_OVER, 410 * MS);
+}
+
+/* Same number, same noise; another number, another one. */
+static void random_faults_are_seeded_by_their_number(void **state)
+{
+    double out[3];
+    for (int i = 0; i < 3; i++) {
+        fresh(state);
+        if (i == 2) add("{'kind':'controller.frozen_words','point':'b.kpsa'}");
+        assert_int_equal(add("{'kind':'sensor.noise','point':'a.sensor.x','rms_v':0.1}"), i == 2 ? 2 : 1);
+        out[i] = sensor_fault_out(r.unit[0].sensor_faults[0], 0.0, 1);
+    }
+    assert_true(out[0] == out[1]);
+    assert_true(out[0] != out[2]);
+}
+
+int main(void)
+{
+#define TEST(name) cmocka_unit_test_setup(name, fresh)
+    const struct CMUnitTest tests[] = {
+        TEST(any_number_of_brownouts_may_be_under_way_at_once),
+        TEST(a_flip_in_a_board_without_power_is_void),
+        TEST(the_least_bias_is_seen),
+        TEST(brownouts_are_those_that_were_asked_for),
+        TEST(a_bias_is_in_the_codes),
+        TEST(volts_of_a_current_sensor_are_those_at_its_load),
+        TEST(faults_of_a_chip_add_up),
+        TEST(what_is_over_at_once_needs_no_lifting),
+        TEST(random_faults_are_seeded_by_their_number),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
