@@ -7,7 +7,7 @@ averaged over the same ones as the controller's own (LEVEL_SEQ), or from the rea
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,6 +23,7 @@ from psabench.procedures.platform_bench import Compensation, Floats, Look, Table
 from psabench.readings import Readings
 
 SLICE_S = 0.5  # between looks at what has come
+TURN_SLACK_S = 10.0  # beyond what a turn takes at its rate: it accelerates, and may be slower than asked
 AWAY_S = 10.0  # waits from here on are spent away from the bus
 SEQ_BITS = 16
 SEQ_MODULUS = 1 << SEQ_BITS
@@ -118,7 +119,9 @@ class WirePlatform:
         self.gyro.set(settle_s=table.settle_s, settle_limit_s=table.settle_limit_s)
         self._begin(Mode.GYROCOMPASS)
         windows = []
-        for w in self._windows(table.sequence_deg):
+        turn_s = 360.0 / table.slew_dps + TURN_SLACK_S
+        patience_s = turn_s + table.settle_s + table.settle_limit_s + table.window_s
+        for w in self._windows(table.sequence_deg, patience_s):
             windows.append(w)
             done()
         self._set_rad = windows[-1].set_rad
@@ -128,7 +131,8 @@ class WirePlatform:
         """See `PlatformBench`."""
         self.gyro.set(calibration_s=length_s, settle_s=settle_s)
         self._begin(Mode.CALIBRATE)
-        return next(iter(self._windows([self._set_rad * DEG])))
+        patience_s = TURN_SLACK_S + settle_s + self.gyro.get("settle_limit_s") + length_s
+        return next(iter(self._windows([self._set_rad * DEG], patience_s)))
 
     def navigate(self, c: Compensation) -> None:
         """See `PlatformBench`."""
@@ -174,16 +178,21 @@ class WirePlatform:
         if words:
             raise LinkError(f"{doing}: {'; '.join(words)}")
 
-    def _windows(self, angles_deg: Sequence[float]) -> Iterator[Window]:
-        """Those of the run under way, each when it is over. Raises LinkError when the run ends before the last."""
-        tape = _Tape()
+    def _windows(self, angles_deg: Sequence[float], patience_s: float) -> Iterator[Window]:
+        """Those of the run under way, each when it is over. Raises LinkError when the run ends before the last, or one
+        does not come within patience_s.
+        """
+        tape = _Tape(self.step_s)
         self.gyro.frames.forget()
         self.level_unit.frames.forget()
         self.gyro.start()
         try:
             for number, angle_deg in enumerate(angles_deg):
+                deadline_s = self.t_s + patience_s
                 while (span := tape.window()) is None:
                     self._still_running(tape, number + 1)
+                    if self.t_s > deadline_s:
+                        raise LinkError(f"position {number + 1} was not measured in {patience_s:.0f} s: {tape.state}")
                     self.wait(SLICE_S)
                     tape.add(self.gyro, self.level_unit)
                 yield self._of(tape, span, number, math.radians(angle_deg))
@@ -217,6 +226,9 @@ class WirePlatform:
             u1_radps=r["U1"] * DEGPH,
             u2_radps=r["U2"] * DEGPH,
             encoder_rad=np.radians(r["ENCODER"]),
+            turned_rad=r["turned_rad"],
+            missed=int(r["missed"][-1]),
+            step_s=self.step_s,
             m1_per_s=self._m1_per_s,
             latitude_rad=self._latitude_rad,
             lost=lost,
@@ -230,8 +242,10 @@ class WirePlatform:
 class _Tape:
     """Readings of the gyro unit and frames of the level unit, as far as they are not used up."""
 
-    def __init__(self) -> None:
-        self.readings: dict[str, Floats] = {}  # columns, and t_rx_s
+    def __init__(self, step_s: float) -> None:
+        self._step_s = step_s
+        self.readings: dict[str, Floats] = {}  # columns, t_rx_s, turned_rad, missed
+        self._before = (-1, 0.0, 0.0, 0)  # STEP of the last reading, its rate, turned_rad and missed
         self._seq: npt.NDArray[np.int64] = np.zeros(0, dtype=np.int64)
         self._u_v: Floats = np.zeros((0, 3))
 
@@ -239,16 +253,40 @@ class _Tape:
         """What has come since."""
         r, f = gyro.frames.take(), level_unit.frames.take()
         assert isinstance(r, Readings)
-        new = {**r.columns, "t_rx_s": r.t_rx_s}
+        new = {**r.columns, "t_rx_s": r.t_rx_s, **self._turned(r.columns)}
         self.readings = {k: np.concatenate([self.readings[k], v]) if k in self.readings else v for k, v in new.items()}
         self._seq, self._u_v = np.concatenate([self._seq, f.seq]), np.concatenate([self._u_v, f.u_v])
         if len(self.readings["PHASE"]) and not np.any(self.readings["PHASE"] == Phase.WINDOW):
             self.drop(len(self.readings["PHASE"]))  # turns may take longer than the counter of the frames takes to wrap
 
+    def _turned(self, r: Mapping[str, Floats]) -> dict[str, Floats]:
+        """What the torquers turned the platform by about the vertical since the first reading, and readings missed since.
+
+        alpha' without drifts and Earth, from (3): (u2 cos gamma - u1 sin gamma) / cos beta. A rate holds from its step on.
+        """
+        beta, gamma = np.radians(r["BETA"]), np.radians(r["GAMMA"])
+        rate = (r["U2"] * np.cos(gamma) - r["U1"] * np.sin(gamma)) / np.cos(beta) * DEGPH
+        step, last_rate, turned_rad, missed = self._before
+        if not len(rate):
+            return {"turned_rad": rate, "missed": rate}
+        first = int(r["STEP"][0]) - 1 if step < 0 else step
+        steps = np.diff(np.concatenate([[first], r["STEP"]])) % SEQ_MODULUS
+        turned = turned_rad + np.cumsum(np.concatenate([[last_rate], rate[:-1]]) * steps) * self._step_s
+        gone = missed + np.cumsum(steps - 1)
+        self._before = (int(r["STEP"][-1]), float(rate[-1]), float(turned[-1]), int(gone[-1]))
+        return {"turned_rad": turned, "missed": gone}
+
     def latest(self, name: str, default: float) -> float:
         """Of the newest reading."""
         column = self.readings.get(name, np.zeros(0))
         return float(column[-1]) if len(column) else default
+
+    @property
+    def state(self) -> str:
+        """What the unit was last seen to do."""
+        if not len(self.readings.get("PHASE", ())):
+            return "no reading of the gyro unit came"
+        return f"the gyro unit stays in phase {Phase(int(self.latest('PHASE', 0.0))).name.lower()}"
 
     def window(self) -> slice | None:
         """The readings of the first window that is over; None: there is none yet."""

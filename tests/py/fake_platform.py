@@ -1,7 +1,7 @@
 """A gyro platform in memory, settled: rotation matrices and the precession equations written a second time.
 
-It shares no line with the estimators or the emulator. What a window shows is the settled state of the loops, with the
-noise and the errors that a test gives; drifts are whatever function of time the test wants.
+It shares no line with the estimators or the emulator. What a window shows is the settled state of the loops, with what
+a turn left of them, the noise and the errors that a test gives; drifts are whatever function of time the test wants.
 """
 
 from __future__ import annotations
@@ -12,11 +12,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
+from scipy.signal import lfilter
 from psabench.errors import LinkError
-from psabench.procedures.platform_bench import STEP_S, Compensation, Look, Table, Window
+from psabench.procedures.platform_bench import Compensation, Look, Table, Window
 
 Array = npt.NDArray[np.float64]
 
+STEP_S = 0.01  # of its controller
 U_DEGPH = 15.041067
 DEGPH = math.radians(1.0) / 3600.0
 ARCMIN = math.radians(1.0 / 60.0)
@@ -44,7 +46,12 @@ class FakePlatform:
     bias_beta_arcmin: float = 0.0  # measured less true
     bias_gamma_arcmin: float = 0.0
     scale1: float = 0.0  # error of the levelling torquer
-    noise_arcmin: float = 0.0  # of beta in each step
+    scale2: float = 0.0  # of the azimuth torquer, in turns
+    noise_arcmin: float = 0.0  # of beta in each step; levelling follows it
+    left_beta_arcmin: float = 0.0  # what each turn leaves of beta when it ends
+    left_gimbal_arcmin: float = 0.0  # and of the gimbal angle
+    vehicle_turns_deg: dict[int, float] = field(default_factory=dict)  # by window: the vehicle turns before it
+    vehicle_tilts_deg: dict[int, float] = field(default_factory=dict)  # by window: its pitch changes before it
     set_sd_arcmin: float = 0.0
     read_sd_arcmin: float = 0.0
     level_sd_arcmin: float = 0.0
@@ -58,7 +65,7 @@ class FakePlatform:
         self._q = math.radians(self.heading_deg) * 0.3
         self._set = 0.0
         self._told_rad = math.radians(self.latitude_deg)
-        self._m1 = 1.0
+        self._m1, self._m2, self._settle_s = 1.0, 2.0, 10.0
         self._comp: Compensation | None = None
         self._alpha_hold = 0.0
         self._held_since_s = 0.0
@@ -112,7 +119,7 @@ class FakePlatform:
     # ---- PlatformBench
 
     def prepare(self, *, latitude_rad: float, m1_per_s: float, m2_per_s: float) -> None:
-        self._told_rad, self._m1 = latitude_rad, m1_per_s
+        self._told_rad, self._m1, self._m2 = latitude_rad, m1_per_s, m2_per_s
 
     def level(self, patience_s: float) -> None:
         if not self.settles:
@@ -121,8 +128,11 @@ class FakePlatform:
 
     def measure(self, table: Table, done: Callable[[], None]) -> Sequence[Window]:
         windows = []
+        self._settle_s = table.settle_s
         for k, angle_deg in enumerate(table.sequence_deg):
             before = self._set
+            self.heading_deg += self.vehicle_turns_deg.get(k, 0.0)
+            self.pitch_deg += self.vehicle_tilts_deg.get(k, 0.0)
             self._set = math.radians(angle_deg)
             self._q = self._set - self.set_sd_arcmin * ARCMIN * self.rng.standard_normal()
             self.t_s += abs(math.degrees(self._set - before)) / table.slew_dps + table.settle_s
@@ -132,6 +142,7 @@ class FakePlatform:
 
     def calibrate(self, length_s: float, settle_s: float) -> Window:
         self.t_s += settle_s
+        self._settle_s = math.inf
         return self._window(0, length_s)
 
     def _window(self, number: int, length_s: float) -> Window:
@@ -140,23 +151,45 @@ class FakePlatform:
         self.t_s = t_mid_s
         s, u1, u2, _, gamma = self.settled(self._q)
         shift = self.level_sd_arcmin * ARCMIN * self.rng.standard_normal(2)  # of the setting: seen, not felt by S
-        noise = self.noise_arcmin * ARCMIN * self.rng.standard_normal(n)
         read = self.read_sd_arcmin * ARCMIN * self.rng.standard_normal()
         encoder = self._q + read if self.stuck_deg is None else math.radians(self.stuck_deg)
+        at_s = STEP_S * np.arange(n)
+        swing = self.left_gimbal_arcmin * ARCMIN * np.exp(-self._m2 * (self._settle_s + at_s))
+        rate = s + self._m2 * swing * math.sin(gamma)  # levelling takes a turn about the vertical for a rate
         self.t_s = t_mid_s + length_s / 2.0
         w = Window(
             number=number,
             set_rad=self._set,
             t_mid_s=t_mid_s,
-            beta_rad=-s / self._m1 + noise,
+            beta_rad=self._levelled(np.asarray(rate)),
             gamma_rad=np.full(n, gamma + self.bias_gamma_arcmin * ARCMIN + shift[0]),
             u1_radps=np.full(n, u1),
             u2_radps=np.full(n, u2),
-            encoder_rad=np.full(n, encoder),
+            encoder_rad=encoder + swing,
+            turned_rad=self._turned(t_mid_s - length_s / 2.0 + at_s, u1, u2, gamma) + swing,
+            missed=0,
+            step_s=STEP_S,
             m1_per_s=self._m1,
             latitude_rad=self._told_rad,
         )
         return replace(w, **self.broken.get(number, {}))  # type: ignore[arg-type]
+
+    def _levelled(self, rate_radps: Array) -> Array:
+        """beta as it is measured in the steps of a window: what levelling makes of rate, noise and a turn's remnant."""
+        n, keep = len(rate_radps), 1.0 - self._m1 * STEP_S
+        noise = self.noise_arcmin * ARCMIN * self.rng.standard_normal(n)
+        before = self.noise_arcmin * ARCMIN * math.sqrt(self._m1 * STEP_S / 2.0) * self.rng.standard_normal()
+        first = -rate_radps[0] / self._m1 + before
+        first += self.left_beta_arcmin * ARCMIN * math.exp(-self._m1 * self._settle_s)
+        drive = np.concatenate([[first], -STEP_S * (rate_radps + self._m1 * noise)[:-1]])
+        return np.asarray(lfilter([1.0], [1.0, -keep], drive)) + noise
+
+    def _turned(self, t_s: Array, u1_radps: float, u2_radps: float, gamma_rad: float) -> Array:
+        """What the torquers turned the platform by until each instant: its turns, and what Earth and drifts took."""
+        q_rad, psi_rad = self._q, math.radians(self.heading_deg)
+        alpha = q_rad - psi_rad + math.remainder(self.attitude(q_rad, 0.0)[0] - q_rad + psi_rad, math.tau)
+        idle = u2_radps * math.cos(gamma_rad) - u1_radps * math.sin(gamma_rad)
+        return np.asarray(alpha * (1.0 - self.scale2) + idle * t_s)
 
     def navigate(self, c: Compensation) -> None:
         self._comp, self._held_since_s = c, self.t_s

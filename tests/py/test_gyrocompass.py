@@ -273,6 +273,9 @@ def test_a_window_with_the_servo_off_is_corrected_by_the_encoder() -> None:
         u1_radps=np.zeros(n),
         u2_radps=np.zeros(n),
         encoder_rad=np.asarray(rate * 0.01 * np.arange(n), dtype=np.float64),
+        turned_rad=np.zeros(n),
+        missed=0,
+        step_s=0.01,
         m1_per_s=1.0,
         latitude_rad=0.87,
     )
@@ -285,7 +288,7 @@ def test_a_window_needs_readings() -> None:
     with pytest.raises(ValueError, match="needs readings"):
         Window(
             number=0, set_rad=0.0, t_mid_s=0.0, beta_rad=none, gamma_rad=none, u1_radps=none, u2_radps=none,
-            encoder_rad=none, m1_per_s=1.0, latitude_rad=0.0,
+            encoder_rad=none, turned_rad=none, missed=0, step_s=0.01, m1_per_s=1.0, latitude_rad=0.0,
         )  # fmt: skip
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from psabench import nav
 from psabench.errors import BadInput
 from psabench.nav import ARCMIN, DEGPH, EARTH_RADPS, Method
-from psabench.procedures.platform_bench import STEP_S, Table
+from psabench.procedures.platform_bench import Table
 from psabench.procedures.result import option
 
 NAME = "gyrocompass"
@@ -26,6 +26,8 @@ METHODS: Mapping[str, Method] = {
 }
 ANGLES = ("set", "encoder")
 SIGNALS = ("frames", "readings")
+WINDOW_LEAST_S = 0.1  # object 2102h
+TAU_LEAST_S = 0.01  # 0 is a drift without memory
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,8 +70,8 @@ class GyrocompassParams:
             value = getattr(self, f.name)
             if isinstance(value, float) and f.name != "latitude_deg" and not 0.0 <= value < math.inf:
                 raise ValueError(f"{f.name} is {value}; it must not be negative")
-        if self.window_s < 10 * STEP_S or self.repeat < 1:
-            raise ValueError(f"window_s is {self.window_s}, repeat {self.repeat}; at least {10 * STEP_S:g} and 1")
+        if self.window_s < WINDOW_LEAST_S or self.repeat < 1:
+            raise ValueError(f"window_s is {self.window_s}, repeat {self.repeat}; at least {WINDOW_LEAST_S:g} and 1")
         rehearse(self)
 
     @property
@@ -144,7 +146,7 @@ def rehearse(p: GyrocompassParams) -> None:
 def noise_of(p: GyrocompassParams, window_sd_radps: float) -> nav.Noise:
     return nav.Noise(
         gm_sigma_radps=p.gm_sigma_degph * DEGPH,
-        gm_tau_s=max(p.gm_tau_s, STEP_S),
+        gm_tau_s=max(p.gm_tau_s, TAU_LEAST_S),
         window_sd_radps=window_sd_radps,
         angle_sd_rad=p.angle_sd_arcmin * ARCMIN,
         level_sd_rad=p.level_sd_arcmin * ARCMIN,

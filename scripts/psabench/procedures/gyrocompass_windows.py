@@ -10,7 +10,7 @@ import numpy as np
 from psabench import nav
 from psabench.angles import wrapped
 from psabench.procedures.gyrocompass_params import GyrocompassParams
-from psabench.procedures.platform_bench import STEP_S, Floats, Window
+from psabench.procedures.platform_bench import Floats, Window
 from psabench.procedures.result import DEG
 
 OFF_LIMIT_RAD = math.radians(1.0)  # encoder against the angle asked for: beyond it the sensor tells nothing
@@ -22,16 +22,16 @@ def s_of(w: Window, *, slope: bool, frozen: bool) -> float:
     With the azimuth servo off the platform turns by what the encoder tells, and levelling takes it for a rate: (3).
     """
     s = w.levelling_radps
-    rate = nav.window_slope(w.beta_rad, s, STEP_S) if slope else float(s.mean())
+    rate = nav.window_slope(w.beta_rad, s, w.step_s) if slope else float(s.mean())
     if frozen and len(s) > 1:
-        turn_radps = _slope(np.unwrap(w.encoder_rad))
+        turn_radps = _slope(np.unwrap(w.encoder_rad), w.step_s)
         rate += turn_radps * math.sin(float(w.gamma_rad.mean()))
     return rate
 
 
-def _slope(x: Floats) -> float:
+def _slope(x: Floats, step_s: float) -> float:
     """Of a straight line through values a step apart, per second."""
-    t = (np.arange(len(x)) - (len(x) - 1) / 2.0) * STEP_S
+    t = (np.arange(len(x)) - (len(x) - 1) / 2.0) * step_s
     return float(t @ x / (t @ t))
 
 
@@ -43,7 +43,7 @@ def s_sd(windows: Sequence[Window], slope: bool) -> float:
     of = []
     for w in windows:
         n = float(np.std(np.diff(w.beta_rad)) / math.sqrt(2.0)) if len(w.beta_rad) > 2 else 0.0
-        of.append(n * math.sqrt(12.0 / len(w.beta_rad) if slope else w.m1_per_s * STEP_S) / w.length_s)
+        of.append(n * math.sqrt(12.0 / len(w.beta_rad) if slope else w.m1_per_s * w.step_s) / w.length_s)
     return float(np.mean(of))
 
 

@@ -17,8 +17,6 @@ import numpy.typing as npt
 
 Floats = npt.NDArray[np.float64]
 
-STEP_S = 0.01  # of the controller: a reading each
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Table:
@@ -50,6 +48,9 @@ class Window:
     u1_radps: Floats  # (n,) asked of the torquers: levelling
     u2_radps: Floats  # azimuth
     encoder_rad: Floats
+    turned_rad: Floats  # by the torquers about the vertical since the run began, drifts and Earth not taken off
+    missed: int  # readings lost since the run began, up to its end
+    step_s: float  # of the controller: a reading each
     m1_per_s: float  # of the levelling loop
     latitude_rad: float  # that the controller was told
     lost: int = 0  # frames or readings missing in it
@@ -64,7 +65,7 @@ class Window:
 
     @property
     def length_s(self) -> float:
-        return len(self.beta_rad) * STEP_S
+        return len(self.beta_rad) * self.step_s
 
     @property
     def levelling_radps(self) -> Floats:
