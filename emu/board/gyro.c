@@ -7,7 +7,6 @@
 #include <string.h>
 
 #define CALM_NS     1000000000 /* after which lost frames and limited rates are over */
-#define CHECK_NS    500000000  /* over which the angle sensor is held against the torquer */
 #define RAD_PER_DEG GYRO_RAD_PER_DEG
 
 const struct board_line gyro_lines[GYRO_LINES] = {
@@ -103,10 +102,28 @@ static bool take_inlet(struct gyro *b, int64_t t_ns)
 
 /* ---- conditions ---- */
 
+/* For who looks from time to time. */
+static void note(struct gyro *b, enum gyro_flag what)
+{
+    for (unsigned i = 0; i < GYRO_FLAGS; i++) {
+        if (what != 1U << i) continue;
+        b->past[i].begun++;
+        b->past[i].step = b->number + 1;
+    }
+}
+
+void gyro_past_begin(struct gyro *b)
+{
+    memset(b->past, 0, sizeof b->past);
+    for (unsigned i = 0; i < GYRO_FLAGS; i++)
+        if (b->standing & 1U << i) note(b, (enum gyro_flag)(1U << i));
+}
+
 void gyro_condition(struct gyro *b, enum gyro_flag what, bool stands, int64_t t_ns)
 {
     if (stands == ((b->standing & what) != 0)) return;
     b->standing = stands ? b->standing | what : b->standing & ~(unsigned)what;
+    if (stands) note(b, what);
     if (stands) gyro_tell(b, GYRO_EV_FAULT, t_ns);
     if (b->host.condition) b->host.condition(b->host.ctx, what, stands, t_ns);
 }
@@ -116,23 +133,6 @@ static void fleeting(struct gyro *b, enum gyro_flag what, bool now, int64_t *cal
 {
     if (now) *calm_ns = t_ns;
     if (now || t_ns - *calm_ns >= CALM_NS) gyro_condition(b, what, now, t_ns);
-}
-
-/* Half a second of driving without the angle sensor moving: it is stuck, or the torquer is dead. */
-static void check_sensor(struct gyro *b, double u2_radps, int64_t t_ns)
-{
-    struct gyro_check *c = &b->check;
-    if (!b->run.servoed) return;
-    c->turned_rad += u2_radps * (1e-9 * b->profile.step_ns);
-    if ((int64_t)++c->steps * b->profile.step_ns < CHECK_NS) return;
-    const double moved_rad = gyro_wrap_rad(b->servo_rad - c->from_rad);
-    const bool dead = fabs(c->turned_rad) > b->profile.stuck_turn_deg * RAD_PER_DEG &&
-                      fabs(moved_rad) < b->profile.stuck_moved_deg * RAD_PER_DEG;
-    *c = (struct gyro_check){.from_rad = b->servo_rad};
-    if (!dead) return;
-    b->counters.encoder_faults++;
-    gyro_run_stop(b, GYRO_LEVEL);
-    gyro_condition(b, GYRO_ENCODER_FAULT, true, t_ns);
 }
 
 /* ---- steps ---- */
@@ -151,7 +151,7 @@ static void drive(struct gyro *b, int64_t t_ns)
     const bool one = limit(&b->u_radps[0], limit_radps), two = limit(&b->u_radps[1], limit_radps);
     if (one || two) b->flags |= GYRO_SATURATED;
     b->counters.saturated += one || two;
-    check_sensor(b, b->u_radps[1], t_ns);
+    gyro_check_step(b, t_ns);
     if (b->io.torque) b->io.torque(b->io.ctx, b->u_radps[0], b->u_radps[1], t_ns);
 }
 
@@ -248,13 +248,14 @@ static void forget(struct gyro *b, int64_t t_ns)
     b->inlet = (struct gyro_inlet){.any = false};
     b->level = gyro_level_of(0.0, 0.0);
     gyro_run_stop(b, GYRO_OFF);
-    b->check = (struct gyro_check){.steps = 0};
     b->silent = true;
     b->flags = b->standing = 0;
+    gyro_check_begin(b, t_ns);
     b->u_radps[0] = b->u_radps[1] = 0.0;
     b->calm_ns[0] = b->calm_ns[1] = -CALM_NS;
     b->latest = (struct gyro_reading){.step = 0};
     b->number = 0;
+    gyro_past_begin(b);
     trace_put(&b->trace, TRACE_FIRST(GYRO_LINES), 0, t_ns);
     if (b->io.torque) b->io.torque(b->io.ctx, 0.0, 0.0, t_ns);
 }

@@ -31,6 +31,9 @@ enum gyro_flag { /* of a reading */
                  GYRO_ENCODER_FAULT = 4,
                  GYRO_NOT_SETTLED = 8
 };
+#define GYRO_FLAGS 4u
+
+enum gyro_test { GYRO_TEST_NONE, GYRO_TEST_PASSED, GYRO_TEST_FAILED, GYRO_TEST_UNCLEAR };
 
 enum gyro_line {
     GYRO_LINE_STEP, /* a pulse of GYRO_STEP_PULSE_NS each step */
@@ -115,6 +118,10 @@ void gyro_settings_changed(struct gyro *b);
 
 /* NULL, or why it is refused. */
 const char *gyro_set_mode(struct gyro *b, enum gyro_mode mode, int64_t t_ns);
+
+/* In navigation: nods once or up to three times, a tenth of a degree there and back, and looks whether the angle sensor follows;
+ * b->nod.result. NULL, or why it is refused. */
+const char *gyro_self_test(struct gyro *b, int64_t t_ns);
 bool gyro_running(const struct gyro *b); /* a run of positions, or a calibration */
 
 double gyro_heading_deg(const struct gyro *b); /* of mode 6, 0 to 360 */

@@ -82,6 +82,22 @@ static void add_run(struct sha256 *s, const struct gyro_run *r)
     add_reals(s, real, sizeof real / sizeof *real);
 }
 
+static void add_checks(struct sha256 *s, const struct gyro *b)
+{
+    const struct gyro_watch *w = &b->watch;
+    const struct gyro_nod *n = &b->nod;
+    add_reals(s, (const double[]){w->turned_rad, w->from_rad, w->track_deg, w->still_rad, w->told_deg}, 5);
+    add_reals(s, (const double[]){n->from_rad, n->top_rad, n->rate_radps, n->asked_radps}, 4);
+    board_digest_u64(s, w->against);
+    board_digest_u64(s, (uint64_t)w->level_ns);
+    board_digest_u64(s, (uint64_t)w->still_ns);
+    board_digest_u64(s, (uint64_t)w->told_ns);
+    board_digest_u64(s, (uint64_t)n->way << 32 | (uint64_t)n->result << 16 | (uint64_t)n->nods << 8 | n->stayed);
+    board_digest_u64(s, (uint64_t)n->begun_ns);
+    board_digest_u64(s, (uint64_t)n->there_ns);
+    for (unsigned i = 0; i < GYRO_FLAGS; i++) board_digest_u64(s, (uint64_t)b->past[i].begun << 32 | b->past[i].step);
+}
+
 static void add_inlet(struct sha256 *s, const struct gyro_inlet *in)
 {
     board_digest_u64(s, (uint64_t)in->x_lsb);
@@ -98,6 +114,7 @@ static void digest(const void *board, struct sha256 *s)
     add_reals(s, (const double *)(const void *)&b->set, sizeof b->set / sizeof(double));
     add_inlet(s, &b->inlet);
     add_run(s, &b->run);
+    add_checks(s, b);
     add_reals(s, (const double[]){b->level.sin_b, b->level.sin_g, b->servo_rad, b->check.turned_rad, b->check.from_rad},
               5);
     add_reals(s, (const double[]){b->u_radps[0], b->u_radps[1], b->latest.u1_radps, b->latest.encoder_rad}, 4);

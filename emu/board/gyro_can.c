@@ -198,6 +198,32 @@ static uint32_t read_clock(struct board_node *n, const struct co_entry *e, struc
     return CO_OK;
 }
 
+static uint32_t read_past(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
+{
+    const struct gyro_past *past = gyro_of(n)->past;
+    const unsigned i = e->sub - 1U;
+    (void)t_ns;
+    v->number = i < GYRO_FLAGS ? past[i].begun : past[i - GYRO_FLAGS].step;
+    return CO_OK;
+}
+
+static uint32_t read_self_test(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
+{
+    const struct gyro_nod *nod = &gyro_of(n)->nod;
+    (void)t_ns;
+    v->number = e->sub == 1 ? nod->way != GYRO_NOD_NONE : nod->result;
+    return CO_OK;
+}
+
+static uint32_t begin_self_test(struct board_node *n, const struct co_entry *e, const struct co_value *v, int64_t t_ns)
+{
+    const char *why = v->number != 0.0 ? gyro_self_test(n->board, t_ns) : NULL;
+    (void)e;
+    if (!why) return CO_OK;
+    board_node_refuse(n, why);
+    return CO_AB_STATE;
+}
+
 static const struct board_object objects[] = {
     {GYRO_OD_CONTROL, read_control, write_mode},
     {GYRO_OD_SLEW, read_setting, write_setting},
@@ -209,6 +235,8 @@ static const struct board_object objects[] = {
     {GYRO_OD_DRIFT, read_setting, write_setting},
     {GYRO_OD_LEVEL, read_setting, write_setting},
     {GYRO_OD_CLOCK, read_clock, NULL},
+    {GYRO_OD_PAST, read_past, NULL},
+    {GYRO_OD_SELF_TEST, read_self_test, begin_self_test},
     {GYRO_OD_LATEST, read_latest, NULL},
 };
 

@@ -16,5 +16,12 @@ void gyro_run_stop(struct gyro *b, enum gyro_mode mode); /* at once, in another 
 
 /* gyro.c */
 void gyro_condition(struct gyro *b, enum gyro_flag what, bool stands, int64_t t_ns);
+void gyro_past_begin(struct gyro *b); /* a mode begins: conditions that stand are its first */
+
+/* gyro_check.c: what was learnt is forgotten; this step, when the rates are known; the rate of a nod in this step, about the
+ * vertical. */
+void gyro_check_begin(struct gyro *b, int64_t t_ns);
+void gyro_check_step(struct gyro *b, int64_t t_ns);
+double gyro_nod_radps(struct gyro *b, int64_t t_ns);
 
 #endif

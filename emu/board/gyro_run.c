@@ -76,7 +76,8 @@ const char *gyro_set_mode(struct gyro *b, enum gyro_mode mode, int64_t t_ns)
     gyro_run_stop(b, mode);
     gyro_condition(b, GYRO_ENCODER_FAULT, false, t_ns);
     gyro_condition(b, GYRO_NOT_SETTLED, false, t_ns);
-    b->check = (struct gyro_check){.from_rad = b->servo_rad};
+    gyro_check_begin(b, t_ns);
+    gyro_past_begin(b);
     b->run.servoed = mode >= GYRO_HOLD && mode <= GYRO_CALIBRATE;
     b->run.q_ref_rad = servoed && mode != GYRO_HOLD ? q_ref_rad : b->servo_rad;
     b->run.positions = (unsigned)(b->set.count * b->set.repeat);
@@ -165,7 +166,7 @@ static double servo_radps(struct gyro *b, int64_t t_ns)
 
 void gyro_run_rates(struct gyro *b, int64_t t_ns, double u_radps[2])
 {
-    double turn_radps = 0.0;
+    double turn_radps = b->run.mode == GYRO_NAVIGATE ? gyro_nod_radps(b, t_ns) : 0.0;
     if (b->run.mode == GYRO_OFF) {
         u_radps[0] = u_radps[1] = 0.0;
         return;
@@ -175,6 +176,7 @@ void gyro_run_rates(struct gyro *b, int64_t t_ns, double u_radps[2])
     if (b->run.mode == GYRO_NAVIGATE) {
         u_radps[0] += b->set.drift1_degph * RADPS_PER_DPH;
         u_radps[1] = gyro_law_keep(&b->level, &b->place, b->sin_a, b->cos_a) + b->set.drift2_degph * RADPS_PER_DPH;
+        u_radps[1] += gyro_law_vertical(&b->level, 0.0, turn_radps);
         return;
     }
     u_radps[1] = gyro_law_vertical(&b->level, b->place.up_radps, turn_radps);

@@ -25,10 +25,35 @@ struct gyro_run {
     double frozen_radps;
 };
 
-/* The angle sensor against the torquer, half a second at a time. */
+/* The angle sensor against the torquer, half a second at a time, while servoed. */
 struct gyro_check {
     unsigned steps;
     double turned_rad, from_rad;
+};
+
+/* In navigation (gyro_check.c). */
+struct gyro_watch {
+    double turned_rad, from_rad,
+        track_deg;    /* of a block: asked of the azimuth torquer; sensor and track when it began */
+    unsigned against; /* blocks in a row */
+    int64_t level_ns; /* last level */
+    double still_rad; /* the sensor has not left its degree, */
+    int64_t still_ns; /* since then */
+    double told_deg;  /* track as it was told of then */
+    int64_t told_ns;  /* last time it was still the same */
+};
+
+struct gyro_nod {
+    enum { GYRO_NOD_NONE, GYRO_NOD_REST, GYRO_NOD_THERE, GYRO_NOD_BACK } way;
+    enum gyro_test result;
+    unsigned nods, stayed; /* so many so far; of them the sensor stayed where it was */
+    int64_t begun_ns, there_ns;
+    double from_rad, top_rad, rate_radps, asked_radps;
+};
+
+/* A condition since the mode began. */
+struct gyro_past {
+    uint32_t begun, step; /* how often; the step in which it did last */
 };
 
 struct gyro {
@@ -53,6 +78,9 @@ struct gyro {
     double servo_rad;        /* of this step */
     struct gyro_run run;
     struct gyro_check check;
+    struct gyro_watch watch;
+    struct gyro_nod nod;
+    struct gyro_past past[GYRO_FLAGS];
     double u_radps[2];  /* asked of the torquers, as limited */
     unsigned flags;     /* of this step */
     uint32_t wrongs;    /* enum board_wrong */

@@ -87,6 +87,12 @@ static void on_reading(void *ctx, const struct gyro_reading *r, int64_t t_ns)
         assert((r->mode == GYRO_COMPASS) == (r->position > 0));
     }
     assert(isfinite(r->beta_rad) && isfinite(r->gamma_rad) && fabs(r->encoder_rad) <= 3.15);
+    assert(r->mode == GYRO_NAVIGATE || (w->b.nod.way == GYRO_NOD_NONE && w->b.nod.result == GYRO_TEST_NONE) ||
+           (w->b.wrongs & BOARD_WRONG_FROZEN_WORDS));
+    for (unsigned i = 0; i < GYRO_FLAGS; i++) {
+        assert(w->b.past[i].step <= r->step + 1 && (w->b.past[i].begun > 0) == (w->b.past[i].step > 0));
+        assert(!(w->conditions & 1U << i) || w->b.past[i].begun > 0);
+    }
     mix(w, (uint64_t)r->mode ^ (uint64_t)r->phase << 8 ^ (uint64_t)r->position << 16 ^ (uint64_t)r->flags << 24);
     mix_real(w, r->beta_rad);
     mix_real(w, r->gamma_rad);
@@ -159,6 +165,14 @@ static void op_mode(struct world *w, struct script *s)
     mix(w, why != NULL);
 }
 
+static void op_self_test(struct world *w, struct script *s)
+{
+    const char *why = gyro_self_test(&w->b, w->s.now_ns);
+    (void)s;
+    assert((why != NULL) == (w->b.run.mode != GYRO_NAVIGATE) || w->b.nod.way != GYRO_NOD_NONE);
+    mix(w, why != NULL);
+}
+
 static void op_angle(struct world *w, struct script *s)
 {
     const uint8_t b = script_byte(s);
@@ -201,7 +215,8 @@ static void op_go(struct world *w, struct script *s)
 }
 
 static void (*const ops[])(struct world *w, struct script *s) = {
-    op_frames, op_frames, op_setting, op_setting, op_mode, op_go, op_go, op_angle, op_power, op_reset, op_wrong,
+    op_frames, op_frames, op_setting, op_setting, op_mode,  op_go,
+    op_go,     op_angle,  op_power,   op_reset,   op_wrong, op_self_test,
 };
 
 /* Only of the watched board, and no byte of the script: what it does must change nothing. */
