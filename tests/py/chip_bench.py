@@ -132,6 +132,13 @@ class Ads1282(Session):
         super().__init__(part, path, seed=seed, **options)
         self.adc.spi_clock(self.SCLK_HZ, self.GAP_NS / NS_PER_S)
 
+    @classmethod
+    def ready(cls, path: Path, **options: float) -> Self:
+        """A part that has been switched on and gives words, without noise."""
+        s = cls(path, "ads1282", seed=1, noise_scale=0, **options)
+        s.adc.run_until_level("DRDY", 0)
+        return s
+
     def send(self, *data: int) -> tuple[int, bytes]:
         """A gap, then bytes; when the first began, and what came back."""
         self.wait_ns(self.GAP_NS)
