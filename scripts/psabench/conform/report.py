@@ -1,0 +1,148 @@
+"""What a run of a suite came to: for the terminal, as JSON, as JUnit's XML, as a page (`report_html`)."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree as ET
+
+from psabench.conform import report_html
+from psabench.conform.outcome import Outcome, Verdict, conforms
+from psabench.conform.requirements import Requirement, requirements
+from psabench.whole_file import replace_file
+
+FORMAT = 1  # of conform.json
+ORDER = tuple(Verdict)
+MARKS = {
+    Verdict.PASSED: "ok",
+    Verdict.FAILED: "FAILED",
+    Verdict.INCONCLUSIVE: "open",
+    Verdict.NOT_OBSERVABLE: "unseen",
+    Verdict.NOT_APPLICABLE: "n/a",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Run:
+    """Of a suite on one subject. facts: who and what was tested, in words."""
+
+    suite: str  # device, recording, host
+    subject: str
+    facts: Mapping[str, str]
+    outcomes: Sequence[Outcome]
+    rows: Sequence[Requirement]  # that hold for the subject
+    interrupted: bool = False
+
+    @property
+    def conforms(self) -> bool:
+        return not self.interrupted and conforms(self.outcomes)
+
+    def verdicts(self) -> dict[str, Verdict]:
+        """Of each requirement: the worst of its tests; not observable where it has none."""
+        found: dict[str, Verdict] = {}
+        for o in self.outcomes:
+            for i in o.requirements:
+                found[i] = max(found.get(i, Verdict.PASSED), o.verdict, key=_BADNESS.index)
+        return {r.id: found.get(r.id, Verdict.NOT_OBSERVABLE) for r in self.rows}
+
+
+_BADNESS = (
+    Verdict.NOT_APPLICABLE,
+    Verdict.PASSED,
+    Verdict.NOT_OBSERVABLE,
+    Verdict.INCONCLUSIVE,
+    Verdict.FAILED,
+)
+
+
+def lines(run: Run, *, everything: bool = False) -> Iterator[str]:
+    """For the terminal: what is not passed (or everything), then the sum."""
+    for o in run.outcomes:
+        if everything or o.verdict in (Verdict.FAILED, Verdict.INCONCLUSIVE):
+            yield from told(o)
+    yield summary(run)
+
+
+def told(o: Outcome) -> Iterator[str]:
+    """An outcome in a few lines."""
+    yield f"{MARKS[o.verdict]:6} {', '.join(o.requirements)}: {o.title}"
+    if o.verdict is Verdict.FAILED:
+        rows = requirements().rows
+        for i in o.requirements:
+            yield f"         {i}: {rows[i].text}"
+        at = "" if o.at_ns is None else f" at {o.at_ns * 1e-6:.6f} ms"
+        yield f"         saw {o.saw}{at}"
+        yield f"         due {o.due}"
+        if o.exhibits:
+            yield f"         see {', '.join(o.exhibits)}"
+    elif o.reason:
+        yield f"         {o.reason}"
+    elif o.saw:
+        yield f"         saw {o.saw}"
+
+
+def summary(run: Run) -> str:
+    """One line: what it came to, with the counts of requirements."""
+    verdicts = list(run.verdicts().values())
+    counts = ", ".join(f"{n} {v.value}" for v in ORDER if (n := verdicts.count(v)))
+    if run.interrupted:
+        return f"{run.subject}: interrupted; of {len(verdicts)} requirements {counts}"
+    said = "conforms" if run.conforms else "does not conform"
+    return f"{run.subject} {said}: of {len(verdicts)} requirements {counts}"
+
+
+def write(folder: Path, run: Run) -> Path:
+    """conform.json, junit.xml and report.html, each whole or not at all; returns the page. Raises OSError."""
+    folder.mkdir(parents=True, exist_ok=True)
+    text = json.dumps(as_dict(run), indent=1, ensure_ascii=False, allow_nan=False)
+    replace_file(folder / "conform.json", text + "\n")
+    replace_file(folder / "junit.xml", junit(run))
+    page = folder / "report.html"
+    replace_file(page, report_html.page(run, folder))
+    return page
+
+
+def as_dict(run: Run) -> dict[str, Any]:
+    """What conform.json holds."""
+    return {
+        "format": FORMAT,
+        "suite": run.suite,
+        "subject": run.subject,
+        "conforms": run.conforms,
+        "interrupted": run.interrupted,
+        "facts": dict(run.facts),
+        "requirements": {i: v.value for i, v in run.verdicts().items()},
+        "tests": [{**asdict(o), "verdict": o.verdict.value} for o in run.outcomes],
+    }
+
+
+def junit(run: Run) -> str:
+    """As CI servers read it: what is not observable or not applicable is skipped, with its reason."""
+    suite = ET.Element("testsuite", name=f"conform {run.suite}: {run.subject}", tests=str(len(run.outcomes)))
+    counts = {
+        "failures": sum(o.verdict is Verdict.FAILED for o in run.outcomes),
+        "errors": sum(o.verdict is Verdict.INCONCLUSIVE for o in run.outcomes),
+        "skipped": sum(o.verdict in (Verdict.NOT_OBSERVABLE, Verdict.NOT_APPLICABLE) for o in run.outcomes),
+    }
+    suite.attrib |= {name: str(n) for name, n in counts.items()}
+    properties = ET.SubElement(suite, "properties")
+    for name, value in run.facts.items():
+        ET.SubElement(properties, "property", name=name, value=value)
+    for o in run.outcomes:
+        case = ET.SubElement(suite, "testcase", classname=" ".join(o.requirements), name=o.test, time=f"{o.took_s:.3f}")
+        kind = _JUNIT.get(o.verdict)
+        if kind is not None:
+            ET.SubElement(case, kind, message=f"saw {o.saw}; due {o.due}" if o.due else o.reason)
+    ET.indent(suite)
+    return '<?xml version="1.0" encoding="utf-8"?>\n' + ET.tostring(suite, encoding="unicode") + "\n"
+
+
+_JUNIT = {
+    Verdict.FAILED: "failure",
+    Verdict.INCONCLUSIVE: "error",
+    Verdict.NOT_OBSERVABLE: "skipped",
+    Verdict.NOT_APPLICABLE: "skipped",
+}

@@ -1,0 +1,131 @@
+"""Runs the device suite: every test of every requirement that holds for this board, each with its verdict.
+
+A scene is played when the first check wants it, and its evidence kept. A test whose probe is missing is not observable;
+one whose scene fails is inconclusive. Ctrl-C ends the run; what was judged so far stays.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+from psabench.conform.evidence import Evidence
+from psabench.conform.outcome import Broken, Outcome, TooLittle, Verdict
+from psabench.conform.plan import Plan, plan_of, scenes
+from psabench.conform.proof import Proof, proofs
+from psabench.conform.requirements import Requirement, requirements
+from psabench.conform.subject import Subject
+from psabench.conform.variant import Variant
+from psabench.errors import BenchError, DeviceError
+from psabench.procedures.head_bench import Progress
+
+MISSING = {
+    "can": "no CAN bus was connected",
+    "line": "no line port or adapter was connected (--lines)",
+    "pins": "a logic analyser on all pins is wanted; INT, DATA and CLK alone do not show it",
+    "bus": "no bus port was connected (--bus-port)",
+    "supply": "no power supply was connected (--scpi supply=...)",
+    "lockstep": "an emulator in lockstep is wanted: it takes longer than anybody would wait",
+    "inputs": "the volts at the inputs were not told (--input x=2.5)",
+}
+
+
+# Keeps what shows a failure: name of the test, what it found, the evidence it had; tells the files.
+Keep = Callable[[str, Broken, Evidence | None], tuple[str, ...]]
+
+
+@dataclass(slots=True)
+class Stage:
+    """The subject and what its scenes have shown so far."""
+
+    subject: Subject
+    clock_ppm: float
+    keep: Keep
+    shown: dict[str, Evidence | Exception] = field(default_factory=dict)
+
+    def evidence(self, name: str) -> Evidence:
+        """Of a scene, which is played if it has not been. Raises what it raised."""
+        if name not in self.shown:
+            self.shown[name] = self._play(name)
+        found = self.shown[name]
+        if isinstance(found, Exception):
+            raise found
+        return found
+
+    def _play(self, name: str) -> Evidence | Exception:
+        known = scenes(self.subject.variant.family)
+        if name not in known:
+            return TooLittle(f"there is no scene {name} for this board")
+        try:
+            return replace(known[name].make(self.subject), clock_ppm=self.clock_ppm)
+        except (BenchError, TooLittle) as e:
+            return e
+
+
+def wanted(variant: Variant, only: Sequence[str] = ()) -> list[tuple[Proof, tuple[Requirement, ...]]]:
+    """Tests with those of their requirements that hold for a variant; only: ids, or beginnings of ids."""
+    rows = requirements().rows
+    found = []
+    for proof in proofs():
+        mine = tuple(rows[i] for i in proof.ids if rows[i].applies(variant.board, variant.profile))
+        if mine and (not only or any(i.startswith(tuple(only)) for i in proof.ids)):
+            found.append((proof, mine))
+    order = list(scenes(variant.family))
+    return sorted(found, key=lambda t: _turn(plan_of(t[0].test), order))
+
+
+def _turn(plan: Plan, order: Sequence[str]) -> int:
+    """Checks first, in the order of their scenes; trials may leave the board otherwise than they found it."""
+    return len(order) if plan.is_trial else order.index(plan.scene) if plan.scene in order else -1
+
+
+def run(
+    subject: Subject,
+    progress: Progress,
+    *,
+    only: Sequence[str] = (),
+    clock_ppm: float = 100.0,
+    told: Callable[[Outcome], None] = lambda _: None,
+    keep: Keep = lambda *_: (),
+) -> list[Outcome]:
+    """Judge everything; told: of each outcome as it comes."""
+    stage = Stage(subject, clock_ppm, keep)
+    outcomes: list[Outcome] = []
+    tests = wanted(subject.variant, only)
+    with progress.step(subject.variant.name, max(1, len(tests))) as advance:
+        for proof, rows in tests:
+            outcomes.append(_judged(stage, proof, rows))
+            told(outcomes[-1])
+            advance()
+    return outcomes
+
+
+def _judged(stage: Stage, proof: Proof, rows: tuple[Requirement, ...]) -> Outcome:
+    plan = plan_of(proof.test)
+    begun_s = time.monotonic()
+    found = Outcome(
+        test=proof.test.__name__,
+        title=(proof.test.__doc__ or proof.test.__name__).partition("\n")[0],
+        requirements=tuple(r.id for r in rows),
+        verdict=Verdict.NOT_OBSERVABLE,
+        scene=plan.scene,
+    )
+    missing = plan.needs - stage.subject.probes
+    if missing:
+        return replace(found, reason="; ".join(MISSING[m] for m in sorted(missing)))
+    return replace(_carried_out(stage, proof, plan, found), took_s=time.monotonic() - begun_s)
+
+
+def _carried_out(stage: Stage, proof: Proof, plan: Plan, open_: Outcome) -> Outcome:
+    evidence = None
+    try:
+        evidence = None if plan.is_trial else stage.evidence(plan.scene)
+        return replace(open_, verdict=Verdict.PASSED, saw=proof.test(evidence or stage.subject))
+    except Broken as e:
+        files = stage.keep(open_.test, e, evidence)
+        return replace(open_, verdict=Verdict.FAILED, saw=e.saw, due=e.due, at_ns=e.at_ns, exhibits=files)
+    except DeviceError as e:
+        return replace(open_, verdict=Verdict.FAILED, saw=str(e), due="no refusal")
+    except (TooLittle, BenchError) as e:
+        return replace(open_, verdict=Verdict.INCONCLUSIVE, reason=str(e))

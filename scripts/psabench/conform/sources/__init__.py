@@ -1,0 +1,1 @@
+"""Files and probes to evidence."""

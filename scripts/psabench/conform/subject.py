@@ -1,0 +1,247 @@
+"""The device under test: a board at the end of its wires, whether we started an emulator for it or it was there.
+
+What a scene may do: send and receive on CAN, look at the lines, run cycles on the bus port, switch the supply, press
+Res, and let time pass. Nothing here reads the emulator's truth or plans a fault.
+"""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from psabench.bench import Bench
+from psabench.busport import BusPort, Cycle
+from psabench.can_host import CanHost, Message
+from psabench.conform.evidence import CanFrame, CanLog, Evidence, LineLog, Marks
+from psabench.conform.probes import LineProbe, PinProbe, PortProbe
+from psabench.conform.variant import Variant
+from psabench.devices import of_board
+from psabench.errors import BadInput
+from psabench.lineport import SAMPLE_HZ
+from psabench.protocol_files import dbc_node
+from psabench.unit import Unit
+
+UNIT = "a"
+# At the inputs of an emulator of ours: none is another's, one is negative, none is a round code.
+INPUTS_V: Mapping[str, float] = {"x": 2.0101, "y": -1.3007, "z": 0.7003}
+BUS_BOARDS = ("psd1", "pmka", "pik")  # boards with a parallel bus
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Addresses:
+    """Where the board's wires end. can None: an emulator is started in lockstep, and everything else with it."""
+
+    can: str | None = None
+    lines: Path | None = None
+    line_hz: float = SAMPLE_HZ
+    bus_port: Path | None = None
+    scpi: Mapping[str, str] = field(default_factory=dict)
+    control: Path | None = None  # of an emulator: time moves in lockstep through it
+    node: int | None = None
+    inputs_v: Mapping[str, float] = field(default_factory=lambda: dict(INPUTS_V))  # volts at the inputs, held still
+    adapter: str = "socketcand:0"  # of an emulator that we start
+    port_only: bool = False  # of an emulator that we start: its line port instead of all pins
+
+
+@dataclass(slots=True)
+class Take:
+    """What a scene collects while it runs."""
+
+    frames: list[CanFrame] = field(default_factory=list)
+    cycles: list[Cycle] = field(default_factory=list)
+    marks: dict[str, float] = field(default_factory=dict)
+    facts: dict[str, object] = field(default_factory=dict)
+    lines: LineLog | None = None
+
+    def on_message(self, m: Message) -> None:
+        """Listener of a CanHost."""
+        self.frames.append(
+            CanFrame(
+                t_s=m.timestamp,
+                can_id=m.arbitration_id,
+                data=bytes(m.data),
+                fd=bool(m.is_fd),
+                error=bool(m.is_error_frame),
+            )
+        )
+
+
+class Subject:
+    """See the module. `bench`, `unit` and `port` are for scenes and trials."""
+
+    def __init__(
+        self,
+        bench: Bench,
+        variant: Variant,
+        probe: LineProbe | None,
+        port: BusPort | None,
+        inputs_v: Mapping[str, float],
+    ) -> None:
+        """inputs_v: what lies at the inputs while it is tested, as far as the user knows."""
+        self.bench, self.variant, self.probe, self.port, self.inputs_v = bench, variant, probe, port, inputs_v
+        kind = of_board(variant.board)
+        found = next((u for u in bench.units.values() if isinstance(u, kind)), None)
+        if found is None:
+            there = ", ".join(u.title for u in bench.units.values()) or "none"
+            raise BadInput(f"no {kind.title} answers on this bus; boards there: {there}")
+        self.unit: Unit = found
+        self.node = found.node.node_id
+        self._stack = ExitStack()
+
+    @property
+    def host(self) -> CanHost:
+        return self.unit.host
+
+    @property
+    def lockstep(self) -> bool:
+        """Whether time moves only when we say so."""
+        return self.bench.pace == "step"
+
+    @property
+    def probes(self) -> frozenset[str]:
+        """What can be seen: can, line (INT, DATA and CLK, or what the line port has), pins (all lines), bus, supply."""
+        seen = {"can"}
+        if self.probe is not None:
+            seen |= {"line", "pins"} if isinstance(self.probe, PinProbe) else {"line"}
+        if self.port is not None:
+            seen.add("bus")
+        if "supply" in self.bench.addresses:
+            seen.add("supply")
+        if self.lockstep:
+            seen.add("lockstep")
+        if self.inputs_v:
+            seen.add("inputs")
+        return frozenset(seen)
+
+    @contextmanager
+    def take(self, *, lines: bool = True) -> Iterator[Take]:
+        """Collect what is seen while the block runs; its lines are there when it has ended."""
+        take = Take()
+        self.host.listeners.append(take.on_message)
+        looking = lines and self.probe is not None
+        try:
+            if looking and self.probe is not None:
+                self.probe.start()
+            yield take
+        finally:
+            self.host.listeners.remove(take.on_message)
+            if looking and self.probe is not None:
+                take.lines = self.probe.stop()
+
+    def evidence(self, scene: str, take: Take, *, clock_ppm: float = 100.0) -> Evidence:
+        """Of a take that has ended."""
+        return Evidence(
+            variant=self.variant,
+            node=self.node,
+            scene=scene,
+            can=CanLog(frames=tuple(take.frames)),
+            lines=take.lines,
+            cycles=tuple(take.cycles),
+            marks=Marks(at_s=dict(take.marks)),
+            facts=dict(take.facts),
+            inputs_v=self.inputs_v,
+            clock_ppm=clock_ppm,
+        )
+
+    def run_for(self, dwell_s: float) -> None:
+        """Let the board's time pass, receiving meanwhile."""
+        self.bench.wait(dwell_s)
+
+    def power_cycle(self, off_s: float) -> None:
+        """Off for off_s and on again. Raises BenchError where there is no supply."""
+        self.bench.supply.output(False)
+        self.run_for(off_s)
+        self.bench.supply.output(True)
+
+    def reset(self) -> None:
+        """A pulse on Res, by NMT (which presses it: docs/protocol.md)."""
+        self.unit.reset()
+
+    def close(self) -> None:
+        self._stack.close()
+        self.bench.close()
+
+    def __enter__(self) -> Subject:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, err: BaseException | None, tb: TracebackType | None) -> None:
+        self.close()
+
+    # ---- making one
+
+    @classmethod
+    def open(cls, variant: Variant, at: Addresses, *, seed: int = 1, clock_ppm: float = 0.0) -> Subject:
+        """At these addresses, or an emulator of ours. Raises BadInput, LinkError or BenchError."""
+        return cls._start(variant, at, seed, clock_ppm) if at.can is None else cls._connect(variant, at)
+
+    @classmethod
+    def _connect(cls, variant: Variant, at: Addresses) -> Subject:
+        node = dbc_node(variant.family) if at.node is None else at.node
+        bench = Bench.connect(at.can, control=at.control, scpi=at.scpi, node=node)
+        with ExitStack() as stack:
+            stack.callback(bench.close)
+            probe = None if at.lines is None else PortProbe(at.lines, variant.family, at.line_hz)
+            port = None if at.bus_port is None else stack.enter_context(BusPort(at.bus_port))
+            subject = cls(bench, variant, probe, port, at.inputs_v)
+            if port is not None:
+                subject._stack.callback(port.close)
+            stack.pop_all()
+        return subject
+
+    @classmethod
+    def _start(cls, variant: Variant, at: Addresses, seed: int, clock_ppm: float) -> Subject:
+        with ExitStack() as stack:
+            folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="psabench-")))
+            path = folder / "bench.yaml"
+            path.write_text(json.dumps(scenario(variant, at.inputs_v, clock_ppm)), encoding="utf-8")  # YAML, too
+            line, bus = folder / "line", folder / "bus"
+            extra: list[str | Path] = ["--vcd-unit", "1"]
+            extra += ["--line", line] if at.port_only else []
+            extra += ["--bus-port", f"{UNIT}:{bus}"] if variant.family in BUS_BOARDS else []
+            bench = Bench.start(path, seed=seed, can=at.adapter, extra=extra)
+            stack.callback(bench.close)
+            probe: LineProbe
+            if at.port_only:
+                probe = PortProbe(line, variant.family)
+            else:
+                probe = pins = PinProbe(bench, UNIT)
+                stack.callback(pins.close)
+            port = stack.enter_context(BusPort(bus, advance=bench.wait)) if variant.family in BUS_BOARDS else None
+            subject = cls(bench, variant, probe, port, at.inputs_v)
+            subject._stack = stack.pop_all()
+        return subject
+
+
+# Frequencies of a profile that follow from the board's own clocks: an error of its clocks scales them.
+CLOCKS: Mapping[str, tuple[str, ...]] = {
+    "psa2": ("fclk_hz", "temp_clkin_hz", "sclk_hz", "line_hz"),
+    "psd1": ("adc_clkin_hz",),
+    "pmka": ("ts_ns",),  # a period
+    "pik": ("clock_hz",),
+    "gyro": ("step_ns",),
+}
+SENSITIVITIES = ("kx_v_per_g", "ky_v_per_g", "kz_v_per_g", "kxy_v_per_g2", "drift_v_per_s", "reading_noise_v")
+PPM = 1e-6
+
+
+def scenario(variant: Variant, inputs_v: Mapping[str, float], clock_ppm: float) -> dict[str, Any]:
+    """A bench around one board: known volts at its inputs, a supply that can be switched.
+
+    clock_ppm: by how much the board's clocks are fast.
+    """
+    axes = {axis: {"sensor": "mems", "u0_v": v, **dict.fromkeys(SENSITIVITIES, 0.0)} for axis, v in inputs_v.items()}
+    unit: dict[str, Any] = {"name": UNIT, "board": variant.family, "profile": variant.profile, "axes": axes}
+    if clock_ppm:
+        unit["profile_set"] = {key: _off(key, variant[key], clock_ppm) for key in CLOCKS[variant.family]}
+    return {"supply": {}, "units": [unit]}
+
+
+def _off(key: str, nominal: float, clock_ppm: float) -> int:
+    factor = 1.0 + clock_ppm * PPM
+    return round(nominal / factor if key.endswith("_ns") else nominal * factor)

@@ -1,0 +1,66 @@
+"""What a board is said to be: its type and its profile, with the figures that the profile's page gives.
+
+The user says it (`--board psa2 --profile w24`); nothing here asks the board. Profiles are read as documentation of a
+variant: the figures that the article leaves open (docs/boards/*.md, open questions).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import yaml
+
+from psabench.devices import ALIASES, BOARDS
+from psabench.errors import BadInput
+from psabench.places import proto_file
+
+FIRST: Mapping[str, str] = {"psa2": "article"}  # profile of a board where none is named; others: of the same name
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Variant:
+    """A board with one reading of what its article leaves open."""
+
+    board: str  # as the user says: psa1
+    family: str  # whose protocol it speaks: psa2
+    profile: str
+    figures: Mapping[str, Any]  # keys of the profile
+
+    def __getitem__(self, key: str) -> Any:
+        """A figure of the profile. Raises BadInput where it has none."""
+        if key not in self.figures:
+            raise BadInput(f"profile {self.profile} has no {key}")
+        return self.figures[key]
+
+    @property
+    def name(self) -> str:
+        """As reports show it."""
+        return self.board if self.board == self.profile else f"{self.board}, profile {self.profile}"
+
+
+def variant(board: str, profile: str | None = None) -> Variant:
+    """Raises BadInput for a board or a profile that there is not, or a profile of another board."""
+    family = ALIASES.get(board, board)
+    if family not in BOARDS:
+        raise BadInput(f"no such board: {board}; there are {', '.join([*BOARDS, *ALIASES])}")
+    name = profile or FIRST.get(board, board)
+    figures = _figures(name)
+    of = figures.get("board", "psa2")
+    if ALIASES.get(of, of) != family:
+        raise BadInput(f"profile {name} is one of {of}, not of {board}")
+    return Variant(board=board, family=family, profile=name, figures=figures)
+
+
+def _figures(profile: str) -> Mapping[str, Any]:
+    if not profile.isidentifier():
+        raise BadInput(f"{profile}: no name of a profile; psa-emu --list-profiles has them")
+    try:
+        text = proto_file(f"profiles/{profile}.yaml").read_text(encoding="utf-8")
+    except BadInput as e:
+        raise BadInput(f"no such profile: {profile}; psa-emu --list-profiles has them") from e
+    found = yaml.safe_load(text)
+    if not isinstance(found, dict):
+        raise BadInput(f"profile {profile} is no mapping")
+    return found
