@@ -1,4 +1,4 @@
-"""Wind on the parked vehicle: the push that level sensors take for a tilt. And the step that the platform is integrated with."""
+"""Wind on the parked vehicle: the push that level sensors take for a tilt. And the step of the platform's integration."""
 
 from __future__ import annotations
 
@@ -60,8 +60,8 @@ def error_deg(r: GyrocompassResult) -> float:
     ("reading", "period_s"), [("article", 7.0), ("article", 20.0), ("article", 80.0), ("improved", 80.0)]
 )
 def test_the_wind_is_fatal_to_a_gyrocompass_and_is_told(tmp_path: Path, reading: str, period_s: float) -> None:
-    """A vertical that wanders by 1' over a window of 10 s is 6 deg/h, of the 9.7 that the Earth has (sources instruments
-    1.4): the heading is off by degrees, and the host does not take it for good."""
+    """A vertical that wanders by 1' over a window of 10 s is 6 deg/h, of the 9.7 that the Earth has: the heading is off
+    by degrees, and the host does not take it for good (sources instruments 1.4)."""
     r = compass(swaying(tmp_path, period_s), reading)
     assert abs(error_deg(r)) > 10.0 * CLAIM_DEG
     assert r.doubts
@@ -119,9 +119,7 @@ def test_a_push_is_a_tilt_of_the_felt_vertical() -> None:
 
     beta, gamma = (amplitude(pushed[:, k]) for k in (0, 1))
     assert math.hypot(beta, gamma) == pytest.approx(PUSH_ARCMIN, rel=0.01)
-    assert beta / gamma == pytest.approx(
-        math.tan(math.radians(33.0)), rel=0.03
-    )  # y_p points 33 deg from north to the east
+    assert beta / gamma == pytest.approx(math.tan(math.radians(33.0)), rel=0.03)  # azimuth of y_p
     assert amplitude(still[:, 0]) < 0.01 * PUSH_ARCMIN
     quarter = PUSH_MG * MG_MPS2 * np.sin(2.0 * np.pi * np.arange(5) / 4.0)
     assert truth == pytest.approx(list(quarter), abs=1e-12)
@@ -148,8 +146,8 @@ def test_a_push_goes_on_from_a_snapshot(tmp_path: Path) -> None:
 
 
 def test_the_step_of_the_integration_is_the_user_s_to_choose(tmp_path: Path) -> None:
-    """1 ms beside the 10 ms that are given: a turn by torques held over 10 ms ends at the same angles. With 20 ms every second
-    rate of the controller is lost, and the platform levels itself all the same."""
+    """1 ms beside the 10 ms that are given: a turn by torques held over 10 ms ends at the same angles. With 20 ms every
+    second rate of the controller is lost, and the platform levels itself all the same."""
     at: dict[str, Any] = {}
     for step_ns in ("10000000", "1000000", "20000000"):
         with Bench.start(scenario(tmp_path, platform=f"step_ns: {step_ns}")) as bench:
