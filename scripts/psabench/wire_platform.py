@@ -19,6 +19,7 @@ from psabench.devices import Gyro, Psa2
 from psabench.devices.gyro import Flag, Mode, Phase
 from psabench.errors import BenchError, LinkError
 from psabench.nav import DEGPH
+from psabench.navigation_watch import FLAG_WORDS, NavigationWatch
 from psabench.procedures.platform_bench import Compensation, Floats, Look, Table, Window
 from psabench.readings import Readings
 
@@ -31,12 +32,9 @@ READY_S = 60.0  # patience for the run-up of the gyroscope
 BUSY_ABORT = 0x08000022  # CiA 301: not in the present state of the device
 DEG = 180.0 / math.pi
 
-FLAG_WORDS = {
-    Flag.SATURATED: "a torquer is at its limit",
-    Flag.LEVEL_LOST: "the level sensors are silent or lose frames",
-    Flag.ENCODER_FAULT: "the angle sensor does not follow the torquer: it is stuck",
-    Flag.NOT_SETTLED: "the platform does not settle",
-}
+LEVEL_SPANS, LEVEL_REST_S = 15.0, 10.0  # patience of levelling: time constants of the loop, and the torquer's own time
+LEVEL_LOOKS, LEVEL_LOOK_S = 10, 0.1  # at beta, before the platform counts as level
+SELF_TEST_S, SELF_TEST_LOOK_S = 10.0, 1.2  # the unit nods for 1 to 5 s
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,7 +68,7 @@ class WirePlatform:
         self.step_s = self.gyro.step_s  # of the controller, and of the readings
         self._m1_per_s = self._latitude_rad = 0.0
         self._set_rad = 0.0
-        self._navigates = False  # it was told to, and nothing else since
+        self._watch: NavigationWatch | None = None  # it was told to navigate, and nothing else since
 
     def _find_level_unit(self) -> Psa2:
         node = self.gyro.level_node
@@ -101,16 +99,24 @@ class WirePlatform:
         self._m1_per_s, self._latitude_rad = self.gyro.get("m1_per_s"), latitude_rad
 
     def level(self, patience_s: float) -> None:
-        """Level; beta must lie within the unit's own tolerance for a second."""
+        """Level; beta must lie within the unit's own tolerance for a second.
+
+        It may take 15 time constants of the loop, or patience_s: what is not level by then never is.
+        """
+        limit_s = min(patience_s, LEVEL_SPANS / self._m1_per_s + LEVEL_REST_S) if self._m1_per_s else patience_s
         self._begin(Mode.LEVEL)
-        tolerance_rad = math.radians(self.gyro.get("tolerance_arcmin") / 60.0)
-        deadline_s = self.t_s + patience_s
-        while self.t_s < deadline_s:
+        tolerance_deg = self.gyro.get("tolerance_arcmin") / 60.0
+        deadline_s = self.t_s + limit_s
+        looks = 0
+        while looks < LEVEL_LOOKS:
+            if self.t_s >= deadline_s:
+                off_arcmin = 60.0 * abs(self.gyro.beta_deg)
+                raise LinkError(
+                    f"the platform was not level after {limit_s:g} s: it never settles; it is off by {off_arcmin:.1f}'"
+                )
+            self.wait(LEVEL_LOOK_S)
             self._raise_for(self.gyro.flags & ~Flag.SATURATED, "levelling")
-            beta_deg = self.gyro.stream(100)["BETA"]
-            if np.abs(np.radians(beta_deg)).max() < tolerance_rad:
-                return
-        raise LinkError(f"the platform was not level after {patience_s:g} s: it never settles")
+            looks = looks + 1 if abs(self.gyro.beta_deg) < tolerance_deg else 0
 
     def measure(self, table: Table, done: Callable[[], None]) -> Sequence[Window]:
         """See `PlatformBench`."""
@@ -145,18 +151,27 @@ class WirePlatform:
         self.gyro.set(latitude_deg=latitude_rad * DEG, speed_mps=speed_mps, track_deg=_wrapped_deg(track_rad * DEG))
 
     def look(self) -> Look:
-        flags, mode = self.gyro.flags, self.gyro.mode
-        faults = [words for flag, words in FLAG_WORDS.items() if flag in flags]
-        if self._navigates and mode != Mode.NAVIGATE:
-            faults.append(
-                f"the unit left navigation, its mode is {mode.name.lower()}: reset, or without power for a while"
-            )
-        return Look(
-            t_s=self.t_s,
-            encoder_rad=math.radians(self.gyro.encoder_deg),
-            heading_rad=math.radians(self.gyro.heading_deg),
-            faults=tuple(faults),
-        )
+        """Heading first; in navigation then a self test, which turns it for a second, and what became of the unit."""
+        t_s = self.t_s
+        encoder_rad, heading_rad = math.radians(self.gyro.encoder_deg), math.radians(self.gyro.heading_deg)
+        if self._watch:
+            self._self_test()
+            faults = self._watch.faults(self.t_s)
+        else:
+            faults = self._in_words(self.gyro.flags)
+        return Look(t_s=t_s, encoder_rad=encoder_rad, heading_rad=heading_rad, faults=faults)
+
+    def _self_test(self) -> None:
+        """What it finds is among the flags. A unit that has left navigation has none."""
+        if self.gyro.mode is not Mode.NAVIGATE:
+            return
+        self.gyro.begin_self_test()
+        deadline_s = self.t_s + SELF_TEST_S
+        self.wait(SELF_TEST_LOOK_S)
+        while self.gyro.self_test is None:
+            if self.t_s >= deadline_s:
+                raise LinkError(f"the self test of the gyro unit has not ended after {SELF_TEST_S:g} s")
+            self.wait(SLICE_S)
 
     # ---- a run
 
@@ -166,16 +181,19 @@ class WirePlatform:
         while True:
             try:
                 self.gyro.mode = mode
-                self._navigates = mode == Mode.NAVIGATE
+                self._watch = NavigationWatch(self.gyro, self.t_s) if mode is Mode.NAVIGATE else None
                 return
             except BenchError as e:
                 if getattr(e, "abort_code", 0) != BUSY_ABORT or self.t_s >= deadline_s:
                     raise
                 self.wait(1.0)
 
+    @staticmethod
+    def _in_words(flags: Flag) -> tuple[str, ...]:
+        return tuple(words for flag, words in FLAG_WORDS.items() if flag in flags)
+
     def _raise_for(self, flags: Flag, doing: str) -> None:
-        words = [w for flag, w in FLAG_WORDS.items() if flag in flags]
-        if words:
+        if words := self._in_words(flags):
             raise LinkError(f"{doing}: {'; '.join(words)}")
 
     def _windows(self, angles_deg: Sequence[float], patience_s: float) -> Iterator[Window]:
@@ -204,8 +222,7 @@ class WirePlatform:
         """Raises LinkError where the unit has left the run."""
         if tape.latest("MODE", Mode.GYROCOMPASS) in (Mode.GYROCOMPASS, Mode.CALIBRATE):
             return
-        flags = self.gyro.flags
-        words = "; ".join(w for flag, w in FLAG_WORDS.items() if flag in flags) or "it does not say why"
+        words = "; ".join(self._in_words(self.gyro.flags)) or "it does not say why"
         raise LinkError(f"the run ended before position {wanted} was measured: {words}")
 
     def _of(self, tape: _Tape, span: slice, number: int, set_rad: float) -> Window:
@@ -260,9 +277,9 @@ class _Tape:
             self.drop(len(self.readings["PHASE"]))  # turns may take longer than the counter of the frames takes to wrap
 
     def _turned(self, r: Mapping[str, Floats]) -> dict[str, Floats]:
-        """What the torquers turned the platform by about the vertical since the first reading, and readings missed since.
+        """What the torquers turned the platform by about the vertical since the first reading, and readings missed.
 
-        alpha' without drifts and Earth, from (3): (u2 cos gamma - u1 sin gamma) / cos beta. A rate holds from its step on.
+        alpha' without drifts and Earth, from (3): (u2 cos gamma - u1 sin gamma)/cos beta; rates last a step.
         """
         beta, gamma = np.radians(r["BETA"]), np.radians(r["GAMMA"])
         rate = (r["U2"] * np.cos(gamma) - r["U1"] * np.sin(gamma)) / np.cos(beta) * DEGPH

@@ -12,6 +12,7 @@ Angles and rates are as in the protocol: degrees, degrees an hour.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from enum import IntEnum, IntFlag
 
 from psabench.errors import BadInput, DeviceError
@@ -49,10 +50,29 @@ class Flag(IntFlag):
     NOT_SETTLED = 8
 
 
+class SelfTest(IntEnum):
+    """Object 210Bh:2."""
+
+    NONE = 0
+    PASSED = 1
+    FAILED = 2
+    UNCLEAR = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Began:
+    """A flag since the mode began, object 2108h."""
+
+    count: int  # how often it began
+    step: int  # in which it did last, as `Gyro.steps`
+
+
 MODE, PHASE, POSITION, FLAGS = (0x2100, 1), (0x2100, 2), (0x2100, 3), (0x2100, 4)
 POSITIONS, POSITIONS_MAX, RUN_MAX = 0x2103, 32, 127
+BEGAN, SELF_TEST, SELF_TEST_RESULT = 0x2108, (0x210B, 1), (0x210B, 2)
 STEP_NS, STEPS = (0x210A, 1), (0x210A, 2)
 LATEST_ENCODER, ENCODER_DEG = (0x2200, 3), 180.0 / 2**31
+LATEST_BETA, LEVEL_DEG = (0x2200, 6), 2e-6
 
 # Settings by the names that this package gives them: object and sub-index.
 SETTINGS: Mapping[str, tuple[int, int]] = {
@@ -143,10 +163,33 @@ class Gyro(BusUnit):
     def flags(self) -> Flag:
         return Flag(int(self.node.read(*FLAGS)))
 
+    def began(self) -> dict[Flag, Began]:
+        """What came since the mode began, gone or not."""
+        return {
+            flag: Began(int(self.node.read(BEGAN, 1 + k)), int(self.node.read(BEGAN, 1 + len(Flag) + k)))
+            for k, flag in enumerate(Flag)
+        }
+
+    def begin_self_test(self) -> None:
+        """In navigation the platform nods by 0.1 deg for a second: does the angle sensor follow?"""
+        self._write("self test", *SELF_TEST, 1)
+
+    @property
+    def self_test(self) -> SelfTest | None:
+        """What came of it; None: it is under way."""
+        if int(self.node.read(*SELF_TEST)):
+            return None
+        return SelfTest(int(self.node.read(*SELF_TEST_RESULT)))
+
     @property
     def encoder_deg(self) -> float:
         """Angle of the outer gimbal as the unit has it now."""
         return int(self.node.read(*LATEST_ENCODER)) * ENCODER_DEG
+
+    @property
+    def beta_deg(self) -> float:
+        """Level angle about the axis of suspension as the unit has it now."""
+        return int(self.node.read(*LATEST_BETA)) * LEVEL_DEG
 
     @property
     def heading_deg(self) -> float:
