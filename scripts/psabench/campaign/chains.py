@@ -135,7 +135,7 @@ def config(setup: Setup) -> nav_mc.McConfig:
         window_s=setup.window_s,
         gap_s=setup.gap_s,
         slew_radps=deg(setup.slew_dps),
-        settle_s=setup.settle_s,
+        settle_s=setup.settle_s + (setup.slew_dps / setup.slew_dps2 if setup.slew_dps2 else 0.0),
         method=nav.Method[setup.method.upper()],
         simplified=setup.simplified,
         noise=nav.Noise(

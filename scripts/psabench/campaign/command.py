@@ -10,10 +10,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from psabench.campaign import builds, chains, runner
+from psabench.campaign import builds, chains, runner, settings
 from psabench.campaign.cases import DEFAULT_STUDIES, STUDIES, WIRE_STUDIES, Case
 from psabench.campaign.runner import Plan
-from psabench.campaign.setup import ANY, CHOICES, Setup, as_input, changed
+from psabench.campaign.setup import Setup
 from psabench.campaign.workers import workers
 from psabench.errors import BadInput
 from psabench.procedures.head_bench import Progress
@@ -23,18 +23,29 @@ from psabench.store import Store
 if TYPE_CHECKING:
     from psabench.campaign.page import Campaign
 
-ABOUT = "A procedure with thousands of virtual instruments, on all cores or on a Dask cluster; resumes after Ctrl-C."
+ABOUT = """\
+Runs a procedure on thousands of virtual instruments, each with errors of its own, on all cores or on a Dask cluster:
+how often the article's claims hold, which error does it, and what better would be.
+"""
 EPILOG = """\
+A study is a list of cases, a case an instrument with its schedule of positions (--list names all):
+{studies}
+
 examples:
   psabench campaign gyrocompass                                  20000 runs a case; build/campaign/report.html
   psabench campaign gyrocompass --study readings --runs 1000000
   psabench campaign gyrocompass --study step --chain samples     sample by sample, beside the closed form
   psabench campaign gyrocompass --case article --chain emulated  200 runs, each through the wire of an emulator
   psabench campaign gyrocompass --study own --set angles_deg=0,120,240 --set gm_sigma_degph=0.05
+  psabench campaign gyrocompass --study latitude --set angle_random_arcmin=0.5 --set encoder=yes
   psabench campaign gyrocompass --dask tcp://192.0.2.7:8786      on the cluster of this scheduler, the same numbers
 
-Results lie in the store (docs/store.md): the same command computes only what is missing. Exit status: 0 done and within
-limits, 1 done and out of limits, 2 bad input, 3 the cluster or the bench failed, 130 ended by Ctrl-C.
+NAME=VALUE of --set, with the article's values; lists with commas, yes or no. A study's own settings win over them:
+{settings}
+
+Results lie in the store (docs/store.md): the same command computes only what is missing, Ctrl-C keeps what is done.
+Exit status: 0 done and within limits, 1 done and out of limits, 2 bad input, 3 the cluster or the bench failed, 130
+ended by Ctrl-C.
 """
 DEFAULT_RUNS = {"closed": 20000, "samples": 20000, "emulated": 200}
 REFERENCE_RUNS = (20000, 1_000_000)  # of the closed form beside another chain: as many as that has, within these
@@ -67,18 +78,22 @@ def add(commands: Any, formatter: Any, natural: Callable[[str], int]) -> None:
         help="a procedure with thousands of virtual instruments",
         description=ABOUT,
         formatter_class=formatter,
-        epilog=EPILOG,
+        epilog=EPILOG.format(studies=_studies(), settings="\n".join(settings.lines())),
     )
     p.set_defaults(handler=_main)
     p.add_argument("procedure", choices=["gyrocompass"], help="gyrocompass")
     p.add_argument("--list", action="store_true", help="name the studies, their cases and the settings")
-    p.add_argument("--study", action="append", default=[], help="which; may be repeated (all but own)")
+    p.add_argument("--study", action="append", default=[], help="which; may be repeated (all but own; emulated: wire)")
     p.add_argument("--case", help="only the cases of this name")
     p.add_argument("--chain", choices=list(DEFAULT_RUNS), default="closed", help="how runs are computed (%(default)s)")
     p.add_argument("--runs", type=natural, help=f"of each case ({DEFAULT_RUNS['closed']}; emulated: 200)")
     p.add_argument("--seed", type=natural, default=1, help="of all random numbers (%(default)s)")
     p.add_argument(
-        "--set", action="append", default=[], metavar="NAME=VALUE", help="instead of the article's error set"
+        "--set",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="instead of the article's error set; the names stand below",
     )
     p.add_argument("--workers", type=natural, help="processes (one a core when it is worth it); 1: none but this one")
     p.add_argument(
@@ -88,6 +103,10 @@ def add(commands: Any, formatter: Any, natural: Callable[[str], int]) -> None:
     p.add_argument("--out", type=Path, default=Path("build/campaign"), help="folder of the report (%(default)s)")
     p.add_argument("--fresh", action="store_true", help="compute anew what the store has")
     p.add_argument("--forget-others", action="store_true", help="remove what other builds have computed of these cases")
+
+
+def _studies() -> str:
+    return "\n".join(f"  {s.name:9} {s.title}" for s in STUDIES.values())
 
 
 def _main(args: argparse.Namespace) -> int:
@@ -122,10 +141,8 @@ def _list() -> None:
         print(f"{study.name}: {study.title}")
         for line in _names(list(study.cases(Setup()))):
             print(f"  {line}")
-    print("settings, with the article's values")
-    for name, value in as_input(Setup(), None)["setup"].items():
-        choices = f" ({', '.join(CHOICES[name])})" if name in CHOICES else ""
-        print(f"  {name}={_word(value)}{choices}")
+    print("settings of --set, with the article's values")
+    print("\n".join(settings.lines()))
 
 
 def _names(cases: Sequence[Case]) -> list[str]:
@@ -135,12 +152,6 @@ def _names(cases: Sequence[Case]) -> list[str]:
         told = case.name if case.title == case.name or case.study == "order" else f"{case.name}: {case.title}"
         curves.setdefault(case.curve or told, []).append(f"{case.x:g}" if case.curve else "")
     return [f"{name}, {' '.join(x)}" if x[0] else name for name, x in curves.items()]
-
-
-def _word(value: object) -> str:
-    if value is None or isinstance(value, bool):
-        return {None: ANY, True: "yes", False: "no"}[value]
-    return ",".join(f"{x:g}" for x in value) if isinstance(value, list) else str(value)
 
 
 def campaign(options: Options, progress: Progress) -> Campaign:
@@ -176,7 +187,7 @@ def _plans(options: Options) -> list[Plan]:
 
 
 def _cases(options: Options) -> list[Case]:
-    base = changed(Setup(), options.settings)
+    base = settings.base(options.settings)
     usual = WIRE_STUDIES if options.chain == "emulated" else DEFAULT_STUDIES
     names = options.studies or (usual if options.case is None else tuple(STUDIES))
     for name in names:
@@ -195,6 +206,7 @@ def _cases(options: Options) -> list[Case]:
             if c.hold is not None:
                 raise BadInput(f"--chain emulated: {c.name}: the hold is computed by closed and samples")
             emulated.params(c.setup)
+    settings.rehearse(cases, options.settings)
     return cases
 
 

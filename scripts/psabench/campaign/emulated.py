@@ -31,6 +31,8 @@ from psabench.wire_platform import WirePlatform
 
 SCENARIO = "scenarios/gyrocompass.yaml"
 SEED_BITS = 62
+UNIT_DPS2 = 20.0  # of the unit's turns, its object 2101h; with 0 a set-up ignores what speeding up and braking take
+UNIT_DPS, FAST_PROFILE, FAST_LIMIT_DPS = 18.0, "gyro_fast", 40.0  # quicker turns want stronger torquers
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,6 +65,7 @@ def check(setup: Setup) -> None:
         (setup.slew_dps <= 0.0, "its turns take time: slew_dps is wanted"),
         (setup.gimbal == "alpha", "its platform turns about the gimbal: gimbal is uncorrected or corrected"),
         (setup.angle_sys in ("increment", "accumulates"), "its angle sensor has one zero: angle_sys is none or common"),
+        (setup.slew_dps2 not in (0.0, UNIT_DPS2), f"its turns accelerate with slew_dps2={UNIT_DPS2:g}"),
         (setup.per_sample, "its errors are drawn once a position"),
         (
             setup.white_degph_rts not in (0.0, white),
@@ -110,6 +113,10 @@ def scenario(setup: Setup, at: Instrument) -> dict[str, Any]:
         "angle_set_arcmin": 0.0 if setup.encoder else setup.angle_random_arcmin,
         "angle_read_arcmin": setup.angle_random_arcmin if setup.encoder else 0.0,
     }
+    if setup.slew_dps > UNIT_DPS:
+        found["platform"]["torquer_limit_dps"] = FAST_LIMIT_DPS
+        for unit in found["units"]:
+            unit |= {"profile": FAST_PROFILE} if unit["board"] == "gyro" else {}
     if setup.white_degph_rts == 0.0:
         level = found["units"][0]
         level |= {"adc_noise_scale": 0, "temp_noise_scale": 0}

@@ -19,6 +19,7 @@ from psabench.whole_file import replace_file
 
 TITLE = "Gyrocompassing: a campaign"
 FORMAT = 1  # of result.json
+FIRST_ORDER_DEG = 5.0
 COLUMNS = ("platform rms", "p95", "largest", "heading rms", "p95", "≤ 0.1°", "drift rms", "p95")
 UNITS = ("deg", "deg", "deg", "deg", "deg", "%", "deg/h", "deg/h")
 HOLD_COLUMNS = ("end rms", "p95", "largest on the way, p95", "≤ 0.3°", "≤ 0.5°")
@@ -172,16 +173,20 @@ def _label(case: Case) -> str:
     return f"{case.name}: {case.title}" if case.study == "readings" else case.name
 
 
+def lines(rows: Sequence[Sequence[str]]) -> Iterator[str]:
+    """A table as text in columns."""
+    widths = [max(len(r[i]) for r in rows) for i in range(len(rows[0]))]
+    for r in rows:
+        yield "  ".join([r[0].ljust(widths[0]), *(x.rjust(w) for x, w in zip(r[1:], widths[1:], strict=True))])
+
+
 def console(c: Campaign) -> Iterator[str]:
     """Lines of all tables, then the claims."""
     for study in _studies(c):
         yield study.title
-        rows = table(c, study)
-        widths = [max(len(r[i]) for r in rows) for i in range(len(rows[0]))]
-        for r in rows:
-            yield "  " + "  ".join(
-                [r[0].ljust(widths[0]), *(x.rjust(w) for x, w in zip(r[1:], widths[1:], strict=True))]
-            )
+        for line in lines(table(c, study)):
+            yield f"  {line}"
+        yield from _too_large(c, study)
     for a in c.agreements:
         runs = f"{a.runs} and {a.reference_runs} runs"
         rms = f"rms {a.rms_deg:.4f} and {a.reference_rms_deg:.4f} deg"
@@ -194,6 +199,16 @@ def console(c: Campaign) -> Iterator[str]:
     for check in c.checks:
         if not check.within:
             yield f"out of limits: {check.what}: {check.value:.4g}, wanted {check.low:.4g} to {check.high:.4g}"
+
+
+def _too_large(c: Campaign, study: Study) -> Iterator[str]:
+    """The closed form is of first order: what it says of large errors is told as such."""
+    if c.facts["chain"] != chains.CHAINS["closed"].title:
+        return
+    for case in c.cases:
+        f = c.found[case.study, case.name]
+        if case.study == study.name and isinstance(f, Figures) and f.platform.rms > FIRST_ORDER_DEG:
+            yield f"  {case.name}: errors so large are beyond the closed form, which is of first order: --chain samples"
 
 
 def _studies(c: Campaign) -> list[Study]:

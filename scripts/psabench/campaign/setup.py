@@ -68,6 +68,7 @@ class Setup:
     window_s: float = 10.0
     gap_s: float = 10.0  # between windows, with slew_dps 0
     slew_dps: float = 0.0
+    slew_dps2: float = 0.0  # acceleration of a turn that reaches its rate; 0: at once
     settle_s: float = 0.0
     method: str = "closed3"
     simplified: bool = True  # (14) for (13)

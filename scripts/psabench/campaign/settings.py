@@ -1,0 +1,125 @@
+"""What `--set` takes: a line a field of `Setup`, its range, and what it means to a person who has not read the code.
+
+A value out of its range is refused by name before anything is computed; what only the algebra sees (positions that
+coincide, a latitude that leaves no horizontal rate) it refuses itself, told with the case.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from psabench.campaign import chains
+from psabench.campaign.cases import Case
+from psabench.campaign.chains import Wanted
+from psabench.campaign.setup import ANY, CHOICES, Setup, changed
+from psabench.errors import BadInput
+from psabench.navlib import library
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Setting:
+    """A field; `low` and `high` where it is a number, or a list of numbers."""
+
+    about: str
+    unit: str = ""
+    low: float = -math.inf
+    high: float = math.inf
+
+
+def _number(unit: str, low: float, high: float, about: str) -> Setting:
+    return Setting(about=about, unit=unit, low=low, high=high)
+
+
+def _word(about: str) -> Setting:
+    return Setting(about=about)
+
+
+SETTINGS: Mapping[str, Setting] = {
+    "latitude_deg": _number("deg", -90, 90, "where it stands"),
+    "latitude_error_arcmin": _number("arcmin", -600, 600, "of what the host is told"),
+    "tilt_deg": _number("deg", 0, 30, "pitch and roll of the parked vehicle"),
+    "tilt": _word("within +-tilt_deg, or at the corners"),
+    "alpha1_deg": _number("deg", -360, 360, "of the platform in position 1"),
+    "gimbal": _word("steps about the vertical, or of the gimbal: uncorrected, corrected"),
+    "drift_degph": _number("deg/h", -1e4, 1e4, "mean drift about the measuring axis"),
+    "gm_sigma_degph": _number("deg/h", 0, 1e4, "random drift, sd of a Gauss-Markov process"),
+    "gm_tau_s": _number("s", 0.1, 1e9, "its correlation time"),
+    "gm_from_zero": _word("it begins at zero instead of anywhere"),
+    "torquer_scale": _number("", -0.4, 1, "relative error of the torquer"),
+    "beta_sys_arcmin": _number("arcmin", -600, 600, "level sensors, constant"),
+    "gamma_sys_arcmin": _number("arcmin", -600, 600, "the same, other axis"),
+    "beta_random_arcmin": _number("arcmin", 0, 600, "level sensors, new in each position"),
+    "gamma_random_arcmin": _number("arcmin", 0, 600, "the same, other axis"),
+    "angle_sys_arcmin": _number("arcmin", -600, 600, "of the set angle"),
+    "angle_sys": _word("how it is read"),
+    "angle_random_arcmin": _number("arcmin", 0, 600, "of the set angle or the encoder, new in each position"),
+    "encoder": _word("the encoder is read (through the wire; the algebra is the same)"),
+    "random_sign": _word("constant errors have a sign drawn for each run"),
+    "per_sample": _word("random errors are drawn each 10 ms and average"),
+    "white_degph_rts": _number("deg/h sqrt(s)", 0, 1e4, "white noise of the levelling rate"),
+    "angles_deg": _number("deg", -36000, 36000, "positions in their order, 3 to 64"),
+    "window_s": _number("s", 0.01, 86400, "measurement in a position"),
+    "gap_s": _number("s", 0, 86400, "between windows, where slew_dps is 0"),
+    "slew_dps": _number("deg/s", 0, 1000, "rate of the turns; 0: gap_s instead"),
+    "slew_dps2": _number("deg/s2", 0, 1000, "their acceleration; 0: at once"),
+    "settle_s": _number("s", 0, 86400, "from a turn to its window, with slew_dps"),
+    "method": _word("estimator"),
+    "simplified": _word("eq. (14) instead of (13)"),
+}
+
+
+def base(words: Sequence[str], start: Setup | None = None) -> Setup:
+    """`start`, else the article's error set, with NAME=VALUE of the command line. Raises BadInput that names the field."""
+    setup = start or Setup()
+    for word in words:
+        name = word.partition("=")[0]
+        if near := difflib.get_close_matches(name, SETTINGS, 3) if name not in SETTINGS else []:
+            raise BadInput(f"--set {word}: no such setting; {', '.join(near)}? --list names all")
+        setup = changed(setup, [word])
+        if reason := out_of_range(setup, name):
+            raise BadInput(f"--set {word}: {reason}")
+    return setup
+
+
+def out_of_range(setup: Setup, name: str) -> str:
+    """Why the field's value is refused, "": it is not."""
+    s, value = SETTINGS.get(name, Setting(about="")), getattr(setup, name)
+    if value is None or isinstance(value, str | bool):
+        return ""
+    if name == "angles_deg" and not 3 <= len(value) <= 64:
+        return f"{name} has {len(value)} positions; it must have 3 to 64"
+    for x in value if isinstance(value, tuple) else (value,):
+        if not s.low <= x <= s.high:
+            return f"{name} is {x:g}; it must lie within {s.low:g} to {s.high:g}{s.unit and ' '}{s.unit}"
+    return ""
+
+
+def rehearse(cases: Sequence[Case], words: Sequence[str]) -> None:
+    """One run of each case: what the algebra refuses is told before any worker starts. Raises BadInput."""
+    library()  # where there is none, that is no case's fault
+    for case in cases:
+        try:
+            chains.compute([Wanted(chain="closed", setup=case.setup, hold=case.hold, seed=0, first_run=0, runs=1)])
+        except BadInput as e:
+            told = "".join(f"--set {w}: " for w in words)
+            raise BadInput(f"{told}case {case.name}: {e}") from e
+
+
+def lines() -> Iterator[str]:
+    """Of --list: name, the article's value, unit or choices, meaning."""
+    plain = Setup()
+    shown = {name: f"{name}={_shown(getattr(plain, name))}" for name in SETTINGS}
+    width = max(map(len, shown.values()))
+    for name, s in SETTINGS.items():
+        choices = f" ({', '.join(CHOICES[name])})" if name in CHOICES else ""
+        unit = f"{s.unit}; " if s.unit else ""
+        yield f"  {shown[name]:{width}}  {unit}{s.about}{choices}"
+
+
+def _shown(value: object) -> str:
+    if value is None or isinstance(value, bool):
+        return {None: ANY, True: "yes", False: "no"}[value]
+    return ",".join(f"{x:g}" for x in value) if isinstance(value, tuple) else f"{value}"

@@ -1,0 +1,118 @@
+"""A series holds the runs of one build: those of others are told, kept, forgotten, and never mixed in."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from psabench.campaign import builds, chains, command, runner, workers
+from psabench.campaign.cases import STUDIES
+from psabench.campaign.chains import CHAINS
+from psabench.campaign.command import Options
+from psabench.campaign.runner import Plan
+from psabench.campaign.setup import Setup
+from psabench.errors import BadInput, BenchError
+from psabench.navlib import NAME, library
+from psabench.progress import Bar
+from psabench.store import Store
+
+QUIET = Bar(Path(os.devnull).open("w"))  # noqa: SIM115  # for as long as the tests run
+(R0,) = [c for c in STUDIES["readings"].cases(Setup()) if c.name == "R0"]
+
+
+def another_build(monkeypatch: pytest.MonkeyPatch, build: str = "0123456789abcdef") -> None:
+    """As if the library had been built anew."""
+    monkeypatch.setattr(chains, "CHAINS", {n: replace(c, build=lambda: build) for n, c in CHAINS.items()})
+
+
+def test_results_of_another_build_are_told_kept_and_never_mixed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    few, more = (Options(case="R0", chain="samples", runs=n, workers=1, out=tmp_path) for n in (8192, 9000))
+    mine = builds.algebra()[:12]
+    command.campaign(few, QUIET)
+    assert capsys.readouterr().err == ""
+    another_build(monkeypatch)
+    command.campaign(more, QUIET)
+    err = capsys.readouterr().err
+    told = f"psabench: {tmp_path}/store.sqlite: runs of other builds than 0123456789ab"
+    assert f"{told} (8192 by {mine}) are kept, not used; --forget-others removes them\n" in err
+    p = Plan(cases=[R0], chain="samples", runs=9000, seed=1)
+    with Store(tmp_path / "store.sqlite") as store:
+        assert store.runs(p.origin(R0)) == {0: 8192, 8192: 808}  # all of them, not the rest alone
+        assert store.others(p.origin(R0)) == {builds.algebra(): 8192}
+    command.campaign(replace(more, forget_others=True), QUIET)
+    assert f"{told} (8192 by {mine}) are removed\n" in capsys.readouterr().err
+    command.campaign(more, QUIET)
+    assert capsys.readouterr().err == ""
+    monkeypatch.undo()  # the first build is back: it finds nothing of its own
+    command.campaign(few, QUIET)
+    assert "(9000 by 0123456789ab) are kept" in capsys.readouterr().err
+
+
+class Elsewhere:
+    """A worker whose library was built anew after the campaign had started."""
+
+    count = 1
+
+    def map(self, compute: Callable[[Any], Any], tasks: Iterable[Any]) -> Iterator[Any]:
+        for task in tasks:
+            yield [replace(p, origin=replace(p.origin, build="0123456789abcdef")) for p in compute(task)]
+
+
+def test_a_worker_whose_build_changed_on_the_way_ends_it(tmp_path: Path) -> None:
+    with Store(tmp_path / "s") as store:
+        wanted = runner.missing(Plan(cases=[R0], chain="closed", runs=10, seed=1), store)
+        with pytest.raises(BenchError, match="a worker computes with another build than this"):
+            runner.run(wanted, store, Elsewhere(), QUIET)
+        assert store.origins() == []
+
+
+class Cluster:
+    """A Dask client whose workers say this of themselves."""
+
+    def __init__(self, *told: str) -> None:
+        self._told = told
+
+    def wait_for_workers(self, _: int, *, timeout: float) -> None:
+        assert timeout > 0
+
+    def run(self, _: object, chain: str) -> dict[str, str]:
+        assert chain == "emulated"
+        return {f"tcp://{k}": told for k, told in enumerate(self._told)}
+
+
+def test_a_cluster_with_another_build_is_refused() -> None:
+    mine = workers.own_build("emulated")
+    assert mine.endswith(f"build {builds.wire()[:12]}")
+    workers._same_psabench(Cluster(mine, mine), "tcp://there", "emulated")
+    with pytest.raises(BadInput, match=r"--dask tcp://there: its workers have mine, build 0123\. This is psabench "):
+        workers._same_psabench(Cluster(mine, "mine, build 0123"), "tcp://there", "emulated")
+
+
+def test_a_build_is_what_its_files_hold(tmp_path: Path) -> None:
+    a, b = tmp_path / "a", tmp_path / "b"
+    a.write_bytes(b"one")
+    b.write_bytes(b"two")
+    first = builds.digest([a, b])
+    assert builds.digest([b, a]) != first
+    assert builds.digest([a]) != first
+    assert builds.algebra() == hashlib.sha256(Path(library().path).read_bytes()).hexdigest()
+    assert builds.wire() not in ("", builds.algebra())
+    a.rename(tmp_path / "c")
+    assert builds.digest([tmp_path / "c", b]) == first
+    b.write_bytes(b"twO")
+    assert builds.digest([tmp_path / "c", b]) != first
+
+
+def test_a_library_that_the_loader_found_is_found_again(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Its path is a bare name then; the kernel knows the file."""
+    file = Path(library().path).resolve()
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(library(), "path", NAME)
+    assert builds._loaded().resolve() == file
