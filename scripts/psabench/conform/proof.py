@@ -1,0 +1,44 @@
+"""@proves ties a test of the conformance suite to the requirements that it proves.
+
+The ids are literals, so that tools/gen_requirements.py finds them without running anything.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from psabench.conform.requirements import requirements
+
+Test = TypeVar("Test", bound=Callable[..., Any])
+
+
+@dataclass(frozen=True, slots=True)
+class Proof:
+    """A test of the suite and the ids of what it proves."""
+
+    test: Callable[..., Any]
+    ids: tuple[str, ...]
+
+
+_proofs: list[Proof] = []
+
+
+def proves(*ids: str) -> Callable[[Test], Test]:
+    """Register a test under ids of requirements. Raises ValueError for none, for one twice and for an unknown one."""
+    if not ids or len(set(ids)) != len(ids):
+        raise ValueError(f"proves: wants ids of requirements, each once, not {ids}")
+    if unknown := [i for i in ids if i not in requirements().rows]:
+        raise ValueError(f"proves: no requirement {', '.join(unknown)}")
+
+    def register(test: Test) -> Test:
+        _proofs.append(Proof(test, ids))
+        return test
+
+    return register
+
+
+def proofs() -> tuple[Proof, ...]:
+    """Every test that was registered so far, in the order in which its module was imported."""
+    return tuple(_proofs)

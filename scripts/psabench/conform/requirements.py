@@ -1,0 +1,328 @@
+"""The requirements of proto/requirements.yaml and proto/requirements/<group>.yaml, read once, checked to the letter.
+
+A row says what a board or a host shall do, where that is written, how sure it is and how somebody sees it who has only
+the wires. Figures that a test needs are in its `limits`, so that they stand in one place.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import yaml
+
+from psabench.errors import BadInput
+from psabench.places import proto_file
+
+Limit = int | float
+INDEX = "requirements.yaml"
+ID = re.compile(r"([A-Z]+[0-9]?)-[A-Z0-9]+-[0-9]{2}")
+NAME = re.compile(r"[a-z][a-z0-9_]*")
+# Where a statement may come from. The pages, their headings and the numbers are looked up by tools/gen_requirements.py.
+SOURCE = re.compile(
+    r"article, section [1-5](: .+)?|sources (instruments |can )?\d(\.\d)?|docs/[\w/]+\.md(#.+)?|proto/[\w/]+\.yaml"
+    r"|CiA 301 \d+(\.\d+)*|ISO 11898-1"
+)
+TABLE = re.compile(r"(docs|proto)/[\w/]+\.(yaml|md)#[^#]+")
+TEST = re.compile(r"tests/(unit/test_\w+\.c:\w+|(py|e2e|golden)/test_\w+\.py:test_\w+)")
+INDEX_FIELDS = {"version", "grades", "observe", "kinds", "boards", "groups", "retired"}
+GROUP_FIELDS = {"title", "prefixes"}
+ROW_FIELDS = {"id", "text", "source", "grade", "kind"}
+ROW_OPTIONS = {"original", "boards", "profiles", "observe", "unobservable", "limits", "table", "note", "proved_by"}
+
+
+class RequirementsError(BadInput):
+    """A file of requirements is not as it should be: file, row, what would be right."""
+
+
+@dataclass(frozen=True, slots=True)
+class Requirement:
+    """One row. `profiles` empty: all profiles of its boards. `observe` empty: `unobservable` says why.
+
+    `original` is the article's sentence in its language, "" where there is none; `table` a table that says the rest.
+    """
+
+    id: str
+    group: str
+    text: str
+    original: str
+    source: tuple[str, ...]
+    grade: str
+    boards: tuple[str, ...]
+    profiles: tuple[str, ...]
+    kind: str
+    observe: Mapping[str, str]
+    unobservable: str
+    limits: Mapping[str, Limit]
+    table: str
+    note: str
+    proved_by: tuple[str, ...]
+
+    def applies(self, board: str, profile: str) -> bool:
+        """Does it hold for that board with that profile?"""
+        return board in self.boards and (not self.profiles or profile in self.profiles)
+
+    def limit(self, name: str) -> Limit:
+        """A figure by name; its name ends in its unit. Raises KeyError with the names there are."""
+        if name not in self.limits:
+            raise KeyError(f"{self.id}: no limit {name}; there are: {', '.join(self.limits) or 'none'}")
+        return self.limits[name]
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """A file of rows; `prefixes` are the first words of its ids."""
+
+    name: str
+    title: str
+    prefixes: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Requirements:
+    """All of them, with the words they are written in; each mapping is word to one line of explanation."""
+
+    version: int
+    grades: Mapping[str, str]
+    ways: Mapping[str, str]
+    kinds: Mapping[str, str]
+    boards: Mapping[str, str]
+    profiles: Mapping[str, str]  # shipped profile to its board
+    groups: tuple[Group, ...]
+    rows: Mapping[str, Requirement]
+
+    def __getitem__(self, key: str) -> Requirement:
+        if key not in self.rows:
+            raise KeyError(f"no requirement {key}")
+        return self.rows[key]
+
+    def __iter__(self) -> Iterator[Requirement]:
+        return iter(self.rows.values())
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def of(self, board: str, profile: str) -> tuple[Requirement, ...]:
+        """Those that hold for a board with a shipped profile. Raises ValueError when there is no such pair."""
+        if self.profiles.get(profile) != board:
+            mine = [p for p, b in self.profiles.items() if b == board]
+            raise ValueError(f"{board} has no profile {profile}; there are: {', '.join(mine) or 'none'}")
+        return tuple(r for r in self if r.applies(board, profile))
+
+
+_Base: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # libyaml's where there is one: ten times faster
+
+
+class _Loader(_Base):  # type: ignore[misc]
+    """As SafeLoader, but a key that stands twice is an error and not a value that vanishes."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        keys = [self.construct_object(k, deep=True) for k, _ in node.value]
+        for key in keys:
+            if keys.count(key) > 1:
+                raise yaml.YAMLError(f"line {node.start_mark.line + 1}: {key} stands twice")
+        return dict(super().construct_mapping(node, deep))
+
+
+@cache
+def requirements() -> Requirements:
+    """Those that are shipped. Raises RequirementsError."""
+    return load(proto_file(INDEX))
+
+
+def load(index: Path) -> Requirements:
+    """Read an index, and the groups and profiles in the folders beside it. Raises RequirementsError."""
+    data = _mapping(_read(index), INDEX_FIELDS - {"retired"}, {"retired"}, index.name)
+    where = index.name
+    grades, ways, kinds, boards = (_words(data[k], f"{where}: {k}") for k in ("grades", "observe", "kinds", "boards"))
+    profiles = _profiles(index.parent / "profiles", boards)
+    retired = set(_texts(data.get("retired", []), f"{where}: retired"))
+    if type(data["version"]) is not int or data["version"] < 1:
+        raise RequirementsError(f"{where}: version {data['version']!r} is no number from 1 on")
+    if not isinstance(data["groups"], dict) or not data["groups"]:
+        raise RequirementsError(f"{where}: groups is a mapping of names to title and prefixes")
+    words = _Words(frozenset(grades), frozenset(ways), frozenset(kinds), frozenset(boards), profiles)
+    groups: list[Group] = []
+    rows: dict[str, Requirement] = {}
+    for name, entry in data["groups"].items():
+        entry = _mapping(entry, GROUP_FIELDS, set(), f"{where}: group {name}")
+        group = Group(str(name), _text(entry["title"], f"{where}: {name}: title"), _texts(entry["prefixes"], where))
+        if taken := {p for g in groups for p in g.prefixes} & set(group.prefixes):
+            raise RequirementsError(f"{where}: group {name}: prefix {', '.join(taken)} belongs to another group")
+        groups.append(group)
+        for row in _group(index.parent / "requirements" / f"{name}.yaml", group, words):
+            if row.id in rows:
+                raise RequirementsError(f"{name}.yaml: {row.id}: this id stands twice")
+            if row.id in retired:
+                raise RequirementsError(f"{name}.yaml: {row.id}: this id is retired and cannot come back")
+            rows[row.id] = row
+    return Requirements(
+        version=data["version"],
+        grades=MappingProxyType(grades),
+        ways=MappingProxyType(ways),
+        kinds=MappingProxyType(kinds),
+        boards=MappingProxyType(boards),
+        profiles=MappingProxyType(profiles),
+        groups=tuple(groups),
+        rows=MappingProxyType(rows),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Words:
+    grades: frozenset[str]
+    ways: frozenset[str]
+    kinds: frozenset[str]
+    boards: frozenset[str]
+    profiles: Mapping[str, str]
+
+
+def _read(path: Path) -> Any:
+    try:
+        return yaml.load(path.read_text(encoding="utf-8"), _Loader)
+    except OSError as e:
+        raise RequirementsError(f"{path.name}: {e.strerror}") from e
+    except yaml.YAMLError as e:
+        raise RequirementsError(f"{path.name}: {' '.join(str(e).split())}") from e
+
+
+def _profiles(folder: Path, boards: Mapping[str, str]) -> dict[str, str]:
+    """Name to board of every shipped profile. One without `board:` is a PSA-2's."""
+    found = {}
+    for path in sorted(folder.glob("*.yaml")):
+        data = _read(path)
+        board = data.get("board", "psa2") if isinstance(data, dict) else ""
+        if board not in boards:
+            raise RequirementsError(f"profiles/{path.name}: board {board!r} is not among: {', '.join(boards)}")
+        found[path.stem] = board
+    return found
+
+
+def _group(path: Path, group: Group, words: _Words) -> Iterator[Requirement]:
+    data = _mapping(_read(path), {"boards", "rows"}, set(), path.name)
+    boards = _known(data["boards"], words.boards, f"{path.name}: boards")
+    if not isinstance(data["rows"], list) or not data["rows"]:
+        raise RequirementsError(f"{path.name}: rows is no list of requirements")
+    for number, raw in enumerate(data["rows"], start=1):
+        key = raw.get("id", f"row {number}") if isinstance(raw, dict) else f"row {number}"
+        yield _row(_mapping(raw, ROW_FIELDS, ROW_OPTIONS, f"{path.name}: {key}"), group, boards, words, path.name)
+
+
+def _row(raw: dict[str, Any], group: Group, boards: tuple[str, ...], words: _Words, file: str) -> Requirement:
+    at = f"{file}: {raw['id']}"
+    if not isinstance(raw["id"], str) or not (m := ID.fullmatch(raw["id"])) or m[1] not in group.prefixes:
+        raise RequirementsError(f"{at}: an id is {' or '.join(group.prefixes)}, a topic and two figures: PSA2-FRAME-03")
+    boards = _known(raw.get("boards", list(boards)), words.boards, f"{at}: boards")
+    profiles = _known(raw.get("profiles", []), frozenset(words.profiles), f"{at}: profiles")
+    if strange := [p for p in profiles if words.profiles[p] not in boards]:
+        raise RequirementsError(f"{at}: profile {', '.join(strange)} is of none of its boards ({', '.join(boards)})")
+    row = Requirement(
+        id=raw["id"],
+        group=group.name,
+        text=_text(raw["text"], f"{at}: text"),
+        original=_text(raw.get("original", ""), f"{at}: original", empty=True),
+        source=_matching(raw["source"], SOURCE, f"{at}: source"),
+        grade=_one(raw["grade"], words.grades, f"{at}: grade"),
+        boards=boards,
+        profiles=profiles,
+        kind=_one(raw["kind"], words.kinds, f"{at}: kind"),
+        observe=_observe(raw.get("observe", {}), words.ways, f"{at}: observe"),
+        unobservable=_text(raw.get("unobservable", ""), f"{at}: unobservable", empty=True),
+        limits=_limits(raw.get("limits", {}), f"{at}: limits"),
+        table=_text(raw.get("table", ""), f"{at}: table", empty=True),
+        note=_text(raw.get("note", ""), f"{at}: note", empty=True),
+        proved_by=_matching(raw.get("proved_by", []), TEST, f"{at}: proved_by"),
+    )
+    for wrong, why in _WRONG:
+        if wrong(row):
+            raise RequirementsError(f"{at}: {why}")
+    return row
+
+
+# What a row as a whole cannot be.
+_WRONG: Sequence[tuple[Callable[[Requirement], bool], str]] = (
+    (
+        lambda r: " shall " not in r.text or not r.text.endswith("."),
+        "text is a sentence with shall and a full stop",
+    ),
+    (lambda r: not r.source, "source is missing"),
+    (lambda r: r.grade == "E1" and not r.original, "grade E1 needs the article's sentence, `original`"),
+    (
+        lambda r: bool(r.original) and not any(s.startswith("article") for s in r.source),
+        "`original` needs the article among its sources",
+    ),
+    (lambda r: bool(r.observe) == bool(r.unobservable), "it needs either `observe` or the reason `unobservable`"),
+    (
+        lambda r: bool(r.table) and not TABLE.fullmatch(r.table),
+        "table is like proto/psd1.yaml#bus",
+    ),
+)
+
+
+def _mapping(raw: Any, needed: set[str], more: set[str], at: str) -> dict[str, Any]:
+    if not isinstance(raw, dict):
+        raise RequirementsError(f"{at}: no mapping")
+    if unknown := [str(k) for k in raw if k not in needed | more]:
+        raise RequirementsError(f"{at}: unknown {', '.join(unknown)}; there are {', '.join(sorted(needed | more))}")
+    if missing := sorted(needed - raw.keys()):
+        raise RequirementsError(f"{at}: {', '.join(missing)} is missing")
+    return raw
+
+
+def _words(raw: Any, at: str) -> dict[str, str]:
+    if not isinstance(raw, dict) or not raw:
+        raise RequirementsError(f"{at}: no mapping of words to what they mean")
+    return {_text(k, at): _text(v, f"{at}: {k}") for k, v in raw.items()}
+
+
+def _text(raw: Any, at: str, empty: bool = False) -> str:
+    if not isinstance(raw, str) or not (raw.strip() or empty):
+        raise RequirementsError(f"{at}: {raw!r} is no text")
+    return " ".join(raw.split())
+
+
+def _texts(raw: Any, at: str) -> tuple[str, ...]:
+    texts = raw if isinstance(raw, list) else [raw]
+    found = tuple(_text(t, at) for t in texts)
+    if len(set(found)) != len(found):
+        raise RequirementsError(f"{at}: something stands twice")
+    return found
+
+
+def _one(raw: Any, known: frozenset[str], at: str) -> str:
+    if raw not in known:
+        raise RequirementsError(f"{at}: {raw!r} is not among: {', '.join(sorted(known))}")
+    return str(raw)
+
+
+def _known(raw: Any, known: frozenset[str], at: str) -> tuple[str, ...]:
+    return tuple(_one(t, known, at) for t in _texts(raw, at))
+
+
+def _matching(raw: Any, pattern: re.Pattern[str], at: str) -> tuple[str, ...]:
+    found = _texts(raw, at)
+    if strange := [t for t in found if not pattern.fullmatch(t)]:
+        raise RequirementsError(f"{at}: {strange[0]!r} is not of the form {pattern.pattern}")
+    return found
+
+
+def _observe(raw: Any, ways: frozenset[str], at: str) -> Mapping[str, str]:
+    if not isinstance(raw, dict):
+        raise RequirementsError(f"{at}: no mapping of ways to phrases")
+    return MappingProxyType({_one(k, ways, at): _text(v, f"{at}: {k}") for k, v in raw.items()})
+
+
+def _limits(raw: Any, at: str) -> Mapping[str, Limit]:
+    if not isinstance(raw, dict):
+        raise RequirementsError(f"{at}: no mapping of names to numbers")
+    for name, value in raw.items():
+        if not isinstance(name, str) or not NAME.fullmatch(name):
+            raise RequirementsError(f"{at}: {name!r} is no name like int_low_min_us")
+        if type(value) not in (int, float):
+            raise RequirementsError(f"{at}: {name}: {value!r} is no number")
+    return MappingProxyType(dict(raw))
