@@ -72,7 +72,7 @@ SETTINGS: Mapping[str, Setting] = {
 
 
 def base(words: Sequence[str], start: Setup | None = None) -> Setup:
-    """`start`, else the article's error set, with NAME=VALUE of the command line. Raises BadInput that names the field."""
+    """`start`, else the article's errors, with NAME=VALUE of the command line. Raises BadInput that names the field."""
     setup = start or Setup()
     for word in words:
         name = word.partition("=")[0]
