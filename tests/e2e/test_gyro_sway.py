@@ -1,8 +1,9 @@
-"""Wind on the parked vehicle: the push that level sensors take for a tilt. And the step of the platform's integration."""
+"""Wind on the parked vehicle: a push that level sensors take for a tilt. And the step of the platform's integration."""
 
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -140,6 +141,30 @@ def test_a_push_goes_on_from_a_snapshot(tmp_path: Path) -> None:
     with Bench.restore(saved) as bench:
         bench.wait(5.0)
         assert bench.truth_state() == later
+
+
+def test_the_digest_of_a_state_knows_the_push(tmp_path: Path) -> None:
+    """At the instant of the command nothing moves yet, and the states differ by what is to come alone."""
+
+    def digest(**push: float) -> str:
+        saved = tmp_path / "now.snapshot"
+        with Bench.start("gyrocompass_ideal") as bench:
+            bench.wait(1.0)
+            bench.control.call("vehicle.sway", pitch_arcmin=0, pitch_s=0, roll_arcmin=0, roll_s=0, **push)
+            bench.snapshot(saved)
+        found = re.findall(r'"state":"([0-9a-f]{64})"', saved.read_text())
+        assert len(found) == 1
+        return str(found[0])
+
+    some: list[dict[str, float]] = [
+        {},
+        {"east_mg": 0.3, "east_s": 8.0},
+        {"east_mg": 0.3, "east_s": 9.0},
+        {"east_mg": 0.4, "east_s": 8.0},
+        {"north_mg": 0.3, "north_s": 8.0},
+    ]
+    assert len({digest(**push) for push in some}) == len(some)
+    assert digest(**some[1]) == digest(**some[1])
 
 
 # ---- the step of the platform

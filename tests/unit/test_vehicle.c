@@ -273,6 +273,9 @@ static void a_push_needs_both_its_numbers(void **state_)
     struct vehicle v = at_latitude(50.0, &c);
     assert_true(vehicle_steady(&v, 0));
     near(state(&v, 3.0).accel_l_mps2[0], 0.0, 0.0);
+    c.sway = push(0.4, 8.0, 0.0, 0.0);
+    v = at_latitude(50.0, &c);
+    assert_false(vehicle_steady(&v, 0));
     c.sway = push(0.0, 0.0, 0.4, 8.0);
     v = at_latitude(50.0, &c);
     assert_false(vehicle_steady(&v, 0));
