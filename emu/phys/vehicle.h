@@ -18,8 +18,8 @@
 #define VEHICLE_MG_MPS2          9.80665e-3 /* standard gravity */
 #define VEHICLE_LATITUDE_MAX_DEG 85.0       /* a flight towards a pole goes on along this parallel */
 
-/* Sines from the command on; a period of 0: none. Of the angles about their means, and of the acceleration along the level axes: a
- * push that the sensors feel. The way it makes, centimetres, is left out: it turns l by less than 0.001 deg/h. */
+/* Sines from the command on; a period of 0: none. Of the angles about their means, and of the acceleration along the level axes,
+ * which the sensors feel. The way that it makes is left out: 0.3 mg over 20 s are 3 cm and turn l by 0.0003 deg/h. */
 struct vehicle_sway {
     double pitch_arcmin, pitch_s;
     double roll_arcmin, roll_s;
