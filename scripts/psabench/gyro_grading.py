@@ -179,6 +179,7 @@ def console_table(s: GyroSection) -> str:
     lines = [s.title, *_aligned(table(s))]
     c = s.result.compass
     lines.append(f"  |hypot(s, c) - 1| = {c.quality:.4f}, determinant {c.geometry:.2f} We^2")
+    lines.append(f"  {s.result.latitude.words}")
     if s.hold is not None:
         lines.append(f"hold, drift of the azimuth axis compensated: {s.hold.drift2_radps / DEGPH:.3f} deg/h")
         lines += _aligned(hold_table(s))
@@ -225,6 +226,7 @@ def result_dict(s: GyroSection) -> dict[str, object]:
         ],
         "quality": r.compass.quality,
         "determinant": r.compass.geometry,
+        "latitude": {name: getattr(r.latitude, name) for name in r.latitude.__dataclass_fields__},
         "positions": [
             {
                 "number": row.number + 1,

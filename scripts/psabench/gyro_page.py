@@ -63,6 +63,7 @@ def _section(s: GyroSection, ident: str) -> str:
         f"<section><h2>{escape(s.title)}</h2>",
         f"<p class=facts>|hypot(s, c) − 1| <b>{c.quality:.4f}</b> · determinant <b>{c.geometry:.2f}</b> We²</p>",
         _table(grading.table(s)),
+        f"<p class=facts>{escape(s.result.latitude.words)}</p>",
         f"<ul class=notes>{doubts}{notes}</ul>" if doubts or notes else "",
         _figure(rates_figure(s), ident + "rates", CAPTIONS["rates"]),
         _figure(course_figure(s), ident + "course", CAPTIONS["course"]),

@@ -12,9 +12,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
-from scipy.signal import lfilter
 from psabench.errors import LinkError
 from psabench.procedures.platform_bench import Compensation, Look, Table, Window
+from scipy.signal import lfilter
 
 Array = npt.NDArray[np.float64]
 
@@ -66,6 +66,7 @@ class FakePlatform:
         self._set = 0.0
         self._told_rad = math.radians(self.latitude_deg)
         self._m1, self._m2, self._settle_s = 1.0, 2.0, 10.0
+        self._idle = (0.0, 0.0, 0.0)  # until when, the rate then, what Earth and drifts took of the torquers' turns
         self._comp: Compensation | None = None
         self._alpha_hold = 0.0
         self._held_since_s = 0.0
@@ -153,7 +154,7 @@ class FakePlatform:
         shift = self.level_sd_arcmin * ARCMIN * self.rng.standard_normal(2)  # of the setting: seen, not felt by S
         read = self.read_sd_arcmin * ARCMIN * self.rng.standard_normal()
         encoder = self._q + read if self.stuck_deg is None else math.radians(self.stuck_deg)
-        at_s = STEP_S * np.arange(n)
+        at_s = STEP_S * np.arange(n, dtype=np.float64)
         swing = self.left_gimbal_arcmin * ARCMIN * np.exp(-self._m2 * (self._settle_s + at_s))
         rate = s + self._m2 * swing * math.sin(gamma)  # levelling takes a turn about the vertical for a rate
         self.t_s = t_mid_s + length_s / 2.0
@@ -189,7 +190,11 @@ class FakePlatform:
         q_rad, psi_rad = self._q, math.radians(self.heading_deg)
         alpha = q_rad - psi_rad + math.remainder(self.attitude(q_rad, 0.0)[0] - q_rad + psi_rad, math.tau)
         idle = u2_radps * math.cos(gamma_rad) - u1_radps * math.sin(gamma_rad)
-        return np.asarray(alpha * (1.0 - self.scale2) + idle * t_s)
+        since_s, before, total = self._idle
+        total += (before + idle) / 2.0 * (float(t_s[0]) - since_s)
+        taken = total + idle * (t_s - t_s[0])
+        self._idle = (float(t_s[-1]), idle, float(taken[-1]))
+        return np.asarray(alpha * (1.0 - self.scale2) + taken)
 
     def navigate(self, c: Compensation) -> None:
         self._comp, self._held_since_s = c, self.t_s

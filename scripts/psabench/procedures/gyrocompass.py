@@ -14,8 +14,15 @@ from psabench import nav
 from psabench.errors import LinkError
 from psabench.estimate.uncertainty import Estimate
 from psabench.nav import ARCMIN, DEGPH, EARTH_RADPS
-from psabench.procedures.gyrocompass_doubts import doubts_of, notes_of
-from psabench.procedures.gyrocompass_fit import Fit, Row, drift2_of, fit
+from psabench.procedures.gyrocompass_doubts import (
+    Evidence,
+    doubts_of,
+    heading_allowance_rad,
+    notes_of,
+    quality_limit,
+)
+from psabench.procedures.gyrocompass_fit import Fit, Row, drift2_of, fit, sensitivity
+from psabench.procedures.gyrocompass_latitude import LatitudeEffect, latitude_effect
 from psabench.procedures.gyrocompass_params import METHODS, NAME, READINGS, GyrocompassParams, params_of
 from psabench.procedures.gyrocompass_windows import good_calibration, s_of, sorted_out
 from psabench.procedures.head_bench import Progress
@@ -85,6 +92,7 @@ class GyrocompassResult:
     attitude: nav.Attitude
     heading_rad: float
     drift2_radps: float
+    latitude: LatitudeEffect
     estimates: tuple[Estimate, ...]
     doubts: tuple[str, ...]  # reasons not to trust the heading
     notes: tuple[str, ...]
@@ -112,7 +120,7 @@ def estimate(windows: Sequence[Window], p: GyrocompassParams) -> GyrocompassResu
     except nav.Refused as e:
         why = "; ".join(left_out) or "all windows are good"
         raise LinkError(f"{NAME}: no heading from {len(good)} of {len(run)} windows: {e} ({why})") from e
-    drift2, drift2_sd = drift2_of(f, good_calibration(windows, p))
+    found = _evidence(f, len(run), drift2_of(f, good_calibration(windows, p)))
     return GyrocompassResult(
         params=p,
         windows=tuple(windows),
@@ -120,10 +128,25 @@ def estimate(windows: Sequence[Window], p: GyrocompassParams) -> GyrocompassResu
         compass=f.compass,
         attitude=f.attitude,
         heading_rad=f.heading_rad,
-        drift2_radps=drift2,
-        estimates=_estimates(f, drift2, drift2_sd),
-        doubts=doubts_of(f),
-        notes=(*left_out, *notes_of(f, windows)),
+        drift2_radps=found.drift2_radps,
+        latitude=found.latitude,
+        estimates=_estimates(f, found.drift2_radps, found.drift2_sd_radps),
+        doubts=doubts_of(found),
+        notes=(*left_out, *notes_of(found, windows)),
+    )
+
+
+def _evidence(f: Fit, planned: int, drift2: tuple[float, float]) -> Evidence:
+    s = sensitivity(f)
+    limit = quality_limit(f, s)
+    return Evidence(
+        fit=f,
+        planned=planned,
+        sensitivity=s,
+        quality_limit=limit,
+        drift2_radps=drift2[0],
+        drift2_sd_radps=drift2[1],
+        latitude=latitude_effect(f, limit, *drift2),
     )
 
 
@@ -152,12 +175,14 @@ def allowance(result: GyrocompassResult) -> dict[str, float]:
     p, c = result.params, result.compass
     level = p.level_zero_arcmin * ARCMIN
     we, wz = EARTH_RADPS * math.cos(p.latitude_rad), EARTH_RADPS * abs(math.sin(p.latitude_rad))
-    zero_deg = p.angle_zero_arcmin / 60.0
+    heading = heading_allowance_rad(p, result.attitude)
+    latitude = we * p.latitude_sd_arcmin * ARCMIN
+    drift2 = math.sqrt(2.0) * we * level + latitude + p.torquer_scale * abs(result.drift2_radps)
     return {
-        "heading_deg": zero_deg + level * math.tan(math.radians(5.0)) * DEG,
-        "alpha1_deg": level * math.tan(math.radians(5.0)) * DEG,
+        "heading_deg": heading * DEG,
+        "alpha1_deg": (heading - p.angle_zero_arcmin * ARCMIN) * DEG,
         "drift1_degph": wz * level / DEGPH + p.torquer_scale * abs(c.drift1_radps) / DEGPH,
-        "drift2_degph": math.sqrt(2.0) * we * level / DEGPH + p.torquer_scale * abs(result.drift2_radps) / DEGPH,
+        "drift2_degph": drift2 / DEGPH,
         "pitch_deg": p.level_zero_arcmin / 60.0 * 2.0,
         "roll_deg": p.level_zero_arcmin / 60.0 * 2.0,
     }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -67,6 +67,61 @@ def fit(windows: Sequence[Window], p: GyrocompassParams) -> Fit:
         compass=compass,
         heading_rad=psi,
     )
+
+
+def again(f: Fit, more_radps: Floats, latitude_rad: float | None = None) -> nav.Compass:
+    """What the same windows would say if their rates had this added, at this latitude. Raises nav.Refused."""
+    p = f.params
+    rows = [
+        replace(r.position, s_radps=r.position.s_radps + float(more))
+        for r, more in zip(f.rows, more_radps, strict=True)
+    ]
+    return nav.gyrocompass(
+        rows,
+        latitude_rad=p.latitude_rad if latitude_rad is None else latitude_rad,
+        method=METHODS[p.method],
+        simplified=p.simplified,
+        noise=f.noise,
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sensitivity:
+    """What a rate of each window does to the results, (n,) each."""
+
+    alpha_s: Floats  # of alpha1: rad per rad/s
+    drift: Floats  # of the drift: a pure number
+    hypot_s: Floats  # of hypot(s, c)
+
+
+def sensitivity(f: Fit) -> Sensitivity:
+    """By differences of a thousandth of We."""
+    step = 1e-3 * EARTH_RADPS * math.cos(f.params.latitude_rad)
+    found = []
+    for one in np.eye(len(f.rows)) * step:
+        up, down = again(f, one), again(f, -one)
+        turned = math.remainder(up.alpha1_rad - down.alpha1_rad, math.tau)
+        size = math.hypot(up.s, up.c) - math.hypot(down.s, down.c)
+        found.append((turned, up.drift1_radps - down.drift1_radps, size))
+    alpha_s, drift, hypot_s = np.array(found).T / (2.0 * step)
+    return Sensitivity(alpha_s=alpha_s, drift=drift, hypot_s=hypot_s)
+
+
+def rate_covariance(f: Fit) -> Floats:
+    """Of the windows' rates, from the random drift, noise, angles and level sensors, (rad/s)^2."""
+    n, we = f.noise, EARTH_RADPS * math.cos(f.params.latitude_rad)
+    rows = [r.position for r in f.rows]
+    cov = np.array(
+        [
+            [
+                nav.gm_window_cov(n.gm_sigma_radps, n.gm_tau_s, a.window_s, b.window_s, abs(a.t_mid_s - b.t_mid_s))
+                for b in rows
+            ]
+            for a in rows
+        ]
+    )
+    alone = n.window_sd_radps**2 + (we * n.angle_sd_rad) ** 2 + (EARTH_RADPS * n.level_sd_rad) ** 2
+    return np.asarray(cov + alone * np.eye(len(rows)))
 
 
 def _attitude(q_rad: Floats, windows: Sequence[Window]) -> nav.Attitude:
@@ -132,13 +187,18 @@ def drift2_of(f: Fit, calibration: Sequence[Window]) -> tuple[float, float]:
         )
         weight.append(w.length_s)
     value = float(np.average(found, weights=weight))
-    level = nav.azimuth_drift_sd(
-        latitude_rad=p.latitude_rad,
-        alpha_rad=f.compass.alpha1_rad + math.pi / 4.0,
-        beta_sd_rad=p.level_sd_arcmin * ARCMIN,
-        gamma_sd_rad=p.level_sd_arcmin * ARCMIN,
-    )
-    return value, math.hypot(p.gm_sigma_degph * DEGPH, level / math.sqrt(len(found)))
+    level_sd = p.level_sd_arcmin * ARCMIN
+    level = [
+        nav.azimuth_drift_sd(
+            latitude_rad=p.latitude_rad,
+            alpha_rad=f.compass.alpha1_rad + delta,
+            beta_sd_rad=level_sd,
+            gamma_sd_rad=level_sd,
+        )
+        for delta in deltas
+    ]
+    shares = np.array(weight) / sum(weight)
+    return value, math.hypot(p.gm_sigma_degph * DEGPH, float(np.linalg.norm(shares * level)))
 
 
 def _delta_at(w: Window, f: Fit) -> float:

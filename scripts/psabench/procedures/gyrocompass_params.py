@@ -26,6 +26,8 @@ METHODS: Mapping[str, Method] = {
 }
 ANGLES = ("set", "encoder")
 SIGNALS = ("frames", "readings")
+SIGNED = ("latitude_deg", "drift2_degph")
+SETTLED = 7.0  # time constants of a loop: e^-7 of what a turn leaves is less than noise and drift make of a heading
 WINDOW_LEAST_S = 0.1  # object 2102h
 TAU_LEAST_S = 0.01  # 0 is a drift without memory
 
@@ -42,7 +44,8 @@ class GyrocompassParams:
     m1_per_s: float = option(1.0, "1/s", "levelling loop")
     m2_per_s: float = option(2.0, "1/s", "azimuth loop")
     freeze: bool = option(False, "", "no azimuth servo in the windows")
-    latitude_deg: float = option(50.0, "deg", "as the operator gives it")
+    latitude_deg: float = option(50.0, "deg", "as the operator gives it; of a scenario, its site's")
+    latitude_sd_arcmin: float = option(0.1, "arcmin", "error of the latitude")
     method: str = option("closed3", "", f"one of {', '.join(METHODS)}")
     angles: str = option("set", "", "which angle is trusted: set or encoder")
     cardan: bool = option(True, "", "correct the angles for the tilt of the outer axis")
@@ -60,7 +63,9 @@ class GyrocompassParams:
     angle_zero_arcmin: float = option(
         6.0, "arcmin", "of the angle sensor against the vehicle, for the heading's limits"
     )
-    torquer_scale: float = option(1e-3, "", "error of the torquers, for the drift's limits")
+    torquer_scale: float = option(1e-3, "", "error of the torquers, for the drift's limits and the vehicle's turns")
+    drift2_degph: float = option(0.0, "deg/h", "drift of the azimuth axis, from the passport: it tells the latitude")
+    drift2_limit_degph: float = option(0.0, "deg/h", "what that may be off by; 0: no passport")
 
     def __post_init__(self) -> None:
         for name, known in (("method", tuple(METHODS)), ("angles", ANGLES), ("signals", SIGNALS)):
@@ -68,8 +73,10 @@ class GyrocompassParams:
                 raise ValueError(f"{name} is {getattr(self, name)!r}; it must be one of {', '.join(known)}")
         for f in fields(self):
             value = getattr(self, f.name)
-            if isinstance(value, float) and f.name != "latitude_deg" and not 0.0 <= value < math.inf:
+            if isinstance(value, float) and f.name not in SIGNED and not 0.0 <= value < math.inf:
                 raise ValueError(f"{f.name} is {value}; it must not be negative")
+        if not math.isfinite(self.drift2_degph):
+            raise ValueError(f"drift2_degph is {self.drift2_degph}; it must be a number")
         if self.window_s < WINDOW_LEAST_S or self.repeat < 1:
             raise ValueError(f"window_s is {self.window_s}, repeat {self.repeat}; at least {WINDOW_LEAST_S:g} and 1")
         rehearse(self)
@@ -110,6 +117,7 @@ READINGS: Mapping[str, Mapping[str, Any]] = {
         "window_s": 5.0,
         "settle_s": 5.0,
         "slew_dps": 18.0,
+        "slope": True,
         "m1_per_s": 2.0,
         "method": "gls-constrained",
         "angles": "encoder",
@@ -134,6 +142,7 @@ def rehearse(p: GyrocompassParams) -> None:
     angles = np.radians(Table(angles_deg=p.angles_deg, repeat=p.repeat).sequence_deg)
     if not abs(p.latitude_deg) <= 90.0:
         raise BadInput(f"{NAME}: latitude_deg is {p.latitude_deg:g}; it must lie within +-90")
+    _patient(p)
     we = EARTH_RADPS * math.cos(p.latitude_rad)
     pace_s = p.window_s + p.settle_s
     rows = [
@@ -143,6 +152,19 @@ def rehearse(p: GyrocompassParams) -> None:
     nav.gyrocompass(rows, latitude_rad=p.latitude_rad, method=METHODS[p.method], noise=noise_of(p, 0.0))
 
 
+def _patient(p: GyrocompassParams) -> None:
+    """Whether the loops have the time to settle. Raises BadInput. The slope does not mind what is left of beta."""
+    loops = (("m1_per_s", p.m1_per_s, "" if p.slope else ", or --slope yes"), ("m2_per_s", p.m2_per_s, ""))
+    for name, m, way_out in loops:
+        if (p.slope and name == "m1_per_s") or m * p.settle_s >= SETTLED:
+            continue
+        need = f"at least {SETTLED / m:.3g}" if m > 0.0 else "a loop"
+        raise BadInput(
+            f"{NAME}: settle_s is {p.settle_s:g}, {name} {m:g}: the platform is not at rest when its window begins; "
+            f"it takes {SETTLED:g}/{name}, {need}{way_out}"
+        )
+
+
 def noise_of(p: GyrocompassParams, window_sd_radps: float) -> nav.Noise:
     return nav.Noise(
         gm_sigma_radps=p.gm_sigma_degph * DEGPH,
@@ -150,4 +172,5 @@ def noise_of(p: GyrocompassParams, window_sd_radps: float) -> nav.Noise:
         window_sd_radps=window_sd_radps,
         angle_sd_rad=p.angle_sd_arcmin * ARCMIN,
         level_sd_rad=p.level_sd_arcmin * ARCMIN,
+        latitude_sd_rad=p.latitude_sd_arcmin * ARCMIN,
     )

@@ -13,6 +13,7 @@ from psabench.procedures.gyrocompass_params import GyrocompassParams
 from psabench.procedures.platform_bench import Floats, Window
 from psabench.procedures.result import DEG
 
+LEVEL_CODE_RAD = 1e-6  # of beta on the wire: codes of PSA-2, 0.99 urad
 OFF_LIMIT_RAD = math.radians(1.0)  # encoder against the angle asked for: beyond it the sensor tells nothing
 
 
@@ -35,6 +36,43 @@ def _slope(x: Floats, step_s: float) -> float:
     return float(t @ x / (t @ t))
 
 
+def unsteady(w: Window, p: GyrocompassParams) -> tuple[float, float]:
+    """What S errs by where it runs in its window, rad/s, and the standard deviation of that from noise and codes.
+
+    A mean is held against the slope, which what a turn left of beta does not touch; a slope against those of its
+    halves, which differ where the rate is not one. What the gimbal still turns, the encoder tells; frozen, S has it.
+    """
+    n_rad, length_s, count = _step_noise(w.beta_rad), w.length_s, len(w.beta_rad)
+    used, steady = s_of(w, slope=p.slope, frozen=p.freeze), s_of(w, slope=True, frozen=True)
+    variance = n_rad**2 * w.step_s * (w.m1_per_s + 24.0 / length_s)
+    if p.slope:
+        steady += float(np.mean([_half(w, k) for k in (0, 1)])) - s_of(w, slope=True, frozen=False)
+        variance = n_rad**2 * 36.0 / count
+    tilt, e_rad = abs(math.sin(float(w.gamma_rad.mean()))), _step_noise(w.encoder_rad)
+    variance += (
+        (tilt * e_rad) ** 2 * 12.0 / count + (0.5 * tilt * _code(w.encoder_rad)) ** 2 + (0.3 * LEVEL_CODE_RAD) ** 2
+    )
+    return used - steady, math.sqrt(variance) / length_s
+
+
+def _half(w: Window, k: int) -> float:
+    """S of the first or the second half of a window, from the slope."""
+    n = len(w.beta_rad) // 2
+    part = slice(k * n, k * n + n)
+    return nav.window_slope(w.beta_rad[part], w.levelling_radps[part], w.step_s)
+
+
+def _step_noise(x: Floats) -> float:
+    """Standard deviation of what is new in each step."""
+    return float(np.std(np.diff(x)) / math.sqrt(2.0)) if len(x) > 2 else 0.0
+
+
+def _code(x: Floats) -> float:
+    """The smallest step that the values show, 0: they are all the same."""
+    steps = np.abs(np.diff(x))
+    return float(steps[steps > 0.0].min()) if steps.any() else 0.0
+
+
 def s_sd(windows: Sequence[Window], slope: bool) -> float:
     """Standard deviation of S from the noise that the level angles show from step to step, rad/s.
 
@@ -42,7 +80,7 @@ def s_sd(windows: Sequence[Window], slope: bool) -> float:
     """
     of = []
     for w in windows:
-        n = float(np.std(np.diff(w.beta_rad)) / math.sqrt(2.0)) if len(w.beta_rad) > 2 else 0.0
+        n = _step_noise(w.beta_rad)
         of.append(n * math.sqrt(12.0 / len(w.beta_rad) if slope else w.m1_per_s * w.step_s) / w.length_s)
     return float(np.mean(of))
 
@@ -63,18 +101,22 @@ def off(w: Window) -> str:
     return f"the encoder shows {shown:.2f} deg, not {asked:g}: it is stuck, or the platform did not turn"
 
 
+def why_not(w: Window) -> tuple[str, ...]:
+    """Why a window does not count; (): it does."""
+    return (*w.faults, *([off(w)] if off(w) else []))
+
+
 def sorted_out(windows: Sequence[Window]) -> tuple[list[Window], list[str]]:
     """The windows that count, and a sentence for each of the others."""
-    good, notes = [], []
-    for w in windows:
-        why = [*w.faults, *([off(w)] if off(w) else [])]
-        if why:
-            notes.append(f"position {w.number + 1} ({w.set_rad * DEG:g} deg) does not count: {'; '.join(why)}")
-        else:
-            good.append(w)
+    good = [w for w in windows if not why_not(w)]
+    notes = [
+        f"position {w.number + 1} ({w.set_rad * DEG:g} deg) does not count: {'; '.join(why_not(w))}"
+        for w in windows
+        if why_not(w)
+    ]
     return good, notes
 
 
 def good_calibration(windows: Sequence[Window], p: GyrocompassParams) -> list[Window]:
     """The window after the run, where there is one and it counts."""
-    return [w for w in windows[len(p.table.sequence_deg) :] if not w.faults]
+    return sorted_out(windows[len(p.table.sequence_deg) :])[0]
