@@ -5,6 +5,7 @@ Without --can and --control each reading gets an emulator of its own with the sa
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -89,11 +90,11 @@ def _made(kind: type[Any], procedure: str, given: Mapping[str, Any]) -> Any:
 def run(options: GyroOptions, progress: Progress) -> list[GyroSection]:
     """Every reading that was asked for. Parameters are checked before anything starts. Raises BenchError."""
     readings: ReadingParams = _made(ReadingParams, options.procedure, options.params)
-    given = _part(GyrocompassParams, options.params)
-    params = [(name, gyrocompass.params_of(name, given)) for name in readings.readings]
+    for name in readings.readings:
+        gyrocompass.params_of(name, _part(GyrocompassParams, options.params))
     hold_params = _made(HoldParams, options.procedure, options.params) if _holds(options) else None
     options.out.mkdir(parents=True, exist_ok=True)
-    return [_one(name, p, hold_params, options, progress) for name, p in params]
+    return [_one(name, hold_params, options, progress) for name in readings.readings]
 
 
 def facts(options: GyroOptions) -> dict[str, str]:
@@ -111,12 +112,12 @@ def _holds(options: GyroOptions) -> bool:
     return options.procedure == heading_hold.NAME
 
 
-def _one(
-    label: str, p: GyrocompassParams, hold_params: HoldParams | None, options: GyroOptions, progress: Progress
-) -> GyroSection:
+def _one(label: str, hold_params: HoldParams | None, options: GyroOptions, progress: Progress) -> GyroSection:
     with _bench(options) as bench:
         if options.scenario and not any(isinstance(u, Gyro) for u in bench.units.values()):
             raise BadInput(f"--scenario {options.scenario}: it has no gyro unit; {SCENARIO} has one")
+        given = {**_site(options), **_part(GyrocompassParams, options.params)}
+        p = gyrocompass.params_of(label, given)
         platform = WirePlatform(bench, signals=p.signals)
         truth = _Truth(bench)
         windows = gyrocompass.measure(platform, p, progress, seen=truth.window)
@@ -130,12 +131,24 @@ def _one(
         return GyroSection(label=label, result=result, truth=section.truth, hold=hold, hold_truth=truth.held())
 
 
+def _resolved(options: GyroOptions) -> Path | None:
+    """Where the emulator of a run writes its scenario, None: the bench is somebody else's."""
+    return None if options.can or options.control else options.out / f"scenario-{SCENARIO}.json"
+
+
+def _site(options: GyroOptions) -> dict[str, float]:
+    """The latitude that an operator at the scenario's site knows; {}: nobody says where the bench stands."""
+    path = _resolved(options)
+    site = json.loads(path.read_text(encoding="utf-8")).get("site", {}) if path else {}
+    return {"latitude_deg": float(site["latitude_deg"])} if "latitude_deg" in site else {}
+
+
 def _bench(options: GyroOptions) -> Bench:
-    if options.can or options.control:
+    resolved = _resolved(options)
+    if resolved is None:
         return Bench.connect(options.can, control=options.control, truth=options.truth)
     pace = "wall" if options.real_time else "step"
-    resolved: list[str | Path] = ["--resolved", options.out / f"scenario-{SCENARIO}.json"]
-    return Bench.start(options.scenario or SCENARIO, pace=pace, seed=options.seed, extra=resolved)
+    return Bench.start(options.scenario or SCENARIO, pace=pace, seed=options.seed, extra=["--resolved", resolved])
 
 
 def _depart(bench: Bench, p: HoldParams) -> None:

@@ -122,8 +122,8 @@ def _unseen_latitude(e: Evidence) -> str:
         return ""
     return (
         f"latitudes from {latitude.low_deg:.2f} to {latitude.high_deg:.2f} deg cannot be told from "
-        f"{f.params.latitude_deg:g} deg here, and on this tilt turn the heading by up to {latitude.unseen_deg:.2f} deg: "
-        "level the vehicle, or give drift2_degph and drift2_limit_degph of the passport"
+        f"{f.params.latitude_deg:g} deg here, and on this tilt turn the heading by up to {latitude.unseen_deg:.2f} "
+        "deg: level the vehicle, or give drift2_degph and drift2_limit_degph of the passport"
     )
 
 
