@@ -259,11 +259,12 @@ format:
 	$(if $(C_FILES),clang-format -i $(C_FILES))
 	$(PY) -m ruff format .
 
-## docs: what follows from proto/psabench.yaml and is kept in git: DBC, EDS, docs/protocol.md
+## docs: what follows from proto/ and is kept in git: DBC, EDS, docs/protocol.md, docs/requirements.md
 docs: all
 	$(PY) tools/gen_proto.py
 	$(if $(wildcard tools/gen_docs.py),$(PY) tools/gen_docs.py)
 	$(PY) tools/gen_commands.py
+	$(PY) tools/gen_requirements.py
 
 SIGROK := share/libsigrokdecode/decoders
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import ast
-import re
 import sys
 from collections import Counter
 from functools import cache
@@ -13,6 +11,7 @@ from types import ModuleType
 from typing import Any
 
 import pytest
+from find_tests import collected_in_python, registered_in_c
 
 ROOT = Path(__file__).resolve().parents[2]
 PYTHON_FOLDERS = ("tests/py", "tests/golden", "tests/e2e")  # as pytest is told in pyproject.toml
@@ -30,29 +29,6 @@ def load_generator() -> ModuleType:
 
 gen_docs = load_generator()
 CHIPS = list(gen_docs.PAGES.values())
-
-
-def registered_in_c(source: str) -> set[str]:
-    """Names of the tests that a cmocka program runs: in a table that is handed to cmocka, and defined in the file."""
-    code = re.sub(r"/\*.*?\*/|//[^\n]*", "", source, flags=re.DOTALL)
-    names: set[str] = set()
-    for table in re.finditer(r"\bconst struct CMUnitTest (\w+)\[\]\s*=\s*\{(.*?)\};", code, re.DOTALL):
-        if re.search(rf"\bcmocka_run_group_tests(?:_name)?\([^;]*\b{table[1]}\b", code):
-            names |= set(re.findall(r"\bcmocka_unit_test\w*\(\s*(\w+)", table[2]))
-    return {n for n in names if re.search(rf"\bvoid {n}\(void \*\*\w+\)\s*\{{", code)}
-
-
-def collected_in_python(source: str) -> set[str]:
-    """Names of the test functions that pytest collects from a file; one that is skipped whatever happens is none."""
-    names: set[str] = set()
-    for node in ast.parse(source).body:
-        inner = node.body if isinstance(node, ast.ClassDef) and node.name.startswith("Test") else [node]
-        for f in inner:
-            if isinstance(f, ast.FunctionDef) and f.name.startswith("test_"):
-                marks = {ast.unparse(d).split("(")[0] for d in f.decorator_list}
-                if not marks & {"pytest.mark.skip", "pytest.mark.xfail"}:
-                    names.add(f.name)
-    return names
 
 
 @cache

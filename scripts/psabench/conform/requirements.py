@@ -144,22 +144,15 @@ def load(index: Path) -> Requirements:
     retired = set(_texts(data.get("retired", []), f"{where}: retired"))
     if type(data["version"]) is not int or data["version"] < 1:
         raise RequirementsError(f"{where}: version {data['version']!r} is no number from 1 on")
-    if not isinstance(data["groups"], dict) or not data["groups"]:
-        raise RequirementsError(f"{where}: groups is a mapping of names to title and prefixes")
     words = _Words(frozenset(grades), frozenset(ways), frozenset(kinds), frozenset(boards), profiles)
-    groups: list[Group] = []
+    groups = _groups(data["groups"], where)
     rows: dict[str, Requirement] = {}
-    for name, entry in data["groups"].items():
-        entry = _mapping(entry, GROUP_FIELDS, set(), f"{where}: group {name}")
-        group = Group(str(name), _text(entry["title"], f"{where}: {name}: title"), _texts(entry["prefixes"], where))
-        if taken := {p for g in groups for p in g.prefixes} & set(group.prefixes):
-            raise RequirementsError(f"{where}: group {name}: prefix {', '.join(taken)} belongs to another group")
-        groups.append(group)
-        for row in _group(index.parent / "requirements" / f"{name}.yaml", group, words):
+    for group in groups:
+        for row in _rows(index.parent / "requirements" / f"{group.name}.yaml", group, words):
             if row.id in rows:
-                raise RequirementsError(f"{name}.yaml: {row.id}: this id stands twice")
+                raise RequirementsError(f"{group.name}.yaml: {row.id}: this id stands twice")
             if row.id in retired:
-                raise RequirementsError(f"{name}.yaml: {row.id}: this id is retired and cannot come back")
+                raise RequirementsError(f"{group.name}.yaml: {row.id}: this id is retired and cannot come back")
             rows[row.id] = row
     return Requirements(
         version=data["version"],
@@ -168,7 +161,7 @@ def load(index: Path) -> Requirements:
         kinds=MappingProxyType(kinds),
         boards=MappingProxyType(boards),
         profiles=MappingProxyType(profiles),
-        groups=tuple(groups),
+        groups=groups,
         rows=MappingProxyType(rows),
     )
 
@@ -203,7 +196,20 @@ def _profiles(folder: Path, boards: Mapping[str, str]) -> dict[str, str]:
     return found
 
 
-def _group(path: Path, group: Group, words: _Words) -> Iterator[Requirement]:
+def _groups(raw: Any, where: str) -> tuple[Group, ...]:
+    if not isinstance(raw, dict) or not raw:
+        raise RequirementsError(f"{where}: groups is a mapping of names to title and prefixes")
+    groups: list[Group] = []
+    for name, entry in raw.items():
+        entry = _mapping(entry, GROUP_FIELDS, set(), f"{where}: group {name}")
+        prefixes = _texts(entry["prefixes"], f"{where}: group {name}: prefixes")
+        if taken := {p for g in groups for p in g.prefixes} & set(prefixes):
+            raise RequirementsError(f"{where}: group {name}: prefix {', '.join(taken)} belongs to another group")
+        groups.append(Group(str(name), _text(entry["title"], f"{where}: group {name}: title"), prefixes))
+    return tuple(groups)
+
+
+def _rows(path: Path, group: Group, words: _Words) -> Iterator[Requirement]:
     data = _mapping(_read(path), {"boards", "rows"}, set(), path.name)
     boards = _known(data["boards"], words.boards, f"{path.name}: boards")
     if not isinstance(data["rows"], list) or not data["rows"]:
