@@ -350,6 +350,14 @@ static void axes(const struct trig *t, const struct tilt *g, double C_lp[3][3])
     }
 }
 
+/* The same from an instant's angles and the vehicle then. */
+static void axes_at(const struct look *l, const struct vehicle_state *v, double C_lp[3][3])
+{
+    const double z_c[3] = {v->C_lc[0][2], v->C_lc[1][2], v->C_lc[2][2]};
+    const struct tilt g = tilt_of(&l->trig, z_c);
+    axes(&l->trig, &g, C_lp);
+}
+
 static double dot(const double a[3], const double b[3])
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -428,12 +436,20 @@ static const struct platform_setting *setting_at(const struct platform *p, int64
     return t_ns < p->setting.from_ns ? &p->setting_before : &p->setting;
 }
 
+/* q of platform_at(), without the rest of it. */
+static double q_rad(struct platform *p, int64_t t_ns)
+{
+    const struct look l = look_at(p, t_ns);
+    const struct vehicle_state *v = vehicle_state_at(p, t_ns);
+    double C_lp[3][3];
+    axes_at(&l, v, C_lp);
+    return gimbal_rad(v, (const double(*)[3])C_lp);
+}
+
 /* What the angle sensor shows before the errors of a setting. */
 static double sensor_rad(struct platform *p, int64_t t_ns)
 {
-    struct platform_state s = {.q_rad = p->stuck_rad};
-    if (!p->stuck) platform_at(p, t_ns, &s);
-    return s.q_rad + p->cfg.angle_zero_arcmin * RAD_PER_ARCMIN;
+    return (p->stuck ? p->stuck_rad : q_rad(p, t_ns)) + p->cfg.angle_zero_arcmin * RAD_PER_ARCMIN;
 }
 
 double platform_servo_rad(struct platform *p, int64_t t_ns)
@@ -458,12 +474,10 @@ void platform_force_mps2(struct platform *p, int64_t t_ns, double f_mps2[3])
     if (p->force_ns != t_ns) {
         const struct look l = look_at(p, t_ns);
         const struct vehicle_state *v = vehicle_state_at(p, t_ns);
-        const double z_c[3] = {v->C_lc[0][2], v->C_lc[1][2], v->C_lc[2][2]};
         const double f_l_mps2[3] = {v->accel_l_mps2[0], v->accel_l_mps2[1],
                                     v->accel_l_mps2[2] + p->vehicle.site.g_mps2};
-        const struct tilt g = tilt_of(&l.trig, z_c);
         double C_lp[3][3];
-        axes(&l.trig, &g, C_lp);
+        axes_at(&l, v, C_lp);
         into_p((const double(*)[3])C_lp, f_l_mps2, p->force_mps2);
         p->force_ns = t_ns;
     }

@@ -2,7 +2,7 @@
  *
  * Frames: l is the level frame of the gyrocompass article, east, north, up (xi, eta, zeta): not the north-east-down of
  * earth.h. c is the vehicle: x to the right, y ahead, z up. From l: heading (clockwise seen from above), pitch (nose up), roll
- * (right side down), about -z, x, y in this order. It moves where its nose points, level, over a sphere: no wind, no sideslip, no
+ * (right side down), about -z, x, y in this order. It moves where its nose points, level, over a sphere: no sideslip, no
  * climb. A command starts from the angles, the speed and the latitude of its instant, so all are continuous (rates are not).
  * Plain struct, one thread; commands in order of time; an instant before the latest VEHICLE_HISTORY commands gets the
  * oldest of them. */
