@@ -1,13 +1,15 @@
 #!/usr/bin/env python3
-"""Draw the pictures of docs/procedures/gyrocompass_campaign.md into docs/img, and print the tables of the page.
+"""Write the tables of docs/procedures/gyrocompass_campaign.md and draw its pictures into docs/img.
 
-Computes the campaign as `psabench campaign gyrocompass` does, into a store of its own. Same library, same bytes.
+Computes the campaign as `psabench campaign gyrocompass` does, into a store of its own. Same library, same bytes. A
+table is the fenced block, or the Markdown table, after a line `<!-- campaign: STUDY -->`; `claims` names the article's.
 
-    tools/plot_campaign.py [docs/img]
+    tools/plot_campaign.py [--check]     --check: write nothing, exit status 1 when a table is not what is computed
 """
 
 from __future__ import annotations
 
+import re
 import sys
 import tempfile
 from pathlib import Path
@@ -16,19 +18,54 @@ from psabench import report_plots
 from psabench.campaign import command, page
 from psabench.campaign.cases import STUDIES
 from psabench.campaign.command import Options
+from psabench.campaign.page import Campaign
 from psabench.progress import Bar
 
+ROOT = Path(__file__).resolve().parents[1]
+PAGE = ROOT / "docs/procedures/gyrocompass_campaign.md"
+RUNS = 100_000  # a case; the third digit of a p95 stands
+IMAGES = ROOT / "docs/img"
 PICTURES = ("step", "latitude", "tilt", "time", "order", "slew", "hold")  # and the distribution
+TABLE = re.compile(r"(?<=<!-- campaign: )(\w+)( -->\n)(```\n.*?```\n|\|.*?\n(?=\n))", re.DOTALL)
 
 
-def main(folder: Path) -> None:
-    with tempfile.TemporaryDirectory() as out:
-        c = command.campaign(Options(out=Path(out)), Bar())
+def computed(out: Path) -> Campaign:
+    """All studies, as without options but with more runs."""
+    return command.campaign(Options(runs=RUNS, out=out), Bar())
+
+
+def with_tables(text: str, c: Campaign) -> str:
+    """The page with its tables as computed."""
+    return TABLE.sub(lambda m: m[1] + m[2] + _table(m[1], c), text)
+
+
+def _table(name: str, c: Campaign) -> str:
+    if name == "claims":
+        rows = [("the article", "kindest reading", "honest", "improved", "verdict"), ("---",) * 5]
+        rows += [(x.says, x.reading, x.honest, x.improved, x.verdict) for x in c.claims]
+        return "".join(f"| {' | '.join(row)} |\n" for row in rows)
+    lines = page.lines(page.table(c, STUDIES[name]))
+    return "```\n" + "".join(f"{line.rstrip()}\n" for line in lines) + "```\n"
+
+
+def draw(folder: Path, c: Campaign) -> None:
     pictures = {"distribution": c.distribution} | {name: page.picture(c, STUDIES[name]) for name in PICTURES}
     for name, picture in pictures.items():
         (folder / f"campaign_{name}.svg").write_text(report_plots.standalone(picture), encoding="utf-8")
-    print("\n".join(page.console(c)))
+
+
+def main(check: bool) -> int:
+    with tempfile.TemporaryDirectory() as out:
+        c = computed(Path(out))
+    text = PAGE.read_text(encoding="utf-8")
+    wanted = with_tables(text, c)
+    if check:
+        print(f"{PAGE.relative_to(ROOT)}: {'its tables are' if text == wanted else 'a table is not'} what is computed")
+        return int(text != wanted)
+    PAGE.write_text(wanted, encoding="utf-8")
+    draw(IMAGES, c)
+    return 0
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "docs/img"))
+    sys.exit(main("--check" in sys.argv[1:]))

@@ -170,7 +170,7 @@ def table(c: Campaign, study: Study) -> list[list[str]]:
 
 
 def _label(case: Case) -> str:
-    return f"{case.name}: {case.title}" if case.study == "readings" else case.name
+    return f"{case.name}: {case.title}" if case.study in ("readings", "improved") else case.name
 
 
 def lines(rows: Sequence[Sequence[str]]) -> Iterator[str]:
