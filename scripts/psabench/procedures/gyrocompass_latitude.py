@@ -21,6 +21,7 @@ from psabench.procedures.result import DEG
 LIMIT_RAD = math.radians(85.0)  # of the library
 GRID_RAD = math.radians(0.01)
 STEP_RAD = math.radians(0.01)  # of the derivative
+LOOKS = 9  # latitudes that are tried of those that look alike
 PASSPORT_SDS = 3.0
 
 
@@ -52,7 +53,7 @@ def latitude_effect(f: Fit, quality_limit: float, drift2_radps: float, drift2_sd
     above, below = hidden[grid > phi], hidden[grid < phi][::-1]
     high = phi + GRID_RAD * _run_length(above)
     low = phi - GRID_RAD * _run_length(below)
-    unseen = max(abs(_turn(f, low)), abs(_turn(f, high)))
+    unseen = max(abs(_turn(f, float(x))) for x in np.linspace(low, high, LOOKS))
     opposite = np.array([-phi])
     told = low <= -phi <= high or not _passport_allows(opposite, f, drift2_radps, drift2_sd_radps)[0]
     toward = -STEP_RAD if phi > 0.0 else STEP_RAD
