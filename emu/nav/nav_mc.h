@@ -50,6 +50,7 @@ struct nav_mc_cfg {
     double gap_s;                   /* between windows, used when slew_radps is 0 */
     double slew_radps, settle_s;    /* otherwise the gap is turn/slew + settle, the turn as asked for */
     struct nav_gyrocompass_cfg fit; /* of the host; its latitude is set from latitude_rad and latitude_error_rad */
+    double gm_before_s;             /* with gm_from_zero: 0 so long before the first window instead of at its start */
 };
 
 /* The article's errors, three positions 90 deg apart, 10 s windows, 10 s gaps, latitude 50 deg, proper Gauss-Markov drift,

@@ -11,6 +11,9 @@ void mc_schedule(const struct nav_mc_cfg *cfg, struct nav_position *p);
 int mc_refusal(const struct nav_mc_cfg *cfg, const struct nav_position *p);
 double mc_samples_per_window(const struct nav_mc_cfg *cfg);
 
+/* Standard deviation of the random drift at the start of the first window. */
+double mc_gm_begin_sd_radps(const struct nav_mc_cfg *cfg);
+
 /* Gain of first order about the truth. Free fit: weighted is the gain itself, normal and inverse are 1. On the circle the gain
  * hangs on alpha: weighted is rows' W, from which mc_solve() goes on. */
 struct mc_linear {

@@ -51,6 +51,12 @@ void mc_schedule(const struct nav_mc_cfg *cfg, struct nav_position *p)
     }
 }
 
+double mc_gm_begin_sd_radps(const struct nav_mc_cfg *cfg)
+{
+    if (!cfg->gm_from_zero) return cfg->gm_sigma_radps;
+    return cfg->gm_sigma_radps * std::sqrt(nav_rise(2.0 * cfg->gm_before_s / cfg->gm_tau_s));
+}
+
 double mc_samples_per_window(const struct nav_mc_cfg *cfg)
 {
     return std::floor(cfg->window_s / cfg->sample_s + 0.5);
@@ -61,7 +67,8 @@ static bool all_finite(const struct nav_mc_cfg *c)
     double sum = c->latitude_rad + c->latitude_error_rad + c->tilt_rad + c->drift1_radps + c->gm_sigma_radps +
                  c->gm_tau_s + c->torquer_scale + c->m1_per_s + c->beta_sys_rad + c->gamma_sys_rad +
                  c->beta_random_rad + c->gamma_random_rad + c->angle_sys_rad + c->angle_random_rad +
-                 c->white_radps_rts + c->sample_s + c->window_s + c->gap_s + c->slew_radps + c->settle_s;
+                 c->white_radps_rts + c->sample_s + c->window_s + c->gap_s + c->slew_radps + c->settle_s +
+                 c->gm_before_s;
     for (int i = 0; i < c->count; i++) sum += c->angle_rad[i];
     return std::isfinite(sum) && (std::isnan(c->alpha1_rad) || std::fabs(c->alpha1_rad) < 1e4);
 }
@@ -78,7 +85,8 @@ int mc_refusal(const struct nav_mc_cfg *c, const struct nav_position *p)
                        c->beta_random_rad >= 0.0 && c->gamma_random_rad >= 0.0 && c->angle_random_rad >= 0.0 &&
                        c->white_radps_rts >= 0.0 && c->torquer_scale > -0.5 && std::fabs(c->tilt_rad) <= 30.0 * NAV_DEG;
     const bool times = c->window_s > 0.0 && c->gap_s >= 0.0 && c->slew_radps >= 0.0 && c->settle_s >= 0.0 &&
-                       c->sample_s > 0.0 && c->window_s >= c->sample_s && c->window_s / c->sample_s < 1e7;
+                       c->gm_before_s >= 0.0 && c->sample_s > 0.0 && c->window_s >= c->sample_s &&
+                       c->window_s / c->sample_s < 1e7;
     if (!choices || !signs || !times) return NAV_RANGE;
     struct nav_compass unused;
     struct nav_gyrocompass_cfg fit = c->fit;

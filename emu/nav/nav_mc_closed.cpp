@@ -27,10 +27,11 @@ static fit_square random_covariance(const struct nav_mc_cfg *cfg, const struct m
         cfg->gm_sigma_radps, cfg->gm_tau_s, cfg->white_radps_rts, 0.0, 0.0, cfg->gamma_random_rad / std::sqrt(ns), 0.0};
     fit_square c = fit_covariance(lin->p, lin->count, &noise, cfg->latitude_rad);
     if (!cfg->gm_from_zero) return c;
+    const double before_s = cfg->gm_before_s;
     for (int i = 0; i < lin->count; i++)
         for (int j = 0; j < lin->count; j++)
-            c(i, j) -= nav_gm_from_zero_less(&noise, lin->p[i].t_mid_s, lin->p[i].window_s, lin->p[j].t_mid_s,
-                                             lin->p[j].window_s) /
+            c(i, j) -= nav_gm_from_zero_less(&noise, before_s + lin->p[i].t_mid_s, lin->p[i].window_s,
+                                             before_s + lin->p[j].t_mid_s, lin->p[j].window_s) /
                        (lin->we_radps * lin->we_radps);
     return c;
 }

@@ -83,7 +83,7 @@ static double window_mean(const struct hold_plan *plan, struct gm *g, int i, str
 
 static struct gm gm_begin(const struct nav_mc_cfg *cfg, struct random_stream *rnd)
 {
-    return {cfg->gm_from_zero ? 0.0 : cfg->gm_sigma_radps * rnd->gauss(), 0.0};
+    return {cfg->gm_from_zero && cfg->gm_before_s == 0.0 ? 0.0 : mc_gm_begin_sd_radps(cfg) * rnd->gauss(), 0.0};
 }
 
 /* What measuring the azimuth torquer in the last window leaves: the level sensors' errors through We. */

@@ -66,7 +66,7 @@ static struct instrument instrument_draw(const struct nav_mc_cfg *cfg, uint64_t 
     u.roll_rad = mc_tilt(cfg, &u.rnd);
     u.q1_rad = NAV_PI * (2.0 * u.rnd.uniform() - 1.0);
     u.psi_rad = nav_heading(u.alpha1_rad, u.q1_rad, 0.0, u.pitch_rad, u.roll_rad);
-    if (!cfg->gm_from_zero) u.drift_radps = cfg->gm_sigma_radps * u.rnd.gauss();
+    if (!cfg->gm_from_zero || cfg->gm_before_s > 0.0) u.drift_radps = mc_gm_begin_sd_radps(cfg) * u.rnd.gauss();
     return u;
 }
 

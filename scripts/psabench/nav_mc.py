@@ -76,6 +76,7 @@ class McConfig:
     gm_sigma_radps: float = 0.2 * DEGPH
     gm_tau_s: float = 1000.0
     gm_from_zero: bool = False
+    gm_before_s: float = 0.0  # with it: zero so long before the first window instead of at its start
     torquer_scale: float = 0.0
     m1_per_s: float = 1.0
     beta_sys_rad: float = 10.0 * ARCMIN

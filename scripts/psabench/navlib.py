@@ -116,6 +116,7 @@ class McStruct(c.Structure):
         ("angle_rad", _D * MAX_POSITIONS),
         *_doubles("window_s", "gap_s", "slew_radps", "settle_s"),
         ("fit", FitStruct),
+        *_doubles("gm_before_s"),
     ]
 
 

@@ -482,6 +482,7 @@ AGREE = {
     "article": R0,
     "no drift": replace(R0, gm_sigma_radps=0.0, simplified=False),
     "from zero, no sign": replace(R0, gm_from_zero=True, random_sign=False),
+    "zero 300 s before": replace(R0, gm_from_zero=True, gm_before_s=300.0),
     "increments": replace(R0, angle_sys=nav_mc.AngleSys.INCREMENT),
     "accumulating": replace(R0, angle_sys=nav_mc.AngleSys.ACCUMULATES),
     "per sample": replace(R0, gm_sigma_radps=0.02 * DEGPH, per_sample=True),
