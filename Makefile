@@ -190,7 +190,7 @@ san:
 
 ## pytest: the Python tests, golden traces included
 pytest: bench-bin
-	$(PY) -m pytest $(wildcard tests/py tests/golden)
+	$(PY) -m pytest $(wildcard tests/py tests/conform tests/golden)
 
 ## builds: the emulator and its library as clang, -O0 and -O3 make them, and under sanitizers, which must all do the same
 builds:

@@ -16,6 +16,7 @@ from psabench import decode, record, run_command
 from psabench.arguments import Help, Parser, board_name, natural, node_id, positive
 from psabench.campaign import command as campaign_command
 from psabench.can_host import open_bus
+from psabench.conform import command as conform_command
 from psabench.devices import ALIASES
 from psabench.errors import BadInput, BenchError
 from psabench.lineport import LineFormat
@@ -35,6 +36,7 @@ a first hour:
   psabench decode run.log --out run.csv   volts against time
   psabench shell                    registers, instruments and faults at the keyboard
   psabench campaign gyrocompass     thousands of virtual gyrocompasses; build/campaign/report.html
+  psabench conform device --board psa2   does a board do what its documents say? build/conform/psa2-article/report.html
 
 psabench COMMAND --help says more. Exit status: 0 done and within limits, 1 done and out of limits, 2 bad input,
 3 the bench or a link failed, 130 ended by Ctrl-C.
@@ -104,6 +106,7 @@ def parser() -> argparse.ArgumentParser:
     _add_record(commands)
     _add_decode(commands)
     campaign_command.add(commands, Help, natural)
+    conform_command.add(commands, Help, BUS_HELP)
     command_line.add(commands, Help, BUS_HELP, node_id)
     return top
 

@@ -65,7 +65,7 @@ class Outcome:
     exhibits: tuple[str, ...] = ()  # files of the report's folder: VCD excerpt, picture, CAN excerpt
 
 
-def conforms(outcomes: Sequence[Outcome]) -> bool:
-    """Nothing failed, nothing was left open for another reason than a missing probe, and something passed."""
+def conforms(verdicts: Sequence[Verdict]) -> bool:
+    """Nothing failed, nothing is open but what no probe was there to see, and something passed."""
     bad = (Verdict.FAILED, Verdict.INCONCLUSIVE)
-    return any(o.verdict is Verdict.PASSED for o in outcomes) and not any(o.verdict in bad for o in outcomes)
+    return Verdict.PASSED in verdicts and not any(v in bad for v in verdicts)

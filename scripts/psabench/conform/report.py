@@ -38,15 +38,17 @@ class Run:
 
     @property
     def conforms(self) -> bool:
-        return not self.interrupted and conforms(self.outcomes)
+        return not self.interrupted and conforms(list(self.verdicts().values()))
 
     def verdicts(self) -> dict[str, Verdict]:
-        """Of each requirement: the worst of its tests; not observable where it has none."""
+        """Of each requirement: the worst of its tests; open where somebody could see it and no test looks."""
         found: dict[str, Verdict] = {}
         for o in self.outcomes:
             for i in o.requirements:
                 found[i] = max(found.get(i, Verdict.PASSED), o.verdict, key=_BADNESS.index)
-        return {r.id: found.get(r.id, Verdict.NOT_OBSERVABLE) for r in self.rows}
+        return {
+            r.id: found.get(r.id, Verdict.NOT_OBSERVABLE if r.unobservable else Verdict.INCONCLUSIVE) for r in self.rows
+        }
 
 
 _BADNESS = (
