@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from psabench import signals as bits
+from psabench.angles import wrapped_deg
 from psabench.bench import Bench
 from psabench.devices import Gyro, Psa2
 from psabench.devices.gyro import Flag, Mode, Phase
@@ -142,13 +143,13 @@ class WirePlatform:
 
     def navigate(self, c: Compensation) -> None:
         """See `PlatformBench`."""
-        self.gyro.set(azimuth_deg=_wrapped_deg(c.azimuth_rad * DEG))
+        self.gyro.set(azimuth_deg=wrapped_deg(c.azimuth_rad * DEG))
         self.gyro.set(drift1_degph=c.drift1_radps / DEGPH, drift2_degph=c.drift2_radps / DEGPH)
         self._begin(Mode.NAVIGATE)
 
     def moved(self, *, latitude_rad: float, speed_mps: float, track_rad: float) -> None:
         self._latitude_rad = latitude_rad
-        self.gyro.set(latitude_deg=latitude_rad * DEG, speed_mps=speed_mps, track_deg=_wrapped_deg(track_rad * DEG))
+        self.gyro.set(latitude_deg=latitude_rad * DEG, speed_mps=speed_mps, track_deg=wrapped_deg(track_rad * DEG))
 
     def look(self) -> Look:
         """Heading first; in navigation then a self test, which turns it for a second, and what became of the unit."""
@@ -353,8 +354,3 @@ def _ahead(seq: npt.NDArray[np.int64], of: int) -> npt.NDArray[np.int64]:
         return seq
     first = (int(seq[0]) - of + SEQ_MODULUS // 2) % SEQ_MODULUS - SEQ_MODULUS // 2
     return np.asarray(first + bits.unwrap(seq, SEQ_BITS) - seq[0])
-
-
-def _wrapped_deg(angle_deg: float) -> float:
-    """Into (-180, 180]."""
-    return 180.0 - (180.0 - angle_deg) % 360.0

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from psabench.devices import Gyro
-from psabench.devices.gyro import SETTINGS, Flag, Mode, Phase
+from psabench.devices.gyro import SETTINGS, Began, Flag, Mode, Phase, SelfTest
 from psabench.errors import BadInput, DeviceError
 from test_devices import at_node
 
@@ -46,10 +46,12 @@ def test_positions_are_written_with_their_count() -> None:
 
 def test_state_is_read_as_what_it_means() -> None:
     values = {(0x2100, 1): 4, (0x2100, 2): 3, (0x2100, 3): 7, (0x2100, 4): 6, (0x2200, 3): 2**30, (0x2109, 1): 5}
+    values[0x2200, 6] = 250_000
     gyro, _ = at_node(Gyro, 9, values)
     assert (gyro.mode, gyro.phase, gyro.position) == (Mode.GYROCOMPASS, Phase.WINDOW, 7)
     assert gyro.flags == Flag.LEVEL_LOST | Flag.ENCODER_FAULT
     assert gyro.encoder_deg == 90.0
+    assert gyro.beta_deg == 0.5
     assert gyro.level_node == 5
 
 
@@ -57,6 +59,26 @@ def test_the_clock_of_the_unit() -> None:
     gyro, _ = at_node(Gyro, 9, {(0x210A, 1): 5_000_000, (0x210A, 2): 2**31 - 1})
     assert gyro.step_s == pytest.approx(5e-3, rel=1e-12)
     assert gyro.steps == 2**31 - 1
+
+
+def test_conditions_since_the_mode_began() -> None:
+    """Counts in the order of the flags' bits, then steps."""
+    gyro, _ = at_node(Gyro, 9, {(0x2108, k): 10 * k for k in range(1, 9)})
+    assert gyro.began() == {
+        Flag.SATURATED: Began(10, 50),
+        Flag.LEVEL_LOST: Began(20, 60),
+        Flag.ENCODER_FAULT: Began(30, 70),
+        Flag.NOT_SETTLED: Began(40, 80),
+    }
+
+
+def test_the_self_test_has_no_result_while_it_is_under_way() -> None:
+    gyro, node = at_node(Gyro, 9, {(0x210B, 1): 1, (0x210B, 2): 2})
+    gyro.begin_self_test()
+    assert node.wrote == [(0x210B, 1, b"\1")]
+    assert gyro.self_test is None
+    gyro, _ = at_node(Gyro, 9, {(0x210B, 1): 0, (0x210B, 2): 2})
+    assert gyro.self_test is SelfTest.FAILED
 
 
 class Refusing:

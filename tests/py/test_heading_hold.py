@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from fake_platform import FakePlatform
 from psabench import gyro_grading, gyro_page
+from psabench.angles import wrapped_deg
 from psabench.errors import LinkError
 from psabench.gyro_grading import GyroSection, HeldTruth
 from psabench.procedures import gyrocompass
@@ -30,7 +31,7 @@ def held(bench: FakePlatform, p: HoldParams) -> HoldResult:
 
 
 def end_error_deg(bench: FakePlatform, r: HoldResult) -> float:
-    return gyro_grading.wrapped_deg(math.degrees(r.held[-1].heading_rad) - bench.heading_deg)
+    return wrapped_deg(math.degrees(r.held[-1].heading_rad) - bench.heading_deg)
 
 
 def test_with_its_own_drift_compensated_the_heading_stays() -> None:
@@ -127,6 +128,20 @@ def test_a_parked_vehicle_does_not_turn() -> None:
     (doubt,) = turning(11.5).doubts
     assert re.match(r"the heading moved by -?0\.9\d deg in 300 s of standing", doubt)
     assert turning(0.2).doubts == ()  # a drift that the calibration leaves
+
+
+@pytest.mark.parametrize(("heading_deg", "doubtful"), [(60.0, False), (75.0, False), (100.0, True), (-120.0, True)])
+def test_a_flying_vehicle_heads_along_its_track(heading_deg: float, doubtful: bool) -> None:
+    """An angle sensor that stuck before the vehicle turned onto its track shows nothing else; wind may be 20 deg."""
+    bench = FakePlatform(heading_deg=heading_deg)
+    r = held(bench, HoldParams(hours=0.5, speed_kmh=500.0, track_deg=60.0))
+    found = [d for d in r.doubts if d not in r.start.doubts]
+    assert bool(found) is doubtful
+    if doubtful:
+        off_deg = wrapped_deg(heading_deg - 60.0)
+        assert found[0].startswith(f"the heading is {off_deg:.0f} deg from the track after 300 s")
+    soon = held(bench, HoldParams(hours=0.025, look_s=90.0, speed_kmh=500.0, track_deg=60.0))
+    assert soon.doubts == soon.start.doubts  # it may still turn
 
 
 def _turned(look: Look, by_rad: float) -> Look:

@@ -287,6 +287,36 @@ static void a_silent_level_unit_is_an_emergency_once(void **state)
     assert_int_equal(emcy(0), 1); /* it has ended */
 }
 
+/* A lost frame, gone by the time somebody looks; a nod that the angle sensor, which is not fitted here, does not follow. */
+static void what_came_and_went_is_counted_and_a_self_test_is_begun(void **state)
+{
+    (void)state;
+    assert_int_equal(write_raw(GYRO_OD_SELF_TEST, 1, 1, 1), CO_AB_STATE);
+    assert_non_null(strstr(refusal(), "navigation"));
+    assert_int_equal(write_raw(GYRO_OD_CONTROL, 1, GYRO_NAVIGATE, 1), 0);
+    rig_run(&r, 1.0);
+    const uint32_t before = read_raw(GYRO_OD_CLOCK, 2);
+    wire.seq++;
+    rig_run(&r, 3.0);
+    assert_int_equal(read_raw(GYRO_OD_CONTROL, 4), 0);
+    for (unsigned i = 1; i <= 4; i++) assert_int_equal(read_raw(GYRO_OD_PAST, i), i == 2);
+    for (unsigned i = 5; i <= 8; i++)
+        assert_in_range(read_raw(GYRO_OD_PAST, i), i == 6 ? before : 0, i == 6 ? before + 2 : 0);
+    assert_int_equal(write_raw(GYRO_OD_SELF_TEST, 1, 0, 1), 0); /* nothing */
+    assert_int_equal(read_raw(GYRO_OD_SELF_TEST, 1), 0);
+    assert_int_equal(write_raw(GYRO_OD_SELF_TEST, 1, 1, 1), 0);
+    assert_int_equal(read_raw(GYRO_OD_SELF_TEST, 1), 1);
+    assert_int_equal(write_raw(GYRO_OD_SELF_TEST, 1, 1, 1), CO_AB_STATE);
+    assert_int_equal(write_raw(GYRO_OD_SELF_TEST, 2, 1, 1), CO_AB_READ_ONLY);
+    wire.count = 0;
+    rig_run(&r, 5.0);
+    assert_int_equal(emcy(GYRO_EMCY_ENCODER_FAULT), 1);
+    assert_int_equal(read_raw(GYRO_OD_SELF_TEST, 1), 0);
+    assert_int_equal(read_raw(GYRO_OD_SELF_TEST, 2), GYRO_TEST_FAILED);
+    assert_int_equal(read_raw(GYRO_OD_PAST, 3), 1);
+    assert_int_equal(read_raw(GYRO_OD_CONTROL, 4), GYRO_ENCODER_FAULT);
+}
+
 static void frames_of_another_node_are_not_the_level_unit_s(void **state)
 {
     (void)state;
@@ -310,6 +340,7 @@ int main(void)
         cmocka_unit_test_setup(the_clock_tells_the_period_and_all_steps_since_reset, up),
         cmocka_unit_test_setup(a_reading_is_three_pdos_of_one_step, up),
         cmocka_unit_test_setup(a_silent_level_unit_is_an_emergency_once, up),
+        cmocka_unit_test_setup(what_came_and_went_is_counted_and_a_self_test_is_begun, up),
         cmocka_unit_test_setup(frames_of_another_node_are_not_the_level_unit_s, up),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

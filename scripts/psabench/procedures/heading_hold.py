@@ -24,10 +24,10 @@ SUMMARY = "gyrocompassing, then heading kept for hours with the drifts compensat
 DRIFTS = ("torquer", "axis1", "none")
 EARTH_RADIUS_M = 6371e3
 LATITUDE_LIMIT_RAD = math.radians(85.0)
-PARKED_SDS, PARKED_RAD = (
-    5.0,
-    math.radians(0.2),
-)  # a parked vehicle's heading may wander so far: growth of the hold, sway
+SDS = 5.0  # of what the hold is expected to be off by
+PARKED_RAD = math.radians(0.2)  # beside them a parked vehicle's heading may wander so far: sway
+DRIFT_ANGLE_RAD = math.radians(20.0)  # and a flying one's be so far from its track: wind
+UNDER_WAY_S = 120.0  # after which it is on its track
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,7 +85,12 @@ class HoldResult:
     @property
     def doubts(self) -> tuple[str, ...]:
         """Reasons not to trust the heading at the end."""
-        return (*self.start.doubts, *dict.fromkeys(words for h in self.held for words in h.faults), *self._wandered)
+        return (
+            *self.start.doubts,
+            *dict.fromkeys(words for h in self.held for words in h.faults),
+            *self._wandered,
+            *self._off_track,
+        )
 
     @property
     def _wandered(self) -> tuple[str, ...]:
@@ -95,10 +100,23 @@ class HoldResult:
         growth = replace(_growth(self.start), heading_sd_rad=0.0)
         for h in self.held[1:]:
             moved_rad = math.remainder(h.heading_rad - self.held[0].heading_rad, math.tau)
-            if abs(moved_rad) > PARKED_SDS * nav.hold_sd_rad(growth, h.t_s) + PARKED_RAD:
+            if abs(moved_rad) > SDS * nav.hold_sd_rad(growth, h.t_s) + PARKED_RAD:
                 return (
                     f"the heading moved by {math.degrees(moved_rad):.2f} deg in {h.t_s:.0f} s of standing, more "
                     "than the drift that was left: the vehicle turned, or azimuth torquer or angle sensor failed",
+                )
+        return ()
+
+    @property
+    def _off_track(self) -> tuple[str, ...]:
+        """The heading of a flying vehicle is its track but for the wind."""
+        under_way = [h for h in self.held[1:] if h.t_s >= UNDER_WAY_S] if self.params.speed_mps else []
+        for h in under_way:
+            off_rad = math.remainder(h.heading_rad - self.params.track_rad, math.tau)
+            if abs(off_rad) > SDS * h.sd_rad + DRIFT_ANGLE_RAD:
+                return (
+                    f"the heading is {math.degrees(off_rad):.0f} deg from the track after {h.t_s:.0f} s, more than the "
+                    "drift that was left and wind: the angle sensor is stuck, or the heading was wrong from the start",
                 )
         return ()
 
