@@ -121,6 +121,7 @@ def test_what_was_read_cannot_be_changed(tmp_path: Path) -> None:
         ({"text": ""}, "text: '' is no text"),
         ({"source": []}, "source is missing"),
         ({"source": "hearsay"}, "source: 'hearsay' is not of the form"),
+        ({"source": "see ISO 11898-1"}, "source: 'see ISO 11898-1' is not of the form"),
         ({"source": ["CiA 301 7.2.4", "CiA 301 7.2.4"]}, "source: something stands twice"),
         ({"grade": "E9"}, "grade: 'E9' is not among: E0, E1"),
         ({"grade": "E1"}, "grade E1 needs the article's sentence"),
