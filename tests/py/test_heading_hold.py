@@ -130,7 +130,7 @@ def test_a_parked_vehicle_does_not_turn() -> None:
     assert turning(0.2).doubts == ()  # a drift that the calibration leaves
 
 
-@pytest.mark.parametrize(("heading_deg", "doubtful"), [(60.0, False), (75.0, False), (100.0, True), (-120.0, True)])
+@pytest.mark.parametrize(("heading_deg", "doubtful"), [(60.0, False), (75.0, False), (100.0, True), (-110.0, True)])
 def test_a_flying_vehicle_heads_along_its_track(heading_deg: float, doubtful: bool) -> None:
     """An angle sensor that stuck before the vehicle turned onto its track shows nothing else; wind may be 20 deg."""
     bench = FakePlatform(heading_deg=heading_deg)
