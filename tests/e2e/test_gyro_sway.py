@@ -126,6 +126,16 @@ def test_a_push_is_a_tilt_of_the_felt_vertical() -> None:
     assert truth == pytest.approx(list(quarter), abs=1e-12)
 
 
+def test_a_scenario_pushes_from_power_on(tmp_path: Path) -> None:
+    push = "sway: {east_mg: 0.2, east_s: 4, north_mg: 0.3, north_s: 8}"
+    with Bench.start(scenario(tmp_path, vehicle=push)) as bench:
+        bench.wait(1.0)
+        t_s = bench.control.call("lines").t_ns * 1e-9  # of simulated time, which stands still between two waits
+        accel = bench.truth_state()["vehicle"]["accel_l_mps2"]
+    want = [0.2 * MG_MPS2 * math.sin(math.tau * t_s / 4.0), 0.3 * MG_MPS2 * math.sin(math.tau * t_s / 8.0), 0.0]
+    assert accel == pytest.approx(want, abs=1e-12)
+
+
 def test_a_push_goes_on_from_a_snapshot(tmp_path: Path) -> None:
     saved = tmp_path / "mid.snapshot"
     with Bench.start("gyrocompass_ideal") as bench:
