@@ -364,6 +364,7 @@ def gen(root: Path, *options: str) -> int:
     gen_requirements.text_of.cache_clear()
     gen_requirements.names_in.cache_clear()
     gen_requirements.headings.cache_clear()
+    gen_requirements.parts.cache_clear()
     return gen_requirements.main([*options, "--root", str(root)])
 
 
@@ -412,6 +413,7 @@ def replace(name: str, was: str, now: str) -> Callable[[Path], None]:
         (replace("docs/a.md", "## Heading", "## Other"), "PSA2-FRAME-03: there is no docs/a.md#Heading"),
         (replace("docs/sources.md", "4.4", "4.5"), "PSA2-FRAME-03: there is no sources 4.4"),
         (replace("proto/t.yaml", "key", "lock"), "PSA2-FRAME-03: there is no proto/t.yaml#key"),
+        (replace("proto/t.yaml", "key: 1", "- section: lock"), "PSA2-FRAME-03: there is no proto/t.yaml#key"),
         (lambda root: (root / "proto/t.yaml").unlink(), "PSA2-FRAME-03: there is no proto/t.yaml#key"),
         (lambda root: (root / "docs/requirements.md").unlink(), "docs/requirements.md is out of date"),
         (replace("proto/requirements/psa2.yaml", "E0", "E9"), "psa2.yaml: PSA2-FRAME-03: grade"),
@@ -425,12 +427,27 @@ def test_what_is_stale_or_missing_is_told(
     assert says in capsys.readouterr().err
 
 
+def test_a_table_may_be_a_section_of_a_list(checkout: Path) -> None:
+    replace("proto/t.yaml", "key: 1", "- section: key")(checkout)
+    assert gen(checkout, "--check") == 0
+
+
 def test_a_page_is_not_written_over_what_is_missing(checkout: Path, capsys: pytest.CaptureFixture[str]) -> None:
     kept = (checkout / "docs/requirements.md").read_text()
     replace("docs/a.md", "## Heading", "## Other")(checkout)
+    replace("proto/requirements/psa2.yaml", "74 us", "75 us")(checkout)
     assert gen(checkout) == 1
     assert (checkout / "docs/requirements.md").read_text() == kept
     assert "there is no docs/a.md#Heading" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("option", ["--check", "--complete"])
+def test_a_check_leaves_a_stale_page_alone(option: str, checkout: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    kept = (checkout / "docs/requirements.md").read_text()
+    replace("proto/requirements/psa2.yaml", "74 us", "75 us")(checkout)
+    assert gen(checkout, option) == 1
+    assert (checkout / "docs/requirements.md").read_text() == kept
+    assert "out of date" in capsys.readouterr().err
 
 
 def test_complete_wants_a_test_for_all_that_can_be_observed(checkout: Path, capsys: pytest.CaptureFixture[str]) -> None:
