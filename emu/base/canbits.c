@@ -15,18 +15,14 @@ struct stream {
     uint32_t crc;  /* over the unstuffed bits; above its 15 bits stands what has been shifted out */
 };
 
-/* A frame begins with a bit 0 alone: there is no run before it, and of the CRC it leaves nothing. */
-static const struct stream after_start = {.bits = 1, .row = 0, .crc = 0};
+/* Before the last bit of an idle bus. With it the start of a classic frame is whole fours of bits; it is not counted, start of
+ * frame ends its run, and it leaves a CRC of zero. */
+static const struct stream idle = {.bits = 0u - 1u, .row = 0, .crc = 0x4000};
 
 /* A stuff bit is due before the next bit, so that a frame form may drop the one after its last bit. */
-static inline unsigned stuff_due(unsigned row)
-{
-    return row >= 2 * (STUFF_RUN - 1);
-}
-
 static inline struct stream put_bit(struct stream s, unsigned bit)
 {
-    const unsigned due = stuff_due(s.row);
+    const unsigned due = s.row >= 2 * (STUFF_RUN - 1);
     const unsigned before = due ? (s.row & 1u) ^ 1u : s.row;
     s.row = (before & 1u) == bit ? before + 2 : bit;
     s.bits += 1 + due;
@@ -76,14 +72,13 @@ static inline struct stream put_data(struct stream s, const struct can_msg *m)
     return s;
 }
 
-/* What follows the start of frame up to the last bit of arbitration, RTR or IDE: base identifier, or base, SRR, IDE and
- * extension; then `bits` more. */
+/* Idle bus and start of frame, arbitration up to RTR or IDE (base identifier, or base, SRR, IDE and extension), `bits` more. */
 static inline struct stream put_head(const struct can_msg *m, unsigned more, unsigned bits)
 {
     const unsigned rtr = m->flags & CAN_RTR ? 1 : 0;
-    if (!(m->flags & CAN_EXT)) return put(after_start, (m->id << 2 | rtr << 1) << bits | more, 13 + bits);
+    if (!(m->flags & CAN_EXT)) return put(idle, (2u << 13 | m->id << 2 | rtr << 1) << bits | more, 15 + bits);
     const uint64_t id = (m->id >> 18) << 21 | 3u << 19 | (m->id & 0x3FFFFu) << 1 | rtr;
-    return put(after_start, id << bits | more, 32 + bits);
+    return put(idle, (UINT64_C(2) << 32 | id) << bits | more, 34 + bits);
 }
 
 static struct can_bits classic(const struct can_msg *m)
@@ -91,8 +86,8 @@ static struct can_bits classic(const struct can_msg *m)
     const unsigned reserved = m->flags & CAN_EXT ? 2 : 1; /* r1, r0 */
     struct stream s = put_head(m, can_dlc(m->len), reserved + 4);
     if (!(m->flags & CAN_RTR)) s = put_data(s, m);
-    s = put(s, s.crc & 0x7FFFu, 15);
-    return (struct can_bits){s.bits + stuff_due(s.row) + TAIL_BITS, 0};
+    s = put(s, (s.crc & 0x7FFFu) << 1 | 1u, 16); /* with its delimiter, and the stuff bit between them */
+    return (struct can_bits){s.bits - 1 + TAIL_BITS, 0};
 }
 
 /* Stuff count (3 bits Gray code and parity), CRC, and a fixed stuff bit before the first and after every fourth of them. */
