@@ -296,6 +296,16 @@ static void a_nod_finds_a_stuck_sensor_and_a_dead_torquer_at_once(void **state)
     }
 }
 
+static void a_nod_tells_a_torquer_that_gives_less_than_half(void **state)
+{
+    (void)state;
+    navigate();
+    platform_set_torquer(&r.p, PLATFORM_AZIMUTH, 0.6, r.s.now_ns);
+    assert_string_equal(test_result(), "passed");
+    platform_set_torquer(&r.p, PLATFORM_AZIMUTH, 0.4, r.s.now_ns);
+    assert_string_equal(test_result(), "failed");
+}
+
 /* A torquer limit below the nod's rate: a smaller nod. */
 static void a_slow_torquer_nods_less(void **state)
 {
@@ -367,6 +377,7 @@ int main(void)
         cmocka_unit_test_setup(a_vehicle_that_is_towed_and_a_wrong_drift_are_no_faults, up),
         cmocka_unit_test_setup(a_nod_leaves_the_azimuth_where_it_was, up),
         cmocka_unit_test_setup(a_nod_finds_a_stuck_sensor_and_a_dead_torquer_at_once, up),
+        cmocka_unit_test_setup(a_nod_tells_a_torquer_that_gives_less_than_half, up),
         cmocka_unit_test_setup(a_slow_torquer_nods_less, up),
         cmocka_unit_test_setup(a_nod_is_of_navigation_and_ends_with_it, up),
         cmocka_unit_test_setup(conditions_are_counted_with_their_last_step, up),
