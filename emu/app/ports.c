@@ -218,7 +218,7 @@ void ports_ready(const struct ports *p, const struct options *o, FILE *out)
                     c->socketcan.can.node.fd ? "true" : "false", c->bus ? " bus=" : "", c->bus ? c->bus : "");
         }
         if (c->kind == OPTIONS_CAN_LOG)
-            fprintf(out, "ready can=log file=%s%s%s\n", c->log.path, c->bus ? " bus=" : "", c->bus ? c->bus : "");
+            fprintf(out, "ready log=%s%s%s\n", c->log.path, c->bus ? " bus=" : "", c->bus ? c->bus : "");
     }
     if (p->line) {
         char what[64];

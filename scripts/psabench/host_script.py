@@ -1,6 +1,6 @@
 """A host that is written down: what it would send over CAN, each frame at its instant, and a bench that carries it out.
 
-In free pace time does not wait for a program. So the host's frames stand in the scenario's timeline (`can.send`), the
+In free pace time does not wait for a program. So the host's frames stand in the scenario's timeline (`can.put`), the
 emulator runs alone from power-on as fast as it goes, and the bus is recorded. What the units answered is in the
 recording, and nothing else is: no truth, no control socket.
 
@@ -131,7 +131,7 @@ class ScriptedBench:
     def _timeline(self) -> list[dict[str, Any]]:
         own = self._scenario.get("timeline") or []
         sent = [(t_s, {"frame": frame, "bus": self._bus}) for t_s, frame in self._frames]
-        return [*own, *({"at_s": t_s, "cmd": "can.send", "args": args} for t_s, args in sent)]
+        return [*own, *({"at_s": t_s, "cmd": "can.put", "args": args} for t_s, args in sent)]
 
     def _heed(self, r: Logged) -> None:
         """Each request has its answer: in the order of asking, a node's own."""

@@ -1,4 +1,4 @@
-/* Frames as text, in a file and by command: can_text, can_log, can.send. */
+/* Frames as text, in a file and by command: can_text, can_log, can.put. */
 #define _GNU_SOURCE /* mkstemp */
 #include "rig.h"
 
@@ -126,13 +126,13 @@ static const char *say(const char *line)
 static void a_command_puts_a_frame_on_the_bus_that_it_names(void **state)
 {
     (void)state;
-    assert_non_null(strstr(say("{'cmd':'can.send','args':{'frame':'609#2F00210104','bus':'can1'}}"), "\"ok\":true"));
+    assert_non_null(strstr(say("{'cmd':'can.put','args':{'frame':'609#2F00210104','bus':'can1'}}"), "\"ok\":true"));
     assert_int_equal(r.frames, 0); /* it takes its bits */
     sched_run_until(&r.s, 1000000);
     assert_int_equal(r.frames, 1);
     assert_int_equal(r.heard.id, 0x609);
     assert_memory_equal(r.heard.data, ((const uint8_t[]){0x2F, 0, 0x21, 1, 4}), 5);
-    assert_non_null(strstr(say("{'cmd':'can.send','args':{'frame':'609#00'}}"), "\"ok\":true"));
+    assert_non_null(strstr(say("{'cmd':'can.put','args':{'frame':'609#00'}}"), "\"ok\":true"));
     sched_run_until(&r.s, 2000000);
     assert_int_equal(r.frames, 1); /* that was the other bus */
     assert_int_equal(r.bus[0].frames, 1);
@@ -151,15 +151,15 @@ static void a_frame_that_cannot_be_sent_is_refused_in_words(void **state)
     (void)state;
     for (size_t i = 0; i < COUNT(rows); i++) {
         char line[256];
-        snprintf(line, sizeof line, "{'cmd':'can.send','args':%s}", rows[i].args);
+        snprintf(line, sizeof line, "{'cmd':'can.put','args':%s}", rows[i].args);
         const char *reply = say(line);
         assert_non_null(strstr(reply, "\"ok\":false"));
         if (!strstr(reply, rows[i].words)) fail_msg("%s does not say %s", reply, rows[i].words);
     }
-    for (unsigned i = 0; i < CAN_QUEUE_MAX; i++) (void)say("{'cmd':'can.send','args':{'frame':'609#00'}}");
-    assert_non_null(strstr(say("{'cmd':'can.send','args':{'frame':'609#00'}}"), "wait for the bus already"));
+    for (unsigned i = 0; i < CAN_QUEUE_MAX; i++) (void)say("{'cmd':'can.put','args':{'frame':'609#00'}}");
+    assert_non_null(strstr(say("{'cmd':'can.put','args':{'frame':'609#00'}}"), "wait for the bus already"));
     r.view.buses = 0;
-    assert_non_null(strstr(say("{'cmd':'can.send','args':{'frame':'609#00'}}"), "no bus on this bench"));
+    assert_non_null(strstr(say("{'cmd':'can.put','args':{'frame':'609#00'}}"), "no bus on this bench"));
 }
 
 /* ---- the file */
@@ -180,8 +180,8 @@ static void every_frame_becomes_a_line_with_its_instant(void **state)
     (void)state;
     assert_int_equal(can_log_open(&r.log, &r.bus[0], "can0", r.path, 1000000000), 0);
     sched_run_until(&r.s, 2000000);
-    (void)say("{'cmd':'can.send','args':{'frame':'609#2F00210104'}}");
-    (void)say("{'cmd':'can.send','args':{'frame':'12345678#R4'}}");
+    (void)say("{'cmd':'can.put','args':{'frame':'609#2F00210104'}}");
+    (void)say("{'cmd':'can.put','args':{'frame':'12345678#R4'}}");
     sched_run_until(&r.s, 3000000);
     assert_int_equal(contents(text, sizeof text), 0); /* waits in memory */
     assert_int_equal(can_log_flush(&r.log), 0);
@@ -192,7 +192,7 @@ static void every_frame_becomes_a_line_with_its_instant(void **state)
     assert_memory_equal(text, "(0000000001.0020", 16);
     assert_non_null(strstr(text, ") can0 609#2F00210104\n(0000000001.002"));
     assert_string_equal(text + strlen(text) - 18, " can0 12345678#R4\n");
-    (void)say("{'cmd':'can.send','args':{'frame':'609#00'}}"); /* nobody listens any more */
+    (void)say("{'cmd':'can.put','args':{'frame':'609#00'}}"); /* nobody listens any more */
     sched_run_until(&r.s, 4000000);
     assert_int_equal(r.log.frames, 2);
 }
@@ -204,7 +204,7 @@ static void more_than_the_buffer_is_all_there(void **state)
     (void)state;
     assert_int_equal(can_log_open(&r.log, &r.bus[0], NULL, r.path, 0), 0);
     for (unsigned i = 0; i < N; i++) {
-        (void)say("{'cmd':'can.send','args':{'frame':'185#0011223344556677'}}");
+        (void)say("{'cmd':'can.put','args':{'frame':'185#0011223344556677'}}");
         sched_run_until(&r.s, r.s.now_ns + 1000000);
     }
     can_log_close(&r.log);
@@ -217,10 +217,10 @@ static void a_file_that_takes_nothing_is_told_and_ends_the_writing(void **state)
     (void)state;
     assert_int_equal(can_log_open(&r.log, &r.bus[0], "can0", "/nowhere/x.log", 0), -ENOENT);
     assert_int_equal(can_log_open(&r.log, &r.bus[0], "can0", "/dev/full", 0), 0);
-    (void)say("{'cmd':'can.send','args':{'frame':'609#00'}}");
+    (void)say("{'cmd':'can.put','args':{'frame':'609#00'}}");
     sched_run_until(&r.s, 1000000);
     assert_int_equal(can_log_flush(&r.log), -ENOSPC);
-    (void)say("{'cmd':'can.send','args':{'frame':'609#00'}}");
+    (void)say("{'cmd':'can.put','args':{'frame':'609#00'}}");
     sched_run_until(&r.s, 2000000);
     assert_int_equal(r.log.frames, 1);
     can_log_close(&r.log);
