@@ -308,6 +308,19 @@ static void a_push_is_felt_on_the_platform(void **state)
     }
 }
 
+/* To the bit, with everything moving: the angle sensor without errors tells q, on and between grid points. */
+static void the_angle_sensor_tells_q(void **state)
+{
+    (void)state;
+    struct platform p = lively(3.0);
+    for (double t_s = 0.0; t_s < 20.0; t_s += 0.317) {
+        platform_torque(&p, 0.05 * sin(t_s), 0.2 * cos(t_s), ns(t_s));
+        const double q_rad = look(&p, t_s).q_rad;
+        near(platform_servo_rad(&p, ns(t_s)), q_rad, 0.0);
+        near(platform_encoder_rad(&p, ns(t_s)), q_rad, 0.0);
+    }
+}
+
 /* ---- grid */
 
 /* Fourth order: a slew at 9 deg/s on steps of 10 ms and on steps of 1 ms ends at the same angles. */
@@ -412,6 +425,7 @@ int main(void)
         cmocka_unit_test(a_lever_arm_feels_the_rate),
         cmocka_unit_test(a_flight_is_felt_on_the_platform),
         cmocka_unit_test(a_push_is_felt_on_the_platform),
+        cmocka_unit_test(the_angle_sensor_tells_q),
         cmocka_unit_test(the_step_does_not_matter),
         cmocka_unit_test(nothing_depends_on_who_looks),
         cmocka_unit_test(half_a_second_back_is_what_it_was),
