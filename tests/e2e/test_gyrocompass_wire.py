@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +14,12 @@ from psabench.bench import Bench
 from psabench.devices import Gyro, Psa2
 from psabench.devices.gyro import Mode
 from psabench.errors import DeviceError, LinkError
+from psabench.places import proto_file
 from psabench.procedures import gyrocompass as g
 from psabench.procedures.gyrocompass import GyrocompassParams, GyrocompassResult
 from psabench.procedures.head_bench import Silent
 from psabench.procedures.heading_hold import Held, HoldParams, hold
+from psabench.procedures.platform_bench import Table
 from psabench.wire_platform import WirePlatform
 
 pytestmark = pytest.mark.host
@@ -133,6 +136,8 @@ def test_a_flight_needs_the_rate_of_transport(tmp_path: Path) -> None:
         (["--sequence", "0,90"], "too few positions"),
         (["--sequence", "30,30,30"], "coincide"),
         (["--latitude-deg", "90"], "latitude beyond 85"),
+        (["--settle-s", "3"], "it takes 7/m1_per_s"),
+        (["--m2-per-s", "0.1", "--slope", "yes"], "it takes 7/m2_per_s"),
         (["--reading", "best"], "article, improved, both"),
         (["--head", "x"], "no such parameter"),
         (["--realisations", "3"], "no such parameter"),
@@ -257,6 +262,105 @@ def test_a_wrong_latitude_is_told_when_it_shows() -> None:
     with Bench.start(IDEAL) as bench:
         r = run(bench, ideal(latitude_deg=52.0))
     assert "right at latitude 50.0" in r.doubts[0]
+
+
+def test_the_other_hemisphere_is_told_by_the_drift_of_the_passport() -> None:
+    """-50 for 50 deg: the Earth's horizontal rate is the same, 2 U sin(50 deg) of azimuth drift is not."""
+    p = ideal(sequence="0,90,180", method="closed3", latitude_deg=-50.0)
+    with Bench.start(IDEAL) as bench:
+        bench.control.call("vehicle.attitude", heading_deg=135.0, pitch_deg=1.0, roll_deg=1.0)
+        windows = g.measure(WirePlatform(bench), p, Silent())
+    r = g.estimate(windows, p)
+    off_deg = abs(r.get("heading_deg").value - 135.0)
+    assert off_deg > 3.0
+    assert r.doubts == ()
+    assert r.latitude.sign_deg == pytest.approx(off_deg, abs=0.3)
+    told = g.estimate(windows, replace(p, drift2_degph=DRIFT_DEGPH, drift2_limit_degph=5.0))
+    assert "its passport says 25 +- 5 deg/h: it would be right at latitude 50.0 deg" in told.doubts[0]
+
+
+def test_the_latitude_is_the_scenario_s(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Of its site, unless the operator says otherwise."""
+    scenario = tmp_path / "sixty.yaml"
+    scenario.write_text(
+        proto_file(f"scenarios/{IDEAL}.yaml").read_text().replace("latitude_deg: 50", "latitude_deg: 60")
+    )
+    argv = ["run", "gyrocompass", "--reading", "article", "--calibrate-s", "0", "--scenario", str(scenario)]
+    assert cli.main([*argv, "--out", str(tmp_path)]) == 0
+    section = json.loads((tmp_path / "result.json").read_text())["sections"][0]
+    assert section["params"]["latitude_deg"] == 60.0
+    assert section["latitude"]["low_deg"] < 60.0 < section["latitude"]["high_deg"]
+    assert "deg look alike" in capsys.readouterr().out
+    assert cli.main([*argv, "--out", str(tmp_path), "--latitude-deg", "50"]) == 1
+    assert "DOUBT: the horizontal Earth rate found is 0.77" in capsys.readouterr().out
+
+
+def impatient(**given: float) -> tuple[str, ...]:
+    """Doubts of a run that the procedure itself would refuse: three positions, settled for too short a time."""
+    p = ideal(sequence="0,90,180", method="closed3", slope=False)
+    with Bench.start(IDEAL) as bench:
+        platform = WirePlatform(bench)
+        platform.prepare(latitude_rad=p.latitude_rad, m1_per_s=given.get("m1", 1.0), m2_per_s=given.get("m2", 2.0))
+        platform.level(60.0)
+        table = Table(angles_deg=p.angles_deg, window_s=10.0, settle_s=given.get("settle_s", 10.0))
+        return g.estimate(platform.measure(table, lambda: None), p).doubts
+
+
+@pytest.mark.parametrize("given", [{"settle_s": 3.0}, {"m1": 0.4}, {"m2": 0.1}], ids=str)
+def test_a_rate_that_still_runs_is_a_doubt(given: dict[str, float]) -> None:
+    """Each turns this heading by 0.3 deg to a degree; the unit calls all of them settled."""
+    assert any("S still runs in its windows" in d for d in impatient(**given))
+
+
+@pytest.mark.parametrize(("sequence", "method"), [("0,90,180", "closed3"), ("0,180,90,270", "gls")])
+def test_a_vehicle_that_turned_between_positions_is_a_doubt(sequence: str, method: str) -> None:
+    p = ideal(sequence=sequence, method=method, calibrate_s=0.0)
+    with Bench.start(IDEAL) as bench:
+        seen = iter((False, True, False, False))
+
+        def turn() -> None:
+            if next(seen):
+                attitude = {"pitch_deg": PITCH_DEG, "roll_deg": ROLL_DEG}
+                bench.control.call("vehicle.attitude", heading_deg=HEADING_DEG + 3.0, **attitude)
+
+        windows = g.measure(WirePlatform(bench), p, Silent(), seen=turn)
+    told = [d for d in g.estimate(windows, p).doubts if "the vehicle turned by" in d]
+    assert "between positions 2 and 3 the vehicle turned by 3.00 deg" in told[0]
+
+
+@pytest.mark.parametrize(
+    ("spoil", "why", "by_s"),
+    [
+        (lambda platform: platform.gyro.set(tolerance_arcmin=0.02), "the platform does not settle", 120.0),
+        (lambda platform: setattr(platform.gyro, "start", lambda: None), "no reading of the gyro unit came", 160.0),
+    ],
+    ids=["never settles", "never tells"],
+)
+def test_a_run_without_windows_gives_up(spoil: Callable[[WirePlatform], object], why: str, by_s: float) -> None:
+    """In the settling limit, or when position 1 should long have been measured."""
+    p = ideal(sequence="0,90,180", method="closed3")
+    with Bench.start(IDEAL) as bench:
+        platform = WirePlatform(bench)
+        platform.prepare(latitude_rad=p.latitude_rad, m1_per_s=1.0, m2_per_s=2.0)
+        platform.level(60.0)
+        spoil(platform)
+        with pytest.raises(LinkError, match=f"position 1 was .*{why}"):
+            platform.measure(p.table, lambda: None)
+        assert bench.time_s < by_s
+
+
+@pytest.mark.parametrize("slope", [False, True])
+def test_the_unit_s_own_step_counts(tmp_path: Path, slope: bool) -> None:
+    """50 readings a second instead of 100: lengths, slopes and turns follow."""
+    scenario = tmp_path / "slow.yaml"
+    text = proto_file(f"scenarios/{IDEAL}.yaml").read_text()
+    scenario.write_text(text.replace("    board: gyro\n", "    board: gyro\n    profile_set: {step_ns: 20000000}\n"))
+    with Bench.start(scenario) as bench:
+        r = run(bench, ideal(sequence="0,90,180", method="closed3", slope=slope))
+    assert r.windows[0].step_s == 0.02
+    assert r.windows[0].length_s == pytest.approx(15.0)
+    assert r.get("heading_deg").value == pytest.approx(HEADING_DEG, abs=0.03)
+    assert r.doubts == ()
 
 
 def test_the_unit_is_asked_again_while_its_gyroscope_runs_up() -> None:
