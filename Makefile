@@ -42,7 +42,7 @@ CXXSTD := $(patsubst -std=c11,-std=c++17,$(STD)) -fno-exceptions -fno-rtti -fno-
 CXXWARN = $(filter-out -Wstrict-prototypes -Wmissing-prototypes,$(WARN)) -Wmissing-declarations
 EIGEN  := $(patsubst -I%,-isystem %,$(shell $(PKGCONFIG) --cflags eigen3 2>/dev/null))
 # Clang's check of function pointers in C++ asks for RTTI.
-CXXSANFL := $(SANFL) $(if $(SAN),$(if $(findstring clang,$(CXX)),-fno-sanitize=function))
+CXXSANFL := $(SANFL) $(if $(findstring undefined,$(SAN)),-fsanitize=float-cast-overflow) $(if $(SAN),$(if $(findstring clang,$(CXX)),-fno-sanitize=function))
 CXXCOMPILE = $(CXX) $(CXXSTD) $(CXXWARN) -Iemu $(EIGEN) $(CPPFLAGS) $(CXXSANFL) $(CXXFLAGS)
 COMPILE = $(CC) $(FLAGS) $(SANFL) $(CFLAGS)
 LINK    = $(CC) $(SANFL) $(CFLAGS) $(LDFLAGS)

@@ -5,7 +5,8 @@
  * right, y_c forward; psi clockwise from north, pitch nose up, roll right wing down. q is the angle of the gimbal about z_c:
  * x_p = cos q x_c + sin q y_c. Equations (1) to (19) are the article's, with the errata of docs/nav.md.
  * All functions are pure: no state, no allocation, nothing printed, any thread. Angles in rad, rates in rad/s. Functions that
- * return int return NAV_OK or a refusal below zero and then leave their outputs as they were. */
+ * return int return NAV_OK or a refusal below zero and then leave their outputs as they were; those that return double give
+ * NaN for an angle that is not finite or beyond 1e6 rad, and for what has no answer. */
 #ifndef PSABENCH_NAV_H
 #define PSABENCH_NAV_H
 
@@ -34,6 +35,15 @@ enum nav_status {
 };
 NAV_API const char *nav_status_text(int status); /* one sentence */
 
+/* Why a call would be refused, for a person: "field is value; want". */
+struct nav_refusal {
+    int status;        /* enum nav_status; NAV_OK: it would not be */
+    int position;      /* whose field it is, from 0; -1: of the configuration */
+    double value;      /* what the field holds */
+    const char *field; /* as the structure calls it; "" when the cause is not one field */
+    const char *want;  /* what would be right; static text */
+};
+
 enum nav_flag {                        /* bits of a result; nav_flag_text() has the sentence of the lowest one */
                 NAV_POOR_GEOMETRY = 1, /* |D|/We^2 < 0.3: steps below 40 or above 175 deg */
                 NAV_POOR_QUALITY = 2,  /* |hypot(s, c) - 1| > 0.01: wrong latitude, rates that do not belong together */
@@ -44,7 +54,7 @@ enum nav_flag {                        /* bits of a result; nav_flag_text() has 
 };
 NAV_API const char *nav_flag_text(uint32_t flags);
 NAV_API int nav_abi(void);
-NAV_API const char *nav_version(void);
+NAV_API const char *nav_version(void); /* "0.1.0 eigen-3.4.0": what the last digits of results hang on */
 
 /* One position of the platform and one window in it. */
 struct nav_position {
@@ -104,6 +114,9 @@ struct nav_compass {
 };
 NAV_API int nav_gyrocompass(const struct nav_position *p, int count, const struct nav_gyrocompass_cfg *cfg,
                             struct nav_compass *out);
+/* The status that nav_gyrocompass() would return, but for NAV_SINGULAR, and its cause. */
+NAV_API int nav_gyrocompass_check(const struct nav_position *p, int count, const struct nav_gyrocompass_cfg *cfg,
+                                  struct nav_refusal *why);
 
 /* (18), (19) and S1 + S3 as printed: wrong, for negative tests only. Three positions. */
 NAV_API int nav_gyrocompass_printed(const struct nav_position *p, double latitude_rad, double *alpha1_rad,

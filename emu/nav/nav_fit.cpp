@@ -115,7 +115,7 @@ double fit_geometry(const fit_design &rows)
     const fit_small normal = rows.leftCols(FIT_RAMP).transpose().lazyProduct(rows.leftCols(FIT_RAMP));
     const Eigen::Matrix3d m = normal;
     const double square = m.determinant();
-    return std::sqrt((square > 0.0 ? square : 0.0) / (n * (n - 1.0) * (n - 2.0) / 6.0));
+    return nav_root(square / (n * (n - 1.0) * (n - 2.0) / 6.0));
 }
 
 bool fit_gain_of(const fit_design &rows, const fit_square &whitener, fit_gain *gain)

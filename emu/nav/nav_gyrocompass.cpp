@@ -1,3 +1,4 @@
+#include "nav/nav_check.hpp"
 #include "nav/nav_fit.hpp"
 
 /* What a result is put together from; x and gain are of (s, c, drift, ramp) or, on the circle, of (alpha, drift, ramp). */
@@ -9,43 +10,52 @@ struct solution {
     bool converged;
 };
 
-static bool all_finite(const struct nav_position *p, int count, const struct nav_gyrocompass_cfg *cfg)
-{
-    const struct nav_noise *n = &cfg->noise;
-    double sum = cfg->latitude_rad + n->gm_sigma_radps + n->gm_tau_s + n->white_radps_rts + n->window_sd_radps +
-                 n->angle_sd_rad + n->level_sd_rad + n->latitude_sd_rad;
-    bool finite = std::isfinite(sum);
-    for (int i = 0; i < count; i++) {
-        sum = p[i].s_radps + p[i].delta_rad + p[i].beta_rad + p[i].gamma_rad + p[i].t_mid_s + p[i].window_s;
-        finite = finite && std::isfinite(sum);
-    }
-    return finite;
-}
+constexpr double TILT_MAX = NAV_PI / 4;
+constexpr const char *WANT_SD = "a standard deviation, 0 or more";
 
-static bool in_range(const struct nav_position *p, int count, const struct nav_gyrocompass_cfg *cfg)
-{
-    const struct nav_noise *n = &cfg->noise;
-    bool good = cfg->method >= NAV_CLOSED3 && cfg->method <= NAV_GLS_CONSTRAINED && n->gm_sigma_radps >= 0.0 &&
-                n->white_radps_rts >= 0.0 && n->window_sd_radps >= 0.0 && n->angle_sd_rad >= 0.0 &&
-                n->level_sd_rad >= 0.0 && n->latitude_sd_rad >= 0.0 && n->latitude_sd_rad < NAV_PI / 4;
-    good = good && (n->gm_sigma_radps == 0.0 || n->gm_tau_s > 0.0);
-    for (int i = 0; i < count; i++)
-        good = good && std::fabs(p[i].gamma_rad) < NAV_PI / 4 && std::fabs(p[i].beta_rad) < NAV_PI / 4 &&
-               std::fabs(p[i].delta_rad) < 1e4 && p[i].window_s >= 0.0;
-    return good;
-}
+static const struct check_rule cfg_rules[] = {
+    CHECK_DOUBLE(nav_gyrocompass_cfg, latitude_rad, -CHECK_ANY, CHECK_ANY, "at most 85 deg of latitude"),
+    CHECK_INT(nav_gyrocompass_cfg, method, NAV_CLOSED3, NAV_GLS_CONSTRAINED, "one of enum nav_method"),
+    CHECK_DOUBLE(nav_gyrocompass_cfg, noise.gm_sigma_radps, 0.0, CHECK_ANY, WANT_SD),
+    CHECK_DOUBLE(nav_gyrocompass_cfg, noise.gm_tau_s, -CHECK_ANY, CHECK_ANY, "a number"),
+    CHECK_DOUBLE(nav_gyrocompass_cfg, noise.white_radps_rts, 0.0, CHECK_ANY, WANT_SD),
+    CHECK_DOUBLE(nav_gyrocompass_cfg, noise.window_sd_radps, 0.0, CHECK_ANY, WANT_SD),
+    CHECK_DOUBLE(nav_gyrocompass_cfg, noise.angle_sd_rad, 0.0, CHECK_ANY, WANT_SD),
+    CHECK_DOUBLE(nav_gyrocompass_cfg, noise.level_sd_rad, 0.0, CHECK_ANY, WANT_SD),
+    CHECK_DOUBLE(nav_gyrocompass_cfg, noise.latitude_sd_rad, 0.0, TILT_MAX, "a standard deviation, 0 to 45 deg"),
+};
 
-static bool times_fit(const struct nav_position *p, int count, const struct nav_gyrocompass_cfg *cfg)
+static const struct check_rule position_rules[] = {
+    CHECK_DOUBLE(nav_position, s_radps, -CHECK_ANY, CHECK_ANY, "a number"),
+    CHECK_DOUBLE(nav_position, delta_rad, -1e4, 1e4, "at most 1e4 rad"),
+    CHECK_DOUBLE(nav_position, beta_rad, -TILT_MAX, TILT_MAX, "a tilt of at most 45 deg"),
+    CHECK_DOUBLE(nav_position, gamma_rad, -TILT_MAX, TILT_MAX, "a tilt of at most 45 deg"),
+    CHECK_DOUBLE(nav_position, t_mid_s, -CHECK_ANY, CHECK_ANY, "a number"),
+    CHECK_DOUBLE(nav_position, window_s, 0.0, CHECK_ANY, "a length, 0 or more"),
+};
+
+/* Windows that follow one another, where drift or a ramp asks for it. */
+static int times_refusal(const struct nav_position *p, int count, const struct nav_gyrocompass_cfg *cfg,
+                         struct nav_refusal *why)
 {
     const bool drift = cfg->noise.gm_sigma_radps > 0.0;
-    if (!drift && !cfg->ramp && cfg->noise.white_radps_rts == 0.0) return true;
+    const bool length = drift || cfg->noise.white_radps_rts > 0.0;
     for (int i = 0; i < count; i++) {
-        if ((drift || cfg->noise.white_radps_rts > 0.0) && p[i].window_s <= 0.0) return false;
-        if (i == 0 || (!drift && !cfg->ramp)) continue;
-        const double apart_s = p[i].t_mid_s - p[i - 1].t_mid_s;
-        if (apart_s <= 0.0 || (drift && apart_s < 0.5 * (p[i].window_s + p[i - 1].window_s) - 1e-6)) return false;
+        int status = NAV_OK;
+        const double apart_s = i > 0 ? p[i].t_mid_s - p[i - 1].t_mid_s : 1.0;
+        if (length && p[i].window_s <= 0.0)
+            status = check_refuse(why, NAV_TIMES, "window_s", p[i].window_s,
+                                  "above 0: correlated drift or white noise was asked for");
+        else if (i > 0 && (drift || cfg->ramp) && apart_s <= 0.0)
+            status = check_refuse(why, NAV_TIMES, "t_mid_s", p[i].t_mid_s, "later than that of the position before");
+        else if (i > 0 && drift && apart_s < 0.5 * (p[i].window_s + p[i - 1].window_s) - 1e-6)
+            status = check_refuse(why, NAV_TIMES, "t_mid_s", p[i].t_mid_s,
+                                  "windows that do not overlap: half of both lengths after that before");
+        if (!status) continue;
+        if (why) why->position = i;
+        return status;
     }
-    return true;
+    return NAV_OK;
 }
 
 /* Are there three directions that differ? */
@@ -62,16 +72,34 @@ static bool three_directions(const struct nav_position *p, int count)
     return found == 3;
 }
 
-static int refusal(const struct nav_position *p, int count, const struct nav_gyrocompass_cfg *cfg)
+static int count_refusal(int count, const struct nav_gyrocompass_cfg *cfg, struct nav_refusal *why)
 {
     const int least = cfg->ramp ? 4 : 3;
-    if (count < least || count > NAV_MAX_POSITIONS || (cfg->method == NAV_CLOSED3 && (count != 3 || cfg->ramp)))
-        return NAV_TOO_FEW;
-    if (!all_finite(p, count, cfg)) return NAV_NOT_FINITE;
-    if (!in_range(p, count, cfg)) return NAV_RANGE;
-    if (std::fabs(cfg->latitude_rad) > 85.0 * NAV_DEG) return NAV_LATITUDE;
-    if (!three_directions(p, count)) return NAV_COINCIDENT;
-    return times_fit(p, count, cfg) ? NAV_OK : NAV_TIMES;
+    if (count < least)
+        return check_refuse(why, NAV_TOO_FEW, "count", count, cfg->ramp ? "4 at least with a ramp" : "3 at least");
+    if (count > NAV_MAX_POSITIONS) return check_refuse(why, NAV_TOO_FEW, "count", count, "64 at most");
+    if (cfg->method == NAV_CLOSED3 && (count != 3 || cfg->ramp))
+        return check_refuse(why, NAV_TOO_FEW, "count", count, "exactly three for the closed form, and no ramp");
+    return NAV_OK;
+}
+
+int nav_gyrocompass_check(const struct nav_position *p, int count, const struct nav_gyrocompass_cfg *cfg,
+                          struct nav_refusal *why)
+{
+    check_refuse(why, NAV_OK, "", 0.0, "");
+    int refused = count_refusal(count, cfg, why);
+    if (!refused) refused = check_all(cfg, cfg_rules, why);
+    if (!refused && cfg->noise.gm_sigma_radps > 0.0 && !(cfg->noise.gm_tau_s > 0.0))
+        refused = check_refuse(why, NAV_RANGE, "noise.gm_tau_s", cfg->noise.gm_tau_s, "above 0, for gm_sigma_radps is");
+    for (int i = 0; i < count && !refused; i++) {
+        refused = check_all(&p[i], position_rules, why);
+        if (refused && why) why->position = i;
+    }
+    if (refused) return refused;
+    if (std::fabs(cfg->latitude_rad) > 85.0 * NAV_DEG)
+        return check_refuse(why, NAV_LATITUDE, "latitude_rad", cfg->latitude_rad, "at most 85 deg (1.4835 rad)");
+    if (!three_directions(p, count)) return check_refuse(why, NAV_COINCIDENT, "", 0.0, "");
+    return times_refusal(p, count, cfg, why);
 }
 
 /* (17) to (19) with the errata, for We = 1: row 1 of the inverse is s, row 2 c, and the drift the mean of what is left. */
@@ -102,7 +130,7 @@ static void from_free(const fit_gain &free_gain, struct solution *x)
     x->gain.row(0) = (c * free_gain.row(FIT_S) - s * free_gain.row(FIT_C)) / (s * s + c * c);
     x->gain.bottomRows(unknowns - 1) = free_gain.bottomRows(unknowns - 1);
     x->params.resize(unknowns);
-    x->params(0) = det_atan2(s, c);
+    x->params(0) = nav_atan2(s, c);
     x->params.tail(unknowns - 1) = x->free.tail(unknowns - 1);
 }
 
@@ -168,11 +196,11 @@ static void spread(const struct solution *x, const struct equations *e, struct n
     for (int i = 0; i < 9; i++) out->cov[i] = 0.0;
     for (Eigen::Index i = 0; i < cov.rows(); i++)
         for (Eigen::Index j = 0; j < cov.cols(); j++) out->cov[3 * i + j] = cov(i, j) * unit[i] * unit[j];
-    out->alpha1_sd_rad = std::sqrt(std::fmax(cov(0, 0), 0.0)); /* rank one: rounding may pass zero */
+    out->alpha1_sd_rad = nav_root(cov(0, 0));
     out->alpha1_half95_rad = 1.959963984540054 * out->alpha1_sd_rad;
-    out->drift1_sd_radps = std::sqrt(std::fmax(cov(1, 1), 0.0)) * we;
+    out->drift1_sd_radps = nav_root(cov(1, 1)) * we;
     const double by_first = x->gain(0, 0) * nav_cos(out->alpha1_rad + p[0].delta_rad);
-    out->platform_sd_rad = std::sqrt(std::fmax(cov(0, 0) + variance * (1.0 - 2.0 * by_first), 0.0));
+    out->platform_sd_rad = nav_root(cov(0, 0) + variance * (1.0 - 2.0 * by_first));
 }
 
 static uint32_t flags_of(const struct nav_compass *r, const struct nav_gyrocompass_cfg *cfg, bool noise, bool converged)
@@ -189,14 +217,14 @@ static uint32_t flags_of(const struct nav_compass *r, const struct nav_gyrocompa
 int nav_gyrocompass(const struct nav_position *p, int count, const struct nav_gyrocompass_cfg *cfg,
                     struct nav_compass *out)
 {
-    const int refused = refusal(p, count, cfg);
+    const int refused = nav_gyrocompass_check(p, count, cfg, nullptr);
     if (refused) return refused;
     const double we = nav_earth_at(cfg->latitude_rad).we_radps;
     struct equations e = {p, cfg, fit_rows(p, count, cfg), fit_vector(count),
                           fit_covariance(p, count, &cfg->noise, cfg->latitude_rad)};
     for (int i = 0; i < count; i++) e.y(i) = p[i].s_radps / we;
     struct solution x;
-    if (!solve(&e, &x)) return NAV_SINGULAR;
+    if (!solve(&e, &x) || !std::isfinite(x.params.sum() + x.free.sum())) return NAV_SINGULAR;
     out->alpha1_rad = x.params(0);
     out->drift1_radps = x.params(1) * we;
     out->ramp_radps2 = cfg->ramp ? x.params(2) * we / fit_time_scale(p, count) : 0.0;
@@ -223,7 +251,7 @@ int nav_gyrocompass_printed(const struct nav_position *p, double latitude_rad, d
     struct nav_gyrocompass_cfg cfg = {};
     cfg.latitude_rad = latitude_rad;
     cfg.simplified = 1;
-    const int refused = refusal(p, 3, &cfg);
+    const int refused = nav_gyrocompass_check(p, 3, &cfg, nullptr);
     if (refused) return refused;
     const double we = nav_earth_at(latitude_rad).we_radps;
     struct nav_row r[3];
@@ -235,7 +263,8 @@ int nav_gyrocompass_printed(const struct nav_position *p, double latitude_rad, d
     const double d1 = r[0].b - r[1].b;
     const double d2 = r[1].b - r[2].b;
     const double det = c1 * d2 - c2 * d1;
-    *alpha1_rad = det_atan2((f1 * d1 - f2 * d2) / det, (c1 * f2 - c2 * f1) / det);
+    if (std::fabs(det) < 1e-9) return NAV_SINGULAR;
+    *alpha1_rad = nav_atan2((f1 * d1 - f2 * d2) / det, (c1 * f2 - c2 * f1) / det);
     *drift1_radps = p[0].s_radps + p[2].s_radps;
     return NAV_OK;
 }

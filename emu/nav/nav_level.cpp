@@ -28,6 +28,7 @@ int nav_attitude_from_level(const double *q_rad, const double *beta_rad, const d
     qr.setThreshold(1e-3); /* directions that differ by less than some tenths of a degree do not count */
     if (qr.rank() < unknowns) return NAV_COINCIDENT;
     const level_unknowns x = nav_qr_solve<level_rows, level_unknowns, level_vector>(qr, y);
+    if (!(x(0) * x(0) + x(1) * x(1) < 1.0)) return NAV_RANGE; /* no attitude: readings of no vehicle */
     out->pitch_rad = nav_asin(x(1));
     out->roll_rad = nav_asin(-x(0) / std::sqrt(1.0 - x(1) * x(1)));
     out->gamma_bias_rad = with_bias ? x(2) : 0.0;
@@ -59,7 +60,7 @@ int nav_cardan(const double *q_rad, const double *beta_rad, int count, double pi
 int nav_window_slope(const double *beta_n_rad, const double *s_radps, int count, double dt_s, double *out_radps)
 {
     if (count < 3) return NAV_TOO_FEW;
-    if (!(dt_s > 0.0)) return NAV_RANGE;
+    if (!(dt_s > 0.0 && std::isfinite(dt_s))) return NAV_RANGE;
     const double middle = 0.5 * (count - 1);
     double integral = 0.0;
     double moment = 0.0;

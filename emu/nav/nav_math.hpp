@@ -14,6 +14,15 @@ constexpr double NAV_DEG = NAV_PI / 180.0;
 constexpr double NAV_ARCMIN = NAV_DEG / 60.0;
 constexpr double NAV_DEGPH = NAV_DEG / 3600.0;
 
+constexpr double NAV_NAN = __builtin_nan("");
+constexpr double NAV_ANGLE_MAX = 1e6; /* rad: beyond it the reduction by pi/2 has lost its digits */
+
+/* The angle, or NaN for what is none. */
+inline double nav_angle(double x_rad)
+{
+    return std::fabs(x_rad) <= NAV_ANGLE_MAX ? x_rad : NAV_NAN;
+}
+
 /* Of |x| < 2^62; std::floor is a call where the processor is not known to round. */
 inline double nav_floor(double x)
 {
@@ -40,10 +49,11 @@ inline __attribute__((always_inline)) double nav_cos_poly(double z)
                           z * (2.08757232129817482790e-09 + z * -1.13596475577881948265e-11))));
 }
 
-/* sin(x + quarters pi/2) of |x| <= 1e6, below 1 ulp. det_sin() divides at each term; here are products alone, for a million runs.
+/* sin(x + quarters pi/2) of |x| <= 1e6, below 1 ulp; NaN beyond. det_sin() divides at each term; here are products alone, for a million runs.
  * pi/2 in three parts. */
 inline double nav_sin_quarters(double x_rad, int64_t quarters)
 {
+    if (!(std::fabs(x_rad) <= NAV_ANGLE_MAX)) return NAV_NAN;
     const double k = nav_floor(x_rad * 0.63661977236758134308 + 0.5);
     const double r = ((x_rad - k * 0x1.921fb54400000p+0) - k * 0x1.0b4611a600000p-34) - k * 0x1.3198a2e037073p-69;
     const double z = r * r;
@@ -64,22 +74,36 @@ inline double nav_cos(double x_rad)
     return nav_sin_quarters(x_rad, 1);
 }
 
-/* To (-pi, pi]. */
+/* Root of what rounding may have taken below zero; what is no number stays none. */
+inline double nav_root(double x)
+{
+    return x <= 0.0 ? 0.0 : std::sqrt(x);
+}
+
+/* To (-pi, pi]; NaN beyond some angles of 1e6 rad. */
 inline double nav_wrap(double x_rad)
 {
+    if (!(std::fabs(x_rad) <= 4.0 * NAV_ANGLE_MAX)) return NAV_NAN;
     const double w = x_rad - 2.0 * NAV_PI * nav_floor((x_rad + NAV_PI) / (2.0 * NAV_PI));
     return w <= -NAV_PI ? w + 2.0 * NAV_PI : w;
+}
+
+/* det_atan2() of what may not be finite. */
+inline double nav_atan2(double y, double x)
+{
+    return std::isfinite(y) && std::isfinite(x) ? det_atan2(y, x) : NAV_NAN;
 }
 
 inline double nav_asin(double x)
 {
     const double in = x > 1.0 ? 1.0 : (x < -1.0 ? -1.0 : x);
-    return det_atan2(in, std::sqrt((1.0 - in) * (1.0 + in)));
+    return nav_atan2(in, std::sqrt((1.0 - in) * (1.0 + in)));
 }
 
 /* e^-x for any x >= 0: beyond 700 it is nothing. */
 inline double nav_decay(double x)
 {
+    if (!(x >= 0.0)) return NAV_NAN;
     return x > 700.0 ? 0.0 : det_exp(-x);
 }
 

@@ -65,13 +65,18 @@ struct nav_mc_out {
     double *quality;
 };
 
-/* Errors of first order in jointly Gaussian means of the windows: the algebra once, then nanoseconds a run. Tilts only
- * enter through the gimbal's error. */
+/* Errors of first order in jointly Gaussian means of the windows: the algebra once, then nanoseconds a run. Tilts enter
+ * through the gimbal's error and times the errors of level sensors, latitude and torquer; errors beyond that order are
+ * refused with NAV_RANGE (nav_mc_check()). */
 NAV_API int nav_mc_closed(const struct nav_mc_cfg *cfg, uint64_t seed, uint64_t first_run, uint64_t runs,
                           const struct nav_mc_out *out);
 /* Drift and noise sample by sample, settled algebra of rest, nav_gyrocompass() at the end of each run. */
 NAV_API int nav_mc_samples(const struct nav_mc_cfg *cfg, uint64_t seed, uint64_t first_run, uint64_t runs,
                            const struct nav_mc_out *out);
+
+enum nav_mc_model { NAV_MC_CLOSED, NAV_MC_SAMPLES };
+/* The status that the model would return at once, and its cause. */
+NAV_API int nav_mc_check(const struct nav_mc_cfg *cfg, int model /* enum nav_mc_model */, struct nav_refusal *why);
 
 enum nav_mc_axis2 {
     NAV_AXIS2_SAME,     /* the azimuth axis has the very drift that was calibrated: the article's silence */
@@ -95,6 +100,7 @@ struct nav_mc_hold_out {
     double *end_rad; /* error of heading at the end */
     double *max_rad; /* largest magnitude on the way */
 };
+NAV_API int nav_mc_hold_check(const struct nav_mc_hold_cfg *cfg, struct nav_refusal *why);
 NAV_API int nav_mc_hold(const struct nav_mc_hold_cfg *cfg, uint64_t seed, uint64_t first_run, uint64_t runs,
                         const struct nav_mc_hold_out *out);
 

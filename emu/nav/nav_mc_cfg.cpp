@@ -1,3 +1,4 @@
+#include "nav/nav_check.hpp"
 #include "nav/nav_mc.hpp"
 
 void nav_mc_default(struct nav_mc_cfg *cfg)
@@ -62,36 +63,112 @@ double mc_samples_per_window(const struct nav_mc_cfg *cfg)
     return std::floor(cfg->window_s / cfg->sample_s + 0.5);
 }
 
-static bool all_finite(const struct nav_mc_cfg *c)
+constexpr const char *WANT_SIZE = "0 or more";
+constexpr const char *WANT_LENGTH = "a length above 0 s";
+constexpr const char *WANT_CHOICE = "one of its enum";
+constexpr const char *WANT_YES_NO = "0 or 1";
+constexpr const char *WANT_ANGLE = "an angle of at most 45 deg";
+
+static const struct check_rule cfg_rules[] = {
+    CHECK_DOUBLE(nav_mc_cfg, latitude_rad, -CHECK_ANY, CHECK_ANY, "at most 85 deg of latitude"),
+    CHECK_DOUBLE(nav_mc_cfg, latitude_error_rad, -NAV_PI / 4, NAV_PI / 4, WANT_ANGLE),
+    CHECK_DOUBLE(nav_mc_cfg, tilt_rad, -30 * NAV_DEG, 30 * NAV_DEG, "a tilt of at most 30 deg"),
+    CHECK_INT(nav_mc_cfg, tilt, 0, NAV_TILT_CORNERS, WANT_CHOICE),
+    CHECK_INT(nav_mc_cfg, cardan, 0, NAV_CARDAN_CORRECTED, WANT_CHOICE),
+    CHECK_DOUBLE(nav_mc_cfg, drift1_radps, -CHECK_ANY, CHECK_ANY, "a number"),
+    CHECK_DOUBLE(nav_mc_cfg, gm_sigma_radps, 0.0, CHECK_ANY, WANT_SIZE),
+    CHECK_DOUBLE(nav_mc_cfg, gm_tau_s, CHECK_ABOVE, CHECK_ANY, "a time above 0 s"),
+    CHECK_INT(nav_mc_cfg, gm_from_zero, 0, 1, WANT_YES_NO),
+    CHECK_DOUBLE(nav_mc_cfg, torquer_scale, -0.5, 1.0, "a relative error, -0.5 to 1"),
+    CHECK_DOUBLE(nav_mc_cfg, m1_per_s, CHECK_ABOVE, CHECK_ANY, "above 0"),
+    CHECK_DOUBLE(nav_mc_cfg, beta_sys_rad, -NAV_PI / 4, NAV_PI / 4, WANT_ANGLE),
+    CHECK_DOUBLE(nav_mc_cfg, gamma_sys_rad, -NAV_PI / 4, NAV_PI / 4, WANT_ANGLE),
+    CHECK_DOUBLE(nav_mc_cfg, beta_random_rad, 0.0, CHECK_ANY, WANT_SIZE),
+    CHECK_DOUBLE(nav_mc_cfg, gamma_random_rad, 0.0, CHECK_ANY, WANT_SIZE),
+    CHECK_DOUBLE(nav_mc_cfg, angle_sys_rad, -NAV_PI, NAV_PI, "an angle of at most 180 deg"),
+    CHECK_DOUBLE(nav_mc_cfg, angle_random_rad, 0.0, CHECK_ANY, WANT_SIZE),
+    CHECK_INT(nav_mc_cfg, angle_sys, 0, NAV_ANGLE_ACCUMULATES, WANT_CHOICE),
+    CHECK_INT(nav_mc_cfg, random_sign, 0, 1, WANT_YES_NO),
+    CHECK_INT(nav_mc_cfg, per_sample, 0, 1, WANT_YES_NO),
+    CHECK_DOUBLE(nav_mc_cfg, white_radps_rts, 0.0, CHECK_ANY, WANT_SIZE),
+    CHECK_DOUBLE(nav_mc_cfg, sample_s, CHECK_ABOVE, CHECK_ANY, WANT_LENGTH),
+    CHECK_DOUBLE(nav_mc_cfg, window_s, CHECK_ABOVE, CHECK_ANY, WANT_LENGTH),
+    CHECK_DOUBLE(nav_mc_cfg, gap_s, 0.0, CHECK_ANY, WANT_SIZE),
+    CHECK_DOUBLE(nav_mc_cfg, slew_radps, 0.0, CHECK_ANY, WANT_SIZE),
+    CHECK_DOUBLE(nav_mc_cfg, settle_s, 0.0, CHECK_ANY, WANT_SIZE),
+    CHECK_DOUBLE(nav_mc_cfg, gm_before_s, 0.0, CHECK_ANY, WANT_SIZE),
+};
+
+/* What first order bears: the closed form and the samples agree to the test's power up to here (docs/nav.md). */
+static const struct check_rule first_order_rules[] = {
+    CHECK_DOUBLE(nav_mc_cfg, latitude_error_rad, -10 * NAV_DEG, 10 * NAV_DEG, "at most 10 deg in first order"),
+    CHECK_DOUBLE(nav_mc_cfg, torquer_scale, -0.2, 0.2, "at most 0.2 in first order"),
+    CHECK_DOUBLE(nav_mc_cfg, beta_sys_rad, -5 * NAV_DEG, 5 * NAV_DEG, "at most 5 deg in first order"),
+    CHECK_DOUBLE(nav_mc_cfg, gamma_sys_rad, -5 * NAV_DEG, 5 * NAV_DEG, "at most 5 deg in first order"),
+};
+
+static int angles_refusal(const struct nav_mc_cfg *c, struct nav_refusal *why)
 {
-    double sum = c->latitude_rad + c->latitude_error_rad + c->tilt_rad + c->drift1_radps + c->gm_sigma_radps +
-                 c->gm_tau_s + c->torquer_scale + c->m1_per_s + c->beta_sys_rad + c->gamma_sys_rad +
-                 c->beta_random_rad + c->gamma_random_rad + c->angle_sys_rad + c->angle_random_rad +
-                 c->white_radps_rts + c->sample_s + c->window_s + c->gap_s + c->slew_radps + c->settle_s +
-                 c->gm_before_s;
-    for (int i = 0; i < c->count; i++) sum += c->angle_rad[i];
-    return std::isfinite(sum) && (std::isnan(c->alpha1_rad) || std::fabs(c->alpha1_rad) < 1e4);
+    if (!std::isnan(c->alpha1_rad) && !(std::fabs(c->alpha1_rad) < 1e4))
+        return check_refuse(why, std::isinf(c->alpha1_rad) ? NAV_NOT_FINITE : NAV_RANGE, "alpha1_rad", c->alpha1_rad,
+                            "below 1e4 rad, or NaN: over the whole turn");
+    for (int i = 0; i < c->count; i++) {
+        if (std::fabs(c->angle_rad[i]) < 1e4) continue;
+        const int status = std::isfinite(c->angle_rad[i]) ? NAV_RANGE : NAV_NOT_FINITE;
+        check_refuse(why, status, "angle_rad", c->angle_rad[i], "below 1e4 rad");
+        if (why) why->position = i;
+        return status;
+    }
+    return NAV_OK;
 }
 
-/* Choices and signs; what the estimator refuses is left to it. */
-int mc_refusal(const struct nav_mc_cfg *c, const struct nav_position *p)
+/* Choices and signs; what the estimator refuses is left to it. Runs may draw either sign of the latitude's error. */
+int mc_refusal(const struct nav_mc_cfg *c, struct nav_refusal *why)
 {
-    if (c->count < 3 || c->count > NAV_MAX_POSITIONS) return NAV_TOO_FEW;
-    if (!all_finite(c)) return NAV_NOT_FINITE;
-    const bool choices = c->tilt >= 0 && c->tilt <= NAV_TILT_CORNERS && c->cardan >= 0 &&
-                         c->cardan <= NAV_CARDAN_CORRECTED && c->angle_sys >= 0 &&
-                         c->angle_sys <= NAV_ANGLE_ACCUMULATES;
-    const bool signs = c->gm_sigma_radps >= 0.0 && c->gm_tau_s > 0.0 && c->m1_per_s > 0.0 &&
-                       c->beta_random_rad >= 0.0 && c->gamma_random_rad >= 0.0 && c->angle_random_rad >= 0.0 &&
-                       c->white_radps_rts >= 0.0 && c->torquer_scale > -0.5 && std::fabs(c->tilt_rad) <= 30.0 * NAV_DEG;
-    const bool times = c->window_s > 0.0 && c->gap_s >= 0.0 && c->slew_radps >= 0.0 && c->settle_s >= 0.0 &&
-                       c->gm_before_s >= 0.0 && c->sample_s > 0.0 && c->window_s >= c->sample_s &&
-                       c->window_s / c->sample_s < 1e7;
-    if (!choices || !signs || !times) return NAV_RANGE;
-    struct nav_compass unused;
+    if (c->count < 3) return check_refuse(why, NAV_TOO_FEW, "count", c->count, "3 positions at least");
+    if (c->count > NAV_MAX_POSITIONS) return check_refuse(why, NAV_TOO_FEW, "count", c->count, "64 positions at most");
+    int refused = check_all(c, cfg_rules, why);
+    if (!refused) refused = angles_refusal(c, why);
+    if (refused) return refused;
+    if (!(c->window_s >= c->sample_s && c->window_s / c->sample_s < 1e7))
+        return check_refuse(why, NAV_RANGE, "sample_s", c->sample_s, "1 to 1e7 samples in window_s");
+    struct nav_position p[NAV_MAX_POSITIONS];
+    mc_schedule(c, p);
     struct nav_gyrocompass_cfg fit = c->fit;
-    fit.latitude_rad = c->latitude_rad + c->latitude_error_rad;
-    return nav_gyrocompass(p, c->count, &fit, &unused);
+    for (int sign = 1; sign >= (c->random_sign ? -1 : 1); sign -= 2) {
+        fit.latitude_rad = c->latitude_rad + sign * c->latitude_error_rad;
+        refused = nav_gyrocompass_check(p, c->count, &fit, why);
+        if (refused) return refused;
+    }
+    struct nav_compass unused;
+    refused = nav_gyrocompass(p, c->count, &fit, &unused);
+    return refused ? check_refuse(why, refused, "angle_rad", c->angle_rad[0], "directions that differ more") : NAV_OK;
+}
+
+/* A constrained fit takes a wrong size of the Earth's rate for a direction, which is first order in that size. Weights that hang on
+ * each run's tilts are not for algebra that is done once. */
+int mc_first_order_refusal(const struct nav_mc_cfg *c, struct nav_refusal *why)
+{
+    int refused = mc_refusal(c, why);
+    if (!refused) refused = check_all(c, first_order_rules, why);
+    if (refused || !fit_is_constrained(c->fit.method)) return refused;
+    if (c->fit.method == NAV_GLS_CONSTRAINED && c->fit.noise.latitude_sd_rad > 0.0)
+        return check_refuse(why, NAV_RANGE, "fit.noise.latitude_sd_rad", c->fit.noise.latitude_sd_rad,
+                            "0 in first order with NAV_GLS_CONSTRAINED: weights would hang on the run");
+    const double tan_latitude = nav_sin(c->latitude_rad) / nav_cos(c->latitude_rad);
+    if (std::fabs(c->torquer_scale) > 0.05)
+        return check_refuse(why, NAV_RANGE, "torquer_scale", c->torquer_scale,
+                            "at most 0.05 in first order with a constrained fit");
+    if (std::fabs(tan_latitude * c->latitude_error_rad) > 0.05)
+        return check_refuse(why, NAV_RANGE, "latitude_error_rad", c->latitude_error_rad,
+                            "times tan(latitude_rad) at most 0.05 in first order with a constrained fit");
+    return NAV_OK;
+}
+
+int nav_mc_check(const struct nav_mc_cfg *cfg, int model, struct nav_refusal *why)
+{
+    check_refuse(why, NAV_OK, "", 0.0, "");
+    return model == NAV_MC_CLOSED ? mc_first_order_refusal(cfg, why) : mc_refusal(cfg, why);
 }
 
 /* Fixed sizes: Eigen has the cofactors of these. */
@@ -108,12 +185,9 @@ static bool invert(const fit_small &normal, fit_small *inverse)
 
 int mc_linear_make(const struct nav_mc_cfg *cfg, struct mc_linear *lin)
 {
-    if (cfg->count < 3 || cfg->count > NAV_MAX_POSITIONS) return NAV_TOO_FEW;
-    mc_schedule(cfg, lin->p);
-    const int refused = mc_refusal(cfg, lin->p);
+    const int refused = mc_first_order_refusal(cfg, nullptr);
     if (refused) return refused;
-    /* Weights that hang on each run's tilts are not for algebra that is done once. */
-    if (cfg->fit.method == NAV_GLS_CONSTRAINED && cfg->fit.noise.latitude_sd_rad > 0.0) return NAV_RANGE;
+    mc_schedule(cfg, lin->p);
     const struct nav_earth e = nav_earth_at(cfg->latitude_rad);
     const fit_design rows = fit_rows(lin->p, cfg->count, &cfg->fit);
     const fit_square covariance = fit_covariance(lin->p, cfg->count, &cfg->fit.noise, cfg->latitude_rad);

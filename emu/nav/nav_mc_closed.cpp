@@ -3,6 +3,21 @@
 /* Runs are computed 32 at a time, one expression for all of them before the next: loops that a compiler turns into vectors. */
 constexpr int LANES = 32;
 
+/* A number for either sign: mean + sign half. */
+struct pair {
+    double mean, half;
+};
+
+INLINE double pair_at(const struct pair *p, double sign)
+{
+    return p->mean + sign * p->half;
+}
+
+static struct pair pair_of(double plus, double minus)
+{
+    return {0.5 * (plus + minus), 0.5 * (plus - minus)};
+}
+
 /* The algebra that is done once: factor of the covariance of weighted errors, sums of weights, scales. */
 struct closed_plan {
     const struct nav_mc_cfg *cfg;
@@ -11,11 +26,17 @@ struct closed_plan {
     double sums[FIT_MAX];                         /* of weighted, of an error that all positions share */
     double cc[FIT_MAX], cs[FIT_MAX], ss[FIT_MAX]; /* of weighted cos^2, cos sin, sin^2 of delta */
     double share[NAV_MAX_POSITIONS];              /* of the angle's systematic error */
-    double level;                                 /* gamma_sys in S/We */
     double beta_left_rad; /* true beta at rest, but for the level sensor's error, where (14) leaves it out */
     double angle_sd_rad;
-    double scale, earth; /* relative errors of s, c and drift, and of s and c where the circle makes them count */
-    double fixed_turn;   /* alpha1 in turns */
+    /* What the given latitude makes of the Earth's rates, as means of both signs of its error and half the differences. All is in
+     * (1 + k) S/We, k the torquer's scale error: it stands before what turns the platform, not before what it takes off gamma. */
+    struct pair compensation; /* of an error of gamma */
+    struct pair excess;       /* of gamma itself: what compensates it less what there is */
+    struct pair ratio;        /* of s and c as the estimator scales them, less 1 */
+    struct pair circle;       /* r less 1 of 1/r: the same as the circle feels it, whose step goes by r, too */
+    double swell;             /* 1 + k */
+    double drift_lost_radps;  /* what k takes off the drift */
+    double fixed_turn;        /* alpha1 in turns */
     bool gimbal;
 };
 
@@ -23,8 +44,13 @@ struct closed_plan {
 static fit_square random_covariance(const struct nav_mc_cfg *cfg, const struct mc_linear *lin)
 {
     const double ns = cfg->per_sample ? mc_samples_per_window(cfg) : 1.0;
-    const struct nav_noise noise = {
-        cfg->gm_sigma_radps, cfg->gm_tau_s, cfg->white_radps_rts, 0.0, 0.0, cfg->gamma_random_rad / std::sqrt(ns), 0.0};
+    const struct nav_noise noise = {cfg->gm_sigma_radps,
+                                    cfg->gm_tau_s,
+                                    (1.0 + cfg->torquer_scale) * cfg->white_radps_rts,
+                                    0.0,
+                                    0.0,
+                                    (1.0 + cfg->torquer_scale) * cfg->gamma_random_rad / std::sqrt(ns),
+                                    0.0};
     fit_square c = fit_covariance(lin->p, lin->count, &noise, cfg->latitude_rad);
     if (!cfg->gm_from_zero) return c;
     const double before_s = cfg->gm_before_s;
@@ -43,9 +69,29 @@ static void factor_of(const fit_small &m, double l[FIT_MAX][FIT_MAX])
         for (Eigen::Index j = 0; j <= i; j++) {
             double left = m(i, j);
             for (Eigen::Index k = 0; k < j; k++) left -= l[i][k] * l[j][k];
-            if (i == j) l[i][j] = left > 1e-14 * m(i, i) ? std::sqrt(left) : 0.0;
-            else l[i][j] = l[j][j] > 0.0 ? left / l[j][j] : 0.0;
+            /* A number that is none stays none. */
+            if (i == j) l[i][j] = left <= 1e-14 * m(i, i) ? 0.0 : std::sqrt(left);
+            else l[i][j] = l[j][j] == 0.0 ? 0.0 : left / l[j][j];
         }
+}
+
+static void latitude_of(const struct nav_mc_cfg *cfg, struct closed_plan *plan)
+{
+    double compensation[2];
+    double excess[2];
+    double ratio[2];
+    const double we = nav_cos(cfg->latitude_rad);
+    for (int minus = 0; minus < 2; minus++) {
+        const double given = cfg->latitude_rad + (minus ? -1.0 : 1.0) * cfg->latitude_error_rad;
+        compensation[minus] = plan->swell * nav_sin(given) / we;
+        excess[minus] = (plan->swell * nav_sin(given) - nav_sin(cfg->latitude_rad)) / we;
+        ratio[minus] =
+            we / (nav_cos(given) * nav_cos(cfg->gamma_sys_rad) * plan->swell) - 1.0; /* rows shrink by a wrong gamma */
+    }
+    plan->compensation = pair_of(compensation[0], compensation[1]);
+    plan->excess = pair_of(excess[0], excess[1]);
+    plan->ratio = pair_of(ratio[0], ratio[1]);
+    plan->circle = pair_of(ratio[0] / (1.0 + ratio[0]), ratio[1] / (1.0 + ratio[1]));
 }
 
 static int plan_make(const struct nav_mc_cfg *cfg, struct closed_plan *plan)
@@ -69,12 +115,11 @@ static int plan_make(const struct nav_mc_cfg *cfg, struct closed_plan *plan)
     const fit_small covariance = spread.lazyProduct(weighted.transpose());
     factor_of(covariance, plan->factor);
     for (int i = 0; i < lin->count; i++) plan->share[i] = mc_angle_share(cfg, i);
-    plan->level = lin->wz_radps * cfg->gamma_sys_rad / lin->we_radps;
+    plan->swell = 1.0 + cfg->torquer_scale;
+    plan->drift_lost_radps = cfg->torquer_scale / plan->swell * cfg->drift1_radps;
+    latitude_of(cfg, plan);
     plan->beta_left_rad = cfg->fit.simplified ? cfg->drift1_radps / cfg->m1_per_s : 0.0;
     plan->angle_sd_rad = cfg->angle_random_rad / std::sqrt(cfg->per_sample ? mc_samples_per_window(cfg) : 1.0);
-    plan->scale = -cfg->torquer_scale;
-    plan->earth =
-        lin->constrained ? cfg->latitude_error_rad * nav_sin(cfg->latitude_rad) / nav_cos(cfg->latitude_rad) : 0.0;
     const double fixed = nav_wrap(std::isnan(cfg->alpha1_rad) ? 0.0 : cfg->alpha1_rad) / (2.0 * NAV_PI);
     plan->fixed_turn = fixed < 0.0 ? fixed + 1.0 : fixed;
     plan->gimbal = cfg->cardan == NAV_CARDAN_UNCORRECTED;
@@ -89,7 +134,7 @@ struct lanes {
     double pitch[LANES], roll[LANES]; /* [0, 1) until they are scaled */
     double sign_angle[LANES], sign_gamma[LANES], sign_beta[LANES], sign_latitude[LANES];
     double z[FIT_MAX + NAV_MAX_POSITIONS + 1][LANES]; /* Gaussian: for the unknowns, then for the angles */
-    double r[FIT_MAX][LANES], first[LANES];
+    double r[FIT_MAX][LANES], first[LANES], as_sin[LANES], as_cos[LANES];
     double alpha[LANES], platform[LANES], drift[LANES], quality[LANES];
 };
 
@@ -136,10 +181,11 @@ INLINE void scale_draws(const struct closed_plan *plan, struct lanes *x)
 
 /* Random errors that do not hang on alpha, the level sensors' systematic ones, and what these do through tilts, gamma_i = A cos
  * delta_i - B sin delta_i: sin(alpha_i) gamma_i of gamma's error, as rows take the cosine of a wrong gamma; cos(alpha_i) gamma_i of
- * beta's. */
+ * beta's. What is compensated of gamma_i itself in excess looks like a sine of A and a cosine of -B. */
 template <int UNKNOWNS> INLINE void add_levels(const struct closed_plan *plan, struct lanes *x)
 {
     const struct nav_mc_cfg *cfg = plan->cfg;
+    double common[LANES];
     double cc[LANES];
     double cs[LANES];
     double ss[LANES];
@@ -148,15 +194,18 @@ template <int UNKNOWNS> INLINE void add_levels(const struct closed_plan *plan, s
         const double b = x->sin_q[l] * x->roll[l] + x->cos_q[l] * x->pitch[l];
         const double gamma = x->sign_gamma[l] * cfg->gamma_sys_rad;
         const double beta = -(x->sign_beta[l] * cfg->beta_sys_rad + plan->beta_left_rad);
+        const double excess = pair_at(&plan->excess, x->sign_latitude[l]);
+        common[l] = pair_at(&plan->compensation, x->sign_latitude[l]) * gamma;
         cc[l] = a * (gamma * x->sin_a[l] + beta * x->cos_a[l]);
         cs[l] = gamma * (a * x->cos_a[l] - b * x->sin_a[l]) - beta * (b * x->cos_a[l] + a * x->sin_a[l]);
         ss[l] = b * (beta * x->sin_a[l] - gamma * x->cos_a[l]);
+        x->as_sin[l] = excess * a;
+        x->as_cos[l] = -excess * b;
     }
     const int unknowns = UNKNOWNS ? UNKNOWNS : plan->lin.unknowns;
     for (int k = 0; k < unknowns; k++) {
         for (int l = 0; l < LANES; l++)
-            x->r[k][l] = plan->sums[k] * (x->sign_gamma[l] * plan->level) + plan->cc[k] * cc[l] + plan->cs[k] * cs[l] +
-                         plan->ss[k] * ss[l];
+            x->r[k][l] = plan->sums[k] * common[l] + plan->cc[k] * cc[l] + plan->cs[k] * cs[l] + plan->ss[k] * ss[l];
         for (int j = 0; j <= k; j++)
             for (int l = 0; l < LANES; l++) x->r[k][l] += plan->factor[k][j] * x->z[j][l];
     }
@@ -195,17 +244,20 @@ template <int COUNT, int UNKNOWNS> INLINE void add_angles(const struct closed_pl
     }
 }
 
-/* r += normal (scale (s, c, drift) + earth (s, c)): a scale error of S, and one of the Earth's rate. */
-INLINE void add_scales(const struct closed_plan *plan, struct lanes *x)
+/* Errors that look like a sine and a cosine: of a free fit they are just that. The circle feels the size of s and c, too. */
+INLINE void add_sines(const struct closed_plan *plan, struct lanes *x)
 {
     const struct mc_linear *lin = &plan->lin;
-    if (plan->scale == 0.0 && plan->earth == 0.0) return;
-    const double drift = plan->scale * plan->cfg->drift1_radps / lin->we_radps;
+    if (!lin->constrained) {
+        for (int l = 0; l < LANES; l++) x->r[FIT_S][l] += x->as_sin[l];
+        for (int l = 0; l < LANES; l++) x->r[FIT_C][l] += x->as_cos[l];
+        return;
+    }
     for (int k = 0; k < lin->unknowns; k++)
         for (int l = 0; l < LANES; l++) {
-            const double scale = plan->scale + x->sign_latitude[l] * plan->earth;
-            x->r[k][l] += scale * (lin->normal[k][FIT_S] * x->sin_a[l] + lin->normal[k][FIT_C] * x->cos_a[l]) +
-                          lin->normal[k][FIT_DRIFT] * drift;
+            const double ratio = pair_at(&plan->circle, x->sign_latitude[l]);
+            x->r[k][l] += lin->normal[k][FIT_S] * (x->as_sin[l] + ratio * x->sin_a[l]) +
+                          lin->normal[k][FIT_C] * (x->as_cos[l] + ratio * x->cos_a[l]);
         }
 }
 
@@ -216,7 +268,9 @@ INLINE void solve(const struct closed_plan *plan, struct lanes *x)
         for (int l = 0; l < LANES; l++) {
             x->alpha[l] = x->cos_a[l] * x->r[FIT_S][l] - x->sin_a[l] * x->r[FIT_C][l];
             x->drift[l] = x->r[FIT_DRIFT][l];
-            x->quality[l] = std::fabs(x->sin_a[l] * x->r[FIT_S][l] + x->cos_a[l] * x->r[FIT_C][l]);
+            const double along = x->sin_a[l] * x->r[FIT_S][l] + x->cos_a[l] * x->r[FIT_C][l];
+            const double ratio = pair_at(&plan->ratio, x->sign_latitude[l]);
+            x->quality[l] = std::fabs(along + ratio + ratio * along);
         }
         return;
     }
@@ -225,7 +279,7 @@ INLINE void solve(const struct closed_plan *plan, struct lanes *x)
         const struct mc_error e = mc_solve_on_circle(lin, r, x->cos_a[l], x->sin_a[l]);
         x->alpha[l] = e.alpha_rad;
         x->drift[l] = e.drift;
-        x->quality[l] = e.quality;
+        x->quality[l] = e.quality * (1.0 + pair_at(&plan->ratio, x->sign_latitude[l]));
     }
 }
 
@@ -239,11 +293,12 @@ INLINE void compute(const struct closed_plan *plan, uint64_t seed, uint64_t firs
     for (int l = 0; l < LANES; l++) random_direction(x->turn_q[l], &x->cos_q[l], &x->sin_q[l]);
     add_levels<UNKNOWNS>(plan, x);
     add_angles<COUNT, UNKNOWNS>(plan, x);
-    add_scales(plan, x);
+    add_sines(plan, x);
     solve(plan, x);
+    const double to_drift = plan->lin.we_radps / plan->swell;
     for (int l = 0; l < LANES; l++) {
         x->platform[l] = x->alpha[l] - x->first[l];
-        x->drift[l] *= plan->lin.we_radps;
+        x->drift[l] = x->drift[l] * to_drift - plan->drift_lost_radps;
         const double whole = x->turn_a[l] > 0.5 ? 1.0 : 0.0;
         x->turn_a[l] = 2.0 * NAV_PI * (x->turn_a[l] - whole); /* an angle from here on */
     }

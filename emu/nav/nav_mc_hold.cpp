@@ -1,3 +1,4 @@
+#include "nav/nav_check.hpp"
 #include "nav/nav_mc.hpp"
 
 /* Exact step of a Gauss-Markov drift and its integral over t: both Gaussian, correlated. */
@@ -26,7 +27,7 @@ static struct gm_step gm_step_of(const struct nav_mc_cfg *cfg, double t_s)
     s.sd_radps = std::sqrt(new_drift);
     s.integral_by_drift_s = new_drift > 0.0 ? both / new_drift : 0.0;
     const double left = from_zero * from_zero - both * s.integral_by_drift_s;
-    s.integral_sd_rad = std::sqrt(left > 0.0 ? left : 0.0);
+    s.integral_sd_rad = nav_root(left);
     return s;
 }
 
@@ -52,17 +53,36 @@ struct hold_start {
     struct gm axis2;
 };
 
+static const struct check_rule hold_rules[] = {
+    CHECK_INT(nav_mc_hold_cfg, axis2, 0, NAV_AXIS2_FIXED, "one of enum nav_mc_axis2"),
+    CHECK_DOUBLE(nav_mc_hold_cfg, axis2_sd_radps, 0.0, CHECK_ANY, "0 or more"),
+    CHECK_DOUBLE(nav_mc_hold_cfg, heading_rad, -NAV_PI, NAV_PI, "an angle of at most 180 deg"),
+    CHECK_DOUBLE(nav_mc_hold_cfg, drift_error_radps, -CHECK_ANY, CHECK_ANY, "a number"),
+    CHECK_DOUBLE(nav_mc_hold_cfg, hours, CHECK_ABOVE, CHECK_ANY, "above 0 h"),
+    CHECK_DOUBLE(nav_mc_hold_cfg, step_s, CHECK_ABOVE, CHECK_ANY, "above 0 s"),
+    CHECK_DOUBLE(nav_mc_hold_cfg, wait_s, 0.0, CHECK_ANY, "0 s or more"),
+    CHECK_DOUBLE(nav_mc_hold_cfg, level_rad, -NAV_PI / 4, NAV_PI / 4, "an angle of at most 45 deg"),
+    CHECK_DOUBLE(nav_mc_hold_cfg, latitude_error_rad, -NAV_PI / 4, NAV_PI / 4, "an angle of at most 45 deg"),
+    CHECK_DOUBLE(nav_mc_hold_cfg, v_east_mps, -CHECK_ANY, CHECK_ANY, "a number"),
+    CHECK_DOUBLE(nav_mc_hold_cfg, speed_error, -CHECK_ANY, CHECK_ANY, "a relative error"),
+};
+
+int nav_mc_hold_check(const struct nav_mc_hold_cfg *cfg, struct nav_refusal *why)
+{
+    check_refuse(why, NAV_OK, "", 0.0, "");
+    const int refused = check_all(cfg, hold_rules, why);
+    if (refused) return refused;
+    if (cfg->hours * 3600.0 / cfg->step_s > 1e7)
+        return check_refuse(why, NAV_RANGE, "step_s", cfg->step_s, "1e7 steps in hours at most");
+    return mc_first_order_refusal(&cfg->start, why);
+}
+
 static int plan_make(const struct nav_mc_hold_cfg *cfg, struct hold_plan *plan)
 {
-    const double sum = cfg->axis2_sd_radps + cfg->heading_rad + cfg->drift_error_radps + cfg->hours + cfg->step_s +
-                       cfg->wait_s + cfg->level_rad + cfg->latitude_error_rad + cfg->v_east_mps + cfg->speed_error;
-    if (!std::isfinite(sum)) return NAV_NOT_FINITE;
-    if (cfg->axis2 < 0 || cfg->axis2 > NAV_AXIS2_FIXED || cfg->hours <= 0.0 || cfg->step_s <= 0.0 ||
-        cfg->wait_s < 0.0 || cfg->hours * 3600.0 / cfg->step_s > 1e7)
-        return NAV_RANGE;
-    plan->cfg = cfg;
-    const int refused = mc_linear_make(&cfg->start, &plan->lin);
+    int refused = nav_mc_hold_check(cfg, nullptr);
+    if (!refused) refused = mc_linear_make(&cfg->start, &plan->lin);
     if (refused) return refused;
+    plan->cfg = cfg;
     const struct nav_position *p = plan->lin.p;
     plan->steps = (uint64_t)std::ceil(cfg->hours * 3600.0 / cfg->step_s - 1e-9);
     plan->step = gm_step_of(&cfg->start, cfg->hours * 3600.0 / (double)plan->steps);
@@ -93,16 +113,66 @@ static double axis2_level(const struct hold_plan *plan, double alpha1_rad, doubl
     return plan->lin.we_radps * (nav_cos(alpha) * beta_rad - nav_sin(alpha) * gamma_rad);
 }
 
+/* What one instrument drew for good: as nav_mc_closed() has it, to first order. */
+struct instrument {
+    double alpha_rad, gamma_east_rad, gamma_north_rad; /* gamma_i = east cos(delta_i) - north sin(delta_i) */
+    double cos_q, sin_q, pitch_rad, roll_rad;
+    double angle_sys_rad, gamma_sys_rad, beta_sys_rad;
+    double compensation, excess, circle; /* of gamma's error, of gamma, of s and c: see struct closed_plan */
+};
+
+/* Tilts and the latitude's sign come from a stream of their own. */
+static struct instrument instrument_draw(const struct nav_mc_cfg *cfg, uint64_t start_of_stream,
+                                         struct random_stream *rnd)
+{
+    struct instrument u = {};
+    u.alpha_rad = mc_alpha1(cfg, rnd);
+    u.angle_sys_rad = mc_signed(cfg, cfg->angle_sys_rad, rnd);
+    u.gamma_sys_rad = mc_signed(cfg, cfg->gamma_sys_rad, rnd);
+    u.beta_sys_rad = mc_signed(cfg, cfg->beta_sys_rad, rnd);
+    struct random_stream aside(random_mix(start_of_stream + RANDOM_STEP / 2));
+    const double given = cfg->latitude_rad + mc_signed(cfg, cfg->latitude_error_rad, &aside);
+    u.pitch_rad = mc_tilt(cfg, &aside);
+    u.roll_rad = mc_tilt(cfg, &aside);
+    const double q = NAV_PI * (2.0 * aside.uniform() - 1.0);
+    u.cos_q = nav_cos(q);
+    u.sin_q = nav_sin(q);
+    u.gamma_east_rad = u.cos_q * u.roll_rad - u.sin_q * u.pitch_rad;
+    u.gamma_north_rad = u.sin_q * u.roll_rad + u.cos_q * u.pitch_rad;
+    const double swell = 1.0 + cfg->torquer_scale;
+    const double we = nav_cos(cfg->latitude_rad);
+    u.compensation = swell * nav_sin(given) / we;
+    u.excess = u.compensation - nav_sin(cfg->latitude_rad) / we;
+    u.circle = 1.0 - nav_cos(given) * nav_cos(cfg->gamma_sys_rad) * swell / we;
+    return u;
+}
+
+/* Of S in position i, but for drift and white noise: angle and gamma_error are this window's. */
+static double window_error(const struct nav_mc_cfg *cfg, const struct mc_linear *lin, const struct instrument *u, int i,
+                           double angle, double gamma_error)
+{
+    const double cd = lin->cos_delta[i];
+    const double sd = lin->sin_delta[i];
+    const double ca = nav_cos(u->alpha_rad + lin->p[i].delta_rad);
+    const double sa = nav_sin(u->alpha_rad + lin->p[i].delta_rad);
+    const double gamma = u->gamma_east_rad * cd - u->gamma_north_rad * sd;
+    const double beta = -(u->beta_sys_rad + (cfg->fit.simplified ? cfg->drift1_radps / cfg->m1_per_s : 0.0));
+    if (cfg->cardan == NAV_CARDAN_UNCORRECTED)
+        angle +=
+            nav_cardan_2nd(u->cos_q * cd - u->sin_q * sd, u->sin_q * cd + u->cos_q * sd, u->pitch_rad, u->roll_rad) -
+            nav_cardan_2nd(u->cos_q, u->sin_q, u->pitch_rad, u->roll_rad);
+    return u->compensation * gamma_error + u->excess * gamma + sa * gamma * u->gamma_sys_rad + ca * gamma * beta +
+           ca * angle;
+}
+
 /* The gyrocompassing, to first order as in nav_mc_closed(), with the random drift's means drawn one after the other. */
-static struct hold_start calibrate(const struct hold_plan *plan, struct random_stream *rnd)
+static struct hold_start calibrate(const struct hold_plan *plan, uint64_t start_of_stream, struct random_stream *rnd)
 {
     const struct nav_mc_cfg *cfg = &plan->cfg->start;
     const struct mc_linear *lin = &plan->lin;
     const double ns = std::sqrt(cfg->per_sample ? mc_samples_per_window(cfg) : 1.0);
-    const double alpha = mc_alpha1(cfg, rnd);
-    const double angle_sys = mc_signed(cfg, cfg->angle_sys_rad, rnd);
-    const double gamma_sys = mc_signed(cfg, cfg->gamma_sys_rad, rnd);
-    const double beta_sys = mc_signed(cfg, cfg->beta_sys_rad, rnd);
+    const double swell = 1.0 + cfg->torquer_scale;
+    const struct instrument u = instrument_draw(cfg, start_of_stream, rnd);
     const bool own = plan->cfg->axis2 == NAV_AXIS2_MEASURED;
     struct gm axis1 = gm_begin(cfg, rnd);
     struct gm axis2 = gm_begin(cfg, rnd);
@@ -111,23 +181,28 @@ static struct hold_start calibrate(const struct hold_plan *plan, struct random_s
     for (int i = 0; i < lin->count; i++) {
         const double drift = window_mean(plan, &axis1, i, rnd);
         if (own) measured2 = window_mean(plan, &axis2, i, rnd);
-        const double angle = angle_sys * mc_angle_share(cfg, i) + cfg->angle_random_rad / ns * rnd->gauss();
-        const double level = lin->wz_radps * (gamma_sys + cfg->gamma_random_rad / ns * rnd->gauss());
-        const double white = cfg->white_radps_rts / std::sqrt(cfg->window_s) * rnd->gauss();
-        const double error = (drift + level + white) / lin->we_radps + nav_cos(alpha + lin->p[i].delta_rad) * angle;
+        const double angle = u.angle_sys_rad * mc_angle_share(cfg, i) + cfg->angle_random_rad / ns * rnd->gauss();
+        const double gamma_error = u.gamma_sys_rad + cfg->gamma_random_rad / ns * rnd->gauss();
+        const double white = swell * cfg->white_radps_rts / std::sqrt(cfg->window_s) * rnd->gauss();
+        const double error = (drift + white) / lin->we_radps + window_error(cfg, lin, &u, i, angle, gamma_error);
         for (int k = 0; k < lin->unknowns; k++) r[k] += lin->weighted[k][i] * error;
     }
-    const struct mc_error found = mc_solve(lin, r, nav_cos(alpha), nav_sin(alpha));
-    struct hold_start start = {found.alpha_rad, found.drift * lin->we_radps - cfg->torquer_scale * cfg->drift1_radps,
-                               axis1};
-    if (own) start = {found.alpha_rad, measured2 + axis2_level(plan, alpha, beta_sys, gamma_sys), axis2};
+    const double ca = nav_cos(u.alpha_rad);
+    const double sa = nav_sin(u.alpha_rad);
+    for (int k = 0; k < lin->unknowns && lin->constrained; k++)
+        r[k] += u.circle * (lin->normal[k][FIT_S] * sa + lin->normal[k][FIT_C] * ca);
+    const struct mc_error found = mc_solve(lin, r, ca, sa);
+    const double lost = cfg->torquer_scale / swell * cfg->drift1_radps;
+    struct hold_start start = {found.alpha_rad, found.drift * lin->we_radps / swell - lost, axis1};
+    if (own)
+        start = {found.alpha_rad, measured2 + axis2_level(plan, u.alpha_rad, u.beta_sys_rad, u.gamma_sys_rad), axis2};
     if (plan->cfg->axis2 == NAV_AXIS2_DIFFERS) start.drift_radps -= plan->cfg->axis2_sd_radps * rnd->gauss();
     return start;
 }
 
-static struct hold_start begin(const struct hold_plan *plan, struct random_stream *rnd)
+static struct hold_start begin(const struct hold_plan *plan, uint64_t start_of_stream, struct random_stream *rnd)
 {
-    if (plan->cfg->axis2 != NAV_AXIS2_FIXED) return calibrate(plan, rnd);
+    if (plan->cfg->axis2 != NAV_AXIS2_FIXED) return calibrate(plan, start_of_stream, rnd);
     /* The sum of the article: an error that grows away from zero. */
     return {plan->cfg->heading_rad, -plan->cfg->drift_error_radps, gm_begin(&plan->cfg->start, rnd)};
 }
@@ -148,7 +223,7 @@ static double flight_rate(const struct hold_plan *plan, struct random_stream *rn
 static void run(const struct hold_plan *plan, uint64_t start_of_stream, const struct nav_mc_hold_out *out, uint64_t k)
 {
     struct random_stream rnd(start_of_stream);
-    struct hold_start start = begin(plan, &rnd);
+    struct hold_start start = begin(plan, start_of_stream, &rnd);
     const double rate = flight_rate(plan, &rnd) - start.drift_radps;
     const double step_s = plan->cfg->hours * 3600.0 / (double)plan->steps;
     gm_go(&start.axis2, &plan->wait, &rnd);

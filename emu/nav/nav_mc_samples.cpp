@@ -30,10 +30,9 @@ struct instrument {
 static int plan_make(const struct nav_mc_cfg *cfg, struct samples_plan *plan)
 {
     plan->cfg = cfg;
-    if (cfg->count < 3 || cfg->count > NAV_MAX_POSITIONS) return NAV_TOO_FEW;
-    mc_schedule(cfg, plan->p);
-    const int refused = mc_refusal(cfg, plan->p);
+    const int refused = mc_refusal(cfg, nullptr);
     if (refused) return refused;
+    mc_schedule(cfg, plan->p);
     plan->per_window = (uint64_t)mc_samples_per_window(cfg);
     plan->decay = nav_decay(cfg->sample_s / cfg->gm_tau_s);
     plan->decays[0] = 1.0;

@@ -23,8 +23,8 @@ double nav_alpha(double psi_rad, double q_rad, double beta_rad, double pitch_rad
     const double up = sq * nav_sin(pitch_rad) - cq * cp * sr;
     const double cb = nav_cos(beta_rad);
     const double sg = -up / cb;
-    const double sideways = det_atan2(nav_sin(beta_rad) * sg, std::sqrt(1.0 - sg * sg));
-    return nav_wrap(det_atan2(north, east) - sideways - psi_rad);
+    const double sideways = nav_atan2(nav_sin(beta_rad) * sg, std::sqrt(1.0 - sg * sg));
+    return nav_wrap(nav_atan2(north, east) - sideways - nav_angle(psi_rad));
 }
 
 double nav_gamma(double alpha_rad, double beta_rad, double psi_rad, double pitch_rad, double roll_rad)
@@ -41,13 +41,14 @@ double nav_gamma(double alpha_rad, double beta_rad, double psi_rad, double pitch
     const double ca = nav_cos(alpha_rad);
     const double x1_zc = z_east * ca + z_north * sa;
     const double z2_zc = nav_cos(beta_rad) * z_up - nav_sin(beta_rad) * (-z_east * sa + z_north * ca);
-    return det_atan2(x1_zc, z2_zc);
+    return nav_atan2(x1_zc, z2_zc);
 }
 
 double nav_heading(double alpha_rad, double q_rad, double beta_rad, double pitch_rad, double roll_rad)
 {
-    const double psi = nav_wrap(nav_alpha(0.0, q_rad, beta_rad, pitch_rad, roll_rad) - alpha_rad);
-    return psi < 0.0 ? psi + 2.0 * NAV_PI : psi;
+    const double psi = nav_wrap(nav_alpha(0.0, q_rad, beta_rad, pitch_rad, roll_rad) - nav_angle(alpha_rad));
+    const double up = psi < 0.0 ? psi + 2.0 * NAV_PI : psi;
+    return up >= 2.0 * NAV_PI ? 0.0 : up; /* a hair below north rounds to the whole turn */
 }
 
 /* (7) at rest, solved for S = -m1 beta_n. beta is some tens of arc seconds and acts through sin(gamma): each turn takes off five
@@ -96,13 +97,13 @@ double nav_transport_radps(double v_east_mps, double latitude_rad)
     return v_east_mps * nav_sin(latitude_rad) / nav_cos(latitude_rad) / 6371000.0;
 }
 
-/* Mean over a window of e^(-mu t), with t from its middle: sinh(x)/x. */
-static double sinhc(double x)
+/* e^-gap sinh(x_a)/x_a sinh(x_b)/x_b, gap at least x_a + x_b: with the halves of the windows taken out of the exponent, so that
+ * nothing overflows. */
+static double decay_of_means(double gap, double x_a, double x_b)
 {
-    if (x > 0.25) return x > 700.0 ? HUGE_VAL : (det_exp(x) - det_exp(-x)) / (2.0 * x);
-    double sum = 1.0;
-    for (int n = 14; n >= 2; n -= 2) sum = 1.0 + sum * x * x / (n * (n + 1));
-    return sum;
+    const double a = x_a < 1e-9 ? 1.0 : nav_rise(2.0 * x_a) / (2.0 * x_a);
+    const double b = x_b < 1e-9 ? 1.0 : nav_rise(2.0 * x_b) / (2.0 * x_b);
+    return nav_decay(gap > x_a + x_b ? gap - x_a - x_b : 0.0) * a * b;
 }
 
 double nav_gm_window_cov(double gm_sigma_radps, double gm_tau_s, double window_a_s, double window_b_s,
@@ -111,21 +112,17 @@ double nav_gm_window_cov(double gm_sigma_radps, double gm_tau_s, double window_a
     const double variance = gm_sigma_radps * gm_sigma_radps;
     const double x_a = 0.5 * window_a_s / gm_tau_s;
     if (between_middles_s == 0.0) return x_a == 0.0 ? variance : variance * nav_ramp_up(2.0 * x_a) / (2.0 * x_a * x_a);
-    /* e^-gap sinhc sinhc: with the halves of the windows taken out of the exponent, so that nothing overflows. */
     const double x_b = 0.5 * window_b_s / gm_tau_s;
-    const double gap = std::fabs(between_middles_s) / gm_tau_s;
-    if (x_a + x_b < 1.0) return variance * nav_decay(gap) * sinhc(x_a) * sinhc(x_b);
-    const double a = x_a < 1e-9 ? 1.0 : nav_rise(2.0 * x_a) / (2.0 * x_a);
-    const double b = x_b < 1e-9 ? 1.0 : nav_rise(2.0 * x_b) / (2.0 * x_b);
-    return variance * nav_decay(gap > x_a + x_b ? gap - x_a - x_b : 0.0) * a * b;
+    return variance * decay_of_means(std::fabs(between_middles_s) / gm_tau_s, x_a, x_b);
 }
 
+/* Windows begin at 0 or later, so that the sum of their middles is at least half of both lengths. */
 double nav_gm_from_zero_less(const struct nav_noise *n, double t_a_s, double window_a_s, double t_b_s,
                              double window_b_s)
 {
-    const double x = (t_a_s + t_b_s) / n->gm_tau_s;
-    return n->gm_sigma_radps * n->gm_sigma_radps * nav_decay(x) * sinhc(0.5 * window_a_s / n->gm_tau_s) *
-           sinhc(0.5 * window_b_s / n->gm_tau_s);
+    return n->gm_sigma_radps * n->gm_sigma_radps *
+           decay_of_means((t_a_s + t_b_s) / n->gm_tau_s, 0.5 * window_a_s / n->gm_tau_s,
+                          0.5 * window_b_s / n->gm_tau_s);
 }
 
 double nav_gm_integral_sd_rad(double gm_sigma_radps, double gm_tau_s, double t_s, int from_zero)
@@ -133,7 +130,7 @@ double nav_gm_integral_sd_rad(double gm_sigma_radps, double gm_tau_s, double t_s
     const double x = t_s / gm_tau_s;
     const double rise = nav_rise(x);
     const double square = 2.0 * nav_ramp_up(x) - (from_zero ? rise * rise : 0.0);
-    return gm_sigma_radps * gm_tau_s * std::sqrt(square > 0.0 ? square : 0.0);
+    return gm_sigma_radps * gm_tau_s * nav_root(square);
 }
 
 double nav_hold_sd_rad(const struct nav_hold *h, double t_s)

@@ -1,5 +1,7 @@
 #include "nav/nav.h"
 
+#include <Eigen/Core>
+
 #define TEXT_(x) #x
 #define TEXT(x)  TEXT_(x)
 
@@ -10,7 +12,8 @@ int nav_abi(void)
 
 const char *nav_version(void)
 {
-    return TEXT(PSABENCH_VERSION);
+    return TEXT(PSABENCH_VERSION) " eigen-" TEXT(EIGEN_WORLD_VERSION) "." TEXT(EIGEN_MAJOR_VERSION) "." TEXT(
+        EIGEN_MINOR_VERSION); /* whose order of sums is in the last digits */
 }
 
 const char *nav_status_text(int status)
@@ -18,14 +21,12 @@ const char *nav_status_text(int status)
     static const char *const text[] = {
         "done",
         "too few positions, or too many: three directions determine the heading (exactly three for the closed form, "
-        "four "
-        "with a ramp, 64 at most)",
+        "four with a ramp, 64 at most)",
         "positions coincide: fewer than three directions that differ by half a degree leave sine, cosine and drift "
         "undetermined",
         "latitude beyond 85 degrees: the horizontal part of the Earth's rate is too small to find north by",
         "a number is not finite",
-        "out of range: a negative noise or window, a tilt beyond 45 degrees, a schedule or a method that does not "
-        "exist",
+        "out of range",
         "windows must follow one another in time and have a length: correlated drift, white noise or a ramp was asked "
         "for",
         "the equations do not determine the unknowns",

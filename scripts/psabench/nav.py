@@ -23,6 +23,7 @@ from psabench.navlib import (
     HoldStruct,
     NoiseStruct,
     PositionStruct,
+    RefusalStruct,
     RestStruct,
     library,
 )
@@ -67,11 +68,19 @@ class Flag(enum.IntFlag):
 
 
 class Refused(BadInput):
-    """The library refused: `status` says why, the message in words."""
+    """The library refused: `status` says why, `field` which field of nav.h or nav_mc.h is the cause ("": none alone),
+    `position` whose from 0 (None: of the configuration); the message has them in words, with what would be right."""
 
-    def __init__(self, what: str, status: int) -> None:
-        super().__init__(f"{what}: {library().status_text(status).decode()}")
+    def __init__(self, what: str, status: int, why: RefusalStruct | None = None) -> None:
         self.status = Status(status)
+        named = why is not None and why.status == status and bool(why.field)
+        self.field = why.field.decode() if why is not None and named else ""
+        self.position = why.position if why is not None and named and why.position >= 0 else None
+        cause = ""
+        if why is not None and named:
+            whose = "" if self.position is None else f" of position {self.position + 1}"
+            cause = f": {self.field}{whose} is {why.value:.6g}; want {why.want.decode()}"
+        super().__init__(f"{what}: {library().status_text(status).decode()}{cause}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -177,7 +186,11 @@ def gyrocompass(
     rows = _rows(positions)
     fit = FitStruct(latitude_rad, int(method), int(simplified), int(ramp), _noise(noise))
     out = CompassStruct()
-    _check("gyrocompass", library().gyrocompass(rows, len(positions), c.byref(fit), c.byref(out)))
+    status = library().gyrocompass(rows, len(positions), c.byref(fit), c.byref(out))
+    if status < 0:
+        why = RefusalStruct()
+        library().gyrocompass_check(rows, len(positions), c.byref(fit), c.byref(why))
+        raise Refused("gyrocompass", status, why)
     values = {name: getattr(out, name) for name, *_ in CompassStruct._fields_ if name not in ("cov", "flags")}
     return Compass(**values, cov=np.array(out.cov).reshape(3, 3), flags=Flag(out.flags))
 

@@ -25,8 +25,16 @@ from psabench.navlib import (
     McOutStruct,
     McStruct,
     NoiseStruct,
+    RefusalStruct,
     library,
 )
+
+
+class Model(enum.IntEnum):
+    """enum nav_mc_model."""
+
+    CLOSED = 0
+    SAMPLES = 1
 
 
 class AngleSys(enum.IntEnum):
@@ -145,14 +153,16 @@ def closed(
 
     `into`: earlier results of as many runs whose arrays are written again; fresh memory takes as long as the runs."""
     out = _arrays(runs) if into is None else {name: getattr(into, name) for name, *_ in McOutStruct._fields_}
-    _ranges(library().mc_closed, config_struct(cfg), McOutStruct, out, (seed, first_run, runs), threads)
+    struct = _checked(cfg, Model.CLOSED)
+    _ranges(library().mc_closed, struct, McOutStruct, out, (seed, first_run, runs), threads)
     return Errors(**out)
 
 
 def samples(cfg: McConfig, seed: int, *, runs: int, first_run: int = 0, threads: int = 1) -> Errors:
     """Drift and noise sample by sample, the estimator itself at the end of each run. Raises Refused."""
     out = _arrays(runs)
-    _ranges(library().mc_samples, config_struct(cfg), McOutStruct, out, (seed, first_run, runs), threads)
+    struct = _checked(cfg, Model.SAMPLES)
+    _ranges(library().mc_samples, struct, McOutStruct, out, (seed, first_run, runs), threads)
     return Errors(**out)
 
 
@@ -160,8 +170,20 @@ def hold(cfg: HoldConfig, seed: int, *, runs: int, first_run: int = 0, threads: 
     """Heading held for hours after a gyrocompassing. Raises Refused."""
     out = {name: np.empty(runs) for name, *_ in McHoldOutStruct._fields_}
     struct = hold_struct(cfg)
+    why = RefusalStruct()
+    if (status := library().mc_hold_check(c.byref(struct), c.byref(why))) < 0:
+        raise Refused("hold", status, why)
     _ranges(library().mc_hold, struct, McHoldOutStruct, out, (seed, first_run, runs), threads)
     return HoldErrors(**out)
+
+
+def _checked(cfg: McConfig, model: Model) -> McStruct:
+    """The structure that the library takes, and will not refuse at once."""
+    struct = config_struct(cfg)
+    why = RefusalStruct()
+    if (status := library().mc_check(c.byref(struct), int(model), c.byref(why))) < 0:
+        raise Refused(f"Monte-Carlo, {model.name.lower()}", status, why)
+    return struct
 
 
 def config_struct(cfg: McConfig) -> McStruct:

@@ -41,6 +41,18 @@ class NoiseStruct(c.Structure):
     )
 
 
+class RefusalStruct(c.Structure):
+    """struct nav_refusal."""
+
+    _fields_ = [
+        ("status", _I),
+        ("position", _I),
+        ("value", _D),
+        ("field", c.c_char_p),
+        ("want", c.c_char_p),
+    ]
+
+
 class FitStruct(c.Structure):
     """struct nav_gyrocompass_cfg."""
 
@@ -153,6 +165,7 @@ PROTOTYPES: dict[str, tuple[Any, ...]] = {
     "status_text": (c.c_char_p, _I),
     "flag_text": (c.c_char_p, c.c_uint32),
     "gyrocompass": (_I, _P(PositionStruct), _I, _P(FitStruct), _P(CompassStruct)),
+    "gyrocompass_check": (_I, _P(PositionStruct), _I, _P(FitStruct), _P(RefusalStruct)),
     "gyrocompass_printed": (_I, _P(PositionStruct), _D, _DOUBLES, _DOUBLES),
     "attitude_from_level": (_I, _DOUBLES, _DOUBLES, _DOUBLES, _I, _I, _P(AttitudeStruct)),
     "alpha": (_D, _D, _D, _D, _D, _D),
@@ -168,6 +181,8 @@ PROTOTYPES: dict[str, tuple[Any, ...]] = {
     "hold_sd_rad": (_D, _P(HoldStruct), _D),
     "gm_window_cov": (_D, _D, _D, _D, _D, _D),
     "mc_default": (None, _P(McStruct)),
+    "mc_check": (_I, _P(McStruct), _I, _P(RefusalStruct)),
+    "mc_hold_check": (_I, _P(McHoldStruct), _P(RefusalStruct)),
     "mc_closed": (_I, _P(McStruct), *_RANGE, _P(McOutStruct)),
     "mc_samples": (_I, _P(McStruct), *_RANGE, _P(McOutStruct)),
     "mc_hold_default": (None, _P(McHoldStruct)),

@@ -161,7 +161,7 @@ def test_a_program_in_another_language_can_include_the_header(installed: Path, t
         "int main()\n{\n    psabench *b = psabench_new(1);\n"
         '    psabench_part *p = psabench_part_new(b, "ads1255", "a", "start=at_once");\n'
         '    const int done = psabench_run_until_level(p, psabench_pin(p, "DRDY"), 0, 1000000000);\n'
-        '    std::printf("%d %d %d\\n", done, psabench_peek(p, ~0u), psabench_abi() == PSABENCH_ABI && !nav_abi());\n'
+        '    std::printf("%d %d %d\\n", done, psabench_peek(p, ~0u), psabench_abi() == PSABENCH_ABI && nav_abi() == NAV_ABI);\n'
         "    psabench_free(b);\n}\n"
     )
     both = [
@@ -180,7 +180,9 @@ def test_uninstall_leaves_nothing_of_it(tmp_path: Path) -> None:
     lib = "usr/lib/here/"
     headers = {"usr/include/psabench.h", "usr/include/psabench/nav/nav.h", "usr/include/psabench/nav/nav_mc.h"}
     assert names == headers | {f"{lib}pkgconfig/{x}.pc" for x in ("psabench", "psabench-nav")} | {
-        f"{lib}lib{x}" for name in ("psabench", "psabench-nav") for x in (f"{name}.a", f"{name}.so", f"{name}.so.0")
+        f"{lib}lib{x}"
+        for name, abi in (("psabench", 0), ("psabench-nav", 1))
+        for x in (f"{name}.a", f"{name}.so", f"{name}.so.{abi}")
     }
     assert "libdir=/usr/lib/here\n" in (tmp_path / f"{lib}pkgconfig/psabench.pc").read_text()
     run(["make", "--no-print-directory", "uninstall", *where])

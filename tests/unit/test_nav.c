@@ -1,4 +1,4 @@
-/* libpsabench-nav as a C program gets it; tests/py/test_nav.py holds its numbers against a reference of its own. */
+/* libpsabench-nav as a C program gets it; tests/py/test_nav_*.py hold its numbers against a reference of its own. */
 #include "rig.h"
 
 #include "base/detmath.h"
@@ -75,6 +75,61 @@ static void a_refusal_leaves_the_result_as_it_was_and_has_a_sentence(void **stat
     assert_string_equal(nav_flag_text(0), "");
 }
 
+static void a_check_says_what_the_call_will_say_and_why(void **state)
+{
+    (void)state;
+    struct nav_position p[3];
+    positions_of(p, 0.0);
+    const struct nav_gyrocompass_cfg cfg = {.latitude_rad = 50 * DEG, .method = NAV_LSQ};
+    struct nav_refusal why = {.status = 1};
+    assert_int_equal(nav_gyrocompass_check(p, 3, &cfg, &why), NAV_OK);
+    assert_int_equal(why.status, NAV_OK);
+    assert_string_equal(why.field, "");
+    p[1].gamma_rad = -1.5;
+    assert_int_equal(nav_gyrocompass_check(p, 3, &cfg, &why), NAV_RANGE);
+    assert_int_equal(nav_gyrocompass_check(p, 3, &cfg, NULL), NAV_RANGE);
+    assert_int_equal(why.status, NAV_RANGE);
+    assert_int_equal(why.position, 1);
+    assert_string_equal(why.field, "gamma_rad");
+    near(why.value, -1.5, 0.0);
+    assert_non_null(strstr(why.want, "45 deg"));
+    struct nav_mc_cfg mc;
+    nav_mc_default(&mc);
+    assert_int_equal(nav_mc_check(&mc, NAV_MC_CLOSED, &why), NAV_OK);
+    mc.torquer_scale = 0.3;
+    assert_int_equal(nav_mc_check(&mc, NAV_MC_CLOSED, &why), NAV_RANGE);
+    assert_string_equal(why.field, "torquer_scale");
+    assert_int_equal(why.position, -1);
+    assert_int_equal(nav_mc_check(&mc, NAV_MC_SAMPLES, &why), NAV_OK);
+}
+
+/* Sanitizers watch the casts (SAN=undefined has float-cast-overflow here). */
+static void what_is_no_angle_gives_what_is_no_number(void **state)
+{
+    (void)state;
+    const double bad[] = {NAN, INFINITY, -INFINITY, 1e30, -1e30, 1.000001e6};
+    for (size_t k = 0; k < COUNT(bad); k++)
+        for (int at = 0; at < 5; at++) {
+            double x[5] = {0.1, 0.2, 0.01, 0.02, 0.03};
+            x[at] = bad[k];
+            assert_true(isnan(nav_alpha(x[0], x[1], x[2], x[3], x[4])));
+            assert_true(isnan(nav_gamma(x[0], x[1], x[2], x[3], x[4])));
+            assert_true(isnan(nav_heading(x[0], x[1], x[2], x[3], x[4])));
+            if (at > 0) assert_true(isnan(nav_azimuth_drift(0.0, x[1], x[2], x[3], x[4])));
+            struct nav_rest rest = {x[0], x[1], x[2], x[3], 1e-4, 1.0, 0.0, x[4], 0.0};
+            assert_true(isnan(nav_rest_s_radps(&rest, NULL)));
+            if (at < 2) assert_true(isnan(nav_azimuth_drift_sd(x[0], x[1], 1e-3, 1e-3)));
+            if (at == 0) assert_true(isnan(nav_transport_radps(100.0, x[0])));
+        }
+    near(nav_heading(1e-17, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0); /* [0, 2 pi): not the whole turn */
+    assert_true(isnan(nav_gm_integral_sd_rad(1e-6, 0.0, 0.0, 1)));
+    near(nav_gm_window_cov(1.0, 1e-3, 10.0, 10.0, 10.0), 1e-8, 1e-13); /* neighbours: (tau/T)^2, without overflow */
+    struct nav_attitude a;
+    const double q[2] = {0.0, 0.1};
+    const double gamma[2] = {0.7, -0.7};
+    assert_int_equal(nav_attitude_from_level(q, NULL, gamma, 2, 0, &a), NAV_RANGE);
+}
+
 /* Whatever the batch, run k is run k; and the arrays that are not asked for are not needed. */
 static void a_run_is_the_same_in_every_batch(void **state)
 {
@@ -125,6 +180,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_check_case_gives_its_rates_and_comes_back),
         cmocka_unit_test(a_refusal_leaves_the_result_as_it_was_and_has_a_sentence),
+        cmocka_unit_test(a_check_says_what_the_call_will_say_and_why),
+        cmocka_unit_test(what_is_no_angle_gives_what_is_no_number),
         cmocka_unit_test(a_run_is_the_same_in_every_batch),
         cmocka_unit_test(what_the_models_cannot_do_is_refused),
     };
