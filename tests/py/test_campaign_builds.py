@@ -103,11 +103,31 @@ def test_a_build_is_what_its_files_hold(tmp_path: Path) -> None:
     assert builds.digest([b, a]) != first
     assert builds.digest([a]) != first
     assert builds.algebra() == hashlib.sha256(Path(library().path).read_bytes()).hexdigest()
-    assert builds.wire() not in ("", builds.algebra())
     a.rename(tmp_path / "c")
     assert builds.digest([tmp_path / "c", b]) == first
     b.write_bytes(b"twO")
     assert builds.digest([tmp_path / "c", b]) != first
+
+
+def test_what_goes_through_the_wire_is_built_of_emulator_library_and_host(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The build is another one when any of the three is; asked without its cache."""
+    wire = builds.wire.__wrapped__
+    for name in ("find_emulator", "_loaded"):
+        (tmp_path / name).write_bytes(b"one")
+        monkeypatch.setattr(builds, name, lambda name=name: tmp_path / name)
+    monkeypatch.setattr(builds, "PACKAGE", tmp_path)
+    (tmp_path / "procedures").mkdir()
+    host = tmp_path / "procedures" / "compass.py"
+    host.write_text("one")
+    found = [wire()]
+    for changed in (tmp_path / "find_emulator", tmp_path / "_loaded", host):
+        changed.write_text("two")
+        found.append(wire())
+    assert len(set(found)) == 4
+    (tmp_path / "notes.txt").write_text("no code")
+    assert wire() == found[-1]
 
 
 def test_a_library_that_the_loader_found_is_found_again(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
