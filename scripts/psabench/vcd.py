@@ -99,23 +99,90 @@ def parse_vcd(text: str, name: str = "VCD") -> Vcd:
         raise ValueError(f"{name}: no $timescale in ns..s, or no $enddefinitions: not a VCD of ours")
     unit_ns = int(scale[1]) * _SCALE_NS[scale[2]]
     code = {m[1]: m[2] for m in re.finditer(r"\$var wire 1 (\S+) (\S+) \$end", head)}
-    t_units: dict[str, list[int]] = {c: [] for c in code}
-    levels: dict[str, list[int]] = {c: [] for c in code}
-    start = now = -1
-    for token in body.split():
-        if token[0] == "#":
-            if not token[1:].isdecimal():
-                raise ValueError(f"{name}: '{token}' is no time")
-            now = int(token[1:])
-            start = now if start < 0 else start
-        elif token[0] in "01" and token[1:] in code:
-            t_units[token[1:]].append(now)
-            levels[token[1:]].append(int(token[0]))
-        elif token not in ("$dumpvars", "$end"):
-            raise ValueError(f"{name}: at #{now}: '{token}' is neither a time nor a level of a 1-bit wire")
-    wires = {
-        code[c]: Wire(np.array(t_units[c], np.int64) * unit_ns, np.array(levels[c], np.uint8))
-        for c in code
-        if levels[c]
-    }
-    return Vcd(unit_ns, start * unit_ns, now * unit_ns, wires)
+    tokens = _Tokens.of(body)
+    wire = np.full(len(tokens), -1)
+    levels = np.flatnonzero((tokens.first == ord("0")) | (tokens.first == ord("1")))
+    if code:
+        wire[levels] = tokens.looked_up(levels, list(code))
+    hashes = np.flatnonzero(tokens.first == ord("#"))
+    numbers = tokens.numbers(hashes)
+    times = np.zeros(len(tokens), bool)
+    times[hashes] = numbers >= 0
+    tokens.refuse(~times & (wire < 0), times, name)
+    t_units = numbers[numbers >= 0]
+    now = np.cumsum(times)  # times so far, at each token
+    since = np.concatenate((np.array([-1], np.int64), t_units))
+    wires = {}
+    for i, c in enumerate(code):
+        mine = np.flatnonzero(wire == i)
+        if len(mine):
+            wires[code[c]] = Wire(since[now[mine]] * unit_ns, (tokens.first[mine] - ord("0")).astype(np.uint8))
+    start, end = (int(t_units[0]), int(t_units[-1])) if len(t_units) else (-1, -1)
+    return Vcd(unit_ns, start * unit_ns, end * unit_ns, wires)
+
+
+_MOST_DIGITS = 18  # of a time: what 64 bits hold
+_MOST_CODE = 8  # characters of a wire's code, in one 64-bit number
+
+
+@dataclass(frozen=True, slots=True)
+class _Tokens:
+    """The words of a file's body, by where they stand in its bytes: a million edges want no loop of Python's."""
+
+    text: NDArray[np.uint8]
+    begin: Ints
+    end: Ints
+    first: NDArray[np.uint8]  # byte of each
+
+    @classmethod
+    def of(cls, body: str) -> _Tokens:
+        text = np.frombuffer(body.encode(), np.uint8)
+        blank = (text == 32) | ((text >= 9) & (text <= 13)) | ((text >= 28) & (text <= 31))  # as str.split has it
+        edges = np.flatnonzero(np.diff(np.concatenate(([True], blank, [True])).view(np.int8)))
+        begin, end = edges[::2].astype(np.int64), edges[1::2].astype(np.int64)
+        return cls(text, begin, end, text[begin])
+
+    def __len__(self) -> int:
+        return len(self.begin)
+
+    def word(self, i: int) -> str:
+        return self.text[self.begin[i] : self.end[i]].tobytes().decode()
+
+    def numbers(self, which: Ints) -> Ints:
+        """What follows the first byte of these words as decimal numbers; -1: none that 64 bits hold."""
+        begin, end = self.begin[which] + 1, self.end[which]
+        size = end - begin
+        good = (size > 0) & (size <= _MOST_DIGITS)
+        value = np.zeros(len(which), np.int64)
+        for k in range(min(int(size.max(initial=0)), _MOST_DIGITS)):  # from the last digit on
+            digit = self.text[np.maximum(end - 1 - k, begin - 1)] - np.uint8(ord("0"))
+            mine = size > k
+            good &= ~mine | (digit <= 9)
+            value += np.where(mine, digit, 0) * np.int64(10**k)
+        return np.where(good, value, -1)
+
+    def looked_up(self, which: Ints, codes: Sequence[str]) -> Ints:
+        """Which of the codes follows the first byte of each of these words, -1: none."""
+        begin, size = self.begin[which] + 1, self.end[which] - self.begin[which] - 1
+        key = np.zeros(len(which), np.uint64)
+        for k in range(min(int(size.max(initial=0)), _MOST_CODE)):
+            more = size > k
+            byte = self.text[begin[more] + k].astype(np.uint64)
+            key[more] = key[more] << np.uint64(8) | byte
+        keys = np.array([int.from_bytes(c.encode()[:_MOST_CODE], "big") for c in codes], np.uint64)
+        order = np.argsort(keys)
+        at = order[np.minimum(np.searchsorted(keys[order], key), len(codes) - 1)]
+        same = (keys[at] == key) & (np.array([len(c) for c in codes])[at] == size)
+        return np.where(same, at, -1)
+
+    def refuse(self, strange: NDArray[np.bool_], times: NDArray[np.bool_], name: str) -> None:
+        """Raises ValueError for the first of these that is none of the two words that may stand there."""
+        for i in np.flatnonzero(strange):
+            word = self.word(int(i))
+            if word in ("$dumpvars", "$end"):
+                continue
+            if word[0] == "#":
+                raise ValueError(f"{name}: '{word}' is no time")
+            before = np.flatnonzero(times[:i])
+            now = int(self.word(int(before[-1]))[1:]) if len(before) else -1
+            raise ValueError(f"{name}: at #{now}: '{word}' is neither a time nor a level of a 1-bit wire")

@@ -26,6 +26,19 @@ def test_a_recording_is_levels_over_time() -> None:
     assert v.edges(["CLK", "Int"], 100, 250) == [(200, "CLK", 1), (250, "CLK", 0), (250, "Int", 1)]
 
 
+def test_codes_of_wires_may_be_long_and_words_apart_by_any_blank() -> None:
+    long = FILE.replace("var wire 1 #", "var wire 1 CLOCKS&!#").replace("0#", "0CLOCKS&!#").replace("1#", "1CLOCKS&!#")
+    v, w = parse_vcd(long.replace("\n", "\r\n\t ")), parse_vcd(FILE)
+    assert [x.t_ns.tolist() for x in v.wires.values()] == [x.t_ns.tolist() for x in w.wires.values()]
+    assert [x.level.tolist() for x in v.wires.values()] == [x.level.tolist() for x in w.wires.values()]
+
+
+def test_a_wire_without_a_level_is_none() -> None:
+    assert list(parse_vcd(FILE.replace("$upscope", "$var wire 1 % Data $end\n$upscope")).wires) == ["Int", "CLK"]
+    empty = parse_vcd(FILE.partition("#5")[0])
+    assert (empty.start_ns, empty.end_ns, empty.wires) == (-10, -10, {})
+
+
 def test_a_window_is_a_recording_that_sigrok_reads_to_its_last_edge() -> None:
     text = parse_vcd(FILE).window(["CLK", "Int"], 150, 250)
     assert text == (
@@ -55,6 +68,10 @@ def test_a_unit_that_vcd_does_not_know_is_refused() -> None:
         (FILE.replace("#20\n1#", "#20\nx#"), "x.vcd: at #20: 'x#' is neither"),
         (FILE.replace("#20\n1#", "#20\n1?"), "at #20: '1.' is neither"),
         (FILE.replace("#20\n", "#2a0\n"), "x.vcd: '#2a0' is no time"),
+        (FILE.replace("#20\n", "#\n"), "x.vcd: '#' is no time"),
+        (FILE.replace("#20\n", "#9999999999999999999\n"), "'#9999999999999999999' is no time"),
+        (FILE.replace("#25\n0#", "#25\n0##"), "x.vcd: at #25: '0##' is neither"),
+        (FILE.replace("#25\n0#", "#25\nx#\n#y"), "x.vcd: at #25: 'x#' is neither"),
     ],
 )
 def test_what_is_no_recording_of_ours_is_told_with_its_place(text: str, says: str) -> None:
