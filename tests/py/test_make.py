@@ -47,15 +47,15 @@ def test_an_installed_emulator_finds_its_files_and_leaves_none_behind(tmp_path: 
 
 
 @pytest.mark.skipif(os.getuid() != 0, reason="drops root's rights to see what set-up says without them")
-def test_set_up_without_rights_says_in_two_lines_what_to_install(tmp_path: Path) -> None:
-    tools = tmp_path / "repo/tools"
-    programs = tmp_path / "bin"
+def test_set_up_without_rights_says_in_two_lines_what_to_install(shared_path: Path) -> None:
+    tools = shared_path / "repo/tools"
+    programs = shared_path / "bin"
     tools.mkdir(parents=True)
     programs.mkdir()
     (tools / "setup").write_bytes((ROOT / "tools/setup").read_bytes())
     for name in ("bash", "dirname", "id", "cat", "apt-get"):  # a machine without a compiler, Python and sudo
         (programs / name).symlink_to(f"/usr/bin/{name}")
-    for path in [*tmp_path.parents[:2], tmp_path, *tmp_path.rglob("*")]:
+    for path in [shared_path, *shared_path.rglob("*")]:
         path.chmod(0o755)
     done = subprocess.run(
         [
@@ -74,4 +74,4 @@ def test_set_up_without_rights_says_in_two_lines_what_to_install(tmp_path: Path)
     )
     assert done.returncode == 1
     assert done.stderr.splitlines()[-1].startswith("setup: as root, run: apt-get install build-essential pkg-config")
-    assert not (tmp_path / "repo/.venv").exists()
+    assert not (shared_path / "repo/.venv").exists()

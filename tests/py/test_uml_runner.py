@@ -57,14 +57,14 @@ def test_the_guest_has_can_the_repository_and_its_python(tmp_path: Path) -> None
     assert done.stdout.splitlines() == ["Makefile", "72", str(RUN.parents[2] / ".venv")]
 
 
-def test_an_unprivileged_user_may_run_it(tmp_path: Path) -> None:
+def test_an_unprivileged_user_may_run_it(shared_path: Path) -> None:
     if os.getuid() != 0:
         pytest.skip("every other test here runs as an ordinary user already")
     # pytest's own folder is closed to others, and so may the repository's be.
-    shutil.copytree(RUN.parent, tmp_path / "repo/tests/uml")
-    script = tmp_path / "repo/job.sh"
+    shutil.copytree(RUN.parent, shared_path / "repo/tests/uml")
+    script = shared_path / "repo/job.sh"
     script.write_text("#!/bin/sh\nid -u; cat /sys/class/net/vcan0/mtu; exit 4\n")
-    for path in [*reversed(tmp_path.parents[:2]), tmp_path, *tmp_path.rglob("*")]:
+    for path in [shared_path, *shared_path.rglob("*")]:
         path.chmod(0o777)
     done = subprocess.run(
         [
@@ -72,7 +72,7 @@ def test_an_unprivileged_user_may_run_it(tmp_path: Path) -> None:
             "--reuid=65534",
             "--regid=65534",
             "--clear-groups",
-            tmp_path / "repo/tests/uml/run",
+            shared_path / "repo/tests/uml/run",
             script,
         ],
         capture_output=True,
