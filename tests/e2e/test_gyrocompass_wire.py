@@ -264,11 +264,14 @@ def test_a_wrong_latitude_is_told_when_it_shows() -> None:
     assert "right at latitude 50.0" in r.doubts[0]
 
 
-def test_the_other_hemisphere_is_told_by_the_drift_of_the_passport() -> None:
+def test_the_other_hemisphere_is_told_by_the_drift_of_the_passport(tmp_path: Path) -> None:
     """-50 for 50 deg: the Earth's horizontal rate is the same, 2 U sin(50 deg) of azimuth drift is not."""
     p = ideal(sequence="0,90,180", method="closed3", latitude_deg=-50.0)
-    with Bench.start(IDEAL) as bench:
-        bench.control.call("vehicle.attitude", heading_deg=135.0, pitch_deg=1.0, roll_deg=1.0)
+    scenario = tmp_path / "east.yaml"
+    text = proto_file(f"scenarios/{IDEAL}.yaml").read_text()
+    text = text.replace("heading_deg: 40, pitch_deg: 2, roll_deg: -1.5", "heading_deg: 135, pitch_deg: 1, roll_deg: 1")
+    scenario.write_text(text.replace("alpha0_deg: -33", "alpha0_deg: -130"))
+    with Bench.start(scenario) as bench:
         windows = g.measure(WirePlatform(bench), p, Silent())
     r = g.estimate(windows, p)
     off_deg = abs(r.get("heading_deg").value - 135.0)
