@@ -87,7 +87,7 @@ static void add_checks(struct sha256 *s, const struct gyro *b)
     const struct gyro_watch *w = &b->watch;
     const struct gyro_nod *n = &b->nod;
     add_reals(s, (const double[]){w->turned_rad, w->from_rad, w->track_deg, w->still_rad, w->told_deg}, 5);
-    add_reals(s, (const double[]){n->from_rad, n->top_rad, n->rate_radps, n->asked_radps}, 4);
+    add_reals(s, (const double[]){n->from_rad, n->top_rad, n->rate_radps}, 3);
     board_digest_u64(s, w->against);
     board_digest_u64(s, (uint64_t)w->level_ns);
     board_digest_u64(s, (uint64_t)w->still_ns);

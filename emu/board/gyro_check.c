@@ -72,11 +72,11 @@ static double told_rad(double to_deg, double from_deg)
     return gyro_wrap_rad((to_deg - from_deg) * GYRO_RAD_PER_DEG);
 }
 
-/* The torquer: what the sensor moved by, less the turn that was told, against what was asked. */
+/* The torquer: what the sensor moved by, less the turn that was told, against what was asked; of a nod nothing is left. */
 static void check_torquer(struct gyro *b, int64_t t_ns)
 {
     struct gyro_watch *w = &b->watch;
-    w->turned_rad += (b->u_radps[1] - b->nod.asked_radps) * (1e-9 * b->profile.step_ns);
+    w->turned_rad += b->u_radps[1] * (1e-9 * b->profile.step_ns);
     if (fabs(w->turned_rad) < BLOCK_RAD || b->nod.way != GYRO_NOD_NONE) return;
     const double moved_rad = gyro_wrap_rad(b->servo_rad - w->from_rad - told_rad(b->set.track_deg, w->track_deg));
     const bool against = fabs(moved_rad + w->turned_rad) < BLOCK_PART * fabs(w->turned_rad);
@@ -169,6 +169,5 @@ double gyro_nod_radps(struct gyro *b, int64_t t_ns)
     } else if (n->way == GYRO_NOD_BACK && age_ns >= n->there_ns) {
         judge(b, t_ns);
     }
-    n->asked_radps = n->way == GYRO_NOD_THERE ? n->rate_radps : n->way == GYRO_NOD_BACK ? -n->rate_radps : 0.0;
-    return n->asked_radps;
+    return n->way == GYRO_NOD_THERE ? n->rate_radps : n->way == GYRO_NOD_BACK ? -n->rate_radps : 0.0;
 }

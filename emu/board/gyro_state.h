@@ -48,7 +48,7 @@ struct gyro_nod {
     enum gyro_test result;
     unsigned nods, stayed; /* so many so far; of them the sensor stayed where it was */
     int64_t begun_ns, there_ns;
-    double from_rad, top_rad, rate_radps, asked_radps;
+    double from_rad, top_rad, rate_radps;
 };
 
 /* A condition since the mode began. */

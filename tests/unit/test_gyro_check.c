@@ -128,11 +128,30 @@ static void a_torquer_that_is_back_in_time_is_no_fault(void **state)
 {
     (void)state;
     navigate();
-    platform_set_torquer(&r.p, PLATFORM_AZIMUTH, 0.0, r.s.now_ns);
-    on_for(20.0);
-    platform_set_torquer(&r.p, PLATFORM_AZIMUTH, 1.0, r.s.now_ns);
-    on_for(600.0);
+    for (unsigned i = 0; i < 3; i++) { /* one block or less each */
+        platform_set_torquer(&r.p, PLATFORM_AZIMUTH, 0.0, r.s.now_ns);
+        on_for(20.0);
+        platform_set_torquer(&r.p, PLATFORM_AZIMUTH, 1.0, r.s.now_ns);
+        on_for(600.0);
+    }
     assert_int_equal(r.b.counters.encoder_faults, 0);
+}
+
+/* As slow as a great circle near a pole. */
+static void a_turn_of_the_vehicle_at_the_rate_of_a_dead_torquer_has_to_be_told(void **state)
+{
+    for (unsigned told = 0; told < 2; told++) {
+        (void)up(state);
+        navigate();
+        on_for(1.0);
+        vehicle()->cfg.turn_dps = rig_last(&r)->u2_radps / GYRO_RAD_PER_DEG;
+        vehicle_attitude(vehicle(), 20.0, 5.0, -4.0, r.s.now_ns);
+        for (unsigned i = 0; i < 120; i++) {
+            on_for(5.0);
+            if (told) aid();
+        }
+        assert_int_equal(r.conditions, told ? 0 : GYRO_ENCODER_FAULT);
+    }
 }
 
 /* ---- the angle sensor, aided ---- */
@@ -369,6 +388,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(a_dead_azimuth_torquer_is_found_before_it_costs_a_degree, up),
         cmocka_unit_test_setup(a_torquer_that_is_back_in_time_is_no_fault, up),
+        cmocka_unit_test_setup(a_turn_of_the_vehicle_at_the_rate_of_a_dead_torquer_has_to_be_told, up),
         cmocka_unit_test_setup(a_track_that_turns_without_the_angle_sensor_is_a_fault, up),
         cmocka_unit_test_setup(a_track_told_ahead_or_late_is_none, up),
         cmocka_unit_test_setup(navigation_that_loses_its_level_says_so, up),
