@@ -18,6 +18,7 @@ WERROR    ?=#                         1: a warning is an error, as in make test
 BUILD     ?= build$(if $(filter clang%,$(notdir $(CC))),-clang)$(if $(SAN),-san)
 FUZZ_S    ?= 20
 BENCH_S   ?= 180#                      seconds of measuring; 60 for a quick look
+JOBS      ?= $(shell nproc)#           tests at once
 SAN_E2E   := $(wildcard tests/e2e/test_bad_*.py) $(patsubst %,tests/e2e/test_%.py,unit tools canopen faults_random cycles)
 # Build a part only, say DIRS='base chip' TESTS=test_ads1282 while the rest does not compile.
 DIRS      ?= base trace phys chip canopen board link control app api
@@ -182,7 +183,8 @@ bench-bin: all $(BENCH_BIN)
 
 ## check: the C unit tests (one: make check TESTS=test_sched)
 check: $(TEST_BIN)
-	@rc=0; for t in $(TEST_BIN); do echo "$$t"; $$t || rc=1; done; exit $$rc
+	@printf '%s\n' $(TEST_BIN) | xargs -P $(JOBS) -n 1 sh -c '{ echo "$$0"; timeout 900 "$$0"; } > "$$0.log" 2>&1; \
+	    rc=$$?; flock $(BUILD)/tests cat "$$0.log"; [ $$rc != 124 ] || echo "$$0: ended after 900 s"; [ $$rc = 0 ]'
 
 ## san: the C unit tests under AddressSanitizer and UBSan
 san:
@@ -190,7 +192,7 @@ san:
 
 ## pytest: the Python tests, golden traces included
 pytest: bench-bin
-	$(PY) -m pytest $(wildcard tests/py tests/conform tests/golden)
+	$(PY) -m pytest -n $(JOBS) --dist loadgroup $(wildcard tests/py tests/conform tests/golden)
 
 ## builds: the emulator and its library as clang, -O0 and -O3 make them, and under sanitizers, which must all do the same
 builds:
