@@ -11,7 +11,6 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import nullcontext
 from dataclasses import replace
 from html import escape
 from pathlib import Path
@@ -330,13 +329,13 @@ def test_a_run_through_the_wire_without_a_heading_is_counted_as_refused(
     def never_settles(*_: object) -> None:
         raise LinkError("the platform was not level after 60 s: it never settles")
 
-    monkeypatch.setattr("psabench.bench.Bench.start", lambda *_, **__: nullcontext())
-    monkeypatch.setattr(emulated, "WirePlatform", lambda _: None)
+    monkeypatch.setattr(emulated, "RecordedPlatform", lambda *_, **__: None)
     monkeypatch.setattr("psabench.procedures.gyrocompass.measure", never_settles)
     found = command.campaign(Options(case="article", chain="emulated", runs=3, workers=1, out=tmp_path), QUIET)
     (f,) = found.found.values()
     assert isinstance(f, Figures)
     assert (f.runs, f.refused) == (3, 3)
+    assert found.refusals == {"the platform was not level after 60 s: it never settles": 3}
     assert not found.within  # nothing came that could be compared
     page.write(tmp_path, found)
     result = json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))

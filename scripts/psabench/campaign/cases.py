@@ -10,7 +10,7 @@ import itertools
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
-from psabench.campaign.setup import Hold, Setup, level_white_degph_rts
+from psabench.campaign.setup import BEFORE_S, Hold, Setup, level_white_degph_rts
 
 QUIET = {  # no error at all; a study of single sources adds one
     "latitude_error_arcmin": 0.0,
@@ -292,7 +292,8 @@ def _wire(base: Setup) -> Iterator[Case]:
 
     12 s: after the 10 s that would do for the article, the levelling loop still leaves 0.02 deg (m1 = 1 1/s).
     """
-    turns: dict[str, object] = {"gimbal": "corrected", "slew_dps": 9.0, "settle_s": 12.0}
+    loops: dict[str, object] = {"m2_per_s": 2.0, "gm_before_s": BEFORE_S}
+    turns: dict[str, object] = {**loops, "gimbal": "corrected", "slew_dps": 9.0, "settle_s": 12.0}
     long: dict[str, object] = {**turns, "white_degph_rts": level_white_degph_rts(base.window_s)}
     fast: dict[str, object] = {**turns, "window_s": 5.0, "white_degph_rts": level_white_degph_rts(5.0)}
     fair: dict[str, object] = {**fast, **ENCODER, "angles_deg": (0.0, 180.0, 90.0, 270.0), "method": "gls"}

@@ -1,8 +1,8 @@
-"""From a set-up to the errors of its runs: three chains that must agree where they can all do it.
+"""From a set-up to the errors of its runs: chains that must agree where they can all do it.
 
 closed: jointly Gaussian means of the windows, nanoseconds a run. samples: drift and noise sample by sample, the
-estimator at the end. emulated: an emulator, its wire and the host's procedure for every run. Run k of a seed is the
-same each time.
+estimator at the end. emulated: an emulator in free pace, its bus and the host's procedure for every run; wire: the
+same live, over a socket. Run k of a seed is the same each time.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import math
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -42,6 +43,7 @@ class Chain:
     holds: bool  # whether it computes the hold
     version: Callable[[], str]
     build: Callable[[], str]  # of what computes here: digest of its files
+    emulates: bool = False  # an emulator and the host's procedure, not the algebra
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,6 +86,14 @@ def _rows(w: Wanted) -> Rows:
         raise BadInput(f"{w.origin.kind}: {e}") from None
 
 
+def refusals(w: Wanted, runs: Sequence[int]) -> Mapping[str, int]:
+    """Why these runs have no heading, and how many each: they are run again, which is the same each time."""
+    from psabench.campaign import emulated
+
+    platforms = emulated.live if w.chain == "wire" else emulated.recorded()
+    return Counter(emulated.why(platforms, w.setup, _seed(w), k) for k in runs)
+
+
 def _computed(w: Wanted) -> Rows:
     chain = CHAINS[w.chain]
     if w.hold is None:
@@ -109,6 +119,8 @@ def _holding() -> list[str]:
 def config(setup: Setup) -> nav_mc.McConfig:
     """The library's own configuration; what the estimator believes of the noise is what it is."""
     arcmin, degph, deg = nav.ARCMIN, nav.DEGPH, math.radians
+    droop_rad = _droop_rad(setup)
+    angle_sys_arcmin = 0.0 if droop_rad and setup.angle_sys == "none" else setup.angle_sys_arcmin
     return nav_mc.McConfig(
         latitude_rad=deg(setup.latitude_deg),
         latitude_error_rad=setup.latitude_error_arcmin * arcmin,
@@ -120,14 +132,16 @@ def config(setup: Setup) -> nav_mc.McConfig:
         gm_sigma_radps=setup.gm_sigma_degph * degph,
         gm_tau_s=setup.gm_tau_s,
         gm_from_zero=setup.gm_from_zero,
+        gm_before_s=setup.gm_before_s,
         torquer_scale=setup.torquer_scale,
+        m1_per_s=setup.m1_per_s,
         beta_sys_rad=setup.beta_sys_arcmin * arcmin,
         gamma_sys_rad=setup.gamma_sys_arcmin * arcmin,
         beta_random_rad=setup.beta_random_arcmin * arcmin,
         gamma_random_rad=setup.gamma_random_arcmin * arcmin,
-        angle_sys_rad=setup.angle_sys_arcmin * arcmin,
+        angle_sys_rad=angle_sys_arcmin * arcmin + droop_rad,
         angle_random_rad=setup.angle_random_arcmin * arcmin,
-        angle_sys=nav_mc.AngleSys[setup.angle_sys.upper()],
+        angle_sys=nav_mc.AngleSys["COMMON" if droop_rad else setup.angle_sys.upper()],
         random_sign=setup.random_sign,
         per_sample=setup.per_sample,
         white_radps_rts=setup.white_degph_rts * degph,
@@ -146,6 +160,14 @@ def config(setup: Setup) -> nav_mc.McConfig:
             level_sd_rad=setup.gamma_random_arcmin * arcmin,
         ),
     )
+
+
+def _droop_rad(setup: Setup) -> float:
+    """What a proportional azimuth loop stands off by while it works against the drift: in all positions, and seen by an
+    encoder that is read."""
+    if setup.m2_per_s <= 0.0 or setup.encoder or setup.angle_sys not in ("none", "common"):
+        return 0.0
+    return -setup.drift_degph * nav.DEGPH / setup.m2_per_s
 
 
 def hold_config(setup: Setup, hold: Hold) -> nav_mc.HoldConfig:
@@ -183,9 +205,15 @@ def _columns(*columns: nav.Floats) -> Rows:
 
 
 def _emulated(setup: Setup, seed: int, first_run: int, runs: int) -> Rows:
-    from psabench.campaign import emulated  # python-can and the boards: the algebra does without
+    from psabench.campaign import emulated  # the boards and cantools: the algebra does without
 
-    return emulated.runs(setup, seed, first_run, runs)
+    return emulated.runs(emulated.recorded(), setup, seed, first_run, runs)
+
+
+def _wire(setup: Setup, seed: int, first_run: int, runs: int) -> Rows:
+    from psabench.campaign import emulated
+
+    return emulated.runs(emulated.live, setup, seed, first_run, runs)
 
 
 # ---- what there is
@@ -226,11 +254,23 @@ CHAINS: Mapping[str, Chain] = {
         ),
         Chain(
             name="emulated",
-            title="through the wire",
-            run_s=0.5,
-            part_runs=1,
+            title="emulator in free pace",
+            run_s=0.15,
+            part_runs=20,
             compute=_emulated,
             holds=False,
+            emulates=True,
+            version=versions,
+            build=builds.wire,
+        ),
+        Chain(
+            name="wire",
+            title="live through the wire",
+            run_s=0.7,
+            part_runs=1,
+            compute=_wire,
+            holds=False,
+            emulates=True,
             version=versions,
             build=builds.wire,
         ),

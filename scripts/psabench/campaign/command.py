@@ -35,7 +35,8 @@ examples:
   psabench campaign gyrocompass                                  20000 runs a case; build/campaign/report.html
   psabench campaign gyrocompass --study readings --runs 1000000
   psabench campaign gyrocompass --study step --chain samples     sample by sample, beside the closed form
-  psabench campaign gyrocompass --case article --chain emulated  200 runs, each through the wire of an emulator
+  psabench campaign gyrocompass --case article --chain emulated  200 runs, each by an emulator and the host's procedure
+  psabench campaign gyrocompass --chain emulated --scenario mine.yaml --set m1_per_s=2
   psabench campaign gyrocompass --study own --set angles_deg=0,120,240 --set gm_sigma_degph=0.05
   psabench campaign gyrocompass --study latitude --set angle_random_arcmin=0.5 --set encoder=yes
   psabench campaign gyrocompass --dask tcp://192.0.2.7:8786      on the cluster of this scheduler, the same numbers
@@ -47,7 +48,7 @@ Results lie in the store (docs/store.md): the same command computes only what is
 Exit status: 0 done and within limits, 1 done and out of limits, 2 bad input, 3 the cluster or the bench failed, 130
 ended by Ctrl-C.
 """
-DEFAULT_RUNS = {"closed": 20000, "samples": 20000, "emulated": 200}
+DEFAULT_RUNS = {"closed": 20000, "samples": 20000, "emulated": 200, "wire": 20}
 REFERENCE_RUNS = (20000, 1_000_000)  # of the closed form beside another chain: as many as that has, within these
 MOST_RUNS = 100_000_000
 MOST_SEED = 2**63 - 1
@@ -60,6 +61,7 @@ class Options:
     studies: Sequence[str] = ()
     case: str | None = None
     chain: str = "closed"
+    scenario: Path | None = None  # of the emulator's bench; None: the shipped one
     runs: int | None = None
     seed: int = 1
     settings: Sequence[str] = ()  # NAME=VALUE
@@ -86,7 +88,19 @@ def add(commands: Any, formatter: Any, natural: Callable[[str], int]) -> None:
     p.add_argument("--study", action="append", default=[], help="which; may be repeated (all but own; emulated: wire)")
     p.add_argument("--case", help="only the cases of this name")
     p.add_argument("--chain", choices=list(DEFAULT_RUNS), default="closed", help="how runs are computed (%(default)s)")
-    p.add_argument("--runs", type=natural, help=f"of each case ({DEFAULT_RUNS['closed']}; emulated: 200)")
+    p.add_argument(
+        "--scenario",
+        type=Path,
+        metavar="FILE",
+        help="bench of --chain emulated or wire, study own: its units, buses, sway, timeline and faults, its latitude "
+        "and its platform's errors; the campaign draws the seed, the vehicle's attitude and where the platform was "
+        "left, --set overrides the rest, and the schedule is the settings' own",
+    )
+    p.add_argument(
+        "--runs",
+        type=natural,
+        help=f"of each case ({DEFAULT_RUNS['closed']}; emulated: 200, wire: {DEFAULT_RUNS['wire']})",
+    )
     p.add_argument("--seed", type=natural, default=1, help="of all random numbers (%(default)s)")
     p.add_argument(
         "--set",
@@ -119,6 +133,7 @@ def _main(args: argparse.Namespace) -> int:
         studies=args.study,
         case=args.case,
         chain=args.chain,
+        scenario=args.scenario,
         runs=args.runs,
         seed=args.seed,
         settings=args.set,
@@ -187,8 +202,10 @@ def _plans(options: Options) -> list[Plan]:
 
 
 def _cases(options: Options) -> list[Case]:
-    base = settings.base(options.settings)
-    usual = WIRE_STUDIES if options.chain == "emulated" else DEFAULT_STUDIES
+    emulates = chains.CHAINS[options.chain].emulates
+    base = settings.base(options.settings, _base(options))
+    usual = WIRE_STUDIES if emulates else DEFAULT_STUDIES
+    usual = usual if options.scenario is None else ("own",)
     names = options.studies or (usual if options.case is None else tuple(STUDIES))
     for name in names:
         if name not in STUDIES:
@@ -199,15 +216,28 @@ def _cases(options: Options) -> list[Case]:
         cases = [c for c in cases if c.name == options.case]
         if not cases:
             raise BadInput(f"--case {options.case}: no such case; {there}")
-    if options.chain == "emulated":
+    if emulates:
         from psabench.campaign import emulated
 
         for c in cases:
             if c.hold is not None:
-                raise BadInput(f"--chain emulated: {c.name}: the hold is computed by closed and samples")
+                raise BadInput(f"--chain {options.chain}: {c.name}: the hold is computed by closed and samples")
             emulated.params(c.setup)
     settings.rehearse(cases, options.settings)
     return cases
+
+
+def _base(options: Options) -> Setup:
+    """What --set changes: the article's error set, or that of a scenario."""
+    if options.scenario is None:
+        return Setup()
+    if not chains.CHAINS[options.chain].emulates:
+        raise BadInput(f"--scenario {options.scenario}: --chain {options.chain} has no bench; emulated and wire have")
+    if options.case is not None or any(name != "own" for name in options.studies):
+        raise BadInput(f"--scenario {options.scenario}: other studies than own bring errors of their own")
+    from psabench.campaign import emulated
+
+    return emulated.setup_of(options.scenario)
 
 
 def _fill(plan: Plan, store: Store, options: Options, progress: Progress) -> None:

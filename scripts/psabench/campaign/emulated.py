@@ -1,7 +1,9 @@
-"""A run through the wire: an emulator of its own, the gyro unit and its PSA-2 on the bus, the host's procedure.
+"""A run through the full chain: an emulator of its own, the gyro unit and its PSA-2 on the bus, the host's procedure.
 
 The virtual instrument of run k is drawn from the seed and k: heading and attitude of the vehicle, and the emulator's
-own seed, from which it draws drift and errors. The truth is what this file put into the scenario.
+own seed, from which it draws drift and errors. The truth is what this file put into the scenario. Two chains: the
+emulator alone in free pace, its bus recorded (`recorded_platform`), and live over socketcand (`wire_platform`); the
+host's procedure is the same.
 """
 
 from __future__ import annotations
@@ -9,30 +11,38 @@ from __future__ import annotations
 import json
 import math
 import random
+import subprocess
 import tempfile
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
+from psabench.angles import wrapped_deg
 from psabench.bench import Bench
-from psabench.campaign.setup import Setup, level_white_degph_rts
-from psabench.errors import BadInput, LinkError
+from psabench.campaign.setup import BEFORE_S, Setup, level_white_degph_rts
+from psabench.errors import BadInput, DeviceError, LinkError
+from psabench.host_script import Plates
 from psabench.nav import DEGPH
-from psabench.places import proto_file
+from psabench.places import find_emulator, proto_file
 from psabench.procedures import gyrocompass
 from psabench.procedures.gyrocompass import GyrocompassParams
+from psabench.procedures.platform_bench import PlatformBench
+from psabench.recorded_platform import RecordedPlatform
 from psabench.store import CELL, Rows
 from psabench.wire_platform import WirePlatform
 
 SCENARIO = "scenarios/gyrocompass.yaml"
 SEED_BITS = 62
+FIRST_TURN_DEG = 1.0  # the gimbal begins at the first position, but for its errors
 UNIT_DPS2 = 20.0  # of the unit's turns, its object 2101h; with 0 a set-up ignores what speeding up and braking take
 UNIT_DPS, FAST_PROFILE, FAST_LIMIT_DPS = 18.0, "gyro_fast", 40.0  # quicker turns want stronger torquers
+
+Scenario = dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,21 +70,22 @@ def instrument(setup: Setup, seed: int, run: int) -> Instrument:
 
 def check(setup: Setup) -> None:
     """Raises BadInput for what an instrument cannot be told to be."""
-    white = level_white_degph_rts(setup.window_s)
+    white = level_white_degph_rts(setup.window_s, setup.m1_per_s)
     reasons = (
         (setup.slew_dps <= 0.0, "its turns take time: slew_dps is wanted"),
+        (setup.m2_per_s <= 0.0, "its azimuth loop has a gain: m2_per_s is wanted, as 2"),
         (setup.gimbal == "alpha", "its platform turns about the gimbal: gimbal is uncorrected or corrected"),
         (setup.angle_sys in ("increment", "accumulates"), "its angle sensor has one zero: angle_sys is none or common"),
         (setup.slew_dps2 not in (0.0, UNIT_DPS2), f"its turns accelerate with slew_dps2={UNIT_DPS2:g}"),
         (setup.per_sample, "its errors are drawn once a position"),
         (
-            setup.white_degph_rts not in (0.0, white),
+            not setup.scenario and setup.white_degph_rts not in (0.0, white),
             f"its noise is that of sensors and converters, white_degph_rts={white}, or 0",
         ),
         (setup.random_sign, "the signs of its systematic errors are those given"),
         (
-            setup.beta_sys_arcmin != setup.gamma_sys_arcmin or setup.beta_random_arcmin != setup.gamma_random_arcmin,
-            "both its level sensors have the same errors",
+            setup.beta_random_arcmin != setup.gamma_random_arcmin,
+            "both its level sensors have the same random error",
         ),
     )
     for wrong, reason in reasons:
@@ -82,53 +93,101 @@ def check(setup: Setup) -> None:
             raise BadInput(f"--chain emulated: {reason}")
 
 
-class _Yaml12(yaml.SafeLoader):
-    """PyYAML reads `on` as true; YAML 1.2 and the emulator read a word."""
+# ---- scenarios
 
 
-_BOOL = "tag:yaml.org,2002:bool"
-_Yaml12.yaml_implicit_resolvers = {
-    first: [r for r in rules if r[0] != _BOOL or first in "tTfF"]
-    for first, rules in yaml.SafeLoader.yaml_implicit_resolvers.items()
-}
+@cache
+def resolved(path: str) -> str:
+    """A scenario with every key, as JSON. Raises BadInput with the emulator's own words."""
+    done = subprocess.run([str(find_emulator()), path, "--dump"], capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise BadInput(done.stderr.strip().removeprefix("psa-emu: "))
+    return done.stdout
 
 
-def scenario(setup: Setup, at: Instrument) -> dict[str, Any]:
-    """The bench for a run: the scenario of the procedure's page with the set-up's numbers."""
-    found: dict[str, Any] = yaml.load(proto_file(SCENARIO).read_text(encoding="utf-8"), _Yaml12)
-    found["seed"] = at.seed
+def setup_of(path: Path) -> Setup:
+    """The set-up that a scenario of one's own stands for: its latitude and its platform's errors.
+
+    The vehicle stands anywhere, tilted within its default range; of the article only the schedule is left. Raises
+    BadInput for a scenario that has no such instrument.
+    """
+    text = resolved(str(path))
+    s: Scenario = json.loads(text)
+    boards = {u["board"] for u in s.get("units", [])}
+    if "platform" not in s or not {"gyro", "psa2"} <= boards:
+        raise BadInput(
+            f"--scenario {path}: a platform, a gyro unit and the PSA-2 of its level sensors are wanted in it"
+        )
+    p = s["platform"]
+    if p["torquer_scale"][0] != p["torquer_scale"][1]:
+        raise BadInput(f"--scenario {path}: torquer_scale of the axes differs; the algebra beside it has one")
+    return Setup(
+        scenario=text,
+        latitude_deg=s["site"]["latitude_deg"],
+        gimbal="corrected",
+        drift_degph=p["drift_degph"][0],
+        gm_sigma_degph=p["gm_sigma_degph"],
+        gm_tau_s=p["gm_tau_s"],
+        gm_from_zero=p["gm_from_zero"],
+        torquer_scale=p["torquer_scale"][0],
+        beta_sys_arcmin=p["level_tilt_arcmin"][0],
+        gamma_sys_arcmin=p["level_tilt_arcmin"][1],
+        beta_random_arcmin=p["level_repeat_arcmin"],
+        gamma_random_arcmin=p["level_repeat_arcmin"],
+        angle_sys="common" if p["angle_zero_arcmin"] else "none",
+        angle_sys_arcmin=-p["angle_zero_arcmin"],
+        angle_random_arcmin=p["angle_set_arcmin"],
+        slew_dps=9.0,
+        settle_s=12.0,
+        m2_per_s=2.0,
+        gm_before_s=BEFORE_S,
+        white_degph_rts=level_white_degph_rts(Setup().window_s),
+    )
+
+
+def scenario(setup: Setup, at: Instrument) -> Scenario:
+    """The bench for a run: the shipped scenario or one's own, with the set-up's numbers."""
+    found: Scenario = json.loads(setup.scenario or resolved(str(proto_file(SCENARIO))))
+    found |= {"seed": at.seed, "start": True}
     found["site"]["latitude_deg"] = setup.latitude_deg
+    second = found["platform"]["drift_degph"][1] if setup.scenario else setup.drift_degph
     # The gimbal begins at the first position: alpha is its angle less the heading.
-    found["platform"] = {
-        "alpha0_deg": _wrapped(setup.angles_deg[0] - at.heading_deg),
+    found["platform"] |= {
+        "alpha0_deg": wrapped_deg(setup.angles_deg[0] - at.heading_deg),
         "beta0_deg": 0.5,
-        "drift_degph": [setup.drift_degph] * 2,
+        "drift_degph": [setup.drift_degph, second],
         "gm_sigma_degph": setup.gm_sigma_degph,
         "gm_tau_s": setup.gm_tau_s,
         "gm_from_zero": setup.gm_from_zero,
         "torquer_scale": [setup.torquer_scale] * 2,
         "level_tilt_arcmin": [setup.beta_sys_arcmin, setup.gamma_sys_arcmin],
         "level_repeat_arcmin": setup.beta_random_arcmin,
-        "angle_zero_arcmin": setup.angle_sys_arcmin if setup.angle_sys == "common" else 0.0,
+        # Where the gimbal stands at more than was asked for, its sensor shows less than there is.
+        "angle_zero_arcmin": -setup.angle_sys_arcmin if setup.angle_sys == "common" else 0.0,
         "angle_set_arcmin": 0.0 if setup.encoder else setup.angle_random_arcmin,
         "angle_read_arcmin": setup.angle_random_arcmin if setup.encoder else 0.0,
     }
-    if setup.slew_dps > UNIT_DPS:
+    if setup.slew_dps > UNIT_DPS and not setup.scenario:
         found["platform"]["torquer_limit_dps"] = FAST_LIMIT_DPS
         for unit in found["units"]:
             unit |= {"profile": FAST_PROFILE} if unit["board"] == "gyro" else {}
     if setup.white_degph_rts == 0.0:
-        level = found["units"][0]
-        level |= {"adc_noise_scale": 0, "temp_noise_scale": 0}
-        for axis in level["axes"].values():
-            axis["quartz"]["noise_a_rthz"] = 0
-    found["vehicle"] = {"heading_deg": at.heading_deg, "pitch_deg": at.pitch_deg, "roll_deg": at.roll_deg}
+        _silence(found)
+    found["vehicle"] |= {"heading_deg": at.heading_deg, "pitch_deg": at.pitch_deg, "roll_deg": at.roll_deg}
     return found
 
 
-def _wrapped(angle_deg: float) -> float:
-    """Into (-180, 180]."""
-    return 180.0 - (180.0 - angle_deg) % 360.0
+def _silence(found: Scenario) -> None:
+    """No noise of converters and level sensors."""
+    for unit in found["units"]:
+        if unit["board"] == "psa2":
+            unit |= {"adc_noise_scale": 0, "temp_noise_scale": 0}
+            for axis in unit["axes"].values():
+                if "quartz" in axis:
+                    axis["quartz"]["noise_a_rthz"] = 0
+
+
+# ---- runs
 
 
 def params(setup: Setup) -> GyrocompassParams:
@@ -140,6 +199,8 @@ def params(setup: Setup) -> GyrocompassParams:
             window_s=setup.window_s,
             settle_s=setup.settle_s,
             slew_dps=setup.slew_dps,
+            m1_per_s=setup.m1_per_s,
+            m2_per_s=setup.m2_per_s,
             latitude_deg=setup.latitude_deg + setup.latitude_error_arcmin / 60.0,
             method=setup.method.replace("_", "-"),
             angles="encoder" if setup.encoder else "set",
@@ -155,11 +216,39 @@ def params(setup: Setup) -> GyrocompassParams:
         raise BadInput(f"--chain emulated: {e}") from e
 
 
-def runs(setup: Setup, seed: int, first_run: int, count: int) -> Rows:
+Platforms = Callable[[Scenario], AbstractContextManager[PlatformBench]]
+
+
+def recorded() -> Platforms:
+    """An emulator a run, in free pace. What the units tell of themselves is asked for once."""
+    plates = Plates()
+    return lambda s: nullcontext(RecordedPlatform(s, first_turn_deg=FIRST_TURN_DEG, plates=plates))
+
+
+@contextmanager
+def live(s: Scenario) -> Iterator[PlatformBench]:
+    """An emulator a run, in step pace, and socketcand."""
+    with tempfile.TemporaryDirectory(prefix="psabench-") as folder:
+        path = Path(folder) / "run.yaml"
+        path.write_text(json.dumps(s), encoding="utf-8")  # YAML, too
+        with Bench.start(path) as bench:
+            yield WirePlatform(bench)
+
+
+def runs(platforms: Platforms, setup: Setup, seed: int, first_run: int, count: int) -> Rows:
     """Errors of the runs. The platform's own in position 1, which the wire does not tell, is NaN; so is a run without
     a heading."""
     p = params(setup)
-    return np.stack([_errors(setup, p, instrument(setup, seed, first_run + k)) for k in range(count)]).astype(CELL)
+    return np.stack([_errors(platforms, setup, p, seed, first_run + k) for k in range(count)]).astype(CELL)
+
+
+def why(platforms: Platforms, setup: Setup, seed: int, run: int) -> str:
+    """Why a run has no heading; "": it has one."""
+    try:
+        _result(platforms, setup, params(setup), instrument(setup, seed, run))
+    except (LinkError, DeviceError) as e:
+        return str(e)
+    return ""
 
 
 class _Silent:
@@ -170,16 +259,20 @@ class _Silent:
         yield lambda: None
 
 
-def _errors(setup: Setup, p: GyrocompassParams, at: Instrument) -> list[float]:
-    with tempfile.TemporaryDirectory(prefix="psabench-") as folder:
-        path = Path(folder) / "run.yaml"
-        path.write_text(json.dumps(scenario(setup, at)), encoding="utf-8")  # YAML, too
-        with Bench.start(path) as bench:
-            try:
-                r = gyrocompass.estimate(gyrocompass.measure(WirePlatform(bench), p, _Silent()), p)
-            except LinkError:
-                return [math.nan] * 4
-    heading = _wrapped(math.degrees(r.heading_rad) - at.heading_deg)
-    quality = r.compass.quality
+def _result(platforms: Platforms, setup: Setup, p: GyrocompassParams, at: Instrument) -> gyrocompass.GyrocompassResult:
+    try:
+        with platforms(scenario(setup, at)) as platform:
+            return gyrocompass.estimate(gyrocompass.measure(platform, p, _Silent()), p)
+    except BadInput as e:
+        raise BadInput(f"--chain emulated: {e}") from e
+
+
+def _errors(platforms: Platforms, setup: Setup, p: GyrocompassParams, seed: int, run: int) -> list[float]:
+    at = instrument(setup, seed, run)
+    try:
+        r = _result(platforms, setup, p, at)
+    except (LinkError, DeviceError):  # `why` tells
+        return [math.nan] * 4
+    heading = wrapped_deg(math.degrees(r.heading_rad) - at.heading_deg)
     # As alpha, counter-clockwise, like the errors of the other chains.
-    return [math.nan, -heading, r.compass.drift1_radps / DEGPH - setup.drift_degph, quality]
+    return [math.nan, -heading, r.compass.drift1_radps / DEGPH - setup.drift_degph, r.compass.quality]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -56,6 +56,9 @@ class Campaign:
     checks: Sequence[Check]
     agreements: Sequence[Agreement]
     distribution: str  # SVG, empty without the readings
+    refusals: Mapping[str, int] = field(
+        default_factory=dict
+    )  # why runs gave no heading, and how many: of the first ones
 
     @property
     def within(self) -> bool:
@@ -191,6 +194,8 @@ def console(c: Campaign) -> Iterator[str]:
         runs = f"{a.runs} and {a.reference_runs} runs"
         rms = f"rms {a.rms_deg:.4f} and {a.reference_rms_deg:.4f} deg"
         yield f"{a.case.name}, {a.chain} beside closed: {rms}, KS {a.statistic:.4f}, p {a.p:.3f} ({runs})"
+    for reason, count in c.refusals.items():
+        yield f"no heading, {count} {'run' if count == 1 else 'runs'}: {reason}"
     for x in c.claims:
         yield f"{x.says}: {x.verdict}"
         yield f"  reading   {x.reading}"

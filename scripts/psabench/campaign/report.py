@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
+
+import numpy as np
 
 from psabench.campaign import builds, chains, page, plots
 from psabench.campaign.cases import STUDIES
-from psabench.campaign.chains import CHAINS
+from psabench.campaign.chains import CHAINS, Wanted
 from psabench.campaign.claims import Figures, HoldFigures, checks, claims
 from psabench.campaign.page import Campaign
 from psabench.campaign.runner import Plan
 from psabench.campaign.setup import Setup
 from psabench.store import Rows, Store
 
+REFUSALS_TOLD = 20  # of a case: each is run again for its reason
 SHOWN = ("R0", "R5n", "R11+", "improved")  # of the readings, in the picture of distributions
 
 
@@ -27,7 +31,7 @@ def gather(plans: Sequence[Plan], store: Store) -> Campaign:
         if case.study == "readings" and case.name in SHOWN:
             curves[case.name] = rows
     # The limits are for the error set as it stands, and for chains that compute all of it.
-    usual = plan.chain != "emulated" and _plain(plan)
+    usual = not CHAINS[plan.chain].emulates and _plain(plan)
     return Campaign(
         facts=_facts(plan),
         cases=plan.cases,
@@ -36,7 +40,18 @@ def gather(plans: Sequence[Plan], store: Store) -> Campaign:
         checks=checks(found) if usual else [],
         agreements=_agreements(plans, store),
         distribution=plots.distribution(curves) if curves else "",
+        refusals=_refusals(plan, store) if CHAINS[plan.chain].emulates else {},
     )
+
+
+def _refusals(plan: Plan, store: Store) -> dict[str, int]:
+    """Of the first runs of each case without a heading."""
+    found = Counter[str]()
+    for case in plan.cases:
+        failed = np.flatnonzero(~np.isfinite(plan.rows(store, case)[:, 1]))[:REFUSALS_TOLD].tolist()
+        wanted = Wanted(chain=plan.chain, setup=case.setup, hold=None, seed=plan.seed, first_run=0, runs=0)
+        found.update(chains.refusals(wanted, failed))
+    return dict(found.most_common())
 
 
 def _plain(plan: Plan) -> bool:

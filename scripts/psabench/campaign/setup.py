@@ -30,6 +30,8 @@ ANY = "any"  # on the command line: drawn for each run
 # sources 1.9).
 LEVEL_NOISE_ARCMIN_RTS = 8.8e-4
 
+BEFORE_S = 20.0  # from power-on to the first window: running up, levelling, settling
+
 
 def level_white_degph_rts(window_s: float, m1_per_s: float = 1.0) -> float:
     """White noise of S that a level angle's leaves: 60 n sqrt(m1 dt)/T deg/h a window, n arcmin a sample of dt."""
@@ -50,6 +52,7 @@ class Setup:
     gm_sigma_degph: float = 0.2
     gm_tau_s: float = 1000.0
     gm_from_zero: bool = False
+    gm_before_s: float = 0.0  # with it: zero so long before the first window, at power-on
     torquer_scale: float = 0.0  # relative error
     beta_sys_arcmin: float = 10.0  # of the level sensors, all positions alike
     gamma_sys_arcmin: float = 10.0
@@ -70,8 +73,11 @@ class Setup:
     slew_dps: float = 0.0
     slew_dps2: float = 0.0  # acceleration of a turn that reaches its rate; 0: at once
     settle_s: float = 0.0
+    m1_per_s: float = 1.0  # levelling loop
+    m2_per_s: float = 0.0  # azimuth loop, proportional: it stands off by drift/m2; 0: an ideal one (algebra only)
     method: str = "closed3"
     simplified: bool = True  # (14) for (13)
+    scenario: str = ""  # of an emulator's bench, resolved, as JSON; "": the shipped one
 
     def __post_init__(self) -> None:
         _check_choices(self)
@@ -118,8 +124,9 @@ def changed(setup: Setup, words: Sequence[str]) -> Setup:
     kinds = typing.get_type_hints(Setup)
     for word in words:
         name, equals, text = word.partition("=")
-        if not equals or name not in kinds:
-            raise BadInput(f"--set {word}: expected NAME=VALUE with a name of {', '.join(kinds)}")
+        if not equals or name not in kinds or name == "scenario":
+            names = ", ".join(k for k in kinds if k != "scenario")
+            raise BadInput(f"--set {word}: expected NAME=VALUE with a name of {names}")
         try:
             setup = dataclasses.replace(setup, **{name: _value(text, kinds[name])})
         except ValueError as e:
