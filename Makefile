@@ -192,7 +192,7 @@ san:
 
 ## pytest: the Python tests, golden traces included
 pytest: bench-bin
-	$(PY) -m pytest -n $(JOBS) --dist loadgroup $(wildcard tests/py tests/conform tests/golden)
+	$(PY) -m pytest $(wildcard tests/py tests/conform tests/golden)
 
 ## builds: the emulator and its library as clang, -O0 and -O3 make them, and under sanitizers, which must all do the same
 builds:
