@@ -109,6 +109,8 @@ def all_cases(bench: Path, peers: dict[str, Peer]) -> list[Case]:
         cases.append(Case(name, unit, partial(printed, partial(python, name)), first))
     for name, first in MONTE_CARLO.items():
         cases.append(Case(name, "runs", partial(printed, partial(python, name)), first))
+    for name in ("gyro-emulator", "gyro-chain"):
+        cases.append(Case(name, "runs", partial(printed, partial(python, name)), 10, fixed=True))
     cases.append(Case("start", "starts", partial(printed, partial(python, "start")), 20, fixed=True))
     return cases
 

@@ -40,6 +40,11 @@ OTHERS = {
     "chips-spi": "psabench.chips from Python: SPI bytes of the same registers, 13 a call",
 }
 
+GYRO = {
+    "gyro-emulator": "one gyrocompassing, article's schedule, full emulated chain in free pace: psa-emu alone",
+    "gyro-chain": "the same, with decoding the recorded bus and the host's estimate in Python",
+}
+
 MONTE_CARLO = {
     "mc-numpy": "NumPy, sample by sample, 1000 runs at once, one thread",
     "mc-samples": "`nav_mc_samples`, sample by sample, one thread",
@@ -67,6 +72,11 @@ def rate(name: str, per: float = 1.0) -> Callable[[Result], float | None]:
 
 def of(name: str, key: str) -> Callable[[Result], float | None]:
     return lambda r: r["cases"].get(name, {}).get(key)
+
+
+def ms_each(name: str) -> Callable[[Result], float | None]:
+    """Of one, by the median rate."""
+    return lambda r: 1e3 / r["cases"][name]["per_s"] if name in r["cases"] else None
 
 
 def watching(r: Result) -> float | None:
@@ -143,6 +153,7 @@ TARGETS = (
     Target("the same on one core", True, 3000, of("mc-closed", "times_peer"), WHY_CLOSED),
     Target("gyrocompasses sample by sample, all cores, times NumPy", True, 8, of("mc-samples-all", "times_peer")),
     Target("the same on one core", True, 8, of("mc-samples", "times_peer"), WHY_SAMPLES),
+    Target("one gyrocompassing, emulator in free pace: ms of CPU of psa-emu", False, 50, ms_each("gyro-emulator")),
     Target("emulator ready to serve, ms after start", False, 50, of("start", "ms")),
 )
 
@@ -195,6 +206,9 @@ def others(r: Result) -> str:
         if c := r["cases"].get(name):
             edges = c.get("medges_per_s")
             rows.append([label, f"{figure(c['per_s'])} {c['unit']}/s", f"{figure(edges)} Medge/s" if edges else ""])
+    for name, label in GYRO.items():
+        if ms := ms_each(name)(r):
+            rows.append([label, f"{figure(ms)} ms of CPU", ""])
     if start := r["cases"].get("start"):
         rows.append(["psa-emu from spawning to `ready all`, scenario `calibrate`", f"{figure(start['ms'])} ms", ""])
     return table(["what", "median", ""], rows)

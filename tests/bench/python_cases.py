@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import random
+import resource
 import socket
 import statistics
 import subprocess
@@ -14,6 +15,7 @@ import sys
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 from psabench.lineport import BLOCK, CLK, DATA, INT, LineDecoder
@@ -181,6 +183,39 @@ def mc_samples_all(count: int) -> str:
     return mc_samples(count, os.cpu_count() or 1, time.perf_counter_ns)
 
 
+def children_cpu_ns() -> int:
+    """CPU time of all processes that have ended."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return int((used.ru_utime + used.ru_stime) * 1e9)
+
+
+def _gyrocompassings(count: int) -> tuple[int, int]:
+    """CPU time of the emulators and of this process for `count` runs through the full emulated chain in free pace: the
+    article's positions, 3 x 10 s, 10 s of settling and turns of 9 deg/s, from power-on; a heading of each."""
+    from psabench.campaign import emulated
+    from psabench.campaign.setup import Setup, level_white_degph_rts
+
+    setup = Setup(gimbal="corrected", slew_dps=9.0, settle_s=10.0, m2_per_s=2.0)
+    setup = replace(setup, white_degph_rts=level_white_degph_rts(setup.window_s))
+    platforms = emulated.recorded()
+    emulated.runs(platforms, setup, 1, 0, 1)  # what is read once
+    began_ns, children_ns = time.process_time_ns(), children_cpu_ns()
+    rows = emulated.runs(platforms, setup, 1, 1, count)
+    if not np.isfinite(rows[:, 1]).all():
+        raise RuntimeError("gyro: a run gave no heading")
+    return children_cpu_ns() - children_ns, time.process_time_ns() - began_ns
+
+
+def gyro_emulator(count: int) -> str:
+    """One gyrocompassing through the full emulated chain: what psa-emu takes of it, user and system."""
+    return f"runs={count} ns={_gyrocompassings(count)[0]}"
+
+
+def gyro_chain(count: int) -> str:
+    """The same, with reading the recording of the bus and the host's procedure."""
+    return f"runs={count} ns={sum(_gyrocompassings(count))}"
+
+
 CASES: dict[str, Callable[[int], str]] = {
     "decode": decode,
     "start": start,
@@ -191,6 +226,8 @@ CASES: dict[str, Callable[[int], str]] = {
     "mc-closed-all": mc_closed_all,
     "mc-samples": mc_samples,
     "mc-samples-all": mc_samples_all,
+    "gyro-emulator": gyro_emulator,
+    "gyro-chain": gyro_chain,
 }
 
 if __name__ == "__main__":
