@@ -11,6 +11,7 @@ import pytest
 
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
+
 @pytest.fixture
 def shared_path(tmp_path: Path) -> Path:
     """tmp_path with the folders above it, which pytest makes its user's own, passable to everybody."""
