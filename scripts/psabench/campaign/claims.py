@@ -129,6 +129,7 @@ _LIMITS: tuple[tuple[str, str, str, Callable[[Figures], float], tuple[float, flo
     ("improved", "unit", "platform p95, deg", lambda f: f.platform.p95, (_UP_TO, 0.10)),
     ("improved", "4 min, silent", "platform p95, deg", lambda f: f.platform.p95, (_UP_TO, 0.10)),
     ("slew", "30 deg/s, 240", "platform p95, deg", lambda f: f.platform.p95, (_UP_TO, 0.10)),
+    ("sources", "latitude 0.1'", "platform rms, deg", lambda f: f.platform.rms, (0.00005, 0.00015)),
     ("readings", "R11", "platform, largest, deg", lambda f: f.platform.largest, (_UP_TO, 0.11)),
 )
 # Latitude, deg: rms of the platform with exact drift, with 0.02 deg/h.

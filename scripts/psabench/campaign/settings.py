@@ -39,7 +39,7 @@ def _word(about: str) -> Setting:
 
 SETTINGS: Mapping[str, Setting] = {
     "latitude_deg": _number("deg", -90, 90, "where it stands"),
-    "latitude_error_arcmin": _number("arcmin", -600, 600, "of what the host is told"),
+    "latitude_error_arcmin": _number("arcmin", -599, 599, "of what the host is told"),
     "tilt_deg": _number("deg", 0, 30, "pitch and roll of the parked vehicle"),
     "tilt": _word("within +-tilt_deg, or at the corners"),
     "alpha1_deg": _number("deg", -360, 360, "of the platform in position 1"),
@@ -48,9 +48,9 @@ SETTINGS: Mapping[str, Setting] = {
     "gm_sigma_degph": _number("deg/h", 0, 1e4, "random drift, sd of a Gauss-Markov process"),
     "gm_tau_s": _number("s", 0.1, 1e9, "its correlation time"),
     "gm_from_zero": _word("it begins at zero instead of anywhere"),
-    "torquer_scale": _number("", -0.4, 1, "relative error of the torquer"),
-    "beta_sys_arcmin": _number("arcmin", -600, 600, "level sensors, constant"),
-    "gamma_sys_arcmin": _number("arcmin", -600, 600, "the same, other axis"),
+    "torquer_scale": _number("", -0.2, 0.2, "relative error of the torquer"),
+    "beta_sys_arcmin": _number("arcmin", -299, 299, "level sensors, constant"),
+    "gamma_sys_arcmin": _number("arcmin", -299, 299, "the same, other axis"),
     "beta_random_arcmin": _number("arcmin", 0, 600, "level sensors, new in each position"),
     "gamma_random_arcmin": _number("arcmin", 0, 600, "the same, other axis"),
     "angle_sys_arcmin": _number("arcmin", -600, 600, "of the set angle"),
