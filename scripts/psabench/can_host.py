@@ -158,10 +158,17 @@ class CanHost:
         except (can.CanError, OSError) as e:
             raise LinkError(f"CAN: {_reason(e)}; the emulator or adapter has gone away") from e
 
-    def send(self, can_id: int, data: bytes, *, fd: bool = False) -> None:
-        """Send a data frame with an 11-bit identifier. Raises LinkError."""
+    def send(self, can_id: int, data: bytes, *, fd: bool = False, remote: bool = False) -> None:
+        """Send a frame with an 11-bit identifier; remote: a remote frame that asks for len(data). Raises LinkError."""
         message = can.Message(
-            arbitration_id=can_id, data=data, is_extended_id=False, is_fd=fd, bitrate_switch=fd, check=True
+            arbitration_id=can_id,
+            data=None if remote else data,
+            dlc=len(data),
+            is_extended_id=False,
+            is_fd=fd,
+            bitrate_switch=fd,
+            is_remote_frame=remote,
+            check=True,
         )
         try:
             self.bus.send(message, timeout=1.0)

@@ -33,6 +33,8 @@ class CanFrame:
     fd: bool = False
     error: bool = False
     sent: bool = False  # by us, not received
+    extended: bool = False  # identifier of 29 bits
+    remote: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -30,7 +30,9 @@ Check = TypeVar("Check", bound=Callable[[Evidence], str])
 Trial = TypeVar("Trial", bound="Callable[[Subject], str]")
 SceneOf = Callable[["Subject"], Evidence]
 
-WAYS = frozenset({"can", "line", "pins", "bus", "supply", "lockstep", "inputs"})
+WAYS = frozenset(
+    {"can", "line", "pins", "bus", "supply", "lockstep", "inputs", "fd", "rtr", "stamps", "errors", "slow"}
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -27,6 +27,11 @@ MISSING = {
     "bus": "no bus port was connected (--bus-port)",
     "supply": "no power supply was connected (--scpi supply=...)",
     "lockstep": "an emulator in lockstep is wanted: it takes longer than anybody would wait",
+    "fd": "the link to the bus carries no FD frames; slcan and SocketCAN do",
+    "rtr": "the link to the bus carries no remote frames; slcan and SocketCAN do",
+    "stamps": "the link's time stamps are this machine's, not the bus's",
+    "errors": "a device that destroys frames on the bus is wanted",
+    "slow": "a bus of another bit rate is wanted",
     "inputs": "the volts at the inputs were not told (--input x=2.5)",
 }
 

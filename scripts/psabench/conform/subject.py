@@ -30,6 +30,8 @@ from psabench.unit import Unit
 UNIT = "a"
 # At the inputs of an emulator of ours: none is another's, one is negative, none is a round code.
 INPUTS_V: Mapping[str, float] = {"x": 2.0101, "y": -1.3007, "z": 0.7003}
+# Links of python-can whose time stamps are this machine's: they say when it looked, not when the frame passed.
+BY_THE_HOST_S_CLOCK = ("slcanBus", "SocketcanBus", "UdpMulticastBus", "VirtualBus", "SerialBus")
 BUS_BOARDS = ("psd1", "pmka", "pik")  # boards with a parallel bus
 
 
@@ -68,6 +70,8 @@ class Take:
                 data=bytes(m.data),
                 fd=bool(m.is_fd),
                 error=bool(m.is_error_frame),
+                extended=bool(m.is_extended_id),
+                remote=bool(m.is_remote_frame),
             )
         )
 
@@ -105,7 +109,10 @@ class Subject:
 
     @property
     def probes(self) -> frozenset[str]:
-        """What can be seen: can, line (INT, DATA and CLK, or what the line port has), pins (all lines), bus, supply."""
+        """What can be seen: can, line (INT, DATA and CLK, or what the line port has), pins (all lines), bus, supply.
+
+        Of the link to the bus: fd and rtr, frames that it carries; stamps, its times are the bus's.
+        """
         seen = {"can"}
         if self.probe is not None:
             seen |= {"line", "pins"} if isinstance(self.probe, PinProbe) else {"line"}
@@ -113,11 +120,18 @@ class Subject:
             seen.add("bus")
         if "supply" in self.bench.addresses:
             seen.add("supply")
+        seen |= self._of_the_link()
         if self.lockstep:
             seen.add("lockstep")
         if self.inputs_v:
             seen.add("inputs")
         return frozenset(seen)
+
+    def _of_the_link(self) -> set[str]:
+        """What this link to the bus can carry and tell: FD frames, remote frames, time stamps of the bus itself."""
+        kind = type(self.host.bus).__name__
+        seen = {"fd", "rtr"} if kind != "SocketCanDaemonBus" else set()
+        return seen if kind in BY_THE_HOST_S_CLOCK else seen | {"stamps"}
 
     @contextmanager
     def take(self, *, lines: bool = True) -> Iterator[Take]:
@@ -213,7 +227,8 @@ class Subject:
                 probe = pins = PinProbe(bench, UNIT)
                 stack.callback(pins.close)
             port = stack.enter_context(BusPort(bus, advance=bench.wait)) if variant.family in BUS_BOARDS else None
-            subject = cls(bench, variant, probe, port, at.inputs_v)
+            inputs_v = {} if variant.family == "gyro" else at.inputs_v
+            subject = cls(bench, variant, probe, port, inputs_v)
             subject._stack = stack.pop_all()
         return subject
 
@@ -228,17 +243,43 @@ CLOCKS: Mapping[str, tuple[str, ...]] = {
 }
 SENSITIVITIES = ("kx_v_per_g", "ky_v_per_g", "kz_v_per_g", "kxy_v_per_g2", "drift_v_per_s", "reading_noise_v")
 PPM = 1e-6
+# What a gyro unit stands on: the platform without errors, as it was left; the PSA-2 that measures its level.
+PLATFORM: Mapping[str, Any] = {
+    "site": {"latitude_deg": 50.0},
+    "platform": {"alpha0_deg": -33.0, "beta0_deg": 0.5},
+    "vehicle": {"heading_deg": 40.0},
+}
+LEVEL_SETUP = [  # 250 words a second, else as the article sets it up (proto/scenarios/gyrocompass.yaml)
+    "DRD_A write_A 41 00 46",
+    "DRD_T write_T 50 00 02",
+    "DRD_T write_T 50 00 04",
+    "DRD_T write_T 53 00 82",
+    "DRD_T sync_T",
+    "DRD_A sync_A",
+]
+LEVEL: Mapping[str, Any] = {
+    "name": "level",
+    "board": "psa2",
+    "on": "platform",
+    "adc_chain": "direct",
+    "profile_set": {"setup": LEVEL_SETUP},
+    "axes": {a: {"sensor": "quartz", "afe": {"input": "current", "load_ohm": 937.5}} for a in "xy"},
+}
 
 
 def scenario(variant: Variant, inputs_v: Mapping[str, float], clock_ppm: float) -> dict[str, Any]:
     """A bench around one board: known volts at its inputs, a supply that can be switched.
 
-    clock_ppm: by how much the board's clocks are fast.
+    clock_ppm: by how much the board's clocks are fast. A gyro unit has no inputs: it has its platform, on a parked
+    vehicle, and the PSA-2 on it that it reads the level from, streaming.
     """
     axes = {axis: {"sensor": "mems", "u0_v": v, **dict.fromkeys(SENSITIVITIES, 0.0)} for axis, v in inputs_v.items()}
     unit: dict[str, Any] = {"name": UNIT, "board": variant.family, "profile": variant.profile, "axes": axes}
     if clock_ppm:
         unit["profile_set"] = {key: _off(key, variant[key], clock_ppm) for key in CLOCKS[variant.family]}
+    if variant.family == "gyro":
+        del unit["axes"]
+        return {"supply": {}, "start": True, **PLATFORM, "units": [unit | {"level": LEVEL["name"]}, LEVEL]}
     return {"supply": {}, "units": [unit]}
 
 
