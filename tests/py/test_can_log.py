@@ -21,7 +21,7 @@ def log_of(seed: int, lines: int, channel: str = "can0") -> bytes:
         t_us += draw.randrange(1, 5_000_000)
         data = draw.randbytes(draw.choice((8, 8, 8, 8, 0, 1, 7))).hex().upper()
         frame = draw.choice(
-            (f"{draw.choice((0x189, 0x289, 0x700)):03X}#{data}",) * 6 + ("12345678#R4", "123##001020304050607")
+            (f"{draw.choice((0x189, 0x289, 0x700)):03X}#{data}",) * 6 + ("12345678#R4", "189##001020304050607")
         )
         text += f"({t_us // 1_000_000:010d}.{t_us % 1_000_000:06d}) {channel} {frame}\n"
     return text.encode()
