@@ -8,7 +8,7 @@
 int main(void)
 {
     /* Levelling commands of four 10 s windows, 20 s apart, at gimbal angles 0, 180, 90, 270 deg; latitude 50 deg. */
-    const double s_degph[4] = {30.27, 19.72, 33.09, 16.90};
+    const double s_degph[4] = {30.27, 19.71, 33.08, 16.90};
     const double turn_deg[4] = {0, 180, 90, 270};
     struct nav_position p[4] = {{0}};
     for (int i = 0; i < 4; i++) {
