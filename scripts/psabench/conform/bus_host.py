@@ -1,0 +1,52 @@
+"""Cycles on a board's parallel bus, one after the other, without waiting longer than a cycle needs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from psabench.busport import BusPort, Cycle
+from psabench.conform.outcome import Broken, TooLittle
+from psabench.conform.subject import Subject
+from psabench.errors import DeviceError
+
+SHORT_S = 50e-6  # a cycle and some more
+
+
+def port(s: Subject) -> BusPort:
+    """Raises TooLittle where there is none."""
+    if s.port is None:
+        raise TooLittle("no bus port was connected (--bus-port)")
+    return s.port
+
+
+def line(s: Subject, text: str) -> Cycle:
+    """The cycle of a line to the bus port: "R 3", "W F 0003 400". Raises CycleRefused."""
+    port(s).ask(text)
+    if s.lockstep:
+        s.run_for(SHORT_S)
+    answer = port(s).answer()
+    if not isinstance(answer, Cycle):
+        raise Broken(f"{answer} as the answer to {text!r}", "that of a cycle")
+    return answer
+
+
+def code_of(e: DeviceError) -> int:
+    """Its CiA 301 abort code."""
+    return e.abort_code
+
+
+def refused(action: Callable[[], object], code: float, what: str) -> None:
+    """An action that must be refused with this abort code. Raises Broken."""
+    due = f"a refusal with {int(code):08X}h"
+    try:
+        done = action()
+    except DeviceError as e:
+        if e.abort_code != int(code):
+            raise Broken(f"{what}: {e}", due) from e
+        return
+    raise Broken(f"{what}: carried out, {done}" if isinstance(done, Cycle) else f"{what}: carried out", due)
+
+
+def line_refused(s: Subject, text: str, code: float) -> None:
+    """A line to the bus port that must be refused with this abort code. Raises Broken."""
+    refused(lambda: line(s, text), code, text)

@@ -1,0 +1,70 @@
+"""Scenes of PSD-1: its set-up, its cycles, all its messages, strobes of another host."""
+
+from __future__ import annotations
+
+from psabench.conform.bus_host import line
+from psabench.conform.evidence import Evidence
+from psabench.conform.plan import scene
+from psabench.conform.psd1_host import calm, drive, has_host, messages_on, run_cycles, setup_s
+from psabench.conform.subject import Subject
+
+CYCLES = 24  # of a scene
+
+
+@scene("power_on", boards=("psd1",))
+def power_on(s: Subject) -> Evidence:
+    """From Res to the first cycles, streaming as soon as it has booted."""
+    with s.take() as take:
+        s.reset()
+        s.run_for(0.002)
+        s.unit.start()
+        s.run_for(setup_s(s.variant))
+        s.unit.stop()
+    return s.evidence("power_on", take)
+
+
+@scene("stream", boards=("psd1",))
+def stream(s: Subject) -> Evidence:
+    """Cycles as the built-in host reads them, or as we do over the bus where there is none."""
+    calm(s)
+    with s.take() as take:
+        s.unit.start()
+        run_cycles(s, CYCLES)
+        s.unit.stop()
+    return s.evidence("stream", take)
+
+
+@scene("messages", boards=("psd1",))
+def messages(s: Subject) -> Evidence:
+    """The same with all messages switched on, and the objects that they map read afterwards."""
+    calm(s)
+    with s.take() as take:
+        s.unit.start()
+        run_cycles(s, 3)
+        s.unit.stop()
+        take.marks["on"] = s.bench.time_s
+        take.facts["before"] = len(take.frames)
+        messages_on(s, True)
+        s.unit.start()
+        run_cycles(s, CYCLES)
+        s.unit.stop()
+    messages_on(s, False)
+    return s.evidence("messages", take)
+
+
+@scene("strobes", boards=("psd1",))
+def strobes(s: Subject) -> Evidence:
+    """Reads of STATUS, and reads and writes of registers, all through some cycles."""
+    calm(s)
+    with s.take() as take:
+        if not has_host(s.variant):
+            drive(s, 2)
+            line(s, "W F 0003")
+        for k in range(CYCLES * 4):
+            take.cycles.append(line(s, f"R 3 {1000 + 700 * (k % 23)}"))
+            if k % 6 == 0:
+                take.cycles.append(line(s, f"W D {0x5A5A ^ k * 0x0421 & 0xFFFF:04X}"))
+                take.cycles.append(line(s, "R D"))
+    if not has_host(s.variant):
+        calm(s)
+    return s.evidence("strobes", take)
