@@ -7,6 +7,7 @@ also works while simulated time stands still between our own steps.
 from __future__ import annotations
 
 import queue
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,9 @@ from psabench.errors import DeviceError, LinkError
 ANSWER_S = 5.0  # bench time: the controller may wait for a conversion, and in wall pace the machine may be busy
 # Command specifiers, bits 7..5 of the first byte (CiA 301, 7.2.4.3): begins a transfer, and its answers or an abort.
 INITIATE, ABORT = {0x20: 0x60, 0x40: 0x40}, 0x80
+
+# Bytes of the types of numbers (CiA 301, 7.4.7); the others are characters.
+DATA_BYTES = {1: 1, 2: 1, 3: 2, 4: 4, 5: 1, 6: 2, 7: 4, 8: 4, 16: 3, 21: 8, 17: 8, 22: 3, 27: 8}
 
 
 class _Network(canopen.Network):
@@ -79,6 +83,35 @@ class _Sdo(SdoClient):
         return begun is None and specifier not in INITIATE.values()
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Described:
+    """An object as the EDS has it. default and limits: None where it says none."""
+
+    index: int
+    sub: int
+    name: str
+    data_bytes: int | None  # None: characters
+    access: str  # const, ro, wo, rw
+    default: Any
+    low: Any
+    high: Any
+    real: bool  # IEEE 754, of data_bytes
+
+
+def _described(v: Any) -> Described:
+    return Described(
+        index=v.index,
+        sub=v.subindex,
+        name=str(v.name),
+        data_bytes=DATA_BYTES.get(v.data_type),
+        access=v.access_type,
+        default=v.default,
+        low=v.min,
+        high=v.max,
+        real=v.data_type in canopen.objectdictionary.FLOAT_TYPES,
+    )
+
+
 class CanopenNode:
     """One node: objects by index and subindex, and its NMT state.
 
@@ -115,6 +148,19 @@ class CanopenNode:
         entry = self._od[index]
         subs = {} if isinstance(entry, canopen.objectdictionary.ODVariable) else entry.subindices
         return {sub: str(v.name) for sub, v in subs.items() if sub}
+
+    def default(self, index: int, sub: int = 0) -> Any:
+        """Value of an object before anybody has written it, from the EDS; None: it says none, or has no such object."""
+        variable = self._od.get_variable(index, sub)
+        return None if variable is None else variable.default
+
+    def objects(self) -> list[Described]:
+        """All that the EDS has."""
+        found = []
+        for entry in self._od.values():
+            single = isinstance(entry, canopen.objectdictionary.ODVariable)
+            found += [_described(v) for v in ([entry] if single else entry.subindices.values())]
+        return found
 
     def nmt(self, command: int) -> None:
         """01h start, 02h stop, 80h pre-operational, 81h reset node, 82h reset communication (CiA 301)."""
