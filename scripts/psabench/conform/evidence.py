@@ -161,6 +161,10 @@ class Evidence:
         """Frames of a message of the DBC that this board sent."""
         return self.can.of(name, self.variant.family, self.node)
 
+    def with_can(self, can: CanLog) -> Evidence:
+        """The same with another log of the bus."""
+        return replace(self, can=can)
+
     def with_lines(self, lines: LineLog | None) -> Evidence:
         """The same with other lines."""
         return replace(self, lines=lines)

@@ -31,7 +31,7 @@ Trial = TypeVar("Trial", bound="Callable[[Subject], str]")
 SceneOf = Callable[["Subject"], Evidence]
 
 WAYS = frozenset(
-    {"can", "line", "pins", "bus", "supply", "lockstep", "inputs", "fd", "rtr", "stamps", "errors", "slow"}
+    {"can", "line", "pins", "bus", "supply", "chamber", "lockstep", "inputs", "fd", "rtr", "stamps", "errors", "slow"}
 )
 
 

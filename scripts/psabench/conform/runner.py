@@ -26,6 +26,7 @@ MISSING = {
     "pins": "a logic analyser on all pins is wanted; INT, DATA and CLK alone do not show it",
     "bus": "no bus port was connected (--bus-port)",
     "supply": "no power supply was connected (--scpi supply=...)",
+    "chamber": "no thermal chamber was connected (--scpi chamber=...)",
     "lockstep": "an emulator in lockstep is wanted: it takes longer than anybody would wait",
     "fd": "the link to the bus carries no FD frames; slcan and SocketCAN do",
     "rtr": "the link to the bus carries no remote frames; slcan and SocketCAN do",

@@ -118,8 +118,7 @@ class Subject:
             seen |= {"line", "pins"} if isinstance(self.probe, PinProbe) else {"line"}
         if self.port is not None:
             seen.add("bus")
-        if "supply" in self.bench.addresses:
-            seen.add("supply")
+        seen |= {"supply", "chamber"} & set(self.bench.addresses)
         seen |= self._of_the_link()
         if self.lockstep:
             seen.add("lockstep")
@@ -280,7 +279,8 @@ def scenario(variant: Variant, inputs_v: Mapping[str, float], clock_ppm: float) 
     if variant.family == "gyro":
         del unit["axes"]
         return {"supply": {}, "start": True, **PLATFORM, "units": [unit | {"level": LEVEL["name"]}, LEVEL]}
-    return {"supply": {}, "units": [unit]}
+    chamber: dict[str, Any] = {"chamber": {}} if variant.family == "psa2" else {}  # its temperatures are looked at
+    return {"supply": {}, **chamber, "units": [unit]}
 
 
 def _off(key: str, nominal: float, clock_ppm: float) -> int:
