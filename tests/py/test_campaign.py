@@ -155,13 +155,14 @@ def test_an_interrupted_campaign_goes_on_where_it_was(tmp_path: Path, monkeypatc
 ENDLESS = "campaign gyrocompass --case R0 --chain samples --runs 100000000 --workers"
 
 
+@pytest.mark.timeout(900)
 @pytest.mark.parametrize("count", ["1", "2"])
 def test_ctrl_c_ends_it_at_once_and_keeps_what_was_done(tmp_path: Path, count: str) -> None:
     """As a terminal does it: the signal goes to the whole group, workers included."""
     argv = [sys.executable, "-m", "psabench.cli", *ENDLESS.split(), count, "--out", str(tmp_path)]
     wanted = Wanted(chain="samples", setup=TWO[0].setup, hold=None, seed=1, first_run=0, runs=8192)
     with subprocess.Popen(argv, stderr=subprocess.PIPE, text=True, start_new_session=True) as process:
-        deadline_s = time.monotonic() + 120
+        deadline_s = time.monotonic() + 500  # a loaded machine starts a cluster slowly
         done: dict[int, int] = {}
         while len(done) < 3:
             assert time.monotonic() < deadline_s
@@ -171,7 +172,7 @@ def test_ctrl_c_ends_it_at_once_and_keeps_what_was_done(tmp_path: Path, count: s
                     done = store.runs(wanted.origin)
             time.sleep(0.05)
         os.killpg(process.pid, signal.SIGINT)
-        _, err = process.communicate(timeout=60)
+        _, err = process.communicate(timeout=300)
     assert process.returncode == 130, err
     assert err.endswith("psabench: interrupted; what was measured is kept\n"), err
     assert "Traceback" not in err

@@ -178,10 +178,11 @@ def test_quick_turns_through_the_wire_have_the_torquers_for_it() -> None:
     at = emulated.instrument(improved["fast"], 1, 0)
     bench = emulated.scenario(improved["fast"], at)
     assert bench["platform"]["torquer_limit_dps"] == emulated.FAST_LIMIT_DPS
-    assert bench["units"][1]["profile"] == "gyro_fast"
+    (gyro,) = [u for u in bench["units"] if u["board"] == "gyro"]
+    assert (gyro["profile"], gyro["profile_set"]) == ("gyro_fast", {})
     bench = emulated.scenario(improved["unit"], at)
-    assert "torquer_limit_dps" not in bench["platform"]
-    assert "profile" not in bench["units"][1]
+    (gyro,) = [u for u in bench["units"] if u["board"] == "gyro"]
+    assert bench["platform"]["torquer_limit_dps"] == gyro["profile_set"]["torquer_limit_dps"] == 20.0
     emulated.check(improved["fast, silent"])
     with pytest.raises(BadInput, match="its turns accelerate with slew_dps2=20"):
         emulated.check(replace(improved["fast, silent"], slew_dps2=7.0))

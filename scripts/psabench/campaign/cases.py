@@ -107,7 +107,8 @@ def _at_once() -> dict[str, object]:
 def _with_turns(angles_deg: tuple[float, ...], slew_dps: float, settle_s: float) -> dict[str, object]:
     """As `psabench run gyrocompass --reading improved` has a gyro unit turn, with its weights."""
     turns: dict[str, object] = {"slew_dps": slew_dps, "slew_dps2": 20.0, "settle_s": settle_s, "angles_deg": angles_deg}
-    return {**SHORT, **turns, "gimbal": "corrected", "method": "gls_constrained"}
+    loops: dict[str, object] = {"m1_per_s": 2.0, "m2_per_s": 2.0, "gimbal": "corrected"}
+    return {**SHORT, **turns, **loops, "method": "gls_constrained"}
 
 
 def _improved(base: Setup) -> Iterator[Case]:

@@ -170,7 +170,8 @@ def scenario(setup: Setup, at: Instrument) -> Scenario:
     if setup.slew_dps > UNIT_DPS and not setup.scenario:
         found["platform"]["torquer_limit_dps"] = FAST_LIMIT_DPS
         for unit in found["units"]:
-            unit |= {"profile": FAST_PROFILE} if unit["board"] == "gyro" else {}
+            if unit["board"] == "gyro":  # without the resolved keys of the usual profile, which would win
+                unit |= {"profile": FAST_PROFILE, "profile_set": {}}
     if setup.white_degph_rts == 0.0:
         _silence(found)
     found["vehicle"] |= {"heading_deg": at.heading_deg, "pitch_deg": at.pitch_deg, "roll_deg": at.roll_deg}
