@@ -305,10 +305,11 @@ compile_commands.json: Makefile $(SRC) $(GEN_SRC)
 	    printf '%s{"directory": "%s", "file": "%s", "command": "%s -c %s"}\n' "$$sep" '$(CURDIR)' $$f '$(COMPILE)' $$f; \
 	    sep=,; done; echo ']'; } > $@
 
+# spidev and gpiod are a Linux machine's hardware, which tests put their own in place of; spidev would have to be compiled.
 ## lock: pin requirements.in in requirements.lock
 lock: $(PY)
 	.venv/bin/uv pip compile -q --upgrade --universal --python-version 3.11 --generate-hashes \
-	    --custom-compile-command 'make lock' -o requirements.lock requirements.in
+	    --no-emit-package spidev --no-emit-package gpiod --custom-compile-command 'make lock' -o requirements.lock requirements.in
 
 ## clean: everything that was built; .venv stays
 clean:
