@@ -38,7 +38,7 @@ def _row(name: str) -> Requirement:
     return requirements().rows[name]
 
 
-def _put(t: Talk, index: int, text: bytes) -> None:
+def put(t: Talk, index: int, text: bytes) -> None:
     """A segmented download. Raises Broken when it is not taken."""
     answer = t.ask(long_write(index, 0, len(text)))
     if answer[:4] != bytes([FINE]) + index.to_bytes(2, "little") + b"\0":
@@ -90,7 +90,7 @@ def long_values_come_in_segments(s: Subject) -> str:
     most = int(_row("BUS-SDO-03").limit("segment_bytes"))
     text = bytes(range(0x30, 0x30 + 64))
     with talk(s) as t:
-        _put(t, REMARK, text)
+        put(t, REMARK, text)
         for index, due in ((NAME, s.unit.title.encode()), (REMARK, text)):
             first = t.ask(read(index))
             if len(due) <= 4:
@@ -98,7 +98,7 @@ def long_values_come_in_segments(s: Subject) -> str:
             if first != bytes([0x41]) + read(index)[1:4] + len(due).to_bytes(4, "little"):
                 raise Broken(f"{words(first)} to an upload of {index:04X}h", f"41h and a length of {len(due)}")
             _take_segments(t, due, most)
-        _put(t, REMARK, b"")
+        put(t, REMARK, b"")
     return f"the name and {len(text)} characters in segments of {most}"
 
 
@@ -122,10 +122,10 @@ def strings_go_down_and_up(s: Subject) -> str:
     with talk(s) as t:
         for n in sizes:
             text = bytes(0x21 + (n + 3 * k) % 90 for k in range(n))
-            _put(t, REMARK, text)
+            put(t, REMARK, text)
             if t.upload(REMARK) != text:
                 raise Broken(f"a remark of {n} characters reads otherwise than written", text.decode())
-        _put(t, REMARK, b"")
+        put(t, REMARK, b"")
     return f"{', '.join(map(str, sizes))} characters"
 
 
@@ -136,7 +136,7 @@ def a_wrong_toggle_bit_is_refused(s: Subject) -> str:
     code = _row("BUS-SDO-05").limit("abort_code")
     with talk(s) as t:
         begin = read(REMARK)
-        _put(t, REMARK, b"0123456789")
+        put(t, REMARK, b"0123456789")
         for toggles in ((0x10,), (0, 0)):
             t.ask(begin)
             for toggle in toggles[:-1]:
@@ -144,7 +144,7 @@ def a_wrong_toggle_bit_is_refused(s: Subject) -> str:
             _aborted(t, segment(toggles[-1]), code, "a segment with the wrong toggle bit", REMARK)
         t.ask(long_write(REMARK, 0, 10))
         _aborted(t, segment(0x10, b"01234567"[:7]), code, "a segment with the wrong toggle bit", REMARK)
-        _put(t, REMARK, b"")
+        put(t, REMARK, b"")
     return f"abort {int(code):08X}h, up and down"
 
 
@@ -164,7 +164,7 @@ def a_silent_client_is_given_up(s: Subject) -> str:
     due_s, late_s = row.limit("patience_s"), row.limit("jitter_max_ms") * 1e-3
     waited = []
     with talk(s) as t:
-        _put(t, REMARK, b"0123456789")
+        put(t, REMARK, b"0123456789")
         for request in (read(REMARK), long_write(REMARK, 0, 20)):
             begun = t.answer_to(request)
             frame = t.next(t.sdo_tx, 2 * due_s + t.patience_s)
@@ -176,7 +176,7 @@ def a_silent_client_is_given_up(s: Subject) -> str:
                 raise Broken(
                     f"given up after {waited[-1]:.6f} s", f"{due_s:g} s +- {late_s * 1e3:g} ms", frames=[begun, frame]
                 )
-        _put(t, REMARK, b"")
+        put(t, REMARK, b"")
     return f"given up after {', '.join(f'{w:.6f}' for w in waited)} s"
 
 
@@ -270,14 +270,14 @@ def other_than_announced_is_refused(s: Subject) -> str:
     """Announce 10 bytes for 2040h and send 8, and announce 8 and send 10."""
     code = _row("BUS-SDO-12").limit("abort_code")
     with talk(s) as t:
-        _put(t, REMARK, b"kept")
+        put(t, REMARK, b"kept")
         for announced, sent in ((10, 8), (8, 10)):
             t.ask(long_write(REMARK, 0, announced))
             t.ask(segment(0, bytes(range(0x41, 0x48))))
             _aborted(t, segment(0x10, b"HIJ"[: sent - 7], last=True), code, f"{sent} of {announced} bytes", REMARK)
         if t.upload(REMARK) != b"kept":
             raise Broken(f"2040h is {t.upload(REMARK)!r} after a download that was refused", "what it was")
-        _put(t, REMARK, b"")
+        put(t, REMARK, b"")
     return f"abort {int(code):08X}h"
 
 
@@ -388,7 +388,7 @@ def refusals_are_counted(s: Subject) -> str:
 def an_abort_of_the_client_ends_it(s: Subject) -> str:
     """Abort an upload of a long value, then ask for its next segment."""
     with talk(s) as t:
-        _put(t, REMARK, b"0123456789")
+        put(t, REMARK, b"0123456789")
         t.ask(read(REMARK))
         came = [f for f in t.after((t.sdo_rx, bytes([ABORT]) + read(REMARK)[1:])) if f.can_id == t.sdo_tx]
         if came:
@@ -397,7 +397,7 @@ def an_abort_of_the_client_ends_it(s: Subject) -> str:
         t.send(t.sdo_rx, bytes([ABORT]) + read(REMARK)[1:])
         if t.abort_of(segment(0)) is None:
             raise Broken("the transfer goes on after an abort", "a refusal of its next segment")
-        _put(t, REMARK, b"")
+        put(t, REMARK, b"")
     return "silence; the next segment is refused"
 
 
