@@ -99,7 +99,7 @@ def parse_vcd(text: str, name: str = "VCD") -> Vcd:
         raise ValueError(f"{name}: no $timescale in ns..s, or no $enddefinitions: not a VCD of ours")
     unit_ns = int(scale[1]) * _SCALE_NS[scale[2]]
     code = {m[1]: m[2] for m in re.finditer(r"\$var wire 1 (\S+) (\S+) \$end", head)}
-    tokens = _Tokens.of(body)
+    tokens = Tokens.of(body)
     wire = np.full(len(tokens), -1)
     levels = np.flatnonzero((tokens.first == ord("0")) | (tokens.first == ord("1")))
     if code:
@@ -126,7 +126,7 @@ _MOST_CODE = 8  # characters of a wire's code, in one 64-bit number
 
 
 @dataclass(frozen=True, slots=True)
-class _Tokens:
+class Tokens:
     """The words of a file's body, by where they stand in its bytes: a million edges want no loop of Python's."""
 
     text: NDArray[np.uint8]
@@ -135,7 +135,7 @@ class _Tokens:
     first: NDArray[np.uint8]  # byte of each
 
     @classmethod
-    def of(cls, body: str) -> _Tokens:
+    def of(cls, body: str) -> Tokens:
         text = np.frombuffer(body.encode(), np.uint8)
         blank = (text == 32) | ((text >= 9) & (text <= 13)) | ((text >= 28) & (text <= 31))  # as str.split has it
         edges = np.flatnonzero(np.diff(np.concatenate(([True], blank, [True])).view(np.int8)))

@@ -1,0 +1,119 @@
+"""Logs of a CAN bus by python-can's readers: candump, BLF, ASC, MF4, TRC, CSV."""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import can
+from can.io.player import MESSAGE_READERS
+
+from psabench.conform.evidence import CanFrame
+from psabench.conform.sources.blf import safe_blf
+from psabench.conform.sources.taken import BLOCK, MOST_FRAMES, Bounds, CanTake
+from psabench.errors import BadInput
+
+TEXT = (".log", ".asc", ".trc", ".csv")
+BINARY = (".blf", ".mf4")
+MOST_LINE = 1 << 16  # characters of a line of a text log
+EPOCH_S = 1e6  # stamps beyond are of a calendar: they are told from the first one on
+MOST_S = 1e11  # of a stamp
+
+
+def read_can(path: Path, bounds: Bounds) -> CanTake:
+    """Raises BadInput for a log without a frame, OSError."""
+    source, trouble = _source(path)
+    frames: list[CanFrame] = []
+    note = ""
+    try:
+        for m in _messages(path, source):
+            if not math.isfinite(m.timestamp) or abs(m.timestamp) > MOST_S:
+                note = f"message {len(frames) + 1} has the time stamp {m.timestamp}"
+                break
+            if frames and m.timestamp - frames[0].t_s > bounds.max_s:
+                note, trouble = f"judged to {bounds.max_s:g} s", ""
+                break
+            if len(frames) >= MOST_FRAMES:
+                note, trouble = f"judged to its {MOST_FRAMES} frames", ""
+                break
+            frames.append(_frame(m))
+    except OSError:
+        raise
+    except ImportError as e:
+        raise BadInput(f"{path}: MF4 wants asammdf: pip install asammdf ({e})") from e
+    except Exception as e:  # python-can's readers raise whatever their parsing comes to; no byte of a file may end us
+        note = (
+            f"message {len(frames) + 1} cannot be read ({type(e).__name__}: {str(e)[:80]}); those before it are judged"
+        )
+    note = note or trouble
+    if not frames:
+        raise BadInput(f"{path}: {note or 'no frame in it'}; nothing in it can be judged")
+    return CanTake(frames=_from_begin(frames), note=note)
+
+
+def _from_begin(frames: list[CanFrame]) -> tuple[CanFrame, ...]:
+    """Stamps of a calendar have too few digits left for microseconds: they are counted from the first frame on."""
+    zero_s = frames[0].t_s if abs(frames[0].t_s) > EPOCH_S else 0.0
+    if not zero_s:
+        return tuple(frames)
+    return tuple(_frame_at(f, f.t_s - zero_s) for f in frames)
+
+
+def _frame_at(f: CanFrame, t_s: float) -> CanFrame:
+    return CanFrame(
+        t_s=t_s, can_id=f.can_id, data=f.data, fd=f.fd, error=f.error, sent=f.sent, extended=f.extended, remote=f.remote
+    )
+
+
+def _frame(m: can.Message) -> CanFrame:
+    return CanFrame(
+        t_s=float(m.timestamp),
+        can_id=int(m.arbitration_id),
+        data=bytes(m.data),
+        fd=bool(m.is_fd),
+        error=bool(m.is_error_frame),
+        extended=bool(m.is_extended_id),
+        remote=bool(m.is_remote_frame),
+    )
+
+
+def _source(path: Path) -> tuple[Any, str]:
+    """What python-can shall read, and what is known to be wrong with it."""
+    if path.suffix.lower() == ".blf":
+        try:
+            return safe_blf(path)
+        except ValueError as e:
+            raise BadInput(f"{path}: {e}") from e
+    if path.suffix.lower() == ".mf4":
+        return str(path), ""
+    _check_lines(path)
+    return io.TextIOWrapper(path.open("rb"), encoding="utf-8", errors="replace"), ""
+
+
+def _check_lines(path: Path) -> None:
+    """python-can takes whole lines: one without an end would fill the memory. Raises BadInput."""
+    where = begin = 0
+    with path.open("rb") as file:
+        while data := file.read(BLOCK):
+            ends = [k for k in (data.find(b"\n"),) if k >= 0]
+            if (where + ends[0] if ends else where + len(data)) - begin > MOST_LINE:
+                raise BadInput(f"{path}: byte {begin}: a line of more than {MOST_LINE} characters: no log")
+            longest = max(map(len, data.split(b"\n")), default=0)
+            if longest > MOST_LINE:
+                raise BadInput(f"{path}: after byte {where}: a line of more than {MOST_LINE} characters: no log")
+            where += len(data)
+            last = data.rfind(b"\n")
+            begin = where - len(data) + last + 1 if last >= 0 else begin
+
+
+def _messages(path: Path, source: Any) -> Iterator[can.Message]:
+    readers: Mapping[str, Callable[..., Any]] = MESSAGE_READERS
+    reader = readers[path.suffix.lower()](source)
+    try:
+        yield from reader
+    finally:
+        if not isinstance(source, str):
+            source.close()

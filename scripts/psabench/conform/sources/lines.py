@@ -1,0 +1,76 @@
+"""Lines of each board by the names that recordings of all pins have, and whose channel of a recording each is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from psabench.conform.evidence import LineLog
+from psabench.conform.outcome import TooLittle
+from psabench.conform.sources.samples import PORT_LINES
+from psabench.conform.sources.taken import LineTake
+from psabench.errors import BadInput
+from psabench.vcd import Vcd, Wire
+
+_PARALLEL = ("CS", "RW", *(f"AB{k}" for k in range(4)), *(f"D{k}" for k in range(16)))
+LINES: Mapping[str, Sequence[str]] = {  # as psa-emu --vcd names them: docs/waveforms.md and the boards' pages
+    "psa2": ("SYNC_A SClk DRD_A DIn DOutX DOutY DOutZ SYNC_T CST DRD_T DInT DOutT Res Data CLK Int").split(),
+    "psd1": (*"A0 INT0 FL1 FL2 DR RFX RFY RFZ TFS SCLK SDAT CLK_1M25".split(), *_PARALLEL),
+    "pmka": (
+        *"KL1 KL2 KL3 KL4 TAU0 TAU1 TAU2 RP1 RN1 RP2 RN2 RP3 RN3 RP4 RN4 SH CONV MUX0 MUX1".split(),
+        *_PARALLEL,
+    ),
+    "pik": (*"CLK LATCH FXP FXN FYP FYN FZP FZN".split(), *_PARALLEL),
+    "gyro": PORT_LINES["gyro"],
+}
+
+
+class Recorded(LineLog):
+    """Lines of a recording: what nobody recorded is not absent, and nothing is said about it."""
+
+    def __contains__(self, name: str) -> bool:
+        if not super().__contains__(name):
+            raise TooLittle(f"the recording has no line {name}")
+        return True
+
+    def __getitem__(self, name: str) -> Wire:
+        if name not in self.recording.wires:
+            raise TooLittle(f"the recording has no line {name}")
+        return self.recording.wires[name]
+
+
+def log_of(take: LineTake, family: str, told: Mapping[str, str], where: str) -> Recorded:
+    """The board's lines among the channels of a take; told: channel of each line, where the user says it.
+
+    Where he says any, those are all. Raises BadInput for a line or a channel that there is not.
+    """
+    chosen = _told(take, family, told, where) if told else _by_name(take, family)
+    if not chosen:
+        raise BadInput(
+            f"{where}: none of its channels is a line of a {family}: {', '.join(take.channels)}; "
+            f"say which is which: --line {PORT_LINES[family][0]}=CHANNEL"
+        )
+    wires = {line: take.channels[channel] for line, channel in chosen.items()}
+    return Recorded(
+        recording=Vcd(1, take.start_ns, take.end_ns, wires), resolution_ns=take.resolution_ns, gaps_ns=take.gaps_ns
+    )
+
+
+def _by_name(take: LineTake, family: str) -> dict[str, str]:
+    """As it is written or, failing that, in other capitals."""
+    lower = {c.lower(): c for c in reversed(list(take.channels))}
+    found = {line: line if line in take.channels else lower.get(line.lower(), "") for line in LINES[family]}
+    return {line: channel for line, channel in found.items() if channel}
+
+
+def _told(take: LineTake, family: str, told: Mapping[str, str], where: str) -> dict[str, str]:
+    lines = {line.lower(): line for line in LINES[family]}
+    found = {}
+    for name, channel in told.items():
+        if name.lower() not in lines:
+            raise BadInput(f"--line {name}={channel}: a {family} has no line {name}; it has {' '.join(LINES[family])}")
+        if channel not in take.channels:
+            raise BadInput(
+                f"--line {name}={channel}: {where} has no channel {channel}; it has {' '.join(take.channels)}"
+            )
+        found[lines[name.lower()]] = channel
+    return found

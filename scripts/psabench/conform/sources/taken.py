@@ -1,0 +1,52 @@
+"""What a reader took from a file, and the bounds within which every reader keeps.
+
+Whatever the bytes of a file are, a reader ends in `BadInput` with the file and the place, or in a take whose `note`
+says where it stopped and why. What came before the damage is judged.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from psabench.conform.evidence import CanFrame
+from psabench.signals import Ints
+from psabench.vcd import Wire
+
+NS = 1e9
+MOST_FRAMES = 2_000_000  # of one log: 0.5 GB
+MOST_EDGES = 40_000_000  # of one recording of lines: 0.4 GB
+MOST_CHANNELS = 64
+MOST_BYTES = 16 << 30  # of a file, unpacked
+BLOCK = 1 << 22  # bytes looked at together
+MOST_NS = 1 << 60  # of a time: 36 years
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bounds:
+    """How much of a file is judged. line_hz None: the file says it, or edges are as exact as its unit."""
+
+    max_s: float = 60.0
+    line_hz: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CanTake:
+    """Frames of a log in its order; note: where and why it ended before its end, "" where it did not."""
+
+    frames: tuple[CanFrame, ...]
+    note: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LineTake:
+    """Channels by the names that the file gives them. resolution_ns: how early an edge may have been."""
+
+    channels: Mapping[str, Wire]
+    start_ns: int
+    end_ns: int
+    resolution_ns: float
+    gaps_ns: Ints = field(default_factory=lambda: np.empty(0, np.int64))
+    note: str = ""
