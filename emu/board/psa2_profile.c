@@ -17,7 +17,7 @@
 // clang-format off
 const struct board_field psa2_fields[PSA2_FIELDS] = {
     ROW(name, STRING, 1, 31, "Name of the profile."),
-    ROW(fclk_hz, UINT, 1e6, 4.096e6, "Crystal GOCh, clock of the accelerometer converters."),
+    ROW(fclk_hz, UINT, 1e6, 4.1e6, "Crystal GOCh, clock of the accelerometer converters: 4.096 MHz at most by their data sheet, and the tolerance of a crystal above it."),
     ROW(temp_clkin_hz, UINT, 1e5, 1e7, "Clock of the temperature converter."),
     ROW(sclk_hz, UINT, 64e3, 2.048e6, "SClk of both serial ports."),
     ROW(line_hz, UINT, 1e5, 1e9, "The output CLK is line_hz / line_div."),

@@ -1,0 +1,357 @@
+"""Samples of PSA-2 and PSA-1 on CAN: order, numbers, times, temperatures."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+
+from psabench.conform.checks.psa2_serial import LEAST
+from psabench.conform.checks.psa2_setup import port_traffic
+from psabench.conform.evidence import CanLog, Evidence
+from psabench.conform.limits import row_for
+from psabench.conform.line_frames import transfers
+from psabench.conform.outcome import Broken, TooLittle
+from psabench.conform.pairs import SEQ_BITS, STAMP_BITS, aligned, pairs, signed
+from psabench.conform.plan import check
+from psabench.conform.proof import proves
+from psabench.conform.scenes.psa2_can import FRAMES, OVERRUNS, Answer
+from psabench.protocol_files import message
+
+LINES = ("Int", "Data", "CLK")
+FORMATS = ("PSA2-FRAME-06", "PSA2-FRAME-07", "PSA2-FRAME-08")
+MESSAGES = ("PSA2_XY", "PSA2_ZT", "PSA2_FAST", "PSA2_FRAME", "PSA2_BLOCK")
+US = 1e-6
+DAMAGED = 0.1  # share of words that bursts of the other port may damage where SClk is not gated
+MOST_LOST = 2  # samples at the ends of a log that only one of two witnesses has
+
+
+def number(a: object) -> int:
+    """Value of an answer. Raises Broken where it is a refusal."""
+    if not isinstance(a, Answer) or not isinstance(a.value, int):
+        raise Broken(f"abort {a.abort:08X}h" if isinstance(a, Answer) else "no answer", "a value")
+    return a.value
+
+
+def unit_us(e: Evidence) -> float:
+    """Of TSTAMP."""
+    return row_for(e, "PSA2-CAN-05").limit("unit_us")
+
+
+# ---- pairs
+
+
+@proves("PSA2-CAN-01")
+@check("stream")
+def xy_and_zt_alternate(e: Evidence) -> str:
+    """Look at the order of the two messages of a sample, and for others of the stream."""
+    ids = {int(message(n).frame_id) - 5 + e.node: n for n in MESSAGES}
+    found = [f for f in e.can.frames if f.can_id in ids and not f.error]
+    if len(found) < 2 * LEAST:
+        raise Broken(f"{len(found)} frames of samples", "two of each sample", frames=e.can.frames[:10])
+    for k, (a, b) in enumerate(itertools.pairwise(found)):
+        names = ids[a.can_id], ids[b.can_id]
+        if names not in (("PSA2_XY", "PSA2_ZT"), ("PSA2_ZT", "PSA2_XY")):
+            raise Broken(
+                f"{names[0]}, then {names[1]}", "PSA2_XY and PSA2_ZT in turn", frames=found[max(0, k - 2) : k + 3]
+            )
+    return f"{len(found)} frames, PSA2_XY and PSA2_ZT in turn"
+
+
+@proves("PSA2-CAN-02")
+@check("stream")
+def messages_have_their_lengths(e: Evidence) -> str:
+    """Compare lengths, forms and ranges of all messages with the table."""
+    seen = 0
+    for name in MESSAGES:
+        log = e.frames_of(name)
+        due = int(message(name).length)
+        bad = [f for f in log.frames if len(f.data) != due]
+        if bad:
+            raise Broken(f"{name} of {len(bad[0].data)} bytes", f"{due}", frames=bad)
+        seen += len(log)
+    p = pairs(e)
+    if (p.channel >= int(row_for(e, "PSA2-TEMP-01").limit("channels_count"))).any():
+        k = int(np.argmax(p.channel))
+        raise Broken(f"CHANNEL {p.channel[k]}", "a channel that there is", frames=p.about(k))
+    return f"{seen} frames of their length"
+
+
+@proves("PSA2-CAN-03")
+@check("stream", needs={"pins", "stamps", "lockstep"})
+def no_frame_before_its_transfer_has_ended(e: Evidence) -> str:
+    """Compare the time of each PSA2_XY on the bus with TSTAMP, and with the rise of Int."""
+    p = pairs(e)
+    row = row_for(e, "PSA2-CAN-03")
+    stamp_us = p.stamp * unit_us(e)
+    rx_us = np.array([f.t_s for f in p.frames]) / US
+    after = (rx_us - stamp_us) % (unit_us(e) * (1 << STAMP_BITS))
+    least_us = row.limit("after_sample_min_us") - unit_us(e)
+    rises = e.wires.rises("Int")
+    k = np.searchsorted(rises, rx_us * 1e3)
+    since_rise = rx_us[k > 0] * 1e3 - rises[k[k > 0] - 1]
+    bad = after < least_us
+    if bad.any():
+        n = int(np.flatnonzero(bad)[0])
+        raise Broken(f"PSA2_XY {after[n]:.0f} us after its sample", f"{least_us:.0f} us or more", frames=p.about(n))
+    if len(since_rise) and since_rise.max() > row.limit("after_int_max_us") * 1e3:
+        n = int(np.argmax(since_rise))
+        raise Broken(f"PSA2_XY {since_rise[n] * 1e-3:.0f} us after Int", "it follows at once", frames=p.about(n))
+    return f"PSA2_XY {after.min():.0f} us and more after the sample, {since_rise.min() * 1e-3:.0f} us after Int"
+
+
+@proves("PSA2-CAN-04", "PSA2-SAMP-01")
+@check("quiet")
+def seq_rises_by_one(e: Evidence) -> str:
+    """Look for gaps of SEQ."""
+    p = pairs(e)
+    bad = np.flatnonzero(p.steps != 1)
+    if len(bad):
+        raise Broken(f"SEQ {p.seq[bad[0]]}, then {p.seq[bad[0] + 1]}", "one more", frames=p.about(int(bad[0])))
+    return f"{len(p)} samples, SEQ {p.seq[0]} to {p.seq[-1]}"
+
+
+@proves("PSA2-CAN-05")
+@check("quiet")
+def tstamp_goes_by_the_data_period(e: Evidence) -> str:
+    """Compare TSTAMP with SEQ times the data period."""
+    p = pairs(e, 100)
+    row = row_for(e, "PSA2-CAN-05")
+    period_us = row_for(e, "PSA2-READ-06").limit("period_us")
+    n = np.concatenate(([0], np.cumsum(p.steps)))
+    t_us = (p.stamp - p.stamp[0]) * unit_us(e)
+    rate = float(t_us[-1]) / float(n[-1])
+    slack_us = e.slack_ns(period_us * 1e3) * 1e-3 + unit_us(e) / n[-1]
+    if abs(rate - period_us) > slack_us:
+        raise Broken(f"{rate:.4f} us a sample", f"{period_us:.1f} +- {slack_us:.4f} us", frames=p.about(0))
+    off = np.abs(t_us - n * rate)
+    k = int(np.argmax(off))
+    if off[k] > row.limit("jitter_max_us") + unit_us(e):
+        raise Broken(
+            f"TSTAMP off by {off[k]:.1f} us",
+            f"at most {row.limit('jitter_max_us'):g} us and its own unit",
+            frames=p.about(k),
+        )
+    return f"{rate:.4f} us a sample over {n[-1]} periods, off by at most {off[k]:.1f} us"
+
+
+@proves("PSA2-CAN-05")
+@check("stream", needs={"pins", "lockstep"})
+def tstamp_is_the_fall_of_drd_a(e: Evidence) -> str:
+    """Compare TSTAMP with the falls of DRD_A."""
+    p = pairs(e)
+    falls = e.wires.falls("DRD_A")
+    if len(falls) < LEAST:
+        raise TooLittle(f"{len(falls)} falls of DRD_A were recorded")
+    due = np.unique(falls // round(unit_us(e) * 1e3) % (1 << STAMP_BITS))
+    bad = ~np.isin(p.stamp % (1 << STAMP_BITS), due)
+    if bad.sum() > MOST_LOST:
+        k = int(np.flatnonzero(bad)[0])
+        raise Broken(
+            f"TSTAMP {p.stamp[k] % (1 << STAMP_BITS)} at no fall of DRD_A", "the instant of one", frames=p.about(k)
+        )
+    return f"{len(p)} time stamps, each a fall of DRD_A"
+
+
+@proves("PSA2-CAN-06")
+@check("starts")
+def samples_come_whole(e: Evidence) -> str:
+    """Start and stop the stream at all phases of a sample: is there a second half without a first?"""
+    first, second = (int(message(n).frame_id) - 5 + e.node for n in ("PSA2_XY", "PSA2_ZT"))
+    halves = [f for f in e.can.frames if f.can_id in (first, second) and not f.error]
+    if len(halves) < LEAST:
+        raise TooLittle(f"{len(halves)} halves of samples came")
+    for k, f in enumerate(halves):
+        if f.can_id == second and (k == 0 or halves[k - 1].can_id == second):
+            raise Broken("a PSA2_ZT without its PSA2_XY", "both", frames=halves[max(0, k - 2) : k + 2])
+    torn = sum(a.can_id == b.can_id == first for a, b in itertools.pairwise(halves))
+    starts = int(row_for(e, "PSA2-CAN-06").limit("starts_count"))
+    if torn > starts:
+        raise Broken(f"{torn} PSA2_XY without PSA2_ZT in {starts} stops", "at most one a stop")
+    return f"{len(halves)} halves, {torn} cut by a stop"
+
+
+@proves("PSA2-CAN-08")
+@check("quiet")
+def overrun_tells_of_lost_conversions(e: Evidence) -> str:
+    """Compare OVERRUN with the gaps of SEQ and with the counter of overruns."""
+    p = pairs(e)
+    gap = np.concatenate(([False], p.steps != 1))
+    wrong = np.flatnonzero(p.overrun[1:] != gap[1:]) + 1
+    if len(wrong):
+        k = int(wrong[0])
+        raise Broken(
+            f"OVERRUN {int(p.overrun[k])} {'at a gap' if gap[k] else 'without a gap'} of SEQ",
+            "OVERRUN after a gap, and only there",
+            frames=p.about(k),
+        )
+    return f"{int(p.overrun.sum())} of {len(p)} samples with OVERRUN, {int(gap.sum())} gaps"
+
+
+def _counted(e: Evidence, sub: int) -> int:
+    before, after = e.facts.get("before"), e.facts.get("after")
+    if not isinstance(before, dict) or not isinstance(after, dict):
+        raise TooLittle("the scene has no counters")
+    return number(after[sub]) - number(before[sub])
+
+
+@proves("PSA2-CNT-01")
+@check("quiet")
+def frames_are_counted(e: Evidence) -> str:
+    """Compare the counter of frames with SEQ."""
+    p, counted = pairs(e), _counted(e, FRAMES)
+    span = int((p.seq[-1] - p.seq[0]) % (1 << SEQ_BITS)) + 1
+    edge = int(row_for(e, "PSA2-CNT-01").limit("edge_max_frames"))
+    if not span <= counted <= span + edge:
+        raise Broken(f"{counted} frames counted, {span} by SEQ", f"as many, and up to {edge} at the ends")
+    return f"{counted} frames counted, {span} by SEQ"
+
+
+@proves("PSA2-CNT-02")
+@check("quiet")
+def overruns_are_counted(e: Evidence) -> str:
+    """Compare the counter of overruns with OVERRUN."""
+    p, counted = pairs(e), _counted(e, OVERRUNS)
+    told = int(p.overrun.sum())
+    if counted < told or (told == 0 and counted):
+        raise Broken(f"{counted} overruns counted, {told} told by OVERRUN", "as many")
+    return f"{counted} overruns counted, {told} told by OVERRUN"
+
+
+@proves("PSA2-RES-05")
+@check("power_on")
+def seq_begins_with_0(e: Evidence) -> str:
+    """Look at the first sample after the reset."""
+    boots = [k for k, f in enumerate(e.can.frames) if f.can_id == 0x700 + e.node and f.data[:1] == b"\0"]
+    if not boots:
+        raise Broken("no boot-up message after the reset", "one", frames=e.can.frames[:10])
+    log = CanLog(frames=e.can.frames[boots[-1] :])
+    first = e.with_can(log).frames_of("PSA2_XY").frames[:1]
+    if not first or len(first[0].data) != 8:
+        raise TooLittle("no PSA2_XY came after the reset")
+    seq = int.from_bytes(first[0].data[6:8], "little")
+    if seq:
+        raise Broken(f"SEQ {seq} first", "0", frames=log.frames[:6])
+    return "SEQ 0 first"
+
+
+@proves("PSA2-READ-06")
+@check("stream", needs={"line"})
+def frames_come_every_data_period(e: Evidence) -> str:
+    """Measure the falls of Int."""
+    t = transfers(e.wires)
+    period_ns = row_for(e, "PSA2-READ-06").limit("period_us") * 1e3
+    clk_ns = 1e9 / row_for(e, *FORMATS).limit("clk_hz")
+    step = np.diff(t.fall_ns)
+    slack_ns = clk_ns + e.slack_ns(period_ns)
+    bad = np.flatnonzero((np.abs(step - period_ns) > slack_ns) & e.wires.known(t.fall_ns[:-1], t.fall_ns[1:]))
+    if len(bad) and e.variant["gate_sclk"]:  # without gates a burst for the other port may delay a read
+        k = int(bad[0])
+        raise Broken(
+            f"{step[k] * 1e-3:.2f} us to the next frame",
+            f"{period_ns * 1e-3:.1f} us, to a period of CLK",
+            at_ns=int(t.fall_ns[k]),
+            lines=LINES,
+        )
+    mean_ns = float(step.mean())
+    allowed_ns = e.slack_ns(period_ns) + clk_ns / len(step)
+    if abs(mean_ns - period_ns) > allowed_ns and not len(e.wires.gaps_ns):
+        raise Broken(
+            f"{mean_ns * 1e-3:.4f} us from frame to frame",
+            f"{period_ns * 1e-3:.1f} us +- {allowed_ns:.0f} ns",
+            at_ns=int(t.fall_ns[0]),
+            lines=LINES,
+        )
+    return f"{len(step)} periods of {mean_ns * 1e-3:.4f} us"
+
+
+# ---- temperatures
+
+
+@proves("PSA2-TEMP-01")
+@check("quiet")
+def channels_take_turns(e: Evidence) -> str:
+    """Follow CHANNEL through the samples with T_NEW."""
+    p = pairs(e)
+    seen = p.channel[p.new]
+    count = int(row_for(e, "PSA2-TEMP-01").limit("channels_count"))
+    if len(seen) < 2 * count:
+        raise Broken(f"{len(seen)} new temperatures in {len(p)} samples", "one every 10 ms", frames=p.about(0))
+    step = np.diff(seen) % count
+    if (step != 1).any() or set(seen.tolist()) != set(range(count)):
+        k = int(np.flatnonzero(step != 1)[0]) if (step != 1).any() else 0
+        raise Broken(
+            f"channel {seen[k]}, then {seen[k + 1]}",
+            f"0 to {count - 1} in turn",
+            frames=p.about(int(np.flatnonzero(p.new)[k])),
+        )
+    return f"{len(seen)} temperatures of {count} channels in turn"
+
+
+@proves("PSA2-TEMP-02")
+@check("stream", needs={"pins"})
+def temperature_codes_are_the_upper_bits_that_were_read(e: Evidence) -> str:
+    """Compare the temperature codes with the words on DOutT."""
+    row = row_for(e, "PSA2-TEMP-02")
+    bits, code_bits = int(row.limit("read_bits")), int(row.limit("code_bits"))
+    bursts = [b for m in port_traffic(e).of(temp=True) if m.sent[:1] == b"\x01" for b in m.bursts[1:]]
+    if len(bursts) < LEAST:
+        raise TooLittle(f"{len(bursts)} temperatures were read")
+    for b in bursts[:-1]:
+        if b.bits != bits:
+            raise Broken(f"{b.bits} clocks", f"{bits}", at_ns=int(b.rise_ns[0]), lines=("SClk", "CST", "DOutT"))
+    read = signed(np.array([[int(b.got[0][:code_bits] or "0", 2)] for b in bursts], np.int64), code_bits)
+    p = pairs(e)
+    told = p.temp[p.new][:, None]
+    _shift, same = aligned(read, told)
+    if same < len(told) - MOST_LOST:
+        raise Broken(
+            f"{len(told) - same} of {len(told)} new codes on CAN were not read",
+            "the upper bits of each word",
+            frames=p.about(int(np.flatnonzero(p.new)[0]) if p.new.any() else 0),
+        )
+    return f"{same} codes are the upper {code_bits} of {bits} bits"
+
+
+@proves("PSA2-TEMP-05")
+@check("quiet")
+def temperatures_come_at_their_rate(e: Evidence) -> str:
+    """Measure TSTAMP between samples with T_NEW."""
+    p, row = pairs(e), row_for(e, "PSA2-TEMP-05")
+    at_us = p.stamp[p.new] * unit_us(e)
+    if len(at_us) < LEAST:
+        raise Broken(f"{len(at_us)} new temperatures in {len(p)} samples", "one every 10 ms", frames=p.about(0))
+    period = np.diff(at_us)
+    mean_ms = float(period.mean()) * 1e-3
+    lo, hi = row.limit("period_min_ms"), row.limit("period_max_ms")
+    sample_ms = row_for(e, "PSA2-READ-06").limit("period_us") * 1e-3
+    off = (period * 1e-3 < lo - sample_ms) | (period * 1e-3 > hi + sample_ms)
+    if not lo <= mean_ms <= hi or off.any():
+        k = int(np.flatnonzero(off)[0]) if off.any() else 0
+        raise Broken(
+            f"{mean_ms:.3f} ms a temperature, one after {period[k] * 1e-3:.3f} ms",
+            f"{lo} to {hi} ms",
+            frames=p.about(int(np.flatnonzero(p.new)[k])),
+        )
+    return f"{len(at_us)} temperatures, {mean_ms:.3f} ms apart"
+
+
+@proves("PSA2-TEMP-08")
+@check("selfcal")
+def the_scan_waits_for_a_calibration(e: Evidence) -> str:
+    """SELFCAL while temperatures are scanned: a pause, then they come again."""
+    if e.facts.get("opcode") != Answer():
+        raise Broken(f"SELFCAL answered by {e.facts.get('opcode')}", "it is taken")
+    p, row = pairs(e), row_for(e, "PSA2-TEMP-08")
+    at_ms = p.stamp[p.new] * unit_us(e) * 1e-3
+    if len(at_ms) < LEAST:
+        raise Broken(f"{len(at_ms)} new temperatures", "they come again", frames=p.about(len(p) - 3))
+    pause = np.diff(at_ms)
+    k = int(np.argmax(pause))
+    if not row.limit("pause_min_ms") <= pause[k] <= row.limit("pause_max_ms"):
+        due = f"{row.limit('pause_min_ms')} to {row.limit('pause_max_ms')} ms"
+        raise Broken(f"the longest pause is {pause[k]:.2f} ms", due, frames=p.about(int(np.flatnonzero(p.new)[k])))
+    tail_ms = (p.stamp[-1] * unit_us(e) * 1e-3) - at_ms[-1]
+    if k == len(pause) - 1 or tail_ms > row.limit("pause_min_ms"):
+        raise Broken("no temperature after the pause", "they come again", frames=p.about(len(p) - 3))
+    return f"a pause of {pause[k]:.2f} ms, then {len(pause) - k - 1} more temperatures"

@@ -1,0 +1,478 @@
+"""Scenes of PSA-2 and PSA-1 that ask for something over CAN: objects, registers, forms, modes, settings.
+
+What was answered is in `facts`: "cut" has the number of CAN frames at named moments, the rest is said at each scene.
+Settings are put back by a reset.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from psabench.canopen_host import Described
+from psabench.conform.evidence import Evidence
+from psabench.conform.plan import scene
+from psabench.conform.scenes.psa2 import PERIOD_S
+from psabench.conform.subject import Subject, Take
+from psabench.errors import DeviceError
+
+ACCEL, TEMP = (0x2000, 0x2003, 0x2004), 0x2001  # objects of registers; sub-index = address + 1
+CONFIG0, CONFIG1, OFC0, FSC0 = 2, 3, 6, 9  # sub-indices
+DRATE = 4
+REGISTERS = range(1, 12)
+COUNTERS, OPCODE, FORM, MODE, NTH, PULSES = 0x2030, 0x2010, 0x2020, 0x2022, 0x2023, 0x2024
+FRAMES, OVERRUNS, TIMEOUTS, SYNCS_MISSED = 1, 2, 9, 12
+SYNC = 0x80
+RATES_HZ = (250, 500, 1000, 2000, 4000)  # by DR
+SETTLE_PERIODS = 64
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """Of an SDO: the value read (None after a write), or the abort code."""
+
+    value: object = None
+    abort: int = 0
+
+
+def ask(s: Subject, index: int, sub: int = 0) -> Answer:
+    """Read an object. Raises LinkError where nobody answers."""
+    try:
+        return Answer(s.unit.node.read(index, sub))
+    except DeviceError as e:
+        return Answer(abort=e.abort_code)
+
+
+def tell(s: Subject, index: int, sub: int, value: int) -> Answer:
+    """Write an object."""
+    try:
+        s.unit.node.write(index, sub, value)
+    except DeviceError as e:
+        return Answer(abort=e.abort_code)
+    return Answer()
+
+
+def cut(take: Take, name: str) -> None:
+    """Note how many frames had come."""
+    cuts = take.facts.setdefault("cut", {})
+    assert isinstance(cuts, dict)
+    cuts[name] = len(take.frames)
+
+
+def counters(s: Subject, *, after: bool = False) -> dict[int, Answer]:
+    """Of object 2030h by sub-index; the frames last before a stream, first after it."""
+    subs = (SYNCS_MISSED, TIMEOUTS, OVERRUNS, FRAMES)
+    return {sub: ask(s, COUNTERS, sub) for sub in (subs[::-1] if after else subs)}
+
+
+@contextmanager
+def changed(s: Subject) -> Iterator[None]:
+    """Settings may be changed within; a reset puts them back."""
+    s.unit.wait_ready()
+    try:
+        yield
+    finally:
+        s.reset()
+        s.run_for(PERIOD_S)
+
+
+def streamed(s: Subject, take: Take, name: str, dwell_s: float) -> None:
+    """Frames for so long, between the cuts `name` and `name end`."""
+    cut(take, name)
+    s.unit.start()
+    s.run_for(dwell_s)
+    s.unit.stop()
+    cut(take, f"{name} end")
+
+
+def split(index: int, sub: int, value: int) -> list[tuple[int, int, int]]:
+    """Writes of the three bytes of OFC or FSC, low byte first."""
+    return [(index, sub + k, value >> 8 * k & 0xFF) for k in range(3)]
+
+
+@scene("quiet", boards=("psa2",))
+def quiet(s: Subject) -> Evidence:
+    """Frames for two and a half seconds, on CAN alone; counters before and after."""
+    s.unit.wait_ready()
+    with s.take(lines=False) as take:
+        take.facts["before"] = counters(s)
+        s.unit.start()
+        s.run_for(2.5)
+        s.unit.stop()
+        take.facts["after"] = counters(s, after=True)
+    return s.evidence("quiet", take)
+
+
+@scene("registers", boards=("psa2",))
+def registers(s: Subject) -> Evidence:
+    """All registers read while frames flow. facts: read, by index and sub-index; counters before and after."""
+    s.unit.wait_ready()
+    with s.take() as take:
+        take.facts["before"] = counters(s)
+        s.unit.start()
+        s.run_for(10 * PERIOD_S)
+        take.facts["read"] = {(i, sub): ask(s, i, sub) for i in (*ACCEL, TEMP) for sub in REGISTERS}
+        s.run_for(10 * PERIOD_S)
+        s.unit.stop()
+        take.facts["after"] = counters(s, after=True)
+    return s.evidence("registers", take)
+
+
+PATTERNS: Sequence[tuple[int, int, int]] = (  # object, sub-index, value that the part takes
+    *(
+        (ACCEL[0], sub, value)
+        for sub, value in zip(range(4, 12), (0xA5, 0x5A, 0x11, 0x22, 0x03, 0x81, 0x7E, 0x3F), strict=True)
+    ),
+    (ACCEL[0], CONFIG0, 0x52),
+    (TEMP, 3, 0x21),
+    (TEMP, 4, 0x72),
+    *((TEMP, sub, value) for sub, value in zip(range(6, 12), (0x12, 0x34, 0x02, 0x9A, 0xBC, 0x41), strict=True)),
+)
+
+
+@scene("writes", boards=("psa2",))
+def writes(s: Subject) -> Evidence:
+    """Registers written and read again. facts: written, list of object, sub-index, value, answer, what reads then."""
+    with changed(s), s.take(lines=False) as take:
+        found = []
+        for index, sub, value in PATTERNS:
+            answer = tell(s, index, sub, value)
+            found.append((index, sub, value, answer, [ask(s, i, sub) for i in (ACCEL if index != TEMP else (TEMP,))]))
+        take.facts["written"] = found
+    return s.evidence("writes", take)
+
+
+@scene("opcodes", boards=("psa2",))
+def opcodes(s: Subject) -> Evidence:
+    """RESET as an opcode to both groups, then all registers. facts: answers, read; cuts around the opcode."""
+    with changed(s), s.take() as take:
+        s.run_for(5 * PERIOD_S)
+        take.facts["answers"] = [tell(s, OPCODE, 1, 0x06), tell(s, OPCODE, 2, 0xFE)]
+        s.run_for(0.1)
+        take.facts["read"] = {(i, sub): ask(s, i, sub) for i in (*ACCEL, TEMP) for sub in REGISTERS}
+    return s.evidence("opcodes", take)
+
+
+# What is refused: object, sub-index, value.
+RESERVED: Sequence[tuple[int, int, int]] = (
+    *((ACCEL[0], CONFIG0, v) for v in (0x6E, 0x76, 0x7E)),  # DR 101..111
+    (ACCEL[0], CONFIG0, 0x55),  # sinc alone
+    (ACCEL[0], CONFIG0, 0x57),  # high-pass
+    (ACCEL[0], CONFIG0, 0xD6),  # continuous synchronisation
+    (TEMP, DRATE, 0x81),
+    (TEMP, DRATE, 0x00),
+)
+RESERVED_GAIN = (ACCEL[0], CONFIG1, 0x0F)  # of the ADS1282
+OPCODES_REFUSED: Sequence[tuple[int, int, int]] = (
+    *((OPCODE, 1, v) for v in (0x12, 0x20, 0x2A, 0x40, 0x4A, 0x02, 0x03, 0x60, 0x61)),
+    *((OPCODE, 2, v) for v in (0x01, 0x03, 0x10, 0x50, 0xFD, 0xF3, 0xF4)),
+)
+
+
+@scene("refusals", boards=("psa2",))
+def refusals(s: Subject) -> Evidence:
+    """Values that the board refuses. facts: reserved, (object, sub, value, answer, before, after); opcodes; others."""
+    reserved = [*RESERVED, *([RESERVED_GAIN] if s.variant.board == "psa2" else [])]
+    with changed(s), s.take() as take:
+        take.facts["reserved"] = [
+            (i, sub, v, ask(s, i, sub), tell(s, i, sub, v), ask(s, i, sub)) for i, sub, v in reserved
+        ]
+        take.facts["opcodes"] = [(i, sub, v, tell(s, i, sub, v)) for i, sub, v in OPCODES_REFUSED]
+        take.facts["read-only"] = [(i, 1, 0x55, tell_raw(s, i, 1, 0x55)) for i in ACCEL]
+        take.facts["form"] = tell_raw(s, FORM, 0, 4)
+    return s.evidence("refusals", take)
+
+
+def tell_raw(s: Subject, index: int, sub: int, value: int) -> Answer:
+    """Write one byte, whatever the EDS says of the object."""
+    try:
+        s.unit.node.write_raw(index, sub, bytes([value]))
+    except DeviceError as e:
+        return Answer(abort=e.abort_code)
+    return Answer()
+
+
+@scene("early", boards=("psa2",))
+def early(s: Subject) -> Evidence:
+    """Asked before the set-up is over, and while another request is under way. facts: early, busy, missed."""
+    s.unit.wait_ready()
+    with s.take(lines=False) as take:
+        s.reset()
+        s.run_for(20 * PERIOD_S)
+        take.facts["early"] = [ask(s, i, CONFIG0) for i in (*ACCEL, TEMP)]
+        tell(s, PULSES, 0, 1)
+        before = ask(s, COUNTERS, SYNCS_MISSED)
+        s.host.send(SYNC, b"")
+        s.run_for(2 * PERIOD_S)
+        take.facts["missed"] = (before, ask(s, COUNTERS, SYNCS_MISSED))
+        tell(s, PULSES, 0, 0)
+        s.unit.wait_ready()
+        take.facts["busy"] = _busy(s, take)
+        s.reset()
+        s.run_for(PERIOD_S)
+    return s.evidence("early", take)
+
+
+def _busy(s: Subject, take: Take) -> list[int]:
+    """Abort codes of a request sent while one that its client gave up is under way: one to the temperature
+    converter waits for the end of its conversion, 10 ms.
+    """
+    tx, rx = 0x580 + s.node, 0x600 + s.node
+    upload = bytes([0x40, TEMP & 0xFF, TEMP >> 8, DRATE, 0, 0, 0, 0])
+    found = []
+    for _ in range(8):
+        since = len(take.frames)
+        for data in (upload, b"\x80" + upload[1:], upload):
+            s.host.send(rx, data)
+        s.run_for(20 * PERIOD_S)
+        got = [f.data for f in take.frames[since:] if f.can_id == tx and len(f.data) == 8]
+        found += [int.from_bytes(d[4:8], "little") for d in got if d[0] == 0x80]
+        s.run_for(1.3 * PERIOD_S)
+    return found
+
+
+@scene("rates", boards=("psa2",))
+def rates(s: Subject) -> Evidence:
+    """Each data rate: frames (every fourth as a PDO), then a pulse on SYNC_A by SYNC. Cuts "DR 0" ... "DR 4"."""
+    with changed(s), s.take() as take:
+        tell(s, NTH, 0, 4)
+        take.facts["mode"] = tell(s, MODE, 0, 2)
+        for dr, rate_hz in enumerate(RATES_HZ):
+            take.facts[f"answer {dr}"] = tell(s, ACCEL[0], CONFIG0, 0x46 | dr << 3)
+            s.run_for(SETTLE_PERIODS / rate_hz)
+            streamed(s, take, f"DR {dr}", 24 / rate_hz + 0.01)
+            tell(s, PULSES, 0, 1)
+            s.host.send(SYNC, b"")
+            s.run_for(SETTLE_PERIODS / rate_hz + 0.005)
+            tell(s, PULSES, 0, 0)
+    return s.evidence("rates", take)
+
+
+@scene("sync", boards=("psa2",))
+def sync(s: Subject) -> Evidence:
+    """SYNC in sample mode 1, then with 2024h = 1. Cuts "SYNC 0" ... before each, "pulse" before the last."""
+    with changed(s), s.take() as take:
+        tell(s, MODE, 0, 1)
+        s.unit.start()
+        s.run_for(5 * PERIOD_S)
+        for k in range(10):
+            cut(take, f"SYNC {k}")
+            take.marks[f"SYNC {k}"] = s.bench.time_s
+            s.host.send(SYNC, b"")
+            s.run_for((4 + 0.3 * k) * PERIOD_S)
+        cut(take, "SYNC end")
+        tell(s, MODE, 0, 0)
+        s.run_for(20 * PERIOD_S)
+        tell(s, PULSES, 0, 1)
+        take.facts["before"] = ask(s, COUNTERS, SYNCS_MISSED)
+        cut(take, "pulse")
+        s.host.send(SYNC, b"")
+        s.run_for(0.1)
+        s.unit.stop()
+        cut(take, "pulse end")
+        take.facts["after"] = ask(s, COUNTERS, SYNCS_MISSED)
+    return s.evidence("sync", take)
+
+
+@scene("gain", boards=("psa2",))
+def gain(s: Subject) -> Evidence:
+    """CONFIG1 written while frames flow: gain 4 for 2. Cuts "before", "gain"; facts: answer, read on all three."""
+    with changed(s), s.take(lines=False) as take:
+        cut(take, "before")
+        s.unit.start()
+        s.run_for(0.1)
+        cut(take, "gain")
+        take.facts["answer"] = tell(s, ACCEL[0], CONFIG1, 0x0A)
+        s.run_for(0.2)
+        s.unit.stop()
+        take.facts["read"] = [ask(s, i, CONFIG1) for i in ACCEL]
+    return s.evidence("gain", take)
+
+
+OFFSET = 0x012345  # codes; positive
+FACTOR = 0x500000  # 1.25
+
+
+@scene("numbers", boards=("psa2",))
+def numbers(s: Subject) -> Evidence:
+    """OFC and FSC written through 2000h: as they were, an offset, a factor, both limits. Cuts by these names."""
+    steps = {
+        "as it was": [],
+        "offset": split(ACCEL[0], OFC0, OFFSET),
+        "factor": split(ACCEL[0], FSC0, FACTOR),
+        "high": [*split(ACCEL[0], OFC0, 0x800000), *split(ACCEL[0], FSC0, 0x7FFFFF)],
+        "low": split(ACCEL[0], OFC0, 0x7FFFFF),
+    }
+    with changed(s), s.take() as take:
+        for name, told in steps.items():
+            take.facts[name] = [tell(s, *x) for x in told]
+            s.run_for(3 * PERIOD_S)
+            streamed(s, take, name, 0.06)
+    return s.evidence("numbers", take)
+
+
+@scene("forms", boards=("psa2",))
+def forms(s: Subject) -> Evidence:
+    """Every frame form for a while. facts: answer of each, and bit 31 of the TPDOs. Cuts "form 0" ... "stop"."""
+    with changed(s), s.take(lines=False) as take:
+        for form in (0, 1, 2, 3):
+            take.facts[f"answer {form}"] = tell(s, FORM, 0, form)
+            take.facts[f"off {form}"] = [ask(s, 0x1800 + k, 1) for k in range(5)]
+            streamed(s, take, f"form {form}", 0.06)
+        s.run_for(2 * PERIOD_S)
+        take.facts["stamp"] = ask(s, 0x2202, 5)  # of the latest sample, us, before the start
+        streamed(s, take, "again", 0.02)
+    return s.evidence("forms", take)
+
+
+@scene("fit", boards=("psa2",))
+def fit(s: Subject) -> Evidence:
+    """What the bus cannot carry. facts: words of 2031h, answers, CONFIG0 after; cuts "form", "rate"."""
+    with changed(s), s.take() as take:
+        cut(take, "rate")
+        take.facts["rate"] = tell(s, ACCEL[0], CONFIG0, 0x66)  # 4000 SPS in pairs
+        s.run_for(5 * PERIOD_S)
+        take.facts["rate text"], take.facts["config0"] = ask(s, 0x2031), ask(s, ACCEL[0], CONFIG0)
+        tell(s, FORM, 0, 1)
+        take.facts["fast"] = tell(s, ACCEL[0], CONFIG0, 0x66)
+        s.run_for(30 * PERIOD_S)
+        cut(take, "form")
+        take.facts["form"] = tell(s, FORM, 0, 0)
+        s.run_for(5 * PERIOD_S)
+        take.facts["form text"], take.facts["form read"] = ask(s, 0x2031), ask(s, FORM)
+        cut(take, "form end")
+    return s.evidence("fit", take)
+
+
+@scene("starts", boards=("psa2",))
+def starts(s: Subject) -> Evidence:
+    """The stream started and stopped many times, at all phases of a sample."""
+    s.unit.wait_ready()
+    with s.take(lines=False) as take:
+        for k in range(24):
+            s.unit.start()
+            s.run_for((4 + 0.13 * k) * PERIOD_S)
+            s.unit.stop()
+    return s.evidence("starts", take)
+
+
+@scene("objects", boards=("psa2",))
+def objects(s: Subject) -> Evidence:
+    """Identity, width and mirrors. facts: read; mirrors, those of one sample, with its PDO in the log."""
+    wanted = [(0x2200, 1), (0x2200, 2), (0x2200, 3), (0x2200, 4), (0x2202, 2), (0x2202, 3), (0x2202, 4)]
+    with changed(s), s.take(lines=False) as take:
+        take.facts["read"] = {
+            (i, sub): ask(s, i, sub) for i, sub in ((0x1008, 0), (0x1018, 2), (0x1018, 3), (0x2021, 0))
+        }
+        for axis in (1, 2, 3):
+            tell(s, 0x2210, axis, axis - 1)
+            tell(s, 0x2211, axis, 2)
+        tell(s, ACCEL[0], CONFIG0, 0x46)  # 250 SPS: a sample stands for 4 ms
+        s.run_for(0.4)
+        s.unit.start()
+        s.run_for(0.02)
+        found = []
+        for index, sub in (
+            *wanted,
+            (0x2201, 1),
+            (0x2201, 2),
+            (0x2201, 3),
+            *((i, k) for i in (0x6130, 0x9130) for k in (1, 2, 3)),
+        ):
+            found.append(_of_one_sample(s, index, sub))
+        s.run_for(0.02)
+        s.unit.stop()
+        take.facts["mirrors"] = found
+    return s.evidence("objects", take)
+
+
+def _of_one_sample(s: Subject, index: int, sub: int) -> tuple[int, int, Answer, Answer]:
+    """Object, sub-index, its value and the number of the sample that stood there before and after."""
+    for _ in range(6):
+        before = ask(s, 0x2202, 1)
+        value = ask(s, index, sub)
+        if before == ask(s, 0x2202, 1):
+            break
+    return index, sub, value, before
+
+
+@scene("trouble", boards=("psa2",))
+def trouble(s: Subject) -> Evidence:
+    """The temperature converter silenced by its SYNC command without WAKEUP. facts: access, counters."""
+    with changed(s), s.take() as take:
+        take.facts["before"] = counters(s)
+        s.unit.start()
+        s.run_for(20 * PERIOD_S)
+        cut(take, "silent")
+        take.facts["opcode"] = tell(s, OPCODE, 2, 0xFC)
+        take.facts["access"] = ask(s, TEMP, 1)
+        s.run_for(0.3)
+        s.unit.stop()
+        take.facts["after"] = counters(s, after=True)
+    return s.evidence("trouble", take)
+
+
+@scene("selfcal", boards=("psa2",))
+def selfcal(s: Subject) -> Evidence:
+    """SELFCAL to the temperature converter while it is scanned. Cuts "before", "selfcal"."""
+    with changed(s), s.take(lines=False) as take:
+        cut(take, "before")
+        s.unit.start()
+        s.run_for(0.08)
+        cut(take, "selfcal")
+        take.facts["opcode"] = tell(s, OPCODE, 2, 0xF0)
+        s.run_for(0.15)
+        s.unit.stop()
+    return s.evidence("selfcal", take)
+
+
+@scene("dictionary", boards=("psa2",))
+def dictionary(s: Subject) -> Evidence:
+    """Every object of the EDS but the registers read, and written where a write is refused. facts: rows."""
+    with changed(s), s.take(lines=False) as take:
+        take.facts["rows"] = [_row(s, d) for d in s.unit.node.objects() if not (d.index in (*ACCEL, TEMP) and d.sub)]
+    return s.evidence("dictionary", take)
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """An object as the EDS has it, and as the board answers."""
+
+    due: Described
+    raw: bytes  # what was read
+    abort: int  # of the read
+    write: int | None  # abort code of a write of the same (read-only) or of one too many; None: none was tried
+
+
+def _row(s: Subject, d: Described) -> Row:
+    raw, abort, write = b"", 0, None
+    try:
+        raw = s.unit.node.read_raw(d.index, d.sub)
+    except DeviceError as e:
+        abort = e.abort_code
+    if d.access in ("ro", "const"):
+        write = _abort_of_write(s, d, raw or bytes(d.data_bytes or 1))
+    elif isinstance(d.high, int) and d.data_bytes in (1, 2) and d.high + 1 < 1 << 8 * d.data_bytes:
+        write = _abort_of_write(s, d, (d.high + 1).to_bytes(d.data_bytes, "little"))
+    return Row(d, raw, abort, write)
+
+
+def _abort_of_write(s: Subject, d: Described, data: bytes) -> int:
+    try:
+        s.unit.node.write_raw(d.index, d.sub, data)
+    except DeviceError as e:
+        return e.abort_code
+    return 0
+
+
+@scene("chamber", boards=("psa2",))
+def chamber(s: Subject) -> Evidence:
+    """Temperature codes beside the temperature of the chamber. facts: temp_degc."""
+    s.unit.wait_ready()
+    with s.take(lines=False) as take:
+        take.facts["temp_degc"] = s.bench.chamber.temp_degc
+        s.unit.start()
+        s.run_for(0.1)
+        s.unit.stop()
+    return s.evidence("chamber", take)
