@@ -191,7 +191,8 @@ static double line_mhz(const struct psa2_profile *p)
 static bool check_int_low(const struct psa2_profile *p, char *why, size_t cap)
 {
     const int64_t low_ns = psa2_int_low_ns(p);
-    if (low_ns >= PSA2_INT_LOW_MIN_NS) return true;
+    if ((low_ns + 1) * 1000000 >= PSA2_INT_LOW_MIN_NS * (1000000 - (int64_t)PSA2_CLOCK_PPM))
+        return true; /* rounded down */
     const unsigned data = psa2_frame_clks(p) - p->lead_in_clk;
     const int64_t one = (int64_t)p->line_div * 1000000000;
     const int64_t need = (PSA2_INT_LOW_MIN_NS * (int64_t)p->line_hz + one - 1) / one;

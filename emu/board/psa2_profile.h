@@ -13,6 +13,7 @@
 #define PSA2_WORDS          4u
 #define PSA2_SETUP_MAX      16u
 #define PSA2_INT_LOW_MIN_NS 74000  /* article, protocol of exchange: "not less than 74 us" */
+#define PSA2_CLOCK_PPM      100    /* E0: by which a clock may be fast; 74.000 us are nominal */
 #define PSA2_GAP_CLK        4u     /* article: pause between words, CLK periods */
 #define PSA2_WORD_NS_MAX    150000 /* edges of a word are reported when it ends: inside TRACE_LAG_NS */
 

@@ -73,6 +73,8 @@ static void what_a_board_cannot_run_is_refused_in_words(void **state)
         {{{"word_bits", "20"}}, "word_bits = 20: use 16, 24 or 32"},
         {{{"code_bits", "32"}}, "code_bits = 32 but only read_bits = 24 are read: use read_bits >= 32"},
         {{{"sclk_hz", "2048000"}}, "sclk_hz = 2048000 > temp_clkin_hz / 4 = 1920000: use a slower SClk"},
+        {{{"line_hz", "2000300"}},
+         "INT low = (8 + 4*32 + 3*4) CLK / 2.000 MHz = 73.988 us < 74 us: use lead_in_clk >= 9 or line_div >= 2"},
         {{{"fclk_hz", "1500000"}}, "sclk_hz = 1024000 > fclk_hz / 2 = 750000: use a slower SClk"},
         {{{"sclk_hz", "200000"}}, "sclk_hz = 200000 < fclk_hz / 16 = 256000: use a faster SClk"},
         {{{"adc_pga", "3"}}, "adc_pga = 3: use 1, 2, 4, 8, 16, 32 or 64"},
@@ -99,6 +101,19 @@ static void what_a_board_cannot_run_is_refused_in_words(void **state)
     }
 }
 
+/* A crystal is 100 ppm fast: CLK is, too, and INT low for 73.993 us; 74.000 us are nominal. */
+static void clocks_may_be_fast_by_a_crystals_tolerance(void **state)
+{
+    (void)state;
+    const char *const rows[][2] = {
+        {"fclk_hz", "4096410"}, {"temp_clkin_hz", "7680768"}, {"sclk_hz", "1024102"}, {"line_hz", "2000200"}};
+    struct psa2_profile p = psa2_profile_default();
+    char why[300] = "";
+    for (size_t i = 0; i < COUNT(rows); i++)
+        if (!psa2_profile_set(&p, rows[i][0], 0, rows[i][1], why, sizeof why)) fail_msg("%s", why);
+    if (!psa2_profile_check(&p, why, sizeof why)) fail_msg("%s", why);
+}
+
 static void texts_that_are_no_values_leave_the_profile_alone(void **state)
 {
     (void)state;
@@ -111,6 +126,7 @@ static void texts_that_are_no_values_leave_the_profile_alone(void **state)
          "colour: unknown key; known here: name, fclk_hz, temp_clkin_hz, sclk_hz, line_hz, line_div, word_bits, "
          "lead_in_clk, word, code_bits, read_bits, gate_sclk, temp_channels, adc_is_1281, adc_vref_v, adc_pga, "
          "temp_vref_v, temp_sensor_a_per_k, temp_load_ohm, setup"},
+        {"fclk_hz", 0, "4100001", "fclk_hz: \"4100001\" is not an integer of 1000000 .. 4100000"},
         {"word_bits", 0, "thirty", "word_bits: \"thirty\" is not an integer of 16 .. 32"},
         {"word_bits", 0, "-24", "word_bits: \"-24\" is not an integer of 16 .. 32"},
         {"word_bits", 0, "33", "word_bits: \"33\" is not an integer of 16 .. 32"},
@@ -173,6 +189,7 @@ int main(void)
         cmocka_unit_test(shipped_profiles_run_and_have_these_times),
         cmocka_unit_test(the_default_is_the_file_article),
         cmocka_unit_test(what_a_board_cannot_run_is_refused_in_words),
+        cmocka_unit_test(clocks_may_be_fast_by_a_crystals_tolerance),
         cmocka_unit_test(texts_that_are_no_values_leave_the_profile_alone),
         cmocka_unit_test(the_data_period_follows_config0),
     };
