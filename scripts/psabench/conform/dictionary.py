@@ -1,0 +1,71 @@
+"""A board's own objects against its EDS: length, value after Res, what may be written (docs/protocol*.md, Objects)."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Container
+
+from psabench.canopen_host import Described
+from psabench.conform.bus_host import refused
+from psabench.conform.outcome import Broken
+from psabench.conform.requirements import requirements
+from psabench.conform.subject import Subject
+
+OWN, BUS, READ_ONLY = (
+    range(0x2000, 0x6000),
+    0x2002,
+    0x06010002,
+)  # BUS: cycles of the parallel bus, with rows of their own
+REAL_FORMATS = {4: "<f", 8: "<d"}
+
+
+def as_the_dictionary_says(s: Subject, eds: str, varies: Container[int] = ()) -> str:
+    """Every object of the board's own; returns what was seen, raises Broken. Just after Res.
+
+    varies: objects whose default is that of one profile.
+    """
+    beyond = int(requirements()["BUS-SDO-13"].limit("abort_code"))
+    objects = [o for o in s.unit.node.objects() if o.index in OWN and o.index != BUS]
+    for o in objects:
+        what = f"{o.index:04X}h:{o.sub} {o.name}"
+        if o.access == "wo":
+            continue
+        data = s.unit.node.read_raw(o.index, o.sub)
+        if o.data_bytes is not None and len(data) != o.data_bytes:
+            raise Broken(f"{what} has {len(data)} bytes", f"{o.data_bytes}")
+        due = None if o.index in varies else _default(o)
+        if due is not None and data != due:
+            raise Broken(f"{what} is {data.hex(' ')} after Res", due.hex(" "))
+    for o in objects:
+        what = f"{o.index:04X}h:{o.sub} {o.name}"
+        if o.access in ("ro", "const"):
+            same = bytes(o.data_bytes or 1)
+            refused(lambda o=o, d=same: s.unit.node.write_raw(o.index, o.sub, d), READ_ONLY, f"a write to {what}")  # type: ignore[misc]
+        elif (data_beyond := _beyond(o)) is not None:
+            refused(lambda o=o, d=data_beyond: s.unit.node.write_raw(o.index, o.sub, d), beyond, f"too much to {what}")  # type: ignore[misc]
+    return f"{len(objects)} objects of {eds}.eds"
+
+
+def _default(o: Described) -> bytes | None:
+    """Bytes of what it holds after Res; None: the EDS cannot know it."""
+    if o.access == "ro" or o.default is None or o.data_bytes is None:
+        return None
+    return _encoded(o, o.default)
+
+
+def _encoded(o: Described, value: float) -> bytes:
+    assert o.data_bytes is not None
+    if o.real:
+        return struct.pack(REAL_FORMATS[o.data_bytes], value)
+    return (int(value) & (1 << 8 * o.data_bytes) - 1).to_bytes(o.data_bytes, "little")
+
+
+def _beyond(o: Described) -> bytes | None:
+    """More than its high limit; None: it has none, or its bytes hold no more."""
+    if o.high is None or o.data_bytes is None:
+        return None
+    if o.real:
+        return _encoded(o, float(o.high) + max(1.0, abs(float(o.high))))
+    signed = o.low is not None and int(o.low) < 0
+    most = (1 << 8 * o.data_bytes - signed) - 1
+    return _encoded(o, int(o.high) + 1) if int(o.high) < most else None

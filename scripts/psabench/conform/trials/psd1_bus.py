@@ -1,0 +1,254 @@
+"""PSD-1's parallel bus through the bus port: registers, refusals, channels, what is latched."""
+
+from __future__ import annotations
+
+from psabench.conform.bus_host import line, line_refused
+from psabench.conform.outcome import Broken
+from psabench.conform.plan import trial
+from psabench.conform.proof import proves
+from psabench.conform.psd1_host import BOTH, calm, drive, has_host, period_s, run_cycles, status, word
+from psabench.conform.registers import names_and_rights
+from psabench.conform.requirements import requirements
+from psabench.conform.subject import Subject
+from psabench.errors import CycleRefused
+
+CYCLE = 0x08  # of STATUS
+HALF_S = 100e-6  # from one word to the next, and some more
+
+
+def _waiting(s: Subject, axis: int = 0) -> None:
+    """Let a cycle run until the word of an axis waits."""
+    calm(s)
+    line(s, f"W F {BOTH:04X}")
+    s.run_for(2 * period_s(s.variant))
+    for k in range(axis):
+        word(s, k)
+        s.run_for(HALF_S)
+
+
+@proves("PSD1-CYC-02")
+@trial(needs={"bus"})
+def no_cycle_without_int0_and_fl1(s: Subject) -> str:
+    """Write FLAGS 0, 1 and 2, look for a running cycle after each, then write 3."""
+    calm(s)
+    if has_host(s.variant):
+        return _without_flags(s)
+    for flags in (0, 1, 2):
+        line(s, f"W F {flags:04X}")
+        s.run_for(3 * period_s(s.variant))
+        if status(s) & CYCLE:
+            raise Broken(f"a cycle with FLAGS {flags}", "none without both INT0 and FL1")
+    _waiting(s)
+    if not status(s) & CYCLE:
+        raise Broken("no cycle with FLAGS 3", "one")
+    calm(s)
+    return "no cycle with FLAGS 0, 1 and 2, one with 3"
+
+
+def _without_flags(s: Subject) -> str:
+    """Where the board reads its words itself it counts them."""
+    found = {}
+    for flags in (0, 1, 2, BOTH):
+        line(s, f"W F {flags:04X}")
+        s.run_for(period_s(s.variant))
+        before = int(s.unit.node.read(0x2030, 12))
+        s.run_for(3 * period_s(s.variant))
+        found[flags] = int(s.unit.node.read(0x2030, 12)) - before
+    calm(s)
+    if any(found[k] for k in (0, 1, 2)) or not found[BOTH]:
+        raise Broken(f"cycles with FLAGS 0 to 3: {list(found.values())}", "none but with 3")
+    return f"no cycle with FLAGS 0, 1 and 2, {found[BOTH]} with 3"
+
+
+@proves("PSD1-CYC-05")
+@trial(needs={"bus"})
+def a_cycle_goes_on_without_its_conditions(s: Subject) -> str:
+    """Write FLAGS 0 while X waits, read the three words, look for another cycle."""
+    _waiting(s)
+    line(s, "W F 0000")
+    words = [word(s, axis).data for axis in range(3)]
+    s.run_for(4 * period_s(s.variant))
+    if status(s) & CYCLE:
+        raise Broken("another cycle", "none with INT0 and FL1 away")
+    calm(s)
+    return f"words {' '.join(f'{w:04X}h' for w in words)}, then no cycle"
+
+
+@proves("PSD1-FL2-06")
+@trial(needs={"bus"})
+def a_word_waits_for_its_strobe(s: Subject) -> str:
+    """Leave X unread for a second, then read X, Y and Z."""
+    _waiting(s)
+    before = line(s, "R 3").data & 0x07
+    s.run_for(1.0)
+    after = line(s, "R 3").data & 0x07
+    if (before, after) != (1, 1):
+        raise Broken(f"bits 2..0 of STATUS {before:03b} and, a second later, {after:03b}", "X waits: 001")
+    words = [word(s, axis).data for axis in range(3)]
+    calm(s)
+    return f"X waited for a second, then {' '.join(f'{w:04X}h' for w in words)}"
+
+
+@proves("PSD1-BUS-02")
+@trial(needs={"bus", "can"})
+def words_are_answered_at_their_addresses(s: Subject) -> str:
+    """Read X, Y and Z at 00h, 01h and 02h, and compare them with what the board tells of that cycle."""
+    calm(s)
+    for _ in range(4):
+        words = [c.data for c in drive(s, 1)]
+        told = [int(s.unit.node.read(0x2200, k)) for k in (1, 2, 3)]
+        if words != told:
+            raise Broken(f"{[f'{w:04X}h' for w in words]} on the bus", f"{[f'{w:04X}h' for w in told]} as 2200h tells")
+    calm(s)
+    return "four cycles, the words at 00h, 01h and 02h"
+
+
+@proves("PSD1-BUS-03")
+@trial(needs={"bus"})
+def a_strobe_for_another_word_is_refused(s: Subject) -> str:
+    """Read Y and Z while X waits, then X; read X before there is a cycle."""
+    code = requirements()["PSD1-BUS-03"].limit("abort_code")
+    calm(s)
+    line_refused(s, "R 0", code)
+    _waiting(s)
+    line_refused(s, "R 2", code)
+    line_refused(s, "R 1", code)
+    first = line(s, "R 0").data
+    if first == 0:
+        raise Broken("0000h from X after refusals", "its word")
+    calm(s)
+    return f"refused, and X gave {first:04X}h afterwards"
+
+
+@proves("PSD1-BUS-04")
+@trial(needs={"bus"})
+def a_word_is_taken_once(s: Subject) -> str:
+    """Read X twice."""
+    code = requirements()["PSD1-BUS-04"].limit("abort_code")
+    _waiting(s)
+    line(s, "R 0")
+    line_refused(s, "R 0", code)
+    calm(s)
+    return "the second strobe is refused"
+
+
+@proves("PSD1-BUS-05")
+@trial(needs={"bus"})
+def words_of_the_built_in_host_are_refused(s: Subject) -> str:
+    """Read X, Y and Z many times while the board reads them itself."""
+    code = requirements()["PSD1-BUS-05"].limit("abort_code")
+    for k in range(30):
+        line_refused(s, f"R {k % 3:X}", code)
+        s.run_for(period_s(s.variant) / 7)
+    return "thirty strobes refused"
+
+
+@proves("PSD1-BUS-06")
+@trial(needs={"bus"})
+def registers_have_their_names_and_rights(s: Subject) -> str:
+    """Ask who is there, read and write every address."""
+    words = {"X": 0x08000022, "Y": 0x08000022, "Z": 0x08000022}
+    calm(s)
+    seen = names_and_rights(s, "psd1", never=words, writes={"COMMAND": 3, "TEMP": 1, "SERVICE": 2, "FLAGS": 0})
+    calm(s)
+    return seen
+
+
+@proves("PSD1-BUS-10")
+@trial(needs={"bus"})
+def channels_come_back_with_their_codes(s: Subject) -> str:
+    """Write each channel to TEMP and SERVICE and read it back."""
+    row = requirements()["PSD1-BUS-10"]
+    bits = int(row.limit("code_bits"))
+    seen = []
+    for address in ("A", "B"):
+        for channel in range(int(row.limit("channels_count"))):
+            line(s, f"W {address} {channel:04X}")
+            got = line(s, f"R {address}").data
+            if got >> bits != channel:
+                raise Broken(f"{got:04X}h at 0{address}h", f"channel {channel} above {bits} bits")
+            seen.append(f"{got & (1 << bits) - 1:03X}h")
+    return f"codes {' '.join(seen)}"
+
+
+@proves("PSD1-BUS-11")
+@trial(needs={"bus"})
+def the_other_signals_are_there(s: Subject) -> str:
+    """Read gyros, rate sensors, temperatures and service signals."""
+    run_cycles(s, 3)
+    gyros = [line(s, f"R {a:X}").data for a in range(4, 7)]
+    rates = [line(s, f"R {a:X}").data for a in range(7, 10)]
+    service = []
+    for channel in range(4):
+        line(s, f"W B {channel:04X}")
+        service.append(line(s, "R B").data & 0xFFF)
+    if not service[0] or not service[1]:
+        raise Broken(f"codes of supply and reference {service[0]}, {service[1]}", "neither is 0 V")
+    self_test = service[3]
+    if self_test & 0x1F != 0x1F:
+        raise Broken(f"self-test {self_test:03X}h", "converters 0..2, coefficients and set-up: bits 0 to 4")
+    return f"gyros {gyros}, rates {rates}, service {service}"
+
+
+@proves("PSD1-BUS-11")
+@trial(needs={"bus", "supply"})
+def the_service_signal_follows_the_supply(s: Subject) -> str:
+    """Change the supply by a tenth and read its code before and after."""
+    line(s, "W B 0000")
+    supply = s.bench.supply
+    volts = supply.volt_v
+    s.run_for(0.2)
+    before = line(s, "R B").data & 0xFFF
+    try:
+        supply.set(volts * 0.95)
+        s.run_for(0.2)
+        after = line(s, "R B").data & 0xFFF
+    finally:
+        supply.set(volts)
+        s.run_for(0.2)
+    if not 0.93 * before < after < 0.97 * before:
+        raise Broken(f"code {before}, at 95 % of the supply {after}", "95 % of it")
+    return f"code {before}, at 95 % of the supply {after}"
+
+
+@proves("PSD1-BUS-12")
+@trial(needs={"bus"})
+def gyros_are_latched_with_the_cycle(s: Subject) -> str:
+    """Read the registers of gyros and rate sensors twice in a cycle; one that waits for its host lasts long."""
+    calm(s)
+    if not has_host(s.variant):
+        _waiting(s)
+    apart = []
+    for attempt in range(12):
+        seen = [line(s, f"R {a:X}").data for a in range(4, 10)]
+        if not has_host(s.variant):
+            s.run_for(0.1)
+        again = [line(s, f"R {a:X}").data for a in range(4, 10)]
+        if seen == again:
+            calm(s)
+            return f"{seen} twice"
+        if not has_host(s.variant):
+            break
+        apart.append(f"{seen}, then {again}")  # a cycle may have passed between
+        s.run_for(period_s(s.variant) * (0.1 + 0.07 * attempt))
+    calm(s)
+    raise Broken(apart[0] if apart else f"{seen}, then {again}", "the same in one cycle")
+
+
+@proves("PSD1-LATE-04")
+@trial(needs={"bus", "can"})
+def refusals_are_counted(s: Subject) -> str:
+    """Strobe words that do not wait and with strobes that are too short; look at the counters."""
+    calm(s)
+    counters = s.unit.counters()
+    refused = 0
+    for text in ("R 0", "R 1", "R 2", "W 3 0", "R 3 100", "R 4 150"):
+        try:
+            line(s, text)
+        except CycleRefused:
+            refused += 1
+    now = s.unit.counters()
+    told = now["Refused strobes"] - counters["Refused strobes"], now["Short strobes"] - counters["Short strobes"]
+    if told != (6, 2) or refused != 6:
+        raise Broken(f"{refused} refused; counted {told[0]}, too short {told[1]}", "6, 6, 2")
+    return "six refusals counted, two of them too short"
