@@ -1,0 +1,90 @@
+"""Mutants one after the other: built, run, judged."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from mutants.declared import ListError, Mutant, Target
+from mutants.suite import Run, Suite
+from mutants.tree import BuildError, Tree
+
+KILLED = ("killed", "crashed", "time-out")  # by a failed requirement; the emulator fell over; nobody came to an end
+SPARED = ("equivalent", "excused", "survived")  # nobody can see it; the suite cannot, and says why; it should have
+WRONG = ("bad list", "does not compile", "suite broken")  # nothing is known of the mutant
+TIMEOUT_FACTOR, TIMEOUT_MIN_S = 6.0, 120.0  # of the unmutated run: a loaded machine is no verdict
+
+
+@dataclass(slots=True, kw_only=True)
+class Result:
+    """Of one mutant."""
+
+    id: str
+    kind: str
+    file: str
+    stamp: str
+    result: str  # one of KILLED, SPARED, WRONG
+    on: str = ""  # the target that told
+    found: list[str] = field(default_factory=list)  # requirements that are worse than without it
+    breaks: list[str] = field(default_factory=list)  # that the list says
+    named: bool = False  # whether one of those was found
+    reason: str = ""
+    took_s: float = 0.0
+
+    @classmethod
+    def of(cls, row: dict[str, Any]) -> Result:
+        """As it stands in mutants.json."""
+        return cls(**row)
+
+
+class Judge:
+    """The unmutated emulator on every target, and mutants beside it."""
+
+    def __init__(self, tree: Tree, suite: Suite) -> None:
+        self.tree, self.suite = tree, suite
+        self.plain: dict[Target, Run] = {}
+
+    def baseline(self, targets: Iterable[Target]) -> dict[Target, Run]:
+        """Runs of the unmutated emulator."""
+        for t in targets:
+            if t not in self.plain:
+                self.plain[t] = self.suite.run(self.tree.emulator, t, 10 * TIMEOUT_MIN_S)
+        return self.plain
+
+    def judge(self, m: Mutant) -> Result:
+        """Build it and run the suite, until one target finds it."""
+        r = Result(id=m.id, kind=m.kind, file=m.file, stamp=m.stamp(), result="bad list", breaks=list(m.breaks))
+        try:
+            text = m.applied((self.tree.folder / m.file).read_text(encoding="utf-8"))
+            with self.tree.mutated(m.file, text) as emulator:
+                self._run(m, emulator, r)
+        except ListError as e:
+            r.reason = str(e)
+        except BuildError as e:
+            r.result, r.reason = "does not compile", str(e)
+        return r
+
+    def _run(self, m: Mutant, emulator: Path, r: Result) -> None:
+        for target in m.on:
+            plain = self.plain[target]
+            run = self.suite.run(emulator, target, max(TIMEOUT_MIN_S, TIMEOUT_FACTOR * plain.took_s))
+            r.on, r.took_s = str(target), round(r.took_s + run.took_s, 1)
+            r.found = run.worse_than(plain)
+            r.named = bool(set(m.breaks) & set(r.found))
+            r.result, r.reason = _verdict(m, run, bool(r.found))
+            if r.result not in SPARED:
+                return
+
+
+def _verdict(m: Mutant, run: Run, found: bool) -> tuple[str, str]:
+    if run.how == "broken":
+        return "suite broken", run.said
+    if run.how in KILLED:
+        return run.how, run.said
+    if found:
+        return "killed", m.reason and f"the list says that nothing finds it: {m.reason}"
+    if m.equivalent:
+        return "equivalent", m.equivalent
+    return ("excused", m.survives) if m.survives else ("survived", "")

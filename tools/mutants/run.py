@@ -1,0 +1,225 @@
+"""Does the conformance suite find what is wrong? Mutants of the emulator, built and judged one after the other."""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import random
+import signal
+import sys
+import tempfile
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from mutants import report
+from mutants.declared import ListError, Mutant, Target, load, problems
+from mutants.judge import KILLED, WRONG, Judge, Result
+from mutants.suite import Run, Suite
+from mutants.tree import ROOT, BuildError, Tree
+from psabench.conform.requirements import requirements
+
+OUT = ROOT / "build" / "mutants.json"
+PAGE = ROOT / "docs" / "mutants.md"
+DECLARED_RATE, RANDOM_RATE = 0.95, 0.85  # what the suite must reach
+
+EPILOG = """\
+Each mutant of tools/mutants/mutants.yaml is built in a private copy of the sources and judged by `psabench conform
+device` on the boards that its row names. It is killed when the verdict of a requirement is worse than that of the
+unmutated emulator, which must conform; an emulator that falls over and a run that does not end are counted apart.
+
+examples:
+  PYTHONPATH=tools .venv/bin/python -m mutants.run                  all of the list
+  PYTHONPATH=tools .venv/bin/python -m mutants.run pik- sdo-        those whose names begin so
+  PYTHONPATH=tools .venv/bin/python -m mutants.run --check          only: does each fit its source, and compile?
+  PYTHONPATH=tools .venv/bin/python -m mutants.run --sample 8       eight of them, the same eight for one list
+  PYTHONPATH=tools .venv/bin/python -m mutants.run --random 60 --seed 7
+  PYTHONPATH=tools .venv/bin/python -m mutants.run --again survived go on with those that were not killed last time
+
+What a run has found stands in build/mutants.json as it goes on; a run that was ended is resumed by --again. Exit status:
+0 the rates are reached and nothing is wrong with the list, 1 they are not, 2 bad input or the unmutated emulator does
+not conform, 130 ended by Ctrl-C.
+"""
+
+
+def parser() -> argparse.ArgumentParser:
+    """Options."""
+    p = argparse.ArgumentParser(
+        prog="mutants.run", description=__doc__, epilog=EPILOG, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    p.add_argument("names", nargs="*", metavar="NAME", help="mutants, or beginnings of their names (all)")
+    p.add_argument("--sample", type=int, metavar="N", help="only N of them, spread over the kinds")
+    p.add_argument("--random", type=int, default=0, metavar="N", help="N random mutants instead of declared ones")
+    p.add_argument("--seed", type=int, default=1, help="of the sample and of the random mutants (%(default)s)")
+    p.add_argument("--check", action="store_true", help="apply and compile each, run nothing")
+    p.add_argument(
+        "--again",
+        choices=("survived", "unknown"),
+        help="leave out what is in the latest file as killed (survived), or what is there at all (unknown)",
+    )
+    p.add_argument(
+        "--relative", action="store_true", help="go on although the unmutated emulator does not conform, and compare"
+    )
+    p.add_argument("--out", type=Path, default=OUT, metavar="FILE", help="results (build/mutants.json)")
+    p.add_argument("--docs", action="store_true", help="write the tables of docs/mutants.md")
+    return p
+
+
+def chosen(mutants: Sequence[Mutant], names: Sequence[str]) -> list[Mutant]:
+    """Those whose names begin so; all without names."""
+    return [m for m in mutants if not names or m.id.startswith(tuple(names))]
+
+
+def sample(mutants: Sequence[Mutant], count: int, seed: int) -> list[Mutant]:
+    """Of as many kinds as there can be, those that something must find; the same for one list and seed."""
+    rng = random.Random(seed)
+    pool = [m for m in mutants if not m.reason]
+    rng.shuffle(pool)
+    kinds: dict[str, list[Mutant]] = {}
+    for m in pool:
+        kinds.setdefault(m.kind, []).append(m)
+    rows = [row for turn in range(len(pool)) for row in (k[turn] for k in kinds.values() if turn < len(k))]
+    return rows[:count]
+
+
+def targets(mutants: Sequence[Mutant]) -> list[Target]:
+    """Each once, in order of appearance."""
+    return list(dict.fromkeys(t for m in mutants for t in m.on))
+
+
+def check(tree: Tree, mutants: Sequence[Mutant]) -> int:
+    """Exit status: whether each applies and compiles."""
+    wrong = 0
+    for n, m in enumerate(mutants, 1):
+        try:
+            with tree.mutated(m.file, m.applied((tree.folder / m.file).read_text(encoding="utf-8"))):
+                print(f"{n}/{len(mutants)} {m.id}: compiles", flush=True)
+        except (ListError, BuildError) as e:
+            wrong += 1
+            print(f"{n}/{len(mutants)} {m.id}: {e}", flush=True)
+    print(f"{len(mutants) - wrong} of {len(mutants)} apply and compile")
+    return 1 if wrong else 0
+
+
+def told_baseline(plain: dict[Target, Run]) -> bool:
+    """Whether the unmutated emulator conforms everywhere; says where it does not."""
+    for target, run in plain.items():
+        if run.conforms:
+            continue
+        bad = [i for i, v in run.verdicts.items() if v in ("failed", "inconclusive")]
+        detail = run.said.splitlines()[-1] if run.said else run.how
+        print(f"unmutated {target}: {detail}" + (f"; open: {' '.join(bad)}" if bad else ""))
+    return all(run.conforms for run in plain.values())
+
+
+def judged(judge: Judge, mutants: Sequence[Mutant], keep: Callable[[Result], None]) -> None:
+    """One after the other, with a line each."""
+    for n, m in enumerate(mutants, 1):
+        r = judge.judge(m)
+        keep(r)
+        print(f"{n}/{len(mutants)} {report.line(r)}", flush=True)
+
+
+def remembered(path: Path, part: str, mutants: Sequence[Mutant], again: str | None) -> dict[str, Result]:
+    """Results of the latest file that still stand: of rows that have not changed."""
+    rows = report.read(path).get(part, []) if again else []
+    stamps = {m.id: m.stamp() for m in mutants}
+    found = [Result.of(row) for row in rows]
+    return {
+        r.id: r
+        for r in found
+        if stamps.get(r.id) == r.stamp and (again == "unknown" or r.result in (*KILLED, "equivalent"))
+    }
+
+
+def state() -> str:
+    """Of the sources that are judged, and of what judges them."""
+    h = hashlib.sha256()
+    for part in ("emu", "proto", "scripts/psabench/conform"):
+        for path in sorted((ROOT / part).rglob("*")):
+            if path.is_file() and path.suffix in (".c", ".h", ".yaml", ".py"):
+                h.update(str(path.relative_to(ROOT)).encode() + b"\0" + path.read_bytes())
+    return h.hexdigest()[:16]
+
+
+def mutants_of(args: argparse.Namespace) -> list[Mutant]:
+    """Declared or random ones. Raises ListError."""
+    if args.random:
+        from mutants.chance import random_mutants
+
+        return random_mutants(ROOT, args.random, args.seed)
+    rows = load()
+    bad = problems(rows, ROOT, requirements().rows)
+    if bad:
+        raise ListError("\n".join(bad))
+    found = chosen(rows, args.names)
+    if not found:
+        raise ListError(f"no mutant begins with {' or '.join(args.names)}")
+    return sample(found, args.sample, args.seed) if args.sample else found
+
+
+def carry_out(args: argparse.Namespace, mutants: list[Mutant], folder: Path) -> int:
+    """Build, judge, tell."""
+    tree = Tree(folder)
+    if args.check:
+        return check(tree, mutants)
+    judge = Judge(tree, Suite(folder))
+    if not told_baseline(judge.baseline(targets(mutants))) and not args.relative:
+        print("the unmutated emulator must conform first (--relative goes on)")
+        return 2
+    part = "random" if args.random else "declared"
+    results = remembered(args.out, part, mutants, args.again)
+    facts: dict[str, Any] = {"state": state(), "seed": args.seed}
+    facts["baseline"] = {str(t): {"conforms": r.conforms, "took_s": round(r.took_s, 1)} for t, r in judge.plain.items()}
+    other = "declared" if args.random else "random"
+    others = [Result.of(row) for row in report.read(args.out).get(other, [])]
+
+    def parts() -> dict[str, Sequence[Result]]:
+        mine = [results[m.id] for m in mutants if m.id in results]
+        return {"declared": others, "random": mine} if args.random else {"declared": mine, "random": others}
+
+    def keep(r: Result) -> None:
+        results[r.id] = r
+        report.write(args.out, parts(), facts)
+
+    todo = [m for m in mutants if m.id not in results]
+    interrupted = False
+    try:
+        if args.random:
+            from mutants.observe import without_equivalent
+
+            todo = without_equivalent(judge, todo, keep)
+        judged(judge, todo, keep)
+    except KeyboardInterrupt:
+        interrupted = True
+    mine = [results[m.id] for m in mutants if m.id in results]
+    for words in report.summary(part, mine):
+        print(words)
+    if args.docs:
+        report.page(PAGE, parts())
+    return 130 if interrupted else status(mine, RANDOM_RATE if args.random else DECLARED_RATE)
+
+
+def status(results: Sequence[Result], wanted: float) -> int:
+    """Exit status for these results."""
+    killed, of = report.rate(results)
+    return 1 if any(r.result in WRONG for r in results) or killed < wanted * of else 0
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Entry point."""
+    args = parser().parse_args(argv)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # as Ctrl-C: the private copy goes
+    try:
+        mutants = mutants_of(args)
+        with tempfile.TemporaryDirectory(prefix="mutants-") as folder:
+            return carry_out(args, mutants, Path(folder) / "work")
+    except (ListError, BuildError) as e:
+        print(e, file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        return 130
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,82 @@
+"""A private copy of the sources, in which one mutant at a time is built. The checkout is never touched."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+DEVICE = ("Makefile", "pyproject.toml", "emu", "proto", "tools", "scripts")  # what an emulator is built from
+SUITE = ("pyproject.toml", "scripts", "proto")  # what judges it
+BUILD = "build-mutants"
+BUILD_S = 600.0
+CFLAGS = "-O1"
+
+
+class BuildError(Exception):
+    """It does not compile; the words are the compiler's."""
+
+
+def copy(parts: tuple[str, ...], root: Path, to: Path) -> None:
+    """Parts of the repository, with their times."""
+    to.mkdir(parents=True)
+    leave_out = shutil.ignore_patterns("__pycache__", "*.pyc", "bundle")
+    for part in parts:
+        if (root / part).is_dir():
+            shutil.copytree(root / part, to / part, ignore=leave_out)
+        else:
+            shutil.copy2(root / part, to / part)
+
+
+class Tree:
+    """An emulator's sources and what they are built into."""
+
+    def __init__(self, folder: Path, root: Path = ROOT) -> None:
+        """Copies and builds the unmutated one. Raises BuildError."""
+        self.folder = folder / "device"
+        copy(DEVICE, root, self.folder)
+        self.build()
+        self._kept = folder / "kept"
+        for name in ("build", BUILD):
+            shutil.copytree(self.folder / name, self._kept / name)
+
+    @property
+    def emulator(self) -> Path:
+        return self.folder / BUILD / "psa-emu"
+
+    def build(self) -> None:
+        """Raises BuildError."""
+        make = ["make", "-j2", "--no-print-directory", f"PY={sys.executable}", f"BUILD={BUILD}", f"CFLAGS={CFLAGS}"]
+        env = {k: v for k, v in os.environ.items() if not k.startswith("MAKE") and k != "MFLAGS"}
+        env["PYTHONPATH"] = str(self.folder / "scripts")
+        done = subprocess.run(
+            [*make, f"{BUILD}/psa-emu"], cwd=self.folder, env=env, capture_output=True, text=True, timeout=BUILD_S
+        )
+        if done.returncode != 0:
+            raise BuildError("\n".join(done.stderr.strip().splitlines()[-8:]))
+
+    @contextmanager
+    def mutated(self, file: str, text: str) -> Iterator[Path]:
+        """The emulator with `text` as that file; afterwards all is as it was. Raises BuildError."""
+        path = self.folder / file
+        before, times = path.read_bytes(), path.stat()
+        try:
+            path.write_text(text, encoding="utf-8")
+            self.build()
+            yield self.emulator
+        finally:
+            path.write_bytes(before)
+            os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
+            self._restore()
+
+    def _restore(self) -> None:
+        """Files of the build that the mutant has made, as they were before: nothing is compiled twice."""
+        for kept in self._kept.rglob("*"):
+            path = self.folder / kept.relative_to(self._kept)
+            if kept.is_file() and (not path.exists() or path.stat().st_mtime_ns != kept.stat().st_mtime_ns):
+                shutil.copy2(kept, path)
