@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from psabench.conform import identity, report, runner, suite
+from psabench.conform import identity, recording_command, report, runner, suite
 from psabench.conform.exhibits import Exhibits
 from psabench.conform.outcome import Outcome
 from psabench.conform.requirements import Requirement, requirements
@@ -25,6 +25,7 @@ examples:
   psabench conform device --board psa2                   an emulator started for it, in lockstep, all lines seen
   psabench conform device --board psa2 --profile w24 --can socketcand:127.0.0.1:29536 --lines /dev/pts/7
   psabench conform device --board psd1 --can slcan:/dev/ttyACM0 --bus-port /dev/ttyUSB1
+  psabench conform recording run.log lines.vcd --board psa2    files that were recorded at a bench
   psabench conform list --board psa2                     its requirements, and how each is seen
 """
 
@@ -48,6 +49,7 @@ def add(commands: Any, formatter: Any, bus_help: str) -> None:
     )
     suites = p.add_subparsers(required=True, metavar="SUITE")
     _add_device(suites, formatter, bus_help)
+    recording_command.add(suites, formatter, _add_board)
     _add_list(suites, formatter)
 
 

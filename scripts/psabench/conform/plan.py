@@ -34,6 +34,19 @@ WAYS = frozenset(
     {"can", "line", "pins", "bus", "supply", "chamber", "lockstep", "inputs", "fd", "rtr", "stamps", "errors", "slow"}
 )
 
+# Parts of a recording: all of it; a Res or boot-up and what follows; the readings after the set-up; "": none of it.
+PARTS = ("all", "boot", "stream", "")
+# Scenes that a bench goes through by itself. Others are a stimulus: a recording has it only if somebody made it.
+SCENE_ON_RECORDING: Mapping[str, str] = {
+    "stream": "stream",
+    "quiet": "stream",
+    "starts": "stream",
+    "power_on": "boot",
+    "services": "all",
+    "overload": "all",
+    "registers": "all",
+}
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Plan:
@@ -41,6 +54,7 @@ class Plan:
 
     scene: str
     needs: frozenset[str]  # probes without which it is not observable
+    on_recording: str = ""  # the part of a recording that it judges, one of PARTS; "": it wants its scene
 
     @property
     def is_trial(self) -> bool:
@@ -60,11 +74,17 @@ _plans: dict[Callable[..., str], Plan] = {}
 _scenes: list[Scene] = []
 
 
-def check(scene: str, *, needs: Iterable[str] = ("can",)) -> Callable[[Check], Check]:
-    """A pure test of the evidence of this scene. Raises ValueError for a need that there is not."""
+def check(scene: str, *, needs: Iterable[str] = ("can",), on_recording: str | None = None) -> Callable[[Check], Check]:
+    """A pure test of the evidence of this scene. Raises ValueError for a need or a part that there is not.
+
+    on_recording: the part of a recording that it judges, that of its scene (SCENE_ON_RECORDING) where it is not said.
+    """
+    part = SCENE_ON_RECORDING.get(scene, "") if on_recording is None else on_recording
+    if part not in PARTS:
+        raise ValueError(f"on_recording is {part!r}; there are {', '.join(map(repr, PARTS))}")
 
     def register(test: Check) -> Check:
-        _plans[test] = Plan(scene=scene, needs=_ways(needs))
+        _plans[test] = Plan(scene=scene, needs=_ways(needs), on_recording=part)
         return test
 
     return register
