@@ -141,6 +141,10 @@ class BusPort:
         """The answer to the oldest line that has none yet."""
         return parse(self._line(patience_s))
 
+    def answered(self, patience_s: float = PATIENCE_S) -> str:
+        """As `answer`, but the line as it stands."""
+        return self._line(patience_s)
+
     def _line(self, patience_s: float) -> str:
         """One line. patience_s: of real time, or of the bench's time where we move it."""
         left_s = patience_s
