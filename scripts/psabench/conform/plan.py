@@ -31,7 +31,22 @@ Trial = TypeVar("Trial", bound="Callable[[Subject], str]")
 SceneOf = Callable[["Subject"], Evidence]
 
 WAYS = frozenset(
-    {"can", "line", "pins", "bus", "supply", "chamber", "lockstep", "inputs", "fd", "rtr", "stamps", "errors", "slow"}
+    {
+        "can",
+        "line",
+        "pins",
+        "bus",
+        "supply",
+        "chamber",
+        "lockstep",
+        "inputs",
+        "fd",
+        "rtr",
+        "stamps",
+        "errors",
+        "slow",
+        "port",
+    }
 )
 
 # Parts of a recording: all of it; a Res or boot-up and what follows; the readings after the set-up; "": none of it.

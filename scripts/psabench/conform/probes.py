@@ -66,6 +66,15 @@ class PortProbe:
         self._data = bytearray()
         self._trouble = ""
 
+    @property
+    def path(self) -> Path:
+        return self._path
+
+    @property
+    def data(self) -> bytes:
+        """The bytes as they came, of the last look."""
+        return bytes(self._data)
+
     def start(self) -> None:
         """Raises LinkError when there is nothing at the path."""
         try:

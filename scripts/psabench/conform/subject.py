@@ -86,8 +86,13 @@ class Subject:
         probe: LineProbe | None,
         port: BusPort | None,
         inputs_v: Mapping[str, float],
+        line_port: PortProbe | None = None,
     ) -> None:
-        """inputs_v: what lies at the inputs while it is tested, as far as the user knows."""
+        """inputs_v: what lies at the inputs while it is tested, as far as the user knows.
+
+        line_port: the line port itself, whether or not `probe` looks through it.
+        """
+        self.line_port = line_port
         self.bench, self.variant, self.probe, self.port, self.inputs_v = bench, variant, probe, port, inputs_v
         kind = of_board(variant.board)
         found = next((u for u in bench.units.values() if isinstance(u, kind)), None)
@@ -109,13 +114,15 @@ class Subject:
 
     @property
     def probes(self) -> frozenset[str]:
-        """What can be seen: can, line (INT, DATA and CLK, or what the line port has), pins (all lines), bus, supply.
+        """What can be seen: can, line (INT, DATA and CLK, or what the line port has), pins (all lines), bus, supply, port.
 
         Of the link to the bus: fd and rtr, frames that it carries; stamps, its times are the bus's.
         """
         seen = {"can"}
         if self.probe is not None:
             seen |= {"line", "pins"} if isinstance(self.probe, PinProbe) else {"line"}
+        if self.line_port is not None:
+            seen.add("port")
         if self.port is not None:
             seen.add("bus")
         seen |= {"supply", "chamber"} & set(self.bench.addresses)
@@ -201,7 +208,7 @@ class Subject:
             stack.callback(bench.close)
             probe = None if at.lines is None else PortProbe(at.lines, variant.family, at.line_hz)
             port = None if at.bus_port is None else stack.enter_context(BusPort(at.bus_port))
-            subject = cls(bench, variant, probe, port, at.inputs_v)
+            subject = cls(bench, variant, probe, port, at.inputs_v, probe)
             if port is not None:
                 subject._stack.callback(port.close)
             stack.pop_all()
@@ -215,19 +222,20 @@ class Subject:
             path.write_text(json.dumps(scenario(variant, at.inputs_v, clock_ppm)), encoding="utf-8")  # YAML, too
             line, bus = folder / "line", folder / "bus"
             extra: list[str | Path] = ["--vcd-unit", "1"]
-            extra += ["--line", line] if at.port_only else []
+            extra += ["--line", line]  # which samples nothing while nobody has it open
             extra += ["--bus-port", f"{UNIT}:{bus}"] if variant.family in BUS_BOARDS else []
             bench = Bench.start(path, seed=seed, can=at.adapter, extra=extra)
             stack.callback(bench.close)
             probe: LineProbe
+            line_port = PortProbe(line, variant.family)
             if at.port_only:
-                probe = PortProbe(line, variant.family)
+                probe = line_port
             else:
                 probe = pins = PinProbe(bench, UNIT)
                 stack.callback(pins.close)
             port = stack.enter_context(BusPort(bus, advance=bench.wait)) if variant.family in BUS_BOARDS else None
             inputs_v = {} if variant.family == "gyro" else at.inputs_v
-            subject = cls(bench, variant, probe, port, inputs_v)
+            subject = cls(bench, variant, probe, port, inputs_v, line_port)
             subject._stack = stack.pop_all()
         return subject
 
