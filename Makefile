@@ -54,7 +54,7 @@ say = $(if $(V),,@echo '  $(1)	$(2)')
 
 # build/gen/gen.mk is made from proto/psabench.yaml before anything is compiled and names the generated sources in GEN_SRC.
 PY     := .venv/bin/python
-NO_GEN := setup run test bench clean help uninstall lock
+NO_GEN := setup run test bench mutants clean help uninstall lock
 ifneq ($(wildcard proto/psabench.yaml),)
 ifneq ($(if $(MAKECMDGOALS),$(filter-out $(NO_GEN),$(MAKECMDGOALS)),all),)
 include build/gen/gen.mk
@@ -80,7 +80,7 @@ C_FILES   = $(sort $(wildcard emu/*/*.[ch] emu/*/*.[ch]pp tests/*/*.[ch] example
 
 .SECONDARY:
 .DELETE_ON_ERROR:
-.PHONY: all lib setup run test bench bench-bin check pytest san builds e2e e2e-san e2e-vcan e2e-slc0 uml soak fuzz fuzz-check fuzz-each lint format golden docs install uninstall wheel clean help lock
+.PHONY: all lib setup run test bench bench-bin mutants check pytest san builds e2e e2e-san e2e-vcan e2e-slc0 uml soak fuzz fuzz-check fuzz-each lint format golden docs install uninstall wheel clean help lock
 
 ## all: the emulator, build/psa-emu (make CC=clang and make SAN=address,undefined build beside it, in build-clang and build-san)
 all: $(if $(MAIN),$(BUILD)/psa-emu,$(LIB_OBJ)) lib
@@ -180,6 +180,10 @@ bench:
 	@BENCH_CC='$(CC)' BENCH_CFLAGS='$(CFLAGS)' $(PY) -m tests.bench.run --seconds $(BENCH_S)
 
 bench-bin: all $(BENCH_BIN)
+
+## mutants: does the conformance suite find what is wrong? docs/mutants.md (some: make mutants MUTANTS='pik- sdo-')
+mutants: | $(PY)
+	@PYTHONPATH=tools $(PY) -m mutants.run $(MUTANTS)
 
 ## check: the C unit tests (one: make check TESTS=test_sched)
 check: $(TEST_BIN)

@@ -131,7 +131,8 @@ def _of_one(m: Mutant, root: Path, known: Iterable[str]) -> Iterator[str]:
 
 def problems(mutants: Iterable[Mutant], root: Path, known: Iterable[str]) -> list[str]:
     """What is wrong with the list, in words; known: ids of requirements."""
-    ids, found, rows = set(known), [], list(mutants)
+    ids, rows = set(known), list(mutants)
+    found: list[str] = []
     for m in rows:
         found += _of_one(m, root, ids)
     seen = [m.id for m in rows]

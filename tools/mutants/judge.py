@@ -42,9 +42,11 @@ class Result:
 class Judge:
     """The unmutated emulator on every target, and mutants beside it."""
 
-    def __init__(self, tree: Tree, suite: Suite) -> None:
-        self.tree, self.suite = tree, suite
+    def __init__(self, tree: Tree, suite: Suite, *, compare: bool = False) -> None:
+        """compare: mutants that `mutants.observe` does not tell from the unmutated one are equivalent."""
+        self.tree, self.suite, self.compare = tree, suite, compare
         self.plain: dict[Target, Run] = {}
+        self._looks: dict[Target, str] = {}
 
     def baseline(self, targets: Iterable[Target]) -> dict[Target, Run]:
         """Runs of the unmutated emulator."""
@@ -59,12 +61,26 @@ class Judge:
         try:
             text = m.applied((self.tree.folder / m.file).read_text(encoding="utf-8"))
             with self.tree.mutated(m.file, text) as emulator:
-                self._run(m, emulator, r)
+                if self.compare and self._alike(m, emulator):
+                    r.result, r.reason = "equivalent", "nothing differs on any wire in the fixed runs"
+                else:
+                    self._run(m, emulator, r)
         except ListError as e:
             r.reason = str(e)
         except BuildError as e:
             r.result, r.reason = "does not compile", str(e)
         return r
+
+    def _look(self, emulator: Path, target: Target) -> str:
+        status, said = self.suite.python(emulator, ["-m", "mutants.observe", str(target)], TIMEOUT_MIN_S)
+        return said.splitlines()[-1] if status == 0 and said else f"status {status}"
+
+    def look(self, targets: Iterable[Target]) -> None:
+        """What is seen of the unmutated emulator; before the first mutant is built."""
+        self._looks = {t: self._look(self.tree.emulator, t) for t in targets}
+
+    def _alike(self, m: Mutant, emulator: Path) -> bool:
+        return all(self._look(emulator, t) == self._looks[t] for t in m.on)
 
     def _run(self, m: Mutant, emulator: Path, r: Result) -> None:
         for target in m.on:
