@@ -24,6 +24,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, TypeVar
 
+from can.interfaces.slcan import slcanBus
+
 from psabench.can_host import QUANTUM_S, CanHost, StepClock, WallClock, open_bus
 from psabench.control import Control, Reply
 from psabench.devices import Psa2, identify, of_board
@@ -37,6 +39,7 @@ from psabench.unit import Unit
 
 NS = 1_000_000_000
 SLICE_NS = NS  # long runs go in slices of simulated time, so that Ctrl-C is heard
+SERIAL_SLICE_NS = NS // 20  # with slcan: a full pseudo-terminal stops time, and nobody reads it while a slice runs
 AWAY_SLICE_NS = 60 * NS  # nobody receives meanwhile: they are as short
 NONE = "none"  # as the CAN specification: no bus
 FIRST = "can0"  # name of a bus that has no other
@@ -315,9 +318,14 @@ class Bench:
             return
         left_ns = round(dwell_s * NS)
         while left_ns > 0:
-            slice_ns = min(left_ns, SLICE_NS)
+            slice_ns = min(left_ns, SERIAL_SLICE_NS if self._serial else SLICE_NS)
             self._clock.command(None, "run", for_s=slice_ns / NS)
             left_ns -= slice_ns
+
+    @property
+    def _serial(self) -> bool:
+        """Whether frames come through a serial line, which holds few of them."""
+        return any(isinstance(h.bus, slcanBus) for h in self.hosts.values())
 
     def wait_away(self, dwell_s: float) -> None:
         """`wait`, but in step pace the buses are left: what passes on them is not received, so hours are soon over.
