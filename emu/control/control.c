@@ -8,18 +8,9 @@
 #include <stdio.h>
 #include <string.h>
 
-const struct control_table *const control_tables[] = {&commands_bench,
-                                                      &commands_head,
-                                                      &commands_table,
-                                                      &commands_chamber,
-                                                      &commands_supply,
-                                                      &commands_platform,
-                                                      &commands_watch,
-                                                      &commands_fault,
-                                                      &commands_snapshot,
-                                                      &commands_bus,
-                                                      &commands_can,
-                                                      NULL};
+const struct control_table *const control_tables[] = {
+    &commands_bench, &commands_head,  &commands_table,    &commands_chamber, &commands_supply, &commands_platform,
+    &commands_watch, &commands_fault, &commands_snapshot, &commands_bus,     &commands_can,    NULL};
 const struct control_table *const control_truth_tables[] = {&commands_truth, NULL};
 
 void control_init(struct control *c, const struct control_table *const *tables, const struct control_bench *bench)
