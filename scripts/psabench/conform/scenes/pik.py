@@ -1,0 +1,45 @@
+"""Scenes of PIK, PIK-5 and PIK-6: from Res, a second on the lines, a minute of readings."""
+
+from __future__ import annotations
+
+from psabench.conform.evidence import Evidence
+from psabench.conform.plan import scene
+from psabench.conform.subject import Subject
+
+START_S, STREAM_S, MINUTE_S = 0.06, 1.0, 60.5
+
+
+@scene("power_on", boards=("pik",))
+def power_on(s: Subject) -> Evidence:
+    """From Res to some readings, streaming as soon as it has booted."""
+    with s.take() as take:
+        s.reset()
+        s.run_for(0.002)
+        s.unit.start()
+        s.run_for(START_S)
+        s.unit.stop()
+    return s.evidence("power_on", take)
+
+
+@scene("stream", boards=("pik",))
+def stream(s: Subject) -> Evidence:
+    """A second of pulses and readings."""
+    s.reset()
+    s.run_for(START_S)
+    with s.take() as take:
+        s.unit.start()
+        s.run_for(STREAM_S)
+        s.unit.stop()
+    return s.evidence("stream", take)
+
+
+@scene("minute", boards=("pik",))
+def minute(s: Subject) -> Evidence:
+    """A minute of readings at still inputs."""
+    s.reset()
+    s.run_for(START_S)
+    with s.take(lines=False) as take:
+        s.unit.start()
+        s.run_for(MINUTE_S)
+        s.unit.stop()
+    return s.evidence("minute", take)
