@@ -39,7 +39,7 @@ def totals(e: Evidence, least: int = LEAST) -> tuple[Floats, Ints]:
     xy, z = _told(e, "PIK_TOTALS", least).raw("PIK_TOTALS"), _told(e, "PIK_TOTAL_Z", least).raw("PIK_TOTAL_Z")
     n = min(len(xy["X"]), len(z["Z"]))
     found = np.stack([_unwrapped(v[:n]) for v in (xy["X"], xy["Y"], z["Z"])], axis=1)
-    return unwrap(z["TSTAMP"][:n], 32) * 1e-6, found
+    return np.asarray(unwrap(z["TSTAMP"][:n], 32) * 1e-6, np.float64), found
 
 
 def _unwrapped(v: Ints) -> Ints:

@@ -48,7 +48,7 @@ def the_period_can_be_set(s: Subject) -> str:
         s.run_for(0.1)
         s.unit.stop()
     log = s.evidence("period", take).frames_of("PIK_TOTAL_Z")
-    stamps = unwrap(log.raw("PIK_TOTAL_Z")["TSTAMP"], 32) if len(log) else []
+    stamps = unwrap(log.raw("PIK_TOTAL_Z")["TSTAMP"], 32).tolist() if len(log) else []
     due = 0x32 * row.limit("unit_us")
     steps = [int(b - a) for a, b in pairwise(stamps)][1:]
     if len(steps) < 5 or max(abs(v - due) for v in steps) > 2:
