@@ -31,9 +31,11 @@ from psabench.procedures.head_bench import Progress
 from psabench.signals import Ints
 from psabench.vcd import Vcd, Wire
 
-PINS_NS = 60.0  # edges known so well or better stand for a clip on each pin
+PINS_NS = 42.0  # edges known so well or better stand for a clip on each pin
 BOOT_UP, NMT_RESETS = b"\0", (0x81, 0x82)
 HEARTBEAT_ID, SDO_RX_ID = 0x700, 0x600
+RES_IS_A_LINE = ("psa2",)
+BEFORE_NS = 300_000  # lines at rest before the first beat, with the read that it tells of
 MARK = "clock_error_ppm"  # limit of rows that say a frequency
 NO_PART = {
     "boot": "the recording has no Res and no boot-up",
@@ -216,15 +218,11 @@ def stream(e: Evidence) -> Evidence:
     beat = BEATS.get(e.variant.family)
     if e.lines is None or beat is None or beat.line not in e.lines.recording.wires:
         return found
-    ends = _resets_ns(e.lines)
-    edges = e.lines.recording.wires[beat.line].edges_ns(beat.level)
-    later = edges[edges > ends[-1]] if len(ends) else edges
-    if not len(ends) or not len(later):
+    ends, edges = _resets_ns(e.lines), e.lines.recording.wires[beat.line].edges_ns(beat.level)
+    later = edges[edges > ends[-1]] if len(ends) else edges[clocks.steady_from(e.variant, edges) :]
+    if not len(later) or (e.variant.family in RES_IS_A_LINE and not len(ends)):
         return found
-    return found.with_lines(lines_from(e.lines, max(int(ends[-1]), int(later[0]) - BEFORE_NS)))
-
-
-BEFORE_NS = 300_000  # lines at rest before the first beat, with the read that it tells of
+    return found.with_lines(lines_from(e.lines, max(e.lines.start_ns, int(later[0]) - BEFORE_NS)))
 
 
 def boot(e: Evidence, needs: frozenset[str]) -> Evidence:
@@ -233,7 +231,7 @@ def boot(e: Evidence, needs: frozenset[str]) -> Evidence:
     if "can" in needs and not boots:
         raise TooLittle("the log has no boot-up")
     if needs & {"line", "pins"} and e.lines is not None and not len(_resets_ns(e.lines)):
-        has_res = "Res" in e.lines.recording.wires or e.variant.family == "psa2"
+        has_res = "Res" in e.lines.recording.wires or e.variant.family in RES_IS_A_LINE
         if has_res or not boots:
             raise TooLittle("the recording has no pulse on Res" if has_res else NO_PART["boot"])
     if e.lines is not None and len(_resets_ns(e.lines)) and not e.lines.recording.wires["Res"].level[0]:

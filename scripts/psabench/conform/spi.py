@@ -102,12 +102,31 @@ def _length(first_two: Sequence[int]) -> int:
 
 
 def _temp(found: Sequence[Burst], log: LineLog) -> list[Message]:
-    """One low of CST holds one message."""
+    """One low of CST holds one message, or several where samples do not show a short high between them."""
     selects = log.falls("CST")
     groups: dict[int, list[Burst]] = {}
     for b in found:
         groups.setdefault(int(np.searchsorted(selects, b.rise_ns[0], "right")), []).append(b)
-    return [_message(group) for group in groups.values()]
+    return [_message(part) for group in groups.values() for part in _temp_messages(group)]
+
+
+def _temp_messages(group: Sequence[Burst]) -> list[list[Burst]]:
+    """Bursts of one low of CST, cut where a command has all its bits (sources 2.5)."""
+    made: list[list[Burst]] = [[]]
+    for b in group:
+        sent = "".join(x.sent for x in made[-1])
+        if sent and len(sent) >= _temp_bits(_bytes(sent)):
+            made.append([])
+        made[-1].append(b)
+    return made
+
+
+def _temp_bits(sent: bytes) -> int:
+    """Of a command to the temperature converter, all told: RDATA has 3 bytes more, RREG and WREG say how many."""
+    if sent[:1] == b"\x01":
+        return 4 * BYTE
+    register = sent[:1] and sent[0] & 0xE0 in (0x00, 0x40) and sent[0] & 0x10
+    return (3 + (sent[1] & 0x0F) if len(sent) > 1 else 2) * BYTE if register else len(sent) * BYTE + BYTE
 
 
 def _message(parts: Sequence[Burst]) -> Message:

@@ -171,11 +171,11 @@ def cst_frames_every_burst_of_its_port(e: Evidence) -> str:
     slack_ns = row.limit("tolerance_ns")
     before, after = [], []
     for fall, rise in zip(falls, rises, strict=True):
-        k = int(np.searchsorted(begin, fall))
-        if k >= len(begin) or end[k] > rise:
+        k, last = int(np.searchsorted(begin, fall)), int(np.searchsorted(begin, rise)) - 1
+        if k > last or end[last] > rise:
             raise Broken("a low of CST without a burst", "one burst in each", at_ns=int(fall), lines=TEMP)
         before.append(float(begin[k] - fall))
-        after.append(float(rise - end[k]))
+        after.append(float(rise - end[last]))
     lo, hi = row.limit("before_min_sclk") * period_ns, row.limit("before_max_sclk") * period_ns
     said = near(e, np.array(before), falls, (lo + hi) / 2, (hi - lo) / 2 + slack_ns, "of CST before SClk", TEMP)
     due_ns = tau_ns(e, row.limit("after_tau"))

@@ -24,6 +24,7 @@ NS = 1e9
 LEAST = 20  # beats, and pairs of them, that a ratio wants
 MOST_PPM = 2000.0  # no crystal is farther off: the period itself is another
 BLOCKS = 8
+STEADY, OFF_BEAT = 4, 0.01  # so many beats in turn are the board's period, each so near to it
 CODE_BITS = 24
 CAN_RESOLUTION_S = 1e-6  # of stamps: candump's digits
 
@@ -128,6 +129,19 @@ def beat_row(variant: Variant) -> str:
 def _period_s(beat: Beat, variant: Variant) -> float | None:
     row = beat_row(variant)
     return requirements().rows[row].limit(beat.rows[row]) * 1e-6 if row else None
+
+
+def steady_from(variant: Variant, edges_ns: Ints) -> int:
+    """The first of these edges of the beat's line from which on they come in the board's period; 0 where none do."""
+    beat = BEATS.get(variant.family)
+    period_s = None if beat is None else _period_s(beat, variant)
+    if period_s is None:
+        return 0
+    steps = np.diff(edges_ns) / NS / period_s
+    good = (np.abs(steps - np.rint(steps)) < OFF_BEAT) & (steps > 0.5)
+    run = np.convolve(good, np.ones(STEADY)) if len(good) else np.empty(0)
+    whole = np.flatnonzero(run == STEADY)
+    return int(whole[0]) - STEADY + 1 if len(whole) else 0
 
 
 def _of_lines(log: LineLog, beat: Beat, period_s: float) -> Ratio | None:
