@@ -20,6 +20,7 @@ from test_frames import pair
 from test_readings import reading
 
 PER_STEP = 3  # frames
+STEP_S = 0.01
 
 
 def streams(first_seq: int, steps: int, phase: Any, lose: frozenset[int] = frozenset()) -> tuple[Any, Any]:
@@ -30,7 +31,7 @@ def streams(first_seq: int, steps: int, phase: Any, lose: frozenset[int] = froze
         for m in itertools.chain.from_iterable(pair((1000 * (k % 8000), -k, 0), q) for q in seqs if q not in lose):
             level.on_message(m)
         raw = {"STEP": k, "PHASE": int(phase(k)), "POSITION": 1 + (k >= 40), "LEVEL_SEQ": seqs[-1] % 2**16, "MODE": 4}
-        for m in reading(Gyro.layout, raw, 9, k * 0.01):
+        for m in reading(Gyro.layout, raw, 9, k * STEP_S):
             assert isinstance(m, can.Message)
             gyro.on_message(m)
     return SimpleNamespace(frames=gyro), SimpleNamespace(frames=level)
@@ -51,7 +52,7 @@ def window(k: int) -> Phase:
 
 @pytest.mark.parametrize("first_seq", [0, 100, 2**16 - 40, 2**16 - 100])
 def test_each_reading_gets_the_frames_since_the_one_before(first_seq: int) -> None:
-    tape = _Tape()
+    tape = _Tape(STEP_S)
     tape.add(*streams(first_seq, 80, window))
     lsb = 10.0 / 2**23
     for first, last in ((10, 30), (50, 60)):
@@ -69,7 +70,7 @@ def test_each_reading_gets_the_frames_since_the_one_before(first_seq: int) -> No
 def test_a_turn_may_take_longer_than_the_frames_take_to_wrap() -> None:
     steps = 12000  # three frames each: more than half a turn of the counter
     gyro, level = streams(0, steps + 40, lambda k: Phase.WINDOW if steps <= k < steps + 20 else Phase.SLEWING)
-    tape = _Tape()
+    tape = _Tape(STEP_S)
     readings, frames = gyro.frames.take(), level.frames.take()
     for first in range(0, steps + 40, 4000):
         tape.add(*taken(readings, frames, first, first + 4000))
@@ -81,7 +82,7 @@ def test_a_turn_may_take_longer_than_the_frames_take_to_wrap() -> None:
 
 
 def test_a_window_right_after_another_has_all_its_frames() -> None:
-    tape = _Tape()
+    tape = _Tape(STEP_S)
     tape.add(*streams(0, 80, lambda k: Phase.WINDOW if 10 <= k < 60 else Phase.IDLE))
     for first, last in ((10, 40), (40, 60)):  # the position changes there
         span = tape.window()
@@ -93,7 +94,7 @@ def test_a_window_right_after_another_has_all_its_frames() -> None:
 
 
 def test_a_window_that_is_not_over_is_none_yet() -> None:
-    tape = _Tape()
+    tape = _Tape(STEP_S)
     assert tape.window() is None
     assert tape.latest("MODE", 4) == 4
     tape.add(*streams(0, 20, window))
@@ -103,7 +104,7 @@ def test_a_window_that_is_not_over_is_none_yet() -> None:
 
 def test_lost_frames_are_counted_in_their_window_alone() -> None:
     lose = frozenset(range(10, 12)) | frozenset([3 * 20 + 1]) | frozenset(range(3 * 25, 3 * 26))
-    tape = _Tape()
+    tape = _Tape(STEP_S)
     tape.add(*streams(0, 40, window, lose))
     span = tape.window()
     assert span is not None
@@ -113,7 +114,7 @@ def test_lost_frames_are_counted_in_their_window_alone() -> None:
 
 
 def test_no_frame_at_all_is_a_failure() -> None:
-    tape = _Tape()
+    tape = _Tape(STEP_S)
     tape.add(*streams(0, 40, window, frozenset(range(3 * 40))))
     span = tape.window()
     assert span is not None
