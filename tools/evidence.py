@@ -39,13 +39,13 @@ LOCK_HEAD = (
 )
 TOKEN = re.compile(
     r"""(?P<comment>//(?:\\\n|[^\n])*|/\*.*?\*/)
-      | (?P<directive>^[ \t]*\#)
+      | (?P<directive>^[ \t]*\#[ \t]*\w*)
       | (?P<text>"(?:\\.|[^"\\\n])*"|'(?:\\.|[^'\\\n])*')
       | (?P<splice>\\\n)
       | (?P<newline>\n)
       | (?P<space>[ \t\r\f\v]+)
       | (?P<word>\.?\d(?:[eEpP][+-]|[\w.])*|\w+)
-      | (?P<other>.)""",
+      | (?P<sign>\.\.\.|<<=|>>=|->|\+\+|--|<<|>>|&&|\|\||\#\#|::|[-+*/%&|^<>=!]=|.)""",
     re.VERBOSE | re.DOTALL | re.MULTILINE,
 )
 
@@ -67,11 +67,14 @@ def tokens(source: str) -> Iterator[str]:
         elif kind in ("comment", "space", "splice"):
             blank = True
         else:
-            directive = directive or kind == "directive"
-            if directive and blank and kind != "directive":
+            if directive and blank:
                 yield " "
             blank = False
-            yield m[0].strip() if kind == "directive" else m[0]
+            if kind == "directive":
+                directive = True
+                yield "#" + m[0].strip(" \t#")
+            else:
+                yield m[0]
 
 
 def normalised(name: str, text: str) -> str:
