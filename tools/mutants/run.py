@@ -159,7 +159,7 @@ def mutants_of(args: argparse.Namespace) -> list[Mutant]:
 
 def carry_out(args: argparse.Namespace, mutants: list[Mutant], folder: Path) -> int:
     """Build, judge, tell."""
-    tree = Tree(folder)
+    tree = Tree(folder, borrow=bool(args.sample))
     if args.check:
         return check(tree, mutants)
     judge = Judge(tree, Suite(folder), compare=bool(args.random))
@@ -207,6 +207,7 @@ def status(results: Sequence[Result], *, random: bool) -> int:
 def main(argv: Sequence[str] | None = None) -> int:
     """Entry point."""
     args = parser().parse_args(argv)
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a script may have started us in the background
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # as Ctrl-C: the private copy goes
     try:
         mutants = mutants_of(args)

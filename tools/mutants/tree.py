@@ -13,9 +13,9 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 DEVICE = ("Makefile", "pyproject.toml", "emu", "proto", "tools", "scripts")  # what an emulator is built from
 SUITE = ("pyproject.toml", "scripts", "proto")  # what judges it
-BUILD = "build-mutants"
+OWN, CHECKOUT_S = "build-mutants", "build"
 BUILD_S = 600.0
-CFLAGS = "-O1"
+CFLAGS = "-O1"  # of our own build: half the time of the compiler
 
 
 class BuildError(Exception):
@@ -36,26 +36,31 @@ def copy(parts: tuple[str, ...], root: Path, to: Path) -> None:
 class Tree:
     """An emulator's sources and what they are built into."""
 
-    def __init__(self, folder: Path, root: Path = ROOT) -> None:
-        """Copies and builds the unmutated one. Raises BuildError."""
+    def __init__(self, folder: Path, root: Path = ROOT, *, borrow: bool = False) -> None:
+        """Copies and builds the unmutated one. borrow: begin with what the checkout has built. Raises BuildError."""
         self.folder = folder / "device"
+        self._name = CHECKOUT_S if borrow else OWN
         copy(DEVICE, root, self.folder)
+        if borrow and (root / CHECKOUT_S / "obj").is_dir():
+            for part in ("obj", "gen"):
+                shutil.copytree(root / CHECKOUT_S / part, self.folder / CHECKOUT_S / part)
         self.build()
         self._kept = folder / "kept"
-        for name in ("build", BUILD):
+        for name in {CHECKOUT_S, self._name}:
             shutil.copytree(self.folder / name, self._kept / name)
 
     @property
     def emulator(self) -> Path:
-        return self.folder / BUILD / "psa-emu"
+        return self.folder / self._name / "psa-emu"
 
     def build(self) -> None:
         """Raises BuildError."""
-        make = ["make", "-j2", "--no-print-directory", f"PY={sys.executable}", f"BUILD={BUILD}", f"CFLAGS={CFLAGS}"]
+        make = ["make", "-j2", "--no-print-directory", f"PY={sys.executable}", f"BUILD={self._name}"]
+        make += [f"CFLAGS={CFLAGS}"] if self._name == OWN else []
         env = {k: v for k, v in os.environ.items() if not k.startswith("MAKE") and k != "MFLAGS"}
         env["PYTHONPATH"] = str(self.folder / "scripts")
         done = subprocess.run(
-            [*make, f"{BUILD}/psa-emu"], cwd=self.folder, env=env, capture_output=True, text=True, timeout=BUILD_S
+            [*make, f"{self._name}/psa-emu"], cwd=self.folder, env=env, capture_output=True, text=True, timeout=BUILD_S
         )
         if done.returncode != 0:
             raise BuildError("\n".join(done.stderr.strip().splitlines()[-8:]))
