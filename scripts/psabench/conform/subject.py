@@ -28,6 +28,7 @@ from psabench.protocol_files import dbc_node
 from psabench.unit import Unit
 
 UNIT = "a"
+SLICE_S = 0.1
 # At the inputs of an emulator of ours: none is another's, one is negative, none is a round code.
 INPUTS_V: Mapping[str, float] = {"x": 2.0101, "y": -1.3007, "z": 0.7003}
 # Links of python-can whose time stamps are this machine's: they say when it looked, not when the frame passed.
@@ -114,7 +115,7 @@ class Subject:
 
     @property
     def probes(self) -> frozenset[str]:
-        """What can be seen: can, line (INT, DATA and CLK, or what the line port has), pins (all lines), bus, supply, port.
+        """What can be seen: can, line (INT, DATA, CLK, or what the line port has), pins (all lines), bus, supply, port.
 
         Of the link to the bus: fd and rtr, frames that it carries; stamps, its times are the bus's.
         """
@@ -170,7 +171,13 @@ class Subject:
         )
 
     def run_for(self, dwell_s: float) -> None:
-        """Let the board's time pass, receiving meanwhile."""
+        """Let the board's time pass, receiving meanwhile.
+
+        In lockstep in slices: what comes over a pseudo-terminal within one has to fit into the kernel's buffer.
+        """
+        while self.lockstep and dwell_s > SLICE_S:
+            self.bench.wait(SLICE_S)
+            dwell_s -= SLICE_S
         self.bench.wait(dwell_s)
 
     def power_cycle(self, off_s: float) -> None:

@@ -158,6 +158,14 @@ class Talk:
         """Value of an object, unsigned."""
         return int.from_bytes(self.upload(index, sub), "little")
 
+    def look(self, index: int, sub: int) -> tuple[int, int]:
+        """A value of up to 4 bytes, and the place of its answer in what was heard."""
+        answer = self.answer_to(read(index, sub))
+        if answer.data[0] & 0xE3 != 0x43 or answer.data[1:4] != read(index, sub)[1:4]:
+            raise Broken(f"{words(answer.data)} to an upload of {index:04X}h:{sub}", "its value", frames=[answer])
+        value = int.from_bytes(answer.data[4 : 8 - (answer.data[0] >> 2 & 3)], "little")
+        return value, next(k for k in reversed(range(len(self.heard))) if self.heard[k] is answer)
+
     def download(self, index: int, sub: int, data: bytes) -> None:
         """Write up to 4 bytes. Raises Broken when it is not taken."""
         answer = self.answer_to(write(index, sub, data))

@@ -208,9 +208,10 @@ def mapped_objects_read_as_the_frames(s: Subject) -> str:
 
 def _compare(t: Talk, can_id: int, entry: int, at: int) -> None:
     index, sub, bits = entry >> 16, entry >> 8 & 0xFF, entry & 0xFF
-    found = t.number(index, sub) & (1 << bits) - 1
-    before = [f for f in t.heard if f.can_id == can_id and not f.error][-NEAR:]
-    near = before + t.readings(NEAR, can_id)
+    value, place = t.look(index, sub)
+    found = value & (1 << bits) - 1
+    before = [f for f in t.heard[:place] if f.can_id == can_id and not f.error][-NEAR:]
+    near = before + t.readings(NEAR, can_id, at=place)[:NEAR]
     due = {int.from_bytes(f.data, "little") >> at & (1 << bits) - 1 for f in near}
     if found not in due:
         raise Broken(
@@ -248,6 +249,18 @@ def errors_on_the_wire_read_0(s: Subject) -> str:
     if any(v != due for v in found.values()):
         raise Broken(f"{found}", f"{due}")
     return f"{', '.join(found)} are {due}"
+
+
+@proves("BUS-ERR-01")
+@trial(needs={"can", "errors"})
+def errors_on_the_wire_are_counted(s: Subject) -> str:
+    """Upload the error counters of the CAN controller while frames are destroyed."""
+    most = int(requirements().rows["BUS-ERR-01"].limit("count_max"))
+    with talk(s) as t:
+        found = {name: t.counter(name) for name in ERRORS_OF_CAN[:2]}
+    if not any(found.values()) or max(found.values()) > most:
+        raise Broken(f"{found}", f"1 to {most} in one of them")
+    return f"{found}"
 
 
 @proves("BUS-LOAD-01")
