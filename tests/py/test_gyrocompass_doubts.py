@@ -162,6 +162,21 @@ def test_a_vehicle_that_tilts_is_no_one_attitude() -> None:
     assert any("no one attitude explains the level angles" in d for d in r.doubts)
 
 
+@pytest.mark.parametrize("reading", ["article", "improved"])
+def test_a_level_sensor_that_is_stuck_is_a_doubt(reading: str) -> None:
+    """gamma stays what it was; the rates alone do not tell, whatever the number of positions."""
+    p = g.params_of(reading)
+    windows = g.measure(FakePlatform(heading_deg=50.0, pitch_deg=2.0, roll_deg=-1.5), p, Silent())
+    stuck = [replace(w, gamma_rad=np.full_like(w.gamma_rad, windows[0].gamma_rad.mean())) for w in windows]
+    assert g.estimate(windows, p).doubts == ()
+    assert any("the level sensor along x is stuck" in d for d in g.estimate(stuck, p).doubts)
+
+
+def test_a_zero_of_the_level_sensors_beyond_the_passport_is_a_doubt() -> None:
+    assert run(FakePlatform(bias_gamma_arcmin=10.0), "article").doubts == ()
+    assert any("gamma is off by 20'" in d for d in run(FakePlatform(bias_gamma_arcmin=20.0), "article").doubts)
+
+
 def test_windows_that_hardly_any_count_are_a_doubt() -> None:
     silent: dict[int, dict[str, object]] = {k: {"level_lost": True} for k in range(24) if k > 10}
     assert run(FakePlatform(broken=silent)).doubts == ("only 11 of 24 windows count",)

@@ -63,7 +63,7 @@ def heading_allowance_rad(p: GyrocompassParams, attitude: nav.Attitude) -> float
 
 def doubts_of(e: Evidence) -> tuple[str, ...]:
     """Reasons not to trust the heading."""
-    checks = (_latitude, _passport, _unseen_latitude, _few, _running, _moved, _tilted, _residuals, _converged)
+    checks = (_latitude, _passport, _unseen_latitude, _few, _running, _moved, _tilted, _biased, _residuals, _converged)
     return tuple(words for check in checks if (words := check(e)))
 
 
@@ -231,6 +231,21 @@ def _tilted(e: Evidence) -> str:
         return ""
     left = f.attitude.residual_rms_rad / ARCMIN
     return f"no one attitude explains the level angles, {left:.2g}' rms are left: the vehicle moved between positions"
+
+
+def _biased(e: Evidence) -> str:
+    """A level sensor that tells what it told shows a gamma that does not turn with the gimbal: all of it a constant."""
+    f, p = e.fit, e.fit.params
+    q = np.array([r.q_rad for r in f.rows])
+    design = np.column_stack([np.cos(q), np.sin(q), np.ones(len(q))])
+    sd = p.level_sd_arcmin * ARCMIN * float(np.linalg.norm(np.linalg.pinv(design)[2]))
+    bias = f.attitude.gamma_bias_rad
+    if abs(bias) <= p.level_zero_arcmin * ARCMIN + deviations(1) * sd + LEVEL_CODE_RAD:
+        return ""
+    return (
+        f"gamma is off by {bias / ARCMIN:.3g}' in all positions where level_zero_arcmin allows "
+        f"{p.level_zero_arcmin:g}': the level sensor along x is stuck, or its zero is another"
+    )
 
 
 def _residuals(e: Evidence) -> str:
