@@ -108,8 +108,9 @@ def told_baseline(plain: dict[Target, Run]) -> bool:
         if run.conforms:
             continue
         bad = [i for i, v in run.verdicts.items() if v in ("failed", "inconclusive")]
-        detail = run.said.splitlines()[-1] if run.said else run.how
-        print(f"unmutated {target}: {detail}" + (f"; open: {' '.join(bad)}" if bad else ""))
+        told = [w for w in run.said.splitlines() if not w.startswith("report: ")]
+        detail = told[-1] if told else run.how
+        print(f"unmutated {target}: {detail}" + (f"; open: {' '.join(bad)}" if bad else ""), flush=True)
     return all(run.conforms for run in plain.values())
 
 
