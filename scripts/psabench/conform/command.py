@@ -10,6 +10,7 @@ from typing import Any
 
 from psabench.conform import identity, recording_command, report, runner, suite
 from psabench.conform.exhibits import Exhibits
+from psabench.conform.host import command as host_command
 from psabench.conform.outcome import Outcome
 from psabench.conform.requirements import Requirement, requirements
 from psabench.conform.subject import INPUTS_V, Addresses, Subject
@@ -26,6 +27,7 @@ examples:
   psabench conform device --board psa2 --profile w24 --can socketcand:127.0.0.1:29536 --lines /dev/pts/7
   psabench conform device --board psd1 --can slcan:/dev/ttyACM0 --bus-port /dev/ttyUSB1
   psabench conform recording run.log lines.vcd --board psa2    files that were recorded at a bench
+  psabench conform host --command "build/host {can} {node}"
   psabench conform list --board psa2                     its requirements, and how each is seen
 """
 
@@ -50,6 +52,7 @@ def add(commands: Any, formatter: Any, bus_help: str) -> None:
     suites = p.add_subparsers(required=True, metavar="SUITE")
     _add_device(suites, formatter, bus_help)
     recording_command.add(suites, formatter, _add_board)
+    host_command.add(suites, formatter)
     _add_list(suites, formatter)
 
 
@@ -153,7 +156,7 @@ def _told(run: report.Run, folder: Path, *, everything: bool) -> int:
 
 
 def _rows(v: Variant) -> list[Requirement]:
-    return [r for r in requirements() if r.applies(v.board, v.profile)]
+    return [r for r in requirements() if r.group != "host" and r.applies(v.board, v.profile)]
 
 
 def _addresses(args: argparse.Namespace) -> Addresses:

@@ -1,0 +1,139 @@
+"""`psabench conform host`: does somebody's program take these boards, good and bad, as it should?"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from psabench.conform import report
+from psabench.conform.host import runner
+from psabench.conform.host.judge import Judged
+from psabench.conform.outcome import Outcome, Verdict
+from psabench.conform.requirements import Requirement, requirements
+from psabench.conform.variant import variant
+from psabench.errors import BadInput
+from psabench.progress import Bar
+
+OUT = Path("build/conform/host")
+LINKS = {"can": "socketcand", "pty": "slcan", "line": "the line port"}  # by the place that a command names
+
+EPILOG = """\
+The program is started once for each case, as soon as its board is powered; it ends when its link ends. In COMMAND
+  {can}      127.0.0.1:PORT of a socketcand server          {node}     CANopen node of the board
+  {pty}      pseudo-terminal of an slcan adapter            {results}  file to tell into (without it: standard output)
+  {line}     pseudo-terminal of the lines, a byte a sample
+and it tells what it takes in JSON (docs/conform_host.md): {"frame": 7, "x": ...}, {"lost": 2}, {"stale": true}.
+
+examples:
+  psabench conform host --command "build/host {can} {node}"
+  psabench conform host --command "build/host_line {line}" --only HOST-TORN
+  psabench conform host --manual can --results build/told.jsonl     start it by hand, case by case
+
+OUT has report.html, junit.xml and conform.json, and of each case what was on the bus and what was told.
+Exit status: 0 conforms, 1 does not, 2 bad input, 3 the bench failed, 130 ended by Ctrl-C.
+"""
+
+
+def add(suites: Any, formatter: Any) -> None:
+    """The sub-command."""
+    p = suites.add_parser(
+        "host",
+        help="a program that takes a board's data",
+        description="Play good and bad boards to a program and judge what it tells.",
+        formatter_class=formatter,
+        epilog=EPILOG.replace("%", "%%"),
+    )
+    p.set_defaults(handler=host)
+    how = p.add_mutually_exclusive_group(required=True)
+    how.add_argument("--command", metavar="COMMAND", help="how the program is started, with {can}, {pty} or {line}")
+    how.add_argument("--manual", choices=list(LINKS), help="it is started by hand when we say so, at this link")
+    p.add_argument("--results", type=Path, metavar="FILE", help="with --manual: the file that the program tells into")
+    p.add_argument("--profile", default="article", help="of the PSA-2 that is played (%(default)s)")
+    p.add_argument("--only", nargs="+", default=[], metavar="ID", help="requirements, or beginnings: HOST-LOST")
+    p.add_argument("--case", nargs="+", default=[], metavar="NAME", help="these cases alone (docs/conform_host.md)")
+    p.add_argument("--speed", type=float, default=1.0, metavar="X", help="times real time, while nothing is silent")
+    p.add_argument("--out", type=Path, default=OUT, metavar="FOLDER", help="for the report (%(default)s)")
+    p.add_argument("--verbose", action="store_true", help="tell what passed, too")
+
+
+def link_of(args: argparse.Namespace) -> str:
+    """The place that the program takes the board at. Raises BadInput for none and for two."""
+    if args.manual:
+        if args.results is None:
+            raise BadInput("--manual wants --results FILE, the file that the program tells into")
+        return str(args.manual)
+    named = [place for place in LINKS if f"{{{place}}}" in args.command]
+    if len(named) != 1:
+        raise BadInput(
+            f"--command {args.command}: one of {', '.join(f'{{{p}}}' for p in LINKS)} says where the board is"
+        )
+    return named[0]
+
+
+def host(args: argparse.Namespace) -> int:
+    """Handler of `conform host`."""
+    if not 0.01 <= args.speed <= 1000:
+        raise BadInput(f"--speed {args.speed:g}: from 0.01 to 1000")
+    link = link_of(args)
+    v = variant("psa2", args.profile)
+    checks = import_module(f"psabench.conform.host.{'line' if link == 'line' else 'can'}_checks")
+    tests = [j for j in runner.wanted(args.only, args.case) if j.test.__module__ == checks.__name__]
+    rows = [r for r in requirements() if r.group == "host" and r.applies(v.board, v.profile)]
+    rows = [r for r in rows if not args.only or r.id.startswith(tuple(args.only))]
+    rows = [r for r in rows if not args.case or any(r.id in j.ids for j in tests)]
+    if not rows or (not tests and not args.case and args.only and not rows):
+        raise BadInput("--only, --case: nothing to judge; docs/conform_host.md has the cases")
+    outcomes = list(unseen(rows, tests, link))
+    play = runner.Play(
+        folder=args.out,
+        profile=args.profile,
+        command=args.command or "",
+        results=args.results,
+        link=link,
+        speed=args.speed,
+        say=lambda words: print(words, file=sys.stderr, flush=True),
+    )
+    interrupted = False
+    try:
+        runner.run(play, tests, Bar(), outcomes.append)
+    except KeyboardInterrupt:
+        interrupted = True
+    told = report.Run(
+        suite="host",
+        subject=args.command or f"host at {link}",
+        facts=facts(args, link),
+        outcomes=outcomes,
+        rows=rows,
+        interrupted=interrupted,
+    )
+    page = report.write(args.out, told)
+    for line in report.lines(told, everything=args.verbose):
+        print(line)
+    print(f"report: {page}", file=sys.stderr)
+    return 130 if interrupted else 0 if told.conforms else 1
+
+
+def unseen(rows: list[Requirement], tests: list[Judged], link: str) -> list[Outcome]:
+    """Of the requirements that no case shows at this link."""
+    seen = {i for j in tests for i in j.ids}
+    return [
+        Outcome(
+            test="not_played",
+            title="What this link does not show.",
+            requirements=(r.id,),
+            verdict=Verdict.NOT_OBSERVABLE,
+            reason=f"no case plays it at {LINKS[link]}",
+        )
+        for r in rows
+        if r.id not in seen
+    ]
+
+
+def facts(args: argparse.Namespace, link: str) -> dict[str, str]:
+    """Head of the report."""
+    from psabench.conform.identity import suite_facts
+
+    return {"board": f"psa2, profile {args.profile}", "link": LINKS[link], **suite_facts()}

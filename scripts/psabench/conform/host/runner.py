@@ -1,0 +1,154 @@
+"""Plays the cases to a host and has them judged."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from psabench.conform.host.can_cases import CASES, NODE, SCENARIO, Case
+from psabench.conform.host.judge import HostEvidence, Judged, Unseen, judged
+from psabench.conform.host.played import Bus, read_log
+from psabench.conform.host.results import Told
+from psabench.conform.host.stage import ByHand, Program, Stage, drain, expand
+from psabench.conform.outcome import Broken, Outcome, TooLittle, Verdict
+from psabench.control import Control
+from psabench.emulator import Emulator
+from psabench.errors import BadInput, BenchError
+from psabench.procedures.head_bench import Progress
+
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Play:
+    """How a host is played to. command "": it is started by hand, and tells into the file `results`."""
+
+    folder: Path  # for logs and what was told
+    profile: str = "article"
+    command: str = ""
+    results: Path | None = None
+    link: str = "can"
+    speed: float = 1.0
+    say: Say = lambda _: None
+
+    @property
+    def adapter(self) -> str:
+        return "slcan" if self.link == "pty" else "socketcand:0"
+
+
+def wanted(only: Sequence[str] = (), cases: Sequence[str] = ()) -> list[Judged]:
+    """Tests of requirements that begin so, or of these cases; all in the order of the cases."""
+    if unknown := [c for c in cases if c not in CASES]:
+        raise BadInput(f"no such case: {', '.join(unknown)}; there are {', '.join(CASES)}")
+    order = list(CASES)
+    found = [
+        j
+        for j in judged()
+        if (not only or any(i.startswith(tuple(only)) for i in j.ids)) and (not cases or j.case in cases)
+    ]
+    return sorted(found, key=lambda j: order.index(j.case))
+
+
+def run(play: Play, tests: Sequence[Judged], progress: Progress, told: Callable[[Outcome], None]) -> None:
+    """Each case once, then its tests; told: of each outcome as it comes."""
+    names = list(dict.fromkeys(j.case for j in tests))
+    with progress.step("host", max(1, len(names))) as advance:
+        for name in names:
+            begun_s = time.monotonic()
+            try:
+                shown: HostEvidence | Exception = perform(play, CASES[name])
+            except BadInput:
+                raise
+            except BenchError as e:
+                shown = e
+            took_s = time.monotonic() - begun_s
+            for j in (j for j in tests if j.case == name):
+                told(replace(judge(j, shown, play.folder), took_s=took_s))
+                took_s = 0.0
+            advance()
+
+
+def judge(j: Judged, shown: HostEvidence | Exception, folder: Path) -> Outcome:
+    """One test of the evidence of its case."""
+    title = f"{(j.test.__doc__ or '').partition(chr(10))[0]}"
+    exhibits = tuple(f"{j.case}.{end}" for end in ("log", "jsonl", "stderr") if (folder / f"{j.case}.{end}").exists())
+    open_ = Outcome(test=j.test.__name__, title=title, requirements=j.ids, verdict=Verdict.INCONCLUSIVE, scene=j.case)
+    if isinstance(shown, Exception):
+        return replace(open_, reason=str(shown))
+    try:
+        return replace(open_, verdict=Verdict.PASSED, saw=j.test(shown))
+    except Broken as e:
+        return replace(open_, verdict=Verdict.FAILED, saw=e.saw, due=e.due, exhibits=exhibits)
+    except Unseen as e:
+        return replace(open_, verdict=Verdict.NOT_OBSERVABLE, reason=str(e))
+    except TooLittle as e:
+        return replace(open_, reason=str(e))
+
+
+def perform(play: Play, case: Case) -> HostEvidence:
+    """Play one case. Raises BenchError where it cannot be played."""
+    play.folder.mkdir(parents=True, exist_ok=True)
+    log = play.folder / f"{case.name}.log"
+    with TemporaryDirectory(prefix="psabench-") as made:
+        scenario = Path(made) / "host.yaml"
+        scenario.write_text(SCENARIO.replace("PROFILE", play.profile), encoding="utf-8")
+        status, stage, streamed = _perform(play, case, scenario, log)
+    told = stage.host.told()
+    return HostEvidence(
+        case=case.name,
+        bus=read_log(log.read_text(encoding="ascii").splitlines(), NODE) if log.exists() else Bus([], NODE),
+        told=told if isinstance(told, Told) else Told(),
+        status=status,
+        marks=stage.marks,
+        stood_s=stage.stood_s,
+        streamed=streamed,
+        errors=stage.host.errors.read_text(errors="replace") if isinstance(stage.host, Program) else "",
+    )
+
+
+def _perform(play: Play, case: Case, scenario: Path, log: Path) -> tuple[int | None, Stage, bool]:
+    with ExitStack() as stack:
+        emulator = stack.enter_context(Emulator(scenario, cans=[play.adapter, f"log:{log}"], pace="step"))
+        control = stack.enter_context(Control(emulator.control_path or Path()))
+        host = _host(play, case, emulator)
+        stack.callback(host.kill)
+        stage = Stage(emulator, control, host, speed=play.speed)
+        case.before(stage)
+        stage.stood_s = 0.0
+        host.start()
+        stage.await_host()
+        streamed = stage.await_stream() if case.streams else True
+        if streamed:
+            case.play(stage)
+        if play.link == "pty":
+            drain(Path(emulator.endpoint(can="slcan")["pty"]))
+        control.close()
+        emulator.stop()
+        return host.wait(), stage, streamed
+
+
+def _host(play: Play, case: Case, emulator: Emulator) -> Program | ByHand:
+    at = emulator.endpoint(can=play.adapter.partition(":")[0])
+    places = (
+        {"node": str(NODE), "can": f"{at.get('host', '')}:{at.get('port', '')}"}
+        if "port" in at
+        else {"node": str(NODE)}
+    )
+    if "pty" in at:
+        places["pty"] = at["pty"]
+    results = play.results or play.folder / f"{case.name}.jsonl"
+    places["results"] = str(results)
+    if not play.command:
+        words = " ".join(f"{k}={v}" for k, v in places.items())
+        play.say(f"{case.name}: {case.title}. Start the host now: {words}")
+        return ByHand(results)
+    return Program(
+        expand(play.command, places),
+        results=results,
+        errors=play.folder / f"{case.name}.stderr",
+        on_stdout="{results}" not in play.command,
+    )

@@ -1,0 +1,125 @@
+"""The host suite: hosts that pass, and hosts broken on purpose, each caught by the requirement it breaks."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from broken_hosts import BROKEN, EXAMPLES, ROOT, BrokenHost, build
+from psabench import cli
+from psabench.conform.host import runner
+from psabench.conform.host.can_cases import CASES
+from psabench.conform.host.stage import expand
+from psabench.errors import BadInput
+
+SPEED = "3"  # times real time: nothing here is slower than that
+
+
+def judged(out: Path, *args: str) -> tuple[int, dict[str, Any]]:
+    """`conform host` with these arguments: exit status and conform.json."""
+    status = cli.main(["conform", "host", "--out", str(out), "--speed", SPEED, *args])
+    return status, json.loads((out / "conform.json").read_text())
+
+
+def failed(told: dict[str, Any]) -> list[str]:
+    return [i for i, verdict in told["requirements"].items() if verdict != "passed"]
+
+
+@pytest.mark.host
+@pytest.mark.timeout(300)
+def test_the_hundred_lines_of_c_conform(tmp_path: Path) -> None:
+    host = build(tmp_path)
+    status, told = judged(tmp_path / "out", "--command", f"{host} {{can}} {{node}}")
+    bad = {
+        t["test"]: (t["saw"], t["due"], t["reason"])
+        for t in told["tests"]
+        if t["verdict"] in ("failed", "inconclusive")
+    }
+    assert (status, bad) == (0, {})
+    assert {t["scene"] for t in told["tests"] if t["scene"]} == set(CASES)
+    assert sum(bool(line.strip()) for line in (EXAMPLES / "host.c").read_text().splitlines()) <= 100
+
+
+@pytest.mark.host
+@pytest.mark.timeout(300)
+def test_our_own_host_conforms(tmp_path: Path) -> None:
+    command = f"{sys.executable} {ROOT / 'examples/vins_host.py'} socketcand:{{can}} {{node}}"
+    status, told = judged(tmp_path, "--command", command)
+    bad = {
+        t["test"]: (t["saw"], t["due"], t["reason"])
+        for t in told["tests"]
+        if t["verdict"] in ("failed", "inconclusive")
+    }
+    assert (status, bad) == (0, {})
+    assert told["requirements"]["HOST-VALUE-01"] == "passed"
+
+
+@pytest.mark.host
+def test_over_slcan_nothing_is_lost_at_the_end(tmp_path: Path) -> None:
+    command = f"{sys.executable} {ROOT / 'examples/vins_host.py'} slcan:{{pty}} {{node}}"
+    status, told = judged(tmp_path, "--command", command, "--case", "torn", "silence")
+    assert status == 0, told["tests"]
+
+
+@pytest.mark.host
+@pytest.mark.parametrize("broken", BROKEN, ids=lambda b: b.name)
+def test_a_broken_host_is_caught(broken: BrokenHost, tmp_path: Path) -> None:
+    host = build(tmp_path, broken)
+    status, told = judged(tmp_path / "out", "--command", f"{host} {{can}} {{node}}", "--case", broken.case)
+    assert status == 1
+    assert told["requirements"][broken.requirement] == "failed", failed(told)
+
+
+def test_there_are_twelve_ways_and_more() -> None:
+    assert len(BROKEN) >= 12
+    assert len({b.requirement for b in BROKEN}) >= 12
+
+
+@pytest.mark.host
+def test_a_host_that_does_nothing_is_told_so(tmp_path: Path) -> None:
+    status, told = judged(tmp_path, "--command", "true {can}", "--case", "torn")
+    assert status == 1
+    assert [t["reason"] for t in told["tests"] if t["scene"]] == ["the host ended before it had opened the bus"]
+
+
+@pytest.mark.host
+def test_results_may_go_to_a_file(tmp_path: Path) -> None:
+    host = build(tmp_path)
+    command = f"sh -c 'exec {host} $1 $2 > $3' host {{can}} {{node}} {{results}}"
+    status, _ = judged(tmp_path / "out", "--command", command, "--case", "torn")
+    assert status == 0
+
+
+def test_places_of_a_command() -> None:
+    assert expand("host {can} -n {node} '{can}'", {"can": "a:1", "node": "5"}) == ["host", "a:1", "-n", "5", "a:1"]
+    for bad in ("host {cann}", "host {", "host '", "", "host {0}"):
+        with pytest.raises(BadInput):
+            expand(bad, {"can": "a:1"})
+
+
+@pytest.mark.parametrize(
+    "args",
+    [
+        ["--command", "host"],
+        ["--command", "host {can} {line}"],
+        ["--manual", "can"],
+        ["--command", "host {can}", "--case", "nonsense"],
+        ["--command", "host {can}", "--only", "NONSENSE"],
+        ["--command", "host {can}", "--profile", "psd1"],
+        ["--command", "host {can}", "--speed", "0"],
+        ["--command", "/nonexistent/host {can}", "--case", "torn"],
+    ],
+)
+def test_bad_input_is_refused(args: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["conform", "host", "--out", str(tmp_path), *args]) == 2
+    assert capsys.readouterr().err.strip()
+
+
+def test_each_case_is_judged_and_on_the_page() -> None:
+    page = (ROOT / "docs/conform_host.md").read_text()
+    assert {j.case for j in runner.wanted()} == set(CASES)
+    for name in CASES:
+        assert f"`{name}`" in page
