@@ -59,7 +59,6 @@ SCENE_ON_RECORDING: Mapping[str, str] = {
     "power_on": "boot",
     "services": "all",
     "overload": "all",
-    "registers": "all",
 }
 
 

@@ -106,7 +106,7 @@ def _known(
 
 
 @proves("PSA2-CHIP-02")
-@check("registers", needs={"pins"})
+@check("registers", needs={"pins"}, on_recording="all")
 def accelerometer_converters_get_commands_that_they_have(e: Evidence) -> str:
     """Decode every burst on DIn."""
     found = port_traffic(e).of(temp=False)
@@ -121,7 +121,7 @@ def accelerometer_converters_get_commands_that_they_have(e: Evidence) -> str:
 
 
 @proves("PSA2-CHIP-08")
-@check("registers", needs={"pins"})
+@check("registers", needs={"pins"}, on_recording="all")
 def the_temperature_converter_gets_commands_that_it_has(e: Evidence) -> str:
     """Decode every burst on DInT."""
     row = row_for(e, "PSA2-CHIP-08")
@@ -161,7 +161,7 @@ def _widths(e: Evidence, found: Sequence[Burst], lo_ns: float, hi_ns: float) -> 
 
 
 @proves("PSA2-CHIP-03")
-@check("registers", needs={"pins"})
+@check("registers", needs={"pins"}, on_recording="all")
 def transfers_keep_the_limits_of_the_accelerometer_converters(e: Evidence) -> str:
     """Measure SClk and DIn against the limits of the part."""
     row, found = row_for(e, "PSA2-CHIP-03"), port_bursts(e, temp=False)
@@ -180,7 +180,7 @@ def transfers_keep_the_limits_of_the_accelerometer_converters(e: Evidence) -> st
 
 
 @proves("PSA2-CHIP-09")
-@check("registers", needs={"pins"})
+@check("registers", needs={"pins"}, on_recording="all")
 def transfers_keep_the_limits_of_the_temperature_converter(e: Evidence) -> str:
     """Measure SClk, DInT and CST against the limits t1, t4, t5, t6, t10 and t11 of the part."""
     row, found, told = row_for(e, "PSA2-CHIP-09"), port_bursts(e, temp=True), temp_messages(e)

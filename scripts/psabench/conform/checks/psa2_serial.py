@@ -208,7 +208,7 @@ def _changes_at(e: Evidence, found: Sequence[Burst], lines: Sequence[str], *, fa
 
 
 @proves("PSA2-SIG-07")
-@check("registers", needs={"pins"})
+@check("registers", needs={"pins"}, on_recording="all")
 def the_accelerometer_port_is_spi_mode_0(e: Evidence) -> str:
     """Compare changes of DIn and DOut with the edges of SClk while CST is high."""
     delay_ns = row_for(e, "PSA2-SIG-07").limit("delay_max_ns")
@@ -216,7 +216,7 @@ def the_accelerometer_port_is_spi_mode_0(e: Evidence) -> str:
 
 
 @proves("PSA2-SIG-08")
-@check("registers", needs={"pins"})
+@check("registers", needs={"pins"}, on_recording="all")
 def the_temperature_port_is_spi_mode_1(e: Evidence) -> str:
     """Compare changes of DInT and DOutT with the edges of SClk while CST is low."""
     delay_ns = row_for(e, "PSA2-SIG-08").limit("delay_max_ns")
@@ -242,7 +242,7 @@ def sclk_has_its_frequency_and_rests_low(e: Evidence) -> str:
 
 
 @proves("PSA2-SIG-10")
-@check("registers", needs={"pins"})
+@check("registers", needs={"pins"}, on_recording="all")
 def command_bytes_keep_their_gap(e: Evidence) -> str:
     """Measure the time between the bytes of commands to the accelerometer converters."""
     found = [m for m in port_traffic(e).of(temp=False) if len(m.bursts) > 1]

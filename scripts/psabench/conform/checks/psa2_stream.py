@@ -119,6 +119,8 @@ def tstamp_goes_by_the_data_period(e: Evidence) -> str:
     row = row_for(e, "PSA2-CAN-05")
     period_us = row_for(e, "PSA2-READ-06").limit("period_us")
     n = np.concatenate(([0], np.cumsum(p.steps)))
+    if not n[-1]:
+        raise Broken(f"SEQ stands still at {p.seq[0]}", "one more a sample", frames=p.about(0))
     t_us = (p.stamp - p.stamp[0]) * unit_us(e)
     rate = float(t_us[-1]) / float(n[-1])
     slack_us = e.slack_ns(period_us * 1e3) * 1e-3 + unit_us(e) / n[-1]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import math
 from collections.abc import Callable, Iterator, Mapping
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -42,8 +43,10 @@ def read_can(path: Path, bounds: Bounds) -> CanTake:
             frames.append(_frame(m))
     except OSError:
         raise
-    except ImportError as e:
-        raise BadInput(f"{path}: MF4 wants asammdf: pip install asammdf ({e})") from e
+    except (ImportError, NotImplementedError) as e:
+        if path.suffix.lower() == ".mf4" and find_spec("asammdf") is None:
+            raise BadInput(f"{path}: MF4 logs are read by asammdf, which is not there: pip install asammdf") from e
+        note = f"message {len(frames) + 1} cannot be read ({e})"
     except Exception as e:  # python-can's readers raise whatever their parsing comes to; no byte of a file may end us
         note = (
             f"message {len(frames) + 1} cannot be read ({type(e).__name__}: {str(e)[:80]}); those before it are judged"
