@@ -374,7 +374,7 @@ def no_more_than_its_queue_waits(e: Evidence) -> str:
 @check("errors", needs={"can", "errors"})
 def error_passive_is_told(e: Evidence) -> str:
     """Look for the emergency after enough error frames, and for its end."""
-    row, told = row_for(e, "BUS-EMCY-07"), _told(e)
+    row, told = row_for(e, "BUS-EMCY-07"), list(e.can.of_id(_id(e, "emcy")).frames)
     code = int(row.limit("emcy_code"))
     begin = next((f for f in told if code_of(f) == code), None)
     errors = [f for f in e.can.frames if f.error]

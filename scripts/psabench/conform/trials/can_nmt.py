@@ -226,25 +226,31 @@ def reset_node_restores_the_defaults(s: Subject) -> str:
     """Write settings, NMT 81h, read them again; count readings before and after."""
     with talk(s, reset=True) as t:
         index, sub, other = OWN.get(s.variant.family, STROBE)
-        before = _written(t, {**_settings(t), (index, sub): other})
+        settings = {**_settings(t), (index, sub): other}
+        _write(t, settings)
         t.reset(_limit("BUS-NMT-04", "command_code"))
-        for at, value in before.items():
-            if t.upload(*at) != value:
-                raise Broken(
-                    f"{at[0]:04X}h:{at[1]} is {t.number(*at)} after NMT 81h", str(int.from_bytes(value, "little"))
-                )
+        _are_defaults(t, settings, "NMT 81h")
         _is(t.state(), PRE_OPERATIONAL, "after NMT 81h")
-    return f"{len(before)} settings have their defaults again"
+    return f"{len(settings)} settings have their defaults again"
 
 
-def _written(t: Talk, settings: dict[tuple[int, int], bytes]) -> dict[tuple[int, int], bytes]:
-    """Write them; what they were before. Raises Broken where the board does not keep one."""
-    before = {at: t.upload(*at) for at in settings}
+Settings = dict[tuple[int, int], bytes]
+
+
+def _write(t: Talk, settings: Settings) -> None:
+    """Raises Broken where the board does not keep one."""
     for at, value in settings.items():
         t.download(*at, value)
         if t.upload(*at) != value:
             raise Broken(f"{at[0]:04X}h:{at[1]} does not keep what was written", value[::-1].hex().upper() + "h")
-    return before
+
+
+def _are_defaults(t: Talk, settings: Settings, what: str) -> None:
+    """Those of the EDS. Raises Broken."""
+    for at, written in settings.items():
+        due = int(t.s.unit.node.default(*at))
+        if t.upload(*at) != due.to_bytes(len(written), "little"):
+            raise Broken(f"{at[0]:04X}h:{at[1]} is {t.number(*at)} after {what}", f"{due}")
 
 
 @proves("BUS-NMT-05")
@@ -254,20 +260,16 @@ def reset_communication_leaves_the_board_alone(s: Subject) -> str:
     with talk(s, reset=True) as t:
         s.unit.wait_ready()
         index, sub, other = OWN.get(s.variant.family, STROBE)
-        before = _written(t, _settings(t))
-        _written(t, {(index, sub): other})
+        _write(t, _settings(t))
+        _write(t, {(index, sub): other})
         count = t.number(COUNTERS, 1)
         t.reset(_limit("BUS-NMT-05", "command_code"))
-        for at, value in before.items():
-            if t.upload(*at) != value:
-                raise Broken(
-                    f"{at[0]:04X}h:{at[1]} is {t.number(*at)} after NMT 82h", str(int.from_bytes(value, "little"))
-                )
+        _are_defaults(t, _settings(t), "NMT 82h")
         if t.upload(index, sub) != other:
             raise Broken(f"{index:04X}h:{sub} is {t.number(index, sub)} after NMT 82h", "what was written")
         if t.number(COUNTERS, 1) < count:
             raise Broken("the count of readings fell with NMT 82h", "that it goes on")
-    return f"{len(before)} communication parameters have their defaults, {index:04X}h:{sub} has what was written"
+    return f"{len(_settings(t))} communication parameters have their defaults, {index:04X}h:{sub} has what was written"
 
 
 @proves("BUS-NMT-06")

@@ -333,7 +333,7 @@ def each_request_has_one_answer(s: Subject) -> str:
         if len(answers) != HUNDRED:
             raise Broken(f"{len(answers)} answers to {HUNDRED} requests", f"{HUNDRED}", frames=answers)
         for request, answer in zip(asked, answers, strict=True):
-            if answer.data[1:4] != request[1:4]:
+            if len(answer.data) != 8 or answer.data[1:4] != request[1:4]:
                 raise Broken(f"{words(answer.data)} to {words(request)}", "its index and sub-index", frames=[answer])
     return f"{HUNDRED} requests, {HUNDRED} answers in their order"
 
