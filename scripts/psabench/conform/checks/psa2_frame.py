@@ -7,7 +7,7 @@ import numpy as np
 from psabench.conform.evidence import Evidence
 from psabench.conform.limits import row_for
 from psabench.conform.line_frames import WORDS, Transfers, transfers
-from psabench.conform.outcome import Broken
+from psabench.conform.outcome import Broken, TooLittle
 from psabench.conform.plan import check
 from psabench.conform.proof import proves
 from psabench.signals import Floats, Ints
@@ -128,6 +128,8 @@ def clk_is_high_for_half_of_its_period(e: Evidence) -> str:
     """Measure the pulses of CLK."""
     row, clk_ns = row_for(e, "PSA2-FRAME-13"), _clk_ns(e)
     up, down = e.wires.pulses("CLK", 1)
+    if not len(up):
+        raise TooLittle("no pulse on CLK was recorded")
     high_ns = (down - up).astype(np.float64)
     due_ns, slack_ns = row.limit("high_clk") * clk_ns, row.limit("tolerance_clk") * clk_ns + e.slack_ns(clk_ns)
     _first(np.abs(high_ns - due_ns) > slack_ns, up, high_ns, f"{due_ns:.1f} +- {slack_ns:.1f} ns high")

@@ -374,6 +374,20 @@ def no_frame_before_the_set_up_is_over(e: Evidence) -> str:
     return f"Int high for {(until_ns - s.res_ns) / MS:.1f} ms after Res"
 
 
+@proves("PSA2-SETUP-15")
+@check("power_on", needs={"line"})
+def int_is_quiet_while_the_set_up_lasts(e: Evidence) -> str:
+    """Press Res while frames flow: how long until Int falls again?"""
+    falls = transfers(e.wires).fall_ns
+    quiet_ns = np.diff(falls)
+    k = int(np.argmax(quiet_ns))
+    due_ns = row_for(e, "PSA2-SETUP-15").limit("quiet_min_ms") * MS
+    if quiet_ns[k] < due_ns - e.slack_ns(due_ns):
+        saw = f"Int falls again after {quiet_ns[k] / MS:.2f} ms"
+        raise Broken(saw, f"{due_ns / MS:g} ms or more", at_ns=int(falls[k + 1]), lines=("Int", "Res"))
+    return f"no fall of Int for {quiet_ns[k] / MS:.2f} ms"
+
+
 @proves("PSA2-SETUP-16")
 @check("power_on", needs={"pins"})
 def nothing_but_the_set_up_is_sent(e: Evidence) -> str:
@@ -434,7 +448,11 @@ def _cut_on_the_line(e: Evidence) -> str:
     if short:
         raise Broken(f"{bits[short[0]]} bits in a frame", f"{whole}", at_ns=int(t.fall_ns[short[0]]), lines=("Int",))
     clk = t.clk_rise_ns
-    stray = clk[(clk > t.rise_ns[k]) & (clk < t.fall_ns[k + 1])]
+    most_ns = row_for(e, "PSA2-ERR-04").limit("pause_max_us") * 1e3
+    late = np.flatnonzero(np.diff(t.rises[k]) > most_ns)
+    cut = t.rises[k][: int(late[0]) + 1] if len(late) else t.rises[k]
+    end_ns = int(cut[-1]) if len(cut) else int(t.fall_ns[k])
+    stray = clk[(clk > end_ns) & (clk < t.fall_ns[k + 1])]
     if len(stray):
         raise Broken("CLK without power", "none", at_ns=int(stray[0]), lines=("Int", "CLK"))
-    return f"; the last frame before it had {bits[k]} of {whole} bits, then {pause_ns[k] / MS:.0f} ms of silence"
+    return f"; the last frame before it had {len(cut)} of {whole} bits, then {pause_ns[k] / MS:.0f} ms of silence"

@@ -14,7 +14,7 @@ PERIOD_S, FRAME_TO_CAN_S, IN_FRAME_S, ON_BUS_S = 1e-3, 298e-6, 40e-6, 65e-6
 def into_a_frame(s: Subject, take: Take, lead_s: float = 0.0) -> None:
     """Let time pass until a frame is under way on the line; only in lockstep can that be met."""
     s.run_for(10 * PERIOD_S)
-    if not s.lockstep or not take.frames:
+    if not {"lockstep", "stamps"} <= s.probes or not take.frames:
         return
     fall_s = take.frames[-1].t_s - FRAME_TO_CAN_S
     ahead_s = (fall_s + IN_FRAME_S - lead_s - s.bench.time_s) % PERIOD_S

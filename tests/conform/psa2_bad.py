@@ -1,0 +1,192 @@
+"""Good evidence made bad on purpose: edges moved, frames dropped, bytes changed, answers exchanged."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from psabench.conform.evidence import CanFrame, CanLog, Evidence
+from psabench.conform.scenes.psa2_can import Answer
+from psabench.protocol_files import message
+from psabench.signals import Ints, layout
+from psabench.vcd import Vcd, Wire
+
+Bad = Callable[[Evidence], Evidence]
+
+
+# ---- lines
+
+
+def rewired(e: Evidence, name: str, t_ns: Ints, level: Any) -> Evidence:
+    """With another course of one line."""
+    old = e.wires.recording
+    order = np.argsort(t_ns, kind="stable")
+    wires = dict(old.wires) | {name: Wire(np.asarray(t_ns, np.int64)[order], np.asarray(level, np.uint8)[order])}
+    return e.with_lines(replace(e.wires, recording=Vcd(old.unit_ns, old.start_ns, old.end_ns, wires)))
+
+
+def without(name: str) -> Bad:
+    """A line is not in the recording."""
+
+    def bad(e: Evidence) -> Evidence:
+        old = e.wires.recording
+        wires = {n: w for n, w in old.wires.items() if n != name}
+        return e.with_lines(replace(e.wires, recording=Vcd(old.unit_ns, old.start_ns, old.end_ns, wires)))
+
+    return bad
+
+
+def inverted(name: str) -> Bad:
+    """A line has the other level all the time."""
+    return lambda e: rewired(e, name, e.wires[name].t_ns, 1 - e.wires[name].level)
+
+
+def still(name: str, level: int) -> Bad:
+    """A line never moves."""
+    return lambda e: rewired(e, name, e.wires[name].t_ns[:1], np.array([level]))
+
+
+def moved(name: str, by_ns: int, level: int | None = None, nth: int | None = None) -> Bad:
+    """Edges of a line come so much later: all, those to a level, the nth of them (after the start)."""
+
+    def bad(e: Evidence) -> Evidence:
+        w = e.wires[name]
+        which = np.arange(len(w.t_ns)) > 0
+        if level is not None:
+            which &= w.level == level
+        if nth is not None:
+            which &= np.cumsum(which) == nth % int(which.sum()) + 1
+        return rewired(e, name, w.t_ns + np.where(which, by_ns, 0), w.level)
+
+    return bad
+
+
+def pulse(name: str, where: Callable[[Evidence], int], long_ns: int = 1000) -> Bad:
+    """A pulse more on a line that stands still there."""
+
+    def bad(e: Evidence) -> Evidence:
+        w, at = e.wires[name], where(e)
+        level = int(w.at(at))
+        t = np.concatenate((w.t_ns, [at, at + long_ns]))
+        return rewired(e, name, t, np.concatenate((w.level, [1 - level, level])))
+
+    return bad
+
+
+def less(name: str, nth: int, level: int) -> Bad:
+    """The nth pulse to a level is missing."""
+
+    def bad(e: Evidence) -> Evidence:
+        w = e.wires[name]
+        k = np.flatnonzero((w.level == level) & (np.arange(len(w.t_ns)) > 0))[nth]
+        keep = np.ones(len(w.t_ns), bool)
+        keep[k : k + 2] = False
+        return rewired(e, name, w.t_ns[keep], w.level[keep])
+
+    return bad
+
+
+def swapped(a: str, b: str) -> Bad:
+    """Two lines are exchanged."""
+
+    def bad(e: Evidence) -> Evidence:
+        one = rewired(e, a, e.wires[b].t_ns, e.wires[b].level)
+        return rewired(one, b, e.wires[a].t_ns, e.wires[a].level)
+
+    return bad
+
+
+def slower(ppm: float) -> Bad:
+    """All lines run slower."""
+
+    def bad(e: Evidence) -> Evidence:
+        for name, w in e.wires.recording.wires.items():
+            e = rewired(e, name, np.rint(w.t_ns * (1 + ppm * 1e-6)).astype(np.int64), w.level)
+        return e
+
+    return bad
+
+
+def after_res(e: Evidence) -> int:
+    """1 ms after the end of Res."""
+    return int(e.wires.rises("Res")[-1]) + 1_000_000
+
+
+def flip(line: str, clock: str, nth: int, *, level: int = 1) -> Bad:
+    """Data have the other level at the nth edge of a clock, from half a period before it to half a period after."""
+
+    def bad(e: Evidence) -> Evidence:
+        edges = e.wires[clock].edges_ns(level)
+        k = nth % len(edges)
+        half = int(edges[k + 1] - edges[k]) // 2 if k + 1 < len(edges) else 100
+        half = min(half, 488)
+        w = e.wires[line]
+        begin, end = int(edges[k]) - half, int(edges[k]) + half
+        inside = (w.t_ns >= begin) & (w.t_ns <= end)
+        t = np.concatenate((w.t_ns[~inside], [begin, end]))
+        levels = np.concatenate((w.level[~inside], [1 - int(w.at(int(edges[k]))), int(w.at(end))]))
+        return rewired(e, line, t, levels)
+
+    return bad
+
+
+# ---- CAN
+
+
+def frames(change: Callable[[list[CanFrame]], list[CanFrame]]) -> Bad:
+    """Another log of the bus; cuts stay where they are, so that a log keeps its length where it has some."""
+    return lambda e: e.with_can(CanLog(frames=tuple(change(list(e.can.frames)))))
+
+
+def each(name: str, change: Callable[[CanFrame], CanFrame], nth: int | None = None) -> Bad:
+    """The frames of a message are changed: all, or the nth."""
+
+    def bad(e: Evidence) -> Evidence:
+        ids = {f.can_id for f in e.frames_of(name).frames}
+        found = list(e.can.frames)
+        at = [k for k, f in enumerate(found) if f.can_id in ids]
+        for k in at if nth is None else [at[nth]]:
+            found[k] = change(found[k])
+        return e.with_can(CanLog(frames=tuple(found)))
+
+    return bad
+
+
+def gone(name: str, nth: int | None = None) -> Bad:
+    """Frames of a message never came."""
+    return each(name, lambda f: replace(f, can_id=0x7FF), nth)
+
+
+def short(name: str, nth: int = 0) -> Bad:
+    """A frame lacks its last byte."""
+    return each(name, lambda f: replace(f, data=f.data[:-1]), nth)
+
+
+def signal(name: str, s: str, change: Callable[[int], int], nth: int | None = None) -> Bad:
+    """A signal of a message has another value."""
+    at = layout(message(name))[s]
+
+    def edit(f: CanFrame) -> CanFrame:
+        word = int.from_bytes(f.data, "little")
+        mask = (1 << at.bits) - 1
+        raw = word >> at.start_bit & mask
+        value = raw - (1 << at.bits) if at.signed and raw >> (at.bits - 1) else raw
+        word = word & ~(mask << at.start_bit) | (change(value) & mask) << at.start_bit
+        return replace(f, data=word.to_bytes(len(f.data), "little"))
+
+    return each(name, edit, nth)
+
+
+# ---- answers
+
+
+def told(name: str, change: Callable[[Any], Any]) -> Bad:
+    """A fact of the scene is another."""
+    return lambda e: replace(e, facts=dict(e.facts) | {name: change(e.facts[name])})
+
+
+def answered(name: str, key: Any, answer: Answer) -> Bad:
+    """One answer among several is another."""
+    return told(name, lambda old: dict(old) | {key: answer})
