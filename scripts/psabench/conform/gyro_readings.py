@@ -1,0 +1,54 @@
+"""Readings of a gyro unit from a log: its three messages of a step as columns, in deg and deg/h."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import lru_cache
+
+import numpy as np
+
+from psabench.conform.evidence import CanLog, Evidence
+from psabench.conform.outcome import TooLittle
+from psabench.protocol_files import message
+from psabench.signals import Floats, layout
+
+MESSAGES = ("GYRO_RATES", "GYRO_ANGLES", "GYRO_LEVEL")
+EARTH_DEGPH = 15.041067  # docs/protocol_gyro.md
+
+
+def columns(e: Evidence, least: int = 20) -> Mapping[str, Floats]:
+    """Signals of whole readings in the units of the DBC. Raises TooLittle."""
+    return _columns(e.can, e.variant.family, e.node, least)
+
+
+@lru_cache(maxsize=8)
+def _columns(can: CanLog, board: str, node: int, least: int) -> Mapping[str, Floats]:
+    logs = [can.of(name, board, node) for name in MESSAGES]
+    n = min(len(log) for log in logs)
+    if n < least:
+        raise TooLittle(f"{', '.join(f'{len(log)} {name}' for log, name in zip(logs, MESSAGES, strict=True))}")
+    found: dict[str, Floats] = {}
+    try:
+        for name, log in zip(MESSAGES, logs, strict=True):
+            raw, scales = CanLog(frames=log.frames[:n]).raw(name), layout(message(name))
+            found |= {k: np.asarray(v * scales[k].scale, np.float64) for k, v in raw.items()}
+    except ValueError as err:
+        raise TooLittle(str(err)) from err
+    return found
+
+
+def vertical_degph(latitude_deg: float) -> float:
+    """Wz of a vehicle that stands still."""
+    return EARTH_DEGPH * float(np.sin(np.radians(latitude_deg)))
+
+
+def wrapped(angle_deg: Floats) -> Floats:
+    """Into half turns."""
+    return np.asarray((angle_deg + 180.0) % 360.0 - 180.0, np.float64)
+
+
+def emergencies(e: Evidence) -> list[tuple[int, float]]:
+    """Codes and the board's own instants, s."""
+    log = e.frames_of("GYRO_EMCY")
+    whole = [f for f in log.frames if len(f.data) == 8]
+    return [(int.from_bytes(f.data[:2], "little"), int.from_bytes(f.data[4:], "little") * 1e-6) for f in whole]
