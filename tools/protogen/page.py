@@ -1,8 +1,17 @@
 """The protocol pages: a written head with tables in it."""
 
+import re
+
 from protogen.model import BOARDS, ROOT, Entry, Message, Protocol, resolved
 
 RATES_HZ = (250, 500, 1000, 2000, 4000)
+BUS = 0x2002  # the parallel bus, of units that have one
+NO_BUS = """\
+## Bus cycles
+
+This unit has no parallel bus and no object 2002h: 2030h:10 and 2030h:11 stay 0.
+
+"""
 
 
 def worst_bits(m: Message) -> tuple[int, int]:
@@ -96,6 +105,8 @@ def page(p: Protocol) -> str:
         words = {"name": p.device["name"], "key": p.key, "KEY": p.key.upper(), "node": str(p.device["node"])}
         for word, meaning in words.items():
             text = text.replace(f"{{{word}}}", meaning)
+    if unit and not any(o.index == BUS for o in p.objects):
+        text = re.sub(r"## Bus cycles\n.*?(?=## )", NO_BUS, text, flags=re.DOTALL)
     for name, lines in tables.items():
         text = text.replace(f"<!-- {name} -->\n", "\n".join(lines) + "\n" if lines else "")
     return f"<!-- {p.generated}; the head is {head.relative_to(ROOT)} -->\n{text}"
