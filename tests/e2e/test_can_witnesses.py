@@ -30,7 +30,7 @@ from psabench.protocol_files import database, dbc_node
 from psabench.unit import NMT_PREOP, NMT_START, TPDO_OFF, Unit
 from rig import HOST, PATIENCE_S, VCAN, bus_spec, need, until
 
-SENSOR = "axes: {x: {sensor: mems, u0_v: 0.2, kx_v_per_g: 1.0}}"
+SENSOR = "axes: {x: {sensor: mems, u0_v: -3.0, kx_v_per_g: 1.0}}"  # a negative code uses every bit of a signal
 PLATFORM = "site: {latitude_deg: 50}\nplatform: {}\n"
 LEVEL = "{name: l, board: psa2, node: 5, on: platform}"
 UNITS = {
