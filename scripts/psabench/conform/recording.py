@@ -234,12 +234,24 @@ def boot(e: Evidence, needs: frozenset[str]) -> Evidence:
         has_res = "Res" in e.lines.recording.wires or e.variant.family in RES_IS_A_LINE
         if has_res or not boots:
             raise TooLittle("the recording has no pulse on Res" if has_res else NO_PART["boot"])
+    if "line" in needs and "pins" not in needs:
+        _reset_amid_readings(e)
     if e.lines is not None and len(_resets_ns(e.lines)) and not e.lines.recording.wires["Res"].level[0]:
         e = e.with_lines(_from_power_up(e.lines))
     if not boots:
         return e
     asked = [f.t_s for f in e.can.frames[: boots[-1]] if f.can_id == 0 and f.data[:1] and f.data[0] in NMT_RESETS]
     return replace(e, marks=Marks(at_s={"reset": asked[-1] if asked else e.can.frames[boots[-1]].t_s}))
+
+
+def _reset_amid_readings(e: Evidence) -> None:
+    """Checks that know Res by what Int does want readings before it. Raises TooLittle."""
+    beat = BEATS.get(e.variant.family)
+    ends = np.empty(0, np.int64) if e.lines is None else _resets_ns(e.lines)
+    if beat is None or e.lines is None or not len(ends) or beat.line not in e.lines.recording.wires:
+        raise TooLittle("the recording of the lines does not show a Res")
+    if not (e.lines.recording.wires[beat.line].edges_ns(beat.level) < ends[-1]).any():
+        raise TooLittle("the recording has no readings before Res")
 
 
 # ---- the run
