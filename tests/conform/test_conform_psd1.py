@@ -1,4 +1,4 @@
-"""Checks of PSD-1 on a cycle made by hand: the good one passes, each wrong one fails as the requirement that it breaks."""
+"""Checks of PSD-1 on cycles made by hand: good ones pass, each wrong one fails as the requirement that it breaks."""
 
 from __future__ import annotations
 
@@ -173,7 +173,7 @@ BAD: list[tuple[Board, Test]] = [
     (Board(change=5), psd1_serial.bits_change_after_the_fall_of_sclk),
     (Board(low=14_400), psd1_serial.rfx_is_low_for_its_time),
     (Board(low=13_601), psd1_serial.rfx_rises_with_a_fall_of_the_clock),
-    (Board(fl2_late=2), psd1_serial.fl2_is_set_as_rfx_rises),
+    (Board(fl2_late=3), psd1_serial.fl2_is_set_as_rfx_rises),
     (Board(clear_late=800), psd1_serial.fl2_is_cleared_by_the_clock_after_the_strobe),
     (Board(clear_late=800), psd1_serial.fl2_of_z_is_cleared_likewise),
     (Board(gap=800), psd1_serial.rfy_falls_as_fl2_of_x_is_cleared),

@@ -1,0 +1,259 @@
+"""Checks of PMKA, PIK and the gyro unit on frames and lines made by hand, good and bad."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from psabench.conform.checks import gyro, pik, pmka_lines, pmka_readings
+from psabench.conform.checks.pik import MESSAGES as PIK_MESSAGES
+from psabench.conform.evidence import CanFrame, CanLog, Evidence, LineLog
+from psabench.conform.gyro_readings import MESSAGES as GYRO_MESSAGES
+from psabench.conform.outcome import Broken, TooLittle
+from psabench.conform.variant import variant
+from psabench.protocol_files import dbc_node, message
+from psabench.vcd import Vcd, Wire
+
+Test = Callable[[Evidence], str]
+Row = Mapping[str, float]
+
+
+def log(board: str, rows: Sequence[tuple[str, Row]]) -> CanLog:
+    """Frames of these messages; signals that a row leaves out are 0."""
+    frames = []
+    for k, (name, values) in enumerate(rows):
+        m = message(name)
+        raw = {s.name: values.get(s.name, 0) for s in m.signals}
+        data = bytes(m.encode(raw, scaling=False, strict=False))
+        frames.append(CanFrame(t_s=k * 1e-3, can_id=int(m.frame_id), data=data))
+    return CanLog(frames=tuple(frames))
+
+
+def lines(moves: Mapping[str, Sequence[tuple[int, int]]], end_ns: int) -> LineLog:
+    wires = {
+        n: Wire(np.array([t for t, _ in v], np.int64), np.array([x for _, x in v], np.uint8)) for n, v in moves.items()
+    }
+    return LineLog(recording=Vcd(1, 0, end_ns, wires))
+
+
+def evidence(board: str, can: CanLog, **more: Any) -> Evidence:
+    inputs = {"x": 2.0, "y": -1.0, "z": 0.5}
+    return Evidence(
+        variant=variant(board), node=dbc_node(variant(board).family), scene="", can=can, inputs_v=inputs, **more
+    )
+
+
+def fails(check: Test, e: Evidence) -> None:
+    with pytest.raises(Broken):
+        check(e)
+
+
+# ---- PMKA
+
+
+def pmka(n: int = 120, change: Callable[[int, dict[str, float], dict[str, float]], None] = lambda *_: None) -> Evidence:
+    """Integrators at 2, -1 and 0.5 V in a beat 1 that lasts, K at rest in its zero."""
+    rows: list[tuple[str, Row]] = []
+    code, reset = {"X": 0.0, "Y": 0.0, "Z": 0.0, "K": 5.0}, dict.fromkeys("XYZK", 0)
+    for k in range(n):
+        for axis, volts in (("X", 2.0), ("Y", -1.0), ("Z", 0.5)):
+            reset[axis] = int(np.sign(code[axis])) if abs(code[axis]) * 10 / 2**15 > 3.5 else 0
+            code[axis] += volts * 0.5106 * 3276.8 - reset[axis] * 16732.6
+        codes: dict[str, float] = {a: round(v) for a, v in code.items()}
+        state: dict[str, float] = {"SEQ": k, "TAU": 1, "CAL": 1, "SERVES_X": 1, "SERVES_Y": 2, "SERVES_Z": 3}
+        state |= {f"RESET_{a}": v for a, v in reset.items()}
+        change(k, codes, state)
+        rows += [("PMKA_CODES", codes), ("PMKA_STATE", state)]
+    return evidence("pmka", log("pmka", rows))
+
+
+def test_a_good_pmka_passes() -> None:
+    e = pmka()
+    for check in (
+        pmka_readings.codes_and_state_alternate,
+        pmka_readings.readings_are_counted_without_gaps,
+        pmka_readings.messages_have_their_lengths,
+        pmka_readings.an_integrator_moves_with_its_input,
+        pmka_readings.resets_follow_codes_beyond_uc,
+        pmka_readings.in_beat_1_the_spare_is_free,
+        pmka_readings.each_axis_has_an_integrator,
+    ):
+        assert check(e)
+
+
+def test_a_bad_pmka_is_found() -> None:
+    def of(name: str, value: float) -> Evidence:
+        return pmka(change=lambda k, _, s: s.update({name: value}) if k == 50 else None)
+
+    fails(pmka_readings.readings_are_counted_without_gaps, of("SEQ", 7))
+    fails(pmka_readings.in_beat_1_the_spare_is_free, of("SERVES_K", 1))
+    fails(pmka_readings.each_axis_has_an_integrator, of("SERVES_X", 0))
+    fails(pmka_readings.resets_follow_codes_beyond_uc, pmka(change=lambda _, __, s: s.update({"RESET_X": 0})))
+    wrong_sign = pmka(change=lambda _, __, s: s.update({"RESET_X": -s["RESET_X"]}))
+    fails(pmka_readings.resets_follow_codes_beyond_uc, wrong_sign)
+    half = pmka(change=lambda _, c, __: c.update({a: round(c[a] / 2) for a in "XYZ"}))
+    fails(pmka_readings.an_integrator_moves_with_its_input, half)
+    good = pmka()
+    fails(
+        pmka_readings.codes_and_state_alternate,
+        replace(good, can=CanLog(frames=good.can.frames[:5] + good.can.frames[6:])),
+    )
+
+
+def samples(step: int = 100_000, period: int = 4_800_000, order: Sequence[int] = (0, 1, 2, 3)) -> Evidence:
+    moves: dict[str, list[tuple[int, int]]] = {"SH": [(0, 0)], "MUX0": [(0, 0)], "MUX1": [(0, 0)]}
+    t = 10_000_000
+    for _ in range(12):
+        for k in range(4):
+            at, following = t + k * step, order[(k + 1) % 4]
+            moves["SH"] += [(at, 1), (at + 50_000, 0)]
+            moves["MUX0"].append((at, following & 1))
+            moves["MUX1"].append((at, following >> 1))
+        t += period
+    return evidence("pmka", CanLog(), lines=lines(moves, t))
+
+
+def test_samples_of_a_pmka() -> None:
+    for check in (pmka_lines.integrators_are_sampled_every_ts, pmka_lines.four_samples_follow_one_another):
+        assert check(samples())
+    fails(pmka_lines.integrators_are_sampled_every_ts, samples(period=4_802_000))
+    fails(pmka_lines.four_samples_follow_one_another, samples(step=101_000))
+    fails(pmka_lines.four_samples_follow_one_another, samples(order=(0, 2, 1, 3)))
+
+
+# ---- PIK
+
+
+def counts(
+    k_hz_per_v: float = 2000.0, off: float = 0.0, seq_step: int = 1, order: Sequence[int] = (0, 1, 2)
+) -> Evidence:
+    rows: list[tuple[str, Row]] = []
+    before = [0, 0, 0]
+    for k in range(1, 6101):
+        total = [int(v * (k_hz_per_v * 0.01 * k)) + (round(off) if k > 3000 else 0) for v in (2.0, -1.0, 0.5)]
+        inc = [a - b for a, b in zip(total, before, strict=True)]
+        before = total
+        three: list[tuple[str, Row]] = [
+            ("PIK_COUNTS", {"X": inc[0], "Y": inc[1], "Z": inc[2], "SEQ": k * seq_step % 256}),
+            ("PIK_TOTALS", {"X": total[0], "Y": total[1]}),
+            ("PIK_TOTAL_Z", {"Z": total[2], "TSTAMP": 10_000 * k}),
+        ]
+        rows += [three[i] for i in order]
+    return evidence("pik6", log("pik", rows))
+
+
+def test_counts_of_a_pik() -> None:
+    good = counts()
+    for check in (
+        pik.the_frequency_follows_the_input,
+        pik.the_coefficient_is_the_printed_one,
+        pik.the_count_is_the_integral,
+        pik.the_law_is_linear,
+        pik.counts_are_differences_of_totals,
+        pik.readings_are_numbered_and_stamped,
+        pik.three_messages_make_a_reading,
+        pik.a_pulse_has_the_printed_weight,
+    ):
+        assert check(good)
+    fails(pik.the_coefficient_is_the_printed_one, counts(k_hz_per_v=2004.0))
+    fails(pik.the_frequency_follows_the_input, counts(k_hz_per_v=-2000.0))
+    fails(pik.the_count_is_the_integral, counts(off=5.0))
+    fails(pik.readings_are_numbered_and_stamped, counts(seq_step=2))
+    fails(pik.three_messages_make_a_reading, counts(order=(0, 2, 1)))
+    fails(pik.a_pulse_has_the_printed_weight, counts(k_hz_per_v=2100.0))
+
+
+def pulses(high: int = 25_000, name: str = "FXP", shift: int = 0) -> Evidence:
+    moves: dict[str, list[tuple[int, int]]] = {n: [(0, 0)] for n in pik.PULSES}
+    moves["CLK"] = [(0, 0), *((t + h, 1 - h // 12_500) for t in range(25_000, 5_000_000, 25_000) for h in (0, 12_500))]
+    for k in range(20):
+        at = 100_000 + k * 200_000 + (shift if k == 9 else 0)
+        moves[name] += [(at, 1), (at + high, 0)]
+    return evidence("pik6", CanLog(), lines=lines(moves, 5_000_000))
+
+
+def test_pulses_of_a_pik() -> None:
+    assert pik.a_reset_lasts_its_time(pulses())
+    assert pik.pulses_begin_on_their_grid(pulses())
+    fails(pik.a_reset_lasts_its_time, pulses(high=25_100))
+    fails(pik.pulses_begin_on_their_grid, pulses(shift=700))
+    fails(pik.signs_have_their_lines, pulses(name="FXN"))
+
+
+# ---- gyro
+
+
+def steps(
+    change: Callable[[int, dict[str, float]], None] = lambda *_: None, order: Sequence[int] = (0, 1, 2)
+) -> Evidence:
+    """Levelling: U1 = -m1 beta - Wz cos beta sin gamma, U2 = Wz cos beta cos gamma."""
+    rows: list[tuple[str, Row]] = []
+    wz = 15.041067 * np.sin(np.radians(50.0))
+    for k in range(300):
+        beta, gamma = np.exp(-k / 100) * 0.1, 0.02
+        u1 = -beta * 3600 - wz * np.cos(np.radians(beta)) * np.sin(np.radians(gamma))
+        u2 = wz * np.cos(np.radians(beta)) * np.cos(np.radians(gamma))
+        v: dict[str, float] = {"U1": u1, "U2": u2, "STEP": k, "MODE": 1, "BETA": beta, "GAMMA": gamma}
+        change(k, v)
+        three: list[tuple[str, Row]] = [
+            ("GYRO_RATES", {"U1": round(v["U1"] * 1e4), "U2": round(v["U2"] * 1e4)}),
+            ("GYRO_ANGLES", {"STEP": v["STEP"], "MODE": v["MODE"]}),
+            ("GYRO_LEVEL", {"BETA": round(v["BETA"] / 2e-6), "GAMMA": round(v["GAMMA"] / 2e-6)}),
+        ]
+        rows += [three[i] for i in order]
+    return evidence("gyro", log("gyro", rows), facts={"m1_per_s": 1.0, "m2_per_s": 2.0, "latitude_deg": 50.0})
+
+
+def test_steps_of_a_gyro_unit() -> None:
+    good = steps()
+    for check in (
+        gyro.three_messages_make_a_reading,
+        gyro.steps_are_counted,
+        gyro.u1_levels,
+        gyro.u2_runs_free_when_it_levels,
+    ):
+        assert check(good)
+    fails(gyro.three_messages_make_a_reading, steps(order=(1, 0, 2)))
+    fails(gyro.steps_are_counted, steps(lambda k, v: v.update(STEP=k + (k > 99))))
+    fails(gyro.u1_levels, steps(lambda _, v: v.update(U1=-v["U1"])))
+    fails(gyro.u2_runs_free_when_it_levels, steps(lambda _, v: v.update(U2=v["U2"] + 1.0)))
+
+
+def checks_of(module: Any) -> list[Test]:
+    """Its checks: public functions that it defines."""
+    found = [f for name, f in vars(module).items() if callable(f) and not name.startswith("_")]
+    return [f for f in found if f.__module__ == module.__name__ and f.__code__.co_argcount == 1]
+
+
+@pytest.mark.parametrize("check", [f for m in (pmka_readings, gyro, pik) for f in checks_of(m)])
+@pytest.mark.parametrize("what", ["nothing", "wrong lengths"])
+def test_nothing_and_wrong_lengths_are_no_pass_and_no_crash(check: Test, what: str) -> None:
+    module = check.__module__.rpartition(".")[2]
+    board = {"pmka_readings": "pmka_drift", "gyro": "gyro", "pik": "pik6"}[module]
+    family = {"pmka_drift": "pmka", "pik6": "pik6"}.get(board, board)
+    names = {"pmka": ("PMKA_CODES", "PMKA_STATE"), "gyro": GYRO_MESSAGES, "pik6": PIK_MESSAGES}[family]
+    ids = [int(message(n).frame_id) for n in names]
+    frames = [CanFrame(t_s=k * 1e-3, can_id=i, data=b"\1\2\3") for k in range(40) for i in ids]
+    empty = lines({}, 10**9)
+    e = Evidence(
+        variant=variant(family, board),
+        node=dbc_node(variant(family, board).family),
+        scene="",
+        can=CanLog(frames=tuple(frames) if what != "nothing" else ()),
+        lines=empty,
+        inputs_v={"x": 2.0, "y": -1.0, "z": 0.5},
+        facts={"rom": [1, 2, 3], "level_node": 5, "positions": [0.0, 90.0, 180.0], "latitude_deg": 50.0},
+    )
+    try:
+        check(e)
+    except (Broken, TooLittle):
+        return
+    except ValueError as err:
+        if "holds for" in str(err):  # a row of another profile: the runner does not ask it
+            return
+        raise
+    assert what == "wrong lengths"
+    assert "alternate" in check.__name__ or "three_messages" in check.__name__  # their order alone is right
