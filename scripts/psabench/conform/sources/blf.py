@@ -77,23 +77,10 @@ def _container_data(data: bytes, most: int) -> tuple[bytes, str]:
     try:
         found = unpack.decompress(packed, most + 1)
     except zlib.error as e:
-        return _before_damage(packed, most), str(e)
+        return b"", f"{e}: nothing of it is sure"
     if len(found) > most:
         return found[:most], f"more than {MOST_UNPACKED} bytes"
     return found, "" if unpack.eof else "packed data end"
-
-
-def _before_damage(packed: bytes, most: int) -> bytes:
-    """What can be unpacked before zlib finds the damage, 256 bytes at a time."""
-    unpack, found = zlib.decompressobj(), bytearray()
-    try:
-        for k in range(0, len(packed), 256):
-            found += unpack.decompress(packed[k : k + 256], most)
-            if len(found) > most:
-                break
-    except zlib.error:
-        pass
-    return bytes(found[:most])
 
 
 def _sound(objects: bytes) -> tuple[int, str]:

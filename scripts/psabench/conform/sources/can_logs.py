@@ -51,6 +51,9 @@ def read_can(path: Path, bounds: Bounds) -> CanTake:
         note = (
             f"message {len(frames) + 1} cannot be read ({type(e).__name__}: {str(e)[:80]}); those before it are judged"
         )
+    if not note and frames and path.suffix.lower() in TEXT and not _ends_with_a_line(path):
+        frames.pop()
+        note = f"its last line is cut; the {len(frames)} frames before it are judged"
     note = note or trouble
     if not frames:
         raise BadInput(f"{path}: {note or 'no frame in it'}; nothing in it can be judged")
@@ -94,6 +97,13 @@ def _source(path: Path) -> tuple[Any, str]:
         return str(path), ""
     _check_lines(path)
     return io.TextIOWrapper(path.open("rb"), encoding="utf-8", errors="replace"), ""
+
+
+def _ends_with_a_line(path: Path) -> bool:
+    """A line that is cut may still read as a frame, and would be a shorter one."""
+    with path.open("rb") as file:
+        file.seek(max(0, path.stat().st_size - 1))
+        return file.read(1) == b"\n"
 
 
 def _check_lines(path: Path) -> None:
