@@ -46,6 +46,7 @@ WAYS = frozenset(
         "errors",
         "slow",
         "port",
+        "stream",
     }
 )
 

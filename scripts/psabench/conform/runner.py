@@ -29,6 +29,7 @@ MISSING = {
     "chamber": "no thermal chamber was connected (--scpi chamber=...)",
     "lockstep": "an emulator in lockstep is wanted: it takes longer than anybody would wait",
     "port": "no line port was connected (--lines)",
+    "stream": "this board sends readings only while a host reads its bus",
     "fd": "the link to the bus carries no FD frames; slcan and SocketCAN do",
     "rtr": "the link to the bus carries no remote frames; slcan and SocketCAN do",
     "stamps": "the link's time stamps are this machine's, not the bus's",

@@ -29,6 +29,7 @@ from psabench.unit import Unit
 
 UNIT = "a"
 SLICE_S = 0.1
+HOSTLESS_SETUP_S = 0.3  # of a board that nobody reads: nothing tells that it is set up
 # At the inputs of an emulator of ours: none is another's, one is negative, none is a round code.
 INPUTS_V: Mapping[str, float] = {"x": 2.0101, "y": -1.3007, "z": 0.7003}
 # Links of python-can whose time stamps are this machine's: they say when it looked, not when the frame passed.
@@ -128,6 +129,8 @@ class Subject:
             seen.add("bus")
         seen |= {"supply", "chamber"} & set(self.bench.addresses)
         seen |= self._of_the_link()
+        if self.variant.figures.get("host_strobe_ns") != 0:
+            seen.add("stream")  # readings come by themselves
         if self.lockstep:
             seen.add("lockstep")
         if self.inputs_v:
@@ -139,6 +142,13 @@ class Subject:
         kind = type(self.host.bus).__name__
         seen = {"fd", "rtr"} if kind != "SocketCanDaemonBus" else set()
         return seen if kind in BY_THE_HOST_S_CLOCK else seen | {"stamps"}
+
+    def wait_ready(self) -> None:
+        """Until readings come, or would if a host read them."""
+        if "stream" in self.probes:
+            self.unit.wait_ready()
+        else:
+            self.run_for(HOSTLESS_SETUP_S)
 
     @contextmanager
     def take(self, *, lines: bool = True) -> Iterator[Take]:

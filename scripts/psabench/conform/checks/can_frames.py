@@ -69,7 +69,7 @@ def _mine(e: Evidence) -> tuple[CanFrame, ...]:
 
 
 @proves("BUS-ID-01")
-@check("services")
+@check("services", needs={"can", "stream"})
 def frames_have_the_identifiers_of_the_node(e: Evidence) -> str:
     """Look at the identifiers of all frames that belong to the node."""
     mine = {f.can_id for f in _mine(e)}
@@ -221,7 +221,7 @@ def stamp_s(e: Evidence, f: CanFrame) -> float:
 
 
 @proves("BUS-EMCY-01")
-@check("overload")
+@check("overload", needs={"can", "stream"})
 def emergencies_have_their_form(e: Evidence) -> str:
     """Look at length, error register and time of each emergency."""
     told = _told(e)
@@ -238,7 +238,7 @@ def emergencies_have_their_form(e: Evidence) -> str:
 
 
 @proves("BUS-EMCY-02")
-@check("overload")
+@check("overload", needs={"can", "stream"})
 def a_condition_is_told_once(e: Evidence) -> str:
     """Count the emergencies of each condition."""
     lasting: set[int] = set()
@@ -252,7 +252,7 @@ def a_condition_is_told_once(e: Evidence) -> str:
 
 
 @proves("BUS-EMCY-03")
-@check("overload")
+@check("overload", needs={"can", "stream"})
 def the_end_is_told_once(e: Evidence) -> str:
     """Look at the emergency that ends the last condition."""
     told = _told(e)
@@ -268,7 +268,7 @@ def the_end_is_told_once(e: Evidence) -> str:
 
 
 @proves("BUS-EMCY-05")
-@check("overload")
+@check("overload", needs={"can", "stream"})
 def codes_are_of_the_table(e: Evidence) -> str:
     """Look each emergency up in the table of codes."""
     table, told = emergencies(e.variant.family), _told(e)
@@ -293,7 +293,7 @@ def _any(bits: Any) -> int:
 
 
 @proves("BUS-EMCY-06")
-@check("overload")
+@check("overload", needs={"can", "stream"})
 def lost_samples_are_told(e: Evidence) -> str:
     """Compare what is missing in the numbers of the readings with the counter, and the emergencies with both."""
     row = row_for(e, "BUS-EMCY-06")
@@ -331,7 +331,7 @@ def _numbers(e: Evidence) -> np.ndarray:
 
 
 @proves("BUS-PDO-04")
-@check("overload")
+@check("overload", needs={"can", "stream"})
 def frames_of_a_sample_keep_their_order(e: Evidence) -> str:
     """Look at the order of the frames of each sample, before, while and after others fill the bus."""
     order = [i + e.node for i in pdos(e.variant.family).values()]
@@ -347,7 +347,7 @@ def frames_of_a_sample_keep_their_order(e: Evidence) -> str:
 
 
 @proves("BUS-LOAD-02")
-@check("overload", needs={"can", "lockstep"})
+@check("overload", needs={"can", "lockstep", "stream"})
 def no_more_than_its_queue_waits(e: Evidence) -> str:
     """Count the readings that were kept when the bus was filled: those that come before the gap in the numbers."""
     if "flood" not in e.marks:

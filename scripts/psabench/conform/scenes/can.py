@@ -37,7 +37,7 @@ def services(s: Subject) -> Evidence:
 def overload(s: Subject) -> Evidence:
     """Every TPDO switched on, a stream, a bus that others fill until samples are lost, two seconds of calm."""
     with talk(s, reset=True) as t:
-        s.unit.wait_ready()
+        s.wait_ready()
         everything_on(t)
         with s.take(lines=False) as take:
             t.take = take

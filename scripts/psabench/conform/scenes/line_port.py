@@ -19,7 +19,7 @@ def line_port(s: Subject) -> Evidence:
     """The line port, beside all pins where they are there. Facts: `bytes` of the port, its edges as `port`."""
     if s.line_port is None:
         raise TooLittle("no line port")
-    s.unit.wait_ready()
+    s.wait_ready()
     both = s.probe is not None and s.probe is not s.line_port
     with s.take(lines=both) as take:
         s.run_for(TAIL_S)

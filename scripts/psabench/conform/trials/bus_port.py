@@ -200,7 +200,7 @@ def the_port_reads_what_can_reads(s: Subject) -> str:
     """Each readable register over CAN, by the port, over CAN again; those that stood still."""
     same = []
     with talk(s, reset=True) as t:
-        s.unit.wait_ready()
+        s.wait_ready()
         for name, (address, access) in registers(s).items():
             if access == "wo":
                 continue

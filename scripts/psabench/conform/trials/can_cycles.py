@@ -35,7 +35,7 @@ def an_object_is_a_cycle(s: Subject) -> str:
     """Upload every readable register of 2002h and write one; look at the lines of the bus."""
     told = 0
     with talk(s, reset=True) as t:
-        s.unit.wait_ready()
+        s.wait_ready()
         where, word = harmless(s)
         for address, access in registers(s).values():
             if access == "wo":
@@ -70,7 +70,7 @@ def a_strobe_is_as_long_as_it_is_set(s: Subject) -> str:
     """Cycles with 2051h at 0, 200, 1234 ns and 1 ms: CS low."""
     told = []
     with talk(s, reset=True) as t:
-        s.unit.wait_ready()
+        s.wait_ready()
         address = quiet(s)
         for length_ns in (0, int(_limit("BUS-CYC-05", "strobe_min_ns")), 1234, 1_000_000):
             _strobe(t, length_ns)
@@ -93,7 +93,7 @@ def a_strobe_is_as_long_as_it_is_set(s: Subject) -> str:
 def the_answer_waits_for_the_strobe(s: Subject) -> str:
     """A strobe of 10 ms: the time from the answer before to that of the cycle."""
     with talk(s, reset=True) as t:
-        s.unit.wait_ready()
+        s.wait_ready()
         before = t.answer_to(write(STROBE_NS, 0, LONG_NS.to_bytes(4, "little")))
         after = t.answer_to(_read(quiet(s)))
     took_s = after.t_s - before.t_s
@@ -107,7 +107,7 @@ def the_answer_waits_for_the_strobe(s: Subject) -> str:
 def cs_rises_before_the_answer(s: Subject) -> str:
     """A strobe of 1 ms: the rise of CS beside the answer."""
     with talk(s, reset=True) as t:
-        s.unit.wait_ready()
+        s.wait_ready()
         _strobe(t, 1_000_000)
         with s.take() as take:
             answer = t.answer_to(_read(quiet(s)))
@@ -134,7 +134,7 @@ def refusals_have_their_codes(s: Subject) -> str:
     if write_only is not None:
         wrong.append((_read(write_only), "write_only_code"))
     with talk(s, reset=True) as t:
-        s.unit.wait_ready()
+        s.wait_ready()
         for request, code in wrong:
             before = t.counter(REFUSED)
             t.refused(request, row.limit(code), f"cycle {words(request[:4])}")
@@ -151,7 +151,7 @@ def a_short_strobe_is_refused(s: Subject) -> str:
     """2051h one less than the least, a cycle; the least, a cycle."""
     least, code = int(_limit("BUS-CYC-05", "strobe_min_ns")), _limit("BUS-CYC-05", "abort_code")
     with talk(s, reset=True) as t:
-        s.unit.wait_ready()
+        s.wait_ready()
         done = t.counter(DONE)
         _strobe(t, least - 1)
         t.refused(_read(quiet(s)), code, f"a strobe of {least - 1} ns")
@@ -179,7 +179,7 @@ def a_second_cycle_is_refused(s: Subject) -> str:
     """A long cycle over CAN, another by the bus port meanwhile; then the other way round."""
     code = int(_limit("BUS-CYC-06", "abort_code"))
     with talk(s, reset=True) as t:
-        s.unit.wait_ready()
+        s.wait_ready()
         address = quiet(s)
         _strobe(t, LONGEST_NS)
         at = len(t.heard)
@@ -212,7 +212,7 @@ def _while_the_port_is_busy(t: Talk, address: int) -> int | None:
 def a_reset_cuts_a_cycle(s: Subject) -> str:
     """NMT 81h in a strobe of 100 ms of the bus port: the answer, and a cycle after it."""
     with talk(s, reset=True) as t:
-        s.unit.wait_ready()
+        s.wait_ready()
         address = quiet(s)
         assert s.port is not None
         s.port.ask(f"R {address:X} {LONGEST_NS}")
@@ -221,7 +221,7 @@ def a_reset_cuts_a_cycle(s: Subject) -> str:
         answer = tell(s)
         if not answer.startswith(f"E off R {address:02X}h"):
             raise Broken(answer, f"E off R {address:02X}h")
-        s.unit.wait_ready()
+        s.wait_ready()
         t.upload(BUS, address + 1)
     return f"{answer}; cycles go on"
 
@@ -231,7 +231,7 @@ def a_reset_cuts_a_cycle(s: Subject) -> str:
 def a_cut_cycle_leaves_the_lines_at_rest(s: Subject) -> str:
     """NMT 81h in a strobe of 100 ms: CS."""
     with talk(s, reset=True) as t:
-        s.unit.wait_ready()
+        s.wait_ready()
         _strobe(t, LONGEST_NS)
         with s.take() as take:
             t.send(t.sdo_rx, _read(quiet(s)))
@@ -251,7 +251,7 @@ def other_lengths_are_no_cycle(s: Subject) -> str:
     """1, 3 and 4 bytes to a register that takes a word."""
     row = requirements().rows["BUS-SDO-11"]
     with talk(s, reset=True) as t:
-        s.unit.wait_ready()
+        s.wait_ready()
         sub = harmless(s)[0] + 1
         before = t.counter(DONE)
         for n, code in ((1, "short_code"), (3, "long_code"), (4, "long_code")):
@@ -266,7 +266,7 @@ def other_lengths_are_no_cycle(s: Subject) -> str:
 def cycles_are_counted(s: Subject) -> str:
     """Five reads and three writes."""
     with talk(s, reset=True) as t:
-        s.unit.wait_ready()
+        s.wait_ready()
         where, word = harmless(s)
         before = t.counter(DONE)
         for _ in range(5):
@@ -298,7 +298,7 @@ def who_gives_up_finds_the_bus_busy(s: Subject) -> str:
     """Abort a cycle of 100 ms, ask for another at once, and again until the bus is free."""
     code = int(_limit("BUS-CYC-06", "abort_code"))
     with talk(s, reset=True) as t:
-        s.unit.wait_ready()
+        s.wait_ready()
         address = quiet(s)
         _strobe(t, LONGEST_NS)
         t.send(t.sdo_rx, _read(address))

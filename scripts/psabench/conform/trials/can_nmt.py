@@ -168,7 +168,7 @@ def it_waits_pre_operational(s: Subject) -> str:
 
 
 @proves("BUS-NMT-01")
-@trial()
+@trial(needs={"can", "stream"})
 def start_makes_it_operational(s: Subject) -> str:
     """NMT start: the heartbeat and the PDOs."""
     row = requirements().rows["BUS-NMT-01"]
@@ -195,13 +195,13 @@ def stop_stops_it(s: Subject) -> str:
 
 
 @proves("BUS-NMT-03")
-@trial()
+@trial(needs={"can", "stream"})
 def pre_operational_ends_its_pdos(s: Subject) -> str:
     """NMT start, PDOs, NMT 80h: no PDO after it was obeyed."""
     row = requirements().rows["BUS-NMT-03"]
     with talk(s, reset=True) as t:
         t.beat(BEAT_MS)
-        s.unit.wait_ready()
+        s.wait_ready()
         t.stream()
         t.nmt(int(row.limit("command_code")))
         t.fence()
@@ -258,7 +258,7 @@ def _are_defaults(t: Talk, settings: Settings, what: str) -> None:
 def reset_communication_leaves_the_board_alone(s: Subject) -> str:
     """Write settings of communication and of the board, NMT 82h, read both again; readings go on being counted."""
     with talk(s, reset=True) as t:
-        s.unit.wait_ready()
+        s.wait_ready()
         index, sub, other = OWN.get(s.variant.family, STROBE)
         _write(t, _settings(t))
         _write(t, {(index, sub): other})
@@ -315,7 +315,7 @@ def unknown_commands_change_nothing(s: Subject) -> str:
 def stopped_it_only_beats(s: Subject) -> str:
     """Stopped: SDO requests, SYNCs; then what it says, and what it counted."""
     with talk(s, reset=True) as t:
-        s.unit.wait_ready()
+        s.wait_ready()
         syncs = t.counter("SYNCs")
         t.beat(BEAT_MS)
         t.nmt(NMT_START)

@@ -91,7 +91,7 @@ def serial_number(s: Subject) -> str:
 
 
 @proves("BUS-OD-04")
-@trial()
+@trial(needs={"can", "stream"})
 def constants_name_the_node(s: Subject) -> str:
     """Upload the objects that name an identifier, and see that it is the one in use."""
     with talk(s, reset=True) as t:
@@ -102,7 +102,7 @@ def constants_name_the_node(s: Subject) -> str:
             found = t.number(index, sub) & 0x7FF
             if found != can_id:
                 raise Broken(f"{index:04X}h:{sub} names {found:03X}h", f"{can_id:03X}h")
-        s.unit.wait_ready()
+        s.wait_ready()
         for can_id in t.pdos.values():
             t.stream(1, can_id)
     return f"{len(due)} objects name the identifiers of node {s.node}"
@@ -186,12 +186,12 @@ def _bounds(name: str, entries: list[int]) -> None:
 
 
 @proves("BUS-OD-07", "BUS-ID-07")
-@trial()
+@trial(needs={"can", "stream"})
 def mapped_objects_read_as_the_frames(s: Subject) -> str:
     """While PDOs come upload all that they map; find each value in a frame that came just before or after."""
     compared = 0
     with talk(s, reset=True) as t:
-        s.unit.wait_ready()
+        s.wait_ready()
         for k, can_id in t.pdos.items():
             mapping = [t.number(MAPPING + k - 1, sub) for sub in range(1, min(t.number(MAPPING + k - 1), 64) + 1)]
             t.stream(LEAST, can_id)
@@ -264,12 +264,12 @@ def errors_on_the_wire_are_counted(s: Subject) -> str:
 
 
 @proves("BUS-LOAD-01")
-@trial(needs={"can", "stamps", "lockstep"})
+@trial(needs={"can", "stamps", "lockstep", "stream"})
 def the_load_is_the_share_of_the_bus(s: Subject) -> str:
     """Stream for a second between two reads of the load, and count the bits of all frames meanwhile."""
     row = requirements().rows["BUS-LOAD-01"]
     with s.take(lines=False) as take, talk(s, reset=True, take=take) as t:
-        s.unit.wait_ready()
+        s.wait_ready()
         t.stream(1)
         t.counter(LOAD)
         at, begun_s = len(take.frames), s.bench.time_s

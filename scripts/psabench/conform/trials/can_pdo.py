@@ -55,7 +55,7 @@ def _sent(t: Talk, at: int, can_id: int, end: int | None = None) -> list[CanFram
 
 def _begin(t: Talk, kind: int) -> tuple[int, int]:
     """Ready and operational, the first TPDO with this transmission type, a reading there for it."""
-    t.s.unit.wait_ready()
+    t.s.wait_ready()
     index, can_id = _first(t)
     t.download(index, 2, bytes([kind]))
     t.nmt(NMT_START)
@@ -78,7 +78,7 @@ def syncs_are_counted(s: Subject) -> str:
 
 
 @proves("BUS-SYNC-02")
-@trial()
+@trial(needs={"can", "stream"})
 def event_types_send_each_reading(s: Subject) -> str:
     """Transmission types 254 and 255: frames and readings of the same while."""
     told = []
@@ -96,7 +96,7 @@ def event_types_send_each_reading(s: Subject) -> str:
 
 
 @proves("BUS-SYNC-03")
-@trial()
+@trial(needs={"can", "stream"})
 def type_0_sends_new_readings_at_sync(s: Subject) -> str:
     """Transmission type 0: no SYNC; one SYNC after a reading; a burst of SYNCs."""
     with talk(s, reset=True) as t:
@@ -129,7 +129,7 @@ def _silent(t: Talk, can_id: int) -> None:
 
 
 @proves("BUS-SYNC-04")
-@trial()
+@trial(needs={"can", "stream"})
 def type_n_sends_at_every_nth_sync(s: Subject) -> str:
     """Transmission types 1, 3 and 240: frames at 6, 9 and 480 SYNCs."""
     told = []
@@ -161,7 +161,7 @@ def reserved_types_are_refused(s: Subject) -> str:
 
 
 @proves("BUS-PDO-01")
-@trial()
+@trial(needs={"can", "stream"})
 def a_tpdo_that_is_off_is_not_sent(s: Subject) -> str:
     """Set bit 31 of 18xxh sub 1 while readings are made, and clear it."""
     off = int(_limit("BUS-PDO-01", "off_mask"))
@@ -178,7 +178,7 @@ def a_tpdo_that_is_off_is_not_sent(s: Subject) -> str:
 
 
 @proves("BUS-PDO-02")
-@trial()
+@trial(needs={"can", "stream"})
 def the_identifier_of_a_tpdo(s: Subject) -> str:
     """Another identifier while it is valid, identifiers of services, another one while it is off."""
     code = _limit("BUS-PDO-02", "abort_code")
@@ -202,7 +202,7 @@ def the_identifier_of_a_tpdo(s: Subject) -> str:
 
 
 @proves("BUS-PDO-03")
-@trial(needs={"can", "stamps"})
+@trial(needs={"can", "stamps", "stream"})
 def the_inhibit_time_keeps_tpdos_apart(s: Subject) -> str:
     """An inhibit time of 50 ms: the time between frames, and the count of those left out."""
     row = requirements().rows["BUS-PDO-03"]
@@ -228,7 +228,7 @@ def the_inhibit_time_keeps_tpdos_apart(s: Subject) -> str:
 
 
 @proves("BUS-EMCY-04")
-@trial()
+@trial(needs={"can", "stream"})
 def the_history_of_errors(s: Subject) -> str:
     """An overload; 1003h beside the emergency; empty it."""
     with talk(s, reset=True) as t:
@@ -246,7 +246,7 @@ def the_history_of_errors(s: Subject) -> str:
 
 
 @proves("BUS-EMCY-04")
-@trial(needs={"can", "lockstep"})
+@trial(needs={"can", "lockstep", "stream"})
 def the_history_holds_eight(s: Subject) -> str:
     """Nine overloads, one after the other."""
     most = int(_limit("BUS-EMCY-04", "history_count"))
@@ -264,7 +264,7 @@ def the_history_holds_eight(s: Subject) -> str:
 def _overload(t: Talk) -> CanFrame:
     """Samples lost, and the calm after it. Raises TooLittle where the bus could not be filled."""
     code = int(_limit("BUS-EMCY-06", "emcy_code"))
-    t.s.unit.wait_ready()
+    t.s.wait_ready()
     t.nmt(NMT_START)
     t.fence()
     at = len(t.heard)

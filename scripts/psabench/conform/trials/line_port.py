@@ -41,7 +41,7 @@ def _look(s: Subject, dwell_s: float) -> bytes:
 def lost_samples_are_marked(s: Subject) -> str:
     """In real time leave the port unread for long; in lockstep, where nothing is lost, look for marks."""
     mask = int(requirements().rows["LINE-GAP-01"].limit("gap_mask"))
-    s.unit.wait_ready()
+    s.wait_ready()
     if s.lockstep:
         x = np.frombuffer(_look(s, LOOK_S), np.uint8)
         if (x & mask).any():
@@ -63,7 +63,7 @@ def lost_samples_are_marked(s: Subject) -> str:
 def a_slow_reader_loses_nothing(s: Subject) -> str:
     """Read slowly while time is to pass."""
     mask = int(requirements().rows["LINE-GAP-01"].limit("gap_mask"))
-    s.unit.wait_ready()
+    s.wait_ready()
     data, enough = bytearray(), threading.Event()
     least = SAMPLE_HZ * LOOK_S * 0.9
 
@@ -93,7 +93,7 @@ def a_slow_reader_loses_nothing(s: Subject) -> str:
 @trial(needs={"port"})
 def the_port_opens_again(s: Subject) -> str:
     """Open, read, close; open again: frames from the second fall of Int on."""
-    s.unit.wait_ready()
+    s.wait_ready()
     _look(s, LOOK_S)
     log = line_log(_look(s, LOOK_S), s.variant.family, SAMPLE_HZ)
     t = transfers(log)
