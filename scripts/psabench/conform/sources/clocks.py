@@ -72,7 +72,7 @@ class Ratio:
     span_s: float
 
     def __str__(self) -> str:
-        return f"{self.ppm:+.2f} +- {self.within_ppm:.2f} ppm ({self.points} points in {self.span_s:.3f} s)"
+        return f"{self.ppm:+.3f} +- {self.within_ppm:.3f} ppm ({self.points} points in {self.span_s:.3f} s)"
 
     def beyond(self, limit_ppm: float) -> bool:
         """Certainly farther off than this."""
