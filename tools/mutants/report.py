@@ -9,6 +9,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from mutants.declared import load
 from mutants.judge import KILLED, WRONG, Result
 from psabench.whole_file import replace_file
 
@@ -87,6 +88,8 @@ def _tables(parts: dict[str, Sequence[Result]]) -> Iterator[str]:
         killed, of = rate(results)
         counts = Counter(r.result for r in results)
         yield f"### {titles[name]}\n"
+        if name == "declared" and len(results) < len(load()):
+            yield f"Judged so far: {len(results)} of the {len(load())} of the list.\n"
         yield (
             f"{killed} of {of} killed, {percent(killed, of)}. Of all {len(results)}: "
             + ", ".join(f"{n} {what}" for what, n in sorted(counts.items()))
