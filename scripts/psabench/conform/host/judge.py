@@ -84,9 +84,9 @@ class HostEvidence:
     def samples(self) -> Match:
         """The match of a case in which samples are due. Raises Broken where none came, or the host did not go on."""
         if not self.streamed or not self.bus.samples:
-            raise Broken(f"no stream was started{self._last_words()}", "NMT start after the set-up has been read")
+            raise Broken(f"no stream was started{self.last_words()}", "NMT start after the set-up has been read")
         if not self.told.samples:
-            raise Broken(f"no sample was told{self._last_words()}", f"{len(self.bus.samples)} samples")
+            raise Broken(f"no sample was told{self.last_words()}", f"{len(self.bus.samples)} samples")
         m = self.match
         if m.strange:
             s = m.strange[0]
@@ -105,7 +105,8 @@ class HostEvidence:
             )
         return m
 
-    def _last_words(self) -> str:
+    def last_words(self) -> str:
+        """What the host has complained of last, in brackets."""
         line = self.errors.strip().splitlines()[-1:]
         return f" ({line[0][:200]})" if line else ""
 

@@ -11,8 +11,9 @@ from tempfile import TemporaryDirectory
 
 from psabench.conform.host.can_cases import CASES, NODE, SCENARIO, Case
 from psabench.conform.host.judge import HostEvidence, Judged, Unseen, judged
+from psabench.conform.host.line_cases import LINE_CASES, LineCase, samples
+from psabench.conform.host.line_stage import LinePort
 from psabench.conform.host.played import Bus, read_log
-from psabench.conform.host.results import Told
 from psabench.conform.host.stage import ByHand, Program, Stage, drain, expand
 from psabench.conform.outcome import Broken, Outcome, TooLittle, Verdict
 from psabench.control import Control
@@ -42,9 +43,9 @@ class Play:
 
 def wanted(only: Sequence[str] = (), cases: Sequence[str] = ()) -> list[Judged]:
     """Tests of requirements that begin so, or of these cases; all in the order of the cases."""
-    if unknown := [c for c in cases if c not in CASES]:
-        raise BadInput(f"no such case: {', '.join(unknown)}; there are {', '.join(CASES)}")
-    order = list(CASES)
+    order = [*CASES, *LINE_CASES]
+    if unknown := [c for c in cases if c not in order]:
+        raise BadInput(f"no such case: {', '.join(unknown)}; there are {', '.join(order)}")
     found = [
         j
         for j in judged()
@@ -60,7 +61,7 @@ def run(play: Play, tests: Sequence[Judged], progress: Progress, told: Callable[
         for name in names:
             begun_s = time.monotonic()
             try:
-                shown: HostEvidence | Exception = perform(play, CASES[name])
+                shown: HostEvidence | Exception = perform(play, name)
             except BadInput:
                 raise
             except BenchError as e:
@@ -89,24 +90,41 @@ def judge(j: Judged, shown: HostEvidence | Exception, folder: Path) -> Outcome:
         return replace(open_, reason=str(e))
 
 
-def perform(play: Play, case: Case) -> HostEvidence:
+def perform(play: Play, name: str) -> HostEvidence:
     """Play one case. Raises BenchError where it cannot be played."""
     play.folder.mkdir(parents=True, exist_ok=True)
+    return on_can(play, CASES[name]) if name in CASES else on_line(play, LINE_CASES[name])
+
+
+def on_line(play: Play, case: LineCase) -> HostEvidence:
+    """Samples on a pseudo-terminal of ours."""
+    with ExitStack() as stack:
+        port = stack.enter_context(LinePort())
+        host = _host(play, case.name, case.title, {"line": str(port.path)})
+        stack.callback(host.kill)
+        host.start()
+        port.play((block.tobytes() for block in samples(case)), host)
+        port.close()
+        status = host.wait()
+        return HostEvidence(case=case.name, bus=Bus([], NODE), told=host.told(), status=status, errors=_errors(host))
+
+
+def on_can(play: Play, case: Case) -> HostEvidence:
+    """An emulator in lockstep."""
     log = play.folder / f"{case.name}.log"
     with TemporaryDirectory(prefix="psabench-") as made:
         scenario = Path(made) / "host.yaml"
         scenario.write_text(SCENARIO.replace("PROFILE", play.profile), encoding="utf-8")
         status, stage, streamed = _perform(play, case, scenario, log)
-    told = stage.host.told()
     return HostEvidence(
         case=case.name,
         bus=read_log(log.read_text(encoding="ascii").splitlines(), NODE) if log.exists() else Bus([], NODE),
-        told=told if isinstance(told, Told) else Told(),
+        told=stage.host.told(),
         status=status,
         marks=stage.marks,
         stood_s=stage.stood_s,
         streamed=streamed,
-        errors=stage.host.errors.read_text(errors="replace") if isinstance(stage.host, Program) else "",
+        errors=_errors(stage.host),
     )
 
 
@@ -114,7 +132,7 @@ def _perform(play: Play, case: Case, scenario: Path, log: Path) -> tuple[int | N
     with ExitStack() as stack:
         emulator = stack.enter_context(Emulator(scenario, cans=[play.adapter, f"log:{log}"], pace="step"))
         control = stack.enter_context(Control(emulator.control_path or Path()))
-        host = _host(play, case, emulator)
+        host = _host(play, case.name, case.title, _places(emulator, play.link))
         stack.callback(host.kill)
         stage = Stage(emulator, control, host, speed=play.speed)
         case.before(stage)
@@ -131,24 +149,27 @@ def _perform(play: Play, case: Case, scenario: Path, log: Path) -> tuple[int | N
         return host.wait(), stage, streamed
 
 
-def _host(play: Play, case: Case, emulator: Emulator) -> Program | ByHand:
-    at = emulator.endpoint(can=play.adapter.partition(":")[0])
-    places = (
-        {"node": str(NODE), "can": f"{at.get('host', '')}:{at.get('port', '')}"}
-        if "port" in at
-        else {"node": str(NODE)}
-    )
-    if "pty" in at:
-        places["pty"] = at["pty"]
-    results = play.results or play.folder / f"{case.name}.jsonl"
-    places["results"] = str(results)
+def _errors(host: Program | ByHand) -> str:
+    return host.errors.read_text(errors="replace") if isinstance(host, Program) else ""
+
+
+def _places(emulator: Emulator, link: str) -> dict[str, str]:
+    if link == "pty":
+        return {"pty": emulator.endpoint(can="slcan")["pty"]}
+    at = emulator.endpoint(can="socketcand")
+    return {"can": f"{at['host']}:{at['port']}"}
+
+
+def _host(play: Play, case: str, title: str, where: dict[str, str]) -> Program | ByHand:
+    results = play.results or play.folder / f"{case}.jsonl"
+    places = {"node": str(NODE), "results": str(results), **where}
     if not play.command:
         words = " ".join(f"{k}={v}" for k, v in places.items())
-        play.say(f"{case.name}: {case.title}. Start the host now: {words}")
+        play.say(f"{case}: {title}. Start the host now: {words}")
         return ByHand(results)
     return Program(
         expand(play.command, places),
         results=results,
-        errors=play.folder / f"{case.name}.stderr",
+        errors=play.folder / f"{case}.stderr",
         on_stdout="{results}" not in play.command,
     )
