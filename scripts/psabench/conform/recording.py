@@ -76,8 +76,10 @@ class Bench:
         """As `Subject.probes`; pins only where edges are known well enough."""
         seen: set[str] = set()
         if self.recording.can is not None:
-            seen |= {"can", "stamps", "rtr", "stream"} | ({"fd"} if any(f.fd for f in self.recording.can.frames) else set())
-            seen |= {"errors"} if any(f.error for f in self.recording.can.frames) else set()
+            frames = self.recording.can.frames
+            seen |= {"can", "stamps", "rtr", "stream"}
+            seen |= {"fd"} if any(f.fd for f in frames) else set()
+            seen |= {"errors"} if any(f.error for f in frames) else set()
         if self.recording.lines is not None:
             seen |= {"line", "pins"} if self.recording.lines.resolution_ns <= PINS_NS else {"line"}
         return frozenset(seen | ({"inputs"} if self.inputs_v else set()))
