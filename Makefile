@@ -80,7 +80,7 @@ C_FILES   = $(sort $(wildcard emu/*/*.[ch] emu/*/*.[ch]pp tests/*/*.[ch] example
 
 .SECONDARY:
 .DELETE_ON_ERROR:
-.PHONY: all lib setup run test bench bench-bin mutants check pytest san builds e2e e2e-san e2e-vcan e2e-slc0 uml soak fuzz fuzz-check fuzz-each lint format golden docs install uninstall wheel clean help lock
+.PHONY: all lib setup run test bench bench-bin mutants check pytest san builds e2e e2e-san e2e-vcan e2e-slc0 uml soak fuzz fuzz-check fuzz-each lint format golden docs prove install uninstall wheel clean help lock
 
 ## all: the emulator, build/psa-emu (make CC=clang and make SAN=address,undefined build beside it, in build-clang and build-san)
 all: $(if $(MAIN),$(BUILD)/psa-emu,$(LIB_OBJ)) lib
@@ -265,12 +265,17 @@ format:
 	$(if $(C_FILES),clang-format -i $(C_FILES))
 	$(PY) -m ruff format .
 
-## docs: what follows from proto/ and is kept in git: DBC, EDS, docs/protocol.md, docs/requirements.md
+## docs: what follows from proto/ and is kept in git: DBC, EDS, docs/protocol.md, docs/requirements.md, FIDELITY.md
 docs: all
 	$(PY) tools/gen_proto.py
 	$(if $(wildcard tools/gen_docs.py),$(PY) tools/gen_docs.py)
 	$(PY) tools/gen_commands.py
 	$(PY) tools/gen_requirements.py
+	$(PY) tools/gen_fidelity.py
+
+## prove: run what proves the models whose sources have changed (or GROUP=psa2, GROUP=all), and record it (docs/evidence.md)
+prove: all
+	@$(PY) tools/evidence.py --prove $(GROUP); rc=$$?; $(PY) tools/gen_fidelity.py && exit $$rc
 
 SIGROK := share/libsigrokdecode/decoders
 
