@@ -172,6 +172,8 @@ def a_reset_lasts_its_time(e: Evidence) -> str:
     seen = ""
     for name in PULSES:
         up, down = e.wires.pulses(name, 1)
+        known = up > e.wires.start_ns + LAG_NS
+        up, down = up[known], down[known]
         if len(up):
             seen = interval(
                 e,
@@ -202,6 +204,7 @@ def pulses_begin_on_their_grid(e: Evidence) -> str:
     clock, count = e.wires.rises("CLK"), 0
     for axis in "XYZ":
         rises = np.sort(np.concatenate([e.wires.rises(f"F{axis}{s}") for s in "PN"]))
+        rises = rises[rises > e.wires.start_ns + LAG_NS]
         inside = rises[rises > (clock[0] if len(clock) else e.wires.end_ns)]
         phase = (inside - before(clock, inside + 1)) / tick_ns
         off_ns = np.abs(phase - np.rint(phase)) * tick_ns
