@@ -21,6 +21,8 @@ PINS = (*PULSES, "LATCH", "CS", "RW", *ADDRESS, *DATA)
 MESSAGES = ("PIK_COUNTS", "PIK_TOTALS", "PIK_TOTAL_Z")
 US = 1e3
 LEAST = 8
+ROUNDED_NS = 2.0  # two edges in whole nanoseconds
+LAG_NS = 300_000  # a recording that begins late may have missed an edge of its first 200 us (docs/boards/pik.md)
 COEFFICIENT = ("PIK-LAW-02", "PIK-LAW-03")
 
 
