@@ -269,12 +269,14 @@ def frames_come_every_data_period(e: Evidence) -> str:
 
 # ---- temperatures
 
+TEMP_LEAST = 120  # samples: fewer have not the temperatures that a judgement wants, one every 10 ms at 1000 SPS
+
 
 @proves("PSA2-TEMP-01")
 @check("quiet")
 def channels_take_turns(e: Evidence) -> str:
     """Follow CHANNEL through the samples with T_NEW."""
-    p = pairs(e)
+    p = pairs(e, TEMP_LEAST)
     seen = p.channel[p.new]
     count = int(row_for(e, "PSA2-TEMP-01").limit("channels_count"))
     if len(seen) < 2 * count:
@@ -319,7 +321,7 @@ def temperature_codes_are_the_upper_bits_that_were_read(e: Evidence) -> str:
 @check("quiet")
 def temperatures_come_at_their_rate(e: Evidence) -> str:
     """Measure TSTAMP between samples with T_NEW."""
-    p, row = pairs(e), row_for(e, "PSA2-TEMP-05")
+    p, row = pairs(e, TEMP_LEAST), row_for(e, "PSA2-TEMP-05")
     at_us = p.stamp[p.new] * unit_us(e)
     if len(at_us) < LEAST:
         raise Broken(f"{len(at_us)} new temperatures in {len(p)} samples", "one every 10 ms", frames=p.about(0))
