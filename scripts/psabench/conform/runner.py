@@ -137,3 +137,6 @@ def _carried_out(stage: Stage, proof: Proof, plan: Plan, open_: Outcome) -> Outc
         return replace(open_, verdict=Verdict.FAILED, saw=str(e), due="no refusal")
     except (TooLittle, BenchError) as e:
         return replace(open_, verdict=Verdict.INCONCLUSIVE, reason=str(e))
+    except (ArithmeticError, AssertionError, AttributeError, LookupError, TypeError, ValueError) as e:
+        # an error of the test's own: a board may be worse than anybody thought, and the others are to be judged
+        return replace(open_, verdict=Verdict.INCONCLUSIVE, reason=f"the test itself failed: {type(e).__name__}: {e}")
