@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import ClassVar, TypeVar
 
 from fault_host import SETUP_S, Host
 from psabench.errors import ControlError
@@ -67,6 +67,23 @@ class FaultCase:
     def reset(self) -> None:
         self.host.reset(self.unit)
         self.host.bus.advance(self.setup_s)
+
+
+CaseT = TypeVar("CaseT", bound=FaultCase)
+
+
+class Looks(dict[str, Callable[[CaseT], None]]):
+    """How each kind of fault is seen: adds it to the case and asserts what is then on the wire."""
+
+    def look(self, kind: str) -> Callable[[Callable[[CaseT], None]], Callable[[CaseT], None]]:
+        """Decorator: the function is that of this kind."""
+        assert kind not in self, kind
+
+        def enter(see: Callable[[CaseT], None]) -> Callable[[CaseT], None]:
+            self[kind] = see
+            return see
+
+        return enter
 
 
 def near(got: float, want: float, tolerance: float) -> None:

@@ -6,10 +6,8 @@ docs/boards/psa2.md.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
-from fault_case import FaultCase, near
+from fault_case import FaultCase, Looks, near
 from fault_host import ACCEL_PORT, PERIOD_S, SETTLE_S, SETUP_S, TEMP_PORT, Seen
 from fault_lines import breaches
 from psabench.vcd import read_vcd
@@ -42,9 +40,13 @@ class Case(FaultCase):
         return volts
 
 
+DETECT = Looks[Case]()
+
+
 # ---- sensors and analog chain: what the codes of the axis say
 
 
+@DETECT.look("sensor.stuck")
 def sensor_stuck(c: Case) -> None:
     c.host.turn(0.0)
     c.host.bus.advance(SETTLE_S)
@@ -56,18 +58,21 @@ def sensor_stuck(c: Case) -> None:
     near(stuck[1], healthy[1], 1e-4)
 
 
+@DETECT.look("sensor.bias")
 def sensor_bias(c: Case) -> None:
     before_v = c.mean_v()
     c.add(bias_v=0.1)
     near(c.mean_v() - before_v, 0.1, 1e-4)
 
 
+@DETECT.look("sensor.drift")
 def sensor_drift(c: Case) -> None:
     c.add(drift_v_per_s=0.5)
     volts = c.settled(0.05).volts(c.axis)
     near(float(np.diff(volts).mean()) / PERIOD_S, 0.5, 0.01)
 
 
+@DETECT.look("sensor.scale")
 def sensor_scale(c: Case) -> None:
     healthy = c.turned_v()
     c.add(scale_ppm=10000)
@@ -75,18 +80,21 @@ def sensor_scale(c: Case) -> None:
     near((wrong[1] - wrong[0]) / (healthy[1] - healthy[0]), 1.01, 1e-4)
 
 
+@DETECT.look("sensor.noise")
 def sensor_noise(c: Case) -> None:
     assert c.settled(0.1).volts(c.axis).std() < 1e-4
     c.add(rms_v=0.01)
     assert 0.005 < c.settled(0.2).volts(c.axis).std() < 0.02
 
 
+@DETECT.look("sensor.saturation")
 def sensor_saturation(c: Case) -> None:
     limit_v = c.mean_v() - 0.25
     c.add(high_v=limit_v)
     near(c.mean_v(), limit_v, 1e-3)
 
 
+@DETECT.look("analog.load_open")
 def load_open(c: Case) -> None:
     c.add()
     seen = c.settled()
@@ -94,18 +102,21 @@ def load_open(c: Case) -> None:
     assert seen.clipped()
 
 
+@DETECT.look("analog.load_short")
 def load_short(c: Case) -> None:
     assert abs(c.mean_v()) > 0.1
     c.add()
     near(c.mean_v(), 0.0, 1e-4)
 
 
+@DETECT.look("analog.reference")
 def reference(c: Case) -> None:
     before_v = c.mean_v()
     c.add(reference_ppm=10000)
     near(c.mean_v() / before_v, 1 / 1.01, 1e-5)
 
 
+@DETECT.look("analog.ripple")
 def ripple(c: Case) -> None:
     """20 Hz over five of its periods."""
     c.add(amplitude_v=0.1, frequency_hz=20)
@@ -117,6 +128,7 @@ def ripple(c: Case) -> None:
 # ---- chips and controller
 
 
+@DETECT.look("chip.drdy_stuck")
 def no_drdy(c: Case) -> None:
     for level in ("high", "low"):
         c.add(level=level)
@@ -133,6 +145,7 @@ def no_drdy(c: Case) -> None:
         assert c.watch(0.1).temperatures()
 
 
+@DETECT.look("chip.dout_dead")
 def dead_dout(c: Case) -> None:
     for level, code in (("high", -1), ("low", 0)):
         c.add(level=level)
@@ -173,6 +186,7 @@ def pulse_sync(c: Case, group: int) -> None:
     c.host.bus.send(0x080, b"")
 
 
+@DETECT.look("chip.lost_sync")
 def lost_sync(c: Case) -> None:
     if c.temperature:
         skipped_sync_t(c)
@@ -188,6 +202,7 @@ def lost_sync(c: Case) -> None:
         assert apart(c) > 0.01
 
 
+@DETECT.look("controller.skip_sync_t")
 def skipped_sync_t(c: Case) -> None:
     """Without a SYNC_T after the change of channel the converter goes on with its 10.00 ms."""
     assert c.watch(1.0).temperature_period_s() > 10.2e-3
@@ -196,6 +211,7 @@ def skipped_sync_t(c: Case) -> None:
     near(c.watch(1.0).temperature_period_s(), 10.0e-3, 1e-5)
 
 
+@DETECT.look("chip.clock")
 def clock(c: Case) -> None:
     if c.temperature:
         healthy = sum(map(len, c.watch(0.5).temperatures().values()))
@@ -212,6 +228,7 @@ def clock(c: Case) -> None:
         assert apart(c) > 0.01
 
 
+@DETECT.look("chip.flip")
 def flip(c: Case) -> None:
     converter, register, mask = ("t", 2, 0x01) if c.temperature else (c.point[-1], 2, 0x01)
     before = c.host.units[c.unit].register(converter, register)
@@ -221,6 +238,7 @@ def flip(c: Case) -> None:
     assert c.host.units[c.unit].register(converter, register) == before
 
 
+@DETECT.look("controller.setup_order")
 def setup_order(c: Case) -> None:
     unit = c.host.units[c.unit]
     article = [("x", 1), ("t", 0), ("t", 3)]  # CONFIG0, STATUS, DRATE
@@ -234,6 +252,7 @@ def setup_order(c: Case) -> None:
     assert registers() != healthy
 
 
+@DETECT.look("controller.frozen_words")
 def frozen_words(c: Case) -> None:
     c.host.turn(0.0)
     c.host.bus.advance(0.2)
@@ -250,6 +269,7 @@ def frozen_words(c: Case) -> None:
 # ---- links
 
 
+@DETECT.look("link.drop")
 def drop(c: Case) -> None:
     c.add(probability=0.3)
     seen = c.watch(0.1)
@@ -259,11 +279,13 @@ def drop(c: Case) -> None:
     assert c.host.units[c.unit].counters()["Dropped"] == 0, "the board knows of no loss"
 
 
+@DETECT.look("link.duplicate")
 def duplicate(c: Case) -> None:
     c.add(probability=0.3)
     assert c.watch(0.1).repeated > 20
 
 
+@DETECT.look("link.reorder")
 def reorder(c: Case) -> None:
     c.add(probability=0.3, can_id=0x180 + c.host.node[c.unit])
     seen = c.watch(0.1)
@@ -271,6 +293,7 @@ def reorder(c: Case) -> None:
     assert set(seen.seq()) == set(range(min(seen.seq()), max(seen.seq()) + 1)), "nothing is lost"
 
 
+@DETECT.look("link.delay")
 def delay(c: Case) -> None:
     before_s = np.median(c.watch(0.05).latency_s())
     c.add(hold_s=0.005)
@@ -278,6 +301,7 @@ def delay(c: Case) -> None:
     near(float(np.median(c.watch(0.05).latency_s()) - before_s), 0.005, 1e-3)
 
 
+@DETECT.look("link.corrupt")
 def corrupt(c: Case) -> None:
     c.add(probability=0.5)
     seen = c.watch(0.1)
@@ -285,6 +309,7 @@ def corrupt(c: Case) -> None:
     assert not seen.errors
 
 
+@DETECT.look("link.error_frame")
 def error_frame(c: Case) -> None:
     c.add(probability=0.2)
     seen = c.watch(0.05)
@@ -292,6 +317,7 @@ def error_frame(c: Case) -> None:
     assert len(seen.xy) > 40, "what was destroyed is sent again"
 
 
+@DETECT.look("link.bus_off")
 def bus_off(c: Case) -> None:
     begun_s = c.host.bus.clock.now_s()
     c.add()
@@ -300,6 +326,7 @@ def bus_off(c: Case) -> None:
     assert seen.complaints() == [], "its frames have waited"
 
 
+@DETECT.look("link.stall")
 def stall(c: Case) -> None:
     c.add()
     assert c.watch(0.05).halves == ""
@@ -310,6 +337,7 @@ def stall(c: Case) -> None:
 # ---- supply
 
 
+@DETECT.look("supply.brownout")
 def brownout(c: Case) -> None:
     """In the middle of a frame: Int has been low for 30 of its 74 us."""
     c.add(drop_v=6, for_s=0.02, after="INT_FALL", delay_s=30e-6, unit=c.unit)
@@ -345,67 +373,37 @@ def line_of(c: Case) -> str:
     return c.point.rpartition(".")[2]
 
 
+@DETECT.look("line.stuck")
 def line_stuck(c: Case) -> None:
     for level in ("low", "high"):
         assert "still" in recorded(c, level=level)[line_of(c)]
         c.clear()
 
 
+@DETECT.look("line.swapped")
 def line_swapped(c: Case) -> None:
     assert recorded(c)[line_of(c)] & {"restless", "misread"}
 
 
+@DETECT.look("line.glitch")
 def line_glitch(c: Case) -> None:
     assert "narrow" in recorded(c, late=True, width_ns=100)[line_of(c)]
 
 
+@DETECT.look("line.noise")
 def line_noise(c: Case) -> None:
     assert "narrow" in recorded(c, rate_hz=2000, width_ns=100)[line_of(c)]
 
 
+@DETECT.look("line.missing_pulse")
 def line_missing_pulse(c: Case) -> None:
     assert "miscounted" in recorded(c, pulse=40)["CLK"]
 
 
+@DETECT.look("line.extra_pulse")
 def line_extra_pulse(c: Case) -> None:
     assert "miscounted" in recorded(c, pulse=40, width_ns=100)["CLK"]
 
-
-DETECT: dict[str, Callable[[Case], None]] = {
-    "sensor.stuck": sensor_stuck,
-    "sensor.bias": sensor_bias,
-    "sensor.drift": sensor_drift,
-    "sensor.scale": sensor_scale,
-    "sensor.noise": sensor_noise,
-    "sensor.saturation": sensor_saturation,
-    "analog.load_open": load_open,
-    "analog.load_short": load_short,
-    "analog.reference": reference,
-    "analog.ripple": ripple,
-    "chip.drdy_stuck": no_drdy,
-    "chip.dout_dead": dead_dout,
-    "chip.lost_sync": lost_sync,
-    "chip.clock": clock,
-    "chip.flip": flip,
-    "controller.skip_sync_t": skipped_sync_t,
-    "controller.setup_order": setup_order,
-    "controller.frozen_words": frozen_words,
-    "link.drop": drop,
-    "link.duplicate": duplicate,
-    "link.reorder": reorder,
-    "link.delay": delay,
-    "link.corrupt": corrupt,
-    "link.error_frame": error_frame,
-    "link.bus_off": bus_off,
-    "link.stall": stall,
-    "supply.brownout": brownout,
-    "line.stuck": line_stuck,
-    "line.swapped": line_swapped,
-    "line.glitch": line_glitch,
-    "line.noise": line_noise,
-    "line.missing_pulse": line_missing_pulse,
-    "line.extra_pulse": line_extra_pulse,
-}
 
 # What must be accepted; everything else must be refused.
 ACCEPTED = {

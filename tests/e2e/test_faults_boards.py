@@ -5,12 +5,10 @@ As test_faults.py does for PSA-2, by a host that knows the pages alone. Faults o
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 from fault_boards import ACCEPTED, BOARDS, SCENARIO, SETUP_S, Board, Seen, seen
-from fault_case import VALUES, FaultCase, accepted, must_accept, near
+from fault_case import VALUES, FaultCase, Looks, accepted, must_accept, near
 from fault_host import Host, fault_host
 
 pytestmark = pytest.mark.host
@@ -62,12 +60,14 @@ def boards(host: Host) -> dict[str, str]:
     return {u["name"]: u["board"] for u in host.call("units")["units"]}
 
 
+DETECT = Looks[Case]()
 TOLERANCE_V = 5e-3  # PIK-6: a pulse in half a second is 1 mV; PMKA: what the period cuts off
 
 
 # ---- sensors and analog chain
 
 
+@DETECT.look("sensor.stuck")
 def sensor_stuck(c: Case) -> None:
     healthy = c.turned_v()
     assert abs(healthy[1] - healthy[0]) > 0.1, "the head turns, the axis feels it"
@@ -77,18 +77,21 @@ def sensor_stuck(c: Case) -> None:
         near(v, healthy[1], TOLERANCE_V)
 
 
+@DETECT.look("sensor.bias")
 def sensor_bias(c: Case) -> None:
     before_v = c.mean_v()
     c.add(bias_v=0.1)
     near(c.mean_v() - before_v, 0.1, TOLERANCE_V)
 
 
+@DETECT.look("sensor.drift")
 def sensor_drift(c: Case) -> None:
     c.add(drift_v_per_s=0.5)
     first = c.settled().mean_v(c.axis)
     near((c.watch().mean_v(c.axis) - first) / LOOK_S, 0.5, 0.02)
 
 
+@DETECT.look("sensor.scale")
 def sensor_scale(c: Case) -> None:
     healthy = c.turned_v()
     c.add(scale_ppm=100000)
@@ -96,35 +99,41 @@ def sensor_scale(c: Case) -> None:
     near((wrong[1] - wrong[0]) / (healthy[1] - healthy[0]), 1.1, 0.02)
 
 
+@DETECT.look("sensor.noise")
 def sensor_noise(c: Case) -> None:
     before_v = c.settled().volts(c.axis).std()
     c.add(rms_v=0.5)
     assert c.settled().volts(c.axis).std() > before_v + 0.1
 
 
+@DETECT.look("sensor.saturation")
 def sensor_saturation(c: Case) -> None:
     limit_v = c.mean_v() - 0.25
     c.add(high_v=limit_v)
     near(c.mean_v(), limit_v, TOLERANCE_V)
 
 
+@DETECT.look("analog.load_open")
 def load_open(c: Case) -> None:
     c.add()
     assert c.settled().mean_v(c.axis) > 0.95 * c.board.full_v
 
 
+@DETECT.look("analog.load_short")
 def load_short(c: Case) -> None:
     assert abs(c.mean_v()) > 0.1
     c.add()
     near(c.mean_v(), 0.0, TOLERANCE_V)
 
 
+@DETECT.look("analog.reference")
 def reference(c: Case) -> None:
     before_v = c.mean_v()
     c.add(reference_ppm=10000)
     near(c.mean_v() / before_v, 1 / 1.01, 3e-3)
 
 
+@DETECT.look("analog.ripple")
 def ripple(c: Case) -> None:
     """20 Hz over ten of its periods."""
     c.add(amplitude_v=0.5, frequency_hz=20)
@@ -136,6 +145,7 @@ def ripple(c: Case) -> None:
 # ---- chips and controllers
 
 
+@DETECT.look("chip.drdy_stuck")
 def no_drdy(c: Case) -> None:
     for level in ("high", "low"):
         c.add(level=level)
@@ -147,6 +157,7 @@ def no_drdy(c: Case) -> None:
         c.reset()
 
 
+@DETECT.look("chip.dout_dead")
 def dead_dout(c: Case) -> None:
     for level in ("high", "low"):
         c.add(level=level)
@@ -161,6 +172,7 @@ def dead_dout(c: Case) -> None:
         c.clear()
 
 
+@DETECT.look("chip.clock")
 def clock(c: Case) -> None:
     before = c.settled()
     if c.board is BOARDS["pik"]:  # pulses are worth its periods, and readings come by them
@@ -183,6 +195,7 @@ def clock(c: Case) -> None:
         assert s.column("PSD1_CYCLE", "OVERRUN").any()
 
 
+@DETECT.look("chip.flip")
 def flip(c: Case) -> None:
     if c.board is BOARDS["psd1"]:
         node, axis = c.host.units[c.unit].node, c.axis + 1
@@ -203,6 +216,7 @@ def flip(c: Case) -> None:
         assert abs(abs(c.watch(0.02).rows[message][-1]["XYZ"[c.axis]] - total) - 0x8000) < 1000
 
 
+@DETECT.look("controller.frozen_words")
 def frozen_words(c: Case) -> None:
     c.host.turn(0.0)
     c.host.bus.advance(SETTLE_S)
@@ -216,6 +230,7 @@ def frozen_words(c: Case) -> None:
     c.host.turn(30.0)
 
 
+@DETECT.look("controller.capacitor")
 def capacitor(c: Case) -> None:
     """Without a reset the code of X grows by more, for the same volts."""
 
@@ -229,12 +244,14 @@ def capacitor(c: Case) -> None:
     near(slope() / before, 1 / 0.7, 0.01)
 
 
+@DETECT.look("controller.stuck_reset")
 def stuck_reset(c: Case) -> None:
     assert not c.settled().column("PMKA_STATE", "SATURATED").any()
     c.add()
     assert (c.settled().column("PMKA_STATE", "SATURATED").astype(int) & 1).all()
 
 
+@DETECT.look("controller.stuck_key")
 def stuck_key(c: Case) -> None:
     """With the board's own rotation K takes an axis now and then; its code moves then."""
 
@@ -255,16 +272,19 @@ def stuck_key(c: Case) -> None:
 # ---- links and supply
 
 
+@DETECT.look("link.drop")
 def drop(c: Case) -> None:
     c.add(probability=0.3)
     assert "numbers" in c.watch().complaints()
 
 
+@DETECT.look("link.duplicate")
 def duplicate(c: Case) -> None:
     c.add(probability=0.3)
     assert c.watch().repeated > 5
 
 
+@DETECT.look("link.reorder")
 def reorder(c: Case) -> None:
     c.add(probability=0.5, hold_s=0.02, can_id=c.board.numbered_id + c.host.node[c.unit])
     s = c.watch()
@@ -272,6 +292,7 @@ def reorder(c: Case) -> None:
     assert max(s.steps()) > s.board.wraps / 2, "some come after their successors"
 
 
+@DETECT.look("link.delay")
 def delay(c: Case) -> None:
     last_s = c.watch(0.1).at_s[-1]
     c.add(hold_s=0.02)  # of all boards that is less than the 64 frames that are kept
@@ -280,6 +301,7 @@ def delay(c: Case) -> None:
     assert (s.steps() == 1).all()
 
 
+@DETECT.look("link.corrupt")
 def corrupt(c: Case) -> None:
     c.add()
     s = c.watch()
@@ -288,6 +310,7 @@ def corrupt(c: Case) -> None:
     assert not s.errors
 
 
+@DETECT.look("link.error_frame")
 def error_frame(c: Case) -> None:
     c.add(probability=0.2)
     s = c.watch()
@@ -295,6 +318,7 @@ def error_frame(c: Case) -> None:
     assert (s.steps() == 1).all(), "what was destroyed is sent again"
 
 
+@DETECT.look("link.bus_off")
 def bus_off(c: Case) -> None:
     begun_s = c.host.bus.clock.now_s()
     c.add()
@@ -303,6 +327,7 @@ def bus_off(c: Case) -> None:
     assert (s.steps() == 1).all(), "its frames have waited"
 
 
+@DETECT.look("link.stall")
 def stall(c: Case) -> None:
     c.add()
     assert not c.watch(0.05).at_s
@@ -310,6 +335,7 @@ def stall(c: Case) -> None:
     assert len(c.watch(0.01).at_s) > 40
 
 
+@DETECT.look("supply.brownout")
 def brownout(c: Case) -> None:
     c.add(drop_v=6, for_s=0.02)
     c.host._kept.clear()
@@ -323,35 +349,6 @@ def brownout(c: Case) -> None:
         assert seen(c.host, unit, BOARDS[board]).numbers(), unit
 
 
-DETECT: dict[str, Callable[[Case], None]] = {
-    "sensor.stuck": sensor_stuck,
-    "sensor.bias": sensor_bias,
-    "sensor.drift": sensor_drift,
-    "sensor.scale": sensor_scale,
-    "sensor.noise": sensor_noise,
-    "sensor.saturation": sensor_saturation,
-    "analog.load_open": load_open,
-    "analog.load_short": load_short,
-    "analog.reference": reference,
-    "analog.ripple": ripple,
-    "chip.drdy_stuck": no_drdy,
-    "chip.dout_dead": dead_dout,
-    "chip.clock": clock,
-    "chip.flip": flip,
-    "controller.frozen_words": frozen_words,
-    "controller.capacitor": capacitor,
-    "controller.stuck_reset": stuck_reset,
-    "controller.stuck_key": stuck_key,
-    "link.drop": drop,
-    "link.duplicate": duplicate,
-    "link.reorder": reorder,
-    "link.delay": delay,
-    "link.corrupt": corrupt,
-    "link.error_frame": error_frame,
-    "link.bus_off": bus_off,
-    "link.stall": stall,
-    "supply.brownout": brownout,
-}
 NEEDED: dict[str, dict[str, object]] = VALUES | {
     "sensor.scale": {"scale_ppm": 1e5},
     "analog.reference": {"reference_ppm": 1e4},
