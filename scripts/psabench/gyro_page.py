@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from psabench import gyro_grading as grading
+from psabench.angles import wrapped_deg
 from psabench.gyro_grading import DEG, GyroSection
 from psabench.nav import DEGPH, EARTH_RADPS
 from psabench.report_page import PAGE
@@ -136,8 +137,7 @@ def rates_figure(s: GyroSection) -> object:
 
     r, p = s.result, s.result.params
     we = EARTH_RADPS * np.cos(p.latitude_rad) / DEGPH
-    alpha = np.array([(r.compass.alpha1_rad + row.position.delta_rad) * DEG for row in r.rows])
-    alpha = 180.0 - (180.0 - alpha) % 360.0
+    alpha = wrapped_deg(np.array([(r.compass.alpha1_rad + row.position.delta_rad) * DEG for row in r.rows]))
     rate = np.array([row.position.s_radps / DEGPH for row in r.rows])
     left = np.array([row.residual_radps / DEGPH for row in r.rows])
     x = np.linspace(-180.0, 180.0, 361)

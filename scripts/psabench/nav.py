@@ -28,7 +28,8 @@ from psabench.navlib import (
     library,
 )
 
-EARTH_RADPS = 7.292115e-5
+EARTH_RADPS = 7.292115e-5  # WGS 84: sources 5.1
+EARTH_RADIUS_M = 6371e3  # of the sphere that transport rates are over, as nav_transport_radps() has it
 DEGPH = math.radians(1.0) / 3600.0  # 1 deg/h in rad/s
 ARCMIN = math.radians(1.0 / 60.0)  # 1' in rad
 

@@ -25,6 +25,7 @@ from psabench.campaign.setup import Setup
 from psabench.errors import BadInput, DeviceError, LinkError
 from psabench.places import proto_file
 from psabench.procedures import gyrocompass
+from psabench.procedures.head_bench import Silent
 from psabench.progress import Bar
 from psabench.recorded_platform import RecordedPlatform
 from psabench.store import Rows, Store
@@ -82,7 +83,7 @@ def test_a_recording_of_the_live_bus_gives_the_live_heading_to_the_last_bit(
     path, log = tmp_path / "run.yaml", tmp_path / "bus.log"
     path.write_text(json.dumps(emulated.scenario(setup, at)), encoding="utf-8")
     with Bench.start(path, extra=["--can", f"log:{log}"]) as bench:
-        windows = gyrocompass.measure(WirePlatform(bench), p, emulated._Silent())
+        windows = gyrocompass.measure(WirePlatform(bench), p, Silent())
         ended_s = bench.time_s
     recorded = RecordedPlatform(emulated.scenario(setup, at))
     script = recorded._script.bench

@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from psabench.angles import wrapped_deg
 from psabench.bench import Bench
 from psabench.campaign import emulated
 from psabench.campaign.cases import STUDIES, duration_s
@@ -39,7 +40,7 @@ def run(setup: Setup, folder: Path) -> tuple[GyrocompassResult, float]:
     )
     with Bench.start(path) as bench:
         r = g.estimate(g.measure(WirePlatform(bench), p, Silent()), p)
-    return r, (math.degrees(r.heading_rad) - at.heading_deg + 180.0) % 360.0 - 180.0
+    return r, wrapped_deg(math.degrees(r.heading_rad) - at.heading_deg)
 
 
 @pytest.mark.host

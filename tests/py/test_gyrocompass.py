@@ -10,6 +10,7 @@ import pytest
 from fake_bench import seeded
 from fake_platform import FakePlatform
 from psabench import nav
+from psabench.angles import wrapped_deg
 from psabench.errors import BadInput, LinkError
 from psabench.nav import DEGPH
 from psabench.procedures import gyrocompass as g
@@ -26,7 +27,7 @@ def run(bench: FakePlatform, reading: str = "improved", **given: object) -> Gyro
 
 
 def heading_error_deg(r: GyrocompassResult, bench: FakePlatform) -> float:
-    return (r.get("heading_deg").value - bench.heading_deg + 180.0) % 360.0 - 180.0
+    return wrapped_deg(r.get("heading_deg").value - bench.heading_deg)
 
 
 # ---- without noise

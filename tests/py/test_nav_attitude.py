@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from nav_reference import DEG, Floats, platform, vehicle
 from psabench import nav
-from psabench.nav import ARCMIN, DEGPH, EARTH_RADPS, Rest
+from psabench.nav import ARCMIN, DEGPH, EARTH_RADIUS_M, EARTH_RADPS, Rest
 
 # ---- attitude, gimbal, azimuth ----
 
@@ -79,6 +79,12 @@ def test_the_azimuth_torquer_tells_the_other_drift() -> None:
     sd = nav.azimuth_drift_sd(latitude_rad=latitude, alpha_rad=math.pi / 2, beta_sd_rad=0.0, gamma_sd_rad=10 * ARCMIN)
     assert sd / DEGPH == pytest.approx(0.028, abs=0.0005)
     assert nav.transport_radps(500 / 3.6, latitude) / DEGPH == pytest.approx(5.36, abs=0.005)
+
+
+def test_python_and_the_library_have_one_earth() -> None:
+    at = Rest(latitude_rad=math.radians(60.0), alpha_rad=math.pi / 2)
+    assert nav.rest_s_radps(at)[0] == pytest.approx(EARTH_RADPS / 2, rel=1e-12)
+    assert nav.transport_radps(1.0, math.pi / 4) == pytest.approx(1.0 / EARTH_RADIUS_M, rel=1e-12)
 
 
 # ---- the loop at rest ----

@@ -31,6 +31,7 @@ from psabench.nav import DEGPH
 from psabench.places import find_emulator, proto_file
 from psabench.procedures import gyrocompass
 from psabench.procedures.gyrocompass import GyrocompassParams
+from psabench.procedures.head_bench import Silent
 from psabench.procedures.platform_bench import PlatformBench
 from psabench.recorded_platform import RecordedPlatform
 from psabench.store import CELL, Rows
@@ -252,18 +253,10 @@ def why(platforms: Platforms, setup: Setup, seed: int, run: int) -> str:
     return ""
 
 
-class _Silent:
-    """Progress of a run among many."""
-
-    @contextmanager
-    def step(self, name: str, total: int) -> Iterator[Callable[[], None]]:
-        yield lambda: None
-
-
 def _result(platforms: Platforms, setup: Setup, p: GyrocompassParams, at: Instrument) -> gyrocompass.GyrocompassResult:
     try:
         with platforms(scenario(setup, at)) as platform:
-            return gyrocompass.estimate(gyrocompass.measure(platform, p, _Silent()), p)
+            return gyrocompass.estimate(gyrocompass.measure(platform, p, Silent()), p)
     except BadInput as e:
         raise BadInput(f"--chain emulated: {e}") from e
 

@@ -14,6 +14,7 @@ from statistics import NormalDist
 import numpy as np
 
 from psabench import nav
+from psabench.angles import wrapped
 from psabench.nav import ARCMIN, DEGPH, EARTH_RADPS, Flag
 from psabench.procedures.gyrocompass_fit import Fit, Sensitivity, rate_covariance
 from psabench.procedures.gyrocompass_latitude import LatitudeEffect, passport_limit_radps
@@ -172,7 +173,7 @@ class _Span:
     @property
     def own_rad(self) -> float:
         """Of the vehicle, clockwise as headings are."""
-        return math.remainder(self.gimbal_rad - self.torquers_rad + self.idle_radps * self.time_s, math.tau)
+        return wrapped(self.gimbal_rad - self.torquers_rad + self.idle_radps * self.time_s)
 
 
 def _spans(e: Evidence) -> list[_Span]:
@@ -198,7 +199,7 @@ def _spans(e: Evidence) -> list[_Span]:
     within = [
         _Span(
             where=f"in position {w.number + 1}",
-            gimbal_rad=math.remainder(float(w.encoder_rad[-1] - w.encoder_rad[0]), math.tau),
+            gimbal_rad=wrapped(float(w.encoder_rad[-1] - w.encoder_rad[0])),
             torquers_rad=float(w.turned_rad[-1] - w.turned_rad[0]),
             idle_radps=float(rate),
             time_s=w.length_s - w.step_s,

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from psabench import nav
+from psabench.angles import wrapped
 from psabench.nav import ARCMIN, DEGPH, EARTH_RADPS
 from psabench.procedures.gyrocompass_params import METHODS, GyrocompassParams, noise_of
 from psabench.procedures.gyrocompass_windows import s_of, s_sd, trusted
@@ -100,7 +101,7 @@ def sensitivity(f: Fit) -> Sensitivity:
     found = []
     for one in np.eye(len(f.rows)) * step:
         up, down = again(f, one), again(f, -one)
-        turned = math.remainder(up.alpha1_rad - down.alpha1_rad, math.tau)
+        turned = wrapped(up.alpha1_rad - down.alpha1_rad)
         size = math.hypot(up.s, up.c) - math.hypot(down.s, down.c)
         found.append((turned, up.drift1_radps - down.drift1_radps, size))
     alpha_s, drift, hypot_s = np.array(found).T / (2.0 * step)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from psabench import nav
+from psabench.angles import wrapped
 from psabench.nav import DEGPH, EARTH_RADPS
 from psabench.procedures.gyrocompass_fit import Fit, again
 from psabench.procedures.platform_bench import Floats
@@ -100,4 +101,4 @@ def _turn(f: Fit, latitude_rad: float) -> float:
         there = again(f, np.array(more), latitude_rad)
     except nav.Refused:  # at the edge of what the library takes
         return math.pi
-    return math.remainder(f.compass.alpha1_rad - there.alpha1_rad, math.tau)
+    return wrapped(f.compass.alpha1_rad - there.alpha1_rad)

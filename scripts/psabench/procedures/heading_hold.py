@@ -11,8 +11,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from psabench import nav
+from psabench.angles import wrapped
 from psabench.errors import LinkError
-from psabench.nav import DEGPH
+from psabench.nav import DEGPH, EARTH_RADIUS_M
 from psabench.procedures.gyrocompass import GyrocompassResult
 from psabench.procedures.head_bench import Progress
 from psabench.procedures.platform_bench import Compensation, Look, PlatformBench
@@ -22,7 +23,6 @@ NAME = "heading-hold"
 SUMMARY = "gyrocompassing, then heading kept for hours with the drifts compensated"
 
 DRIFTS = ("torquer", "axis1", "none")
-EARTH_RADIUS_M = 6371e3
 LATITUDE_LIMIT_RAD = math.radians(85.0)
 SDS = 5.0  # of what the hold is expected to be off by
 PARKED_RAD = math.radians(0.2)  # beside them a parked vehicle's heading may wander so far: sway
@@ -99,7 +99,7 @@ class HoldResult:
             return ()
         growth = replace(_growth(self.start), heading_sd_rad=0.0)
         for h in self.held[1:]:
-            moved_rad = math.remainder(h.heading_rad - self.held[0].heading_rad, math.tau)
+            moved_rad = wrapped(h.heading_rad - self.held[0].heading_rad)
             if abs(moved_rad) > SDS * nav.hold_sd_rad(growth, h.t_s) + PARKED_RAD:
                 return (
                     f"the heading moved by {math.degrees(moved_rad):.2f} deg in {h.t_s:.0f} s of standing, more "
@@ -112,7 +112,7 @@ class HoldResult:
         """The heading of a flying vehicle is its track but for the wind."""
         under_way = [h for h in self.held[1:] if h.t_s >= UNDER_WAY_S] if self.params.speed_mps else []
         for h in under_way:
-            off_rad = math.remainder(h.heading_rad - self.params.track_rad, math.tau)
+            off_rad = wrapped(h.heading_rad - self.params.track_rad)
             if abs(off_rad) > SDS * h.sd_rad + DRIFT_ANGLE_RAD:
                 return (
                     f"the heading is {math.degrees(off_rad):.0f} deg from the track after {h.t_s:.0f} s, more than the "

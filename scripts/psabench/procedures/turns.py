@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from psabench.angles import wrapped_deg
 from psabench.estimate import model
 from psabench.estimate.uncertainty import Correlation, Estimate, estimate, not_identifiable
 from psabench.face import Face
@@ -170,7 +171,7 @@ def _halves(readings: Sequence[Reading], pair: Pair, search_deg: float, kx_v_per
 def _position(readings: Sequence[Reading], centre_deg: float, searched: bool) -> tuple[float, float]:
     """Voltage of a position and how far off nominal it was, rad. When searched: the extreme of a parabola."""
     u_v = np.array([r.u_v for r in readings])
-    off_rad = np.radians([(r.alpha_deg - centre_deg + 180.0) % 360.0 - 180.0 for r in readings])
+    off_rad = np.radians([wrapped_deg(r.alpha_deg - centre_deg) for r in readings])
     if not searched:
         return float(u_v.mean()), float(off_rad.mean())
     if np.unique(off_rad).size < SEARCH_POINTS:  # cut short: the nominal position alone
