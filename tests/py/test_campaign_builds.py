@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import os
+import subprocess
+import sys
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -18,6 +20,7 @@ from psabench.campaign.runner import Plan
 from psabench.campaign.setup import Setup
 from psabench.errors import BadInput, BenchError
 from psabench.navlib import NAME, library
+from psabench.places import PACKAGE, proto_file
 from psabench.progress import Bar
 from psabench.store import Store
 
@@ -109,25 +112,94 @@ def test_a_build_is_what_its_files_hold(tmp_path: Path) -> None:
     assert builds.digest([tmp_path / "c", b]) != first
 
 
-def test_what_goes_through_the_wire_is_built_of_emulator_library_and_host(
+def made_package(root: Path) -> Path:
+    """A package with what the emulated chain would import, and more; its modules by name."""
+    files = {
+        "__init__": "",
+        "campaign/__init__": "",
+        "campaign/chains": "import json\nfrom psabench.nav import alpha\n\ndef f():\n    from psabench import bench\n",
+        "nav": "import psabench.deep.inner as i\nalpha = 1\n",
+        "bench": "from psabench.campaign import chains\n",  # a ring
+        "deep/__init__": "import psabench.errors\n",
+        "deep/inner": "",
+        "deep/beside": "",
+        "errors": "",
+        "conform/__init__": "from psabench.nav import alpha\n",
+        "conform/suite": "import psabench.campaign.chains\n",
+    }
+    for name, text in files.items():
+        path = root / "psabench" / f"{name}.py"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    return root / "psabench"
+
+
+def test_the_sources_of_a_module_are_what_it_imports_at_any_depth(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The build is another one when any of the three is; asked without its cache."""
+    package = made_package(tmp_path)
+    monkeypatch.setattr(builds, "PACKAGE", package)
+    found = [str(path.relative_to(package)) for path in builds.sources("psabench.campaign.chains")]
+    chain = ["campaign/__init__", "campaign/chains", "deep/__init__", "deep/inner", "errors", "nav"]
+    assert found == [f"{name}.py" for name in ("__init__", "bench", *chain)]
+
+
+def test_what_goes_through_the_wire_is_built_of_emulator_library_protocol_and_host(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The build is another one when any of them is, and the same when something else is; asked without its cache."""
     wire = builds.wire.__wrapped__
     for name in ("find_emulator", "_loaded"):
         (tmp_path / name).write_bytes(b"one")
         monkeypatch.setattr(builds, name, lambda name=name: tmp_path / name)
-    monkeypatch.setattr(builds, "PACKAGE", tmp_path)
-    (tmp_path / "procedures").mkdir()
-    host = tmp_path / "procedures" / "compass.py"
-    host.write_text("one")
+    for name in builds.WIRE_PROTO:
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_bytes(b"one")
+    monkeypatch.setattr(builds, "proto_file", lambda name: tmp_path / name)
+    package = made_package(tmp_path)
+    monkeypatch.setattr(builds, "PACKAGE", package)
     found = [wire()]
-    for changed in (tmp_path / "find_emulator", tmp_path / "_loaded", host):
-        changed.write_text("two")
+    parts = ["find_emulator", "_loaded", *builds.WIRE_PROTO, "psabench/bench.py", "psabench/campaign/chains.py"]
+    for name in parts:
+        (tmp_path / name).write_bytes((tmp_path / name).read_bytes() + b"\n#")
         found.append(wire())
-    assert len(set(found)) == 4
-    (tmp_path / "notes.txt").write_text("no code")
+    assert len(set(found)) == 1 + len(parts)
+    for name in ("conform/__init__.py", "conform/suite.py", "deep/beside.py"):
+        (package / name).write_text("other = True\n")
     assert wire() == found[-1]
+
+
+READ_BY_A_RUN = """
+import sys
+
+opened = set()
+sys.addaudithook(lambda event, args: opened.add(str(args[0])) if event == "open" else None)
+from psabench.campaign.cases import STUDIES
+from psabench.campaign.chains import Wanted, compute
+from psabench.campaign.setup import Setup
+
+setup = next(c.setup for c in STUDIES["wire"].cases(Setup()) if c.name == "article")
+(part,) = compute([Wanted(chain=sys.argv[1], setup=setup, hold=None, seed=1, first_run=0, runs=1)])
+assert part.rows[0, 1] == part.rows[0, 1]
+modules = {m.__file__ for name, m in sys.modules.items() if name.partition(".")[0] == "psabench"}
+print("\\n".join(opened | modules))
+"""
+
+
+@pytest.mark.host
+@pytest.mark.parametrize("chain", ["emulated", "wire"])
+def test_whatever_a_run_reads_is_in_its_build(chain: str) -> None:
+    """Of ours: modules that it has loaded, files that it has opened. The studies are in the key, as their set-ups."""
+    done = subprocess.run(
+        [sys.executable, "-c", READ_BY_A_RUN, chain], capture_output=True, text=True, check=True, timeout=120
+    )
+    read = {Path(line).resolve() for line in done.stdout.splitlines()}
+    proto = proto_file("psabench.dbc").resolve().parent
+    known = {*builds.sources(builds.WIRE_MODULE), *(proto_file(name).resolve() for name in builds.WIRE_PROTO)}
+    ours = {p for p in read if (p.suffix == ".py" and p.is_relative_to(PACKAGE)) or p.is_relative_to(proto)}
+    assert ours - known == {PACKAGE / "campaign" / "cases.py"}
+    assert len(ours & known) > 40
+    assert not any(p.is_relative_to(PACKAGE / "conform") for p in known)
 
 
 def test_a_library_that_the_loader_found_is_found_again(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
