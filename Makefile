@@ -76,7 +76,7 @@ TEST_BIN := $(addprefix $(BUILD)/tests/,$(TESTS))
 FUZZ      ?= *#                        one fuzz target, without its fuzz_
 FUZZ_BIN := $(patsubst tests/fuzz/%.c,$(BUILD)/fuzz/%,$(sort $(wildcard tests/fuzz/fuzz_$(strip $(FUZZ)).c)))
 BENCH_BIN := $(patsubst tests/bench/%.c,$(BUILD)/bench/%,$(sort $(wildcard tests/bench/*.c)))
-C_FILES   = $(sort $(wildcard emu/*/*.[ch] emu/*/*.[ch]pp tests/*/*.[ch] examples/*.c))
+C_FILES   = $(sort $(wildcard emu/*/*.[ch] emu/*/*.[ch]pp tests/*/*.[ch] examples/*.c docs/examples/*.[ch]))
 
 .SECONDARY:
 .DELETE_ON_ERROR:
