@@ -13,9 +13,7 @@ from dataclasses import dataclass, field, fields
 from psabench.estimate.model import Sensor
 from psabench.estimate.uncertainty import Estimate
 from psabench.procedures import PROCEDURES
-from psabench.procedures.result import ProcedureResult
-
-LIMIT_CI = 2.0  # an estimate is out of limits beyond this many half widths of its own 95 % interval
+from psabench.procedures.result import LIMIT_CI, ProcedureResult
 
 # Printed by the article for its sensor, to these digits.
 ARTICLE = (

@@ -5,18 +5,16 @@ The truth comes from the truth port, after each window and at each look; no proc
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from psabench.angles import wrapped_deg
 from psabench.estimate.uncertainty import Estimate
-from psabench.grading import LIMIT_CI, with_ci
+from psabench.grading import with_ci
 from psabench.nav import DEGPH
 from psabench.procedures.gyrocompass import GyrocompassResult, allowance
 from psabench.procedures.heading_hold import HoldResult
-
-DEG = 180.0 / math.pi
+from psabench.procedures.result import DEG, LIMIT_CI
 
 # What the article says that its simulation reaches, and what a hold may be off by.
 CLAIMS: Mapping[str, tuple[float, str]] = {"heading_deg": (0.1, "deg"), "drift1_degph": (0.05, "deg/h")}
@@ -92,8 +90,7 @@ def hold_limits_deg(s: GyroSection) -> tuple[float, ...]:
         return ()
     may = allowance(s.result)
     return tuple(
-        LIMIT_CI * 1.96 * h.sd_rad * DEG + may["heading_deg"] + may["drift2_degph"] * h.t_s / 3600.0
-        for h in s.hold.held
+        LIMIT_CI * h.half95_rad * DEG + may["heading_deg"] + may["drift2_degph"] * h.t_s / 3600.0 for h in s.hold.held
     )
 
 
@@ -154,7 +151,7 @@ def hold_table(s: GyroSection) -> list[tuple[str, ...]]:
     for k in sorted({round(i * (n - 1) / 8) for i in range(9)}):
         h = s.hold.held[k]
         error = f"{errors[k]:+.4f}" if errors else ""
-        ci = f"{1.96 * h.sd_rad * DEG:.3f}"
+        ci = f"{h.half95_rad * DEG:.3f}"
         rows.append(
             (f"after {h.t_s / 3600.0:.2f} h", f"{h.heading_rad * DEG:.4f}", ci, "deg", error, f"{limits[k]:.2g}")
         )

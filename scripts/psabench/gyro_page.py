@@ -11,8 +11,9 @@ import numpy as np
 
 from psabench import gyro_grading as grading
 from psabench.angles import wrapped_deg
-from psabench.gyro_grading import DEG, GyroSection
+from psabench.gyro_grading import GyroSection
 from psabench.nav import DEGPH, EARTH_RADPS
+from psabench.procedures.result import DEG
 from psabench.report_page import PAGE
 from psabench.whole_file import replace_file
 
@@ -194,7 +195,7 @@ def hold_figure(s: GyroSection) -> object:
 
     assert s.hold is not None
     hours = np.array([h.t_s / 3600.0 for h in s.hold.held])
-    band = np.array([1.96 * h.sd_rad * DEG for h in s.hold.held])
+    band = np.array([h.half95_rad * DEG for h in s.hold.held])
     errors = np.array(grading.hold_errors_deg(s) or np.full(len(hours), np.nan))
     with matplotlib.rc_context(plots.STYLE):
         figure = Figure(figsize=(7.4, 3.0), layout="constrained")

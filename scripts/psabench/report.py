@@ -14,7 +14,6 @@ from pathlib import Path
 
 from psabench.grading import (
     ARTICLE,
-    LIMIT_CI,
     Graded,
     Section,
     as_printed,
@@ -26,6 +25,7 @@ from psabench.grading import (
     within_limits,
 )
 from psabench.procedures import PROCEDURES
+from psabench.procedures.result import LIMIT_CI
 from psabench.report_page import PAGE
 from psabench.whole_file import replace_file
 

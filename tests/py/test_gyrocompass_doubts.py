@@ -225,7 +225,10 @@ def test_the_other_hemisphere_shows_in_the_passport_s_drift_alone() -> None:
     assert blind.doubts == ()
     assert blind.latitude.sign_deg == pytest.approx(abs(error_deg(blind, 135.0)), abs=0.1)
     assert right.latitude.sign_deg == pytest.approx(blind.latitude.sign_deg, abs=0.1)
-    assert "so do both signs, 3.3" in right.latitude.words
+    assert (
+        "do not tell the hemisphere, a latitude of the wrong sign would turn this heading by 3.3"
+        in right.latitude.words
+    )
     passport = {"drift2_degph": -12.0, "drift2_limit_degph": 5.0}
     told = run(FakePlatform(**bench), latitude_deg=-50.0, **passport)  # type: ignore[arg-type]
     assert "drifts by 11.05 deg/h where its passport says -12 +- 5" in told.doubts[0]
@@ -254,6 +257,19 @@ def test_the_latitude_s_error_widens_the_interval_on_a_tilt() -> None:
     turns = [abs(run(FakePlatform(heading_deg=h), method="gls").latitude.heading_per_latitude) for h in (0.0, 90.0)]
     assert more == pytest.approx(turns, rel=0.03)
     assert math.hypot(*turns) == pytest.approx(math.radians(math.hypot(5.0, 4.0)), rel=0.05)
+
+
+@pytest.mark.parametrize(("gm_sigma_degph", "half_deg"), [(1e15, 180.0), (400.0, None)])
+def test_an_interval_is_a_whole_turn_at_most_and_a_heading_that_is_open_is_in_doubt(
+    gm_sigma_degph: float, half_deg: float | None
+) -> None:
+    """400 deg/h of random drift leave more than half a turn, 1e15 nothing at all."""
+    r = run(FakePlatform(), gm_sigma_degph=gm_sigma_degph)
+    heading = r.get("heading_deg")
+    assert 90.0 < heading.ci_half <= 180.0
+    assert half_deg is None or heading.ci_half == half_deg
+    assert f"+- {heading.ci_half:.0f} deg at 95 %: with the errors given these positions leave" in r.doubts[-1]
+    assert -85.0 <= r.latitude.low_deg < r.latitude.high_deg <= 85.0
 
 
 def test_the_allowance_is_of_the_tilt_there_is() -> None:

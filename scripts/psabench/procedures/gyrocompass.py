@@ -27,7 +27,7 @@ from psabench.procedures.gyrocompass_params import METHODS, NAME, READINGS, Gyro
 from psabench.procedures.gyrocompass_windows import good_calibration, s_of, sorted_out
 from psabench.procedures.head_bench import Progress
 from psabench.procedures.platform_bench import PlatformBench, Window
-from psabench.procedures.result import DEG
+from psabench.procedures.result import DEG, Z95
 
 __all__ = [
     "METHODS",
@@ -45,7 +45,6 @@ __all__ = [
 
 SUMMARY = "a gyro platform finds north and its drifts from several positions, the article's way and a better one"
 
-Z95 = 1.96
 LEVEL_LIMIT_S = 60.0  # patience for levelling
 
 
@@ -118,8 +117,9 @@ def estimate(windows: Sequence[Window], p: GyrocompassParams) -> GyrocompassResu
     try:
         f = fit(good, p)
     except nav.Refused as e:
-        why = "; ".join(left_out) or "all windows are good"
-        raise LinkError(f"{NAME}: no heading from {len(good)} of {len(run)} windows: {e} ({why})") from e
+        why = "three are wanted" if e.status is nav.Status.TOO_FEW else str(e).removeprefix(f"{NAME}: ")
+        told = "; ".join(left_out) or "all windows are good"
+        raise LinkError(f"{NAME}: no heading from {len(good)} of {len(run)} windows: {why} ({told})") from e
     found = _evidence(f, len(run), drift2_of(f, good_calibration(windows, p)))
     return GyrocompassResult(
         params=p,
@@ -167,7 +167,9 @@ def _estimates(f: Fit, drift2: float, drift2_sd: float) -> tuple[Estimate, ...]:
 
 
 def _estimate(name: str, symbol: str, unit: str, value: float, sd: float) -> Estimate:
-    return Estimate(name=name, symbol=symbol, unit=unit, value=value, sd=sd, ci_half=Z95 * sd)
+    """The interval of an angle is a whole turn at most."""
+    ci_half = min(Z95 * sd, 180.0) if unit == "deg" else Z95 * sd
+    return Estimate(name=name, symbol=symbol, unit=unit, value=value, sd=sd, ci_half=ci_half)
 
 
 def allowance(result: GyrocompassResult) -> dict[str, float]:

@@ -21,7 +21,7 @@ from psabench.procedures.gyrocompass_latitude import LatitudeEffect, passport_li
 from psabench.procedures.gyrocompass_params import GyrocompassParams
 from psabench.procedures.gyrocompass_windows import LEVEL_CODE_RAD, good_calibration, unsteady, why_not
 from psabench.procedures.platform_bench import Window
-from psabench.procedures.result import DEG
+from psabench.procedures.result import DEG, LIMIT_CI, Z95
 
 FALSE_ALARM = 1e-3  # of each check, in a run where nothing is wrong
 QUALITY_LEAST = 0.01  # of |hypot(s, c) - 1|: what the library flags
@@ -29,7 +29,7 @@ RESIDUAL_LIMIT = 4.0  # residuals may be so many times what noise and drift expl
 RATE_STEP = 1e-3 * DEGPH  # resolution of a rate on the wire, generously
 TURN_STEP_RAD = math.radians(0.01)  # turns of the vehicle below are nobody's business
 RELEVANT = 0.25  # of the interval: a remnant of settling that moves a result by less is let pass
-LIMIT_CI = 2.0  # half widths of the interval that a heading may be off by (grading)
+OPEN_RAD = math.radians(90.0)  # a heading whose interval is half the circle is none
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,7 +64,19 @@ def heading_allowance_rad(p: GyrocompassParams, attitude: nav.Attitude) -> float
 
 def doubts_of(e: Evidence) -> tuple[str, ...]:
     """Reasons not to trust the heading."""
-    checks = (_latitude, _passport, _unseen_latitude, _few, _running, _moved, _tilted, _biased, _residuals, _converged)
+    checks = (
+        _latitude,
+        _passport,
+        _unseen_latitude,
+        _open,
+        _few,
+        _running,
+        _moved,
+        _tilted,
+        _biased,
+        _residuals,
+        _converged,
+    )
     return tuple(words for check in checks if (words := check(e)))
 
 
@@ -128,6 +140,14 @@ def _unseen_latitude(e: Evidence) -> str:
     )
 
 
+def _open(e: Evidence) -> str:
+    """Errors that the passport admits to, against steps of these positions."""
+    half_deg = min(e.fit.compass.alpha1_half95_rad * DEG, 180.0)
+    if half_deg < OPEN_RAD * DEG:
+        return ""
+    return f"+- {half_deg:.0f} deg at 95 %: with the errors given these positions leave the heading open"
+
+
 def _few(e: Evidence) -> str:
     count = len(e.fit.rows)
     return f"only {count} of {e.planned} windows count" if 2 * count < e.planned else ""
@@ -140,7 +160,7 @@ def _running(e: Evidence) -> str:
     error, sd = np.array([x for x, _ in found]), np.array([x for _, x in found])
     results = (
         (e.sensitivity.alpha_s, c.alpha1_half95_rad, DEG, "the heading by {:.2f} deg"),
-        (e.sensitivity.drift, 1.96 * c.drift1_sd_radps, 1.0 / DEGPH, "the drift by {:.2f} deg/h"),
+        (e.sensitivity.drift, Z95 * c.drift1_sd_radps, 1.0 / DEGPH, "the drift by {:.2f} deg/h"),
     )
     moves = []
     for by, half, unit, words in results:

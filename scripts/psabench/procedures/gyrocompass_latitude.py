@@ -43,7 +43,12 @@ class LatitudeEffect:
             f"latitude: 1 deg turns this heading by {abs(self.heading_per_latitude):.3f} deg; "
             f"{self.low_deg:.2f} to {self.high_deg:.2f} deg look alike, up to {self.unseen_deg:.3f} deg of heading"
         )
-        return line if self.sign_deg is None else f"{line}; so do both signs, {self.sign_deg:.2f} deg"
+        if self.sign_deg is None:
+            return line
+        return (
+            f"{line}; the rates do not tell the hemisphere, a latitude of the wrong sign would turn this heading by "
+            f"{self.sign_deg:.2f} deg"
+        )
 
 
 def latitude_effect(f: Fit, quality_limit: float, drift2_radps: float, drift2_sd_radps: float) -> LatitudeEffect:
@@ -52,8 +57,8 @@ def latitude_effect(f: Fit, quality_limit: float, drift2_radps: float, drift2_sd
     grid = np.linspace(-LIMIT_RAD, LIMIT_RAD, round(2.0 * LIMIT_RAD / GRID_RAD) + 1)
     hidden = _hidden(grid, f, quality_limit) & _passport_allows(grid, f, drift2_radps, drift2_sd_radps)
     above, below = hidden[grid > phi], hidden[grid < phi][::-1]
-    high = phi + GRID_RAD * _run_length(above)
-    low = phi - GRID_RAD * _run_length(below)
+    high = min(phi + GRID_RAD * _run_length(above), LIMIT_RAD)
+    low = max(phi - GRID_RAD * _run_length(below), -LIMIT_RAD)
     unseen = max(abs(_turn(f, float(x))) for x in np.linspace(low, high, LOOKS))
     opposite = np.array([-phi])
     told = low <= -phi <= high or not _passport_allows(opposite, f, drift2_radps, drift2_sd_radps)[0]

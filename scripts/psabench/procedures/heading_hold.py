@@ -17,7 +17,7 @@ from psabench.nav import DEGPH, EARTH_RADIUS_M
 from psabench.procedures.gyrocompass import GyrocompassResult
 from psabench.procedures.head_bench import Progress
 from psabench.procedures.platform_bench import Compensation, Look, PlatformBench
-from psabench.procedures.result import option
+from psabench.procedures.result import Z95, option
 
 NAME = "heading-hold"
 SUMMARY = "gyrocompassing, then heading kept for hours with the drifts compensated"
@@ -71,6 +71,11 @@ class Held:
     heading_rad: float
     sd_rad: float  # that is to be expected of it
     faults: tuple[str, ...]
+
+    @property
+    def half95_rad(self) -> float:
+        """Half width of its 95 % interval: half a turn at most."""
+        return min(Z95 * self.sd_rad, math.pi)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -16,6 +16,8 @@ from psabench.procedures.head_bench import Reading
 Array = npt.NDArray[np.float64]
 
 DEG = 180.0 / math.pi
+Z95 = 1.96  # standard deviations: half width of a 95 % interval
+LIMIT_CI = 2.0  # an estimate is out of limits beyond this many half widths of its own 95 % interval
 
 
 def option(default: Any, unit: str, text: str) -> Any:
