@@ -115,7 +115,7 @@ def test_random_mutants_are_the_same_for_one_seed_and_apply() -> None:
 def test_the_page_has_the_tables_between_its_marks(tmp_path: Path) -> None:
     page = tmp_path / "p.md"
     page.write_text(f"before\n{report.BEGIN}\nold\n{report.END}\nafter\n")
-    report.page(page, {"declared": [result("a", "killed"), result("b", "survived", ["X-1"])], "random": []})
+    report.page(page, {"declared": [result("a", "killed"), result("b", "survived", ["X-1"])], "random": []}, {})
     text = page.read_text()
     assert text.startswith("before\n")
     assert text.endswith("\nafter\n")

@@ -25,6 +25,8 @@ ON: tuple[tuple[str, str], ...] = (
     ("emu/chip/ad7712", "psd1"),
     ("emu/board/pmka", "pmka"),
     ("emu/board/pik", "pik"),
+    ("emu/board/gyro", "gyro"),
+    ("emu/canopen/co_", "psa2"),
 )
 # What no board of these has: pins that nobody drives edge by edge, faults, what only truth and digest tell.
 LEFT_OUT = re.compile(r"_(fault|pins|gpio|board|profile|profile_set|mod|cal|hpf|cic)\.c$")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -71,40 +71,46 @@ def write(path: Path, parts: dict[str, Sequence[Result]], facts: dict[str, Any])
     replace_file(path, json.dumps(everything, indent=1, ensure_ascii=False) + "\n")
 
 
-def page(path: Path, parts: dict[str, Sequence[Result]]) -> None:
+def page(path: Path, parts: dict[str, Sequence[Result]], facts: Mapping[str, Any]) -> None:
     """The tables of docs/mutants.md, in place of those that are there."""
     text = path.read_text(encoding="utf-8")
     head, _, rest = text.partition(BEGIN)
     _, _, tail = rest.partition(END)
-    body = "\n".join(_tables(parts))
+    titles = {"declared": "Declared mutants", "random": f"Random mutants, seed {facts.get('random_seed')}"}
+    body = "\n".join(row for name, results in parts.items() if results for row in _part(name, titles[name], results))
     replace_file(path, f"{head}{BEGIN}\n\n{body}\n{END}{tail}")
 
 
-def _tables(parts: dict[str, Sequence[Result]]) -> Iterator[str]:
-    titles = {"declared": "Declared mutants", "random": "Random mutants"}
-    for name, results in parts.items():
-        if not results:
-            continue
-        killed, of = rate(results)
-        counts = Counter(r.result for r in results)
-        yield f"### {titles[name]}\n"
-        if name == "declared" and len(results) < len(load()):
-            yield f"Judged so far: {len(results)} of the {len(load())} of the list.\n"
-        yield (
-            f"{killed} of {of} killed, {percent(killed, of)}. Of all {len(results)}: "
-            + ", ".join(f"{n} {what}" for what, n in sorted(counts.items()))
-            + ".\n"
-        )
-        yield "| kind | killed | of | rate |\n|---|---|---|---|"
-        for kind in sorted({r.kind for r in results}):
-            killed, of = rate(r for r in results if r.kind == kind)
-            yield f"| {kind} | {killed} | {of} | {percent(killed, of)} |"
+def _part(name: str, title: str, results: Sequence[Result]) -> Iterator[str]:
+    yield f"### {title}\n"
+    if name == "declared" and len(results) < len(load()):
+        yield f"Judged so far: {len(results)} of the {len(load())} of the list.\n"
+    counts = Counter(r.result for r in results)
+    yield f"{_said(results)} Of all {len(results)}: {', '.join(f'{n} {what}' for what, n in sorted(counts.items()))}.\n"
+    yield "| kind | killed | of | rate |\n|---|---|---|---|"
+    for kind in sorted({r.kind for r in results}):
+        killed, of = rate(r for r in results if r.kind == kind)
+        yield f"| {kind} | {killed} | {of} | {percent(killed, of)} |"
+    yield ""
+    spared = [r for r in results if r.result not in KILLED and (r.result != "equivalent" or r.breaks)]
+    if spared:
+        yield "| not killed | what became of it | breaks | reason |\n|---|---|---|---|"
+    for r in sorted(spared, key=lambda r: r.id):
+        reason = r.reason.splitlines()[-1].replace("|", "\\|") if r.reason else ""
+        yield f"| {r.id} | {r.result} | {', '.join(r.breaks) or r.file} | {reason} |"
+    if spared:
         yield ""
-        spared = [r for r in results if r.result not in KILLED and (r.result != "equivalent" or r.breaks)]
-        if spared:
-            yield "| not killed | what became of it | breaks | reason |\n|---|---|---|---|"
-        for r in sorted(spared, key=lambda r: r.id):
-            reason = r.reason.splitlines()[-1].replace("|", "\\|") if r.reason else ""
-            yield f"| {r.id} | {r.result} | {', '.join(r.breaks) or r.file} | {reason} |"
-        if spared:
-            yield ""
+
+
+def _said(results: Sequence[Result]) -> str:
+    """The rate, and how those that a requirement found were found."""
+    killed, of = rate(results)
+    found = [r for r in results if r.result == "killed"]
+    words = f"{killed} of {of} killed, {percent(killed, of)}."
+    if found:
+        failed = sum(r.failed for r in found)
+        words += f" In {failed} of {len(found)} a requirement failed; in the others one could not be carried out."
+    listed = [r for r in found if r.breaks]
+    if listed:
+        words += f" {sum(r.named for r in listed)} were found by a requirement that the list names."
+    return words

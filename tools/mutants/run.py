@@ -8,7 +8,9 @@ import signal
 import sys
 import tempfile
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
+from queue import SimpleQueue
 from random import Random
 from typing import Any
 
@@ -53,6 +55,14 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("--random", type=int, default=0, metavar="N", help="N random mutants instead of declared ones")
     p.add_argument("--seed", type=int, default=1, help="of the sample and of the random mutants (%(default)s)")
     p.add_argument("--check", action="store_true", help="apply and compile each, run nothing")
+    p.add_argument(
+        "--jobs", type=int, choices=range(1, 65), default=1, metavar="N", help="mutants at once (%(default)s)"
+    )
+    p.add_argument(
+        "--quick",
+        action="store_true",
+        help="run the tests of the requirements that a mutant breaks first, and all only where those find nothing",
+    )
     p.add_argument(
         "--again",
         choices=("survived", "unknown"),
@@ -114,24 +124,42 @@ def told_baseline(plain: dict[Target, Run]) -> bool:
     return all(run.conforms for run in plain.values())
 
 
-def judged(judge: Judge, mutants: Sequence[Mutant], keep: Callable[[Result], None]) -> None:
-    """One after the other, with a line each."""
-    for n, m in enumerate(mutants, 1):
-        r = judge.judge(m)
-        keep(r)
-        print(f"{n}/{len(mutants)} {report.line(r)}", flush=True)
+def judged(judges: Sequence[Judge], mutants: Sequence[Mutant], keep: Callable[[Result], None]) -> None:
+    """Each by the next judge that is free, with a line as it is done. What runs is ended when this is interrupted."""
+    free: SimpleQueue[Judge] = SimpleQueue()
+    for judge in judges:
+        free.put(judge)
+
+    def one(m: Mutant) -> Result:
+        judge = free.get()
+        try:
+            return judge.judge(m)
+        finally:
+            free.put(judge)
+
+    with ThreadPoolExecutor(len(judges)) as pool:
+        try:
+            for n, done in enumerate(as_completed([pool.submit(one, m) for m in mutants]), 1):
+                r = done.result()
+                keep(r)
+                print(f"{n}/{len(mutants)} {report.line(r)}", flush=True)
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            for judge in judges:
+                judge.suite.stop()
+            raise
 
 
-def remembered(path: Path, part: str, mutants: Sequence[Mutant], again: str | None) -> dict[str, Result]:
+def latest(path: Path, part: str, mutants: Sequence[Mutant]) -> dict[str, Result]:
     """Results of the latest file that still stand: of rows that have not changed."""
-    rows = report.read(path).get(part, []) if again else []
     stamps = {m.id: m.stamp() for m in mutants}
-    found = [Result.of(row) for row in rows]
-    return {
-        r.id: r
-        for r in found
-        if stamps.get(r.id) == r.stamp and (again == "unknown" or r.result in (*KILLED, "equivalent"))
-    }
+    found = [Result.of(row) for row in report.read(path).get(part, [])]
+    return {r.id: r for r in found if stamps.get(r.id) == r.stamp}
+
+
+def left_out(again: str | None, r: Result) -> bool:
+    """Whether `--again` goes on without this one."""
+    return again == "unknown" or (again == "survived" and r.result in (*KILLED, "equivalent"))
 
 
 def state() -> str:
@@ -163,38 +191,42 @@ def carry_out(args: argparse.Namespace, mutants: list[Mutant], folder: Path) -> 
     tree = Tree(folder, borrow=bool(args.sample))
     if args.check:
         return check(tree, mutants)
-    judge = Judge(tree, Suite(folder), compare=bool(args.random))
-    if not told_baseline(judge.baseline(targets(mutants))) and not args.relative:
+    judge = Judge(tree, Suite(folder), compare=bool(args.random), quick=args.quick)
+    plain = judge.baseline(targets(mutants))
+    if not told_baseline(plain) and not args.relative:
         print("the unmutated emulator must conform first (--relative goes on)")
         return 2
     if args.random:
         judge.look(targets(mutants))
-    part = "random" if args.random else "declared"
-    results = remembered(args.out, part, mutants, args.again)
-    facts: dict[str, Any] = {"state": state(), "seed": args.seed}
-    facts["baseline"] = {str(t): {"conforms": r.conforms, "took_s": round(r.took_s, 1)} for t, r in judge.plain.items()}
-    other = "declared" if args.random else "random"
-    others = [Result.of(row) for row in report.read(args.out).get(other, [])]
+    part, other = ("random", "declared") if args.random else ("declared", "random")
+    every = mutants if args.random else load()
+    results = latest(args.out, part, every)
+    todo = [m for m in mutants if m.id not in results or not left_out(args.again, results[m.id])]
+    for m in todo:
+        results.pop(m.id, None)
+    before = report.read(args.out)
+    facts: dict[str, Any] = {"state": state(), "random_seed": args.seed if args.random else before.get("random_seed")}
+    facts["baseline"] = {str(t): {"conforms": r.conforms, "took_s": round(r.took_s, 1)} for t, r in plain.items()}
+    others = [Result.of(row) for row in before.get(other, [])]
 
     def parts() -> dict[str, Sequence[Result]]:
-        mine = [results[m.id] for m in mutants if m.id in results]
+        mine = [results[m.id] for m in every if m.id in results]
         return {"declared": others, "random": mine} if args.random else {"declared": mine, "random": others}
 
     def keep(r: Result) -> None:
         results[r.id] = r
         report.write(args.out, parts(), facts)
 
-    todo = [m for m in mutants if m.id not in results]
     interrupted = False
     try:
-        judged(judge, todo, keep)
+        judged([judge, *(judge.beside(folder / str(k)) for k in range(1, args.jobs))], todo, keep)
     except KeyboardInterrupt:
         interrupted = True
     mine = [results[m.id] for m in mutants if m.id in results]
     for words in report.summary(part, mine):
         print(words)
     if args.docs:
-        report.page(PAGE, parts())
+        report.page(PAGE, parts(), facts)
     return 130 if interrupted else status(mine, random=bool(args.random))
 
 

@@ -9,7 +9,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -50,17 +50,32 @@ class Suite:
     def __init__(self, folder: Path, root: Path = ROOT) -> None:
         self._folder = folder
         self._here = folder / "suite"
-        copy(SUITE, root, self._here)
+        self._child: subprocess.Popen[bytes] | None = None
+        self._stopped = False
+        if not self._here.is_dir():
+            copy(SUITE, root, self._here)
 
-    def run(self, emulator: Path, target: Target, timeout_s: float) -> Run:
-        """Judge this emulator."""
+    def beside(self, folder: Path) -> Suite:
+        """The same suite once more, for another thread: what it runs writes into another folder."""
+        shutil.copytree(self._here, folder / "suite")
+        return Suite(folder)
+
+    def stop(self) -> None:
+        """From another thread: what runs is ended, nothing is begun any more."""
+        self._stopped = True
+        if self._child is not None:
+            _end(self._child)
+
+    def run(self, emulator: Path, target: Target, timeout_s: float, only: Sequence[str] = ()) -> Run:
+        """Judge this emulator. only: requirements; empty: all."""
         out = self._folder / "out"
         shutil.rmtree(out, ignore_errors=True)
         out.mkdir()
         words = ["conform", "device", "--board", target.board, "--out", str(out)]
         words += ["--profile", target.profile] if target.profile else []
+        words += ["--only", *only] if only else []
         begun_s = time.monotonic()
-        status, said = _bounded([sys.executable, "-c", PROGRAM, *words], self._env(emulator), out, timeout_s)
+        status, said = self._bounded([sys.executable, "-c", PROGRAM, *words], self._env(emulator), out, timeout_s)
         took_s = time.monotonic() - begun_s
         path = out / "conform.json"
         if status is None:
@@ -87,22 +102,23 @@ class Suite:
         env["PYTHONPATH"] += os.pathsep + str(Path(__file__).parents[1])
         scratch = self._folder / "scratch"
         scratch.mkdir(exist_ok=True)
-        return _bounded([sys.executable, *words], env, scratch, timeout_s)
+        return self._bounded([sys.executable, *words], env, scratch, timeout_s)
 
-
-def _bounded(command: list[str], env: dict[str, str], cwd: Path, timeout_s: float) -> tuple[int | None, str]:
-    """Exit status, None after a time-out, and the last lines; whatever it started is ended with it."""
-    log = cwd / "said"
-    with log.open("w", encoding="utf-8") as to:
-        child = subprocess.Popen(command, cwd=cwd, env=env, stdout=to, stderr=to, start_new_session=True)
-        status: int | None = None
-        try:
-            status = child.wait(timeout_s)
-        except subprocess.TimeoutExpired:
-            pass
-        finally:
-            _end(child)
-    return status, "\n".join(log.read_text(encoding="utf-8", errors="replace").strip().splitlines()[-12:])
+    def _bounded(self, command: list[str], env: dict[str, str], cwd: Path, timeout_s: float) -> tuple[int | None, str]:
+        """Exit status, None after a time-out, and the last lines; whatever it started is ended with it."""
+        log = cwd / "said"
+        with log.open("w", encoding="utf-8") as to:
+            child = subprocess.Popen(command, cwd=cwd, env=env, stdout=to, stderr=to, start_new_session=True)
+            self._child = child
+            status: int | None = None
+            try:
+                status = child.wait(0 if self._stopped else timeout_s)
+            except subprocess.TimeoutExpired:
+                pass
+            finally:
+                _end(child)
+                self._child = None
+        return status, "\n".join(log.read_text(encoding="utf-8", errors="replace").strip().splitlines()[-12:])
 
 
 def _end(child: subprocess.Popen[bytes]) -> None:

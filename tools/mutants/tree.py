@@ -23,9 +23,9 @@ class BuildError(Exception):
 
 
 def copy(parts: tuple[str, ...], root: Path, to: Path) -> None:
-    """Parts of the repository, with their times."""
+    """Parts of the repository, with their times, by which Python's compiled files still hold."""
     to.mkdir(parents=True)
-    leave_out = shutil.ignore_patterns("__pycache__", "*.pyc", "bundle")
+    leave_out = shutil.ignore_patterns("*.pyc.*", "bundle")
     for part in parts:
         if (root / part).is_dir():
             shutil.copytree(root / part, to / part, ignore=leave_out)
@@ -38,20 +38,30 @@ class Tree:
 
     def __init__(self, folder: Path, root: Path = ROOT, *, borrow: bool = False) -> None:
         """Copies and builds the unmutated one. borrow: begin with what the checkout has built. Raises BuildError."""
+        self._borrow = borrow
         self.folder = folder / "device"
         self._name = CHECKOUT_S if borrow else OWN
-        copy(DEVICE, root, self.folder)
-        if borrow and (root / CHECKOUT_S / "obj").is_dir():
-            for part in ("obj", "gen"):
-                shutil.copytree(root / CHECKOUT_S / part, self.folder / CHECKOUT_S / part)
+        if not self.folder.is_dir():
+            self._fetch(root)
         self.build()
         self._kept = folder / "kept"
         for name in {CHECKOUT_S, self._name}:
             shutil.copytree(self.folder / name, self._kept / name)
 
+    def beside(self, folder: Path) -> Tree:
+        """The same tree once more, for another thread; nothing is compiled. Raises BuildError."""
+        shutil.copytree(self.folder, folder / "device")
+        return Tree(folder, borrow=self._borrow)
+
     @property
     def emulator(self) -> Path:
         return self.folder / self._name / "psa-emu"
+
+    def _fetch(self, root: Path) -> None:
+        copy(DEVICE, root, self.folder)
+        if self._borrow and (root / CHECKOUT_S / "obj").is_dir():
+            for part in ("obj", "gen"):
+                shutil.copytree(root / CHECKOUT_S / part, self.folder / CHECKOUT_S / part)
 
     def build(self) -> None:
         """Raises BuildError."""
@@ -60,7 +70,13 @@ class Tree:
         env = {k: v for k, v in os.environ.items() if not k.startswith("MAKE") and k != "MFLAGS"}
         env["PYTHONPATH"] = str(self.folder / "scripts")
         done = subprocess.run(
-            [*make, f"{self._name}/psa-emu"], cwd=self.folder, env=env, capture_output=True, text=True, timeout=BUILD_S
+            [*make, f"{self._name}/psa-emu"],
+            cwd=self.folder,
+            env=env,
+            capture_output=True,
+            text=True,
+            timeout=BUILD_S,
+            start_new_session=True,  # Ctrl-C is ours: half a build is no verdict
         )
         if done.returncode != 0:
             raise BuildError("\n".join(done.stderr.strip().splitlines()[-8:]))
