@@ -67,7 +67,7 @@ class Stage:
             return TooLittle(f"there is no scene {name} for this board")
         try:
             return replace(known[name].make(self.subject), clock_ppm=self.clock_ppm)
-        except (BenchError, TooLittle) as e:
+        except (BenchError, Broken, TooLittle) as e:
             return e
 
 

@@ -22,7 +22,7 @@ from psabench.conform.evidence import CanFrame, CanLog, Evidence, LineLog, Marks
 from psabench.conform.probes import LineProbe, PinProbe, PortProbe
 from psabench.conform.variant import Variant
 from psabench.devices import of_board
-from psabench.errors import BadInput
+from psabench.errors import BadInput, LinkError
 from psabench.lineport import SAMPLE_HZ
 from psabench.protocol_files import dbc_node
 from psabench.unit import Unit
@@ -104,6 +104,7 @@ class Subject:
         self.unit: Unit = found
         self.node = found.node.node_id
         self._stack = ExitStack()
+        self._never_ready = False
 
     @property
     def host(self) -> CanHost:
@@ -144,11 +145,19 @@ class Subject:
         return seen if kind in BY_THE_HOST_S_CLOCK else seen | {"stamps"}
 
     def wait_ready(self) -> None:
-        """Until readings come, or would if a host read them."""
-        if "stream" in self.probes:
-            self.unit.wait_ready()
-        else:
+        """Until readings come, or would if a host read them.
+
+        Raises LinkError where they do not, but once: afterwards the board is looked at as it is, after the time that a
+        set-up takes, so that one which never becomes ready is judged by what it does show.
+        """
+        if "stream" not in self.probes or self._never_ready:
             self.run_for(HOSTLESS_SETUP_S)
+            return
+        try:
+            self.unit.wait_ready()
+        except LinkError:
+            self._never_ready = True
+            raise
 
     @contextmanager
     def take(self, *, lines: bool = True) -> Iterator[Take]:

@@ -24,7 +24,7 @@ def into_a_frame(s: Subject, take: Take, lead_s: float = 0.0) -> None:
 @scene("power_on", boards=("psa2",))
 def power_on(s: Subject) -> Evidence:
     """Res in the middle of a frame, then until frames come: the set-up on all lines, boot-up, the first frames."""
-    s.unit.wait_ready()
+    s.wait_ready()
     with s.take() as take:
         s.unit.start()
         into_a_frame(s, take, ON_BUS_S)
@@ -40,7 +40,7 @@ def power_on(s: Subject) -> Evidence:
 @scene("power_cycle", boards=("psa2",))
 def power_cycle(s: Subject) -> Evidence:
     """The supply off in the middle of a frame, and on again until frames come."""
-    s.unit.wait_ready()
+    s.wait_ready()
     with s.take() as take:
         s.unit.start()
         s.run_for(0.03)
@@ -58,7 +58,7 @@ def power_cycle(s: Subject) -> Evidence:
 @scene("stream", boards=("psa2",))
 def stream(s: Subject) -> Evidence:
     """Some hundred frames, on the lines and on CAN."""
-    s.unit.wait_ready()
+    s.wait_ready()
     with s.take() as take:
         s.unit.start()
         s.run_for(STREAM_S)

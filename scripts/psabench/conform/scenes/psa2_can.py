@@ -69,7 +69,7 @@ def counters(s: Subject, *, after: bool = False) -> dict[int, Answer]:
 @contextmanager
 def changed(s: Subject) -> Iterator[None]:
     """Settings may be changed within; a reset puts them back."""
-    s.unit.wait_ready()
+    s.wait_ready()
     try:
         yield
     finally:
@@ -94,7 +94,7 @@ def split(index: int, sub: int, value: int) -> list[tuple[int, int, int]]:
 @scene("quiet", boards=("psa2",))
 def quiet(s: Subject) -> Evidence:
     """Frames for two and a half seconds, on CAN alone; counters before and after."""
-    s.unit.wait_ready()
+    s.wait_ready()
     with s.take(lines=False) as take:
         take.facts["before"] = counters(s)
         s.unit.start()
@@ -107,7 +107,7 @@ def quiet(s: Subject) -> Evidence:
 @scene("registers", boards=("psa2",))
 def registers(s: Subject) -> Evidence:
     """All registers read while frames flow. facts: read, by index and sub-index; counters before and after."""
-    s.unit.wait_ready()
+    s.wait_ready()
     with s.take() as take:
         take.facts["before"] = counters(s)
         s.unit.start()
@@ -196,7 +196,7 @@ def tell_raw(s: Subject, index: int, sub: int, value: int) -> Answer:
 @scene("early", boards=("psa2",))
 def early(s: Subject) -> Evidence:
     """Asked before the set-up is over, and while another request is under way. facts: early, busy, missed."""
-    s.unit.wait_ready()
+    s.wait_ready()
     with s.take(lines=False) as take:
         s.reset()
         s.run_for(20 * PERIOD_S)
@@ -207,7 +207,7 @@ def early(s: Subject) -> Evidence:
         s.run_for(2 * PERIOD_S)
         take.facts["missed"] = (before, ask(s, COUNTERS, SYNCS_MISSED))
         tell(s, PULSES, 0, 0)
-        s.unit.wait_ready()
+        s.wait_ready()
         take.facts["busy"] = _busy(s, take)
         s.reset()
         s.run_for(PERIOD_S)
@@ -348,7 +348,7 @@ def fit(s: Subject) -> Evidence:
 @scene("starts", boards=("psa2",))
 def starts(s: Subject) -> Evidence:
     """The stream started and stopped many times, at all phases of a sample."""
-    s.unit.wait_ready()
+    s.wait_ready()
     with s.take(lines=False) as take:
         for k in range(24):
             s.unit.start()
@@ -469,7 +469,7 @@ def _abort_of_write(s: Subject, d: Described, data: bytes) -> int:
 @scene("chamber", boards=("psa2",))
 def chamber(s: Subject) -> Evidence:
     """Temperature codes beside the temperature of the chamber. facts: temp_degc."""
-    s.unit.wait_ready()
+    s.wait_ready()
     with s.take(lines=False) as take:
         take.facts["temp_degc"] = s.bench.chamber.temp_degc
         s.unit.start()
