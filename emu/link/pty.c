@@ -10,6 +10,10 @@
 #include <termios.h>
 #include <unistd.h>
 
+/* Wall time from a going to the question who is left. Whoever opens the port again at once comes meanwhile, and his coming
+ * is seen: while the kernel is asked, nobody's is. */
+enum { ASK_MS = 37 };
+
 static int make_raw(int fd)
 {
     struct termios tio;
@@ -45,7 +49,7 @@ static void set_openers(struct pty *p, int openers, int64_t t_ns)
 }
 
 /* The kernel merges equal events that follow each other, so two programs that close at once look like one: the count
- * keeps the order of coming and going, and after each going the kernel is asked. */
+ * keeps the order of coming and going, and some time after a going the kernel is asked. */
 static void on_watch(struct link *l, int64_t t_ns)
 {
     struct pty *p = (struct pty *)l;
@@ -60,7 +64,13 @@ static void on_watch(struct link *l, int64_t t_ns)
         closed = true;
         if (p->openers > 0) set_openers(p, p->openers - 1, t_ns);
     }
-    if (closed) set_openers(p, !in_use(p) ? 0 : p->openers ? p->openers : 1, t_ns);
+    if (closed) l->timer_ms = ASK_MS;
+}
+
+static void on_ask(struct link *l, int64_t t_ns)
+{
+    struct pty *p = (struct pty *)l;
+    set_openers(p, !in_use(p) ? 0 : p->openers ? p->openers : 1, t_ns);
 }
 
 /* Where a symbolic link points, "" for anything else. */
@@ -94,7 +104,8 @@ static int open_pair(struct pty *p)
 /* Watches who opens the slave; not fatal where inotify is not to be had. */
 static void watch(struct pty *p)
 {
-    p->watch = (struct link){.fd = inotify_init1(IN_NONBLOCK | IN_CLOEXEC), .want_read = true, .readable = on_watch};
+    p->watch = (struct link){
+        .fd = inotify_init1(IN_NONBLOCK | IN_CLOEXEC), .want_read = true, .readable = on_watch, .timer = on_ask};
     if (p->watch.fd >= 0) start_watch(p);
     if (p->watch.fd >= 0 && p->watch_id < 0) {
         close(p->watch.fd);
