@@ -34,7 +34,7 @@ def test_there_are_enough_of_every_family() -> None:
     rows = load()
     boards = Counter(t.board for m in rows for t in m.on[:1])
     assert len(rows) >= LEAST
-    assert min(boards[b] for b in ("psa2", "psd1", "pmka", "pik")) >= 10
+    assert min(boards[b] for b in ("psa2", "psd1", "pmka", "pik", "gyro")) >= 10
     assert len({m.kind for m in rows}) >= 12
 
 

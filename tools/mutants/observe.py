@@ -23,6 +23,7 @@ from psabench.errors import BenchError, TimeOut
 
 BEYOND_V = {"x": 10.0, "y": -10.0, "z": 9.99}
 NMT = (0x01, 0x02, 0x03, 0x80, 0x01, 0x82, 0x01, 0x81)
+MODE_OF_GYRO, SELF_TEST = 0x2100, 0x210B
 SIZES = (b"\x01", b"\x00\x00", b"\x02\x00\x00", b"\x01\x00\x00\x00", b"\xff\xff\xff\xff", b"\x00" * 4)
 
 
@@ -127,6 +128,23 @@ def _cycles(s: Subject, total: Sum) -> None:
     total.take(take)
 
 
+def _modes(s: Subject, total: Sum) -> None:
+    """Each mode of a gyro unit: off, level, hold, a turn, a run, a calibration, navigation with its self test."""
+    if s.variant.family != "gyro":
+        return
+    with s.take() as take, talk(s) as t:
+        s.wait_ready()
+        t.nmt(0x01)
+        _set(t, total, MODE_OF_GYRO, 1, 2, 1)
+        s.run_for(1.0)
+        for mode, dwell_s in ((1, 1.0), (3, 25.0), (4, 40.0), (0, 0.5), (5, 15.0), (6, 2.0)):
+            _set(t, total, MODE_OF_GYRO, 1, mode, 1)
+            s.run_for(dwell_s)
+        _set(t, total, SELF_TEST, 1, 1, 1)
+        s.run_for(5.0)
+    total.take(take)
+
+
 def _power(s: Subject, total: Sum) -> None:
     with s.take() as take:
         s.power_cycle(0.003)
@@ -147,7 +165,7 @@ def _beyond(s: Subject, total: Sum) -> None:
     total.take(take)
 
 
-STEPS: tuple[Callable[[Subject, Sum], None], ...] = (_power, _states, _stream, _cycles, _talk, _power)
+STEPS: tuple[Callable[[Subject, Sum], None], ...] = (_power, _states, _stream, _cycles, _talk, _power, _modes)
 
 
 def seen(target: Target) -> str:
