@@ -16,15 +16,15 @@ BROKEN_LINES = (
     ),
     BrokenHost(
         "bits_reversed",
-        "word[bits / WORD] >> 1 | (b & DATA ? 1U << 31 : 0)",
-        "word[bits / WORD] << 1 | (b & DATA ? 1U : 0)",
+        "word[bits / word_bits] >> 1 | (b & DATA ? 1U << 31 : 0)",
+        "word[bits / word_bits] << 1 | (b & DATA ? 1U : 0)",
         "line_good",
         "HOST-LINE-03",
         L,
     ),
     BrokenHost(
         "no_sign",
-        "(int32_t)word[0], (int32_t)word[1]",
+        "(int32_t)word[0] / last, (int32_t)word[1] / last",
         "(int32_t)(word[0] & 0xFFFFFF), (int32_t)(word[1] & 0xFFFFFF)",
         "line_good",
         "HOST-LINE-04",
@@ -39,16 +39,27 @@ BROKEN_LINES = (
         "line_under_way",
         "HOST-LINE-07",
         L,
-        also=("static int bits, listening,", "static int bits, listening = 1,"),
+        also=("code_bits = 24, bits, listening,", "code_bits = 24, bits, listening = 1,"),
     ),
-    BrokenHost("few_bits_taken", "bits == BITS && whole()", "bits >= BITS - 1", "line_missing", "HOST-TORN-01", L),
-    BrokenHost("many_bits_taken", "bits == BITS && whole()", "bits >= BITS", "line_extra", "HOST-TORN-02", L),
-    BrokenHost("pauses_unseen", "bits == BITS && whole()", "bits == BITS", "line_pauses", "HOST-TORN-03", L),
+    BrokenHost(
+        "few_bits_taken",
+        "bits == 4 * word_bits && whole()",
+        "bits >= 4 * word_bits - 1",
+        "line_missing",
+        "HOST-TORN-01",
+        L,
+    ),
+    BrokenHost(
+        "many_bits_taken", "bits == 4 * word_bits && whole()", "bits >= 4 * word_bits", "line_extra", "HOST-TORN-02", L
+    ),
+    BrokenHost(
+        "pauses_unseen", "bits == 4 * word_bits && whole()", "bits == 4 * word_bits", "line_pauses", "HOST-TORN-03", L
+    ),
     BrokenHost("empty_unseen", "if (!bits && now - fall < GLITCH)", "if (!bits)", "line_cut", "HOST-TORN-04", L),
     BrokenHost(
         "glitch_is_a_frame",
         "if (!bits && now - fall < GLITCH) return;",
-        "if (!bits) { on_frame(); return; }",
+        "if (!bits) { word[3] = 1U << 20, on_frame(); return; }",
         "line_glitch",
         "HOST-TORN-05",
         L,

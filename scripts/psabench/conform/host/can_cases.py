@@ -28,7 +28,7 @@ units:
       y: {{sensor: mems, u0_v: -1.25, kx_v_per_g: 0.25}}
       z: {{sensor: mems, u0_v: 0.7, kx_v_per_g: -1.0}}
 """
-SECOND_XY, SECOND_ZT = 0x180 + NODE, 0x280 + NODE
+XY, ZT = 0x180 + NODE, 0x280 + NODE
 
 
 def _nothing(s: Stage) -> None:
@@ -72,11 +72,17 @@ def _lost(s: Stage) -> None:
     s.run(0.1)
 
 
-def _torn(s: Stage) -> None:
-    for half in (SECOND_ZT, SECOND_XY, SECOND_ZT):
+def _hit(kind: str, halves: tuple[int, ...], frames: int = 1) -> Callable[[Stage], None]:
+    """That happens to the next frames with each of these identifiers in turn, a tenth of a second apart."""
+
+    def play(s: Stage) -> None:
+        for half in halves:
+            s.run(0.1)
+            s.run_to_quiet()
+            s.fault(kind, "a.can", frames=frames, can_id=half)
         s.run(0.1)
-        _drop(s, 1, can_id=half)
-    s.run(0.1)
+
+    return play
 
 
 def _mixed(s: Stage) -> None:
@@ -84,26 +90,10 @@ def _mixed(s: Stage) -> None:
     s.run(0.2)
     for _ in range(3):
         s.run_to_quiet()
-        s.fault("link.drop", "a.can", frames=1, can_id=SECOND_ZT)
+        s.fault("link.drop", "a.can", frames=1, can_id=ZT)
         s.run(0.0008)
-        s.fault("link.drop", "a.can", frames=1, can_id=SECOND_XY)
+        s.fault("link.drop", "a.can", frames=1, can_id=XY)
         s.run(0.1)
-
-
-def _order(s: Stage) -> None:
-    for half in (SECOND_ZT, SECOND_XY):
-        s.run(0.1)
-        s.run_to_quiet()
-        s.fault("link.reorder", "a.can", frames=1, can_id=half)
-    s.run(0.1)
-
-
-def _twice(s: Stage) -> None:
-    for half in (SECOND_ZT, SECOND_XY):
-        s.run(0.1)
-        s.run_to_quiet()
-        s.fault("link.duplicate", "a.can", frames=2, can_id=half)
-    s.run(0.1)
 
 
 def _delayed(s: Stage) -> None:
@@ -113,20 +103,12 @@ def _delayed(s: Stage) -> None:
     s.run(0.4)
 
 
-def _corrupt(s: Stage) -> None:
-    for half in (SECOND_ZT, SECOND_XY, SECOND_ZT, SECOND_XY):
-        s.run(0.1)
-        s.run_to_quiet()
-        s.fault("link.corrupt", "a.can", frames=1, can_id=half)
-    s.run(0.2)
-
-
 def _length(s: Stage) -> None:
     """Between two samples a frame that looks like a first half and is too short."""
     for _ in range(2):
         s.run(0.1)
         s.run_to_quiet()
-        s.put(f"{SECOND_XY:03X}#11223344556677")
+        s.put(f"{XY:03X}#11223344556677")
     s.run(0.1)
 
 
@@ -177,8 +159,8 @@ def _flags(s: Stage) -> None:
     for _ in range(3):
         t_ns = s.control.call("run.until", event="DRD_A").t_ns
         seq = round(t_ns * 1e-6 - FIRST_MS) & 0xFFFF
-        s.put(f"{SECOND_XY:03X}#112200332200{seq.to_bytes(2, 'little').hex().upper()}")
-        s.put(f"{SECOND_ZT:03X}#443300102705{(t_ns // 4000 & 0xFFFF).to_bytes(2, 'little').hex().upper()}")
+        s.put(f"{XY:03X}#112200332200{seq.to_bytes(2, 'little').hex().upper()}")
+        s.put(f"{ZT:03X}#443300102705{(t_ns // 4000 & 0xFFFF).to_bytes(2, 'little').hex().upper()}")
         s.run(0.0005)
     s.run_to_quiet()
     s.put(f"000#01{NODE:02X}")
@@ -280,12 +262,16 @@ CASES: Mapping[str, Case] = {
         Case(name="power_on", title="a board at power-on", play=lambda s: s.run(0.2)),
         Case(name="slow", title="answers that take 0.6 s", before=_with_slow_answers, play=lambda s: s.run(0.1)),
         Case(name="lost", title="1, 2 and 1000 samples are lost", play=_lost),
-        Case(name="torn", title="halves of samples are lost", play=_torn),
+        Case(name="torn", title="halves of samples are lost", play=_hit("link.drop", (ZT, XY, ZT))),
         Case(name="mixed", title="the second half of a sample and the first of the next are lost", play=_mixed),
-        Case(name="order", title="halves come in another order", play=_order),
-        Case(name="twice", title="halves come twice", play=_twice),
+        Case(name="order", title="halves come in another order", play=_hit("link.reorder", (ZT, XY))),
+        Case(name="twice", title="halves come twice", play=_hit("link.duplicate", (ZT, XY), frames=2)),
         Case(name="delayed", title="frames come 30 ms late", play=_delayed),
-        Case(name="corrupt", title="a bit of a frame is wrong and nobody notices", play=_corrupt),
+        Case(
+            name="corrupt",
+            title="a bit of a frame is wrong and nobody notices",
+            play=_hit("link.corrupt", (ZT, XY, ZT, XY)),
+        ),
         Case(name="length", title="a PSA2_XY of 7 bytes", play=_length),
         Case(name="others", title="frames of another node, error frames, off the bus and back", play=_others),
         Case(name="over_range", title="each axis at 9.9 V and beyond the range, both ways", play=_over_range),

@@ -71,6 +71,7 @@ class HostEvidence:
     case: str
     bus: Bus
     told: Told
+    profile: str = "article"  # of the board that is played
     status: int | None = 0  # the host's exit status; None: it had to be ended
     marks: Mapping[str, float] = field(default_factory=dict)  # instants of the case, simulated s
     stood_s: float = 0.0  # longest that the stage has stood still against the wall's time
@@ -143,15 +144,15 @@ class Judged:
     ids: tuple[str, ...]
 
 
-_cases: dict[Judge, str] = {}
+_cases: dict[Judge, tuple[str, ...]] = {}
 _judged: list[Judged] = []
 
 
-def judges(case: str) -> Callable[[Test], Test]:
-    """The case whose evidence a test wants."""
+def judges(*cases: str) -> Callable[[Test], Test]:
+    """The cases whose evidence a test wants; it judges each by itself."""
 
     def register(test: Test) -> Test:
-        _cases[test] = case
+        _cases[test] = cases
         return test
 
     return register
@@ -163,7 +164,7 @@ def proves(*ids: str) -> Callable[[Test], Test]:
         raise ValueError(f"proves: no requirement {', '.join(unknown)}")
 
     def register(test: Test) -> Test:
-        _judged.append(Judged(test, _cases[test], ids))
+        _judged.extend(Judged(test, case, ids) for case in _cases[test])
         return test
 
     return register

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import select
 import time
@@ -10,10 +11,13 @@ from collections.abc import Iterable
 from pathlib import Path
 from types import TracebackType
 
-from psabench.conform.host.stage import COME_S, STUCK_S, ByHand, Program, drain
+from psabench.conform.host.stage import COME_S, STUCK_S, ByHand, Program
 from psabench.errors import TimeOut
+from psabench.lineport import INT
 
 HELD = 1 << 17  # bytes: more than the kernel keeps of what nobody reads
+# Rest of the line, 16 ms: when it has been taken, all before it has been read; its own end may be lost.
+TAIL = bytes([INT]) * HELD
 
 
 class LinePort:
@@ -28,7 +32,7 @@ class LinePort:
     def play(self, blocks: Iterable[bytes], host: Program | ByHand) -> None:
         """Raises TimeOut when the host does not read at all; one that reads no more is ended."""
         written = 0
-        for block in blocks:
+        for block in itertools.chain(blocks, [TAIL]):
             left = memoryview(block)
             while left:
                 if not self._room(host, STUCK_S if written > HELD else COME_S):
@@ -38,7 +42,6 @@ class LinePort:
                     return
                 n = os.write(self._ours, left)
                 left, written = left[n:], written + n
-        drain(self.path)
 
     def _room(self, host: Program | ByHand, patience_s: float) -> bool:
         deadline_s = time.monotonic() + patience_s

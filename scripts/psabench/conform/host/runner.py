@@ -13,6 +13,7 @@ from psabench.conform.host.can_cases import CASES, NODE, SCENARIO, Case
 from psabench.conform.host.judge import HostEvidence, Judged, Unseen, judged
 from psabench.conform.host.line_cases import LINE_CASES, LineCase, samples
 from psabench.conform.host.line_stage import LinePort
+from psabench.conform.host.line_waves import form_of
 from psabench.conform.host.played import Bus, read_log
 from psabench.conform.host.stage import ByHand, Program, Stage, drain, expand
 from psabench.conform.outcome import Broken, Outcome, TooLittle, Verdict
@@ -100,13 +101,25 @@ def on_line(play: Play, case: LineCase) -> HostEvidence:
     """Samples on a pseudo-terminal of ours."""
     with ExitStack() as stack:
         port = stack.enter_context(LinePort())
-        host = _host(play, case.name, case.title, {"line": str(port.path)})
+        host = _host(play, case.name, case.title, {"line": str(port.path), **_form(play.profile)})
         stack.callback(host.kill)
         host.start()
-        port.play((block.tobytes() for block in samples(case)), host)
+        port.play((block.tobytes() for block in samples(case, form_of(play.profile))), host)
         port.close()
         status = host.wait()
-        return HostEvidence(case=case.name, bus=Bus([], NODE), told=host.told(), status=status, errors=_errors(host))
+        return HostEvidence(
+            case=case.name,
+            bus=Bus([], NODE),
+            told=host.told(),
+            profile=play.profile,
+            status=status,
+            errors=_errors(host),
+        )
+
+
+def _form(profile: str) -> dict[str, str]:
+    form = form_of(profile)
+    return {"word_bits": str(form.word_bits), "code_bits": str(form.code_bits)}
 
 
 def on_can(play: Play, case: Case) -> HostEvidence:
@@ -143,7 +156,9 @@ def _perform(play: Play, case: Case, scenario: Path, log: Path) -> tuple[int | N
         if streamed:
             case.play(stage)
         if play.link == "pty":
+            begun_s = time.monotonic()
             drain(Path(emulator.endpoint(can="slcan")["pty"]))
+            stage.stood_s = max(stage.stood_s, time.monotonic() - begun_s)
         control.close()
         emulator.stop()
         return host.wait(), stage, streamed

@@ -33,7 +33,8 @@ COME_S = 60.0  # patience for a host to come: it may have to be started by hand,
 STUCK_S = 30.0  # patience for a host that reads nothing
 END_S = 20.0  # patience for a host to end after its link has ended
 READY_S = 3.0  # simulated, for a host to start the stream
-PLACES = ("can", "pty", "line", "node", "results")
+EMPTY_LOOKS = 10  # at a pseudo-terminal, one after the other, 10 ms apart, until it has been read
+PLACES = ("can", "pty", "line", "bus", "node", "results", "word_bits", "code_bits")
 
 
 def expand(command: str, places: Mapping[str, str]) -> list[str]:
@@ -210,7 +211,9 @@ def drain(pty: Path) -> None:
     port = os.open(pty, os.O_RDONLY | os.O_NOCTTY | os.O_NONBLOCK)
     try:
         empty, deadline_s = 0, time.monotonic() + END_S
-        while empty < 3 and time.monotonic() < deadline_s:  # what is on its way through the kernel comes meanwhile
+        while (
+            empty < EMPTY_LOOKS and time.monotonic() < deadline_s
+        ):  # what is on its way through the kernel comes meanwhile
             held = struct.unpack("i", fcntl.ioctl(port, termios.FIONREAD, b"\0\0\0\0"))[0]
             empty = 0 if held else empty + 1
             time.sleep(0.01)
