@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import re
 import signal
@@ -14,11 +15,12 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from html import escape
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
-from psabench.campaign import chains, claims, command, emulated, page, runner, workers
+from psabench.campaign import chains, claims, command, emulated, page, report, runner, workers
 from psabench.campaign.cases import STUDIES, Case
 from psabench.campaign.chains import CHAINS, Wanted
 from psabench.campaign.claims import Figures, HoldFigures
@@ -193,6 +195,20 @@ def test_a_cluster_that_is_not_there_is_told_in_one_line(tmp_path: Path, monkeyp
         command.campaign(Options(case="R0", dask="tcp://127.0.0.1:9", out=tmp_path), QUIET)
     with pytest.raises(LinkError, match=r"--dask nonsense://: no Dask scheduler answers there"):
         command.campaign(Options(case="R0", dask="nonsense://", out=tmp_path), QUIET)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_wrong_address_is_told_where_nothing_is_missing_and_nothing_is_forgotten(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(workers, "CONNECT_S", 0.5)
+    done = Options(case="R0", runs=100, workers=1, out=tmp_path)
+    command.campaign(done, QUIET)
+    for fresh in (False, True):
+        with pytest.raises(LinkError, match=r"--dask tcp://127.0.0.1:9: no Dask scheduler answers there"):
+            command.campaign(replace(done, workers=None, dask="tcp://127.0.0.1:9", fresh=fresh), QUIET)
+        with Store(tmp_path / "store.sqlite") as store:
+            assert [store.runs(o) for o in store.origins()] == [{0: 100}]
 
 
 def test_a_cluster_with_another_psabench_is_refused(
@@ -319,6 +335,9 @@ def test_figures_of_a_table_worked_by_hand() -> None:
     assert f.drift.rms == pytest.approx(1.0)
     h = HoldFigures.of(np.array([[0.1, 0.3], [-0.2, 0.31], [0.0, 0.6]], CELL))
     assert list(h.within.values()) == pytest.approx([1 / 3, 2 / 3])
+    assert f.doubted is None
+    doubts = np.array([[0, 0, 1, 0, 2], [0, 0, 1, 0, 0], [nan] * 5, [0, 0, 1, 0, 1]], CELL)
+    assert (Figures.of(doubts).refused, Figures.of(doubts).doubted) == (1, 2)
     none = Figures.of(np.full((2, 4), nan, CELL))
     assert (none.refused, none.within_claim) == (2, 0.0)
     assert np.isnan(none.heading.p95)
@@ -338,9 +357,41 @@ def test_a_run_through_the_wire_without_a_heading_is_counted_as_refused(
     assert (f.runs, f.refused) == (3, 3)
     assert found.refusals == {"the platform was not level after 60 s: it never settles": 3}
     assert not found.within  # nothing came that could be compared
-    page.write(tmp_path, found)
+    text = page.write(tmp_path, found).read_text(encoding="utf-8")
+    assert "<p>article: of 3 runs 3 without a heading, 0 in doubt.</p>" in text
+    assert "<th>no heading, 3 runs</th><td>the platform was not level after 60 s: it never settles</td>" in text
     result = json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))
     assert result["agreements"][0]["p"] is None
+    assert list(result["no_heading"].values()) == [3]
+
+
+def test_doubts_of_the_procedure_are_counted_and_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every other instrument, by its heading, is in doubt; of two reasons each counts by itself."""
+
+    def result(_: object, __: object, ___: object, at: emulated.Instrument) -> SimpleNamespace:
+        doubts = ("S still runs", "the vehicle turned") if at.heading_deg > 0.0 else ()
+        compass = SimpleNamespace(drift1_radps=1e-4, quality=0.001)
+        return SimpleNamespace(heading_rad=math.radians(at.heading_deg), compass=compass, doubts=doubts)
+
+    monkeypatch.setattr(emulated, "_result", result)
+    found = command.campaign(Options(case="article", chain="emulated", runs=30, workers=1, out=tmp_path), QUIET)
+    (case,) = found.cases
+    seed = chains._seed(Wanted(chain="emulated", setup=case.setup, hold=None, seed=1, first_run=0, runs=1))
+    east = sum(emulated.instrument(case.setup, seed, k).heading_deg > 0.0 for k in range(30))
+    (f,) = found.found.values()
+    assert isinstance(f, Figures)
+    assert (f.refused, f.doubted) == (0, east)
+    assert found.doubts == dict.fromkeys(("S still runs", "the vehicle turned"), min(east, report.REASONS_TOLD))
+    text = "\n".join(page.console(found))
+    assert f"article: of 30 runs 0 without a heading, {east} in doubt\n" in text
+    assert f"in doubt, {east} runs: the vehicle turned" in text
+    assert f"<th>in doubt, {east} runs</th><td>S still runs</td>" in page.html_page(found)
+
+
+def test_the_algebra_has_no_doubts_to_count(tmp_path: Path) -> None:
+    found = command.campaign(Options(case="R0", runs=100, out=tmp_path), QUIET)
+    assert "in doubt" not in "\n".join(page.console(found))
+    assert "in doubt" not in page.html_page(found)
 
 
 def test_a_hold_is_for_chains_that_have_it() -> None:

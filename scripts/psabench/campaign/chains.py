@@ -26,6 +26,7 @@ from psabench.navlib import library
 from psabench.store import CELL, Origin, Part, Rows
 
 ERRORS = ("platform_error_deg", "heading_error_deg", "drift_error_degph", "quality")
+DOUBTS = "doubts"  # how many the host's procedure has of a run; the algebra has none to tell
 HELD = ("end_error_deg", "largest_error_deg")
 KMPH_MPS = 1.0 / 3.6
 KS_P = 0.01  # of two chains that agree, one comparison of a hundred lies below
@@ -70,7 +71,7 @@ def origin(chain: str, setup: Setup, hold: Hold | None, seed: int) -> Origin:
         seed=seed,
         version=CHAINS[chain].version(),
         build=CHAINS[chain].build(),
-        columns=ERRORS if hold is None else HELD,
+        columns=HELD if hold is not None else (*ERRORS, DOUBTS) if CHAINS[chain].emulates else ERRORS,
     )
 
 
@@ -86,12 +87,12 @@ def _rows(w: Wanted) -> Rows:
         raise BadInput(f"{w.origin.kind}: {e}") from None
 
 
-def refusals(w: Wanted, runs: Sequence[int]) -> Mapping[str, int]:
-    """Why these runs have no heading, and how many each: they are run again, which is the same each time."""
+def reasons(w: Wanted, runs: Sequence[int]) -> Mapping[str, int]:
+    """Why these runs have no heading, or one in doubt, and how many each: they are run again, the same each time."""
     from psabench.campaign import emulated
 
     platforms = emulated.live if w.chain == "wire" else emulated.recorded()
-    return Counter(emulated.why(platforms, w.setup, _seed(w), k) for k in runs)
+    return Counter(words for k in runs for words in emulated.why(platforms, w.setup, _seed(w), k))
 
 
 def _computed(w: Wanted) -> Rows:

@@ -49,6 +49,7 @@ class Figures:
 
     runs: int
     refused: int  # runs that gave no heading
+    doubted: int | None  # runs whose heading the procedure itself doubts; None: the chain has no procedure
     platform: Spread
     heading: Spread
     drift: Spread
@@ -64,6 +65,7 @@ class Figures:
         return Figures(
             runs=len(rows),
             refused=int(np.count_nonzero(~ok)),
+            doubted=int(np.count_nonzero(rows[ok, 4])) if rows.shape[1] > 4 else None,
             platform=Spread.of(platform),
             heading=Spread.of(heading),
             drift=Spread.of(drift),

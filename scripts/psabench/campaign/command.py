@@ -14,7 +14,7 @@ from psabench.campaign import builds, chains, runner, settings
 from psabench.campaign.cases import DEFAULT_STUDIES, STUDIES, WIRE_STUDIES, Case
 from psabench.campaign.runner import Plan
 from psabench.campaign.setup import Setup
-from psabench.campaign.workers import workers
+from psabench.campaign.workers import reach, workers
 from psabench.errors import BadInput
 from psabench.procedures.head_bench import Progress
 from psabench.progress import Bar
@@ -177,6 +177,8 @@ def campaign(options: Options, progress: Progress) -> Campaign:
     from psabench.campaign import report
 
     plans = _plans(options)
+    if options.dask is not None:
+        reach(options.dask)  # first: the store may have all that is wanted, and --fresh forgets what it has
     with Store(options.store or options.out / "store.sqlite") as store:
         for plan in plans:
             _fill(plan, store, options, progress)

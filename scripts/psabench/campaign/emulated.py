@@ -238,19 +238,18 @@ def live(s: Scenario) -> Iterator[PlatformBench]:
 
 
 def runs(platforms: Platforms, setup: Setup, seed: int, first_run: int, count: int) -> Rows:
-    """Errors of the runs. The platform's own in position 1, which the wire does not tell, is NaN; so is a run without
-    a heading."""
+    """Errors of the runs, and how many doubts the procedure has. The platform's own in position 1, which the wire does
+    not tell, is NaN; so is a run without a heading."""
     p = params(setup)
     return np.stack([_errors(platforms, setup, p, seed, first_run + k) for k in range(count)]).astype(CELL)
 
 
-def why(platforms: Platforms, setup: Setup, seed: int, run: int) -> str:
-    """Why a run has no heading; "": it has one."""
+def why(platforms: Platforms, setup: Setup, seed: int, run: int) -> tuple[str, ...]:
+    """Why a run has no heading, or what makes its heading doubtful; (): nothing does."""
     try:
-        _result(platforms, setup, params(setup), instrument(setup, seed, run))
+        return _result(platforms, setup, params(setup), instrument(setup, seed, run)).doubts
     except (LinkError, DeviceError) as e:
-        return str(e)
-    return ""
+        return (str(e),)
 
 
 def _result(platforms: Platforms, setup: Setup, p: GyrocompassParams, at: Instrument) -> gyrocompass.GyrocompassResult:
@@ -266,7 +265,8 @@ def _errors(platforms: Platforms, setup: Setup, p: GyrocompassParams, seed: int,
     try:
         r = _result(platforms, setup, p, at)
     except (LinkError, DeviceError):  # `why` tells
-        return [math.nan] * 4
+        return [math.nan] * 5
     heading = wrapped_deg(math.degrees(r.heading_rad) - at.heading_deg)
     # As alpha, counter-clockwise, like the errors of the other chains.
-    return [math.nan, -heading, r.compass.drift1_radps / DEGPH - setup.drift_degph, r.compass.quality]
+    drift_degph = r.compass.drift1_radps / DEGPH - setup.drift_degph
+    return [math.nan, -heading, drift_degph, r.compass.quality, float(len(r.doubts))]

@@ -56,9 +56,9 @@ class Campaign:
     checks: Sequence[Check]
     agreements: Sequence[Agreement]
     distribution: str  # SVG, empty without the readings
-    refusals: Mapping[str, int] = field(
-        default_factory=dict
-    )  # why runs gave no heading, and how many: of the first ones
+    # Of the first runs of each case that gave no heading, and that gave one in doubt: why, and how many runs each.
+    refusals: Mapping[str, int] = field(default_factory=dict)
+    doubts: Mapping[str, int] = field(default_factory=dict)
 
     @property
     def within(self) -> bool:
@@ -135,6 +135,8 @@ def result_dict(c: Campaign) -> dict[str, Any]:
             )
             for a in c.agreements
         ],
+        "no_heading": dict(c.refusals),
+        "in_doubt": dict(c.doubts),
         "cases": [_case_dict(case, c.found[case.study, case.name]) for case in c.cases],
     }
 
@@ -194,8 +196,9 @@ def console(c: Campaign) -> Iterator[str]:
         runs = f"{a.runs} and {a.reference_runs} runs"
         rms = f"rms {a.rms_deg:.4f} and {a.reference_rms_deg:.4f} deg"
         yield f"{a.case.name}, {a.chain} beside closed: {rms}, KS {a.statistic:.4f}, p {a.p:.3f} ({runs})"
-    for reason, count in c.refusals.items():
-        yield f"no heading, {count} {'run' if count == 1 else 'runs'}: {reason}"
+    yield from _failures(c)
+    for what, words in _reasons(c):
+        yield f"{what}: {words}"
     for x in c.claims:
         yield f"{x.says}: {x.verdict}"
         yield f"  reading   {x.reading}"
@@ -204,6 +207,24 @@ def console(c: Campaign) -> Iterator[str]:
     for check in c.checks:
         if not check.within:
             yield f"out of limits: {check.what}: {check.value:.4g}, wanted {check.low:.4g} to {check.high:.4g}"
+
+
+def _failures(c: Campaign) -> Iterator[str]:
+    """A line a case whose host may have doubts."""
+    for case in c.cases:
+        f = c.found[case.study, case.name]
+        if isinstance(f, Figures) and f.doubted is not None:
+            yield f"{case.name}: of {_runs(f.runs)} {f.refused} without a heading, {f.doubted} in doubt"
+
+
+def _reasons(c: Campaign) -> list[tuple[str, str]]:
+    """What became of how many of the first such runs, and why."""
+    told = (("no heading", c.refusals), ("in doubt", c.doubts))
+    return [(f"{what}, {_runs(count)}", words) for what, found in told for words, count in found.items()]
+
+
+def _runs(count: int) -> str:
+    return f"{count} {'run' if count == 1 else 'runs'}"
 
 
 def _too_large(c: Campaign, study: Study) -> Iterator[str]:
@@ -234,6 +255,7 @@ def html_page(c: Campaign) -> str:
         _agreements(c),
         _distribution(c),
         *(_study(c, s) for s in _studies(c)),
+        _failed(c),
         _checks(c),
     ]
     return PAGE.replace("<title>Accelerometer calibration</title>", f"<title>{TITLE}</title>").replace(
@@ -295,6 +317,13 @@ def picture(c: Campaign, study: Study) -> str:
     if held:
         return plots.held(cases, held)
     return plots.scan(study, cases, compass) if study.axis else plots.bars(study.name, cases, compass)
+
+
+def _failed(c: Campaign) -> str:
+    """Runs without a heading, and headings that the host's procedure doubts."""
+    cases = "".join(f"<p>{escape(line)}.</p>" for line in _failures(c))
+    reasons = _html_table([["first runs", "why"]], _reasons(c), numbers=False) if _reasons(c) else ""
+    return f"<section><h2>No heading, or one in doubt</h2>{cases}{reasons}</section>" if cases else ""
 
 
 def _checks(c: Campaign) -> str:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
+import numpy.typing as npt
 
 from psabench.campaign import builds, chains, page, plots
 from psabench.campaign.cases import STUDIES
@@ -16,7 +17,7 @@ from psabench.campaign.runner import Plan
 from psabench.campaign.setup import Setup
 from psabench.store import Rows, Store
 
-REFUSALS_TOLD = 20  # of a case: each is run again for its reason
+REASONS_TOLD = 20  # runs of a case: each is run again for its words
 SHOWN = ("R0", "R5n", "R11+", "improved")  # of the readings, in the picture of distributions
 
 
@@ -40,17 +41,18 @@ def gather(plans: Sequence[Plan], store: Store) -> Campaign:
         checks=checks(found) if usual else [],
         agreements=_agreements(plans, store),
         distribution=plots.distribution(curves) if curves else "",
-        refusals=_refusals(plan, store) if CHAINS[plan.chain].emulates else {},
+        refusals=_reasons(plan, store, lambda rows: ~np.isfinite(rows[:, 1])),
+        doubts=_reasons(plan, store, lambda rows: rows[:, 4] > 0.0),
     )
 
 
-def _refusals(plan: Plan, store: Store) -> dict[str, int]:
-    """Of the first runs of each case without a heading."""
+def _reasons(plan: Plan, store: Store, chosen: Callable[[Rows], npt.NDArray[np.bool_]]) -> dict[str, int]:
+    """In words, with how many runs each: of the first runs of each case that are chosen."""
     found = Counter[str]()
-    for case in plan.cases:
-        failed = np.flatnonzero(~np.isfinite(plan.rows(store, case)[:, 1]))[:REFUSALS_TOLD].tolist()
+    for case in plan.cases if CHAINS[plan.chain].emulates else ():
+        runs = np.flatnonzero(chosen(plan.rows(store, case)))[:REASONS_TOLD].tolist()
         wanted = Wanted(chain=plan.chain, setup=case.setup, hold=None, seed=plan.seed, first_run=0, runs=0)
-        found.update(chains.refusals(wanted, failed))
+        found.update(chains.reasons(wanted, runs))
     return dict(found.most_common())
 
 

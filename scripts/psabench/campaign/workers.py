@@ -127,16 +127,28 @@ def _no_interrupt_for_children() -> Iterator[None]:
 
 @contextmanager
 def _cluster_at(address: str, chain: str) -> Iterator[Workers]:
-    distributed = _distributed()
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    reach(address)  # a Client that finds nobody does not end quietly
     try:
-        asyncio.run(_answer(distributed, address))  # a Client that finds nobody does not end quietly
-        client = distributed.Client(address, timeout=CONNECT_S)
-    except (OSError, ValueError) as e:
-        raise LinkError(f"--dask {address}: no Dask scheduler answers there ({e or type(e).__name__})") from e
+        client = _distributed().Client(address, timeout=CONNECT_S)
+    except OSError as e:
+        raise _nobody(address, e) from e
     with client:
         _same_psabench(client, address, chain)
         yield Dask(client)
+
+
+def reach(address: str) -> None:
+    """Raises LinkError where no Dask scheduler answers."""
+    distributed = _distributed()
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    try:
+        asyncio.run(_answer(distributed, address))
+    except (OSError, ValueError) as e:
+        raise _nobody(address, e) from e
+
+
+def _nobody(address: str, e: Exception) -> LinkError:
+    return LinkError(f"--dask {address}: no Dask scheduler answers there ({e or type(e).__name__})")
 
 
 async def _answer(distributed: Any, address: str) -> None:
