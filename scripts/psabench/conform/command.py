@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ from psabench.conform.subject import INPUTS_V, Addresses, Subject
 from psabench.conform.variant import Variant, variant
 from psabench.errors import BadInput
 from psabench.lineport import SAMPLE_HZ
+from psabench.procedures.head_bench import Progress
 from psabench.progress import Bar
 
 OUT = Path("build/conform")
@@ -121,30 +122,52 @@ def list_requirements(args: argparse.Namespace) -> int:
 def device(args: argparse.Namespace) -> int:
     """Handler of `conform device`."""
     v = variant(args.board, args.profile)
-    rows = [r for r in _rows(v) if not args.only or r.id.startswith(tuple(args.only))]
-    if not rows:
-        raise BadInput(
-            f"--only {' '.join(args.only)}: no requirement of {v.name} begins so; psabench conform list has them"
-        )
-    suite.load()
     folder = args.out or OUT / f"{v.board}-{v.profile}"
+    run = device_run(
+        v,
+        _addresses(args),
+        folder,
+        Bar(),
+        only=args.only,
+        seed=args.seed,
+        clock_error=args.clock_error,
+        clock_ppm=args.clock_ppm,
+    )
+    return _told(run, folder, everything=args.verbose)
+
+
+def device_run(
+    v: Variant,
+    at: Addresses,
+    folder: Path,
+    progress: Progress,
+    *,
+    only: Sequence[str] = (),
+    seed: int = 1,
+    clock_error: float = 0.0,
+    clock_ppm: float = 100.0,
+) -> report.Run:
+    """Judge a board; what shows a failure goes into the folder. Ctrl-C ends it, and what was judged stays.
+
+    clock_error: ppm by which the clocks of an emulator that is started are fast. Raises BadInput where `only` selects
+    nothing, LinkError or BenchError where the board cannot be reached.
+    """
+    rows = [r for r in _rows(v) if not only or r.id.startswith(tuple(only))]
+    if not rows:
+        raise BadInput(f"--only {' '.join(only)}: no requirement of {v.name} begins so; psabench conform list has them")
+    suite.load()
     outcomes: list[Outcome] = []
     interrupted = False
-    with Subject.open(v, _addresses(args), seed=args.seed, clock_ppm=args.clock_error) as subject:
+    with Subject.open(v, at, seed=seed, clock_ppm=clock_error) as subject:
         facts = identity.subject_facts(subject) | identity.suite_facts()
+        keep = Exhibits(folder).keep
         try:
-            runner.run(
-                subject,
-                Bar(),
-                only=args.only,
-                clock_ppm=args.clock_ppm,
-                told=outcomes.append,
-                keep=Exhibits(folder).keep,
-            )
+            runner.run(subject, progress, only=only, clock_ppm=clock_ppm, told=outcomes.append, keep=keep)
         except KeyboardInterrupt:
             interrupted = True
-    run = report.Run(suite="device", subject=v.name, facts=facts, outcomes=outcomes, rows=rows, interrupted=interrupted)
-    return _told(run, folder, everything=args.verbose)
+    return report.Run(
+        suite="device", subject=v.name, facts=facts, outcomes=outcomes, rows=rows, interrupted=interrupted
+    )
 
 
 def _told(run: report.Run, folder: Path, *, everything: bool) -> int:

@@ -11,7 +11,7 @@ from importlib.metadata import version
 from psabench.conform.requirements import INDEX, requirements
 from psabench.conform.subject import Subject
 from psabench.errors import BenchError
-from psabench.places import proto_file
+from psabench.places import find_emulator, proto_file
 
 # Objects of CiA 301 that name a device: what a report calls them.
 OBJECTS: Mapping[str, tuple[int, int]] = {
@@ -47,4 +47,6 @@ def subject_facts(s: Subject) -> dict[str, str]:
             found[name] = str(s.unit.node.read(index, sub))
     found["node"] = str(s.node)
     found["probes"] = ", ".join(sorted(s.probes))
+    if s.bench.emulator is not None:
+        found["emulator"] = f"psa-emu, {hashlib.sha256(find_emulator().read_bytes()).hexdigest()[:16]}"
     return found

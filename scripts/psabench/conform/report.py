@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -61,10 +62,13 @@ _BADNESS = (
 
 
 def lines(run: Run, *, everything: bool = False) -> Iterator[str]:
-    """For the terminal: what is not passed (or everything), then the sum."""
+    """For the terminal: what is not passed (or everything), why requirements of a board were not seen, the sum."""
     for o in run.outcomes:
         if everything or o.verdict in (Verdict.FAILED, Verdict.INCONCLUSIVE):
             yield from told(o)
+    if run.suite != "host":  # whose cases want what a program says it can, not a probe
+        for reason, count in unseen(run).items():
+            yield f"{count:3} not observable: {reason}"
     yield summary(run)
 
 
@@ -94,6 +98,14 @@ def summary(run: Run) -> str:
         return f"{run.subject}: interrupted; of {len(verdicts)} requirements {counts}"
     said = "conforms" if run.conforms else "does not conform"
     return f"{run.subject} {said}: of {len(verdicts)} requirements {counts}"
+
+
+def unseen(run: Run) -> dict[str, int]:
+    """Why requirements are not observable, and how many: what no wire shows first, then probe by probe."""
+    because = {i: o.reason for o in run.outcomes if o.verdict is Verdict.NOT_OBSERVABLE for i in o.requirements}
+    nobody = "nobody sees it on the wires of any board"
+    reasons = [because.get(i, nobody) for i, v in run.verdicts().items() if v is Verdict.NOT_OBSERVABLE]
+    return dict(sorted(Counter(reasons).items(), key=lambda found: (found[0] != nobody, -found[1], found[0])))
 
 
 def write(folder: Path, run: Run) -> Path:

@@ -40,9 +40,12 @@ def page(run: Run, folder: Path) -> str:
 
 
 def _verdict(run: Run) -> str:
-    from psabench.conform.report import summary
+    from psabench.conform.report import summary, unseen
 
-    return f"<p class='verdict {'good' if run.conforms else 'bad'}'>{escape(summary(run))}</p>"
+    why = "".join(f"<li>{count} not observable: {escape(reason)}</li>" for reason, count in unseen(run).items())
+    return (
+        f"<p class='verdict {'good' if run.conforms else 'bad'}'>{escape(summary(run))}</p><ul class=small>{why}</ul>"
+    )
 
 
 def _failure(o: Outcome, folder: Path) -> str:
