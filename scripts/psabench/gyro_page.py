@@ -12,7 +12,7 @@ import numpy as np
 from psabench import gyro_grading as grading
 from psabench.angles import wrapped_deg
 from psabench.gyro_grading import GyroSection
-from psabench.nav import DEGPH, EARTH_RADPS
+from psabench.nav import DEGPH
 from psabench.procedures.result import DEG
 from psabench.report_page import PAGE
 from psabench.whole_file import replace_file
@@ -137,7 +137,7 @@ def rates_figure(s: GyroSection) -> object:
     from psabench import report_plots as plots
 
     r, p = s.result, s.result.params
-    we = EARTH_RADPS * np.cos(p.latitude_rad) / DEGPH
+    we_degph = p.we_radps / DEGPH
     alpha = wrapped_deg(np.array([(r.compass.alpha1_rad + row.position.delta_rad) * DEG for row in r.rows]))
     rate = np.array([row.position.s_radps / DEGPH for row in r.rows])
     left = np.array([row.residual_radps / DEGPH for row in r.rows])
@@ -145,7 +145,7 @@ def rates_figure(s: GyroSection) -> object:
     with matplotlib.rc_context(plots.STYLE):
         figure = Figure(figsize=(7.4, 4.4), layout="constrained")
         top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=[3, 1.4])
-        top.plot(x, r.compass.drift1_radps / DEGPH + we * np.sin(np.radians(x)), color=plots.MUTED, lw=1.0)
+        top.plot(x, r.compass.drift1_radps / DEGPH + we_degph * np.sin(np.radians(x)), color=plots.MUTED, lw=1.0)
         top.axhline(r.compass.drift1_radps / DEGPH, color=plots.SERIES[1], lw=0.9, ls="--", label="drift")
         top.plot(alpha, rate, "o", color=plots.SERIES[0], ms=4.5, label="position")
         bottom.plot(alpha, left, "o", color=plots.SERIES[0], ms=4.0)

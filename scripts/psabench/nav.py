@@ -29,6 +29,7 @@ from psabench.navlib import (
 )
 
 EARTH_RADPS = 7.292115e-5  # WGS 84: sources 5.1
+LATITUDE_LIMIT_RAD = math.radians(85.0)  # beyond it the library refuses
 EARTH_RADIUS_M = 6371e3  # of the sphere that transport rates are over, as nav_transport_radps() has it
 DEGPH = math.radians(1.0) / 3600.0  # 1 deg/h in rad/s
 ARCMIN = math.radians(1.0 / 60.0)  # 1' in rad

@@ -29,6 +29,7 @@ def good() -> list[Position]:
         ([replace(p, delta_rad=0.3 * DEG * i) for i, p in enumerate(good())], {}, Status.COINCIDENT, "coincide"),
         (good(), {"latitude_rad": 90 * DEG}, Status.LATITUDE, "85 degrees"),
         (good(), {"latitude_rad": -85.1 * DEG}, Status.LATITUDE, "85 degrees"),
+        (good(), {"latitude_rad": math.nextafter(nav.LATITUDE_LIMIT_RAD, 2.0)}, Status.LATITUDE, "85 degrees"),
         (good(), {"latitude_rad": math.nan}, Status.NOT_FINITE, "not finite"),
         ([replace(p, gamma_rad=math.inf) for p in good()], {}, Status.NOT_FINITE, "not finite"),
         ([replace(p, gamma_rad=1.0) for p in good()], {}, Status.RANGE, "gamma_rad of position 1 is 1; want a tilt"),
@@ -45,6 +46,11 @@ def test_what_cannot_be_answered_is_refused_in_words(
         nav.gyrocompass(rows, **({"latitude_rad": 50 * DEG} | options))  # type: ignore[arg-type]
     assert refused.value.status is status
     assert isinstance(refused.value, BadInput)
+
+
+def test_the_highest_latitude_is_taken() -> None:
+    rows = positions(nav.LATITUDE_LIMIT_RAD, 0.5, np.arange(4) * 90 * DEG)
+    assert nav.gyrocompass(rows, latitude_rad=nav.LATITUDE_LIMIT_RAD).alpha1_rad == pytest.approx(0.5)
 
 
 def test_the_other_functions_refuse_too() -> None:

@@ -279,11 +279,8 @@ def _hold(base: Setup) -> Iterator[Case]:
         ("R11, azimuth axis' drift differs by 1 deg/h", averaged, Hold(axis2="differs", axis2_sd_degph=1.0)),
         ("R11, azimuth axis' drift measured", averaged, Hold(axis2="measured")),
     )
-    for (
-        title,
-        change,
-        hold,
-    ) in rows:  # with the signs as given, 6' of the angle and 10' of the level would cancel for hours
+    for title, change, hold in rows:
+        # With the signs as given, 6' of the angle and 10' of the level would cancel for hours.
         setup = _with(base, {"random_sign": True, **change})
         yield Case(study="hold", name=title, title=title, setup=setup, hold=hold)
 

@@ -61,9 +61,8 @@ class Setup:
     angle_sys_arcmin: float = 6.0  # of the set angle
     angle_sys: str = "common"  # how those 6' are read
     angle_random_arcmin: float = 3.0  # of the set angle, or of the encoder's reading
-    encoder: bool = (
-        False  # through the wire: the encoder is read instead of the set angle trusted; the algebra is the same
-    )
+    # Through the wire: the encoder is read instead of the set angle trusted; the algebra is the same.
+    encoder: bool = False
     random_sign: bool = False  # of systematic errors
     per_sample: bool = False  # random errors are drawn a sample and average, instead of once a position
     white_degph_rts: float = 0.0  # white noise of S besides, deg/h sqrt(s)
@@ -89,9 +88,8 @@ class Hold:
 
     hours: float = 4.0
     step_s: float = 60.0  # extremes are looked for at steps
-    axis2: str = (
-        "same"  # the azimuth axis' drift: the measured axis', another, measured itself; fixed: no gyrocompassing
-    )
+    # The azimuth axis' drift: the measured axis', another, measured itself; fixed: no gyrocompassing.
+    axis2: str = "same"
     axis2_sd_degph: float = 0.0
     heading_deg: float = 0.1  # errors with which a fixed one starts
     drift_error_degph: float = 0.05

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from psabench import nav
 from psabench.errors import LinkError
 from psabench.estimate.uncertainty import Estimate
-from psabench.nav import ARCMIN, DEGPH, EARTH_RADPS
+from psabench.nav import ARCMIN, DEGPH
 from psabench.procedures.gyrocompass_doubts import (
     Evidence,
     doubts_of,
@@ -153,16 +153,16 @@ def _evidence(f: Fit, planned: int, drift2: tuple[float, float]) -> Evidence:
 # ---- what is reported
 
 
-def _estimates(f: Fit, drift2: float, drift2_sd: float) -> tuple[Estimate, ...]:
+def _estimates(f: Fit, drift2_radps: float, drift2_sd_radps: float) -> tuple[Estimate, ...]:
     c, attitude = f.compass, f.attitude
-    tilt_sd = f.params.level_sd_arcmin * ARCMIN
+    tilt_sd_rad = f.params.level_sd_arcmin * ARCMIN
     return (
         _estimate("heading_deg", "ψ", "deg", f.heading_rad * DEG, c.alpha1_sd_rad * DEG),
         _estimate("alpha1_deg", "α_1", "deg", c.alpha1_rad * DEG, c.platform_sd_rad * DEG),
         _estimate("drift1_degph", "ω_d1", "deg/h", c.drift1_radps / DEGPH, c.drift1_sd_radps / DEGPH),
-        _estimate("drift2_degph", "ω_d2", "deg/h", drift2 / DEGPH, drift2_sd / DEGPH),
-        _estimate("pitch_deg", "ϑ", "deg", attitude.pitch_rad * DEG, tilt_sd * DEG),
-        _estimate("roll_deg", "γ", "deg", attitude.roll_rad * DEG, tilt_sd * DEG),
+        _estimate("drift2_degph", "ω_d2", "deg/h", drift2_radps / DEGPH, drift2_sd_radps / DEGPH),
+        _estimate("pitch_deg", "ϑ", "deg", attitude.pitch_rad * DEG, tilt_sd_rad * DEG),
+        _estimate("roll_deg", "γ", "deg", attitude.roll_rad * DEG, tilt_sd_rad * DEG),
     )
 
 
@@ -175,16 +175,15 @@ def _estimate(name: str, symbol: str, unit: str, value: float, sd: float) -> Est
 def allowance(result: GyrocompassResult) -> dict[str, float]:
     """What the constant errors of the instrument may add to each estimate, in its unit: no window sees them."""
     p, c = result.params, result.compass
-    level = p.level_zero_arcmin * ARCMIN
-    we, wz = EARTH_RADPS * math.cos(p.latitude_rad), EARTH_RADPS * abs(math.sin(p.latitude_rad))
-    heading = heading_allowance_rad(p, result.attitude)
-    latitude = we * p.latitude_sd_arcmin * ARCMIN
-    drift2 = math.sqrt(2.0) * we * level + latitude + p.torquer_scale * abs(result.drift2_radps)
+    level_rad, latitude_rad = p.level_zero_arcmin * ARCMIN, p.latitude_sd_arcmin * ARCMIN
+    heading_rad = heading_allowance_rad(p, result.attitude)
+    drift1_radps = abs(p.wz_radps) * level_rad + p.torquer_scale * abs(c.drift1_radps)
+    drift2_radps = p.we_radps * (math.sqrt(2.0) * level_rad + latitude_rad) + p.torquer_scale * abs(result.drift2_radps)
     return {
-        "heading_deg": heading * DEG,
-        "alpha1_deg": (heading - p.angle_zero_arcmin * ARCMIN) * DEG,
-        "drift1_degph": wz * level / DEGPH + p.torquer_scale * abs(c.drift1_radps) / DEGPH,
-        "drift2_degph": drift2 / DEGPH,
+        "heading_deg": heading_rad * DEG,
+        "alpha1_deg": (heading_rad - p.angle_zero_arcmin * ARCMIN) * DEG,
+        "drift1_degph": drift1_radps / DEGPH,
+        "drift2_degph": drift2_radps / DEGPH,
         "pitch_deg": p.level_zero_arcmin / 60.0 * 2.0,
         "roll_deg": p.level_zero_arcmin / 60.0 * 2.0,
     }

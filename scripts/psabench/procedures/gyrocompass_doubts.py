@@ -16,7 +16,7 @@ import numpy as np
 from psabench import nav
 from psabench.angles import wrapped
 from psabench.nav import ARCMIN, DEGPH, EARTH_RADPS, Flag
-from psabench.procedures.gyrocompass_fit import Fit, Sensitivity, rate_covariance
+from psabench.procedures.gyrocompass_fit import Fit, Sensitivity, alpha_turns, rate_covariance
 from psabench.procedures.gyrocompass_latitude import LatitudeEffect, passport_limit_radps
 from psabench.procedures.gyrocompass_params import GyrocompassParams
 from psabench.procedures.gyrocompass_windows import LEVEL_CODE_RAD, good_calibration, unsteady, why_not
@@ -26,7 +26,7 @@ from psabench.procedures.result import DEG, LIMIT_CI, Z95
 FALSE_ALARM = 1e-3  # of each check, in a run where nothing is wrong
 QUALITY_LEAST = 0.01  # of |hypot(s, c) - 1|: what the library flags
 RESIDUAL_LIMIT = 4.0  # residuals may be so many times what noise and drift explain
-RATE_STEP = 1e-3 * DEGPH  # resolution of a rate on the wire, generously
+RATE_STEP_RADPS = 1e-3 * DEGPH  # resolution of a rate on the wire, generously
 TURN_STEP_RAD = math.radians(0.01)  # turns of the vehicle below are nobody's business
 RELEVANT = 0.25  # of the interval: a remnant of settling that moves a result by less is let pass
 OPEN_RAD = math.radians(90.0)  # a heading whose interval is half the circle is none
@@ -199,12 +199,9 @@ class _Span:
 def _spans(e: Evidence) -> list[_Span]:
     """From middle to middle of windows that follow one another, and each window by itself."""
     f = e.fit
-    q = np.array([np.unwrap(w.encoder_rad).mean() for w in f.windows])
-    beta = np.array([w.beta_rad.mean() for w in f.windows])
-    gamma = np.array([w.gamma_rad.mean() for w in f.windows])
-    alpha = nav.cardan(q, pitch_rad=f.attitude.pitch_rad, roll_rad=f.attitude.roll_rad, beta_rad=beta)
-    earth = EARTH_RADPS * math.sin(f.params.latitude_rad)
-    idle = e.drift2_radps * np.cos(gamma) - f.compass.drift1_radps * np.sin(gamma) + earth
+    gamma = np.array([w.mean_gamma_rad for w in f.windows])
+    alpha = alpha_turns(np.array([w.mean_encoder_rad for w in f.windows]), f.windows, f.attitude)
+    idle = e.drift2_radps * np.cos(gamma) - f.compass.drift1_radps * np.sin(gamma) + f.params.wz_radps
     between = [
         _Span(
             where=f"between positions {a.number + 1} and {b.number + 1}",
@@ -273,9 +270,9 @@ def _residuals(e: Evidence) -> str:
     """Three positions have none."""
     f = e.fit
     left = float(np.sqrt(np.mean([r.residual_radps**2 for r in f.rows])))
-    angle = EARTH_RADPS * math.cos(f.params.latitude_rad) * f.noise.angle_sd_rad
+    angle = f.params.we_radps * f.noise.angle_sd_rad
     expected = math.hypot(f.noise.gm_sigma_radps, f.noise.window_sd_radps, angle, EARTH_RADPS * f.noise.level_sd_rad)
-    if len(f.rows) <= 3 or left <= RESIDUAL_LIMIT * expected + RATE_STEP:
+    if len(f.rows) <= 3 or left <= RESIDUAL_LIMIT * expected + RATE_STEP_RADPS:
         return ""
     return (
         f"the rates miss the model by {left / DEGPH:.3g} deg/h rms where {expected / DEGPH:.2g} is expected: "

@@ -97,20 +97,20 @@ class Sensitivity:
 
 def sensitivity(f: Fit) -> Sensitivity:
     """By differences of a thousandth of We."""
-    step = 1e-3 * EARTH_RADPS * math.cos(f.params.latitude_rad)
+    step_radps = 1e-3 * f.params.we_radps
     found = []
-    for one in np.eye(len(f.rows)) * step:
+    for one in np.eye(len(f.rows)) * step_radps:
         up, down = again(f, one), again(f, -one)
         turned = wrapped(up.alpha1_rad - down.alpha1_rad)
         size = math.hypot(up.s, up.c) - math.hypot(down.s, down.c)
         found.append((turned, up.drift1_radps - down.drift1_radps, size))
-    alpha_s, drift, hypot_s = np.array(found).T / (2.0 * step)
+    alpha_s, drift, hypot_s = np.array(found).T / (2.0 * step_radps)
     return Sensitivity(alpha_s=alpha_s, drift=drift, hypot_s=hypot_s)
 
 
 def rate_covariance(f: Fit) -> Floats:
     """Of the windows' rates, from the random drift, noise, angles and level sensors, (rad/s)^2."""
-    n, we = f.noise, EARTH_RADPS * math.cos(f.params.latitude_rad)
+    n = f.noise
     rows = [r.position for r in f.rows]
     cov = np.array(
         [
@@ -121,22 +121,24 @@ def rate_covariance(f: Fit) -> Floats:
             for a in rows
         ]
     )
-    alone = n.window_sd_radps**2 + (we * n.angle_sd_rad) ** 2 + (EARTH_RADPS * n.level_sd_rad) ** 2
+    alone = n.window_sd_radps**2 + (f.params.we_radps * n.angle_sd_rad) ** 2 + (EARTH_RADPS * n.level_sd_rad) ** 2
     return np.asarray(cov + alone * np.eye(len(rows)))
 
 
 def _attitude(q_rad: Floats, windows: Sequence[Window]) -> nav.Attitude:
     """Of the vehicle, with the constant error of gamma where the positions tell it."""
-    beta = np.array([w.beta_rad.mean() for w in windows])
-    gamma = np.array([w.gamma_rad.mean() for w in windows])
-    return nav.attitude_from_level(q_rad, gamma, beta, bias=True)
+    beta_rad, gamma_rad = [w.mean_beta_rad for w in windows], [w.mean_gamma_rad for w in windows]
+    return nav.attitude_from_level(q_rad, gamma_rad, beta_rad, bias=True)
 
 
-def _increments(q: Floats, windows: Sequence[Window], attitude: nav.Attitude, p: GyrocompassParams) -> Floats:
-    if not p.cardan:
-        return np.asarray(q - q[0])
-    beta = np.array([w.beta_rad.mean() for w in windows])
-    return nav.cardan(q, pitch_rad=attitude.pitch_rad, roll_rad=attitude.roll_rad, beta_rad=beta)
+def alpha_turns(q_rad: Floats, windows: Sequence[Window], attitude: nav.Attitude) -> Floats:
+    """Increments of alpha from the first window to each, rad: those of the gimbal, corrected for the tilt."""
+    beta_rad = [w.mean_beta_rad for w in windows]
+    return nav.cardan(q_rad, pitch_rad=attitude.pitch_rad, roll_rad=attitude.roll_rad, beta_rad=beta_rad)
+
+
+def _increments(q_rad: Floats, windows: Sequence[Window], attitude: nav.Attitude, p: GyrocompassParams) -> Floats:
+    return alpha_turns(q_rad, windows, attitude) if p.cardan else np.asarray(q_rad - q_rad[0])
 
 
 def _positions(
@@ -147,8 +149,8 @@ def _positions(
         nav.Position(
             s_radps=s_of(w, slope=p.slope, frozen=p.freeze),
             delta_rad=float(d),
-            beta_rad=float(w.beta_rad.mean()),
-            gamma_rad=float(w.gamma_rad.mean()) - bias,
+            beta_rad=w.mean_beta_rad,
+            gamma_rad=w.mean_gamma_rad - bias,
             t_mid_s=w.t_mid_s,
             window_s=w.length_s,
         )
@@ -158,10 +160,9 @@ def _positions(
 
 def _residual(r: nav.Position, c: nav.Compass, p: GyrocompassParams) -> float:
     """What a window's rate misses the model by, rad/s."""
-    we = EARTH_RADPS * math.cos(p.latitude_rad)
     a = c.alpha1_rad + r.delta_rad
     tilt = 0.0 if p.simplified else math.sin(r.gamma_rad) * math.sin(r.beta_rad)
-    return r.s_radps - we * (math.sin(a) * math.cos(r.gamma_rad) + math.cos(a) * tilt) - c.drift1_radps
+    return r.s_radps - p.we_radps * (math.sin(a) * math.cos(r.gamma_rad) + math.cos(a) * tilt) - c.drift1_radps
 
 
 # ---- the azimuth axis
@@ -182,8 +183,8 @@ def drift2_of(f: Fit, calibration: Sequence[Window]) -> tuple[float, float]:
                 float(w.u2_radps.mean()),
                 latitude_rad=p.latitude_rad,
                 alpha_rad=f.compass.alpha1_rad + delta,
-                beta_rad=float(w.beta_rad.mean()),
-                gamma_rad=float(w.gamma_rad.mean()) - f.attitude.gamma_bias_rad,
+                beta_rad=w.mean_beta_rad,
+                gamma_rad=w.mean_gamma_rad - f.attitude.gamma_bias_rad,
             )
         )
         weight.append(w.length_s)

@@ -14,12 +14,11 @@ import numpy as np
 
 from psabench import nav
 from psabench.angles import wrapped
-from psabench.nav import DEGPH, EARTH_RADPS
+from psabench.nav import DEGPH, EARTH_RADPS, LATITUDE_LIMIT_RAD
 from psabench.procedures.gyrocompass_fit import Fit, again
 from psabench.procedures.platform_bench import Floats
 from psabench.procedures.result import DEG
 
-LIMIT_RAD = math.radians(85.0)  # of the library
 GRID_RAD = math.radians(0.01)
 STEP_RAD = math.radians(0.01)  # of the derivative
 LOOKS = 9  # latitudes that are tried of those that look alike
@@ -54,11 +53,11 @@ class LatitudeEffect:
 def latitude_effect(f: Fit, quality_limit: float, drift2_radps: float, drift2_sd_radps: float) -> LatitudeEffect:
     """quality_limit: of |hypot(s, c) - 1|, beyond which a run is in doubt."""
     phi = f.params.latitude_rad
-    grid = np.linspace(-LIMIT_RAD, LIMIT_RAD, round(2.0 * LIMIT_RAD / GRID_RAD) + 1)
+    grid = np.linspace(-LATITUDE_LIMIT_RAD, LATITUDE_LIMIT_RAD, round(2.0 * LATITUDE_LIMIT_RAD / GRID_RAD) + 1)
     hidden = _hidden(grid, f, quality_limit) & _passport_allows(grid, f, drift2_radps, drift2_sd_radps)
     above, below = hidden[grid > phi], hidden[grid < phi][::-1]
-    high = min(phi + GRID_RAD * _run_length(above), LIMIT_RAD)
-    low = max(phi - GRID_RAD * _run_length(below), -LIMIT_RAD)
+    high = min(phi + GRID_RAD * _run_length(above), LATITUDE_LIMIT_RAD)
+    low = max(phi - GRID_RAD * _run_length(below), -LATITUDE_LIMIT_RAD)
     unseen = max(abs(_turn(f, float(x))) for x in np.linspace(low, high, LOOKS))
     opposite = np.array([-phi])
     told = low <= -phi <= high or not _passport_allows(opposite, f, drift2_radps, drift2_sd_radps)[0]
@@ -84,7 +83,7 @@ def _passport_allows(
     p = f.params
     if not p.drift2_limit_degph:
         return np.full(phi_rad.shape, True)
-    drift = drift2_radps - EARTH_RADPS * (np.sin(phi_rad) - math.sin(p.latitude_rad))
+    drift = drift2_radps - EARTH_RADPS * np.sin(phi_rad) + p.wz_radps
     return np.asarray(np.abs(drift - p.drift2_degph * DEGPH) <= passport_limit_radps(f, sd_radps))
 
 
@@ -100,7 +99,7 @@ def _run_length(flags: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]) -> int:
 
 def _turn(f: Fit, latitude_rad: float) -> float:
     """What the heading would turn by at another latitude, rad."""
-    more_wz = EARTH_RADPS * (math.sin(latitude_rad) - math.sin(f.params.latitude_rad))
+    more_wz = EARTH_RADPS * math.sin(latitude_rad) - f.params.wz_radps
     more = [more_wz * math.sin(r.position.gamma_rad) * math.cos(r.position.beta_rad) for r in f.rows]
     try:
         there = again(f, np.array(more), latitude_rad)

@@ -97,6 +97,16 @@ class GyrocompassParams:
         return math.radians(self.latitude_deg)
 
     @property
+    def we_radps(self) -> float:
+        """The Earth's horizontal rate at that latitude."""
+        return EARTH_RADPS * math.cos(self.latitude_rad)
+
+    @property
+    def wz_radps(self) -> float:
+        """Its vertical rate, below zero in the south."""
+        return EARTH_RADPS * math.sin(self.latitude_rad)
+
+    @property
     def table(self) -> Table:
         return Table(
             angles_deg=self.angles_deg,
@@ -143,10 +153,9 @@ def rehearse(p: GyrocompassParams) -> None:
     if not abs(p.latitude_deg) <= 90.0:
         raise BadInput(f"{NAME}: latitude_deg is {p.latitude_deg:g}; it must lie within +-90")
     _patient(p)
-    we = EARTH_RADPS * math.cos(p.latitude_rad)
     pace_s = p.window_s + p.settle_s
     rows = [
-        nav.Position(s_radps=we * math.sin(a), delta_rad=a - angles[0], t_mid_s=k * pace_s, window_s=p.window_s)
+        nav.Position(s_radps=p.we_radps * math.sin(a), delta_rad=a - angles[0], t_mid_s=k * pace_s, window_s=p.window_s)
         for k, a in enumerate(angles)
     ]
     nav.gyrocompass(rows, latitude_rad=p.latitude_rad, method=METHODS[p.method], noise=noise_of(p, 0.0))

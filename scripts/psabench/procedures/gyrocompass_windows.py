@@ -26,7 +26,7 @@ def s_of(w: Window, *, slope: bool, frozen: bool) -> float:
     rate = nav.window_slope(w.beta_rad, s, w.step_s) if slope else float(s.mean())
     if frozen and len(s) > 1:
         turn_radps = _slope(np.unwrap(w.encoder_rad), w.step_s)
-        rate += turn_radps * math.sin(float(w.gamma_rad.mean()))
+        rate += turn_radps * math.sin(w.mean_gamma_rad)
     return rate
 
 
@@ -48,7 +48,7 @@ def unsteady(w: Window, p: GyrocompassParams) -> tuple[float, float]:
     if p.slope:
         steady += float(np.mean([_half(w, k) for k in (0, 1)])) - s_of(w, slope=True, frozen=False)
         variance = n_rad**2 * 36.0 / count
-    tilt, e_rad = abs(math.sin(float(w.gamma_rad.mean()))), _step_noise(w.encoder_rad)
+    tilt, e_rad = abs(math.sin(w.mean_gamma_rad)), _step_noise(w.encoder_rad)
     variance += (
         (tilt * e_rad) ** 2 * 12.0 / count + (0.5 * tilt * _code(w.encoder_rad)) ** 2 + (0.3 * LEVEL_CODE_RAD) ** 2
     )
@@ -89,12 +89,12 @@ def trusted(w: Window, p: GyrocompassParams) -> float:
     """The gimbal angle of a window, rad."""
     if p.angles == "set":
         return w.set_rad
-    return w.set_rad + wrapped(float(np.unwrap(w.encoder_rad).mean()) - w.set_rad)
+    return w.set_rad + wrapped(w.mean_encoder_rad - w.set_rad)
 
 
 def off(w: Window) -> str:
     """Why the encoder of a window contradicts the angle that was asked for, "": it does not."""
-    off_rad = wrapped(float(np.unwrap(w.encoder_rad).mean()) - w.set_rad)
+    off_rad = wrapped(w.mean_encoder_rad - w.set_rad)
     if abs(off_rad) <= OFF_LIMIT_RAD:
         return ""
     shown, asked = (w.set_rad + off_rad) * DEG, w.set_rad * DEG

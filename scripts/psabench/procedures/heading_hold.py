@@ -13,8 +13,9 @@ from dataclasses import dataclass, replace
 from psabench import nav
 from psabench.angles import wrapped
 from psabench.errors import LinkError
-from psabench.nav import DEGPH, EARTH_RADIUS_M
+from psabench.nav import DEGPH, EARTH_RADIUS_M, LATITUDE_LIMIT_RAD
 from psabench.procedures.gyrocompass import GyrocompassResult
+from psabench.procedures.gyrocompass_params import TAU_LEAST_S
 from psabench.procedures.head_bench import Progress
 from psabench.procedures.platform_bench import Compensation, Look, PlatformBench
 from psabench.procedures.result import Z95, option
@@ -23,7 +24,6 @@ NAME = "heading-hold"
 SUMMARY = "gyrocompassing, then heading kept for hours with the drifts compensated"
 
 DRIFTS = ("torquer", "axis1", "none")
-LATITUDE_LIMIT_RAD = math.radians(85.0)
 SDS = 5.0  # of what the hold is expected to be off by
 PARKED_RAD = math.radians(0.2)  # beside them a parked vehicle's heading may wander so far: sway
 DRIFT_ANGLE_RAD = math.radians(20.0)  # and a flying one's be so far from its track: wind
@@ -143,10 +143,10 @@ def hold(
     if first.faults:
         raise LinkError(f"{NAME}: navigation cannot begin: {'; '.join(first.faults)}")
     azimuth_rad = _alpha(start, first)
-    drift2 = {"torquer": start.drift2_radps, "axis1": start.compass.drift1_radps, "none": 0.0}[p.compensate]
-    latitude = start.params.latitude_rad
-    _tell(bench, p, latitude)
-    bench.navigate(Compensation(azimuth_rad=azimuth_rad, drift1_radps=start.compass.drift1_radps, drift2_radps=drift2))
+    drift1_radps, latitude_rad = start.compass.drift1_radps, start.params.latitude_rad
+    drift2_radps = {"torquer": start.drift2_radps, "axis1": drift1_radps, "none": 0.0}[p.compensate]
+    _tell(bench, p, latitude_rad)
+    bench.navigate(Compensation(azimuth_rad=azimuth_rad, drift1_radps=drift1_radps, drift2_radps=drift2_radps))
     begun_s = bench.t_s
     held: list[Held] = []
 
@@ -162,10 +162,10 @@ def hold(
         for k in range(p.looks):
             bench.wait(begun_s + (k + 1) * p.look_s - bench.t_s)
             look()
-            latitude = _moved(latitude, p)
-            _tell(bench, p, latitude)
+            latitude_rad = _moved(latitude_rad, p)
+            _tell(bench, p, latitude_rad)
             done()
-    return HoldResult(params=p, start=start, drift2_radps=drift2, held=tuple(held))
+    return HoldResult(params=p, start=start, drift2_radps=drift2_radps, held=tuple(held))
 
 
 def _alpha(start: GyrocompassResult, look: Look) -> float:
@@ -194,7 +194,7 @@ def _growth(start: GyrocompassResult) -> nav.Hold:
         heading_sd_rad=math.radians(start.get("heading_deg").sd),
         drift_sd_radps=start.get("drift2_degph").sd * DEGPH,
         gm_sigma_radps=p.gm_sigma_degph * DEGPH,
-        gm_tau_s=max(p.gm_tau_s, 1.0),
+        gm_tau_s=max(p.gm_tau_s, TAU_LEAST_S),
     )
 
 

@@ -68,6 +68,19 @@ class Window:
         return len(self.beta_rad) * self.step_s
 
     @property
+    def mean_beta_rad(self) -> float:
+        return float(self.beta_rad.mean())
+
+    @property
+    def mean_gamma_rad(self) -> float:
+        return float(self.gamma_rad.mean())
+
+    @property
+    def mean_encoder_rad(self) -> float:
+        """Of an angle that may pass half a turn: within one turn of the first."""
+        return float(np.unwrap(self.encoder_rad).mean())
+
+    @property
     def levelling_radps(self) -> Floats:
         """S of each step: what levelling asks of the torquer, without the compensation of gamma, eq. (8)."""
         return np.asarray(-self.m1_per_s * self.beta_rad)
