@@ -34,7 +34,7 @@ class Result:
     found: list[str] = field(default_factory=list)  # requirements that are worse than without it
     breaks: list[str] = field(default_factory=list)  # that the list says
     named: bool = False  # whether one of those was found
-    failed: bool = False  # whether one of those found has failed; else they could no longer be carried out
+    failed: bool | None = None  # whether one of those found has failed; else they could no longer be carried out
     reason: str = ""
     took_s: float = 0.0
 

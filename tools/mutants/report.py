@@ -107,8 +107,8 @@ def _said(results: Sequence[Result]) -> str:
     killed, of = rate(results)
     found = [r for r in results if r.result == "killed"]
     words = f"{killed} of {of} killed, {percent(killed, of)}."
-    if found:
-        failed = sum(r.failed for r in found)
+    if found and all(r.failed is not None for r in found):
+        failed = sum(r.failed is True for r in found)
         words += f" In {failed} of {len(found)} a requirement failed; in the others one could not be carried out."
     listed = [r for r in found if r.breaks]
     if listed:
