@@ -1,4 +1,4 @@
-"""Every board with every shipped profile conforms, and its report is there: build/conform/BOARD-PROFILE, by all pins."""
+"""Every board with every shipped profile conforms, by all pins; its report is in build/conform/BOARD-PROFILE."""
 
 from __future__ import annotations
 

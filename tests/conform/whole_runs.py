@@ -22,7 +22,7 @@ PROFILES = [(board, profile) for profile, board in requirements().profiles.items
 
 
 def reported(board: str, profile: str, at: Addresses, link: str = "") -> report.Run:
-    """Run everything; the report is written anew into build/conform/BOARD-PROFILE[-LINK]. Asserts what it has to say."""
+    """Run everything; the report goes into build/conform/BOARD-PROFILE[-LINK], anew. Asserts what it has to say."""
     folder = OUT / "-".join(filter(None, (board, profile, link)))
     shutil.rmtree(folder, ignore_errors=True)
     run = command.device_run(variant(board, profile), at, folder, Silent())
