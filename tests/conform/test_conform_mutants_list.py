@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from mutants import chance, report
+from mutants.book import Book
 from mutants.declared import ListError, Mutant, Target, load, problems
 from mutants.judge import Result
 from mutants.run import sample, status
@@ -111,6 +113,25 @@ def test_random_mutants_are_the_same_for_one_seed_and_apply() -> None:
     for m in first:
         text = (ROOT / m.file).read_text(encoding="utf-8")
         assert m.applied(text) != text
+
+
+def test_results_stand_as_long_as_their_row_is_the_same(tmp_path: Path) -> None:
+    rows = [mutant("a", name=i) for i in "abc"]
+    book = Book(tmp_path / "m.json", "declared", rows)
+    for m, what in zip(rows, ("killed", "survived", "killed"), strict=True):
+        book.keep(replace(result(m.id, what), stamp=m.stamp()))
+    drawn = mutant("a", name="r")
+    Book(tmp_path / "m.json", "random", [drawn]).keep(replace(result("r", "killed"), stamp=drawn.stamp()))
+    changed = [rows[0], rows[1], mutant("other", name="c")]
+
+    def todo(again: str | None) -> list[str]:
+        return [m.id for m in Book(tmp_path / "m.json", "declared", changed).todo(changed, again)]
+
+    assert (todo(None), todo("survived"), todo("unknown")) == (["a", "b", "c"], ["b", "c"], ["c"])
+    again = Book(tmp_path / "m.json", "declared", changed)
+    again.todo(changed[1:2], None)
+    assert [r.id for r in again.of(changed)] == ["a"]
+    assert [r.id for r in again.parts()["random"]] == ["r"]
 
 
 def test_the_page_has_the_tables_between_its_marks(tmp_path: Path) -> None:

@@ -12,12 +12,12 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 from queue import SimpleQueue
 from random import Random
-from typing import Any
 
 from mutants import report
+from mutants.book import Book
 from mutants.chance import random_mutants
 from mutants.declared import ListError, Mutant, Target, load, problems
-from mutants.judge import KILLED, WRONG, Judge, Result
+from mutants.judge import WRONG, Judge, Result
 from mutants.suite import Run, Suite
 from mutants.tree import ROOT, BuildError, Tree
 from psabench.conform.requirements import requirements
@@ -150,18 +150,6 @@ def judged(judges: Sequence[Judge], mutants: Sequence[Mutant], keep: Callable[[R
             raise
 
 
-def latest(path: Path, part: str, mutants: Sequence[Mutant]) -> dict[str, Result]:
-    """Results of the latest file that still stand: of rows that have not changed."""
-    stamps = {m.id: m.stamp() for m in mutants}
-    found = [Result.of(row) for row in report.read(path).get(part, [])]
-    return {r.id: r for r in found if stamps.get(r.id) == r.stamp}
-
-
-def left_out(again: str | None, r: Result) -> bool:
-    """Whether `--again` goes on without this one."""
-    return again == "unknown" or (again == "survived" and r.result in (*KILLED, "equivalent"))
-
-
 def state() -> str:
     """Of the sources that are judged, and of what judges them."""
     h = hashlib.sha256()
@@ -191,43 +179,29 @@ def carry_out(args: argparse.Namespace, mutants: list[Mutant], folder: Path) -> 
     tree = Tree(folder, borrow=bool(args.sample))
     if args.check:
         return check(tree, mutants)
+    part = "random" if args.random else "declared"
+    book = Book(args.out, part, mutants if args.random else load())
+    todo = book.todo(mutants, args.again)
     judge = Judge(tree, Suite(folder), compare=bool(args.random), quick=args.quick)
-    plain = judge.baseline(targets(mutants))
+    plain = judge.baseline(targets(todo))
     if not told_baseline(plain) and not args.relative:
         print("the unmutated emulator must conform first (--relative goes on)")
         return 2
     if args.random:
-        judge.look(targets(mutants))
-    part, other = ("random", "declared") if args.random else ("declared", "random")
-    every = mutants if args.random else load()
-    results = latest(args.out, part, every)
-    todo = [m for m in mutants if m.id not in results or not left_out(args.again, results[m.id])]
-    for m in todo:
-        results.pop(m.id, None)
-    before = report.read(args.out)
-    facts: dict[str, Any] = {"state": state(), "random_seed": args.seed if args.random else before.get("random_seed")}
-    facts["baseline"] = {str(t): {"conforms": r.conforms, "took_s": round(r.took_s, 1)} for t, r in plain.items()}
-    others = [Result.of(row) for row in before.get(other, [])]
-
-    def parts() -> dict[str, Sequence[Result]]:
-        mine = [results[m.id] for m in every if m.id in results]
-        return {"declared": others, "random": mine} if args.random else {"declared": mine, "random": others}
-
-    def keep(r: Result) -> None:
-        results[r.id] = r
-        report.write(args.out, parts(), facts)
-
+        judge.look(targets(todo))
+        book.facts["random_seed"] = args.seed
+    book.facts["state"] = state()
+    book.facts["baseline"] = {str(t): {"conforms": r.conforms, "took_s": round(r.took_s, 1)} for t, r in plain.items()}
     interrupted = False
     try:
-        judged([judge, *(judge.beside(folder / str(k)) for k in range(1, args.jobs))], todo, keep)
+        judged([judge, *(judge.beside(folder / str(k)) for k in range(1, args.jobs))], todo, book.keep)
     except KeyboardInterrupt:
         interrupted = True
-    mine = [results[m.id] for m in mutants if m.id in results]
-    for words in report.summary(part, mine):
+    for words in report.summary(part, book.of(mutants)):
         print(words)
     if args.docs:
-        report.page(PAGE, parts(), facts)
-    return 130 if interrupted else status(mine, random=bool(args.random))
+        report.page(PAGE, book.parts(), book.facts)
+    return 130 if interrupted else status(book.of(mutants), random=bool(args.random))
 
 
 def status(results: Sequence[Result], *, random: bool) -> int:
