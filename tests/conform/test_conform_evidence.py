@@ -31,6 +31,19 @@ def test_a_gap_makes_a_pulse_unknown() -> None:
     assert log.known(np.array([30, 0]), np.array([60, 60])).tolist() == [True, False]
 
 
+def test_an_edge_at_a_gap_may_be_older() -> None:
+    log = log_of([(0, 1), (10, 0), (30, 1), (50, 0), (70, 1)], gaps=[30])
+    assert log.pulses("L", 0)[0].tolist() == [50]
+    assert log.pulses("L", 1)[0].tolist() == []
+
+
+def test_the_longest_stretch_without_a_gap() -> None:
+    log = log_of([(0, 1), (10, 0), (30, 1), (50, 0), (70, 1)], gaps=[20, 60]).unbroken()
+    assert (log.start_ns, log.end_ns, len(log.gaps_ns)) == (60, 170, 0)
+    assert (log["L"].t_ns.tolist(), log["L"].level.tolist()) == ([60, 70], [0, 1])
+    assert log.unbroken() is log
+
+
 def test_a_line_without_an_edge_has_no_pulse() -> None:
     for level in (0, 1):
         begin, end = log_of([(0, 1)]).pulses("L", level)

@@ -21,13 +21,30 @@ def port(s: Subject) -> BusPort:
 
 def line(s: Subject, text: str) -> Cycle:
     """The cycle of a line to the bus port: "R 3", "W F 0003 400". Raises CycleRefused."""
-    port(s).ask(text)
-    if s.lockstep:
-        s.run_for(SHORT_S)
-    answer = port(s).answer()
-    if not isinstance(answer, Cycle):
-        raise Broken(f"{answer} as the answer to {text!r}", "that of a cycle")
-    return answer
+    return burst(s, text)[0]
+
+
+def burst(s: Subject, *lines: str) -> list[Cycle]:
+    """Cycles as close as can be: all lines at once where time passes by itself, a moment for each in lockstep."""
+    if not s.lockstep:
+        port(s).ask("\n".join(lines))
+    found = []
+    for text in lines:
+        if s.lockstep:
+            port(s).ask(text)
+            s.run_for(SHORT_S + _strobe_s(text))
+        answer = port(s).answer()
+        if not isinstance(answer, Cycle):
+            raise Broken(f"{answer} as the answer to {text!r}", "that of a cycle")
+        found.append(answer)
+    return found
+
+
+def _strobe_s(text: str) -> float:
+    """That a line asks for: the word behind address and data."""
+    words = text.split()
+    at = 2 if words[0] == "R" else 3
+    return int(words[at]) * 1e-9 if len(words) > at else 0.0
 
 
 def code_of(e: DeviceError) -> int:

@@ -108,13 +108,30 @@ class LineLog:
         end = end[np.searchsorted(end, begin[0], "right") :] if len(begin) else end[:0]
         n = min(len(begin), len(end))
         begin, end = begin[:n], end[:n]
-        whole = np.searchsorted(self.gaps_ns, begin) == np.searchsorted(self.gaps_ns, end)
+        whole = self.known(begin, end)
         return begin[whole], end[whole]
 
     def known(self, begin_ns: Ints, end_ns: Ints) -> Bools:
-        """(n,) whether no samples were lost between these instants."""
-        same: Bools = np.searchsorted(self.gaps_ns, begin_ns) == np.searchsorted(self.gaps_ns, end_ns)
+        """(n,) whether no samples were lost between these instants, nor just before one: its edge may be older."""
+        same: Bools = np.searchsorted(self.gaps_ns, begin_ns) == np.searchsorted(self.gaps_ns, end_ns, "right")
         return same
+
+    def unbroken(self) -> LineLog:
+        """The longest stretch in which no samples were lost; all of it where none were."""
+        if not len(self.gaps_ns):
+            return self
+        ends = np.concatenate(([self.start_ns], self.gaps_ns, [self.end_ns + 1]))
+        k = int(np.argmax(np.diff(ends)))
+        begin, end = int(ends[k]), int(ends[k + 1]) - 1
+        wires = {name: _part(w, begin, end) for name, w in self.recording.wires.items()}
+        return LineLog(recording=Vcd(self.recording.unit_ns, begin, end, wires), resolution_ns=self.resolution_ns)
+
+
+def _part(w: Wire, begin_ns: int, end_ns: int) -> Wire:
+    """Its level at the begin, then its edges up to the end."""
+    k = max(0, int(np.searchsorted(w.t_ns, begin_ns, "right")) - 1)
+    n = int(np.searchsorted(w.t_ns, end_ns, "right"))
+    return Wire(np.concatenate(([np.int64(begin_ns)], w.t_ns[k + 1 : n])), w.level[k:n])
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -31,7 +31,12 @@ def first_bad(bad: npt.NDArray[np.bool_], at_ns: Ints, saw: Sequence[object], du
 def interval(
     e: Evidence, from_ns: Ints, to_ns: Ints, due_ns: float, tolerance_ns: float, what: str, lines: Sequence[str]
 ) -> str:
-    """(n,) each to_ns - from_ns is due_ns. Returns what was seen; raises Broken, TooLittle where there is none."""
+    """(n,) each to_ns - from_ns is due_ns, as far as no samples were lost between. Returns what was seen.
+
+    Raises Broken, TooLittle where there is none.
+    """
+    known = e.wires.known(np.minimum(from_ns, to_ns), np.maximum(from_ns, to_ns))
+    from_ns, to_ns = from_ns[known], to_ns[known]
     if not len(from_ns):
         raise TooLittle(f"nothing to measure: {what}")
     took_ns = (to_ns - from_ns).astype(np.float64)

@@ -43,7 +43,7 @@ def fl2_level(e: Evidence) -> int:
 def transfers(e: Evidence) -> list[Transfer]:
     """All words in their order, whole ones. Raises TooLittle where a line or words are missing."""
     wires_needed(e, *LINES)
-    log = e.wires
+    log = e.wires.unbroken()
     active = fl2_level(e)
     sets, clears = log["FL2"].edges_ns(active), log["FL2"].edges_ns(1 - active)
     up, down = log.rises("SCLK"), log.falls("SCLK")

@@ -35,6 +35,7 @@ INPUTS_V: Mapping[str, float] = {"x": 2.0101, "y": -1.3007, "z": 0.7003}
 # Links of python-can whose time stamps are this machine's: they say when it looked, not when the frame passed.
 BY_THE_HOST_S_CLOCK = ("slcanBus", "SocketcanBus", "UdpMulticastBus", "VirtualBus", "SerialBus")
 BUS_BOARDS = ("psd1", "pmka", "pik")  # boards with a parallel bus
+THERMOMETERS = ("psa2", "pmka")  # boards whose temperatures are compared with a chamber's
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -313,7 +314,7 @@ def scenario(variant: Variant, inputs_v: Mapping[str, float], clock_ppm: float) 
     if variant.family == "gyro":
         del unit["axes"]
         return {"supply": {}, "start": True, **PLATFORM, "units": [unit | {"level": LEVEL["name"]}, LEVEL]}
-    chamber: dict[str, Any] = {"chamber": {}} if variant.family == "psa2" else {}  # its temperatures are looked at
+    chamber: dict[str, Any] = {"chamber": {}} if variant.family in THERMOMETERS else {}
     return {"supply": {}, **chamber, "units": [unit]}
 
 

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from itertools import pairwise
 
 import numpy as np
 
-from psabench.conform.evidence import Evidence
+from psabench.conform.after_res import late_readings
+from psabench.conform.evidence import CanLog, Evidence
 from psabench.conform.gyro_readings import EARTH_DEGPH, MESSAGES, columns, emergencies, vertical_degph, wrapped
 from psabench.conform.intervals import interval, wires_needed
 from psabench.conform.limits import row_for
+from psabench.conform.messages import as_laid_out, in_turn
 from psabench.conform.outcome import Broken, TooLittle
 from psabench.conform.plan import check
 from psabench.conform.proof import proves
@@ -21,6 +22,8 @@ from psabench.signals import Floats, layout
 LINES = ("STEP", "READY", "SLEW", "SETTLE", "WINDOW", "FAULT")
 PHASES = {"SLEW": Phase.SLEWING, "SETTLE": Phase.SETTLING, "WINDOW": Phase.WINDOW}
 US = 1e3
+LEAST = 20  # readings that a judgement wants
+ACCEL_OVER_S = 0.1  # rates so far apart give an acceleration: the encoder has an error that goes with its angle
 LIMITS = ("GYRO-LAW-05", "GYRO-LAW-06")
 
 
@@ -36,14 +39,7 @@ def _number(e: Evidence, name: str) -> float:
 @check("run", needs={"can"})
 def three_messages_make_a_reading(e: Evidence) -> str:
     """Follow the messages of each step."""
-    ids = {e.frames_of(n).frames[0].can_id: k for k, n in enumerate(MESSAGES) if len(e.frames_of(n))}
-    if len(ids) < len(MESSAGES):
-        raise Broken(f"{len(ids)} of the messages {', '.join(MESSAGES)}", "three")
-    order = [(ids[f.can_id], f) for f in e.can.frames if f.can_id in ids and not f.sent]
-    for (a, _), (b, f) in pairwise(order):
-        if b != (a + 1) % len(MESSAGES):
-            raise Broken(f"{MESSAGES[b]} after {MESSAGES[a]}", "the three in turn", frames=(f,))
-    return f"{len(order)} messages in turn"
+    return in_turn(e, MESSAGES)
 
 
 @proves("GYRO-CAN-02")
@@ -72,15 +68,8 @@ def steps_come_at_their_rate(e: Evidence) -> str:
 @proves("GYRO-CAN-03")
 @check("run", needs={"can"})
 def messages_have_their_lengths(e: Evidence) -> str:
-    """Look at the lengths of the three messages."""
-    for name in MESSAGES:
-        log, due = e.frames_of(name), int(message(name).length)
-        if not len(log):
-            raise TooLittle(f"no {name} came")
-        bad = [f for f in log.frames if len(f.data) != due]
-        if bad:
-            raise Broken(f"{name} of {len(bad[0].data)} bytes", f"{due}", frames=bad)
-    return f"{', '.join(MESSAGES)} of 8 bytes"
+    """Look at the lengths of the three messages, and at bits that have no signal."""
+    return as_laid_out(e, MESSAGES)
 
 
 def _codes(e: Evidence) -> tuple[np.ndarray, Floats]:
@@ -158,6 +147,12 @@ def _steady(c: Mapping[str, Floats], mode: Mode, phases: tuple[Phase, ...]) -> n
     return np.asarray(inside, bool)
 
 
+def _runs(rows: np.ndarray) -> list[tuple[int, ...]]:
+    """Rows (n, m) with repetitions left out."""
+    found = [tuple(int(v) for v in r) for r in rows]
+    return [r for k, r in enumerate(found) if k == 0 or r != found[k - 1]]
+
+
 @proves("GYRO-LAW-01")
 @check("run", needs={"can"})
 def u1_levels(e: Evidence) -> str:
@@ -174,7 +169,7 @@ def u1_levels(e: Evidence) -> str:
 @proves("GYRO-LAW-02")
 @check("run", needs={"can"})
 def u2_holds_the_gimbal(e: Evidence) -> str:
-    """Compute U2 of readings at a position from ENCODER, BETA and GAMMA; what the sensor is off there is a constant."""
+    """Compute U2 at each position of a run from ENCODER, BETA and GAMMA; what the sensor is off there is a constant."""
     c, positions = columns(e), e.facts.get("positions")
     if not isinstance(positions, list):
         raise TooLittle("the positions are not known")
@@ -188,6 +183,26 @@ def u2_holds_the_gimbal(e: Evidence) -> str:
         if here.any():
             due[here] += np.median((c["U2"] - due)[here])
     return _as_the_law(c["U2"], due, mine, row_for(e, "GYRO-LAW-02").limit("tolerance_degph"))
+
+
+@proves("GYRO-LAW-02")
+@check("hold", needs={"can"})
+def u2_turns_with_the_earth(e: Evidence) -> str:
+    """Turn Wz round by the latitude in mode 2, and compute U2 before and after with one constant for the sensor."""
+    parts, row = e.facts.get("latitudes"), row_for(e, "GYRO-LAW-02")
+    if not isinstance(parts, list):
+        raise TooLittle("no latitudes in the recording")
+    logs = [columns(e.with_can(CanLog(frames=e.can.frames[a:b]))) for _, a, b in parts]
+    c = {name: np.concatenate([log[name] for log in logs]) for name in logs[0]}
+    wz = np.repeat([vertical_degph(d) for d, _, _ in parts], [len(log["U2"]) for log in logs])
+    if (c["MODE"] != Mode.HOLD).any():
+        raise TooLittle("another mode than 2")
+    b, g = np.radians(c["BETA"]), np.radians(c["GAMMA"])
+    moved = wrapped(c["ENCODER"] - c["ENCODER"][0])
+    m2 = _number(e, "m2_per_s")
+    law = -m2 * moved * 3600 + wz * np.cos(b) * np.cos(g)
+    most = row.limit("tolerance_degph") + m2 * row.limit("encoder_step_arcsec")
+    return _as_the_law(c["U2"], law + np.median(c["U2"] - law), np.ones(len(law), bool), most)
 
 
 @proves("GYRO-LAW-03")
@@ -241,9 +256,10 @@ def rates_are_limited_and_say_so(e: Evidence) -> str:
     """Look at U1, U2 and SATURATED when the level is told wrongly and the loop is stiff."""
     c, most = columns(e), row_for(e, *LIMITS).limit("rate_max_dps") * 3600
     top = np.maximum(np.abs(c["U1"]), np.abs(c["U2"]))
-    if top.max() > most + 1.0:
+    near = row_for(e, *LIMITS).limit("tolerance_degph")
+    if top.max() > most + near:
         raise Broken(f"{top.max() / 3600:.3f} deg/s", f"{most / 3600:g} deg/s at most")
-    at_limit = top > most - 1.0
+    at_limit = top > most - near
     if not at_limit.any():
         raise TooLittle(f"{top.max() / 3600:.3f} deg/s at most: nothing was limited")
     if (at_limit != (c["SATURATED"] == 1)).any():
@@ -291,7 +307,7 @@ def missing_frames_are_told(e: Evidence) -> str:
     period_s = row_for(e, "GYRO-CAN-02").limit("period_us") * 1e-6
     due = float(steps[-1] - steps[0]) * period_s + row.limit("ends_s")
     took = ended[-1] - begun[0]
-    if abs(took - due) > 0.1:  # silence is known after 50 ms
+    if abs(took - due) > row.limit("tolerance_s"):
         raise Broken(f"ended {took:.3f} s after it began", f"{due:.3f} s")
     return f"LEVEL_LOST in {int(lost.sum())} readings, FF21h ended {took:.3f} s after it began"
 
@@ -302,7 +318,7 @@ def angles_stay_without_the_level_unit(e: Evidence) -> str:
     """Look at BETA, GAMMA and U1 while the level unit is silent."""
     row, c = row_for(e, "GYRO-LEV-04"), columns(e)
     lost = np.flatnonzero(c["LEVEL_LOST"] == 1)
-    silent = round(row.limit("silent_ms") * 1e-3 / 0.01)
+    silent = round(row.limit("silent_ms") * 1e3 / row_for(e, "GYRO-CAN-02").limit("period_us"))
     if len(lost) < 2 * silent:
         raise TooLittle(f"{len(lost)} readings without the level unit")
     mine = lost[silent:-silent]
@@ -315,18 +331,31 @@ def angles_stay_without_the_level_unit(e: Evidence) -> str:
     return f"{len(mine)} readings with the same angles and U1, one emergency"
 
 
-@proves("GYRO-MODE-01", "GYRO-RES-01")
+@proves("GYRO-MODE-01")
 @check("power_on", needs={"can"})
-def after_res_the_torquers_are_left_alone(e: Evidence) -> str:
-    """Look at U1, U2, STEP and MODE after a Res while it levelled."""
-    if not len(e.frames_of("GYRO_HEARTBEAT")):
-        raise TooLittle("no boot-up message came after Res")
+def in_mode_0_the_torquers_are_left_alone(e: Evidence) -> str:
+    """Look at U1 and U2 of the readings with mode 0."""
     c = columns(e)
-    if c["U1"].any() or c["U2"].any() or c["MODE"].any():
-        raise Broken(f"U1 {np.abs(c['U1']).max():g}, U2 {np.abs(c['U2']).max():g} deg/h, mode {c['MODE'].max():g}", "0")
-    if c["STEP"][0] > 1:
-        raise Broken(f"STEP {c['STEP'][0]:g} first", "0 or 1")
-    return f"{len(c['U1'])} readings of mode 0, U1 and U2 0, STEP from {c['STEP'][0]:g}"
+    mine = c["MODE"] == Mode.OFF
+    if mine.sum() < LEAST:
+        raise TooLittle(f"{int(mine.sum())} readings of mode 0")
+    if c["U1"][mine].any() or c["U2"][mine].any():
+        raise Broken(f"U1 {np.abs(c['U1'][mine]).max():g}, U2 {np.abs(c['U2'][mine]).max():g} deg/h", "0")
+    return f"{int(mine.sum())} readings of mode 0, U1 and U2 0"
+
+
+@proves("GYRO-RES-01")
+@check("power_on", needs={"can"})
+def res_ends_the_mode_and_counts_anew(e: Evidence) -> str:
+    """Look at MODE and STEP after a Res while it levelled."""
+    period_s = row_for(e, "GYRO-CAN-02").limit("period_us") * 1e-6
+    late = late_readings(e, "GYRO_HEARTBEAT", MESSAGES[0], 0.0, period_s)
+    c = columns(e)
+    if c["MODE"].any():
+        raise Broken(f"mode {c['MODE'].max():g}", "0")
+    if c["STEP"][0] > 1 + late:
+        raise Broken(f"STEP {c['STEP'][0]:g} first", f"{1 + late} at most")
+    return f"{len(c['MODE'])} readings of mode 0, STEP from {c['STEP'][0]:g}"
 
 
 @proves("GYRO-MODE-04")
@@ -385,18 +414,105 @@ def windows_begin_settled(e: Evidence) -> str:
     return f"{len(begins)} windows, settled for {least} steps and more"
 
 
+@proves("GYRO-MODE-06")
+@check("tilted", needs={"can"})
+def a_window_waits_for_the_level(e: Evidence) -> str:
+    """Look at BETA from the begin of settling to the first window of a run that begins half a degree off."""
+    row, c = row_for(e, "GYRO-MODE-06"), columns(e)
+    most = row.limit("tolerance_arcmin") / 60
+    settling = np.flatnonzero((c["MODE"] == Mode.GYROCOMPASS) & (c["PHASE"] == Phase.SETTLING))
+    window = np.flatnonzero(c["PHASE"] == Phase.WINDOW)
+    if not len(settling) or abs(c["BETA"][settling[0]]) < 2 * most:
+        raise TooLittle("the run does not begin far enough off the level")
+    if not len(window) or abs(c["BETA"][window[0]]) > most:
+        saw = f"beta {c['BETA'][window[0]]:.4f} deg" if len(window) else "no window"
+        raise Broken(saw, f"one that begins within {most:.4f} deg")
+    return f"beta {c['BETA'][settling[0]]:.4f} deg as settling begins, {c['BETA'][window[0]]:.4f} deg in the window"
+
+
+@proves("GYRO-MODE-08")
+@check("navigation", needs={"can"})
+def navigation_keeps_the_azimuth(e: Evidence) -> str:
+    """Compare the heading of a parked vehicle before and after some time of mode 6, its drift being compensated."""
+    row = row_for(e, "GYRO-MODE-08")
+    most = row.limit("drift_max_degph")
+    moved_degph = abs(_number(e, "moved_deg")) / _number(e, "moved_s") * 3600
+    drift_degph, free_degph = _number(e, "drift_degph"), _number(e, "free_deg") / _number(e, "free_s") * 3600
+    saw = f"{moved_degph:.3f} deg/h in {_number(e, 'moved_s'):.1f} s, {free_degph:.3f} without what cancels the drift"
+    if moved_degph > most:
+        raise Broken(saw, f"{most:g} deg/h at most")
+    if abs(abs(free_degph) - abs(drift_degph)) > row.limit("free_tolerance_pct") / 100 * abs(drift_degph):
+        raise Broken(saw, f"the drift of {abs(drift_degph):.3f} deg/h where nothing cancels it")
+    return saw
+
+
+def _turns(e: Evidence) -> list[tuple[float, float, Mapping[str, Floats]]]:
+    """From, to, deg, and the readings of each turn by mode 3. Raises TooLittle."""
+    parts = e.facts.get("turns")
+    if not isinstance(parts, list) or not parts:
+        raise TooLittle("no turns in the recording")
+    logs = [columns(e.with_can(CanLog(frames=e.can.frames[a:b]))) for _, a, b in parts]
+    ends = [float(logs[0]["ENCODER"][0])] + [float(to) for to, _, _ in parts]
+    return list(zip(ends[:-1], ends[1:], logs, strict=True))
+
+
+@proves("GYRO-MODE-02")
+@check("turns", needs={"can"})
+def a_turn_ends_at_its_angle_and_holds(e: Evidence) -> str:
+    """Look where ENCODER ends in each turn by mode 3, and whether it stays there in mode 2."""
+    row, held = row_for(e, "GYRO-MODE-02"), e.facts.get("held")
+    turns, worst = _turns(e), 0.0
+    for _, to, c in turns:
+        off = abs(float(wrapped(np.array([c["ENCODER"][-1] - to]))[0]))
+        if off > row.limit("encoder_off_max_arcmin") / 60:
+            raise Broken(f"{c['ENCODER'][-1]:.4f} deg", f"{to:g} deg")
+        worst = max(worst, off)
+    if not isinstance(held, tuple):
+        raise TooLittle("mode 2 is not in the recording")
+    c = columns(e.with_can(CanLog(frames=e.can.frames[held[0] : held[1]])))
+    mine = c["MODE"] == Mode.HOLD
+    moved = np.abs(wrapped(c["ENCODER"][mine] - turns[-1][2]["ENCODER"][-1]))
+    if mine.sum() < LEAST or moved.max() > row.limit("tolerance_arcmin") / 60:
+        raise Broken(f"{int(mine.sum())} readings of mode 2", "the angle that the gimbal has")
+    return f"{len(turns)} turns, {worst:.4f} deg off at the end; {moved.max():.4f} deg in mode 2"
+
+
+@proves("GYRO-MODE-03")
+@check("turns", needs={"can"})
+def turns_take_the_shorter_way(e: Evidence) -> str:
+    """Look at ENCODER on the way: where it turns, how far and how fast."""
+    row, seen = row_for(e, "GYRO-MODE-03"), []
+    period_s = row_for(e, "GYRO-CAN-02").limit("period_us") * 1e-6
+    allowed = 1 + row.limit("tolerance_pct") / 100
+    for at, to, c in _turns(e):
+        way = 180.0 - (180.0 - (to - at)) % 360.0  # of two alike the positive one
+        steps = wrapped(np.diff(c["ENCODER"]))
+        made, rates = float(steps.sum()), steps / period_s
+        if abs(made - way) > row.limit("way_tolerance_deg"):
+            raise Broken(f"{made:.2f} deg from {at:g} to {to:g}", f"{way:g} deg")
+        fastest = float(np.abs(rates).max())
+        if fastest > allowed * row.limit("rate_dps"):
+            raise Broken(f"{fastest:.2f} deg/s", f"{row.limit('rate_dps'):g} deg/s")
+        over = round(ACCEL_OVER_S / period_s)
+        pushed = float(np.abs(rates[over:] - rates[:-over]).max()) / ACCEL_OVER_S
+        if pushed > allowed * row.limit("accel_dps2"):
+            raise Broken(f"{pushed:.2f} deg/s2", f"{row.limit('accel_dps2'):g} deg/s2")
+        seen.append(f"{made:.1f} deg with {fastest:.2f} deg/s and {pushed:.1f} deg/s2")
+    return "; ".join(seen)
+
+
 @proves("GYRO-MODE-07")
 @check("navigation", needs={"can"})
 def a_calibration_measures_one_window(e: Evidence) -> str:
     """Follow PHASE in mode 5 and count the readings of its window."""
-    row, c = row_for(e, "GYRO-MODE-07"), columns(e)
+    c = columns(e)
     here = np.flatnonzero(c["MODE"] == Mode.CALIBRATE)
     if len(here) < 100:
         raise TooLittle("no calibration in the recording")
     phases = c["PHASE"][here].astype(np.int64)
     order = [int(p) for k, p in enumerate(phases) if k == 0 or p != phases[k - 1]]
     window = int((phases == Phase.WINDOW).sum())
-    due = round(row.limit("window_s") / (row_for(e, "GYRO-CAN-02").limit("period_us") * 1e-6))
+    due = round(_number(e, "calibration_s") / (row_for(e, "GYRO-CAN-02").limit("period_us") * 1e-6))
     if order != [Phase.SETTLING, Phase.WINDOW] or window != due:
         raise Broken(f"phases {order}, {window} readings of its window", f"2, 3 and {due}")
     after = c["MODE"][here[-1] + 1 :]
@@ -417,11 +533,14 @@ def lines_show_the_phases(e: Evidence) -> str:
     )
     rises, n = e.wires.rises("STEP"), len(c["PHASE"])
     at = rises + round(US)
-    for name, phase in PHASES.items():
-        high = int((e.wires[name].at(at) == 1).sum())
-        told = int((c["PHASE"] == phase).sum())
-        if abs(high - told) > abs(len(rises) - n) + 2:
-            raise Broken(f"{name} high in {high} steps", f"{told} readings with phase {int(phase)}", lines=LINES)
+    shown = np.stack([e.wires[name].at(at) for name in PHASES], axis=1).astype(np.int64)
+    told = np.stack([c["PHASE"] == phase for phase in PHASES.values()], axis=1).astype(np.int64)
+    if _runs(shown) != _runs(told):
+        raise Broken(f"{', '.join(PHASES)} in turn {_runs(shown)}", f"{_runs(told)} as PHASE tells", lines=LINES)
+    if not len(e.wires.gaps_ns):
+        off = np.abs(shown.sum(axis=0) - told.sum(axis=0))
+        if off.max() > abs(len(rises) - n) + 2:  # steps at the ends of the recording
+            raise Broken(f"{', '.join(PHASES)} high in {shown.sum(axis=0)} steps", f"{told.sum(axis=0)}", lines=LINES)
     if not int(e.wires["READY"].at(e.wires.end_ns)):
         raise Broken("READY low in a run", "high", lines=LINES)
     return f"{seen}; SLEW, SETTLE and WINDOW with their phases"

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 
-from psabench.conform.evidence import CanLog, Evidence
+from psabench.conform.after_res import late_readings
+from psabench.conform.evidence import CanLog, Evidence, LineLog
 from psabench.conform.intervals import before, first_bad, interval, wires_needed
 from psabench.conform.limits import row_for
+from psabench.conform.messages import as_laid_out, in_turn
 from psabench.conform.outcome import Broken, TooLittle
 from psabench.conform.plan import check
 from psabench.conform.proof import proves
@@ -70,8 +70,9 @@ def _allowed_hz(e: Evidence, volts: float, part: float) -> float:
 def the_frequency_follows_the_input(e: Evidence) -> str:
     """Compare pulses a second with the volts at the inputs."""
     k, seen = row_for(e, *COEFFICIENT).limit("k_hz_per_v"), []
+    part = row_for(e, "PIK-LAW-01").limit("pik6_tolerance_pct" if e.variant.board == "pik6" else "tolerance_pct") / 100
     for axis, (volts, hz) in rates(e).items():
-        most = _allowed_hz(e, volts, 2 * row_for(e, *COEFFICIENT).limit("error_max_pct") / 100)
+        most = _allowed_hz(e, volts, part)
         if abs(hz - k * volts) > most:
             raise Broken(f"{hz:.3f} Hz at {volts:g} V on {axis.upper()}", f"{k * volts:.3f} +- {most:.3f} Hz")
         seen.append(f"{hz:.2f}")
@@ -170,22 +171,15 @@ def signs_have_their_lines(e: Evidence) -> str:
 def a_reset_lasts_its_time(e: Evidence) -> str:
     """Measure the pulses."""
     wires_needed(e, *PULSES)
-    due_ns, slack_ns = _tclk_ns(e), 2.0
+    due_ns = _tclk_ns(e)
+    slack_ns = ROUNDED_NS + due_ns * row_for(e, "PIK-LAW-08").limit("clock_error_ppm") * 1e-6
     seen = ""
     for name in PULSES:
         up, down = e.wires.pulses(name, 1)
         known = up > e.wires.start_ns + LAG_NS
         up, down = up[known], down[known]
         if len(up):
-            seen = interval(
-                e,
-                up,
-                down,
-                due_ns,
-                slack_ns + due_ns * row_for(e, "PIK-LAW-08").limit("clock_error_ppm") * 1e-6,
-                f"of {name} high",
-                (name,),
-            )
+            seen = interval(e, up, down, due_ns, slack_ns, f"of {name} high", (name,))
     if not seen:
         raise TooLittle("no pulse was recorded")
     return seen
@@ -210,7 +204,7 @@ def pulses_begin_on_their_grid(e: Evidence) -> str:
         inside = rises[rises > (clock[0] if len(clock) else e.wires.end_ns)]
         phase = (inside - before(clock, inside + 1)) / tick_ns
         off_ns = np.abs(phase - np.rint(phase)) * tick_ns
-        slack_ns = 3.0 + e.slack_ns(tclk_ns)
+        slack_ns = ROUNDED_NS + row.limit("tolerance_ns") + e.slack_ns(tclk_ns)
         first_bad(
             off_ns > slack_ns,
             inside,
@@ -238,10 +232,11 @@ def pulses_begin_on_their_grid(e: Evidence) -> str:
 def counts_are_the_pulses(e: Evidence) -> str:
     """Count pulses between falls of LATCH and compare them with the readings."""
     wires_needed(e, *PULSES, "LATCH")
-    latch = e.wires.falls("LATCH")
+    log = e.wires.unbroken()
+    latch = log.falls("LATCH")
     if len(latch) < LEAST:
         raise TooLittle(f"{len(latch)} latches were recorded")
-    seen = np.stack([_between(e, f"F{a}P", latch) - _between(e, f"F{a}N", latch) for a in "XYZ"], axis=1)
+    seen = np.stack([_between(log, f"F{a}P", latch) - _between(log, f"F{a}N", latch) for a in "XYZ"], axis=1)
     raw = _told(e, "PIK_COUNTS").raw("PIK_COUNTS")
     told = np.stack([raw[a] for a in "XYZ"], axis=1)
     n, m = len(seen), len(told)
@@ -257,8 +252,8 @@ def counts_are_the_pulses(e: Evidence) -> str:
     )
 
 
-def _between(e: Evidence, name: str, latch: Ints) -> Ints:
-    found: Ints = np.diff(np.searchsorted(e.wires.rises(name), latch, "right"))
+def _between(log: LineLog, name: str, latch: Ints) -> Ints:
+    found: Ints = np.diff(np.searchsorted(log.rises(name), latch, "right"))
     return found
 
 
@@ -267,9 +262,9 @@ def _between(e: Evidence, name: str, latch: Ints) -> Ints:
 def counters_are_latched_every_period(e: Evidence) -> str:
     """Measure from one fall of LATCH to the next."""
     wires_needed(e, "LATCH")
-    due_ns = row_for(e, "PIK-CNT-02").limit("default_us") * US
-    falls = e.wires.falls("LATCH")
-    return interval(e, falls[:-1], falls[1:], due_ns, US, "from latch to latch", ("LATCH",))
+    row, falls = row_for(e, "PIK-CNT-02"), e.wires.falls("LATCH")
+    due_ns, tolerance_ns = row.limit("default_us") * US, row.limit("tolerance_us") * US
+    return interval(e, falls[:-1], falls[1:], due_ns, tolerance_ns, "from latch to latch", ("LATCH",))
 
 
 @proves("PIK-CNT-03")
@@ -286,14 +281,7 @@ def latch_is_low_for_its_time(e: Evidence) -> str:
 @check("stream", needs={"can"})
 def three_messages_make_a_reading(e: Evidence) -> str:
     """Follow the messages of each reading."""
-    ids = {e.frames_of(n).frames[0].can_id: k for k, n in enumerate(MESSAGES) if len(e.frames_of(n))}
-    if len(ids) < len(MESSAGES):
-        raise Broken(f"{len(ids)} of the messages {', '.join(MESSAGES)}", "three")
-    order = [(ids[f.can_id], f) for f in e.can.frames if f.can_id in ids and not f.sent]
-    for (a, _), (b, f) in pairwise(order):
-        if b != (a + 1) % len(MESSAGES):
-            raise Broken(f"{MESSAGES[b]} after {MESSAGES[a]}", "the three in turn", frames=(f,))
-    return f"{len(order)} messages in turn"
+    return in_turn(e, MESSAGES)
 
 
 @proves("PIK-CAN-02")
@@ -329,34 +317,24 @@ def readings_are_numbered_and_stamped(e: Evidence) -> str:
 @check("stream", needs={"can"})
 def messages_have_their_lengths(e: Evidence) -> str:
     """Look at lengths and at bits without a signal."""
-    for name in MESSAGES:
-        log = e.frames_of(name)
-        if not len(log):
-            raise TooLittle(f"no {name} came")
-        used = 0
-        for s in message(name).signals:
-            used |= ((1 << s.length) - 1) << s.start
-        due = int(message(name).length)
-        bad = [f for f in log.frames if len(f.data) != due or int.from_bytes(f.data, "little") & ~used]
-        if bad:
-            raise Broken(f"{name} {bad[0].data.hex(' ')}", f"{due} bytes, 0 in bits without a signal", frames=bad)
-    return ", ".join(MESSAGES)
+    return as_laid_out(e, MESSAGES)
 
 
 @proves("PIK-RES-01")
 @check("power_on", needs={"can"})
 def counters_begin_with_res(e: Evidence) -> str:
     """Look at SEQ and the totals of the first reading after Res."""
-    if not len(e.frames_of("PIK_HEARTBEAT")):
-        raise TooLittle("no boot-up message came after Res")
+    row, period_s = row_for(e, "PIK-RES-01"), row_for(e, "PIK-CNT-02").limit("default_us") * 1e-6
     raw = _told(e, "PIK_COUNTS", 2).raw("PIK_COUNTS")
     _, n = totals(e, 2)
-    counts = [int(raw[a][0]) for a in "XYZ"]
-    if int(raw["SEQ"][0]) != 1 or n[0].tolist() != counts:
-        raise Broken(
-            f"SEQ {int(raw['SEQ'][0])}, totals {n[0].tolist()}, counts {counts}", "SEQ 1, totals as the counts"
-        )
-    return f"SEQ 1, totals {n[0].tolist()}"
+    seq, counts = int(raw["SEQ"][0]), [int(raw[a][0]) for a in "XYZ"]
+    late = late_readings(e, "PIK_HEARTBEAT", "PIK_COUNTS", period_s, period_s)
+    if not 1 <= seq <= 1 + late or (seq == 1 and n[0].tolist() != counts):
+        raise Broken(f"SEQ {seq}, totals {n[0].tolist()}, counts {counts}", "SEQ 1, totals as the counts")
+    each = (n[-1] - n[0]) / (len(n) - 1)
+    if np.abs(n[0] - seq * each).max() > row.limit("error_max_pulses"):
+        raise Broken(f"totals {n[0].tolist()} in reading {seq}", f"{(seq * each).round(1).tolist()} since Res")
+    return f"SEQ {seq}, totals {n[0].tolist()}"
 
 
 @proves("PIK-SIG-01")

@@ -28,11 +28,10 @@ SPARE = 3
 def samples(e: Evidence, least: int = LEAST) -> tuple[Ints, Ints]:
     """Instants of the rises of SH and the integrator that each samples: MUX just before it. Raises TooLittle."""
     wires_needed(e, "SH", *MUX)
-    rises = e.wires.rises("SH")
+    log = e.wires.unbroken()
+    rises = log.rises("SH")
     pause_ns = row_for(e, "PMKA-SAMP-01").limit("ts_us") * US / 2
-    begins = np.flatnonzero(
-        np.diff(rises, prepend=e.wires.start_ns) > pause_ns
-    )  # what comes before is a part of a reading
+    begins = np.flatnonzero(np.diff(rises, prepend=log.start_ns) > pause_ns)  # what comes before is a part of a reading
     rises = rises[int(begins[0]) :] if len(begins) else rises[:0]
     if len(rises) < 4 * least:
         raise TooLittle(f"{len(rises)} samples were recorded; {4 * least} are wanted")

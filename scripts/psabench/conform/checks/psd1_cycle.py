@@ -134,7 +134,12 @@ def a0_falls_where_the_profile_says(e: Evidence) -> str:
     due = of(z, "rise" if early else "clear")
     fell = after(e.wires.falls("A0"), starts(e, whole))
     return together(
-        e, fell, due, 1.0, f"A0 and the {'rise of RFZ' if early else 'end of the last FL2'}", ("A0", "RFZ", "FL2")
+        e,
+        fell,
+        due,
+        row_for(e, "PSD1-CYC-08").limit("tolerance_ns"),
+        f"A0 and the {'rise of RFZ' if early else 'end of the last FL2'}",
+        ("A0", "RFZ", "FL2"),
     )
 
 

@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 from psabench.conform.evidence import Evidence
+from psabench.conform.gyro_readings import columns, vertical_degph
 from psabench.conform.outcome import TooLittle
 from psabench.conform.plan import scene
 from psabench.conform.subject import Subject
-from psabench.devices.gyro import SETTINGS, Gyro, Mode
+from psabench.devices.gyro import SETTINGS, Gyro, Mode, Phase
 from psabench.unit import NMT_PREOP, NMT_START
 
 READY_S = 0.4
-STEP_S = 0.01
-LEVEL_S = 12.0  # from half a degree to seconds of arc, with m1 = 1/s
-WAIT_S = 1.0
+LEVEL_LIMIT_S = 15.0  # from half a degree, with m1 = 1/s
+LEVELLED_DEG = 1 / 60  # an arc minute: the Earth and the drift leave half of it
+WAIT_S = 0.5
 RUN_LIMIT_S = 150.0
+TURN_LIMIT_S = 30.0  # half a turn takes 21 s
+TURNS_DEG = (90.0, 270.0, 0.0, -100.0)  # from where it is, a half, one over 360, one the other way
+CALIBRATION_S, NAVIGATION_S, FREE_S = 30.0, 30.0, 5.0
+LEVEL_S = 3.0  # of readings in mode 1
+TILT_G, SLOW_PER_S = 0.0087, 0.15  # half a degree; 12 s from there to the tolerance of 5 arc minutes
 FACTS = ("m1_per_s", "m2_per_s", "latitude_deg", "zero_x_v", "zero_y_v", "scale_x_v_per_g", "scale_y_v_per_g")
 
 
@@ -56,6 +62,34 @@ def until_mode(s: Subject, mode: Mode, limit_s: float) -> None:
         left_s -= WAIT_S
 
 
+def levelled(s: Subject) -> None:
+    """As after power-on, and level."""
+    calm(s)
+    unit(s).mode = Mode.LEVEL
+    left_s = LEVEL_LIMIT_S
+    while True:
+        s.run_for(WAIT_S)
+        left_s -= WAIT_S
+        if abs(unit(s).beta_deg) <= LEVELLED_DEG:
+            return
+        if left_s <= 0:
+            raise TooLittle(f"the platform is not level after {LEVEL_LIMIT_S:g} s")
+
+
+def slew(s: Subject, to_deg: float) -> None:
+    """Turn there and stand for a second. Raises TooLittle where the turn does not end."""
+    unit(s).set(slew_deg=to_deg)
+    unit(s).mode = Mode.SLEW
+    s.run_for(0.1)
+    left_s = TURN_LIMIT_S
+    while unit(s).phase == Phase.SLEWING:
+        if left_s <= 0:
+            raise TooLittle(f"a turn to {to_deg:g} deg does not end within {TURN_LIMIT_S:g} s")
+        s.run_for(WAIT_S)
+        left_s -= WAIT_S
+    s.run_for(1.0)
+
+
 @scene("power_on", boards=("gyro",))
 def power_on(s: Subject) -> Evidence:
     """From Res on while it levels, streaming as soon as it has booted."""
@@ -74,11 +108,10 @@ def power_on(s: Subject) -> Evidence:
 @scene("run", boards=("gyro",))
 def run(s: Subject) -> Evidence:
     """Levelling, then a run of three positions with the settings of power-on, on the lines and on CAN."""
-    calm(s)
+    levelled(s)
     facts = settings(s)
     with s.take() as take:
         s.unit.start()
-        unit(s).mode = Mode.LEVEL
         s.run_for(LEVEL_S)
         unit(s).mode = Mode.GYROCOMPASS
         until_mode(s, Mode.HOLD, RUN_LIMIT_S)
@@ -90,26 +123,106 @@ def run(s: Subject) -> Evidence:
 
 @scene("navigation", boards=("gyro",))
 def navigation(s: Subject) -> Evidence:
-    """Levelling, a calibration, then navigation with what it gave."""
-    calm(s)
-    facts = settings(s)
-    unit(s).mode = Mode.LEVEL
-    s.run_for(LEVEL_S)
+    """A calibration, then the drift about z that it gave, navigation with it, and the heading of a parked vehicle."""
+    levelled(s)
+    facts = settings(s) | {"calibration_s": CALIBRATION_S}
+    unit(s).set(calibration_s=CALIBRATION_S)
     with s.take(lines=False) as take:
         s.unit.start()
         unit(s).mode = Mode.CALIBRATE
         until_mode(s, Mode.HOLD, RUN_LIMIT_S)
         s.unit.stop()
     take.facts |= facts
+    e = s.evidence("navigation", take)
+    c = columns(e)
+    window = c["PHASE"] == Phase.WINDOW
+    if not window.any():
+        return e
+    drift = float(c["U2"][window].mean()) - vertical_degph(unit(s).get("latitude_deg"))
+    unit(s).set(drift2_degph=drift, azimuth_deg=float(c["ENCODER"][-1]))
+    unit(s).mode = Mode.NAVIGATE
+    s.run_for(5.0)
+    take.facts["drift_degph"] = drift
+    take.facts["moved_deg"], take.facts["moved_s"] = _moved(s, NAVIGATION_S)
+    unit(s).set(drift2_degph=0.0)  # the heading is alive: it shows the drift that nothing cancels
+    take.facts["free_deg"], take.facts["free_s"] = _moved(s, FREE_S)
+    calm(s)
     return s.evidence("navigation", take)
+
+
+def _moved(s: Subject, dwell_s: float) -> tuple[float, float]:
+    """How far the heading moves, deg, and in how many seconds of the bench."""
+    first_deg, begun_s = unit(s).heading_deg, s.bench.time_s
+    s.run_for(dwell_s)
+    return (unit(s).heading_deg - first_deg + 180.0) % 360.0 - 180.0, s.bench.time_s - begun_s
+
+
+@scene("turns", boards=("gyro",))
+def turns(s: Subject) -> Evidence:
+    """Turns of all kinds by mode 3, then mode 2."""
+    levelled(s)
+    parts: list[tuple[float, int, int]] = []  # angle, first and last frame
+    with s.take(lines=False) as take:
+        s.unit.start()
+        s.run_for(0.1)
+        for to_deg in TURNS_DEG:
+            begin = len(take.frames)
+            slew(s, to_deg)
+            parts.append((to_deg, begin, len(take.frames)))
+        begin = len(take.frames)
+        unit(s).mode = Mode.HOLD
+        s.run_for(3.0)
+        s.unit.stop()
+    take.facts |= {"turns": parts, "held": (begin, len(take.frames))}
+    calm(s)
+    return s.evidence("turns", take)
+
+
+@scene("hold", boards=("gyro",))
+def hold(s: Subject) -> Evidence:
+    """Mode 2 with one latitude, then with that of the other hemisphere, which turns Wz round."""
+    levelled(s)
+    facts = settings(s)
+    latitude_deg = unit(s).get("latitude_deg")
+    unit(s).mode = Mode.HOLD
+    s.run_for(1.0)
+    parts: list[tuple[float, int, int]] = []  # latitude, first and last frame
+    with s.take(lines=False) as take:
+        s.unit.start()
+        for told_deg in (latitude_deg, -latitude_deg):
+            unit(s).set(latitude_deg=told_deg)
+            s.run_for(0.1)
+            begin = len(take.frames)
+            s.run_for(2.0)
+            parts.append((told_deg, begin, len(take.frames)))
+        s.unit.stop()
+    take.facts |= facts | {"latitudes": parts}
+    calm(s)
+    return s.evidence("hold", take)
+
+
+@scene("tilted", boards=("gyro",))
+def tilted(s: Subject) -> Evidence:
+    """A run that begins half a degree off the level, with a slow loop and no settling time: its first window."""
+    levelled(s)
+    zero_v, scale_v = unit(s).get("zero_y_v"), unit(s).get("scale_y_v_per_g")
+    unit(s).set(zero_y_v=zero_v + scale_v * TILT_G)
+    s.run_for(5.0)
+    unit(s).set(m1_per_s=SLOW_PER_S, zero_y_v=zero_v, settle_s=0.0, settle_limit_s=60.0, count=1, window_s=1.0)
+    unit(s).positions_deg = (round(unit(s).encoder_deg),)
+    with s.take(lines=False) as take:
+        s.unit.start()
+        unit(s).mode = Mode.GYROCOMPASS
+        until_mode(s, Mode.HOLD, RUN_LIMIT_S)
+        s.unit.stop()
+    calm(s)
+    return s.evidence("tilted", take)
 
 
 @scene("limits", boards=("gyro",))
 def limits(s: Subject) -> Evidence:
     """A zero of the level sensors that is suddenly told wrongly, with a stiff loop: rates at their limits."""
-    calm(s)
-    unit(s).mode = Mode.LEVEL
-    s.run_for(LEVEL_S)
+    levelled(s)
     with s.take(lines=False) as take:
         s.unit.start()
         s.run_for(0.3)
@@ -126,9 +239,7 @@ def limits(s: Subject) -> Evidence:
 @scene("silence", boards=("gyro",))
 def silence(s: Subject) -> Evidence:
     """The level unit silent for a while, twice: shorter and longer than the unit waits."""
-    calm(s)
-    unit(s).mode = Mode.LEVEL
-    s.run_for(LEVEL_S)
+    levelled(s)
     facts = settings(s)
     with s.take(lines=False) as take:
         s.unit.start()
