@@ -7,11 +7,16 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from psabench.conform.checks.psa2_setup import port_traffic
+from psabench.conform.checks.psa2_words import beside
 from psabench.conform.evidence import CanFrame, CanLog, Evidence
+from psabench.conform.line_frames import transfers
 from psabench.conform.scenes.psa2_can import Answer
 from psabench.protocol_files import message
 from psabench.signals import Ints, layout
 from psabench.vcd import Vcd, Wire
+
+REFUSED, BUSY, NOTHING = Answer(abort=0x06090030), Answer(abort=0x08000022), Answer()
 
 Bad = Callable[[Evidence], Evidence]
 
@@ -190,3 +195,146 @@ def told(name: str, change: Callable[[Any], Any]) -> Bad:
 def answered(name: str, key: Any, answer: Answer) -> Bad:
     """One answer among several is another."""
     return told(name, lambda old: dict(old) | {key: answer})
+
+
+# ---- the board in whole
+
+
+def three_words(e: Evidence) -> Evidence:
+    """CLK stands still while the last word is due."""
+    w, ends = e.wires["CLK"], e.wires.rises("Int")
+    ahead = ends[np.minimum(np.searchsorted(ends, w.t_ns), len(ends) - 1)] - w.t_ns
+    keep = (ahead < 0) | (ahead > 17_000)
+    return rewired(e, "CLK", w.t_ns[keep], w.level[keep])
+
+
+def channel_on_the_line_flipped(e: Evidence) -> Evidence:
+    """The lowest bit of the channel in word T is another in a frame with a new temperature."""
+    b = beside(e)
+    fall_ns = b.fall_ns[np.flatnonzero(b.samples.new)[3]]
+    bits = int(e.variant["word_bits"])
+    return flip("Data", "CLK", int(np.searchsorted(e.wires.rises("CLK"), fall_ns)) + 3 * bits + 16)(e)
+
+
+def without_sdatac(e: Evidence) -> Evidence:
+    """The first SDATAC is another byte."""
+    m = next(m for m in port_traffic(e).of(temp=False) if m.sent == b"\x11")
+    return flip("DIn", "SClk", int(np.searchsorted(e.wires.rises("SClk"), m.begin_ns)) + 3)(e)
+
+
+def drd_a_after_cst(e: Evidence) -> Evidence:
+    """A conversion ends 3 us after a burst for the other port."""
+    return pulse("DRD_A", lambda x: int(x.wires.rises("CST")[4]) + 3000)(e)
+
+
+def dropped(e: Evidence) -> Evidence:
+    """One sample is missing, with both halves."""
+    return gone("PSA2_ZT", 50)(gone("PSA2_XY", 50)(e))
+
+
+def marked(sub: int, value: int) -> Bad:
+    """A register of converter Y reads otherwise."""
+    return answered("read", (0x2003, sub), Answer(value))
+
+
+def temp_register(sub: int, value: int) -> Bad:
+    return answered("read", (0x2001, sub), Answer(value))
+
+
+def counted(sub: int, more: int) -> Bad:
+    return told("after", lambda old: dict(old) | {sub: Answer(old[sub].value + more)})
+
+
+def of_rows(change: Callable[[tuple[Any, ...]], tuple[Any, ...]]) -> Callable[[list[Any]], list[Any]]:
+    return lambda rows: [change(rows[0]), *rows[1:]]
+
+
+def mirror(nth: int) -> Bad:
+    """The nth mirror shows another value."""
+
+    def change(rows: list[Any]) -> list[Any]:
+        index, sub, answer, seq = rows[nth]
+        return [*rows[:nth], (index, sub, Answer(answer.value + 3), seq), *rows[nth + 1 :]]
+
+    return told("mirrors", change)
+
+
+def last_abort(row: tuple[Any, ...]) -> tuple[Any, ...]:
+    return (*row[:-1], NOTHING)
+
+
+def no_emcy(e: Evidence) -> Evidence:
+    return gone("EMCY")(e)
+
+
+def same_gain(e: Evidence) -> Evidence:
+    """Codes that no write changes."""
+    early = e.can.frames[: e.facts["cut"]["gain"]]  # type: ignore[index]
+    return e.with_can(CanLog(frames=early * 4))
+
+
+def late_half(e: Evidence) -> Evidence:
+    """The step stands in Z one frame later."""
+    found = list(e.frames_of("PSA2_ZT").frames)
+    shifted = [found[0], *found[:-1]]
+    it = iter(shifted)
+    return each("PSA2_ZT", lambda f: replace(f, data=next(it).data[:3] + f.data[3:]))(e)
+
+
+def boxcar(e: Evidence) -> Evidence:
+    """A step in the codes without a filter: the first sample until the gain changes, the last one from then on."""
+    begin = e.facts["cut"]["gain"]  # type: ignore[index]
+    found = list(e.can.frames)
+    for name, size in (("PSA2_XY", 6), ("PSA2_ZT", 3)):
+        mine = e.frames_of(name).frames
+        for k, f in enumerate(found):
+            if f.can_id == mine[0].can_id:
+                found[k] = replace(f, data=(mine[0] if k < begin else mine[-1]).data[:size] + f.data[size:])
+    return e.with_can(CanLog(frames=tuple(found)))
+
+
+def twice_the_pulses(e: Evidence) -> Evidence:
+    return pulse("SYNC_A", lambda x: int(x.wires.rises("SYNC_A")[0]) + 5_000_000)(e)
+
+
+def slower_clk(e: Evidence) -> Evidence:
+    """CLK runs slower by a twentieth than its frame allows, from its first rise on."""
+    w = e.wires["CLK"]
+    t0_ns = w.t_ns[1]
+    return rewired(e, "CLK", np.rint(t0_ns + (w.t_ns - t0_ns) * 1.05).astype(np.int64), w.level)
+
+
+def mirrored(e: Evidence) -> Evidence:
+    """Every word is sent most significant bit first."""
+    t = transfers(e.wires)
+    bits = int(e.variant["word_bits"])
+    rises, levels = t.grid_ns(bits).astype(np.int64), t.bits(bits)
+    levels = levels.reshape(-1, 4, bits)[:, :, ::-1].reshape(-1)
+    at = rises.reshape(-1)
+    edges = np.stack((at - 200, at + 200), axis=1).reshape(-1)
+    course = np.stack((levels, np.zeros_like(levels)), axis=1).reshape(-1)
+    return rewired(e, "Data", np.concatenate(([e.wires.start_ns], edges)), np.concatenate(([0], course)))
+
+
+def swap_axes(e: Evidence) -> Evidence:
+    """X and Y are exchanged on CAN."""
+    return each("PSA2_XY", lambda f: replace(f, data=f.data[3:6] + f.data[:3] + f.data[6:]))(e)
+
+
+def same_numbers(e: Evidence) -> Evidence:
+    """Codes that no register corrects."""
+    x = iter([f.data for f in e.frames_of("PSA2_XY").frames[:50]] * 20)
+    return each("PSA2_XY", lambda f: replace(f, data=next(x)[:6] + f.data[6:]))(e)
+
+
+def noisier(e: Evidence) -> Evidence:
+    """Twice the noise."""
+    middle = int.from_bytes(e.frames_of("PSA2_XY").frames[0].data[:3], "little")
+    return signal("PSA2_XY", "X", lambda v: middle + 2 * (v - middle))(e)
+
+
+def steady(e: Evidence) -> Evidence:
+    """The codes of all samples are those of the first."""
+    x, z = e.frames_of("PSA2_XY").frames[0], e.frames_of("PSA2_ZT").frames[0]
+    made = each("PSA2_XY", lambda f: replace(f, data=x.data[:6] + f.data[6:]))(e)
+    return each("PSA2_ZT", lambda f: replace(f, data=z.data[:3] + f.data[3:]))(made)

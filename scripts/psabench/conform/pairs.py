@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -37,6 +37,18 @@ class Pairs:
     def steps(self) -> Ints:
         """(n-1,) by how much SEQ rises."""
         return np.diff(self.seq) % (1 << SEQ_BITS)
+
+    def where(self, keep: Bools) -> Pairs:
+        """Those with keep (n,)."""
+        columns = {f.name: getattr(self, f.name)[keep] for f in fields(self) if f.name != "frames"}
+        return Pairs(**columns, frames=tuple(f for f, k in zip(self.frames, keep, strict=True) if k))
+
+    def unbroken(self) -> None:
+        """Raises Broken for the first gap of SEQ."""
+        bad = np.flatnonzero(self.steps != 1)
+        if len(bad):
+            k = int(bad[0])
+            raise Broken(f"SEQ {self.seq[k]}, then {self.seq[k + 1]}", "one more", frames=self.about(k))
 
     def about(self, k: int) -> tuple[CanFrame, ...]:
         """Frames around sample k, for a report."""

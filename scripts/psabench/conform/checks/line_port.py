@@ -116,7 +116,7 @@ def samples_come_at_their_rate(e: Evidence) -> str:
         raise TooLittle("fewer than two edges")
     samples = (port[-1] - port[0]) * rate_hz / NS
     took_s = (pin[at[1]] - pin[at[0]]) / NS
-    if abs(samples - took_s * rate_hz) > 1.0:
+    if abs(samples - took_s * rate_hz) > row_for(e, "LINE-RATE-01").limit("tolerance_samples"):
         raise Broken(f"{samples:.0f} samples in {took_s:.9f} s", f"{took_s * rate_hz:.1f}", lines=[name])
     return f"{samples:.0f} samples in {took_s:.9f} s"
 

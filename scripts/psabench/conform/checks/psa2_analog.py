@@ -75,12 +75,12 @@ def ofc_and_fsc_act_as_they_should(e: Evidence) -> str:
     """Write an offset and a factor, and compare the codes with those before."""
     row = row_for(e, "PSA2-CHIP-05")
     before = _settled(e, "as it was")
-    raw = before.code[_sound(before)]
+    raw = before.code[_sound(e, before)]
     unity = row.limit("fsc_unity_code")
     said = []
     for name, factor in (("offset", 1.0), ("factor", FACTOR / unity)):
         p = _settled(e, name)
-        saw = p.code[_sound(p)]
+        saw = p.code[_sound(e, p)]
         due = (raw.mean(axis=0) - OFFSET) * factor
         noise = np.maximum(raw.std(axis=0), 1.0) * max(1.0, factor) * row.limit("noise_max_sigma")
         slack = row.limit("tolerance_codes") + noise * np.sqrt(1 / len(raw) + 1 / len(saw))
@@ -94,6 +94,25 @@ def ofc_and_fsc_act_as_they_should(e: Evidence) -> str:
             )
         said.append(f"{name}: off by {off.max():.1f} codes at most")
     return ", ".join(said)
+
+
+@proves("PSA2-ADC-03")
+@check("numbers", needs={"inputs"})
+def clip_tells_of_any_axis(e: Evidence) -> str:
+    """Drive one axis beyond full scale, the others not: the code of that one at its limit, and CLIP."""
+    row, said = row_for(e, "PSA2-ADC-03"), []
+    alone = fact(e, "alone")
+    if set(alone) != {"one high", "one low"}:
+        raise TooLittle("the inputs of the three axes lie too near to each other for one to be driven beyond alone")
+    for name, limit in (("one high", "code_max"), ("one low", "code_min")):
+        p, axis, due = _settled(e, name), alone[name], int(row.limit(limit))
+        others = np.delete(p.code, axis, axis=1)
+        bad = (p.code[:, axis] != due) | (others == due).any(axis=1) | ~p.clip
+        if bad.any():
+            k = int(np.flatnonzero(bad)[0])
+            raise Broken(f"{p.code[k]}, CLIP {int(p.clip[k])}", f"{'XYZ'[axis]} {due} and CLIP 1", frames=p.about(k))
+        said.append(f"{'XYZ'[axis]} {due}")
+    return f"{', then '.join(said)} alone at its limit, with CLIP"
 
 
 @proves("PSA2-ADC-03")
@@ -126,12 +145,13 @@ def _step(e: Evidence) -> tuple[Pairs, int, Floats]:
     tail = np.median(p.code[-50:], axis=0)
     head = np.median(p.code[:50], axis=0)
     swing = tail - head
-    if (np.abs(swing) < 1000).any():
+    row = row_for(e, "PSA2-REG-08")
+    if (np.abs(swing) < row.limit("swing_min_codes")).any():
         raise Broken(
             f"codes {head.round()} before, {tail.round()} after", "another gain shows in all codes", frames=p.about(0)
         )
     y = (p.code - head) / swing
-    moved = np.abs(p.code - head) > 50 * np.maximum(p.code[:50].std(axis=0), 1.0)
+    moved = np.abs(p.code - head) > row.limit("moved_min_sigma") * np.maximum(p.code[:50].std(axis=0), 1.0)
     first = int(np.argmax(moved.any(axis=1)))
     return p, first, y
 
@@ -186,7 +206,8 @@ def the_filter_has_its_corner(e: Evidence) -> str:
     """Response to a step of the gain at the corner and in the pass band."""
     row = row_for(e, "PSA2-CHIP-06")
     corner = (row.limit("corner_per_rate"), row.limit("corner_db"), row.limit("tolerance_db"))
-    for per_rate, due_db, slack_db in (corner, *((f, 0.0, row.limit("passband_db")) for f in (0.1, 0.3))):
+    inside = (row.limit("passband_1_per_rate"), row.limit("passband_2_per_rate"))
+    for per_rate, due_db, slack_db in (corner, *((f, 0.0, row.limit("passband_db")) for f in inside)):
         saw_db = _response_db(e, per_rate)
         if abs(saw_db - due_db) > slack_db:
             raise Broken(f"{saw_db:.3f} dB at {per_rate:g} of the data rate", f"{due_db:g} +- {slack_db:g} dB")
@@ -203,8 +224,9 @@ def three_axes_move_together(e: Evidence) -> str:
     part = y[max(first - 2, 0) : first + 70]
     apart = np.abs(part - part[:, :1]).max(axis=0)
     swing = np.abs(p.code[-50:].mean(axis=0) - p.code[:50].mean(axis=0))
-    most = row_for(e, "PSA2-READ-10").limit("apart_max_ppm") * 1e-6
-    noise = 20.0 * p.code[-50:].std(axis=0) * (1 / swing + 1 / swing[0])
+    row = row_for(e, "PSA2-READ-10")
+    most = row.limit("apart_max_ppm") * 1e-6
+    noise = row.limit("noise_max_sigma") * p.code[-50:].std(axis=0) * (1 / swing + 1 / swing[0])
     if (apart > most + noise).any():
         k = int(np.argmax(apart))
         raise Broken(f"{'XYZ'[k]} {apart[k]:.5f} of the step away from X", f"at most {most:.5f}", frames=p.about(first))
@@ -232,11 +254,12 @@ def settled_tells_of_a_new_gain(e: Evidence) -> str:
 def a_write_changes_all_codes(e: Evidence) -> str:
     """Write CONFIG1 through 2000h: the registers and the codes of all axes."""
     p, _, _ = _step(e)
+    row = row_for(e, "PSA2-REG-08")
     for a in fact(e, "read"):
-        if number(a) != 0x0A:
+        if number(a) != int(row.limit("config1_code")):
             raise Broken(f"CONFIG1 {number(a):02X}h", "0Ah on each converter")
     ratio = np.median(p.code[-50:], axis=0) / np.median(p.code[:50], axis=0)
-    if (np.abs(ratio - 2.0) > row_for(e, "PSA2-ADC-01").limit("tolerance_pct") / 50).any():
+    if (np.abs(ratio - row.limit("ratio")) > row.limit("tolerance_ratio")).any():
         raise Broken(f"codes grew by {ratio.round(4)}", "2, on each axis", frames=p.about(len(p) - 3))
     return f"codes of all axes grew by {ratio.round(5)}"
 
@@ -251,7 +274,7 @@ def noise_is_the_published_one(e: Evidence) -> str:
     row = row_for(e, "PSA2-CHIP-07", "PSA1-CHIP-01")
     p = pairs(e, int(row.limit("readings_count")))
     code_uv = row_for(e, "PSA2-ADC-01").limit("code_uv")
-    sound = _sound(p)
+    sound = _sound(e, p)
     for k in range(3):
         saw_uv = float(p.code[sound, k].std()) * code_uv
         due_uv = row.limit("noise_uv")
@@ -260,10 +283,11 @@ def noise_is_the_published_one(e: Evidence) -> str:
     return f"{(p.code[sound].std(axis=0) * code_uv).round(2)} uV on X, Y, Z"
 
 
-def _sound(p: Pairs) -> np.ndarray:
+def _sound(e: Evidence, p: Pairs) -> np.ndarray:
     """(n,) samples near the middle of their axis: within what no noise leaves."""
     off = np.abs(p.code - np.median(p.code, axis=0))
-    limit = 12.0 * np.maximum(np.median(off, axis=0), 1.0)
+    most = row_for(e, "PSA2-SIG-12", "PSA2-SIG-13").limit("noise_max_mad")
+    limit = most * np.maximum(np.median(off, axis=0), 1.0)
     sound: np.ndarray = (off <= limit).all(axis=1)
     return sound
 
@@ -273,7 +297,7 @@ def _sound(p: Pairs) -> np.ndarray:
 def no_word_is_damaged_by_the_other_port(e: Evidence) -> str:
     """Look for single codes far from the others while temperatures are scanned."""
     p = pairs(e, 100)
-    bad = np.flatnonzero(~_sound(p))
+    bad = np.flatnonzero(~_sound(e, p))
     if len(bad):
         k = int(bad[0])
         raise Broken(
@@ -289,7 +313,7 @@ def no_word_is_damaged_by_the_other_port(e: Evidence) -> str:
 def bursts_damage_words_where_nothing_gates_them(e: Evidence) -> str:
     """Count single codes far from the others."""
     p, row = pairs(e, 100), row_for(e, "PSA2-SIG-13")
-    bad = int((~_sound(p)).sum())
+    bad = int((~_sound(e, p)).sum())
     if bad < row.limit("wrong_min_frames") or bad > row.limit("wrong_max_pct") / 100 * len(p):
         due = f"{row.limit('wrong_min_frames')} and more, at most {row.limit('wrong_max_pct'):g} %"
         raise Broken(f"{bad} wrong frames of {len(p)}", due, frames=p.about(0))

@@ -8,13 +8,14 @@ import numpy as np
 
 from psabench import signals
 from psabench.conform.checks.psa2_serial import LEAST
-from psabench.conform.checks.psa2_stream import DAMAGED, MESSAGES, US, number, unit_us
+from psabench.conform.checks.psa2_stream import MESSAGES, US, number, unit_us
 from psabench.conform.evidence import CanLog, Evidence
 from psabench.conform.limits import row_for
 from psabench.conform.outcome import Broken, TooLittle
 from psabench.conform.pairs import SEQ_BITS, STAMP_BITS, pairs, segment
 from psabench.conform.plan import check
 from psabench.conform.proof import proves
+from psabench.conform.requirements import Requirement
 from psabench.conform.scenes.psa2_can import Answer
 from psabench.protocol_files import message
 from psabench.signals import Ints
@@ -53,10 +54,11 @@ def the_fast_form_drops_bits(e: Evidence) -> str:
     fast = np.stack([raw[a] for a in "XYZ"], axis=1)
     for k in range(3):
         lo, hi = np.percentile(pair.code[:, k], (10, 90)).astype(int)
-        around = 4 * (hi - lo + 2)  # noise of one stay beside that of the other
+        # noise of one stay beside that of the other
+        around = int(row.limit("noise_factor") * (hi - lo) + row.limit("noise_codes"))
         due = (lo - around) >> int(row.limit("shift_bits")), (hi + around) >> int(row.limit("shift_bits"))
         bad = (fast[:, k] < due[0]) | (fast[:, k] > due[1])
-        if bad.sum() > len(bad) * (0.0 if e.variant["gate_sclk"] else DAMAGED):
+        if bad.sum() > len(bad) * (0.0 if e.variant["gate_sclk"] else row.limit("damaged_max_share")):
             raise Broken(
                 f"{'XYZ'[k]} {fast[bad, k][0]}",
                 f"{due[0]} to {due[1]}, codes of form 0 shifted by 3 bits",
@@ -94,7 +96,7 @@ def form_2_is_one_fd_frame_a_sample(e: Evidence) -> str:
     """Look at the frames of form 2: form, length, time stamps."""
     log = _form(e, 2, "PSA2_FRAME")
     _fd(log, "PSA2_FRAME")
-    return f"{len(log)} FD frames, {_evenly(e, log.raw('PSA2_FRAME')['TSTAMP'], 1)}"
+    return f"{len(log)} FD frames, {_evenly(e, row_for(e, 'PSA2-FORM-03'), log.raw('PSA2_FRAME')['TSTAMP'], 1)}"
 
 
 @proves("PSA2-FORM-04")
@@ -103,16 +105,17 @@ def form_3_is_one_fd_frame_every_five_samples(e: Evidence) -> str:
     """Look at the frames of form 3: form, length, time stamps."""
     log = _form(e, 3, "PSA2_BLOCK")
     _fd(log, "PSA2_BLOCK")
-    samples = int(row_for(e, "PSA2-FORM-04").limit("samples_count"))
-    return f"{len(log)} FD frames, {_evenly(e, log.raw('PSA2_BLOCK')['TSTAMP'], samples)}"
+    row = row_for(e, "PSA2-FORM-04")
+    samples = int(row.limit("samples_count"))
+    return f"{len(log)} FD frames, {_evenly(e, row, log.raw('PSA2_BLOCK')['TSTAMP'], samples)}"
 
 
-def _evenly(e: Evidence, stamp_us: Ints, samples: int) -> str:
+def _evenly(e: Evidence, row: Requirement, stamp_us: Ints, samples: int) -> str:
     """Time stamps, us, so many samples apart. Raises Broken."""
     step = np.diff(signals.unwrap(stamp_us, 32))
     due = samples * row_for(e, "PSA2-READ-06").limit("period_us")
-    slack = 2.0 + e.slack_ns(due * 1e3) * 1e-3
-    if (np.abs(step - due) > slack).any():
+    slack_us = row.limit("tolerance_us") + e.slack_ns(due * 1e3) * 1e-3
+    if (np.abs(step - due) > slack_us).any():
         raise Broken(f"{step[np.argmax(np.abs(step - due))]} us from frame to frame", f"{due:.0f} us")
     return f"{due:.0f} us apart"
 
@@ -267,7 +270,10 @@ def sync_pulses_sync_a(e: Evidence) -> str:
     slack_ms = e.slack_ns(settled_ms * 1e6) * 1e-6 if len(later) else 0.0
     if not row.limit("settling_min_ms") - slack_ms <= settled_ms <= row.limit("settling_max_ms") + slack_ms:
         raise Broken(
-            f"DRD_A falls {settled_ms:.3f} ms after SYNC_A", "63.1 ms", at_ns=int(up[0]), lines=("SYNC_A", "DRD_A")
+            f"DRD_A falls {settled_ms:.3f} ms after SYNC_A",
+            f"{row.limit('settling_min_ms')} to {row.limit('settling_max_ms')} ms",
+            at_ns=int(up[0]),
+            lines=("SYNC_A", "DRD_A"),
         )
     return f"SYNC_A, then DRD_A {settled_ms:.4f} ms later"
 

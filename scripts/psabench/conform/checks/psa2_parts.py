@@ -8,10 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from psabench.conform.checks.psa2_serial import (
-    MUX_WRITE,
     RDATA,
     least,
-    near,
     port_bursts,
     rdata_gaps,
     tau_ns,
@@ -25,57 +23,6 @@ from psabench.conform.outcome import Broken, TooLittle
 from psabench.conform.plan import check
 from psabench.conform.proof import proves
 from psabench.conform.spi import Burst, Message
-
-# ---- temperatures
-
-
-@proves("PSA2-TEMP-06")
-@check("stream", needs={"pins"})
-def the_scan_goes_by_its_steps(e: Evidence) -> str:
-    """Decode the messages to the temperature converter, with the edges of SYNC_T and DRD_T between them."""
-    found = temp_messages(e)
-    rises, ready = e.wires.rises("SYNC_T"), e.wires.falls("DRD_T")
-    read_bits = int(row_for(e, "PSA2-TEMP-02").limit("read_bits"))
-    for a, b in itertools.pairwise(found):
-        if a.sent[:2] == bytes([MUX_WRITE, 0]):
-            pulse = rises[(rises > a.end_ns) & (rises < b.begin_ns)]
-            told = ready[(ready > (pulse[-1] if len(pulse) else a.end_ns)) & (ready < b.begin_ns)]
-            good = len(pulse) == 1 and len(told) == 1 and b.sent[:1] == bytes([RDATA])
-        else:
-            good = (
-                a.sent[:1] == bytes([RDATA]) and len(a.sent) == 1 + read_bits // 8 and b.sent[:1] == bytes([MUX_WRITE])
-            )
-        if not good:
-            due = "51 00 mm, SYNC_T, DRD_T, 01 and 24 clocks, in turn"
-            raise Broken(f"{a.name}, then {b.name}", due, at_ns=a.begin_ns, lines=TEMP)
-    return f"{len(found)} messages: MUX, SYNC_T, DRD_T, RDATA in turn"
-
-
-@proves("PSA2-TEMP-07")
-@check("stream", needs={"pins"})
-def bursts_keep_clear_of_the_next_conversion(e: Evidence) -> str:
-    """Measure the end of each burst to the temperature converter to the next fall of DRD_A."""
-    due_ns = row_for(e, "PSA2-TEMP-07").limit("margin_min_us") * 1e3
-    falls = e.wires.falls("DRD_A")
-    ends = np.array([m.end_ns for m in temp_messages(e)], np.int64)
-    ends = ends[ends < falls[-1]] if len(falls) else ends[:0]
-    margin = (falls[np.searchsorted(falls, ends)] - ends).astype(np.float64) if len(ends) else np.empty(0)
-    return least(e, margin, ends, due_ns, "from a burst to the next fall of DRD_A", TEMP)
-
-
-@proves("PSA2-CHIP-10")
-@check("stream", needs={"pins"})
-def a_temperature_settles_in_its_time(e: Evidence) -> str:
-    """Measure the rise of SYNC_T to the next fall of DRD_T."""
-    row = row_for(e, "PSA2-CHIP-10")
-    rises, falls = e.wires.rises("SYNC_T"), e.wires.falls("DRD_T")
-    rises = rises[rises < falls[-1]] if len(falls) else rises[:0]
-    if not len(rises):
-        raise TooLittle("no fall of DRD_T after a pulse on SYNC_T was recorded")
-    saw = (falls[np.searchsorted(falls, rises)] - rises).astype(np.float64)
-    lo, hi = row.limit("t18_min_ms") * 1e6, row.limit("t18_max_ms") * 1e6
-    return near(e, saw, rises, (lo + hi) / 2, (hi - lo) / 2, "from SYNC_T to DRD_T", TEMP)
-
 
 # ---- limits of the parts
 

@@ -18,6 +18,7 @@ from psabench.signals import Floats, Ints
 NS = 1e9
 RDATA, MUX_WRITE = 0x01, 0x51
 READING = ("DRD_A", "SClk", "CST", "DOutX", "Int")
+STILL_IN_A_STREAM = ("Res", "SYNC_A", "DIn")  # lines that only a set-up or a request moves
 LEAST = 5  # messages or instants that a judgement wants
 
 
@@ -84,7 +85,7 @@ def _column(found: Sequence[float]) -> tuple[Floats, Ints]:
 @proves("PSA2-SIG-01")
 @check("stream", needs={"pins"})
 def the_board_has_its_lines(e: Evidence) -> str:
-    """Look for the lines of the article's table in the recording."""
+    """Look for the lines of the article's table in the recording, and for those that a stream moves to move."""
     due = (
         "SYNC_A",
         "SClk",
@@ -105,6 +106,9 @@ def the_board_has_its_lines(e: Evidence) -> str:
     count = int(row_for(e, "PSA2-SIG-01").limit("lines_count"))
     if missing or len(due) != count:
         raise Broken(f"no {', '.join(missing)}", f"{count} lines")
+    still = [name for name in due if name not in STILL_IN_A_STREAM and len(e.wires[name].t_ns) < 2]
+    if still:
+        raise Broken(f"{', '.join(still)} never moves", "it does", at_ns=e.wires.start_ns, lines=still)
     return f"{count} lines"
 
 
@@ -147,6 +151,30 @@ def sync_a_is_high_for_its_time(e: Evidence) -> str:
         raise Broken("no pulse on SYNC_A", "one after Res", at_ns=e.wires.start_ns, lines=("SYNC_A", "Res"))
     saw = (down - up).astype(np.float64)
     return near(e, saw, up, row.limit("pulse_ns"), row.limit("tolerance_ns"), "of SYNC_A high", ("SYNC_A",))
+
+
+@proves("PSA2-SIG-04")
+@check("sync", needs={"pins"})
+def sync_a_moves_on_falling_edges_of_fclk(e: Evidence) -> str:
+    """Pulse SYNC_A while frames flow: where do its edges lie in the clock that the falls of DRD_A before it give?"""
+    row, edges = row_for(e, "PSA2-SIG-04"), e.wires["SYNC_A"].t_ns[1:]
+    if not len(edges):
+        raise Broken("no pulse on SYNC_A", "one for the SYNC with 2024h = 1", at_ns=e.wires.end_ns, lines=("SYNC_A",))
+    falls = e.wires.falls("DRD_A")
+    falls = falls[falls < edges[0]]
+    if len(falls) <= LEAST:
+        raise TooLittle(f"{len(falls)} falls of DRD_A before the pulse")
+    clocks = row_for(e, "PSA2-READ-06").limit("period_tclk")
+    period_ns = float(falls[-1] - falls[-1 - LEAST]) / LEAST / clocks
+    phase = (edges - falls[-1]) / period_ns % 1.0
+    off = np.abs(phase - row.limit("phase_tclk"))
+    slack = row.limit("tolerance_tclk") + e.slack_ns(0.0) / period_ns
+    if (off > slack).any():
+        k = int(np.argmax(off))
+        due = f"{row.limit('phase_tclk')} +- {slack:.3f} tCLK"
+        saw = f"an edge of SYNC_A {phase[k]:.3f} tCLK after the rise of fCLK that DRD_A falls with"
+        raise Broken(saw, due, at_ns=int(edges[k]), lines=("SYNC_A", "DRD_A"))
+    return f"{len(edges)} edges, {phase.min():.3f} to {phase.max():.3f} tCLK after the rise of fCLK"
 
 
 @proves("PSA2-SIG-05")
@@ -233,12 +261,18 @@ def sclk_has_its_frequency_and_rests_low(e: Evidence) -> str:
     if not found:
         raise TooLittle("no burst of SClk was recorded")
     at = np.array([b.rise_ns[0] for b in found])
-    period = np.array([(b.rise_ns[-1] - b.rise_ns[0]) / (b.bits - 1) for b in found])
-    said = near(e, period, at, due_ns, due_ns * row.limit("tolerance_pct") / 100, "a period of SClk", ("SClk",))
+    count = np.array([b.bits - 1 for b in found])
+    period_ns = np.array([b.rise_ns[-1] - b.rise_ns[0] for b in found]) / count
+    slack_ns = due_ns * row.limit("tolerance_pct") / 100 + np.array([e.slack_ns(due_ns * n) for n in count]) / count
+    off = np.abs(period_ns - due_ns) > slack_ns
+    if off.any():
+        k = int(np.flatnonzero(off)[0])
+        due = f"{due_ns:.2f} +- {slack_ns[k]:.2f} ns"
+        raise Broken(f"{period_ns[k]:.2f} ns a period of SClk", due, at_ns=int(at[k]), lines=("SClk",))
     tail = np.array([b.fall_ns[-1] - b.rise_ns[-1] for b in found], np.float64)
     if (tail > due_ns).any():
         raise Broken("SClk high between bursts", "low", at_ns=int(at[tail > due_ns][0]), lines=("SClk",))
-    return said
+    return f"{period_ns.min():.2f} to {period_ns.max():.2f} ns a period of SClk, low between {len(found)} bursts"
 
 
 @proves("PSA2-SIG-10")

@@ -153,7 +153,7 @@ def res_rests_high_and_acts_low(e: Evidence) -> str:
     total_ns = int((high - low).sum())
     if not e.wires["Res"].at(e.wires.end_ns):
         raise Broken("Res low at the end", "high", at_ns=e.wires.end_ns, lines=("Res",))
-    if total_ns * 2 > e.wires.end_ns - e.wires.start_ns:
+    if total_ns > row_for(e, "PSA2-RES-03").limit("low_max_share") * (e.wires.end_ns - e.wires.start_ns):
         raise Broken("Res low most of the time", "high", at_ns=int(low[0]), lines=("Res",))
     return f"{len(low)} low pulse of {total_ns * 1e-3:.1f} us, high otherwise"
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from psabench.conform.checks.psa2_serial import LEAST
 from psabench.conform.checks.psa2_setup import port_traffic
-from psabench.conform.checks.psa2_stream import FORMATS, LINES, MOST_LOST
+from psabench.conform.checks.psa2_stream import FORMATS, LINES
 from psabench.conform.evidence import Evidence
 from psabench.conform.limits import row_for
 from psabench.conform.line_frames import transfers
@@ -38,11 +40,18 @@ WORDS = {
 }  # bits of a code that a word lacks
 
 
-def _beside(e: Evidence) -> tuple[Ints, Pairs, Ints]:
-    """Words X, Y, Z as 24-bit codes (or what is left of them), the samples of the same frames, all words.
+@dataclass(frozen=True, kw_only=True)
+class Beside:
+    """n frames on the line and the samples of the same frames on CAN."""
 
-    The two logs are laid beside each other where most samples agree in X, the others are what is judged.
-    """
+    line: Ints  # (n, 3) words X, Y, Z as 24-bit codes, or what is left of them
+    words: Ints  # (n, 4) as sent
+    fall_ns: Ints  # (n,) of Int
+    samples: Pairs
+
+
+def beside(e: Evidence) -> Beside:
+    """Both logs laid beside each other where most samples agree in an axis; the other axes are what is judged."""
     words, p = _words(e), pairs(e)
     row = row_for(e, *WORDS)
     lost = WORDS[row.id]
@@ -62,17 +71,19 @@ def _beside(e: Evidence) -> tuple[Ints, Pairs, Ints]:
     keep = (i >= 0) & (i < len(words))
     if keep.sum() < LEAST:
         raise TooLittle("the recording and the log have few samples in common")
-    return line[i[keep]] << max(lost, 0), _kept(p, keep), words[i[keep]]
+    at = i[keep]
+    return Beside(
+        line=line[at] << max(lost, 0), words=words[at], fall_ns=transfers(e.wires).fall_ns[at], samples=p.where(keep)
+    )
 
 
-def _kept(p: Pairs, keep: np.ndarray) -> Pairs:
-    columns = {
-        n: getattr(p, n)[keep] for n in ("seq", "code", "temp", "channel", "settled", "clip", "overrun", "new", "stamp")
-    }
-    return Pairs(**columns, frames=tuple(f for f, k in zip(p.frames, keep, strict=True) if k))
+def _codes_due(e: Evidence, p: Pairs) -> Ints:
+    """(n, 3) the codes of CAN with the bits that a word has."""
+    lost = WORDS[row_for(e, *WORDS).id]
+    return p.code >> lost << lost if lost > 0 else p.code
 
 
-def _same(e: Evidence, saw: Ints, due: Ints, p: Pairs, what: str) -> str:
+def _same(saw: Ints, due: Ints, p: Pairs, what: str) -> str:
     """Raises Broken for the first row that differs."""
     bad = saw != due
     bad = bad.any(axis=1) if bad.ndim > 1 else bad
@@ -109,61 +120,75 @@ def words_come_least_significant_bit_first(e: Evidence) -> str:
 @check("stream", needs={"line"})
 def words_are_the_codes(e: Evidence) -> str:
     """Compare the words X, Y and Z of each frame with the codes of the same frame on CAN."""
-    line, p, _ = _beside(e)
-    lost = WORDS[row_for(e, *WORDS).id]
-    due = p.code >> lost << lost if lost > 0 else p.code
-    return _same(e, np.sort(line, axis=1), np.sort(due, axis=1), p, "codes")
+    b = beside(e)
+    due = _codes_due(e, b.samples)
+    return _same(np.sort(b.line, axis=1), np.sort(due, axis=1), b.samples, "codes")
 
 
-@proves("PSA2-FRAME-04", "PSA2-FRAME-05")
+@proves("PSA2-FRAME-04")
+@check("stream", needs={"line"})
+def the_first_word_is_that_of_the_lowest_address(e: Evidence) -> str:
+    """Compare the first word with the code of X on CAN."""
+    b = beside(e)
+    return _same(b.line[:, 0], _codes_due(e, b.samples)[:, 0], b.samples, "X first")
+
+
+@proves("PSA2-FRAME-05")
 @check("stream", needs={"line"})
 def words_are_in_their_order(e: Evidence) -> str:
-    """Compare the order of the words with that of the codes on CAN."""
-    line, p, _ = _beside(e)
-    lost = WORDS[row_for(e, *WORDS).id]
-    return _same(e, line, p.code >> lost << lost if lost > 0 else p.code, p, "X, Y, Z in this order")
+    """Compare the order of the words with X, Y, Z and T on CAN."""
+    b = beside(e)
+    mask = (1 << int(row_for(e, "PSA2-WORD-05").limit("code_bits"))) - 1
+    saw = np.column_stack((b.line, b.words[:, 3] & mask))
+    due = np.column_stack((_codes_due(e, b.samples), b.samples.temp & mask))
+    return _same(saw, due, b.samples, "X, Y, Z, T in this order")
 
 
 @proves("PSA2-CAN-07")
 @check("stream", needs={"line"})
 def can_and_line_carry_the_same(e: Evidence) -> str:
     """Compare all that a frame carries on the line with its pair on CAN."""
-    line, p, words = _beside(e)
-    _same(e, line, p.code, p, "codes")
-    return _same(e, words[:, 3] & 0xFFFF, p.temp & 0xFFFF, p, "codes and T")
+    b = beside(e)
+    mask = (1 << int(row_for(e, "PSA2-WORD-05").limit("code_bits"))) - 1
+    _same(b.line, b.samples.code, b.samples, "codes")
+    return _same(b.words[:, 3] & mask, b.samples.temp & mask, b.samples, "codes and T")
 
 
 @proves("PSA2-WORD-05", "PSA2-WORD-08")
 @check("stream", needs={"line"})
 def word_t_has_the_temperature_code(e: Evidence) -> str:
     """Compare the lower bits of word T with T on CAN."""
-    _, p, words = _beside(e)
+    b = beside(e)
     mask = (1 << int(row_for(e, "PSA2-WORD-05").limit("code_bits"))) - 1
-    return _same(e, words[:, 3] & mask, p.temp & mask, p, "T")
+    return _same(b.words[:, 3] & mask, b.samples.temp & mask, b.samples, "T")
+
+
+def channel_on_the_line(e: Evidence, b: Beside) -> Ints:
+    """(n,) the channel that word T has."""
+    row = row_for(e, "PSA2-WORD-06")
+    return b.words[:, 3] >> int(row.limit("channel_shift_bits")) & ((1 << int(row.limit("channel_bits"))) - 1)
 
 
 @proves("PSA2-WORD-06")
 @check("stream", needs={"line"})
 def word_t_has_the_channel(e: Evidence) -> str:
     """Compare bits 19 to 16 of word T with CHANNEL on CAN."""
-    _, p, words = _beside(e)
-    row = row_for(e, "PSA2-WORD-06")
-    mask = (1 << int(row.limit("channel_bits"))) - 1
-    return _same(e, words[:, 3] >> int(row.limit("channel_shift_bits")) & mask, p.channel, p, "CHANNEL")
+    b = beside(e)
+    return _same(channel_on_the_line(e, b), b.samples.channel, b.samples, "CHANNEL")
 
 
 @proves("PSA2-WORD-07")
 @check("stream", needs={"line"})
 def word_t_has_the_status(e: Evidence) -> str:
     """Compare bits 23 to 20 of word T with the status bits on CAN."""
-    _, p, words = _beside(e)
-    row = row_for(e, "PSA2-WORD-07")
+    b, row = beside(e), row_for(e, "PSA2-WORD-07")
+    p = b.samples
     due = sum(
         int(row.limit(f"{n}_bit")) * v
         for n, v in (("settled", p.settled), ("clip", p.clip), ("overrun", p.overrun), ("new", p.new))
     )
-    saw = words[:, 3] >> int(row.limit("status_shift_bits")) & 0xF
-    return _same(e, saw, np.asarray(due, np.int64), p, "status")
+    saw = b.words[:, 3] >> int(row.limit("status_shift_bits")) & 0xF
+    return _same(saw, np.asarray(due, np.int64), p, "status")
 
 
 # ---- the words that were read
@@ -183,7 +208,7 @@ def three_axes_are_read_at_once(e: Evidence) -> str:
     """Decode DOutX, DOutY and DOutZ by the same pulses of SClk, beside the codes on CAN."""
     read, p = _read_words(e), pairs(e)
     shift, same = aligned(read, p.code)
-    if same < len(p) - MOST_LOST:
+    if same < len(p) - int(row_for(e, "PSA2-READ-04").limit("edge_max_frames")):
         i = np.arange(len(p)) + shift
         at = np.flatnonzero([not (0 <= k < len(read)) or (read[k] != c).any() for k, c in zip(i, p.code, strict=True)])
         raise Broken(

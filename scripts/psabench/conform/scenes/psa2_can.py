@@ -6,12 +6,16 @@ Settings are put back by a reset.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from psabench.canopen_host import Described
+import numpy as np
+
 from psabench.conform.evidence import Evidence
+from psabench.conform.outcome import Broken, TooLittle
+from psabench.conform.pairs import CODE_MAX, pairs, segment
 from psabench.conform.plan import scene
 from psabench.conform.scenes.psa2 import PERIOD_S
 from psabench.conform.subject import Subject, Take
@@ -26,6 +30,7 @@ FRAMES, OVERRUNS, TIMEOUTS, SYNCS_MISSED = 1, 2, 9, 12
 SYNC = 0x80
 RATES_HZ = (250, 500, 1000, 2000, 4000)  # by DR
 SETTLE_PERIODS = 64
+BUSY_ROUNDS = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,6 +122,24 @@ def registers(s: Subject) -> Evidence:
         s.unit.stop()
         take.facts["after"] = counters(s, after=True)
     return s.evidence("registers", take)
+
+
+@scene("busy", boards=("psa2",))
+def busy(s: Subject) -> Evidence:
+    """All registers read again and again at 4000 SPS in the fast form. facts: answers; counters before and after."""
+    with changed(s), s.take() as take:
+        take.facts["answers"] = [tell(s, FORM, 0, 1), tell(s, ACCEL[0], CONFIG0, 0x46 | 4 << 3)]
+        s.run_for(SETTLE_PERIODS / RATES_HZ[4])
+        take.facts["before"] = counters(s)
+        s.unit.start()
+        for k in range(BUSY_ROUNDS):
+            s.run_for((1 + k / BUSY_ROUNDS) * PERIOD_S)  # at another phase of a conversion each
+            for index, sub in itertools.product((*ACCEL, TEMP), REGISTERS):
+                ask(s, index, sub)
+        s.run_for(10 * PERIOD_S)
+        s.unit.stop()
+        take.facts["after"] = counters(s, after=True)
+    return s.evidence("busy", take)
 
 
 PATTERNS: Sequence[tuple[int, int, int]] = (  # object, sub-index, value that the part takes
@@ -292,11 +315,16 @@ def gain(s: Subject) -> Evidence:
 
 OFFSET = 0x012345  # codes; positive
 FACTOR = 0x500000  # 1.25
+APART_CODES = 2000  # of two axes, so that one can be beyond its limit alone, whatever the noise
 
 
 @scene("numbers", boards=("psa2",))
 def numbers(s: Subject) -> Evidence:
-    """OFC and FSC written through 2000h: as they were, an offset, a factor, both limits. Cuts by these names."""
+    """OFC and FSC written through 2000h: as they were, an offset, a factor, both limits. Cuts by these names.
+
+    At last one axis alone is driven beyond either limit. facts: alone, its number by "one high" and "one low", where
+    the inputs are far enough apart for it.
+    """
     steps = {
         "as it was": [],
         "offset": split(ACCEL[0], OFC0, OFFSET),
@@ -309,7 +337,31 @@ def numbers(s: Subject) -> Evidence:
             take.facts[name] = [tell(s, *x) for x in told]
             s.run_for(3 * PERIOD_S)
             streamed(s, take, name, 0.06)
+        alone: dict[str, int] = {}
+        take.facts["alone"] = alone
+        for name, (axis, ofc) in _alone(s.evidence("numbers", take)).items():
+            alone[name] = axis
+            take.facts[name] = [tell(s, *x) for x in split(ACCEL[0], OFC0, ofc & 0xFFFFFF)]
+            s.run_for(3 * PERIOD_S)
+            streamed(s, take, name, 0.06)
     return s.evidence("numbers", take)
+
+
+def _alone(e: Evidence) -> dict[str, tuple[int, int]]:
+    """The axis and the OFC that drives it beyond a limit while the others stay below, FSC being at its highest."""
+    try:
+        codes = np.median(pairs(segment(e, "as it was", "as it was end"), 3).code, axis=0)
+    except (Broken, TooLittle):
+        return {}
+    lowest, middle, highest = np.sort(codes)
+    order = np.argsort(codes)
+    limit = (CODE_MAX + 1) * 0x400000 // 0x7FFFFF
+    found = {}
+    if highest - middle > APART_CODES:
+        found["one high"] = int(order[2]), round((highest + middle) / 2) - limit
+    if middle - lowest > APART_CODES:
+        found["one low"] = int(order[0]), round((lowest + middle) / 2) + limit
+    return found
 
 
 @scene("forms", boards=("psa2",))
@@ -357,46 +409,6 @@ def starts(s: Subject) -> Evidence:
     return s.evidence("starts", take)
 
 
-@scene("objects", boards=("psa2",))
-def objects(s: Subject) -> Evidence:
-    """Identity, width and mirrors. facts: read; mirrors, those of one sample, with its PDO in the log."""
-    wanted = [(0x2200, 1), (0x2200, 2), (0x2200, 3), (0x2200, 4), (0x2202, 2), (0x2202, 3), (0x2202, 4)]
-    with changed(s), s.take(lines=False) as take:
-        take.facts["read"] = {
-            (i, sub): ask(s, i, sub) for i, sub in ((0x1008, 0), (0x1018, 2), (0x1018, 3), (0x2021, 0))
-        }
-        for axis in (1, 2, 3):
-            tell(s, 0x2210, axis, axis - 1)
-            tell(s, 0x2211, axis, 2)
-        tell(s, ACCEL[0], CONFIG0, 0x46)  # 250 SPS: a sample stands for 4 ms
-        s.run_for(0.4)
-        s.unit.start()
-        s.run_for(0.02)
-        found = []
-        for index, sub in (
-            *wanted,
-            (0x2201, 1),
-            (0x2201, 2),
-            (0x2201, 3),
-            *((i, k) for i in (0x6130, 0x9130) for k in (1, 2, 3)),
-        ):
-            found.append(_of_one_sample(s, index, sub))
-        s.run_for(0.02)
-        s.unit.stop()
-        take.facts["mirrors"] = found
-    return s.evidence("objects", take)
-
-
-def _of_one_sample(s: Subject, index: int, sub: int) -> tuple[int, int, Answer, Answer]:
-    """Object, sub-index, its value and the number of the sample that stood there before and after."""
-    for _ in range(6):
-        before = ask(s, 0x2202, 1)
-        value = ask(s, index, sub)
-        if before == ask(s, 0x2202, 1):
-            break
-    return index, sub, value, before
-
-
 @scene("trouble", boards=("psa2",))
 def trouble(s: Subject) -> Evidence:
     """The temperature converter silenced by its SYNC command without WAKEUP. facts: access, counters."""
@@ -425,45 +437,6 @@ def selfcal(s: Subject) -> Evidence:
         s.run_for(0.15)
         s.unit.stop()
     return s.evidence("selfcal", take)
-
-
-@scene("dictionary", boards=("psa2",))
-def dictionary(s: Subject) -> Evidence:
-    """Every object of the EDS but the registers read, and written where a write is refused. facts: rows."""
-    with changed(s), s.take(lines=False) as take:
-        take.facts["rows"] = [_row(s, d) for d in s.unit.node.objects() if not (d.index in (*ACCEL, TEMP) and d.sub)]
-    return s.evidence("dictionary", take)
-
-
-@dataclass(frozen=True, slots=True)
-class Row:
-    """An object as the EDS has it, and as the board answers."""
-
-    due: Described
-    raw: bytes  # what was read
-    abort: int  # of the read
-    write: int | None  # abort code of a write of the same (read-only) or of one too many; None: none was tried
-
-
-def _row(s: Subject, d: Described) -> Row:
-    raw, abort, write = b"", 0, None
-    try:
-        raw = s.unit.node.read_raw(d.index, d.sub)
-    except DeviceError as e:
-        abort = e.abort_code
-    if d.access in ("ro", "const"):
-        write = _abort_of_write(s, d, raw or bytes(d.data_bytes or 1))
-    elif isinstance(d.high, int) and d.data_bytes in (1, 2) and d.high + 1 < 1 << 8 * d.data_bytes:
-        write = _abort_of_write(s, d, (d.high + 1).to_bytes(d.data_bytes, "little"))
-    return Row(d, raw, abort, write)
-
-
-def _abort_of_write(s: Subject, d: Described, data: bytes) -> int:
-    try:
-        s.unit.node.write_raw(d.index, d.sub, data)
-    except DeviceError as e:
-        return e.abort_code
-    return 0
 
 
 @scene("chamber", boards=("psa2",))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import re
 
-from psabench.conform.bus_cycles import BUS, LINES, TAIL_S, harmless, quiet, registers, say, strobes
+from psabench.conform.bus_cycles import BUS, LINES, TAIL_S, Strobes, harmless, quiet, registers, say, strobes
 from psabench.conform.outcome import Broken, TooLittle
 from psabench.conform.plan import trial
 from psabench.conform.proof import proves
@@ -30,6 +30,7 @@ ABORTS = {
     "busy": 0x08000022,
 }
 STROBE_MS = 1
+STROBE_NS = 1000
 
 
 def _cycle(answer: str, letter: str, address: int) -> tuple[int, int]:
@@ -172,26 +173,46 @@ def times_go_on_by_the_strobe(s: Subject) -> str:
     strobe_ns = STROBE_MS * 1_000_000
     line = f"R {quiet(s):X} {strobe_ns}"
     times = [_cycle(a, "R", quiet(s))[1] for a in say(s, line, line, line, dwell_s=3.1 * STROBE_MS * 1e-3)]
-    apart = [b - a for a, b in itertools.pairwise(times)]
-    if min(apart) < strobe_ns:
-        raise Broken(f"{apart} ns apart", f"{strobe_ns} ns and more")
-    return f"{apart} ns apart"
+    apart_ns = [b - a for a, b in itertools.pairwise(times)]
+    if min(apart_ns) < strobe_ns:
+        raise Broken(f"{apart_ns} ns apart", f"{strobe_ns} ns and more")
+    return f"{apart_ns} ns apart"
+
+
+def _strobed(s: Subject, strobe_ns: int) -> tuple[int, Strobes]:
+    """Time of the answer to a cycle with this strobe, and the cycles that the lines show at its address."""
+    with s.take() as take:
+        _, t_ns = _cycle(say(s, f"R {quiet(s):X} {strobe_ns}", dwell_s=1e-4)[0], "R", quiet(s))
+        s.run_for(TAIL_S)
+    if take.lines is None:
+        raise TooLittle("no lines were recorded")
+    return t_ns, strobes(take.lines).at(quiet(s))
 
 
 @proves("BUS-PORT-08")
 @trial(needs={"bus", "pins"})
 def times_are_those_of_cs(s: Subject) -> str:
     """A cycle: its time beside the rise of CS."""
-    with s.take() as take:
-        _, t_ns = _cycle(say(s, f"R {quiet(s):X} 1000", dwell_s=1e-4)[0], "R", quiet(s))
-        s.run_for(TAIL_S)
-    assert take.lines is not None
-    rises = strobes(take.lines).at(quiet(s)).rise_ns.tolist()
+    t_ns, found = _strobed(s, STROBE_NS)
+    rises = found.rise_ns.tolist()
     if rises != [t_ns]:
         raise Broken(
             f"t={t_ns}, CS rises at {rises} ns", "the rise of CS", at_ns=rises[0] if rises else None, lines=LINES
         )
     return f"t={t_ns}, the rise of CS"
+
+
+@proves("BUS-PORT-10")
+@trial(needs={"bus", "pins"})
+def a_strobe_is_as_long_as_it_is_told(s: Subject) -> str:
+    """A cycle with a strobe of so many ns, in decimal: how long is CS low?"""
+    _, found = _strobed(s, STROBE_NS)
+    low_ns = (found.rise_ns - found.fall_ns).tolist()
+    slack_ns = requirements().rows["BUS-PORT-10"].limit("tolerance_ns")
+    if len(low_ns) != 1 or abs(low_ns[0] - STROBE_NS) > slack_ns:
+        at_ns = int(found.fall_ns[0]) if low_ns else None
+        raise Broken(f"CS low for {low_ns} ns", f"once, {STROBE_NS} +- {slack_ns:g} ns", at_ns=at_ns, lines=LINES)
+    return f"CS low for {low_ns[0]} ns"
 
 
 @proves("BUS-PORT-09")
