@@ -145,6 +145,18 @@ def refusals_have_their_codes(s: Subject) -> str:
     return f"{len(wrong)} kinds of refusal, each with its code, counted and explained"
 
 
+@proves("BUS-CYC-04")
+@trial(needs={"can", "lockstep"})
+def a_word_that_does_not_wait_is_refused(s: Subject) -> str:
+    """Reset node, and the word at address 0 before there is one; no host but one in lockstep is sure to ask so soon."""
+    row = requirements().rows["BUS-CYC-04"]
+    with talk(s, reset=True) as t:
+        s.wait_ready()
+        t.reset(NMT_RESET)
+        t.refused(_read(0), row.limit("state_code"), "a word before the first reading")
+    return f"refused with {int(row.limit('state_code')):08X}h"
+
+
 @proves("BUS-CYC-05")
 @trial()
 def a_short_strobe_is_refused(s: Subject) -> str:

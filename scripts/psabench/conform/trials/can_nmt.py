@@ -79,10 +79,11 @@ def it_listens_at_the_identifiers_of_its_node(s: Subject) -> str:
 @proves("BUS-ID-03")
 @trial()
 def requests_to_another_node_stay_unanswered(s: Subject) -> str:
-    """Send SDO requests to the identifiers of other nodes."""
+    """Send SDO requests to the identifiers of other nodes, those that differ in one bit among them."""
     with talk(s) as t:
         before = [t.counter(c) for c in ("Malformed requests", "Requests refused")]
-        others = [t.sdo_rx - s.node + n for n in (1, 120, 127) if n != s.node]
+        nodes = {1, 120, 127, *(s.node ^ 1 << bit for bit in range(7))} - {0, s.node}  # neighbours differ in one bit
+        others = [t.sdo_rx - s.node + n for n in sorted(nodes)]
         came = [f for f in t.after(*((other, read(DEVICE_TYPE)) for other in others)) if f.can_id == t.sdo_tx]
         if came:
             raise Broken(f"{len(came)} answers to requests to other nodes", "none", frames=came)

@@ -10,6 +10,7 @@ from psabench.conform.proof import proves
 from psabench.conform.requirements import requirements
 from psabench.conform.subject import Subject
 from psabench.conform.talk import (
+    COUNTERS,
     DEVICE_TYPE,
     HEARTBEAT,
     LEAST,
@@ -30,6 +31,7 @@ SERIAL = 4
 NEAR = 3  # readings before and after an answer that it may be of
 ERRORS_OF_CAN = ("Transmit errors", "Receive errors", "Controller state")
 LOAD_S = 1.0
+READINGS, SOME_S = 1, 0.1  # sub-index of 2030h; some of them
 SPACE_BITS = 3  # interframe space (ISO 11898-1, 10.4.6)
 
 
@@ -225,15 +227,19 @@ def _compare(t: Talk, can_id: int, entry: int, at: int) -> None:
 @proves("BUS-CNT-01")
 @trial()
 def counters_outlive_a_reset(s: Subject) -> str:
-    """Refusals and SYNCs, NMT 81h, the counters again."""
+    """Refusals and SYNCs, NMT 81h, the counters again; the readings, which go on, are not less."""
     names = ("Requests refused", "Malformed requests", "SYNCs")
     with talk(s, reset=True) as t:
+        s.wait_ready()
+        s.run_for(SOME_S)
         t.ask(read(NOWHERE))
         t.send(t.sdo_rx, b"\0")
         t.send(t.sync_id, b"")
-        before = [t.counter(n) for n in names]
+        before, readings = [t.counter(n) for n in names], t.number(COUNTERS, READINGS)
         t.reset(NMT_RESET)
-        after = [t.counter(n) for n in names]
+        after, later = [t.counter(n) for n in names], t.number(COUNTERS, READINGS)
+    if later < readings:
+        raise Broken(f"{readings} readings, {later} after NMT 81h", "as many or more")
     if after != before or not all(before):
         raise Broken(f"{', '.join(names)}: {before} became {after}", "the same, none of them 0")
     return f"{', '.join(names)}: {before}, after NMT 81h {after}"
