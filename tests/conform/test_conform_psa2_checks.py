@@ -67,7 +67,7 @@ def stage() -> Iterator[Stage]:
     made.close()
 
 
-WRONG: Mapping[str, Sequence[Bad]] = WRONG_PINS | WRONG_CAN  # ways of showing it wrongly, by check
+WRONG: Mapping[str, Sequence[Bad]] = {**WRONG_PINS, **WRONG_CAN}  # ways of showing it wrongly, by check
 
 
 @pytest.mark.parametrize("name", CHECKS)
