@@ -80,7 +80,7 @@ C_FILES   = $(sort $(wildcard emu/*/*.[ch] emu/*/*.[ch]pp tests/*/*.[ch] example
 
 .SECONDARY:
 .DELETE_ON_ERROR:
-.PHONY: all lib setup run test bench bench-bin mutants check pytest san builds e2e e2e-san e2e-vcan e2e-slc0 uml soak fuzz fuzz-check fuzz-each lint format golden docs prove install uninstall wheel clean help lock
+.PHONY: all lib setup run test bench bench-bin mutants alarms check pytest san builds e2e e2e-san e2e-vcan e2e-slc0 uml soak fuzz fuzz-check fuzz-each lint format golden docs prove install uninstall wheel clean help lock
 
 ## all: the emulator, build/psa-emu (make CC=clang and make SAN=address,undefined build beside it, in build-clang and build-san)
 all: $(if $(MAIN),$(BUILD)/psa-emu,$(LIB_OBJ)) lib
@@ -184,6 +184,10 @@ bench-bin: all $(BENCH_BIN)
 ## mutants: does the conformance suite find what is wrong? docs/mutants.md (some: make mutants MUTANTS='pik- sdo-')
 mutants: | $(PY)
 	@PYTHONPATH=tools $(PY) -m mutants.run $(MUTANTS)
+
+## alarms: does the conformance suite fail boards that conform? docs/alarms.md (some: make alarms ALARMS='w24 --minutes 5')
+alarms: all
+	@PYTHONPATH=tools $(PY) -m alarms.run $(ALARMS)
 
 ## check: the C unit tests (one: make check TESTS=test_sched)
 check: $(TEST_BIN)

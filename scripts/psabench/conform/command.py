@@ -87,6 +87,9 @@ def _add_device(suites: Any, formatter: Any, bus_help: str) -> None:
     own.add_argument("--port-only", action="store_true", help="see its line port alone, not all its pins")
     own.add_argument("--seed", type=int, default=1, help="of its noise (%(default)s)")
     own.add_argument("--clock-error", type=float, default=0.0, metavar="PPM", help="by which its clocks are fast")
+    own.add_argument(
+        "--recorder-error", type=float, default=0.0, metavar="PPM", help="by which the clock of the probes is fast"
+    )
     what = p.add_argument_group("what is tested, and where it is told")
     what.add_argument(
         "--clock-ppm", type=float, default=100.0, metavar="PPM", help="allowed to all clocks (%(default)g)"
@@ -131,6 +134,7 @@ def device(args: argparse.Namespace) -> int:
         only=args.only,
         seed=args.seed,
         clock_error=args.clock_error,
+        recorder_error=args.recorder_error,
         clock_ppm=args.clock_ppm,
     )
     return _told(run, folder, everything=args.verbose)
@@ -145,12 +149,13 @@ def device_run(
     only: Sequence[str] = (),
     seed: int = 1,
     clock_error: float = 0.0,
+    recorder_error: float = 0.0,
     clock_ppm: float = 100.0,
 ) -> report.Run:
     """Judge a board; what shows a failure goes into the folder. Ctrl-C ends it, and what was judged stays.
 
-    clock_error: ppm by which the clocks of an emulator that is started are fast. Raises BadInput where `only` selects
-    nothing, LinkError or BenchError where the board cannot be reached.
+    clock_error, recorder_error: ppm by which clocks of an emulator that is started are fast, and its probes'. Raises
+    BadInput where `only` selects nothing, LinkError or BenchError where the board cannot be reached.
     """
     rows = [r for r in _rows(v) if not only or r.id.startswith(tuple(only))]
     if not rows:
@@ -158,7 +163,7 @@ def device_run(
     suite.load()
     outcomes: list[Outcome] = []
     interrupted = False
-    with Subject.open(v, at, seed=seed, clock_ppm=clock_error) as subject:
+    with Subject.open(v, at, seed=seed, clock_ppm=clock_error, recorder_ppm=recorder_error) as subject:
         facts = identity.subject_facts(subject) | identity.suite_facts()
         keep = Exhibits(folder).keep
         try:

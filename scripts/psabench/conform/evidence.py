@@ -111,6 +111,24 @@ class LineLog:
         whole = self.known(begin, end)
         return begin[whole], end[whole]
 
+    def by_clock(self, rate: float) -> LineLog:
+        """As a clock sees them that counts `rate` seconds in one; an edge still happened before its instant."""
+        if rate == 1.0:
+            return self
+        r = self.recording
+
+        def seen(t_ns: Ints) -> Ints:
+            off: Ints = np.ceil(t_ns * (rate - 1.0)).astype(np.int64)
+            return t_ns + off
+
+        ends = seen(np.array([r.start_ns, r.end_ns], np.int64))
+        wires = {name: Wire(seen(w.t_ns), w.level) for name, w in r.wires.items()}
+        return LineLog(
+            recording=Vcd(r.unit_ns, int(ends[0]), int(ends[1]), wires),
+            resolution_ns=self.resolution_ns * max(rate, 1.0) + 1.0,
+            gaps_ns=seen(self.gaps_ns),
+        )
+
     def known(self, begin_ns: Ints, end_ns: Ints) -> Bools:
         """(n,) whether no samples were lost between these instants, nor just before one: its edge may be older."""
         same: Bools = np.searchsorted(self.gaps_ns, begin_ns) == np.searchsorted(self.gaps_ns, end_ns, "right")
@@ -172,7 +190,8 @@ class Evidence:
     def slack_ns(self, interval_ns: float, edges: int = 2) -> float:
         """How far an interval between two edges may seem off: resolution of the edges, clocks that differ."""
         resolution_ns = 0.0 if self.lines is None else self.lines.resolution_ns
-        return edges / 2 * resolution_ns + abs(interval_ns) * self.clock_ppm * PPM
+        slow = self.clock_ppm * PPM / (1.0 - self.clock_ppm * PPM)  # of the two the farther: a clock that is slow
+        return edges / 2 * resolution_ns + abs(interval_ns) * slow
 
     def frames_of(self, name: str) -> CanLog:
         """Frames of a message of the DBC that this board sent."""

@@ -39,6 +39,7 @@ WAYS = frozenset(
         "supply",
         "chamber",
         "lockstep",
+        "exact",
         "inputs",
         "fd",
         "rtr",

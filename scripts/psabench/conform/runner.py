@@ -28,6 +28,7 @@ MISSING = {
     "supply": "no power supply was connected (--scpi supply=...)",
     "chamber": "no thermal chamber was connected (--scpi chamber=...)",
     "lockstep": "an emulator in lockstep is wanted: it takes longer than anybody would wait",
+    "exact": "the probes' clock is not the board's own: an emulator in lockstep is wanted",
     "port": "no line port was connected (--lines)",
     "stream": "this board sends readings only while a host reads its bus",
     "fd": "the link to the bus carries no FD frames; slcan and SocketCAN do",

@@ -63,12 +63,13 @@ class Take:
     marks: dict[str, float] = field(default_factory=dict)
     facts: dict[str, object] = field(default_factory=dict)
     lines: LineLog | None = None
+    rate: float = 1.0  # seconds of the recorder's clock in one of the bench
 
     def on_message(self, m: Message) -> None:
         """Listener of a CanHost."""
         self.frames.append(
             CanFrame(
-                t_s=m.timestamp,
+                t_s=m.timestamp * self.rate,
                 can_id=m.arbitration_id,
                 data=bytes(m.data),
                 fd=bool(m.is_fd),
@@ -104,6 +105,7 @@ class Subject:
             raise BadInput(f"no {kind.title} answers on this bus; boards there: {there}")
         self.unit: Unit = found
         self.node = found.node.node_id
+        self.recorder_rate = 1.0  # seconds of its clock in one of the bench; an emulator's may be set off
         self._stack = ExitStack()
         self._never_ready = False
 
@@ -120,6 +122,7 @@ class Subject:
     def probes(self) -> frozenset[str]:
         """What can be seen: can, line (INT, DATA, CLK, or what the line port has), pins (all lines), bus, supply, port.
 
+        exact: all probes tell the time that the board's own clock would, were it not off.
         Of the link to the bus: fd and rtr, frames that it carries; stamps, its times are the bus's.
         """
         seen = {"can"}
@@ -134,7 +137,7 @@ class Subject:
         if self.variant.figures.get("host_strobe_ns") != 0:
             seen.add("stream")  # readings come by themselves
         if self.lockstep:
-            seen.add("lockstep")
+            seen |= {"lockstep"} if self.recorder_rate != 1.0 else {"lockstep", "exact"}
         if self.inputs_v:
             seen.add("inputs")
         return frozenset(seen)
@@ -163,7 +166,7 @@ class Subject:
     @contextmanager
     def take(self, *, lines: bool = True) -> Iterator[Take]:
         """Collect what is seen while the block runs; its lines are there when it has ended."""
-        take = Take()
+        take = Take(rate=self.recorder_rate)
         self.host.listeners.append(take.on_message)
         looking = lines and self.probe is not None
         try:
@@ -173,7 +176,7 @@ class Subject:
         finally:
             self.host.listeners.remove(take.on_message)
             if looking and self.probe is not None:
-                take.lines = self.probe.stop()
+                take.lines = self.probe.stop().by_clock(self.recorder_rate)
 
     def evidence(self, scene: str, take: Take, *, clock_ppm: float = 100.0) -> Evidence:
         """Of a take that has ended."""
@@ -223,9 +226,21 @@ class Subject:
     # ---- making one
 
     @classmethod
-    def open(cls, variant: Variant, at: Addresses, *, seed: int = 1, clock_ppm: float = 0.0) -> Subject:
-        """At these addresses, or an emulator of ours. Raises BadInput, LinkError or BenchError."""
-        return cls._start(variant, at, seed, clock_ppm) if at.can is None else cls._connect(variant, at)
+    def open(
+        cls, variant: Variant, at: Addresses, *, seed: int = 1, clock_ppm: float = 0.0, recorder_ppm: float = 0.0
+    ) -> Subject:
+        """At these addresses, or an emulator of ours. Raises BadInput, LinkError or BenchError.
+
+        Of an emulator of ours: clock_ppm, by how much the board's clocks are fast; recorder_ppm, by how much that of
+        the probes is. Where a profile cannot have such a clock, that of the probes is slow by as much: from outside
+        nobody can tell the two.
+        """
+        if at.can is not None:
+            return cls._connect(variant, at)
+        own = has_clock(variant, clock_ppm)
+        found = cls._start(variant, at, seed, clock_ppm if own else 0.0, still=bool(clock_ppm or recorder_ppm))
+        found.recorder_rate = (1.0 + recorder_ppm * PPM) / (1.0 if own else 1.0 + clock_ppm * PPM)
+        return found
 
     @classmethod
     def _connect(cls, variant: Variant, at: Addresses) -> Subject:
@@ -242,11 +257,12 @@ class Subject:
         return subject
 
     @classmethod
-    def _start(cls, variant: Variant, at: Addresses, seed: int, clock_ppm: float) -> Subject:
+    def _start(cls, variant: Variant, at: Addresses, seed: int, clock_ppm: float, *, still: bool) -> Subject:
         with ExitStack() as stack:
             folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="psabench-")))
             path = folder / "bench.yaml"
-            path.write_text(json.dumps(scenario(variant, at.inputs_v, clock_ppm)), encoding="utf-8")  # YAML, too
+            made = scenario(variant, at.inputs_v, clock_ppm, still=still)
+            path.write_text(json.dumps(made), encoding="utf-8")  # YAML, too
             line, bus = folder / "line", folder / "bus"
             extra: list[str | Path] = ["--vcd-unit", "1"]
             extra += ["--line", line]  # which samples nothing while nobody has it open
@@ -267,14 +283,15 @@ class Subject:
         return subject
 
 
-# Frequencies of a profile that follow from the board's own clocks: an error of its clocks scales them.
+# Frequencies of a profile that follow from the board's own clocks: an error of its clocks scales them. Of the others a
+# profile cannot say it: PIK's clock is whole Hz, the steps of a gyro unit are what it counts its seconds by.
 CLOCKS: Mapping[str, tuple[str, ...]] = {
     "psa2": ("fclk_hz", "temp_clkin_hz", "sclk_hz", "line_hz"),
     "psd1": ("adc_clkin_hz",),
     "pmka": ("ts_ns",),  # a period
-    "pik": ("clock_hz",),
-    "gyro": ("step_ns",),
 }
+AT_THEIR_FASTEST = ("psd1",)  # the part's clock is at its limit
+CRYSTALS: Mapping[str, str] = {"pik": "clock_tol_ppm"}  # what a specimen's clock is off by, drawn
 SENSITIVITIES = ("kx_v_per_g", "ky_v_per_g", "kz_v_per_g", "kxy_v_per_g2", "drift_v_per_s", "reading_noise_v")
 PPM = 1e-6
 # What a gyro unit stands on: the platform without errors, as it was left; the PSA-2 that measures its level.
@@ -301,16 +318,26 @@ LEVEL: Mapping[str, Any] = {
 }
 
 
-def scenario(variant: Variant, inputs_v: Mapping[str, float], clock_ppm: float) -> dict[str, Any]:
+def has_clock(variant: Variant, clock_ppm: float) -> bool:
+    """Whether a profile of this board can have clocks that are fast by as much."""
+    return variant.family in CLOCKS and not (clock_ppm > 0.0 and variant.family in AT_THEIR_FASTEST)
+
+
+def scenario(
+    variant: Variant, inputs_v: Mapping[str, float], clock_ppm: float, *, still: bool = False
+) -> dict[str, Any]:
     """A bench around one board: known volts at its inputs, a supply that can be switched.
 
-    clock_ppm: by how much the board's clocks are fast. A gyro unit has no inputs: it has its platform, on a parked
-    vehicle, and the PSA-2 on it that it reads the level from, streaming.
+    clock_ppm: by how much the board's clocks are fast; still: the specimen's crystal adds nothing to it. A gyro unit
+    has no inputs: it has its platform, on a parked vehicle, and the PSA-2 on it that it reads the level from.
     """
     axes = {axis: {"sensor": "mems", "u0_v": v, **dict.fromkeys(SENSITIVITIES, 0.0)} for axis, v in inputs_v.items()}
     unit: dict[str, Any] = {"name": UNIT, "board": variant.family, "profile": variant.profile, "axes": axes}
+    clocks: dict[str, float] = {CRYSTALS[variant.family]: 0.0} if still and variant.family in CRYSTALS else {}
     if clock_ppm:
-        unit["profile_set"] = {key: _off(key, variant[key], clock_ppm) for key in CLOCKS[variant.family]}
+        clocks |= {key: _off(key, variant[key], clock_ppm) for key in CLOCKS[variant.family]}
+    if clocks:
+        unit["profile_set"] = clocks
     if variant.family == "gyro":
         del unit["axes"]
         return {"supply": {}, "start": True, **PLATFORM, "units": [unit | {"level": LEVEL["name"]}, LEVEL]}
@@ -319,5 +346,6 @@ def scenario(variant: Variant, inputs_v: Mapping[str, float], clock_ppm: float) 
 
 
 def _off(key: str, nominal: float, clock_ppm: float) -> int:
+    """A whole number that is off by as much, not more."""
     factor = 1.0 + clock_ppm * PPM
-    return round(nominal / factor if key.endswith("_ns") else nominal * factor)
+    return round(nominal) + int((nominal / factor if key.endswith("_ns") else nominal * factor) - nominal)

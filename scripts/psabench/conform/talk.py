@@ -41,7 +41,7 @@ class Talk:
         self.emcy = int(r["BUS-ID-01"].limit("emcy_id")) + s.node
         self.heartbeat = int(r["BUS-ID-01"].limit("heartbeat_id")) + s.node
         self.patience_s = LOCKSTEP_S if s.lockstep else REAL_S
-        self._taken = Take()
+        self._taken = Take(rate=s.recorder_rate)
         self._burst = 0
 
     def on_message(self, m: Message) -> None:

@@ -95,7 +95,7 @@ def _agrees(port: LineLog, pins: LineLog, name: str, t0_ns: float, step_ns: floa
 
 
 @proves("LINE-BYTE-02")
-@check("line_port", needs={"port", "pins", "stream"})
+@check("line_port", needs={"port", "pins", "stream", "exact"})
 def bits_of_the_other_boards(e: Evidence) -> str:
     """Lay each bit beside the line of the table as the pins show it."""
     _t0_ns(e)
@@ -105,7 +105,7 @@ def bits_of_the_other_boards(e: Evidence) -> str:
 
 
 @proves("LINE-RATE-01")
-@check("line_port", needs={"port", "pins", "stream"})
+@check("line_port", needs={"port", "pins", "stream", "exact"})
 def samples_come_at_their_rate(e: Evidence) -> str:
     """Compare the samples between the first and the last edge of the port with their time at the pins."""
     rate_hz, t0_ns = row_for(e, "LINE-RATE-01").limit("sample_hz"), _t0_ns(e)
@@ -122,7 +122,7 @@ def samples_come_at_their_rate(e: Evidence) -> str:
 
 
 @proves("LINE-RATE-02")
-@check("line_port", needs={"port", "pins", "stream"})
+@check("line_port", needs={"port", "pins", "stream", "exact"})
 def samples_are_the_levels_of_their_instants(e: Evidence) -> str:
     """Look up the level of the pin at each sample before and at an edge of the port."""
     t0_ns, port = _t0_ns(e), _port(e)

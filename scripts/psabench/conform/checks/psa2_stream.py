@@ -149,7 +149,7 @@ def tstamp_goes_by_the_data_period(e: Evidence) -> str:
 
 
 @proves("PSA2-CAN-05")
-@check("stream", needs={"pins", "lockstep"})
+@check("stream", needs={"pins", "exact"})
 def tstamp_is_the_fall_of_drd_a(e: Evidence) -> str:
     """Compare TSTAMP with the falls of DRD_A."""
     p = pairs(e)

@@ -16,7 +16,7 @@ def into_a_frame(s: Subject, take: Take, lead_s: float = 0.0) -> None:
     s.run_for(10 * PERIOD_S)
     if not {"lockstep", "stamps"} <= s.probes or not take.frames:
         return
-    fall_s = take.frames[-1].t_s - FRAME_TO_CAN_S
+    fall_s = take.frames[-1].t_s / take.rate - FRAME_TO_CAN_S
     ahead_s = (fall_s + IN_FRAME_S - lead_s - s.bench.time_s) % PERIOD_S
     s.run_for(ahead_s)
 

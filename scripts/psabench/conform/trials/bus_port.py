@@ -190,7 +190,7 @@ def _strobed(s: Subject, strobe_ns: int) -> tuple[int, Strobes]:
 
 
 @proves("BUS-PORT-08")
-@trial(needs={"bus", "pins"})
+@trial(needs={"bus", "pins", "exact"})
 def times_are_those_of_cs(s: Subject) -> str:
     """A cycle: its time beside the rise of CS."""
     t_ns, found = _strobed(s, STROBE_NS)

@@ -65,7 +65,7 @@ def an_object_is_a_cycle(s: Subject) -> str:
 
 
 @proves("BUS-CYC-02")
-@trial(needs={"can", "pins"})
+@trial(needs={"can", "pins", "exact"})
 def a_strobe_is_as_long_as_it_is_set(s: Subject) -> str:
     """Cycles with 2051h at 0, 200, 1234 ns and 1 ms: CS low."""
     told = []

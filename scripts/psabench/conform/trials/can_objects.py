@@ -291,7 +291,7 @@ def the_load_is_the_share_of_the_bus(s: Subject) -> str:
 
 
 @proves("BUS-ID-08")
-@trial(needs={"can", "stamps", "lockstep"})
+@trial(needs={"can", "stamps", "exact"})
 def an_answer_waits_for_the_interframe_space(s: Subject) -> str:
     """Take the time from a request on a quiet bus to the end of its answer, and take off the bits of both."""
     row = requirements().rows["BUS-ID-08"]
