@@ -10,7 +10,7 @@ import numpy as np
 
 from psabench import comparison
 from psabench.comparison import AXES, Comparison
-from psabench.report_page import PAGE
+from psabench.report_page import whole_page
 from psabench.whole_file import replace_file
 
 TITLE = "Five generations of converters, one motion"
@@ -28,21 +28,17 @@ def write(folder: Path, c: Comparison) -> Path:
 
 def html_page(c: Comparison) -> str:
     """The whole page. Same input, same bytes."""
-    facts = " · ".join(f"{escape(k)} <b>{escape(v)}</b>" for k, v in c.facts.items())
     pictures = "".join(
         f"<section><h2>{heading}</h2><figure>{picture}<figcaption>{words}</figcaption></figure></section>"
         for heading, picture, words in zip(_HEADINGS, figures(c), _CAPTIONS, strict=True)
     )
     body = [
-        f"<header><h1>{TITLE}</h1><p class=facts>{facts}</p></header>",
         f"<p class='verdict {'good' if c.within else 'bad'}'>{escape(comparison.verdict(c))}</p>",
         _tables(c),
         pictures,
         _method(c),
     ]
-    return PAGE.replace("<title>Accelerometer calibration</title>", f"<title>{TITLE}</title>").replace(
-        "@BODY@", "\n".join(body)
-    )
+    return whole_page(TITLE, c.facts, body)
 
 
 _HEADINGS = ("Resolution, noise, error", "Velocity error", "The motion")

@@ -14,7 +14,7 @@ from psabench.angles import wrapped_deg
 from psabench.gyro_grading import GyroSection
 from psabench.nav import DEGPH
 from psabench.procedures.result import DEG
-from psabench.report_page import PAGE
+from psabench.report_page import whole_page
 from psabench.whole_file import replace_file
 
 TITLE = "Gyrocompassing and heading hold"
@@ -46,15 +46,12 @@ def write(folder: Path, sections: Sequence[GyroSection], facts: Mapping[str, str
 def html_page(sections: Sequence[GyroSection], facts: Mapping[str, str]) -> str:
     """The whole page. Same input, same bytes."""
     good = grading.within_limits(sections)
-    told = " · ".join(f"{escape(k)} <b>{escape(v)}</b>" for k, v in facts.items())
     body = [
-        f"<header><h1>{TITLE}</h1><p class=facts>{told}</p></header>",
         f"<p class='verdict {'good' if good else 'bad'}'>{escape(grading.verdict(sections))}</p>",
         *(_section(s, f"g{k}") for k, s in enumerate(sections)),
         _method(),
     ]
-    titled = PAGE.replace("<title>Accelerometer calibration</title>", f"<title>{TITLE}</title>")
-    return titled.replace("@BODY@", "\n".join(body))
+    return whole_page(TITLE, facts, body)
 
 
 def _section(s: GyroSection, ident: str) -> str:

@@ -26,7 +26,7 @@ from psabench.grading import (
 )
 from psabench.procedures import PROCEDURES
 from psabench.procedures.result import LIMIT_CI
-from psabench.report_page import PAGE
+from psabench.report_page import whole_page
 from psabench.whole_file import replace_file
 
 __all__ = ["Section", "console_table", "html_page", "within_limits", "write"]
@@ -61,15 +61,13 @@ def write(folder: Path, sections: Sequence[Section], facts: Mapping[str, str] | 
 def html_page(sections: Sequence[Section], facts: Mapping[str, str]) -> str:
     """The whole page. Same input, same bytes."""
     body = [
-        "<header><h1>Accelerometer calibration</h1>",
-        f"<p class=facts>{' · '.join(f'{escape(k)} <b>{escape(v)}</b>' for k, v in facts.items())}</p></header>",
         _verdict(sections),
         _comparison(sections),
         _alpha0(sections),
         *(_section(s, f"f{i}") for i, s in enumerate(sections)),
         _method(),
     ]
-    return PAGE.replace("@BODY@", "\n".join(body))
+    return whole_page("Accelerometer calibration", facts, body)
 
 
 def _verdict(sections: Sequence[Section]) -> str:

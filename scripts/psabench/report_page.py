@@ -1,8 +1,13 @@
-"""The frame of report.html: style for light, dark and print; `@BODY@` is where the sections go."""
+"""The frame of every report.html: title, facts of the run, sections; style for light, dark and print."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from html import escape
 
 PAGE = """<!doctype html>
 <html lang=en><head><meta charset=utf-8><meta name=viewport content="width=device-width, initial-scale=1">
-<title>Accelerometer calibration</title>
+<title>@TITLE@</title>
 <style>
 :root { color-scheme: light dark; --ground:#fbfcfd; --card:#ffffff; --ink:#1d2733; --muted:#5b6875;
   --grid:#dfe4ea; --line:#d3dae2;
@@ -46,3 +51,11 @@ sub { font-size: .72em; line-height: 0; }
 @BODY@
 </body></html>
 """
+
+
+def whole_page(title: str, facts: Mapping[str, str], sections: Iterable[str]) -> str:
+    """One file, nothing loaded from elsewhere. Same input, same bytes; empty sections leave no trace."""
+    told = " · ".join(f"{escape(k)} <b>{escape(v)}</b>" for k, v in facts.items())
+    header = f"<header><h1>{escape(title)}</h1><p class=facts>{told}</p></header>"
+    body = "\n".join([header, *(s for s in sections if s)])
+    return PAGE.replace("@TITLE@", escape(title)).replace("@BODY@", body)

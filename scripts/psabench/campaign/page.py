@@ -13,7 +13,7 @@ from typing import Any
 from psabench.campaign import chains, claims, plots
 from psabench.campaign.cases import STUDIES, Case, Study
 from psabench.campaign.claims import Check, Claim, Figures, Found, HoldFigures
-from psabench.report_page import PAGE
+from psabench.report_page import whole_page
 from psabench.store import Rows
 from psabench.whole_file import replace_file
 
@@ -247,9 +247,7 @@ def _studies(c: Campaign) -> list[Study]:
 
 def html_page(c: Campaign) -> str:
     """The whole page. Same input, same bytes."""
-    facts = " · ".join(f"{escape(k)} <b>{escape(v)}</b>" for k, v in c.facts.items())
     body = [
-        f"<header><h1>{TITLE}</h1><p class=facts>{facts}</p></header>",
         f"<p class='verdict {'good' if c.within else 'bad'}'>{escape(verdict(c))}</p>",
         _claims(c),
         _agreements(c),
@@ -258,9 +256,7 @@ def html_page(c: Campaign) -> str:
         _failed(c),
         _checks(c),
     ]
-    return PAGE.replace("<title>Accelerometer calibration</title>", f"<title>{TITLE}</title>").replace(
-        "@BODY@", "\n".join(x for x in body if x)
-    )
+    return whole_page(TITLE, c.facts, body)
 
 
 def _html_table(head: Sequence[Sequence[str]], rows: Sequence[Sequence[str]], numbers: bool) -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from psabench.conform.outcome import Outcome, Verdict
 from psabench.conform.requirements import requirements
-from psabench.report_page import PAGE
+from psabench.report_page import whole_page
 
 if TYPE_CHECKING:
     from psabench.conform.report import Run
@@ -24,19 +24,14 @@ CSS = {Verdict.PASSED: "v-passed", Verdict.FAILED: "v-failed", Verdict.INCONCLUS
 
 def page(run: Run, folder: Path) -> str:
     """One file, nothing loaded from elsewhere; pictures are those of the folder. Same input, same bytes."""
-    title = f"Conformance of {run.subject}"
-    told = " · ".join(f"{escape(k)} <b>{escape(v)}</b>" for k, v in run.facts.items())
     body = [
         STYLE,
-        f"<header><h1>{escape(title)}</h1><p class=facts>{told}</p></header>",
         _verdict(run),
         *(_failure(o, folder) for o in run.outcomes if o.verdict is Verdict.FAILED),
         _table(run),
         _signed(run),
     ]
-    return PAGE.replace("<title>Accelerometer calibration</title>", f"<title>{escape(title)}</title>").replace(
-        "@BODY@", "\n".join(body)
-    )
+    return whole_page(f"Conformance of {run.subject}", run.facts, body)
 
 
 def _verdict(run: Run) -> str:
