@@ -43,10 +43,8 @@ UNITS = {
 }  # fmt: skip
 HEAD = "seed: 3\nbus: {bitrate_hz: 1000000, data_bitrate_hz: 5000000}\n"
 HEARTBEAT_MS, FRAME_FORM, SYNC_ID, HELLO = 0x1017, 0x2020, 0x080, 0x7FF
-CLASSIC, ALL_FORMS = (
-    (0, 1),
-    (0, 1, 2, 3),
-)  # of a PSA-2: pair, fast; frame, block are CAN FD, which socketcand does not carry
+# Of a PSA-2: pair, fast; frame, block are CAN FD, which socketcand does not carry.
+CLASSIC, ALL_FORMS = (0, 1), (0, 1, 2, 3)
 NOT_NOW = "0x08000022"
 # Words that the host built into a PSD-1 takes itself.
 TAKEN: dict[str, list[str]] = {"psd1": ["2002h:1", "2002h:2", "2002h:3"]}

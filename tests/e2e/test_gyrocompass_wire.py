@@ -18,7 +18,6 @@ from psabench.places import proto_file
 from psabench.procedures import gyrocompass as g
 from psabench.procedures.gyrocompass import GyrocompassParams, GyrocompassResult
 from psabench.procedures.head_bench import Silent
-from psabench.procedures.heading_hold import Held, HoldParams, hold
 from psabench.procedures.platform_bench import Table
 from psabench.wire_platform import WirePlatform
 
@@ -166,7 +165,9 @@ def test_a_lost_frame_in_a_window_costs_the_window() -> None:
             assert "position 2 (90 deg) does not count" in r.notes[0]
             assert "lost" in r.notes[0]
         else:
-            with pytest.raises(LinkError, match=r"no heading from 2 of 3 windows: three are wanted \(position 2 .*lost"):
+            with pytest.raises(
+                LinkError, match=r"no heading from 2 of 3 windows: three are wanted \(position 2 .*lost"
+            ):
                 g.estimate(windows, p)
 
 
@@ -214,36 +215,6 @@ def test_a_drift_that_jumps_is_seen_in_a_long_run() -> None:
         p = ideal(sequence="0,180,90,270", repeat=2)
         r = g.estimate(g.measure(platform, p, Silent()), p)
     assert any("the drift jumped" in d for d in r.doubts)
-
-
-def doubts_of_a_hold(spoil: Callable[[Bench], object]) -> tuple[str, ...]:
-    """Of half an hour, spoilt after its second look."""
-    with Bench.start(IDEAL) as bench:
-        platform = WirePlatform(bench)
-        p = ideal(sequence="0,90,180", method="closed3")
-        start = g.estimate(g.measure(platform, p, Silent()), p)
-        looks: list[Held] = []
-
-        def watch(h: Held) -> None:
-            looks.append(h)
-            if len(looks) == 2:
-                spoil(bench)
-
-        return hold(platform, start, HoldParams(hours=0.5), Silent(), watch=watch).doubts
-
-
-def test_a_hold_that_nothing_spoils_has_no_doubts() -> None:
-    assert doubts_of_a_hold(lambda _: None) == ()
-
-
-def test_a_unit_that_was_reset_does_not_navigate() -> None:
-    doubts = doubts_of_a_hold(lambda bench: bench.control.call("unit.reset", unit="gyro"))
-    assert any("the unit left navigation, its mode is off" in d for d in doubts)
-
-
-def test_a_dead_azimuth_torquer_is_seen_in_the_hold() -> None:
-    doubts = doubts_of_a_hold(lambda bench: bench.fault("platform.torquer", "platform.azimuth"))
-    assert any("the heading moved by" in d for d in doubts)
 
 
 def test_a_level_unit_that_falls_silent_is_no_heading() -> None:

@@ -12,6 +12,7 @@ from psabench import Bench
 from psabench.devices import Gyro
 from psabench.devices.gyro import Flag, Mode, SelfTest
 from psabench.errors import DeviceError, LinkError
+from psabench.places import proto_file
 from psabench.procedures import gyrocompass
 from psabench.procedures.head_bench import Silent
 from psabench.procedures.heading_hold import Held, HoldParams, HoldResult, hold
@@ -91,11 +92,17 @@ def test_what_spoils_a_hold_is_named_with_its_time(
     assert at_s[0] <= time_s <= at_s[1], doubt
 
 
+def test_a_dead_azimuth_torquer_moves_the_heading_of_a_parked_vehicle() -> None:
+    """Beside what the unit says: the platform turns as the Earth does not, 11.5 deg/h."""
+    r, _ = held(fault("platform.torquer", "platform.azimuth"))
+    (doubt,) = [d for d in r.doubts if d.startswith("the heading moved by")]
+    assert "in 600 s of standing" in doubt
+
+
 def test_a_dip_of_the_supply_between_two_looks_is_a_doubt(tmp_path: Path) -> None:
     """Board and level unit lose their power for a tenth of a second and are back long before the next look."""
     path = tmp_path / "supplied.yaml"
-    text = Path(__file__).parents[2].joinpath("proto/scenarios/gyrocompass_ideal.yaml").read_text()
-    path.write_text("supply: {}\n" + text)
+    path.write_text("supply: {}\n" + proto_file(f"scenarios/{IDEAL}.yaml").read_text(encoding="utf-8"))
     r, errors_deg = held(later("supply.brownout", "supply", for_s=0.1, drop_v=20.0), scenario=path)
     (doubt,) = [d for d in r.doubts if d.startswith("the unit left navigation, its mode is off")]
     assert f"{RESET}, 35" in doubt
