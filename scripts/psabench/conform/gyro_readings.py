@@ -13,6 +13,7 @@ from psabench.protocol_files import message
 from psabench.signals import Floats, layout
 
 MESSAGES = ("GYRO_RATES", "GYRO_ANGLES", "GYRO_LEVEL")
+EMCY = "GYRO_EMCY"
 EARTH_DEGPH = 15.041067  # docs/protocol_gyro.md
 
 
@@ -45,10 +46,3 @@ def vertical_degph(latitude_deg: float) -> float:
 def wrapped(angle_deg: Floats) -> Floats:
     """Into half turns."""
     return np.asarray((angle_deg + 180.0) % 360.0 - 180.0, np.float64)
-
-
-def emergencies(e: Evidence) -> list[tuple[int, float]]:
-    """Codes and the board's own instants, s."""
-    log = e.frames_of("GYRO_EMCY")
-    whole = [f for f in log.frames if len(f.data) == 8]
-    return [(int.from_bytes(f.data[:2], "little"), int.from_bytes(f.data[4:], "little") * 1e-6) for f in whole]

@@ -9,6 +9,8 @@ from psabench.conform.evidence import Evidence
 from psabench.conform.outcome import Broken, TooLittle
 from psabench.protocol_files import message
 
+EMCY_BYTES = 8
+
 
 def in_turn(e: Evidence, names: Sequence[str]) -> str:
     """The messages of each reading follow one another in this order. Returns what was seen."""
@@ -36,3 +38,9 @@ def as_laid_out(e: Evidence, names: Sequence[str]) -> str:
         if bad:
             raise Broken(f"{name} {bad[0].data.hex(' ')}", f"{due} bytes, 0 in bits without a signal", frames=bad)
     return f"{', '.join(names)} as in the table"
+
+
+def emergencies(e: Evidence, name: str) -> list[tuple[int, float]]:
+    """Codes, and the board's own instants, s, of the EMCY of this name."""
+    whole = [f for f in e.frames_of(name).frames if len(f.data) == EMCY_BYTES]
+    return [(int.from_bytes(f.data[:2], "little"), int.from_bytes(f.data[4:], "little") * 1e-6) for f in whole]

@@ -38,6 +38,8 @@ WAYS = frozenset(
         "bus",
         "supply",
         "chamber",
+        "head",
+        "table",
         "lockstep",
         "exact",
         "inputs",

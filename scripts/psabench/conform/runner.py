@@ -27,6 +27,8 @@ MISSING = {
     "bus": "no bus port was connected (--bus-port)",
     "supply": "no power supply was connected (--scpi supply=...)",
     "chamber": "no thermal chamber was connected (--scpi chamber=...)",
+    "head": "no dividing head was connected (--scpi head=...)",
+    "table": "no rate table was connected (--scpi table=...)",
     "lockstep": "an emulator in lockstep is wanted: it takes longer than anybody would wait",
     "exact": "the probes' clock is not the board's own: an emulator in lockstep is wanted",
     "port": "no line port was connected (--lines)",

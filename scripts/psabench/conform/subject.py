@@ -35,6 +35,7 @@ INPUTS_V: Mapping[str, float] = {"x": 2.0101, "y": -1.3007, "z": 0.7003}
 # Links of python-can whose time stamps are this machine's: they say when it looked, not when the frame passed.
 BY_THE_HOST_S_CLOCK = ("slcanBus", "SocketcanBus", "UdpMulticastBus", "VirtualBus", "SerialBus")
 BUS_BOARDS = ("psd1", "pmka", "pik")  # boards with a parallel bus
+OVERDRIVE_V_PER_G = 9.0  # of the accelerometer X of a PIK, which a dividing head can turn
 THERMOMETERS = ("psa2", "pmka")  # boards whose temperatures are compared with a chamber's
 
 
@@ -132,7 +133,7 @@ class Subject:
             seen.add("port")
         if self.port is not None:
             seen.add("bus")
-        seen |= {"supply", "chamber"} & set(self.bench.addresses)
+        seen |= {"supply", "chamber", "head", "table"} & set(self.bench.addresses)
         seen |= self._of_the_link()
         if self.variant.figures.get("host_strobe_ns") != 0:
             seen.add("stream")  # readings come by themselves
@@ -167,6 +168,8 @@ class Subject:
     def take(self, *, lines: bool = True) -> Iterator[Take]:
         """Collect what is seen while the block runs; its lines are there when it has ended."""
         take = Take(rate=self.recorder_rate)
+        while not self.lockstep and self.host.receive(0.0):
+            pass  # what came before is no part of it
         self.host.listeners.append(take.on_message)
         looking = lines and self.probe is not None
         try:
@@ -341,8 +344,12 @@ def scenario(
     if variant.family == "gyro":
         del unit["axes"]
         return {"supply": {}, "start": True, **PLATFORM, "units": [unit | {"level": LEVEL["name"]}, LEVEL]}
-    chamber: dict[str, Any] = {"chamber": {}} if variant.family in THERMOMETERS else {}
-    return {"supply": {}, **chamber, "units": [unit]}
+    around: dict[str, Any] = {"chamber": {}} if variant.family in THERMOMETERS else {}
+    if variant.family == "psd1":  # it has gyros
+        unit["on"], around["table"] = "table", {}
+    if variant.family == "pik" and "x" in axes:  # nothing at 0 deg; beyond full scale at -90 deg
+        axes["x"]["kx_v_per_g"], around["head"] = OVERDRIVE_V_PER_G, {}
+    return {"supply": {}, **around, "units": [unit]}
 
 
 def _off(key: str, nominal: float, clock_ppm: float) -> int:

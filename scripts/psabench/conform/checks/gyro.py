@@ -8,10 +8,10 @@ import numpy as np
 
 from psabench.conform.after_res import late_readings
 from psabench.conform.evidence import CanLog, Evidence
-from psabench.conform.gyro_readings import EARTH_DEGPH, MESSAGES, columns, emergencies, vertical_degph, wrapped
+from psabench.conform.gyro_readings import EARTH_DEGPH, EMCY, MESSAGES, columns, vertical_degph, wrapped
 from psabench.conform.intervals import interval, wires_needed
 from psabench.conform.limits import row_for
-from psabench.conform.messages import as_laid_out, in_turn
+from psabench.conform.messages import as_laid_out, emergencies, in_turn
 from psabench.conform.outcome import Broken, TooLittle
 from psabench.conform.plan import check
 from psabench.conform.proof import proves
@@ -23,7 +23,7 @@ LINES = ("STEP", "READY", "SLEW", "SETTLE", "WINDOW", "FAULT")
 PHASES = {"SLEW": Phase.SLEWING, "SETTLE": Phase.SETTLING, "WINDOW": Phase.WINDOW}
 US = 1e3
 LEAST = 20  # readings that a judgement wants
-ACCEL_OVER_S = 0.1  # rates so far apart give an acceleration: the encoder has an error that goes with its angle
+ACCEL_OVER_S = 0.3  # rates so far apart give an acceleration: the encoder has an error that goes with its angle
 LIMITS = ("GYRO-LAW-05", "GYRO-LAW-06")
 
 
@@ -274,7 +274,7 @@ def rates_are_limited_and_say_so(e: Evidence) -> str:
 def a_limited_rate_is_an_emergency(e: Evidence) -> str:
     """Look for EMCY FF24h and for its end a second after the last limited rate."""
     row, c = row_for(e, "GYRO-ERR-03"), columns(e)
-    found = emergencies(e)
+    found = emergencies(e, EMCY)
     code = int(row.limit("emcy_code"))
     begun = [t for k, t in found if k == code]
     ended = [t for k, t in found if k == 0]
@@ -297,7 +297,7 @@ def missing_frames_are_told(e: Evidence) -> str:
     row, c = row_for(e, "GYRO-LEV-03"), columns(e)
     lost = c["LEVEL_LOST"] == 1
     code = int(row.limit("emcy_code"))
-    found = emergencies(e)
+    found = emergencies(e, EMCY)
     begun, ended = [t for k, t in found if k == code], [t for k, t in found if k == 0]
     if not lost.any() or lost.all() or not begun or not ended:
         raise Broken(
@@ -325,7 +325,7 @@ def angles_stay_without_the_level_unit(e: Evidence) -> str:
     for name in ("BETA", "GAMMA", "U1"):
         if np.ptp(c[name][mine]) > 0:
             raise Broken(f"{name} moves by {np.ptp(c[name][mine]):g}", "it stays")
-    begun = [k for k, _ in emergencies(e) if k == int(row.limit("emcy_code"))]
+    begun = [k for k, _ in emergencies(e, EMCY) if k == int(row.limit("emcy_code"))]
     if len(begun) != 1:
         raise Broken(f"{len(begun)} emergencies FF21h", "one")
     return f"{len(mine)} readings with the same angles and U1, one emergency"

@@ -8,7 +8,7 @@ from psabench.conform.after_res import late_readings
 from psabench.conform.evidence import CanLog, Evidence, LineLog
 from psabench.conform.intervals import before, first_bad, interval, wires_needed
 from psabench.conform.limits import row_for
-from psabench.conform.messages import as_laid_out, in_turn
+from psabench.conform.messages import as_laid_out, emergencies, in_turn
 from psabench.conform.outcome import Broken, TooLittle
 from psabench.conform.plan import check
 from psabench.conform.proof import proves
@@ -225,6 +225,48 @@ def pulses_begin_on_their_grid(e: Evidence) -> str:
     if count < LEAST:
         raise TooLittle(f"{count} pulses were recorded")
     return f"{count} pulses on a grid of {tick_ns:.1f} ns"
+
+
+@proves("PIK-LAW-10")
+@check("overdrive", needs={"line", "head"})
+def pulses_keep_their_distance(e: Evidence) -> str:
+    """Measure from pulse to pulse of a channel that cannot keep up with its input."""
+    wires_needed(e, *PULSES)
+    row, tclk_ns = row_for(e, "PIK-LAW-10"), _tclk_ns(e)
+    least_ns, seen = row.limit("gap_min_per_tclk") * tclk_ns, []
+    slack_ns = ROUNDED_NS + row.limit("tolerance_ns") + e.slack_ns(least_ns)
+    for name in PULSES:
+        rises = e.wires.rises(name)
+        known = e.wires.known(rises[:-1], rises[1:])
+        gaps_ns, at = np.diff(rises)[known], rises[1:][known]
+        saw = [f"{g} ns between pulses" for g in gaps_ns]
+        first_bad(gaps_ns < least_ns - slack_ns, at, saw, f"{least_ns:.0f} ns", (name,))
+        seen += gaps_ns.tolist()
+    if not seen or min(seen) > least_ns + 2 * tclk_ns / row.limit("grid_per_tclk"):
+        raise TooLittle(f"pulses {min(seen, default=0)} ns apart: no channel is at its limit")
+    return f"{len(seen)} gaps between pulses, {min(seen)} ns and more"
+
+
+@proves("PIK-SAT-01")
+@check("overdrive", needs={"can", "head"})
+def saturation_is_told(e: Evidence) -> str:
+    """Look for SAT and EMCY FF11h while a channel cannot keep up, and for their end."""
+    row, raw = row_for(e, "PIK-SAT-01"), _told(e, "PIK_COUNTS").raw("PIK_COUNTS")
+    stamps = unwrap(_told(e, "PIK_TOTAL_Z").raw("PIK_TOTAL_Z")["TSTAMP"], 32) * 1e-6
+    sat = np.stack([raw[f"SAT_{a}"] for a in "XYZ"], axis=1)[: len(stamps)]
+    code = int(row.limit("emcy_code"))
+    found = [(k, t) for k, t in emergencies(e, "PIK_EMCY") if k in (0, code)]
+    if not sat.any() and not found:
+        raise TooLittle("no channel was at its limit")
+    if not sat.any() or sat[-1].any() or [k for k, _ in found] != [code, 0]:
+        told = [f"{k:04X}h" for k, _ in found]
+        raise Broken(f"SAT in {int(sat.any(axis=1).sum())} readings, emergencies {told}", f"{code:04X}h, 0000h")
+    last_s = float(stamps[np.flatnonzero(sat.any(axis=1))[-1]])
+    took_ms, due_ms = (found[1][1] - last_s) * 1e3, row.limit("ends_ms")
+    period_ms = row_for(e, "PIK-CNT-02").limit("default_us") * 1e-3  # the last loss was within the reading before
+    if not due_ms - period_ms <= took_ms <= due_ms + row.limit("tolerance_ms"):
+        raise Broken(f"it ends {took_ms:.1f} ms after the last reading with SAT", f"{due_ms:g} ms after the last loss")
+    return f"SAT in {int(sat.any(axis=1).sum())} readings, FF11h, over {took_ms:.1f} ms after the last of them"
 
 
 @proves("PIK-CNT-01")

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from psabench.conform.evidence import Evidence
+from psabench.conform.outcome import TooLittle
 from psabench.conform.plan import scene
 from psabench.conform.subject import Subject
 
 START_S, STREAM_S, MINUTE_S = 0.06, 1.0, 60.5
+OVERDRIVE_DEG = -90.0  # there the accelerometer X gives more than its channel can follow
 
 
 @scene("power_on", boards=("pik",))
@@ -43,3 +45,25 @@ def minute(s: Subject) -> Evidence:
         s.run_for(MINUTE_S)
         s.unit.stop()
     return s.evidence("minute", take)
+
+
+@scene("overdrive", boards=("pik",))
+def overdrive(s: Subject) -> Evidence:
+    """The accelerometer X turned by a dividing head until its channel cannot keep up, and back."""
+    if "head" not in s.probes:
+        raise TooLittle("no dividing head was connected")
+    s.reset()
+    s.run_for(START_S)
+    head = s.bench.head
+    rest_deg = head.angle_deg
+    with s.take(lines=False) as take:
+        s.unit.start()
+        head.turn(OVERDRIVE_DEG)
+        s.run_for(0.2)
+        with s.take() as looked:
+            s.run_for(0.2)
+        head.turn(rest_deg)
+        s.run_for(0.4)
+        s.unit.stop()
+    take.lines = looked.lines
+    return s.evidence("overdrive", take)

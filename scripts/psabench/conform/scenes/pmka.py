@@ -12,7 +12,7 @@ from psabench.devices import Pmka
 
 BEAT, ZERO, RESETS = 200, 120, 78  # periods, as the board turns itself (PMKA-CAL-03)
 SHORT = (40, 20, 12)  # a beat of a scene where the computer turns it
-ROTATION, MINUTE = 5, 65  # beats
+ROTATION, MINUTE = 5, 69  # beats; the minute begins and ends with the spare at rest, up to three beats from its ends
 START_S = 0.02
 
 

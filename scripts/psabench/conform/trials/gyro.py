@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from psabench.conform.bus_host import refused
 from psabench.conform.dictionary import as_the_dictionary_says
-from psabench.conform.gyro_readings import columns, emergencies
+from psabench.conform.gyro_readings import EMCY, columns
+from psabench.conform.messages import emergencies
 from psabench.conform.outcome import Broken
 from psabench.conform.plan import trial
 from psabench.conform.proof import proves
@@ -69,8 +70,8 @@ def what_does_not_settle_is_told(s: Subject) -> str:
         raise Broken(
             f"mode {c['MODE'][-1]:g}, NOT_SETTLED {c['NOT_SETTLED'][-1]:g}", "no window, mode 2, NOT_SETTLED 1"
         )
-    if code not in [k for k, _ in emergencies(e)]:
-        raise Broken(f"emergencies {[f'{k:04X}h' for k, _ in emergencies(e)]}", f"{code:04X}h")
+    if code not in [k for k, _ in emergencies(e, EMCY)]:
+        raise Broken(f"emergencies {[f'{k:04X}h' for k, _ in emergencies(e, EMCY)]}", f"{code:04X}h")
     return "no window, mode 2, NOT_SETTLED, FF23h"
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 from psabench.busport import Cycle
 from psabench.conform.bus_host import burst, line, line_refused
 from psabench.conform.dictionary import as_the_dictionary_says
@@ -18,7 +20,8 @@ from psabench.estimate import pmka as est
 STATUS, MODE, COMMAND, BEAT, ZERO = 8, 9, 10, 11, 12
 LATEST = tuple(f"R {a}" for a in (6, 0, 1, 2, 3, 4, 5, 7, 6))
 STROBE_NS = 20_000_000
-HEAT_K, HEAT_S = 10.0, 120.0
+ATTEMPTS = 20  # of cycles that must fit into a period, on a machine that has other things to do
+HEAT_K, HEAT_K_PER_MIN, HEAT_S = 10.0, 5.0, 60.0
 ROM_WORDS_AT, COUNTS_AT = 0x100, 0
 SIGNS = {0: 0, 1: 1, 3: -1}  # two bits of RESETS
 AUTONOMOUS = 1
@@ -173,19 +176,21 @@ def _degc(s: Subject) -> float:
 @proves("PMKA-ROM-03")
 @trial(needs={"bus", "chamber"})
 def the_temperature_is_that_of_the_chamber(s: Subject) -> str:
-    """Compare TEMPERATURE with the chamber at rest; heat the air for two minutes, and see it follow."""
+    """Compare TEMPERATURE with the chamber at rest; heat the air for a minute, and see it follow."""
     row = requirements()["PMKA-ROM-03"]
     calm(s)
     chamber = s.bench.chamber
-    air, first = chamber.temp_degc, _degc(s)
+    air, first, ramp = chamber.temp_degc, _degc(s), chamber.ramp_k_per_min
     if abs(first - air) > row.limit("offset_max_k"):
         raise Broken(f"{first:.3f} degC", f"{air:.3f} degC in the chamber")
     try:
+        chamber.ramp(HEAT_K_PER_MIN)
         chamber.set(air + HEAT_K)
         s.run_for(HEAT_S)
         hot, later = chamber.temp_degc, _degc(s)
     finally:
         chamber.set(air)
+        chamber.ramp(ramp)
     calm(s)
     if not first + row.limit("offset_max_k") < later < hot:
         raise Broken(f"{first:.3f}, later {later:.3f} degC", f"more, and less than the air's {hot:.3f} degC")
@@ -199,14 +204,26 @@ def a_reading_that_nobody_took_is_told(s: Subject) -> str:
     row = requirements()["PMKA-BUS-03"]
     waits, missed = int(row.limit("waits_mask")), int(row.limit("missed_mask"))
     calm(s)
-    s.run_for(3 * ts_s())
-    first, _, taken = (c.data for c in burst(s, "R 8", "R 3", "R 8"))
+    for _ in range(ATTEMPTS):
+        s.run_for(3 * ts_s())
+        before, *found, after = (c.data for c in burst(s, "R 6", "R 8", "R 3", "R 8", "R 6"))
+        if before == after:
+            break
+    else:
+        raise TooLittle("five cycles on the bus last longer than a period")
+    first, _, taken = found
     if not first & waits or not first & missed or taken & (waits | missed):
         raise Broken(f"STATUS {first:04X}h before K was read, {taken:04X}h after", "it waits, one was missed; neither")
     pause = f"R 9 {round(0.6 * ts_s() * 1e9)}"  # a strobe so long: the bridge keeps time, whatever its host does
-    timely = burst(s, *("R 3", pause) * 4, "R 8")[-1].data
-    if timely & missed:
-        raise Broken(f"STATUS {timely:04X}h with K read in each period", "no reading missed")
+    for _ in range(ATTEMPTS):
+        cycles = burst(s, "R 3", "R 8", *(pause, "R 3") * 4, "R 8")
+        took_s = [b.t_s - a.t_s for a, b in pairwise([c for c in cycles if c.address == 3])]
+        if max(took_s) < 0.9 * ts_s():
+            break
+    else:
+        raise TooLittle("cycles on the bus last longer than a period")
+    if cycles[-1].data & missed:
+        raise Broken(f"STATUS {cycles[-1].data:04X}h with K read in each period", "no reading missed")
     return "bit 0 until K is read, bit 1 where one was not taken"
 
 

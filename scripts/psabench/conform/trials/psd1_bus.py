@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from psabench.conform.bus_host import line, line_refused
+from psabench.conform.bus_host import burst, line, line_refused
 from psabench.conform.outcome import Broken
 from psabench.conform.plan import trial
 from psabench.conform.proof import proves
@@ -13,6 +13,11 @@ from psabench.conform.subject import Subject
 from psabench.errors import CycleRefused
 
 CYCLE = 0x08  # of STATUS
+OTHERS = tuple(f"R {a:X}" for a in range(4, 10))  # gyros and rate sensors
+GYROS = 0x2047
+TURN_DPS, TURN_DPS2 = 50.0, 400.0  # of the rate table: its rate, and what it speeds up with
+ANGLE_DEG = 10.0  # more than half of what 16 bits of arc seconds hold
+ASKEW = 0.01  # what a gyro square to the axis may see of a turn
 HALF_S = 100e-6  # from one word to the next, and some more
 
 
@@ -193,20 +198,21 @@ def the_other_signals_are_there(s: Subject) -> str:
 @proves("PSD1-BUS-11")
 @trial(needs={"bus", "supply"})
 def the_service_signal_follows_the_supply(s: Subject) -> str:
-    """Change the supply by a tenth and read its code before and after."""
+    """Lower the supply by a twentieth and read its code before and after."""
+    row = requirements()["PSD1-BUS-11"]
     line(s, "W B 0000")
     supply = s.bench.supply
     volts = supply.volt_v
     s.run_for(0.2)
     before = line(s, "R B").data & 0xFFF
     try:
-        supply.set(volts * 0.95)
+        supply.set(volts * row.limit("lowered_part"))
         s.run_for(0.2)
         after = line(s, "R B").data & 0xFFF
     finally:
         supply.set(volts)
         s.run_for(0.2)
-    if not 0.93 * before < after < 0.97 * before:
+    if abs(after / max(before, 1) - row.limit("lowered_part")) > row.limit("tolerance_pct") / 100:
         raise Broken(f"code {before}, at 95 % of the supply {after}", "95 % of it")
     return f"code {before}, at 95 % of the supply {after}"
 
@@ -214,25 +220,81 @@ def the_service_signal_follows_the_supply(s: Subject) -> str:
 @proves("PSD1-BUS-12")
 @trial(needs={"bus"})
 def gyros_are_latched_with_the_cycle(s: Subject) -> str:
-    """Read the registers of gyros and rate sensors twice in a cycle; one that waits for its host lasts long."""
+    """Read the registers of gyros and rate sensors twice in a cycle; where there is a rate table it turns meanwhile."""
+    table = s.bench.table if "table" in s.probes else None
+    if table is not None:
+        table.rate(TURN_DPS)
+        s.run_for(TURN_DPS / TURN_DPS2 + 0.1)
+    try:
+        first, later = _latched(s), _latched(s)
+    finally:
+        if table is not None:
+            table.stop()
+    calm(s)
+    if table is not None and first[:3] == later[:3]:
+        raise Broken(f"gyros {first[:3]} in two cycles of a board that turns", "counts that go on")
+    return f"{first} twice in a cycle" + (f", then {later}" if table is not None else "")
+
+
+def _latched(s: Subject) -> list[int]:
+    """04h to 09h, as they were read twice in one cycle. Raises Broken where no cycle shows them alike."""
     calm(s)
     if not has_host(s.variant):
         _waiting(s)
-    apart = []
+    seen: list[int] = []
+    again: list[int] = []
     for attempt in range(12):
-        seen = [line(s, f"R {a:X}").data for a in range(4, 10)]
-        if not has_host(s.variant):
+        if has_host(s.variant):
+            both = [c.data for c in burst(s, *OTHERS, *OTHERS)]
+        else:
+            both = [c.data for c in burst(s, *OTHERS)]
             s.run_for(0.1)
-        again = [line(s, f"R {a:X}").data for a in range(4, 10)]
+            both += [c.data for c in burst(s, *OTHERS)]
+        seen, again = both[: len(OTHERS)], both[len(OTHERS) :]
         if seen == again:
-            calm(s)
-            return f"{seen} twice"
+            return seen
         if not has_host(s.variant):
             break
-        apart.append(f"{seen}, then {again}")  # a cycle may have passed between
-        s.run_for(period_s(s.variant) * (0.1 + 0.07 * attempt))
+        s.run_for(period_s(s.variant) * (0.1 + 0.07 * attempt))  # a cycle may have passed between
+    raise Broken(f"{seen}, then {again}", "the same in one cycle")
+
+
+@proves("PSD1-BUS-13")
+@trial(needs={"bus", "can", "table"})
+def gyros_count_arc_seconds(s: Subject) -> str:
+    """Turn a rate table by ten degrees and back; compare counts with its readout, and 04h to 06h with the counts."""
+    row = requirements()["PSD1-BUS-13"]
+    modulo, table = 1 << int(row.limit("code_bits")), s.bench.table
     calm(s)
-    raise Broken(apart[0] if apart else f"{seen}, then {again}", "the same in one cycle")
+    at_deg, counts, seen = table.angle_deg(), _gyros(s), []
+    for to_deg in (at_deg + ANGLE_DEG, at_deg):
+        before_deg, before = table.angle_deg(), counts
+        table.position(to_deg, TURN_DPS)
+        counts = _gyros(s)
+        turned_arcsec = (table.angle_deg() - before_deg) * 3600
+        moved = [b - a for a, b in zip(before, counts, strict=True)]
+        due = turned_arcsec / row.limit("count_arcsec")
+        most = row.limit("tolerance_counts") + abs(due) * row.limit("scale_error_ppm") * 1e-6
+        mine = max(range(3), key=lambda k: abs(moved[k]))
+        others = [abs(m) for k, m in enumerate(moved) if k != mine]
+        if abs(abs(moved[mine]) - abs(due)) > most or max(others) > ASKEW * abs(due):
+            raise Broken(f"{moved} counts", f"{abs(due):.1f} +- {most:.1f} of one of them")
+        seen.append((mine, moved[mine]))
+        words = [c.data for c in burst(s, *OTHERS[:3])]
+        off = [(c - w + modulo // 2) % modulo - modulo // 2 for c, w in zip(counts, words, strict=True)]
+        if max(map(abs, off)) > row.limit("tolerance_counts"):
+            raise Broken(f"{words} at 04h to 06h", f"{counts} modulo {modulo}")
+    table.stop()
+    calm(s)
+    if seen[0][0] != seen[1][0] or seen[0][1] * seen[1][1] > 0:
+        raise Broken(f"{seen[0][1]} counts one way, {seen[1][1]} the other", "signs that differ")
+    return f"{seen[0][1]} and {seen[1][1]} counts of gyro {'XYZ'[seen[0][0]]} for {ANGLE_DEG:g} deg and back"
+
+
+def _gyros(s: Subject) -> list[int]:
+    """2047h as of a cycle that begins now."""
+    run_cycles(s, 2)
+    return [int(s.unit.node.read(GYROS, k)) for k in (1, 2, 3)]
 
 
 @proves("PSD1-LATE-04")

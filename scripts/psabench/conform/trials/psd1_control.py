@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from psabench.can_host import QUANTUM_S
-from psabench.conform.bus_host import line, line_refused, refused
+from psabench.conform.bus_cycles import TAIL_S
+from psabench.conform.bus_host import line, line_refused, port, refused
 from psabench.conform.dictionary import as_the_dictionary_says
 from psabench.conform.outcome import Broken, TooLittle
 from psabench.conform.plan import trial
 from psabench.conform.proof import proves
+from psabench.conform.psd1_cycles import LINES, of, transfers
 from psabench.conform.psd1_host import BOTH, FLAGS, calm, drive, has_host, messages_on, period_s, run_cycles, word
 from psabench.conform.requirements import requirements
 from psabench.conform.subject import Subject
@@ -19,6 +21,8 @@ UC1, UC2, ZERO, FULL, IN_CONVERTERS, COUNTERS, REFUSAL = 0x2042, 0x2043, 0x2044,
 AXES = (1, 2, 3)
 FS_MASK, GAIN_SHIFT, GAIN_MASK, MODE_MASK, WL, PD, CALIBRATE = 0xFFF, 18, 7 << 18, 7 << 21, 1 << 15, 1 << 16, 1 << 21
 CLIP_GAIN = 4  # code of gain 16
+UNIPOLAR = 1 << 12  # B/U
+LATE_CYCLES, LATE_STEPS, LATE_STEP_S, STROBE_S = 9, 7, 5e-6, 20e-6  # a word comes 15 us after the one before was taken
 HELD = {0x2200: 3, 0x2202: 5, 0x2203: 3, 0x2204: 3}  # objects of the latest cycle, their sub-indices
 # Signals of the messages and the objects that they map (docs/protocol_psd1.md, Objects: 1A00h to 1A03h).
 MAPPED = {
@@ -124,7 +128,7 @@ def uc1_calibrates_anew(s: Subject) -> str:
         raise Broken(f"coefficients {before} before and after", "new ones")
     if s.lockstep and took[0] > most_s:
         raise Broken(f"an answer after {took[0] * 1e3:.1f} ms", f"{most_s * 1e3:.1f} ms at most")
-    if s.lockstep and took[0] < 2 * period_s(s.variant):
+    if s.lockstep and took[0] < row.limit("answer_min_periods") * period_s(s.variant):
         raise Broken(f"an answer after {took[0] * 1e3:.1f} ms", "when the calibration is done")
     calm(s)
     return f"answers after {took[0] * 1e3:.1f} and {took[1] * 1e3:.1f} ms, six new coefficients"
@@ -220,11 +224,12 @@ def the_gain_is_where_the_table_has_it(s: Subject) -> str:
     _set(s, 1 << GAIN_SHIFT)
     two = _mean(_cycles(s, 40)) - zero
     calm(s)
-    wide = [k for k in range(3) if abs(one[k]) > 1000]  # codes: far above what calibration leaves
+    row = requirements()["PSD1-CHIP-01"]
+    wide = [k for k in range(3) if abs(one[k]) > row.limit("input_min_codes")]
     if not wide:
-        raise TooLittle("inputs of 0.4 V and more are wanted")
+        raise TooLittle(f"inputs of {row.limit('input_min_codes'):g} codes and more are wanted")
     for k in wide:
-        if abs(two[k] / one[k] - 2) > 0.15:
+        if abs(two[k] - 2 * one[k]) > row.limit("tolerance_codes"):
             raise Broken(f"{one[k]:.0f} codes on {'XYZ'[k]}, with gain 2 {two[k]:.0f}", "twice as many")
     return f"codes {', '.join(f'{v:.0f}' for v in one)}, with gain 2 {', '.join(f'{v:.0f}' for v in two)}"
 
@@ -269,7 +274,7 @@ def words_beyond_full_scale_are_marked(s: Subject) -> str:
     """Set gain 16, which makes the inputs larger than full scale, and look at words and CLIP."""
     row = requirements()["PSD1-WORD-03"]
     full_v = requirements()["PSD1-WORD-01"].limit("full_scale_v") / (1 << CLIP_GAIN)
-    beyond = {a: v for a, v in s.inputs_v.items() if abs(v) > 1.06 * full_v}
+    beyond = {a: v for a, v in s.inputs_v.items() if abs(v) > (1 + row.limit("margin_pct") / 100) * full_v}
     if not any(v > 0 for v in beyond.values()) or not any(v < 0 for v in beyond.values()):
         raise TooLittle(f"an input beyond {full_v:g} V and one below -{full_v:g} V are wanted")
     calm(s)
@@ -286,6 +291,69 @@ def words_beyond_full_scale_are_marked(s: Subject) -> str:
     if not np.all(words["CLIP"][1:]):
         raise Broken("CLIP 0 with words at their limit", "1")
     return f"{', '.join(beyond)} at their limits, CLIP 1"
+
+
+@proves("PSD1-WORD-03")
+@trial(needs={"can", "inputs"})
+def a_word_at_0_alone_is_marked(s: Subject) -> str:
+    """Make the converters unipolar: negative inputs give 0000h, positive ones lie within, and CLIP stands."""
+    row, zero = requirements()["PSD1-WORD-03"], requirements()["PSD1-WORD-01"]
+    least_v = row.limit("unipolar_min_v")
+    below = [a for a, v in s.inputs_v.items() if v < -least_v]
+    within = [a for a, v in s.inputs_v.items() if least_v < v < zero.limit("full_scale_v") - least_v]
+    if not below or len(below) + len(within) != len("xyz"):
+        raise TooLittle(f"inputs of more than {least_v:g} V either way, one of them negative, are wanted")
+    calm(s)
+    uc1, uc2 = _control(s)
+    s.unit.node.write(UC1, 0, uc1 | UNIPOLAR)
+    s.unit.node.write(UC2, 0, uc2 | UNIPOLAR)
+    words = _cycles(s, 6)
+    calm(s)
+    low = [a for a in below if np.any(words[a.upper()][1:] != row.limit("code_min"))]
+    if low or not all(0 < int(w) < row.limit("code_max") for a in within for w in words[a.upper()][1:]):
+        raise Broken(f"{[f'{int(words[a][-1]):04X}h' for a in 'XYZ']}", f"0000h on {', '.join(below)} alone")
+    if not np.all(words["CLIP"][1:]):
+        raise Broken("CLIP 0 with a word at 0000h", "1")
+    return f"0000h on {', '.join(below)} alone, CLIP 1"
+
+
+@proves("PSD1-LATE-01")
+@trial(needs={"bus", "can", "line", "lockstep"})
+def late_begins_at_its_time(s: Subject) -> str:
+    """Read words sooner and later; count the strobes that the lines show to begin too long after FL2."""
+    row = requirements()["PSD1-LATE-01"]
+    late_ns = row.limit("late_ns")
+    calm(s)
+    before = int(s.unit.node.read(COUNTERS, 16))
+    with s.take() as take:
+        line(s, f"W F {BOTH:04X}")
+        for k in range(LATE_CYCLES):
+            word(s, 0)
+            for axis in (1, 2):
+                _word_after(s, axis, LATE_STEP_S * ((2 * k + axis) % LATE_STEPS))
+        line(s, "W F 0000")
+        s.run_for(TAIL_S)
+    told = int(s.unit.node.read(COUNTERS, 16)) - before
+    words = transfers(s.evidence("late", take))
+    waited = of(words, "cs_fall") - of(words, "fl2")
+    slack_ns = 0.0 if take.lines is None else take.lines.resolution_ns
+    sure, may = int((waited > late_ns + slack_ns).sum()), int((waited > late_ns - slack_ns).sum())
+    near = np.abs(waited - late_ns) < late_ns / 2
+    if not (near & (waited > late_ns)).any() or not (near & (waited < late_ns)).any():
+        raise TooLittle(f"strobes {waited.min()} to {waited.max()} ns after FL2; some about {late_ns:g} ns are wanted")
+    calm(s)
+    if not sure <= told <= may:
+        raise Broken(f"{told} late strobes counted", f"{sure}, those later than {late_ns:g} ns", lines=LINES)
+    return f"{told} of {len(waited)} strobes late, {waited.min()} to {waited.max()} ns after FL2"
+
+
+def _word_after(s: Subject, axis: int, wait_s: float) -> None:
+    """Take a word, having waited; the line carries it out as time begins to pass."""
+    s.run_for(wait_s)
+    host = port(s)
+    host.ask(f"R {axis:X}")
+    s.run_for(STROBE_S)
+    host.answer()
 
 
 @proves("PSD1-LATE-01")
@@ -355,7 +423,9 @@ def lost_conversions_are_told(s: Subject) -> str:
     cycles, counted = _stay_away(s)
     overrun = [int(v) for v in cycles["OVERRUN"]]
     lost = [counted[f"Lost {a}"] for a in "XYZ"]
-    if overrun[2] != 1 or overrun[1] or min(lost) < 5 or max(lost) > min(lost) + 2:
+    row = requirements()["PSD1-LATE-03"]
+    apart = max(lost) - min(lost)
+    if overrun[2] != 1 or overrun[1] or min(lost) < row.limit("lost_min") or apart > row.limit("apart_max"):
         raise Broken(f"OVERRUN {overrun}, lost {lost}", "1 in the third, five or more lost of each")
     return f"OVERRUN {overrun}, lost {lost}"
 
