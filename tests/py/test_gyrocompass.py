@@ -281,7 +281,7 @@ def test_a_window_with_the_servo_off_is_corrected_by_the_encoder() -> None:
         m1_per_s=1.0,
         latitude_rad=0.87,
     )
-    assert g.s_of(w, slope=False, frozen=True) == pytest.approx(s, rel=1e-9)
+    assert g.s_of(w, slope=False, frozen=True) == pytest.approx(s, rel=1e-9, abs=0.0)
     assert g.s_of(w, slope=False, frozen=False) == pytest.approx(s - rate * math.sin(gamma), rel=1e-9)
 
 

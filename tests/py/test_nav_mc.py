@@ -25,7 +25,7 @@ def same_struct(a: c.Structure, b: c.Structure) -> None:
         elif isinstance(x, c.Array):
             assert list(x) == pytest.approx(list(y), abs=1e-15), name
         else:
-            assert x == pytest.approx(y, rel=1e-14, nan_ok=True), name
+            assert x == pytest.approx(y, rel=1e-14, abs=0.0, nan_ok=True), name
 
 
 def test_the_defaults_of_python_are_those_of_the_library() -> None:
