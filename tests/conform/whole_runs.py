@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shutil
-from collections.abc import Iterable
+from collections.abc import Sequence
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -21,11 +21,11 @@ OUT = ROOT / "build/conform"
 PROFILES = [(board, profile) for profile, board in requirements().profiles.items()]
 
 
-def reported(board: str, profile: str, at: Addresses, link: str = "") -> report.Run:
-    """Run everything; the report goes into build/conform/BOARD-PROFILE[-LINK], anew. Asserts what it has to say."""
+def reported(board: str, profile: str, at: Addresses, link: str = "", only: Sequence[str] = ()) -> report.Run:
+    """Run everything, or some groups; build/conform/BOARD-PROFILE[-LINK] is written anew. Asserts what it says."""
     folder = OUT / "-".join(filter(None, (board, profile, link)))
     shutil.rmtree(folder, ignore_errors=True)
-    run = command.device_run(variant(board, profile), at, folder, Silent())
+    run = command.device_run(variant(board, profile), at, folder, Silent(), only=only)
     report.write(folder, run)
     check_report(folder, run)
     return run
@@ -60,9 +60,3 @@ def untested(run: report.Run) -> set[str]:
     """Requirements that somebody can see, and no test looks at."""
     looked_at = {i for o in run.outcomes for i in o.requirements}
     return {r.id for r in run.rows if r.observe and r.id not in looked_at}
-
-
-def unseen(run: report.Run, probes: Iterable[str]) -> set[str]:
-    """Requirements that could be seen by these probes, and were not."""
-    verdicts = run.verdicts()
-    return {r.id for r in run.rows if set(probes) & set(r.observe) and verdicts[r.id] is Verdict.NOT_OBSERVABLE}
