@@ -396,6 +396,6 @@ def test_the_algebra_has_no_doubts_to_count(tmp_path: Path) -> None:
 
 def test_a_hold_is_for_chains_that_have_it() -> None:
     w = Wanted(chain="emulated", setup=Setup(), hold=Hold(), seed=1, first_run=0, runs=1)
-    with pytest.raises(BadInput, match="--chain emulated: the hold is not computed by it; closed, samples does"):
+    with pytest.raises(BadInput, match="--chain emulated: the hold is not computed by it; closed and samples do"):
         chains.compute([w])
     assert CHAINS["closed"].holds

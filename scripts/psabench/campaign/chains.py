@@ -100,7 +100,7 @@ def _computed(w: Wanted) -> Rows:
     if w.hold is None:
         return chain.compute(w.setup, _seed(w), w.first_run, w.runs)
     if not chain.holds:
-        raise BadInput(f"--chain {w.chain}: the hold is not computed by it; {', '.join(_holding())} does")
+        raise BadInput(f"--chain {w.chain}: the hold is not computed by it; {' and '.join(_holding())} do")
     found = nav_mc.hold(hold_config(w.setup, w.hold), _seed(w), first_run=w.first_run, runs=w.runs)
     return _columns(np.degrees(found.end_rad), np.degrees(found.max_rad))
 

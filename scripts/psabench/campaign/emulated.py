@@ -37,6 +37,7 @@ from psabench.recorded_platform import RecordedPlatform
 from psabench.store import CELL, Rows
 from psabench.wire_platform import WirePlatform
 
+OPTION = "--chain emulated or wire"  # of the command line
 SCENARIO = "scenarios/gyrocompass.yaml"
 SEED_BITS = 62
 FIRST_TURN_DEG = 1.0  # the gimbal begins at the first position, but for its errors
@@ -91,7 +92,7 @@ def check(setup: Setup) -> None:
     )
     for wrong, reason in reasons:
         if wrong:
-            raise BadInput(f"--chain emulated: {reason}")
+            raise BadInput(f"{OPTION}: {reason}")
 
 
 # ---- scenarios
@@ -215,7 +216,7 @@ def params(setup: Setup) -> GyrocompassParams:
             level_sd_arcmin=setup.gamma_random_arcmin,
         )
     except ValueError as e:
-        raise BadInput(f"--chain emulated: {e}") from e
+        raise BadInput(f"{OPTION}: {e}") from e
 
 
 Platforms = Callable[[Scenario], AbstractContextManager[PlatformBench]]
@@ -257,7 +258,7 @@ def _result(platforms: Platforms, setup: Setup, p: GyrocompassParams, at: Instru
         with platforms(scenario(setup, at)) as platform:
             return gyrocompass.estimate(gyrocompass.measure(platform, p, Silent()), p)
     except BadInput as e:
-        raise BadInput(f"--chain emulated: {e}") from e
+        raise BadInput(f"{OPTION}: {e}") from e
 
 
 def _errors(platforms: Platforms, setup: Setup, p: GyrocompassParams, seed: int, run: int) -> list[float]:
