@@ -222,6 +222,120 @@ def test_steps_of_a_gyro_unit() -> None:
     fails(gyro.u2_runs_free_when_it_levels, steps(lambda _, v: v.update(U2=v["U2"] + 1.0)))
 
 
+def gimbal(at_deg: float, way_deg: float, *, dps: float = 9.0, dps2: float = 20.0) -> list[float]:
+    """Angles of a turn, 100 a second, into half turns: speeds up, brakes, stands for half a second."""
+    angles, done, rate, sign = [at_deg], 0.0, 0.0, np.sign(way_deg)
+    while done < abs(way_deg) - 1e-6 and len(angles) < 5000:
+        rate = min(dps, rate + dps2 * 0.01, max(0.05, np.sqrt(2 * dps2 * (abs(way_deg) - done)) - dps2 * 0.01))
+        done = min(abs(way_deg), done + rate * 0.01)
+        angles.append(at_deg + sign * done)
+    return [float(v) for v in (np.array(angles + angles[-1:] * 50) + 180.0) % 360.0 - 180.0]
+
+
+def turns(ways: Sequence[Sequence[float]], ends: Sequence[float], *, moves_deg: float = 0.0) -> Evidence:
+    """Turns by mode 3, then mode 2, in which the gimbal goes on moving."""
+    parts, frames, rows = [], 0, list[tuple[str, Row]]()
+    held = [float(ways[-1][-1] + moves_deg * k / 100) for k in range(100)]
+    for mode, angles, to in (*((3, w, e) for w, e in zip(ways, ends, strict=True)), (2, held, 0.0)):
+        for k, q in enumerate(angles):
+            rows += [
+                ("GYRO_RATES", {"U1": 0}),
+                ("GYRO_ANGLES", {"STEP": k % 65536, "MODE": mode, "ENCODER": round(q / (180 / 2**31))}),
+                ("GYRO_LEVEL", {"BETA": 0}),
+            ]
+        parts.append((to, frames, frames + 3 * len(angles)))
+        frames += 3 * len(angles)
+    facts = {"turns": parts[:-1], "held": parts[-1][1:]}
+    return evidence("gyro", log("gyro", rows), facts=facts)
+
+
+def test_turns_of_a_gyro_unit() -> None:
+    good = turns([gimbal(10, 80), gimbal(90, 180), gimbal(-90, 90)], [90.0, 270.0, 0.0])
+    assert gyro.turns_take_the_shorter_way(good)
+    assert gyro.a_turn_ends_at_its_angle_and_holds(good)
+    fails(gyro.turns_take_the_shorter_way, turns([gimbal(10, -280)], [90.0]))
+    fails(gyro.turns_take_the_shorter_way, turns([gimbal(90, -180)], [270.0]))  # of two alike the positive one
+    fails(gyro.turns_take_the_shorter_way, turns([gimbal(10, 80, dps=10.5)], [90.0]))
+    fails(gyro.turns_take_the_shorter_way, turns([gimbal(10, 80, dps2=25.0)], [90.0]))
+    fails(gyro.a_turn_ends_at_its_angle_and_holds, turns([gimbal(10, 79)], [90.0]))
+    fails(gyro.a_turn_ends_at_its_angle_and_holds, turns([gimbal(10, 80)], [90.0], moves_deg=1.0))
+
+
+def test_u2_of_a_gyro_unit_that_holds() -> None:
+    def held(knows: bool) -> Evidence:
+        rows: list[tuple[str, Row]] = []
+        for latitude_deg in (50.0, -50.0):
+            wz = 15.041067 * np.sin(np.radians(latitude_deg)) if knows else 0.0
+            rows += [
+                ("GYRO_RATES", {"U2": round((wz + 7.0) * 1e4)}),
+                ("GYRO_ANGLES", {"MODE": 2}),
+                ("GYRO_LEVEL", {}),
+            ] * 30
+        parts = [(50.0, 0, 90), (-50.0, 90, 180)]
+        return evidence("gyro", log("gyro", rows), facts={"m2_per_s": 2.0, "latitudes": parts})
+
+    assert gyro.u2_turns_with_the_earth(held(True))
+    fails(gyro.u2_turns_with_the_earth, held(False))
+
+
+def test_a_gyro_unit_that_begins_tilted() -> None:
+    def tilted(first_deg: float) -> Evidence:
+        """Settling from half a degree, and a window."""
+        beta = [0.5 * 0.97**k for k in range(100) if 0.5 * 0.97**k > first_deg]
+        rows: list[tuple[str, Row]] = []
+        for phase, angles in ((2, beta), (3, [first_deg] * 20)):
+            for b in angles:
+                mode = {"MODE": 4, "PHASE": phase, "POSITION": 1}
+                rows += [("GYRO_RATES", {}), ("GYRO_ANGLES", mode), ("GYRO_LEVEL", {"BETA": round(b / 2e-6)})]
+        return evidence("gyro", log("gyro", rows))
+
+    assert gyro.a_window_waits_for_the_level(tilted(0.08))
+    fails(gyro.a_window_waits_for_the_level, tilted(0.09))
+
+
+def test_a_heading_of_a_gyro_unit() -> None:
+    def kept(moved_deg: float, free_deg: float) -> Evidence:
+        facts = {"drift_degph": 25.0, "moved_deg": moved_deg, "moved_s": 36.0, "free_deg": free_deg, "free_s": 3.6}
+        return evidence("gyro", CanLog(), facts=facts)
+
+    assert gyro.navigation_keeps_the_azimuth(kept(0.0005, 0.025))
+    fails(gyro.navigation_keeps_the_azimuth, kept(0.002, 0.025))
+    fails(gyro.navigation_keeps_the_azimuth, kept(0.0, 0.0))  # a heading that stands still
+
+
+def saturated(told: int = 20, over_s: float = 0.15) -> Evidence:
+    """A PIK-6 whose X cannot keep up for 20 readings from the 10th on; FF11h and its end by the board's time."""
+    rows: list[tuple[str, Row]] = []
+    for k in range(1, 51):
+        if k == 10:
+            rows.append(("PIK_EMCY", {"CODE": 0xFF11, "T": 100_000}))
+        sat = {"SAT_X": 1} if 10 <= k < 10 + told else {}
+        rows += [("PIK_COUNTS", sat | {"SEQ": k}), ("PIK_TOTALS", {}), ("PIK_TOTAL_Z", {"TSTAMP": k * 10_000})]
+    if told:
+        rows.append(("PIK_EMCY", {"CODE": 0, "T": round((0.01 * (9 + told) + over_s) * 1e6)}))
+    return evidence("pik6", log("pik", rows))
+
+
+def test_saturation_of_a_pik() -> None:
+    assert pik.saturation_is_told(saturated(over_s=0.095))
+    fails(pik.saturation_is_told, saturated(over_s=0.15))
+    fails(pik.saturation_is_told, saturated(over_s=0.05))
+    fails(pik.saturation_is_told, saturated(told=0))
+
+
+def gaps(apart: int) -> Evidence:
+    moves: dict[str, list[tuple[int, int]]] = {n: [(0, 0)] for n in pik.PULSES}
+    moves["FXP"] += [(t + h, 1 - h // 25_000) for t in range(1000, 4_000_000, apart) for h in (0, 25_000)]
+    return evidence("pik6", CanLog(), lines=lines(moves, 5_000_000))
+
+
+def test_distances_of_pulses_of_a_pik() -> None:
+    assert pik.pulses_keep_their_distance(gaps(48_437))
+    fails(pik.pulses_keep_their_distance, gaps(46_875))
+    with pytest.raises(TooLittle):
+        pik.pulses_keep_their_distance(gaps(80_000))
+
+
 def checks_of(module: Any) -> list[Test]:
     """Its checks: public functions that it defines."""
     found = [f for name, f in vars(module).items() if callable(f) and not name.startswith("_")]

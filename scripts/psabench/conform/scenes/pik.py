@@ -5,6 +5,7 @@ from __future__ import annotations
 from psabench.conform.evidence import Evidence
 from psabench.conform.outcome import TooLittle
 from psabench.conform.plan import scene
+from psabench.conform.streamed import from_res, readings
 from psabench.conform.subject import Subject
 
 START_S, STREAM_S, MINUTE_S = 0.06, 1.0, 60.5
@@ -14,37 +15,19 @@ OVERDRIVE_DEG = -90.0  # there the accelerometer X gives more than its channel c
 @scene("power_on", boards=("pik",))
 def power_on(s: Subject) -> Evidence:
     """From Res to some readings, streaming as soon as it has booted."""
-    with s.take() as take:
-        s.reset()
-        s.run_for(0.002)
-        s.unit.start()
-        s.run_for(START_S)
-        s.unit.stop()
-    return s.evidence("power_on", take)
+    return from_res(s, START_S)
 
 
 @scene("stream", boards=("pik",))
 def stream(s: Subject) -> Evidence:
     """A second of pulses and readings."""
-    s.reset()
-    s.run_for(START_S)
-    with s.take() as take:
-        s.unit.start()
-        s.run_for(STREAM_S)
-        s.unit.stop()
-    return s.evidence("stream", take)
+    return s.evidence("stream", readings(s, START_S, lambda: s.run_for(STREAM_S)))
 
 
 @scene("minute", boards=("pik",))
 def minute(s: Subject) -> Evidence:
     """A minute of readings at still inputs."""
-    s.reset()
-    s.run_for(START_S)
-    with s.take(lines=False) as take:
-        s.unit.start()
-        s.run_for(MINUTE_S)
-        s.unit.stop()
-    return s.evidence("minute", take)
+    return s.evidence("minute", readings(s, START_S, lambda: s.run_for(MINUTE_S), lines=False))
 
 
 @scene("overdrive", boards=("pik",))

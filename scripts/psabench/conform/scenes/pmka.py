@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from psabench.busport import Cycle
 from psabench.conform.bus_host import line
 from psabench.conform.evidence import Evidence
 from psabench.conform.outcome import TooLittle
 from psabench.conform.plan import scene
 from psabench.conform.requirements import requirements
+from psabench.conform.streamed import from_res, readings
 from psabench.conform.subject import Subject
 from psabench.devices import Pmka
 
@@ -45,38 +47,20 @@ def turn(s: Subject, beats: int, lengths: tuple[int, int, int]) -> None:
 @scene("power_on", boards=("pmka",))
 def power_on(s: Subject) -> Evidence:
     """From Res to some readings, streaming as soon as it has booted."""
-    with s.take() as take:
-        s.reset()
-        s.run_for(0.002)
-        s.unit.start()
-        s.run_for(START_S + 6 * ts_s())
-        s.unit.stop()
-    return s.evidence("power_on", take)
+    return from_res(s, START_S + 6 * ts_s())
 
 
 @scene("stream", boards=("pmka",))
 def stream(s: Subject) -> Evidence:
     """A rotation and some more, on the lines and on CAN."""
-    s.reset()
-    s.run_for(START_S)
-    with s.take() as take:
-        s.unit.start()
-        turn(s, ROTATION + 1, SHORT)
-        s.unit.stop()
-    return s.evidence("stream", take)
+    return s.evidence("stream", readings(s, START_S, lambda: turn(s, ROTATION + 1, SHORT)))
 
 
 @scene("minute", boards=("pmka",))
 def minute(s: Subject) -> Evidence:
     """A minute of readings through many rotations, and the words of the ROM."""
-    s.reset()
-    s.run_for(START_S)
-    rom = unit(s).rom_words()
-    with s.take(lines=False) as take:
-        s.unit.start()
-        turn(s, MINUTE, (BEAT, ZERO, RESETS))
-        s.unit.stop()
-    take.facts["rom"] = rom
+    take = readings(s, START_S, lambda: turn(s, MINUTE, (BEAT, ZERO, RESETS)), lines=False)
+    take.facts["rom"] = unit(s).rom_words()
     s.reset()
     s.run_for(START_S)
     return s.evidence("minute", take)
@@ -85,13 +69,14 @@ def minute(s: Subject) -> Evidence:
 @scene("strobes", boards=("pmka",))
 def strobes(s: Subject) -> Evidence:
     """Reads and writes of registers over the bus port, while readings come."""
-    s.reset()
-    s.run_for(START_S)
-    with s.take() as take:
-        s.unit.start()
+    cycles: list[Cycle] = []
+
+    def strobe() -> None:
         for k in range(40):
-            take.cycles.append(line(s, f"R {k % 13 if k % 13 != 10 else 6:X} {800 + 100 * (k % 7)}"))
-            take.cycles.append(line(s, f"W D {k % 8:X}"))
+            cycles.append(line(s, f"R {k % 13 if k % 13 != 10 else 6:X} {800 + 100 * (k % 7)}"))
+            cycles.append(line(s, f"W D {k % 8:X}"))
             s.run_for(0.3 * ts_s())
-        s.unit.stop()
+
+    take = readings(s, START_S, strobe)
+    take.cycles += cycles
     return s.evidence("strobes", take)

@@ -6,6 +6,7 @@ from psabench.conform.bus_host import line
 from psabench.conform.evidence import Evidence
 from psabench.conform.plan import scene
 from psabench.conform.psd1_host import calm, has_host, messages_on, period_s, run_cycles, setup_s, word
+from psabench.conform.streamed import from_res
 from psabench.conform.subject import Subject
 
 CYCLES = 24  # of a scene
@@ -15,13 +16,7 @@ MANY, FAST_S = 1030, 0.002  # readings that a noise wants; a word sooner than th
 @scene("power_on", boards=("psd1",))
 def power_on(s: Subject) -> Evidence:
     """From Res to the first cycles, streaming as soon as it has booted."""
-    with s.take() as take:
-        s.reset()
-        s.run_for(0.002)
-        s.unit.start()
-        s.run_for(setup_s(s.variant))
-        s.unit.stop()
-    return s.evidence("power_on", take)
+    return from_res(s, setup_s(s.variant))
 
 
 @scene("stream", boards=("psd1",))
