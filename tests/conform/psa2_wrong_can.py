@@ -41,6 +41,7 @@ from psabench.conform.scenes.psa2_can import Answer
 WRONG_CAN: Mapping[str, Sequence[Bad]] = {
     # CAN
     "xy_and_zt_alternate": [gone("PSA2_ZT"), gone("PSA2_ZT", 20), gone("PSA2_XY", 20)],
+    "xy_comes_before_its_zt": [each("PSA2_ZT", lambda f: replace(f, t_s=f.t_s + 600e-6))],
     "messages_have_their_lengths": [short("PSA2_XY"), short("PSA2_ZT", 9), signal("PSA2_ZT", "CHANNEL", lambda v: 9)],
     "no_frame_before_its_transfer_has_ended": [
         each("PSA2_XY", lambda f: replace(f, t_s=f.t_s - 300e-6)),
@@ -118,6 +119,10 @@ WRONG_CAN: Mapping[str, Sequence[Bad]] = {
     "the_temperature_converter_keeps_what_is_written": [
         told("written", lambda rows: [(*r[:3], REFUSED, r[4]) if r[0] == 0x2001 else r for r in rows])
     ],
+    "the_part_of_the_temperature_converter_cannot_be_written": [
+        told("status", lambda old: [old[0], Answer(old[1].value ^ 0xF0), old[2]]),
+        told("status", lambda old: [REFUSED, *old[1:]]),
+    ],
     "one_write_reaches_three_converters": [told("written", of_rows(lambda r: (*r[:4], [r[4][0], Answer(0), r[4][2]])))],
     "a_register_read_is_what_the_converter_says": [
         marked(4, 0),
@@ -170,11 +175,12 @@ WRONG_CAN: Mapping[str, Sequence[Bad]] = {
     "worst_case_times_are_those_of_the_table": [told("rate text", lambda _: Answer("no"))],
     "a_silent_temperature_converter_is_told": [
         no_emcy,
-        gone("EMCY", 0),
-        gone("EMCY", 1),
+        gone("EMCY", 2),
+        gone("EMCY", 3),
         signal("EMCY", "SOURCE", lambda v: 1),
         told("opcode", lambda _: REFUSED),
     ],
+    "the_history_has_the_latest_first": [told("history", lambda old: [old[1], old[0], *old[2:]])],
     "axes_go_on_without_temperatures": [dropped, signal("PSA2_ZT", "T_NEW", lambda v: 1)],
     "time_outs_are_counted": [counted(9, -1)],
     "an_access_without_data_ready_is_aborted": [told("access", lambda _: Answer(0x34))],

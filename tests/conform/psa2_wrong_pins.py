@@ -90,6 +90,7 @@ WRONG_PINS: Mapping[str, Sequence[Bad]] = {
     "the_scan_goes_by_its_steps": [inverted("DInT"), still("SYNC_T", 1), still("DRD_T", 1)],
     "bursts_keep_clear_of_the_next_conversion": [drd_a_after_cst],
     "bursts_keep_clear_at_the_highest_rate": [drd_a_after_cst],
+    "drd_t_rises_when_a_temperature_is_read": [inverted("DRD_T"), moved("DRD_T", 60_000, 1)],
     "a_temperature_on_can_is_of_its_channel": [signal("PSA2_ZT", "CHANNEL", lambda v: v + 1 & 3)],
     "a_temperature_on_the_line_is_of_its_channel": [channel_on_the_line_flipped],
     "a_temperature_settles_in_its_time": [moved("SYNC_T", 30_000)],

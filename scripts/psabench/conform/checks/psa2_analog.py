@@ -172,6 +172,10 @@ def a_step_settles_in_its_time(e: Evidence) -> str:
         raise Broken(
             f"off by {off[k].max():.0f} codes after {k - first} frames", f"settled after {due}", frames=p.about(k)
         )
+    half = int(np.argmax(y[:, 0] > 0.5)) - first
+    if half > row.limit("half_max_frames"):
+        due_half = f"at most {int(row.limit('half_max_frames'))}, as the minimum-phase filter"
+        raise Broken(f"half of the step after {half} frames", due_half, frames=p.about(first + half))
     early = np.abs(y[first + int(row.limit("moving_min_frames"))] - 1.0)
     if (early < row.limit("settled_ppm") * 1e-6).all():
         raise Broken("settled at once", "as a filter does", frames=p.about(first))

@@ -178,6 +178,18 @@ def the_temperature_converter_keeps_what_is_written(e: Evidence) -> str:
     return _keeps(e, temp=True, part="ads1256")
 
 
+@proves("PSA2-REG-07")
+@check("writes")
+def the_part_of_the_temperature_converter_cannot_be_written(e: Evidence) -> str:
+    """Write every bit of STATUS: those that name the part stay."""
+    mask = int(row_for(e, "PSA2-REG-07").limit("status_id_mask"))
+    before, *after = (number(a) for a in fact(e, "status"))
+    for saw in after:
+        if (saw ^ before) & mask:
+            raise Broken(f"STATUS {saw:02X}h, {before:02X}h before", f"bits {mask:02X}h as they were")
+    return f"STATUS {', '.join(f'{v:02X}h' for v in (before, *after))}"
+
+
 @proves("PSA2-SIG-03", "PSA2-ACC-10")
 @check("writes")
 def one_write_reaches_three_converters(e: Evidence) -> str:

@@ -55,6 +55,25 @@ def xy_and_zt_alternate(e: Evidence) -> str:
     return f"{len(found)} frames, PSA2_XY and PSA2_ZT in turn"
 
 
+@proves("PSA2-CAN-01")
+@check("stream", needs={"can", "stamps"})
+def xy_comes_before_its_zt(e: Evidence) -> str:
+    """Measure from each of the two messages to the other: those of a sample follow each other at once."""
+    ids = {int(message(n).frame_id) - 5 + e.node: n for n in MESSAGES[:2]}
+    found = [f for f in e.can.frames if f.can_id in ids and not f.error]
+    apart_s: dict[str, list[float]] = {n: [] for n in ids.values()}
+    for a, b in itertools.pairwise(found):
+        if a.can_id != b.can_id:
+            apart_s[ids[a.can_id]].append(b.t_s - a.t_s)
+    if min(len(times) for times in apart_s.values()) < LEAST:
+        raise TooLittle(f"{len(found)} frames PSA2_XY and PSA2_ZT came")
+    after_xy_us, after_zt_us = (float(np.median(apart_s[n])) / US for n in MESSAGES[:2])
+    if after_xy_us > after_zt_us:
+        saw = f"PSA2_ZT {after_xy_us:.0f} us after PSA2_XY, PSA2_XY {after_zt_us:.0f} us after PSA2_ZT"
+        raise Broken(saw, "PSA2_ZT follows PSA2_XY, not the other way", frames=found[:4])
+    return f"PSA2_ZT {after_xy_us:.0f} us after PSA2_XY"
+
+
 @proves("PSA2-CAN-02")
 @check("stream")
 def messages_have_their_lengths(e: Evidence) -> str:

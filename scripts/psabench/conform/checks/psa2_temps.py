@@ -114,6 +114,22 @@ def the_scan_waits_for_a_calibration(e: Evidence) -> str:
 # ---- the scan on its port
 
 
+@proves("PSA2-CHIP-08")
+@check("stream", needs={"pins"})
+def drd_t_rises_when_a_temperature_is_read(e: Evidence) -> str:
+    """Look at DRD_T before and after each RDATA."""
+    reads = [m for m in temp_messages(e) if m.sent[:1] == bytes([RDATA])][:-1]
+    if not reads:
+        raise TooLittle("no RDATA was recorded")
+    begin, end = (np.array([getattr(m, side) for m in reads], np.int64) for side in ("begin_ns", "end_ns"))
+    for at_ns, level in ((begin, 0), (end, 1)):
+        bad = e.wires["DRD_T"].at(at_ns) != level
+        if bad.any():
+            saw = f"DRD_T {1 - level} {'after' if level else 'before'} RDATA ({int(bad.sum())} of {len(bad)})"
+            raise Broken(saw, f"{level}", at_ns=int(at_ns[bad][0]), lines=TEMP)
+    return f"DRD_T low before and high after each of {len(reads)} RDATA"
+
+
 @proves("PSA2-TEMP-06")
 @check("stream", needs={"pins"})
 def the_scan_goes_by_its_steps(e: Evidence) -> str:

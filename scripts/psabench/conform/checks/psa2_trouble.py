@@ -98,7 +98,7 @@ def a_silent_temperature_converter_is_told(e: Evidence) -> str:
     """Silence it by its SYNC command without WAKEUP: EMCY once, and its end."""
     if fact(e, "opcode") != Answer():
         raise Broken(f"SYNC FCh answered by {fact(e, 'opcode').abort:08X}h", "it is taken")
-    row = row_for(e, "PSA2-ERR-02")
+    row, e = row_for(e, "PSA2-ERR-02"), segment(e, "silent", "silent end")
     told = _emcy(e, int(row.limit("emcy_code")))
     if told.data[3] != int(row.limit("source_code")):
         raise Broken(f"source {told.data[3]}", f"{int(row.limit('source_code'))}", frames=[told])
@@ -112,7 +112,7 @@ def a_silent_temperature_converter_is_told(e: Evidence) -> str:
 @check("trouble")
 def axes_go_on_without_temperatures(e: Evidence) -> str:
     """SEQ and T_NEW while the temperature converter is silent."""
-    p, row = pairs(e), row_for(e, "PSA2-ERR-03")
+    p, row = pairs(segment(e, "stream", "silent end")), row_for(e, "PSA2-ERR-03")
     p.unbroken()
     at = p.new.nonzero()[0]
     if not len(at):
@@ -121,6 +121,20 @@ def axes_go_on_without_temperatures(e: Evidence) -> str:
     if pause < row.limit("silent_min_frames"):
         raise Broken(f"T_NEW pauses for {pause} frames at most", "the converter is silent", frames=p.about(int(at[-1])))
     return f"{len(p)} frames without a gap, {pause} of them without a temperature"
+
+
+@proves("BUS-EMCY-04")
+@check("trouble")
+def the_history_has_the_latest_first(e: Evidence) -> str:
+    """Compare 1003h with the emergencies of different codes that came."""
+    due = [f.data[:2] for f in reversed(emcys(e)) if f.data[:2] != b"\0\0"]
+    if len(set(due)) < 2 or len(due) < 3:
+        raise TooLittle(f"{len(due)} emergencies of {len(set(due))} codes came; three of two are wanted")
+    for n, (answer, code) in enumerate(zip(fact(e, "history"), due, strict=False), 1):
+        saw = number(answer).to_bytes(4, "little")[:2]
+        if saw != code:
+            raise Broken(f"1003h:{n} has {saw[::-1].hex().upper()}h", f"{code[::-1].hex().upper()}h", frames=emcys(e))
+    return f"{', '.join(f'{c[::-1].hex().upper()}h' for c in due)}, as they came"
 
 
 @proves("PSA2-CNT-03")

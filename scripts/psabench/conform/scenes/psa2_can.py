@@ -31,6 +31,7 @@ SYNC = 0x80
 RATES_HZ = (250, 500, 1000, 2000, 4000)  # by DR
 SETTLE_PERIODS = 64
 BUSY_ROUNDS = 3
+HISTORY, HISTORY_LOOKS = 0x1003, 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,26 +144,32 @@ def busy(s: Subject) -> Evidence:
 
 
 PATTERNS: Sequence[tuple[int, int, int]] = (  # object, sub-index, value that the part takes
-    *(
-        (ACCEL[0], sub, value)
-        for sub, value in zip(range(4, 12), (0xA5, 0x5A, 0x11, 0x22, 0x03, 0x81, 0x7E, 0x3F), strict=True)
-    ),
+    *((ACCEL[0], sub, value) for sub in range(4, 12) for value in (0xA5, 0x5A)),
     (ACCEL[0], CONFIG0, 0x52),
     (TEMP, 3, 0x21),
     (TEMP, 4, 0x72),
-    *((TEMP, sub, value) for sub, value in zip(range(6, 12), (0x12, 0x34, 0x02, 0x9A, 0xBC, 0x41), strict=True)),
+    *((TEMP, sub, value) for sub in range(6, 12) for value in (0xA5, 0x5A)),
 )
+STATUS_WRITES = (0xF6, 0x04)  # all but ORDER, which turns the bits of an answer; what the set-up writes
 
 
 @scene("writes", boards=("psa2",))
 def writes(s: Subject) -> Evidence:
-    """Registers written and read again. facts: written, list of object, sub-index, value, answer, what reads then."""
+    """Registers written and read again. facts: written, list of object, sub-index, value, answer, what reads then.
+
+    status: of the temperature converter, before and after each of STATUS_WRITES.
+    """
     with changed(s), s.take(lines=False) as take:
         found = []
         for index, sub, value in PATTERNS:
             answer = tell(s, index, sub, value)
             found.append((index, sub, value, answer, [ask(s, i, sub) for i in (ACCEL if index != TEMP else (TEMP,))]))
         take.facts["written"] = found
+        status = [ask(s, TEMP, 1)]
+        for value in STATUS_WRITES:
+            tell(s, TEMP, 1, value)
+            status.append(ask(s, TEMP, 1))
+        take.facts["status"] = status
     return s.evidence("writes", take)
 
 
@@ -411,9 +418,14 @@ def starts(s: Subject) -> Evidence:
 
 @scene("trouble", boards=("psa2",))
 def trouble(s: Subject) -> Evidence:
-    """The temperature converter silenced by its SYNC command without WAKEUP. facts: access, counters."""
+    """The temperature converter silenced by its SYNC command without WAKEUP, a form refused before and after it.
+
+    facts: access, counters, history of errors.
+    """
     with changed(s), s.take() as take:
+        _refused_form(s)
         take.facts["before"] = counters(s)
+        cut(take, "stream")
         s.unit.start()
         s.run_for(20 * PERIOD_S)
         cut(take, "silent")
@@ -422,7 +434,21 @@ def trouble(s: Subject) -> Evidence:
         s.run_for(0.3)
         s.unit.stop()
         take.facts["after"] = counters(s, after=True)
+        cut(take, "silent end")
+        _refused_form(s)
+        take.facts["history"] = [ask(s, HISTORY, sub) for sub in range(1, 1 + HISTORY_LOOKS)]
     return s.evidence("trouble", take)
+
+
+def _refused_form(s: Subject) -> None:
+    """An emergency of another kind: pairs at 4000 SPS, asked for and refused, then everything as it was."""
+    tell(s, FORM, 0, 1)
+    tell(s, ACCEL[0], CONFIG0, 0x46 | 4 << 3)
+    s.run_for(SETTLE_PERIODS / RATES_HZ[4])
+    tell(s, FORM, 0, 0)
+    tell(s, ACCEL[0], CONFIG0, 0x46 | 2 << 3)
+    s.run_for(SETTLE_PERIODS / RATES_HZ[2])
+    tell(s, FORM, 0, 0)
 
 
 @scene("selfcal", boards=("psa2",))
