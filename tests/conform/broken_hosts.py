@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import subprocess
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -93,15 +94,21 @@ BROKEN = (
 )
 
 
+def patched(text: str, name: str, changes: Iterable[tuple[str, str]]) -> str:
+    """With each of them made; each text to be replaced must stand there once."""
+    for old, new in changes:
+        assert text.count(old) == 1, f"{name}: {old!r} stands {text.count(old)} times"
+        text = text.replace(old, new)
+    return text
+
+
 def build(folder: Path, broken: BrokenHost | None = None, main: str = "host.c") -> Path:
     """The example, or the broken one, compiled; the path of the program."""
     name = broken.source if broken else ""
     for file in EXAMPLES.glob("*.[ch]"):
         text = file.read_text(encoding="utf-8")
         if broken and file.name == name:
-            for old, new in ((broken.old, broken.new), broken.also):
-                assert not old or text.count(old) == 1, f"{broken.name}: {old!r} stands {text.count(old)} times"
-                text = text.replace(old, new) if old else text
+            text = patched(text, broken.name, [c for c in ((broken.old, broken.new), broken.also) if c[0]])
         (folder / file.name).write_text(text, encoding="utf-8")
     program = folder / "host"
     strict = [] if broken else ["-Wall", "-Wextra", "-Wconversion", "-Werror"]

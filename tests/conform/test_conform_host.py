@@ -12,6 +12,7 @@ from broken_hosts import BROKEN, EXAMPLES, ROOT, BrokenHost, build
 from psabench import cli
 from psabench.conform.host import runner
 from psabench.conform.host.can_cases import CASES
+from psabench.conform.host.line_cases import LINE_CASES
 from psabench.conform.host.stage import expand
 from psabench.errors import BadInput
 
@@ -74,6 +75,10 @@ def test_a_broken_host_is_caught(broken: BrokenHost, tmp_path: Path) -> None:
 
 
 def test_there_are_twelve_ways_and_more() -> None:
+    """Each of them, with the requirement that finds it, stands on the page."""
+    page = (ROOT / "docs/conform_host.md").read_text()
+    listed = [line for line in page.splitlines() if line.endswith(" |") and line.count("HOST-") == 1 and "| `" in line]
+    assert listed == [f"| `{b.name}` | `{b.case}` | {b.requirement} |" for b in BROKEN]
     assert len(BROKEN) >= 12
     assert len({b.requirement for b in BROKEN}) >= 12
 
@@ -121,5 +126,6 @@ def test_bad_input_is_refused(args: list[str], tmp_path: Path, capsys: pytest.Ca
 def test_each_case_is_judged_and_on_the_page() -> None:
     page = (ROOT / "docs/conform_host.md").read_text()
     assert {j.case for j in runner.wanted()} == set(CASES)
+    assert {j.case for j in runner.wanted(link="line")} == set(LINE_CASES)
     for name in CASES:
         assert f"`{name}`" in page

@@ -14,7 +14,6 @@ import pytest
 from broken_hosts import ROOT, BrokenHost, build
 from broken_lines import BROKEN_LINES
 from psabench import cli
-from psabench.conform.host import runner
 from psabench.conform.host.line_cases import LINE_CASES
 from psabench.conform.host.line_waves import LineFrame, form_of, wave
 from psabench.control import Control
@@ -55,12 +54,8 @@ def test_a_host_that_does_not_open_the_port_is_told_so(tmp_path: Path) -> None:
     }
 
 
-def test_each_line_case_is_judged_and_on_the_page() -> None:
-    from psabench.conform.host import can_checks, line_checks
-
-    assert can_checks.__name__ != line_checks.__name__
+def test_each_line_case_is_on_the_page() -> None:
     page = (ROOT / "docs/conform_host.md").read_text()
-    assert set(LINE_CASES) <= {j.case for j in runner.wanted()}
     for name in LINE_CASES:
         assert f"`{name}`" in page
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from psabench.conform.host.judge import limits
-from psabench.conform.host.stage import Stage
+from psabench.conform.host.stage import READY_S, Stage
 
 NODE = 5
 SCENARIO = f"""\
@@ -18,7 +18,7 @@ head: {{resolution_arcsec: 0, setting_error_arcsec_rms: 0, periodic_arcsec: 0, m
 supply: {{volt_v: 12, brownout_v: 9, hysteresis_v: 0.5}}
 units:
   - name: a
-    board: psa2
+    board: BOARD
     profile: PROFILE
     node: {NODE}
     serial: 1
@@ -28,6 +28,8 @@ units:
       y: {{sensor: mems, u0_v: -1.25, kx_v_per_g: 0.25}}
       z: {{sensor: mems, u0_v: 0.7, kx_v_per_g: -1.0}}
 """
+FAMILY, ON_CAN = ("psa2", "psa1"), ("can", "pty")
+BUSY = 50
 XY, ZT = 0x180 + NODE, 0x280 + NODE
 
 
@@ -44,6 +46,12 @@ class Case:
     play: Callable[[Stage], None]
     before: Callable[[Stage], None] = _nothing
     streams: bool = True  # a good host starts the stream
+    boards: tuple[str, ...] = FAMILY  # that it is played with
+    links: tuple[str, ...] = ON_CAN  # that it is played at
+    profile: str = ""  # it wants this one, whatever the user said
+    scenario: str = SCENARIO
+    busy: int = BUSY  # frames in 50 ms that say that the stream runs; 0: there is none until it is played
+    ready_s: float = READY_S  # simulated, for a host to start it
 
 
 def _good(s: Stage) -> None:

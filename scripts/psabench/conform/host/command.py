@@ -4,32 +4,42 @@ from __future__ import annotations
 
 import argparse
 import sys
-from importlib import import_module
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from psabench.conform import report
 from psabench.conform.host import runner
 from psabench.conform.host.judge import Judged
+from psabench.conform.identity import suite_facts
 from psabench.conform.outcome import Outcome, Verdict
 from psabench.conform.requirements import Requirement, requirements
-from psabench.conform.variant import variant
+from psabench.conform.variant import Variant, variant
+from psabench.devices import ALIASES
 from psabench.errors import BadInput
+from psabench.procedures.head_bench import Silent
 from psabench.progress import Bar
 
 OUT = Path("build/conform/host")
-LINKS = {"can": "socketcand", "pty": "slcan", "line": "the line port"}  # by the place that a command names
+LINKS = {
+    "can": "socketcand",
+    "pty": "slcan",
+    "line": "the line port",
+    "bus": "the bus port",
+}  # by the place that a command names
 
 EPILOG = """\
 The program is started once for each case, as soon as its board is powered; it ends when its link ends. In COMMAND
   {can}      127.0.0.1:PORT of a socketcand server          {node}     CANopen node of the board
   {pty}      pseudo-terminal of an slcan adapter            {results}  file to tell into (without it: standard output)
-  {line}     pseudo-terminal of the lines, a byte a sample
+  {line}     pseudo-terminal of the lines, a byte a sample; {word_bits}, {code_bits}: of its words and codes
+  {bus}      pseudo-terminal of a bus port: PSD-1, PIK
 and it tells what it takes in JSON (docs/conform_host.md): {"frame": 7, "x": ...}, {"lost": 2}, {"stale": true}.
 
 examples:
   psabench conform host --command "build/host {can} {node}"
   psabench conform host --command "build/host_line {line}" --only HOST-TORN
+  psabench conform host --board pik --command "build/host {can} {node}"
   psabench conform host --manual can --results build/told.jsonl     start it by hand, case by case
 
 OUT has report.html, junit.xml and conform.json, and of each case what was on the bus and what was told.
@@ -51,7 +61,11 @@ def add(suites: Any, formatter: Any) -> None:
     how.add_argument("--command", metavar="COMMAND", help="how the program is started, with {can}, {pty} or {line}")
     how.add_argument("--manual", choices=list(LINKS), help="it is started by hand when we say so, at this link")
     p.add_argument("--results", type=Path, metavar="FILE", help="with --manual: the file that the program tells into")
-    p.add_argument("--profile", default="article", help="of the PSA-2 that is played (%(default)s)")
+    p.add_argument("--port", type=int, default=29536, help="with --manual can: of socketcand, each time (%(default)s)")
+    p.add_argument(
+        "--board", default="psa2", help="that is played: psa2, psa1, psd1, pmka, pik, pik5, pik6 (%(default)s)"
+    )
+    p.add_argument("--profile", help="of the board (article for psa2, else of its own name)")
     p.add_argument("--only", nargs="+", default=[], metavar="ID", help="requirements, or beginnings: HOST-LOST")
     p.add_argument("--case", nargs="+", default=[], metavar="NAME", help="these cases alone (docs/conform_host.md)")
     p.add_argument("--speed", type=float, default=1.0, metavar="X", help="times real time, while nothing is silent")
@@ -77,34 +91,39 @@ def host(args: argparse.Namespace) -> int:
     """Handler of `conform host`."""
     if not 0.01 <= args.speed <= 1000:
         raise BadInput(f"--speed {args.speed:g}: from 0.01 to 1000")
+    if not 0 <= args.port <= 65535:
+        raise BadInput(f"--port {args.port}: from 0 to 65535")
     link = link_of(args)
-    v = variant("psa2", args.profile)
-    checks = import_module(f"psabench.conform.host.{'line' if link == 'line' else 'can'}_checks")
-    tests = [j for j in runner.wanted(args.only, args.case) if j.test.__module__ == checks.__name__]
+    v = variant(args.board, args.profile)
+    refuse(v, link)
+    tests = runner.wanted(args.only, args.case, v.board, link)
     rows = [r for r in requirements() if r.group == "host" and r.applies(v.board, v.profile)]
     rows = [r for r in rows if not args.only or r.id.startswith(tuple(args.only))]
     rows = [r for r in rows if not args.case or any(r.id in j.ids for j in tests)]
-    if not rows or (not tests and not args.case and args.only and not rows):
+    if not rows:
         raise BadInput("--only, --case: nothing to judge; docs/conform_host.md has the cases")
     outcomes = list(unseen(rows, tests, link))
     play = runner.Play(
         folder=args.out,
-        profile=args.profile,
+        board=v.family if v.board in ALIASES else v.board,
+        profile=v.profile,
         command=args.command or "",
         results=args.results,
         link=link,
         speed=args.speed,
         say=lambda words: print(words, file=sys.stderr, flush=True),
+        port=args.port if args.manual else 0,
+        terminal=sys.stdin if args.manual and sys.stdin.isatty() else None,
     )
     interrupted = False
     try:
-        runner.run(play, tests, Bar(), outcomes.append)
+        runner.run(play, tests, Silent() if args.manual else Bar(), partial(take, outcomes, tell=bool(args.manual)))
     except KeyboardInterrupt:
         interrupted = True
     told = report.Run(
         suite="host",
         subject=args.command or f"host at {link}",
-        facts=facts(args, link),
+        facts={"board": v.name, "link": LINKS[link], **suite_facts()},
         outcomes=outcomes,
         rows=rows,
         interrupted=interrupted,
@@ -114,6 +133,14 @@ def host(args: argparse.Namespace) -> int:
         print(line)
     print(f"report: {page}", file=sys.stderr)
     return 130 if interrupted else 0 if told.conforms else 1
+
+
+def take(outcomes: list[Outcome], outcome: Outcome, *, tell: bool) -> None:
+    """Keep an outcome; tell it at once to who starts the host by hand."""
+    outcomes.append(outcome)
+    if tell:
+        said = outcome.saw or outcome.reason
+        print(f"  {outcome.verdict.value} {', '.join(outcome.requirements)}: {said}", file=sys.stderr, flush=True)
 
 
 def unseen(rows: list[Requirement], tests: list[Judged], link: str) -> list[Outcome]:
@@ -132,8 +159,13 @@ def unseen(rows: list[Requirement], tests: list[Judged], link: str) -> list[Outc
     ]
 
 
-def facts(args: argparse.Namespace, link: str) -> dict[str, str]:
-    """Head of the report."""
-    from psabench.conform.identity import suite_facts
-
-    return {"board": f"psa2, profile {args.profile}", "link": LINKS[link], **suite_facts()}
+def refuse(v: Variant, link: str) -> None:
+    """Raises BadInput for a board that has no such link, or none that a host could take words at."""
+    if not any(v.board in c.boards and link in c.links for c in runner.ALL.values()):
+        raise BadInput(f"no case with {v.board} at {LINKS[link]}")
+    if v.family == "psd1" and (v["host_strobe_ns"] == 0) != (link == "bus"):
+        raise BadInput(
+            f"profile {v.profile}: its words wait for a host on the bus, {{bus}}"
+            if link != "bus"
+            else f"profile {v.profile} has a built-in host that takes each word: --profile psd1_host has none"
+        )

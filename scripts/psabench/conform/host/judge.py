@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TypeVar
 
+from psabench.conform.host.bus_stage import BusCycle
 from psabench.conform.host.played import Bus, Played
 from psabench.conform.host.results import Sample, Told
 from psabench.conform.outcome import Broken, TooLittle
@@ -76,6 +77,7 @@ class HostEvidence:
     marks: Mapping[str, float] = field(default_factory=dict)  # instants of the case, simulated s
     stood_s: float = 0.0  # longest that the stage has stood still against the wall's time
     streamed: bool = True  # the host has started the stream
+    cycles: Sequence[BusCycle] = ()  # of the host on the board's parallel bus
     errors: str = ""  # what the host has written beside its results
 
     @cached_property

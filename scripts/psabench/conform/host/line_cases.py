@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from psabench.conform.host.can_cases import FAMILY
 from psabench.conform.host.judge import limits
 from psabench.conform.host.line_waves import (
     CLIPPED,
@@ -39,6 +40,8 @@ class LineCase:
     frames: Callable[[Form], Frames]
     first: Callable[[Form], Samples] = field(default=lambda _: idle(PERIOD))
     ppm: float = 0.0
+    boards: tuple[str, ...] = FAMILY
+    links: tuple[str, ...] = ("line",)
     stuck: tuple[int, int] = (0, 0)  # INT is low from the beginning of one frame to that of another
 
 

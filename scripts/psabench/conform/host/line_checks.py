@@ -255,21 +255,3 @@ def nothing_is_told_that_was_not_on_the_line(e: HostEvidence) -> str:
     """Everything told of 1.5 s of a good board."""
     e.nothing_but()
     return f"{len(_pairs(e))} frames and no fault"
-
-
-@proves("HOST-RES-03")
-@judges("line_good")
-def the_end_of_the_line_is_told(e: HostEvidence) -> str:
-    """The port hangs up: the last word, and the exit status."""
-    if e.told.of("end") != [True] or e.status != 0:
-        raise Broken(f"{len(e.told.of('end'))} ends, exit status {e.status}", '{"end": true} once, exit status 0')
-    return "end told, exit status 0"
-
-
-@proves("HOST-RES-04")
-@judges("line_good")
-def lines_are_of_the_results_channel(e: HostEvidence) -> str:
-    """The lines told, against the words of the results channel."""
-    if e.told.bad_lines:
-        raise Broken(f"{e.told.bad_lines} lines that are none, the first {e.told.bad[0]}", "docs/conform_host.md")
-    return f"{len(e.told.samples) + len(e.told.events)} lines"

@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from types import TracebackType
 
-from psabench.conform.host.stage import COME_S, STUCK_S, ByHand, Program
+from psabench.conform.host.stage import STUCK_S, ByHand, Program
 from psabench.errors import TimeOut
 from psabench.lineport import INT
 
@@ -35,7 +35,7 @@ class LinePort:
         for block in itertools.chain(blocks, [TAIL]):
             left = memoryview(block)
             while left:
-                if not self._room(host, STUCK_S if written > HELD else COME_S):
+                if not self._room(host, STUCK_S if written > HELD else host.come_s):
                     if written <= HELD:
                         raise TimeOut("the host did not open the line port, or did not read it")
                     host.kill()

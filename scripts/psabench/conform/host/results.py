@@ -36,6 +36,8 @@ EVENTS: Mapping[str, Callable[[Any], bool]] = {
     "lost": _is_count,
     "torn": _is_count,
     "overrun": _is_count,
+    "late": _is_count,
+    "mixed": _is_count,
     "over_range": _is_axis,
     "in_range": _is_axis,
     "restart": lambda v: v is True,
@@ -63,8 +65,16 @@ class Sample:
 
 
 @dataclass(frozen=True, slots=True)
+class Reading:
+    """Of a board that is none of PSA-2's family, as the host tells it. number: CNT or SEQ of the board."""
+
+    number: int
+    values: tuple[float, float, float]  # words, pulses or volt seconds, docs/conform_host.md
+
+
+@dataclass(frozen=True, slots=True)
 class Event:
-    """Anything else. at: number of samples that were told before it."""
+    """Anything else. at: number of samples and readings that were told before it."""
 
     name: str
     value: Any
@@ -76,9 +86,15 @@ class Told:
     """All that a host has told, in order."""
 
     samples: list[Sample] = field(default_factory=list)
+    readings: list[Reading] = field(default_factory=list)
     events: list[Event] = field(default_factory=list)
     bad: list[str] = field(default_factory=list)
     bad_lines: int = 0
+
+    @property
+    def count(self) -> int:
+        """Samples and readings."""
+        return len(self.samples) + len(self.readings)
 
     def of(self, name: str) -> list[Any]:
         """Values of the events of that name."""
@@ -125,6 +141,8 @@ def _take(told: Told, text: bytes) -> None:
         pass
     elif "frame" in raw:
         _take_sample(told, raw, text)
+    elif "reading" in raw:
+        _take_reading(told, raw, text)
     else:
         name, value = next(iter(raw.items()))
         if len(raw) != 1 or name not in EVENTS:
@@ -132,7 +150,7 @@ def _take(told: Told, text: bytes) -> None:
         elif not EVENTS[name](value):
             told._refuse(text, f"not a value of {name}")
         else:
-            told.events.append(Event(name, value, len(told.samples)))
+            told.events.append(Event(name, value, told.count))
 
 
 def _take_sample(told: Told, raw: Mapping[str, Any], text: bytes) -> None:
@@ -157,6 +175,15 @@ def _take_sample(told: Told, raw: Mapping[str, Any], text: bytes) -> None:
                 volts=None if volts is None else (float(volts[0]), float(volts[1]), float(volts[2])),
             )
         )
+
+
+def _take_reading(told: Told, raw: Mapping[str, Any], text: bytes) -> None:
+    number, values = raw["reading"], [raw.get(axis) for axis in "xyz"]
+    if not _is_number(number) or not all(isinstance(v, int | float) and abs(v) < 1e18 for v in values):
+        told._refuse(text, "reading is a whole number, x, y and z are numbers")
+    else:
+        x, y, z = (float(v) for v in values)  # type: ignore[arg-type]
+        told.readings.append(Reading(number, (x, y, z)))
 
 
 def _are_volts(v: Any) -> bool:

@@ -3,26 +3,33 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import TextIO
 
-from psabench.conform.host.can_cases import CASES, NODE, SCENARIO, Case
+from psabench.conform.host import can_checks, line_checks, unit_checks
+from psabench.conform.host.bus_stage import BusBridge
+from psabench.conform.host.can_cases import CASES, NODE, Case
 from psabench.conform.host.judge import HostEvidence, Judged, Unseen, judged
 from psabench.conform.host.line_cases import LINE_CASES, LineCase, samples
 from psabench.conform.host.line_stage import LinePort
 from psabench.conform.host.line_waves import form_of
 from psabench.conform.host.played import Bus, read_log
-from psabench.conform.host.stage import ByHand, Program, Stage, drain, expand
+from psabench.conform.host.stage import READY_S, ByHand, Program, Stage, drain, expand
+from psabench.conform.host.unit_cases import UNIT_CASES
 from psabench.conform.outcome import Broken, Outcome, TooLittle, Verdict
+from psabench.conform.variant import variant
 from psabench.control import Control
 from psabench.emulator import Emulator
 from psabench.errors import BadInput, BenchError
 from psabench.procedures.head_bench import Progress
 
 Say = Callable[[str], None]
+ALL: Mapping[str, Case | LineCase] = {**CASES, **LINE_CASES, **UNIT_CASES}
+MODULES = (can_checks, line_checks, unit_checks)  # imported, they have registered their tests
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,27 +37,30 @@ class Play:
     """How a host is played to. command "": it is started by hand, and tells into the file `results`."""
 
     folder: Path  # for logs and what was told
+    board: str = "psa2"
     profile: str = "article"
     command: str = ""
     results: Path | None = None
     link: str = "can"
     speed: float = 1.0
     say: Say = lambda _: None
+    port: int = 0  # of socketcand; 0: any
+    terminal: TextIO | None = None  # of who starts the host by hand
 
     @property
     def adapter(self) -> str:
-        return "slcan" if self.link == "pty" else "socketcand:0"
+        return "slcan" if self.link == "pty" else f"socketcand:{self.port}"
 
 
-def wanted(only: Sequence[str] = (), cases: Sequence[str] = ()) -> list[Judged]:
-    """Tests of requirements that begin so, or of these cases; all in the order of the cases."""
-    order = [*CASES, *LINE_CASES]
+def wanted(only: Sequence[str] = (), cases: Sequence[str] = (), board: str = "psa2", link: str = "can") -> list[Judged]:
+    """Tests of requirements that begin so, of these cases, with that board and link; in the order of the cases."""
+    order = [name for name, c in ALL.items() if board in c.boards and link in c.links]
     if unknown := [c for c in cases if c not in order]:
-        raise BadInput(f"no such case: {', '.join(unknown)}; there are {', '.join(order)}")
+        raise BadInput(f"no such case with {board} at this link: {', '.join(unknown)}; there are {', '.join(order)}")
     found = [
         j
         for j in judged()
-        if (not only or any(i.startswith(tuple(only)) for i in j.ids)) and (not cases or j.case in cases)
+        if j.case in (cases or order) and (not only or any(i.startswith(tuple(only)) for i in j.ids))
     ]
     return sorted(found, key=lambda j: order.index(j.case))
 
@@ -94,7 +104,8 @@ def judge(j: Judged, shown: HostEvidence | Exception, folder: Path) -> Outcome:
 def perform(play: Play, name: str) -> HostEvidence:
     """Play one case. Raises BenchError where it cannot be played."""
     play.folder.mkdir(parents=True, exist_ok=True)
-    return on_can(play, CASES[name]) if name in CASES else on_line(play, LINE_CASES[name])
+    case = ALL[name]
+    return on_line(play, case) if isinstance(case, LineCase) else on_board(play, case)
 
 
 def on_line(play: Play, case: LineCase) -> HostEvidence:
@@ -122,21 +133,25 @@ def _form(profile: str) -> dict[str, str]:
     return {"word_bits": str(form.word_bits), "code_bits": str(form.code_bits)}
 
 
-def on_can(play: Play, case: Case) -> HostEvidence:
+def on_board(play: Play, case: Case) -> HostEvidence:
     """An emulator in lockstep."""
     log = play.folder / f"{case.name}.log"
     with TemporaryDirectory(prefix="psabench-") as made:
         scenario = Path(made) / "host.yaml"
-        scenario.write_text(SCENARIO.replace("PROFILE", play.profile), encoding="utf-8")
+        profile = case.profile or play.profile
+        text = case.scenario.replace("BOARD", play.board).replace("PROFILE", profile)
+        scenario.write_text(text, encoding="utf-8")
         status, stage, streamed = _perform(play, case, scenario, log)
     return HostEvidence(
         case=case.name,
         bus=read_log(log.read_text(encoding="ascii").splitlines(), NODE) if log.exists() else Bus([], NODE),
         told=stage.host.told(),
+        profile=profile,
         status=status,
         marks=stage.marks,
         stood_s=stage.stood_s,
         streamed=streamed,
+        cycles=stage.bridge.cycles if isinstance(stage.bridge, BusBridge) else (),
         errors=_errors(stage.host),
     )
 
@@ -145,16 +160,22 @@ def _perform(play: Play, case: Case, scenario: Path, log: Path) -> tuple[int | N
     with ExitStack() as stack:
         emulator = stack.enter_context(Emulator(scenario, cans=[play.adapter, f"log:{log}"], pace="step"))
         control = stack.enter_context(Control(emulator.control_path or Path()))
-        host = _host(play, case.name, case.title, _places(emulator, play.link))
+        bridge = BusBridge(variant(play.board).family) if play.link == "bus" else None
+        if bridge:
+            stack.callback(bridge.close)
+        host = _host(play, case.name, case.title, {"bus": str(bridge.path)} if bridge else _places(emulator, play.link))
         stack.callback(host.kill)
-        stage = Stage(emulator, control, host, speed=play.speed)
+        stage = Stage(emulator, control, host, speed=play.speed, node=NODE, bridge=bridge)
         case.before(stage)
+        if bridge:
+            stage.run(READY_S, speed=0.0)
         stage.stood_s = 0.0
         host.start()
-        stage.await_host()
-        streamed = stage.await_stream() if case.streams else True
+        streamed = bridge is not None or _streams(stage, case)
         if streamed:
             case.play(stage)
+        if bridge:
+            bridge.close()
         if play.link == "pty":
             begun_s = time.monotonic()
             drain(Path(emulator.endpoint(can="slcan")["pty"]))
@@ -162,6 +183,12 @@ def _perform(play: Play, case: Case, scenario: Path, log: Path) -> tuple[int | N
         control.close()
         emulator.stop()
         return host.wait(), stage, streamed
+
+
+def _streams(stage: Stage, case: Case) -> bool:
+    """Whether the host has come, and has started the stream where there is one."""
+    stage.await_host()
+    return not case.streams or not case.busy or stage.await_stream(case.busy, case.ready_s)
 
 
 def _errors(host: Program | ByHand) -> str:
@@ -176,15 +203,24 @@ def _places(emulator: Emulator, link: str) -> dict[str, str]:
 
 
 def _host(play: Play, case: str, title: str, where: dict[str, str]) -> Program | ByHand:
-    results = play.results or play.folder / f"{case}.jsonl"
-    places = {"node": str(NODE), "results": str(results), **where}
+    kept = play.folder / f"{case}.jsonl"
+    results = play.results or kept
     if not play.command:
-        words = " ".join(f"{k}={v}" for k, v in places.items())
-        play.say(f"{case}: {title}. Start the host now: {words}")
-        return ByHand(results)
+        places = {k: _fixed(play.folder / k, v) if k in ("pty", "line", "bus") else v for k, v in where.items()}
+        words = " ".join(f"{k}={v}" for k, v in {**places, "node": str(NODE), "results": str(results)}.items())
+        invite = f"{case}: {title}\n  start the host now, Enter skips: {words}"
+        return ByHand(results, kept, lambda: play.say(invite), play.terminal)
+    places = {"node": str(NODE), "results": str(results), **where}
     return Program(
         expand(play.command, places),
         results=results,
         errors=play.folder / f"{case}.stderr",
         on_stdout="{results}" not in play.command,
     )
+
+
+def _fixed(link: Path, pty: str) -> str:
+    """A name of the pseudo-terminal that is the same in every case."""
+    link.unlink(missing_ok=True)
+    link.symlink_to(pty)
+    return str(link)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import fcntl
 import os
+import select
 import shlex
 import signal
 import struct
@@ -16,11 +17,12 @@ import subprocess
 import termios
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
+from typing import Protocol, TextIO
 
 from psabench.conform.host import results
 from psabench.conform.host.results import Told
@@ -29,7 +31,8 @@ from psabench.emulator import Emulator
 from psabench.errors import BadInput, TimeOut
 
 STEP_S = 0.005  # simulated, between looks at the wall's clock
-COME_S = 60.0  # patience for a host to come: it may have to be started by hand, or be an interpreter
+COME_S = 60.0  # patience for a host to come: it may be an interpreter
+BY_HAND_S = 3600.0  # likewise, where somebody has to start it
 STUCK_S = 30.0  # patience for a host that reads nothing
 END_S = 20.0  # patience for a host to end after its link has ended
 READY_S = 3.0  # simulated, for a host to start the stream
@@ -60,6 +63,7 @@ class Program:
     results: Path
     errors: Path
     on_stdout: bool
+    come_s: float = COME_S
     process: subprocess.Popen[bytes] | None = None
     killed: bool = False
 
@@ -104,15 +108,31 @@ class Program:
 
 @dataclass(slots=True)
 class ByHand:
-    """A host that somebody starts by hand and that appends to a file; a case ends with its line "end"."""
+    """A host that somebody starts by hand and that tells into a file, which is emptied before each case.
+
+    A case ends with its line "end"; Enter on the terminal skips one whose host has not come.
+    """
 
     results: Path
-    begin: int = 0
+    kept: Path  # a copy of what was told
+    invite: Callable[[], None]  # says that it is time
+    terminal: TextIO | None = None  # where Enter is looked for
+    come_s: float = BY_HAND_S
 
     def start(self) -> None:
-        self.begin = self.results.stat().st_size if self.results.exists() else 0
+        """Raises BadInput when the file is something else than what a host told."""
+        if self.results.exists():
+            with self.results.open("rb") as lines:
+                if results.read(lines).bad_lines:
+                    raise BadInput(f"{self.results}: holds other things than a host tells; it would be emptied")
+        self.results.parent.mkdir(parents=True, exist_ok=True)
+        self.results.write_bytes(b"")
+        self.invite()
 
     def gone(self) -> bool:
+        """Raises TimeOut when Enter was pressed."""
+        if self.terminal and select.select([self.terminal], [], [], 0)[0] and self.terminal.readline():
+            raise TimeOut("skipped with Enter")
         return False
 
     def kill(self) -> None:
@@ -130,9 +150,16 @@ class ByHand:
     def told(self) -> Told:
         if not self.results.exists():
             return Told()
-        with self.results.open("rb") as lines:
-            lines.seek(self.begin)
-            return results.read(lines)
+        text = self.results.read_bytes()
+        if self.kept != self.results:
+            self.kept.write_bytes(text)
+        return results.read(text.splitlines(keepends=True))
+
+
+class Bridge(Protocol):
+    """A bus port: bus_stage.BusBridge."""
+
+    def serve(self, control: Control, host: Program | ByHand, for_s: float, cycle_s: float, leap_s: float) -> None: ...
 
 
 @dataclass(slots=True)
@@ -143,6 +170,8 @@ class Stage:
     control: Control
     host: Program | ByHand
     speed: float = 1.0
+    node: int = 5
+    bridge: Bridge | None = None  # where the host is on the board's parallel bus
     stood_s: float = 0.0  # longest that simulated time has stood still against the wall's
     marks: dict[str, float] = field(default_factory=dict)  # instants, simulated s, that a check wants to know
 
@@ -167,6 +196,20 @@ class Stage:
             self.stood_s = max(self.stood_s, time.monotonic() - begun_s)
             left_s -= step_s
 
+    def serve(self, for_s: float, *, cycle_s: float, leap_s: float = 0.0) -> None:
+        """Let the host's cycles on the bus be carried out; each moves simulated time by so much, nothing else does."""
+        assert self.bridge is not None
+        self.put(f"000#01{self.node:02X}")  # what the board sends on CAN is our witness
+        self.run(0.005, speed=0.0)
+        self.bridge.serve(self.control, self.host, for_s, cycle_s, leap_s)
+        self.run(0.005, speed=0.0)
+
+    def run_between(self) -> None:
+        """To where a reading has been sent and the next is not yet there: the first ms in which nothing is sent."""
+        before = -1
+        while before != (before := self.sent()):
+            self.run(0.001, speed=0.0)
+
     def run_to_quiet(self) -> None:
         """To 0.9 ms after a conversion: both halves of its sample have been sent, the next is not yet there."""
         self.control.call("run.until", event="DRD_A")
@@ -184,25 +227,26 @@ class Stage:
 
     def await_host(self) -> None:
         """Until it is on the bus; time stands still meanwhile. Raises TimeOut."""
-        deadline_s = time.monotonic() + COME_S
+        deadline_s = time.monotonic() + self.host.come_s
         while not self.control.call("frames").result["clients"]:
             if self.host.gone():
                 raise TimeOut("the host ended before it had opened the bus")
             if time.monotonic() > deadline_s:
-                raise TimeOut(f"the host was not on the bus after {COME_S:g} s")
+                raise TimeOut(f"the host was not on the bus after {self.host.come_s:g} s")
             time.sleep(0.005)
 
-    def await_stream(self) -> bool:
-        """Until the host has started the stream; False when it does not in READY_S of simulated time."""
-        sent = self._sent()
-        for _ in range(round(READY_S / 0.05)):
+    def await_stream(self, busy: int = 50, ready_s: float = READY_S) -> bool:
+        """Until more than so many frames come in 50 ms; False when they do not in so much simulated time."""
+        sent = self.sent()
+        for _ in range(round(ready_s / 0.05)):
             self.run(0.05, speed=1.0)
-            before, sent = sent, self._sent()
-            if sent - before > 50:
+            before, sent = sent, self.sent()
+            if sent - before > busy:
                 return True
         return False
 
-    def _sent(self) -> int:
+    def sent(self) -> int:
+        """CAN frames of the board so far."""
         return int(self.control.call("counters", unit="a").result["can"]["tx_frames"])
 
 
