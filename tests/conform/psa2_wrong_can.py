@@ -81,15 +81,20 @@ WRONG_CAN: Mapping[str, Sequence[Bad]] = {
     "tog_alternates": [signal("PSA2_FAST", "TOG", lambda v: 0), signal("PSA2_FAST", "TOG", lambda v: 1 - v, 9)],
     "form_2_is_one_fd_frame_a_sample": [
         each("PSA2_FRAME", lambda f: replace(f, fd=False)),
+        each("PSA2_FRAME", lambda f: replace(f, brs=False), 3),
         gone("PSA2_FRAME"),
         signal("PSA2_FRAME", "TSTAMP", lambda v: v + 9, 7),
         short("PSA2_FRAME"),
     ],
     "form_3_is_one_fd_frame_every_five_samples": [
         each("PSA2_BLOCK", lambda f: replace(f, fd=False)),
+        each("PSA2_BLOCK", lambda f: replace(f, brs=False)),
         signal("PSA2_BLOCK", "TSTAMP", lambda v: v + 9, 3),
     ],
-    "a_block_begins_anew_after_a_stop": [told("stamp", lambda a: Answer(a.value + 100_000)), gone("PSA2_BLOCK")],
+    "a_block_begins_anew_after_a_stop": [
+        told("stamps", lambda old: [*old[:-1], Answer(old[-1].value + 100_000)]),
+        gone("PSA2_BLOCK"),
+    ],
     "a_form_switches_its_tpdos": [told("off 2", lambda old: [Answer(a.value ^ 1 << 31) for a in old])],
     "fd_frames_are_those_of_two_forms": [each("PSA2_XY", lambda f: replace(f, fd=True))],
     "each_sync_takes_one_sample": [gone("PSA2_XY", 3), signal("PSA2_XY", "SEQ", lambda v: 1)],

@@ -77,6 +77,7 @@ class Take:
                 error=bool(m.is_error_frame),
                 extended=bool(m.is_extended_id),
                 remote=bool(m.is_remote_frame),
+                brs=bool(m.bitrate_switch) if m.is_fd else None,
             )
         )
 

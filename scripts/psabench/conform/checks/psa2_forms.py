@@ -88,6 +88,9 @@ def _fd(log: CanLog, name: str) -> None:
     classic = [f for f in log.frames if not f.fd]
     if classic:
         raise Broken(f"{name} in a classic frame", "an FD frame", frames=classic[:3])
+    slow = [f for f in log.frames if f.brs is False]
+    if slow:
+        raise Broken(f"{name} without bit rate switch", "with it", frames=slow[:3])
 
 
 @proves("PSA2-FORM-03")
@@ -124,13 +127,21 @@ def _evenly(e: Evidence, row: Requirement, stamp_us: Ints, samples: int) -> str:
 @check("forms", needs={"fd"})
 def a_block_begins_anew_after_a_stop(e: Evidence) -> str:
     """Stop the stream and start it: is the first sample of the block one after the start?"""
-    log = segment(e, "again", "again end").frames_of("PSA2_BLOCK")
-    if not len(log):
-        raise Broken("no block after the start", "one every five samples")
-    before_us, first_us = number(e.facts.get("stamp")), int(log.raw("PSA2_BLOCK")["TSTAMP"][0])
-    if (first_us - before_us) % (1 << 32) >= 1 << 31 or first_us == before_us:
-        raise Broken(f"a sample of {first_us} us in the first block", f"after {before_us} us", frames=log.frames[:1])
-    return f"the first sample is {(first_us - before_us) * 1e-3:.1f} ms after the stop"
+    stamps = e.facts.get("stamps")
+    if not isinstance(stamps, list):
+        raise TooLittle("the scene started no stream again")
+    for k, stamp in enumerate(stamps):
+        log = segment(e, f"again {k}", f"again {k} end").frames_of("PSA2_BLOCK")
+        if not len(log):
+            raise Broken("no block after the start", "one every five samples")
+        try:
+            before_us, first_us = number(stamp), int(log.raw("PSA2_BLOCK")["TSTAMP"][0])
+        except ValueError as err:
+            raise Broken(str(err), "messages of their length", frames=log.frames[:1]) from err
+        if (first_us - before_us) % (1 << 32) >= 1 << 31 or first_us == before_us:
+            saw = f"a sample of {first_us} us in the first block"
+            raise Broken(saw, f"after {before_us} us", frames=log.frames[:1])
+    return f"in {len(stamps)} starts the first sample of the first block comes after the stop"
 
 
 @proves("PSA2-FORM-06")

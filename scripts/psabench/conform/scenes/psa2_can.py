@@ -31,6 +31,7 @@ SYNC = 0x80
 RATES_HZ = (250, 500, 1000, 2000, 4000)  # by DR
 SETTLE_PERIODS = 64
 BUSY_ROUNDS = 3
+AGAIN = 6
 HISTORY, HISTORY_LOOKS = 0x1003, 4
 
 
@@ -373,15 +374,21 @@ def _alone(e: Evidence) -> dict[str, tuple[int, int]]:
 
 @scene("forms", boards=("psa2",))
 def forms(s: Subject) -> Evidence:
-    """Every frame form for a while. facts: answer of each, and bit 31 of the TPDOs. Cuts "form 0" ... "stop"."""
+    """Every frame form for a while, the last one several times. Cuts "form 0" ..., "again 0" ...
+
+    facts: answer of each, bit 31 of the TPDOs, stamps before each time.
+    """
     with changed(s), s.take(lines=False) as take:
         for form in (0, 1, 2, 3):
             take.facts[f"answer {form}"] = tell(s, FORM, 0, form)
             take.facts[f"off {form}"] = [ask(s, 0x1800 + k, 1) for k in range(5)]
             streamed(s, take, f"form {form}", 0.06)
-        s.run_for(2 * PERIOD_S)
-        take.facts["stamp"] = ask(s, 0x2202, 5)  # of the latest sample, us, before the start
-        streamed(s, take, "again", 0.02)
+        stamps = []
+        for k in range(AGAIN):  # stopped with another number of samples in the block each
+            s.run_for(2 * PERIOD_S)
+            stamps.append(ask(s, 0x2202, 5))  # of the latest sample, us, before the start
+            streamed(s, take, f"again {k}", (20 + k) * PERIOD_S)
+        take.facts["stamps"] = stamps
     return s.evidence("forms", take)
 
 
