@@ -253,8 +253,8 @@ def mirror(nth: int) -> Bad:
     """The nth mirror shows another value."""
 
     def change(rows: list[Any]) -> list[Any]:
-        index, sub, answer, seq = rows[nth]
-        return [*rows[:nth], (index, sub, Answer(answer.value + 3), seq), *rows[nth + 1 :]]
+        index, sub, answer, *numbers = rows[nth]
+        return [*rows[:nth], (index, sub, Answer(answer.value + 3), *numbers), *rows[nth + 1 :]]
 
     return told("mirrors", change)
 

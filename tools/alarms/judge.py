@@ -17,7 +17,7 @@ from typing import Any
 
 from alarms.design import Case
 from psabench.bench import scpi_addresses
-from psabench.conform import runner, suite
+from psabench.conform import runner
 from psabench.conform.outcome import Outcome, Verdict
 from psabench.conform.subject import BUS_BOARDS, INPUTS_V, UNIT, Addresses, Subject, scenario
 from psabench.conform.variant import variant
@@ -129,8 +129,10 @@ def busy(count: int) -> Iterator[None]:
 
 
 def result(case: Case, state: str, judged: Judged = judged) -> Result:
-    """Run it in a process of its own, which is ended with all that it started when it takes too long."""
-    suite.load()
+    """Run it in a process of its own, which is ended with all that it started when it takes too long.
+
+    The suite has been loaded (`suite.load`): whoever edits it meanwhile changes nothing.
+    """
     begun_s = time.monotonic()
     found = _bounded(case, LOAD_LIMIT_S if case.load else LIMIT_S, judged)
     alarms = [_alarm(o) for o in found.outcomes if o.verdict in ALARMS]

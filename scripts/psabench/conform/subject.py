@@ -354,6 +354,8 @@ def scenario(
 
 
 def _off(key: str, nominal: float, clock_ppm: float) -> int:
-    """A whole number that is off by as much, not more."""
+    """A whole number that is off by as much, not more; a time by an even number of ns, for it may be halved."""
     factor = 1.0 + clock_ppm * PPM
-    return round(nominal) + int((nominal / factor if key.endswith("_ns") else nominal * factor) - nominal)
+    if key.endswith("_ns"):
+        return round(nominal) + 2 * int((nominal / factor - nominal) / 2)
+    return round(nominal) + int(nominal * factor - nominal)

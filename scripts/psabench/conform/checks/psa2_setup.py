@@ -383,6 +383,8 @@ def int_is_quiet_while_the_set_up_lasts(e: Evidence) -> str:
     k = int(np.argmax(quiet_ns))
     due_ns = row_for(e, "PSA2-SETUP-15").limit("quiet_min_ms") * MS
     if quiet_ns[k] < due_ns - e.slack_ns(due_ns):
+        if len(e.wires.gaps_ns):
+            raise TooLittle("the line port lost samples, and with them time")
         saw = f"Int falls again after {quiet_ns[k] / MS:.2f} ms"
         raise Broken(saw, f"{due_ns / MS:g} ms or more", at_ns=int(falls[k + 1]), lines=("Int", "Res"))
     return f"no fall of Int for {quiet_ns[k] / MS:.2f} ms"

@@ -99,9 +99,11 @@ def _same(saw: Ints, due: Ints, p: Pairs, what: str) -> str:
 @check("stream", needs={"line"})
 def words_come_least_significant_bit_first(e: Evidence) -> str:
     """Read the words either way round: which way do they hold the codes of CAN?"""
-    t, p = transfers(e.wires), pairs(e)
+    t, p = transfers(e.wires.unbroken()), pairs(e)
     bits = int(row_for(e, *FORMATS).limit("word_bits"))
     t = t.of(4 * bits)
+    if len(t) < LEAST and len(e.wires.gaps_ns):
+        raise TooLittle(f"{len(t)} frames between two losses of samples")
     if len(t) < LEAST:
         raise Broken(f"{len(t)} transfers of {4 * bits} bits", "all", at_ns=int(e.wires.falls("Int")[0]), lines=LINES)
     lost = WORDS[row_for(e, *WORDS).id]
@@ -110,7 +112,7 @@ def words_come_least_significant_bit_first(e: Evidence) -> str:
     for name, lsb_first in (("least", True), ("most", False)):
         words = t.words(bits, lsb_first=lsb_first) >> (-lost if lost < 0 else 0) & 0xFFFF
         count[name] = max(aligned(words[:, [k]], code[:, [j]])[1] for k in range(4) for j in range(3))
-    if count["least"] < len(p) // 2:
+    if count["least"] < min(len(t), len(p)) // 2:
         saw = f"{count['most']} words read most significant bit first are codes, {count['least']} the other way"
         raise Broken(saw, f"{len(p)}, least significant bit first", at_ns=int(t.fall_ns[0]), lines=LINES)
     return f"{count['least']} words are codes, read so; {count['most']} the other way round"
