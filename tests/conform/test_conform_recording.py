@@ -71,7 +71,9 @@ def test_mf4_is_judged_or_says_what_it_wants(psa2: Made, tmp_path: Path, capsys:
     path = tmp_path / "run.mf4"
     path.write_bytes(b"MDF     4.10")
     assert main(["conform", "recording", str(path), "--board", "psa2"]) == 2
-    assert "pip install asammdf" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "pip install asammdf" in said
+    assert "can_logconvert run.mf4 run.log" in said
 
 
 def test_stamps_of_a_calendar_are_as_good(psa2: Made, tmp_path: Path) -> None:

@@ -45,7 +45,10 @@ def read_can(path: Path, bounds: Bounds) -> CanTake:
         raise
     except (ImportError, NotImplementedError) as e:
         if path.suffix.lower() == ".mf4" and find_spec("asammdf") is None:
-            raise BadInput(f"{path}: MF4 logs are read by asammdf, which is not there: pip install asammdf") from e
+            raise BadInput(
+                f"{path}: MF4 logs are read by asammdf, which is not there: pip install asammdf, or where it is "
+                f"can_logconvert {path.name} {path.stem}.log makes a log that is read here"
+            ) from e
         note = f"message {len(frames) + 1} cannot be read ({e})"
     except Exception as e:  # python-can's readers raise whatever their parsing comes to; no byte of a file may end us
         note = (
