@@ -144,3 +144,13 @@ def test_the_page_has_the_tables_between_its_marks(tmp_path: Path) -> None:
     assert "1 of 2 killed, 50.0 %" in text
     assert "| b | survived | X-1 |" in text
     assert "old" not in text
+
+
+@pytest.mark.parametrize(
+    ("text", "board", "profile", "adapter"),
+    [("psa2", "psa2", None, ""), ("psa2:w24", "psa2", "w24", ""), ("psa2@slcan", "psa2", None, "slcan")],
+)
+def test_a_target_is_read_and_written(text: str, board: str, profile: str | None, adapter: str) -> None:
+    target = Target.of(text)
+    assert (target.board, target.profile, target.adapter) == (board, profile, adapter)
+    assert str(target) == text

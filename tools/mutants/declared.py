@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -22,19 +22,22 @@ class ListError(Exception):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Target:
-    """What the suite is run on: `psa2`, `psa2:w24`."""
+    """What the suite is run on: `psa2`, `psa2:w24`, `psa2@slcan`."""
 
     board: str
     profile: str | None = None
+    adapter: str = field(default="", repr=False)  # CAN adapter of the emulator; repr: stamps of rows without it stand
 
     @classmethod
     def of(cls, text: str) -> Target:
         """As the list writes it."""
+        text, _, adapter = text.partition("@")
         board, _, profile = text.partition(":")
-        return cls(board=board, profile=profile or None)
+        return cls(board=board, profile=profile or None, adapter=adapter)
 
     def __str__(self) -> str:
-        return self.board if self.profile is None else f"{self.board}:{self.profile}"
+        board = self.board if self.profile is None else f"{self.board}:{self.profile}"
+        return f"{board}@{self.adapter}" if self.adapter else board
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

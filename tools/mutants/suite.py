@@ -73,6 +73,7 @@ class Suite:
         out.mkdir()
         words = ["conform", "device", "--board", target.board, "--out", str(out)]
         words += ["--profile", target.profile] if target.profile else []
+        words += ["--adapter", target.adapter] if target.adapter else []
         words += ["--only", *only] if only else []
         begun_s = time.monotonic()
         status, said = self._bounded([sys.executable, "-c", PROGRAM, *words], self._env(emulator), out, timeout_s)
