@@ -90,6 +90,18 @@ BROKEN = (
     BrokenHost("wrap_is_a_loss", "(seq - s.seq) & 0xFFFF", "(seq - s.seq)", "good", "HOST-CAN-03"),
     BrokenHost("neighbours_taken", "id == 0x280 + node", "(id & 0x780) == 0x280", "others", "HOST-CAN-04"),
     BrokenHost("no_end", 'return TELL("end", "%s", "true"), 0;', "return 1;", "good", "HOST-RES-03"),
+    BrokenHost(
+        "leaves_some_out",
+        "if (!(z[5] & 1)) return; /* not settled */",
+        "if (!(z[5] & 1) || seq % 1000 == 7) return;",
+        "good",
+        "HOST-RES-01",
+    ),
+    BrokenHost("false_alarm", "if (z[5] & 4) TELL", "if (seq % 1000 == 7) TELL", "good", "HOST-RES-02"),
+    BrokenHost("other_words", '"{\\"frame\\": %u', '"{\\"sample\\": %u', "good", "HOST-RES-04"),
+    BrokenHost(
+        "starts_unread", "s.started = ++s.row == ROWS;", "s.started = ++s.row >= 1;", "power_on", "HOST-SETUP-03"
+    ),
     BrokenHost("prose", 'TELL("lost", "%u", steps - 1)', 'puts("lost some")', "lost", "HOST-LOST-01"),
 )
 

@@ -66,4 +66,12 @@ BROKEN_LINES = (
     ),
     BrokenHost("losses_untold", "if (steps > 1) TELL", "if (steps > 2) TELL", "line_lost", "HOST-LOST-01", L),
     BrokenHost("silence_untold", "STALE = 250 * PERIOD", "STALE = 800 * PERIOD", "line_silence", "HOST-STALE-01", L),
+    BrokenHost("half_times", "(double)fall / 8", "(double)fall / 16", "line_good", "HOST-LINE-01", L),
+    BrokenHost("torn_untold", '    else TELL("torn", "%d", 1);\n', "", "line_missing", "HOST-TORN-01", L),
+    BrokenHost("frozen_untold", "(same >= 999)", "(same >= 9999)", "line_frozen", "HOST-STALE-02", L),
+    BrokenHost("positive_limit", "c[i] >= most", "c[i] > most", "line_over", "HOST-RANGE-01", L),
+    BrokenHost(
+        "unsettled_taken", "if (!(status & 1)) return; /* not settled */", "", "line_status", "HOST-SETTLE-01", L
+    ),
+    BrokenHost("overrun_untold", "if (status & 4) TELL", "if (status & 2) TELL", "line_status", "HOST-OVER-01", L),
 )
