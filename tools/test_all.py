@@ -1,17 +1,22 @@
 #!/usr/bin/env python3
-"""Every test there is, in order, with each step's output visible and kept in build/test/: `make test` after set-up.
+"""Every test there is, each step's output visible and kept in build/test/: `make test` after set-up.
 
+Steps that keep all cores busy by themselves run one after the other; those of one process, two at a time. Of two, the
+earlier one is seen as it goes; the other one's output follows when that has ended, and grows in build/test/ meanwhile.
 Goes on after a failure, closes with the runners' own closing lines and a line of counts; exits 1 if anything failed.
 Usage: test_all.py [STEP...] (names as printed; all without one).
 """
 
+import itertools
 import os
 import re
 import signal
 import subprocess
 import sys
+import threading
 import time
-from collections.abc import Iterable
+from collections import deque
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -20,23 +25,39 @@ LOGS = ROOT / "build/test"
 MAKE = ["make", "--no-print-directory", f"-j{os.cpu_count() or 1}"]
 STRICT = [*MAKE, "WERROR=1"]
 SANITIZED = "SAN=address,undefined"
+LANES = 2  # more would do: memory and the real time of some tests set the limit
+GRACE_S = 20.0  # for a step that is ended: pytest's fixtures end what they have started
 
-# name, command, seconds it may take: so many that only what hangs is ended, on a busy machine, too
-STEPS: list[tuple[str, list[str], float]] = [
-    ("build", [*STRICT, "all"], 600),
-    ("lint", [*MAKE, "lint"], 1200),
-    ("C tests, gcc", [*STRICT, "check"], 600),
-    ("C tests, clang", [*STRICT, "CC=clang", "check"], 600),
-    ("C tests, gcc, sanitizers", [*STRICT, SANITIZED, "check"], 1200),
-    ("C tests, clang, sanitizers", [*STRICT, "CC=clang", SANITIZED, "check"], 1200),
-    ("fuzz targets, a short run", [*STRICT, "fuzz-check"], 1800),
-    ("other builds of the emulator", [*STRICT, "builds"], 1200),
-    ("Python tests and golden traces", [*MAKE, "pytest"], 1800),
-    ("end to end on the host", [*MAKE, "e2e"], 1200),
-    ("end to end, sanitizers", [*MAKE, "e2e-san"], 1800),
-    ("end to end on vcan0", [*MAKE, "e2e-vcan"], 1200),
-    ("end to end on slc0", [*MAKE, "e2e-slc0"], 1200),
-    ("real time, a minute each", [*MAKE, "soak"], 1800),
+
+@dataclass(frozen=True)
+class Step:
+    """A command and the seconds it may take: so many that only what hangs is ended, on a busy machine, too."""
+
+    name: str
+    command: Sequence[str]
+    limit_s: float
+    beside: bool = False
+    """Leaves room for another step beside it: one process, no time that is judged by this machine's clock."""
+    builds: Sequence[str] = ()
+    """What its make builds before it tests, where other steps build, too: made before it runs beside one."""
+
+
+STEPS: list[Step] = [
+    Step("build", [*STRICT, "all"], 600),
+    Step("lint", [*MAKE, "lint"], 1200),
+    Step("C tests, gcc", [*STRICT, "check"], 600),
+    Step("C tests, clang", [*STRICT, "CC=clang", "check"], 600),
+    Step("C tests, gcc, sanitizers", [*STRICT, SANITIZED, "check"], 1200),
+    Step("C tests, clang, sanitizers", [*STRICT, "CC=clang", SANITIZED, "check"], 1200),
+    Step("other builds of the emulator", [*STRICT, "builds"], 1200),
+    # The long ones first, and what fits beside them last: both lanes end at about the same time.
+    Step("end to end on vcan0", [*MAKE, "e2e-vcan"], 1200, beside=True, builds=["all"]),
+    Step("Python tests and golden traces", [*MAKE, "pytest"], 1800, beside=True, builds=["bench-bin"]),
+    Step("end to end on the host", [*MAKE, "e2e"], 1800, beside=True, builds=["all"]),
+    Step("real time, a minute each", [*MAKE, "soak"], 1800, beside=True, builds=["all"]),
+    Step("end to end, sanitizers", [*MAKE, "e2e-san"], 1800, beside=True, builds=[SANITIZED, "all"]),
+    Step("fuzz targets, a short run", [*STRICT, "fuzz-check"], 1800, beside=True),
+    Step("end to end on slc0", [*MAKE, "e2e-slc0"], 1200, beside=True, builds=["all"]),
 ]
 
 ANSI = re.compile(r"\x1b\[[0-9;]*m")
@@ -58,6 +79,7 @@ class Outcome:
     skipped: int = 0
     status: int = 0
     duration_s: float = 0.0
+    cpu_s: float = 0.0
     closing: list[str] = field(default_factory=list)
 
     def read(self, line: str) -> None:
@@ -74,29 +96,60 @@ class Outcome:
     def add(self, kind: str, count: int) -> None:
         setattr(self, kind, getattr(self, kind) + count)
 
-    def close(self, status: int, duration_s: float) -> None:
+    def close(self, status: int, duration_s: float, cpu_s: float) -> None:
         """A step that fails without a runner saying so (a crash, a compiler, lint) is one failure."""
-        self.status, self.duration_s = status, duration_s
+        self.status, self.duration_s, self.cpu_s = status, duration_s, cpu_s
         if status != 0 and self.failed == 0:
             self.failed = 1
         if status == 0 and self.failed:
             self.status = 1
 
 
-def run(name: str, command: list[str], limit_s: float) -> Outcome:
-    """Run one step to its end or its time limit; its output goes to ours and into a log."""
-    outcome = Outcome(name)
-    log = LOGS / (re.sub(r"\W+", "-", name) + ".log")
-    print(f"\n--- {name}: {' '.join(command)}", flush=True)
-    began_s = time.monotonic()
-    # make's own flags must not leak into the makes we start.
-    env = {k: v for k, v in os.environ.items() if k not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")} | {
-        "PYTHONUNBUFFERED": "1"
-    }
-    with (
-        log.open("w", encoding="utf-8") as keep,
-        subprocess.Popen(
-            command,
+class Screen:
+    """Our output for steps that run at once: the earliest one's as it comes, the others' lines wait for their turn."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._waiting: dict[str, list[str]] = {}  # of each step that has begun, in order; the first one's is printed
+        self._ended: set[str] = set()
+
+    def begin(self, name: str, title: str) -> None:
+        with self._lock:
+            self._waiting[name] = []
+            if len(self._waiting) > 1:
+                print(f"--- beside it: {name}", flush=True)
+        self.line(name, f"\n--- {title}\n")
+
+    def line(self, name: str, text: str) -> None:
+        with self._lock:
+            if name == next(iter(self._waiting)):
+                print(text, end="", flush=True)
+            else:
+                self._waiting[name].append(text)
+
+    def end(self, name: str, verdict: str) -> None:
+        with self._lock:
+            self._ended.add(name)
+            if name != next(iter(self._waiting)):
+                print(f"--- beside it: {name}: {verdict}", flush=True)
+            while self._waiting and (first := next(iter(self._waiting))) in self._ended:
+                del self._waiting[first]
+                self._ended.remove(first)
+                if self._waiting:
+                    print("".join(self._waiting[next(iter(self._waiting))]), end="", flush=True)
+
+
+class Run:
+    """One step on its way to its end or its time limit; its output goes to the screen and into a log."""
+
+    def __init__(self, step: Step, screen: Screen, env: dict[str, str]) -> None:
+        self.outcome = Outcome(step.name)
+        self.cut = False  # ended by us
+        self._step, self._screen = step, screen
+        self._over = threading.Event()
+        self._began_s = time.monotonic()
+        self._process = subprocess.Popen(
+            step.command,
             cwd=ROOT,
             env=env,
             stdin=subprocess.DEVNULL,
@@ -105,36 +158,127 @@ def run(name: str, command: list[str], limit_s: float) -> Outcome:
             text=True,
             errors="replace",
             start_new_session=True,
-        ) as step,
-    ):
-        assert step.stdout is not None
-        # The alarm ends the whole group, and with it the pipe that we read.
-        signal.signal(signal.SIGALRM, lambda *_: os.killpg(step.pid, signal.SIGTERM))
-        signal.setitimer(signal.ITIMER_REAL, limit_s)
-        try:
-            for line in step.stdout:
-                print(line, end="", flush=True)
+        )
+
+    def finish(self) -> Outcome:
+        """To the end of the step and of all that writes into its pipe."""
+        name, log = self._step.name, LOGS / (re.sub(r"\W+", "-", self._step.name) + ".log")
+        limit = threading.Timer(self._step.limit_s, self.end)
+        limit.daemon = True
+        limit.start()
+        self._screen.begin(name, f"{name}: {' '.join(self._step.command)}")
+        with log.open("w", encoding="utf-8") as keep, self._process as process:
+            assert process.stdout is not None
+            for line in process.stdout:
+                self._screen.line(name, line)
                 keep.write(line)
-                outcome.read(line)
-            status = step.wait()
+                keep.flush()
+                self.outcome.read(line)
+            _, status, used = os.wait4(process.pid, 0)
+            process.returncode = os.waitstatus_to_exitcode(status)
+        limit.cancel()
+        self._over.set()
+        self.outcome.close(
+            process.returncode or int(self.cut), time.monotonic() - self._began_s, used.ru_utime + used.ru_stime
+        )
+        if self.cut:
+            self._screen.line(name, f"--- {name}: ended after {self.outcome.duration_s:.0f} s\n")
+        self._screen.end(name, "ok" if self.outcome.status == 0 else "FAILED")
+        return self.outcome
+
+    def end(self) -> None:
+        """As by Ctrl-C, so that pytest says where it was and its fixtures end what they started; then less kindly."""
+        self.cut = True
+        for number, grace_s in ((signal.SIGINT, GRACE_S), (signal.SIGTERM, GRACE_S / 4), (signal.SIGKILL, GRACE_S)):
+            try:
+                os.killpg(self._process.pid, number)
+            except ProcessLookupError:
+                return
+            if self._over.wait(grace_s):
+                return
+
+
+class Lanes:
+    """Runs steps at once, as many as there are lanes, the next one where one has ended."""
+
+    def __init__(self, steps: Iterable[Step], count: int, screen: Screen) -> None:
+        self.outcomes: dict[str, Outcome] = {}
+        self._next = deque(steps)
+        self._screen = screen
+        self._running: list[Run] = []
+        self._lock = threading.Lock()
+        self._threads = [threading.Thread(target=self._lane, args=(n,)) for n in range(min(count, len(self._next)))]
+
+    def run(self) -> None:
+        """To the last step's end; Ctrl-C ends those that run."""
+        try:
+            for thread in self._threads:
+                thread.start()
+            for thread in self._threads:
+                thread.join()
         except KeyboardInterrupt:
-            os.killpg(step.pid, signal.SIGTERM)
+            signal.signal(signal.SIGINT, signal.SIG_IGN)  # once is enough: what runs is being ended
+            signal.signal(signal.SIGTERM, signal.SIG_IGN)
+            with self._lock:
+                self._next.clear()
+                running = list(self._running)
+            enders = [threading.Thread(target=run.end) for run in running]
+            for thread in enders:
+                thread.start()
+            for thread in [*enders, *self._threads]:
+                if thread.ident is not None:
+                    thread.join()
+            for run in running:
+                self.outcomes.pop(run.outcome.name, None)
             raise
-        finally:
-            signal.setitimer(signal.ITIMER_REAL, 0)
-    outcome.close(status, time.monotonic() - began_s)
-    if outcome.duration_s >= limit_s:
-        print(f"--- {name}: ended after {limit_s:.0f} s")
-    return outcome
+
+    def _lane(self, number: int) -> None:
+        # make's own flags must not leak into the makes we start. A user-mode kernel keeps to one CPU.
+        cpus = sorted(os.sched_getaffinity(0))
+        env = {k: v for k, v in os.environ.items() if k not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")} | {
+            "PYTHONUNBUFFERED": "1",
+            "UML_CPU": str(cpus[-1 - number % len(cpus)]),
+        }
+        while True:
+            with self._lock:
+                if not self._next:
+                    return
+                step = self._next.popleft()
+                try:
+                    run = Run(step, self._screen, env)
+                except OSError as error:
+                    print(f"\n--- {step.name}: {error}", flush=True)
+                    self.outcomes[step.name] = Outcome(step.name, failed=1, status=1)
+                    continue
+                self._running.append(run)
+            outcome = run.finish()
+            with self._lock:
+                self._running.remove(run)
+                self.outcomes[outcome.name] = outcome
+
+
+def groups(steps: Iterable[Step]) -> Iterable[list[Step]]:
+    """What runs at once, in order: a step alone, or all that come one after the other and leave room for others."""
+    for beside, some in itertools.groupby(steps, lambda step: step.beside):
+        if beside:
+            yield list(some)
+        else:
+            yield from ([step] for step in list(some))
+
+
+def build_first(steps: Sequence[Step]) -> list[Step]:
+    """What makes that run at once would both build. A failure is seen a second time, in the steps that need it."""
+    wanted = dict.fromkeys(tuple(step.builds) for step in steps if step.builds) if len(steps) > 1 else ()
+    return [Step(f"to begin with, {' '.join(goals)}", [*STRICT, *goals], 1200) for goals in wanted]
 
 
 def summary(outcomes: Iterable[Outcome]) -> bool:
     """Print a row for each step, pytest's closing lines and the sum; true when nothing failed and something ran."""
     outcomes = list(outcomes)
-    print(f"\n{'step':34} {'':7} {'passed':>7} {'failed':>7} {'skipped':>7} {'time/s':>7}")
+    print(f"\n{'step':34} {'':7} {'passed':>7} {'failed':>7} {'skipped':>7} {'time/s':>7} {'CPU/s':>7}")
     for o in outcomes:
         verdict = "ok" if o.status == 0 else "FAILED"
-        print(f"{o.name:34} {verdict:7} {o.passed:7} {o.failed:7} {o.skipped:7} {o.duration_s:7.1f}")
+        print(f"{o.name:34} {verdict:7} {o.passed:7} {o.failed:7} {o.skipped:7} {o.duration_s:7.1f} {o.cpu_s:7.1f}")
     print()
     for o in outcomes:
         for line in o.closing:
@@ -145,23 +289,36 @@ def summary(outcomes: Iterable[Outcome]) -> bool:
 
 
 def main(names: list[str]) -> int:
-    if unknown := set(names) - {name for name, _, _ in STEPS}:
+    if unknown := set(names) - {step.name for step in STEPS}:
         print(
-            f"test_all: no step {', '.join(sorted(unknown))}; there are: {'; '.join(n for n, _, _ in STEPS)}",
+            f"test_all: no step {', '.join(sorted(unknown))}; there are: {'; '.join(s.name for s in STEPS)}",
             file=sys.stderr,
         )
         return 2
     LOGS.mkdir(parents=True, exist_ok=True)
-    outcomes = []
+    chosen = [step for step in STEPS if not names or step.name in names]
+    screen = Screen()
+    lanes: list[Lanes] = []
+    before = {n: signal.signal(n, signal.default_int_handler) for n in (signal.SIGINT, signal.SIGTERM)}
     try:
-        for name, command, limit_s in STEPS:
-            if not names or name in names:
-                outcomes.append(run(name, command, limit_s))
+        for group in groups(chosen):
+            for step in build_first(group):
+                Lanes([step], 1, screen).run()
+            lanes.append(Lanes(group, LANES, screen))
+            lanes[-1].run()
     except KeyboardInterrupt:
         print("\ninterrupted")
-        summary(outcomes)
+        summary(outcome for step in chosen if (outcome := ended(step, lanes)))
         return 130
-    return 0 if summary(outcomes) else 1
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    # One without an outcome: its lane broke down, and what that printed says why.
+    return 0 if summary(ended(step, lanes) or Outcome(step.name, failed=1, status=1) for step in chosen) else 1
+
+
+def ended(step: Step, lanes: Iterable[Lanes]) -> Outcome | None:
+    return next((some.outcomes[step.name] for some in lanes if step.name in some.outcomes), None)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,13 @@
 """`make test` adds up honestly: runners' closing lines are counted, and no failure gets past the last line."""
 
 import importlib.util
+import itertools
+import re
+import signal
+import subprocess
 import sys
+import time
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 
@@ -94,10 +100,162 @@ def test_the_last_line_and_the_status(
     status: int,
 ) -> None:
     monkeypatch.setattr(tool, "LOGS", tmp_path)
-    monkeypatch.setattr(tool, "STEPS", [(f"step {n}", [*SAY, code], 2.0) for n, code in enumerate(steps)])
+    monkeypatch.setattr(tool, "STEPS", [tool.Step(f"step {n}", [*SAY, code], 2.0) for n, code in enumerate(steps)])
     assert tool.main([]) == status, what
     assert capsys.readouterr().out.splitlines()[-1] == last
     assert len(list(tmp_path.glob("*.log"))) == len(steps)
+
+
+@pytest.fixture
+def said(
+    tool: ModuleType, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> Callable[..., tuple[int, list[str]]]:
+    """Runs steps beside each other, [name, code] each, and gives the status and what was printed."""
+    monkeypatch.setattr(tool, "LOGS", tmp_path / "logs")
+
+    def run(*steps: tuple[str, str]) -> tuple[int, list[str]]:
+        made = [tool.Step(name, [*SAY, code, str(tmp_path)], 60.0, beside=True) for name, code in steps]
+        monkeypatch.setattr(tool, "STEPS", made)
+        return tool.main([]), capsys.readouterr().out.splitlines()
+
+    return run
+
+
+# Two that wait for each other end only if both run at once.
+MEET = """
+import os, pathlib, sys, time
+here = pathlib.Path(sys.argv[1])
+def tell(what): (here / what).touch()
+def wait(what):
+    while not (here / what).exists(): time.sleep(0.01)
+"""
+FIRST = MEET + "print('first 1', flush=True); tell('a'); wait('b'); print('first 2'); {}"
+SECOND = MEET + "print('second 1', flush=True); wait('a'); print('second 2', flush=True); {} tell('b')"
+PASS, FAIL = "print('= 1 passed in 1.0s =');", "print('= 1 failed in 1.0s ='); tell('b'); sys.exit(1);"
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "last", "status"),
+    [
+        (PASS, PASS, "3 passed, 0 failed, 0 skipped", 0),
+        (FAIL, PASS, "2 passed, 1 failed, 0 skipped", 1),
+        (PASS, FAIL, "2 passed, 1 failed, 0 skipped", 1),
+    ],
+)
+def test_a_failure_in_either_lane_is_named(
+    said: Callable[..., tuple[int, list[str]]], first: str, second: str, last: str, status: int
+) -> None:
+    found, lines = said(("one", FIRST.format(first)), ("two", SECOND.format(second)), ("three", PASS))
+    assert (found, lines[-1]) == (status, last)
+    verdicts = {"ok": 0, "FAILED": 1}
+    rows = [line.split()[:2] for line in lines if line.split()[1:2] and line.split()[1] in verdicts]
+    assert rows == [
+        ["one", "FAILED" if first == FAIL else "ok"],
+        ["two", "FAILED" if second == FAIL else "ok"],
+        ["three", "ok"],
+    ]
+
+
+def test_the_output_of_two_steps_is_not_mixed(tool: ModuleType, capsys: pytest.CaptureFixture[str]) -> None:
+    screen = tool.Screen()
+
+    def seen() -> list[str]:
+        return capsys.readouterr().out.split("\n")[:-1]
+
+    screen.begin("a", "a: make a")
+    screen.begin("b", "b: make b")
+    screen.line("b", "of b\n")
+    screen.line("a", "of a\n")
+    assert seen() == ["", "--- a: make a", "--- beside it: b", "of a"]
+    screen.end("b", "ok")
+    screen.begin("c", "c: make c")
+    screen.line("c", "of c\n")
+    screen.line("a", "more of a\n")
+    assert seen() == ["--- beside it: b: ok", "--- beside it: c", "more of a"]
+    screen.end("a", "FAILED")
+    screen.line("c", "more of c\n")
+    assert seen() == ["", "--- b: make b", "of b", "", "--- c: make c", "of c", "more of c"]
+    screen.end("c", "ok")
+    assert seen() == []
+
+
+def test_one_lane_takes_the_next_step_while_the_other_is_busy(said: Callable[..., tuple[int, list[str]]]) -> None:
+    more = MEET + PASS + "tell(f'more{}')"
+    wait = MEET + PASS + "; ".join(f"wait('more{n}')" for n in range(3))
+    status, lines = said(("long", wait), *((f"more {n}", more.replace("{}", str(n))) for n in range(3)))
+    assert (status, lines[-1]) == (0, "4 passed, 0 failed, 0 skipped")
+
+
+def test_a_step_that_cannot_be_started_is_a_failure(
+    tool: ModuleType, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    monkeypatch.setattr(tool, "LOGS", tmp_path)
+    steps = [tool.Step("not there", [str(tmp_path / "none")], 2.0), tool.Step("there", [*SAY, PASS], 9.0)]
+    monkeypatch.setattr(tool, "STEPS", steps)
+    assert tool.main([]) == 1
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[-1] == "1 passed, 1 failed, 0 skipped"
+    assert any(re.fullmatch(r"--- not there: .* No such file or directory: .*", line) for line in lines)
+
+
+def test_steps_that_run_at_once_are_built_before_and_others_run_alone(tool: ModuleType) -> None:
+    names = [[step.name for step in group] for group in tool.groups(tool.STEPS)]
+    assert list(itertools.chain(*names)) == [step.name for step in tool.STEPS]
+    assert [len(group) for group in names].count(1) == len(names) - 1
+    together = max(tool.groups(tool.STEPS), key=len)
+    assert [step.command[3:] for step in tool.build_first(together)] == [
+        ["WERROR=1", "all"],
+        ["WERROR=1", "bench-bin"],
+        ["WERROR=1", "SAN=address,undefined", "all"],
+    ]
+    assert tool.build_first(together[:1]) == []
+
+
+DRIVER = """
+import importlib.util, pathlib, sys
+spec = importlib.util.spec_from_file_location("test_all_tool", sys.argv[1])
+tool = sys.modules[spec.name] = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(tool)
+here = sys.argv[2]
+tool.LOGS = pathlib.Path(here)
+say = [sys.executable, "-c"]
+stay = "import os, sys, time; print('at work', os.getpid(), flush=True); time.sleep(600)"
+stubborn = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN); " + stay
+tool.GRACE_S = 0.5
+tool.STEPS = [
+    tool.Step("before", [*say, "print('= 2 passed in 1.0s =')"], 60.0),
+    tool.Step("one", [*say, stay], 600.0, beside=True),
+    tool.Step("two", [*say, stubborn], 600.0, beside=True),
+    tool.Step("never", [*say, "print('= 1 passed in 1.0s =')"], 600.0, beside=True),
+]
+sys.exit(tool.main([]))
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda n: n.name)
+def test_ctrl_c_ends_both_lanes(tmp_path: Path, number: signal.Signals) -> None:
+    with subprocess.Popen([*SAY, DRIVER, str(PATH), str(tmp_path)], stdout=subprocess.PIPE, text=True) as run:
+        try:
+            pids = [at_work(tmp_path / f"{name}.log") for name in ("one", "two")]
+            run.send_signal(number)
+            out, _ = run.communicate(timeout=60)
+        finally:
+            run.kill()
+    assert run.returncode == 130
+    assert "interrupted" in out.splitlines()
+    assert out.splitlines()[-1] == "2 passed, 0 failed, 0 skipped"
+    assert not [pid for pid in pids if Path(f"/proc/{pid}").exists()]
+    assert not (tmp_path / "never.log").exists()
+
+
+def at_work(log: Path) -> int:
+    """The process that a step's log names, as soon as it does."""
+    deadline_s = time.monotonic() + 60
+    while time.monotonic() < deadline_s:
+        if log.exists() and (told := log.read_text().split()):
+            return int(told[2])
+        time.sleep(0.01)
+    raise AssertionError(f"{log.name}: nothing came")
 
 
 def test_an_unknown_step_is_refused(tool: ModuleType, capsys: pytest.CaptureFixture[str]) -> None:
