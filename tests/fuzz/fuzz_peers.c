@@ -231,11 +231,21 @@ static void op_timers(struct world *w, struct peer *p, struct script *s)
 
 /* ---- beginning and end ---- */
 
-static const char *control_path(void)
+static char control_dir[] = P_tmpdir "/fuzz_peers.XXXXXX", control_path[sizeof control_dir + 16];
+
+static void remove_control(void)
 {
-    static char dir[] = P_tmpdir "/fuzz_peers.XXXXXX", path[sizeof dir + 16];
-    if (!path[0]) (void)snprintf(path, sizeof path, "%s/control", mkdtemp(dir) ? dir : ".");
-    return path;
+    (void)unlink(control_path);
+    (void)rmdir(control_dir);
+}
+
+/* A port in a folder of this process alone, gone with it. */
+static void listen_for_control(struct world *w)
+{
+    if (!mkdtemp(control_dir)) abort();
+    (void)snprintf(control_path, sizeof control_path, "%s/control", control_dir);
+    (void)atexit(remove_control);
+    if (ctl_listen(&w->control, control_path)) abort();
 }
 
 /* Once: to open and close the port's watch takes the kernel 10 ms. The ports stay, those who use them come and go. */
@@ -250,7 +260,7 @@ static void open_ports(struct world *w)
     w->control = (struct ctl_server){.links = &w->links, .line = on_line, .gone = on_gone, .ctx = w};
     if (socketcand_listen(&w->socketcand, &w->hub, 1, 0)) abort();
     if (slcan_pty_open(&w->slcan, &w->hub, NULL)) abort();
-    if (ctl_listen(&w->control, control_path())) abort();
+    listen_for_control(w);
     for (unsigned i = 0; i < PEERS_MAX; i++) w->peer[i].fd = -1;
 }
 
