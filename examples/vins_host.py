@@ -1,6 +1,6 @@
 """A navigation computer's end of one PSA-2 on CAN, which tells what it takes as docs/conform_host.md says.
 
-psabench conform host --command ".venv/bin/python examples/vins_host.py socketcand:{can} {node}"
+psabench conform host --command ".venv/bin/python examples/vins_host.py socketcand:{can} {node} {form}"
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ TICKS, WRAP = 250, 1 << 16  # of TSTAMP: in a data period, and before it begins 
 class Host:
     """State of one board as this host knows it."""
 
-    def __init__(self, bus: CanHost, node: int) -> None:
-        self.bus, self.node = bus, node
+    def __init__(self, bus: CanHost, node: int, form: int) -> None:
+        self.bus, self.node, self.form = bus, node, form
         self.objects = CanopenNode(bus, node, proto_file("psa2.eds"))
         self.beat_s = time.monotonic()
         self.gone = self.started = self.again = False
@@ -39,7 +39,7 @@ class Host:
     def forget(self) -> None:
         """The board has begun anew, or is new to us."""
         self.reader = FrameReader(self.node)
-        self.torn = self.told_torn = self.told_overruns = self.odd = self.same = 0
+        self.torn = self.told_torn = self.told_lost = self.told_overruns = self.odd = self.same = 0
         self.xy, self.zt, self.stale, self.frozen = b"", b"", False, False
         self.base: tuple[int, int] | None = None  # SEQ and TSTAMP of the last pair
         self.seq: int | None = None
@@ -68,6 +68,8 @@ class Host:
             if value & mask != due:
                 self.tell(wrong_setup=f"{index:04X}h:{sub} is {value:02X}h")
                 return False
+        if self.form:
+            self.objects.write(0x2020, 0, self.form)
         self.forget()
         self.started, self.again = True, False
         self.objects.nmt(0x01)
@@ -84,7 +86,7 @@ class Host:
             if data == b"\0" and self.started:
                 self.tell(restart=True)
                 self.started, self.again = False, True
-        elif self.started and service in (0x180, 0x280) and self.is_right(service, data):
+        elif self.started and (service == 0x380 or (service in (0x180, 0x280) and self.is_right(service, data))):
             self.reader.on_message(m)
 
     def is_right(self, service: int, data: bytes) -> bool:
@@ -115,6 +117,9 @@ class Host:
         """Tell the samples that have come, and what is to be said of them."""
         frames = self.reader.take()
         codes = np.rint(frames.u_v / CODE_V).astype(np.int64)
+        if self.form:
+            self.take_fast(codes >> 3)
+            return
         for i in range(len(frames)):
             seq = int(frames.seq[i])
             steps = 1 if self.seq is None else (seq - self.seq) % WRAP
@@ -129,6 +134,15 @@ class Host:
                 sample |= {"t": int(frames.temp_code[i]), "channel": int(frames.temp_channel[i])}
                 print(json.dumps(sample | {"t_us": float(frames.t_sample_s[i]) * 1e6, "v": frames.u_v[i].tolist()}))
         self.tell_counts()
+
+    def take_fast(self, codes: np.ndarray[Any, np.dtype[np.int64]]) -> None:
+        """Frames of form 1 have no number of their own; what is missing between two is told by TOG."""
+        if lost := self.reader.counters.lost - self.told_lost:
+            print(json.dumps({"lost": lost}))
+        self.told_lost += lost
+        for x, y, z in codes.tolist():
+            print(json.dumps({"reading": self.count, "x": x, "y": y, "z": z}))
+            self.count += 1
 
     def tell_counts(self) -> None:
         torn, overruns = self.torn + self.reader.counters.torn, self.reader.counters.overruns
@@ -173,7 +187,7 @@ class Host:
 
 def main() -> int:
     with CanHost(open_bus(sys.argv[1]), WallClock()) as bus:
-        host = Host(bus, int(sys.argv[2]))
+        host = Host(bus, int(sys.argv[2]), int(sys.argv[3]) if len(sys.argv) > 3 else 0)
         try:
             host.set_up()
             while True:

@@ -78,7 +78,7 @@ def test_a_person_starts_the_host_case_by_case(mode: str, host: Path, tmp_path: 
     )
     for case in ("lost", "torn"):
         said = terminal.wait_for(
-            rf"{case}: [^\n]+\r\n  start the host now, Enter skips: can=(\S+) node=(\d+) results=(\S+)\r\n"
+            rf"{case}: [^\n]+\r\n  start the host now, Enter skips: can=(\S+) form=0 node=(\d+) results=(\S+)\r\n"
         )
         assert said.groups() == (f"127.0.0.1:{port}", "5", str(results))
         with results.open(mode) as told:

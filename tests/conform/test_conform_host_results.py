@@ -180,6 +180,19 @@ def test_silence_of_the_stage_is_no_alarm() -> None:
         e.nothing_but()
 
 
+def test_a_slow_machine_is_no_alarm() -> None:
+    """Simulated time passes at a quarter of the wall's: a heartbeat every 4 s of the host's own clock."""
+    e = evidence(results.read([b'{"gone": true}\n']))
+    with pytest.raises(Broken):
+        e.nothing_but()
+    e.clock = [(0.25 * t, t) for t in range(20)]
+    assert (e.wall_s(1.1, 1.9), e.longest_s(1.0)) == (4.0, 4.0)
+    e.nothing_but()
+    e.clock = [(t / 3, t / 3) for t in range(20)]
+    with pytest.raises(Broken):
+        e.nothing_but()
+
+
 def test_any_log_is_read() -> None:
     rng = random.Random(3)
     frames = [f for n in range(10, 40) for f in pair(n)]

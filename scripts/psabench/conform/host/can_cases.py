@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from psabench.conform.host.judge import limits
+from psabench.conform.host.judge import HEARTBEAT_S, limits
 from psabench.conform.host.stage import READY_S, Stage
 
 NODE = 5
@@ -30,7 +30,7 @@ units:
 """
 FAMILY, ON_CAN = ("psa2", "psa1"), ("can", "pty")
 BUSY = 50
-XY, ZT = 0x180 + NODE, 0x280 + NODE
+XY, ZT, FAST = 0x180 + NODE, 0x280 + NODE, 0x380 + NODE
 
 
 def _nothing(s: Stage) -> None:
@@ -50,6 +50,7 @@ class Case:
     links: tuple[str, ...] = ON_CAN  # that it is played at
     profile: str = ""  # it wants this one, whatever the user said
     scenario: str = SCENARIO
+    form: int = 0  # frame form that the host has to ask for
     busy: int = BUSY  # frames in 50 ms that say that the stream runs; 0: there is none until it is played
     ready_s: float = READY_S  # simulated, for a host to start it
 
@@ -109,6 +110,13 @@ def _delayed(s: Stage) -> None:
     s.run_to_quiet()
     s.fault("link.delay", "a.can", hold_s=0.03)
     s.run(0.4)
+
+
+def _fast(s: Stage) -> None:
+    """One PSA2_FAST is lost, three times."""
+    for _ in range(3):
+        _drop(s, 1, can_id=FAST)
+        s.run(0.1)
 
 
 def _length(s: Stage) -> None:
@@ -248,9 +256,6 @@ def _off(s: Stage) -> None:
     s.run(beats * HEARTBEAT_S + 1.0, speed=1.0)
 
 
-HEARTBEAT_S = 1.0  # 1017h as the board has it
-
-
 def _with_slow_answers(s: Stage) -> None:
     s.run(0.3, speed=0.0)
     s.fault(
@@ -280,6 +285,7 @@ CASES: Mapping[str, Case] = {
             title="a bit of a frame is wrong and nobody notices",
             play=_hit("link.corrupt", (ZT, XY, ZT, XY)),
         ),
+        Case(name="fast", title="frame form 1, and three frames are lost", play=_fast, form=1, busy=30),
         Case(name="length", title="a PSA2_XY of 7 bytes", play=_length),
         Case(name="others", title="frames of another node, error frames, off the bus and back", play=_others),
         Case(name="over_range", title="each axis at 9.9 V and beyond the range, both ways", play=_over_range),

@@ -10,7 +10,7 @@ from typing import Any
 
 from psabench.conform import report
 from psabench.conform.host import runner
-from psabench.conform.host.judge import Judged
+from psabench.conform.host.judge import Judged, judged
 from psabench.conform.identity import suite_facts
 from psabench.conform.outcome import Outcome, Verdict
 from psabench.conform.requirements import Requirement, requirements
@@ -31,6 +31,7 @@ LINKS = {
 EPILOG = """\
 The program is started once for each case, as soon as its board is powered; it ends when its link ends. In COMMAND
   {can}      127.0.0.1:PORT of a socketcand server          {node}     CANopen node of the board
+  {form}     frame form to ask for, for hosts that take 1, too
   {pty}      pseudo-terminal of an slcan adapter            {results}  file to tell into (without it: standard output)
   {line}     pseudo-terminal of the lines, a byte a sample; {word_bits}, {code_bits}: of its words and codes
   {bus}      pseudo-terminal of a bus port: PSD-1, PIK
@@ -97,6 +98,8 @@ def host(args: argparse.Namespace) -> int:
     v = variant(args.board, args.profile)
     refuse(v, link)
     tests = runner.wanted(args.only, args.case, v.board, link)
+    if args.command and "{form}" not in args.command:
+        tests = [j for j in tests if not wants_form(j.case)]
     rows = [r for r in requirements() if r.group == "host" and r.applies(v.board, v.profile)]
     rows = [r for r in rows if not args.only or r.id.startswith(tuple(args.only))]
     rows = [r for r in rows if not args.case or any(r.id in j.ids for j in tests)]
@@ -135,6 +138,11 @@ def host(args: argparse.Namespace) -> int:
     return 130 if interrupted else 0 if told.conforms else 1
 
 
+def wants_form(case: str) -> bool:
+    """Whether the case is only for a host that takes other frame forms than pairs."""
+    return getattr(runner.ALL[case], "form", 0) != 0
+
+
 def take(outcomes: list[Outcome], outcome: Outcome, *, tell: bool) -> None:
     """Keep an outcome; tell it at once to who starts the host by hand."""
     outcomes.append(outcome)
@@ -146,13 +154,14 @@ def take(outcomes: list[Outcome], outcome: Outcome, *, tell: bool) -> None:
 def unseen(rows: list[Requirement], tests: list[Judged], link: str) -> list[Outcome]:
     """Of the requirements that no case shows at this link."""
     seen = {i for j in tests for i in j.ids}
+    of_forms = {i for j in judged() if wants_form(j.case) and link in runner.ALL[j.case].links for i in j.ids}
     return [
         Outcome(
             test="not_played",
             title="What this link does not show.",
             requirements=(r.id,),
             verdict=Verdict.NOT_OBSERVABLE,
-            reason=f"no case plays it at {LINKS[link]}",
+            reason="COMMAND has no {form}" if r.id in of_forms else f"no case plays it at {LINKS[link]}",
         )
         for r in rows
         if r.id not in seen

@@ -16,12 +16,15 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TypeVar
 
+import numpy as np
+
 from psabench.conform.host.bus_stage import BusCycle
 from psabench.conform.host.played import Bus, Played
 from psabench.conform.host.results import Sample, Told
 from psabench.conform.outcome import Broken, TooLittle
 from psabench.conform.requirements import Requirement, requirements
 
+HEARTBEAT_S = 1.0  # 1017h as the board has it
 STOOD_S = 0.04  # the stage may have stood still for so long before a host may take the board for silent
 
 
@@ -76,6 +79,7 @@ class HostEvidence:
     status: int | None = 0  # the host's exit status; None: it had to be ended
     marks: Mapping[str, float] = field(default_factory=dict)  # instants of the case, simulated s
     stood_s: float = 0.0  # longest that the stage has stood still against the wall's time
+    clock: Sequence[tuple[float, float]] = ()  # simulated and the wall's time, s, about each step of the stage
     streamed: bool = True  # the host has started the stream
     cycles: Sequence[BusCycle] = ()  # of the host on the board's parallel bus
     errors: str = ""  # what the host has written beside its results
@@ -113,12 +117,35 @@ class HostEvidence:
         line = self.errors.strip().splitlines()[-1:]
         return f" ({line[0][:200]})" if line else ""
 
+    def wall_s(self, begin_s: float, end_s: float) -> float:
+        """How long a host may have held that simulated time for, which passes slower on a loaded machine."""
+        if not self.clock:
+            return end_s - begin_s
+        sim_s, wall_s = np.array(self.clock).T
+        first = max(0, int(np.searchsorted(sim_s, begin_s)) - 1)
+        last = min(len(sim_s) - 1, int(np.searchsorted(sim_s, end_s)))
+        return max(end_s - begin_s, float(wall_s[last] - wall_s[first]))
+
+    @property
+    def may_seem_silent(self) -> bool:
+        """Whether the stage stood still, or went so slowly, that a host may have taken the board for silent."""
+        short_s = float(limits("HOST-STALE-01").limit("silent_max_s"))
+        return self.stood_s > STOOD_S or self.longest_s(short_s) > short_s + 2 * STOOD_S
+
+    def longest_s(self, span_s: float) -> float:
+        """The most that so much simulated time has taken."""
+        if not self.clock:
+            return span_s
+        sim_s, wall_s = np.array(self.clock).T
+        last = np.minimum(np.searchsorted(sim_s, sim_s + span_s), len(sim_s) - 1)
+        return max(span_s, float((wall_s[last] - wall_s).max()))
+
     def nothing_but(self, *names: str) -> None:
         """Raises Broken when the host told anything else. Silence that the stage itself made is no false alarm."""
         allowed = {*names, "end"}
-        if self.stood_s > STOOD_S:
+        if self.may_seem_silent:
             allowed |= {"stale"}
-        if self.stood_s > 1.0:
+        if self.longest_s(HEARTBEAT_S) > 0.9 * HEARTBEAT_S * float(limits("HOST-CAN-07").limit("gone_after_periods")):
             allowed |= {"gone"}
         for event in self.told.events:
             if event.name not in allowed:

@@ -150,6 +150,7 @@ def on_board(play: Play, case: Case) -> HostEvidence:
         status=status,
         marks=stage.marks,
         stood_s=stage.stood_s,
+        clock=stage.clock,
         streamed=streamed,
         cycles=stage.bridge.cycles if isinstance(stage.bridge, BusBridge) else (),
         errors=_errors(stage.host),
@@ -163,7 +164,8 @@ def _perform(play: Play, case: Case, scenario: Path, log: Path) -> tuple[int | N
         bridge = BusBridge(variant(play.board).family) if play.link == "bus" else None
         if bridge:
             stack.callback(bridge.close)
-        host = _host(play, case.name, case.title, {"bus": str(bridge.path)} if bridge else _places(emulator, play.link))
+        where = {"bus": str(bridge.path)} if bridge else _places(emulator, play.link)
+        host = _host(play, case.name, case.title, {**where, "form": str(case.form)})
         stack.callback(host.kill)
         stage = Stage(emulator, control, host, speed=play.speed, node=NODE, bridge=bridge)
         case.before(stage)
@@ -210,7 +212,7 @@ def _host(play: Play, case: str, title: str, where: dict[str, str]) -> Program |
         words = " ".join(f"{k}={v}" for k, v in {**places, "node": str(NODE), "results": str(results)}.items())
         invite = f"{case}: {title}\n  start the host now, Enter skips: {words}"
         return ByHand(results, kept, lambda: play.say(invite), play.terminal)
-    places = {"node": str(NODE), "results": str(results), **where}
+    places = {"node": str(NODE), "results": str(results), "form": "0", **where}
     return Program(
         expand(play.command, places),
         results=results,

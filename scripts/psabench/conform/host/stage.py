@@ -37,7 +37,7 @@ STUCK_S = 30.0  # patience for a host that reads nothing
 END_S = 20.0  # patience for a host to end after its link has ended
 READY_S = 3.0  # simulated, for a host to start the stream
 EMPTY_LOOKS = 10  # at a pseudo-terminal, one after the other, 10 ms apart, until it has been read
-PLACES = ("can", "pty", "line", "bus", "node", "results", "word_bits", "code_bits")
+PLACES = ("can", "pty", "line", "bus", "node", "form", "results", "word_bits", "code_bits")
 
 
 def expand(command: str, places: Mapping[str, str]) -> list[str]:
@@ -173,6 +173,7 @@ class Stage:
     node: int = 5
     bridge: Bridge | None = None  # where the host is on the board's parallel bus
     stood_s: float = 0.0  # longest that simulated time has stood still against the wall's
+    clock: list[tuple[float, float]] = field(default_factory=list)  # simulated and the wall's time, about each step
     marks: dict[str, float] = field(default_factory=dict)  # instants, simulated s, that a check wants to know
 
     @property
@@ -193,7 +194,9 @@ class Stage:
                 self.control.call("run", for_s=step_s)
             if pace and (rest_s := step_s / pace - (time.monotonic() - begun_s)) > 0:
                 time.sleep(rest_s)
-            self.stood_s = max(self.stood_s, time.monotonic() - begun_s)
+            ended_s = time.monotonic()
+            self.stood_s = max(self.stood_s, ended_s - begun_s)
+            self.clock += [(self.now_s - step_s, begun_s), (self.now_s, ended_s)]
             left_s -= step_s
 
     def serve(self, for_s: float, *, cycle_s: float, leap_s: float = 0.0) -> None:
