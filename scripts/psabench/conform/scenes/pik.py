@@ -9,6 +9,7 @@ from psabench.conform.streamed import from_res, readings
 from psabench.conform.subject import Subject
 
 START_S, STREAM_S, MINUTE_S = 0.06, 1.0, 60.5
+BUS, PERIOD, SOON = 0x2002, 0x0C, 20  # registers over CAN; 20 times 100 us
 OVERDRIVE_DEG = -90.0  # there the accelerometer X gives more than its channel can follow
 
 
@@ -32,11 +33,12 @@ def minute(s: Subject) -> Evidence:
 
 @scene("overdrive", boards=("pik",))
 def overdrive(s: Subject) -> Evidence:
-    """The accelerometer X turned by a dividing head until its channel cannot keep up, and back."""
+    """The accelerometer X turned by a dividing head until its channel cannot keep up, and back; a reading each 2 ms."""
     if "head" not in s.probes:
         raise TooLittle("no dividing head was connected")
     s.reset()
     s.run_for(START_S)
+    s.unit.node.write_raw(BUS, PERIOD + 1, SOON.to_bytes(2, "little"))
     head = s.bench.head
     rest_deg = head.angle_deg
     with s.take(lines=False) as take:
@@ -49,4 +51,6 @@ def overdrive(s: Subject) -> Evidence:
         s.run_for(0.4)
         s.unit.stop()
     take.lines = looked.lines
+    s.reset()
+    s.run_for(START_S)
     return s.evidence("overdrive", take)

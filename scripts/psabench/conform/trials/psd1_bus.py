@@ -143,6 +143,7 @@ def a_word_is_taken_once(s: Subject) -> str:
 def words_of_the_built_in_host_are_refused(s: Subject) -> str:
     """Read X, Y and Z many times while the board reads them itself."""
     code = requirements()["PSD1-BUS-05"].limit("abort_code")
+    calm(s)
     for k in range(30):
         line_refused(s, f"R {k % 3:X}", code)
         s.run_for(period_s(s.variant) / 7)
@@ -165,6 +166,7 @@ def registers_have_their_names_and_rights(s: Subject) -> str:
 def channels_come_back_with_their_codes(s: Subject) -> str:
     """Write each channel to TEMP and SERVICE and read it back."""
     row = requirements()["PSD1-BUS-10"]
+    calm(s)
     bits = int(row.limit("code_bits"))
     seen = []
     for address in ("A", "B"):
@@ -181,6 +183,7 @@ def channels_come_back_with_their_codes(s: Subject) -> str:
 @trial(needs={"bus"})
 def the_other_signals_are_there(s: Subject) -> str:
     """Read gyros, rate sensors, temperatures and service signals."""
+    calm(s)
     run_cycles(s, 3)
     gyros = [line(s, f"R {a:X}").data for a in range(4, 7)]
     rates = [line(s, f"R {a:X}").data for a in range(7, 10)]
@@ -201,6 +204,7 @@ def the_other_signals_are_there(s: Subject) -> str:
 def the_service_signal_follows_the_supply(s: Subject) -> str:
     """Lower the supply by a twentieth and read its code before and after."""
     row = requirements()["PSD1-BUS-11"]
+    calm(s)
     line(s, "W B 0000")
     supply = s.bench.supply
     volts = supply.volt_v
