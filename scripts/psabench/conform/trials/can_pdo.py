@@ -19,6 +19,7 @@ from psabench.conform.talk import COUNTERS, NMT_START, OFF, TPDO, Talk, talk, wo
 READINGS, PATIENCE_S = 1, 5.0  # sub-index of 2030h
 FEW = 4  # readings in which something should come, or nothing
 FREE_ID = 0x1F0  # of no service and no message of a node below 112
+LONG_ID = 0x800  # the first that 11 bits do not hold
 EVENT, SYNC_NEW = 254, 0
 INHIBIT_S = 0.05
 HISTORY, OVERLOADS = 0x1003, 9
@@ -180,7 +181,7 @@ def a_tpdo_that_is_off_is_not_sent(s: Subject) -> str:
 @proves("BUS-PDO-02")
 @trial(needs={"can", "stream"})
 def the_identifier_of_a_tpdo(s: Subject) -> str:
-    """Another identifier while it is valid, identifiers of services, another one while it is off."""
+    """Another identifier while it is valid; services, more than 11 bits, RTR; another one while it is off."""
     code = _limit("BUS-PDO-02", "abort_code")
     with talk(s, reset=True) as t:
         index, can_id = _begin(t, EVENT)
@@ -190,6 +191,8 @@ def the_identifier_of_a_tpdo(s: Subject) -> str:
         for service in (t.nmt_id, t.sync_id, t.emcy, t.sdo_tx, t.sdo_rx, t.heartbeat):
             word = (cob | service | OFF).to_bytes(4, "little")
             t.refused(write(index, 1, word), code, f"{service:03X}h")
+        for word, what in ((cob | LONG_ID | OFF, "an identifier of more than 11 bits"), (FREE_ID | OFF, "RTR allowed")):
+            t.refused(write(index, 1, word.to_bytes(4, "little")), code, what)
         t.download(index, 1, (cob | FREE_ID | OFF).to_bytes(4, "little"))
         t.download(index, 1, (cob | FREE_ID).to_bytes(4, "little"))
         t.readings(FEW, FREE_ID)
