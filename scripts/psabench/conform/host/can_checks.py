@@ -382,9 +382,10 @@ def codes_that_stand_still_are_told(e: HostEvidence) -> str:
         i for i, (a, b) in enumerate(zip(e.bus.samples, e.bus.samples[1:], strict=False)) if a.codes[:3] == b.codes[:3]
     )
     after = e.told.places("frozen")[0] - first
-    bound = 1000 * float(limits("HOST-STALE-02").limit("frozen_after_s"))
-    if not 0.5 * bound <= after <= 1.1 * bound:
-        raise Broken(f"frozen told after {after} samples of the same codes", f"after {bound:.0f}")
+    row = limits("HOST-STALE-02")
+    least, most = (1000 * float(row.limit(name)) for name in ("told_min_s", "told_max_s"))
+    if not least <= after <= most:
+        raise Broken(f"frozen told after {after} samples of the same codes", f"after {least:.0f} to {most:.0f}")
     e.nothing_but("frozen")
     return f"frozen after {after} samples of the same codes"
 

@@ -11,10 +11,11 @@ from psabench.conform.host.stage import Stage
 PIKS = ("pik", "pik5", "pik6")
 BUS = ("bus",)
 INPUT_V = (1.2, -0.6, 0.024)  # article: 1.2 V/g
-NEAR_RANGE_V = 9.0
-BEYOND_V = 12.0
+NEAR_RANGE_V = float(limits("HOST-PIK-02").limit("input_v"))
+BEYOND_V = float(limits("HOST-PIK-03").limit("input_v"))
 ROM_S = 30.0  # simulated, for a host to read the correction ROM word by word
-COLD_DEGC, WARM_DEGC = -10.0, 45.0
+COLD_DEGC = float(limits("HOST-PMKA-02").limit("cold_degc"))
+WARM_DEGC = float(limits("HOST-PMKA-01").limit("warm_degc"))
 
 
 def scenario(volts: tuple[float, float, float] = INPUT_V, degc: float = 25.0) -> str:
@@ -101,7 +102,7 @@ def _pmka_lost(s: Stage) -> None:
         s.run_between()
         s.fault("link.drop", "a.can", frames=2 * readings)
     s.run(0.5)
-    s.fault("sensor.stuck", "a.sensor.x", out_v=BEYOND_V)
+    s.fault("sensor.stuck", "a.sensor.x", out_v=float(limits("HOST-PMKA-03").limit("input_v")))
     s.run(0.5)
     s.clear()
     s.run(0.5)
