@@ -191,7 +191,7 @@ def the_identifier_of_a_tpdo(s: Subject) -> str:
         for service in (t.nmt_id, t.sync_id, t.emcy, t.sdo_tx, t.sdo_rx, t.heartbeat):
             word = (cob | service | OFF).to_bytes(4, "little")
             t.refused(write(index, 1, word), code, f"{service:03X}h")
-        for other, what in ((cob | LONG_ID | OFF, "an identifier of more than 11 bits"), (FREE_ID | OFF, "RTR allowed")):
+        for other, what in ((cob | LONG_ID | OFF, "more than 11 bits"), (FREE_ID | OFF, "RTR allowed")):
             t.refused(write(index, 1, other.to_bytes(4, "little")), code, what)
         t.download(index, 1, (cob | FREE_ID | OFF).to_bytes(4, "little"))
         t.download(index, 1, (cob | FREE_ID).to_bytes(4, "little"))
