@@ -118,11 +118,13 @@ $(BUILD)/libpsabench.so $(BUILD)/libpsabench-nav.so:
 $(BUILD)/libpsabench.a $(BUILD)/libpsabench-nav.a: $(BUILD)/lib%.a: $(BUILD)/lib/%.o
 	$(Q)rm -f $@ && $(AR) rcs $@ $^
 
+# Other makes may run in this folder at the same time: a name of its own until it is whole, and install fills in its own.
+FILL_IN = sed -e 's|@PREFIX@|$(PREFIX)|; s|@LIBDIR@|$(LIBDIR)|; s|@VERSION@|$(VERSION)|'
 $(BUILD)/psabench.pc: emu/api/psabench.pc.in
 $(BUILD)/psabench-nav.pc: emu/nav/psabench-nav.pc.in
 $(BUILD)/psabench.pc $(BUILD)/psabench-nav.pc: pyproject.toml Makefile FORCE
-	$(Q)sed -e 's|@PREFIX@|$(PREFIX)|; s|@LIBDIR@|$(LIBDIR)|; s|@VERSION@|$(VERSION)|' $(filter %.in,$^) > $@.new
-	$(Q)cmp -s $@.new $@ && rm $@.new || mv $@.new $@
+	$(Q)$(FILL_IN) $(filter %.in,$^) > $@.$$$$ && \
+	    { cmp -s $@.$$$$ $@ && rm $@.$$$$ || mv $@.$$$$ $@; }
 
 # In a line of its own: .SECONDARY above would leave a target alone that waits for a file that is never there.
 .PHONY: FORCE
@@ -290,12 +292,12 @@ install: all
 	install -D -m 755 $(LIB_SO) $(DESTDIR)$(LIBDIR)/$(notdir $(LIB_SO))
 	ln -sf $(notdir $(LIB_SO)) $(DESTDIR)$(LIBDIR)/libpsabench.so
 	install -m 644 $(BUILD)/libpsabench.a $(DESTDIR)$(LIBDIR)/libpsabench.a
-	install -D -m 644 $(BUILD)/psabench.pc $(DESTDIR)$(LIBDIR)/pkgconfig/psabench.pc
+	$(FILL_IN) emu/api/psabench.pc.in | install -D -m 644 /dev/stdin $(DESTDIR)$(LIBDIR)/pkgconfig/psabench.pc
 	install -D -m 644 -t $(DESTDIR)$(PREFIX)/include/psabench/nav emu/nav/nav.h emu/nav/nav_mc.h
 	install -m 755 $(NAV_SO) $(DESTDIR)$(LIBDIR)/$(notdir $(NAV_SO))
 	ln -sf $(notdir $(NAV_SO)) $(DESTDIR)$(LIBDIR)/libpsabench-nav.so
 	install -m 644 $(BUILD)/libpsabench-nav.a $(DESTDIR)$(LIBDIR)/libpsabench-nav.a
-	install -m 644 $(BUILD)/psabench-nav.pc $(DESTDIR)$(LIBDIR)/pkgconfig/psabench-nav.pc
+	$(FILL_IN) emu/nav/psabench-nav.pc.in | install -m 644 /dev/stdin $(DESTDIR)$(LIBDIR)/pkgconfig/psabench-nav.pc
 	for f in $$(find -L proto decoders share -type f ! -name '*.pyc'); do \
 	    install -D -m 644 $$f $(DESTDIR)$(PREFIX)/share/psabench/$$f || exit 1; done
 	cd decoders && for f in $$(find -L * -type f ! -name '*.pyc'); do \
