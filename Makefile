@@ -80,7 +80,7 @@ C_FILES   = $(sort $(wildcard emu/*/*.[ch] emu/*/*.[ch]pp tests/*/*.[ch] example
 
 .SECONDARY:
 .DELETE_ON_ERROR:
-.PHONY: all lib setup run test bench bench-bin mutants alarms check pytest san builds e2e e2e-san e2e-vcan e2e-slc0 uml soak fuzz fuzz-check fuzz-each lint format golden docs prove install uninstall wheel clean help lock
+.PHONY: all lib setup run test bench bench-bin mutants fault-matrix alarms check pytest san builds e2e e2e-san e2e-vcan e2e-slc0 uml soak fuzz fuzz-check fuzz-each lint format golden docs prove install uninstall wheel clean help lock
 
 ## all: the emulator, build/psa-emu (make CC=clang and make SAN=address,undefined build beside it, in build-clang and build-san)
 all: $(if $(MAIN),$(BUILD)/psa-emu,$(LIB_OBJ)) lib
@@ -191,6 +191,10 @@ mutants: | $(PY)
 alarms: all
 	@PYTHONPATH=tools $(PY) -m alarms.run $(ALARMS)
 
+## fault-matrix: every fault at every point, and the requirements that the conformance suite finds broken (docs/faults.md)
+fault-matrix: all
+	PSABENCH_FAULTS=all $(PY) -m pytest tests/conform/test_conform_faults.py
+
 ## check: the C unit tests (one: make check TESTS=test_sched)
 check: $(TEST_BIN)
 	@printf '%s\n' $(TEST_BIN) | xargs -P $(JOBS) -n 1 sh -c '{ echo "$$0"; timeout 900 "$$0"; } > "$$0.log" 2>&1; \
@@ -277,6 +281,7 @@ docs: all
 	$(if $(wildcard tools/gen_docs.py),$(PY) tools/gen_docs.py)
 	$(PY) tools/gen_commands.py
 	$(PY) tools/gen_requirements.py
+	$(PY) tools/gen_fault_matrix.py
 	$(PY) tools/gen_fidelity.py
 
 ## prove: run what proves the models whose sources have changed (or GROUP=psa2, GROUP=all), and record it (docs/evidence.md)
