@@ -291,14 +291,20 @@ def register_reads_cost_no_conversion_at_the_highest_rate(e: Evidence) -> str:
 # ---- refusals
 
 
+def _refused(answer: Answer, due: int, what: str) -> None:
+    """Raises Broken for another answer than this abort."""
+    if answer.abort != due:
+        saw = "taken" if answer == Answer() else f"answered by {answer.abort:08X}h {answer.value or ''}".rstrip()
+        raise Broken(f"{what} {saw}", f"abort {due:08X}h")
+
+
 @proves("PSA2-ACC-03")
 @check("refusals")
 def a_read_only_register_is_not_written(e: Evidence) -> str:
     """Write to ID."""
     due = int(row_for(e, "PSA2-ACC-03").limit("abort_code"))
     for index, sub, _, answer in fact(e, "read-only"):
-        if answer.abort != due:
-            raise Broken(f"a write to {index:04X}h:{sub} answered by {answer.abort:08X}h", f"{due:08X}h")
+        _refused(answer, due, f"a write to {index:04X}h:{sub}")
     return f"abort {due:08X}h"
 
 
@@ -309,8 +315,7 @@ def reserved_values_are_refused(e: Evidence) -> str:
     due = int(row_for(e, "PSA2-ACC-04").limit("abort_code"))
     found = fact(e, "reserved")
     for index, sub, value, before, answer, after in found:
-        if answer.abort != due:
-            raise Broken(f"{value:02X}h to {index:04X}h:{sub} answered by {answer.abort:08X}h", f"abort {due:08X}h")
+        _refused(answer, due, f"{value:02X}h to {index:04X}h:{sub}")
         if before != after:
             raise Broken(f"{index:04X}h:{sub} is {number(after):02X}h after a refusal", f"{number(before):02X}h")
     return f"{len(found)} values refused and not stored"
@@ -323,8 +328,7 @@ def opcodes_that_want_more_are_refused(e: Evidence) -> str:
     due = int(row_for(e, "PSA2-ACC-08").limit("abort_code"))
     found = fact(e, "opcodes")
     for _, sub, value, answer in found:
-        if answer.abort != due:
-            raise Broken(f"opcode {value:02X}h to 2010h:{sub} answered by {answer.abort:08X}h", f"abort {due:08X}h")
+        _refused(answer, due, f"opcode {value:02X}h to 2010h:{sub}")
     return f"{len(found)} opcodes refused"
 
 
@@ -349,8 +353,7 @@ def refused_opcodes_never_reach_a_converter(e: Evidence) -> str:
 def an_unknown_form_is_refused(e: Evidence) -> str:
     """Write 4 to 2020h."""
     due, answer = int(row_for(e, "PSA2-FORM-07").limit("abort_code")), fact(e, "form")
-    if answer.abort != due:
-        raise Broken(f"answered by {answer.abort:08X}h", f"abort {due:08X}h")
+    _refused(answer, due, "form 4")
     return f"abort {due:08X}h"
 
 
@@ -360,8 +363,7 @@ def no_access_before_the_set_up_is_over(e: Evidence) -> str:
     """Read registers right after a reset."""
     due = int(row_for(e, "PSA2-ACC-05").limit("abort_code"))
     for a in fact(e, "early"):
-        if a.abort != due:
-            raise Broken(f"answered by {a.abort:08X}h {a.value}", f"abort {due:08X}h")
+        _refused(a, due, "a read before the end of the set-up")
     return f"abort {due:08X}h for {len(fact(e, 'early'))} reads"
 
 
