@@ -25,10 +25,8 @@ def judged(v: Variant, at: Addresses, seed: int, clock_ppm: float) -> list[Outco
 @pytest.mark.parametrize(
     ("board", "profile", "seed", "clock_ppm", "at"),
     [
-        ("psa2", "article", 1, 0.0, Addresses()),
         ("psa2", "article", 2, 100.0, Addresses()),
         ("psa2", "intent", 3, -100.0, Addresses()),
-        ("psa2", "ungated", 4, 0.0, Addresses()),
         ("psa2", "ungated", 5, 100.0, Addresses()),
         ("psa2", "lab32", 6, 100.0, Addresses()),
         ("psa2", "w16", 7, -100.0, Addresses()),
