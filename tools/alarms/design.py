@@ -8,7 +8,7 @@ from random import Random
 
 from psabench.conform.requirements import requirements
 from psabench.conform.subject import has_clock
-from psabench.conform.variant import variant
+from psabench.conform.variant import Variant, variant
 
 SEEDS = range(1, 201)
 LOAD_SEEDS = range(1, 4)
@@ -64,12 +64,12 @@ def _errors(profile: str) -> Sequence[float]:
     return deck
 
 
-def _case(board: str, profile: str, seed: int, error_ppm: float) -> Case:
+def _case(v: Variant, seed: int, error_ppm: float) -> Case:
     """The error is the board's with every other seed, where a profile can have it; else the probes'."""
-    own = error_ppm != 0.0 and seed % 2 == 0 and has_clock(variant(board, profile), error_ppm)
+    own = error_ppm != 0.0 and seed % 2 == 0 and has_clock(v, error_ppm)
     return Case(
-        board=board,
-        profile=profile,
+        board=v.board,
+        profile=v.profile,
         seed=seed,
         board_ppm=error_ppm if own else 0.0,
         probes_ppm=0.0 if own else 0.0 - error_ppm,
@@ -81,12 +81,12 @@ def lockstep(names: Iterable[str] = (), seeds: range = SEEDS, *, full: bool = Fa
 
     Profiles change fastest, so that runs which are ended early have met them all.
     """
-    found = profiles(names)
-    drawn = {p: _errors(p) for p in found}
+    found = [variant(board, profile) for profile, board in profiles(names).items()]
+    drawn = {v.profile: _errors(v.profile) for v in found}
     for seed in seeds:
-        for profile, board in found.items():
-            for error_ppm in ERRORS_PPM if full else (drawn[profile][seed - SEEDS.start],):
-                yield _case(board, profile, seed, error_ppm)
+        for v in found:
+            for error_ppm in ERRORS_PPM if full else (drawn[v.profile][seed - SEEDS.start],):
+                yield _case(v, seed, error_ppm)
 
 
 def under_load(names: Iterable[str] = (), seeds: range = LOAD_SEEDS) -> Iterator[Case]:
