@@ -235,7 +235,7 @@ def test_words_the_wrong_way_round_fail(
 
 
 @pytest.mark.parametrize(
-    ("line", "requirement"), [("CLK", "PSA2-FRAME-01"), ("Int", "PSA2-FRAME-09"), ("Int", "PSA2-READ-06")]
+    ("line", "requirement"), [("CLK", "PSA2-FRAME-06"), ("Int", "PSA2-FRAME-09"), ("Int", "PSA2-READ-06")]
 )
 def test_a_missing_pulse_fails(line: str, requirement: str, psa2: Made, tmp_path: Path) -> None:
     wires, end_ns = make.port_lines(psa2), make.span_ns(psa2)
