@@ -207,15 +207,17 @@ class Lanes:
         self._screen = screen
         self._running: list[Run] = []
         self._lock = threading.Lock()
-        self._threads = [threading.Thread(target=self._lane, args=(n,)) for n in range(min(count, len(self._next)))]
+        # Waited for by events: a join() that Ctrl-C interrupts takes the thread for ended ever after.
+        self._done = [threading.Event() for _ in range(min(count, len(self._next)))]
+        self._threads = [threading.Thread(target=self._lane, args=(n,)) for n in range(len(self._done))]
 
     def run(self) -> None:
         """To the last step's end; Ctrl-C ends those that run."""
         try:
             for thread in self._threads:
                 thread.start()
-            for thread in self._threads:
-                thread.join()
+            for done in self._done:
+                done.wait()
         except KeyboardInterrupt:
             signal.signal(signal.SIGINT, signal.SIG_IGN)  # once is enough: what runs is being ended
             signal.signal(signal.SIGTERM, signal.SIG_IGN)
@@ -225,14 +227,22 @@ class Lanes:
             enders = [threading.Thread(target=run.end) for run in running]
             for thread in enders:
                 thread.start()
-            for thread in [*enders, *self._threads]:
+            for thread in enders:
+                thread.join()
+            for thread, done in zip(self._threads, self._done, strict=True):
                 if thread.ident is not None:
-                    thread.join()
+                    done.wait()
             for run in running:
                 self.outcomes.pop(run.outcome.name, None)
             raise
 
     def _lane(self, number: int) -> None:
+        try:
+            self._steps_of(number)
+        finally:
+            self._done[number].set()
+
+    def _steps_of(self, number: int) -> None:
         # make's own flags must not leak into the makes we start. A user-mode kernel keeps to one CPU.
         cpus = sorted(os.sched_getaffinity(0))
         env = {k: v for k, v in os.environ.items() if k not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")} | {
