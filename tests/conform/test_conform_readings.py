@@ -183,6 +183,30 @@ def test_pulses_of_a_pik() -> None:
     fails(pik.signs_have_their_lines, pulses(name="FXN"))
 
 
+def resting(**changed: Sequence[tuple[int, int]]) -> Evidence:
+    """Pulses on FXP from 100 us on, a latch each 10 ms, all else at rest."""
+    moves: dict[str, Sequence[tuple[int, int]]] = {n: [(0, int(n in ("LATCH", "CS", "RW")))] for n in pik.PINS}
+    moves["FXP"] = [(0, 0), *FXP]
+    moves["LATCH"] = [(0, 1), *((t + h, int(h > 0)) for t in (10_000_000, 20_000_000) for h in (0, 10_000))]
+    return evidence("pik6", CanLog(), lines=lines(moves | changed, 25_000_000))
+
+
+FXP = [(t + h, int(not h)) for t in range(100_000, 20_000_000, 400_000) for h in (0, 25_000)]
+
+
+def test_lines_of_a_pik_at_rest() -> None:
+    """A fault shows from the recording's first instant on, as an edge there or as a level."""
+    assert pik.lines_rest_at_their_levels(resting())
+    assert pik.lines_rest_at_their_levels(resting(FXP=[(0, 1), (20_000, 0), *FXP]))  # it begins amid a pulse
+    fails(pik.lines_rest_at_their_levels, resting(FXP=[(0, 0), (0, 1), *((t, 1 - v) for t, v in FXP)]))
+    for name in pik.PINS:
+        level = int(name not in ("LATCH", "CS", "RW"))
+        fails(pik.lines_rest_at_their_levels, resting(**{name: [(0, level)]}))
+        fails(pik.lines_rest_at_their_levels, resting(**{name: [(0, 1 - level), (0, level)]}))
+    with pytest.raises(TooLittle):
+        pik.lines_rest_at_their_levels(resting(FXP=[(0, 0)], LATCH=[(0, 1)]))
+
+
 # ---- gyro
 
 

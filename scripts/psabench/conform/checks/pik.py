@@ -6,7 +6,7 @@ import numpy as np
 
 from psabench.conform.after_res import late_readings
 from psabench.conform.evidence import CanLog, Evidence, LineLog
-from psabench.conform.intervals import before, first_bad, interval, wires_needed
+from psabench.conform.intervals import before, edges, first_bad, interval, wires_needed
 from psabench.conform.limits import row_for
 from psabench.conform.messages import as_laid_out, emergencies, in_turn
 from psabench.conform.outcome import Broken, TooLittle
@@ -383,17 +383,23 @@ def counters_begin_with_res(e: Evidence) -> str:
 @proves("PIK-SIG-01")
 @check("power_on", needs={"pins"})
 def lines_rest_at_their_levels(e: Evidence) -> str:
-    """Look at every line between Res and the first pulse."""
+    """Look at every line before the first pulse or latch that comes when nothing has moved for longer than a pulse."""
     wires_needed(e, *PINS)
-    row = row_for(e, "PIK-SIG-01")
-    first = [int(e.wires.rises(n)[0]) for n in PULSES if len(e.wires.rises(n))] + [
-        int(t) for t in e.wires.falls("LATCH")[:1]
-    ]
-    if not first:
-        raise TooLittle("no pulse and no latch after Res")
-    at = min(first) - 1 - round(e.slack_ns(0.0))
+    row, at = row_for(e, "PIK-SIG-01"), _at_rest_ns(e)
     for name in PINS:
         due = int(row.limits.get(f"{name.lower()}_level", 0))
         if int(e.wires[name].at(at)) != due:
             raise Broken(f"{name} {1 - due} at rest", f"{due}", at_ns=at, lines=(name, *PULSES))
     return f"{len(PINS)} lines at rest"
+
+
+def _at_rest_ns(e: Evidence) -> int:
+    """An instant at which nothing has moved for longer than a pulse lasts, before one begins. Raises TooLittle."""
+    tclk_ns = _tclk_ns(e)
+    moves = np.unique(np.concatenate([edges(e, name) for name in PINS]))
+    begins = np.concatenate([*(edges(e, name) for name in PULSES), e.wires.falls("LATCH")])
+    still = np.diff(moves, prepend=e.wires.start_ns) > tclk_ns + ROUNDED_NS + e.slack_ns(tclk_ns)
+    found = moves[still & np.isin(moves, begins)]
+    if not len(found):
+        raise TooLittle("no pulse and no latch after Res, or too many for the lines to be at rest")
+    return int(found[0]) - 1 - round(e.slack_ns(0.0))
