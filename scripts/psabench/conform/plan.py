@@ -73,6 +73,7 @@ class Plan:
     scene: str
     needs: frozenset[str]  # probes without which it is not observable
     on_recording: str = ""  # the part of a recording that it judges, one of PARTS; "": it wants its scene
+    boards: frozenset[str] = frozenset()  # families that it is for; none: all that have its requirements
 
     @property
     def is_trial(self) -> bool:
@@ -92,17 +93,20 @@ _plans: dict[Callable[..., str], Plan] = {}
 _scenes: list[Scene] = []
 
 
-def check(scene: str, *, needs: Iterable[str] = ("can",), on_recording: str | None = None) -> Callable[[Check], Check]:
+def check(
+    scene: str, *, needs: Iterable[str] = ("can",), on_recording: str | None = None, boards: Iterable[str] = ()
+) -> Callable[[Check], Check]:
     """A pure test of the evidence of this scene. Raises ValueError for a need or a part that there is not.
 
     on_recording: the part of a recording that it judges, that of its scene (SCENE_ON_RECORDING) where it is not said.
+    boards: families that have the scene, where requirements of others, too, are proved, which have another test.
     """
     part = SCENE_ON_RECORDING.get(scene, "") if on_recording is None else on_recording
     if part not in PARTS:
         raise ValueError(f"on_recording is {part!r}; there are {', '.join(map(repr, PARTS))}")
 
     def register(test: Check) -> Check:
-        _plans[test] = Plan(scene=scene, needs=_ways(needs), on_recording=part)
+        _plans[test] = Plan(scene=scene, needs=_ways(needs), on_recording=part, boards=frozenset(boards))
         return test
 
     return register

@@ -17,7 +17,6 @@ from psabench.conform.proof import Proof, proofs
 from psabench.conform.requirements import Requirement, requirements
 from psabench.conform.subject import Subject
 from psabench.conform.variant import Variant
-from psabench.devices import BOARDS
 from psabench.errors import BenchError, DeviceError
 from psabench.procedures.head_bench import Progress
 
@@ -81,25 +80,18 @@ class Stage:
 
 
 def wanted(variant: Variant, only: Sequence[str] = ()) -> list[tuple[Proof, tuple[Requirement, ...]]]:
-    """Tests with those of their requirements that hold for a variant; only: ids, or beginnings of ids."""
+    """Tests for a variant with those of their requirements that hold for it; only: ids, or beginnings of ids."""
     rows = requirements().rows
     found = []
     for proof in proofs():
+        boards = plan_of(proof.test).boards
+        if boards and variant.family not in boards:
+            continue
         mine = tuple(rows[i] for i in proof.ids if rows[i].applies(variant.board, variant.profile))
         if mine and (not only or any(i.startswith(tuple(only)) for i in proof.ids)):
             found.append((proof, mine))
     order = list(scenes(variant.family))
     return sorted(found, key=lambda t: _turn(plan_of(t[0].test), order))
-
-
-def _playable(
-    tests: list[tuple[Proof, tuple[Requirement, ...]]], variant: Variant
-) -> list[tuple[Proof, tuple[Requirement, ...]]]:
-    """Without the checks of scenes that other boards have, where a test at hand shows the same requirements."""
-    elsewhere = {name for family in BOARDS for name in scenes(family)} - set(scenes(variant.family))
-    here = [plan_of(proof.test).is_trial or plan_of(proof.test).scene not in elsewhere for proof, _ in tests]
-    shown = {r.id for (_, mine), h in zip(tests, here, strict=True) if h for r in mine}
-    return [t for t, h in zip(tests, here, strict=True) if h or not shown >= {r.id for r in t[1]}]
 
 
 def _turn(plan: Plan, order: Sequence[str]) -> int:
@@ -119,7 +111,7 @@ def run(
     """Judge everything; told: of each outcome as it comes."""
     stage = Stage(subject, clock_ppm, keep)
     outcomes: list[Outcome] = []
-    tests = _playable(wanted(subject.variant, only), subject.variant)
+    tests = wanted(subject.variant, only)
     with progress.step(subject.variant.name, max(1, len(tests))) as advance:
         for proof, rows in tests:
             outcomes.append(_judged(stage, proof, rows))

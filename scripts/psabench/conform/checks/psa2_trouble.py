@@ -124,7 +124,7 @@ def axes_go_on_without_temperatures(e: Evidence) -> str:
 
 
 @proves("BUS-EMCY-04")
-@check("trouble")
+@check("trouble", boards=("psa2",))
 def the_history_has_the_latest_first(e: Evidence) -> str:
     """Compare 1003h with the emergencies of different codes that came."""
     due = [f.data[:2] for f in reversed(emcys(e)) if f.data[:2] != b"\0\0"]
