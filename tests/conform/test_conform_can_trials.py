@@ -235,6 +235,29 @@ def test_a_trial_notices_its_fault(board: Subject, monkeypatch: pytest.MonkeyPat
         print(trial(board))
 
 
+def early_cycles(m: can.Message) -> list[can.Message]:
+    return [changed(m, bytes(m.data), -0.0008 if m.data[1:3] == b"\2\x20" else 0.0)]
+
+
+OFF: list[tuple[Trial, Rule]] = [
+    (can_nmt.a_new_period_holds_at_once, of("heartbeat", late(0.002))),
+    (can_sdo.a_silent_client_is_given_up, of("sdo_tx", late(0.002))),
+    (can_pdo.the_inhibit_time_keeps_tpdos_apart, of("pdo", late(-0.002))),
+    (can_cycles.the_answer_waits_for_the_strobe, of("sdo_tx", early_cycles)),
+]
+
+
+@pytest.mark.parametrize(("trial", "rule"), OFF, ids=[t.__name__ for t, _ in OFF])
+def test_clocks_may_lie_as_far_apart_as_the_run_allows(
+    bus_board: Subject, monkeypatch: pytest.MonkeyPatch, trial: Trial, rule: Rule
+) -> None:
+    tampered(monkeypatch, rule)
+    with pytest.raises(Broken):
+        trial(bus_board)
+    monkeypatch.setattr(bus_board, "allowed_ppm", 50_000.0)
+    assert trial(bus_board)
+
+
 CYCLES: list[tuple[Trial, Rule]] = [
     (can_cycles.an_object_is_a_cycle, answers(0x2002, lambda d: d[:4] + bytes([d[4] ^ 1]) + d[5:])),
     (can_cycles.the_answer_waits_for_the_strobe, answers(0x2002, lambda d: b"\x80" + d[1:])),

@@ -191,8 +191,7 @@ class Evidence:
     def slack_ns(self, interval_ns: float, edges: int = 2) -> float:
         """How far an interval between two edges may seem off: resolution of the edges, clocks that differ."""
         resolution_ns = 0.0 if self.lines is None else self.lines.resolution_ns
-        slow = self.clock_ppm * PPM / (1.0 - self.clock_ppm * PPM)  # of the two the farther: a clock that is slow
-        return edges / 2 * resolution_ns + abs(interval_ns) * slow
+        return edges / 2 * resolution_ns + apart(interval_ns, self.clock_ppm)
 
     def frames_of(self, name: str) -> CanLog:
         """Frames of a message of the DBC that this board sent."""
@@ -205,6 +204,11 @@ class Evidence:
     def with_lines(self, lines: LineLog | None) -> Evidence:
         """The same with other lines."""
         return replace(self, lines=lines)
+
+
+def apart(interval: float, clock_ppm: float) -> float:
+    """How far an interval may seem off between clocks that differ by as much; the farther of the two: one is slow."""
+    return abs(interval) * clock_ppm * PPM / (1.0 - clock_ppm * PPM)
 
 
 def joined(logs: Sequence[CanLog]) -> CanLog:

@@ -52,7 +52,6 @@ class Stage:
     """The subject and what its scenes have shown so far."""
 
     subject: Subject
-    clock_ppm: float
     keep: Keep
     shown: dict[str, Evidence | Exception] = field(default_factory=dict)
 
@@ -74,7 +73,7 @@ class Stage:
                 found = known[name].make(self.subject)
                 if found.lines is None or not len(found.lines.gaps_ns):
                     break  # else samples were lost on their way, and nobody can tell what they were
-            return replace(found, clock_ppm=self.clock_ppm)
+            return found
         except (BenchError, Broken, TooLittle) as e:
             return e
 
@@ -108,8 +107,9 @@ def run(
     told: Callable[[Outcome], None] = lambda _: None,
     keep: Keep = lambda *_: (),
 ) -> list[Outcome]:
-    """Judge everything; told: of each outcome as it comes."""
-    stage = Stage(subject, clock_ppm, keep)
+    """Judge everything; told: of each outcome as it comes. clock_ppm: allowed to all clocks."""
+    subject.allowed_ppm = clock_ppm
+    stage = Stage(subject, keep)
     outcomes: list[Outcome] = []
     tests = wanted(subject.variant, only)
     with progress.step(subject.variant.name, max(1, len(tests))) as advance:

@@ -18,7 +18,7 @@ from typing import Any
 from psabench.bench import Bench
 from psabench.busport import BusPort, Cycle
 from psabench.can_host import CanHost, Message
-from psabench.conform.evidence import CanFrame, CanLog, Evidence, LineLog, Marks
+from psabench.conform.evidence import CanFrame, CanLog, Evidence, LineLog, Marks, apart
 from psabench.conform.probes import LineProbe, PinProbe, PortProbe
 from psabench.conform.variant import Variant
 from psabench.devices import of_board
@@ -107,6 +107,7 @@ class Subject:
             raise BadInput(f"no {kind.title} answers on this bus; boards there: {there}")
         self.unit: Unit = found
         self.node = found.node.node_id
+        self.allowed_ppm = 100.0  # how far the board's clocks and the recorder's may lie apart: a run says it
         self.recorder_rate = 1.0  # seconds of its clock in one of the bench; an emulator's may be set off
         self._stack = ExitStack()
         self._never_ready = False
@@ -182,7 +183,11 @@ class Subject:
             if looking and self.probe is not None:
                 take.lines = self.probe.stop().by_clock(self.recorder_rate)
 
-    def evidence(self, scene: str, take: Take, *, clock_ppm: float = 100.0) -> Evidence:
+    def slack_s(self, interval_s: float) -> float:
+        """How far an interval may seem off, by clocks that differ."""
+        return apart(interval_s, self.allowed_ppm)
+
+    def evidence(self, scene: str, take: Take) -> Evidence:
         """Of a take that has ended."""
         return Evidence(
             variant=self.variant,
@@ -194,7 +199,7 @@ class Subject:
             marks=Marks(at_s=dict(take.marks)),
             facts=dict(take.facts),
             inputs_v=self.inputs_v,
-            clock_ppm=clock_ppm,
+            clock_ppm=self.allowed_ppm,
         )
 
     def run_for(self, dwell_s: float) -> None:

@@ -97,7 +97,7 @@ def the_answer_waits_for_the_strobe(s: Subject) -> str:
         before = t.answer_to(write(STROBE_NS, 0, LONG_NS.to_bytes(4, "little")))
         after = t.answer_to(_read(quiet(s)))
     took_s = after.t_s - before.t_s
-    if after.data[0] == ABORT or took_s < LONG_NS * 1e-9 * (1 - 100e-6):
+    if after.data[0] == ABORT or took_s < LONG_NS * 1e-9 - s.slack_s(LONG_NS * 1e-9):
         raise Broken(f"{words(after.data)} {took_s:.6f} s later", f"its word after {LONG_NS * 1e-9} s", frames=[after])
     return f"answered {took_s * 1e3:.3f} ms after the strobe was set to {LONG_NS * 1e-6:g} ms"
 

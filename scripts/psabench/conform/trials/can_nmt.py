@@ -397,7 +397,7 @@ def a_new_period_holds_at_once(s: Subject) -> str:
         raise Broken(f"{len(came) - 1} heartbeats with a period of {NEW_BEAT_MS} ms", "one in each")
     for a, b in itertools.pairwise(came):
         off_s = b.t_s - a.t_s - period_s
-        if abs(off_s) > late_s + period_s * 100e-6:
+        if abs(off_s) > late_s + s.slack_s(period_s):
             raise Broken(
                 f"a heartbeat {b.t_s - a.t_s:.6f} s after the one before or the write", f"{period_s} s", frames=came
             )

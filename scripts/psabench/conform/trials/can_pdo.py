@@ -223,7 +223,7 @@ def the_inhibit_time_keeps_tpdos_apart(s: Subject) -> str:
         left_out = after[1][0] - before[1][0]
         least, most = after[0][0] - before[2][0], after[2][0] - before[0][0]  # readings, by looks within and around
     apart_s = [b.t_s - a.t_s for a, b in itertools.pairwise(came)]
-    if min(apart_s) < INHIBIT_S * (1 - 100e-6) - late_s:
+    if min(apart_s) < INHIBIT_S - s.slack_s(INHIBIT_S) - late_s:
         raise Broken(f"{min(apart_s):.6f} s between two frames {can_id:03X}h", f"{INHIBIT_S:g} s and more", frames=came)
     if not least - 2 <= len(came) + left_out <= most + 2:
         raise Broken(f"{len(came)} sent, {left_out} left out of {least} to {most} readings", "each sent or counted")

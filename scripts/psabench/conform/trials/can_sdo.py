@@ -172,7 +172,7 @@ def a_silent_client_is_given_up(s: Subject) -> str:
             if frame is None or frame.data != abort:
                 raise Broken(words(frame.data) if frame else "nothing", words(abort), frames=[frame] if frame else [])
             waited.append(frame.t_s - begun.t_s)
-            if abs(waited[-1] - due_s) > late_s + due_s * 100e-6:
+            if abs(waited[-1] - due_s) > late_s + s.slack_s(due_s):
                 raise Broken(
                     f"given up after {waited[-1]:.6f} s", f"{due_s:g} s +- {late_s * 1e3:g} ms", frames=[begun, frame]
                 )
