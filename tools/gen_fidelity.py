@@ -36,9 +36,9 @@ or a real unit's report, and what happens when a model changes: [docs/evidence.m
 LADDER = """Of a statement, E0 to E2 say where it comes from. Of its evidence, the rung says how far from our own hand
 it was proved: the highest one on which a test of the row stands. *Own tests* are ours, of our own code; the runs of the
 conformance suite are among them."""
-ROWS = """Requirements of the boards ([docs/requirements.md](docs/requirements.md)), then the rows of the chips' tables
-(docs/chips) that are modelled or simplified. A row of *own tests* that says E2 has our word that a figure of the data
-sheet is met; one in column E2 has it measured."""
+ROWS = """Requirements of the boards and of a host ([docs/requirements.md](docs/requirements.md)), those common to all
+boards counted for each; then the rows of the chips' tables (docs/chips) that are modelled or simplified. A row of *own
+tests* that says E2 has our word that a figure of the data sheet is met; one in column E2 has it measured."""
 STALE = (
     """A group is stale when one of its files has changed, comments and blanks apart, since its tests last passed."""
 )
@@ -51,6 +51,8 @@ NAMES = {
     "psd1": "PSD-1",
     "pmka": "PMKA",
     "pik": "PIK",
+    "pik5": "PIK-5",
+    "pik6": "PIK-6",
     "gyro": "gyro unit",
     "host": "a host",
 }
@@ -81,10 +83,10 @@ def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> Iterator[str
 
 
 def board_rows(reqs: Requirements, suite: Mapping[str, object]) -> dict[str, list[Row]]:
-    """Requirements of each board; "host" and the like are boards of the requirements, too."""
-    found: dict[str, list[Row]] = {board: [] for board in reqs.boards}
+    """Requirements of each board; those of a host, whatever board it listens to, are of "host"."""
+    found: dict[str, list[Row]] = {board: [] for board in [*reqs.boards, "host"]}
     for r in reqs:
-        for board in r.boards:
+        for board in ("host",) if r.group == "host" else r.boards:
             found[board].append(Row(r.grade, r.proved_by, r.id in suite))
     return {board: rows for board, rows in found.items() if rows}
 
@@ -153,7 +155,7 @@ def absences(root: Path) -> Iterator[str]:
     for page in sorted((root / "docs/boards").glob("*.md")):
         found = list(not_modelled(page.read_text(encoding="utf-8")))
         if found:
-            yield f"**[{page.stem.upper()}](docs/boards/{page.name})**: {'; '.join(found)}."
+            yield f"**[{NAMES.get(page.stem, page.stem)}](docs/boards/{page.name})**: {'; '.join(found)}."
             yield ""
     for chip, title in CHIPS.items():
         rows = chip_rows(root, chip)
