@@ -57,7 +57,7 @@ WRONG_CAN: Mapping[str, Sequence[Bad]] = {
     "tstamp_is_the_fall_of_drd_a": [signal("PSA2_ZT", "TSTAMP", lambda v: v + 1)],
     "samples_come_whole": [gone("PSA2_XY", 5)],
     "overrun_tells_of_lost_conversions": [signal("PSA2_ZT", "OVERRUN", lambda v: 1, 60), dropped],
-    "frames_are_counted": [counted(1, 9), counted(1, -9)],
+    "frames_are_counted": [counted(1, 5), counted(1, -2)],
     "overruns_are_counted": [counted(2, 1), signal("PSA2_ZT", "OVERRUN", lambda v: 1, 60)],
     "seq_begins_with_0": [signal("PSA2_XY", "SEQ", lambda v: v + 1), gone("HEARTBEAT")],
     "channels_take_turns": [signal("PSA2_ZT", "CHANNEL", lambda v: v ^ 1), signal("PSA2_ZT", "T_NEW", lambda v: 0)],

@@ -227,10 +227,6 @@ def _counted(e: Evidence, sub: int) -> int:
     return number(after[sub]) - number(before[sub])
 
 
-ON_ITS_WAY = 1  # sample that is counted before an answer and comes after it: a PDO follows its frame within a period
-TOLD_LATE = 3  # samples, at most, from an overrun to the PDO that tells it
-
-
 def _meanwhile(e: Evidence, sub: int) -> Evidence:
     """The log between the two answers that told a counter: the bus has them in their order, whoever was late."""
     answer, what = int(row_for(e, "BUS-ID-01").limit("sdo_tx_id")) + e.node, bytes([0x30, 0x20, sub])
@@ -244,9 +240,10 @@ def frames_are_counted(e: Evidence) -> str:
     """Compare the counter of frames with SEQ."""
     p, counted = pairs(_meanwhile(e, FRAMES)), _counted(e, FRAMES)
     span = int((p.seq[-1] - p.seq[0]) % (1 << SEQ_BITS)) + 1
-    edge = int(row_for(e, "PSA2-CNT-01").limit("edge_max_frames"))
-    if not span - ON_ITS_WAY <= counted <= span + edge:
-        raise Broken(f"{counted} frames counted, {span} by SEQ", f"as many, and up to {edge} at the ends")
+    row = row_for(e, "PSA2-CNT-01")
+    fewer, more = int(row.limit("on_its_way_max_frames")), int(row.limit("edge_max_frames"))
+    if not span - fewer <= counted <= span + more:
+        raise Broken(f"{counted} frames counted, {span} by SEQ", f"{fewer} less to {more} more, at the ends")
     return f"{counted} frames counted, {span} by SEQ"
 
 
@@ -255,7 +252,8 @@ def frames_are_counted(e: Evidence) -> str:
 def overruns_are_counted(e: Evidence) -> str:
     """Compare the counter of overruns with OVERRUN."""
     counted = _counted(e, OVERRUNS)
-    told = int(pairs(_meanwhile(e, OVERRUNS)).overrun[TOLD_LATE:].sum())  # the first were counted before
+    late = int(row_for(e, "PSA2-CNT-02").limit("told_late_max_frames"))  # those were counted before
+    told = int(pairs(_meanwhile(e, OVERRUNS)).overrun[late:].sum())
     if counted < told or (counted and not pairs(e).overrun.any()):
         raise Broken(f"{counted} overruns counted, {told} told by OVERRUN", "as many")
     return f"{counted} overruns counted, {told} told by OVERRUN"
