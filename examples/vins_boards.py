@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Iterable
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from psabench.busport import BusPort
@@ -133,14 +133,21 @@ class PmkaIntegrals:
             tell(reading=int(row["SEQ"]), x=x, y=y, z=z)
 
 
+class Taker(Protocol):
+    """What becomes of the readings."""
+
+    def take(self, r: Readings) -> None: ...
+    def end(self) -> None: ...
+
+
 def on_can(board: str, address: str, node: int) -> None:
     with CanHost(open_bus(address), WallClock()) as bus:
-        unit = {"psd1": Psd1, "pmka": Pmka}.get(board, Pik)(bus, node)
+        kind: type[Psd1 | Pmka | Pik] = Psd1 if board == "psd1" else Pmka if board == "pmka" else Pik
+        unit = kind(bus, node)
         unit.serial()  # who is there
-        taker = {
-            "psd1": Psd1Words,
-            "pmka": lambda: PmkaIntegrals(est.rom_of(unit.rom_words())),
-        }.get(board, PikSums)()
+        taker: Taker = Psd1Words() if isinstance(unit, Psd1) else PikSums()
+        if isinstance(unit, Pmka):
+            taker = PmkaIntegrals(est.rom_of(unit.rom_words()))
         unit.frames.forget()
         unit.start()
         try:
