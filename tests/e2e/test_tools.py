@@ -201,7 +201,7 @@ def test_candump_sees_as_many_frames_as_the_emulator_sent(make_rig: MakeRig) -> 
     with candump(rig) as rows:
         before = rig.clients()[0]["delivered"]
         rig.unit.start()
-        for _ in range(20):
+        while rig.clients()[0]["delivered"] <= before + 2000:  # however fast this machine is
             rig.host.advance(0.05)
         rig.unit.stop()
         sent = rig.clients()[0]["delivered"] - before
@@ -209,7 +209,7 @@ def test_candump_sees_as_many_frames_as_the_emulator_sent(make_rig: MakeRig) -> 
         until_end = itertools.takewhile(lambda row: row[0] != "7FE", rows)
         hosts = {"000", "605", "7FF"}  # our own requests, which the emulator took and did not send
         seen = [row for row in until_end if row[0] not in hosts]
-    assert len(seen) == sent > 2000
+    assert len(seen) == sent
     assert seen == [(f"{i:03X}", d.hex().upper()) for i, d in contents(ours) if i not in (0x000, 0x605, 0x7FF)]
 
 
