@@ -8,10 +8,12 @@ Usage:
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -70,13 +72,36 @@ def _checked(row: Row, rest: Mapping[str, Any]) -> None:
         raise ValueError(f"{where}: no requirements of that board: {', '.join(strange)}")
 
 
+def places(points: tuple[str, ...]) -> str:
+    """As the page's other tables: `UNIT.line.CS\\|D0..15`, in the order of the points."""
+    found: dict[str, list[str]] = {}
+    for point in points:
+        where, _, name = re.sub(r"^a\.", "UNIT.", point).rpartition(".")
+        found.setdefault(where, []).append(name)
+    return ", ".join(f"`{'.'.join(filter(None, (w, _short(names))))}`" for w, names in found.items())
+
+
+def _short(names: list[str]) -> str:
+    """With D0..2 for D0, D1, D2."""
+    parts: list[str] = []
+    for (stem, _), run in groupby(enumerate(names), lambda at: _numbered(*at)):
+        those = [name for _, name in run]
+        parts += [f"{those[0]}..{those[-1].removeprefix(stem)}"] if len(those) > 2 else those
+    return "\\|".join(parts)
+
+
+def _numbered(place: int, name: str) -> tuple[str, int]:
+    """The same for names at places that follow each other as their numbers do."""
+    m = re.fullmatch(r"(\D+)(\d+)", name)
+    return (m[1], int(m[2]) - place) if m else (name, 0)
+
+
 def table() -> str:
     """For the page: a line for each row."""
     lines = ["| board | fault | at | requirements that fail |", "|---|---|---|---|"]
     for r in load():
-        at = ", ".join(f"`{p.replace('a.', 'UNIT.', 1) if p.startswith('a.') else p}`" for p in r.at)
         found = ", ".join(sorted(r.breaks)) or (f"none: {r.unseen}" if r.unseen else f"not found: {r.open}")
-        lines.append(f"| {r.board} | `{r.kind}` | {at} | {found} |")
+        lines.append(f"| {r.board} | `{r.kind}` | {places(r.at)} | {found} |")
     return "\n".join(lines)
 
 
