@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from psabench.conform.checks import gyro, pik, pmka_lines, pmka_readings
+from psabench.conform.checks import gyro, gyro_modes, pik, pmka_lines, pmka_readings
 from psabench.conform.checks.pik import MESSAGES as PIK_MESSAGES
 from psabench.conform.evidence import CanFrame, CanLog, Evidence, LineLog
 from psabench.conform.gyro_readings import MESSAGES as GYRO_MESSAGES
@@ -275,14 +275,14 @@ def turns(ways: Sequence[Sequence[float]], ends: Sequence[float], *, moves_deg: 
 
 def test_turns_of_a_gyro_unit() -> None:
     good = turns([gimbal(10, 80), gimbal(90, 180), gimbal(-90, 90)], [90.0, 270.0, 0.0])
-    assert gyro.turns_take_the_shorter_way(good)
-    assert gyro.a_turn_ends_at_its_angle_and_holds(good)
-    fails(gyro.turns_take_the_shorter_way, turns([gimbal(10, -280)], [90.0]))
-    fails(gyro.turns_take_the_shorter_way, turns([gimbal(90, -180)], [270.0]))  # of two alike the positive one
-    fails(gyro.turns_take_the_shorter_way, turns([gimbal(10, 80, dps=10.5)], [90.0]))
-    fails(gyro.turns_take_the_shorter_way, turns([gimbal(10, 80, dps2=25.0)], [90.0]))
-    fails(gyro.a_turn_ends_at_its_angle_and_holds, turns([gimbal(10, 79)], [90.0]))
-    fails(gyro.a_turn_ends_at_its_angle_and_holds, turns([gimbal(10, 80)], [90.0], moves_deg=1.0))
+    assert gyro_modes.turns_take_the_shorter_way(good)
+    assert gyro_modes.a_turn_ends_at_its_angle_and_holds(good)
+    fails(gyro_modes.turns_take_the_shorter_way, turns([gimbal(10, -280)], [90.0]))
+    fails(gyro_modes.turns_take_the_shorter_way, turns([gimbal(90, -180)], [270.0]))  # of two alike the positive one
+    fails(gyro_modes.turns_take_the_shorter_way, turns([gimbal(10, 80, dps=10.5)], [90.0]))
+    fails(gyro_modes.turns_take_the_shorter_way, turns([gimbal(10, 80, dps2=25.0)], [90.0]))
+    fails(gyro_modes.a_turn_ends_at_its_angle_and_holds, turns([gimbal(10, 79)], [90.0]))
+    fails(gyro_modes.a_turn_ends_at_its_angle_and_holds, turns([gimbal(10, 80)], [90.0], moves_deg=1.0))
 
 
 def test_u2_of_a_gyro_unit_that_holds() -> None:
@@ -313,8 +313,8 @@ def test_a_gyro_unit_that_begins_tilted() -> None:
                 rows += [("GYRO_RATES", {}), ("GYRO_ANGLES", mode), ("GYRO_LEVEL", {"BETA": round(b / 2e-6)})]
         return evidence("gyro", log("gyro", rows))
 
-    assert gyro.a_window_waits_for_the_level(tilted(0.08))
-    fails(gyro.a_window_waits_for_the_level, tilted(0.09))
+    assert gyro_modes.a_window_waits_for_the_level(tilted(0.08))
+    fails(gyro_modes.a_window_waits_for_the_level, tilted(0.09))
 
 
 def test_a_heading_of_a_gyro_unit() -> None:
@@ -322,9 +322,9 @@ def test_a_heading_of_a_gyro_unit() -> None:
         facts = {"drift_degph": 25.0, "moved_deg": moved_deg, "moved_s": 36.0, "free_deg": free_deg, "free_s": 3.6}
         return evidence("gyro", CanLog(), facts=facts)
 
-    assert gyro.navigation_keeps_the_azimuth(kept(0.0005, 0.025))
-    fails(gyro.navigation_keeps_the_azimuth, kept(0.002, 0.025))
-    fails(gyro.navigation_keeps_the_azimuth, kept(0.0, 0.0))  # a heading that stands still
+    assert gyro_modes.navigation_keeps_the_azimuth(kept(0.0005, 0.025))
+    fails(gyro_modes.navigation_keeps_the_azimuth, kept(0.002, 0.025))
+    fails(gyro_modes.navigation_keeps_the_azimuth, kept(0.0, 0.0))  # a heading that stands still
 
 
 def saturated(told: int = 20, over_s: float = 0.15) -> Evidence:
@@ -366,11 +366,11 @@ def checks_of(module: Any) -> list[Test]:
     return [f for f in found if f.__module__ == module.__name__ and f.__code__.co_argcount == 1]
 
 
-@pytest.mark.parametrize("check", [f for m in (pmka_readings, gyro, pik) for f in checks_of(m)])
+@pytest.mark.parametrize("check", [f for m in (pmka_readings, gyro, gyro_modes, pik) for f in checks_of(m)])
 @pytest.mark.parametrize("what", ["nothing", "wrong lengths"])
 def test_nothing_and_wrong_lengths_are_no_pass_and_no_crash(check: Test, what: str) -> None:
     module = check.__module__.rpartition(".")[2]
-    board = {"pmka_readings": "pmka_drift", "gyro": "gyro", "pik": "pik6"}[module]
+    board = {"pmka_readings": "pmka_drift", "gyro": "gyro", "gyro_modes": "gyro", "pik": "pik6"}[module]
     family = {"pmka_drift": "pmka", "pik6": "pik6"}.get(board, board)
     names = {"pmka": ("PMKA_CODES", "PMKA_STATE"), "gyro": GYRO_MESSAGES, "pik6": PIK_MESSAGES}[family]
     ids = [int(message(n).frame_id) for n in names]

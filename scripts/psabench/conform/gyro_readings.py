@@ -43,6 +43,9 @@ def vertical_degph(latitude_deg: float) -> float:
     return EARTH_DEGPH * float(np.sin(np.radians(latitude_deg)))
 
 
-def wrapped(angle_deg: Floats) -> Floats:
-    """Into half turns."""
-    return np.asarray((angle_deg + 180.0) % 360.0 - 180.0, np.float64)
+def setting(e: Evidence, name: str) -> float:
+    """A setting of the unit, or what else the scene has read. Raises TooLittle."""
+    value = e.facts.get(name)
+    if not isinstance(value, int | float):
+        raise TooLittle(f"{name} is not known")
+    return float(value)

@@ -1,4 +1,4 @@
-"""The gyro unit: readings, level angles, laws of its loops, runs, flags (docs/protocol_gyro.md)."""
+"""The gyro unit: readings, level angles, laws of its loops, flags, lines (docs/protocol_gyro.md)."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from psabench.angles import wrapped_deg
 from psabench.conform.after_res import late_readings
 from psabench.conform.evidence import CanLog, Evidence
-from psabench.conform.gyro_readings import EARTH_DEGPH, EMCY, MESSAGES, columns, vertical_degph, wrapped
+from psabench.conform.gyro_readings import EARTH_DEGPH, EMCY, MESSAGES, columns, setting, vertical_degph
 from psabench.conform.intervals import interval, wires_needed
 from psabench.conform.limits import row_for
 from psabench.conform.messages import as_laid_out, emergencies, in_turn
@@ -22,17 +23,7 @@ from psabench.signals import Floats, layout
 LINES = ("STEP", "READY", "SLEW", "SETTLE", "WINDOW", "FAULT")
 PHASES = {"SLEW": Phase.SLEWING, "SETTLE": Phase.SETTLING, "WINDOW": Phase.WINDOW}
 US = 1e3
-LEAST = 20  # readings that a judgement wants
-ACCEL_OVER_S = 0.3  # rates so far apart give an acceleration: the encoder has an error that goes with its angle
 LIMITS = ("GYRO-LAW-05", "GYRO-LAW-06")
-
-
-def _number(e: Evidence, name: str) -> float:
-    """A setting that the scene has read. Raises TooLittle."""
-    value = e.facts.get(name)
-    if not isinstance(value, int | float):
-        raise TooLittle(f"{name} is not known")
-    return float(value)
 
 
 @proves("GYRO-CAN-01")
@@ -74,7 +65,7 @@ def messages_have_their_lengths(e: Evidence) -> str:
 
 def _codes(e: Evidence) -> tuple[np.ndarray, Floats]:
     """SEQ (n,) and volts X, Y (n, 2) of the level unit's frames."""
-    node = int(_number(e, "level_node"))
+    node = int(setting(e, "level_node"))
     log = e.can.of_id(int(message("PSA2_XY").frame_id) - dbc_node("psa2") + node)
     if len(log) < 20:
         raise TooLittle(f"{len(log)} frames of the level unit came")
@@ -94,8 +85,8 @@ def level_angles_follow_from_the_codes(e: Evidence) -> str:
     row, c = row_for(e, "GYRO-LEV-01"), columns(e)
     seq, volts = _codes(e)
     place = {int(s): k for k, s in enumerate(seq)}
-    zero = np.array([_number(e, "zero_x_v"), _number(e, "zero_y_v")])
-    scale = np.array([_number(e, "scale_x_v_per_g"), _number(e, "scale_y_v_per_g")])
+    zero = np.array([setting(e, "zero_x_v"), setting(e, "zero_y_v")])
+    scale = np.array([setting(e, "scale_x_v_per_g"), setting(e, "scale_y_v_per_g")])
     last, worst, count = c["LEVEL_SEQ"].astype(np.int64), 0.0, 0
     for k in range(1, len(last)):
         a, b = place.get(int(last[k - 1])), place.get(int(last[k]))
@@ -120,7 +111,7 @@ def level_angles_follow_from_the_codes(e: Evidence) -> str:
 @check("run", needs={"can"})
 def level_seq_is_that_of_the_last_frame(e: Evidence) -> str:
     """Compare LEVEL_SEQ with the frames of the level unit that passed before the reading."""
-    node = int(_number(e, "level_node"))
+    node = int(setting(e, "level_node"))
     theirs = int(message("PSA2_XY").frame_id) - dbc_node("psa2") + node
     mine = int(message("GYRO_LEVEL").frame_id) - dbc_node("gyro") + e.node
     scale, latest, count = layout(message("PSA2_XY"))["SEQ"], None, 0
@@ -160,7 +151,7 @@ def u1_levels(e: Evidence) -> str:
     c = columns(e)
     mine = _steady(c, Mode.GYROCOMPASS, (Phase.SETTLING, Phase.WINDOW)) | _steady(c, Mode.LEVEL, (Phase.IDLE,))
     b, g = np.radians(c["BETA"]), np.radians(c["GAMMA"])
-    due = -_number(e, "m1_per_s") * c["BETA"] * 3600 - vertical_degph(_number(e, "latitude_deg")) * np.cos(b) * np.sin(
+    due = -setting(e, "m1_per_s") * c["BETA"] * 3600 - vertical_degph(setting(e, "latitude_deg")) * np.cos(b) * np.sin(
         g
     )
     return _as_the_law(c["U1"], due, mine & (c["SATURATED"] == 0), row_for(e, "GYRO-LAW-01").limit("tolerance_degph"))
@@ -176,8 +167,8 @@ def u2_holds_the_gimbal(e: Evidence) -> str:
     mine = _steady(c, Mode.GYROCOMPASS, (Phase.WINDOW,)) & (c["SATURATED"] == 0)
     k = np.clip(c["POSITION"].astype(np.int64) - 1, 0, len(positions) - 1)
     b, g = np.radians(c["BETA"]), np.radians(c["GAMMA"])
-    wz, m2 = vertical_degph(_number(e, "latitude_deg")), _number(e, "m2_per_s")
-    due = -m2 * wrapped(c["ENCODER"] - np.array(positions)[k]) * 3600 + wz * np.cos(b) * np.cos(g)
+    wz, m2 = vertical_degph(setting(e, "latitude_deg")), setting(e, "m2_per_s")
+    due = -m2 * wrapped_deg(c["ENCODER"] - np.array(positions)[k]) * 3600 + wz * np.cos(b) * np.cos(g)
     for at in range(len(positions)):
         here = mine & (k == at)
         if here.any():
@@ -198,8 +189,8 @@ def u2_turns_with_the_earth(e: Evidence) -> str:
     if (c["MODE"] != Mode.HOLD).any():
         raise TooLittle("another mode than 2")
     b, g = np.radians(c["BETA"]), np.radians(c["GAMMA"])
-    moved = wrapped(c["ENCODER"] - c["ENCODER"][0])
-    m2 = _number(e, "m2_per_s")
+    moved = wrapped_deg(c["ENCODER"] - c["ENCODER"][0])
+    m2 = setting(e, "m2_per_s")
     law = -m2 * moved * 3600 + wz * np.cos(b) * np.cos(g)
     most = row.limit("tolerance_degph") + m2 * row.limit("encoder_step_arcsec")
     return _as_the_law(c["U2"], law + np.median(c["U2"] - law), np.ones(len(law), bool), most)
@@ -211,7 +202,7 @@ def u2_runs_free_when_it_levels(e: Evidence) -> str:
     """Compute U2 of readings in mode 1."""
     c = columns(e)
     b, g = np.radians(c["BETA"]), np.radians(c["GAMMA"])
-    due = vertical_degph(_number(e, "latitude_deg")) * np.cos(b) * np.cos(g)
+    due = vertical_degph(setting(e, "latitude_deg")) * np.cos(b) * np.cos(g)
     return _as_the_law(
         c["U2"], due, _steady(c, Mode.LEVEL, (Phase.IDLE,)), row_for(e, "GYRO-LAW-03").limit("tolerance_degph")
     )
@@ -242,9 +233,9 @@ def windows_show_the_rate_of_the_earth(e: Evidence) -> str:
             raise TooLittle(f"no window at position {k}")
         q = np.radians(float(c["ENCODER"][mine].mean()))
         rows.append([np.sin(q), np.cos(q), 1.0])
-        s.append(-_number(e, "m1_per_s") * float(c["BETA"][mine].mean()) * 3600)
+        s.append(-setting(e, "m1_per_s") * float(c["BETA"][mine].mean()) * 3600)
     a, b, _ = np.linalg.lstsq(np.array(rows), np.array(s), rcond=None)[0]
-    saw, due = float(np.hypot(a, b)), EARTH_DEGPH * float(np.cos(np.radians(_number(e, "latitude_deg"))))
+    saw, due = float(np.hypot(a, b)), EARTH_DEGPH * float(np.cos(np.radians(setting(e, "latitude_deg"))))
     if abs(saw - due) > row.limit("tolerance_degph"):
         raise Broken(f"{saw:.4f} deg/h", f"{due:.4f} +- {row.limit('tolerance_degph'):g} deg/h, We")
     return f"{saw:.4f} deg/h, We is {due:.4f}"
@@ -331,19 +322,6 @@ def angles_stay_without_the_level_unit(e: Evidence) -> str:
     return f"{len(mine)} readings with the same angles and U1, one emergency"
 
 
-@proves("GYRO-MODE-01")
-@check("power_on", needs={"can"})
-def in_mode_0_the_torquers_are_left_alone(e: Evidence) -> str:
-    """Look at U1 and U2 of the readings with mode 0."""
-    c = columns(e)
-    mine = c["MODE"] == Mode.OFF
-    if mine.sum() < LEAST:
-        raise TooLittle(f"{int(mine.sum())} readings of mode 0")
-    if c["U1"][mine].any() or c["U2"][mine].any():
-        raise Broken(f"U1 {np.abs(c['U1'][mine]).max():g}, U2 {np.abs(c['U2'][mine]).max():g} deg/h", "0")
-    return f"{int(mine.sum())} readings of mode 0, U1 and U2 0"
-
-
 @proves("GYRO-RES-01")
 @check("power_on", needs={"can"})
 def res_ends_the_mode_and_counts_anew(e: Evidence) -> str:
@@ -356,170 +334,6 @@ def res_ends_the_mode_and_counts_anew(e: Evidence) -> str:
     if c["STEP"][0] > 1 + late:
         raise Broken(f"STEP {c['STEP'][0]:g} first", f"{1 + late} at most")
     return f"{len(c['MODE'])} readings of mode 0, STEP from {c['STEP'][0]:g}"
-
-
-@proves("GYRO-MODE-04")
-@check("run", needs={"can"})
-def a_run_goes_through_its_positions(e: Evidence) -> str:
-    """Follow MODE, PHASE and POSITION."""
-    c = columns(e)
-    here = np.flatnonzero(c["MODE"] == Mode.GYROCOMPASS)
-    if len(here) < 100:
-        raise TooLittle("no run in the recording")
-    pairs = np.stack([c["POSITION"][here], c["PHASE"][here]], axis=1)
-    order = [tuple(int(v) for v in p) for k, p in enumerate(pairs) if k == 0 or (p != pairs[k - 1]).any()]
-    positions = e.facts.get("positions")
-    due = [(k, p) for k in range(1, len(positions if isinstance(positions, list) else []) + 1) for p in (1, 2, 3)]
-    due_still = [p for p in due if p != (1, 1)] if order[:1] == [(1, 2)] else due
-    if order not in (due, due_still):
-        raise Broken(f"positions and phases {order}", f"{due}")
-    after = c["MODE"][here[-1] + 1 :]
-    if not len(after) or after[0] != Mode.HOLD:
-        raise Broken("another mode than 2 after the run", "2")
-    return f"{len(order)} phases in their order, then mode 2"
-
-
-@proves("GYRO-MODE-05")
-@check("run", needs={"can"})
-def windows_have_their_length(e: Evidence) -> str:
-    """Count the readings of each window."""
-    row, c = row_for(e, "GYRO-MODE-05"), columns(e)
-    due = round(row.limit("window_s") / (row_for(e, "GYRO-CAN-02").limit("period_us") * 1e-6))
-    count = int(c["POSITION"].max())
-    seen = [int(((c["PHASE"] == Phase.WINDOW) & (c["POSITION"] == k)).sum()) for k in range(1, count + 1)]
-    if not seen or any(abs(n - due) > row.limit("tolerance_steps") for n in seen):
-        raise Broken(f"{seen} readings", f"{due} each")
-    return f"{seen} readings"
-
-
-@proves("GYRO-MODE-06")
-@check("run", needs={"can"})
-def windows_begin_settled(e: Evidence) -> str:
-    """Look at BETA and ENCODER as a window begins, and how long it has settled."""
-    row, c = row_for(e, "GYRO-MODE-06"), columns(e)
-    positions = e.facts.get("positions")
-    begins = np.flatnonzero((np.diff(c["PHASE"]) != 0) & (c["PHASE"][1:] == Phase.WINDOW)) + 1
-    if not len(begins) or not isinstance(positions, list):
-        raise TooLittle("no window in the recording")
-    most, shown = row.limit("tolerance_arcmin") / 60, row.limit("encoder_off_max_arcmin") / 60
-    least = round(row.limit("settling_s") / (row_for(e, "GYRO-CAN-02").limit("period_us") * 1e-6))
-    for k in begins:
-        off = float(wrapped(np.array([c["ENCODER"][k] - positions[int(c["POSITION"][k]) - 1]]))[0])
-        settling = int((c["PHASE"][max(0, k - least) : k] == Phase.SETTLING).sum())
-        if abs(c["BETA"][k]) > most or abs(off) > shown or settling < least - 1:
-            raise Broken(
-                f"beta {c['BETA'][k]:.4f} deg, {off:.4f} deg off, {settling} steps settled",
-                f"{most:.4f} deg, {least} steps",
-            )
-    return f"{len(begins)} windows, settled for {least} steps and more"
-
-
-@proves("GYRO-MODE-06")
-@check("tilted", needs={"can"})
-def a_window_waits_for_the_level(e: Evidence) -> str:
-    """Look at BETA from the begin of settling to the first window of a run that begins half a degree off."""
-    row, c = row_for(e, "GYRO-MODE-06"), columns(e)
-    most = row.limit("tolerance_arcmin") / 60
-    settling = np.flatnonzero((c["MODE"] == Mode.GYROCOMPASS) & (c["PHASE"] == Phase.SETTLING))
-    window = np.flatnonzero(c["PHASE"] == Phase.WINDOW)
-    if not len(settling) or abs(c["BETA"][settling[0]]) < 2 * most:
-        raise TooLittle("the run does not begin far enough off the level")
-    if not len(window) or abs(c["BETA"][window[0]]) > most:
-        saw = f"beta {c['BETA'][window[0]]:.4f} deg" if len(window) else "no window"
-        raise Broken(saw, f"one that begins within {most:.4f} deg")
-    return f"beta {c['BETA'][settling[0]]:.4f} deg as settling begins, {c['BETA'][window[0]]:.4f} deg in the window"
-
-
-@proves("GYRO-MODE-08")
-@check("navigation", needs={"can"})
-def navigation_keeps_the_azimuth(e: Evidence) -> str:
-    """Compare the heading of a parked vehicle before and after some time of mode 6, its drift being compensated."""
-    row = row_for(e, "GYRO-MODE-08")
-    most = row.limit("drift_max_degph")
-    moved_degph = abs(_number(e, "moved_deg")) / _number(e, "moved_s") * 3600
-    drift_degph, free_degph = _number(e, "drift_degph"), _number(e, "free_deg") / _number(e, "free_s") * 3600
-    saw = f"{moved_degph:.3f} deg/h in {_number(e, 'moved_s'):.1f} s, {free_degph:.3f} without what cancels the drift"
-    if moved_degph > most:
-        raise Broken(saw, f"{most:g} deg/h at most")
-    if abs(abs(free_degph) - abs(drift_degph)) > row.limit("free_tolerance_pct") / 100 * abs(drift_degph):
-        raise Broken(saw, f"the drift of {abs(drift_degph):.3f} deg/h where nothing cancels it")
-    return saw
-
-
-def _turns(e: Evidence) -> list[tuple[float, float, Mapping[str, Floats]]]:
-    """From, to, deg, and the readings of each turn by mode 3. Raises TooLittle."""
-    parts = e.facts.get("turns")
-    if not isinstance(parts, list) or not parts:
-        raise TooLittle("no turns in the recording")
-    logs = [columns(e.with_can(CanLog(frames=e.can.frames[a:b]))) for _, a, b in parts]
-    ends = [float(logs[0]["ENCODER"][0])] + [float(to) for to, _, _ in parts]
-    return list(zip(ends[:-1], ends[1:], logs, strict=True))
-
-
-@proves("GYRO-MODE-02")
-@check("turns", needs={"can"})
-def a_turn_ends_at_its_angle_and_holds(e: Evidence) -> str:
-    """Look where ENCODER ends in each turn by mode 3, and whether it stays there in mode 2."""
-    row, held = row_for(e, "GYRO-MODE-02"), e.facts.get("held")
-    turns, worst = _turns(e), 0.0
-    for _, to, c in turns:
-        off = abs(float(wrapped(np.array([c["ENCODER"][-1] - to]))[0]))
-        if off > row.limit("encoder_off_max_arcmin") / 60:
-            raise Broken(f"{c['ENCODER'][-1]:.4f} deg", f"{to:g} deg")
-        worst = max(worst, off)
-    if not isinstance(held, tuple):
-        raise TooLittle("mode 2 is not in the recording")
-    c = columns(e.with_can(CanLog(frames=e.can.frames[held[0] : held[1]])))
-    mine = c["MODE"] == Mode.HOLD
-    moved = np.abs(wrapped(c["ENCODER"][mine] - turns[-1][2]["ENCODER"][-1]))
-    if mine.sum() < LEAST or moved.max() > row.limit("tolerance_arcmin") / 60:
-        raise Broken(f"{int(mine.sum())} readings of mode 2", "the angle that the gimbal has")
-    return f"{len(turns)} turns, {worst:.4f} deg off at the end; {moved.max():.4f} deg in mode 2"
-
-
-@proves("GYRO-MODE-03")
-@check("turns", needs={"can"})
-def turns_take_the_shorter_way(e: Evidence) -> str:
-    """Look at ENCODER on the way: where it turns, how far and how fast."""
-    row, seen = row_for(e, "GYRO-MODE-03"), []
-    period_s = row_for(e, "GYRO-CAN-02").limit("period_us") * 1e-6
-    allowed = 1 + row.limit("tolerance_pct") / 100
-    for at, to, c in _turns(e):
-        way = 180.0 - (180.0 - (to - at)) % 360.0  # of two alike the positive one
-        steps = wrapped(np.diff(c["ENCODER"]))
-        made = float(steps.sum())
-        rates = np.median([steps[:-2], steps[1:-1], steps[2:]], axis=0) / period_s  # a new setting may jump: its errors
-        if abs(made - way) > row.limit("way_tolerance_deg"):
-            raise Broken(f"{made:.2f} deg from {at:g} to {to:g}", f"{way:g} deg")
-        fastest = float(np.abs(rates).max())
-        if fastest > allowed * row.limit("rate_dps"):
-            raise Broken(f"{fastest:.2f} deg/s", f"{row.limit('rate_dps'):g} deg/s")
-        over = round(ACCEL_OVER_S / period_s)
-        pushed = float(np.abs(rates[over:] - rates[:-over]).max()) / ACCEL_OVER_S
-        if pushed > allowed * row.limit("accel_dps2"):
-            raise Broken(f"{pushed:.2f} deg/s2", f"{row.limit('accel_dps2'):g} deg/s2")
-        seen.append(f"{made:.1f} deg with {fastest:.2f} deg/s and {pushed:.1f} deg/s2")
-    return "; ".join(seen)
-
-
-@proves("GYRO-MODE-07")
-@check("navigation", needs={"can"})
-def a_calibration_measures_one_window(e: Evidence) -> str:
-    """Follow PHASE in mode 5 and count the readings of its window."""
-    c = columns(e)
-    here = np.flatnonzero(c["MODE"] == Mode.CALIBRATE)
-    if len(here) < 100:
-        raise TooLittle("no calibration in the recording")
-    phases = c["PHASE"][here].astype(np.int64)
-    order = [int(p) for k, p in enumerate(phases) if k == 0 or p != phases[k - 1]]
-    window = int((phases == Phase.WINDOW).sum())
-    due = round(_number(e, "calibration_s") / (row_for(e, "GYRO-CAN-02").limit("period_us") * 1e-6))
-    if order != [Phase.SETTLING, Phase.WINDOW] or window != due:
-        raise Broken(f"phases {order}, {window} readings of its window", f"2, 3 and {due}")
-    after = c["MODE"][here[-1] + 1 :]
-    if len(after) and after[0] != Mode.HOLD:
-        raise Broken(f"mode {after[0]:g} afterwards", "2")
-    return f"settling, then a window of {window} readings"
 
 
 @proves("GYRO-SIG-01")
