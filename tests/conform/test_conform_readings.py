@@ -103,6 +103,18 @@ def test_a_bad_pmka_is_found() -> None:
     )
 
 
+def test_only_a_late_host_excuses_a_late_first_reading() -> None:
+    """SEQ 2 after Res, two periods late: a host in real time may have begun there, one in lockstep has not."""
+    rows: list[tuple[str, Row]] = [("PMKA_HEARTBEAT", {})]
+    for k in range(2, 30):
+        rows += [("PMKA_CODES", {}), ("PMKA_STATE", {"SEQ": k})]
+    frames = log("pmka", rows).frames
+    later = (replace(f, t_s=f.t_s + 0.0104 + 2 * 0.0048) for f in frames[1:])
+    can = CanLog(frames=(replace(frames[0], data=b"\0"), *later))
+    assert pmka_readings.readings_begin_with_0_after_res(evidence("pmka", can))
+    fails(pmka_readings.readings_begin_with_0_after_res, evidence("pmka", can, facts={"prompt": True}))
+
+
 def samples(step: int = 100_000, period: int = 4_800_000, order: Sequence[int] = (0, 1, 2, 3)) -> Evidence:
     moves: dict[str, list[tuple[int, int]]] = {"SH": [(0, 0)], "MUX0": [(0, 0)], "MUX1": [(0, 0)]}
     t = 10_000_000

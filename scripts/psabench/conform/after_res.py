@@ -17,10 +17,10 @@ def booted(e: Evidence, heartbeat: str) -> CanFrame:
 def late_readings(e: Evidence, heartbeat: str, name: str, first_s: float, period_s: float) -> int:
     """How many readings may have passed before the first that was told, a host that starts it late being no fault.
 
-    0 in lockstep, where the host starts it before the first. first_s: from Res to the first reading. Raises TooLittle.
+    first_s: from Res to the first reading. The fact "prompt": the host was in time for it. Raises TooLittle.
     """
     boot = booted(e, heartbeat)
     told = [f for f in e.frames_of(name).frames if f.t_s > boot.t_s]
     if not told:
         raise TooLittle(f"no {name} came after the boot-up message")
-    return max(0, round((told[0].t_s - boot.t_s - first_s) / period_s))
+    return 0 if e.facts.get("prompt") else max(0, round((told[0].t_s - boot.t_s - first_s) / period_s))

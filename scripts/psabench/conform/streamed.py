@@ -11,8 +11,12 @@ BOOT_S = 0.002
 
 
 def from_res(s: Subject, dwell_s: float) -> Evidence:
-    """The scene power_on: Res, and readings from as soon as it has booted."""
+    """The scene power_on: Res, and readings from as soon as it has booted.
+
+    facts: prompt, in lockstep alone: the start came before the first reading.
+    """
     with s.take() as take:
+        take.facts["prompt"] = s.lockstep
         s.reset()
         s.run_for(BOOT_S)
         s.unit.start()

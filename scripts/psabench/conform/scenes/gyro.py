@@ -6,6 +6,7 @@ from psabench.conform.evidence import Evidence
 from psabench.conform.gyro_readings import columns, vertical_degph
 from psabench.conform.outcome import TooLittle
 from psabench.conform.plan import scene
+from psabench.conform.streamed import from_res
 from psabench.conform.subject import Subject
 from psabench.devices.gyro import SETTINGS, Gyro, Mode, Phase
 from psabench.unit import NMT_PREOP, NMT_START
@@ -18,6 +19,7 @@ RUN_LIMIT_S = 150.0
 TURN_LIMIT_S = 30.0  # half a turn takes 21 s
 TURNS_DEG = (90.0, 270.0, 0.0, -100.0)  # from where it is, a half, one over 360, one the other way
 CALIBRATION_S, NAVIGATION_S, FREE_S = 30.0, 30.0, 5.0
+POWER_ON_S = 1.0  # of readings after Res
 LEVEL_S = 3.0  # of readings in mode 1
 TILT_G, SLOW_PER_S = 0.0087, 0.15  # half a degree; 12 s from there to the tolerance of 5 arc minutes
 FACTS = ("m1_per_s", "m2_per_s", "latitude_deg", "zero_x_v", "zero_y_v", "scale_x_v_per_g", "scale_y_v_per_g")
@@ -96,13 +98,7 @@ def power_on(s: Subject) -> Evidence:
     calm(s)
     unit(s).mode = Mode.LEVEL
     s.run_for(0.5)
-    with s.take() as take:
-        s.reset()
-        s.run_for(0.002)
-        s.unit.start()
-        s.run_for(1.0)
-        s.unit.stop()
-    return s.evidence("power_on", take)
+    return from_res(s, POWER_ON_S)
 
 
 @scene("run", boards=("gyro",))
