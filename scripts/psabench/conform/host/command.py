@@ -40,7 +40,7 @@ and it tells what it takes in JSON (docs/conform_host.md): {"frame": 7, "x": ...
 examples:
   psabench conform host --command "build/host {can} {node}"
   psabench conform host --command "build/host_line {line}" --only HOST-TORN
-  psabench conform host --board pik --command "build/host {can} {node}"
+  psabench conform host --board pik --command ".venv/bin/python examples/vins_boards.py pik socketcand:{can} {node}"
   psabench conform host --manual can --results build/told.jsonl     start it by hand, case by case
 
 OUT has report.html, junit.xml and conform.json, and of each case what was on the bus and what was told.
