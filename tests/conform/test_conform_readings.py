@@ -79,6 +79,7 @@ def test_a_good_pmka_passes() -> None:
         pmka_readings.an_integrator_moves_with_its_input,
         pmka_readings.resets_follow_codes_beyond_uc,
         pmka_readings.in_beat_1_the_spare_is_free,
+        pmka_readings.nothing_saturates_below_full_scale,
         pmka_readings.each_axis_has_an_integrator,
     ):
         assert check(e)
@@ -91,6 +92,8 @@ def test_a_bad_pmka_is_found() -> None:
     fails(pmka_readings.readings_are_counted_without_gaps, of("SEQ", 7))
     fails(pmka_readings.in_beat_1_the_spare_is_free, of("SERVES_K", 1))
     fails(pmka_readings.each_axis_has_an_integrator, of("SERVES_X", 0))
+    fails(pmka_readings.nothing_saturates_below_full_scale, of("SATURATED", 1))
+    fails(pmka_readings.nothing_saturates_below_full_scale, of("CLIPPED", 1))
     fails(pmka_readings.resets_follow_codes_beyond_uc, pmka(change=lambda _, __, s: s.update({"RESET_X": 0})))
     wrong_sign = pmka(change=lambda _, __, s: s.update({"RESET_X": -s["RESET_X"]}))
     fails(pmka_readings.resets_follow_codes_beyond_uc, wrong_sign)

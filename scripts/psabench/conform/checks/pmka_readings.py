@@ -150,6 +150,19 @@ def resets_are_as_many_as_the_input_wants(e: Evidence) -> str:
     return f"resets for {', '.join(seen)} V"
 
 
+@proves("PMKA-INT-04")
+@check("minute", needs={"can", "inputs"})
+def nothing_saturates_below_full_scale(e: Evidence) -> str:
+    """Look for SATURATED and CLIPPED in a minute."""
+    most, c = row_for(e, "PMKA-INT-04").limit("full_scale_v"), columns(e)
+    if any(abs(v) > most for v in e.inputs_v.values()):
+        raise TooLittle(f"inputs of {most:g} V at most are wanted")
+    for flag in ("SATURATED", "CLIPPED"):
+        if c[flag].any():
+            raise Broken(f"{flag} in {np.count_nonzero(c[flag])} of {len(c[flag])} readings", f"none up to {most:g} V")
+    return f"{len(c['SEQ'])} readings without SATURATED and CLIPPED"
+
+
 @proves("PMKA-RST-01")
 @check("stream", needs={"can"})
 def resets_follow_codes_beyond_uc(e: Evidence) -> str:
