@@ -326,10 +326,12 @@ compile_commands.json: Makefile $(SRC) $(GEN_SRC)
 	    sep=,; done; echo ']'; } > $@
 
 # spidev and gpiod are a Linux machine's hardware, which tests put their own in place of; spidev would have to be compiled.
-## lock: pin requirements.in in requirements.lock
+UV_LOCK = .venv/bin/uv pip compile -q --upgrade --universal --python-version 3.11 --generate-hashes --custom-compile-command 'make lock'
+## lock: pin requirements.in in requirements.lock, and what requirements-mf4.in needs beside it in requirements-mf4.lock
 lock: $(PY)
-	.venv/bin/uv pip compile -q --upgrade --universal --python-version 3.11 --generate-hashes \
-	    --no-emit-package spidev --no-emit-package gpiod --custom-compile-command 'make lock' -o requirements.lock requirements.in
+	$(UV_LOCK) --no-emit-package spidev --no-emit-package gpiod -o requirements.lock requirements.in
+	$(UV_LOCK) $$(sed -n 's/^\([^ =]*\)==.*/--no-emit-package \1/p' requirements.lock) -c requirements.lock \
+	    -o requirements-mf4.lock requirements-mf4.in
 
 ## clean: everything that was built; .venv stays
 clean:

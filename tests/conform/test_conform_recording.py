@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import shutil
 import subprocess
 from collections.abc import Callable
@@ -62,18 +61,6 @@ def test_every_format_of_a_log_is_judged_alike(ending: str, psa2: Made, tmp_path
     said = judge(tmp_path, make.converted(psa2.log, ending))
     assert (said.status, said.passed) == (0, judge(tmp_path, psa2.log).passed)
     assert "PSA2-TEMP-05" in said.passed
-
-
-def test_mf4_is_judged_or_says_what_it_wants(psa2: Made, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    if importlib.util.find_spec("asammdf"):
-        assert judge(tmp_path, make.converted(psa2.log, ".mf4")).status == 0
-        return
-    path = tmp_path / "run.mf4"
-    path.write_bytes(b"MDF     4.10")
-    assert main(["conform", "recording", str(path), "--board", "psa2"]) == 2
-    said = capsys.readouterr().err
-    assert "pip install asammdf" in said
-    assert "can_logconvert run.mf4 run.log" in said
 
 
 def test_stamps_of_a_calendar_are_as_good(psa2: Made, tmp_path: Path) -> None:

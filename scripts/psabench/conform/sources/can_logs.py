@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import math
 from collections.abc import Callable, Iterator, Mapping
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +13,7 @@ from can.io.player import MESSAGE_READERS
 
 from psabench.conform.evidence import CanFrame
 from psabench.conform.sources.blf import safe_blf
+from psabench.conform.sources.mf4 import candump_of
 from psabench.conform.sources.taken import BLOCK, MOST_FRAMES, Bounds, CanTake
 from psabench.errors import BadInput
 
@@ -26,7 +26,7 @@ MOST_S = 1e11  # of a stamp
 
 def read_can(path: Path, bounds: Bounds) -> CanTake:
     """Raises BadInput for a log without a frame, OSError."""
-    source, trouble = _source(path)
+    source, trouble = _source(path, bounds)
     frames: list[CanFrame] = []
     note = ""
     try:
@@ -43,13 +43,6 @@ def read_can(path: Path, bounds: Bounds) -> CanTake:
             frames.append(_frame(m))
     except OSError:
         raise
-    except (ImportError, NotImplementedError) as e:
-        if path.suffix.lower() == ".mf4" and find_spec("asammdf") is None:
-            raise BadInput(
-                f"{path}: MF4 logs are read by asammdf, which is not there: pip install asammdf, or where it is "
-                f"can_logconvert {path.name} {path.stem}.log makes a log that is read here"
-            ) from e
-        note = f"message {len(frames) + 1} cannot be read ({e})"
     except Exception as e:  # python-can's readers raise whatever their parsing comes to; no byte of a file may end us
         note = (
             f"message {len(frames) + 1} cannot be read ({type(e).__name__}: {str(e)[:80]}); those before it are judged"
@@ -89,15 +82,16 @@ def _frame(m: can.Message) -> CanFrame:
     )
 
 
-def _source(path: Path) -> tuple[Any, str]:
+def _source(path: Path, bounds: Bounds) -> tuple[Any, str]:
     """What python-can shall read, and what is known to be wrong with it."""
-    if path.suffix.lower() == ".blf":
-        try:
+    try:
+        if path.suffix.lower() == ".blf":
             return safe_blf(path)
-        except ValueError as e:
-            raise BadInput(f"{path}: {e}") from e
-    if path.suffix.lower() == ".mf4":
-        return str(path), ""
+        if path.suffix.lower() == ".mf4":
+            log, trouble = candump_of(path, bounds.max_s, MOST_FRAMES)
+            return io.TextIOWrapper(log, encoding="utf-8", errors="replace"), trouble
+    except ValueError as e:
+        raise BadInput(f"{path}: {e}") from e
     _check_lines(path)
     return io.TextIOWrapper(path.open("rb"), encoding="utf-8", errors="replace"), ""
 
@@ -127,9 +121,8 @@ def _check_lines(path: Path) -> None:
 
 def _messages(path: Path, source: Any) -> Iterator[can.Message]:
     readers: Mapping[str, Callable[..., Any]] = MESSAGE_READERS
-    reader = readers[path.suffix.lower()](source)
+    ending = path.suffix.lower()
     try:
-        yield from reader
+        yield from readers[".log" if ending == ".mf4" else ending](source)
     finally:
-        if not isinstance(source, str):
-            source.close()
+        source.close()
