@@ -332,6 +332,21 @@ def test_a_gyro_unit_that_begins_tilted() -> None:
     fails(gyro_modes.a_window_waits_for_the_level, tilted(0.09))
 
 
+def test_a_gyro_unit_that_levels() -> None:
+    def levelling(ends_deg: float, mode: int = 1) -> Evidence:
+        rows: list[tuple[str, Row]] = []
+        for k in range(100):
+            beta = round((ends_deg + 0.5 * 0.9**k) / 2e-6)
+            rows += [("GYRO_RATES", {}), ("GYRO_ANGLES", {"MODE": mode}), ("GYRO_LEVEL", {"BETA": beta})]
+        return evidence("gyro", log("gyro", rows))
+
+    assert gyro_modes.mode_1_levels(levelling(0.016))
+    fails(gyro_modes.mode_1_levels, levelling(0.018))
+    fails(gyro_modes.mode_1_levels, levelling(-0.018))
+    with pytest.raises(TooLittle):
+        gyro_modes.mode_1_levels(levelling(0.0, mode=0))
+
+
 def test_a_heading_of_a_gyro_unit() -> None:
     def kept(moved_deg: float, free_deg: float) -> Evidence:
         facts = {"drift_degph": 25.0, "moved_deg": moved_deg, "moved_s": 36.0, "free_deg": free_deg, "free_s": 3.6}

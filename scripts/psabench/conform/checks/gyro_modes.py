@@ -33,6 +33,21 @@ def in_mode_0_the_torquers_are_left_alone(e: Evidence) -> str:
     return f"{int(mine.sum())} readings of mode 0, U1 and U2 0"
 
 
+@proves("GYRO-MODE-11")
+@check("level", needs={"can"})
+def mode_1_levels(e: Evidence) -> str:
+    """Look at BETA of the last readings, the platform having had its time."""
+    c, most = columns(e), row_for(e, "GYRO-MODE-11").limit("level_max_arcmin")
+    beta_arcmin = c["BETA"][c["MODE"] == Mode.LEVEL] * 60
+    if len(beta_arcmin) < 2 * LEAST:
+        raise TooLittle(f"{len(beta_arcmin)} readings of mode 1")
+    left = float(np.abs(beta_arcmin[-LEAST:]).max())
+    saw = f"beta {beta_arcmin[0]:.2f} arc minutes, at last {left:.2f}"
+    if left > most:
+        raise Broken(saw, f"{most:g} at most")
+    return saw
+
+
 @proves("GYRO-MODE-04")
 @check("run", needs={"can"})
 def a_run_goes_through_its_positions(e: Evidence) -> str:

@@ -6,14 +6,13 @@ from psabench.conform.evidence import Evidence
 from psabench.conform.gyro_readings import columns, vertical_degph
 from psabench.conform.outcome import TooLittle
 from psabench.conform.plan import scene
+from psabench.conform.requirements import requirements
 from psabench.conform.streamed import from_res
 from psabench.conform.subject import Subject
 from psabench.devices.gyro import SETTINGS, Gyro, Mode, Phase
 from psabench.unit import NMT_PREOP, NMT_START
 
 READY_S = 0.4
-LEVEL_LIMIT_S = 15.0  # from half a degree, with m1 = 1/s
-LEVELLED_DEG = 1 / 60  # an arc minute: the Earth and the drift leave half of it
 WAIT_S = 0.5
 RUN_LIMIT_S = 150.0
 TURN_LIMIT_S = 30.0  # half a turn takes 21 s
@@ -65,17 +64,18 @@ def until_mode(s: Subject, mode: Mode, limit_s: float) -> None:
 
 
 def levelled(s: Subject) -> None:
-    """As after power-on, and level."""
+    """As after power-on, and level. Raises TooLittle where it does not get so."""
+    row = requirements()["GYRO-MODE-11"]
     calm(s)
     unit(s).mode = Mode.LEVEL
-    left_s = LEVEL_LIMIT_S
+    left_s = row.limit("limit_s")
     while True:
         s.run_for(WAIT_S)
         left_s -= WAIT_S
-        if abs(unit(s).beta_deg) <= LEVELLED_DEG:
+        if abs(unit(s).beta_deg) * 60 <= row.limit("level_max_arcmin"):
             return
         if left_s <= 0:
-            raise TooLittle(f"the platform is not level after {LEVEL_LIMIT_S:g} s")
+            raise TooLittle(f"the platform is not level after {row.limit('limit_s'):g} s")
 
 
 def slew(s: Subject, to_deg: float) -> None:
@@ -99,6 +99,18 @@ def power_on(s: Subject) -> Evidence:
     unit(s).mode = Mode.LEVEL
     s.run_for(0.5)
     return from_res(s, POWER_ON_S)
+
+
+@scene("level", boards=("gyro",))
+def level(s: Subject) -> Evidence:
+    """Mode 1, for as long as the platform may take to get level from where it stands."""
+    calm(s)
+    with s.take(lines=False) as take:
+        s.unit.start()
+        unit(s).mode = Mode.LEVEL
+        s.run_for(requirements()["GYRO-MODE-11"].limit("limit_s"))
+        s.unit.stop()
+    return s.evidence("level", take)
 
 
 @scene("run", boards=("gyro",))
