@@ -340,9 +340,9 @@ def test_a_gyro_unit_that_levels() -> None:
             rows += [("GYRO_RATES", {}), ("GYRO_ANGLES", {"MODE": mode}), ("GYRO_LEVEL", {"BETA": beta})]
         return evidence("gyro", log("gyro", rows))
 
-    assert gyro_modes.mode_1_levels(levelling(0.016))
-    fails(gyro_modes.mode_1_levels, levelling(0.018))
-    fails(gyro_modes.mode_1_levels, levelling(-0.018))
+    assert gyro_modes.mode_1_levels(levelling(0.082))
+    fails(gyro_modes.mode_1_levels, levelling(0.085))
+    fails(gyro_modes.mode_1_levels, levelling(-0.085))
     with pytest.raises(TooLittle):
         gyro_modes.mode_1_levels(levelling(0.0, mode=0))
 

@@ -13,6 +13,7 @@ from psabench.devices.gyro import SETTINGS, Gyro, Mode, Phase
 from psabench.unit import NMT_PREOP, NMT_START
 
 READY_S = 0.4
+REST_S = 2.0  # from there to what the Earth and the drift leave, nearly: two time constants
 WAIT_S = 0.5
 RUN_LIMIT_S = 150.0
 TURN_LIMIT_S = 30.0  # half a turn takes 21 s
@@ -69,13 +70,13 @@ def levelled(s: Subject) -> None:
     calm(s)
     unit(s).mode = Mode.LEVEL
     left_s = row.limit("limit_s")
-    while True:
-        s.run_for(WAIT_S)
-        left_s -= WAIT_S
-        if abs(unit(s).beta_deg) * 60 <= row.limit("level_max_arcmin"):
-            return
+    s.run_for(WAIT_S)
+    while abs(unit(s).beta_deg) * 60 > row.limit("level_max_arcmin"):
         if left_s <= 0:
             raise TooLittle(f"the platform is not level after {row.limit('limit_s'):g} s")
+        s.run_for(WAIT_S)
+        left_s -= WAIT_S
+    s.run_for(REST_S)
 
 
 def slew(s: Subject, to_deg: float) -> None:
