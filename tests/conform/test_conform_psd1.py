@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
@@ -11,6 +12,8 @@ from psabench.conform.checks import psd1_can, psd1_cycle, psd1_serial
 from psabench.conform.evidence import CanFrame, CanLog, Evidence, LineLog
 from psabench.conform.outcome import Broken, TooLittle
 from psabench.conform.psd1_cycles import PINS
+from psabench.conform.subject import Addresses, Subject
+from psabench.conform.trials import psd1_control
 from psabench.conform.variant import variant
 from psabench.vcd import Vcd, Wire
 
@@ -224,3 +227,18 @@ def test_strobes_that_are_not_told_are_found() -> None:
     with pytest.raises(Broken, match="READ_Z"):
         psd1_can.strobes_are_told(e)
     assert psd1_can.strobes_are_told(replace(e, can=frames([WORDS] * 9)))
+
+
+def test_a_converter_out_of_step_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Y loses a word more than the others after each Res of a board that waits for its host, who is never late."""
+    with Subject.open(variant("psd1", "psd1_host"), Addresses()) as s:
+        assert psd1_control.converters_are_in_step_after_res(s)
+        counters, looks = s.unit.counters, itertools.count()
+
+        def off() -> dict[str, int]:
+            found, k = dict(counters()), next(looks)
+            return found | {name: found[name] + k for name in ("Lost Y", "Stretched cycles")}
+
+        monkeypatch.setattr(s.unit, "counters", off)
+        with pytest.raises(Broken):
+            psd1_control.converters_are_in_step_after_res(s)
