@@ -112,6 +112,15 @@ def test_a_check_says_broken_or_too_little_of_wrong_lengths(name: str, stage: St
         return
 
 
+@pytest.mark.parametrize("name", ["frames_are_counted", "overruns_are_counted"])
+def test_a_counter_is_not_judged_without_its_answers(name: str, stage: Stage) -> None:
+    """Frames of the whole log are none of those that it has counted."""
+    e = stage.evidence(name)
+    streams = CanLog(frames=tuple(f for f in e.can.frames if f.can_id != 0x580 + e.node))
+    with pytest.raises(TooLittle, match="answers"):
+        CHECKS[name](e.with_can(streams))
+
+
 def test_every_observable_row_of_these_boards_has_a_check() -> None:
     proved = {i for p in proofs() for i in p.ids}
     rows = [r for r in requirements() if r.group == "psa2"]

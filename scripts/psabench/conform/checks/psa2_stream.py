@@ -228,10 +228,15 @@ def _counted(e: Evidence, sub: int) -> int:
 
 
 def _meanwhile(e: Evidence, sub: int) -> Evidence:
-    """The log between the two answers that told a counter: the bus has them in their order, whoever was late."""
+    """The log between the two answers that told a counter: the bus has them in their order, whoever was late.
+
+    Raises TooLittle where it lacks one.
+    """
     answer, what = int(row_for(e, "BUS-ID-01").limit("sdo_tx_id")) + e.node, bytes([0x30, 0x20, sub])
     at = [k for k, f in enumerate(e.can.frames) if f.can_id == answer and f.data[1:4] == what and not f.sent]
-    return e.with_can(CanLog(frames=e.can.frames[at[0] : at[-1]])) if len(at) > 1 else e
+    if len(at) < 2:
+        raise TooLittle("the answers that told the counter are not in the log")
+    return e.with_can(CanLog(frames=e.can.frames[at[0] : at[-1]]))
 
 
 @proves("PSA2-CNT-01")
