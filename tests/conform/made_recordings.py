@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import subprocess
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -31,14 +31,21 @@ class Made:
     vcd: Path
 
 
-def record(folder: Path, board: str, profile: str | None = None, clock_ppm: float = 0.0, dwell: str = "550ms") -> Made:
+def record(
+    folder: Path,
+    board: str,
+    profile: str | None = None,
+    clock_ppm: float = 0.0,
+    dwell: str = "550ms",
+    faults: Sequence[Mapping[str, Any]] = (),
+) -> Made:
     """From power-on; streaming begins with the set-up's end."""
     v = variant(board, profile)
     bench = scenario(v, INPUTS_V, clock_ppm)
     for axis in bench["units"][0].get("axes", {}).values():
         axis["reading_noise_v"] = NOISE_V
     path = folder / f"{board}.yaml"
-    path.write_text(json.dumps(bench | {"start": True}))
+    path.write_text(json.dumps(bench | {"start": True, "faults": [*faults]}))
     made = Made(folder / f"{board}.log", folder / f"{board}.vcd")
     words = ["--can", f"log:{made.log}", "--vcd", str(made.vcd), "--vcd-unit", "1", "--unit", "a"]
     command = [str(find_emulator()), str(path), *words, "--pace", "free", "--for", dwell, "--seed", "1", "--quiet"]

@@ -56,6 +56,31 @@ def test_so_does_every_profile_of_a_psa2(profile: str, tmp_path: Path) -> None:
     assert "PSA2-FRAME-03" in said.passed
 
 
+MOVING = [
+    {"kind": kind, "point": f"a.sensor.{axis}", **value}
+    for kind, value in (("sensor.noise", {"rms_v": 0.05}), ("sensor.drift", {"drift_v_per_s": 0.3}))
+    for axis in "xyz"
+]
+
+
+@pytest.mark.parametrize("board", [*BOARDS, "pik6"])
+def test_so_does_one_whose_inputs_move(board: str, tmp_path: Path) -> None:
+    """A bench that nobody has put to rest: what wants still inputs is not observable."""
+    made = make.record(tmp_path, board, dwell="1500ms", faults=MOVING)
+    said = judge(tmp_path, made.log, board=board)
+    assert said.status == 0, [said.told(i) for i in said.failed]
+    assert not {i for i in said.report["requirements"] if i.startswith("HOST-")}
+
+
+@pytest.mark.parametrize(
+    ("board", "requirement"), [("psa2", "PSA2-CHIP-07"), ("psa1", "PSA1-CHIP-01"), ("pik6", "PIK-RES-01")]
+)
+def test_inputs_that_are_said_to_stand_still_are_held_to_it(board: str, requirement: str, tmp_path: Path) -> None:
+    made = make.record(tmp_path, board, dwell="1500ms", faults=MOVING)
+    said = judge(tmp_path, made.log, *(f"--input={a}={v}" for a, v in make.INPUTS_V.items()), board=board)
+    assert requirement in said.failed
+
+
 @pytest.mark.parametrize("ending", [".blf", ".asc", ".trc", ".csv"])
 def test_every_format_of_a_log_is_judged_alike(ending: str, psa2: Made, tmp_path: Path) -> None:
     said = judge(tmp_path, make.converted(psa2.log, ending))

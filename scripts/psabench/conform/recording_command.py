@@ -67,7 +67,7 @@ def add(suites: Any, formatter: Any, add_board: Callable[[argparse.ArgumentParse
 def handle(args: argparse.Namespace) -> int:
     """Handler of `conform recording`."""
     v = variant(args.board, args.profile)
-    rows = [r for r in requirements() if r.applies(v.board, v.profile)]
+    rows = [r for r in requirements() if r.group != "host" and r.applies(v.board, v.profile)]
     rows = [r for r in rows if not args.only or r.id.startswith(tuple(args.only))]
     if not rows:
         raise BadInput(f"--only {' '.join(args.only)}: no requirement of {v.name} begins so")

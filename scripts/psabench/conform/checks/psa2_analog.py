@@ -272,7 +272,7 @@ def a_write_changes_all_codes(e: Evidence) -> str:
 
 
 @proves("PSA2-CHIP-07", "PSA1-CHIP-01")
-@check("quiet")
+@check("quiet", needs={"can", "inputs"})
 def noise_is_the_published_one(e: Evidence) -> str:
     """Standard deviation of the codes at quiet inputs; words that another port damaged are left out."""
     row = row_for(e, "PSA2-CHIP-07", "PSA1-CHIP-01")
@@ -297,7 +297,7 @@ def _sound(e: Evidence, p: Pairs) -> np.ndarray:
 
 
 @proves("PSA2-SIG-12")
-@check("quiet")
+@check("quiet", needs={"can", "inputs"})
 def no_word_is_damaged_by_the_other_port(e: Evidence) -> str:
     """Look for single codes far from the others while temperatures are scanned."""
     p = pairs(e, 100)
@@ -313,7 +313,7 @@ def no_word_is_damaged_by_the_other_port(e: Evidence) -> str:
 
 
 @proves("PSA2-SIG-13")
-@check("quiet")
+@check("quiet", needs={"can", "inputs"})
 def bursts_damage_words_where_nothing_gates_them(e: Evidence) -> str:
     """Count single codes far from the others."""
     p, row = pairs(e, 100), row_for(e, "PSA2-SIG-13")
