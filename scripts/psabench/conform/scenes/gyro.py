@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from psabench.angles import wrapped_deg
 from psabench.conform.evidence import Evidence
 from psabench.conform.gyro_readings import columns, vertical_degph
 from psabench.conform.outcome import TooLittle
@@ -163,7 +164,7 @@ def _moved(s: Subject, dwell_s: float) -> tuple[float, float]:
     """How far the heading moves, deg, and in how many seconds of the bench."""
     first_deg, begun_s = unit(s).heading_deg, s.bench.time_s
     s.run_for(dwell_s)
-    return (unit(s).heading_deg - first_deg + 180.0) % 360.0 - 180.0, s.bench.time_s - begun_s
+    return wrapped_deg(unit(s).heading_deg - first_deg), s.bench.time_s - begun_s
 
 
 @scene("turns", boards=("gyro",))
