@@ -62,7 +62,7 @@ class FrameCounters:
 
     frames: int = 0
     lost: int = 0  # gaps in the sequence (or, in the fast form, toggles that did not toggle)
-    torn: int = 0  # half a pair, or a frame of the wrong length
+    torn: int = 0  # half a pair, or a frame of the wrong length; the gap that it leaves in the sequence is `lost`, too
     overruns: int = 0  # the board says that it lost a conversion
 
 
