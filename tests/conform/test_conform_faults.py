@@ -44,6 +44,7 @@ def felt(bench: dict[str, Any]) -> None:
     axes = bench["units"][0]["axes"]
     for axis, along in (("x", "ky"), ("y", "kx"), ("z", "kz")):  # the sensor's axis that is vertical with the head at 0
         axes[axis] |= {"u0_v": axes[axis]["u0_v"] + 0.5, f"{along}_v_per_g": 0.5}
+    bench["units"][0].pop("on", None)  # the head, not the rate table
     errors = ("setting_error_arcsec_rms", "periodic_arcsec", "mount_error_arcsec_rms", "resolution_arcsec")
     bench |= {"head": dict.fromkeys(errors, 0), "site": {"g_mps2": 9.80665}}
 

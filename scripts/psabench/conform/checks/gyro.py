@@ -21,6 +21,7 @@ from psabench.protocol_files import dbc_node, message
 from psabench.signals import Floats, layout
 
 LINES = ("STEP", "READY", "SLEW", "SETTLE", "WINDOW", "FAULT")
+FLAGS = ("SATURATED", "LEVEL_LOST", "ENCODER_FAULT", "NOT_SETTLED")
 PHASES = {"SLEW": Phase.SLEWING, "SETTLE": Phase.SETTLING, "WINDOW": Phase.WINDOW}
 US = 1e3
 LIMITS = ("GYRO-LAW-05", "GYRO-LAW-06")
@@ -359,3 +360,18 @@ def lines_show_the_phases(e: Evidence) -> str:
     if not int(e.wires["READY"].at(e.wires.end_ns)):
         raise Broken("READY low in a run", "high", lines=LINES)
     return f"{seen}; SLEW, SETTLE and WINDOW with their phases"
+
+
+@proves("GYRO-SIG-01")
+@check("silence", needs={"line", "can"})
+def fault_shows_the_flags(e: Evidence) -> str:
+    """Compare FAULT with the flags of the readings while the level unit is silent for a while, twice."""
+    wires_needed(e, "STEP", "FAULT")
+    if len(e.wires.gaps_ns):
+        raise TooLittle("samples were lost: a flag of a single step may be among them")
+    c = columns(e)
+    shown = e.wires["FAULT"].at(e.wires.rises("STEP") + round(US)).astype(np.int64)[:, None]
+    told = np.max([c[name] for name in FLAGS], axis=0).astype(np.int64)[:, None]
+    if not len(shown) or _runs(shown) != _runs(told):
+        raise Broken(f"FAULT in turn {_runs(shown)}", f"{_runs(told)} as the flags tell", lines=("STEP", "FAULT"))
+    return f"FAULT in {int(shown.sum())} steps, flags in {int(told.sum())} readings"

@@ -251,7 +251,7 @@ def silence(s: Subject) -> Evidence:
     """The level unit silent for a while, twice: shorter and longer than the unit waits."""
     levelled(s)
     facts = settings(s)
-    with s.take(lines=False) as take:
+    with s.take() as take:
         s.unit.start()
         s.run_for(0.3)
         level_unit(s, False)

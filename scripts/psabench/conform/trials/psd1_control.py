@@ -22,6 +22,7 @@ UC1, UC2, ZERO, FULL, IN_CONVERTERS, COUNTERS, REFUSAL = 0x2042, 0x2043, 0x2044,
 AXES = (1, 2, 3)
 FS_MASK, GAIN_SHIFT, GAIN_MASK, MODE_MASK, WL, PD, CALIBRATE = 0xFFF, 18, 7 << 18, 7 << 21, 1 << 15, 1 << 16, 1 << 21
 CLIP_GAIN = 4  # code of gain 16
+STAYS = 24  # cycles through which control words stay
 UNIPOLAR = 1 << 12  # B/U
 LATE_CYCLES, LATE_STEPS, LATE_STEP_S, STROBE_S = 9, 7, 5e-6, 20e-6  # a word comes 15 us after the one before was taken
 HELD = {0x2200: 3, 0x2202: 5, 0x2203: 3, 0x2204: 3}  # objects of the latest cycle, their sub-indices
@@ -219,15 +220,18 @@ def a_command_cuts_a_cycle_that_waits(s: Subject) -> str:
 @proves("PSD1-UC-07")
 @trial(needs={"can"})
 def control_words_are_read_back(s: Subject) -> str:
-    """Read 2046h and compare it with 2043h, as set up and with another code."""
+    """Read 2046h and compare it with 2043h, some cycles after the set-up and with another code."""
     calm(s)
-    for value in (_control(s)[1], _control(s)[1] + 1):
-        s.unit.node.write(UC2, 0, value)
+    sent = _control(s)[1]
+    run_cycles(s, STAYS)
+    for value in (sent, sent + 1):
+        if value != sent:
+            s.unit.node.write(UC2, 0, value)
         got = [int(s.unit.node.read(IN_CONVERTERS, k)) for k in AXES]
         if got != [value & ~MODE_MASK] * 3:
             raise Broken(f"{[f'{g:06X}h' for g in got]}", f"{value & ~MODE_MASK:06X}h three times")
     calm(s)
-    return "as written, two values"
+    return f"as set up {STAYS} cycles later, another as written"
 
 
 @proves("PSD1-CHIP-01")
