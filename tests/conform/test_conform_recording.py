@@ -22,6 +22,7 @@ BOARDS = {
     "psd1": {"PSD1-CYC-12"},
     "pmka": {"BUS-ID-05"},
     "pik": {"BUS-ID-05"},
+    "gyro": {"GYRO-RES-01"},
 }
 LINE_ROWS = {"PSA2-FRAME-01", "PSA2-FRAME-02", "PSA2-FRAME-10", "PSA2-FRAME-11", "PSA2-INT-04", "PSA2-INT-03"}
 WITH_SIGROK = pytest.mark.skipif(not shutil.which("sigrok-cli"), reason="sigrok-cli is not installed")
@@ -48,6 +49,16 @@ def test_a_recording_of_a_good_board_conforms(board: str, tmp_path: Path) -> Non
     assert any("SHA-256" in fact for fact in said.report["facts"].values())
 
 
+@pytest.mark.parametrize(("board", "whose"), [("psa2", 2), ("psd1", 2), ("pmka", 2), ("gyro", 2), ("pik", 0)])
+def test_clocks_are_found_by_the_board_s_beat(board: str, whose: int, tmp_path: Path) -> None:
+    """Of the lines and of the log; a PIK has no fixed period."""
+    made = make.record(tmp_path, board, dwell="700ms")
+    said = judge(tmp_path, made.log, made.vcd, board=board)
+    found = [fact for name, fact in said.report["facts"].items() if name.endswith("against the board's period")]
+    assert len(found) == whose
+    assert all(abs(float(fact.split()[0])) < 5.0 for fact in found)
+
+
 @pytest.mark.parametrize("profile", ["w24", "w16", "intent", "ungated"])
 def test_so_does_every_profile_of_a_psa2(profile: str, tmp_path: Path) -> None:
     made = make.record(tmp_path, "psa2", profile)
@@ -63,7 +74,7 @@ MOVING = [
 ]
 
 
-@pytest.mark.parametrize("board", [*BOARDS, "pik6"])
+@pytest.mark.parametrize("board", ["psa2", "psa1", "psd1", "pmka", "pik", "pik6"])
 def test_so_does_one_whose_inputs_move(board: str, tmp_path: Path) -> None:
     """A bench that nobody has put to rest: what wants still inputs is not observable."""
     made = make.record(tmp_path, board, dwell="1500ms", faults=MOVING)

@@ -58,7 +58,7 @@ BEATS: Mapping[str, Beat] = {
         counter="CNT",
     ),
     "pmka": Beat(rows={"PMKA-SAMP-01": "ts_us"}, line="SH", level=1, message="PMKA_STATE", counter="SEQ"),
-    "gyro": Beat(rows={"GYRO-CAN-02": "period_us"}, line="STEP", level=1, message="GYRO_RATES", counter="STEP"),
+    "gyro": Beat(rows={"GYRO-CAN-02": "period_us"}, line="STEP", level=1, message="GYRO_ANGLES", counter="STEP"),
 }
 
 
