@@ -187,6 +187,17 @@ def test_lines_that_nobody_recorded_are_named(psa2: Made, tmp_path: Path) -> Non
     assert "PSA2-SIG-01" in said.of("not observable")
 
 
+@pytest.mark.parametrize("frames", [0, 4])
+def test_a_board_that_nobody_started_is_not_broken(frames: int, psa2: Made, tmp_path: Path) -> None:
+    def few(lines: list[str]) -> list[str]:
+        samples = [x for x in lines if " 185#" in x or " 285#" in x]
+        return [x for x in lines if x not in samples[frames:]]
+
+    said = judge(tmp_path, make.changed_log(psa2.log, "few", few))
+    assert said.status == 0, said.failed
+    assert "PSA2-CAN-01" in said.of("not observable")
+
+
 # ---- broken boards
 
 
