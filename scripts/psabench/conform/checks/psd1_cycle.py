@@ -221,11 +221,12 @@ def a_cycle_follows_each_fall_of_dr(e: Evidence) -> str:
 def lines_rest_at_their_levels(e: Evidence) -> str:
     """Look at every line after Res, before the first control word goes out."""
     wires_needed(e, *PINS)
-    falls = e.wires.falls("TFS")
-    if not len(falls):
-        raise TooLittle("TFS never falls after Res")
+    moves = edges(e, "TFS")
+    moves = moves[moves > e.wires.start_ns]
+    if not len(moves):
+        raise TooLittle("TFS never moves after Res")
     row = row_for(e, "PSD1-SIG-01")
-    at = np.array([int(falls[0]) - 1 - round(e.slack_ns(0.0))], np.int64)
+    at = np.array([int(moves[0]) - 1 - round(e.slack_ns(0.0))], np.int64)
     for name in PINS:
         if name in ("CLK_1M25", "FL2"):
             continue
