@@ -403,3 +403,21 @@ def _at_rest_ns(e: Evidence) -> int:
     if not len(found):
         raise TooLittle("no pulse and no latch after Res, or too many for the lines to be at rest")
     return int(found[0]) - 1 - round(e.slack_ns(0.0))
+
+
+@proves("PIK-SIG-01")
+@check("power_cycle", needs={"pins", "supply"})
+def the_clock_rests_low(e: Evidence) -> str:
+    """Look at CLK while the board has no power: the longest time without an edge of it."""
+    wires_needed(e, "CLK")
+    ends = e.wires["CLK"].t_ns
+    if len(ends) < 3:
+        raise TooLittle("CLK does not move")
+    k = int(np.argmax(np.diff(ends)))
+    still_ns = int(ends[k + 1] - ends[k])
+    if still_ns < 2 * _tclk_ns(e):
+        raise TooLittle(f"CLK moves on: {still_ns} ns without an edge at most")
+    level, due = int(e.wires["CLK"].level[k]), int(row_for(e, "PIK-SIG-01").limits.get("clk_level", 0))
+    if level != due:
+        raise Broken(f"CLK {level} for {still_ns} ns", f"{due} at rest", at_ns=int(ends[k]), lines=("CLK",))
+    return f"CLK {level} for {still_ns} ns without power"

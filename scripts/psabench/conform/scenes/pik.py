@@ -9,6 +9,7 @@ from psabench.conform.streamed import from_res, readings
 from psabench.conform.subject import Subject
 
 START_S, STREAM_S, MINUTE_S = 0.06, 1.0, 60.5
+OFF_S = 0.02  # without power
 BUS, PERIOD, SOON = 0x2002, 0x0C, 20  # registers over CAN; 20 times 100 us
 OVERDRIVE_DEG = -90.0  # there the accelerometer X gives more than its channel can follow
 
@@ -54,3 +55,14 @@ def overdrive(s: Subject) -> Evidence:
     s.reset()
     s.run_for(START_S)
     return s.evidence("overdrive", take)
+
+
+@scene("power_cycle", boards=("pik",))
+def power_cycle(s: Subject) -> Evidence:
+    """Readings, no power for a while, and its first periods afterwards."""
+    s.reset()
+    s.run_for(START_S)
+    with s.take() as take:
+        s.power_cycle(OFF_S)
+        s.run_for(START_S)
+    return s.evidence("power_cycle", take)
