@@ -122,12 +122,12 @@ def test_a_pulse_that_a_gap_cuts_is_no_fault() -> None:
 
 
 def test_clocks_may_be_off() -> None:
-    e = good("pik6")
+    e = good("pmka")
 
     def fast(by: float) -> Evidence:
         old = e.wires.recording.wires
         return evidence(
-            "pik6", {n: Wire(np.floor(w.t_ns * (1 - by)).astype(np.int64), w.level) for n, w in old.items()}
+            "pmka", {n: Wire(np.floor(w.t_ns * (1 - by)).astype(np.int64), w.level) for n, w in old.items()}
         )
 
     assert short(fast(180e-6))
