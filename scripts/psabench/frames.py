@@ -108,7 +108,7 @@ class FrameReader:
             handler(m)
 
     def __len__(self) -> int:
-        """Samples that `take` would return."""
+        """Samples that `take` would return; fewer where it finds halves of two samples taken for one."""
         return len(self._first.data) * (5 if self._form is Form.BLOCK else 1)
 
     def forget(self) -> None:
@@ -184,13 +184,16 @@ class FrameReader:
     def _pairs(self, xy_kept: _Kept, zt_kept: _Kept) -> Frames:
         xy, xy_at = _bits("PSA2_XY", xy_kept.data)
         zt, zt_at = _bits("PSA2_ZT", zt_kept.data)
+        stamp = zt_at["TSTAMP"]
+        mixed = _mixed(signals.raw(xy, xy_at["SEQ"]), signals.raw(zt, stamp), self._seq, self._stamp)
+        self.counters.torn += int(mixed.sum())
+        xy, zt, t_rx_s = xy[~mixed], zt[~mixed], np.array(zt_kept.t_s)[~mixed]
         seq = signals.raw(xy, xy_at["SEQ"])
         self._count_gaps(seq, xy_at["SEQ"].bits)
-        stamp = zt_at["TSTAMP"]
         settled, clipped = self._status(*(signals.raw(zt, zt_at[s]) for s in ("SETTLED", "CLIP", "OVERRUN")))
         u = [signals.physical(xy, xy_at["X"]), signals.physical(xy, xy_at["Y"]), signals.physical(zt, zt_at["Z"])]
         return Frames(
-            t_rx_s=np.array(zt_kept.t_s),
+            t_rx_s=t_rx_s,
             t_sample_s=self._times(signals.raw(zt, stamp), stamp.bits, stamp.scale),
             seq=seq,
             u_v=np.stack(u, axis=1),
@@ -261,6 +264,24 @@ class FrameReader:
             periods = np.rint(steps_s / np.median(steps_s))
             self.counters.lost += int((periods - 1).clip(min=0).sum()) * each
         return t_s
+
+
+def _mixed(seq: Ints, stamp: Ints, seq_before: int | None, stamp_before: int | None) -> npt.NDArray[np.bool_]:
+    """Which pairs are the first half of one sample and the second half of a later one.
+
+    Where both halves between them were lost, TSTAMP alone tells: the pair's instant is whole periods from where its SEQ
+    has it, the next pair's is right again, and SEQ has a gap after it. A last pair has no next one and is believed.
+    """
+    known = seq_before is not None and stamp_before is not None
+    before = np.array([[seq_before or 0, stamp_before or 0]] if known else [[seq[0], stamp[0]]])
+    numbers, ticks = np.diff(np.concatenate([before, np.stack([seq, stamp], axis=1)]), axis=0).T % (1 << 16)
+    single = ticks[numbers == 1]
+    mixed = np.zeros(len(seq), dtype=np.bool_)
+    if single.size < 3 or not (period := np.mean(single[np.abs(single - np.median(single)) <= 2])):
+        return mixed  # nobody knows the period
+    off = (ticks - numbers * period + (1 << 15)) % (1 << 16) - (1 << 15)
+    mixed[:-1] = (np.abs(off[:-1]) > period / 2) & (np.abs(off[:-1] + off[1:]) < period / 2) & (numbers[1:] > 1)
+    return mixed
 
 
 def _bits(name: str, data: list[bytes]) -> tuple[Bits, dict[str, signals.Signal]]:

@@ -125,6 +125,41 @@ def test_halves_and_wrong_lengths_are_torn_and_never_mixed() -> None:
     assert reader.counters.torn == 4  # all but the first zt, which was under way: zt, xy, the short frame, zt
 
 
+@pytest.mark.parametrize("period", [62.5, 250.0, 1000.0])  # of 4 us: 4000, 1000 and 250 a second
+@pytest.mark.parametrize("after", [1, 2, 40])
+@pytest.mark.parametrize("take_at", [0, 20, 29])
+def test_halves_of_two_samples_are_not_one(period: float, after: int, take_at: int) -> None:
+    """The second half of sample 30 and the first of a later one were lost, and all between."""
+    reader = FrameReader()
+    taken = 0
+    for k in range(120):
+        xy, zt = pair((k, k, k), 65500 + k, round(k * period))
+        if 30 < k < 30 + after:
+            continue
+        feed(reader, [xy] * (k != 30 + after) + [zt] * (k != 30))
+        if k == take_at:
+            taken += len(reader.take())
+    frames = reader.take()
+    codes = np.rint(frames.u_v / LSB_V)
+    assert (codes[:, 0] == codes[:, 2]).all()
+    assert taken + len(frames) == 120 - 1 - after
+    assert reader.counters.torn == 1
+    assert reader.counters.lost == 1 + after
+
+
+def test_other_rates_and_lost_samples_are_no_halves() -> None:
+    """A stream that goes on faster, or slower, after a gap, or that has lost whole samples."""
+    stamps = np.cumsum([0] + [250] * 20 + [100] * 20 + [500] * 20)
+    stamps[10] += 200  # a stamp that is wrong, no sample that is lost
+    reader = FrameReader()
+    for k, stamp in enumerate(stamps.tolist()):
+        if k not in (7, 8, 20, 33, 40, 41):
+            feed(reader, pair((k, k, k), k, stamp))
+    assert len(reader.take()) == 61 - 6
+    assert reader.counters.torn == 0
+    assert reader.counters.lost == 6
+
+
 def test_other_nodes_and_error_frames_are_let_by() -> None:
     reader = FrameReader(node_id=6)
     error = can.Message(arbitration_id=0x186, is_error_frame=True)
