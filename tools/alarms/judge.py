@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import multiprocessing
 import os
@@ -174,6 +175,7 @@ def _bounded(case: Case, limit_s: float, judged: Judged) -> Found:
 
 def _child(to: Connection, case: Case, judged: Judged) -> None:
     os.setsid()  # a group of its own: it can be ended with its busy loops
+    gc.disable()  # it lives for seconds; a tenth of them would go there
     try:
         to.send(Found(outcomes=judged(case)))
     except BenchError as e:
