@@ -155,7 +155,7 @@ def test_what_was_run_is_not_run_again(tmp_path: Path) -> None:
 def test_the_exit_status_says_whether_there_was_one(
     found: Result, status: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(run, "result", lambda case, now: replace(found, case=case, state=now))
+    monkeypatch.setattr(run, "result", lambda case, now, judged: replace(found, case=case, state=now))
     monkeypatch.setattr(run, "own_copy", lambda folder: None)
     out = tmp_path / "alarms.json"
     assert run.main(["w24", "--seeds", "3-4", "--out", str(out)]) == status

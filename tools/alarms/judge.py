@@ -73,9 +73,9 @@ class Found:
 Judged = Callable[[Case], list[Outcome]]
 
 
-def judged(case: Case) -> list[Outcome]:
-    """All outcomes of the suite. Raises BenchError."""
-    return real_time(case) if case.load else in_lockstep(case)
+def judged(case: Case, *, loops: int = os.cpu_count() or 1) -> list[Outcome]:
+    """All outcomes of the suite. loops: busy ones, where the case is under load. Raises BenchError."""
+    return real_time(case, loops) if case.load else in_lockstep(case)
 
 
 def in_lockstep(case: Case) -> list[Outcome]:
@@ -86,8 +86,8 @@ def in_lockstep(case: Case) -> list[Outcome]:
         return runner.run(subject, Silent())
 
 
-def real_time(case: Case) -> list[Outcome]:
-    """With an emulator in real time, over its socketcand, line port, bus port and supply, while all cores are busy."""
+def real_time(case: Case, loops: int) -> list[Outcome]:
+    """With an emulator in real time, over its socketcand, line port, bus port and supply, beside so many busy loops."""
     v = variant(case.board, case.profile)
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="psabench-")))
@@ -105,7 +105,7 @@ def real_time(case: Case) -> list[Outcome]:
             scpi=scpi_addresses(emulator.endpoints),
             inputs_v={} if v.family == "gyro" else INPUTS_V,
         )
-        stack.enter_context(busy(os.cpu_count() or 1))
+        stack.enter_context(busy(loops))
         with Subject.open(v, at) as subject:
             return runner.run(subject, Silent())
 

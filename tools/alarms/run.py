@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import logging
 import os
 import shutil
 import signal
@@ -10,11 +11,12 @@ import sys
 import tempfile
 import time
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 from alarms import report
 from alarms.design import LOAD_SEEDS, SEEDS, Case, lockstep, under_load
-from alarms.judge import Result, result
+from alarms.judge import Result, judged, result
 from mutants.run import state
 from mutants.tree import ROOT, copy
 from psabench.conform import suite
@@ -45,6 +47,9 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("--seeds", type=seeds, metavar="A-B", help="the lockstep part has 1-200, that under load 1-3")
     p.add_argument("--full", action="store_true", help="each error of the clocks with each seed")
     p.add_argument("--load", action="store_true", help="the part in real time under load")
+    p.add_argument(
+        "--busy", type=int, default=os.cpu_count() or 1, metavar="N", help="busy loops beside --load (one a core)"
+    )
     p.add_argument("--anew", action="store_true", help="run again what was run")
     p.add_argument("--stale", action="store_true", help="run again what was run with other sources")
     p.add_argument("--minutes", type=float, metavar="N", help="begin no run after that")
@@ -100,7 +105,7 @@ def carry_out(args: argparse.Namespace, wanted: Sequence[Case]) -> int:
             if time.monotonic() >= ends_s:
                 print(f"{len(todo) - n + 1} runs are left")
                 break
-            r = result(case, now)
+            r = result(case, now, partial(judged, loops=args.busy))
             known[case.key] = r
             report.write(args.out, known)
             print(f"{n}/{len(todo)} {report.line(r)}", flush=True)
@@ -121,6 +126,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     args = parser().parse_args(argv)
     signal.signal(signal.SIGINT, signal.default_int_handler)  # a script may have started us in the background
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # as Ctrl-C
+    logging.getLogger("can").setLevel(logging.CRITICAL)  # what goes wrong there is raised as well
     suite.load()
     try:
         wanted = cases(args)
