@@ -167,6 +167,13 @@ def test_the_exit_status_says_whether_there_was_one(
     assert "w24            seed" not in capsys.readouterr().out
 
 
+def test_of_a_part_of_the_suite_nothing_is_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "alarms.json"
+    assert run.main(["w24", "--seeds", "3-3", "--out", str(out), "--only", "PSA2-FRAME-06", "PSA2-INT-01"]) == 0
+    assert "2 of 2 passed" in capsys.readouterr().out
+    assert not out.exists()
+
+
 @pytest.mark.parametrize("words", [["nobody"], ["w24", "--seeds", "0-4"], ["w24", "--seeds", "4-3"]])
 def test_what_there_is_not_is_refused(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     try:

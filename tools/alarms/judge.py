@@ -73,20 +73,23 @@ class Found:
 Judged = Callable[[Case], list[Outcome]]
 
 
-def judged(case: Case, *, loops: int = os.cpu_count() or 1) -> list[Outcome]:
-    """All outcomes of the suite. loops: busy ones, where the case is under load. Raises BenchError."""
-    return real_time(case, loops) if case.load else in_lockstep(case)
+def judged(case: Case, *, loops: int = os.cpu_count() or 1, only: Sequence[str] = ()) -> list[Outcome]:
+    """All outcomes of the suite. loops: busy ones, where the case is under load; only: as `runner.run`'s.
+
+    Raises BenchError.
+    """
+    return real_time(case, loops, only) if case.load else in_lockstep(case, only)
 
 
-def in_lockstep(case: Case) -> list[Outcome]:
+def in_lockstep(case: Case, only: Sequence[str]) -> list[Outcome]:
     """With an emulator whose time moves when we say so."""
     v = variant(case.board, case.profile)
     errors = {"clock_ppm": case.board_ppm, "recorder_ppm": case.probes_ppm}
     with Subject.open(v, Addresses(), seed=case.seed, **errors) as subject:
-        return runner.run(subject, Silent())
+        return runner.run(subject, Silent(), only=only)
 
 
-def real_time(case: Case, loops: int) -> list[Outcome]:
+def real_time(case: Case, loops: int, only: Sequence[str]) -> list[Outcome]:
     """With an emulator in real time, over its socketcand, line port, bus port and supply, beside so many busy loops."""
     v = variant(case.board, case.profile)
     with ExitStack() as stack:
@@ -107,7 +110,7 @@ def real_time(case: Case, loops: int) -> list[Outcome]:
         )
         stack.enter_context(busy(loops))
         with Subject.open(v, at) as subject:
-            return runner.run(subject, Silent())
+            return runner.run(subject, Silent(), only=only)
 
 
 def _spin() -> None:

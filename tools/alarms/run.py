@@ -50,6 +50,7 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument(
         "--busy", type=int, default=os.cpu_count() or 1, metavar="N", help="busy loops beside --load (one a core)"
     )
+    p.add_argument("--only", nargs="+", default=[], metavar="ID", help="tests of these requirements; nothing is kept")
     p.add_argument("--anew", action="store_true", help="run again what was run")
     p.add_argument("--stale", action="store_true", help="run again what was run with other sources")
     p.add_argument("--minutes", type=float, metavar="N", help="begin no run after that")
@@ -105,7 +106,7 @@ def carry_out(args: argparse.Namespace, wanted: Sequence[Case]) -> int:
             if time.monotonic() >= ends_s:
                 print(f"{len(todo) - n + 1} runs are left")
                 break
-            r = result(case, now, partial(judged, loops=args.busy))
+            r = result(case, now, partial(judged, loops=args.busy, only=args.only))
             known[case.key] = r
             report.write(args.out, known)
             print(f"{n}/{len(todo)} {report.line(r)}", flush=True)
@@ -135,6 +136,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     with tempfile.TemporaryDirectory(prefix="alarms-") as folder:
         own_copy(Path(folder))
+        if args.only:  # less than a run
+            args.out, args.docs = Path(folder) / OUT.name, False
         return carry_out(args, wanted)
 
 
