@@ -355,13 +355,26 @@ def _judged(bench: Bench, proof: Proof, rows: tuple[Requirement, ...], keep: Kee
     return replace(_carried_out(bench, proof, evidence, found, keep), took_s=time.monotonic() - begun_s)
 
 
+# Where the device suite would say which option is wanted.
+UNRECORDED = {
+    "can": "no CAN bus was recorded",
+    "fd": "no FD frame was recorded",
+    "port": "the line port itself is asked; a recording has its samples alone",
+    "bus": "the bus port is asked; a recording has none",
+    "supply": "the suite turns a power supply; a recording has none",
+    "chamber": "the suite turns a thermal chamber; a recording has none",
+    "head": "the suite turns a dividing head; a recording has none",
+    "table": "the suite turns a rate table; a recording has none",
+}
+
+
 def _missing(bench: Bench, way: str) -> str:
     lines = bench.recording.lines
     if way == "pins" and lines is not None:
         return f"edges are known to {lines.resolution_ns:.4g} ns; {PINS_NS:g} ns or better are wanted"
     if way in ("line", "pins"):
         return "no lines were recorded"
-    return {"can": "no CAN bus was recorded", "fd": "no FD frame was recorded"}.get(way, MISSING.get(way, way))
+    return UNRECORDED.get(way) or MISSING.get(way, way)
 
 
 def _carried_out(bench: Bench, proof: Proof, evidence: Evidence, open_: Outcome, keep: Keep) -> Outcome:
