@@ -18,7 +18,7 @@ from psabench.conform.proof import proves
 from psabench.conform.requirements import Requirement
 from psabench.conform.scenes.psa2_can import Answer
 from psabench.protocol_files import message
-from psabench.signals import Ints
+from psabench.signals import Floats, Ints
 
 # ---- frame forms
 
@@ -65,11 +65,16 @@ def the_fast_form_drops_bits(e: Evidence) -> str:
                 frames=_form(e, 1, "PSA2_FAST").frames[:3],
             )
         sound = (pair.code[:, k] >= lo - around) & (pair.code[:, k] <= hi + around)
-        mean = float(pair.code[sound, k].mean()) / (1 << int(row.limit("shift_bits")))
-        off = float(fast[~bad, k].mean()) + 0.5 - mean
-        if abs(off) > row.limit("mean_max_codes"):
+        step = 1 << int(row.limit("shift_bits"))
+        off, error = _apart(fast[~bad, k] + 0.5, pair.code[sound, k] / step)
+        if abs(off) > max(row.limit("mean_max_codes"), row.limit("sigmas") * error):
             raise Broken(f"{'XYZ'[k]} {off:+.2f} codes from the middle of its step", "rounded towards minus infinity")
     return f"{len(fast)} frames, X, Y, Z those of form 0 shifted"
+
+
+def _apart(a: Floats, b: Floats) -> tuple[float, float]:
+    """Mean of a less that of b, and its standard error."""
+    return float(a.mean() - b.mean()), float(np.sqrt(a.var() / len(a) + b.var() / len(b)))
 
 
 @proves("PSA2-FORM-02")
