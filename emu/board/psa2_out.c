@@ -42,16 +42,17 @@ static void report_word(struct psa2 *b, int64_t until_ns)
     o->at = clk_on(o->at, &o->word_gap);
     struct trace_step *const step = trace_room(&b->trace, 3 * 32 + 1), *p = step;
     if (!step) return;
-    const uint64_t changes = word ^ (uint64_t)word << 1; /* DATA rests low before the first bit and after the last */
-    for (unsigned bit = 0; bit < b->profile.word_bits; bit++) {
-        *p = (struct trace_step){at.t_ns, DATA, (word >> bit & 1) << PSA2_LINE_DATA};
-        p += changes >> bit & 1; /* no branch: data cannot be predicted */
+    uint64_t level = (uint64_t)word << PSA2_LINE_DATA; /* beside DATA it means nothing */
+    uint64_t changes = word ^ (uint64_t)word << 1;     /* DATA rests low before the first bit and after the last */
+    for (unsigned bit = 0; bit < b->profile.word_bits; bit++, level >>= 1, changes >>= 1) {
+        *p = (struct trace_step){at.t_ns, DATA, level};
+        p += changes & 1; /* no branch: data cannot be predicted */
         at = clk_on(at, &one);
         *p++ = (struct trace_step){at.t_ns, CLK, CLK};
         at = clk_on(at, &one);
         *p++ = (struct trace_step){at.t_ns, CLK, 0};
     }
-    *p++ = (struct trace_step){at.t_ns, changes >> b->profile.word_bits & 1 ? DATA : 0, 0};
+    *p++ = (struct trace_step){at.t_ns, changes & 1 ? DATA : 0, 0};
     if (at.t_ns <= until_ns) {
         trace_commit_run(&b->trace, (unsigned)(p - step), CLK | DATA);
         return;

@@ -110,11 +110,10 @@ int64_t psa2_spi_span_ns(const struct psa2 *b, const struct psa2_xfer *x, int64_
     return span_ns + (x->group == PSA2_TEMP ? psa2_tau_ns(b, CST_TAU) : periods_ns(b->profile.sclk_hz, 1));
 }
 
-/* Bit `shift` of up to four bytes, side by side. */
+/* Bit `shift` of up to four bytes, side by side: the product has bit 8 n of the factor at bit 24 + n, and nothing above. */
 static uint32_t bit_of_each(uint32_t bytes, unsigned shift)
 {
-    const uint32_t v = bytes >> shift & 0x01010101;
-    return (v | v >> 7 | v >> 14 | v >> 21) & 0xF;
+    return (bytes >> shift & 0x01010101) * 0x01020408 >> 24;
 }
 
 /* Bytes of lines whose numbers follow on one another, the first in the low byte. */

@@ -72,7 +72,7 @@ static int64_t saturate(struct ads1282 *a, double x)
 
 /* Zero mean, unit rms after division by DRAW_SD. Four uniforms are enough: the chain averages more than 50 blocks, which
  * leaves the output an excess kurtosis below 0.006, at a seventh of the cost of a Gaussian draw. */
-static double draw(struct rng *r)
+static inline double draw(struct rng *r)
 {
     const uint64_t u = rng_u64(r);
     const uint32_t sum =
@@ -125,6 +125,18 @@ static void modulate(struct ads1282 *a, const double *vin_v, unsigned n, int64_t
     a->last_lsb = lsb[n - 1];
 }
 
+/* The instants of the next samples up to until_ns, at most n; returns how many. */
+static unsigned pass(struct ads1282 *a, int64_t until_ns, unsigned n, int64_t *t_ns)
+{
+    const struct clk_step step = a->step;
+    struct clk_pos next = a->next;
+    unsigned i = 0;
+    for (; i < n && next.t_ns <= until_ns; next = clk_on(next, &step)) t_ns[i++] = next.t_ns;
+    a->next = next;
+    a->index += i;
+    return i;
+}
+
 /* Blocks up to the end of their data period at a time. */
 static void sample_fir(struct ads1282 *a, int64_t until_ns)
 {
@@ -133,8 +145,7 @@ static void sample_fir(struct ads1282 *a, int64_t until_ns)
         const unsigned period = (unsigned)(a->index / ADS1282_BLOCKS);
         int64_t t_ns[ADS1282_BLOCKS];
         double vin_v[ADS1282_BLOCKS];
-        unsigned n = 0;
-        for (; slot + n < ADS1282_BLOCKS && a->next.t_ns <= until_ns; advance(a)) t_ns[n++] = a->next.t_ns;
+        const unsigned n = pass(a, until_ns, ADS1282_BLOCKS - slot, t_ns);
         input_row_v(a, t_ns, n, vin_v);
         modulate(a, vin_v, n, a->sinc + slot);
         if (slot + n == ADS1282_BLOCKS)

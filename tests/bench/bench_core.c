@@ -71,20 +71,18 @@ static void rate(void *ctx, int64_t t_ns, double w_radps[3])
     w_radps[2] = 0.3;
 }
 
-static uint64_t bits_set(uint64_t v)
-{
-    v -= v >> 1 & UINT64_C(0x5555555555555555);
-    v = (v & UINT64_C(0x3333333333333333)) + (v >> 2 & UINT64_C(0x3333333333333333));
-    return ((v + (v >> 4)) & UINT64_C(0x0F0F0F0F0F0F0F0F)) * UINT64_C(0x0101010101010101) >> 56;
-}
+/* The instruction that counts bits, where there is one: what is measured is the emulator, not its listener. */
+#if defined __x86_64__
+#define COUNTS_BITS __attribute__((target("popcnt")))
+#else
+#define COUNTS_BITS
+#endif
 
-static void count(void *ctx, const struct trace_step *s, unsigned n)
+COUNTS_BITS static void count(void *ctx, const struct trace_step *s, unsigned n)
 {
     uint64_t edges = 0;
-    for (unsigned i = 0; i < n; i++) {
-        const uint64_t lines = s[i].lines; /* mostly one, where reads are more, seldom none */
-        edges += lines & (lines - 1) ? bits_set(lines) : lines != 0;
-    }
+#pragma GCC unroll 8
+    for (unsigned i = 0; i < n; i++) edges += (unsigned)__builtin_popcountll(s[i].lines);
     ((struct bench *)ctx)->edges += edges;
 }
 

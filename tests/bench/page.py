@@ -90,7 +90,7 @@ def watching(r: Result) -> float | None:
 LINES = "all lines watched, no decimation chain"
 WHY_LINES = (
     "the target is a prototype's that made lines from ready words; here four converters keep their registers and draw "
-    "their noise, and of the instructions about eleven an edge are the counting listener's own"
+    "their noise, and of the instructions about three an edge are the counting listener's own"
 )
 WHY_CHAIN = "the decimation chain of three converters, which the models lack, takes about half of it"
 WHY_STRETCH = (
