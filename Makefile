@@ -80,7 +80,7 @@ C_FILES   = $(sort $(wildcard emu/*/*.[ch] emu/*/*.[ch]pp tests/*/*.[ch] example
 
 .SECONDARY:
 .DELETE_ON_ERROR:
-.PHONY: all lib setup run test bench bench-bin mutants fault-matrix alarms check pytest san builds e2e e2e-san e2e-vcan e2e-slc0 uml soak fuzz fuzz-check fuzz-each lint format golden docs prove install uninstall wheel clean help lock
+.PHONY: all lib setup run test bench bench-bin mutants fault-matrix alarms check pytest san builds e2e e2e-san e2e-vcan e2e-slc0 uml soak fuzz fuzz-check fuzz-long fuzz-bin fuzz-each lint format golden docs prove install uninstall wheel clean help lock
 
 ## all: the emulator, build/psa-emu (make CC=clang and make SAN=address,undefined build beside it, in build-clang and build-san)
 all: $(if $(MAIN),$(BUILD)/psa-emu,$(LIB_OBJ)) lib
@@ -253,6 +253,13 @@ fuzz:
 ## fuzz-check: the files that fuzzing has found so far, then some thousand inputs for each target, the same each time
 fuzz-check:
 	@$(FUZZ_MAKE) FUZZ_S=check fuzz-each
+
+## fuzz-long: each target for an hour of CPU in all, a target a core; what has been run counts (LONG='psa2 pik --minutes 5')
+fuzz-long:
+	@$(FUZZ_MAKE) fuzz-bin
+	@PYTHONPATH=tools $(PY) tools/fuzz_long.py $(LONG)
+
+fuzz-bin: $(FUZZ_BIN)
 
 fuzz-each: $(FUZZ_BIN)
 	@tests/fuzz/run $(FUZZ_S) $(FUZZ_BIN)
