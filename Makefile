@@ -257,7 +257,7 @@ fuzz-check:
 ## fuzz-long: each target for an hour of CPU in all, a target a core; what has been run counts (LONG='psa2 pik --minutes 5')
 fuzz-long:
 	@$(FUZZ_MAKE) fuzz-bin
-	@PYTHONPATH=tools $(PY) tools/fuzz_long.py $(LONG)
+	@$(PY) tools/fuzz_long.py $(LONG)
 
 fuzz-bin: $(FUZZ_BIN)
 
