@@ -40,6 +40,7 @@ examples:
   make fuzz-long LONG='--minutes 0 --docs'                  run nothing, write the table of docs/fuzzing.md
 
 What was run stands in tests/fuzz/minutes.csv, a row for each target and state of the sources, and counts the next time.
+What a target was run before a finding does not count: its time begins anew.
 Ctrl-C ends it and loses nothing. Exit status: 0 all have had their time, 1 a finding, 2 bad input, 130 ended by Ctrl-C.
 """
 
@@ -154,8 +155,12 @@ class Campaign:
             spent = self.record.setdefault((target, self.sources), Spent())
             spent.cpu_s += cpu_s
             spent.inputs += int(executed[1]) if executed else 0
+            good = self.told(target, status, text)
+            if not good:
+                for key in [k for k in self.record if k[0] == target]:
+                    del self.record[key]
             write(self.path, self.record)
-            return self.told(target, status, text)
+            return good
 
     def child(self, command: list[str]) -> tuple[int, float, str]:
         """Exit status, seconds of CPU, what it said. In a session of its own: Ctrl-C is ours to hand on."""

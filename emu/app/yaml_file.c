@@ -2,6 +2,7 @@
 
 #include "base/text.h"
 
+#include <ctype.h>
 #include <errno.h>
 #include <libfyaml.h>
 #include <stdarg.h>
@@ -193,14 +194,31 @@ static bool build(struct yaml_file *f, struct fy_parser *p, struct fy_diag *diag
     return ok;
 }
 
+/* Whether a word ends before text[i]. A byte order mark is none. */
+static bool word_before(const char *text, size_t i)
+{
+    const unsigned char c = i > 0 ? (unsigned char)text[i - 1] : ' ';
+    if (i >= 3 && memcmp(text + i - 3, "\xEF\xBB\xBF", 3) == 0) return false;
+    return c >= 0x80 || isalnum(c) || strchr("_.)?", c);
+}
+
+/* `? ` where a key may begin, or might: quotes and comments are not looked for. */
+static bool explicit_key(const char *text, size_t len, size_t i)
+{
+    return text[i] == '?' && (i + 1 == len || strchr(" \t\r\n", text[i + 1])) && !word_before(text, i);
+}
+
 /* What libfyaml 0.7.12 must not see: a NUL is the end to it, what follows would go unread; some directives, lines that
- * begin with %, keep it busy for ever. Nobody needs either. */
+ * begin with %, keep it busy for ever; a tab behind an explicit key, `? KD:\t`, makes it free the same memory twice.
+ * Nobody needs any of them. */
 static bool check_bytes(struct yaml_file *f, const char *text, size_t len)
 {
     struct yaml_node at = {.line = 1, .column = 1};
     for (size_t i = 0; i < len; i++) {
         if (text[i] == '\0') return yaml_file_fail(f, &at, NULL, "not YAML: a NUL byte");
         if (text[i] == '%' && at.column == 1) return yaml_file_fail(f, &at, NULL, "a directive: there are none here");
+        if (explicit_key(text, len, i))
+            return yaml_file_fail(f, &at, NULL, "a ? of its own, an explicit key: `key: value` is wanted");
         const bool ends = text[i] == '\n' || text[i] == '\r';
         at.column = ends ? 1 : at.column + 1;
         at.line += text[i] == '\n';

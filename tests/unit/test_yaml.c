@@ -185,6 +185,11 @@ static const struct {
     {"faults: [1]\nunits: [{}]\n", "dir/s.yaml:1:10: faults: a mapping with the arguments of fault.add"},
     {"seed: 1\n---\nseed: 2\n", "dir/s.yaml:3:1: a second document"},
     {"%YAML 1.2\n---\nunits: [{}]\n", "dir/s.yaml:1:1: a directive: there are none here"},
+    {"? KD:\t? :", "dir/s.yaml:1:1: a ? of its own, an explicit key"}, /* libfyaml frees the same memory twice */
+    {"\xEF\xBB\xBF? KD:\t? :", "dir/s.yaml:1:4: a ? of its own"},
+    {"units: [{}]\n&a ?\tb:\t? :", "dir/s.yaml:2:4: a ? of its own"},
+    {"units: [{\"a\"? b:\t? :", "dir/s.yaml:1:13: a ? of its own"},
+    {"seed: ?", "dir/s.yaml:1:7: a ? of its own"},
     {"seed: *x\n", "dir/s.yaml:1:7: *x: no such anchor"},
     {"a: &x [*x]\n", "dir/s.yaml:1:8: *x: no such anchor"},
 };
@@ -198,6 +203,14 @@ static void what_is_wrong_is_told_with_file_line_key_and_remedy(void **state)
             fail_msg("%s\n  gave %s\n  want %s", bad[i].text, why, bad[i].why);
         assert_null(strchr(why, '\n'));
     }
+}
+
+static void a_question_in_words_is_no_key(void **state)
+{
+    (void)state;
+    if (!parse("# Why? Because. \xD0\xB4\xD0\xB0? (yes)? 5? no?? so\nseed: 7 # what?\nunits: [{}]\n"))
+        fail_msg("%s", why);
+    assert_int_equal(s.seed, 7);
 }
 
 static void the_order_of_keys_means_nothing(void **state)
@@ -314,6 +327,7 @@ int main(void)
         cmocka_unit_test(a_scenario_without_more_than_a_unit_has_sound_defaults),
         cmocka_unit_test(every_key_reaches_its_field),
         cmocka_unit_test(what_is_wrong_is_told_with_file_line_key_and_remedy),
+        cmocka_unit_test(a_question_in_words_is_no_key),
         cmocka_unit_test(the_order_of_keys_means_nothing),
         cmocka_unit_test(each_board_brings_its_defaults),
         cmocka_unit_test(cut_off_anywhere_a_scenario_is_refused_or_sound),
