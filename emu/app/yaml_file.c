@@ -194,11 +194,16 @@ static bool build(struct yaml_file *f, struct fy_parser *p, struct fy_diag *diag
     return ok;
 }
 
-/* Whether a word ends before text[i]. A byte order mark is none. */
+/* Whether text[i] begins a byte order mark. */
+static bool order_mark(const char *text, size_t len, size_t i)
+{
+    return len - i >= 3 && memcmp(text + i, "\xEF\xBB\xBF", 3) == 0;
+}
+
+/* Whether a word ends before text[i]. */
 static bool word_before(const char *text, size_t i)
 {
     const unsigned char c = i > 0 ? (unsigned char)text[i - 1] : ' ';
-    if (i >= 3 && memcmp(text + i - 3, "\xEF\xBB\xBF", 3) == 0) return false;
     return c >= 0x80 || isalnum(c) || strchr("_.)?", c);
 }
 
@@ -209,13 +214,14 @@ static bool explicit_key(const char *text, size_t len, size_t i)
 }
 
 /* What libfyaml 0.7.12 must not see: a NUL is the end to it, what follows would go unread; some directives, lines that
- * begin with %, keep it busy for ever; a tab behind an explicit key, `? KD:\t`, makes it free the same memory twice.
- * Nobody needs any of them. */
+ * begin with %, be it behind a byte order mark, keep it busy for ever; a tab behind an explicit key, `? KD:\t`, makes it
+ * free the same memory twice. Nobody needs any of them. */
 static bool check_bytes(struct yaml_file *f, const char *text, size_t len)
 {
     struct yaml_node at = {.line = 1, .column = 1};
     for (size_t i = 0; i < len; i++) {
         if (text[i] == '\0') return yaml_file_fail(f, &at, NULL, "not YAML: a NUL byte");
+        if (order_mark(text, len, i)) return yaml_file_fail(f, &at, NULL, "a byte order mark within the text");
         if (text[i] == '%' && at.column == 1) return yaml_file_fail(f, &at, NULL, "a directive: there are none here");
         if (explicit_key(text, len, i))
             return yaml_file_fail(f, &at, NULL, "a ? of its own, an explicit key: `key: value` is wanted");
@@ -230,6 +236,10 @@ bool yaml_file_parse(struct yaml_file *f, const char *path, const char *text, si
 {
     struct fy_diag_cfg diag_cfg;
     *f = (struct yaml_file){.path = path, .why = why, .cap = cap};
+    if (order_mark(text, len, 0)) { /* some editors put it there */
+        text += 3;
+        len -= 3;
+    }
     if (!check_bytes(f, text, len)) return false;
     fy_diag_cfg_default(&diag_cfg);
     diag_cfg.fp = NULL;
