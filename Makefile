@@ -179,7 +179,7 @@ test:
 bench:
 	@tools/setup bench
 	@$(MAKE) --no-print-directory bench-bin
-	@BENCH_CC='$(CC)' BENCH_CFLAGS='$(CFLAGS)' $(PY) -m tests.bench.run --seconds $(BENCH_S)
+	@PYTHONPATH=tools BENCH_CC='$(CC)' BENCH_CFLAGS='$(CFLAGS)' $(PY) -m tests.bench.run --seconds $(BENCH_S)
 
 bench-bin: all $(BENCH_BIN)
 

@@ -5,32 +5,34 @@ from __future__ import annotations
 
 import argparse
 import csv
-import hashlib
+import math
 import os
 import re
 import signal
 import subprocess
 import sys
-import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
 from pathlib import Path
 from threading import Event, Lock
 
+from between import marks, spliced
 from psabench.whole_file import replace_file
+from sources import digest
 
 ROOT = Path(__file__).resolve().parents[1]
+RUN = ROOT / "tests/fuzz/run"
 BINARIES = ROOT / "build-fuzz/fuzz"
 RECORD = ROOT / "tests/fuzz/minutes.csv"
 PAGE = ROOT / "docs/fuzzing.md"
 FIELDS = ("target", "sources", "cpu_s", "inputs")
 SLICE_S = 300  # what is lost at most when the machine goes down
-INPUT_S = 120  # an input that takes longer is a finding: a thousand times the usual
-EXECUTED = re.compile(r"^stat::number_of_executed_units: *(\d+)", re.MULTILINE)
-WRITTEN = re.compile(r"Test unit written to (\S+)")
-BEGIN, END = "<!-- minutes:begin -->", "<!-- minutes:end -->"
+JOBS = range(1, 65)
+INPUTS = re.compile(r"^fuzz_\w+: (\d+) inputs$", re.MULTILINE)  # of RUN, after a target that found nothing
+INTERRUPTED = 130  # exit status, of RUN as of ours
+MARKS = marks("minutes")
 
 EPILOG = """\
 examples:
@@ -57,11 +59,15 @@ Record = dict[tuple[str, str], Spent]  # (target, sources)
 
 
 def read(path: Path) -> Record:
-    """What was run so far. Raises ValueError, KeyError for a file that is not ours."""
+    """What was run so far. Raises ValueError, with the place, for a file that is not ours."""
     if not path.exists():
         return {}
     with path.open(newline="", encoding="ascii") as f:
-        return {(r["target"], r["sources"]): Spent(float(r["cpu_s"]), int(r["inputs"])) for r in csv.DictReader(f)}
+        rows = csv.DictReader(f)
+        try:
+            return {(r["target"], r["sources"]): Spent(float(r["cpu_s"]), int(r["inputs"])) for r in rows}
+        except (ValueError, KeyError, TypeError):
+            raise ValueError(f"{path}: line {rows.line_num}: wanted {','.join(FIELDS)}") from None
 
 
 def write(path: Path, record: Record) -> None:
@@ -71,13 +77,9 @@ def write(path: Path, record: Record) -> None:
     replace_file(path, "\n".join(rows) + "\n")
 
 
-def state(root: Path = ROOT) -> str:
+def state() -> str:
     """Of the sources that are fuzzed, and of the targets."""
-    digest = hashlib.sha256()
-    for part in ("emu", "tests/fuzz"):
-        for path in sorted(p for p in (root / part).rglob("*") if p.suffix in (".c", ".h")):
-            digest.update(str(path.relative_to(root)).encode() + b"\0" + path.read_bytes())
-    return digest.hexdigest()[:12]
+    return digest(ROOT, ("emu", "tests/fuzz"), (".c", ".h"))[:12]
 
 
 def in_all(record: Record, target: str) -> Spent:
@@ -97,9 +99,7 @@ def table(record: Record) -> Iterator[str]:
 
 def page(path: Path, record: Record) -> None:
     """What stands between the marks."""
-    head, rest = path.read_text(encoding="utf-8").split(BEGIN)
-    tail = rest.split(END)[1]
-    replace_file(path, f"{head}{BEGIN}\n" + "\n".join(table(record)) + f"\n{END}{tail}")
+    replace_file(path, spliced(path.read_text(encoding="utf-8"), MARKS, "\n".join(table(record))))
 
 
 @dataclass
@@ -107,11 +107,11 @@ class Campaign:
     """Targets that have not had their time yet, taken by as many threads as there are jobs."""
 
     targets: list[str]
-    minutes: float
+    cpu_minutes: float  # each is to have had in all
     record: Record
     path: Path
     binaries: Path
-    slice_s: float = SLICE_S
+    slice_s: int = SLICE_S
     sources: str = field(default_factory=state)
     findings: list[str] = field(default_factory=list)
     ended: Event = field(default_factory=Event)
@@ -123,38 +123,35 @@ class Campaign:
         with ThreadPoolExecutor(jobs) as pool:
             done = [pool.submit(self.whole, target) for target in self.targets]
             try:
-                while not all(d.done() for d in done):
-                    time.sleep(0.2)  # signals reach the main thread only
+                wait(done)
             except KeyboardInterrupt:
-                self.ended.set()
-                with self._lock:
-                    for process in self._running:
-                        process.send_signal(signal.SIGINT)
+                self.end()
                 raise
             for d in done:
                 d.result()
 
+    def end(self) -> None:
+        """What runs is told to; nothing more is begun."""
+        with self._lock:
+            self.ended.set()
+            for process in self._running:
+                os.killpg(process.pid, signal.SIGINT)
+
     def whole(self, target: str) -> None:
         """All slices of a target that are left."""
         while not self.ended.is_set():
-            left_s = 60 * self.minutes - in_all(self.record, target).cpu_s
-            if left_s <= 0 or not self.one_slice(target, min(self.slice_s, left_s + 1)):
+            left_s = 60 * self.cpu_minutes - in_all(self.record, target).cpu_s
+            if left_s <= 0 or not self.one_slice(target, min(self.slice_s, math.ceil(left_s))):
                 return
 
-    def one_slice(self, target: str, slice_s: float) -> bool:
+    def one_slice(self, target: str, slice_s: int) -> bool:
         """False after a finding."""
-        name = f"fuzz_{target}"
-        found = self.binaries.parent / "corpus" / name
-        found.mkdir(parents=True, exist_ok=True)
-        command = [self.binaries / name, f"-artifact_prefix={self.binaries.parent}/{name}-", "-max_len=512"]
-        command += [f"-timeout={INPUT_S}", f"-max_total_time={max(1, round(slice_s))}", "-verbosity=0"]
-        command += ["-print_final_stats=1", found, ROOT / "tests/fuzz/corpus" / name]
-        status, cpu_s, text = self.child([str(c) for c in command])
-        executed = EXECUTED.search(text)
+        status, cpu_s, text = self.child([str(RUN), str(slice_s), str(self.binaries / f"fuzz_{target}")])
+        inputs = INPUTS.search(text)
         with self._lock:
             spent = self.record.setdefault((target, self.sources), Spent())
             spent.cpu_s += cpu_s
-            spent.inputs += int(executed[1]) if executed else 0
+            spent.inputs += int(inputs[1]) if inputs else 0
             good = self.told(target, status, text)
             if not good:
                 for key in [k for k in self.record if k[0] == target]:
@@ -164,32 +161,40 @@ class Campaign:
 
     def child(self, command: list[str]) -> tuple[int, float, str]:
         """Exit status, seconds of CPU, what it said. In a session of its own: Ctrl-C is ours to hand on."""
-        env = os.environ | {"UBSAN_OPTIONS": "print_stacktrace=1"}
-        with subprocess.Popen(
-            command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace", env=env,
-            start_new_session=True,
-        ) as process:  # fmt: skip
-            with self._lock:
-                self._running.add(process)
+        with self._lock:
+            if self.ended.is_set():
+                return 0, 0.0, ""
+            process = subprocess.Popen(
+                command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace",
+                start_new_session=True,
+            )  # fmt: skip
+            self._running.add(process)
+        with process:
             assert process.stdout
             text = process.stdout.read()
+            with self._lock:  # once it is waited for, its number may be another's
+                self._running.remove(process)
             _, status, usage = os.wait4(process.pid, 0)
             process.returncode = os.waitstatus_to_exitcode(status)
-            with self._lock:
-                self._running.remove(process)
         return process.returncode, usage.ru_utime + usage.ru_stime, text
 
     def told(self, target: str, status: int, text: str) -> bool:
         """A line about a slice; False after a finding."""
         spent = in_all(self.record, target)
-        print(f"{target}: {spent.cpu_s / 60:.1f} of {self.minutes:g} min, {spent.inputs:,} inputs", flush=True)
-        if status == 0 or self.ended.is_set():
+        print(f"{target}: {spent.cpu_s / 60:.1f} of {self.cpu_minutes:g} min, {spent.inputs:,} inputs", flush=True)
+        if status in (0, INTERRUPTED, -signal.SIGINT):
             return True
-        file = WRITTEN.search(text)
-        again = f"; again with: {self.binaries}/fuzz_{target} {file[1]}" if file else f", status {status}"
         self.findings.append(target)
-        print(f"{text}\n{target}: a finding{again}", file=sys.stderr, flush=True)
+        print(text, file=sys.stderr, flush=True)
         return False
+
+
+def cpu_minutes(text: str) -> float:
+    """Of the command line."""
+    minutes = float(text)
+    if not 0 <= minutes < math.inf:
+        raise ValueError
+    return minutes
 
 
 def parser() -> argparse.ArgumentParser:
@@ -198,10 +203,21 @@ def parser() -> argparse.ArgumentParser:
         prog="fuzz_long.py", description=__doc__, epilog=EPILOG, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     p.add_argument("targets", nargs="*", metavar="TARGET", help="without its fuzz_ (all), in this order")
-    p.add_argument("--minutes", type=float, default=60.0, metavar="N", help="CPU each is to have had in all (60)")
-    p.add_argument("--jobs", type=int, default=os.cpu_count() or 1, metavar="N", help="targets at once (one a core)")
+    p.add_argument("--minutes", type=cpu_minutes, default=60.0, metavar="N", help="CPU each is to have had in all (60)")
+    p.add_argument(
+        "--jobs", type=int, choices=JOBS, default=os.cpu_count() or 1, metavar="N", help="targets at once (one a core)"
+    )
     p.add_argument("--docs", action="store_true", help="at the end, write the table of docs/fuzzing.md")
     return p
+
+
+def chosen(names: Sequence[str], built: Sequence[str]) -> list[str]:
+    """All without names. Raises ValueError."""
+    if not built:
+        raise ValueError(f"no target is built in {BINARIES}: make fuzz-long builds them")
+    if unknown := [n for n in names if n not in built]:
+        raise ValueError(f"no such target: {' '.join(unknown)}; there are {' '.join(built)}")
+    return list(names or built)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -210,14 +226,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     signal.signal(signal.SIGINT, signal.default_int_handler)  # a script may have started us in the background
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # as Ctrl-C
     built = sorted(p.name.removeprefix("fuzz_") for p in BINARIES.glob("fuzz_*"))
-    unknown = [t for t in args.targets if t not in built]
-    if unknown or not built or args.jobs < 1:
-        print(
-            f"fuzz_long: {' '.join(unknown) or 'nothing'}: not a target that is built: {' '.join(built)}",
-            file=sys.stderr,
-        )
+    try:
+        targets, record = chosen(args.targets, built), read(RECORD)
+    except ValueError as e:
+        print(f"fuzz_long: {e}", file=sys.stderr)
         return 2
-    campaign = Campaign(args.targets or built, args.minutes, read(RECORD), RECORD, BINARIES)
+    campaign = Campaign(targets, args.minutes, record, RECORD, BINARIES)
     interrupted = False
     try:
         campaign.run(args.jobs)
@@ -225,7 +239,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         interrupted = True
     if args.docs:
         page(PAGE, campaign.record)
-    return 1 if campaign.findings else 130 if interrupted else 0
+    return 1 if campaign.findings else INTERRUPTED if interrupted else 0
 
 
 if __name__ == "__main__":

@@ -12,10 +12,11 @@ Needs build/psa-emu, or the one that $PSA_EMU names.
 from __future__ import annotations
 
 import os
-import re
 import subprocess
 import sys
 from pathlib import Path
+
+from between import marks, spliced
 
 ROOT = Path(__file__).resolve().parents[1]
 # page -> option that prints its tables -> their marks in the order of printing
@@ -34,23 +35,14 @@ def tables(option: str) -> list[str]:
     return out.strip().split("\n\n")
 
 
-def spliced(text: str, mark: str, table: str) -> str:
-    """The page with the table between its marks."""
-    between = re.compile(rf"(<!-- {mark}:begin -->\n).*?(<!-- {mark}:end -->)", re.DOTALL)
-    new, count = between.subn(lambda m: f"{m[1]}{table}\n{m[2]}", text)
-    if count != 1:
-        raise SystemExit(f"gen_commands: {mark}:begin ... {mark}:end stands {count} times in the page; once is wanted")
-    return new
-
-
 def main(check: bool) -> int:
     stale = []
-    for name, (option, marks) in PAGES.items():
+    for name, (option, parts) in PAGES.items():
         page = ROOT / "docs" / name
         was = text = page.read_text(encoding="utf-8")
         printed = tables(option)
-        for mark, table in zip(marks, printed if len(marks) > 1 else ["\n\n".join(printed)], strict=True):
-            text = spliced(text, mark, table)
+        for part, table in zip(parts, printed if len(parts) > 1 else ["\n\n".join(printed)], strict=True):
+            text = spliced(text, marks(part), table)
         if text == was:
             continue
         stale.append(f"docs/{name}")

@@ -28,12 +28,13 @@ from pathlib import Path
 from typing import Any
 
 import yaml
+from between import marks, spliced
 
 ROOT = Path(__file__).resolve().parents[1]
 CHIPS = ROOT / "docs/chips"
 PAGES = {"1": "ads1282", "2": "ads1256", "3": "ad7712"}  # first figure of a section: the chip's page
 STATES = ("modelled", "simplified", "absent")
-BEGIN, END = "<!-- fidelity:begin -->", "<!-- fidelity:end -->"
+MARKS = marks("fidelity")
 ROW_ID = re.compile(r"[123]\.[0-9]-[a-z0-9][a-z0-9-]*")
 GRADE = re.compile(r"E[0-6]( M\d\d)?\b.*")
 TEST = re.compile(r"(test_\w+\.c:\w+|test_\w+\.py:test_\w+)")
@@ -234,11 +235,10 @@ def table(chip: str, sections: Iterable[Section], rows: list[Row]) -> str:
 
 def page(text: str, generated: str, name: str = "page") -> str:
     """A page with what stands between its marks replaced."""
-    head, begin, rest = text.partition(BEGIN)
-    _, end, tail = rest.partition(END)
-    if not begin or not end:
-        raise FidelityError(f"{name}: needs a line {BEGIN} and after it a line {END}")
-    return f"{head}{BEGIN}\n{generated}\n{END}{tail}"
+    try:
+        return spliced(text, MARKS, generated)
+    except ValueError as e:
+        raise FidelityError(f"{name}: {e}") from None
 
 
 def pages() -> dict[Path, str]:

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-from gen_commands import spliced
+from between import marks, spliced
 from psabench.conform.requirements import requirements
 from psabench.conform.variant import variant
 
@@ -107,7 +107,7 @@ def table() -> str:
 
 def main(check: bool) -> int:
     was = PAGE.read_text(encoding="utf-8")
-    text = spliced(was, "conform", table())
+    text = spliced(was, marks("conform"), table())
     if not check:
         PAGE.write_text(text, encoding="utf-8")
     elif text != was:

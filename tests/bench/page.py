@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 from xml.sax.saxutils import escape
 
+from between import spliced
+
 Result = dict[str, Any]
 FRAME_HZ = 1000  # of the board: so many frames are one second of it
 PEER = "verilator"
@@ -263,12 +265,7 @@ SECTIONS: dict[str, Callable[[Result], str]] = {
 def fill(page: str, r: Result) -> str:
     """The page with what stands between its markers written anew. ValueError if a marker is missing."""
     for name, make in SECTIONS.items():
-        begin, end = f"<!-- bench:{name} -->\n", "<!-- bench:end -->"
-        before, found, rest = page.partition(begin)
-        _, closed, after = rest.partition(end)
-        if not found or not closed:
-            raise ValueError(f"docs/performance.md: no `{begin.strip()}` ... `{end}`")
-        page = f"{before}{begin}{make(r)}\n{end}{after}"
+        page = spliced(page, (f"<!-- bench:{name} -->", "<!-- bench:end -->"), make(r))
     return page
 
 

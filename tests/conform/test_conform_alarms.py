@@ -189,7 +189,7 @@ def test_what_there_is_not_is_refused(words: list[str], capsys: pytest.CaptureFi
 
 def test_the_page_has_a_row_for_each_profile_and_each_alarm(tmp_path: Path) -> None:
     page = tmp_path / "alarms.md"
-    page.write_text(f"before\n{report.BEGIN}\nold\n{report.END}\nafter\n", encoding="utf-8")
+    page.write_text("before\n{}\nold\n{}\nafter\n".format(*report.MARKS), encoding="utf-8")
     report.page(page, [GOOD, replace(BAD, case=replace(CASE, seed=9, load=True))], "now")
     text = page.read_text(encoding="utf-8")
     assert text.startswith("before\n")

@@ -136,7 +136,7 @@ def test_results_stand_as_long_as_their_row_is_the_same(tmp_path: Path) -> None:
 
 def test_the_page_has_the_tables_between_its_marks(tmp_path: Path) -> None:
     page = tmp_path / "p.md"
-    page.write_text(f"before\n{report.BEGIN}\nold\n{report.END}\nafter\n")
+    page.write_text("before\n{}\nold\n{}\nafter\n".format(*report.MARKS))
     report.page(page, {"declared": [result("a", "killed"), result("b", "survived", ["X-1"])], "random": []}, {})
     text = page.read_text()
     assert text.startswith("before\n")

@@ -192,9 +192,10 @@ def test_a_file_that_is_no_list_is_told(text: str, says: str, tmp_path: Path) ->
 
 
 def test_the_table_stands_between_its_marks_and_nothing_else_changes() -> None:
-    text = f"before\n{gen_docs.BEGIN}\nold\n{gen_docs.END}\nafter\n"
-    assert gen_docs.page(text, "new") == f"before\n{gen_docs.BEGIN}\nnew\n{gen_docs.END}\nafter\n"
-    with pytest.raises(gen_docs.FidelityError, match="needs a line"):
+    begin, end = gen_docs.MARKS
+    text = f"before\n{begin}\nold\n{end}\nafter\n"
+    assert gen_docs.page(text, "new") == f"before\n{begin}\nnew\n{end}\nafter\n"
+    with pytest.raises(gen_docs.FidelityError, match=r"page: wanted once.* <!-- fidelity:begin -->"):
         gen_docs.page("no marks", "new")
 
 

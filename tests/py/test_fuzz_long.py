@@ -6,7 +6,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import fuzz_long
@@ -30,9 +29,9 @@ def binaries(tmp_path: Path) -> Path:
     return folder
 
 
-def campaign(binaries: Path, *targets: str, minutes: float = 0.003) -> Campaign:
+def campaign(binaries: Path, *targets: str, cpu_minutes: float = 0.003) -> Campaign:
     path = binaries.parent / "minutes.csv"
-    return Campaign(list(targets), minutes, fuzz_long.read(path), path, binaries, slice_s=1, sources="now")
+    return Campaign(list(targets), cpu_minutes, fuzz_long.read(path), path, binaries, slice_s=1, sources="now")
 
 
 def test_each_target_has_its_time_and_no_more(binaries: Path) -> None:
@@ -45,7 +44,7 @@ def test_each_target_has_its_time_and_no_more(binaries: Path) -> None:
         assert 0.18 <= spent.cpu_s < 1.5
         assert spent.inputs > 0
         assert spent.inputs % 7 == 0
-    again = campaign(binaries, "a", "b", minutes=0.001)
+    again = campaign(binaries, "a", "b", cpu_minutes=0.001)
     again.run(1)
     assert {k: s.inputs for k, s in again.record.items()} == {k: s.inputs for k, s in first.record.items()}
 
@@ -54,7 +53,7 @@ def test_what_was_run_with_other_sources_counts(binaries: Path) -> None:
     target(binaries, "a", f"touch {binaries}/ran; {SAYS}")
     path = binaries.parent / "minutes.csv"
     fuzz_long.write(path, {("a", "before"): Spent(100, 5), ("a", "now"): Spent(81, 6)})
-    campaign(binaries, "a", minutes=3).run(1)
+    campaign(binaries, "a", cpu_minutes=3).run(1)
     assert not (binaries / "ran").exists()
     assert fuzz_long.in_all(fuzz_long.read(path), "a") == Spent(181, 11)
 
@@ -71,7 +70,7 @@ def test_a_finding_ends_its_target_alone_and_says_how_to_see_it_again(
     assert (binaries / "times").read_text() == "x\n"
     assert c.record["good", "now"].cpu_s >= 0.18
     assert not [k for k in fuzz_long.read(c.path) if k[0] == "bad"]  # its time begins anew
-    assert f"bad: a finding; again with: {binaries}/fuzz_bad crash-1" in capsys.readouterr().err
+    assert f"fuzz_bad: a finding; again with: {binaries}/fuzz_bad crash-1\n" in capsys.readouterr().err
 
 
 def test_ctrl_c_takes_the_targets_down_and_keeps_what_they_have_had(tmp_path: Path, binaries: Path) -> None:
@@ -82,27 +81,67 @@ def test_ctrl_c_takes_the_targets_down_and_keeps_what_they_have_had(tmp_path: Pa
         "sys.exit(f.main(['a', '--minutes', '60', '--jobs', '1']))"
     )
     env = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    up = tmp_path / "up"
+    os.mkfifo(up)
     with subprocess.Popen([sys.executable, "-c", program], env=env, stdout=subprocess.DEVNULL) as process:
-        up = tmp_path / "up"
-        while not up.exists() or not up.read_text().endswith("\n"):
-            assert process.poll() is None
-            time.sleep(0.01)
+        pid = int(up.read_text())
         process.send_signal(signal.SIGINT)
         assert process.wait() == 130
     with pytest.raises(ProcessLookupError):
-        os.kill(int(up.read_text()), 0)
+        os.kill(pid, 0)
     spent = fuzz_long.in_all(fuzz_long.read(tmp_path / "minutes.csv"), "a")
     assert spent.inputs == 7
 
 
-def test_the_page_is_the_record() -> None:
+def test_nothing_is_begun_once_it_is_ended(tmp_path: Path, binaries: Path) -> None:
+    target(binaries, "a", f"touch {tmp_path}/ran")
+    c = campaign(binaries, "a")
+    c.end()
+    c.one_slice("a", 1)
+    assert not (tmp_path / "ran").exists()
+    assert fuzz_long.in_all(c.record, "a") == Spent()
+
+
+def test_the_page_is_the_record(tmp_path: Path) -> None:
     """`make fuzz-long LONG='--minutes 0 --docs'` writes it."""
     text = fuzz_long.PAGE.read_text(encoding="utf-8")
-    shown = text.split(fuzz_long.BEGIN)[1].split(fuzz_long.END)[0]
-    wanted = fuzz_long.table(fuzz_long.read(fuzz_long.RECORD))
-    assert shown.strip() == "\n".join(wanted)
+    copy = tmp_path / "fuzzing.md"
+    copy.write_text(text, encoding="utf-8")
+    fuzz_long.page(copy, fuzz_long.read(fuzz_long.RECORD))
+    assert copy.read_text(encoding="utf-8") == text
 
 
-def test_a_target_that_is_not_built_is_told(capsys: pytest.CaptureFixture[str]) -> None:
-    assert fuzz_long.main(["nosuch"]) == 2
-    assert "nosuch: not a target" in capsys.readouterr().err
+@pytest.mark.parametrize(
+    ("names", "record", "says"),
+    [
+        (["nosuch"], "target,sources,cpu_s,inputs\n", "no such target: nosuch; there are a\n"),
+        (["a"], "target,sources,cpu_s,inputs\na,now,1.0,7\na,then\n", "minutes.csv: line 3: wanted target,sources,"),
+    ],
+)
+def test_bad_input_is_told(
+    names: list[str], record: str, says: str, binaries: Path, monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    target(binaries, "a", "exit 1")
+    path = binaries.parent / "minutes.csv"
+    path.write_text(record)
+    monkeypatch.setattr(fuzz_long, "BINARIES", binaries)
+    monkeypatch.setattr(fuzz_long, "RECORD", path)
+    assert fuzz_long.main(names) == 2
+    assert says in capsys.readouterr().err
+    assert path.read_text() == record
+
+
+def test_nothing_built_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(fuzz_long, "BINARIES", tmp_path)
+    assert fuzz_long.main([]) == 2
+    assert "no target is built in" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("option", ["--minutes=nan", "--minutes=-1", "--minutes=inf", "--jobs=0"])
+def test_numbers_have_bounds(option: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        fuzz_long.main([option])
+    assert f"argument {option.split('=')[0]}: invalid" in capsys.readouterr().err

@@ -9,10 +9,11 @@ from pathlib import Path
 
 from alarms.design import ERRORS_PPM, SEEDS, profiles
 from alarms.judge import Alarm, Result, worst
+from between import spliced
 from psabench.whole_file import replace_file
 
 FORMAT = 1  # of alarms.json
-BEGIN, END = "<!-- result: made by `make alarms`, do not edit -->", "<!-- end of result -->"
+MARKS = "<!-- result: made by `make alarms`, do not edit -->", "<!-- end of result -->"
 
 
 def read(path: Path) -> dict[str, Result]:
@@ -71,9 +72,8 @@ def _seeds(results: Iterable[Result]) -> str:
 
 def page(path: Path, results: Sequence[Result], state: str) -> None:
     """The tables of docs/alarms.md, in place of those that are there."""
-    head, _, rest = path.read_text(encoding="utf-8").partition(BEGIN)
-    _, _, tail = rest.partition(END)
-    replace_file(path, f"{head}{BEGIN}\n\n" + "\n".join(_tables(results, state)) + f"\n\n{END}{tail}")
+    tables = "\n".join(_tables(results, state))
+    replace_file(path, spliced(path.read_text(encoding="utf-8"), MARKS, f"\n{tables}\n"))
 
 
 def _tables(results: Sequence[Result], state: str) -> Iterator[str]:

@@ -9,12 +9,13 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from between import spliced
 from mutants.declared import load
 from mutants.judge import KILLED, WRONG, Result
 from psabench.whole_file import replace_file
 
 FORMAT = 1  # of mutants.json
-BEGIN, END = "<!-- result: made by `make mutants`, do not edit -->", "<!-- end of result -->"
+MARKS = "<!-- result: made by `make mutants`, do not edit -->", "<!-- end of result -->"
 
 
 def rate(results: Iterable[Result]) -> tuple[int, int]:
@@ -73,12 +74,9 @@ def write(path: Path, parts: dict[str, Sequence[Result]], facts: dict[str, Any])
 
 def page(path: Path, parts: dict[str, Sequence[Result]], facts: Mapping[str, Any]) -> None:
     """The tables of docs/mutants.md, in place of those that are there."""
-    text = path.read_text(encoding="utf-8")
-    head, _, rest = text.partition(BEGIN)
-    _, _, tail = rest.partition(END)
     titles = {"declared": "Declared mutants", "random": f"Random mutants, seed {facts.get('random_seed')}"}
     body = "\n".join(row for name, results in parts.items() if results for row in _part(name, titles[name], results))
-    replace_file(path, f"{head}{BEGIN}\n\n{body}\n{END}{tail}")
+    replace_file(path, spliced(path.read_text(encoding="utf-8"), MARKS, f"\n{body}"))
 
 
 def _part(name: str, title: str, results: Sequence[Result]) -> Iterator[str]:

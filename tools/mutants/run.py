@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import hashlib
 import signal
 import sys
 import tempfile
@@ -21,6 +20,7 @@ from mutants.judge import WRONG, Judge, Result
 from mutants.suite import Run, Suite
 from mutants.tree import ROOT, BuildError, Tree
 from psabench.conform.requirements import requirements
+from sources import digest
 
 OUT = ROOT / "build" / "mutants.json"
 PAGE = ROOT / "docs" / "mutants.md"
@@ -152,12 +152,7 @@ def judged(judges: Sequence[Judge], mutants: Sequence[Mutant], keep: Callable[[R
 
 def state() -> str:
     """Of the sources that are judged, and of what judges them."""
-    h = hashlib.sha256()
-    for part in ("emu", "proto", "scripts/psabench/conform"):
-        for path in sorted((ROOT / part).rglob("*")):
-            if path.is_file() and path.suffix in (".c", ".h", ".yaml", ".py"):
-                h.update(str(path.relative_to(ROOT)).encode() + b"\0" + path.read_bytes())
-    return h.hexdigest()[:16]
+    return digest(ROOT, ("emu", "proto", "scripts/psabench/conform"), (".c", ".h", ".yaml", ".py"))[:16]
 
 
 def mutants_of(args: argparse.Namespace) -> list[Mutant]:
