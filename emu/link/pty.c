@@ -36,7 +36,6 @@ static bool in_use(struct pty *p)
     const bool used = poll(&master, 1, 0) < 1 || !(master.revents & POLLHUP);
     p->slave = open(p->path, O_RDWR | O_NOCTTY | O_CLOEXEC);
     if (!used) make_raw(p->slave); /* the last one to close takes the settings along */
-    if (!used) pty_discard(p);     /* what it has not read is not for the next one */
     start_watch(p);
     return used;
 }
@@ -45,6 +44,7 @@ static void set_openers(struct pty *p, int openers, int64_t t_ns)
 {
     const bool was = p->openers > 0;
     p->openers = openers;
+    if (openers == 0) pty_discard(p); /* what the last one has not read is not for the next */
     if (was != (openers > 0)) p->opened(p->ctx, openers > 0, t_ns);
 }
 

@@ -220,7 +220,7 @@ def test_frames_of_a_program_that_opens_again_before_they_are_out_stay_counted(m
 def test_a_line_begun_by_one_program_is_not_ended_by_the_next(make_rig: MakeRig) -> None:
     rig = make_rig("socketcand", pace="wall", extra=("--can", "slcan"))
     with serial(rig) as say:
-        say(b"S8\rO\r")
+        assert say(b"S8\r") == say(b"O\r") == b"\r"
         fd = os.open(rig.emulator.endpoint(can="slcan")["pty"], os.O_RDWR | os.O_NOCTTY)
         os.write(fd, b"t12381122")
         os.close(fd)
@@ -229,6 +229,16 @@ def test_a_line_begun_by_one_program_is_not_ended_by_the_next(make_rig: MakeRig)
         assert say(b"S8\r") == b"\r"
         assert say(b"O\r") == b"\r"
         assert say(b"t1230\r") == b"z\r"
+
+
+@HOST
+def test_an_answer_that_one_program_has_not_read_is_not_for_the_next(make_rig: MakeRig) -> None:
+    rig = make_rig("socketcand", pace="wall", extra=("--can", "slcan"))
+    with serial(rig) as say:
+        assert say(b"O\rN\r") == b"\r"
+    until(lambda: all(c["adapter"] != "slcan" for c in rig.clients()), "the channel to be closed")
+    with serial(rig) as say:
+        assert say(b"V\r") == b"V1013\r"
 
 
 # ---- the control socket

@@ -14,8 +14,10 @@ static void check(const struct options *o)
     assert(o->pace == PACE_WALL || o->pace == PACE_STEP || o->pace == PACE_FREE);
     assert(o->for_ns >= 0 && o->vcd_unit_ns > 0 && o->line_hz > 0);
     assert(o->pace != PACE_STEP || o->control);
-    for (unsigned i = 0; i < o->can_count; i++)
-        assert(o->can[i].kind <= OPTIONS_SOCKETCAN && (o->can[i].kind != OPTIONS_SOCKETCAN || o->can[i].arg));
+    for (unsigned i = 0; i < o->can_count; i++) {
+        assert(o->can[i].kind <= OPTIONS_CAN_LOG);
+        assert(o->can[i].arg || (o->can[i].kind != OPTIONS_SOCKETCAN && o->can[i].kind != OPTIONS_CAN_LOG));
+    }
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
