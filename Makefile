@@ -285,11 +285,12 @@ format:
 ## docs: what follows from proto/ and is kept in git: DBC, EDS, docs/protocol.md, docs/requirements.md, FIDELITY.md
 docs: all
 	$(PY) tools/gen_proto.py
-	$(if $(wildcard tools/gen_docs.py),$(PY) tools/gen_docs.py)
+	$(PY) tools/gen_docs.py
 	$(PY) tools/gen_commands.py
 	$(PY) tools/gen_requirements.py
 	$(PY) tools/gen_fault_matrix.py
 	$(PY) tools/gen_fidelity.py
+	$(PY) tools/fuzz_long.py --docs
 
 ## prove: run what proves the models whose sources have changed (or GROUP=psa2, GROUP=all), and record it (docs/evidence.md)
 prove: all

@@ -2,17 +2,27 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
+from psabench.whole_file import replace_file
+
 
 def marks(name: str) -> tuple[str, str]:
     """Lines that a page has around a part of that name."""
     return f"<!-- {name}:begin -->", f"<!-- {name}:end -->"
 
 
-def spliced(text: str, between: tuple[str, str], body: str) -> str:
-    """The page with another body between its marks. Raises ValueError, with the marks, unless they stand there once."""
+def spliced(text: str, between: tuple[str, str], body: str, page: str = "page") -> str:
+    """The page with another body between its marks. Raises ValueError, with its name, unless the first one stands there
+    once, at the end of a line, and the other one after it."""
     begin, end = between
     head, _, rest = text.partition(f"{begin}\n")
     _, closed, tail = rest.partition(end)
-    if not closed or begin in rest:
-        raise ValueError(f"wanted once, each on a line of its own: {begin} and after it {end}")
+    if text.count(begin) != 1 or not closed:
+        raise ValueError(f"{page}: wanted once, on a line of its own, {begin} and after it {end}")
     return f"{head}{begin}\n{body}\n{end}{tail}"
+
+
+def write(page: Path, between: tuple[str, str], body: str) -> None:
+    """The whole page or none of it. Raises ValueError as spliced()."""
+    replace_file(page, spliced(page.read_text(encoding="utf-8"), between, body, page.name))

@@ -16,9 +16,9 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
 from pathlib import Path
-from threading import Event, Lock
+from threading import Event, RLock
 
-from between import marks, spliced
+import between
 from psabench.whole_file import replace_file
 from sources import digest
 
@@ -29,21 +29,21 @@ RECORD = ROOT / "tests/fuzz/minutes.csv"
 PAGE = ROOT / "docs/fuzzing.md"
 FIELDS = ("target", "sources", "cpu_s", "inputs")
 SLICE_S = 300  # what is lost at most when the machine goes down
-JOBS = range(1, 65)
+JOBS_MAX = 64
 INPUTS = re.compile(r"^fuzz_\w+: (\d+) inputs$", re.MULTILINE)  # of RUN, after a target that found nothing
-INTERRUPTED = 130  # exit status, of RUN as of ours
-MARKS = marks("minutes")
+FINDING, BAD, INTERRUPTED = 1, 2, 130  # exit statuses, of RUN as of ours
+MARKS = between.marks("minutes")
 
 EPILOG = """\
 examples:
   make fuzz-long                                            all targets, 60 minutes of CPU each, a target a core
   make fuzz-long LONG='psa2 pik'                            these, one after the other as cores get free
   make fuzz-long LONG='--minutes 5 --jobs 1'                a shorter time, one core
-  make fuzz-long LONG='--minutes 0 --docs'                  run nothing, write the table of docs/fuzzing.md
 
-What was run stands in tests/fuzz/minutes.csv, a row for each target and state of the sources, and counts the next time.
-What a target was run before a finding does not count: its time begins anew.
-Ctrl-C ends it and loses nothing. Exit status: 0 all have had their time, 1 a finding, 2 bad input, 130 ended by Ctrl-C.
+What was run stands in tests/fuzz/minutes.csv, a row for each target and state of the sources, and in docs/fuzzing.md.
+It counts the next time. What a target was run before a finding does not count: its time begins anew.
+Ctrl-C ends it and loses nothing. Exit status: 0 all have had their time, 1 a finding, 2 bad input or a target that does
+not run, 130 ended by Ctrl-C.
 """
 
 
@@ -99,7 +99,7 @@ def table(record: Record) -> Iterator[str]:
 
 def page(path: Path, record: Record) -> None:
     """What stands between the marks."""
-    replace_file(path, spliced(path.read_text(encoding="utf-8"), MARKS, "\n".join(table(record))))
+    between.write(path, MARKS, "\n".join(table(record)))
 
 
 @dataclass
@@ -109,31 +109,29 @@ class Campaign:
     targets: list[str]
     cpu_minutes: float  # each is to have had in all
     record: Record
-    path: Path
+    path: Path  # of the record
+    page: Path  # shows it
     binaries: Path
     slice_s: int = SLICE_S
     sources: str = field(default_factory=state)
-    findings: list[str] = field(default_factory=list)
+    wrong: dict[str, int] = field(default_factory=dict)  # targets that found something or did not run: FINDING, BAD
     ended: Event = field(default_factory=Event)
     _running: set[subprocess.Popen[str]] = field(default_factory=set)
-    _lock: Lock = field(default_factory=Lock)
+    _lock: RLock = field(default_factory=RLock)  # a signal's handler may come while another has it
 
-    def run(self, jobs: int) -> None:
-        """Until all have had their time, or KeyboardInterrupt, which is raised when everything is down and kept."""
+    def run(self, jobs: int) -> int:
+        """Until all have had their time, or end(). The exit status."""
         with ThreadPoolExecutor(jobs) as pool:
             done = [pool.submit(self.whole, target) for target in self.targets]
-            try:
-                wait(done)
-            except KeyboardInterrupt:
-                self.end()
-                raise
+            wait(done)  # signals reach the main thread only
             for d in done:
                 d.result()
+        return min(self.wrong.values(), default=INTERRUPTED if self.ended.is_set() else 0)
 
     def end(self) -> None:
-        """What runs is told to; nothing more is begun."""
+        """What runs is told to, whenever this is called; nothing more is begun."""
+        self.ended.set()
         with self._lock:
-            self.ended.set()
             for process in self._running:
                 os.killpg(process.pid, signal.SIGINT)
 
@@ -145,25 +143,22 @@ class Campaign:
                 return
 
     def one_slice(self, target: str, slice_s: int) -> bool:
-        """False after a finding."""
+        """False when it is the last one."""
         status, cpu_s, text = self.child([str(RUN), str(slice_s), str(self.binaries / f"fuzz_{target}")])
         inputs = INPUTS.search(text)
         with self._lock:
-            spent = self.record.setdefault((target, self.sources), Spent())
-            spent.cpu_s += cpu_s
-            spent.inputs += int(inputs[1]) if inputs else 0
-            good = self.told(target, status, text)
-            if not good:
-                for key in [k for k in self.record if k[0] == target]:
-                    del self.record[key]
-            write(self.path, self.record)
-            return good
+            if inputs and status in (0, INTERRUPTED):
+                self.count(target, Spent(cpu_s, int(inputs[1])))
+            elif not self.ended.is_set() or status == FINDING:
+                self.lose(target, status, text)
+                return False
+        return True
 
     def child(self, command: list[str]) -> tuple[int, float, str]:
         """Exit status, seconds of CPU, what it said. In a session of its own: Ctrl-C is ours to hand on."""
         with self._lock:
             if self.ended.is_set():
-                return 0, 0.0, ""
+                return INTERRUPTED, 0.0, ""
             process = subprocess.Popen(
                 command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace",
                 start_new_session=True,
@@ -178,23 +173,46 @@ class Campaign:
             process.returncode = os.waitstatus_to_exitcode(status)
         return process.returncode, usage.ru_utime + usage.ru_stime, text
 
-    def told(self, target: str, status: int, text: str) -> bool:
-        """A line about a slice; False after a finding."""
+    def count(self, target: str, slice_: Spent) -> None:
+        """Into the record, with a line."""
+        spent = self.record.setdefault((target, self.sources), Spent())
+        spent.cpu_s += slice_.cpu_s
+        spent.inputs += slice_.inputs
+        self.keep()
         spent = in_all(self.record, target)
         print(f"{target}: {spent.cpu_s / 60:.1f} of {self.cpu_minutes:g} min, {spent.inputs:,} inputs", flush=True)
-        if status in (0, INTERRUPTED, -signal.SIGINT):
-            return True
-        self.findings.append(target)
+
+    def lose(self, target: str, status: int, text: str) -> None:
+        """After a finding its time begins anew. A target that does not run keeps what it has had."""
+        self.wrong[target] = FINDING if status == FINDING else BAD
         print(text, file=sys.stderr, flush=True)
-        return False
+        if status == FINDING:
+            for key in [k for k in self.record if k[0] == target]:
+                del self.record[key]
+            self.keep()
+
+    def keep(self) -> None:
+        """The record, and the page that shows it."""
+        write(self.path, self.record)
+        page(self.page, self.record)
 
 
 def cpu_minutes(text: str) -> float:
-    """Of the command line."""
-    minutes = float(text)
+    """Of the command line. Raises ArgumentTypeError."""
+    try:
+        minutes = float(text)
+    except ValueError:
+        minutes = math.nan
     if not 0 <= minutes < math.inf:
-        raise ValueError
+        raise argparse.ArgumentTypeError(f"{text}: minutes, 0 or more, are wanted")
     return minutes
+
+
+def jobs(text: str) -> int:
+    """Of the command line. Raises ArgumentTypeError."""
+    if not (text.isdecimal() and 1 <= int(text) <= JOBS_MAX):
+        raise argparse.ArgumentTypeError(f"{text}: 1 to {JOBS_MAX} is wanted")
+    return int(text)
 
 
 def parser() -> argparse.ArgumentParser:
@@ -204,10 +222,8 @@ def parser() -> argparse.ArgumentParser:
     )
     p.add_argument("targets", nargs="*", metavar="TARGET", help="without its fuzz_ (all), in this order")
     p.add_argument("--minutes", type=cpu_minutes, default=60.0, metavar="N", help="CPU each is to have had in all (60)")
-    p.add_argument(
-        "--jobs", type=int, choices=JOBS, default=os.cpu_count() or 1, metavar="N", help="targets at once (one a core)"
-    )
-    p.add_argument("--docs", action="store_true", help="at the end, write the table of docs/fuzzing.md")
+    p.add_argument("--jobs", type=jobs, default=os.cpu_count() or 1, metavar="N", help="targets at once (one a core)")
+    p.add_argument("--docs", action="store_true", help="run nothing, write the table of docs/fuzzing.md (make docs)")
     return p
 
 
@@ -220,26 +236,27 @@ def chosen(names: Sequence[str], built: Sequence[str]) -> list[str]:
     return list(names or built)
 
 
+def carry_out(args: argparse.Namespace) -> int:
+    """Exit status. Raises ValueError for bad input."""
+    record = read(RECORD)
+    page(PAGE, record)
+    if args.docs:
+        return 0
+    built = sorted(p.name.removeprefix("fuzz_") for p in BINARIES.glob("fuzz_*"))
+    campaign = Campaign(chosen(args.targets, built), args.minutes, record, RECORD, PAGE, BINARIES)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: campaign.end())
+    return campaign.run(args.jobs)
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Entry point."""
     args = parser().parse_args(argv)
-    signal.signal(signal.SIGINT, signal.default_int_handler)  # a script may have started us in the background
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # as Ctrl-C
-    built = sorted(p.name.removeprefix("fuzz_") for p in BINARIES.glob("fuzz_*"))
     try:
-        targets, record = chosen(args.targets, built), read(RECORD)
+        return carry_out(args)
     except ValueError as e:
         print(f"fuzz_long: {e}", file=sys.stderr)
-        return 2
-    campaign = Campaign(targets, args.minutes, record, RECORD, BINARIES)
-    interrupted = False
-    try:
-        campaign.run(args.jobs)
-    except KeyboardInterrupt:
-        interrupted = True
-    if args.docs:
-        page(PAGE, campaign.record)
-    return 1 if campaign.findings else INTERRUPTED if interrupted else 0
+        return BAD
 
 
 if __name__ == "__main__":

@@ -42,7 +42,7 @@ def main(check: bool) -> int:
         was = text = page.read_text(encoding="utf-8")
         printed = tables(option)
         for part, table in zip(parts, printed if len(parts) > 1 else ["\n\n".join(printed)], strict=True):
-            text = spliced(text, marks(part), table)
+            text = spliced(text, marks(part), table, name)
         if text == was:
             continue
         stale.append(f"docs/{name}")
@@ -54,4 +54,7 @@ def main(check: bool) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main("--check" in sys.argv[1:]))
+    try:
+        sys.exit(main("--check" in sys.argv[1:]))
+    except ValueError as e:
+        sys.exit(f"gen_commands: {e}")

@@ -236,9 +236,9 @@ def table(chip: str, sections: Iterable[Section], rows: list[Row]) -> str:
 def page(text: str, generated: str, name: str = "page") -> str:
     """A page with what stands between its marks replaced."""
     try:
-        return spliced(text, MARKS, generated)
+        return spliced(text, MARKS, generated, name)
     except ValueError as e:
-        raise FidelityError(f"{name}: {e}") from None
+        raise FidelityError(str(e)) from None
 
 
 def pages() -> dict[Path, str]:

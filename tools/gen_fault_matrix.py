@@ -107,7 +107,7 @@ def table() -> str:
 
 def main(check: bool) -> int:
     was = PAGE.read_text(encoding="utf-8")
-    text = spliced(was, marks("conform"), table())
+    text = spliced(was, marks("conform"), table(), PAGE.name)
     if not check:
         PAGE.write_text(text, encoding="utf-8")
     elif text != was:
@@ -116,4 +116,7 @@ def main(check: bool) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main("--check" in sys.argv[1:]))
+    try:
+        sys.exit(main("--check" in sys.argv[1:]))
+    except ValueError as e:
+        sys.exit(f"gen_fault_matrix: {e}")

@@ -265,7 +265,7 @@ SECTIONS: dict[str, Callable[[Result], str]] = {
 def fill(page: str, r: Result) -> str:
     """The page with what stands between its markers written anew. ValueError if a marker is missing."""
     for name, make in SECTIONS.items():
-        page = spliced(page, (f"<!-- bench:{name} -->", "<!-- bench:end -->"), make(r))
+        page = spliced(page, (f"<!-- bench:{name} -->", "<!-- bench:end -->"), make(r), "docs/performance.md")
     return page
 
 

@@ -7,9 +7,9 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
+import between
 from alarms.design import ERRORS_PPM, SEEDS, profiles
 from alarms.judge import Alarm, Result, worst
-from between import spliced
 from psabench.whole_file import replace_file
 
 FORMAT = 1  # of alarms.json
@@ -73,7 +73,7 @@ def _seeds(results: Iterable[Result]) -> str:
 def page(path: Path, results: Sequence[Result], state: str) -> None:
     """The tables of docs/alarms.md, in place of those that are there."""
     tables = "\n".join(_tables(results, state))
-    replace_file(path, spliced(path.read_text(encoding="utf-8"), MARKS, f"\n{tables}\n"))
+    between.write(path, MARKS, f"\n{tables}\n")
 
 
 def _tables(results: Sequence[Result], state: str) -> Iterator[str]:

@@ -9,7 +9,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from between import spliced
+import between
 from mutants.declared import load
 from mutants.judge import KILLED, WRONG, Result
 from psabench.whole_file import replace_file
@@ -76,7 +76,7 @@ def page(path: Path, parts: dict[str, Sequence[Result]], facts: Mapping[str, Any
     """The tables of docs/mutants.md, in place of those that are there."""
     titles = {"declared": "Declared mutants", "random": f"Random mutants, seed {facts.get('random_seed')}"}
     body = "\n".join(row for name, results in parts.items() if results for row in _part(name, titles[name], results))
-    replace_file(path, spliced(path.read_text(encoding="utf-8"), MARKS, f"\n{body}"))
+    between.write(path, MARKS, f"\n{body}")
 
 
 def _part(name: str, title: str, results: Sequence[Result]) -> Iterator[str]:
