@@ -154,7 +154,8 @@ bool bench_record(struct bench *b, unsigned unit, FILE *out, uint32_t unit_ns)
     const struct vcd_cfg cfg = {.out = out,
                                 .scope = u->type->name, /* whatever the unit's name: share/psa2.gtkw opens it */
                                 .unit_ns = unit_ns,
-                                .mask = TRACE_FIRST(u->type->line_count)};
+                                .mask = TRACE_FIRST(u->type->line_count),
+                                .from_ns = b->sched.now_ns};
     b->recording = vcd_open(&b->vcd, &cfg, unit_trace(u));
     return b->recording;
 }

@@ -196,7 +196,7 @@ static bool roll(struct can_fault *f)
 
 static bool concerns(const struct can_bus *b, const struct can_fault *f)
 {
-    if (f->from && (!b->sender || !shares(b->sender, f->from))) return false;
+    if (f->from && (!b->sender || can_controller(b->sender) != can_controller(f->from))) return false;
     if (f->to && (f->to == b->sender || f->to->bus != b)) return false;
     return ((b->wire.id ^ f->id) & f->mask) == 0;
 }

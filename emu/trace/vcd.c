@@ -116,6 +116,46 @@ static void advance(void *ctx, int64_t t_ns)
     v->seen_units = t_ns / v->unit_ns;
 }
 
+/* From here on the file has edges: the levels at from_ns first. */
+static void begin(struct vcd *v)
+{
+    put_time(v, v->from_ns / v->unit_ns);
+    put(v, "$dumpvars\n");
+    char lines[3 * TRACE_SIGNALS_MAX + 1];
+    *level_lines(lines, v->sink.mask, v->level) = '\0';
+    put(v, lines);
+    put(v, "$end\n");
+    v->edge_units = v->seen_units = v->t_units;
+    v->sink.steps = steps;
+    v->sink.advance = advance;
+}
+
+/* What was up to from_ns is in the levels there. */
+static void steps_before(void *ctx, const struct trace_step *s, unsigned n)
+{
+    struct vcd *v = ctx;
+    for (; n > 0 && s->t_ns <= v->from_ns; n--, s++) v->level = (v->level & ~s->lines) | (s->level & s->lines);
+    if (n == 0) return;
+    begin(v);
+    steps(v, s, n);
+}
+
+static void advance_before(void *ctx, int64_t t_ns)
+{
+    struct vcd *v = ctx;
+    if (t_ns < v->from_ns) return;
+    begin(v);
+    advance(v, t_ns);
+}
+
+/* The first that the trace tells: how its lines are at done_ns. */
+static void present_levels(void *ctx, const struct trace_step *s, unsigned n)
+{
+    struct vcd *v = ctx;
+    (void)n;
+    v->level = s->level;
+}
+
 /* VCD knows 1, 10 and 100 of ns, us and ms here. */
 static bool put_timescale(struct vcd *v, uint32_t unit_ns)
 {
@@ -156,13 +196,11 @@ bool vcd_open(struct vcd *v, const struct vcd_cfg *cfg, struct trace *t)
     v->unit_ns = cfg->unit_ns;
     if (!put_timescale(v, cfg->unit_ns)) return false;
     put_names(v, cfg->scope, cfg->mask);
-    v->seen_units = t->done_ns / v->unit_ns;
-    put_time(v, v->seen_units);
-    put(v, "$dumpvars\n");
-    v->sink = (struct trace_sink){.mask = cfg->mask, .steps = steps, .advance = advance, .ctx = v};
-    trace_attach(t, &v->sink); /* tells the levels */
-    put(v, "$end\n");
-    v->changes = 0;
+    v->from_ns = cfg->from_ns > t->done_ns ? cfg->from_ns : t->done_ns;
+    v->sink = (struct trace_sink){.mask = cfg->mask, .steps = present_levels, .advance = advance_before, .ctx = v};
+    trace_attach(t, &v->sink);
+    v->sink.steps = steps_before;
+    if (v->from_ns == t->done_ns) begin(v);
     return true;
 }
 
@@ -177,6 +215,7 @@ void vcd_flush(struct vcd *v)
 void vcd_close(struct vcd *v, int64_t t_ns)
 {
     trace_detach(v->trace, &v->sink);
+    if (v->sink.steps != steps) begin(v);
     const int64_t end_units = t_ns / v->unit_ns;
     v->seen_units = end_units > v->edge_units ? end_units : v->edge_units + 1;
     vcd_flush(v);

@@ -23,6 +23,7 @@ struct vcd_cfg {
     const char *scope; /* no spaces; sigrok drops it, viewers show it */
     uint32_t unit_ns;  /* 1, 10, 100, 1000 ..., 100000000 */
     uint64_t mask;     /* bit i: signal i; the signals must have been added before */
+    int64_t from_ns;   /* the file begins here, or at the trace's done_ns when later: see vcd_open() */
 };
 
 struct vcd { /* read-only outside vcd.c */
@@ -30,6 +31,8 @@ struct vcd { /* read-only outside vcd.c */
     struct trace *trace;
     FILE *out;
     int64_t unit_ns;
+    int64_t from_ns;     /* of the first levels in the file */
+    uint64_t level;      /* of all lines at from_ns, as far as told */
     int64_t t_units;     /* last time written */
     int64_t edge_units;  /* time of the last change */
     int64_t seen_units;  /* nothing will change before this */
@@ -43,11 +46,12 @@ struct vcd { /* read-only outside vcd.c */
     char buf[VCD_BUF];
 };
 
-/* Writes the header and the present levels, then records every change. False, and nothing written, when unit_ns is no unit
- * of VCD. A write that fails is reported by vcd_error(). */
+/* Writes the header, the levels at from_ns and every change after it; what a board does before, while nobody listens, need
+ * not be known. False, and nothing written, when unit_ns is no unit of VCD. A write that fails is reported by vcd_error(). */
 bool vcd_open(struct vcd *v, const struct vcd_cfg *cfg, struct trace *t);
 
-/* Puts all that was delivered into the file, with a closing time, so that it can be looked at while it grows. */
+/* Puts all that was delivered into the file, with a closing time, so that it can be looked at while it grows. Before
+ * the trace has come to from_ns that is the header alone. */
 void vcd_flush(struct vcd *v);
 
 /* Detaches and writes a closing time later than the last change (sigrok loses that change otherwise): t_ns, the end of the

@@ -19,7 +19,6 @@ from psabench.vcd import Vcd, read_vcd
 pytestmark = pytest.mark.host
 
 RECORD_S = 0.05
-BEFORE_NS = 200_000  # by which a recording begins before its command: what is reported late belongs to it
 
 
 def record(host: Host, unit: str) -> Vcd:
@@ -48,26 +47,20 @@ def line_case(kind: str, unit: str, names: list[str], **args: object) -> tuple[V
     right = healthy(unit)
     for other, wire in right.wires.items():
         if other not in names:
-            assert np.array_equal(known(right, wire.t_ns), known(wrong, wrong.wires[other].t_ns)), other
+            assert np.array_equal(wire.t_ns, wrong.wires[other].t_ns), other
     return right, wrong
-
-
-def known(v: Vcd, t_ns: np.ndarray) -> np.ndarray:
-    """Instants from that of the command on; the recording begins BEFORE_NS earlier, with lines as they were."""
-    return t_ns[t_ns > v.start_ns + BEFORE_NS]
 
 
 def differ(right: Vcd, wrong: Vcd, name: str) -> tuple[np.ndarray, np.ndarray]:
     """Instants at which either recording of a line has an edge, and whether the two differ from there on."""
-    edges_ns = np.concatenate([right.wires[name].t_ns, wrong.wires[name].t_ns])
-    at_ns = np.unique(np.concatenate([[right.start_ns + BEFORE_NS], known(right, edges_ns)]))
+    at_ns = np.unique(np.concatenate([right.wires[name].t_ns, wrong.wires[name].t_ns]))
     return at_ns, right.wires[name].at(at_ns) != wrong.wires[name].at(at_ns)
 
 
 def line_stuck(unit: str, names: list[str]) -> None:
     for level in (0, 1):
         _, wrong = line_case("line.stuck", unit, names, level=("low", "high")[level])
-        at_ns = np.arange(wrong.start_ns + BEFORE_NS, wrong.end_ns, 99_991)
+        at_ns = np.arange(wrong.start_ns, wrong.end_ns, 99_991)
         for name in names:
             assert (wrong.wires[name].at(at_ns) == level).all(), name
 

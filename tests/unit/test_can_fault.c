@@ -53,6 +53,22 @@ static void a_fault_picks_by_sender_receiver_and_identifier(void **state)
     assert_false(r->bus.odd);
 }
 
+static void a_fault_at_any_queue_is_one_at_its_controller(void **state)
+{
+    (void)state;
+    struct bench *r = up(500000);
+    struct can_fault of_second = fault(CAN_FAULT_DROP);
+    of_second.from = &r->second.node;
+    can_fault_add(&r->bus, &of_second);
+    send(r, &r->a, 0x10);
+    send(r, &r->second, 0x11);
+    send(r, &r->b, 0x12);
+    run(r, 10000000);
+    assert_int_equal(count(r, 'C', 'r'), 1);
+    assert_int_equal(entry(r, 'C', 'r', 0)->m.id, 0x12);
+    assert_int_equal(of_second.hits, 2);
+}
+
 static void a_doubled_frame_takes_the_wire_twice(void **state)
 {
     (void)state;
@@ -251,6 +267,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_dropped_frame_is_sent_but_nobody_receives_it),
         cmocka_unit_test(a_fault_picks_by_sender_receiver_and_identifier),
+        cmocka_unit_test(a_fault_at_any_queue_is_one_at_its_controller),
         cmocka_unit_test(a_doubled_frame_takes_the_wire_twice),
         cmocka_unit_test(a_late_frame_is_received_after_its_delay),
         cmocka_unit_test(what_a_removed_fault_holds_is_received),

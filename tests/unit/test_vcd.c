@@ -18,13 +18,18 @@ static int fresh(void **state)
     return 0;
 }
 
-static FILE *open_vcd(uint32_t unit_ns)
+static FILE *open_vcd_from(uint32_t unit_ns, int64_t from_ns)
 {
     FILE *f = tmpfile();
     assert_non_null(f);
-    const struct vcd_cfg cfg = {.out = f, .scope = "unit1", .unit_ns = unit_ns, .mask = 3};
+    const struct vcd_cfg cfg = {.out = f, .scope = "unit1", .unit_ns = unit_ns, .mask = 3, .from_ns = from_ns};
     assert_true(vcd_open(&vcd, &cfg, &trace));
     return f;
+}
+
+static FILE *open_vcd(uint32_t unit_ns)
+{
+    return open_vcd_from(unit_ns, 0);
 }
 
 static const char *read_back(FILE *f)
@@ -150,6 +155,50 @@ static void a_late_start_begins_at_its_own_time(void **state)
     fclose(f);
 }
 
+/* The trace lags behind the board, which has kept its edges to itself until now: the file begins now. */
+static void edges_up_to_its_start_are_in_its_first_levels(void **state)
+{
+    (void)state;
+    trace_advance(&trace, 5000);
+    FILE *f = open_vcd_from(10, 7000);
+    vcd_flush(&vcd);
+    assert_string_equal(read_back(f), HEADER("10 ns"));
+    trace_set(&trace, 0, false, 5500);
+    trace_set(&trace, 1, true, 6990);
+    trace_set(&trace, 0, true, 7000);
+    trace_set(&trace, 0, false, 7500);
+    trace_advance(&trace, 6995);
+    trace_advance(&trace, 8000);
+    vcd_close(&vcd, 9000);
+    assert_string_equal(read_back(f), HEADER("10 ns") "#700\n$dumpvars\n1!\n1\"\n$end\n#750\n0!\n#900\n");
+    fclose(f);
+}
+
+static void a_quiet_start_is_told_when_the_trace_has_come_to_it(void **state)
+{
+    (void)state;
+    FILE *f = open_vcd_from(10, 7000);
+    trace_advance(&trace, 6999);
+    vcd_flush(&vcd);
+    assert_string_equal(read_back(f), HEADER("10 ns"));
+    trace_advance(&trace, 7500);
+    vcd_flush(&vcd);
+    assert_string_equal(read_back(f), HEADER("10 ns") "#700\n$dumpvars\n1!\n0\"\n$end\n#750\n");
+    vcd_close(&vcd, 7500);
+    fclose(f);
+}
+
+static void a_recording_that_ends_before_its_start_is_known_has_its_levels(void **state)
+{
+    (void)state;
+    FILE *f = open_vcd_from(10, 7000);
+    trace_set(&trace, 1, true, 5000);
+    trace_advance(&trace, 6000);
+    vcd_close(&vcd, 6800);
+    assert_string_equal(read_back(f), HEADER("10 ns") "#700\n$dumpvars\n1!\n1\"\n$end\n#701\n");
+    fclose(f);
+}
+
 static void a_flushed_file_can_be_looked_at_while_it_grows(void **state)
 {
     (void)state;
@@ -216,6 +265,9 @@ int main(void)
         cmocka_unit_test_setup(times_have_the_digits_that_printf_gives, fresh),
         cmocka_unit_test_setup(a_unit_that_vcd_does_not_know_is_refused, fresh),
         cmocka_unit_test_setup(a_late_start_begins_at_its_own_time, fresh),
+        cmocka_unit_test_setup(edges_up_to_its_start_are_in_its_first_levels, fresh),
+        cmocka_unit_test_setup(a_quiet_start_is_told_when_the_trace_has_come_to_it, fresh),
+        cmocka_unit_test_setup(a_recording_that_ends_before_its_start_is_known_has_its_levels, fresh),
         cmocka_unit_test_setup(a_flushed_file_can_be_looked_at_while_it_grows, fresh),
         cmocka_unit_test_setup(long_recordings_survive_the_buffer, fresh),
         cmocka_unit_test_setup(a_full_disk_is_told_once_and_stops_nothing, fresh),
