@@ -130,11 +130,11 @@ static void begin(struct vcd *v)
     v->sink.advance = advance;
 }
 
-/* What was up to from_ns is in the levels there. */
+/* What was before from_ns is in the levels there. */
 static void steps_before(void *ctx, const struct trace_step *s, unsigned n)
 {
     struct vcd *v = ctx;
-    for (; n > 0 && s->t_ns <= v->from_ns; n--, s++) v->level = (v->level & ~s->lines) | (s->level & s->lines);
+    for (; n > 0 && s->t_ns < v->from_ns; n--, s++) v->level = (v->level & ~s->lines) | (s->level & s->lines);
     if (n == 0) return;
     begin(v);
     steps(v, s, n);

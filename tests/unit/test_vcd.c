@@ -156,7 +156,7 @@ static void a_late_start_begins_at_its_own_time(void **state)
 }
 
 /* The trace lags behind the board, which has kept its edges to itself until now: the file begins now. */
-static void edges_up_to_its_start_are_in_its_first_levels(void **state)
+static void edges_before_its_start_are_in_its_first_levels(void **state)
 {
     (void)state;
     trace_advance(&trace, 5000);
@@ -170,7 +170,7 @@ static void edges_up_to_its_start_are_in_its_first_levels(void **state)
     trace_advance(&trace, 6995);
     trace_advance(&trace, 8000);
     vcd_close(&vcd, 9000);
-    assert_string_equal(read_back(f), HEADER("10 ns") "#700\n$dumpvars\n1!\n1\"\n$end\n#750\n0!\n#900\n");
+    assert_string_equal(read_back(f), HEADER("10 ns") "#700\n$dumpvars\n0!\n1\"\n$end\n1!\n#750\n0!\n#900\n");
     fclose(f);
 }
 
@@ -265,7 +265,7 @@ int main(void)
         cmocka_unit_test_setup(times_have_the_digits_that_printf_gives, fresh),
         cmocka_unit_test_setup(a_unit_that_vcd_does_not_know_is_refused, fresh),
         cmocka_unit_test_setup(a_late_start_begins_at_its_own_time, fresh),
-        cmocka_unit_test_setup(edges_up_to_its_start_are_in_its_first_levels, fresh),
+        cmocka_unit_test_setup(edges_before_its_start_are_in_its_first_levels, fresh),
         cmocka_unit_test_setup(a_quiet_start_is_told_when_the_trace_has_come_to_it, fresh),
         cmocka_unit_test_setup(a_recording_that_ends_before_its_start_is_known_has_its_levels, fresh),
         cmocka_unit_test_setup(a_flushed_file_can_be_looked_at_while_it_grows, fresh),
