@@ -39,7 +39,7 @@ static void run_wall(struct loop *l)
 
 static void run_step(struct loop *l)
 {
-    if (l->run == LOOP_ARMED && l->taken(l->ctx) >= l->after_taken) l->run = LOOP_RUNNING;
+    if (l->run == LOOP_ARMED && l->taken(l->ctx, l->after_taken)) l->run = LOOP_RUNNING;
     if (l->run != LOOP_RUNNING || links_full(l->links)) return;
     run_slice(l, l->until_ns);
 }
@@ -88,7 +88,7 @@ static int64_t patience_ns(const struct loop *l)
     }
     const bool running = l->started && (l->pace->kind == PACE_FREE || l->run == LOOP_RUNNING);
     if (running && !links_full(l->links) && (l->pace->kind == PACE_FREE || l->sched->now_ns < l->until_ns)) return 0;
-    if (l->run == LOOP_ARMED && l->taken(l->ctx) >= l->after_taken) return 0;
+    if (l->run == LOOP_ARMED && l->taken(l->ctx, l->after_taken)) return 0;
     return wait_ns > 0 ? wait_ns : 0;
 }
 

@@ -22,7 +22,7 @@ struct loop {
     bool (*may_start)(void *ctx);             /* free, wall: time waits until this is true; NULL: at once */
     void (*moved)(void *ctx, int64_t now_ns); /* after time has moved: traces and files follow */
     void (*run_done)(void *ctx);              /* a run of step pace is over and its output with the kernel */
-    uint64_t (*taken)(void *ctx);             /* frames taken from CAN clients so far */
+    bool (*taken)(void *ctx, uint64_t count); /* so many frames of CAN clients, or no more before time moves */
     void *ctx;
     /* read-only outside loop.c */
     bool quit, started;
@@ -38,7 +38,7 @@ void loop_run(struct loop *l, const volatile sig_atomic_t *stop);
 /* Hands out what waits, while peers keep reading: at the end of a run. Gives up after patience_ms without progress. */
 void loop_drain(struct loop *l, int patience_ms);
 
-/* Step pace: time is to move by for_ns once after_taken frames of clients have been taken. False: a run is under way. */
+/* Step pace: time is to move by for_ns once `taken` says so of after_taken. False: a run is under way. */
 bool loop_step(struct loop *l, int64_t for_ns, uint64_t after_taken);
 
 /* From within an event: the run ends at the present instant, and is over when its output is with the kernel. */

@@ -103,7 +103,7 @@ static const struct control_command rows[] = {
     {"time", "Tells the simulated time and the pace.", {{0}}, .run = do_time},
     {"run", "Moves the time in step pace; the answer comes when everything due has run and all output is with the kernel.",
      {{"for_s", CONTROL_REAL, false, "s", 0, 86400, .what = "simulated seconds"},
-      {"after_tx", CONTROL_COUNT, true, NULL, 0, CONTROL_COUNT_MAX, .what = "start once this many frames have been taken from CAN clients"}}, .run = do_run},
+      {"after_tx", CONTROL_COUNT, true, NULL, 0, CONTROL_COUNT_MAX, .what = "start once this many frames have been taken from CAN clients, or one has filled its queue of 128"}}, .run = do_run},
     {"frames", "Counts the CAN frames of each client, with its number in order of coming (came): delivered to it, taken from it, dropped, lost in the kernel, refused.", {{0}}, .run = do_frames},
     {"counters", "Tells the counters of pace, bus, clients and units; with a unit, that unit's alone.", {CONTROL_UNIT_ARG(true)}, .run = do_counters},
     {"units", "Lists the units: name, type of board, serial number, CAN node, board profile.", {{0}}, .run = do_units},

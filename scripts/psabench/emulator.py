@@ -99,9 +99,11 @@ class Emulator:
         raise BenchError(f"emulator has no endpoint {wanted}; it has {self.endpoints}")
 
     def messages(self) -> str:
-        """What the emulator has written to stderr so far."""
+        """What the emulator has written to stderr so far; nothing after stop()."""
+        if self._stderr.closed:
+            return ""
         self._stderr.flush()
-        return (self.directory / "stderr").read_text(errors="replace") if self.directory.exists() else ""
+        return (self.directory / "stderr").read_text(errors="replace")
 
     def wait(self, timeout_s: float) -> int:
         """Exit status of an emulator that ends by itself (`--for`). Raises BenchError when it does not."""

@@ -12,6 +12,7 @@ import struct
 from pathlib import Path
 
 import can
+import numpy as np
 import pytest
 from psabench.can_host import CanHost, StepClock, WallClock, open_bus
 from psabench.control import Control
@@ -261,6 +262,25 @@ def test_a_recording_is_complete_whatever_ends_it(make_rig: MakeRig, tmp_path: P
         count = len(list(logged))
     assert out.splitlines()[0].startswith(f"{count} messages")
     assert "lost 0, torn 0" in out
+
+
+@HOST
+@pytest.mark.parametrize(("transport", "count"), [("socketcand", 2000), ("slcan", 250)])  # a terminal takes 4 KiB
+def test_time_moves_for_a_host_that_has_sent_more_than_its_queue_holds(
+    make_rig: MakeRig, tmp_path: Path, transport: str, count: int
+) -> None:
+    """In step pace 128 frames wait for the bus, the others follow as it has room, and it never rests in between."""
+    log = tmp_path / "bus.log"
+    rig = make_rig(transport, extra=("--can", f"log:{log}"))
+    rig.unit.wait_ready()
+    for k in range(count):
+        rig.host.send(0x7F0, bytes([k >> 8, k & 255, 0, 0, 0, 0, 0, 0]))
+    rig.host.advance(0.5)
+    rig.emulator.stop()
+    frames = [line.split() for line in log.read_text().splitlines() if " 7F0#" in line]
+    assert [int(data[4:8], 16) for _, _, data in frames] == list(range(count))
+    gaps_s = np.diff([float(stamp.strip("()")) for stamp, _, _ in frames])
+    assert gaps_s.max() < 300e-6, "a frame of 8 bytes takes 111 to 135 us, and one of the unit's may come between"
 
 
 @HOST
