@@ -189,14 +189,12 @@ static void wake(void *ctx, uint64_t mask)
 {
     struct psd1 *b = ctx;
     const int64_t t_ns = b->sched->now_ns;
-    /* A level that the listener finds, no edge that it hears; edges of this instant are still to come. */
-    const int64_t found_ns = t_ns > b->trace.done_ns && t_ns > b->t0_ns ? t_ns - 1 : t_ns;
     if (b->phase == PSD1_OFF) return;
     const bool clock = mask & CLK && !b->wave.clock_on;
     const bool frame = mask & (SCLK | SDAT) && b->frame.active;
     if (b->wave.on) psd1_wave_catch_up(b, t_ns);
-    if (clock) join_clock(b, found_ns);
-    if (b->frame.active && (b->wave.frame_on ? clock : frame)) join_frame(b, found_ns);
+    if (clock) join_clock(b, t_ns);
+    if (b->frame.active && (b->wave.frame_on ? clock : frame)) join_frame(b, t_ns);
 }
 
 static int64_t report(void *ctx, int64_t t_ns)

@@ -53,8 +53,8 @@ struct control_bench {
     const char *scenario;
     struct fault_engine *faults; /* NULL: no commands of faults */
 
-    /* Time is to move by for_ns once after_tx frames of clients have been taken; control_run_done() is called then. False
-     * with a sentence in why when it cannot. */
+    /* Time is to move by for_ns once after_tx frames of clients have been taken, or a client's queue is full, which only time
+     * empties; control_run_done() is called then. False with a sentence in why when it cannot. */
     bool (*run)(void *ctx, int64_t for_ns, uint64_t after_tx, char *why);
     void (*run_stop)(void *ctx); /* from within an event: the run ends at this instant */
     void (*quit)(void *ctx);

@@ -172,11 +172,5 @@ uint64_t control_lines(struct control *c, unsigned unit, int64_t t_ns)
         w->probe[unit] = (struct trace_sink){.mask = TRACE_FIRST(t->count), .steps = ignore_steps};
         trace_attach(t, &w->probe[unit]);
     }
-    if (t->filter) return t->filter->level; /* a faulty line is known as far as it was delivered: TRACE_LAG_NS ago */
-    uint64_t level = t->level;
-    for (unsigned i = t->first; i < t->first + t->pending_count && t->pending[i].t_ns <= t_ns; i++) {
-        const struct trace_step *s = &t->pending[i];
-        level = (level & ~s->lines) | (s->level & s->lines);
-    }
-    return level;
+    return trace_known(t, t_ns); /* a faulty line is known as far as it was delivered: TRACE_LAG_NS ago */
 }

@@ -99,6 +99,7 @@ int trace_find(const struct trace *t, const char *name)
 void trace_attach(struct trace *t, struct trace_sink *s)
 {
     if (t->source.wake) t->source.wake(t->source.ctx, s->mask);
+    if (t->filter) deliver_until(t, t->done_ns); /* it sees levels that have moved without a step */
     struct trace_sink **end = &t->sinks;
     while (*end) {
         assert(*end != s);
@@ -119,6 +120,16 @@ void trace_detach(struct trace *t, struct trace_sink *s)
     s->next = NULL;
     watch_again(t);
     if (!t->sinks) deliver_until(t, INT64_MAX); /* to nobody: the levels stay right for the next listener */
+}
+
+uint64_t trace_known(const struct trace *t, int64_t t_ns)
+{
+    if (t->filter) return t->filter->level;
+    uint64_t level = t->level;
+    for (const struct trace_step *s = t->pending + t->first, *end = s + t->pending_count; s < end && s->t_ns <= t_ns;
+         s++)
+        level = (level & ~s->lines) | (s->level & s->lines);
+    return level;
 }
 
 struct trace_step *trace_room(struct trace *t, unsigned n)

@@ -91,6 +91,9 @@ void trace_attach(struct trace *t, struct trace_sink *s);
 void trace_detach(struct trace *t,
                   struct trace_sink *s); /* hears nothing more; harmless for one that is not attached */
 
+/* Levels at t_ns, of lines that somebody listens to, as far as they have been reported; with a filter, those delivered. */
+uint64_t trace_known(const struct trace *t, int64_t t_ns);
+
 /* Whether anybody listens to one of the signals in mask. */
 static inline bool trace_watched(const struct trace *t, uint64_t mask)
 {

@@ -116,25 +116,37 @@ static void advance(void *ctx, int64_t t_ns)
     v->seen_units = t_ns / v->unit_ns;
 }
 
-/* From here on the file has edges: the levels at from_ns first. */
+static void put_levels(struct vcd *v, uint64_t lines, uint64_t level)
+{
+    char text[3 * TRACE_SIGNALS_MAX + 1];
+    *level_lines(text, lines & v->sink.mask, level) = '\0';
+    put(v, text);
+}
+
+/* From here on the file has edges. What a line did at from_ns before it was asked for is in its first level. */
 static void begin(struct vcd *v)
 {
+    const uint64_t first = v->before ^ ((v->before ^ v->found) & v->moved);
     put_time(v, v->from_ns / v->unit_ns);
     put(v, "$dumpvars\n");
-    char lines[3 * TRACE_SIGNALS_MAX + 1];
-    *level_lines(lines, v->sink.mask, v->level) = '\0';
-    put(v, lines);
+    put_levels(v, UINT64_MAX, first);
     put(v, "$end\n");
+    put_levels(v, first ^ v->level, v->level);
     v->edge_units = v->seen_units = v->t_units;
     v->sink.steps = steps;
     v->sink.advance = advance;
 }
 
-/* What was before from_ns is in the levels there. */
+static uint64_t after(uint64_t level, const struct trace_step *s)
+{
+    return (level & ~s->lines) | (s->level & s->lines);
+}
+
 static void steps_before(void *ctx, const struct trace_step *s, unsigned n)
 {
     struct vcd *v = ctx;
-    for (; n > 0 && s->t_ns < v->from_ns; n--, s++) v->level = (v->level & ~s->lines) | (s->level & s->lines);
+    for (; n > 0 && s->t_ns < v->from_ns; n--, s++) v->before = v->level = after(v->level, s);
+    for (; n > 0 && s->t_ns == v->from_ns; n--, s++) v->level = after(v->level, s);
     if (n == 0) return;
     begin(v);
     steps(v, s, n);
@@ -153,7 +165,14 @@ static void present_levels(void *ctx, const struct trace_step *s, unsigned n)
 {
     struct vcd *v = ctx;
     (void)n;
-    v->level = s->level;
+    v->before = v->level = s->level;
+}
+
+/* Ends before the trace has come to from_ns. */
+static void begin_and_end(struct vcd *v)
+{
+    if (!v->trace->filter) v->before = v->level = v->found;
+    begin(v);
 }
 
 /* VCD knows 1, 10 and 100 of ns, us and ms here. */
@@ -200,6 +219,8 @@ bool vcd_open(struct vcd *v, const struct vcd_cfg *cfg, struct trace *t)
     v->sink = (struct trace_sink){.mask = cfg->mask, .steps = present_levels, .advance = advance_before, .ctx = v};
     trace_attach(t, &v->sink);
     v->sink.steps = steps_before;
+    v->found = trace_known(t, v->from_ns);
+    v->moved = v->found ^ trace_known(t, v->from_ns - 1);
     if (v->from_ns == t->done_ns) begin(v);
     return true;
 }
@@ -215,7 +236,7 @@ void vcd_flush(struct vcd *v)
 void vcd_close(struct vcd *v, int64_t t_ns)
 {
     trace_detach(v->trace, &v->sink);
-    if (v->sink.steps != steps) begin(v);
+    if (v->sink.steps != steps) begin_and_end(v);
     const int64_t end_units = t_ns / v->unit_ns;
     v->seen_units = end_units > v->edge_units ? end_units : v->edge_units + 1;
     vcd_flush(v);

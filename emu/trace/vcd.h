@@ -31,8 +31,11 @@ struct vcd { /* read-only outside vcd.c */
     struct trace *trace;
     FILE *out;
     int64_t unit_ns;
-    int64_t from_ns;     /* of the first levels in the file */
-    uint64_t level;      /* of all lines at from_ns, as far as told */
+    int64_t from_ns;     /* of the first levels in the file; until the trace has come there: */
+    uint64_t before;     /* levels before from_ns, as far as delivered */
+    uint64_t level;      /* and with what has happened at from_ns */
+    uint64_t found;      /* levels at from_ns when the recording was asked for */
+    uint64_t moved;      /* lines that had moved at that instant already */
     int64_t t_units;     /* last time written */
     int64_t edge_units;  /* time of the last change */
     int64_t seen_units;  /* nothing will change before this */

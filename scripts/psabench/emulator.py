@@ -61,6 +61,7 @@ class Emulator:
         self.argv += [str(x) for x in extra]
         self.endpoints: list[dict[str, str]] = []
         self._stderr = (self.directory / "stderr").open("w+b")
+        self._messages = ""
         self._process: subprocess.Popen[bytes] | None = None
 
     def __enter__(self) -> Emulator:
@@ -99,11 +100,10 @@ class Emulator:
         raise BenchError(f"emulator has no endpoint {wanted}; it has {self.endpoints}")
 
     def messages(self) -> str:
-        """What the emulator has written to stderr so far; nothing after stop()."""
-        if self._stderr.closed:
-            return ""
-        self._stderr.flush()
-        return (self.directory / "stderr").read_text(errors="replace")
+        """What the emulator has written to stderr so far, or, after stop(), in all."""
+        if not self._stderr.closed:
+            self._messages = (self.directory / "stderr").read_text(errors="replace")
+        return self._messages
 
     def wait(self, timeout_s: float) -> int:
         """Exit status of an emulator that ends by itself (`--for`). Raises BenchError when it does not."""
@@ -127,6 +127,7 @@ class Emulator:
             for pipe in (self._process.stdin, self._process.stdout):
                 if pipe:
                     pipe.close()
+        self.messages()  # before they are gone
         self._stderr.close()
         self._dir.cleanup()
         return status

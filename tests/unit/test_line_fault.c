@@ -271,6 +271,25 @@ static void who_listens_late_hears_the_faulty_levels(void **state)
     assert_int_equal(r->level & 7, 0);
 }
 
+/* Nobody listens, so that the lines move without a step; a fault of one of them must not hide where the others are. */
+static void who_listens_late_hears_where_healthy_lines_are(void **state)
+{
+    (void)state;
+    struct bench *r = up();
+    const struct line_fault f = fault(LINE_STUCK_LOW, OTHER);
+    trace_detach(&r->t, &r->sink);
+    assert_int_equal(line_fault_add(&r->l, &f), 1);
+    trace_advance(&r->t, 1000);
+    trace_set(&r->t, CLK, true, 1500);
+    trace_attach(&r->t, &r->sink);
+    assert_int_equal(r->level, TRACE_BIT(INT) | TRACE_BIT(CLK));
+    r->n = 0;
+    trace_set(&r->t, CLK, false, 2000);
+    trace_advance(&r->t, 3000);
+    assert_int_equal(r->n, 1);
+    assert_change(r, CLK, 0, false, 2000);
+}
+
 static void as_many_faults_as_there_is_room_for_and_no_more(void **state)
 {
     (void)state;
@@ -372,6 +391,7 @@ int main(void)
         cmocka_unit_test(a_pulse_too_many_follows_the_nth_of_each_frame),
         cmocka_unit_test(noise_has_its_rate_and_width_and_a_seed_the_same_pulses),
         cmocka_unit_test(who_listens_late_hears_the_faulty_levels),
+        cmocka_unit_test(who_listens_late_hears_where_healthy_lines_are),
         cmocka_unit_test(as_many_faults_as_there_is_room_for_and_no_more),
         cmocka_unit_test(who_listens_again_hears_times_in_order),
         cmocka_unit_test(a_fault_that_ends_before_it_begins_is_none),

@@ -174,6 +174,30 @@ static void edges_before_its_start_are_in_its_first_levels(void **state)
     fclose(f);
 }
 
+static void listen(void *ctx, const struct trace_step *s, unsigned n)
+{
+    (void)ctx;
+    (void)s;
+    (void)n;
+}
+
+static struct trace_sink listener = {.mask = 3, .steps = listen};
+
+/* Time stands at 7000 when the recording is asked for: what has happened there already is no edge of it, what follows is. */
+static void edges_at_its_start_count_from_the_command_on(void **state)
+{
+    (void)state;
+    trace_attach(&trace, &listener);
+    trace_advance(&trace, 5000);
+    trace_set(&trace, 1, true, 7000);
+    FILE *f = open_vcd_from(10, 7000);
+    trace_set(&trace, 0, false, 7000);
+    trace_advance(&trace, 7000);
+    vcd_close(&vcd, 9000);
+    assert_string_equal(read_back(f), HEADER("10 ns") "#700\n$dumpvars\n1!\n1\"\n$end\n0!\n#900\n");
+    fclose(f);
+}
+
 static void a_quiet_start_is_told_when_the_trace_has_come_to_it(void **state)
 {
     (void)state;
@@ -188,14 +212,16 @@ static void a_quiet_start_is_told_when_the_trace_has_come_to_it(void **state)
     fclose(f);
 }
 
-static void a_recording_that_ends_before_its_start_is_known_has_its_levels(void **state)
+static void a_recording_that_ends_before_its_start_is_delivered_has_its_levels(void **state)
 {
     (void)state;
-    FILE *f = open_vcd_from(10, 7000);
+    trace_attach(&trace, &listener);
     trace_set(&trace, 1, true, 5000);
     trace_advance(&trace, 6000);
+    trace_set(&trace, 0, false, 6500);
+    FILE *f = open_vcd_from(10, 7000);
     vcd_close(&vcd, 6800);
-    assert_string_equal(read_back(f), HEADER("10 ns") "#700\n$dumpvars\n1!\n1\"\n$end\n#701\n");
+    assert_string_equal(read_back(f), HEADER("10 ns") "#700\n$dumpvars\n0!\n1\"\n$end\n#701\n");
     fclose(f);
 }
 
@@ -266,8 +292,9 @@ int main(void)
         cmocka_unit_test_setup(a_unit_that_vcd_does_not_know_is_refused, fresh),
         cmocka_unit_test_setup(a_late_start_begins_at_its_own_time, fresh),
         cmocka_unit_test_setup(edges_before_its_start_are_in_its_first_levels, fresh),
+        cmocka_unit_test_setup(edges_at_its_start_count_from_the_command_on, fresh),
         cmocka_unit_test_setup(a_quiet_start_is_told_when_the_trace_has_come_to_it, fresh),
-        cmocka_unit_test_setup(a_recording_that_ends_before_its_start_is_known_has_its_levels, fresh),
+        cmocka_unit_test_setup(a_recording_that_ends_before_its_start_is_delivered_has_its_levels, fresh),
         cmocka_unit_test_setup(a_flushed_file_can_be_looked_at_while_it_grows, fresh),
         cmocka_unit_test_setup(long_recordings_survive_the_buffer, fresh),
         cmocka_unit_test_setup(a_full_disk_is_told_once_and_stops_nothing, fresh),
