@@ -31,6 +31,7 @@ units:
 FAMILY, ON_CAN = ("psa2", "psa1"), ("can", "pty")
 BUSY = 50
 XY, ZT, FAST = 0x180 + NODE, 0x280 + NODE, 0x380 + NODE
+STREAM: Mapping[str, int] = {"can_id": 0x080 + NODE, "can_id_mask": 0x4FF}  # these, and no heartbeat or answer
 
 
 def _nothing(s: Stage) -> None:
@@ -64,10 +65,10 @@ def _just_before_the_wrap(s: Stage) -> None:
     s.run(float(limits("HOST-CAN-03").limit("seq_modulo")) * 1e-3 - 5.0, speed=0.0)
 
 
-def _drop(s: Stage, frames: int, **only: object) -> None:
-    """The next frames do not reach anybody."""
+def _drop(s: Stage, frames: int, **only: int) -> None:
+    """The next frames of the stream, or of one identifier, do not reach anybody."""
     s.run_to_quiet()
-    s.fault("link.drop", "a.can", frames=frames, **only)
+    s.fault("link.drop", "a.can", frames=frames, **(only or STREAM))
 
 
 def _lost(s: Stage) -> None:
@@ -108,7 +109,7 @@ def _mixed(s: Stage) -> None:
 def _delayed(s: Stage) -> None:
     s.run(0.1)
     s.run_to_quiet()
-    s.fault("link.delay", "a.can", hold_s=0.03)
+    s.fault("link.delay", "a.can", hold_s=0.03, **STREAM)
     s.run(0.4)
 
 
@@ -194,7 +195,7 @@ def _silence(s: Stage) -> None:
     s.clear()
     s.run_to_quiet()
     s.mark("silent")
-    s.fault("link.drop", "a.can")
+    s.fault("link.drop", "a.can", **STREAM)
     s.run(float(row.limit("told_after_s")), speed=1.0)
     s.clear()
     s.mark("back")

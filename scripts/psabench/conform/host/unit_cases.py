@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from psabench.conform.host.can_cases import NODE, Case
+from psabench.conform.host.can_cases import NODE, STREAM, Case
 from psabench.conform.host.judge import limits
 from psabench.conform.host.stage import Stage
 
@@ -100,7 +100,7 @@ def _pmka_lost(s: Stage) -> None:
     for readings in (1, 3):
         s.run(0.5)
         s.run_between()
-        s.fault("link.drop", "a.can", frames=2 * readings)
+        s.fault("link.drop", "a.can", frames=2 * readings, **STREAM)
     s.run(0.5)
     s.fault("sensor.stuck", "a.sensor.x", out_v=float(limits("HOST-PMKA-03").limit("input_v")))
     s.run(0.5)
