@@ -73,8 +73,8 @@ NAV_OBJ  := $(patsubst %.cpp,$(BUILD)/obj/%.o,$(sort $(wildcard emu/nav/*.cpp)))
 NAV_SO   := $(BUILD)/libpsabench-nav.so.$(NAV_ABI)
 NAV_ALL  := $(NAV_SO) $(BUILD)/libpsabench-nav.so $(BUILD)/libpsabench-nav.a $(BUILD)/psabench-nav.pc
 TEST_BIN := $(addprefix $(BUILD)/tests/,$(TESTS))
-FUZZ      ?= *#                        one fuzz target, without its fuzz_
-FUZZ_BIN := $(patsubst tests/fuzz/%.c,$(BUILD)/fuzz/%,$(sort $(wildcard tests/fuzz/fuzz_$(strip $(FUZZ)).c)))
+FUZZ      ?= $(sort $(patsubst tests/fuzz/fuzz_%.c,%,$(wildcard tests/fuzz/fuzz_*.c)))
+FUZZ_BIN := $(FUZZ:%=$(BUILD)/fuzz/fuzz_%)
 BENCH_BIN := $(patsubst tests/bench/%.c,$(BUILD)/bench/%,$(sort $(wildcard tests/bench/*.c)))
 C_FILES   = $(sort $(wildcard emu/*/*.[ch] emu/*/*.[ch]pp tests/*/*.[ch] examples/*.c docs/examples/*.[ch]))
 
@@ -246,7 +246,7 @@ soak: all
 
 FUZZ_MAKE := $(MAKE) --no-print-directory CC=clang SAN=address,undefined,fuzzer-no-link BUILD=build-fuzz
 
-## fuzz: each tests/fuzz/fuzz_*.c for FUZZ_S seconds (libFuzzer, sanitizers; one: make fuzz FUZZ=psa2 FUZZ_S=3600)
+## fuzz: each tests/fuzz/fuzz_*.c for FUZZ_S seconds (libFuzzer, sanitizers; some: make fuzz FUZZ='psa2 api' FUZZ_S=3600)
 fuzz:
 	@$(FUZZ_MAKE) fuzz-each
 
