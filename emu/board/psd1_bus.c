@@ -261,8 +261,9 @@ static enum board_cycle_result refusal(const struct psd1 *b, const struct board_
     if (c->write && !registers[c->address].write) return BOARD_CYCLE_READ_ONLY;
     if (len_ns < (int64_t)b->profile.strobe_min_ns) return BOARD_CYCLE_TOO_SHORT;
     if (c->write) return registers[c->address].check ? registers[c->address].check(b, c->data) : BOARD_CYCLE_OK;
-    if (c->address > PSD1_REG_Z || (b->fl2 && !b->taken && b->axis == c->address)) return BOARD_CYCLE_OK;
-    return b->profile.host_strobe_ns > 0 ? BOARD_CYCLE_TAKEN : BOARD_CYCLE_NOT_READY;
+    if (c->address > PSD1_REG_Z) return BOARD_CYCLE_OK;
+    if (b->profile.host_strobe_ns > 0) return BOARD_CYCLE_TAKEN;
+    return b->fl2 && !b->taken && b->axis == c->address ? BOARD_CYCLE_OK : BOARD_CYCLE_NOT_READY;
 }
 
 static void count_refusal(struct psd1 *b, enum board_cycle_result r)
@@ -290,7 +291,6 @@ static enum board_cycle_result begin(struct psd1 *b, struct board_cycle *c, int6
     lines_begin(b, c->write, c->address, data ? c->data : 0, t_ns);
     sched_at(b->sched, &s->ev, s->end_ns);
     if (r != BOARD_CYCLE_OK || c->write || c->address > PSD1_REG_Z) return r;
-    psd1_due(b, PSD1_READY, SCHED_NEVER); /* not the built-in host's any more */
     take(b, t_ns);
     return r;
 }

@@ -88,7 +88,19 @@ static void refusals_leave_the_word(void **state)
     }
     assert_int_equal(rig_bus(&rig, false, 0, 0, 200), BOARD_CYCLE_OK);
     assert_int_equal(rig.bus.data, 40921);
-    assert_int_equal(rig_bus(&rig, false, 0, 0, 0), BOARD_CYCLE_NOT_READY); /* it has been taken, though FL2 stands */
+}
+
+static void a_word_is_taken_once(void **state)
+{
+    (void)state;
+    const struct psd1_profile p = no_host();
+    rig_up(&rig, &p);
+    rig_await(&rig, PSD1_READY);
+    const unsigned strobes = rig.events[PSD1_EV_STROBE];
+    assert_int_equal(rig_bus(&rig, false, 0, 0, 200), BOARD_CYCLE_OK);
+    assert_true(rig.b.fl2);
+    assert_int_equal(rig_bus(&rig, false, 0, 0, 0), BOARD_CYCLE_NOT_READY); /* though FL2 stands */
+    assert_int_equal(rig.events[PSD1_EV_STROBE], strobes + 1);
 }
 
 /* One cycle at a time; OFF without power and in reset, also for one under way. */
@@ -133,19 +145,25 @@ static void the_built_in_host_shares_the_bus(void **state)
     assert_int_equal(rig.cycle[rig.cycles - 1].word[2], 65208);
 }
 
-/* Somebody else takes the word before the built-in host. */
-static void a_word_is_taken_once(void **state)
+/* Nobody gets a word before the built-in host, not even in the time from FL2 to its strobe. */
+static void words_are_the_built_in_hosts_alone(void **state)
 {
     (void)state;
     const struct psd1_profile p = rig_exact();
     rig_up(&rig, &p);
-    rig_await(&rig, PSD1_READY);
-    const unsigned strobes = rig.events[PSD1_EV_STROBE];
-    assert_int_equal(rig_read(&rig, 0), 40921);
-    rig_await(&rig, PSD1_RF_RISE);
-    assert_int_equal(rig.events[PSD1_EV_STROBE], strobes + 1);
+    for (uint8_t axis = 0; axis < 3; axis++) {
+        rig_await(&rig, PSD1_READY);
+        assert_int_equal(rig.b.axis, axis);
+        const unsigned strobes = rig.events[PSD1_EV_STROBE];
+        const int64_t fl2_ns = rig.b.fl2_ns;
+        assert_int_equal(rig_bus(&rig, false, axis, 0, 0), BOARD_CYCLE_TAKEN);
+        rig_await(&rig, PSD1_CLEAR);
+        assert_int_equal(rig.events[PSD1_EV_STROBE], strobes + 1);
+        assert_int_equal(rig.event_ns[PSD1_EV_STROBE], fl2_ns + 1000); /* the refused strobe has ended at 800 */
+    }
     rig_await(&rig, PSD1_IDLE);
     assert_int_equal(rig.cycle[rig.cycles - 1].status, PSD1_CY_READ);
+    assert_int_equal(rig.b.counters.refused, 3);
 }
 
 /* The cycle stretches, conversions are lost, all is counted, and it goes on as if nothing had been. */
@@ -214,6 +232,7 @@ int main(void)
         cmocka_unit_test(the_bus_takes_one_cycle_at_a_time),
         cmocka_unit_test(the_built_in_host_shares_the_bus),
         cmocka_unit_test(a_word_is_taken_once),
+        cmocka_unit_test(words_are_the_built_in_hosts_alone),
         cmocka_unit_test(a_host_that_is_late_stretches_the_cycle),
         cmocka_unit_test(a_host_that_never_comes_hangs_nothing),
         cmocka_unit_test(late_begins_after_late_ns),
