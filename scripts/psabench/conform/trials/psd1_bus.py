@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from psabench.conform.bus_host import burst, line, line_refused
+import math
+
+from psabench.conform.bus_host import SHORT_S, burst, line, line_refused
 from psabench.conform.outcome import Broken
 from psabench.conform.plan import trial
 from psabench.conform.proof import proves
@@ -20,6 +22,9 @@ ATTEMPTS = 40  # to read twice within a millisecond
 ANGLE_DEG = 10.0  # more than half of what 16 bits of arc seconds hold
 ASKEW = 0.01  # what a gyro square to the axis may see of a turn
 HALF_S = 100e-6  # from one word to the next, and some more
+CYCLE_S = 40e-6  # less than a cycle takes
+SCAN_S = 120e-6  # of two cycles and more
+SCAN_STEP_S = 0.8e-6  # less than a word waits for the built-in host
 
 
 def _waiting(s: Subject, axis: int = 0) -> None:
@@ -141,13 +146,30 @@ def a_word_is_taken_once(s: Subject) -> str:
 @proves("PSD1-BUS-05")
 @trial(needs={"bus"})
 def words_of_the_built_in_host_are_refused(s: Subject) -> str:
-    """Read X, Y and Z many times while the board reads them itself."""
+    """Read X, Y and Z while the board reads them itself, each time a little earlier in the cycle."""
     code = requirements()["PSD1-BUS-05"].limit("abort_code")
     calm(s)
-    for k in range(30):
-        line_refused(s, f"R {k % 3:X}", code)
-        s.run_for(period_s(s.variant) / 7)
-    return "thirty strobes refused"
+    strobes = round(SCAN_S / SCAN_STEP_S)
+    for axis in range(3):
+        _into_a_cycle(s)
+        s.run_for(period_s(s.variant) + SCAN_S / 2)
+        for _ in range(strobes):
+            line_refused(s, f"R {axis:X}", code)
+            _a_period_later(s, SCAN_STEP_S)
+    return f"{3 * strobes} strobes refused"
+
+
+def _into_a_cycle(s: Subject) -> None:
+    """Look for a running cycle, in one period after the other."""
+    for _ in range(math.ceil(period_s(s.variant) / CYCLE_S)):
+        if status(s) & CYCLE:
+            return
+        _a_period_later(s, CYCLE_S)
+
+
+def _a_period_later(s: Subject, less_s: float) -> None:
+    """From the answer to a line to when it was sent, a period later and so much less."""
+    s.run_for(period_s(s.variant) - SHORT_S - less_s)
 
 
 @proves("PSD1-BUS-06")
