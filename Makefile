@@ -21,8 +21,9 @@ BENCH_S   ?= 180#                      seconds of measuring; 60 for a quick look
 JOBS      ?= $(shell nproc)#           tests at once
 SAN_E2E   := $(wildcard tests/e2e/test_bad_*.py) $(patsubst %,tests/e2e/test_%.py,unit tools canopen faults_random cycles)
 # Build a part only, say DIRS='base chip' TESTS=test_ads1282 while the rest does not compile.
-DIRS      ?= base trace phys chip canopen board link control app api
-TESTS     ?= $(basename $(notdir $(sort $(wildcard tests/unit/test_*.c))))
+DIRS      ?= base trace phys chip canopen board unit link command fault control scpi scenario bench app api
+UNIT      := $(sort $(wildcard tests/unit/*/test_*.c tests/unit/*/*/test_*.c))
+TESTS     ?= $(basename $(notdir $(UNIT)))
 
 VERSION := $(shell sed -n 's/^version = "\(.*\)"/\1/p' pyproject.toml)
 ABI     := $(shell sed -n 's/^\#define PSABENCH_ABI \([0-9]*\)/\1/p' emu/api/psabench.h)
@@ -61,12 +62,12 @@ include build/gen/gen.mk
 endif
 endif
 
-SRC      := $(sort $(foreach d,$(DIRS),$(wildcard emu/$(d)/*.c)))
+SRC      := $(sort $(foreach d,$(DIRS),$(wildcard emu/$(d)/*.c emu/$(d)/*/*.c)))
 MAIN     := $(filter emu/app/main.c,$(SRC))
 OBJ      := $(patsubst %.c,$(BUILD)/obj/%.o,$(SRC) $(GEN_SRC))
 LIB_OBJ  := $(filter-out $(BUILD)/obj/emu/app/main.o,$(OBJ))
 API_OBJ  := $(filter $(BUILD)/obj/emu/api/%,$(OBJ))
-CORE_OBJ := $(filter-out $(API_OBJ) $(BUILD)/obj/emu/app/% $(BUILD)/obj/emu/link/% $(BUILD)/obj/emu/control/%,$(OBJ))
+CORE_OBJ := $(filter-out $(API_OBJ) $(foreach d,link command fault control scpi scenario bench app,$(BUILD)/obj/emu/$(d)/%),$(OBJ))
 LIB_SO   := $(BUILD)/libpsabench.so.$(ABI)
 LIB_ALL  := $(if $(API_OBJ),$(LIB_SO) $(BUILD)/libpsabench.so $(BUILD)/libpsabench.a $(BUILD)/psabench.pc)
 NAV_OBJ  := $(patsubst %.cpp,$(BUILD)/obj/%.o,$(sort $(wildcard emu/nav/*.cpp))) $(BUILD)/obj/emu/base/detmath.o
@@ -76,7 +77,7 @@ TEST_BIN := $(addprefix $(BUILD)/tests/,$(TESTS))
 FUZZ      ?= $(sort $(patsubst tests/fuzz/fuzz_%.c,%,$(wildcard tests/fuzz/fuzz_*.c)))
 FUZZ_BIN := $(FUZZ:%=$(BUILD)/fuzz/fuzz_%)
 BENCH_BIN := $(patsubst tests/bench/%.c,$(BUILD)/bench/%,$(sort $(wildcard tests/bench/*.c)))
-C_FILES   = $(sort $(wildcard emu/*/*.[ch] emu/*/*.[ch]pp tests/*/*.[ch] examples/*.c docs/examples/*.[ch]))
+C_FILES   = $(sort $(shell find emu tests examples docs/examples -name '*.[ch]' -o -name '*.[ch]pp'))
 
 .SECONDARY:
 .DELETE_ON_ERROR:
@@ -92,11 +93,12 @@ $(BUILD)/psa-emu: $(filter-out $(API_OBJ),$(OBJ))
 	$(call say,LINK,$@)
 	$(Q)$(LINK) -o $@ $^ $(LIBS)
 
-# One object of what the interface needs of the core, with no name but psabench_* to be seen: also in the static library.
+# One object of what the interface needs of the core, with no name but psabench_* to be seen: also in the static library. A thin
+# archive (T): an ordinary one would keep one object of each file name, and every room has its board.o.
 $(BUILD)/lib/psabench.o: $(API_OBJ) $(CORE_OBJ)
 	@mkdir -p $(@D)
 	$(call say,LD -r,$@)
-	$(Q)rm -f $(@D)/core.a && $(AR) rcs $(@D)/core.a $(CORE_OBJ)
+	$(Q)rm -f $(@D)/core.a && $(AR) rcsT $(@D)/core.a $(CORE_OBJ)
 	$(Q)$(LD) -r -o $@ $(API_OBJ) $(@D)/core.a && $(OBJCOPY) --localize-hidden $@
 
 $(BUILD)/lib/psabench-nav.o: $(NAV_OBJ)
@@ -141,10 +143,12 @@ $(BUILD)/obj/%.o: %.c Makefile
 	$(Q)$(COMPILE) -MMD -MP -c -o $@ $<
 
 $(BUILD)/tests/test_nav: $(BUILD)/libpsabench-nav.a
-$(BUILD)/tests/%: $(BUILD)/obj/tests/unit/%.o $(LIB_OBJ)
+$(BUILD)/obj/tests/%.o: CPPFLAGS += -Itests/unit#                                   rigs that several folders use
+$(foreach t,$(UNIT),$(eval $(BUILD)/tests/$(basename $(notdir $(t))): $(BUILD)/obj/$(t:.c=.o)))
+$(BUILD)/tests/%: $(LIB_OBJ)
 	@mkdir -p $(@D)
 	$(call say,LINK,$@)
-	$(Q)$(LINK) -o $@ $< $(LIB_OBJ) $(filter %.a,$^) $(LIBS) -lcmocka
+	$(Q)$(LINK) -o $@ $(filter %.o,$^) $(filter %.a,$^) $(LIBS) -lcmocka
 
 $(BUILD)/obj/tests/bench/%.o: CPPFLAGS += -D_POSIX_C_SOURCE=199309L#                     clock_gettime
 $(BUILD)/bench/%: $(BUILD)/obj/tests/bench/%.o $(LIB_OBJ)
@@ -329,8 +333,8 @@ wheel: all
 
 ## compile_commands.json: how each file is compiled, for editors and clang-tidy
 compile_commands.json: Makefile $(SRC) $(GEN_SRC)
-	@{ echo '['; sep=; for f in $(SRC) $(GEN_SRC) $(wildcard tests/unit/*.c); do \
-	    printf '%s{"directory": "%s", "file": "%s", "command": "%s -c %s"}\n' "$$sep" '$(CURDIR)' $$f '$(COMPILE)' $$f; \
+	@{ echo '['; sep=; for f in $(SRC) $(GEN_SRC) $(UNIT); do \
+	    printf '%s{"directory": "%s", "file": "%s", "command": "%s -c %s"}\n' "$$sep" '$(CURDIR)' $$f '$(COMPILE) -Itests/unit' $$f; \
 	    sep=,; done; echo ']'; } > $@
 
 # spidev and gpiod are a Linux machine's hardware, which tests put their own in place of; spidev would have to be compiled.
@@ -351,4 +355,4 @@ help:
 
 -include $(BENCH_BIN:$(BUILD)/bench/%=$(BUILD)/obj/tests/bench/%.d)
 -include $(FUZZ_BIN:$(BUILD)/fuzz/%=$(BUILD)/obj/tests/fuzz/%.d)
--include $(OBJ:.o=.d) $(NAV_OBJ:.o=.d) $(TEST_BIN:$(BUILD)/tests/%=$(BUILD)/obj/tests/unit/%.d)
+-include $(OBJ:.o=.d) $(NAV_OBJ:.o=.d) $(UNIT:%.c=$(BUILD)/obj/%.d)

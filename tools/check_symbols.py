@@ -1,17 +1,17 @@
 #!/usr/bin/env python3
 """What the compiled core must not contain: mutable globals, allocation, output, clocks, inexact libm functions.
 
-Usage: check_symbols.py OBJECT_ROOT (build/obj). Reads every object below emu/ but those of link and app, which may do
-all this. Two compilers or machines give equal bytes only while no result depends on a libm whose last digit is its own.
+Usage: check_symbols.py OBJECT_ROOT (build/obj). Reads every object below emu/ but those of link, scenario, bench and app,
+which may do all this. Two compilers or machines give equal bytes only while no result depends on a libm whose last digit is its own.
 """
 
 import subprocess
 import sys
 from pathlib import Path
 
-FREE_FOLDERS = {"link", "app"}
+FREE_FOLDERS = {"link", "app", "bench", "scenario"}
 CXX_FOLDERS = {"nav"}
-ALLOCATOR_FOLDERS = {"control", "api"}  # through cJSON; the library's benches and parts
+ALLOCATOR_FOLDERS = {"command", "control", "fault", "scpi", "api"}  # through cJSON; the library's benches and parts
 LIBM = (
     "sin cos tan asin acos atan atan2 sinh cosh tanh asinh acosh atanh exp exp2 expm1 "
     "log log2 log10 log1p pow cbrt hypot erf erfc tgamma"
@@ -55,12 +55,13 @@ def mutable(objects: Path) -> list[str]:
 
 def main(root: Path) -> int:
     breaches = []
-    objects = sorted(root.glob("emu/*/*.o"))
+    objects = sorted((root / "emu").rglob("*.o"))
     for path in objects:
-        folder = path.parent.name
+        room = path.parent.relative_to(root / "emu")
+        folder = room.parts[0]
         if folder in FREE_FOLDERS:
             continue
-        source = f"emu/{folder}/{path.stem}.{'cpp' if folder in CXX_FOLDERS else 'c'}"
+        source = f"emu/{room}/{path.stem}.{'cpp' if folder in CXX_FOLDERS else 'c'}"
         breaches += [f"{source}: mutable global {name}" for name in mutable(path)]
         for name in undefined(path):
             if name in FORBIDDEN and not (folder in ALLOCATOR_FOLDERS and FORBIDDEN[name] == "allocates"):

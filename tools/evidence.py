@@ -31,7 +31,16 @@ from find_tests import collected_in_python, registered_in_c
 
 ROOT = Path(__file__).resolve().parents[1]
 LEDGER, LOCK = "docs/evidence.yaml", "docs/evidence.lock"
-MODELS = ("base", "board", "canopen", "chip", "nav", "phys", "trace")  # folders of emu whose files must be in a group
+MODELS = (
+    "base",
+    "board",
+    "canopen",
+    "chip",
+    "nav",
+    "phys",
+    "trace",
+    "unit",
+)  # folders of emu whose files must be in a group
 SOURCES = (".c", ".h", ".cpp", ".hpp")
 RUNGS = ("E2", "E3", "E4", "E5", "E6")  # that a test can be on; what is our own test of our own code is on none
 LOCK_HEAD = (
@@ -198,7 +207,7 @@ def faults(root: Path, ledger: Ledger) -> Iterator[str]:
                 yield f"{file} is in two groups, {owner[file]} and {group.name}"
             owner[file] = group.name
     for folder in MODELS:
-        for path in sorted((root / "emu" / folder).glob("*")):
+        for path in sorted((root / "emu" / folder).rglob("*")):
             if path.suffix in SOURCES and path.relative_to(root).as_posix() not in owner:
                 yield f"{path.relative_to(root)} is in no group of {LEDGER}: nothing says what proves it"
     subjects = {g.name for g in ledger.groups}

@@ -94,7 +94,8 @@ def board_rows(reqs: Requirements, suite: Mapping[str, object]) -> dict[str, lis
 def path_of(root: Path, test: str) -> str:
     """test_x.py:name as tests/py/test_x.py:name."""
     file, name = test.split(":")
-    return next((f"{d}/{file}:{name}" for d in FOLDERS if (root / d / file).is_file()), test)
+    found = next((p for d in FOLDERS for p in (root / d).rglob(file)), None)
+    return f"{found.relative_to(root).as_posix()}:{name}" if found else test
 
 
 def chip_rows(root: Path, chip: str) -> list[gen_docs.Row]:

@@ -138,7 +138,7 @@ def tests_cell(row: Requirement, suite: Mapping[str, list[str]]) -> str:
 
 
 def short(test: str) -> str:
-    """tests/unit/test_psa2.c:name as "psa2: name"."""
+    """tests/unit/board/psa2/test_psa2.c:name as "psa2: name"."""
     file, name = test.split(":")
     return f"{Path(file).stem.removeprefix('test_')}: {name.removeprefix('test_')}"
 

@@ -1,10 +1,10 @@
-/* --bus-port: cycles of the parallel buses of units as lines of text on pseudo-terminals (link/bus_pty.h). */
+/* --bus-port: cycles of the parallel buses of units as lines of text on pseudo-terminals (link/line/bus_pty.h). */
 #ifndef PSABENCH_APP_BUS_PORTS_H
 #define PSABENCH_APP_BUS_PORTS_H
 
-#include "app/bench.h"
 #include "app/options.h"
-#include "link/bus_pty.h"
+#include "bench/bench.h"
+#include "link/line/bus_pty.h"
 
 struct bus_port {
     struct bus_pty pty;

@@ -1,6 +1,6 @@
 #include "app/instruments.h"
 
-#include "app/why.h"
+#include "base/why.h"
 
 #include <errno.h>
 #include <stdlib.h>

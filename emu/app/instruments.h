@@ -3,8 +3,8 @@
 #define PSABENCH_APP_INSTRUMENTS_H
 
 #include "app/options.h"
-#include "control/scpi.h"
 #include "link/scpi_port.h"
+#include "scpi/scpi.h"
 
 #include <stdio.h>
 

@@ -1,10 +1,10 @@
 #include "app/list.h"
 
-#include "app/find.h"
-#include "app/profile_yaml.h"
 #include "control/control.h"
-#include "control/fault.h"
-#include "control/scpi.h"
+#include "fault/fault.h"
+#include "scenario/find.h"
+#include "scenario/profile.h"
+#include "scpi/scpi.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -1,6 +1,8 @@
 #define _GNU_SOURCE /* ppoll */
 #include "app/loop.h"
 
+#include "bench/bench.h"
+
 #include <poll.h>
 #include <time.h>
 
@@ -18,7 +20,7 @@ static bool run_slice(struct loop *l, int64_t until_ns)
     const int64_t next_ns = sched_next_ns(l->sched);
     /* Over a stretch without events in one stride. */
     const int64_t from_ns = next_ns > now_ns ? next_ns : now_ns;
-    const int64_t to_ns = from_ns >= until_ns ? until_ns : min_ns(until_ns, from_ns + PACE_SLICE_NS);
+    const int64_t to_ns = from_ns >= until_ns ? until_ns : min_ns(until_ns, from_ns + BENCH_SLICE_NS);
     sched_run_until(l->sched, to_ns);
     l->moved(l->ctx, l->sched->now_ns);
     return l->sched->now_ns == until_ns;

@@ -3,7 +3,7 @@
 #include "app/options.h"
 #include "app/service.h"
 #include "base/text.h"
-#include "control/exact.h"
+#include "command/exact.h"
 
 #include <errno.h>
 #include <signal.h>

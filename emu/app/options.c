@@ -1,8 +1,8 @@
 #define _GNU_SOURCE /* getopt_long */
 #include "app/options.h"
 
-#include "app/why.h"
-#include "link/socketcand_tcp.h"
+#include "base/why.h"
+#include "link/can/socketcand_tcp.h"
 
 #include <errno.h>
 #include <getopt.h>

@@ -1,6 +1,6 @@
 #include "app/ports.h"
 
-#include "app/why.h"
+#include "base/why.h"
 
 #include <errno.h>
 #include <inttypes.h>

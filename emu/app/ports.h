@@ -2,17 +2,17 @@
 #ifndef PSABENCH_APP_PORTS_H
 #define PSABENCH_APP_PORTS_H
 
-#include "app/bench.h"
 #include "app/bus_ports.h"
 #include "app/instruments.h"
 #include "app/options.h"
-#include "link/can_hub.h"
-#include "link/can_log.h"
+#include "bench/bench.h"
+#include "link/can/can_hub.h"
+#include "link/can/can_log.h"
+#include "link/can/slcan_pty.h"
+#include "link/can/socketcan.h"
+#include "link/can/socketcand_tcp.h"
 #include "link/ctl_sock.h"
-#include "link/line_pty.h"
-#include "link/slcan_pty.h"
-#include "link/socketcan.h"
-#include "link/socketcand_tcp.h"
+#include "link/line/line_pty.h"
 
 struct ports_can {
     enum options_can_kind kind;

@@ -2,14 +2,14 @@
 #ifndef PSABENCH_APP_SERVICE_H
 #define PSABENCH_APP_SERVICE_H
 
-#include "app/bench.h"
 #include "app/loop.h"
 #include "app/ports.h"
-#include "app/snapshot.h"
-#include "app/timeline.h"
-#include "app/truth_log.h"
+#include "bench/bench.h"
+#include "bench/snapshot.h"
+#include "bench/timeline.h"
+#include "bench/truth_log.h"
 #include "control/control.h"
-#include "control/fault.h"
+#include "fault/fault.h"
 
 /* Exit statuses of the process. */
 enum { SERVICE_DONE = 0, SERVICE_INPUT = 2, SERVICE_MACHINE = 3, SERVICE_INT = 130 };

@@ -1,5 +1,5 @@
 /* What every board gives the bench: one const table a type. The bench, links, control, faults, snapshots and scenarios know
- * boards only through it; board/boards.c lists the types.
+ * boards only through it; unit/boards.c lists the types.
  *
  * A board is a plain struct that its unit owns, one thread, no allocation. `board` is a pointer to that struct, `can` one to
  * its CAN side, `profile` one to its profile struct. Times are simulated ns since power-on of the bench. */
@@ -8,11 +8,11 @@
 
 #include "base/sched.h"
 #include "base/sha256.h"
-#include "board/board_bus.h"
-#include "board/board_can.h"
-#include "board/board_cfg.h"
-#include "board/board_field.h"
-#include "board/board_part.h"
+#include "board/bus.h"
+#include "board/can.h"
+#include "board/cfg.h"
+#include "board/field.h"
+#include "board/part.h"
 #include "trace/line_fault.h"
 #include "trace/trace.h"
 

@@ -4,7 +4,7 @@
 #ifndef PSABENCH_BOARD_BUS_LINES_H
 #define PSABENCH_BOARD_BUS_LINES_H
 
-#include "board/board_bus.h"
+#include "board/bus.h"
 #include "trace/trace.h"
 
 /* Numbers in the board's trace; AB0 and D0 are the first of 4 and of 16. */

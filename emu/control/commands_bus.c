@@ -1,5 +1,5 @@
 /* Cycles on the parallel bus of a board that has one. */
-#include "control/args.h"
+#include "command/args.h"
 #include "control/commands.h"
 
 enum { UNIT, ADDRESS, READ_STROBE, DATA = READ_STROBE, WRITE_STROBE };

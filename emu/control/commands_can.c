@@ -1,5 +1,5 @@
 /* Frames on the bus from the bench itself: a host's part in scenarios without one. */
-#include "control/args.h"
+#include "command/args.h"
 #include "control/commands.h"
 
 #include "base/can_text.h"

@@ -1,7 +1,7 @@
 /* Commands of faults: what there is, what is wrong now, and what is to go wrong. */
-#include "control/args.h"
+#include "command/args.h"
 #include "control/commands.h"
-#include "control/fault_parts.h"
+#include "fault/fault.h"
 
 #include <string.h>
 

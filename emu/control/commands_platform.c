@@ -1,5 +1,5 @@
 /* Commands of the vehicle under the gyro-stabilised platform, and of the gyro unit's panel. */
-#include "control/args.h"
+#include "command/args.h"
 #include "control/commands.h"
 
 static struct platform *platform_of(const struct control_bench *b)

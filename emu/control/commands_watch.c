@@ -1,6 +1,6 @@
 /* Commands that look on: events, levels, recordings. */
+#include "command/events.h"
 #include "control/commands.h"
-#include "control/events.h"
 
 #include <math.h>
 

@@ -1,6 +1,6 @@
 #include "control/control.h"
 
-#include "control/args.h"
+#include "command/args.h"
 #include "control/commands.h"
 
 #include <inttypes.h>
@@ -31,25 +31,6 @@ enum control_outcome control_refuse(struct control *c, const char *code, const c
 void control_settle_inputs(const struct control_bench *b, int64_t t_ns)
 {
     for (unsigned i = 0; i < b->units; i++) unit_sample_until(b->unit[i], t_ns);
-}
-
-/* ---- the rows */
-
-const struct control_command *control_row(const struct control_table *const *tables, unsigned i)
-{
-    for (; *tables; i -= (*tables)->count, tables++) {
-        if (i < (*tables)->count) return &(*tables)->row[i];
-    }
-    return NULL;
-}
-
-const struct control_command *control_find(const struct control_table *const *tables, const char *name)
-{
-    const struct control_command *row;
-    for (unsigned i = 0; (row = control_row(tables, i)); i++) {
-        if (strcmp(row->name, name) == 0) return row;
-    }
-    return NULL;
 }
 
 /* ---- carrying out */

@@ -10,7 +10,7 @@
 #ifndef PSABENCH_CONTROL_CONTROL_H
 #define PSABENCH_CONTROL_CONTROL_H
 
-#include "control/command.h"
+#include "command/args.h"
 #include "control/watch.h"
 
 #define CONTROL_REPLY_MAX  524288u /* counters of 64 units */
@@ -57,16 +57,6 @@ void control_cycles_forget(struct control *c, const void *client); /* likewise; 
 
 /* ---- a command without a line: scenarios, SCPI, the journal */
 
-/* The i-th row of the tables; NULL past the last. */
-const struct control_command *control_row(const struct control_table *const *tables, unsigned i);
-const struct control_command *control_find(const struct control_table *const *tables, const char *name);
-unsigned control_arg_count(const struct control_command *row);
-
-/* Fills v[CONTROL_ARGS_MAX] from a JSON object (NULL: no arguments); strings stay the object's. False with the refusal. Of
- * the bench it needs unit_name; ranges that depend on the instruments are checked when lab is there. */
-bool control_args(const struct control_bench *b, const struct control_command *row, const cJSON *args,
-                  struct control_value v[CONTROL_ARGS_MAX], struct control_refusal *why);
-
 /* The one way to carry out a command: runs the handler and tells the journal. */
 enum control_outcome control_do(struct control *c, const struct control_command *row, const struct control_value *v,
                                 cJSON *result, int64_t t_ns);
@@ -80,8 +70,5 @@ bool control_check(const struct control_bench *b, const char *cmd, const cJSON *
 /* For handlers: remembers why; returns CONTROL_REFUSED. */
 __attribute__((format(printf, 3, 4))) enum control_outcome control_refuse(struct control *c, const char *code,
                                                                           const char *format, ...);
-
-/* The table as Markdown, for docs/emulator.md and --list-commands: next line into out, false at the end. */
-bool control_markdown(const struct control_table *const *tables, unsigned line, char *out, size_t cap);
 
 #endif

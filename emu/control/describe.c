@@ -1,6 +1,6 @@
 #include "control/describe.h"
 
-#include "control/args.h"
+#include "command/args.h"
 
 #include <string.h>
 

@@ -156,7 +156,7 @@ static void add_pair(cJSON *to, const char *name, const double v[2], double scal
     cJSON_AddItemToObject(to, name, cJSON_CreateDoubleArray(scaled, 2));
 }
 
-/* Angles of platform and vehicle as in phys/platform.h; pairs: about x, about z. */
+/* Angles of platform and vehicle as in phys/motion/platform.h; pairs: about x, about z. */
 static void add_platform(struct lab *l, cJSON *to, int64_t t_ns)
 {
     const double degph_of_radps = deg_of_rad * 3600.0;

@@ -2,7 +2,7 @@
 
 #include "control/control.h"
 #include "control/describe.h"
-#include "control/fault.h"
+#include "fault/fault.h"
 
 #include <string.h>
 

@@ -9,7 +9,7 @@
 #define PSABENCH_CONTROL_WATCH_H
 
 #include "base/sched.h"
-#include "control/view.h"
+#include "command/view.h"
 
 #define CONTROL_SUBS_MAX 32u
 

@@ -11,10 +11,10 @@
 #define PSABENCH_PHYS_LAB_H
 
 #include "phys/chamber.h"
-#include "phys/head.h"
-#include "phys/platform.h"
+#include "phys/motion/head.h"
+#include "phys/motion/platform.h"
+#include "phys/motion/table.h"
 #include "phys/supply.h"
-#include "phys/table.h"
 
 enum lab_mount { LAB_HEAD, LAB_TABLE, LAB_FIXED, LAB_PLATFORM };
 

@@ -5,8 +5,8 @@
  *
  * The clock runs from the first frame after the set-up on. Under callgrind take the difference of two counts of frames:
  * the set-up is the same in both. The hash is over the words of all frames: a faster core says the same. */
-#include "board/psa2.h"
-#include "board/psd1.h"
+#include "board/psa2/psa2.h"
+#include "board/psd1/psd1.h"
 #include "trace/vcd.h"
 
 #include <inttypes.h>

@@ -5,7 +5,7 @@
  * FILE gets a line a cycle: words X, Y and Z, in hex, as they stood on the bus. Standard output gets what came of them on
  * the lines, in the order of psd1.v: "frames N checksum H", then "line I edges M when W", with W the sum of when: half
  * periods of 1M25 since A0 rose, for SDAT and DR edges of SCLK since then. */
-#include "board/psd1.h"
+#include "board/psd1/psd1.h"
 
 #include <inttypes.h>
 #include <stdio.h>

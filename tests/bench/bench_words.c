@@ -6,7 +6,7 @@
  * them on the lines, in the order of psa2.v: "frames N checksum H", then "line I edges M when W", with W the sum of when:
  * for Data, CLK and Int in half periods of CLK since Int fell, for DOutX/Y/Z in levels of SClk since DRD_A fell. SClk
  * counts only while CST is high: the temperature port, which the models lack, uses the same wire. */
-#include "board/psa2.h"
+#include "board/psa2/psa2.h"
 
 #include <inttypes.h>
 #include <stdio.h>

@@ -45,5 +45,5 @@ def test_a_text_that_is_not_there_and_one_that_does_not_compile_are_told_as_such
         ("no such text", "", "bad list"),
         ("static bool port_free", "static bowl port_free", "does not"),
     ):
-        m = Mutant(id="a", kind="value", file="emu/board/psa2.c", old=old, new=new, on=ON)
+        m = Mutant(id="a", kind="value", file="emu/board/psa2/controller.c", old=old, new=new, on=ON)
         assert judge.judge(m).result.startswith(what)

@@ -21,7 +21,7 @@ from test_snapshot import Desk, at, desk, edges, heard, truth_lines, watching
 
 pytestmark = pytest.mark.host
 
-LIST = (ROOT / "emu/board/boards.c").read_text(encoding="utf-8")
+LIST = (ROOT / "emu/unit/boards.c").read_text(encoding="utf-8")
 NAMES = {m[1]: m[2] for m in re.finditer(r'\{"(\w+)", &(\w+)_board, ', LIST)}  # what a scenario may say: the type
 ALL = sorted(NAMES)
 LINE_BYTES = 190_000  # 0.1 s at 2 MHz, but for what is not known yet at its end

@@ -4,7 +4,7 @@
 
 #include "fuzz.h"
 
-#include "chip/ad7712.h"
+#include "chip/ad7712/ad7712.h"
 
 /* How frames reach the chip: edge by edge, or as words. */
 enum w7712_drive { W7712_PINS, W7712_WORDS };

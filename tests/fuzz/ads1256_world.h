@@ -4,7 +4,7 @@
 
 #include "fuzz.h"
 
-#include "chip/ads1256.h"
+#include "chip/ads1256/ads1256.h"
 
 /* How bytes reach the chip. Of two worlds driven by one script none gets a byte while something is due: what a word that
  * comes inside a byte tears, only the pins show. */

@@ -4,7 +4,7 @@
 
 #include "fuzz.h"
 
-#include "chip/ads1282.h"
+#include "chip/ads1282/ads1282.h"
 
 /* How bytes reach the chip. Of two worlds driven by one script none gets a byte while something is due, nor after a gap that
  * is too short from rise to rise and long enough from rise to fall: what a word that comes inside a byte tears, and what

@@ -3,9 +3,9 @@
  * of JSON. In the end the journal makes the same bench again. */
 #include "fuzz.h"
 
-#include "app/snapshot.h"
-#include "control/args.h"
-#include "control/fault.h"
+#include "bench/snapshot.h"
+#include "command/args.h"
+#include "fault/fault.h"
 
 #include <stdio.h>
 #include <stdlib.h>

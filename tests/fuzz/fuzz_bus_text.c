@@ -1,7 +1,7 @@
 /* Lines of the bus port: any bytes are a request or are refused, and what is answered is one line. */
 #include "fuzz.h"
 
-#include "link/bus_text.h"
+#include "link/line/bus_text.h"
 
 #include <string.h>
 

@@ -3,7 +3,7 @@
 #include "fuzz.h"
 
 #include "base/bits.h"
-#include "board/psa2_can.h"
+#include "board/psa2/can.h"
 
 #include <string.h>
 

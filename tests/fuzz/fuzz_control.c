@@ -1,7 +1,7 @@
 /* A control line of any bytes gives one line of JSON, or a run to be answered later. The bench lives on between inputs. */
 #include "fuzz.h"
 
-#include "app/bench.h"
+#include "bench/bench.h"
 #include "control/control.h"
 
 #include <stdlib.h>

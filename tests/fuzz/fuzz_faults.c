@@ -4,7 +4,7 @@
 #include "fuzz.h"
 #include "listener.h"
 
-#include "board/psa2_can.h"
+#include "board/psa2/can.h"
 
 #include <string.h>
 

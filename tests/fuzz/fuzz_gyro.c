@@ -3,8 +3,8 @@
 #include "fuzz.h"
 #include "listener.h"
 
-#include "board/gyro.h"
-#include "board/gyro_board.h"
+#include "board/gyro/board.h"
+#include "board/gyro/gyro.h"
 
 #include <math.h>
 #include <string.h>

@@ -3,10 +3,10 @@
 #define _GNU_SOURCE /* SOCK_NONBLOCK */
 #include "fuzz.h"
 
-#include "link/can_hub.h"
+#include "link/can/can_hub.h"
+#include "link/can/slcan_pty.h"
+#include "link/can/socketcand_tcp.h"
 #include "link/ctl_sock.h"
-#include "link/slcan_pty.h"
-#include "link/socketcand_tcp.h"
 
 #include <arpa/inet.h>
 #include <fcntl.h>

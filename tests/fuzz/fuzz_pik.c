@@ -4,7 +4,7 @@
 #include "listener.h"
 #include "twin.h"
 
-#include "board/pik.h"
+#include "board/pik/pik.h"
 
 #include <string.h>
 

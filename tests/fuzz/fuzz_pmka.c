@@ -4,8 +4,8 @@
 #include "listener.h"
 #include "twin.h"
 
-#include "board/pmka.h"
-#include "board/pmka_board.h"
+#include "board/pmka/board.h"
+#include "board/pmka/pmka.h"
 
 #include <math.h>
 #include <string.h>

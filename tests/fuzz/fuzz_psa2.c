@@ -5,7 +5,7 @@
 #include "twin.h"
 
 #include "base/clk.h"
-#include "board/psa2.h"
+#include "board/psa2/psa2.h"
 
 #include <string.h>
 

@@ -5,7 +5,7 @@
 #include "twin.h"
 
 #include "board/board.h"
-#include "board/psd1.h"
+#include "board/psd1/psd1.h"
 
 #include <string.h>
 

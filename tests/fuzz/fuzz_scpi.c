@@ -2,7 +2,7 @@
  * answered by at most one line of printable characters, and the error queue only tells standard numbers. */
 #include "fuzz.h"
 
-#include "../unit/scpi_rig.h"
+#include "scpi_rig.h"
 
 #include <stdlib.h>
 

@@ -1,8 +1,8 @@
 /* slcan: bytes to lines to frames; what is accepted is a valid frame and has the same length of text again. */
 #include "fuzz.h"
 
-#include "link/lines.h"
-#include "link/slcan.h"
+#include "link/can/slcan.h"
+#include "link/line/lines.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {

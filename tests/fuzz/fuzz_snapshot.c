@@ -2,8 +2,8 @@
  * and the sum, which are put around it so that more than damage is found. */
 #include "fuzz.h"
 
-#include "app/snapshot.h"
 #include "base/text.h"
+#include "bench/snapshot.h"
 
 #include <stdio.h>
 #include <stdlib.h>

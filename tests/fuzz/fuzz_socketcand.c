@@ -1,8 +1,8 @@
 /* socketcand: bytes to messages; an accepted frame is valid and has a text, a refusal has words. */
 #include "fuzz.h"
 
-#include "link/lines.h"
-#include "link/socketcand.h"
+#include "link/can/socketcand.h"
+#include "link/line/lines.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {

@@ -1,7 +1,7 @@
 /* A scenario of any bytes is loaded or refused in one line with the name of the file. */
 #include "fuzz.h"
 
-#include "app/scenario_yaml.h"
+#include "scenario/scenario.h"
 
 #include <string.h>
 

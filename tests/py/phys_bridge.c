@@ -1,6 +1,6 @@
 /* The physics of emu/phys as flat functions of numbers, for ctypes: compiled and loaded by tests/py/physics.py only. */
 #include "phys/lab.h"
-#include "phys/mems.h"
+#include "phys/sensor/mems.h"
 
 #include <stdlib.h>
 

@@ -55,7 +55,7 @@ def build(where: Path) -> ctypes.CDLL:
     """Compile emu/phys with the bridge into a library of its own and load it."""
     out = where / "physics.so"
     sources = [ROOT / "tests/py/phys_bridge.c", ROOT / "emu/base/detmath.c", ROOT / "emu/base/rng.c"]
-    sources += sorted((ROOT / "emu/phys").glob("*.c"))
+    sources += sorted((ROOT / "emu/phys").rglob("*.c"))
     flags = ["-std=c11", "-O2", "-ffp-contract=off", "-shared", "-fPIC", f"-I{ROOT / 'emu'}"]
     subprocess.run([os.environ.get("CC", "cc"), *flags, "-o", str(out), *map(str, sources), "-lm"], check=True)
     lib = ctypes.CDLL(str(out))

@@ -276,7 +276,7 @@ def test_every_model_file_is_in_a_group_and_every_claim_has_its_test() -> None:
 def test_rows_count_by_their_highest_test() -> None:
     ledger = evidence.load(ROOT)
     own, timed, driver = (
-        "tests/unit/test_ads1256.c:x",
+        "tests/unit/chip/ads1256/test_ads1256.c:x",
         "tests/py/test_chip_timing_ads1256.py:y",
         "tests/py/test_pipyadc.py:z",
     )
@@ -322,11 +322,11 @@ def test_a_stale_group_is_marked_on_the_page(tmp_path: Path) -> None:
     ledger = evidence.load(tmp_path)
     evidence.prove(tmp_path, ledger, [g.name for g in ledger.groups], passes)
     assert {row[-1] for row in gen_fidelity.group_rows(tmp_path, ledger)} == {"as proved"}
-    path = tmp_path / "emu/chip/ad7712.c"
+    path = tmp_path / "emu/chip/ad7712/control.c"
     path.write_text(path.read_text() + "\nint more;\n")
     (row,) = [line for line in gen_fidelity.page(tmp_path).splitlines() if "**stale**" in line]
     assert row.startswith("| `ad7712` |")
-    assert row.endswith("| **stale**: emu/chip/ad7712.c changed |")
+    assert row.endswith("| **stale**: emu/chip/ad7712/control.c changed |")
 
 
 def test_the_page_is_up_to_date(capsys: pytest.CaptureFixture[str]) -> None:

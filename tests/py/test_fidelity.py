@@ -35,9 +35,9 @@ CHIPS = list(gen_docs.PAGES.values())
 def names_in(file: str) -> frozenset[str]:
     """Tests in a file of that name; empty when there is none where the runners look."""
     if file.endswith(".c"):
-        path = ROOT / "tests/unit" / file
-        return frozenset(registered_in_c(path.read_text()) if path.exists() else ())
-    paths = [p for folder in PYTHON_FOLDERS if (p := ROOT / folder / file).exists()]
+        found = list((ROOT / "tests/unit").rglob(file))
+        return frozenset(registered_in_c(found[0].read_text()) if len(found) == 1 else ())
+    paths = [p for folder in PYTHON_FOLDERS for p in (ROOT / folder).rglob(file)]
     return frozenset(collected_in_python(paths[0].read_text()) if len(paths) == 1 else ())
 
 

@@ -4,7 +4,7 @@
 
 #include "rig.h"
 
-#include "app/bench.h"
+#include "bench/bench.h"
 #include "control/control.h"
 
 #include <string.h>

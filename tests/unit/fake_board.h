@@ -3,7 +3,7 @@
 #ifndef PSABENCH_TESTS_FAKE_BOARD_H
 #define PSABENCH_TESTS_FAKE_BOARD_H
 
-#include "board/unit.h"
+#include "unit/unit.h"
 
 #include <stdio.h>
 #include <string.h>

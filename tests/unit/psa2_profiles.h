@@ -4,7 +4,7 @@
 
 #include "rig.h"
 
-#include "board/psa2_profile.h"
+#include "board/psa2/profile.h"
 
 #include <string.h>
 

@@ -2,7 +2,7 @@
 #ifndef PSABENCH_TESTS_SCPI_RIG_H
 #define PSABENCH_TESTS_SCPI_RIG_H
 
-#include "control/scpi.h"
+#include "scpi/scpi.h"
 
 #include <string.h>
 

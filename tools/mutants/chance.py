@@ -18,18 +18,18 @@ BLANKS = re.compile(
 )
 # By the beginning of a file's name: which boards it is run on. Files of no row here are not mutated.
 ON: tuple[tuple[str, str], ...] = (
-    ("emu/board/psa2", "psa2"),
-    ("emu/chip/ads1282", "psa2"),
-    ("emu/chip/ads1256", "psa2"),
-    ("emu/board/psd1", "psd1 psd1:psd1_host"),
-    ("emu/chip/ad7712", "psd1"),
-    ("emu/board/pmka", "pmka"),
-    ("emu/board/pik", "pik"),
-    ("emu/board/gyro", "gyro"),
+    ("emu/board/psa2/", "psa2"),
+    ("emu/chip/ads1282/", "psa2"),
+    ("emu/chip/ads1256/", "psa2"),
+    ("emu/board/psd1/", "psd1 psd1:psd1_host"),
+    ("emu/chip/ad7712/", "psd1"),
+    ("emu/board/pmka/", "pmka"),
+    ("emu/board/pik/", "pik"),
+    ("emu/board/gyro/", "gyro"),
     ("emu/canopen/co_", "psa2"),
 )
 # What no board of these has: pins that nobody drives edge by edge, faults, what only truth and digest tell.
-LEFT_OUT = re.compile(r"_(fault|pins|gpio|board|profile|profile_set|mod|cal|hpf|cic)\.c$")
+LEFT_OUT = re.compile(r"/(fault|pins|gpio|board|profile|profile_set|mod|cal|hpf|cic)\.c$")
 
 Match = re.Match[str]
 RELATIONS: Mapping[str, str] = {"<": "<=", "<=": "<", ">": ">=", ">=": ">", "==": "!=", "!=": "=="}
@@ -102,10 +102,17 @@ def places(path: str, text: str) -> Iterator[tuple[str, int, int, str]]:
             yield kind, m.start(), m.end(), change(m)
 
 
+def _name(path: str) -> str:
+    """emu/chip/ads1282/conv.c: ads1282-conv; emu/canopen/co_sdo.c: co-sdo."""
+    p = Path(path)
+    room = f"{p.parent.name}-" if p.parts[1] in ("chip", "board") else ""
+    return room + p.stem.replace("_", "-")
+
+
 def _mutant(path: str, text: str, place: tuple[str, int, int, str], on: str) -> Mutant:
     """The text before the place is its address: it stands there once."""
     kind, begin, end, new = place
-    line, name = text.count("\n", 0, begin) + 1, Path(path).stem.replace("_", "-")
+    line, name = text.count("\n", 0, begin) + 1, _name(path)
     return Mutant(
         id=f"{name}-{line}-{begin - text.rfind(chr(10), 0, begin)}-{kind}",
         kind=kind,
@@ -121,8 +128,9 @@ def random_mutants(root: Path, count: int, seed: int) -> list[Mutant]:
     found: list[Mutant] = []
     for prefix, on in ON:
         for file in sorted(root.glob(f"{prefix}*.c")):
-            if LEFT_OUT.search(file.name):
+            path = file.relative_to(root).as_posix()
+            if LEFT_OUT.search(path):
                 continue
-            path, text = str(file.relative_to(root)), file.read_text(encoding="utf-8")
+            text = file.read_text(encoding="utf-8")
             found += [_mutant(path, text, place, on) for place in places(path, text)]
     return random.Random(seed).sample(found, min(count, len(found)))

@@ -29,7 +29,7 @@ SOURCE = re.compile(
     r"|CiA 301 \d+(\.\d+)*|ISO 11898-1"
 )
 TABLE = re.compile(r"(docs|proto)/[\w/]+\.(yaml|md)#[^#]+")
-TEST = re.compile(r"tests/(unit/test_\w+\.c:\w+|(py|e2e|golden)/test_\w+\.py:test_\w+)")
+TEST = re.compile(r"tests/(unit/(\w+/)*test_\w+\.c:\w+|(py|e2e|golden)/(\w+/)*test_\w+\.py:test_\w+)")
 INDEX_FIELDS = {"version", "grades", "observe", "kinds", "boards", "groups", "retired"}
 GROUP_FIELDS = {"title", "prefixes"}
 ROW_FIELDS = {"id", "text", "source", "grade", "kind"}

@@ -1,0 +1,218 @@
+#include "api/internal.h"
+
+#include "chip/ad7712/ad7712.h"
+
+#include <stdio.h>
+
+struct part_ad7712 {
+    struct psabench_part part;
+    uint32_t clkin_hz, cells_max, rfs_access_ns, bit_access_ns, drdy_rise_ns;
+    double vref_v, noise_scale, offset_v, gain_error, source_ohm;
+    bool strict_timing, strict_drdy, free_settling;
+    struct ad7712 chip;
+};
+
+static struct ad7712 *chip(struct psabench_part *p)
+{
+    return &((struct part_ad7712 *)p)->chip;
+}
+
+static const struct ad7712 *cchip(const struct psabench_part *p)
+{
+    return &((const struct part_ad7712 *)p)->chip;
+}
+
+#define OPTIONS(X)                                                                                                     \
+    X("clkin_hz", API_UINT, part_ad7712, clkin_hz, "10000000", 400000, 10000000, NULL, "clock at MCLK IN, Hz")         \
+    X("vref_v", API_REAL, part_ad7712, vref_v, "2.5", 0.5, 5, NULL, "REF IN(+) - REF IN(-), V; full scale at gain 1")  \
+    X("noise_scale", API_REAL, part_ad7712, noise_scale, "1", 0, 1000, NULL, "noise, 1: published, 0: none")           \
+    X("offset_v", API_REAL, part_ad7712, offset_v, "0", -1, 1, NULL,                                                   \
+      "offset of the uncalibrated path, V, which self-calibration takes away")                                         \
+    X("gain_error", API_REAL, part_ad7712, gain_error, "0", -0.5, 0.5, NULL,                                           \
+      "relative gain error of the uncalibrated path, likewise")                                                        \
+    X("source_ohm", API_REAL, part_ad7712, source_ohm, "0", 0, 1e9, NULL,                                              \
+      "resistance behind each input, ohm: the input's capacitor and the burn-out current meet it")                     \
+    X("looks", API_CHOICE, part_ad7712, cells_max, "auto", 0, 7, "auto|1|2|4|8|16|32|64",                              \
+      "looks at the input per output period; auto: as many as make 4 kHz, at least 4")                                 \
+    X("rfs_access_ns", API_UINT, part_ad7712, rfs_access_ns, "0", 0, 10000, NULL,                                      \
+      "RFS low to the first bit, ns; 0: 3 periods of MCLK")                                                            \
+    X("bit_access_ns", API_UINT, part_ad7712, bit_access_ns, "0", 0, 10000, NULL,                                      \
+      "SCLK fall to the next bit, ns; 0: 1 period of MCLK")                                                            \
+    X("drdy_rise_ns", API_UINT, part_ad7712, drdy_rise_ns, "0", 0, 10000, NULL,                                        \
+      "last SCLK fall to DRDY high, ns; 0: 1 period of MCLK")                                                          \
+    X("strict_timing", API_BOOL, part_ad7712, strict_timing, "0", 0, 1, NULL,                                          \
+      "breaches of the limits garble words and lose writes, not only count")                                           \
+    X("strict_drdy", API_BOOL, part_ad7712, strict_drdy, "0", 0, 1, NULL,                                              \
+      "a word read while DRDY is high reads as ones, not as the old word")                                             \
+    X("free_settling", API_BOOL, part_ad7712, free_settling, "0", 0, 1, NULL,                                          \
+      "a new channel or gain does not restart the filter")
+
+static const struct api_option options[] = {OPTIONS(API_OPTION_ROW)};
+
+/* ---- pins ---- */
+
+typedef void pin_fn(struct ad7712 *a, bool level, int64_t t_ns);
+
+static void set_pin(struct psabench_part *p, unsigned arg, bool level, int64_t t_ns)
+{
+    static pin_fn *const fn[] = {ad7712_a0_pin,   ad7712_rfs_pin,     ad7712_tfs_pin,  ad7712_mode_pin,
+                                 ad7712_sync_pin, ad7712_standby_pin, ad7712_sclk_pin, ad7712_sdata_pin};
+    fn[arg](chip(p), level, t_ns);
+}
+
+static bool get_drdy(const struct psabench_part *p, unsigned arg)
+{
+    (void)arg;
+    return ad7712_drdy(cchip(p));
+}
+
+/* Levels on the wires: of whoever drives them. */
+static bool get_sdata(const struct psabench_part *p, unsigned arg)
+{
+    (void)arg;
+    const int64_t now_ns = p->bench->sched.now_ns;
+    return ad7712_sdata_driven(cchip(p), now_ns) ? ad7712_sdata(cchip(p), now_ns) : cchip(p)->port.sdata;
+}
+
+static bool get_sclk(const struct psabench_part *p, unsigned arg)
+{
+    (void)arg;
+    return cchip(p)->port.mode ? ad7712_sclk(cchip(p)) : cchip(p)->port.sclk;
+}
+
+static const struct api_pin pins[] = {
+    {"DRDY", API_OUT, .get = get_drdy},
+    {"SDATA", API_BOTH, .set = set_pin, .get = get_sdata, .arg = 7},
+    {"SCLK", API_BOTH, .set = set_pin, .get = get_sclk, .arg = 6},
+    {"A0", API_IN, .set = set_pin, .arg = 0},
+    {"RFS", API_IN, .idle = true, .set = set_pin, .arg = 1},
+    {"TFS", API_IN, .idle = true, .set = set_pin, .arg = 2},
+    {"MODE", API_IN, .set = set_pin, .arg = 3},
+    {"SYNC", API_IN, .idle = true, .set = set_pin, .arg = 4},
+    {"STANDBY", API_IN, .idle = true, .set = set_pin, .arg = 5},
+};
+
+/* ---- the chip ---- */
+
+/* Inputs 2 * channel and, where the part has it, the one after it; VBIAS is 0 V. */
+static double vin_v(void *ctx, unsigned channel, int64_t t_ns)
+{
+    struct psabench_part *p = ctx;
+    const double v = api_input(p, 2 * channel, t_ns);
+    return p->kind->inputs >> (2 * channel + 1) & 1 ? v - api_input(p, 2 * channel + 1, t_ns) : v;
+}
+
+static double source_ohm(void *ctx, unsigned channel, int64_t t_ns)
+{
+    (void)channel;
+    (void)t_ns;
+    return ((const struct part_ad7712 *)ctx)->source_ohm;
+}
+
+/* The pin is read after the event that moved it. */
+static void on_pin(void *ctx, bool level, int64_t t_ns)
+{
+    (void)ctx;
+    (void)level;
+    (void)t_ns;
+}
+
+static enum ad7712_part part_of(const struct api_kind *k)
+{
+    if (k == &api_ad7710) return AD7712_PART_7710;
+    if (k == &api_ad7711) return AD7712_PART_7711;
+    return k == &api_ad7711a ? AD7712_PART_7711A : AD7712_PART_7712;
+}
+
+static bool open_ad7712(struct psabench_part *p, char *why, size_t cap)
+{
+    (void)why;
+    (void)cap;
+    const struct part_ad7712 *s = (const struct part_ad7712 *)p;
+    const struct ad7712_cfg cfg = {.part = part_of(p->kind),
+                                   .clkin_hz = s->clkin_hz,
+                                   .vref_v = s->vref_v,
+                                   .noise_scale = s->noise_scale,
+                                   .offset_v = {s->offset_v, s->offset_v},
+                                   .gain_error = {s->gain_error, s->gain_error},
+                                   .cells_max = (uint8_t)(s->cells_max ? 1u << (s->cells_max - 1) : 0),
+                                   .rfs_access_ns = (int32_t)s->rfs_access_ns,
+                                   .bit_access_ns = (int32_t)s->bit_access_ns,
+                                   .drdy_rise_ns = (int32_t)s->drdy_rise_ns,
+                                   .strict_timing = s->strict_timing,
+                                   .strict_drdy = s->strict_drdy,
+                                   .free_settling = s->free_settling};
+    const struct ad7712_io io = {.ctx = p,
+                                 .vin_v = vin_v,
+                                 .source_ohm = s->source_ohm > 0.0 ? source_ohm : NULL,
+                                 .drdy = on_pin,
+                                 .sdata = on_pin,
+                                 .sclk = on_pin};
+    ad7712_init(chip(p), &cfg, &io, &p->bench->sched, api_noise(p, "adc"));
+    ad7712_power_up(chip(p), p->bench->sched.now_ns);
+    return true;
+}
+
+static void before_input(struct psabench_part *p, int64_t t_ns)
+{
+    ad7712_sample_until(chip(p), t_ns);
+}
+
+static int peek(const struct psabench_part *p, unsigned address)
+{
+    const struct ad7712 *a = cchip(p);
+    const uint32_t word[] = {a->control, a->zero[0], a->full[0], a->zero[1], a->full[1], a->word};
+    if (address >= 3 * sizeof word / sizeof *word) return -1;
+    return (int)(word[address / 3] >> (16 - 8 * (address % 3)) & 0xFF);
+}
+
+static uint64_t sampling_hz(const struct psabench_part *p)
+{
+    return ad7712_sampling_hz(cchip(p));
+}
+
+static uint64_t iout_na(const struct psabench_part *p)
+{
+    return (uint64_t)(ad7712_iout_a(cchip(p)) * 1e9 + 0.5);
+}
+
+#define N(field) API_COUNTER(#field, part_ad7712, chip.n.field)
+static const struct api_counter counters[] = {
+    N(conversions),
+    N(calibrations),
+    N(restarts),
+    N(power_downs),
+    N(overruns),
+    N(lost_words),
+    N(torn_reads),
+    N(stale_reads),
+    N(blocked_reads),
+    N(over_reads),
+    N(dropped),
+    N(refused),
+    N(over_writes),
+    N(clipped),
+    N(overloads),
+    N(cal_clamped),
+    N(bad_fs),
+    N(bad_channel),
+    N(bad_bit),
+    N(a0_violations),
+    N(sclk_violations),
+    N(sdata_violations),
+    N(frame_violations),
+    {"sampling_hz", .get = sampling_hz},
+    {"iout_na", .get = iout_na},
+};
+#undef N
+
+#define COMMON                                                                                                         \
+    .size = sizeof(struct part_ad7712), .options = options, .option_count = sizeof options / sizeof *options,          \
+    .options_text = OPTIONS(API_OPTION_TEXT), .pins = pins, .pin_count = sizeof pins / sizeof *pins,                   \
+    .counters = counters, .counter_count = sizeof counters / sizeof *counters, .spi = API_NO_SPI, .open = open_ad7712, \
+    .before_input = before_input, .peek = peek
+
+const struct api_kind api_ad7710 = {COMMON, .name = "ad7710", .inputs = 0xF, .fn_inputs = 0xF};
+const struct api_kind api_ad7711 = {COMMON, .name = "ad7711", .inputs = 0x7, .fn_inputs = 0x7};
+const struct api_kind api_ad7711a = {COMMON, .name = "ad7711a", .inputs = 0x3, .fn_inputs = 0x3};
+const struct api_kind api_ad7712 = {COMMON, .name = "ad7712", .inputs = 0x7, .fn_inputs = 0x7};

@@ -1,0 +1,217 @@
+#include "api/internal.h"
+
+#include "chip/ads1256/ads1256.h"
+
+#include <stdio.h>
+
+enum { PINS_1255 = 9, PINS = 11 };
+
+struct part_ads1256 {
+    struct psabench_part part;
+    uint32_t clkin_hz, cells_max;
+    unsigned start;
+    double vref_v, avdd_v, noise_scale, offset_v, gain_error, source_ohm;
+    bool strict_timing, strict_bus, strict_cs;
+    struct ads1256 chip;
+};
+
+static struct ads1256 *chip(struct psabench_part *p)
+{
+    return &((struct part_ads1256 *)p)->chip;
+}
+
+static const struct ads1256 *cchip(const struct psabench_part *p)
+{
+    return &((const struct part_ads1256 *)p)->chip;
+}
+
+#define OPTIONS(X)                                                                                                     \
+    X("clkin_hz", API_UINT, part_ads1256, clkin_hz, "7680000", 100000, 10000000, NULL, "clock at CLKIN, Hz")           \
+    X("start", API_CHOICE, part_ads1256, start, "clock", 0, 2, "at_once|clock|crystal",                                \
+      "what power-up and the end of power-down wait for: nothing, 8192 periods of a clock, 30 ms of a crystal")        \
+    X("sclk_hz", API_UINT, part_ads1256, part.sclk_hz, "1000000", 1, 50000000, NULL, "SCLK of psabench_spi(), Hz")     \
+    X("vref_v", API_REAL, part_ads1256, vref_v, "2.5", 0.5, 5.5, NULL, "VREFP - VREFN, V; full scale is twice this")   \
+    X("avdd_v", API_REAL, part_ads1256, avdd_v, "5", 3, 6, NULL, "analog supply, V; the buffer passes AVDD - 2 V")     \
+    X("noise_scale", API_REAL, part_ads1256, noise_scale, "1", 0, 1000, NULL, "noise, 1: published, 0: none")          \
+    X("offset_v", API_REAL, part_ads1256, offset_v, "0", -1, 1, NULL,                                                  \
+      "offset of the uncalibrated path, V, which self-calibration takes away")                                         \
+    X("gain_error", API_REAL, part_ads1256, gain_error, "0", -0.5, 0.5, NULL,                                          \
+      "relative gain error of the uncalibrated path, likewise")                                                        \
+    X("source_ohm", API_REAL, part_ads1256, source_ohm, "0", 0, 1e9, NULL,                                             \
+      "resistance behind each input, ohm: sensor-detect currents meet it, an input without buffer loads it")           \
+    X("cells_max", API_UINT, part_ads1256, cells_max, "0", 0, 65535, NULL,                                             \
+      "looks at the input per conversion at 500 SPS and below; 0: one a millisecond")                                  \
+    X("strict_timing", API_BOOL, part_ads1256, strict_timing, "0", 0, 1, NULL,                                         \
+      "a data read inside t6 of its command gives FFh")                                                                \
+    X("strict_bus", API_BOOL, part_ads1256, strict_bus, "0", 0, 1, NULL,                                               \
+      "other breaches of timing do what silicon may do, not only count")                                               \
+    X("strict_cs", API_BOOL, part_ads1256, strict_cs, "0", 0, 1, NULL, "CS high ends RDATAC")
+
+static const struct api_option options[] = {OPTIONS(API_OPTION_ROW)};
+
+/* ---- pins ---- */
+
+static void set_cs(struct psabench_part *p, unsigned arg, bool level, int64_t t_ns)
+{
+    (void)arg;
+    ads1256_cs_pin(chip(p), level, t_ns);
+}
+
+static void set_sclk(struct psabench_part *p, unsigned arg, bool level, int64_t t_ns)
+{
+    (void)arg;
+    ads1256_sclk_pin(chip(p), level, t_ns);
+}
+
+static void set_din(struct psabench_part *p, unsigned arg, bool level, int64_t t_ns)
+{
+    (void)arg;
+    ads1256_din_pin(chip(p), level, t_ns);
+}
+
+static void set_sync(struct psabench_part *p, unsigned arg, bool level, int64_t t_ns)
+{
+    (void)arg;
+    ads1256_sync_pin(chip(p), level, t_ns);
+}
+
+static void set_reset(struct psabench_part *p, unsigned arg, bool level, int64_t t_ns)
+{
+    (void)arg;
+    ads1256_reset_pin(chip(p), level, t_ns);
+}
+
+static void set_gpio(struct psabench_part *p, unsigned d, bool level, int64_t t_ns)
+{
+    ads1256_gpio_pin(chip(p), d, level, t_ns);
+}
+
+static bool get_drdy(const struct psabench_part *p, unsigned arg)
+{
+    (void)arg;
+    return ads1256_drdy(cchip(p));
+}
+
+static bool get_dout(const struct psabench_part *p, unsigned arg)
+{
+    (void)arg;
+    return ads1256_dout(cchip(p));
+}
+
+/* D0 as CLKOUT is drawn low: its edges are no events (counter clkout_hz). */
+static bool get_gpio(const struct psabench_part *p, unsigned d)
+{
+    return !(d == 0 && ads1256_clkout_hz(cchip(p))) && ads1256_gpio(cchip(p), d);
+}
+
+/* The ADS1255 has the first nine. */
+static const struct api_pin pins[PINS] = {
+    {"DRDY", API_OUT, .get = get_drdy},
+    {"DOUT", API_OUT, .get = get_dout},
+    {"SCLK", API_IN, .set = set_sclk},
+    {"DIN", API_IN, .set = set_din},
+    {"CS", API_IN, .idle = true, .set = set_cs},
+    {"SYNC", API_IN, .idle = true, .set = set_sync},
+    {"RESET", API_IN, .idle = true, .set = set_reset},
+    {"D0", API_BOTH, .set = set_gpio, .get = get_gpio, .arg = 0},
+    {"D1", API_BOTH, .set = set_gpio, .get = get_gpio, .arg = 1},
+    {"D2", API_BOTH, .set = set_gpio, .get = get_gpio, .arg = 2},
+    {"D3", API_BOTH, .set = set_gpio, .get = get_gpio, .arg = 3},
+};
+
+/* ---- the chip ---- */
+
+static double ain_v(void *ctx, unsigned ain, int64_t t_ns)
+{
+    struct psabench_part *p = ctx;
+    return p->kind->inputs >> ain & 1 ? api_input(p, ain, t_ns) : 0.0;
+}
+
+static double source_ohm(void *ctx, unsigned ain, int64_t t_ns)
+{
+    (void)ain;
+    (void)t_ns;
+    return ((const struct part_ads1256 *)ctx)->source_ohm;
+}
+
+/* The pin is read after the event that moved it. */
+static void on_drdy(void *ctx, bool level, int64_t t_ns)
+{
+    (void)ctx;
+    (void)level;
+    (void)t_ns;
+}
+
+static bool open_ads1256(struct psabench_part *p, char *why, size_t cap)
+{
+    (void)why;
+    (void)cap;
+    const struct part_ads1256 *s = (const struct part_ads1256 *)p;
+    const struct ads1256_cfg cfg = {.part = p->kind == &api_ads1255 ? ADS1256_PART_1255 : ADS1256_PART_1256,
+                                    .start = (enum ads1256_start)s->start,
+                                    .clkin_hz = s->clkin_hz,
+                                    .vref_v = s->vref_v,
+                                    .avdd_v = s->avdd_v,
+                                    .noise_scale = s->noise_scale,
+                                    .offset_v = s->offset_v,
+                                    .gain_error = s->gain_error,
+                                    .cells_max = (uint16_t)s->cells_max,
+                                    .strict_timing = s->strict_timing,
+                                    .strict_bus = s->strict_bus,
+                                    .strict_cs = s->strict_cs};
+    const struct ads1256_io io = {
+        .ctx = p, .ain_v = ain_v, .drdy = on_drdy, .source_ohm = s->source_ohm > 0.0 ? source_ohm : NULL};
+    ads1256_init(chip(p), &cfg, &io, &p->bench->sched, api_noise(p, "adc"));
+    ads1256_power_up(chip(p), p->bench->sched.now_ns);
+    return true;
+}
+
+static int peek(const struct psabench_part *p, unsigned address)
+{
+    const struct reg_file *f = &cchip(p)->regs;
+    return address < f->count && f->map[address].name ? reg_peek(f, address) : -1;
+}
+
+static uint64_t clkout_hz(const struct psabench_part *p)
+{
+    return ads1256_clkout_hz(cchip(p));
+}
+
+#define N(field) API_COUNTER(#field, part_ads1256, chip.n.field)
+#define R(field) API_COUNTER(#field, part_ads1256, chip.regs.field)
+static const struct api_counter counters[] = {
+    N(conversions),
+    N(calibrations),
+    N(restarts),
+    N(power_downs),
+    N(overruns),
+    N(torn_reads),
+    N(window_reads),
+    N(clipped),
+    N(buffer_clipped),
+    N(range_exceeded),
+    N(bad_mux),
+    N(cal_clamped),
+    N(bad_opcodes),
+    N(refused),
+    N(bad_drate),
+    N(dropped),
+    N(gap_violations),
+    N(sclk_violations),
+    N(din_violations),
+    R(bad_access),
+    R(ro_write),
+    R(unimp_access),
+    {"clkout_hz", .get = clkout_hz},
+};
+#undef N
+#undef R
+
+#define COMMON                                                                                                         \
+    .size = sizeof(struct part_ads1256), .options = options, .option_count = sizeof options / sizeof *options,         \
+    .options_text = OPTIONS(API_OPTION_TEXT), .pins = pins, .counters = counters,                                      \
+    .counter_count = sizeof counters / sizeof *counters, .spi = API_SPI_MODE1, .open = open_ads1256, .peek = peek
+
+const struct api_kind api_ads1255 = {COMMON, .name = "ads1255", .pin_count = PINS_1255, .inputs = 0x103,
+                                     .fn_inputs = 0x103};
+const struct api_kind api_ads1256 = {COMMON, .name = "ads1256", .pin_count = PINS, .inputs = 0x1FF, .fn_inputs = 0x1FF};

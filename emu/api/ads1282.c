@@ -1,0 +1,258 @@
+#include "api/internal.h"
+
+#include "base/clk.h"
+#include "chip/ads1282/ads1282.h"
+
+#include <stdio.h>
+
+enum { MUX_AIN1 = 0, MUX_AIN2 = 1, MUX_BOTH = 3, PINS_1282 = 11, PINS = 16 };
+
+/* Mode pins of an ADS1281, with pin_mode. */
+enum mode_pin { MODE_DR0, MODE_DR1, MODE_PHS, MODE_HPF, MODE_CSYNC };
+
+struct part_ads1282 {
+    struct psabench_part part;
+    uint32_t clk_hz, power_up_tclk;
+    unsigned chain;
+    double vref_v, noise_scale;
+    bool strict_sdatac, strict_gap, wreg_gap_free, strict_sync, strict_config0, cal_corrected, pin_mode;
+    bool m0, m1, mclk;
+    struct sched_ev mclk_fall;
+    unsigned mode; /* bit i: enum mode_pin i is high */
+    struct ads1282 chip;
+};
+
+static struct ads1282 *chip(struct psabench_part *p)
+{
+    return &((struct part_ads1282 *)p)->chip;
+}
+
+static const struct part_ads1282 *cself(const struct psabench_part *p)
+{
+    return (const struct part_ads1282 *)p;
+}
+
+#define OPTIONS(X)                                                                                                     \
+    X("clk_hz", API_UINT, part_ads1282, clk_hz, "4096000", 1000000, 4096000, NULL, "clock at CLK, Hz")                 \
+    X("power_up_tclk", API_UINT, part_ads1282, power_up_tclk, "65536", 0, 16777216, NULL,                              \
+      "internal reset after power-up and PWDN, periods of CLK")                                                        \
+    X("sclk_hz", API_UINT, part_ads1282, part.sclk_hz, "1024000", 1, 50000000, NULL, "SCLK of psabench_spi(), Hz")     \
+    X("vref_v", API_REAL, part_ads1282, vref_v, "5", 0.5, 5.5, NULL, "VREFP - VREFN, V; full scale is half of it")     \
+    X("noise_scale", API_REAL, part_ads1282, noise_scale, "1", 0, 1000, NULL, "noise, 1: published, 0: none")          \
+    X("chain", API_CHOICE, part_ads1282, chain, "exact", 0, 2, "exact|modulator|direct",                               \
+      "ideal modulator and bit-true filters; bit-true modulator too; settled value at the chain's delay")              \
+    X("strict_sdatac", API_BOOL, part_ads1282, strict_sdatac, "0", 0, 1, NULL,                                         \
+      "in RDATAC obeys only WAKEUP, SDATAC and RESET")                                                                 \
+    X("strict_gap", API_BOOL, part_ads1282, strict_gap, "0", 0, 1, NULL,                                               \
+      "a byte sooner than 24 tCLK after a command's last is lost, and its command with it")                            \
+    X("wreg_gap_free", API_BOOL, part_ads1282, wreg_gap_free, "0", 0, 1, NULL, "the bytes of WREG need no gap")        \
+    X("strict_sync", API_BOOL, part_ads1282, strict_sync, "0", 0, 1, NULL,                                             \
+      "limits of a SYNC pulse matter: too close to CLK it is taken late, too short by none")                           \
+    X("strict_config0", API_BOOL, part_ads1282, strict_config0, "0", 0, 1, NULL,                                       \
+      "each write to CONFIG0 restarts, even one that changes nothing")                                                 \
+    X("cal_corrected", API_BOOL, part_ads1282, cal_corrected, "0", 0, 1, NULL,                                         \
+      "OFSCAL and GANCAL measure with OFC and FSC acting")
+
+#define OPTIONS_1281(X)                                                                                                \
+    OPTIONS(X)                                                                                                         \
+    X("pin_mode", API_BOOL, part_ads1282, pin_mode, "0", 0, 1, NULL,                                                   \
+      "PINMODE is high: DR0 DR1 PHS HPF CSYNC instead of registers and commands")
+
+static const struct api_option options_1282[] = {OPTIONS(API_OPTION_ROW)};
+static const struct api_option options_1281[] = {OPTIONS_1281(API_OPTION_ROW)};
+
+/* ---- pins ---- */
+
+static void set_sclk(struct psabench_part *p, unsigned arg, bool level, int64_t t_ns)
+{
+    (void)arg;
+    ads1282_sclk_pin(chip(p), level, t_ns);
+}
+
+static void set_din(struct psabench_part *p, unsigned arg, bool level, int64_t t_ns)
+{
+    (void)arg;
+    ads1282_din_pin(chip(p), level, t_ns);
+}
+
+static void set_sync(struct psabench_part *p, unsigned arg, bool level, int64_t t_ns)
+{
+    (void)arg;
+    ads1282_sync_pin(chip(p), level, t_ns);
+}
+
+static void set_reset(struct psabench_part *p, unsigned arg, bool level, int64_t t_ns)
+{
+    (void)arg;
+    ads1282_reset_pin(chip(p), level, t_ns);
+}
+
+static void set_pwdn(struct psabench_part *p, unsigned arg, bool level, int64_t t_ns)
+{
+    (void)arg;
+    ads1282_pwdn_pin(chip(p), level, t_ns);
+}
+
+/* In register mode the part does not look at them. */
+static void set_mode(struct psabench_part *p, unsigned bit, bool level, int64_t t_ns)
+{
+    struct part_ads1282 *s = (struct part_ads1282 *)p;
+    s->mode = (s->mode & ~(1u << bit)) | (unsigned)level << bit;
+    const struct ads1282_mode_pins mode = {.dr = s->mode & 3,
+                                           .minimum_phase = s->mode >> MODE_PHS & 1,
+                                           .high_pass = s->mode >> MODE_HPF & 1,
+                                           .continuous_sync = s->mode >> MODE_CSYNC & 1};
+    if (s->pin_mode) ads1282_mode_pins(&s->chip, &mode, t_ns);
+}
+
+static bool get_drdy(const struct psabench_part *p, unsigned arg)
+{
+    (void)arg;
+    return ads1282_drdy(&cself(p)->chip);
+}
+
+static bool get_dout(const struct psabench_part *p, unsigned arg)
+{
+    (void)arg;
+    return ads1282_dout(&cself(p)->chip);
+}
+
+static bool get_mflag(const struct psabench_part *p, unsigned arg)
+{
+    (void)arg;
+    return ads1282_mflag(&cself(p)->chip);
+}
+
+static bool get_modulator(const struct psabench_part *p, unsigned arg)
+{
+    const struct part_ads1282 *s = cself(p);
+    return arg == 0 ? s->m0 : arg == 1 ? s->m1 : s->mclk;
+}
+
+/* The ADS1282 has the first eleven; the mode pins of an ADS1281 have their names from what they say (E0). */
+static const struct api_pin pins[PINS] = {
+    {"DRDY", API_OUT, .get = get_drdy},
+    {"DOUT", API_OUT, .get = get_dout},
+    {"SCLK", API_IN, .set = set_sclk},
+    {"DIN", API_IN, .set = set_din},
+    {"SYNC", API_IN, .set = set_sync},
+    {"RESET", API_IN, .idle = true, .set = set_reset},
+    {"PWDN", API_IN, .idle = true, .set = set_pwdn},
+    {"MFLAG", API_OUT, .get = get_mflag},
+    {"M0", API_OUT, .get = get_modulator, .arg = 0},
+    {"M1", API_OUT, .get = get_modulator, .arg = 1},
+    {"MCLK", API_OUT, .get = get_modulator, .arg = 2},
+    {"DR0", API_IN, .set = set_mode, .arg = MODE_DR0},
+    {"DR1", API_IN, .set = set_mode, .arg = MODE_DR1},
+    {"PHS", API_IN, .set = set_mode, .arg = MODE_PHS},
+    {"HPF", API_IN, .set = set_mode, .arg = MODE_HPF},
+    {"CSYNC", API_IN, .set = set_mode, .arg = MODE_CSYNC},
+};
+
+/* ---- the chip ---- */
+
+static double vin_v(void *ctx, unsigned mux, int64_t t_ns)
+{
+    struct psabench_part *p = ctx;
+    const unsigned second = p->kind->inputs >> 1 & 1;
+    if (mux == MUX_AIN1 || !second) return api_input(p, 0, t_ns);
+    if (mux == MUX_AIN2) return api_input(p, 1, t_ns);
+    if (mux == MUX_BOTH) return 0.5 * (api_input(p, 0, t_ns) + api_input(p, 1, t_ns)); /* equal sources: E0 */
+    return 0.0;
+}
+
+/* MFLAG is read when an event has happened; that there is one for each change is all that is wanted here. */
+static void on_mflag(void *ctx, bool level, int64_t t_ns)
+{
+    (void)ctx;
+    (void)level;
+    (void)t_ns;
+}
+
+/* M0 and M1 change with the rise of MCLK (E0); it falls half a period, 2 tCLK, later. */
+static void on_modulator(void *ctx, bool m0, bool m1, int64_t t_ns)
+{
+    struct part_ads1282 *s = ctx;
+    s->m0 = m0;
+    s->m1 = m1;
+    s->mclk = true;
+    const struct clk *clk = &s->chip.clk;
+    sched_at(&s->part.bench->sched, &s->mclk_fall, clk_edge_ns(clk, clk_count_at(clk, t_ns) + 2));
+}
+
+static void on_mclk_fall(void *ctx, int64_t t_ns)
+{
+    (void)t_ns;
+    ((struct part_ads1282 *)ctx)->mclk = false;
+}
+
+static bool open_ads1282(struct psabench_part *p, char *why, size_t cap)
+{
+    (void)why;
+    (void)cap;
+    struct part_ads1282 *s = (struct part_ads1282 *)p;
+    const struct ads1282_cfg cfg = {.part = p->kind == &api_ads1281 ? ADS1282_PART_1281 : ADS1282_PART_1282,
+                                    .clk_hz = s->clk_hz,
+                                    .vref_v = s->vref_v,
+                                    .noise_scale = s->noise_scale,
+                                    .strict_sdatac = s->strict_sdatac,
+                                    .strict_gap = s->strict_gap,
+                                    .wreg_gap_free = s->wreg_gap_free,
+                                    .strict_sync = s->strict_sync,
+                                    .strict_config0 = s->strict_config0,
+                                    .cal_corrected = s->cal_corrected,
+                                    .pin_mode = s->pin_mode,
+                                    .power_up_tclk = s->power_up_tclk,
+                                    .chain = (enum ads1282_chain)s->chain};
+    const struct ads1282_io io = {.ctx = p, .vin_v = vin_v, .mflag = on_mflag, .modulator = on_modulator};
+    sched_ev(&s->mclk_fall, on_mclk_fall, s);
+    ads1282_init(&s->chip, &cfg, &io, &p->bench->sched, api_noise(p, "adc"));
+    ads1282_power_up(&s->chip, p->bench->sched.now_ns);
+    return true;
+}
+
+static void before_input(struct psabench_part *p, int64_t t_ns)
+{
+    ads1282_sample_until(chip(p), t_ns);
+}
+
+static int peek(const struct psabench_part *p, unsigned address)
+{
+    const struct reg_file *f = &cself(p)->chip.regs;
+    return address < f->count && f->map[address].name ? reg_peek(f, address) : -1;
+}
+
+#define N(field) API_COUNTER(#field, part_ads1282, chip.count.field)
+#define L(field) API_COUNTER("limit_" #field, part_ads1282, chip.limit.field)
+#define R(field) API_COUNTER(#field, part_ads1282, chip.regs.field)
+static const struct api_counter counters[] = {
+    N(conversions),    N(overruns),   N(torn_reads), N(late_reads),   N(bad_opcodes),  N(refused),
+    N(gap_violations), N(restarts),   N(clipped),    N(realigned),    N(calibrations), L(sclk_period),
+    L(sclk_width),     L(din_setup),  L(din_hold),   L(drdy_to_sclk), L(sync_width),   L(sync_keepout),
+    L(reset_width),    R(bad_access), R(ro_write),   R(unimp_access),
+};
+#undef N
+#undef L
+#undef R
+
+#define COMMON                                                                                                         \
+    .size = sizeof(struct part_ads1282), .pins = pins, .counters = counters,                                           \
+    .counter_count = sizeof counters / sizeof *counters, .spi = API_SPI_MODE0, .open = open_ads1282,                   \
+    .before_input = before_input, .peek = peek
+
+const struct api_kind api_ads1281 = {COMMON,
+                                     .name = "ads1281",
+                                     .options = options_1281,
+                                     .option_count = sizeof options_1281 / sizeof *options_1281,
+                                     .options_text = OPTIONS_1281(API_OPTION_TEXT),
+                                     .pin_count = PINS,
+                                     .inputs = 0x1,
+                                     .fn_inputs = 0x1};
+const struct api_kind api_ads1282 = {COMMON,
+                                     .name = "ads1282",
+                                     .options = options_1282,
+                                     .option_count = sizeof options_1282 / sizeof *options_1282,
+                                     .options_text = OPTIONS(API_OPTION_TEXT),
+                                     .pin_count = PINS_1282,
+                                     .inputs = 0x3,
+                                     .fn_inputs = 0x3};

@@ -1,0 +1,111 @@
+/* What the files of libpsabench share: the bench and its parts. Not for others.
+ *
+ * A kind of part is one const row of tables: options, pins, counters, and a handful of functions. Nothing else in here
+ * knows a chip. Outputs are compared with what was last told after every stimulus and every instant at which something
+ * happened; only the pins that somebody watches or records. */
+#ifndef PSABENCH_API_INTERNAL_H
+#define PSABENCH_API_INTERNAL_H
+
+#include "api/kind.h"
+#include "api/psabench.h"
+#include "base/rng.h"
+#include "base/sched.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+enum { API_PINS_MAX = 32, API_INPUTS_MAX = 9, API_NAME = 32, API_ERROR = 400, API_WHY = 300 };
+
+#define API_NO_PIN      255u
+#define API_TIME_MAX_NS (INT64_C(1) << 60) /* 36 years */
+#define API_STEP_NS     50000
+#define API_VOLTS_MAX   1e6
+
+struct api_watch {
+    psabench_watch_fn *fn;
+    void *ctx;
+};
+
+struct api_edge {
+    int64_t t_ns;
+    uint8_t pin, level;
+};
+
+/* Edges on their way to the recording: in order within a part, merged with the other parts' in order of time. */
+struct api_queue {
+    struct api_edge *edge;
+    size_t head, len, cap;
+};
+
+struct psabench_part {
+    const struct api_kind *kind;
+    psabench *bench;
+    struct psabench_part *next; /* in order of making */
+    char name[API_NAME];
+    uint32_t level;             /* as told last, outputs; as set last, inputs */
+    uint32_t watched, recorded; /* pins */
+    struct api_watch watch[API_PINS_MAX];
+    unsigned inside; /* a callback from within its own code is running */
+    psabench_input_fn *input;
+    void *input_ctx;
+    uint16_t by_fn; /* inputs that input() gives; the others are volts[] */
+    double volts[API_INPUTS_MAX];
+    uint32_t sclk_hz; /* option of every part with SPI */
+    int64_t gap_ns;
+    unsigned sclk, din, dout; /* pin numbers, API_NO_PIN */
+    psabench_frame_fn *frame;
+    void *frame_ctx;
+    struct api_queue queue;
+    unsigned first_code; /* of its pins in the recording */
+};
+
+struct api_vcd;
+
+struct psabench {
+    struct sched sched;
+    uint64_t seed;
+    struct psabench_part *parts;
+    struct api_vcd *vcd;
+    unsigned inside; /* time moves or a pin is being set: callbacks come from here */
+    unsigned nested; /* psabench_set() within callbacks of psabench_set() */
+    char error[API_ERROR];
+};
+
+/* Notes why, for psabench_error_text(), and returns code. b may be NULL. */
+int api_fail(psabench *b, int code, const char *format, ...) __attribute__((format(printf, 3, 4)));
+
+/* Whether time may move now; else a noted error. */
+int api_may_move(psabench *b, const char *function);
+
+/* Lets everything up to t_ns happen, each instant told as it comes. The caller has raised b->inside. */
+void api_move(psabench *b, int64_t t_ns);
+
+/* Tells what has changed since it was told last. */
+void api_tell(psabench *b);
+
+/* A pin has changed: to the recording, then to its watcher. */
+void api_edge(struct psabench_part *p, unsigned pin, bool level, int64_t t_ns);
+
+/* An input pin takes a level, without telling the outputs that follow. */
+void api_drive(struct psabench_part *p, unsigned pin, bool level);
+
+/* Volts (amperes) of an input at t_ns. */
+double api_input(struct psabench_part *p, unsigned input, int64_t t_ns);
+
+/* Stream of one of the part's noise sources. */
+struct rng api_noise(const struct psabench_part *p, const char *source);
+uint64_t api_serial(const struct psabench_part *p); /* made from its name */
+
+/* Sets the options of a new part: the defaults, then the text. False with a sentence in why. */
+bool api_options(struct psabench_part *p, const char *text, char *why, size_t cap);
+
+/* Number of the pin of that name, or API_NO_PIN. */
+unsigned api_find_pin(const struct api_kind *k, const char *name);
+
+/* Recording. */
+void api_vcd_put(struct psabench_part *p, unsigned pin, bool level, int64_t t_ns);
+void api_vcd_follow(psabench *b);
+int api_vcd_end(psabench *b); /* what is still on its way, closing time; 0 or an errno */
+
+#endif

@@ -1,0 +1,345 @@
+#include "api/internal.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { KINDS = 9 };
+
+const struct api_kind *const api_kinds[KINDS] = {&api_ads1281, &api_ads1282, &api_ads1255, &api_ads1256, &api_ad7710,
+                                                 &api_ad7711,  &api_ad7711a, &api_ad7712,  &api_psa2};
+const unsigned api_kind_count = KINDS;
+
+const char *psabench_parts(void)
+{
+    return "ads1281 ads1282 ads1255 ads1256 ad7710 ad7711 ad7711a ad7712 psa2"; /* a test holds it against api_kinds */
+}
+
+static const struct api_kind *find_kind(const char *name)
+{
+    for (unsigned i = 0; name && i < api_kind_count; i++)
+        if (strcmp(api_kinds[i]->name, name) == 0) return api_kinds[i];
+    return NULL;
+}
+
+const char *psabench_options(const char *part)
+{
+    const struct api_kind *k = find_kind(part);
+    return k ? k->options_text : NULL;
+}
+
+unsigned api_find_pin(const struct api_kind *k, const char *name)
+{
+    for (unsigned i = 0; i < k->pin_count; i++)
+        if (strcmp(k->pins[i].name, name) == 0) return i;
+    return API_NO_PIN;
+}
+
+/* FNV-1a: a name's own number, the same on every machine. */
+uint64_t api_serial(const struct psabench_part *p)
+{
+    uint64_t hash = UINT64_C(14695981039346656037);
+    for (const char *c = p->name; *c; c++) hash = (hash ^ (unsigned char)*c) * UINT64_C(1099511628211);
+    return hash;
+}
+
+struct rng api_noise(const struct psabench_part *p, const char *source)
+{
+    return rng_stream(p->bench->seed, api_serial(p), source);
+}
+
+/* ---- making a part ---- */
+
+static bool is_name_char(char c)
+{
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-' ||
+           c == '.';
+}
+
+static int check_name(psabench *b, const char *name)
+{
+    size_t len = 0;
+    while (name && name[len] && len < API_NAME && is_name_char(name[len])) len++;
+    if (!name || len == 0 || len >= API_NAME || name[len])
+        return api_fail(b, PSABENCH_BAD_ARGUMENT, "name %.40s: use 1 to %d of the characters A-Z a-z 0-9 _ - .",
+                        name ? name : "(NULL)", API_NAME - 1);
+    for (const struct psabench_part *p = b->parts; p; p = p->next)
+        if (strcmp(p->name, name) == 0)
+            return api_fail(b, PSABENCH_BAD_ARGUMENT, "name %s: a part on this bench has it already, use another",
+                            name);
+    return PSABENCH_OK;
+}
+
+/* Not on the list yet. */
+static struct psabench_part *make(psabench *b, const struct api_kind *k, const char *name)
+{
+    struct psabench_part *p = calloc(1, k->size);
+    if (!p) {
+        (void)api_fail(b, PSABENCH_SYSTEM, "part %s: no memory", name);
+        return NULL;
+    }
+    p->kind = k;
+    p->bench = b;
+    strcpy(p->name, name); /* its length has been checked */
+    for (unsigned i = 0; i < k->pin_count; i++) p->level |= (uint32_t)k->pins[i].idle << i;
+    p->sclk = api_find_pin(k, "SCLK");
+    p->din = api_find_pin(k, "DIN");
+    p->dout = api_find_pin(k, "DOUT");
+    return p;
+}
+
+psabench_part *psabench_part_new(psabench *b, const char *part, const char *name, const char *options)
+{
+    char why[API_WHY];
+    if (!b || api_may_move(b, "psabench_part_new()") || check_name(b, name)) return NULL;
+    const struct api_kind *k = find_kind(part);
+    if (!k) {
+        (void)api_fail(b, PSABENCH_BAD_ARGUMENT, "no part %.40s: there are %s", part ? part : "(NULL)",
+                       psabench_parts());
+        return NULL;
+    }
+    struct psabench_part *p = make(b, k, name);
+    if (!p) return NULL;
+    if (!api_options(p, options, why, sizeof why) || !k->open(p, why, sizeof why)) {
+        (void)api_fail(b, PSABENCH_BAD_ARGUMENT, "%s: %s", name, why);
+        free(p);
+        return NULL;
+    }
+    struct psabench_part **end = &b->parts;
+    while (*end) end = &(*end)->next;
+    *end = p;
+    return p;
+}
+
+psabench *psabench_of(const psabench_part *p)
+{
+    return p ? p->bench : NULL;
+}
+
+const char *psabench_part_name(const psabench_part *p)
+{
+    return p ? p->name : NULL;
+}
+
+/* ---- pins ---- */
+
+static int no_such_pin(const psabench_part *p, const char *name)
+{
+    char list[API_WHY] = "";
+    size_t len = 0;
+    for (unsigned i = 0; i < p->kind->pin_count && len < sizeof list; i++)
+        len += (size_t)snprintf(list + len, sizeof list - len, " %s", p->kind->pins[i].name);
+    return api_fail(p->bench, PSABENCH_BAD_ARGUMENT, "%s: no pin %.40s of %s: there are%s", p->name,
+                    name ? name : "(NULL)", p->kind->name, list);
+}
+
+int psabench_pin(const psabench_part *p, const char *name)
+{
+    if (!p) return PSABENCH_BAD_ARGUMENT;
+    const unsigned pin = name ? api_find_pin(p->kind, name) : API_NO_PIN;
+    return pin != API_NO_PIN ? (int)pin : no_such_pin(p, name);
+}
+
+static const struct api_pin *pin_of(const psabench_part *p, int pin)
+{
+    return p && pin >= 0 && (unsigned)pin < p->kind->pin_count ? &p->kind->pins[pin] : NULL;
+}
+
+static int no_pin(const psabench_part *p, int pin)
+{
+    if (!p) return PSABENCH_BAD_ARGUMENT;
+    return api_fail(p->bench, PSABENCH_BAD_ARGUMENT, "%s: no pin number %d: 0 to %u", p->name, pin,
+                    p->kind->pin_count - 1);
+}
+
+const char *psabench_pin_name(const psabench_part *p, int pin)
+{
+    const struct api_pin *row = pin_of(p, pin);
+    return row ? row->name : NULL;
+}
+
+int psabench_pin_is_input(const psabench_part *p, int pin)
+{
+    const struct api_pin *row = pin_of(p, pin);
+    return row ? row->dir != API_OUT : no_pin(p, pin);
+}
+
+static int level_now(const psabench_part *p, int pin)
+{
+    const struct api_pin *row = &p->kind->pins[pin];
+    return row->get ? row->get(p, row->arg) : (int)(p->level >> pin & 1);
+}
+
+/* Only known when the burst that it belongs to is over. */
+static bool is_late(const struct api_pin *row)
+{
+    return row->dir == API_OUT && !row->get;
+}
+
+static int too_late(const psabench_part *p, const struct api_pin *row)
+{
+    return api_fail(p->bench, PSABENCH_NOT_HERE, "%s: %s is known when its burst is over: watch or record it", p->name,
+                    row->name);
+}
+
+int psabench_get(const psabench_part *p, int pin)
+{
+    const struct api_pin *row = pin_of(p, pin);
+    if (!row) return no_pin(p, pin);
+    return is_late(row) ? too_late(p, row) : level_now(p, pin);
+}
+
+void api_drive(struct psabench_part *p, unsigned pin, bool level)
+{
+    const struct api_pin *row = &p->kind->pins[pin];
+    const int64_t t_ns = p->bench->sched.now_ns;
+    row->set(p, row->arg, level, t_ns);
+    if (row->dir == API_IN && level != (p->level >> pin & 1)) api_edge(p, pin, level, t_ns);
+}
+
+int psabench_set(psabench_part *p, int pin, int level)
+{
+    enum { NESTED_MAX = 16 };
+    const struct api_pin *row = pin_of(p, pin);
+    if (!row) return no_pin(p, pin);
+    psabench *b = p->bench;
+    if (row->dir == API_OUT || (level != 0 && level != 1))
+        return api_fail(b, PSABENCH_BAD_ARGUMENT, "%s: %s = %d: %s", p->name, row->name, level,
+                        row->dir == API_OUT ? "it is an output" : "a level is 0 or 1");
+    if (p->inside || b->nested >= NESTED_MAX)
+        return api_fail(b, PSABENCH_BAD_ARGUMENT, "%s: %s set from %s", p->name, row->name,
+                        p->inside ? "a callback that the same part is waiting for" : "callbacks of psabench_set()");
+    b->inside++;
+    b->nested++;
+    api_drive(p, (unsigned)pin, level);
+    api_tell(b);
+    b->nested--;
+    b->inside--;
+    return PSABENCH_OK;
+}
+
+int psabench_watch(psabench_part *p, int pin, psabench_watch_fn *fn, void *ctx)
+{
+    const struct api_pin *row = pin_of(p, pin);
+    if (!row) return no_pin(p, pin);
+    if (row->dir == API_IN)
+        return api_fail(p->bench, PSABENCH_BAD_ARGUMENT, "%s: %s is an input: who sets it knows", p->name, row->name);
+    const uint32_t bit = UINT32_C(1) << pin;
+    if (row->get && !((p->watched | p->recorded) & bit)) { /* changes count from now */
+        p->level = row->get(p, row->arg) ? p->level | bit : p->level & ~bit;
+    }
+    p->watch[pin] = (struct api_watch){fn, ctx};
+    p->watched = fn ? p->watched | bit : p->watched & ~bit;
+    if (!p->inside && p->kind->follow) p->kind->follow(p, p->bench->sched.now_ns);
+    return PSABENCH_OK;
+}
+
+/* When an output of p may change next. */
+static int64_t next_ns(const psabench_part *p)
+{
+    const int64_t event_ns = sched_next_ns(&p->bench->sched);
+    const int64_t own_ns = p->kind->next_ns ? p->kind->next_ns(p) : INT64_MAX;
+    return event_ns < own_ns ? event_ns : own_ns;
+}
+
+int psabench_run_until_level(psabench_part *p, int pin, int level, int64_t timeout_ns)
+{
+    const struct api_pin *row = pin_of(p, pin);
+    if (!row) return no_pin(p, pin);
+    psabench *b = p->bench;
+    const int may = api_may_move(b, "psabench_run_until_level()");
+    if (may) return may;
+    if (is_late(row)) return too_late(p, row);
+    if ((level != 0 && level != 1) || timeout_ns < 0 || timeout_ns > API_TIME_MAX_NS - b->sched.now_ns)
+        return api_fail(b, PSABENCH_BAD_ARGUMENT, "%s: %s to be %d within %lld ns: a level is 0 or 1, a span >= 0",
+                        p->name, row->name, level, (long long)timeout_ns);
+    const int64_t end_ns = b->sched.now_ns + timeout_ns;
+    b->inside++;
+    while (level_now(p, pin) != level && b->sched.now_ns < end_ns) {
+        const int64_t t_ns = next_ns(p);
+        api_move(b, t_ns < end_ns ? t_ns : end_ns);
+    }
+    b->inside--;
+    if (level_now(p, pin) == level) return PSABENCH_OK;
+    return api_fail(b, PSABENCH_TIMEOUT, "%s: %s did not become %d within %lld ns", p->name, row->name, level,
+                    (long long)timeout_ns);
+}
+
+/* ---- inputs ---- */
+
+double api_input(struct psabench_part *p, unsigned input, int64_t t_ns)
+{
+    if (!(p->by_fn >> input & 1)) return p->volts[input];
+    p->inside++;
+    const double v = p->input(p->input_ctx, p, (int)input, t_ns);
+    p->inside--;
+    if (!isfinite(v)) return 0.0;
+    return v > API_VOLTS_MAX ? API_VOLTS_MAX : v < -API_VOLTS_MAX ? -API_VOLTS_MAX : v;
+}
+
+/* The past is sampled with the input as it was. */
+static int before_input(struct psabench_part *p, const char *function)
+{
+    if (p->inside)
+        return api_fail(p->bench, PSABENCH_BAD_ARGUMENT, "%s: %s from a callback that the same part is waiting for",
+                        p->name, function);
+    p->bench->inside++;
+    if (p->kind->before_input) p->kind->before_input(p, p->bench->sched.now_ns);
+    p->bench->inside--;
+    return PSABENCH_OK;
+}
+
+int psabench_set_input(psabench_part *p, psabench_input_fn *fn, void *ctx)
+{
+    if (!p) return PSABENCH_BAD_ARGUMENT;
+    const int bad = before_input(p, "psabench_set_input()");
+    if (bad) return bad;
+    p->input = fn;
+    p->input_ctx = ctx;
+    p->by_fn = fn ? p->kind->fn_inputs : 0;
+    return PSABENCH_OK;
+}
+
+static int no_such_input(const psabench_part *p, int input)
+{
+    char list[API_WHY] = "";
+    size_t len = 0;
+    for (unsigned i = 0; i < API_INPUTS_MAX && len < sizeof list; i++)
+        if (p->kind->inputs >> i & 1) len += (size_t)snprintf(list + len, sizeof list - len, " %u", i);
+    return api_fail(p->bench, PSABENCH_BAD_ARGUMENT, "%s: no input %d of %s: there are%s", p->name, input,
+                    p->kind->name, list);
+}
+
+int psabench_set_volts(psabench_part *p, int input, double volts)
+{
+    if (!p) return PSABENCH_BAD_ARGUMENT;
+    if (input < 0 || input >= API_INPUTS_MAX || !(p->kind->inputs >> input & 1)) return no_such_input(p, input);
+    if (!(volts >= -API_VOLTS_MAX && volts <= API_VOLTS_MAX))
+        return api_fail(p->bench, PSABENCH_BAD_ARGUMENT, "%s: input %d: not a number of volts", p->name, input);
+    const int bad = before_input(p, "psabench_set_volts()");
+    if (bad) return bad;
+    p->volts[input] = volts;
+    p->by_fn &= (uint16_t) ~(1u << input);
+    return PSABENCH_OK;
+}
+
+/* ---- inside ---- */
+
+int psabench_peek(const psabench_part *p, unsigned address)
+{
+    if (!p) return PSABENCH_BAD_ARGUMENT;
+    const int value = p->kind->peek(p, address);
+    if (value >= 0) return value;
+    return api_fail(p->bench, PSABENCH_BAD_ARGUMENT, "%s: no register %03Xh of %s", p->name, address, p->kind->name);
+}
+
+const char *psabench_counter(const psabench_part *p, int i, uint64_t *value)
+{
+    if (!p || i < 0 || (unsigned)i >= p->kind->counter_count) return NULL;
+    const struct api_counter *c = &p->kind->counters[i];
+    uint32_t v = 0;
+    if (!c->get) memcpy(&v, (const char *)p + c->offset, sizeof v);
+    if (value) *value = c->get ? c->get(p) : v;
+    return c->name;
+}

@@ -1,0 +1,436 @@
+#include "api/psa2.h"
+
+#include "api/internal.h"
+#include "board/psa2/psa2.h"
+
+#include <stdio.h>
+#include <string.h>
+
+enum { TEMPS = 4, TEMP_INPUT = 3 /* inputs 3..6: temperatures */ };
+
+struct part_psa2 {
+    struct psabench_part part;
+    unsigned profile, chain, input;
+    double noise_scale, temp_noise_scale, temp_degc;
+    struct psa2 board;
+    struct trace_sink sink[2]; /* one is attached, the other takes over when the lines heeded change */
+    unsigned attached;         /* sink that is */
+    bool attaching;
+    struct psa2_request request;
+    bool pending; /* the board has the request */
+    enum psa2_result result;
+};
+
+static struct part_psa2 *self(struct psabench_part *p)
+{
+    return (struct part_psa2 *)p;
+}
+
+static const struct part_psa2 *cself(const struct psabench_part *p)
+{
+    return (const struct part_psa2 *)p;
+}
+
+/* ---- options and profiles ---- */
+
+#define PROFILES "article|intent|lab32|psa1|ungated|w16|w24"
+
+#define OPTIONS(X)                                                                                                     \
+    X("profile", API_CHOICE, part_psa2, profile, "article", 0, 6, PROFILES, "board profile, proto/profiles")           \
+    X("chain", API_CHOICE, part_psa2, chain, "exact", 0, 2, "exact|modulator|direct",                                  \
+      "of the accelerometer converters, as that of an ads1282")                                                        \
+    X("noise_scale", API_REAL, part_psa2, noise_scale, "1", 0, 1000, NULL,                                             \
+      "noise of the accelerometer converters, 1: published, 0: none")                                                  \
+    X("temp_noise_scale", API_REAL, part_psa2, temp_noise_scale, "1", 0, 1000, NULL,                                   \
+      "noise of the temperature converter, 1: published, 0: none")                                                     \
+    X("input", API_CHOICE, part_psa2, input, "volts", 0, 1, "volts|amps",                                              \
+      "what the sensors X Y Z give: volts, or amperes into 1 kohm")                                                    \
+    X("temp_degc", API_REAL, part_psa2, temp_degc, "25", -273, 1000, NULL,                                             \
+      "temperature of sensors and board until psabench_set_volts(), degC")
+
+static const struct api_option options[] = {OPTIONS(API_OPTION_ROW)};
+
+/* What each profile has other than "article", in the words of its file; a test holds them against proto/profiles. */
+static const struct {
+    const char *profile, *key, *text;
+    unsigned index;
+} differences[] = {
+    {"intent", "setup", "DRD_A write_A 41 00 56", 0},
+    {"intent", "setup", "DRD_T write_T 50 00 06", 1},
+    {"intent", "setup", "DRD_T write_T 53 00 82", 2},
+    {"intent", "setup", "DRD_T sync_T", 3},
+    {"intent", "setup", "DRD_A sync_A", 4},
+    {"lab32", "code_bits", "32", 0},
+    {"lab32", "read_bits", "32", 0},
+    {"psa1", "adc_is_1281", "true", 0},
+    {"psa1", "adc_vref_v", "2.5", 0},
+    {"psa1", "adc_pga", "1", 0},
+    {"ungated", "temp_clkin_hz", "8000000", 0},
+    {"ungated", "gate_sclk", "false", 0},
+    {"w16", "line_hz", "4096000", 0},
+    {"w16", "line_div", "4", 0},
+    {"w16", "word_bits", "16", 0},
+    {"w16", "lead_in_clk", "0", 0},
+    {"w16", "code_bits", "16", 0},
+    {"w24", "line_hz", "4096000", 0},
+    {"w24", "line_div", "3", 0},
+    {"w24", "word_bits", "24", 0},
+    {"w24", "lead_in_clk", "0", 0},
+};
+
+bool api_psa2_profile(unsigned number, struct psa2_profile *p, char *why, size_t cap)
+{
+    const char *name = PROFILES;
+    while (number-- > 0) name = strchr(name, '|') + 1;
+    const size_t len = strcspn(name, "|");
+    *p = psa2_profile_default();
+    memcpy(p->name, name, len);
+    p->name[len] = '\0';
+    for (size_t i = 0; i < sizeof differences / sizeof *differences; i++) {
+        if (strcmp(differences[i].profile, p->name) != 0) continue;
+        if (!psa2_profile_set(p, differences[i].key, differences[i].index, differences[i].text, why, cap)) return false;
+    }
+    return psa2_profile_check(p, why, cap);
+}
+
+/* ---- lines ---- */
+
+static int64_t now_ns(const struct psabench_part *p)
+{
+    return p->bench->sched.now_ns;
+}
+
+static bool get_drd_a(const struct psabench_part *p, unsigned arg)
+{
+    (void)arg;
+    return ads1282_drdy(&cself(p)->board.adc[0]);
+}
+
+static bool get_drd_t(const struct psabench_part *p, unsigned arg)
+{
+    (void)arg;
+    return ads1256_drdy(&cself(p)->board.tadc);
+}
+
+static bool get_sync_a(const struct psabench_part *p, unsigned arg)
+{
+    (void)arg;
+    const struct psa2_pulse *pulse = &cself(p)->board.pulse;
+    return pulse->active && pulse->group == PSA2_ACCEL;
+}
+
+static bool get_sync_t(const struct psabench_part *p, unsigned arg)
+{
+    (void)arg;
+    const struct psa2_pulse *pulse = &cself(p)->board.pulse;
+    return !(pulse->active && pulse->group == PSA2_TEMP);
+}
+
+static bool get_cst(const struct psabench_part *p, unsigned arg)
+{
+    (void)arg;
+    const struct psa2_spi *spi = &cself(p)->board.spi;
+    return spi->phase == PSA2_SPI_IDLE || spi->x.group != PSA2_TEMP;
+}
+
+static bool get_int(const struct psabench_part *p, unsigned arg)
+{
+    (void)arg;
+    const struct psa2_out *out = &cself(p)->board.out;
+    return !(out->busy && now_ns(p) >= out->f.t_int_fall_ns);
+}
+
+/* INT falls on the grid of CLK, which is no event while nobody watches. */
+static int64_t next_ns(const struct psabench_part *p)
+{
+    const struct psa2_out *out = &cself(p)->board.out;
+    return out->busy && now_ns(p) < out->f.t_int_fall_ns ? out->f.t_int_fall_ns : INT64_MAX;
+}
+
+static bool get_res(const struct psabench_part *p, unsigned arg)
+{
+    (void)arg;
+    return cself(p)->board.mode != PSA2_IN_RESET;
+}
+
+/* The board makes a pulse of its own length of a fall. */
+static void set_res(struct psabench_part *p, unsigned arg, bool level, int64_t t_ns)
+{
+    (void)arg;
+    if (!level && get_res(p, 0)) psa2_reset(&self(p)->board, t_ns);
+}
+
+static const struct api_pin pins[PSA2_LINES] = {
+    [PSA2_LINE_SYNC_A] = {.name = "SYNC_A", .dir = API_OUT, .get = get_sync_a},
+    [PSA2_LINE_SCLK] = {.name = "SClk", .dir = API_OUT},
+    [PSA2_LINE_DRD_A] = {.name = "DRD_A", .dir = API_OUT, .get = get_drd_a},
+    [PSA2_LINE_DIN] = {.name = "DIn", .dir = API_OUT},
+    [PSA2_LINE_DOUTX] = {.name = "DOutX", .dir = API_OUT},
+    [PSA2_LINE_DOUTY] = {.name = "DOutY", .dir = API_OUT},
+    [PSA2_LINE_DOUTZ] = {.name = "DOutZ", .dir = API_OUT},
+    [PSA2_LINE_SYNC_T] = {.name = "SYNC_T", .dir = API_OUT, .get = get_sync_t},
+    [PSA2_LINE_CST] = {.name = "CST", .dir = API_OUT, .get = get_cst},
+    [PSA2_LINE_DRD_T] = {.name = "DRD_T", .dir = API_OUT, .get = get_drd_t},
+    [PSA2_LINE_DINT] = {.name = "DInT", .dir = API_OUT},
+    [PSA2_LINE_DOUTT] = {.name = "DOutT", .dir = API_OUT},
+    [PSA2_LINE_RES] = {.name = "Res", .dir = API_BOTH, .set = set_res, .get = get_res},
+    [PSA2_LINE_DATA] = {.name = "Data", .dir = API_OUT},
+    [PSA2_LINE_CLK] = {.name = "CLK", .dir = API_OUT},
+    [PSA2_LINE_INT] = {.name = "Int", .dir = API_OUT, .get = get_int},
+};
+
+static void on_edge(void *ctx, unsigned sig, bool level, int64_t t_ns)
+{
+    struct part_psa2 *s = ctx;
+    const uint32_t bit = UINT32_C(1) << sig;
+    if (s->attaching) s->part.level = level ? s->part.level | bit : s->part.level & ~bit;
+    else api_edge(&s->part, sig, level, t_ns);
+}
+
+static void on_steps(void *ctx, const struct trace_step *step, unsigned n)
+{
+    const struct part_psa2 *s = ctx;
+    trace_each(step, n, s->sink[s->attached].mask, on_edge, ctx);
+}
+
+/* The lines heeded go to one sink. Another set of lines: a new sink is attached before the old one goes, for a trace
+ * without sinks throws away what it still holds back. */
+static void attach(struct part_psa2 *s)
+{
+    const uint32_t want = s->part.watched | s->part.recorded;
+    struct trace_sink *old = &s->sink[s->attached];
+    if (want == old->mask) return;
+    s->attached ^= 1u;
+    struct trace_sink *new = &s->sink[s->attached];
+    *new = (struct trace_sink){.mask = want, .steps = on_steps, .ctx = s};
+    s->attaching = true;
+    if (want) trace_attach(&s->board.trace, new);
+    s->attaching = false;
+    trace_detach(&s->board.trace, old);
+    old->mask = 0;
+}
+
+static void advance(struct psabench_part *p, int64_t t_ns)
+{
+    struct part_psa2 *s = self(p);
+    if (p->inside) return;
+    attach(s);
+    p->inside++;
+    trace_advance(&s->board.trace, t_ns);
+    p->inside--;
+}
+
+static void follow(struct psabench_part *p, int64_t t_ns)
+{
+    advance(p, t_ns - TRACE_LAG_NS);
+}
+
+/* ---- the board ---- */
+
+static double accel(void *ctx, unsigned axis, int64_t t_ns)
+{
+    return api_input(ctx, axis, t_ns);
+}
+
+static double temp_degc(void *ctx, unsigned channel, int64_t t_ns)
+{
+    (void)t_ns;
+    const struct psabench_part *p = ctx;
+    return channel < TEMPS ? p->volts[TEMP_INPUT + channel] : 0.0;
+}
+
+static void on_frame(void *ctx, const struct psa2_frame *f, int64_t t_ns)
+{
+    (void)t_ns;
+    struct psabench_part *p = ctx;
+    if (!p->frame) return;
+    struct psabench_frame out = {.size = sizeof out,
+                                 .seq = f->seq,
+                                 .t_sample_ns = f->t_sample_ns,
+                                 .t_int_fall_ns = f->t_int_fall_ns,
+                                 .t_int_rise_ns = f->t_int_rise_ns,
+                                 .temp_code = f->temp_code,
+                                 .temp_channel = f->temp_channel,
+                                 .status = f->status};
+    memcpy(out.code, f->code, sizeof out.code);
+    memcpy(out.word, f->word, sizeof out.word);
+    p->inside++;
+    p->frame(p->frame_ctx, p, &out);
+    p->inside--;
+}
+
+static bool open_psa2(struct psabench_part *p, char *why, size_t cap)
+{
+    struct part_psa2 *s = self(p);
+    struct psa2_profile profile;
+    if (!api_psa2_profile(s->profile, &profile, why, cap)) return false;
+    const uint64_t serial = api_serial(p);
+    struct board_cfg unit = {.adc_noise_scale = s->noise_scale,
+                             .temp_noise_scale = s->temp_noise_scale,
+                             .seed = p->bench->seed,
+                             .adc_chain = (enum ads1282_chain)s->chain,
+                             .serial = (uint32_t)(serial ^ serial >> 32)};
+    for (unsigned i = 0; i < 3; i++) unit.afe[i] = afe_nominal(s->input == 0 ? AFE_VOLTAGE : AFE_CURRENT);
+    for (unsigned i = 0; i < TEMPS; i++) p->volts[TEMP_INPUT + i] = s->temp_degc;
+    const struct board_io io = {.ctx = p, .accel = accel, .temp_degc = temp_degc};
+    psa2_init(&s->board, &profile, &unit, &io, &p->bench->sched);
+    psa2_attach(&s->board, &(struct psa2_host){.ctx = p, .frame = on_frame});
+    psa2_power_up(&s->board, now_ns(p));
+    return true;
+}
+
+static void before_input(struct psabench_part *p, int64_t t_ns)
+{
+    psa2_sample_until(&self(p)->board, t_ns);
+}
+
+/* Group 0..2 X, Y, Z, 3 temperature, above the eight bits of the register's address. */
+static int peek(const struct psabench_part *p, unsigned address)
+{
+    const struct psa2 *b = &cself(p)->board;
+    const unsigned group = address >> 8;
+    const struct reg_file *f = group < 3 ? &b->adc[group].regs : &b->tadc.regs;
+    return group < 4 && (address & 0xFF) < f->count ? reg_peek(f, address & 0xFF) : -1;
+}
+
+/* ---- registers through the controller ---- */
+
+static void done(void *ctx, struct psa2_request *r, enum psa2_result result, int64_t t_ns)
+{
+    (void)r;
+    (void)t_ns;
+    struct part_psa2 *s = ctx;
+    s->pending = false;
+    s->result = result;
+}
+
+/* Hands the request over, once the board has finished its set-up and whatever was asked before. */
+static enum psa2_result submit(struct part_psa2 *s, const struct psa2_request *r, int64_t end_ns)
+{
+    psabench *b = s->part.bench;
+    for (;;) {
+        enum psa2_result result = PSA2_BUSY;
+        if (!s->pending) {
+            s->request = *r;
+            result = psa2_submit(&s->board, &s->request, b->sched.now_ns);
+        }
+        const int64_t event_ns = sched_next_ns(&b->sched);
+        if (result != PSA2_BUSY || event_ns > end_ns) return result;
+        api_move(b, event_ns);
+    }
+}
+
+static enum psa2_result carry_out(struct part_psa2 *s, const struct psa2_request *r, int64_t timeout_ns)
+{
+    psabench *b = s->part.bench;
+    const int64_t end_ns = b->sched.now_ns + timeout_ns;
+    b->inside++;
+    enum psa2_result result = submit(s, r, end_ns);
+    if (result == PSA2_OK) {
+        s->pending = true;
+        while (s->pending && sched_next_ns(&b->sched) <= end_ns) api_move(b, sched_next_ns(&b->sched));
+        result = s->pending ? PSA2_BUSY : s->result;
+    }
+    if (result == PSA2_BUSY) api_move(b, end_ns);
+    b->inside--;
+    return result;
+}
+
+static int no_access(psabench_part *p, unsigned group, unsigned address, int64_t timeout_ns, const char *function)
+{
+    if (!p) return PSABENCH_BAD_ARGUMENT;
+    if (!p->kind->board)
+        return api_fail(p->bench, PSABENCH_NOT_HERE, "%s: %s is no board: %s", p->name, p->kind->name, function);
+    if (group > 3 || address > 0xFF || timeout_ns < 0 || timeout_ns > API_TIME_MAX_NS - now_ns(p))
+        return api_fail(p->bench, PSABENCH_BAD_ARGUMENT,
+                        "%s: %s: group %u, register %u, within %lld ns: groups are 0 to 3, registers bytes", p->name,
+                        function, group, address, (long long)timeout_ns);
+    return api_may_move(p->bench, function);
+}
+
+static int result_of(const struct part_psa2 *s, enum psa2_result result, unsigned group, unsigned address)
+{
+    static const struct {
+        int code;
+        const char *text;
+    } row[] = {
+        [PSA2_OK] = {PSABENCH_OK, ""},
+        [PSA2_NO_SUCH_REG] = {PSABENCH_BAD_ARGUMENT, "the converter has no such register"},
+        [PSA2_READ_ONLY] = {PSABENCH_REFUSED, "no bit there can be written"},
+        [PSA2_BAD_VALUE] = {PSABENCH_REFUSED, "the converter does not take the value"},
+        [PSA2_BUSY] = {PSABENCH_TIMEOUT, "not within the time given"},
+        [PSA2_TIMEOUT] = {PSABENCH_TIMEOUT, "the converter's data-ready did not come"},
+    };
+    if (result == PSA2_OK) return PSABENCH_OK;
+    return api_fail(s->part.bench, row[result].code, "%s: group %u, register %02Xh: %s", s->part.name, group, address,
+                    row[result].text);
+}
+
+static struct psa2_request request_of(struct part_psa2 *s, enum psa2_op op, unsigned group, unsigned address)
+{
+    return (struct psa2_request){
+        .group = group < 3 ? PSA2_ACCEL : PSA2_TEMP, .op = op, .addr = (uint8_t)address, .done = done, .ctx = s};
+}
+
+int psabench_board_read(psabench_part *p, unsigned group, unsigned address, int64_t timeout_ns)
+{
+    const int bad = no_access(p, group, address, timeout_ns, "psabench_board_read()");
+    if (bad) return bad;
+    struct part_psa2 *s = self(p);
+    const struct psa2_request r = request_of(s, PSA2_READ_REG, group, address);
+    const int code = result_of(s, carry_out(s, &r, timeout_ns), group, address);
+    return code ? code : s->request.answer[group % 3];
+}
+
+int psabench_board_write(psabench_part *p, unsigned group, unsigned address, uint8_t value, int64_t timeout_ns)
+{
+    const int bad = no_access(p, group, address, timeout_ns, "psabench_board_write()");
+    if (bad) return bad;
+    struct part_psa2 *s = self(p);
+    struct psa2_request r = request_of(s, PSA2_WRITE_REG, group, address);
+    r.value = value;
+    return result_of(s, carry_out(s, &r, timeout_ns), group, address);
+}
+
+int psabench_on_frame(psabench_part *p, psabench_frame_fn *fn, void *ctx)
+{
+    if (!p) return PSABENCH_BAD_ARGUMENT;
+    if (!p->kind->board) return api_fail(p->bench, PSABENCH_NOT_HERE, "%s: %s has no frames", p->name, p->kind->name);
+    p->frame = fn;
+    p->frame_ctx = ctx;
+    return PSABENCH_OK;
+}
+
+static const struct api_counter counters[] = {
+    API_COUNTER("frames", part_psa2, board.counters.frames),
+    API_COUNTER("resets", part_psa2, board.counters.resets),
+    API_COUNTER("requests", part_psa2, board.counters.requests),
+    API_COUNTER("timeouts", part_psa2, board.counters.timeouts),
+    API_COUNTER("overruns", part_psa2, board.counters.overruns),
+    API_COUNTER("int_late", part_psa2, board.counters.int_late),
+    API_COUNTER("edges_dropped", part_psa2, board.trace.dropped),
+    API_COUNTER("edges_late", part_psa2, board.trace.late),
+};
+
+const struct api_kind api_psa2 = {
+    .name = "psa2",
+    .size = sizeof(struct part_psa2),
+    .options = options,
+    .option_count = sizeof options / sizeof *options,
+    .options_text = OPTIONS(API_OPTION_TEXT),
+    .pins = pins,
+    .pin_count = PSA2_LINES,
+    .counters = counters,
+    .counter_count = sizeof counters / sizeof *counters,
+    .inputs = 0x7F,
+    .fn_inputs = 0x07,
+    .spi = API_NO_SPI,
+    .open = open_psa2,
+    .before_input = before_input,
+    .follow = follow,
+    .finish = advance,
+    .peek = peek,
+    .next_ns = next_ns,
+    .lag_ns = TRACE_LAG_NS,
+    .board = true,
+};

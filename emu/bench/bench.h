@@ -1,0 +1,82 @@
+/* What stands on the bench: instruments, units, buses, and who watches the lines. Assembled from a scenario; no OS, no clock. */
+#ifndef PSABENCH_BENCH_BENCH_H
+#define PSABENCH_BENCH_BENCH_H
+
+#include "command/view.h"
+#include "scenario/scenario.h"
+#include "trace/sampler.h"
+#include "trace/vcd.h"
+
+#define BENCH_SLICE_NS 1000000 /* step, free, restoring: simulated time between looks at input and output */
+
+/* The bench's own node on each bus: writes the scenario's frame forms (SDO to 2020h) and starts the units (NMT). */
+struct bench_starter {
+    struct can_node node[SCENARIO_BUSES_MAX];
+    struct sched_ev ev;
+};
+
+/* Cycles on the parallel bus of a unit that come from outside; one at a time. They belong to the bench, for a board may be
+ * in the middle of one when who asked for it has gone. */
+struct bench_cycle {
+    struct board_cycle cycle;
+    bool busy;
+    void (*done)(void *ctx, const struct board_cycle *c, enum board_cycle_result r,
+                 int64_t t_ns); /* NULL: nobody waits */
+    void *ctx;
+};
+
+struct bench {
+    struct scenario scenario;
+    struct sched sched;
+    struct can_bus bus[SCENARIO_BUSES_MAX];
+    unsigned buses;
+    struct lab lab;
+    bool fed;                                                                /* the supply feeds the boards */
+    uint32_t brownouts;                                                      /* times that it ceased to */
+    struct sched_ev power;                                                   /* the next change of that */
+    struct can_node monitor[SCENARIO_BUSES_MAX];                             /* hear every frame */
+    void (*on_frame)(void *ctx, const struct can_msg *m, int64_t t_ns);      /* of the monitor; may be NULL */
+    void (*on_cycle)(void *ctx, unsigned unit, const struct board_cycle *c); /* one has come; may be NULL */
+    void (*on_refused)(void *ctx, const char *unit, const char *why);        /* frame form; may be NULL */
+    void *ctx;
+    struct bench_starter starter;
+    unsigned watched; /* unit whose lines are recorded */
+    bool recording;
+    struct vcd vcd;
+    struct sampler sampler;
+    /* last, and only those that the scenario has are written: 20 MB of address space, 0.3 MB a unit in use */
+    struct unit unit[SCENARIO_UNITS_MAX];
+    struct bench_cycle cycle[SCENARIO_UNITS_MAX];
+};
+
+/* The scenario is copied. Megabytes: take it from the heap; it never moves afterwards. */
+void bench_init(struct bench *b, const struct scenario *s, unsigned watched);
+
+/* Index of the unit of that name, or -1. */
+int bench_find_unit(const struct scenario *s, const char *name);
+
+/* Records the lines of a unit from now on; before power-up, so that the first edge is in it. False: no such time unit. */
+bool bench_record(struct bench *b, unsigned unit, FILE *out, uint32_t unit_ns);
+
+/* Ends the recording TRACE_LAG_NS before now: what comes later may not all be known yet. */
+void bench_record_end(struct bench *b);
+
+void bench_power_up(struct bench *b);
+
+/* The supply was told something: boards go off and on now, and at the instants that follow from it. */
+void bench_supply_changed(struct bench *b, int64_t t_ns);
+
+/* A cycle for a unit whose board has a bus, c as it is wanted; done is called later if it is BOARD_CYCLE_OK, else never. */
+enum board_cycle_result bench_cycle(struct bench *b, unsigned unit, const struct bench_cycle *c, int64_t t_ns);
+void bench_cycle_forget(struct bench *b, unsigned unit); /* it goes on, nobody waits for it */
+
+/* What commands may reach of it, as far as the bench knows: the callbacks are left as they are. */
+void bench_view(struct bench *b, struct control_bench *v);
+
+/* After time has moved: lines follow their watchers. */
+void bench_follow(struct bench *b);
+
+/* The end: what is still pending goes to the recording. */
+void bench_finish(struct bench *b);
+
+#endif

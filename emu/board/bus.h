@@ -1,0 +1,58 @@
+/* The parallel bus of a board that has one, cycle by cycle. */
+#ifndef PSABENCH_BOARD_BUS_H
+#define PSABENCH_BOARD_BUS_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+enum board_cycle_result {
+    BOARD_CYCLE_OK,
+    BOARD_CYCLE_NO_ADDRESS, /* nothing answers at this address */
+    BOARD_CYCLE_READ_ONLY,
+    BOARD_CYCLE_WRITE_ONLY,
+    BOARD_CYCLE_NOT_READY, /* too early: no word waits */
+    BOARD_CYCLE_TOO_SHORT, /* the strobe is shorter than the board needs */
+    BOARD_CYCLE_BUSY,      /* somebody else's cycle is under way: refused at once, to be asked again */
+    BOARD_CYCLE_BAD_VALUE,
+    BOARD_CYCLE_TAKEN, /* too early: no word waits, and the board's built-in host takes each that comes */
+    BOARD_CYCLE_OFF    /* no power, or cut by a reset */
+};
+
+/* One word for programs, "not-ready"; "ok" for BOARD_CYCLE_OK. */
+const char *board_cycle_word(enum board_cycle_result r);
+
+/* One cycle on the parallel bus by which the navigation computer reads a board (PSD-1, PMKA, PIK). Owned by the caller
+ * until done() has been called. */
+struct board_cycle {
+    bool write;
+    uint8_t address;   /* A3..A0 */
+    uint16_t data;     /* written, or what was read */
+    int64_t strobe_ns; /* length; 0: the profile's */
+    void (*done)(void *ctx, struct board_cycle *c, enum board_cycle_result r, int64_t t_ns);
+    void *ctx;
+};
+
+/* Lengths of strobes, ns. */
+struct board_strobe {
+    int64_t own_ns, least_ns; /* where the host gives none; the shortest that the board takes */
+};
+
+struct board_bus {
+    /* BOARD_CYCLE_OK: done() will be called later, never from inside; else it will not. */
+    enum board_cycle_result (*submit)(void *board, struct board_cycle *c, int64_t t_ns);
+    unsigned addresses;
+    const char *(*name)(unsigned address); /* of what is there: "X"; NULL: nothing */
+    struct board_strobe (*strobe)(const void *board);
+    /* Of a cycle refused as BAD_VALUE or NOT_READY, what would be right, a clause: "it takes 0 to 3". May write nothing. */
+    void (*wanted)(const void *board, const struct board_cycle *c, enum board_cycle_result r, char *out, size_t cap);
+};
+
+#define BOARD_CYCLE_WHY_MAX 190u
+
+/* Why a cycle was refused, and what would be right, for a human: "read of address 0Ah (TEMP), strobe 50 ns: ...". An address is
+ * written so wherever one is: two hexadecimal digits and h. */
+void board_cycle_why(const struct board_bus *bus, const void *board, const struct board_cycle *c,
+                     enum board_cycle_result r, char out[BOARD_CYCLE_WHY_MAX]);
+
+#endif

@@ -1,0 +1,42 @@
+/* What a board is given: what it can reach of the world, and what is its own among boards of its profile. */
+#ifndef PSABENCH_BOARD_CFG_H
+#define PSABENCH_BOARD_CFG_H
+
+#include "board/afe.h"
+#include "chip/ads1282/ads1282.h"
+
+#include <stdint.h>
+
+#define BOARD_AXES 3u
+
+/* What a board can reach of the world. */
+struct board_io {
+    void *ctx;
+    /* Sensor output, A or V by the channel's afe_cfg.input; t_ns never earlier than the axis's last call. Whoever changes the
+     * physics abruptly calls sample_until() first. */
+    double (*accel)(void *ctx, unsigned axis, int64_t t_ns);
+    double (*temp_degc)(void *ctx, unsigned channel, int64_t t_ns); /* at X, Y, Z sensor and the board itself (3) */
+    void (*rate_radps)(void *ctx, int64_t t_ns, double w_ib_b[3]);  /* inertial rate, axes of the unit's case */
+    void (*event)(void *ctx, unsigned event, int64_t t_ns);         /* number in board_type.events; may be NULL */
+    /* The voltage that feeds the unit, to its nominal one. NULL: the bench has no supply. */
+    double (*supply_ratio)(void *ctx, int64_t t_ns);
+    /* Of the gyro-stabilised platform, phys/motion/platform.h: rates for its torquers, a new setting, its angle sensor as the servo and
+     * as the encoder has it. NULL: there is none. */
+    void (*torque)(void *ctx, double u1_radps, double u2_radps, int64_t t_ns);
+    void (*reposition)(void *ctx, int64_t t_ns);
+    double (*servo_rad)(void *ctx, int64_t t_ns);
+    double (*encoder_rad)(void *ctx, int64_t t_ns);
+};
+
+/* One specimen: what differs between two boards of a profile. */
+struct board_cfg {
+    struct afe_cfg afe[BOARD_AXES];
+    double adc_noise_scale, temp_noise_scale;      /* 1 published, 0 none */
+    enum ads1282_chain adc_chain;                  /* PSA-2 */
+    double temp_adc_offset_v, temp_adc_gain_error; /* PSA-2 */
+    uint64_t seed;
+    uint32_t serial;
+    uint8_t level_node; /* gyro unit: node of the unit that reads its level sensors; 0: none */
+};
+
+#endif

@@ -1,0 +1,178 @@
+#include "board/field.h"
+
+#include <ctype.h>
+#include <errno.h>
+#include <math.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Text of one element -> *value, its bytes; false if the text is not such a value. */
+typedef bool parse_fn(const struct board_field *f, const char *text, void *value);
+
+static bool parse_string(const struct board_field *f, const char *text, void *value)
+{
+    const size_t len = strlen(text);
+    if (len < (size_t)f->min || len > (size_t)f->max) return false;
+    memcpy(value, text, len + 1);
+    return true;
+}
+
+static bool parse_uint(const struct board_field *f, const char *text, void *value)
+{
+    char *end;
+    errno = 0;
+    const unsigned long v = strtoul(text, &end, 0);
+    if (!isdigit((unsigned char)text[0]) || *end || errno || (double)v < f->min || (double)v > f->max) return false;
+    const unsigned u = (unsigned)v;
+    memcpy(value, &u, sizeof u);
+    return true;
+}
+
+static bool parse_real(const struct board_field *f, const char *text, void *value)
+{
+    char *end;
+    const double v = strtod(text, &end);
+    if (end == text || *end || !isfinite(v) || v < f->min || v > f->max) return false;
+    memcpy(value, &v, sizeof v);
+    return true;
+}
+
+static bool parse_bool(const struct board_field *f, const char *text, void *value)
+{
+    (void)f;
+    const bool yes = strcmp(text, "true") == 0;
+    if (!yes && strcmp(text, "false") != 0) return false;
+    memcpy(value, &yes, sizeof yes);
+    return true;
+}
+
+static bool parse_choice(const struct board_field *f, const char *text, void *value)
+{
+    for (int i = 0; f->choices[i]; i++) {
+        if (strcmp(f->choices[i], text) != 0) continue;
+        memcpy(value, &i, sizeof i);
+        return true;
+    }
+    return false;
+}
+
+static const struct {
+    parse_fn *parse; /* NULL: the board's own */
+    size_t element;  /* bytes of one element of a sequence */
+    const char *like;
+} types[] = {
+    [BOARD_FIELD_STRING] = {parse_string, 0, "1 to 31 characters"},
+    [BOARD_FIELD_UINT] = {parse_uint, 0, "an integer"},
+    [BOARD_FIELD_REAL] = {parse_real, 0, "a number"},
+    [BOARD_FIELD_REALS] = {parse_real, sizeof(double), "a number"},
+    [BOARD_FIELD_BOOL] = {parse_bool, 0, "true or false"},
+    [BOARD_FIELD_CHOICE] = {parse_choice, 0, NULL},
+    [BOARD_FIELD_LIST] = {NULL, 0, NULL},
+};
+
+const struct board_field *board_field_find(const struct board_field *fields, unsigned n, const char *key)
+{
+    for (unsigned i = 0; i < n; i++)
+        if (strcmp(fields[i].key, key) == 0) return &fields[i];
+    return NULL;
+}
+
+bool board_field_is_list(const struct board_field *f)
+{
+    return f->type == BOARD_FIELD_REALS || f->type == BOARD_FIELD_LIST;
+}
+
+unsigned board_field_elements(const struct board_field *f)
+{
+    if (!board_field_is_list(f)) return 1;
+    return f->count ? f->count : (unsigned)f->max;
+}
+
+static bool is_number(const struct board_field *f)
+{
+    return f->type == BOARD_FIELD_UINT || f->type == BOARD_FIELD_REAL || f->type == BOARD_FIELD_REALS;
+}
+
+static void append(char *out, size_t cap, const char *separator, const char *word)
+{
+    const size_t at = strlen(out);
+    (void)snprintf(out + at, cap - at, "%s%s", at ? separator : "", word);
+}
+
+static void not_a_value(const struct board_field *f, const char *text, char *why, size_t cap)
+{
+    char words[200] = "";
+    for (unsigned i = 0; f->type == BOARD_FIELD_CHOICE && f->choices[i]; i++)
+        append(words, sizeof words, f->choices[i + 1] ? ", " : " or ", f->choices[i]);
+    const char *like = f->type == BOARD_FIELD_CHOICE ? words
+                       : f->type == BOARD_FIELD_LIST ? f->like
+                                                     : types[f->type].like;
+    if (is_number(f))
+        (void)snprintf(why, cap, "%s: \"%.40s\" is not %s of %.10g .. %.10g", f->key, text, like, f->min, f->max);
+    else (void)snprintf(why, cap, "%s: \"%.40s\" is not %s", f->key, text, like);
+}
+
+static void not_a_key(const struct board_field *fields, unsigned n, const char *key, char *why, size_t cap)
+{
+    int at = snprintf(why, cap, "%.40s: unknown key; known here: ", key);
+    for (unsigned i = 0; i < n && at >= 0 && (size_t)at < cap; i++)
+        at += snprintf(why + at, cap - (size_t)at, "%s%s", i ? ", " : "", fields[i].key);
+}
+
+bool board_field_set(const struct board_field *fields, unsigned n, void *profile, const char *key, unsigned index,
+                     const char *text, char *why, size_t cap)
+{
+    const struct board_field *f = board_field_find(fields, n, key);
+    if (!f) {
+        not_a_key(fields, n, key, why, cap);
+        return false;
+    }
+    if (index >= board_field_elements(f)) {
+        (void)snprintf(why, cap, "%s: more than %u elements", key, board_field_elements(f));
+        return false;
+    }
+    void *value = (char *)profile + f->offset + index * types[f->type].element;
+    const bool done =
+        f->type == BOARD_FIELD_LIST ? f->parse(profile, index, text) : types[f->type].parse(f, text, value);
+    if (!done) not_a_value(f, text, why, cap);
+    return done;
+}
+
+static double number(const struct board_field *f, const void *profile, unsigned index)
+{
+    const char *at = (const char *)profile + f->offset + index * types[f->type].element;
+    unsigned u;
+    double d;
+    if (f->type != BOARD_FIELD_UINT) {
+        memcpy(&d, at, sizeof d);
+        return d;
+    }
+    memcpy(&u, at, sizeof u);
+    return u;
+}
+
+static bool check_numbers(const struct board_field *f, const void *profile, char *why, size_t cap)
+{
+    for (unsigned i = 0; is_number(f) && i < board_field_elements(f); i++) {
+        const double v = number(f, profile, i);
+        if (v >= f->min && v <= f->max) continue;
+        (void)snprintf(why, cap, "%s = %.10g is outside %.10g .. %.10g", f->key, v, f->min, f->max);
+        return false;
+    }
+    return true;
+}
+
+bool board_field_check(const struct board_field *fields, unsigned n, const void *profile, char *why, size_t cap)
+{
+    for (unsigned i = 0; i < n; i++) {
+        const struct board_field *f = &fields[i];
+        if (f->type == BOARD_FIELD_STRING && f->min > 0 && !*((const char *)profile + f->offset)) {
+            (void)snprintf(why, cap, "%s is empty: give the profile a name of 1 to 31 characters", f->key);
+            return false;
+        }
+        if (!check_numbers(f, profile, why, cap)) return false;
+    }
+    return true;
+}

@@ -1,0 +1,173 @@
+/* What the controller can tell of its own sensor and torquers: while it servoes, in navigation, and by a nod when it is asked.
+ *
+ * In navigation nothing is taken from the angle sensor, so it can bear witness. A dead azimuth torquer leaves the platform
+ * turning at what was asked of it, backwards; a platform off the level has lost its horizon; an angle sensor that stands still
+ * while the vehicle is told to have turned is stuck. One that stands still on a vehicle of which nothing is told proves nothing:
+ * for that there is the nod. Limits: E0. docs/boards/gyro.md has what cannot be seen. */
+#include "board/gyro/internal.h"
+
+#include <math.h>
+
+#define CHECK_NS INT64_C(500000000) /* over which the angle sensor is held against the torquer */
+
+/* A block of navigation is so much asked of the azimuth torquer. The sensor runs against all of it but a quarter, twice in a
+ * row: dead. */
+#define BLOCK_RAD   (0.25 * GYRO_RAD_PER_DEG)
+#define BLOCK_PART  0.25
+#define BLOCKS_DEAD 2u
+
+/* Aiding: a track told as changed by so much, at so much speed, and an angle sensor that has not left its degree. What is told
+ * late has been told by LATE_NS after the turn; a turn that was told ahead is over by then, too. */
+#define ALOFT_MPS 20.0
+#define STILL_RAD (1.0 * GYRO_RAD_PER_DEG)
+#define TOLD_DEG  20.0
+#define LATE_NS   INT64_C(600000000000)
+#define AHEAD_NS  INT64_C(120000000000)
+
+#define NOD_RADPS   (0.2 * GYRO_RAD_PER_DEG)
+#define NOD_NS      INT64_C(500000000) /* there, and the same back */
+#define NOD_REST_NS INT64_C(700000000) /* before the next: not in step with a sway */
+#define NODS        3u
+
+static void found(struct gyro *b, int64_t t_ns)
+{
+    if (b->standing & GYRO_ENCODER_FAULT) return;
+    b->counters.encoder_faults++;
+    gyro_condition(b, GYRO_ENCODER_FAULT, true, t_ns);
+}
+
+/* ---- servoed ---- */
+
+/* Half a second of driving without the angle sensor moving: it is stuck, or the torquer is dead. */
+static void check_servo(struct gyro *b, int64_t t_ns)
+{
+    struct gyro_check *c = &b->check;
+    c->turned_rad += b->u_radps[1] * (1e-9 * b->profile.step_ns);
+    if ((int64_t)++c->steps * b->profile.step_ns < CHECK_NS) return;
+    const double moved_rad = gyro_wrap_rad(b->servo_rad - c->from_rad);
+    const bool dead = fabs(c->turned_rad) > b->profile.stuck_turn_deg * GYRO_RAD_PER_DEG &&
+                      fabs(moved_rad) < b->profile.stuck_moved_deg * GYRO_RAD_PER_DEG;
+    *c = (struct gyro_check){.from_rad = b->servo_rad};
+    if (!dead) return;
+    gyro_run_stop(b, GYRO_LEVEL);
+    found(b, t_ns);
+}
+
+/* ---- in navigation ---- */
+
+void gyro_check_begin(struct gyro *b, int64_t t_ns)
+{
+    b->check = (struct gyro_check){.from_rad = b->servo_rad};
+    b->watch = (struct gyro_watch){.from_rad = b->servo_rad,
+                                   .track_deg = b->set.track_deg,
+                                   .level_ns = t_ns,
+                                   .still_rad = b->servo_rad,
+                                   .still_ns = t_ns,
+                                   .told_deg = b->set.track_deg};
+    b->nod = (struct gyro_nod){.nods = 0};
+}
+
+static double told_rad(double to_deg, double from_deg)
+{
+    return gyro_wrap_rad((to_deg - from_deg) * GYRO_RAD_PER_DEG);
+}
+
+/* The torquer: what the sensor moved by, less the turn that was told, against what was asked; of a nod nothing is left. */
+static void check_torquer(struct gyro *b, int64_t t_ns)
+{
+    struct gyro_watch *w = &b->watch;
+    w->turned_rad += b->u_radps[1] * (1e-9 * b->profile.step_ns);
+    if (fabs(w->turned_rad) < BLOCK_RAD || b->nod.way != GYRO_NOD_NONE) return;
+    const double moved_rad = gyro_wrap_rad(b->servo_rad - w->from_rad - told_rad(b->set.track_deg, w->track_deg));
+    const bool against = fabs(moved_rad + w->turned_rad) < BLOCK_PART * fabs(w->turned_rad);
+    w->against = against ? w->against + 1 : 0;
+    w->turned_rad = 0.0;
+    w->from_rad = b->servo_rad;
+    w->track_deg = b->set.track_deg;
+    if (w->against >= BLOCKS_DEAD) found(b, t_ns);
+}
+
+/* The sensor: it stands still while the vehicle is told to have turned. */
+static void check_aided(struct gyro *b, int64_t t_ns)
+{
+    struct gyro_watch *w = &b->watch;
+    const bool moves = fabs(gyro_wrap_rad(b->servo_rad - w->still_rad)) > STILL_RAD;
+    if (moves || b->set.speed_mps < ALOFT_MPS) {
+        w->still_rad = b->servo_rad;
+        w->still_ns = t_ns;
+    }
+    if (t_ns - w->still_ns < LATE_NS) w->told_deg = b->set.track_deg;
+    const bool told = fabs(told_rad(b->set.track_deg, w->told_deg)) > TOLD_DEG * GYRO_RAD_PER_DEG;
+    if (!told) w->told_ns = t_ns;
+    else if (t_ns - w->told_ns >= AHEAD_NS) found(b, t_ns);
+}
+
+/* The horizon: as long off the level as a run would wait for it. */
+static void check_level(struct gyro *b, int64_t t_ns)
+{
+    const double tolerance_rad = b->set.tolerance_arcmin / 60.0 * GYRO_RAD_PER_DEG;
+    if (fabs(b->level.beta_rad) <= tolerance_rad) b->watch.level_ns = t_ns;
+    const double off_s = 1e-9 * (double)(t_ns - b->watch.level_ns);
+    if (off_s > b->set.settle_s + b->set.settle_limit_s) gyro_condition(b, GYRO_NOT_SETTLED, true, t_ns);
+}
+
+void gyro_check_step(struct gyro *b, int64_t t_ns)
+{
+    if (b->run.servoed) check_servo(b, t_ns);
+    if (b->run.mode != GYRO_NAVIGATE) return;
+    check_torquer(b, t_ns);
+    check_aided(b, t_ns);
+    check_level(b, t_ns);
+}
+
+/* ---- a nod ---- */
+
+const char *gyro_self_test(struct gyro *b, int64_t t_ns)
+{
+    const char *why = NULL;
+    if (b->run.mode != GYRO_NAVIGATE) why = "the self test is one of navigation: mode 6";
+    else if (b->nod.way != GYRO_NOD_NONE) why = "a self test is under way";
+    b->counters.refused += why != NULL;
+    if (why) return why;
+    b->nod = (struct gyro_nod){.way = GYRO_NOD_REST, .begun_ns = t_ns - NOD_REST_NS};
+    return NULL;
+}
+
+/* There and back: the vehicle's own turn, as far as it is steady, drops out. A sensor that neither follows nor stays is one on
+ * a vehicle that turns, or accelerates, and proves nothing. */
+static void judge(struct gyro *b, int64_t t_ns)
+{
+    struct gyro_nod *n = &b->nod;
+    const double back_rad = gyro_wrap_rad(b->servo_rad - n->from_rad);
+    const double nodded_rad = gyro_wrap_rad(n->top_rad - n->from_rad) - 0.5 * back_rad;
+    const double want_rad = 1e-9 * (double)n->there_ns * n->rate_radps;
+    const bool follows = fabs(nodded_rad - want_rad) < 0.5 * want_rad;
+    n->nods++;
+    n->stayed += fabs(nodded_rad) < 0.5 * want_rad && fabs(back_rad) < 0.5 * want_rad;
+    n->begun_ns = t_ns;
+    n->way = follows || n->nods == NODS ? GYRO_NOD_NONE : GYRO_NOD_REST;
+    if (n->way != GYRO_NOD_NONE) return;
+    n->result = follows ? GYRO_TEST_PASSED : n->stayed == NODS ? GYRO_TEST_FAILED : GYRO_TEST_UNCLEAR;
+    if (n->result == GYRO_TEST_FAILED) found(b, t_ns);
+}
+
+double gyro_nod_radps(struct gyro *b, int64_t t_ns)
+{
+    struct gyro_nod *n = &b->nod;
+    const int64_t age_ns = t_ns - n->begun_ns;
+    if (n->way == GYRO_NOD_REST && age_ns >= NOD_REST_NS) {
+        const double most_radps = 0.5 * b->profile.torquer_limit_dps * GYRO_RAD_PER_DEG;
+        n->way = GYRO_NOD_THERE;
+        n->begun_ns = t_ns;
+        n->from_rad = b->servo_rad;
+        n->rate_radps = fmin(NOD_RADPS, most_radps);
+    } else if (n->way == GYRO_NOD_THERE && age_ns >= NOD_NS) {
+        n->way = GYRO_NOD_BACK;
+        n->begun_ns = t_ns;
+        n->there_ns = age_ns;
+        n->top_rad = b->servo_rad;
+    } else if (n->way == GYRO_NOD_BACK && age_ns >= n->there_ns) {
+        judge(b, t_ns);
+    }
+    return n->way == GYRO_NOD_THERE ? n->rate_radps : n->way == GYRO_NOD_BACK ? -n->rate_radps : 0.0;
+}

@@ -1,0 +1,45 @@
+/* What is on a board, as lines, counters and faults see it. */
+#ifndef PSABENCH_BOARD_PART_H
+#define PSABENCH_BOARD_PART_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+struct board_line {
+    const char *name; /* article's, "Int" */
+    bool level;       /* before the first power-up and at rest */
+};
+
+struct board_counter {
+    const char *name;
+    size_t offset; /* of a uint32_t in the part */
+};
+
+/* What can be wrong with a chip: the sum of the faults that are active on it. */
+struct board_chip_fault {
+    bool drdy_stuck, drdy_level, dout_stuck, dout_level, lost_sync;
+    int32_t clock_ppm;
+};
+enum board_chip_fault_bit { /* which of them a part has; why not the others stands in board_part.unless */
+                            BOARD_FAULT_DRDY = 1,
+                            BOARD_FAULT_DOUT = 2,
+                            BOARD_FAULT_SYNC = 4,
+                            BOARD_FAULT_CLOCK = 8
+};
+
+/* A chip, or the controller (part 0, label "board"): its counters, and where faults of kinds chip.* go. */
+struct board_part {
+    const char *name;  /* of its fault point: "adc.x"; NULL: no faults */
+    const char *label; /* of its counters: "adc_x" */
+    size_t offset;     /* in the board's struct */
+    const struct board_counter *counters;
+    unsigned counter_count;
+    uint32_t faults;    /* enum board_chip_fault_bit */
+    const char *unless; /* why it has not the others, one sentence; or NULL */
+    unsigned registers; /* that can be flipped, from 0 */
+    void (*fault)(void *board, unsigned part, const struct board_chip_fault *f, int64_t t_ns);
+    bool (*flip)(void *board, unsigned part, unsigned reg, uint8_t mask, int64_t t_ns); /* false: without power */
+};
+
+#endif

@@ -1,0 +1,262 @@
+#include "board/pik/board.h"
+
+#include "board/digest.h"
+#include "board/life.h"
+#include "board/pik/can.h"
+#include "board/pik/pik.h"
+
+#include <stdio.h>
+
+/* ---- profile ---- */
+
+static void profile_default(void *profile)
+{
+    *(struct pik_profile *)profile = pik_profile_default();
+}
+
+static bool profile_check(const void *profile, char *why, size_t cap)
+{
+    return pik_profile_check(profile, why, cap);
+}
+
+static int64_t period_ns(const void *profile)
+{
+    return pik_profile_period_ns(profile);
+}
+
+static void about(const void *profile, char *out, size_t cap)
+{
+    const struct pik_profile *p = profile;
+    (void)snprintf(out, cap, "%.4g Hz/V, a pulse of %.4g mV s, at most %.4g kHz, TCLK %.4g us, latched every %.4g ms",
+                   pik_profile_k_hz_per_v(p), pik_profile_quantum_vs(p) * 1e3, pik_profile_limit_hz(p) * 1e-3,
+                   1e6 / p->clock_hz, p->latch_us * 1e-3);
+}
+
+/* The load alone stands before the integrator (article, figure 1). */
+static void set_load(struct board_cfg *cfg, double ohm)
+{
+    for (unsigned i = 0; i < BOARD_AXES; i++) {
+        cfg->afe[i].load_ohm = ohm;
+        cfg->afe[i].divider_ratio = 1.0;
+        cfg->afe[i].filter_hz = 0.0;
+    }
+}
+
+static void cfg_default(struct board_cfg *cfg)
+{
+    set_load(cfg, pik_profile_default().ra_ohm);
+}
+
+static void cfg_profiled(struct board_cfg *cfg, const void *profile)
+{
+    set_load(cfg, ((const struct pik_profile *)profile)->ra_ohm);
+}
+
+/* ---- what is on it ---- */
+
+#define OF(type, name, field)                                                                                          \
+    {                                                                                                                  \
+#name, offsetof(struct type, field)                                                                            \
+    }
+
+// clang-format off
+static const struct board_counter controller_counters[] = {
+    OF(pik_counters, readings, readings), OF(pik_counters, resets, resets), OF(pik_counters, strobes, strobes),
+    OF(pik_counters, cycles, cycles), OF(pik_counters, cycles_refused, cycles_refused),
+};
+static const struct board_counter converter_counters[] = {
+    OF(pik_channel, pulses_plus, plus), OF(pik_channel, pulses_minus, minus), OF(pik_channel, saturated, saturated_looks),
+    OF(pik_channel, opposed, opposed), OF(pik_channel, pulses_lost, lost),
+};
+// clang-format on
+#define COUNTERS(table) .counters = (table), .counter_count = sizeof(table) / sizeof *(table)
+
+enum { PART_CONTROLLER, PART_X, PART_Y, PART_Z, PART_CLOCK, PARTS };
+
+static void converter_fault(void *board, unsigned part, const struct board_chip_fault *f, int64_t t_ns)
+{
+    pik_stick(board, part - PART_X, f, t_ns);
+}
+
+static void clock_fault(void *board, unsigned part, const struct board_chip_fault *f, int64_t t_ns)
+{
+    (void)part;
+    pik_clock(board, f->clock_ppm, t_ns);
+}
+
+static bool flip(void *board, unsigned part, unsigned reg, uint8_t mask, int64_t t_ns)
+{
+    return pik_flip(board, part - PART_X, reg, mask, t_ns);
+}
+
+#define NO_CHIP "a channel has no data-ready pin, no synchronisation and no clock of its own; its pulses are its output"
+#define NO_PORT "the generator has one output, its clock"
+#define PART(axis, nr)                                                                                                 \
+    {                                                                                                                  \
+        .name = "conv." axis, .label = "conv_" axis,                                                                   \
+        .offset = offsetof(struct pik, channel) + (nr) * sizeof(struct pik_channel), COUNTERS(converter_counters),     \
+        .faults = BOARD_FAULT_DOUT, .unless = NO_CHIP, .registers = 4, .fault = converter_fault, .flip = flip          \
+    }
+
+static const struct board_part parts[PARTS] = {
+    [PART_CONTROLLER] = {.name = "controller",
+                         .label = "board",
+                         .offset = offsetof(struct pik, counters),
+                         COUNTERS(controller_counters)},
+    [PART_X] = PART("x", 0),
+    [PART_Y] = PART("y", 1),
+    [PART_Z] = PART("z", 2),
+    [PART_CLOCK] =
+        {.name = "clock", .label = "clock", .faults = BOARD_FAULT_CLOCK, .unless = NO_PORT, .fault = clock_fault},
+};
+
+static const char *const port_lines[] = {"FXP", "FXN", "FYP", "FYN", "FZP", "FZN", "LATCH", NULL};
+
+static enum board_cycle_result submit(void *board, struct board_cycle *c, int64_t t_ns)
+{
+    return pik_submit(board, c, t_ns);
+}
+
+BOARD_STROBE(pik);
+
+static const struct board_bus bus = {
+    .submit = submit, .addresses = PIK_REGISTERS, .name = pik_register_name, .strobe = strobe, .wanted = pik_wanted};
+
+/* ---- what faults are measured by ---- */
+
+/* One pulse in a second. */
+static double code_v(const void *board)
+{
+    return pik_profile_quantum_vs(&((const struct pik *)board)->profile);
+}
+
+static double range_v(const void *board)
+{
+    const struct pik_profile *p = &((const struct pik *)board)->profile;
+    return pik_profile_limit_hz(p) * pik_profile_quantum_vs(p);
+}
+
+/* ---- life ---- */
+
+BOARD_LIFE(pik);
+
+static bool ready(const void *board)
+{
+    const struct pik *b = board;
+    return b->on && (b->any || b->period_100us == 0);
+}
+
+static void wrong(void *board, uint32_t wrongs)
+{
+    ((struct pik *)board)->frozen = wrongs & BOARD_WRONG_FROZEN_WORDS;
+}
+
+static void listen(void *board, bool on)
+{
+    pik_listen(board, on);
+}
+
+static struct afe *afe(void *board, unsigned axis)
+{
+    return &((struct pik *)board)->channel[axis].afe;
+}
+
+static void truth(const void *board, board_truth_fn *put, void *ctx)
+{
+    const struct pik *b = board;
+    static const char *const plus[] = {"x_plus_hz_per_v", "y_plus_hz_per_v", "z_plus_hz_per_v"};
+    static const char *const minus[] = {"x_minus_hz_per_v", "y_minus_hz_per_v", "z_minus_hz_per_v"};
+    static const char *const tc[] = {"x_tc_ppm_per_k", "y_tc_ppm_per_k", "z_tc_ppm_per_k"};
+    static const char *const zero[] = {"x_zero_v", "y_zero_v", "z_zero_v"};
+    static const char *const zero_tc[] = {"x_zero_tc_v_per_k", "y_zero_tc_v_per_k", "z_zero_tc_v_per_k"};
+    static const char *const c_pct[] = {"x_c_pct", "y_c_pct", "z_c_pct"};
+    for (unsigned i = 0; i < PIK_AXES; i++) {
+        put(ctx, plus[i], pik_true_k_hz_per_v(b, i, 1, 25.0));
+        put(ctx, minus[i], pik_true_k_hz_per_v(b, i, -1, 25.0));
+        put(ctx, tc[i], b->specimen.ratio_tc[i] - b->specimen.uref_tc);
+        put(ctx, zero[i], b->specimen.zero_v[i]);
+        put(ctx, zero_tc[i], b->specimen.zero_tc[i]);
+        put(ctx, c_pct[i], b->specimen.c_pct[i]);
+    }
+    put(ctx, "uref_ppm", b->specimen.uref_ppm);
+    put(ctx, "clock_ppm", b->specimen.clock_ppm);
+}
+
+/* ---- digest ---- */
+
+static void add_channel(struct sha256 *s, const struct pik *b, unsigned i)
+{
+    const struct pik_channel *c = &b->channel[i];
+    const struct pik_axis *a = &c->axis;
+    board_digest_u64(s, (uint64_t)a->charge);
+    board_digest_u64(s, (uint64_t)a->begun_tick);
+    board_digest_u64(s, a->plus);
+    board_digest_u64(s, a->minus);
+    board_digest_u64(s, (uint64_t)a->drive.per_tick);
+    board_digest_u64(s, (uint64_t)a->saturated << 32 | a->opposed);
+    board_digest_u64(s, c->plus_from);
+    board_digest_u64(s, c->minus_from);
+    board_digest_real(s, c->due_vs);
+    board_digest_real(s, c->noise_v);
+    board_digest_real(s, c->afe.state_v);
+    board_digest_noise(s, &c->afe.noise);
+    board_digest_noise(s, &c->noise);
+}
+
+static void digest(const void *board, struct sha256 *s)
+{
+    const struct pik *b = board;
+    const struct pik_reading *r = &b->latched;
+    board_digest_u64(s, (uint64_t)b->on << 32 | (uint64_t)b->any << 1 | b->saturated);
+    board_digest_u64(s, (uint64_t)b->look_tick);
+    board_digest_u64(s, (uint64_t)b->fed_ns);
+    board_digest_u64(s, (uint64_t)b->counters.readings << 32 | b->counters.resets);
+    board_digest_u64(s, (uint64_t)b->counters.cycles << 32 | b->counters.cycles_refused);
+    board_digest_u64(s, (uint64_t)r->seq << 32 | r->status);
+    board_digest_u64(s, (uint64_t)b->period_100us << 1 | (b->cycle != NULL));
+    for (unsigned i = 0; i < PIK_AXES; i++) board_digest_u64(s, (uint64_t)r->total[i]);
+    for (unsigned i = 0; i < PIK_AXES; i++) add_channel(s, b, i);
+}
+
+const struct board_type pik_board = {
+    .name = "pik",
+    .title = "PIK",
+    .size = sizeof(struct pik),
+    .profile_size = sizeof(struct pik_profile),
+    .fields = pik_fields,
+    .field_count = PIK_FIELDS,
+    .profile_name = "pik",
+    .profile_default = profile_default,
+    .profile_check = profile_check,
+    .about = about,
+    .cfg_default = cfg_default,
+    .cfg_profiled = cfg_profiled,
+    .node = 8,
+    .period_ns = period_ns,
+    .lines = pik_lines,
+    .line_count = PIK_LINES,
+    .port_lines = port_lines,
+    .frame_line = PIK_LINE_LATCH,
+    .events = pik_events,
+    .event_count = PIK_EVENTS,
+    .code_v = code_v,
+    .range_v = range_v,
+    .parts = parts,
+    .part_count = PARTS,
+    .wrongs = BOARD_WRONG_FROZEN_WORDS,
+    .can = &pik_can_side,
+    .bus = &bus,
+    .init = init,
+    .power_up = power_up,
+    .power_down = power_down,
+    .reset = reset,
+    .ready = ready,
+    .sample_until = sample_until,
+    .wrong = wrong,
+    .listen = listen,
+    .trace = trace,
+    .line = line,
+    .afe = afe,
+    .digest = digest,
+    .truth = truth,
+};

@@ -1,0 +1,124 @@
+#include "board/pik/can.h"
+
+#include "base/bits.h"
+#include "board/pik/board.h"
+#include "board/pik/pik.h"
+#include "gen/pik_od.h"
+
+#include <string.h>
+
+enum { SOURCE_CONVERTER = 1, REG_DEVICE = 0x81, NS_PER_US = 1000 };
+enum { SATURATED = PIK_ST_SATURATED_X | PIK_ST_SATURATED_Y | PIK_ST_SATURATED_Z };
+
+static const struct pik *pik_of(const struct board_node *n)
+{
+    return n->board;
+}
+
+/* ---- objects ---- */
+
+static uint32_t read_totals(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
+{
+    (void)t_ns;
+    v->number = pik_of(n)->latched.total[e->sub - 1];
+    return CO_OK;
+}
+
+static uint32_t read_increments(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
+{
+    (void)t_ns;
+    v->number = (int16_t)pik_of(n)->latched.increment[e->sub - 1];
+    return CO_OK;
+}
+
+static uint32_t read_reading(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
+{
+    const struct pik_reading *r = &pik_of(n)->latched;
+    const uint32_t value[] = {0,         r->seq,          (uint32_t)(r->t_ns / NS_PER_US),
+                              r->status, (uint8_t)r->seq, r->status & SATURATED};
+    (void)t_ns;
+    v->number = value[e->sub];
+    return CO_OK;
+}
+
+static uint32_t read_plate(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
+{
+    const struct pik_profile *p = &pik_of(n)->profile;
+    const double value[] = {0.0, 0.0, pik_profile_k_hz_per_v(p) * 1e3, pik_profile_limit_hz(p), p->k_error_pct * 1e2};
+    (void)t_ns;
+    v->number = (double)(uint32_t)(value[e->sub] + 0.5);
+    if (e->sub != 1) return CO_OK;
+    v->len = (uint16_t)strlen(p->name);
+    memcpy(v->text, p->name, (size_t)v->len + 1);
+    return CO_OK;
+}
+
+static const struct board_object objects[] = {
+    {PIK_OD_TOTALS, read_totals, NULL},
+    {PIK_OD_INCREMENTS, read_increments, NULL},
+    {PIK_OD_READING, read_reading, NULL},
+    {PIK_OD_PLATE, read_plate, NULL},
+};
+
+/* ---- what the board tells ---- */
+
+static void put16(uint8_t *at, unsigned v)
+{
+    at[0] = (uint8_t)v;
+    at[1] = (uint8_t)(v >> 8);
+}
+
+static void put32(uint8_t *at, uint32_t v)
+{
+    put16(at, v & 0xFFFF);
+    put16(at + 2, v >> 16);
+}
+
+static void on_reading(void *ctx, const struct pik_reading *r, int64_t t_ns)
+{
+    struct can_msg m[PIK_TPDOS] = {{.len = 8}, {.len = 8}, {.len = 8}};
+    for (unsigned i = 0; i < PIK_AXES; i++) put16(m[0].data + 2 * i, (uint16_t)r->increment[i]);
+    m[0].data[6] = (uint8_t)r->seq;
+    m[0].data[7] = r->status & SATURATED;
+    put32(m[1].data, (uint32_t)r->total[0]);
+    put32(m[1].data + 4, (uint32_t)r->total[1]);
+    put32(m[2].data, (uint32_t)r->total[2]);
+    put32(m[2].data + 4, (uint32_t)(r->t_ns / NS_PER_US));
+    board_node_stream(ctx, PIK_COUNTS_TPDO, m, PIK_TPDOS, t_ns);
+}
+
+static void on_saturated(void *ctx, bool on, int64_t t_ns)
+{
+    struct co_node *n = board_node_co(ctx);
+    if (on) co_node_error(n, PIK_EMCY_SATURATED, REG_DEVICE, SOURCE_CONVERTER, t_ns);
+    else co_node_error_end(n, PIK_EMCY_SATURATED, t_ns);
+}
+
+static uint32_t serial(const void *board)
+{
+    return ((const struct pik *)board)->cfg.serial;
+}
+
+static int64_t period_ns(const void *board)
+{
+    return pik_period_ns(board);
+}
+
+static const struct board_node_type type = {.board = &pik_board,
+                                            .device = &pik_device,
+                                            .objects = objects,
+                                            .object_count = sizeof objects / sizeof *objects,
+                                            .serial = serial,
+                                            .period_ns = period_ns};
+
+static void init(void *can, const struct board_can_cfg *cfg, void *board, struct can_bus *bus, struct sched *s)
+{
+    board_node_init(can, &type, cfg, board, bus, s);
+    pik_attach(board, &(struct pik_host){.ctx = can, .reading = on_reading, .saturated = on_saturated});
+}
+
+const struct board_can pik_can_side = {.size = sizeof(struct pik_can),
+                                       .init = init,
+                                       .power_up = board_node_power_up,
+                                       .power_down = board_node_power_down,
+                                       .node = board_node_co};

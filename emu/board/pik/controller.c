@@ -1,0 +1,341 @@
+#include "board/pik/pik.h"
+
+#include "board/bus_lines.h"
+#include "board/pik/internal.h"
+
+#include <math.h>
+#include <string.h>
+
+#define WARM_NS      INT64_C(10000000)   /* between looks at the temperature, rounded up to looks at the inputs */
+#define GAUSS        0.28867513459481287 /* of the two points from the middle, sqrt(1/12) */
+#define PIECE_PULSES 0.02
+#define PIECES_MAX   8
+#define BOARD_SENSOR 3u /* temperature channel of the board itself */
+
+const struct board_line pik_lines[PIK_LINES] = {
+    [PIK_LINE_CLK] = {"CLK", false}, [PIK_LINE_LATCH] = {"LATCH", true}, [PIK_LINE_CS] = {"CS", true},
+    [PIK_LINE_RW] = {"RW", true},    [PIK_LINE_FXP] = {"FXP", false},    [PIK_LINE_FXN] = {"FXN", false},
+    [PIK_LINE_FYP] = {"FYP", false}, [PIK_LINE_FYN] = {"FYN", false},    [PIK_LINE_FZP] = {"FZP", false},
+    [PIK_LINE_FZN] = {"FZN", false}, BUS_LINES_AB(PIK_LINE_AB0),         BUS_LINES_D(PIK_LINE_D0),
+};
+const char *const pik_events[PIK_EVENTS] = {
+    [PIK_EV_RES] = "RES",
+    [PIK_EV_LATCH] = "LATCH",
+    [PIK_EV_FX] = "FX",
+    [PIK_EV_FY] = "FY",
+    [PIK_EV_FZ] = "FZ",
+    [PIK_EV_SATURATED] = "SATURATED",
+    [PIK_EV_POWER_DOWN] = "POWER_DOWN",
+    [PIK_EV_POWER_UP] = "POWER_UP",
+};
+
+/* ---- time ---- */
+
+int64_t pik_tick_at(const struct pik *b, int64_t t_ns)
+{
+    return b->first_tick + clk_count_at(&b->clk, t_ns + 1) - 1;
+}
+
+int64_t pik_tick_ns(const struct pik *b, int64_t tick)
+{
+    return clk_edge_ns(&b->clk, tick - b->first_tick);
+}
+
+static void set_clock(struct pik *b, int64_t tick, int64_t t_ns)
+{
+    b->clk = (struct clk){.t0_ns = t_ns, .hz = pik_tick_hz(b), .div = 1000};
+    b->first_tick = tick;
+}
+
+/* ---- inputs ---- */
+
+/* Integral from where it stands: Gauss with two points, exact for a cubic, a look at most at a time. Both points lie within, so
+ * that a step at either end is on its right side. */
+static void integrate(struct pik *b, unsigned i, int64_t t_ns)
+{
+    struct pik_channel *c = &b->channel[i];
+    const double span_ns = (double)(t_ns - b->fed_ns);
+    const int64_t within_ns = (int64_t)(span_ns * (0.5 - GAUSS));
+    const int64_t node_ns[2] = {b->fed_ns + within_ns, t_ns - 1 - within_ns};
+    double v[2];
+    for (unsigned n = 0; n < 2; n++) {
+        const double signal = b->io.accel(b->io.ctx, i, node_ns[n]);
+        v[n] = afe_out_v(&c->afe, signal, b->degc, node_ns[n]);
+    }
+    c->due_vs += 0.5 * (v[0] + v[1]) * span_ns * 1e-9;
+    c->slope_v_per_s = (v[1] - v[0]) / (2.0 * GAUSS * 1e-9 * span_ns);
+}
+
+/* What is beyond twice the strongest reference moves the integrator to its rail as well; charges stay within 64 bits. */
+static double limited_v(const struct pik *b, double v)
+{
+    const double limit_v = 2.0 * b->profile.clock_hz / b->k_hz_per_v;
+    return v > limit_v ? limit_v : v < -limit_v ? -limit_v : v;
+}
+
+static int64_t rounded(double x)
+{
+    return (int64_t)floor(x + 0.5);
+}
+
+static struct pik_drive driven(const struct pik_channel *c, double v)
+{
+    struct pik_drive d = c->drive;
+    d.per_tick = rounded(v * c->per_volt);
+    if (!(c->lost_per_volt > 0.0)) return d;
+    const int64_t lost = rounded(v * c->lost_per_volt), least = PIK_PULSE / 256;
+    d.plus = d.plus + lost > least ? d.plus + lost : least;
+    d.minus = d.minus - lost > least ? d.minus - lost : least;
+    return d;
+}
+
+/* ---- converters ---- */
+
+uint64_t pik_count_plus(const struct pik_channel *c)
+{
+    return c->plus_from + (c->stuck ? 0 : c->axis.plus);
+}
+
+uint64_t pik_count_minus(const struct pik_channel *c)
+{
+    return c->minus_from + (c->stuck ? 0 : c->axis.minus);
+}
+
+/* Up to and including tick with the drive it has; a pulse is told at t_ns, when it is known, and shown where it was. */
+static void pulses(struct pik *b, unsigned i, int64_t tick, int64_t t_ns)
+{
+    struct pik_axis *a = &b->channel[i].axis;
+    const bool watched = trace_watched(&b->trace, PIK_PULSE_LINES), each = b->heard || watched;
+    for (int64_t next; each && (next = pik_axis_next(a)) <= tick;) {
+        pik_axis_advance(a, next);
+        const int64_t begun_ns = pik_tick_ns(b, next);
+        if (watched) pik_lines_pulse(b, i, begun_ns);
+        if (begun_ns >= b->heard_ns) pik_tell(b, (enum pik_event)(PIK_EV_FX + i), t_ns);
+    }
+    pik_axis_advance(a, tick);
+}
+
+/* Into so many pieces of one mean each that the charge is nowhere off by PIECE_PULSES within them. */
+static int64_t pieces(const struct pik *b, const struct pik_channel *c, double span_s)
+{
+    const double bend = fabs(c->slope_v_per_s) * span_s * span_s * b->k_hz_per_v / 8.0;
+    int64_t n = 1;
+    while (n < PIECES_MAX && bend > PIECE_PULSES * (double)(n * n)) n *= 2;
+    return n;
+}
+
+/* The ticks up to `tick` get all the charge that is due, as the slope has it. */
+static void convert(struct pik *b, unsigned i, int64_t tick, int64_t t_ns)
+{
+    struct pik_channel *c = &b->channel[i];
+    const int64_t from = c->axis.tick, ticks = tick - from;
+    if (ticks <= 0) return;
+    const double tick_s = 1000.0 / (double)b->clk.hz;
+    const double mean_v = c->due_vs / ((double)ticks * tick_s) + c->zero_v + c->noise_v;
+    const int64_t n = pieces(b, c, (double)ticks * tick_s);
+    for (int64_t k = 1; k <= n; k++) {
+        const int64_t begin = c->axis.tick, end = from + ticks * k / n;
+        const double off_ticks = 0.5 * (double)(begin + end - from - tick);
+        c->axis.drive = driven(c, limited_v(b, mean_v + c->slope_v_per_s * off_ticks * tick_s));
+        pulses(b, i, end, t_ns);
+    }
+    c->due_vs = 0.0;
+}
+
+/* The order of channels at one instant is that of their numbers, as everywhere. */
+void pik_sample_until(struct pik *b, int64_t t_ns)
+{
+    if (!b->on) return;
+    const int64_t tick = pik_tick_at(b, t_ns);
+    for (unsigned i = 0; i < PIK_AXES; i++) {
+        if (t_ns > b->fed_ns) integrate(b, i, t_ns);
+        convert(b, i, tick, t_ns);
+    }
+    b->fed_ns = t_ns;
+}
+
+/* ---- looks ---- */
+
+static void keep_counters(struct pik_channel *c)
+{
+    c->plus = (uint32_t)c->axis.plus;
+    c->minus = (uint32_t)c->axis.minus;
+    c->saturated_looks = c->axis.saturated;
+    c->opposed = c->axis.opposed;
+    c->lost = (uint32_t)(c->axis.lost / PIK_PULSE);
+}
+
+/* Whether it could not keep up since the last look. */
+static bool keep_up(struct pik_channel *c)
+{
+    const uint32_t before = c->axis.saturated;
+    pik_axis_look(&c->axis, c->axis.tick, &c->axis.drive);
+    keep_counters(c);
+    const bool saturated = c->axis.saturated != before;
+    c->saturated |= saturated;
+    return saturated;
+}
+
+static void tell_saturation(struct pik *b, bool now, int64_t t_ns)
+{
+    if (now) b->saturated_ns = t_ns;
+    if (now == b->saturated) return;
+    if (!now && (double)(t_ns - b->saturated_ns) < b->profile.saturated_ms * 1e6) return;
+    b->saturated = now;
+    if (now) pik_tell(b, PIK_EV_SATURATED, t_ns);
+    if (b->host.saturated) b->host.saturated(b->host.ctx, now, t_ns);
+}
+
+/* By the pace, whoever listens: what the converters come to depends on nobody. Noise is a value for each stretch between two. */
+static void look(void *ctx, int64_t t_ns)
+{
+    struct pik *b = ctx;
+    const int64_t pace = b->profile.look_ticks;
+    bool saturated = false;
+    pik_sample_until(b, t_ns);
+    for (unsigned i = 0; i < PIK_AXES; i++) saturated |= keep_up(&b->channel[i]);
+    if (t_ns >= b->warm_ns) {
+        pik_warm(b, b->io.temp_degc(b->io.ctx, BOARD_SENSOR, t_ns));
+        b->warm_ns = t_ns + WARM_NS;
+    }
+    for (unsigned i = 0; b->noise_v > 0.0 && i < PIK_AXES; i++)
+        b->channel[i].noise_v = b->noise_v * rng_gauss(&b->channel[i].noise);
+    tell_saturation(b, saturated, t_ns);
+    b->look_tick += pace;
+    sched_at(b->sched, &b->look, pik_tick_ns(b, b->look_tick));
+}
+
+/* ---- life ---- */
+
+static void init_channel(struct pik *b, unsigned i)
+{
+    static const char *const afe_noise[PIK_AXES] = {"afe.x", "afe.y", "afe.z"};
+    static const char *const noise[PIK_AXES] = {"pik.x", "pik.y", "pik.z"};
+    struct pik_channel *c = &b->channel[i];
+    afe_init(&c->afe, &b->cfg.afe[i], rng_stream(b->cfg.seed, b->cfg.serial, afe_noise[i]));
+    c->noise = rng_stream(b->cfg.seed, b->cfg.serial, noise[i]);
+}
+
+void pik_init(struct pik *b, const struct pik_profile *p, const struct board_cfg *cfg, const struct board_io *io,
+              struct sched *s)
+{
+    memset(b, 0, sizeof *b);
+    b->profile = *p;
+    b->cfg = *cfg;
+    b->io = *io;
+    b->sched = s;
+    b->specimen = pik_specimen_draw(p, cfg->seed, cfg->serial);
+    set_clock(b, 0, 0);
+    pik_warm(b, 25.0);
+    for (unsigned i = 0; i < PIK_AXES; i++) init_channel(b, i);
+    sched_ev(&b->look, look, b);
+    pik_lines_init(b);
+    pik_latch_init(b);
+    pik_bus_init(b);
+}
+
+void pik_attach(struct pik *b, const struct pik_host *host)
+{
+    b->host = *host;
+}
+
+void pik_power_up(struct pik *b, int64_t t_ns)
+{
+    if (b->on) return;
+    b->on = true;
+    set_clock(b, 0, t_ns);
+    for (unsigned i = 0; i < PIK_AXES; i++) {
+        struct pik_channel *c = &b->channel[i];
+        const struct pik_axis was = c->axis;
+        c->axis = pik_axis_at(0, &c->drive);
+        c->axis.plus = was.plus; /* counters of the bench outlive the power */
+        c->axis.minus = was.minus;
+        c->axis.saturated = was.saturated;
+        c->axis.opposed = was.opposed;
+        c->axis.lost = was.lost;
+        c->due_vs = c->slope_v_per_s = c->noise_v = 0.0;
+        c->shown_tick = -1;
+    }
+    b->look_tick = 0;
+    b->fed_ns = b->warm_ns = t_ns;
+    b->clk_shown_tick = 0;
+    pik_lines_rest(b, true, t_ns);
+    pik_tell(b, PIK_EV_POWER_UP, t_ns);
+    sched_at(b->sched, &b->look, t_ns);
+    pik_latch_restart(b, t_ns);
+}
+
+void pik_power_down(struct pik *b, int64_t t_ns)
+{
+    if (!b->on) return;
+    pik_sample_until(b, t_ns);
+    for (unsigned i = 0; i < PIK_AXES; i++) keep_counters(&b->channel[i]);
+    pik_lines_clock(b, t_ns);
+    b->on = false;
+    b->any = b->saturated = false;
+    sched_cancel(b->sched, &b->look);
+    sched_cancel(b->sched, &b->latch);
+    sched_cancel(b->sched, &b->latch_end);
+    pik_bus_cut(b, t_ns);
+    pik_lines_rest(b, false, t_ns);
+    pik_tell(b, PIK_EV_POWER_DOWN, t_ns);
+}
+
+void pik_reset(struct pik *b, int64_t t_ns)
+{
+    if (!b->on) return;
+    b->counters.resets++;
+    pik_sample_until(b, t_ns);
+    pik_bus_cut(b, t_ns);
+    pik_tell(b, PIK_EV_RES, t_ns);
+    pik_latch_restart(b, t_ns);
+}
+
+void pik_listen(struct pik *b, bool on)
+{
+    if (on && !b->heard) b->heard_ns = b->sched->now_ns; /* what was before is told to nobody */
+    b->heard = on;
+}
+
+/* ---- faults ---- */
+
+void pik_clock(struct pik *b, int32_t ppm, int64_t t_ns)
+{
+    if (ppm == b->clock_fault_ppm) return;
+    if (!b->on) {
+        b->clock_fault_ppm = ppm;
+        pik_warm(b, b->degc);
+        return;
+    }
+    const int64_t tick = pik_tick_at(b, t_ns);
+    pik_sample_until(b, t_ns);
+    pik_lines_clock(b, t_ns);
+    const int64_t tick_ns = pik_tick_ns(b, tick);
+    b->clock_fault_ppm = ppm;
+    set_clock(b, tick, tick_ns);
+    pik_warm(b, b->degc);
+    sched_at(b->sched, &b->look, pik_tick_ns(b, b->look_tick));
+}
+
+void pik_stick(struct pik *b, unsigned axis, const struct board_chip_fault *f, int64_t t_ns)
+{
+    struct pik_channel *c = &b->channel[axis];
+    pik_sample_until(b, t_ns);
+    const uint64_t plus = pik_count_plus(c), minus = pik_count_minus(c);
+    c->stuck = f->dout_stuck;
+    c->stuck_level = f->dout_level;
+    c->plus_from = plus - (c->stuck ? 0 : c->axis.plus);
+    c->minus_from = minus - (c->stuck ? 0 : c->axis.minus);
+    pik_lines_stuck(b, axis, t_ns);
+}
+
+bool pik_flip(struct pik *b, unsigned axis, unsigned reg, uint8_t mask, int64_t t_ns)
+{
+    struct pik_channel *c = &b->channel[axis];
+    if (!b->on) return false;
+    pik_sample_until(b, t_ns);
+    const uint64_t bits = (uint64_t)mask << (8 * (reg & 1));
+    const uint64_t was = reg < 2 ? pik_count_plus(c) : pik_count_minus(c);
+    *(reg < 2 ? &c->plus_from : &c->minus_from) += (was ^ bits) - was;
+    return true;
+}

@@ -1,0 +1,183 @@
+#include "board/pik/profile.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+
+#define OFF(member) offsetof(struct pik_profile, member)
+#define ROW(name, kind, lo, hi, words)                                                                                 \
+    {                                                                                                                  \
+        .key = #name, .type = BOARD_FIELD_##kind, .offset = OFF(name), .min = (lo), .max = (hi), .what = (words)       \
+    }
+
+// clang-format off
+const struct board_field pik_fields[PIK_FIELDS] = {
+    ROW(name, STRING, 1, 31, "Name of the profile."),
+    ROW(uref_v, REAL, 0.1, 100, "UREF, either sign: what the reset applies. E0 (10 V is PMKA's)."),
+    ROW(rr_ohm, REAL, 10, 1e8, "Rr, from UREF to the integrator. E0."),
+    ROW(rin_ohm, REAL, 10, 1e8, "RIN, from the input to the integrator. E0."),
+    ROW(clock_hz, UINT, 100, 1000000, "1/TCLK: a reset lasts one period. E0, K = Rr/(RIN UREF TCLK) is the article's."),
+    ROW(grid, UINT, 1, 64, "Instants in TCLK at which a reset may begin: the control unit's faster clock. E0."),
+    ROW(recovery_ticks, UINT, 0, 1024, "Rest of a reference after its reset, in TCLK/grid: 15 of 16 allow 3 % more than F at 10 V. E0."),
+    ROW(switch_on_ns, REAL, 0, 1e6, "By which the reference comes late. E0."),
+    ROW(switch_off_ns, REAL, 0, 1e6, "By which it goes late; only the difference enters the charge. E0."),
+    ROW(input_off_ns, REAL, 0, 1e6, "For which a reset takes the input off; the article's does not. E0."),
+    ROW(c_int_nf, REAL, 0.01, 1e5, "Capacitor of the integrator; no count depends on it. E0."),
+    ROW(uc_v, REAL, 0.01, 100, "Uc, either sign: where a reset begins. E0."),
+    ROW(rail_v, REAL, 0.1, 200, "At which the integrator's output stays, either sign. E0."),
+    ROW(ra_ohm, REAL, 1, 1e6, "Ra, load of a sensor with current output, if the scenario gives none: 0.94 and 0.98 V/g of 1.28 mA/g. E0."),
+    ROW(look_ticks, UINT, 1, 100000, "TCLK/grid between two looks of the model at its input. E0."),
+    ROW(latch_us, UINT, 0, 1000000, "Period at which the counters are latched and sent; 0: only by strobe. E0."),
+    ROW(strobe_ns, UINT, 20, 1000000, "Length of a bus cycle's strobe, if the host gives none. E0."),
+    ROW(strobe_min_ns, UINT, 0, 1000000, "Shortest strobe that reads or writes. E0."),
+    ROW(latch_ns, UINT, 1, 1000000, "Length of the pulse on LATCH. E0."),
+    ROW(k_error_pct, REAL, 0, 10, "Error of the coefficient that a specimen keeps from -10 to 60 degC; 0: no limit. E1, range E0."),
+    ROW(uref_tol_ppm, REAL, 0, 1e5, "Standard deviation of UREF. E0."),
+    ROW(uref_tc_ppm_per_k, REAL, 0, 1e4, "Standard deviation of its temperature coefficient. E0."),
+    ROW(ratio_tol_ppm, REAL, 0, 1e5, "Standard deviation of Rr/RIN. E0."),
+    ROW(ratio_tc_ppm_per_k, REAL, 0, 1e4, "Standard deviation of its temperature coefficient. E0."),
+    ROW(asymmetry_ppm, REAL, 0, 1e5, "Standard deviation of half the difference of the two signs. E0."),
+    ROW(clock_tol_ppm, REAL, 0, 1000, "Standard deviation of the crystal. E0."),
+    ROW(c_tol_pct, REAL, 0, 20, "Standard deviation of the capacitor. E0."),
+    ROW(c_tc_ppm_per_k, REAL, 0, 1e4, "Temperature coefficient of the capacitor. E0."),
+    ROW(zero_v, REAL, 0, 1, "Standard deviation of the zero drift, at the input. E0."),
+    ROW(zero_tc_v_per_k, REAL, 0, 0.01, "Standard deviation of its temperature coefficient. E0."),
+    ROW(noise_v_rthz, REAL, 0, 1, "White noise of the integrator, at the input, one-sided. E0."),
+    ROW(saturated_ms, REAL, 0, 1e5, "Without saturation: its flag and EMCY end. E0."),
+};
+// clang-format on
+
+struct pik_profile pik_profile_default(void)
+{
+    return (struct pik_profile){
+        .name = "pik",
+        .uref_v = 10.0,
+        .rr_ohm = 10e3,
+        .rin_ohm = 20e3,
+        .clock_hz = 3480,
+        .grid = 16,
+        .recovery_ticks = 15,
+        .c_int_nf = 56.0,
+        .uc_v = 3.75,
+        .rail_v = 12.0,
+        .ra_ohm = 735.0,
+        .look_ticks = 10,
+        .latch_us = 10000,
+        .strobe_ns = 1000,
+        .strobe_min_ns = 200,
+        .latch_ns = 10000,
+        .k_error_pct = 0.15,
+        .uref_tol_ppm = 300.0,
+        .uref_tc_ppm_per_k = 6.0,
+        .ratio_tol_ppm = 250.0,
+        .ratio_tc_ppm_per_k = 5.0,
+        .asymmetry_ppm = 60.0,
+        .clock_tol_ppm = 20.0,
+        .c_tol_pct = 3.0,
+        .c_tc_ppm_per_k = 100.0,
+        .zero_v = 200e-6,
+        .zero_tc_v_per_k = 5e-6,
+        .noise_v_rthz = 5e-6,
+        .saturated_ms = 100.0,
+    };
+}
+
+double pik_profile_k_hz_per_v(const struct pik_profile *p)
+{
+    return p->rr_ohm / (p->rin_ohm * p->uref_v) * p->clock_hz;
+}
+
+double pik_profile_quantum_vs(const struct pik_profile *p)
+{
+    return 1.0 / pik_profile_k_hz_per_v(p);
+}
+
+double pik_profile_limit_hz(const struct pik_profile *p)
+{
+    return (double)p->clock_hz * p->grid / (p->grid + p->recovery_ticks);
+}
+
+double pik_profile_step_v(const struct pik_profile *p)
+{
+    return p->uref_v / (p->rr_ohm * p->c_int_nf * 1e-9 * p->clock_hz);
+}
+
+double pik_profile_threshold(const struct pik_profile *p)
+{
+    return p->uc_v / pik_profile_step_v(p);
+}
+
+int64_t pik_profile_period_ns(const struct pik_profile *p)
+{
+    return (int64_t)p->latch_us * 1000;
+}
+
+/* Writes the sentence and is false, so that a check reads `return no(...)`. */
+static bool no(char *why, size_t cap, const char *format, ...) __attribute__((format(printf, 3, 4)));
+static bool no(char *why, size_t cap, const char *format, ...)
+{
+    va_list args;
+    va_start(args, format);
+    if (cap > 0) (void)vsnprintf(why, cap, format, args);
+    va_end(args);
+    return false;
+}
+
+/* Below half a pulse a reset ends beyond the other threshold and calls for the opposite one, for ever. */
+static bool check_integrator(const struct pik_profile *p, char *why, size_t cap)
+{
+    const double step_v = pik_profile_step_v(p);
+    if (p->uc_v < 0.505 * step_v)
+        return no(why, cap,
+                  "uc_v = %g: a reset moves the integrator by %.3f V, so that Uc below %.3f V would call for the "
+                  "opposite reset at once",
+                  p->uc_v, step_v, 0.505 * step_v);
+    if (p->rail_v < p->uc_v + 1.05 * step_v)
+        return no(why, cap, "rail_v = %g: less than Uc = %g V and a step of %.3f V: saturation would not be noticed",
+                  p->rail_v, p->uc_v, step_v);
+    if (p->rail_v > 16.0 * step_v) return no(why, cap, "rail_v = %g: more than 16 steps of %.3f V", p->rail_v, step_v);
+    return true;
+}
+
+static bool check_time(const struct pik_profile *p, char *why, size_t cap)
+{
+    const double tclk_ns = 1e9 / p->clock_hz;
+    if ((double)p->clock_hz * p->grid > 990e3)
+        return no(why, cap, "grid = %u: %u instants in each of %u periods a second are more than 990000 a second",
+                  p->grid, p->grid, p->clock_hz);
+    if (p->clock_hz * p->grid > PIK_LOOKS_HZ_MAX * (double)p->look_ticks)
+        return no(why, cap, "look_ticks = %u: more than %u looks a second at the input", p->look_ticks,
+                  PIK_LOOKS_HZ_MAX);
+    if ((p->look_ticks - 1) * tclk_ns / p->grid > PIK_LATE_NS_MAX)
+        return no(why, cap, "look_ticks = %u: a pulse would be known %.0f us late, more than %.0f us", p->look_ticks,
+                  (p->look_ticks - 1) * tclk_ns / p->grid * 1e-3, PIK_LATE_NS_MAX * 1e-3);
+    if (p->switch_on_ns >= tclk_ns)
+        return no(why, cap, "switch_on_ns = %g: longer than the reset, %.0f ns", p->switch_on_ns, tclk_ns);
+    if (p->switch_off_ns >= tclk_ns)
+        return no(why, cap, "switch_off_ns = %g: longer than the reset, %.0f ns", p->switch_off_ns, tclk_ns);
+    if (p->input_off_ns > tclk_ns)
+        return no(why, cap, "input_off_ns = %g: longer than the reset, %.0f ns", p->input_off_ns, tclk_ns);
+    return true;
+}
+
+/* An increment has 16 bits, and a period longer than what it takes in them would wrap unseen. */
+static bool check_reading(const struct pik_profile *p, char *why, size_t cap)
+{
+    if (p->latch_us > 0 && p->latch_us < 200) return no(why, cap, "latch_us = %u: below 200 us", p->latch_us);
+    if (p->latch_us * 1e-6 * pik_profile_limit_hz(p) > 32767.0)
+        return no(why, cap, "latch_us = %u: up to %.0f pulses would not fit into 16 bits", p->latch_us,
+                  p->latch_us * 1e-6 * pik_profile_limit_hz(p));
+    if (p->latch_us > 0 && p->latch_ns >= p->latch_us * 1000.0)
+        return no(why, cap, "latch_ns = %u: no shorter than the period", p->latch_ns);
+    if (p->strobe_ns < p->strobe_min_ns)
+        return no(why, cap, "strobe_ns = %u: shorter than strobe_min_ns = %u", p->strobe_ns, p->strobe_min_ns);
+    return true;
+}
+
+bool pik_profile_check(const struct pik_profile *p, char *why, size_t cap)
+{
+    const double k = pik_profile_k_hz_per_v(p);
+    if (!board_field_check(pik_fields, PIK_FIELDS, p, why, cap)) return false;
+    if (k > 20e3 || k < 1.0)
+        return no(why, cap, "rr_ohm = %g: K = Rr/(RIN UREF TCLK) = %g Hz/V is not within 1..20000", p->rr_ohm, k);
+    return check_integrator(p, why, cap) && check_time(p, why, cap) && check_reading(p, why, cap);
+}

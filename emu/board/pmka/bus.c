@@ -1,0 +1,249 @@
+/* Parallel bus of a PMKA: 16 addresses, one cycle at a time (docs/boards/pmka.md; ours, E0). */
+#include "board/bus_lines.h"
+#include "board/pmka/internal.h"
+
+#include <stddef.h>
+#include <stdio.h>
+
+#define INDEX_ROM 0x100u /* of the ROM's first word; below: numbers of resets */
+#define BEAT_MAX  60000u
+
+enum { STATUS_FRESH = 1, STATUS_OVERRUN = 2, STATUS_SATURATED = 4, STATUS_CLIPPED = 8, STATUS_AUTONOMOUS = 16 };
+
+/* ---- reading ---- */
+
+static uint16_t read_code(struct pmka *b, unsigned address)
+{
+    if (address == PMKA_K) b->bus.fresh = false; /* the last of them */
+    return (uint16_t)b->latest.code[address];
+}
+
+/* Two bits an integrator: 1 positive, 3 negative. */
+static uint16_t read_resets(struct pmka *b, unsigned address)
+{
+    unsigned word = 0;
+    (void)address;
+    for (unsigned i = 0; i < PMKA_INTS; i++) word |= ((unsigned)b->latest.reset[i] & 3u) << (2 * i);
+    return (uint16_t)word;
+}
+
+static uint16_t read_rotation(struct pmka *b, unsigned address)
+{
+    const struct pmka_reading *r = &b->latest;
+    unsigned word = (unsigned)r->tau << 8 | (unsigned)r->cal << 12;
+    (void)address;
+    for (unsigned i = 0; i < PMKA_INTS; i++) word |= (unsigned)r->serves[i] << (2 * i);
+    return (uint16_t)word;
+}
+
+static uint16_t read_seq(struct pmka *b, unsigned address)
+{
+    (void)address;
+    return (uint16_t)b->latest.seq;
+}
+
+static uint16_t read_temp(struct pmka *b, unsigned address)
+{
+    (void)address;
+    return (uint16_t)b->latest.temp_code;
+}
+
+static uint16_t read_status(struct pmka *b, unsigned address)
+{
+    unsigned word = b->bus.fresh ? STATUS_FRESH : 0u;
+    (void)address;
+    if (b->bus.overrun) word |= STATUS_OVERRUN;
+    for (unsigned i = 0; i < PMKA_INTS; i++) {
+        if (b->latest.saturated[i]) word |= STATUS_SATURATED;
+        if (b->latest.clipped[i]) word |= STATUS_CLIPPED;
+    }
+    if (b->rotation.mode == PMKA_AUTONOMOUS) word |= STATUS_AUTONOMOUS;
+    b->bus.overrun = false;
+    return (uint16_t)word;
+}
+
+static uint16_t read_mode(struct pmka *b, unsigned address)
+{
+    (void)address;
+    return (uint16_t)b->rotation.mode;
+}
+
+static uint16_t read_beat(struct pmka *b, unsigned address)
+{
+    (void)address;
+    return (uint16_t)b->rotation.beat_periods;
+}
+
+static uint16_t read_zero(struct pmka *b, unsigned address)
+{
+    (void)address;
+    return (uint16_t)b->rotation.zero_periods;
+}
+
+static uint16_t read_index(struct pmka *b, unsigned address)
+{
+    (void)address;
+    return b->bus.index;
+}
+
+static uint16_t read_data(struct pmka *b, unsigned address)
+{
+    const unsigned index = b->bus.index;
+    (void)address;
+    if (index >= INDEX_ROM) return b->rom[index - INDEX_ROM];
+    return (uint16_t)b->channel[index / 2].count[index % 2];
+}
+
+/* ---- writing: false: the register does not take this value ---- */
+
+static bool write_mode(struct pmka *b, uint16_t word)
+{
+    if (word > PMKA_AUTONOMOUS) return false;
+    pmka_set_mode(b, (enum pmka_mode)word);
+    return true;
+}
+
+/* Bits 2..0 beat, 0: the present one goes on; bits 5..4 calibration. */
+static bool write_command(struct pmka *b, uint16_t word)
+{
+    const unsigned cal = word >> 4 & 3u;
+    return !(word & ~0x37u) && cal <= PMKA_CAL_RESET && pmka_command(b, word & 7u, (enum pmka_cal)cal);
+}
+
+static bool write_beat(struct pmka *b, uint16_t word)
+{
+    if (word < b->rotation.zero_periods + PMKA_BEAT_SPARE || word > BEAT_MAX) return false;
+    b->rotation.beat_periods = word;
+    return true;
+}
+
+static bool write_zero(struct pmka *b, uint16_t word)
+{
+    if (word < 1 || word + PMKA_BEAT_SPARE > b->rotation.beat_periods) return false;
+    b->rotation.zero_periods = word;
+    return true;
+}
+
+static bool write_index(struct pmka *b, uint16_t word)
+{
+    if (word >= 2 * PMKA_INTS && (word < INDEX_ROM || word >= INDEX_ROM + PMKA_ROM_WORDS)) return false;
+    b->bus.index = word;
+    return true;
+}
+
+static const struct {
+    const char *name; /* NULL: nothing answers */
+    uint16_t (*read)(struct pmka *b, unsigned address);
+    bool (*write)(struct pmka *b, uint16_t word);
+    bool of_reading; /* there is nothing before the first */
+} registers[PMKA_ADDRESSES] = {
+    {"X", read_code, NULL, true},
+    {"Y", read_code, NULL, true},
+    {"Z", read_code, NULL, true},
+    {"K", read_code, NULL, true},
+    {"RESETS", read_resets, NULL, true},
+    {"ROTATION", read_rotation, NULL, true},
+    {"SEQ", read_seq, NULL, true},
+    {"TEMPERATURE", read_temp, NULL, true},
+    {"STATUS", read_status, NULL, false},
+    {"MODE", read_mode, write_mode, false},
+    {"COMMAND", NULL, write_command, false},
+    {"BEAT", read_beat, write_beat, false},
+    {"ZERO", read_zero, write_zero, false},
+    {"INDEX", read_index, write_index, false},
+    {"DATA", read_data, NULL, false},
+};
+
+const char *pmka_register_name(unsigned address)
+{
+    return address < PMKA_ADDRESSES ? registers[address].name : NULL;
+}
+
+static void wanted_value(const struct pmka *b, unsigned address, char *out, size_t cap)
+{
+    const struct pmka_rotation *r = &b->rotation;
+    bool (*const write)(struct pmka *, uint16_t) = registers[address].write;
+    if (write == write_mode) (void)snprintf(out, cap, "it takes 0 or 1");
+    if (write == write_command)
+        (void)snprintf(out, cap,
+                       "it takes in MODE 0 alone: beat 0 to %u in bits 0 to 2, calibration 0 to %d in bits 4, 5",
+                       PMKA_TAUS, PMKA_CAL_RESET);
+    if (write == write_beat) (void)snprintf(out, cap, "it takes %u to %u", r->zero_periods + PMKA_BEAT_SPARE, BEAT_MAX);
+    if (write == write_zero) (void)snprintf(out, cap, "it takes 1 to %u", r->beat_periods - PMKA_BEAT_SPARE);
+    if (write == write_index)
+        (void)snprintf(out, cap, "it takes 0 to %u and %u to %u", 2 * PMKA_INTS - 1, INDEX_ROM,
+                       INDEX_ROM + PMKA_ROM_WORDS - 1);
+}
+
+void pmka_wanted(const void *board, const struct board_cycle *c, enum board_cycle_result r, char *out, size_t cap)
+{
+    if (r == BOARD_CYCLE_BAD_VALUE) wanted_value(board, c->address, out, cap);
+    else (void)snprintf(out, cap, "STATUS (08h) has bit 0 when the first reading is there");
+}
+
+/* ---- cycles ---- */
+
+static enum board_cycle_result check(const struct pmka *b, const struct board_cycle *c)
+{
+    const int64_t strobe_ns = c->strobe_ns ? c->strobe_ns : b->profile.strobe_ns;
+    if (b->life == PMKA_OFF) return BOARD_CYCLE_OFF;
+    if (b->bus.cycle) return BOARD_CYCLE_BUSY;
+    if (!pmka_register_name(c->address)) return BOARD_CYCLE_NO_ADDRESS;
+    if (c->write && !registers[c->address].write) return BOARD_CYCLE_READ_ONLY;
+    if (!c->write && !registers[c->address].read) return BOARD_CYCLE_WRITE_ONLY;
+    if (strobe_ns < b->profile.strobe_min_ns) return BOARD_CYCLE_TOO_SHORT;
+    if (registers[c->address].of_reading && !b->any) return BOARD_CYCLE_NOT_READY;
+    return BOARD_CYCLE_OK;
+}
+
+static const struct bus_lines bus_lines = {PMKA_LINE_CS, PMKA_LINE_RW, PMKA_LINE_AB0, PMKA_LINE_D0};
+
+/* What a register holds is taken at the beginning of the strobe, what is written is taken over at its end. */
+enum board_cycle_result pmka_submit(struct pmka *b, struct board_cycle *c, int64_t t_ns)
+{
+    const enum board_cycle_result r = check(b, c);
+    if (r != BOARD_CYCLE_OK) {
+        b->counters.cycles_refused++;
+        return r;
+    }
+    b->bus.cycle = c;
+    if (!c->write) b->bus.answer = registers[c->address].read(b, c->address);
+    bus_lines_begin(&b->trace, &bus_lines, c, c->write ? c->data : b->bus.answer, t_ns);
+    sched_at(b->sched, &b->bus.end, t_ns + (c->strobe_ns ? c->strobe_ns : b->profile.strobe_ns));
+    return BOARD_CYCLE_OK;
+}
+
+static void finish(struct pmka *b, enum board_cycle_result r, int64_t t_ns)
+{
+    struct board_cycle *c = b->bus.cycle;
+    b->bus.cycle = NULL;
+    if (b->life != PMKA_OFF) bus_lines_end(&b->trace, &bus_lines, t_ns);
+    if (r == BOARD_CYCLE_OK) b->counters.cycles++;
+    else b->counters.cycles_refused++;
+    if (c->done) c->done(c->ctx, c, r, t_ns);
+}
+
+static void strobe_ends(void *ctx, int64_t t_ns)
+{
+    struct pmka *b = ctx;
+    struct board_cycle *c = b->bus.cycle;
+    if (!c->write) {
+        c->data = b->bus.answer;
+        finish(b, BOARD_CYCLE_OK, t_ns);
+        return;
+    }
+    finish(b, registers[c->address].write(b, c->data) ? BOARD_CYCLE_OK : BOARD_CYCLE_BAD_VALUE, t_ns);
+}
+
+void pmka_bus_init(struct pmka *b)
+{
+    sched_ev(&b->bus.end, strobe_ends, b);
+}
+
+void pmka_bus_cut(struct pmka *b, int64_t t_ns)
+{
+    sched_cancel(b->sched, &b->bus.end);
+    b->bus.index = 0;
+    b->bus.fresh = b->bus.overrun = false;
+    if (b->bus.cycle) finish(b, BOARD_CYCLE_OFF, t_ns);
+}

@@ -1,0 +1,105 @@
+#include "board/pmka/can.h"
+
+#include "board/pmka/board.h"
+#include "board/pmka/pmka.h"
+#include "gen/pmka_od.h"
+#include "gen/psabench_can.h"
+
+static unsigned mask_of(const bool flag[PMKA_INTS])
+{
+    unsigned mask = 0;
+    for (unsigned i = 0; i < PMKA_INTS; i++) mask |= (unsigned)flag[i] << i;
+    return mask;
+}
+
+static void pack_codes(const struct pmka_reading *r, struct can_msg *m)
+{
+    const struct psabench_pmka_codes_t codes = {r->code[0], r->code[1], r->code[2], r->code[3]};
+    m->len = (uint8_t)psabench_pmka_codes_pack(m->data, &codes, sizeof m->data);
+}
+
+static void pack_state(const struct pmka_reading *r, struct can_msg *m)
+{
+    const struct psabench_pmka_state_t state = {
+        .seq = (uint16_t)r->seq,
+        .reset_x = r->reset[0],
+        .reset_y = r->reset[1],
+        .reset_z = r->reset[2],
+        .reset_k = r->reset[3],
+        .serves_x = r->serves[0],
+        .serves_y = r->serves[1],
+        .serves_z = r->serves[2],
+        .serves_k = r->serves[3],
+        .tau = r->tau,
+        .cal = (uint8_t)r->cal,
+        .autonomous = r->autonomous,
+        .saturated = (uint8_t)mask_of(r->saturated),
+        .clipped = (uint8_t)mask_of(r->clipped),
+        .t = r->temp_code,
+    };
+    m->len = (uint8_t)psabench_pmka_state_pack(m->data, &state, sizeof m->data);
+}
+
+static void on_reading(void *ctx, const struct pmka_reading *r, int64_t t_ns)
+{
+    struct pmka_can *c = ctx;
+    struct can_msg m[2] = {{0}, {0}};
+    pack_codes(r, &m[0]);
+    pack_state(r, &m[1]);
+    board_node_stream(&c->node, PMKA_CODES_TPDO, m, 2, t_ns);
+}
+
+static const struct pmka_reading *latest(const struct board_node *n)
+{
+    return &((const struct pmka *)n->board)->latest;
+}
+
+static uint32_t read_code(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
+{
+    (void)t_ns;
+    v->number = latest(n)->code[e->sub - 1];
+    return CO_OK;
+}
+
+/* The bytes of the message. */
+static uint32_t read_state(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
+{
+    enum { RESETS = 2, TEMPERATURE = 6 };
+    struct can_msg m = {0};
+    (void)t_ns;
+    pack_state(latest(n), &m);
+    if (e->sub < RESETS) v->number = (uint16_t)latest(n)->seq;
+    else v->number = e->sub < TEMPERATURE ? m.data[e->sub] : latest(n)->temp_code;
+    return CO_OK;
+}
+
+static const struct board_object objects[] = {{PMKA_OD_CODES, read_code, NULL}, {PMKA_OD_STATE, read_state, NULL}};
+
+static uint32_t serial(const void *board)
+{
+    return ((const struct pmka *)board)->cfg.serial;
+}
+
+static int64_t period_ns(const void *board)
+{
+    return ((const struct pmka *)board)->profile.ts_ns;
+}
+
+static const struct board_node_type type = {.board = &pmka_board,
+                                            .device = &pmka_device,
+                                            .objects = objects,
+                                            .object_count = sizeof objects / sizeof *objects,
+                                            .serial = serial,
+                                            .period_ns = period_ns};
+
+static void init(void *can, const struct board_can_cfg *cfg, void *board, struct can_bus *bus, struct sched *s)
+{
+    board_node_init(can, &type, cfg, board, bus, s);
+    pmka_attach(board, &(struct pmka_host){.ctx = can, .reading = on_reading});
+}
+
+const struct board_can pmka_can = {.size = sizeof(struct pmka_can),
+                                   .init = init,
+                                   .power_up = board_node_power_up,
+                                   .power_down = board_node_power_down,
+                                   .node = board_node_co};

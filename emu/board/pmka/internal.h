@@ -1,0 +1,44 @@
+/* What the files of the PMKA board share. Not for others. */
+#ifndef PSABENCH_BOARD_PMKA_INTERNAL_H
+#define PSABENCH_BOARD_PMKA_INTERNAL_H
+
+#include "board/pmka/pmka.h"
+
+static inline void pmka_tell(const struct pmka *b, enum pmka_event e, int64_t t_ns)
+{
+    if (b->told) b->io.event(b->io.ctx, e, t_ns);
+}
+
+static inline void pmka_line(struct pmka *b, unsigned line, bool level, int64_t t_ns)
+{
+    trace_set(&b->trace, line, level && b->life != PMKA_OFF, t_ns);
+}
+
+static inline int64_t pmka_half_ns(const struct pmka *b)
+{
+    return b->profile.ts_ns / 2;
+}
+
+/* pmka/sample.c */
+void pmka_sample_init(struct pmka *b);
+void pmka_integrate(struct pmka *b, unsigned i, int64_t t_ns); /* its state at t_ns, not before the last call's */
+void pmka_pull(struct pmka *b, unsigned axis, int64_t t_ns);   /* of an axis that no integrator has */
+void pmka_sample(struct pmka *b, unsigned i, int64_t t_ns);    /* hold, comparators, reset */
+void pmka_cut_reset(struct pmka *b, unsigned i, int64_t t_ns); /* one under way ends now */
+void pmka_converter_wake(struct pmka *b, int64_t t_ns);        /* SH, CONV: somebody is about to watch */
+void pmka_converter_stop(struct pmka *b, int64_t t_ns);
+
+/* pmka/rotation.c */
+void pmka_rotation_start(struct pmka *b);          /* as after Res */
+void pmka_rotation_next(struct pmka *b);           /* a Ts begins: what the next period will be */
+bool pmka_rotation_turns(const struct pmka *b);    /* a hand-over comes in this Ts */
+void pmka_release(struct pmka *b, int64_t t_ns);   /* K gives its axis back */
+void pmka_take(struct pmka *b, int64_t t_ns);      /* K takes the next one */
+void pmka_keys_home(struct pmka *b, int64_t t_ns); /* each axis on its own integrator */
+void pmka_key_stuck(struct pmka *b, int64_t t_ns); /* b->wrongs has changed */
+
+/* pmka/bus.c */
+void pmka_bus_init(struct pmka *b);
+void pmka_bus_cut(struct pmka *b, int64_t t_ns);
+
+#endif

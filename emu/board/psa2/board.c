@@ -1,0 +1,276 @@
+#include "board/psa2/board.h"
+
+#include "board/digest.h"
+#include "board/life.h"
+#include "board/psa2/can.h"
+
+#include <stdio.h>
+#include <string.h>
+
+/* ---- profile ---- */
+
+static void profile_default(void *profile)
+{
+    *(struct psa2_profile *)profile = psa2_profile_default();
+}
+
+static bool profile_check(const void *profile, char *why, size_t cap)
+{
+    return psa2_profile_check(profile, why, cap);
+}
+
+static int64_t period_ns(const void *profile)
+{
+    return psa2_profile_period_ns(profile);
+}
+
+static void about(const void *profile, char *out, size_t cap)
+{
+    const struct psa2_profile *p = profile;
+    (void)snprintf(out, cap, "%s, %u bit words, CLK %.6g MHz, INT low %.3f us, a frame every %.3f us",
+                   p->adc_is_1281 ? "ADS1281" : "ADS1282", p->word_bits, (double)p->line_hz / p->line_div * 1e-6,
+                   (double)psa2_int_low_ns(p) * 1e-3, (double)psa2_profile_period_ns(p) * 1e-3);
+}
+
+/* ---- what is on it ---- */
+
+#define OF(type, name, field)                                                                                          \
+    {                                                                                                                  \
+#name, offsetof(struct type, field)                                                                            \
+    }
+#define ADC(field)  OF(ads1282, field, count.field)
+#define TADC(field) OF(ads1256, field, n.field)
+#define KPSA(field) OF(psa2_counters, field, field)
+
+// clang-format off
+static const struct board_counter kpsa_counters[] = {
+    KPSA(frames), KPSA(resets), KPSA(requests), KPSA(timeouts), KPSA(overruns), KPSA(int_late),
+};
+static const struct board_counter adc_counters[] = {
+    ADC(conversions), ADC(overruns), ADC(torn_reads), ADC(late_reads), ADC(bad_opcodes), ADC(refused), ADC(gap_violations),
+    ADC(restarts), ADC(clipped), ADC(realigned), ADC(calibrations),
+    OF(ads1282, bad_register, regs.bad_access), OF(ads1282, unmodelled_bit, regs.unimp_access), OF(ads1282, read_only_write, regs.ro_write),
+};
+static const struct board_counter temp_counters[] = {
+    TADC(conversions), TADC(overruns), TADC(torn_reads), TADC(window_reads), TADC(clipped), TADC(buffer_clipped),
+    TADC(range_exceeded), TADC(bad_mux), TADC(calibrations), TADC(cal_clamped), TADC(restarts), TADC(power_downs),
+    TADC(bad_opcodes), TADC(refused), TADC(bad_drate), TADC(gap_violations), TADC(dropped),
+    OF(ads1256, bad_register, regs.bad_access), OF(ads1256, unmodelled_bit, regs.unimp_access), OF(ads1256, read_only_write, regs.ro_write),
+};
+// clang-format on
+#define COUNTERS(table) .counters = (table), .counter_count = sizeof(table) / sizeof *(table)
+
+enum { PART_KPSA, PART_ADC_X, PART_ADC_Y, PART_ADC_Z, PART_TADC, PARTS };
+
+static void adc_fault(void *board, unsigned part, const struct board_chip_fault *f, int64_t t_ns)
+{
+    static const enum ads1282_stuck stuck[] = {ADS1282_STUCK_LOW, ADS1282_STUCK_HIGH};
+    const struct ads1282_fault all = {.drdy = f->drdy_stuck ? stuck[f->drdy_level] : ADS1282_FREE,
+                                      .dout = f->dout_stuck ? stuck[f->dout_level] : ADS1282_FREE,
+                                      .lost_sync = f->lost_sync,
+                                      .clock_ppm = f->clock_ppm};
+    ads1282_fault(&((struct psa2 *)board)->adc[part - PART_ADC_X], &all, t_ns);
+}
+
+static void tadc_fault(void *board, unsigned part, const struct board_chip_fault *f, int64_t t_ns)
+{
+    static const enum ads1256_stuck stuck[] = {ADS1256_STUCK_LOW, ADS1256_STUCK_HIGH};
+    const struct ads1256_fault all = {.drdy = f->drdy_stuck ? stuck[f->drdy_level] : ADS1256_FREE,
+                                      .dout = f->dout_stuck ? stuck[f->dout_level] : ADS1256_FREE,
+                                      .lost_sync = f->lost_sync,
+                                      .clock_ppm = f->clock_ppm};
+    (void)part;
+    ads1256_fault(&((struct psa2 *)board)->tadc, &all, t_ns);
+}
+
+/* Registers without power hold nothing. */
+static bool adc_flip(void *board, unsigned part, unsigned reg, uint8_t mask, int64_t t_ns)
+{
+    struct psa2 *b = board;
+    return b->mode != PSA2_OFF && ads1282_flip(&b->adc[part - PART_ADC_X], reg, mask, t_ns);
+}
+
+static bool tadc_flip(void *board, unsigned part, unsigned reg, uint8_t mask, int64_t t_ns)
+{
+    struct psa2 *b = board;
+    (void)part;
+    return b->mode != PSA2_OFF && ads1256_flip(&b->tadc, reg, mask, t_ns);
+}
+
+#define EVERY_FAULT (BOARD_FAULT_DRDY | BOARD_FAULT_DOUT | BOARD_FAULT_SYNC | BOARD_FAULT_CLOCK)
+#define DRD_A_IS_X  "DRD_A is the pin of converter X alone, nobody hears this one; adc.x has it"
+
+static const struct board_part parts[PARTS] = {
+    [PART_KPSA] = {.name = "kpsa",
+                   .label = "board",
+                   .offset = offsetof(struct psa2, counters),
+                   COUNTERS(kpsa_counters)},
+#define ADC_PART(nr, axis, faults_of, why_not)                                                                         \
+    {                                                                                                                  \
+        .name = "adc." axis, .label = "adc_" axis,                                                                     \
+        .offset = offsetof(struct psa2, adc) + (nr) * sizeof(struct ads1282), COUNTERS(adc_counters),                  \
+        .faults = (faults_of), .unless = (why_not), .registers = ADS1282_REGS, .fault = adc_fault, .flip = adc_flip    \
+    }
+    [PART_ADC_X] = ADC_PART(0, "x", EVERY_FAULT, NULL),
+    [PART_ADC_Y] = ADC_PART(1, "y", EVERY_FAULT & ~(unsigned)BOARD_FAULT_DRDY, DRD_A_IS_X),
+    [PART_ADC_Z] = ADC_PART(2, "z", EVERY_FAULT & ~(unsigned)BOARD_FAULT_DRDY, DRD_A_IS_X),
+    [PART_TADC] = {.name = "tadc",
+                   .label = "adc_temp",
+                   .offset = offsetof(struct psa2, tadc),
+                   COUNTERS(temp_counters),
+                   .faults = EVERY_FAULT,
+                   .registers = ADS1256_REGS,
+                   .fault = tadc_fault,
+                   .flip = tadc_flip},
+};
+
+static unsigned pulses(const void *board)
+{
+    return PSA2_WORDS * ((const struct psa2 *)board)->profile.word_bits;
+}
+
+static void wrong(void *board, uint32_t wrongs)
+{
+    const struct psa2_controller_fault f = {.skip_sync_t = wrongs & BOARD_WRONG_SKIP_SYNC_T,
+                                            .wrong_setup_order = wrongs & BOARD_WRONG_SETUP_ORDER,
+                                            .frozen_words = wrongs & BOARD_WRONG_FROZEN_WORDS};
+    psa2_fault_set(board, &f);
+}
+
+/* ---- life ---- */
+
+BOARD_LIFE(psa2);
+
+static bool ready(const void *board)
+{
+    return psa2_ready(board);
+}
+
+static void listen(void *board, bool on)
+{
+    psa2_listen(board, on);
+}
+
+static struct afe *afe(void *board, unsigned axis)
+{
+    return &((struct psa2 *)board)->afe[axis];
+}
+
+static void truth(const void *board, board_truth_fn *put, void *ctx)
+{
+    const struct board_cfg *c = &((const struct psa2 *)board)->cfg;
+    put(ctx, "temp_noise_scale", c->temp_noise_scale);
+    put(ctx, "temp_adc_offset_v", c->temp_adc_offset_v);
+    put(ctx, "temp_adc_gain_error", c->temp_adc_gain_error);
+}
+
+/* ---- digest ---- */
+
+static void add_ads1282(struct sha256 *s, const struct ads1282 *a)
+{
+    sha256_add(s, a->reg_value, sizeof a->reg_value);
+    board_digest_noise(s, &a->noise);
+    board_digest_u64(s, (uint64_t)a->period);
+    board_digest_u64(s, (uint64_t)a->index);
+    board_digest_u64(s, (uint64_t)a->last_lsb);
+    board_digest_u64(s, a->out);
+}
+
+static void add_ads1256(struct sha256 *s, const struct ads1256 *a)
+{
+    sha256_add(s, a->value, sizeof a->value);
+    board_digest_noise(s, &a->noise);
+    board_digest_u64(s, (uint64_t)a->cell);
+    board_digest_u64(s, (uint64_t)a->ready);
+    board_digest_u64(s, (uint64_t)a->word);
+}
+
+static void digest(const void *board, struct sha256 *s)
+{
+    const struct psa2 *b = board;
+    const struct psa2_counters *c = &b->counters;
+    board_digest_u64(s, (uint64_t)b->mode << 32 | b->seq);
+    board_digest_u64(s, (uint64_t)b->drd_a_ns);
+    board_digest_u64(s, (uint64_t)c->frames << 32 | c->resets);
+    board_digest_u64(s, (uint64_t)c->requests << 32 | c->timeouts);
+    board_digest_u64(s, (uint64_t)c->overruns << 32 | c->int_late);
+    for (unsigned i = 0; i < 3; i++) board_digest_u64(s, (uint64_t)b->latest.code[i]);
+    for (unsigned i = 0; i < 3; i++) add_ads1282(s, &b->adc[i]);
+    add_ads1256(s, &b->tadc);
+}
+
+/* ---- CAN ---- */
+
+static void can_init(void *can, const struct board_can_cfg *cfg, void *board, struct can_bus *bus, struct sched *s)
+{
+    const struct psa2_can_port port = psa2_can_port(board);
+    psa2_can_init(can, cfg, &port, bus, s);
+    psa2_attach(board, &(struct psa2_host){.ctx = can, .frame = psa2_can_frame, .fault = psa2_can_fault});
+}
+
+static void can_power_up(void *can, int64_t t_ns)
+{
+    psa2_can_power_up(can, t_ns);
+}
+
+static void can_power_down(void *can)
+{
+    psa2_can_power_down(can);
+}
+
+static struct co_node *can_node(void *can)
+{
+    return &((struct psa2_can *)can)->node;
+}
+
+static const struct board_can can_side = {
+    .size = sizeof(struct psa2_can),
+    .init = can_init,
+    .power_up = can_power_up,
+    .power_down = can_power_down,
+    .node = can_node,
+};
+
+static const char *const port_lines[] = {"Int", "Data", "CLK", NULL};
+
+const struct board_type psa2_board = {
+    .name = "psa2",
+    .title = "PSA-2",
+    .size = sizeof(struct psa2),
+    .profile_size = sizeof(struct psa2_profile),
+    .fields = psa2_fields,
+    .field_count = PSA2_FIELDS,
+    .profile_name = "article",
+    .profile_default = profile_default,
+    .profile_check = profile_check,
+    .about = about,
+    .knobs = BOARD_KNOB_CHAIN | BOARD_KNOB_TEMP_ADC | BOARD_KNOB_TEMP_NOISE,
+    .node = 5,
+    .frame_forms = 4,
+    .period_ns = period_ns,
+    .lines = psa2_lines,
+    .line_count = PSA2_LINES,
+    .port_lines = port_lines,
+    .frame_line = PSA2_LINE_INT,
+    .pulse_line = PSA2_LINE_CLK,
+    .pulses = pulses,
+    .events = psa2_events,
+    .event_count = PSA2_EVENTS,
+    .parts = parts,
+    .part_count = PARTS,
+    .wrongs = BOARD_WRONG_SKIP_SYNC_T | BOARD_WRONG_SETUP_ORDER | BOARD_WRONG_FROZEN_WORDS,
+    .can = &can_side,
+    .init = init,
+    .power_up = power_up,
+    .power_down = power_down,
+    .reset = reset,
+    .ready = ready,
+    .sample_until = sample_until,
+    .wrong = wrong,
+    .listen = listen,
+    .trace = trace,
+    .line = line,
+    .afe = afe,
+    .digest = digest,
+    .truth = truth,
+};

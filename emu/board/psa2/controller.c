@@ -1,0 +1,500 @@
+#include "board/psa2/psa2.h"
+
+#include "base/bits.h"
+#include "board/psa2/internal.h"
+
+#include <assert.h>
+#include <string.h>
+
+#define RES_LOW_NS   10000 /* E0: length of the pulse on Res */
+#define SYNC_A_TCLK  4     /* E0: SYNC high; the part needs 2 */
+#define SYNC_T_TAU   8     /* E0: SYNC/PDWN low; the part needs 4 */
+#define MARGIN_TCLK  32    /* a read ends 4 tCLK, a command 24 tCLK before the next DRD_A */
+#define CONFIG1_CHOP 0x08  /* chopping on, as after reset; multiplexer 000: AIN1 */
+
+/* ---- pins ---- */
+
+static void pulse_edge(struct psa2 *b, bool level, int64_t t_ns)
+{
+    if (b->pulse.group == PSA2_TEMP) {
+        psa2_line(b, PSA2_LINE_SYNC_T, level, t_ns);
+        ads1256_sync_pin(&b->tadc, level, t_ns);
+        return;
+    }
+    trace_set(&b->trace, PSA2_LINE_SYNC_A, level, t_ns);
+    for (unsigned i = 0; i < 3; i++) ads1282_sync_pin(&b->adc[i], level, t_ns);
+}
+
+/* SYNC_A idles low and works on its rise, SYNC_T idles high and works when it is high again. */
+static void pulse_event(void *ctx, int64_t t_ns)
+{
+    struct psa2 *b = ctx;
+    struct psa2_pulse *p = &b->pulse;
+    const bool temp = p->group == PSA2_TEMP;
+    p->active = !p->active;
+    if (!p->skipped) pulse_edge(b, p->active != temp, t_ns);
+    if (!p->skipped && p->active != temp) psa2_tell(b, temp ? PSA2_EV_SYNC_T : PSA2_EV_SYNC_A, t_ns);
+    if (p->active) {
+        sched_at(b->sched, &p->ev, t_ns + (temp ? psa2_tau_ns(b, SYNC_T_TAU) : psa2_tclk_ns(b, SYNC_A_TCLK)));
+        return;
+    }
+    p->busy = false;
+    if (!temp) b->sample.unsettled = 0;
+    p->done(b, t_ns);
+}
+
+/* On a falling edge of fCLK: 122 ns from the rising one, whose keep-out is 30 ns (sources 1.4). */
+void psa2_pulse(struct psa2 *b, enum psa2_group group, void (*done)(struct psa2 *b, int64_t t_ns), int64_t t_ns)
+{
+    const struct clk half = {.hz = 2 * (int64_t)b->profile.fclk_hz, .div = 1};
+    const int64_t k = clk_count_at(&half, t_ns + 1);
+    b->pulse.busy = true;
+    b->pulse.active = false;
+    b->pulse.skipped = group == PSA2_TEMP && b->wrong.skip_sync_t;
+    b->pulse.group = group;
+    b->pulse.done = done;
+    sched_at(b->sched, &b->pulse.ev, clk_edge_ns(&half, k | 1));
+}
+
+static void pulse_stop(struct psa2 *b, int64_t t_ns)
+{
+    sched_cancel(b->sched, &b->pulse.ev);
+    if (b->pulse.active) pulse_edge(b, b->pulse.group == PSA2_TEMP, t_ns);
+    b->pulse.busy = b->pulse.active = false;
+}
+
+static void res_pin(struct psa2 *b, bool level, int64_t t_ns)
+{
+    trace_set(&b->trace, PSA2_LINE_RES, level, t_ns);
+    for (unsigned i = 0; i < 3; i++) ads1282_reset_pin(&b->adc[i], level, t_ns);
+    ads1256_reset_pin(&b->tadc, level, t_ns);
+}
+
+static bool port_free(const struct psa2 *b)
+{
+    return !psa2_spi_busy(b) && !b->pulse.busy;
+}
+
+/* ---- set-up ---- */
+
+static void enter_run(struct psa2 *b, int64_t t_ns)
+{
+    b->mode = PSA2_RUN;
+    psa2_tell(b, PSA2_EV_SETUP_DONE, t_ns);
+    psa2_arm_patience(b, t_ns);
+    psa2_service(b, t_ns);
+}
+
+/* Beyond the article: the gain. It follows SYNC_A at once, while the filters are empty. */
+static void setup_gain(struct psa2 *b, int64_t t_ns)
+{
+    uint8_t code = 0;
+    for (unsigned gain = b->profile.adc_pga; gain > 1; gain /= 2) code++;
+    const uint8_t bytes[] = {0x42, 0x00, (uint8_t)(CONFIG1_CHOP | code)};
+    struct psa2_xfer x = psa2_xfer_accel(b, bytes, sizeof bytes);
+    x.done = enter_run;
+    psa2_spi_start(b, &x, t_ns);
+}
+
+/* The step that is due; the wrong way: the last of its event's in place of the first. */
+static const struct psa2_setup_step *setup_step(const struct psa2 *b)
+{
+    const struct psa2_setup_step *const all = b->profile.setup, *due = &all[b->step];
+    if (!b->reversed) return due;
+    int before = 0;
+    for (unsigned i = 0; i < b->step; i++) before += all[i].on == due->on;
+    const struct psa2_setup_step *s = all + b->profile.setup_count;
+    do before -= (--s)->on == due->on;
+    while (before >= 0);
+    return s;
+}
+
+/* DRD_A is awaited all the time, anew after each step: a new CONFIG0 means another settling time. */
+static void await_step(struct psa2 *b, int64_t t_ns)
+{
+    psa2_arm_patience(b, t_ns);
+    if (b->profile.setup[b->step].on == PSA2_ON_DRD_T) psa2_temp_await(b, t_ns);
+}
+
+static void setup_done(struct psa2 *b, int64_t t_ns)
+{
+    if (++b->step < b->profile.setup_count) {
+        await_step(b, t_ns);
+        return;
+    }
+    if (b->profile.adc_pga > 1 && !b->profile.adc_is_1281) setup_gain(b, t_ns);
+    else enter_run(b, t_ns);
+}
+
+static void setup_event(struct psa2 *b, enum psa2_setup_event on, int64_t t_ns)
+{
+    if (b->step >= b->profile.setup_count || !port_free(b)) return;
+    const struct psa2_setup_step *s = setup_step(b);
+    if (s->on != on) return;
+    if (on == PSA2_ON_DRD_T) psa2_temp_heard(b);
+    if (s->action == PSA2_SYNC_A || s->action == PSA2_SYNC_T) {
+        psa2_pulse(b, s->action == PSA2_SYNC_T ? PSA2_TEMP : PSA2_ACCEL, setup_done, t_ns);
+        return;
+    }
+    struct psa2_xfer x =
+        s->action == PSA2_WRITE_T ? psa2_xfer_temp(b, s->bytes, s->count) : psa2_xfer_accel(b, s->bytes, s->count);
+    x.done = setup_done;
+    psa2_spi_start(b, &x, t_ns);
+}
+
+/* ---- reading ---- */
+
+static uint8_t status_of(struct psa2 *b, const struct psa2_frame *f)
+{
+    uint8_t status = b->sample.unsettled ? 0 : PSA2_ST_SETTLED;
+    for (unsigned i = 0; i < 3; i++)
+        if (f->code[i] == 0x7FFFFF || f->code[i] == -0x800000) status |= PSA2_ST_CLIP;
+    if (b->sample.overrun) status |= PSA2_ST_OVERRUN;
+    if (b->temp.fresh) status |= PSA2_ST_TEMP_NEW;
+    return status;
+}
+
+static void take_codes(struct psa2 *b, struct psa2_frame *f)
+{
+    for (unsigned i = 0; i < 3; i++) {
+        const uint8_t *rx = b->spi.rx[i]; /* 0 beyond what was read */
+        f->raw[i] = (uint32_t)rx[0] << 24 | (uint32_t)rx[1] << 16 | (uint32_t)rx[2] << 8 | rx[3];
+        f->code[i] = bits_sign_extend(f->raw[i] >> 8, 24);
+    }
+    f->temp_code = b->temp.code;
+    f->temp_channel = b->temp.code_channel;
+}
+
+static void read_done(struct psa2 *b, int64_t t_ns)
+{
+    struct psa2_frame *f = &b->latest; /* in place: copies of what has just been written are slow */
+    f->seq = b->sample.seq;
+    f->t_sample_ns = b->sample.t_ns;
+    if (!b->wrong.frozen_words) take_codes(b, f);
+    f->status = status_of(b, f);
+    for (unsigned i = 0; i < PSA2_WORDS; i++) f->word[i] = 0; /* until it is sent */
+    b->sample.reading = b->sample.overrun = b->temp.fresh = false;
+    if (b->sample.unsettled) b->sample.unsettled--;
+    if (b->stream) psa2_out_start(b, t_ns);
+    psa2_service(b, t_ns);
+}
+
+static void read_start(struct psa2 *b, int64_t t_ns)
+{
+    b->sample.due = false;
+    b->sample.reading = true;
+    b->sample.seq = b->sample.due_seq;
+    b->sample.t_ns = b->sample.due_ns;
+    psa2_spi_start(b, &b->read, t_ns);
+}
+
+static void init_read(struct psa2 *b)
+{
+    static const uint8_t zeros[4] = {0}; /* DIn low: WAKEUP, harmless */
+    b->read = psa2_xfer_accel(b, zeros, b->profile.read_bits / 8);
+    for (unsigned i = 0; i + 1 < b->read.count; i++) b->read.gap_ns[i] = 0;
+    b->read.zeros = true;
+    b->read.done = read_done;
+}
+
+bool psa2_flowing(const struct psa2 *b, int64_t t_ns)
+{
+    return b->drd_a_seen && t_ns - b->drd_a_ns < 2 * b->period_ns;
+}
+
+bool psa2_window(const struct psa2 *b, int64_t span_ns, int64_t t_ns)
+{
+    if (!psa2_flowing(b, t_ns)) return true;
+    const int64_t need_ns = span_ns + psa2_tclk_ns(b, MARGIN_TCLK);
+    const int64_t read_ns = clk_span_ns(b->profile.sclk_hz, b->profile.read_bits + 2);
+    return t_ns + need_ns <= b->drd_a_ns + b->period_ns || read_ns + need_ns > b->period_ns;
+}
+
+void psa2_service(struct psa2 *b, int64_t t_ns)
+{
+    if (b->mode != PSA2_RUN || !port_free(b)) return;
+    if (b->sample.due) {
+        read_start(b, t_ns);
+        return;
+    }
+    if (b->request && psa2_request_start(b, t_ns)) return;
+    (void)psa2_temp_start(b, t_ns);
+}
+
+static void sample_due(struct psa2 *b, int64_t t_ns)
+{
+    struct psa2_sample *s = &b->sample;
+    if (s->due || s->reading) {
+        b->counters.overruns++;
+        s->overrun = true;
+    }
+    s->due = true;
+    s->due_ns = t_ns;
+    s->due_seq = b->seq++;
+    psa2_service(b, t_ns);
+}
+
+/* ---- data-ready and patience ---- */
+
+void psa2_arm_patience(struct psa2 *b, int64_t t_ns)
+{
+    b->patience_ns = t_ns + PSA2_PATIENCE_NS + ads1282_settle_ns(&b->adc[0]);
+    if (!b->patience.queued || b->patience.due_ns > b->patience_ns) sched_at(b->sched, &b->patience, b->patience_ns);
+}
+
+static void out_of_patience(void *ctx, int64_t t_ns)
+{
+    struct psa2 *b = ctx;
+    if (t_ns < b->patience_ns) {
+        sched_at(b->sched, &b->patience, b->patience_ns);
+        return;
+    }
+    b->counters.timeouts++;
+    if (!b->fault_told && b->host.fault) b->host.fault(b->host.ctx, PSA2_FAULT_ACCEL_PORT, t_ns);
+    b->fault_told = true;
+    psa2_request_fail(b, PSA2_ACCEL, false, t_ns);
+    psa2_service(b, t_ns);
+}
+
+static void drd_a_fell(struct psa2 *b, int64_t t_ns)
+{
+    b->board_degc = b->io.temp_degc(b->io.ctx, 3, t_ns);
+    b->period_ns = ads1282_period_ns(&b->adc[0]);
+    b->drd_a_seen = true;
+    b->drd_a_ns = t_ns;
+    b->fault_told = false;
+    psa2_arm_patience(b, t_ns);
+    if (b->mode == PSA2_SETUP) setup_event(b, PSA2_ON_DRD_A, t_ns);
+    else if (b->mode == PSA2_RUN) sample_due(b, t_ns);
+}
+
+/* The wire DRD_A comes from converter X (E0). */
+static void accel_drdy(void *ctx, bool level, int64_t t_ns)
+{
+    const struct psa2_port *port = ctx;
+    struct psa2 *b = port->b;
+    if (!level) trace_set(&b->trace, PSA2_LINE_DOUTX + port->axis, spi_miso(&b->adc[port->axis].spi), t_ns);
+    if (port->axis != 0) return;
+    psa2_line(b, PSA2_LINE_DRD_A, level, t_ns);
+    if (level || b->mode == PSA2_OFF) return;
+    psa2_tell(b, PSA2_EV_DRD_A, t_ns);
+    drd_a_fell(b, t_ns);
+}
+
+static void temp_drdy(void *ctx, bool level, int64_t t_ns)
+{
+    struct psa2 *b = ctx;
+    psa2_line(b, PSA2_LINE_DRD_T, level, t_ns);
+    if (level || b->mode == PSA2_OFF) return;
+    psa2_tell(b, PSA2_EV_DRD_T, t_ns);
+    if (b->mode == PSA2_SETUP) setup_event(b, PSA2_ON_DRD_T, t_ns);
+    else if (b->mode == PSA2_RUN) psa2_temp_ready(b, t_ns);
+}
+
+/* Input pair 1 carries the channel; pair 2 is not connected. */
+static double accel_vin_v(void *ctx, unsigned mux, int64_t t_ns)
+{
+    const struct psa2_port *port = ctx;
+    struct psa2 *b = port->b;
+    if (mux != 0 && mux != 3) return 0.0;
+    const double signal = b->io.accel(b->io.ctx, port->axis, t_ns);
+    return afe_out_v(&b->afe[port->axis], signal, b->board_degc, t_ns);
+}
+
+static void accel_vin_row_v(void *ctx, unsigned mux, const int64_t *t_ns, unsigned n, double *vin_v)
+{
+    const struct psa2_port *port = ctx;
+    struct psa2 *b = port->b;
+    const bool connected = mux == 0 || mux == 3;
+    for (unsigned i = 0; i < n; i++) vin_v[i] = connected ? b->io.accel(b->io.ctx, port->axis, t_ns[i]) : 0.0;
+    if (connected) afe_out_row_v(&b->afe[port->axis], vin_v, b->board_degc, t_ns, n);
+}
+
+/* ---- life ---- */
+
+const struct board_line psa2_lines[PSA2_LINES] = {
+    [PSA2_LINE_SYNC_A] = {"SYNC_A", false}, [PSA2_LINE_SCLK] = {"SClk", false},    [PSA2_LINE_DRD_A] = {"DRD_A", true},
+    [PSA2_LINE_DIN] = {"DIn", false},       [PSA2_LINE_DOUTX] = {"DOutX", false},  [PSA2_LINE_DOUTY] = {"DOutY", false},
+    [PSA2_LINE_DOUTZ] = {"DOutZ", false},   [PSA2_LINE_SYNC_T] = {"SYNC_T", true}, [PSA2_LINE_CST] = {"CST", true},
+    [PSA2_LINE_DRD_T] = {"DRD_T", true},    [PSA2_LINE_DINT] = {"DInT", false},    [PSA2_LINE_DOUTT] = {"DOutT", false},
+    [PSA2_LINE_RES] = {"Res", false},       [PSA2_LINE_DATA] = {"Data", false},    [PSA2_LINE_CLK] = {"CLK", false},
+    [PSA2_LINE_INT] = {"Int", true},
+};
+
+const char *psa2_line_name(enum psa2_line line)
+{
+    return psa2_lines[line].name;
+}
+
+static void wake(void *ctx, uint64_t mask)
+{
+    const uint32_t out_lines = 1u << PSA2_LINE_INT | 1u << PSA2_LINE_DATA | 1u << PSA2_LINE_CLK;
+    struct psa2 *b = ctx;
+    if (mask & out_lines) psa2_out_wake(b, b->sched->now_ns);
+}
+
+static void init_trace(struct psa2 *b)
+{
+    trace_init(&b->trace);
+    b->trace.source = (struct trace_source){.wake = wake, .ctx = b};
+    line_faults_init(&b->line, &b->trace);
+    for (unsigned i = 0; i < PSA2_LINES; i++) (void)trace_add(&b->trace, psa2_lines[i].name, psa2_lines[i].level);
+    b->idle_lines = b->trace.level;
+}
+
+static void init_accel(struct psa2 *b)
+{
+    static const char *const adc_noise[] = {"adc.x", "adc.y", "adc.z"};
+    static const char *const afe_noise[] = {"afe.x", "afe.y", "afe.z"};
+    const struct ads1282_cfg cfg = {.part = b->profile.adc_is_1281 ? ADS1282_PART_1281 : ADS1282_PART_1282,
+                                    .clk_hz = b->profile.fclk_hz,
+                                    .vref_v = b->profile.adc_vref_v,
+                                    .noise_scale = b->cfg.adc_noise_scale,
+                                    .chain = b->cfg.adc_chain};
+    for (unsigned i = 0; i < 3; i++) {
+        b->port[i] = (struct psa2_port){b, i};
+        const struct ads1282_io io = {
+            .ctx = &b->port[i], .vin_v = accel_vin_v, .vin_row_v = accel_vin_row_v, .drdy = accel_drdy};
+        ads1282_init(&b->adc[i], &cfg, &io, b->sched, rng_stream(b->cfg.seed, b->cfg.serial, adc_noise[i]));
+        afe_init(&b->afe[i], &b->cfg.afe[i], rng_stream(b->cfg.seed, b->cfg.serial, afe_noise[i]));
+    }
+}
+
+static void init_temp(struct psa2 *b)
+{
+    const struct ads1256_cfg cfg = {.clkin_hz = b->profile.temp_clkin_hz,
+                                    .vref_v = b->profile.temp_vref_v,
+                                    .noise_scale = b->cfg.temp_noise_scale,
+                                    .offset_v = b->cfg.temp_adc_offset_v,
+                                    .gain_error = b->cfg.temp_adc_gain_error,
+                                    .strict_timing = true};
+    const struct ads1256_io io = {.ctx = b, .ain_v = psa2_temp_ain_v, .drdy = temp_drdy};
+    ads1256_init(&b->tadc, &cfg, &io, b->sched, rng_stream(b->cfg.seed, b->cfg.serial, "adc.t"));
+}
+
+static void res_up(void *ctx, int64_t t_ns)
+{
+    struct psa2 *b = ctx;
+    b->mode = PSA2_SETUP;
+    b->reversed = b->wrong.wrong_setup_order;
+    res_pin(b, true, t_ns);
+    await_step(b, t_ns);
+}
+
+void psa2_init(struct psa2 *b, const struct psa2_profile *p, const struct board_cfg *cfg, const struct board_io *io,
+               struct sched *s)
+{
+    assert(io->accel && io->temp_degc);
+    memset(b, 0, sizeof *b); /* nothing of an earlier life, above all no time of it */
+    b->profile = *p;
+    b->cfg = *cfg;
+    b->io = *io;
+    b->sched = s;
+    b->stream = true;
+    b->board_degc = io->temp_degc(io->ctx, 3, s->now_ns);
+    init_trace(b);
+    sched_ev(&b->pulse.ev, pulse_event, b);
+    sched_ev(&b->res_up, res_up, b);
+    sched_ev(&b->patience, out_of_patience, b);
+    psa2_spi_init(b);
+    init_read(b);
+    psa2_temp_init(b);
+    psa2_out_init(b);
+    init_accel(b);
+    init_temp(b);
+}
+
+/* Everything under way ends, the lines go idle, the controller forgets. */
+static void stop_all(struct psa2 *b, int64_t t_ns)
+{
+    b->step = 0;
+    b->seq = 0;
+    b->drd_a_seen = b->fault_told = false;
+    b->sample = (struct psa2_sample){.due = false};
+    sched_cancel(b->sched, &b->patience);
+    psa2_spi_stop(b, t_ns);
+    psa2_out_stop(b, t_ns);
+    psa2_temp_restart(b);
+    pulse_stop(b, t_ns);
+    res_pin(b, false, t_ns);
+}
+
+static void enter_reset(struct psa2 *b, int64_t t_ns)
+{
+    b->mode = PSA2_IN_RESET;
+    stop_all(b, t_ns);
+    sched_at(b->sched, &b->res_up, t_ns + RES_LOW_NS);
+}
+
+/* After a power-down: the lines that rest high rise. */
+static void light_up(struct psa2 *b, int64_t t_ns)
+{
+    const uint32_t all = (UINT32_C(1) << PSA2_LINES) - 1;
+    b->dark = false;
+    trace_steps(&b->trace, &(struct trace_step){t_ns, all, b->idle_lines}, 1);
+}
+
+void psa2_power_up(struct psa2 *b, int64_t t_ns)
+{
+    psa2_tell(b, PSA2_EV_POWER_UP, t_ns);
+    if (b->dark) light_up(b, t_ns);
+    enter_reset(b, t_ns);
+    for (unsigned i = 0; i < 3; i++) ads1282_power_up(&b->adc[i], t_ns);
+    ads1256_power_up(&b->tadc, t_ns);
+}
+
+void psa2_reset(struct psa2 *b, int64_t t_ns)
+{
+    if (b->mode == PSA2_OFF) return;
+    b->counters.resets++;
+    enter_reset(b, t_ns);
+    psa2_tell(b, PSA2_EV_RES, t_ns);
+    psa2_request_fail(b, PSA2_ACCEL, true, t_ns);
+}
+
+void psa2_power_down(struct psa2 *b, int64_t t_ns)
+{
+    if (b->mode == PSA2_OFF) return;
+    b->mode = PSA2_OFF; /* from here on every line is low */
+    b->dark = true;
+    sched_cancel(b->sched, &b->res_up);
+    stop_all(b, t_ns);
+    for (unsigned i = 0; i < 3; i++) ads1282_power_off(&b->adc[i], t_ns);
+    ads1256_power_off(&b->tadc, t_ns);
+    trace_steps(&b->trace, &(struct trace_step){t_ns, (UINT32_C(1) << PSA2_LINES) - 1, 0}, 1);
+    b->stream = true;
+    b->latest = (struct psa2_frame){0};
+    psa2_tell(b, PSA2_EV_RES, t_ns);
+    psa2_tell(b, PSA2_EV_POWER_DOWN, t_ns);
+    psa2_request_fail(b, PSA2_ACCEL, true, t_ns);
+}
+
+void psa2_attach(struct psa2 *b, const struct psa2_host *h)
+{
+    b->host = *h;
+}
+
+void psa2_listen(struct psa2 *b, bool on)
+{
+    b->heard = on && b->io.event;
+}
+
+void psa2_fault_set(struct psa2 *b, const struct psa2_controller_fault *f)
+{
+    b->wrong = *f;
+}
+
+bool psa2_ready(const struct psa2 *b)
+{
+    return b->mode == PSA2_RUN;
+}
+
+void psa2_stream(struct psa2 *b, bool on)
+{
+    b->stream = on;
+}
+
+void psa2_sample_until(struct psa2 *b, int64_t t_ns)
+{
+    for (unsigned i = 0; i < 3; i++) ads1282_sample_until(&b->adc[i], t_ns);
+}

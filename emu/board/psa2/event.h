@@ -1,0 +1,36 @@
+/* What happens on a PSA-2 board, told at the very instant, and the faults of its controller: included by board/psa2/psa2.h. */
+#ifndef PSABENCH_BOARD_PSA2_EVENT_H
+#define PSABENCH_BOARD_PSA2_EVENT_H
+
+#include <stdbool.h>
+
+enum psa2_event {
+    PSA2_EV_RES,        /* Res falls */
+    PSA2_EV_SETUP_DONE, /* the set-up has been carried out */
+    PSA2_EV_SYNC_A,     /* SYNC_A rises: the converters synchronise */
+    PSA2_EV_SYNC_T,     /* SYNC_T rises again: the converter synchronises */
+    PSA2_EV_DRD_A,      /* DRD_A falls */
+    PSA2_EV_DRD_T,      /* DRD_T falls */
+    PSA2_EV_INT_FALL,   /* a frame begins on the output line */
+    PSA2_EV_INT_RISE,   /* it has been sent whole */
+    PSA2_EV_POWER_DOWN,
+    PSA2_EV_POWER_UP,
+    PSA2_EVENTS
+};
+
+extern const char *const psa2_events[PSA2_EVENTS];
+
+/* As in the list above without its prefix: "DRD_A". NULL: no such event. */
+const char *psa2_event_name(enum psa2_event e);
+
+/* Of that name, or -1. */
+int psa2_event_find(const char *name);
+
+/* What the controller KPSA does wrong, while it does. */
+struct psa2_controller_fault {
+    bool skip_sync_t;       /* never a pulse on SYNC_T: temperature words come every data period, settled or not */
+    bool wrong_setup_order; /* the set-up's steps of each data-ready event in reverse order; from the next Res on */
+    bool frozen_words;      /* the codes of the frame before, over and over; number and time go on */
+};
+
+#endif

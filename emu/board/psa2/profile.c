@@ -1,0 +1,231 @@
+#include "board/psa2/profile.h"
+
+#include "base/clk.h"
+#include "board/psa2/profile_internal.h"
+#include "chip/ads1282/ads1282.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+#define OFF(member) offsetof(struct psa2_profile, member)
+#define ROW(name, kind, lo, hi, words)                                                                                 \
+    {                                                                                                                  \
+        .key = #name, .type = BOARD_FIELD_##kind, .offset = OFF(name), .min = (lo), .max = (hi), .what = (words)       \
+    }
+
+// clang-format off
+const struct board_field psa2_fields[PSA2_FIELDS] = {
+    ROW(name, STRING, 1, 31, "Name of the profile."),
+    ROW(fclk_hz, UINT, 1e6, 4.1e6, "Crystal GOCh, clock of the accelerometer converters: 4.096 MHz at most by their data sheet, and the tolerance of a crystal above it."),
+    ROW(temp_clkin_hz, UINT, 1e5, 1e7, "Clock of the temperature converter."),
+    ROW(sclk_hz, UINT, 64e3, 2.048e6, "SClk of both serial ports."),
+    ROW(line_hz, UINT, 1e5, 1e9, "The output CLK is line_hz / line_div."),
+    ROW(line_div, UINT, 1, 65536, "Divider of the output CLK."),
+    ROW(word_bits, UINT, 16, 32, "Bits of an output word: 16, 24 or 32."),
+    ROW(lead_in_clk, UINT, 0, 255, "CLK periods from the fall of INT to the first bit."),
+    {.key = "word", .type = BOARD_FIELD_LIST, .offset = OFF(word), .min = 0, .max = 3, .what = "Order of the words X, Y, Z, T, lowest address first.",
+     .count = PSA2_WORDS, .like = "one of X, Y, Z, T", .parse = psa2_parse_word, .text = psa2_word_text},
+    ROW(code_bits, UINT, 16, 32, "Significant bits of a code in its word: 16, 24 or 32."),
+    ROW(read_bits, UINT, 24, 32, "SClk pulses of one accelerometer read: 24 or 32."),
+    ROW(gate_sclk, BOOL, 0, 1, "SClk reaches only the group addressed."),
+    ROW(temp_channels, UINT, 0, 8, "Temperature inputs scanned in turn; 0: none."),
+    ROW(adc_is_1281, BOOL, 0, 1, "ADS1281 (no gain stage) instead of ADS1282."),
+    ROW(adc_vref_v, REAL, 0.5, 5.5, "Reference of the accelerometer converters."),
+    ROW(adc_pga, UINT, 1, 64, "Gain written to CONFIG1 after the article's set-up; 1: not written."),
+    ROW(temp_vref_v, REAL, 0.5, 5.5, "Reference of the temperature converter."),
+    ROW(temp_sensor_a_per_k, REAL, 0, 1e-3, "Current of a temperature sensor per kelvin of absolute temperature."),
+    ROW(temp_load_ohm, REAL, 0, 1e6, "Load resistor RTD of a temperature sensor."),
+    {.key = "setup", .type = BOARD_FIELD_LIST, .offset = OFF(setup), .min = 1, .max = PSA2_SETUP_MAX, .what = "Transfers after Res, each on its data-ready event.",
+     .like = "like \"DRD_A write_A 41 00 56\" or \"DRD_T sync_T\"", .parse = psa2_parse_step, .text = psa2_step_text},
+};
+// clang-format on
+
+struct psa2_profile psa2_profile_default(void)
+{
+    return (struct psa2_profile){
+        .name = "article",
+        .fclk_hz = 4096000,
+        .temp_clkin_hz = 7680000,
+        .sclk_hz = 1024000,
+        .line_hz = 2000000,
+        .line_div = 1,
+        .word_bits = 32,
+        .lead_in_clk = 8,
+        .word = {PSA2_WORD_X, PSA2_WORD_Y, PSA2_WORD_Z, PSA2_WORD_T},
+        .code_bits = 24,
+        .read_bits = 24,
+        .gate_sclk = true,
+        .temp_channels = 4,
+        .adc_vref_v = 5.0,
+        .adc_pga = 2,
+        .temp_vref_v = 2.5,
+        .temp_sensor_a_per_k = 1e-6,
+        .temp_load_ohm = 10e3,
+        .setup = {{PSA2_ON_DRD_A, PSA2_WRITE_A, {0x41, 0x00, 0x56}, 3},
+                  {PSA2_ON_DRD_T, PSA2_WRITE_T, {0x50, 0x00, 0x02}, 3},
+                  {PSA2_ON_DRD_T, PSA2_WRITE_T, {0x50, 0x00, 0x04}, 3},
+                  {PSA2_ON_DRD_T, PSA2_WRITE_T, {0x53, 0x00, 0x82}, 3},
+                  {PSA2_ON_DRD_T, PSA2_SYNC_T, {0}, 0},
+                  {PSA2_ON_DRD_A, PSA2_SYNC_A, {0}, 0}},
+        .setup_count = 6,
+    };
+}
+
+unsigned psa2_frame_clks(const struct psa2_profile *p)
+{
+    return p->lead_in_clk + PSA2_WORDS * p->word_bits + (PSA2_WORDS - 1) * PSA2_GAP_CLK;
+}
+
+static int64_t line_ns(const struct psa2_profile *p, unsigned clks)
+{
+    return clk_span_ns(p->line_hz, (int64_t)clks * p->line_div);
+}
+
+int64_t psa2_int_low_ns(const struct psa2_profile *p)
+{
+    return line_ns(p, psa2_frame_clks(p));
+}
+
+/* CONFIG0 after the set-up: the value it writes there last, else that of reset. */
+static uint8_t config0_of(const struct psa2_profile *p)
+{
+    uint8_t config0 = 0x52;
+    for (unsigned i = 0; i < p->setup_count; i++) {
+        const struct psa2_setup_step *s = &p->setup[i];
+        if (s->action == PSA2_WRITE_A && s->count >= 3 && s->bytes[0] == 0x41) config0 = s->bytes[2];
+    }
+    return config0;
+}
+
+/* DR is in bits 5..3 of CONFIG0, FILTR in bits 1..0 (sources 1.2). */
+int64_t psa2_profile_period_ns(const struct psa2_profile *p)
+{
+    const uint8_t config0 = config0_of(p);
+    const unsigned dr = config0 >> 3 & 7u;
+    const unsigned fmod_periods = dr > 4 ? 256 : 4096u >> dr;
+    const unsigned decimation = (config0 & 3) == 1 ? 32 : 1; /* sinc alone gives 32 times the words */
+    return clk_span_ns(p->fclk_hz, 4 * (int64_t)fmod_periods / decimation);
+}
+
+/* Writes the sentence and is false, so that a check reads `return no(...)`. */
+static bool no(char *why, size_t cap, const char *format, ...) __attribute__((format(printf, 3, 4)));
+static bool no(char *why, size_t cap, const char *format, ...)
+{
+    va_list args;
+    va_start(args, format);
+    if (cap > 0) (void)vsnprintf(why, cap, format, args);
+    va_end(args);
+    return false;
+}
+
+static bool is_width(unsigned bits)
+{
+    return bits == 16 || bits == 24 || bits == 32;
+}
+
+static bool check_words(const struct psa2_profile *p, char *why, size_t cap)
+{
+    if (!is_width(p->word_bits)) return no(why, cap, "word_bits = %u: use 16, 24 or 32", p->word_bits);
+    if (!is_width(p->code_bits)) return no(why, cap, "code_bits = %u: use 16, 24 or 32", p->code_bits);
+    if (p->read_bits != 24 && p->read_bits != 32) return no(why, cap, "read_bits = %u: use 24 or 32", p->read_bits);
+    if (p->code_bits > p->word_bits)
+        return no(why, cap, "code_bits = %u do not fit into word_bits = %u: use code_bits <= %u or longer words",
+                  p->code_bits, p->word_bits, p->word_bits);
+    if (p->code_bits > p->read_bits)
+        return no(why, cap, "code_bits = %u but only read_bits = %u are read: use read_bits >= %u", p->code_bits,
+                  p->read_bits, p->code_bits);
+    unsigned seen = 0;
+    for (unsigned i = 0; i < PSA2_WORDS; i++)
+        if ((unsigned)p->word[i] < PSA2_WORDS) seen |= 1u << p->word[i];
+    return seen == 0xF || no(why, cap, "word: each of X, Y, Z, T must be sent once");
+}
+
+static bool check_setup(const struct psa2_profile *p, char *why, size_t cap)
+{
+    if (p->setup_count == 0 || p->setup_count > PSA2_SETUP_MAX)
+        return no(why, cap, "setup has %u steps: use 1 to %u", p->setup_count, PSA2_SETUP_MAX);
+    for (unsigned i = 0; i < p->setup_count; i++) {
+        const bool write = p->setup[i].action == PSA2_WRITE_A || p->setup[i].action == PSA2_WRITE_T;
+        if (write != (p->setup[i].count > 0) || p->setup[i].count > sizeof p->setup[i].bytes)
+            return no(why, cap, "setup step %u has %u bytes: a write has 1 to 8, a pulse none", i, p->setup[i].count);
+    }
+    return true;
+}
+
+static bool check_mode(const struct psa2_profile *p, char *why, size_t cap)
+{
+    const uint8_t config0 = config0_of(p);
+    return ads1282_models(config0) ||
+           no(why, cap, "setup: KPSA cannot read CONFIG0 = %02Xh: use pulse sync (bit 7 = 0), DR 000 to 100, FILTR 10",
+              config0);
+}
+
+/* SClk limits: ADS128x period 2..16 tCLK (M75), ADS1256 period >= 4 tau (M90): sources 1.4, 2.4. */
+static bool check_sclk(const struct psa2_profile *p, char *why, size_t cap)
+{
+    const uint32_t max_a = p->fclk_hz / 2;
+    const uint32_t max_t = p->temp_clkin_hz / 4;
+    if (p->sclk_hz > max_a)
+        return no(why, cap, "sclk_hz = %u > fclk_hz / 2 = %u: use a slower SClk", p->sclk_hz, max_a);
+    if (p->sclk_hz > max_t)
+        return no(why, cap, "sclk_hz = %u > temp_clkin_hz / 4 = %u: use a slower SClk", p->sclk_hz, max_t);
+    if (p->sclk_hz < p->fclk_hz / 16)
+        return no(why, cap, "sclk_hz = %u < fclk_hz / 16 = %u: use a faster SClk", p->sclk_hz, p->fclk_hz / 16);
+    return true;
+}
+
+static bool check_gain(const struct psa2_profile *p, char *why, size_t cap)
+{
+    if (p->adc_pga & (p->adc_pga - 1)) return no(why, cap, "adc_pga = %u: use 1, 2, 4, 8, 16, 32 or 64", p->adc_pga);
+    if (p->adc_is_1281 && p->adc_pga != 1)
+        return no(why, cap, "adc_pga = %u: the ADS1281 has no gain stage, use 1 or adc_is_1281: false", p->adc_pga);
+    return true;
+}
+
+static double line_mhz(const struct psa2_profile *p)
+{
+    return 1e-6 * (double)p->line_hz / (double)p->line_div;
+}
+
+static bool check_int_low(const struct psa2_profile *p, char *why, size_t cap)
+{
+    const int64_t low_ns = psa2_int_low_ns(p);
+    if ((low_ns + 1) * 1000000 >= PSA2_INT_LOW_MIN_NS * (1000000 - (int64_t)PSA2_CLOCK_PPM))
+        return true; /* rounded down */
+    const unsigned data = psa2_frame_clks(p) - p->lead_in_clk;
+    const int64_t one = (int64_t)p->line_div * 1000000000;
+    const int64_t need = (PSA2_INT_LOW_MIN_NS * (int64_t)p->line_hz + one - 1) / one;
+    const int64_t all = (int64_t)psa2_frame_clks(p) * 1000000000;
+    const int64_t div = (PSA2_INT_LOW_MIN_NS * (int64_t)p->line_hz + all - 1) / all;
+    return no(
+        why, cap,
+        "INT low = (%u + 4*%u + 3*%u) CLK / %.3f MHz = %.3f us < 74 us: use lead_in_clk >= %lld or line_div >= %lld",
+        p->lead_in_clk, p->word_bits, PSA2_GAP_CLK, line_mhz(p), 1e-3 * (double)low_ns, (long long)(need - data),
+        (long long)div);
+}
+
+static bool check_times(const struct psa2_profile *p, char *why, size_t cap)
+{
+    const int64_t word_ns = line_ns(p, p->word_bits);
+    if (word_ns > PSA2_WORD_NS_MAX)
+        return no(why, cap, "a word lasts %u CLK / %.3f MHz = %.3f us > %.0f us: use a faster CLK", p->word_bits,
+                  line_mhz(p), 1e-3 * (double)word_ns, 1e-3 * PSA2_WORD_NS_MAX);
+    /* From DRD_A: up to 2 SClk periods to the first edge, the bits, up to 1 CLK period to the grid of the line. */
+    const int64_t read_ns = clk_span_ns(p->sclk_hz, p->read_bits + 2) + line_ns(p, 1);
+    const int64_t low_ns = psa2_int_low_ns(p);
+    const int64_t period_ns = psa2_profile_period_ns(p);
+    return read_ns + low_ns <= period_ns ||
+           no(why, cap,
+              "reading %u bits at %.3f MHz (%.3f us) and INT low (%.3f us) make %.3f us > data period %.3f us: use "
+              "a faster sclk_hz or CLK, or a lower data rate in setup",
+              p->read_bits, 1e-6 * (double)p->sclk_hz, 1e-3 * (double)read_ns, 1e-3 * (double)low_ns,
+              1e-3 * (double)(read_ns + low_ns), 1e-3 * (double)period_ns);
+}
+
+bool psa2_profile_check(const struct psa2_profile *p, char *why, size_t cap)
+{
+    return board_field_check(psa2_fields, PSA2_FIELDS, p, why, cap) && check_words(p, why, cap) &&
+           check_setup(p, why, cap) && check_mode(p, why, cap) && check_sclk(p, why, cap) && check_gain(p, why, cap) &&
+           check_int_low(p, why, cap) && check_times(p, why, cap);
+}

@@ -1,0 +1,119 @@
+#include "board/psa2/internal.h"
+
+#define WREG_MUX 0x51
+#define RDATA    0x01
+#define AINCOM   0x08
+#define T6_TAU   50 /* command to data, sources 2.4 */
+#define KELVIN   273.15
+#define SENSORS  4u
+
+/* A current proportional to absolute temperature on the load RTD: unipolar volts (E0, as an AD590 would give). */
+double psa2_temp_ain_v(void *ctx, unsigned ain, int64_t t_ns)
+{
+    const struct psa2 *b = ctx;
+    if (ain >= SENSORS || ain >= b->profile.temp_channels) return 0.0;
+    const double temp_k = b->io.temp_degc(b->io.ctx, ain, t_ns) + KELVIN;
+    return b->profile.temp_sensor_a_per_k * temp_k * b->profile.temp_load_ohm;
+}
+
+void psa2_temp_await(struct psa2 *b, int64_t t_ns)
+{
+    sched_at(b->sched, &b->temp.patience, t_ns + PSA2_PATIENCE_NS + 4 * ads1256_settle_ns(&b->tadc));
+}
+
+static void out_of_patience(void *ctx, int64_t t_ns)
+{
+    struct psa2 *b = ctx;
+    b->counters.timeouts++;
+    if (!b->temp.fault_told && b->host.fault) b->host.fault(b->host.ctx, PSA2_FAULT_TEMP_PORT, t_ns);
+    b->temp.fault_told = true;
+    b->temp.hold = false;
+    b->temp.stage = PSA2_SCAN_MUX;
+    psa2_request_fail(b, PSA2_TEMP, false, t_ns);
+    psa2_service(b, t_ns);
+}
+
+void psa2_temp_init(struct psa2 *b)
+{
+    sched_ev(&b->temp.patience, out_of_patience, b);
+    psa2_temp_restart(b);
+}
+
+void psa2_temp_restart(struct psa2 *b)
+{
+    const struct sched_ev patience = b->temp.patience;
+    b->temp = (struct psa2_temp){.patience = patience};
+    sched_cancel(b->sched, &b->temp.patience);
+}
+
+static void synced(struct psa2 *b, int64_t t_ns)
+{
+    b->temp.stage = PSA2_SCAN_WAIT;
+    psa2_temp_await(b, t_ns);
+    psa2_service(b, t_ns);
+}
+
+static void mux_written(struct psa2 *b, int64_t t_ns)
+{
+    b->temp.stage = PSA2_SCAN_SYNC;
+    psa2_pulse(b, PSA2_TEMP, synced, t_ns);
+}
+
+static void read_done(struct psa2 *b, int64_t t_ns)
+{
+    struct psa2_temp *m = &b->temp;
+    m->code = (uint16_t)(b->spi.rx[3][1] << 8 | b->spi.rx[3][2]);
+    m->code_channel = m->channel;
+    m->fresh = true;
+    m->channel = (uint8_t)((m->channel + 1u) % b->profile.temp_channels);
+    m->stage = PSA2_SCAN_MUX;
+    psa2_service(b, t_ns);
+}
+
+/* KPSA keeps a burst out of the way of the next DRD_A; the profile without gates shows what happens if it does not. */
+static bool may_start(const struct psa2 *b, const struct psa2_xfer *x, int64_t t_ns)
+{
+    return !b->profile.gate_sclk || psa2_window(b, psa2_spi_span_ns(b, x, t_ns), t_ns);
+}
+
+bool psa2_temp_start(struct psa2 *b, int64_t t_ns)
+{
+    const struct psa2_temp *m = &b->temp;
+    const uint8_t write_mux[] = {WREG_MUX, 0x00, (uint8_t)(m->channel << 4 | AINCOM)};
+    const uint8_t read_data[] = {RDATA, 0x00, 0x00, 0x00};
+    if (b->profile.temp_channels == 0 || m->hold) return false;
+    if (m->stage != PSA2_SCAN_MUX && m->stage != PSA2_SCAN_READ) return false;
+    const bool read = m->stage == PSA2_SCAN_READ;
+    struct psa2_xfer x =
+        read ? psa2_xfer_temp(b, read_data, sizeof read_data) : psa2_xfer_temp(b, write_mux, sizeof write_mux);
+    if (read) x.gap_ns[0] = psa2_tau_ns(b, T6_TAU);
+    x.done = read ? read_done : mux_written;
+    if (!may_start(b, &x, t_ns)) return false;
+    psa2_spi_start(b, &x, t_ns);
+    return true;
+}
+
+void psa2_temp_heard(struct psa2 *b)
+{
+    b->temp.hold = b->temp.fault_told = false;
+    sched_cancel(b->sched, &b->temp.patience);
+}
+
+void psa2_temp_ready(struct psa2 *b, int64_t t_ns)
+{
+    if (b->temp.stage == PSA2_SCAN_WAIT) b->temp.stage = PSA2_SCAN_READ;
+    psa2_temp_heard(b);
+    psa2_service(b, t_ns);
+}
+
+void psa2_temp_disturbed(struct psa2 *b, int64_t t_ns)
+{
+    b->temp.hold = true;
+    b->temp.stage = PSA2_SCAN_MUX;
+    psa2_temp_await(b, t_ns);
+}
+
+bool psa2_temp_free(const struct psa2 *b)
+{
+    return !b->temp.hold && (b->temp.stage == PSA2_SCAN_MUX || b->temp.stage == PSA2_SCAN_READ);
+}

@@ -1,0 +1,383 @@
+/* The bus D0..D15 with A3..A0, R/W, CS: strobes, and the registers behind the addresses. */
+#include "board/psd1/internal.h"
+
+#include <stdio.h>
+
+typedef uint16_t read_fn(struct psd1 *b, unsigned address, int64_t t_ns);
+typedef enum board_cycle_result check_fn(const struct psd1 *b, uint16_t data);
+typedef void write_fn(struct psd1 *b, uint16_t data, int64_t t_ns);
+
+/* ---- registers ---- */
+
+static uint16_t read_word(struct psd1 *b, unsigned address, int64_t t_ns)
+{
+    (void)address;
+    (void)t_ns;
+    return psd1_rk_bus(&b->rk);
+}
+
+static uint16_t read_status(struct psd1 *b, unsigned address, int64_t t_ns)
+{
+    (void)address;
+    (void)t_ns;
+    const bool cycle = b->phase >= PSD1_RF_FALL && b->phase <= PSD1_CLEAR;
+    const unsigned bits[] = {
+        b->fl2 ? PSD1_ST_FL2 | b->axis << 1 : 0u,
+        cycle ? PSD1_ST_CYCLE : 0u,
+        b->int0 ? PSD1_ST_INT0 : 0u,
+        b->fl1 ? PSD1_ST_FL1 : 0u,
+        b->dr ? 0u : PSD1_ST_DR,
+        b->ready ? PSD1_ST_READY : 0u,
+        b->job.at || b->job.request ? PSD1_ST_COMMAND : 0u,
+        b->coef_known ? PSD1_ST_COEF : 0u,
+        b->latest.status & PSD1_CY_OVERRUN ? PSD1_ST_OVERRUN : 0u,
+        b->latest.status & PSD1_CY_LATE ? PSD1_ST_LATE : 0u,
+    };
+    unsigned all = 0;
+    for (unsigned i = 0; i < sizeof bits / sizeof *bits; i++) all |= bits[i];
+    return (uint16_t)all;
+}
+
+/* Latched at A0: of the cycle under way, else of the latest. */
+static const struct psd1_cycle *latched(const struct psd1 *b)
+{
+    return b->phase >= PSD1_RF_FALL && b->phase <= PSD1_CLEAR ? &b->now : &b->latest;
+}
+
+static uint16_t read_gyro(struct psd1 *b, unsigned address, int64_t t_ns)
+{
+    (void)t_ns;
+    return (uint16_t)latched(b)->gyro[address - PSD1_REG_GYRO_X];
+}
+
+static uint16_t read_rate(struct psd1 *b, unsigned address, int64_t t_ns)
+{
+    (void)t_ns;
+    return (uint16_t)latched(b)->rate[address - PSD1_REG_RATE_X];
+}
+
+static uint16_t read_temp(struct psd1 *b, unsigned address, int64_t t_ns)
+{
+    (void)address;
+    return psd1_aux_temp(b, t_ns);
+}
+
+static uint16_t read_service(struct psd1 *b, unsigned address, int64_t t_ns)
+{
+    (void)address;
+    return psd1_aux_service(b, t_ns);
+}
+
+static uint16_t read_uc_high(struct psd1 *b, unsigned address, int64_t t_ns)
+{
+    (void)address;
+    (void)t_ns;
+    return (uint16_t)(b->staged >> 16);
+}
+
+static uint16_t read_uc_low(struct psd1 *b, unsigned address, int64_t t_ns)
+{
+    (void)address;
+    (void)t_ns;
+    return (uint16_t)b->staged;
+}
+
+/* Bit 15: it is under way, bit 14: it has failed. */
+static uint16_t read_command(struct psd1 *b, unsigned address, int64_t t_ns)
+{
+    (void)address;
+    (void)t_ns;
+    const bool busy = b->job.request == &b->job.own;
+    return (uint16_t)(b->last_command | (busy ? 0x8000u : 0u) | (b->job.failed ? 0x4000u : 0u));
+}
+
+static uint16_t read_flags(struct psd1 *b, unsigned address, int64_t t_ns)
+{
+    (void)address;
+    (void)t_ns;
+    return (uint16_t)((b->int0 ? 1u : 0u) | (b->fl1 ? 2u : 0u));
+}
+
+static enum board_cycle_result two_bits(const struct psd1 *b, uint16_t data)
+{
+    (void)b;
+    return data < 4 ? BOARD_CYCLE_OK : BOARD_CYCLE_BAD_VALUE;
+}
+
+static enum board_cycle_result eight_bits(const struct psd1 *b, uint16_t data)
+{
+    (void)b;
+    return data < 256 ? BOARD_CYCLE_OK : BOARD_CYCLE_BAD_VALUE;
+}
+
+static void write_temp(struct psd1 *b, uint16_t data, int64_t t_ns)
+{
+    (void)t_ns;
+    b->temp_channel = (uint8_t)data;
+}
+
+static void write_service(struct psd1 *b, uint16_t data, int64_t t_ns)
+{
+    (void)t_ns;
+    b->service_channel = (uint8_t)data;
+}
+
+static void write_uc_high(struct psd1 *b, uint16_t data, int64_t t_ns)
+{
+    (void)t_ns;
+    b->staged = (b->staged & 0xFFFF) | (uint32_t)data << 16;
+}
+
+static void write_uc_low(struct psd1 *b, uint16_t data, int64_t t_ns)
+{
+    (void)t_ns;
+    b->staged = (b->staged & 0xFF0000) | data;
+}
+
+static void write_flags(struct psd1 *b, uint16_t data, int64_t t_ns)
+{
+    psd1_flags(b, data & 1, data & 2, t_ns);
+}
+
+/* ---- register COMMAND ---- */
+
+/* What a command shows at once in UC_HIGH and UC_LOW; false: it is none of those. */
+static bool shown(const struct psd1 *b, unsigned command, uint32_t *word)
+{
+    const unsigned axis = command & PSD1_CMD_AXIS, kind = command - axis;
+    const bool uc = command == PSD1_CMD_SHOW_UC1 || command == PSD1_CMD_SHOW_UC2;
+    const bool coef = axis < 3 && (kind == PSD1_CMD_ZERO || kind == PSD1_CMD_FULL);
+    if (uc) *word = command == PSD1_CMD_SHOW_UC1 ? b->uc1 : b->uc2;
+    if (coef) *word = kind == PSD1_CMD_ZERO ? b->zero[axis] : b->full[axis];
+    return uc || coef;
+}
+
+static enum board_cycle_result check_command(const struct psd1 *b, uint16_t data)
+{
+    const char *why = NULL;
+    uint32_t word;
+    if (data > 255) return BOARD_CYCLE_BAD_VALUE;
+    if (shown(b, data, &word)) return BOARD_CYCLE_OK;
+    return psd1_request_check(b, (uint8_t)data, b->staged, &why);
+}
+
+static void own_done(void *ctx, struct psd1_request *r, enum board_cycle_result result, int64_t t_ns)
+{
+    struct psd1 *b = ctx;
+    (void)t_ns;
+    b->job.failed = result != BOARD_CYCLE_OK;
+    if (!b->job.failed && r->command >= PSD1_CMD_CONTROL) b->staged = r->word;
+}
+
+static void write_command(struct psd1 *b, uint16_t data, int64_t t_ns)
+{
+    const char *why = NULL;
+    b->last_command = (uint8_t)data;
+    b->job.failed = false;
+    if (shown(b, data, &b->staged)) return;
+    b->job.own = (struct psd1_request){.command = (uint8_t)data, .word = b->staged, .done = own_done, .ctx = b};
+    b->job.failed = psd1_request(b, &b->job.own, &why, t_ns) != BOARD_CYCLE_OK; /* somebody else's came meanwhile */
+}
+
+static const struct {
+    const char *name;
+    read_fn *read;
+    check_fn *check;
+    write_fn *write;
+} registers[PSD1_REGS] = {
+    [PSD1_REG_X] = {"X", read_word, NULL, NULL},
+    [PSD1_REG_Y] = {"Y", read_word, NULL, NULL},
+    [PSD1_REG_Z] = {"Z", read_word, NULL, NULL},
+    [PSD1_REG_STATUS] = {"STATUS", read_status, NULL, NULL},
+    [PSD1_REG_GYRO_X] = {"GYRO_X", read_gyro, NULL, NULL},
+    [PSD1_REG_GYRO_X + 1] = {"GYRO_Y", read_gyro, NULL, NULL},
+    [PSD1_REG_GYRO_X + 2] = {"GYRO_Z", read_gyro, NULL, NULL},
+    [PSD1_REG_RATE_X] = {"RATE_X", read_rate, NULL, NULL},
+    [PSD1_REG_RATE_X + 1] = {"RATE_Y", read_rate, NULL, NULL},
+    [PSD1_REG_RATE_X + 2] = {"RATE_Z", read_rate, NULL, NULL},
+    [PSD1_REG_TEMP] = {"TEMP", read_temp, two_bits, write_temp},
+    [PSD1_REG_SERVICE] = {"SERVICE", read_service, two_bits, write_service},
+    [PSD1_REG_UC_HIGH] = {"UC_HIGH", read_uc_high, eight_bits, write_uc_high},
+    [PSD1_REG_UC_LOW] = {"UC_LOW", read_uc_low, NULL, write_uc_low},
+    [PSD1_REG_COMMAND] = {"COMMAND", read_command, check_command, write_command},
+    [PSD1_REG_FLAGS] = {"FLAGS", read_flags, two_bits, write_flags},
+};
+
+const char *psd1_register_name(unsigned address)
+{
+    return address < PSD1_REGS ? registers[address].name : NULL;
+}
+
+static const char *wanted_value(const struct psd1 *b, const struct board_cycle *c)
+{
+    const char *why = NULL;
+    if (registers[c->address].check == two_bits) return "it takes 0 to 3";
+    if (registers[c->address].check == eight_bits || c->data > 255) return "it takes 0 to 255";
+    (void)psd1_request_check(b, (uint8_t)c->data, b->staged, &why);
+    return why;
+}
+
+void psd1_wanted(const void *board, const struct board_cycle *c, enum board_cycle_result r, char *out, size_t cap)
+{
+    const char *const why = r == BOARD_CYCLE_BAD_VALUE ? wanted_value(board, c)
+                                                       : "STATUS (03h) has bit 0 while one does, its axis in bits 1, 2";
+    if (why) (void)snprintf(out, cap, "%s", why);
+}
+
+/* ---- strobes ---- */
+
+static void lines_begin(struct psd1 *b, bool write, unsigned address, uint16_t data, int64_t t_ns)
+{
+    psd1_put(b, PSD1_BUS,
+             (write ? 0 : PSD1_BIT(RW)) | (uint64_t)address << PSD1_LINE_AB0 | (uint64_t)data << PSD1_LINE_D0, t_ns);
+}
+
+static void lines_end(struct psd1 *b, int64_t t_ns)
+{
+    psd1_put(b, PSD1_BUS, PSD1_BIT(CS) | PSD1_BIT(RW), t_ns);
+}
+
+/* The word that waits is being read. */
+static void take(struct psd1 *b, int64_t t_ns)
+{
+    b->bus.takes = b->taken = true;
+    if (t_ns - b->fl2_ns > b->profile.late_ns) {
+        b->counters.late++;
+        b->now.status |= PSD1_CY_LATE;
+    }
+    psd1_tell(b, PSD1_EV_STROBE, t_ns);
+}
+
+static void took(struct psd1 *b)
+{
+    b->bus.takes = false;
+    b->now.status |= (uint8_t)(1u << b->axis);
+}
+
+static enum board_cycle_result refusal(const struct psd1 *b, const struct board_cycle *c, int64_t len_ns)
+{
+    if (b->phase == PSD1_OFF || b->phase == PSD1_IN_RESET) return BOARD_CYCLE_OFF;
+    if (c->address >= PSD1_REGS) return BOARD_CYCLE_NO_ADDRESS;
+    if (c->write && !registers[c->address].write) return BOARD_CYCLE_READ_ONLY;
+    if (len_ns < (int64_t)b->profile.strobe_min_ns) return BOARD_CYCLE_TOO_SHORT;
+    if (c->write) return registers[c->address].check ? registers[c->address].check(b, c->data) : BOARD_CYCLE_OK;
+    if (c->address > PSD1_REG_Z) return BOARD_CYCLE_OK;
+    if (b->profile.host_strobe_ns > 0) return BOARD_CYCLE_TAKEN;
+    return b->fl2 && !b->taken && b->axis == c->address ? BOARD_CYCLE_OK : BOARD_CYCLE_NOT_READY;
+}
+
+static void count_refusal(struct psd1 *b, enum board_cycle_result r)
+{
+    b->counters.refused++;
+    b->counters.too_short += r == BOARD_CYCLE_TOO_SHORT;
+}
+
+/* A refused strobe moves CS, R/W and the address, too. */
+static enum board_cycle_result begin(struct psd1 *b, struct board_cycle *c, int64_t t_ns)
+{
+    struct psd1_strobe *s = &b->bus;
+    const int64_t len_ns = c->strobe_ns > 0 ? c->strobe_ns : b->profile.strobe_ns;
+    const enum board_cycle_result r = refusal(b, c, len_ns);
+    if (r == BOARD_CYCLE_OFF || r == BOARD_CYCLE_NO_ADDRESS) {
+        count_refusal(b, r);
+        return r;
+    }
+    if (r != BOARD_CYCLE_OK) count_refusal(b, r);
+    else if (!c->write) c->data = registers[c->address].read(b, c->address, t_ns);
+    const bool data = c->write || r == BOARD_CYCLE_OK;
+    s->busy = true;
+    s->cycle = r == BOARD_CYCLE_OK ? c : NULL;
+    s->end_ns = t_ns + len_ns;
+    lines_begin(b, c->write, c->address, data ? c->data : 0, t_ns);
+    sched_at(b->sched, &s->ev, s->end_ns);
+    if (r != BOARD_CYCLE_OK || c->write || c->address > PSD1_REG_Z) return r;
+    take(b, t_ns);
+    return r;
+}
+
+/* The one that has waited for its turn. */
+static void next(struct psd1 *b, int64_t t_ns)
+{
+    struct board_cycle *c = b->bus.waiting;
+    b->bus.waiting = NULL;
+    if (!c) return;
+    const enum board_cycle_result r = begin(b, c, t_ns);
+    if (r != BOARD_CYCLE_OK) c->done(c->ctx, c, r, t_ns);
+}
+
+static void strobe_end(void *ctx, int64_t t_ns)
+{
+    struct psd1 *b = ctx;
+    struct psd1_strobe *s = &b->bus;
+    struct board_cycle *c = s->cycle;
+    s->busy = false;
+    s->cycle = NULL;
+    lines_end(b, t_ns);
+    if (s->takes) {
+        took(b);
+        psd1_due(b, PSD1_CLEAR, psd1_next_fall(b, t_ns));
+    }
+    if (c) {
+        b->counters.bus_cycles++;
+        if (c->write) registers[c->address].write(b, c->data, t_ns);
+        c->done(c->ctx, c, BOARD_CYCLE_OK, t_ns);
+    }
+    if (!s->busy) next(b, t_ns); /* unless done() has begun another */
+}
+
+enum board_cycle_result psd1_submit(struct psd1 *b, struct board_cycle *c, int64_t t_ns)
+{
+    if (b->phase == PSD1_OFF) return BOARD_CYCLE_OFF;
+    if (b->bus.cycle || b->bus.waiting) return BOARD_CYCLE_BUSY;
+    if (!b->bus.busy) return begin(b, c, t_ns);
+    b->bus.waiting = c;
+    return BOARD_CYCLE_OK;
+}
+
+/* ---- the built-in host ---- */
+
+bool psd1_bus_free(const struct psd1 *b)
+{
+    return !b->bus.busy;
+}
+
+void psd1_bus_host(struct psd1 *b, int64_t t_ns)
+{
+    b->bus.busy = true;
+    b->bus.end_ns = t_ns + b->profile.strobe_ns;
+    lines_begin(b, false, b->axis, psd1_rk_bus(&b->rk), t_ns);
+    take(b, t_ns);
+}
+
+void psd1_bus_over(struct psd1 *b, int64_t t_ns)
+{
+    b->bus.busy = false;
+    b->counters.bus_cycles++;
+    lines_end(b, t_ns);
+    took(b);
+    next(b, t_ns);
+}
+
+/* ---- life ---- */
+
+void psd1_bus_init(struct psd1 *b)
+{
+    sched_ev(&b->bus.ev, strobe_end, b);
+}
+
+static void cut(struct board_cycle **of, int64_t t_ns)
+{
+    struct board_cycle *c = *of;
+    *of = NULL;
+    if (c) c->done(c->ctx, c, BOARD_CYCLE_OFF, t_ns);
+}
+
+void psd1_bus_stop(struct psd1 *b, int64_t t_ns)
+{
+    struct psd1_strobe *s = &b->bus;
+    sched_cancel(b->sched, &s->ev);
+    if (s->busy) lines_end(b, t_ns);
+    s->busy = s->takes = false;
+    cut(&s->cycle, t_ns);
+    cut(&s->waiting, t_ns);
+}

@@ -1,0 +1,376 @@
+#include "board/psd1/psd1.h"
+
+#include "board/psd1/internal.h"
+
+#include <assert.h>
+#include <string.h>
+
+/* ---- the controller's event ---- */
+
+/* SYNC of the three converters: Res drives it, so that they are in step after it (article: synchronised; how is E0). */
+static void sync(struct psd1 *b, bool level, int64_t t_ns)
+{
+    for (unsigned i = 0; i < 3; i++) ad7712_sync_pin(&b->adc[i], level, t_ns);
+}
+
+/* Power and resets are over: the set-up begins. */
+static int64_t reset_over(struct psd1 *b, int64_t t_ns)
+{
+    sync(b, true, t_ns);
+    psd1_job_setup(b);
+    return psd1_job_next(b, t_ns);
+}
+
+static int64_t nothing(struct psd1 *b, int64_t t_ns)
+{
+    (void)b;
+    (void)t_ns;
+    return SCHED_NEVER;
+}
+
+static psd1_step *const steps[PSD1_PHASES] = {
+    [PSD1_OFF] = nothing,
+    [PSD1_IN_RESET] = reset_over,
+    [PSD1_IDLE] = nothing,
+    [PSD1_START] = psd1_cycle_start,
+    [PSD1_RF_FALL] = psd1_rf_fall,
+    [PSD1_RF_RISE] = psd1_rf_rise,
+    [PSD1_READY] = psd1_host_strobe,
+    [PSD1_STROBE_END] = psd1_host_end,
+    [PSD1_CLEAR] = psd1_clear,
+    [PSD1_TFS_FALL] = psd1_tfs_fall,
+    [PSD1_TFS_RISE] = psd1_tfs_rise,
+    [PSD1_AWAIT_DR] = psd1_await_dr,
+    [PSD1_COEF_A0] = psd1_coef_a0,
+    [PSD1_COEF_FALL] = psd1_coef_fall,
+    [PSD1_COEF_RISE] = psd1_coef_rise,
+};
+
+static void step_event(void *ctx, int64_t t_ns)
+{
+    struct psd1 *b = ctx;
+    b->stepping = true;
+    do t_ns = b->due_ns = steps[b->phase](b, t_ns);
+    while (t_ns != SCHED_NEVER && sched_go_on(b->sched, t_ns));
+    b->stepping = false;
+    if (t_ns != SCHED_NEVER) sched_at(b->sched, &b->ev, t_ns);
+}
+
+void psd1_due(struct psd1 *b, enum psd1_phase phase, int64_t t_ns)
+{
+    b->phase = phase;
+    b->due_ns = t_ns;
+    if (b->stepping) return;
+    if (t_ns == SCHED_NEVER) sched_cancel(b->sched, &b->ev);
+    else sched_at(b->sched, &b->ev, t_ns);
+}
+
+/* ---- pins ---- */
+
+void psd1_a0(struct psd1 *b, bool level, int64_t t_ns)
+{
+    psd1_put(b, PSD1_BIT(A0), level ? PSD1_BIT(A0) : 0, t_ns);
+    for (unsigned i = 0; i < 3; i++) ad7712_a0_pin(&b->adc[i], level, t_ns);
+}
+
+void psd1_rf(struct psd1 *b, unsigned axis, bool level, int64_t t_ns)
+{
+    const uint64_t line = PSD1_BIT(RFX) << axis;
+    psd1_put(b, line, level ? line : 0, t_ns);
+    ad7712_rfs_pin(&b->adc[axis], level, t_ns);
+}
+
+/* ---- conditions of a cycle ---- */
+
+static bool conditions(const struct psd1 *b)
+{
+    return b->ready && b->int0 && b->fl1 && !b->dr;
+}
+
+void psd1_try_start(struct psd1 *b, int64_t t_ns)
+{
+    if (b->phase != PSD1_IDLE || psd1_job_waits(b, t_ns) || !conditions(b)) return;
+    psd1_due(b, PSD1_START, psd1_next_rise(b, t_ns));
+}
+
+/* One of them has changed. What changes at the very instant of the rise is too late for it. */
+static void look_again(struct psd1 *b, int64_t t_ns)
+{
+    if (b->phase == PSD1_IDLE) psd1_try_start(b, t_ns);
+    else if (b->phase == PSD1_START && !conditions(b) && b->due_ns > t_ns) psd1_due(b, PSD1_IDLE, SCHED_NEVER);
+}
+
+void psd1_flags(struct psd1 *b, bool int0, bool fl1, int64_t t_ns)
+{
+    if (b->phase == PSD1_OFF) return;
+    b->int0 = int0;
+    b->fl1 = fl1;
+    psd1_put(b, PSD1_BIT(INT0) | PSD1_BIT(FL1), (int0 ? PSD1_BIT(INT0) : 0) | (fl1 ? 0 : PSD1_BIT(FL1)), t_ns);
+    look_again(b, t_ns);
+}
+
+void psd1_setup_done(struct psd1 *b, int64_t t_ns)
+{
+    b->ready = true;
+    b->lost = psd1_lost(b);
+    psd1_tell(b, PSD1_EV_SETUP_DONE, t_ns);
+    if (b->profile.int0 == PSD1_INT0_AUTO) psd1_flags(b, true, true, t_ns);
+}
+
+/* ---- data-ready and patience ---- */
+
+void psd1_arm_patience(struct psd1 *b, int64_t t_ns)
+{
+    b->patience_ns = t_ns + PSD1_PATIENCE_NS + 12 * ad7712_period_ns(&b->adc[0]);
+    if (!b->patience.queued || b->patience.due_ns > b->patience_ns) sched_at(b->sched, &b->patience, b->patience_ns);
+}
+
+/* A host that does not read keeps DR low: nothing is wrong with the converters then. */
+static void out_of_patience(void *ctx, int64_t t_ns)
+{
+    struct psd1 *b = ctx;
+    if (t_ns < b->patience_ns) {
+        sched_at(b->sched, &b->patience, b->patience_ns);
+        return;
+    }
+    b->counters.timeouts++;
+    if (!b->fault_told && b->host.fault) b->host.fault(b->host.ctx, PSD1_FAULT_DR, t_ns);
+    b->fault_told = true;
+    psd1_job_patience(b, t_ns);
+}
+
+static void refresh_degc(struct psd1 *b, int64_t t_ns)
+{
+    const double degc = b->io.temp_degc(b->io.ctx, 3, t_ns);
+    if (degc == b->board_degc && b->per_vref > 0.0) return;
+    b->board_degc = degc;
+    b->vref_scale = 1.0 + b->vref_error + b->vref_tc_per_k * (b->board_degc - 25.0);
+    b->per_vref = 1.0 / b->vref_scale;
+}
+
+static void dr_fell(struct psd1 *b, int64_t t_ns)
+{
+    b->dr_ns = t_ns;
+    refresh_degc(b, t_ns);
+    psd1_arm_patience(b, t_ns);
+    if (b->fault_told && b->host.fault) b->host.fault(b->host.ctx, 0, t_ns);
+    b->fault_told = false;
+    psd1_tell(b, PSD1_EV_DR, t_ns);
+    psd1_job_dr(b, t_ns);
+}
+
+static bool dr_of(const struct psd1 *b)
+{
+    const bool *const d = b->drdy;
+    if (b->profile.dr == PSD1_DR_X) return d[0];
+    return b->profile.dr == PSD1_DR_ALL ? d[0] || d[1] || d[2] : d[0] && d[1] && d[2];
+}
+
+static void on_drdy(void *ctx, bool level, int64_t t_ns)
+{
+    const struct psd1_port *port = ctx;
+    struct psd1 *b = port->b;
+    b->drdy[port->axis] = level;
+    const bool dr = dr_of(b);
+    if (dr == b->dr || b->phase == PSD1_OFF) return;
+    b->dr = dr;
+    psd1_put(b, PSD1_BIT(DR), dr ? PSD1_BIT(DR) : 0, t_ns);
+    if (!dr) dr_fell(b, t_ns);
+    look_again(b, t_ns);
+}
+
+/* The signal is on the profile's input; the other one is not connected. The reference's error is its inverse on the input. */
+static void vin_row_v(void *ctx, unsigned channel, const int64_t *t_ns, unsigned n, double *vin_v)
+{
+    const struct psd1_port *port = ctx;
+    struct psd1 *b = port->b;
+    struct afe *const afe = &b->afe[port->axis];
+    const bool connected = channel + 1 == b->profile.adc_input;
+    for (unsigned i = 0; i < n; i++) {
+        const double signal = connected ? b->io.accel(b->io.ctx, port->axis, t_ns[i]) : 0.0;
+        vin_v[i] = connected ? afe_out_v(afe, signal, b->board_degc, t_ns[i]) * b->per_vref : 0.0;
+    }
+}
+
+static double vin_v(void *ctx, unsigned channel, int64_t t_ns)
+{
+    double v = 0.0;
+    vin_row_v(ctx, channel, &t_ns, 1, &v);
+    return v;
+}
+
+/* ---- life ---- */
+
+// clang-format off
+const struct board_line psd1_lines[PSD1_LINES] = {
+    {"A0", false}, {"INT0", false}, {"FL1", true}, {"FL2", false}, {"DR", true}, {"RFX", true}, {"RFY", true}, {"RFZ", true},
+    {"TFS", true}, {"SCLK", false}, {"SDAT", false}, {"CLK_1M25", false}, {"CS", true}, {"RW", true},
+    {"AB0", false}, {"AB1", false}, {"AB2", false}, {"AB3", false},
+    {"D0", false}, {"D1", false}, {"D2", false}, {"D3", false}, {"D4", false}, {"D5", false}, {"D6", false}, {"D7", false},
+    {"D8", false}, {"D9", false}, {"D10", false}, {"D11", false}, {"D12", false}, {"D13", false}, {"D14", false}, {"D15", false},
+};
+// clang-format on
+
+const char *const psd1_events[PSD1_EVENTS] = {
+    [PSD1_EV_RES] = "RES",
+    [PSD1_EV_SETUP_DONE] = "SETUP_DONE",
+    [PSD1_EV_DR] = "DR",
+    [PSD1_EV_A0] = "A0",
+    [PSD1_EV_RFX] = "RFX",
+    [PSD1_EV_RFY] = "RFY",
+    [PSD1_EV_RFZ] = "RFZ",
+    [PSD1_EV_FL2] = "FL2",
+    [PSD1_EV_STROBE] = "STROBE",
+    [PSD1_EV_CYCLE] = "CYCLE",
+    [PSD1_EV_UC] = "UC",
+    [PSD1_EV_POWER_DOWN] = "POWER_DOWN",
+    [PSD1_EV_POWER_UP] = "POWER_UP",
+};
+
+static uint64_t rest_levels(const struct psd1 *b)
+{
+    uint64_t level = b->profile.fl2 == PSD1_ACTIVE_LOW ? PSD1_BIT(FL2) : 0;
+    for (unsigned i = 0; i < PSD1_LINES; i++) level |= (uint64_t)psd1_lines[i].level << i;
+    return level;
+}
+
+static void init_trace(struct psd1 *b)
+{
+    trace_init(&b->trace);
+    line_faults_init(&b->line, &b->trace);
+    const uint64_t level = rest_levels(b);
+    for (unsigned i = 0; i < PSD1_LINES; i++) (void)trace_add(&b->trace, psd1_lines[i].name, level >> i & 1);
+    psd1_wave_init(b);
+}
+
+static struct ad7712_cfg adc_cfg(const struct psd1 *b, unsigned axis)
+{
+    static const char *const of[] = {"psd1.adc.x", "psd1.adc.y", "psd1.adc.z"};
+    static const enum ad7712_part part[] = {AD7712_PART_7712, AD7712_PART_7710, AD7712_PART_7711};
+    const struct psd1_profile *p = &b->profile;
+    struct rng r = rng_stream(b->unit.seed, b->unit.serial, of[axis]);
+    struct ad7712_cfg c = {.part = part[p->part],
+                           .clkin_hz = p->adc_clkin_hz,
+                           .vref_v = p->adc_vref_v,
+                           .noise_scale = b->unit.adc_noise_scale,
+                           .rfs_access_ns = (int32_t)p->rfs_access_ns,
+                           .bit_access_ns = (int32_t)p->bit_access_ns,
+                           .drdy_rise_ns = (int32_t)p->drdy_rise_ns,
+                           .strict_timing = true};
+    for (unsigned i = 0; i < AD7712_CHANNELS; i++) {
+        c.offset_v[i] = rng_gauss(&r) * p->adc_offset_sd_v;
+        c.gain_error[i] = 1e-6 * rng_gauss(&r) * p->adc_gain_sd_ppm;
+    }
+    return c;
+}
+
+static void init_adc(struct psd1 *b)
+{
+    static const char *const adc_noise[] = {"adc.x", "adc.y", "adc.z"};
+    static const char *const afe_noise[] = {"afe.x", "afe.y", "afe.z"};
+    struct rng vref = rng_stream(b->unit.seed, b->unit.serial, "psd1.vref");
+    b->vref_error = 1e-6 * rng_gauss(&vref) * b->profile.vref_sd_ppm;
+    b->vref_tc_per_k = 1e-6 * rng_gauss(&vref) * b->profile.vref_tc_sd_ppm_per_k;
+    for (unsigned i = 0; i < 3; i++) {
+        const struct ad7712_cfg cfg = adc_cfg(b, i);
+        b->port[i] = (struct psd1_port){b, i};
+        const bool heard = i == 0 || b->profile.dr != PSD1_DR_X; /* else its DRDY is not connected */
+        const struct ad7712_io io = {
+            .ctx = &b->port[i], .vin_v = vin_v, .vin_row_v = vin_row_v, .drdy = heard ? on_drdy : NULL};
+        ad7712_init(&b->adc[i], &cfg, &io, b->sched, rng_stream(b->unit.seed, b->unit.serial, adc_noise[i]));
+        afe_init(&b->afe[i], &b->unit.afe[i], rng_stream(b->unit.seed, b->unit.serial, afe_noise[i]));
+        b->drdy[i] = true;
+    }
+}
+
+void psd1_init(struct psd1 *b, const struct psd1_profile *p, const struct board_cfg *cfg, const struct board_io *io,
+               struct sched *s)
+{
+    assert(io->accel && io->temp_degc);
+    memset(b, 0, sizeof *b); /* nothing of an earlier life, above all no time of it */
+    b->profile = *p;
+    b->unit = *cfg;
+    b->io = *io;
+    b->sched = s;
+    b->due_ns = SCHED_NEVER;
+    b->dr = true;
+    sched_ev(&b->ev, step_event, b);
+    sched_ev(&b->patience, out_of_patience, b);
+    init_trace(b);
+    init_adc(b);
+    psd1_bus_init(b);
+    psd1_job_init(b);
+    psd1_aux_init(b);
+    refresh_degc(b, s->now_ns);
+}
+
+void psd1_attach(struct psd1 *b, const struct psd1_host *host)
+{
+    b->host = *host;
+}
+
+/* Everything under way ends, the lines that the controller drives go to rest, it forgets. */
+static void stop_all(struct psd1 *b, enum board_cycle_result why, int64_t t_ns)
+{
+    psd1_cut(b, t_ns);
+    psd1_due(b, b->phase, SCHED_NEVER);
+    psd1_bus_stop(b, t_ns);
+    psd1_flags(b, false, false, t_ns);
+    b->ready = b->taken = b->coef_known = false;
+    b->seq = 0;
+    b->latest = (struct psd1_cycle){0};
+    b->staged = b->last_command = b->temp_channel = b->service_channel = 0;
+    b->uc1 = psd1_profile_uc1(&b->profile);
+    b->uc2 = psd1_profile_uc2(&b->profile);
+    psd1_job_stop(b, why, t_ns);
+}
+
+static void enter_reset(struct psd1 *b, int64_t t_ns)
+{
+    stop_all(b, BOARD_CYCLE_OFF, t_ns);
+    sync(b, false, t_ns);
+    psd1_due(b, PSD1_IN_RESET, t_ns + b->profile.reset_ns);
+    psd1_arm_patience(b, t_ns);
+}
+
+void psd1_power_up(struct psd1 *b, int64_t t_ns)
+{
+    if (b->phase != PSD1_OFF) return;
+    psd1_tell(b, PSD1_EV_POWER_UP, t_ns);
+    b->t0_ns = t_ns;
+    b->phase = PSD1_IN_RESET;
+    trace_put(&b->trace, TRACE_FIRST(PSD1_LINES), rest_levels(b), t_ns);
+    psd1_wave_power(b, true, t_ns);
+    psd1_aux_power_up(b, t_ns);
+    enter_reset(b, t_ns);
+    for (unsigned i = 0; i < 3; i++) ad7712_power_up(&b->adc[i], t_ns);
+}
+
+void psd1_reset(struct psd1 *b, int64_t t_ns)
+{
+    if (b->phase == PSD1_OFF) return;
+    b->counters.resets++;
+    enter_reset(b, t_ns);
+    psd1_tell(b, PSD1_EV_RES, t_ns);
+}
+
+void psd1_power_down(struct psd1 *b, int64_t t_ns)
+{
+    if (b->phase == PSD1_OFF) return;
+    stop_all(b, BOARD_CYCLE_OFF, t_ns);
+    psd1_wave_power(b, false, t_ns);
+    psd1_due(b, PSD1_OFF, SCHED_NEVER);
+    sched_cancel(b->sched, &b->patience);
+    b->fault_told = false;
+    for (unsigned i = 0; i < 3; i++) ad7712_power_off(&b->adc[i], t_ns);
+    b->dr = true;
+    trace_put(&b->trace, TRACE_FIRST(PSD1_LINES), 0, t_ns);
+    psd1_tell(b, PSD1_EV_RES, t_ns);
+    psd1_tell(b, PSD1_EV_POWER_DOWN, t_ns);
+}
+
+void psd1_sample_until(struct psd1 *b, int64_t t_ns)
+{
+    for (unsigned i = 0; i < 3; i++) ad7712_sample_until(&b->adc[i], t_ns);
+    psd1_aux_until(b, t_ns);
+}

@@ -1,0 +1,241 @@
+#include "chip/ads1256/internal.h"
+
+static uint32_t get24(const struct ads1256 *a, enum ads1256_reg low)
+{
+    return a->value[low] | (uint32_t)a->value[low + 1] << 8 | (uint32_t)a->value[low + 2] << 16;
+}
+
+static int32_t get_ofc(const struct ads1256 *a)
+{
+    return (int32_t)(get24(a, ADS1256_OFC0) ^ 0x800000) - 0x800000;
+}
+
+static void poke24(struct ads1256 *a, enum ads1256_reg low, uint32_t v)
+{
+    for (unsigned i = 0; i < 3; i++) reg_poke(&a->regs, low + i, (uint8_t)(v >> (8 * i)));
+}
+
+void ads1256_set_drdy(struct ads1256 *a, bool level, int64_t t_ns)
+{
+    if (level == a->drdy) return;
+    a->drdy = level;
+    reg_poke(&a->regs, ADS1256_STATUS, (uint8_t)((ads1256_value(a, ADS1256_STATUS) & ~ADS1256_STATUS_DRDY) | level));
+    a->io.drdy(a->io.ctx, level, t_ns);
+}
+
+/* Fraction of full scale for volts at the input of the uncalibrated path. */
+static double path_fs(const struct ads1256 *a, double vin_v)
+{
+    const double gain = (double)(1u << ads1256_pga_log2(a)) * (1.0 + a->cfg.gain_error);
+    return gain * (vin_v + a->cfg.offset_v) / (2.0 * a->cfg.vref_v);
+}
+
+static double noise_fs(struct ads1256 *a)
+{
+    const double rms_v = a->cfg.noise_scale * ads1256_noise_v(a->rate, ads1256_pga_log2(a));
+    return (double)(1u << ads1256_pga_log2(a)) * rms_v * rng_gauss(&a->noise) / (2.0 * a->cfg.vref_v);
+}
+
+static int64_t run_edge_ns(const struct ads1256 *a, int64_t tau)
+{
+    return clk_edge_ns(&a->clkin, a->start_tau + tau);
+}
+
+static int64_t ready_tau(const struct ads1256 *a, int64_t conversion)
+{
+    return ads1256_settle_tau(a->rate) + conversion * ads1256_period_tau(a->rate);
+}
+
+static void await_cell(struct ads1256 *a)
+{
+    sched_at(a->sched, &a->cell_ev, run_edge_ns(a, ads1256_cell_tau(&a->mean, a->rate, a->cell)));
+}
+
+static void await_ready(struct ads1256 *a)
+{
+    sched_at(a->sched, &a->ready_ev, run_edge_ns(a, ready_tau(a, a->ready)));
+}
+
+/* A run of conversions that began at CLKIN count start_tau: the first DRDY is t18 later. */
+static void start_run(struct ads1256 *a, int64_t start_tau)
+{
+    a->mode = ADS1256_RUNNING;
+    a->rate = a->rate_next;
+    a->start_tau = start_tau;
+    a->cell = a->ready = 0;
+    ads1256_mean_start(&a->mean, a->rate, a->cfg.cells_max);
+    await_cell(a);
+    await_ready(a);
+}
+
+/* DRATE changed without synchronisation: periods of the new length from the DRDY at CLKIN count ready on. The sinc5 goes
+ * on with what it holds; only the mean begins anew. */
+static void change_rate(struct ads1256 *a, int64_t ready)
+{
+    a->rate = a->rate_next;
+    a->start_tau = ready - ADS1256_START_TAU;
+    a->ready = 0;
+    a->cell = ads1256_mean_change(&a->mean, a->rate, a->cfg.cells_max);
+    await_cell(a);
+    await_ready(a);
+}
+
+void ads1256_freeze(struct ads1256 *a, enum ads1256_mode mode)
+{
+    sched_cancel(a->sched, &a->cell_ev);
+    sched_cancel(a->sched, &a->ready_ev);
+    sched_cancel(a->sched, &a->pulse_ev);
+    sched_cancel(a->sched, &a->cal_ev);
+    a->updating = false;
+    a->mode = mode;
+}
+
+void ads1256_halt(struct ads1256 *a, enum ads1256_mode mode, int64_t t_ns)
+{
+    ads1256_freeze(a, mode);
+    ads1256_set_drdy(a, true, t_ns);
+}
+
+void ads1256_restart(struct ads1256 *a, int64_t extra_tau, int64_t t_ns)
+{
+    ads1256_halt(a, ADS1256_RUNNING, t_ns);
+    a->n.restarts++;
+    start_run(a, clk_count_at(&a->clkin, t_ns) + extra_tau);
+}
+
+static void on_cell(void *ctx, int64_t t_ns)
+{
+    struct ads1256 *a = ctx;
+    ads1256_mean_push(&a->mean, path_fs(a, ads1256_input_v(a, t_ns)));
+    a->cell++;
+    await_cell(a);
+}
+
+static int32_t convert(struct ads1256 *a)
+{
+    bool clipped = false;
+    const double raw = a->rate->alpha * (a->mean.out + noise_fs(a));
+    const int32_t code = ads1256_code(raw, get_ofc(a), get24(a, ADS1256_FSC0), &clipped);
+    a->n.clipped += clipped;
+    return code;
+}
+
+/* The serial port's side of a new word: a read in progress goes on with the new one's bytes, each RDATAC word starts over. */
+static void offer_word(struct ads1256 *a)
+{
+    a->n.overruns += a->unread;
+    a->unread = true;
+    a->n.torn_reads += a->port == ADS1256_WORD && (a->word_left == 1 || a->word_left == 2);
+    if (a->rdatac) a->word_left = 3;
+    else if (a->port != ADS1256_WORD) a->word_left = 0;
+}
+
+static void await_pulse(struct ads1256 *a)
+{
+    sched_at(a->sched, &a->pulse_ev, run_edge_ns(a, ready_tau(a, a->ready) - ADS1256_PULSE_TAU));
+}
+
+static void on_ready(void *ctx, int64_t t_ns)
+{
+    struct ads1256 *a = ctx;
+    a->n.conversions++;
+    a->updating = a->after_sdatac = false;
+    a->word = convert(a);
+    offer_word(a);
+    a->ready++;
+    if (a->rate != a->rate_next) change_rate(a, a->start_tau + ready_tau(a, a->ready - 1));
+    else await_ready(a);
+    await_pulse(a);
+    ads1256_set_drdy(a, false, t_ns);
+}
+
+static void on_pulse(void *ctx, int64_t t_ns)
+{
+    struct ads1256 *a = ctx;
+    a->updating = true;
+    ads1256_set_drdy(a, true, t_ns);
+}
+
+/* What a calibration measures: the signal at the pins or shorted inputs and VREF; what it stores. */
+static const struct {
+    bool pins, ofc, fsc;
+} steps[] = {
+    [ADS1256_SELFCAL] = {.ofc = true, .fsc = true},
+    [ADS1256_SELFOCAL] = {.ofc = true},
+    [ADS1256_SELFGCAL] = {.fsc = true},
+    [ADS1256_SYSOCAL] = {.pins = true, .ofc = true},
+    [ADS1256_SYSGCAL] = {.pins = true, .fsc = true},
+};
+
+void ads1256_calibrate(struct ads1256 *a, enum ads1256_cal kind, int64_t t_ns)
+{
+    a->cal = kind;
+    a->cal_due = !a->sync || a->mode == ADS1256_STANDBY;
+    if (a->cal_due) { /* the filter is held: at the rise of SYNC/PDWN, at WAKEUP (E0) */
+        if (a->mode != ADS1256_STANDBY) ads1256_halt(a, ADS1256_SYNC_LOW, t_ns);
+        return;
+    }
+    ads1256_halt(a, ADS1256_CALIBRATING, t_ns);
+    a->rate = a->rate_next;
+    const int64_t end_tau = clk_count_at(&a->clkin, t_ns) + ads1256_cal_tau(a->rate, kind, ads1256_pga_log2(a));
+    const int64_t settle_tau = ads1256_settle_tau(a->rate);
+    /* The printed durations include the settling of the run that follows. Before it lies the measurement: a system
+     * calibration takes one word of the pins, whose first cell is 52 tau after the command in the shortest of them. */
+    a->start_tau = end_tau - 2 * settle_tau;
+    a->next_ok_ns = clk_edge_ns(&a->clkin, end_tau);
+    sched_at(a->sched, &a->cal_ev, run_edge_ns(a, settle_tau));
+    if (!steps[kind].pins) return;
+    ads1256_mean_start(&a->mean, a->rate, a->cfg.cells_max);
+    a->cell = 0;
+    await_cell(a);
+}
+
+static void store_ofc(struct ads1256 *a, double raw)
+{
+    bool clamped = false;
+    poke24(a, ADS1256_OFC0, (uint32_t)ads1256_cal_ofc(raw, &clamped));
+    a->n.cal_clamped += clamped;
+}
+
+static void store_fsc(struct ads1256 *a, double raw)
+{
+    bool clamped = false;
+    poke24(a, ADS1256_FSC0, ads1256_cal_fsc(a->rate, raw, &clamped));
+    a->n.cal_clamped += clamped;
+}
+
+/* The self-gain calibration is without noise (E0). */
+static void store_result(struct ads1256 *a)
+{
+    const double alpha = a->rate->alpha;
+    const bool pins = steps[a->cal].pins;
+    if (steps[a->cal].ofc) store_ofc(a, alpha * ((pins ? a->mean.out : path_fs(a, 0.0)) + noise_fs(a)));
+    if (!steps[a->cal].fsc) return;
+    store_fsc(a, pins ? alpha * (a->mean.out + noise_fs(a)) - get_ofc(a) : alpha * (1.0 + a->cfg.gain_error));
+}
+
+static void on_cal(void *ctx, int64_t t_ns)
+{
+    struct ads1256 *a = ctx;
+    a->n.calibrations++;
+    store_result(a);
+    if (a->sync) start_run(a, a->start_tau + ads1256_settle_tau(a->rate));
+    else ads1256_halt(a, ADS1256_SYNC_LOW, t_ns);
+}
+
+/* Counts of the clock go on, their instants are new ones from here on. */
+void ads1256_retime(struct ads1256 *a)
+{
+    if (a->cell_ev.queued) await_cell(a);
+    if (a->ready_ev.queued) await_ready(a);
+    if (a->pulse_ev.queued) await_pulse(a);
+    if (a->cal_ev.queued) sched_at(a->sched, &a->cal_ev, run_edge_ns(a, ads1256_settle_tau(a->rate)));
+}
+
+void ads1256_conv_init(struct ads1256 *a)
+{
+    sched_ev(&a->cell_ev, on_cell, a);
+    sched_ev(&a->ready_ev, on_ready, a);
+    sched_ev(&a->pulse_ev, on_pulse, a);
+    sched_ev(&a->cal_ev, on_cal, a);
+}

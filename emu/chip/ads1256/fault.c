@@ -1,0 +1,40 @@
+#include "chip/ads1256/fault.h"
+
+#include "chip/ads1256/internal.h"
+
+#include <assert.h>
+
+/* From the next edge on, which keeps its instant and its number. */
+static void set_clock(struct ads1256 *a, int64_t hz, int64_t t_ns)
+{
+    if (hz == a->clkin.hz) return;
+    const int64_t edge = clk_count_at(&a->clkin, t_ns);
+    const int64_t at_ns = clk_edge_ns(&a->clkin, edge);
+    a->clkin = (struct clk){.t0_ns = at_ns - clk_span_ns(hz, edge), .hz = hz, .div = 1};
+    ads1256_retime(a);
+}
+
+static void tell_nobody(void *ctx, bool level, int64_t t_ns)
+{
+    (void)ctx;
+    (void)level;
+    (void)t_ns;
+}
+
+void ads1256_fault(struct ads1256 *a, const struct ads1256_fault *f, int64_t t_ns)
+{
+    assert(f->clock_ppm >= -500000 && f->clock_ppm <= 500000);
+    const bool drdy = ads1256_drdy(a);
+    a->fault = *f;
+    a->io.drdy = f->drdy ? tell_nobody : a->tell_drdy;
+    set_clock(a, a->cfg.clkin_hz + (int64_t)a->cfg.clkin_hz * f->clock_ppm / 1000000, t_ns);
+    if (f->lost_sync) ads1256_sync_pin(a, true, t_ns); /* the wire is broken, a pull-up holds the pin */
+    spi_load(&a->spi, ads1256_on_wire(a, a->spi.out));
+    ads1256_pins_refresh(a, t_ns);
+    if (ads1256_drdy(a) != drdy) a->tell_drdy(a->io.ctx, !drdy, t_ns);
+}
+
+bool ads1256_flip(struct ads1256 *a, unsigned reg, uint8_t mask, int64_t t_ns)
+{
+    return reg_flip(&a->regs, reg, mask, t_ns);
+}

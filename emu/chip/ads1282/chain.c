@@ -1,0 +1,368 @@
+#include "chip/ads1282/internal.h"
+
+#include "base/bits.h"
+
+#include <math.h>
+#include <string.h>
+
+/* Input samples to results. Each chain is one function that takes samples up to an instant, called through a->sample: the
+ * mode is chosen when it is configured, not looked at for each sample. */
+
+/* Latency of the arithmetic behind the last sample of a word: what is left of t_DR (sources 1.6). E0. */
+#define FIR_LATENCY_TCLK  468
+#define SINC_LATENCY_TCLK 264
+#define SINC_LAG          4 /* a word of the sinc needs five blocks */
+
+#define FS_LSB  (INT64_C(1) << ADS1282_BLOCK_LOG2)
+#define DRAW_SD 37837.227475000000 /* of the sum of four uniform 16-bit numbers: sqrt((2^32 - 1) / 3) */
+
+static unsigned rate_of(const struct ads1282 *a)
+{
+    return (a->config0 & ADS1282_CONFIG0_DR) >> 3;
+}
+
+unsigned ads1282_sinc_ratio(const struct ads1282 *a)
+{
+    return 128u >> (rate_of(a) <= 4 ? rate_of(a) : 2);
+}
+
+bool ads1282_sinc_only(const struct ads1282 *a)
+{
+    return (a->config0 & ADS1282_CONFIG0_FILTR) == 1;
+}
+
+bool ads1282_bits_only(const struct ads1282 *a)
+{
+    return (a->config0 & ADS1282_CONFIG0_FILTR) == 0;
+}
+
+static bool bit_true(const struct ads1282 *a)
+{
+    return a->cfg.chain == ADS1282_CHAIN_MODULATOR || ads1282_bits_only(a);
+}
+
+/* Samples are those of the modulator's clock, not of sinc blocks or data periods. */
+static bool at_modulator_rate(const struct ads1282 *a)
+{
+    return bit_true(a) || (ads1282_sinc_only(a) && a->cfg.chain == ADS1282_CHAIN_EXACT);
+}
+
+static unsigned log2_of(unsigned power_of_two)
+{
+    unsigned n = 0;
+    while (power_of_two >> (n + 1)) n++;
+    return n;
+}
+
+/* ---- Input ---- */
+
+/* Volts, as a number of full scale 2^34, to the modulator, which saturates. Rounds to nearest without a call into libm. */
+static int64_t saturated(double x)
+{
+    const double max = ADS1282_SATURATION * (double)FS_LSB;
+    if (!(x < max)) x = max; /* not a number saturates too */
+    if (x < -max) x = -max;
+    return (int64_t)(x + 0x1p36 + 0.5) - (INT64_C(1) << 36);
+}
+
+static int64_t saturate(struct ads1282 *a, double x)
+{
+    return a->last_lsb = saturated(x);
+}
+
+/* Zero mean, unit rms after division by DRAW_SD. Four uniforms are enough: the chain averages more than 50 blocks, which
+ * leaves the output an excess kurtosis below 0.006, at a seventh of the cost of a Gaussian draw. */
+static inline double draw(struct rng *r)
+{
+    const uint64_t u = rng_u64(r);
+    const uint32_t sum =
+        (uint32_t)(u & 0xFFFF) + (uint32_t)(u >> 16 & 0xFFFF) + (uint32_t)(u >> 32 & 0xFFFF) + (uint32_t)(u >> 48);
+    return (double)sum - 131070.0;
+}
+
+static double input_v(const struct ads1282 *a)
+{
+    return a->mux == 2 || a->mux > 4 ? 0.0 : a->io.vin_v(a->io.ctx, a->mux, a->next.t_ns);
+}
+
+static void input_row_v(const struct ads1282 *a, const int64_t *t_ns, unsigned n, double *vin_v)
+{
+    const bool shorted = a->mux == 2 || a->mux > 4;
+    if (a->io.vin_row_v && !shorted) {
+        a->io.vin_row_v(a->io.ctx, a->mux, t_ns, n, vin_v);
+        return;
+    }
+    for (unsigned i = 0; i < n; i++) vin_v[i] = shorted ? 0.0 : a->io.vin_v(a->io.ctx, a->mux, t_ns[i]);
+}
+
+static int64_t noisy_input(struct ads1282 *a)
+{
+    double x = input_v(a) * a->lsb_per_v;
+    if (a->noise_lsb > 0.0) x += a->noise_lsb * draw(&a->noise);
+    return saturate(a, x);
+}
+
+/* To the next sample. */
+static void advance(struct ads1282 *a)
+{
+    a->index++;
+    a->next = clk_on(a->next, &a->step);
+}
+
+/* ---- Ideal modulator, sinc by held blocks ---- */
+
+/* As noisy_input(), for n samples whose volts are known: the generator's state stays in registers. */
+static void modulate(struct ads1282 *a, const double *vin_v, unsigned n, int64_t *lsb)
+{
+    const double lsb_per_v = a->lsb_per_v, noise_lsb = a->noise_lsb;
+    struct rng noise = a->noise;
+    for (unsigned i = 0; i < n; i++) {
+        double x = vin_v[i] * lsb_per_v;
+        if (noise_lsb > 0.0) x += noise_lsb * draw(&noise);
+        lsb[i] = saturated(x);
+    }
+    a->noise = noise;
+    a->last_lsb = lsb[n - 1];
+}
+
+/* The instants of the next samples up to until_ns, at most n; returns how many. */
+static unsigned pass(struct ads1282 *a, int64_t until_ns, unsigned n, int64_t *t_ns)
+{
+    const struct clk_step step = a->step;
+    struct clk_pos next = a->next;
+    unsigned i = 0;
+    for (; i < n && next.t_ns <= until_ns; next = clk_on(next, &step)) t_ns[i++] = next.t_ns;
+    a->next = next;
+    a->index += i;
+    return i;
+}
+
+/* Blocks up to the end of their data period at a time. */
+static void sample_fir(struct ads1282 *a, int64_t until_ns)
+{
+    while (a->next.t_ns <= until_ns) {
+        const unsigned slot = (unsigned)(a->index % ADS1282_BLOCKS);
+        const unsigned period = (unsigned)(a->index / ADS1282_BLOCKS);
+        int64_t t_ns[ADS1282_BLOCKS];
+        double vin_v[ADS1282_BLOCKS];
+        const unsigned n = pass(a, until_ns, ADS1282_BLOCKS - slot, t_ns);
+        input_row_v(a, t_ns, n, vin_v);
+        modulate(a, vin_v, n, a->sinc + slot);
+        if (slot + n == ADS1282_BLOCKS)
+            a->result[period % ADS1282_RESULTS] = ads1282_filter_period(&a->filter, a->sinc);
+    }
+}
+
+/* The sinc alone passes what a held block would lose: each clock of the modulator is sampled. N^5 times full scale needs
+ * up to 70 bits: the sample is taken in two parts. */
+static void sample_sinc(struct ads1282 *a, int64_t until_ns)
+{
+    enum { LOW = 14 };
+    const unsigned shift = 5 * log2_of(a->cic.ratio) + 4 - LOW; /* word of full scale 2^30 */
+    while (a->next.t_ns <= until_ns) {
+        int64_t high, low;
+        const int64_t x = noisy_input(a);
+        const int64_t x_high = bits_round_shift(x, LOW);
+        advance(a);
+        (void)ads1282_cic_take(&a->cic_low, x - x_high * (1 << LOW), &low);
+        if (!ads1282_cic_take(&a->cic, x_high, &high)) continue;
+        const unsigned k = (unsigned)a->block++;
+        a->result[k % ADS1282_RESULTS] = bits_round_shift(high + bits_round_shift(low, LOW), shift);
+    }
+}
+
+/* ---- Bit-true modulator ---- */
+
+/* Sinc output of gain N^5, in bits of which 2/3 are full scale, to full scale 2^34. */
+static int64_t sinc_lsb(int64_t y, unsigned ratio)
+{
+    const unsigned gain_log2 = 5 * log2_of(ratio);
+    return gain_log2 > 33 ? bits_round_shift(3 * y, gain_log2 - 33) : 3 * y * (INT64_C(1) << (33 - gain_log2));
+}
+
+static void take_sinc(struct ads1282 *a, int64_t lsb)
+{
+    const unsigned k = (unsigned)a->block++;
+    if (ads1282_sinc_only(a)) {
+        a->result[k % ADS1282_RESULTS] = bits_round_shift(lsb, 4);
+        return;
+    }
+    a->sinc[k % ADS1282_BLOCKS] = lsb;
+    if (k % ADS1282_BLOCKS == ADS1282_BLOCKS - 1)
+        a->result[k / ADS1282_BLOCKS % ADS1282_RESULTS] = ads1282_filter_fir(&a->filter, a->sinc);
+}
+
+static void sample_bit_true(struct ads1282 *a, int64_t until_ns)
+{
+    while (a->next.t_ns <= until_ns) {
+        const bool decoded = a->index >= ADS1282_MOD_DELAY;
+        int64_t y;
+        ads1282_mod_step(&a->mod, noisy_input(a));
+        advance(a);
+        if (decoded && ads1282_cic_take(&a->cic, ads1282_mod_decode(&a->mod), &y))
+            take_sinc(a, sinc_lsb(y, a->cic.ratio));
+    }
+}
+
+static void sample_bits(struct ads1282 *a, int64_t until_ns)
+{
+    while (a->next.t_ns <= until_ns) {
+        const int64_t t_ns = a->next.t_ns;
+        ads1282_mod_step(&a->mod, noisy_input(a));
+        advance(a);
+        if (a->io.modulator) a->io.modulator(a->io.ctx, a->mod.m0 & 1, a->mod.m1 & 1, t_ns);
+    }
+}
+
+/* Nobody looks at the bits. */
+static void sample_nothing(struct ads1282 *a, int64_t until_ns)
+{
+    (void)a;
+    (void)until_ns;
+}
+
+/* ---- No chain ---- */
+
+struct fir_dc {
+    double gain, delay; /* delay in blocks */
+};
+
+static struct fir_dc fir_dc(enum ads1282_phase phase)
+{
+    struct fir_dc dc = {1.0, 0.0};
+    double step = 1.0;
+    for (int s = 0; s < ADS1282_FIR_STAGES; s++) {
+        const struct ads1282_fir *fir = &ads1282_fir[phase][s];
+        double sum = 0.0;
+        double moment = 0.0;
+        for (unsigned i = 0; i < fir->taps; i++) {
+            sum += fir->tap[i];
+            moment += (double)i * fir->tap[i];
+        }
+        dc.gain *= ldexp(sum, -(int)fir->scale_log2);
+        dc.delay += step * moment / sum;
+        step *= fir->decim;
+    }
+    return dc;
+}
+
+/* Group delay at DC from the input to DRDY: the sinc's 5(N - 1)/2 + 1/2 clocks of the modulator, the FIR's, and latency. */
+static int64_t direct_delay_tclk(const struct ads1282 *a)
+{
+    const int64_t n = ads1282_sinc_ratio(a);
+    const int64_t sinc = 10 * n - 8;
+    if (ads1282_sinc_only(a)) return sinc + SINC_LATENCY_TCLK;
+    return sinc + FIR_LATENCY_TCLK + (int64_t)(4.0 * (double)n * fir_dc(a->filter.phase).delay + 0.5);
+}
+
+static void sample_direct(struct ads1282 *a, int64_t until_ns)
+{
+    while (a->next.t_ns <= until_ns) {
+        const unsigned k = (unsigned)a->index;
+        double y = (double)saturate(a, input_v(a) * a->lsb_per_v) * a->direct_gain;
+        if (a->noise_lsb > 0.0) y += a->noise_lsb * rng_gauss(&a->noise);
+        a->result[k % ADS1282_RESULTS] = (int64_t)(y + 0x1p36 + 0.5) - (INT64_C(1) << 36);
+        advance(a);
+    }
+}
+
+/* ---- Choice ---- */
+
+/* Middle of block 0. FIR: block 1 begins 1.5 N tCLK after the restart; block 0, which the restart cuts short, counts as
+ * taken with value 0. Sinc: five blocks and the latency end with the first word. Both E0. */
+static int64_t block_origin_tclk(const struct ads1282 *a)
+{
+    const int64_t n = ads1282_sinc_ratio(a);
+    return ads1282_sinc_only(a) ? a->timing.first_tclk - SINC_LATENCY_TCLK - 18 * n : -n / 2;
+}
+
+static void time_samples(struct ads1282 *a)
+{
+    struct ads1282_timing *t = &a->timing;
+    const int64_t n = ads1282_sinc_ratio(a);
+    t->step_tclk = 4 * n;
+    t->origin_tclk = block_origin_tclk(a);
+    if (at_modulator_rate(a)) {
+        t->step_tclk = 4;
+        t->origin_tclk += ads1282_sinc_only(a) ? 2 - 2 * n : 2 + 2 * n; /* the first clock of block 0, or of block 1 */
+        if (ads1282_bits_only(a)) t->origin_tclk = 4;
+    } else if (a->cfg.chain == ADS1282_CHAIN_DIRECT) {
+        t->step_tclk = t->period_tclk;
+        t->origin_tclk = t->first_tclk - direct_delay_tclk(a);
+    }
+}
+
+static void (*chain_of(const struct ads1282 *a))(struct ads1282 *, int64_t)
+{
+    if (!a->running) return sample_nothing;
+    if (ads1282_bits_only(a)) return a->io.modulator || a->io.mflag ? sample_bits : sample_nothing;
+    if (bit_true(a)) return sample_bit_true;
+    if (a->cfg.chain == ADS1282_CHAIN_DIRECT) return sample_direct;
+    return ads1282_sinc_only(a) ? sample_sinc : sample_fir;
+}
+
+void ads1282_chain_configure(struct ads1282 *a)
+{
+    a->sample = chain_of(a);
+    if (!a->running) return;
+    const bool minimum = a->config0 & ADS1282_CONFIG0_PHASE;
+    ads1282_filter_init(&a->filter, ads1282_sinc_ratio(a), minimum ? ADS1282_MINIMUM : ADS1282_LINEAR);
+    time_samples(a);
+    a->lag = ads1282_sinc_only(a) && a->cfg.chain != ADS1282_CHAIN_DIRECT ? SINC_LAG : 0;
+    a->direct_gain = (ads1282_sinc_only(a) ? 1.0 : fir_dc(a->filter.phase).gain) / 16.0;
+}
+
+/* n over 9. */
+static double choose9(double n)
+{
+    double c = 1.0;
+    for (int i = 0; i < 9; i++) c *= (n - i) / (9 - i);
+    return c;
+}
+
+/* Root of the sum of squares of the sinc's impulse response of DC gain 1, times sqrt(N). The sum is the middle coefficient
+ * of the tenth power of 1 + z + .. + z^(N-1). */
+static double sinc_noise_gain(double n)
+{
+    static const double choose10[5] = {1, -10, 45, -120, 210};
+    double sum = 0.0;
+    for (int j = 0; j < 5; j++)
+        if (5 * (n - 1) - j * n >= 0) sum += choose10[j] * choose9(5 * (n - 1) - j * n + 9);
+    return sqrt(sum / (n * n * n * n * n * n * n * n * n));
+}
+
+/* From the rms that the published figure means behind the FIR, in LSB of 2^-34 full scale, to that of one draw: the noise
+ * is white, so a modulator clock has sqrt(N) times that of a block. */
+double ads1282_chain_noise_lsb(const struct ads1282 *a, double output_lsb)
+{
+    const double block_lsb = output_lsb / ads1282_filter_noise_gain(&a->filter);
+    const double n = a->filter.sinc_ratio;
+    if (at_modulator_rate(a)) return block_lsb / DRAW_SD * sqrt(n);
+    if (a->cfg.chain != ADS1282_CHAIN_DIRECT) return block_lsb / DRAW_SD;
+    return (ads1282_sinc_only(a) ? block_lsb * sinc_noise_gain(n) : output_lsb) / 16.0;
+}
+
+/* ---- Restart ---- */
+
+/* The first input sample: none before the restart. */
+static int64_t first_index(const struct ads1282 *a)
+{
+    if (a->sample == sample_fir) return 1;
+    const struct ads1282_timing *t = &a->timing;
+    return t->origin_tclk < 0 ? (-t->origin_tclk + t->step_tclk - 1) / t->step_tclk : 0;
+}
+
+void ads1282_chain_restart(struct ads1282 *a)
+{
+    ads1282_filter_clear(&a->filter);
+    ads1282_mod_clear(&a->mod);
+    ads1282_cic_init(&a->cic, ads1282_sinc_ratio(a));
+    a->cic_low = a->cic;
+    memset(a->sinc, 0, sizeof a->sinc);
+    memset(a->result, 0, sizeof a->result);
+    const struct ads1282_timing *t = &a->timing;
+    a->index = first_index(a);
+    a->block = !ads1282_sinc_only(a);
+    a->next = clk_pos(&a->clk, a->sync_count + t->origin_tclk + a->index * t->step_tclk);
+    a->step = clk_step(&a->clk, t->step_tclk);
+}

@@ -1,0 +1,330 @@
+/* Arguments of commands: from JSON to values and back, and how the manual shows them. */
+#include "command/args.h"
+
+#include "command/events.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+enum { NAME_MAX_BYTES = 31, TEXT_MAX_BYTES = 1023 };
+
+bool control_refuse_in(struct control_refusal *r, const char *code, const char *format, ...)
+{
+    va_list ap;
+    va_start(ap, format);
+    vsnprintf(r->why, sizeof r->why, format, ap);
+    va_end(ap);
+    r->code = code;
+    return false;
+}
+
+unsigned control_arg_count(const struct control_command *row)
+{
+    unsigned n = 0;
+    while (n < CONTROL_ARGS_MAX && row->arg[n].name) n++;
+    return n;
+}
+
+/* ---- one function for each type */
+
+struct target {
+    const struct control_bench *bench;
+    const struct control_arg *arg;
+    struct control_refusal *why;
+};
+
+static bool in_range(const struct target *t, double x, double min, double max)
+{
+    const char *unit = t->arg->unit;
+    const double least = t->arg->least;
+    if (x >= min && x <= max && !(x != 0.0 && fabs(x) < least)) return true;
+    if (least > 0.0) {
+        return control_refuse_in(t->why, "range", "%s: %.10g is outside %.10g ... %.10g and %.10g ... %.10g%s%s",
+                                 t->arg->name, x, min, -least, least, max, unit ? " " : "", unit ? unit : "");
+    }
+    return control_refuse_in(t->why, "range", "%s: %.10g is outside %.10g ... %.10g%s%s", t->arg->name, x, min, max,
+                             unit ? " " : "", unit ? unit : "");
+}
+
+static bool parse_real(const struct target *t, const cJSON *j, struct control_value *v)
+{
+    if (!cJSON_IsNumber(j)) return control_refuse_in(t->why, "type", "%s: a number is wanted", t->arg->name);
+    v->real = j->valuedouble;
+    return in_range(t, v->real, t->arg->min, t->arg->max);
+}
+
+static bool parse_count(const struct target *t, const cJSON *j, struct control_value *v)
+{
+    if (!parse_real(t, j, v)) return false;
+    if (v->real != floor(v->real))
+        return control_refuse_in(t->why, "type", "%s: %.10g is not an integer", t->arg->name, v->real);
+    v->count = (uint64_t)v->real;
+    return true;
+}
+
+static bool parse_bool(const struct target *t, const cJSON *j, struct control_value *v)
+{
+    if (!cJSON_IsBool(j)) return control_refuse_in(t->why, "type", "%s: true or false is wanted", t->arg->name);
+    v->on = cJSON_IsTrue(j);
+    return true;
+}
+
+static bool parse_text(const struct target *t, const cJSON *j, struct control_value *v)
+{
+    if (!cJSON_IsString(j)) return control_refuse_in(t->why, "type", "%s: a string is wanted", t->arg->name);
+    v->text = j->valuestring;
+    if (strlen(v->text) > TEXT_MAX_BYTES)
+        return control_refuse_in(t->why, "range", "%s: longer than %d bytes", t->arg->name, TEXT_MAX_BYTES);
+    return *v->text || control_refuse_in(t->why, "range", "%s: is empty", t->arg->name);
+}
+
+static bool parse_name(const struct target *t, const cJSON *j, struct control_value *v)
+{
+    if (!parse_text(t, j, v)) return false;
+    bool good = strlen(v->text) <= NAME_MAX_BYTES;
+    for (const char *s = v->text; *s; s++) good = good && *s > ' ' && *s <= '~';
+    return good ||
+           control_refuse_in(t->why, "range", "%s: \"%.40s\" is no name: up to %d printable characters without spaces",
+                             t->arg->name, v->text, NAME_MAX_BYTES);
+}
+
+static size_t join(char *out, size_t cap, size_t at, const char *word)
+{
+    const int n = at < cap ? snprintf(out + at, cap - at, "%s%s", at ? ", " : "", word) : 0;
+    return at + (size_t)n;
+}
+
+static bool parse_choice(const struct target *t, const cJSON *j, struct control_value *v)
+{
+    if (!parse_text(t, j, v)) return false;
+    char words[192] = "";
+    size_t at = 0;
+    for (v->choice = 0; t->arg->choices[v->choice]; v->choice++) {
+        const char *word = t->arg->choices[v->choice];
+        if (strcmp(word, v->text) == 0) {
+            v->text = word;
+            return true;
+        }
+        at = join(words, sizeof words, at, word);
+    }
+    return control_refuse_in(t->why, "range", "%s: \"%.40s\" is none of %s", t->arg->name, v->text, words);
+}
+
+static bool parse_unit(const struct target *t, const cJSON *j, struct control_value *v)
+{
+    if (!parse_text(t, j, v)) return false;
+    char names[160] = "";
+    size_t at = 0;
+    for (v->unit = 0; v->unit < t->bench->units; v->unit++) {
+        if (strcmp(t->bench->unit_name[v->unit], v->text) == 0) return true;
+        at = join(names, sizeof names, at, t->bench->unit_name[v->unit]);
+    }
+    v->unit = 0;
+    return control_refuse_in(t->why, "range", "%s: no unit \"%.40s\"; there is %s", t->arg->name, v->text, names);
+}
+
+static bool parse_reals(const struct target *t, const cJSON *j, struct control_value *v)
+{
+    const cJSON *item;
+    if (!cJSON_IsArray(j)) return control_refuse_in(t->why, "type", "%s: a list of numbers is wanted", t->arg->name);
+    v->n = 0;
+    cJSON_ArrayForEach(item, j)
+    {
+        if (v->n == CONTROL_REALS_MAX)
+            return control_refuse_in(t->why, "range", "%s: more than %u numbers", t->arg->name, CONTROL_REALS_MAX);
+        if (!cJSON_IsNumber(item))
+            return control_refuse_in(t->why, "type", "%s: a list of numbers is wanted", t->arg->name);
+        if (!in_range(t, item->valuedouble, t->arg->min, t->arg->max)) return false;
+        v->reals[v->n++] = item->valuedouble;
+    }
+    return v->n > 0 ||
+           control_refuse_in(t->why, "range", "%s: 1 to %u numbers are wanted", t->arg->name, CONTROL_REALS_MAX);
+}
+
+/* ---- and back */
+
+static cJSON *number(const struct control_value *v)
+{
+    return cJSON_CreateNumber(v->real);
+}
+
+static cJSON *boolean(const struct control_value *v)
+{
+    return cJSON_CreateBool(v->on);
+}
+
+static cJSON *string(const struct control_value *v)
+{
+    return cJSON_CreateString(v->text);
+}
+
+static cJSON *numbers(const struct control_value *v)
+{
+    return cJSON_CreateDoubleArray(v->reals, (int)v->n);
+}
+
+static const struct {
+    const char *name;
+    bool (*parse)(const struct target *t, const cJSON *j, struct control_value *v);
+    cJSON *(*print)(const struct control_value *v);
+    bool numeric;
+} types[] = {
+    [CONTROL_REAL] = {"number", parse_real, number, true},
+    [CONTROL_COUNT] = {"integer", parse_count, number, true},
+    [CONTROL_BOOL] = {"boolean", parse_bool, boolean, false},
+    [CONTROL_NAME] = {"string", parse_name, string, false},
+    [CONTROL_TEXT] = {"string", parse_text, string, false},
+    [CONTROL_CHOICE] = {"choice", parse_choice, string, false},
+    [CONTROL_EVENT] = {"choice", parse_name, string, false},
+    [CONTROL_UNIT] = {"unit", parse_unit, string, false},
+    [CONTROL_REALS] = {"numbers", parse_reals, numbers, true},
+};
+
+const char *control_choice(const struct control_arg *a, unsigned i)
+{
+    if (a->type == CONTROL_EVENT) return control_event(i);
+    return a->choices ? a->choices[i] : NULL;
+}
+
+const char *control_type_name(enum control_type type)
+{
+    return types[type].name;
+}
+
+bool control_type_numeric(enum control_type type)
+{
+    return types[type].numeric;
+}
+
+cJSON *control_args_json(const struct control_command *row, const struct control_value *v)
+{
+    cJSON *args = cJSON_CreateObject();
+    for (unsigned i = 0; i < control_arg_count(row); i++) {
+        if (v[i].given) cJSON_AddItemToObject(args, row->arg[i].name, types[row->arg[i].type].print(&v[i]));
+    }
+    return args;
+}
+
+/* ---- all arguments of a command */
+
+static const struct control_arg *find_arg(const struct control_command *row, const char *name)
+{
+    for (unsigned i = 0; i < control_arg_count(row); i++) {
+        if (strcmp(row->arg[i].name, name) == 0) return &row->arg[i];
+    }
+    return NULL;
+}
+
+static bool refuse_unknown(struct control_refusal *why, const struct control_command *row, const char *name)
+{
+    char known[160] = "";
+    size_t at = 0;
+    for (unsigned i = 0; i < control_arg_count(row); i++) at = join(known, sizeof known, at, row->arg[i].name);
+    return control_refuse_in(why, "argument", "no argument \"%.40s\"; it takes %s", name, at ? known : "none");
+}
+
+void control_arg_limits(const struct control_bench *b, const struct control_arg *a, const struct control_value *v,
+                        double *min, double *max)
+{
+    *min = a->min;
+    *max = a->max;
+    if (a->limits && b->lab) a->limits(b, v, min, max);
+}
+
+/* What only this bench's instruments can tell; the arguments before this one are good. */
+static bool within_limits(const struct target *t, const struct control_value *all, const struct control_value *v)
+{
+    double min, max;
+    if (!v->given || !t->arg->limits) return true;
+    control_arg_limits(t->bench, t->arg, all, &min, &max);
+    for (unsigned i = 0; i < v->n; i++) {
+        if (!in_range(t, v->reals[i], min, max)) return false;
+    }
+    return t->arg->type == CONTROL_REALS || in_range(t, v->real, min, max);
+}
+
+bool control_args(const struct control_bench *b, const struct control_command *row, const cJSON *args,
+                  struct control_value v[CONTROL_ARGS_MAX], struct control_refusal *why)
+{
+    memset(v, 0, CONTROL_ARGS_MAX * sizeof *v);
+    if (args && !cJSON_IsObject(args)) return control_refuse_in(why, "syntax", "args: an object is wanted");
+    const cJSON *j;
+    cJSON_ArrayForEach(j, args)
+    {
+        const struct control_arg *a = find_arg(row, j->string);
+        if (!a) return refuse_unknown(why, row, j->string);
+        struct control_value *value = &v[a - row->arg];
+        if (value->given) return control_refuse_in(why, "argument", "%s is given twice", a->name);
+        if (!types[a->type].parse(&(struct target){b, a, why}, j, value)) return false;
+        value->given = true;
+    }
+    for (unsigned i = 0; i < control_arg_count(row); i++) {
+        const struct control_arg *a = &row->arg[i];
+        if (!v[i].given && !a->optional)
+            return control_refuse_in(why, "argument", "%s is missing: %s", a->name, a->what);
+        if (!within_limits(&(struct target){b, a, why}, v, &v[i])) return false;
+    }
+    return !row->check || row->check(b, v, why);
+}
+
+/* ---- the table for people */
+
+static size_t markdown_arg(const struct control_arg *a, char *out, size_t cap)
+{
+    size_t at = (size_t)snprintf(out, cap, "`%s`%s %s", a->name, a->optional ? " (optional)" : "", a->what);
+    if (types[a->type].numeric && at < cap) {
+        at += (size_t)snprintf(out + at, cap - at, ", %.10g to ", a->min);
+        if (a->least > 0.0 && at < cap) {
+            at += (size_t)snprintf(out + at, cap - at, "%.10g and %.10g to ", -a->least, a->least);
+        }
+        if (at < cap) {
+            at += (size_t)snprintf(out + at, cap - at, "%.10g%s%s", a->max, a->unit ? " " : "", a->unit ? a->unit : "");
+        }
+    }
+    const char *word;
+    for (unsigned i = 0; (word = control_choice(a, i)) && at < cap; i++) {
+        at += (size_t)snprintf(out + at, cap - at, "%s%s", i ? ", " : ": ", word);
+    }
+    return at;
+}
+
+const struct control_command *control_row(const struct control_table *const *tables, unsigned i)
+{
+    for (; *tables; i -= (*tables)->count, tables++) {
+        if (i < (*tables)->count) return &(*tables)->row[i];
+    }
+    return NULL;
+}
+
+const struct control_command *control_find(const struct control_table *const *tables, const char *name)
+{
+    const struct control_command *row;
+    for (unsigned i = 0; (row = control_row(tables, i)); i++) {
+        if (strcmp(row->name, name) == 0) return row;
+    }
+    return NULL;
+}
+
+static const char *markdown_args(const struct control_command *row, char *out, size_t cap)
+{
+    size_t at = 0;
+    snprintf(out, cap, "none");
+    for (unsigned i = 0; i < control_arg_count(row) && at + 2 < cap; i++) {
+        if (i) at += (size_t)snprintf(out + at, cap - at, "; ");
+        at += markdown_arg(&row->arg[i], out + at, cap - at);
+    }
+    return out;
+}
+
+bool control_markdown(const struct control_table *const *tables, unsigned line, char *out, size_t cap)
+{
+    char args[8192];
+    if (line == 0) snprintf(out, cap, "| command | what it does | arguments |");
+    if (line == 1) snprintf(out, cap, "|---|---|---|");
+    if (line < 2) return true;
+    const struct control_command *row = control_row(tables, line - 2);
+    if (row) snprintf(out, cap, "| `%s` | %s | %s |", row->name, row->what, markdown_args(row, args, sizeof args));
+    return row != NULL;
+}

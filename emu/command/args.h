@@ -1,0 +1,40 @@
+/* Arguments of commands, their types by name, values as JSON, and the ranges in force. */
+#ifndef PSABENCH_COMMAND_ARGS_H
+#define PSABENCH_COMMAND_ARGS_H
+
+#include "command/command.h"
+
+const char *control_type_name(enum control_type type);
+bool control_type_numeric(enum control_type type); /* has a range, perhaps a unit */
+
+unsigned control_arg_count(const struct control_command *row);
+
+/* Fills v[CONTROL_ARGS_MAX] from a JSON object (NULL: no arguments); strings stay the object's. False with the refusal. Of
+ * the bench it needs unit_name; ranges that depend on the instruments are checked when lab is there. */
+bool control_args(const struct control_bench *b, const struct control_command *row, const cJSON *args,
+                  struct control_value v[CONTROL_ARGS_MAX], struct control_refusal *why);
+
+/* The i-th word that an argument takes, asked for in order; NULL past the last, and where any will do. */
+const char *control_choice(const struct control_arg *a, unsigned i);
+
+/* Writes down a refusal and returns false. */
+__attribute__((format(printf, 3, 4))) bool control_refuse_in(struct control_refusal *r, const char *code,
+                                                             const char *format, ...);
+
+/* The arguments that were given, as they would be sent. The caller deletes it. */
+cJSON *control_args_json(const struct control_command *row, const struct control_value *v);
+
+/* The range of an argument on this bench; v: the arguments before it. */
+void control_arg_limits(const struct control_bench *b, const struct control_arg *a, const struct control_value *v,
+                        double *min, double *max);
+
+/* ---- rows */
+
+/* The i-th row of the tables; NULL past the last. */
+const struct control_command *control_row(const struct control_table *const *tables, unsigned i);
+const struct control_command *control_find(const struct control_table *const *tables, const char *name);
+
+/* The table as Markdown, for docs/emulator.md and --list-commands: next line into out, false at the end. */
+bool control_markdown(const struct control_table *const *tables, unsigned line, char *out, size_t cap);
+
+#endif

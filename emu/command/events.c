@@ -1,0 +1,50 @@
+#include "command/events.h"
+
+#include "command/args.h"
+#include "unit/boards.h"
+
+#include <stdio.h>
+#include <string.h>
+
+static bool among(const char *const *names, unsigned n, const char *name)
+{
+    for (unsigned i = 0; i < n; i++) {
+        if (strcmp(names[i], name) == 0) return true;
+    }
+    return false;
+}
+
+/* Whether a type before this one in the list has an event of that name. */
+static bool met_before(const struct board_type *const *type, const char *name)
+{
+    for (const struct board_type *const *t = board_types; t < type; t++) {
+        if (among((*t)->events, (*t)->event_count, name)) return true;
+    }
+    return false;
+}
+
+const char *control_event(unsigned i)
+{
+    for (const struct board_type *const *t = board_types; *t; t++) {
+        for (unsigned e = 0; e < (*t)->event_count; e++) {
+            if (!met_before(t, (*t)->events[e]) && i-- == 0) return (*t)->events[e];
+        }
+    }
+    return NULL;
+}
+
+bool control_event_find(const struct control_bench *b, unsigned unit, const char *arg, const char *name,
+                        unsigned *event, struct control_refusal *why)
+{
+    char known[160] = "";
+    size_t at = 0;
+    if (unit >= b->units) return control_refuse_in(why, "state", "%s: there is no unit", arg);
+    const struct board_type *t = b->unit[unit]->type;
+    for (*event = 0; *event < t->event_count; ++*event) {
+        const char *other = t->events[*event];
+        if (strcmp(other, name) == 0) return true;
+        if (at < sizeof known) at += (size_t)snprintf(known + at, sizeof known - at, "%s%s", at ? ", " : "", other);
+    }
+    return control_refuse_in(why, "range", "%s: no event \"%.20s\" on %s, a %s; there is %s", arg, name,
+                             b->unit_name[unit], t->title, known);
+}

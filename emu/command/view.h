@@ -1,0 +1,86 @@
+/* What the commands may reach of the bench. The application fills it in; callbacks get ctx. */
+#ifndef PSABENCH_COMMAND_VIEW_H
+#define PSABENCH_COMMAND_VIEW_H
+
+#include "base/can.h"
+#include "phys/lab.h"
+#include "unit/unit.h"
+
+#define CONTROL_UNITS_MAX 64u
+#define CONTROL_BUSES_MAX 8u
+#define CONTROL_WHY_MAX   256u
+
+/* One client of a CAN adapter, or the sum of those who left. */
+struct control_client {
+    const char *adapter, *name;
+    uint32_t came;  /* its number, in order of coming, for ever */
+    uint32_t place; /* came of the first at its place on the bus: another than its own if it took over from a ghost */
+    uint64_t delivered, taken, dropped, overrun, refused;
+};
+
+/* Lateness of the wall pace. */
+struct control_pace {
+    const char *name; /* wall, step, free */
+    bool by_step;     /* time moves only when told */
+    uint64_t turns, late, slips;
+    double p50_us, p99_us, p999_us, max_us; /* of events */
+    uint64_t frames;
+    double frame_p50_us, frame_p99_us, frame_p999_us, frame_max_us; /* of frames handed to the kernel */
+};
+
+struct control_command;
+struct fault_engine;
+struct cJSON;
+
+/* Endpoints of a bench that is doubled. */
+struct control_fork {
+    const char *control, *can, *truth; /* paths of sockets, truth may be NULL; can: as --can, several with spaces */
+};
+
+struct control_bench {
+    void *ctx;
+    struct lab *lab;
+    struct can_bus *bus[CONTROL_BUSES_MAX];
+    const char *bus_name[CONTROL_BUSES_MAX];  /* NULL: can0, can1, ... */
+    struct can_node *host[CONTROL_BUSES_MAX]; /* who sends for the bench itself */
+    unsigned buses;
+    struct unit *unit[CONTROL_UNITS_MAX];
+    const char *unit_name[CONTROL_UNITS_MAX];
+    struct can_node *node[CONTROL_UNITS_MAX]; /* of the unit on the bus; may be NULL */
+    unsigned units;
+    struct sched *sched;
+    uint64_t seed;
+    const char *scenario;
+    struct fault_engine *faults; /* NULL: no commands of faults */
+
+    /* Time is to move by for_ns once after_tx frames of clients have been taken, or a client's queue is full, which only time
+     * empties; control_run_done() is called then. False with a sentence in why when it cannot. */
+    bool (*run)(void *ctx, int64_t for_ns, uint64_t after_tx, char *why);
+    void (*run_stop)(void *ctx); /* from within an event: the run ends at this instant */
+    void (*quit)(void *ctx);
+    /* A line for a client of the control socket that is no reply. NULL: there are no subscriptions. */
+    void (*push)(void *ctx, void *client, const char *line);
+    void (*reply)(void *ctx, void *client, const char *line); /* one that is due, at any time but from control_line() */
+    /* Save the bench, double it. False with a sentence in why. NULL: it cannot. */
+    bool (*snapshot)(void *ctx, const char *path, struct cJSON *result, char *why);
+    bool (*fork)(void *ctx, const struct control_fork *f, struct cJSON *result, char *why);
+    /* Adds "endpoints": where programs connect. False without memory. NULL: nobody can. */
+    bool (*endpoints)(void *ctx, struct cJSON *result);
+    /* The supply was told something else: its next brown-out has to be asked for anew. May be NULL. */
+    void (*supply_changed)(void *ctx, int64_t t_ns);
+    bool (*vcd_flush)(void *ctx, char *why);
+    bool (*vcd_start)(void *ctx, const char *path, unsigned unit, char *why); /* NULL: it cannot */
+    bool (*vcd_stop)(void *ctx, char *why);
+    uint64_t (*can_rx)(void *ctx); /* frames delivered to the client that has been on the bus longest */
+    bool (*client)(void *ctx, unsigned i,
+                   struct control_client *out); /* i-th in order of coming; false past the last */
+    void (*gone)(void *ctx, struct control_client *out);
+    struct can_node *(*client_node)(void *ctx, uint32_t place); /* of the client there; NULL: it has left */
+    bool (*stall)(void *ctx, const struct can_node *client,
+                  bool on); /* its program reads nothing; false: it has gone */
+    void (*pace)(void *ctx, struct control_pace *out);
+    /* A command that changes the bench's future was carried out; args as it was given. May be NULL. */
+    void (*journal)(void *ctx, const struct control_command *row, const struct cJSON *args, bool done, int64_t t_ns);
+};
+
+#endif

@@ -1,0 +1,174 @@
+/* Which faults are refused, and why: the kind, the point, the values, the instant. */
+#include "fault/internal.h"
+
+#include "command/args.h"
+#include "command/events.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+const struct fault_table *const fault_tables[] = {&fault_sensor,     &fault_analog,   &fault_chip,
+                                                  &fault_controller, &fault_line,     &fault_link,
+                                                  &fault_supply,     &fault_platform, NULL};
+
+const struct fault_kind *fault_kind(unsigned i)
+{
+    for (unsigned t = 0; fault_tables[t]; t++) {
+        if (i < fault_tables[t]->count) return &fault_tables[t]->kind[i];
+        i -= fault_tables[t]->count;
+    }
+    return NULL;
+}
+
+const struct fault_kind *fault_kind_find(const char *name)
+{
+    const struct fault_kind *k;
+    for (unsigned i = 0; (k = fault_kind(i)) != NULL; i++) {
+        if (strcmp(k->name, name) == 0) return k;
+    }
+    return NULL;
+}
+
+static void join(char *out, size_t cap, const char *word)
+{
+    const size_t at = strlen(out);
+    snprintf(out + at, cap - at, "%s%s", at ? ", " : "", word);
+}
+
+/* ---- kind and point */
+
+static bool find_kind(const char *name, const struct fault_kind **kind, struct control_refusal *why)
+{
+    char known[160] = "";
+    const struct fault_kind *k;
+    *kind = fault_kind_find(name);
+    if (*kind) return true;
+    const char *dot = strchr(name, '.');
+    const size_t layer = dot ? (size_t)(dot - name) + 1 : 0;
+    for (unsigned i = 0; (k = fault_kind(i)) != NULL; i++) {
+        if (layer && strncmp(k->name, name, layer) == 0) join(known, sizeof known, k->name);
+    }
+    if (!known[0]) return control_refuse_in(why, "range", "kind: no \"%.40s\"; fault.kinds lists them", name);
+    return control_refuse_in(why, "range", "kind: no \"%.40s\"; there is %s", name, known);
+}
+
+static bool find_point(const struct control_bench *b, const char *text, struct fault *f, struct control_refusal *why)
+{
+    if (fault_point_find(b, text, &f->point, f->name)) return true;
+    return control_refuse_in(why, "range", "point: no \"%.40s\" on this bench; fault.points lists them", text);
+}
+
+static bool has_unit(enum fault_place place)
+{
+    return place < FAULT_AT_BUS;
+}
+
+/* Where a kind works, in the names of the board that the point is on, or of the boards that there are. */
+static void join_places(const struct control_bench *b, const struct fault *f, char *out, size_t cap)
+{
+    char name[FAULT_POINT_MAX];
+    const bool on_board = has_unit(f->point.place);
+    const struct fault_types t = on_board ? fault_type_of(b->unit[f->point.unit]->type) : fault_types_of(b);
+    for (unsigned p = 0; p < FAULT_PLACES; p++) {
+        for (unsigned i = 0; f->kind->places & FAULT_BIT(p) && fault_place_name(&t, (enum fault_place)p, i, name); i++)
+            join(out, cap, name);
+    }
+}
+
+bool fault_fits(const struct control_bench *b, const struct fault *f, char *why)
+{
+    char places[120] = "";
+    if (f->kind->places & FAULT_BIT(f->point.place)) return !f->kind->fits || f->kind->fits(b, f, why);
+    join_places(b, f, places, sizeof places);
+    if (!places[0]) snprintf(places, sizeof places, "other boards");
+    snprintf(why, CONTROL_WHY_MAX, "%s: not on %s, which is %s; it works on %s", f->kind->name, f->name,
+             fault_place_what(f->point.place), places);
+    return false;
+}
+
+/* ---- values */
+
+static int64_t ns(double s)
+{
+    return (int64_t)nearbyint(s * (double)NS_PER_S);
+}
+
+bool fault_values_fit(const struct fault *f, struct control_refusal *why)
+{
+    const struct fault_kind *k = f->kind;
+    for (unsigned i = FAULT_FOR_S; i < FAULT_ARGS; i++) {
+        const char *name = fault_arg_name((enum fault_arg)i);
+        const bool given = fault_given(f, (enum fault_arg)i);
+        if (given && i != FAULT_FOR_S && !((k->need | k->may) & FAULT_BIT(i))) {
+            return control_refuse_in(why, "argument", "%s: %s takes no such value", name, k->name);
+        }
+        if (!given && (k->need & FAULT_BIT(i))) {
+            return control_refuse_in(why, "argument", "%s is missing: %s", name, fault_arg_what((enum fault_arg)i));
+        }
+        if (given && (k->nonzero & FAULT_BIT(i)) && f->value[i] == 0.0) {
+            return control_refuse_in(why, "range", "%s: 0 would change nothing", name);
+        }
+        if ((i == FAULT_FOR_S || i == FAULT_HOLD_S) && f->value[i] > 0.0 && ns(f->value[i]) == 0) {
+            return control_refuse_in(why, "range", "%s: %.10g: less than a nanosecond", name, f->value[i]);
+        }
+    }
+    return !k->once || !fault_given(f, FAULT_FOR_S) ||
+           control_refuse_in(why, "argument", "for_s: %s is over as soon as it is done", k->name);
+}
+
+/* ---- when */
+
+static bool find_event(const struct control_bench *b, unsigned unit, const struct control_value *v, const char *arg,
+                       int *event, struct control_refusal *why)
+{
+    unsigned number;
+    *event = FAULT_NO_EVENT;
+    if (!v->given) return true;
+    if (!control_event_find(b, unit, arg, v->text, &number, why)) return false;
+    *event = (int)number;
+    return true;
+}
+
+static bool set_trigger(const struct control_bench *b, const struct control_value *v, struct fault *f,
+                        struct control_refusal *why)
+{
+    static const enum fault_arg of_events[] = {FAULT_COUNT, FAULT_SINCE, FAULT_UNIT, FAULT_DELAY_S};
+    int after, since;
+    f->trigger.after = FAULT_NO_EVENT;
+    f->unit = v[FAULT_UNIT].given ? v[FAULT_UNIT].unit : f->point.unit;
+    for (unsigned i = 0; !v[FAULT_AFTER].given && i < sizeof of_events / sizeof *of_events; i++) {
+        const char *name = fault_arg_name(of_events[i]);
+        if (v[of_events[i]].given)
+            return control_refuse_in(why, "argument", "%s: only with after, an event's name", name);
+    }
+    if (!v[FAULT_AFTER].given) return true;
+    if (!v[FAULT_UNIT].given && !has_unit(f->point.place) && b->units != 1)
+        return control_refuse_in(why, "argument", "unit is missing: whose events count");
+    if (!find_event(b, f->unit, &v[FAULT_AFTER], "after", &after, why)) return false;
+    if (!find_event(b, f->unit, &v[FAULT_SINCE], "since", &since, why)) return false;
+    if (after == since) return control_refuse_in(why, "range", "since: is after itself");
+    f->trigger = fault_trigger(after, since, v[FAULT_COUNT].given ? (unsigned)v[FAULT_COUNT].count : 1);
+    return true;
+}
+
+bool fault_make(const struct control_bench *b, const struct control_value *v, struct fault *out,
+                struct control_refusal *why)
+{
+    memset(out, 0, sizeof *out);
+    for (unsigned i = 0; i < FAULT_ARGS; i++) {
+        if (!v[i].given) continue;
+        out->given |= FAULT_BIT(i);
+        out->value[i] = i == FAULT_LEVEL ? (double)v[i].choice : v[i].real;
+    }
+    out->at_ns = ns(out->value[FAULT_AT_S]);
+    out->delay_ns = ns(out->value[FAULT_DELAY_S]);
+    out->for_ns = ns(out->value[FAULT_FOR_S]);
+    if (!find_kind(v[FAULT_KIND].text, &out->kind, why) || !find_point(b, v[FAULT_POINT].text, out, why)) return false;
+    if (!set_trigger(b, v, out, why)) return false;
+    why->code = "point";
+    if (!(out->kind->places & FAULT_BIT(out->point.place))) return fault_fits(b, out, why->why);
+    if (!fault_values_fit(out, why)) return false;
+    why->code = "point";
+    return fault_fits(b, out, why->why);
+}

@@ -1,0 +1,151 @@
+/* Faults of the chips and of the controller of a board, as its table says (board_type.parts, board_type.wrongs). Those of a
+ * chip add up: its hook is given the sum of what is active. */
+#include "fault/internal.h"
+
+#include <math.h>
+#include <stdio.h>
+
+static const struct board_part *part_of(const struct control_bench *b, const struct fault *f)
+{
+    return &b->unit[f->point.unit]->type->parts[f->point.index];
+}
+
+static bool here(const struct fault *f, const struct fault *other)
+{
+    return other->id != 0 && other->state == FAULT_ACTIVE && !other->kind->once &&
+           other->point.place == f->point.place && other->point.unit == f->point.unit &&
+           other->point.index == f->point.index;
+}
+
+/* ---- chips; the variant of a kind is its bit of enum board_chip_fault_bit */
+
+static void add_to_sum(const struct fault *f, struct board_chip_fault *s, double *ppm)
+{
+    const bool high = f->value[FAULT_LEVEL] != 0.0;
+    if (f->kind->variant == BOARD_FAULT_DRDY) s->drdy_stuck = true, s->drdy_level = high;
+    if (f->kind->variant == BOARD_FAULT_DOUT) s->dout_stuck = true, s->dout_level = high;
+    if (f->kind->variant == BOARD_FAULT_SYNC) s->lost_sync = true;
+    if (f->kind->variant == BOARD_FAULT_CLOCK) *ppm += f->value[FAULT_CLOCK_PPM];
+}
+
+static void refresh_chip(struct fault *f, int64_t t_ns)
+{
+    struct board_chip_fault s = {.clock_ppm = 0};
+    double ppm = 0.0;
+    for (unsigned i = 0; i < FAULTS_MAX; i++) {
+        if (here(f, &f->engine->fault[i])) add_to_sum(&f->engine->fault[i], &s, &ppm);
+    }
+    s.clock_ppm = (int32_t)nearbyint(fmin(fmax(ppm, -FAULT_PPM_MAX), FAULT_PPM_MAX));
+    part_of(f->engine->bench, f)->fault(fault_unit(f)->board, f->point.index, &s, t_ns);
+}
+
+static bool apply_chip(struct fault *f, int64_t t_ns)
+{
+    refresh_chip(f, t_ns);
+    return true;
+}
+
+static bool flip(struct fault *f, int64_t t_ns)
+{
+    const unsigned reg = (unsigned)f->value[FAULT_REGISTER];
+    const uint8_t mask = (uint8_t)f->value[FAULT_MASK];
+    return part_of(f->engine->bench, f)->flip(fault_unit(f)->board, f->point.index, reg, mask, t_ns);
+}
+
+static bool lacks(const struct fault *f, const char *reason, char *why)
+{
+    snprintf(why, CONTROL_WHY_MAX, "%s: %s", f->name, reason ? reason : f->kind->lacks);
+    return false;
+}
+
+static bool has_fault(const struct control_bench *b, const struct fault *f, char *why)
+{
+    const struct board_part *p = part_of(b, f);
+    return p->faults & f->kind->variant || lacks(f, p->unless, why);
+}
+
+/* A clock is off by whole ppm. */
+static bool has_clock(const struct control_bench *b, const struct fault *f, char *why)
+{
+    const double ppm = f->value[FAULT_CLOCK_PPM];
+    if (!has_fault(b, f, why)) return false;
+    if (ppm == nearbyint(ppm)) return true;
+    snprintf(why, CONTROL_WHY_MAX, "clock_ppm: %.10g: whole ppm are wanted", ppm);
+    return false;
+}
+
+static bool has_register(const struct control_bench *b, const struct fault *f, char *why)
+{
+    const struct board_part *p = part_of(b, f);
+    if (p->registers == 0) return lacks(f, NULL, why);
+    if (f->value[FAULT_REGISTER] < p->registers) return true;
+    snprintf(why, CONTROL_WHY_MAX, "register: %.0f: %s has 0 to %u", f->value[FAULT_REGISTER], f->name,
+             p->registers - 1);
+    return false;
+}
+
+// clang-format off
+#define CHIP(v) .variant = (v), .places = FAULT_BIT(FAULT_AT_CHIP), .apply = apply_chip, .lift = refresh_chip
+static const struct fault_kind chip[] = {
+    {"chip.drdy_stuck", "The data-ready pin stays at level; inside, conversions go on.", "no frames, or no new values of that chip, and an EMCY that says so",
+     CHIP(BOARD_FAULT_DRDY), .need = FAULT_BIT(FAULT_LEVEL), .unless = "nobody hears the pin of that chip", .fits = has_fault,
+     .lacks = "this chip has no data-ready pin that anybody hears"},
+    {"chip.dout_dead", "The data pin stays at level.", "all ones or all zeros in the words of that chip",
+     CHIP(BOARD_FAULT_DOUT), .need = FAULT_BIT(FAULT_LEVEL), .unless = "no data pin", .fits = has_fault,
+     .lacks = "this chip has no data pin"},
+    {"chip.lost_sync", "The chip does not hear SYNC, neither pin nor command.", "after a pulse on SYNC the chip goes on in its old phase: no gap in the frames if they follow that chip, another answer to a step than the other axes if they do not",
+     CHIP(BOARD_FAULT_SYNC), .unless = "nothing synchronises that chip", .fits = has_fault,
+     .lacks = "nothing synchronises this chip"},
+    {"chip.clock", "The clock of the chip is off by clock_ppm (negative: slow).", "the data rate is off by as much if the frames follow that chip, or the axis answers to a step in another time than the others",
+     CHIP(BOARD_FAULT_CLOCK), .need = FAULT_BIT(FAULT_CLOCK_PPM), .nonzero = FAULT_BIT(FAULT_CLOCK_PPM), .unless = "no clock of its own; clock_ppm is no whole number", .fits = has_clock,
+     .lacks = "this chip has no clock of its own"},
+    {"chip.flip", "Bits of a register are inverted, once.", "the register reads otherwise, and the chip does what it now says",
+     .places = FAULT_BIT(FAULT_AT_CHIP), .need = FAULT_BIT(FAULT_REGISTER) | FAULT_BIT(FAULT_MASK),
+     .once = true, .unless = "no such register", .fits = has_register, .apply = flip, .lacks = "this chip has no registers"},
+};
+// clang-format on
+const struct fault_table fault_chip = {chip, sizeof chip / sizeof *chip};
+
+/* ---- controller; the variant of a kind is its bit of enum board_wrong */
+
+static void refresh_controller(struct fault *f, int64_t t_ns)
+{
+    struct unit *u = fault_unit(f);
+    uint32_t all = 0;
+    (void)t_ns;
+    for (unsigned i = 0; i < FAULTS_MAX; i++) {
+        const struct fault *other = &f->engine->fault[i];
+        if (here(f, other)) all |= other->kind->variant;
+    }
+    u->type->wrong(u->board, all);
+}
+
+static bool apply_controller(struct fault *f, int64_t t_ns)
+{
+    refresh_controller(f, t_ns);
+    return true;
+}
+
+static bool may_be_wrong(const struct control_bench *b, const struct fault *f, char *why)
+{
+    return b->unit[f->point.unit]->type->wrongs & f->kind->variant || lacks(f, NULL, why);
+}
+
+// clang-format off
+#define WRONG(v) .variant = (v), .places = FAULT_BIT(FAULT_AT_CONTROLLER), .apply = apply_controller, .lift = refresh_controller, .fits = may_be_wrong
+static const struct fault_kind controller[] = {
+    {"controller.skip_sync_t", "The controller gives no pulse on SYNC_T.", "SYNC_T rests; temperature codes come every 10.00 ms at 100 SPS instead of every 10.25 ms",
+     WRONG(BOARD_WRONG_SKIP_SYNC_T), .unless = "no SYNC_T on the board", .lacks = "the controller of this board has no SYNC_T to give a pulse on"},
+    {"controller.setup_order", "The controller carries out the steps of the set-up in reverse order, from the next Res on.", "after Res the registers of the converters differ from those of the article",
+     WRONG(BOARD_WRONG_SETUP_ORDER), .unless = "no set-up of several steps", .lacks = "the controller of this board has no set-up whose order matters"},
+    {"controller.frozen_words", "The controller sends the codes of the frame before, over and over.", "numbers and times of the frames go on, their codes stand still to the bit",
+     WRONG(BOARD_WRONG_FROZEN_WORDS), .unless = "the controller keeps no words", .lacks = "the controller of this board keeps no words that could freeze"},
+    {"controller.capacitor", "The capacitor of integrator X has lost 30 %.", "its codes grow, and its resets jump, by 1/0.7; what is summed of them does not change but for the converter's steps",
+     WRONG(BOARD_WRONG_CAPACITOR), .unless = "no integrators that are sampled", .lacks = "this board has no integrator whose capacitor a host could tell"},
+    {"controller.stuck_reset", "The positive reset of integrator X never ends.", "the code of integrator X runs to its limit and the reading says saturated",
+     WRONG(BOARD_WRONG_STUCK_RESET), .unless = "no precision resets", .lacks = "this board has no precision reset that could stay on"},
+    {"controller.stuck_key", "The key of the spare integrator never closes.", "the axis that the spare has stands still while it does",
+     WRONG(BOARD_WRONG_STUCK_KEY), .unless = "no spare integrator", .lacks = "this board has no spare integrator with a key"},
+};
+// clang-format on
+const struct fault_table fault_controller = {controller, sizeof controller / sizeof *controller};

@@ -1,0 +1,124 @@
+/* The page of faults: kinds with what they take, the matrix of kinds and places, and what each type of board has. */
+#include "fault/internal.h"
+
+#include "unit/boards.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+
+struct text {
+    char *out;
+    size_t cap, at;
+};
+
+__attribute__((format(printf, 2, 3))) static void add(struct text *t, const char *format, ...)
+{
+    va_list ap;
+    va_start(ap, format);
+    if (t->at < t->cap) t->at += (size_t)vsnprintf(t->out + t->at, t->cap - t->at, format, ap);
+    va_end(ap);
+}
+
+static void add_args(struct text *t, const struct fault_kind *k)
+{
+    bool any = false;
+    for (unsigned i = FAULT_FOR_S; i < FAULT_ARGS; i++) {
+        if (!((k->need | k->may) & FAULT_BIT(i))) continue;
+        const char *name = fault_arg_name((enum fault_arg)i);
+        add(t, "%s`%s`%s", any ? ", " : "", name, k->need & FAULT_BIT(i) ? "" : " (optional)");
+        any = true;
+    }
+    if (!any) add(t, "nothing");
+}
+
+bool fault_markdown(unsigned line, char *out, size_t cap)
+{
+    struct text t = {.out = out, .cap = cap};
+    if (line == 0) add(&t, "| kind | what it does | takes | how a host sees it | refused if |");
+    if (line == 1) add(&t, "|---|---|---|---|---|");
+    if (line < 2) return true;
+    const struct fault_kind *k = fault_kind(line - 2);
+    if (!k) return false;
+    add(&t, "| `%s` | %s%s | ", k->name, k->what, k->once ? " Over at once." : "");
+    add_args(&t, k);
+    add(&t, " | %s | %s |", k->seen, k->unless ? k->unless : "");
+    return true;
+}
+
+/* In a table a bar has to be escaped. */
+static void add_place(struct text *t, enum fault_place place)
+{
+    add(t, " `");
+    for (const char *s = fault_place_any(place); *s; s++) add(t, *s == '|' ? "\\|" : "%c", *s);
+    add(t, "` |");
+}
+
+bool fault_markdown_matrix(unsigned line, char *out, size_t cap)
+{
+    struct text t = {.out = out, .cap = cap};
+    const struct fault_kind *k = line < 2 ? NULL : fault_kind(line - 2);
+    if (line >= 2 && !k) return false;
+    if (line == 1) add(&t, "|---|");
+    else if (k) add(&t, "| `%s` |", k->name);
+    else add(&t, "| |");
+    for (unsigned i = 0; i < FAULT_PLACES; i++) {
+        if (line == 0) add_place(&t, (enum fault_place)i);
+        else if (line == 1) add(&t, "---|");
+        else if (!(k->places & FAULT_BIT(i))) add(&t, " refused |");
+        else add(&t, k->fits ? " seen, or refused (above) |" : " seen |");
+    }
+    return true;
+}
+
+/* The n-th part with a fault point of any type of board. */
+static const struct board_part *part_at(unsigned n, const struct board_type **type)
+{
+    for (const struct board_type *const *t = board_types; *t; t++) {
+        for (unsigned i = 0; i < (*t)->part_count; i++) {
+            *type = *t;
+            if ((*t)->parts[i].name && n-- == 0) return &(*t)->parts[i];
+        }
+    }
+    return NULL;
+}
+
+static bool has(const struct board_type *t, const struct board_part *p, const struct fault_kind *k)
+{
+    if (p == t->parts) return k->places & FAULT_BIT(FAULT_AT_CONTROLLER) && t->wrongs & k->variant;
+    if (!(k->places & FAULT_BIT(FAULT_AT_CHIP))) return false;
+    return k->once ? p->registers > 0 : (p->faults & k->variant) != 0;
+}
+
+bool fault_markdown_boards(unsigned line, char *out, size_t cap)
+{
+    struct text t = {.out = out, .cap = cap};
+    const struct board_type *type;
+    const struct fault_kind *k;
+    if (line == 0) add(&t, "| board | point | kinds it has | why not the others |");
+    if (line == 1) add(&t, "|---|---|---|---|");
+    if (line < 2) return true;
+    const struct board_part *p = part_at(line - 2, &type);
+    if (!p) return false;
+    add(&t, "| %s | `UNIT.%s` |", type->title, p->name);
+    for (unsigned i = 0; (k = fault_kind(i)) != NULL; i++) {
+        if (has(type, p, k)) add(&t, " `%s`", k->name);
+    }
+    if (p->registers) add(&t, " (registers 0 to %u)", p->registers - 1);
+    add(&t, " | %s |", p->unless ? p->unless : "");
+    return true;
+}
+
+bool fault_markdown_events(unsigned line, char *out, size_t cap)
+{
+    struct text t = {.out = out, .cap = cap};
+    if (line == 0) add(&t, "| board | events |");
+    if (line == 1) add(&t, "|---|---|");
+    if (line < 2) return true;
+    const struct board_type *const *type = board_types;
+    for (unsigned left = line - 2; *type && left > 0; left--) type++;
+    if (!*type) return false;
+    add(&t, "| %s |", (*type)->title);
+    for (unsigned i = 0; i < (*type)->event_count; i++) add(&t, "%s `%s`", i ? "," : "", (*type)->events[i]);
+    add(&t, " |");
+    return true;
+}

@@ -1,0 +1,73 @@
+/* Faults of the gyro-stabilised platform: torquers and drift of an axis, the gimbal's angle sensor. */
+#include "fault/internal.h"
+
+static struct platform *platform_of(const struct fault *f)
+{
+    return &f->engine->bench->lab->platform;
+}
+
+/* What is active of the kind at the point: its number, and the sum of its value. */
+static unsigned active(const struct fault *f, enum fault_arg arg, double *sum)
+{
+    unsigned n = 0;
+    *sum = 0.0;
+    for (unsigned i = 0; i < FAULTS_MAX; i++) {
+        const struct fault *other = &f->engine->fault[i];
+        const bool here = other->id != 0 && other->state == FAULT_ACTIVE && other->kind == f->kind &&
+                          other->point.place == f->point.place && other->point.index == f->point.index;
+        if (!here) continue;
+        n++;
+        *sum += other->value[arg];
+    }
+    return n;
+}
+
+static void refresh_torquer(struct fault *f, int64_t t_ns)
+{
+    double unused;
+    const double gain = active(f, FAULT_ID, &unused) ? 0.0 : 1.0;
+    platform_set_torquer(platform_of(f), (enum platform_axis)f->point.index, gain, t_ns);
+}
+
+static void refresh_drift(struct fault *f, int64_t t_ns)
+{
+    double degph;
+    (void)active(f, FAULT_DRIFT_DEGPH, &degph);
+    platform_step_drift(platform_of(f), (enum platform_axis)f->point.index, degph, t_ns);
+}
+
+static void refresh_sensor(struct fault *f, int64_t t_ns)
+{
+    double unused;
+    platform_stick(platform_of(f), active(f, FAULT_ID, &unused) > 0, t_ns);
+}
+
+static bool apply_torquer(struct fault *f, int64_t t_ns)
+{
+    refresh_torquer(f, t_ns);
+    return true;
+}
+
+static bool apply_drift(struct fault *f, int64_t t_ns)
+{
+    refresh_drift(f, t_ns);
+    return true;
+}
+
+static bool apply_sensor(struct fault *f, int64_t t_ns)
+{
+    refresh_sensor(f, t_ns);
+    return true;
+}
+
+// clang-format off
+static const struct fault_kind platform[] = {
+    {"platform.torquer", "The torquer of the axis gives nothing.", "the gyro unit's windows do not come: level: it does not settle (EMCY FF23h); azimuth: the angle sensor does not follow (EMCY FF22h)",
+     .places = FAULT_BIT(FAULT_AT_TORQUER), .apply = apply_torquer, .lift = refresh_torquer},
+    {"platform.drift_step", "The gyroscope drifts by drift_degph more about the axis.", "the levelling rate (azimuth: the rate of the azimuth torquer) is another by so much",
+     .places = FAULT_BIT(FAULT_AT_TORQUER), .need = FAULT_BIT(FAULT_DRIFT_DEGPH), .nonzero = FAULT_BIT(FAULT_DRIFT_DEGPH), .apply = apply_drift, .lift = refresh_drift},
+    {"platform.encoder_stuck", "The angle sensor of the outer gimbal tells what it told.", "ENCODER stands still to the bit; in a turn the unit says so (EMCY FF22h)",
+     .places = FAULT_BIT(FAULT_AT_ENCODER), .apply = apply_sensor, .lift = refresh_sensor},
+};
+// clang-format on
+const struct fault_table fault_platform = {platform, sizeof platform / sizeof *platform};

@@ -1,0 +1,243 @@
+#include "fault/point.h"
+
+#include <ctype.h>
+#include <inttypes.h>
+#include <stdio.h>
+#include <string.h>
+
+static const struct {
+    const char *name; /* as the page shows its points */
+    const char *what;
+} places[FAULT_PLACES] = {
+    [FAULT_AT_SENSOR] = {"UNIT.sensor.x|y|z", "the output of a sensor"},
+    [FAULT_AT_AFE] = {"UNIT.afe.x|y|z", "the analog chain of a channel"},
+    [FAULT_AT_CHIP] = {"UNIT.CHIP", "a chip of a board"},
+    [FAULT_AT_CONTROLLER] = {"UNIT.CONTROLLER", "the controller of a board"},
+    [FAULT_AT_LINE] = {"UNIT.line.NAME", "a line of a board"},
+    [FAULT_AT_NODE] = {"UNIT.can", "the CAN node of a board"},
+    [FAULT_AT_BUS] = {"bus.NAME", "a CAN bus"},
+    [FAULT_AT_CLIENT] = {"client.N", "a program on the CAN bus"},
+    [FAULT_AT_SUPPLY] = {"supply", "the power supply"},
+    [FAULT_AT_TORQUER] = {"platform.level|azimuth", "an axis of the platform"},
+    [FAULT_AT_ENCODER] = {"platform.encoder", "the angle sensor of the platform"},
+};
+
+const char *fault_place_any(enum fault_place place)
+{
+    return places[place].name;
+}
+
+const char *fault_place_what(enum fault_place place)
+{
+    return places[place].what;
+}
+
+/* ---- types of boards */
+
+struct fault_types fault_type_of(const struct board_type *t)
+{
+    return (struct fault_types){.type = {t}, .count = 1};
+}
+
+struct fault_types fault_types_of(const struct control_bench *b)
+{
+    struct fault_types t = {.count = 0};
+    for (unsigned i = 0; i < b->units; i++) {
+        unsigned k = 0;
+        while (k < t.count && t.type[k] != b->unit[i]->type) k++;
+        if (k == t.count && k < FAULT_TYPES_MAX) t.type[t.count++] = b->unit[i]->type;
+    }
+    return t;
+}
+
+/* ---- points of one unit, in a row */
+
+static const struct {
+    enum fault_place place;
+    const char *infix;
+} of_unit[] = {
+    {FAULT_AT_SENSOR, "sensor."}, {FAULT_AT_AFE, "afe."},   {FAULT_AT_CHIP, ""},
+    {FAULT_AT_CONTROLLER, ""},    {FAULT_AT_LINE, "line."}, {FAULT_AT_NODE, "can"},
+};
+
+enum { OF_UNIT = sizeof of_unit / sizeof *of_unit };
+
+/* What a point is called behind its infix; NULL: no faults there. */
+static const char *suffix(const struct board_type *t, enum fault_place place, unsigned index)
+{
+    static const char *const axis[UNIT_AXES] = {"x", "y", "z"};
+    switch (place) {
+    case FAULT_AT_SENSOR:
+    case FAULT_AT_AFE:
+        return axis[index];
+    case FAULT_AT_CHIP:
+    case FAULT_AT_CONTROLLER:
+        return t->parts[index].name;
+    case FAULT_AT_LINE:
+        return t->lines[index].name;
+    default:
+        return "";
+    }
+}
+
+/* Indices at a place of a board: from `first`, `count` of them. */
+static unsigned indices(const struct board_type *t, enum fault_place place, unsigned *first)
+{
+    *first = place == FAULT_AT_CHIP;
+    switch (place) {
+    case FAULT_AT_SENSOR:
+    case FAULT_AT_AFE:
+        return t->afe ? UNIT_AXES : 0;
+    case FAULT_AT_CHIP:
+        return t->part_count - 1;
+    case FAULT_AT_LINE:
+        return t->line_count;
+    default:
+        return 1;
+    }
+}
+
+/* Takes from *n the points that this unit has; true when the n-th was among them. */
+static bool unit_point(const struct control_bench *b, unsigned unit, unsigned *n, struct fault_point *p, char *name)
+{
+    const struct board_type *t = b->unit[unit]->type;
+    for (unsigned row = 0; row < OF_UNIT; row++) {
+        unsigned first;
+        const enum fault_place place = of_unit[row].place;
+        const unsigned count = indices(t, place, &first);
+        for (unsigned i = first; i < first + count; i++) {
+            const char *last = suffix(t, place, i);
+            if (!last || (*n)-- > 0) continue;
+            *p = (struct fault_point){.place = place, .unit = unit, .index = i};
+            snprintf(name, FAULT_POINT_MAX, "%s.%s%s", b->unit_name[unit], of_unit[row].infix, last);
+            return true;
+        }
+    }
+    return false;
+}
+
+/* ---- points of a bench */
+
+static unsigned clients(const struct control_bench *b)
+{
+    struct control_client c;
+    unsigned n = 0;
+    while (b->client && b->client(b->ctx, n, &c)) n++;
+    return n;
+}
+
+static bool point_of_supply(struct fault_point *p, char *name)
+{
+    *p = (struct fault_point){.place = FAULT_AT_SUPPLY};
+    snprintf(name, FAULT_POINT_MAX, "supply");
+    return true;
+}
+
+static bool point_of_platform(const struct control_bench *b, unsigned n, struct fault_point *p, char *name)
+{
+    static const char *const names[] = {[PLATFORM_LEVEL] = "level", [PLATFORM_AZIMUTH] = "azimuth", "encoder"};
+    if (!b->lab || !b->lab->platform.cfg.present || n > PLATFORM_AXES) return false;
+    *p = (struct fault_point){.place = n < PLATFORM_AXES ? FAULT_AT_TORQUER : FAULT_AT_ENCODER, .index = n};
+    snprintf(name, FAULT_POINT_MAX, "platform.%s", names[n]);
+    return true;
+}
+
+bool fault_point(const struct control_bench *b, unsigned n, struct fault_point *p, char name[FAULT_POINT_MAX])
+{
+    for (unsigned i = 0; i < b->units; i++) {
+        if (unit_point(b, i, &n, p, name)) return true;
+    }
+    if (n < b->buses) {
+        *p = (struct fault_point){.place = FAULT_AT_BUS, .index = n};
+        if (b->bus_name[n]) snprintf(name, FAULT_POINT_MAX, "bus.%s", b->bus_name[n]);
+        else snprintf(name, FAULT_POINT_MAX, "bus.can%u", n);
+        return true;
+    }
+    n -= b->buses;
+    const unsigned programs = clients(b);
+    if (n < programs) {
+        struct control_client c = {0};
+        (void)b->client(b->ctx, n, &c);
+        *p = (struct fault_point){.place = FAULT_AT_CLIENT, .index = c.place};
+        snprintf(name, FAULT_POINT_MAX, "client.%" PRIu32, c.came);
+        return true;
+    }
+    return n == programs ? point_of_supply(p, name) : point_of_platform(b, n - programs - 1, p, name);
+}
+
+static bool same_letters(const char *a, const char *b)
+{
+    while (*a && toupper((unsigned char)*a) == toupper((unsigned char)*b)) a++, b++;
+    return *a == *b;
+}
+
+/* A line may be written in capitals: Int of the trace is INT in much of the literature. */
+bool fault_point_find(const struct control_bench *b, const char *text, struct fault_point *p,
+                      char name[FAULT_POINT_MAX])
+{
+    for (unsigned n = 0; fault_point(b, n, p, name); n++) {
+        if (strcmp(name, text) == 0) return true;
+        if (p->place == FAULT_AT_LINE && same_letters(name, text)) return true;
+    }
+    return false;
+}
+
+/* ---- how points of a place are named */
+
+/* Bytes of a part's name up to its dot: adc.x, adc.y and adc.z are one group, adc.x|y|z. */
+static size_t group(const char *part)
+{
+    const char *dot = strchr(part, '.');
+    return dot ? (size_t)(dot - part) + 1 : 0;
+}
+
+static bool same_group(const char *a, const char *b)
+{
+    const size_t n = group(a);
+    return n > 0 && n == group(b) && strncmp(a, b, n) == 0;
+}
+
+/* The i-th group of parts of a board at a place, or how many there are less than that. */
+static bool part_name(const struct board_type *t, enum fault_place place, unsigned *i, char *name)
+{
+    unsigned first;
+    const unsigned count = indices(t, place, &first);
+    for (unsigned p = first; p < first + count; p++) {
+        const char *part = t->parts[p].name;
+        const bool begins = part && (p == first || !t->parts[p - 1].name || !same_group(part, t->parts[p - 1].name));
+        if (!begins || (*i)-- > 0) continue;
+        size_t at = (size_t)snprintf(name, FAULT_POINT_MAX, "UNIT.%s", part);
+        for (p++; p < first + count && t->parts[p].name && same_group(part, t->parts[p].name); p++) {
+            if (at < FAULT_POINT_MAX)
+                at += (size_t)snprintf(name + at, FAULT_POINT_MAX - at, "|%s", t->parts[p].name + group(part));
+        }
+        return true;
+    }
+    return false;
+}
+
+/* Whether an earlier type has this name, too. */
+static bool named_before(const struct fault_types *t, unsigned type, enum fault_place place, const char *name)
+{
+    char other[FAULT_POINT_MAX];
+    for (unsigned k = 0; k < type; k++) {
+        for (unsigned i = 0, left = 0; part_name(t->type[k], place, &left, other); left = ++i) {
+            if (strcmp(other, name) == 0) return true;
+        }
+    }
+    return false;
+}
+
+bool fault_place_name(const struct fault_types *t, enum fault_place place, unsigned i, char name[FAULT_POINT_MAX])
+{
+    if (place != FAULT_AT_CHIP && place != FAULT_AT_CONTROLLER) {
+        snprintf(name, FAULT_POINT_MAX, "%s", places[place].name);
+        return i == 0;
+    }
+    for (unsigned k = 0; k < t->count; k++) {
+        for (unsigned n = 0, left = 0; part_name(t->type[k], place, &left, name); left = ++n) {
+            if (!named_before(t, k, place, name) && i-- == 0) return true;
+        }
+    }
+    return false;
+}

@@ -1,0 +1,229 @@
+/* Faults of sensors and of the analog chains behind them. */
+#include "fault/internal.h"
+
+#include <math.h>
+#include <stdio.h>
+
+/* The inputs up to now belong to the chain as it was. */
+static struct unit *settled_unit(struct fault *f, int64_t t_ns)
+{
+    struct unit *u = fault_unit(f);
+    unit_sample_until(u, t_ns);
+    return u;
+}
+
+/* ---- sensors */
+
+/* Volts in the arguments are volts at the load: a sensor with current output gives the current that makes them. */
+static double signal_per_v(const struct unit *u, unsigned axis)
+{
+    const struct afe_cfg *afe = &u->cfg.board.afe[axis];
+    return afe->input == AFE_CURRENT ? 1.0 / afe->load_ohm : 1.0;
+}
+
+static bool has_sensor(const struct control_bench *b, const struct fault *f, char *why)
+{
+    const struct unit *u = b->unit[f->point.unit];
+    if (u->cfg.axis[f->point.index].sensor != UNIT_NO_SENSOR) return true;
+    snprintf(why, CONTROL_WHY_MAX, "%s: the channel has no sensor", f->name);
+    return false;
+}
+
+static double range_v(const struct unit *u)
+{
+    return u->type->range_v ? u->type->range_v(u->board) : 10.0;
+}
+
+/* What a board tells apart: less is refused. */
+static double least_v(const struct unit *u)
+{
+    return u->type->code_v ? fmax(FAULT_LEAST_V, u->type->code_v(u->board)) : FAULT_LEAST_V;
+}
+
+static double least_ppm(const struct unit *u)
+{
+    return u->type->code_v ? fmax(FAULT_LEAST_PPM, least_v(u) / range_v(u) * 1e6) : FAULT_LEAST_PPM;
+}
+
+static bool at_least(const struct fault *f, enum fault_arg arg, double least, const char *unit, char *why)
+{
+    if (fabs(f->value[arg]) >= least) return true;
+    snprintf(why, CONTROL_WHY_MAX, "%s: %.10g: a code of this board is %.4g %s, nobody would see less",
+             fault_arg_name(arg), f->value[arg], least, unit);
+    return false;
+}
+
+static bool seen_volts(const struct control_bench *b, const struct fault *f, char *why)
+{
+    const enum fault_arg arg = fault_given(f, FAULT_BIAS_V) ? FAULT_BIAS_V : FAULT_RMS_V;
+    return has_sensor(b, f, why) && at_least(f, arg, least_v(b->unit[f->point.unit]), "V", why);
+}
+
+static bool seen_scale(const struct control_bench *b, const struct fault *f, char *why)
+{
+    return has_sensor(b, f, why) && at_least(f, FAULT_SCALE_PPM, least_ppm(b->unit[f->point.unit]), "ppm", why);
+}
+
+static bool passes(const struct control_bench *b, const struct fault *f, enum fault_arg limit, char *why)
+{
+    const struct unit *u = b->unit[f->point.unit];
+    const double most_v = fmin(u->cfg.board.afe[f->point.index].clip_v, range_v(u)); /* buffer, converter */
+    if (!fault_given(f, limit) || fabs(f->value[limit]) < most_v) return true;
+    snprintf(why, CONTROL_WHY_MAX, "%s: %.10g: the chain passes %.10g ... %.10g V, nobody would see this limit",
+             fault_arg_name(limit), f->value[limit], -most_v, most_v);
+    return false;
+}
+
+/* What has grown to next to nothing when it ends was never seen. */
+static bool grows(const struct control_bench *b, const struct fault *f, char *why)
+{
+    const double least = least_v(b->unit[f->point.unit]);
+    const double end_v = fabs(f->value[FAULT_DRIFT_V_PER_S]) * (double)f->for_ns / (double)NS_PER_S;
+    if (!has_sensor(b, f, why)) return false;
+    if (f->for_ns == 0 || end_v >= least) return true;
+    snprintf(why, CONTROL_WHY_MAX, "drift_v_per_s: %.10g: in %.10g s it comes to %.10g V, less than %.4g V, a code",
+             f->value[FAULT_DRIFT_V_PER_S], f->value[FAULT_FOR_S], end_v, least);
+    return false;
+}
+
+static bool has_limits(const struct control_bench *b, const struct fault *f, char *why)
+{
+    if (!has_sensor(b, f, why)) return false;
+    if (!fault_given(f, FAULT_LOW_V) && !fault_given(f, FAULT_HIGH_V)) {
+        snprintf(why, CONTROL_WHY_MAX, "low_v or high_v is missing: where the output stops");
+        return false;
+    }
+    if (!passes(b, f, FAULT_LOW_V, why) || !passes(b, f, FAULT_HIGH_V, why)) return false;
+    if (!fault_given(f, FAULT_LOW_V) || !fault_given(f, FAULT_HIGH_V)) return true;
+    if (f->value[FAULT_LOW_V] < f->value[FAULT_HIGH_V]) return true;
+    snprintf(why, CONTROL_WHY_MAX, "low_v: %.10g is not below high_v, %.10g", f->value[FAULT_LOW_V],
+             f->value[FAULT_HIGH_V]);
+    return false;
+}
+
+static double volts(const struct fault *f, enum fault_arg arg, double otherwise)
+{
+    return fault_given(f, arg) ? f->value[arg] * signal_per_v(fault_unit(f), f->point.index) : otherwise;
+}
+
+static double output_now(const struct fault *f, int64_t t_ns)
+{
+    struct unit *u = fault_unit(f);
+    const unsigned axis = f->point.index;
+    return sensor_fault_out(u->sensor_faults[axis], unit_sensor_out(u, axis, t_ns), t_ns);
+}
+
+/* Value and upper value of each kind, by enum sensor_fault_kind. */
+static bool apply_sensor(struct fault *f, int64_t t_ns)
+{
+    const double infinite = (double)INFINITY;
+    struct unit *u = settled_unit(f, t_ns);
+    const double values[SENSOR_FAULTS][2] = {
+        [SENSOR_STUCK] = {volts(f, FAULT_OUT_V, output_now(f, t_ns))},
+        [SENSOR_BIAS] = {volts(f, FAULT_BIAS_V, 0.0)},
+        [SENSOR_DRIFT] = {volts(f, FAULT_DRIFT_V_PER_S, 0.0)},
+        [SENSOR_SCALE] = {f->value[FAULT_SCALE_PPM] * 1e-6},
+        [SENSOR_NOISE] = {mems_density_v_rthz(volts(f, FAULT_RMS_V, 0.0), 1000.0)},
+        [SENSOR_SATURATION] = {volts(f, FAULT_LOW_V, -infinite), volts(f, FAULT_HIGH_V, infinite)},
+    };
+    const unsigned k = f->kind->variant;
+    const bool mems = u->cfg.axis[f->point.index].sensor == UNIT_MEMS; /* others are about 0 without acceleration */
+    f->as.sensor = (struct sensor_fault){.kind = (enum sensor_fault_kind)k,
+                                         .value = values[k][0],
+                                         .value_high = values[k][1],
+                                         .zero = mems ? u->mems[f->point.index].cfg.u0_v : 0.0,
+                                         .from_ns = t_ns,
+                                         .noise = f->random};
+    sensor_fault_add(&u->sensor_faults[f->point.index], &f->as.sensor);
+    return true;
+}
+
+static void lift_sensor(struct fault *f, int64_t t_ns)
+{
+    struct unit *u = settled_unit(f, t_ns);
+    sensor_fault_remove(&u->sensor_faults[f->point.index], &f->as.sensor);
+}
+
+// clang-format off
+#define SENSOR(v) .variant = (v), .places = FAULT_BIT(FAULT_AT_SENSOR), .apply = apply_sensor, .lift = lift_sensor
+static const struct fault_kind sensor[] = {
+    {"sensor.stuck", "The output stays at out_v, or at what it is at that instant.", "the codes of the axis stand still but for the converter's noise, whatever the head does",
+     SENSOR(SENSOR_STUCK), .may = FAULT_BIT(FAULT_OUT_V), .unless = "the channel has no sensor", .fits = has_sensor},
+    {"sensor.bias", "bias_v is added to the output.", "the codes of the axis step and stay there",
+     SENSOR(SENSOR_BIAS), .need = FAULT_BIT(FAULT_BIAS_V), .nonzero = FAULT_BIT(FAULT_BIAS_V), .unless = "the channel has no sensor; it is less than a code of the board", .fits = seen_volts},
+    {"sensor.drift", "The output runs away.", "the codes of the axis have a slope",
+     SENSOR(SENSOR_DRIFT), .need = FAULT_BIT(FAULT_DRIFT_V_PER_S), .nonzero = FAULT_BIT(FAULT_DRIFT_V_PER_S), .unless = "the channel has no sensor; it ends before it has come to a code", .fits = grows},
+    {"sensor.scale", "The deviation of the output from its zero is wrong by scale_ppm.", "the codes of the axis are wrong in proportion to what the axis feels",
+     SENSOR(SENSOR_SCALE), .need = FAULT_BIT(FAULT_SCALE_PPM), .nonzero = FAULT_BIT(FAULT_SCALE_PPM), .unless = "the channel has no sensor; it is less than a code of the board", .fits = seen_scale},
+    {"sensor.noise", "White noise is added; it gives a settled reading at 1000 SPS the rms rms_v.", "the codes of the axis scatter more",
+     SENSOR(SENSOR_NOISE), .need = FAULT_BIT(FAULT_RMS_V), .unless = "the channel has no sensor; it is less than a code of the board", .fits = seen_volts},
+    {"sensor.saturation", "The output does not leave low_v ... high_v.", "the codes of the axis stop at a limit that is not the converter's",
+     SENSOR(SENSOR_SATURATION), .may = FAULT_BIT(FAULT_LOW_V) | FAULT_BIT(FAULT_HIGH_V), .unless = "the channel has no sensor; low_v is not below high_v; a limit is beyond what the chain passes", .fits = has_limits},
+};
+// clang-format on
+const struct fault_table fault_sensor = {sensor, sizeof sensor / sizeof *sensor};
+
+/* ---- analog chain */
+
+static bool has_load(const struct control_bench *b, const struct fault *f, char *why)
+{
+    const struct unit *u = b->unit[f->point.unit];
+    if (u->cfg.board.afe[f->point.index].input == AFE_CURRENT) return true;
+    snprintf(why, CONTROL_WHY_MAX, "%s: no load resistor in the chain of a sensor with voltage output", f->name);
+    return false;
+}
+
+static bool has_error(const struct control_bench *b, const struct fault *f, char *why)
+{
+    const double least = least_ppm(b->unit[f->point.unit]);
+    const double grown_ppm = f->value[FAULT_DRIFT_PPM_PER_S] * (double)f->for_ns / (double)NS_PER_S;
+    const bool drifts = f->value[FAULT_DRIFT_PPM_PER_S] != 0.0;
+    if (f->value[FAULT_REFERENCE_PPM] == 0.0 && !drifts) {
+        snprintf(why, CONTROL_WHY_MAX, "reference_ppm or drift_ppm_per_s is missing, or reference_ppm is 0");
+        return false;
+    }
+    if (!drifts) return at_least(f, FAULT_REFERENCE_PPM, least, "ppm", why);
+    if (f->value[FAULT_REFERENCE_PPM] != 0.0 || f->for_ns == 0 || grown_ppm >= least) return true;
+    snprintf(why, CONTROL_WHY_MAX, "drift_ppm_per_s: %.10g: in %.10g s it comes to %.10g ppm, less than %.4g ppm",
+             f->value[FAULT_DRIFT_PPM_PER_S], f->value[FAULT_FOR_S], grown_ppm, least);
+    return false;
+}
+
+static bool ripples(const struct control_bench *b, const struct fault *f, char *why)
+{
+    return at_least(f, FAULT_AMPLITUDE_V, least_v(b->unit[f->point.unit]), "V", why);
+}
+
+static bool apply_afe(struct fault *f, int64_t t_ns)
+{
+    const bool ripple = f->kind->variant == AFE_RIPPLE;
+    struct unit *u = settled_unit(f, t_ns);
+    f->as.afe = (struct afe_fault){.kind = (enum afe_fault_kind)f->kind->variant,
+                                   .value = ripple ? f->value[FAULT_AMPLITUDE_V] : f->value[FAULT_REFERENCE_PPM] * 1e-6,
+                                   .rate_per_s = f->value[FAULT_DRIFT_PPM_PER_S] * 1e-6,
+                                   .frequency_hz = f->value[FAULT_FREQUENCY_HZ],
+                                   .from_ns = t_ns};
+    afe_fault_add(u->type->afe(u->board, f->point.index), &f->as.afe);
+    return true;
+}
+
+static void lift_afe(struct fault *f, int64_t t_ns)
+{
+    struct unit *u = settled_unit(f, t_ns);
+    afe_fault_remove(u->type->afe(u->board, f->point.index), &f->as.afe);
+}
+
+// clang-format off
+#define CHAIN(v) .variant = (v), .places = FAULT_BIT(FAULT_AT_AFE), .apply = apply_afe, .lift = lift_afe
+static const struct fault_kind analog[] = {
+    {"analog.load_open", "The load resistor of a current-output sensor is open: the buffer goes to its limit.", "the codes of the axis stand at the limit, status CLIP",
+     CHAIN(AFE_LOAD_OPEN), .unless = "the sensor has voltage output: no load resistor", .fits = has_load},
+    {"analog.load_short", "The load resistor of a current-output sensor is shorted: no volts.", "the codes of the axis stand near 0, whatever the head does",
+     CHAIN(AFE_LOAD_SHORT), .unless = "the sensor has voltage output: no load resistor", .fits = has_load},
+    {"analog.reference", "The converter's reference is wrong by reference_ppm and runs away by drift_ppm_per_s.", "the codes of the axis are too small in proportion, offset and all",
+     CHAIN(AFE_REFERENCE), .may = FAULT_BIT(FAULT_REFERENCE_PPM) | FAULT_BIT(FAULT_DRIFT_PPM_PER_S), .unless = "neither is given; the error is less than a code of the board, or a drift ends before it has come to one", .fits = has_error},
+    {"analog.ripple", "A sine of the supply comes through the buffer, amplitude at the load.", "the codes of the axis carry a line at frequency_hz",
+     CHAIN(AFE_RIPPLE), .need = FAULT_BIT(FAULT_AMPLITUDE_V) | FAULT_BIT(FAULT_FREQUENCY_HZ), .unless = "it is less than a code of the board", .fits = ripples},
+};
+// clang-format on
+const struct fault_table fault_analog = {analog, sizeof analog / sizeof *analog};

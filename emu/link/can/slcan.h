@@ -1,0 +1,37 @@
+/* slcan (Lawicel) text form of a frame, with the FD letters of the CANable 2.0 dialect.
+ *
+ *   tiiildd..  11-bit data   Tiiiiiiiildd..  29-bit data   r, R  the same, remote, no data
+ *   diiildd..  11-bit FD     Diiiiiiiildd..  29-bit FD     b, B  the same with bit rate switch
+ *
+ * i: identifier, l: DLC, one hexadecimal digit (9..F only FD), d: data, two digits a byte; a line ends with CR, which
+ * is not part of the text here. Example: t4563112233 is 456h with the bytes 11 22 33. Pure. */
+#ifndef PSABENCH_LINK_CAN_SLCAN_H
+#define PSABENCH_LINK_CAN_SLCAN_H
+
+#include "base/can.h"
+
+#include <stddef.h>
+
+#define SLCAN_LINE_MAX 160u /* B + 8 + 1 + 128 digits, time stamp, CR and room */
+
+enum slcan_err {
+    SLCAN_OK,
+    SLCAN_NO_FRAME, /* the letter does not begin a frame: a command, or garbage */
+    SLCAN_SHORT,    /* fewer digits than the letter and the DLC ask for */
+    SLCAN_LONG,     /* more digits */
+    SLCAN_DIGIT,    /* not hexadecimal */
+    SLCAN_ID,       /* identifier above 7FFh or 1FFFFFFFh */
+    SLCAN_DLC       /* DLC above 8 in a classic frame */
+};
+
+/* No state between calls; out is untouched on error. */
+enum slcan_err slcan_decode(const char *line, size_t len, struct can_msg *out);
+
+/* Text without CR; 0 when cap is too small, the frame is not valid, or it is an error frame. */
+size_t slcan_encode(const struct can_msg *m, char *out, size_t cap);
+
+/* DLC of a data length (the next larger one for an odd length), and back (dlc 0..15). */
+uint8_t slcan_dlc(uint8_t len);
+uint8_t slcan_len(uint8_t dlc);
+
+#endif

@@ -1,0 +1,267 @@
+#include "link/can/slcan_pty.h"
+
+#include "link/can/slcan.h"
+#include "link/hex.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+
+enum { OUT_MAX = 4 << 20, OUT_HIGH = 1 << 18 };
+enum { STATUS_RX_FULL = 0x01, STATUS_OVERRUN = 0x08, STATUS_PASSIVE = 0x20, STATUS_BUS_ERROR = 0x80 };
+
+static const uint32_t bitrate_hz[] = {10000, 20000, 50000, 100000, 125000, 250000, 500000, 800000, 1000000};
+
+static void reply(struct slcan_pty *s, const char *text)
+{
+    text_link_put(&s->io, text, strlen(text));
+}
+
+static void say(const struct slcan_pty *s, const char *text)
+{
+    s->hub->say(s->hub->say_ctx, text);
+}
+
+/* ---- bus to client */
+
+/* Time stamp of the Lawicel protocol: ms within the minute, four digits before CR. */
+static size_t put_stamp(const struct slcan_pty *s, int64_t t_ns, char *p)
+{
+    if (!s->stamps) return 0;
+    hex_put(p, (uint32_t)((t_ns + s->hub->epoch_ns) / 1000000 % 60000), 4);
+    return 4;
+}
+
+static void on_frame(void *ctx, const struct can_msg *m, int64_t t_ns)
+{
+    struct slcan_pty *s = ctx;
+    char line[SLCAN_LINE_MAX];
+    size_t n = slcan_encode(m, line, sizeof line - 5);
+    if (!n || s->closing) return;
+    n += put_stamp(s, t_ns, line + n);
+    line[n++] = '\r';
+    if (text_link_put(&s->io, line, n)) {
+        can_hub_delivered(&s->can);
+        return;
+    }
+    s->can.dropped++;
+    s->status |= STATUS_RX_FULL | STATUS_OVERRUN;
+    if (!s->lost_told) say(s, "slcan: the client reads too slowly, frames are being dropped");
+    s->lost_told = true;
+}
+
+static void on_error(void *ctx, const struct can_msg *m, int64_t t_ns)
+{
+    struct slcan_pty *s = ctx;
+    (void)t_ns;
+    s->status |= m->id & CAN_CLASS_PROTOCOL ? STATUS_BUS_ERROR : STATUS_PASSIVE;
+}
+
+static void on_stall(struct can_client *can)
+{
+    struct slcan_pty *s = can->node.ctx;
+    text_link_stall(&s->io, can->stalled);
+}
+
+/* ---- commands: true is acknowledged with CR, false refused with BEL */
+
+static bool cmd_open(struct slcan_pty *s, const char *arg, int64_t t_ns)
+{
+    (void)t_ns;
+    if (*arg) return false;
+    s->listen_only = false;
+    if (s->open) return true; /* python-can opens twice when it sets the bit rate */
+    s->open = true;
+    s->closing = s->can.leaving = s->lost_told = false;
+    s->status = 0;
+    if (s->can.up) can_hub_restart(s->hub, &s->can);
+    else can_hub_up(s->hub, &s->can);
+    return true;
+}
+
+static bool cmd_listen(struct slcan_pty *s, const char *arg, int64_t t_ns)
+{
+    if (!cmd_open(s, arg, t_ns)) return false;
+    s->listen_only = true;
+    return true;
+}
+
+/* A client that sent and closed: its frames still go out, then it leaves the bus (on_flush), also when it closes again. */
+static bool cmd_close(struct slcan_pty *s, const char *arg, int64_t t_ns)
+{
+    (void)t_ns;
+    if (*arg) return false;
+    if (s->open) s->closing = s->can.leaving = true;
+    s->open = false;
+    return true;
+}
+
+/* A bus of another bit rate would answer with error frames only: refuse, so that the client hears of it. */
+static bool cmd_bitrate(struct slcan_pty *s, const char *arg, int64_t t_ns)
+{
+    (void)t_ns;
+    if (arg[0] < '0' || arg[0] > '8' || arg[1]) return false;
+    const uint32_t bus_hz = s->hub->bus->cfg.bitrate_hz;
+    return bus_hz == 0 || bitrate_hz[arg[0] - '0'] == bus_hz;
+}
+
+static bool cmd_data_bitrate(struct slcan_pty *s, const char *arg, int64_t t_ns)
+{
+    (void)t_ns;
+    if (arg[0] < '0' || arg[0] > '8' || arg[1]) return false;
+    const struct can_bus_cfg *bus = &s->hub->bus->cfg;
+    return bus->bitrate_hz == 0 || (uint32_t)(arg[0] - '0') * 1000000 == bus->data_bitrate_hz;
+}
+
+static bool cmd_version(struct slcan_pty *s, const char *arg, int64_t t_ns)
+{
+    (void)t_ns;
+    if (!*arg) reply(s, "V1013");
+    return !*arg;
+}
+
+static bool cmd_version_long(struct slcan_pty *s, const char *arg, int64_t t_ns)
+{
+    (void)t_ns;
+    if (!*arg) reply(s, "vpsabench");
+    return !*arg;
+}
+
+static bool cmd_serial(struct slcan_pty *s, const char *arg, int64_t t_ns)
+{
+    (void)t_ns;
+    if (!*arg) reply(s, "NPSAB");
+    return !*arg;
+}
+
+static bool cmd_status(struct slcan_pty *s, const char *arg, int64_t t_ns)
+{
+    (void)t_ns;
+    if (*arg || !s->open) return false;
+    char text[4] = {'F', '0', '0', '\0'};
+    hex_put(text + 1, s->status, 2);
+    reply(s, text);
+    s->status = 0;
+    return true;
+}
+
+static bool cmd_stamps(struct slcan_pty *s, const char *arg, int64_t t_ns)
+{
+    (void)t_ns;
+    if ((arg[0] != '0' && arg[0] != '1') || arg[1] || s->open) return false;
+    s->stamps = arg[0] == '1';
+    return true;
+}
+
+static const struct {
+    char letter;
+    bool (*run)(struct slcan_pty *s, const char *arg, int64_t t_ns);
+} commands[] = {
+    {'O', cmd_open},    {'L', cmd_listen},       {'C', cmd_close},  {'S', cmd_bitrate}, {'Y', cmd_data_bitrate},
+    {'V', cmd_version}, {'v', cmd_version_long}, {'N', cmd_serial}, {'F', cmd_status},  {'Z', cmd_stamps},
+};
+
+static bool do_command(struct slcan_pty *s, const char *line, int64_t t_ns)
+{
+    for (unsigned i = 0; i < sizeof commands / sizeof commands[0]; i++) {
+        if (commands[i].letter == line[0]) return commands[i].run(s, line + 1, t_ns);
+    }
+    return false;
+}
+
+static bool do_frame(struct slcan_pty *s, const struct can_msg *m, int64_t t_ns)
+{
+    if (!s->open || s->listen_only || !can_hub_send(s->hub, &s->can, m, t_ns)) return false;
+    reply(s, m->flags & CAN_EXT ? "Z" : "z");
+    return true;
+}
+
+static void on_line(struct text_link *t, enum lines_result r, const char *line, size_t len, int64_t t_ns)
+{
+    struct slcan_pty *s = (struct slcan_pty *)t;
+    struct can_msg m;
+    while (r == LINES_LINE && len && *line == '\n') { /* clients that end a line with CR LF */
+        line++;
+        len--;
+    }
+    const enum slcan_err err = r == LINES_LINE ? slcan_decode(line, len, &m) : SLCAN_LONG;
+    const bool done = err == SLCAN_OK                                ? do_frame(s, &m, t_ns)
+                      : r == LINES_LINE && len == 0                  ? true /* python-can's absent data bit rate */
+                      : err == SLCAN_NO_FRAME && strlen(line) == len ? do_command(s, line, t_ns)
+                                                                     : false;
+    if (!done) s->can.refused++;
+    reply(s, done ? "\r" : "\a");
+}
+
+static bool on_ready(struct text_link *t)
+{
+    return can_hub_room(&((struct slcan_pty *)t)->can);
+}
+
+/* ---- the port */
+
+static void on_flush(struct link *l, int64_t t_ns)
+{
+    struct slcan_pty *s = (struct slcan_pty *)l;
+    if (!s->pty.openers) {
+        if (s->open) cmd_close(s, "", t_ns);
+        s->stamps = false;
+        text_link_forget_output(&s->io);
+    }
+    if (s->closing && !s->can.node.queued) {
+        s->closing = false;
+        can_hub_down(s->hub, &s->can);
+    }
+    text_link_flush(l, t_ns);
+}
+
+static void on_opened(void *ctx, bool open, int64_t t_ns)
+{
+    struct slcan_pty *s = ctx;
+    (void)t_ns;
+    say(s, open ? "slcan: port opened" : "slcan: port closed");
+    if (!open) return; /* its last bytes may still be on their way: on_flush closes the channel after them */
+    text_link_forget(&s->io);
+    pty_discard(&s->pty);
+}
+
+/* Cannot happen while our own slave descriptor is open. */
+static void on_closed(struct text_link *t, int64_t t_ns)
+{
+    (void)t_ns;
+    t->link.want_read = t->link.want_write = false;
+}
+
+static const struct text_link_ops ops = {on_line, on_ready, NULL, on_closed};
+
+int slcan_pty_open(struct slcan_pty *s, struct can_hub *hub, const char *name)
+{
+    *s = (struct slcan_pty){.hub = hub};
+    const int err = pty_open(&s->pty, name);
+    if (err) return err;
+    const struct text_link_cfg cfg = {
+        .fd = s->pty.master, .end = '\r', .line_max = SLCAN_LINE_MAX, .out_max = OUT_MAX, .out_high = OUT_HIGH};
+    if (!text_link_init(&s->io, &cfg, &ops)) {
+        pty_close(&s->pty);
+        return -ENOMEM;
+    }
+    s->pty.master = -1; /* the text link's now */
+    s->pty.opened = on_opened;
+    s->pty.ctx = s;
+    s->io.link.flush = on_flush;
+    s->can.adapter = "slcan";
+    snprintf(s->can.name, sizeof s->can.name, "%.31s", s->pty.path);
+    s->can.node = (struct can_node){.order = CAN_ORDER_FIFO, .fd = true, .rx = on_frame, .error = on_error, .ctx = s};
+    s->can.stall = on_stall;
+    links_add_first(hub->links, &s->io.link);
+    links_add_first(hub->links, &s->pty.watch);
+    return 0;
+}
+
+void slcan_pty_close(struct slcan_pty *s)
+{
+    can_hub_down(s->hub, &s->can);
+    text_link_free(&s->io);
+    s->io.link.gone = true;
+    pty_close(&s->pty);
+}

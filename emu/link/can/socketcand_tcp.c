@@ -1,0 +1,334 @@
+#define _GNU_SOURCE /* accept4 */
+#include "link/can/socketcand_tcp.h"
+
+#include "link/can/socketcand.h"
+#include "link/line/text_link.h"
+#include "link/tcp_listen.h"
+#include "link/tcp_peer.h"
+
+#include <errno.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+enum phase { PHASE_HELLO, PHASE_OPEN, PHASE_HOLD, PHASE_RAW, PHASE_LEAVING };
+
+struct client {
+    struct text_link io; /* first */
+    struct can_client can;
+    struct socketcand_server *server;
+    struct can_hub *hub; /* of the bus it has opened; before that the first */
+    enum phase phase;
+    unsigned held; /* hold periods so far */
+    uint64_t lost; /* frames dropped since the client was last told */
+    bool fd_told;
+};
+
+/* The kernel's own buffer is kept small: else it grows to megabytes and hides how far behind a client is. */
+enum { OUT_MAX = 4 << 20, OUT_HIGH = 1 << 20, SNDBUF = 256 << 10 };
+
+static size_t pad_of(const struct client *c)
+{
+    return c->hub->lossless ? SOCKETCAND_PAD : 0;
+}
+
+static int64_t stamp(const struct client *c, int64_t t_ns)
+{
+    return t_ns + c->hub->epoch_ns;
+}
+
+static void say(const struct client *c, const char *what)
+{
+    char line[160];
+    snprintf(line, sizeof line, "socketcand: client %s: %s", c->can.name[0] ? c->can.name : "(no channel)", what);
+    c->hub->say(c->hub->say_ctx, line);
+}
+
+/* Before rawmode a client compares answers for equality: no padding. */
+static void answer(struct client *c, const char *text)
+{
+    text_link_put(&c->io, text, strlen(text));
+}
+
+static void tell_error(struct client *c, uint32_t class, const char *text, int64_t t_ns)
+{
+    char msg[2 * SOCKETCAND_MSG_MAX];
+    const size_t n =
+        socketcand_error(class, stamp(c, t_ns), text, c->phase == PHASE_RAW ? pad_of(c) : 0, msg, sizeof msg);
+    if (n) text_link_put(&c->io, msg, n);
+}
+
+static void refuse(struct client *c, const char *text, int64_t t_ns)
+{
+    c->can.refused++;
+    tell_error(c, SOCKETCAND_REFUSED, text, t_ns);
+}
+
+/* ---- bus to client */
+
+static void tell_lost(struct client *c, int64_t t_ns)
+{
+    char text[80];
+    snprintf(text, sizeof text, "%llu frames lost here: the client reads too slowly", (unsigned long long)c->lost);
+    c->lost = 0;
+    tell_error(c, SOCKETCAND_LOST, text, t_ns);
+}
+
+static void on_frame(void *ctx, const struct can_msg *m, int64_t t_ns)
+{
+    struct client *c = ctx;
+    char msg[SOCKETCAND_MSG_MAX];
+    if (c->phase == PHASE_LEAVING) return;
+    if (c->lost && outbuf_pending(&c->io.out) < OUT_HIGH) tell_lost(c, t_ns);
+    const size_t n = socketcand_frame(m, stamp(c, t_ns), pad_of(c), msg, sizeof msg);
+    if (n && !c->lost && text_link_put(&c->io, msg, n)) {
+        can_hub_delivered(&c->can);
+    } else if (n) {
+        if (!c->lost++) say(c, "reads too slowly, frames are being dropped");
+        c->can.dropped++;
+    }
+}
+
+/* An error frame of the bus, or news of the client's own controller. */
+static void on_error(void *ctx, const struct can_msg *m, int64_t t_ns)
+{
+    struct client *c = ctx;
+    char text[80];
+    if (c->phase == PHASE_LEAVING) return;
+    snprintf(text, sizeof text, "%s, TEC %u REC %u", socketcand_class(m->id), m->data[6], m->data[7]);
+    tell_error(c, SOCKETCAND_ERROR_FLAG | m->id, text, t_ns);
+}
+
+static void on_stall(struct can_client *can)
+{
+    struct client *c = can->node.ctx;
+    text_link_stall(&c->io, can->stalled);
+}
+
+/* ---- client to bus */
+
+static void release_hold(struct client *c)
+{
+    if (c->phase != PHASE_HOLD) return;
+    c->phase = PHASE_RAW;
+    c->io.hold = false;
+}
+
+/* With several buses the channel is the name of one. */
+static bool choose_bus(struct client *c, const char *channel, int64_t t_ns)
+{
+    const struct socketcand_server *s = c->server;
+    char text[160] = "no such bus; there are";
+    for (unsigned i = 0; i < s->hubs; i++) {
+        c->hub = &s->hub[i];
+        if (s->hubs == 1 || strcmp(s->hub[i].name, channel) == 0) return true;
+        const size_t at = strlen(text);
+        snprintf(text + at, sizeof text - at, "%s %s", i ? "," : "", s->hub[i].name);
+    }
+    c->hub = s->hub;
+    refuse(c, text, t_ns);
+    return false;
+}
+
+static void do_open(struct client *c, const struct socketcand_msg *m, int64_t t_ns)
+{
+    if (c->phase != PHASE_HELLO) {
+        refuse(c, "a channel is open already", t_ns);
+        return;
+    }
+    if (!choose_bus(c, m->channel, t_ns)) return;
+    memcpy(c->can.name, m->channel, sizeof c->can.name);
+    c->phase = PHASE_OPEN;
+    answer(c, "< ok >");
+}
+
+static void do_rawmode(struct client *c, int64_t t_ns)
+{
+    if (c->phase != PHASE_OPEN) {
+        refuse(c, c->phase == PHASE_HELLO ? "rawmode before open CHANNEL" : "rawmode already", t_ns);
+        return;
+    }
+    answer(c, "< ok >");
+    c->io.link.flush(&c->io.link, t_ns); /* now, as a segment of its own */
+    if (c->phase == PHASE_LEAVING) return;
+    c->phase = PHASE_HOLD;
+    c->io.hold = true;
+    c->io.link.timer_ms = SOCKETCAND_HOLD_MS;
+    can_hub_up(c->hub, &c->can);
+    say(c, "connected");
+}
+
+static void do_send(struct client *c, const struct can_msg *m, int64_t t_ns)
+{
+    if (!c->can.up) {
+        refuse(c, "send before open CHANNEL and rawmode", t_ns);
+        return;
+    }
+    can_hub_send(c->hub, &c->can, m, t_ns);
+}
+
+static void on_line(struct text_link *t, enum lines_result r, const char *line, size_t len, int64_t t_ns)
+{
+    struct client *c = (struct client *)t;
+    struct socketcand_msg m;
+    if (r == LINES_OVERLONG) {
+        refuse(c, "message too long: up to 200 characters from bracket to bracket", t_ns);
+        return;
+    }
+    const enum socketcand_err err = socketcand_decode(line, len, &m);
+    release_hold(c); /* it speaks, so it has read its < ok > */
+    if (err) {
+        refuse(c, socketcand_strerror(err), t_ns);
+        return;
+    }
+    switch (m.verb) {
+    case SOCKETCAND_OPEN:
+        do_open(c, &m, t_ns);
+        break;
+    case SOCKETCAND_RAWMODE:
+        do_rawmode(c, t_ns);
+        break;
+    case SOCKETCAND_SEND:
+        do_send(c, &m.frame, t_ns);
+        break;
+    case SOCKETCAND_ECHO:
+        answer(c, "< echo >");
+        break;
+    }
+}
+
+static bool on_ready(struct text_link *t)
+{
+    return can_hub_room(&((struct client *)t)->can);
+}
+
+static void on_read(struct text_link *t)
+{
+    const int on = 1;
+    setsockopt(t->link.fd, IPPROTO_TCP, TCP_QUICKACK, &on, sizeof on);
+}
+
+/* ---- coming and going */
+
+static void leave(struct client *c)
+{
+    if (c->can.up) {
+        if (c->can.node.queued) return; /* frames of a client that sent and left still go out */
+        say(c, "gone");
+        can_hub_down(c->hub, &c->can);
+    }
+    c->server->clients--;
+    c->io.link.gone = true;
+}
+
+static void on_closed(struct text_link *t, int64_t t_ns)
+{
+    struct client *c = (struct client *)t;
+    (void)t_ns;
+    c->phase = PHASE_LEAVING;
+    c->can.leaving = true;
+    t->link.want_read = t->link.want_write = t->link.full = false;
+    t->link.pending = 0;
+    close(t->link.fd);
+    t->link.fd = -1;
+    leave(c);
+}
+
+static void on_flush(struct link *l, int64_t t_ns)
+{
+    struct client *c = (struct client *)l;
+    if (c->phase == PHASE_LEAVING) {
+        if (!l->gone) leave(c);
+        return;
+    }
+    if (c->can.node.fd_refused && !c->fd_told && c->phase == PHASE_RAW) {
+        c->fd_told = true;
+        tell_error(c, SOCKETCAND_REFUSED, "FD frames are on the bus that socketcand cannot carry", t_ns);
+    }
+    text_link_flush(l, t_ns);
+}
+
+/* After < ok > to rawmode: frames may flow once the client has read it. */
+static void on_timer(struct link *l, int64_t t_ns)
+{
+    struct client *c = (struct client *)l;
+    if (c->phase != PHASE_HOLD) return;
+    if (tcp_peer_unread(l->fd) > 0 && ++c->held < SOCKETCAND_HOLD_MAX) {
+        l->timer_ms = SOCKETCAND_HOLD_MS;
+        return;
+    }
+    release_hold(c);
+    on_flush(l, t_ns);
+}
+
+static void on_release(struct link *l)
+{
+    struct client *c = (struct client *)l;
+    can_hub_down(c->hub, &c->can);
+    text_link_free(&c->io);
+    free(c);
+}
+
+static const struct text_link_ops client_ops = {on_line, on_ready, on_read, on_closed};
+
+static struct client *client_new(struct socketcand_server *s, int fd)
+{
+    struct client *c = calloc(1, sizeof *c);
+    const struct text_link_cfg cfg = {
+        .fd = fd, .end = '>', .line_max = SOCKETCAND_MSG_MAX, .out_max = OUT_MAX, .out_high = OUT_HIGH};
+    if (!c || !text_link_init(&c->io, &cfg, &client_ops)) {
+        free(c);
+        return NULL;
+    }
+    c->server = s;
+    c->hub = s->hub;
+    c->io.link.flush = on_flush;
+    c->io.link.timer = on_timer;
+    c->io.link.release = on_release;
+    c->can.adapter = "socketcand";
+    c->can.node = (struct can_node){.order = CAN_ORDER_FIFO, .rx = on_frame, .error = on_error, .ctx = c};
+    c->can.stall = on_stall;
+    return c;
+}
+
+static void on_connection(struct link *l, int64_t t_ns)
+{
+    struct socketcand_server *s = (struct socketcand_server *)l;
+    const int on = 1, size = SNDBUF;
+    const int fd = accept4(l->fd, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC);
+    if (fd < 0) return;
+    setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+    setsockopt(fd, SOL_SOCKET, SO_SNDBUF, &size, sizeof size);
+    struct client *c = s->clients < SOCKETCAND_CLIENTS_MAX ? client_new(s, fd) : NULL;
+    if (!c) {
+        static const char full[] = "< error 20000008 0.000000 too many clients >";
+        (void)!write(fd, full, sizeof full - 1);
+        close(fd);
+        return;
+    }
+    s->clients++;
+    links_add_first(s->hub->links, &c->io.link);
+    answer(c, "< hi >");
+    c->io.link.flush(&c->io.link, t_ns);
+}
+
+int socketcand_listen(struct socketcand_server *s, struct can_hub *hub, unsigned hubs, uint16_t port)
+{
+    const int fd = tcp_listen(&port);
+    if (fd < 0) return fd;
+    *s = (struct socketcand_server){.hub = hub, .hubs = hubs, .port = port};
+    s->listen = (struct link){.fd = fd, .want_read = true, .readable = on_connection};
+    links_add_first(hub->links, &s->listen);
+    return 0;
+}
+
+void socketcand_close(struct socketcand_server *s)
+{
+    if (s->listen.fd >= 0) close(s->listen.fd);
+    s->listen.fd = -1;
+    s->listen.gone = true;
+}

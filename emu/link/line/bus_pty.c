@@ -1,0 +1,131 @@
+#include "link/line/bus_pty.h"
+
+#include <errno.h>
+#include <inttypes.h>
+#include <stdio.h>
+
+enum { OUT_MAX = 1 << 20 };
+
+static void put(struct bus_pty *p, const char *text, size_t n)
+{
+    text_link_put(&p->io, text, n);
+}
+
+static void refuse(struct bus_pty *p, const struct bus_request *r, unsigned fields, const char *code, int64_t t_ns)
+{
+    char text[BUS_TEXT_MAX];
+    p->refused++;
+    put(p, text, bus_text_refused(r, fields, code, t_ns, text));
+}
+
+static void say_who(struct bus_pty *p, int64_t t_ns)
+{
+    char text[BUS_TEXT_MAX];
+    size_t n = (size_t)snprintf(text, sizeof text, "I %.16s", p->ops.board);
+    for (unsigned a = 0; a < p->ops.addresses; a++) {
+        const char *const name = p->ops.name(p->ops.ctx, a);
+        if (name && n + 40 < sizeof text) n += (size_t)snprintf(text + n, sizeof text - n, " %02Xh=%.11s", a, name);
+    }
+    n += (size_t)snprintf(text + n, sizeof text - n, " t=%" PRId64 "\n", t_ns);
+    put(p, text, n);
+}
+
+static void on_line(struct text_link *t, enum lines_result r, const char *line, size_t len, int64_t t_ns)
+{
+    struct bus_pty *p = (struct bus_pty *)t;
+    struct bus_request request = {.op = BUS_READ};
+    unsigned fields = 0;
+    const enum bus_text_err err = r == LINES_LINE ? bus_text_parse(line, len, &request, &fields) : BUS_TEXT_OVERLONG;
+    if (err != BUS_TEXT_OK) {
+        refuse(p, &request, fields, bus_text_code(err), t_ns);
+        return;
+    }
+    if (request.op == BUS_WHO) {
+        say_who(p, t_ns);
+        return;
+    }
+    const char *const code = p->ops.submit(p->ops.ctx, &request, t_ns);
+    if (code) {
+        refuse(p, &request, fields, code, t_ns);
+        return;
+    }
+    p->request = request;
+    p->busy = true;
+    p->orphan = false;
+}
+
+static bool on_ready(struct text_link *t)
+{
+    return !((const struct bus_pty *)t)->busy;
+}
+
+void bus_pty_done(struct bus_pty *p, uint16_t data, int64_t t_ns)
+{
+    char text[BUS_TEXT_MAX];
+    if (!p->busy) return;
+    p->busy = false;
+    p->cycles++;
+    if (!p->orphan) put(p, text, bus_text_done(&p->request, data, t_ns, text));
+}
+
+void bus_pty_failed(struct bus_pty *p, const char *code, int64_t t_ns)
+{
+    if (!p->busy) return;
+    p->busy = false;
+    if (!p->orphan) refuse(p, &p->request, 2, code, t_ns);
+}
+
+/* Nobody is there to read. */
+static void on_flush(struct link *l, int64_t t_ns)
+{
+    struct bus_pty *p = (struct bus_pty *)l;
+    if (!p->pty.openers) text_link_forget_output(&p->io);
+    text_link_flush(l, t_ns);
+}
+
+static void on_opened(void *ctx, bool open, int64_t t_ns)
+{
+    struct bus_pty *p = ctx;
+    (void)t_ns;
+    if (!open) return;
+    p->orphan = p->busy;
+    text_link_forget(&p->io);
+    pty_discard(&p->pty);
+}
+
+/* Cannot happen while our own slave descriptor is open. */
+static void on_closed(struct text_link *t, int64_t t_ns)
+{
+    (void)t_ns;
+    t->link.want_read = t->link.want_write = false;
+}
+
+static const struct text_link_ops text_ops = {on_line, on_ready, NULL, on_closed};
+
+int bus_pty_open(struct bus_pty *p, struct links *links, const struct bus_pty_ops *ops, const char *name)
+{
+    *p = (struct bus_pty){.ops = *ops};
+    const int err = pty_open(&p->pty, name);
+    if (err) return err;
+    const struct text_link_cfg cfg = {
+        .fd = p->pty.master, .end = '\n', .line_max = BUS_TEXT_LINE_MAX + 1, .out_max = OUT_MAX, .out_high = OUT_MAX};
+    if (!text_link_init(&p->io, &cfg, &text_ops)) {
+        pty_close(&p->pty);
+        return -ENOMEM;
+    }
+    p->pty.master = -1; /* the text link's now */
+    p->pty.opened = on_opened;
+    p->pty.ctx = p;
+    p->io.link.flush = on_flush;
+    links_add_first(links, &p->io.link);
+    links_add_first(links, &p->pty.watch);
+    return 0;
+}
+
+void bus_pty_close(struct bus_pty *p)
+{
+    p->busy = false;
+    text_link_free(&p->io);
+    p->io.link.gone = true;
+    pty_close(&p->pty);
+}

@@ -1,0 +1,111 @@
+#include "link/line/text_link.h"
+
+#include <errno.h>
+#include <stdlib.h>
+#include <unistd.h>
+
+static void refresh(struct text_link *t)
+{
+    t->link.pending = t->stall ? 0 : outbuf_pending(&t->out);
+    t->link.full = t->link.pending > t->out_high;
+    t->link.want_write = t->link.pending > 0 && !t->hold;
+    t->link.want_read = t->in_pos == t->in_len && !t->eof;
+}
+
+static void end(struct text_link *t, int64_t t_ns)
+{
+    if (t->ended) return;
+    t->ended = true;
+    t->ops->closed(t, t_ns);
+}
+
+/* Hands over lines until there are no more or the owner takes no more. */
+static void take_lines(struct text_link *t, int64_t t_ns)
+{
+    if (t->taking) return;
+    t->taking = true;
+    while (t->in_pos < t->in_len && !t->ended && (!t->ops->ready || t->ops->ready(t))) {
+        size_t used;
+        const enum lines_result r = lines_feed(&t->lines, t->in + t->in_pos, t->in_len - t->in_pos, &used);
+        t->in_pos += used;
+        if (r != LINES_MORE) t->ops->line(t, r, t->lines.buf, t->lines.len, t_ns);
+    }
+    t->taking = false;
+    if (t->in_pos == t->in_len && t->eof) end(t, t_ns);
+}
+
+static void on_readable(struct link *l, int64_t t_ns)
+{
+    struct text_link *t = (struct text_link *)l;
+    if (t->in_pos < t->in_len || t->eof) return;
+    const ssize_t n = read(l->fd, t->in, sizeof t->in);
+    if (n < 0 && (errno == EAGAIN || errno == EINTR)) return;
+    if (t->ops->was_read) t->ops->was_read(t);
+    t->in_pos = 0;
+    t->in_len = n > 0 ? (size_t)n : 0;
+    t->eof = n <= 0;
+    take_lines(t, t_ns);
+    refresh(t);
+}
+
+void text_link_flush(struct link *l, int64_t t_ns)
+{
+    struct text_link *t = (struct text_link *)l;
+    if (t->ended) return;
+    if (t->in_pos < t->in_len) take_lines(t, t_ns);
+    if (!t->hold && !t->stall && outbuf_pending(&t->out) && outbuf_flush(&t->out, l->fd) < 0) {
+        outbuf_clear(&t->out); /* nobody will read it; what the peer had sent before is still taken */
+        t->eof = true;
+        if (t->in_pos == t->in_len) end(t, t_ns);
+    }
+    refresh(t);
+}
+
+bool text_link_init(struct text_link *t, const struct text_link_cfg *cfg, const struct text_link_ops *ops)
+{
+    *t = (struct text_link){.ops = ops, .out_high = cfg->out_high};
+    char *line = malloc(cfg->line_max + 1);
+    if (!line) return false;
+    if (!outbuf_init(&t->out, cfg->out_max)) {
+        free(line);
+        return false;
+    }
+    lines_init(&t->lines, line, cfg->line_max + 1, cfg->end);
+    t->link = (struct link){.fd = cfg->fd, .want_read = true, .readable = on_readable, .flush = text_link_flush};
+    return true;
+}
+
+void text_link_free(struct text_link *t)
+{
+    if (t->link.fd >= 0) close(t->link.fd);
+    t->link.fd = -1;
+    free(t->lines.buf);
+    t->lines.buf = NULL;
+    outbuf_free(&t->out);
+}
+
+bool text_link_put(struct text_link *t, const char *text, size_t n)
+{
+    const bool fits = outbuf_put(&t->out, text, n);
+    refresh(t);
+    return fits;
+}
+
+void text_link_stall(struct text_link *t, bool on)
+{
+    t->stall = on;
+    refresh(t);
+}
+
+void text_link_forget_output(struct text_link *t)
+{
+    outbuf_clear(&t->out);
+    refresh(t);
+}
+
+void text_link_forget(struct text_link *t)
+{
+    lines_reset(&t->lines);
+    t->in_pos = t->in_len = 0;
+    text_link_forget_output(t);
+}

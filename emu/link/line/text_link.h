@@ -1,0 +1,60 @@
+/* A descriptor that carries lines of text both ways: what socketcand clients, the slcan pty and control clients share.
+ *
+ * Input is split into lines and handed over one at a time while the owner takes them; what it does not take yet stays
+ * here and then in the kernel, so that a peer that is too fast is slowed down and nothing is lost. Output waits in a
+ * bounded buffer. */
+#ifndef PSABENCH_LINK_LINE_TEXT_LINK_H
+#define PSABENCH_LINK_LINE_TEXT_LINK_H
+
+#include "link/line/lines.h"
+#include "link/link.h"
+#include "link/outbuf.h"
+
+struct text_link;
+
+struct text_link_ops {
+    /* One line, or the news that an overlong one was skipped. */
+    void (*line)(struct text_link *t, enum lines_result r, const char *line, size_t len, int64_t t_ns);
+    bool (*ready)(struct text_link *t);                /* takes another line now; NULL: always */
+    void (*was_read)(struct text_link *t);             /* after each read of the descriptor; may be NULL */
+    void (*closed)(struct text_link *t, int64_t t_ns); /* the peer has gone and all its lines were taken; called once */
+};
+
+struct text_link_cfg {
+    int fd;          /* non-blocking; owned by the link from here on */
+    char end;        /* of a line */
+    size_t line_max; /* longest line */
+    size_t out_max;  /* bytes of output kept for a slow peer */
+    size_t out_high; /* above this the link calls itself full */
+};
+
+struct text_link {
+    struct link link; /* first: the loop's pointer is ours */
+    const struct text_link_ops *ops;
+    struct lines lines;
+    struct outbuf out;
+    size_t out_high;
+    bool hold;   /* output is kept back */
+    bool stall;  /* likewise, and nobody is to wait for it */
+    bool taking; /* lines are being handed over: an owner that flushes meanwhile is not handed the next one */
+    bool eof;    /* the peer sends no more */
+    bool ended;  /* closed() has been called */
+    char in[4096];
+    size_t in_pos, in_len;
+};
+
+/* False when there is no memory; then the descriptor is still the caller's. */
+bool text_link_init(struct text_link *t, const struct text_link_cfg *cfg, const struct text_link_ops *ops);
+void text_link_free(struct text_link *t); /* closes the descriptor */
+
+/* The link's flush(), for owners that add to it. */
+void text_link_flush(struct link *l, int64_t t_ns);
+
+/* The whole message or nothing: false when the buffer is full. */
+bool text_link_put(struct text_link *t, const char *text, size_t n);
+
+void text_link_stall(struct text_link *t, bool on);
+void text_link_forget_output(struct text_link *t);
+void text_link_forget(struct text_link *t); /* drops a partial line and all output: another peer sits at the pty */
+
+#endif

@@ -1,0 +1,166 @@
+#include "phys/motion/head.h"
+
+#include "base/detmath.h"
+#include "base/sched.h"
+
+#include <math.h>
+#include <string.h>
+
+#define RAD_PER_DEG    0.017453292519943295
+#define RAD_PER_ARCSEC (RAD_PER_DEG / 3600.0)
+
+void head_init(struct head *h, const struct head_cfg *cfg, const struct site *site, struct rng error)
+{
+    *h = (struct head){.cfg = *cfg, .site = *site, .error = error, .cached_to_ns = -1};
+}
+
+static double quantise_rad(const struct head_cfg *c, double angle_rad)
+{
+    if (c->resolution_arcsec <= 0.0) return angle_rad;
+    const double step_rad = c->resolution_arcsec * RAD_PER_ARCSEC;
+    return nearbyint(angle_rad / step_rad) * step_rad;
+}
+
+static double periodic_rad(const struct head_cfg *c, double angle_rad)
+{
+    const double order = c->periodic_order ? (double)c->periodic_order : 1.0;
+    return c->periodic_arcsec * RAD_PER_ARCSEC * det_sin(order * angle_rad);
+}
+
+static double draw_rad(struct head *h, double arcsec_rms)
+{
+    return arcsec_rms > 0.0 ? arcsec_rms * RAD_PER_ARCSEC * rng_gauss(&h->error) : 0.0;
+}
+
+/* Angle of the mount alone. Smooth start and stop: 3 x^2 - 2 x^3. */
+static double mount_angle_rad(const struct head *h, int64_t t_ns)
+{
+    if (t_ns >= h->end_ns) return h->to_rad;
+    if (t_ns <= h->start_ns) return h->from_rad;
+    const double x = (double)(t_ns - h->start_ns) / (double)(h->end_ns - h->start_ns);
+    return h->from_rad + (h->to_rad - h->from_rad) * x * x * (3.0 - 2.0 * x);
+}
+
+void head_turn(struct head *h, double angle_deg, int64_t t_ns)
+{
+    h->from_rad = mount_angle_rad(h, t_ns);
+    h->scale_rad = quantise_rad(&h->cfg, angle_deg * RAD_PER_DEG);
+    h->setting_rad = draw_rad(h, h->cfg.setting_error_arcsec_rms);
+    h->to_rad = h->scale_rad + h->setting_rad + periodic_rad(&h->cfg, h->scale_rad);
+    h->start_ns = t_ns;
+    h->end_ns = t_ns + (int64_t)(h->cfg.turn_s * (double)NS_PER_S + 0.5);
+    h->cached_to_ns = -1;
+}
+
+void head_mount(struct head *h, enum head_face face, int64_t t_ns)
+{
+    h->face_before = h->face;
+    h->mount_before_rad = h->mount_rad;
+    h->face = face;
+    h->face_ns = t_ns;
+    h->mount_rad = draw_rad(h, h->cfg.mount_error_arcsec_rms);
+    h->cached_to_ns = -1;
+}
+
+enum head_face head_face(const struct head *h, int64_t t_ns)
+{
+    return t_ns < h->face_ns ? h->face_before : h->face;
+}
+
+bool head_at_rest(const struct head *h, int64_t t_ns)
+{
+    return t_ns >= h->end_ns;
+}
+
+int64_t head_rest_ns(const struct head *h)
+{
+    return h->end_ns;
+}
+
+double head_angle_rad(const struct head *h, int64_t t_ns)
+{
+    return mount_angle_rad(h, t_ns) + (t_ns < h->face_ns ? h->mount_before_rad : h->mount_rad);
+}
+
+struct motion_state head_motion(const struct head *h, int64_t t_ns)
+{
+    struct motion_state s = {.angle_rad = head_angle_rad(h, t_ns)};
+    if (t_ns < h->end_ns && t_ns >= h->start_ns) {
+        const double turn_s = (double)(h->end_ns - h->start_ns) / (double)NS_PER_S;
+        const double way_rad = h->to_rad - h->from_rad;
+        const double x = (double)(t_ns - h->start_ns) / (double)(h->end_ns - h->start_ns);
+        s.rate_radps = way_rad * 6.0 * x * (1.0 - x) / turn_s;
+        s.accel_radps2 = way_rad * (6.0 - 12.0 * x) / (turn_s * turn_s);
+    }
+    return s;
+}
+
+/* The scale carries its own periodic error: it shows what the operator set, off by the setting error. */
+double head_read_deg(const struct head *h, int64_t t_ns)
+{
+    const double angle_rad = mount_angle_rad(h, t_ns);
+    return quantise_rad(&h->cfg, angle_rad - periodic_rad(&h->cfg, angle_rad)) / RAD_PER_DEG;
+}
+
+static bool holds_from(const struct head *h, int64_t t_ns)
+{
+    return t_ns >= h->end_ns && t_ns >= h->face_ns;
+}
+
+void head_gravity_mps2(struct head *h, int64_t t_ns, double a_m_mps2[3])
+{
+    if (t_ns < h->cached_from_ns || t_ns > h->cached_to_ns) {
+        const double alpha_rad = head_angle_rad(h, t_ns);
+        h->cached_g_mps2[0] = -h->site.g_mps2 * det_sin(alpha_rad);
+        h->cached_g_mps2[1] = -h->site.g_mps2 * det_cos(alpha_rad);
+        h->cached_g_mps2[2] = 0.0;
+        h->cached_from_ns = t_ns;
+        h->cached_to_ns = holds_from(h, t_ns) ? INT64_MAX : t_ns;
+    }
+    memcpy(a_m_mps2, h->cached_g_mps2, sizeof h->cached_g_mps2);
+}
+
+/* Rows: which mount axis a sensor axis lies along, and its sense. A face is a rotation about Ox: determinant +1. */
+struct face_axis {
+    unsigned along;
+    double sense;
+};
+
+static const struct {
+    const char *name;
+    struct face_axis y, z;
+    double quarters; /* the rotation */
+} faces[HEAD_FACES] = {
+    [HEAD_DIRECT] = {"direct", {1, 1.0}, {2, 1.0}, 0.0},
+    [HEAD_REVERSED] = {"reversed", {1, -1.0}, {2, -1.0}, 2.0},
+    [HEAD_SIDE] = {"side", {2, -1.0}, {1, 1.0}, -1.0},
+    [HEAD_SIDE_REVERSED] = {"side_reversed", {2, 1.0}, {1, -1.0}, 1.0},
+};
+
+void head_sensor_mps2(enum head_face face, double cos_alpha0, double sin_alpha0, const double a_m_mps2[3],
+                      double a_s_mps2[3])
+{
+    /* sin(alpha + alpha0) and cos(alpha + alpha0) from those of alpha */
+    const double tilted[3] = {a_m_mps2[0] * cos_alpha0 + a_m_mps2[1] * sin_alpha0,
+                              a_m_mps2[1] * cos_alpha0 - a_m_mps2[0] * sin_alpha0, a_m_mps2[2]};
+    a_s_mps2[0] = tilted[0];
+    a_s_mps2[1] = faces[face].y.sense * tilted[faces[face].y.along];
+    a_s_mps2[2] = faces[face].z.sense * tilted[faces[face].z.along];
+}
+
+double head_face_rad(enum head_face face)
+{
+    return faces[face].quarters * HEAD_QUARTER_RAD;
+}
+
+const char *head_face_name(enum head_face face)
+{
+    return (unsigned)face < HEAD_FACES ? faces[face].name : NULL;
+}
+
+int head_face_by_name(const char *name)
+{
+    for (unsigned i = 0; i < HEAD_FACES; i++)
+        if (strcmp(faces[i].name, name) == 0) return (int)i;
+    return -1;
+}

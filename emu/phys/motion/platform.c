@@ -1,0 +1,498 @@
+#include "phys/motion/platform.h"
+
+#include "base/detmath.h"
+#include "base/sched.h"
+
+#include <math.h>
+#include <string.h>
+
+#define RAD_PER_DEG     0.017453292519943295
+#define RAD_PER_ARCMIN  (RAD_PER_DEG / 60.0)
+#define RAD_PER_ARCSEC  (RAD_PER_DEG / 3600.0)
+#define RADPS_PER_DEGPH (RAD_PER_DEG / 3600.0)
+#define TURN_RAD        6.283185307179586
+#define STOP_RAD        (PLATFORM_STOP_DEG * RAD_PER_DEG)
+#define AFRESH_EVERY    64 /* steps: sines and cosines are then computed anew, in between turned on */
+
+struct platform_cfg platform_default(void)
+{
+    return (struct platform_cfg){
+        .step_ns = NS_PER_S / 100,
+        .drift_degph = {25.0, 25.0},
+        .gm_sigma_degph = 0.2,
+        .gm_tau_s = 1000.0,
+        .torquer_limit_dps = 20.0,
+        .level_tilt_arcmin = {10.0, 10.0},
+        .level_repeat_arcmin = 1.0,
+        .angle_zero_arcmin = 6.0,
+        .angle_set_arcmin = 3.0,
+        .angle_read_arcmin = 0.5,
+        .angle_step_arcsec = 1.0,
+    };
+}
+
+/* ---- kinematics */
+
+/* What the platform stands on: the rate of l, and the outer axis in l. */
+struct ground {
+    double w_l_radps[3];
+    double z_c[3];
+};
+
+struct trig {
+    double sin_a, cos_a, sin_b, cos_b;
+};
+
+/* Block 1 of the article's fig. 3 without small angles: tan gamma = (x1 z_c)/(z2 z_c), with x1 = (cos a, sin a, 0) and
+ * z2 = (sin b sin a, -sin b cos a, cos b), the platform's axes before the turn by gamma. */
+struct tilt {
+    double sin_g, cos_g;
+    double across, along, inverse; /* x1 z_c, z2 z_c, 1 over their hypotenuse */
+};
+
+static struct tilt tilt_of(const struct trig *t, const double z_c[3])
+{
+    struct tilt g;
+    g.across = z_c[0] * t->cos_a + z_c[1] * t->sin_a;
+    g.along = t->cos_b * z_c[2] - t->sin_b * (z_c[1] * t->cos_a - z_c[0] * t->sin_a);
+    g.inverse = 1.0 / sqrt(g.across * g.across + g.along * g.along);
+    g.sin_g = g.across * g.inverse;
+    g.cos_g = g.along * g.inverse;
+    return g;
+}
+
+/* Equations (3) of the article solved for the rates of alpha and beta, with the whole rate of l (sources instruments 1.4). */
+static void solve(const struct ground *on, const struct trig *t, const double w_radps[2], double rate_radps[2])
+{
+    const struct tilt g = tilt_of(t, on->z_c);
+    const double *w_l = on->w_l_radps;
+    const double ahead = t->cos_a * w_l[1] - t->sin_a * w_l[0];
+    rate_radps[0] = (w_radps[1] * g.cos_g - w_radps[0] * g.sin_g + t->sin_b * ahead) / t->cos_b - w_l[2];
+    rate_radps[1] = w_radps[0] * g.cos_g + w_radps[1] * g.sin_g - w_l[0] * t->cos_a - w_l[1] * t->sin_a;
+}
+
+/* Turns on by a small angle, up to 0.1 rad: the series are good to the last bit there. Products: divisions take thrice as long. */
+static void turn_on(double *sin_x, double *cos_x, double d_rad)
+{
+    const double z = d_rad * d_rad;
+    const double s = d_rad - d_rad * z * (1.0 / 6.0 - z * (1.0 / 120.0 - z * (1.0 / 5040.0)));
+    const double less = z * (0.5 - z * (1.0 / 24.0 - z * (1.0 / 720.0 - z * (1.0 / 40320.0)))); /* 1 - cos */
+    const double was = *sin_x;
+    *sin_x += *cos_x * s - was * less;
+    *cos_x -= was * s + *cos_x * less;
+}
+
+static struct trig trig_at(const struct platform_node *n, double da_rad, double db_rad)
+{
+    struct trig t = {n->sin_a, n->cos_a, n->sin_b, n->cos_b};
+    turn_on(&t.sin_a, &t.cos_a, da_rad);
+    turn_on(&t.sin_b, &t.cos_b, db_rad);
+    return t;
+}
+
+/* ---- grid */
+
+static struct platform_node *node_at(struct platform *p, int64_t k)
+{
+    return &p->node[(uint64_t)k % PLATFORM_HISTORY];
+}
+
+static const struct vehicle_state *vehicle_state_at(struct platform *p, int64_t t_ns)
+{
+    if (t_ns < p->ground_from_ns || t_ns > p->ground_to_ns) {
+        vehicle_at(&p->vehicle, t_ns, &p->ground);
+        p->ground_from_ns = t_ns;
+        p->ground_to_ns = vehicle_steady(&p->vehicle, t_ns) ? INT64_MAX : t_ns;
+    }
+    return &p->ground;
+}
+
+static struct ground ground_at(struct platform *p, int64_t t_ns)
+{
+    const struct vehicle_state *s = vehicle_state_at(p, t_ns);
+    struct ground g;
+    for (unsigned k = 0; k < 3; k++) {
+        g.w_l_radps[k] = s->w_il_l_radps[k];
+        g.z_c[k] = s->C_lc[k][2];
+    }
+    return g;
+}
+
+static double drift_radps(const struct platform *p, const struct platform_node *n, unsigned axis)
+{
+    return p->cfg.drift_degph[axis] * RADPS_PER_DEGPH + n->drift_step_radps[axis] + n->gm_radps[axis];
+}
+
+/* Rates about x_p and z_p that the gyroscope keeps: (7) of the article with a torquer's scale error. */
+static void gyro_rates(const struct platform *p, const struct platform_node *n, double w_radps[2])
+{
+    for (unsigned i = 0; i < PLATFORM_AXES; i++) {
+        const double scale = (1.0 + p->cfg.torquer_scale[i]) * n->torquer_gain[i];
+        w_radps[i] = n->torque_radps[i] * scale - drift_radps(p, n, i);
+    }
+}
+
+static void afresh(struct platform_node *n)
+{
+    n->sin_a = det_sin(n->alpha_rad);
+    n->cos_a = det_cos(n->alpha_rad);
+    n->sin_b = det_sin(n->beta_rad);
+    n->cos_b = det_cos(n->beta_rad);
+}
+
+/* Exact for any step (sources instruments 1.4). */
+static void drift_on(const struct platform *p, struct platform_node *n)
+{
+    if (p->gm_kick_radps == 0.0) return;
+    for (unsigned i = 0; i < PLATFORM_AXES; i++) {
+        n->gm_radps[i] = p->gm_keep * n->gm_radps[i] + p->gm_kick_radps * rng_gauss(&n->gm[i]);
+    }
+}
+
+/* Runge and Kutta's fourth-order step. */
+static void advance(struct platform *p)
+{
+    const int64_t t_ns = p->newest * p->cfg.step_ns;
+    struct platform_node *from = node_at(p, p->newest);
+    struct platform_node *to = node_at(p, p->newest + 1);
+    const double h = p->step_s;
+    const struct ground start = ground_at(p, t_ns);
+    const struct ground middle = ground_at(p, t_ns + p->cfg.step_ns / 2);
+    const struct ground end = ground_at(p, t_ns + p->cfg.step_ns);
+    const struct trig now = {from->sin_a, from->cos_a, from->sin_b, from->cos_b};
+    double w[2], k1[2], k2[2], k3[2], k4[2];
+    gyro_rates(p, from, w);
+    solve(&start, &now, w, k1);
+    struct trig t = trig_at(from, 0.5 * h * k1[0], 0.5 * h * k1[1]);
+    solve(&middle, &t, w, k2);
+    t = trig_at(from, 0.5 * h * k2[0], 0.5 * h * k2[1]);
+    solve(&middle, &t, w, k3);
+    t = trig_at(from, h * k3[0], h * k3[1]);
+    solve(&end, &t, w, k4);
+    const double da_rad = h / 6.0 * (k1[0] + 2.0 * (k2[0] + k3[0]) + k4[0]);
+    const double db_rad = h / 6.0 * (k1[1] + 2.0 * (k2[1] + k3[1]) + k4[1]);
+    memcpy(from->rate_radps, k1, sizeof k1);
+    t = trig_at(from, da_rad, db_rad);
+    solve(&end, &t, w, from->rate_end_radps);
+    *to = *from;
+    to->alpha_rad += da_rad;
+    to->beta_rad += db_rad;
+    to->sin_a = t.sin_a;
+    to->cos_a = t.cos_a;
+    to->sin_b = t.sin_b;
+    to->cos_b = t.cos_b;
+    p->newest++;
+    if (fabs(to->beta_rad) > STOP_RAD) {
+        to->beta_rad = to->beta_rad > 0.0 ? STOP_RAD : -STOP_RAD;
+        afresh(to);
+    } else if (p->newest % AFRESH_EVERY == 0) {
+        afresh(to);
+    }
+    drift_on(p, to);
+}
+
+static void advance_to(struct platform *p, int64_t k)
+{
+    while (p->newest < k) advance(p);
+}
+
+/* The node from which on something is to be changed at t_ns; what was computed behind it is done again when it is asked for. */
+static struct platform_node *change_from(struct platform *p, int64_t t_ns)
+{
+    const int64_t k = t_ns > 0 ? (t_ns + p->cfg.step_ns - 1) / p->cfg.step_ns : 0;
+    advance_to(p, k);
+    p->newest = k;
+    p->force_ns = -1;
+    return node_at(p, k);
+}
+
+/* ---- life and commands */
+
+static double draw_rad(struct platform *p, double arcmin)
+{
+    return arcmin * RAD_PER_ARCMIN * rng_gauss(&p->draws); /* always one number: an error set to 0 shifts no other */
+}
+
+static struct platform_setting draw_setting(struct platform *p, int64_t t_ns)
+{
+    const struct platform_cfg *c = &p->cfg;
+    struct platform_setting s = {.from_ns = t_ns};
+    double tilt_rad[3] = {0.0, 0.0, 0.0};
+    for (unsigned i = 0; i < 2; i++) {
+        tilt_rad[i] = c->level_tilt_arcmin[i] * RAD_PER_ARCMIN + draw_rad(p, c->level_repeat_arcmin);
+    }
+    pose_start(&s.level, &(struct site){0});
+    pose_tilt(&s.level, tilt_rad);
+    s.set_rad = draw_rad(p, c->angle_set_arcmin);
+    s.read_rad = draw_rad(p, c->angle_read_arcmin);
+    return s;
+}
+
+static void start_drift(struct platform *p, struct platform_node *n, uint64_t seed)
+{
+    static const char *const streams[PLATFORM_AXES] = {"platform.drift1", "platform.drift2"};
+    const double sigma_radps = p->cfg.gm_sigma_degph * RADPS_PER_DEGPH;
+    p->gm_keep = sigma_radps > 0.0 ? det_exp(-p->step_s / p->cfg.gm_tau_s) : 0.0;
+    p->gm_kick_radps = sigma_radps * sqrt(1.0 - p->gm_keep * p->gm_keep);
+    for (unsigned i = 0; i < PLATFORM_AXES; i++) {
+        n->gm[i] = rng_stream(seed, 0, streams[i]);
+        if (sigma_radps > 0.0 && !p->cfg.gm_from_zero) n->gm_radps[i] = sigma_radps * rng_gauss(&n->gm[i]);
+    }
+}
+
+void platform_init(struct platform *p, const struct platform_cfg *cfg, const struct vehicle_cfg *vehicle,
+                   const struct site *site, uint64_t seed)
+{
+    *p = (struct platform){
+        .cfg = *cfg, .ground_to_ns = -1, .force_ns = -1, .draws = rng_stream(seed, 0, "platform.setting")};
+    p->step_s = (double)cfg->step_ns / (double)NS_PER_S;
+    vehicle_init(&p->vehicle, vehicle, site);
+    p->setting = p->setting_before = draw_setting(p, 0);
+    struct platform_node *n = node_at(p, 0);
+    n->alpha_rad = cfg->alpha0_deg * RAD_PER_DEG;
+    n->beta_rad = cfg->beta0_deg * RAD_PER_DEG;
+    n->torquer_gain[PLATFORM_LEVEL] = n->torquer_gain[PLATFORM_AZIMUTH] = 1.0;
+    afresh(n);
+    start_drift(p, n, seed);
+}
+
+bool platform_torque(struct platform *p, double u1_radps, double u2_radps, int64_t t_ns)
+{
+    const double limit_radps = p->cfg.torquer_limit_dps * RAD_PER_DEG;
+    struct platform_node *n = change_from(p, t_ns);
+    n->torque_radps[PLATFORM_LEVEL] = fmin(fmax(u1_radps, -limit_radps), limit_radps);
+    n->torque_radps[PLATFORM_AZIMUTH] = fmin(fmax(u2_radps, -limit_radps), limit_radps);
+    return fabs(u1_radps) > limit_radps || fabs(u2_radps) > limit_radps;
+}
+
+void platform_reposition(struct platform *p, int64_t t_ns)
+{
+    if (t_ns > p->setting.from_ns) p->setting_before = p->setting;
+    p->setting = draw_setting(p, t_ns);
+    p->force_ns = -1;
+}
+
+struct vehicle *platform_vehicle(struct platform *p, int64_t t_ns)
+{
+    const int64_t k = t_ns > 0 ? t_ns / p->cfg.step_ns : 0;
+    advance_to(p, k);
+    p->newest = k;
+    p->ground_to_ns = -1;
+    p->force_ns = -1;
+    return &p->vehicle;
+}
+
+void platform_set_torquer(struct platform *p, enum platform_axis axis, double gain, int64_t t_ns)
+{
+    change_from(p, t_ns)->torquer_gain[axis] = gain;
+}
+
+void platform_step_drift(struct platform *p, enum platform_axis axis, double degph, int64_t t_ns)
+{
+    change_from(p, t_ns)->drift_step_radps[axis] = degph * RADPS_PER_DEGPH;
+}
+
+void platform_stick(struct platform *p, bool stuck, int64_t t_ns)
+{
+    struct platform_state s;
+    platform_at(p, t_ns, &s);
+    p->stuck = stuck;
+    p->stuck_rad = s.q_rad;
+}
+
+/* ---- what it is at an instant */
+
+struct look {
+    double alpha_rad, beta_rad;
+    struct trig trig;
+    const struct platform_node *node; /* at or before the instant */
+};
+
+/* Between grid points by the cubic through angles and rates at both: as good as the integration. */
+static struct look look_at(struct platform *p, int64_t t_ns)
+{
+    const int64_t step_ns = p->cfg.step_ns;
+    int64_t k = t_ns > 0 ? t_ns / step_ns : 0;
+    int64_t past_ns = t_ns > 0 ? t_ns - k * step_ns : 0;
+    advance_to(p, past_ns > 0 ? k + 1 : k);
+    const int64_t oldest = p->newest - (int64_t)PLATFORM_HISTORY + 1;
+    if (k < oldest) {
+        k = oldest;
+        past_ns = 0;
+    }
+    const struct platform_node *n = node_at(p, k);
+    struct look l = {n->alpha_rad, n->beta_rad, {n->sin_a, n->cos_a, n->sin_b, n->cos_b}, n};
+    if (past_ns == 0) return l;
+    const struct platform_node *next = node_at(p, k + 1);
+    const double x = (double)past_ns / (double)step_ns;
+    const double y = 1.0 - x;
+    const double way = x * x * (1.0 + 2.0 * y);
+    const double from = x * y * y * p->step_s;
+    const double to = -x * x * y * p->step_s;
+    const double da_rad = way * (next->alpha_rad - n->alpha_rad) + from * n->rate_radps[0] + to * n->rate_end_radps[0];
+    const double db_rad = way * (next->beta_rad - n->beta_rad) + from * n->rate_radps[1] + to * n->rate_end_radps[1];
+    l.alpha_rad += da_rad;
+    l.beta_rad += db_rad;
+    l.trig = trig_at(n, da_rad, db_rad);
+    return l;
+}
+
+/* Columns x_p = x1 cos g - z2 sin g, y_p, z_p = z2 cos g + x1 sin g. */
+static void axes(const struct trig *t, const struct tilt *g, double C_lp[3][3])
+{
+    const double x1[3] = {t->cos_a, t->sin_a, 0.0};
+    const double z2[3] = {t->sin_b * t->sin_a, -t->sin_b * t->cos_a, t->cos_b};
+    const double y2[3] = {-t->cos_b * t->sin_a, t->cos_b * t->cos_a, t->sin_b};
+    for (unsigned k = 0; k < 3; k++) {
+        C_lp[k][0] = g->cos_g * x1[k] - g->sin_g * z2[k];
+        C_lp[k][1] = y2[k];
+        C_lp[k][2] = g->cos_g * z2[k] + g->sin_g * x1[k];
+    }
+}
+
+/* The same from an instant's angles and the vehicle then. */
+static void axes_at(const struct look *l, const struct vehicle_state *v, double C_lp[3][3])
+{
+    const double z_c[3] = {v->C_lc[0][2], v->C_lc[1][2], v->C_lc[2][2]};
+    const struct tilt g = tilt_of(&l->trig, z_c);
+    axes(&l->trig, &g, C_lp);
+}
+
+static double dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/* gamma' by differentiating tan gamma: x1' = alpha' y1, z2' = alpha' sin b x1 - beta' y2, z_c' = w_lc x z_c. */
+static double gamma_radps(const struct vehicle_state *v, const struct trig *t, const struct tilt *g,
+                          const double rate_radps[2])
+{
+    const double *w = v->w_lc_l_radps;
+    const double z_c[3] = {v->C_lc[0][2], v->C_lc[1][2], v->C_lc[2][2]};
+    const double moves[3] = {w[1] * z_c[2] - w[2] * z_c[1], w[2] * z_c[0] - w[0] * z_c[2],
+                             w[0] * z_c[1] - w[1] * z_c[0]};
+    const double x1[3] = {t->cos_a, t->sin_a, 0.0};
+    const double y1[3] = {-t->sin_a, t->cos_a, 0.0};
+    const double y2[3] = {-t->cos_b * t->sin_a, t->cos_b * t->cos_a, t->sin_b};
+    const double z2[3] = {t->sin_b * t->sin_a, -t->sin_b * t->cos_a, t->cos_b};
+    const double across = rate_radps[0] * dot(y1, z_c) + dot(x1, moves);
+    const double along = rate_radps[0] * t->sin_b * dot(x1, z_c) - rate_radps[1] * dot(y2, z_c) + dot(z2, moves);
+    return (across * g->cos_g - along * g->sin_g) * g->inverse;
+}
+
+static double gimbal_rad(const struct vehicle_state *v, const double C_lp[3][3])
+{
+    double along[2];
+    for (unsigned c = 0; c < 2; c++) {
+        along[c] = v->C_lc[0][c] * C_lp[0][0] + v->C_lc[1][c] * C_lp[1][0] + v->C_lc[2][c] * C_lp[2][0];
+    }
+    return det_atan2(along[1], along[0]);
+}
+
+/* What p's axes have of a vector in l. */
+static void into_p(const double C_lp[3][3], const double v_l[3], double v_p[3])
+{
+    for (unsigned k = 0; k < 3; k++) v_p[k] = C_lp[0][k] * v_l[0] + C_lp[1][k] * v_l[1] + C_lp[2][k] * v_l[2];
+}
+
+void platform_at(struct platform *p, int64_t t_ns, struct platform_state *out)
+{
+    const struct look l = look_at(p, t_ns);
+    const struct ground on = ground_at(p, t_ns);
+    const struct tilt g = tilt_of(&l.trig, on.z_c);
+    double w_radps[2];
+    double rate_radps[2];
+    gyro_rates(p, l.node, w_radps);
+    solve(&on, &l.trig, w_radps, rate_radps);
+    const double gamma = gamma_radps(&p->ground, &l.trig, &g, rate_radps);
+    *out = (struct platform_state){
+        .alpha_rad = l.alpha_rad,
+        .beta_rad = l.beta_rad,
+        .gamma_rad = det_atan2(g.across, g.along),
+        .alpha_radps = rate_radps[0],
+        .beta_radps = rate_radps[1],
+        .gamma_radps = gamma,
+    };
+    axes(&l.trig, &g, out->C_lp);
+    out->q_rad = gimbal_rad(&p->ground, (const double(*)[3])out->C_lp);
+    into_p((const double(*)[3])out->C_lp, on.w_l_radps, out->w_ip_p_radps);
+    out->w_ip_p_radps[0] += rate_radps[1] * g.cos_g - rate_radps[0] * l.trig.cos_b * g.sin_g;
+    out->w_ip_p_radps[1] += gamma + rate_radps[0] * l.trig.sin_b;
+    out->w_ip_p_radps[2] += rate_radps[1] * g.sin_g + rate_radps[0] * l.trig.cos_b * g.cos_g;
+    for (unsigned i = 0; i < PLATFORM_AXES; i++) {
+        out->drift_radps[i] = drift_radps(p, l.node, i);
+        out->torque_radps[i] = l.node->torque_radps[i];
+    }
+}
+
+/* In (-pi, pi]. */
+static double wrap_rad(double angle_rad)
+{
+    return angle_rad - TURN_RAD * ceil(angle_rad / TURN_RAD - 0.5);
+}
+
+static const struct platform_setting *setting_at(const struct platform *p, int64_t t_ns)
+{
+    return t_ns < p->setting.from_ns ? &p->setting_before : &p->setting;
+}
+
+/* q of platform_at(), without the rest of it. */
+static double q_rad(struct platform *p, int64_t t_ns)
+{
+    const struct look l = look_at(p, t_ns);
+    const struct vehicle_state *v = vehicle_state_at(p, t_ns);
+    double C_lp[3][3];
+    axes_at(&l, v, C_lp);
+    return gimbal_rad(v, (const double(*)[3])C_lp);
+}
+
+/* What the angle sensor shows before the errors of a setting. */
+static double sensor_rad(struct platform *p, int64_t t_ns)
+{
+    return (p->stuck ? p->stuck_rad : q_rad(p, t_ns)) + p->cfg.angle_zero_arcmin * RAD_PER_ARCMIN;
+}
+
+double platform_servo_rad(struct platform *p, int64_t t_ns)
+{
+    return wrap_rad(sensor_rad(p, t_ns) + setting_at(p, t_ns)->set_rad);
+}
+
+double platform_encoder_rad(struct platform *p, int64_t t_ns)
+{
+    const double step_rad = p->cfg.angle_step_arcsec * RAD_PER_ARCSEC;
+    const double shown_rad = sensor_rad(p, t_ns) + setting_at(p, t_ns)->read_rad;
+    return wrap_rad(step_rad > 0.0 ? nearbyint(shown_rad / step_rad) * step_rad : shown_rad);
+}
+
+const struct pose *platform_level(const struct platform *p, int64_t t_ns)
+{
+    return &setting_at(p, t_ns)->level;
+}
+
+void platform_force_mps2(struct platform *p, int64_t t_ns, double f_mps2[3])
+{
+    if (p->force_ns != t_ns) {
+        const struct look l = look_at(p, t_ns);
+        const struct vehicle_state *v = vehicle_state_at(p, t_ns);
+        const double f_l_mps2[3] = {v->accel_l_mps2[0], v->accel_l_mps2[1],
+                                    v->accel_l_mps2[2] + p->vehicle.site.g_mps2};
+        double C_lp[3][3];
+        axes_at(&l, v, C_lp);
+        into_p((const double(*)[3])C_lp, f_l_mps2, p->force_mps2);
+        p->force_ns = t_ns;
+    }
+    memcpy(f_mps2, p->force_mps2, sizeof p->force_mps2);
+}
+
+/* n is north, east, down. */
+void platform_pose(struct platform *p, int64_t t_ns, struct pose *out)
+{
+    struct platform_state s;
+    platform_at(p, t_ns, &s);
+    *out = (struct pose){.w_ib_b_radps = {s.w_ip_p_radps[0], s.w_ip_p_radps[1], s.w_ip_p_radps[2]}};
+    for (unsigned k = 0; k < 3; k++) {
+        out->C_nb[0][k] = s.C_lp[1][k];
+        out->C_nb[1][k] = s.C_lp[0][k];
+        out->C_nb[2][k] = -s.C_lp[2][k];
+    }
+}

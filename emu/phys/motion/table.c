@@ -1,0 +1,222 @@
+#include "phys/motion/table.h"
+
+#include "base/detmath.h"
+#include "base/rng.h"
+#include "base/sched.h"
+
+#include <assert.h>
+#include <math.h>
+
+#define RAD_PER_DEG    0.017453292519943295
+#define RAD_PER_ARCSEC (RAD_PER_DEG / 3600.0)
+#define TURN_RAD       6.283185307179586
+#define WHOLE_ABOVE    1000.0 /* rad */
+#define ROUNDING_RAD   1e-9   /* by which a limit may be missed that was given as the readout shows it */
+
+/* Of the kind of a one-axis iXBlue EVO 30 L; figures E0 (docs/instruments.md). */
+static const struct table_axis_cfg precise = {
+    .rate_max_dps = 1000.0, .accel_max_dps2 = 400.0, .wobble_arcsec = 1.0, .readout_resolution_arcsec = 0.036};
+
+struct table_cfg table_default(unsigned axes)
+{
+    static const enum pose_axis along[TABLE_AXES_MAX + 1][TABLE_AXES_MAX] = {
+        {POSE_Z, POSE_Y, POSE_X}, {POSE_Z, POSE_Y, POSE_X}, {POSE_Y, POSE_Z, POSE_X}, {POSE_Z, POSE_Y, POSE_X}};
+    assert(axes <= TABLE_AXES_MAX);
+    struct table_cfg c = {.axes = axes};
+    for (unsigned i = 0; i < TABLE_AXES_MAX; i++) {
+        c.axis[i] = precise;
+        c.axis[i].along = along[axes][i];
+    }
+    return c;
+}
+
+void table_init(struct table *t, const struct table_cfg *cfg, const struct site *site, uint64_t seed)
+{
+    assert(cfg->axes <= TABLE_AXES_MAX);
+    *t = (struct table){.cfg = *cfg, .site = *site, .seed = seed, .cached_to_ns = -1};
+    for (unsigned i = 0; i < cfg->axes; i++) {
+        const struct table_axis_cfg *a = &cfg->axis[i];
+        const struct motion_limits limits = {
+            .rate_radps = a->rate_max_dps * RAD_PER_DEG,
+            .accel_radps2 = a->accel_max_dps2 * RAD_PER_DEG,
+            .bounded = a->angle_min_deg != 0.0 || a->angle_max_deg != 0.0,
+            .min_rad = a->angle_min_deg * RAD_PER_DEG,
+            .max_rad = a->angle_max_deg * RAD_PER_DEG,
+        };
+        motion_init(&t->axis[i], &limits);
+    }
+}
+
+/* ---- commands */
+
+/* What the readout shows above the true angle. */
+static double offset_rad(const struct table *t, unsigned axis)
+{
+    return t->cfg.axis[axis].readout_zero_arcsec * RAD_PER_ARCSEC + t->set_zero_rad[axis];
+}
+
+double table_offset_deg(const struct table *t, unsigned axis)
+{
+    return offset_rad(t, axis) / RAD_PER_DEG;
+}
+
+/* The axis's angle for one of the readout. */
+static double axis_rad(const struct table *t, unsigned axis, double shown_deg)
+{
+    const struct motion_limits *l = &t->axis[axis].limits;
+    const double angle_rad = shown_deg * RAD_PER_DEG - offset_rad(t, axis);
+    if (l->bounded && fabs(angle_rad - l->min_rad) < ROUNDING_RAD) return l->min_rad;
+    if (l->bounded && fabs(angle_rad - l->max_rad) < ROUNDING_RAD) return l->max_rad;
+    return angle_rad;
+}
+
+static enum motion_result moved(struct table *t, enum motion_result r)
+{
+    t->cached_to_ns = -1;
+    return r;
+}
+
+enum motion_result table_position(struct table *t, unsigned axis, double angle_deg, double rate_dps, int64_t t_ns)
+{
+    if (axis >= t->cfg.axes) return MOTION_NO_AXIS;
+    return moved(t, motion_position(&t->axis[axis], axis_rad(t, axis, angle_deg), rate_dps * RAD_PER_DEG, t_ns));
+}
+
+enum motion_result table_rate(struct table *t, unsigned axis, double rate_dps, int64_t t_ns)
+{
+    if (axis >= t->cfg.axes) return MOTION_NO_AXIS;
+    return moved(t, motion_rate(&t->axis[axis], rate_dps * RAD_PER_DEG, t_ns));
+}
+
+enum motion_result table_profile(struct table *t, unsigned axis, const double *times_s, const double *rates_dps,
+                                 unsigned n, int64_t t_ns)
+{
+    double rates_radps[MOTION_PROFILE_MAX];
+    if (axis >= t->cfg.axes) return MOTION_NO_AXIS;
+    if (n > MOTION_PROFILE_MAX) return MOTION_BAD_PROFILE;
+    for (unsigned i = 0; i < n; i++) rates_radps[i] = rates_dps[i] * RAD_PER_DEG;
+    return moved(t, motion_profile(&t->axis[axis], times_s, rates_radps, n, t_ns));
+}
+
+enum motion_result table_sine(struct table *t, unsigned axis, double amplitude_deg, double frequency_hz, int64_t t_ns)
+{
+    if (axis >= t->cfg.axes) return MOTION_NO_AXIS;
+    return moved(t, motion_sine(&t->axis[axis], amplitude_deg * RAD_PER_DEG, frequency_hz, t_ns));
+}
+
+enum motion_result table_stop(struct table *t, unsigned axis, int64_t t_ns)
+{
+    if (axis >= t->cfg.axes) return MOTION_NO_AXIS;
+    motion_stop(&t->axis[axis], t_ns);
+    return moved(t, MOTION_OK);
+}
+
+enum motion_result table_zero(struct table *t, unsigned axis, double angle_deg, int64_t t_ns)
+{
+    if (axis >= t->cfg.axes) return MOTION_NO_AXIS;
+    const double true_rad = motion_at(&t->axis[axis], t_ns).angle_rad;
+    t->set_zero_rad[axis] += angle_deg * RAD_PER_DEG - (true_rad + offset_rad(t, axis));
+    return MOTION_OK;
+}
+
+/* ---- readout */
+
+/* A stream for each instant: who reads twice, or another axis between, sees the same. */
+static double readout_noise_rad(const struct table *t, unsigned axis, int64_t t_ns)
+{
+    static const char *const names[TABLE_AXES_MAX] = {"table.1.readout", "table.2.readout", "table.3.readout"};
+    const double rms_rad = t->cfg.axis[axis].readout_noise_arcsec_rms * RAD_PER_ARCSEC;
+    if (rms_rad <= 0.0) return 0.0;
+    struct rng r = rng_stream(t->seed, (uint64_t)t_ns, names[axis]);
+    return rms_rad * rng_gauss(&r);
+}
+
+struct table_reading table_read(const struct table *t, unsigned axis, int64_t t_ns)
+{
+    assert(axis < t->cfg.axes);
+    const struct table_axis_cfg *c = &t->cfg.axis[axis];
+    const struct motion *m = &t->axis[axis];
+    const int64_t shown_ns = t_ns - (int64_t)nearbyint(c->readout_delay_s * (double)NS_PER_S);
+    const struct motion_state s = motion_at(m, shown_ns);
+    const double step_rad = c->readout_resolution_arcsec * RAD_PER_ARCSEC;
+    double angle_rad = s.angle_rad + offset_rad(t, axis) + readout_noise_rad(t, axis, t_ns);
+    if (step_rad > 0.0) angle_rad = nearbyint(angle_rad / step_rad) * step_rad;
+    const int64_t rest_ns = motion_rest_ns(m);
+    return (struct table_reading){
+        .angle_deg = angle_rad / RAD_PER_DEG,
+        .rate_dps = s.rate_radps / RAD_PER_DEG,
+        .mode = motion_mode(m),
+        .at_rest = t_ns >= rest_ns,
+        .rest_in_s = rest_ns == INT64_MAX ? -1.0
+                     : rest_ns > t_ns     ? (double)(rest_ns - t_ns) / (double)NS_PER_S
+                                          : 0.0,
+    };
+}
+
+/* ---- truth */
+
+bool table_at_rest(const struct table *t, int64_t t_ns)
+{
+    for (unsigned i = 0; i < t->cfg.axes; i++) {
+        if (!motion_at_rest(&t->axis[i], t_ns)) return false;
+    }
+    return true;
+}
+
+struct motion_state table_axis(const struct table *t, unsigned axis, int64_t t_ns)
+{
+    assert(axis < t->cfg.axes);
+    return motion_at(&t->axis[axis], t_ns);
+}
+
+/* The cone: turns about the two axes across by w cos(n angle + phase) and w sin(n angle + phase). det_sin() takes up to 1e6
+ * rad: whole turns are taken off a table that has been turning for long. */
+static void wobble(struct pose *p, const struct table_axis_cfg *c, const struct motion_state *s)
+{
+    const double w_rad = c->wobble_arcsec * RAD_PER_ARCSEC;
+    if (w_rad == 0.0) return;
+    const double n = c->wobble_order ? (double)c->wobble_order : 1.0;
+    const double sum_rad = n * s->angle_rad + c->wobble_phase_deg * RAD_PER_DEG;
+    const double phase_rad = fabs(sum_rad) > WHOLE_ABOVE ? fmod(sum_rad, TURN_RAD) : sum_rad;
+    const double cos_rad = w_rad * det_cos(phase_rad);
+    const double sin_rad = w_rad * det_sin(phase_rad);
+    const double rate = n * s->rate_radps;
+    const double accel = n * s->accel_radps2;
+    pose_turn(p, (enum pose_axis)((c->along + 1u) % 3u), cos_rad, -sin_rad * rate,
+              -cos_rad * rate * rate - sin_rad * accel);
+    pose_turn(p, (enum pose_axis)((c->along + 2u) % 3u), sin_rad, cos_rad * rate,
+              -sin_rad * rate * rate + cos_rad * accel);
+}
+
+/* The axis across both this one and the one outside: a turn about it changes the angle between them. */
+static enum pose_axis across(enum pose_axis a, enum pose_axis b)
+{
+    return a == b ? (enum pose_axis)((a + 1u) % 3u) : (enum pose_axis)(3u - a - b);
+}
+
+static void set_pose(const struct table *t, int64_t t_ns, struct pose *p)
+{
+    const double tilt_rad[3] = {t->cfg.base_tilt_x_arcsec * RAD_PER_ARCSEC, t->cfg.base_tilt_y_arcsec * RAD_PER_ARCSEC};
+    pose_start(p, &t->site);
+    pose_tilt(p, tilt_rad);
+    for (unsigned i = 0; i < t->cfg.axes; i++) {
+        const struct table_axis_cfg *c = &t->cfg.axis[i];
+        const struct motion_state s = motion_at(&t->axis[i], t_ns);
+        if (i > 0) {
+            pose_turn(p, across(c->along, t->cfg.axis[i - 1].along), c->nonorthogonality_arcsec * RAD_PER_ARCSEC, 0.0,
+                      0.0);
+        }
+        wobble(p, c, &s);
+        pose_turn(p, c->along, s.angle_rad, s.rate_radps, s.accel_radps2);
+    }
+}
+
+const struct pose *table_pose(struct table *t, int64_t t_ns)
+{
+    if (t_ns < t->cached_from_ns || t_ns > t->cached_to_ns) {
+        set_pose(t, t_ns, &t->cached);
+        t->cached_from_ns = t_ns;
+        t->cached_to_ns = table_at_rest(t, t_ns) ? INT64_MAX : t_ns;
+    }
+    return &t->cached;
+}

@@ -1,0 +1,78 @@
+#include "phys/sensor/fault.h"
+
+#include "base/sched.h"
+
+#include <assert.h>
+#include <math.h>
+#include <stddef.h>
+
+#define FIRST_PULL_NS 31250 /* interval assumed before the first pull: one block of the converter at 1000 SPS */
+
+void sensor_fault_add(struct sensor_fault **list, struct sensor_fault *f)
+{
+    assert(f->kind < SENSOR_FAULTS);
+    while (*list) list = &(*list)->next;
+    f->held = 0.0;
+    f->held_ns = -1;
+    f->next = NULL;
+    *list = f;
+}
+
+void sensor_fault_remove(struct sensor_fault **list, struct sensor_fault *f)
+{
+    while (*list && *list != f) list = &(*list)->next;
+    if (*list) *list = f->next;
+}
+
+static double stuck(struct sensor_fault *f, double out, int64_t t_ns)
+{
+    (void)out;
+    (void)t_ns;
+    return f->value;
+}
+
+static double bias(struct sensor_fault *f, double out, int64_t t_ns)
+{
+    (void)t_ns;
+    return out + f->value;
+}
+
+static double drift(struct sensor_fault *f, double out, int64_t t_ns)
+{
+    return out + f->value * ((double)(t_ns - f->from_ns) / (double)NS_PER_S);
+}
+
+static double scale(struct sensor_fault *f, double out, int64_t t_ns)
+{
+    (void)t_ns;
+    return out + f->value * (out - f->zero);
+}
+
+/* White noise of one-sided density d, averaged over dt, has the variance d^2 / (2 dt), as in phys/sensor/mems.c. */
+static double noise(struct sensor_fault *f, double out, int64_t t_ns)
+{
+    const int64_t dt_ns = f->held_ns < 0 ? FIRST_PULL_NS : t_ns - f->held_ns;
+    if (dt_ns > 0) {
+        f->held = f->value * sqrt((double)NS_PER_S / (2.0 * (double)dt_ns)) * rng_gauss(&f->noise);
+        f->held_ns = t_ns;
+    }
+    return out + f->held;
+}
+
+static double saturation(struct sensor_fault *f, double out, int64_t t_ns)
+{
+    (void)t_ns;
+    return out < f->value ? f->value : out > f->value_high ? f->value_high : out;
+}
+
+double sensor_fault_out(struct sensor_fault *list, double out, int64_t t_ns)
+{
+    static double (*const effect[SENSOR_FAULTS])(struct sensor_fault *, double, int64_t) = {
+        [SENSOR_STUCK] = stuck, [SENSOR_BIAS] = bias,   [SENSOR_DRIFT] = drift,
+        [SENSOR_SCALE] = scale, [SENSOR_NOISE] = noise, [SENSOR_SATURATION] = saturation,
+    };
+    for (struct sensor_fault *f = list; f; f = f->next) {
+        if (t_ns >= f->from_ns) out = effect[f->kind](f, out, t_ns);
+    }
+    return out;
+}

@@ -1,0 +1,54 @@
+/* From the keys to the bench: what a scenario leaves to the seed is drawn here. */
+#include "scenario/keys.h"
+
+#include <string.h>
+
+static double clamp(double v, double lo, double hi)
+{
+    return v < lo ? lo : v > hi ? hi : v;
+}
+
+/* Each parameter has its own stream: one more in the table does not shift the others. */
+static void draw(const struct yaml_fields *t, const void *deviation, void *value, const struct scenario *s,
+                 uint32_t serial, const char *channel)
+{
+    size_t offset;
+    const struct yaml_field *d;
+    for (size_t i = 0; (d = yaml_row(t, i, &offset)); i++) {
+        char stream[80];
+        double sd, v;
+        memcpy(&sd, (const char *)deviation + offset + d->offset, sizeof sd);
+        memcpy(&v, (const char *)value + offset + d->offset, sizeof v);
+        if (!(sd > 0.0)) continue;
+        snprintf(stream, sizeof stream, "passport.%s.%s", channel, d->key);
+        struct rng r = rng_stream(s->seed, serial, stream);
+        v = clamp(v + sd * rng_gauss(&r), d->min, d->max);
+        memcpy((char *)value + offset + d->offset, &v, sizeof v);
+    }
+}
+
+static void draw_unit(const struct scenario *s, struct scenario_unit *u)
+{
+    static const char *const sensor[] = {"x", "y", "z"}, *const chain[] = {"x.afe", "y.afe", "z.afe"};
+    for (unsigned i = 0; i < UNIT_AXES; i++) {
+        const uint32_t serial = u->cfg.board.serial;
+        draw(&scenario_mems_fields, &s->spread.mems, &u->cfg.axis[i].mems, s, serial, sensor[i]);
+        draw(&scenario_afe_numbers, &s->spread.afe, &u->cfg.board.afe[i], s, serial, chain[i]);
+    }
+}
+
+#define RAD_PER_ARCSEC (0.017453292519943295 / 3600.0)
+
+void scenario_bind(struct scenario *s)
+{
+    s->lab.site = scenario_site(&s->site);
+    for (unsigned i = 0; i < s->unit_count; i++) {
+        struct scenario_unit *u = &s->units[i];
+        u->cfg.name = u->name;
+        u->cfg.profile = &u->profile;
+        u->cfg.board.seed = s->seed;
+        for (unsigned k = 0; k < 3; k++) u->cfg.seat.misalignment_rad[k] = u->misalignment_arcsec[k] * RAD_PER_ARCSEC;
+        scenario_bind_level(s, u);
+        if (u->spread) draw_unit(s, u);
+    }
+}

@@ -1,0 +1,215 @@
+/* Keys of the site and the instruments. */
+#include "scenario/keys.h"
+
+#include <string.h>
+
+#define RAD_PER_DEG 0.017453292519943295
+
+/* ---- site */
+
+#define SITE(m) offsetof(struct scenario_site, m)
+
+// clang-format off
+static const struct yaml_field site_rows[] = {
+    {.key = "g_mps2",        .type = YAML_REAL, .offset = SITE(g_mps2), .min = 0.001, .max = 20, .what = "local gravity; with a latitude and without this key: normal gravity of the place"},
+    {.key = "latitude_deg",  .type = YAML_REAL, .offset = SITE(latitude_deg), .min = -90, .max = 90, .what = "geodetic; without it the Earth does not turn"},
+    {.key = "longitude_deg", .type = YAML_REAL, .offset = SITE(longitude_deg), .min = -180, .max = 360, .what = "east"},
+    {.key = "height_m",      .type = YAML_REAL, .offset = SITE(height_m), .min = -500, .max = 9000, .what = "above the ellipsoid"},
+    {.key = "azimuth_deg",   .type = YAML_REAL, .offset = SITE(azimuth_deg), .min = -360, .max = 360, .what = "of the bench's x axis from north, clockwise"},
+};
+const struct yaml_fields scenario_site_fields = YAML_FIELDS(site_rows);
+// clang-format on
+
+bool scenario_load_site(struct yaml_file *f, const struct yaml_node *node, void *section)
+{
+    struct scenario_site *site = &((struct scenario *)section)->site;
+    if (!yaml_load(f, node, "site", &scenario_site_fields, site)) return false;
+    site->placed = yaml_get(node, "latitude_deg") != NULL;
+    if (site->placed && !yaml_get(node, "g_mps2"))
+        site->g_mps2 = earth_gravity_mps2(site->latitude_deg * RAD_PER_DEG, site->height_m);
+    for (size_t i = 2; i < scenario_site_fields.count && !site->placed; i++) {
+        const char *key = site_rows[i].key;
+        if (yaml_get(node, key))
+            return yaml_file_fail(f, yaml_get(node, key), "site", "%s without latitude_deg: both are wanted", key);
+    }
+    return true;
+}
+
+void scenario_dump_site(const struct yaml_field *d, const void *section, cJSON *to)
+{
+    const struct scenario_site *site = &((const struct scenario *)section)->site;
+    const struct yaml_fields rows = {site_rows, site->placed ? scenario_site_fields.count : 1};
+    yaml_dump(&rows, site, cJSON_AddObjectToObject(to, d->key));
+}
+
+struct site scenario_site(const struct scenario_site *s)
+{
+    return (struct site){.g_mps2 = s->g_mps2,
+                         .latitude_rad = s->latitude_deg * RAD_PER_DEG,
+                         .longitude_rad = s->longitude_deg * RAD_PER_DEG,
+                         .height_m = s->height_m,
+                         .azimuth_rad = s->azimuth_deg * RAD_PER_DEG,
+                         .placed = s->placed};
+}
+
+/* ---- dividing head and chamber and supply: tables only */
+
+#define HEAD(m)    offsetof(struct head_cfg, m)
+#define CHAMBER(m) offsetof(struct chamber_cfg, m)
+#define SUPPLY(m)  offsetof(struct supply_cfg, m)
+
+// clang-format off
+static const struct yaml_field head_rows[] = {
+    {.key = "resolution_arcsec",        .type = YAML_REAL, .offset = HEAD(resolution_arcsec),        .max = 3600, .what = "step of the scale; 0: none"},
+    {.key = "setting_error_arcsec_rms", .type = YAML_REAL, .offset = HEAD(setting_error_arcsec_rms), .max = 3600, .what = "drawn at each turn"},
+    {.key = "periodic_arcsec",          .type = YAML_REAL, .offset = HEAD(periodic_arcsec),          .max = 3600, .what = "error of the divided circle, amplitude"},
+    {.key = "periodic_order",           .type = YAML_U32,  .offset = HEAD(periodic_order),           .max = 3600, .what = "its periods in a turn; 0 is taken as 1"},
+    {.key = "mount_error_arcsec_rms",   .type = YAML_REAL, .offset = HEAD(mount_error_arcsec_rms),   .max = 3600, .what = "tilt of the unit, drawn at each mounting"},
+    {.key = "turn_s",                   .type = YAML_REAL, .offset = HEAD(turn_s),                   .max = 3600, .what = "duration of a turn; 0: at once"},
+};
+const struct yaml_fields scenario_head_fields = YAML_FIELDS(head_rows);
+
+static const struct yaml_field chamber_rows[] = {
+    {.key = "start_degc",            .type = YAML_REAL, .offset = CHAMBER(start_degc), .min = -100, .max = 200, .what = "of air and units, and set point, at power-on"},
+    {.key = "min_degc",              .type = YAML_REAL, .offset = CHAMBER(min_degc), .min = -100, .max = 200, .what = "lowest set point"},
+    {.key = "max_degc",              .type = YAML_REAL, .offset = CHAMBER(max_degc), .min = -100, .max = 200, .what = "highest set point"},
+    {.key = "heating_max_k_per_min", .type = YAML_REAL, .offset = CHAMBER(heating_max_k_per_min), .min = 0.001, .max = 100, .what = "fastest rise of the air"},
+    {.key = "cooling_max_k_per_min", .type = YAML_REAL, .offset = CHAMBER(cooling_max_k_per_min), .min = 0.001, .max = 100, .what = "fastest fall"},
+    {.key = "ramp_k_per_min",        .type = YAML_REAL, .offset = CHAMBER(ramp_k_per_min), .min = 0.001, .max = 100, .what = "at power-on; the air takes the lesser of ramp and limit"},
+    {.key = "tau_case_s",            .type = YAML_REAL, .offset = CHAMBER(tau_case_s), .max = 1e5, .what = "lag of a unit's case behind the air; 0: none"},
+    {.key = "tau_element_s",         .type = YAML_REAL, .offset = CHAMBER(tau_element_s), .max = 1e5, .what = "lag of a sensor's element behind the case; 0: none"},
+    {.key = "readout_offset_k",      .type = YAML_REAL, .offset = CHAMBER(readout_offset_k), .min = -10, .max = 10, .what = "error of its thermometer"},
+    {.key = "readout_resolution_k",  .type = YAML_REAL, .offset = CHAMBER(readout_resolution_k), .max = 10, .what = "step of its thermometer; 0: none"},
+};
+const struct yaml_fields scenario_chamber_fields = YAML_FIELDS(chamber_rows);
+
+static const struct yaml_field supply_rows[] = {
+    {.key = "volt_v",               .type = YAML_REAL, .offset = SUPPLY(volt_v), .max = 100, .what = "at power-on, output on"},
+    {.key = "volt_max_v",           .type = YAML_REAL, .offset = SUPPLY(volt_max_v), .min = 0.1, .max = 100, .what = "largest voltage it can be set to"},
+    {.key = "slew_v_per_s",         .type = YAML_REAL, .offset = SUPPLY(slew_v_per_s), .max = 1e6, .what = "of the output after a command; 0: at once"},
+    {.key = "ripple_v",             .type = YAML_REAL, .offset = SUPPLY(ripple_v), .max = 100, .what = "amplitude of the ripple at power-on; 0: none"},
+    {.key = "ripple_hz",            .type = YAML_REAL, .offset = SUPPLY(ripple_hz), .max = 1e6, .what = "its frequency"},
+    {.key = "ripple_max_v",         .type = YAML_REAL, .offset = SUPPLY(ripple_max_v), .max = 100, .what = "largest amplitude it can be set to"},
+    {.key = "ripple_max_hz",        .type = YAML_REAL, .offset = SUPPLY(ripple_max_hz), .max = 1e6, .what = "highest frequency"},
+    {.key = "brownout_v",           .type = YAML_REAL, .offset = SUPPLY(brownout_v), .max = 100, .what = "below it the boards are off"},
+    {.key = "hysteresis_v",         .type = YAML_REAL, .offset = SUPPLY(hysteresis_v), .min = 1e-6, .max = 100, .what = "so much above it they are on again"},
+    {.key = "readout_resolution_v", .type = YAML_REAL, .offset = SUPPLY(readout_resolution_v), .max = 10, .what = "step of its voltmeter; 0: none"},
+};
+const struct yaml_fields scenario_supply_fields = YAML_FIELDS(supply_rows);
+
+/* ---- rate table */
+
+#define TABLE(m) offsetof(struct table_cfg, m)
+#define AXIS(m)  offsetof(struct table_axis_cfg, m)
+
+static const char *const along[] = {[POSE_X] = "x", [POSE_Y] = "y", [POSE_Z] = "z", NULL};
+static const struct yaml_field axis_rows[] = {
+    {.key = "along",                    .type = YAML_CHOICE, .offset = AXIS(along), .choices = along, .what = "axis of the frame that carries it; z points down"},
+    {.key = "rate_max_dps",             .type = YAML_REAL, .offset = AXIS(rate_max_dps), .min = 1e-6, .max = 1e5, .what = "largest rate"},
+    {.key = "accel_max_dps2",           .type = YAML_REAL, .offset = AXIS(accel_max_dps2), .min = 1e-6, .max = 1e6, .what = "largest acceleration"},
+    {.key = "angle_min_deg",            .type = YAML_REAL, .offset = AXIS(angle_min_deg), .min = -36000, .max = 36000, .what = "lowest angle; both 0: without end"},
+    {.key = "angle_max_deg",            .type = YAML_REAL, .offset = AXIS(angle_max_deg), .min = -36000, .max = 36000, .what = "highest angle"},
+    {.key = "nonorthogonality_arcsec",  .type = YAML_REAL, .offset = AXIS(nonorthogonality_arcsec), .min = -3600, .max = 3600, .what = "off square to the axis outside it"},
+    {.key = "wobble_arcsec",            .type = YAML_REAL, .offset = AXIS(wobble_arcsec), .max = 3600, .what = "half-angle of the cone the axis describes as it turns"},
+    {.key = "wobble_order",             .type = YAML_U32,  .offset = AXIS(wobble_order), .max = 3600, .what = "times a turn; 0 is taken as 1"},
+    {.key = "wobble_phase_deg",         .type = YAML_REAL, .offset = AXIS(wobble_phase_deg), .min = -360, .max = 360, .what = "of the cone at angle 0"},
+    {.key = "readout_noise_arcsec_rms", .type = YAML_REAL, .offset = AXIS(readout_noise_arcsec_rms), .max = 3600, .what = "of the angle shown"},
+    {.key = "readout_resolution_arcsec", .type = YAML_REAL, .offset = AXIS(readout_resolution_arcsec), .max = 3600, .what = "its step; 0: none"},
+    {.key = "readout_delay_s",          .type = YAML_REAL, .offset = AXIS(readout_delay_s), .max = 1, .what = "it shows the angle of so long ago"},
+    {.key = "readout_zero_arcsec",      .type = YAML_REAL, .offset = AXIS(readout_zero_arcsec), .min = -3600, .max = 3600, .what = "it shows so much too much"},
+};
+const struct yaml_fields scenario_axis_of_table_fields = YAML_FIELDS(axis_rows);
+
+static bool load_axes(struct yaml_file *f, const struct yaml_node *node, void *section);
+static void dump_axes(const struct yaml_field *d, const void *section, cJSON *to);
+
+static const struct yaml_field table_rows[] = {
+    {.key = "base_tilt_x_arcsec", .type = YAML_REAL, .offset = TABLE(base_tilt_x_arcsec), .min = -36000, .max = 36000, .what = "of its base about the bench's x"},
+    {.key = "base_tilt_y_arcsec", .type = YAML_REAL, .offset = TABLE(base_tilt_y_arcsec), .min = -36000, .max = 36000, .what = "about y"},
+    {.key = "axes", .type = YAML_CUSTOM, .load = load_axes, .dump = dump_axes, .what = "1 to 3 for so many axes of the model, or a sequence of them, from the outermost"},
+};
+const struct yaml_fields scenario_table_fields = YAML_FIELDS(table_rows);
+// clang-format on
+
+static bool check_axis(struct yaml_file *f, const struct yaml_node *node, const struct table_axis_cfg *a)
+{
+    const bool endless = a->angle_min_deg == 0.0 && a->angle_max_deg == 0.0;
+    return endless || a->angle_min_deg < a->angle_max_deg ||
+           yaml_file_fail(f, node, "axes", "angle_min_deg %.10g is not below angle_max_deg %.10g", a->angle_min_deg,
+                          a->angle_max_deg);
+}
+
+static bool load_axes(struct yaml_file *f, const struct yaml_node *node, void *section)
+{
+    struct table_cfg *t = section;
+    const struct yaml_field number = {.key = "axes", .type = YAML_U32, .min = 1, .max = TABLE_AXES_MAX};
+    uint32_t n = yaml_count(node);
+    if (node->kind == YAML_SCALAR && !yaml_load_value(f, node, &number, &n)) return false;
+    if (n < 1 || n > TABLE_AXES_MAX) return yaml_file_fail(f, node, "axes", "1 to %u axes are wanted", TABLE_AXES_MAX);
+    const struct table_cfg model = table_default(n);
+    memcpy(t->axis, model.axis, sizeof t->axis);
+    t->axes = n;
+    unsigned i = 0;
+    for (const struct yaml_item *item = node->first; item; item = item->next, i++) {
+        char where[16];
+        snprintf(where, sizeof where, "axes[%u]", i);
+        if (!yaml_load(f, item->value, where, &scenario_axis_of_table_fields, &t->axis[i])) return false;
+        if (!check_axis(f, item->value, &t->axis[i])) return false;
+    }
+    return true;
+}
+
+static void dump_axes(const struct yaml_field *d, const void *section, cJSON *to)
+{
+    const struct table_cfg *t = section;
+    cJSON *list = cJSON_AddArrayToObject(to, d->key);
+    for (unsigned i = 0; i < t->axes; i++) {
+        cJSON *j = cJSON_CreateObject();
+        yaml_dump(&scenario_axis_of_table_fields, &t->axis[i], j);
+        cJSON_AddItemToArray(list, j);
+    }
+}
+
+bool scenario_load_table(struct yaml_file *f, const struct yaml_node *node, void *section)
+{
+    struct table_cfg *t = &((struct scenario *)section)->lab.table;
+    if (!yaml_load(f, node, "table", &scenario_table_fields, t)) return false;
+    if (t->axes) return true;
+    const struct table_cfg model = table_default(1); /* no axes said: the model as it is */
+    memcpy(t->axis, model.axis, sizeof t->axis);
+    t->axes = model.axes;
+    return true;
+}
+
+void scenario_dump_table(const struct yaml_field *d, const void *section, cJSON *to)
+{
+    const struct table_cfg *t = &((const struct scenario *)section)->lab.table;
+    if (t->axes) yaml_dump(&scenario_table_fields, t, cJSON_AddObjectToObject(to, d->key));
+}
+
+/* ---- what stands in two keys */
+
+static const struct yaml_node *at(const struct yaml_node *root, const char *section, const char *key)
+{
+    const struct yaml_node *in = yaml_get(root, section), *value = yaml_get(in, key);
+    return value ? value : in ? in : root;
+}
+
+bool scenario_check_lab(struct yaml_file *f, const struct yaml_node *root, const struct lab_cfg *lab)
+{
+    const struct chamber_cfg *c = &lab->chamber;
+    const struct supply_cfg *s = &lab->supply;
+    if (!(c->min_degc <= c->start_degc && c->start_degc <= c->max_degc)) {
+        return yaml_file_fail(f, at(root, "chamber", "start_degc"), "chamber.start_degc",
+                              "%.10g is outside min_degc %.10g ... max_degc %.10g", c->start_degc, c->min_degc,
+                              c->max_degc);
+    }
+    if (s->volt_v > s->volt_max_v)
+        return yaml_file_fail(f, at(root, "supply", "volt_v"), "supply.volt_v", "%.10g is above volt_max_v %.10g",
+                              s->volt_v, s->volt_max_v);
+    if (s->ripple_v > s->ripple_max_v || s->ripple_hz > s->ripple_max_hz)
+        return yaml_file_fail(f, at(root, "supply", "ripple_v"), "supply.ripple_v",
+                              "the ripple is above ripple_max_v %.10g or ripple_max_hz %.10g", s->ripple_max_v,
+                              s->ripple_max_hz);
+    return true;
+}

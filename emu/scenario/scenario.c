@@ -1,0 +1,327 @@
+#include "scenario/scenario.h"
+
+#include "base/text.h"
+#include "command/exact.h"
+#include "scenario/keys.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define VERSION TEXT_OF(PSABENCH_VERSION) /* of pyproject.toml, by way of the Makefile */
+
+#define SCENARIO(m) offsetof(struct scenario, m)
+
+/* ---- buses */
+
+static bool check_rate(struct yaml_file *f, const struct yaml_node *node, const struct scenario_bus *b)
+{
+    if (!b->cfg.bitrate_hz || b->cfg.bitrate_hz >= 10000) return true;
+    const struct yaml_node *at = yaml_get(node, "bitrate_hz");
+    return yaml_file_fail(f, at ? at : node, "bitrate_hz", "%u is below 10000; 0 is a bus on which frames take no time",
+                          b->cfg.bitrate_hz);
+}
+
+static bool load_bus(struct yaml_file *f, const struct yaml_node *node, void *section)
+{
+    struct scenario *s = section;
+    if (!yaml_load(f, node, "bus", &scenario_bus_fields, &s->bus[0].cfg)) return false;
+    snprintf(f->where, sizeof f->where, "bus.");
+    if (!check_rate(f, node, &s->bus[0])) return false;
+    f->where[0] = '\0';
+    return true;
+}
+
+static bool check_bus(struct yaml_file *f, const struct yaml_node *node, const struct scenario *s, unsigned i)
+{
+    const char *name = s->bus[i].name;
+    static const char letters[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_";
+    if (name[strspn(name, letters)])
+        return yaml_file_fail(f, node, "name", "\"%s\": letters, digits and _ are wanted", name);
+    for (unsigned k = 0; k < i; k++)
+        if (strcmp(s->bus[k].name, name) == 0)
+            return yaml_file_fail(f, node, "name", "\"%s\" is taken by another bus", name);
+    return check_rate(f, node, &s->bus[i]);
+}
+
+static bool load_buses(struct yaml_file *f, const struct yaml_node *node, struct scenario *s)
+{
+    if (node->kind != YAML_SEQUENCE || !node->first)
+        return yaml_file_fail(f, node, "buses", "a sequence of buses is wanted");
+    s->bus_count = 0;
+    for (const struct yaml_item *i = node->first; i; i = i->next) {
+        char where[40];
+        const unsigned n = s->bus_count;
+        if (n == SCENARIO_BUSES_MAX) return yaml_file_fail(f, i->value, "buses", "up to %u", SCENARIO_BUSES_MAX);
+        s->bus[n] = (struct scenario_bus){.cfg = {.bitrate_hz = 1000000, .data_bitrate_hz = 5000000}};
+        snprintf(s->bus[n].name, sizeof s->bus[n].name, "can%u", n);
+        snprintf(where, sizeof where, "buses.%s", s->bus[n].name);
+        if (!yaml_load(f, i->value, where, &scenario_buses_fields, &s->bus[n])) return false;
+        snprintf(f->where, sizeof f->where, "%s.", where);
+        if (!check_bus(f, i->value, s, n)) return false;
+        f->where[0] = '\0';
+        s->bus_count++;
+    }
+    return true;
+}
+
+/* The buses are known before the units that name them are read. */
+static bool buses_are_loaded(struct yaml_file *f, const struct yaml_node *node, void *section)
+{
+    (void)section;
+    if (!yaml_get(f->root, "bus")) return true;
+    return yaml_file_fail(f, node, "buses", "stands beside bus, which is short for one; one of the two is wanted");
+}
+
+static void dump_buses(const struct yaml_field *d, const void *section, cJSON *to)
+{
+    const struct scenario *s = section;
+    cJSON *list = cJSON_AddArrayToObject(to, d->key);
+    for (unsigned i = 0; i < s->bus_count; i++) {
+        cJSON *j = cJSON_CreateObject();
+        yaml_dump(&scenario_buses_fields, &s->bus[i], j);
+        cJSON_AddItemToArray(list, j);
+    }
+}
+
+/* ---- units and their spread */
+
+static bool load_units(struct yaml_file *f, const struct yaml_node *node, void *section)
+{
+    return scenario_load_units(f, node, section);
+}
+
+static void dump_units(const struct yaml_field *d, const void *section, cJSON *to)
+{
+    const struct scenario *s = section;
+    cJSON *list = cJSON_AddArrayToObject(to, d->key);
+    for (unsigned i = 0; i < s->unit_count; i++) {
+        cJSON *j = cJSON_CreateObject();
+        scenario_dump_unit(&s->units[i], j);
+        cJSON_AddItemToArray(list, j);
+    }
+}
+
+enum { SPREAD_ROWS = 64 };
+
+/* The rows of numbers, each from 0 to the width of its range: deviations. */
+static size_t deviations(const struct yaml_fields *t, struct yaml_field *out)
+{
+    size_t n = 0, offset;
+    for (const struct yaml_field *d; (d = yaml_row(t, n, &offset)) && n < SPREAD_ROWS; n++) {
+        out[n] = *d;
+        out[n].offset += offset;
+        out[n].min = 0;
+        out[n].max = d->max - d->min;
+    }
+    return n;
+}
+
+static bool load_spread(struct yaml_file *f, const struct yaml_node *node, void *section)
+{
+    struct scenario *s = section;
+    struct yaml_field afe[SPREAD_ROWS], rows[SPREAD_ROWS + 1];
+    const struct yaml_fields afe_fields = {afe, deviations(&scenario_afe_numbers, afe)};
+    const size_t n = deviations(&scenario_mems_fields, rows);
+    rows[n] = (struct yaml_field){
+        .key = "afe", .type = YAML_SECTION, .offset = offsetof(struct scenario_spread, afe), .sub = &afe_fields};
+    const struct yaml_fields all = {rows, n + 1};
+    return yaml_load(f, node, "spread", &all, &s->spread);
+}
+
+static void dump_spread(const struct yaml_field *d, const void *section, cJSON *to)
+{
+    yaml_dump(&scenario_spread_fields, &((const struct scenario *)section)->spread,
+              cJSON_AddObjectToObject(to, d->key));
+}
+
+// clang-format off
+static const struct yaml_field spread_afe_rows[] = {
+    {.type = YAML_INLINE, .sub = &scenario_afe_numbers},
+};
+static const struct yaml_fields spread_afe_fields = YAML_FIELDS(spread_afe_rows);
+static const struct yaml_field spread_rows[] = {
+    {.type = YAML_INLINE, .offset = offsetof(struct scenario_spread, mems), .sub = &scenario_mems_fields},
+    {.key = "afe", .type = YAML_SECTION, .offset = offsetof(struct scenario_spread, afe), .sub = &spread_afe_fields, .what = "of the analog chain"},
+};
+const struct yaml_fields scenario_spread_fields = YAML_FIELDS(spread_rows);
+// clang-format on
+
+/* ---- timeline and faults */
+
+static bool print_args(struct yaml_file *f, const struct yaml_node *node, cJSON *args, struct scenario_event *e)
+{
+    char *line = exact_line(args);
+    const bool fits = line && strlen(line) < sizeof e->args;
+    if (fits) snprintf(e->args, sizeof e->args, "%s", line);
+    free(line);
+    cJSON_Delete(args);
+    return fits || yaml_file_fail(f, node, NULL, "arguments of up to %u characters are wanted", SCENARIO_ARGS_MAX - 1);
+}
+
+static bool load_args(struct yaml_file *f, const struct yaml_node *node, void *section)
+{
+    if (node->kind != YAML_MAPPING) return yaml_file_fail(f, node, "args", "a mapping `name: value` is wanted");
+    cJSON *args = yaml_json(f, node);
+    return args && print_args(f, node, args, section);
+}
+
+static void dump_args(const struct yaml_field *d, const void *section, cJSON *to)
+{
+    cJSON_AddRawToObject(to, d->key, ((const struct scenario_event *)section)->args);
+}
+
+// clang-format off
+static const struct yaml_field event_rows[] = {
+    {.key = "at_s", .type = YAML_REAL, .offset = offsetof(struct scenario_event, at_s), .max = 1e6, .what = "simulated time since power-on"},
+    {.key = "cmd",  .type = YAML_TEXT, .offset = offsetof(struct scenario_event, cmd), .max = 32, .what = "a command of the control socket"},
+    {.key = "args", .type = YAML_CUSTOM, .load = load_args, .dump = dump_args, .what = "its arguments, a mapping"},
+};
+const struct yaml_fields scenario_event_fields = YAML_FIELDS(event_rows);
+// clang-format on
+
+static struct scenario_event *new_event(struct yaml_file *f, const struct yaml_node *node, const char *list,
+                                        struct scenario_events *events)
+{
+    if (events->count == SCENARIO_EVENTS_MAX) {
+        yaml_file_fail(f, node, list, "up to %u entries are wanted", SCENARIO_EVENTS_MAX);
+        return NULL;
+    }
+    struct scenario_event *e = &events->event[events->count];
+    *e = (struct scenario_event){.args = "{}", .line = node->line, .column = node->column};
+    return e;
+}
+
+static bool load_timeline(struct yaml_file *f, const struct yaml_node *node, void *section)
+{
+    struct scenario_events *t = &((struct scenario *)section)->timeline;
+    if (node->kind != YAML_SEQUENCE) return yaml_file_fail(f, node, "timeline", "a sequence of commands is wanted");
+    for (const struct yaml_item *i = node->first; i; i = i->next) {
+        char where[32];
+        struct scenario_event *e = new_event(f, i->value, "timeline", t);
+        snprintf(where, sizeof where, "timeline[%u]", t->count);
+        if (!e || !yaml_load(f, i->value, where, &scenario_event_fields, e)) return false;
+        if (!e->cmd[0]) return yaml_file_fail(f, i->value, where, "cmd is missing: a command is wanted");
+        t->count++;
+    }
+    return true;
+}
+
+static bool load_faults(struct yaml_file *f, const struct yaml_node *node, void *section)
+{
+    struct scenario_events *t = &((struct scenario *)section)->faults;
+    if (node->kind != YAML_SEQUENCE) return yaml_file_fail(f, node, "faults", "a sequence of faults is wanted");
+    for (const struct yaml_item *i = node->first; i; i = i->next) {
+        struct scenario_event *e = new_event(f, i->value, "faults", t);
+        if (!e) return false;
+        if (i->value->kind != YAML_MAPPING)
+            return yaml_file_fail(f, i->value, "faults", "a mapping with the arguments of fault.add is wanted");
+        snprintf(e->cmd, sizeof e->cmd, "fault.add");
+        cJSON *args = yaml_json(f, i->value);
+        if (!args || !print_args(f, i->value, args, e)) return false;
+        t->count++;
+    }
+    return true;
+}
+
+static void dump_timeline(const struct yaml_field *d, const void *section, cJSON *to)
+{
+    const struct scenario_events *t = &((const struct scenario *)section)->timeline;
+    cJSON *list = cJSON_AddArrayToObject(to, d->key);
+    for (unsigned i = 0; i < t->count; i++) {
+        cJSON *j = cJSON_CreateObject();
+        yaml_dump(&scenario_event_fields, &t->event[i], j);
+        cJSON_AddItemToArray(list, j);
+    }
+}
+
+static void dump_faults(const struct yaml_field *d, const void *section, cJSON *to)
+{
+    const struct scenario_events *t = &((const struct scenario *)section)->faults;
+    cJSON *list = cJSON_AddArrayToObject(to, d->key);
+    for (unsigned i = 0; i < t->count; i++) cJSON_AddItemToArray(list, cJSON_CreateRaw(t->event[i].args));
+}
+
+/* ---- the whole */
+
+static bool load_version(struct yaml_file *f, const struct yaml_node *node, void *section)
+{
+    (void)section;
+    return yaml_scalar(node) || yaml_file_fail(f, node, "version", "a word is wanted");
+}
+
+static void dump_version(const struct yaml_field *d, const void *section, cJSON *to)
+{
+    (void)section;
+    cJSON_AddStringToObject(to, d->key, VERSION);
+}
+
+// clang-format off
+static const struct yaml_field scenario_rows[] = {
+    {.key = "version", .type = YAML_CUSTOM, .load = load_version, .dump = dump_version, .what = "of the program that wrote the file; not looked at"},
+    {.key = "seed",  .type = YAML_U64, .offset = SCENARIO(seed), .max = 18446744073709551615.0, .what = "of all noise; each unit and source has its own stream"},
+    {.key = "start", .type = YAML_BOOL, .offset = SCENARIO(start), .what = "the bench's own node writes the frame forms and starts the units, 1 ms after power-on"},
+    {.key = "bus",   .type = YAML_CUSTOM, .load = load_bus, .what = "short for one bus, `can0`"},
+    {.key = "buses", .type = YAML_CUSTOM, .load = buses_are_loaded, .dump = dump_buses, .what = "a sequence of up to 8 buses"},
+    {.key = "site",  .type = YAML_CUSTOM, .load = scenario_load_site, .dump = scenario_dump_site, .what = "where the bench stands"},
+    {.key = "head",  .type = YAML_SECTION, .offset = SCENARIO(lab.head), .sub = &scenario_head_fields, .what = "the dividing head"},
+    {.key = "table", .type = YAML_CUSTOM, .load = scenario_load_table, .dump = scenario_dump_table, .what = "the rate table; without it there is none"},
+    {.key = "chamber", .type = YAML_SECTION, .offset = SCENARIO(lab.chamber), .sub = &scenario_chamber_fields, .present = SCENARIO(lab.chamber.present), .what = "the thermal chamber; without it there is none"},
+    {.key = "supply", .type = YAML_SECTION, .offset = SCENARIO(lab.supply), .sub = &scenario_supply_fields, .present = SCENARIO(lab.supply.present), .what = "the power supply; without it the boards are always fed"},
+    {.key = "platform", .type = YAML_SECTION, .offset = SCENARIO(lab.platform), .sub = &scenario_platform_fields, .present = SCENARIO(lab.platform.present), .what = "the gyro-stabilised platform; without it there is none"},
+    {.key = "vehicle", .type = YAML_CUSTOM, .load = scenario_load_vehicle, .dump = scenario_dump_vehicle, .what = "what the platform stands on"},
+    {.key = "spread", .type = YAML_CUSTOM, .load = load_spread, .dump = dump_spread, .what = "production spread: standard deviations of what differs from unit to unit"},
+    {.key = "units", .type = YAML_CUSTOM, .load = load_units, .dump = dump_units, .what = "a sequence of up to 64 units"},
+    {.key = "timeline", .type = YAML_CUSTOM, .load = load_timeline, .dump = dump_timeline, .what = "a sequence of commands that the bench gives itself, each at its time"},
+    {.key = "faults", .type = YAML_CUSTOM, .load = load_faults, .dump = dump_faults, .what = "a sequence of faults: the arguments of fault.add, given before power-on"},
+};
+const struct yaml_fields scenario_fields = YAML_FIELDS(scenario_rows);
+// clang-format on
+
+void scenario_default(struct scenario *s, const char *path)
+{
+    memset(s, 0, sizeof *s);
+    s->seed = 1;
+    s->bus_count = 1;
+    s->bus[0] = (struct scenario_bus){.name = "can0", .cfg = {.bitrate_hz = 1000000, .data_bitrate_hz = 5000000}};
+    s->lab = lab_default();
+    s->site.g_mps2 = s->lab.site.g_mps2;
+    snprintf(s->path, sizeof s->path, "%s", path);
+}
+
+static bool load(struct yaml_file *f, struct scenario *s)
+{
+    const struct yaml_node *buses = yaml_get(f->root, "buses");
+    scenario_default(s, f->path);
+    if (buses && !load_buses(f, buses, s)) return false;
+    if (!yaml_load(f, f->root, "", &scenario_fields, s)) return false;
+    if (!scenario_check_lab(f, f->root, &s->lab) || !scenario_check_seats(f, f->root, s)) return false;
+    if (!scenario_check_platform(f, f->root, s)) return false;
+    return s->unit_count > 0 || yaml_file_fail(f, NULL, "units", "at least one unit is wanted");
+}
+
+bool scenario_parse(const char *path, const char *text, size_t len, struct scenario *s, char *why, size_t cap)
+{
+    struct yaml_file f;
+    if (!yaml_file_parse(&f, path, text, len, why, cap)) return false;
+    const bool ok = load(&f, s);
+    yaml_file_close(&f);
+    return ok;
+}
+
+bool scenario_load(const char *name, struct scenario *s, char *why, size_t cap)
+{
+    struct yaml_file f;
+    char path[FIND_PATH_MAX];
+    if (!find_proto("scenarios", name, NULL, path, why, cap) || !yaml_file_open(&f, path, why, cap)) return false;
+    const bool ok = load(&f, s);
+    yaml_file_close(&f);
+    return ok;
+}
+
+cJSON *scenario_dump(const struct scenario *s)
+{
+    cJSON *j = cJSON_CreateObject();
+    yaml_dump(&scenario_fields, s, j);
+    return j;
+}

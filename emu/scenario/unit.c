@@ -1,0 +1,385 @@
+/* Keys of a unit, and one entry that stands for many. */
+#include "scenario/keys.h"
+
+#include "scenario/profile.h"
+
+#include <inttypes.h>
+#include <limits.h>
+#include <stdio.h>
+#include <string.h>
+
+#define UNIT(m) offsetof(struct scenario_unit, m)
+
+/* ---- board and profile: they decide what the other keys default to, so they are read first, wherever they stand */
+
+static bool fail_board(struct yaml_file *f, const struct yaml_node *node)
+{
+    char known[160];
+    profile_yaml_boards(known, sizeof known);
+    return yaml_file_fail(f, node, "board", "%s is wanted", known);
+}
+
+/* What is wrong within the profile is told with its line there, that it is another board's with the line here. */
+static bool find_profile(struct yaml_file *f, const struct yaml_node *node, const char *name, struct scenario_unit *u)
+{
+    char path[FIND_PATH_MAX], why[400];
+    const struct board_type *type = u->board->type;
+    const struct board_name *of;
+    if (!find_proto("profiles", name, f->path, path, why, sizeof why))
+        return yaml_file_fail(f, node, "profile", "%s", why);
+    if (!profile_yaml_load(path, &of, &u->profile, f->why, f->cap)) return false;
+    if (!board_name_takes(u->board, of)) {
+        return yaml_file_fail(f, node, "profile", "%s is a profile of %s (board: %s), one of %s (board: %s) is wanted",
+                              name, of->title, of->name, u->board->title, u->board->name);
+    }
+    if (type->cfg_profiled) type->cfg_profiled(&u->cfg.board, &u->profile);
+    return true;
+}
+
+/* A unit of the type that its mapping names, the i-th of it, with its profile; the type's defaults for the rest. */
+static bool begin_unit(struct yaml_file *f, const struct yaml_node *node, const struct scenario *s,
+                       struct scenario_unit *u)
+{
+    const struct yaml_node *board = yaml_get(node, "board"), *profile = yaml_get(node, "profile");
+    const char *name = board ? yaml_scalar(board) : board_names[0].name;
+    const struct board_name *found = name ? board_name_find(name) : NULL;
+    if (!found) return fail_board(f, board);
+    scenario_unit_board(u, found);
+    unsigned before = 0;
+    for (unsigned i = 0; i < s->unit_count; i++) before += s->units[i].cfg.type == found->type;
+    u->cfg.node = (uint8_t)(u->cfg.node + before);
+    if (!profile) return !found->profile || find_profile(f, node, found->profile, u);
+    name = yaml_scalar(profile);
+    if (!name) return yaml_file_fail(f, profile, "profile", "a name of proto/profiles or a path is wanted");
+    return find_profile(f, profile, name, u);
+}
+
+/* begin_unit() has. */
+static bool loaded(struct yaml_file *f, const struct yaml_node *node, void *section)
+{
+    (void)f;
+    (void)node;
+    (void)section;
+    return true;
+}
+
+static void dump_board(const struct yaml_field *d, const void *section, cJSON *to)
+{
+    cJSON_AddStringToObject(to, d->key, ((const struct scenario_unit *)section)->board->name);
+}
+
+/* Fields that differ from the profile. */
+static bool load_profile_set(struct yaml_file *f, const struct yaml_node *node, void *section)
+{
+    struct scenario_unit *u = section;
+    const struct board_type *type = u->board->type;
+    const size_t outer = strlen(f->where);
+    if (node->kind != YAML_MAPPING) return yaml_file_fail(f, node, "profile_set", "a mapping `key: value` is wanted");
+    snprintf(f->where + outer, sizeof f->where - outer, "profile_set.");
+    if (!profile_yaml_fields(f, node, type, &u->profile)) return false;
+    snprintf(f->where + outer, sizeof f->where - outer, "profile_set: "); /* a whole sentence follows */
+    if (!profile_yaml_check(f, node, type, &u->profile)) return false;
+    f->where[outer] = '\0';
+    return true;
+}
+
+/* Every field: the dump needs no other file. */
+static void dump_profile_set(const struct yaml_field *d, const void *section, cJSON *to)
+{
+    const struct scenario_unit *u = section;
+    cJSON_AddItemToObject(to, d->key, profile_dump(u->board->type, &u->profile));
+}
+
+/* ---- the tables */
+
+/* While a mapping is read: the unit it describes, and how many such there are. */
+struct entry {
+    struct scenario_unit unit; /* first: the offsets of the table hold */
+    uint32_t count;            /* 0: not given */
+};
+
+static bool load_count(struct yaml_file *f, const struct yaml_node *node, void *section)
+{
+    struct entry *e = section;
+    const struct yaml_field row = {
+        .key = "count", .type = YAML_U32, .offset = offsetof(struct entry, count), .min = 1, .max = SCENARIO_UNITS_MAX};
+    return yaml_load_value(f, node, &row, e);
+}
+
+// clang-format off
+static const char *const sensors[] = {[UNIT_NO_SENSOR] = "none", [UNIT_MEMS] = "mems", [UNIT_QUARTZ] = "quartz", NULL};
+#define AXIS(i)                                                                                                        \
+    {.key = "sensor", .type = YAML_CHOICE, .offset = UNIT(cfg.axis[i].sensor), .choices = sensors,                     \
+     .what = "`none`: the channel is shorted"},                                                                        \
+    {.type = YAML_INLINE, .offset = UNIT(cfg.axis[i].mems), .sub = &scenario_mems_fields},                             \
+    {.key = "quartz", .type = YAML_SECTION, .offset = UNIT(cfg.axis[i].quartz), .sub = &scenario_quartz_fields,        \
+     .present = UNIT(cfg.axis[i].quartz_given), .what = "parameters of a quartz sensor; its afe.input is current"},    \
+    {.key = "at_m", .type = YAML_REALS, .offset = UNIT(cfg.axis[i].at_m), .count = 3, .min = -10, .max = 10,           \
+     .what = "where the sensor is in the unit, its case's x, y, z"},                                                   \
+    {.key = "afe", .type = YAML_SECTION, .offset = UNIT(cfg.board.afe[i]), .sub = &scenario_afe_fields,                \
+     .what = "the analog chain"}
+static const struct yaml_field axis_x_rows[] = {AXIS(0)}, axis_y_rows[] = {AXIS(1)}, axis_z_rows[] = {AXIS(2)};
+const struct yaml_fields scenario_axis_fields = YAML_FIELDS(axis_x_rows);
+static const struct yaml_fields axis_y_fields = YAML_FIELDS(axis_y_rows), axis_z_fields = YAML_FIELDS(axis_z_rows);
+
+static const struct yaml_field axes_rows[] = {
+    {.key = "x", .type = YAML_SECTION, .sub = &scenario_axis_fields, .what = "channel X; its sensor has the unit's axes x, y, z"},
+    {.key = "y", .type = YAML_SECTION, .sub = &axis_y_fields, .what = "channel Y; its sensor has the unit's axes y, z, x"},
+    {.key = "z", .type = YAML_SECTION, .sub = &axis_z_fields, .what = "channel Z; its sensor has the unit's axes z, x, y"},
+};
+static const struct yaml_fields axes_fields = YAML_FIELDS(axes_rows);
+
+static const char *const mounts[] = {[LAB_HEAD] = "head", [LAB_TABLE] = "table", [LAB_FIXED] = "fixed",
+                                     [LAB_PLATFORM] = "platform", NULL};
+
+static const char *const chains[] = {
+    [ADS1282_CHAIN_EXACT] = "exact", [ADS1282_CHAIN_MODULATOR] = "modulator", [ADS1282_CHAIN_DIRECT] = "direct", NULL};
+
+static const struct yaml_field unit_rows[] = {
+    {.key = "name",   .type = YAML_TEXT, .offset = UNIT(name), .max = 32, .what = "letters, digits and _; with `count` a number stands in it, `%02u`"},
+    {.key = "count",  .type = YAML_CUSTOM, .min = 1, .max = SCENARIO_UNITS_MAX, .load = load_count, .what = "so many units, alike but for name, node and serial, which count up"},
+    {.key = "board",  .type = YAML_CUSTOM, .load = loaded, .dump = dump_board, .what = "type of the board, or a name of one of its profiles: see below"},
+    {.key = "profile", .type = YAML_CUSTOM, .load = loaded, .what = "name in proto/profiles, or a path, relative to the scenario"},
+    {.key = "profile_set", .type = YAML_CUSTOM, .load = load_profile_set, .dump = dump_profile_set, .what = "fields of the profile that differ"},
+    {.key = "bus",    .type = YAML_TEXT, .offset = UNIT(bus_name), .max = 16, .what = "name of its bus; the first if it is not given"},
+    {.key = "node",   .type = YAML_U8, .offset = UNIT(cfg.node), .min = 1, .max = 127, .what = "CANopen node id; each its own on a bus; the default is the board's, or the next that is free"},
+    {.key = "serial", .type = YAML_U32, .offset = UNIT(cfg.board.serial), .min = 1, .max = 4294967295.0, .what = "serial number; each its own, its noise and its spread are drawn by it"},
+    {.key = "frame_form", .type = YAML_U8, .offset = UNIT(frame_form), .max = 3, .what = "0 pair, 1 fast, 2 FD frame, 3 FD block; written to object 2020h at the start"},
+    {.key = "spread", .type = YAML_BOOL, .offset = UNIT(spread), .what = "its parameters are drawn from the scenario's `spread`"},
+    {.key = "axes",   .type = YAML_SECTION, .sub = &axes_fields, .what = "the channels `x`, `y`, `z`"},
+    {.key = "level",  .type = YAML_TEXT, .offset = UNIT(level), .max = 32, .what = "of a gyro unit: name of the PSA-2 on the platform that reads its level sensors"},
+    {.key = "on",     .type = YAML_CHOICE, .offset = UNIT(cfg.seat.on), .choices = mounts, .what = "where it is mounted"},
+    {.key = "lever_arm_m", .type = YAML_REALS, .offset = UNIT(cfg.seat.lever_m), .count = 3, .min = -10, .max = 10, .what = "from the instrument's centre to the unit, mount's x, y, z"},
+    {.key = "misalignment_arcsec", .type = YAML_REALS, .offset = UNIT(misalignment_arcsec), .count = 3, .min = -36000, .max = 36000, .what = "of its case in the mount, about x, y, z"},
+    {.key = "tau_case_s", .type = YAML_REAL, .offset = UNIT(cfg.tau_case_s), .max = 1e5, .what = "in the chamber; 0: the chamber's own"},
+    {.key = "tau_element_s", .type = YAML_REAL, .offset = UNIT(cfg.tau_element_s), .max = 1e5, .what = "in the chamber; 0: the chamber's own"},
+    {.key = "temp_degc", .type = YAML_EACH, .offset = UNIT(cfg.temp_degc), .count = UNIT_TEMPS, .min = -60, .max = 125, .what = "of X, Y, Z and the board, where there is no chamber"},
+    {.key = "adc_chain", .type = YAML_CHOICE, .offset = UNIT(cfg.board.adc_chain), .choices = chains, .what = "of the accelerometer converters: [ADS1282](chips/ads1282.md)"},
+    {.key = "adc_noise_scale", .type = YAML_REAL, .offset = UNIT(cfg.board.adc_noise_scale), .max = 1000, .what = "1: published noise, 0: none"},
+    {.key = "temp_noise_scale", .type = YAML_REAL, .offset = UNIT(cfg.board.temp_noise_scale), .max = 1000, .what = "the same of the temperature converter"},
+    {.key = "temp_adc_offset_v", .type = YAML_REAL, .offset = UNIT(cfg.board.temp_adc_offset_v), .min = -0.1, .max = 0.1, .what = "of the temperature converter before its calibration"},
+    {.key = "temp_adc_gain_error", .type = YAML_REAL, .offset = UNIT(cfg.board.temp_adc_gain_error), .min = -0.1, .max = 0.1, .what = "relative, before its calibration"},
+};
+const struct yaml_fields scenario_unit_fields = YAML_FIELDS(unit_rows);
+// clang-format on
+
+/* ---- what no table can say */
+
+/* The node of a key that is wrong, else that of the whole. */
+static const struct yaml_node *at(const struct yaml_node *unit, const char *key)
+{
+    const struct yaml_node *value = yaml_get(unit, key);
+    return value ? value : unit;
+}
+
+static bool plain(const char *name)
+{
+    return name[strspn(name, "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_")] == '\0';
+}
+
+/* Keys of settings that not every board has. */
+static const struct {
+    const char *key;
+    enum { OF_FORMS, OF_INPUTS, OF_KNOB } of;
+    uint32_t knob;
+} some_have[] = {
+    {"frame_form", OF_FORMS, 0},
+    {"axes", OF_INPUTS, 0},
+    {"adc_noise_scale", OF_INPUTS, 0},
+    {"level", OF_KNOB, BOARD_KNOB_LEVEL},
+    {"adc_chain", OF_KNOB, BOARD_KNOB_CHAIN},
+    {"temp_noise_scale", OF_KNOB, BOARD_KNOB_TEMP_NOISE},
+    {"temp_adc_offset_v", OF_KNOB, BOARD_KNOB_TEMP_ADC},
+    {"temp_adc_gain_error", OF_KNOB, BOARD_KNOB_TEMP_ADC},
+};
+enum { SOME_HAVE = sizeof some_have / sizeof *some_have };
+
+static bool has_key(const struct board_type *t, unsigned i)
+{
+    if (some_have[i].of == OF_INPUTS) return t->afe;
+    return some_have[i].of == OF_KNOB ? t->knobs & some_have[i].knob : t->frame_forms > 0;
+}
+
+static bool check_keys(struct yaml_file *f, const struct yaml_node *node, const struct scenario_unit *u)
+{
+    const struct board_type *t = u->cfg.type;
+    for (unsigned i = 0; i < SOME_HAVE; i++) {
+        const struct yaml_node *value = yaml_get(node, some_have[i].key);
+        if (value && !has_key(t, i))
+            return yaml_file_fail(f, value, some_have[i].key, "a %s has no such setting", t->title);
+    }
+    if (u->frame_form && u->frame_form >= t->frame_forms)
+        return yaml_file_fail(f, yaml_get(node, "frame_form"), "frame_form", "%u: a %s has 0 to %u", u->frame_form,
+                              t->title, t->frame_forms - 1);
+    return true;
+}
+
+void scenario_dump_unit(const struct scenario_unit *u, cJSON *to)
+{
+    yaml_dump(&scenario_unit_fields, u, to);
+    for (unsigned i = 0; i < SOME_HAVE; i++)
+        if (!has_key(u->cfg.type, i)) cJSON_DeleteItemFromObject(to, some_have[i].key);
+    if (!u->level[0]) cJSON_DeleteItemFromObject(to, "level");
+}
+
+/* A quartz sensor's amperes must not be taken for volts. */
+static bool check_inputs(struct yaml_file *f, const struct yaml_node *node, const struct scenario_unit *u)
+{
+    for (unsigned i = 0; i < UNIT_AXES; i++) {
+        if (u->cfg.axis[i].sensor == UNIT_QUARTZ && u->cfg.board.afe[i].input != AFE_CURRENT) {
+            return yaml_file_fail(f, at(node, "axes"), "axes",
+                                  "%c: a quartz sensor gives a current: afe: {input: current}", "xyz"[i]);
+        }
+    }
+    return true;
+}
+
+/* A name, a node and a number that no other unit of the scenario has. */
+static bool check_unit(struct yaml_file *f, const struct yaml_node *node, const struct scenario *s,
+                       const struct scenario_unit *u)
+{
+    if (!plain(u->name))
+        return yaml_file_fail(f, at(node, "name"), "name", "\"%s\": letters, digits and _ are wanted", u->name);
+    if (!check_inputs(f, node, u)) return false;
+    for (const struct scenario_unit *other = s->units; other < s->units + s->unit_count; other++) {
+        if (strcmp(other->name, u->name) == 0)
+            return yaml_file_fail(f, at(node, "name"), "name", "\"%s\" is taken by another unit", u->name);
+        if (other->cfg.node == u->cfg.node && other->bus == u->bus) {
+            return yaml_file_fail(f, at(node, "node"), "node", "%u is taken by unit %s; each needs its own",
+                                  u->cfg.node, other->name);
+        }
+        if (other->cfg.board.serial == u->cfg.board.serial) {
+            return yaml_file_fail(f, at(node, "serial"), "serial", "%u is taken by unit %s; each needs its own",
+                                  u->cfg.board.serial, other->name);
+        }
+    }
+    return true;
+}
+
+static const char *bus_at(const void *ctx, size_t i)
+{
+    const struct scenario *s = ctx;
+    return i < s->bus_count ? s->bus[i].name : NULL;
+}
+
+/* Who has been given no node and finds his type's taken, has the next one that is free. */
+static void find_node(const struct yaml_node *node, const struct scenario *s, struct scenario_unit *u)
+{
+    if (yaml_get(node, "node") || yaml_get(node, "count")) return;
+    for (unsigned i = 0; i < s->unit_count && u->cfg.node < 127; i++) {
+        if (s->units[i].bus != u->bus || s->units[i].cfg.node != u->cfg.node) continue;
+        u->cfg.node++;
+        i = UINT_MAX; /* from the first on again */
+    }
+}
+
+static bool find_bus(struct yaml_file *f, const struct yaml_node *node, const struct scenario *s,
+                     struct scenario_unit *u)
+{
+    char known[160] = "";
+    if (!u->bus_name[0]) snprintf(u->bus_name, sizeof u->bus_name, "%s", s->bus[0].name);
+    for (u->bus = 0; u->bus < s->bus_count; u->bus++) {
+        if (strcmp(s->bus[u->bus].name, u->bus_name) == 0) return true;
+        const size_t end = strlen(known);
+        snprintf(known + end, sizeof known - end, "%s%s", end ? ", " : "", s->bus[u->bus].name);
+    }
+    const char *near = yaml_nearest(u->bus_name, bus_at, s);
+    return yaml_file_fail(f, at(node, "bus"), "bus", "no bus \"%s\"; %s%s%sthere is %s", u->bus_name,
+                          near ? "nearest: " : "", near ? near : "", near ? "; " : "", known);
+}
+
+/* The number n in a pattern like u%02u; false if there is not exactly one place for it. */
+static bool number_name(const char *pattern, unsigned n, char *name, size_t cap)
+{
+    const char *percent = strchr(pattern, '%');
+    if (!percent || strchr(percent + 1, '%')) return false;
+    const bool padded = percent[1] == '0' && percent[2] >= '1' && percent[2] <= '9';
+    const char *end = percent + (padded ? 3 : 1);
+    if (*end != 'u') return false;
+    const int width = padded ? percent[2] - '0' : 1;
+    const int len = snprintf(name, cap, "%.*s%0*u%s", (int)(percent - pattern), pattern, width, n, end + 1);
+    return len > 0 && (size_t)len < cap;
+}
+
+struct scenario_unit scenario_unit_default(unsigned i)
+{
+    struct scenario_unit u = {.cfg = unit_default(NULL)};
+    if (i < 26) snprintf(u.name, sizeof u.name, "%c", 'a' + (int)i);
+    else snprintf(u.name, sizeof u.name, "u%02u", i + 1);
+    u.cfg.board.serial = i + 1;
+    scenario_unit_board(&u, &board_names[0]);
+    return u;
+}
+
+void scenario_unit_board(struct scenario_unit *u, const struct board_name *name)
+{
+    u->board = name;
+    unit_cfg_type(&u->cfg, name->type);
+    name->type->profile_default(&u->profile);
+}
+
+/* The k-th of the units that an entry stands for. */
+static bool place_unit(struct yaml_file *f, const struct yaml_node *node, const struct entry *e, unsigned k,
+                       struct scenario *s)
+{
+    if (s->unit_count == SCENARIO_UNITS_MAX)
+        return yaml_file_fail(f, node, "count", "up to %u units in all are wanted", SCENARIO_UNITS_MAX);
+    struct scenario_unit *u = &s->units[s->unit_count];
+    *u = e->unit;
+    if (e->count && !number_name(e->unit.name, k + 1, u->name, sizeof u->name)) {
+        return yaml_file_fail(f, at(node, "name"), "name", "\"%s\": with count a number stands in it, as in u%%02u",
+                              e->unit.name);
+    }
+    const unsigned id = e->unit.cfg.node + k;
+    if (id > 127) return yaml_file_fail(f, at(node, "node"), "node", "%u is outside 1 ... 127", id);
+    u->cfg.node = (uint8_t)id;
+    u->cfg.board.serial = e->unit.cfg.board.serial + k;
+    if (u->cfg.board.serial < e->unit.cfg.board.serial || u->cfg.board.serial == 0)
+        return yaml_file_fail(f, at(node, "serial"), "serial", "counts beyond 4294967295");
+    if (!check_unit(f, node, s, u)) return false;
+    s->unit_count++;
+    return true;
+}
+
+static bool load_entry(struct yaml_file *f, const struct yaml_node *node, struct scenario *s)
+{
+    struct entry e = {.unit = scenario_unit_default(s->unit_count)};
+    char where[40];
+    const char *named = yaml_scalar(yaml_get(node, "name"));
+    if (yaml_get(node, "count")) snprintf(e.unit.name, sizeof e.unit.name, "u%%02u");
+    snprintf(where, sizeof where, "units.%.31s", named ? named : e.unit.name);
+    snprintf(f->where, sizeof f->where, "%s.", where);
+    if (!begin_unit(f, node, s, &e.unit)) return false;
+    f->where[0] = '\0';
+    if (!yaml_load(f, node, where, &scenario_unit_fields, &e)) return false;
+    snprintf(f->where, sizeof f->where, "%s.", where);
+    if (!check_keys(f, node, &e.unit) || !find_bus(f, node, s, &e.unit)) return false;
+    find_node(node, s, &e.unit);
+    for (unsigned k = 0; k < (e.count ? e.count : 1); k++)
+        if (!place_unit(f, node, &e, k, s)) return false;
+    f->where[0] = '\0';
+    return true;
+}
+
+bool scenario_load_units(struct yaml_file *f, const struct yaml_node *node, struct scenario *s)
+{
+    if (node->kind != YAML_SEQUENCE) return yaml_file_fail(f, node, "units", "a sequence of units is wanted");
+    for (const struct yaml_item *i = node->first; i; i = i->next)
+        if (!load_entry(f, i->value, s)) return false;
+    return true;
+}
+
+bool scenario_check_seats(struct yaml_file *f, const struct yaml_node *root, const struct scenario *s)
+{
+    for (unsigned i = 0; i < s->unit_count; i++) {
+        const struct scenario_unit *u = &s->units[i];
+        const bool there = u->cfg.seat.on == LAB_TABLE      ? s->lab.table.axes > 0
+                           : u->cfg.seat.on == LAB_PLATFORM ? s->lab.platform.present
+                                                            : true;
+        const char *on = lab_mount_name(u->cfg.seat.on);
+        if (!there)
+            return yaml_file_fail(f, yaml_get(root, "units"), "units",
+                                  "%s stands on the %s, and there is none: a section %s is wanted", u->name, on, on);
+    }
+    return true;
+}

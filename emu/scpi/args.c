@@ -1,0 +1,209 @@
+/* Parameters of a program message unit as arguments of a row of the command table. */
+#include "command/args.h"
+#include "scpi/internal.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+__attribute__((format(printf, 3, 4))) static cJSON *fail(struct scpi_failure *why, int code, const char *format, ...)
+{
+    va_list ap;
+    va_start(ap, format);
+    vsnprintf(why->what, sizeof why->what, format, ap);
+    va_end(ap);
+    why->code = code;
+    return NULL;
+}
+
+static bool word_is(struct scpi_text t, const char *mnemonic)
+{
+    return scpi_is(mnemonic, strlen(mnemonic), t);
+}
+
+unsigned scpi_suffixes(const char *pattern)
+{
+    unsigned n = 0;
+    for (; *pattern; pattern++) n += *pattern == '#';
+    return n;
+}
+
+bool scpi_limit(const struct control_bench *b, const struct control_command *row, unsigned arg,
+                const unsigned suffix[4], struct scpi_text word, double *out)
+{
+    struct control_value v[CONTROL_ARGS_MAX] = {{0}};
+    double min, max;
+    for (unsigned i = 0; i < 4; i++)
+        v[i] = (struct control_value){.given = true, .real = suffix[i], .count = suffix[i]};
+    control_arg_limits(b, &row->arg[arg], v, &min, &max);
+    if (word_is(word, "MINimum")) *out = min;
+    else if (word_is(word, "MAXimum")) *out = max;
+    else if (word_is(word, "DEFault")) *out = row->arg[arg].def;
+    else return false;
+    return true;
+}
+
+/* ---- one parameter */
+
+struct source {
+    const struct control_bench *bench;
+    const struct control_command *row;
+    unsigned arg;
+    const unsigned *suffix;
+    const struct scpi_param *param;
+    struct scpi_failure *why;
+};
+
+static cJSON *to_number(const struct source *s)
+{
+    const struct control_arg *a = &s->row->arg[s->arg];
+    double x;
+    if (s->param->form == SCPI_STRING) return fail(s->why, -158, "%s: a number is wanted", a->name);
+    if (s->param->form == SCPI_WORD) {
+        if (scpi_limit(s->bench, s->row, s->arg, s->suffix, s->param->text, &x)) return cJSON_CreateNumber(x);
+        return fail(s->why, -148, "%s: a number, MIN, MAX or DEF is wanted", a->name);
+    }
+    const int err = scpi_to_unit(a->unit, s->param->text, s->param->number, &x);
+    if (err) {
+        return fail(s->why, err, "%s is in %s, not %.*s", a->name, a->unit ? a->unit : "no unit", (int)s->param->text.n,
+                    s->param->text.p);
+    }
+    return cJSON_CreateNumber(x);
+}
+
+static cJSON *to_bool(const struct source *s)
+{
+    const struct control_arg *a = &s->row->arg[s->arg];
+    const struct scpi_param *p = s->param;
+    if (p->form == SCPI_STRING) return fail(s->why, -158, "%s: ON, OFF, 1 or 0 is wanted", a->name);
+    if (p->form == SCPI_NUMBER && p->text.n) return fail(s->why, -138, "%s: ON, OFF, 1 or 0 is wanted", a->name);
+    if (p->form == SCPI_NUMBER) return cJSON_CreateBool(p->number >= 0.5 || p->number <= -0.5);
+    if (word_is(p->text, "ON")) return cJSON_CreateTrue();
+    if (word_is(p->text, "OFF")) return cJSON_CreateFalse();
+    return fail(s->why, -224, "%s: ON, OFF, 1 or 0 is wanted", a->name);
+}
+
+static bool same_word(struct scpi_text t, const char *word, size_t len)
+{
+    if (t.n != len) return false;
+    for (size_t i = 0; i < len; i++) {
+        if ((t.p[i] | 0x20) != (word[i] | 0x20)) return false; /* letters, digits and _ */
+    }
+    return true;
+}
+
+/* Four letters, three if the fourth is a vowel: SCPI-99 volume 1, 6.2.1. */
+static size_t short_form(const char *word)
+{
+    const size_t len = strlen(word);
+    return len <= 4 ? len : strchr("aeiou", word[3]) ? 3 : 4;
+}
+
+static const char *find_choice(const struct control_arg *a, struct scpi_text t)
+{
+    const char *found = NULL;
+    unsigned shorts = 0;
+    for (unsigned i = 0; a->choices[i]; i++) {
+        if (same_word(t, a->choices[i], strlen(a->choices[i]))) return a->choices[i];
+        if (!same_word(t, a->choices[i], short_form(a->choices[i]))) continue;
+        shorts++;
+        found = a->choices[i];
+    }
+    return shorts == 1 ? found : NULL;
+}
+
+static cJSON *to_choice(const struct source *s)
+{
+    const struct control_arg *a = &s->row->arg[s->arg];
+    char words[160] = "";
+    size_t at = 0;
+    if (s->param->form == SCPI_NUMBER) return fail(s->why, -128, "%s: a word is wanted", a->name);
+    const char *found = find_choice(a, s->param->text);
+    if (found) return cJSON_CreateString(found);
+    for (unsigned i = 0; a->choices[i] && at < sizeof words; i++) {
+        at += (size_t)snprintf(words + at, sizeof words - at, "%s%s", i ? ", " : "", a->choices[i]);
+    }
+    return fail(s->why, -224, "%s: one of %s is wanted", a->name, words);
+}
+
+static cJSON *to_string(const struct source *s)
+{
+    const struct scpi_param *p = s->param;
+    char text[SCPI_LINE_MAX];
+    size_t n = 0;
+    if (p->form == SCPI_NUMBER) return fail(s->why, -128, "%s: a string is wanted", s->row->arg[s->arg].name);
+    for (size_t i = 0; i < p->text.n && n < sizeof text - 1; i++) {
+        text[n++] = p->text.p[i];
+        if (p->form == SCPI_STRING && i + 1 < p->text.n && p->text.p[i] == p->text.p[-1] &&
+            p->text.p[i + 1] == p->text.p[i])
+            i++; /* a doubled quote */
+    }
+    text[n] = '\0';
+    return cJSON_CreateString(text);
+}
+
+static cJSON *convert(const struct source *s)
+{
+    static cJSON *(*const to[])(const struct source *) = {
+        [CONTROL_REAL] = to_number, [CONTROL_COUNT] = to_number, [CONTROL_BOOL] = to_bool,
+        [CONTROL_NAME] = to_string, [CONTROL_TEXT] = to_string,  [CONTROL_CHOICE] = to_choice,
+        [CONTROL_UNIT] = to_string, [CONTROL_REALS] = to_number,
+    };
+    return to[s->row->arg[s->arg].type](s);
+}
+
+/* ---- all of them */
+
+/* A suffix that the argument does not take is the header's fault. */
+static bool suffix_fits(const struct control_bench *b, const struct control_command *row, unsigned arg,
+                        const unsigned suffix[4], struct scpi_failure *why)
+{
+    double min = 0, max = 0;
+    (void)scpi_limit(b, row, arg, suffix, (struct scpi_text){"MIN", 3}, &min);
+    (void)scpi_limit(b, row, arg, suffix, (struct scpi_text){"MAX", 3}, &max);
+    if (suffix[arg] >= min && suffix[arg] <= max) return true;
+    fail(why, -114, "%s: %u is outside %.10g ... %.10g", row->arg[arg].name, suffix[arg], min, max);
+    return false;
+}
+
+/* Which argument the i-th parameter is: lists are dealt in turn, time, rate, time, rate. -1: there is none. */
+static int arg_of_param(const struct control_command *row, unsigned suffixes, unsigned i)
+{
+    const unsigned args = control_arg_count(row);
+    unsigned list = suffixes, lists = 0;
+    while (list < args && row->arg[list].type != CONTROL_REALS) list++;
+    while (list + lists < args && row->arg[list + lists].type == CONTROL_REALS) lists++;
+    const unsigned arg = suffixes + i;
+    if (lists && arg >= list) return (int)(list + (arg - list) % lists);
+    return arg < args ? (int)arg : -1;
+}
+
+static bool add_param(const struct source *s, cJSON *args)
+{
+    const struct control_arg *a = &s->row->arg[s->arg];
+    cJSON *item = convert(s);
+    if (!item) return false;
+    if (a->type != CONTROL_REALS) return cJSON_AddItemToObject(args, a->name, item);
+    cJSON *list = cJSON_GetObjectItemCaseSensitive(args, a->name);
+    return cJSON_AddItemToArray(list ? list : cJSON_AddArrayToObject(args, a->name), item);
+}
+
+cJSON *scpi_args(const struct control_bench *b, const struct control_command *row, const struct control_scpi *how,
+                 const unsigned suffix[4], const struct scpi_unit *u, struct scpi_failure *why)
+{
+    const unsigned suffixes = scpi_suffixes(how->header);
+    cJSON *args = cJSON_CreateObject();
+    bool good = true;
+    for (unsigned i = 0; i < suffixes && good; i++) {
+        good = suffix_fits(b, row, i, suffix, why);
+        cJSON_AddNumberToObject(args, row->arg[i].name, suffix[i]);
+    }
+    for (unsigned i = 0; i < u->params && good; i++) {
+        const int arg = arg_of_param(row, suffixes, i);
+        if (arg < 0) fail(why, -108, "%u parameters are enough", control_arg_count(row) - suffixes);
+        good = arg >= 0 && add_param(&(struct source){b, row, (unsigned)arg, suffix, &u->param[i], why}, args);
+    }
+    if (good) return args;
+    cJSON_Delete(args);
+    return NULL;
+}

@@ -1,0 +1,369 @@
+#include "scpi/scpi.h"
+
+#include "command/args.h"
+#include "scpi/internal.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+/* ---- the response */
+
+void scpi_put(struct scpi *s, const char *text)
+{
+    const size_t n = strlen(text), sep = s->out_len > 0;
+    if (s->out_len + sep + n >
+        sizeof s->out) { /* 488.2 6.3.1.7: the output queue is full and the message not at its end */
+        scpi_error(&s->status, -430, "the answers to one message are longer than 8192 bytes");
+        s->out_len = 0;
+        s->pos = s->len;
+        return;
+    }
+    if (sep) s->out[s->out_len++] = ';';
+    memcpy(s->out + s->out_len, text, n);
+    s->out_len += n;
+}
+
+void scpi_putf(struct scpi *s, const char *format, ...)
+{
+    char text[256];
+    va_list ap;
+    va_start(ap, format);
+    vsnprintf(text, sizeof text, format, ap);
+    va_end(ap);
+    scpi_put(s, text);
+}
+
+static bool is_word(const char *text)
+{
+    for (; *text; text++) {
+        const char c = *text;
+        if (!((c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_')) return false;
+    }
+    return true;
+}
+
+/* A word is character data in capitals, other text a string in quotes. */
+static size_t format_text(const char *text, char *out, size_t cap)
+{
+    if (!is_word(text)) return (size_t)snprintf(out, cap, "\"%.200s\"", text);
+    size_t n = 0;
+    for (; text[n] && n < cap - 1; n++)
+        out[n] = (char)(text[n] >= 'a' && text[n] <= 'z' ? text[n] - 'a' + 'A' : text[n]);
+    out[n] = '\0';
+    return n;
+}
+
+/* As many digits as always survive the way through a double: 30 degrees are 30, not 29.999999999999996. */
+static size_t format_number(double x, char *out, size_t cap)
+{
+    return (size_t)snprintf(out, cap, "%.15g", x);
+}
+
+static size_t format_item(const cJSON *j, char *out, size_t cap)
+{
+    if (cJSON_IsBool(j)) return (size_t)snprintf(out, cap, "%d", cJSON_IsTrue(j));
+    if (cJSON_IsNumber(j)) return format_number(j->valuedouble, out, cap);
+    if (cJSON_IsString(j)) return format_text(j->valuestring, out, cap);
+    return (size_t)snprintf(out, cap, "9.91E37"); /* not a number: SCPI-99 volume 1, 7.2.1.5 */
+}
+
+/* The fields of a result, named with commas between. */
+static void put_fields(struct scpi *s, const cJSON *result, const char *fields)
+{
+    char text[512], name[64];
+    size_t at = 0;
+    while (*fields && at + 256 < sizeof text) {
+        const size_t n = strcspn(fields, ",");
+        snprintf(name, sizeof name, "%.*s", (int)n, fields);
+        if (at) text[at++] = ',';
+        at += format_item(cJSON_GetObjectItemCaseSensitive(result, name), text + at, sizeof text - at);
+        fields += n + (fields[n] == ',');
+    }
+    scpi_put(s, text);
+}
+
+/* ---- waiting for the end of a motion */
+
+static bool over(const struct scpi *s, int64_t t_ns)
+{
+    return s->kind->rest_ns(s->control->bench, t_ns) <= t_ns;
+}
+
+/* What has waited for the end: *OPC, *OPC?, *WAI. */
+static void end_wait(struct scpi *s)
+{
+    if (s->opc) s->status.esr |= SCPI_ESR_OPC;
+    s->opc = false;
+    if (s->wait == SCPI_OPC_QUERY) scpi_put(s, "1");
+    s->wait = SCPI_GO;
+}
+
+void scpi_await(struct scpi *s, int64_t t_ns)
+{
+    if (over(s, t_ns)) end_wait(s);
+    else sched_at(s->sched, &s->rest, s->kind->rest_ns(s->control->bench, t_ns));
+}
+
+bool scpi_busy(const struct scpi *s)
+{
+    return s->wait != SCPI_GO;
+}
+
+void scpi_look(struct scpi *s, int64_t t_ns)
+{
+    const struct control_bench *b = s->control->bench;
+    scpi_condition(&s->status.operation, s->kind->operation(b, t_ns));
+    scpi_condition(&s->status.questionable, s->kind->questionable(b, t_ns));
+    if (s->opc || scpi_busy(s)) sched_at(s->sched, &s->rest, s->kind->rest_ns(b, t_ns));
+}
+
+/* ---- a unit of a message */
+
+bool scpi_asks(const char *pattern)
+{
+    return pattern[strlen(pattern) - 1] == '?';
+}
+
+static bool belongs(const struct scpi_kind *kind, const struct control_command *row)
+{
+    return strncmp(row->name, kind->module, strlen(kind->module)) == 0;
+}
+
+const struct control_command *scpi_find_row(const struct scpi *s, struct scpi_text header, bool query,
+                                            const struct control_scpi **how, unsigned suffix[4])
+{
+    const struct control_command *row;
+    for (unsigned i = 0; (row = control_row(control_tables, i)); i++) {
+        if (!belongs(s->kind, row)) continue;
+        for (unsigned k = 0; k < CONTROL_SCPI_MAX && row->scpi[k].header; k++) {
+            *how = &row->scpi[k];
+            if (scpi_asks((*how)->header) == query && scpi_match((*how)->header, header, suffix)) return row;
+        }
+    }
+    return NULL;
+}
+
+/* The standard's number for a refusal; an argument that is not there is the only one that can be wrong by then. */
+static int refusal_code(const struct control_refusal *r)
+{
+    static const struct {
+        const char *code;
+        int number;
+    } rows[] = {{"syntax", -102}, {"argument", -109}, {"type", -104},
+                {"range", -222},  {"state", -221},    {"machine", -240}};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        if (strcmp(rows[i].code, r->code) == 0) return rows[i].number;
+    }
+    return -200;
+}
+
+/* Command errors are of the form of the message: its rest makes no sense any more. */
+static bool fail(struct scpi *s, int code, const char *what)
+{
+    scpi_error(&s->status, code, what);
+    return code <= -200;
+}
+
+static bool do_row(struct scpi *s, const struct control_command *row, const struct control_scpi *how,
+                   const unsigned suffix[4], const struct scpi_unit *u, int64_t t_ns)
+{
+    struct scpi_failure why = {0};
+    cJSON *args = scpi_args(s->control->bench, row, how, suffix, u, &why);
+    if (!args) return fail(s, why.code, why.what);
+    cJSON *result = cJSON_CreateObject();
+    const bool done = control_call(s->control, row->name, args, result, t_ns) == CONTROL_DONE;
+    if (done && how->result) put_fields(s, result, how->result);
+    cJSON_Delete(args);
+    cJSON_Delete(result);
+    scpi_look(s, t_ns);
+    return done || fail(s, refusal_code(&s->control->refusal), s->control->refusal.why);
+}
+
+/* ANGLe? MAX: what the setting of the same name would take. */
+static bool do_limit(struct scpi *s, struct scpi_text header, const struct scpi_unit *u)
+{
+    const struct control_scpi *how;
+    unsigned suffix[4] = {1, 1, 1, 1};
+    double x;
+    const struct control_command *row = scpi_find_row(s, header, false, &how, suffix);
+    if (!row || u->params != 1) return fail(s, -108, NULL);
+    const unsigned arg = scpi_suffixes(how->header);
+    const bool numeric = row->arg[arg].name && control_type_numeric(row->arg[arg].type);
+    if (!numeric || u->param[0].form != SCPI_WORD ||
+        !scpi_limit(s->control->bench, row, arg, suffix, u->param[0].text, &x)) {
+        return fail(s, -224, "MIN, MAX or DEF is wanted");
+    }
+    scpi_putf(s, "%.12g", x);
+    return true;
+}
+
+static const struct scpi_command *find_common(struct scpi_text header, bool query)
+{
+    const struct scpi_command *row;
+    unsigned suffix[4];
+    for (unsigned i = 0; (row = scpi_common(i)); i++) {
+        if (scpi_asks(row->pattern) == query && scpi_match(row->pattern, header, suffix)) break;
+    }
+    return row;
+}
+
+static bool do_common(struct scpi *s, const struct scpi_command *row, const struct scpi_unit *u, int64_t t_ns)
+{
+    char range[48];
+    const struct scpi_param *p = u->param;
+    snprintf(range, sizeof range, "an integer from 0 to %u is wanted", row->max);
+    if (u->params > (row->max > 0)) return fail(s, -108, NULL);
+    if (u->params < (row->max > 0)) return fail(s, -109, range);
+    if (row->max && p->form != SCPI_NUMBER) return fail(s, p->form == SCPI_WORD ? -148 : -158, range);
+    if (row->max && p->text.n) return fail(s, -138, range);
+    if (row->max && !(p->number > -0.5 && p->number < row->max + 0.5)) return fail(s, -222, range);
+    scpi_look(s, t_ns);
+    row->run(s, row, row->max ? (unsigned)(p->number + 0.5) : 0, t_ns);
+    return true;
+}
+
+/* The header with the path it stands in: SCPI-99 volume 1, 6.2.4. False: too long. */
+static bool make_path(struct scpi *s, const struct scpi_unit *u, char *full, struct scpi_text *header)
+{
+    const size_t before = u->rooted || u->common ? 0 : s->path_len;
+    if (before + u->header.n > SCPI_HEADER_MAX) return false;
+    memcpy(full, s->path, before);
+    memcpy(full + before, u->header.p, u->header.n);
+    *header = (struct scpi_text){full, before + u->header.n};
+    if (u->common) return true; /* leaves the path as it is */
+    s->path_len = header->n;
+    while (s->path_len > 0 && full[s->path_len - 1] != ':') s->path_len--;
+    memcpy(s->path, full, s->path_len);
+    return true;
+}
+
+static bool do_unit(struct scpi *s, const struct scpi_unit *u, int64_t t_ns)
+{
+    char full[SCPI_HEADER_MAX + 1];
+    struct scpi_text header;
+    const struct control_scpi *how;
+    unsigned suffix[4] = {1, 1, 1, 1};
+    if (!make_path(s, u, full, &header)) return fail(s, -112, NULL);
+    const struct scpi_command *common = find_common(header, u->query);
+    if (common) return do_common(s, common, u, t_ns);
+    const struct control_command *row = scpi_find_row(s, header, u->query, &how, suffix);
+    if (row && u->query && u->params) return do_limit(s, header, u);
+    if (row) return do_row(s, row, how, suffix, u, t_ns);
+    full[header.n] = '\0';
+    return fail(s, -113, full);
+}
+
+/* ---- a message */
+
+static void go_on(struct scpi *s, int64_t t_ns)
+{
+    struct scpi_unit u;
+    while (s->pos < s->len && !scpi_busy(s)) {
+        struct scpi_text rest = {s->line + s->pos, s->len - s->pos};
+        const int err = scpi_lex_unit(&rest, &u);
+        s->pos = s->len - rest.n;
+        const bool good = err ? fail(s, err, NULL) && false : !u.header.n || do_unit(s, &u, t_ns);
+        if (!good) s->pos = s->len;
+    }
+    if (scpi_busy(s)) return;
+    if (s->out_len) s->reply(s->ctx, s->out, s->out_len);
+    s->out_len = 0;
+}
+
+static void on_rest(void *ctx, int64_t t_ns)
+{
+    struct scpi *s = ctx;
+    const bool busy = scpi_busy(s);
+    if (!s->opc && !busy) return;
+    scpi_await(s, t_ns); /* once more, if another command came meanwhile */
+    if (!busy || scpi_busy(s)) return;
+    go_on(s, t_ns);
+    if (!scpi_busy(s) && s->idle) s->idle(s->ctx, t_ns);
+}
+
+void scpi_open(struct scpi *s)
+{
+    scpi_status_init(&s->status);
+    sched_ev(&s->rest, on_rest, s);
+    s->opc = false;
+    s->wait = SCPI_GO;
+    s->pos = s->len = s->path_len = s->out_len = 0;
+}
+
+void scpi_close(struct scpi *s)
+{
+    sched_cancel(s->sched, &s->rest);
+}
+
+void scpi_line(struct scpi *s, const char *text, size_t len, int64_t t_ns)
+{
+    if (!text || len > sizeof s->line) {
+        scpi_error(&s->status, -363, "a message has up to 4096 bytes");
+        return;
+    }
+    memcpy(s->line, text, len);
+    s->pos = s->path_len = s->out_len = 0;
+    s->len = len;
+    scpi_look(s, t_ns);
+    go_on(s, t_ns);
+}
+
+/* ---- the rows for people */
+
+static void markdown_params(const struct control_command *row, unsigned suffixes, char *out, size_t cap)
+{
+    size_t at = 0;
+    out[0] = '\0';
+    for (unsigned i = suffixes; i < control_arg_count(row) && at + 2 < cap; i++) {
+        const struct control_arg *a = &row->arg[i];
+        const char *next = ": ";
+        at += (size_t)snprintf(out + at, cap - at, "%s%s%s", i > suffixes ? "; " : "", a->name,
+                               a->optional ? " (optional)" : "");
+        if (control_type_numeric(a->type) && at < cap) {
+            at += (size_t)snprintf(out + at, cap - at, " %.10g to %.10g", a->min, a->max);
+            next = " ";
+        }
+        const char *word;
+        for (unsigned k = 0; at < cap && (word = a->choices ? a->choices[k] : scpi_suffix(a->unit, k));
+             k++, next = ", ") {
+            at += (size_t)snprintf(out + at, cap - at, "%s%s", next, word);
+        }
+        if (a->type == CONTROL_BOOL && at < cap) at += (size_t)snprintf(out + at, cap - at, ": ON, OFF, 1, 0");
+    }
+}
+
+/* The i-th header of the instrument's rows. */
+static const struct control_scpi *nth_header(const struct scpi_kind *kind, unsigned i,
+                                             const struct control_command **row)
+{
+    for (unsigned r = 0; (*row = control_row(control_tables, r)); r++) {
+        for (unsigned k = 0; belongs(kind, *row) && k < CONTROL_SCPI_MAX && (*row)->scpi[k].header; k++) {
+            if (i-- == 0) return &(*row)->scpi[k];
+        }
+    }
+    return NULL;
+}
+
+bool scpi_markdown(const struct scpi_kind *kind, unsigned line, char *out, size_t cap)
+{
+    char params[512];
+    const struct control_command *row = NULL;
+    const struct scpi_command *common = kind ? NULL : scpi_common(line - 2);
+    if (line == 0)
+        snprintf(out, cap,
+                 kind ? "| header | parameters, answer | command | what it does |"
+                      : "| header | parameter | what it does |");
+    if (line == 1) snprintf(out, cap, kind ? "|---|---|---|---|" : "|---|---|---|");
+    if (line < 2) return true;
+    if (common && common->max) snprintf(params, sizeof params, "0 to %u", common->max);
+    else params[0] = '\0';
+    if (common) snprintf(out, cap, "| `%s` | %s | %s |", common->pattern, params, common->what);
+    if (!kind) return common != NULL;
+    const struct control_scpi *how = nth_header(kind, line - 2, &row);
+    if (!how) return false;
+    if (how->result) snprintf(params, sizeof params, "answers %s", how->result);
+    else markdown_params(row, scpi_suffixes(how->header), params, sizeof params);
+    snprintf(out, cap, "| `%s` | %s | `%s` | %s |", how->header, params, row->name, row->what);
+    return true;
+}

@@ -1,0 +1,244 @@
+#include "unit/unit.h"
+
+#include "base/detmath.h"
+#include "canopen/co_node.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#define RAD_PER_DEG 0.017453292519943295
+
+/* In the chamber the board is as warm as the case, the thermometers of the sensors as their elements. */
+static double temp_degc(void *ctx, unsigned channel, int64_t t_ns)
+{
+    const struct unit *u = ctx;
+    const struct chamber *c = &u->lab->chamber;
+    if (channel >= UNIT_TEMPS) return 0.0;
+    if (!c->cfg.present) return u->cfg.temp_degc[channel];
+    return channel < UNIT_AXES ? chamber_element_degc(c, &u->body, t_ns) : chamber_case_degc(c, &u->body, t_ns);
+}
+
+enum { WARM_STEP_NS = 10000000 }; /* 10 mK at most in a chamber of 60 K/min, without any lag */
+
+/* Of the sensor's element, where the sensor minds it; as it was at the latest whole step, whoever looks how often. Without a
+ * chamber a quartz's case is as warm as its element. */
+static void warm(struct unit *u, unsigned axis, int64_t t_ns)
+{
+    struct mems *m = &u->mems[axis];
+    struct quartz *q = &u->quartz[axis];
+    const struct chamber *c = &u->lab->chamber;
+    const bool quartz = u->cfg.axis[axis].sensor == UNIT_QUARTZ;
+    const int64_t step = t_ns / WARM_STEP_NS;
+    if (!quartz && m->cfg.u0_tc_v_per_k == 0.0 && m->cfg.k_tc_per_k == 0.0) return;
+    if (step == u->warm_step[axis]) return;
+    u->warm_step[axis] = step;
+    const double element_degc = temp_degc(u, axis, step * WARM_STEP_NS);
+    m->temp_degc = q->element_degc = element_degc;
+    q->case_degc = c->cfg.present ? chamber_case_degc(c, &u->body, step * WARM_STEP_NS) : element_degc;
+}
+
+static double accel_signal(void *ctx, unsigned axis, int64_t t_ns)
+{
+    struct unit *u = ctx;
+    if (u->cfg.axis[axis].sensor == UNIT_NO_SENSOR) return 0.0;
+    double a_mps2[3];
+    unit_gravity_mps2(u, axis, t_ns, a_mps2);
+    warm(u, axis, t_ns);
+    const double out = u->cfg.axis[axis].sensor == UNIT_QUARTZ ? quartz_out_a(&u->quartz[axis], a_mps2, t_ns)
+                                                               : mems_out_v(&u->mems[axis], a_mps2, t_ns);
+    return u->sensor_faults[axis] ? sensor_fault_out(u->sensor_faults[axis], out, t_ns) : out;
+}
+
+/* Of the case, wherever in it. */
+static void rate_radps(void *ctx, int64_t t_ns, double w_ib_b[3])
+{
+    static const double origin_m[3] = {0.0, 0.0, 0.0};
+    const struct unit *u = ctx;
+    struct felt felt;
+    lab_feel(u->lab, &u->cfg.seat, origin_m, t_ns, &felt);
+    for (unsigned i = 0; i < 3; i++) w_ib_b[i] = felt.w_radps[i];
+}
+
+/* To what the scenario has it at power-on. */
+static double supply_ratio(void *ctx, int64_t t_ns)
+{
+    const struct supply *s = &((const struct unit *)ctx)->lab->supply;
+    return s->cfg.volt_v > 0.0 ? supply_volts(s, t_ns) / s->cfg.volt_v : 0.0;
+}
+
+/* ---- the platform, for a gyro unit */
+
+static void torque(void *ctx, double u1_radps, double u2_radps, int64_t t_ns)
+{
+    const struct unit *u = ctx;
+    (void)platform_torque(&u->lab->platform, u1_radps, u2_radps, t_ns);
+}
+
+static void reposition(void *ctx, int64_t t_ns)
+{
+    const struct unit *u = ctx;
+    platform_reposition(&u->lab->platform, t_ns);
+}
+
+static double servo_rad(void *ctx, int64_t t_ns)
+{
+    const struct unit *u = ctx;
+    return platform_servo_rad(&u->lab->platform, t_ns);
+}
+
+static double encoder_rad(void *ctx, int64_t t_ns)
+{
+    const struct unit *u = ctx;
+    return platform_encoder_rad(&u->lab->platform, t_ns);
+}
+
+/* A listener may end its own or another's listening: the cursor lives in the unit, where unit_unlisten() sees it. */
+static void on_event(void *ctx, unsigned event, int64_t t_ns)
+{
+    struct unit *u = ctx;
+    u->told_next = u->listeners;
+    while (u->told_next) {
+        struct unit_listener *l = u->told_next;
+        u->told_next = l->next;
+        l->fn(l->ctx, event, t_ns);
+    }
+}
+
+void unit_listen(struct unit *u, struct unit_listener *l)
+{
+    struct unit_listener **at = &u->listeners;
+    while (*at) at = &(*at)->next;
+    l->next = NULL;
+    *at = l;
+    u->type->listen(u->board, true);
+}
+
+void unit_unlisten(struct unit *u, struct unit_listener *l)
+{
+    struct unit_listener **at = &u->listeners;
+    while (*at && *at != l) at = &(*at)->next;
+    if (!*at) return;
+    if (u->told_next == l) u->told_next = l->next;
+    *at = l->next;
+    l->next = NULL;
+    if (!u->listeners) u->type->listen(u->board, false);
+}
+
+struct unit_cfg unit_default(const char *name)
+{
+    static const struct board_cfg quiet = {.adc_noise_scale = 1.0, .temp_noise_scale = 1.0, .seed = 1, .serial = 1};
+    struct unit_cfg c = {.name = name, .board = quiet, .temp_degc = {25.0, 25.0, 25.0, 25.0}};
+    for (unsigned i = 0; i < UNIT_AXES; i++) c.axis[i].quartz = quartz_default();
+    unit_cfg_type(&c, board_types[0]);
+    return c;
+}
+
+void unit_cfg_type(struct unit_cfg *cfg, const struct board_type *type)
+{
+    cfg->type = type;
+    cfg->profile = NULL;
+    cfg->node = type->node;
+    for (unsigned i = 0; i < UNIT_AXES; i++) cfg->board.afe[i] = afe_nominal(AFE_VOLTAGE);
+    if (type->cfg_default) type->cfg_default(&cfg->board);
+}
+
+/* A copy of its own for the board; its name stays here. */
+static void init_board(struct unit *u, struct sched *s)
+{
+    struct board_io io = {
+        .ctx = u, .accel = accel_signal, .temp_degc = temp_degc, .rate_radps = rate_radps, .event = on_event};
+    if (u->lab->supply.cfg.present) io.supply_ratio = supply_ratio;
+    if (u->lab->platform.cfg.present) {
+        io.torque = torque;
+        io.reposition = reposition;
+        io.servo_rad = servo_rad;
+        io.encoder_rad = encoder_rad;
+    }
+    union board_profile_store defaults;
+    const void *profile = u->cfg.profile;
+    if (!profile) {
+        memset(&defaults, 0, sizeof defaults);
+        u->type->profile_default(&defaults);
+        profile = &defaults;
+    }
+    snprintf(u->profile, sizeof u->profile, "%s", board_profile_name(u->type, profile));
+    u->type->init(u->board, profile, &u->cfg.board, &io, s);
+}
+
+void unit_init(struct unit *u, const struct unit_cfg *cfg, struct lab *lab, struct sched *s)
+{
+    static const char *const noise[UNIT_AXES] = {"mems.x", "mems.y", "mems.z"};
+    static const char *const quartz_noise[UNIT_AXES] = {"quartz.x", "quartz.y", "quartz.z"};
+    u->cfg = *cfg;
+    u->lab = lab;
+    u->type = cfg->type;
+    u->board = &u->store;
+    u->can = NULL;
+    u->listeners = u->told_next = NULL;
+    for (unsigned i = 0; i < UNIT_AXES; i++) {
+        u->sensor_faults[i] = NULL;
+        u->warm_step[i] = -1;
+        const struct mems_cfg m = mems_cfg_si(&cfg->axis[i].mems, lab->site.g_mps2);
+        mems_init(&u->mems[i], &m, rng_stream(cfg->board.seed, cfg->board.serial, noise[i]));
+        quartz_init(&u->quartz[i], &cfg->axis[i].quartz, lab->site.g_mps2,
+                    rng_stream(cfg->board.seed, cfg->board.serial, quartz_noise[i]));
+        const bool quartz = cfg->axis[i].sensor == UNIT_QUARTZ;
+        const double alpha0_rad = quartz ? cfg->axis[i].quartz.alpha0_deg * RAD_PER_DEG : m.alpha0_rad;
+        u->cos_alpha0[i] = det_cos(alpha0_rad);
+        u->sin_alpha0[i] = det_sin(alpha0_rad);
+    }
+    chamber_put_in(&lab->chamber, &u->body, cfg->tau_case_s, cfg->tau_element_s);
+    init_board(u, s);
+}
+
+void unit_connect(struct unit *u, const struct board_can_cfg *cfg, struct can_bus *bus, struct sched *s)
+{
+    u->can = &u->can_store;
+    u->type->can->init(u->can, cfg, u->board, bus, s);
+}
+
+void unit_power_up(struct unit *u, int64_t t_ns)
+{
+    u->type->power_up(u->board, t_ns);
+    if (u->can) u->type->can->power_up(u->can, t_ns);
+}
+
+void unit_power_down(struct unit *u, int64_t t_ns)
+{
+    u->type->power_down(u->board, t_ns);
+    if (u->can) u->type->can->power_down(u->can);
+}
+
+void unit_sample_until(struct unit *u, int64_t t_ns)
+{
+    u->type->sample_until(u->board, t_ns);
+}
+
+struct trace *unit_trace(const struct unit *u)
+{
+    return u->type->trace(u->board);
+}
+
+struct can_node *unit_node(const struct unit *u)
+{
+    return u->can ? &u->type->can->node(u->can)->stream : NULL;
+}
+
+/* The face turns the sensor's own axes; which of the unit's axes they are follows from its channel. The sensor is where it is
+ * in the unit: at_m stays in the case's axes. */
+void unit_gravity_mps2(struct unit *u, unsigned axis, int64_t t_ns, double a_mps2[3])
+{
+    double a[3];
+    lab_sensor_mps2(u->lab, &u->cfg.seat, u->cfg.axis[axis].at_m, u->cos_alpha0[axis], u->sin_alpha0[axis], t_ns, a);
+    for (unsigned i = 0; i < 3; i++) a_mps2[i] = a[(i + axis) % 3];
+}
+
+double unit_sensor_out(struct unit *u, unsigned axis, int64_t t_ns)
+{
+    if (u->cfg.axis[axis].sensor == UNIT_NO_SENSOR) return 0.0;
+    double a_mps2[3];
+    unit_gravity_mps2(u, axis, t_ns, a_mps2);
+    warm(u, axis, t_ns);
+    if (u->cfg.axis[axis].sensor == UNIT_QUARTZ) return quartz_true_a(&u->quartz[axis], a_mps2);
+    return mems_true_v(&u->mems[axis], a_mps2, t_ns);
+}

@@ -1,0 +1,95 @@
+/* One unit of the bench: a board of any type, the sensors on its three channels, and its seat on an instrument of the lab.
+ *
+ * The unit wires sensors to the board (board_io) and, if asked, the board's CAN side to a bus. A
+ * sensor on channel X has the unit's axes (x, y, z), on Y (y, z, x), on Z (z, x, y). Several units share a lab. Owned
+ * by the caller, about 300 kB, never moved after unit_init. One thread. */
+#ifndef PSABENCH_UNIT_UNIT_H
+#define PSABENCH_UNIT_UNIT_H
+
+#include "phys/lab.h"
+#include "phys/sensor/fault.h"
+#include "phys/sensor/mems.h"
+#include "phys/sensor/quartz.h"
+#include "unit/boards.h"
+
+#define UNIT_AXES  BOARD_AXES
+#define UNIT_TEMPS 4u /* sensors X, Y, Z, converter board */
+
+/* Without a sensor the channel is shorted: 0 V or 0 A. Quartz gives a current: afe.input has to be current. */
+enum unit_sensor { UNIT_NO_SENSOR, UNIT_MEMS, UNIT_QUARTZ };
+
+struct unit_axis_cfg {
+    enum unit_sensor sensor;
+    struct mems_g mems;
+    struct quartz_g quartz;
+    bool quartz_given; /* the scenario says something of it */
+    double at_m[3];    /* where it is in the unit, its case's axes */
+};
+
+struct unit_cfg {
+    const char *name; /* kept by pointer */
+    const struct board_type *type;
+    const void *profile;    /* of the type, checked by the caller; NULL: the type's default */
+    struct board_cfg board; /* afe, noise scales, seed, serial */
+    struct unit_axis_cfg axis[UNIT_AXES];
+    double temp_degc[UNIT_TEMPS];     /* where the lab has no chamber */
+    double tau_case_s, tau_element_s; /* in the chamber; 0: the chamber's own */
+    struct lab_seat seat;
+    uint8_t node; /* CAN node id, for those above */
+};
+
+/* Who wants to hear of the board's events. Owned by the listener. */
+struct unit_listener {
+    void (*fn)(void *ctx, unsigned event, int64_t t_ns); /* as board_io.event; it may end any listening */
+    void *ctx;
+    struct unit_listener *next;
+};
+
+struct unit {
+    struct unit_cfg cfg;
+    struct lab *lab;
+    struct chamber_body body;
+    int64_t warm_step[UNIT_AXES]; /* at which the sensor's temperature was taken */
+    const struct board_type *type;
+    void *board;      /* in store, of the type */
+    void *can;        /* in can_store; NULL: on no bus */
+    char profile[32]; /* its name */
+    struct mems mems[UNIT_AXES];
+    struct quartz quartz[UNIT_AXES];
+    struct sensor_fault *sensor_faults[UNIT_AXES]; /* unit_sample_until() before each change */
+    double cos_alpha0[UNIT_AXES], sin_alpha0[UNIT_AXES];
+    struct unit_listener *listeners; /* in order of coming */
+    struct unit_listener *told_next; /* cursor of the event under way */
+    union board_store store;
+    union board_can_store can_store;
+};
+
+/* A PSA-2 of profile "article" at 25 degC with nominal chains, no sensor, no noise but the converters'. */
+struct unit_cfg unit_default(const char *name);
+
+/* Makes it one of another type: profile, analog chains and node id are the type's defaults. */
+void unit_cfg_type(struct unit_cfg *cfg, const struct board_type *type);
+
+void unit_init(struct unit *u, const struct unit_cfg *cfg, struct lab *lab, struct sched *s);
+
+/* Once, before power-up: the board has a node on the bus from then on. */
+void unit_connect(struct unit *u, const struct board_can_cfg *cfg, struct can_bus *bus, struct sched *s);
+
+void unit_power_up(struct unit *u, int64_t t_ns); /* board, then its node */
+void unit_power_down(struct unit *u, int64_t t_ns);
+void unit_sample_until(struct unit *u, int64_t t_ns); /* before the physics change abruptly */
+struct trace *unit_trace(const struct unit *u);
+struct can_node *unit_node(const struct unit *u); /* NULL: on no bus */
+
+/* From the next event on, after those who listen already; the board computes events only while somebody listens. A frame
+ * that is about to begin may begin untold. */
+void unit_listen(struct unit *u, struct unit_listener *l);
+void unit_unlisten(struct unit *u, struct unit_listener *l); /* harmless for one that does not listen */
+
+/* What the sensor of a channel measures, a = -f on its own axes: at rest the projections of gravity. Truth. */
+void unit_gravity_mps2(struct unit *u, unsigned axis, int64_t t_ns, double a_mps2[3]);
+
+/* What the sensor of a channel would give without noise: volts, or amperes if it is a quartz. Truth. */
+double unit_sensor_out(struct unit *u, unsigned axis, int64_t t_ns);
+
+#endif

@@ -1,0 +1,160 @@
+/* Fields of a profile: every kind of value in, what is no such value out with a sentence. */
+#include "rig.h"
+
+#include "board/field.h"
+
+#include <string.h>
+
+struct profile {
+    char name[32];
+    unsigned count;
+    double gain, at[3];
+    bool on;
+    int mode;
+    unsigned step[4], steps;
+};
+
+static bool parse_step(void *profile, unsigned i, const char *text)
+{
+    struct profile *p = profile;
+    if (strlen(text) != 1 || *text < '0' || *text > '9') return false;
+    p->step[i] = (unsigned)(*text - '0');
+    p->steps = i + 1;
+    return true;
+}
+
+static bool step_text(const void *profile, unsigned i, char *out, size_t cap)
+{
+    const struct profile *p = profile;
+    if (i >= p->steps) return false;
+    (void)snprintf(out, cap, "%u", p->step[i]);
+    return true;
+}
+
+#define OF(m) offsetof(struct profile, m)
+static const char *const modes[] = {"slow", "fast", "both", NULL};
+static const struct board_field fields[] = {
+    {.key = "name", .type = BOARD_FIELD_STRING, .offset = OF(name), .min = 1, .max = 31},
+    {.key = "count", .type = BOARD_FIELD_UINT, .offset = OF(count), .min = 2, .max = 9},
+    {.key = "gain", .type = BOARD_FIELD_REAL, .offset = OF(gain), .min = -1, .max = 1},
+    {.key = "at_m", .type = BOARD_FIELD_REALS, .offset = OF(at), .min = 0, .max = 5, .count = 3},
+    {.key = "on", .type = BOARD_FIELD_BOOL, .offset = OF(on)},
+    {.key = "mode", .type = BOARD_FIELD_CHOICE, .offset = OF(mode), .choices = modes},
+    {.key = "steps", .type = BOARD_FIELD_LIST, .max = 4, .like = "a digit", .parse = parse_step, .text = step_text},
+};
+enum { FIELDS = COUNT(fields) };
+
+static struct profile p;
+static char why[200];
+
+static int sound(void **state)
+{
+    (void)state;
+    p = (struct profile){.name = "a", .count = 2, .at = {1, 2, 3}};
+    why[0] = '\0';
+    return 0;
+}
+
+static bool set(const char *key, unsigned index, const char *text)
+{
+    return board_field_set(fields, FIELDS, &p, key, index, text, why, sizeof why);
+}
+
+static void each_kind_takes_its_text(void **state)
+{
+    (void)state;
+    assert_true(set("name", 0, "psd1"));
+    assert_true(set("count", 0, "0x9"));
+    assert_true(set("gain", 0, "-1"));
+    assert_true(set("at_m", 2, "2.5e-1"));
+    assert_true(set("on", 0, "true"));
+    assert_true(set("mode", 0, "both"));
+    assert_true(set("steps", 0, "7"));
+    assert_true(set("steps", 1, "8"));
+    assert_string_equal(p.name, "psd1");
+    assert_int_equal(p.count, 9);
+    assert_true(p.gain == -1 && p.at[0] == 1 && p.at[1] == 2 && p.at[2] == 0.25);
+    assert_true(p.on);
+    assert_int_equal(p.mode, 2);
+    assert_int_equal(p.steps, 2);
+    assert_int_equal(p.step[1], 8);
+    assert_true(set("steps", 0, "1")); /* begins anew */
+    assert_int_equal(p.steps, 1);
+}
+
+static void what_is_no_such_value_is_refused_and_changes_nothing(void **state)
+{
+    static const struct {
+        const char *key;
+        unsigned index;
+        const char *text, *why;
+    } rows[] = {
+        {"name", 0, "", "name: \"\" is not 1 to 31 characters"},
+        {"name", 0, "01234567890123456789012345678901", "name: "},
+        {"count", 0, "1", "count: \"1\" is not an integer of 2 .. 9"},
+        {"count", 0, "-3", "count: "},
+        {"count", 0, "3.0", "count: "},
+        {"count", 0, "99999999999999999999", "count: "},
+        {"gain", 0, "1.0000001", "gain: \"1.0000001\" is not a number of -1 .. 1"},
+        {"gain", 0, "nan", "gain: "},
+        {"gain", 0, "0 ", "gain: "},
+        {"at_m", 3, "1", "at_m: more than 3 elements"},
+        {"at_m", 1, "-1", "at_m: \"-1\" is not a number of 0 .. 5"},
+        {"on", 0, "yes", "on: \"yes\" is not true or false"},
+        {"on", 1, "true", "on: more than 1 elements"},
+        {"mode", 0, "fas", "mode: \"fas\" is not slow, fast or both"},
+        {"steps", 0, "x", "steps: \"x\" is not a digit"},
+        {"steps", 4, "1", "steps: more than 4 elements"},
+        {"gian", 0, "1", "gian: unknown key; known here: name, count, gain, at_m, on, mode, steps"},
+    };
+    (void)state;
+    const struct profile before = p;
+    for (unsigned i = 0; i < COUNT(rows); i++) {
+        assert_false(set(rows[i].key, rows[i].index, rows[i].text));
+        if (strncmp(why, rows[i].why, strlen(rows[i].why)) != 0) fail_msg("%s\n  want %s", why, rows[i].why);
+        assert_string_equal(p.name, before.name);
+        assert_true(p.count == before.count && p.gain == before.gain && p.on == before.on && p.mode == before.mode);
+        assert_true(p.at[1] == before.at[1] && p.steps == before.steps);
+    }
+}
+
+static void a_check_finds_numbers_out_of_range_and_a_missing_name(void **state)
+{
+    (void)state;
+    assert_true(board_field_check(fields, FIELDS, &p, why, sizeof why));
+    p.at[2] = 5.5;
+    assert_false(board_field_check(fields, FIELDS, &p, why, sizeof why));
+    assert_string_equal(why, "at_m = 5.5 is outside 0 .. 5");
+    p.count = 1;
+    assert_false(board_field_check(fields, FIELDS, &p, why, sizeof why));
+    assert_string_equal(why, "count = 1 is outside 2 .. 9");
+    p.name[0] = '\0';
+    assert_false(board_field_check(fields, FIELDS, &p, why, sizeof why));
+    assert_non_null(strstr(why, "name is empty"));
+    p = (struct profile){.name = "a", .count = 2};
+    p.gain = 0.0 / (p.gain * 0.0); /* NaN is in no range */
+    assert_false(board_field_check(fields, FIELDS, &p, why, sizeof why));
+}
+
+static void lists_know_how_many_they_take(void **state)
+{
+    static const unsigned most[FIELDS] = {1, 1, 1, 3, 1, 1, 4};
+    (void)state;
+    for (unsigned i = 0; i < FIELDS; i++) {
+        assert_int_equal(board_field_elements(&fields[i]), most[i]);
+        assert_int_equal(board_field_is_list(&fields[i]), most[i] > 1);
+        assert_ptr_equal(board_field_find(fields, FIELDS, fields[i].key), &fields[i]);
+    }
+    assert_null(board_field_find(fields, FIELDS, "nam"));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup(each_kind_takes_its_text, sound),
+        cmocka_unit_test_setup(what_is_no_such_value_is_refused_and_changes_nothing, sound),
+        cmocka_unit_test_setup(a_check_finds_numbers_out_of_range_and_a_missing_name, sound),
+        cmocka_unit_test_setup(lists_know_how_many_they_take, sound),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

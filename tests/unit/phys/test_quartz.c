@@ -1,0 +1,169 @@
+/* Quartz accelerometer: scale, zero signal against temperature, play, and the answer of its loop. */
+#include "rig.h"
+
+#include "base/sched.h"
+#include "phys/sensor/quartz.h"
+#include "unit/unit.h"
+
+#include <math.h>
+
+#define G 9.81
+
+static void near(double got, double want, double tol)
+{
+    if (!(fabs(got - want) <= tol)) fail_msg("got %.15g, want %.15g within %g", got, want, tol);
+}
+
+static struct quartz up(const struct quartz_g *cfg)
+{
+    struct quartz q;
+    quartz_init(&q, cfg, G, rng_stream(1, 1, "quartz.x"));
+    return q;
+}
+
+static void each_term_of_the_model(void **state)
+{
+    (void)state;
+    const struct {
+        struct quartz_g cfg;
+        double a_g[3], degc, current_a;
+    } rows[] = {
+        {{.scale_a_per_g = 1.28e-3}, {1, 1, 1}, 70, 1.28e-3},
+        {{.scale_a_per_g = 1e-3, .zero_ug = 50}, {0, 0, 0}, 70, 50e-9},
+        {{.scale_a_per_g = 1e-3, .slope_ug_per_k = 2}, {0, 0, 0}, 40, 20e-9},
+        {{.scale_a_per_g = 1e-3, .scale_tc_ppm_per_k = 100}, {-1, 0, 0}, 40, -1.001e-3},
+        {{.scale_a_per_g = 1e-3, .tilt_y_mrad = 2, .tilt_z_mrad = -1}, {0, 0.5, 1}, 30, 0},
+        {{.scale_a_per_g = 1e-3, .tilt_y_mrad = 2}, {0, 0.5, 1}, 30, 1e-6},
+        {{.scale_a_per_g = 1e-3, .square_ug_per_g2 = 30}, {-2, 0, 0}, 30, -2e-3 + 120e-9},
+        {{.scale_a_per_g = 1e-3, .limit_a = 1.5e-3}, {2, 0, 0}, 30, 1.5e-3},
+        {{.scale_a_per_g = 1e-3, .curve_ug = 300, .curve_centre_degc = 10, .curve_width_k = 25},
+         {0, 0, 0},
+         60,
+         600e-9 * 0.22313016014842982},
+        {{.scale_a_per_g = 1e-3, .curve_ug = 300, .curve_centre_degc = 10, .curve_width_k = 50}, {0, 0, 0}, 60, 300e-9},
+        {{.scale_a_per_g = 1e-3, .curve_ug = 300, .curve_centre_degc = 10, .curve_width_k = 50},
+         {0, 0, 0},
+         -40,
+         -300e-9},
+        {{.scale_a_per_g = 1e-3, .curve_ug = 300, .curve_centre_degc = 10, .curve_width_k = 50}, {0, 0, 0}, 10, 0},
+    };
+    for (size_t i = 0; i < COUNT(rows); i++) {
+        struct quartz q = up(&rows[i].cfg);
+        q.case_degc = q.element_degc = rows[i].degc;
+        const double a[3] = {rows[i].a_g[0] * G, rows[i].a_g[1] * G, rows[i].a_g[2] * G};
+        near(quartz_true_a(&q, a), rows[i].current_a, 1e-17);
+        near(quartz_out_a(&q, a, 1000), rows[i].current_a, 1e-17);
+    }
+}
+
+static void a_case_warmer_than_the_element_shifts_the_zero(void **state)
+{
+    (void)state;
+    struct quartz q = up(&(struct quartz_g){.scale_a_per_g = 1e-3, .gradient_ug_per_k = 1.5});
+    q.case_degc = 36.0;
+    near(quartz_true_a(&q, (const double[3]){0}), 9e-9, 1e-20);
+}
+
+/* Up 10 K and back: what is felt stays 0.5 K behind, on either side; within the play it does not move. */
+static void the_play_makes_a_loop(void **state)
+{
+    (void)state;
+    struct quartz q = up(&(struct quartz_g){.scale_a_per_g = 1e-3, .slope_ug_per_k = 1.0, .play_k = 0.5});
+    const double still[3] = {0};
+    const double course[][2] = {{30.0, 0.0}, {30.4, 0.0}, {40.0, 9.5}, {39.2, 9.5}, {30.0, 0.5}, {29.0, -0.5}};
+    for (size_t i = 0; i < COUNT(course); i++) {
+        q.case_degc = q.element_degc = course[i][0];
+        near(quartz_true_a(&q, still), course[i][1] * 1e-9, 1e-20); /* a look at the truth moves nothing */
+        near(quartz_out_a(&q, still, (int64_t)(i + 1) * 1000), course[i][1] * 1e-9, 1e-20);
+    }
+}
+
+/* Step of 1 g on w = 2 pi 350, z = 0.7: 1 - exp(-z w t) (cos wd t + z/d sin wd t), however often one looks. */
+static void a_step_is_answered_as_an_oscillator_does(void **state)
+{
+    (void)state;
+    const struct quartz_g cfg = {.scale_a_per_g = 1e-3, .natural_hz = 350.0, .damping = 0.7};
+    const double wd = 2.0 * acos(-1.0) * 350.0 * sqrt(1.0 - 0.49);
+    const double zw = 0.7 * 2.0 * acos(-1.0) * 350.0;
+    const int64_t steps_ns[] = {31250, 7000, 500000};
+    for (size_t k = 0; k < COUNT(steps_ns); k++) {
+        struct quartz q = up(&cfg);
+        double peak = 0.0;
+        near(quartz_out_a(&q, (const double[3]){0}, 0), 0.0, 0.0);
+        struct quartz resting = up(&cfg);
+        near(quartz_out_a(&resting, (const double[3]){G, 0, 0}, 0), 1e-3, 1e-18); /* it has been where it is */
+        for (int64_t t_ns = steps_ns[k]; t_ns < 10000000; t_ns += steps_ns[k]) {
+            const double t_s = (double)t_ns * 1e-9;
+            const double want = 1.0 - exp(-zw * t_s) * (cos(wd * t_s) + 0.7 / sqrt(0.51) * sin(wd * t_s));
+            const double got = quartz_out_a(&q, (const double[3]){G, 0, 0}, t_ns) / 1e-3;
+            near(got, want, 1e-12);
+            if (got > peak) peak = got;
+        }
+        if (k < 2) near(peak, 1.046, 0.001); /* overshoot of 4.6 % */
+    }
+}
+
+static void noise_of_a_look_follows_its_interval(void **state)
+{
+    (void)state;
+    enum { N = 40000 };
+    struct quartz q = up(&(struct quartz_g){.scale_a_per_g = 1e-3, .noise_a_rthz = 1e-8});
+    const int64_t steps_ns[] = {31250, 1000000};
+    int64_t t_ns = 0;
+    for (size_t k = 0; k < COUNT(steps_ns); k++) {
+        double sum2 = 0.0;
+        for (unsigned i = 0; i < N; i++) {
+            t_ns += steps_ns[k];
+            const double a = quartz_out_a(&q, (const double[3]){0}, t_ns);
+            near(quartz_out_a(&q, (const double[3]){0}, t_ns), a, 0.0);
+            sum2 += i > 0 ? a * a : 0.0;
+        }
+        near(sqrt(sum2 / N) / (1e-8 * sqrt(1e9 / (2.0 * (double)steps_ns[k]))), 1.0, 4.0 / sqrt(2.0 * N));
+    }
+}
+
+static void keep_code(void *ctx, const struct psa2_frame *f, int64_t t_ns)
+{
+    (void)t_ns;
+    *(int32_t *)ctx = f->code[0];
+}
+
+/* 1 g at 48 degC: current, 1 kohm, 1 : 8, 1.25 V for 2^23 codes. The zero signal and the scale are those of the element. */
+static void a_board_reads_its_current(void **state)
+{
+    (void)state;
+    static struct unit u;
+    static struct lab lab;
+    struct sched s;
+    int32_t code = 0;
+    sched_init(&s);
+    struct lab_cfg laboratory = lab_default();
+    laboratory.site.g_mps2 = G;
+    laboratory.chamber.present = true;
+    laboratory.chamber.start_degc = 48.0;
+    lab_init(&lab, &laboratory, 1);
+    head_turn(&lab.head, 270.0, 0); /* x down */
+    struct unit_cfg cfg = unit_default("u");
+    cfg.board.adc_noise_scale = 0.0;
+    cfg.board.afe[0] = afe_nominal(AFE_CURRENT);
+    cfg.axis[0].sensor = UNIT_QUARTZ;
+    cfg.axis[0].quartz =
+        (struct quartz_g){.scale_a_per_g = 1.28e-3, .slope_ug_per_k = 1000.0, .scale_tc_ppm_per_k = 500};
+    unit_init(&u, &cfg, &lab, &s);
+    psa2_attach(u.board, &(struct psa2_host){.ctx = &code, .frame = keep_code});
+    psa2_power_up(u.board, 0);
+    sched_run_until(&s, NS_PER_S / 2);
+    near(unit_sensor_out(&u, 0, NS_PER_S / 2), 1.28e-3 * 1.009 * 1.018, 1e-15);
+    near((double)code * 1.25 / 8388608.0, 1.28e-3 * 1.009 * 1.018 * 1000.0 / 8.0,
+         3.4e-5); /* 2e-4: the FIR filter's own gain is 1.00017 */
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(each_term_of_the_model),    cmocka_unit_test(a_case_warmer_than_the_element_shifts_the_zero),
+        cmocka_unit_test(the_play_makes_a_loop),     cmocka_unit_test(a_step_is_answered_as_an_oscillator_does),
+        cmocka_unit_test(a_board_reads_its_current), cmocka_unit_test(noise_of_a_look_follows_its_interval),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

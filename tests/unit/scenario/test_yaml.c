@@ -1,0 +1,341 @@
+#include "rig.h"
+
+#include "scenario/profile.h"
+#include "scenario/scenario.h"
+
+#include <string.h>
+#include <unistd.h>
+
+static struct scenario s;
+static char why[1024];
+
+static bool parse(const char *text)
+{
+    why[0] = '\0';
+    return scenario_parse("dir/s.yaml", text, strlen(text), &s, why, sizeof why);
+}
+
+static void a_scenario_without_more_than_a_unit_has_sound_defaults(void **state)
+{
+    (void)state;
+    if (!parse("units: [{}]\n")) fail_msg("%s", why);
+    assert_int_equal(s.seed, 1);
+    assert_int_equal(s.bus[0].cfg.bitrate_hz, 1000000);
+    assert_int_equal(s.unit_count, 1);
+    assert_string_equal(s.units[0].name, "a");
+    assert_int_equal(s.units[0].cfg.node, 5);
+    assert_string_equal(s.units[0].profile.psa2.name, "article");
+    assert_int_equal(s.units[0].cfg.axis[0].sensor, UNIT_NO_SENSOR);
+    assert_false(s.start);
+}
+
+static void every_key_reaches_its_field(void **state)
+{
+    (void)state;
+    const bool ok =
+        parse("seed: 18446744073709551615\n"
+              "start: true\n"
+              "bus: {bitrate_hz: 500000, data_bitrate_hz: 2000000}\n"
+              "site: {g_mps2: 9.7803}\n"
+              "head: {resolution_arcsec: 1, setting_error_arcsec_rms: 2, periodic_arcsec: 3, periodic_order: 4,\n"
+              "       mount_error_arcsec_rms: 5, turn_s: 6}\n"
+              "units:\n"
+              "  - name: left\n"
+              "    node: 9\n"
+              "    serial: 77\n"
+              "    frame_form: 2\n"
+              "    temp_degc: [1, 2, 3, 4]\n"
+              "    adc_noise_scale: 0.5\n"
+              "    adc_chain: direct\n"
+              "    profile_set: {word_bits: 24, line_hz: 4096000, line_div: 3, word: [T, Z, Y, X]}\n"
+              "    axes:\n"
+              "      y: {sensor: mems, u0_v: -0.25, kxy_v_per_g2: 1e-3, alpha0_deg: 0.1121,\n"
+              "          afe: {input: current, load_ohm: 999, load_tol_ppm: -12}}\n");
+    if (!ok) fail_msg("%s", why);
+    assert_true(s.seed == UINT64_MAX && s.start);
+    assert_int_equal(s.bus[0].cfg.bitrate_hz, 500000);
+    assert_int_equal(s.bus[0].cfg.data_bitrate_hz, 2000000);
+    assert_true(s.site.g_mps2 == 9.7803);
+    assert_true(s.lab.head.resolution_arcsec == 1 && s.lab.head.setting_error_arcsec_rms == 2 &&
+                s.lab.head.periodic_arcsec == 3);
+    assert_true(s.lab.head.periodic_order == 4 && s.lab.head.mount_error_arcsec_rms == 5 && s.lab.head.turn_s == 6);
+    const struct scenario_unit *u = &s.units[0];
+    assert_string_equal(u->name, "left");
+    assert_int_equal(u->cfg.node, 9);
+    assert_int_equal(u->cfg.board.serial, 77);
+    assert_int_equal(u->frame_form, 2);
+    assert_true(u->cfg.temp_degc[0] == 1 && u->cfg.temp_degc[3] == 4);
+    assert_true(u->cfg.board.adc_noise_scale == 0.5 && u->cfg.board.temp_noise_scale == 1);
+    assert_int_equal(u->cfg.board.adc_chain, ADS1282_CHAIN_DIRECT);
+    assert_int_equal(u->profile.psa2.word_bits, 24);
+    assert_int_equal(u->profile.psa2.word[0], PSA2_WORD_T);
+    assert_int_equal(u->cfg.axis[1].sensor, UNIT_MEMS);
+    assert_true(u->cfg.axis[1].mems.u0_v == -0.25 && u->cfg.axis[1].mems.kxy_v_per_g2 == 1e-3);
+    assert_true(u->cfg.axis[1].mems.alpha0_deg == 0.1121);
+    assert_int_equal(u->cfg.board.afe[1].input, AFE_CURRENT);
+    assert_true(u->cfg.board.afe[1].load_ohm == 999 && u->cfg.board.afe[1].load_tol_ppm == -12);
+    assert_true(u->cfg.board.afe[0].load_ohm == 1000); /* the other axes keep the nominal chain */
+}
+
+static const struct {
+    const char *text, *why; /* the whole line, or its beginning */
+} bad[] = {
+    {"", "dir/s.yaml:1:1: empty: a mapping `key: value` is wanted"},
+    {"- 1\n", "dir/s.yaml:1:1: a mapping `key: value` is wanted"},
+    {"units: [{}]\nseed: -1\n", "dir/s.yaml:2:7: seed: \"-1\" is not an integer of 0 or more"},
+    {"units: [{}]\nseed: [1]\n", "dir/s.yaml:2:7: seed: one value of up to 256 characters is wanted"},
+    {"units: [{}]\nseed: \"1\\n2\"\n", "dir/s.yaml:2:7: seed: \"1?2\" is not an integer of 0 or more"},
+    {"units: [{}]\nsead: 1\n",
+     "dir/s.yaml:2:1: sead: unknown key; nearest: seed; known here: version, seed, start, bus, buses, "},
+    {"seed: 1\nseed: 2\nunits: [{}]\n", "dir/s.yaml:2:1: seed: comes twice"},
+    {"seed: 1\n", "dir/s.yaml:1:1: units: at least one unit is wanted"},
+    {"units: 5\n", "dir/s.yaml:1:8: units: a sequence of units is wanted"},
+    {"units: [5]\n", "dir/s.yaml:1:9: units.a: a mapping `key: value` is wanted"},
+    {"units: [{}]\nstart: yes\n", "dir/s.yaml:2:8: start: \"yes\": true or false is wanted"},
+    {"bus:\n  bitrate_hz: 2e6\n", "dir/s.yaml:2:15: bus.bitrate_hz: \"2e6\" is not an integer of 0 or more"},
+    {"bus:\n  bitrate_hz: 1000001\n", "dir/s.yaml:2:15: bus.bitrate_hz: 1000001 is outside 0 ... 1000000"},
+    {"bus: {bitrate_hz: 9999}\nunits: [{}]\n", "dir/s.yaml:1:19: bus.bitrate_hz: 9999 is below 10000; 0 is a bus"},
+    {"units:\n  - name: a\n    node: 0\n", "dir/s.yaml:3:11: units.a.node: 0 is outside 1 ... 127"},
+    {"units:\n  - {name: a}\n  - {name: a}\n", "dir/s.yaml:3:12: units.a.name: \"a\" is taken by another unit"},
+    {"units:\n  - {node: 5}\n  - {node: 5}\n",
+     "dir/s.yaml:3:12: units.b.node: 5 is taken by unit a; each needs its own"},
+    {"units:\n  - {serial: 2}\n  - {}\n", "dir/s.yaml:3:5: units.b.serial: 2 is taken by unit a; each needs its own"},
+    {"units: [{name: \"a b\"}]\n", "dir/s.yaml:1:16: units.a b.name: \"a b\": letters, digits and _ are wanted"},
+    {"units: [{board: psa3}]\n", "dir/s.yaml:1:17: units.a.board: psa2, "},
+    {"units: [{board: []}]\n", "dir/s.yaml:1:17: units.a.board: psa2, "},
+    {"units: [{adc_chain: exact, board: pmka}]\n", "dir/s.yaml:1:21: units.a.adc_chain: a PMKA has no such setting"},
+    {"units: [{board: pmka, temp_adc_offset_v: 0}]\n",
+     "dir/s.yaml:1:42: units.a.temp_adc_offset_v: a PMKA has no such setting"},
+    {"units: [{board: pmka, frame_form: 0}]\n", "dir/s.yaml:1:35: units.a.frame_form: a PMKA has no such setting"},
+    {"units: [{board: pmka, profile_set: {word_bits: 24}}]\n",
+     "dir/s.yaml:1:37: units.a.profile_set.word_bits: unknown key; "},
+    {"units: [{board: psd1, profile: pmka}]\n",
+     "dir/s.yaml:1:32: units.a.profile: pmka is a profile of PMKA (board: pmka), one of PSD-1 (board: psd1) is wanted"},
+    {"units: [{profile: pmka}]\n",
+     "dir/s.yaml:1:19: units.a.profile: pmka is a profile of PMKA (board: pmka), one of PSA-2 (board: psa2) is wanted"},
+    {"units:\n  - board: pik5\n    profile: pik6\n", "dir/s.yaml:3:14: units.a.profile: pik6 is a profile of PIK-6 "
+                                                     "(board: pik6), one of PIK-5 (board: pik5) is wanted"},
+    {"units: [{board: psa1, profile: w16}]\n",
+     "dir/s.yaml:1:32: units.a.profile: w16 is a profile of PSA-2 (board: psa2), one of PSA-1 (board: psa1) is wanted"},
+    {"units: [{profile: nope}]\n", "dir/s.yaml:1:19: units.a.profile: nope: no such file in proto/profiles"},
+    {"units: [{profile: ./nope.yaml}]\n", "dir/s.yaml:1:19: units.a.profile: dir/./nope.yaml: no such file"},
+    {"units:\n- profile_set:\n    word_bits: 20\n",
+     "dir/s.yaml:3:5: units.a.profile_set: word_bits = 20: use 16, 24 or 32"},
+    {"units:\n- profile_set: {lead_in_clk: 0}\n",
+     "dir/s.yaml:2:16: units.a.profile_set: INT low"}, /* INT low would be 70 us */
+    {"units:\n- profile_set: {word: [X, Y, Z]}\n",
+     "dir/s.yaml:2:23: units.a.profile_set.word: 3 elements; 4 are wanted"},
+    {"units:\n- profile_set:\n    wrod: [X, Y, Z, T]\n", "dir/s.yaml:3:5: units.a.profile_set.wrod: unknown key; "
+                                                         "nearest: word; known here: name, fclk_hz, temp_clkin_hz, "},
+    {"units: [{profile_set: 5}]\n", "dir/s.yaml:1:23: units.a.profile_set: a mapping `key: value` is wanted"},
+    {"units: [{profile_set: {word_bits: 24, word_bits: 32}}]\n",
+     "dir/s.yaml:1:39: units.a.profile_set.word_bits: comes twice"},
+    {"units: [{profile_set: {word_bits: 32}, nod: 5}]\n", "dir/s.yaml:1:40: units.a.nod: unknown key; nearest: node; "},
+    {"units: [{temp_degc: [1, 2]}]\n", "dir/s.yaml:1:21: units.a.temp_degc: one value or a list of 4 numbers"},
+    {"units: [{temp_degc: 200}]\n", "dir/s.yaml:1:21: units.a.temp_degc: 200 is outside -60 ... 125"},
+    {"units:\n  - axes:\n      x:\n        sensor: gyro\n",
+     "dir/s.yaml:4:17: units.a.axes.x.sensor: none, mems or quartz is wanted"},
+    {"units:\n  - axes: {x: {sensor: quartz}}\n", "dir/s.yaml:2:11: units.a.axes: x: a quartz sensor gives a current"},
+    {"units:\n  - axes:\n      x:\n        u0_v: 2,5\n",
+     "dir/s.yaml:4:15: units.a.axes.x.u0_v: \"2,5\" is not a number"},
+    {"units:\n  - axes:\n      x:\n        u0_v: nan\n",
+     "dir/s.yaml:4:15: units.a.axes.x.u0_v: \"nan\" is not a number"},
+    {"units: [{axes: {w: {}}}]\n", "dir/s.yaml:1:17: units.a.axes.w: unknown key; known here: x, y, z"},
+    {"units: [{adc_chain: sinc}]\n", "dir/s.yaml:1:21: units.a.adc_chain: exact, modulator or direct is wanted"},
+    {"units: [{axes: {x: {afe: {input: tube}}}}]\n",
+     "dir/s.yaml:1:34: units.a.axes.x.afe.input: current or voltage is wanted"},
+    {"units: [{count: 65}]\n", "dir/s.yaml:1:17: units.u%02u.count: 65 is outside 1 ... 64"},
+    {"units: [{count: 60, node: 1}, {count: 5, name: v%u, node: 61, serial: 61}]\n",
+     "dir/s.yaml:1:31: units.v%u.count: up to 64 units in all are wanted"},
+    {"units: [{}\n", "dir/s.yaml:2:1: not YAML: "},
+    {"a: b: c\n", "dir/s.yaml:1:5: not YAML: "},
+    {"seed: \t\n\t- x", "dir/s.yaml:"},
+    {"seed: \"1\\0\"\nunits: [{}]\n", "dir/s.yaml:1:7: seed: one value"}, /* a NUL would hide what follows */
+    {"units: [{}]\nhead: {turn: 2}\n",
+     "dir/s.yaml:2:8: head.turn: unknown key; nearest: turn_s (its unit is part of the name); known here: "},
+    {"units: [{adc_chain: modulater}]\n",
+     "dir/s.yaml:1:21: units.a.adc_chain: exact, modulator or direct is wanted; nearest: modulator"},
+    {"units: [{count: 2, name: u}]\n", "dir/s.yaml:1:26: units.u.name: \"u\": with count a number stands in it"},
+    {"units: [{count: 2, name: u%d}]\n", "dir/s.yaml:1:26: units.u%d.name: \"u%d\": with count"},
+    {"units: [{count: 2, name: \"%u%u\"}]\n", "dir/s.yaml:1:26: units.%u%u.name: \"%u%u\": with count"},
+    {"units: [{count: 10, node: 120}]\n", "dir/s.yaml:1:27: units.u%02u.node: 128 is outside 1 ... 127"},
+    {"units: [{count: 2, serial: 4294967295}]\n", "dir/s.yaml:1:28: units.u%02u.serial: counts beyond"},
+    {"units: [{bus: can1}]\n", "dir/s.yaml:1:15: units.a.bus: no bus \"can1\"; nearest: can0; there is can0"},
+    {"bus: {}\nbuses: [{}]\nunits: [{}]\n", "dir/s.yaml:2:8: buses: stands beside bus"},
+    {"buses: [{}, {name: can0}]\nunits: [{}]\n", "dir/s.yaml:1:13: buses.can1.name: \"can0\" is taken by another bus"},
+    {"buses: []\nunits: [{}]\n", "dir/s.yaml:1:8: buses: a sequence of buses is wanted"},
+    {"site: {longitude_deg: 30}\nunits: [{}]\n", "dir/s.yaml:1:23: site: longitude_deg without latitude_deg"},
+    {"site: {g_mps2: 0}\nunits: [{}]\n",
+     "dir/s.yaml:1:16: site.g_mps2: 0 is outside 0.001 ... 20"}, /* per g of what? */
+    {"site: {latitude_deg: 91}\nunits: [{}]\n", "dir/s.yaml:1:22: site.latitude_deg: 91 is outside -90 ... 90"},
+    {"table: {axes: 4}\nunits: [{}]\n", "dir/s.yaml:1:15: table.axes: 4 is outside 1 ... 3"},
+    {"table: {axes: [{along: w}]}\nunits: [{}]\n", "dir/s.yaml:1:24: table.axes[0].along: x, y or z is wanted"},
+    {"table: {axes: [{angle_min_deg: 5}]}\nunits: [{}]\n", "dir/s.yaml:1:16: table.axes: angle_min_deg 5 is not below"},
+    {"units: [{on: table}]\n", "dir/s.yaml:1:8: units: a stands on the table, and there is none"},
+    {"units: [{lever_arm_m: 1}]\n", "dir/s.yaml:1:23: units.a.lever_arm_m: a list of 3 numbers are wanted"},
+    {"chamber: {start_degc: 90}\nunits: [{}]\n",
+     "dir/s.yaml:1:23: chamber.start_degc: 90 is outside min_degc -60 ... max_degc 85"},
+    {"supply: {volt_v: 16}\nunits: [{}]\n", "dir/s.yaml:1:18: supply.volt_v: 16 is above volt_max_v 15"},
+    {"spread: {u0_v: -1}\nunits: [{}]\n", "dir/s.yaml:1:16: spread.u0_v: -1 is outside 0 ... 20"},
+    {"spread: {afe: {input: current}}\nunits: [{}]\n", "dir/s.yaml:1:16: spread.afe.input: unknown key"},
+    {"timeline: [{at_s: 1}]\nunits: [{}]\n", "dir/s.yaml:1:12: timeline[0]: cmd is missing"},
+    {"timeline: [{at_s: -1, cmd: x}]\nunits: [{}]\n", "dir/s.yaml:1:19: timeline[0].at_s: -1 is outside 0 ... 1000000"},
+    {"timeline: [{cmd: x, args: {a: 1, a: 2}}]\nunits: [{}]\n", "dir/s.yaml:1:34: timeline[0].a: comes twice"},
+    {"timeline: [{cmd: x, args: {a: [[[[[1]]]]]}}]\nunits: [{}]\n", "dir/s.yaml:1:35: timeline[0].args: nested deeper"},
+    {"faults: [1]\nunits: [{}]\n", "dir/s.yaml:1:10: faults: a mapping with the arguments of fault.add"},
+    {"seed: 1\n---\nseed: 2\n", "dir/s.yaml:3:1: a second document"},
+    {"%YAML 1.2\n---\nunits: [{}]\n", "dir/s.yaml:1:1: a directive: there are none here"},
+    {"? KD:\t? :", "dir/s.yaml:1:1: a ? of its own, an explicit key"}, /* libfyaml frees the same memory twice */
+    {"\xEF\xBB\xBF? KD:\t? :", "dir/s.yaml:1:1: a ? of its own"},
+    {"\xEF\xBB\xBF%%%%\xD5%", "dir/s.yaml:1:1: a directive"}, /* keeps libfyaml busy for ever */
+    {"a:\n\xEF\xBB\xBF%%", "dir/s.yaml:2:1: a byte order mark"},
+    {"units: [{}]\n&a ?\tb:\t? :", "dir/s.yaml:2:4: a ? of its own"},
+    {"units: [{\"a\"? b:\t? :", "dir/s.yaml:1:13: a ? of its own"},
+    {"seed: ?", "dir/s.yaml:1:7: a ? of its own"},
+    {"seed: *x\n", "dir/s.yaml:1:7: *x: no such anchor"},
+    {"a: &x [*x]\n", "dir/s.yaml:1:8: *x: no such anchor"},
+};
+
+static void what_is_wrong_is_told_with_file_line_key_and_remedy(void **state)
+{
+    (void)state;
+    for (size_t i = 0; i < COUNT(bad); i++) {
+        if (parse(bad[i].text)) fail_msg("accepted:\n%s", bad[i].text);
+        if (strncmp(why, bad[i].why, strlen(bad[i].why)) != 0)
+            fail_msg("%s\n  gave %s\n  want %s", bad[i].text, why, bad[i].why);
+        assert_null(strchr(why, '\n'));
+    }
+}
+
+static void a_question_in_words_is_no_key(void **state)
+{
+    (void)state;
+    if (!parse("\xEF\xBB\xBF# Why? Because. \xD0\xB4\xD0\xB0? (yes)? 5? no?? so\nseed: 7 # what?\nunits: [{}]\n"))
+        fail_msg("%s", why);
+    assert_int_equal(s.seed, 7);
+}
+
+static void the_order_of_keys_means_nothing(void **state)
+{
+    static const char *const orders[] = {
+        "units: [{board: psa2, profile: w24, profile_set: {lead_in_clk: 50}, node: 9}]\n",
+        "units: [{profile_set: {lead_in_clk: 50}, node: 9, profile: w24, board: psa2}]\n",
+    };
+    (void)state;
+    for (unsigned i = 0; i < COUNT(orders); i++) {
+        if (!parse(orders[i])) fail_msg("%s", why);
+        assert_int_equal(s.units[0].profile.psa2.word_bits, 24);
+        assert_int_equal(s.units[0].profile.psa2.lead_in_clk, 50);
+        assert_int_equal(s.units[0].cfg.node, 9);
+    }
+    if (!parse("units: [{profile_set: {lead_in_clk: 50}, board: psa1}]\n")) fail_msg("%s", why);
+    assert_string_equal(s.units[0].profile.psa2.name, "psa1");
+    assert_int_equal(s.units[0].profile.psa2.lead_in_clk, 50);
+}
+
+/* Nodes of the boards' own, the next that is free where one is taken; analog chains of the boards' own. */
+static void each_board_brings_its_defaults(void **state)
+{
+    static const unsigned node[] = {5, 6, 7, 8, 9, 40};
+    (void)state;
+    if (!parse("units: [{}, {}, {board: pmka}, {board: psa1}, {board: pmka}, {board: pmka, node: 40}]\n"))
+        fail_msg("%s", why);
+    for (unsigned i = 0; i < COUNT(node); i++) assert_int_equal(s.units[i].cfg.node, node[i]);
+    assert_string_equal(s.units[2].cfg.type->name, "pmka");
+    assert_string_equal(s.units[3].cfg.type->name, "psa2");
+    const struct afe_cfg pmka = s.units[2].cfg.board.afe[0];
+    assert_true(pmka.divider_ratio == 1 && s.units[3].cfg.board.afe[0].divider_ratio == 8);
+    if (!parse("units: [{axes: {x: {afe: {load_ohm: 999}}}, node: 9, board: pmka}]\n")) fail_msg("%s", why);
+    assert_true(s.units[0].cfg.board.afe[0].load_ohm == 999);
+    assert_true(s.units[0].cfg.board.afe[0].divider_ratio == 1);
+    assert_int_equal(s.units[0].cfg.node, 9);
+    if (!parse("buses: [{}, {}]\nunits: [{}, {bus: can1}, {bus: can1, board: psa1}]\n")) fail_msg("%s", why);
+    assert_int_equal(s.units[1].cfg.node, 6); /* as ever: the second of its type */
+    assert_int_equal(s.units[2].cfg.node, 7);
+}
+
+static void cut_off_anywhere_a_scenario_is_refused_or_sound(void **state)
+{
+    (void)state;
+    static const char text[] =
+        "seed: 3\nhead: {turn_s: 2}\nunits:\n  - {name: q, axes: {x: {sensor: mems, u0_v: 2.5}}}\n";
+    for (size_t n = 0; n < sizeof text - 1; n++) {
+        why[0] = '\0';
+        const bool ok = scenario_parse("cut", text, n, &s, why, sizeof why);
+        assert_true(ok ? s.unit_count == 1 : strlen(why) > 0);
+    }
+}
+
+/* The files that are shipped; the tests run in the root of the repository. */
+static void the_shipped_scenarios_and_profiles_load(void **state)
+{
+    (void)state;
+    static const char *const scenarios[] = {"converters", "calibrate", "quiet",         "stream",
+                                            "fast",       "multi",     "brownout",      "chamber_sweep",
+                                            "faults",     "fleet64",   "six_positions", "table_rate"};
+    static const char *const profiles[] = {"article", "intent", "ungated", "w24", "w16",  "lab32",
+                                           "psa1",    "psd1",   "pmka",    "pik", "pik5", "pik6"};
+    if (access("proto/scenarios", R_OK) != 0) skip();
+    for (size_t i = 0; i < COUNT(scenarios); i++) {
+        if (!scenario_load(scenarios[i], &s, why, sizeof why)) fail_msg("%s", why);
+    }
+    for (size_t i = 0; i < COUNT(profiles); i++) {
+        char path[FIND_PATH_MAX];
+        const struct board_name *board;
+        union board_profile_store p;
+        assert_true(find_proto("profiles", profiles[i], NULL, path, why, sizeof why));
+        if (!profile_yaml_load(path, &board, &p, why, sizeof why)) fail_msg("%s", why);
+        assert_string_equal(board_profile_name(board->type, &p), profiles[i]);
+    }
+    assert_true(scenario_load("fast", &s, why, sizeof why));
+    assert_int_equal(psa2_profile_period_ns(&s.units[0].profile.psa2), 250000);
+}
+
+static void a_missing_scenario_is_told_in_one_line(void **state)
+{
+    (void)state;
+    assert_false(scenario_load("nope", &s, why, sizeof why));
+    assert_string_equal(
+        why, "nope: no such file in proto/scenarios; a path, or a name from there, is wanted: "
+             "brownout, calibrate, chamber_sweep, converters, fast, faults, fleet64, gyrocompass, gyrocompass_ideal, "
+             "multi, quiet, six_positions, stream, table_rate");
+    assert_false(scenario_load("./nope.yaml", &s, why, sizeof why));
+    assert_string_equal(why, "./nope.yaml: no such file, or not readable");
+}
+
+static void a_dump_has_every_bit_of_a_number_and_every_unit_of_a_count(void **state)
+{
+    (void)state;
+    static struct scenario again;
+    if (!parse("seed: 18446744073709551615\nsite: {g_mps2: 9.8066500000000012}\nbuses: [{}, {name: b}]\n"
+               "units: [&u {count: 3, bus: b, lever_arm_m: [0.1, -0.30000000000000004, 1e-300]}]\n"))
+        fail_msg("%s", why);
+    cJSON *j = scenario_dump(&s);
+    char *text = cJSON_Print(j);
+    if (!scenario_parse("dump", text, strlen(text), &again, why, sizeof why)) fail_msg("%s", why);
+    assert_true(again.seed == UINT64_MAX && again.site.g_mps2 == s.site.g_mps2);
+    assert_int_equal(again.unit_count, 3);
+    assert_string_equal(again.units[2].name, "u03");
+    assert_int_equal(again.units[2].bus, 1);
+    assert_int_equal(again.units[2].cfg.node, 7);
+    for (unsigned k = 0; k < 3; k++) assert_true(again.units[1].cfg.seat.lever_m[k] == s.units[0].cfg.seat.lever_m[k]);
+    cJSON_free(text);
+    cJSON_Delete(j);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_scenario_without_more_than_a_unit_has_sound_defaults),
+        cmocka_unit_test(every_key_reaches_its_field),
+        cmocka_unit_test(what_is_wrong_is_told_with_file_line_key_and_remedy),
+        cmocka_unit_test(a_question_in_words_is_no_key),
+        cmocka_unit_test(the_order_of_keys_means_nothing),
+        cmocka_unit_test(each_board_brings_its_defaults),
+        cmocka_unit_test(cut_off_anywhere_a_scenario_is_refused_or_sound),
+        cmocka_unit_test(the_shipped_scenarios_and_profiles_load),
+        cmocka_unit_test(a_missing_scenario_is_told_in_one_line),
+        cmocka_unit_test(a_dump_has_every_bit_of_a_number_and_every_unit_of_a_count),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
