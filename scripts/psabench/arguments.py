@@ -5,9 +5,15 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from psabench.devices import ALIASES
 from psabench.errors import BadInput
-from psabench.protocol_files import BOARDS
+from psabench.protocol_files import ALIASES, BOARDS, dbc_node
+
+LINE_HZ = 8_000_000.0  # psabench.lineport.SAMPLE_HZ, without loading NumPy
+BUS_HELP = """\
+the bus: INTERFACE:CHANNEL[,key=value...] of python-can. Examples: socketcand:127.0.0.1:29536, slcan:/dev/pts/7,
+socketcan:vcan0,fd=true"""
+CAN_HELP = f"""\
+{BUS_HELP}. Without it python-can's own configuration is used ($CAN_INTERFACE, $CAN_CHANNEL, ~/.canrc)"""
 
 
 class Parser(argparse.ArgumentParser):
@@ -68,3 +74,16 @@ def node_id(text: str) -> int:
     if not text.isdecimal() or not 1 <= int(text) <= 127:
         raise argparse.ArgumentTypeError(f"{text!r}; expected a CANopen node, 1 to 127")
     return int(text)
+
+
+def add_board(p: argparse.ArgumentParser, what: str) -> None:
+    """--board and --node of the unit `what`."""
+    names = ", ".join([*BOARDS, *ALIASES])
+    text = f"board of the unit {what}: {names} (%(default)s)"
+    p.add_argument("--board", type=board_name, metavar="BOARD", default="psa2", help=text)
+    p.add_argument("--node", type=node_id, help=f"node {what} (the board's usual one)")
+
+
+def node_of(args: argparse.Namespace) -> int:
+    """The node that `add_board` took, else the board's default."""
+    return dbc_node(args.board) if args.node is None else int(args.node)

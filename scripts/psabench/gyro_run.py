@@ -16,44 +16,13 @@ from psabench.devices import Gyro
 from psabench.errors import BadInput
 from psabench.gyro_grading import GyroSection, HeldTruth
 from psabench.procedures import gyrocompass, heading_hold
+from psabench.procedures.gyro_params import ReadingParams
 from psabench.procedures.gyrocompass import GyrocompassParams, GyrocompassResult
 from psabench.procedures.head_bench import Progress
 from psabench.procedures.heading_hold import Held, HoldParams
-from psabench.procedures.result import option
 from psabench.wire_platform import WirePlatform
 
 SCENARIO = "gyrocompass"
-BOTH = "both"
-SUMMARIES: Mapping[str, str] = {
-    gyrocompass.NAME: gyrocompass.SUMMARY,
-    heading_hold.NAME: heading_hold.SUMMARY,
-}
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ReadingParams:
-    """Which reading of the article."""
-
-    reading: str = option(
-        BOTH, "", f"{', '.join(gyrocompass.READINGS)} or {BOTH}; gives the other parameters their values"
-    )
-
-    def __post_init__(self) -> None:
-        if self.reading not in (*gyrocompass.READINGS, BOTH):
-            raise ValueError(
-                f"reading is {self.reading!r}; it must be one of {', '.join(gyrocompass.READINGS)}, {BOTH}"
-            )
-
-    @property
-    def readings(self) -> tuple[str, ...]:
-        return tuple(gyrocompass.READINGS) if self.reading == BOTH else (self.reading,)
-
-
-# Parameters of each procedure, by their dataclasses.
-PARAMS: Mapping[str, tuple[type[Any], ...]] = {
-    gyrocompass.NAME: (ReadingParams, GyrocompassParams),
-    heading_hold.NAME: (ReadingParams, HoldParams, GyrocompassParams),
-}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,11 +38,6 @@ class GyroOptions:
     seed: int | None = None
     real_time: bool = False
     params: Mapping[str, Any] = field(default_factory=dict)  # fields of the parameters, by name
-
-
-def fields_of(procedure: str) -> dict[str, Any]:
-    """All parameters of a procedure, dataclass fields by name."""
-    return {name: f for kind in PARAMS[procedure] for name, f in kind.__dataclass_fields__.items()}
 
 
 def _part(kind: type[Any], given: Mapping[str, Any]) -> dict[str, Any]:

@@ -24,9 +24,9 @@ from psabench.grading import (
     with_ci,
     within_limits,
 )
-from psabench.procedures import PROCEDURES
 from psabench.procedures.result import LIMIT_CI
 from psabench.report_page import whole_page
+from psabench.run_table import ON_THE_HEAD
 from psabench.whole_file import replace_file
 
 __all__ = ["Section", "console_table", "html_page", "within_limits", "write"]
@@ -139,7 +139,7 @@ def _section(section: Section, ident: str) -> str:
     if r.drift is not None:
         facts.append(f"drift of the zero <b>{r.drift.value * 1e6:.3g} ± {r.drift.ci_half * 1e6:.2g} µV/s</b>")
     notes = "".join(f"<li>{_symbol(escape(n))}</li>" for n in r.notes)
-    summary = PROCEDURES[r.procedure].summary
+    summary = ON_THE_HEAD[r.procedure]
     return (
         f"<section><h2>{escape(section.title)}</h2><p class=facts>{escape(summary)}<br>{' · '.join(facts)}</p>"
         f"{_estimates(section)}{f'<ul class=notes>{notes}</ul>' if notes else ''}{''.join(pictures)}"

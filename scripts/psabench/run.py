@@ -23,40 +23,8 @@ from psabench.procedures.head_bench import Progress, Watch
 from psabench.procedures.result import ProcedureResult
 from psabench.protocol_files import DBC_NODE
 from psabench.recording import CsvRecorder
-from psabench.wire_bench import G_MPS2, WireBench
-
-SITE_G_MPS2 = 9.8094  # of the scenarios that the conditions use: an operator knows the gravity of the laboratory
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Condition:
-    """One way to run a procedure on our own emulator."""
-
-    label: str
-    scenario: str
-    average: int  # samples in a reading, 0: whole conversion words (WireBench)
-    about: str
-    g_mps2: float = SITE_G_MPS2
-
-
-# Samples in a realistic reading: the converter's own noise is 4.5 uV a sample at the load, far below the sensor's.
-CONDITIONS: Mapping[str, Condition] = {
-    c.label: c
-    for c in (
-        Condition(
-            label="quiet",
-            scenario="quiet",
-            average=0,
-            about="no noise, no tolerances, whole 32-bit words: the printed figures",
-        ),
-        Condition(
-            label="realistic",
-            scenario="calibrate",
-            average=16,
-            about="1 mV sensor noise, tolerances, converter noise: what a bench would find",
-        ),
-    )
-}
+from psabench.run_table import CONDITIONS, G_MPS2, Condition
+from psabench.wire_bench import WireBench
 
 # Error of the measuring chain that no interval contains: load, divider, reference and the DC gain of the converter's
 # integer filter taps (1.000169) within 0.05 %; 1 mV of offset at the load; a step of the code or word.

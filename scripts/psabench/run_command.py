@@ -9,17 +9,17 @@ import argparse
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
-from psabench import comparison, comparison_page, grading, gyro_grading, gyro_page, gyro_run, report, run
-from psabench.arguments import Help, natural, node_id, positive, yes_no
+from psabench.arguments import Help, Parser, natural, node_id, positive, yes_no
 from psabench.errors import BadInput
 from psabench.instruments import EXAMPLES
-from psabench.procedures import PROCEDURES, compare_converters, gyrocompass, heading_hold
 from psabench.progress import Bar
 from psabench.protocol_files import DBC_NODE
-from psabench.wire_bench import G_MPS2
+from psabench.run_table import COMPARE, CONDITIONS, G_MPS2, ON_THE_HEAD, ON_THE_PLATFORM
+from psabench.shell import command_line
 
 EPILOG = """\
 psabench run PROCEDURE --help tells its options, with units and defaults, and examples.
@@ -28,24 +28,24 @@ Exit status: 0 done and within limits, 1 something measured misses the truth by 
 2 bad input, 3 the bench or a link failed, 130 ended by Ctrl-C.
 """
 
-ON_THE_HEAD = """
+NOTES_HEAD = """
 Without --head or --control an emulator is started for each condition. Ctrl-C ends a run; the readings taken so far stay
 in OUT/PROCEDURE-CONDITION.csv. Exit status 1: something measured misses the truth by more than its limits.
 """
 
-ON_THE_PLATFORM = """
+NOTES_PLATFORM = """
 Without --can or --control an emulator is started for each reading, with the scenario gyrocompass. Exit status 1:
 something measured misses the truth by more than its limits, or is in doubt, which is printed with its reason.
 """
 
 ALL = "all"
 SCRIPT = "script"  # psabench.shell.command_line has its parser
-FLAGS = ("-h", "--help", "--list", "--real-time")  # the options that take no value
+FLAGS = ("-h", "--help", "--list", "--real-time", "-v", "--verbose")  # the options that take no value
 
 # Options of more than one procedure.
 COMMON: Mapping[str, Mapping[str, Any]] = {
     "--condition": {
-        "choices": [*run.CONDITIONS, "both"],
+        "choices": [*CONDITIONS, "both"],
         "default": "both",
         "help": "on which emulated bench (%(default)s)",
     },
@@ -74,8 +74,8 @@ COMMON: Mapping[str, Mapping[str, Any]] = {
     "--average": {
         "type": natural,
         "metavar": "N",
-        "help": f"samples in a reading; 0: whole 32-bit words by SDO (quiet {run.CONDITIONS['quiet'].average}, "
-        f"else {run.CONDITIONS['realistic'].average})",
+        "help": f"samples in a reading; 0: whole 32-bit words by SDO (quiet {CONDITIONS['quiet'].average}, "
+        f"else {CONDITIONS['realistic'].average})",
     },
     "--gravity": {
         "type": positive,
@@ -85,10 +85,19 @@ COMMON: Mapping[str, Mapping[str, Any]] = {
     "--seed": {"type": int, "metavar": "N", "help": "seed of the emulator's noise, instead of the scenario's"},
     "--real-time": {"action": "store_true", "help": "at wall-clock pace, as a real bench would take"},
     "--out": {"type": Path, "default": Path("build/run"), "metavar": "FOLDER", "help": "of the report (%(default)s)"},
+    "--verbose": {"action": "store_true", "help": "print the tables of results, too"},
 }
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Parameters:
+    """Of a procedure."""
+
+    fields: Mapping[str, Any] = field(default_factory=dict)  # of its parameters' dataclasses
+    defaults: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)  # others for its fields, by who has them
+
+
+@dataclass(frozen=True, kw_only=True)
 class Command:
     """A procedure as the command line has it."""
 
@@ -96,17 +105,27 @@ class Command:
     summary: str
     handler: Callable[[argparse.Namespace], int]
     common: Sequence[str]  # of COMMON
-    fields: Mapping[str, Any] = field(default_factory=dict)  # of its parameters' dataclasses
-    defaults: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)  # others for its fields, by who has them
+    load: Callable[[], Parameters] = Parameters  # imports the procedure, and NumPy with it
     examples: str
     notes: str = ""
 
+    @cached_property
+    def parameters(self) -> Parameters:
+        return self.load()
 
-def add(commands: Any) -> None:
-    """A parser for each procedure, and one for `run` itself."""
-    p = commands.add_parser(
-        "run",
-        help="run a procedure over the wire, grade and report it; psabench run --help names them",
+
+def parse(argv: Sequence[str]) -> argparse.Namespace:
+    """What follows `psabench run`. Raises BadInput."""
+    name, rest = words(argv)
+    if name == SCRIPT:
+        return command_line.parse_script(rest)
+    return (_parser_of(COMMANDS[name]) if name else _parser()).parse_args(rest)
+
+
+def _parser() -> Parser:
+    """Of `run` without a procedure."""
+    p = Parser(
+        prog="psabench run",
         usage="psabench run [-h] [--list] PROCEDURE [option...]",
         description="Run a procedure over the wire, grade it where the truth is known, and report.\n\n" + _table(),
         formatter_class=Help,
@@ -115,22 +134,19 @@ def add(commands: Any) -> None:
     p.set_defaults(handler=_without_procedure)
     p.add_argument("--list", action="store_true", help="name the procedures and their parameters")
     p.add_argument("procedure", nargs="?", metavar="PROCEDURE", help=argparse.SUPPRESS)
-    for command in COMMANDS.values():
-        _add(commands, command)
+    return p
 
 
-def words(argv: Sequence[str]) -> list[str]:
-    """`run turns` is one command of two words, wherever among its options the second one stands."""
-    if argv[:1] != ["run"]:
-        return list(argv)
-    rest = list(argv[1:])
+def words(argv: Sequence[str]) -> tuple[str, list[str]]:
+    """The procedure, wherever among its options it stands, and the other words; "": none, and what `run` takes."""
+    rest = list(argv)
     if "--list" in rest:
-        return ["run", "--list"]
+        return "", ["--list"]
     at = _procedure_at(rest)
     if at is None:
-        return ["run", *(w for w in rest if w in ("-h", "--help"))]
+        return "", [w for w in rest if w in ("-h", "--help")]
     name = rest.pop(at)
-    return [f"run {name}", *rest] if name in (*COMMANDS, SCRIPT) else ["run", name]
+    return (name, rest) if name in (*COMMANDS, SCRIPT) else ("", [name])
 
 
 def _procedure_at(rest: Sequence[str]) -> int | None:
@@ -144,23 +160,25 @@ def _procedure_at(rest: Sequence[str]) -> int | None:
     return None
 
 
-def _add(commands: Any, command: Command) -> None:
-    p = commands.add_parser(
-        f"run {command.name}",
+def _parser_of(command: Command) -> Parser:
+    p = Parser(
+        prog=f"psabench run {command.name}",
         usage=f"psabench run {command.name} [-h] [option...]",
         description=_sentence(command.summary),
         formatter_class=Help,
         epilog=f"examples:\n{command.examples}{command.notes}",
     )
     p.set_defaults(handler=command.handler, procedure=command.name)
-    if command.fields:
+    taken = command.parameters
+    if taken.fields:
         group = p.add_argument_group(f"parameters of {command.name}")
-        for name, f in command.fields.items():
-            others = {label: changed.get(name, f.default) for label, changed in command.defaults.items()}
+        for name, f in taken.fields.items():
+            others = {label: changed.get(name, f.default) for label, changed in taken.defaults.items()}
             _add_parameter(group, name, f, {k: v for k, v in others.items() if v != f.default})
     group = p.add_argument_group("the bench and the report")
     for option in command.common:
-        group.add_argument(option, **COMMON[option])
+        group.add_argument(*(["-v"] if option == "--verbose" else []), option, **COMMON[option])
+    return p
 
 
 def _add_parameter(group: Any, name: str, f: Any, others: Mapping[str, Any]) -> None:
@@ -202,7 +220,7 @@ def _without_procedure(args: argparse.Namespace) -> int:
     if args.list:
         for c in COMMANDS.values():
             print(f"{c.name}: {c.summary}")
-            print(f"  {' '.join([*map(_option, c.fields), *c.common])}")
+            print(f"  {' '.join([*map(_option, c.parameters.fields), *c.common])}")
         return 0
     known = f"{', '.join(COMMANDS)} or {SCRIPT}"
     if args.procedure is None:
@@ -216,10 +234,13 @@ def _params(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _calibrate(args: argparse.Namespace) -> int:
+    from psabench import grading, report, run
+    from psabench.procedures import PROCEDURES
+
     options = run.RunOptions(
         procedures=list(PROCEDURES) if args.procedure == ALL else [args.procedure],
         out=args.out,
-        conditions=list(run.CONDITIONS) if args.condition == "both" else [args.condition],
+        conditions=list(CONDITIONS) if args.condition == "both" else [args.condition],
         can=args.can,
         head=args.head,
         control=args.control,
@@ -233,9 +254,10 @@ def _calibrate(args: argparse.Namespace) -> int:
         params=_params(args),
     )
     page, sections = run.run(options, Bar())
-    for section in sections:
-        print(report.console_table(section))
-    print(grading.console_comparison(sections))
+    if args.verbose:
+        for section in sections:
+            print(report.console_table(section))
+        print(grading.console_comparison(sections))
     print(grading.verdict(sections))
     print(f"report: {page}")
     return 0 if report.within_limits(sections) else 1
@@ -243,10 +265,14 @@ def _calibrate(args: argparse.Namespace) -> int:
 
 def _compare(args: argparse.Namespace) -> int:
     """Its units stand on one bench, their motion in the scenario: it starts an emulator and takes no addresses."""
+    from psabench import comparison, comparison_page
+    from psabench.procedures import compare_converters
+
     p = compare_converters.CompareParams()
     c = comparison.compare(args.out, p, Bar(), scenario=args.scenario, seed=args.seed)
     page = comparison_page.write(args.out, c)
-    print(comparison.console_table(c))
+    if args.verbose:
+        print(comparison.console_table(c))
     print(comparison.verdict(c))
     print(f"report: {page}")
     return 0 if c.within else 1
@@ -254,6 +280,8 @@ def _compare(args: argparse.Namespace) -> int:
 
 def _gyro(args: argparse.Namespace) -> int:
     """Its platform is a unit on the bus: no dividing head, no volts to average."""
+    from psabench import gyro_grading, gyro_page, gyro_run
+
     options = gyro_run.GyroOptions(
         procedure=args.procedure,
         out=args.out,
@@ -267,16 +295,20 @@ def _gyro(args: argparse.Namespace) -> int:
     )
     sections = gyro_run.run(options, Bar())
     page = gyro_page.write(args.out, sections, gyro_run.facts(options))
-    for section in sections:
-        print(gyro_grading.console_table(section))
+    if args.verbose:
+        for section in sections:
+            print(gyro_grading.console_table(section))
+    else:
+        for section in sections:
+            print("".join(f"DOUBT: {section.label}: {d}\n" for d in gyro_grading.doubts(section)), end="")
     print(gyro_grading.verdict(sections))
     print(f"report: {page}")
     return 0 if gyro_grading.within_limits(sections) else 1
 
 
 # What each takes of COMMON.
-_STARTED = ("--scenario", "--seed", "--out")
-_PLATFORM = ("--can", "--control", "--truth", "--scenario", "--seed", "--real-time", "--out")
+_STARTED = ("--scenario", "--seed", "--out", "--verbose")
+_PLATFORM = ("--can", "--control", "--truth", "--scenario", "--seed", "--real-time", "--out", "--verbose")
 _HEAD = tuple(COMMON)
 
 _EXAMPLES: Mapping[str, str] = {
@@ -292,46 +324,65 @@ _EXAMPLES: Mapping[str, str] = {
   psabench run reversal
   psabench run reversal --condition quiet --realisations 2   a shorter one, without noise
 """,
-    gyrocompass.NAME: """\
+    "gyrocompass": """\
   psabench run gyrocompass                                   the article's way and a better one
   psabench run gyrocompass --reading article --sequence 0,120,240 --window-s 20
   psabench run gyrocompass --scenario my.yaml --latitude-deg 60   a scenario of yours, at its latitude
   psabench run gyrocompass --can slcan:/dev/ttyACM0 --latitude-deg 50.45   the platform on this bus
 """,
-    heading_hold.NAME: """\
+    "heading-hold": """\
   psabench run heading-hold
   psabench run heading-hold --reading improved --hours 4 --speed-kmh 500 --track-deg 90   in flight to the east
 """,
 }
 
 
+def _of_the_head(name: str) -> Parameters:
+    from psabench.procedures import PROCEDURES
+
+    return Parameters(fields=PROCEDURES[name].params.__dataclass_fields__)
+
+
+def _of_all() -> Parameters:
+    each = {name: _of_the_head(name).fields for name in ON_THE_HEAD}
+    return Parameters(
+        fields={name: f for fields in each.values() for name, f in fields.items()},
+        defaults={label: {name: f.default for name, f in fields.items()} for label, fields in each.items()},
+    )
+
+
+def _of_the_platform(name: str) -> Parameters:
+    from psabench.procedures import gyro_params, gyrocompass
+
+    return Parameters(fields=gyro_params.fields_of(name), defaults=gyrocompass.READINGS)
+
+
 def _commands() -> list[Command]:
     head = [
         Command(
-            name=p.name,
-            summary=p.summary,
+            name=name,
+            summary=summary,
             handler=_calibrate,
             common=_HEAD,
-            fields=p.params.__dataclass_fields__,
-            examples=_EXAMPLES[p.name],
-            notes=ON_THE_HEAD,
+            load=partial(_of_the_head, name),
+            examples=_EXAMPLES[name],
+            notes=NOTES_HEAD,
         )
-        for p in PROCEDURES.values()
+        for name, summary in ON_THE_HEAD.items()
     ]
     every = Command(
         name=ALL,
-        summary=f"{', '.join(PROCEDURES)}: an accelerometer on the dividing head, each procedure on each bench",
+        summary=f"{', '.join(ON_THE_HEAD)}: an accelerometer on the dividing head, each procedure on each bench",
         handler=_calibrate,
         common=_HEAD,
-        fields={name: f for c in head for name, f in c.fields.items()},
-        defaults={c.name: {name: f.default for name, f in c.fields.items()} for c in head},
+        load=_of_all,
         examples="  psabench run all             quiet and realistic, on emulators started for it\n"
         "  psabench run all --condition quiet --realisations 2\n",
-        notes=ON_THE_HEAD,
+        notes=NOTES_HEAD,
     )
     compare = Command(
-        name=compare_converters.NAME,
-        summary=compare_converters.SUMMARY,
+        name=COMPARE[0],
+        summary=COMPARE[1],
         handler=_compare,
         common=_STARTED,
         examples="  psabench run compare-converters --out build/run/converters\n",
@@ -342,12 +393,11 @@ def _commands() -> list[Command]:
             summary=summary,
             handler=_gyro,
             common=_PLATFORM,
-            fields=gyro_run.fields_of(name),
-            defaults=gyrocompass.READINGS,
+            load=partial(_of_the_platform, name),
             examples=_EXAMPLES[name],
-            notes=ON_THE_PLATFORM,
+            notes=NOTES_PLATFORM,
         )
-        for name, summary in gyro_run.SUMMARIES.items()
+        for name, summary in ON_THE_PLATFORM.items()
     ]
     return [*head, every, compare, *gyro]
 

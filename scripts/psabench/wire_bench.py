@@ -8,8 +8,7 @@ import numpy.typing as npt
 from psabench.device import SETTLE_PERIODS, Psa2
 from psabench.face import Face
 from psabench.instruments import Head
-
-G_MPS2 = 9.80665  # standard gravity (CGPM 1901); the site's own value is the user's to give
+from psabench.run_table import G_MPS2
 
 
 class WireBench:

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
-from psabench.conform import command, report
+from psabench.conform import device_command, report
 from psabench.conform.outcome import Verdict
 from psabench.conform.requirements import requirements
 from psabench.conform.subject import Addresses
@@ -25,7 +25,7 @@ def reported(board: str, profile: str, at: Addresses, link: str = "", only: Sequ
     """Run everything, or some groups; build/conform/BOARD-PROFILE[-LINK] is written anew. Asserts what it says."""
     folder = OUT / "-".join(filter(None, (board, profile, link)))
     shutil.rmtree(folder, ignore_errors=True)
-    run = command.device_run(variant(board, profile), at, folder, Silent(), only=only)
+    run = device_command.device_run(variant(board, profile), at, folder, Silent(), only=only)
     report.write(folder, run)
     check_report(folder, run)
     return run

@@ -91,7 +91,7 @@ def test_frames_and_readings_tell_the_same_angles() -> None:
 
 
 def test_as_a_user_runs_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(["run", "gyrocompass", "--out", str(tmp_path)]) == 0
+    assert cli.main(["run", "gyrocompass", "--verbose", "--out", str(tmp_path)]) == 0
     out = capsys.readouterr().out
     assert "gyrocompass, article: 3 positions" in out
     assert "gyrocompass, improved: 24 positions" in out
@@ -260,13 +260,13 @@ def test_the_latitude_is_the_scenario_s(tmp_path: Path, capsys: pytest.CaptureFi
         proto_file(f"scenarios/{IDEAL}.yaml").read_text().replace("latitude_deg: 50", "latitude_deg: 60")
     )
     argv = ["run", "gyrocompass", "--reading", "article", "--calibrate-s", "0", "--scenario", str(scenario)]
-    assert cli.main([*argv, "--out", str(tmp_path)]) == 0
+    assert cli.main([*argv, "-v", "--out", str(tmp_path)]) == 0
     section = json.loads((tmp_path / "result.json").read_text())["sections"][0]
     assert section["params"]["latitude_deg"] == 60.0
     assert section["latitude"]["low_deg"] < 60.0 < section["latitude"]["high_deg"]
     assert "deg look alike" in capsys.readouterr().out
     assert cli.main([*argv, "--out", str(tmp_path), "--latitude-deg", "50"]) == 1
-    assert "DOUBT: the horizontal Earth rate found is 0.77" in capsys.readouterr().out
+    assert "DOUBT: article: the horizontal Earth rate found is 0.77" in capsys.readouterr().out
 
 
 def impatient(**given: float) -> tuple[str, ...]:

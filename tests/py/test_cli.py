@@ -10,7 +10,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from psabench import arguments, cli, run_command
+from psabench import arguments, cli, lineport, record, record_command, run_command, run_table
+from psabench.procedures import PROCEDURES, compare_converters, gyro_params
 from psabench.protocol_files import dbc_node
 from test_lineport import lines
 
@@ -181,11 +182,11 @@ def test_help_of_a_procedure_is_of_its_own_options_with_unit_and_default(
 ) -> None:
     command = run_command.COMMANDS[name]
     told = help_of(f"run {name}", capsys, monkeypatch)
-    shown = re.findall(r"^  (--[a-z0-9-]+)", told, re.MULTILINE)
-    own = [f"--{f.replace('_', '-')}" for f in command.fields]
+    shown = re.findall(r"^  (?:-v, )?(--[a-z0-9-]+)", told, re.MULTILINE)
+    own = [f"--{f.replace('_', '-')}" for f in command.parameters.fields]
     assert shown == [*own, *command.common]
     assert command.summary[1:] in told
-    for option, f in zip(own, command.fields.values(), strict=True):
+    for option, f in zip(own, command.parameters.fields.values(), strict=True):
         text = " ".join(re.findall(rf"^  {option} .*\n(?:    +.*\n)*", told, re.MULTILINE)[0].split())
         shown_default = text.rpartition("(")[2].rstrip(")").partition(";")[0]
         value, _, unit = shown_default.partition(" ")
@@ -213,33 +214,33 @@ def test_every_example_of_a_help_is_understood(
     examples = re.findall(r"^  psabench (run .*?)(?:   .*)?$", told.partition("examples:")[2], re.MULTILINE)
     assert examples
     for example in examples:
-        args = cli.parser().parse_args(run_command.words(shlex.split(example)))
+        args = cli.parse(shlex.split(example))
         assert callable(args.handler)
 
 
-WORDS: list[tuple[str, str]] = [
-    ("run turns --seed 3", "run turns|--seed|3"),
-    ("run --seed 3 turns --axis y", "run turns|--seed|3|--axis|y"),
-    ("run --seed=3 turns", "run turns|--seed=3"),
-    ("run --real-time turns", "run turns|--real-time"),
-    ("run --real- turns", "run turns|--real-"),
-    ("run --out turns turns", "run turns|--out|turns"),
-    ("run --latitude-deg -50 gyrocompass", "run gyrocompass|--latitude-deg|-50"),
-    ("run turns --list", "run|--list"),
-    ("run --list", "run|--list"),
-    ("run -h turns", "run turns|-h"),
-    ("run --help", "run|--help"),
-    ("run --seed 3", "run"),
-    ("run spin --seed 3", "run|spin"),
-    ("run script a.psa --json", "run script|a.psa|--json"),
-    ("record run", "record|run"),
-    ("", ""),
+WORDS: list[tuple[str, str, str]] = [
+    ("turns --seed 3", "turns", "--seed 3"),
+    ("--seed 3 turns --axis y", "turns", "--seed 3 --axis y"),
+    ("--seed=3 turns", "turns", "--seed=3"),
+    ("--real-time turns", "turns", "--real-time"),
+    ("--real- turns", "turns", "--real-"),
+    ("-v turns", "turns", "-v"),
+    ("--out turns turns", "turns", "--out turns"),
+    ("--latitude-deg -50 gyrocompass", "gyrocompass", "--latitude-deg -50"),
+    ("turns --list", "", "--list"),
+    ("--list", "", "--list"),
+    ("-h turns", "turns", "-h"),
+    ("--help", "", "--help"),
+    ("--seed 3", "", ""),
+    ("spin --seed 3", "", "spin"),
+    ("script a.psa --json", "script", "a.psa --json"),
+    ("", "", ""),
 ]
 
 
-@pytest.mark.parametrize(("typed", "words"), WORDS, ids=[w[0] for w in WORDS])
-def test_the_procedure_may_stand_anywhere_among_its_options(typed: str, words: str) -> None:
-    assert run_command.words(typed.split()) == [w for w in words.split("|") if w]
+@pytest.mark.parametrize(("typed", "name", "rest"), WORDS, ids=[w[0] for w in WORDS])
+def test_the_procedure_may_stand_anywhere_among_its_options(typed: str, name: str, rest: str) -> None:
+    assert run_command.words(typed.split()) == (name, rest.split())
 
 
 def test_list_names_every_procedure_with_its_parameters(capsys: pytest.CaptureFixture[str]) -> None:
@@ -247,7 +248,7 @@ def test_list_names_every_procedure_with_its_parameters(capsys: pytest.CaptureFi
     lines = capsys.readouterr().out.splitlines()
     assert [line.partition(":")[0] for line in lines[::2]] == list(run_command.COMMANDS)
     for line, c in zip(lines[1::2], run_command.COMMANDS.values(), strict=True):
-        assert line.split() == [*(f"--{f.replace('_', '-')}" for f in c.fields), *c.common]
+        assert line.split() == [*(f"--{f.replace('_', '-')}" for f in c.parameters.fields), *c.common]
 
 
 def test_without_a_command_help_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
@@ -257,8 +258,89 @@ def test_without_a_command_help_is_printed(capsys: pytest.CaptureFixture[str]) -
     assert "a first hour:" in err
 
 
-def test_help_and_the_shell_do_without_the_libraries_of_the_report() -> None:
-    """Each takes a second to import."""
-    told = "import sys, psabench.cli; print(sorted({'matplotlib', 'scipy', 'IPython'} & set(sys.modules)))"
-    done = subprocess.run([sys.executable, "-c", told], capture_output=True, text=True, check=True, timeout=60)
-    assert done.stdout == "[]\n"
+# Libraries that take 0.1 s or more to load, and the modules of the package that load them.
+HEAVY = {
+    "numpy",
+    "scipy",
+    "matplotlib",
+    "can",
+    "canopen",
+    "cantools",
+    "yaml",
+    "serial",
+    "pyvisa",
+    "prompt_toolkit",
+    "IPython",
+    "dask",
+    "distributed",
+    "asammdf",
+}
+LIGHT: list[tuple[str, set[str]]] = [  # a command line, and what reading it may load of HEAVY
+    ("--version", set()),
+    ("--help", set()),
+    ("run --help", set()),
+    ("run spin", set()),
+    ("run turns --axis y", {"numpy"}),
+    ("run gyrocompass --seed 3", {"numpy"}),
+    ("run script x.psa", set()),
+    ("record run.log --board pmka --for 3", set()),
+    ("decode run.log --out run.csv", set()),
+    ("campaign gyrocompass --runs 3", {"numpy"}),
+    ("conform --help", set()),
+    ("conform device --board psa2", set()),
+    ("conform recording run.log --board psa2", set()),
+    ("conform host --manual can", set()),
+    ("conform list --board psa2", set()),
+    ("shell quiet", set()),
+]
+
+
+@pytest.mark.parametrize(("line", "allowed"), LIGHT, ids=[x[0] for x in LIGHT])
+def test_a_command_line_is_read_without_libraries_and_other_commands(line: str, allowed: set[str]) -> None:
+    program = f"""if True:
+        import contextlib, io, sys
+        import psabench.cli
+        with contextlib.redirect_stdout(io.StringIO()), contextlib.suppress(SystemExit):
+            psabench.cli.parse({line.split()!r})
+        print(*sys.modules)
+    """
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, timeout=60)
+    loaded = done.stdout.split()
+    assert "psabench.cli" in loaded
+    assert HEAVY & set(loaded) <= allowed
+    commands = {"psabench.record", "psabench.decode", "psabench.bench", "psabench.report", "psabench.conform.runner"}
+    assert not commands & set(loaded)
+
+
+def test_heavy_libraries_are_loaded_when_a_command_needs_them() -> None:
+    """That names of HEAVY are still those of libraries in use: the test above could not fail otherwise."""
+    program = """if True:
+        import sys
+        from psabench import report_plots, run  # noqa
+        from psabench.conform import requirements
+        from psabench.protocol_files import database
+        from psabench.shell import terminal
+        database()
+        print(*sys.modules)
+    """
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, timeout=60)
+    expected = {"numpy", "matplotlib", "can", "canopen", "cantools", "yaml", "prompt_toolkit"}
+    assert HEAVY & set(done.stdout.split()) >= expected
+
+
+def test_help_names_every_command_with_its_help_line(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told = help_of("", capsys, monkeypatch)
+    for name, line in cli.COMMANDS.items():
+        assert re.search(rf"^    {name} +{re.escape(line)}$", told, re.MULTILINE)
+        assert help_of(name, capsys, monkeypatch).startswith(f"usage: psabench {name} ")
+
+
+def test_what_the_options_repeat_is_what_the_libraries_have() -> None:
+    assert arguments.LINE_HZ == lineport.SAMPLE_HZ
+    shown = re.findall(r"\.[a-z0-9]+", record_command.FORMATS)
+    assert set(shown) | {".mf4"} == {*record.FORMATS, ".mf4"}  # .mf4 with asammdf
+    assert list(run_table.ON_THE_HEAD) == list(PROCEDURES)
+    assert list(run_table.ON_THE_PLATFORM) == list(gyro_params.PARAMS)
+    assert run_table.COMPARE[0] == compare_converters.NAME

@@ -5,11 +5,12 @@ from __future__ import annotations
 import argparse
 import sys
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from psabench.arguments import Help, Parser, natural
 from psabench.campaign import builds, chains, runner, settings
 from psabench.campaign.cases import DEFAULT_STUDIES, STUDIES, WIRE_STUDIES, Case
 from psabench.campaign.runner import Plan
@@ -73,13 +74,12 @@ class Options:
     forget_others: bool = False
 
 
-def add(commands: Any, formatter: Any, natural: Callable[[str], int]) -> None:
-    """The command's parser."""
-    p = commands.add_parser(
-        "campaign",
-        help="a procedure with thousands of virtual instruments",
+def parse(words: Sequence[str]) -> argparse.Namespace:
+    """What follows `psabench campaign`. Raises BadInput."""
+    p = Parser(
+        prog="psabench campaign",
         description=ABOUT,
-        formatter_class=formatter,
+        formatter_class=Help,
         epilog=EPILOG.format(studies=_studies(), settings="\n".join(settings.lines())),
     )
     p.set_defaults(handler=_main)
@@ -117,6 +117,7 @@ def add(commands: Any, formatter: Any, natural: Callable[[str], int]) -> None:
     p.add_argument("--out", type=Path, default=Path("build/campaign"), help="folder of the report (%(default)s)")
     p.add_argument("--fresh", action="store_true", help="compute anew what the store has")
     p.add_argument("--forget-others", action="store_true", help="remove what other builds have computed of these cases")
+    return p.parse_args(words)
 
 
 def _studies() -> str:

@@ -1,26 +1,14 @@
-"""`psabench conform`: does a board, a recording of one, or a host conform?"""
+"""`psabench conform`: the options of its suites. What a suite needs is loaded when it runs."""
 
 from __future__ import annotations
 
 import argparse
-import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from psabench.conform import identity, recording_command, report, runner, suite
-from psabench.conform.exhibits import Exhibits
-from psabench.conform.host import command as host_command
-from psabench.conform.outcome import Outcome
-from psabench.conform.requirements import Requirement, requirements
-from psabench.conform.subject import INPUTS_V, Addresses, Subject
-from psabench.conform.variant import Variant, variant
-from psabench.errors import BadInput
-from psabench.lineport import SAMPLE_HZ
-from psabench.procedures.head_bench import Progress
-from psabench.progress import Bar
-
-OUT = Path("build/conform")
+from psabench.arguments import BUS_HELP, LINE_HZ, Help, Parser
+from psabench.conform.defaults import LINKS, MAX_S, OUT
 
 EPILOG = """\
 examples:
@@ -40,37 +28,65 @@ machines; a failure has its waveform beside it.
 Exit status: 0 conforms, 1 does not, 2 bad input, 3 the bench or a link failed, 130 ended by Ctrl-C.
 """
 
+RECORDING_EPILOG = """\
+FILE: at most one log of the CAN bus (.log of candump, .blf, .asc, .trc, .csv, .mf4), at most one recording of lines
+(.vcd of any tool, .sr of sigrok, .bin: bytes of the line port). Together they are one recording of one bench.
 
-def add(commands: Any, formatter: Any, bus_help: str) -> None:
-    """The command and its sub-commands."""
-    p = commands.add_parser(
-        "conform",
-        help="does a board conform to its requirements?",
+What the files do not show is told as not observable, never as passed.
+
+Exit status: 0 conforms, 1 does not, 2 bad input, 130 ended by Ctrl-C.
+"""
+
+HOST_EPILOG = """\
+The program is started once for each case, as soon as its board is powered; it ends when its link ends. In COMMAND
+  {can}      127.0.0.1:PORT of a socketcand server          {node}     CANopen node of the board
+  {form}     frame form to ask for, for hosts that take 1, too
+  {pty}      pseudo-terminal of an slcan adapter            {results}  file to tell into (without it: standard output)
+  {line}     pseudo-terminal of the lines, a byte a sample; {word_bits}, {code_bits}: of its words and codes
+  {bus}      pseudo-terminal of a bus port: PSD-1, PIK
+and it tells what it takes in JSON (docs/conform_host.md): {"frame": 7, "x": ...}, {"lost": 2}, {"stale": true}.
+
+examples:
+  psabench conform host --command "build/host {can} {node}"
+  psabench conform host --command "build/host_line {line}" --only HOST-TORN
+  psabench conform host --board pik --command ".venv/bin/python examples/vins_boards.py pik socketcand:{can} {node}"
+  psabench conform host --manual can --results build/told.jsonl     start it by hand, case by case
+
+OUT has report.html, junit.xml and conform.json, and of each case what was on the bus and what was told.
+Exit status: 0 conforms, 1 does not, 2 bad input, 3 the bench failed, 130 ended by Ctrl-C.
+"""
+
+
+def parse(words: Sequence[str]) -> argparse.Namespace:
+    """What follows `psabench conform`. Raises BadInput."""
+    p = Parser(
+        prog="psabench conform",
         description="Conformance of a board to docs/requirements.md, over its wires alone.",
-        formatter_class=formatter,
+        formatter_class=Help,
         epilog=EPILOG,
     )
     suites = p.add_subparsers(required=True, metavar="SUITE")
-    _add_device(suites, formatter, bus_help)
-    recording_command.add(suites, formatter, _add_board)
-    host_command.add(suites, formatter)
-    _add_list(suites, formatter)
+    _add_device(suites)
+    _add_recording(suites)
+    _add_host(suites)
+    _add_list(suites)
+    return p.parse_args(words)
 
 
-def _add_device(suites: Any, formatter: Any, bus_help: str) -> None:
+def _add_device(suites: Any) -> None:
     p = suites.add_parser(
         "device",
         help="a board, emulated or real",
         description="Test a board at the end of its wires.",
-        formatter_class=formatter,
+        formatter_class=Help,
         epilog=DEVICE_EPILOG,
     )
-    p.set_defaults(handler=device)
+    p.set_defaults(handler=_device)
     _add_board(p)
     at = p.add_argument_group("where its wires end (without --can an emulator is started)")
-    at.add_argument("--can", metavar="BUS", help=bus_help)
+    at.add_argument("--can", metavar="BUS", help=BUS_HELP)
     at.add_argument("--lines", type=Path, metavar="PORT", help="line port: pseudo-terminal or adapter of that kind")
-    at.add_argument("--line-hz", type=float, default=SAMPLE_HZ, metavar="HZ", help="its samples a second (%(default)g)")
+    at.add_argument("--line-hz", type=float, default=LINE_HZ, metavar="HZ", help="its samples a second (%(default)g)")
     at.add_argument("--bus-port", type=Path, metavar="PORT", help="bus port of PSD-1, PMKA and PIK")
     at.add_argument(
         "--scpi", action="append", default=[], metavar="NAME=ADDRESS", help="an instrument: supply=TCPIP::..."
@@ -96,7 +112,75 @@ def _add_device(suites: Any, formatter: Any, bus_help: str) -> None:
     )
     what.add_argument("--only", nargs="+", default=[], metavar="ID", help="requirements, or beginnings: PSA2-FRAME")
     what.add_argument("--out", type=Path, metavar="FOLDER", help=f"for the report ({OUT}/BOARD-PROFILE)")
-    what.add_argument("--verbose", action="store_true", help="tell what passed, too")
+    what.add_argument("-v", "--verbose", action="store_true", help="tell what passed, too")
+
+
+def _add_recording(suites: Any) -> None:
+    p = suites.add_parser(
+        "recording",
+        help="files that were recorded at a bench",
+        description="Judge recordings of a board's CAN bus and lines.",
+        formatter_class=Help,
+        epilog=RECORDING_EPILOG,
+    )
+    p.set_defaults(handler=_recording)
+    p.add_argument("files", nargs="+", type=Path, metavar="FILE")
+    _add_board(p)
+    p.add_argument("--node", type=int, metavar="ID", help="CANopen node (the board's default)")
+    p.add_argument(
+        "--line", action="append", default=[], metavar="LINE=CHANNEL", help="a line by the analyser's name: Int=D0"
+    )
+    p.add_argument(
+        "--line-hz", type=float, metavar="HZ", help="samples a second of the lines (of .bin 8e6, else the file's)"
+    )
+    p.add_argument("--input", action="append", default=[], metavar="AXIS=V", help="volts at an input meanwhile: x=2.5")
+    p.add_argument(
+        "--max-seconds",
+        type=float,
+        default=MAX_S,
+        metavar="S",
+        help="of each file, from its begin (%(default)g)",
+    )
+    p.add_argument("--clock-ppm", type=float, default=100.0, metavar="PPM", help="allowed between clocks (%(default)g)")
+    p.add_argument("--only", nargs="+", default=[], metavar="ID", help="requirements, or beginnings: PSA2-FRAME")
+    p.add_argument("--out", type=Path, metavar="FOLDER", help=f"for the report ({OUT}/recording-BOARD-PROFILE)")
+    p.add_argument("-v", "--verbose", action="store_true", help="tell what passed, too")
+
+
+def _add_host(suites: Any) -> None:
+    p = suites.add_parser(
+        "host",
+        help="a program that takes a board's data",
+        description="Play good and bad boards to a program and judge what it tells.",
+        formatter_class=Help,
+        epilog=HOST_EPILOG.replace("%", "%%"),
+    )
+    p.set_defaults(handler=_host)
+    how = p.add_mutually_exclusive_group(required=True)
+    how.add_argument("--command", metavar="COMMAND", help="how the program is started, with {can}, {pty} or {line}")
+    how.add_argument("--manual", choices=list(LINKS), help="it is started by hand when we say so, at this link")
+    p.add_argument("--results", type=Path, metavar="FILE", help="with --manual: the file that the program tells into")
+    p.add_argument("--port", type=int, default=29536, help="with --manual can: of socketcand, each time (%(default)s)")
+    p.add_argument(
+        "--board", default="psa2", help="that is played: psa2, psa1, psd1, pmka, pik, pik5, pik6 (%(default)s)"
+    )
+    p.add_argument("--profile", help="of the board (article for psa2, else of its own name)")
+    p.add_argument("--only", nargs="+", default=[], metavar="ID", help="requirements, or beginnings: HOST-LOST")
+    p.add_argument("--case", nargs="+", default=[], metavar="NAME", help="these cases alone (docs/conform_host.md)")
+    p.add_argument("--speed", type=float, default=1.0, metavar="X", help="times real time, while nothing is silent")
+    p.add_argument("--out", type=Path, default=OUT / "host", metavar="FOLDER", help="for the report (%(default)s)")
+    p.add_argument("-v", "--verbose", action="store_true", help="tell what passed, too")
+
+
+def _add_list(suites: Any) -> None:
+    p = suites.add_parser(
+        "list",
+        help="the requirements of a board",
+        description="Requirements of a board: grade, how each is seen, the sentence.",
+        formatter_class=Help,
+    )
+    p.set_defaults(handler=_list)
+    _add_board(p)
 
 
 def _add_board(p: argparse.ArgumentParser) -> None:
@@ -104,115 +188,25 @@ def _add_board(p: argparse.ArgumentParser) -> None:
     p.add_argument("--profile", help="which of its profiles it is said to have (psa-emu --list-profiles)")
 
 
-def _add_list(suites: Any, formatter: Any) -> None:
-    p = suites.add_parser(
-        "list",
-        help="the requirements of a board",
-        description="Requirements of a board: grade, how each is seen, the sentence.",
-        formatter_class=formatter,
-    )
-    p.set_defaults(handler=list_requirements)
-    _add_board(p)
+def _device(args: argparse.Namespace) -> int:
+    from psabench.conform import device_command
+
+    return device_command.device(args)
 
 
-def list_requirements(args: argparse.Namespace) -> int:
-    """Handler of `conform list`."""
-    for r in _rows(variant(args.board, args.profile)):
-        print(f"{r.id:16} {r.grade} {'/'.join(r.observe) or '-':16} {r.text}")
-    return 0
+def _recording(args: argparse.Namespace) -> int:
+    from psabench.conform import recording_command
+
+    return recording_command.handle(args)
 
 
-def device(args: argparse.Namespace) -> int:
-    """Handler of `conform device`."""
-    v = variant(args.board, args.profile)
-    folder = args.out or OUT / f"{v.board}-{v.profile}"
-    run = device_run(
-        v,
-        _addresses(args),
-        folder,
-        Bar(),
-        only=args.only,
-        seed=args.seed,
-        clock_error=args.clock_error,
-        recorder_error=args.recorder_error,
-        clock_ppm=args.clock_ppm,
-    )
-    return _told(run, folder, everything=args.verbose)
+def _host(args: argparse.Namespace) -> int:
+    from psabench.conform.host import command
+
+    return command.host(args)
 
 
-def device_run(
-    v: Variant,
-    at: Addresses,
-    folder: Path,
-    progress: Progress,
-    *,
-    only: Sequence[str] = (),
-    seed: int = 1,
-    clock_error: float = 0.0,
-    recorder_error: float = 0.0,
-    clock_ppm: float = 100.0,
-) -> report.Run:
-    """Judge a board; what shows a failure goes into the folder. Ctrl-C ends it, and what was judged stays.
+def _list(args: argparse.Namespace) -> int:
+    from psabench.conform import device_command
 
-    clock_error, recorder_error: ppm by which clocks of an emulator that is started are fast, and its probes'. Raises
-    BadInput where `only` selects nothing, LinkError or BenchError where the board cannot be reached.
-    """
-    rows = [r for r in _rows(v) if not only or r.id.startswith(tuple(only))]
-    if not rows:
-        raise BadInput(f"--only {' '.join(only)}: no requirement of {v.name} begins so; psabench conform list has them")
-    suite.load()
-    outcomes: list[Outcome] = []
-    interrupted = False
-    with Subject.open(v, at, seed=seed, clock_ppm=clock_error, recorder_ppm=recorder_error) as subject:
-        facts = identity.subject_facts(subject) | identity.suite_facts()
-        keep = Exhibits(folder).keep
-        try:
-            runner.run(subject, progress, only=only, clock_ppm=clock_ppm, told=outcomes.append, keep=keep)
-        except KeyboardInterrupt:
-            interrupted = True
-    return report.Run(
-        suite="device", subject=v.name, facts=facts, outcomes=outcomes, rows=rows, interrupted=interrupted
-    )
-
-
-def _told(run: report.Run, folder: Path, *, everything: bool) -> int:
-    page = report.write(folder, run)
-    for line in report.lines(run, everything=everything):
-        print(line)
-    print(f"report: {page}", file=sys.stderr)
-    return 130 if run.interrupted else 0 if run.conforms else 1
-
-
-def _rows(v: Variant) -> list[Requirement]:
-    return [r for r in requirements() if r.group != "host" and r.applies(v.board, v.profile)]
-
-
-def _addresses(args: argparse.Namespace) -> Addresses:
-    if args.can is None and (args.lines or args.bus_port or args.control or args.scpi):
-        raise BadInput("--lines, --bus-port, --control and --scpi are of a board that is there: --can says where")
-    inputs = _pairs(args.input, "--input", float)
-    return Addresses(
-        can=args.can,
-        lines=args.lines,
-        line_hz=args.line_hz,
-        bus_port=args.bus_port,
-        scpi=_pairs(args.scpi, "--scpi", str),
-        control=args.control,
-        node=args.node,
-        inputs_v=inputs if args.can or inputs else INPUTS_V,
-        adapter=args.adapter,
-        port_only=args.port_only,
-    )
-
-
-def _pairs(words: list[str], option: str, kind: Callable[[str], Any]) -> dict[str, Any]:
-    found = {}
-    for word in words:
-        name, equals, value = word.partition("=")
-        try:
-            found[name] = kind(value)
-        except ValueError as e:
-            raise BadInput(f"{option} {word}: {value!r} is no number") from e
-        if not equals or not name or not value:
-            raise BadInput(f"{option} {word}: NAME=VALUE is wanted")
-    return found
+    return device_command.list_requirements(args)

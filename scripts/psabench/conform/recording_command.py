@@ -1,14 +1,12 @@
-"""`psabench conform recording FILE...`: its options, and its report."""
+"""`psabench conform recording FILE...`: the recording, judged and reported."""
 
 from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any
 
 from psabench.conform import identity, recording, report, suite
+from psabench.conform.defaults import OUT
 from psabench.conform.exhibits import Exhibits
 from psabench.conform.outcome import Outcome
 from psabench.conform.requirements import requirements
@@ -18,50 +16,6 @@ from psabench.conform.variant import variant
 from psabench.errors import BadInput
 from psabench.progress import Bar
 from psabench.protocol_files import dbc_node
-
-OUT = Path("build/conform")
-
-EPILOG = """\
-FILE: at most one log of the CAN bus (.log of candump, .blf, .asc, .trc, .csv, .mf4), at most one recording of lines
-(.vcd of any tool, .sr of sigrok, .bin: bytes of the line port). Together they are one recording of one bench.
-
-What the files do not show is told as not observable, never as passed.
-
-Exit status: 0 conforms, 1 does not, 2 bad input, 130 ended by Ctrl-C.
-"""
-
-
-def add(suites: Any, formatter: Any, add_board: Callable[[argparse.ArgumentParser], None]) -> None:
-    """The sub-command."""
-    p = suites.add_parser(
-        "recording",
-        help="files that were recorded at a bench",
-        description="Judge recordings of a board's CAN bus and lines.",
-        formatter_class=formatter,
-        epilog=EPILOG,
-    )
-    p.set_defaults(handler=handle)
-    p.add_argument("files", nargs="+", type=Path, metavar="FILE")
-    add_board(p)
-    p.add_argument("--node", type=int, metavar="ID", help="CANopen node (the board's default)")
-    p.add_argument(
-        "--line", action="append", default=[], metavar="LINE=CHANNEL", help="a line by the analyser's name: Int=D0"
-    )
-    p.add_argument(
-        "--line-hz", type=float, metavar="HZ", help="samples a second of the lines (of .bin 8e6, else the file's)"
-    )
-    p.add_argument("--input", action="append", default=[], metavar="AXIS=V", help="volts at an input meanwhile: x=2.5")
-    p.add_argument(
-        "--max-seconds",
-        type=float,
-        default=Bounds().max_s,
-        metavar="S",
-        help="of each file, from its begin (%(default)g)",
-    )
-    p.add_argument("--clock-ppm", type=float, default=100.0, metavar="PPM", help="allowed between clocks (%(default)g)")
-    p.add_argument("--only", nargs="+", default=[], metavar="ID", help="requirements, or beginnings: PSA2-FRAME")
-    p.add_argument("--out", type=Path, metavar="FOLDER", help=f"for the report ({OUT}/recording-BOARD-PROFILE)")
-    p.add_argument("--verbose", action="store_true", help="tell what passed, too")
 
 
 def handle(args: argparse.Namespace) -> int:

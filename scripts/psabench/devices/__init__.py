@@ -14,13 +14,13 @@ from psabench.devices.psd1 import Psd1
 from psabench.errors import LinkError
 from psabench.frames import FrameReader
 from psabench.places import proto_file
+from psabench.protocol_files import ALIASES
 from psabench.readings import ReadingReader
 from psabench.unit import NAME, Unit
 
 __all__ = ["BOARDS", "Gyro", "Pik", "Pmka", "Psa2", "Psd1", "identify", "of_board", "reader_of"]
 
 BOARDS: Mapping[str, type[Unit]] = {"psa2": Psa2, "psd1": Psd1, "pmka": Pmka, "pik": Pik, "gyro": Gyro}
-ALIASES: Mapping[str, str] = {"psa1": "psa2", "pik5": "pik", "pik6": "pik"}  # the same board, another profile
 NAME_S = 1.0  # bench time for the answer to object 1008h: a unit that is there answers at once
 
 

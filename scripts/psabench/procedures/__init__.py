@@ -1,4 +1,4 @@
-"""The procedures by name: `psabench run --list` and its options come from this table.
+"""The procedures by name: `psabench.run_table` says what each is for.
 
 A procedure is one function, `run(bench, params, watch)`, that measures and then calls `estimate(readings,
 params)`, which is pure: an interrupted run is estimated from the readings that were recorded
@@ -23,7 +23,6 @@ class Procedure:
     """One row of the registry; `params` is the dataclass that `run` and `estimate` take."""
 
     name: str
-    summary: str
     params: type[Any]
     run: Callable[..., ProcedureResult]  # (bench, params, watch) -> result
     estimate: Callable[..., ProcedureResult]  # (readings, params, g_mps2) -> result
@@ -35,7 +34,6 @@ PROCEDURES: Mapping[str, Procedure] = {
     for p in (
         Procedure(
             name="turns",
-            summary="test turns, eqs (1)-(11): u0, kx, ky, kz from six positions",
             params=TurnsParams,
             run=turns,
             estimate=estimate_turns,
@@ -43,7 +41,6 @@ PROCEDURES: Mapping[str, Procedure] = {
         ),
         Procedure(
             name="fourier",
-            summary="Fourier series over a turn, eqs (12)-(18): u0, alpha0, kx, ky, kxy",
             params=FourierParams,
             run=fourier,
             estimate=estimate_fourier,
@@ -51,7 +48,6 @@ PROCEDURES: Mapping[str, Procedure] = {
         ),
         Procedure(
             name="reversal",
-            summary="two Fourier series with the sensor reversed about Ox: the one to trust",
             params=ReversalParams,
             run=reversal,
             estimate=estimate_reversal,

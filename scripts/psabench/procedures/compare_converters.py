@@ -25,7 +25,6 @@ from psabench.unit import Unit
 
 NAME = "compare-converters"
 SCENARIO = "converters"
-SUMMARY = "one motion to every generation of converters: resolution, noise, drift, velocity error"
 
 AMPERE_PER_G = 1.28e-3  # of the accelerometers, from their passport
 SETTLE_S = 4.0  # from power-on until every board of the scenario is set up

@@ -33,7 +33,6 @@ __all__ = [
     "METHODS",
     "NAME",
     "READINGS",
-    "SUMMARY",
     "GyrocompassParams",
     "GyrocompassResult",
     "allowance",
@@ -43,7 +42,6 @@ __all__ = [
     "s_of",
 ]
 
-SUMMARY = "a gyro platform finds north and its drifts from several positions, the article's way and a better one"
 
 LEVEL_LIMIT_S = 60.0  # patience for levelling
 

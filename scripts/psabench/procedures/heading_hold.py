@@ -21,7 +21,6 @@ from psabench.procedures.platform_bench import Compensation, Look, PlatformBench
 from psabench.procedures.result import Z95, option
 
 NAME = "heading-hold"
-SUMMARY = "gyrocompassing, then heading kept for hours with the drifts compensated"
 
 DRIFTS = ("torquer", "axis1", "none")
 SDS = 5.0  # of what the hold is expected to be off by

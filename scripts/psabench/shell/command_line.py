@@ -1,18 +1,12 @@
-"""`psabench shell` and `psabench run script`: options, and who carries the lines out."""
+"""`psabench shell` and `psabench run script`: their options. What they need is loaded when they run."""
 
 from __future__ import annotations
 
 import argparse
-import signal
-import sys
-from collections.abc import Callable
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
-from psabench.errors import BadInput
-from psabench.shell.opening import Opening, addresses
-from psabench.shell.script import Voice, run_file, run_lines, run_stream
-from psabench.shell.session import Session
+from psabench.arguments import BUS_HELP, Help, Parser, node_id
 
 SHELL_EPILOG = """\
 examples:
@@ -37,13 +31,12 @@ before anything is done), 3 the bench refused or a link failed.
 """
 
 
-def add(commands: Any, formatter: Any, bus_help: str, node: Callable[[str], int]) -> None:
-    """Both commands to the parsers of `psabench`."""
-    shell = commands.add_parser(
-        "shell",
-        help="talk to a bench: instruments, device, faults, with completion",
+def parse(words: Sequence[str]) -> argparse.Namespace:
+    """What follows `psabench shell`. Raises BadInput."""
+    shell = Parser(
+        prog="psabench shell",
         description="An interactive shell for the bench; docs/shell.md tells all of it.",
-        formatter_class=formatter,
+        formatter_class=Help,
         epilog=SHELL_EPILOG,
     )
     shell.set_defaults(handler=_shell)
@@ -53,13 +46,16 @@ def add(commands: Any, formatter: Any, bus_help: str, node: Callable[[str], int]
         "--command", action="append", metavar="LINE", help="carry out this line and end; may be repeated"
     )
     shell.add_argument("--connect", type=Path, metavar="CONTROL", help="control socket of an emulator that is there")
-    _add_common(shell, bus_help, node)
+    _add_common(shell)
+    return shell.parse_args(words)
 
-    script = commands.add_parser(
-        "run script",
-        help="run a script of the shell",
+
+def parse_script(words: Sequence[str]) -> argparse.Namespace:
+    """What follows `psabench run script`. Raises BadInput."""
+    script = Parser(
+        prog="psabench run script",
         description="Run a script of the shell.",
-        formatter_class=formatter,
+        formatter_class=Help,
         epilog=SCRIPT_EPILOG,
     )
     script.set_defaults(handler=_script)
@@ -67,12 +63,13 @@ def add(commands: Any, formatter: Any, bus_help: str, node: Callable[[str], int]
     script.add_argument("--scenario", help="instead of that of the script")
     script.add_argument("--pace", choices=["wall", "step"], help="instead of that of the script")
     script.add_argument("--control", dest="connect", type=Path, help="control socket of an emulator that is there")
-    _add_common(script, bus_help, node)
+    _add_common(script)
+    return script.parse_args(words)
 
 
-def _add_common(p: argparse.ArgumentParser, bus_help: str, node: Callable[[str], int]) -> None:
+def _add_common(p: argparse.ArgumentParser) -> None:
     p.add_argument("--seed", type=int, help="of the emulator's noise, instead of the scenario's")
-    p.add_argument("--can", help=f"{bus_help}; without it that of an emulator: there, or started")
+    p.add_argument("--can", help=f"{BUS_HELP}; without it that of an emulator: there, or started")
     p.add_argument(
         "--scpi",
         action="append",
@@ -80,46 +77,17 @@ def _add_common(p: argparse.ArgumentParser, bus_help: str, node: Callable[[str],
         metavar="NAME=ADDRESS",
         help="VISA address of an instrument; may be repeated",
     )
-    p.add_argument("--node", type=node, help="CANopen node of the unit (what the emulator tells, else 5)")
+    p.add_argument("--node", type=node_id, help="CANopen node of the unit (what the emulator tells, else 5)")
     p.add_argument("--json", action="store_true", help="one JSON object a line instead of text")
 
 
-def _opening(args: argparse.Namespace, pace: str | None) -> Opening:
-    return Opening(
-        scenario=args.scenario,
-        pace=args.pace or pace,
-        seed=args.seed,
-        connect=args.connect,
-        can=args.can,
-        scpi=addresses(args.scpi),
-        node=args.node,
-    )
-
-
 def _shell(args: argparse.Namespace) -> int:
-    typed = sys.stdin.isatty() and sys.stdout.isatty() and not args.command
-    if typed and args.json:
-        raise BadInput("--json: for --command and pipes; at a terminal the shell talks to people")
-    opening = _opening(args, "wall" if typed else "step")
-    for number in (signal.SIGTERM, signal.SIGHUP):  # Ctrl-C ends a command; these end the shell, and its emulator
-        signal.signal(number, _leave)
-    with opening.open() as bench:
-        session = Session(bench, opening.start)
-        if typed:
-            from psabench.shell.terminal import Terminal
+    from psabench.shell import command_run
 
-            return Terminal(session).run()
-        voice = Voice(_say, json=args.json)
-        return run_lines(session, args.command, voice) if args.command else run_stream(session, sys.stdin, voice)
-
-
-def _leave(number: int, _: object) -> None:
-    sys.exit(128 + number)
+    return command_run.run_shell(args)
 
 
 def _script(args: argparse.Namespace) -> int:
-    return run_file(args.file, _opening(args, None), Voice(_say, json=args.json, echo=True))
+    from psabench.shell import command_run
 
-
-def _say(text: str) -> None:
-    print(text, flush=True)
+    return command_run.run_script(args)

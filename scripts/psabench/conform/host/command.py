@@ -5,73 +5,19 @@ from __future__ import annotations
 import argparse
 import sys
 from functools import partial
-from pathlib import Path
-from typing import Any
 
 from psabench.conform import report
+from psabench.conform.defaults import LINKS
 from psabench.conform.host import runner
 from psabench.conform.host.judge import Judged, judged
 from psabench.conform.identity import suite_facts
 from psabench.conform.outcome import Outcome, Verdict
 from psabench.conform.requirements import Requirement, requirements
 from psabench.conform.variant import Variant, variant
-from psabench.devices import ALIASES
 from psabench.errors import BadInput
 from psabench.procedures.head_bench import Silent
 from psabench.progress import Bar
-
-OUT = Path("build/conform/host")
-LINKS = {
-    "can": "socketcand",
-    "pty": "slcan",
-    "line": "the line port",
-    "bus": "the bus port",
-}  # by the place that a command names
-
-EPILOG = """\
-The program is started once for each case, as soon as its board is powered; it ends when its link ends. In COMMAND
-  {can}      127.0.0.1:PORT of a socketcand server          {node}     CANopen node of the board
-  {form}     frame form to ask for, for hosts that take 1, too
-  {pty}      pseudo-terminal of an slcan adapter            {results}  file to tell into (without it: standard output)
-  {line}     pseudo-terminal of the lines, a byte a sample; {word_bits}, {code_bits}: of its words and codes
-  {bus}      pseudo-terminal of a bus port: PSD-1, PIK
-and it tells what it takes in JSON (docs/conform_host.md): {"frame": 7, "x": ...}, {"lost": 2}, {"stale": true}.
-
-examples:
-  psabench conform host --command "build/host {can} {node}"
-  psabench conform host --command "build/host_line {line}" --only HOST-TORN
-  psabench conform host --board pik --command ".venv/bin/python examples/vins_boards.py pik socketcand:{can} {node}"
-  psabench conform host --manual can --results build/told.jsonl     start it by hand, case by case
-
-OUT has report.html, junit.xml and conform.json, and of each case what was on the bus and what was told.
-Exit status: 0 conforms, 1 does not, 2 bad input, 3 the bench failed, 130 ended by Ctrl-C.
-"""
-
-
-def add(suites: Any, formatter: Any) -> None:
-    """The sub-command."""
-    p = suites.add_parser(
-        "host",
-        help="a program that takes a board's data",
-        description="Play good and bad boards to a program and judge what it tells.",
-        formatter_class=formatter,
-        epilog=EPILOG.replace("%", "%%"),
-    )
-    p.set_defaults(handler=host)
-    how = p.add_mutually_exclusive_group(required=True)
-    how.add_argument("--command", metavar="COMMAND", help="how the program is started, with {can}, {pty} or {line}")
-    how.add_argument("--manual", choices=list(LINKS), help="it is started by hand when we say so, at this link")
-    p.add_argument("--results", type=Path, metavar="FILE", help="with --manual: the file that the program tells into")
-    p.add_argument("--port", type=int, default=29536, help="with --manual can: of socketcand, each time (%(default)s)")
-    p.add_argument(
-        "--board", default="psa2", help="that is played: psa2, psa1, psd1, pmka, pik, pik5, pik6 (%(default)s)"
-    )
-    p.add_argument("--profile", help="of the board (article for psa2, else of its own name)")
-    p.add_argument("--only", nargs="+", default=[], metavar="ID", help="requirements, or beginnings: HOST-LOST")
-    p.add_argument("--case", nargs="+", default=[], metavar="NAME", help="these cases alone (docs/conform_host.md)")
-    p.add_argument("--speed", type=float, default=1.0, metavar="X", help="times real time, while nothing is silent")
-    p.add_argument("--out", type=Path, default=OUT, metavar="FOLDER", help="for the report (%(default)s)")
-    p.add_argument("--verbose", action="store_true", help="tell what passed, too")
+from psabench.protocol_files import ALIASES
 
 
 def link_of(args: argparse.Namespace) -> str:

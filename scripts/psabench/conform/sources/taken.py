@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from psabench.conform.defaults import MAX_S
 from psabench.conform.evidence import CanFrame
 from psabench.signals import Ints
 from psabench.vcd import Wire
@@ -28,7 +29,7 @@ MOST_NS = 1 << 60  # of a time: 36 years
 class Bounds:
     """How much of a file is judged. line_hz None: the file says it, or edges are as exact as its unit."""
 
-    max_s: float = 60.0
+    max_s: float = MAX_S
     line_hz: float | None = None
 
 

@@ -1,0 +1,123 @@
+"""`psabench conform device` and `list`: what they do, and what is printed."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from psabench.conform import identity, report, runner, suite
+from psabench.conform.defaults import OUT
+from psabench.conform.exhibits import Exhibits
+from psabench.conform.outcome import Outcome
+from psabench.conform.requirements import Requirement, requirements
+from psabench.conform.subject import INPUTS_V, Addresses, Subject
+from psabench.conform.variant import Variant, variant
+from psabench.errors import BadInput
+from psabench.procedures.head_bench import Progress
+from psabench.progress import Bar
+
+
+def list_requirements(args: argparse.Namespace) -> int:
+    """Handler of `conform list`."""
+    for r in _rows(variant(args.board, args.profile)):
+        print(f"{r.id:16} {r.grade} {'/'.join(r.observe) or '-':16} {r.text}")
+    return 0
+
+
+def device(args: argparse.Namespace) -> int:
+    """Handler of `conform device`."""
+    v = variant(args.board, args.profile)
+    folder = args.out or OUT / f"{v.board}-{v.profile}"
+    run = device_run(
+        v,
+        _addresses(args),
+        folder,
+        Bar(),
+        only=args.only,
+        seed=args.seed,
+        clock_error=args.clock_error,
+        recorder_error=args.recorder_error,
+        clock_ppm=args.clock_ppm,
+    )
+    return _told(run, folder, everything=args.verbose)
+
+
+def device_run(
+    v: Variant,
+    at: Addresses,
+    folder: Path,
+    progress: Progress,
+    *,
+    only: Sequence[str] = (),
+    seed: int = 1,
+    clock_error: float = 0.0,
+    recorder_error: float = 0.0,
+    clock_ppm: float = 100.0,
+) -> report.Run:
+    """Judge a board; what shows a failure goes into the folder. Ctrl-C ends it, and what was judged stays.
+
+    clock_error, recorder_error: ppm by which clocks of an emulator that is started are fast, and its probes'. Raises
+    BadInput where `only` selects nothing, LinkError or BenchError where the board cannot be reached.
+    """
+    rows = [r for r in _rows(v) if not only or r.id.startswith(tuple(only))]
+    if not rows:
+        raise BadInput(f"--only {' '.join(only)}: no requirement of {v.name} begins so; psabench conform list has them")
+    suite.load()
+    outcomes: list[Outcome] = []
+    interrupted = False
+    with Subject.open(v, at, seed=seed, clock_ppm=clock_error, recorder_ppm=recorder_error) as subject:
+        facts = identity.subject_facts(subject) | identity.suite_facts()
+        keep = Exhibits(folder).keep
+        try:
+            runner.run(subject, progress, only=only, clock_ppm=clock_ppm, told=outcomes.append, keep=keep)
+        except KeyboardInterrupt:
+            interrupted = True
+    return report.Run(
+        suite="device", subject=v.name, facts=facts, outcomes=outcomes, rows=rows, interrupted=interrupted
+    )
+
+
+def _told(run: report.Run, folder: Path, *, everything: bool) -> int:
+    page = report.write(folder, run)
+    for line in report.lines(run, everything=everything):
+        print(line)
+    print(f"report: {page}", file=sys.stderr)
+    return 130 if run.interrupted else 0 if run.conforms else 1
+
+
+def _rows(v: Variant) -> list[Requirement]:
+    return [r for r in requirements() if r.group != "host" and r.applies(v.board, v.profile)]
+
+
+def _addresses(args: argparse.Namespace) -> Addresses:
+    if args.can is None and (args.lines or args.bus_port or args.control or args.scpi):
+        raise BadInput("--lines, --bus-port, --control and --scpi are of a board that is there: --can says where")
+    inputs = _pairs(args.input, "--input", float)
+    return Addresses(
+        can=args.can,
+        lines=args.lines,
+        line_hz=args.line_hz,
+        bus_port=args.bus_port,
+        scpi=_pairs(args.scpi, "--scpi", str),
+        control=args.control,
+        node=args.node,
+        inputs_v=inputs if args.can or inputs else INPUTS_V,
+        adapter=args.adapter,
+        port_only=args.port_only,
+    )
+
+
+def _pairs(words: list[str], option: str, kind: Callable[[str], Any]) -> dict[str, Any]:
+    found = {}
+    for word in words:
+        name, equals, value = word.partition("=")
+        try:
+            found[name] = kind(value)
+        except ValueError as e:
+            raise BadInput(f"{option} {word}: {value!r} is no number") from e
+        if not equals or not name or not value:
+            raise BadInput(f"{option} {word}: NAME=VALUE is wanted")
+    return found
