@@ -12,18 +12,21 @@ OBJCOPY   ?= objcopy
 PKGCONFIG ?= pkg-config
 PREFIX    ?= /usr/local
 LIBDIR    ?= $(PREFIX)/lib
-CFLAGS    ?= -O2 -g
 SAN       ?=#                         address,undefined
+CFLAGS    ?= $(if $(SAN),-O1 -g1,-O2 -g)
 WERROR    ?=#                         1: a warning is an error, as in make test
 BUILD     ?= build$(if $(filter clang%,$(notdir $(CC))),-clang)$(if $(SAN),-san)
 FUZZ_S    ?= 20
 BENCH_S   ?= 180#                      seconds of measuring; 60 for a quick look
 JOBS      ?= $(shell nproc)#           tests at once
 SAN_E2E   := $(wildcard tests/e2e/test_bad_*.py) $(patsubst %,tests/e2e/test_%.py,unit tools canopen faults_random cycles)
-# Build a part only, say DIRS='base chip' TESTS=test_ads1282 while the rest does not compile.
+# Build a part only, say DIRS='base chip' T=test_ads1282 while the rest does not compile.
 DIRS      ?= base trace phys chip canopen board unit link command fault control scpi scenario bench app api
 UNIT      := $(sort $(wildcard tests/unit/*/test_*.c tests/unit/*/*/test_*.c))
-TESTS     ?= $(basename $(notdir $(UNIT)))
+TIER      ?= all#                      tests of tests/tiers.toml: test, rest (what make test leaves out), all
+ifneq ($(filter check,$(MAKECMDGOALS)),)
+TESTS     ?= $(if $(T),$(foreach t,$(T),$(if $(filter %/$(t).c,$(UNIT)),$(t),$(error no file $(t).c in tests/unit))),$(shell python3 tools/tiers.py $(TIER) $(if $(SAN),--sanitizers)))
+endif
 
 VERSION := $(shell sed -n 's/^version = "\(.*\)"/\1/p' pyproject.toml)
 ABI     := $(shell sed -n 's/^\#define PSABENCH_ABI \([0-9]*\)/\1/p' emu/api/psabench.h)
@@ -55,7 +58,7 @@ say = $(if $(V),,@echo '  $(1)	$(2)')
 
 # build/gen/gen.mk is made from proto/psabench.yaml before anything is compiled and names the generated sources in GEN_SRC.
 PY     := .venv/bin/python
-NO_GEN := setup run test bench mutants clean help uninstall lock
+NO_GEN := setup run test test-all quick bench mutants clean help uninstall lock
 ifneq ($(wildcard proto/psabench.yaml),)
 ifneq ($(if $(MAKECMDGOALS),$(filter-out $(NO_GEN),$(MAKECMDGOALS)),all),)
 include build/gen/gen.mk
@@ -81,7 +84,7 @@ C_FILES   = $(sort $(shell find emu tests examples docs/examples -name '*.[ch]' 
 
 .SECONDARY:
 .DELETE_ON_ERROR:
-.PHONY: all lib setup run test bench bench-bin mutants fault-matrix alarms check pytest san builds e2e e2e-san e2e-vcan e2e-slc0 uml soak fuzz fuzz-check fuzz-long fuzz-bin fuzz-each lint format golden docs prove install uninstall wheel clean help lock
+.PHONY: all lib setup run quick test test-all bench bench-bin mutants fault-matrix alarms check pytest san builds e2e e2e-san e2e-vcan e2e-slc0 uml soak fuzz fuzz-check fuzz-long fuzz-bin fuzz-each lint format golden docs prove install uninstall wheel clean help lock
 
 ## all: the emulator, build/psa-emu (make CC=clang and make SAN=address,undefined build beside it, in build-clang and build-san)
 all: $(if $(MAIN),$(BUILD)/psa-emu,$(LIB_OBJ)) lib
@@ -174,10 +177,20 @@ run:
 	@$(MAKE) --no-print-directory all
 	@.venv/bin/psabench run all --out build/run
 
-## test: set-up, build, and every test there is, on virtual CAN; ends with one line of counts
+## quick: build and the tests nearest to what changed since the last commit, within a minute; says what it left out
+quick:
+	@tools/setup test
+	@$(PY) tools/quick.py
+
+## test: set-up, build, and the tests of tier `test` (tests/tiers.toml) in ten minutes; ends with one line of counts
 test:
 	@tools/setup test
-	@python3 tools/test_all.py
+	@python3 tools/test_all.py test
+
+## test-all: set-up, and every test there is: all compilers, sanitizers, links, pages, fuzz corpus, long runs
+test-all:
+	@tools/setup test
+	@python3 tools/test_all.py all
 
 ## bench: speed beside Verilog models of the same board (Icarus, Verilator) and against the targets, into docs/performance.md
 bench:
@@ -199,18 +212,18 @@ alarms: all
 fault-matrix: all
 	PSABENCH_FAULTS=all $(PY) -m pytest tests/conform/test_conform_faults.py
 
-## check: the C unit tests (one: make check TESTS=test_sched)
+## check: the C unit tests (one: make check T=test_sched)
 check: $(TEST_BIN)
-	@printf '%s\n' $(TEST_BIN) | xargs -P $(JOBS) -n 1 sh -c '{ echo "$$0"; timeout 900 "$$0"; } > "$$0.log" 2>&1; \
-	    rc=$$?; flock $(BUILD)/tests cat "$$0.log"; [ $$rc != 124 ] || echo "$$0: ended after 900 s"; [ $$rc = 0 ]'
+	@python3 tools/run_c_tests.py --jobs $(JOBS) $(TEST_BIN)
 
 ## san: the C unit tests under AddressSanitizer and UBSan
 san:
 	@$(MAKE) --no-print-directory SAN=address,undefined check
 
-## pytest: the Python tests, golden traces included
-pytest: bench-bin
-	$(PY) -m pytest $(wildcard tests/py tests/conform tests/golden)
+## pytest: the Python tests, golden traces included (a file: make pytest T=test_frames)
+PYTESTS = $(if $(T),$(foreach t,$(T),$(or $(shell find tests -name '$(t).py'),$(error no file $(t).py in tests))),tests/py tests/conform tests/golden)
+pytest: $(if $(T),all,bench-bin)
+	$(PY) -m pytest --tier $(TIER) $(PYTESTS)
 
 ## builds: the emulator and its library as clang, -O0 and -O3 make them, and under sanitizers, which must all do the same
 builds:
@@ -223,7 +236,7 @@ builds:
 
 ## e2e: the end-to-end suite over the transports of the host (socketcand, slcan on a pty)
 e2e: all
-	$(PY) -m pytest tests/e2e -m "host and not soak"
+	$(PY) -m pytest --tier $(TIER) tests/e2e -m "host and not soak"
 
 ## e2e-san: what strangers and their mistakes do to the emulator, with it under AddressSanitizer and UBSan
 e2e-san:
@@ -234,10 +247,10 @@ e2e-san:
 uml: e2e-vcan e2e-slc0
 
 e2e-vcan: all
-	tests/uml/native tests/uml/job_e2e.sh
+	tests/uml/native tests/uml/job_e2e.sh --tier $(TIER)
 
 e2e-slc0: all
-	tests/uml/slc0
+	tests/uml/slc0 --tier $(TIER)
 
 ## golden: write the golden traces anew; review the difference like code
 golden: all
@@ -277,9 +290,9 @@ $(BUILD)/fuzz/%: $(BUILD)/obj/tests/fuzz/%.o $(LIB_OBJ)
 	$(call say,LINK,$@)
 	$(Q)$(LINK) -fsanitize=fuzzer -o $@ $(filter %.o,$^) $(LIBS)
 
-## lint: formatting, warnings of gcc and clang, clang-tidy, include table and sizes, ruff, strict mypy
+## lint: formatting, warnings of gcc and clang, clang-tidy, include table and sizes, ruff, strict mypy (part: LINT=test, LINT=rest)
 lint: all
-	@FLAGS='$(FLAGS)' CXXLINT='$(CXXSTD) $(CXXWARN) -Iemu $(EIGEN)' tools/lint
+	@FLAGS='$(FLAGS)' CXXLINT='$(CXXSTD) $(CXXWARN) -Iemu $(EIGEN)' tools/lint $(LINT)
 
 ## format: rewrite C and Python in the project's format
 format:

@@ -1,13 +1,15 @@
 #!/usr/bin/env python3
-"""Every test there is, each step's output visible and kept in build/test/: `make test` after set-up.
+"""The steps of `make test` and `make test-all`, each one's output visible and kept in build/test/.
 
 Steps that keep all cores busy by themselves run one after the other; those of one process, two at a time. Of two, the
 earlier one is seen as it goes; the other one's output follows when that has ended, and grows in build/test/ meanwhile.
-Goes on after a failure, closes with the runners' own closing lines and a line of counts; exits 1 if anything failed.
-Usage: test_all.py [STEP...] (names as printed; all without one).
+Goes on after a failure, closes with a table of times, the runners' own closing lines, the reasons of skips and a line
+of counts; exits 1 if anything failed.
 """
 
+import argparse
 import itertools
+import json
 import os
 import re
 import signal
@@ -17,14 +19,16 @@ import threading
 import time
 from collections import deque
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 LOGS = ROOT / "build/test"
+OUTCOMES = "outcomes.json"
 MAKE = ["make", "--no-print-directory", f"-j{os.cpu_count() or 1}"]
 STRICT = [*MAKE, "WERROR=1"]
 SANITIZED = "SAN=address,undefined"
+TIERS = ("test", "rest", "all")
 LANES = 2  # more would do: memory and the real time of some tests set the limit
 GRACE_S = 20.0  # for a step that is ended: pytest's fixtures end what they have started
 
@@ -40,29 +44,47 @@ class Step:
     """Leaves room for another step beside it: one process, no time that is judged by this machine's clock."""
     builds: Sequence[str] = ()
     """What its make builds before it tests, where other steps build, too: made before it runs beside one."""
+    tiers: Sequence[str] = TIERS
+    """Where it belongs: `test` is make test, `rest` what make test leaves out, `all` make test-all."""
 
 
+TIER = "TIER={tier}"  # in a command: the tests of tests/tiers.toml that it runs
+REST = ("rest", "all")
 STEPS: list[Step] = [
     Step("build", [*STRICT, "all"], 600),
-    Step("lint", [*MAKE, "lint"], 1200),
-    Step("C tests, gcc", [*STRICT, "check"], 600),
-    Step("C tests, clang", [*STRICT, "CC=clang", "check"], 600),
-    Step("C tests, gcc, sanitizers", [*STRICT, SANITIZED, "check"], 1200),
-    Step("C tests, clang, sanitizers", [*STRICT, "CC=clang", SANITIZED, "check"], 1200),
-    Step("other builds of the emulator", [*STRICT, "builds"], 1200),
+    Step("lint", [*MAKE, "lint", "LINT=test"], 600, tiers=["test"]),
+    # The steps below compile everything with WERROR=1 and both compilers: lint does not look for their warnings again.
+    Step("lint", [*MAKE, "lint", "LINT={tier}", "BUILT=1"], 1200, tiers=REST),
+    Step("C tests, gcc", [*STRICT, "check", TIER], 600, tiers=["test", "all"]),
+    Step("C tests, gcc, sanitizers", [*STRICT, SANITIZED, "check", TIER], 1200),
+    Step("C tests, clang", [*STRICT, "CC=clang", "check"], 600, tiers=REST),
+    Step("C tests, clang, sanitizers", [*STRICT, "CC=clang", SANITIZED, "check"], 1200, tiers=REST),
+    Step("other builds of the emulator", [*STRICT, "builds"], 1200, tiers=REST),
     # The long ones first, and what fits beside them last: both lanes end at about the same time.
-    Step("end to end on vcan0", [*MAKE, "e2e-vcan"], 1200, beside=True, builds=["all"]),
-    Step("Python tests and golden traces", [*MAKE, "pytest"], 1800, beside=True, builds=["bench-bin"]),
-    Step("end to end on the host", [*MAKE, "e2e"], 1800, beside=True, builds=["all"]),
-    Step("real time, a minute each", [*MAKE, "soak"], 1800, beside=True, builds=["all"]),
-    Step("end to end, sanitizers", [*MAKE, "e2e-san"], 1800, beside=True, builds=[SANITIZED, "all"]),
-    Step("fuzz targets, a short run", [*STRICT, "fuzz-check"], 1800, beside=True),
-    Step("end to end on slc0", [*MAKE, "e2e-slc0"], 1200, beside=True, builds=["all"]),
+    Step("real time, a minute each", [*MAKE, "soak"], 1800, beside=True, builds=["all"], tiers=REST),
+    Step("Python tests and golden traces", [*MAKE, "pytest", TIER], 1800, beside=True, builds=["bench-bin"]),
+    Step("end to end on the host", [*MAKE, "e2e", TIER], 1800, beside=True, builds=["all"]),
+    Step("end to end on vcan0", [*MAKE, "e2e-vcan", TIER], 1200, beside=True, builds=["all"]),
+    Step("fuzz targets, a short run", [*STRICT, "fuzz-check"], 1800, beside=True, tiers=REST),
+    Step("end to end, sanitizers", [*MAKE, "e2e-san"], 1800, beside=True, builds=[SANITIZED, "all"], tiers=REST),
+    Step("end to end on slc0", [*MAKE, "e2e-slc0"], 1200, beside=True, builds=["all"], tiers=["test", "all"]),
 ]
+
+
+def steps_of(tier: str) -> list[Step]:
+    """Steps of a tier, their commands with its name filled in."""
+    return [
+        replace(step, command=[word.replace("{tier}", tier) for word in step.command])
+        for step in STEPS
+        if tier in step.tiers
+    ]
+
 
 ANSI = re.compile(r"\x1b\[[0-9;]*m")
 CMOCKA = re.compile(r"\[  (PASSED |FAILED |SKIPPED)[ ]?\] (\d+) test\(s\)")
 PYTEST = re.compile(r"=*\s*((?:\d+ [a-z]+(?:, )?)+) in [\d.]+s\b.*")
+TOTAL = re.compile(r"check: (\d+) passed, (\d+) failed, (\d+) skipped")
+SKIPPED = re.compile(r"SKIPPED (?!\(|\[\d+%\])\S.*")  # pytest's short summary (-ra), tools/run_c_tests.py
 PYTEST_KIND = {"passed": "passed", "failed": "failed", "error": "failed", "errors": "failed", "skipped": "skipped"} | {
     "xfailed": "skipped",
     "xpassed": "failed",
@@ -81,6 +103,8 @@ class Outcome:
     duration_s: float = 0.0
     cpu_s: float = 0.0
     closing: list[str] = field(default_factory=list)
+    reasons: list[str] = field(default_factory=list)
+    """Of what was skipped, a line each."""
 
     def read(self, line: str) -> None:
         """Count a runner's closing line; every other line changes nothing."""
@@ -92,6 +116,11 @@ class Outcome:
                 if kind in PYTEST_KIND:
                     self.add(PYTEST_KIND[kind], int(count))
             self.closing.append(line)
+        elif m := TOTAL.fullmatch(line):
+            for kind, count in zip(("passed", "failed", "skipped"), m.groups(), strict=True):
+                setattr(self, kind, int(count))  # of all programs, also those whose output was shown
+        elif SKIPPED.fullmatch(line):
+            self.reasons.append(line)
 
     def add(self, kind: str, count: int) -> None:
         setattr(self, kind, getattr(self, kind) + count)
@@ -183,7 +212,11 @@ class Run:
         )
         if self.cut:
             self._screen.line(name, f"--- {name}: ended after {self.outcome.duration_s:.0f} s\n")
-        self._screen.end(name, "ok" if self.outcome.status == 0 else "FAILED")
+        verdict = "ok" if self.outcome.status == 0 else "FAILED"
+        self._screen.line(
+            name, f"--- {name}: {verdict}, {self.outcome.passed} passed, {self.outcome.duration_s:.0f} s\n"
+        )
+        self._screen.end(name, verdict)
         return self.outcome
 
     def end(self) -> None:
@@ -283,7 +316,7 @@ def build_first(steps: Sequence[Step]) -> list[Step]:
 
 
 def summary(outcomes: Iterable[Outcome]) -> bool:
-    """Print a row for each step, pytest's closing lines and the sum; true when nothing failed and something ran."""
+    """Print a row for each step, pytest's closing lines, why tests were skipped and the sum; true when all is well."""
     outcomes = list(outcomes)
     print(f"\n{'step':34} {'':7} {'passed':>7} {'failed':>7} {'skipped':>7} {'time/s':>7} {'CPU/s':>7}")
     for o in outcomes:
@@ -293,23 +326,20 @@ def summary(outcomes: Iterable[Outcome]) -> bool:
     for o in outcomes:
         for line in o.closing:
             print(f"{o.name}:\n{line}")
+    for o in outcomes:
+        for line in o.reasons:
+            print(f"{o.name}: {line}")
     passed, failed, skipped = (sum(getattr(o, kind) for o in outcomes) for kind in ("passed", "failed", "skipped"))
     print(f"\n{passed} passed, {failed} failed, {skipped} skipped", flush=True)
     return bool(passed) and not failed
 
 
-def main(names: list[str]) -> int:
-    if unknown := set(names) - {step.name for step in STEPS}:
-        print(
-            f"test_all: no step {', '.join(sorted(unknown))}; there are: {'; '.join(s.name for s in STEPS)}",
-            file=sys.stderr,
-        )
-        return 2
+def run_steps(chosen: Sequence[Step], before: Sequence[Outcome] = ()) -> int:
+    """The steps, and a summary of them after that of what ran before. The exit status."""
     LOGS.mkdir(parents=True, exist_ok=True)
-    chosen = [step for step in STEPS if not names or step.name in names]
     screen = Screen()
     lanes: list[Lanes] = []
-    before = {n: signal.signal(n, signal.default_int_handler) for n in (signal.SIGINT, signal.SIGTERM)}
+    handlers = {n: signal.signal(n, signal.default_int_handler) for n in (signal.SIGINT, signal.SIGTERM)}
     try:
         for group in groups(chosen):
             for step in build_first(group):
@@ -318,13 +348,44 @@ def main(names: list[str]) -> int:
             lanes[-1].run()
     except KeyboardInterrupt:
         print("\ninterrupted")
-        summary(outcome for step in chosen if (outcome := ended(step, lanes)))
+        summary([*before, *(outcome for step in chosen if (outcome := ended(step, lanes)))])
         return 130
     finally:
-        for number, handler in before.items():
+        for number, handler in handlers.items():
             signal.signal(number, handler)
     # One without an outcome: its lane broke down, and what that printed says why.
-    return 0 if summary(ended(step, lanes) or Outcome(step.name, failed=1, status=1) for step in chosen) else 1
+    outcomes = [ended(step, lanes) or Outcome(step.name, failed=1, status=1) for step in chosen]
+    keep(outcomes)
+    return 0 if summary([*before, *outcomes]) else 1
+
+
+def keep(outcomes: Sequence[Outcome]) -> None:
+    """For a run of the rest that follows (--after)."""
+    (LOGS / OUTCOMES).write_text(json.dumps([asdict(o) for o in outcomes]), encoding="utf-8")
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Entry point: 0 all passed, 1 something failed, 2 bad input, 130 interrupted."""
+    p = argparse.ArgumentParser(prog="test_all.py", description=(__doc__ or "").split("\n")[0])
+    p.add_argument(
+        "tier", choices=TIERS, nargs="?", default="all", help="test: make test; rest: what it leaves out; all (default)"
+    )
+    p.add_argument("steps", nargs="*", metavar="STEP", help="only these steps, names as printed")
+    p.add_argument("--after", action="store_true", help="add what the run before this one counted to the total")
+    args = p.parse_args(argv)
+    steps = steps_of(args.tier)
+    if unknown := set(args.steps) - {step.name for step in steps}:
+        names = "; ".join(step.name for step in steps)
+        print(f"test_all: no step {', '.join(sorted(unknown))}; there are: {names}", file=sys.stderr)
+        return 2
+    before: list[Outcome] = []
+    if args.after:
+        try:
+            before = [Outcome(**fields) for fields in json.loads((LOGS / OUTCOMES).read_text(encoding="utf-8"))]
+        except (OSError, ValueError) as error:
+            print(f"test_all: --after: expected the counts of a run before this one: {error}", file=sys.stderr)
+            return 2
+    return run_steps([step for step in steps if not args.steps or step.name in args.steps], before)
 
 
 def ended(step: Step, lanes: Iterable[Lanes]) -> Outcome | None:
@@ -332,4 +393,4 @@ def ended(step: Step, lanes: Iterable[Lanes]) -> Outcome | None:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(main())

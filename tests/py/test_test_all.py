@@ -46,6 +46,7 @@ def tool() -> ModuleType:
         ("[  SKIPPED ] 1 test(s), listed below:", (0, 0, 1)),
         ("[  FAILED  ] name_of_a_test", (0, 0, 0)),
         ("[==========] 12 test(s) run.", (0, 0, 0)),
+        ("check: 12 passed, 1 failed, 2 skipped", (12, 1, 2)),
         ("the test says: 5 passed in the street", (0, 0, 0)),
     ],
 )
@@ -211,6 +212,64 @@ def test_steps_that_run_at_once_are_built_before_and_others_run_alone(tool: Modu
     assert tool.build_first(together[:1]) == []
 
 
+def test_the_total_of_the_c_tests_counts_and_not_the_output_shown_before_it(tool: ModuleType) -> None:
+    outcome = tool.Outcome("x")
+    for line in (
+        "[  PASSED  ] 1 test(s).",
+        "[  FAILED  ] 2 test(s), listed below:",
+        "check: 5 passed, 2 failed, 0 skipped",
+    ):
+        outcome.read(line)
+    assert (outcome.passed, outcome.failed, outcome.skipped) == (5, 2, 0)
+
+
+@pytest.mark.parametrize(
+    ("line", "kept"),
+    [
+        ("SKIPPED [2] tests/py/test_x.py:3: no recordings here", True),
+        ("SKIPPED test_api: test_a", True),
+        ("tests/py/test_x.py::test_a SKIPPED (no recordings here) [ 3%]", False),
+        ("SKIPPED", False),
+    ],
+)
+def test_reasons_of_skips_are_kept(tool: ModuleType, line: str, kept: bool) -> None:
+    outcome = tool.Outcome("x")
+    outcome.read(line + "\n")
+    assert outcome.reasons == ([line] if kept else [])
+
+
+def test_the_rest_is_what_make_test_leaves_out(tool: ModuleType) -> None:
+    """A step of make test-all that runs tests of a tier is in both parts; every other one is in one of them, whole."""
+    part = {tier: {step.name: step.command for step in tool.steps_of(tier)} for tier in tool.TIERS}
+    assert part["all"].keys() == part["test"].keys() | part["rest"].keys()
+    twice = part["test"].keys() & part["rest"].keys()
+    for name in twice - {"build"}:
+        words = {tier: " ".join(part[tier][name]) for tier in tool.TIERS}
+        assert words["test"] != words["rest"] != words["all"], name
+    for name in part["all"].keys() - twice:
+        whole = part["test"].get(name) or part["rest"][name]
+        assert [w for w in whole if "TIER" not in w] == [w for w in part["all"][name] if "TIER" not in w]
+
+
+def test_the_rest_adds_to_the_total_what_ran_before(
+    tool: ModuleType, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    monkeypatch.setattr(tool, "LOGS", tmp_path)
+    steps = [
+        tool.Step("first", [*SAY, "print('= 1 failed, 2 passed in 1.0s ='); exit(1)"], 9.0, tiers=["test"]),
+        tool.Step("second", [*SAY, "print('= 3 passed in 1.0s =')"], 9.0, tiers=["rest"]),
+    ]
+    monkeypatch.setattr(tool, "STEPS", steps)
+    assert tool.main(["rest", "--after"]) == 2
+    assert "--after: expected the counts of a run before this one" in capsys.readouterr().err
+    assert tool.main(["test"]) == 1
+    assert tool.main(["rest"]) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == "3 passed, 0 failed, 0 skipped"
+    assert tool.main(["test"]) == 1
+    assert tool.main(["rest", "--after"]) == 1
+    assert capsys.readouterr().out.splitlines()[-1] == "5 passed, 1 failed, 0 skipped"
+
+
 DRIVER = """
 import importlib.util, pathlib, sys
 spec = importlib.util.spec_from_file_location("test_all_tool", sys.argv[1])
@@ -260,5 +319,5 @@ def at_work(log: Path) -> int:
 
 
 def test_an_unknown_step_is_refused(tool: ModuleType, capsys: pytest.CaptureFixture[str]) -> None:
-    assert tool.main(["no such step"]) == 2
+    assert tool.main(["all", "no such step"]) == 2
     assert "no step no such step; there are: build; lint" in capsys.readouterr().err
