@@ -11,8 +11,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-# A room is a folder of emu/ with sources: a layer, or a part of one ("chip/ads1282", "board/psa2"). A layer may include what is
-# below it; parts are rooms with doors of their own: see may_include(). gen is generated from proto/.
+# A room is a folder of emu/ with sources: a layer, or a part of one ("chip/ads1282", "board/psa2"). A layer may include
+# the layers of its row; parts do not include each other: may_include(). gen is generated from proto/.
 _MODELS = {"base", "trace", "phys", "chip", "canopen", "board", "gen"}
 _COMMANDS = _MODELS | {"board/*", "unit", "command", "fault"}
 MAY_INCLUDE = {
@@ -58,6 +58,7 @@ KINDS = ("*.c", "*.h", "*.cpp", "*.hpp")
 FUNCTION_REASON, FUNCTION_MAX, FUNCTION_MEDIAN = 40, 70, 15  # lines, braces included
 SOURCE_MAX, HEADER_MAX = 600, 150  # lines; a file is about one topic, and the cap does not cut it
 HEADER_EXCEPTIONS = {"emu/api/psabench.h": 250, "emu/nav/nav.h": 250}  # installed alone: manuals of whole libraries
+ONE_WORD = 497  # functions whose name is one word, which neither grep nor a backtrace finds; the goal is 60
 REASON = re.compile(r"\blong:", re.IGNORECASE)  # in the comment above the function: "// Long: one row per opcode."
 INCLUDE = re.compile(r'\s*#\s*include\s+([<"])([^>"]+)[>"]')
 
@@ -86,8 +87,8 @@ def functions(path: Path, text: list[str]) -> Iterator[Function]:
             while head > 0 and text[head] and not text[head].startswith(("}", "#", "/*")):
                 head -= 1
             above = text[head:start]
-            signature = " ".join(line for line in above if not line.startswith("//"))
-            name = re.search(r"(\w+)\s*\(", signature)
+            signature = re.sub(r"/\*.*?\*/|//[^\n]*", "", "\n".join(above), flags=re.DOTALL)
+            name = re.search(r"(\w+)\s*\((?!\()", re.sub(r"__attribute__\(\(.*?\)\)\)?", "", signature))
             yield Function(
                 path,
                 start,
@@ -187,6 +188,10 @@ def main(root: Path) -> int:
     median = statistics.median([f.length for f in bodies] or [0])
     if median > FUNCTION_MEDIAN:
         breaches.append(f"emu: the median function has {median:g} lines, at most {FUNCTION_MEDIAN}")
+    one_word = sorted(f"{f.path}:{f.line}: {f.name}()" for f in bodies if "_" not in f.name)
+    if len(one_word) > ONE_WORD:
+        breaches += [f"{name}: the name does not say its object" for name in one_word]
+    print(f"one-word function names: {len(one_word)} (limit {ONE_WORD})")
     for line in breaches:
         print(line)
     longest = max(bodies, key=lambda f: f.length, default=None)

@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
-"""What the compiled core must not contain: mutable globals, allocation, output, clocks, inexact libm functions.
+"""What the compiled core must not contain: mutable globals, allocation, output, clocks, inexact libm, circles.
 
-Usage: check_symbols.py OBJECT_ROOT (build/obj). Reads every object below emu/ but those of link, scenario, bench and app,
-which may do all this. Two compilers or machines give equal bytes only while no result depends on a libm whose last digit is its own.
+Usage: check_symbols.py OBJECT_ROOT (build/obj). Reads every object below emu/; those of link, scenario, bench and app
+may do all this, but for circles: files, or folders, that call each other, directly or through others. Two compilers or
+machines give equal bytes only while no result depends on a libm whose last digit is its own.
 """
 
 import subprocess
@@ -11,6 +12,7 @@ from pathlib import Path
 
 FREE_FOLDERS = {"link", "app", "bench", "scenario"}
 CXX_FOLDERS = {"nav"}
+CIRCLES = 1, 20  # of symbols between folders, and in all; the goal is 0 and 6
 ALLOCATOR_FOLDERS = {"command", "control", "fault", "scpi", "api"}  # through cJSON; the library's benches and parts
 LIBM = (
     "sin cos tan asin acos atan atan2 sinh cosh tanh asinh acosh atanh exp exp2 expm1 "
@@ -53,6 +55,40 @@ def mutable(objects: Path) -> list[str]:
     return names
 
 
+def calls(objects: list[Path]) -> dict[Path, set[Path]]:
+    """Each object with the others that define what it needs."""
+    home: dict[str, Path] = {}
+    for path in objects:
+        out = subprocess.run(["nm", "-g", "--defined-only", "--format=posix", path], capture_output=True, text=True)
+        home |= {line.split()[0]: path for line in out.stdout.splitlines()}
+    return {path: {home[n] for n in undefined(path) if n in home} - {path} for path in objects}
+
+
+def circles(graph: dict[Path, set[Path]]) -> list[list[Path]]:
+    """Sets of two or more nodes that all reach each other."""
+    reach = {node: set(to) for node, to in graph.items()}
+    for middle in graph:
+        for to in reach.values():
+            if middle in to:
+                to |= reach[middle]
+    mutual = {frozenset({a} | {b for b in reach[a] if a in reach.get(b, ())}) for a in reach if a in reach[a]}
+    return sorted(sorted(group) for group in mutual if len(group) > 1)
+
+
+def circle_breaches(root: Path, objects: list[Path], limits: tuple[int, int] = CIRCLES) -> list[str]:
+    """Circles between folders, and those between files, where there are more than the limits."""
+    name = {path: path.relative_to(root / "emu").with_suffix("") for path in objects}
+    files = {name[a]: {name[b] for b in to} for a, to in calls(objects).items()}
+    folders: dict[Path, set[Path]] = {}
+    for a, to in files.items():
+        folders.setdefault(a.parent, set()).update(b.parent for b in to if b.parent != a.parent)
+    found = circles(folders), circles(files)
+    for groups, limit, where in zip(found, limits, ("between folders", "in all"), strict=True):
+        print(f"symbol circles {where}: {len(groups)} (limit {limit})")
+    over = [group for groups, limit in zip(found, limits, strict=True) if len(groups) > limit for group in groups]
+    return [f"circle: {', '.join(map(str, group))}" for group in over]
+
+
 def main(root: Path) -> int:
     breaches = []
     objects = sorted((root / "emu").rglob("*.o"))
@@ -66,6 +102,7 @@ def main(root: Path) -> int:
         for name in undefined(path):
             if name in FORBIDDEN and not (folder in ALLOCATOR_FOLDERS and FORBIDDEN[name] == "allocates"):
                 breaches.append(f"{source}: calls {name}(), which {FORBIDDEN[name]}")
+    breaches += circle_breaches(root, objects)
     for line in breaches:
         print(line)
     print(f"symbols: {len(objects)} objects, {len(breaches)} breaches")

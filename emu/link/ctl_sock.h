@@ -5,7 +5,7 @@
 #ifndef PSABENCH_LINK_CTL_SOCK_H
 #define PSABENCH_LINK_CTL_SOCK_H
 
-#include "link/line/text_link.h"
+#include "link/text_link.h"
 
 #define CTL_LINE_MAX    4096u
 #define CTL_CLIENTS_MAX 16u

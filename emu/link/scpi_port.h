@@ -6,8 +6,8 @@
 #ifndef PSABENCH_LINK_SCPI_PORT_H
 #define PSABENCH_LINK_SCPI_PORT_H
 
-#include "link/line/text_link.h"
 #include "link/pty.h"
+#include "link/text_link.h"
 
 #define SCPI_PORT_LINE_MAX    4096u
 #define SCPI_PORT_CLIENTS_MAX 16u

@@ -2,7 +2,7 @@
 #include "fuzz.h"
 
 #include "link/hex.h"
-#include "link/line/lines.h"
+#include "link/lines.h"
 
 #include <string.h>
 

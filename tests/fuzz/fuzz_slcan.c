@@ -2,7 +2,7 @@
 #include "fuzz.h"
 
 #include "link/can/slcan.h"
-#include "link/line/lines.h"
+#include "link/lines.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {

@@ -1,5 +1,6 @@
 """The checks of tools/ find what they are for: each row is one breach in an otherwise clean tree."""
 
+import importlib
 import shutil
 import subprocess
 import sys
@@ -132,3 +133,26 @@ def test_symbols_of_the_core(tmp_path: Path, cc: str, folder: str, text: str, sa
         [sys.executable, ROOT / "tools/check_symbols.py", tmp_path / "obj"], capture_output=True, text=True, timeout=30
     )
     assert (done.returncode, says in done.stdout) == (1 if says else 0, True), done.stdout
+
+
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc")
+def test_circles_of_symbols_are_found(tmp_path: Path) -> None:
+    texts = {
+        "a/x": "int y(void); int x(void) { return y(); }",
+        "b/y": "int z(void); int y(void) { return z(); }",
+        "a/z": "int w(void); int z(void) { return w(); }",
+        "c/w": "int w(void) { return 1; }",
+        "c/p": "int q(void); int p(int n) { return n ? q() : 0; }",
+        "c/q": "int p(int n); int q(void) { return p(0); }",
+    }
+    for name, text in texts.items():
+        path = tmp_path / "emu" / f"{name}.o"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        subprocess.run(["gcc", "-x", "c", "-c", "-o", path, "-"], input=text, text=True, check=True, timeout=30)
+    sys.path.insert(0, str(ROOT / "tools"))
+    check_symbols = importlib.import_module("check_symbols")
+    objects = sorted(tmp_path.rglob("*.o"))
+    found = check_symbols.circle_breaches(tmp_path, objects, limits=(0, 0))
+    assert found == ["circle: a, b", "circle: c/p, c/q"]
+    assert check_symbols.circle_breaches(tmp_path, objects, limits=(1, 0)) == found[1:]
+    assert check_symbols.circle_breaches(tmp_path, objects, limits=(1, 1)) == []

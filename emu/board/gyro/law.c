@@ -1,7 +1,7 @@
 #include "board/gyro/law.h"
 
 #include "base/detmath.h"
-#include "phys/earth.h"
+#include "phys/motion/earth.h"
 
 #include <math.h>
 

@@ -8,8 +8,8 @@
 #define PSABENCH_LINK_CAN_SLCAN_PTY_H
 
 #include "link/can/can_hub.h"
-#include "link/line/text_link.h"
 #include "link/pty.h"
+#include "link/text_link.h"
 
 struct slcan_pty {
     struct text_link io; /* first: the master */

@@ -2,9 +2,9 @@
 #include "link/can/socketcand_tcp.h"
 
 #include "link/can/socketcand.h"
-#include "link/line/text_link.h"
 #include "link/tcp_listen.h"
 #include "link/tcp_peer.h"
+#include "link/text_link.h"
 
 #include <errno.h>
 #include <netinet/in.h>

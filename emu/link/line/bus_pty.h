@@ -8,8 +8,8 @@
 #define PSABENCH_LINK_LINE_BUS_PTY_H
 
 #include "link/line/bus_text.h"
-#include "link/line/text_link.h"
 #include "link/pty.h"
+#include "link/text_link.h"
 
 /* The board, in the application's hands. */
 struct bus_pty_ops {

@@ -9,7 +9,7 @@
 #define PSABENCH_PHYS_MOTION_HEAD_H
 
 #include "base/rng.h"
-#include "phys/earth.h"
+#include "phys/motion/earth.h"
 #include "phys/motion/motion.h"
 
 #include <stdbool.h>

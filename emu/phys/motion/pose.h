@@ -6,7 +6,7 @@
 #ifndef PSABENCH_PHYS_MOTION_POSE_H
 #define PSABENCH_PHYS_MOTION_POSE_H
 
-#include "phys/earth.h"
+#include "phys/motion/earth.h"
 
 enum pose_axis { POSE_X, POSE_Y, POSE_Z };
 

@@ -9,7 +9,7 @@
 #ifndef PSABENCH_PHYS_MOTION_VEHICLE_H
 #define PSABENCH_PHYS_MOTION_VEHICLE_H
 
-#include "phys/earth.h"
+#include "phys/motion/earth.h"
 
 #include <stdbool.h>
 #include <stdint.h>

@@ -2,7 +2,7 @@
 #define _POSIX_C_SOURCE 200809L
 #include "link/can/socketcand.h"
 #include "link/can/socketcand_tcp.h"
-#include "link/line/text_link.h"
+#include "link/text_link.h"
 
 #include "rig.h"
 

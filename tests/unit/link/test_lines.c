@@ -1,7 +1,7 @@
 #include "rig.h"
 
 #include "base/rng.h"
-#include "link/line/lines.h"
+#include "link/lines.h"
 
 #include <string.h>
 

@@ -2,7 +2,7 @@
 #include "rig.h"
 
 #include "base/detmath.h"
-#include "phys/earth.h"
+#include "phys/motion/earth.h"
 #include "phys/motion/pose.h"
 
 #include <math.h>

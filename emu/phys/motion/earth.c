@@ -1,4 +1,4 @@
-#include "phys/earth.h"
+#include "phys/motion/earth.h"
 
 #include "base/detmath.h"
 

@@ -3,10 +3,10 @@
  * Input is split into lines and handed over one at a time while the owner takes them; what it does not take yet stays
  * here and then in the kernel, so that a peer that is too fast is slowed down and nothing is lost. Output waits in a
  * bounded buffer. */
-#ifndef PSABENCH_LINK_LINE_TEXT_LINK_H
-#define PSABENCH_LINK_LINE_TEXT_LINK_H
+#ifndef PSABENCH_LINK_TEXT_LINK_H
+#define PSABENCH_LINK_TEXT_LINK_H
 
-#include "link/line/lines.h"
+#include "link/lines.h"
 #include "link/link.h"
 #include "link/outbuf.h"
 

@@ -2,8 +2,8 @@
  *
  * Frames: n is north-east-down at the site; l is the bench's level frame: x towards azimuth_rad, z down, y to the right of x.
  * Pure functions. */
-#ifndef PSABENCH_PHYS_EARTH_H
-#define PSABENCH_PHYS_EARTH_H
+#ifndef PSABENCH_PHYS_MOTION_EARTH_H
+#define PSABENCH_PHYS_MOTION_EARTH_H
 
 #include <stdbool.h>
 

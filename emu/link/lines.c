@@ -1,4 +1,4 @@
-#include "link/line/lines.h"
+#include "link/lines.h"
 
 #include <assert.h>
 #include <string.h>

@@ -1,4 +1,4 @@
-#include "link/line/text_link.h"
+#include "link/text_link.h"
 
 #include <errno.h>
 #include <stdlib.h>

@@ -2,8 +2,8 @@
  *
  * A line longer than the buffer is skipped to the next terminator, counted, and reported once as overlong; a truncated
  * line is never completed by bytes of the line before it. Pure: the caller reads the descriptor. */
-#ifndef PSABENCH_LINK_LINE_LINES_H
-#define PSABENCH_LINK_LINE_LINES_H
+#ifndef PSABENCH_LINK_LINES_H
+#define PSABENCH_LINK_LINES_H
 
 #include <stdbool.h>
 #include <stddef.h>
