@@ -5,6 +5,7 @@ inherit that, and the tests that press Ctrl-C would wait for ever.
 """
 
 import signal
+import time
 from pathlib import Path
 
 import hypothesis
@@ -23,6 +24,33 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(
         "--tier", choices=tiers.CHOICES, default="all", help="tests of tests/tiers.toml: test, rest, all (default)"
     )
+    parser.addoption("--budget", type=float, metavar="S", help="begin no test after so many seconds (make quick)")
+
+
+class Budget:
+    """Begins no test after its time, and says how many it left out."""
+
+    def __init__(self, budget_s: float) -> None:
+        self._budget_s = budget_s
+        self._end_s = time.monotonic() + budget_s
+        self._left: list[str] = []
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_runtest_protocol(self, item: pytest.Item) -> object:
+        if time.monotonic() < self._end_s:
+            return None
+        self._left.append(item.path.stem)
+        return True  # has been dealt with
+
+    def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
+        if self._left:
+            files = ", ".join(dict.fromkeys(self._left))
+            terminalreporter.write_line(f"left out: {len(self._left)} tests, after {self._budget_s:g} s: {files}")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    if (budget_s := config.getoption("budget")) is not None:
+        config.pluginmanager.register(Budget(budget_s))
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
