@@ -51,20 +51,15 @@ static const struct api_option options[] = {OPTIONS(API_OPTION_ROW)};
 
 /* ---- pins ---- */
 
-typedef void pin_fn(struct ad7712 *a, bool level, int64_t t_ns);
-
-static void set_pin(struct psabench_part *p, unsigned arg, bool level, int64_t t_ns)
-{
-    static pin_fn *const fn[] = {ad7712_a0_pin,   ad7712_rfs_pin,     ad7712_tfs_pin,  ad7712_mode_pin,
-                                 ad7712_sync_pin, ad7712_standby_pin, ad7712_sclk_pin, ad7712_sdata_pin};
-    fn[arg](chip(p), level, t_ns);
-}
-
-static bool get_drdy(const struct psabench_part *p, unsigned arg)
-{
-    (void)arg;
-    return ad7712_drdy(cchip(p));
-}
+API_SET_PIN(set_sdata, part_ad7712, ad7712_sdata_pin);
+API_SET_PIN(set_sclk, part_ad7712, ad7712_sclk_pin);
+API_SET_PIN(set_a0, part_ad7712, ad7712_a0_pin);
+API_SET_PIN(set_rfs, part_ad7712, ad7712_rfs_pin);
+API_SET_PIN(set_tfs, part_ad7712, ad7712_tfs_pin);
+API_SET_PIN(set_mode, part_ad7712, ad7712_mode_pin);
+API_SET_PIN(set_sync, part_ad7712, ad7712_sync_pin);
+API_SET_PIN(set_standby, part_ad7712, ad7712_standby_pin);
+API_GET_PIN(get_drdy, part_ad7712, ad7712_drdy);
 
 /* Levels on the wires: of whoever drives them. */
 static bool get_sdata(const struct psabench_part *p, unsigned arg)
@@ -82,14 +77,14 @@ static bool get_sclk(const struct psabench_part *p, unsigned arg)
 
 static const struct api_pin pins[] = {
     {"DRDY", API_OUT, .get = get_drdy},
-    {"SDATA", API_BOTH, .set = set_pin, .get = get_sdata, .arg = 7},
-    {"SCLK", API_BOTH, .set = set_pin, .get = get_sclk, .arg = 6},
-    {"A0", API_IN, .set = set_pin, .arg = 0},
-    {"RFS", API_IN, .idle = true, .set = set_pin, .arg = 1},
-    {"TFS", API_IN, .idle = true, .set = set_pin, .arg = 2},
-    {"MODE", API_IN, .set = set_pin, .arg = 3},
-    {"SYNC", API_IN, .idle = true, .set = set_pin, .arg = 4},
-    {"STANDBY", API_IN, .idle = true, .set = set_pin, .arg = 5},
+    {"SDATA", API_BOTH, .set = set_sdata, .get = get_sdata},
+    {"SCLK", API_BOTH, .set = set_sclk, .get = get_sclk},
+    {"A0", API_IN, .set = set_a0},
+    {"RFS", API_IN, .idle = true, .set = set_rfs},
+    {"TFS", API_IN, .idle = true, .set = set_tfs},
+    {"MODE", API_IN, .set = set_mode},
+    {"SYNC", API_IN, .idle = true, .set = set_sync},
+    {"STANDBY", API_IN, .idle = true, .set = set_standby},
 };
 
 /* ---- the chip ---- */
@@ -107,14 +102,6 @@ static double source_ohm(void *ctx, unsigned channel, int64_t t_ns)
     (void)channel;
     (void)t_ns;
     return ((const struct part_ad7712 *)ctx)->source_ohm;
-}
-
-/* The pin is read after the event that moved it. */
-static void on_pin(void *ctx, bool level, int64_t t_ns)
-{
-    (void)ctx;
-    (void)level;
-    (void)t_ns;
 }
 
 static enum ad7712_part part_of(const struct api_kind *k)
@@ -145,9 +132,9 @@ static bool open_ad7712(struct psabench_part *p, char *why, size_t cap)
     const struct ad7712_io io = {.ctx = p,
                                  .vin_v = vin_v,
                                  .source_ohm = s->source_ohm > 0.0 ? source_ohm : NULL,
-                                 .drdy = on_pin,
-                                 .sdata = on_pin,
-                                 .sclk = on_pin};
+                                 .drdy = api_ignore_edge,
+                                 .sdata = api_ignore_edge,
+                                 .sclk = api_ignore_edge};
     ad7712_init(chip(p), &cfg, &io, &p->bench->sched, api_noise(p, "adc"));
     ad7712_power_up(chip(p), p->bench->sched.now_ns);
     return true;
@@ -177,34 +164,16 @@ static uint64_t iout_na(const struct psabench_part *p)
 }
 
 #define N(field) API_COUNTER(#field, part_ad7712, chip.n.field)
+#define G        API_COUNTER_GET
 static const struct api_counter counters[] = {
-    N(conversions),
-    N(calibrations),
-    N(restarts),
-    N(power_downs),
-    N(overruns),
-    N(lost_words),
-    N(torn_reads),
-    N(stale_reads),
-    N(blocked_reads),
-    N(over_reads),
-    N(dropped),
-    N(refused),
-    N(over_writes),
-    N(clipped),
-    N(overloads),
-    N(cal_clamped),
-    N(bad_fs),
-    N(bad_channel),
-    N(bad_bit),
-    N(a0_violations),
-    N(sclk_violations),
-    N(sdata_violations),
-    N(frame_violations),
-    {"sampling_hz", .get = sampling_hz},
-    {"iout_na", .get = iout_na},
+    N(conversions),     N(calibrations),     N(restarts),         N(power_downs),   N(overruns),
+    N(lost_words),      N(torn_reads),       N(stale_reads),      N(blocked_reads), N(over_reads),
+    N(dropped),         N(refused),          N(over_writes),      N(clipped),       N(overloads),
+    N(cal_clamped),     N(bad_fs),           N(bad_channel),      N(bad_bit),       N(a0_violations),
+    N(sclk_violations), N(sdata_violations), N(frame_violations), G(sampling_hz),   G(iout_na),
 };
 #undef N
+#undef G
 
 #define COMMON                                                                                                         \
     .size = sizeof(struct part_ad7712), .options = options, .option_count = sizeof options / sizeof *options,          \

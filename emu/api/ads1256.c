@@ -51,52 +51,19 @@ static const struct api_option options[] = {OPTIONS(API_OPTION_ROW)};
 
 /* ---- pins ---- */
 
-static void set_cs(struct psabench_part *p, unsigned arg, bool level, int64_t t_ns)
-{
-    (void)arg;
-    ads1256_cs_pin(chip(p), level, t_ns);
-}
-
-static void set_sclk(struct psabench_part *p, unsigned arg, bool level, int64_t t_ns)
-{
-    (void)arg;
-    ads1256_sclk_pin(chip(p), level, t_ns);
-}
-
-static void set_din(struct psabench_part *p, unsigned arg, bool level, int64_t t_ns)
-{
-    (void)arg;
-    ads1256_din_pin(chip(p), level, t_ns);
-}
-
-static void set_sync(struct psabench_part *p, unsigned arg, bool level, int64_t t_ns)
-{
-    (void)arg;
-    ads1256_sync_pin(chip(p), level, t_ns);
-}
-
-static void set_reset(struct psabench_part *p, unsigned arg, bool level, int64_t t_ns)
-{
-    (void)arg;
-    ads1256_reset_pin(chip(p), level, t_ns);
-}
+API_SET_PIN(set_cs, part_ads1256, ads1256_cs_pin);
+API_SET_PIN(set_sclk, part_ads1256, ads1256_sclk_pin);
+API_SET_PIN(set_din, part_ads1256, ads1256_din_pin);
+API_SET_PIN(set_sync, part_ads1256, ads1256_sync_pin);
+API_SET_PIN(set_reset, part_ads1256, ads1256_reset_pin);
 
 static void set_gpio(struct psabench_part *p, unsigned d, bool level, int64_t t_ns)
 {
     ads1256_gpio_pin(chip(p), d, level, t_ns);
 }
 
-static bool get_drdy(const struct psabench_part *p, unsigned arg)
-{
-    (void)arg;
-    return ads1256_drdy(cchip(p));
-}
-
-static bool get_dout(const struct psabench_part *p, unsigned arg)
-{
-    (void)arg;
-    return ads1256_dout(cchip(p));
-}
+API_GET_PIN(get_drdy, part_ads1256, ads1256_drdy);
+API_GET_PIN(get_dout, part_ads1256, ads1256_dout);
 
 /* D0 as CLKOUT is drawn low: its edges are no events (counter clkout_hz). */
 static bool get_gpio(const struct psabench_part *p, unsigned d)
@@ -134,14 +101,6 @@ static double source_ohm(void *ctx, unsigned ain, int64_t t_ns)
     return ((const struct part_ads1256 *)ctx)->source_ohm;
 }
 
-/* The pin is read after the event that moved it. */
-static void on_drdy(void *ctx, bool level, int64_t t_ns)
-{
-    (void)ctx;
-    (void)level;
-    (void)t_ns;
-}
-
 static bool open_ads1256(struct psabench_part *p, char *why, size_t cap)
 {
     (void)why;
@@ -160,7 +119,7 @@ static bool open_ads1256(struct psabench_part *p, char *why, size_t cap)
                                     .strict_bus = s->strict_bus,
                                     .strict_cs = s->strict_cs};
     const struct ads1256_io io = {
-        .ctx = p, .ain_v = ain_v, .drdy = on_drdy, .source_ohm = s->source_ohm > 0.0 ? source_ohm : NULL};
+        .ctx = p, .ain_v = ain_v, .drdy = api_ignore_edge, .source_ohm = s->source_ohm > 0.0 ? source_ohm : NULL};
     ads1256_init(chip(p), &cfg, &io, &p->bench->sched, api_noise(p, "adc"));
     ads1256_power_up(chip(p), p->bench->sched.now_ns);
     return true;
@@ -168,8 +127,7 @@ static bool open_ads1256(struct psabench_part *p, char *why, size_t cap)
 
 static int peek(const struct psabench_part *p, unsigned address)
 {
-    const struct reg_file *f = &cchip(p)->regs;
-    return address < f->count && f->map[address].name ? reg_peek(f, address) : -1;
+    return api_peek_reg(&cchip(p)->regs, address);
 }
 
 static uint64_t clkout_hz(const struct psabench_part *p)
@@ -178,33 +136,16 @@ static uint64_t clkout_hz(const struct psabench_part *p)
 }
 
 #define N(field) API_COUNTER(#field, part_ads1256, chip.n.field)
+#define G        API_COUNTER_GET
 #define R(field) API_COUNTER(#field, part_ads1256, chip.regs.field)
 static const struct api_counter counters[] = {
-    N(conversions),
-    N(calibrations),
-    N(restarts),
-    N(power_downs),
-    N(overruns),
-    N(torn_reads),
-    N(window_reads),
-    N(clipped),
-    N(buffer_clipped),
-    N(range_exceeded),
-    N(bad_mux),
-    N(cal_clamped),
-    N(bad_opcodes),
-    N(refused),
-    N(bad_drate),
-    N(dropped),
-    N(gap_violations),
-    N(sclk_violations),
-    N(din_violations),
-    R(bad_access),
-    R(ro_write),
-    R(unimp_access),
-    {"clkout_hz", .get = clkout_hz},
+    N(conversions),    N(calibrations), N(restarts),       N(power_downs),    N(overruns),       N(torn_reads),
+    N(window_reads),   N(clipped),      N(buffer_clipped), N(range_exceeded), N(bad_mux),        N(cal_clamped),
+    N(bad_opcodes),    N(refused),      N(bad_drate),      N(dropped),        N(gap_violations), N(sclk_violations),
+    N(din_violations), R(bad_access),   R(ro_write),       R(unimp_access),   G(clkout_hz),
 };
 #undef N
+#undef G
 #undef R
 
 #define COMMON                                                                                                         \

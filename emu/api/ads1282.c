@@ -63,35 +63,11 @@ static const struct api_option options_1281[] = {OPTIONS_1281(API_OPTION_ROW)};
 
 /* ---- pins ---- */
 
-static void set_sclk(struct psabench_part *p, unsigned arg, bool level, int64_t t_ns)
-{
-    (void)arg;
-    ads1282_sclk_pin(chip(p), level, t_ns);
-}
-
-static void set_din(struct psabench_part *p, unsigned arg, bool level, int64_t t_ns)
-{
-    (void)arg;
-    ads1282_din_pin(chip(p), level, t_ns);
-}
-
-static void set_sync(struct psabench_part *p, unsigned arg, bool level, int64_t t_ns)
-{
-    (void)arg;
-    ads1282_sync_pin(chip(p), level, t_ns);
-}
-
-static void set_reset(struct psabench_part *p, unsigned arg, bool level, int64_t t_ns)
-{
-    (void)arg;
-    ads1282_reset_pin(chip(p), level, t_ns);
-}
-
-static void set_pwdn(struct psabench_part *p, unsigned arg, bool level, int64_t t_ns)
-{
-    (void)arg;
-    ads1282_pwdn_pin(chip(p), level, t_ns);
-}
+API_SET_PIN(set_sclk, part_ads1282, ads1282_sclk_pin);
+API_SET_PIN(set_din, part_ads1282, ads1282_din_pin);
+API_SET_PIN(set_sync, part_ads1282, ads1282_sync_pin);
+API_SET_PIN(set_reset, part_ads1282, ads1282_reset_pin);
+API_SET_PIN(set_pwdn, part_ads1282, ads1282_pwdn_pin);
 
 /* In register mode the part does not look at them. */
 static void set_mode(struct psabench_part *p, unsigned bit, bool level, int64_t t_ns)
@@ -105,23 +81,9 @@ static void set_mode(struct psabench_part *p, unsigned bit, bool level, int64_t 
     if (s->pin_mode) ads1282_mode_pins(&s->chip, &mode, t_ns);
 }
 
-static bool get_drdy(const struct psabench_part *p, unsigned arg)
-{
-    (void)arg;
-    return ads1282_drdy(&cself(p)->chip);
-}
-
-static bool get_dout(const struct psabench_part *p, unsigned arg)
-{
-    (void)arg;
-    return ads1282_dout(&cself(p)->chip);
-}
-
-static bool get_mflag(const struct psabench_part *p, unsigned arg)
-{
-    (void)arg;
-    return ads1282_mflag(&cself(p)->chip);
-}
+API_GET_PIN(get_drdy, part_ads1282, ads1282_drdy);
+API_GET_PIN(get_dout, part_ads1282, ads1282_dout);
+API_GET_PIN(get_mflag, part_ads1282, ads1282_mflag);
 
 static bool get_modulator(const struct psabench_part *p, unsigned arg)
 {
@@ -161,14 +123,6 @@ static double vin_v(void *ctx, unsigned mux, int64_t t_ns)
     return 0.0;
 }
 
-/* MFLAG is read when an event has happened; that there is one for each change is all that is wanted here. */
-static void on_mflag(void *ctx, bool level, int64_t t_ns)
-{
-    (void)ctx;
-    (void)level;
-    (void)t_ns;
-}
-
 /* M0 and M1 change with the rise of MCLK (E0); it falls half a period, 2 tCLK, later. */
 static void on_modulator(void *ctx, bool m0, bool m1, int64_t t_ns)
 {
@@ -204,7 +158,7 @@ static bool open_ads1282(struct psabench_part *p, char *why, size_t cap)
                                     .pin_mode = s->pin_mode,
                                     .power_up_tclk = s->power_up_tclk,
                                     .chain = (enum ads1282_chain)s->chain};
-    const struct ads1282_io io = {.ctx = p, .vin_v = vin_v, .mflag = on_mflag, .modulator = on_modulator};
+    const struct ads1282_io io = {.ctx = p, .vin_v = vin_v, .mflag = api_ignore_edge, .modulator = on_modulator};
     sched_ev(&s->mclk_fall, on_mclk_fall, s);
     ads1282_init(&s->chip, &cfg, &io, &p->bench->sched, api_noise(p, "adc"));
     ads1282_power_up(&s->chip, p->bench->sched.now_ns);
@@ -218,8 +172,7 @@ static void before_input(struct psabench_part *p, int64_t t_ns)
 
 static int peek(const struct psabench_part *p, unsigned address)
 {
-    const struct reg_file *f = &cself(p)->chip.regs;
-    return address < f->count && f->map[address].name ? reg_peek(f, address) : -1;
+    return api_peek_reg(&cself(p)->chip.regs, address);
 }
 
 #define N(field) API_COUNTER(#field, part_ads1282, chip.count.field)

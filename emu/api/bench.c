@@ -147,6 +147,8 @@ int psabench_run_for(psabench *b, int64_t dt_ns)
     return psabench_run_until(b, b->sched.now_ns + dt_ns);
 }
 
+/* ---- recording ---- */
+
 int psabench_vcd_close(psabench *b)
 {
     if (!b) return PSABENCH_BAD_ARGUMENT;
@@ -156,4 +158,13 @@ int psabench_vcd_close(psabench *b)
     const int error = api_vcd_end(b);
     b->inside--;
     return error ? api_fail(b, PSABENCH_SYSTEM, "the recording is not complete: %s", strerror(error)) : PSABENCH_OK;
+}
+
+int psabench_vcd(psabench *b, const char *path)
+{
+    const int closed = psabench_vcd_close(b);
+    if (closed) return closed;
+    if (!path) return api_fail(b, PSABENCH_BAD_ARGUMENT, "psabench_vcd(): no path");
+    const int error = api_vcd_begin(b, path);
+    return error ? api_fail(b, PSABENCH_SYSTEM, "%.200s: %s", path, strerror(error)) : PSABENCH_OK;
 }

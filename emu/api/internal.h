@@ -8,6 +8,7 @@
 
 #include "api/kind.h"
 #include "api/psabench.h"
+#include "base/reg.h"
 #include "base/rng.h"
 #include "base/sched.h"
 
@@ -97,15 +98,22 @@ double api_input(struct psabench_part *p, unsigned input, int64_t t_ns);
 struct rng api_noise(const struct psabench_part *p, const char *source);
 uint64_t api_serial(const struct psabench_part *p); /* made from its name */
 
+/* For a chip that calls at each change of a pin: the pin is read after the event that moved it. */
+void api_ignore_edge(void *ctx, bool level, int64_t t_ns);
+
+/* A named register, or -1. */
+int api_peek_reg(const struct reg_file *f, unsigned address);
+
 /* Sets the options of a new part: the defaults, then the text. False with a sentence in why. */
 bool api_options(struct psabench_part *p, const char *text, char *why, size_t cap);
 
 /* Number of the pin of that name, or API_NO_PIN. */
 unsigned api_find_pin(const struct api_kind *k, const char *name);
 
-/* Recording. */
+/* Recording; 0 or an errno. */
+int api_vcd_begin(psabench *b, const char *path);
 void api_vcd_put(struct psabench_part *p, unsigned pin, bool level, int64_t t_ns);
 void api_vcd_follow(psabench *b);
-int api_vcd_end(psabench *b); /* what is still on its way, closing time; 0 or an errno */
+int api_vcd_end(psabench *b); /* what is still on its way, closing time */
 
 #endif

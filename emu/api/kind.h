@@ -21,6 +21,22 @@ struct api_pin {
     unsigned arg;
 };
 
+/* Pin functions that only pass a level on to the function of the device, member chip of struct `part`, or get it there. */
+#define API_SET_PIN(name, part, function)                                                                              \
+    static void name(struct psabench_part *p, unsigned arg, bool level, int64_t t_ns)                                  \
+    {                                                                                                                  \
+        (void)arg;                                                                                                     \
+        function(&((struct part *)p)->chip, level, t_ns);                                                              \
+    }                                                                                                                  \
+    struct part /* so that a semicolon has to follow */
+#define API_GET_PIN(name, part, function)                                                                              \
+    static bool name(const struct psabench_part *p, unsigned arg)                                                      \
+    {                                                                                                                  \
+        (void)arg;                                                                                                     \
+        return function(&((const struct part *)p)->chip);                                                              \
+    }                                                                                                                  \
+    struct part /* so that a semicolon has to follow */
+
 enum api_option_type { API_REAL, API_UINT, API_BOOL, API_CHOICE };
 
 struct api_option {
@@ -51,6 +67,10 @@ struct api_counter {
 #define API_COUNTER(name, part, member)                                                                                \
     {                                                                                                                  \
         name, offsetof(struct part, member), NULL                                                                      \
+    }
+#define API_COUNTER_GET(name)                                                                                          \
+    {                                                                                                                  \
+#name, .get = name                                                                                             \
     }
 
 enum api_spi { API_NO_SPI, API_SPI_MODE0, API_SPI_MODE1 };

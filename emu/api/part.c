@@ -2,32 +2,7 @@
 
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
-
-enum { KINDS = 9 };
-
-const struct api_kind *const api_kinds[KINDS] = {&api_ads1281, &api_ads1282, &api_ads1255, &api_ads1256, &api_ad7710,
-                                                 &api_ad7711,  &api_ad7711a, &api_ad7712,  &api_psa2};
-const unsigned api_kind_count = KINDS;
-
-const char *psabench_parts(void)
-{
-    return "ads1281 ads1282 ads1255 ads1256 ad7710 ad7711 ad7711a ad7712 psa2"; /* a test holds it against api_kinds */
-}
-
-static const struct api_kind *find_kind(const char *name)
-{
-    for (unsigned i = 0; name && i < api_kind_count; i++)
-        if (strcmp(api_kinds[i]->name, name) == 0) return api_kinds[i];
-    return NULL;
-}
-
-const char *psabench_options(const char *part)
-{
-    const struct api_kind *k = find_kind(part);
-    return k ? k->options_text : NULL;
-}
 
 unsigned api_find_pin(const struct api_kind *k, const char *name)
 {
@@ -47,69 +22,6 @@ uint64_t api_serial(const struct psabench_part *p)
 struct rng api_noise(const struct psabench_part *p, const char *source)
 {
     return rng_stream(p->bench->seed, api_serial(p), source);
-}
-
-/* ---- making a part ---- */
-
-static bool is_name_char(char c)
-{
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-' ||
-           c == '.';
-}
-
-static int check_name(psabench *b, const char *name)
-{
-    size_t len = 0;
-    while (name && name[len] && len < API_NAME && is_name_char(name[len])) len++;
-    if (!name || len == 0 || len >= API_NAME || name[len])
-        return api_fail(b, PSABENCH_BAD_ARGUMENT, "name %.40s: use 1 to %d of the characters A-Z a-z 0-9 _ - .",
-                        name ? name : "(NULL)", API_NAME - 1);
-    for (const struct psabench_part *p = b->parts; p; p = p->next)
-        if (strcmp(p->name, name) == 0)
-            return api_fail(b, PSABENCH_BAD_ARGUMENT, "name %s: a part on this bench has it already, use another",
-                            name);
-    return PSABENCH_OK;
-}
-
-/* Not on the list yet. */
-static struct psabench_part *make(psabench *b, const struct api_kind *k, const char *name)
-{
-    struct psabench_part *p = calloc(1, k->size);
-    if (!p) {
-        (void)api_fail(b, PSABENCH_SYSTEM, "part %s: no memory", name);
-        return NULL;
-    }
-    p->kind = k;
-    p->bench = b;
-    strcpy(p->name, name); /* its length has been checked */
-    for (unsigned i = 0; i < k->pin_count; i++) p->level |= (uint32_t)k->pins[i].idle << i;
-    p->sclk = api_find_pin(k, "SCLK");
-    p->din = api_find_pin(k, "DIN");
-    p->dout = api_find_pin(k, "DOUT");
-    return p;
-}
-
-psabench_part *psabench_part_new(psabench *b, const char *part, const char *name, const char *options)
-{
-    char why[API_WHY];
-    if (!b || api_may_move(b, "psabench_part_new()") || check_name(b, name)) return NULL;
-    const struct api_kind *k = find_kind(part);
-    if (!k) {
-        (void)api_fail(b, PSABENCH_BAD_ARGUMENT, "no part %.40s: there are %s", part ? part : "(NULL)",
-                       psabench_parts());
-        return NULL;
-    }
-    struct psabench_part *p = make(b, k, name);
-    if (!p) return NULL;
-    if (!api_options(p, options, why, sizeof why) || !k->open(p, why, sizeof why)) {
-        (void)api_fail(b, PSABENCH_BAD_ARGUMENT, "%s: %s", name, why);
-        free(p);
-        return NULL;
-    }
-    struct psabench_part **end = &b->parts;
-    while (*end) end = &(*end)->next;
-    *end = p;
-    return p;
 }
 
 psabench *psabench_of(const psabench_part *p)
@@ -325,6 +237,18 @@ int psabench_set_volts(psabench_part *p, int input, double volts)
 }
 
 /* ---- inside ---- */
+
+void api_ignore_edge(void *ctx, bool level, int64_t t_ns)
+{
+    (void)ctx;
+    (void)level;
+    (void)t_ns;
+}
+
+int api_peek_reg(const struct reg_file *f, unsigned address)
+{
+    return address < f->count && f->map[address].name ? reg_peek(f, address) : -1;
+}
 
 int psabench_peek(const psabench_part *p, unsigned address)
 {

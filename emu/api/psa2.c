@@ -100,57 +100,29 @@ static int64_t now_ns(const struct psabench_part *p)
     return p->bench->sched.now_ns;
 }
 
-static bool get_drd_a(const struct psabench_part *p, unsigned arg)
-{
-    (void)arg;
-    return ads1282_drdy(&cself(p)->board.adc[0]);
-}
+/* What a line's level is made of: an expression of the board b. */
+#define GET_LINE(name, expression)                                                                                     \
+    static bool get_##name(const struct psabench_part *p, unsigned arg)                                                \
+    {                                                                                                                  \
+        const struct psa2 *b = &cself(p)->board;                                                                       \
+        (void)arg;                                                                                                     \
+        return expression;                                                                                             \
+    }                                                                                                                  \
+    struct part_psa2 /* so that a semicolon has to follow */
 
-static bool get_drd_t(const struct psabench_part *p, unsigned arg)
-{
-    (void)arg;
-    return ads1256_drdy(&cself(p)->board.tadc);
-}
-
-static bool get_sync_a(const struct psabench_part *p, unsigned arg)
-{
-    (void)arg;
-    const struct psa2_pulse *pulse = &cself(p)->board.pulse;
-    return pulse->active && pulse->group == PSA2_ACCEL;
-}
-
-static bool get_sync_t(const struct psabench_part *p, unsigned arg)
-{
-    (void)arg;
-    const struct psa2_pulse *pulse = &cself(p)->board.pulse;
-    return !(pulse->active && pulse->group == PSA2_TEMP);
-}
-
-static bool get_cst(const struct psabench_part *p, unsigned arg)
-{
-    (void)arg;
-    const struct psa2_spi *spi = &cself(p)->board.spi;
-    return spi->phase == PSA2_SPI_IDLE || spi->x.group != PSA2_TEMP;
-}
-
-static bool get_int(const struct psabench_part *p, unsigned arg)
-{
-    (void)arg;
-    const struct psa2_out *out = &cself(p)->board.out;
-    return !(out->busy && now_ns(p) >= out->f.t_int_fall_ns);
-}
+GET_LINE(drd_a, ads1282_drdy(&b->adc[0]));
+GET_LINE(drd_t, ads1256_drdy(&b->tadc));
+GET_LINE(sync_a, b->pulse.active && b->pulse.group == PSA2_ACCEL);
+GET_LINE(sync_t, !(b->pulse.active && b->pulse.group == PSA2_TEMP));
+GET_LINE(cst, b->spi.phase == PSA2_SPI_IDLE || b->spi.x.group != PSA2_TEMP);
+GET_LINE(int, !(b->out.busy && now_ns(p) >= b->out.f.t_int_fall_ns));
+GET_LINE(res, b->mode != PSA2_IN_RESET);
 
 /* INT falls on the grid of CLK, which is no event while nobody watches. */
 static int64_t next_ns(const struct psabench_part *p)
 {
     const struct psa2_out *out = &cself(p)->board.out;
     return out->busy && now_ns(p) < out->f.t_int_fall_ns ? out->f.t_int_fall_ns : INT64_MAX;
-}
-
-static bool get_res(const struct psabench_part *p, unsigned arg)
-{
-    (void)arg;
-    return cself(p)->board.mode != PSA2_IN_RESET;
 }
 
 /* The board makes a pulse of its own length of a fall. */

@@ -161,25 +161,22 @@ static void begin(psabench *b)
     put(b->vcd, "$end\n");
 }
 
-int psabench_vcd(psabench *b, const char *path)
+int api_vcd_begin(psabench *b, const char *path)
 {
-    const int closed = psabench_vcd_close(b);
-    if (closed) return closed;
-    if (!path) return api_fail(b, PSABENCH_BAD_ARGUMENT, "psabench_vcd(): no path");
     struct api_vcd *v = calloc(1, sizeof *v);
     errno = 0;
     FILE *out = v ? fopen(path, "w") : NULL;
     if (!out) {
         const int error = v ? errno : ENOMEM;
         free(v);
-        return api_fail(b, PSABENCH_SYSTEM, "%.200s: %s", path, strerror(error));
+        return error;
     }
     v->out = out;
     b->vcd = v;
     b->inside++;
     begin(b);
     b->inside--;
-    return PSABENCH_OK;
+    return 0;
 }
 
 int api_vcd_end(psabench *b)
