@@ -207,6 +207,6 @@ def _host(args: argparse.Namespace) -> int:
 
 
 def _list(args: argparse.Namespace) -> int:
-    from psabench.conform import device_command
+    from psabench.conform import list_command
 
-    return device_command.list_requirements(args)
+    return list_command.list_requirements(args)

@@ -1,4 +1,4 @@
-"""`psabench conform device` and `list`: what they do, and what is printed."""
+"""`psabench conform device`: what it does, and what is printed."""
 
 from __future__ import annotations
 
@@ -11,20 +11,13 @@ from typing import Any
 from psabench.conform import identity, report, runner, suite
 from psabench.conform.defaults import OUT
 from psabench.conform.exhibits import Exhibits
+from psabench.conform.list_command import requirements_of
 from psabench.conform.outcome import Outcome
-from psabench.conform.requirements import Requirement, requirements
 from psabench.conform.subject import INPUTS_V, Addresses, Subject
 from psabench.conform.variant import Variant, variant
 from psabench.errors import BadInput
 from psabench.procedures.head_bench import Progress
 from psabench.progress import Bar
-
-
-def list_requirements(args: argparse.Namespace) -> int:
-    """Handler of `conform list`."""
-    for r in _rows(variant(args.board, args.profile)):
-        print(f"{r.id:16} {r.grade} {'/'.join(r.observe) or '-':16} {r.text}")
-    return 0
 
 
 def device(args: argparse.Namespace) -> int:
@@ -62,7 +55,7 @@ def device_run(
     clock_error, recorder_error: ppm by which clocks of an emulator that is started are fast, and its probes'. Raises
     BadInput where `only` selects nothing, LinkError or BenchError where the board cannot be reached.
     """
-    rows = [r for r in _rows(v) if not only or r.id.startswith(tuple(only))]
+    rows = [r for r in requirements_of(v) if not only or r.id.startswith(tuple(only))]
     if not rows:
         raise BadInput(f"--only {' '.join(only)}: no requirement of {v.name} begins so; psabench conform list has them")
     suite.load()
@@ -86,10 +79,6 @@ def _told(run: report.Run, folder: Path, *, everything: bool) -> int:
         print(line)
     print(f"report: {page}", file=sys.stderr)
     return 130 if run.interrupted else 0 if run.conforms else 1
-
-
-def _rows(v: Variant) -> list[Requirement]:
-    return [r for r in requirements() if r.group != "host" and r.applies(v.board, v.profile)]
 
 
 def _addresses(args: argparse.Namespace) -> Addresses:

@@ -12,10 +12,9 @@ from typing import Any
 
 import yaml
 
-from psabench.devices import BOARDS
 from psabench.errors import BadInput
 from psabench.places import proto_file
-from psabench.protocol_files import ALIASES
+from psabench.protocol_files import ALIASES, BOARDS
 
 FIRST: Mapping[str, str] = {"psa2": "article"}  # profile of a board where none is named; others: of the same name
 
