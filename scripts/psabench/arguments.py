@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
+from psabench.board_names import ALIASES, BOARDS
 from psabench.errors import BadInput
-from psabench.protocol_files import ALIASES, BOARDS, dbc_node
 
 LINE_HZ = 8_000_000.0  # psabench.lineport.SAMPLE_HZ, without loading NumPy
 BUS_HELP = """\
@@ -86,4 +86,6 @@ def add_board(p: argparse.ArgumentParser, what: str) -> None:
 
 def node_of(args: argparse.Namespace) -> int:
     """The node that `add_board` took, else the board's default."""
+    from psabench.protocol_files import dbc_node
+
     return dbc_node(args.board) if args.node is None else int(args.node)

@@ -26,6 +26,7 @@ from typing import Any, TypeVar
 
 from can.interfaces.slcan import slcanBus
 
+from psabench.board_names import DBC_NODE
 from psabench.can_host import QUANTUM_S, CanHost, StepClock, WallClock, open_bus
 from psabench.control import Control, Reply
 from psabench.devices import Psa2, identify, of_board
@@ -34,7 +35,6 @@ from psabench.errors import BadInput, BenchError, ControlError, TimeOut
 from psabench.faults import Fault, Faults
 from psabench.instruments import KINDS, Chamber, Head, Instrument, Supply, Table, open_instrument, visa_address
 from psabench.probe import Probe
-from psabench.protocol_files import DBC_NODE
 from psabench.unit import Unit
 
 NS = 1_000_000_000

@@ -15,8 +15,9 @@ import numpy as np
 import numpy.typing as npt
 
 from psabench import signals
+from psabench.board_names import DBC_NODE
 from psabench.can_host import Message
-from psabench.protocol_files import DBC_NODE, message
+from psabench.protocol_files import message
 from psabench.signals import Floats, Ints
 
 Bits = npt.NDArray[np.uint8]

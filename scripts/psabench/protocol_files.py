@@ -6,20 +6,17 @@ from collections.abc import Mapping
 from functools import cache
 from typing import Any
 
+import cantools
+
 from psabench.places import proto_file
 
 
 @cache
 def database() -> Any:
     """The DBC, as cantools reads it."""
-    import cantools  # 0.1 s: the command line and the shell's help do without it
-
     return cantools.database.load_file(str(proto_file("psabench.dbc")))
 
 
-DBC_NODE = 5  # node of PSA-2's identifiers in the DBC; those of node n are n - 5 higher
-BOARDS = ("psa2", "psd1", "pmka", "pik", "gyro")
-ALIASES: Mapping[str, str] = {"psa1": "psa2", "pik5": "pik", "pik6": "pik"}  # the same board, another profile
 HEARTBEAT_BASE = 0x700  # CiA 301, 7.3.3
 NODE_BITS = 0x7F  # of an identifier that belongs to a node
 

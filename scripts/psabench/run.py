@@ -15,13 +15,13 @@ from typing import Any
 
 from psabench import report
 from psabench.bench import Bench
+from psabench.board_names import DBC_NODE
 from psabench.errors import BadInput
 from psabench.grading import Section
 from psabench.instruments import EXAMPLES
 from psabench.procedures import PROCEDURES, Procedure
 from psabench.procedures.head_bench import Progress, Watch
 from psabench.procedures.result import ProcedureResult
-from psabench.protocol_files import DBC_NODE
 from psabench.recording import CsvRecorder
 from psabench.run_table import CONDITIONS, G_MPS2, Condition
 from psabench.wire_bench import WireBench

@@ -14,10 +14,10 @@ from pathlib import Path
 from typing import Any
 
 from psabench.arguments import Help, Parser, natural, node_id, positive, yes_no
+from psabench.board_names import DBC_NODE
 from psabench.errors import BadInput
 from psabench.instruments import EXAMPLES
 from psabench.progress import Bar
-from psabench.protocol_files import DBC_NODE
 from psabench.run_table import COMPARE, CONDITIONS, G_MPS2, ON_THE_HEAD, ON_THE_PLATFORM
 from psabench.shell import command_line
 

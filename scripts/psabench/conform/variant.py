@@ -12,9 +12,9 @@ from typing import Any
 
 import yaml
 
+from psabench.board_names import ALIASES, BOARDS
 from psabench.errors import BadInput
 from psabench.places import proto_file
-from psabench.protocol_files import ALIASES, BOARDS
 
 FIRST: Mapping[str, str] = {"psa2": "article"}  # profile of a board where none is named; others: of the same name
 

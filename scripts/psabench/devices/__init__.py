@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from psabench.board_names import ALIASES
 from psabench.can_host import CanHost
 from psabench.canopen_host import CanopenNode
 from psabench.devices.gyro import Gyro
@@ -14,7 +15,6 @@ from psabench.devices.psd1 import Psd1
 from psabench.errors import LinkError
 from psabench.frames import FrameReader
 from psabench.places import proto_file
-from psabench.protocol_files import ALIASES
 from psabench.readings import ReadingReader
 from psabench.unit import NAME, Unit
 

@@ -8,10 +8,11 @@ with CanHost(open_bus("socketcand:127.0.0.1:29536"), WallClock()) as host:
 
 from __future__ import annotations
 
+from psabench.board_names import DBC_NODE
 from psabench.can_host import CanHost
 from psabench.errors import LinkError
 from psabench.frames import Form, FrameReader, Frames
-from psabench.protocol_files import DBC_NODE, message
+from psabench.protocol_files import message
 from psabench.signals import layout
 from psabench.unit import Unit
 

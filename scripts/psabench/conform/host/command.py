@@ -6,6 +6,7 @@ import argparse
 import sys
 from functools import partial
 
+from psabench.board_names import ALIASES
 from psabench.conform import report
 from psabench.conform.defaults import LINKS
 from psabench.conform.host import runner
@@ -17,7 +18,6 @@ from psabench.conform.variant import Variant, variant
 from psabench.errors import BadInput
 from psabench.procedures.head_bench import Silent
 from psabench.progress import Bar
-from psabench.protocol_files import ALIASES
 
 
 def link_of(args: argparse.Namespace) -> str:
