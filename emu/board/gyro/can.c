@@ -17,7 +17,7 @@ enum { REG_DEVICE = 0x81, XY_COB = 0x180 };
 /* ---- readings ---- */
 
 /* Rounded, and limited to what so many bits hold. */
-static int32_t lsb(double value, double step, unsigned bits)
+static int32_t to_lsb(double value, double step, unsigned bits)
 {
     const double top = (double)((INT64_C(1) << (bits - 1)) - 1);
     return (int32_t)floor(fmin(fmax(value / step, -top - 1.0), top) + 0.5);
@@ -25,13 +25,14 @@ static int32_t lsb(double value, double step, unsigned bits)
 
 static struct psabench_gyro_rates_t rates_of(const struct gyro_reading *r)
 {
-    return (struct psabench_gyro_rates_t){lsb(r->u1_radps, RATE_LSB_RADPS, 32), lsb(r->u2_radps, RATE_LSB_RADPS, 32)};
+    return (struct psabench_gyro_rates_t){to_lsb(r->u1_radps, RATE_LSB_RADPS, 32),
+                                          to_lsb(r->u2_radps, RATE_LSB_RADPS, 32)};
 }
 
 static struct psabench_gyro_angles_t angles_of(const struct gyro_reading *r)
 {
     return (struct psabench_gyro_angles_t){
-        .encoder = lsb(r->encoder_rad, ANGLE_LSB_RAD, 32),
+        .encoder = to_lsb(r->encoder_rad, ANGLE_LSB_RAD, 32),
         .step = (uint16_t)r->step,
         .mode = (uint8_t)r->mode,
         .phase = (uint8_t)r->phase,
@@ -45,8 +46,8 @@ static struct psabench_gyro_angles_t angles_of(const struct gyro_reading *r)
 
 static struct psabench_gyro_level_t level_of(const struct gyro_reading *r)
 {
-    return (struct psabench_gyro_level_t){lsb(r->beta_rad, LEVEL_LSB_RAD, 24), lsb(r->gamma_rad, LEVEL_LSB_RAD, 24),
-                                          r->level_seq};
+    return (struct psabench_gyro_level_t){to_lsb(r->beta_rad, LEVEL_LSB_RAD, 24),
+                                          to_lsb(r->gamma_rad, LEVEL_LSB_RAD, 24), r->level_seq};
 }
 
 static void on_reading(void *ctx, const struct gyro_reading *r, int64_t t_ns)
@@ -82,7 +83,7 @@ static void on_condition(void *ctx, enum gyro_flag what, bool stands, int64_t t_
 
 /* ---- the level unit ---- */
 
-static void heard(struct board_node *n, const struct can_msg *m, int64_t t_ns)
+static void on_level_frame(struct board_node *n, const struct can_msg *m, int64_t t_ns)
 {
     const struct gyro_can *c = (const struct gyro_can *)n;
     struct psabench_psa2_xy_t xy;
@@ -137,7 +138,7 @@ static uint32_t read_setting(struct board_node *n, const struct co_entry *e, str
     return CO_OK;
 }
 
-static uint32_t refuse(struct board_node *n, uint32_t abort, const char *why)
+static uint32_t reject_setting(struct board_node *n, uint32_t abort, const char *why)
 {
     ((struct gyro *)n->board)->counters.refused++;
     board_node_refuse(n, why);
@@ -150,8 +151,9 @@ static uint32_t write_setting(struct board_node *n, const struct co_entry *e, co
     const struct row *r = row_of(e);
     (void)t_ns;
     if (!r) return CO_AB_READ_ONLY;
-    if (r->between_runs && gyro_running(b)) return refuse(n, CO_AB_STATE, "a run is under way");
-    if (r->not_zero && v->number == 0.0) return refuse(n, CO_AB_VALUE, "the scale of a level sensor cannot be 0");
+    if (r->between_runs && gyro_running(b)) return reject_setting(n, CO_AB_STATE, "a run is under way");
+    if (r->not_zero && v->number == 0.0)
+        return reject_setting(n, CO_AB_VALUE, "the scale of a level sensor cannot be 0");
     *value_of(&b->set, r, e->sub) = v->number;
     gyro_settings_changed(b);
     return CO_OK;
@@ -240,7 +242,7 @@ static const struct board_object objects[] = {
     {GYRO_OD_LATEST, read_latest, NULL},
 };
 
-static uint32_t serial(const void *board)
+static uint32_t serial_of(const void *board)
 {
     return ((const struct gyro *)board)->cfg.serial;
 }
@@ -254,11 +256,11 @@ static const struct board_node_type type = {.board = &gyro_board,
                                             .device = &gyro_device,
                                             .objects = objects,
                                             .object_count = sizeof objects / sizeof *objects,
-                                            .serial = serial,
+                                            .serial = serial_of,
                                             .period_ns = period_ns,
-                                            .heard = heard};
+                                            .heard = on_level_frame};
 
-static void init(void *can, const struct board_can_cfg *cfg, void *board, struct can_bus *bus, struct sched *s)
+static void init_can(void *can, const struct board_can_cfg *cfg, void *board, struct can_bus *bus, struct sched *s)
 {
     struct gyro_can *c = can;
     struct gyro *b = board;
@@ -268,7 +270,7 @@ static void init(void *can, const struct board_can_cfg *cfg, void *board, struct
 }
 
 const struct board_can gyro_can = {.size = sizeof(struct gyro_can),
-                                   .init = init,
+                                   .init = init_can,
                                    .power_up = board_node_power_up,
                                    .power_down = board_node_power_down,
                                    .node = board_node_co};

@@ -1,5 +1,5 @@
 /* A gyro unit on CAN (docs/protocol_gyro.md; the mapping is ours, E0): three PDOs a step, settings as objects; and the frames
- * of the level unit, which it hears on the same bus. */
+ * of the level unit, which it receives on the same bus. */
 #ifndef PSABENCH_BOARD_GYRO_CAN_H
 #define PSABENCH_BOARD_GYRO_CAN_H
 

@@ -1,8 +1,8 @@
-/* What the controller can tell of its own sensor and torquers: while it servoes, in navigation, and by a nod when it is asked.
+/* Self-monitoring of the angle sensor and the torquers: while servoed, in navigation, and by a nod on request.
  *
- * In navigation nothing is taken from the angle sensor, so it can bear witness. A dead azimuth torquer leaves the platform
+ * In navigation nothing is taken from the angle sensor, so it is independent. A dead azimuth torquer leaves the platform
  * turning at what was asked of it, backwards; a platform off the level has lost its horizon; an angle sensor that stands still
- * while the vehicle is told to have turned is stuck. One that stands still on a vehicle of which nothing is told proves nothing:
+ * while the reported track turns is stuck. One that stands still without a reported track proves nothing:
  * for that there is the nod. Limits: E0. docs/boards/gyro.md has what cannot be seen. */
 #include "board/gyro/internal.h"
 
@@ -16,8 +16,8 @@
 #define BLOCK_PART  0.25
 #define BLOCKS_DEAD 2u
 
-/* Aiding: a track told as changed by so much, at so much speed, and an angle sensor that has not left its degree. What is told
- * late has been told by LATE_NS after the turn; a turn that was told ahead is over by then, too. */
+/* Aiding: a reported track that changed by so much, at so much speed, and an angle sensor that has not left its degree. A turn
+ * reported late is reported by LATE_NS after it; a turn reported ahead is over by then, too. */
 #define ALOFT_MPS 20.0
 #define STILL_RAD (1.0 * GYRO_RAD_PER_DEG)
 #define TOLD_DEG  20.0
@@ -29,7 +29,7 @@
 #define NOD_REST_NS INT64_C(700000000) /* before the next: not in step with a sway */
 #define NODS        3u
 
-static void found(struct gyro *b, int64_t t_ns)
+static void report_encoder_fault(struct gyro *b, int64_t t_ns)
 {
     if (b->standing & GYRO_ENCODER_FAULT) return;
     b->counters.encoder_faults++;
@@ -50,7 +50,7 @@ static void check_servo(struct gyro *b, int64_t t_ns)
     *c = (struct gyro_check){.from_rad = b->servo_rad};
     if (!dead) return;
     gyro_run_stop(b, GYRO_LEVEL);
-    found(b, t_ns);
+    report_encoder_fault(b, t_ns);
 }
 
 /* ---- in navigation ---- */
@@ -72,7 +72,7 @@ static double told_rad(double to_deg, double from_deg)
     return gyro_wrap_rad((to_deg - from_deg) * GYRO_RAD_PER_DEG);
 }
 
-/* The torquer: what the sensor moved by, less the turn that was told, against what was asked; of a nod nothing is left. */
+/* The torquer: what the sensor moved by, less the reported turn, against what was asked; of a nod nothing is left. */
 static void check_torquer(struct gyro *b, int64_t t_ns)
 {
     struct gyro_watch *w = &b->watch;
@@ -84,10 +84,10 @@ static void check_torquer(struct gyro *b, int64_t t_ns)
     w->turned_rad = 0.0;
     w->from_rad = b->servo_rad;
     w->track_deg = b->set.track_deg;
-    if (w->against >= BLOCKS_DEAD) found(b, t_ns);
+    if (w->against >= BLOCKS_DEAD) report_encoder_fault(b, t_ns);
 }
 
-/* The sensor: it stands still while the vehicle is told to have turned. */
+/* The sensor: it stands still while the reported track turns. */
 static void check_aided(struct gyro *b, int64_t t_ns)
 {
     struct gyro_watch *w = &b->watch;
@@ -99,7 +99,7 @@ static void check_aided(struct gyro *b, int64_t t_ns)
     if (t_ns - w->still_ns < LATE_NS) w->told_deg = b->set.track_deg;
     const bool told = fabs(told_rad(b->set.track_deg, w->told_deg)) > TOLD_DEG * GYRO_RAD_PER_DEG;
     if (!told) w->told_ns = t_ns;
-    else if (t_ns - w->told_ns >= AHEAD_NS) found(b, t_ns);
+    else if (t_ns - w->told_ns >= AHEAD_NS) report_encoder_fault(b, t_ns);
 }
 
 /* The horizon: as long off the level as a run would wait for it. */
@@ -135,7 +135,7 @@ const char *gyro_self_test(struct gyro *b, int64_t t_ns)
 
 /* There and back: the vehicle's own turn, as far as it is steady, drops out. A sensor that neither follows nor stays is one on
  * a vehicle that turns, or accelerates, and proves nothing. */
-static void judge(struct gyro *b, int64_t t_ns)
+static void evaluate_nod(struct gyro *b, int64_t t_ns)
 {
     struct gyro_nod *n = &b->nod;
     const double back_rad = gyro_wrap_rad(b->servo_rad - n->from_rad);
@@ -148,7 +148,7 @@ static void judge(struct gyro *b, int64_t t_ns)
     n->way = follows || n->nods == NODS ? GYRO_NOD_NONE : GYRO_NOD_REST;
     if (n->way != GYRO_NOD_NONE) return;
     n->result = follows ? GYRO_TEST_PASSED : n->stayed == NODS ? GYRO_TEST_FAILED : GYRO_TEST_UNCLEAR;
-    if (n->result == GYRO_TEST_FAILED) found(b, t_ns);
+    if (n->result == GYRO_TEST_FAILED) report_encoder_fault(b, t_ns);
 }
 
 double gyro_nod_radps(struct gyro *b, int64_t t_ns)
@@ -167,7 +167,7 @@ double gyro_nod_radps(struct gyro *b, int64_t t_ns)
         n->there_ns = age_ns;
         n->top_rad = b->servo_rad;
     } else if (n->way == GYRO_NOD_BACK && age_ns >= n->there_ns) {
-        judge(b, t_ns);
+        evaluate_nod(b, t_ns);
     }
     return n->way == GYRO_NOD_THERE ? n->rate_radps : n->way == GYRO_NOD_BACK ? -n->rate_radps : 0.0;
 }

@@ -102,8 +102,8 @@ static bool take_inlet(struct gyro *b, int64_t t_ns)
 
 /* ---- conditions ---- */
 
-/* For who looks from time to time. */
-static void note(struct gyro *b, enum gyro_flag what)
+/* For observers that poll. */
+static void record_flag(struct gyro *b, enum gyro_flag what)
 {
     for (unsigned i = 0; i < GYRO_FLAGS; i++) {
         if (what != 1U << i) continue;
@@ -116,20 +116,20 @@ void gyro_past_begin(struct gyro *b)
 {
     memset(b->past, 0, sizeof b->past);
     for (unsigned i = 0; i < GYRO_FLAGS; i++)
-        if (b->standing & 1U << i) note(b, (enum gyro_flag)(1U << i));
+        if (b->standing & 1U << i) record_flag(b, (enum gyro_flag)(1U << i));
 }
 
 void gyro_condition(struct gyro *b, enum gyro_flag what, bool stands, int64_t t_ns)
 {
     if (stands == ((b->standing & what) != 0)) return;
     b->standing = stands ? b->standing | what : b->standing & ~(unsigned)what;
-    if (stands) note(b, what);
-    if (stands) gyro_tell(b, GYRO_EV_FAULT, t_ns);
+    if (stands) record_flag(b, what);
+    if (stands) gyro_notify_event(b, GYRO_EV_FAULT, t_ns);
     if (b->host.condition) b->host.condition(b->host.ctx, what, stands, t_ns);
 }
 
 /* One that comes and goes ends when it has not come for a while. */
-static void fleeting(struct gyro *b, enum gyro_flag what, bool now, int64_t *calm_ns, int64_t t_ns)
+static void update_intermittent(struct gyro *b, enum gyro_flag what, bool now, int64_t *calm_ns, int64_t t_ns)
 {
     if (now) *calm_ns = t_ns;
     if (now || t_ns - *calm_ns >= CALM_NS) gyro_condition(b, what, now, t_ns);
@@ -137,18 +137,18 @@ static void fleeting(struct gyro *b, enum gyro_flag what, bool now, int64_t *cal
 
 /* ---- steps ---- */
 
-static bool limit(double *u_radps, double limit_radps)
+static bool clamp_rate(double *u_radps, double limit_radps)
 {
     const double asked = *u_radps;
     *u_radps = fmin(fmax(asked, -limit_radps), limit_radps);
     return *u_radps != asked;
 }
 
-static void drive(struct gyro *b, int64_t t_ns)
+static void drive_torquers(struct gyro *b, int64_t t_ns)
 {
     const double limit_radps = b->profile.torquer_limit_dps * RAD_PER_DEG;
     gyro_run_rates(b, t_ns, b->u_radps);
-    const bool one = limit(&b->u_radps[0], limit_radps), two = limit(&b->u_radps[1], limit_radps);
+    const bool one = clamp_rate(&b->u_radps[0], limit_radps), two = clamp_rate(&b->u_radps[1], limit_radps);
     if (one || two) b->flags |= GYRO_SATURATED;
     b->counters.saturated += one || two;
     gyro_check_step(b, t_ns);
@@ -168,7 +168,7 @@ static void put_lines(struct gyro *b, int64_t t_ns)
     trace_set(&b->trace, GYRO_LINE_STEP, false, t_ns + GYRO_STEP_PULSE_NS);
 }
 
-static struct gyro_reading reading(const struct gyro *b, int64_t t_ns)
+static struct gyro_reading make_reading(const struct gyro *b, int64_t t_ns)
 {
     return (struct gyro_reading){
         .mode = b->run.mode,
@@ -184,13 +184,13 @@ static struct gyro_reading reading(const struct gyro *b, int64_t t_ns)
     };
 }
 
-static void tell_reading(struct gyro *b, int64_t t_ns)
+static void publish_reading(struct gyro *b, int64_t t_ns)
 {
     b->number++;
-    if (!(b->wrongs & BOARD_WRONG_FROZEN_WORDS)) b->latest = reading(b, t_ns);
+    if (!(b->wrongs & BOARD_WRONG_FROZEN_WORDS)) b->latest = make_reading(b, t_ns);
     b->latest.step = b->number;
     put_lines(b, t_ns);
-    gyro_tell(b, GYRO_EV_STEP, t_ns);
+    gyro_notify_event(b, GYRO_EV_STEP, t_ns);
     if (b->host.reading) b->host.reading(b->host.ctx, &b->latest, t_ns);
 }
 
@@ -201,21 +201,22 @@ static int64_t next_step_ns(const struct gyro *b, int64_t after_ns)
     return (after_ns + period - 1) / period * period;
 }
 
-static void step(void *ctx, int64_t t_ns)
+static void run_step(void *ctx, int64_t t_ns)
 {
     struct gyro *b = ctx;
     sched_at(b->sched, &b->step, t_ns + b->profile.step_ns);
-    if (!b->ready) gyro_tell(b, GYRO_EV_READY, t_ns);
+    if (!b->ready) gyro_notify_event(b, GYRO_EV_READY, t_ns);
     b->ready = true;
     b->counters.steps++;
     b->flags = take_inlet(b, t_ns) ? 0 : GYRO_LEVEL_LOST;
     b->servo_rad = b->io.servo_rad ? b->io.servo_rad(b->io.ctx, t_ns) : 0.0;
     gyro_run_step(b, t_ns);
-    drive(b, t_ns);
+    drive_torquers(b, t_ns);
     const bool at_work = b->run.mode != GYRO_OFF;
-    fleeting(b, GYRO_LEVEL_LOST, at_work && b->flags & GYRO_LEVEL_LOST, &b->calm_ns[0], t_ns);
-    fleeting(b, GYRO_SATURATED, b->flags & GYRO_SATURATED && b->run.phase != GYRO_SLEWING, &b->calm_ns[1], t_ns);
-    tell_reading(b, t_ns);
+    update_intermittent(b, GYRO_LEVEL_LOST, at_work && b->flags & GYRO_LEVEL_LOST, &b->calm_ns[0], t_ns);
+    update_intermittent(b, GYRO_SATURATED, b->flags & GYRO_SATURATED && b->run.phase != GYRO_SLEWING, &b->calm_ns[1],
+                        t_ns);
+    publish_reading(b, t_ns);
 }
 
 /* ---- life ---- */
@@ -228,7 +229,7 @@ void gyro_init(struct gyro *b, const struct gyro_profile *p, const struct board_
     b->cfg = *cfg;
     b->io = *io;
     b->sched = s;
-    sched_ev(&b->step, step, b);
+    sched_ev(&b->step, run_step, b);
     trace_init(&b->trace);
     for (unsigned i = 0; i < GYRO_LINES; i++) (void)trace_add(&b->trace, gyro_lines[i].name, gyro_lines[i].level);
     line_faults_init(&b->line, &b->trace);
@@ -240,7 +241,7 @@ void gyro_attach(struct gyro *b, const struct gyro_host *host)
 }
 
 /* Nothing is left but the counters. */
-static void forget(struct gyro *b, int64_t t_ns)
+static void reset_state(struct gyro *b, int64_t t_ns)
 {
     b->ready = false;
     b->set = gyro_settings_default();
@@ -264,8 +265,8 @@ void gyro_power_up(struct gyro *b, int64_t t_ns)
 {
     if (b->on) return;
     b->on = true;
-    forget(b, t_ns);
-    gyro_tell(b, GYRO_EV_POWER_UP, t_ns);
+    reset_state(b, t_ns);
+    gyro_notify_event(b, GYRO_EV_POWER_UP, t_ns);
     sched_at(b->sched, &b->step, next_step_ns(b, t_ns + b->profile.start_ns));
 }
 
@@ -274,16 +275,16 @@ void gyro_power_down(struct gyro *b, int64_t t_ns)
     if (!b->on) return;
     b->on = false;
     sched_cancel(b->sched, &b->step);
-    forget(b, t_ns);
-    gyro_tell(b, GYRO_EV_POWER_DOWN, t_ns);
+    reset_state(b, t_ns);
+    gyro_notify_event(b, GYRO_EV_POWER_DOWN, t_ns);
 }
 
 void gyro_reset(struct gyro *b, int64_t t_ns)
 {
     if (!b->on) return;
     b->counters.res++;
-    forget(b, t_ns);
-    gyro_tell(b, GYRO_EV_RES, t_ns);
+    reset_state(b, t_ns);
+    gyro_notify_event(b, GYRO_EV_RES, t_ns);
     sched_at(b->sched, &b->step, next_step_ns(b, t_ns + b->profile.start_ns));
 }
 

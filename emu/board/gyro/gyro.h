@@ -88,7 +88,7 @@ struct gyro_counters {
     uint32_t steps, res, level_frames, level_lost, level_silent, saturated, windows, unsettled, encoder_faults, refused;
 };
 
-/* Who wants its readings, and its conditions (enum gyro_flag) as they begin and end. */
+/* Receiver of the readings, and of the conditions (enum gyro_flag) as they begin and end. */
 struct gyro_host {
     void *ctx;
     void (*reading)(void *ctx, const struct gyro_reading *r, int64_t t_ns);

@@ -4,7 +4,7 @@
 
 #include "board/gyro/gyro.h"
 
-static inline void gyro_tell(const struct gyro *b, enum gyro_event e, int64_t t_ns)
+static inline void gyro_notify_event(const struct gyro *b, enum gyro_event e, int64_t t_ns)
 {
     if (b->told) b->io.event(b->io.ctx, e, t_ns);
 }

@@ -11,16 +11,16 @@
 
 /* ---- level ---- */
 
-static double limited(double x)
+static double clamp_unit(double x)
 {
     return fmin(fmax(x, -1.0), 1.0);
 }
 
 struct gyro_level gyro_level_of(double y_g, double x_g)
 {
-    struct gyro_level l = {.sin_b = limited(y_g)};
+    struct gyro_level l = {.sin_b = clamp_unit(y_g)};
     l.cos_b = sqrt(1.0 - l.sin_b * l.sin_b);
-    l.sin_g = l.cos_b > 0.0 ? limited(-x_g / l.cos_b) : 0.0;
+    l.sin_g = l.cos_b > 0.0 ? clamp_unit(-x_g / l.cos_b) : 0.0;
     l.cos_g = sqrt(1.0 - l.sin_g * l.sin_g);
     l.beta_rad = det_atan2(l.sin_b, l.cos_b);
     l.gamma_rad = det_atan2(l.sin_g, l.cos_g);

@@ -15,7 +15,7 @@ static int64_t ns_of(double s)
     return (int64_t)(s * 1e9 + 0.5);
 }
 
-static void enter(struct gyro *b, enum gyro_phase phase, int64_t t_ns)
+static void enter_phase(struct gyro *b, enum gyro_phase phase, int64_t t_ns)
 {
     b->run.phase = phase;
     b->run.phase_ns = t_ns;
@@ -45,8 +45,8 @@ static void begin_turn(struct gyro *b, double to_deg, int64_t t_ns)
         gyro_turn_of(b->run.q_ref_rad, to_deg * GYRO_RAD_PER_DEG, fmin(b->set.slew_dps * GYRO_RAD_PER_DEG, limit_radps),
                      b->set.slew_dps2 * GYRO_RAD_PER_DEG, t_ns);
     if (b->io.reposition) b->io.reposition(b->io.ctx, t_ns);
-    enter(b, GYRO_SLEWING, t_ns);
-    gyro_tell(b, GYRO_EV_SLEW, t_ns);
+    enter_phase(b, GYRO_SLEWING, t_ns);
+    gyro_notify_event(b, GYRO_EV_SLEW, t_ns);
 }
 
 static void begin_position(struct gyro *b, unsigned position, int64_t t_ns)
@@ -55,7 +55,7 @@ static void begin_position(struct gyro *b, unsigned position, int64_t t_ns)
     begin_turn(b, b->set.position_deg[(position - 1) % (unsigned)b->set.count], t_ns);
 }
 
-static const char *refused(const struct gyro *b, enum gyro_mode mode)
+static const char *mode_error(const struct gyro *b, enum gyro_mode mode)
 {
     if (!b->ready) return "the gyroscope runs up, or there is no power";
     if (mode == GYRO_OFF) return NULL;
@@ -68,7 +68,7 @@ static const char *refused(const struct gyro *b, enum gyro_mode mode)
 
 const char *gyro_set_mode(struct gyro *b, enum gyro_mode mode, int64_t t_ns)
 {
-    const char *why = refused(b, mode);
+    const char *why = mode_error(b, mode);
     b->counters.refused += why != NULL;
     if (why) return why;
     const bool servoed = b->run.servoed;
@@ -81,10 +81,10 @@ const char *gyro_set_mode(struct gyro *b, enum gyro_mode mode, int64_t t_ns)
     b->run.servoed = mode >= GYRO_HOLD && mode <= GYRO_CALIBRATE;
     b->run.q_ref_rad = servoed && mode != GYRO_HOLD ? q_ref_rad : b->servo_rad;
     b->run.positions = (unsigned)(b->set.count * b->set.repeat);
-    gyro_tell(b, GYRO_EV_MODE, t_ns);
+    gyro_notify_event(b, GYRO_EV_MODE, t_ns);
     if (mode == GYRO_SLEW) begin_turn(b, b->set.slew_deg, t_ns);
     if (mode == GYRO_COMPASS) begin_position(b, 1, t_ns);
-    if (mode == GYRO_CALIBRATE) enter(b, GYRO_SETTLING, t_ns);
+    if (mode == GYRO_CALIBRATE) enter_phase(b, GYRO_SETTLING, t_ns);
     return NULL;
 }
 
@@ -95,35 +95,35 @@ static double servo_error_rad(const struct gyro *b)
     return gyro_wrap_rad(b->servo_rad - b->run.q_ref_rad);
 }
 
-static void slewing(struct gyro *b, int64_t t_ns)
+static void step_slewing(struct gyro *b, int64_t t_ns)
 {
     double rate_radps;
     b->run.q_ref_rad = gyro_turn_at(&b->run.turn, t_ns, &rate_radps);
     if (t_ns - b->run.turn.from_ns < ns_of(b->run.turn.total_s)) return;
     b->run.q_ref_rad = gyro_wrap_rad(b->run.q_ref_rad);
-    enter(b, GYRO_SETTLING, t_ns);
+    enter_phase(b, GYRO_SETTLING, t_ns);
 }
 
-static void settled(struct gyro *b, int64_t t_ns)
+static void end_settling(struct gyro *b, int64_t t_ns)
 {
     if (!gyro_running(b)) {
-        enter(b, GYRO_IDLE, t_ns);
+        enter_phase(b, GYRO_IDLE, t_ns);
         return;
     }
     b->run.frozen = b->set.freeze != 0.0 && b->run.servo_steps > 0;
     b->run.frozen_radps = b->run.frozen ? b->run.servo_radps / b->run.servo_steps : 0.0;
-    enter(b, GYRO_WINDOW, t_ns);
-    gyro_tell(b, GYRO_EV_WINDOW, t_ns);
+    enter_phase(b, GYRO_WINDOW, t_ns);
+    gyro_notify_event(b, GYRO_EV_WINDOW, t_ns);
 }
 
-static void settling(struct gyro *b, int64_t t_ns)
+static void step_settling(struct gyro *b, int64_t t_ns)
 {
     const int64_t age_ns = t_ns - b->run.phase_ns, least_ns = ns_of(b->set.settle_s);
     const double tolerance_rad = b->set.tolerance_arcmin * RAD_PER_ARCMIN;
     if (age_ns < least_ns) return;
     const bool level = fabs(b->level.beta_rad) <= tolerance_rad && !(b->flags & GYRO_LEVEL_LOST);
     if (level && fabs(servo_error_rad(b)) <= tolerance_rad) {
-        settled(b, t_ns);
+        end_settling(b, t_ns);
         return;
     }
     if (age_ns < least_ns + ns_of(b->set.settle_limit_s)) return;
@@ -132,12 +132,12 @@ static void settling(struct gyro *b, int64_t t_ns)
     gyro_condition(b, GYRO_NOT_SETTLED, true, t_ns);
 }
 
-static void window(struct gyro *b, int64_t t_ns)
+static void step_window(struct gyro *b, int64_t t_ns)
 {
     const double length_s = b->run.mode == GYRO_CALIBRATE ? b->set.calibration_s : b->set.window_s;
     if (t_ns - b->run.phase_ns < ns_of(length_s)) return;
     b->counters.windows++;
-    gyro_tell(b, GYRO_EV_WINDOW_END, t_ns);
+    gyro_notify_event(b, GYRO_EV_WINDOW_END, t_ns);
     const bool more = b->run.mode == GYRO_COMPASS && b->run.position < b->run.positions;
     if (more) begin_position(b, b->run.position + 1, t_ns);
     else gyro_run_stop(b, GYRO_HOLD);
@@ -145,8 +145,10 @@ static void window(struct gyro *b, int64_t t_ns)
 
 void gyro_run_step(struct gyro *b, int64_t t_ns)
 {
-    static void (*const phase[])(struct gyro *, int64_t) = {
-        [GYRO_IDLE] = NULL, [GYRO_SLEWING] = slewing, [GYRO_SETTLING] = settling, [GYRO_WINDOW] = window};
+    static void (*const phase[])(struct gyro *, int64_t) = {[GYRO_IDLE] = NULL,
+                                                            [GYRO_SLEWING] = step_slewing,
+                                                            [GYRO_SETTLING] = step_settling,
+                                                            [GYRO_WINDOW] = step_window};
     if (phase[b->run.phase]) phase[b->run.phase](b, t_ns);
 }
 

@@ -39,7 +39,7 @@ struct gyro_watch {
     int64_t level_ns; /* last level */
     double still_rad; /* the sensor has not left its degree, */
     int64_t still_ns; /* since then */
-    double told_deg;  /* track as it was told of then */
+    double told_deg;  /* reported track at that time */
     int64_t told_ns;  /* last time it was still the same */
 };
 
@@ -64,7 +64,7 @@ struct gyro {
     struct sched *sched;
     struct trace trace;
     struct line_faults line;
-    bool told; /* somebody listens to events */
+    bool told; /* io.event has a subscriber */
     struct gyro_counters counters;
 
     bool on, ready;
@@ -85,7 +85,7 @@ struct gyro {
     unsigned flags;     /* of this step */
     uint32_t wrongs;    /* enum board_wrong */
     bool silent;        /* the level unit */
-    unsigned standing;  /* conditions the host was told of */
+    unsigned standing;  /* conditions notified to the host */
     int64_t calm_ns[2]; /* last time the level was lost, a rate limited */
     struct gyro_reading latest;
 };

@@ -46,7 +46,7 @@ static uint16_t word_at(struct pik *b, unsigned address)
     return status;
 }
 
-static void clear(struct pik *b, unsigned axes, int64_t t_ns)
+static void clear_counters(struct pik *b, unsigned axes, int64_t t_ns)
 {
     pik_sample_until(b, t_ns);
     for (unsigned i = 0; i < PIK_AXES; i++) {
@@ -62,7 +62,7 @@ static void clear(struct pik *b, unsigned axes, int64_t t_ns)
 static void write_word(struct pik *b, const struct board_cycle *c, int64_t t_ns)
 {
     if (c->address == PIK_REG_PERIOD) pik_set_period(b, c->data, t_ns);
-    if (c->address == PIK_REG_CLEAR) clear(b, c->data, t_ns);
+    if (c->address == PIK_REG_CLEAR) clear_counters(b, c->data, t_ns);
     if (c->address != PIK_REG_LATCH) return;
     b->counters.strobes++;
     pik_latch_now(b, t_ns);
@@ -82,7 +82,7 @@ static void cycle_end(void *ctx, int64_t t_ns)
     c->done(c->ctx, c, BOARD_CYCLE_OK, t_ns);
 }
 
-static bool takes(const struct pik *b, const struct board_cycle *c)
+static bool accepts_value(const struct pik *b, const struct board_cycle *c)
 {
     if (c->address == PIK_REG_PERIOD) return pik_period_fits(b, c->data);
     return c->address != PIK_REG_CLEAR || c->data < 1u << PIK_AXES;
@@ -98,7 +98,7 @@ void pik_wanted(const void *board, const struct board_cycle *c, enum board_cycle
     else (void)snprintf(out, cap, "it takes 0 to %u", (1u << PIK_AXES) - 1);
 }
 
-static enum board_cycle_result judge(const struct pik *b, const struct board_cycle *c)
+static enum board_cycle_result check_cycle(const struct pik *b, const struct board_cycle *c)
 {
     if (!b->on) return BOARD_CYCLE_OFF;
     if (c->address >= PIK_REGISTERS) return BOARD_CYCLE_NO_ADDRESS;
@@ -108,12 +108,12 @@ static enum board_cycle_result judge(const struct pik *b, const struct board_cyc
     if (c->strobe_ns != 0 && c->strobe_ns < b->profile.strobe_min_ns) return BOARD_CYCLE_TOO_SHORT;
     if (b->cycle) return BOARD_CYCLE_BUSY;
     if (rights & LATCHED && !b->any) return BOARD_CYCLE_NOT_READY;
-    return !c->write || takes(b, c) ? BOARD_CYCLE_OK : BOARD_CYCLE_BAD_VALUE;
+    return !c->write || accepts_value(b, c) ? BOARD_CYCLE_OK : BOARD_CYCLE_BAD_VALUE;
 }
 
 enum board_cycle_result pik_submit(struct pik *b, struct board_cycle *c, int64_t t_ns)
 {
-    const enum board_cycle_result r = judge(b, c);
+    const enum board_cycle_result r = check_cycle(b, c);
     if (r != BOARD_CYCLE_OK) {
         b->counters.cycles_refused++;
         return r;

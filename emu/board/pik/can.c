@@ -60,30 +60,30 @@ static const struct board_object objects[] = {
     {PIK_OD_PLATE, read_plate, NULL},
 };
 
-/* ---- what the board tells ---- */
+/* ---- notifications of the board ---- */
 
-static void put16(uint8_t *at, unsigned v)
+static void put_u16(uint8_t *at, unsigned v)
 {
     at[0] = (uint8_t)v;
     at[1] = (uint8_t)(v >> 8);
 }
 
-static void put32(uint8_t *at, uint32_t v)
+static void put_u32(uint8_t *at, uint32_t v)
 {
-    put16(at, v & 0xFFFF);
-    put16(at + 2, v >> 16);
+    put_u16(at, v & 0xFFFF);
+    put_u16(at + 2, v >> 16);
 }
 
 static void on_reading(void *ctx, const struct pik_reading *r, int64_t t_ns)
 {
     struct can_msg m[PIK_TPDOS] = {{.len = 8}, {.len = 8}, {.len = 8}};
-    for (unsigned i = 0; i < PIK_AXES; i++) put16(m[0].data + 2 * i, (uint16_t)r->increment[i]);
+    for (unsigned i = 0; i < PIK_AXES; i++) put_u16(m[0].data + 2 * i, (uint16_t)r->increment[i]);
     m[0].data[6] = (uint8_t)r->seq;
     m[0].data[7] = r->status & SATURATED;
-    put32(m[1].data, (uint32_t)r->total[0]);
-    put32(m[1].data + 4, (uint32_t)r->total[1]);
-    put32(m[2].data, (uint32_t)r->total[2]);
-    put32(m[2].data + 4, (uint32_t)(r->t_ns / NS_PER_US));
+    put_u32(m[1].data, (uint32_t)r->total[0]);
+    put_u32(m[1].data + 4, (uint32_t)r->total[1]);
+    put_u32(m[2].data, (uint32_t)r->total[2]);
+    put_u32(m[2].data + 4, (uint32_t)(r->t_ns / NS_PER_US));
     board_node_stream(ctx, PIK_COUNTS_TPDO, m, PIK_TPDOS, t_ns);
 }
 
@@ -94,7 +94,7 @@ static void on_saturated(void *ctx, bool on, int64_t t_ns)
     else co_node_error_end(n, PIK_EMCY_SATURATED, t_ns);
 }
 
-static uint32_t serial(const void *board)
+static uint32_t serial_of(const void *board)
 {
     return ((const struct pik *)board)->cfg.serial;
 }
@@ -108,17 +108,17 @@ static const struct board_node_type type = {.board = &pik_board,
                                             .device = &pik_device,
                                             .objects = objects,
                                             .object_count = sizeof objects / sizeof *objects,
-                                            .serial = serial,
+                                            .serial = serial_of,
                                             .period_ns = period_ns};
 
-static void init(void *can, const struct board_can_cfg *cfg, void *board, struct can_bus *bus, struct sched *s)
+static void init_can(void *can, const struct board_can_cfg *cfg, void *board, struct can_bus *bus, struct sched *s)
 {
     board_node_init(can, &type, cfg, board, bus, s);
     pik_attach(board, &(struct pik_host){.ctx = can, .reading = on_reading, .saturated = on_saturated});
 }
 
 const struct board_can pik_can_side = {.size = sizeof(struct pik_can),
-                                       .init = init,
+                                       .init = init_can,
                                        .power_up = board_node_power_up,
                                        .power_down = board_node_power_down,
                                        .node = board_node_co};

@@ -49,9 +49,9 @@ static void set_clock(struct pik *b, int64_t tick, int64_t t_ns)
 
 /* ---- inputs ---- */
 
-/* Integral from where it stands: Gauss with two points, exact for a cubic, a look at most at a time. Both points lie within, so
+/* Integral since the last call: Gauss with two points, exact for a cubic, a look at most at a time. Both points lie within, so
  * that a step at either end is on its right side. */
-static void integrate(struct pik *b, unsigned i, int64_t t_ns)
+static void integrate_input(struct pik *b, unsigned i, int64_t t_ns)
 {
     struct pik_channel *c = &b->channel[i];
     const double span_ns = (double)(t_ns - b->fed_ns);
@@ -73,17 +73,17 @@ static double limited_v(const struct pik *b, double v)
     return v > limit_v ? limit_v : v < -limit_v ? -limit_v : v;
 }
 
-static int64_t rounded(double x)
+static int64_t round_to_int64(double x)
 {
     return (int64_t)floor(x + 0.5);
 }
 
-static struct pik_drive driven(const struct pik_channel *c, double v)
+static struct pik_drive drive_at(const struct pik_channel *c, double v)
 {
     struct pik_drive d = c->drive;
-    d.per_tick = rounded(v * c->per_volt);
+    d.per_tick = round_to_int64(v * c->per_volt);
     if (!(c->lost_per_volt > 0.0)) return d;
-    const int64_t lost = rounded(v * c->lost_per_volt), least = PIK_PULSE / 256;
+    const int64_t lost = round_to_int64(v * c->lost_per_volt), least = PIK_PULSE / 256;
     d.plus = d.plus + lost > least ? d.plus + lost : least;
     d.minus = d.minus - lost > least ? d.minus - lost : least;
     return d;
@@ -101,8 +101,8 @@ uint64_t pik_count_minus(const struct pik_channel *c)
     return c->minus_from + (c->stuck ? 0 : c->axis.minus);
 }
 
-/* Up to and including tick with the drive it has; a pulse is told at t_ns, when it is known, and shown where it was. */
-static void pulses(struct pik *b, unsigned i, int64_t tick, int64_t t_ns)
+/* Up to and including tick with the drive it has; a pulse is notified at t_ns, when it is known, and traced at its own instant. */
+static void advance_pulses(struct pik *b, unsigned i, int64_t tick, int64_t t_ns)
 {
     struct pik_axis *a = &b->channel[i].axis;
     const bool watched = trace_watched(&b->trace, PIK_PULSE_LINES), each = b->heard || watched;
@@ -110,13 +110,13 @@ static void pulses(struct pik *b, unsigned i, int64_t tick, int64_t t_ns)
         pik_axis_advance(a, next);
         const int64_t begun_ns = pik_tick_ns(b, next);
         if (watched) pik_lines_pulse(b, i, begun_ns);
-        if (begun_ns >= b->heard_ns) pik_tell(b, (enum pik_event)(PIK_EV_FX + i), t_ns);
+        if (begun_ns >= b->heard_ns) pik_notify_event(b, (enum pik_event)(PIK_EV_FX + i), t_ns);
     }
     pik_axis_advance(a, tick);
 }
 
 /* Into so many pieces of one mean each that the charge is nowhere off by PIECE_PULSES within them. */
-static int64_t pieces(const struct pik *b, const struct pik_channel *c, double span_s)
+static int64_t piece_count(const struct pik *b, const struct pik_channel *c, double span_s)
 {
     const double bend = fabs(c->slope_v_per_s) * span_s * span_s * b->k_hz_per_v / 8.0;
     int64_t n = 1;
@@ -125,19 +125,19 @@ static int64_t pieces(const struct pik *b, const struct pik_channel *c, double s
 }
 
 /* The ticks up to `tick` get all the charge that is due, as the slope has it. */
-static void convert(struct pik *b, unsigned i, int64_t tick, int64_t t_ns)
+static void convert_ticks(struct pik *b, unsigned i, int64_t tick, int64_t t_ns)
 {
     struct pik_channel *c = &b->channel[i];
     const int64_t from = c->axis.tick, ticks = tick - from;
     if (ticks <= 0) return;
     const double tick_s = 1000.0 / (double)b->clk.hz;
     const double mean_v = c->due_vs / ((double)ticks * tick_s) + c->zero_v + c->noise_v;
-    const int64_t n = pieces(b, c, (double)ticks * tick_s);
+    const int64_t n = piece_count(b, c, (double)ticks * tick_s);
     for (int64_t k = 1; k <= n; k++) {
         const int64_t begin = c->axis.tick, end = from + ticks * k / n;
         const double off_ticks = 0.5 * (double)(begin + end - from - tick);
-        c->axis.drive = driven(c, limited_v(b, mean_v + c->slope_v_per_s * off_ticks * tick_s));
-        pulses(b, i, end, t_ns);
+        c->axis.drive = drive_at(c, limited_v(b, mean_v + c->slope_v_per_s * off_ticks * tick_s));
+        advance_pulses(b, i, end, t_ns);
     }
     c->due_vs = 0.0;
 }
@@ -148,8 +148,8 @@ void pik_sample_until(struct pik *b, int64_t t_ns)
     if (!b->on) return;
     const int64_t tick = pik_tick_at(b, t_ns);
     for (unsigned i = 0; i < PIK_AXES; i++) {
-        if (t_ns > b->fed_ns) integrate(b, i, t_ns);
-        convert(b, i, tick, t_ns);
+        if (t_ns > b->fed_ns) integrate_input(b, i, t_ns);
+        convert_ticks(b, i, tick, t_ns);
     }
     b->fed_ns = t_ns;
 }
@@ -166,7 +166,7 @@ static void keep_counters(struct pik_channel *c)
 }
 
 /* Whether it could not keep up since the last look. */
-static bool keep_up(struct pik_channel *c)
+static bool check_saturation(struct pik_channel *c)
 {
     const uint32_t before = c->axis.saturated;
     pik_axis_look(&c->axis, c->axis.tick, &c->axis.drive);
@@ -176,31 +176,31 @@ static bool keep_up(struct pik_channel *c)
     return saturated;
 }
 
-static void tell_saturation(struct pik *b, bool now, int64_t t_ns)
+static void notify_saturation(struct pik *b, bool now, int64_t t_ns)
 {
     if (now) b->saturated_ns = t_ns;
     if (now == b->saturated) return;
     if (!now && (double)(t_ns - b->saturated_ns) < b->profile.saturated_ms * 1e6) return;
     b->saturated = now;
-    if (now) pik_tell(b, PIK_EV_SATURATED, t_ns);
+    if (now) pik_notify_event(b, PIK_EV_SATURATED, t_ns);
     if (b->host.saturated) b->host.saturated(b->host.ctx, now, t_ns);
 }
 
-/* By the pace, whoever listens: what the converters come to depends on nobody. Noise is a value for each stretch between two. */
-static void look(void *ctx, int64_t t_ns)
+/* At a fixed pace, with or without observers: the result does not depend on them. Noise is one value per interval. */
+static void look_at_inputs(void *ctx, int64_t t_ns)
 {
     struct pik *b = ctx;
     const int64_t pace = b->profile.look_ticks;
     bool saturated = false;
     pik_sample_until(b, t_ns);
-    for (unsigned i = 0; i < PIK_AXES; i++) saturated |= keep_up(&b->channel[i]);
+    for (unsigned i = 0; i < PIK_AXES; i++) saturated |= check_saturation(&b->channel[i]);
     if (t_ns >= b->warm_ns) {
         pik_warm(b, b->io.temp_degc(b->io.ctx, BOARD_SENSOR, t_ns));
         b->warm_ns = t_ns + WARM_NS;
     }
     for (unsigned i = 0; b->noise_v > 0.0 && i < PIK_AXES; i++)
         b->channel[i].noise_v = b->noise_v * rng_gauss(&b->channel[i].noise);
-    tell_saturation(b, saturated, t_ns);
+    notify_saturation(b, saturated, t_ns);
     b->look_tick += pace;
     sched_at(b->sched, &b->look, pik_tick_ns(b, b->look_tick));
 }
@@ -228,7 +228,7 @@ void pik_init(struct pik *b, const struct pik_profile *p, const struct board_cfg
     set_clock(b, 0, 0);
     pik_warm(b, 25.0);
     for (unsigned i = 0; i < PIK_AXES; i++) init_channel(b, i);
-    sched_ev(&b->look, look, b);
+    sched_ev(&b->look, look_at_inputs, b);
     pik_lines_init(b);
     pik_latch_init(b);
     pik_bus_init(b);
@@ -260,7 +260,7 @@ void pik_power_up(struct pik *b, int64_t t_ns)
     b->fed_ns = b->warm_ns = t_ns;
     b->clk_shown_tick = 0;
     pik_lines_rest(b, true, t_ns);
-    pik_tell(b, PIK_EV_POWER_UP, t_ns);
+    pik_notify_event(b, PIK_EV_POWER_UP, t_ns);
     sched_at(b->sched, &b->look, t_ns);
     pik_latch_restart(b, t_ns);
 }
@@ -278,7 +278,7 @@ void pik_power_down(struct pik *b, int64_t t_ns)
     sched_cancel(b->sched, &b->latch_end);
     pik_bus_cut(b, t_ns);
     pik_lines_rest(b, false, t_ns);
-    pik_tell(b, PIK_EV_POWER_DOWN, t_ns);
+    pik_notify_event(b, PIK_EV_POWER_DOWN, t_ns);
 }
 
 void pik_reset(struct pik *b, int64_t t_ns)
@@ -287,13 +287,13 @@ void pik_reset(struct pik *b, int64_t t_ns)
     b->counters.resets++;
     pik_sample_until(b, t_ns);
     pik_bus_cut(b, t_ns);
-    pik_tell(b, PIK_EV_RES, t_ns);
+    pik_notify_event(b, PIK_EV_RES, t_ns);
     pik_latch_restart(b, t_ns);
 }
 
 void pik_listen(struct pik *b, bool on)
 {
-    if (on && !b->heard) b->heard_ns = b->sched->now_ns; /* what was before is told to nobody */
+    if (on && !b->heard) b->heard_ns = b->sched->now_ns; /* earlier events are not notified */
     b->heard = on;
 }
 

@@ -39,7 +39,7 @@ int64_t pik_axis_next(const struct pik_axis *a)
 }
 
 /* A reset begins at a tick, at which the charge is beyond the threshold. */
-static void reset(struct pik_axis *a, int64_t tick)
+static void begin_reset(struct pik_axis *a, int64_t tick)
 {
     const struct pik_drive *d = &a->drive;
     a->charge += d->per_tick * (tick - a->tick);
@@ -54,7 +54,7 @@ static void reset(struct pik_axis *a, int64_t tick)
 
 /* After a reset on the side of the drive: whether all further ones up to the next look come as the input reaches the
  * threshold, none waits for its reference and none overshoots to the other threshold. */
-static bool regular(const struct pik_axis *a)
+static bool resets_regularly(const struct pik_axis *a)
 {
     const struct pik_drive *d = &a->drive;
     const int64_t speed = a->begun_sign * d->per_tick;
@@ -67,7 +67,7 @@ static bool regular(const struct pik_axis *a)
 }
 
 /* The regular resets up to tick at one stroke. */
-static void resets(struct pik_axis *a, int64_t tick)
+static void apply_resets(struct pik_axis *a, int64_t tick)
 {
     const struct pik_drive *d = &a->drive;
     const int sign = a->begun_sign;
@@ -99,8 +99,8 @@ void pik_axis_advance(struct pik_axis *a, int64_t tick)
     assert(tick >= a->tick);
     if (stays_within(a, tick)) return;
     for (int64_t next = pik_axis_next(a); next <= tick; next = pik_axis_next(a)) {
-        reset(a, next);
-        if (regular(a)) resets(a, tick);
+        begin_reset(a, next);
+        if (resets_regularly(a)) apply_resets(a, tick);
     }
     a->charge += a->drive.per_tick * (tick - a->tick);
     a->tick = tick;

@@ -4,7 +4,7 @@
  * reset at the next tick of its clock: a reference of the opposite sign for TCLK, one pulse of output. While it lasts no other
  * begins, and the same reference rests a while before it is used again. Charge is counted in nominal pulses, in integers,
  * and the input is constant between two looks at it: so the pulses of any stretch follow in closed form, and are the same
- * however finely somebody wants to see them. Pure, plain struct. */
+ * whatever the resolution of the observer. Pure, plain struct. */
 #ifndef PSABENCH_BOARD_PIK_CONVERTER_H
 #define PSABENCH_BOARD_PIK_CONVERTER_H
 

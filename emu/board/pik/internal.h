@@ -12,7 +12,7 @@ int64_t pik_tick_ns(const struct pik *b, int64_t tick);
 uint64_t pik_count_plus(const struct pik_channel *c); /* as the counter has it */
 uint64_t pik_count_minus(const struct pik_channel *c);
 
-static inline void pik_tell(const struct pik *b, enum pik_event e, int64_t t_ns)
+static inline void pik_notify_event(const struct pik *b, enum pik_event e, int64_t t_ns)
 {
     if (b->heard) b->io.event(b->io.ctx, e, t_ns);
 }

@@ -19,7 +19,7 @@ static void latch_end(void *ctx, int64_t t_ns)
 }
 
 /* Counts of a channel into r, which holds those of the reading before. */
-static void take(struct pik_channel *c, struct pik_reading *r, unsigned i, bool frozen)
+static void latch_channel(struct pik_channel *c, struct pik_reading *r, unsigned i, bool frozen)
 {
     if (frozen) return;
     r->plus[i] = pik_count_plus(c);
@@ -38,7 +38,7 @@ void pik_latch_now(struct pik *b, int64_t t_ns)
     r->status = PIK_ST_NEW;
     for (unsigned i = 0; i < PIK_AXES; i++) {
         struct pik_channel *c = &b->channel[i];
-        take(c, r, i, b->frozen);
+        latch_channel(c, r, i, b->frozen);
         if (c->saturated) r->status |= (uint8_t)(PIK_ST_SATURATED_X << i);
         c->saturated = false;
     }
@@ -46,11 +46,11 @@ void pik_latch_now(struct pik *b, int64_t t_ns)
     b->counters.readings++;
     latch_line(b, false, t_ns);
     sched_at(b->sched, &b->latch_end, t_ns + b->profile.latch_ns);
-    pik_tell(b, PIK_EV_LATCH, t_ns);
+    pik_notify_event(b, PIK_EV_LATCH, t_ns);
     if (b->host.reading) b->host.reading(b->host.ctx, r, t_ns);
 }
 
-static void latch(void *ctx, int64_t t_ns)
+static void latch_periodically(void *ctx, int64_t t_ns)
 {
     struct pik *b = ctx;
     sched_at(b->sched, &b->latch, t_ns + pik_period_ns(b));
@@ -95,6 +95,6 @@ void pik_period_range(const struct pik *b, unsigned *least, unsigned *most)
 
 void pik_latch_init(struct pik *b)
 {
-    sched_ev(&b->latch, latch, b);
+    sched_ev(&b->latch, latch_periodically, b);
     sched_ev(&b->latch_end, latch_end, b);
 }

@@ -1,4 +1,4 @@
-/* What the trace hears: computed only while somebody listens, pulse by pulse, period by period of CLK. */
+/* Edges for the trace: computed only while a line is watched, pulse by pulse, period by period of CLK. */
 #include "board/pik/internal.h"
 
 #define BIT(line)    (UINT64_C(1) << (line))
@@ -66,7 +66,7 @@ static int64_t report_clk(struct pik *b, int64_t t_ns)
     }
 }
 
-static int64_t report(void *ctx, int64_t t_ns)
+static int64_t report_lines(void *ctx, int64_t t_ns)
 {
     return report_clk(ctx, t_ns);
 }
@@ -76,7 +76,7 @@ void pik_lines_clock(struct pik *b, int64_t t_ns)
     while (report_clk(b, t_ns) < t_ns) continue;
 }
 
-/* ---- late listeners ---- */
+/* ---- late observers ---- */
 
 static void wake_clk(struct pik *b)
 {
@@ -96,7 +96,7 @@ static void wake_pulses(struct pik *b)
     }
 }
 
-static void wake(void *ctx, uint64_t mask)
+static void wake_lines(void *ctx, uint64_t mask)
 {
     struct pik *b = ctx;
     if (!b->on) return;
@@ -109,5 +109,5 @@ void pik_lines_init(struct pik *b)
     trace_init(&b->trace);
     for (unsigned i = 0; i < PIK_LINES; i++) (void)trace_add(&b->trace, pik_lines[i].name, pik_lines[i].level);
     line_faults_init(&b->line, &b->trace);
-    b->trace.source = (struct trace_source){.wake = wake, .report = report, .ctx = b};
+    b->trace.source = (struct trace_source){.wake = wake_lines, .report = report_lines, .ctx = b};
 }

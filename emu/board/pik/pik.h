@@ -2,7 +2,7 @@
  * (article, sections 1 and 2).
  *
  * The model is behind the time by less than a look: at each it integrates its inputs since the last, and decides which pulses
- * there were. Looks come at a fixed pace, shorter than the trace's lag, whoever listens or reads, so that this changes
+ * there were. Looks come at a fixed pace, shorter than the trace's lag, with or without observers, so that this changes
  * nothing; what needs the counters at an instant between two looks takes the inputs up to it. Counters are latched by the
  * board's own period, or by a strobe on the bus.
  * Plain struct owned by the caller, one thread, no allocation; read-only outside the board's files. */
@@ -112,7 +112,7 @@ void pik_power_up(struct pik *b, int64_t t_ns);
 void pik_power_down(struct pik *b, int64_t t_ns);
 void pik_reset(struct pik *b, int64_t t_ns);              /* counters and registers; the integrators run on */
 void pik_sample_until(struct pik *b, int64_t t_ns);       /* takes its inputs, and counts what they give */
-void pik_listen(struct pik *b, bool on);                  /* somebody wants io.event */
+void pik_listen(struct pik *b, bool on);                  /* subscribes to io.event */
 void pik_clock(struct pik *b, int32_t ppm, int64_t t_ns); /* the generator is off by so much, beside its own error */
 void pik_stick(struct pik *b, unsigned axis, const struct board_chip_fault *f, int64_t t_ns);
 bool pik_flip(struct pik *b, unsigned axis, unsigned reg, uint8_t mask, int64_t t_ns);

@@ -111,9 +111,9 @@ int64_t pik_profile_period_ns(const struct pik_profile *p)
     return (int64_t)p->latch_us * 1000;
 }
 
-/* Writes the sentence and is false, so that a check reads `return no(...)`. */
-static bool no(char *why, size_t cap, const char *format, ...) __attribute__((format(printf, 3, 4)));
-static bool no(char *why, size_t cap, const char *format, ...)
+/* Writes the sentence and is false, so that a check reads `return set_error(...)`. */
+static bool set_error(char *why, size_t cap, const char *format, ...) __attribute__((format(printf, 3, 4)));
+static bool set_error(char *why, size_t cap, const char *format, ...)
 {
     va_list args;
     va_start(args, format);
@@ -122,19 +122,22 @@ static bool no(char *why, size_t cap, const char *format, ...)
     return false;
 }
 
-/* Below half a pulse a reset ends beyond the other threshold and calls for the opposite one, for ever. */
+/* Below half a pulse a reset ends beyond the other threshold and causes the opposite one, endlessly. */
 static bool check_integrator(const struct pik_profile *p, char *why, size_t cap)
 {
     const double step_v = pik_profile_step_v(p);
     if (p->uc_v < 0.505 * step_v)
-        return no(why, cap,
-                  "uc_v = %g: a reset moves the integrator by %.3f V, so that Uc below %.3f V would call for the "
-                  "opposite reset at once",
-                  p->uc_v, step_v, 0.505 * step_v);
+        return set_error(
+            why, cap,
+            "uc_v = %g: a reset moves the integrator by %.3f V, so that Uc below %.3f V would call for the "
+            "opposite reset at once",
+            p->uc_v, step_v, 0.505 * step_v);
     if (p->rail_v < p->uc_v + 1.05 * step_v)
-        return no(why, cap, "rail_v = %g: less than Uc = %g V and a step of %.3f V: saturation would not be noticed",
-                  p->rail_v, p->uc_v, step_v);
-    if (p->rail_v > 16.0 * step_v) return no(why, cap, "rail_v = %g: more than 16 steps of %.3f V", p->rail_v, step_v);
+        return set_error(why, cap,
+                         "rail_v = %g: less than Uc = %g V and a step of %.3f V: saturation would not be noticed",
+                         p->rail_v, p->uc_v, step_v);
+    if (p->rail_v > 16.0 * step_v)
+        return set_error(why, cap, "rail_v = %g: more than 16 steps of %.3f V", p->rail_v, step_v);
     return true;
 }
 
@@ -142,34 +145,35 @@ static bool check_time(const struct pik_profile *p, char *why, size_t cap)
 {
     const double tclk_ns = 1e9 / p->clock_hz;
     if ((double)p->clock_hz * p->grid > 990e3)
-        return no(why, cap, "grid = %u: %u instants in each of %u periods a second are more than 990000 a second",
-                  p->grid, p->grid, p->clock_hz);
+        return set_error(why, cap,
+                         "grid = %u: %u instants in each of %u periods a second are more than 990000 a second", p->grid,
+                         p->grid, p->clock_hz);
     if (p->clock_hz * p->grid > PIK_LOOKS_HZ_MAX * (double)p->look_ticks)
-        return no(why, cap, "look_ticks = %u: more than %u looks a second at the input", p->look_ticks,
-                  PIK_LOOKS_HZ_MAX);
+        return set_error(why, cap, "look_ticks = %u: more than %u looks a second at the input", p->look_ticks,
+                         PIK_LOOKS_HZ_MAX);
     if ((p->look_ticks - 1) * tclk_ns / p->grid > PIK_LATE_NS_MAX)
-        return no(why, cap, "look_ticks = %u: a pulse would be known %.0f us late, more than %.0f us", p->look_ticks,
-                  (p->look_ticks - 1) * tclk_ns / p->grid * 1e-3, PIK_LATE_NS_MAX * 1e-3);
+        return set_error(why, cap, "look_ticks = %u: a pulse would be known %.0f us late, more than %.0f us",
+                         p->look_ticks, (p->look_ticks - 1) * tclk_ns / p->grid * 1e-3, PIK_LATE_NS_MAX * 1e-3);
     if (p->switch_on_ns >= tclk_ns)
-        return no(why, cap, "switch_on_ns = %g: longer than the reset, %.0f ns", p->switch_on_ns, tclk_ns);
+        return set_error(why, cap, "switch_on_ns = %g: longer than the reset, %.0f ns", p->switch_on_ns, tclk_ns);
     if (p->switch_off_ns >= tclk_ns)
-        return no(why, cap, "switch_off_ns = %g: longer than the reset, %.0f ns", p->switch_off_ns, tclk_ns);
+        return set_error(why, cap, "switch_off_ns = %g: longer than the reset, %.0f ns", p->switch_off_ns, tclk_ns);
     if (p->input_off_ns > tclk_ns)
-        return no(why, cap, "input_off_ns = %g: longer than the reset, %.0f ns", p->input_off_ns, tclk_ns);
+        return set_error(why, cap, "input_off_ns = %g: longer than the reset, %.0f ns", p->input_off_ns, tclk_ns);
     return true;
 }
 
 /* An increment has 16 bits, and a period longer than what it takes in them would wrap unseen. */
 static bool check_reading(const struct pik_profile *p, char *why, size_t cap)
 {
-    if (p->latch_us > 0 && p->latch_us < 200) return no(why, cap, "latch_us = %u: below 200 us", p->latch_us);
+    if (p->latch_us > 0 && p->latch_us < 200) return set_error(why, cap, "latch_us = %u: below 200 us", p->latch_us);
     if (p->latch_us * 1e-6 * pik_profile_limit_hz(p) > 32767.0)
-        return no(why, cap, "latch_us = %u: up to %.0f pulses would not fit into 16 bits", p->latch_us,
-                  p->latch_us * 1e-6 * pik_profile_limit_hz(p));
+        return set_error(why, cap, "latch_us = %u: up to %.0f pulses would not fit into 16 bits", p->latch_us,
+                         p->latch_us * 1e-6 * pik_profile_limit_hz(p));
     if (p->latch_us > 0 && p->latch_ns >= p->latch_us * 1000.0)
-        return no(why, cap, "latch_ns = %u: no shorter than the period", p->latch_ns);
+        return set_error(why, cap, "latch_ns = %u: no shorter than the period", p->latch_ns);
     if (p->strobe_ns < p->strobe_min_ns)
-        return no(why, cap, "strobe_ns = %u: shorter than strobe_min_ns = %u", p->strobe_ns, p->strobe_min_ns);
+        return set_error(why, cap, "strobe_ns = %u: shorter than strobe_min_ns = %u", p->strobe_ns, p->strobe_min_ns);
     return true;
 }
 
@@ -178,6 +182,7 @@ bool pik_profile_check(const struct pik_profile *p, char *why, size_t cap)
     const double k = pik_profile_k_hz_per_v(p);
     if (!board_field_check(pik_fields, PIK_FIELDS, p, why, cap)) return false;
     if (k > 20e3 || k < 1.0)
-        return no(why, cap, "rr_ohm = %g: K = Rr/(RIN UREF TCLK) = %g Hz/V is not within 1..20000", p->rr_ohm, k);
+        return set_error(why, cap, "rr_ohm = %g: K = Rr/(RIN UREF TCLK) = %g Hz/V is not within 1..20000", p->rr_ohm,
+                         k);
     return check_integrator(p, why, cap) && check_time(p, why, cap) && check_reading(p, why, cap);
 }

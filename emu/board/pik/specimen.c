@@ -6,7 +6,7 @@
 #define NOMINAL_DEGC 25.0
 #define CUT_SIGMA    3.0 /* no part is off by more */
 
-static double draw(uint64_t seed, uint32_t serial, const char *source, double sd)
+static double draw_value(uint64_t seed, uint32_t serial, const char *source, double sd)
 {
     struct rng r = rng_stream(seed, serial, source);
     const double z = rng_gauss(&r);
@@ -16,7 +16,7 @@ static double draw(uint64_t seed, uint32_t serial, const char *source, double sd
 static void draw_axes(uint64_t seed, uint32_t serial, const char *const source[PIK_AXES], double sd,
                       double out[PIK_AXES])
 {
-    for (unsigned i = 0; i < PIK_AXES; i++) out[i] = draw(seed, serial, source[i], sd);
+    for (unsigned i = 0; i < PIK_AXES; i++) out[i] = draw_value(seed, serial, source[i], sd);
 }
 
 #define AXES(name)                                                                                                     \
@@ -25,7 +25,7 @@ static void draw_axes(uint64_t seed, uint32_t serial, const char *const source[P
         "pik." name ".x", "pik." name ".y", "pik." name ".z"                                                           \
     }
 
-static double size(double x)
+static double magnitude_of(double x)
 {
     return x < 0.0 ? -x : x;
 }
@@ -35,8 +35,8 @@ static double worst_ppm(const struct pik_specimen *s)
 {
     double worst = 0.0;
     for (unsigned i = 0; i < PIK_AXES; i++) {
-        const double ppm = size(s->ratio_ppm[i] - s->uref_ppm + s->clock_ppm) + size(s->asymmetry_ppm[i]) +
-                           PIK_SPAN_K * size(s->ratio_tc[i] - s->uref_tc);
+        const double ppm = magnitude_of(s->ratio_ppm[i] - s->uref_ppm + s->clock_ppm) +
+                           magnitude_of(s->asymmetry_ppm[i]) + PIK_SPAN_K * magnitude_of(s->ratio_tc[i] - s->uref_tc);
         if (ppm > worst) worst = ppm;
     }
     return worst;
@@ -61,9 +61,9 @@ static void select_parts(struct pik_specimen *s, double limit_ppm)
 
 struct pik_specimen pik_specimen_draw(const struct pik_profile *p, uint64_t seed, uint32_t serial)
 {
-    struct pik_specimen s = {.uref_ppm = draw(seed, serial, "pik.uref", p->uref_tol_ppm),
-                             .uref_tc = draw(seed, serial, "pik.uref_tc", p->uref_tc_ppm_per_k),
-                             .clock_ppm = draw(seed, serial, "pik.clock", p->clock_tol_ppm)};
+    struct pik_specimen s = {.uref_ppm = draw_value(seed, serial, "pik.uref", p->uref_tol_ppm),
+                             .uref_tc = draw_value(seed, serial, "pik.uref_tc", p->uref_tc_ppm_per_k),
+                             .clock_ppm = draw_value(seed, serial, "pik.clock", p->clock_tol_ppm)};
     draw_axes(seed, serial, AXES("ratio"), p->ratio_tol_ppm, s.ratio_ppm);
     draw_axes(seed, serial, AXES("ratio_tc"), p->ratio_tc_ppm_per_k, s.ratio_tc);
     draw_axes(seed, serial, AXES("asymmetry"), p->asymmetry_ppm, s.asymmetry_ppm);
@@ -81,7 +81,7 @@ int64_t pik_tick_hz(const struct pik *b)
 }
 
 /* Charge of a reset in nominal pulses: UREF for as long as it is switched on, through Rr, referred to RIN. */
-static double weight(const struct pik *b, unsigned axis, int sign, double degc)
+static double reset_weight(const struct pik *b, unsigned axis, int sign, double degc)
 {
     const struct pik_profile *p = &b->profile;
     const struct pik_specimen *s = &b->specimen;
@@ -94,10 +94,10 @@ static double weight(const struct pik *b, unsigned axis, int sign, double degc)
 
 double pik_true_k_hz_per_v(const struct pik *b, unsigned axis, int sign, double degc)
 {
-    return pik_profile_k_hz_per_v(&b->profile) / weight(b, axis, sign, degc);
+    return pik_profile_k_hz_per_v(&b->profile) / reset_weight(b, axis, sign, degc);
 }
 
-static int64_t charge(double pulses)
+static int64_t to_charge(double pulses)
 {
     return (int64_t)(pulses * (double)PIK_PULSE + 0.5); /* positive */
 }
@@ -114,10 +114,10 @@ void pik_warm(struct pik *b, double degc)
     for (unsigned i = 0; i < PIK_AXES; i++) {
         struct pik_channel *c = &b->channel[i];
         const double c_int = (1.0 + 1e-2 * b->specimen.c_pct[i]) * (1.0 + 1e-6 * p->c_tc_ppm_per_k * dt_k);
-        c->drive = (struct pik_drive){.plus = charge(weight(b, i, 1, degc)),
-                                      .minus = charge(weight(b, i, -1, degc)),
-                                      .threshold = charge(p->uc_v / step_v * c_int),
-                                      .rail = charge(p->rail_v / step_v * c_int),
+        c->drive = (struct pik_drive){.plus = to_charge(reset_weight(b, i, 1, degc)),
+                                      .minus = to_charge(reset_weight(b, i, -1, degc)),
+                                      .threshold = to_charge(p->uc_v / step_v * c_int),
+                                      .rail = to_charge(p->rail_v / step_v * c_int),
                                       .pulse_ticks = p->grid,
                                       .recovery_ticks = p->recovery_ticks};
         c->per_volt = k_hz_per_v * 1000.0 / (double)pik_tick_hz(b) * (double)PIK_PULSE;

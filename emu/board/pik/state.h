@@ -18,7 +18,7 @@ struct pik_channel {
     double noise_v;                 /* until the next look */
     struct pik_drive drive;         /* for no input, at this temperature */
     double per_volt;                /* charge of a tick for a volt */
-    double zero_v;                  /* drift, likewise */
+    double zero_v;                  /* drift, at this temperature */
     double lost_per_volt;           /* charge that a reset loses because it takes the input off */
     uint64_t plus_from, minus_from; /* the counters: this beside the converter's pulses; all, while the pin is stuck */
     bool stuck, stuck_level;
@@ -46,11 +46,11 @@ struct pik {
     int64_t look_tick; /* next */
     int64_t fed_ns;    /* up to which the inputs have been taken */
     int64_t warm_ns;   /* of the next look at the temperature */
-    int64_t heard_ns;  /* since when somebody hears */
+    int64_t heard_ns;  /* since when io.event has a subscriber */
     double degc;
     double k_hz_per_v, noise_v; /* nominal; rms of the mean from look to look */
     struct sched_ev look, latch, latch_end, cycle_end;
-    /* saturation as it is told */
+    /* saturation as notified */
     bool saturated;
     int64_t saturated_ns;
     /* registers */

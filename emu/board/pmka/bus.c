@@ -159,7 +159,7 @@ const char *pmka_register_name(unsigned address)
     return address < PMKA_ADDRESSES ? registers[address].name : NULL;
 }
 
-static void wanted_value(const struct pmka *b, unsigned address, char *out, size_t cap)
+static void expected_value(const struct pmka *b, unsigned address, char *out, size_t cap)
 {
     const struct pmka_rotation *r = &b->rotation;
     bool (*const write)(struct pmka *, uint16_t) = registers[address].write;
@@ -177,13 +177,13 @@ static void wanted_value(const struct pmka *b, unsigned address, char *out, size
 
 void pmka_wanted(const void *board, const struct board_cycle *c, enum board_cycle_result r, char *out, size_t cap)
 {
-    if (r == BOARD_CYCLE_BAD_VALUE) wanted_value(board, c->address, out, cap);
+    if (r == BOARD_CYCLE_BAD_VALUE) expected_value(board, c->address, out, cap);
     else (void)snprintf(out, cap, "STATUS (08h) has bit 0 when the first reading is there");
 }
 
 /* ---- cycles ---- */
 
-static enum board_cycle_result check(const struct pmka *b, const struct board_cycle *c)
+static enum board_cycle_result check_cycle(const struct pmka *b, const struct board_cycle *c)
 {
     const int64_t strobe_ns = c->strobe_ns ? c->strobe_ns : b->profile.strobe_ns;
     if (b->life == PMKA_OFF) return BOARD_CYCLE_OFF;
@@ -201,7 +201,7 @@ static const struct bus_lines bus_lines = {PMKA_LINE_CS, PMKA_LINE_RW, PMKA_LINE
 /* What a register holds is taken at the beginning of the strobe, what is written is taken over at its end. */
 enum board_cycle_result pmka_submit(struct pmka *b, struct board_cycle *c, int64_t t_ns)
 {
-    const enum board_cycle_result r = check(b, c);
+    const enum board_cycle_result r = check_cycle(b, c);
     if (r != BOARD_CYCLE_OK) {
         b->counters.cycles_refused++;
         return r;
@@ -213,7 +213,7 @@ enum board_cycle_result pmka_submit(struct pmka *b, struct board_cycle *c, int64
     return BOARD_CYCLE_OK;
 }
 
-static void finish(struct pmka *b, enum board_cycle_result r, int64_t t_ns)
+static void finish_cycle(struct pmka *b, enum board_cycle_result r, int64_t t_ns)
 {
     struct board_cycle *c = b->bus.cycle;
     b->bus.cycle = NULL;
@@ -229,10 +229,10 @@ static void strobe_ends(void *ctx, int64_t t_ns)
     struct board_cycle *c = b->bus.cycle;
     if (!c->write) {
         c->data = b->bus.answer;
-        finish(b, BOARD_CYCLE_OK, t_ns);
+        finish_cycle(b, BOARD_CYCLE_OK, t_ns);
         return;
     }
-    finish(b, registers[c->address].write(b, c->data) ? BOARD_CYCLE_OK : BOARD_CYCLE_BAD_VALUE, t_ns);
+    finish_cycle(b, registers[c->address].write(b, c->data) ? BOARD_CYCLE_OK : BOARD_CYCLE_BAD_VALUE, t_ns);
 }
 
 void pmka_bus_init(struct pmka *b)
@@ -245,5 +245,5 @@ void pmka_bus_cut(struct pmka *b, int64_t t_ns)
     sched_cancel(b->sched, &b->bus.end);
     b->bus.index = 0;
     b->bus.fresh = b->bus.overrun = false;
-    if (b->bus.cycle) finish(b, BOARD_CYCLE_OFF, t_ns);
+    if (b->bus.cycle) finish_cycle(b, BOARD_CYCLE_OFF, t_ns);
 }

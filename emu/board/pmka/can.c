@@ -49,7 +49,7 @@ static void on_reading(void *ctx, const struct pmka_reading *r, int64_t t_ns)
     board_node_stream(&c->node, PMKA_CODES_TPDO, m, 2, t_ns);
 }
 
-static const struct pmka_reading *latest(const struct board_node *n)
+static const struct pmka_reading *latest_reading(const struct board_node *n)
 {
     return &((const struct pmka *)n->board)->latest;
 }
@@ -57,7 +57,7 @@ static const struct pmka_reading *latest(const struct board_node *n)
 static uint32_t read_code(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
 {
     (void)t_ns;
-    v->number = latest(n)->code[e->sub - 1];
+    v->number = latest_reading(n)->code[e->sub - 1];
     return CO_OK;
 }
 
@@ -67,15 +67,15 @@ static uint32_t read_state(struct board_node *n, const struct co_entry *e, struc
     enum { RESETS = 2, TEMPERATURE = 6 };
     struct can_msg m = {0};
     (void)t_ns;
-    pack_state(latest(n), &m);
-    if (e->sub < RESETS) v->number = (uint16_t)latest(n)->seq;
-    else v->number = e->sub < TEMPERATURE ? m.data[e->sub] : latest(n)->temp_code;
+    pack_state(latest_reading(n), &m);
+    if (e->sub < RESETS) v->number = (uint16_t)latest_reading(n)->seq;
+    else v->number = e->sub < TEMPERATURE ? m.data[e->sub] : latest_reading(n)->temp_code;
     return CO_OK;
 }
 
 static const struct board_object objects[] = {{PMKA_OD_CODES, read_code, NULL}, {PMKA_OD_STATE, read_state, NULL}};
 
-static uint32_t serial(const void *board)
+static uint32_t serial_of(const void *board)
 {
     return ((const struct pmka *)board)->cfg.serial;
 }
@@ -89,17 +89,17 @@ static const struct board_node_type type = {.board = &pmka_board,
                                             .device = &pmka_device,
                                             .objects = objects,
                                             .object_count = sizeof objects / sizeof *objects,
-                                            .serial = serial,
+                                            .serial = serial_of,
                                             .period_ns = period_ns};
 
-static void init(void *can, const struct board_can_cfg *cfg, void *board, struct can_bus *bus, struct sched *s)
+static void init_can(void *can, const struct board_can_cfg *cfg, void *board, struct can_bus *bus, struct sched *s)
 {
     board_node_init(can, &type, cfg, board, bus, s);
     pmka_attach(board, &(struct pmka_host){.ctx = can, .reading = on_reading});
 }
 
 const struct board_can pmka_can = {.size = sizeof(struct pmka_can),
-                                   .init = init,
+                                   .init = init_can,
                                    .power_up = board_node_power_up,
                                    .power_down = board_node_power_down,
                                    .node = board_node_co};

@@ -26,17 +26,17 @@ const struct board_line pmka_lines[PMKA_LINES] = {
 
 /* ---- the specimen ---- */
 
-static double drawn(struct rng *r, double sd)
+static double draw_gauss(struct rng *r, double sd)
 {
     return sd * rng_gauss(r);
 }
 
-static struct rng source(const struct pmka *b, const char *name)
+static struct rng noise_source(const struct pmka *b, const char *name)
 {
     return rng_stream(b->cfg.seed, b->cfg.serial, name);
 }
 
-static double ppm(double x)
+static double from_ppm(double x)
 {
     return 1e-6 * x;
 }
@@ -45,22 +45,23 @@ static double ppm(double x)
 static void draw_integrators(struct pmka *b)
 {
     const struct pmka_profile *p = &b->profile;
-    struct rng cap = source(b, "pmka.capacitor"), res = source(b, "pmka.resistors"), tc = source(b, "pmka.resistor_tc"),
-               zero = source(b, "pmka.zero"), zero_tc = source(b, "pmka.zero_tc");
+    struct rng cap = noise_source(b, "pmka.capacitor"), res = noise_source(b, "pmka.resistors"),
+               tc = noise_source(b, "pmka.resistor_tc"), zero = noise_source(b, "pmka.zero"),
+               zero_tc = noise_source(b, "pmka.zero_tc");
     for (unsigned i = 0; i < PMKA_INTS; i++) {
-        struct pmka_int_cfg c = {.cap_f = p->cap_f * (1.0 + drawn(&cap, p->cap_tol_sd)),
-                                 .cap_tc_per_k = ppm(p->cap_tc_ppm_per_k),
+        struct pmka_int_cfg c = {.cap_f = p->cap_f * (1.0 + draw_gauss(&cap, p->cap_tol_sd)),
+                                 .cap_tc_per_k = from_ppm(p->cap_tc_ppm_per_k),
                                  .cap_ageing_per_s = p->cap_ageing_per_h / 3600.0,
                                  .limit_v = p->limit_v};
-        c.r_in_ohm = p->r_in_ohm * (1.0 + ppm(drawn(&res, p->r_tol_sd_ppm)));
-        c.r_in_tc_per_k = ppm(drawn(&tc, p->r_tc_sd_ppm_per_k));
+        c.r_in_ohm = p->r_in_ohm * (1.0 + from_ppm(draw_gauss(&res, p->r_tol_sd_ppm)));
+        c.r_in_tc_per_k = from_ppm(draw_gauss(&tc, p->r_tc_sd_ppm_per_k));
         for (unsigned s = 0; s < 2; s++) {
-            const double asymmetry = 0.5 * ppm(p->reset_asymmetry_ppm) * (s == PMKA_MINUS ? 1.0 : -1.0);
-            c.rr_ohm[s] = p->rr_ohm * (1.0 + asymmetry + ppm(drawn(&res, p->r_tol_sd_ppm)));
-            c.rr_tc_per_k[s] = ppm(drawn(&tc, p->r_tc_sd_ppm_per_k));
+            const double asymmetry = 0.5 * from_ppm(p->reset_asymmetry_ppm) * (s == PMKA_MINUS ? 1.0 : -1.0);
+            c.rr_ohm[s] = p->rr_ohm * (1.0 + asymmetry + from_ppm(draw_gauss(&res, p->r_tol_sd_ppm)));
+            c.rr_tc_per_k[s] = from_ppm(draw_gauss(&tc, p->r_tc_sd_ppm_per_k));
         }
-        c.zero_v = drawn(&zero, p->zero_sd_v);
-        c.zero_tc_v_per_k = drawn(&zero_tc, p->zero_tc_sd_v_per_k);
+        c.zero_v = draw_gauss(&zero, p->zero_sd_v);
+        c.zero_tc_v_per_k = draw_gauss(&zero_tc, p->zero_tc_sd_v_per_k);
         pmka_int_init(&b->channel[i].integrator, &c);
     }
 }
@@ -68,16 +69,16 @@ static void draw_integrators(struct pmka *b)
 static void draw_specimen(struct pmka *b)
 {
     const struct pmka_profile *p = &b->profile;
-    struct rng uref = source(b, "pmka.uref"), uc = source(b, "pmka.uc"), adc = source(b, "pmka.adc"),
-               temp = source(b, "pmka.thermometer");
+    struct rng uref = noise_source(b, "pmka.uref"), uc = noise_source(b, "pmka.uc"), adc = noise_source(b, "pmka.adc"),
+               temp = noise_source(b, "pmka.thermometer");
     struct pmka_specimen *s = &b->specimen;
-    s->uref_v = p->uref_v * (1.0 + ppm(drawn(&uref, p->uref_tol_sd_ppm)));
-    s->uref_tc_v_per_k = p->uref_v * ppm(drawn(&uref, p->uref_tc_sd_ppm_per_k));
+    s->uref_v = p->uref_v * (1.0 + from_ppm(draw_gauss(&uref, p->uref_tol_sd_ppm)));
+    s->uref_tc_v_per_k = p->uref_v * from_ppm(draw_gauss(&uref, p->uref_tc_sd_ppm_per_k));
     for (unsigned i = 0; i < PMKA_INTS; i++)
-        for (unsigned sign = 0; sign < 2; sign++) s->uc_v[i][sign] = p->uc_v + drawn(&uc, p->uc_sd_v);
-    s->adc_offset_lsb = drawn(&adc, p->adc_offset_sd_lsb);
-    s->adc_gain = 1.0 + ppm(drawn(&adc, p->adc_gain_sd_ppm));
-    s->temp_offset_k = drawn(&temp, p->temp_offset_sd_k);
+        for (unsigned sign = 0; sign < 2; sign++) s->uc_v[i][sign] = p->uc_v + draw_gauss(&uc, p->uc_sd_v);
+    s->adc_offset_lsb = draw_gauss(&adc, p->adc_offset_sd_lsb);
+    s->adc_gain = 1.0 + from_ppm(draw_gauss(&adc, p->adc_gain_sd_ppm));
+    s->temp_offset_k = draw_gauss(&temp, p->temp_offset_sd_k);
 }
 
 static double uref_at_v(const struct pmka *b, double degc)
@@ -89,10 +90,10 @@ static void burn_rom(struct pmka *b)
 {
     struct pmka_rom_cfg cfg = {
         .uref_nominal_v = b->profile.uref_v, .ts_s = 1e-9 * b->profile.ts_ns, .serial = b->cfg.serial};
-    struct rng factory = source(b, "pmka.factory");
+    struct rng factory = noise_source(b, "pmka.factory");
     for (unsigned i = 0; i < PMKA_INTS; i++) {
         cfg.integrator[i] = &b->channel[i].integrator.cfg;
-        cfg.ct_error[i] = ppm(drawn(&factory, b->profile.rom_ct_sd_ppm));
+        cfg.ct_error[i] = from_ppm(draw_gauss(&factory, b->profile.rom_ct_sd_ppm));
     }
     for (unsigned point = 0; point < PMKA_ROM_POINTS; point++) cfg.uref_v[point] = uref_at_v(b, pmka_rom_degc(point));
     pmka_rom_burn(b->rom, &cfg);
@@ -124,7 +125,7 @@ static void begin_set(struct pmka *b, int64_t t_ns)
 
 static void end_set(struct pmka *b, int64_t t_ns)
 {
-    pmka_tell(b, PMKA_EV_READING, t_ns);
+    pmka_notify_event(b, PMKA_EV_READING, t_ns);
     if (b->wrongs & BOARD_WRONG_FROZEN_WORDS && b->any) memcpy(b->next.code, b->latest.code, sizeof b->next.code);
     b->bus.overrun |= b->bus.fresh;
     b->bus.fresh = b->any = true;
@@ -149,7 +150,7 @@ static int64_t stage_ns(const struct pmka *b, enum pmka_stage stage)
     return at_ns[stage];
 }
 
-static void carry_out(struct pmka *b, enum pmka_stage stage, int64_t t_ns)
+static void do_stage(struct pmka *b, enum pmka_stage stage, int64_t t_ns)
 {
     switch (stage) {
     case PMKA_AT_X:
@@ -163,13 +164,13 @@ static void carry_out(struct pmka *b, enum pmka_stage stage, int64_t t_ns)
         pmka_sample(b, 2, t_ns);
         return;
     case PMKA_AT_RELEASE:
-        if (pmka_rotation_turns(b)) pmka_release(b, t_ns);
+        if (pmka_rotation_turns(b)) pmka_release_axis(b, t_ns);
         return;
     case PMKA_AT_K:
         pmka_sample(b, PMKA_K, t_ns);
         return;
     case PMKA_AT_TAKE:
-        pmka_take(b, t_ns);
+        pmka_take_axis(b, t_ns);
         return;
     case PMKA_AT_READING:
         end_set(b, t_ns);
@@ -177,15 +178,15 @@ static void carry_out(struct pmka *b, enum pmka_stage stage, int64_t t_ns)
     }
 }
 
-static void step(void *ctx, int64_t t_ns)
+static void run_stage(void *ctx, int64_t t_ns)
 {
     struct pmka *b = ctx;
     const enum pmka_stage stage = b->stage;
     if (b->life == PMKA_STARTING) {
         b->life = PMKA_RUNNING;
-        pmka_tell(b, PMKA_EV_START, t_ns);
+        pmka_notify_event(b, PMKA_EV_START, t_ns);
     }
-    carry_out(b, stage, t_ns);
+    do_stage(b, stage, t_ns);
     b->stage = stage == PMKA_AT_READING ? PMKA_AT_X : (enum pmka_stage)(stage + 1);
     const int64_t ts_ns = stage == PMKA_AT_READING ? b->profile.ts_ns : 0;
     sched_at(b->sched, &b->step, b->set_ns + ts_ns + stage_ns(b, b->stage));
@@ -193,7 +194,7 @@ static void step(void *ctx, int64_t t_ns)
 
 /* ---- life ---- */
 
-static void wake(void *ctx, uint64_t mask)
+static void wake_lines(void *ctx, uint64_t mask)
 {
     struct pmka *b = ctx;
     (void)mask;
@@ -203,7 +204,7 @@ static void wake(void *ctx, uint64_t mask)
 static void init_trace(struct pmka *b)
 {
     trace_init(&b->trace);
-    b->trace.source = (struct trace_source){.wake = wake, .ctx = b};
+    b->trace.source = (struct trace_source){.wake = wake_lines, .ctx = b};
     line_faults_init(&b->line, &b->trace);
     for (unsigned i = 0; i < PMKA_LINES; i++) (void)trace_add(&b->trace, pmka_lines[i].name, pmka_lines[i].level);
 }
@@ -219,15 +220,15 @@ void pmka_init(struct pmka *b, const struct pmka_profile *p, const struct board_
     b->io = *io;
     b->sched = s;
     init_trace(b);
-    sched_ev(&b->step, step, b);
+    sched_ev(&b->step, run_stage, b);
     pmka_sample_init(b);
     pmka_bus_init(b);
-    for (unsigned i = 0; i < BOARD_AXES; i++) afe_init(&b->afe[i], &cfg->afe[i], source(b, afe_noise[i]));
+    for (unsigned i = 0; i < BOARD_AXES; i++) afe_init(&b->afe[i], &cfg->afe[i], noise_source(b, afe_noise[i]));
     draw_integrators(b);
     draw_specimen(b);
     burn_rom(b);
-    b->adc_noise = source(b, "adc");
-    b->temp_noise = source(b, "temp");
+    b->adc_noise = noise_source(b, "adc");
+    b->temp_noise = noise_source(b, "temp");
     pmka_rotation_start(b);
     for (unsigned i = 0; i < PMKA_INTS; i++) b->channel[i].axis = b->channel[i].said_axis = i < PMKA_K ? (int)i : -1;
 }
@@ -237,8 +238,8 @@ void pmka_attach(struct pmka *b, const struct pmka_host *host)
     b->host = *host;
 }
 
-/* The controller begins anew. */
-static void start(struct pmka *b, int64_t t_ns)
+/* The controller restarts. */
+static void start_controller(struct pmka *b, int64_t t_ns)
 {
     b->life = PMKA_STARTING;
     b->stage = PMKA_AT_X;
@@ -254,8 +255,8 @@ static void start(struct pmka *b, int64_t t_ns)
     sched_at(b->sched, &b->step, t_ns + b->profile.start_ns);
 }
 
-/* Whatever is under way ends; the integrators keep what they have. */
-static void stop(struct pmka *b, int64_t t_ns)
+/* Ends all activity; the integrators keep their charge. */
+static void stop_controller(struct pmka *b, int64_t t_ns)
 {
     sched_cancel(b->sched, &b->step);
     for (unsigned i = 0; i < PMKA_INTS; i++) pmka_cut_reset(b, i, t_ns);
@@ -267,7 +268,7 @@ static void stop(struct pmka *b, int64_t t_ns)
 }
 
 /* Until the first sampling instant the capacitors are shorted (E0). */
-static void empty(struct pmka *b, int64_t t_ns)
+static void empty_integrators(struct pmka *b, int64_t t_ns)
 {
     const int64_t from_ns = t_ns + b->profile.start_ns;
     b->board_degc = b->io.temp_degc(b->io.ctx, 3, t_ns);
@@ -282,7 +283,7 @@ static void empty(struct pmka *b, int64_t t_ns)
     for (unsigned a = 0; a < BOARD_AXES; a++) b->axis[a] = (struct pmka_axis){.at_ns = from_ns};
 }
 
-static void all_lines(struct pmka *b, bool rest, int64_t t_ns)
+static void put_all_lines(struct pmka *b, bool rest, int64_t t_ns)
 {
     for (unsigned i = 0; i < PMKA_LINES; i++) pmka_line(b, i, rest && pmka_lines[i].level, t_ns);
 }
@@ -290,32 +291,32 @@ static void all_lines(struct pmka *b, bool rest, int64_t t_ns)
 void pmka_power_up(struct pmka *b, int64_t t_ns)
 {
     if (b->life != PMKA_OFF) return;
-    pmka_tell(b, PMKA_EV_POWER_UP, t_ns);
-    empty(b, t_ns);
-    start(b, t_ns);
-    if (b->dark) all_lines(b, true, t_ns);
-    b->dark = false;
+    pmka_notify_event(b, PMKA_EV_POWER_UP, t_ns);
+    empty_integrators(b, t_ns);
+    start_controller(b, t_ns);
+    if (b->unpowered) put_all_lines(b, true, t_ns);
+    b->unpowered = false;
 }
 
 void pmka_reset(struct pmka *b, int64_t t_ns)
 {
     if (b->life == PMKA_OFF) return;
     b->counters.res++;
-    stop(b, t_ns);
-    start(b, t_ns);
-    pmka_tell(b, PMKA_EV_RES, t_ns);
+    stop_controller(b, t_ns);
+    start_controller(b, t_ns);
+    pmka_notify_event(b, PMKA_EV_RES, t_ns);
     pmka_bus_cut(b, t_ns);
 }
 
 void pmka_power_down(struct pmka *b, int64_t t_ns)
 {
     if (b->life == PMKA_OFF) return;
-    stop(b, t_ns);
+    stop_controller(b, t_ns);
     b->life = PMKA_OFF;
-    b->dark = true;
+    b->unpowered = true;
     b->any = false;
-    all_lines(b, false, t_ns);
-    pmka_tell(b, PMKA_EV_POWER_DOWN, t_ns);
+    put_all_lines(b, false, t_ns);
+    pmka_notify_event(b, PMKA_EV_POWER_DOWN, t_ns);
     pmka_bus_cut(b, t_ns);
 }
 
@@ -328,7 +329,7 @@ void pmka_sample_until(struct pmka *b, int64_t t_ns)
 {
     if (b->life == PMKA_OFF) return;
     for (unsigned i = 0; i < PMKA_INTS; i++) pmka_integrate(b, i, t_ns);
-    for (unsigned a = 0; a < BOARD_AXES; a++) pmka_pull(b, a, t_ns);
+    for (unsigned a = 0; a < BOARD_AXES; a++) pmka_integrate_axis(b, a, t_ns);
 }
 
 void pmka_wrong(struct pmka *b, uint32_t wrongs)

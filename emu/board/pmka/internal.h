@@ -4,7 +4,7 @@
 
 #include "board/pmka/pmka.h"
 
-static inline void pmka_tell(const struct pmka *b, enum pmka_event e, int64_t t_ns)
+static inline void pmka_notify_event(const struct pmka *b, enum pmka_event e, int64_t t_ns)
 {
     if (b->told) b->io.event(b->io.ctx, e, t_ns);
 }
@@ -22,20 +22,20 @@ static inline int64_t pmka_half_ns(const struct pmka *b)
 /* pmka/sample.c */
 void pmka_sample_init(struct pmka *b);
 void pmka_integrate(struct pmka *b, unsigned i, int64_t t_ns); /* its state at t_ns, not before the last call's */
-void pmka_pull(struct pmka *b, unsigned axis, int64_t t_ns);   /* of an axis that no integrator has */
-void pmka_sample(struct pmka *b, unsigned i, int64_t t_ns);    /* hold, comparators, reset */
-void pmka_cut_reset(struct pmka *b, unsigned i, int64_t t_ns); /* one under way ends now */
-void pmka_converter_wake(struct pmka *b, int64_t t_ns);        /* SH, CONV: somebody is about to watch */
+void pmka_integrate_axis(struct pmka *b, unsigned axis, int64_t t_ns); /* of an axis that no integrator has */
+void pmka_sample(struct pmka *b, unsigned i, int64_t t_ns);            /* hold, comparators, reset */
+void pmka_cut_reset(struct pmka *b, unsigned i, int64_t t_ns);         /* one under way ends now */
+void pmka_converter_wake(struct pmka *b, int64_t t_ns);                /* SH, CONV: an observer is about to subscribe */
 void pmka_converter_stop(struct pmka *b, int64_t t_ns);
 
 /* pmka/rotation.c */
-void pmka_rotation_start(struct pmka *b);          /* as after Res */
-void pmka_rotation_next(struct pmka *b);           /* a Ts begins: what the next period will be */
-bool pmka_rotation_turns(const struct pmka *b);    /* a hand-over comes in this Ts */
-void pmka_release(struct pmka *b, int64_t t_ns);   /* K gives its axis back */
-void pmka_take(struct pmka *b, int64_t t_ns);      /* K takes the next one */
-void pmka_keys_home(struct pmka *b, int64_t t_ns); /* each axis on its own integrator */
-void pmka_key_stuck(struct pmka *b, int64_t t_ns); /* b->wrongs has changed */
+void pmka_rotation_start(struct pmka *b);             /* as after Res */
+void pmka_rotation_next(struct pmka *b);              /* a Ts begins: what the next period will be */
+bool pmka_rotation_turns(const struct pmka *b);       /* a hand-over comes in this Ts */
+void pmka_release_axis(struct pmka *b, int64_t t_ns); /* K gives its axis back */
+void pmka_take_axis(struct pmka *b, int64_t t_ns);    /* K takes the next one */
+void pmka_keys_home(struct pmka *b, int64_t t_ns);    /* each axis on its own integrator */
+void pmka_key_stuck(struct pmka *b, int64_t t_ns);    /* b->wrongs has changed */
 
 /* pmka/bus.c */
 void pmka_bus_init(struct pmka *b);

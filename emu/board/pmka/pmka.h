@@ -87,7 +87,7 @@ struct pmka_counters {
     uint32_t cycles, cycles_refused;
 };
 
-/* Who wants its readings. */
+/* Receiver of the readings. */
 struct pmka_host {
     void *ctx;
     void (*reading)(void *ctx, const struct pmka_reading *r, int64_t t_ns); /* its last code is there; may be NULL */

@@ -99,8 +99,8 @@ void pmka_profile_default(void *profile)
     };
 }
 
-/* Writes the sentence and is false, so that a check reads `return no(...)`. */
-static bool no(char *why, size_t cap, const char *sentence, double a, double b)
+/* Writes the sentence and is false, so that a check reads `return set_error(...)`. */
+static bool set_error(char *why, size_t cap, const char *sentence, double a, double b)
 {
     if (cap > 0) (void)snprintf(why, cap, sentence, a, b);
     return false;
@@ -108,42 +108,43 @@ static bool no(char *why, size_t cap, const char *sentence, double a, double b)
 
 static bool check_time(const struct pmka_profile *p, char *why, size_t cap)
 {
-    if (p->ts_ns % 2) return no(why, cap, "ts_ns = %.0f is odd: a reset lasts half of it", p->ts_ns, 0);
+    if (p->ts_ns % 2) return set_error(why, cap, "ts_ns = %.0f is odd: a reset lasts half of it", p->ts_ns, 0);
     if (p->hold_ns >= p->convert_ns)
-        return no(why, cap, "hold_ns = %.0f: conversion begins before the code is there, after %.0f ns", p->hold_ns,
-                  p->convert_ns);
+        return set_error(why, cap, "hold_ns = %.0f: conversion begins before the code is there, after %.0f ns",
+                         p->hold_ns, p->convert_ns);
     if (p->convert_ns > p->mux_step_ns)
-        return no(why, cap, "convert_ns = %.0f: the next integrator is sampled after mux_step_ns = %.0f", p->convert_ns,
-                  p->mux_step_ns);
+        return set_error(why, cap, "convert_ns = %.0f: the next integrator is sampled after mux_step_ns = %.0f",
+                         p->convert_ns, p->mux_step_ns);
     if (p->key_gap_ns >= p->convert_ns)
-        return no(why, cap,
-                  "key_gap_ns = %.0f: use less than convert_ns = %.0f, keys rest when the reading is complete",
-                  p->key_gap_ns, p->convert_ns);
+        return set_error(why, cap,
+                         "key_gap_ns = %.0f: use less than convert_ns = %.0f, keys rest when the reading is complete",
+                         p->key_gap_ns, p->convert_ns);
     if (4.0 * p->mux_step_ns > 0.5 * p->ts_ns)
-        return no(why, cap, "mux_step_ns = %.0f: four of them are longer than a reset, %.0f ns", p->mux_step_ns,
-                  0.5 * p->ts_ns);
+        return set_error(why, cap, "mux_step_ns = %.0f: four of them are longer than a reset, %.0f ns", p->mux_step_ns,
+                         0.5 * p->ts_ns);
     return p->strobe_ns >= p->strobe_min_ns ||
-           no(why, cap, "strobe_ns = %.0f is shorter than strobe_min_ns = %.0f", p->strobe_ns, p->strobe_min_ns);
+           set_error(why, cap, "strobe_ns = %.0f is shorter than strobe_min_ns = %.0f", p->strobe_ns, p->strobe_min_ns);
 }
 
-/* A reset that leads beyond the comparator of the other sign would be answered by one of that sign, for ever. */
+/* A reset that leads beyond the comparator of the other sign would cause one of that sign, endlessly. */
 static bool check_reset(const struct pmka_profile *p, char *why, size_t cap)
 {
     const double ur_v = p->uref_v * (0.5e-9 * p->ts_ns) / (p->rr_ohm * p->cap_f);
     const double ct = p->r_in_ohm / (2.0 * p->rr_ohm);
     if (p->uc_v * 2.0 <= ur_v)
-        return no(why, cap, "uc_v = %.3f: a reset is Ur = %.3f V, use more than half of it", p->uc_v, ur_v);
+        return set_error(why, cap, "uc_v = %.3f: a reset is Ur = %.3f V, use more than half of it", p->uc_v, ur_v);
     if (p->uc_v + ur_v >= p->adc_range_v)
-        return no(why, cap, "uc_v = %.3f: with Ur = %.3f V above it the converter is at its end", p->uc_v, ur_v);
+        return set_error(why, cap, "uc_v = %.3f: with Ur = %.3f V above it the converter is at its end", p->uc_v, ur_v);
     return (ct > 0.997 && ct < 1.003) ||
-           no(why, cap, "r_in_ohm: RIN / (2 Rr) = %.5f, the ROM holds CT of 0.997 .. 1.003", ct, 0);
+           set_error(why, cap, "r_in_ohm: RIN / (2 Rr) = %.5f, the ROM holds CT of 0.997 .. 1.003", ct, 0);
 }
 
 static bool check_beat(const struct pmka_profile *p, char *why, size_t cap)
 {
     return p->zero_periods + PMKA_BEAT_SPARE <= p->beat_periods ||
-           no(why, cap, "zero_periods = %.0f: use at most beat_periods - 6 = %.0f, the resets are calibrated after it",
-              p->zero_periods, (double)p->beat_periods - PMKA_BEAT_SPARE);
+           set_error(why, cap,
+                     "zero_periods = %.0f: use at most beat_periods - 6 = %.0f, the resets are calibrated after it",
+                     p->zero_periods, (double)p->beat_periods - PMKA_BEAT_SPARE);
 }
 
 bool pmka_profile_check(const void *profile, char *why, size_t cap)

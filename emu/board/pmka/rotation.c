@@ -15,7 +15,7 @@ void pmka_rotation_start(struct pmka *b)
 }
 
 /* The period of the hand-over is for nothing, then zero, then resets, and a last one for the keys to move in peace. */
-static enum pmka_cal planned(const struct pmka_rotation *r)
+static enum pmka_cal planned_cal(const struct pmka_rotation *r)
 {
     if (r->tau == 0) return PMKA_CAL_NONE;
     if (r->age <= r->zero_periods) return PMKA_CAL_ZERO;
@@ -27,7 +27,7 @@ void pmka_rotation_next(struct pmka *b)
     struct pmka_rotation *r = &b->rotation;
     r->age++;
     if (r->mode == PMKA_AUTONOMOUS) {
-        r->cal = planned(r);
+        r->cal = planned_cal(r);
         if (r->tau == 0 || r->age >= r->beat_periods) r->asked_tau = r->tau % PMKA_TAUS + 1;
     } else {
         r->cal = r->asked_tau == 0 && r->tau != 0 ? r->asked_cal : PMKA_CAL_NONE;
@@ -40,58 +40,58 @@ bool pmka_rotation_turns(const struct pmka *b)
 }
 
 /* The key of K may be stuck: the controller does not know. */
-static bool closes(const struct pmka *b, unsigned i)
+static bool key_closes(const struct pmka *b, unsigned i)
 {
     return !(i == PMKA_K && b->wrongs & BOARD_WRONG_STUCK_KEY);
 }
 
-static void key_line(struct pmka *b, unsigned i, int64_t t_ns)
+static void put_key_line(struct pmka *b, unsigned i, int64_t t_ns)
 {
     pmka_line(b, PMKA_LINE_KL1 + i, b->channel[i].axis >= 0, t_ns);
 }
 
-static void move(struct pmka *b, unsigned axis, unsigned from, unsigned to, int64_t t_ns)
+static void move_key(struct pmka *b, unsigned axis, unsigned from, unsigned to, int64_t t_ns)
 {
     struct pmka_channel *f = &b->channel[from], *t = &b->channel[to];
     pmka_integrate(b, from, t_ns);
     pmka_integrate(b, to, t_ns);
-    pmka_pull(b, axis, t_ns);
+    pmka_integrate_axis(b, axis, t_ns);
     f->axis = f->said_axis = -1;
     t->said_axis = (int)axis;
-    t->axis = closes(b, to) ? (int)axis : -1;
+    t->axis = key_closes(b, to) ? (int)axis : -1;
     t->served = axis + 1;
     b->counters.handovers++;
-    key_line(b, from, t_ns);
-    key_line(b, to, t_ns);
+    put_key_line(b, from, t_ns);
+    put_key_line(b, to, t_ns);
 }
 
 void pmka_keys_home(struct pmka *b, int64_t t_ns)
 {
     const int axis = b->channel[PMKA_K].said_axis;
-    if (axis >= 0) move(b, (unsigned)axis, PMKA_K, (unsigned)axis, t_ns);
+    if (axis >= 0) move_key(b, (unsigned)axis, PMKA_K, (unsigned)axis, t_ns);
 }
 
-static void tau_lines(struct pmka *b, int64_t t_ns)
+static void put_tau_lines(struct pmka *b, int64_t t_ns)
 {
     for (unsigned n = 0; n < 3; n++) pmka_line(b, PMKA_LINE_TAU0 + n, b->rotation.tau >> n & 1u, t_ns);
 }
 
-void pmka_release(struct pmka *b, int64_t t_ns)
+void pmka_release_axis(struct pmka *b, int64_t t_ns)
 {
     struct pmka_rotation *r = &b->rotation;
     r->tau = r->asked_tau;
     r->asked_tau = 0;
     r->age = 0;
     b->counters.beats++;
-    pmka_tell(b, PMKA_EV_TAU, t_ns);
-    tau_lines(b, t_ns);
+    pmka_notify_event(b, PMKA_EV_TAU, t_ns);
+    put_tau_lines(b, t_ns);
     pmka_keys_home(b, t_ns);
 }
 
-void pmka_take(struct pmka *b, int64_t t_ns)
+void pmka_take_axis(struct pmka *b, int64_t t_ns)
 {
     const int axis = axis_of_k(b->rotation.tau);
-    if (axis >= 0 && b->channel[PMKA_K].said_axis < 0) move(b, (unsigned)axis, (unsigned)axis, PMKA_K, t_ns);
+    if (axis >= 0 && b->channel[PMKA_K].said_axis < 0) move_key(b, (unsigned)axis, (unsigned)axis, PMKA_K, t_ns);
 }
 
 void pmka_key_stuck(struct pmka *b, int64_t t_ns)
@@ -99,9 +99,9 @@ void pmka_key_stuck(struct pmka *b, int64_t t_ns)
     struct pmka_channel *k = &b->channel[PMKA_K];
     if (k->said_axis < 0) return;
     pmka_integrate(b, PMKA_K, t_ns);
-    pmka_pull(b, (unsigned)k->said_axis, t_ns);
-    k->axis = closes(b, PMKA_K) ? k->said_axis : -1;
-    key_line(b, PMKA_K, t_ns);
+    pmka_integrate_axis(b, (unsigned)k->said_axis, t_ns);
+    k->axis = key_closes(b, PMKA_K) ? k->said_axis : -1;
+    put_key_line(b, PMKA_K, t_ns);
 }
 
 bool pmka_command(struct pmka *b, unsigned tau, enum pmka_cal cal)

@@ -3,19 +3,19 @@
 
 #include <math.h>
 
-static int64_t later(int64_t a, int64_t b)
+static int64_t later_ns(int64_t a, int64_t b)
 {
     return a > b ? a : b;
 }
 
-static int64_t sooner(int64_t a, int64_t b)
+static int64_t earlier_ns(int64_t a, int64_t b)
 {
     return a < b ? a : b;
 }
 
 /* ---- inputs ---- */
 
-/* Integral of an axis from where it stands to t_ns: one cell, half a period at most. */
+/* Integral of an axis from its last instant to t_ns: one cell, half a period at most. */
 static double cell_vs(struct pmka *b, unsigned axis, int64_t t_ns)
 {
     struct pmka_axis *a = &b->axis[axis];
@@ -32,22 +32,22 @@ static double cell_vs(struct pmka *b, unsigned axis, int64_t t_ns)
     return vs;
 }
 
-void pmka_pull(struct pmka *b, unsigned axis, int64_t t_ns)
+void pmka_integrate_axis(struct pmka *b, unsigned axis, int64_t t_ns)
 {
     struct pmka_axis *a = &b->axis[axis];
-    while (a->at_ns < t_ns) (void)cell_vs(b, axis, sooner(t_ns, a->at_ns + pmka_half_ns(b)));
+    while (a->at_ns < t_ns) (void)cell_vs(b, axis, earlier_ns(t_ns, a->at_ns + pmka_half_ns(b)));
 }
 
 /* ---- integrators ---- */
 
-static void draw(const struct pmka *b, struct pmka_channel *c, int64_t from_ns, int64_t until_ns)
+static void apply_reset(const struct pmka *b, struct pmka_channel *c, int64_t from_ns, int64_t until_ns)
 {
     if (b->wrongs & BOARD_WRONG_STUCK_RESET && c == &b->channel[0]) {
         pmka_int_reset(&c->integrator, PMKA_PLUS, b->uref_v, until_ns - from_ns);
         return;
     }
     if (!c->resetting) return;
-    const int64_t on_ns = later(from_ns, c->reset_from_ns), off_ns = sooner(until_ns, c->reset_until_ns);
+    const int64_t on_ns = later_ns(from_ns, c->reset_from_ns), off_ns = earlier_ns(until_ns, c->reset_until_ns);
     if (on_ns < off_ns) pmka_int_reset(&c->integrator, c->sign, b->uref_v, off_ns - on_ns);
 }
 
@@ -56,10 +56,10 @@ void pmka_integrate(struct pmka *b, unsigned i, int64_t t_ns)
     struct pmka_channel *c = &b->channel[i];
     while (c->at_ns < t_ns) {
         while (c->cell_ns <= c->at_ns) c->cell_ns += pmka_half_ns(b);
-        const int64_t end_ns = sooner(t_ns, c->cell_ns);
+        const int64_t end_ns = earlier_ns(t_ns, c->cell_ns);
         const double input_vs = c->axis < 0 ? 0.0 : cell_vs(b, (unsigned)c->axis, end_ns);
         pmka_int_feed(&c->integrator, input_vs, end_ns - c->at_ns);
-        draw(b, c, c->at_ns, end_ns);
+        apply_reset(b, c, c->at_ns, end_ns);
         (void)pmka_int_out_v(&c->integrator, end_ns); /* the limit */
         c->at_ns = end_ns;
     }
@@ -67,7 +67,7 @@ void pmka_integrate(struct pmka *b, unsigned i, int64_t t_ns)
 
 /* ---- resets ---- */
 
-static void reset_lines(struct pmka *b, unsigned i, bool on, int64_t t_ns)
+static void put_reset_line(struct pmka *b, unsigned i, bool on, int64_t t_ns)
 {
     const unsigned line = PMKA_LINE_RP1 + 2 * i + (b->channel[i].sign == PMKA_MINUS);
     pmka_line(b, line, on, t_ns);
@@ -84,8 +84,8 @@ static void start_reset(struct pmka *b, unsigned i, enum pmka_sign sign, int64_t
     c->count[sign]++;
     if (sign == PMKA_PLUS) b->counters.resets_plus++;
     else b->counters.resets_minus++;
-    pmka_tell(b, PMKA_EV_RESET, t_ns);
-    reset_lines(b, i, true, t_ns);
+    pmka_notify_event(b, PMKA_EV_RESET, t_ns);
+    put_reset_line(b, i, true, t_ns);
     sched_at(b->sched, &c->reset_end, c->reset_until_ns);
 }
 
@@ -94,7 +94,7 @@ void pmka_cut_reset(struct pmka *b, unsigned i, int64_t t_ns)
     struct pmka_channel *c = &b->channel[i];
     pmka_integrate(b, i, t_ns);
     sched_cancel(b->sched, &c->reset_end);
-    reset_lines(b, i, false, t_ns);
+    put_reset_line(b, i, false, t_ns);
     c->resetting = false;
 }
 
@@ -103,11 +103,11 @@ static void reset_ended(void *ctx, int64_t t_ns)
 {
     struct pmka *b = ctx;
     for (unsigned i = 0; i < PMKA_INTS; i++)
-        if (b->channel[i].resetting && b->channel[i].reset_until_ns == t_ns) reset_lines(b, i, false, t_ns);
+        if (b->channel[i].resetting && b->channel[i].reset_until_ns == t_ns) put_reset_line(b, i, false, t_ns);
 }
 
 /* Beyond Uc, or because the one out of work is being calibrated: then towards zero, which alternates the signs. */
-static void look_at_comparators(struct pmka *b, unsigned i, double out_v, int64_t t_ns)
+static void check_comparators(struct pmka *b, unsigned i, double out_v, int64_t t_ns)
 {
     const struct pmka_channel *c = &b->channel[i];
     const double *uc_v = b->specimen.uc_v[i];
@@ -136,22 +136,22 @@ static int16_t to_code(struct pmka *b, double out_v, bool *clipped)
 #define SH   (UINT64_C(1) << PMKA_LINE_SH)
 #define CONV (UINT64_C(1) << PMKA_LINE_CONV)
 
-static void report(struct pmka *b, int64_t t_ns, uint64_t lines, uint64_t level)
+static void report_step(struct pmka *b, int64_t t_ns, uint64_t lines, uint64_t level)
 {
-    trace_steps(&b->trace, &(struct trace_step){later(t_ns, b->trace.done_ns), lines, level}, 1);
+    trace_steps(&b->trace, &(struct trace_step){later_ns(t_ns, b->trace.done_ns), lines, level}, 1);
 }
 
 /* Its end is known as it begins; should the board stop before, the lines fall the sooner. */
 static void conversion_begins(void *ctx, int64_t t_ns)
 {
     struct pmka *b = ctx;
-    report(b, t_ns, CONV, CONV);
-    report(b, b->sampled_ns + b->profile.convert_ns, SH | CONV, 0);
+    report_step(b, t_ns, CONV, CONV);
+    report_step(b, b->sampled_ns + b->profile.convert_ns, SH | CONV, 0);
 }
 
 static void report_hold(struct pmka *b)
 {
-    report(b, b->sampled_ns, SH, SH);
+    report_step(b, b->sampled_ns, SH, SH);
     sched_at(b->sched, &b->conversion, b->sampled_ns + b->profile.hold_ns);
 }
 
@@ -174,7 +174,7 @@ void pmka_converter_stop(struct pmka *b, int64_t t_ns)
 }
 
 /* The multiplexer moves on as soon as the sample is held. */
-static void hold(struct pmka *b, unsigned i, int64_t t_ns)
+static void hold_sample(struct pmka *b, unsigned i, int64_t t_ns)
 {
     const unsigned next = (i + 1) % PMKA_INTS;
     b->sampled_ns = t_ns;
@@ -201,8 +201,8 @@ void pmka_sample(struct pmka *b, unsigned i, int64_t t_ns)
     c->served = (unsigned)(c->said_axis + 1);
     c->cell_ns = t_ns + pmka_half_ns(b);
     pmka_int_warm(&c->integrator, b->board_degc);
-    hold(b, i, t_ns);
-    look_at_comparators(b, i, out_v, t_ns);
+    hold_sample(b, i, t_ns);
+    check_comparators(b, i, out_v, t_ns);
 }
 
 void pmka_sample_init(struct pmka *b)

@@ -74,12 +74,12 @@ struct pmka {
     uint16_t rom[PMKA_ROM_WORDS];
     struct rng adc_noise, temp_noise;
     uint32_t wrongs;
-    bool told; /* somebody listens to events */
+    bool told; /* io.event has a subscriber */
     bool adc_stuck, adc_stuck_level;
     struct pmka_counters counters;
 
     enum pmka_life life;
-    bool dark; /* the lines lie low since a power-down */
+    bool unpowered; /* the lines lie low since a power-down */
     struct pmka_channel channel[PMKA_INTS];
     struct pmka_axis axis[BOARD_AXES];
     double board_degc, uref_v; /* refreshed each Ts */
