@@ -50,7 +50,7 @@ static bool check_event(const struct scenario *s, const struct control_bench *vi
     if (section) snprintf(text, sizeof text, "there is none on this bench: a section %s is wanted", section);
     if (section) return fail(s, e, what, text, why, cap);
     cJSON *args = cJSON_Parse(e->args);
-    const bool ok = control_check(view, e->cmd, args, text);
+    const bool ok = control_check(control_tables, view, e->cmd, args, text);
     cJSON_Delete(args);
     return ok || fail(s, e, what, text, why, cap);
 }

@@ -1,29 +1,19 @@
 /* Arguments of commands: from JSON to values and back, and how the manual shows them. */
 #include "command/args.h"
 
+#include "command/error.h"
 #include "command/events.h"
 
 #include <math.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 
 enum { NAME_MAX_BYTES = 31, TEXT_MAX_BYTES = 1023 };
 
-bool control_refuse_in(struct control_refusal *r, const char *code, const char *format, ...)
-{
-    va_list ap;
-    va_start(ap, format);
-    vsnprintf(r->why, sizeof r->why, format, ap);
-    va_end(ap);
-    r->code = code;
-    return false;
-}
-
 unsigned control_arg_count(const struct control_command *row)
 {
     unsigned n = 0;
-    while (n < CONTROL_ARGS_MAX && row->arg[n].name) n++;
+    while (row->arg && row->arg[n].name) n++;
     return n;
 }
 
@@ -90,24 +80,17 @@ static bool parse_name(const struct target *t, const cJSON *j, struct control_va
                              t->arg->name, v->text, NAME_MAX_BYTES);
 }
 
-static size_t join(char *out, size_t cap, size_t at, const char *word)
-{
-    const int n = at < cap ? snprintf(out + at, cap - at, "%s%s", at ? ", " : "", word) : 0;
-    return at + (size_t)n;
-}
-
 static bool parse_choice(const struct target *t, const cJSON *j, struct control_value *v)
 {
     if (!parse_text(t, j, v)) return false;
     char words[192] = "";
-    size_t at = 0;
     for (v->choice = 0; t->arg->choices[v->choice]; v->choice++) {
         const char *word = t->arg->choices[v->choice];
         if (strcmp(word, v->text) == 0) {
             v->text = word;
             return true;
         }
-        at = join(words, sizeof words, at, word);
+        control_list_add(words, sizeof words, word);
     }
     return control_refuse_in(t->why, "range", "%s: \"%.40s\" is none of %s", t->arg->name, v->text, words);
 }
@@ -116,10 +99,9 @@ static bool parse_unit(const struct target *t, const cJSON *j, struct control_va
 {
     if (!parse_text(t, j, v)) return false;
     char names[160] = "";
-    size_t at = 0;
     for (v->unit = 0; v->unit < t->bench->units; v->unit++) {
         if (strcmp(t->bench->unit_name[v->unit], v->text) == 0) return true;
-        at = join(names, sizeof names, at, t->bench->unit_name[v->unit]);
+        control_list_add(names, sizeof names, t->bench->unit_name[v->unit]);
     }
     v->unit = 0;
     return control_refuse_in(t->why, "range", "%s: no unit \"%.40s\"; there is %s", t->arg->name, v->text, names);
@@ -220,9 +202,8 @@ static const struct control_arg *find_arg(const struct control_command *row, con
 static bool refuse_unknown(struct control_refusal *why, const struct control_command *row, const char *name)
 {
     char known[160] = "";
-    size_t at = 0;
-    for (unsigned i = 0; i < control_arg_count(row); i++) at = join(known, sizeof known, at, row->arg[i].name);
-    return control_refuse_in(why, "argument", "no argument \"%.40s\"; it takes %s", name, at ? known : "none");
+    for (unsigned i = 0; i < control_arg_count(row); i++) control_list_add(known, sizeof known, row->arg[i].name);
+    return control_refuse_in(why, "argument", "no argument \"%.40s\"; it takes %s", name, known[0] ? known : "none");
 }
 
 void control_arg_limits(const struct control_bench *b, const struct control_arg *a, const struct control_value *v,
@@ -267,64 +248,4 @@ bool control_args(const struct control_bench *b, const struct control_command *r
         if (!within_limits(&(struct target){b, a, why}, v, &v[i])) return false;
     }
     return !row->check || row->check(b, v, why);
-}
-
-/* ---- the table for people */
-
-static size_t markdown_arg(const struct control_arg *a, char *out, size_t cap)
-{
-    size_t at = (size_t)snprintf(out, cap, "`%s`%s %s", a->name, a->optional ? " (optional)" : "", a->what);
-    if (types[a->type].numeric && at < cap) {
-        at += (size_t)snprintf(out + at, cap - at, ", %.10g to ", a->min);
-        if (a->least > 0.0 && at < cap) {
-            at += (size_t)snprintf(out + at, cap - at, "%.10g and %.10g to ", -a->least, a->least);
-        }
-        if (at < cap) {
-            at += (size_t)snprintf(out + at, cap - at, "%.10g%s%s", a->max, a->unit ? " " : "", a->unit ? a->unit : "");
-        }
-    }
-    const char *word;
-    for (unsigned i = 0; (word = control_choice(a, i)) && at < cap; i++) {
-        at += (size_t)snprintf(out + at, cap - at, "%s%s", i ? ", " : ": ", word);
-    }
-    return at;
-}
-
-const struct control_command *control_row(const struct control_table *const *tables, unsigned i)
-{
-    for (; *tables; i -= (*tables)->count, tables++) {
-        if (i < (*tables)->count) return &(*tables)->row[i];
-    }
-    return NULL;
-}
-
-const struct control_command *control_find(const struct control_table *const *tables, const char *name)
-{
-    const struct control_command *row;
-    for (unsigned i = 0; (row = control_row(tables, i)); i++) {
-        if (strcmp(row->name, name) == 0) return row;
-    }
-    return NULL;
-}
-
-static const char *markdown_args(const struct control_command *row, char *out, size_t cap)
-{
-    size_t at = 0;
-    snprintf(out, cap, "none");
-    for (unsigned i = 0; i < control_arg_count(row) && at + 2 < cap; i++) {
-        if (i) at += (size_t)snprintf(out + at, cap - at, "; ");
-        at += markdown_arg(&row->arg[i], out + at, cap - at);
-    }
-    return out;
-}
-
-bool control_markdown(const struct control_table *const *tables, unsigned line, char *out, size_t cap)
-{
-    char args[8192];
-    if (line == 0) snprintf(out, cap, "| command | what it does | arguments |");
-    if (line == 1) snprintf(out, cap, "|---|---|---|");
-    if (line < 2) return true;
-    const struct control_command *row = control_row(tables, line - 2);
-    if (row) snprintf(out, cap, "| `%s` | %s | %s |", row->name, row->what, markdown_args(row, args, sizeof args));
-    return row != NULL;
 }

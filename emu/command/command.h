@@ -54,6 +54,16 @@ struct control_scpi {
     const char *header, *result;
 };
 
+/* The arguments of a row. */
+#define CONTROL_ARGS(...)                                                                                              \
+    (const struct control_arg[])                                                                                       \
+    {                                                                                                                  \
+        __VA_ARGS__,                                                                                                   \
+        {                                                                                                              \
+            .name = NULL                                                                                               \
+        }                                                                                                              \
+    }
+
 enum control_outcome { CONTROL_DONE, CONTROL_LATER, CONTROL_REFUSED };
 
 struct control;
@@ -61,8 +71,8 @@ struct control_refusal;
 
 struct control_command {
     const char *name;
-    const char *what;                         /* one sentence */
-    struct control_arg arg[CONTROL_ARGS_MAX]; /* up to the first without a name */
+    const char *what;              /* one sentence */
+    const struct control_arg *arg; /* up to the one without a name: CONTROL_ARGS(); NULL: none */
     /* v: the arguments in the order of arg. Adds to result; CONTROL_REFUSED after control_refuse(). */
     enum control_outcome (*run)(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns);
     bool changes; /* the bench's future: goes into the journal */

@@ -1,9 +1,8 @@
 #include "command/events.h"
 
-#include "command/args.h"
+#include "command/error.h"
 #include "unit/boards.h"
 
-#include <stdio.h>
 #include <string.h>
 
 static bool among(const char *const *names, unsigned n, const char *name)
@@ -37,13 +36,12 @@ bool control_event_find(const struct control_bench *b, unsigned unit, const char
                         unsigned *event, struct control_refusal *why)
 {
     char known[160] = "";
-    size_t at = 0;
     if (unit >= b->units) return control_refuse_in(why, "state", "%s: there is no unit", arg);
     const struct board_type *t = b->unit[unit]->type;
     for (*event = 0; *event < t->event_count; ++*event) {
         const char *other = t->events[*event];
         if (strcmp(other, name) == 0) return true;
-        if (at < sizeof known) at += (size_t)snprintf(known + at, sizeof known - at, "%s%s", at ? ", " : "", other);
+        control_list_add(known, sizeof known, other);
     }
     return control_refuse_in(why, "range", "%s: no event \"%.20s\" on %s, a %s; there is %s", arg, name,
                              b->unit_name[unit], t->title, known);

@@ -2,7 +2,7 @@
 #ifndef PSABENCH_CONTROL_COMMANDS_H
 #define PSABENCH_CONTROL_COMMANDS_H
 
-#include "control/control.h"
+#include "control/reply.h"
 
 extern const struct control_table commands_bench, commands_head, commands_table, commands_chamber, commands_supply,
     commands_platform, commands_watch, commands_fault, commands_snapshot, commands_bus, commands_can, commands_truth;
@@ -16,15 +16,18 @@ extern const struct control_table commands_bench, commands_head, commands_table,
 /* The largest integer that JSON carries without loss. */
 #define CONTROL_COUNT_MAX 9007199254740991.0
 
-/* commands_bus.c: what came of a cycle that is over. */
-enum control_outcome control_cycle_result(struct control *c, const struct control_cycle *k, cJSON *result);
-
-/* control.c: a cycle has come to its end: whoever waits for it is answered. */
-void control_cycle_over(struct control *c, struct control_cycle *k, int64_t t_ns);
-
-bool control_by_step(const struct control_bench *b); /* time moves only when told */
+/* Time moves only by commands. */
+static inline bool control_by_step(const struct control_bench *b)
+{
+    struct control_pace p = {0};
+    b->pace(b->ctx, &p);
+    return p.by_step;
+}
 
 /* The converters take their inputs in blocks: what was before a change of their world must be sampled before it. */
-void control_settle_inputs(const struct control_bench *b, int64_t t_ns);
+static inline void control_settle_inputs(const struct control_bench *b, int64_t t_ns)
+{
+    for (unsigned i = 0; i < b->units; i++) unit_sample_until(b->unit[i], t_ns);
+}
 
 #endif

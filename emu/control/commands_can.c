@@ -47,8 +47,8 @@ static enum control_outcome do_send(struct control *c, const struct control_valu
 // clang-format off
 static const struct control_command rows[] = {
     {"can.put", "Puts a frame on a bus as a program there would: a host's part in scenarios without one.",
-     {{"frame", CONTROL_TEXT, .what = "as cansend of can-utils takes it, capital digits: 609#2F00210104"},
-      {"bus", CONTROL_NAME, .optional = true, .what = "name of a bus of the scenario; else the first"}},
+     CONTROL_ARGS({"frame", CONTROL_TEXT, .what = "as cansend of can-utils takes it, capital digits: 609#2F00210104"},
+      {"bus", CONTROL_NAME, .optional = true, .what = "name of a bus of the scenario; else the first"}),
      .run = do_send, .changes = true, .check = can_be_sent},
 };
 // clang-format on

@@ -78,15 +78,15 @@ static enum control_outcome do_reset(struct control *c, const struct control_val
 // clang-format off
 static const struct control_command rows[] = {
     {"chamber.set", "Gives the air of the chamber a new set point, to be reached with the present ramp.",
-     {{"temp_degc", CONTROL_REAL, false, "degC", -200, 300, .what = "set point", .def = 25, .limits = temp_limits}},
+     CONTROL_ARGS({"temp_degc", CONTROL_REAL, false, "degC", -200, 300, .what = "set point", .def = 25, .limits = temp_limits}),
      .run = do_set, .changes = true, .scpi = {{"TEMPerature", NULL}}},
     {"chamber.ramp", "Limits how fast the air changes.",
-     {{"ramp_k_per_min", CONTROL_REAL, false, "K/min", 1e-6, 1000, .what = "ramp, both ways", .def = 1, .limits = ramp_limits}},
+     CONTROL_ARGS({"ramp_k_per_min", CONTROL_REAL, false, "K/min", 1e-6, 1000, .what = "ramp, both ways", .def = 1, .limits = ramp_limits}),
      .run = do_ramp, .changes = true, .scpi = {{"RAMP", NULL}}},
-    {"chamber.read", "Reads the chamber: air by its thermometer, set point, ramp, whether the air is there and in how many seconds.", {{0}},
+    {"chamber.read", "Reads the chamber: air by its thermometer, set point, ramp, whether the air is there and in how many seconds.", NULL,
      .run = do_read, .scpi = {{"TEMPerature?", "temp_degc"}, {"TEMPerature:SETPoint?", "set_degc"}, {"RAMP?", "ramp_k_per_min"},
                               {"STABle?", "stable"}}},
-    {"chamber.reset", "Back to set point and ramp of power-on.", {{0}}, .run = do_reset, .changes = true, .scpi = {{"*RST", NULL}}},
+    {"chamber.reset", "Back to set point and ramp of power-on.", NULL, .run = do_reset, .changes = true, .scpi = {{"*RST", NULL}}},
 };
 // clang-format on
 const struct control_table commands_chamber = {rows, sizeof rows / sizeof *rows};

@@ -5,20 +5,6 @@
 
 #include <string.h>
 
-static const char *const levels[] = {"low", "high", NULL};
-enum { ADD, CLEAR, LIST, KINDS, POINTS, COMMANDS };
-static const struct control_command rows[COMMANDS];
-
-const char *fault_arg_name(enum fault_arg arg)
-{
-    return rows[ADD].arg[arg].name;
-}
-
-const char *fault_arg_what(enum fault_arg arg)
-{
-    return rows[ADD].arg[arg].what;
-}
-
 static bool check_add(const struct control_bench *b, const struct control_value *v, struct control_refusal *why)
 {
     struct fault f;
@@ -65,7 +51,7 @@ static enum control_outcome do_clear(struct control *c, const struct control_val
 
 static void add_arg(cJSON *to, enum fault_arg arg, bool optional)
 {
-    const struct control_arg *a = &rows[ADD].arg[arg];
+    const struct control_arg *a = &fault_args[arg];
     cJSON *j = cJSON_CreateObject();
     cJSON_AddItemToArray(to, j);
     cJSON_AddStringToObject(j, "name", a->name);
@@ -77,7 +63,7 @@ static void add_arg(cJSON *to, enum fault_arg arg, bool optional)
         cJSON_AddNumberToObject(j, "max", a->max);
         if (a->least > 0.0) cJSON_AddNumberToObject(j, "least", a->least);
     }
-    if (a->choices) cJSON_AddItemToObject(j, "choices", cJSON_CreateStringArray(levels, 2));
+    if (a->choices) cJSON_AddItemToObject(j, "choices", cJSON_CreateStringArray(a->choices, 2));
     cJSON_AddStringToObject(j, "what", a->what);
 }
 
@@ -130,7 +116,7 @@ static enum control_outcome do_points(struct control *c, const struct control_va
 
 static void add_value(cJSON *to, const struct fault *f, enum fault_arg arg)
 {
-    const struct control_arg *a = &rows[ADD].arg[arg];
+    const struct control_arg *a = &fault_args[arg];
     if (!fault_given(f, arg)) return;
     if (a->choices) cJSON_AddStringToObject(to, a->name, a->choices[(unsigned)f->value[arg]]);
     else cJSON_AddNumberToObject(to, a->name, f->value[arg]);
@@ -182,48 +168,12 @@ static enum control_outcome do_list(struct control *c, const struct control_valu
 }
 
 // clang-format off
-#define TIME_MAX_S 1e6
-static const struct control_command rows[COMMANDS] = {
-    [ADD] = {"fault.add", "Brings about a fault now, at an instant or after an event; what it takes besides is told by fault.kinds.", {
-     [FAULT_KIND] = {"kind", CONTROL_NAME, .what = "what goes wrong: a name of fault.kinds"},
-     [FAULT_POINT] = {"point", CONTROL_NAME, .what = "where: a name of fault.points"},
-     [FAULT_AT_S] = {"at_s", CONTROL_REAL, true, "s", 0, TIME_MAX_S, .what = "simulated instant; without it: now. With after: events count from then on"},
-     [FAULT_AFTER] = {"after", CONTROL_EVENT, true, .what = "event of a board that brings it about, one that this board has"},
-     [FAULT_COUNT] = {"count", CONTROL_COUNT, true, NULL, 1, 1e9, .what = "which of these events; without it the first"},
-     [FAULT_SINCE] = {"since", CONTROL_EVENT, true, .what = "event that starts the count anew"},
-     [FAULT_UNIT] = {"unit", CONTROL_UNIT, true, .what = "whose events; without it those of the point's unit"},
-     [FAULT_DELAY_S] = {"delay_s", CONTROL_REAL, true, "s", 0, 1000, .what = "from the event to the fault"},
-     [FAULT_FOR_S] = {"for_s", CONTROL_REAL, true, "s", 0, TIME_MAX_S, .what = "how long it lasts; 0 or without it: until fault.clear"},
-     [FAULT_OUT_V] = {"out_v", CONTROL_REAL, true, "V", -15, 15, .what = "output of the sensor (one with current output: at its load)"},
-     [FAULT_BIAS_V] = {"bias_v", CONTROL_REAL, true, "V", -15, 15, .what = "added to the output of the sensor", .least = FAULT_LEAST_V},
-     [FAULT_DRIFT_V_PER_S] = {"drift_v_per_s", CONTROL_REAL, true, "V/s", -1000, 1000, .what = "by which the output of the sensor grows", .least = FAULT_LEAST_V},
-     [FAULT_SCALE_PPM] = {"scale_ppm", CONTROL_REAL, true, "ppm", -1e7, 1e7, .what = "error of the sensor's scale factor; -1000000: deaf", .least = FAULT_LEAST_PPM},
-     [FAULT_RMS_V] = {"rms_v", CONTROL_REAL, true, "V", FAULT_LEAST_V, 10, .what = "noise of a settled reading at 1000 SPS"},
-     [FAULT_LOW_V] = {"low_v", CONTROL_REAL, true, "V", -15, 15, .what = "least output of the sensor"},
-     [FAULT_HIGH_V] = {"high_v", CONTROL_REAL, true, "V", -15, 15, .what = "greatest output of the sensor"},
-     [FAULT_REFERENCE_PPM] = {"reference_ppm", CONTROL_REAL, true, "ppm", -500000, 1e6, .what = "error of the converter's reference", .least = FAULT_LEAST_PPM},
-     [FAULT_DRIFT_PPM_PER_S] = {"drift_ppm_per_s", CONTROL_REAL, true, "ppm/s", FAULT_LEAST_PPM, 1e6, .what = "by which that error grows"},
-     [FAULT_AMPLITUDE_V] = {"amplitude_v", CONTROL_REAL, true, "V", FAULT_LEAST_V, 10, .what = "of the ripple at the load"},
-     [FAULT_FREQUENCY_HZ] = {"frequency_hz", CONTROL_REAL, true, "Hz", 0.1, 100, .what = "of the ripple; more would not pass the filter at 250 SPS"},
-     [FAULT_LEVEL] = {"level", CONTROL_CHOICE, true, .what = "at which it stays", .choices = levels},
-     [FAULT_REGISTER] = {"register", CONTROL_COUNT, true, NULL, 0, 255, .what = "number of the register in the chip"},
-     [FAULT_MASK] = {"mask", CONTROL_COUNT, true, NULL, 1, 255, .what = "bits that are inverted"},
-     [FAULT_CLOCK_PPM] = {"clock_ppm", CONTROL_REAL, true, "ppm", -FAULT_PPM_MAX, FAULT_PPM_MAX, .what = "error of the chip's clock; negative: slow"},
-     [FAULT_WIDTH_NS] = {"width_ns", CONTROL_COUNT, true, "ns", 1, 1e9, .what = "of the pulse"},
-     [FAULT_PULSE] = {"pulse", CONTROL_COUNT, true, NULL, 1, 128, .what = "number of the pulse in the frame, from 1"},
-     [FAULT_RATE_HZ] = {"rate_hz", CONTROL_REAL, true, "Hz", 0.001, 1e6, .what = "pulses a second, on average"},
-     [FAULT_PROBABILITY] = {"probability", CONTROL_REAL, true, NULL, 1e-6, 1, .what = "that a frame is hit; without it 1"},
-     [FAULT_FRAMES] = {"frames", CONTROL_COUNT, true, NULL, 1, 1e9, .what = "that are hit, then no more; without it all"},
-     [FAULT_ID] = {"can_id", CONTROL_COUNT, true, NULL, 0, 536870911, .what = "identifier of the frames; without it any"},
-     [FAULT_ID_MASK] = {"can_id_mask", CONTROL_COUNT, true, NULL, 0, 536870911, .what = "bits of the identifier that are compared; without it all"},
-     [FAULT_HOLD_S] = {"hold_s", CONTROL_REAL, true, "s", 0, 10, .what = "by which a frame is held back"},
-     [FAULT_DROP_V] = {"drop_v", CONTROL_REAL, true, "V", 1e-3, 100, .what = "by which the supply falls"},
-     [FAULT_DRIFT_DEGPH] = {"drift_degph", CONTROL_REAL, true, "deg/h", -1000, 1000, .what = "of the gyroscope, more than it had", .least = 1e-3},
-     }, .run = do_add, .changes = true, .check = check_add},
-    [CLEAR] = {"fault.clear", "Lifts a fault, or all of them, and forgets it.", {{"id", CONTROL_COUNT, true, NULL, 1, 4294967295.0, .what = "what fault.add told"}}, .run = do_clear, .changes = true},
-    [LIST] = {"fault.list", "Lists the faults: waiting, listening for their event, active, over, or void (the point was gone).", {{0}}, .run = do_list},
-    [KINDS] = {"fault.kinds", "Lists the kinds of faults: what they do, how a host sees them, where they can be and what they take.", {{0}}, .run = do_kinds},
-    [POINTS] = {"fault.points", "Lists the points of the bench at which faults can be.", {{"kind", CONTROL_NAME, true, .what = "only those for this kind"}}, .run = do_points},
+static const struct control_command rows[] = {
+    {"fault.add", "Brings about a fault now, at an instant or after an event; what it takes besides is told by fault.kinds.", fault_args, .run = do_add, .changes = true, .check = check_add},
+    {"fault.clear", "Lifts a fault, or all of them, and forgets it.", CONTROL_ARGS({"id", CONTROL_COUNT, true, NULL, 1, 4294967295.0, .what = "what fault.add told"}), .run = do_clear, .changes = true},
+    {"fault.list", "Lists the faults: waiting, listening for their event, active, over, or void (the point was gone).", NULL, .run = do_list},
+    {"fault.kinds", "Lists the kinds of faults: what they do, how a host sees them, where they can be and what they take.", NULL, .run = do_kinds},
+    {"fault.points", "Lists the points of the bench at which faults can be.", CONTROL_ARGS({"kind", CONTROL_NAME, true, .what = "only those for this kind"}), .run = do_points},
 };
 // clang-format on
 const struct control_table commands_fault = {rows, sizeof rows / sizeof *rows};

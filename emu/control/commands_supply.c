@@ -96,17 +96,17 @@ static enum control_outcome do_reset(struct control *c, const struct control_val
 // clang-format off
 static const struct control_command rows[] = {
     {"supply.set", "Sets the voltage of the supply.",
-     {{"volt_v", CONTROL_REAL, false, "V", 0, 1000, .what = "voltage", .def = 12, .limits = volt_limits}},
+     CONTROL_ARGS({"volt_v", CONTROL_REAL, false, "V", 0, 1000, .what = "voltage", .def = 12, .limits = volt_limits}),
      .run = do_set, .changes = true, .scpi = {{"VOLTage", NULL}}},
-    {"supply.output", "Switches its output.", {{"on", CONTROL_BOOL, .what = "whether it feeds the boards"}},
+    {"supply.output", "Switches its output.", CONTROL_ARGS({"on", CONTROL_BOOL, .what = "whether it feeds the boards"}),
      .run = do_output, .changes = true, .scpi = {{"OUTPut", NULL}}},
     {"supply.ripple", "Puts a sine on the voltage.",
-     {{"amplitude_v", CONTROL_REAL, false, "V", 0, 1000, .what = "from the middle; 0: none", .limits = ripple_limits},
-      {"frequency_hz", CONTROL_REAL, false, "Hz", 1e-3, 1e6, .what = "of the sine", .def = 100, .limits = frequency_limits}},
+     CONTROL_ARGS({"amplitude_v", CONTROL_REAL, false, "V", 0, 1000, .what = "from the middle; 0: none", .limits = ripple_limits},
+      {"frequency_hz", CONTROL_REAL, false, "Hz", 1e-3, 1e6, .what = "of the sine", .def = 100, .limits = frequency_limits}),
      .run = do_ripple, .changes = true, .scpi = {{"RIPPle", NULL}}},
-    {"supply.read", "Reads the supply: voltage as set and as measured at its output, output on or off, ripple.", {{0}}, .run = do_read,
+    {"supply.read", "Reads the supply: voltage as set and as measured at its output, output on or off, ripple.", NULL, .run = do_read,
      .scpi = {{"VOLTage?", "volt_v"}, {"MEASure:VOLTage?", "measured_v"}, {"OUTPut?", "on"}, {"RIPPle?", "ripple_v,ripple_hz"}}},
-    {"supply.reset", "Back to voltage and ripple of power-on, output on.", {{0}}, .run = do_reset, .changes = true, .scpi = {{"*RST", NULL}}},
+    {"supply.reset", "Back to voltage and ripple of power-on, output on.", NULL, .run = do_reset, .changes = true, .scpi = {{"*RST", NULL}}},
 };
 // clang-format on
 const struct control_table commands_supply = {rows, sizeof rows / sizeof *rows};

@@ -24,14 +24,11 @@ static enum control_outcome do_state(struct control *c, const struct control_val
 }
 
 static const struct control_command rows[] = {
-    {"help", "Lists the commands with their arguments.", {{0}}, .run = do_help},
-    {"truth",
-     "Tells the hidden parameters of the bench: for graders, after the estimate is made.",
-     {{0}},
+    {"help", "Lists the commands with their arguments.", NULL, .run = do_help},
+    {"truth", "Tells the hidden parameters of the bench: for graders, after the estimate is made.", NULL,
      .run = do_truth},
     {"truth.state",
      "Tells the true state of this instant: angles, rates, temperatures, supply, and what a unit and its sensors feel.",
-     {{"unit", CONTROL_UNIT, true, .what = "name of a unit; else the first"}},
-     .run = do_state},
+     CONTROL_ARGS({"unit", CONTROL_UNIT, true, .what = "name of a unit; else the first"}), .run = do_state},
 };
 const struct control_table commands_truth = {rows, sizeof rows / sizeof *rows};

@@ -96,20 +96,20 @@ static enum control_outcome do_vcd_flush(struct control *c, const struct control
 
 static const struct control_command rows[] = {
     {"run.until", "As run, but ends at the instant of an event of a board; tells whether it was reached and how many were seen.",
-     {{"event", CONTROL_EVENT, .what = "of the board, one that it has"}, FIRST_UNIT,
+     CONTROL_ARGS({"event", CONTROL_EVENT, .what = "of the board, one that it has"}, FIRST_UNIT,
       {"count", CONTROL_COUNT, true, NULL, 1, CONTROL_COUNT_MAX, .what = "of such events from now on; else 1", .def = 1},
       {"limit_s", CONTROL_REAL, true, "s", 0, 86400, .what = "give up after this; else 60", .def = 60},
-      {"after_tx", CONTROL_COUNT, true, NULL, 0, CONTROL_COUNT_MAX, .what = "as of run"}}, .run = do_until, .check = check_until},
+      {"after_tx", CONTROL_COUNT, true, NULL, 0, CONTROL_COUNT_MAX, .what = "as of run"}), .run = do_until, .check = check_until},
     {"subscribe", "From now on this client gets a line for each event, fault or status.",
-     {{"what", CONTROL_CHOICE, .what = "kind of lines", .choices = control_topics},
-      {"every_s", CONTROL_REAL, true, "s", 1e-3, 3600, .what = "simulated time between lines of status; else 0.1", .def = 0.1}}, .run = do_subscribe},
+     CONTROL_ARGS({"what", CONTROL_CHOICE, .what = "kind of lines", .choices = control_topics},
+      {"every_s", CONTROL_REAL, true, "s", 1e-3, 3600, .what = "simulated time between lines of status; else 0.1", .def = 0.1}), .run = do_subscribe},
     {"unsubscribe", "Ends subscriptions of this client: of one kind, or all.",
-     {{"what", CONTROL_CHOICE, true, .what = "kind of lines", .choices = control_topics}}, .run = do_unsubscribe},
-    {"lines", "Tells the levels of a unit's lines now; with a fault on a line, those of 0.2 ms ago.", {FIRST_UNIT}, .run = do_lines},
+     CONTROL_ARGS({"what", CONTROL_CHOICE, true, .what = "kind of lines", .choices = control_topics}), .run = do_unsubscribe},
+    {"lines", "Tells the levels of a unit's lines now; with a fault on a line, those of 0.2 ms ago.", CONTROL_ARGS(FIRST_UNIT), .run = do_lines},
     {"vcd.start", "Records the lines of a unit into a VCD file from now on. A word on a converter's port or a pulse of STEP that is under way and that nobody watched is not in it.",
-     {{"path", CONTROL_TEXT, .what = "file to write; one of that name is replaced"}, FIRST_UNIT}, .run = do_vcd_start},
-    {"vcd.stop", "Ends the recording, 0.2 ms before now: later edges are not all known.", {{0}}, .run = do_vcd_stop},
-    {"vcd.flush", "Writes to the VCD file what has been recorded so far, with a closing time; in its first 0.2 ms that is a header.", {{0}}, .run = do_vcd_flush},
+     CONTROL_ARGS({"path", CONTROL_TEXT, .what = "file to write; one of that name is replaced"}, FIRST_UNIT), .run = do_vcd_start},
+    {"vcd.stop", "Ends the recording, 0.2 ms before now: later edges are not all known.", NULL, .run = do_vcd_stop},
+    {"vcd.flush", "Writes to the VCD file what has been recorded so far, with a closing time; in its first 0.2 ms that is a header.", NULL, .run = do_vcd_flush},
 };
 // clang-format on
 const struct control_table commands_watch = {rows, sizeof rows / sizeof *rows};

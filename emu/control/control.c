@@ -2,35 +2,14 @@
 
 #include "command/args.h"
 #include "control/commands.h"
+#include "control/cycle.h"
 
-#include <inttypes.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
-
-const struct control_table *const control_tables[] = {
-    &commands_bench, &commands_head,  &commands_table,    &commands_chamber, &commands_supply, &commands_platform,
-    &commands_watch, &commands_fault, &commands_snapshot, &commands_bus,     &commands_can,    NULL};
-const struct control_table *const control_truth_tables[] = {&commands_truth, NULL};
 
 void control_init(struct control *c, const struct control_table *const *tables, const struct control_bench *bench)
 {
     *c = (struct control){.tables = tables, .bench = bench};
-}
-
-enum control_outcome control_refuse(struct control *c, const char *code, const char *format, ...)
-{
-    va_list ap;
-    va_start(ap, format);
-    vsnprintf(c->refusal.why, sizeof c->refusal.why, format, ap);
-    va_end(ap);
-    c->refusal.code = code;
-    return CONTROL_REFUSED;
-}
-
-void control_settle_inputs(const struct control_bench *b, int64_t t_ns)
-{
-    for (unsigned i = 0; i < b->units; i++) unit_sample_until(b->unit[i], t_ns);
 }
 
 /* ---- carrying out */
@@ -57,100 +36,19 @@ enum control_outcome control_call(struct control *c, const char *cmd, const cJSO
     return control_do(c, row, v, result, t_ns);
 }
 
-bool control_check(const struct control_bench *b, const char *cmd, const cJSON *args, char *why)
+bool control_check(const struct control_table *const *tables, const struct control_bench *b, const char *cmd,
+                   const cJSON *args, char *why)
 {
     struct control_value v[CONTROL_ARGS_MAX];
     struct control_refusal refusal;
-    const struct control_command *row = control_find(control_tables, cmd);
+    const struct control_command *row = control_find(tables, cmd);
     if (row && control_args(b, row, args, v, &refusal)) return true;
     if (row) snprintf(why, CONTROL_WHY_MAX, "%s", refusal.why);
     else snprintf(why, CONTROL_WHY_MAX, "\"%.40s\": unknown command", cmd);
     return false;
 }
 
-/* ---- replies */
-
-static const char *print(struct control *c, cJSON *reply)
-{
-    static const char too_long[] = "{\"ok\":false,\"error\":{\"code\":\"machine\",\"text\":\"reply too long\"}}";
-    if (!cJSON_PrintPreallocated(reply, c->reply, (int)sizeof c->reply, 0)) memcpy(c->reply, too_long, sizeof too_long);
-    cJSON_Delete(reply);
-    return c->reply;
-}
-
-/* What has been delivered to each CAN client so far, by its number: the barrier of a host that drives several. */
-static void add_rx(const struct control *c, cJSON *reply)
-{
-    struct control_client k;
-    char number[16];
-    cJSON_AddNumberToObject(reply, "can_rx", (double)c->bench->can_rx(c->bench->ctx));
-    cJSON *rx = cJSON_AddObjectToObject(reply, "rx");
-    for (unsigned i = 0; c->bench->client(c->bench->ctx, i, &k); i++) {
-        snprintf(number, sizeof number, "%" PRIu32, k.came);
-        cJSON_AddNumberToObject(rx, number, (double)k.delivered);
-    }
-}
-
-/* Takes over id and result. */
-static const char *reply_with(struct control *c, cJSON *id, bool ok, cJSON *result, int64_t t_ns)
-{
-    cJSON *reply = cJSON_CreateObject();
-    cJSON_AddItemToObject(reply, "id", id ? id : cJSON_CreateNull());
-    cJSON_AddBoolToObject(reply, "ok", ok);
-    cJSON_AddNumberToObject(reply, "t_ns", (double)t_ns);
-    add_rx(c, reply);
-    if (ok) {
-        cJSON_AddItemToObject(reply, "result", result ? result : cJSON_CreateObject());
-        return print(c, reply);
-    }
-    cJSON_Delete(result);
-    c->refused++;
-    cJSON *error = cJSON_AddObjectToObject(reply, "error");
-    cJSON_AddStringToObject(error, "code", c->refusal.code);
-    cJSON_AddStringToObject(error, "text", c->refusal.why);
-    return print(c, reply);
-}
-
-bool control_by_step(const struct control_bench *b)
-{
-    struct control_pace p = {0};
-    b->pace(b->ctx, &p);
-    return p.by_step;
-}
-
-/* The reply to a cycle that is over, or was given up; its place is free then if it is over. */
-static const char *reply_cycle(struct control *c, struct control_cycle *k, cJSON *id, int64_t t_ns)
-{
-    cJSON *result = cJSON_CreateObject();
-    const enum control_outcome outcome = control_cycle_result(c, k, result);
-    k->client = NULL;
-    k->id = NULL;
-    if (k->over) k->control = NULL;
-    return reply_with(c, id, outcome == CONTROL_DONE, result, t_ns);
-}
-
-void control_cycle_over(struct control *c, struct control_cycle *k, int64_t t_ns)
-{
-    if (c->waiting && c->running == k) {
-        c->bench->run_stop(c->bench->ctx); /* answered with the run */
-    } else if (k->client) {
-        void *client = k->client;
-        c->bench->reply(c->bench->ctx, client, reply_cycle(c, k, k->id, t_ns));
-    } else {
-        k->control = NULL;
-    }
-}
-
-void control_cycles_forget(struct control *c, const void *client)
-{
-    for (unsigned i = 0; i < CONTROL_CYCLES_MAX; i++) {
-        struct control_cycle *k = &c->cycle[i];
-        if (!k->control || (client && k->client != client)) continue;
-        cJSON_Delete(k->id);
-        k->id = NULL;
-        k->client = NULL;
-    }
-}
+/* ---- a run */
 
 const char *control_run_done(struct control *c, int64_t t_ns)
 {
@@ -160,11 +58,11 @@ const char *control_run_done(struct control *c, int64_t t_ns)
     c->running = NULL;
     c->waiting = false;
     const struct control_until until = control_watch_end(c);
-    if (cycle) return reply_cycle(c, cycle, id, t_ns);
+    if (cycle) return control_cycle_reply(c, cycle, id, t_ns);
     cJSON *result = cJSON_CreateObject();
     if (until.active) cJSON_AddBoolToObject(result, "reached", until.reached);
     if (until.active) cJSON_AddNumberToObject(result, "seen", (double)until.seen);
-    return reply_with(c, id, true, result, t_ns);
+    return control_reply(c, id, true, result, t_ns);
 }
 
 void control_run_forget(struct control *c)
@@ -208,7 +106,7 @@ const char *control_line(struct control *c, const char *line, int64_t t_ns)
     c->started = NULL;
     const enum control_outcome outcome = dispatch(c, request, result, t_ns);
     cJSON_Delete(request);
-    if (outcome != CONTROL_LATER) return reply_with(c, id, outcome == CONTROL_DONE, result, t_ns);
+    if (outcome != CONTROL_LATER) return control_reply(c, id, outcome == CONTROL_DONE, result, t_ns);
     cJSON_Delete(result);
     if (c->started && !control_by_step(c->bench)) {
         c->started->id = id; /* control_cycle_over() answers */

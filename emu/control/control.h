@@ -64,11 +64,8 @@ enum control_outcome control_do(struct control *c, const struct control_command 
 /* Both, by name; the refusal stands in c. */
 enum control_outcome control_call(struct control *c, const char *cmd, const cJSON *args, cJSON *result, int64_t t_ns);
 
-/* Whether control_call() would get as far as the handler; does nothing. False with the reason in why[CONTROL_WHY_MAX]. */
-bool control_check(const struct control_bench *b, const char *cmd, const cJSON *args, char *why);
-
-/* For handlers: remembers why; returns CONTROL_REFUSED. */
-__attribute__((format(printf, 3, 4))) enum control_outcome control_refuse(struct control *c, const char *code,
-                                                                          const char *format, ...);
+/* Whether control_call() of a control with these tables would get as far as the handler; does nothing. False with the reason in why[CONTROL_WHY_MAX]. */
+bool control_check(const struct control_table *const *tables, const struct control_bench *b, const char *cmd,
+                   const cJSON *args, char *why);
 
 #endif

@@ -1,6 +1,8 @@
-/* Arguments of fault.add and of the kinds of faults. The rows with units and ranges are in commands_fault.c. */
+/* Arguments of fault.add and of the kinds of faults. */
 #ifndef PSABENCH_FAULT_ARGS_H
 #define PSABENCH_FAULT_ARGS_H
+
+#include "command/command.h"
 
 #define FAULT_PPM_MAX 500000.0 /* of a chip's clock */
 
@@ -48,8 +50,6 @@ enum fault_arg {
     FAULT_ARGS
 };
 
-/* control/commands_fault.c: of the arguments of fault.add. */
-const char *fault_arg_name(enum fault_arg arg);
-const char *fault_arg_what(enum fault_arg arg);
+extern const struct control_arg fault_args[]; /* names, units, ranges; up to the one without a name */
 
 #endif

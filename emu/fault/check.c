@@ -30,12 +30,6 @@ const struct fault_kind *fault_kind_find(const char *name)
     return NULL;
 }
 
-static void join(char *out, size_t cap, const char *word)
-{
-    const size_t at = strlen(out);
-    snprintf(out + at, cap - at, "%s%s", at ? ", " : "", word);
-}
-
 /* ---- kind and point */
 
 static bool find_kind(const char *name, const struct fault_kind **kind, struct control_refusal *why)
@@ -47,7 +41,7 @@ static bool find_kind(const char *name, const struct fault_kind **kind, struct c
     const char *dot = strchr(name, '.');
     const size_t layer = dot ? (size_t)(dot - name) + 1 : 0;
     for (unsigned i = 0; (k = fault_kind(i)) != NULL; i++) {
-        if (layer && strncmp(k->name, name, layer) == 0) join(known, sizeof known, k->name);
+        if (layer && strncmp(k->name, name, layer) == 0) control_list_add(known, sizeof known, k->name);
     }
     if (!known[0]) return control_refuse_in(why, "range", "kind: no \"%.40s\"; fault.kinds lists them", name);
     return control_refuse_in(why, "range", "kind: no \"%.40s\"; there is %s", name, known);
@@ -72,7 +66,7 @@ static void join_places(const struct control_bench *b, const struct fault *f, ch
     const struct fault_types t = on_board ? fault_type_of(b->unit[f->point.unit]->type) : fault_types_of(b);
     for (unsigned p = 0; p < FAULT_PLACES; p++) {
         for (unsigned i = 0; f->kind->places & FAULT_BIT(p) && fault_place_name(&t, (enum fault_place)p, i, name); i++)
-            join(out, cap, name);
+            control_list_add(out, cap, name);
     }
 }
 
@@ -98,13 +92,13 @@ bool fault_values_fit(const struct fault *f, struct control_refusal *why)
 {
     const struct fault_kind *k = f->kind;
     for (unsigned i = FAULT_FOR_S; i < FAULT_ARGS; i++) {
-        const char *name = fault_arg_name((enum fault_arg)i);
+        const char *name = fault_args[i].name;
         const bool given = fault_given(f, (enum fault_arg)i);
         if (given && i != FAULT_FOR_S && !((k->need | k->may) & FAULT_BIT(i))) {
             return control_refuse_in(why, "argument", "%s: %s takes no such value", name, k->name);
         }
         if (!given && (k->need & FAULT_BIT(i))) {
-            return control_refuse_in(why, "argument", "%s is missing: %s", name, fault_arg_what((enum fault_arg)i));
+            return control_refuse_in(why, "argument", "%s is missing: %s", name, fault_args[i].what);
         }
         if (given && (k->nonzero & FAULT_BIT(i)) && f->value[i] == 0.0) {
             return control_refuse_in(why, "range", "%s: 0 would change nothing", name);
@@ -138,7 +132,7 @@ static bool set_trigger(const struct control_bench *b, const struct control_valu
     f->trigger.after = FAULT_NO_EVENT;
     f->unit = v[FAULT_UNIT].given ? v[FAULT_UNIT].unit : f->point.unit;
     for (unsigned i = 0; !v[FAULT_AFTER].given && i < sizeof of_events / sizeof *of_events; i++) {
-        const char *name = fault_arg_name(of_events[i]);
+        const char *name = fault_args[of_events[i]].name;
         if (v[of_events[i]].given)
             return control_refuse_in(why, "argument", "%s: only with after, an event's name", name);
     }

@@ -24,7 +24,7 @@ static void add_args(struct text *t, const struct fault_kind *k)
     bool any = false;
     for (unsigned i = FAULT_FOR_S; i < FAULT_ARGS; i++) {
         if (!((k->need | k->may) & FAULT_BIT(i))) continue;
-        const char *name = fault_arg_name((enum fault_arg)i);
+        const char *name = fault_args[i].name;
         add(t, "%s`%s`%s", any ? ", " : "", name, k->need & FAULT_BIT(i) ? "" : " (optional)");
         any = true;
     }

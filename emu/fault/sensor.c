@@ -49,7 +49,7 @@ static bool at_least(const struct fault *f, enum fault_arg arg, double least, co
 {
     if (fabs(f->value[arg]) >= least) return true;
     snprintf(why, CONTROL_WHY_MAX, "%s: %.10g: a code of this board is %.4g %s, nobody would see less",
-             fault_arg_name(arg), f->value[arg], least, unit);
+             fault_args[arg].name, f->value[arg], least, unit);
     return false;
 }
 
@@ -70,7 +70,7 @@ static bool passes(const struct control_bench *b, const struct fault *f, enum fa
     const double most_v = fmin(u->cfg.board.afe[f->point.index].clip_v, range_v(u)); /* buffer, converter */
     if (!fault_given(f, limit) || fabs(f->value[limit]) < most_v) return true;
     snprintf(why, CONTROL_WHY_MAX, "%s: %.10g: the chain passes %.10g ... %.10g V, nobody would see this limit",
-             fault_arg_name(limit), f->value[limit], -most_v, most_v);
+             fault_args[limit].name, f->value[limit], -most_v, most_v);
     return false;
 }
 

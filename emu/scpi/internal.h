@@ -1,4 +1,4 @@
-/* What the files scpi*.c share. */
+/* What the files of this folder share. Not for others. */
 #ifndef PSABENCH_SCPI_INTERNAL_H
 #define PSABENCH_SCPI_INTERNAL_H
 
@@ -25,6 +25,11 @@ const struct scpi_command *scpi_common(unsigned i); /* NULL past the last */
 /* Adds an answer to the response under way. */
 void scpi_put(struct scpi *s, const char *text);
 __attribute__((format(printf, 2, 3))) void scpi_putf(struct scpi *s, const char *format, ...);
+
+/* The fields of a result, named with commas between. */
+void scpi_put_fields(struct scpi *s, const cJSON *result, const char *fields);
+
+bool scpi_belongs(const struct scpi_kind *kind, const struct control_command *row);
 
 /* Whether a pattern is a query. */
 bool scpi_asks(const char *pattern);

@@ -210,7 +210,7 @@ static void what_changes_the_bench_goes_into_the_journal(void **state)
 static bool check(const char *cmd, const char *args, char *why)
 {
     cJSON *j = cJSON_Parse(args);
-    const bool good = control_check(&view, cmd, j, why);
+    const bool good = control_check(control_tables, &view, cmd, j, why);
     cJSON_Delete(j);
     return good;
 }
