@@ -2,6 +2,8 @@
 #ifndef PSABENCH_BOARD_PART_H
 #define PSABENCH_BOARD_PART_H
 
+#include "base/chip_fault.h"
+
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -16,17 +18,8 @@ struct board_counter {
     size_t offset; /* of a uint32_t in the part */
 };
 
-/* What can be wrong with a chip: the sum of the faults that are active on it. */
-struct board_chip_fault {
-    bool drdy_stuck, drdy_level, dout_stuck, dout_level, lost_sync;
-    int32_t clock_ppm;
-};
-enum board_chip_fault_bit { /* which of them a part has; why not the others stands in board_part.unless */
-                            BOARD_FAULT_DRDY = 1,
-                            BOARD_FAULT_DOUT = 2,
-                            BOARD_FAULT_SYNC = 4,
-                            BOARD_FAULT_CLOCK = 8
-};
+/* Which members of struct chip_fault a part has; board_part.unless says why not the others. */
+enum board_chip_fault_bit { BOARD_FAULT_DRDY = 1, BOARD_FAULT_DOUT = 2, BOARD_FAULT_SYNC = 4, BOARD_FAULT_CLOCK = 8 };
 
 /* A chip, or the controller (part 0, label "board"): its counters, and where faults of kinds chip.* go. */
 struct board_part {
@@ -38,7 +31,8 @@ struct board_part {
     uint32_t faults;    /* enum board_chip_fault_bit */
     const char *unless; /* why it has not the others, one sentence; or NULL */
     unsigned registers; /* that can be flipped, from 0 */
-    void (*fault)(void *board, unsigned part, const struct board_chip_fault *f, int64_t t_ns);
+    /* f: the sum of the faults that are active on it */
+    void (*fault)(void *board, unsigned part, const struct chip_fault *f, int64_t t_ns);
     bool (*flip)(void *board, unsigned part, unsigned reg, uint8_t mask, int64_t t_ns); /* false: without power */
 };
 

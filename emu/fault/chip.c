@@ -19,18 +19,18 @@ static bool here(const struct fault *f, const struct fault *other)
 
 /* ---- chips; the variant of a kind is its bit of enum board_chip_fault_bit */
 
-static void add_to_sum(const struct fault *f, struct board_chip_fault *s, double *ppm)
+static void add_to_sum(const struct fault *f, struct chip_fault *s, double *ppm)
 {
-    const bool high = f->value[FAULT_LEVEL] != 0.0;
-    if (f->kind->variant == BOARD_FAULT_DRDY) s->drdy_stuck = true, s->drdy_level = high;
-    if (f->kind->variant == BOARD_FAULT_DOUT) s->dout_stuck = true, s->dout_level = high;
+    const enum chip_stuck stuck = f->value[FAULT_LEVEL] != 0.0 ? CHIP_STUCK_HIGH : CHIP_STUCK_LOW;
+    if (f->kind->variant == BOARD_FAULT_DRDY) s->drdy = stuck;
+    if (f->kind->variant == BOARD_FAULT_DOUT) s->dout = stuck;
     if (f->kind->variant == BOARD_FAULT_SYNC) s->lost_sync = true;
     if (f->kind->variant == BOARD_FAULT_CLOCK) *ppm += f->value[FAULT_CLOCK_PPM];
 }
 
 static void refresh_chip(struct fault *f, int64_t t_ns)
 {
-    struct board_chip_fault s = {.clock_ppm = 0};
+    struct chip_fault s = {.clock_ppm = 0};
     double ppm = 0.0;
     for (unsigned i = 0; i < FAULTS_MAX; i++) {
         if (here(f, &f->engine->fault[i])) add_to_sum(&f->engine->fault[i], &s, &ppm);

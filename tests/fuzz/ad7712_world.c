@@ -160,9 +160,9 @@ static void op_fault(struct w7712 *w, struct script *s)
         return;
     }
     /* DRDY stays free: its falls are what the invariants hang on. */
-    const struct ad7712_fault f = {.sdata = (enum ad7712_stuck)((b >> 1 & 3) % 3),
-                                   .lost_sync = b >> 3 & 1,
-                                   .clock_ppm = b >> 4 ? ((int32_t)(b >> 4) - 8) * 100 : 0};
+    const struct chip_fault f = {.dout = (enum chip_stuck)((b >> 1 & 3) % 3),
+                                 .lost_sync = b >> 3 & 1,
+                                 .clock_ppm = b >> 4 ? ((int32_t)(b >> 4) - 8) * 100 : 0};
     ad7712_fault(&w->a, &f, w->s.now_ns);
 }
 

@@ -19,8 +19,8 @@ struct world {
     struct can_fault can_fault[CAN_FAULTS];
     bool added[CAN_FAULTS];
     uint32_t line_fault;
-    struct ads1282_fault adc[3];
-    struct ads1256_fault tadc;
+    struct chip_fault adc[3];
+    struct chip_fault tadc;
     struct psa2_controller_fault kpsa;
     struct listener ear;
     bool attached, powered;
@@ -114,13 +114,12 @@ static void chip(struct world *w, struct script *s)
     }
     const int32_t clock_ppm = what & 0x20 ? ppm : 0;
     if (which % 4 < 3) {
-        w->adc[which % 4] =
-            (struct ads1282_fault){(enum ads1282_stuck)(what % 3), (enum ads1282_stuck)((what >> 2) % 3 * (what >> 7)),
-                                   what & 0x10, clock_ppm};
+        w->adc[which % 4] = (struct chip_fault){
+            (enum chip_stuck)(what % 3), (enum chip_stuck)((what >> 2) % 3 * (what >> 7)), what & 0x10, clock_ppm};
         ads1282_fault(&w->b.adc[which % 4], &w->adc[which % 4], w->s.now_ns);
     } else {
-        w->tadc = (struct ads1256_fault){(enum ads1256_stuck)(what % 3),
-                                         (enum ads1256_stuck)((what >> 2) % 3 * (what >> 7)), what & 0x10, clock_ppm};
+        w->tadc = (struct chip_fault){(enum chip_stuck)(what % 3), (enum chip_stuck)((what >> 2) % 3 * (what >> 7)),
+                                      what & 0x10, clock_ppm};
         ads1256_fault(&w->b.tadc, &w->tadc, w->s.now_ns);
     }
 }
@@ -225,8 +224,8 @@ static void op(struct world *w, struct script *s)
 
 static void lift(struct world *w)
 {
-    for (unsigned i = 0; i < 3; i++) ads1282_fault(&w->b.adc[i], &(struct ads1282_fault){.clock_ppm = 0}, w->s.now_ns);
-    ads1256_fault(&w->b.tadc, &(struct ads1256_fault){.clock_ppm = 0}, w->s.now_ns);
+    for (unsigned i = 0; i < 3; i++) ads1282_fault(&w->b.adc[i], &(struct chip_fault){.clock_ppm = 0}, w->s.now_ns);
+    ads1256_fault(&w->b.tadc, &(struct chip_fault){.clock_ppm = 0}, w->s.now_ns);
     psa2_fault_set(&w->b, &(struct psa2_controller_fault){.frozen_words = false});
     for (uint32_t id = 1; id <= w->b.line.last_id; id++) line_fault_end(&w->b.line, id, w->s.now_ns);
     for (unsigned i = 0; i < CAN_FAULTS; i++) can_fault_remove(&w->bus, &w->can_fault[i], w->s.now_ns);

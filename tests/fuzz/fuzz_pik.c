@@ -150,7 +150,8 @@ static void op_clock(struct world *w, struct script *s)
 static void op_stick(struct world *w, struct script *s)
 {
     const uint8_t b = script_byte(s);
-    pik_stick(&w->b, b % PIK_AXES, &(struct board_chip_fault){.dout_stuck = b & 64, .dout_level = b & 128},
+    pik_stick(&w->b, b % PIK_AXES,
+              &(struct chip_fault){.dout = b & 64 ? b & 128 ? CHIP_STUCK_HIGH : CHIP_STUCK_LOW : CHIP_FREE},
               w->s.now_ns);
 }
 

@@ -163,7 +163,9 @@ static void op_chip(struct world *w, struct script *s)
 {
     const uint8_t b = script_byte(s);
     const struct board_part *adc = &pmka_board.parts[1], *rom = &pmka_board.parts[2];
-    if (b & 1) adc->fault(&w->b, 1, &(struct board_chip_fault){.dout_stuck = b & 2, .dout_level = b & 4}, w->s.now_ns);
+    if (b & 1)
+        adc->fault(&w->b, 1, &(struct chip_fault){.dout = b & 2 ? b & 4 ? CHIP_STUCK_HIGH : CHIP_STUCK_LOW : CHIP_FREE},
+                   w->s.now_ns);
     else assert(rom->flip(&w->b, 2, script_byte(s) % rom->registers, b, w->s.now_ns));
 }
 

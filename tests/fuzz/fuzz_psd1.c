@@ -221,9 +221,9 @@ static void op_watch(struct world *w, struct script *s)
 static void op_fault(struct world *w, struct script *s)
 {
     const uint8_t b = script_byte(s);
-    const struct ad7712_fault f = {.drdy = (enum ad7712_stuck)(b >> 2 & 3) % 3,
-                                   .sdata = (enum ad7712_stuck)(b >> 4 & 3) % 3,
-                                   .clock_ppm = b & 64 ? 30000 : 0};
+    const struct chip_fault f = {.drdy = (enum chip_stuck)(b >> 2 & 3) % 3,
+                                 .dout = (enum chip_stuck)(b >> 4 & 3) % 3,
+                                 .clock_ppm = b & 64 ? 30000 : 0};
     ad7712_fault(&w->b.adc[b % 3], &f, w->s.now_ns);
 }
 

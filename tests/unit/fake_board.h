@@ -16,7 +16,7 @@ enum { FAKE_CTL, FAKE_CONV_A, FAKE_CONV_B, FAKE_ROM, FAKE_LAMP, FAKE_PARTS };
 
 struct fake_chip {
     uint32_t conversions, lost;
-    struct board_chip_fault fault;
+    struct chip_fault fault;
     unsigned flipped;
 };
 
@@ -133,7 +133,7 @@ static void fake_truth(const void *board, board_truth_fn *put, void *ctx)
     put(ctx, "capacitor_error_ppm", 250.0);
 }
 
-static void fake_chip_fault(void *board, unsigned part, const struct board_chip_fault *f, int64_t t_ns)
+static void fake_chip_fault(void *board, unsigned part, const struct chip_fault *f, int64_t t_ns)
 {
     (void)t_ns;
     ((struct fake_board *)board)->chip[part - 1].fault = *f;

@@ -73,12 +73,12 @@ static const struct board_counter converter_counters[] = {
 
 enum { PART_CONTROLLER, PART_X, PART_Y, PART_Z, PART_CLOCK, PARTS };
 
-static void converter_fault(void *board, unsigned part, const struct board_chip_fault *f, int64_t t_ns)
+static void converter_fault(void *board, unsigned part, const struct chip_fault *f, int64_t t_ns)
 {
     pik_stick(board, part - PART_X, f, t_ns);
 }
 
-static void clock_fault(void *board, unsigned part, const struct board_chip_fault *f, int64_t t_ns)
+static void clock_fault(void *board, unsigned part, const struct chip_fault *f, int64_t t_ns)
 {
     (void)part;
     pik_clock(board, f->clock_ppm, t_ns);

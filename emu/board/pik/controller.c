@@ -317,13 +317,13 @@ void pik_clock(struct pik *b, int32_t ppm, int64_t t_ns)
     sched_at(b->sched, &b->look, pik_tick_ns(b, b->look_tick));
 }
 
-void pik_stick(struct pik *b, unsigned axis, const struct board_chip_fault *f, int64_t t_ns)
+void pik_stick(struct pik *b, unsigned axis, const struct chip_fault *f, int64_t t_ns)
 {
     struct pik_channel *c = &b->channel[axis];
     pik_sample_until(b, t_ns);
     const uint64_t plus = pik_count_plus(c), minus = pik_count_minus(c);
-    c->stuck = f->dout_stuck;
-    c->stuck_level = f->dout_level;
+    c->stuck = f->dout != CHIP_FREE;
+    c->stuck_level = f->dout == CHIP_STUCK_HIGH;
     c->plus_from = plus - (c->stuck ? 0 : c->axis.plus);
     c->minus_from = minus - (c->stuck ? 0 : c->axis.minus);
     pik_lines_stuck(b, axis, t_ns);

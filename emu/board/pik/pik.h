@@ -114,7 +114,7 @@ void pik_reset(struct pik *b, int64_t t_ns);              /* counters and regist
 void pik_sample_until(struct pik *b, int64_t t_ns);       /* takes its inputs, and counts what they give */
 void pik_listen(struct pik *b, bool on);                  /* subscribes to io.event */
 void pik_clock(struct pik *b, int32_t ppm, int64_t t_ns); /* the generator is off by so much, beside its own error */
-void pik_stick(struct pik *b, unsigned axis, const struct board_chip_fault *f, int64_t t_ns);
+void pik_stick(struct pik *b, unsigned axis, const struct chip_fault *f, int64_t t_ns);
 bool pik_flip(struct pik *b, unsigned axis, unsigned reg, uint8_t mask, int64_t t_ns);
 
 /* As board_bus.submit. */

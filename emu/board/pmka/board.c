@@ -53,13 +53,13 @@ static const struct board_counter counters[] = {
     COUNT(handovers),     COUNT(beats), COUNT(saturations), COUNT(clips),        COUNT(cycles),
     COUNT(cycles_refused)};
 
-static void adc_fault(void *board, unsigned part, const struct board_chip_fault *f, int64_t t_ns)
+static void adc_fault(void *board, unsigned part, const struct chip_fault *f, int64_t t_ns)
 {
     struct pmka *b = board;
     (void)part;
     (void)t_ns;
-    b->adc_stuck = f->dout_stuck;
-    b->adc_stuck_level = f->dout_level;
+    b->adc_stuck = f->dout != CHIP_FREE;
+    b->adc_stuck_level = f->dout == CHIP_STUCK_HIGH;
 }
 
 /* The ROM keeps its words without power, damaged or not. */

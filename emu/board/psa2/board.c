@@ -62,25 +62,15 @@ static const struct board_counter temp_counters[] = {
 
 enum { PART_KPSA, PART_ADC_X, PART_ADC_Y, PART_ADC_Z, PART_TADC, PARTS };
 
-static void adc_fault(void *board, unsigned part, const struct board_chip_fault *f, int64_t t_ns)
+static void adc_fault(void *board, unsigned part, const struct chip_fault *f, int64_t t_ns)
 {
-    static const enum ads1282_stuck stuck[] = {ADS1282_STUCK_LOW, ADS1282_STUCK_HIGH};
-    const struct ads1282_fault all = {.drdy = f->drdy_stuck ? stuck[f->drdy_level] : ADS1282_FREE,
-                                      .dout = f->dout_stuck ? stuck[f->dout_level] : ADS1282_FREE,
-                                      .lost_sync = f->lost_sync,
-                                      .clock_ppm = f->clock_ppm};
-    ads1282_fault(&((struct psa2 *)board)->adc[part - PART_ADC_X], &all, t_ns);
+    ads1282_fault(&((struct psa2 *)board)->adc[part - PART_ADC_X], f, t_ns);
 }
 
-static void tadc_fault(void *board, unsigned part, const struct board_chip_fault *f, int64_t t_ns)
+static void tadc_fault(void *board, unsigned part, const struct chip_fault *f, int64_t t_ns)
 {
-    static const enum ads1256_stuck stuck[] = {ADS1256_STUCK_LOW, ADS1256_STUCK_HIGH};
-    const struct ads1256_fault all = {.drdy = f->drdy_stuck ? stuck[f->drdy_level] : ADS1256_FREE,
-                                      .dout = f->dout_stuck ? stuck[f->dout_level] : ADS1256_FREE,
-                                      .lost_sync = f->lost_sync,
-                                      .clock_ppm = f->clock_ppm};
     (void)part;
-    ads1256_fault(&((struct psa2 *)board)->tadc, &all, t_ns);
+    ads1256_fault(&((struct psa2 *)board)->tadc, f, t_ns);
 }
 
 /* Registers without power hold nothing. */

@@ -49,14 +49,9 @@ static const struct board_counter adc_counters[] = {
 
 enum { PART_KPSD, PART_ADC_X, PART_ADC_Y, PART_ADC_Z, PARTS };
 
-static void adc_fault(void *board, unsigned part, const struct board_chip_fault *f, int64_t t_ns)
+static void adc_fault(void *board, unsigned part, const struct chip_fault *f, int64_t t_ns)
 {
-    static const enum ad7712_stuck stuck[] = {AD7712_STUCK_LOW, AD7712_STUCK_HIGH};
-    const struct ad7712_fault all = {.drdy = f->drdy_stuck ? stuck[f->drdy_level] : AD7712_FREE,
-                                     .sdata = f->dout_stuck ? stuck[f->dout_level] : AD7712_FREE,
-                                     .lost_sync = f->lost_sync,
-                                     .clock_ppm = f->clock_ppm};
-    ad7712_fault(&((struct psd1 *)board)->adc[part - PART_ADC_X], &all, t_ns);
+    ad7712_fault(&((struct psd1 *)board)->adc[part - PART_ADC_X], f, t_ns);
 }
 
 static bool adc_flip(void *board, unsigned part, unsigned reg, uint8_t mask, int64_t t_ns)

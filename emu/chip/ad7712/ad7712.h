@@ -8,11 +8,11 @@
 #ifndef PSABENCH_CHIP_AD7712_AD7712_H
 #define PSABENCH_CHIP_AD7712_AD7712_H
 
+#include "base/chip_fault.h"
 #include "base/clk.h"
 #include "base/rng.h"
 #include "base/sched.h"
 #include "chip/ad7712/cfg.h"
-#include "chip/ad7712/fault.h"
 #include "chip/ad7712/filter.h"
 
 #include <stdbool.h>
@@ -58,7 +58,7 @@ struct ad7712_port {
 struct ad7712 {
     struct ad7712_cfg cfg;
     struct ad7712_io io;
-    struct ad7712_fault fault;
+    struct chip_fault fault;
     struct sched *sched;
     struct rng noise;
     struct clk clkin;
@@ -125,5 +125,16 @@ void ad7712_sample_until(struct ad7712 *a, int64_t t_ns);
 int64_t ad7712_period_ns(const struct ad7712 *a);    /* of the outputs, with the present filter code */
 uint32_t ad7712_sampling_hz(const struct ad7712 *a); /* of the input capacitor, by the gain */
 double ad7712_iout_a(const struct ad7712 *a);        /* AD7710: current source; AD7711: each of its RTD sources */
+
+/* ---- Faults ---- */
+
+enum { AD7712_FLIP_REGS = 15 }; /* bytes, high first: control, then zero and full scale of AIN1, then of AIN2 */
+
+/* From t_ns on, in place of the faults that were; outlives power. Not from inside a callback of the chip. */
+void ad7712_fault(struct ad7712 *a, const struct chip_fault *f, int64_t t_ns);
+
+/* Inverts bits of a register's byte, as a particle or a bad supply does; the chip acts on what it finds there as if it had
+ * been written. False: no such byte, or no power. */
+bool ad7712_flip(struct ad7712 *a, unsigned reg, uint8_t mask, int64_t t_ns);
 
 #endif

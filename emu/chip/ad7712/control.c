@@ -92,5 +92,5 @@ void ad7712_standby_pin(struct ad7712 *a, bool level, int64_t t_ns)
 
 bool ad7712_drdy(const struct ad7712 *a)
 {
-    return a->fault.drdy ? a->fault.drdy == AD7712_STUCK_HIGH : a->drdy;
+    return chip_fault_level(a->fault.drdy, a->drdy);
 }

@@ -1,5 +1,3 @@
-#include "chip/ad7712/fault.h"
-
 #include "chip/ad7712/internal.h"
 
 #include <assert.h>
@@ -23,18 +21,18 @@ static void set_clock(struct ad7712 *a, int64_t hz, int64_t t_ns)
     const int64_t edge = clk_count_at(&a->clkin, t_ns);
     const int64_t at_ns = clk_edge_ns(&a->clkin, edge);
     if (hz == a->cfg.clkin_hz) back_to_own(a, edge, at_ns);
-    else a->clkin = (struct clk){.t0_ns = at_ns - clk_span_ns(hz, edge), .hz = hz, .div = 1};
+    else a->clkin = chip_fault_clk(&a->clkin, hz, t_ns);
     ad7712_retime(a);
 }
 
-void ad7712_fault(struct ad7712 *a, const struct ad7712_fault *f, int64_t t_ns)
+void ad7712_fault(struct ad7712 *a, const struct chip_fault *f, int64_t t_ns)
 {
     assert(f->clock_ppm >= -500000 && f->clock_ppm <= 500000);
     const bool drdy = ad7712_drdy(a), sdata = ad7712_sdata(a, t_ns);
     a->fault = *f;
     if (ad7712_drdy(a) != drdy && a->io.drdy) a->io.drdy(a->io.ctx, !drdy, t_ns);
     if (a->io.sdata && ad7712_sdata(a, t_ns) != sdata) a->io.sdata(a->io.ctx, !sdata, t_ns);
-    set_clock(a, a->cfg.clkin_hz + (int64_t)a->cfg.clkin_hz * f->clock_ppm / 1000000, t_ns);
+    set_clock(a, chip_fault_hz(f, a->cfg.clkin_hz), t_ns);
     ad7712_follow_pins(a, t_ns); /* a broken SYNC is held high by its pull-up */
 }
 

@@ -83,7 +83,7 @@ bool ad7712_sdata_driven(const struct ad7712 *a, int64_t t_ns)
 bool ad7712_sdata(const struct ad7712 *a, int64_t t_ns)
 {
     if (!ad7712_sdata_driven(a, t_ns)) return false;
-    if (a->fault.sdata) return a->fault.sdata == AD7712_STUCK_HIGH;
+    if (a->fault.dout) return a->fault.dout == CHIP_STUCK_HIGH;
     return t_ns < a->port.change_ns ? a->port.out : a->port.out_next;
 }
 
@@ -133,8 +133,7 @@ uint32_t ad7712_read_word(struct ad7712 *a, unsigned bits, const struct ad7712_s
     p->change_ns = p->fall_ns + ad7712_bit_access_ns(a);
     if (a->io.sdata) sched_at(a->sched, &a->sdata_ev, p->change_ns);
     ad7712_word_over(a, p->fall_ns);
-    if (!a->fault.sdata) return word;
-    return a->fault.sdata == AD7712_STUCK_HIGH ? all : 0;
+    return chip_fault_word(a->fault.dout, word, all);
 }
 
 /* Data change with the falls of SCLK, the first bit with the frame's begin. */

@@ -8,13 +8,13 @@
 #ifndef PSABENCH_CHIP_ADS1256_ADS1256_H
 #define PSABENCH_CHIP_ADS1256_ADS1256_H
 
+#include "base/chip_fault.h"
 #include "base/clk.h"
 #include "base/reg.h"
 #include "base/rng.h"
 #include "base/sched.h"
 #include "base/spi.h"
 #include "chip/ads1256/cfg.h"
-#include "chip/ads1256/fault.h"
 #include "chip/ads1256/filter.h"
 
 #include <stdbool.h>
@@ -47,7 +47,7 @@ struct ads1256_pins {
 struct ads1256 {
     struct ads1256_cfg cfg;
     struct ads1256_io io;
-    struct ads1256_fault fault;
+    struct chip_fault fault;
     void (*tell_drdy)(void *ctx, bool level, int64_t t_ns); /* io.drdy, which tells nobody while DRDY is stuck */
     struct sched *sched;
     struct rng noise;
@@ -122,5 +122,14 @@ uint32_t ads1256_clkout_hz(const struct ads1256 *a); /* 0: D0 is no clock. Its e
 
 bool ads1256_drdy(const struct ads1256 *a);
 int64_t ads1256_settle_ns(const struct ads1256 *a); /* t18 of the present DRATE */
+
+/* ---- Faults ---- */
+
+/* From t_ns on, in place of the faults that were; outlives resets and power. Not from inside a callback of the chip. */
+void ads1256_fault(struct ads1256 *a, const struct chip_fault *f, int64_t t_ns);
+
+/* Inverts bits of a register, as a particle or a bad supply does, read-only ones too; the chip acts on what it finds there
+ * as if it had been written. False: no such register. */
+bool ads1256_flip(struct ads1256 *a, unsigned reg, uint8_t mask, int64_t t_ns);
 
 #endif

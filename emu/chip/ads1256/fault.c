@@ -1,5 +1,3 @@
-#include "chip/ads1256/fault.h"
-
 #include "chip/ads1256/internal.h"
 
 #include <assert.h>
@@ -8,9 +6,7 @@
 static void set_clock(struct ads1256 *a, int64_t hz, int64_t t_ns)
 {
     if (hz == a->clkin.hz) return;
-    const int64_t edge = clk_count_at(&a->clkin, t_ns);
-    const int64_t at_ns = clk_edge_ns(&a->clkin, edge);
-    a->clkin = (struct clk){.t0_ns = at_ns - clk_span_ns(hz, edge), .hz = hz, .div = 1};
+    a->clkin = chip_fault_clk(&a->clkin, hz, t_ns);
     ads1256_retime(a);
 }
 
@@ -21,13 +17,13 @@ static void tell_nobody(void *ctx, bool level, int64_t t_ns)
     (void)t_ns;
 }
 
-void ads1256_fault(struct ads1256 *a, const struct ads1256_fault *f, int64_t t_ns)
+void ads1256_fault(struct ads1256 *a, const struct chip_fault *f, int64_t t_ns)
 {
     assert(f->clock_ppm >= -500000 && f->clock_ppm <= 500000);
     const bool drdy = ads1256_drdy(a);
     a->fault = *f;
     a->io.drdy = f->drdy ? tell_nobody : a->tell_drdy;
-    set_clock(a, a->cfg.clkin_hz + (int64_t)a->cfg.clkin_hz * f->clock_ppm / 1000000, t_ns);
+    set_clock(a, chip_fault_hz(f, a->cfg.clkin_hz), t_ns);
     if (f->lost_sync) ads1256_sync_pin(a, true, t_ns); /* the wire is broken, a pull-up holds the pin */
     spi_load(&a->spi, ads1256_on_wire(a, a->spi.out));
     ads1256_pins_refresh(a, t_ns);

@@ -36,8 +36,7 @@ static inline bool ads1256_deaf(const struct ads1256 *a)
 /* What DOUT makes of a byte. */
 static inline uint8_t ads1256_on_wire(const struct ads1256 *a, uint8_t byte)
 {
-    if (!a->fault.dout) return byte;
-    return a->fault.dout == ADS1256_STUCK_HIGH ? 0xFF : 0x00;
+    return (uint8_t)chip_fault_word(a->fault.dout, byte, 0xFF);
 }
 
 static inline void ads1256_refuse(struct ads1256 *a, uint8_t opcode)

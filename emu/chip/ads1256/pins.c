@@ -13,7 +13,7 @@ static const struct {
 static void set_dout(struct ads1256 *a, bool driven, bool level, int64_t t_ns)
 {
     a->pins.driven = driven;
-    if (a->fault.dout) level = a->fault.dout == ADS1256_STUCK_HIGH;
+    if (a->fault.dout) level = a->fault.dout == CHIP_STUCK_HIGH;
     if (level == a->pins.dout) return;
     a->pins.dout = level;
     if (a->io.dout) a->io.dout(a->io.ctx, level, t_ns);

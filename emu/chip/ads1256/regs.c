@@ -193,7 +193,7 @@ void ads1256_cs_pin(struct ads1256 *a, bool level, int64_t t_ns)
 
 bool ads1256_drdy(const struct ads1256 *a)
 {
-    return a->fault.drdy ? a->fault.drdy == ADS1256_STUCK_HIGH : a->drdy;
+    return chip_fault_level(a->fault.drdy, a->drdy);
 }
 
 int64_t ads1256_settle_ns(const struct ads1256 *a)

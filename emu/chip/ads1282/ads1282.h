@@ -12,7 +12,6 @@
 #include "base/rng.h"
 #include "base/sched.h"
 #include "chip/ads1282/cfg.h"
-#include "chip/ads1282/fault.h"
 #include "chip/ads1282/state.h"
 
 #include <stdbool.h>
@@ -70,5 +69,14 @@ bool ads1282_running(const struct ads1282 *a); /* powered, not in reset nor STAN
 int64_t
 ads1282_settle_ns(const struct ads1282 *a); /* restart to first settled DRDY with the present CONFIG0; 0: none */
 int64_t ads1282_period_ns(const struct ads1282 *a); /* DRDY to DRDY with the present CONFIG0, rounded down; 0: none */
+
+/* ---- Faults ---- */
+
+/* From t_ns on, in place of the faults that were; outlives resets and power. Not from inside a callback of the chip. */
+void ads1282_fault(struct ads1282 *a, const struct chip_fault *f, int64_t t_ns);
+
+/* Inverts bits of a register, as a particle or a bad supply does, read-only ones too; the chip acts on what it finds there
+ * as if it had been written. False: no such register. */
+bool ads1282_flip(struct ads1282 *a, unsigned reg, uint8_t mask, int64_t t_ns);
 
 #endif

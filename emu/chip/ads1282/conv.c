@@ -312,7 +312,7 @@ void ads1282_retime(struct ads1282 *a)
 
 bool ads1282_drdy(const struct ads1282 *a)
 {
-    return a->fault.drdy ? a->fault.drdy == ADS1282_STUCK_HIGH : a->drdy;
+    return chip_fault_level(a->fault.drdy, a->drdy);
 }
 
 bool ads1282_running(const struct ads1282 *a)

@@ -1,5 +1,3 @@
-#include "chip/ads1282/fault.h"
-
 #include "chip/ads1282/internal.h"
 
 #include <assert.h>
@@ -9,21 +7,19 @@
 static void set_clock(struct ads1282 *a, int64_t hz, int64_t t_ns)
 {
     if (hz == a->clk.hz) return;
-    const int64_t edge = clk_count_at(&a->clk, t_ns);
-    const int64_t at_ns = clk_edge_ns(&a->clk, edge);
     ads1282_sample_until(a, t_ns);
-    a->clk = (struct clk){.t0_ns = at_ns - clk_span_ns(hz, edge), .hz = hz, .div = 1};
+    a->clk = chip_fault_clk(&a->clk, hz, t_ns);
     ads1282_serial_times(a);
     ads1282_retime(a);
 }
 
-void ads1282_fault(struct ads1282 *a, const struct ads1282_fault *f, int64_t t_ns)
+void ads1282_fault(struct ads1282 *a, const struct chip_fault *f, int64_t t_ns)
 {
     assert(f->clock_ppm >= -500000 && f->clock_ppm <= 500000);
     const bool drdy = ads1282_drdy(a);
     a->fault = *f;
     a->io.drdy = f->drdy ? NULL : a->tell_drdy;
-    set_clock(a, a->cfg.clk_hz + (int64_t)a->cfg.clk_hz * f->clock_ppm / 1000000, t_ns);
+    set_clock(a, chip_fault_hz(f, a->cfg.clk_hz), t_ns);
     ads1282_serial_stuck(a);
     if (ads1282_drdy(a) != drdy && a->tell_drdy) a->tell_drdy(a->io.ctx, !drdy, t_ns);
 }

@@ -78,6 +78,6 @@ void ads1282_din_pin(struct ads1282 *a, bool level, int64_t t_ns)
 /* Without power and in reset the shift register holds zeros. */
 bool ads1282_dout(const struct ads1282 *a)
 {
-    if (a->fault.dout) return a->fault.dout == ADS1282_STUCK_HIGH;
+    if (a->fault.dout) return a->fault.dout == CHIP_STUCK_HIGH;
     return a->pin.sclk ? a->pin.dout_held : spi_miso(&a->spi);
 }

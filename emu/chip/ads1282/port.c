@@ -17,8 +17,7 @@ static uint8_t out_byte(const struct ads1282 *a)
 /* What DOUT makes of a byte. */
 static uint8_t on_wire(const struct ads1282 *a, uint8_t byte)
 {
-    if (!a->fault.dout) return byte;
-    return a->fault.dout == ADS1282_STUCK_HIGH ? 0xFF : 0x00;
+    return (uint8_t)chip_fault_word(a->fault.dout, byte, 0xFF);
 }
 
 void ads1282_serial_stuck(struct ads1282 *a)

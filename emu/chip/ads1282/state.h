@@ -2,6 +2,7 @@
 #ifndef PSABENCH_CHIP_ADS1282_STATE_H
 #define PSABENCH_CHIP_ADS1282_STATE_H
 
+#include "base/chip_fault.h"
 #include "base/clk.h"
 #include "base/reg.h"
 #include "base/rng.h"
@@ -10,7 +11,6 @@
 #include "chip/ads1282/cal.h"
 #include "chip/ads1282/cfg.h"
 #include "chip/ads1282/cic.h"
-#include "chip/ads1282/fault.h"
 #include "chip/ads1282/filter.h"
 #include "chip/ads1282/hpf.h"
 #include "chip/ads1282/mod.h"
@@ -44,7 +44,7 @@ struct ads1282_timing {
 struct ads1282 {
     struct ads1282_cfg cfg;
     struct ads1282_io io;
-    struct ads1282_fault fault;
+    struct chip_fault fault;
     void (*tell_drdy)(void *ctx, bool level, int64_t t_ns); /* io.drdy, which is NULL while DRDY is stuck */
     struct sched *sched;
     struct ads1282_counters count;

@@ -199,15 +199,15 @@ static void the_least_that_is_seen_is_accepted(void **state)
 static void faults_reach_the_part_that_they_are_for(void **state)
 {
     (void)state;
-    const struct board_chip_fault *a = &r.board.chip[FAKE_CONV_A - 1].fault, *b = &r.board.chip[FAKE_CONV_B - 1].fault;
+    const struct chip_fault *a = &r.board.chip[FAKE_CONV_A - 1].fault, *b = &r.board.chip[FAKE_CONV_B - 1].fault;
     assert_says(ADD("'kind':'chip.dout_dead','point':'f.conv.a','level':'high','for_s':0.1"), "'id':1");
     assert_says(ADD("'kind':'chip.clock','point':'f.conv.a','clock_ppm':-40"), "'id':2");
     assert_says(ADD("'kind':'chip.clock','point':'f.conv.a','clock_ppm':25,'for_s':0.2"), "'id':3");
     assert_says(ADD("'kind':'chip.dout_dead','point':'f.conv.b','level':'low'"), "'id':4");
-    assert_true(a->dout_stuck && a->dout_level && a->clock_ppm == -15 && !a->drdy_stuck && !a->lost_sync);
-    assert_true(b->dout_stuck && !b->dout_level && b->clock_ppm == 0);
+    assert_true(a->dout == CHIP_STUCK_HIGH && a->clock_ppm == -15 && !a->drdy && !a->lost_sync);
+    assert_true(b->dout == CHIP_STUCK_LOW && b->clock_ppm == 0);
     sched_run_until(&r.s, 150000000);
-    assert_true(!a->dout_stuck && a->clock_ppm == -15);
+    assert_true(!a->dout && a->clock_ppm == -15);
     sched_run_until(&r.s, 250000000);
     assert_int_equal(a->clock_ppm, -40);
     assert_says(ADD("'kind':'chip.flip','point':'f.conv.a','register':2,'mask':5"), "'id':5");
@@ -216,7 +216,7 @@ static void faults_reach_the_part_that_they_are_for(void **state)
     assert_int_equal(r.board.wrongs, BOARD_WRONG_FROZEN_WORDS);
     assert_says("{'cmd':'fault.clear'}", "'cleared':6");
     assert_int_equal(r.board.wrongs, 0);
-    assert_true(!b->dout_stuck && a->clock_ppm == 0);
+    assert_true(!b->dout && a->clock_ppm == 0);
     r.board.on = false;
     assert_says(ADD("'kind':'chip.flip','point':'f.conv.a','register':0,'mask':1"), "'id':7");
     assert_int_equal(fault_find(&r.engine, 7)->state, FAULT_VOID);

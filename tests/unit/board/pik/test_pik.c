@@ -341,12 +341,12 @@ static void stuck_outputs_are_not_counted(void **state)
     for (unsigned i = 0; i < PIK_AXES; i++) r.input[i].v = 5.0;
     rig_run_until(&r, NS_PER_S + 1);
     const int32_t at = r.reading[r.readings - 1].total[1];
-    pik_stick(&r.b, 1, &(struct board_chip_fault){.dout_stuck = true}, r.s.now_ns);
+    pik_stick(&r.b, 1, &(struct chip_fault){.dout = CHIP_STUCK_LOW}, r.s.now_ns);
     rig_run_until(&r, 2 * NS_PER_S + 1);
     assert_in_range(r.reading[r.readings - 1].total[1], at, at + 1);
     assert_int_equal(r.reading[r.readings - 1].increment[1], 0);
     assert_in_range(r.reading[r.readings - 1].total[0], 1739, 1741);
-    pik_stick(&r.b, 1, &(struct board_chip_fault){.dout_stuck = false}, r.s.now_ns);
+    pik_stick(&r.b, 1, &(struct chip_fault){.dout = CHIP_FREE}, r.s.now_ns);
     rig_run_until(&r, 3 * NS_PER_S + 1);
     assert_in_range(r.reading[r.readings - 1].total[1], at + 869, at + 872);
 }

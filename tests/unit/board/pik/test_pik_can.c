@@ -270,9 +270,9 @@ static void faults_of_parts(void **state)
     rig_up(&r, NULL, NULL);
     assert_int_equal(pik_board.part_count, COUNT(names));
     for (unsigned i = 0; i < COUNT(names); i++) assert_string_equal(pik_board.parts[i].name, names[i]);
-    pik_board.parts[3].fault(&r.b, 3, &(struct board_chip_fault){.dout_stuck = true}, r.s.now_ns);
+    pik_board.parts[3].fault(&r.b, 3, &(struct chip_fault){.dout = CHIP_STUCK_LOW}, r.s.now_ns);
     assert_true(r.b.channel[2].stuck && !r.b.channel[0].stuck && !r.b.channel[1].stuck);
-    pik_board.parts[4].fault(&r.b, 4, &(struct board_chip_fault){.clock_ppm = 77}, r.s.now_ns);
+    pik_board.parts[4].fault(&r.b, 4, &(struct chip_fault){.clock_ppm = 77}, r.s.now_ns);
     assert_int_equal(r.b.clock_fault_ppm, 77);
     assert_true(pik_board.parts[1].flip(&r.b, 1, 0, 4, r.s.now_ns));
     r.v[0] = r.v[1] = 10.0;

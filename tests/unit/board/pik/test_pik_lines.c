@@ -171,7 +171,7 @@ static void a_stuck_output_shows_on_its_lines(void **state)
     pik_power_up(&r.b, 0);
     r.input[0].v = r.input[1].v = 5.0;
     rig_run_until(&r, 10000000);
-    pik_stick(&r.b, 1, &(struct board_chip_fault){.dout_stuck = true, .dout_level = true}, r.s.now_ns);
+    pik_stick(&r.b, 1, &(struct chip_fault){.dout = CHIP_STUCK_HIGH}, r.s.now_ns);
     rig_run_until(&r, 11000000);
     r.edges = 0;
     rig_run_until(&r, 20000000);
@@ -179,7 +179,7 @@ static void a_stuck_output_shows_on_its_lines(void **state)
     assert_int_equal(edge_of(0, PIK_LINE_FYN, false), r.edges);
     assert_true(r.b.trace.level >> PIK_LINE_FYP & 1);
     assert_true(edge_of(0, PIK_LINE_FXP, true) < r.edges);
-    pik_stick(&r.b, 1, &(struct board_chip_fault){.dout_stuck = false}, r.s.now_ns);
+    pik_stick(&r.b, 1, &(struct chip_fault){.dout = CHIP_FREE}, r.s.now_ns);
     rig_run_until(&r, 30000000);
     assert_true(edge_of(0, PIK_LINE_FYN, false) < r.edges);
     assert_true(rises_of(PIK_LINE_FYP, 20000000, 29000000) > 80);

@@ -125,11 +125,12 @@ static void data_of_the_converter_that_stick(void **state)
     const struct board_part *adc = part("adc", &number);
     assert_int_equal(adc->faults, BOARD_FAULT_DOUT);
     for (int level = 0; level <= 1; level++) {
-        adc->fault(&rig.b, number, &(struct board_chip_fault){.dout_stuck = true, .dout_level = level}, rig.s.now_ns);
+        adc->fault(&rig.b, number, &(struct chip_fault){.dout = level ? CHIP_STUCK_HIGH : CHIP_STUCK_LOW},
+                   rig.s.now_ns);
         rig_readings(&rig, 20 + 10 * (unsigned)level);
         for (unsigned i = 0; i < 4; i++) assert_int_equal(rig.reading[rig.readings - 1].code[i], -level);
     }
-    adc->fault(&rig.b, number, &(struct board_chip_fault){.dout_stuck = false}, rig.s.now_ns);
+    adc->fault(&rig.b, number, &(struct chip_fault){.dout = CHIP_FREE}, rig.s.now_ns);
     rig_readings(&rig, 40);
     assert_true(rig.reading[39].code[1] != -1 && rig.reading[39].code[1] != 0);
 }

@@ -171,7 +171,7 @@ static void dr_of_three(void **state)
         rig_up(&rig, &p);
         rig_run(&rig, 20 * 972800);
         assert_in_range(rig.cycles, 19, 22);
-        const struct ad7712_fault slow = {.clock_ppm = -100000};
+        const struct chip_fault slow = {.clock_ppm = -100000};
         ad7712_fault(&rig.b.adc[rows[i].slow], &slow, rig.s.now_ns);
         const unsigned before = rig.cycles;
         rig_run(&rig, 90 * 972800);
@@ -213,7 +213,7 @@ static void dr_that_never_comes_is_told(void **state)
     const struct psd1_profile p = rig_exact();
     rig_up(&rig, &p);
     rig_run(&rig, 10000000);
-    const struct ad7712_fault stuck = {.drdy = AD7712_STUCK_HIGH}, none = {.drdy = AD7712_FREE};
+    const struct chip_fault stuck = {.drdy = CHIP_STUCK_HIGH}, none = {.drdy = CHIP_FREE};
     ad7712_fault(&rig.b.adc[0], &stuck, rig.s.now_ns);
     rig_run(&rig, 100000000);
     assert_int_equal(rig.faults, 0); /* 100 ms and the settling time */

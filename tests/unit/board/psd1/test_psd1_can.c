@@ -247,7 +247,7 @@ static void silence_is_an_emergency(void **state)
     rig.b.host.ctx = wire.stream.ctx;
     rig.b.host.cycle = wire.stream.cycle;
     operational();
-    ad7712_fault(&rig.b.adc[0], &(struct ad7712_fault){.drdy = AD7712_STUCK_HIGH}, rig.s.now_ns);
+    ad7712_fault(&rig.b.adc[0], &(struct chip_fault){.drdy = CHIP_STUCK_HIGH}, rig.s.now_ns);
     rig_run(&rig, 5000000);
     wire.count = 0;
     rig_run(&rig, 120000000);
@@ -255,7 +255,7 @@ static void silence_is_an_emergency(void **state)
     assert_int_equal(wire.seen[0].id, 0x086);
     assert_int_equal(wire.seen[0].data[0] | wire.seen[0].data[1] << 8, 0xFF01);
     wire.count = 0;
-    ad7712_fault(&rig.b.adc[0], &(struct ad7712_fault){.drdy = AD7712_FREE}, rig.s.now_ns);
+    ad7712_fault(&rig.b.adc[0], &(struct chip_fault){.drdy = CHIP_FREE}, rig.s.now_ns);
     rig_run(&rig, 3000000);
     assert_int_equal(wire.seen[0].id, 0x086);
     assert_int_equal(wire.seen[0].data[0] | wire.seen[0].data[1] << 8, 0);
@@ -307,7 +307,7 @@ static void every_part_and_counter_has_its_place(void **state)
                 assert_int_equal(v, rig.b.adc[i - 1].n.conversions);
         }
     }
-    const struct board_chip_fault fault = {.dout_stuck = true, .dout_level = true};
+    const struct chip_fault fault = {.dout = CHIP_STUCK_HIGH};
     psd1_board.parts[2].fault(&rig.b, 2, &fault, rig.s.now_ns);
     rig_run(&rig, 3000000);
     assert_int_equal(rig.b.latest.word[1], 0xFFFF);

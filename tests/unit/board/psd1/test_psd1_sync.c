@@ -7,7 +7,7 @@ enum { PERIOD_NS = 972800 };
 
 static void clock_of_x(int32_t ppm)
 {
-    ad7712_fault(&rig.b.adc[0], &(struct ad7712_fault){.clock_ppm = ppm}, rig.s.now_ns);
+    ad7712_fault(&rig.b.adc[0], &(struct chip_fault){.clock_ppm = ppm}, rig.s.now_ns);
 }
 
 static unsigned mixed_in(unsigned from)

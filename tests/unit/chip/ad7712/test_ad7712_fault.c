@@ -11,7 +11,7 @@ static void up(struct rig *r)
     await_fall(r);
 }
 
-static void fault(struct rig *r, struct ad7712_fault f)
+static void fault(struct rig *r, struct chip_fault f)
 {
     ad7712_fault(&r->a, &f, r->s.now_ns);
 }
@@ -24,7 +24,7 @@ static void a_stuck_drdy(void **state)
         struct rig r;
         up(&r);
         const unsigned n = r.drdy.n;
-        fault(&r, (struct ad7712_fault){.drdy = high ? AD7712_STUCK_HIGH : AD7712_STUCK_LOW});
+        fault(&r, (struct chip_fault){.drdy = high ? CHIP_STUCK_HIGH : CHIP_STUCK_LOW});
         assert_int_equal(ad7712_drdy(&r.a), high);
         assert_int_equal(r.drdy.n, n + high);
         const uint32_t conversions = r.a.n.conversions;
@@ -33,7 +33,7 @@ static void a_stuck_drdy(void **state)
         assert_int_equal(r.drdy.n, n + high);
         assert_int_equal(ad7712_drdy(&r.a), high);
         assert_int_equal(read_frame(&r, true, 24), r.a.word);
-        fault(&r, (struct ad7712_fault){0});
+        fault(&r, (struct chip_fault){0});
         assert_true(ad7712_drdy(&r.a));
         assert_int_equal(r.drdy.n, n + 1);
         await_fall(&r);
@@ -46,7 +46,7 @@ static void a_dead_sdata(void **state)
     for (unsigned high = 0; high < 2; high++) {
         struct rig r;
         up(&r);
-        fault(&r, (struct ad7712_fault){.sdata = high ? AD7712_STUCK_HIGH : AD7712_STUCK_LOW});
+        fault(&r, (struct chip_fault){.dout = high ? CHIP_STUCK_HIGH : CHIP_STUCK_LOW});
         assert_int_equal(read_frame(&r, true, 24), high ? 0xFFFFFF : 0);
         assert_true(ad7712_drdy(&r.a));               /* the chip knows nothing of it */
         assert_false(ad7712_sdata(&r.a, r.s.now_ns)); /* not ours in high impedance */
@@ -57,7 +57,7 @@ static void a_dead_sdata(void **state)
         wait_ns(&r, 400);
         assert_int_equal(ad7712_sdata(&r.a, r.s.now_ns), high);
         const unsigned n = r.sdata.n;
-        fault(&r, (struct ad7712_fault){0});
+        fault(&r, (struct chip_fault){0});
         assert_int_equal(r.sdata.n, n + high); /* bit 23 of the control word is 0 */
         assert_false(ad7712_sdata(&r.a, r.s.now_ns));
     }
@@ -68,7 +68,7 @@ static void a_lost_sync(void **state)
     (void)state;
     struct rig r;
     up(&r);
-    fault(&r, (struct ad7712_fault){.lost_sync = true});
+    fault(&r, (struct chip_fault){.lost_sync = true});
     const uint32_t restarts = r.a.n.restarts;
     ad7712_sync_pin(&r.a, false, r.s.now_ns);
     await_fall(&r);
@@ -77,10 +77,10 @@ static void a_lost_sync(void **state)
     ad7712_sync_pin(&r.a, false, r.s.now_ns);
     await_fall(&r);
     const unsigned n = r.drdy.n;
-    fault(&r, (struct ad7712_fault){0}); /* the wire is whole again, and low: DRDY goes high, told once */
+    fault(&r, (struct chip_fault){0}); /* the wire is whole again, and low: DRDY goes high, told once */
     assert_int_equal(r.a.state, AD7712_SYNC_LOW);
     assert_int_equal(r.drdy.n, n + 1);
-    fault(&r, (struct ad7712_fault){.lost_sync = true});
+    fault(&r, (struct chip_fault){.lost_sync = true});
     await_fall(&r);
 }
 
@@ -95,7 +95,7 @@ static void a_clock_that_is_off(void **state)
         const int64_t fall_ns = r.s.now_ns;
         wait_ns(&r, 200000); /* 2000 of 9728 tau have gone by; looks at 1216, 3648 ... */
         r.looks = 0;
-        fault(&r, (struct ad7712_fault){.clock_ppm = rows[i]});
+        fault(&r, (struct chip_fault){.clock_ppm = rows[i]});
         const double tau_ns = 1e9 / (1e7 + 10.0 * rows[i]);
         near((double)await_fall(&r), (double)fall_ns + 200000 + 7728 * tau_ns, 2.0);
         assert_int_equal(r.look_ns[0], fall_ns + 121600);
@@ -104,7 +104,7 @@ static void a_clock_that_is_off(void **state)
         near((double)r.drdy.e[r.drdy.n - 2].t_ns, (double)r.s.now_ns - 500 * tau_ns, 2.0);
         near((double)await_fall(&r), next_ns, 2.0);
         near(r.a.word, 8388608 * 1.28, 2);
-        fault(&r, (struct ad7712_fault){0});
+        fault(&r, (struct chip_fault){0});
         const int64_t back_ns = r.s.now_ns;
         near((double)await_fall(&r), (double)back_ns + 972800, 400.0);
         near((double)ad7712_period_ns(&r.a), 972800, 0);
@@ -144,7 +144,7 @@ static void faults_outlive_power(void **state)
     (void)state;
     struct rig r;
     up(&r);
-    fault(&r, (struct ad7712_fault){.drdy = AD7712_STUCK_HIGH, .clock_ppm = 1000});
+    fault(&r, (struct chip_fault){.drdy = CHIP_STUCK_HIGH, .clock_ppm = 1000});
     ad7712_power_off(&r.a, r.s.now_ns);
     ad7712_power_up(&r.a, r.s.now_ns);
     const unsigned n = r.drdy.n;

@@ -120,9 +120,9 @@ static void words_are_the_edges(void **state)
         power_up_seeded(&p, &cfg, s);
         power_up_seeded(&w, &cfg, s);
         p.v[0] = w.v[0] = 0.7;
-        const struct ad7712_fault fault = {.sdata = s % 10 == 9   ? AD7712_STUCK_HIGH
-                                                    : s % 10 == 8 ? AD7712_STUCK_LOW
-                                                                  : AD7712_FREE};
+        const struct chip_fault fault = {.dout = s % 10 == 9   ? CHIP_STUCK_HIGH
+                                                 : s % 10 == 8 ? CHIP_STUCK_LOW
+                                                               : CHIP_FREE};
         ad7712_fault(&p.a, &fault, 0);
         ad7712_fault(&w.a, &fault, 0);
         for (unsigned i = 0; i < 300; i++) {

@@ -5,7 +5,7 @@ static struct rig rig;
 
 enum { RATE_100 = 0x82, PERIOD_100_NS = 10000000 };
 
-static void set(struct rig *r, struct ads1256_fault f)
+static void set(struct rig *r, struct chip_fault f)
 {
     ads1256_fault(&r->a, &f, r->s.now_ns);
 }
@@ -26,7 +26,7 @@ static void a_stuck_drdy_moves_to_its_level_and_stays_there(void **state)
     (void)state;
     struct rig *r = up();
     const unsigned edges = r->edges;
-    set(r, (struct ads1256_fault){.drdy = ADS1256_STUCK_HIGH});
+    set(r, (struct chip_fault){.drdy = CHIP_STUCK_HIGH});
     assert_int_equal(r->edges, edges + 1);
     assert_true(r->edge[edges].level);
     assert_true(ads1256_drdy(&r->a));
@@ -35,12 +35,12 @@ static void a_stuck_drdy_moves_to_its_level_and_stays_there(void **state)
     assert_int_equal(r->edges, edges + 1);
     assert_int_equal(r->a.n.conversions, conversions + 5);
     assert_int_equal(rreg(r, ADS1256_STATUS) & ADS1256_STATUS_DRDY, 0); /* the register bit is not the pin */
-    set(r, (struct ads1256_fault){.drdy = ADS1256_STUCK_LOW});
+    set(r, (struct chip_fault){.drdy = CHIP_STUCK_LOW});
     assert_int_equal(r->edges, edges + 2);
     wait_ns(r, 5 * PERIOD_100_NS);
     assert_int_equal(r->edges, edges + 2);
     assert_false(ads1256_drdy(&r->a));
-    set(r, (struct ads1256_fault){.drdy = ADS1256_FREE});
+    set(r, (struct chip_fault){.drdy = CHIP_FREE});
     await_fall(r);
     assert_int_equal(r->edges, edges + 4);
 }
@@ -49,18 +49,18 @@ static void a_dead_dout_reads_as_its_level_by_bytes_and_pins(void **state)
 {
     (void)state;
     struct rig *r = up();
-    set(r, (struct ads1256_fault){.dout = ADS1256_STUCK_HIGH});
+    set(r, (struct chip_fault){.dout = CHIP_STUCK_HIGH});
     assert_int_equal(rdata(r), -1);
     assert_int_equal(rreg(r, ADS1256_DRATE), 0xFF);
     assert_true(ads1256_dout(&r->a)); /* with CS high, too */
     ads1256_cs_pin(&r->a, true, r->s.now_ns);
     assert_true(ads1256_dout(&r->a));
     ads1256_cs_pin(&r->a, false, r->s.now_ns);
-    set(r, (struct ads1256_fault){.dout = ADS1256_STUCK_LOW});
+    set(r, (struct chip_fault){.dout = CHIP_STUCK_LOW});
     assert_false(ads1256_dout(&r->a));
     assert_int_equal(rdata(r), 0);
     assert_int_equal(rreg(r, ADS1256_DRATE), 0x00);
-    set(r, (struct ads1256_fault){.dout = ADS1256_FREE});
+    set(r, (struct chip_fault){.dout = CHIP_FREE});
     assert_int_equal(rreg(r, ADS1256_DRATE), RATE_100);
     wait_ns(r, PERIOD_100_NS);
     near(rdata(r) / 8388608.0, 0.2, 1e-4); /* 1 V of 5 V */
@@ -70,7 +70,7 @@ static void sync_is_not_heard(void **state)
 {
     (void)state;
     struct rig *r = up();
-    set(r, (struct ads1256_fault){.lost_sync = true});
+    set(r, (struct chip_fault){.lost_sync = true});
     const uint32_t restarts = r->a.n.restarts, downs = r->a.n.power_downs;
     const unsigned edges = r->edges;
     ads1256_sync_pin(&r->a, false, r->s.now_ns);
@@ -84,7 +84,7 @@ static void sync_is_not_heard(void **state)
     ads1256_sync_pin(&r->a, false, r->s.now_ns);
     wait_ns(r, 30 * PERIOD_100_NS); /* long enough for power-down */
     assert_int_equal(r->a.n.power_downs, downs);
-    set(r, (struct ads1256_fault){.lost_sync = false});
+    set(r, (struct chip_fault){.lost_sync = false});
     ads1256_sync_pin(&r->a, true, r->s.now_ns);
     ads1256_sync_pin(&r->a, false, r->s.now_ns);
     wait_ns(r, 2000);
@@ -99,7 +99,7 @@ static void a_wire_that_breaks_in_a_pulse_ends_it(void **state)
     struct rig *r = up();
     ads1256_sync_pin(&r->a, false, r->s.now_ns);
     wait_ns(r, 2000);
-    set(r, (struct ads1256_fault){.lost_sync = true});
+    set(r, (struct chip_fault){.lost_sync = true});
     const int64_t at_ns = r->s.now_ns;
     near((double)(await_fall(r) - at_ns), (double)ads1256_settle_ns(&r->a), 200.0);
 }
@@ -118,7 +118,7 @@ static void a_slow_clock_stretches_what_comes(void **state)
     const int64_t first_ns = await_fall(r);
     wait_ns(r, PERIOD_100_NS / 2);
     const int64_t cell_ns = r->a.cell_ev.due_ns, pulse_ns = r->a.pulse_ev.due_ns;
-    set(r, (struct ads1256_fault){.clock_ppm = -1000});
+    set(r, (struct chip_fault){.clock_ppm = -1000});
     const double slow = 7680000.0 / (7680000 - 7680);
     assert_moved(r, &r->a.cell_ev, cell_ns, slow);
     assert_moved(r, &r->a.pulse_ev, pulse_ns, slow);
@@ -128,7 +128,7 @@ static void a_slow_clock_stretches_what_comes(void **state)
     for (int i = 0; i < 100; i++) last_ns = await_fall(r);
     near((double)(last_ns - second_ns), 100.0 * PERIOD_100_NS * slow, 2.0);
     near(rdata(r) / 8388608.0, 0.2, 1e-4);
-    set(r, (struct ads1256_fault){.clock_ppm = 0});
+    set(r, (struct chip_fault){.clock_ppm = 0});
     last_ns = await_fall(r);
     near((double)(await_fall(r) - last_ns), PERIOD_100_NS, 1.0);
 }
@@ -143,7 +143,7 @@ static void the_clock_may_change_in_a_calibration(void **state)
     const int64_t cal_ns = await_fall(r) - from_ns;
     xfer(r, 0xF0);
     const int64_t at_ns = r->s.now_ns, stored_ns = r->a.cal_ev.due_ns;
-    set(r, (struct ads1256_fault){.clock_ppm = -100000});
+    set(r, (struct chip_fault){.clock_ppm = -100000});
     assert_moved(r, &r->a.cal_ev, stored_ns, 1.0 / 0.9);
     near((double)(await_fall(r) - at_ns), (double)cal_ns / 0.9, 2000.0);
 }

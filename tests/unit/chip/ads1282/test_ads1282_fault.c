@@ -5,7 +5,7 @@ enum { PERIOD_NS = 1000000 };
 
 static struct rig rig;
 
-static void set(struct rig *r, struct ads1282_fault f)
+static void set(struct rig *r, struct chip_fault f)
 {
     ads1282_fault(&r->a, &f, r->s.now_ns);
 }
@@ -17,19 +17,19 @@ static void a_stuck_drdy_moves_to_its_level_and_stays_there(void **state)
     powered(r, &quiet);
     to_fall(r);
     const unsigned falls = r->falls, rises = r->rises;
-    set(r, (struct ads1282_fault){.drdy = ADS1282_STUCK_HIGH});
+    set(r, (struct chip_fault){.drdy = CHIP_STUCK_HIGH});
     assert_int_equal(r->rises, rises + 1);
     assert_true(ads1282_drdy(&r->a));
     sched_run_until(&r->s, r->s.now_ns + 10 * PERIOD_NS);
     assert_int_equal(r->falls, falls);
     const uint32_t conversions = r->a.count.conversions;
     assert_true(conversions >= 10); /* inside all goes on */
-    set(r, (struct ads1282_fault){.drdy = ADS1282_STUCK_LOW});
+    set(r, (struct chip_fault){.drdy = CHIP_STUCK_LOW});
     assert_int_equal(r->falls, falls + 1);
     sched_run_until(&r->s, r->s.now_ns + 10 * PERIOD_NS);
     assert_int_equal(r->falls, falls + 1);
     assert_int_equal(r->rises, rises + 1);
-    set(r, (struct ads1282_fault){.drdy = ADS1282_FREE});
+    set(r, (struct chip_fault){.drdy = CHIP_FREE});
     const int64_t fall_ns = to_fall(r);
     assert_true(fall_ns > 0);
     assert_int_equal((fall_ns - clk_edge_ns(&r->clk, T_DR_1000)) % PERIOD_NS, 0); /* on the old grid */
@@ -44,17 +44,17 @@ static void a_dead_dout_reads_as_its_level_by_bytes_bits_and_pins(void **state)
         r->bus = bus;
         r->v = 0.4;
         settled_word(r);
-        set(r, (struct ads1282_fault){.dout = ADS1282_STUCK_HIGH});
+        set(r, (struct chip_fault){.dout = CHIP_STUCK_HIGH});
         to_fall(r);
         hex_is(read_bytes(r, 4), 0xFFFFFFFF);
         to_fall(r);
         SEND(r, 0x11);
         hex_is(rreg(r, ADS1282_CONFIG0), 0xFF);
         SEND(r, 0x10);
-        set(r, (struct ads1282_fault){.dout = ADS1282_STUCK_LOW});
+        set(r, (struct chip_fault){.dout = CHIP_STUCK_LOW});
         to_fall(r);
         hex_is(read_bytes(r, 4), 0x00000000);
-        set(r, (struct ads1282_fault){.dout = ADS1282_FREE});
+        set(r, (struct chip_fault){.dout = CHIP_FREE});
         to_fall(r);
         near(fraction(read_bytes(r, 4)), 0.4 / 2.5, 1e-4);
     }
@@ -69,7 +69,7 @@ static void a_read_at_one_go_is_not_taken_while_dout_is_dead(void **state)
     to_fall(r);
     spi_first(&r->a.spi, r->s.now_ns + 1000);
     assert_true(ads1282_only_shifts(&r->a));
-    set(r, (struct ads1282_fault){.dout = ADS1282_STUCK_HIGH});
+    set(r, (struct chip_fault){.dout = CHIP_STUCK_HIGH});
     assert_false(ads1282_only_shifts(&r->a));
 }
 
@@ -82,7 +82,7 @@ static void dout_gets_stuck_in_the_middle_of_a_word(void **state)
     settled_word(r);
     to_fall(r);
     assert_int_not_equal(byte(r, 0), 0xFF);
-    set(r, (struct ads1282_fault){.dout = ADS1282_STUCK_HIGH});
+    set(r, (struct chip_fault){.dout = CHIP_STUCK_HIGH});
     hex_is(read_bytes(r, 3), 0xFFFFFF);
 }
 
@@ -92,7 +92,7 @@ static void sync_is_not_heard(void **state)
     struct rig *r = &rig;
     powered(r, &quiet);
     for (int i = 0; i < 3; i++) to_fall(r);
-    set(r, (struct ads1282_fault){.lost_sync = true});
+    set(r, (struct chip_fault){.lost_sync = true});
     const uint32_t restarts = r->a.count.restarts;
     ads1282_sync_pin(&r->a, true, r->s.now_ns);
     ads1282_sync_pin(&r->a, false, r->s.now_ns + 1000);
@@ -100,7 +100,7 @@ static void sync_is_not_heard(void **state)
     assert_int_equal(r->a.count.restarts, restarts);
     const int64_t before_ns = r->fall_ns;
     assert_int_equal(to_fall(r), before_ns + PERIOD_NS);
-    set(r, (struct ads1282_fault){.lost_sync = false});
+    set(r, (struct chip_fault){.lost_sync = false});
     ads1282_sync_pin(&r->a, true, r->s.now_ns);
     assert_int_equal(r->a.count.restarts, restarts + 1);
 }
@@ -114,7 +114,7 @@ static void a_slow_clock_stretches_what_comes_and_nothing_that_was(void **state)
     const int64_t first_ns = to_fall(r);
     const int64_t at_ns = first_ns + PERIOD_NS / 2;
     sched_run_until(&r->s, at_ns);
-    set(r, (struct ads1282_fault){.clock_ppm = -1000});
+    set(r, (struct chip_fault){.clock_ppm = -1000});
     assert_int_equal(r->a.clk.hz, 4091904);
     assert_in_range(at_ns - r->last_sample_ns, 0,
                     31249); /* the input up to now by the old clock, 32 samples a period */
@@ -130,7 +130,7 @@ static void a_slow_clock_stretches_what_comes_and_nothing_that_was(void **state)
     assert_int_equal(r->last_sample_ns <= last_ns, 1);
     r->v = 0.4;
     near(fraction(settled_word(r)), 0.4 / 2.5, 1e-4);
-    set(r, (struct ads1282_fault){.clock_ppm = 0});
+    set(r, (struct chip_fault){.clock_ppm = 0});
     const int64_t fast_ns = to_fall(r);
     assert_int_equal(ads1282_period_ns(&r->a), PERIOD_NS);
     near((double)(to_fall(r) - fast_ns), PERIOD_NS, 1.0);
@@ -143,7 +143,7 @@ static void a_fast_clock_keeps_its_rate_through_restarts_and_power(void **state)
     powered(r, &quiet);
     sched_run_until(&r->s, 500000);
     const int64_t due_ns = r->a.due.due_ns;
-    set(r, (struct ads1282_fault){.clock_ppm = 500000}); /* in data period 0 */
+    set(r, (struct chip_fault){.clock_ppm = 500000}); /* in data period 0 */
     near((double)(r->a.due.due_ns - r->s.now_ns), (double)(due_ns - r->s.now_ns) / 1.5, 300.0);
     const int64_t first_ns = to_fall(r);
     near((double)(first_ns - 500000), ((double)T_DR_1000 / 4.096e6 * 1e9 - 500000.0) / 1.5, 300.0);
@@ -172,9 +172,9 @@ static void each_chain_survives_a_change_of_its_clock(void **state)
             wreg(r, ADS1282_CONFIG0, config0[k]);
             r->v = 0.4;
             for (int i = 0; i < 70; i++) to_fall(r);
-            set(r, (struct ads1282_fault){.clock_ppm = -20000});
+            set(r, (struct chip_fault){.clock_ppm = -20000});
             for (int i = 0; i < 5; i++) assert_true(to_fall(r) > 0);
-            set(r, (struct ads1282_fault){.clock_ppm = 20000});
+            set(r, (struct chip_fault){.clock_ppm = 20000});
             for (int i = 0; i < 5; i++) assert_true(to_fall(r) > 0);
             assert_int_equal(r->a.count.torn_reads, 0);
         }
