@@ -183,7 +183,10 @@ def stepped(root: Path, folder: Path, scenario: str) -> tuple[str, int, bytes, P
 
 
 def restored(root: Path, folder: Path, snapshot: Path) -> tuple[str, bytes]:
-    bench = Bench(root, folder, "--restore", str(snapshot), "--can", f"log:{folder / 'bus'}")
+    try:
+        bench = Bench(root, folder, "--restore", str(snapshot), "--can", f"log:{folder / 'bus'}")
+    except RuntimeError as e:
+        return str(e), b""
     bench.run(0.5)
     again = folder / "again"
     bench.say("snapshot", path=str(again))
@@ -200,23 +203,13 @@ def names(root: Path, listing: str) -> set[str]:
     return set(rows)
 
 
-def verdicts(root: Path, folder: Path, board: str, profile: str) -> dict[str, Any]:
+def verdicts(root: Path, folder: Path, board: str, profile: str) -> dict[str, str]:
     """Verdict of each requirement; the suite's status does not matter here."""
     program = root / ".venv/bin/psabench"
     argv = [str(program), "conform", "device", "--board", board, "--profile", profile, "--out", str(folder)]
     subprocess.run(argv, capture_output=True, cwd=root, check=False)
-    return {row["id"]: row["verdict"] for row in requirements_in(json.loads((folder / "conform.json").read_text()))}
-
-
-def requirements_in(report: Any) -> Iterator[dict[str, Any]]:
-    """All objects of a report that have an id and a verdict, however deep."""
-    if isinstance(report, dict):
-        if "id" in report and "verdict" in report:
-            yield report
-        report = list(report.values())
-    if isinstance(report, list):
-        for item in report:
-            yield from requirements_in(item)
+    found: dict[str, str] = json.loads((folder / "conform.json").read_text())["requirements"]
+    return found
 
 
 def compare(old: Path, new: Path, only: str, with_conform: bool) -> Outcome:
@@ -251,7 +244,7 @@ def compare(old: Path, new: Path, only: str, with_conform: bool) -> Outcome:
     return outcome
 
 
-def diff(old: dict[str, Any], new: dict[str, Any]) -> list[str]:
+def diff(old: dict[str, str], new: dict[str, str]) -> list[str]:
     return [f"{i}: {old.get(i)} -> {new.get(i)}" for i in sorted(old | new) if old.get(i) != new.get(i)]
 
 
