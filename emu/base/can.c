@@ -1,17 +1,20 @@
 #include "base/can.h"
 
-#include "base/can_parts.h"
+#include "base/can_internal.h"
 #include "base/canbits.h"
 
 #include <assert.h>
 #include <string.h>
 
-static void step(void *ctx, int64_t t_ns);
+/* ISO 11898-1. Bits: error flags one after the other and delimiter; suspend transmission. */
+enum { ERROR_BITS = 12 + 8, SUSPEND_BITS = 8 };
+
+static void end_phase(void *ctx, int64_t t_ns);
 
 void can_bus_init(struct can_bus *b, const struct can_bus_cfg *cfg, struct sched *s)
 {
     *b = (struct can_bus){.cfg = *cfg, .sched = s, .phase = CAN_IDLE};
-    sched_ev(&b->step, step, b);
+    sched_ev(&b->step, end_phase, b);
 }
 
 void can_attach(struct can_bus *b, struct can_node *n)
@@ -19,7 +22,7 @@ void can_attach(struct can_bus *b, struct can_node *n)
     n->queued = 0;
     n->silent = false;
     n->tec = n->rec = 0;
-    n->now = CAN_ACTIVE;
+    n->error_state = CAN_STATE_ERROR_ACTIVE;
     n->bus = b;
     n->next = NULL;
     struct can_node **at = &b->nodes;
@@ -31,7 +34,8 @@ void can_detach(struct can_bus *b, struct can_node *n)
 {
     if (b->next_rx == n) b->next_rx = n->next;
     if (b->sender == n) b->sender = NULL;
-    if (b->odd) can_odd_detach(b, n);
+    if (b->degraded) can_error_detach(b, n);
+    if (b->tap) b->tap->detach(b, n);
     for (struct can_node **at = &b->nodes; *at; at = &(*at)->next) {
         if (*at != n) continue;
         *at = n->next;
@@ -40,6 +44,12 @@ void can_detach(struct can_bus *b, struct can_node *n)
     n->next = NULL;
     n->bus = NULL;
     n->queued = 0;
+}
+
+void can_unplug(struct can_bus *b, struct can_node *n, int64_t t_ns)
+{
+    if (can_is_sending(b, n)) can_interrupt_frame(b, t_ns);
+    can_detach(b, n);
 }
 
 void can_replace(struct can_bus *b, struct can_node *n, struct can_node *by)
@@ -52,7 +62,8 @@ void can_replace(struct can_bus *b, struct can_node *n, struct can_node *by)
     }
     if (b->next_rx == n) b->next_rx = by;
     if (b->sender == n) b->sender = by;
-    if (b->odd) can_odd_replace(b, n, by);
+    if (b->degraded) can_error_replace(b, n, by);
+    if (b->tap) b->tap->replace(b, n, by);
     n->next = NULL;
     n->queued = 0;
 }
@@ -137,11 +148,12 @@ static bool goes_before(const struct can_bus *b, const struct can_waiting *x, co
     return x_id != y_id ? x_id < y_id : x->number < y->number;
 }
 
-struct can_node *can_winner(const struct can_bus *b, unsigned *slot)
+/* Of an arbitration now, among all nodes but those of one controller, or NULL. */
+static struct can_node *winner(const struct can_bus *b, const struct can_node *without, unsigned *slot)
 {
     struct can_node *best = NULL;
     for (struct can_node *n = b->nodes; n; n = n->next) {
-        if (n->queued == 0 || n->silent) continue;
+        if (n->queued == 0 || n->silent || (without && can_shares(n, without))) continue;
         const unsigned i = b->cfg.bitrate_hz ? offered(n) : 0;
         if (best && !goes_before(b, &n->queue[i], &best->queue[*slot])) continue;
         best = n;
@@ -150,23 +162,46 @@ struct can_node *can_winner(const struct can_bus *b, unsigned *slot)
     return best;
 }
 
+/* An error-passive sender gives way: true when the bus waits for the end of its suspension. */
+static bool suspend_tx(struct can_bus *b, struct can_node **n, unsigned *slot, int64_t t_ns)
+{
+    const struct can_node *suspended = can_suspended(b, *n);
+    if (!suspended) return false;
+    *n = winner(b, suspended, slot);
+    if (*n) return false;
+    b->phase = CAN_ARBITRATION;
+    sched_at(b->sched, &b->step, t_ns + can_nominal_ns(b, SUSPEND_BITS));
+    return true;
+}
+
+/* The frame on the wire begins: true when an error will destroy it; it stays first in its queue. */
+static bool start_degraded(struct can_bus *b, const struct can_waiting *w, int64_t t_ns)
+{
+    b->repeat = w->repeat;
+    can_error_frame_start(b, t_ns);
+    const int64_t error_ns = b->tap && b->cfg.bitrate_hz ? b->tap->error_after_ns(b) : -1;
+    if (error_ns < 0) return false;
+    can_start_error_frame(b, t_ns + error_ns + can_nominal_ns(b, ERROR_BITS));
+    return true;
+}
+
 static void arbitrate(struct can_bus *b, int64_t t_ns)
 {
     unsigned slot = 0;
-    struct can_node *n = can_winner(b, &slot);
-    if (b->odd && can_odd_wait(b, &n, &slot, t_ns)) return;
+    struct can_node *n = winner(b, NULL, &slot);
+    if (b->degraded && suspend_tx(b, &n, &slot, t_ns)) return;
     b->phase = n ? CAN_FRAME : CAN_IDLE;
     if (!n) return;
     b->sender = n;
     b->wire = n->queue[slot].m;
     b->start_ns = t_ns;
-    if (b->odd && can_odd_start(b, slot, t_ns)) return;
+    if (b->degraded && start_degraded(b, &n->queue[slot], t_ns)) return;
     n->queued--;
     memmove(&n->queue[slot], &n->queue[slot + 1], (n->queued - slot) * sizeof n->queue[0]);
     sched_at(b->sched, &b->step, t_ns + can_frame_ns(&b->cfg, &b->wire) - ifs_ns(&b->cfg));
 }
 
-void can_give(struct can_node *n, const struct can_msg *m, int64_t t_ns)
+void can_deliver(struct can_node *n, const struct can_msg *m, int64_t t_ns)
 {
     if (m->flags & CAN_FD && !n->fd) {
         n->fd_refused++;
@@ -176,36 +211,50 @@ void can_give(struct can_node *n, const struct can_msg *m, int64_t t_ns)
     if (n->rx) n->rx(n->ctx, m, t_ns);
 }
 
-void can_start_ifs(struct can_bus *b, int64_t t_ns)
+/* A callback may attach and detach nodes, its own included: the cursor lives in the bus, where can_detach() sees it. */
+void can_deliver_all(struct can_bus *b, const struct can_msg *m, const struct can_node *sender, int64_t t_ns)
+{
+    b->next_rx = b->nodes;
+    while (b->next_rx) {
+        struct can_node *n = b->next_rx;
+        b->next_rx = n->next;
+        if (n != sender && !n->silent) can_deliver(n, m, t_ns);
+    }
+}
+
+static void start_ifs(struct can_bus *b, int64_t t_ns)
 {
     b->phase = CAN_IFS;
     sched_at(b->sched, &b->step, t_ns + ifs_ns(&b->cfg));
 }
 
-/* A callback may attach and detach nodes, its own included: the cursor lives in the bus, where can_detach() sees it. */
 static void end_of_frame(struct can_bus *b, int64_t t_ns)
 {
     struct can_node *sender = b->sender;
+    const bool degraded = b->degraded;
     b->frames++;
-    can_start_ifs(b, t_ns);
-    if (b->odd) {
-        can_odd_end(b, t_ns);
-        return;
-    }
-    if (sender) {
+    start_ifs(b, t_ns);
+    if (degraded) can_error_frame_passed(b, sender, t_ns);
+    if (sender && !b->repeat) {
         sender->tx_frames++;
         if (sender->sent) sender->sent(sender->ctx, &b->wire, t_ns);
     }
-    b->next_rx = b->nodes;
-    while (b->next_rx) {
-        struct can_node *n = b->next_rx;
-        b->next_rx = n->next;
-        if (n != sender) can_give(n, &b->wire, t_ns);
-    }
+    if (degraded && b->tap) b->tap->deliver(b, t_ns);
+    else can_deliver_all(b, &b->wire, b->sender, t_ns);
     b->sender = NULL;
+    if (degraded) can_update_degraded(b);
 }
 
-static void step(void *ctx, int64_t t_ns)
+static void end_of_error_frame(struct can_bus *b, int64_t t_ns)
+{
+    b->error_frames++;
+    start_ifs(b, t_ns);
+    can_error_frame_destroyed(b, t_ns);
+    b->sender = NULL;
+    can_update_degraded(b);
+}
+
+static void end_phase(void *ctx, int64_t t_ns)
 {
     struct can_bus *b = ctx;
     assert(b->phase != CAN_IDLE);
@@ -214,11 +263,11 @@ static void step(void *ctx, int64_t t_ns)
         return;
     }
     if (b->phase == CAN_ERROR_FRAME) {
-        can_odd_error(b, t_ns);
+        end_of_error_frame(b, t_ns);
         return;
     }
     if (b->phase == CAN_IFS) b->busy_ns += t_ns - b->start_ns;
-    if (b->odd && b->phase == CAN_IFS) can_odd_recessive(b, t_ns);
+    if (b->degraded && b->phase == CAN_IFS) can_error_recessive(b, t_ns);
     arbitrate(b, t_ns);
 }
 
@@ -226,14 +275,4 @@ int64_t can_busy_ns(const struct can_bus *b, int64_t t_ns)
 {
     const bool in_use = b->phase == CAN_FRAME || b->phase == CAN_ERROR_FRAME || b->phase == CAN_IFS;
     return b->busy_ns + (in_use ? t_ns - b->start_ns : 0);
-}
-
-uint32_t can_load_permille(struct can_bus *b, int64_t t_ns)
-{
-    const int64_t busy_ns = can_busy_ns(b, t_ns);
-    const int64_t span_ns = t_ns - b->load_mark_ns;
-    const int64_t used_ns = busy_ns - b->load_mark_busy_ns;
-    b->load_mark_ns = t_ns;
-    b->load_mark_busy_ns = busy_ns;
-    return span_ns > 0 ? (uint32_t)(used_ns * 1000 / span_ns) : 0;
 }

@@ -5,12 +5,12 @@
  * number of bits including stuffing (canbits.h), and at the end of frame every other node receives it; the interframe
  * space follows. Frames sent at one instant all take part in the arbitration of that instant. A bus whose bit rate is 0
  * is ideal: frames pass at once in the order of sending, yet each in its own event, so that a receiver that answers does
- * not recurse. Nodes are owned by their owners and linked in; nothing allocates. Errors come only as faults (can_fault.h);
- * a frame that nobody receives passes. */
+ * not recurse. Nodes are owned by their owners and linked in; nothing allocates. The wire itself has no errors: they are
+ * injected (can_fault.h) and confined by can_error.h; a frame without receivers passes. */
 #ifndef PSABENCH_BASE_CAN_H
 #define PSABENCH_BASE_CAN_H
 
-#include "base/can_fault.h"
+#include "base/can_error.h"
 #include "base/sched.h"
 
 #include <stdbool.h>
@@ -64,10 +64,10 @@ struct can_node {
     struct can_node *next;
     /* of the controller, where `of` is NULL */
     uint16_t tec, rec; /* error counters */
-    enum can_state now;
-    unsigned off_left;   /* times 11 recessive bits before it is back */
-    int64_t off_idle_ns; /* since when the bus is idle for it; -1: it is not */
-    struct sched_ev back;
+    enum can_state error_state;
+    unsigned recovery_left; /* bus-off: times 11 recessive bits before recovery */
+    int64_t idle_since_ns;  /* bus-off: start of the present idle time; -1: the bus is busy */
+    struct sched_ev recovery;
 };
 
 struct can_bus_cfg {
@@ -77,15 +77,18 @@ struct can_bus_cfg {
 
 enum can_phase { CAN_IDLE, CAN_ARBITRATION, CAN_FRAME, CAN_ERROR_FRAME, CAN_IFS };
 
-struct can_held {         /* a frame that a fault keeps back */
+#define CAN_HELD_MAX 64u /* frames that faults hold; more are lost and counted */
+
+struct can_fault;
+struct can_held {         /* a frame that a fault holds */
     struct can_fault *by; /* NULL: free */
     struct can_node *from, *to;
-    uint64_t number; /* order of keeping */
+    uint64_t number; /* order of holding */
     int64_t due_ns;
     struct can_msg m;
 };
 
-/* Read-only outside can.c. */
+/* Read-only outside can*.c. */
 struct can_bus {
     struct can_bus_cfg cfg;
     struct sched *sched;
@@ -95,17 +98,17 @@ struct can_bus {
     struct can_node *sender;  /* of the frame on the wire; NULL if it has left */
     struct can_node *next_rx; /* cursor of the delivery under way */
     struct can_msg wire;
-    bool repeat; /* of the frame on the wire */
-    bool odd;    /* faults, error counts or nodes off the bus are to be minded: can_fault.c */
+    bool repeat;               /* of the frame on the wire */
+    bool degraded;             /* faults, error counters above 0 or nodes in bus-off: can_error.c has work to do */
+    const struct can_tap *tap; /* fault injection (can_fault.c); NULL: none */
     struct can_fault *faults;
-    struct can_node *tired; /* error-passive sender of the last frame: waits 8 bits more */
+    struct can_node *suspended; /* error-passive controller that sent the last frame: suspends transmission */
     struct can_held held[CAN_HELD_MAX];
     uint64_t held_number;
     uint32_t error_frames;
     int64_t start_ns; /* start of the frame on the wire */
     int64_t busy_ns;  /* of finished frames with their interframe space, since power-on */
     uint64_t frames, number;
-    int64_t load_mark_ns, load_mark_busy_ns;
 };
 
 enum can_result { CAN_OK, CAN_FULL, CAN_NO_FD, CAN_BAD };
@@ -115,6 +118,9 @@ void can_bus_init(struct can_bus *b, const struct can_bus_cfg *cfg, struct sched
 /* The node's name, order, fd, rx, sent and ctx are filled in by the caller. */
 void can_attach(struct can_bus *b, struct can_node *n);
 void can_detach(struct can_bus *b, struct can_node *n); /* drops what it had queued; a frame on the wire is finished */
+
+/* The node loses its power: a frame that it sends breaks off, the others see an error frame; then can_detach(). */
+void can_unplug(struct can_bus *b, struct can_node *n, int64_t t_ns);
 
 /* `by` stands where n stood, with all that n was, its waiting frames and the one on the wire included; n is off the bus. */
 void can_replace(struct can_bus *b, struct can_node *n, struct can_node *by);
@@ -132,9 +138,6 @@ int64_t can_frame_ns(const struct can_bus_cfg *cfg, const struct can_msg *m);
 
 /* Time the wire was in use since power-on, interframe spaces included. */
 int64_t can_busy_ns(const struct can_bus *b, int64_t t_ns);
-
-/* Load in units of 0.1 % since the previous call. */
-uint32_t can_load_permille(struct can_bus *b, int64_t t_ns);
 
 /* Whether the frame has a legal length, identifier and combination of flags. */
 bool can_valid(const struct can_msg *m);

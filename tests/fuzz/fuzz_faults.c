@@ -4,6 +4,7 @@
 #include "fuzz.h"
 #include "listener.h"
 
+#include "base/can_fault.h"
 #include "board/psa2/can.h"
 
 #include <string.h>

@@ -1,5 +1,7 @@
 #include "link/can/can_hub.h"
 
+#include "base/can_fault.h"
+
 #include <stdio.h>
 #include <stdlib.h>
 

@@ -2,7 +2,7 @@
 #ifndef PSABENCH_TESTS_CAN_FAULT_RIG_H
 #define PSABENCH_TESTS_CAN_FAULT_RIG_H
 
-#include "base/can.h"
+#include "base/can_fault.h"
 
 #include "rig.h"
 

@@ -50,7 +50,7 @@ static void a_fault_picks_by_sender_receiver_and_identifier(void **state)
     assert_int_equal(count(r, 'B', 'r'), 2);
     assert_int_equal(entry(r, 'B', 'r', 1)->m.id, 0x40);
     can_fault_remove(&r->bus, &of_id, r->s.now_ns);
-    assert_false(r->bus.odd);
+    assert_false(r->bus.degraded);
 }
 
 static void a_fault_at_any_queue_is_one_at_its_controller(void **state)
@@ -259,7 +259,7 @@ static void a_node_that_leaves_takes_its_faults_along(void **state)
     assert_int_equal(late.held, 0);
     can_fault_remove(&r->bus, &late, r->s.now_ns);
     can_fault_remove(&r->bus, &drop, r->s.now_ns);
-    assert_false(r->bus.odd);
+    assert_false(r->bus.degraded);
 }
 
 int main(void)
