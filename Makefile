@@ -19,7 +19,7 @@ BUILD     ?= build$(if $(filter clang%,$(notdir $(CC))),-clang)$(if $(SAN),-san)
 FUZZ_S    ?= 20
 BENCH_S   ?= 180#                      seconds of measuring; 60 for a quick look
 JOBS      ?= $(shell nproc)#           tests at once
-SAN_E2E   := $(wildcard tests/e2e/test_bad_*.py) $(patsubst %,tests/e2e/test_%.py,unit tools canopen faults_random cycles)
+SAN_E2E   := $(wildcard $(addprefix tests/e2e/*/test_,$(addsuffix .py,bad_* unit tools canopen faults_random cycles)))
 # Build a part only, say DIRS='base chip' T=test_ads1282 while the rest does not compile.
 DIRS      ?= base trace phys chip canopen board unit link command fault control scpi scenario bench app api
 UNIT      := $(sort $(wildcard tests/unit/*/test_*.c tests/unit/*/*/test_*.c))
@@ -84,7 +84,7 @@ C_FILES   = $(sort $(shell find emu tests examples docs/examples -name '*.[ch]' 
 
 .SECONDARY:
 .DELETE_ON_ERROR:
-.PHONY: all lib setup run quick test test-all bench bench-bin mutants fault-matrix alarms check pytest san builds e2e e2e-san e2e-vcan e2e-slc0 uml soak fuzz fuzz-check fuzz-long fuzz-bin fuzz-each lint format golden docs prove install uninstall wheel clean help lock
+.PHONY: all lib setup run quick test test-all bench bench-bin mutants fault-matrix false-positives alarms check pytest san builds e2e e2e-san e2e-vcan e2e-slc0 uml soak fuzz fuzz-check fuzz-long fuzz-bin fuzz-each lint format golden docs prove install uninstall wheel clean help lock
 
 ## all: the emulator, build/psa-emu (make CC=clang and make SAN=address,undefined build beside it, in build-clang and build-san)
 all: $(if $(MAIN),$(BUILD)/psa-emu,$(LIB_OBJ)) lib
@@ -192,7 +192,7 @@ test-all:
 	@tools/setup test
 	@python3 tools/test_all.py all
 
-## bench: speed beside Verilog models of the same board (Icarus, Verilator) and against the targets, into docs/performance.md
+## bench: speed beside Verilog models of the same board (Icarus, Verilator) and against the targets, into docs/reference/performance.md
 bench:
 	@tools/setup bench
 	@$(MAKE) --no-print-directory bench-bin
@@ -200,17 +200,18 @@ bench:
 
 bench-bin: all $(BENCH_BIN)
 
-## mutants: does the conformance suite find what is wrong? docs/mutants.md (some: make mutants MUTANTS='pik- sdo-')
+## mutants: does the conformance suite find what is wrong? docs/reference/mutants.md (some: make mutants MUTANTS='pik- sdo-')
 mutants: | $(PY)
-	@PYTHONPATH=tools $(PY) -m mutants.run $(MUTANTS)
+	@PYTHONPATH=tools $(PY) -m tests.mutants.run $(MUTANTS)
 
-## alarms: does the conformance suite fail boards that conform? docs/alarms.md (some: make alarms ALARMS='w24 --minutes 5')
-alarms: all
-	@PYTHONPATH=tools $(PY) -m alarms.run $(ALARMS)
+## false-positives: does the conformance suite fail boards that conform? docs/reference/false_positives.md (some: ARGS='w24 --minutes 5')
+alarms: false-positives # its earlier name
+false-positives: all
+	@PYTHONPATH=tools $(PY) -m tests.false_positives.run $(ARGS) $(ALARMS)
 
 ## fault-matrix: every fault at every point, and the requirements that the conformance suite finds broken (docs/faults.md)
 fault-matrix: all
-	PSABENCH_FAULTS=all $(PY) -m pytest tests/conform/test_conform_faults.py
+	PSABENCH_FAULTS=all $(PY) -m pytest tests/conform/suite/test_conform_faults.py
 
 ## check: the C unit tests (one: make check T=test_sched)
 check: $(TEST_BIN)
@@ -299,7 +300,7 @@ format:
 	$(if $(C_FILES),clang-format -i $(C_FILES))
 	$(PY) -m ruff format .
 
-## docs: what follows from proto/ and is kept in git: DBC, EDS, docs/protocol.md, docs/requirements.md, FIDELITY.md
+## docs: what follows from proto/ and is kept in git: DBC, EDS, docs/reference/protocol.md, docs/reference/requirements.md, FIDELITY.md
 docs: all
 	$(PY) tools/gen_proto.py
 	$(PY) tools/gen_docs.py

@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 import numpy as np
-from psabench import nav_mc
-from psabench.nav import ARCMIN, DEGPH, Method, Noise
+from psabench.native import nav_mc
+from psabench.native.nav import ARCMIN, DEGPH, Method, Noise
 
 article = nav_mc.McConfig()
 improved = replace(

@@ -12,12 +12,12 @@ from collections.abc import Iterable
 from typing import Any, Protocol
 
 import numpy as np
-from psabench.busport import BusPort
-from psabench.can_host import CanHost, WallClock, open_bus
-from psabench.devices import Pik, Pmka, Psd1
+from psabench.boards.pmka import estimate as est
+from psabench.boards.readings import Readings
+from psabench.boards.registry import Pik, Pmka, Psd1
 from psabench.errors import LinkError
-from psabench.estimate import pmka as est
-from psabench.readings import Readings
+from psabench.link.busport import BusPort
+from psabench.link.can_host import CanHost, WallClock, open_bus
 
 STATUS, FLAGS, FL2, BUS_ON = 3, 15, 0x01, 0x03  # of PSD-1: registers and bits; INT0 and FL1 active
 SEQ, LATCH, PERIOD = 9, 11, 12  # of PIK

@@ -11,10 +11,10 @@ import time
 from typing import Any
 
 import numpy as np
-from psabench.can_host import CanHost, Message, WallClock, open_bus
-from psabench.canopen_host import CanopenNode
+from psabench.boards.psa2.frames import FrameReader
 from psabench.errors import DeviceError, LinkError
-from psabench.frames import FrameReader
+from psabench.link.can_host import CanHost, Message, WallClock, open_bus
+from psabench.link.canopen_host import CanopenNode
 from psabench.places import proto_file
 
 CODE_V = 10.0 / 2**23

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What the conformance suite says of each fault: tests/conform/fault_matrix.yaml as a table of docs/faults.md.
+"""What the conformance suite says of each fault: tests/conform/support/fault_matrix.yaml as a table of docs/faults.md.
 
 Usage:
     gen_fault_matrix.py           write what stands between the marks conform:begin and conform:end of the page
@@ -19,12 +19,12 @@ from typing import Any
 
 import yaml
 from between import marks, spliced
+from psabench.conform.profile import variant
 from psabench.conform.requirements import requirements
-from psabench.conform.variant import variant
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs/faults.md"
-TABLE = ROOT / "tests/conform/fault_matrix.yaml"
+TABLE = ROOT / "tests/conform/support/fault_matrix.yaml"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

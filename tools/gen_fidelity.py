@@ -36,8 +36,8 @@ or a real unit's report, and what happens when a model changes: [docs/evidence.m
 LADDER = """Of a statement, E0 to E2 say where it comes from. Of its evidence, the rung says how far from our own hand
 it was proved: the highest one on which a test of the row stands. *Own tests* are ours, of our own code; the runs of the
 conformance suite are among them."""
-ROWS = """Requirements of the boards and of a host ([docs/requirements.md](docs/requirements.md)), those common to all
-boards counted for each; then the rows of the chips' tables (docs/chips) that are modelled or simplified. A row of *own
+ROWS = """Requirements of the boards and of a host ([requirements.md](docs/reference/requirements.md)), those common to
+all boards counted for each; then rows of the chips' tables (docs/chips) that are modelled or simplified. A row of *own
 tests* that says E2 has our word that a figure of the data sheet is met; one in column E2 has it measured."""
 STALE = (
     """A group is stale when one of its files has changed, comments and blanks apart, since its tests last passed."""
@@ -92,7 +92,7 @@ def board_rows(reqs: Requirements, suite: Mapping[str, object]) -> dict[str, lis
 
 
 def path_of(root: Path, test: str) -> str:
-    """test_x.py:name as tests/py/test_x.py:name."""
+    """test_x.py:name as tests/py/boards/test_x.py:name."""
     file, name = test.split(":")
     found = next((p for d in FOLDERS for p in (root / d).rglob(file)), None)
     return f"{found.relative_to(root).as_posix()}:{name}" if found else test
@@ -196,7 +196,7 @@ def page(root: Path) -> str:
     """FIDELITY.md. Raises what its sources raise."""
     ledger = evidence.load(root)
     reqs = load(root / "proto/requirements.yaml")
-    suite = {i: test for test, ids in suite_tests(root / "scripts/psabench/conform") for i in ids}
+    suite = {i: test for test, ids in suite_tests(root / "scripts/psabench") for i in ids}
     head = ["", "rows", *(f"says {g}" for g in STATEMENTS), "no test", "own tests", *REACHED, "E5", "E6"]
     rows = [counts(NAMES.get(b, b), of, ledger) for b, of in board_rows(reqs, suite).items()]
     for chip, title in CHIPS.items():

@@ -27,7 +27,8 @@ def kept_files(protocols: list[Protocol]) -> dict[Path, str]:
     files = {ROOT / "proto/psabench.dbc": dbc(protocols)}
     for p in protocols:
         files[ROOT / f"proto/{p.key}.eds"] = eds(p)
-        files[ROOT / ("docs/protocol.md" if p.key == "psa2" else f"docs/protocol_{p.key}.md")] = page(p)
+        name = "protocol.md" if p.key == "psa2" else f"protocol_{p.key}.md"
+        files[ROOT / "docs/reference" / name] = page(p)
     return files
 
 

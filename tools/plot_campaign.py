@@ -14,12 +14,12 @@ import sys
 import tempfile
 from pathlib import Path
 
-from psabench import report_plots
 from psabench.campaign import command, page
 from psabench.campaign.cases import STUDIES
 from psabench.campaign.command import Options
 from psabench.campaign.page import Campaign
 from psabench.progress import Bar
+from psabench.report import plots as report_plots
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs/procedures/gyrocompass_campaign.md"

@@ -17,12 +17,14 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
-from psabench import comparison, comparison_page, report_plots
-from psabench.estimate import pik
+from psabench.boards.pik import estimate as pik
+from psabench.link.vcd import Vcd, read_vcd
 from psabench.places import find_emulator
+from psabench.procedures import comparison
 from psabench.procedures.compare_converters import CompareParams
 from psabench.progress import Bar
-from psabench.vcd import Vcd, read_vcd
+from psabench.report import comparison_page
+from psabench.report import plots as report_plots
 
 INPUT_V = {"X": 3.0, "Y": -1.0, "Z": 9.0}
 SCENARIO = """\

@@ -18,9 +18,10 @@ from matplotlib.figure import Figure
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT / "scripts")]
 
-from psabench import Bench, report_plots  # noqa: E402 of this tree
-from psabench.devices.gyro import Gyro, Mode, Phase  # noqa: E402
-from psabench.readings import Readings  # noqa: E402
+from psabench import Bench  # noqa: E402 of this tree
+from psabench.boards.gyro.device import Gyro, Mode, Phase  # noqa: E402
+from psabench.boards.readings import Readings  # noqa: E402
+from psabench.report import plots as report_plots  # noqa: E402 of this tree
 
 RUN_S = 86.0
 STEP_S = 0.01

@@ -22,7 +22,7 @@ sys.path[:0] = [str(ROOT / "tests/py"), str(ROOT / "scripts")]
 
 import physics  # noqa: E402 the compiled physics: its way is known only now
 from physics import Array, Lab, doubles, ns  # noqa: E402
-from psabench import report_plots  # noqa: E402
+from psabench.report import plots as report_plots  # noqa: E402
 
 SERIES = report_plots.SERIES
 NEVER = 2**63 - 1

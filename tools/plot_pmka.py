@@ -19,10 +19,11 @@ from matplotlib.figure import Figure
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT / "scripts")]
 
-from psabench import Bench, report_plots  # noqa: E402 of this tree
-from psabench.devices import Pmka  # noqa: E402
-from psabench.estimate import pmka as est  # noqa: E402
-from psabench.signals import Floats  # noqa: E402
+from psabench import Bench  # noqa: E402 of this tree
+from psabench.boards.pmka import estimate as est  # noqa: E402
+from psabench.boards.registry import Pmka  # noqa: E402
+from psabench.link.signals import Floats  # noqa: E402
+from psabench.report import plots as report_plots  # noqa: E402 of this tree
 
 BEAT, ZERO = 14, 5  # Ts; the article's figure has four machine cycles a beat
 TS_MS = 4.8

@@ -17,14 +17,14 @@ from typing import cast
 import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
-from psabench import report_plots
 from psabench.estimate import harmonics, model
+from psabench.estimate.face import Face
 from psabench.estimate.model import Array, Sensor
-from psabench.face import Face
-from psabench.grading import Section
 from psabench.procedures.fourier import FourierParams, fourier
 from psabench.procedures.head_bench import HeadBench
 from psabench.procedures.reversal import ReversalParams, reversal
+from psabench.report import plots as report_plots
+from psabench.report.grading import Section
 
 ARTICLE = Sensor(
     u0_v=2.50, alpha0_rad=np.radians(0.1121), kx_v_per_g=1.0, ky_v_per_g=0.0098, kz_v_per_g=0.004, kxy_v_per_g2=0.0010

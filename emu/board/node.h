@@ -1,4 +1,4 @@
-/* A board's unit on CAN, as all boards but PSA-2 have it (docs/protocol_<board>.md): ties a board to a CANopen-shaped node.
+/* A board's unit on CAN, as all boards but PSA-2 have it (docs/reference/protocol_<board>.md): ties a board to a CANopen-shaped node.
  *
  * What every unit has is answered here: identity, counters (2030h, the board's own from board_part[0]), the parallel bus
  * as objects (2002h: sub-index = address + 1, answered when the cycle is done; strobe length 2051h), the last refusal in

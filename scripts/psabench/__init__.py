@@ -15,7 +15,11 @@ Everything raises `errors.BenchError` or one of its kinds when the bench is at f
 
 from typing import TYPE_CHECKING
 
+from psabench import moved
+
 __all__ = ["Bench"]
+
+moved.install()
 
 if TYPE_CHECKING:
     from psabench.bench import Bench

@@ -27,15 +27,15 @@ from typing import Any, TypeVar
 from can.interfaces.slcan import slcanBus
 
 from psabench.board_names import DBC_NODE
-from psabench.can_host import QUANTUM_S, CanHost, StepClock, WallClock, open_bus
-from psabench.control import Control, Reply
-from psabench.devices import Psa2, identify, of_board
+from psabench.boards.registry import Psa2, identify, of_board
+from psabench.boards.unit import Unit
 from psabench.emulator import Emulator, Forked
 from psabench.errors import BadInput, BenchError, ControlError, TimeOut
 from psabench.faults import Fault, Faults
 from psabench.instruments import KINDS, Chamber, Head, Instrument, Supply, Table, open_instrument, visa_address
+from psabench.link.can_host import QUANTUM_S, CanHost, StepClock, WallClock, open_bus
+from psabench.link.control import Control, Reply
 from psabench.probe import Probe
-from psabench.unit import Unit
 
 NS = 1_000_000_000
 SLICE_NS = NS  # long runs go in slices of simulated time, so that Ctrl-C is heard

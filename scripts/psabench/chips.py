@@ -30,8 +30,8 @@ from os import PathLike, fspath
 from types import TracebackType
 from typing import Any
 
-from psabench.clib import FRAME, INPUT, WATCH, FrameStruct, library
 from psabench.errors import BadInput, BenchError, TimeOut
+from psabench.native.clib import FRAME, INPUT, WATCH, FrameStruct, library
 
 NEVER_NS = 2**63 - 1
 SLICE_NS = 100_000_000  # time runs in slices of this length, so that Ctrl-C and what callbacks raise come out soon

@@ -10,8 +10,8 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from psabench.arguments import Help, Parser
 from psabench.errors import BadInput, BenchError
+from psabench.options import Help, Parser
 
 # Help line of each command. Its module and libraries are loaded when it is called (`parse`).
 COMMANDS: Mapping[str, str] = {
@@ -77,15 +77,15 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     command, rest = words[0], words[1:]
     match command:
         case "run":
-            from psabench import run_command
+            from psabench.procedures import command as run_command
 
             return run_command.parse(rest)
         case "record":
-            from psabench import record_command
+            from psabench.link import record_command
 
             return record_command.parse(rest)
         case "decode":
-            from psabench import decode_command
+            from psabench.boards import decode_command
 
             return decode_command.parse(rest)
         case "campaign":

@@ -17,8 +17,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
 
-from psabench.control import Control
 from psabench.errors import BadInput, BenchError
+from psabench.link.control import Control
 from psabench.places import executable, find_emulator, own_emulators
 
 START_S = 20.0  # patience for "ready all": a bare emulator needs milliseconds, one under sanitizers in a guest seconds

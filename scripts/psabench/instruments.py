@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from psabench.errors import BadInput, InstrumentError, LinkError, TimeOut
-from psabench.face import Face
+from psabench.estimate.face import Face
 
 if TYPE_CHECKING:
     from pyvisa.resources import MessageBasedResource

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from psabench.nav import EARTH_RADPS
-from psabench.nav_mc import McConfig
+from psabench.native.nav import EARTH_RADPS
+from psabench.native.nav_mc import McConfig
 
 Floats = npt.NDArray[np.float64]
 BATCH = 1000  # runs at once: fastest of 200 to 10,000

@@ -1,4 +1,4 @@
-"""Results of `make bench` as the tables and the picture of docs/performance.md: pure functions of result.json."""
+"""Results of `make bench` as tables and picture of docs/reference/performance.md: pure functions of result.json."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ UNWATCHED = {
 OTHERS = {
     "vcd": "VCD writer alone, fed with the edges of frames",
     "frames-vcd": "whole board, no decimation chain, all lines into a VCD",
-    "decode": "host: line port at 8 MHz to words (`psabench.lineport`)",
+    "decode": "host: line port at 8 MHz to words (`psabench.link.lineport`)",
     "can": "CAN: psa-emu in free pace, socketcand, a client that only counts",
     "spi": "libpsabench from C: SPI bytes of an ADS1256's registers",
     "readings": "libpsabench from C: bytes of readings at each DRDY, 30 kSPS",
@@ -265,7 +265,7 @@ SECTIONS: dict[str, Callable[[Result], str]] = {
 def fill(page: str, r: Result) -> str:
     """The page with what stands between its markers written anew. ValueError if a marker is missing."""
     for name, make in SECTIONS.items():
-        page = spliced(page, (f"<!-- bench:{name} -->", "<!-- bench:end -->"), make(r), "docs/performance.md")
+        page = spliced(page, (f"<!-- bench:{name} -->", "<!-- bench:end -->"), make(r), "docs/reference/performance.md")
     return page
 
 

@@ -24,7 +24,7 @@ PSD1 = "verilator-psd1"
 PSA2_LINES, PSD1_LINES = 9, 34
 ROWS = 512  # frames in the file of words; psa2_tb.v has the same number
 
-# AVX-512 is left out because valgrind 3.19 cannot run it; without it the driver is as fast (docs/performance.md).
+# AVX-512 is left out because valgrind 3.19 cannot run it; without it the driver is as fast.
 CFLAGS = "-O3 -march=native -mno-avx512f"
 VERILATOR = [
     *("verilator", "--cc", "--exe", "--build", "-O3", "--x-assign", "fast", "--x-initial", "fast", "--noassert"),

@@ -18,7 +18,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
-from psabench.lineport import BLOCK, CLK, DATA, INT, LineDecoder
+from psabench.link.lineport import BLOCK, CLK, DATA, INT, LineDecoder
 from psabench.places import find_emulator
 
 SAMPLES = 8000  # of a frame period: 8 MHz, 1 ms
@@ -126,7 +126,7 @@ MC_BATCH = 1 << 15  # runs of the closed form a call: their results stay in the 
 
 def mc_numpy(count: int) -> str:
     """Gyrocompasses of NumPy, sample by sample, all of a batch at once; one thread."""
-    from psabench.nav_mc import McConfig
+    from psabench.native.nav_mc import McConfig
 
     from tests.bench.numpy_gyrocompass import BATCH, batch
 
@@ -140,7 +140,7 @@ def mc_numpy(count: int) -> str:
 
 
 def _closed(first: int, batches: int) -> None:
-    from psabench.nav_mc import McConfig, closed
+    from psabench.native.nav_mc import McConfig, closed
 
     cfg = McConfig()
     into = closed(cfg, 1, runs=MC_BATCH)
@@ -170,7 +170,7 @@ def mc_closed_all(count: int) -> str:
 
 def mc_samples(count: int, threads: int = 1, clock_ns: Callable[[], int] = time.process_time_ns) -> str:
     """The same sample by sample; one thread, CPU time."""
-    from psabench.nav_mc import McConfig, samples
+    from psabench.native.nav_mc import McConfig, samples
 
     samples(McConfig(), 1, runs=threads, threads=threads)
     began_ns = clock_ns()

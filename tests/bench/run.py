@@ -1,7 +1,7 @@
 """`make bench`: the emulator beside HDL simulators of the same board, and what else has a target of speed.
 
 Everything is measured in the same run, interleaved, round after round; medians go into build/bench/result.json, and
-from there into docs/performance.md and its picture. `--page-only` writes these from the last result.
+from there into docs/reference/performance.md and its picture. `--page-only` writes these from the last result.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from tests.bench import cases, page, peers
 from tests.bench.cases import ROOT, Case
 
 OUT = ROOT / "build/bench"
-PAGE = ROOT / "docs/performance.md"
+PAGE = ROOT / "docs/reference/performance.md"
 PICTURE = ROOT / "docs/img/performance.svg"
 PEER = page.PEER
 
@@ -112,7 +112,7 @@ def bench(seconds: float) -> page.Result:
 def main(argv: list[str]) -> int:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--seconds", type=float, default=180.0, help="of measuring, about (default 180)")
-    parser.add_argument("--no-page", action="store_true", help="leave docs/performance.md as it is")
+    parser.add_argument("--no-page", action="store_true", help="leave docs/reference/performance.md as it is")
     parser.add_argument("--page-only", action="store_true", help="write it from the last result")
     args = parser.parse_args(argv)
     result_file = OUT / "result.json"

@@ -10,10 +10,10 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
-from psabench.can_host import CanHost, StepClock, WallClock, open_bus
-from psabench.control import Control
-from psabench.device import Psa2
+from psabench.boards.psa2.device import Psa2
 from psabench.emulator import Emulator
+from psabench.link.can_host import CanHost, StepClock, WallClock, open_bus
+from psabench.link.control import Control
 from rig import ADAPTERS, BENCH, HOST, PATIENCE_S, SLC, SLC0, VCAN, MakeRig, Rig, bus_spec, need
 
 logging.getLogger("can").setLevel(logging.ERROR)  # a warning for every message that a read has cut in two

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 from chip_scenes import SCENES
-from psabench.vcd import Vcd, parse_vcd, read_vcd
+from psabench.link.vcd import Vcd, parse_vcd, read_vcd
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]

@@ -8,9 +8,9 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
-from psabench.vcd import Vcd, read_vcd
-from psabench.waveform import frame_picture, setup_picture
-from psabench.waveform_psd1 import cycle_picture, handover_picture
+from psabench.boards.psd1.waveform import cycle_picture, handover_picture
+from psabench.link.vcd import Vcd, read_vcd
+from psabench.report.waveform import frame_picture, setup_picture
 
 HERE = Path(__file__).resolve().parent
 IMG = HERE.parents[1] / "docs" / "img"

@@ -1,4 +1,4 @@
-/* A gyro unit on CAN (docs/protocol_gyro.md; the mapping is ours, E0): three PDOs a step, settings as objects; and the frames
+/* A gyro unit on CAN (docs/reference/protocol_gyro.md; the mapping is ours, E0): three PDOs a step, settings as objects; and the frames
  * of the level unit, which it receives on the same bus. */
 #ifndef PSABENCH_BOARD_GYRO_CAN_H
 #define PSABENCH_BOARD_GYRO_CAN_H

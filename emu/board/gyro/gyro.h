@@ -1,4 +1,4 @@
-/* Gyro unit: controller of a two-axis gyro-stabilised platform (docs/boards/gyro.md, docs/protocol_gyro.md).
+/* Gyro unit: controller of a two-axis gyro-stabilised platform (docs/boards/gyro.md, docs/reference/protocol_gyro.md).
  *
  * A hundred times a second it takes what the level unit has sent since the step before, its angle sensor and its settings, and
  * asks the torquers for two rates; runs of positions are turns, settling and windows, step by step. Of the platform it knows
@@ -60,7 +60,7 @@ enum gyro_event {
     GYRO_EVENTS
 };
 
-/* By object, docs/protocol_gyro.md; numbers as the object dictionary has them. */
+/* By object, docs/reference/protocol_gyro.md; numbers as the object dictionary has them. */
 struct gyro_settings {
     double slew_deg, slew_dps, slew_dps2, settle_s, settle_limit_s, tolerance_arcmin;
     double count, repeat, window_s, calibration_s, freeze;

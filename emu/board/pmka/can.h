@@ -1,4 +1,4 @@
-/* A PMKA unit on CAN (docs/protocol_pmka.md; the mapping is ours, E0): the readings as a pair of PDOs, all else by the
+/* A PMKA unit on CAN (docs/reference/protocol_pmka.md; the mapping is ours, E0): the readings as a pair of PDOs, all else by the
  * parallel bus, object 2002h. */
 #ifndef PSABENCH_BOARD_PMKA_CAN_H
 #define PSABENCH_BOARD_PMKA_CAN_H

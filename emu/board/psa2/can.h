@@ -1,4 +1,4 @@
-/* A PSA-2 unit on CAN: ties a board to a CANopen-shaped node (docs/protocol.md; the mapping is ours, E0).
+/* A PSA-2 unit on CAN: ties a board to a CANopen-shaped node (docs/reference/protocol.md; the mapping is ours, E0).
  *
  * The board's frames become PDOs of the chosen frame form, queued when INT rises; SDO reaches every register through the
  * controller KPSA. A form or data rate whose worst-case time on the wire does not fit the bus is refused in words: SDO

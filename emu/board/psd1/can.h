@@ -1,4 +1,4 @@
-/* A PSD-1 unit on CAN (docs/protocol_psd1.md; the mapping is ours, E0): the cycles as PDOs, control words and coefficients as
+/* A PSD-1 unit on CAN (docs/reference/protocol_psd1.md; the mapping is ours, E0): the cycles as PDOs, control words and coefficients as
  * objects, all else by the parallel bus, object 2002h. */
 #ifndef PSABENCH_BOARD_PSD1_CAN_H
 #define PSABENCH_BOARD_PSD1_CAN_H

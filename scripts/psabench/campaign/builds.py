@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 
-from psabench.navlib import NAME, library
+from psabench.native.navlib import NAME, library
 from psabench.places import PACKAGE, find_emulator, proto_file
 
 SHOWN = 12  # digits that people see

@@ -18,12 +18,12 @@ from typing import Any
 
 import numpy as np
 
-from psabench import nav, nav_mc
 from psabench.campaign import builds
 from psabench.campaign.setup import Hold, Setup, as_input
+from psabench.campaign.store import CELL, Origin, Part, Rows
 from psabench.errors import BadInput
-from psabench.navlib import library
-from psabench.store import CELL, Origin, Part, Rows
+from psabench.native import nav, nav_mc
+from psabench.native.navlib import library
 
 ERRORS = ("platform_error_deg", "heading_error_deg", "drift_error_degph", "quality")
 DOUBTS = "doubts"  # how many the host's procedure has of a run; the algebra has none to tell

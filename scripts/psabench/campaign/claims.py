@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from psabench.store import Rows
+from psabench.campaign.store import Rows
 
 CLAIM_DEG, DRIFT_DEGPH, HOLD_DEG, SEVERAL_HOURS_DEG = 0.1, 0.05, 0.3, 0.5  # printed
 ENOUGH_RUNS = 2000  # for a limit to mean anything

@@ -10,16 +10,16 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from psabench.arguments import Help, Parser, natural
 from psabench.campaign import builds, chains, runner, settings
 from psabench.campaign.cases import DEFAULT_STUDIES, STUDIES, WIRE_STUDIES, Case
 from psabench.campaign.runner import Plan
 from psabench.campaign.setup import Setup
+from psabench.campaign.store import Store
 from psabench.campaign.workers import reach, workers
 from psabench.errors import BadInput
+from psabench.options import Help, Parser, natural
 from psabench.procedures.head_bench import Progress
 from psabench.progress import Bar
-from psabench.store import Store
 
 if TYPE_CHECKING:
     from psabench.campaign.page import Campaign

@@ -22,20 +22,20 @@ from typing import Any
 
 import numpy as np
 
-from psabench.angles import wrapped_deg
 from psabench.bench import Bench
 from psabench.campaign.setup import BEFORE_S, Setup, level_white_degph_rts
+from psabench.campaign.store import CELL, Rows
 from psabench.errors import BadInput, DeviceError, LinkError
-from psabench.host_script import Plates
-from psabench.nav import DEGPH
+from psabench.estimate.angles import wrapped_deg
+from psabench.native.nav import DEGPH
 from psabench.places import find_emulator, proto_file
 from psabench.procedures import gyrocompass
 from psabench.procedures.gyrocompass import GyrocompassParams
 from psabench.procedures.head_bench import Silent
+from psabench.procedures.host_script import Plates
 from psabench.procedures.platform_bench import PlatformBench
-from psabench.recorded_platform import RecordedPlatform
-from psabench.store import CELL, Rows
-from psabench.wire_platform import WirePlatform
+from psabench.procedures.recorded_platform import RecordedPlatform
+from psabench.procedures.wire_platform import WirePlatform
 
 OPTION = "--chain emulated or wire"  # of the command line
 SCENARIO = "scenarios/gyrocompass.yaml"

@@ -13,9 +13,9 @@ from typing import Any
 from psabench.campaign import chains, claims, plots
 from psabench.campaign.cases import STUDIES, Case, Study
 from psabench.campaign.claims import Check, Claim, Figures, Found, HoldFigures
-from psabench.report_page import whole_page
-from psabench.store import Rows
-from psabench.whole_file import replace_file
+from psabench.campaign.store import Rows
+from psabench.report.page import whole_page
+from psabench.report.whole_file import replace_file
 
 TITLE = "Gyrocompassing: a campaign"
 FORMAT = 1  # of result.json

@@ -9,10 +9,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from psabench import report_plots as style
 from psabench.campaign.cases import Case, Study
 from psabench.campaign.claims import CLAIM_DEG, HOLD_DEG, SEVERAL_HOURS_DEG, Figures, HoldFigures
-from psabench.store import Rows
+from psabench.campaign.store import Rows
+from psabench.report import plots as style
 
 WIDTH, ROW = 7.4, 0.3  # inch
 BINS = 120

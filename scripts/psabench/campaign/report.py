@@ -15,7 +15,7 @@ from psabench.campaign.claims import Figures, HoldFigures, checks, claims
 from psabench.campaign.page import Campaign
 from psabench.campaign.runner import Plan
 from psabench.campaign.setup import Setup
-from psabench.store import Rows, Store
+from psabench.campaign.store import Rows, Store
 
 REASONS_TOLD = 20  # runs of a case: each is run again for its words
 SHOWN = ("R0", "R5n", "R11+", "improved")  # of the readings, in the picture of distributions

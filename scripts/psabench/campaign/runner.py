@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from psabench.campaign import chains
 from psabench.campaign.cases import Case
 from psabench.campaign.chains import CHAINS, Wanted
+from psabench.campaign.store import Origin, Part, Rows, Store
 from psabench.campaign.workers import Workers, spread
 from psabench.errors import BenchError
 from psabench.procedures.head_bench import Progress
-from psabench.store import Origin, Part, Rows, Store
 
 TASK_S = 0.4  # of one core: long beside the 2 ms that a Dask task costs, short beside a person's patience
 ALONE_S = 4.0  # of one core: starting a cluster takes about as long

@@ -16,7 +16,7 @@ from psabench.campaign.cases import Case
 from psabench.campaign.chains import Wanted
 from psabench.campaign.setup import ANY, CHOICES, Setup, changed
 from psabench.errors import BadInput
-from psabench.navlib import library
+from psabench.native.navlib import library
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from psabench.busport import BusPort, Cycle
-from psabench.conform.outcome import Broken, TooLittle
-from psabench.conform.subject import Subject
+from psabench.conform.dut import Subject
+from psabench.conform.verdict import Broken, TooLittle
 from psabench.errors import DeviceError
+from psabench.link.busport import BusPort, Cycle
 
 SHORT_S = 50e-6  # a cycle and some more
 

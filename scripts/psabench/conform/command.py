@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from psabench.arguments import BUS_HELP, LINE_HZ, Help, Parser
 from psabench.conform.defaults import LINKS, MAX_S, OUT
+from psabench.options import BUS_HELP, LINE_HZ, Help, Parser
 
 EPILOG = """\
 examples:
@@ -61,7 +61,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     """What follows `psabench conform`. Raises BadInput."""
     p = Parser(
         prog="psabench conform",
-        description="Conformance of a board to docs/requirements.md, over its wires alone.",
+        description="Conformance of a board to docs/reference/requirements.md, over its wires alone.",
         formatter_class=Help,
         epilog=EPILOG,
     )

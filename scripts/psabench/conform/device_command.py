@@ -10,11 +10,11 @@ from typing import Any
 
 from psabench.conform import identity, report, runner, suite
 from psabench.conform.defaults import OUT
-from psabench.conform.exhibits import Exhibits
+from psabench.conform.dut import INPUTS_V, Addresses, Subject
+from psabench.conform.excerpts import Exhibits
 from psabench.conform.list_command import requirements_of
-from psabench.conform.outcome import Outcome
-from psabench.conform.subject import INPUTS_V, Addresses, Subject
-from psabench.conform.variant import Variant, variant
+from psabench.conform.profile import Variant, variant
+from psabench.conform.verdict import Outcome
 from psabench.errors import BadInput
 from psabench.procedures.head_bench import Progress
 from psabench.progress import Bar

@@ -1,15 +1,15 @@
-"""A board's own objects against its EDS: length, value after Res, what may be written (docs/protocol*.md, Objects)."""
+"""A board's own objects against its EDS: length, value after Res, write access (docs/reference/protocol*.md)."""
 
 from __future__ import annotations
 
 import struct
 from collections.abc import Container
 
-from psabench.canopen_host import Described
 from psabench.conform.bus_host import refused
-from psabench.conform.outcome import Broken
+from psabench.conform.dut import Subject
 from psabench.conform.requirements import requirements
-from psabench.conform.subject import Subject
+from psabench.conform.verdict import Broken
+from psabench.link.canopen_host import Described
 
 OWN, BUS, READ_ONLY = (
     range(0x2000, 0x6000),

@@ -8,8 +8,8 @@ from contextlib import suppress
 from datetime import datetime
 from importlib.metadata import version
 
+from psabench.conform.dut import Subject
 from psabench.conform.requirements import INDEX, requirements
-from psabench.conform.subject import Subject
 from psabench.errors import BenchError
 from psabench.places import find_emulator, proto_file
 

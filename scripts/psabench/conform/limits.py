@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from psabench.conform.evidence import Evidence
+from psabench.conform.capture.log import Evidence
 from psabench.conform.requirements import Requirement, requirements
 
 

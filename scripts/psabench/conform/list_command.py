@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 
+from psabench.conform.profile import Variant, variant
 from psabench.conform.requirements import Requirement, requirements
-from psabench.conform.variant import Variant, variant
 
 
 def list_requirements(args: argparse.Namespace) -> int:

@@ -21,10 +21,10 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeVar
 
-from psabench.conform.evidence import Evidence
+from psabench.conform.capture.log import Evidence
 
 if TYPE_CHECKING:
-    from psabench.conform.subject import Subject
+    from psabench.conform.dut import Subject
 
 Check = TypeVar("Check", bound=Callable[[Evidence], str])
 Trial = TypeVar("Trial", bound="Callable[[Subject], str]")

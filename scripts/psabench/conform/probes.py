@@ -14,11 +14,11 @@ from types import TracebackType
 from typing import BinaryIO, Protocol
 
 from psabench.bench import Bench
-from psabench.conform.evidence import LineLog
+from psabench.conform.capture.log import LineLog
 from psabench.conform.sources.samples import line_log
 from psabench.errors import LinkError
-from psabench.lineport import SAMPLE_HZ, open_line
-from psabench.vcd import read_vcd
+from psabench.link.lineport import SAMPLE_HZ, open_line
+from psabench.link.vcd import read_vcd
 
 BLOCK = 1 << 16
 MOST = 1 << 30  # samples of one scene: two minutes at 8 MHz

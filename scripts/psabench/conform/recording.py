@@ -15,21 +15,21 @@ from functools import cached_property
 
 import numpy as np
 
-from psabench.conform.evidence import CanFrame, CanLog, Evidence, LineLog, Marks
-from psabench.conform.outcome import Broken, Outcome, TooLittle, Verdict
+from psabench.conform.capture.log import CanFrame, CanLog, Evidence, LineLog, Marks
 from psabench.conform.plan import Plan, plan_of
-from psabench.conform.proof import Proof
+from psabench.conform.profile import Variant
+from psabench.conform.proves import Proof
 from psabench.conform.requirements import Requirement
 from psabench.conform.runner import MISSING, Keep, wanted
 from psabench.conform.sources import clocks
 from psabench.conform.sources.clocks import BEATS, Clocks, Ratio
 from psabench.conform.sources.files import Recording
 from psabench.conform.sources.lines import Recorded
-from psabench.conform.variant import Variant
+from psabench.conform.verdict import Broken, Outcome, TooLittle, Verdict
 from psabench.errors import BadInput, BenchError
+from psabench.link.signals import Ints
+from psabench.link.vcd import Vcd, Wire
 from psabench.procedures.head_bench import Progress
-from psabench.signals import Ints
-from psabench.vcd import Vcd, Wire
 
 PINS_NS = 42.0  # edges known so well or better stand for a clip on each pin
 BOOT_UP, NMT_RESETS = b"\0", (0x81, 0x82)

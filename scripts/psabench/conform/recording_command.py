@@ -7,15 +7,15 @@ import sys
 
 from psabench.conform import identity, recording, report, suite
 from psabench.conform.defaults import OUT
-from psabench.conform.exhibits import Exhibits
-from psabench.conform.outcome import Outcome
+from psabench.conform.excerpts import Exhibits
+from psabench.conform.profile import variant
 from psabench.conform.requirements import requirements
 from psabench.conform.sources.files import read_files
 from psabench.conform.sources.taken import Bounds
-from psabench.conform.variant import variant
+from psabench.conform.verdict import Outcome
 from psabench.errors import BadInput
+from psabench.link.protocol_files import dbc_node
 from psabench.progress import Bar
-from psabench.protocol_files import dbc_node
 
 
 def handle(args: argparse.Namespace) -> int:

@@ -9,8 +9,8 @@ from typing import Any
 import yaml
 
 from psabench.conform.bus_host import line, line_refused, port
-from psabench.conform.outcome import Broken
-from psabench.conform.subject import Subject
+from psabench.conform.dut import Subject
+from psabench.conform.verdict import Broken
 from psabench.places import proto_file
 
 NO_ADDRESS, READ_ONLY, WRITE_ONLY = 0x06090011, 0x06010002, 0x06010001  # abort codes (docs/busport.md)

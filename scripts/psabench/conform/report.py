@@ -11,9 +11,9 @@ from typing import Any
 from xml.etree import ElementTree as ET
 
 from psabench.conform import report_html
-from psabench.conform.outcome import Outcome, Verdict, conforms
 from psabench.conform.requirements import Requirement, requirements
-from psabench.whole_file import replace_file
+from psabench.conform.verdict import Outcome, Verdict, conforms
+from psabench.report.whole_file import replace_file
 
 FORMAT = 1  # of conform.json
 ORDER = tuple(Verdict)

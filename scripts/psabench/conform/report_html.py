@@ -6,9 +6,9 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from psabench.conform.outcome import Outcome, Verdict
 from psabench.conform.requirements import requirements
-from psabench.report_page import whole_page
+from psabench.conform.verdict import Outcome, Verdict
+from psabench.report.page import whole_page
 
 if TYPE_CHECKING:
     from psabench.conform.report import Run

@@ -10,13 +10,13 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
-from psabench.conform.evidence import Evidence
-from psabench.conform.outcome import Broken, Outcome, TooLittle, Verdict
+from psabench.conform.capture.log import Evidence
+from psabench.conform.dut import Subject
 from psabench.conform.plan import Plan, plan_of, scenes
-from psabench.conform.proof import Proof, proofs
+from psabench.conform.profile import Variant
+from psabench.conform.proves import Proof, proofs
 from psabench.conform.requirements import Requirement, requirements
-from psabench.conform.subject import Subject
-from psabench.conform.variant import Variant
+from psabench.conform.verdict import Broken, Outcome, TooLittle, Verdict
 from psabench.errors import BenchError, DeviceError
 from psabench.procedures.head_bench import Progress
 

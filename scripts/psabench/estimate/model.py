@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from psabench.face import Face
+from psabench.estimate.face import Face
 
 Array = npt.NDArray[np.float64]
 

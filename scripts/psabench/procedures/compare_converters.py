@@ -2,7 +2,7 @@
 
 Every unit of the bench streams while the table moves as the scenario's timeline says; each generation's readings become
 volt seconds at its load, by the article's formulas and the protocol page of its board, and these a velocity with
-the scale Ma of its accelerometer. What the motion was this file does not know: `psabench.comparison` grades.
+the scale Ma of its accelerometer. What the motion was this file does not know: `psabench.procedures.comparison` grades.
 """
 
 from __future__ import annotations
@@ -15,13 +15,14 @@ import numpy as np
 import numpy.typing as npt
 
 from psabench.bench import Bench
-from psabench.devices import Pik, Pmka, Psa2, Psd1
-from psabench.devices.psd1 import FULL_SCALE_V, OFFSET_BINARY, volts
+from psabench.boards.pik import estimate as pik
+from psabench.boards.pmka import estimate as pmka
+from psabench.boards.psd1.device import FULL_SCALE_V, OFFSET_BINARY, volts
+from psabench.boards.readings import Readings
+from psabench.boards.registry import Pik, Pmka, Psa2, Psd1
+from psabench.boards.unit import Unit
 from psabench.errors import BadInput, LinkError
-from psabench.estimate import pik, pmka
 from psabench.procedures.head_bench import Progress
-from psabench.readings import Readings
-from psabench.unit import Unit
 
 NAME = "compare-converters"
 SCENARIO = "converters"

@@ -14,25 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from psabench.estimate import model
-from psabench.estimate.uncertainty import (
-    Estimate,
-    alpha0_doubt,
-    correlation,
-    estimate,
-    not_identifiable,
-    propagate,
-)
-from psabench.face import Face
+from psabench.estimate.face import Face
+from psabench.estimate.uncertainty import Estimate, alpha0_doubt, correlation, estimate, not_identifiable, propagate
 from psabench.procedures.head_bench import HeadBench, Reading, Watch
 from psabench.procedures.result import DEG, ProcedureResult, option
-from psabench.procedures.series import (
-    FaceFit,
-    SeriesParams,
-    fit_face,
-    fit_notes,
-    measure_face,
-    residual_rms_v,
-)
+from psabench.procedures.series import FaceFit, SeriesParams, fit_face, fit_notes, measure_face, residual_rms_v
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -10,17 +10,11 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from psabench import nav
 from psabench.errors import LinkError
 from psabench.estimate.uncertainty import Estimate
-from psabench.nav import ARCMIN, DEGPH
-from psabench.procedures.gyrocompass_doubts import (
-    Evidence,
-    doubts_of,
-    heading_allowance_rad,
-    notes_of,
-    quality_limit,
-)
+from psabench.native import nav
+from psabench.native.nav import ARCMIN, DEGPH
+from psabench.procedures.gyrocompass_doubts import Evidence, doubts_of, heading_allowance_rad, notes_of, quality_limit
 from psabench.procedures.gyrocompass_fit import Fit, Row, drift2_of, fit, sensitivity
 from psabench.procedures.gyrocompass_latitude import LatitudeEffect, latitude_effect
 from psabench.procedures.gyrocompass_params import METHODS, NAME, READINGS, GyrocompassParams, params_of

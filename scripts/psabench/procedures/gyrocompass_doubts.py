@@ -13,9 +13,9 @@ from statistics import NormalDist
 
 import numpy as np
 
-from psabench import nav
-from psabench.angles import wrapped
-from psabench.nav import ARCMIN, DEGPH, EARTH_RADPS, Flag
+from psabench.estimate.angles import wrapped
+from psabench.native import nav
+from psabench.native.nav import ARCMIN, DEGPH, EARTH_RADPS, Flag
 from psabench.procedures.gyrocompass_fit import Fit, Sensitivity, alpha_turns, rate_covariance
 from psabench.procedures.gyrocompass_latitude import LatitudeEffect, passport_limit_radps
 from psabench.procedures.gyrocompass_params import GyrocompassParams

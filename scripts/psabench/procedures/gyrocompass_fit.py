@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from psabench import nav
-from psabench.angles import wrapped
-from psabench.nav import ARCMIN, DEGPH, EARTH_RADPS
+from psabench.estimate.angles import wrapped
+from psabench.native import nav
+from psabench.native.nav import ARCMIN, DEGPH, EARTH_RADPS
 from psabench.procedures.gyrocompass_params import METHODS, GyrocompassParams, noise_of
 from psabench.procedures.gyrocompass_windows import s_of, s_sd, trusted
 from psabench.procedures.platform_bench import Floats, Window

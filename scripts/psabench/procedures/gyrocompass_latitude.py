@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from psabench import nav
-from psabench.angles import wrapped
-from psabench.nav import DEGPH, EARTH_RADPS, LATITUDE_LIMIT_RAD
+from psabench.estimate.angles import wrapped
+from psabench.native import nav
+from psabench.native.nav import DEGPH, EARTH_RADPS, LATITUDE_LIMIT_RAD
 from psabench.procedures.gyrocompass_fit import Fit, again
 from psabench.procedures.platform_bench import Floats
 from psabench.procedures.result import DEG

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from psabench import nav
 from psabench.errors import BadInput
-from psabench.nav import ARCMIN, DEGPH, EARTH_RADPS, Method
+from psabench.native import nav
+from psabench.native.nav import ARCMIN, DEGPH, EARTH_RADPS, Method
 from psabench.procedures.platform_bench import Table
 from psabench.procedures.result import option
 

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from psabench import nav
-from psabench.angles import wrapped
+from psabench.estimate.angles import wrapped
+from psabench.native import nav
 from psabench.procedures.gyrocompass_params import GyrocompassParams
 from psabench.procedures.platform_bench import Floats, Window
 from psabench.procedures.result import DEG

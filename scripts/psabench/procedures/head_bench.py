@@ -1,7 +1,7 @@
 """What a procedure may ask of a bench, and nothing else.
 
 A procedure is written against `HeadBench`; the same procedure then runs on the emulator over CAN, on a real
-dividing head and on the in-memory bench of the tests. Faces are those of `psabench.face`. Angles are degrees
+dividing head and on the in-memory bench of the tests. Faces are those of `psabench.estimate.face`. Angles are degrees
 here because the head's scale is (estimators take radians), voltages are volts at the load resistor, before the
 board's divider.
 """
@@ -16,7 +16,7 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from psabench.face import Face
+from psabench.estimate.face import Face
 
 
 class HeadBench(Protocol):

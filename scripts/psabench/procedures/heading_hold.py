@@ -10,10 +10,10 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from psabench import nav
-from psabench.angles import wrapped
 from psabench.errors import LinkError
-from psabench.nav import DEGPH, EARTH_RADIUS_M, LATITUDE_LIMIT_RAD
+from psabench.estimate.angles import wrapped
+from psabench.native import nav
+from psabench.native.nav import DEGPH, EARTH_RADIUS_M, LATITUDE_LIMIT_RAD
 from psabench.procedures.gyrocompass import GyrocompassResult
 from psabench.procedures.gyrocompass_params import TAU_LEAST_S
 from psabench.procedures.head_bench import Progress

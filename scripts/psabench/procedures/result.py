@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from psabench.estimate.face import Face
 from psabench.estimate.uncertainty import Correlation, Estimate
-from psabench.face import Face
 from psabench.procedures.head_bench import Reading
 
 Array = npt.NDArray[np.float64]

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from psabench.estimate import model
+from psabench.estimate.face import Face
 from psabench.estimate.uncertainty import Correlation, Estimate, correlation, estimate, propagate
-from psabench.face import Face
 from psabench.procedures.head_bench import HeadBench, Reading, Watch
 from psabench.procedures.result import DEG, ProcedureResult, option
 from psabench.procedures.series import (

@@ -10,9 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from psabench.estimate import harmonics
+from psabench.estimate.face import Face
 from psabench.estimate.uncertainty import Estimate, lack_of_fit_p
 from psabench.estimate.uncertainty import estimate as make_estimate
-from psabench.face import Face
 from psabench.procedures.head_bench import HeadBench, Reading, Watch
 from psabench.procedures.result import FaceSeries, option
 

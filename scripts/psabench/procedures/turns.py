@@ -14,10 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from psabench.angles import wrapped_deg
 from psabench.estimate import model
+from psabench.estimate.angles import wrapped_deg
+from psabench.estimate.face import Face
 from psabench.estimate.uncertainty import Correlation, Estimate, estimate, not_identifiable
-from psabench.face import Face
 from psabench.procedures.head_bench import HeadBench, Reading, Watch
 from psabench.procedures.result import FaceSeries, ProcedureResult, option
 from psabench.procedures.series import read_position

@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from psabench.arguments import BUS_HELP, Help, Parser, node_id
+from psabench.options import BUS_HELP, Help, Parser, node_id
 
 SHELL_EPILOG = """\
 examples:

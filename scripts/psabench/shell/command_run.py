@@ -7,7 +7,7 @@ import signal
 import sys
 
 from psabench.errors import BadInput
-from psabench.shell.opening import Opening, addresses
+from psabench.shell.connect import Opening, addresses
 from psabench.shell.script import Voice, run_file, run_lines, run_stream
 from psabench.shell.session import Session
 

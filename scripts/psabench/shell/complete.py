@@ -6,8 +6,8 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from psabench.shell.commands import OBJECTS, Arg, Command, Kind, Vocabulary
 from psabench.shell.grammar import describe
-from psabench.shell.vocabulary import OBJECTS, Arg, Command, Kind, Vocabulary
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from psabench.bench import Bench
-from psabench.devices import Psa2
+from psabench.boards.psa2.frames import Form, Frames
+from psabench.boards.readings import Readings
+from psabench.boards.registry import Psa2
+from psabench.boards.unit import BANKS, Unit
 from psabench.errors import CycleRefused
-from psabench.frames import Form, Frames
-from psabench.readings import Readings
 from psabench.shell import registers
+from psabench.shell.commands import Arg, Command, Kind
+from psabench.shell.lexer import Wrong
 from psabench.shell.row import Args, Handler, Row, number
-from psabench.shell.vocabulary import Arg, Command, Kind
-from psabench.shell.words import Wrong
-from psabench.unit import BANKS, Unit
 
 if TYPE_CHECKING:
     from psabench.shell.session import Session

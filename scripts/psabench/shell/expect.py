@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from psabench.shell.words import Wrong, split
+from psabench.shell.lexer import Wrong, split
 
 _FORM = re.compile(r"(?P<path>\S+)\s+(?P<op>=|!=|<=|>=|<|>)\s+(?P<value>.+?)(?:\s+\+-\s+(?P<within>\S+))?\s*")
 _OPS: Mapping[str, Callable[[Any, Any], bool]] = {

@@ -1,7 +1,7 @@
 """Fields of the registers, by group: converters "accel" and "temp", registers on the bus of a board under its name.
 
 Converters from their data sheets (SBAS418, SBAS288; what each rests on: docs/sources.md, 1.2 and 2.2), the boards' own
-from docs/protocol_psd1.md, protocol_pmka.md and protocol_pik.md.
+from docs/reference/protocol_psd1.md, protocol_pmka.md and protocol_pik.md.
 """
 
 from __future__ import annotations

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from psabench.shell import units
-from psabench.shell.vocabulary import Arg, Command, Kind, Vocabulary
-from psabench.shell.words import Word, Wrong, quote, split
+from psabench.shell.commands import Arg, Command, Kind, Vocabulary
+from psabench.shell.lexer import Word, Wrong, quote, split
 
 Value = float | int | bool | str | list[float]
 LISTED = 12  # choices that are told when one of them may have been meant

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from psabench.shell.fields import FIELDS
-from psabench.shell.words import Wrong
+from psabench.shell.lexer import Wrong
 
 
 def group(converter: str) -> str:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from psabench.bench import Bench
+from psabench.shell.commands import Command
 from psabench.shell.grammar import Value
-from psabench.shell.vocabulary import Command
 
 if TYPE_CHECKING:
     from psabench.shell.session import Session

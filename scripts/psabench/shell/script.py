@@ -13,11 +13,11 @@ from pathlib import Path
 
 from psabench.errors import BadInput, BenchError
 from psabench.shell import render
+from psabench.shell.connect import Opening
 from psabench.shell.expect import Expectation
 from psabench.shell.grammar import parse
-from psabench.shell.opening import Opening
+from psabench.shell.lexer import Wrong
 from psabench.shell.session import Outcome, Session
-from psabench.shell.words import Wrong
 
 FAILED = 1
 

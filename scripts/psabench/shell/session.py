@@ -9,14 +9,14 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from psabench.bench import Bench
+from psabench.boards.unit import Unit
 from psabench.errors import BenchError, ControlError, CycleRefused, DeviceError
 from psabench.instruments import KINDS
-from psabench.shell import dut, own
+from psabench.shell import builtins, dut
+from psabench.shell.commands import EVENTS, Command, Vocabulary, from_help, with_events, with_kinds
 from psabench.shell.grammar import Call, parse
+from psabench.shell.lexer import Wrong
 from psabench.shell.transcript import Transcript
-from psabench.shell.vocabulary import EVENTS, Command, Vocabulary, from_help, with_events, with_kinds
-from psabench.shell.words import Wrong
-from psabench.unit import Unit
 
 # The bench understood these codes of a refusal to mean: the line is wrong. Others: not now, not here.
 WRONG_CODES = {"syntax", "command", "argument", "type", "range"}
@@ -91,7 +91,7 @@ class Session:
         except BenchError as e:
             self.transcript.add(line.strip(), t_ns, str(e))
             raise
-        if call.command.name not in own.UNSAID:
+        if call.command.name not in builtins.UNSAID:
             self.transcript.add(line.strip(), t_ns)
         return outcome
 
@@ -106,7 +106,7 @@ class Session:
                 raise
             raise BenchError(f"{e}; {self._why_not_now()}") from e
         failed = str(result.get("failed", "")) if call.command.name == "expect" else ""
-        if result and call.command.name not in own.UNSAID and call.command.name != "expect":
+        if result and call.command.name not in builtins.UNSAID and call.command.name != "expect":
             self.latest = result
         t_ns = None if call.command.wire == QUIT else self.now_ns()  # nobody is there to tell it
         return Outcome(call=call, result=result, t_ns=t_ns, failed=failed)
@@ -120,7 +120,7 @@ class Session:
         return "while the board is being set up: dut.ready waits for the end"
 
     def _result(self, call: Call) -> Mapping[str, Any]:
-        mine = own.HANDLERS.get(call.command.name)
+        mine = builtins.HANDLERS.get(call.command.name)
         if mine:
             return mine(self, call.args)
         args = {k: os.path.abspath(str(v)) if k in PATHS else v for k, v in call.args.items()}
@@ -132,7 +132,7 @@ class Session:
 
 def learn(bench: Bench) -> Vocabulary:
     """What may be said to this bench, and which objects it has not."""
-    mine = [row.command for row in own.ROWS if row.here(bench)]
+    mine = [row.command for row in builtins.ROWS if row.here(bench)]
     theirs = _of_table(bench) if bench.pace != "real" else []
     missing = _not_in_scenario(bench) if theirs else {}
     if theirs:

@@ -25,9 +25,9 @@ from psabench.errors import BenchError
 from psabench.shell import render
 from psabench.shell.complete import argument, candidates
 from psabench.shell.grammar import describe
+from psabench.shell.lexer import Wrong
 from psabench.shell.session import Session
 from psabench.shell.status import EVERY_S, Watch
-from psabench.shell.words import Wrong
 
 GREETING = "Tab completes, help lists, Ctrl-D leaves. {bench}."
 MAIN = "psa"

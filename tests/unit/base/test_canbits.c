@@ -35,7 +35,7 @@ static void bounds_are_the_figures_engineers_quote(void **state)
     }
 }
 
-/* Counted by hand, or by the bit-string model in tests/py/test_canbits.py. */
+/* Counted by hand, or by the bit-string model in tests/py/link/test_canbits.py. */
 static void known_frames_have_known_lengths(void **state)
 {
     (void)state;

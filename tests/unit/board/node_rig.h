@@ -242,7 +242,7 @@ static inline void write_u32(struct rig *r, uint16_t index, uint8_t sub, uint32_
     ask(r, 0x23, index, sub, value);
 }
 
-/* Sub-indices of 2030h, as docs/protocol_psd1.md numbers them. */
+/* Sub-indices of 2030h, as docs/reference/protocol_psd1.md numbers them. */
 enum { READINGS = 1, DROPPED, LOAD, TEC, REC, INHIBITED, SYNCS, SDO_REFUSED, MALFORMED, CYCLES, CYCLES_REFUSED };
 
 #endif

@@ -1,4 +1,4 @@
-/* Thermal chamber: ramps, limits, and bodies that follow. tests/py/test_physics.py integrates the lags by itself. */
+/* Thermal chamber: ramps, limits, and bodies that follow. tests/py/lab/test_physics.py integrates the lags by itself. */
 #include "rig.h"
 
 #include "base/sched.h"

@@ -1,4 +1,4 @@
-/* Gravity and rate of the Earth; tests/py/test_physics.py holds them against a closed form of its own. */
+/* Gravity and rate of the Earth; tests/py/lab/test_physics.py holds them against a closed form of its own. */
 #include "rig.h"
 
 #include "base/detmath.h"

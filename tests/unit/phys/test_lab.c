@@ -1,4 +1,4 @@
-/* The laboratory: what a unit feels on each mount. Kinematics with lever arms: tests/py/test_physics.py. */
+/* The laboratory: what a unit feels on each mount. Kinematics with lever arms: tests/py/lab/test_physics.py. */
 #include "rig.h"
 
 #include "base/detmath.h"

@@ -1,4 +1,4 @@
-/* Slow noise and what else a sensor's output goes through. Its Allan deviations: tests/py/test_physics.py. */
+/* Slow noise and what else a sensor's output goes through. Its Allan deviations: tests/py/lab/test_physics.py. */
 #include "rig.h"
 
 #include "base/sched.h"

@@ -1,4 +1,4 @@
-/* Rate table: what its operator sees, where its errors go. tests/py/test_physics.py holds its kinematics against numerical
+/* Rate table: what its operator sees, where its errors go. tests/py/lab/test_physics.py holds its kinematics against numerical
  * differentiation of attitudes of its own. */
 #include "rig.h"
 

@@ -10,11 +10,11 @@ from psabench.board_names import ALIASES
 from psabench.conform import report
 from psabench.conform.defaults import LINKS
 from psabench.conform.host import runner
-from psabench.conform.host.judge import Judged, judged
+from psabench.conform.host.check import Judged, judged
 from psabench.conform.identity import suite_facts
-from psabench.conform.outcome import Outcome, Verdict
+from psabench.conform.profile import Variant, variant
 from psabench.conform.requirements import Requirement, requirements
-from psabench.conform.variant import Variant, variant
+from psabench.conform.verdict import Outcome, Verdict
 from psabench.errors import BadInput
 from psabench.procedures.head_bench import Silent
 from psabench.progress import Bar

@@ -14,8 +14,8 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from psabench.conform.variant import variant
-from psabench.lineport import CLK, DATA, INT, PAUSE_CLK, WORDS
+from psabench.conform.profile import variant
+from psabench.link.lineport import CLK, DATA, INT, PAUSE_CLK, WORDS
 
 Samples = NDArray[np.uint8]
 

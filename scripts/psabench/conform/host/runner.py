@@ -10,21 +10,23 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TextIO
 
-from psabench.conform.host import can_checks, line_checks, unit_checks
-from psabench.conform.host.bus_stage import BusBridge
-from psabench.conform.host.can_cases import CASES, NODE, Case
-from psabench.conform.host.judge import HostEvidence, Judged, Unseen, judged
-from psabench.conform.host.line_cases import LINE_CASES, LineCase, samples
-from psabench.conform.host.line_stage import LinePort
+from psabench.conform.host import check_can as can_checks
+from psabench.conform.host import check_line as line_checks
+from psabench.conform.host import check_units as unit_checks
+from psabench.conform.host.capture import Bus, read_log
+from psabench.conform.host.cases_can import CASES, NODE, Case
+from psabench.conform.host.cases_line import LINE_CASES, LineCase, samples
+from psabench.conform.host.cases_units import UNIT_CASES
+from psabench.conform.host.check import HostEvidence, Judged, Unseen, judged
 from psabench.conform.host.line_waves import form_of
-from psabench.conform.host.played import Bus, read_log
-from psabench.conform.host.stage import READY_S, ByHand, Program, Stage, drain, expand
-from psabench.conform.host.unit_cases import UNIT_CASES
-from psabench.conform.outcome import Broken, Outcome, TooLittle, Verdict
-from psabench.conform.variant import variant
-from psabench.control import Control
+from psabench.conform.host.stimulus import READY_S, ByHand, Program, Stage, drain, expand
+from psabench.conform.host.stimulus_bus import BusBridge
+from psabench.conform.host.stimulus_line import LinePort
+from psabench.conform.profile import variant
+from psabench.conform.verdict import Broken, Outcome, TooLittle, Verdict
 from psabench.emulator import Emulator
 from psabench.errors import BadInput, BenchError
+from psabench.link.control import Control
 from psabench.procedures.head_bench import Progress
 
 Say = Callable[[str], None]

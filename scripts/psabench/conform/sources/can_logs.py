@@ -11,7 +11,7 @@ from typing import Any
 import can
 from can.io.player import MESSAGE_READERS
 
-from psabench.conform.evidence import CanFrame
+from psabench.conform.capture.log import CanFrame
 from psabench.conform.sources.blf import safe_blf
 from psabench.conform.sources.mf4 import candump_of
 from psabench.conform.sources.taken import BLOCK, MOST_FRAMES, Bounds, CanTake

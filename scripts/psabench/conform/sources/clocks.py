@@ -10,14 +10,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from psabench import signals
-from psabench.conform.evidence import CanLog, Evidence, LineLog
-from psabench.conform.line_frames import transfers
-from psabench.conform.outcome import TooLittle
+from psabench.boards.psa2.conform.capture_line import transfers
+from psabench.conform.capture.log import CanLog, Evidence, LineLog
+from psabench.conform.profile import Variant
 from psabench.conform.requirements import requirements
-from psabench.conform.variant import Variant
-from psabench.protocol_files import message
-from psabench.signals import Floats, Ints
+from psabench.conform.verdict import TooLittle
+from psabench.link import signals
+from psabench.link.protocol_files import message
+from psabench.link.signals import Floats, Ints
 
 PPM = 1e-6
 NS = 1e9

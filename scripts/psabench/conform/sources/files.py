@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from psabench.conform.evidence import CanLog
+from psabench.conform.capture.log import CanLog
 from psabench.conform.sources import can_logs
 from psabench.conform.sources.lines import Recorded, log_of
 from psabench.conform.sources.sampled import read_samples

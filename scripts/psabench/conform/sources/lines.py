@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from psabench.conform.evidence import LineLog
-from psabench.conform.outcome import TooLittle
+from psabench.conform.capture.log import LineLog
 from psabench.conform.sources.samples import PORT_LINES
 from psabench.conform.sources.taken import LineTake
+from psabench.conform.verdict import TooLittle
 from psabench.errors import BadInput
-from psabench.vcd import Vcd, Wire
+from psabench.link.vcd import Vcd, Wire
 
 _PARALLEL = ("CS", "RW", *(f"AB{k}" for k in range(4)), *(f"D{k}" for k in range(16)))
 LINES: Mapping[str, Sequence[str]] = {  # as psa-emu --vcd names them: docs/waveforms.md and the boards' pages

@@ -10,8 +10,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from psabench.conform.evidence import LineLog
-from psabench.vcd import Vcd, Wire
+from psabench.conform.capture.log import LineLog
+from psabench.link.vcd import Vcd, Wire
 
 NS = 1e9
 GAP = 0x80

@@ -11,10 +11,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from psabench.conform.capture.log import CanFrame
 from psabench.conform.defaults import MAX_S
-from psabench.conform.evidence import CanFrame
-from psabench.signals import Ints
-from psabench.vcd import Wire
+from psabench.link.signals import Ints
+from psabench.link.vcd import Wire
 
 NS = 1e9
 MOST_FRAMES = 2_000_000  # of one log: 0.5 GB

@@ -1,7 +1,7 @@
 """VCD files of any tool: any names, any unit down to 1 fs, scopes, vectors beside the 1-bit wires (which are left out).
 
-IEEE 1364-2001, clause 18. x and z leave a line as it was. `psabench.vcd` reads the emulator's own files at once; this
-reader takes a file block by block and keeps what came before a damage.
+IEEE 1364-2001, clause 18. x and z leave a line as it was. `psabench.link.vcd` reads the emulator's own files at once;
+this reader takes a file block by block and keeps what came before a damage.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from typing import BinaryIO
 import numpy as np
 import numpy.typing as npt
 
-from psabench.conform.evidence import Bools
+from psabench.conform.capture.log import Bools
 from psabench.conform.sources.taken import BLOCK, MOST_CHANNELS, MOST_EDGES, MOST_NS, NS, Bounds, LineTake
 from psabench.errors import BadInput
-from psabench.signals import Ints
-from psabench.vcd import Tokens, Wire
+from psabench.link.signals import Ints
+from psabench.link.vcd import Tokens, Wire
 
 MOST_HEAD = 1 << 22  # bytes before $enddefinitions
 MOST_CODE = 8  # characters of a wire's code

@@ -1,0 +1,1 @@
+"""The boards: what all have in common here, and a folder for each."""

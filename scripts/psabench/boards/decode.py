@@ -1,0 +1,137 @@
+"""`psabench decode`: a CAN log (any format python-can reads) or a line-port capture into a CSV of SI values."""
+
+from __future__ import annotations
+
+import csv
+import struct
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import IO
+
+import can
+import numpy as np
+from can.io.player import MESSAGE_READERS
+
+from psabench.boards.psa2.frames import FrameReader, Frames
+from psabench.boards.readings import ReadingReader, Readings
+from psabench.boards.registry import Psa2, of_board, reader_of
+from psabench.errors import BadInput
+from psabench.link.lineport import LineDecoder, LineFormat, decode_stream
+from psabench.link.protocol_files import dbc_node, message
+
+CHUNK = 4096  # samples decoded at once
+
+CAN_COLUMNS = ("t_rx_s", "t_sample_s", "x_v", "y_v", "z_v", "temp_code", "temp_channel", "settled", "clipped")
+SAMPLE_MESSAGES = ("PSA2_XY", "PSA2_ZT", "PSA2_FAST", "PSA2_FRAME", "PSA2_BLOCK")
+COUNTED = ("", "LSB", "counts", "pulses")  # units of columns that are whole numbers
+LINE_COLUMNS = ("t_int_fall_s", "t_int_rise_s", "word0", "word1", "word2", "word3")
+
+
+def decode_can(path: Path, node: int, out: IO[str], board: str = "psa2") -> FrameReader | ReadingReader:
+    """Frames (of other boards: readings) of one node from a log. Nothing is written before the first.
+
+    Raises BadInput for a file that cannot be read, with what was wrong and where, and for one without a frame of that
+    node, with the nodes whose frames it has.
+    """
+    if path.suffix not in MESSAGE_READERS:
+        raise BadInput(
+            f"{path}: ending {path.suffix or 'missing'}; python-can reads {' '.join(sorted(MESSAGE_READERS))}"
+        )
+    _check_there(path)
+    reader, ids = reader_of(board, node), set[int]()
+    table = csv.writer(out, lineterminator="\n")
+    begun = False
+    for frames in _chunks(path, reader, ids):
+        if len(frames) and not begun:
+            table.writerow(CAN_COLUMNS if isinstance(frames, Frames) else _reading_columns(frames))
+            begun = True
+        table.writerows(_rows(frames) if isinstance(frames, Frames) else _reading_rows(frames))
+    if not begun:
+        raise BadInput(f"{path}: {_no_frame(node, _senders(ids, board))}")
+    return reader
+
+
+def _no_frame(node: int, senders: set[int]) -> str:
+    others = ", ".join(map(str, sorted(senders - {node}))) or "none"
+    what = f"only parts of frames of node {node}; others" if node in senders else f"no frame of node {node}; nodes"
+    return f"{what} with frames: {others}"
+
+
+def _senders(ids: set[int], board: str) -> set[int]:
+    """Nodes whose samples these identifiers announce, if they are such boards'."""
+    names = SAMPLE_MESSAGES if of_board(board) is Psa2 else of_board(board).layout.messages
+    bases = [int(message(name).frame_id) - dbc_node(of_board(board).board) for name in names]
+    return {i - base for i in ids for base in bases if 1 <= i - base <= 127}
+
+
+def _check_there(path: Path) -> None:
+    """Before the table's head is printed."""
+    if not path.exists() or path.is_dir():
+        raise BadInput(f"{path}: no such file" if not path.exists() else f"{path}: a folder; a file is wanted")
+
+
+def _chunks(path: Path, reader: FrameReader | ReadingReader, ids: set[int]) -> Iterator[Frames | Readings]:
+    """Frames of the reader's node, some at a time; `ids` collects the 11-bit identifiers of all data frames."""
+    read = 0
+    try:
+        with can.LogReader(str(path)) as log:
+            for read, m in enumerate(log, start=1):  # noqa: B007 (the number stands in the message below)
+                reader.on_message(m)
+                if not (m.is_extended_id or m.is_error_frame or m.is_remote_frame):
+                    ids.add(m.arbitration_id)
+                if len(reader) >= CHUNK:
+                    yield reader.take()
+    except OSError as e:
+        raise BadInput(f"{path}: {e.strerror}") from e
+    except (ValueError, IndexError, KeyError, EOFError, struct.error) as e:
+        yield reader.take()  # what came before the damage is good
+        raise BadInput(f"{path}: message {read + 1} cannot be read ({e}); the {read} before it are decoded") from e
+    yield reader.take()
+
+
+def _rows(f: Frames) -> Iterable[tuple[object, ...]]:
+    columns = [
+        f.t_rx_s,
+        f.t_sample_s,
+        *f.u_v.T,
+        f.temp_code,
+        f.temp_channel,
+        f.settled.astype(int),
+        f.clipped.astype(int),
+    ]
+    return zip(*(np.asarray(c).tolist() for c in columns), strict=True)
+
+
+def _reading_columns(r: Readings) -> tuple[str, ...]:
+    """Names with their units: X_LSB, T_degC; bare where a signal is a number or a bit."""
+    return ("t_rx_s", "t_sample_s", *("_".join(filter(None, (name, r.units[name]))) for name in r.columns))
+
+
+def _reading_rows(r: Readings) -> Iterable[tuple[object, ...]]:
+    columns = [c.astype(np.int64) if r.units[name] in COUNTED else c for name, c in r.columns.items()]
+    return zip(*(c.tolist() for c in (r.t_rx_s, r.t_sample_s, *columns)), strict=True)
+
+
+def decode_line(path: Path, fmt: LineFormat, out: IO[str]) -> LineDecoder:
+    """Frames of a capture of INT/DATA/CLK samples. Raises BadInput when the file cannot be opened or has no frame.
+
+    Nothing is written before the first frame.
+    """
+    decoder = LineDecoder(fmt)
+    _check_there(path)
+    try:
+        stream = path.open("rb")
+    except OSError as e:
+        raise BadInput(f"{path}: {e.strerror}") from e
+    table = csv.writer(out, lineterminator="\n")
+    begun = False
+    with stream:
+        for frames in decode_stream(stream, decoder):
+            if len(frames) and not begun:
+                table.writerow(LINE_COLUMNS)
+                begun = True
+            fall_s, rise_s = frames.fall / fmt.sample_hz, frames.rise / fmt.sample_hz
+            table.writerows(zip(fall_s.tolist(), rise_s.tolist(), *frames.words.T.tolist(), strict=True))
+    if not begun:
+        raise BadInput(f"{path}: no frame of {fmt.word_bits}-bit words ({decoder.counts})")
+    return decoder

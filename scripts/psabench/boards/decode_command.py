@@ -1,0 +1,76 @@
+"""`psabench decode`: its options, and where the table goes."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from psabench.errors import BadInput
+from psabench.options import LINE_HZ, Help, Parser, add_board, node_of, positive
+
+EPILOG = """\
+examples:
+  psabench decode run.log --out run.csv        frames of node 5: time of reception and of sampling, volts at the load
+  psabench decode run.blf --node 7 | head
+  psabench decode --line capture.bin           words from INT/DATA/CLK samples; capture: cat LINK > capture.bin
+
+Counters stand on stderr at the end: frames, lost, torn (CAN); also late, early, gaps with --line.
+"""
+
+
+def parse(words: Sequence[str]) -> argparse.Namespace:
+    """What follows `psabench decode`. Raises BadInput."""
+    p = Parser(
+        prog="psabench decode",
+        description="Frames of one node from a CAN log, or words from a capture of the line port, as CSV.",
+        formatter_class=Help,
+        epilog=EPILOG,
+    )
+    p.set_defaults(handler=_decode)
+    p.add_argument("file", type=Path, help="CAN log of python-can, or samples of the line port with --line")
+    p.add_argument("--out", type=Path, help="CSV file (standard output)")
+    add_board(p, "to decode")
+    p.add_argument("--line", action="store_true", help="the file holds INT/DATA/CLK samples, one byte each")
+    p.add_argument("--word-bits", type=int, default=32, help="word width on the line: 16, 24 or 32 (%(default)s)")
+    p.add_argument("--sample-hz", type=positive, default=LINE_HZ, help="sample rate of the capture (%(default)g)")
+    return p.parse_args(words)
+
+
+def _decode(args: argparse.Namespace) -> int:
+    if args.line and args.board != "psa2":
+        raise BadInput(f"--line: line frames are PSA-2's; of a {args.board} a CAN log is decoded: leave --line out")
+    with args.out.open("w", encoding="utf-8") if args.out else _Stdout() as out:
+        return _decode_line(args, out) if args.line else _decode_can(args, out)
+
+
+def _decode_line(args: argparse.Namespace, out: Any) -> int:
+    from psabench.boards.decode import decode_line
+    from psabench.link.lineport import LineFormat
+
+    try:
+        line_format = LineFormat(word_bits=args.word_bits, sample_hz=args.sample_hz)
+    except ValueError as e:
+        raise BadInput(str(e)) from e
+    print(decode_line(args.file, line_format, out).counts, file=sys.stderr)
+    return 0
+
+
+def _decode_can(args: argparse.Namespace, out: Any) -> int:
+    from psabench.boards.decode import decode_can
+
+    c = decode_can(args.file, node_of(args), out, args.board).counters
+    print(f"frames {c.frames}, lost {c.lost}, torn {c.torn}", file=sys.stderr)
+    return 0
+
+
+class _Stdout:
+    """Standard output as a context that does not close it."""
+
+    def __enter__(self) -> Any:
+        return sys.stdout
+
+    def __exit__(self, *_: object) -> None:
+        sys.stdout.flush()

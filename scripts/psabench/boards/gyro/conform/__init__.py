@@ -1,0 +1,1 @@
+"""The conformance tests of the gyro unit: stimulus, capture, check."""

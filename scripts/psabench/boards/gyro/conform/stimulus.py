@@ -1,0 +1,264 @@
+"""Scenes of the gyro unit: from Res, a run of positions, a calibration and navigation, trouble that settings make."""
+
+from __future__ import annotations
+
+from psabench.boards.gyro.conform.capture_readings import columns, vertical_degph
+from psabench.boards.gyro.device import SETTINGS, Gyro, Mode, Phase
+from psabench.boards.unit import NMT_PREOP, NMT_START
+from psabench.conform.capture.log import Evidence
+from psabench.conform.dut import Subject
+from psabench.conform.plan import scene
+from psabench.conform.requirements import requirements
+from psabench.conform.stimulus.streamed import from_res
+from psabench.conform.verdict import TooLittle
+from psabench.estimate.angles import wrapped_deg
+
+READY_S = 0.4
+REST_S = 2.0  # from there to what the Earth and the drift leave, nearly: two time constants
+WAIT_S = 0.5
+RUN_LIMIT_S = 150.0
+TURN_LIMIT_S = 30.0  # half a turn takes 21 s
+TURNS_DEG = (90.0, 270.0, 0.0, -100.0)  # from where it is, a half, one over 360, one the other way
+CALIBRATION_S, NAVIGATION_S, FREE_S = 30.0, 30.0, 5.0
+POWER_ON_S = 1.0  # of readings after Res
+LEVEL_S = 3.0  # of readings in mode 1
+TILT_G, SLOW_PER_S = 0.0087, 0.15  # half a degree; 12 s from there to the tolerance of 5 arc minutes
+FACTS = ("m1_per_s", "m2_per_s", "latitude_deg", "zero_x_v", "zero_y_v", "scale_x_v_per_g", "scale_y_v_per_g")
+
+
+def unit(s: Subject) -> Gyro:
+    """Raises TooLittle where it is none."""
+    if not isinstance(s.unit, Gyro):
+        raise TooLittle("no gyro unit")
+    return s.unit
+
+
+def calm(s: Subject) -> None:
+    """As after power-on, ready, its level unit streaming."""
+    s.reset()
+    s.run_for(READY_S)
+    level_unit(s, True)
+
+
+def level_unit(s: Subject, on: bool) -> None:
+    """Let the level unit stream, or keep it silent."""
+    node = int(s.unit.node.read(0x2109, 1))
+    s.host.send(0x000, bytes([NMT_START if on else NMT_PREOP, node]))
+    s.run_for(0.2 if on else 0.02)
+
+
+def settings(s: Subject) -> dict[str, object]:
+    """What the laws of the controller want to know."""
+    return {name: float(s.unit.node.read(*SETTINGS[name])) for name in FACTS} | {
+        "level_node": int(s.unit.node.read(0x2109, 1)),
+        "positions": [float(s.unit.node.read(0x2103, k)) for k in range(1, 4)],
+    }
+
+
+def until_mode(s: Subject, mode: Mode, limit_s: float) -> None:
+    """Raises TooLittle where the unit does not come to that mode."""
+    left_s = limit_s
+    while int(s.unit.node.read(0x2100, 1)) != mode:
+        if left_s <= 0:
+            raise TooLittle(f"the unit does not come to mode {int(mode)} within {limit_s:g} s")
+        s.run_for(WAIT_S)
+        left_s -= WAIT_S
+
+
+def levelled(s: Subject) -> None:
+    """As after power-on, and level. Raises TooLittle where it does not get so."""
+    row = requirements()["GYRO-MODE-11"]
+    calm(s)
+    unit(s).mode = Mode.LEVEL
+    left_s = row.limit("limit_s")
+    s.run_for(WAIT_S)
+    while abs(unit(s).beta_deg) * 60 > row.limit("level_max_arcmin"):
+        if left_s <= 0:
+            raise TooLittle(f"the platform is not level after {row.limit('limit_s'):g} s")
+        s.run_for(WAIT_S)
+        left_s -= WAIT_S
+    s.run_for(REST_S)
+
+
+def slew(s: Subject, to_deg: float) -> None:
+    """Turn there and stand for a second. Raises TooLittle where the turn does not end."""
+    unit(s).set(slew_deg=to_deg)
+    unit(s).mode = Mode.SLEW
+    s.run_for(0.1)
+    left_s = TURN_LIMIT_S
+    while unit(s).phase == Phase.SLEWING:
+        if left_s <= 0:
+            raise TooLittle(f"a turn to {to_deg:g} deg does not end within {TURN_LIMIT_S:g} s")
+        s.run_for(WAIT_S)
+        left_s -= WAIT_S
+    s.run_for(1.0)
+
+
+@scene("power_on", boards=("gyro",))
+def power_on(s: Subject) -> Evidence:
+    """From Res on while it levels, streaming as soon as it has booted."""
+    calm(s)
+    unit(s).mode = Mode.LEVEL
+    s.run_for(0.5)
+    return from_res(s, POWER_ON_S)
+
+
+@scene("level", boards=("gyro",))
+def level(s: Subject) -> Evidence:
+    """Mode 1, for as long as the platform may take to get level from where it stands."""
+    calm(s)
+    with s.take(lines=False) as take:
+        s.unit.start()
+        unit(s).mode = Mode.LEVEL
+        s.run_for(requirements()["GYRO-MODE-11"].limit("limit_s"))
+        s.unit.stop()
+    return s.evidence("level", take)
+
+
+@scene("run", boards=("gyro",))
+def run(s: Subject) -> Evidence:
+    """Levelling, then a run of three positions with the settings of power-on, on the lines and on CAN."""
+    levelled(s)
+    facts = settings(s)
+    with s.take() as take:
+        s.unit.start()
+        s.run_for(LEVEL_S)
+        unit(s).mode = Mode.GYROCOMPASS
+        until_mode(s, Mode.HOLD, RUN_LIMIT_S)
+        s.run_for(2.0)
+        s.unit.stop()
+    take.facts |= facts
+    return s.evidence("run", take)
+
+
+@scene("navigation", boards=("gyro",))
+def navigation(s: Subject) -> Evidence:
+    """A calibration, then the drift about z that it gave, navigation with it, and the heading of a parked vehicle."""
+    levelled(s)
+    facts = settings(s) | {"calibration_s": CALIBRATION_S}
+    unit(s).set(calibration_s=CALIBRATION_S)
+    with s.take(lines=False) as take:
+        s.unit.start()
+        unit(s).mode = Mode.CALIBRATE
+        until_mode(s, Mode.HOLD, RUN_LIMIT_S)
+        s.unit.stop()
+    take.facts |= facts
+    e = s.evidence("navigation", take)
+    c = columns(e)
+    window = c["PHASE"] == Phase.WINDOW
+    if not window.any():
+        return e
+    drift = float(c["U2"][window].mean()) - vertical_degph(unit(s).get("latitude_deg"))
+    unit(s).set(drift2_degph=drift, azimuth_deg=float(c["ENCODER"][-1]))
+    unit(s).mode = Mode.NAVIGATE
+    s.run_for(5.0)
+    take.facts["drift_degph"] = drift
+    take.facts["moved_deg"], take.facts["moved_s"] = _moved(s, NAVIGATION_S)
+    unit(s).set(drift2_degph=0.0)  # the heading is alive: it shows the drift that nothing cancels
+    take.facts["free_deg"], take.facts["free_s"] = _moved(s, FREE_S)
+    calm(s)
+    return s.evidence("navigation", take)
+
+
+def _moved(s: Subject, dwell_s: float) -> tuple[float, float]:
+    """How far the heading moves, deg, and in how many seconds of the bench."""
+    first_deg, begun_s = unit(s).heading_deg, s.bench.time_s
+    s.run_for(dwell_s)
+    return wrapped_deg(unit(s).heading_deg - first_deg), s.bench.time_s - begun_s
+
+
+@scene("turns", boards=("gyro",))
+def turns(s: Subject) -> Evidence:
+    """Turns of all kinds by mode 3, then mode 2."""
+    levelled(s)
+    parts: list[tuple[float, int, int]] = []  # angle, first and last frame
+    with s.take(lines=False) as take:
+        s.unit.start()
+        s.run_for(0.1)
+        for to_deg in TURNS_DEG:
+            begin = len(take.frames)
+            slew(s, to_deg)
+            parts.append((to_deg, begin, len(take.frames)))
+        begin = len(take.frames)
+        unit(s).mode = Mode.HOLD
+        s.run_for(3.0)
+        s.unit.stop()
+    take.facts |= {"turns": parts, "held": (begin, len(take.frames))}
+    calm(s)
+    return s.evidence("turns", take)
+
+
+@scene("hold", boards=("gyro",))
+def hold(s: Subject) -> Evidence:
+    """Mode 2 with one latitude, then with that of the other hemisphere, which turns Wz round."""
+    levelled(s)
+    facts = settings(s)
+    latitude_deg = unit(s).get("latitude_deg")
+    unit(s).mode = Mode.HOLD
+    s.run_for(1.0)
+    parts: list[tuple[float, int, int]] = []  # latitude, first and last frame
+    with s.take(lines=False) as take:
+        s.unit.start()
+        for told_deg in (latitude_deg, -latitude_deg):
+            unit(s).set(latitude_deg=told_deg)
+            s.run_for(0.1)
+            begin = len(take.frames)
+            s.run_for(2.0)
+            parts.append((told_deg, begin, len(take.frames)))
+        s.unit.stop()
+    take.facts |= facts | {"latitudes": parts}
+    calm(s)
+    return s.evidence("hold", take)
+
+
+@scene("tilted", boards=("gyro",))
+def tilted(s: Subject) -> Evidence:
+    """A run that begins half a degree off the level, with a slow loop and no settling time: its first window."""
+    levelled(s)
+    zero_v, scale_v = unit(s).get("zero_y_v"), unit(s).get("scale_y_v_per_g")
+    unit(s).set(zero_y_v=zero_v + scale_v * TILT_G)
+    s.run_for(5.0)
+    unit(s).set(m1_per_s=SLOW_PER_S, zero_y_v=zero_v, settle_s=0.0, settle_limit_s=60.0, count=1, window_s=1.0)
+    unit(s).positions_deg = (round(unit(s).encoder_deg),)
+    with s.take(lines=False) as take:
+        s.unit.start()
+        unit(s).mode = Mode.GYROCOMPASS
+        until_mode(s, Mode.HOLD, RUN_LIMIT_S)
+        s.unit.stop()
+    calm(s)
+    return s.evidence("tilted", take)
+
+
+@scene("limits", boards=("gyro",))
+def limits(s: Subject) -> Evidence:
+    """A zero of the level sensors that is suddenly told wrongly, with a stiff loop: rates at their limits."""
+    levelled(s)
+    with s.take(lines=False) as take:
+        s.unit.start()
+        s.run_for(0.3)
+        unit(s).set(m1_per_s=20.0)
+        unit(s).set(zero_y_v=0.3)
+        s.run_for(0.2)
+        unit(s).set(m1_per_s=1.0, zero_y_v=0.0)
+        s.run_for(8.0)
+        s.unit.stop()
+    calm(s)
+    return s.evidence("limits", take)
+
+
+@scene("silence", boards=("gyro",))
+def silence(s: Subject) -> Evidence:
+    """The level unit silent for a while, twice: shorter and longer than the unit waits."""
+    levelled(s)
+    facts = settings(s)
+    with s.take() as take:
+        s.unit.start()
+        s.run_for(0.3)
+        level_unit(s, False)
+        s.run_for(0.5)
+        level_unit(s, True)
+        s.run_for(2.5)
+        s.unit.stop()
+    take.facts |= facts
+    calm(s)
+    return s.evidence("silence", take)

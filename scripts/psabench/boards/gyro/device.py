@@ -1,0 +1,212 @@
+"""A gyro unit over CAN: the controller of a two-axis gyro-stabilised platform (docs/reference/protocol_gyro.md).
+
+    gyro = bench.board(Gyro)
+    gyro.set(latitude_deg=50.0, window_s=10.0, count=3)
+    gyro.positions_deg = (0.0, 90.0, 180.0)
+    gyro.mode = Mode.GYROCOMPASS
+    gyro.stream(10)["U1"]          # deg/h, the rate asked of the torquer of the suspension axis
+
+Angles and rates are as in the protocol: degrees, degrees an hour.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import IntEnum, IntFlag
+
+from psabench.boards.readings import ReadingLayout
+from psabench.boards.unit import BusUnit
+from psabench.errors import BadInput, DeviceError
+
+
+class Mode(IntEnum):
+    """Object 2100h:1."""
+
+    OFF = 0
+    LEVEL = 1
+    HOLD = 2
+    SLEW = 3
+    GYROCOMPASS = 4
+    CALIBRATE = 5
+    NAVIGATE = 6
+
+
+class Phase(IntEnum):
+    """Object 2100h:2, of a run or a turn."""
+
+    IDLE = 0
+    SLEWING = 1
+    SETTLING = 2
+    WINDOW = 3
+
+
+class Flag(IntFlag):
+    """Object 2100h:4."""
+
+    SATURATED = 1
+    LEVEL_LOST = 2
+    ENCODER_FAULT = 4
+    NOT_SETTLED = 8
+
+
+class SelfTest(IntEnum):
+    """Object 210Bh:2."""
+
+    NONE = 0
+    PASSED = 1
+    FAILED = 2
+    UNCLEAR = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Began:
+    """A flag since the mode began, object 2108h."""
+
+    count: int  # how often it began
+    step: int  # in which it did last, as `Gyro.steps`
+
+
+MODE, PHASE, POSITION, FLAGS = (0x2100, 1), (0x2100, 2), (0x2100, 3), (0x2100, 4)
+POSITIONS, POSITIONS_MAX, RUN_MAX = 0x2103, 32, 127
+BEGAN, SELF_TEST, SELF_TEST_RESULT = 0x2108, (0x210B, 1), (0x210B, 2)
+STEP_NS, STEPS = (0x210A, 1), (0x210A, 2)
+LATEST_ENCODER, ENCODER_DEG = (0x2200, 3), 180.0 / 2**31
+LATEST_BETA, LEVEL_DEG = (0x2200, 6), 2e-6
+
+# Settings by the names that this package gives them: object and sub-index.
+SETTINGS: Mapping[str, tuple[int, int]] = {
+    "slew_deg": (0x2101, 1),
+    "slew_dps": (0x2101, 2),
+    "slew_dps2": (0x2101, 3),
+    "settle_s": (0x2101, 4),
+    "settle_limit_s": (0x2101, 5),
+    "tolerance_arcmin": (0x2101, 6),
+    "count": (0x2102, 1),
+    "repeat": (0x2102, 2),
+    "window_s": (0x2102, 3),
+    "calibration_s": (0x2102, 4),
+    "freeze": (0x2102, 5),
+    "m1_per_s": (0x2104, 1),
+    "m2_per_s": (0x2104, 2),
+    "latitude_deg": (0x2105, 1),
+    "speed_mps": (0x2105, 2),
+    "track_deg": (0x2105, 3),
+    "azimuth_deg": (0x2106, 1),
+    "drift1_degph": (0x2107, 1),
+    "drift2_degph": (0x2107, 2),
+    "zero_x_v": (0x2109, 2),
+    "zero_y_v": (0x2109, 3),
+    "scale_x_v_per_g": (0x2109, 4),
+    "scale_y_v_per_g": (0x2109, 5),
+}
+LEVEL_NODE, HEADING = (0x2109, 1), (0x2106, 2)
+ABORT_RANGE = {0x06090030, 0x06090031, 0x06090032}  # CiA 301, 7.2.4.3.17: value range, too high, too low
+
+
+class Gyro(BusUnit):
+    """One unit on the bus. What it refuses raises with its own words (object 2031h)."""
+
+    board = "gyro"
+    title = "GYRO"
+    layout = ReadingLayout(board="gyro", messages=("GYRO_RATES", "GYRO_ANGLES", "GYRO_LEVEL"), counter="STEP")
+
+    def get(self, name: str) -> float:
+        """A setting by its name here."""
+        return float(self.node.read(*SETTINGS[name]))
+
+    def set(self, **settings: float) -> None:
+        """Settings by their names here, in the order given. Raises BadInput for a value that the unit does not take."""
+        for name, value in settings.items():
+            self._write(name, *SETTINGS[name], value)
+
+    def _write(self, name: str, index: int, sub: int, value: float) -> None:
+        try:
+            self.node.write(index, sub, value)
+        except DeviceError as e:
+            words = self.refusal() or e.text
+            if e.abort_code in ABORT_RANGE:
+                raise BadInput(f"{name} = {value:g}: {words}") from e
+            raise DeviceError(e.what, e.abort_code, words) from e
+
+    @property
+    def positions_deg(self) -> tuple[float, ...]:
+        """The positions of a run, as many as there are in use."""
+        return tuple(float(self.node.read(POSITIONS, 1 + k)) for k in range(int(self.get("count"))))
+
+    @positions_deg.setter
+    def positions_deg(self, angles_deg: Sequence[float]) -> None:
+        if not 1 <= len(angles_deg) <= POSITIONS_MAX:
+            raise BadInput(f"{len(angles_deg)} positions; the unit has room for 1 to {POSITIONS_MAX}")
+        for k, angle_deg in enumerate(angles_deg):
+            self._write(f"position {k + 1}", POSITIONS, 1 + k, angle_deg)
+        self.set(count=len(angles_deg))
+
+    @property
+    def mode(self) -> Mode:
+        return Mode(int(self.node.read(*MODE)))
+
+    @mode.setter
+    def mode(self, mode: Mode) -> None:
+        self._write(f"mode {mode.name.lower()}", *MODE, int(mode))
+
+    @property
+    def phase(self) -> Phase:
+        return Phase(int(self.node.read(*PHASE)))
+
+    @property
+    def position(self) -> int:
+        """Of the run, from 1; 0: none."""
+        return int(self.node.read(*POSITION))
+
+    @property
+    def flags(self) -> Flag:
+        return Flag(int(self.node.read(*FLAGS)))
+
+    def began(self) -> dict[Flag, Began]:
+        """What came since the mode began, gone or not."""
+        return {
+            flag: Began(int(self.node.read(BEGAN, 1 + k)), int(self.node.read(BEGAN, 1 + len(Flag) + k)))
+            for k, flag in enumerate(Flag)
+        }
+
+    def begin_self_test(self) -> None:
+        """In navigation the platform nods by 0.1 deg for a second: does the angle sensor follow?"""
+        self._write("self test", *SELF_TEST, 1)
+
+    @property
+    def self_test(self) -> SelfTest | None:
+        """What came of it; None: it is under way."""
+        if int(self.node.read(*SELF_TEST)):
+            return None
+        return SelfTest(int(self.node.read(*SELF_TEST_RESULT)))
+
+    @property
+    def encoder_deg(self) -> float:
+        """Angle of the outer gimbal as the unit has it now."""
+        return int(self.node.read(*LATEST_ENCODER)) * ENCODER_DEG
+
+    @property
+    def beta_deg(self) -> float:
+        """Level angle about the axis of suspension as the unit has it now."""
+        return int(self.node.read(*LATEST_BETA)) * LEVEL_DEG
+
+    @property
+    def heading_deg(self) -> float:
+        """As the unit itself has it in mode 6, of a level vehicle, 0 to 360."""
+        return float(self.node.read(*HEADING))
+
+    @property
+    def step_s(self) -> float:
+        """Period of the controller's steps, and of the readings."""
+        return int(self.node.read(*STEP_NS)) * 1e-9
+
+    @property
+    def steps(self) -> int:
+        """Steps of the controller since its last reset."""
+        return int(self.node.read(*STEPS))
+
+    @property
+    def level_node(self) -> int:
+        """CANopen node of the unit that reads the level sensors; 0: none is fitted."""
+        return int(self.node.read(*LEVEL_NODE))

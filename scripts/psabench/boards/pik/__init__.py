@@ -1,0 +1,1 @@
+"""PIK, PIK-5 and PIK-6."""

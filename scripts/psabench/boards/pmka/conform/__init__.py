@@ -1,0 +1,1 @@
+"""The conformance tests of PMKA: stimulus, capture, check."""

@@ -1,0 +1,82 @@
+"""Scenes of PMKA: its start, a rotation on the lines, a minute of readings, strobes on its bus."""
+
+from __future__ import annotations
+
+from psabench.boards.registry import Pmka
+from psabench.conform.bus_host import line
+from psabench.conform.capture.log import Evidence
+from psabench.conform.dut import Subject
+from psabench.conform.plan import scene
+from psabench.conform.requirements import requirements
+from psabench.conform.stimulus.streamed import from_res, readings
+from psabench.conform.verdict import TooLittle
+from psabench.link.busport import Cycle
+
+BEAT, ZERO, RESETS = 200, 120, 78  # periods, as the board turns itself (PMKA-CAL-03)
+SHORT = (40, 20, 12)  # a beat of a scene where the computer turns it
+ROTATION, MINUTE = 5, 69  # beats; the minute begins and ends with the spare at rest, up to three beats from its ends
+START_S = 0.02
+
+
+def ts_s() -> float:
+    return requirements()["PMKA-SAMP-01"].limit("ts_us") * 1e-6
+
+
+def unit(s: Subject) -> Pmka:
+    """Raises TooLittle where it is none."""
+    if not isinstance(s.unit, Pmka):
+        raise TooLittle("no PMKA")
+    return s.unit
+
+
+def turn(s: Subject, beats: int, lengths: tuple[int, int, int]) -> None:
+    """Let beats pass; where the board leaves the calibration to the computer, be that one."""
+    beat, zero, resets = lengths
+    if s.variant["rotation"] != "program":
+        s.run_for(beats * BEAT * ts_s())
+        return
+    for k in range(beats):
+        tau = k % 5 + 1
+        unit(s).command(tau)
+        s.run_for(3 * ts_s())
+        for cal, length in ((1, zero), (2, resets), (0, beat - zero - resets - 3)):
+            unit(s).command(0, cal=cal)
+            s.run_for(length * ts_s())
+
+
+@scene("power_on", boards=("pmka",))
+def power_on(s: Subject) -> Evidence:
+    """From Res to some readings, streaming as soon as it has booted."""
+    return from_res(s, START_S + 6 * ts_s())
+
+
+@scene("stream", boards=("pmka",))
+def stream(s: Subject) -> Evidence:
+    """A rotation and some more, on the lines and on CAN."""
+    return s.evidence("stream", readings(s, START_S, lambda: turn(s, ROTATION + 1, SHORT)))
+
+
+@scene("minute", boards=("pmka",))
+def minute(s: Subject) -> Evidence:
+    """A minute of readings through many rotations, and the words of the ROM."""
+    take = readings(s, START_S, lambda: turn(s, MINUTE, (BEAT, ZERO, RESETS)), lines=False)
+    take.facts["rom"] = unit(s).rom_words()
+    s.reset()
+    s.run_for(START_S)
+    return s.evidence("minute", take)
+
+
+@scene("strobes", boards=("pmka",))
+def strobes(s: Subject) -> Evidence:
+    """Reads and writes of registers over the bus port, while readings come."""
+    cycles: list[Cycle] = []
+
+    def strobe() -> None:
+        for k in range(40):
+            cycles.append(line(s, f"R {k % 13 if k % 13 != 10 else 6:X} {800 + 100 * (k % 7)}"))
+            cycles.append(line(s, f"W D {k % 8:X}"))
+            s.run_for(0.3 * ts_s())
+
+    take = readings(s, START_S, strobe)
+    take.cycles += cycles
+    return s.evidence("strobes", take)

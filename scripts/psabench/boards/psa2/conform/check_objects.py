@@ -1,0 +1,120 @@
+"""Objects of PSA-2 and PSA-1: who it is, mirrors of the sample, type, rights, default and limits of each."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Mapping
+
+from psabench.boards.psa2.conform.capture_can import Pairs, pairs
+from psabench.boards.psa2.conform.check_registers import fact
+from psabench.boards.psa2.conform.check_stream import number, unit_us
+from psabench.boards.psa2.conform.stimulus_objects import Row
+from psabench.conform.capture.log import Evidence
+from psabench.conform.limits import row_for
+from psabench.conform.plan import check
+from psabench.conform.proves import proves
+from psabench.conform.verdict import Broken, TooLittle
+from psabench.link.canopen_host import Described
+
+READ_ONLY, WRITE_ONLY = 0x06010002, 0x06010001
+
+
+@proves("PSA2-CAN-09")
+@check("objects")
+def the_board_says_who_it_is(e: Evidence) -> str:
+    """Read 1008h and 1018h."""
+    row, read = row_for(e, "PSA2-CAN-09"), fact(e, "read")
+    name = read[0x1008, 0].value
+    if name != "PSA-2":
+        raise Broken(f"1008h {name!r}", "'PSA-2'")
+    for sub, limit in ((2, "product_code"), (3, "revision_code")):
+        saw, due = number(read[0x1018, sub]), int(row.limit(limit))
+        if saw != due:
+            raise Broken(f"1018h:{sub} {saw:08X}h", f"{due:08X}h")
+    return f"{name}, product {number(read[0x1018, 2]):08X}h, revision {number(read[0x1018, 3]):08X}h"
+
+
+@proves("PSA2-CAN-10")
+@check("objects")
+def object_2021h_is_the_word_width(e: Evidence) -> str:
+    """Read 2021h."""
+    saw = number(fact(e, "read")[0x2021, 0])
+    due = int(row_for(e, "PSA2-FRAME-06", "PSA2-FRAME-07", "PSA2-FRAME-08").limit("word_bits"))
+    if saw != due:
+        raise Broken(f"{saw} bits", f"{due} bits")
+    return f"{saw} bits"
+
+
+@proves("PSA2-CAN-11")
+@check("objects")
+def mirrors_show_the_sample(e: Evidence) -> str:
+    """Compare the mirrors with the PDO of the same number, or of one of those that came while it was asked for."""
+    p, row = pairs(e), row_for(e, "PSA2-CAN-11")
+    at = {int(s): k for k, s in enumerate(p.seq)}
+    rounding = {0x6130: row.limit("rounding_g"), 0x9130: row.limit("rounding_ug")}
+    for index, sub, answer, *numbers in fact(e, "mirrors"):
+        first, last = (at.get(number(numbers[k])) for k in (0, -1))
+        if first is None or last is None:
+            raise TooLittle(f"the sample of {index:04X}h:{sub} is not in the log")
+        saw = answer.value
+        if not isinstance(saw, (int, float)):
+            raise Broken(f"{index:04X}h:{sub} answered by abort {answer.abort:08X}h", "a value")
+        if index == 0x2201:
+            saw = int(saw) >> 8
+        elif (index, sub) == (0x2202, 5):  # us, where TSTAMP has units
+            saw = int(saw / unit_us(e)) & 0xFFFF
+        due = [_mirrored(e, p, k, index, sub) for k in range(first, last + 1)]
+        if not any(abs(saw - d) <= rounding.get(index, 0.0) for d in due):
+            raise Broken(
+                f"{index:04X}h:{sub} {saw}", f"{due} of SEQ {p.seq[first]} to {p.seq[last]}", frames=p.about(first)
+            )
+    return f"{len(fact(e, 'mirrors'))} objects as in the PDO of their sample"
+
+
+def _mirrored(e: Evidence, p: Pairs, k: int, index: int, sub: int) -> float:
+    """What an object shows of sample k."""
+    status = int(p.settled[k]) | p.clip[k] << 1 | p.overrun[k] << 2 | p.new[k] << 3 | int(p.channel[k]) << 4
+    axis, code_v = (sub - 1) % 3, row_for(e, "PSA2-ADC-01").limit("code_uv") * 1e-6
+    due_g = (float(p.code[k, axis]) * code_v - axis) / 2.0  # u0 = 0, 1, 2 V, k = 2 V/g
+    due: Mapping[int, float] = {
+        0x2200: int(p.code[k, axis]) if sub < 4 else int(p.temp[k]),
+        0x2201: int(p.code[k, axis]),
+        0x2202: {2: status, 4: int(p.temp[k])}.get(sub, int(p.stamp[k]) & 0xFFFF),
+        0x6130: due_g,
+        0x9130: due_g * 1e6,
+    }
+    return due[index]
+
+
+def encoded(d: Described) -> bytes:
+    """The default of an object as its bytes."""
+    if isinstance(d.default, str):
+        return d.default.encode()
+    size = d.data_bytes or 0
+    if d.real:
+        return struct.pack("<f" if size == 4 else "<d", d.default)
+    return (int(d.default) & ((1 << 8 * size) - 1)).to_bytes(size, "little")
+
+
+@proves("PSA2-CAN-12")
+@check("dictionary")
+def objects_have_type_rights_default_and_limits(e: Evidence) -> str:
+    """Read every object of the EDS, and write what it must refuse."""
+    rows: list[Row] = fact(e, "rows")
+    beyond = int(row_for(e, "PSA2-FORM-07").limit("abort_code"))
+    for r in rows:
+        d, name = r.due, f"{r.due.index:04X}h:{r.due.sub} {r.due.name}"
+        if d.access == "wo":
+            if r.abort != WRITE_ONLY:
+                raise Broken(f"{name} read: abort {r.abort:08X}h", f"{WRITE_ONLY:08X}h")
+            continue
+        if r.abort:
+            raise Broken(f"{name} read: abort {r.abort:08X}h", "its value")
+        if d.data_bytes is not None and len(r.raw) != d.data_bytes:
+            raise Broken(f"{name} of {len(r.raw)} bytes", f"{d.data_bytes}")
+        if d.access in ("const", "rw") and d.default is not None and r.raw != encoded(d):
+            raise Broken(f"{name} {r.raw[::-1].hex().upper()}h", f"{d.default}")
+        if r.write is not None and r.write != (READ_ONLY if d.access in ("ro", "const") else beyond):
+            due = READ_ONLY if d.access in ("ro", "const") else beyond
+            raise Broken(f"a write to {name} answered by {r.write:08X}h", f"abort {due:08X}h")
+    return f"{len(rows)} objects"

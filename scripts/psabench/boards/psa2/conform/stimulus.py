@@ -1,0 +1,66 @@
+"""Scenes of PSA-2 and PSA-1."""
+
+from __future__ import annotations
+
+from psabench.conform.capture.log import Evidence
+from psabench.conform.dut import Subject, Take
+from psabench.conform.plan import scene
+
+SETUP_S = 0.22  # Res to the first frames takes 0.19 s
+STREAM_S = 0.4
+PERIOD_S, FRAME_TO_CAN_S, IN_FRAME_S, ON_BUS_S = 1e-3, 298e-6, 40e-6, 65e-6
+
+
+def into_a_frame(s: Subject, take: Take, lead_s: float = 0.0) -> None:
+    """Let time pass until a frame is under way on the line; only in lockstep can that be met."""
+    s.run_for(10 * PERIOD_S)
+    if not {"lockstep", "stamps"} <= s.probes or not take.frames:
+        return
+    fall_s = take.frames[-1].t_s / take.rate - FRAME_TO_CAN_S
+    ahead_s = (fall_s + IN_FRAME_S - lead_s - s.bench.time_s) % PERIOD_S
+    s.run_for(ahead_s)
+
+
+@scene("power_on", boards=("psa2",))
+def power_on(s: Subject) -> Evidence:
+    """Res in the middle of a frame, then until frames come: the set-up on all lines, boot-up, the first frames."""
+    s.wait_ready()
+    with s.take() as take:
+        s.unit.start()
+        into_a_frame(s, take, ON_BUS_S)
+        take.marks["reset"] = s.bench.time_s
+        s.reset()
+        s.run_for(0.01)
+        s.unit.start()
+        s.run_for(SETUP_S)
+        s.unit.stop()
+    return s.evidence("power_on", take)
+
+
+@scene("power_cycle", boards=("psa2",))
+def power_cycle(s: Subject) -> Evidence:
+    """The supply off in the middle of a frame, and on again until frames come."""
+    s.wait_ready()
+    with s.take() as take:
+        s.unit.start()
+        s.run_for(0.03)
+        into_a_frame(s, take)
+        take.marks["off"] = s.bench.time_s
+        s.power_cycle(0.02)
+        take.marks["on"] = s.bench.time_s
+        s.run_for(0.01)
+        s.unit.start()
+        s.run_for(SETUP_S)
+        s.unit.stop()
+    return s.evidence("power_cycle", take)
+
+
+@scene("stream", boards=("psa2",))
+def stream(s: Subject) -> Evidence:
+    """Some hundred frames, on the lines and on CAN."""
+    s.wait_ready()
+    with s.take() as take:
+        s.unit.start()
+        s.run_for(STREAM_S)
+        s.unit.stop()
+    return s.evidence("stream", take)

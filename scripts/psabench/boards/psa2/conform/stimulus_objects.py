@@ -1,0 +1,98 @@
+"""Scenes of PSA-2 and PSA-1 that read objects: identity, mirrors of a sample, the whole dictionary."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from psabench.boards.psa2.conform.stimulus_can import ACCEL, CONFIG0, TEMP, Answer, ask, changed, tell
+from psabench.conform.capture.log import Evidence
+from psabench.conform.dut import Subject
+from psabench.conform.plan import scene
+from psabench.errors import DeviceError
+from psabench.link.canopen_host import Described
+
+TEMP_PERIOD_S, CHANNEL_LOOKS = 10.25e-3, 4
+TRIES = 6  # in real time, on a busy machine, three answers may not come within one sample of 4 ms
+
+
+@scene("objects", boards=("psa2",))
+def objects(s: Subject) -> Evidence:
+    """Identity, width and mirrors. facts: read; mirrors, those of one sample, with its PDO in the log."""
+    wanted = [(0x2200, 1), (0x2200, 2), (0x2200, 3), (0x2200, 4), (0x2202, 2), (0x2202, 3), (0x2202, 4), (0x2202, 5)]
+    with changed(s), s.take(lines=False) as take:
+        take.facts["read"] = {
+            (i, sub): ask(s, i, sub) for i, sub in ((0x1008, 0), (0x1018, 2), (0x1018, 3), (0x2021, 0))
+        }
+        for axis in (1, 2, 3):
+            tell(s, 0x2210, axis, axis - 1)
+            tell(s, 0x2211, axis, 2)
+        tell(s, ACCEL[0], CONFIG0, 0x46)  # 250 SPS: a sample stands for 4 ms
+        s.run_for(0.4)
+        s.unit.start()
+        s.run_for(0.02)
+        found = []
+        for index, sub in (
+            *wanted,
+            (0x2201, 1),
+            (0x2201, 2),
+            (0x2201, 3),
+            *((i, k) for i in (0x6130, 0x9130) for k in (1, 2, 3)),
+        ):
+            found.append(_of_one_sample(s, index, sub))
+        for _ in range(CHANNEL_LOOKS):  # every temperature channel stands in one of them
+            s.run_for(TEMP_PERIOD_S)
+            found.append(_of_one_sample(s, 0x2202, 2))
+        s.run_for(0.02)
+        s.unit.stop()
+        take.facts["mirrors"] = found
+    return s.evidence("objects", take)
+
+
+def _of_one_sample(s: Subject, index: int, sub: int) -> tuple[int, int, Answer, Answer, Answer]:
+    """Object, sub-index, its value and the numbers of the samples that stood there before and after."""
+    for _ in range(TRIES):
+        before = ask(s, 0x2202, 1)
+        value = ask(s, index, sub)
+        after = ask(s, 0x2202, 1)
+        if before == after:
+            break
+    return index, sub, value, before, after
+
+
+@scene("dictionary", boards=("psa2",))
+def dictionary(s: Subject) -> Evidence:
+    """Every object of the EDS but the registers read, and written where a write is refused. facts: rows."""
+    with changed(s), s.take(lines=False) as take:
+        take.facts["rows"] = [_row(s, d) for d in s.unit.node.objects() if not (d.index in (*ACCEL, TEMP) and d.sub)]
+    return s.evidence("dictionary", take)
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """An object as the EDS has it, and as the board answers."""
+
+    due: Described
+    raw: bytes  # what was read
+    abort: int  # of the read
+    write: int | None  # abort code of a write of the same (read-only) or of one too many; None: none was tried
+
+
+def _row(s: Subject, d: Described) -> Row:
+    raw, abort, write = b"", 0, None
+    try:
+        raw = s.unit.node.read_raw(d.index, d.sub)
+    except DeviceError as e:
+        abort = e.abort_code
+    if d.access in ("ro", "const"):
+        write = _abort_of_write(s, d, raw or bytes(d.data_bytes or 1))
+    elif isinstance(d.high, int) and d.data_bytes in (1, 2) and d.high + 1 < 1 << 8 * d.data_bytes:
+        write = _abort_of_write(s, d, (d.high + 1).to_bytes(d.data_bytes, "little"))
+    return Row(d, raw, abort, write)
+
+
+def _abort_of_write(s: Subject, d: Described, data: bytes) -> int:
+    try:
+        s.unit.node.write_raw(d.index, d.sub, data)
+    except DeviceError as e:
+        return e.abort_code
+    return 0

@@ -1,0 +1,87 @@
+"""A PSA-2 unit over CAN: registers, stream, state; SI out. Written from docs/reference/protocol.md and the article.
+
+with CanHost(open_bus("socketcand:127.0.0.1:29536"), WallClock()) as host:
+    unit = Psa2(host, node_id=5)
+    unit.register("x", 1)          # CONFIG0 of converter X: 0x56
+    frames = unit.stream(100)      # 100 samples, volts at the loads
+"""
+
+from __future__ import annotations
+
+from psabench.board_names import DBC_NODE
+from psabench.boards.psa2.frames import Form, FrameReader, Frames
+from psabench.boards.unit import Unit
+from psabench.errors import LinkError
+from psabench.link.can_host import CanHost
+from psabench.link.protocol_files import message
+from psabench.link.signals import layout
+
+REGISTERS = {"x": 0x2000, "t": 0x2001, "y": 0x2003, "z": 0x2004}  # objects; sub-index = register + 1
+OPCODE = {"accel": 1, "temp": 2}  # sub-index of 2010h
+CONFIG0, DRATE = 0x01, 0x03
+
+# Output words a second at 4.096 MHz by the DR field of CONFIG0 (converter data sheet).
+DATA_HZ = {0: 250, 1: 500, 2: 1000, 3: 2000, 4: 4000}
+SETTLE_PERIODS = 64  # 62.98 data periods and 468 clocks from a step to a settled word, rounded up
+SETUP_S = 0.5  # after Res: self-calibrations of the temperature converter, then the filters settle
+
+
+class Psa2(Unit):
+    """One unit on the bus.
+
+    Raises DeviceError with the unit's abort code when it refuses, LinkError when it does not answer.
+    """
+
+    board = "psa2"
+    title = "PSA-2"
+    reading_s = 0.004
+    frames: FrameReader
+
+    def __init__(self, host: CanHost, node_id: int = DBC_NODE) -> None:
+        super().__init__(host, node_id)
+
+    def _reader(self, node_id: int) -> FrameReader:
+        return FrameReader(node_id)
+
+    def opcode(self, group: str, code: int) -> None:
+        """Send one command byte to the converters of group "accel" or "temp"."""
+        self.node.write(0x2010, OPCODE[group], code)
+
+    @property
+    def data_hz(self) -> int:
+        """Samples a second, from CONFIG0."""
+        return DATA_HZ[self.register("x", CONFIG0) >> 3 & 7]
+
+    @property
+    def form(self) -> Form:
+        return Form(int(self.node.read(0x2020)))
+
+    @form.setter
+    def form(self, form: Form) -> None:
+        self.node.write(0x2020, 0, int(form))
+
+    def wait_ready(self, patience_s: float = 5.0) -> None:
+        """Until the set-up after Res is over: the controller then serves its registers and frames are settled.
+
+        Raises LinkError when the unit is not ready after patience_s of bench time.
+        """
+        deadline_s = self.host.clock.now_s() + patience_s
+        while self.host.clock.now_s() < deadline_s:
+            self.stop()
+            if self.stream(1).settled.all():
+                return
+        raise LinkError(f"node {self.node.node_id}: frames are not settled after {patience_s:g} s")
+
+    def stream(self, count: int, patience_s: float = 5.0) -> Frames:
+        """The next `count` samples; the stream runs only meanwhile. Raises LinkError when fewer come in patience_s."""
+        self._gather(count, patience_s)
+        return self.frames.take().head(count)
+
+    def words_v(self) -> tuple[float, float, float]:
+        """Volts at the loads X, Y, Z of the latest conversion, from the whole 32-bit words (object 2201h).
+
+        31 significant bits: 9.3 nV a step, where a code of the stream has 1.19 uV. Needs a profile that reads 32 bits.
+        """
+        full_scale_v = layout(message("PSA2_XY"))["X"].scale * 2**23
+        x, y, z = (int(self.node.read(0x2201, sub)) / 2**31 * full_scale_v for sub in (1, 2, 3))
+        return x, y, z

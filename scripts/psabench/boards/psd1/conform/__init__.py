@@ -1,0 +1,1 @@
+"""The conformance tests of PSD-1: stimulus, capture, check."""

@@ -1,0 +1,186 @@
+"""A unit over CAN, whatever its board: registers, bus cycles, counters, stream, state (docs/reference/protocol*.md).
+
+`boards.registry` has a class for each board, and `identify` there finds which of them answers at a node.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import ClassVar
+
+from psabench.boards.psa2.frames import FrameReader, Frames
+from psabench.boards.readings import ReadingLayout, ReadingReader, Readings
+from psabench.errors import CycleRefused, DeviceError, LinkError
+from psabench.link.can_host import CanHost
+from psabench.link.canopen_host import CanopenNode
+from psabench.link.protocol_files import dbc_node
+from psabench.places import proto_file
+
+NMT_START, NMT_STOP, NMT_PREOP, NMT_RESET_NODE, NMT_RESET_COMMUNICATION = 0x01, 0x02, 0x80, 0x81, 0x82
+
+# Objects that are registers, by what they are called here; sub-index = address + 1.
+BANKS: Mapping[str, int] = {"x": 0x2000, "y": 0x2003, "z": 0x2004, "t": 0x2001, "bus": 0x2002}
+ERROR_REGISTER, NAME, IDENTITY = 0x1001, 0x1008, 0x1018
+TPDO_OFF = 0x80000000  # bit 31 of 1800h..:1
+COUNTERS, REFUSAL, STROBE_NS = 0x2030, 0x2031, 0x2051
+
+
+class Unit:
+    """One unit on the bus; a board's class says what its readings are.
+
+    Raises DeviceError with the unit's abort code when it refuses, LinkError when it does not answer.
+    """
+
+    board: ClassVar[str]  # as the EDS and the emulator call it: "psd1"
+    title: ClassVar[str]  # object 1008h: "PSD-1"
+    layout: ClassVar[ReadingLayout]
+    reading_s: ClassVar[float] = 0.01  # patience for one reading, bench time
+
+    def __init__(self, host: CanHost, node_id: int | None = None) -> None:
+        """node_id: None for the board's default."""
+        node_id = dbc_node(self.board) if node_id is None else node_id
+        self.host = host
+        self.node = CanopenNode(host, node_id, proto_file(f"{self.board}.eds"))
+        self.frames: FrameReader | ReadingReader = self._reader(node_id)
+        self.banks = {name: index for name, index in BANKS.items() if self.node.has(index)}
+        host.listeners.append(self.frames.on_message)
+
+    def _reader(self, node_id: int) -> FrameReader | ReadingReader:
+        return ReadingReader(self.layout, node_id)
+
+    # ---- registers
+
+    def registers(self, bank: str) -> dict[int, str]:
+        """Addresses and names of the registers of a bank, from the EDS. Raises ValueError for a bank it has not."""
+        return {sub - 1: name for sub, name in self.node.names(self._bank(bank)).items()}
+
+    def register(self, bank: str, address: int) -> int:
+        """A register: of converter "x", "y", "z" or "t", or by a read cycle on the board's "bus"."""
+        if bank == "bus":
+            return self.bus_read(address)
+        return int(self.node.read(self._bank(bank), address + 1))
+
+    def write_register(self, bank: str, address: int, value: int) -> None:
+        """Write one register."""
+        if bank == "bus":
+            self.bus_write(address, value)
+            return
+        self.node.write(self._bank(bank), address + 1, value)
+
+    def _bank(self, bank: str) -> int:
+        if bank not in self.banks:
+            raise ValueError(f"{bank!r}; a {self.title} has {', '.join(self.banks) or 'no registers'}")
+        return self.banks[bank]
+
+    # ---- the parallel bus
+
+    def bus_read(self, address: int, strobe_ns: int | None = None) -> int:
+        """A read cycle on the board's parallel bus; strobe_ns: of this strobe and the next ones (0: the profile's).
+
+        Raises CycleRefused with the board's own words (object 2031h).
+        """
+        self._strobe(strobe_ns)
+        try:
+            data = self.node.read_raw(self._bank("bus"), address + 1)
+        except DeviceError as e:
+            raise self._in_words(e) from e
+        return int.from_bytes(data, "little")
+
+    def bus_write(self, address: int, value: int, strobe_ns: int | None = None) -> None:
+        """A write cycle. Raises CycleRefused."""
+        self._strobe(strobe_ns)
+        if not 0 <= value <= 0xFFFF:
+            raise ValueError(f"value is {value}; a word of the bus has 16 bits")
+        try:
+            self.node.write_raw(self._bank("bus"), address + 1, value.to_bytes(2, "little"))
+        except DeviceError as e:
+            raise self._in_words(e) from e
+
+    def _strobe(self, strobe_ns: int | None) -> None:
+        if strobe_ns is not None:
+            self.node.write(STROBE_NS, 0, strobe_ns)
+
+    def _in_words(self, e: DeviceError) -> CycleRefused:
+        return CycleRefused(e.what, e.abort_code, self.refusal() or e.text)
+
+    def refusal(self) -> str:
+        """Object 2031h: why a bus cycle or a setting was refused last, in words; "": nothing was."""
+        return str(self.node.read(REFUSAL))
+
+    # ---- as a whole
+
+    def serial(self) -> int:
+        """Of the specimen."""
+        return int(self.node.read(IDENTITY, 4))
+
+    def counters(self) -> dict[str, int]:
+        """Object 2030h by name."""
+        subs = self.node.names(COUNTERS)
+        return {name: int(self.node.read(COUNTERS, sub)) for sub, name in subs.items()}
+
+    def wait_ready(self, patience_s: float = 5.0) -> None:
+        """Until readings come. Raises LinkError when the unit is not ready after patience_s of bench time."""
+        self.stop()
+        self.stream(1, patience_s)
+
+    def start(self) -> None:
+        """Readings flow from now on."""
+        self.node.nmt(NMT_START)
+
+    def stop(self) -> None:
+        """Readings stop; SDO still answers (NMT pre-operational). What was on its way has arrived afterwards."""
+        self.node.nmt(NMT_PREOP)
+        self.node.read(
+            ERROR_REGISTER
+        )  # readings go before SDO answers on the bus: this one comes after the last of them
+        self.frames.forget_half()
+
+    def reset(self) -> None:
+        """A pulse on the board's reset: everything falls back to its defaults and is set up anew."""
+        self.node.nmt(NMT_RESET_NODE)
+
+    def stream(self, count: int, patience_s: float = 5.0) -> Frames | Readings:
+        """The next `count` readings; the stream runs only meanwhile. Raises LinkError when fewer come in patience_s."""
+        self._gather(count, patience_s)
+        return self.frames.take().head(count)
+
+    def _gather(self, count: int, patience_s: float) -> None:
+        self.frames.forget()
+        self.start()
+        came = self.host.pump_until(lambda: len(self.frames) >= count, patience_s + count * self.reading_s)
+        self.stop()
+        if not came:
+            raise LinkError(
+                f"node {self.node.node_id}: {len(self.frames)} of {count} samples came in {patience_s:g} s; "
+                "is the board set up and the frame form one that this link carries?"
+            )
+
+
+class BusUnit(Unit):
+    """A board of which a reading is a row of signals."""
+
+    frames: ReadingReader
+
+    def also(self, *messages: str) -> None:
+        """Switch on messages that are off by default; they belong to each reading from now on, until a reset.
+
+        Raises ValueError for one that the board has not.
+        """
+        tpdos = {
+            self.node.title(0x1800 + k).partition(":")[0]: 0x1800 + k for k in range(8) if self.node.has(0x1800 + k)
+        }
+        for name in messages:
+            if name not in tpdos:
+                raise ValueError(f"{name!r}; a {self.title} sends {', '.join(tpdos)}")
+            self.node.write(tpdos[name], 1, int(self.node.read(tpdos[name], 1)) & ~TPDO_OFF)
+        wanted = {*self.frames.layout.messages, *messages}
+        self.host.listeners.remove(self.frames.on_message)
+        in_order = tuple(name for name in tpdos if name in wanted)
+        self.frames = ReadingReader(replace(self.frames.layout, messages=in_order), self.node.node_id)
+        self.host.listeners.append(self.frames.on_message)
+
+    def stream(self, count: int, patience_s: float = 5.0) -> Readings:
+        """The next `count` readings; the stream runs only meanwhile. Raises LinkError when fewer come in patience_s."""
+        self._gather(count, patience_s)
+        return self.frames.take().head(count)

@@ -1,0 +1,325 @@
+"""Cycles of the parallel bus by object 2002h (docs/reference/protocol_psd1.md, Bus cycles)."""
+
+from __future__ import annotations
+
+from psabench.boards.unit import REFUSAL, STROBE_NS
+from psabench.conform.capture.bus_cycles import BUS, LINES, TAIL_S, harmless, quiet, registers, say, strobes, tell
+from psabench.conform.dut import Subject
+from psabench.conform.plan import trial
+from psabench.conform.proves import proves
+from psabench.conform.raw_can import ABORT, DEVICE_TYPE, NMT_RESET, Talk, read, talk, words, write
+from psabench.conform.requirements import requirements
+from psabench.conform.verdict import Broken, TooLittle
+
+DONE, REFUSED = "Bus cycles", "Bus cycles refused"
+LONG_NS, LONGEST_NS = 10_000_000, 100_000_000
+ADDRESSES = 16  # of the bus: AB0..AB3
+SOON_S = 0.002
+
+
+def _limit(row: str, name: str) -> float:
+    return requirements().rows[row].limit(name)
+
+
+def _strobe(t: Talk, length_ns: int) -> None:
+    t.download(STROBE_NS, 0, length_ns.to_bytes(4, "little"))
+
+
+def _read(address: int) -> bytes:
+    return read(BUS, address + 1)
+
+
+@proves("BUS-CYC-01")
+@trial(needs={"can", "pins"})
+def an_object_is_a_cycle(s: Subject) -> str:
+    """Upload every readable register of 2002h and write one; look at the lines of the bus."""
+    told = 0
+    with talk(s, reset=True) as t:
+        s.wait_ready()
+        where, word = harmless(s)
+        for address, access in registers(s).values():
+            if access == "wo":
+                continue
+            with s.take() as take:
+                answer = t.ask(_read(address))
+                s.run_for(TAIL_S)
+            if answer[0] == ABORT or take.lines is None:
+                continue  # a word that does not wait
+            found = strobes(take.lines).at(address)
+            value = int.from_bytes(answer[4:6], "little")
+            if not any(found.data[k] == value and not found.write[k] for k in range(len(found))):
+                raise Broken(
+                    f"{len(found)} strobes at address {address:X}h, none of them a read of {value:04X}h",
+                    "a strobe with address and word",
+                    lines=LINES,
+                )
+            told += 1
+        with s.take() as take:
+            t.download(BUS, where + 1, word.to_bytes(2, "little"))
+            s.run_for(TAIL_S)
+        assert take.lines is not None
+        found = strobes(take.lines).at(where)
+        if len(found) != 1 or not found.write[0] or found.data[0] != word:
+            raise Broken(f"{len(found)} strobes at {where:X}h for a write", "one write with its word", lines=LINES)
+    return f"{told} reads and a write, each a strobe with its address and word"
+
+
+@proves("BUS-CYC-02")
+@trial(needs={"can", "pins", "exact"})
+def a_strobe_is_as_long_as_it_is_set(s: Subject) -> str:
+    """Cycles with 2051h at 0, 200, 1234 ns and 1 ms: CS low."""
+    told = []
+    with talk(s, reset=True) as t:
+        s.wait_ready()
+        address = quiet(s)
+        for length_ns in (0, int(_limit("BUS-CYC-05", "strobe_min_ns")), 1234, 1_000_000):
+            _strobe(t, length_ns)
+            with s.take() as take:
+                t.upload(BUS, address + 1)
+                s.run_for(TAIL_S)
+            assert take.lines is not None
+            found = strobes(take.lines).at(address)
+            due = length_ns or int(s.variant["strobe_ns"])
+            low = (found.rise_ns - found.fall_ns).tolist()
+            if low != [due]:
+                at = int(found.fall_ns[0]) if len(found) else None
+                raise Broken(f"CS low for {low} ns with 2051h = {length_ns}", f"once, {due} ns", at_ns=at, lines=LINES)
+            told.append(f"{length_ns}: {due} ns")
+    return "; ".join(told)
+
+
+@proves("BUS-CYC-02", "BUS-CYC-03")
+@trial(needs={"can", "stamps"})
+def the_answer_waits_for_the_strobe(s: Subject) -> str:
+    """A strobe of 10 ms: the time from the answer before to that of the cycle."""
+    with talk(s, reset=True) as t:
+        s.wait_ready()
+        before = t.answer_to(write(STROBE_NS, 0, LONG_NS.to_bytes(4, "little")))
+        after = t.answer_to(_read(quiet(s)))
+    took_s = after.t_s - before.t_s
+    if after.data[0] == ABORT or took_s < LONG_NS * 1e-9 - s.slack_s(LONG_NS * 1e-9):
+        raise Broken(f"{words(after.data)} {took_s:.6f} s later", f"its word after {LONG_NS * 1e-9} s", frames=[after])
+    return f"answered {took_s * 1e3:.3f} ms after the strobe was set to {LONG_NS * 1e-6:g} ms"
+
+
+@proves("BUS-CYC-03")
+@trial(needs={"can", "pins", "lockstep", "stamps"})
+def cs_rises_before_the_answer(s: Subject) -> str:
+    """A strobe of 1 ms: the rise of CS beside the answer."""
+    with talk(s, reset=True) as t:
+        s.wait_ready()
+        _strobe(t, 1_000_000)
+        with s.take() as take:
+            answer = t.answer_to(_read(quiet(s)))
+            s.run_for(TAIL_S)
+        assert take.lines is not None
+        found = strobes(take.lines).at(quiet(s))
+    if len(found) != 1 or answer.t_s * 1e9 < found.rise_ns[0]:
+        rise = found.rise_ns.tolist()
+        raise Broken(f"CS rises at {rise} ns, the answer ends at {answer.t_s * 1e9:.0f} ns", "CS first", lines=LINES)
+    return f"CS rises {answer.t_s * 1e6 - found.rise_ns[0] * 1e-3:.1f} us before the end of the answer"
+
+
+@proves("BUS-CYC-04")
+@trial()
+def refusals_have_their_codes(s: Subject) -> str:
+    """Cycles at no address, writes to what is read-only, reads of what is write-only: code, counter, text."""
+    row = requirements().rows["BUS-CYC-04"]
+    of = registers(s)
+    read_only = next(a for a, access in of.values() if access == "ro")
+    write_only = next((a for a, access in of.values() if access == "wo"), None)
+    wrong = [(write(BUS, read_only + 1, b"\0\0"), "read_only_code")]
+    taken = {a for a, _ in of.values()}
+    wrong += [(_read(a), "no_address_code") for a in range(ADDRESSES) if a not in taken]
+    if write_only is not None:
+        wrong.append((_read(write_only), "write_only_code"))
+    with talk(s, reset=True) as t:
+        s.wait_ready()
+        for request, code in wrong:
+            before = t.counter(REFUSED)
+            t.refused(request, row.limit(code), f"cycle {words(request[:4])}")
+            if t.counter(REFUSED) - before != 1:
+                raise Broken(f"{t.counter(REFUSED) - before} refused cycles counted after one", "1")
+            if not t.upload(REFUSAL):
+                raise Broken("2031h is empty after a refused cycle", "why")
+    return f"{len(wrong)} kinds of refusal, each with its code, counted and explained"
+
+
+@proves("BUS-CYC-04")
+@trial(needs={"can", "lockstep"})
+def a_word_that_does_not_wait_is_refused(s: Subject) -> str:
+    """Reset node, and the word at address 0 before there is one; no host but one in lockstep is sure to ask so soon."""
+    row = requirements().rows["BUS-CYC-04"]
+    with talk(s, reset=True) as t:
+        s.wait_ready()
+        t.reset(NMT_RESET)
+        t.refused(_read(0), row.limit("state_code"), "a word before the first reading")
+    return f"refused with {int(row.limit('state_code')):08X}h"
+
+
+@proves("BUS-CYC-05")
+@trial()
+def a_short_strobe_is_refused(s: Subject) -> str:
+    """2051h one less than the least, a cycle; the least, a cycle."""
+    least, code = int(_limit("BUS-CYC-05", "strobe_min_ns")), _limit("BUS-CYC-05", "abort_code")
+    with talk(s, reset=True) as t:
+        s.wait_ready()
+        done = t.counter(DONE)
+        _strobe(t, least - 1)
+        t.refused(_read(quiet(s)), code, f"a strobe of {least - 1} ns")
+        if t.counter(DONE) != done:
+            raise Broken("a cycle was carried out", "none")
+        _strobe(t, least)
+        t.upload(BUS, quiet(s) + 1)
+    return f"{least - 1} ns refused, {least} ns taken"
+
+
+@proves("BUS-CYC-05")
+@trial(needs={"bus"})
+def a_short_strobe_is_refused_by_the_port(s: Subject) -> str:
+    """R with a strobe one less than the least, and with the least."""
+    least = int(_limit("BUS-CYC-05", "strobe_min_ns"))
+    answers = say(s, f"R {quiet(s):X} {least - 1}", f"R {quiet(s):X} {least}")
+    if not answers[0].startswith("E too-short R") or not answers[1].startswith("R "):
+        raise Broken(f"{answers}", "E too-short, then the word")
+    return "; ".join(answers)
+
+
+@proves("BUS-CYC-06")
+@trial(needs={"can", "bus"})
+def a_second_cycle_is_refused(s: Subject) -> str:
+    """A long cycle over CAN, another by the bus port meanwhile; then the other way round."""
+    code = int(_limit("BUS-CYC-06", "abort_code"))
+    with talk(s, reset=True) as t:
+        s.wait_ready()
+        address = quiet(s)
+        _strobe(t, LONGEST_NS)
+        at = len(t.heard)
+        t.send(t.sdo_rx, _read(address))
+        s.run_for(SOON_S)
+        answer = say(s, f"R {address:X}")[0]
+        if any(f.can_id == t.sdo_tx for f in t.heard[at:]):
+            raise TooLittle("the long cycle was over before the other one began")
+        if not answer.startswith("E busy R"):
+            raise Broken(answer, "E busy")
+        t.until(lambda: any(f.can_id == t.sdo_tx for f in t.heard[at:]))
+        _strobe(t, 0)
+        found = _while_the_port_is_busy(t, address)
+        s.run_for(1.1 * LONGEST_NS * 1e-9)
+        tell(s)
+    if found != code:
+        raise Broken(f"{'a word' if found is None else f'{found:08X}h'} while the port's cycle runs", f"{code:08X}h")
+    return f"{answer}; abort {code:08X}h"
+
+
+def _while_the_port_is_busy(t: Talk, address: int) -> int | None:
+    assert t.s.port is not None
+    t.s.port.ask(f"R {address:X} {LONGEST_NS}")
+    t.s.run_for(SOON_S)
+    return t.abort_of(_read(address))
+
+
+@proves("BUS-CYC-07")
+@trial(needs={"can", "bus"})
+def a_reset_cuts_a_cycle(s: Subject) -> str:
+    """NMT 81h in a strobe of 100 ms of the bus port: the answer, and a cycle after it."""
+    with talk(s, reset=True) as t:
+        s.wait_ready()
+        address = quiet(s)
+        assert s.port is not None
+        s.port.ask(f"R {address:X} {LONGEST_NS}")
+        s.run_for(SOON_S)
+        t.reset(NMT_RESET)
+        answer = tell(s)
+        if not answer.startswith(f"E off R {address:02X}h"):
+            raise Broken(answer, f"E off R {address:02X}h")
+        s.wait_ready()
+        t.upload(BUS, address + 1)
+    return f"{answer}; cycles go on"
+
+
+@proves("BUS-CYC-07")
+@trial(needs={"can", "pins"})
+def a_cut_cycle_leaves_the_lines_at_rest(s: Subject) -> str:
+    """NMT 81h in a strobe of 100 ms: CS."""
+    with talk(s, reset=True) as t:
+        s.wait_ready()
+        _strobe(t, LONGEST_NS)
+        with s.take() as take:
+            t.send(t.sdo_rx, _read(quiet(s)))
+            s.run_for(SOON_S)
+            t.nmt(NMT_RESET)
+            s.run_for(SOON_S)
+        assert take.lines is not None
+        low, high = strobes(take.lines).at(quiet(s)), take.lines["CS"].level[-1]
+    if not len(low) or not high:
+        raise Broken(f"{len(low)} strobes that ended, CS {'high' if high else 'low'} after the reset", "one, CS high")
+    return f"CS rises {(low.rise_ns[-1] - low.fall_ns[-1]) * 1e-6:.3f} ms after its fall"
+
+
+@proves("BUS-CYC-08")
+@trial()
+def other_lengths_are_no_cycle(s: Subject) -> str:
+    """1, 3 and 4 bytes to a register that takes a word."""
+    row = requirements().rows["BUS-SDO-11"]
+    with talk(s, reset=True) as t:
+        s.wait_ready()
+        sub = harmless(s)[0] + 1
+        before = t.counter(DONE)
+        for n, code in ((1, "short_code"), (3, "long_code"), (4, "long_code")):
+            t.refused(write(BUS, sub, bytes(n)), row.limit(code), f"{n} bytes")
+        if t.counter(DONE) != before:
+            raise Broken(f"{t.counter(DONE) - before} cycles", "none")
+    return "1, 3 and 4 bytes are refused, and no cycle runs"
+
+
+@proves("BUS-CYC-09")
+@trial()
+def cycles_are_counted(s: Subject) -> str:
+    """Five reads and three writes."""
+    with talk(s, reset=True) as t:
+        s.wait_ready()
+        where, word = harmless(s)
+        before = t.counter(DONE)
+        for _ in range(5):
+            t.upload(BUS, quiet(s) + 1)
+        for _ in range(3):
+            t.download(BUS, where + 1, word.to_bytes(2, "little"))
+        counted = t.counter(DONE) - before
+    if counted != 8:
+        raise Broken(f"{counted} cycles counted after 8", "8")
+    return "8 of 8"
+
+
+@proves("BUS-CYC-10")
+@trial()
+def a_strobe_that_is_too_long_is_refused(s: Subject) -> str:
+    """2051h one more than the most, and the most."""
+    row = requirements().rows["BUS-CYC-10"]
+    most = int(row.limit("strobe_max_ns"))
+    with talk(s, reset=True) as t:
+        over = write(STROBE_NS, 0, (most + 1).to_bytes(4, "little"))
+        t.refused(over, row.limit("abort_code"), f"{most + 1} ns")
+        _strobe(t, most)
+    return f"{most} ns taken, {most + 1} ns refused"
+
+
+@proves("BUS-CYC-11")
+@trial()
+def who_gives_up_finds_the_bus_busy(s: Subject) -> str:
+    """Abort a cycle of 100 ms, ask for another at once, and again until the bus is free."""
+    code = int(_limit("BUS-CYC-06", "abort_code"))
+    with talk(s, reset=True) as t:
+        s.wait_ready()
+        address = quiet(s)
+        _strobe(t, LONGEST_NS)
+        t.send(t.sdo_rx, _read(address))
+        t.send(t.sdo_rx, bytes([ABORT]) + _read(address)[1:])
+        found = t.abort_of(_read(address))
+        if found != code:
+            raise Broken(f"{'a word' if found is None else f'{found:08X}h'} right after giving up", f"{code:08X}h")
+        s.run_for(1.1 * LONGEST_NS * 1e-9)
+        _strobe(t, 0)
+        t.upload(BUS, address + 1)
+        t.ask(read(DEVICE_TYPE))
+    return f"abort {code:08X}h meanwhile, free after it"

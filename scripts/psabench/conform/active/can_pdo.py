@@ -1,0 +1,290 @@
+"""SYNC, communication parameters of TPDOs, history of errors of every board (CiA 301, 7.5.2).
+
+What is due is counted in readings (2030h sub 1), so that no clock of ours judges.
+"""
+
+from __future__ import annotations
+
+import itertools
+
+from psabench.conform.capture.log import CanFrame
+from psabench.conform.dut import Subject
+from psabench.conform.plan import trial
+from psabench.conform.proves import proves
+from psabench.conform.raw_can import COUNTERS, NMT_START, OFF, TPDO, Talk, talk, words, write
+from psabench.conform.requirements import requirements
+from psabench.conform.stimulus.flood import flood
+from psabench.conform.verdict import Broken, TooLittle
+
+READINGS, PATIENCE_S = 1, 5.0  # sub-index of 2030h
+FEW = 4  # readings in which something should come, or nothing
+FREE_ID = 0x1F0  # of no service and no message of a node below 112
+LONG_ID = 0x800  # the first that 11 bits do not hold
+EVENT, SYNC_NEW = 254, 0
+INHIBIT_S = 0.05
+HISTORY, OVERLOADS = 0x1003, 9
+FLOOD_S, CALM_S = 0.3, 1.3
+
+
+def _limit(row: str, name: str) -> float:
+    return requirements().rows[row].limit(name)
+
+
+def _first(t: Talk) -> tuple[int, int]:
+    """Object and identifier of the first TPDO that is sent as the board comes."""
+    k, can_id = next(iter(t.pdos.items()))
+    return TPDO + k - 1, can_id
+
+
+def _readings(t: Talk, count: int) -> tuple[int, int, int]:
+    """Let so many readings be made: how many there were, and what was heard meanwhile, from where to where."""
+    begin, at = t.look(COUNTERS, READINGS)
+    now, end = begin, at
+    for _ in range(2000):
+        if now - begin >= count:
+            break
+        t.s.run_for(0.002)
+        now, end = t.look(COUNTERS, READINGS)
+    else:
+        raise TooLittle(f"{now - begin} readings in 4 s; {count} are wanted")
+    return now - begin, at, end
+
+
+def _sent(t: Talk, at: int, can_id: int, end: int | None = None) -> list[CanFrame]:
+    return [f for f in t.heard[at:end] if f.can_id == can_id and not f.error]
+
+
+def _begin(t: Talk, kind: int) -> tuple[int, int]:
+    """Ready and operational, the first TPDO with this transmission type, a reading there for it."""
+    t.s.wait_ready()
+    index, can_id = _first(t)
+    t.download(index, 2, bytes([kind]))
+    t.nmt(NMT_START)
+    _readings(t, FEW)
+    return index, can_id
+
+
+@proves("BUS-SYNC-01")
+@trial()
+def syncs_are_counted(s: Subject) -> str:
+    """SYNCs without a byte and with a counter of 0, 7 and 255; one of two bytes."""
+    with talk(s) as t:
+        before = t.counter("SYNCs")
+        for data in (b"", b"\0", b"\7", b"\xff"):
+            t.send(t.sync_id, data)
+        counted = t.counter("SYNCs") - before
+    if counted != 4:
+        raise Broken(f"{counted} of 4 SYNCs counted", "4")
+    return "4 of 4 counted, whatever their counter"
+
+
+@proves("BUS-SYNC-02")
+@trial(needs={"can", "stream"})
+def event_types_send_each_reading(s: Subject) -> str:
+    """Transmission types 254 and 255: frames and readings of the same while."""
+    told = []
+    for kind in (255, EVENT):
+        with talk(s, reset=True) as t:
+            _, can_id = _begin(t, kind)
+            count, at, end = _readings(t, 20)
+            came = len(_sent(t, at, can_id, end))
+            if abs(came - count) > 1:
+                raise Broken(
+                    f"{came} frames {can_id:03X}h of {count} readings with type {kind}", f"{count}, give or take 1"
+                )
+            told.append(f"{kind}: {came} frames, {count} readings")
+    return "; ".join(told)
+
+
+@proves("BUS-SYNC-03")
+@trial(needs={"can", "stream"})
+def type_0_sends_new_readings_at_sync(s: Subject) -> str:
+    """Transmission type 0: no SYNC; one SYNC after a reading; a burst of SYNCs."""
+    with talk(s, reset=True) as t:
+        _, can_id = _begin(t, SYNC_NEW)
+        t.fence()
+        _silent(t, can_id)
+        came = _sent_by(t, can_id, t.after((t.sync_id, b"")))
+        if came != 1:
+            raise Broken(f"{came} frames at a SYNC after a reading", "1")
+        begin = t.number(COUNTERS, READINGS)
+        came = _sent_by(t, can_id, t.after(*[(t.sync_id, b"")] * 40))
+        count = t.number(COUNTERS, READINGS) - begin
+        if came > count + 1:
+            raise Broken(f"{came} frames at 40 SYNCs, while {count} readings were made", f"{count + 1} at most")
+    return f"none without SYNC, 1 at a SYNC, {came} at 40 SYNCs and {count} readings"
+
+
+def _sent_by(t: Talk, can_id: int, frames: list[CanFrame]) -> int:
+    """How many of this identifier, those included that still wait for the bus behind the answer."""
+    late = [f for f in t.fence() if f.can_id == can_id]
+    return len([f for f in frames if f.can_id == can_id]) + len(late)
+
+
+def _silent(t: Talk, can_id: int) -> None:
+    """Raises Broken for a frame while readings are made."""
+    count, at, end = _readings(t, FEW)
+    came = _sent(t, at, can_id, end)
+    if came:
+        raise Broken(f"{len(came)} frames {can_id:03X}h in {count} readings", "none", frames=came)
+
+
+@proves("BUS-SYNC-04")
+@trial(needs={"can", "stream"})
+def type_n_sends_at_every_nth_sync(s: Subject) -> str:
+    """Transmission types 1, 3 and 240: frames at 6, 9 and 480 SYNCs."""
+    told = []
+    with talk(s, reset=True) as t:
+        index, can_id = _begin(t, SYNC_NEW)
+        for n, syncs in ((1, 6), (3, 9), (240, 480)):
+            t.download(index, 2, bytes([n]))
+            _silent(t, can_id)
+            came = 0
+            for k in range(0, syncs, 30):
+                came += _sent_by(t, can_id, t.after(*[(t.sync_id, b"")] * min(30, syncs - k)))
+            if came != syncs // n:
+                raise Broken(f"{came} frames at {syncs} SYNCs with type {n}", f"{syncs // n}")
+            told.append(f"{n}: {came} of {syncs}")
+    return "; ".join(told)
+
+
+@proves("BUS-SYNC-05")
+@trial()
+def reserved_types_are_refused(s: Subject) -> str:
+    """Write the transmission types 241 to 253."""
+    row = requirements().rows["BUS-SYNC-05"]
+    low, high = int(row.limit("type_min")), int(row.limit("type_max"))
+    with talk(s) as t:
+        index, _ = _first(t)
+        for kind in range(low, high + 1):
+            t.refused(write(index, 2, bytes([kind])), row.limit("abort_code"), f"type {kind}")
+    return f"{low} to {high} are refused"
+
+
+@proves("BUS-PDO-01")
+@trial(needs={"can", "stream"})
+def a_tpdo_that_is_off_is_not_sent(s: Subject) -> str:
+    """Set bit 31 of 18xxh sub 1 while readings are made, and clear it."""
+    off = int(_limit("BUS-PDO-01", "off_mask"))
+    with talk(s, reset=True) as t:
+        index, can_id = _begin(t, EVENT)
+        t.readings(1, can_id)
+        cob = t.number(index, 1)
+        t.download(index, 1, (cob | off).to_bytes(4, "little"))
+        t.fence()
+        _silent(t, can_id)
+        t.download(index, 1, (cob & ~off).to_bytes(4, "little"))
+        t.readings(1, can_id)
+    return f"{can_id:03X}h: none with bit 31, and again without"
+
+
+@proves("BUS-PDO-02")
+@trial(needs={"can", "stream"})
+def the_identifier_of_a_tpdo(s: Subject) -> str:
+    """Another identifier while it is valid; services, more than 11 bits, RTR; another one while it is off."""
+    code = _limit("BUS-PDO-02", "abort_code")
+    with talk(s, reset=True) as t:
+        index, can_id = _begin(t, EVENT)
+        cob = t.number(index, 1) & ~0x7FF
+        t.refused(write(index, 1, (cob | FREE_ID).to_bytes(4, "little")), code, f"{FREE_ID:03X}h while valid")
+        t.download(index, 1, (cob | can_id | OFF).to_bytes(4, "little"))
+        for service in (t.nmt_id, t.sync_id, t.emcy, t.sdo_tx, t.sdo_rx, t.heartbeat):
+            word = (cob | service | OFF).to_bytes(4, "little")
+            t.refused(write(index, 1, word), code, f"{service:03X}h")
+        for other, what in ((cob | LONG_ID | OFF, "more than 11 bits"), (FREE_ID | OFF, "RTR allowed")):
+            t.refused(write(index, 1, other.to_bytes(4, "little")), code, what)
+        t.download(index, 1, (cob | FREE_ID | OFF).to_bytes(4, "little"))
+        t.download(index, 1, (cob | FREE_ID).to_bytes(4, "little"))
+        t.readings(FEW, FREE_ID)
+        at = len(t.heard)
+        t.readings(FEW, FREE_ID)
+        left = _sent(t, at, can_id)
+    if left:
+        raise Broken(f"frames {can_id:03X}h after it became {FREE_ID:03X}h", "none", frames=left)
+    return f"{can_id:03X}h became {FREE_ID:03X}h; services are refused, and any while it is valid"
+
+
+@proves("BUS-PDO-03")
+@trial(needs={"can", "stamps", "stream"})
+def the_inhibit_time_keeps_tpdos_apart(s: Subject) -> str:
+    """An inhibit time of 50 ms: the time between frames, and the count of those left out."""
+    row = requirements().rows["BUS-PDO-03"]
+    unit_s, late_s = row.limit("unit_us") * 1e-6, row.limit("jitter_max_ms") * 1e-3
+    with talk(s, reset=True) as t:
+        index, can_id = _begin(t, EVENT)
+        t.download(index, 3, round(INHIBIT_S / unit_s).to_bytes(2, "little"))
+        _readings(t, 1)
+        sub = next(sub for sub, name in s.unit.node.names(COUNTERS).items() if name == "PDOs inhibited")
+        looks = [(COUNTERS, READINGS), (COUNTERS, sub), (COUNTERS, READINGS)]
+        before = [t.look(*x) for x in looks]
+        t.readings(FEW, can_id)
+        after = [t.look(*x) for x in looks]
+        came = _sent(t, before[1][1], can_id, after[1][1])
+        left_out = after[1][0] - before[1][0]
+        least, most = after[0][0] - before[2][0], after[2][0] - before[0][0]  # readings, by looks within and around
+    apart_s = [b.t_s - a.t_s for a, b in itertools.pairwise(came)]
+    if min(apart_s) < INHIBIT_S - s.slack_s(INHIBIT_S) - late_s:
+        raise Broken(f"{min(apart_s):.6f} s between two frames {can_id:03X}h", f"{INHIBIT_S:g} s and more", frames=came)
+    if not least - 2 <= len(came) + left_out <= most + 2:
+        raise Broken(f"{len(came)} sent, {left_out} left out of {least} to {most} readings", "each sent or counted")
+    return f"{min(apart_s):.6f} s and more apart; of {most} readings {left_out} left out"
+
+
+@proves("BUS-EMCY-04")
+@trial(needs={"can", "stream"})
+def the_history_of_errors(s: Subject) -> str:
+    """An overload; 1003h beside the emergency; empty it."""
+    with talk(s, reset=True) as t:
+        told = _overload(t)
+        count, latest = t.number(HISTORY), t.upload(HISTORY, 1)
+        due = told.data[:2] + bytes([told.data[3], 0])
+        if count < 1 or latest != due:
+            raise Broken(
+                f"1003h has {count}, the latest {words(latest)}", f"{words(due)}, as the emergency", frames=[told]
+            )
+        t.download(HISTORY, 0, b"\0")
+        if t.number(HISTORY) or any(t.upload(HISTORY, 1)):
+            raise Broken("1003h holds emergencies after writing 0 to sub 0", "none")
+    return f"{count}, the latest {words(latest)}; none after the write"
+
+
+@proves("BUS-EMCY-04")
+@trial(needs={"can", "lockstep", "stream"})
+def the_history_holds_eight(s: Subject) -> str:
+    """Nine overloads, one after the other."""
+    most = int(_limit("BUS-EMCY-04", "history_count"))
+    with talk(s, reset=True) as t:
+        for k in range(OVERLOADS):
+            _overload(t)
+            if t.number(HISTORY) != min(k + 1, most):
+                raise Broken(f"1003h has {t.number(HISTORY)} after {k + 1} emergencies", f"{min(k + 1, most)}")
+        empty = [k for k in range(1, most + 1) if not t.number(HISTORY, k)]
+    if empty:
+        raise Broken(f"1003h:{empty[0]} is 0", "an emergency")
+    return f"{most} of {OVERLOADS}"
+
+
+def _overload(t: Talk) -> CanFrame:
+    """Samples lost, and the calm after it. Raises TooLittle where the bus could not be filled."""
+    code = int(_limit("BUS-EMCY-06", "emcy_code"))
+    t.s.wait_ready()
+    t.nmt(NMT_START)
+    t.fence()
+    at = len(t.heard)
+    dwell_s = FLOOD_S
+    while not _told(t, at, code) and dwell_s < 8 * FLOOD_S:
+        flood(t, dwell_s)
+        t.s.run_for(0.05)
+        dwell_s *= 2.0
+    told = _told(t, at, code)
+    if not told:
+        raise TooLittle(f"no emergency {code:04X}h on a bus that others fill")
+    t.hush()
+    t.s.run_for(CALM_S)
+    return told[0]
+
+
+def _told(t: Talk, at: int, code: int) -> list[CanFrame]:
+    return [
+        f for f in t.heard[at:] if f.can_id == t.emcy and f.data[:2] == code.to_bytes(2, "little") and len(f.data) == 8
+    ]

@@ -1,0 +1,1 @@
+"""What the wires of a board showed, and how it is read."""

@@ -1,0 +1,101 @@
+"""Cycles of the parallel bus as its lines show them: CS, RW, AB0..AB3, D0..D15 (docs/boards/psd1.md, Parallel bus)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from psabench.conform.capture.log import LineLog
+from psabench.conform.dut import Subject
+from psabench.conform.verdict import Broken, TooLittle
+from psabench.link.signals import Ints
+
+ADDRESS, DATA = tuple(f"AB{k}" for k in range(4)), tuple(f"D{k}" for k in range(16))
+LINES = ("CS", "RW", *ADDRESS)
+BUS_BOARDS = ("psd1", "pmka", "pik")
+BUS = 0x2002
+EACH_S = 20e-6  # that a cycle takes at the most without a strobe of its own
+TAIL_S = 5e-3  # after what a recording of the lines must have: its end may lie behind the present
+# A register of each board that takes a write and is none the worse for it, and the word; None: the one that it has.
+HARMLESS = {"psd1": ("TEMP", 0), "pmka": ("INDEX", 0), "pik": ("PERIOD", None)}
+# One that can be read at any time, and whose reading moves nothing.
+QUIET = {"psd1": "STATUS", "pmka": "MODE", "pik": "PERIOD"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Strobes:
+    """n lows of CS. write: RW is low; address and data: as they stand at its end."""
+
+    fall_ns: Ints
+    rise_ns: Ints
+    write: Ints
+    address: Ints
+    data: Ints
+
+    def __len__(self) -> int:
+        return len(self.fall_ns)
+
+    def at(self, address: int) -> Strobes:
+        """Those at one address."""
+        keep = self.address == address
+        return Strobes(
+            fall_ns=self.fall_ns[keep],
+            rise_ns=self.rise_ns[keep],
+            write=self.write[keep],
+            address=self.address[keep],
+            data=self.data[keep],
+        )
+
+
+def strobes(log: LineLog) -> Strobes:
+    """All whole lows of CS. Raises Broken where the lines are not there."""
+    missing = [n for n in (*LINES, *DATA) if n not in log]
+    if missing:
+        raise Broken(f"no line {missing[0]}", "the lines of the bus")
+    fall, rise = log.pulses("CS", 0)
+    end = rise - 1
+
+    def word(names: tuple[str, ...]) -> Ints:
+        found: Ints = sum(
+            (log[n].at(end).astype(np.int64) << k for k, n in enumerate(names)), np.zeros(len(end), np.int64)
+        )
+        return found
+
+    write = 1 - log["RW"].at(end).astype(np.int64)
+    return Strobes(fall_ns=fall, rise_ns=rise, write=write, address=word(ADDRESS), data=word(DATA))
+
+
+def registers(s: Subject) -> dict[str, tuple[int, str]]:
+    """Addresses and rights (ro, wo, rw) of the registers on the bus by name, as the EDS has them."""
+    mine = [o for o in s.unit.node.objects() if o.index == BUS and o.sub]
+    return {o.name: (o.sub - 1, o.access) for o in mine}
+
+
+def harmless(s: Subject) -> tuple[int, int]:
+    """Address of a register that may be written, and with what."""
+    name, word = HARMLESS[s.variant.family]
+    address = registers(s)[name][0]
+    return address, s.unit.bus_read(address) if word is None else word
+
+
+def quiet(s: Subject) -> int:
+    """Address of a register that can be read at any time."""
+    return registers(s)[QUIET[s.variant.family]][0]
+
+
+def say(s: Subject, *lines: str, dwell_s: float = 0.0) -> list[str]:
+    """Lines all at once, and as many answers. dwell_s: that they take beyond a cycle each."""
+    if s.port is None:
+        raise TooLittle("no bus port was connected (--bus-port)")
+    s.port.ask("\n".join(lines))
+    if s.lockstep:
+        s.run_for(len(lines) * EACH_S + dwell_s)
+    return [s.port.answered() for _ in lines]
+
+
+def tell(s: Subject) -> str:
+    """One answer more: to a line that was sent before."""
+    if s.port is None:
+        raise TooLittle("no bus port was connected (--bus-port)")
+    return s.port.answered()

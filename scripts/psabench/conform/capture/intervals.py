@@ -1,0 +1,94 @@
+"""Comparisons that checks of lines share: intervals, coincidences of edges, levels at instants."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from psabench.conform.capture.log import Evidence
+from psabench.conform.verdict import Broken, TooLittle
+from psabench.link.signals import Ints
+
+Numbers = npt.NDArray[np.int64] | npt.NDArray[np.float64]
+
+
+def wires_needed(e: Evidence, *names: str) -> None:
+    """Raises TooLittle for a line that the recording lacks."""
+    for name in names:
+        if name not in e.wires:
+            raise TooLittle(f"the recording has no line {name}")
+
+
+def first_bad(bad: npt.NDArray[np.bool_], at_ns: Ints, saw: Sequence[object], due: str, lines: Sequence[str]) -> None:
+    """Raises Broken for the first of `bad`, saying what was seen there and how many there are."""
+    if bad.any():
+        k = int(np.flatnonzero(bad)[0])
+        raise Broken(f"{saw[k]} ({int(bad.sum())} of {len(bad)})", due, at_ns=int(at_ns[k]), lines=lines)
+
+
+def interval(
+    e: Evidence, from_ns: Ints, to_ns: Ints, due_ns: float, tolerance_ns: float, what: str, lines: Sequence[str]
+) -> str:
+    """(n,) each to_ns - from_ns is due_ns, as far as no samples were lost between. Returns what was seen.
+
+    Raises Broken, TooLittle where there is none.
+    """
+    known = e.wires.known(np.minimum(from_ns, to_ns), np.maximum(from_ns, to_ns))
+    from_ns, to_ns = from_ns[known], to_ns[known]
+    if not len(from_ns):
+        raise TooLittle(f"nothing to measure: {what}")
+    took_ns = (to_ns - from_ns).astype(np.float64)
+    slack_ns = tolerance_ns + e.slack_ns(due_ns)
+    saw = [f"{t:.0f} ns {what}" for t in took_ns]
+    first_bad(np.abs(took_ns - due_ns) > slack_ns, from_ns, saw, f"{due_ns:.1f} +- {slack_ns:.1f} ns", lines)
+    return f"{len(took_ns)} times {took_ns.min():.0f} to {took_ns.max():.0f} ns {what}"
+
+
+def nearest(edges_ns: Ints, at_ns: Ints) -> Ints:
+    """(n,) the edge nearest to each instant; far away where there are no edges."""
+    if not len(edges_ns):
+        return np.full(len(at_ns), np.iinfo(np.int64).max // 4, np.int64)
+    k = np.searchsorted(edges_ns, at_ns)
+    before, after = edges_ns[np.maximum(k - 1, 0)], edges_ns[np.minimum(k, len(edges_ns) - 1)]
+    return np.where(np.abs(at_ns - before) <= np.abs(after - at_ns), before, after)
+
+
+def before(edges_ns: Ints, at_ns: Ints) -> Ints:
+    """(n,) the last edge before each instant; far before where there is none."""
+    padded = np.concatenate(([np.int64(np.iinfo(np.int64).min // 4)], edges_ns))
+    found: Ints = padded[np.searchsorted(edges_ns, at_ns, "left")]
+    return found
+
+
+def after(edges_ns: Ints, at_ns: Ints) -> Ints:
+    """(n,) the first edge strictly after each instant; far away where there is none."""
+    padded = np.concatenate((edges_ns, [np.int64(np.iinfo(np.int64).max // 4)]))
+    found: Ints = padded[np.searchsorted(edges_ns, at_ns, "right")]
+    return found
+
+
+def together(e: Evidence, at_ns: Ints, edges_ns: Ints, tolerance_ns: float, what: str, lines: Sequence[str]) -> str:
+    """Each instant (n,) is one of these edges. Returns what was seen; raises Broken, TooLittle where there is none."""
+    if not len(at_ns):
+        raise TooLittle(f"nothing to compare: {what}")
+    off_ns = np.abs(at_ns - nearest(edges_ns, at_ns))
+    slack_ns = tolerance_ns + e.slack_ns(0.0)
+    saw = [f"{min(int(t), 10**9)} ns between {what}" for t in off_ns]
+    first_bad(off_ns > slack_ns, at_ns, saw, f"not more than {slack_ns:.1f} ns", lines)
+    return f"{len(at_ns)} times, not more than {off_ns.max()} ns between {what}"
+
+
+def edges(e: Evidence, name: str) -> Ints:
+    """All edges of a line in the recording."""
+    found: Ints = e.wires[name].t_ns[1:]
+    return found
+
+
+def bus_word(e: Evidence, prefix: str, bits: int, at_ns: Ints) -> Ints:
+    """(n,) what the lines prefix0 .. make up at these instants."""
+    word = np.zeros(len(at_ns), np.int64)
+    for k in range(bits):
+        word |= e.wires[f"{prefix}{k}"].at(at_ns).astype(np.int64) << k
+    return word

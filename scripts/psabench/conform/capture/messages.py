@@ -1,0 +1,46 @@
+"""Messages of a reading: in their turn, each as long as its row of the table, nothing in bits without a signal."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+from psabench.conform.capture.log import Evidence
+from psabench.conform.verdict import Broken, TooLittle
+from psabench.link.protocol_files import message
+
+EMCY_BYTES = 8
+
+
+def in_turn(e: Evidence, names: Sequence[str]) -> str:
+    """The messages of each reading follow one another in this order. Returns what was seen."""
+    ids = {e.frames_of(n).frames[0].can_id: k for k, n in enumerate(names) if len(e.frames_of(n))}
+    if not ids:
+        raise TooLittle(f"none of the messages {', '.join(names)} came")
+    if len(ids) < len(names):
+        raise Broken(f"{len(ids)} of the messages {', '.join(names)}", f"all {len(names)}")
+    order = [(ids[f.can_id], f) for f in e.can.frames if f.can_id in ids and not f.sent]
+    for (a, _), (b, f) in pairwise(order):
+        if b != (a + 1) % len(names):
+            raise Broken(f"{names[b]} after {names[a]}", f"{', '.join(names)} in turn", frames=(f,))
+    return f"{len(order)} messages in turn"
+
+
+def as_laid_out(e: Evidence, names: Sequence[str]) -> str:
+    """Each message has its length, and 0 in the bits that no signal has. Returns what was seen."""
+    for name in names:
+        log, due, used = e.frames_of(name), int(message(name).length), 0
+        if not len(log):
+            raise TooLittle(f"no {name} came")
+        for s in message(name).signals:
+            used |= ((1 << s.length) - 1) << s.start
+        bad = [f for f in log.frames if len(f.data) != due or int.from_bytes(f.data, "little") & ~used]
+        if bad:
+            raise Broken(f"{name} {bad[0].data.hex(' ')}", f"{due} bytes, 0 in bits without a signal", frames=bad)
+    return f"{', '.join(names)} as in the table"
+
+
+def emergencies(e: Evidence, name: str) -> list[tuple[int, float]]:
+    """Codes, and the board's own instants, s, of the EMCY of this name."""
+    whole = [f for f in e.frames_of(name).frames if len(f.data) == EMCY_BYTES]
+    return [(int.from_bytes(f.data[:2], "little"), int.from_bytes(f.data[4:], "little") * 1e-6) for f in whole]

@@ -1,0 +1,1 @@
+"""Checks of a capture: the same for the device suite and for a recording."""

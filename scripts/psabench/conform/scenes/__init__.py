@@ -1,1 +1,0 @@
-"""Stimuli, and what was seen meanwhile."""

@@ -1,0 +1,1 @@
+"""Stimuli, and what was captured meanwhile."""

@@ -1,0 +1,74 @@
+"""Scenes of the services that all boards have on CAN."""
+
+from __future__ import annotations
+
+from psabench.conform.capture.log import Evidence
+from psabench.conform.dut import Subject
+from psabench.conform.plan import scene
+from psabench.conform.raw_can import NMT_START, OFF, TPDO, Talk, read, talk
+from psabench.conform.stimulus.flood import flood
+from psabench.conform.verdict import Broken, TooLittle
+
+BOARDS = ("psa2", "psd1", "pmka", "pik", "gyro")
+BEATS_S, STREAM_S = 3.3, 0.2
+FLOOD_S, TRIES = 0.15, 5  # each flood twice as long as the one before
+CALM_S = 2.0  # an overload is over after one second
+CALLED = (0x1000, 0x1001, 0x1008, 0x1018, 0x1017, 0x5FFF)
+
+
+@scene("services", boards=BOARDS)
+def services(s: Subject) -> Evidence:
+    """A reset, heartbeats, SDO requests good and bad, a stream."""
+    with talk(s) as t, s.take(lines=False) as take:
+        t.take = take
+        take.marks["reset"] = s.bench.time_s
+        s.reset()
+        s.run_for(BEATS_S)
+        for index in CALLED:
+            t.send(t.sdo_rx, read(index))
+            s.run_for(0.005)
+        t.nmt(NMT_START)
+        s.run_for(STREAM_S)
+        t.hush()
+    return s.evidence("services", take)
+
+
+@scene("overload", boards=BOARDS)
+def overload(s: Subject) -> Evidence:
+    """Every TPDO switched on, a stream, a bus that others fill until samples are lost, two seconds of calm."""
+    with talk(s, reset=True) as t:
+        s.wait_ready()
+        everything_on(t)
+        with s.take(lines=False) as take:
+            t.take = take
+            before = t.counter("Dropped")
+            t.nmt(NMT_START)
+            s.run_for(STREAM_S)
+            for k in range(TRIES):
+                take.marks["flood"] = float(len(take.frames))
+                flood(t, FLOOD_S * 2**k)
+                s.run_for(CALM_S)
+                if t.counter("Dropped") != before:
+                    break
+            t.hush()
+            take.facts["dropped"] = t.counter("Dropped") - before
+            take.facts["history"] = t.upload(0x1003, 1)
+    if not take.facts["dropped"]:
+        _nothing_lost(s)
+    return s.evidence("overload", take)
+
+
+def _nothing_lost(s: Subject) -> None:
+    if s.lockstep:
+        raise Broken("no sample dropped on a bus that was full for seconds", "samples dropped and counted")
+    raise TooLittle("the bus could not be filled long enough for a sample to be lost")
+
+
+def everything_on(t: Talk) -> None:
+    """TPDOs that the host may switch on. Those of a PSA-2 are chosen by its frame form."""
+    node = t.s.unit.node
+    for k in range(8):
+        if t.s.variant.family != "psa2" and node.has(TPDO + k):
+            cob = t.number(TPDO + k, 1)
+            if cob & OFF:
+                t.download(TPDO + k, 1, (cob & ~OFF).to_bytes(4, "little"))

@@ -1,0 +1,36 @@
+"""What scenes of boards that send readings have in common: from Res to some readings, and a while of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from psabench.conform.capture.log import Evidence
+from psabench.conform.dut import Subject, Take
+
+BOOT_S = 0.002
+
+
+def from_res(s: Subject, dwell_s: float) -> Evidence:
+    """The scene power_on: Res, and readings from as soon as it has booted.
+
+    facts: prompt, in lockstep alone: the start came before the first reading.
+    """
+    with s.take() as take:
+        take.facts["prompt"] = s.lockstep
+        s.reset()
+        s.run_for(BOOT_S)
+        s.unit.start()
+        s.run_for(dwell_s)
+        s.unit.stop()
+    return s.evidence("power_on", take)
+
+
+def readings(s: Subject, begun_s: float, pass_time: Callable[[], object], *, lines: bool = True) -> Take:
+    """Readings after a Res and begun_s while pass_time lets time pass."""
+    s.reset()
+    s.run_for(begun_s)
+    with s.take(lines=lines) as take:
+        s.unit.start()
+        pass_time()
+        s.unit.stop()
+    return take

@@ -1,0 +1,275 @@
+"""The host's end of the CAN bus. The only file that imports python-can.
+
+One thread: frames are received where the caller waits (`advance`, `pump_until`), so that a procedure in step time is a
+pure function of its inputs. Time is the bench's: with a control socket in step pace it moves only when we say so, and a
+wait ends when every frame of that time has arrived (barrier: the emulator says how many it has sent); otherwise it is
+the wall clock's and a wait is spent receiving.
+"""
+
+from __future__ import annotations
+
+import socket
+import time
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from types import TracebackType
+from typing import Any, Protocol
+
+import can
+from can.interfaces.socketcan import SocketcanBus
+
+from psabench.errors import BadInput, LinkError
+from psabench.link.control import Control, Reply
+
+BARRIER_S = 10.0  # patience for a frame that the emulator says it has sent
+GREETING_S = 10.0  # patience for the first words of a socketcand server
+LOOK_S = 0.2  # real time between looks whether a silent link is still there
+OTHERS_S = 0.005  # real time between looks at the other buses
+QUANTUM_S = 0.001  # step of simulated time while waiting for an answer
+SO_RCVBUFFORCE, RCVBUF = 33, 4 << 20  # asm-generic/socket.h; bytes
+
+Message = can.Message
+Listener = Callable[[Message], None]
+
+
+class Clock(Protocol):
+    """Whose time it is."""
+
+    def now_s(self) -> float:
+        """Bench time, s."""
+        ...
+
+    def advance(self, host: CanHost, dwell_s: float) -> None:
+        """Let dwell_s pass, receiving meanwhile."""
+        ...
+
+
+class WallClock:
+    """Real time: a real bench, or an emulator in wall pace. others: hosts of further buses, received from as well."""
+
+    def __init__(self, others: Sequence[CanHost] = ()) -> None:
+        self._others = others
+
+    def now_s(self) -> float:
+        return time.monotonic()
+
+    def advance(self, host: CanHost, dwell_s: float) -> None:
+        deadline = time.monotonic() + dwell_s
+        while (left := deadline - time.monotonic()) > 0.0:
+            host.receive(min(left, OTHERS_S) if self._others else left)
+            for other in self._others:
+                while other is not host and other.receive(0.0):
+                    pass
+
+
+class StepClock:
+    """Simulated time of an emulator in step pace, moved through its control socket.
+
+    hosts: all that this program has on the buses, in the order of their opening and the last to have come. Without
+    them it is the clock of one host, which has been on the bus longest.
+    """
+
+    def __init__(self, control: Control, hosts: Sequence[CanHost] = ()) -> None:
+        self._control = control
+        self._hosts = list(hosts)
+        first = control.call("frames")
+        self._t_ns = first.t_ns
+        clients = [*first.result["clients"], first.result["gone"]]
+        self._base_tx = sum(int(c["taken"]) for c in clients)
+        self._mine = sorted(first.rx)[-len(self._hosts) :] if self._hosts else []  # they came last
+        self._base_rx = self._delivered(first)  # frames sent before these hosts were there
+
+    def now_s(self) -> float:
+        return self._t_ns * 1e-9
+
+    def advance(self, host: CanHost, dwell_s: float) -> None:
+        self.command(host, "run", for_s=dwell_s)
+
+    def command(self, host: CanHost | None, name: str, **args: object) -> Reply:
+        """A command that moves time, `run` or `run.until`; returns when every frame of that time has come."""
+        hosts = self._hosts or ([] if host is None else [host])
+        # after_tx: what we have sent takes another way than this command, and must not be overtaken by it
+        after_tx = self._base_tx + sum(h.sent for h in hosts)
+        reply = self._control.call(name, **args, after_tx=after_tx)
+        self._t_ns = reply.t_ns
+        for h, delivered, base in zip(hosts, self._delivered(reply), self._base_rx, strict=False):
+            _receive_all(h, delivered - base)
+        return reply
+
+    def _delivered(self, reply: Reply) -> list[int]:
+        """Frames handed to each of our hosts so far."""
+        return [reply.rx.get(client, 0) for client in self._mine] or [reply.can_rx]
+
+
+def _receive_all(host: CanHost, sent: int) -> None:
+    """Receive until the host has all frames that the emulator has sent it."""
+    while (missing := sent - host.received) > 0:
+        if not host.receive(BARRIER_S):
+            raise LinkError(f"CAN: {missing} frames that the emulator has sent did not arrive in {BARRIER_S:g} s")
+    while host.shared and host.receive(0.0):
+        pass  # frames of others were counted for the emulator's; all of its own are with our kernel by now
+
+
+class CanHost:
+    """A python-can bus with a clock. `sent` and `received` count frames; listeners get each received one, in order.
+
+    shared: frames of other programs may come that have not passed through the emulator (an interface of the kernel).
+    """
+
+    def __init__(self, bus: can.BusABC, clock: Clock) -> None:
+        self.bus = bus
+        self.clock = clock
+        self.shared = isinstance(bus, SocketcanBus)
+        self.received = self.sent = 0
+        self.listeners: list[Listener] = []
+
+    def __enter__(self) -> CanHost:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, e: BaseException | None, tb: TracebackType | None) -> None:
+        self.close()
+
+    def close(self) -> None:
+        with suppress(can.CanError):  # slcan says good-bye to an adapter that may have gone
+            self.bus.shutdown()
+
+    def reopen(self, bus: can.BusABC) -> None:
+        """Go on with another connection after `close`; frames are counted anew."""
+        self.bus = bus
+        self.received = self.sent = 0
+
+    def receive(self, timeout_s: float) -> bool:
+        """Take one frame if one comes within timeout_s. Raises LinkError when the link has gone."""
+        deadline_s = time.monotonic() + timeout_s
+        while (message := self._take(min(timeout_s, LOOK_S))) is None:
+            if _hung_up(self.bus):
+                raise LinkError("CAN: the connection was closed; the emulator or adapter has gone away")
+            timeout_s = deadline_s - time.monotonic()
+            if timeout_s <= 0.0:
+                return False
+        self.received += not message.is_error_frame  # socketcand reports a refusal as one; it was on no bus
+        for listener in self.listeners:
+            listener(message)
+        return True
+
+    def _take(self, timeout_s: float) -> Message | None:
+        try:
+            return self.bus.recv(timeout_s)
+        except (can.CanError, OSError) as e:
+            raise LinkError(f"CAN: {_reason(e)}; the emulator or adapter has gone away") from e
+
+    def send(self, can_id: int, data: bytes, *, fd: bool = False, remote: bool = False) -> None:
+        """Send a frame with an 11-bit identifier; remote: a remote frame that asks for len(data). Raises LinkError."""
+        message = can.Message(
+            arbitration_id=can_id,
+            data=None if remote else data,
+            dlc=len(data),
+            is_extended_id=False,
+            is_fd=fd,
+            bitrate_switch=fd,
+            is_remote_frame=remote,
+            check=True,
+        )
+        try:
+            self.bus.send(message, timeout=1.0)
+        except (can.CanError, OSError) as e:
+            raise LinkError(f"CAN: cannot send {can_id:03X}h: {_reason(e)}") from e
+        self.sent += 1
+
+    def advance(self, dwell_s: float) -> None:
+        self.clock.advance(self, dwell_s)
+
+    def pump_until(self, done: Callable[[], bool], patience_s: float) -> bool:
+        """Let time pass until done() is true; False after patience_s of bench time."""
+        deadline_s = self.clock.now_s() + patience_s
+        while not done():
+            if self.clock.now_s() >= deadline_s:
+                return False
+            self.advance(QUANTUM_S)
+        return True
+
+
+def open_bus(spec: str | None) -> can.BusABC:
+    """Open `INTERFACE:CHANNEL[,key=value...]` of python-can, or python-can's own configuration when spec is None.
+
+    socketcand takes HOST:PORT as its channel: "socketcand:127.0.0.1:29536"; others the device, and options after
+    commas: "slcan:/dev/pts/7"; "socketcan:vcan0,fd=true".
+    Raises BadInput for a spec nobody can use, LinkError when the link is not there.
+    """
+    arguments = _bus_arguments(spec)
+    if arguments.get("interface") == "socketcand":
+        _greet(arguments["host"], arguments["port"])
+    try:
+        bus = can.Bus(**arguments)
+        if isinstance(bus, SocketcanBus):
+            _enlarge_buffer(bus.socket)
+        return bus
+    except (can.CanInterfaceNotImplementedError, ValueError, TypeError) as e:
+        raise BadInput(f"--can {spec}: {e}; expected INTERFACE:CHANNEL[,key=value]") from e
+    except (can.CanError, OSError) as e:
+        raise LinkError(f"--can {spec}: {e}") from e
+
+
+def _greet(host: str, port: int) -> None:
+    """Make sure that a server is there: python-can would try for 10 s, a warning each time, or wait for ever."""
+    try:
+        with socket.create_connection((host, port), GREETING_S) as s:
+            hello = s.recv(256)
+    except OSError as e:
+        raise LinkError(f"--can socketcand:{host}:{port}: {e.strerror or e}; is psa-emu running there?") from e
+    if hello != b"< hi >":
+        raise LinkError(f"--can socketcand:{host}:{port}: what listens there is no socketcand server")
+
+
+def _reason(e: BaseException) -> str:
+    """One line of an error, that of its cause where there is one: python-can's own may hold a whole traceback."""
+    cause = e.__cause__ or e
+    return str(getattr(cause, "strerror", None) or cause).partition("\n")[0]
+
+
+def _hung_up(bus: can.BusABC) -> bool:
+    """Whether a socketcand server has closed the connection: python-can's client takes the end for silence."""
+    s = getattr(bus, "_SocketCanDaemonBus__socket", None)
+    try:
+        return s is not None and s.recv(1, socket.MSG_PEEK | socket.MSG_DONTWAIT) == b""
+    except BlockingIOError:
+        return False
+    except OSError:
+        return True
+
+
+def _enlarge_buffer(s: socket.socket) -> None:
+    """The kernel's usual buffer holds a few hundred frames, a tenth of a second, and loses what does not fit."""
+    try:
+        s.setsockopt(socket.SOL_SOCKET, SO_RCVBUFFORCE, RCVBUF)
+    except PermissionError:
+        s.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RCVBUF)  # up to net.core.rmem_max
+
+
+def _bus_arguments(spec: str | None) -> dict[str, Any]:
+    if spec is None:
+        return {}  # $CAN_INTERFACE, ~/.canrc: see python-can
+    head, *pairs = spec.split(",")
+    interface, _, channel = head.partition(":")
+    if not channel or not all("=" in p for p in pairs):
+        raise BadInput(f"--can {spec}: expected INTERFACE:CHANNEL[,key=value], e.g. socketcand:127.0.0.1:29536")
+    arguments: dict[str, Any] = {"interface": interface, "channel": channel}
+    if interface == "socketcand":
+        host, _, port = channel.rpartition(":")
+        if not port.isdecimal():
+            raise BadInput(f"--can {spec}: expected socketcand:HOST:PORT, e.g. socketcand:127.0.0.1:29536")
+        arguments |= {"channel": "can0", "host": host, "port": int(port), "tcp_tune": True}
+    if interface == "slcan":
+        arguments["sleep_after_open"] = 0.0  # an emulator needs no 2 s to wake up
+    return arguments | {k: _value(v) for k, v in (p.split("=", 1) for p in pairs)}
+
+
+def _value(text: str) -> bool | int | float | str:
+    if text.lower() in ("true", "false"):
+        return text.lower() == "true"
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            pass
+    return text

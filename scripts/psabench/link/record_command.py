@@ -1,0 +1,54 @@
+"""`psabench record`: its options, and what is printed."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from psabench.options import CAN_HELP, Help, Parser, add_board, natural, node_of, positive
+
+FORMATS = ".asc .blf .csv .db .log .mf4 .trc .txt"  # of python-can, without loading it
+
+EPILOG = """\
+examples:
+  psabench record run.log --can socketcand:127.0.0.1:29536         until Ctrl-C, in candump's format
+  psabench record run.blf --can slcan:/dev/ttyACM0 --for 60        a minute, for CANalyzer
+  psabench record run.asc --can socketcan:vcan0,fd=true --count 1000
+
+Ends with --for, --count, Ctrl-C, SIGTERM or when the link breaks (exit status 3); the file is complete each time.
+lost: frame numbers missing; torn: halves of a frame without the other; overruns: conversions the board itself missed.
+"""
+
+
+def parse(words: Sequence[str]) -> argparse.Namespace:
+    """What follows `psabench record`. Raises BadInput."""
+    p = Parser(
+        prog="psabench record",
+        description="Record all that is on the bus; count what the stream of one node lost.",
+        formatter_class=Help,
+        epilog=EPILOG,
+    )
+    p.set_defaults(handler=_record)
+    p.add_argument("file", type=Path, help=f"its extension selects the format: {FORMATS}")
+    p.add_argument("--can", help=CAN_HELP)
+    add_board(p, "whose frames are counted")
+    p.add_argument("--for", dest="for_s", type=positive, metavar="SECONDS", help="end after this much wall time")
+    p.add_argument("--count", type=natural, help="end after this many CAN messages")
+    return p.parse_args(words)
+
+
+def _record(args: argparse.Namespace) -> int:
+    from psabench.link.can_host import open_bus
+    from psabench.link.record import record
+
+    node = node_of(args)
+    r = record(open_bus(args.can), args.file, node, args.for_s, args.count, args.board)
+    c = r.counters
+    print(f"{r.messages} messages, {r.last_s - r.first_s:.3f} s, in {args.file}")
+    print(f"frames of node {node}: {c.frames}, lost {c.lost}, torn {c.torn}, overruns {c.overruns}")
+    if r.broken:
+        print(f"psabench: {r.broken}; the recording up to there is complete", file=sys.stderr)
+        return 3
+    return 0

@@ -1,0 +1,1 @@
+"""libpsabench and libpsabench-nav through ctypes."""

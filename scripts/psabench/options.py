@@ -1,0 +1,91 @@
+"""What the words of the command line may be; each function returns the value or raises ArgumentTypeError."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from psabench.board_names import ALIASES, BOARDS
+from psabench.errors import BadInput
+
+LINE_HZ = 8_000_000.0  # psabench.link.lineport.SAMPLE_HZ, without loading NumPy
+BUS_HELP = """\
+the bus: INTERFACE:CHANNEL[,key=value...] of python-can. Examples: socketcand:127.0.0.1:29536, slcan:/dev/pts/7,
+socketcan:vcan0,fd=true"""
+CAN_HELP = f"""\
+{BUS_HELP}. Without it python-can's own configuration is used ($CAN_INTERFACE, $CAN_CHANNEL, ~/.canrc)"""
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser that refuses a word it does not know in one line, with what there is instead of it."""
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Raises BadInput."""
+        found, rest = super().parse_known_args(args, namespace)
+        if rest:
+            name = self.prog.removeprefix("psabench ").removeprefix("run ")
+            if not rest[0].startswith("-"):
+                raise BadInput(f"{rest[0]}: one word too many for {name}")
+            options = (a.option_strings[-1] for a in self._actions if a.option_strings and a.dest != "help")
+            raise BadInput(f"{rest[0].partition('=')[0]}: {name} has no such parameter; it has {', '.join(options)}")
+        return found, rest
+
+
+class Help(argparse.RawDescriptionHelpFormatter):
+    """Keeps the examples as they are written, and most options on the line of their explanation."""
+
+    def __init__(self, prog: str) -> None:
+        super().__init__(prog, max_help_position=32)
+
+
+def yes_no(text: str) -> bool:
+    if text.lower() in ("1", "yes", "true", "on"):
+        return True
+    if text.lower() in ("0", "no", "false", "off"):
+        return False
+    raise argparse.ArgumentTypeError(f"{text!r}; expected yes or no")
+
+
+def natural(text: str) -> int:
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"{text!r}; expected an integer of 0 or more")
+    return int(text)
+
+
+def positive(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 0.0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text!r}; expected a number above 0")
+    return value
+
+
+def board_name(text: str) -> str:
+    """A board; another name of it, as psa1 or pik5, is that of the board."""
+    board = ALIASES.get(text, text)
+    if board not in BOARDS:
+        raise argparse.ArgumentTypeError(f"{text!r}; expected {', '.join([*BOARDS, *ALIASES])}")
+    return board
+
+
+def node_id(text: str) -> int:
+    if not text.isdecimal() or not 1 <= int(text) <= 127:
+        raise argparse.ArgumentTypeError(f"{text!r}; expected a CANopen node, 1 to 127")
+    return int(text)
+
+
+def add_board(p: argparse.ArgumentParser, what: str) -> None:
+    """--board and --node of the unit `what`."""
+    names = ", ".join([*BOARDS, *ALIASES])
+    text = f"board of the unit {what}: {names} (%(default)s)"
+    p.add_argument("--board", type=board_name, metavar="BOARD", default="psa2", help=text)
+    p.add_argument("--node", type=node_id, help=f"node {what} (the board's usual one)")
+
+
+def node_of(args: argparse.Namespace) -> int:
+    """The node that `add_board` took, else the board's default."""
+    from psabench.link.protocol_files import dbc_node
+
+    return dbc_node(args.board) if args.node is None else int(args.node)

@@ -1,0 +1,408 @@
+"""`psabench run`: a parser for each procedure with its own options, and what is printed.
+
+`run turns` is one command of two words (`words`): each procedure has its own help, and refuses the options of others.
+"""
+
+from __future__ import annotations
+
+import argparse
+import textwrap
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property, partial
+from pathlib import Path
+from typing import Any
+
+from psabench.board_names import DBC_NODE
+from psabench.errors import BadInput
+from psabench.instruments import EXAMPLES
+from psabench.options import Help, Parser, natural, node_id, positive, yes_no
+from psabench.procedures.run_table import COMPARE, CONDITIONS, G_MPS2, ON_THE_HEAD, ON_THE_PLATFORM
+from psabench.progress import Bar
+from psabench.shell import command_line
+
+EPILOG = """\
+psabench run PROCEDURE --help tells its options, with units and defaults, and examples.
+
+Exit status: 0 done and within limits, 1 something measured misses the truth by more than its limits or is in doubt,
+2 bad input, 3 the bench or a link failed, 130 ended by Ctrl-C.
+"""
+
+NOTES_HEAD = """
+Without --head or --control an emulator is started for each condition. Ctrl-C ends a run; the readings taken so far stay
+in OUT/PROCEDURE-CONDITION.csv. Exit status 1: something measured misses the truth by more than its limits.
+"""
+
+NOTES_PLATFORM = """
+Without --can or --control an emulator is started for each reading, with the scenario gyrocompass. Exit status 1:
+something measured misses the truth by more than its limits, or is in doubt, which is printed with its reason.
+"""
+
+ALL = "all"
+SCRIPT = "script"  # psabench.shell.command_line has its parser
+FLAGS = ("-h", "--help", "--list", "--real-time", "-v", "--verbose")  # the options that take no value
+
+# Options of more than one procedure.
+COMMON: Mapping[str, Mapping[str, Any]] = {
+    "--condition": {
+        "choices": [*CONDITIONS, "both"],
+        "default": "both",
+        "help": "on which emulated bench (%(default)s)",
+    },
+    "--scenario": {"type": Path, "metavar": "FILE", "help": "scenario for the emulator, instead of the usual one"},
+    "--can": {
+        "metavar": "BUS",
+        "help": "the bus of a bench that is there: INTERFACE:CHANNEL[,key=value...] of python-can, such as "
+        "socketcand:127.0.0.1:29536, slcan:/dev/pts/7, socketcan:vcan0,fd=true. Without it --control tells",
+    },
+    "--head": {
+        "metavar": "VISA-ADDRESS",
+        "help": f"the dividing head, real or emulated: {EXAMPLES}. With it alone the bus is that of python-can's own "
+        "configuration",
+    },
+    "--control": {
+        "type": Path,
+        "metavar": "SOCKET",
+        "help": "control socket of an emulator that is there: tells its bus and instruments, moves time",
+    },
+    "--truth": {
+        "type": Path,
+        "metavar": "SOCKET",
+        "help": "truth socket of an emulator, asked after the run to grade it",
+    },
+    "--node": {"type": node_id, "default": DBC_NODE, "metavar": "N", "help": "CANopen node of the unit (%(default)s)"},
+    "--average": {
+        "type": natural,
+        "metavar": "N",
+        "help": f"samples in a reading; 0: whole 32-bit words by SDO (quiet {CONDITIONS['quiet'].average}, "
+        f"else {CONDITIONS['realistic'].average})",
+    },
+    "--gravity": {
+        "type": positive,
+        "metavar": "M/S2",
+        "help": f"local g, m/s^2 (the scenario's, else {G_MPS2})",
+    },
+    "--seed": {"type": int, "metavar": "N", "help": "seed of the emulator's noise, instead of the scenario's"},
+    "--real-time": {"action": "store_true", "help": "at wall-clock pace, as a real bench would take"},
+    "--out": {"type": Path, "default": Path("build/run"), "metavar": "FOLDER", "help": "of the report (%(default)s)"},
+    "--verbose": {"action": "store_true", "help": "print the tables of results, too"},
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Parameters:
+    """Of a procedure."""
+
+    fields: Mapping[str, Any] = field(default_factory=dict)  # of its parameters' dataclasses
+    defaults: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)  # others for its fields, by who has them
+
+
+@dataclass(frozen=True, kw_only=True)
+class Command:
+    """A procedure as the command line has it."""
+
+    name: str
+    summary: str
+    handler: Callable[[argparse.Namespace], int]
+    common: Sequence[str]  # of COMMON
+    load: Callable[[], Parameters] = Parameters  # imports the procedure, and NumPy with it
+    examples: str
+    notes: str = ""
+
+    @cached_property
+    def parameters(self) -> Parameters:
+        return self.load()
+
+
+def parse(argv: Sequence[str]) -> argparse.Namespace:
+    """What follows `psabench run`. Raises BadInput."""
+    name, rest = words(argv)
+    if name == SCRIPT:
+        return command_line.parse_script(rest)
+    return (_parser_of(COMMANDS[name]) if name else _parser()).parse_args(rest)
+
+
+def _parser() -> Parser:
+    """Of `run` without a procedure."""
+    p = Parser(
+        prog="psabench run",
+        usage="psabench run [-h] [--list] PROCEDURE [option...]",
+        description="Run a procedure over the wire, grade it where the truth is known, and report.\n\n" + _table(),
+        formatter_class=Help,
+        epilog=EPILOG,
+    )
+    p.set_defaults(handler=_without_procedure)
+    p.add_argument("--list", action="store_true", help="name the procedures and their parameters")
+    p.add_argument("procedure", nargs="?", metavar="PROCEDURE", help=argparse.SUPPRESS)
+    return p
+
+
+def words(argv: Sequence[str]) -> tuple[str, list[str]]:
+    """The procedure, wherever among its options it stands, and the other words; "": none, and what `run` takes."""
+    rest = list(argv)
+    if "--list" in rest:
+        return "", ["--list"]
+    at = _procedure_at(rest)
+    if at is None:
+        return "", [w for w in rest if w in ("-h", "--help")]
+    name = rest.pop(at)
+    return (name, rest) if name in (*COMMANDS, SCRIPT) else ("", [name])
+
+
+def _procedure_at(rest: Sequence[str]) -> int | None:
+    """Where the first word stands that is neither an option nor the value of one."""
+    k = 0
+    while k < len(rest):
+        word = rest[k]
+        if not word.startswith("-"):
+            return k
+        k += 1 if "=" in word or any(flag.startswith(word) for flag in FLAGS) else 2
+    return None
+
+
+def _parser_of(command: Command) -> Parser:
+    p = Parser(
+        prog=f"psabench run {command.name}",
+        usage=f"psabench run {command.name} [-h] [option...]",
+        description=_sentence(command.summary),
+        formatter_class=Help,
+        epilog=f"examples:\n{command.examples}{command.notes}",
+    )
+    p.set_defaults(handler=command.handler, procedure=command.name)
+    taken = command.parameters
+    if taken.fields:
+        group = p.add_argument_group(f"parameters of {command.name}")
+        for name, f in taken.fields.items():
+            others = {label: changed.get(name, f.default) for label, changed in taken.defaults.items()}
+            _add_parameter(group, name, f, {k: v for k, v in others.items() if v != f.default})
+    group = p.add_argument_group("the bench and the report")
+    for option in command.common:
+        group.add_argument(*(["-v"] if option == "--verbose" else []), option, **COMMON[option])
+    return p
+
+
+def _add_parameter(group: Any, name: str, f: Any, others: Mapping[str, Any]) -> None:
+    unit = f.metadata["unit"]
+    kind = type(f.default) if f.default is not None else float
+    metavar = unit.upper() or {bool: "YES|NO", int: "N", float: "X", str: "WORD"}[kind]
+    defaults = " ".join(x for x in (_default(f.default), unit) if x)
+    defaults += "".join(f"; {label} {_default(value)}" for label, value in others.items())
+    text = f"{f.metadata['help']} ({defaults})".replace("%", "%%")
+    group.add_argument(
+        _option(name), dest=f"param_{name}", type=yes_no if kind is bool else kind, metavar=metavar, help=text
+    )
+
+
+def _default(value: Any) -> str:
+    if value is None or isinstance(value, bool):
+        return {None: "none", True: "yes", False: "no"}[value]
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _sentence(summary: str) -> str:
+    return f"{summary[0].upper()}{summary[1:]}."
+
+
+def _table() -> str:
+    rows = [*((c.name, c.summary) for c in COMMANDS.values()), (SCRIPT, "lines of the shell from a file")]
+    indent = 4 + max(len(name) for name, _ in rows)
+    filled = (
+        textwrap.fill(f"  {name:{indent - 2}}{text}", width=100, subsequent_indent=" " * indent) for name, text in rows
+    )
+    return "\n".join(["procedures:", *filled])
+
+
+def _option(parameter: str) -> str:
+    return f"--{parameter.replace('_', '-')}"
+
+
+def _without_procedure(args: argparse.Namespace) -> int:
+    if args.list:
+        for c in COMMANDS.values():
+            print(f"{c.name}: {c.summary}")
+            print(f"  {' '.join([*map(_option, c.parameters.fields), *c.common])}")
+        return 0
+    known = f"{', '.join(COMMANDS)} or {SCRIPT}"
+    if args.procedure is None:
+        raise BadInput(f"run: which procedure? {known}; psabench run --help tells of each")
+    raise BadInput(f"run {args.procedure}: no such procedure; {known}")
+
+
+def _params(args: argparse.Namespace) -> dict[str, Any]:
+    """The parameters that were given."""
+    return {k.removeprefix("param_"): v for k, v in vars(args).items() if k.startswith("param_") and v is not None}
+
+
+def _calibrate(args: argparse.Namespace) -> int:
+    from psabench.procedures import run
+    from psabench.procedures.registry import PROCEDURES
+    from psabench.report import calibration as report
+    from psabench.report import grading
+
+    options = run.RunOptions(
+        procedures=list(PROCEDURES) if args.procedure == ALL else [args.procedure],
+        out=args.out,
+        conditions=list(CONDITIONS) if args.condition == "both" else [args.condition],
+        can=args.can,
+        head=args.head,
+        control=args.control,
+        truth=args.truth,
+        scenario=args.scenario,
+        node=args.node,
+        average=args.average,
+        real_time=args.real_time,
+        seed=args.seed,
+        g_mps2=args.gravity,
+        params=_params(args),
+    )
+    page, sections = run.run(options, Bar())
+    if args.verbose:
+        for section in sections:
+            print(report.console_table(section))
+        print(grading.console_comparison(sections))
+    print(grading.verdict(sections))
+    print(f"report: {page}")
+    return 0 if report.within_limits(sections) else 1
+
+
+def _compare(args: argparse.Namespace) -> int:
+    """Its units stand on one bench, their motion in the scenario: it starts an emulator and takes no addresses."""
+    from psabench.procedures import compare_converters, comparison
+    from psabench.report import comparison_page
+
+    p = compare_converters.CompareParams()
+    c = comparison.compare(args.out, p, Bar(), scenario=args.scenario, seed=args.seed)
+    page = comparison_page.write(args.out, c)
+    if args.verbose:
+        print(comparison.console_table(c))
+    print(comparison.verdict(c))
+    print(f"report: {page}")
+    return 0 if c.within else 1
+
+
+def _gyro(args: argparse.Namespace) -> int:
+    """Its platform is a unit on the bus: no dividing head, no volts to average."""
+    from psabench.procedures import gyro_run
+    from psabench.report import gyro_grading, gyro_page
+
+    options = gyro_run.GyroOptions(
+        procedure=args.procedure,
+        out=args.out,
+        can=args.can,
+        control=args.control,
+        truth=args.truth,
+        scenario=args.scenario,
+        seed=args.seed,
+        real_time=args.real_time,
+        params=_params(args),
+    )
+    sections = gyro_run.run(options, Bar())
+    page = gyro_page.write(args.out, sections, gyro_run.facts(options))
+    if args.verbose:
+        for section in sections:
+            print(gyro_grading.console_table(section))
+    else:
+        for section in sections:
+            print("".join(f"DOUBT: {section.label}: {d}\n" for d in gyro_grading.doubts(section)), end="")
+    print(gyro_grading.verdict(sections))
+    print(f"report: {page}")
+    return 0 if gyro_grading.within_limits(sections) else 1
+
+
+# What each takes of COMMON.
+_STARTED = ("--scenario", "--seed", "--out", "--verbose")
+_PLATFORM = ("--can", "--control", "--truth", "--scenario", "--seed", "--real-time", "--out", "--verbose")
+_HEAD = tuple(COMMON)
+
+_EXAMPLES: Mapping[str, str] = {
+    "turns": """\
+  psabench run turns
+  psabench run turns --can slcan:/dev/ttyACM0 --head TCPIP::192.0.2.7::5025::SOCKET   on the bench at these addresses
+""",
+    "fourier": """\
+  psabench run fourier
+  psabench run fourier --scenario my.yaml --average 32
+""",
+    "reversal": """\
+  psabench run reversal
+  psabench run reversal --condition quiet --realisations 2   a shorter one, without noise
+""",
+    "gyrocompass": """\
+  psabench run gyrocompass                                   the article's way and a better one
+  psabench run gyrocompass --reading article --sequence 0,120,240 --window-s 20
+  psabench run gyrocompass --scenario my.yaml --latitude-deg 60   a scenario of yours, at its latitude
+  psabench run gyrocompass --can slcan:/dev/ttyACM0 --latitude-deg 50.45   the platform on this bus
+""",
+    "heading-hold": """\
+  psabench run heading-hold
+  psabench run heading-hold --reading improved --hours 4 --speed-kmh 500 --track-deg 90   in flight to the east
+""",
+}
+
+
+def _of_the_head(name: str) -> Parameters:
+    from psabench.procedures.registry import PROCEDURES
+
+    return Parameters(fields=PROCEDURES[name].params.__dataclass_fields__)
+
+
+def _of_all() -> Parameters:
+    each = {name: _of_the_head(name).fields for name in ON_THE_HEAD}
+    return Parameters(
+        fields={name: f for fields in each.values() for name, f in fields.items()},
+        defaults={label: {name: f.default for name, f in fields.items()} for label, fields in each.items()},
+    )
+
+
+def _of_the_platform(name: str) -> Parameters:
+    from psabench.procedures import gyro_params, gyrocompass
+
+    return Parameters(fields=gyro_params.fields_of(name), defaults=gyrocompass.READINGS)
+
+
+def _commands() -> list[Command]:
+    head = [
+        Command(
+            name=name,
+            summary=summary,
+            handler=_calibrate,
+            common=_HEAD,
+            load=partial(_of_the_head, name),
+            examples=_EXAMPLES[name],
+            notes=NOTES_HEAD,
+        )
+        for name, summary in ON_THE_HEAD.items()
+    ]
+    every = Command(
+        name=ALL,
+        summary=f"{', '.join(ON_THE_HEAD)}: an accelerometer on the dividing head, each procedure on each bench",
+        handler=_calibrate,
+        common=_HEAD,
+        load=_of_all,
+        examples="  psabench run all             quiet and realistic, on emulators started for it\n"
+        "  psabench run all --condition quiet --realisations 2\n",
+        notes=NOTES_HEAD,
+    )
+    compare = Command(
+        name=COMPARE[0],
+        summary=COMPARE[1],
+        handler=_compare,
+        common=_STARTED,
+        examples="  psabench run compare-converters --out build/run/converters\n",
+    )
+    gyro = [
+        Command(
+            name=name,
+            summary=summary,
+            handler=_gyro,
+            common=_PLATFORM,
+            load=partial(_of_the_platform, name),
+            examples=_EXAMPLES[name],
+            notes=NOTES_PLATFORM,
+        )
+        for name, summary in ON_THE_PLATFORM.items()
+    ]
+    return [*head, every, compare, *gyro]
+
+
+COMMANDS: Mapping[str, Command] = {c.name: c for c in _commands()}

@@ -1,0 +1,161 @@
+"""`psabench run gyrocompass` and `heading-hold`: the runs over the wire, their truth, the report.
+
+Without --can and --control each reading gets an emulator of its own with the same scenario and seed.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from psabench.bench import Bench
+from psabench.boards.registry import Gyro
+from psabench.errors import BadInput
+from psabench.procedures import gyrocompass, heading_hold
+from psabench.procedures.gyro_params import ReadingParams
+from psabench.procedures.gyrocompass import GyrocompassParams, GyrocompassResult
+from psabench.procedures.head_bench import Progress
+from psabench.procedures.heading_hold import Held, HoldParams
+from psabench.procedures.wire_platform import WirePlatform
+from psabench.report.gyro_grading import GyroSection, HeldTruth
+
+SCENARIO = "gyrocompass"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GyroOptions:
+    """What the command line asked for."""
+
+    procedure: str
+    out: Path
+    can: str | None = None
+    control: Path | None = None
+    truth: Path | None = None
+    scenario: Path | None = None
+    seed: int | None = None
+    real_time: bool = False
+    params: Mapping[str, Any] = field(default_factory=dict)  # fields of the parameters, by name
+
+
+def _part(kind: type[Any], given: Mapping[str, Any]) -> dict[str, Any]:
+    return {k: v for k, v in given.items() if k in kind.__dataclass_fields__}
+
+
+def _made(kind: type[Any], procedure: str, given: Mapping[str, Any]) -> Any:
+    try:
+        return kind(**_part(kind, given))
+    except ValueError as e:
+        raise BadInput(f"{procedure}: {e}") from e
+
+
+def run(options: GyroOptions, progress: Progress) -> list[GyroSection]:
+    """Every reading that was asked for. Parameters are checked before anything starts. Raises BenchError."""
+    readings: ReadingParams = _made(ReadingParams, options.procedure, options.params)
+    for name in readings.readings:
+        gyrocompass.params_of(name, _part(GyrocompassParams, options.params))
+    hold_params = _made(HoldParams, options.procedure, options.params) if _holds(options) else None
+    options.out.mkdir(parents=True, exist_ok=True)
+    return [_one(name, hold_params, options, progress) for name in readings.readings]
+
+
+def facts(options: GyroOptions) -> dict[str, str]:
+    """What the report says of the run."""
+    there = " ".join(str(x) for x in (options.can, options.control) if x)
+    return {
+        "procedure": options.procedure,
+        "bench": there or str(options.scenario or SCENARIO),
+        "seed": "of the scenario" if options.seed is None else str(options.seed),
+        "pace": "real time" if options.real_time else "simulated time",
+    }
+
+
+def _holds(options: GyroOptions) -> bool:
+    return options.procedure == heading_hold.NAME
+
+
+def _one(label: str, hold_params: HoldParams | None, options: GyroOptions, progress: Progress) -> GyroSection:
+    with _bench(options) as bench:
+        if options.scenario and not any(isinstance(u, Gyro) for u in bench.units.values()):
+            raise BadInput(f"--scenario {options.scenario}: it has no gyro unit; {SCENARIO} has one")
+        given = {**_site(options), **_part(GyrocompassParams, options.params)}
+        p = gyrocompass.params_of(label, given)
+        platform = WirePlatform(bench, signals=p.signals)
+        truth = _Truth(bench)
+        windows = gyrocompass.measure(platform, p, progress, seen=truth.window)
+        result = gyrocompass.estimate(windows, p)
+        section = GyroSection(label=label, result=result, truth=truth.of(result))
+        if hold_params is None or result.doubts:
+            return section  # navigation does not begin with a heading that is in doubt
+        hold = heading_hold.hold(
+            platform, result, hold_params, progress, watch=truth.look, depart=lambda: _depart(bench, hold_params)
+        )
+        return GyroSection(label=label, result=result, truth=section.truth, hold=hold, hold_truth=truth.held())
+
+
+def _resolved(options: GyroOptions) -> Path | None:
+    """Where the emulator of a run writes its scenario, None: the bench is somebody else's."""
+    return None if options.can or options.control else options.out / f"scenario-{SCENARIO}.json"
+
+
+def _site(options: GyroOptions) -> dict[str, float]:
+    """The latitude that an operator at the scenario's site knows; {}: nobody says where the bench stands."""
+    path = _resolved(options)
+    site = json.loads(path.read_text(encoding="utf-8")).get("site", {}) if path else {}
+    return {"latitude_deg": float(site["latitude_deg"])} if "latitude_deg" in site else {}
+
+
+def _bench(options: GyroOptions) -> Bench:
+    resolved = _resolved(options)
+    if resolved is None:
+        return Bench.connect(options.can, control=options.control, truth=options.truth)
+    pace = "wall" if options.real_time else "step"
+    return Bench.start(options.scenario or SCENARIO, pace=pace, seed=options.seed, extra=["--resolved", resolved])
+
+
+def _depart(bench: Bench, p: HoldParams) -> None:
+    """An emulated vehicle flies, level, when it is told to; a real one has a pilot."""
+    if bench.pace != "real":
+        bench.control.call("vehicle.attitude", heading_deg=p.track_deg, pitch_deg=0.0, roll_deg=0.0)
+        bench.control.call("vehicle.fly", speed_mps=p.speed_mps, track_deg=p.track_deg)
+
+
+class _Truth:
+    """What the truth port says after each window and at each look, where there is one."""
+
+    def __init__(self, bench: Bench) -> None:
+        self._bench = bench
+        self._there = bench.truth_path is not None
+        self._windows: list[Mapping[str, Any]] = []
+        self._headings: list[float] = []
+
+    def window(self) -> None:
+        if self._there:
+            self._windows.append(self._bench.truth_state())
+
+    def look(self, _: Held) -> None:
+        if self._there:
+            self._headings.append(float(self._bench.truth_state()["vehicle"]["heading_deg"]))
+
+    def held(self) -> HeldTruth | None:
+        return HeldTruth(heading_deg=tuple(self._headings)) if self._there else None
+
+    def of(self, result: GyrocompassResult) -> dict[str, float] | None:
+        """By name of the estimate: attitude at the end, drifts as means over the windows."""
+        if not self._windows:
+            return None
+        drifts = [state["platform"]["drift_degph"] for state in self._windows]
+        vehicle = self._windows[-1]["vehicle"]
+        return {
+            "heading_deg": float(vehicle["heading_deg"]) % 360.0,
+            "drift1_degph": _mean([float(d[0]) for d in drifts]),
+            "drift2_degph": _mean([float(d[1]) for d in drifts]),
+            "pitch_deg": float(vehicle["pitch_deg"]),
+            "roll_deg": float(vehicle["roll_deg"]),
+        }
+
+
+def _mean(values: Sequence[float]) -> float:
+    return sum(values) / len(values)

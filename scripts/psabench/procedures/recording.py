@@ -1,0 +1,81 @@
+"""Readings on disk: one CSV row per reading, flushed as it comes, so an interrupted run loses nothing."""
+
+from __future__ import annotations
+
+import csv
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import IO
+
+from psabench.estimate.face import Face
+from psabench.procedures.head_bench import Reading
+
+COLUMNS = ("t_s", "face", "set_deg", "alpha_deg", "axis", "realisation", "u_v")
+
+
+class CsvRecorder:
+    """`Watch(record=recorder)`. Rows survive Ctrl-C, an exception and the death of the process."""
+
+    def __init__(self, path: Path) -> None:
+        """Raises OSError when the file cannot be made; an earlier file of that name is replaced."""
+        self.path = path
+        self.rows = 0
+        self._file: IO[str] = path.open("w", newline="", encoding="utf-8")
+        self._csv = csv.writer(self._file, lineterminator="\n")
+        self._csv.writerow(COLUMNS)
+
+    def __call__(self, r: Reading) -> None:
+        # repr of a float is the shortest text that reads back to the same bits
+        self._csv.writerow(
+            (
+                repr(r.t_s),
+                r.face.value,
+                repr(r.set_deg),
+                repr(r.alpha_deg),
+                r.axis,
+                r.realisation,
+                repr(r.u_v),
+            )
+        )
+        self._file.flush()
+        self.rows += 1
+
+    def __enter__(self) -> CsvRecorder:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, err: BaseException | None, tb: TracebackType | None) -> None:
+        self._file.flush()
+        os.fsync(self._file.fileno())
+        self._file.close()
+
+
+def load_csv(path: Path) -> tuple[Reading, ...]:
+    """Read back what `CsvRecorder` wrote; a last row cut short by a crash is left out.
+
+    Raises ValueError with file and line when the columns or a complete row are not as written.
+    """
+    with path.open(newline="", encoding="utf-8") as f:
+        text = f.read()
+    complete = text[: text.rfind("\n") + 1]
+    rows = list(csv.reader(complete.splitlines()))
+    if not rows or tuple(rows[0]) != COLUMNS:
+        raise ValueError(f"{path}:1: expected the columns {','.join(COLUMNS)}")
+    return tuple(_reading(path, n, row) for n, row in enumerate(rows[1:], start=2))
+
+
+def _reading(path: Path, line: int, row: Sequence[str]) -> Reading:
+    try:
+        t_s, face, set_deg, alpha_deg, axis, realisation, u_v = row
+        return Reading(
+            t_s=float(t_s),
+            face=Face(face),
+            set_deg=float(set_deg),
+            alpha_deg=float(alpha_deg),
+            axis=axis,
+            realisation=int(realisation),
+            u_v=float(u_v),
+        )
+    except ValueError as err:
+        raise ValueError(f"{path}:{line}: {err}; a row is {','.join(COLUMNS)}") from err

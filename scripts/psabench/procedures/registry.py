@@ -1,0 +1,57 @@
+"""The procedures by name: `psabench.procedures.run_table` says what each is for.
+
+A procedure is one function, `run(bench, params, watch)`, that measures and then calls `estimate(readings,
+params)`, which is pure: an interrupted run is estimated from the readings that were recorded
+(`recording.load_csv`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from psabench.estimate.model import Sensor
+from psabench.procedures.fourier import FourierParams, estimate_fourier, expected_fourier, fourier
+from psabench.procedures.result import ProcedureResult
+from psabench.procedures.reversal import ReversalParams, estimate_reversal, expected_reversal, reversal
+from psabench.procedures.turns import TurnsParams, estimate_turns, expected_turns, turns
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Procedure:
+    """One row of the registry; `params` is the dataclass that `run` and `estimate` take."""
+
+    name: str
+    params: type[Any]
+    run: Callable[..., ProcedureResult]  # (bench, params, watch) -> result
+    estimate: Callable[..., ProcedureResult]  # (readings, params, g_mps2) -> result
+    expected: Callable[[Sensor], Mapping[str, float]]  # truth -> what each estimate should have been
+
+
+PROCEDURES: Mapping[str, Procedure] = {
+    p.name: p
+    for p in (
+        Procedure(
+            name="turns",
+            params=TurnsParams,
+            run=turns,
+            estimate=estimate_turns,
+            expected=expected_turns,
+        ),
+        Procedure(
+            name="fourier",
+            params=FourierParams,
+            run=fourier,
+            estimate=estimate_fourier,
+            expected=expected_fourier,
+        ),
+        Procedure(
+            name="reversal",
+            params=ReversalParams,
+            run=reversal,
+            estimate=estimate_reversal,
+            expected=expected_reversal,
+        ),
+    )
+}

@@ -1,0 +1,135 @@
+"""`psabench run`: procedures over the wire, graded and reported.
+
+Without --can it starts the emulator itself, once per reading of the article: quiet (the reading in which the printed
+figures can be reproduced) and realistic (what the same procedure finds with honest noise). With --can and --head, or
+the --control of an emulator, it runs against what is there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from psabench.bench import Bench
+from psabench.board_names import DBC_NODE
+from psabench.errors import BadInput
+from psabench.instruments import EXAMPLES
+from psabench.procedures.head_bench import Progress, Watch
+from psabench.procedures.recording import CsvRecorder
+from psabench.procedures.registry import PROCEDURES, Procedure
+from psabench.procedures.result import ProcedureResult
+from psabench.procedures.run_table import CONDITIONS, G_MPS2, Condition
+from psabench.procedures.wire_bench import WireBench
+from psabench.report import calibration as report
+from psabench.report.grading import Section
+
+# Error of the measuring chain that no interval contains: load, divider, reference and the DC gain of the converter's
+# integer filter taps (1.000169) within 0.05 %; 1 mV of offset at the load; a step of the code or word.
+ZERO_SIGNALS = ("u0_v", "u0_side_v", "c0_v")
+CHAIN_GAIN, CHAIN_ZERO_V, CODE_V, WORD_V = 5e-4, 1e-3, 1.2e-6, 1e-8
+
+
+def allowance(result: ProcedureResult, average: int) -> dict[str, float]:
+    """What the chain may add to each estimate, in the estimate's own unit."""
+    step_v = CODE_V if average else WORD_V
+    added = {"V": step_v, "V/g": step_v, "V/g²": step_v, "deg": 0.0}
+    of = {e.name: CHAIN_GAIN * abs(e.value) + added.get(e.unit, 0.0) for e in result.estimates if e.unit in added}
+    return of | {name: of[name] + CHAIN_ZERO_V for name in ZERO_SIGNALS if name in of}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunOptions:
+    """What the command line asked for."""
+
+    procedures: Sequence[str]
+    out: Path
+    conditions: Sequence[str] = ("quiet", "realistic")
+    can: str | None = None  # python-can spec of a bench that is already there
+    head: str | None = None  # VISA address of that bench's dividing head
+    control: Path | None = None  # of an emulator: moves its time, and tells can and head
+    truth: Path | None = None
+    scenario: Path | None = None  # instead of the conditions' own
+    node: int = DBC_NODE
+    average: int | None = None
+    real_time: bool = False
+    seed: int | None = None
+    g_mps2: float | None = None  # local gravity; None: the condition's, standard gravity on another bench
+    params: Mapping[str, Any] | None = None  # fields of the procedures' parameters, by name
+
+
+def run(options: RunOptions, progress: Progress) -> tuple[Path, list[Section]]:
+    """Every procedure under every condition; writes the report. Raises BenchError; Ctrl-C keeps the readings taken."""
+    options.out.mkdir(parents=True, exist_ok=True)
+    sections = []
+    for condition in _conditions(options):
+        for name in options.procedures:
+            sections.append(_one(PROCEDURES[name], condition, options, progress))
+    page = report.write(options.out, sections, facts=_facts(options))
+    return page, sections
+
+
+def _conditions(options: RunOptions) -> list[Condition]:
+    if _there(options) or options.scenario:
+        average = 16 if options.average is None else options.average
+        return [Condition(label="", scenario=str(options.scenario or ""), average=average, about="", g_mps2=G_MPS2)]
+    return [CONDITIONS[c] for c in options.conditions]
+
+
+def _one(procedure: Procedure, condition: Condition, options: RunOptions, progress: Progress) -> Section:
+    params = make_params(procedure, options.params or {})
+    average = condition.average if options.average is None else options.average
+    g_mps2 = condition.g_mps2 if options.g_mps2 is None else options.g_mps2
+    stem = "-".join(x for x in (procedure.name, condition.label) if x)
+    with ExitStack() as stack:
+        bench = stack.enter_context(_bench(condition, options))
+        on_head = WireBench(bench.unit, bench.head, average=average, g_mps2=g_mps2)
+        recorder = stack.enter_context(CsvRecorder(options.out / f"{stem}.csv"))
+        result = procedure.run(on_head, params, Watch(progress=progress, record=recorder))
+        truth = _axis_truth(bench.truth(), params.axis) if bench.truth_path else None
+    return Section(label=condition.label, result=result, truth=truth, allowance=allowance(result, average))
+
+
+def _there(options: RunOptions) -> bool:
+    """Whether the bench is there already; else an emulator is started."""
+    return bool(options.can or options.head or options.control)
+
+
+def _bench(condition: Condition, options: RunOptions) -> Bench:
+    if _there(options):
+        if not options.head and not options.control:
+            raise BadInput(f"--head is missing: the VISA address of the dividing head, such as {EXAMPLES}")
+        there = {"head": options.head} if options.head else {}
+        return Bench.connect(options.can, scpi=there, control=options.control, truth=options.truth, node=options.node)
+    scenario = options.scenario or condition.scenario
+    pace = "wall" if options.real_time else "step"
+    resolved = options.out / ("-".join(x for x in ("scenario", condition.label) if x) + ".json")
+    extra: list[str | Path] = [
+        "--resolved",
+        resolved,
+    ]  # every key with its value, and the seed: the run can be repeated from it
+    return Bench.start(scenario, pace=pace, seed=options.seed, node=options.node, extra=extra)
+
+
+def make_params(procedure: Procedure, given: Mapping[str, Any]) -> Any:
+    """The procedure's parameters with those fields of `given` that it has. Raises BadInput for a value out of range."""
+    known = {k: v for k, v in given.items() if k in procedure.params.__dataclass_fields__}
+    try:
+        return procedure.params(**known)
+    except ValueError as e:
+        raise BadInput(f"{procedure.name}: {e}") from e
+
+
+def _axis_truth(truth: Mapping[str, Any], axis: str) -> Mapping[str, float]:
+    first = next(iter(truth["units"].values()))
+    sensor = first["axes"][axis]
+    return {k: float(v) for k, v in sensor.items() if isinstance(v, int | float)}
+
+
+def _facts(options: RunOptions) -> dict[str, str]:
+    there = " ".join(str(x) for x in (options.can, options.head, options.control) if x)
+    where = there or str(options.scenario or ", ".join(CONDITIONS[c].scenario for c in options.conditions))
+    seed = "of the scenario" if options.seed is None else str(options.seed)
+    return {"bench": where, "seed": seed, "pace": "real time" if options.real_time else "simulated time"}

@@ -1,0 +1,62 @@
+"""The bench of the procedures over the wire: the board over CAN, the dividing head over SCPI."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from psabench.boards.psa2.device import SETTLE_PERIODS, Psa2
+from psabench.estimate.face import Face
+from psabench.instruments import Head
+from psabench.procedures.run_table import G_MPS2
+
+
+class WireBench:
+    """A `procedures.head_bench.HeadBench` of a unit and the head that it is mounted on.
+
+    average: settled samples in one reading, from the stream of 24-bit codes; 0: one whole 32-bit conversion word by
+    SDO, for boards whose profile reads 32 bits.
+    """
+
+    def __init__(self, unit: Psa2, head: Head, *, average: int = 1, g_mps2: float = G_MPS2) -> None:
+        self.g_mps2 = g_mps2
+        self._unit = unit
+        self._head = head
+        self._average = average
+        unit.wait_ready()
+        self._period_s = 1.0 / unit.data_hz
+        self._settle_s = SETTLE_PERIODS * self._period_s
+        self._settled_at_s = self.t_s
+
+    @property
+    def t_s(self) -> float:
+        return self._unit.host.clock.now_s()
+
+    def turn(self, angle_deg: float) -> float:
+        """Head to angle_deg; the time it takes to get there passes. Returns its scale, deg."""
+        return self._rested(self._head.turn(angle_deg))
+
+    def mount(self, face: Face) -> None:
+        """Put the unit on the head's mount with this face."""
+        self._rested(self._head.mount(face))
+
+    def _rested(self, scale_deg: float) -> float:
+        """The head has come to rest just now: the filters settle from here."""
+        self._settled_at_s = self.t_s + self._settle_s
+        return scale_deg
+
+    def wait(self, dwell_s: float) -> None:
+        if dwell_s > 0.0:
+            self._unit.host.advance(dwell_s)
+
+    def read(self, axis: str, readings: int) -> npt.NDArray[np.float64]:
+        """Settled readings, each the mean of `average` samples (or one whole word)."""
+        self.wait(self._settled_at_s - self.t_s)
+        if self._average:
+            u_v = self._unit.stream(readings * self._average).axis(axis)
+            return np.asarray(u_v.reshape(readings, self._average).mean(axis=1), dtype=np.float64)
+        return np.array([self._word(axis) for _ in range(readings)])
+
+    def _word(self, axis: str) -> float:
+        self.wait(self._period_s)  # the next conversion
+        return self._unit.words_v()["xyz".index(axis)]

@@ -1,0 +1,1 @@
+"""Reports: grading against the truth and the article, pages, pictures."""

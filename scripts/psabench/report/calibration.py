@@ -1,0 +1,233 @@
+"""report.html (one file, nothing loaded from elsewhere), result.json and the console table of a calibration.
+
+folder = Path("build/run")
+write(folder, [Section(label="quiet", result=r, truth=truth)], facts={"seed": "7"})
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping, Sequence
+from html import escape
+from pathlib import Path
+
+from psabench.procedures.result import LIMIT_CI
+from psabench.procedures.run_table import ON_THE_HEAD
+from psabench.report.grading import (
+    ARTICLE,
+    Graded,
+    Section,
+    as_printed,
+    console_table,
+    grade,
+    result_dict,
+    verdict,
+    with_ci,
+    within_limits,
+)
+from psabench.report.page import whole_page
+from psabench.report.whole_file import replace_file
+
+__all__ = ["Section", "console_table", "html_page", "within_limits", "write"]
+
+FORMAT = 1  # of result.json
+_DAGGER = "<span class=flag title='not identifiable'>†</span>"
+
+
+def write(folder: Path, sections: Sequence[Section], facts: Mapping[str, str] | None = None) -> Path:
+    """Write report.html and result.json into `folder` (made when missing), each whole or not at all.
+
+    Returns the page. `facts` (seed, profile, version...) go into both as they are. Raises ValueError for no section,
+    OSError from the disk.
+    """
+    if not sections:
+        raise ValueError("a report needs at least one section")
+    facts = facts or {}
+    folder.mkdir(parents=True, exist_ok=True)
+    data = {
+        "format": FORMAT,
+        "facts": dict(facts),
+        "within_limits": within_limits(sections),
+        "article": {name: printed for name, _, _, printed in ARTICLE},
+        "sections": [result_dict(s) for s in sections],
+    }
+    replace_file(folder / "result.json", json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+    page = folder / "report.html"
+    replace_file(page, html_page(sections, facts))
+    return page
+
+
+def html_page(sections: Sequence[Section], facts: Mapping[str, str]) -> str:
+    """The whole page. Same input, same bytes."""
+    body = [
+        _verdict(sections),
+        _comparison(sections),
+        _alpha0(sections),
+        *(_section(s, f"f{i}") for i, s in enumerate(sections)),
+        _method(),
+    ]
+    return whole_page("Accelerometer calibration", facts, body)
+
+
+def _verdict(sections: Sequence[Section]) -> str:
+    compared = [g for s in sections for g in grade(s) if g.within is not None]
+    kind = "plain" if not compared else "good" if within_limits(sections) else "bad"
+    return f"<p class='verdict {kind}'>{verdict(sections)}</p>"
+
+
+def _comparison(sections: Sequence[Section]) -> str:
+    """The article's printed values beside ours."""
+    head = "".join(f"<th>{escape(s.title)}</th>" for s in sections)
+    rows = []
+    for name, symbol, unit, printed in ARTICLE:
+        cells = "".join(f"<td>{_beside(s, name, printed)}</td>" for s in sections)
+        first = f"<th>{_symbol(symbol)}</th><td class=num>{printed}</td><td class=unit>{unit}</td>"
+        rows.append(f"<tr>{first}{cells}</tr>")
+    return (
+        "<section><h2>Beside the article</h2><div class=scroll><table class=cmp>"
+        "<thead><tr><th></th><th>printed</th><th></th>"
+        f"{head}</tr></thead><tbody>{''.join(rows)}</tbody></table></div>"
+        "<p class=small>Large: our value with the digits that the article prints (green: the same). "
+        "Below it: the value with its 95 % interval. "
+        f"{_DAGGER} not identifiable from these data.</p></section>"
+    )
+
+
+def _beside(section: Section, name: str, printed: str) -> str:
+    found = next((e for e in section.result.estimates if e.name == name), None)
+    if found is None:
+        return "<span class=none>–</span>"
+    ours = as_printed(found.value, printed)
+    kind = "same" if ours == printed else "other"
+    flag = "" if found.identifiable else _DAGGER
+    value, ci = with_ci(found.value, found.ci_half, most=6)
+    return f"<span class={kind}>{ours}</span>{flag}<br><span class=ci>{value} ± {ci}</span>"
+
+
+def _alpha0(sections: Sequence[Section]) -> str:
+    from psabench.report import plots as report_plots  # matplotlib takes a second: the shell and --help do without
+
+    figure = report_plots.alpha0_figure(sections)
+    if figure is None:
+        return ""
+    return (
+        "<section><h2>The mounting error α<sub>0</sub>, 95 % intervals</h2>"
+        f"<figure>{report_plots.svg(figure, 'alpha0')}"
+        "<figcaption>Green: identifiable. Orange: flagged. Dashed: the truth, or the printed value where there is none."
+        "</figcaption></figure></section>"
+    )
+
+
+def _section(section: Section, ident: str) -> str:
+    from psabench.report import plots as report_plots
+
+    r = section.result
+    pictures = [f"<figure>{report_plots.svg(report_plots.turn_figure(section), ident + 'turn')}</figure>"]
+    if r.procedure == "fourier":
+        second = report_plots.svg(report_plots.second_harmonic_figure(section), ident + "second")
+        pictures.append(
+            f"<figure>{second}<figcaption>What is left without zero and first harmonic. "
+            "From one face α<sub>0</sub> is half the arc tangent of the ratio of these two amplitudes."
+            "</figcaption></figure>"
+        )
+    facts = [
+        f"channel <b>{escape(r.axis)}</b>",
+        f"<b>{len(r.readings)}</b> readings in <b>{r.duration_s:.4g} s</b> of bench time",
+        f"residual <b>{r.residual_rms_v * 1e6:.4g} µV</b> rms",
+    ]
+    if r.drift is not None:
+        facts.append(f"drift of the zero <b>{r.drift.value * 1e6:.3g} ± {r.drift.ci_half * 1e6:.2g} µV/s</b>")
+    notes = "".join(f"<li>{_symbol(escape(n))}</li>" for n in r.notes)
+    summary = ON_THE_HEAD[r.procedure]
+    return (
+        f"<section><h2>{escape(section.title)}</h2><p class=facts>{escape(summary)}<br>{' · '.join(facts)}</p>"
+        f"{_estimates(section)}{f'<ul class=notes>{notes}</ul>' if notes else ''}{''.join(pictures)}"
+        f"{_correlation(section)}</section>"
+    )
+
+
+def _estimates(section: Section) -> str:
+    graded = grade(section)
+    truth_head = "<th>truth</th><th>error</th><th>z</th>" if section.truth is not None else ""
+    rows = "".join(_estimate_row(g, section.truth is not None, section.result.g_mps2) for g in graded)
+    why = "".join(
+        f"<li>{_DAGGER} {_symbol(e.symbol)} not identifiable: {_symbol(escape(e.reason))}</li>"
+        for e in section.result.estimates
+        if e.reason
+    )
+    return (
+        "<div class=scroll><table class=est>"
+        "<thead><tr><th></th><th>estimate</th><th>± 95 %</th><th>unit</th><th>in SI</th>"
+        f"{truth_head}<th></th></tr></thead><tbody>{rows}</tbody></table></div>"
+        f"{f'<ul class=notes>{why}</ul>' if why else ''}"
+    )
+
+
+def _estimate_row(g: Graded, with_truth: bool, g_mps2: float) -> str:
+    e = g.estimate
+    value, ci = with_ci(e.value, e.ci_half)
+    truth = ""
+    if with_truth:
+        cells = (
+            "" if g.truth is None else f"{g.truth:.7g}",
+            "" if g.error is None else f"{g.error:+.2g}",
+            "" if g.z is None else f"{g.z:+.1f}",
+        )
+        truth = "".join(f"<td class=num>{c}</td>" for c in cells)
+    mark = "<span class=bad>out of limits</span>" if g.within is False else ""
+    kind, flag = ("", "") if e.identifiable else (" class=off", _DAGGER)
+    return (
+        f"<tr{kind}><th>{_symbol(e.symbol)}{flag}</th><td class=num>{value}</td>"
+        f"<td class=num>{ci}</td><td class=unit>{e.unit}</td><td class='num si'>{_si(e.value, e.unit, g_mps2)}</td>"
+        f"{truth}<td class=mark>{mark}</td></tr>"
+    )
+
+
+def _si(value: float, unit: str, g_mps2: float) -> str:
+    if unit == "V/g":
+        return f"{value / g_mps2 * 1e3:.6g} mV/(m/s²)"
+    if unit == "V/g²":
+        return f"{value / g_mps2**2 * 1e6:.4g} µV/(m/s²)²"
+    return ""
+
+
+def _correlation(section: Section) -> str:
+    c = section.result.correlation
+    symbols = {e.name: _symbol(e.symbol) for e in section.result.estimates}
+    head = "".join(f"<th>{symbols[n]}</th>" for n in c.names)
+    rows = "".join(
+        f"<tr><th>{symbols[n]}</th>{''.join(_correlation_cell(float(v)) for v in row)}</tr>"
+        for n, row in zip(c.names, c.matrix, strict=True)
+    )
+    return (
+        "<details><summary>Correlation of the estimates</summary><div class=scroll><table><thead><tr><th></th>"
+        f"{head}</tr></thead><tbody>{rows}</tbody></table></div></details>"
+    )
+
+
+def _correlation_cell(v: float) -> str:
+    shade = round(abs(v) * 55)
+    ground = "var(--s1)" if v < 0 else "var(--s2)"
+    style = f"background:color-mix(in srgb, {ground} {shade}%, transparent)"
+    return f'<td class=num style="{style}">{v:+.3f}</td>'
+
+
+def _symbol(text: str) -> str:
+    """k_xy -> k<sub>xy</sub>, alpha0 -> α<sub>0</sub>, as the article writes them."""
+    text = re.sub(r"\balpha0\b", "α_0", text)
+    return re.sub(r"\b([A-Za-zα])_([a-z0-9]{1,2})(?![a-z0-9])", r"\1<sub>\2</sub>", text)
+
+
+def _method() -> str:
+    return (
+        "<section class=method><h2>How to read this</h2>"
+        "<p>Voltages are at the load resistor; coefficients are per local g. Intervals are 95 %, by the delta method "
+        "from the residual. A measured number is out of limits when it misses the truth by more than "
+        f"{LIMIT_CI:g} half widths of its interval and what the chain is allowed. "
+        "u<sub>0</sub> contains the quadratic terms that no turn in 1 g can take out of it.</p>"
+        "<p>Repairs to the article: position 1 of its fig. 2 has a<sub>x</sub> = +g; "
+        "(17) needs least squares (80 × 5); "
+        "k<sub>xy</sub> of (18) takes the sign of C<sub>3</sub>; "
+        "α<sub>0</sub> = ½ atan(C<sub>4</sub>/C<sub>3</sub>), not atan2.</p></section>"
+    )

@@ -1,0 +1,187 @@
+"""report.html of a comparison of converters, and its pictures."""
+
+from __future__ import annotations
+
+import json
+from html import escape
+from pathlib import Path
+
+import numpy as np
+
+from psabench.procedures import comparison
+from psabench.procedures.comparison import AXES, Comparison
+from psabench.report.page import whole_page
+from psabench.report.whole_file import replace_file
+
+TITLE = "Five generations of converters, one motion"
+
+
+def write(folder: Path, c: Comparison) -> Path:
+    """result.json and report.html into `folder`, each whole or not at all; returns the page. Raises OSError."""
+    folder.mkdir(parents=True, exist_ok=True)
+    data = json.dumps(comparison.result_dict(c), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    replace_file(folder / "result.json", data)
+    page = folder / "report.html"
+    replace_file(page, html_page(c))
+    return page
+
+
+def html_page(c: Comparison) -> str:
+    """The whole page. Same input, same bytes."""
+    pictures = "".join(
+        f"<section><h2>{heading}</h2><figure>{picture}<figcaption>{words}</figcaption></figure></section>"
+        for heading, picture, words in zip(_HEADINGS, figures(c), _CAPTIONS, strict=True)
+    )
+    body = [
+        f"<p class='verdict {'good' if c.within else 'bad'}'>{escape(comparison.verdict(c))}</p>",
+        _tables(c),
+        pictures,
+        _method(c),
+    ]
+    return whole_page(TITLE, c.facts, body)
+
+
+_HEADINGS = ("Resolution, noise, error", "Velocity error", "The motion")
+_CAPTIONS = (
+    "Of each generation: the quantum of its unit, in a ring where the article prints one; the scatter of the velocity "
+    "about a line at rest, the largest error while the table moved, the error at the end of the run.",
+    "Velocity of each axis less the exact integral, on a scale of its own; the delay of the readings is taken out.",
+    "What the accelerometers felt, from the truth log.",
+)
+
+
+_ABOUT_FIGURES = (
+    "printed: quantum as the article has it. step seen: smallest difference between two increments on the wire, where "
+    "they lie on a grid. noise at rest: about a straight line. drift at rest: slope of that line, the worse of the "
+    "level axes, beyond what they felt; as a zero: the same in µg. largest in motion: of any axis, the drift taken off."
+)
+_ABOUT_ERRORS = (
+    "printed: error of the coefficient as the article has it. end: from the first reading to the last, at rest in the "
+    "same attitude. limit: error of the coefficient times what the axis felt, a zero of three standard deviations, two "
+    "quanta."
+)
+
+
+def _tables(c: Comparison) -> str:
+    return _table("Beside the article", comparison.figures_table(c), _ABOUT_FIGURES) + _table(
+        "Beside the exact integral", comparison.errors_table(c), _ABOUT_ERRORS
+    )
+
+
+def _table(heading: str, rows: comparison.Table, about: str) -> str:
+    """The first column is the row's head; a NO stands out."""
+    head = "".join(
+        f"<tr>{''.join(f'<th style=text-align:{side}>{escape(x)}</th>' for x, side in _sides(r))}</tr>"
+        for r in rows[:2]
+    )
+    body = "".join(
+        f"<tr><th>{escape(r[0])}</th>"
+        + "".join(f"<td class='num{' bad' if x == 'NO' else ''}'>{escape(x)}</td>" for x in r[1:])
+        + "</tr>"
+        for r in rows[2:]
+    )
+    return (
+        f"<section><h2>{heading}</h2><div class=scroll><table>"
+        f"<thead>{head}</thead><tbody>{body}</tbody></table></div><p class=small>{about}</p></section>"
+    )
+
+
+def _sides(row: tuple[str, ...]) -> list[tuple[str, str]]:
+    return [(x, "left" if i == 0 else "right") for i, x in enumerate(row)]
+
+
+def _method(c: Comparison) -> str:
+    rows = "".join(
+        f"<li><b>{escape(g.figures.track.title)}</b>: {escape(g.article.printed)}; {escape(g.figures.track.note)}; "
+        f"{g.figures.track.ma_v_per_g:.4g} V/g; its readings are {g.lag_s * 1e3:.2f} ms behind; "
+        f"limit: {g.article.scale * 1e2:.3g} % ({g.article.k_source}) and {g.article.zero_v * 1e3:.3g} mV of zero "
+        f"({g.article.zero_source})"
+        f"{f'; {escape(g.article.why)}' if g.article.why else ''}</li>"
+        for g in c.graded
+    )
+    return f"<section class=method><h2>How</h2><ul>{rows}</ul></section>"
+
+
+def figures(c: Comparison) -> tuple[str, str, str]:
+    """Inline SVG: dots, errors, motion."""
+    return _dots(c), _errors(c), _motion(c)
+
+
+def _dots(c: Comparison) -> str:
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    from psabench.report import plots as plots
+
+    with matplotlib.rc_context(plots.STYLE):
+        figure = Figure(figsize=(7.4, 0.9 + 0.36 * len(c.graded)), layout="constrained")
+        ax = figure.subplots()
+        for i, g in enumerate(c.graded):
+            values = (
+                ("quantum", "o", plots.SERIES[0], g.figures.track.quantum_mps(c.g_mps2)),
+                ("noise at rest", "s", plots.SERIES[2], float(g.figures.noise_mps.max())),
+                ("largest error in motion", "^", plots.SERIES[3], g.swing_mps),
+                ("error at the end", "D", plots.SERIES[1], float(np.abs(g.end_mps).max())),
+            )
+            for label, marker, colour, value in values:
+                if value:
+                    ax.plot(value, -i, marker, color=colour, ms=5, label=label if i == 0 else None, ls="none")
+            if g.article.pulse_mps:  # a ring: the quantum lies in it
+                ring = ax.plot(g.article.pulse_mps, -i, "o", color=plots.INK, ls="none", ms=10, mfc="none", mew=1.0)
+                ring[0].set_label("printed quantum" if i == 0 else "_")
+        ax.set_xscale("log")
+        ax.set_xlabel("m/s")
+        ax.set_yticks([-i for i in range(len(c.graded))], [g.figures.track.title for g in c.graded])
+        ax.set_ylim(-len(c.graded) + 0.4, 0.6)
+        ax.legend(loc="upper center", ncols=5, bbox_to_anchor=(0.45, 1.2), handletextpad=0.1, columnspacing=1.0)
+        return plots.svg(figure, "dots")
+
+
+def _errors(c: Comparison) -> str:
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    from psabench.report import plots as plots
+
+    with matplotlib.rc_context(plots.STYLE):
+        figure = Figure(figsize=(7.4, 1.25 * len(c.graded)), layout="constrained")
+        rows = figure.subplots(len(c.graded), 1, sharex=True)
+        for ax, g in zip(np.atleast_1d(rows), c.graded, strict=True):
+            t_s = g.figures.track.t_s
+            every = max(1, len(t_s) // 1400)
+            scale, unit = _unit(float(np.abs(g.error_mps).max(initial=0.0)))
+            for i, colour in enumerate(plots.SERIES[:3]):
+                ax.plot(t_s[::every], g.error_mps[::every, i] * scale, lw=0.8, color=colour, label=AXES[i])
+            ax.set_ylabel(unit)
+            ax.set_title(g.figures.track.title)
+        np.atleast_1d(rows)[0].legend(loc="upper right", ncols=3, bbox_to_anchor=(1.0, 1.35))
+        np.atleast_1d(rows)[-1].set_xlabel("time, s")
+        return plots.svg(figure, "errors")
+
+
+def _motion(c: Comparison) -> str:
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    from psabench.report import plots as plots
+
+    m = c.motion
+    span = (m.t_s >= c.graded[0].figures.track.t_s[0]) & (m.t_s <= c.graded[0].figures.track.t_s[-1])
+    with matplotlib.rc_context(plots.STYLE):
+        figure = Figure(figsize=(7.4, 3.2), layout="constrained")
+        top, bottom = figure.subplots(2, 1, sharex=True)
+        for i, colour in enumerate(plots.SERIES[:3]):
+            top.plot(m.t_s[span][::5], m.a_mps2[span][::5, i], lw=1.0, color=colour, label=AXES[i])
+            bottom.plot(m.t_s[span][::5], (m.v_mps[span] - m.v_mps[span][0])[::5, i], lw=1.0, color=colour)
+        top.set_ylabel("m/s²")
+        bottom.set_ylabel("integral, m/s")
+        bottom.set_xlabel("time, s")
+        top.legend(loc="upper right", ncols=3, bbox_to_anchor=(1.0, 1.25))
+        return plots.svg(figure, "motion")
+
+
+def _unit(largest_mps: float) -> tuple[float, str]:
+    for scale, unit in ((1.0, "m/s"), (1e3, "mm/s"), (1e6, "µm/s")):
+        if largest_mps * scale >= 0.3:
+            return scale, unit
+    return 1e9, "nm/s"

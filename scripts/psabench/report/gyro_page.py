@@ -1,0 +1,207 @@
+"""report.html and result.json of gyrocompassing and heading hold, and their pictures."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from html import escape
+from pathlib import Path
+
+import numpy as np
+
+from psabench.estimate.angles import wrapped_deg
+from psabench.native.nav import DEGPH
+from psabench.procedures.result import DEG
+from psabench.report import gyro_grading as grading
+from psabench.report.gyro_grading import GyroSection
+from psabench.report.page import whole_page
+from psabench.report.whole_file import replace_file
+
+TITLE = "Gyrocompassing and heading hold"
+FORMAT = 1  # of result.json
+CAPTIONS = {
+    "rates": "Levelling rate of each position against the azimuth angle α of the platform: the Earth's horizontal rate "
+    "as a sine about the drift. The line is the fit. Below: what the rates miss it by.",
+    "course": "The same in time: the line is what the fit expects in each window.",
+    "hold": "Heading less the truth while it is kept by the gyroscope. Shaded: 95 % of what is to be expected; dashed: "
+    "the article's 0.3°.",
+}
+
+
+def write(folder: Path, sections: Sequence[GyroSection], facts: Mapping[str, str]) -> Path:
+    """result.json and report.html into `folder`, each whole or not at all; returns the page. Raises OSError."""
+    folder.mkdir(parents=True, exist_ok=True)
+    data = {
+        "format": FORMAT,
+        "facts": dict(facts),
+        "within_limits": grading.within_limits(sections),
+        "sections": [grading.result_dict(s) for s in sections],
+    }
+    replace_file(folder / "result.json", json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+    page = folder / "report.html"
+    replace_file(page, html_page(sections, facts))
+    return page
+
+
+def html_page(sections: Sequence[GyroSection], facts: Mapping[str, str]) -> str:
+    """The whole page. Same input, same bytes."""
+    good = grading.within_limits(sections)
+    body = [
+        f"<p class='verdict {'good' if good else 'bad'}'>{escape(grading.verdict(sections))}</p>",
+        *(_section(s, f"g{k}") for k, s in enumerate(sections)),
+        _method(),
+    ]
+    return whole_page(TITLE, facts, body)
+
+
+def _section(s: GyroSection, ident: str) -> str:
+    doubts = "".join(f"<li class=bad>{escape(d)}</li>" for d in grading.doubts(s))
+    notes = "".join(f"<li>{escape(n)}</li>" for n in s.result.notes)
+    c = s.result.compass
+    parts = [
+        f"<section><h2>{escape(s.title)}</h2>",
+        f"<p class=facts>|hypot(s, c) − 1| <b>{c.quality:.4f}</b> · determinant <b>{c.geometry:.2f}</b> We²</p>",
+        _table(grading.table(s)),
+        f"<p class=facts>{escape(s.result.latitude.words)}</p>",
+        f"<ul class=notes>{doubts}{notes}</ul>" if doubts or notes else "",
+        _figure(rates_figure(s), ident + "rates", CAPTIONS["rates"]),
+        _figure(course_figure(s), ident + "course", CAPTIONS["course"]),
+        _positions(s),
+        _hold(s, ident),
+        "</section>",
+    ]
+    return "".join(parts)
+
+
+def _hold(s: GyroSection, ident: str) -> str:
+    if s.hold is None:
+        return ""
+    return (
+        f"<h2>Hold: {s.hold.drift2_radps / DEGPH:.3f} deg/h compensated in azimuth</h2>"
+        f"<p>{escape(grading.hold_summary(s))}</p>{_table(grading.hold_table(s))}"
+        f"{_figure(hold_figure(s), ident + 'hold', CAPTIONS['hold'])}"
+    )
+
+
+def _table(rows: Sequence[tuple[str, ...]]) -> str:
+    head = "".join(f"<th>{escape(x)}</th>" for x in rows[0])
+    body = "".join(
+        f"<tr><th>{escape(r[0])}</th>" + "".join(f"<td class=num>{escape(x)}</td>" for x in r[1:]) + "</tr>"
+        for r in rows[1:]
+    )
+    return f"<div class=scroll><table class=est><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>"
+
+
+def _positions(s: GyroSection) -> str:
+    rows: list[tuple[str, ...]] = [
+        ("position", "gimbal, deg", "turn of α, deg", "S, deg/h", "β, ′", "γ, deg", "left, deg/h")
+    ]
+    for row in s.result.rows:
+        p = row.position
+        numbers = (row.q_rad * DEG, p.delta_rad * DEG, p.s_radps / DEGPH, p.beta_rad * DEG * 60.0, p.gamma_rad * DEG)
+        cells = [f"{x:.4f}" for x in numbers]
+        rows.append((str(row.number + 1), *cells, f"{row.residual_radps / DEGPH:+.4f}"))
+    return f"<details><summary>Positions</summary>{_table(rows)}</details>"
+
+
+def _figure(figure: object, ident: str, caption: str) -> str:
+    from matplotlib.figure import Figure
+
+    from psabench.report import plots as plots
+
+    assert isinstance(figure, Figure)
+    return f"<figure>{plots.svg(figure, ident)}<figcaption>{escape(caption)}</figcaption></figure>"
+
+
+def _method() -> str:
+    return (
+        "<section class=method><h2>How to read this</h2><p>limit: two half widths of the 95 % interval and the "
+        "constant errors that no window sees (level sensors, zero of the angle sensor, scale of the torquers). "
+        "Intervals count the random drift of the passport as a Gauss-Markov process. The article's figures are of one "
+        "simulated run; what they are worth, and under which reading they hold, is on the page of the procedure.</p>"
+        "</section>"
+    )
+
+
+# ---- pictures
+
+
+def rates_figure(s: GyroSection) -> object:
+    """S against alpha with its fit, and what is left."""
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    from psabench.report import plots as plots
+
+    r, p = s.result, s.result.params
+    we_degph = p.we_radps / DEGPH
+    alpha = wrapped_deg(np.array([(r.compass.alpha1_rad + row.position.delta_rad) * DEG for row in r.rows]))
+    rate = np.array([row.position.s_radps / DEGPH for row in r.rows])
+    left = np.array([row.residual_radps / DEGPH for row in r.rows])
+    x = np.linspace(-180.0, 180.0, 361)
+    with matplotlib.rc_context(plots.STYLE):
+        figure = Figure(figsize=(7.4, 4.4), layout="constrained")
+        top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=[3, 1.4])
+        top.plot(x, r.compass.drift1_radps / DEGPH + we_degph * np.sin(np.radians(x)), color=plots.MUTED, lw=1.0)
+        top.axhline(r.compass.drift1_radps / DEGPH, color=plots.SERIES[1], lw=0.9, ls="--", label="drift")
+        top.plot(alpha, rate, "o", color=plots.SERIES[0], ms=4.5, label="position")
+        bottom.plot(alpha, left, "o", color=plots.SERIES[0], ms=4.0)
+        bottom.axhline(0.0, color=plots.MUTED, lw=0.8)
+        top.set_ylabel("S, deg/h")
+        bottom.set_ylabel("left, deg/h")
+        bottom.set_xlabel("α, deg")
+        bottom.set_xlim(-180.0, 180.0)
+        bottom.set_xticks(range(-180, 181, 45))
+        top.legend(loc="upper left", ncols=2)
+        return figure
+
+
+def course_figure(s: GyroSection) -> object:
+    """S of each window in time."""
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    from psabench.report import plots as plots
+
+    r = s.result
+    run = r.windows[: len(r.params.table.sequence_deg)]
+    begun_s = run[0].t_mid_s - run[0].length_s / 2.0
+    with matplotlib.rc_context(plots.STYLE):
+        figure = Figure(figsize=(7.4, 2.8), layout="constrained")
+        ax = figure.subplots()
+        for w in run:
+            t = w.t_mid_s - begun_s + w.length_s * (np.arange(len(w.beta_rad)) / len(w.beta_rad) - 0.5)
+            every = max(1, len(t) // 200)
+            ax.plot(t[::every], w.levelling_radps[::every] / DEGPH, color=plots.SERIES[0], lw=0.8)
+        for row in r.rows:
+            p = row.position
+            middle, half = p.t_mid_s - begun_s, p.window_s / 2.0
+            expected = (p.s_radps - row.residual_radps) / DEGPH
+            ax.plot([middle - half, middle + half], [expected] * 2, color=plots.SERIES[1], lw=1.4)
+        ax.set_xlabel("time from the first window, s")
+        ax.set_ylabel("S, deg/h")
+        return figure
+
+
+def hold_figure(s: GyroSection) -> object:
+    """Error of the heading in time, with what is to be expected of it."""
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    from psabench.report import plots as plots
+
+    assert s.hold is not None
+    hours = np.array([h.t_s / 3600.0 for h in s.hold.held])
+    band = np.array([h.half95_rad * DEG for h in s.hold.held])
+    errors = np.array(grading.hold_errors_deg(s) or np.full(len(hours), np.nan))
+    with matplotlib.rc_context(plots.STYLE):
+        figure = Figure(figsize=(7.4, 3.0), layout="constrained")
+        ax = figure.subplots()
+        ax.fill_between(hours, -band, band, color=plots.MUTED, alpha=0.18, lw=0)
+        for sign in (-1.0, 1.0):
+            ax.axhline(sign * grading.HOLD_CLAIM_DEG, color=plots.SERIES[1], lw=0.9, ls="--")
+        ax.plot(hours, errors, color=plots.SERIES[0], lw=1.4)
+        ax.set_xlabel("time, h")
+        ax.set_ylabel("error of heading, deg")
+        ax.set_xlim(0.0, float(hours[-1]))
+        return figure

@@ -1,0 +1,45 @@
+"""`psabench run compare-converters` as a user runs it: seven units, one motion, graded."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from psabench import cli
+
+ROOT = Path(__file__).resolve().parents[3]
+PULSES = {"pik": 60e-3, "pik5": 60e-3, "pik6": 5e-3, "pmka": 2.4e-5}  # m/s, as the article prints them
+
+
+def test_seven_units_one_motion(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["run", "compare-converters", "--out", str(tmp_path)]) == 0
+    assert "The velocities of all 7 generations lie within their limits" in capsys.readouterr().out
+    data = json.loads((tmp_path / "result.json").read_text())
+    of = {g["name"]: g for g in data["generations"]}
+    for name, printed in PULSES.items():
+        assert of[name]["quantum_mps"] == pytest.approx(printed, rel=0.03)
+    for name in ("pik", "pik5", "pik6", "psa1", "psa2"):  # what the wire shows is the quantum of the formulas
+        seen = [s for s in of[name]["step_seen_mps"] if s is not None]
+        assert seen
+        assert min(seen) == pytest.approx(of[name]["quantum_mps"], rel=1e-3)
+    quanta = [float(f"{g['quantum_mps']:.6g}") for g in data["generations"] if g["name"] != "psd1"]
+    assert quanta == sorted(quanta, reverse=True)
+    # 16 bits of +-10 V each 9.984 ms: one code is as fine as PMKA's each 4.8 ms, and no finer
+    assert of["psd1"]["quantum_mps"] == pytest.approx(10 / 2**15 * 9.984e-3 / 1.2 * 9.8094, rel=1e-4)
+    assert max(abs(e) for e in of["pmka"]["end_error_mps"]) < 2e-3
+    assert max(abs(e) for e in of["psa2"]["end_error_mps"]) < 0.15
+    assert of["pik6"]["noise_rms_mps"][2] == pytest.approx(of["pik6"]["quantum_mps"] / 12**0.5, rel=0.1)
+    assert (tmp_path / "report.html").read_text().count("<svg") == 3
+    assert json.loads((tmp_path / "scenario-converters.json").read_text())["units"]
+
+
+def test_another_bench_is_bad_input(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["run", "compare-converters", "--scenario", "nowhere.yaml", "--out", str(tmp_path)]) == 2
+    assert cli.main(["run", "compare-converters", "--scenario", "quiet", "--out", str(tmp_path)]) == 2
+    assert "no unit pik, pik5, pik6, pmka, psd1, psa1, psa2 of" in capsys.readouterr().err
+    other = tmp_path / "other.yaml"
+    text = (ROOT / "proto/scenarios/converters.yaml").read_text(encoding="utf-8")
+    other.write_text(text.replace("board: pik5\n", "board: psa2\n"), encoding="utf-8")
+    assert cli.main(["run", "compare-converters", "--scenario", str(other), "--out", str(tmp_path)]) == 2
+    assert "no unit pik5 of the board of that name" in capsys.readouterr().err

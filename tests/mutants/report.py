@@ -1,0 +1,115 @@
+"""What the mutants came to: a table for the terminal, mutants.json, the tables of docs/reference/mutants.md."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import between
+from psabench.report.whole_file import replace_file
+
+from tests.mutants.declared import load
+from tests.mutants.verdict import KILLED, WRONG, Result
+
+FORMAT = 1  # of mutants.json
+MARKS = "<!-- result: made by `make mutants`, do not edit -->", "<!-- end of result -->"
+
+
+def rate(results: Iterable[Result]) -> tuple[int, int]:
+    """Killed, and of how many: those that nobody can see, or of which nothing is known, do not count."""
+    rows = [r for r in results if r.result != "equivalent" and r.result not in WRONG]
+    return sum(r.result in KILLED for r in rows), len(rows)
+
+
+def percent(killed: int, of: int) -> str:
+    """As a table shows it."""
+    return f"{100.0 * killed / of:.1f} %" if of else "-"
+
+
+def line(r: Result) -> str:
+    """One mutant on the terminal."""
+    found = " ".join(r.found[:4]) + (f" and {len(r.found) - 4} more" if len(r.found) > 4 else "")
+    named = "" if r.named or not r.found or not r.breaks else f" (not {' or '.join(r.breaks)})"
+    detail = f"{found}{named}" if r.found else r.reason or f"breaks {', '.join(r.breaks) or 'what nobody has said'}"
+    return f"{r.result:12} {r.id:34} {r.on:16} {detail.splitlines()[-1] if detail else ''}"
+
+
+def summary(title: str, results: Sequence[Result]) -> Iterator[str]:
+    """Rates, overall and per kind; then who was not found."""
+    killed, of = rate(results)
+    counts = Counter(r.result for r in results)
+    yield f"{title}: {killed} of {of} killed, {percent(killed, of)}: " + ", ".join(
+        f"{n} {name}" for name, n in sorted(counts.items())
+    )
+    named = sum(r.named for r in results if r.result == "killed" and r.breaks)
+    declared = sum(r.result == "killed" for r in results if r.breaks)
+    if declared:
+        yield f"  of {declared} that a requirement found, {named} by one that the list names"
+    for kind in sorted({r.kind for r in results}):
+        killed, of = rate(r for r in results if r.kind == kind)
+        yield f"  {kind:16} {killed:4} of {of:4}  {percent(killed, of)}"
+    for r in sorted(results, key=lambda r: (r.breaks, r.id)):
+        if r.result not in KILLED:
+            why = f": {r.reason.splitlines()[-1]}" if r.reason else ""
+            yield f"  {r.result}: {r.id} ({', '.join(r.breaks) or r.file}){why}"
+
+
+def read(path: Path) -> dict[str, Any]:
+    """The latest mutants.json; empty: none, or of another format."""
+    if not path.is_file():
+        return {}
+    found = json.loads(path.read_text(encoding="utf-8"))
+    return found if isinstance(found, dict) and found.get("format") == FORMAT else {}
+
+
+def write(path: Path, parts: dict[str, Sequence[Result]], facts: dict[str, Any]) -> None:
+    """parts: declared, random."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    everything = {"format": FORMAT, **facts, **{name: [asdict(r) for r in rows] for name, rows in parts.items()}}
+    replace_file(path, json.dumps(everything, indent=1, ensure_ascii=False) + "\n")
+
+
+def page(path: Path, parts: dict[str, Sequence[Result]], facts: Mapping[str, Any]) -> None:
+    """The tables of docs/reference/mutants.md, in place of those that are there."""
+    titles = {"declared": "Declared mutants", "random": f"Random mutants, seed {facts.get('random_seed')}"}
+    body = "\n".join(row for name, results in parts.items() if results for row in _part(name, titles[name], results))
+    between.write(path, MARKS, f"\n{body}")
+
+
+def _part(name: str, title: str, results: Sequence[Result]) -> Iterator[str]:
+    yield f"### {title}\n"
+    if name == "declared" and len(results) < len(load()):
+        yield f"Judged so far: {len(results)} of the {len(load())} of the list.\n"
+    counts = Counter(r.result for r in results)
+    yield f"{_said(results)} Of all {len(results)}: {', '.join(f'{n} {what}' for what, n in sorted(counts.items()))}.\n"
+    yield "| kind | killed | of | rate |\n|---|---|---|---|"
+    for kind in sorted({r.kind for r in results}):
+        killed, of = rate(r for r in results if r.kind == kind)
+        yield f"| {kind} | {killed} | {of} | {percent(killed, of)} |"
+    yield ""
+    spared = [r for r in results if r.result not in KILLED and (r.result != "equivalent" or r.breaks)]
+    if spared:
+        yield "| not killed | what became of it | breaks | reason |\n|---|---|---|---|"
+    for r in sorted(spared, key=lambda r: r.id):
+        reason = r.reason.splitlines()[-1].replace("|", "\\|") if r.reason else ""
+        yield f"| {r.id} | {r.result} | {', '.join(r.breaks) or r.file} | {reason} |"
+    if spared:
+        yield ""
+
+
+def _said(results: Sequence[Result]) -> str:
+    """The rate, and how those that a requirement found were found."""
+    killed, of = rate(results)
+    found = [r for r in results if r.result == "killed"]
+    words = f"{killed} of {of} killed, {percent(killed, of)}."
+    if found and all(r.failed is not None for r in found):
+        failed = sum(r.failed is True for r in found)
+        words += f" In {failed} of {len(found)} a requirement failed; in the others one could not be carried out."
+    listed = [r for r in found if r.breaks]
+    if listed:
+        words += f" {sum(r.named for r in listed)} were found by a requirement that the list names."
+    return words

@@ -1,0 +1,54 @@
+"""Recording: what is counted is what is in the file, wherever Ctrl-C falls."""
+
+import os
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import can
+import pytest
+from psabench.link import record as module
+from psabench.link.record import record
+
+
+class Endless(can.BusABC):
+    """A bus that always has a frame."""
+
+    def __init__(self) -> None:
+        super().__init__(channel=0)
+
+    def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
+        return can.Message(arbitration_id=0x123, data=b"12345678", is_extended_id=False, timestamp=1.0), True
+
+    def send(self, msg: can.Message, timeout: float | None = None) -> None: ...
+
+
+@pytest.mark.parametrize("ending", [".log", ".blf", ".asc"])
+@pytest.mark.parametrize("when", ["before", "after"])
+def test_ctrl_c_falls_between_two_messages(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, when: str, ending: str
+) -> None:
+    path = tmp_path / f"bus{ending}"
+    written = 0
+
+    @contextmanager
+    def interrupted(path: Path) -> Iterator[Callable[[can.Message], None]]:
+        def write(m: can.Message) -> None:
+            nonlocal written
+            written += 1
+            if when == "before" and written == 3:
+                os.kill(os.getpid(), signal.SIGINT)
+            log(m)
+            if when == "after" and written == 3:
+                os.kill(os.getpid(), signal.SIGINT)
+
+        with can.Logger(str(path)) as log:
+            yield write
+
+    monkeypatch.setattr(module, "_writer", interrupted)
+    handler = signal.getsignal(signal.SIGINT)
+    recorded = record(Endless(), path, node=5, for_s=10.0, count=None)
+    assert signal.getsignal(signal.SIGINT) is handler
+    with can.LogReader(path) as logged:
+        assert len(list(logged)) == recorded.messages == 3

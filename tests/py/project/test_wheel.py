@@ -1,0 +1,103 @@
+"""The wheel of this checkout, in an environment of its own and an empty folder: emulator, library and data come along.
+
+The environment sees the packages of .venv (numpy and so on) but not the psabench there, so that no network is needed.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import sysconfig
+import zipfile
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[3]
+UV = str(Path(sys.executable).with_name("uv"))
+ENV = {
+    k: v
+    for k, v in os.environ.items()
+    if k not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL", "PYTHONPATH", "PSA_EMU", "PSABENCH_LIB", "PSABENCH_PROTO")
+}
+
+
+def run(command: Sequence[str | Path], cwd: Path, timeout_s: float = 100.0) -> str:
+    done = subprocess.run(command, cwd=cwd, env=ENV, capture_output=True, text=True, timeout=timeout_s)
+    assert done.returncode == 0, f"{command}\n{done.stdout}{done.stderr}"
+    return done.stdout
+
+
+def build() -> Path:
+    run(["make", "--no-print-directory", "wheel"], ROOT)
+    return max((ROOT / "build/dist").glob("psabench-*.whl"), key=lambda p: p.stat().st_mtime_ns)
+
+
+@pytest.fixture(scope="module")
+def wheel() -> Path:
+    return build()
+
+
+@pytest.fixture(scope="module")
+def programs(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """bin of a new environment with the wheel in it."""
+    venv = tmp_path_factory.mktemp("wheel") / "venv"
+    run([UV, "venv", "-q", "--offline", "--python", sys.executable, venv], ROOT)
+    python = venv / "bin/python"
+    run([UV, "pip", "install", "-q", "--offline", "--no-deps", "--python", python, wheel], ROOT)
+    site = run([python, "-c", "import sysconfig; print(sysconfig.get_path('purelib'))"], venv).strip()
+    # A line of a .pth is a folder to import from; the .pth files there, our editable install's too, are not read.
+    (Path(site) / "packages_of_the_checkout.pth").write_text(sysconfig.get_path("purelib") + "\n")
+    return venv / "bin"
+
+
+def test_it_is_for_any_python_3_on_this_platform(wheel: Path) -> None:
+    platform = sysconfig.get_platform().replace("-", "_").replace(".", "_")
+    assert wheel.name.endswith(f"-py3-none-{platform}.whl")
+
+
+def test_the_same_sources_make_the_same_wheel(wheel: Path) -> None:
+    first = wheel.read_bytes()
+    (package,) = (ROOT / "build/wheel").glob("lib*/psabench")
+    (package / "of_an_earlier_version.py").touch()
+    assert build().read_bytes() == first
+
+
+def test_it_holds_what_is_installed_and_no_path_of_this_machine(wheel: Path) -> None:
+    with zipfile.ZipFile(wheel) as z:
+        files = {n.removeprefix("psabench/bundle/"): z.read(n) for n in z.namelist() if "/bundle/" in n}
+        ours = [n for n, data in files.items() if str(ROOT).encode() in data]
+    assert ours == []
+    libraries = {"lib/libpsabench.so.0", "lib/libpsabench-nav.so.1"}
+    assert libraries | {"bin/psa-emu", "include/psabench.h", "share/psabench/proto/psabench.dbc"} <= set(files)
+    for folder in ("proto", "decoders", "share"):
+        here = {p for p in (ROOT / folder).rglob("*") if p.is_file() and p.suffix != ".pyc"}
+        assert {f"share/psabench/{p.relative_to(ROOT)}" for p in here} <= set(files)
+
+
+def test_the_command_runs_a_procedure_on_its_own_emulator(programs: Path, tmp_path: Path) -> None:
+    assert "psabench run all" in run([programs / "psabench", "--help"], tmp_path)
+    said = run([programs / "psabench", "run", "turns", "--condition", "quiet"], tmp_path)
+    assert "lie within their limits of the truth" in said
+    assert (tmp_path / "build/run/report.html").is_file()
+
+
+def test_the_emulator_is_a_command_too(programs: Path, tmp_path: Path) -> None:
+    said = run([programs / "psa-emu", "quiet", "--pace", "free", "--for", "5ms"], tmp_path, timeout_s=30)
+    assert said.splitlines()[-1] == "ready all"
+
+
+def test_python_uses_its_own_emulator_library_and_files(programs: Path, tmp_path: Path) -> None:
+    script = (
+        "import psabench.chips as c, psabench.native.clib as l, psabench.native.navlib as n, psabench.places as p\n"
+        "print(p.find_emulator(), l.library().path, n.library().path, p.proto_file('psabench.dbc'), sep='\\n')\n"
+        "with c.Bench() as b:\n"
+        "    adc = b.part('ads1256')\n"
+        "    adc.run_until_level('DRDY', 0)\n"
+        "    print(b.now_ns > 0)\n"
+    )
+    *places, moved = run([programs / "python", "-c", script], tmp_path).splitlines()
+    assert moved == "True"
+    assert [p for p in places if not Path(p).is_relative_to(programs.parent)] == []

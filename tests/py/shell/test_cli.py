@@ -1,0 +1,358 @@
+"""The command line: each mistake gets one line (what, where, what would be right) and status 2, before any work."""
+
+from __future__ import annotations
+
+import argparse
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from psabench import cli
+from psabench import options as arguments
+from psabench.link import lineport, record, record_command
+from psabench.link.protocol_files import dbc_node
+from psabench.procedures import command as run_command
+from psabench.procedures import compare_converters, gyro_params, run_table
+from psabench.procedures.registry import PROCEDURES
+
+from tests.py.link.test_lineport import lines
+
+MISTAKES: list[tuple[str, str]] = [
+    (
+        "run",
+        "run: which procedure? turns, fourier, reversal, all, compare-converters, gyrocompass, heading-hold or script",
+    ),
+    ("run --out turns", "run: which procedure? turns"),
+    ("run spin", "run spin: no such procedure; turns, fourier, reversal, all, compare-converters, gyrocompass, "),
+    ("run spin --positions 80", "run spin: no such procedure; turns"),
+    ("run turns --positions 80", "--positions: turns has no such parameter; it has --axis, --realisations, "),
+    ("run --positions=80 turns", "--positions: turns has no such parameter; it has --axis"),
+    ("run turns fourier", "fourier: one word too many for turns"),
+    ("run gyrocompass --node 5", "--node: gyrocompass has no such parameter; it has --reading, --sequence"),
+    ("run gyrocompass --hours 4", "--hours: gyrocompass has no such parameter"),
+    ("run heading-hold --average 16", "--average: heading-hold has no such parameter; it has --reading, --hours"),
+    ("run compare-converters --real-time", "--real-time: compare-converters has no such parameter; it has --scenario"),
+    ("run gyrocompass --window-s 0", "gyrocompass: window_s is 0.0"),
+    ("run script nothing.psa --axis x", "--axis: script has no such parameter; it has --scenario"),
+    ("record run.log --speed 3", "--speed: record has no such parameter; it has --can"),
+    ("run all --axis w", "turns: axis is 'w'; it must be x, y or z"),
+    ("run turns --out /dev/null/x", "/dev/null/x: "),
+    ("run turns --can socketcand:127.0.0.1:1", "--head is missing"),
+    ("decode nothing.log", "nothing.log: no such file"),
+    ("decode README.md", "README.md: ending .md; python-can reads"),
+    ("decode --line nothing.bin", "nothing.bin: no such file"),
+    ("decode --line x.bin --board psd1 --out x.csv", "--line: line frames are PSA-2's; of a psd1 a CAN log is decoded"),
+    ("decode --line nothing.bin --board psa1", "nothing.bin: no such file"),
+    ("decode --line /", "/: a folder; a file is wanted"),
+    ("decode --line /dev/null --word-bits 17", "word_bits is 17; a PSA-2 sends words of 16, 24 or 32 bits"),
+    ("decode --line /dev/null --out /dev/null/x.csv", "/dev/null/x.csv: "),
+]
+
+
+@pytest.mark.parametrize(("line", "words"), MISTAKES, ids=[m[0] for m in MISTAKES])
+def test_a_mistake_gets_one_line_and_status_2(
+    line: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(line.split()) == 2
+    out, err = capsys.readouterr()
+    assert (out, err.count("\n")) == ("", 1)
+    assert err.startswith("psabench: ")
+    assert words in err
+
+
+@pytest.mark.parametrize(
+    ("convert", "text"),
+    [
+        (arguments.natural, "-3"),
+        (arguments.natural, "x"),
+        (arguments.positive, "0"),
+        (arguments.positive, "nan"),
+        (arguments.positive, "inf"),
+        (arguments.node_id, "0"),
+        (arguments.node_id, "128"),
+        (arguments.yes_no, "maybe"),
+        (arguments.board_name, "psd9"),
+    ],
+)
+def test_an_argument_out_of_range_is_refused(convert: object, text: str) -> None:
+    assert callable(convert)
+    with pytest.raises(argparse.ArgumentTypeError, match="expected"):
+        convert(text)
+
+
+@pytest.mark.parametrize(("name", "board"), [("psa1", "psa2"), ("pik5", "pik"), ("pik6", "pik"), ("pmka", "pmka")])
+def test_another_name_of_a_board_is_taken_as_the_board(
+    name: str, board: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    node = dbc_node(board)
+    Path("bus.log").write_text("".join(f"(0.{k}) can0 {k}8{node}#0000000000000000\n" for k in (1, 2, 3)))
+    tables = []
+    for known in (name, board):
+        assert cli.main(["decode", "bus.log", "--board", known]) == 0
+        tables.append(capsys.readouterr())
+    assert tables[0] == tables[1]
+    assert "frames 1" in tables[0].err
+
+
+LOGS: list[tuple[str, str, str]] = [
+    ("empty", "", "no frame of node 5; nodes with frames: none"),
+    ("no samples", "(0.1) can0 705#00\n(0.2) can0 000#0100\n", "no frame of node 5; nodes with frames: none"),
+    (
+        "pair, FD frame, block and fast form of others",
+        "(0.1) can0 187#15DA1F0100000000\n(0.2) can0 287#000000534C19E4B8\n(0.3) can0 201##100\n(0.4) can0 489##100\n"
+        "(0.5) can0 3FF#0000000000000000\n",
+        "no frame of node 5; nodes with frames: 1, 7, 9, 127",
+    ),
+    ("29-bit, remote", "(0.1) can0 00000187#00\n(0.2) can0 187#R\n", "no frame of node 5; nodes with frames: none"),
+    ("half a pair", "(0.1) can0 185#15DA1F0100000000\n", "only parts of frames of node 5; others with frames: none"),
+]
+
+
+@pytest.mark.parametrize(("log", "words"), [x[1:] for x in LOGS], ids=[x[0] for x in LOGS])
+def test_a_log_without_a_frame_of_the_node_gets_one_line_and_status_2(
+    log: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("bus.log").write_text(log)
+    assert cli.main(["decode", "bus.log"]) == 2
+    assert capsys.readouterr() == ("", f"psabench: bus.log: {words}\n")
+
+
+def test_a_log_with_a_frame_of_the_node_is_a_table(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("bus.log").write_text("(0.1) can0 187#15DA1F0100000000\n(0.2) can0 287#000000534C19E4B8\n")
+    assert cli.main(["decode", "bus.log", "--node", "7"]) == 0
+    out, err = capsys.readouterr()
+    assert out.startswith("t_rx_s,")
+    assert out.count("\n") == 2
+    assert err == "frames 1, lost 0, torn 0\n"
+
+
+def test_a_capture_without_a_frame_gets_one_line_and_status_2(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("x.bin").write_bytes(b"\x01\x00\x01")
+    assert cli.main(["decode", "--line", "x.bin"]) == 2
+    counts = "samples=3 frames=0 torn=1 lost=0 late=0 early=0 gaps=0"
+    assert capsys.readouterr() == ("", f"psabench: x.bin: no frame of 32-bit words ({counts})\n")
+
+
+def test_a_reader_that_has_seen_enough_is_no_error() -> None:
+    samples = b"\x01" * 100 + lines([1, 2, 3, 4])
+    command = [sys.executable, "-m", "psabench.cli", "decode", "--line", "/dev/stdin"]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as p:
+        assert p.stdin
+        assert p.stdout
+        assert p.stderr
+        p.stdout.close()
+        p.stdin.write(samples)
+        p.stdin.close()
+        words = p.stderr.read().decode()
+        assert p.wait(60) == 0
+    assert "Traceback" not in words
+    assert "Broken pipe" not in words
+
+
+def help_of(words: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> str:
+    monkeypatch.setenv("COLUMNS", "160")
+    with pytest.raises(SystemExit) as ended:
+        cli.main([*words.split(), "--help"])
+    assert ended.value.code == 0
+    out, err = capsys.readouterr()
+    assert err == ""
+    return out
+
+
+def test_help_of_run_names_each_procedure_and_no_option_of_any(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told = help_of("run", capsys, monkeypatch)
+    for c in run_command.COMMANDS.values():
+        assert re.search(rf"^  {c.name} +{re.escape(' '.join(c.summary.split()[:6]))}", told, re.MULTILINE)
+    assert re.search(r"^  script +lines of the shell", told, re.MULTILINE)
+    assert set(re.findall(r"^  .*?(--[a-z-]+)", told, re.MULTILINE)) == {"--help", "--list"}
+
+
+@pytest.mark.parametrize("name", list(run_command.COMMANDS))
+def test_help_of_a_procedure_is_of_its_own_options_with_unit_and_default(
+    name: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    command = run_command.COMMANDS[name]
+    told = help_of(f"run {name}", capsys, monkeypatch)
+    shown = re.findall(r"^  (?:-v, )?(--[a-z0-9-]+)", told, re.MULTILINE)
+    own = [f"--{f.replace('_', '-')}" for f in command.parameters.fields]
+    assert shown == [*own, *command.common]
+    assert command.summary[1:] in told
+    for option, f in zip(own, command.parameters.fields.values(), strict=True):
+        text = " ".join(re.findall(rf"^  {option} .*\n(?:    +.*\n)*", told, re.MULTILINE)[0].split())
+        shown_default = text.rpartition("(")[2].rstrip(")").partition(";")[0]
+        value, _, unit = shown_default.partition(" ")
+        assert unit == f.metadata["unit"]
+        if f.default is None or isinstance(f.default, bool):
+            assert value == ("none" if f.default is None else "yes" if f.default else "no")
+        else:
+            assert type(f.default)(value) == f.default
+
+
+def test_defaults_of_another_reading_and_of_another_procedure_are_told(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told = help_of("run gyrocompass", capsys, monkeypatch)
+    assert "(0,90,180 deg; improved 0,180,90,270)" in told
+    assert "(2 1/s)" in told  # m2 is the same in both
+    assert "readings at each position (1; turns 16)" in help_of("run all", capsys, monkeypatch)
+
+
+@pytest.mark.parametrize("name", [*run_command.COMMANDS, "script"])
+def test_every_example_of_a_help_is_understood(
+    name: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told = help_of(f"run {name}", capsys, monkeypatch)
+    examples = re.findall(r"^  psabench (run .*?)(?:   .*)?$", told.partition("examples:")[2], re.MULTILINE)
+    assert examples
+    for example in examples:
+        args = cli.parse(shlex.split(example))
+        assert callable(args.handler)
+
+
+WORDS: list[tuple[str, str, str]] = [
+    ("turns --seed 3", "turns", "--seed 3"),
+    ("--seed 3 turns --axis y", "turns", "--seed 3 --axis y"),
+    ("--seed=3 turns", "turns", "--seed=3"),
+    ("--real-time turns", "turns", "--real-time"),
+    ("--real- turns", "turns", "--real-"),
+    ("-v turns", "turns", "-v"),
+    ("--out turns turns", "turns", "--out turns"),
+    ("--latitude-deg -50 gyrocompass", "gyrocompass", "--latitude-deg -50"),
+    ("turns --list", "", "--list"),
+    ("--list", "", "--list"),
+    ("-h turns", "turns", "-h"),
+    ("--help", "", "--help"),
+    ("--seed 3", "", ""),
+    ("spin --seed 3", "", "spin"),
+    ("script a.psa --json", "script", "a.psa --json"),
+    ("", "", ""),
+]
+
+
+@pytest.mark.parametrize(("typed", "name", "rest"), WORDS, ids=[w[0] for w in WORDS])
+def test_the_procedure_may_stand_anywhere_among_its_options(typed: str, name: str, rest: str) -> None:
+    assert run_command.words(typed.split()) == (name, rest.split())
+
+
+def test_list_names_every_procedure_with_its_parameters(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["run", "--list"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.partition(":")[0] for line in lines[::2]] == list(run_command.COMMANDS)
+    for line, c in zip(lines[1::2], run_command.COMMANDS.values(), strict=True):
+        assert line.split() == [*(f"--{f.replace('_', '-')}" for f in c.parameters.fields), *c.common]
+
+
+def test_without_a_command_help_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main([]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert "a first hour:" in err
+
+
+# Libraries that take 0.1 s or more to load, and the modules of the package that load them.
+HEAVY = {
+    "numpy",
+    "scipy",
+    "matplotlib",
+    "can",
+    "canopen",
+    "cantools",
+    "yaml",
+    "serial",
+    "pyvisa",
+    "prompt_toolkit",
+    "IPython",
+    "dask",
+    "distributed",
+    "asammdf",
+}
+LIGHT: list[tuple[str, set[str]]] = [  # a command line, and what reading it may load of HEAVY
+    ("--version", set()),
+    ("--help", set()),
+    ("run --help", set()),
+    ("run spin", set()),
+    ("run turns --axis y", {"numpy"}),
+    ("run gyrocompass --seed 3", {"numpy"}),
+    ("run script x.psa", set()),
+    ("record run.log --board pmka --for 3", set()),
+    ("decode run.log --out run.csv", set()),
+    ("campaign gyrocompass --runs 3", {"numpy"}),
+    ("conform --help", set()),
+    ("conform device --board psa2", set()),
+    ("conform recording run.log --board psa2", set()),
+    ("conform host --manual can", set()),
+    ("conform list --board psa2", set()),
+    ("shell quiet", set()),
+]
+
+
+@pytest.mark.parametrize(("line", "allowed"), LIGHT, ids=[x[0] for x in LIGHT])
+def test_a_command_line_is_read_without_libraries_and_other_commands(line: str, allowed: set[str]) -> None:
+    program = f"""if True:
+        import contextlib, io, sys
+        import psabench.cli
+        with contextlib.redirect_stdout(io.StringIO()), contextlib.suppress(SystemExit):
+            psabench.cli.parse({line.split()!r})
+        print(*sys.modules)
+    """
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, timeout=60)
+    loaded = done.stdout.split()
+    assert "psabench.cli" in loaded
+    assert HEAVY & set(loaded) <= allowed
+    commands = {
+        "psabench.link.record",
+        "psabench.boards.decode",
+        "psabench.bench",
+        "psabench.report.calibration",
+        "psabench.conform.runner",
+    }
+    assert not commands & set(loaded)
+
+
+def test_heavy_libraries_are_loaded_when_a_command_needs_them() -> None:
+    """That names of HEAVY are still those of libraries in use: the test above could not fail otherwise."""
+    program = """if True:
+        import sys
+        from psabench.procedures import run  # noqa
+        from psabench.report import plots  # noqa
+        from psabench.conform import requirements
+        from psabench.link.protocol_files import database
+        from psabench.shell import terminal
+        database()
+        print(*sys.modules)
+    """
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, timeout=60)
+    expected = {"numpy", "matplotlib", "can", "canopen", "cantools", "yaml", "prompt_toolkit"}
+    assert HEAVY & set(done.stdout.split()) >= expected
+
+
+def test_help_names_every_command_with_its_help_line(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told = help_of("", capsys, monkeypatch)
+    for name, line in cli.COMMANDS.items():
+        assert re.search(rf"^    {name} +{re.escape(line)}$", told, re.MULTILINE)
+        assert help_of(name, capsys, monkeypatch).startswith(f"usage: psabench {name} ")
+
+
+def test_what_the_options_repeat_is_what_the_libraries_have() -> None:
+    assert arguments.LINE_HZ == lineport.SAMPLE_HZ
+    shown = re.findall(r"\.[a-z0-9]+", record_command.FORMATS)
+    assert set(shown) | {".mf4"} == {*record.FORMATS, ".mf4"}  # .mf4 with asammdf
+    assert list(run_table.ON_THE_HEAD) == list(PROCEDURES)
+    assert list(run_table.ON_THE_PLATFORM) == list(gyro_params.PARAMS)
+    assert run_table.COMPARE[0] == compare_converters.NAME
