@@ -56,16 +56,27 @@ void service_close(struct service *s);
 /* The rest of the life of a child: until its end or a signal, then closed; the exit status of the process. */
 int service_live(struct service *s);
 
-/* ---- saving and doubling, for service.c and fork.c */
+/* ---- for the files of the service */
 
-/* Callbacks of the commands. */
+void service_say(void *ctx, const char *text); /* on stderr */
+void service_power_up(struct service *s);      /* bench, faults and timeline of the scenario */
+
+/* clients.c */
+extern const struct control_clients service_clients;
+bool service_taken(void *ctx, uint64_t count);   /* for loop.taken */
+void service_sweep(struct service *s, bool all); /* ghosts */
+void service_print_clients(const struct service *s);
+
+/* recording.c */
+extern const struct control_recording service_recording;
+void service_recording_error(struct service *s, const char *what_now); /* on stderr, if there is one */
+bool service_open_truth_log(struct service *s, char *why, size_t cap);
+
+/* service_save.c */
 bool service_snapshot(void *ctx, const char *path, cJSON *result, char *why);
 void service_journal(void *ctx, const struct control_command *row, const cJSON *args, bool done, int64_t t_ns);
-
-void service_power_up(struct service *s); /* bench, faults and timeline of the scenario */
-void service_follow(struct service *s);   /* the journal begins */
+void service_follow(struct service *s); /* the journal begins */
 bool service_restore(struct service *s, const struct snapshot *from, char *why, size_t cap);
-void service_sweep(struct service *s, bool all); /* ghosts */
 
 /* In the child of a fork, whose descriptors lead nowhere: everything of the parent's is closed but the bench. */
 void service_abandon(struct service *s);

@@ -1,3 +1,4 @@
+/* The journal, snapshots, and the state that the child of a fork takes over. */
 #include "app/service.h"
 
 #include <inttypes.h>
@@ -40,11 +41,6 @@ bool service_restore(struct service *s, const struct snapshot *from, char *why, 
     s->comings = s->ports.comings;
     if (s->loop.end_ns < SCHED_NEVER) s->loop.end_ns += s->bench->sched.now_ns;
     return true;
-}
-
-void service_sweep(struct service *s, bool all)
-{
-    for (unsigned i = 0; i < s->ports.hubs; i++) can_hub_sweep(&s->ports.hub[i], all);
 }
 
 /* ---- in the child of a fork */

@@ -110,7 +110,7 @@ void timeline_start(struct timeline *t, struct bench *b, const struct control_be
     const struct scenario *s = &b->scenario;
     t->bench = b;
     t->view = *view;
-    t->view.journal = NULL;
+    t->view.process.journal = NULL;
     t->next = t->refused = 0;
     control_init(&t->control, control_tables, &t->view);
     put_in_order(t);

@@ -1,4 +1,4 @@
-/* What the commands may reach of the bench. The application fills it in; callbacks get ctx. */
+/* What the commands may reach of the bench. The application fills it in. */
 #ifndef PSABENCH_COMMAND_VIEW_H
 #define PSABENCH_COMMAND_VIEW_H
 
@@ -21,7 +21,7 @@ struct control_client {
 /* Lateness of the wall pace. */
 struct control_pace {
     const char *name; /* wall, step, free */
-    bool by_step;     /* time moves only when told */
+    bool by_step;     /* time moves only by commands */
     uint64_t turns, late, slips;
     double p50_us, p99_us, p999_us, max_us; /* of events */
     uint64_t frames;
@@ -32,9 +32,47 @@ struct control_command;
 struct fault_engine;
 struct cJSON;
 
-/* Endpoints of a bench that is doubled. */
+/* Endpoints of a child of `fork`. */
 struct control_fork {
     const char *control, *can, *truth; /* paths of sockets, truth may be NULL; can: as --can, several with spaces */
+};
+
+/* What the bench does for commands, by trade. Each function gets control_bench.ctx; those with `why` write a sentence into it
+ * when they return false. */
+
+struct control_sim { /* the time */
+    /* Time is to move by for_ns once after_tx frames of clients have been taken, or a client's queue is full, which only time
+     * empties; control_run_done() is called then. False when it cannot. */
+    bool (*run)(void *ctx, int64_t for_ns, uint64_t after_tx, char *why);
+    void (*run_stop)(void *ctx); /* from within an event: the run ends at this instant */
+    void (*pace)(void *ctx, struct control_pace *out);
+    /* The supply was set: its next brown-out has to be computed again. May be NULL. */
+    void (*supply_changed)(void *ctx, int64_t t_ns);
+};
+
+struct control_recording { /* of the lines of a unit, as VCD; start NULL: there is none */
+    bool (*start)(void *ctx, const char *path, unsigned unit, char *why);
+    bool (*stop)(void *ctx, char *why);
+    bool (*flush)(void *ctx, char *why);
+};
+
+struct control_clients {           /* programs on the CAN buses */
+    uint64_t (*can_rx)(void *ctx); /* frames delivered to the client that has been on the bus longest */
+    bool (*nth)(void *ctx, unsigned i, struct control_client *out); /* in order of coming; false past the last */
+    void (*gone)(void *ctx, struct control_client *out);
+    struct can_node *(*node)(void *ctx, uint32_t place);              /* of the client there; NULL: it has left */
+    bool (*stall)(void *ctx, const struct can_node *client, bool on); /* it reads nothing; false: it has gone */
+};
+
+struct control_process { /* of the emulator; NULL: not here */
+    void (*quit)(void *ctx);
+    void (*push)(void *ctx, void *client, const char *line);  /* to a client of the control socket, that is no reply */
+    void (*reply)(void *ctx, void *client, const char *line); /* one that is due, at any time but from control_line() */
+    bool (*snapshot)(void *ctx, const char *path, struct cJSON *result, char *why);
+    bool (*fork)(void *ctx, const struct control_fork *f, struct cJSON *result, char *why);
+    bool (*endpoints)(void *ctx, struct cJSON *result); /* adds "endpoints", where programs connect; false: no memory */
+    /* A command that changes the bench's future was carried out; args as it was given. */
+    void (*journal)(void *ctx, const struct control_command *row, const struct cJSON *args, bool done, int64_t t_ns);
 };
 
 struct control_bench {
@@ -53,34 +91,10 @@ struct control_bench {
     const char *scenario;
     struct fault_engine *faults; /* NULL: no commands of faults */
 
-    /* Time is to move by for_ns once after_tx frames of clients have been taken, or a client's queue is full, which only time
-     * empties; control_run_done() is called then. False with a sentence in why when it cannot. */
-    bool (*run)(void *ctx, int64_t for_ns, uint64_t after_tx, char *why);
-    void (*run_stop)(void *ctx); /* from within an event: the run ends at this instant */
-    void (*quit)(void *ctx);
-    /* A line for a client of the control socket that is no reply. NULL: there are no subscriptions. */
-    void (*push)(void *ctx, void *client, const char *line);
-    void (*reply)(void *ctx, void *client, const char *line); /* one that is due, at any time but from control_line() */
-    /* Save the bench, double it. False with a sentence in why. NULL: it cannot. */
-    bool (*snapshot)(void *ctx, const char *path, struct cJSON *result, char *why);
-    bool (*fork)(void *ctx, const struct control_fork *f, struct cJSON *result, char *why);
-    /* Adds "endpoints": where programs connect. False without memory. NULL: nobody can. */
-    bool (*endpoints)(void *ctx, struct cJSON *result);
-    /* The supply was told something else: its next brown-out has to be asked for anew. May be NULL. */
-    void (*supply_changed)(void *ctx, int64_t t_ns);
-    bool (*vcd_flush)(void *ctx, char *why);
-    bool (*vcd_start)(void *ctx, const char *path, unsigned unit, char *why); /* NULL: it cannot */
-    bool (*vcd_stop)(void *ctx, char *why);
-    uint64_t (*can_rx)(void *ctx); /* frames delivered to the client that has been on the bus longest */
-    bool (*client)(void *ctx, unsigned i,
-                   struct control_client *out); /* i-th in order of coming; false past the last */
-    void (*gone)(void *ctx, struct control_client *out);
-    struct can_node *(*client_node)(void *ctx, uint32_t place); /* of the client there; NULL: it has left */
-    bool (*stall)(void *ctx, const struct can_node *client,
-                  bool on); /* its program reads nothing; false: it has gone */
-    void (*pace)(void *ctx, struct control_pace *out);
-    /* A command that changes the bench's future was carried out; args as it was given. May be NULL. */
-    void (*journal)(void *ctx, const struct control_command *row, const struct cJSON *args, bool done, int64_t t_ns);
+    struct control_sim sim;
+    struct control_recording recording;
+    struct control_clients clients;
+    struct control_process process;
 };
 
 #endif

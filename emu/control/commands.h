@@ -20,7 +20,7 @@ extern const struct control_table commands_bench, commands_head, commands_table,
 static inline bool control_by_step(const struct control_bench *b)
 {
     struct control_pace p = {0};
-    b->pace(b->ctx, &p);
+    b->sim.pace(b->ctx, &p);
     return p.by_step;
 }
 

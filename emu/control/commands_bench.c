@@ -16,7 +16,7 @@ static enum control_outcome do_time(struct control *c, const struct control_valu
 {
     struct control_pace p = {0};
     (void)v;
-    c->bench->pace(c->bench->ctx, &p);
+    c->bench->sim.pace(c->bench->ctx, &p);
     cJSON_AddNumberToObject(result, "t_s", (double)t_ns * 1e-9);
     cJSON_AddStringToObject(result, "pace", p.name);
     return CONTROL_DONE;
@@ -28,7 +28,7 @@ static enum control_outcome do_run(struct control *c, const struct control_value
     (void)t_ns;
     if (c->waiting) return control_refuse(c, "state", "another run is under way");
     const int64_t for_ns = (int64_t)nearbyint(v[0].real * 1e9);
-    if (c->bench->run(c->bench->ctx, for_ns, v[1].count, c->refusal.why)) return CONTROL_LATER;
+    if (c->bench->sim.run(c->bench->ctx, for_ns, v[1].count, c->refusal.why)) return CONTROL_LATER;
     c->refusal.code = "state";
     return CONTROL_REFUSED;
 }
@@ -83,8 +83,8 @@ static enum control_outcome do_endpoints(struct control *c, const struct control
 {
     (void)v;
     (void)t_ns;
-    if (!c->bench->endpoints) return control_refuse(c, "state", "this bench has no endpoints");
-    if (!c->bench->endpoints(c->bench->ctx, result)) return control_refuse(c, "machine", "no memory");
+    if (!c->bench->process.endpoints) return control_refuse(c, "state", "this bench has no endpoints");
+    if (!c->bench->process.endpoints(c->bench->ctx, result)) return control_refuse(c, "machine", "no memory");
     return CONTROL_DONE;
 }
 
@@ -93,7 +93,7 @@ static enum control_outcome do_quit(struct control *c, const struct control_valu
     (void)v;
     (void)result;
     (void)t_ns;
-    c->bench->quit(c->bench->ctx);
+    c->bench->process.quit(c->bench->ctx);
     return CONTROL_DONE;
 }
 

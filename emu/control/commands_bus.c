@@ -17,7 +17,7 @@ static enum control_outcome submit(struct control *c, struct control_cycle *k, i
         return control_cycle_refuse(c, k, r);
     }
     c->started = k;
-    if (k->client && control_by_step(b) && !b->run(b->ctx, PATIENCE_NS, 0, c->refusal.why)) {
+    if (k->client && control_by_step(b) && !b->sim.run(b->ctx, PATIENCE_NS, 0, c->refusal.why)) {
         c->refusal.code = "state";
         k->client = NULL; /* it goes its way, nobody waits */
         return CONTROL_REFUSED;

@@ -46,7 +46,7 @@ static enum control_outcome no_supply(struct control *c)
 static enum control_outcome answer(struct control *c, enum supply_result r, cJSON *result, int64_t t_ns)
 {
     if (r != SUPPLY_OK) return control_refuse(c, "range", "that is not what the supply can");
-    if (c->bench->supply_changed) c->bench->supply_changed(c->bench->ctx, t_ns);
+    if (c->bench->sim.supply_changed) c->bench->sim.supply_changed(c->bench->ctx, t_ns);
     add_supply(c, result, t_ns);
     return CONTROL_DONE;
 }

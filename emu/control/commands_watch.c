@@ -27,7 +27,7 @@ static enum control_outcome do_until(struct control *c, const struct control_val
     unsigned event;
     if (c->waiting) return control_refuse(c, "state", "another run is under way");
     if (!control_event_find(b, v[1].unit, "event", v[0].text, &event, &c->refusal)) return CONTROL_REFUSED;
-    if (!b->run(b->ctx, (int64_t)nearbyint(limit_s * 1e9), v[4].count, c->refusal.why)) return from_bench(c, false);
+    if (!b->sim.run(b->ctx, (int64_t)nearbyint(limit_s * 1e9), v[4].count, c->refusal.why)) return from_bench(c, false);
     control_watch_until(c, event, v[1].unit, count);
     return CONTROL_LATER;
 }
@@ -36,7 +36,7 @@ static enum control_outcome do_subscribe(struct control *c, const struct control
 {
     (void)result;
     const double every_s = v[1].given ? v[1].real : 0.1;
-    if (!c->bench->push) return control_refuse(c, "state", "nothing can be subscribed here");
+    if (!c->bench->process.push) return control_refuse(c, "state", "nothing can be subscribed here");
     if (control_subscribe(c, c->client, (enum control_topic)v[0].choice, (int64_t)nearbyint(every_s * 1e9), t_ns)) {
         return CONTROL_DONE;
     }
@@ -70,8 +70,8 @@ static enum control_outcome do_vcd_start(struct control *c, const struct control
     const struct control_bench *b = c->bench;
     (void)result;
     (void)t_ns;
-    if (!b->vcd_start || !b->units) return control_refuse(c, "state", "nothing can be recorded here");
-    return from_bench(c, b->vcd_start(b->ctx, v[0].text, v[1].unit, c->refusal.why));
+    if (!b->recording.start || !b->units) return control_refuse(c, "state", "nothing can be recorded here");
+    return from_bench(c, b->recording.start(b->ctx, v[0].text, v[1].unit, c->refusal.why));
 }
 
 static enum control_outcome do_vcd_stop(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
@@ -79,8 +79,8 @@ static enum control_outcome do_vcd_stop(struct control *c, const struct control_
     (void)v;
     (void)result;
     (void)t_ns;
-    if (!c->bench->vcd_stop) return control_refuse(c, "state", "nothing is being recorded");
-    return from_bench(c, c->bench->vcd_stop(c->bench->ctx, c->refusal.why));
+    if (!c->bench->recording.stop) return control_refuse(c, "state", "nothing is being recorded");
+    return from_bench(c, c->bench->recording.stop(c->bench->ctx, c->refusal.why));
 }
 
 static enum control_outcome do_vcd_flush(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
@@ -88,7 +88,7 @@ static enum control_outcome do_vcd_flush(struct control *c, const struct control
     (void)v;
     (void)result;
     (void)t_ns;
-    return from_bench(c, c->bench->vcd_flush(c->bench->ctx, c->refusal.why));
+    return from_bench(c, c->bench->recording.flush(c->bench->ctx, c->refusal.why));
 }
 
 // clang-format off

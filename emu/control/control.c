@@ -19,9 +19,9 @@ enum control_outcome control_do(struct control *c, const struct control_command 
 {
     const enum control_outcome outcome = row->run(c, v, result, t_ns);
     /* Refused by its handler, too: converters may have taken their inputs by then, which moves their noise. */
-    if (row->changes && c->bench->journal) {
+    if (row->changes && c->bench->process.journal) {
         cJSON *args = control_args_json(row, v);
-        c->bench->journal(c->bench->ctx, row, args, outcome != CONTROL_REFUSED, t_ns);
+        c->bench->process.journal(c->bench->ctx, row, args, outcome != CONTROL_REFUSED, t_ns);
         cJSON_Delete(args);
     }
     return outcome;

@@ -47,10 +47,10 @@ const char *control_cycle_reply(struct control *c, struct control_cycle *k, cJSO
 static void end_cycle(struct control *c, struct control_cycle *k, int64_t t_ns)
 {
     if (c->waiting && c->running == k) {
-        c->bench->run_stop(c->bench->ctx); /* answered with the run */
+        c->bench->sim.run_stop(c->bench->ctx); /* answered with the run */
     } else if (k->client) {
         void *client = k->client;
-        c->bench->reply(c->bench->ctx, client, control_cycle_reply(c, k, k->id, t_ns));
+        c->bench->process.reply(c->bench->ctx, client, control_cycle_reply(c, k, k->id, t_ns));
     } else {
         k->control = NULL;
     }

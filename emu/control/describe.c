@@ -68,7 +68,7 @@ void describe_clients(const struct control_bench *b, cJSON *to)
 {
     struct control_client k;
     cJSON *list = cJSON_AddArrayToObject(to, "clients");
-    for (unsigned i = 0; b->client(b->ctx, i, &k); i++) {
+    for (unsigned i = 0; b->clients.nth(b->ctx, i, &k); i++) {
         cJSON *j = cJSON_CreateObject();
         cJSON_AddStringToObject(j, "adapter", k.adapter);
         cJSON_AddStringToObject(j, "name", k.name);
@@ -76,14 +76,14 @@ void describe_clients(const struct control_bench *b, cJSON *to)
         add_client(&k, j);
         cJSON_AddItemToArray(list, j);
     }
-    b->gone(b->ctx, &k);
+    b->clients.gone(b->ctx, &k);
     add_client(&k, cJSON_AddObjectToObject(to, "gone"));
 }
 
 void describe_pace(const struct control_bench *b, cJSON *to)
 {
     struct control_pace p = {0};
-    b->pace(b->ctx, &p);
+    b->sim.pace(b->ctx, &p);
     cJSON *j = cJSON_AddObjectToObject(to, "pace");
     cJSON_AddStringToObject(j, "name", p.name);
     add_count(j, "turns", p.turns);
@@ -184,7 +184,7 @@ void describe_status(const struct control_bench *b, cJSON *to, int64_t t_ns)
 {
     struct control_pace p = {0};
     uint64_t frames = 0;
-    b->pace(b->ctx, &p);
+    b->sim.pace(b->ctx, &p);
     for (unsigned i = 0; i < b->buses; i++) frames += b->bus[i]->frames;
     cJSON_AddStringToObject(to, "pace", p.name);
     add_count(to, "frames", frames);

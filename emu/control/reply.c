@@ -28,9 +28,9 @@ static void add_rx(const struct control *c, cJSON *reply)
 {
     struct control_client k;
     char number[16];
-    cJSON_AddNumberToObject(reply, "can_rx", (double)c->bench->can_rx(c->bench->ctx));
+    cJSON_AddNumberToObject(reply, "can_rx", (double)c->bench->clients.can_rx(c->bench->ctx));
     cJSON *rx = cJSON_AddObjectToObject(reply, "rx");
-    for (unsigned i = 0; c->bench->client(c->bench->ctx, i, &k); i++) {
+    for (unsigned i = 0; c->bench->clients.nth(c->bench->ctx, i, &k); i++) {
         snprintf(number, sizeof number, "%" PRIu32, k.came);
         cJSON_AddNumberToObject(rx, number, (double)k.delivered);
     }

@@ -16,7 +16,8 @@ static void push(const struct control_sub *s, const cJSON *event)
     char line[PUSH_MAX];
     const struct control_bench *b = s->control->bench;
     /* cJSON_PrintPreallocated() has the type of a tree it changes; it does not change it. */
-    if (cJSON_PrintPreallocated((cJSON *)(uintptr_t)event, line, sizeof line, 0)) b->push(b->ctx, s->client, line);
+    if (cJSON_PrintPreallocated((cJSON *)(uintptr_t)event, line, sizeof line, 0))
+        b->process.push(b->ctx, s->client, line);
 }
 
 void control_tell(struct control *c, enum control_topic topic, cJSON *event)
@@ -66,7 +67,7 @@ static void on_event(void *ctx, unsigned e, int64_t t_ns)
     }
     if (!u->active || u->reached || e != u->event || ear->unit != u->unit) return;
     u->reached = ++u->seen == u->count;
-    if (u->reached) c->bench->run_stop(c->bench->ctx);
+    if (u->reached) c->bench->sim.run_stop(c->bench->ctx);
 }
 
 /* Listens as long as somebody wants to know. */

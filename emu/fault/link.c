@@ -24,7 +24,7 @@ static bool find(const struct fault *f, struct can_bus **bus, struct can_node **
     *bus = NULL;
     if (f->point.place == FAULT_AT_BUS) *bus = b->bus[f->point.index];
     if (f->point.place == FAULT_AT_NODE) *node = b->node[f->point.unit];
-    if (f->point.place == FAULT_AT_CLIENT) *node = b->client_node(b->ctx, f->point.index);
+    if (f->point.place == FAULT_AT_CLIENT) *node = b->clients.node(b->ctx, f->point.index);
     if (*node) *bus = bus_of(b, *node);
     return *bus != NULL;
 }
@@ -73,15 +73,15 @@ static bool stall(struct fault *f, int64_t t_ns)
 {
     const struct control_bench *b = f->engine->bench;
     (void)t_ns;
-    f->as.client = b->client_node(b->ctx, f->point.index);
-    return f->as.client && b->stall(b->ctx, f->as.client, true);
+    f->as.client = b->clients.node(b->ctx, f->point.index);
+    return f->as.client && b->clients.stall(b->ctx, f->as.client, true);
 }
 
 static void lift_stall(struct fault *f, int64_t t_ns)
 {
     const struct control_bench *b = f->engine->bench;
     (void)t_ns;
-    (void)b->stall(b->ctx, f->as.client, false);
+    (void)b->clients.stall(b->ctx, f->as.client, false);
 }
 
 /* What takes bits needs a bus that has them. */

@@ -122,7 +122,7 @@ static unsigned clients(const struct control_bench *b)
 {
     struct control_client c;
     unsigned n = 0;
-    while (b->client && b->client(b->ctx, n, &c)) n++;
+    while (b->clients.nth && b->clients.nth(b->ctx, n, &c)) n++;
     return n;
 }
 
@@ -157,7 +157,7 @@ bool fault_point(const struct control_bench *b, unsigned n, struct fault_point *
     const unsigned programs = clients(b);
     if (n < programs) {
         struct control_client c = {0};
-        (void)b->client(b->ctx, n, &c);
+        (void)b->clients.nth(b->ctx, n, &c);
         *p = (struct fault_point){.place = FAULT_AT_CLIENT, .index = c.place};
         snprintf(name, FAULT_POINT_MAX, "client.%" PRIu32, c.came);
         return true;

@@ -25,7 +25,7 @@ static bool dip(struct fault *f, int64_t t_ns)
     char why[CONTROL_WHY_MAX];
     if (!reaches_brownout(b, f, why)) return false; /* it has been set higher meanwhile */
     if (supply_dip(&b->lab->supply, f->value[FAULT_DROP_V], t_ns, f->for_ns, t_ns) != SUPPLY_OK) return false;
-    if (b->supply_changed) b->supply_changed(b->ctx, t_ns);
+    if (b->sim.supply_changed) b->sim.supply_changed(b->ctx, t_ns);
     return true;
 }
 
@@ -34,7 +34,7 @@ static void lift_dip(struct fault *f, int64_t t_ns)
 {
     const struct control_bench *b = f->engine->bench;
     supply_dip_end(&b->lab->supply, f->value[FAULT_DROP_V], f->began_ns, f->for_ns, t_ns);
-    if (b->supply_changed) b->supply_changed(b->ctx, t_ns);
+    if (b->sim.supply_changed) b->sim.supply_changed(b->ctx, t_ns);
 }
 
 // clang-format off

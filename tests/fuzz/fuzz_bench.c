@@ -156,13 +156,13 @@ static void up(struct world *w, bool watched)
     bench_init(&w->bench, &scenario, 0);
     w->hub.bus = &w->bench.bus[0];
     w->view = (struct control_bench){.ctx = w,
-                                     .can_rx = can_rx,
-                                     .client = client,
-                                     .client_node = client_node,
-                                     .gone = gone,
-                                     .pace = pace,
-                                     .supply_changed = supply_changed,
-                                     .journal = on_journal};
+                                     .clients.can_rx = can_rx,
+                                     .clients.nth = client,
+                                     .clients.node = client_node,
+                                     .clients.gone = gone,
+                                     .sim.pace = pace,
+                                     .sim.supply_changed = supply_changed,
+                                     .process.journal = on_journal};
     bench_view(&w->bench, &w->view);
     w->view.faults = &w->faults;
     fault_init(&w->faults, &w->view, &w->bench.sched);

@@ -80,13 +80,13 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
                                       .unit_name = {"a"},
                                       .units = 1,
                                       .scenario = "fuzz",
-                                      .run = on_run,
-                                      .quit = on_quit,
-                                      .vcd_flush = on_vcd_flush,
-                                      .can_rx = on_can_rx,
-                                      .client = on_client,
-                                      .gone = on_gone,
-                                      .pace = on_pace};
+                                      .sim.run = on_run,
+                                      .process.quit = on_quit,
+                                      .recording.flush = on_vcd_flush,
+                                      .clients.can_rx = on_can_rx,
+                                      .clients.nth = on_client,
+                                      .clients.gone = on_gone,
+                                      .sim.pace = on_pace};
         control_init(&control, control_tables, &view);
     }
     const size_t n = size < sizeof line ? size : sizeof line - 1;

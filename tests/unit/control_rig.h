@@ -147,19 +147,19 @@ static inline int fresh(void **state)
                                   .scenario = "test.yaml",
                                   .unit = {&bench->unit[0], &bench->unit[1]},
                                   .unit_name = {"a", "b"},
-                                  .run = on_run,
-                                  .run_stop = on_run_stop,
-                                  .push = on_push,
-                                  .vcd_start = on_vcd_start,
-                                  .vcd_stop = on_vcd_stop,
+                                  .sim.run = on_run,
+                                  .sim.run_stop = on_run_stop,
+                                  .process.push = on_push,
+                                  .recording.start = on_vcd_start,
+                                  .recording.stop = on_vcd_stop,
                                   .sched = &bench->sched,
-                                  .endpoints = on_endpoints,
-                                  .quit = on_quit,
-                                  .vcd_flush = on_vcd_flush,
-                                  .can_rx = on_can_rx,
-                                  .client = on_client,
-                                  .gone = on_gone,
-                                  .pace = on_pace};
+                                  .process.endpoints = on_endpoints,
+                                  .process.quit = on_quit,
+                                  .recording.flush = on_vcd_flush,
+                                  .clients.can_rx = on_can_rx,
+                                  .clients.nth = on_client,
+                                  .clients.gone = on_gone,
+                                  .sim.pace = on_pace};
     control_init(&control, control_tables, &view);
     control_init(&truth, control_truth_tables, &view);
     return 0;

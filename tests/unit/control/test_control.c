@@ -194,7 +194,7 @@ static void recordings_go_to_the_bench(void **state)
 static void what_changes_the_bench_goes_into_the_journal(void **state)
 {
     (void)state;
-    view.journal = on_journal;
+    view.process.journal = on_journal;
     say("{\"cmd\":\"head.turn\",\"args\":{\"angle_deg\":90}}");
     assert_string_equal(asked.pushed, "head.turn {\"angle_deg\":90} 0");
     say("{\"cmd\":\"head.turn\",\"args\":{\"angle_deg\":9}}"); /* it is turning */

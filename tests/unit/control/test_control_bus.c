@@ -89,13 +89,13 @@ static int fresh(void **state)
                                     .unit_name = {"f", "p"},
                                     .units = 2,
                                     .sched = &r.s,
-                                    .run = on_run,
-                                    .run_stop = on_run_stop,
-                                    .reply = on_reply,
-                                    .pace = on_pace,
-                                    .can_rx = on_can_rx,
-                                    .client = on_client,
-                                    .journal = on_journal};
+                                    .sim.run = on_run,
+                                    .sim.run_stop = on_run_stop,
+                                    .process.reply = on_reply,
+                                    .sim.pace = on_pace,
+                                    .clients.can_rx = on_can_rx,
+                                    .clients.nth = on_client,
+                                    .process.journal = on_journal};
     control_init(&r.control, control_tables, &r.view);
     r.board.word[0] = 4711;
     r.board.waits = true;

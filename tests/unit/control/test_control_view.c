@@ -108,7 +108,7 @@ static void endpoints_are_told_by_the_bench(void **state)
     assert_says("{\"cmd\":\"endpoints\"}", "\"result\":{\"endpoints\":[]}");
     asked.refuse = true;
     assert_says("{\"cmd\":\"endpoints\"}", "{\"code\":\"machine\",\"text\":\"no memory\"}");
-    view.endpoints = NULL;
+    view.process.endpoints = NULL;
     assert_says("{\"cmd\":\"endpoints\"}", "{\"code\":\"state\",\"text\":\"this bench has no endpoints\"}");
 }
 

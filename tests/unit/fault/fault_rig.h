@@ -115,8 +115,8 @@ static inline int fresh(void **state)
                                     .units = UNITS,
                                     .seed = 7,
                                     .faults = &r.engine,
-                                    .client = on_client,
-                                    .client_node = on_client_node};
+                                    .clients.nth = on_client,
+                                    .clients.node = on_client_node};
     for (unsigned i = 0; i < UNITS; i++) init_unit(i);
     r.program[0].name = "program";
     can_attach(&r.bus, &r.program[0]);

@@ -73,11 +73,11 @@ static int fresh(void **state)
                                     .sched = &r.s,
                                     .seed = 7,
                                     .faults = &r.engine,
-                                    .run = on_run,
-                                    .run_stop = on_run_stop,
-                                    .push = on_push,
-                                    .can_rx = on_can_rx,
-                                    .client = no_client};
+                                    .sim.run = on_run,
+                                    .sim.run_stop = on_run_stop,
+                                    .process.push = on_push,
+                                    .clients.can_rx = on_can_rx,
+                                    .clients.nth = no_client};
     fault_init(&r.engine, &r.view, &r.s);
     control_init(&r.control, control_tables, &r.view);
     control_init(&r.truth, control_truth_tables, &r.view);

@@ -63,8 +63,8 @@ static int fresh(void **state)
                                     .host = {&r.host[0], &r.host[1]},
                                     .buses = 2,
                                     .sched = &r.s,
-                                    .can_rx = on_can_rx,
-                                    .client = on_client};
+                                    .clients.can_rx = on_can_rx,
+                                    .clients.nth = on_client};
     control_init(&r.control, control_tables, &r.view);
     strcpy(r.path, "/tmp/psabench-log-XXXXXX");
     const int fd = mkstemp(r.path);

@@ -1,0 +1,129 @@
+/* Programs on the CAN buses, as commands and counters see them. */
+#include "app/service.h"
+
+#include <inttypes.h>
+#include <stdio.h>
+
+/* The client of any bus that came next after `came`; NULL: the last. */
+static const struct can_client *client_after(const struct ports *p, uint32_t came)
+{
+    const struct can_client *next = NULL;
+    for (unsigned i = 0; i < p->hubs; i++) {
+        for (const struct can_client *c = p->hub[i].clients; c; c = c->next)
+            if (c->came > came && (!next || c->came < next->came)) next = c;
+    }
+    return next;
+}
+
+static uint64_t do_can_rx(void *ctx)
+{
+    const struct ports *p = &((struct service *)ctx)->ports;
+    const struct can_client *c = client_after(p, 0);
+    while (c && c->leaving) c = client_after(p, c->came);
+    return c ? c->delivered : 0;
+}
+
+static void put_client(const struct can_client *c, struct control_client *out)
+{
+    *out = (struct control_client){.adapter = c->adapter,
+                                   .name = c->name,
+                                   .came = c->came,
+                                   .place = c->place,
+                                   .delivered = c->delivered,
+                                   .taken = c->taken,
+                                   .dropped = c->dropped,
+                                   .overrun = c->overrun,
+                                   .refused = c->refused};
+}
+
+/* The i-th in order of coming. */
+static const struct can_client *client_at(const struct service *s, unsigned i)
+{
+    const struct can_client *c = client_after(&s->ports, 0);
+    while (c && i--) c = client_after(&s->ports, c->came);
+    return c;
+}
+
+static bool do_client(void *ctx, unsigned i, struct control_client *out)
+{
+    const struct can_client *c = client_at(ctx, i);
+    if (c) put_client(c, out);
+    return c != NULL;
+}
+
+static struct can_node *do_client_node(void *ctx, uint32_t place)
+{
+    const struct service *s = ctx;
+    const struct can_client *c = client_after(&s->ports, 0);
+    while (c && c->place != place) c = client_after(&s->ports, c->came);
+    return c ? &((struct can_client *)c)->node : NULL;
+}
+
+static bool do_stall(void *ctx, const struct can_node *node, bool on)
+{
+    const struct ports *p = &((struct service *)ctx)->ports;
+    for (unsigned i = 0; i < p->hubs; i++) {
+        for (struct can_client *c = p->hub[i].clients; c; c = c->next) {
+            if (&c->node != node) continue;
+            can_hub_stall(c, on);
+            return true;
+        }
+    }
+    return false;
+}
+
+static void sum_gone(const struct ports *p, struct control_client *out)
+{
+    struct can_client sum = {.adapter = NULL};
+    for (unsigned i = 0; i < p->hubs; i++) {
+        const struct can_client *gone = &p->hub[i].gone;
+        sum.delivered += gone->delivered;
+        sum.taken += gone->taken;
+        sum.dropped += gone->dropped;
+        sum.overrun += gone->overrun;
+        sum.refused += gone->refused;
+    }
+    put_client(&sum, out);
+}
+
+static void do_gone(void *ctx, struct control_client *out)
+{
+    sum_gone(&((struct service *)ctx)->ports, out);
+}
+
+const struct control_clients service_clients = {
+    .can_rx = do_can_rx, .nth = do_client, .gone = do_gone, .node = do_client_node, .stall = do_stall};
+
+/* A client that has sent more than its queue holds can only be heard on when time moves. */
+bool service_taken(void *ctx, uint64_t count)
+{
+    const struct ports *p = &((struct service *)ctx)->ports;
+    uint64_t sum = 0;
+    bool room = true;
+    for (unsigned i = 0; i < p->hubs; i++) {
+        sum += p->hub[i].taken;
+        for (const struct can_client *c = p->hub[i].clients; c; c = c->next) room &= c->leaving || can_hub_room(c);
+    }
+    return sum >= count || !room;
+}
+
+void service_sweep(struct service *s, bool all)
+{
+    for (unsigned i = 0; i < s->ports.hubs; i++) can_hub_sweep(&s->ports.hub[i], all);
+}
+
+void service_print_clients(const struct service *s)
+{
+    for (const struct can_client *c = client_after(&s->ports, 0); c; c = client_after(&s->ports, c->came)) {
+        fprintf(stderr,
+                "psa-emu: %s %s: delivered %" PRIu64 ", taken %" PRIu64 ", dropped %" PRIu64 ", overrun %" PRIu64
+                ", refused %" PRIu64 "\n",
+                c->adapter, c->name, c->delivered, c->taken, c->dropped, c->overrun, c->refused);
+    }
+    struct control_client gone;
+    sum_gone(&s->ports, &gone);
+    fprintf(stderr,
+            "psa-emu: clients gone: delivered %" PRIu64 ", taken %" PRIu64 ", dropped %" PRIu64 ", refused %" PRIu64
+            "\n",
+            gone.delivered, gone.taken, gone.dropped, gone.refused);
+}
