@@ -101,7 +101,7 @@ class PikSums:
 class PmkaIntegrals:
     """Volt seconds of each axis, by the article's equations, once the calibrations of a whole run are known.
 
-    A reading that is missing or at a limit ends a run: what was lost nobody knows, and the next begins at 0.
+    A reading that is missing or at a limit ends a run: the loss is unknown, and the next begins at 0.
     """
 
     def __init__(self, rom: est.Rom) -> None:

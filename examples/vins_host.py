@@ -22,7 +22,7 @@ NOT_NOW = 0x08000022
 SETUP = {(0x2000, 2): (0xFF, 0x56), (0x2003, 2): (0xFF, 0x56), (0x2004, 2): (0xFF, 0x56)}  # CONFIG0: what counts, value
 SETUP |= {(0x2001, 1): (0x04, 0x04), (0x2001, 4): (0xFF, 0x82)}  # STATUS, DRATE
 STALE_S, GONE_S, FROZEN, RATE_FRAMES, RATE_PPM = 0.25, 3.5, 1000, 500, 1000
-TICKS, WRAP = 250, 1 << 16  # of TSTAMP: in a data period, and before it begins anew
+TICKS, WRAP = 250, 1 << 16  # of TSTAMP: in a data period, and before it begins again
 
 
 class Host:
@@ -37,7 +37,7 @@ class Host:
         bus.listeners.append(self.on_message)
 
     def forget(self) -> None:
-        """The board has begun anew, or is new to us."""
+        """The board has begun again, or is new to us."""
         self.reader = FrameReader(self.node)
         self.torn = self.told_torn = self.told_lost = self.told_overruns = self.odd = self.same = 0
         self.xy, self.zt, self.stale, self.frozen = b"", b"", False, False
@@ -136,7 +136,7 @@ class Host:
         self.tell_counts()
 
     def take_fast(self, codes: np.ndarray[Any, np.dtype[np.int64]]) -> None:
-        """Frames of form 1 have no number of their own; what is missing between two is told by TOG."""
+        """Frames of form 1 have no number of their own; what is missing between two is reported by TOG."""
         if lost := self.reader.counters.lost - self.told_lost:
             print(json.dumps({"lost": lost}))
         self.told_lost += lost

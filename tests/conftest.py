@@ -1,7 +1,7 @@
 """For all tests: their tier (--tier), Ctrl-C for the programs that they start, and a folder that everybody may enter.
 
 A runner in the background (`make test &` in a script, many CI runners) starts us with SIGINT ignored; programs would
-inherit that, and the tests that press Ctrl-C would wait for ever.
+inherit that, and the tests that press Ctrl-C would wait without end.
 """
 
 import signal

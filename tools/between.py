@@ -1,4 +1,4 @@
-"""A page of which a tool writes a part: what stands between two marks."""
+"""A page of which a tool writes a part: the text between two marks."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ def marks(name: str) -> tuple[str, str]:
 
 
 def spliced(text: str, between: tuple[str, str], body: str, page: str = "page") -> str:
-    """The page with another body between its marks. Raises ValueError, with its name, unless the first one stands there
+    """The page with another body between its marks. Raises ValueError, with its name, unless the first one is there
     once, at the end of a line, and the other one after it."""
     begin, end = between
     head, _, rest = text.partition(f"{begin}\n")

@@ -109,7 +109,7 @@ class Group:
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """What is claimed of a subject, the rung it stands on, and the tests that carry it, "file" or "file:name"."""
+    """What is claimed of a subject, the rung it is on, and the tests that carry it, "file" or "file:name"."""
 
     subject: str
     claim: str
@@ -172,7 +172,7 @@ def read_lock(root: Path) -> dict[tuple[str, str], str]:
     path = root / LOCK
     rows = [line.split() for line in path.read_text().splitlines() if line[:1] != "#"] if path.is_file() else []
     if any(len(row) != 3 for row in rows):
-        raise EvidenceError(f"{LOCK}: a line is group, file, digest; `make prove GROUP=all` writes it anew")
+        raise EvidenceError(f"{LOCK}: a line is group, file, digest; `make prove GROUP=all` writes it again")
     return {(group, file): value for group, file, value in rows}
 
 
@@ -313,7 +313,7 @@ def report(root: Path, ledger: Ledger) -> list[str]:
     for name, what in stale(root, ledger).items():
         lines.append(
             f"{name} is stale, its evidence is of other sources: {', '.join(what)}. "
-            f"`make prove GROUP={name}` proves it anew by {runs(tests[name])}"
+            f"`make prove GROUP={name}` proves it again by {runs(tests[name])}"
         )
     return lines
 

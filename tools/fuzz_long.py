@@ -40,8 +40,8 @@ examples:
   make fuzz-long LONG='psa2 pik'                            these, one after the other as cores get free
   make fuzz-long LONG='--minutes 5 --jobs 1'                a shorter time, one core
 
-What was run stands in tests/fuzz/minutes.csv, a row for each target and state of the sources, and in docs/fuzzing.md.
-It counts the next time. What a target was run before a finding does not count: its time begins anew.
+What was run is in tests/fuzz/minutes.csv, a row for each target and state of the sources, and in docs/fuzzing.md.
+It counts the next time. What a target was run before a finding does not count: its time begins again.
 Ctrl-C ends it and loses nothing. Exit status: 0 all have had their time, 1 a finding, 2 bad input or a target that does
 not run, 130 ended by Ctrl-C.
 """
@@ -98,7 +98,7 @@ def table(record: Record) -> Iterator[str]:
 
 
 def page(path: Path, record: Record) -> None:
-    """What stands between the marks."""
+    """The text between the marks."""
     between.write(path, MARKS, "\n".join(table(record)))
 
 
@@ -129,7 +129,7 @@ class Campaign:
         return min(self.wrong.values(), default=INTERRUPTED if self.ended.is_set() else 0)
 
     def end(self) -> None:
-        """What runs is told to, whenever this is called; nothing more is begun."""
+        """What runs is ended, whenever this is called; nothing more is begun."""
         self.ended.set()
         with self._lock:
             for process in self._running:
@@ -183,7 +183,7 @@ class Campaign:
         print(f"{target}: {spent.cpu_s / 60:.1f} of {self.cpu_minutes:g} min, {spent.inputs:,} inputs", flush=True)
 
     def lose(self, target: str, status: int, text: str) -> None:
-        """After a finding its time begins anew. A target that does not run keeps what it has had."""
+        """After a finding its time begins again. A target that does not run keeps what it has had."""
         self.wrong[target] = FINDING if status == FINDING else BAD
         print(text, file=sys.stderr, flush=True)
         if status == FINDING:
@@ -204,14 +204,14 @@ def cpu_minutes(text: str) -> float:
     except ValueError:
         minutes = math.nan
     if not 0 <= minutes < math.inf:
-        raise argparse.ArgumentTypeError(f"{text}: minutes, 0 or more, are wanted")
+        raise argparse.ArgumentTypeError(f"{text}: expected minutes, 0 or more")
     return minutes
 
 
 def jobs(text: str) -> int:
     """Of the command line. Raises ArgumentTypeError."""
     if not (text.isdecimal() and 1 <= int(text) <= JOBS_MAX):
-        raise argparse.ArgumentTypeError(f"{text}: 1 to {JOBS_MAX} is wanted")
+        raise argparse.ArgumentTypeError(f"{text}: expected 1 to {JOBS_MAX}")
     return int(text)
 
 

@@ -3,7 +3,7 @@
 emulator prints them.
 
 Usage:
-    gen_commands.py           write what stands between the marks NAME:begin and NAME:end of the pages
+    gen_commands.py           write the text between the marks NAME:begin and NAME:end of the pages
     gen_commands.py --check   exit 1 and name the pages that are out of date
 
 Needs build/psa-emu, or the one that $PSA_EMU names.

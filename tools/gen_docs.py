@@ -2,7 +2,7 @@
 """The fidelity tables of the chips' pages, from facts.yaml (what is known) and <chip>.yaml (what we do) in docs/chips.
 
 Usage:
-    gen_docs.py           write what stands between the marks fidelity:begin and fidelity:end of docs/chips/<chip>.md
+    gen_docs.py           write the text between the marks fidelity:begin and fidelity:end of docs/chips/<chip>.md
     gen_docs.py --check   exit 1 and name the pages that are out of date
 
 A row of docs/chips/<chip>.yaml:
@@ -39,7 +39,7 @@ ROW_ID = re.compile(r"[123]\.[0-9]-[a-z0-9][a-z0-9-]*")
 GRADE = re.compile(r"E[0-6]( M\d\d)?\b.*")
 TEST = re.compile(r"(test_\w+\.c:\w+|test_\w+\.py:test_\w+)")
 KEYS = {"id", "state", "grade", "tests", "note", "fact", "value", "also"}
-NAME_WIDTH = 34  # of a test in the table; the whole name stands in the yaml file
+NAME_WIDTH = 34  # of a test in the table; the whole name is in the yaml file
 
 
 class FidelityError(Exception):
@@ -48,7 +48,7 @@ class FidelityError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Fact:
-    """A row of facts.yaml; rows is the number of printed rows it stands for.
+    """A row of facts.yaml; rows is the number of printed rows it represents.
 
     analog: a digital model cannot know; measured: to be read off a recording.
     """
@@ -125,7 +125,7 @@ def load_rows(chip: str, sections: Iterable[Section], path: Path | None = None) 
             row = parse_row(item, facts)
             for name in (row.id, *row.also):
                 if name in seen:
-                    raise FidelityError(f"{name} stands in two rows")
+                    raise FidelityError(f"{name} is in two rows")
                 seen.add(name)
         except FidelityError as e:
             where = item.get("id", "without id") if isinstance(item, dict) else "no mapping"
@@ -212,7 +212,7 @@ def cell(text: str) -> str:
 
 
 def table(chip: str, sections: Iterable[Section], rows: list[Row]) -> str:
-    """What stands between the marks of a page."""
+    """The text between the marks of a page."""
     letter = letters(rows)
     lines = ["", "Generated from `docs/chips/" + chip + ".yaml`. Tests are named by the letter of their file:"]
     lines += [", ".join(f"{mark} `{file}`" for file, mark in letter.items()) + ".", ""]
@@ -234,7 +234,7 @@ def table(chip: str, sections: Iterable[Section], rows: list[Row]) -> str:
 
 
 def page(text: str, generated: str, name: str = "page") -> str:
-    """A page with what stands between its marks replaced."""
+    """A page with the text between its marks replaced."""
     try:
         return spliced(text, MARKS, generated, name)
     except ValueError as e:

@@ -2,7 +2,7 @@
 """What the conformance suite says of each fault: tests/conform/support/fault_matrix.yaml as a table of docs/faults.md.
 
 Usage:
-    gen_fault_matrix.py           write what stands between the marks conform:begin and conform:end of the page
+    gen_fault_matrix.py           write the text between the marks conform:begin and conform:end of the page
     gen_fault_matrix.py --check   exit 1 if it is out of date
 """
 

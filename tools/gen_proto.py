@@ -33,7 +33,7 @@ def kept_files(protocols: list[Protocol]) -> dict[Path, str]:
 
 
 def write(path: Path, text: str) -> None:
-    """Write only what changes, so that nothing is compiled anew for nothing."""
+    """Write only what changes, so that nothing is compiled again for nothing."""
     if not path.exists() or path.read_text() != text:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text)

@@ -23,7 +23,7 @@ from psabench.report import plots as report_plots
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs/procedures/gyrocompass_campaign.md"
-RUNS = 100_000  # a case; the third digit of a p95 stands
+RUNS = 100_000  # a case; the third digit of a p95 is
 IMAGES = ROOT / "docs/img"
 PICTURES = ("step", "latitude", "tilt", "time", "order", "slew", "hold")  # and the distribution
 TABLE = re.compile(r"(?<=<!-- campaign: )(\w+)( -->\n)(```\n.*?```\n|\|.*?\n(?=\n))", re.DOTALL)

@@ -195,7 +195,7 @@ def play(argv: list[str]) -> Screen:
         finally:
             process.terminate()
             while process.poll() is None and select.select([master], [], [], PATIENCE_S)[0]:
-                with suppress(OSError):  # nobody has the other end open any more
+                with suppress(OSError):  # no one has the other end open any more
                     os.read(master, 65536)
             os.close(master)
     return screen

@@ -6,7 +6,7 @@ A0, RFX, RFY, RFZ, SCLK, SDAT, FL2, CS, RW, AB, D = *range(9), 9, 13
 ANN_BIT, ANN_WORD, ANN_READ, ANN_CYCLE, ANN_WARNING = range(5)
 AXES = "XYZ"
 BITS = 16
-COEFFICIENT_BITS = 24  # read with A0 high in the set-up, for nobody
+COEFFICIENT_BITS = 24  # read with A0 high in the set-up, for no one
 ZERO = 0x8000  # offset binary
 
 # Limits of an AD7712 on 10 MHz, ns (external clocking, 10 MHz: one clock is 100 ns)

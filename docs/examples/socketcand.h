@@ -46,7 +46,7 @@ static int can_hear(int link, const char *word)
     return 0;
 }
 
-/* ADDRESS:PORT to a link, -1 with a message when nobody is there. */
+/* ADDRESS:PORT to a link, -1 with a message when no one is there. */
 static int can_open(char *place)
 {
     char *port = strrchr(place, ':');

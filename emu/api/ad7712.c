@@ -29,7 +29,7 @@ static const struct ad7712 *cchip(const struct psabench_part *p)
     X("offset_v", API_REAL, part_ad7712, offset_v, "0", -1, 1, NULL,                                                   \
       "offset of the uncalibrated path, V, which self-calibration takes away")                                         \
     X("gain_error", API_REAL, part_ad7712, gain_error, "0", -0.5, 0.5, NULL,                                           \
-      "relative gain error of the uncalibrated path, likewise")                                                        \
+      "relative gain error of the uncalibrated path, which self-calibration removes")                                  \
     X("source_ohm", API_REAL, part_ad7712, source_ohm, "0", 0, 1e9, NULL,                                              \
       "resistance behind each input, ohm: the input's capacitor and the burn-out current meet it")                     \
     X("looks", API_CHOICE, part_ad7712, cells_max, "auto", 0, 7, "auto|1|2|4|8|16|32|64",                              \

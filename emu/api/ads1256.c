@@ -36,7 +36,7 @@ static const struct ads1256 *cchip(const struct psabench_part *p)
     X("offset_v", API_REAL, part_ads1256, offset_v, "0", -1, 1, NULL,                                                  \
       "offset of the uncalibrated path, V, which self-calibration takes away")                                         \
     X("gain_error", API_REAL, part_ads1256, gain_error, "0", -0.5, 0.5, NULL,                                          \
-      "relative gain error of the uncalibrated path, likewise")                                                        \
+      "relative gain error of the uncalibrated path, which self-calibration removes")                                  \
     X("source_ohm", API_REAL, part_ads1256, source_ohm, "0", 0, 1e9, NULL,                                             \
       "resistance behind each input, ohm: sensor-detect currents meet it, an input without buffer loads it")           \
     X("cells_max", API_UINT, part_ads1256, cells_max, "0", 0, 65535, NULL,                                             \

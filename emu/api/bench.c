@@ -112,7 +112,7 @@ static int64_t tell_again_ns(const psabench *b)
     return INT64_MAX;
 }
 
-/* Instant by instant, so that a change is told when it happens. */
+/* Instant by instant, so that a change is reported when it happens. */
 void api_move(psabench *b, int64_t t_ns)
 {
     while (b->sched.now_ns < t_ns || sched_next_ns(&b->sched) <= t_ns) {

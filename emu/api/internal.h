@@ -82,7 +82,7 @@ int api_may_move(psabench *b, const char *function);
 /* Lets everything up to t_ns happen, each instant told as it comes. The caller has raised b->inside. */
 void api_move(psabench *b, int64_t t_ns);
 
-/* Tells what has changed since it was told last. */
+/* Reports what has changed since the last report. */
 void api_tell(psabench *b);
 
 /* A pin has changed: to the recording, then to its watcher. */

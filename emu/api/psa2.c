@@ -118,7 +118,7 @@ GET_LINE(cst, b->spi.phase == PSA2_SPI_IDLE || b->spi.x.group != PSA2_TEMP);
 GET_LINE(int, !(b->out.busy && now_ns(p) >= b->out.f.t_int_fall_ns));
 GET_LINE(res, b->mode != PSA2_IN_RESET);
 
-/* INT falls on the grid of CLK, which is no event while nobody watches. */
+/* INT falls on the grid of CLK, which is no event without observers. */
 static int64_t next_ns(const struct psabench_part *p)
 {
     const struct psa2_out *out = &cself(p)->board.out;

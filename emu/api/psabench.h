@@ -1,4 +1,4 @@
-/* libpsabench: converter chips and boards, register by register and edge by edge, for somebody else's program.
+/* libpsabench: converter chips and boards, register by register and edge by edge, for other programs.
  * (docs/library.md is the way in, with examples; this is the manual.)
  *
  * A driver under test is linked or shimmed against a part on a simulated bench: the program moves the pins or exchanges
@@ -76,7 +76,7 @@ PSABENCH_API int psabench_run_for(psabench *b, int64_t dt_ns);
 
 /* Records the pins of the parts that are on the bench (VCD, 1 ns, a scope named after each part) from now until
  * psabench_vcd_close(), psabench_free() or the next call. The picture of what a driver did, for GTKWave, PulseView,
- * sigrok-cli. A write that failed on the way (disk full) is told by psabench_vcd_close(). */
+ * sigrok-cli. A write that failed on the way (disk full) is reported by psabench_vcd_close(). */
 PSABENCH_API int psabench_vcd(psabench *b, const char *path);
 PSABENCH_API int psabench_vcd_close(psabench *b); /* PSABENCH_OK too when there is no recording */
 
@@ -107,7 +107,7 @@ PSABENCH_API const char *psabench_part_name(const psabench_part *p);
  *                      output: what is read is the level of whoever drives
  *   psa2               the article's lines SYNC_A SClk DRD_A DIn DOutX DOutY DOutZ SYNC_T CST DRD_T DInT DOutT Res Data CLK
  *                      Int, all outputs; a 0 set on Res starts the board's own reset pulse
- * Inputs that nobody has set: SCLK, DIN, the SYNC and mode pins of the ads128x and D0.. low; CS, RESET, PWDN, the SYNC of
+ * Inputs that no one has set: SCLK, DIN, the SYNC and mode pins of the ads128x and D0.. low; CS, RESET, PWDN, the SYNC of
  * the ads125x high; of the ad771x RFS, TFS, SYNC, STANDBY high. DOUT of the ads125x reads 0 in high impedance. */
 PSABENCH_API int psabench_pin(const psabench_part *p, const char *name);
 PSABENCH_API const char *psabench_pin_name(const psabench_part *p, int pin);
@@ -118,7 +118,7 @@ PSABENCH_API int psabench_pin_is_input(const psabench_part *p, int pin); /* of t
 PSABENCH_API int psabench_set(psabench_part *p, int pin, int level);
 PSABENCH_API int psabench_get(const psabench_part *p, int pin); /* 0, 1 or an error */
 
-/* Called at each change of an output pin, at its own instant; fn NULL: no more. One watcher a pin. A line of psa2 is told
+/* Called at each change of an output pin, at its own instant; fn NULL: no more. One watcher a pin. A line of psa2 is reported
  * up to 0.25 ms late, with its own t_ns and in order of time with the other lines of the board. */
 typedef void psabench_watch_fn(void *ctx, psabench_part *p, int pin, int level, int64_t t_ns);
 PSABENCH_API int psabench_watch(psabench_part *p, int pin, psabench_watch_fn *fn, void *ctx);

@@ -12,7 +12,7 @@ struct api_vcd {
     FILE *out;
     int64_t written_ns; /* the latest time stamp */
     int error;          /* errno of the first failure */
-    bool dirty;         /* a change stands after it */
+    bool dirty;         /* a change is after it */
 };
 
 static void put(struct api_vcd *v, const char *text)

@@ -81,7 +81,7 @@ static bool open_one(struct bus_ports *all, struct links *links, struct bench *b
     }
     free(p);
     if (err == -EEXIST)
-        return why_fail(why, cap, "--bus-port %s: exists and is no symbolic link to a pty; another name is wanted",
+        return why_fail(why, cap, "--bus-port %s: exists and is no symbolic link to a pty; expected another name",
                         o->arg);
     return why_fail(why, cap, "--bus-port %s: %s", o->arg, strerror(-err));
 }

@@ -24,7 +24,7 @@ bool bus_ports_open(struct bus_ports *p, struct links *links, struct bench *b, c
                     size_t cap);
 void bus_ports_ready(const struct bus_ports *p, FILE *out);
 void bus_ports_abandon(struct bus_ports *p); /* their names are the parent's */
-void bus_ports_close(struct bus_ports *p);   /* cycles under way go on, nobody waits for them */
+void bus_ports_close(struct bus_ports *p);   /* cycles under way go on, no client waits for them */
 void bus_ports_free(struct bus_ports *p);    /* once the links have been reaped */
 
 #endif

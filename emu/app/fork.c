@@ -17,7 +17,7 @@ static const char failure[] = "fail ";
 /* ---- the child */
 
 /* Every descriptor of the parent but stderr and `keep` leads nowhere from now on: what the parent's links and files do when
- * they are closed reaches nobody. */
+ * they are closed reaches no one. */
 static bool cut_off(int keep)
 {
     const int null = open("/dev/null", O_RDWR | O_CLOEXEC);

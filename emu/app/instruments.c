@@ -87,10 +87,9 @@ static bool open_port(struct instruments *all, const struct scpi_kind *kind, con
     }
     free(i);
     if (err == -EADDRINUSE)
-        return why_fail(why, cap, "--scpi %s: port %u is taken on 127.0.0.1; another one, or 0, is wanted", o->arg,
-                        port);
+        return why_fail(why, cap, "--scpi %s: port %u is taken on 127.0.0.1; expected another one, or 0", o->arg, port);
     if (err == -EEXIST)
-        return why_fail(why, cap, "--scpi %s: %s exists and is no symbolic link to a pty; another name is wanted",
+        return why_fail(why, cap, "--scpi %s: %s exists and is no symbolic link to a pty; expected another name",
                         o->arg, name);
     return why_fail(why, cap, "--scpi %s: %s", o->arg, strerror(-err));
 }
@@ -117,7 +116,7 @@ bool instruments_check(const struct instruments *all, const struct options *o, c
         const struct options_scpi *s = &o->scpi[i];
         const struct scpi_kind *kind = scpi_kind(s->kind);
         if (strcmp(s->kind, "all") == 0) continue;
-        if (!kind) return why_fail(why, cap, "--scpi %s: head, table, chamber, supply or all is wanted", s->arg);
+        if (!kind) return why_fail(why, cap, "--scpi %s: expected head, table, chamber, supply or all", s->arg);
         if (!kind->present(all->control->bench))
             return why_fail(why, cap, "--scpi %s: the scenario has no %s", s->arg, kind->name);
     }

@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* First sentence of the comment that a file begins with, as far as it stands on the first line: what the file is. */
+/* First sentence of the comment that a file begins with, as far as it is on the first line: what the file is. */
 static void first_comment(const char *path, char *text, size_t cap)
 {
     char line[256] = "";

@@ -131,7 +131,7 @@ static unsigned collect(const struct loop *l, struct link **polled, struct pollf
     for (struct link *k = l->links->first; k && n < LOOP_LINKS_MAX; k = k->next) {
         const short events = (short)((k->want_read ? POLLIN : 0) | (k->want_write ? POLLOUT : 0));
         polled[n] = k;
-        /* An idle descriptor is left out: a hang-up would be reported for ever. */
+        /* An idle descriptor is left out: a hang-up would be reported without end. */
         p[n++] = (struct pollfd){.fd = events && !k->gone ? k->fd : -1, .events = events};
     }
     return n;
@@ -144,7 +144,7 @@ static void flush_all(struct loop *l)
     }
 }
 
-/* At full speed with nobody to hear, the kernel is only asked now and then, for signals. */
+/* At full speed with no one to hear, the kernel is only asked now and then, for signals. */
 static bool alone(struct loop *l)
 {
     enum { TURNS = 64 };
@@ -191,7 +191,7 @@ void loop_cancel_step(struct loop *l)
     l->run = LOOP_IDLE;
 }
 
-/* At the end, and nobody waits for an answer. */
+/* At the end, and no client waits for an answer. */
 static bool over(const struct loop *l)
 {
     return l->sched->now_ns >= l->end_ns && l->run != LOOP_RUNNING;

@@ -20,7 +20,7 @@ static const char help[] =
     "        socketcand[:PORT]  socketcand protocol on 127.0.0.1 (default, port 29536; 0 takes a free one)\n"
     "        slcan[:LINK]       slcan on a pseudo-terminal, LINK is made a symbolic link to it\n"
     "        socketcan:IFACE    an interface of the kernel: vcan0, can0\n"
-    "        log:FILE           nobody's: all frames into a file, as candump -L writes them\n"
+    "        log:FILE           record every frame to FILE (candump -L format)\n"
     "                           --can may be given several times; socketcand without BUS= serves every bus by the\n"
     "                           name that a client opens; --can none: no adapter\n"
     "  --pace wall|step|free    real time (default), only when the control socket says so, as fast as it goes\n"
@@ -141,8 +141,9 @@ static bool set_can(struct target *t, const char *arg)
     } else if (len == 3 && strncmp(kind, "log", 3) == 0 && rest) {
         c->kind = OPTIONS_CAN_LOG;
     } else {
-        return why_fail(t->why, t->cap,
-                        "--can %s: socketcand[:PORT], slcan[:LINK], socketcan:IFACE, log:FILE or none is wanted", arg);
+        return why_fail(
+            t->why, t->cap,
+            "--can: expected socketcand[:PORT], slcan[:LINK], socketcan:IFACE, log:FILE or none, got \"%s\"", arg);
     }
     o->can_count++;
     return true;
@@ -161,7 +162,7 @@ static bool set_scpi(struct target *t, const char *arg)
     *i = (struct options_scpi){.arg = arg, .pty = strcmp(rest, "pty") == 0 || strncmp(rest, "pty:", 4) == 0};
     snprintf(i->kind, sizeof i->kind, "%.*s", (int)len, arg);
     if (len == 0 || len >= sizeof i->kind)
-        return why_fail(t->why, t->cap, "--scpi %s: head, table, chamber, supply or all is wanted", arg);
+        return why_fail(t->why, t->cap, "--scpi: expected head, table, chamber, supply or all, got \"%s\"", arg);
     if (i->pty && rest[3] && rest[4]) i->link = rest + 4;
     if (!i->pty && !parse_u64(rest, 65535, &port)) {
         return why_fail(t->why, t->cap,
@@ -185,7 +186,7 @@ bool options_cans(struct options *o, char *text, char *why, size_t cap)
 static bool set_truth_every(struct target *t, const char *arg)
 {
     if (options_duration(arg, &t->o->truth_every_ns) && t->o->truth_every_ns >= 1000) return true;
-    return why_fail(t->why, t->cap, "--truth-every %s: a time of 1us or more is wanted, as 10ms", arg);
+    return why_fail(t->why, t->cap, "--truth-every: expected a time of 1us or more, as 10ms, got \"%s\"", arg);
 }
 
 static bool set_pace(struct target *t, const char *arg)
@@ -194,26 +195,27 @@ static bool set_pace(struct target *t, const char *arg)
         t->o->pace = (enum pace_kind)k;
         if (strcmp(arg, pace_name(t->o->pace)) == 0) return true;
     }
-    return why_fail(t->why, t->cap, "--pace %s: wall, step or free is wanted", arg);
+    return why_fail(t->why, t->cap, "--pace: expected wall, step or free, got \"%s\"", arg);
 }
 
 static bool set_for(struct target *t, const char *arg)
 {
     if (options_duration(arg, &t->o->for_ns)) return true;
-    return why_fail(t->why, t->cap, "--for %s: a time is wanted, as 300ms, 10s or 2min, up to 1e6 s", arg);
+    return why_fail(t->why, t->cap, "--for: expected a time, as 300ms, 10s or 2min, up to 1e6 s, got \"%s\"", arg);
 }
 
 static bool set_seed(struct target *t, const char *arg)
 {
     t->o->seed_given = parse_u64(arg, UINT64_MAX, &t->o->seed);
-    return t->o->seed_given || why_fail(t->why, t->cap, "--seed %s: an integer from 0 to 2^64 - 1 is wanted", arg);
+    return t->o->seed_given ||
+           why_fail(t->why, t->cap, "--seed: expected an integer from 0 to 2^64 - 1, got \"%s\"", arg);
 }
 
 static bool set_rate(struct target *t, const char *arg, const char *name, uint32_t *hz, bool *given)
 {
     uint64_t v;
     *given = parse_u64(arg, 8000000, &v) && (v == 0 || v >= 10000);
-    if (!*given) return why_fail(t->why, t->cap, "--%s %s: 0 or 10000 to 8000000 bit/s is wanted", name, arg);
+    if (!*given) return why_fail(t->why, t->cap, "--%s: expected 0 or 10000 to 8000000 bit/s, got \"%s\"", name, arg);
     *hz = (uint32_t)v;
     return true;
 }
@@ -233,7 +235,8 @@ static bool set_epoch(struct target *t, const char *arg)
     char *end;
     const double s = strtod(arg, &end);
     if (end == arg || *end || !(s >= 0 && s <= 9e9)) {
-        return why_fail(t->why, t->cap, "--epoch %s: seconds are wanted, 0 to 9e9 (date +%%s gives today's)", arg);
+        return why_fail(t->why, t->cap, "--epoch: expected seconds, 0 to 9e9 (date +%%s gives today's), got \"%s\"",
+                        arg);
     }
     t->o->epoch_ns = (int64_t)nearbyint(s) * 1000000000 + (int64_t)nearbyint((s - nearbyint(s)) * 1e9);
     return true;
@@ -244,7 +247,7 @@ static bool set_vcd_unit(struct target *t, const char *arg)
     uint64_t v;
     bool power = parse_u64(arg, 100000000, &v) && v > 0;
     for (uint64_t x = power ? v : 1; x > 1; x /= 10) power = power && x % 10 == 0;
-    if (!power) return why_fail(t->why, t->cap, "--vcd-unit %s: 1, 10, 100 ... 100000000 ns is wanted", arg);
+    if (!power) return why_fail(t->why, t->cap, "--vcd-unit: expected 1, 10, 100 ... 100000000 ns, got \"%s\"", arg);
     t->o->vcd_unit_ns = (uint32_t)v;
     return true;
 }
@@ -253,7 +256,7 @@ static bool set_line_hz(struct target *t, const char *arg)
 {
     uint64_t v;
     if (!parse_u64(arg, 100000000, &v) || v < 1000) {
-        return why_fail(t->why, t->cap, "--line-hz %s: 1000 to 100000000 samples a second are wanted", arg);
+        return why_fail(t->why, t->cap, "--line-hz: expected 1000 to 100000000 samples a second, got \"%s\"", arg);
     }
     t->o->line_hz = (int64_t)v;
     return true;
@@ -272,14 +275,14 @@ static bool set_bus_port(struct target *t, const char *arg)
     const char *link = named ? arg + len + 1 : arg;
     *b = (struct options_bus){.arg = arg, .link = strcmp(link, "-") == 0 ? NULL : link};
     if (!*link || (named && len >= sizeof b->unit))
-        return why_fail(t->why, t->cap, "--bus-port %s: [UNIT:]LINK is wanted, LINK a path or -", arg);
+        return why_fail(t->why, t->cap, "--bus-port: expected [UNIT:]LINK, LINK a path or -, got \"%s\"", arg);
     if (named) snprintf(b->unit, sizeof b->unit, "%.*s", (int)len, arg);
     return true;
 }
 
 static bool set_path(struct target *t, const char *name, const char *arg, const char **path)
 {
-    if (!*arg) return why_fail(t->why, t->cap, "--%s: a path is wanted", name);
+    if (!*arg) return why_fail(t->why, t->cap, "--%s: expected a path", name);
     *path = arg;
     return true;
 }

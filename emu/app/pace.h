@@ -38,7 +38,7 @@ int64_t pace_clock_ns(void);
 /* Wall pace: simulated time sim_ns is now. */
 void pace_start(struct pace *p, int64_t sim_ns);
 
-/* Wall pace: the simulated time that corresponds to now, given that the simulation stands at sim_ns; slips if it is too
+/* Wall pace: the simulated time that corresponds to now, given that the simulation is at sim_ns; slips if it is too
  * far ahead. */
 int64_t pace_target_ns(struct pace *p, int64_t sim_ns);
 

@@ -16,8 +16,7 @@ static bool open_socketcand(struct can_hub *hub, struct ports_can *c, const stru
     if (!err) return true;
     if (err == -EADDRINUSE) {
         return why_fail(
-            why, cap,
-            "--can socketcand:%u: the port is taken on 127.0.0.1; another one, or 0 for a free one, is wanted",
+            why, cap, "--can socketcand:%u: the port is taken on 127.0.0.1; expected another one, or 0 for a free one",
             o->port);
     }
     return why_fail(why, cap, "--can socketcand:%u: %s", o->port, strerror(-err));
@@ -28,7 +27,7 @@ static bool open_slcan(struct can_hub *hub, struct ports_can *c, const struct op
     const int err = slcan_pty_open(&c->slcan, hub, o->arg);
     if (!err) return true;
     if (err == -EEXIST)
-        return why_fail(why, cap, "--can slcan:%s: exists and is no symbolic link to a pty; another name is wanted",
+        return why_fail(why, cap, "--can slcan:%s: exists and is no symbolic link to a pty; expected another name",
                         o->arg);
     return why_fail(why, cap, "--can slcan%s%s: %s", o->arg ? ":" : "", o->arg ? o->arg : "", strerror(-err));
 }
@@ -137,8 +136,7 @@ static bool open_line(struct ports *p, struct bench *b, const struct options *o,
     free(p->line);
     p->line = NULL;
     if (err == -EEXIST)
-        return why_fail(why, cap, "--line %s: exists and is no symbolic link to a pty; another name is wanted",
-                        o->line);
+        return why_fail(why, cap, "--line %s: exists and is no symbolic link to a pty; expected another name", o->line);
     return why_fail(why, cap, "--line %s: %s", o->line, strerror(-err));
 }
 
@@ -151,7 +149,7 @@ static bool open_socket(struct ctl_server *s, const char *option, const char *pa
     if (!err) return true;
     if (err == -EADDRINUSE) return why_fail(why, cap, "--%s %s: another process listens there", option, path);
     if (err == -EEXIST)
-        return why_fail(why, cap, "--%s %s: exists and is no socket; another path is wanted", option, path);
+        return why_fail(why, cap, "--%s %s: exists and is no socket; expected another path", option, path);
     if (err == -ENAMETOOLONG)
         return why_fail(why, cap, "--%s %s: a path of a socket has up to 107 bytes", option, path);
     return why_fail(why, cap, "--%s %s: %s", option, path, strerror(-err));

@@ -26,7 +26,7 @@ struct service {
     struct timeline timeline;
     struct ctl_client *runner; /* who waits for the answer to `run` */
     char vcd_path[1024];       /* of the recording, --vcd or vcd.start */
-    bool vcd_failed;           /* the recording is not complete, and it was told */
+    bool vcd_failed;           /* the recording is not complete, and this was reported */
     struct journal journal;
     const char *scenario; /* resolved, one line of JSON */
     bool powered;         /* the bench comes from a snapshot */

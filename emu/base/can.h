@@ -47,7 +47,7 @@ struct can_node {
     const char *name;
     enum can_order order;
     bool fd; /* takes part in FD traffic; a classic node is not given FD frames and counts them */
-    /* End of somebody else's frame; may be NULL. */
+    /* End of another node's frame; may be NULL. */
     void (*rx)(void *ctx, const struct can_msg *m, int64_t t_ns);
     void (*sent)(void *ctx, const struct can_msg *m, int64_t t_ns);  /* end of frame of one's own; may be NULL */
     void (*error)(void *ctx, const struct can_msg *m, int64_t t_ns); /* an error frame has passed; may be NULL */
@@ -122,7 +122,7 @@ void can_detach(struct can_bus *b, struct can_node *n); /* drops what it had que
 /* The node loses its power: a frame that it sends breaks off, the others see an error frame; then can_detach(). */
 void can_unplug(struct can_bus *b, struct can_node *n, int64_t t_ns);
 
-/* `by` stands where n stood, with all that n was, its waiting frames and the one on the wire included; n is off the bus. */
+/* `by` is where n stood, with all that n was, its waiting frames and the one on the wire included; n is off the bus. */
 void can_replace(struct can_bus *b, struct can_node *n, struct can_node *by);
 
 /* Queues a copy. CAN_FULL: counted in tx_overflow; CAN_NO_FD: FD frame on a classic bus; CAN_BAD: no such length or id. */

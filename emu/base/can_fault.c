@@ -84,7 +84,7 @@ static void hold_frame(struct can_bus *b, struct can_fault *f, const struct can_
     if (!f->due.queued) arm_release(f);
 }
 
-/* Which faults befall the frame that has just ended. A REORDER that holds one lets this one pass. */
+/* Which faults affect the frame that has just ended. A REORDER that holds one lets this one pass. */
 static unsigned select_hits(struct can_bus *b, struct hit *hit)
 {
     unsigned n = 0;

@@ -12,7 +12,7 @@ enum {
 struct stream {
     unsigned bits; /* sent so far, stuff bits included */
     unsigned row;  /* 2 (run - 1) + level: equal bits up to now, and theirs */
-    uint32_t crc;  /* over the unstuffed bits; above its 15 bits stands what has been shifted out */
+    uint32_t crc;  /* over the unstuffed bits; above its 15 bits is what has been shifted out */
 };
 
 /* Before the last bit of an idle bus. With it the start of a classic frame is whole fours of bits; it is not counted, start of
@@ -103,7 +103,7 @@ static struct can_bits fd(const struct can_msg *m)
     struct stream s = put_head(m, 4 | brs, 3); /* FDF, res, BRS */
     const unsigned arbitration = s.bits;
     s = put_data(put(s, can_dlc(m->len), 5), m); /* ESI 0 */
-    /* No stuff bit after the last data bit: the fixed one stands there. */
+    /* No stuff bit after the last data bit: the fixed one is there. */
     const unsigned fast = s.bits - arbitration + fd_crc_bits(m->len);
     return brs ? (struct can_bits){arbitration + TAIL_BITS, fast}
                : (struct can_bits){arbitration + fast + TAIL_BITS, 0};

@@ -1,4 +1,4 @@
-/* SHA-256 (FIPS 180-4): what a file or a state is told apart by. Pure; nothing allocates. */
+/* SHA-256 (FIPS 180-4): what a file or a state is distinguished by. Pure; nothing allocates. */
 #ifndef PSABENCH_BASE_SHA256_H
 #define PSABENCH_BASE_SHA256_H
 

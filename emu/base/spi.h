@@ -1,7 +1,7 @@
 /* Shift register of an SPI slave: bits to bytes and back, nothing of the chip behind it.
  *
  * A bus may drive it bit by bit (spi_sample on each sampling edge, then spi_miso for the next bit) or byte by byte
- * (spi_byte); both drive the same state and give the same bits. MSB first. The chip is told each byte when its last bit
+ * (spi_byte); both drive the same state and give the same bits. MSB first. The chip is given each byte when its last bit
  * has been sampled, and answers with the byte to shift out next. */
 #ifndef PSABENCH_BASE_SPI_H
 #define PSABENCH_BASE_SPI_H

@@ -1,4 +1,4 @@
-/* Text: what a macro stands for, and messages that quote a stranger. Pure. */
+/* Text: what a macro represents, and messages that quote a stranger. Pure. */
 #ifndef PSABENCH_BASE_TEXT_H
 #define PSABENCH_BASE_TEXT_H
 

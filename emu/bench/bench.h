@@ -1,4 +1,4 @@
-/* What stands on the bench: instruments, units, buses, and who watches the lines. Assembled from a scenario; no OS, no clock. */
+/* What is on the bench: instruments, units, buses, and who watches the lines. Assembled from a scenario; no OS, no clock. */
 #ifndef PSABENCH_BENCH_BENCH_H
 #define PSABENCH_BENCH_BENCH_H
 
@@ -21,7 +21,7 @@ struct bench_cycle {
     struct board_cycle cycle;
     bool busy;
     void (*done)(void *ctx, const struct board_cycle *c, enum board_cycle_result r,
-                 int64_t t_ns); /* NULL: nobody waits */
+                 int64_t t_ns); /* NULL: no client waits */
     void *ctx;
 };
 
@@ -63,12 +63,12 @@ void bench_record_end(struct bench *b);
 
 void bench_power_up(struct bench *b);
 
-/* The supply was told something: boards go off and on now, and at the instants that follow from it. */
+/* The supply was given something: boards go off and on now, and at the instants that follow from it. */
 void bench_supply_changed(struct bench *b, int64_t t_ns);
 
-/* A cycle for a unit whose board has a bus, c as it is wanted; done is called later if it is BOARD_CYCLE_OK, else never. */
+/* A cycle for a unit whose board has a bus, c as requested; done is called later if it is BOARD_CYCLE_OK, else never. */
 enum board_cycle_result bench_cycle(struct bench *b, unsigned unit, const struct bench_cycle *c, int64_t t_ns);
-void bench_cycle_forget(struct bench *b, unsigned unit); /* it goes on, nobody waits for it */
+void bench_cycle_forget(struct bench *b, unsigned unit); /* it goes on, no client waits for it */
 
 /* What commands may reach of it, as far as the bench knows: the callbacks are left as they are. */
 void bench_view(struct bench *b, struct control_bench *v);

@@ -74,7 +74,7 @@ static int64_t now_ns(const struct journal *j)
     return j->bench->sched.now_ns;
 }
 
-/* A name that can stand in quotes as it is. */
+/* A name that can be in quotes as it is. */
 static void plain(const char *name, char *out, size_t cap)
 {
     size_t n = 0;

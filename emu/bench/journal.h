@@ -6,10 +6,10 @@
  *     {"t":2500,"refused":true,"cmd":"supply.set",...}     one was refused on the spot: even that moves noise
  *     {"t":9000,"bus":0,"went":1}     the program has left
  *     {"t":2500,"unit":0,"cycle":3,"write":true,"data":9029,"strobe_ns":800}     one on the bus of a unit, at address 3
- *     {"t":9000,"unit":0,"watch":16383}     somebody listens to these lines of a unit (0: nobody)
+ *     {"t":9000,"unit":0,"watch":16383}     somebody listens to these lines of a unit (0: no one)
  *
  * An entry comes after everything that was due before its instant; with "ran", also after everything due at it. Nothing
- * that happens inside the bench stands here (timeline, faults under way, answers). Kept in memory, up to a limit; one
+ * that happens inside the bench is here (timeline, faults under way, answers). Kept in memory, up to a limit; one
  * thread. */
 #ifndef PSABENCH_BENCH_JOURNAL_H
 #define PSABENCH_BENCH_JOURNAL_H
@@ -71,7 +71,7 @@ struct journal_entry {
     int64_t t_ns;
     bool ran;
     unsigned bus, unit;
-    uint32_t client, heir_of; /* heir_of: whose place, and frames that wait, it took over; 0: nobody's */
+    uint32_t client, heir_of; /* heir_of: whose place, and frames that wait, it took over; 0: no one's */
     uint64_t watch;
     bool fd;
     char name[32];

@@ -45,9 +45,9 @@ static bool check_event(const struct scenario *s, const struct control_bench *vi
         snprintf(text, sizeof text, "unknown command%s%s", near ? "; nearest: " : "", near ? near : "");
         return fail(s, e, what, text, why, cap);
     }
-    if (!row->changes) return fail(s, e, what, "changes nothing on the bench; a command that does is wanted", why, cap);
+    if (!row->changes) return fail(s, e, what, "changes nothing on the bench; expected a command that does", why, cap);
     const char *section = missing(s, e->cmd);
-    if (section) snprintf(text, sizeof text, "there is none on this bench: a section %s is wanted", section);
+    if (section) snprintf(text, sizeof text, "there is none on this bench: expected a section %s", section);
     if (section) return fail(s, e, what, text, why, cap);
     cJSON *args = cJSON_Parse(e->args);
     const bool ok = control_check(control_tables, view, e->cmd, args, text);

@@ -83,7 +83,7 @@ struct board_type {
     void (*sample_until)(void *board,
                          int64_t t_ns);          /* takes its inputs up to now; the physics may change abruptly after */
     void (*wrong)(void *board, uint32_t wrongs); /* from now on; outlives resets and power */
-    void (*listen)(void *board, bool on);        /* somebody wants board_io.event, or nobody does */
+    void (*listen)(void *board, bool on);        /* somebody wants board_io.event, or no one does */
     struct trace *(*trace)(void *board);
     struct line_faults *(*line)(void *board);
     struct afe *(*afe)(void *board, unsigned axis);      /* for faults: sample_until() first; NULL: no analog inputs */

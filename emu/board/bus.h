@@ -13,7 +13,7 @@ enum board_cycle_result {
     BOARD_CYCLE_WRITE_ONLY,
     BOARD_CYCLE_NOT_READY, /* too early: no word waits */
     BOARD_CYCLE_TOO_SHORT, /* the strobe is shorter than the board needs */
-    BOARD_CYCLE_BUSY,      /* somebody else's cycle is under way: refused at once, to be asked again */
+    BOARD_CYCLE_BUSY,      /* another client's cycle is in progress: rejected at once, to be repeated */
     BOARD_CYCLE_BAD_VALUE,
     BOARD_CYCLE_TAKEN, /* too early: no word waits, and the board's built-in host takes each that comes */
     BOARD_CYCLE_OFF    /* no power, or cut by a reset */

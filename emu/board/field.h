@@ -21,7 +21,7 @@ struct board_field {
     size_t offset;
     double min, max;            /* of numbers, and of characters of a string; LIST: most elements in max */
     const char *what;           /* one sentence, source and grade at its end */
-    unsigned count;             /* REALS; LIST: 0, or how many are wanted */
+    unsigned count;             /* REALS; LIST: 0, or the required number */
     const char *const *choices; /* CHOICE: up to NULL */
     const char *like;           /* LIST: "one of X, Y, Z, T" */
     /* LIST: element i from its text (element 0 empties the list first); its text, false past the last. */

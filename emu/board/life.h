@@ -1,6 +1,6 @@
 /* The functions of a board_type that only give a pointer its type, written once.
  *
- * BOARD_STROBE(NAME) likewise defines strobe, of board_bus, by the profile's strobe_ns and strobe_min_ns.
+ * BOARD_STROBE(NAME) defines strobe, of board_bus, by the profile's strobe_ns and strobe_min_ns.
  *
  * BOARD_LIFE(NAME) at the file's top level defines init, power_up, power_down, reset, sample_until, trace and line for a board
  * whose struct is struct NAME, with members trace and line, and whose functions are NAME_init() and so on. */

@@ -201,9 +201,9 @@ static bool fits(const struct board_node *n, unsigned tpdos, int64_t period_ns, 
 static uint32_t read_text(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
 {
     (void)t_ns;
-    char stands[BOARD_NODE_TEXT];
+    char reason[BOARD_NODE_TEXT];
     const char *text = e->index == REFUSAL ? n->refusal : n->remark;
-    if (e->index == REFUSAL && !fits(n, n->fit_tpdos, n->fit_period_ns, stands)) text = stands;
+    if (e->index == REFUSAL && !fits(n, n->fit_tpdos, n->fit_period_ns, reason)) text = reason;
     v->len = (uint16_t)strlen(text);
     memcpy(v->text, text, (size_t)v->len + 1);
     return CO_OK;

@@ -48,7 +48,7 @@ struct board_node_type {
     void (*defaults)(struct board_node *n);              /* settings of its own, also at init; or NULL */
     void (*sync)(struct board_node *n, int64_t t_ns);    /* SYNC came; or NULL */
     void (*started)(struct board_node *n, int64_t t_ns); /* the node became operational; or NULL */
-    /* co_node_io.heard: somebody else's frame; or NULL. */
+    /* co_node_io.heard: another node's frame; or NULL. */
     void (*heard)(struct board_node *n, const struct can_msg *m, int64_t t_ns);
 };
 
@@ -62,7 +62,7 @@ struct board_node {
     /* stream */
     int64_t fit_period_ns; /* fits holds for this period and these TPDOs */
     unsigned fit_tpdos;
-    bool fits; /* false: the stream stands, EMCY FF03h is active */
+    bool fits; /* false: the stream stops, EMCY FF03h is active */
     uint32_t readings, dropped;
     int64_t drop_ns; /* last */
     /* bus cycle under way */

@@ -83,7 +83,7 @@ void co_node_power_down(struct co_node *n);
 /* As the NMT commands do; reset node calls the owner for its part. */
 void co_node_reset(struct co_node *n, enum co_event what, int64_t t_ns);
 
-/* A condition begins: 1001h, 1003h, EMCY (not in stopped) with five bytes source and time in us. One that stands
+/* A condition begins: 1001h, 1003h, EMCY (not in stopped) with five bytes source and time in us. One that is active
  * already is not told again. */
 void co_node_error(struct co_node *n, uint16_t code, uint8_t reg, uint8_t source, int64_t t_ns);
 

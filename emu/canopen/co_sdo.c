@@ -211,7 +211,7 @@ static void download_segment(struct co_sdo *s, const uint8_t *data, int64_t t_ns
 
 /* ---- requests ---- */
 
-/* A client that begins anew has given up whatever was under way. */
+/* A client that begins again has given up whatever was under way. */
 static void begin(struct co_sdo *s, const uint8_t *data, int64_t t_ns)
 {
     finish(s);
@@ -245,7 +245,7 @@ void co_sdo_request(struct co_sdo *s, const uint8_t *data, size_t len, int64_t t
     case CS_ABORT:
         finish(s);
         return;
-    default: /* block transfer and what nobody has defined */
+    default: /* block transfer and what no one has defined */
         s->index = (uint16_t)bits_get_le(&data[1], 2);
         s->sub = data[3];
         send_abort(s, CO_AB_COMMAND, t_ns);

@@ -40,7 +40,7 @@ static bool in_range(const struct target *t, double x, double min, double max)
 
 static bool parse_real(const struct target *t, const cJSON *j, struct control_value *v)
 {
-    if (!cJSON_IsNumber(j)) return control_refuse_in(t->why, "type", "%s: a number is wanted", t->arg->name);
+    if (!cJSON_IsNumber(j)) return control_refuse_in(t->why, "type", "%s: expected a number", t->arg->name);
     v->real = j->valuedouble;
     return in_range(t, v->real, t->arg->min, t->arg->max);
 }
@@ -56,14 +56,14 @@ static bool parse_count(const struct target *t, const cJSON *j, struct control_v
 
 static bool parse_bool(const struct target *t, const cJSON *j, struct control_value *v)
 {
-    if (!cJSON_IsBool(j)) return control_refuse_in(t->why, "type", "%s: true or false is wanted", t->arg->name);
+    if (!cJSON_IsBool(j)) return control_refuse_in(t->why, "type", "%s: expected true or false", t->arg->name);
     v->on = cJSON_IsTrue(j);
     return true;
 }
 
 static bool parse_text(const struct target *t, const cJSON *j, struct control_value *v)
 {
-    if (!cJSON_IsString(j)) return control_refuse_in(t->why, "type", "%s: a string is wanted", t->arg->name);
+    if (!cJSON_IsString(j)) return control_refuse_in(t->why, "type", "%s: expected a string", t->arg->name);
     v->text = j->valuestring;
     if (strlen(v->text) > TEXT_MAX_BYTES)
         return control_refuse_in(t->why, "range", "%s: longer than %d bytes", t->arg->name, TEXT_MAX_BYTES);
@@ -110,19 +110,19 @@ static bool parse_unit(const struct target *t, const cJSON *j, struct control_va
 static bool parse_reals(const struct target *t, const cJSON *j, struct control_value *v)
 {
     const cJSON *item;
-    if (!cJSON_IsArray(j)) return control_refuse_in(t->why, "type", "%s: a list of numbers is wanted", t->arg->name);
+    if (!cJSON_IsArray(j)) return control_refuse_in(t->why, "type", "%s: expected a list of numbers", t->arg->name);
     v->n = 0;
     cJSON_ArrayForEach(item, j)
     {
         if (v->n == CONTROL_REALS_MAX)
             return control_refuse_in(t->why, "range", "%s: more than %u numbers", t->arg->name, CONTROL_REALS_MAX);
         if (!cJSON_IsNumber(item))
-            return control_refuse_in(t->why, "type", "%s: a list of numbers is wanted", t->arg->name);
+            return control_refuse_in(t->why, "type", "%s: expected a list of numbers", t->arg->name);
         if (!in_range(t, item->valuedouble, t->arg->min, t->arg->max)) return false;
         v->reals[v->n++] = item->valuedouble;
     }
     return v->n > 0 ||
-           control_refuse_in(t->why, "range", "%s: 1 to %u numbers are wanted", t->arg->name, CONTROL_REALS_MAX);
+           control_refuse_in(t->why, "range", "%s: expected 1 to %u numbers", t->arg->name, CONTROL_REALS_MAX);
 }
 
 /* ---- and back */
@@ -230,7 +230,7 @@ bool control_args(const struct control_bench *b, const struct control_command *r
                   struct control_value v[CONTROL_ARGS_MAX], struct control_refusal *why)
 {
     memset(v, 0, CONTROL_ARGS_MAX * sizeof *v);
-    if (args && !cJSON_IsObject(args)) return control_refuse_in(why, "syntax", "args: an object is wanted");
+    if (args && !cJSON_IsObject(args)) return control_refuse_in(why, "syntax", "args: expected an object");
     const cJSON *j;
     cJSON_ArrayForEach(j, args)
     {

@@ -42,7 +42,7 @@ struct control_arg {
     double min, max;  /* of numbers, both included */
     const char *what;
     const char *const *choices; /* CHOICE: up to NULL */
-    double def;                 /* what SCPI's DEFault stands for */
+    double def;                 /* what SCPI's DEFault represents */
     double least;               /* magnitude of numbers other than 0 that changes anything; 0: any does */
     /* Narrows min and max to what this bench's instrument can; v are the arguments before this one. NULL: as they are. */
     void (*limits)(const struct control_bench *b, const struct control_value *v, double *min, double *max);

@@ -1,4 +1,4 @@
-/* Commands of the bench as a whole: what an operator may do. No hidden parameter is told here. */
+/* Commands of the bench as a whole: what an operator may do. No hidden parameter is reported here. */
 #include "control/commands.h"
 #include "control/describe.h"
 

@@ -19,7 +19,7 @@ static enum control_outcome submit(struct control *c, struct control_cycle *k, i
     c->started = k;
     if (k->client && control_by_step(b) && !b->sim.run(b->ctx, PATIENCE_NS, 0, c->refusal.why)) {
         c->refusal.code = "state";
-        k->client = NULL; /* it goes its way, nobody waits */
+        k->client = NULL; /* it goes its way, no client waits */
         return CONTROL_REFUSED;
     }
     return CONTROL_LATER;
@@ -68,7 +68,7 @@ static bool has_bus(const struct control_bench *b, const struct control_value *v
 static const struct control_command rows[] = {
     {"bus.read", "One read cycle on the parallel bus of a board; the answer comes when the cycle is done, for which time moves in step pace.",
      CONTROL_ARGS(WHERE, STROBE), .run = do_read, .changes = true, .check = has_bus},
-    {"bus.write", "One write cycle, likewise.",
+    {"bus.write", "Makes one write cycle on the parallel bus of a board; see bus.read.",
      CONTROL_ARGS(WHERE, {"data", CONTROL_COUNT, false, NULL, 0, 65535, .what = "word to write"}, STROBE), .run = do_write, .changes = true, .check = has_bus},
 };
 // clang-format on

@@ -169,7 +169,7 @@ static enum control_outcome do_list(struct control *c, const struct control_valu
 
 // clang-format off
 static const struct control_command rows[] = {
-    {"fault.add", "Brings about a fault now, at an instant or after an event; what it takes besides is told by fault.kinds.", fault_args, .run = do_add, .changes = true, .check = check_add},
+    {"fault.add", "Injects a fault now, at a time or after an event; see fault.kinds for its parameters.", fault_args, .run = do_add, .changes = true, .check = check_add},
     {"fault.clear", "Lifts a fault, or all of them, and forgets it.", CONTROL_ARGS({"id", CONTROL_COUNT, true, NULL, 1, 4294967295.0, .what = "what fault.add told"}), .run = do_clear, .changes = true},
     {"fault.list", "Lists the faults: waiting, listening for their event, active, over, or void (the point was gone).", NULL, .run = do_list},
     {"fault.kinds", "Lists the kinds of faults: what they do, how a host sees them, where they can be and what they take.", NULL, .run = do_kinds},

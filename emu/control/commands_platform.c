@@ -7,7 +7,7 @@ static struct platform *platform_of(const struct control_bench *b)
     return b->lab && b->lab->platform.cfg.present ? &b->lab->platform : NULL;
 }
 
-static bool stands(const struct control_bench *b, const struct control_value *v, struct control_refusal *why)
+static bool has_vehicle(const struct control_bench *b, const struct control_value *v, struct control_refusal *why)
 {
     (void)v;
     return platform_of(b) ||
@@ -73,7 +73,7 @@ static const struct control_command rows[] = {
     {"vehicle.attitude", "Turns the vehicle under the platform to another mean attitude, at the scenario's rates.",
      CONTROL_ARGS({"heading_deg", CONTROL_REAL, false, "deg", -360, 360, .what = "from north, clockwise; it turns the shorter way"},
       {"pitch_deg", CONTROL_REAL, false, "deg", -30, 30, .what = "nose up"},
-      {"roll_deg", CONTROL_REAL, false, "deg", -30, 30, .what = "right side down"}), .run = do_attitude, .changes = true, .check = stands},
+      {"roll_deg", CONTROL_REAL, false, "deg", -30, 30, .what = "right side down"}), .run = do_attitude, .changes = true, .check = has_vehicle},
     {"vehicle.sway", "Lets the vehicle sway about its mean attitude from now on; amplitudes or periods of 0 end it.",
      CONTROL_ARGS({"pitch_arcmin", CONTROL_REAL, false, "arcmin", 0, 600, .what = "amplitude of the pitch"},
       {"pitch_s", CONTROL_REAL, false, "s", 0, 1000, .what = "its period"},
@@ -82,10 +82,10 @@ static const struct control_command rows[] = {
       {"east_mg", CONTROL_REAL, true, "mg", 0, 100, .what = "amplitude of the acceleration to the east"},
       {"east_s", CONTROL_REAL, true, "s", 0, 1000, .what = "its period"},
       {"north_mg", CONTROL_REAL, true, "mg", 0, 100, .what = "amplitude of the acceleration to the north"},
-      {"north_s", CONTROL_REAL, true, "s", 0, 1000, .what = "its period"}), .run = do_sway, .changes = true, .check = stands},
+      {"north_s", CONTROL_REAL, true, "s", 0, 1000, .what = "its period"}), .run = do_sway, .changes = true, .check = has_vehicle},
     {"vehicle.fly", "Brings the vehicle to a speed and a track, which is its heading; 0 m/s parks it.",
      CONTROL_ARGS({"speed_mps", CONTROL_REAL, false, "m/s", 0, 1000, .what = "over ground"},
-      {"track_deg", CONTROL_REAL, false, "deg", -360, 360, .what = "from north, clockwise"}), .run = do_fly, .changes = true, .check = stands},
+      {"track_deg", CONTROL_REAL, false, "deg", -360, 360, .what = "from north, clockwise"}), .run = do_fly, .changes = true, .check = has_vehicle},
     {"gyro.mode", "Gives a gyro unit a mode, as its object 2100h does: a panel for scenarios without a host.",
      CONTROL_ARGS(CONTROL_UNIT_ARG(false), {"mode", CONTROL_CHOICE, .what = "which", .choices = modes}), .run = do_mode, .changes = true, .check = has_modes},
 };

@@ -106,7 +106,7 @@ static const struct control_command rows[] = {
     {"unsubscribe", "Ends subscriptions of this client: of one kind, or all.",
      CONTROL_ARGS({"what", CONTROL_CHOICE, true, .what = "kind of lines", .choices = control_topics}), .run = do_unsubscribe},
     {"lines", "Tells the levels of a unit's lines now; with a fault on a line, those of 0.2 ms ago.", CONTROL_ARGS(FIRST_UNIT), .run = do_lines},
-    {"vcd.start", "Records the lines of a unit into a VCD file from now on. A word on a converter's port or a pulse of STEP that is under way and that nobody watched is not in it.",
+    {"vcd.start", "Records the lines of a unit into a VCD file from now on. A word on a converter's port or a pulse of STEP in progress at the start is left out.",
      CONTROL_ARGS({"path", CONTROL_TEXT, .what = "file to write; one of that name is replaced"}, FIRST_UNIT), .run = do_vcd_start},
     {"vcd.stop", "Ends the recording, 0.2 ms before now: later edges are not all known.", NULL, .run = do_vcd_stop},
     {"vcd.flush", "Writes to the VCD file what has been recorded so far, with a closing time; in its first 0.2 ms that is a header.", NULL, .run = do_vcd_flush},

@@ -93,7 +93,7 @@ static enum control_outcome dispatch(struct control *c, const cJSON *request, cJ
         }
     }
     const cJSON *name = cJSON_GetObjectItemCaseSensitive(request, "cmd");
-    if (!cJSON_IsString(name)) return control_refuse(c, "syntax", "cmd: a command's name is wanted; help lists them");
+    if (!cJSON_IsString(name)) return control_refuse(c, "syntax", "cmd: expected a command's name; help lists them");
     return control_call(c, name->valuestring, cJSON_GetObjectItemCaseSensitive(request, "args"), result, t_ns);
 }
 

@@ -19,7 +19,7 @@
 /* A cycle on the parallel bus of a board, bus.read or bus.write, until it is over. */
 struct control_cycle {
     struct control *control; /* NULL: free */
-    void *client;            /* who waits for the answer; NULL: nobody */
+    void *client;            /* who waits for the answer; NULL: no one */
     cJSON *id;
     unsigned unit;
     struct board_cycle cycle;
@@ -53,7 +53,7 @@ const char *control_line(struct control *c, const char *line, int64_t t_ns);
 const char *control_run_done(struct control *c, int64_t t_ns);
 
 void control_run_forget(struct control *c);                        /* who asked has gone */
-void control_cycles_forget(struct control *c, const void *client); /* likewise; NULL: all have */
+void control_cycles_forget(struct control *c, const void *client); /* the same for cycles; NULL: all clients */
 
 /* ---- a command without a line: scenarios, SCPI, the journal */
 
@@ -61,7 +61,7 @@ void control_cycles_forget(struct control *c, const void *client); /* likewise; 
 enum control_outcome control_do(struct control *c, const struct control_command *row, const struct control_value *v,
                                 cJSON *result, int64_t t_ns);
 
-/* Both, by name; the refusal stands in c. */
+/* Both, by name; the refusal is in c. */
 enum control_outcome control_call(struct control *c, const char *cmd, const cJSON *args, cJSON *result, int64_t t_ns);
 
 /* Whether control_call() of a control with these tables would get as far as the handler; does nothing. False with the reason in why[CONTROL_WHY_MAX]. */

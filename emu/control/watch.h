@@ -51,7 +51,7 @@ struct control_watch { /* read-only outside watch.c */
 /* run.until: the bench's run_stop() is called at the very instant of the count-th event from now on. */
 void control_watch_until(struct control *c, unsigned event, unsigned unit, uint64_t count);
 
-/* The run is over: what came, and nobody waits any more. */
+/* The run is over: what came, and no client waits any more. */
 struct control_until control_watch_end(struct control *c);
 
 /* False: there is no room, or the client has that topic already and its interval was changed instead (true). */

@@ -11,7 +11,7 @@ const struct control_arg fault_args[FAULT_ARGS + 1] = {
     [FAULT_AT_S] = {"at_s", CONTROL_REAL, true, "s", 0, TIME_MAX_S, .what = "simulated instant; without it: now. With after: events count from then on"},
     [FAULT_AFTER] = {"after", CONTROL_EVENT, true, .what = "event of a board that brings it about, one that this board has"},
     [FAULT_COUNT] = {"count", CONTROL_COUNT, true, NULL, 1, 1e9, .what = "which of these events; without it the first"},
-    [FAULT_SINCE] = {"since", CONTROL_EVENT, true, .what = "event that starts the count anew"},
+    [FAULT_SINCE] = {"since", CONTROL_EVENT, true, .what = "event that starts the count again"},
     [FAULT_UNIT] = {"unit", CONTROL_UNIT, true, .what = "whose events; without it those of the point's unit"},
     [FAULT_DELAY_S] = {"delay_s", CONTROL_REAL, true, "s", 0, 1000, .what = "from the event to the fault"},
     [FAULT_FOR_S] = {"for_s", CONTROL_REAL, true, "s", 0, TIME_MAX_S, .what = "how long it lasts; 0 or without it: until fault.clear"},

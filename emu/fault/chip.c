@@ -70,7 +70,7 @@ static bool has_clock(const struct control_bench *b, const struct fault *f, char
     const double ppm = f->value[FAULT_CLOCK_PPM];
     if (!has_fault(b, f, why)) return false;
     if (ppm == nearbyint(ppm)) return true;
-    snprintf(why, CONTROL_WHY_MAX, "clock_ppm: %.10g: whole ppm are wanted", ppm);
+    snprintf(why, CONTROL_WHY_MAX, "clock_ppm: %.10g: expected whole ppm", ppm);
     return false;
 }
 
@@ -88,7 +88,7 @@ static bool has_register(const struct control_bench *b, const struct fault *f, c
 #define CHIP(v) .variant = (v), .places = FAULT_BIT(FAULT_AT_CHIP), .apply = apply_chip, .lift = refresh_chip
 static const struct fault_kind chip[] = {
     {"chip.drdy_stuck", "The data-ready pin stays at level; inside, conversions go on.", "no frames, or no new values of that chip, and an EMCY that says so",
-     CHIP(BOARD_FAULT_DRDY), .need = FAULT_BIT(FAULT_LEVEL), .unless = "nobody hears the pin of that chip", .fits = has_fault,
+     CHIP(BOARD_FAULT_DRDY), .need = FAULT_BIT(FAULT_LEVEL), .unless = "the controller does not use the pin of that chip", .fits = has_fault,
      .lacks = "this chip has no data-ready pin that anybody hears"},
     {"chip.dout_dead", "The data pin stays at level.", "all ones or all zeros in the words of that chip",
      CHIP(BOARD_FAULT_DOUT), .need = FAULT_BIT(FAULT_LEVEL), .unless = "no data pin", .fits = has_fault,

@@ -1,7 +1,7 @@
 /* Faults: what goes wrong where, when and for how long.
  *
  * A kind of fault is a row of a table (fault_tables): its layer, the places it can happen at, the arguments it takes, and
- * how it is brought about and lifted. A fault is a kind at a point, `a.sensor.x`, begun at an instant of simulated time or
+ * how it is injected and cleared. A fault is a kind at a point, `a.sensor.x`, begun at an instant of simulated time or
  * by an event of a board, and lifted after a time or by command. Random ones draw from rng_stream(seed, id, "fault").
  * What a point does not support is refused with the reason. Several faults may be at one point. One thread; owned by the
  * application, never moved after fault_init(). */

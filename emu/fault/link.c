@@ -1,4 +1,4 @@
-/* Faults of the links: what befalls frames on a bus, from a board, and on their way to a program (base/can_fault.h). */
+/* Faults of the links: what happens to frames on a bus, from a board, and on their way to a program (base/can_fault.h). */
 #include "fault/internal.h"
 
 #include <math.h>
@@ -111,7 +111,7 @@ static const struct fault_kind link[] = {
      FRAMES(CAN_FAULT_REORDER), .places = ANY_FRAME, .may = WHICH | HOLD},
     {"link.delay", "Frames are received hold_s later.", "frames come later after the instant of their sample than the bus explains",
      FRAMES(CAN_FAULT_DELAY), .places = ANY_FRAME, .need = HOLD, .nonzero = HOLD, .may = WHICH},
-    {"link.corrupt", "A data bit of frames is inverted and nobody notices, as by a gateway.", "codes, numbers or times that cannot be",
+    {"link.corrupt", "Inverts a data bit of frames without a CRC error, as a faulty gateway does.", "codes, numbers or times that cannot be",
      FRAMES(CAN_FAULT_ALTER), .places = ANY_FRAME, .may = WHICH},
     {"link.error_frame", "Frames are destroyed by an error frame and sent again, until their sender is off the bus.", "error frames (socketcand and SocketCAN show them; slcan has none), frames later than they were due",
      FRAMES(CAN_FAULT_ERROR), .places = AT(NODE) | AT(BUS), .may = WHICH, .unless = "the bus is ideal, bitrate_hz 0: no bits", .fits = has_bits},

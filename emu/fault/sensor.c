@@ -48,7 +48,7 @@ static double least_ppm(const struct unit *u)
 static bool at_least(const struct fault *f, enum fault_arg arg, double least, const char *unit, char *why)
 {
     if (fabs(f->value[arg]) >= least) return true;
-    snprintf(why, CONTROL_WHY_MAX, "%s: %.10g: a code of this board is %.4g %s, nobody would see less",
+    snprintf(why, CONTROL_WHY_MAX, "%s: %.10g: a code of this board is %.4g %s, a smaller value has no effect",
              fault_args[arg].name, f->value[arg], least, unit);
     return false;
 }
@@ -69,7 +69,7 @@ static bool passes(const struct control_bench *b, const struct fault *f, enum fa
     const struct unit *u = b->unit[f->point.unit];
     const double most_v = fmin(u->cfg.board.afe[f->point.index].clip_v, range_v(u)); /* buffer, converter */
     if (!fault_given(f, limit) || fabs(f->value[limit]) < most_v) return true;
-    snprintf(why, CONTROL_WHY_MAX, "%s: %.10g: the chain passes %.10g ... %.10g V, nobody would see this limit",
+    snprintf(why, CONTROL_WHY_MAX, "%s: %.10g: the chain passes %.10g ... %.10g V, this limit has no effect",
              fault_args[limit].name, f->value[limit], -most_v, most_v);
     return false;
 }

@@ -1,4 +1,4 @@
-/* Which event of a board a fault waits for: the n-th of a kind, counted anew from each event of another. Pure. */
+/* Which event of a board a fault waits for: the n-th of a kind, counted again from each event of another. Pure. */
 #ifndef PSABENCH_FAULT_TRIGGER_H
 #define PSABENCH_FAULT_TRIGGER_H
 
@@ -8,7 +8,7 @@
 
 struct fault_trigger {
     int after;      /* number of the event that is counted */
-    int since;      /* of the one that starts the count anew; FAULT_NO_EVENT: counted from the beginning */
+    int since;      /* of the one that starts the count again; FAULT_NO_EVENT: counted from the beginning */
     unsigned count; /* which one it is to be, from 1 */
     /* read-only outside */
     unsigned seen;

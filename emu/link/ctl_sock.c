@@ -15,7 +15,7 @@ struct ctl_client {
     struct text_link io; /* first */
     struct ctl_server *server;
     bool due;      /* a reply is */
-    bool pushed;   /* lines that are no replies wait: nobody waits for those */
+    bool pushed;   /* lines that are no replies wait: no client waits for those */
     uint64_t lost; /* of them, since the client was last told */
 };
 
@@ -111,7 +111,7 @@ static void on_connection(struct link *l, int64_t t_ns)
     links_add_last(s->links, &c->io.link);
 }
 
-/* A path that nobody answers at is a leftover. 0 when it may be used. */
+/* A path that no one answers at is a leftover. 0 when it may be used. */
 static int clear_path(const struct sockaddr_un *a)
 {
     struct stat st;

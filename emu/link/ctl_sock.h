@@ -31,8 +31,8 @@ void ctl_close(struct ctl_server *s); /* and removes the path */
 /* Sends one line (without its LF). */
 void ctl_reply(struct ctl_client *c, const char *line);
 
-/* A line that is no reply. No run waits until it is taken; a client that is half a megabyte behind loses such lines and is
- * told how many: {"event":"lost","lines":5}. */
+/* A line that is no reply. No run waits until it is taken; a client that is half a megabyte behind loses such lines and gets
+ * how many: {"event":"lost","lines":5}. */
 void ctl_push(struct ctl_client *c, const char *line);
 
 #endif

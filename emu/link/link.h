@@ -17,11 +17,11 @@ struct link {
     bool full;         /* output is above its high-water mark: in step and free pace time stands still meanwhile */
     bool gone;         /* to be reaped: release() is the last call */
     size_t pending;    /* bytes of output not yet handed to the kernel */
-    unsigned timer_ms; /* > 0: timer() is wanted once, this wall time from now; zeroed by the loop when it takes note */
+    unsigned timer_ms; /* > 0: timer() is called once, this wall time from now; zeroed by the loop when it takes note */
     void (*readable)(struct link *l, int64_t t_ns);
     void (*flush)(struct link *l, int64_t t_ns); /* every turn and when writable: hand out what waits; may be NULL */
     void (*timer)(struct link *l, int64_t t_ns); /* may be NULL */
-    void (*release)(struct link *l);             /* free what the link stands in; may be NULL */
+    void (*release)(struct link *l);             /* free what the link is in; may be NULL */
     void *ctx;
     int64_t timer_due_ns; /* the loop's: wall time, 0 while none is armed */
     struct link *next;    /* the loop's list */

@@ -11,7 +11,7 @@
 #include <unistd.h>
 
 /* Wall time from a going to the question who is left. Whoever opens the port again at once comes meanwhile, and his coming
- * is seen: while the kernel is asked, nobody's is. */
+ * is seen: while the kernel is asked, no one's is. */
 enum { ASK_MS = 37 };
 
 static int make_raw(int fd)
@@ -27,11 +27,11 @@ static void start_watch(struct pty *p)
     p->watch_id = inotify_add_watch(p->watch.fd, p->path, IN_OPEN | IN_CLOSE_WRITE | IN_CLOSE_NOWRITE);
 }
 
-/* Whether a program has the slave open. Without our own descriptor the kernel reports a hang-up when nobody has. */
+/* Whether a program has the slave open. Without our own descriptor the kernel reports a hang-up when no one has. */
 static bool in_use(struct pty *p)
 {
     struct pollfd master = {.fd = p->line};
-    inotify_rm_watch(p->watch.fd, p->watch_id); /* what we do here is nobody's coming and going */
+    inotify_rm_watch(p->watch.fd, p->watch_id); /* what we do here is no one's coming and going */
     close(p->slave);
     const bool used = poll(&master, 1, 0) < 1 || !(master.revents & POLLHUP);
     p->slave = open(p->path, O_RDWR | O_NOCTTY | O_CLOEXEC);

@@ -125,7 +125,7 @@ int scpi_port_tcp(struct scpi_port *p, uint16_t port)
 
 /* ---- pseudo-terminal */
 
-/* Nobody is there to read. */
+/* No program has it open. */
 static void on_pty_flush(struct link *l, int64_t t_ns)
 {
     struct scpi_peer *p = (struct scpi_peer *)l;

@@ -2,7 +2,7 @@
  *
  * It knows nothing of SCPI: a line goes up, answers come down, each a line of LF. Every client has a session that the owner
  * makes; while it is busy the client's further lines wait. Ports are served before control sockets, so that what an
- * instrument was told before a `run` is done before it. */
+ * instrument was reported before a `run` is done before it. */
 #ifndef PSABENCH_LINK_SCPI_PORT_H
 #define PSABENCH_LINK_SCPI_PORT_H
 

@@ -4,7 +4,7 @@
 
 #include <stdint.h>
 
-/* Listens, non-blocking, at *port; 0: a free one, which is told. The descriptor, or -errno. */
+/* Listens, non-blocking, at *port; 0: a free one, which is reported. The descriptor, or -errno. */
 int tcp_listen(uint16_t *port);
 
 #endif

@@ -35,7 +35,7 @@ struct text_link {
     struct outbuf out;
     size_t out_high;
     bool hold;   /* output is kept back */
-    bool stall;  /* likewise, and nobody is to wait for it */
+    bool stall;  /* the same, and no client waits for it */
     bool taking; /* lines are being handed over: an owner that flushes meanwhile is not handed the next one */
     bool eof;    /* the peer sends no more */
     bool ended;  /* closed() has been called */

@@ -72,10 +72,10 @@ struct nav_noise {
     double gm_sigma_radps;  /* drift's random part, stationary Gauss-Markov */
     double gm_tau_s;        /* 1/mu */
     double white_radps_rts; /* white noise of S: a window's standard deviation times sqrt(window_s) */
-    double window_sd_radps; /* what is drawn anew for each window and does not average */
+    double window_sd_radps; /* what is drawn again for each window and does not average */
     double angle_sd_rad;    /* each angle reading, the first included */
     double level_sd_rad;    /* each window's gamma: S errs by U sin(lat) of it */
-    /* Of the latitude that compensates gamma and stands in the cfg, one error for all windows: S errs by U cos(lat) sin(gamma) of
+    /* Of the latitude that compensates gamma and is in the cfg, one error for all windows: S errs by U cos(lat) sin(gamma) of
      * it, which turns the heading by up to the tilt times it, and s and c by tan(lat) of it, which a constrained fit feels. */
     double latitude_sd_rad;
 };

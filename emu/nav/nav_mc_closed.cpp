@@ -29,7 +29,7 @@ struct closed_plan {
     double beta_left_rad; /* true beta at rest, but for the level sensor's error, where (14) leaves it out */
     double angle_sd_rad;
     /* What the given latitude makes of the Earth's rates, as means of both signs of its error and half the differences. All is in
-     * (1 + k) S/We, k the torquer's scale error: it stands before what turns the platform, not before what it takes off gamma. */
+     * (1 + k) S/We, k the torquer's scale error: it is before what turns the platform, not before what it takes off gamma. */
     struct pair compensation; /* of an error of gamma */
     struct pair excess;       /* of gamma itself: what compensates it less what there is */
     struct pair ratio;        /* of s and c as the estimator scales them, less 1 */

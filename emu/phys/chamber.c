@@ -156,7 +156,7 @@ void chamber_put_in(struct chamber *c, struct chamber_body *b, double tau_case_s
 
 /* ---- commands */
 
-/* Everything starts anew from where it is. */
+/* Everything starts again from where it is. */
 static void plan(struct chamber *c, double set_degc, int64_t t_ns)
 {
     const double air_degc = chamber_air_degc(c, t_ns);

@@ -30,7 +30,7 @@ static bool is_zero(const double v[3])
     return v[0] == 0.0 && v[1] == 0.0 && v[2] == 0.0;
 }
 
-/* How the case stands in the mount: the face of the head or the tilt of the level sensors, then the misalignment. */
+/* How the case is in the mount: the face of the head or the tilt of the level sensors, then the misalignment. */
 static struct pose case_in_mount(const struct lab *l, const struct lab_seat *seat, int64_t t_ns)
 {
     struct pose p;

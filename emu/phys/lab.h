@@ -2,7 +2,7 @@
  *
  * A unit sits on the dividing head, on the rate table, on the gyro-stabilised platform or on the bench itself. Its seat says
  * where: the lever arm from the instrument's centre (where the axes meet) to the unit's origin, in the mount's axes, and how
- * its case stands askew there. Mount's axes: of the head x and y in the plane of turning, z its axis (head.h); of the table t
+ * its case is askew there. Mount's axes: of the head x and y in the plane of turning, z its axis (head.h); of the table t
  * (table.h); of the bench x towards the site's azimuth and z down; of the platform p (platform.h), where the case is turned by
  * the tilt errors of the level sensors first. Sensors get the exact specific force and inertial rate at their own point; of a
  * lever arm on the platform the centripetal part alone.

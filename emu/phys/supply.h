@@ -2,7 +2,7 @@
  *
  * The volts are a function of the instant. What it feeds goes off when they fall below brownout_v, and on when they are back
  * at brownout_v + hysteresis_v: supply_next_ns() tells the exact nanosecond, so that the bench can arm an event for it instead
- * of looking at the voltage. After any command or dip the instant has to be asked for anew. Plain struct, one thread;
+ * of looking at the voltage. After any command or dip the instant has to be asked for again. Plain struct, one thread;
  * commands in order of time; an instant before the latest command gets what held at the command. */
 #ifndef PSABENCH_PHYS_SUPPLY_H
 #define PSABENCH_PHYS_SUPPLY_H

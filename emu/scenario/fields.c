@@ -77,7 +77,7 @@ static bool load_bool(struct yaml_file *f, const struct yaml_node *node, const s
 {
     const char *text = yaml_scalar(node);
     *v = strcmp(text, "true") == 0;
-    return *v || strcmp(text, "false") == 0 || yaml_file_fail(f, node, d->key, "\"%s\": true or false is wanted", text);
+    return *v || strcmp(text, "false") == 0 || yaml_file_fail(f, node, d->key, "\"%s\": expected true or false", text);
 }
 
 static bool load_text(struct yaml_file *f, const struct yaml_node *node, const struct yaml_field *d, char *v)
@@ -85,7 +85,7 @@ static bool load_text(struct yaml_file *f, const struct yaml_node *node, const s
     const char *text = yaml_scalar(node);
     const size_t len = strlen(text);
     if (len < 1 || len + 1 > (size_t)d->max)
-        return yaml_file_fail(f, node, d->key, "1 to %d characters are wanted", (int)d->max - 1);
+        return yaml_file_fail(f, node, d->key, "expected 1 to %d characters", (int)d->max - 1);
     memcpy(v, text, len + 1);
     return true;
 }
@@ -110,7 +110,7 @@ static bool load_choice(struct yaml_file *f, const struct yaml_node *node, const
     }
     list_choices(d, all, sizeof all);
     const char *near = text ? yaml_nearest(text, choice_at, d->choices) : NULL;
-    return yaml_file_fail(f, node, d->key, "%s is wanted%s%s", all, near ? "; nearest: " : "", near ? near : "");
+    return yaml_file_fail(f, node, d->key, "expected %s%s%s", all, near ? "; nearest: " : "", near ? near : "");
 }
 
 static bool load_reals(struct yaml_file *f, const struct yaml_node *node, const struct yaml_field *d, double *v)
@@ -122,7 +122,7 @@ static bool load_reals(struct yaml_file *f, const struct yaml_node *node, const 
         return true;
     }
     if (node->kind != YAML_SEQUENCE || yaml_count(node) != d->count) {
-        return yaml_file_fail(f, node, d->key, "%s%u numbers are wanted: %s",
+        return yaml_file_fail(f, node, d->key, "expected %s%u numbers: %s",
                               d->type == YAML_EACH ? "one value or a list of " : "a list of ", d->count, d->what);
     }
     for (const struct yaml_item *i = node->first; i; i = i->next)
@@ -155,7 +155,7 @@ bool yaml_load_value(struct yaml_file *f, const struct yaml_node *node, const st
     if (d->type == YAML_REALS || d->type == YAML_EACH) return load_reals(f, node, d, at);
     if (d->type == YAML_CHOICE) return load_choice(f, node, d, at);
     if (!yaml_scalar(node))
-        return yaml_file_fail(f, node, d->key, "one value of up to %u characters is wanted", YAML_FILE_TEXT);
+        return yaml_file_fail(f, node, d->key, "expected one value of up to %u characters", YAML_FILE_TEXT);
     if (d->type == YAML_REAL) return load_real(f, node, d, at);
     if (d->type == YAML_BOOL) return load_bool(f, node, d, at);
     if (d->type == YAML_TEXT) return load_text(f, node, d, at);
@@ -204,7 +204,7 @@ bool yaml_load(struct yaml_file *f, const struct yaml_node *node, const char *na
 {
     const size_t outer = strlen(f->where);
     if (node->kind != YAML_MAPPING)
-        return yaml_file_fail(f, node, *name ? name : NULL, "a mapping `key: value` is wanted");
+        return yaml_file_fail(f, node, *name ? name : NULL, "expected a mapping `key: value`");
     if (*name) snprintf(f->where + outer, sizeof f->where - outer, "%s.", name);
     for (const struct yaml_item *i = node->first; i; i = i->next)
         if (!load_pair(f, node, i, t, section)) return false;
@@ -315,7 +315,7 @@ static cJSON *json_node(struct yaml_file *f, const struct yaml_node *node, unsig
 {
     if (node->kind == YAML_SCALAR) {
         const char *text = yaml_scalar(node);
-        if (!text) yaml_file_fail(f, node, "args", "a value of up to %u characters is wanted", YAML_FILE_TEXT);
+        if (!text) yaml_file_fail(f, node, "args", "expected a value of up to %u characters", YAML_FILE_TEXT);
         return text ? json_scalar(node, text) : NULL;
     }
     cJSON *j = node->kind == YAML_MAPPING ? cJSON_CreateObject() : cJSON_CreateArray();

@@ -80,7 +80,7 @@ static void tell_names(const char *folder, const char *name, char *why, size_t c
     unsigned count;
     if (!find_proto_folder(folder, path, why, cap) || !find_names(path, &names, &count, why, cap)) return;
     int at =
-        snprintf(why, cap, "%.60s: no such file in proto/%s; a path, or a name from there, is wanted:", name, folder);
+        snprintf(why, cap, "%.60s: no such file in proto/%s; expected a path, or a name from there:", name, folder);
     for (unsigned i = 0; i < count && at >= 0 && (size_t)at < cap; i++)
         at += snprintf(why + at, cap - (size_t)at, "%s %s", i ? "," : "", names[i]);
     free(names);

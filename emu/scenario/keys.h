@@ -42,7 +42,7 @@ void scenario_dump_vehicle(const struct yaml_field *d, const void *section, cJSO
 
 struct site scenario_site(const struct scenario_site *s);
 
-/* What stands in more than one key. */
+/* What is in more than one key. */
 bool scenario_check_lab(struct yaml_file *f, const struct yaml_node *root, const struct lab_cfg *lab);
 bool scenario_check_seats(struct yaml_file *f, const struct yaml_node *root, const struct scenario *s);
 

@@ -30,7 +30,7 @@ bool scenario_load_site(struct yaml_file *f, const struct yaml_node *node, void 
     for (size_t i = 2; i < scenario_site_fields.count && !site->placed; i++) {
         const char *key = site_rows[i].key;
         if (yaml_get(node, key))
-            return yaml_file_fail(f, yaml_get(node, key), "site", "%s without latitude_deg: both are wanted", key);
+            return yaml_file_fail(f, yaml_get(node, key), "site", "%s without latitude_deg: expected both", key);
     }
     return true;
 }
@@ -145,7 +145,7 @@ static bool load_axes(struct yaml_file *f, const struct yaml_node *node, void *s
     const struct yaml_field number = {.key = "axes", .type = YAML_U32, .min = 1, .max = TABLE_AXES_MAX};
     uint32_t n = yaml_count(node);
     if (node->kind == YAML_SCALAR && !yaml_load_value(f, node, &number, &n)) return false;
-    if (n < 1 || n > TABLE_AXES_MAX) return yaml_file_fail(f, node, "axes", "1 to %u axes are wanted", TABLE_AXES_MAX);
+    if (n < 1 || n > TABLE_AXES_MAX) return yaml_file_fail(f, node, "axes", "expected 1 to %u axes", TABLE_AXES_MAX);
     const struct table_cfg model = table_default(n);
     memcpy(t->axis, model.axis, sizeof t->axis);
     t->axes = n;
@@ -187,7 +187,7 @@ void scenario_dump_table(const struct yaml_field *d, const void *section, cJSON 
     if (t->axes) yaml_dump(&scenario_table_fields, t, cJSON_AddObjectToObject(to, d->key));
 }
 
-/* ---- what stands in two keys */
+/* ---- what is in two keys */
 
 static const struct yaml_node *at(const struct yaml_node *root, const char *section, const char *key)
 {

@@ -55,7 +55,7 @@ bool scenario_load_vehicle(struct yaml_file *f, const struct yaml_node *node, vo
 {
     if (!yaml_get(f->root, "platform"))
         return yaml_file_fail(f, node, "vehicle",
-                              "stands under a platform, and there is none: a section platform is wanted");
+                              "is under a platform, and there is none: expected a section platform");
     return yaml_load(f, node, "vehicle", &scenario_vehicle_fields, &((struct scenario *)section)->lab.vehicle);
 }
 
@@ -65,7 +65,7 @@ void scenario_dump_vehicle(const struct yaml_field *d, const void *section, cJSO
     if (lab->platform.present) yaml_dump(&scenario_vehicle_fields, &lab->vehicle, cJSON_AddObjectToObject(to, d->key));
 }
 
-/* ---- what stands in more than one key */
+/* ---- what is in more than one key */
 
 static const struct scenario_unit *unit_named(const struct scenario *s, const char *name)
 {
@@ -83,11 +83,10 @@ static bool check_level(struct yaml_file *f, const struct yaml_node *units, cons
     if (!level || level->cfg.type != board_types[0])
         return yaml_file_fail(f, units, "units", "%s: level: \"%s\" is not the name of a PSA-2", u->name, u->level);
     if (level->bus != u->bus)
-        return yaml_file_fail(f, units, "units",
-                              "%s: level: %s is on bus %s; one on %s is wanted: the gyro unit hears it", u->name,
-                              level->name, level->bus_name, u->bus_name);
+        return yaml_file_fail(f, units, "units", "%s: level: %s is on bus %s; expected %s, the bus of the gyro unit",
+                              u->name, level->name, level->bus_name, u->bus_name);
     return level->cfg.seat.on == LAB_PLATFORM ||
-           yaml_file_fail(f, units, "units", "%s: level: %s does not sit on the platform: on: platform is wanted",
+           yaml_file_fail(f, units, "units", "%s: level: %s does not sit on the platform; expected on: platform",
                           u->name, level->name);
 }
 
@@ -97,13 +96,13 @@ bool scenario_check_platform(struct yaml_file *f, const struct yaml_node *root, 
     const struct scenario_unit *gyro = NULL;
     const bool present = s->lab.platform.present;
     if (present && !s->site.placed)
-        return yaml_file_fail(f, platform, "platform", "site.latitude_deg is wanted: north is where the Earth turns");
+        return yaml_file_fail(f, platform, "platform", "expected site.latitude_deg: north is where the Earth turns");
     for (unsigned i = 0; i < s->unit_count; i++) {
         const struct scenario_unit *u = &s->units[i];
         const bool controls = u->cfg.type->knobs & BOARD_KNOB_LEVEL;
         if (!present && controls)
             return yaml_file_fail(f, units, "units",
-                                  "%s controls a platform, and there is none: a section platform is wanted", u->name);
+                                  "%s controls a platform, and there is none: expected a section platform", u->name);
         if (controls && gyro)
             return yaml_file_fail(f, units, "units", "%s and %s: there is one platform, and it has one gyro unit",
                                   gyro->name, u->name);

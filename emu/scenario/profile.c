@@ -20,7 +20,7 @@ static bool set(struct yaml_file *f, const struct yaml_node *node, const char *k
     char why[WHY];
     const struct board_type *t = fill->type;
     const char *text = yaml_scalar(node);
-    if (!text) return yaml_file_fail(f, node, key, "one value of up to %u characters is wanted", YAML_FILE_TEXT);
+    if (!text) return yaml_file_fail(f, node, key, "expected one value of up to %u characters", YAML_FILE_TEXT);
     if (board_field_set(t->fields, t->field_count, fill->profile, key, index, text, why, sizeof why)) return true;
     /* The setter names the key itself; the line is ours to add. */
     return yaml_file_fail(f, node, NULL, "%s", why);
@@ -33,8 +33,8 @@ static bool set_sequence(struct yaml_file *f, const struct yaml_node *node, cons
     for (const struct yaml_item *i = node->first; i; i = i->next)
         if (!set(f, i->value, field->key, index++, fill)) return false;
     if (field->count && index != field->count)
-        return yaml_file_fail(f, node, field->key, "%u elements; %u are wanted", index, field->count);
-    return index > 0 || yaml_file_fail(f, node, field->key, "at least one element is wanted");
+        return yaml_file_fail(f, node, field->key, "%u elements; expected %u", index, field->count);
+    return index > 0 || yaml_file_fail(f, node, field->key, "expected at least one element");
 }
 
 static const char *key_at(const void *ctx, size_t i)
@@ -67,7 +67,7 @@ static bool load_pair(struct yaml_file *f, const struct yaml_item *pair, struct 
     *seen = true;
     if (!board_field_is_list(field)) return set(f, pair->value, key, 0, fill);
     if (pair->value->kind != YAML_SEQUENCE)
-        return yaml_file_fail(f, pair->value, key, "a sequence is wanted: %s", field->what);
+        return yaml_file_fail(f, pair->value, key, "expected a sequence: %s", field->what);
     return set_sequence(f, pair->value, field, fill);
 }
 
@@ -76,7 +76,7 @@ static bool load_fields(struct yaml_file *f, const struct yaml_node *mapping, co
                         void *profile, bool file)
 {
     struct fill fill = {.type = type, .profile = profile};
-    if (mapping->kind != YAML_MAPPING) return yaml_file_fail(f, mapping, NULL, "a mapping `key: value` is wanted");
+    if (mapping->kind != YAML_MAPPING) return yaml_file_fail(f, mapping, NULL, "expected a mapping `key: value`");
     for (const struct yaml_item *i = mapping->first; i; i = i->next) {
         const char *key = yaml_scalar(i->key);
         if (file && key && strcmp(key, "board") == 0) continue;
@@ -127,7 +127,7 @@ static const struct board_name *find_board(struct yaml_file *f)
     const char *name = node ? yaml_scalar(node) : board_names[0].name;
     const struct board_name *found = name ? board_name_find(name) : NULL;
     profile_yaml_boards(known, sizeof known);
-    if (!found) (void)yaml_file_fail(f, node, "board", "no such board; %s is wanted", known);
+    if (!found) (void)yaml_file_fail(f, node, "board", "no such board; expected %s", known);
     return found;
 }
 

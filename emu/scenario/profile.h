@@ -10,7 +10,7 @@
 #include <cjson/cJSON.h>
 
 /* The default of the board's type, then what the file says. *board: the file's, of which type *p is; whether it is the one that
- * is wanted is the caller's to say, board_name_takes(). False with one line in why: path:line:column: what is wrong, what is
+ * is expected is the caller's decision, board_name_takes(). False with one line in why: path:line:column: what is wrong, what is
  * known. */
 bool profile_yaml_load(const char *path, const struct board_name **board, union board_profile_store *p, char *why,
                        size_t cap);

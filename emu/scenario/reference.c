@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* A mapping of the scenario: where it stands, what it is, its rows, and a struct with the defaults. */
+/* A mapping of the scenario: where it is, what it is, its rows, and a struct with the defaults. */
 struct chapter {
     const char *path, *words;
     const struct yaml_fields *rows;
@@ -20,14 +20,14 @@ struct chapter {
 static const struct chapter chapters[] = {
     {"", "The whole.", &scenario_fields, 0},
     {"buses[]", "A bus. `bus:` is short for a single one with the same keys but the name.", &scenario_buses_fields, IN(bus)},
-    {"site", "Where the bench stands.", &scenario_site_fields, IN(site)},
+    {"site", "Where the bench is.", &scenario_site_fields, IN(site)},
     {"head", "The dividing head.", &scenario_head_fields, IN(lab.head)},
     {"table", "The rate table; `table: {}` is the model with one axis.", &scenario_table_fields, IN(lab.table)},
     {"table.axes[]", "An axis of it, from the outermost.", &scenario_axis_of_table_fields, IN(lab.table.axis)},
     {"chamber", "The thermal chamber; `chamber: {}` is the model.", &scenario_chamber_fields, IN(lab.chamber)},
     {"supply", "The power supply; `supply: {}` is the model.", &scenario_supply_fields, IN(lab.supply)},
     {"platform", "The gyro-stabilised platform of [the gyro unit](boards/gyro.md); `platform: {}` has the article's figures and ours.", &scenario_platform_fields, IN(lab.platform)},
-    {"vehicle", "What the platform stands on.", &scenario_vehicle_fields, IN(lab.vehicle)},
+    {"vehicle", "What the platform is on.", &scenario_vehicle_fields, IN(lab.vehicle)},
     {"vehicle.sway", "Its pitch and roll about their means.", &scenario_sway_fields, IN(lab.vehicle.sway)},
     {"spread", "Standard deviations of the production spread, by the keys of a channel; a unit with `spread: true` draws its own.", &scenario_spread_fields, IN(spread)},
     {"units[]", "A unit, or `count` of them. The defaults are those of the first.", &scenario_unit_fields, IN(units)},

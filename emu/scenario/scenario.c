@@ -37,7 +37,7 @@ static bool check_bus(struct yaml_file *f, const struct yaml_node *node, const s
     const char *name = s->bus[i].name;
     static const char letters[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_";
     if (name[strspn(name, letters)])
-        return yaml_file_fail(f, node, "name", "\"%s\": letters, digits and _ are wanted", name);
+        return yaml_file_fail(f, node, "name", "\"%s\": expected letters, digits and _", name);
     for (unsigned k = 0; k < i; k++)
         if (strcmp(s->bus[k].name, name) == 0)
             return yaml_file_fail(f, node, "name", "\"%s\" is taken by another bus", name);
@@ -47,7 +47,7 @@ static bool check_bus(struct yaml_file *f, const struct yaml_node *node, const s
 static bool load_buses(struct yaml_file *f, const struct yaml_node *node, struct scenario *s)
 {
     if (node->kind != YAML_SEQUENCE || !node->first)
-        return yaml_file_fail(f, node, "buses", "a sequence of buses is wanted");
+        return yaml_file_fail(f, node, "buses", "expected a sequence of buses");
     s->bus_count = 0;
     for (const struct yaml_item *i = node->first; i; i = i->next) {
         char where[40];
@@ -70,7 +70,7 @@ static bool buses_are_loaded(struct yaml_file *f, const struct yaml_node *node, 
 {
     (void)section;
     if (!yaml_get(f->root, "bus")) return true;
-    return yaml_file_fail(f, node, "buses", "stands beside bus, which is short for one; one of the two is wanted");
+    return yaml_file_fail(f, node, "buses", "is beside bus, which is short for one; expected one of the two");
 }
 
 static void dump_buses(const struct yaml_field *d, const void *section, cJSON *to)
@@ -156,12 +156,12 @@ static bool print_args(struct yaml_file *f, const struct yaml_node *node, cJSON 
     if (fits) snprintf(e->args, sizeof e->args, "%s", line);
     free(line);
     cJSON_Delete(args);
-    return fits || yaml_file_fail(f, node, NULL, "arguments of up to %u characters are wanted", SCENARIO_ARGS_MAX - 1);
+    return fits || yaml_file_fail(f, node, NULL, "expected arguments of up to %u characters", SCENARIO_ARGS_MAX - 1);
 }
 
 static bool load_args(struct yaml_file *f, const struct yaml_node *node, void *section)
 {
-    if (node->kind != YAML_MAPPING) return yaml_file_fail(f, node, "args", "a mapping `name: value` is wanted");
+    if (node->kind != YAML_MAPPING) return yaml_file_fail(f, node, "args", "expected a mapping `name: value`");
     cJSON *args = yaml_json(f, node);
     return args && print_args(f, node, args, section);
 }
@@ -184,7 +184,7 @@ static struct scenario_event *new_event(struct yaml_file *f, const struct yaml_n
                                         struct scenario_events *events)
 {
     if (events->count == SCENARIO_EVENTS_MAX) {
-        yaml_file_fail(f, node, list, "up to %u entries are wanted", SCENARIO_EVENTS_MAX);
+        yaml_file_fail(f, node, list, "expected up to %u entries", SCENARIO_EVENTS_MAX);
         return NULL;
     }
     struct scenario_event *e = &events->event[events->count];
@@ -195,13 +195,13 @@ static struct scenario_event *new_event(struct yaml_file *f, const struct yaml_n
 static bool load_timeline(struct yaml_file *f, const struct yaml_node *node, void *section)
 {
     struct scenario_events *t = &((struct scenario *)section)->timeline;
-    if (node->kind != YAML_SEQUENCE) return yaml_file_fail(f, node, "timeline", "a sequence of commands is wanted");
+    if (node->kind != YAML_SEQUENCE) return yaml_file_fail(f, node, "timeline", "expected a sequence of commands");
     for (const struct yaml_item *i = node->first; i; i = i->next) {
         char where[32];
         struct scenario_event *e = new_event(f, i->value, "timeline", t);
         snprintf(where, sizeof where, "timeline[%u]", t->count);
         if (!e || !yaml_load(f, i->value, where, &scenario_event_fields, e)) return false;
-        if (!e->cmd[0]) return yaml_file_fail(f, i->value, where, "cmd is missing: a command is wanted");
+        if (!e->cmd[0]) return yaml_file_fail(f, i->value, where, "cmd is missing: expected a command");
         t->count++;
     }
     return true;
@@ -210,12 +210,12 @@ static bool load_timeline(struct yaml_file *f, const struct yaml_node *node, voi
 static bool load_faults(struct yaml_file *f, const struct yaml_node *node, void *section)
 {
     struct scenario_events *t = &((struct scenario *)section)->faults;
-    if (node->kind != YAML_SEQUENCE) return yaml_file_fail(f, node, "faults", "a sequence of faults is wanted");
+    if (node->kind != YAML_SEQUENCE) return yaml_file_fail(f, node, "faults", "expected a sequence of faults");
     for (const struct yaml_item *i = node->first; i; i = i->next) {
         struct scenario_event *e = new_event(f, i->value, "faults", t);
         if (!e) return false;
         if (i->value->kind != YAML_MAPPING)
-            return yaml_file_fail(f, i->value, "faults", "a mapping with the arguments of fault.add is wanted");
+            return yaml_file_fail(f, i->value, "faults", "expected a mapping with the arguments of fault.add");
         snprintf(e->cmd, sizeof e->cmd, "fault.add");
         cJSON *args = yaml_json(f, i->value);
         if (!args || !print_args(f, i->value, args, e)) return false;
@@ -247,7 +247,7 @@ static void dump_faults(const struct yaml_field *d, const void *section, cJSON *
 static bool load_version(struct yaml_file *f, const struct yaml_node *node, void *section)
 {
     (void)section;
-    return yaml_scalar(node) || yaml_file_fail(f, node, "version", "a word is wanted");
+    return yaml_scalar(node) || yaml_file_fail(f, node, "version", "expected a word");
 }
 
 static void dump_version(const struct yaml_field *d, const void *section, cJSON *to)
@@ -263,13 +263,13 @@ static const struct yaml_field scenario_rows[] = {
     {.key = "start", .type = YAML_BOOL, .offset = SCENARIO(start), .what = "the bench's own node writes the frame forms and starts the units, 1 ms after power-on"},
     {.key = "bus",   .type = YAML_CUSTOM, .load = load_bus, .what = "short for one bus, `can0`"},
     {.key = "buses", .type = YAML_CUSTOM, .load = buses_are_loaded, .dump = dump_buses, .what = "a sequence of up to 8 buses"},
-    {.key = "site",  .type = YAML_CUSTOM, .load = scenario_load_site, .dump = scenario_dump_site, .what = "where the bench stands"},
+    {.key = "site",  .type = YAML_CUSTOM, .load = scenario_load_site, .dump = scenario_dump_site, .what = "where the bench is"},
     {.key = "head",  .type = YAML_SECTION, .offset = SCENARIO(lab.head), .sub = &scenario_head_fields, .what = "the dividing head"},
     {.key = "table", .type = YAML_CUSTOM, .load = scenario_load_table, .dump = scenario_dump_table, .what = "the rate table; without it there is none"},
     {.key = "chamber", .type = YAML_SECTION, .offset = SCENARIO(lab.chamber), .sub = &scenario_chamber_fields, .present = SCENARIO(lab.chamber.present), .what = "the thermal chamber; without it there is none"},
     {.key = "supply", .type = YAML_SECTION, .offset = SCENARIO(lab.supply), .sub = &scenario_supply_fields, .present = SCENARIO(lab.supply.present), .what = "the power supply; without it the boards are always fed"},
     {.key = "platform", .type = YAML_SECTION, .offset = SCENARIO(lab.platform), .sub = &scenario_platform_fields, .present = SCENARIO(lab.platform.present), .what = "the gyro-stabilised platform; without it there is none"},
-    {.key = "vehicle", .type = YAML_CUSTOM, .load = scenario_load_vehicle, .dump = scenario_dump_vehicle, .what = "what the platform stands on"},
+    {.key = "vehicle", .type = YAML_CUSTOM, .load = scenario_load_vehicle, .dump = scenario_dump_vehicle, .what = "what the platform is on"},
     {.key = "spread", .type = YAML_CUSTOM, .load = load_spread, .dump = dump_spread, .what = "production spread: standard deviations of what differs from unit to unit"},
     {.key = "units", .type = YAML_CUSTOM, .load = load_units, .dump = dump_units, .what = "a sequence of up to 64 units"},
     {.key = "timeline", .type = YAML_CUSTOM, .load = load_timeline, .dump = dump_timeline, .what = "a sequence of commands that the bench gives itself, each at its time"},
@@ -297,7 +297,7 @@ static bool load(struct yaml_file *f, struct scenario *s)
     if (!yaml_load(f, f->root, "", &scenario_fields, s)) return false;
     if (!scenario_check_lab(f, f->root, &s->lab) || !scenario_check_seats(f, f->root, s)) return false;
     if (!scenario_check_platform(f, f->root, s)) return false;
-    return s->unit_count > 0 || yaml_file_fail(f, NULL, "units", "at least one unit is wanted");
+    return s->unit_count > 0 || yaml_file_fail(f, NULL, "units", "expected at least one unit");
 }
 
 bool scenario_parse(const char *path, const char *text, size_t len, struct scenario *s, char *why, size_t cap)

@@ -1,4 +1,4 @@
-/* A scenario from YAML: what stands on the bench and what happens to it. docs/scenarios.md lists the keys.
+/* A scenario from YAML: what is on the bench and what happens to it. docs/scenarios.md lists the keys.
  *
  *     seed: 1
  *     buses: [{name: can0, bitrate_hz: 1000000, data_bitrate_hz: 5000000}]
@@ -78,7 +78,7 @@ struct scenario {
     unsigned bus_count;
     struct scenario_site site;
     struct lab_cfg lab; /* its site: from the one above, by scenario_bind() */
-    bool start;         /* units are told to stream by the bench itself */
+    bool start;         /* units are commanded to stream by the bench itself */
     struct scenario_spread spread;
     unsigned unit_count;
     struct scenario_unit units[SCENARIO_UNITS_MAX];
@@ -88,7 +88,7 @@ struct scenario {
 /* name: a path, or a scenario of proto/scenarios. False with one line in why. */
 bool scenario_load(const char *name, struct scenario *s, char *why, size_t cap);
 
-/* The same from memory; path says where relative profiles lie and stands in messages. */
+/* The same from memory; path says where relative profiles lie and is in messages. */
 bool scenario_parse(const char *path, const char *text, size_t len, struct scenario *s, char *why, size_t cap);
 
 /* Sets the pointers inside the units and the seed of every noise, and draws what the production spread leaves open: once,

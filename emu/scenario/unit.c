@@ -1,4 +1,4 @@
-/* Keys of a unit, and one entry that stands for many. */
+/* Keys of a unit, and one entry that represents many. */
 #include "scenario/keys.h"
 
 #include "scenario/profile.h"
@@ -16,10 +16,10 @@ static bool fail_board(struct yaml_file *f, const struct yaml_node *node)
 {
     char known[160];
     profile_yaml_boards(known, sizeof known);
-    return yaml_file_fail(f, node, "board", "%s is wanted", known);
+    return yaml_file_fail(f, node, "board", "expected %s", known);
 }
 
-/* What is wrong within the profile is told with its line there, that it is another board's with the line here. */
+/* What is wrong within the profile is reported with its line there, that it is another board's with the line here. */
 static bool find_profile(struct yaml_file *f, const struct yaml_node *node, const char *name, struct scenario_unit *u)
 {
     char path[FIND_PATH_MAX], why[400];
@@ -29,8 +29,9 @@ static bool find_profile(struct yaml_file *f, const struct yaml_node *node, cons
         return yaml_file_fail(f, node, "profile", "%s", why);
     if (!profile_yaml_load(path, &of, &u->profile, f->why, f->cap)) return false;
     if (!board_name_takes(u->board, of)) {
-        return yaml_file_fail(f, node, "profile", "%s is a profile of %s (board: %s), one of %s (board: %s) is wanted",
-                              name, of->title, of->name, u->board->title, u->board->name);
+        return yaml_file_fail(f, node, "profile",
+                              "expected a profile of %s (board: %s), got %s, a profile of %s (board: %s)",
+                              u->board->title, u->board->name, name, of->title, of->name);
     }
     if (type->cfg_profiled) type->cfg_profiled(&u->cfg.board, &u->profile);
     return true;
@@ -50,7 +51,7 @@ static bool begin_unit(struct yaml_file *f, const struct yaml_node *node, const 
     u->cfg.node = (uint8_t)(u->cfg.node + before);
     if (!profile) return !found->profile || find_profile(f, node, found->profile, u);
     name = yaml_scalar(profile);
-    if (!name) return yaml_file_fail(f, profile, "profile", "a name of proto/profiles or a path is wanted");
+    if (!name) return yaml_file_fail(f, profile, "profile", "expected a name of proto/profiles or a path");
     return find_profile(f, profile, name, u);
 }
 
@@ -74,7 +75,7 @@ static bool load_profile_set(struct yaml_file *f, const struct yaml_node *node, 
     struct scenario_unit *u = section;
     const struct board_type *type = u->board->type;
     const size_t outer = strlen(f->where);
-    if (node->kind != YAML_MAPPING) return yaml_file_fail(f, node, "profile_set", "a mapping `key: value` is wanted");
+    if (node->kind != YAML_MAPPING) return yaml_file_fail(f, node, "profile_set", "expected a mapping `key: value`");
     snprintf(f->where + outer, sizeof f->where - outer, "profile_set.");
     if (!profile_yaml_fields(f, node, type, &u->profile)) return false;
     snprintf(f->where + outer, sizeof f->where - outer, "profile_set: "); /* a whole sentence follows */
@@ -136,7 +137,7 @@ static const char *const chains[] = {
     [ADS1282_CHAIN_EXACT] = "exact", [ADS1282_CHAIN_MODULATOR] = "modulator", [ADS1282_CHAIN_DIRECT] = "direct", NULL};
 
 static const struct yaml_field unit_rows[] = {
-    {.key = "name",   .type = YAML_TEXT, .offset = UNIT(name), .max = 32, .what = "letters, digits and _; with `count` a number stands in it, `%02u`"},
+    {.key = "name",   .type = YAML_TEXT, .offset = UNIT(name), .max = 32, .what = "letters, digits and _; with `count` a number is in it, `%02u`"},
     {.key = "count",  .type = YAML_CUSTOM, .min = 1, .max = SCENARIO_UNITS_MAX, .load = load_count, .what = "so many units, alike but for name, node and serial, which count up"},
     {.key = "board",  .type = YAML_CUSTOM, .load = loaded, .dump = dump_board, .what = "type of the board, or a name of one of its profiles: see below"},
     {.key = "profile", .type = YAML_CUSTOM, .load = loaded, .what = "name in proto/profiles, or a path, relative to the scenario"},
@@ -239,7 +240,7 @@ static bool check_unit(struct yaml_file *f, const struct yaml_node *node, const 
                        const struct scenario_unit *u)
 {
     if (!plain(u->name))
-        return yaml_file_fail(f, at(node, "name"), "name", "\"%s\": letters, digits and _ are wanted", u->name);
+        return yaml_file_fail(f, at(node, "name"), "name", "\"%s\": expected letters, digits and _", u->name);
     if (!check_inputs(f, node, u)) return false;
     for (const struct scenario_unit *other = s->units; other < s->units + s->unit_count; other++) {
         if (strcmp(other->name, u->name) == 0)
@@ -318,16 +319,16 @@ void scenario_unit_board(struct scenario_unit *u, const struct board_name *name)
     name->type->profile_default(&u->profile);
 }
 
-/* The k-th of the units that an entry stands for. */
+/* The k-th of the units that an entry represents. */
 static bool place_unit(struct yaml_file *f, const struct yaml_node *node, const struct entry *e, unsigned k,
                        struct scenario *s)
 {
     if (s->unit_count == SCENARIO_UNITS_MAX)
-        return yaml_file_fail(f, node, "count", "up to %u units in all are wanted", SCENARIO_UNITS_MAX);
+        return yaml_file_fail(f, node, "count", "expected up to %u units in all", SCENARIO_UNITS_MAX);
     struct scenario_unit *u = &s->units[s->unit_count];
     *u = e->unit;
     if (e->count && !number_name(e->unit.name, k + 1, u->name, sizeof u->name)) {
-        return yaml_file_fail(f, at(node, "name"), "name", "\"%s\": with count a number stands in it, as in u%%02u",
+        return yaml_file_fail(f, at(node, "name"), "name", "\"%s\": with count a number is in it, as in u%%02u",
                               e->unit.name);
     }
     const unsigned id = e->unit.cfg.node + k;
@@ -363,7 +364,7 @@ static bool load_entry(struct yaml_file *f, const struct yaml_node *node, struct
 
 bool scenario_load_units(struct yaml_file *f, const struct yaml_node *node, struct scenario *s)
 {
-    if (node->kind != YAML_SEQUENCE) return yaml_file_fail(f, node, "units", "a sequence of units is wanted");
+    if (node->kind != YAML_SEQUENCE) return yaml_file_fail(f, node, "units", "expected a sequence of units");
     for (const struct yaml_item *i = node->first; i; i = i->next)
         if (!load_entry(f, i->value, s)) return false;
     return true;
@@ -379,7 +380,7 @@ bool scenario_check_seats(struct yaml_file *f, const struct yaml_node *root, con
         const char *on = lab_mount_name(u->cfg.seat.on);
         if (!there)
             return yaml_file_fail(f, yaml_get(root, "units"), "units",
-                                  "%s stands on the %s, and there is none: a section %s is wanted", u->name, on, on);
+                                  "%s is on the %s, and there is none: expected a section %s", u->name, on, on);
     }
     return true;
 }

@@ -47,7 +47,7 @@ static struct yaml_node *new_node(struct builder *b, enum yaml_kind kind, const 
 {
     struct yaml_node *n = calloc(1, sizeof *n + len + 1);
     if (!n) return NULL;
-    const struct yaml_node *near = b->depth ? b->key[b->depth - 1] : NULL; /* an empty value stands nowhere */
+    const struct yaml_node *near = b->depth ? b->key[b->depth - 1] : NULL; /* an empty value is nowhere */
     n->kind = kind;
     n->line = m ? (unsigned)m->line + 1 : near ? near->line : 1;
     n->column = m ? (unsigned)m->column + 1 : near ? near->column : 1;
@@ -75,7 +75,7 @@ static bool append(struct builder *b, struct yaml_node *value)
 static bool place(struct builder *b, struct yaml_node *n)
 {
     if (b->depth == 0) {
-        if (b->f->root) return yaml_file_fail(b->f, n, NULL, "a second document; one is wanted");
+        if (b->f->root) return yaml_file_fail(b->f, n, NULL, "a second document; expected one");
         b->f->root = n;
         return true;
     }
@@ -111,7 +111,7 @@ static bool add_scalar(struct builder *b, const struct fy_event *e, const struct
     const enum fy_scalar_style style = e->scalar.value ? fy_token_scalar_style(e->scalar.value) : FYSS_ANY;
     n->plain = style == FYSS_PLAIN;
     const bool quoted = style == FYSS_SINGLE_QUOTED || style == FYSS_DOUBLE_QUOTED;
-    n->column -= quoted && n->column > 1; /* the mark stands behind the quote */
+    n->column -= quoted && n->column > 1; /* the mark is behind the quote */
     set_anchor(b, new_anchor(b, e->scalar.anchor), n);
     return place(b, n);
 }
@@ -121,9 +121,8 @@ static bool add_alias(struct builder *b, const struct fy_event *e, const struct 
     size_t len = 0;
     const char *name = fy_token_get_text(e->alias.anchor, &len);
     const struct yaml_node at = {.line = m ? (unsigned)m->line + 1 : 1,
-                                 .column =
-                                     m && m->column ? (unsigned)m->column : 1}; /* the mark stands behind the star */
-    for (unsigned i = b->anchors; name && i-- > 0;) {                           /* the latest of that name */
+                                 .column = m && m->column ? (unsigned)m->column : 1}; /* the mark is behind the star */
+    for (unsigned i = b->anchors; name && i-- > 0;) {                                 /* the latest of that name */
         const struct anchor *a = &b->anchor[i];
         if (strlen(a->name) == len && memcmp(a->name, name, len) == 0 && a->node) return place(b, a->node);
     }
@@ -190,7 +189,7 @@ static bool build(struct yaml_file *f, struct fy_parser *p, struct fy_diag *diag
         fy_parser_event_free(p, e);
     }
     if (ok && fy_parser_get_stream_error(p)) return tell_parser(f, diag);
-    if (ok && !f->root) return yaml_file_fail(f, NULL, NULL, "empty: a mapping `key: value` is wanted");
+    if (ok && !f->root) return yaml_file_fail(f, NULL, NULL, "empty: expected a mapping `key: value`");
     return ok;
 }
 
@@ -214,8 +213,8 @@ static bool explicit_key(const char *text, size_t len, size_t i)
 }
 
 /* What libfyaml 0.7.12 must not see: a NUL is the end to it, what follows would go unread; some directives, lines that
- * begin with %, be it behind a byte order mark, keep it busy for ever; a tab behind an explicit key, `? KD:\t`, makes it
- * free the same memory twice. Nobody needs any of them. */
+ * begin with %, be it behind a byte order mark, keep it busy without end; a tab behind an explicit key, `? KD:\t`, makes it
+ * free the same memory twice. No one needs any of them. */
 static bool check_bytes(struct yaml_file *f, const char *text, size_t len)
 {
     struct yaml_node at = {.line = 1, .column = 1};
@@ -224,7 +223,7 @@ static bool check_bytes(struct yaml_file *f, const char *text, size_t len)
         if (order_mark(text, len, i)) return yaml_file_fail(f, &at, NULL, "a byte order mark within the text");
         if (text[i] == '%' && at.column == 1) return yaml_file_fail(f, &at, NULL, "a directive: there are none here");
         if (explicit_key(text, len, i))
-            return yaml_file_fail(f, &at, NULL, "a ? of its own, an explicit key: `key: value` is wanted");
+            return yaml_file_fail(f, &at, NULL, "a ? of its own, an explicit key: expected `key: value`");
         const bool ends = text[i] == '\n' || text[i] == '\r';
         at.column = ends ? 1 : at.column + 1;
         at.line += text[i] == '\n';

@@ -58,10 +58,10 @@ static cJSON *to_number(const struct source *s)
 {
     const struct control_arg *a = &s->row->arg[s->arg];
     double x;
-    if (s->param->form == SCPI_STRING) return fail(s->why, -158, "%s: a number is wanted", a->name);
+    if (s->param->form == SCPI_STRING) return fail(s->why, -158, "%s: expected a number", a->name);
     if (s->param->form == SCPI_WORD) {
         if (scpi_limit(s->bench, s->row, s->arg, s->suffix, s->param->text, &x)) return cJSON_CreateNumber(x);
-        return fail(s->why, -148, "%s: a number, MIN, MAX or DEF is wanted", a->name);
+        return fail(s->why, -148, "%s: expected a number, MIN, MAX or DEF", a->name);
     }
     const int err = scpi_to_unit(a->unit, s->param->text, s->param->number, &x);
     if (err) {
@@ -75,12 +75,12 @@ static cJSON *to_bool(const struct source *s)
 {
     const struct control_arg *a = &s->row->arg[s->arg];
     const struct scpi_param *p = s->param;
-    if (p->form == SCPI_STRING) return fail(s->why, -158, "%s: ON, OFF, 1 or 0 is wanted", a->name);
-    if (p->form == SCPI_NUMBER && p->text.n) return fail(s->why, -138, "%s: ON, OFF, 1 or 0 is wanted", a->name);
+    if (p->form == SCPI_STRING) return fail(s->why, -158, "%s: expected ON, OFF, 1 or 0", a->name);
+    if (p->form == SCPI_NUMBER && p->text.n) return fail(s->why, -138, "%s: expected ON, OFF, 1 or 0", a->name);
     if (p->form == SCPI_NUMBER) return cJSON_CreateBool(p->number >= 0.5 || p->number <= -0.5);
     if (word_is(p->text, "ON")) return cJSON_CreateTrue();
     if (word_is(p->text, "OFF")) return cJSON_CreateFalse();
-    return fail(s->why, -224, "%s: ON, OFF, 1 or 0 is wanted", a->name);
+    return fail(s->why, -224, "%s: expected ON, OFF, 1 or 0", a->name);
 }
 
 static bool same_word(struct scpi_text t, const char *word, size_t len)
@@ -117,13 +117,13 @@ static cJSON *to_choice(const struct source *s)
     const struct control_arg *a = &s->row->arg[s->arg];
     char words[160] = "";
     size_t at = 0;
-    if (s->param->form == SCPI_NUMBER) return fail(s->why, -128, "%s: a word is wanted", a->name);
+    if (s->param->form == SCPI_NUMBER) return fail(s->why, -128, "%s: expected a word", a->name);
     const char *found = find_choice(a, s->param->text);
     if (found) return cJSON_CreateString(found);
     for (unsigned i = 0; a->choices[i] && at < sizeof words; i++) {
         at += (size_t)snprintf(words + at, sizeof words - at, "%s%s", i ? ", " : "", a->choices[i]);
     }
-    return fail(s->why, -224, "%s: one of %s is wanted", a->name, words);
+    return fail(s->why, -224, "%s: expected one of %s", a->name, words);
 }
 
 static cJSON *to_string(const struct source *s)
@@ -131,7 +131,7 @@ static cJSON *to_string(const struct source *s)
     const struct scpi_param *p = s->param;
     char text[SCPI_LINE_MAX];
     size_t n = 0;
-    if (p->form == SCPI_NUMBER) return fail(s->why, -128, "%s: a string is wanted", s->row->arg[s->arg].name);
+    if (p->form == SCPI_NUMBER) return fail(s->why, -128, "%s: expected a string", s->row->arg[s->arg].name);
     for (size_t i = 0; i < p->text.n && n < sizeof text - 1; i++) {
         text[n++] = p->text.p[i];
         if (p->form == SCPI_STRING && i + 1 < p->text.n && p->text.p[i] == p->text.p[-1] &&

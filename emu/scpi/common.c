@@ -104,7 +104,7 @@ static void do_wai(struct scpi *s, const struct scpi_command *row, unsigned valu
     scpi_await(s, t_ns);
 }
 
-/* What the instrument has to do with it stands in the command table: nothing for a head, which stays where it is. */
+/* What the instrument has to do with it is in the command table: nothing for a head, which stays where it is. */
 static void do_rst(struct scpi *s, const struct scpi_command *row, unsigned value, int64_t t_ns)
 {
     const struct control_scpi *how;

@@ -2,7 +2,7 @@
  *
  *   AXIS1:POSition 30 DEG, 5 DPS; RATE?        two units: header, parameters; header
  *
- * Text is told by pointers into the message, which need not end in NUL and may have any bytes in it. */
+ * Text is reported by pointers into the message, which need not end in NUL and may have any bytes in it. */
 #ifndef PSABENCH_SCPI_LEX_H
 #define PSABENCH_SCPI_LEX_H
 

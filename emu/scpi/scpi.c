@@ -56,7 +56,7 @@ static bool do_limit(struct scpi *s, struct scpi_text header, const struct scpi_
     const bool numeric = arg < control_arg_count(row) && control_type_numeric(row->arg[arg].type);
     if (!numeric || u->param[0].form != SCPI_WORD ||
         !scpi_limit(s->control->bench, row, arg, suffix, u->param[0].text, &x)) {
-        return fail(s, -224, "MIN, MAX or DEF is wanted");
+        return fail(s, -224, "expected MIN, MAX or DEF");
     }
     scpi_putf(s, "%.12g", x);
     return true;
@@ -76,7 +76,7 @@ static bool do_common(struct scpi *s, const struct scpi_command *row, const stru
 {
     char range[48];
     const struct scpi_param *p = u->param;
-    snprintf(range, sizeof range, "an integer from 0 to %u is wanted", row->max);
+    snprintf(range, sizeof range, "expected an integer from 0 to %u", row->max);
     if (u->params > (row->max > 0)) return fail(s, -108, NULL);
     if (u->params < (row->max > 0)) return fail(s, -109, range);
     if (row->max && p->form != SCPI_NUMBER) return fail(s, p->form == SCPI_WORD ? -148 : -158, range);
@@ -87,7 +87,7 @@ static bool do_common(struct scpi *s, const struct scpi_command *row, const stru
     return true;
 }
 
-/* The header with the path it stands in: SCPI-99 volume 1, 6.2.4. False: too long. */
+/* The header with the path it is in: SCPI-99 volume 1, 6.2.4. False: too long. */
 static bool make_path(struct scpi *s, const struct scpi_unit *u, char *full, struct scpi_text *header)
 {
     const size_t before = u->rooted || u->common ? 0 : s->path_len;

@@ -67,7 +67,7 @@ static uint8_t class_bit(int code)
     return class >= 1 && class <= 4 ? bit[class] : 0;
 }
 
-/* The description stands in double quotes in the answer. */
+/* The description is in double quotes in the answer. */
 static void unquote(char *text)
 {
     for (; *text; text++) {

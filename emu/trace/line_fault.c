@@ -140,9 +140,9 @@ static void on_steps(void *ctx, uint64_t before, const struct trace_step *s, uns
 {
     struct line_faults *l = ctx;
     struct out o = {.n = 0};
-    /* Nobody listens any more: what is told before its time is taken in, but a new listener hears from done_ns on. */
+    /* No one listens any more: what is reported before its time is taken in, but a new listener hears from done_ns on. */
     if (until_ns == INT64_MAX || until_ns < l->done_ns) until_ns = l->done_ns;
-    l->level = before; /* lines that nobody listens to move without a step */
+    l->level = before; /* lines that no observer to move without a step */
     for (const struct trace_step *const end = s + n; s < end;) {
         const int64_t t_ns = s->t_ns;
         run_until(l, &o, t_ns);

@@ -32,7 +32,7 @@ struct line_fault {
     struct rng rng;            /* NOISE */
 };
 
-struct line_fault_slot { /* a fault and where it stands */
+struct line_fault_slot { /* a fault and where it is */
     struct line_fault f;
     uint32_t id;     /* 0: free */
     bool began;      /* from_ns has passed */

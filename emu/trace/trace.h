@@ -5,7 +5,7 @@
  * order of time, then of report, and only real changes. One trace per unit. Fixed storage, no allocation, one thread.
  *
  * A listener that comes late hears the levels last reported, and what the board's `wake` adds. So a board that computes no
- * edges for nobody still reports where its lines come to rest (trace_put() costs little), and wakes what is under way. */
+ * edges for no one still reports where its lines come to rest (trace_put() costs little), and wakes what is under way. */
 #ifndef PSABENCH_TRACE_TRACE_H
 #define PSABENCH_TRACE_TRACE_H
 
@@ -43,7 +43,7 @@ struct trace_sink {
     struct trace_sink *next;
 };
 
-/* Stands between the trace and its sinks: line_fault.h. */
+/* Between the trace and its sinks: line_fault.h. */
 struct trace_filter {
     /* All steps up to and including until_ns, real changes from the levels `before`; hands on what trace_emit() is given. */
     void (*steps)(void *ctx, uint64_t before, const struct trace_step *s, unsigned n, int64_t until_ns);
@@ -51,7 +51,7 @@ struct trace_filter {
     void *ctx;
 };
 
-/* Of a board that keeps things to itself while nobody listens. */
+/* Of a board that keeps things to itself without observers. */
 struct trace_source {
     void (*wake)(void *ctx, uint64_t mask); /* somebody is about to listen to these signals: report what is under way */
     /* For lines that move all the time: report them up to t_ns, or as far as there is room; returns how far. May be NULL. */
@@ -114,7 +114,7 @@ void trace_commit(struct trace *t, unsigned n);
 /* As trace_commit() for steps that are a run of these lines. Delivered faster. */
 void trace_commit_run(struct trace *t, unsigned n, uint64_t lines);
 
-/* Reports the levels of the signals in the mask `lines` from t_ns on. Cheap when nobody listens to them. */
+/* Reports the levels of the signals in the mask `lines` from t_ns on. Cheap without observers. */
 static inline void trace_put(struct trace *t, uint64_t lines, uint64_t level, int64_t t_ns)
 {
     if (!(t->watched & lines) && t->pending_count == 0) t->level = (t->level & ~lines) | (level & lines);
@@ -130,7 +130,7 @@ static inline void trace_set(struct trace *t, unsigned sig, bool level, int64_t 
 typedef void trace_change_fn(void *ctx, unsigned sig, bool level, int64_t t_ns);
 void trace_each(const struct trace_step *s, unsigned n, uint64_t mask, trace_change_fn *change, void *ctx);
 
-/* Delivers everything up to and including t_ns: call with now - TRACE_LAG_NS while running (also while nobody listens, so
+/* Delivers everything up to and including t_ns: call with now - TRACE_LAG_NS while running (also without observers, so
  * that done_ns keeps up), with now at the end. Then tells every sink. Going back does nothing. */
 void trace_advance(struct trace *t, int64_t t_ns);
 

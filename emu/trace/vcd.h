@@ -1,7 +1,7 @@
 /* Writer of Value Change Dump (IEEE 1364-2005 clause 18): a trace sink that sigrok, PulseView, GTKWave and Surfer open.
  *
  * 1-bit wires only, no date, so that the same run gives the same bytes. Times are rounded down to the file's unit: order is
- * kept and an edge stands less than one unit early. The unit is 10 ns unless told otherwise: a half period of CLK (250 ns)
+ * kept and an edge is less than one unit early. The unit is 10 ns unless told otherwise: a half period of CLK (250 ns)
  * is then exact and of SClk (244.14 ns) within 4 %, no datasheet's set-up time (50 ns) collapses into one sample, and
  * sigrok, which makes a sample of every unit, still loads 10 s in seconds (docs/waveforms.md has the figures).
  *
@@ -49,7 +49,7 @@ struct vcd { /* read-only outside vcd.c */
     char buf[VCD_BUF];
 };
 
-/* Writes the header, the levels at from_ns and every change after it; what a board does before, while nobody listens, need
+/* Writes the header, the levels at from_ns and every change after it; what a board does before, without observers, need
  * not be known. False, and nothing written, when unit_ns is no unit of VCD. A write that fails is reported by vcd_error(). */
 bool vcd_open(struct vcd *v, const struct vcd_cfg *cfg, struct trace *t);
 

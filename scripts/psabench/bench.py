@@ -39,8 +39,8 @@ from psabench.probe import Probe
 
 NS = 1_000_000_000
 SLICE_NS = NS  # long runs go in slices of simulated time, so that Ctrl-C is heard
-SERIAL_SLICE_NS = NS // 20  # with slcan: a full pseudo-terminal stops time, and nobody reads it while a slice runs
-AWAY_SLICE_NS = 60 * NS  # nobody receives meanwhile: they are as short
+SERIAL_SLICE_NS = NS // 20  # with slcan: a full pseudo-terminal stops time, and no one reads it while a slice runs
+AWAY_SLICE_NS = 60 * NS  # no one receives meanwhile: they are as short
 NONE = "none"  # as the CAN specification: no bus
 FIRST = "can0"  # name of a bus that has no other
 
@@ -50,7 +50,7 @@ Board = TypeVar("Board", bound=Unit)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Status:
-    """How the bench stands; None: the bench has no such instrument, or no control socket."""
+    """How the bench is; None: the bench has no such instrument, or no control socket."""
 
     time_s: float
     pace: str  # wall, step, free; real: no emulator
@@ -402,7 +402,7 @@ class Bench:
             self.probe.stop()
 
     def status(self) -> Status:
-        """How the bench stands, for a status bar or a log."""
+        """How the bench is, for a status bar or a log."""
         table = self._maybe("table.read", axis=1)
         chamber = self._maybe("chamber.read")
         counters = self._maybe("counters")

@@ -5,7 +5,7 @@
 
 The address is VISA's, so the same script runs with an instrument on a network, a serial line or a bus adapter. After
 each setting the instrument's error queue is read: a refusal is raised where it happened, and in lockstep the setting
-has been made when the call returns. Nothing blocks on `*OPC?`, which would stand still for ever where time moves only
+has been made when the call returns. Nothing blocks on `*OPC?`, which would block where time moves only
 when the host says so: the state is asked, and the bench's time moves in between. The only file that imports PyVISA.
 
 Angles are degrees and rates degrees a second, as on the instruments' own scales; temperatures degrees Celsius.
@@ -158,7 +158,7 @@ class Table(Instrument):
     """A rate table of one to three axes; axis 1 is the outermost."""
 
     def position(self, angle_deg: float, rate_dps: float | None = None, *, axis: int = 1, wait: bool = True) -> None:
-        """Go to an angle, at most at rate_dps; returns when it stands there, or at once."""
+        """Go to an angle, at most at rate_dps; returns when it is there, or at once."""
         rate = "" if rate_dps is None else f",{rate_dps!r}"
         self.write(f"AXIS{axis}:POS {angle_deg!r}{rate}")
         if wait:
@@ -169,13 +169,13 @@ class Table(Instrument):
         self.write(f"AXIS{axis}:RATE {rate_dps!r}")
 
     def sine(self, amplitude_deg: float, frequency_hz: float, *, axis: int = 1) -> None:
-        """Swing about where it stands."""
+        """Swing about where it is."""
         self.write(f"AXIS{axis}:SINE {amplitude_deg!r},{frequency_hz!r}")
 
     def profile(self, times_s: Sequence[float], rates_dps: Sequence[float], *, axis: int = 1) -> None:
         """Run through rates: rates_dps[k] at times_s[k] from now, linear between them."""
         if len(times_s) != len(rates_dps):
-            raise ValueError(f"{len(times_s)} times and {len(rates_dps)} rates; as many of each are wanted")
+            raise ValueError(f"{len(times_s)} times and {len(rates_dps)} rates; expected as many of each")
         pairs = ",".join(f"{t!r},{r!r}" for t, r in zip(times_s, rates_dps, strict=True))
         self.write(f"AXIS{axis}:PROF {pairs}")
 

@@ -160,7 +160,7 @@ static const struct bench_case {
     void (*before)(struct bench *n);
     void (*run)(struct bench *n, uint64_t frames);
 } cases[] = {
-    {"frames", power_up, ADS1282_CHAIN_EXACT, NULL, run_frames}, /* nobody watches, bit-exact decimation chain */
+    {"frames", power_up, ADS1282_CHAIN_EXACT, NULL, run_frames}, /* without observers, bit-exact decimation chain */
     {"frames-direct", power_up, ADS1282_CHAIN_DIRECT, NULL, run_frames},       /* without the chain */
     {"frames-modulator", power_up, ADS1282_CHAIN_MODULATOR, NULL, run_frames}, /* with a bit-true modulator, too */
     {"frames-watched", power_up, ADS1282_CHAIN_EXACT, watch, run_frames},      /* all lines, a watcher that counts */

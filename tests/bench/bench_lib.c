@@ -1,4 +1,4 @@
-/* How fast somebody else's driver can talk to a chip through libpsabench.
+/* How fast a third-party driver can talk to a chip through libpsabench.
  *
  *     bench_lib CASE [BYTES]    prints: CASE bytes=N readings=M ns=T hash=H
  *

@@ -41,7 +41,7 @@ class Case:
     first: int  # a count that takes well under a second
     under_callgrind: Callable[[int], list[str]] | None = None
     counts: tuple[int, int] = (200, 600)  # of two runs under callgrind; the difference is free of the set-up
-    fixed: bool = False  # the count is what is wanted, not a matter of time
+    fixed: bool = False  # the count is the result, not a time
     count: int = 0
     rates: list[float] = field(default_factory=list)
     ns: list[float] = field(default_factory=list)
@@ -50,7 +50,7 @@ class Case:
 
 
 def parse(output: str) -> dict[str, int]:
-    """The integers of `NAME key=value ...`; of a Verilated driver's `frames N checksum H edges E ns T` likewise."""
+    """The integers of `NAME key=value ...`; of a Verilated driver's `frames N checksum H edges E ns T` too."""
     return {k: int(v) for k, v in re.findall(r"(\w+)[= ](\d+)(?= |$)", output.strip())}
 
 

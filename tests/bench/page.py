@@ -25,7 +25,7 @@ PSD1_ENGINES = {
     "verilator-psd1": "Verilator, hand-written C++ driver",
     "psd1-watched": "psabench, all 34 lines watched",
     "psd1-cycle": "psabench, all but the clock watched",
-    "psd1-unwatched": "psabench, nobody watches",
+    "psd1-unwatched": "psabench, without observers",
 }
 UNWATCHED = {
     "frames-direct": "no decimation chain (`adc_chain: direct`)",
@@ -263,7 +263,7 @@ SECTIONS: dict[str, Callable[[Result], str]] = {
 
 
 def fill(page: str, r: Result) -> str:
-    """The page with what stands between its markers written anew. ValueError if a marker is missing."""
+    """The page with the text between its markers written again. ValueError if a marker is missing."""
     for name, make in SECTIONS.items():
         page = spliced(page, (f"<!-- bench:{name} -->", "<!-- bench:end -->"), make(r), "docs/reference/performance.md")
     return page

@@ -57,7 +57,7 @@ def run(command: Sequence[str | Path], **kw: str) -> str:
 
 
 def build(out: Path, words: Path) -> dict[str, Peer]:
-    """All three peers of PSA-2, in out; built anew only if a source is newer."""
+    """All three peers of PSA-2, in out; built again only if a source is newer."""
     return {p.name: p for p in (_icarus(out, words), _timing(out, words), _driven(out, words))}
 
 

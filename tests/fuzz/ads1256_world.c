@@ -165,7 +165,7 @@ static bool moment(struct w1256 *w, int64_t half_ns)
 }
 
 /* Zeros in a row that the chip has taken. An edge lost to a strict chip is a bit that it has not shifted, and an SCLK that
- * stopped offers it a half read word anew. */
+ * stopped offers it a half read word again. */
 static void note_quiet(struct w1256 *w, uint8_t mosi, const struct ads1256_counters *before)
 {
     const bool whole = !w->a.cfg.strict_bus || w->a.n.sclk_violations == before->sclk_violations;
@@ -254,7 +254,7 @@ static void op_reset(struct w1256 *w, struct script *s)
 static void op_cs(struct w1256 *w, struct script *s)
 {
     const bool level = script_byte(s) & 1;
-    if (level != w->a.cs) w->quiet = 0; /* in RDATAC a half read word is offered anew (M50) */
+    if (level != w->a.cs) w->quiet = 0; /* in RDATAC a half read word is offered again (M50) */
     ads1256_cs_pin(&w->a, level, w->s.now_ns);
 }
 

@@ -1,4 +1,4 @@
-/* A PSA-2 on a CAN bus, and whatever may befall them: faults of converters, controller, lines and bus, registers that flip,
+/* A PSA-2 on a CAN bus, and what may affect them: faults of converters, controller, lines and bus, registers that flip,
  * power that fails, at any time and on top of one another. Watchers hear real changes in order; nothing hangs; once all is
  * lifted and the power has been off and on again, board, stream and bus are as good as new. */
 #include "fuzz.h"
@@ -239,7 +239,7 @@ static void lift(struct world *w)
     const unsigned frames = w->frames, got = w->got;
     run(w, UP_NS);
     assert(psa2_ready(&w->b) && w->frames > frames + 40 && w->got > got + 2 * 40);
-    /* The board's counters began anew with its power; the host's fall by what it sends, and it has sent little. */
+    /* The board's counters began again with its power; the host's fall by what it sends, and it has sent little. */
     assert(w->can.node.services.now == CAN_ACTIVE && w->host.now != CAN_BUS_OFF);
 }
 

@@ -100,10 +100,10 @@ static void on_reading(void *ctx, const struct gyro_reading *r, int64_t t_ns)
     w->any = true;
 }
 
-static void on_condition(void *ctx, enum gyro_flag what, bool stands, int64_t t_ns)
+static void on_condition(void *ctx, enum gyro_flag what, bool active, int64_t t_ns)
 {
     struct world *w = ctx;
-    assert(t_ns == w->s.now_ns && ((w->conditions & what) != 0) != stands);
+    assert(t_ns == w->s.now_ns && ((w->conditions & what) != 0) != active);
     w->conditions ^= what;
 }
 

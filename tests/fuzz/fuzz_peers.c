@@ -1,5 +1,5 @@
 /* Programs that connect, send any bytes in pieces of any size, read or not, and vanish: socketcand clients, a program at the
- * slcan port, control clients. Lines wait while a reply is due, messages to clients are whole, and in the end nobody is left. */
+ * slcan port, control clients. Lines wait while a reply is due, messages to clients are whole, and in the end no one is left. */
 #define _GNU_SOURCE /* SOCK_NONBLOCK */
 #include "fuzz.h"
 
@@ -272,7 +272,7 @@ static void begin(struct world *w, uint8_t choice)
     w->hub.lossless = choice & 4;
 }
 
-/* All go; what they had sent still goes out, then nobody is left. */
+/* All go; what they had sent still goes out, then no one is left. */
 static void finish(struct world *w)
 {
     for (unsigned i = 0; i < PEERS_MAX; i++) leave(&w->peer[i]);

@@ -20,7 +20,7 @@ struct world {
     bool any; /* a frame since the last reset */
     struct psa2_request request;
     bool waiting, submitting; /* for done(); inside psa2_submit() */
-    bool clean;               /* KPSA's rules alone reached the converters: registers are what it was told */
+    bool clean;               /* KPSA's rules alone reached the converters: registers are what it was given */
     uint64_t trail;           /* of frames and answers */
     struct listener ear;
     bool attached;
@@ -73,7 +73,7 @@ static void on_fault(void *ctx, uint16_t code, int64_t t_ns)
     mix(w, code + (uint64_t)t_ns);
 }
 
-/* An answer is what stands in the register, and it comes once, never from inside psa2_submit(). */
+/* An answer is what is in the register, and it comes once, never from inside psa2_submit(). */
 static void on_done(void *ctx, struct psa2_request *r, enum psa2_result result, int64_t t_ns)
 {
     struct world *w = ctx;
@@ -139,7 +139,7 @@ static void op_wait(struct world *w, struct script *s)
     run_until(w, w->s.now_ns + script_span_ns(s));
 }
 
-/* To the next event of the board that nobody watches (the other has more of them), a nanosecond before it, or after it. */
+/* To the next event of the board that without observers (the other has more of them), a nanosecond before it, or after it. */
 static void op_next(struct world *w, struct script *s)
 {
     run_until(w, w->next_ns + script_byte(s) % 3 - 1);

@@ -190,7 +190,7 @@ static void op_wait(struct world *w, struct script *s)
     run_until(w, w->s.now_ns + script_span_ns(s));
 }
 
-/* To the next event of the board that nobody watches, a nanosecond before it, or after it. */
+/* To the next event of the board that without observers, a nanosecond before it, or after it. */
 static void op_next(struct world *w, struct script *s)
 {
     run_until(w, w->next_ns + script_byte(s) % 3 - 1);

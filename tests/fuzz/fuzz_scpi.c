@@ -30,7 +30,7 @@ static void init(void)
     for (unsigned i = 0; i < 8; i++) scpi_rig_session(&rig, &client[i], scpi_kinds[i % 4].name);
 }
 
-/* What waits for ever, for a ramp of a century, still has its queue. */
+/* What waits without end, for a ramp of a century, still has its queue. */
 static void finish(struct scpi *s)
 {
     scpi_close(s);

@@ -1,4 +1,4 @@
-/* Fuzz target: files of --restore. The first byte says whether the rest is the whole file, or what stands between the head
+/* Fuzz target: files of --restore. The first byte says whether the rest is the whole file, or the text between the head
  * and the sum, which are put around it so that more than damage is found. */
 #include "fuzz.h"
 

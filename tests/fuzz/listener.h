@@ -1,4 +1,4 @@
-/* Who listens to a board's lines and asserts what it is told: real changes, in order of time. */
+/* Who listens to a board's lines and asserts what it is given: real changes, in order of time. */
 #ifndef PSABENCH_FUZZ_LISTENER_H
 #define PSABENCH_FUZZ_LISTENER_H
 
@@ -8,7 +8,7 @@
 
 struct listener {
     struct trace_sink sink;
-    uint64_t level, known; /* of the lines, as it was told; cleared by who attaches it anew */
+    uint64_t level, known; /* of the lines, as it was given; cleared by who attaches it again */
     int64_t edge_ns;       /* last told */
 };
 

@@ -39,7 +39,7 @@ static inline void twin_run_until(struct sched *s, struct trace *t, int64_t t_ns
     }
 }
 
-/* All of a world (size bytes) but the storage of edges that nobody has reported, which lies at `at` in it. */
+/* All of a world (size bytes) but the storage of edges that no one has reported, which lies at `at` in it. */
 static inline void twin_restore(void *to, const void *from, size_t size, size_t at)
 {
     const size_t tail = at + sizeof((struct trace *)0)->pending;

@@ -1,4 +1,4 @@
-"""The lines of emulator and chips against the traces of manifest.toml; GOLDEN=rewrite (`make golden`) writes them anew.
+"""The lines of emulator and chips against the traces of manifest.toml; GOLDEN=rewrite (`make golden`) rewrites them.
 
 Both sides are cut to the manifest's lines and window. A failure names instant, line, want and got.
 """

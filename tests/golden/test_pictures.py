@@ -1,4 +1,4 @@
-"""The waveform pictures of the docs are drawn from the golden traces; GOLDEN=rewrite draws them anew."""
+"""The waveform pictures of the docs are drawn from the golden traces; GOLDEN=rewrite draws them again."""
 
 from __future__ import annotations
 

@@ -64,9 +64,7 @@ class Mutant:
         """The file with the wrong in it. Raises ListError."""
         at = text.find(self.after) + len(self.after) if self.after else 0
         if self.after and text.count(self.after) != 1:
-            raise ListError(
-                f"{self.id}: {self.file} has {text.count(self.after)} times what stands before the old text"
-            )
+            raise ListError(f"{self.id}: {self.file} has {text.count(self.after)} times what is before the old text")
         found = text.count(self.old, at)
         if not self.old or found == 0 or (found > 1 and not self.after):
             raise ListError(f"{self.id}: {self.file} has the old text {found} times, not once")
@@ -110,7 +108,7 @@ def load(path: Path = LIST) -> list[Mutant]:
     """Raises ListError."""
     rows = yaml.safe_load(path.read_text(encoding="utf-8"))
     if not isinstance(rows, list):
-        raise ListError(f"{path}: a list of rows is wanted")
+        raise ListError(f"{path}: expected a list of rows")
     return [_mutant(row) for row in rows]
 
 

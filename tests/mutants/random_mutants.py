@@ -1,4 +1,4 @@
-"""Random mutants from the syntax of C: small wrongs at places that nobody has chosen.
+"""Random mutants from the syntax of C: small wrongs at places that no one has chosen.
 
 Comments, strings and the preprocessor's lines are left alone. A place is a match of one of the patterns below; which of
 all places of all files are taken is drawn from the seed, each file as often as it has places.
@@ -28,7 +28,7 @@ ON: tuple[tuple[str, str], ...] = (
     ("emu/board/gyro/", "gyro"),
     ("emu/canopen/co_", "psa2"),
 )
-# What no board of these has: pins that nobody drives edge by edge, faults, what only truth and digest tell.
+# What no board of these has: pins that no one drives edge by edge, faults, what only truth and digest tell.
 LEFT_OUT = re.compile(r"/(fault|pins|gpio|board|profile|profile_set|mod|cal|hpf|cic)\.c$")
 
 Match = re.Match[str]
@@ -110,7 +110,7 @@ def _name(path: str) -> str:
 
 
 def _mutant(path: str, text: str, place: tuple[str, int, int, str], on: str) -> Mutant:
-    """The text before the place is its address: it stands there once."""
+    """The text before the place is its address: it is there once."""
     kind, begin, end, new = place
     line, name = text.count("\n", 0, begin) + 1, _name(path)
     return Mutant(

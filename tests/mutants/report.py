@@ -20,7 +20,7 @@ MARKS = "<!-- result: made by `make mutants`, do not edit -->", "<!-- end of res
 
 
 def rate(results: Iterable[Result]) -> tuple[int, int]:
-    """Killed, and of how many: those that nobody can see, or of which nothing is known, do not count."""
+    """Killed, and of how many: those that no one can see, or of which nothing is known, do not count."""
     rows = [r for r in results if r.result != "equivalent" and r.result not in WRONG]
     return sum(r.result in KILLED for r in rows), len(rows)
 
@@ -34,7 +34,9 @@ def line(r: Result) -> str:
     """One mutant on the terminal."""
     found = " ".join(r.found[:4]) + (f" and {len(r.found) - 4} more" if len(r.found) > 4 else "")
     named = "" if r.named or not r.found or not r.breaks else f" (not {' or '.join(r.breaks)})"
-    detail = f"{found}{named}" if r.found else r.reason or f"breaks {', '.join(r.breaks) or 'what nobody has said'}"
+    detail = (
+        f"{found}{named}" if r.found else r.reason or f"breaks {', '.join(r.breaks) or 'an undeclared requirement'}"
+    )
     return f"{r.result:12} {r.id:34} {r.on:16} {detail.splitlines()[-1] if detail else ''}"
 
 

@@ -17,7 +17,7 @@ class Book:
     """Of one part, declared or random; the other stays as it is in the file."""
 
     def __init__(self, path: Path, part: str, rows: Sequence[Mutant]) -> None:
-        """rows: all of this part. What the file has of them stands as long as the row is the same."""
+        """rows: all of this part. What the file has of them is as long as the row is the same."""
         self._path, self._part, self._rows = path, part, rows
         before = report.read(path)
         stamps = {m.id: m.stamp() for m in rows}

@@ -40,7 +40,7 @@ examples (in the root of a checkout, with PYTHONPATH=tools):
   python -m tests.mutants.run --random 60 --seed 7
   python -m tests.mutants.run --again survived go on with those that were not killed last time
 
-What a run has found stands in build/mutants.json as it goes on; a run that was ended is resumed by --again. Exit
+What a run has found is in build/mutants.json as it goes on; a run that was ended is resumed by --again. Exit
 status: 0 the rates are reached and nothing is wrong with the list, 1 they are not, 2 bad input or the unmutated
 emulator does not conform, 130 ended by Ctrl-C.
 """

@@ -14,8 +14,8 @@ from tests.mutants.declared import ListError, Mutant, Target
 from tests.mutants.suite import Run, Suite
 from tests.mutants.tree import BuildError, Tree
 
-KILLED = ("killed", "crashed", "time-out")  # by a failed requirement; the emulator fell over; nobody came to an end
-SPARED = ("equivalent", "excused", "survived")  # nobody can see it; the suite cannot, and says why; it should have
+KILLED = ("killed", "crashed", "time-out")  # by a failed requirement; the emulator fell over; no one came to an end
+SPARED = ("equivalent", "excused", "survived")  # no one can see it; the suite cannot, and says why; it should have
 WRONG = ("bad list", "does not compile", "suite broken")  # nothing is known of the mutant
 TIMEOUT_FACTOR, TIMEOUT_MIN_S = 6.0, 120.0  # of the unmutated run: a loaded machine is no verdict
 
@@ -41,7 +41,7 @@ class Result:
 
     @classmethod
     def of(cls, row: dict[str, Any]) -> Result:
-        """As it stands in mutants.json."""
+        """As in mutants.json."""
         return cls(**row)
 
 

@@ -168,7 +168,7 @@ def load_unit(key: str, base: Protocol) -> Protocol:
             raise ValueError(f"{path.name}: TPDO {t['message']}: no such key: {unknown}")
     indices = [o.index for o in objects]
     if len(set(indices)) != len(indices):
-        raise ValueError(f"{path.name}: an object stands twice")
+        raise ValueError(f"{path.name}: an object occurs twice")
     common = [e for e in base.emcy if e["code"] < 0xFF00 or e["name"] == "STREAM_REFUSED"]
     return Protocol(
         key=key,

@@ -63,7 +63,7 @@ static void on_reading(void *ctx, const struct gyro_reading *r, int64_t t_ns)
     board_node_stream(&c->node, GYRO_RATES_TPDO, m, GYRO_TPDOS, t_ns);
 }
 
-static void on_condition(void *ctx, enum gyro_flag what, bool stands, int64_t t_ns)
+static void on_condition(void *ctx, enum gyro_flag what, bool active, int64_t t_ns)
 {
     static const struct {
         enum gyro_flag what;
@@ -76,7 +76,7 @@ static void on_condition(void *ctx, enum gyro_flag what, bool stands, int64_t t_
     struct gyro_can *c = ctx;
     for (unsigned i = 0; i < sizeof rows / sizeof *rows; i++) {
         if (rows[i].what != what) continue;
-        if (stands) co_node_error(&c->node.node, rows[i].code, REG_DEVICE, rows[i].source, t_ns);
+        if (active) co_node_error(&c->node.node, rows[i].code, REG_DEVICE, rows[i].source, t_ns);
         else co_node_error_end(&c->node.node, rows[i].code, t_ns);
     }
 }

@@ -119,13 +119,13 @@ void gyro_past_begin(struct gyro *b)
         if (b->standing & 1U << i) record_flag(b, (enum gyro_flag)(1U << i));
 }
 
-void gyro_condition(struct gyro *b, enum gyro_flag what, bool stands, int64_t t_ns)
+void gyro_condition(struct gyro *b, enum gyro_flag what, bool active, int64_t t_ns)
 {
-    if (stands == ((b->standing & what) != 0)) return;
-    b->standing = stands ? b->standing | what : b->standing & ~(unsigned)what;
-    if (stands) record_flag(b, what);
-    if (stands) gyro_notify_event(b, GYRO_EV_FAULT, t_ns);
-    if (b->host.condition) b->host.condition(b->host.ctx, what, stands, t_ns);
+    if (active == ((b->standing & what) != 0)) return;
+    b->standing = active ? b->standing | what : b->standing & ~(unsigned)what;
+    if (active) record_flag(b, what);
+    if (active) gyro_notify_event(b, GYRO_EV_FAULT, t_ns);
+    if (b->host.condition) b->host.condition(b->host.ctx, what, active, t_ns);
 }
 
 /* One that comes and goes ends when it has not come for a while. */

@@ -92,7 +92,7 @@ struct gyro_counters {
 struct gyro_host {
     void *ctx;
     void (*reading)(void *ctx, const struct gyro_reading *r, int64_t t_ns);
-    void (*condition)(void *ctx, enum gyro_flag what, bool stands, int64_t t_ns);
+    void (*condition)(void *ctx, enum gyro_flag what, bool active, int64_t t_ns);
 };
 
 #include "board/gyro/state.h" /* struct gyro, read-only outside the board's own files */

@@ -15,7 +15,7 @@ void gyro_run_rates(struct gyro *b, int64_t t_ns, double u_radps[2]);
 void gyro_run_stop(struct gyro *b, enum gyro_mode mode); /* at once, in another mode */
 
 /* gyro.c */
-void gyro_condition(struct gyro *b, enum gyro_flag what, bool stands, int64_t t_ns);
+void gyro_condition(struct gyro *b, enum gyro_flag what, bool active, int64_t t_ns);
 void gyro_past_begin(struct gyro *b); /* a mode begins: conditions that stand are its first */
 
 /* gyro/check.c: what was learnt is forgotten; this step, when the rates are known; the rate of a nod in this step, about the

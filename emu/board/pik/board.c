@@ -32,7 +32,7 @@ static void about(const void *profile, char *out, size_t cap)
                    1e6 / p->clock_hz, p->latch_us * 1e-3);
 }
 
-/* The load alone stands before the integrator (article, figure 1). */
+/* The load alone is before the integrator (article, figure 1). */
 static void set_load(struct board_cfg *cfg, double ohm)
 {
     for (unsigned i = 0; i < BOARD_AXES; i++) {

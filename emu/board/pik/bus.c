@@ -93,7 +93,7 @@ void pik_wanted(const void *board, const struct board_cycle *c, enum board_cycle
     unsigned least, most;
     pik_period_range(board, &least, &most);
     if (r == BOARD_CYCLE_NOT_READY)
-        (void)snprintf(out, cap, "a write to LATCH (0Bh) latches, PERIOD (0Ch) does so for ever");
+        (void)snprintf(out, cap, "a write to LATCH (0Bh) latches, PERIOD (0Ch) does so without end");
     else if (c->address == PIK_REG_PERIOD) (void)snprintf(out, cap, "it takes 0 and %u to %u", least, most);
     else (void)snprintf(out, cap, "it takes 0 to %u", (1u << PIK_AXES) - 1);
 }

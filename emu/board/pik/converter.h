@@ -1,6 +1,6 @@
 /* One channel of a charge-balance converter, voltage to pulses (article, sections 1 and 2, figure 2).
  *
- * The integrator takes the input without a break. Where its output stands at +Uc or -Uc or beyond, the control unit begins a
+ * The integrator takes the input without a break. Where its output is at +Uc or -Uc or beyond, the control unit begins a
  * reset at the next tick of its clock: a reference of the opposite sign for TCLK, one pulse of output. While it lasts no other
  * begins, and the same reference rests a while before it is used again. Charge is counted in nominal pulses, in integers,
  * and the input is constant between two looks at it: so the pulses of any stretch follow in closed form, and are the same

@@ -1,7 +1,7 @@
 /* One analog integrator of a PMKA with its precision reset (article section 3, figure 4), and the quadrature of its input.
  *
  * The state is the charge of the capacitor, q = C U: what flows in is (Ua + zero) / RIN, a reset draws UREF / Rr(sign). So C
- * stands only between the charge and the voltage, as in the article's (1)..(4), and may age while charged. The voltage
+ * is only between the charge and the voltage, as in the article's (1)..(4), and may age while charged. The voltage
  * follows (1): a positive input raises it; a positive reset lowers it (docs/boards/pmka.md). Pure, one thread. */
 #ifndef PSABENCH_BOARD_PMKA_INTEGRATOR_H
 #define PSABENCH_BOARD_PMKA_INTEGRATOR_H

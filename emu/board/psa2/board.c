@@ -88,7 +88,7 @@ static bool tadc_flip(void *board, unsigned part, unsigned reg, uint8_t mask, in
 }
 
 #define EVERY_FAULT (BOARD_FAULT_DRDY | BOARD_FAULT_DOUT | BOARD_FAULT_SYNC | BOARD_FAULT_CLOCK)
-#define DRD_A_IS_X  "DRD_A is the pin of converter X alone, nobody hears this one; adc.x has it"
+#define DRD_A_IS_X  "DRD_A is the pin of converter X only, this pin is not connected; use adc.x"
 
 static const struct board_part parts[PARTS] = {
     [PART_KPSA] = {.name = "kpsa",

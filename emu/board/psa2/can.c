@@ -33,10 +33,10 @@ static uint32_t abort_of(enum psa2_result result)
     return CO_AB_GENERAL;
 }
 
-static void port_fault(struct psa2_can *c, enum psa2_group group, bool stands, int64_t t_ns)
+static void port_fault(struct psa2_can *c, enum psa2_group group, bool active, int64_t t_ns)
 {
     const uint16_t code = group == PSA2_ACCEL ? PSA2_EMCY_ACCEL_PORT : PSA2_EMCY_TEMP_PORT;
-    if (stands) co_node_error(&c->node, code, 0x81, group == PSA2_ACCEL ? 1 : 2, t_ns);
+    if (active) co_node_error(&c->node, code, 0x81, group == PSA2_ACCEL ? 1 : 2, t_ns);
     else co_node_error_end(&c->node, code, t_ns);
 }
 

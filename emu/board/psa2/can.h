@@ -61,7 +61,7 @@ struct psa2_can {
     struct psa2_frame latest;
     /* stream */
     int64_t checked_period_ns; /* period for which fits holds */
-    bool fits;                 /* false: the stream stands, EMCY FF03h is active */
+    bool fits;                 /* false: the stream stops, EMCY FF03h is active */
     bool sync_armed;
     int64_t sync_ns;
     struct can_msg block; /* being filled */
@@ -71,7 +71,7 @@ struct psa2_can {
     /* controller's serial port */
     struct psa2_request request, pulse;
     bool request_busy, pulse_busy;
-    uint8_t request_axis; /* whose answer is wanted */
+    uint8_t request_axis; /* whose answer is requested */
     uint32_t ticket, syncs_missed;
     /* text objects, load mark */
     char refusal[PSA2_CAN_TEXT], remark[PSA2_CAN_REMARK + 1];

@@ -32,7 +32,7 @@ static void say_needs_fd(unsigned form, char why[PSA2_CAN_TEXT])
                    forms[form].name);
 }
 
-/* How often a form is due; with samples on SYNC the host sets the pace, and an overrun is told when it happens. */
+/* How often a form is due; with samples on SYNC the host sets the pace, and an overrun is reported when it happens. */
 static int64_t due_ns(const struct psa2_can_settings *set, int64_t period_ns)
 {
     if (set->sample_mode == PSA2_ON_SYNC) return 0;
@@ -60,7 +60,7 @@ int64_t psa2_can_config0_period_ns(uint32_t fclk_hz, uint8_t config0)
     return (INT64_C(16384) >> dr) * NS_PER_S / fclk_hz;
 }
 
-/* A host that asks for the same again and again is told by its aborts; the listener hears each text once. */
+/* A host that asks for the same again and again is reported by its aborts; the listener hears each text once. */
 static void refuse(struct psa2_can *c, const char why[PSA2_CAN_TEXT])
 {
     if (strcmp(c->refusal, why) == 0) return;

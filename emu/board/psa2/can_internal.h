@@ -14,7 +14,7 @@ uint32_t psa2_can_read(void *ctx, const struct co_entry *e, struct co_value *v, 
 uint32_t psa2_can_write(void *ctx, const struct co_entry *e, const struct co_value *v, int64_t t_ns);
 void psa2_can_defaults(struct psa2_can *c);
 
-/* Hands a request of the SDO server to the board; axis: whose answer is wanted. CO_PENDING, or why not. */
+/* Hands a request of the SDO server to the board; axis: whose answer is requested. CO_PENDING, or why not. */
 uint32_t psa2_can_submit(struct psa2_can *c, enum psa2_group group, enum psa2_op op, uint8_t addr, uint8_t value,
                          unsigned axis, int64_t t_ns);
 

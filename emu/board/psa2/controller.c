@@ -109,7 +109,7 @@ static const struct psa2_setup_step *setup_step(const struct psa2 *b)
     return s;
 }
 
-/* DRD_A is awaited all the time, anew after each step: a new CONFIG0 means another settling time. */
+/* DRD_A is awaited all the time, again after each step: a new CONFIG0 means another settling time. */
 static void await_step(struct psa2 *b, int64_t t_ns)
 {
     psa2_arm_patience(b, t_ns);

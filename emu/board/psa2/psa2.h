@@ -3,7 +3,7 @@
  * After Res the controller sets the converters up as its profile says, then reads the three codes at each DRD_A, scans
  * the temperature channels, and sends four words on Int/Data/CLK (article section 5). The host of the bench reaches the
  * registers only through the controller: psa2_submit(). Plain struct owned by the caller, one thread, no allocation.
- * Edges are reported to the trace only while watched, unwatched lines only where they come to rest: a late listener is told
+ * Edges are reported to the trace only while watched, unwatched lines only where they come to rest: a late listener is given
  * true levels. Words, times and counters are the same either way. */
 #ifndef PSABENCH_BOARD_PSA2_PSA2_H
 #define PSABENCH_BOARD_PSA2_PSA2_H
@@ -71,7 +71,7 @@ struct psa2_frame {
 /* EMCY codes of psa2_host.fault: told once, again only after data-ready has come. */
 enum psa2_fault {
     PSA2_FAULT_ACCEL_PORT = 0xFF01, /* no DRD_A for 100 ms beyond the settling time */
-    PSA2_FAULT_TEMP_PORT = 0xFF02   /* no DRD_T likewise */
+    PSA2_FAULT_TEMP_PORT = 0xFF02   /* no DRD_T for the same time */
 };
 
 enum psa2_group { PSA2_ACCEL, PSA2_TEMP };
@@ -115,13 +115,13 @@ struct psa2_counters {
  * nothing of the board's may be called from inside. */
 void psa2_init(struct psa2 *b, const struct psa2_profile *p, const struct board_cfg *cfg, const struct board_io *io,
                struct sched *s);
-void psa2_attach(struct psa2 *b, const struct psa2_host *h); /* from the next frame on; nobody after psa2_init() */
-void psa2_listen(struct psa2 *b, bool on); /* io->event is told; a frame that is about to begin may begin untold */
+void psa2_attach(struct psa2 *b, const struct psa2_host *h); /* from the next frame on; no one after psa2_init() */
+void psa2_listen(struct psa2 *b, bool on); /* io->event is reported; a frame that is about to begin may begin untold */
 void psa2_power_up(struct psa2 *b, int64_t t_ns); /* supplies good: chips power up, Res released, set-up begins */
 void psa2_reset(struct psa2 *b, int64_t t_ns);    /* a pulse on Res */
 
 /* The supply fails, in the middle of whatever goes on: all lines fall, a frame under way ends there, converters and
- * controller forget everything but the counters. psa2_power_up() begins anew. Without power it does nothing. */
+ * controller forget everything but the counters. psa2_power_up() begins again. Without power it does nothing. */
 void psa2_power_down(struct psa2 *b, int64_t t_ns);
 
 /* From now on; all false: none. Outlives resets and power. */

@@ -38,7 +38,7 @@ static enum psa2_result check_register(const struct psa2 *b, const struct psa2_r
 }
 
 /* Whole commands of one byte that the models carry out and that leave KPSA able to read on: no RREG or WREG without its
- * other bytes, no RDATA whose answer nobody would take. */
+ * other bytes, no RDATA whose answer no one would take. */
 static bool is_opcode(enum psa2_group group, uint8_t op)
 {
     static const uint8_t accel[] = {0x00, 0x01, 0x04, 0x05, 0x06, 0x07, 0x10, 0x11};

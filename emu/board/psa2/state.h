@@ -127,7 +127,7 @@ struct psa2 {
     bool fault_told; /* no DRD_A has come since the fault */
     bool drd_a_seen;
     int64_t drd_a_ns;    /* last fall */
-    int64_t period_ns;   /* of DRD_A as CONFIG0 stands */
+    int64_t period_ns;   /* of DRD_A as CONFIG0 is */
     int64_t patience_ns; /* no DRD_A until then is a fault; `patience` may be due earlier and then waits on */
     uint32_t seq;        /* of the next DRD_A */
     struct psa2_request *request;

@@ -176,7 +176,7 @@ static void write_command(struct psd1 *b, uint16_t data, int64_t t_ns)
     b->job.failed = false;
     if (shown(b, data, &b->staged)) return;
     b->job.own = (struct psd1_request){.command = (uint8_t)data, .word = b->staged, .done = own_done, .ctx = b};
-    b->job.failed = psd1_request(b, &b->job.own, &why, t_ns) != BOARD_CYCLE_OK; /* somebody else's came meanwhile */
+    b->job.failed = psd1_request(b, &b->job.own, &why, t_ns) != BOARD_CYCLE_OK; /* another client's came meanwhile */
 }
 
 static const struct {

@@ -42,7 +42,7 @@ struct psd1_cycle {
     int64_t t_dr_ns, t_a0_ns, t_end_ns; /* DR fall, A0 rise, last FL2 clear */
     uint16_t word[3];
     int32_t gyro[3]; /* counts since power-up, latched at A0 */
-    int16_t rate[3]; /* codes of the rate sensors, likewise */
+    int16_t rate[3]; /* codes of the rate sensors, at the same time */
     uint8_t status;  /* enum psd1_cycle_status */
 };
 
@@ -54,7 +54,7 @@ enum psd1_command {
     PSD1_CMD_NONE,
     PSD1_CMD_UC1,      /* calibrate: the word becomes UC1, is sent, coefficients are read, UC2 is sent */
     PSD1_CMD_UC2,      /* the word becomes UC2 and is sent */
-    PSD1_CMD_SHOW_UC1, /* UC1 to registers UC_HIGH, UC_LOW; likewise the others */
+    PSD1_CMD_SHOW_UC1, /* UC1 to registers UC_HIGH, UC_LOW; the others do the same */
     PSD1_CMD_SHOW_UC2,
     PSD1_CMD_ZERO = 0x10,    /* + axis: stored zero-scale coefficient */
     PSD1_CMD_FULL = 0x20,    /* + axis: stored full-scale coefficient */
@@ -81,7 +81,7 @@ struct psd1_counters {
     uint32_t cycles, resets, commands, timeouts;
     uint32_t late;                   /* strobes that began later than late_ns after FL2 */
     uint32_t stretched;              /* cycles inside which a conversion ended */
-    uint32_t lost_x, lost_y, lost_z; /* conversions that nobody has read, as of the latest cycle or DR */
+    uint32_t lost_x, lost_y, lost_z; /* conversions that no one has read, as of the latest cycle or DR */
     uint32_t bus_cycles;             /* on the bus carried out, the built-in host's too */
     uint32_t refused;                /* strobes without their word, and other cycles that were refused */
     uint32_t too_short;              /* of these: strobes shorter than strobe_min_ns */

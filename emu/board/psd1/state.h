@@ -113,7 +113,7 @@ struct psd1 {
     bool taken;     /* the word that waited has been read */
     uint32_t seq;
     uint32_t conversions; /* of all converters, when the cycle began */
-    uint32_t lost;        /* likewise, lost */
+    uint32_t lost;        /* lost, counted in the same way */
     struct psd1_cycle now, latest;
     /* control words and what else registers hold */
     uint32_t uc1, uc2, staged;

@@ -13,7 +13,7 @@ static const struct {
     enum { PINS, SHORTED, REFERENCE } measure;
     enum { WORD, ZERO, FULL } use;
     enum phase next;
-    bool anew;
+    bool restart;
 } phases[] = {
     // clang-format off
     [NORMAL]      = {PINS,      WORD, NORMAL,    false},
@@ -218,9 +218,9 @@ static void use_coef(struct ad7712 *a, double x)
 
 static void go_on(struct ad7712 *a)
 {
-    const bool anew = phases[a->phase].anew;
+    const bool restart = phases[a->phase].restart;
     const enum phase next = phases[a->phase].next;
-    if (anew) {
+    if (restart) {
         start_run(a, next, a->due.k);
         return;
     }

@@ -10,7 +10,7 @@
 #define CELLS_HZ   4000.0 /* looks a second at 10 MHz that leave no mains harmonic of note to the first alias */
 #define NOMINAL_HZ (1e7 / AD7712_MOD_TAU)
 
-/* Sources 3.5, gain 1 to 128; the last of a row stands for those that are not printed. */
+/* Sources 3.5, gain 1 to 128; the last of a row represents those that are not printed. */
 // clang-format off
 const struct ad7712_noise_row ad7712_noise[AD7712_NOISE_ROWS] = {
     {10,   {1.0,  .78,  .48, .33, .25, .25, .25, .25}},
@@ -49,7 +49,7 @@ double ad7712_noise_v(unsigned code, unsigned gain_log2)
     return lo->uv[gain_log2] * 1e-6 * det_exp(part * det_log(hi->uv[gain_log2] / lo->uv[gain_log2]));
 }
 
-/* Three boxcars of M looks, one after the other, have the zeros. Between them and the sinc3 of N modulator periods stands the
+/* Three boxcars of M looks, one after the other, have the zeros. Between them and the sinc3 of N modulator periods is the
  * droop of a look's own cell, (M sin(x/M) / (N sin(x/N)))^3 with x = pi f / fout; three more weights c, 1 - 2c, c with
  * c = (1 - M^2/N^2) / 8 make it to second order. With M = N nothing is left to make. */
 static void weigh(struct ad7712_sinc3 *f)

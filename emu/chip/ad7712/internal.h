@@ -1,4 +1,4 @@
-/* Between the files of the AD7712; nobody else includes it.
+/* Between the files of the AD7712; no other file includes it.
  *
  * ad7712/control.c control word, coefficients, power; ad7712/port.c frames; ad7712/pins.c the pins' edges, words at once and the
  * chip's own SCLK; ad7712/input.c volts to fractions of full scale; ad7712/conv.c conversions and calibrations on the

@@ -147,7 +147,7 @@ void ad7712_word_over(struct ad7712 *a, int64_t fall_ns)
 {
     if (a->port.source != AD7712_FROM_WORD || !a->unread) return;
     ad7712_word_read(a);
-    if (!a->io.drdy) a->drdy = true; /* nobody sees when */
+    if (!a->io.drdy) a->drdy = true; /* no one sees when */
     if (!a->drdy) sched_at(a->sched, &a->rise_ev, fall_ns + delay_ns(a, a->cfg.drdy_rise_ns, 1));
 }
 

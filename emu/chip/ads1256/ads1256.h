@@ -48,7 +48,7 @@ struct ads1256 {
     struct ads1256_cfg cfg;
     struct ads1256_io io;
     struct chip_fault fault;
-    void (*tell_drdy)(void *ctx, bool level, int64_t t_ns); /* io.drdy, which tells nobody while DRDY is stuck */
+    void (*tell_drdy)(void *ctx, bool level, int64_t t_ns); /* io.drdy, which tells no one while DRDY is stuck */
     struct sched *sched;
     struct rng noise;
     struct clk clkin;

@@ -69,7 +69,7 @@ static void start_run(struct ads1256 *a, int64_t start_tau)
 }
 
 /* DRATE changed without synchronisation: periods of the new length from the DRDY at CLKIN count ready on. The sinc5 goes
- * on with what it holds; only the mean begins anew. */
+ * on with what it holds; only the mean begins again. */
 static void change_rate(struct ads1256 *a, int64_t ready)
 {
     a->rate = a->rate_next;

@@ -65,7 +65,7 @@ struct ads1256_mean {
 /* Starts afresh at rate r. cells_max limits the looks at the input where the sinc5 is not computed; 0: no limit. */
 void ads1256_mean_start(struct ads1256_mean *m, const struct ads1256_rate *r, unsigned cells_max);
 
-/* Goes over to rate r between two conversions, with the sinc5 as it stands. Returns the number of the run's next cell. */
+/* Goes over to rate r between two conversions, with the sinc5 as it is. Returns the number of the run's next cell. */
 int64_t ads1256_mean_change(struct ads1256_mean *m, const struct ads1256_rate *r, unsigned cells_max);
 
 /* Takes the cell x; a complete mean goes to m->out. */

@@ -26,7 +26,7 @@ static inline unsigned ain_of(unsigned select)
     return select > ADS1256_AINCOM ? ADS1256_AINCOM : select;
 }
 
-/* Voltage of the open circuit. What an ADS1255 does not have is taken as AGND (E0): what floats there nobody knows. */
+/* Voltage of the open circuit. What an ADS1255 does not have is taken as AGND (E0): what floats there no one knows. */
 static inline double open_v(struct ads1256 *a, unsigned select, int64_t t_ns)
 {
     const unsigned ain = ain_of(select);

@@ -1,4 +1,4 @@
-/* Between the files of the ADS1255/ADS1256; nobody else includes it.
+/* Between the files of the ADS1255/ADS1256; no other file includes it.
  *
  * ads1256/regs.c registers, reset and power; ads1256/port.c bytes to commands; ads1256/pins.c edges of SCLK and DIN;
  * ads1256/gpio.c D0..D3 and CLKOUT; ads1256/input.c pins to volts; ads1256/conv.c conversions and calibrations on the

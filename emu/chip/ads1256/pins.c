@@ -91,7 +91,7 @@ static bool pattern_complete(struct ads1256 *a, int64_t high_ns)
     struct ads1256_pins *p = &a->pins;
     const unsigned from = p->pattern;
     p->pattern = 0;
-    for (unsigned i = from;; i = 0) { /* a pulse that does not go on may begin anew */
+    for (unsigned i = from;; i = 0) { /* a pulse that does not go on may begin again */
         const bool fits =
             high_ns >= ads1256_tau_ns(a, pattern[i].min_tau) && high_ns <= ads1256_tau_ns(a, pattern[i].max_tau);
         if (fits) p->pattern = (uint8_t)(i + 1);

@@ -67,7 +67,7 @@ struct ads1282_io {
     /* The same for n samples in a row, if that is cheaper; may be NULL. */
     void (*vin_row_v)(void *ctx, unsigned mux, const int64_t *t_ns, unsigned n, double *vin_v);
     void (*drdy)(void *ctx, bool level, int64_t t_ns);  /* DRDY pin, active low; called on changes only */
-    void (*mflag)(void *ctx, bool level, int64_t t_ns); /* MFLAG pin likewise; costs an event for each input sample */
+    void (*mflag)(void *ctx, bool level, int64_t t_ns); /* MFLAG pin; costs an event for each input sample */
     /* Pins M0 and M1 at each MCLK (CLK/4) while CONFIG0 FILTR = 00; not given: the bits are not computed. */
     void (*modulator)(void *ctx, bool m0, bool m1, int64_t t_ns);
 };

@@ -214,7 +214,7 @@ static void sample_bits(struct ads1282 *a, int64_t until_ns)
     }
 }
 
-/* Nobody looks at the bits. */
+/* No one looks at the bits. */
 static void sample_nothing(struct ads1282 *a, int64_t until_ns)
 {
     (void)a;

@@ -6,7 +6,7 @@
 
 #include "chip/ads1282/ads1282.h"
 
-#define ADS1282_PULSE_TCLK 4 /* DRDY high when nobody read; E2 ADS1287, M80 */
+#define ADS1282_PULSE_TCLK 4 /* DRDY high when no one read; E2 ADS1287, M80 */
 
 /* ---- Serial column ---- */
 

@@ -49,7 +49,7 @@ static bool read_under_way(const struct ads1282 *a, int64_t t_ns)
 }
 
 /* The output register takes a word, read or not: there is no lock. A read under way goes on at its bit in the new word
- * (the exact tear is M50); else the word begins at bit 31, wherever the shifter's byte stands. */
+ * (the exact tear is M50); else the word begins at bit 31, wherever the shifter's byte is. */
 void ads1282_serial_deliver(struct ads1282 *a, uint32_t word, int64_t t_ns)
 {
     if (!a->rdatac && !a->rdata_due) { /* the word of an RDATA, once read, answers SCLK no more */

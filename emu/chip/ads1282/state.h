@@ -104,7 +104,7 @@ struct ads1282 {
     double lsb_per_v, noise_lsb, direct_gain;
     struct clk_pos ended;                    /* end of data period `period` - 1, at first of period 0 */
     struct clk_step period_step, pulse_step; /* from there to the next end; to 4 tCLK before it */
-    struct sched_ev due, pulse;              /* DRDY falls; DRDY rises 4 tCLK earlier if nobody read */
+    struct sched_ev due, pulse;              /* DRDY falls; DRDY rises 4 tCLK earlier if no one read */
     struct sched_ev wake;                    /* end of the internal reset */
     struct sched_ev watch;                   /* next input sample, where MFLAG or the modulator's bits are looked at */
 };

@@ -36,7 +36,7 @@ enum can_hub_deed { CAN_HUB_CAME, CAN_HUB_WENT, CAN_HUB_SENT };
 
 struct can_hub_tap {
     void (*deed)(void *ctx, const struct can_hub *h, const struct can_client *c, enum can_hub_deed deed,
-                 const struct can_msg *m); /* m: the frame that was queued; NULL: nobody listens */
+                 const struct can_msg *m); /* m: the frame that was queued; NULL: no observer */
     void *ctx;
 };
 
@@ -51,7 +51,7 @@ struct can_hub {
     void *say_ctx;
     struct can_hub_tap tap;
     /* read-only outside can/can_hub.c */
-    struct can_client *clients; /* ghosts among them: `leaving`, nobody behind them */
+    struct can_client *clients; /* ghosts among them: `leaving`, no one behind them */
     struct can_client gone;     /* counters of those who left */
     uint64_t taken;
     uint32_t clients_seen;
@@ -60,7 +60,7 @@ struct can_hub {
 /* Attaches the client: its node's rx, sent, fd, order and ctx and its adapter and name have been filled in. */
 void can_hub_up(struct can_hub *h, struct can_client *c);
 
-/* The client starts anew without having left the bus: its counters begin at zero, what they were is added to the gone. */
+/* The client starts again without having left the bus: its counters begin at zero, what they were is added to the gone. */
 void can_hub_restart(struct can_hub *h, struct can_client *c);
 
 /* Detaches it; its counters are added to those of the gone. Frames of its still queued are dropped. */

@@ -4,7 +4,7 @@
  *
  * Seconds have ten digits, so that lines of frames of one kind are of one length. It only listens and is no client: it
  * changes nothing on the bus, and time does not wait for it but while the kernel takes the text (a file, not a pipe that
- * nobody reads). */
+ * no one reads). */
 #ifndef PSABENCH_LINK_CAN_CAN_LOG_H
 #define PSABENCH_LINK_CAN_CAN_LOG_H
 

@@ -98,7 +98,7 @@ static void pop(struct socketcan *s)
     s->len--;
 }
 
-/* The interface is down, or refuses the frame: it is lost as on an unplugged cable, so that nobody waits for it. */
+/* The interface is down, or refuses the frame: it is lost as on an unplugged cable, so that no client waits for it. */
 static void lose(struct socketcan *s, int err)
 {
     if (!s->down_told) say(s, strerror(err));

@@ -75,7 +75,7 @@ void bus_pty_failed(struct bus_pty *p, const char *code, int64_t t_ns)
     if (!p->orphan) refuse(p, &p->request, 2, code, t_ns);
 }
 
-/* Nobody is there to read. */
+/* No program has it open. */
 static void on_flush(struct link *l, int64_t t_ns)
 {
     struct bus_pty *p = (struct bus_pty *)l;

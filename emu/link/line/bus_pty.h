@@ -2,7 +2,7 @@
  *
  * The text is that of line/bus_text.h; docs/busport.md is its page. One client; lines are carried out one after the other: the next
  * is taken when the one before has been answered, so that a host may send many at once. A cycle takes simulated time: in
- * step pace it ends when the bench is told to run. What a client that has left had sent is still carried out, the answers
+ * step pace it ends when the bench is commanded to run. What a client that has left had sent is still carried out, the answers
  * are thrown away. */
 #ifndef PSABENCH_LINK_LINE_BUS_PTY_H
 #define PSABENCH_LINK_LINE_BUS_PTY_H

@@ -1,4 +1,4 @@
-/* Motion of one axis of a table: what it was told, and where that takes it under its limits.
+/* Motion of one axis of a table: what it was given, and where that takes it under its limits.
  *
  * A command makes a plan: pieces of constant acceleration, then rest, a constant rate or a sine. Angle, rate and acceleration
  * are closed forms of time; a command in mid-motion starts from the angle and rate of that instant, so both are continuous.

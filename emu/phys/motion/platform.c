@@ -12,7 +12,7 @@
 #define RADPS_PER_DEGPH (RAD_PER_DEG / 3600.0)
 #define TURN_RAD        6.283185307179586
 #define STOP_RAD        (PLATFORM_STOP_DEG * RAD_PER_DEG)
-#define AFRESH_EVERY    64 /* steps: sines and cosines are then computed anew, in between turned on */
+#define AFRESH_EVERY    64 /* steps: sines and cosines are then computed again, in between turned on */
 
 struct platform_cfg platform_default(void)
 {
@@ -33,7 +33,7 @@ struct platform_cfg platform_default(void)
 
 /* ---- kinematics */
 
-/* What the platform stands on: the rate of l, and the outer axis in l. */
+/* What the platform is on: the rate of l, and the outer axis in l. */
 struct ground {
     double w_l_radps[3];
     double z_c[3];

@@ -53,7 +53,7 @@ struct platform_node {
 /* What was drawn for a setting. */
 struct platform_setting {
     int64_t from_ns;
-    struct pose level; /* how the block of the level sensors stands on the platform */
+    struct pose level; /* how the block of the level sensors is on the platform */
     double set_rad, read_rad;
 };
 
@@ -107,7 +107,7 @@ void platform_at(struct platform *p, int64_t t_ns, struct platform_state *out);
 double platform_servo_rad(struct platform *p, int64_t t_ns);
 double platform_encoder_rad(struct platform *p, int64_t t_ns);
 
-/* How the block of the level sensors stands on the platform, by its tilt errors: p in the place of n. */
+/* How the block of the level sensors is on the platform, by its tilt errors: p in the place of n. */
 const struct pose *platform_level(const struct platform *p, int64_t t_ns);
 
 /* Specific force in p at the centre, where the axes meet: at rest g (-sin g cos b, sin b, cos g cos b). */

@@ -1,6 +1,6 @@
 /* Rate table of one to three axes, outer to inner, with the errors that a table has.
  *
- * Frames: l is the bench's level frame (earth.h); the base stands on it with a tilt; each axis turns what it carries about its
+ * Frames: l is the bench's level frame (earth.h); the base is on it with a tilt; each axis turns what it carries about its
  * x, y or z, so that at zero angles all frames are parallel but for the errors; t is what the innermost axis carries, and
  * the units on it. All axes meet in one point, the origin of lever arms. An operator's angles are the readout's: a command
  * moves the axis to where the readout, without noise, shows the angle. Axes count from 0. Plain struct, one thread. */

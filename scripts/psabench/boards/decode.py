@@ -67,7 +67,7 @@ def _senders(ids: set[int], board: str) -> set[int]:
 def _check_there(path: Path) -> None:
     """Before the table's head is printed."""
     if not path.exists() or path.is_dir():
-        raise BadInput(f"{path}: no such file" if not path.exists() else f"{path}: a folder; a file is wanted")
+        raise BadInput(f"{path}: no such file" if not path.exists() else f"{path}: a folder; expected a file")
 
 
 def _chunks(path: Path, reader: FrameReader | ReadingReader, ids: set[int]) -> Iterator[Frames | Readings]:
@@ -75,7 +75,7 @@ def _chunks(path: Path, reader: FrameReader | ReadingReader, ids: set[int]) -> I
     read = 0
     try:
         with can.LogReader(str(path)) as log:
-            for read, m in enumerate(log, start=1):  # noqa: B007 (the number stands in the message below)
+            for read, m in enumerate(log, start=1):  # noqa: B007 (the number is in the message below)
                 reader.on_message(m)
                 if not (m.is_extended_id or m.is_error_frame or m.is_remote_frame):
                     ids.add(m.arbitration_id)

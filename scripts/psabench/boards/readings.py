@@ -114,7 +114,7 @@ class ReadingReader:
         return len(self._kept)
 
     def forget(self) -> None:
-        """Drop what has arrived and is not taken; the counting starts anew."""
+        """Drop what has arrived and is not taken; the counting starts again."""
         self._begun, self._kept, self._t_s, self._count, self._seen = [], [], [], None, False
 
     def forget_half(self) -> None:

@@ -39,7 +39,7 @@ def reader_of(board: str, node_id: int) -> FrameReader | ReadingReader:
 
 
 def identify(host: CanHost, node_id: int) -> type[Unit]:
-    """The class of the unit at a node, from its name (object 1008h); PSA-2 where nobody answers, or the name is new."""
+    """The class of the unit at a node, from its name (object 1008h); PSA-2 where no one answers, or the name is new."""
     listeners = list(host.listeners)
     try:
         title = str(CanopenNode(host, node_id, proto_file("psa2.eds"), patience_s=NAME_S).read(NAME))

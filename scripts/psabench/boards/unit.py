@@ -137,7 +137,7 @@ class Unit:
         self.frames.forget_half()
 
     def reset(self) -> None:
-        """A pulse on the board's reset: everything falls back to its defaults and is set up anew."""
+        """A pulse on the board's reset: everything falls back to its defaults and is set up again."""
         self.node.nmt(NMT_RESET_NODE)
 
     def stream(self, count: int, patience_s: float = 5.0) -> Frames | Readings:

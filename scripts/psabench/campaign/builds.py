@@ -81,7 +81,7 @@ def _imports(path: Path) -> Iterator[str]:
 
 
 def _loaded() -> Path:
-    """The library's file. One that the system's loader found by its name is told by the kernel."""
+    """The library's file. One that the system's loader found by its name is reported by the kernel."""
     path = Path(library().path)
     if path.is_file():
         return path

@@ -1,7 +1,7 @@
 """The studies of a campaign of gyrocompassing: which set-ups are computed, and what a reader sees beside them.
 
 A study is a list of cases; a case is a set-up through a chain, so many runs of it. The article's sentence, one by one
-(readings), one source of error at a time, scans, and the hold. What must come out stands in `claims`.
+(readings), one source of error at a time, scans, and the hold. What must come out is in `claims`.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ ENCODER = {  # read, instead of the set angle trusted
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Case:
-    """A set-up with what the report calls it; `x` is where it stands on the axis of a scan."""
+    """A set-up with what the report calls it; `x` is where it is on the axis of a scan."""
 
     study: str
     name: str

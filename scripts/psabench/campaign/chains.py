@@ -164,7 +164,7 @@ def config(setup: Setup) -> nav_mc.McConfig:
 
 
 def _droop_rad(setup: Setup) -> float:
-    """What a proportional azimuth loop stands off by while it works against the drift: in all positions, and seen by an
+    """What a proportional azimuth loop is off by while it works against the drift: in all positions, and seen by an
     encoder that is read."""
     if setup.m2_per_s <= 0.0 or setup.encoder or setup.angle_sys not in ("none", "common"):
         return 0.0

@@ -115,7 +115,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     )
     p.add_argument("--store", type=Path, help="file of results (OUT/store.sqlite)")
     p.add_argument("--out", type=Path, default=Path("build/campaign"), help="folder of the report (%(default)s)")
-    p.add_argument("--fresh", action="store_true", help="compute anew what the store has")
+    p.add_argument("--fresh", action="store_true", help="compute again what the store has")
     p.add_argument("--forget-others", action="store_true", help="remove what other builds have computed of these cases")
     return p.parse_args(words)
 
@@ -179,7 +179,7 @@ def campaign(options: Options, progress: Progress) -> Campaign:
 
     plans = _plans(options)
     if options.dask is not None:
-        reach(options.dask)  # first: the store may have all that is wanted, and --fresh forgets what it has
+        reach(options.dask)  # first: the store may have all results, and --fresh forgets what it has
     with Store(options.store or options.out / "store.sqlite") as store:
         for plan in plans:
             _fill(plan, store, options, progress)
@@ -259,7 +259,7 @@ def _fill(plan: Plan, store: Store, options: Options, progress: Progress) -> Non
 
 
 def _others(plan: Plan, store: Store, forget: bool) -> None:
-    """Tell, on stderr, what other builds have computed of these cases, and remove it if that is wanted."""
+    """Report, on stderr, what other builds have computed of these cases, and remove it on request."""
     origins = {o.key: o for o in map(plan.origin, plan.cases)}.values()
     found = Counter[str]()
     for o in origins:

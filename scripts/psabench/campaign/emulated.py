@@ -74,8 +74,8 @@ def check(setup: Setup) -> None:
     """Raises BadInput for what an instrument cannot be told to be."""
     white = level_white_degph_rts(setup.window_s, setup.m1_per_s)
     reasons = (
-        (setup.slew_dps <= 0.0, "its turns take time: slew_dps is wanted"),
-        (setup.m2_per_s <= 0.0, "its azimuth loop has a gain: m2_per_s is wanted, as 2"),
+        (setup.slew_dps <= 0.0, "its turns take time: expected slew_dps"),
+        (setup.m2_per_s <= 0.0, "its azimuth loop has a gain: expected m2_per_s, as 2"),
         (setup.gimbal == "alpha", "its platform turns about the gimbal: gimbal is uncorrected or corrected"),
         (setup.angle_sys in ("increment", "accumulates"), "its angle sensor has one zero: angle_sys is none or common"),
         (setup.slew_dps2 not in (0.0, UNIT_DPS2), f"its turns accelerate with slew_dps2={UNIT_DPS2:g}"),
@@ -108,18 +108,16 @@ def resolved(path: str) -> str:
 
 
 def setup_of(path: Path) -> Setup:
-    """The set-up that a scenario of one's own stands for: its latitude and its platform's errors.
+    """The set-up that a scenario of one's own represents: its latitude and its platform's errors.
 
-    The vehicle stands anywhere, tilted within its default range; of the article only the schedule is left. Raises
+    The vehicle is anywhere, tilted within its default range; of the article only the schedule is left. Raises
     BadInput for a scenario that has no such instrument.
     """
     text = resolved(str(path))
     s: Scenario = json.loads(text)
     boards = {u["board"] for u in s.get("units", [])}
     if "platform" not in s or not {"gyro", "psa2"} <= boards:
-        raise BadInput(
-            f"--scenario {path}: a platform, a gyro unit and the PSA-2 of its level sensors are wanted in it"
-        )
+        raise BadInput(f"--scenario {path}: expected a platform, a gyro unit and the PSA-2 of its level sensors in it")
     p = s["platform"]
     if p["torquer_scale"][0] != p["torquer_scale"][1]:
         raise BadInput(f"--scenario {path}: torquer_scale of the axes differs; the algebra beside it has one")
@@ -164,7 +162,7 @@ def scenario(setup: Setup, at: Instrument) -> Scenario:
         "torquer_scale": [setup.torquer_scale] * 2,
         "level_tilt_arcmin": [setup.beta_sys_arcmin, setup.gamma_sys_arcmin],
         "level_repeat_arcmin": setup.beta_random_arcmin,
-        # Where the gimbal stands at more than was asked for, its sensor shows less than there is.
+        # Where the gimbal is at more than was asked for, its sensor shows less than there is.
         "angle_zero_arcmin": -setup.angle_sys_arcmin if setup.angle_sys == "common" else 0.0,
         "angle_set_arcmin": 0.0 if setup.encoder else setup.angle_random_arcmin,
         "angle_read_arcmin": setup.angle_random_arcmin if setup.encoder else 0.0,

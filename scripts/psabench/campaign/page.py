@@ -228,7 +228,7 @@ def _runs(count: int) -> str:
 
 
 def _too_large(c: Campaign, study: Study) -> Iterator[str]:
-    """The closed form is of first order: what it says of large errors is told as such."""
+    """The closed form is of first order: what it says of large errors is reported as such."""
     if c.facts["chain"] != chains.CHAINS["closed"].title:
         return
     for case in c.cases:

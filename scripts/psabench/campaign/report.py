@@ -31,7 +31,7 @@ def gather(plans: Sequence[Plan], store: Store) -> Campaign:
         found[case.study, case.name] = Figures.of(rows) if case.hold is None else HoldFigures.of(rows)
         if case.study == "readings" and case.name in SHOWN:
             curves[case.name] = rows
-    # The limits are for the error set as it stands, and for chains that compute all of it.
+    # The limits are for the error set as it is, and for chains that compute all of it.
     usual = not CHAINS[plan.chain].emulates and _plain(plan)
     return Campaign(
         facts=_facts(plan),

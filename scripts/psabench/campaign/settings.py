@@ -38,8 +38,8 @@ def _word(about: str) -> Setting:
 
 
 SETTINGS: Mapping[str, Setting] = {
-    "latitude_deg": _number("deg", -90, 90, "where it stands"),
-    "latitude_error_arcmin": _number("arcmin", -599, 599, "of what the host is told"),
+    "latitude_deg": _number("deg", -90, 90, "where it is"),
+    "latitude_error_arcmin": _number("arcmin", -599, 599, "of what the host is reported"),
     "tilt_deg": _number("deg", 0, 30, "pitch and roll of the parked vehicle"),
     "tilt": _word("within +-tilt_deg, or at the corners"),
     "alpha1_deg": _number("deg", -360, 360, "of the platform in position 1"),
@@ -66,7 +66,7 @@ SETTINGS: Mapping[str, Setting] = {
     "slew_dps": _number("deg/s", 0, 1000, "rate of the turns; 0: gap_s instead"),
     "slew_dps2": _number("deg/s2", 0, 1000, "their acceleration; 0: at once"),
     "m1_per_s": _number("1/s", 0.01, 20, "levelling loop"),
-    "m2_per_s": _number("1/s", 0, 20, "azimuth loop, which stands off by drift/m2; 0: an ideal one (algebra only)"),
+    "m2_per_s": _number("1/s", 0, 20, "azimuth loop, which is off by drift/m2; 0: an ideal one (algebra only)"),
     "gm_before_s": _number("s", 0, 1e6, "with gm_from_zero: from power-on to the first window"),
     "settle_s": _number("s", 0, 86400, "from a turn to its window, with slew_dps"),
     "method": _word("estimator"),
@@ -101,7 +101,7 @@ def out_of_range(setup: Setup, name: str) -> str:
 
 
 def rehearse(cases: Sequence[Case], words: Sequence[str]) -> None:
-    """One run of each case: what the algebra refuses is told before any worker starts. Raises BadInput."""
+    """One run of each case: what the algebra refuses is reported before any worker starts. Raises BadInput."""
     library()  # where there is none, that is no case's fault
     for case in cases:
         try:

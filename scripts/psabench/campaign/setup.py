@@ -1,6 +1,6 @@
 """What a campaign of gyrocompassing varies: errors of the instrument, schedule of positions, estimation, and the hold.
 
-Fields are in people's units; the names say which. Defaults are the article's error set as it stands, read literally.
+Fields are in people's units; the names say which. Defaults are the article's error set as it is, read literally.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def level_white_degph_rts(window_s: float, m1_per_s: float = 1.0) -> float:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Setup:
-    """A virtual instrument, where it stands, and what is done with it."""
+    """A virtual instrument, where it is, and what is done with it."""
 
     latitude_deg: float = 50.0  # the article names none; E0
     latitude_error_arcmin: float = 0.1
@@ -73,7 +73,7 @@ class Setup:
     slew_dps2: float = 0.0  # acceleration of a turn that reaches its rate; 0: at once
     settle_s: float = 0.0
     m1_per_s: float = 1.0  # levelling loop
-    m2_per_s: float = 0.0  # azimuth loop, proportional: it stands off by drift/m2; 0: an ideal one (algebra only)
+    m2_per_s: float = 0.0  # azimuth loop, proportional: it is off by drift/m2; 0: an ideal one (algebra only)
     method: str = "closed3"
     simplified: bool = True  # (14) for (13)
     scenario: str = ""  # of an emulator's bench, resolved, as JSON; "": the shipped one

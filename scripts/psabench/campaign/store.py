@@ -2,7 +2,7 @@
 
 A series is a table of float32 numbers, a row a run, that its origin determines: kind, input, seed, version and build.
 Run k of an origin is the same whoever computes it, so a series is filled in parts, in any order, and grows when more
-runs are wanted. Another build has series of its own, beside these and never mixed with them. What is written is written
+runs are requested. Another build has its own series, never mixed with these. What is written is written
 whole: a part lies in the file with its checksum or not at all, whatever ends us. One thread of one process uses a
 `Store`; several processes may share the file.
 """
@@ -132,7 +132,7 @@ class Store:
             elif application != APPLICATION:
                 raise BadInput(f"{self.path}: an SQLite file of another program, not a store of results")
             elif (found := int(self._one("PRAGMA user_version"))) == 1:
-                # The same tables, but a series may hold runs of several builds: kept under its old key, for nobody.
+                # The same tables, but a series may hold runs of several builds: kept under its old key, for no one.
                 self._do(f"PRAGMA user_version = {FORMAT}")
             elif found != FORMAT:
                 raise BadInput(f"{self.path}: a store of format {found}; this psabench reads format {FORMAT}")

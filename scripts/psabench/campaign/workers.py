@@ -127,7 +127,7 @@ def _no_interrupt_for_children() -> Iterator[None]:
 
 @contextmanager
 def _cluster_at(address: str, chain: str) -> Iterator[Workers]:
-    reach(address)  # a Client that finds nobody does not end quietly
+    reach(address)  # a Client that finds no one does not end quietly
     try:
         client = _distributed().Client(address, timeout=CONNECT_S)
     except OSError as e:

@@ -21,7 +21,7 @@ examples:
 """
 
 DEVICE_EPILOG = """\
-Black box: the suite sees CAN, lines and the bus port, and nothing else. What a missing probe would have shown is told
+Black box: the suite sees CAN, lines and the bus port, and nothing else. What a missing probe would show is reported
 as not observable, never as passed. OUT/report.html is the report, OUT/junit.xml and OUT/conform.json the same for
 machines; a failure has its waveform beside it.
 
@@ -32,7 +32,7 @@ RECORDING_EPILOG = """\
 FILE: at most one log of the CAN bus (.log of candump, .blf, .asc, .trc, .csv, .mf4), at most one recording of lines
 (.vcd of any tool, .sr of sigrok, .bin: bytes of the line port). Together they are one recording of one bench.
 
-What the files do not show is told as not observable, never as passed.
+What the files do not show is reported as not observable, never as passed.
 
 Exit status: 0 conforms, 1 does not, 2 bad input, 130 ended by Ctrl-C.
 """
@@ -52,7 +52,7 @@ examples:
   psabench conform host --board pik --command ".venv/bin/python examples/vins_boards.py pik socketcand:{can} {node}"
   psabench conform host --manual can --results build/told.jsonl     start it by hand, case by case
 
-OUT has report.html, junit.xml and conform.json, and of each case what was on the bus and what was told.
+OUT has report.html, junit.xml and conform.json, and of each case what was on the bus and what was reported.
 Exit status: 0 conforms, 1 does not, 2 bad input, 3 the bench failed, 130 ended by Ctrl-C.
 """
 
@@ -106,7 +106,7 @@ def _add_device(suites: Any) -> None:
     own.add_argument(
         "--recorder-error", type=float, default=0.0, metavar="PPM", help="by which the clock of the probes is fast"
     )
-    what = p.add_argument_group("what is tested, and where it is told")
+    what = p.add_argument_group("what is tested, and where it is")
     what.add_argument(
         "--clock-ppm", type=float, default=100.0, metavar="PPM", help="allowed to all clocks (%(default)g)"
     )

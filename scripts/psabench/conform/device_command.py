@@ -108,5 +108,5 @@ def _pairs(words: list[str], option: str, kind: Callable[[str], Any]) -> dict[st
         except ValueError as e:
             raise BadInput(f"{option} {word}: {value!r} is no number") from e
         if not equals or not name or not value:
-            raise BadInput(f"{option} {word}: NAME=VALUE is wanted")
+            raise BadInput(f"{option} {word}: expected NAME=VALUE")
     return found

@@ -29,7 +29,7 @@ from psabench.link.protocol_files import dbc_node
 
 UNIT = "a"
 SLICE_S = 0.1
-HOSTLESS_SETUP_S = 0.3  # of a board that nobody reads: nothing tells that it is set up
+HOSTLESS_SETUP_S = 0.3  # of a board that is not read: nothing tells that it is set up
 # At the inputs of an emulator of ours: none is another's, one is negative, none is a round code.
 INPUTS_V: Mapping[str, float] = {"x": 2.0101, "y": -1.3007, "z": 0.7003}
 # Links of python-can whose time stamps are this machine's: they say when it looked, not when the frame passed.
@@ -242,7 +242,7 @@ class Subject:
 
         Of an emulator of ours: clock_ppm, by how much the board's clocks are fast; recorder_ppm, by how much that of
         the probes is. Where a profile cannot have such a clock, that of the probes is slow by as much: from outside
-        nobody can tell the two.
+        no one can tell the two.
         """
         if at.can is not None:
             return cls._connect(variant, at)
@@ -274,7 +274,7 @@ class Subject:
             path.write_text(json.dumps(made), encoding="utf-8")  # YAML, too
             line, bus = folder / "line", folder / "bus"
             extra: list[str | Path] = ["--vcd-unit", "1"]
-            extra += ["--line", line]  # which samples nothing while nobody has it open
+            extra += ["--line", line]  # which samples nothing while no one has it open
             extra += ["--bus-port", f"{UNIT}:{bus}"] if variant.family in BUS_BOARDS else []
             bench = Bench.start(path, seed=seed, can=at.adapter, extra=extra)
             stack.callback(bench.close)
@@ -303,7 +303,7 @@ AT_THEIR_FASTEST = ("psd1",)  # the part's clock is at its limit
 CRYSTALS: Mapping[str, str] = {"pik": "clock_tol_ppm"}  # what a specimen's clock is off by, drawn
 SENSITIVITIES = ("kx_v_per_g", "ky_v_per_g", "kz_v_per_g", "kxy_v_per_g2", "drift_v_per_s", "reading_noise_v")
 PPM = 1e-6
-# What a gyro unit stands on: the platform without errors, as it was left; the PSA-2 that measures its level.
+# What a gyro unit is on: the platform without errors, as it was left; the PSA-2 that measures its level.
 PLATFORM: Mapping[str, Any] = {
     "site": {"latitude_deg": 50.0},
     "platform": {"alpha0_deg": -33.0, "beta0_deg": 0.5, "gm_sigma_degph": 0.0},  # 0.2 deg/h are 0.04 over a run

@@ -52,7 +52,7 @@ class Talk:
     # ---- frames
 
     def send(self, can_id: int, data: bytes, *, fd: bool = False, remote: bool = False) -> None:
-        """A frame as it stands; it is in the log of the take, too."""
+        """A frame as it is; it is in the log of the take, too."""
         if self.take is not None:
             t_s = self.take.frames[-1].t_s if self.take.frames else 0.0
             self.take.frames.append(CanFrame(t_s=t_s, can_id=can_id, data=data, fd=fd, sent=True, remote=remote))

@@ -316,7 +316,7 @@ def untested(rows: Sequence[Requirement], outcomes: Sequence[Outcome]) -> list[O
 
 
 def _clock_outcome(bench: Bench, only: Sequence[str]) -> Iterator[Outcome]:
-    """A clock that is off and that nobody excuses is a finding about the board's period."""
+    """A clock that is off and that no one excuses is a finding about the board's period."""
     row, c = clocks.beat_row(bench.variant), bench.clocks
     bad = [
         own
@@ -355,7 +355,7 @@ def _judged(bench: Bench, proof: Proof, rows: tuple[Requirement, ...], keep: Kee
     return replace(_carried_out(bench, proof, evidence, found, keep), took_s=time.monotonic() - begun_s)
 
 
-# Where the device suite would say which option is wanted.
+# Where the device suite would name the missing option.
 UNRECORDED = {
     "can": "no CAN bus was recorded",
     "fd": "no FD frame was recorded",
@@ -371,7 +371,7 @@ UNRECORDED = {
 def _missing(bench: Bench, way: str) -> str:
     lines = bench.recording.lines
     if way == "pins" and lines is not None:
-        return f"edges are known to {lines.resolution_ns:.4g} ns; {PINS_NS:g} ns or better are wanted"
+        return f"edges are known to {lines.resolution_ns:.4g} ns; expected {PINS_NS:g} ns or better"
     if way in ("line", "pins"):
         return "no lines were recorded"
     return UNRECORDED.get(way) or MISSING.get(way, way)

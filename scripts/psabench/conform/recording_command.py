@@ -50,7 +50,7 @@ def _bench(args: argparse.Namespace) -> recording.Bench:
     v = variant(args.board, args.profile)
     for name, value in (("--line-hz", args.line_hz), ("--max-seconds", args.max_seconds)):
         if value is not None and not 0.0 < value < 1e12:
-            raise BadInput(f"{name} {value:g}: more than 0 is wanted")
+            raise BadInput(f"{name} {value:g}: expected more than 0")
     node = dbc_node(v.family) if args.node is None else args.node
     told = dict(_pair(word, "--line") for word in args.line)
     inputs = {axis: _volts(value, axis) for axis, value in (_pair(word, "--input") for word in args.input)}
@@ -76,7 +76,7 @@ def _about(bench: recording.Bench) -> list[str]:
 def _pair(word: str, option: str) -> tuple[str, str]:
     name, _, value = word.partition("=")
     if not name or not value:
-        raise BadInput(f"{option} {word}: NAME=VALUE is wanted")
+        raise BadInput(f"{option} {word}: expected NAME=VALUE")
     return name, value
 
 

@@ -103,9 +103,9 @@ def summary(run: Run) -> str:
 def unseen(run: Run) -> dict[str, int]:
     """Why requirements are not observable, and how many: what no wire shows first, then probe by probe."""
     because = {i: o.reason for o in run.outcomes if o.verdict is Verdict.NOT_OBSERVABLE for i in o.requirements}
-    nobody = "nobody sees it on the wires of any board"
-    reasons = [because.get(i, nobody) for i, v in run.verdicts().items() if v is Verdict.NOT_OBSERVABLE]
-    return dict(sorted(Counter(reasons).items(), key=lambda found: (found[0] != nobody, -found[1], found[0])))
+    unseen = "no external interface shows it"
+    reasons = [because.get(i, unseen) for i, v in run.verdicts().items() if v is Verdict.NOT_OBSERVABLE]
+    return dict(sorted(Counter(reasons).items(), key=lambda found: (found[0] != unseen, -found[1], found[0])))
 
 
 def write(folder: Path, run: Run) -> Path:

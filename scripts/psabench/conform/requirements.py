@@ -1,7 +1,7 @@
 """The requirements of proto/requirements.yaml and proto/requirements/<group>.yaml, read once, checked to the letter.
 
 A row says what a board or a host shall do, where that is written, how sure it is and how somebody sees it who has only
-the wires. Figures that a test needs are in its `limits`, so that they stand in one place.
+the wires. Figures that a test needs are in its `limits`, so that they be in one place.
 """
 
 from __future__ import annotations
@@ -119,13 +119,13 @@ _Base: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # libyaml's where th
 
 
 class _Loader(_Base):  # type: ignore[misc]
-    """As SafeLoader, but a key that stands twice is an error and not a value that vanishes."""
+    """As SafeLoader, but a key that occurs twice is an error and not a value that vanishes."""
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
         keys = [self.construct_object(k, deep=True) for k, _ in node.value]
         for key in keys:
             if keys.count(key) > 1:
-                raise yaml.YAMLError(f"line {node.start_mark.line + 1}: {key} stands twice")
+                raise yaml.YAMLError(f"line {node.start_mark.line + 1}: {key} occurs twice")
         return dict(super().construct_mapping(node, deep))
 
 
@@ -150,7 +150,7 @@ def load(index: Path) -> Requirements:
     for group in groups:
         for row in _rows(index.parent / "requirements" / f"{group.name}.yaml", group, words):
             if row.id in rows:
-                raise RequirementsError(f"{group.name}.yaml: {row.id}: this id stands twice")
+                raise RequirementsError(f"{group.name}.yaml: {row.id}: this id occurs twice")
             if row.id in retired:
                 raise RequirementsError(f"{group.name}.yaml: {row.id}: this id is retired and cannot come back")
             rows[row.id] = row
@@ -296,7 +296,7 @@ def _texts(raw: Any, at: str) -> tuple[str, ...]:
     texts = raw if isinstance(raw, list) else [raw]
     found = tuple(_text(t, at) for t in texts)
     if len(set(found)) != len(found):
-        raise RequirementsError(f"{at}: something stands twice")
+        raise RequirementsError(f"{at}: something occurs twice")
     return found
 
 

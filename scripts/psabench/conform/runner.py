@@ -23,21 +23,21 @@ from psabench.procedures.head_bench import Progress
 MISSING = {
     "can": "no CAN bus was connected",
     "line": "no line port or adapter was connected (--lines)",
-    "pins": "a logic analyser on all pins is wanted; INT, DATA and CLK alone do not show it",
+    "pins": "requires a logic analyser on all pins; INT, DATA and CLK alone do not show it",
     "bus": "no bus port was connected (--bus-port)",
     "supply": "no power supply was connected (--scpi supply=...)",
     "chamber": "no thermal chamber was connected (--scpi chamber=...)",
     "head": "no dividing head was connected (--scpi head=...)",
     "table": "no rate table was connected (--scpi table=...)",
-    "lockstep": "an emulator in lockstep is wanted: it takes longer than anybody would wait",
-    "exact": "the probes' clock is not the board's own: an emulator in lockstep is wanted",
+    "lockstep": "requires an emulator in lockstep: it takes too long in real time",
+    "exact": "the probes' clock is not the board's own: requires an emulator in lockstep",
     "port": "no line port was connected (--lines)",
     "stream": "this board sends readings only while a host reads its bus",
     "fd": "the link to the bus carries no FD frames; slcan and SocketCAN do",
     "rtr": "the link to the bus carries no remote frames; slcan and SocketCAN do",
     "stamps": "the link's time stamps are this machine's, not the bus's",
-    "errors": "a device that destroys frames on the bus is wanted",
-    "slow": "a bus of another bit rate is wanted",
+    "errors": "requires a device that destroys frames on the bus",
+    "slow": "requires a bus of another bit rate",
     "inputs": "the volts at the inputs were not told (--input x=2.5)",
 }
 
@@ -72,7 +72,7 @@ class Stage:
             for _ in range(PLAYS):
                 found = known[name].make(self.subject)
                 if found.lines is None or not len(found.lines.gaps_ns):
-                    break  # else samples were lost on their way, and nobody can tell what they were
+                    break  # else samples were lost on their way, and no one can tell what they were
             return found
         except (BenchError, Broken, TooLittle) as e:
             return e

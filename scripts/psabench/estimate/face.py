@@ -7,7 +7,7 @@ turn of the sensor about its own Ox, so Ox, and with it a_x and alpha0, stay whe
     face            a_x          a_y          a_z
     DIRECT          -g sin th    -g cos th     0             article, eq. (12)
     REVERSED        -g sin th    +g cos th     0             180 deg about Ox
-    SIDE            -g sin th     0           -g cos th      90 deg about Ox: Oz stands where Oy stood
+    SIDE            -g sin th     0           -g cos th      90 deg about Ox: Oz is where Oy stood
     SIDE_REVERSED   -g sin th     0           +g cos th      90 deg the other way: SIDE turned by 180 deg
 """
 

@@ -2,7 +2,7 @@
 
 Every function is elementwise over trailing axes, so thousands of simulated calibrations are one call:
 coefficients have shape (5, ...) for one face and (10, ...) for a pair (direct, then reversed), parameters (q,
-...), Jacobians (q, p, ...). Each Jacobian stands beside its function and is tested against central
+...), Jacobians (q, p, ...). Each Jacobian is beside its function and is tested against central
 differences.
 """
 

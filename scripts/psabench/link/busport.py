@@ -124,7 +124,7 @@ class BusPort:
         return answer
 
     def ask(self, line: str) -> None:
-        """Send a line as it stands; its answer is the next that has not been taken."""
+        """Send a line as it is; its answer is the next that has not been taken."""
         data = line.encode() + b"\n"
         deadline_s = time.monotonic() + PATIENCE_S
         while data:
@@ -142,7 +142,7 @@ class BusPort:
         return parse(self._line(patience_s))
 
     def answered(self, patience_s: float = PATIENCE_S) -> str:
-        """As `answer`, but the line as it stands."""
+        """As `answer`, but the line as it is."""
         return self._line(patience_s)
 
     def _line(self, patience_s: float) -> str:

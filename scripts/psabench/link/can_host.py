@@ -134,7 +134,7 @@ class CanHost:
             self.bus.shutdown()
 
     def reopen(self, bus: can.BusABC) -> None:
-        """Go on with another connection after `close`; frames are counted anew."""
+        """Go on with another connection after `close`; frames are counted again."""
         self.bus = bus
         self.received = self.sent = 0
 
@@ -194,7 +194,7 @@ def open_bus(spec: str | None) -> can.BusABC:
 
     socketcand takes HOST:PORT as its channel: "socketcand:127.0.0.1:29536"; others the device, and options after
     commas: "slcan:/dev/pts/7"; "socketcan:vcan0,fd=true".
-    Raises BadInput for a spec nobody can use, LinkError when the link is not there.
+    Raises BadInput for a spec no one can use, LinkError when the link is not there.
     """
     arguments = _bus_arguments(spec)
     if arguments.get("interface") == "socketcand":
@@ -211,7 +211,7 @@ def open_bus(spec: str | None) -> can.BusABC:
 
 
 def _greet(host: str, port: int) -> None:
-    """Make sure that a server is there: python-can would try for 10 s, a warning each time, or wait for ever."""
+    """Make sure that a server is there: python-can would try for 10 s, a warning each time, or wait without end."""
     try:
         with socket.create_connection((host, port), GREETING_S) as s:
             hello = s.recv(256)

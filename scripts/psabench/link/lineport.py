@@ -3,7 +3,7 @@
 A byte is one sample of the three lines, bit 0 INT, bit 1 DATA, bit 2 CLK; bit 7 says that samples were lost just before
 it. A frame lasts while INT is low; its bits are the levels of DATA where CLK has risen, least significant bit of the
 word with the lowest address first, words 4 CLK periods apart (docs/lineport.md). Time is the count of samples: sample k
-of an unbroken stream stands at t0_s + k / sample_hz.
+of an unbroken stream stops at t0_s + k / sample_hz.
 
 Needs numpy only. Whatever the bytes are, nothing is raised and memory stays bounded: what is no frame is counted.
 """

@@ -43,7 +43,7 @@ def _names(board: str) -> dict[int, str]:
 
 
 def message_name(arbitration_id: int, boards: Mapping[int, str]) -> str:
-    """Name of the message that an identifier stands for; boards: by node, as they are on this bus. "": none."""
+    """Name of the message that an identifier represents; boards: by node, as they are on this bus. "": none."""
     everybody_s = {int(message(name).frame_id): name for name in ("NMT", "SYNC")}
     if arbitration_id in everybody_s:
         return everybody_s[arbitration_id]

@@ -92,7 +92,7 @@ def read_vcd(path: Path) -> Vcd:
 
 
 def parse_vcd(text: str, name: str = "VCD") -> Vcd:
-    """As `read_vcd`, from text; name stands in error messages."""
+    """As `read_vcd`, from text; name is in error messages."""
     head, found, body = text.partition("$enddefinitions $end")
     scale = re.search(r"\$timescale\s+(1|10|100)\s*(ns|us|ms|s)\s+\$end", head)
     if not found or not scale:
@@ -127,7 +127,7 @@ _MOST_CODE = 8  # characters of a wire's code, in one 64-bit number
 
 @dataclass(frozen=True, slots=True)
 class Tokens:
-    """The words of a file's body, by where they stand in its bytes: a million edges want no loop of Python's."""
+    """The words of a file's body, by where they be in its bytes: a million edges want no loop of Python's."""
 
     text: NDArray[np.uint8]
     begin: Ints

@@ -104,7 +104,7 @@ class Noise:
     gm_sigma_radps: float = 0.0
     gm_tau_s: float = 1000.0
     white_radps_rts: float = 0.0  # a window's standard deviation times sqrt(window_s)
-    window_sd_radps: float = 0.0  # drawn anew for each window
+    window_sd_radps: float = 0.0  # drawn again for each window
     angle_sd_rad: float = 0.0  # each angle reading, the first included
     level_sd_rad: float = 0.0  # each window's gamma
     latitude_sd_rad: float = 0.0  # of the latitude given: on a tilt it turns the heading by up to the tilt times it

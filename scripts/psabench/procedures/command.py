@@ -138,7 +138,7 @@ def _parser() -> Parser:
 
 
 def words(argv: Sequence[str]) -> tuple[str, list[str]]:
-    """The procedure, wherever among its options it stands, and the other words; "": none, and what `run` takes."""
+    """The procedure, wherever among its options it is, and the other words; "": none, and what `run` takes."""
     rest = list(argv)
     if "--list" in rest:
         return "", ["--list"]
@@ -150,7 +150,7 @@ def words(argv: Sequence[str]) -> tuple[str, list[str]]:
 
 
 def _procedure_at(rest: Sequence[str]) -> int | None:
-    """Where the first word stands that is neither an option nor the value of one."""
+    """Where the first word is that is neither an option nor the value of one."""
     k = 0
     while k < len(rest):
         word = rest[k]

@@ -96,12 +96,12 @@ def _one(label: str, hold_params: HoldParams | None, options: GyroOptions, progr
 
 
 def _resolved(options: GyroOptions) -> Path | None:
-    """Where the emulator of a run writes its scenario, None: the bench is somebody else's."""
+    """Where the emulator of a run writes its scenario, None: the bench is not ours."""
     return None if options.can or options.control else options.out / f"scenario-{SCENARIO}.json"
 
 
 def _site(options: GyroOptions) -> dict[str, float]:
-    """The latitude that an operator at the scenario's site knows; {}: nobody says where the bench stands."""
+    """The latitude that an operator at the scenario's site knows; {}: no one says where the bench is."""
     path = _resolved(options)
     site = json.loads(path.read_text(encoding="utf-8")).get("site", {}) if path else {}
     return {"latitude_deg": float(site["latitude_deg"])} if "latitude_deg" in site else {}
@@ -116,7 +116,7 @@ def _bench(options: GyroOptions) -> Bench:
 
 
 def _depart(bench: Bench, p: HoldParams) -> None:
-    """An emulated vehicle flies, level, when it is told to; a real one has a pilot."""
+    """An emulated vehicle flies, level, when it is commanded to; a real one has a pilot."""
     if bench.pace != "real":
         bench.control.call("vehicle.attitude", heading_deg=p.track_deg, pitch_deg=0.0, roll_deg=0.0)
         bench.control.call("vehicle.fly", speed_mps=p.speed_mps, track_deg=p.track_deg)

@@ -109,7 +109,7 @@ def estimate(windows: Sequence[Window], p: GyrocompassParams) -> GyrocompassResu
     try:
         f = fit(good, p)
     except nav.Refused as e:
-        why = "three are wanted" if e.status is nav.Status.TOO_FEW else str(e).removeprefix(f"{NAME}: ")
+        why = "expected three" if e.status is nav.Status.TOO_FEW else str(e).removeprefix(f"{NAME}: ")
         told = "; ".join(left_out) or "all windows are good"
         raise LinkError(f"{NAME}: no heading from {len(good)} of {len(run)} windows: {why} ({told})") from e
     found = _evidence(f, len(run), drift2_of(f, good_calibration(windows, p)))

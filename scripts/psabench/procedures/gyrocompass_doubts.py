@@ -27,7 +27,7 @@ FALSE_ALARM = 1e-3  # of each check, in a run where nothing is wrong
 QUALITY_LEAST = 0.01  # of |hypot(s, c) - 1|: what the library flags
 RESIDUAL_LIMIT = 4.0  # residuals may be so many times what noise and drift explain
 RATE_STEP_RADPS = 1e-3 * DEGPH  # resolution of a rate on the wire, generously
-TURN_STEP_RAD = math.radians(0.01)  # turns of the vehicle below are nobody's business
+TURN_STEP_RAD = math.radians(0.01)  # turns of the vehicle below are no one's business
 RELEVANT = 0.25  # of the interval: a remnant of settling that moves a result by less is let pass
 OPEN_RAD = math.radians(90.0)  # a heading whose interval is half the circle is none
 

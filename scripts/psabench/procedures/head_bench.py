@@ -76,7 +76,7 @@ class Silent:
 
 
 def _drop(_: Reading) -> None:
-    """Nobody wants the readings as they come."""
+    """No one wants the readings as they come."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -174,7 +174,7 @@ def _alpha(start: GyrocompassResult, look: Look) -> float:
 
 
 def _held(look: Look, azimuth_rad: float, begun_s: float, start: GyrocompassResult, level: bool) -> Held:
-    """Heading of a vehicle that stands as it stood, or flies level."""
+    """Heading of a vehicle that is parked as it stood, or flies level."""
     a = start.attitude
     pitch, roll = (0.0, 0.0) if level else (a.pitch_rad, a.roll_rad)
     t_s = look.t_s - begun_s

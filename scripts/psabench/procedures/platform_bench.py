@@ -52,7 +52,7 @@ class Window:
     missed: int  # readings lost since the run began, up to its end
     step_s: float  # of the controller: a reading each
     m1_per_s: float  # of the levelling loop
-    latitude_rad: float  # that the controller was told
+    latitude_rad: float  # that the controller was reported
     lost: int = 0  # frames or readings missing in it
     saturated: bool = False
     level_lost: bool = False

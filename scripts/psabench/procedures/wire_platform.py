@@ -69,7 +69,7 @@ class WirePlatform:
         self.step_s = self.gyro.step_s  # of the controller, and of the readings
         self._m1_per_s = self._latitude_rad = 0.0
         self._set_rad = 0.0
-        self._watch: NavigationWatch | None = None  # it was told to navigate, and nothing else since
+        self._watch: NavigationWatch | None = None  # it was commanded to navigate, and nothing else since
 
     def _find_level_unit(self) -> Psa2:
         node = self.gyro.level_node

@@ -69,7 +69,7 @@ def _tables(c: Comparison) -> str:
 
 
 def _table(heading: str, rows: comparison.Table, about: str) -> str:
-    """The first column is the row's head; a NO stands out."""
+    """The first column is the row's head; a NO is out."""
     head = "".join(
         f"<tr>{''.join(f'<th style=text-align:{side}>{escape(x)}</th>' for x, side in _sides(r))}</tr>"
         for r in rows[:2]

@@ -28,7 +28,7 @@ _CSS = {
     _GRID: "var(--grid)",
     **{c: f"var(--s{i + 1})" for i, c in enumerate(SERIES)},
 }
-# For a picture that stands alone, in the docs.
+# For a picture that is alone, in the docs.
 LIGHT = {
     "var(--ink)": "#1d2733",
     "var(--muted)": "#5b6875",

@@ -36,7 +36,7 @@ class Arg:
     least: float = 0.0  # magnitude of what is not 0 and changes anything
     choices: tuple[str, ...] = ()
     strict: bool = True  # nothing but one of the choices; False: they are offered, the bench decides
-    offered: tuple[str, ...] | None = None  # of the choices, what is told and completed now; None: all of them
+    offered: tuple[str, ...] | None = None  # of the choices, what is reported and completed now; None: all of them
     what: str = ""
 
     @property

@@ -13,7 +13,7 @@ from psabench.shell.commands import Arg, Command, Kind, Vocabulary
 from psabench.shell.lexer import Word, Wrong, quote, split
 
 Value = float | int | bool | str | list[float]
-LISTED = 12  # choices that are told when one of them may have been meant
+LISTED = 12  # choices that are reported when one of them may have been meant
 _NAMED = re.compile(r"([a-z][a-z0-9_]*)=")
 _BOOLS = {"on": True, "true": True, "yes": True, "1": True, "off": False, "false": False, "no": False, "0": False}
 
@@ -62,7 +62,7 @@ def unknown(word: Word, vocabulary: Vocabulary) -> Wrong:
 
 
 def _with_rest(command: Command, line: str) -> dict[str, Value]:
-    """The last argument is what is left of the line as it stands, blanks, quotes, # and all."""
+    """The last argument is what is left of the line as it is, blanks, quotes, # and all."""
     *head, last = command.args
     words = line.split(maxsplit=len(head) + 1)[1:]
     values: dict[str, Value] = {}

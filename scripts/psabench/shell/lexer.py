@@ -22,7 +22,7 @@ class Wrong(BadInput):
 
 @dataclass(frozen=True, slots=True)
 class Word:
-    """text: without quotes; raw: as it stands in the line from column `start` (from 0)."""
+    """text: without quotes; raw: as it is in the line from column `start` (from 0)."""
 
     text: str
     raw: str

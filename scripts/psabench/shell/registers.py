@@ -47,7 +47,7 @@ def changed(converter: str, name: str, value: int, text: str) -> int:
 def _byte(name: str, text: str) -> int:
     n = number(text)
     if n is None or n > 0xFF:
-        raise Wrong(f"{name}: {text!r}; a byte is wanted (56h, 0x56, 86), or fields (DR=3,PHASE=0)")
+        raise Wrong(f"{name}: {text!r}; expected a byte (56h, 0x56, 86), or fields (DR=3,PHASE=0)")
     return n
 
 
@@ -55,7 +55,7 @@ def word(name: str, text: str) -> int:
     """A word for a register on a bus: a number up to FFFFh. Raises Wrong."""
     n = number(text)
     if n is None or n > 0xFFFF:
-        raise Wrong(f"{name}: {text!r}; a word is wanted (A55Ah, 0xA55A, 42330)")
+        raise Wrong(f"{name}: {text!r}; expected a word (A55Ah, 0xA55A, 42330)")
     return n
 
 

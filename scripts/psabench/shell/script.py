@@ -24,7 +24,7 @@ FAILED = 1
 
 @dataclass(slots=True)
 class Voice:
-    """How results are told. say gets one line or block; json: one object a line; echo: the lines as well."""
+    """How results are reported. say gets one line or block; json: one object a line; echo: the lines as well."""
 
     say: Callable[[str], None]
     json: bool = False

@@ -34,7 +34,7 @@ class Outcome:
 
     call: Call
     result: Mapping[str, Any]
-    t_ns: int | None  # simulated time afterwards; None: nobody tells it
+    t_ns: int | None  # simulated time afterwards; None: no one tells it
     failed: str = ""
 
 
@@ -58,11 +58,11 @@ class Session:
 
     @property
     def dut(self) -> Unit:
-        """The unit that `dut` stands for."""
+        """The unit that `dut` represents."""
         return self.bench.units[self.dut_name]
 
     def use(self, name: str) -> None:
-        """`dut` is this unit from now on, one of the bench's; what may be said to it is told accordingly."""
+        """`dut` is this unit from now on, one of the bench's; the commands that are offered follow."""
         self.dut_name = name
         mine = {r.command.name: dut.of_unit(r.command, self.dut) for r in dut.ROWS}
         commands = {n: mine.get(n, c) for n, c in self.vocabulary.commands.items()}
@@ -79,7 +79,7 @@ class Session:
     def do(self, line: str) -> Outcome | None:
         """Carry out one line; None for a blank or a comment.
 
-        Raises Wrong for a line that cannot be understood or carried out as it stands, other BenchErrors for what
+        Raises Wrong for a line that cannot be understood or carried out as it is, other BenchErrors for what
         the bench refuses now or for a link that fails. Whatever happens is in the transcript.
         """
         t_ns = self.now_ns()
@@ -108,7 +108,7 @@ class Session:
         failed = str(result.get("failed", "")) if call.command.name == "expect" else ""
         if result and call.command.name not in builtins.UNSAID and call.command.name != "expect":
             self.latest = result
-        t_ns = None if call.command.wire == QUIT else self.now_ns()  # nobody is there to tell it
+        t_ns = None if call.command.wire == QUIT else self.now_ns()  # no one is there to tell it
         return Outcome(call=call, result=result, t_ns=t_ns, failed=failed)
 
     def _why_not_now(self) -> str:

@@ -1,4 +1,4 @@
-"""The status bar: how the bench stands, in one line."""
+"""The status bar: how the bench is, in one line."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Watch:
     """Looks at a bench now and then, and takes the frames that came meanwhile: none may pile up or be lost for it."""
 
     bench: Bench
-    now_ns: Callable[[], int | None]  # simulated time, None where nobody tells it
+    now_ns: Callable[[], int | None]  # simulated time, None where no one tells it
     clock: Callable[[], float] = time.monotonic
     _text: str = ""
     _next_s: float = field(default=-1.0)

@@ -73,7 +73,7 @@ class Terminal:
         self.session = session
         self.mode = MAIN  # "psa", "can" or the name of an instrument
         self._watch = Watch(session.bench, session.now_ns)
-        self._waiting = False  # a status line stands below a command that runs
+        self._waiting = False  # a status line is below a command that runs
         session.tick = self._tick
         self._prompt: PromptSession[str] = PromptSession(
             history=history or _file_history(),

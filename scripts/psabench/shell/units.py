@@ -1,4 +1,4 @@
-"""Numbers with units: `5ms` where seconds are wanted, `10deg/s`, `0.1rad`, `3.3e-3`."""
+"""Numbers with units: `5ms` for an argument in seconds, `10deg/s`, `0.1rad`, `3.3e-3`."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def number(text: str, unit: str) -> float:
 
 
 def alike(unit: str) -> list[str]:
-    """Units that may be written where `unit` is wanted, that one first."""
+    """Units that may be written in place of `unit`, that one first."""
     if unit not in _UNITS:
         return [unit] if unit else []
     return [unit, *(u for u, (quantity, _) in _UNITS.items() if quantity == _UNITS[unit][0] and u != unit)]
@@ -70,5 +70,5 @@ def _ratio(given: str, wanted: str) -> Fraction:
         return Fraction(1)
     if given not in alike(wanted):
         known = " ".join(alike(wanted))
-        raise ValueError(f"unit {given!r}; " + (f"one of {known} is right" if known else "a bare number is wanted"))
+        raise ValueError(f"unit {given!r}; " + (f"one of {known} is right" if known else "expected a bare number"))
     return _UNITS[given][1] / _UNITS[wanted][1]

@@ -116,7 +116,7 @@ def test_each_check_has_a_host_that_it_catches() -> None:
 
 
 def test_there_are_twelve_ways_and_more() -> None:
-    """Each of them, with the requirement that finds it, stands on the page."""
+    """Each of them, with the requirement that finds it, is on the page."""
     page = (ROOT / "docs/conform_host.md").read_text()
     listed = [line for line in page.splitlines() if line.endswith(" |") and line.count("HOST-") == 1 and "| `" in line]
     assert listed == [f"| `{b.name}` | `{b.case}` | {b.requirement} |" for b in BROKEN]

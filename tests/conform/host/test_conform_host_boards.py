@@ -124,7 +124,7 @@ LINES = (
 
 
 class HostThatLeaves(ByHand):
-    """Nobody: it has gone when it is told to."""
+    """No one: it has left when it is ended."""
 
     def __init__(self, results: Path) -> None:
         super().__init__(results, results, lambda: None)

@@ -74,7 +74,7 @@ def a_port() -> str:
 @pytest.mark.timeout(300)
 @pytest.mark.parametrize("mode", ["wb", "ab"])
 def test_a_person_starts_the_host_case_by_case(mode: str, host: Path, tmp_path: Path) -> None:
-    """As the page has it; the file is written anew or appended to."""
+    """As the page has it; the file is written again or appended to."""
     results, port = tmp_path / "told.jsonl", a_port()
     terminal = Terminal(
         *("--manual", "can", "--results", str(results), "--port", port, "--out", str(tmp_path / "out")),

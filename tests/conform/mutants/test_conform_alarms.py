@@ -179,7 +179,7 @@ def test_of_a_part_of_the_suite_nothing_is_kept(
     assert not out.exists()
 
 
-@pytest.mark.parametrize("words", [["nobody"], ["w24", "--seeds", "0-4"], ["w24", "--seeds", "4-3"]])
+@pytest.mark.parametrize("words", [["nosuch"], ["w24", "--seeds", "0-4"], ["w24", "--seeds", "4-3"]])
 def test_what_there_is_not_is_refused(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     try:
         status = run.main(words)

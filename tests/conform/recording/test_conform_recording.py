@@ -76,7 +76,7 @@ MOVING = [
 
 @pytest.mark.parametrize("board", ["psa2", "psa1", "psd1", "pmka", "pik", "pik6"])
 def test_so_does_one_whose_inputs_move(board: str, tmp_path: Path) -> None:
-    """A bench that nobody has put to rest: what wants still inputs is not observable."""
+    """A bench that no one has put to rest: what wants still inputs is not observable."""
     made = make.record(tmp_path, board, dwell="1500ms", faults=MOVING)
     said = judge(tmp_path, made.log, board=board)
     assert said.status == 0, [said.told(i) for i in said.failed]

@@ -1,6 +1,6 @@
 """Readers of recordings: damaged, cut, hostile and random files end in BadInput with file and place, or in a take.
 
-The seed of the random files is fixed and stands in every message of a failure.
+The seed of the random files is fixed and is in every message of a failure.
 """
 
 from __future__ import annotations

@@ -181,10 +181,10 @@ def test_a_controller_s_troubles() -> None:
 
 
 def test_a_stream_that_does_not_fit() -> None:
-    stands = [emergency(1.0, 0xFF03, 0x81), emergency(2.0, 0, 0), *pair(2.1, 1)]
-    assert c.a_stream_that_does_not_fit_stands(evidence(stands))
+    stopped = [emergency(1.0, 0xFF03, 0x81), emergency(2.0, 0, 0), *pair(2.1, 1)]
+    assert c.a_stream_that_does_not_fit_stands(evidence(stopped))
     with pytest.raises(Broken):
-        c.a_stream_that_does_not_fit_stands(evidence([stands[0], *pair(1.5, 1), *stands[1:]]))
+        c.a_stream_that_does_not_fit_stands(evidence([stopped[0], *pair(1.5, 1), *stopped[1:]]))
 
 
 def test_bits_of_a_frame() -> None:

@@ -133,7 +133,7 @@ def test_without_the_fault_they_pass(board: str, bench: str) -> None:
 
 @pytest.mark.parametrize("board", BOARDS)
 def test_every_fault_that_a_board_can_have_stands_in_the_table_once(board: str) -> None:
-    stands = Counter((r.kind, point) for r in load() if r.board == board for point in r.at)
+    listed = Counter((r.kind, point) for r in load() if r.board == board for point in r.at)
     values = {r.kind: r.values for r in load() if r.board == board}
     with opened(board, "" if board == "gyro" else "current") as s:
         has = {
@@ -142,9 +142,9 @@ def test_every_fault_that_a_board_can_have_stands_in_the_table_once(board: str) 
             for point in points(s, kind["kind"])
             if taken(s, kind["kind"], point, values.get(kind["kind"], {}))
         }
-    assert sorted(has - set(stands)) == [], "not in the table"
-    assert sorted(set(stands) - has) == [], "the board has no such fault"
-    assert [fault for fault, times in stands.items() if times > 1] == []
+    assert sorted(has - set(listed)) == [], "not in the table"
+    assert sorted(set(listed) - has) == [], "the board has no such fault"
+    assert [fault for fault, times in listed.items() if times > 1] == []
 
 
 def test_the_page_has_the_table() -> None:

@@ -266,7 +266,7 @@ def test_steps_of_a_gyro_unit() -> None:
 
 
 def gimbal(at_deg: float, way_deg: float, *, dps: float = 9.0, dps2: float = 20.0) -> list[float]:
-    """Angles of a turn, 100 a second, into half turns: speeds up, brakes, stands for half a second."""
+    """Angles of a turn, 100 a second, into half turns: speeds up, brakes, rests for half a second."""
     angles, done, rate, sign = [at_deg], 0.0, 0.0, np.sign(way_deg)
     while done < abs(way_deg) - 1e-6 and len(angles) < 5000:
         rate = min(dps, rate + dps2 * 0.01, max(0.05, np.sqrt(2 * dps2 * (abs(way_deg) - done)) - dps2 * 0.01))

@@ -14,7 +14,7 @@ MEAN_CT = "__import__('dataclasses').replace(rom, ct=rom.ct.mean(2, keepdims=Tru
 
 @dataclass(frozen=True, slots=True)
 class BrokenBoardHost:
-    """changes: texts that stand once in the source, and what stands there instead; place: in the command."""
+    """changes: texts that occur once in the source, and the replacement; place: in the command."""
 
     name: str
     board: str

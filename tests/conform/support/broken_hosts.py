@@ -13,7 +13,7 @@ EXAMPLES = ROOT / "docs/examples"
 
 @dataclass(frozen=True, slots=True)
 class BrokenHost:
-    """old: text that stands once in the source; new: what stands there instead; case: where it shows."""
+    """old: text that occurs once in the source; new: the replacement; case: where it shows."""
 
     name: str
     old: str
@@ -109,7 +109,7 @@ BROKEN = (
 def patched(text: str, name: str, changes: Iterable[tuple[str, str]]) -> str:
     """With each of them made; each text to be replaced must stand there once."""
     for old, new in changes:
-        assert text.count(old) == 1, f"{name}: {old!r} stands {text.count(old)} times"
+        assert text.count(old) == 1, f"{name}: {old!r} occurs {text.count(old)} times"
         text = text.replace(old, new)
     return text
 

@@ -274,7 +274,7 @@ def same_gain(e: Evidence) -> Evidence:
 
 
 def late_half(e: Evidence) -> Evidence:
-    """The step stands in Z one frame later."""
+    """The step is in Z one frame later."""
     found = list(e.frames_of("PSA2_ZT").frames)
     shifted = [found[0], *found[:-1]]
     it = iter(shifted)

@@ -22,7 +22,7 @@ PROFILES = [(board, profile) for profile, board in requirements().profiles.items
 
 
 def reported(board: str, profile: str, at: Addresses, link: str = "", only: Sequence[str] = ()) -> report.Run:
-    """Run everything, or some groups; build/conform/BOARD-PROFILE[-LINK] is written anew. Asserts what it says."""
+    """Run everything, or some groups; build/conform/BOARD-PROFILE[-LINK] is written again. Asserts what it says."""
     folder = OUT / "-".join(filter(None, (board, profile, link)))
     shutil.rmtree(folder, ignore_errors=True)
     run = device_command.device_run(variant(board, profile), at, folder, Silent(), only=only)

@@ -121,7 +121,7 @@ def test_python_cans_own_logger_writes_the_same_bytes_twice(tmp_path: Path, endi
                 try:
                     assert emulator.wait(PATIENCE_S) == 0
                     until(lambda: unread(int(emulator.endpoints[0]["port"])) == 0, "the logger to read")
-                    # python-can does not notice the end of a connection but asks again at once, for ever.
+                    # python-can does not notice the end of a connection but asks again at once, without end.
                     enough = cpu_ticks(logger.pid) + 5
                     until(lambda: cpu_ticks(logger.pid) >= enough, "the logger to have written what it read")
                     logger.send_signal(signal.SIGINT)

@@ -1,6 +1,6 @@
 """What the pages show is run: every ```console block, in order, one shell a page, its output compared.
 
-A line `...` stands for any lines. A command ending in `&` runs in the background and the next one waits for its
+A line `...` matches any lines. A command ending in `&` runs in the background and the next one waits for its
 `ready all`. A block after `<!-- not run: reason -->` is not run, and the reason is printed.
 """
 

@@ -171,7 +171,7 @@ def test_what_the_head_refuses_is_raised_where_it_was_asked(bench: Bench) -> Non
 @HOST
 def test_time_moves_only_when_the_host_says_so(bench: Bench) -> None:
     assert bench.time_s == 0.0
-    bench.run_for(2.25)  # in slices, of which nobody sees anything
+    bench.run_for(2.25)  # in slices, of which no one sees anything
     assert bench.time_s == 2.25
     assert bench.control.call("time").t_ns == round(2.25 * NS)
     bench.head.turn(10.0)

@@ -1,4 +1,4 @@
-"""A recording that begins late, of lines that nobody has watched before, is a piece of the one from power-on."""
+"""A recording that begins late, of lines that no one has watched before, is a piece of the one from power-on."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ pytestmark = HOST
 
 SCENARIOS = sorted(p.stem for p in (ROOT / "proto/scenarios").glob("*.yaml"))
 KELVIN = 273.15
-OFFSET_V = 1e-3  # at the load, of a chain that nobody has calibrated: 53 uV at the converter's input, eight times here
+OFFSET_V = 1e-3  # at the load, of a chain that no one has calibrated: 53 uV at the converter's input, eight times here
 GAIN = 2e-4  # of its filters, 150 ppm by the published coefficients
 
 

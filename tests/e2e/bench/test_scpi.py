@@ -288,7 +288,7 @@ def answered(lab: Lab) -> bool:
 @pytest.mark.parametrize(
     ("given", "want"),
     [
-        ("fly", "--scpi fly: head, table, chamber, supply or all is wanted"),
+        ("fly", "--scpi fly: expected head, table, chamber, supply or all"),
         ("head:x", '--scpi head:x: "x" is neither pty[:LINK] nor a port'),
         ("head:70000", '"70000" is neither'),
         ("", "--scpi : head, table"),
@@ -363,7 +363,7 @@ def test_a_subscriber_that_does_not_read_stops_nobody_and_is_told_what_it_lost(l
             while heard[-1]["event"] != "lost" and heard[-1]["t_ns"] < 20_000_000_000:
                 heard.append(json.loads(lines.readline()))
                 if len(heard) == 3000:
-                    lab.run(0.01)  # there is room again: the loss is told
+                    lab.run(0.01)  # there is room again: the loss is reported
     assert heard[-1]["event"] == "lost"
     assert heard[-1]["lines"] + len(heard) - 1 >= 20_000
 

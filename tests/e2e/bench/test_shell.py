@@ -285,7 +285,7 @@ def test_a_device_without_a_control_socket(env: dict[str, str], make_rig: MakeRi
     done = shell(env, "shell", "--can", rig.spec, "--json", *(a for line in lines for a in ("--command", line)))
     assert done.returncode == 0, done.stderr
     assert objects(done.stdout)[3]["result"]["frames"] == 10
-    assert "t_s" not in objects(done.stdout)[0]  # nobody tells the simulated time
+    assert "t_s" not in objects(done.stdout)[0]  # no one tells the simulated time
     for thing in ("head.turn 5", "faults.list"):
         done = shell(env, "shell", "--can", rig.spec, "--command", thing)
         assert done.returncode == 2

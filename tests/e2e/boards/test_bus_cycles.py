@@ -140,7 +140,7 @@ def test_in_real_time_the_answer_comes_by_itself() -> None:
 
 
 def test_who_comes_while_another_has_the_bus_is_refused(tmp_path: Path) -> None:
-    """A cycle from the bus port, in step pace: it is under way for as long as nobody lets time pass."""
+    """A cycle from the bus port, in step pace: it is under way for as long as no one lets time pass."""
     link = tmp_path / "port"
     with (
         Emulator(SCENARIO, pace="step", extra=("--bus-port", f"p:{link}")) as emulator,

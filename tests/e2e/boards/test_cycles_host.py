@@ -77,7 +77,7 @@ def test_the_shell_s_words_for_the_device_go_for_every_board() -> None:
             ("dut.opcode accel 4", "only a PSA-2"),
             ("dut.form", "only a PSA-2"),
             ("dut.registers x", "a PMKA has bus"),
-            ("dut.write bus MODE 10000h", "a word is wanted"),
+            ("dut.write bus MODE 10000h", "expected a word"),
             ("dut.register bus COMMAND", "write-only"),
         ):
             with pytest.raises(BenchError, match=why):
@@ -133,8 +133,8 @@ def test_a_bench_finds_units_by_their_boards() -> None:
         assert bench.board(Psd1, "psd1_host").node.node_id == 16
         with pytest.raises(BenchError, match="no PIK called psd1"):
             bench.board(Pik, "psd1")
-        with pytest.raises(BenchError, match="no unit nobody"):
-            bench.board(Pik, "nobody")
+        with pytest.raises(BenchError, match="no unit nosuch"):
+            bench.board(Pik, "nosuch")
         told = bench.control.call("units").result["units"]
         assert {u["name"]: u["board"] for u in told} == {n: kind.board for n, (kind, _) in NODES.items()}
         path = bench.control.path

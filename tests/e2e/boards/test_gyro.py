@@ -244,10 +244,10 @@ units:
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("platform: {}" + UNITS, "platform: site.latitude_deg is wanted"),
-        ("site: {latitude_deg: 50}" + UNITS, "level stands on the platform, and there is none"),
+        ("platform: {}" + UNITS, "platform: expected site.latitude_deg"),
+        ("site: {latitude_deg: 50}" + UNITS, "level is on the platform, and there is none"),
         ("site: {latitude_deg: 50}\nunits: [{board: gyro}]", "a controls a platform, and there is none"),
-        ("vehicle: {heading_deg: 3}\nunits: [{}]", "vehicle: stands under a platform, and there is none"),
+        ("vehicle: {heading_deg: 3}\nunits: [{}]", "vehicle: is under a platform, and there is none"),
         ("site: {latitude_deg: 50}\nplatform: {}\nunits: [{board: gyro, level: b}, {name: b}]", "b does not sit on"),
         ("site: {latitude_deg: 50}\nplatform: {}\nunits: [{board: gyro, level: c}]", '"c" is not the name of a PSA-2'),
         ("site: {latitude_deg: 50}\nplatform: {}\nunits: [{board: gyro}, {board: gyro}]", "it has one gyro unit"),

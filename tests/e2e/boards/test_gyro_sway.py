@@ -94,7 +94,7 @@ def level_arcmin(bench: Bench, for_s: float) -> np.ndarray[Any, np.dtype[np.floa
 
 
 def test_a_push_is_a_tilt_of_the_felt_vertical() -> None:
-    """By command, with a platform that nobody levels: it drifts, and its two angles show the push along x and y."""
+    """By command, with a platform that no one levels: it drifts, and its two angles show the push along x and y."""
     period_s = 8.0
     with Bench.start("gyrocompass_ideal") as bench:
         bench.wait(1.0)

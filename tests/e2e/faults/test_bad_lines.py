@@ -119,7 +119,7 @@ def test_garbage_on_every_port_leaves_the_unit_working(make_rig: MakeRig) -> Non
             got += s.recv(65536)
     for endpoint in (rig.emulator.endpoint(can="slcan"), rig.emulator.endpoint(line="sampled")):
         fd = os.open(endpoint["pty"], os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
-        with suppress(BlockingIOError):  # nobody must take it all
+        with suppress(BlockingIOError):  # no one must take it all
             os.write(fd, rng.randbytes(4000))
         os.close(fd)
     with socket.socket(socket.AF_UNIX) as c:
@@ -289,7 +289,7 @@ def test_a_bad_command_is_refused_by_code_and_changes_nothing(make_rig: MakeRig,
 @HOST
 def test_time_is_not_moved_by_hand_in_real_time(make_rig: MakeRig) -> None:
     rig = make_rig("socketcand", pace="wall")
-    with pytest.raises(ControlError, match="time moves by itself") as refused:
+    with pytest.raises(ControlError, match="run requires --pace step") as refused:
         rig.control.call("run", for_s=1)
     assert refused.value.code == "state"
 

@@ -363,7 +363,7 @@ def test_each_kind_is_taken_where_it_can_be_seen_and_refused_elsewhere() -> None
                 want = must_accept(ACCEPTED, kind, point)
                 assert accepted(Case(host, kind, point), NEEDED) == want, f"{kind} at {point}"
             if kind not in DETECT and not kind.startswith("line."):  # those: test_faults_boards_lines.py
-                assert not any(must_accept(ACCEPTED, kind, point) for point in points), f"nobody looks for {kind}"
+                assert not any(must_accept(ACCEPTED, kind, point) for point in points), f"no test looks for {kind}"
 
 
 @pytest.mark.parametrize("kind", DETECT)

@@ -63,7 +63,7 @@ class Logged:
 
 
 def lines_of(text: str) -> list[Logged]:
-    """Read by the rule of candump's manual, by nobody else's reader."""
+    """Read by the rule of candump's manual, by no one else's reader."""
     found = []
     for line in text.splitlines():
         m = LINE.fullmatch(line.removesuffix(" R").removesuffix(" T"))

@@ -69,7 +69,7 @@ def test_cansend_and_cangen_reach_the_unit(unit: Psa2) -> None:
     assert unit.host.pump_until(lambda: len(unit.frames) >= 10, PATIENCE_S)
     unit.stop()
     before = statistic("tx_packets")
-    # Ids of nobody: the unit must take them without harm and go on answering.
+    # Ids of no one: the unit must take them without harm and go on answering.
     subprocess.run(["cangen", "slc0", "-g", "1", "-n", "50", "-I", "7EF", "-L", "8"], check=True)
     assert unit.register("t", 3) == 0x82
     assert statistic("tx_packets") >= before + 50

@@ -1,4 +1,4 @@
-"""Real time for a minute: nothing lost that nobody counted. How late things came, and how much of the minute a busy
+"""Real time for a minute: nothing lost that no one counted. How late things came, and how much of the minute a busy
 machine left to the bench, is printed and not judged: that is the machine's.
 
 PSABENCH_SOAK_S makes it shorter or longer.

@@ -1,4 +1,4 @@
-"""A wait without the buses: time goes on, what passed is nobody's, and afterwards all is as before."""
+"""A wait without the buses: time goes on, what passed is no one's, and afterwards all is as before."""
 
 from __future__ import annotations
 

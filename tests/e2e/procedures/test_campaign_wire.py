@@ -116,7 +116,7 @@ def test_both_ways_find_the_same_heading_of_the_same_instrument() -> None:
 @pytest.mark.host
 @pytest.mark.timeout(300)
 def test_what_the_set_angle_is_in_error_by_has_one_sign_in_all_chains() -> None:
-    """A zero of the angle, and what the azimuth loop stands off by. Without noise codes of 1 ug leave a run 0.01 deg,
+    """A zero of the angle, and what the azimuth loop is off by. Without noise codes of 1 ug leave a run 0.01 deg,
     some 0.05: the middle one of five tells."""
     plain = {**QUIET, "white_degph_rts": 0.0, "angle_sys": "common", "angle_sys_arcmin": 30.0}
     zero = replace(WIRE["article"].setup, **plain)  # type: ignore[arg-type]

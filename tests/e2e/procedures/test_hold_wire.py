@@ -1,4 +1,4 @@
-"""Heading hold through the wire: what spoils it is named, whether it still stands at a look or is long over."""
+"""Heading hold through the wire: what spoils it is named, whether it is still active at a look or is long over."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def fault(kind: str, point: str, **args: Any) -> Spoil:
 
 
 def later(kind: str, point: str, **args: Any) -> Spoil:
-    """50 s after the look, where nobody is looking."""
+    """50 s after the look, where no one is looking."""
     return lambda bench: bench.fault(kind, point, at_s=bench.time_s + 50.0, **args)
 
 

@@ -1,4 +1,4 @@
-"""A host that is told the protocol and nothing else: what it sees on CAN in a while of simulated time, per board."""
+"""A host that knows only the protocol: what it sees on CAN in a while of simulated time, per board."""
 
 from __future__ import annotations
 

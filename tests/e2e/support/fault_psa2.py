@@ -198,7 +198,7 @@ def lost_sync(c: Case) -> None:
     if c.axis == 0:  # drives DRD_A: the stream goes on through the SYNC
         near(samples, 200, 2)
     else:
-        near(samples, 200 - 63, 2)  # the others start anew, this one goes on in its old phase
+        near(samples, 200 - 63, 2)  # the others start again, this one goes on in its old phase
         assert apart(c) > 0.01
 
 
@@ -347,7 +347,7 @@ def brownout(c: Case) -> None:
     assert len(seen.xy) < 5
     c.host.start()
     again = c.watch(SETUP_S)
-    assert again.seq()[0] < 5, "numbers begin anew"
+    assert again.seq()[0] < 5, "numbers begin again"
 
 
 # ---- lines: what a recording breaks of the rules

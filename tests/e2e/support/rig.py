@@ -115,7 +115,7 @@ def need(transport: str) -> None:
 
 
 def until(condition: Callable[[], object], what: str, patience_s: float = PATIENCE_S) -> None:
-    """Wait for a condition that another process brings about. Fails, naming it, when it does not come."""
+    """Wait for a condition that another process causes. Fails, naming it, when it does not come."""
     deadline_s = time.monotonic() + patience_s
     while not condition():
         if time.monotonic() >= deadline_s:

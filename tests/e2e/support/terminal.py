@@ -79,7 +79,7 @@ class Terminal:
         """False when the program has closed its terminal."""
         if select.select([self._master], [], [], timeout_s)[0]:
             chunk = b""
-            with contextlib.suppress(OSError):  # EIO: nobody has the slave open any more
+            with contextlib.suppress(OSError):  # EIO: no one has the slave open any more
                 chunk = os.read(self._master, 65536)
             if not chunk:
                 return False

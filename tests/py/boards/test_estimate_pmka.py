@@ -159,9 +159,9 @@ def test_rom_words() -> None:
 @pytest.mark.parametrize(
     ("change", "says"),
     [
-        (lambda w: [2, *w[1:]], "layout 2: layout 1 is wanted"),
+        (lambda w: [2, *w[1:]], "layout 2: expected layout 1"),
         (lambda w: [], "layout none"),
-        (lambda w: w[:-1], "42 words: 43 are wanted"),
+        (lambda w: w[:-1], "42 words: expected 43"),
         (lambda w: [*w[:20], w[20] ^ 0x40, *w[21:]], "damaged"),
     ],
 )

@@ -89,7 +89,7 @@ def test_overruns_that_the_board_tells_are_counted() -> None:
 
 @pytest.mark.parametrize("layout", LAYOUTS, ids=lambda layout: layout.board)
 def test_the_counter_of_a_board_tells_what_was_lost(layout: ReadingLayout) -> None:
-    assert layout.counter, "a board whose losses nobody would see"
+    assert layout.counter, "a board whose losses no one would see"
     bits = next(s.length for name in layout.messages for s in message(name).signals if s.name == layout.counter)
     reader = ReadingReader(layout, 9)
     before_wrap = 2**bits - 3

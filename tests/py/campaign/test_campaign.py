@@ -119,7 +119,7 @@ def test_processes_and_a_cluster_at_an_address_give_the_same_bytes(tmp_path: Pat
         with Store(out / "store.sqlite") as store:
             rows = [store.rows(x, 9000).tobytes() for x in sorted(store.origins(), key=lambda x: x.key)]
         found[name] = ((out / "result.json").read_bytes(), (out / "report.html").read_bytes(), rows)
-    assert len(found["one"][2]) == 2 * 3  # the closed form stands beside
+    assert len(found["one"][2]) == 2 * 3  # the closed form is beside
     assert found["two"] == found["one"]
     assert found["dask"] == found["one"]
 

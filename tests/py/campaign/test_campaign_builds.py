@@ -1,4 +1,4 @@
-"""A series holds the runs of one build: those of others are told, kept, forgotten, and never mixed in."""
+"""A series holds the runs of one build: those of others are reported, kept, forgotten, and never mixed in."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ QUIET = Bar(Path(os.devnull).open("w"))  # noqa: SIM115  # for as long as the te
 
 
 def another_build(monkeypatch: pytest.MonkeyPatch, build: str = "0123456789abcdef") -> None:
-    """As if the library had been built anew."""
+    """As if the library had been built again."""
     monkeypatch.setattr(chains, "CHAINS", {n: replace(c, build=lambda: build) for n, c in CHAINS.items()})
 
 
@@ -59,7 +59,7 @@ def test_results_of_another_build_are_told_kept_and_never_mixed(
 
 
 class Elsewhere:
-    """A worker whose library was built anew after the campaign had started."""
+    """A worker whose library was built again after the campaign had started."""
 
     count = 1
 

@@ -65,7 +65,7 @@ MISTAKES = [
         "--study hold --chain emulated",
         "--chain emulated: 0.1 deg and 0.05 deg/h, nothing else: the hold is computed by",
     ),
-    ("--case R5n --chain wire", "--chain emulated or wire: its turns take time: slew_dps is wanted"),
+    ("--case R5n --chain wire", "--chain emulated or wire: its turns take time: expected slew_dps"),
     ("--store README.md", "README.md: not a store of results"),
 ]
 

@@ -40,7 +40,7 @@ DRDY_PULSE_TAU = 16  # t17
 START_TAU = 8192  # of a clock, after power-up
 CRYSTAL_NS = 30_000_000
 
-# DRATE: SELFOCAL and SYSOCAL; SYSGCAL; SELFGCAL for gains 1, 2, 4, 8, 16..64; SELFCAL likewise. us below 1 ms; 2.7-t-*
+# DRATE: SELFOCAL and SYSOCAL; SYSGCAL; SELFGCAL and SELFCAL for gains 1, 2, 4, 8, 16..64. us below 1 ms; 2.7-t-*
 US = {
     0xF0: ("387", "417", "417 417 451 517 651", "596 596 692 696 892"),
     0xE0: ("453", "484", "484 484 484 551 617", "696 696 696 762 896"),

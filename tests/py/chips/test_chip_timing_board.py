@@ -56,7 +56,7 @@ def clocked(r: Recording, line: str, temperature: bool) -> list[Byte]:
 
 
 def found(bytes_: list[Byte], *wanted: int) -> list[Byte]:
-    """The first place where these bytes stand in a row."""
+    """The first place where these bytes be in a row."""
     values = [b.value for b in bytes_]
     for i in range(len(values)):
         if values[i : i + len(wanted)] == list(wanted):
@@ -119,7 +119,7 @@ def test_bytes_of_commands_to_the_accelerometer_converters_are_24_clocks_apart(r
 
 
 def test_drd_t_after_reset_and_after_the_article_s_set_up(recording: Recording) -> None:
-    """Self-calibration of 596 us after Res, of 31.2 ms after DRATE = 82h under ACAL; t17 while nobody reads."""
+    """Self-calibration of 596 us after Res, of 31.2 ms after DRATE = 82h under ACAL; t17 while no one reads."""
     r = recording
     bytes_ = clocked(r, "DInT", True)
     res_ns = r.edges_ns("Res", 1)[0]

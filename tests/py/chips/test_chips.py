@@ -25,7 +25,7 @@ STATUS, MUX, DRATE = 0, 1, 3
 RDATA, RREG, WREG = 0x01, 0x10, 0x50
 T6_S = 7e-6
 SPS_30000_NS = 33_333
-SETTLED_S = 200e-6  # five conversions that nobody synchronised, and one more
+SETTLED_S = 200e-6  # five conversions that no one synchronised, and one more
 
 
 @pytest.fixture

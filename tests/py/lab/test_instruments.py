@@ -21,7 +21,7 @@ Answers = Mapping[str, "str | list[str] | None"]
 
 
 class Wire:
-    """What an instrument was told, a program message a line, and what it answers; a list is used up, its last stays."""
+    """What an instrument received, a program message a line, and what it answers; a list is used up, its last stays."""
 
     def __init__(self, answers: Answers) -> None:
         self.told: list[str] = []
@@ -42,7 +42,7 @@ class Wire:
 
 @contextmanager
 def listening(answers: Answers) -> Iterator[tuple[Wire, str]]:
-    """An instrument on a TCP port; yields what it was told and its VISA address."""
+    """An instrument on a TCP port; yields what it received and its VISA address."""
     wire = Wire(answers)
 
     class Session(socketserver.StreamRequestHandler):

@@ -376,7 +376,7 @@ def test_allan_deviation_of_a_noise_term_lies_in_its_band(lib: ctypes.CDLL, term
 
 
 def test_flicker_is_flat_at_its_floor() -> None:
-    """0.664 B, IEEE Std 952, within 3 % from 1 s to 300 s: the sum of processes is what it stands for."""
+    """0.664 B, IEEE Std 952, within 3 % from 1 s to 300 s: the sum of processes is what it represents."""
     floor = 2 * math.log(2) / math.pi
     for m in (100, 300, 1000, 3000, 10000, 30000):
         assert flicker_variance(1.0, m) == pytest.approx(floor, rel=0.06)

@@ -224,7 +224,7 @@ def test_a_step_waits_for_each_bus_of_ours_and_for_nobody_elses(tmp_path: Path) 
         CanHost(buses[0], WallClock()) as a,
         CanHost(buses[1], a.clock) as b,
     ):
-        clock = StepClock(port, [a, b])  # the second and the third client; the first is somebody else's
+        clock = StepClock(port, [a, b])  # the second and the third client; the first is another program's
         b.send(0x605, b"")
         clock.command(None, "run", for_s=0.1)
         assert (a.received, b.received) == (1, 1)
@@ -388,7 +388,7 @@ def test_a_server_that_leaves_is_noticed_after_its_last_frame(how: str, says: st
 
 @pytest.fixture
 def program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Path of a shell script that stands in for psa-emu; the test writes it."""
+    """Path of a shell script that replaces psa-emu; the test writes it."""
     path = tmp_path / "psa-emu"
     monkeypatch.setenv("PSA_EMU", str(path))
     return path

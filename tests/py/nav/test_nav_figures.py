@@ -254,7 +254,7 @@ def test_tilts_hurt_through_the_gimbals_unless_corrected(tilt_deg: float, cardan
 
 
 def test_longer_windows_make_a_wandering_drift_worse() -> None:
-    """10 s between windows; those below 10 s are told with gaps that nobody noted, so only their order is held."""
+    """10 s between windows; those below 10 s are reported with gaps that no one noted, so only their order is held."""
     sd = {}
     for seconds in (2, 5, 10, 30, 60, 120):
         e = nav_mc.closed(replace(ENCODER, window_s=float(seconds)), 11, runs=100_000)

@@ -47,7 +47,7 @@ def test_the_error_of_the_latitude_is_in_the_covariance(latitude_deg: float, met
 
 
 def test_on_the_circle_weights_that_know_of_it_are_better_ones() -> None:
-    """Free, its share looks like s and c; on the circle it is told from them (a third of the spread, N)."""
+    """Free, its share looks like s and c; on the circle it is distinguished from them (a third of the spread, N)."""
     wise, _ = errors(50 * DEG, Method.GLS_CONSTRAINED, sd_rad=SD, seed=32)
     blind, _ = errors(50 * DEG, Method.GLS_CONSTRAINED, sd_rad=0.0, seed=32)
     assert np.std(wise[:, 0]) < 0.5 * np.std(blind[:, 0])

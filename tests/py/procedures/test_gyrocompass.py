@@ -212,7 +212,7 @@ BROKEN = (
 
 @pytest.mark.parametrize(("fault", "words"), BROKEN)
 def test_three_positions_of_which_one_is_broken_give_no_heading(fault: dict[str, object], words: str) -> None:
-    with pytest.raises(LinkError, match=rf"no heading from 2 of 3 windows: three are wanted \(position 2 .*{words}"):
+    with pytest.raises(LinkError, match=rf"no heading from 2 of 3 windows: expected three \(position 2 .*{words}"):
         run(FakePlatform(broken={1: fault}), "article")
 
 

@@ -46,7 +46,7 @@ def wander(rng: np.random.Generator, mean_degph: float) -> Any:
 
 
 def article_s_instrument(rng: np.random.Generator) -> FakePlatform:
-    """The article's errors, drawn anew; what a turn leaves of beta is more than on the emulator."""
+    """The article's errors, drawn again; what a turn leaves of beta is more than on the emulator."""
     return FakePlatform(
         heading_deg=float(rng.uniform(0.0, 360.0)),
         pitch_deg=float(rng.uniform(-5.0, 5.0)),

@@ -54,7 +54,7 @@ def bench_of(s: Sensor, **others: float) -> FakeBench:
         (Face.REVERSED, 270.0, (1, 0, 0)),  # Ox is the axis of the turn: it stays
         (Face.REVERSED, 180.0, (0, -1, 0)),
         (Face.SIDE, 270.0, (1, 0, 0)),
-        (Face.SIDE, 180.0, (0, 0, 1)),  # fig. 4: Oz stands where Oy stood
+        (Face.SIDE, 180.0, (0, 0, 1)),  # fig. 4: Oz is where Oy stood
         (Face.SIDE, 0.0, (0, 0, -1)),
         (Face.SIDE_REVERSED, 180.0, (0, 0, -1)),
     ],

@@ -1,4 +1,4 @@
-"""tools/between.py: what stands between a page's marks, and nothing else, is written."""
+"""tools/between.py: the text between a page's marks, and nothing else, is written."""
 
 from __future__ import annotations
 

@@ -151,7 +151,7 @@ def test_a_changed_file_is_named_with_its_group_and_what_proves_it(tree: Path) -
     (line,) = says(tree)
     assert line == (
         "chip is stale, its evidence is of other sources: emu/chip/chip.c changed. `make prove GROUP=chip` proves it "
-        "anew by 1 files of C tests, test_chip.py"
+        "again by 1 files of C tests, test_chip.py"
     )
     assert prove(tree, "chip") == {}
     assert says(tree) == []

@@ -80,7 +80,7 @@ def test_a_finding_ends_its_target_alone_and_says_how_to_see_it_again(
     assert (binaries / "times").read_text() == "x\n"
     assert c.record["good", "now"].cpu_s >= 0.18
     assert c.page.read_text() == shown(fuzz_long.read(c.path))
-    assert not [k for k in fuzz_long.read(c.path) if k[0] == "bad"]  # its time begins anew
+    assert not [k for k in fuzz_long.read(c.path) if k[0] == "bad"]  # its time begins again
     assert f"fuzz_bad: a finding; again with: {binaries}/fuzz_bad crash-1\n" in capsys.readouterr().err
 
 
@@ -176,8 +176,8 @@ def test_nothing_built_is_told(
 @pytest.mark.parametrize(
     ("option", "says"),
     [
-        *((f"--minutes={n}", f"{n}: minutes, 0 or more, are wanted") for n in ("nan", "-1", "inf", "one")),
-        *((f"--jobs={n}", f"{n}: 1 to 64 is wanted") for n in ("0", "65", "-1", "1.5")),
+        *((f"--minutes={n}", f"{n}: expected minutes, 0 or more") for n in ("nan", "-1", "inf", "one")),
+        *((f"--jobs={n}", f"{n}: expected 1 to 64") for n in ("0", "65", "-1", "1.5")),
     ],
 )
 def test_numbers_have_bounds(option: str, says: str, capsys: pytest.CaptureFixture[str]) -> None:

@@ -277,7 +277,7 @@ def test_the_least_that_a_unit_needs(monkeypatch: pytest.MonkeyPatch, tmp_path: 
     ("more", "why"),
     [
         ("tpdos: [{message: TEST_A, cob: 0x180, off: true}]", "TPDO TEST_A: no such key"),  # YAML reads off as False
-        ("tpdos: []\nobjects: [{index: 0x2030, name: N, type: UNSIGNED8, access: ro}]", "an object stands twice"),
+        ("tpdos: []\nobjects: [{index: 0x2030, name: N, type: UNSIGNED8, access: ro}]", "an object occurs twice"),
     ],
 )
 def test_a_unit_that_cannot_be_is_refused(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, more: str, why: str) -> None:

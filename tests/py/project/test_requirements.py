@@ -122,7 +122,7 @@ def test_what_was_read_cannot_be_changed(tmp_path: Path) -> None:
         ({"source": []}, "source is missing"),
         ({"source": "hearsay"}, "source: 'hearsay' is not of the form"),
         ({"source": "see ISO 11898-1"}, "source: 'see ISO 11898-1' is not of the form"),
-        ({"source": ["CiA 301 7.2.4", "CiA 301 7.2.4"]}, "source: something stands twice"),
+        ({"source": ["CiA 301 7.2.4", "CiA 301 7.2.4"]}, "source: something occurs twice"),
         ({"grade": "E9"}, "grade: 'E9' is not among: E0, E1"),
         ({"grade": "E1"}, "grade E1 needs the article's sentence"),
         ({"original": "слово"}, "`original` needs the article among its sources"),
@@ -164,7 +164,7 @@ def test_a_row_without_what_it_needs_is_told(key: str, tmp_path: Path) -> None:
 
 
 def test_an_id_stands_once_and_does_not_come_back(tmp_path: Path) -> None:
-    with pytest.raises(RequirementsError, match="PSA2-FRAME-03: this id stands twice"):
+    with pytest.raises(RequirementsError, match="PSA2-FRAME-03: this id occurs twice"):
         load(write(tmp_path, [ROW, ROW]))
     with pytest.raises(RequirementsError, match="PSA2-FRAME-03: this id is retired"):
         load(write(tmp_path, [ROW], INDEX | {"retired": ["PSA2-FRAME-03"]}))
@@ -193,12 +193,12 @@ def test_a_bad_index_is_told(change: dict[str, Any], says: str, tmp_path: Path) 
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("boards: [psa2]\nboards: [psa2]\nrows: []\n", "psa2.yaml: line 1: boards stands twice"),
+        ("boards: [psa2]\nboards: [psa2]\nrows: []\n", "psa2.yaml: line 1: boards occurs twice"),
         ("boards: [psa2]\nrows: []\n", "psa2.yaml: rows is no list"),
         ("boards: [psa2]\nrows: [5]\n", "psa2.yaml: row 1: no mapping"),
         ("boards: [\n", "psa2.yaml: "),
         ("5\n", "psa2.yaml: no mapping"),
-        ("boards: [psa2]\nrows:\n- {id: A, id: B}\n", "line 3: id stands twice"),
+        ("boards: [psa2]\nrows:\n- {id: A, id: B}\n", "line 3: id occurs twice"),
     ],
 )
 def test_a_file_that_is_none_is_told(text: str, says: str, tmp_path: Path) -> None:

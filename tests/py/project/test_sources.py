@@ -1,4 +1,4 @@
-"""Every "sources N.N" that code, tests and pages cite stands in docs/sources.md, and what stands there exists."""
+"""Every "sources N.N" that code, tests and pages cite is in docs/sources.md, and what is there exists."""
 
 from __future__ import annotations
 

@@ -78,7 +78,7 @@ def test_the_argument_at_the_cursor(before: str, name: str | None) -> None:
 
 @given(st.sampled_from(sorted(V.commands)), st.text("abdefgnorstu_= 123", max_size=20))
 def test_what_is_offered_ends_what_was_typed(name: str, more: str) -> None:
-    """A candidate replaces what stands at the cursor and nothing else, and makes no command unknown."""
+    """A candidate replaces what is at the cursor and nothing else, and makes no command unknown."""
     before = f"{name} {more}"
     for c in candidates(before, V):
         typed = before[len(before) - c.typed :]

@@ -64,7 +64,7 @@ def test_fields_do_not_overlap_and_shift_as_their_mask() -> None:
 
 
 def test_fields_are_of_registers_that_the_board_has() -> None:
-    """Names as in the EDS; what a board tells of its state is told field by field."""
+    """Names as in the EDS; what a board tells of its state is reported field by field."""
     for board in ("psd1", "pmka", "pik"):
         od = canopen.import_od(str(proto_file(f"{board}.eds")), 1)
         bus: Any = od[BANKS["bus"]]
@@ -118,8 +118,8 @@ def test_a_register_is_written_whole_or_by_fields(text: str, value: int) -> None
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("256", "a byte is wanted"),
-        ("zz", "a byte is wanted"),
+        ("256", "expected a byte"),
+        ("zz", "expected a byte"),
         ("DR=8", "CONFIG0.DR: '8'; 0 to 7 is right"),
         ("RATE=1", "CONFIG0 has no field RATE; it has SYNC, DR, PHASE, FILTR"),
     ],

@@ -12,7 +12,7 @@ from psabench.estimate.face import Face
 DEFAULT_SEED = 20080924  # the day the article was received
 SEED = int(os.environ.get("TEST_SEED", DEFAULT_SEED))
 
-# The sensor's turn about its own Ox, deg, right-handed. Oz stands where Oy stood: y' = -z, z' = y, which is -90.
+# The sensor's turn about its own Ox, deg, right-handed. Oz is where Oy stood: y' = -z, z' = y, which is -90.
 ABOUT_OX_DEG = {Face.DIRECT: 0.0, Face.REVERSED: 180.0, Face.SIDE: -90.0, Face.SIDE_REVERSED: 90.0}
 
 

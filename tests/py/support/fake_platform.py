@@ -55,7 +55,7 @@ class FakePlatform:
     set_sd_arcmin: float = 0.0
     read_sd_arcmin: float = 0.0
     level_sd_arcmin: float = 0.0
-    stuck_deg: float | None = None  # what the encoder shows for ever
+    stuck_deg: float | None = None  # what the encoder shows without end
     settles: bool = True
     broken: dict[int, dict[str, object]] = field(default_factory=dict)  # by window: fields that the wire would tell
     t_s: float = 0.0

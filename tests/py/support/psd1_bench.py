@@ -155,7 +155,7 @@ class Host:
         self.now_ns = reply.t_ns
 
     def timed(self, s: Strobe) -> Strobe:
-        """The same with delay and length as numbers. Words that nobody reads end in a steady row; DR falls at each."""
+        """The same with delay and length as numbers. Words that is not read end in a steady row; DR falls at each."""
         if s.before_dr_ns is None:
             return s
         if self._dr_ns - s.before_dr_ns <= self.now_ns:

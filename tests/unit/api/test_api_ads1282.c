@@ -255,7 +255,7 @@ static void mode_pins_set_the_rate_without_registers(void **state)
     psabench_free(b);
     b = psabench_new(1);
     p = part(b, "ads1281", "u", "power_up_tclk=0");
-    set(p, "DR0", 1); /* in register mode nobody looks at it */
+    set(p, "DR0", 1); /* in register mode no one looks at it */
     until(p, "DRDY", 0);
     assert_true(psabench_now_ns(b) < 64 * MS);
     assert_null(psabench_part_new(b, "ads1282", "v", "pin_mode=1"));

@@ -143,7 +143,7 @@ static void the_lines_carry_the_words_of_the_frame(void **state)
     psabench_free(b);
 }
 
-/* INT falls on the grid of CLK, which is no event of the board while nobody watches. */
+/* INT falls on the grid of CLK, which is no event of the board without observers. */
 static void int_can_be_waited_for_unwatched(void **state)
 {
     (void)state;

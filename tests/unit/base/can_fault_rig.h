@@ -1,4 +1,4 @@
-/* A bus with four queues of three controllers, and a log of all that each of them is told. */
+/* A bus with four queues of three controllers, and a log of all that each of them is given. */
 #ifndef PSABENCH_TESTS_CAN_FAULT_RIG_H
 #define PSABENCH_TESTS_CAN_FAULT_RIG_H
 

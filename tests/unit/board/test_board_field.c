@@ -78,7 +78,7 @@ static void each_kind_takes_its_text(void **state)
     assert_int_equal(p.mode, 2);
     assert_int_equal(p.steps, 2);
     assert_int_equal(p.step[1], 8);
-    assert_true(set("steps", 0, "1")); /* begins anew */
+    assert_true(set("steps", 0, "1")); /* begins again */
     assert_int_equal(p.steps, 1);
 }
 

@@ -49,7 +49,7 @@ static void error_counters_read_255_at_most(void **state)
     assert_in_range(rec, 16, 17);
 }
 
-/* The numbers that node.c knows stand in every device's table. */
+/* The numbers that node.c knows be in every device's table. */
 static void every_device_has_the_common_objects(void **state)
 {
     (void)state;
@@ -77,8 +77,8 @@ static void objects_of_the_board_s_own_go_to_its_handlers(void **state)
     assert_int_equal(r->can.node.io.read(r->can.node.io.ctx, &e, &v, 0), CO_OK);
     assert_int_equal((int)v.number, 40005);
     assert_int_equal(r->can.node.io.write(r->can.node.io.ctx, &e, &v, 0), CO_AB_NO_OBJECT);
-    const struct co_entry nobody = {.index = 0x5FFF};
-    assert_int_equal(r->can.node.io.read(r->can.node.io.ctx, &nobody, &v, 0), CO_AB_NO_OBJECT);
+    const struct co_entry missing = {.index = 0x5FFF};
+    assert_int_equal(r->can.node.io.read(r->can.node.io.ctx, &missing, &v, 0), CO_AB_NO_OBJECT);
 }
 
 static void reset_node_resets_the_board_and_its_settings(void **state)
@@ -99,7 +99,7 @@ static void reset_node_resets_the_board_and_its_settings(void **state)
     nmt(r, 129);
     assert_int_equal(r->board.resets, 1);
     assert_int_equal(r->defaults, before + 1);
-    assert_null(seen_id(r, 0x580 + NODE)); /* communication began anew: no answer to what was asked before */
+    assert_null(seen_id(r, 0x580 + NODE)); /* communication began again: no answer to what was asked before */
     assert_int_equal(upload(r, PSD1_OD_STROBE_NS, 0), 0);
     assert_string_equal(upload_text(r, PSD1_OD_REFUSAL), "");
 }

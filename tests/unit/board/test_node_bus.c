@@ -155,7 +155,7 @@ static void who_gives_up_a_cycle_finds_the_bus_busy_until_it_ends(void **state)
     r->count = 0;
     fake_done(r, BOARD_CYCLE_OK, 0x1234);
     settle(r);
-    assert_null(seen_id(r, 0x580 + NODE)); /* nobody waits for it any more */
+    assert_null(seen_id(r, 0x580 + NODE)); /* no client waits any more */
     ask(r, 0x40, PSD1_OD_BUS, 2, 0);
     assert_int_equal(r->board.submits, 2);
     fake_done(r, BOARD_CYCLE_OK, 2);

@@ -51,7 +51,7 @@ static void a_stream_that_does_not_fit_stands_and_says_why(void **state)
     assert_int_equal(upload(r, PSD1_OD_COUNTERS, DROPPED), 5);
     assert_string_equal(upload_text(r, PSD1_OD_REFUSAL), r->told + sizeof "unit " - 1);
     nmt(r, 130);
-    nmt(r, 1); /* told anew after a reset of communication */
+    nmt(r, 1); /* told again after a reset of communication */
     assert_int_equal(bits_get_le(seen_id(r, 0x80 + NODE)->data, 2), PSD1_EMCY_STREAM_REFUSED);
     assert_int_equal(r->refusals, 2);
     r->board.period_ns = 1080000;

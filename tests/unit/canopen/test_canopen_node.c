@@ -184,7 +184,7 @@ static void stopped_is_deaf_to_all_but_nmt(void **state)
     assert_int_equal(upload(r, 0x1001, 0), 0x81);
 }
 
-/* An upload of the device's name stands between two segments when the node is stopped: nobody may take it up later. */
+/* An upload of the device's name is between two segments when the node is stopped: no one may take it up later. */
 static void stopping_ends_a_transfer(void **state)
 {
     (void)state;
@@ -221,7 +221,7 @@ static void emcy_tells_a_condition_once_and_its_end(void **state)
     assert_int_equal(m->data[2], 0x91);
     co_node_error_end(&r->node, 0xFF01, r->s.now_ns);
     settle(r);
-    assert_null(next(r)); /* one stands yet */
+    assert_null(next(r)); /* one is yet */
     assert_int_equal(upload(r, 0x1001, 0), 0x11);
     co_node_error_end(&r->node, 0x8110, r->s.now_ns);
     settle(r);
@@ -383,7 +383,7 @@ static void synchronous_types_send_at_sync(void **state)
     sdo(r, 0x2F, 0x1801, 2, 3); /* every third, new or not */
     nmt(r, 1, 5);
     for (int i = 0; i < 3; i++) assert_int_equal(sync_and_count(r), 0); /* nothing yet */
-    sdo(r, 0x2F, 0x1801, 2, 3);                                         /* counts anew */
+    sdo(r, 0x2F, 0x1801, 2, 3);                                         /* counts again */
     assert_int_equal(sync_and_count(r), 0);
     assert_int_equal(offer(r, 0, 1), CO_PDO_HELD);
     assert_int_equal(offer(r, 1, 1), CO_PDO_HELD);

@@ -281,7 +281,7 @@ static void a_pending_access_is_answered_when_it_is_done(void **state)
     assert_int_equal(r->answers, 1);
     co_sdo_answer(&r->sdo, r->ticket, CO_OK, NULL, 2000);
     expect(r, "60 04 20 00 00 00 00 00");
-    co_sdo_answer(&r->sdo, r->ticket, CO_OK, NULL, 3000); /* twice: nobody waits any more */
+    co_sdo_answer(&r->sdo, r->ticket, CO_OK, NULL, 3000); /* twice: no client waits any more */
     assert_int_equal(r->answers, 2);
 }
 
@@ -297,12 +297,13 @@ static void a_pending_access_may_fail(void **state)
 static void an_answer_to_an_abandoned_request_is_dropped(void **state)
 {
     (void)state;
-    static const char *const anew[] = {"40 00 10 00 00 00 00 00", "80 04 20 00 00 00 04 05"}; /* new, or client abort */
+    static const char *const again[] = {"40 00 10 00 00 00 00 00",
+                                        "80 04 20 00 00 00 04 05"}; /* new, or client abort */
     for (unsigned i = 0; i < 2; i++) {
         struct rig *r = rig_up();
         ask(r, "40 04 20 00 00 00 00 00");
         const uint32_t old = r->ticket;
-        ask(r, anew[i]);
+        ask(r, again[i]);
         const unsigned before = r->answers;
         ask(r, "40 04 20 00 00 00 00 00");
         const struct co_value v = {.number = 1};

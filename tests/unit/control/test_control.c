@@ -24,24 +24,24 @@ static const struct {
     {"{\"id\":1", "syntax", "not a JSON object"},
     {"{\"cmd\":\"time\"} {\"cmd\":\"quit\"}", "syntax", "not a JSON object"},
     {"{\"cmd\":\"time\",\"cmd\":\"quit\"}", "syntax", "cmd is given twice"},
-    {"{\"id\":1}", "syntax", "cmd: a command's name is wanted"},
-    {"{\"cmd\":5}", "syntax", "cmd: a command's name is wanted"},
+    {"{\"id\":1}", "syntax", "cmd: expected a command's name"},
+    {"{\"cmd\":5}", "syntax", "cmd: expected a command's name"},
     {"{\"cmd\":\"time\",\"ards\":{}}", "syntax", "\\\"ards\\\": unknown member"},
-    {"{\"cmd\":\"time\",\"args\":[1]}", "syntax", "args: an object is wanted"},
+    {"{\"cmd\":\"time\",\"args\":[1]}", "syntax", "args: expected an object"},
     {"{\"cmd\":\"fly\"}", "command", "\\\"fly\\\": unknown command; help lists them"},
     {"{\"cmd\":\"time\",\"args\":{\"x\":1}}", "argument", "no argument \\\"x\\\"; it takes none"},
     {"{\"cmd\":\"head.turn\",\"args\":{\"angle\":1}}", "argument", "no argument \\\"angle\\\"; it takes angle_deg"},
     {"{\"cmd\":\"head.turn\"}", "argument", "angle_deg is missing: degrees on the head's scale"},
-    {"{\"cmd\":\"head.turn\",\"args\":{\"angle_deg\":\"5\"}}", "type", "angle_deg: a number is wanted"},
+    {"{\"cmd\":\"head.turn\",\"args\":{\"angle_deg\":\"5\"}}", "type", "angle_deg: expected a number"},
     {"{\"cmd\":\"head.turn\",\"args\":{\"angle_deg\":3600.5}}", "range", "angle_deg: 3600.5 is outside -3600 ... 3600"},
     {"{\"cmd\":\"head.mount\",\"args\":{\"face\":\"up\"}}", "range",
      "is none of direct, reversed, side, side_reversed"},
-    {"{\"cmd\":\"head.mount\",\"args\":{\"face\":2}}", "type", "face: a string is wanted"},
+    {"{\"cmd\":\"head.mount\",\"args\":{\"face\":2}}", "type", "face: expected a string"},
     {"{\"cmd\":\"run\",\"args\":{\"for_s\":-0.1}}", "range", "for_s: -0.1 is outside 0 ... 86400"},
     {"{\"cmd\":\"run\",\"args\":{\"for_s\":1,\"after_tx\":1.5}}", "type", "after_tx: 1.5 is not an integer"},
     {"{\"cmd\":\"unit.reset\"}", "argument", "unit is missing: there are 2 units"},
     {"{\"cmd\":\"unit.reset\",\"args\":{\"unit\":\"c\"}}", "range", "no unit \\\"c\\\"; there is a, b"},
-    {"{\"cmd\":\"counters\",\"args\":{\"unit\":5}}", "type", "unit: a string is wanted"},
+    {"{\"cmd\":\"counters\",\"args\":{\"unit\":5}}", "type", "unit: expected a string"},
     {"{\"cmd\":\"vcd.flush\"}", "state", "no recording"},
     {"{\"cmd\":\"truth\"}", "command", "unknown command"}, /* not on this port */
 };
@@ -103,7 +103,7 @@ static void run_until_ends_at_the_very_event(void **state)
     const char *reply = control_run_done(&control, 0);
     assert_non_null(strstr(reply, "\"reached\":false,\"seen\":"));
     assert_null(strstr(reply, "\"seen\":0"));
-    assert_null(bench->unit[0].listeners); /* nobody listens any more */
+    assert_null(bench->unit[0].listeners); /* no client waits any more */
     assert_int_equal(asked.stops, 1);
     asked.refuse = true;
     assert_says("{\"cmd\":\"run.until\",\"args\":{\"event\":\"RES\"}}", "not now");
@@ -230,7 +230,7 @@ static void a_command_can_be_checked_without_being_carried_out(void **state)
     assert_false(check("table.profile", "{\"axis\":1,\"times_s\":[],\"rates_dps\":[1]}", why));
     assert_false(check("table.profile", "{\"axis\":1,\"times_s\":[\"0\"],\"rates_dps\":[1]}", why));
     assert_false(check("supply.output", "{\"on\":1}", why));
-    assert_string_equal(why, "on: true or false is wanted");
+    assert_string_equal(why, "on: expected true or false");
     assert_false(check("run.until", "{\"event\":\"DRD_A\",\"event\":\"RES\"}", why));
     assert_string_equal(why, "event is given twice");
     assert_true(head_at_rest(&bench->lab.head, 0));

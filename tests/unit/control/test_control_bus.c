@@ -102,7 +102,7 @@ static int fresh(void **state)
     return 0;
 }
 
-/* Of a client, 0: nobody waits, as in a timeline. Single quotes for double ones. */
+/* Of a client, 0: no client waits, as in a timeline. Single quotes for double ones. */
 static const char *say(int *client, const char *line)
 {
     char json[512];

@@ -136,7 +136,7 @@ static inline void run_to(int64_t t_ns)
     sched_run_until(&r.s, t_ns);
 }
 
-/* The number that fault.add gives; 0: refused, the reason stands in the control. Single quotes for double ones. */
+/* The number that fault.add gives; 0: refused, the reason is in the control. Single quotes for double ones. */
 static inline uint32_t add(const char *args)
 {
     char json[512];

@@ -175,7 +175,7 @@ static void what_does_not_fit_is_refused_with_the_reason(void **state)
         {"{'kind':'analog.load_open','point':'a.afe.x'}", "no load resistor"},
         {"{'kind':'analog.reference','point':'a.afe.x'}", "reference_ppm or drift_ppm_per_s is missing"},
         {"{'kind':'chip.drdy_stuck','point':'a.adc.y','level':'low'}",
-         "a.adc.y: DRD_A is the pin of converter X alone, nobody hears this one; adc.x has it"},
+         "a.adc.y: DRD_A is the pin of converter X only, this pin is not connected; use adc.x"},
         {"{'kind':'chip.drdy_stuck','point':'a.adc.x','level':'middle'}", "none of low, high"},
         {"{'kind':'chip.flip','point':'a.adc.x','register':11,'mask':1}", "a.adc.x has 0 to 10"},
         {"{'kind':'chip.flip','point':'a.adc.x','register':1,'mask':1,'for_s':1}", "is over as soon as it is done"},

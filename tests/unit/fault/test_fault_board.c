@@ -1,4 +1,4 @@
-/* Faults, events, counters and truth of a board that is none of ours: all that the commands know of it stands in its table. */
+/* Faults, events, counters and truth of a board that is none of ours: all that the commands know of it is in its table. */
 #include "rig.h"
 
 #include "fake_board.h"

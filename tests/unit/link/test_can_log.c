@@ -192,7 +192,7 @@ static void every_frame_becomes_a_line_with_its_instant(void **state)
     assert_memory_equal(text, "(0000000001.0020", 16);
     assert_non_null(strstr(text, ") can0 609#2F00210104\n(0000000001.002"));
     assert_string_equal(text + strlen(text) - 18, " can0 12345678#R4\n");
-    (void)say("{'cmd':'can.put','args':{'frame':'609#00'}}"); /* nobody listens any more */
+    (void)say("{'cmd':'can.put','args':{'frame':'609#00'}}"); /* no client waits any more */
     sched_run_until(&r.s, 4000000);
     assert_int_equal(r.log.frames, 2);
 }

@@ -11,7 +11,7 @@ enum { NEWS_MS = 10000 };
 
 struct client_rig {
     struct pty p;
-    int came, left; /* times that `opened` was told */
+    int came, left; /* times that `opened` was reported */
 };
 
 static void on_opened(void *ctx, bool open, int64_t t_ns)
@@ -45,7 +45,7 @@ static void news(struct client_rig *r)
     r->p.watch.readable(&r->p.watch, 0);
 }
 
-/* What the loop does with a timer that is wanted. */
+/* What the loop does with a timer that is set. */
 static void ask(struct client_rig *r)
 {
     assert_true(r->p.watch.timer_ms > 0);

@@ -155,7 +155,7 @@ static void a_level_vehicle_has_the_heading_in_the_gimbal_angle(void **state)
     near(atan2(look(&p, 0.0).C_lp[0][1], look(&p, 0.0).C_lp[1][1]), -30.0 * RAD_PER_DEG, 1e-15); /* azimuth of y_p */
 }
 
-/* A platform that stands level at azimuth angle alpha on a tilted vehicle. */
+/* A platform that is level at azimuth angle alpha on a tilted vehicle. */
 static struct platform_state levelled(double alpha_deg, const struct vehicle_cfg *v)
 {
     struct platform_cfg c = ideal();
@@ -346,7 +346,7 @@ static void the_step_does_not_matter(void **state)
     }
 }
 
-/* To the bit: with somebody who looks all the time, ahead and back, and with nobody. */
+/* To the bit: with somebody who looks all the time, ahead and back, and with no one. */
 static void nothing_depends_on_who_looks(void **state)
 {
     (void)state;

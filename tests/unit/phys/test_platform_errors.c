@@ -186,7 +186,7 @@ static void a_setting_draws_its_errors(void **state)
         const int64_t t_ns = (int64_t)(i + 1) * STEP_NS;
         const double servo_rad = platform_servo_rad(&p, t_ns - 1);
         platform_reposition(&p, t_ns);
-        platform_reposition(&p, t_ns); /* drawn anew, at the same instant */
+        platform_reposition(&p, t_ns); /* drawn again, at the same instant */
         near(platform_servo_rad(&p, t_ns - 1), servo_rad, 0.0);
         const struct pose *level = platform_level(&p, t_ns);
         const double got[4] = {atan2(level->C_nb[2][1], level->C_nb[1][1]) / RAD_PER_ARCMIN,

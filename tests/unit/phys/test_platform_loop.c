@@ -109,7 +109,7 @@ static void check_case_gives_the_three_rates(void **state)
     }
 }
 
-/* (9) with all its terms, wherever it stands: S = We (sin a cos g + cos a sin g sin b) + w_d1; and the azimuth loop rests at
+/* (9) with all its terms, wherever it is: S = We (sin a cos g + cos a sin g sin b) + w_d1; and the azimuth loop rests at
  * w_d2/m2, the residual of the Earth's rate aside. */
 static void settled_loop_is_equation_9(void **state)
 {

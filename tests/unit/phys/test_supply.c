@@ -147,7 +147,7 @@ static void the_voltmeter_has_steps(void **state)
     near(supply_shown_v(&s, 0), 10.5, 0.0);
 }
 
-/* Against a look at every nanosecond-like step: nothing changes before the instant that was told, and there it does. */
+/* Against a look at every nanosecond-like step: nothing changes before the instant that was reported, and there it does. */
 static void random_courses_change_where_they_are_said_to(void **state)
 {
     (void)state;

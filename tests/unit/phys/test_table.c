@@ -159,7 +159,7 @@ static void a_table_may_turn_for_long(void **state)
     near(p->w_ib_b_radps[2] / RAD_PER_DEG, 1000.0, 0.1);
 }
 
-/* An axis from -100 to +100 deg whose readout was told to show 90 deg at 0. */
+/* An axis from -100 to +100 deg whose readout was commanded to show 90 deg at 0. */
 static void limits_are_those_of_the_axis_wherever_its_readout_is(void **state)
 {
     (void)state;

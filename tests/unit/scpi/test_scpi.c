@@ -176,7 +176,7 @@ static void a_message_of_several_units_gives_one_answer(void **state)
 static void a_header_goes_on_from_the_one_before(void **state)
 {
     (void)state;
-    say("AXIS2:RATE 5;ZERO 3"); /* of axis 2: a header without a colon stands in the path of the one before */
+    say("AXIS2:RATE 5;ZERO 3"); /* of axis 2: a header without a colon is in the path of the one before */
     assert_int_equal(error(), 0);
     assert_true(rig.lab.table.set_zero_rad[1] != 0 && rig.lab.table.set_zero_rad[0] == 0);
     say("AXIS2:RATE 5;:AXIS1:ZERO 3");

@@ -261,7 +261,7 @@ static void who_listens_late_hears_the_faulty_levels(void **state)
     const struct line_fault f = fault(LINE_STUCK_LOW, INT);
     trace_detach(&r->t, &r->sink);
     (void)line_fault_add(&r->l, &f);
-    trace_set(&r->t, OTHER, true, 500); /* nobody listens */
+    trace_set(&r->t, OTHER, true, 500); /* no observer */
     trace_advance(&r->t, 1000);
     assert_int_equal(r->n, 0);
     trace_attach(&r->t, &r->sink);
@@ -271,7 +271,7 @@ static void who_listens_late_hears_the_faulty_levels(void **state)
     assert_int_equal(r->level & 7, 0);
 }
 
-/* Nobody listens, so that the lines move without a step; a fault of one of them must not hide where the others are. */
+/* No one listens, so that the lines move without a step; a fault of one of them must not hide where the others are. */
 static void who_listens_late_hears_where_healthy_lines_are(void **state)
 {
     (void)state;
@@ -307,7 +307,7 @@ static void as_many_faults_as_there_is_room_for_and_no_more(void **state)
     line_fault_end(&r->l, 3, 2000);                                   /* harmless */
 }
 
-/* What was told ahead of its time goes to nobody; the time of a new listener begins where the trace is. */
+/* What was reported ahead of its time goes to no one; the time of a new listener begins where the trace is. */
 static void who_listens_again_hears_times_in_order(void **state)
 {
     (void)state;

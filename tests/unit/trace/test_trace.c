@@ -106,7 +106,7 @@ static void only_real_changes_are_told(void **state)
 static void a_sink_first_hears_the_levels_and_only_its_own_signals(void **state)
 {
     (void)state;
-    trace_set(&trace, 1, true, 40); /* nobody listens: kept as the level, nothing pending */
+    trace_set(&trace, 1, true, 40); /* no observer: kept as the level, nothing pending */
     assert_int_equal(trace.pending_count, 0);
     trace_advance(&trace, 500);
     listen(&ear, 3);
@@ -131,11 +131,11 @@ static void nobody_listening_costs_no_work_and_detaching_keeps_the_levels(void *
     trace_detach(&trace, &other.sink);
     trace_detach(&trace, &other.sink); /* twice is harmless */
     assert_false(trace_watched(&trace, 6));
-    trace_set(&trace, 2, false, 850); /* nobody's, but an edge of the same line is still on its way */
+    trace_set(&trace, 2, false, 850); /* no one's, but an edge of the same line is still on its way */
     trace_set(&trace, 0, false, 900);
     trace_detach(&trace, &ear.sink);
     assert_int_equal(trace.pending_count, 0);
-    assert_int_equal(trace.level, 0); /* Int and CLK fell, though nobody heard it */
+    assert_int_equal(trace.level, 0); /* Int and CLK fell, though no one heard it */
     assert_int_equal(ear.count, 1);
 }
 

@@ -183,7 +183,7 @@ static void listen(void *ctx, const struct trace_step *s, unsigned n)
 
 static struct trace_sink listener = {.mask = 3, .steps = listen};
 
-/* Time stands at 7000 when the recording is asked for: what has happened there already is no edge of it, what follows is. */
+/* Time is at 7000 when the recording is asked for: what has happened there already is no edge of it, what follows is. */
 static void edges_at_its_start_count_from_the_command_on(void **state)
 {
     (void)state;

@@ -33,7 +33,7 @@ class NavigationWatch:
         self._reset = ""
 
     def faults(self, t_s: float) -> tuple[str, ...]:
-        """In words: what stands, and what began since the call before; the same as long as it stands."""
+        """In words: what is, and what began since the call before; the same as long as it is."""
         said = self._lost(t_s)
         flags, began = self._gyro.flags, self._gyro.began()
         for flag, words in FLAG_WORDS.items():

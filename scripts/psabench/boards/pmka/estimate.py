@@ -57,10 +57,10 @@ def rom_of(words: Sequence[int]) -> Rom:
     """The ROM from its 16-bit words. Raises ValueError for one that is damaged or of another layout."""
     w = np.asarray(words, dtype=np.int64) & 0xFFFF
     if len(w) < ROM_HEAD or w[0] != ROM_LAYOUT:
-        raise ValueError(f"ROM of {len(w)} words, layout {w[0] if len(w) else 'none'}: layout {ROM_LAYOUT} is wanted")
+        raise ValueError(f"ROM of {len(w)} words, layout {w[0] if len(w) else 'none'}: expected layout {ROM_LAYOUT}")
     points = int(w[2])
     if len(w) != ROM_HEAD + 4 * ROM_ROW * points + 1:
-        raise ValueError(f"ROM of {len(w)} words: {ROM_HEAD + 4 * ROM_ROW * points + 1} are wanted for {points} points")
+        raise ValueError(f"ROM of {len(w)} words: expected {ROM_HEAD + 4 * ROM_ROW * points + 1} for {points} points")
     if int(w.sum()) & 0xFFFF:
         raise ValueError(f"ROM is damaged: the sum of its words is {int(w.sum()) & 0xFFFF:04X}h, not 0")
     signed = np.where(w > 0x7FFF, w - 0x10000, w).astype(np.float64)
@@ -91,7 +91,7 @@ class Periods:
 def periods_of(columns: Mapping[str, Floats]) -> Periods:
     """From the columns of PMKA_CODES and PMKA_STATE in the units of the DBC.
 
-    Raises ValueError when a reading is missing, or an amplifier or a code was at its limit: what was lost there nobody
+    Raises ValueError when a reading is missing, or an amplifier or a code was at its limit: what was lost there no one
     knows.
     """
     seq = columns["SEQ"].astype(np.int64)
@@ -172,7 +172,7 @@ def calibrate(p: Periods, integrator: int) -> Calibration:
             nr_at.append((first + last) / 2)
             nr.append(size)
     if not nr:
-        raise ValueError(f"the resets of integrator {name} have not been calibrated: a run of both signs is wanted")
+        raise ValueError(f"the resets of integrator {name} have not been calibrated: expected a run of both signs")
     sizes = (np.array(nr_at), np.array(nr))
     zero_at, zeros = _zero_of_runs(p, integrator, sizes)
     if not len(zeros):

@@ -113,7 +113,7 @@ class FrameReader:
         return len(self._first.data) * (5 if self._form is Form.BLOCK else 1)
 
     def forget(self) -> None:
-        """Drop what has arrived and is not taken; the sequence starts anew."""
+        """Drop what has arrived and is not taken; the sequence starts again."""
         self._first, self._second, self._xy, self._seq, self._stamp = _Kept(), _Kept(), None, None, None
 
     def forget_half(self) -> None:
@@ -279,7 +279,7 @@ def _mixed(seq: Ints, stamp: Ints, seq_before: int | None, stamp_before: int | N
     single = ticks[numbers == 1]
     mixed = np.zeros(len(seq), dtype=np.bool_)
     if single.size < 3 or not (period := np.mean(single[np.abs(single - np.median(single)) <= 2])):
-        return mixed  # nobody knows the period
+        return mixed  # no one knows the period
     off = (ticks - numbers * period + (1 << 15)) % (1 << 16) - (1 << 15)
     mixed[:-1] = (np.abs(off[:-1]) > period / 2) & (np.abs(off[:-1] + off[1:]) < period / 2) & (numbers[1:] > 1)
     return mixed

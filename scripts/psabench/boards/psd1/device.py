@@ -24,7 +24,7 @@ class Psd1(BusUnit):
     unit.stream(100)["X"]      # words of converter X, LSB
     volts(unit.stream(100))    # (100, 3), V
     unit.bus_read(3)           # a read cycle at address 3
-    unit.also("PSD1_TIME")     # from now on readings have their instants: PSD1_GYRO, PSD1_RATE likewise
+    unit.also("PSD1_TIME")     # from now on readings have their instants: the same for PSD1_GYRO, PSD1_RATE
     """
 
     board = "psd1"

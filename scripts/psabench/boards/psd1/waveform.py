@@ -53,7 +53,7 @@ def _cycle(vcd: Vcd) -> tuple[int, list[_Transfer]]:
     """The first whole cycle: rise of A0, its transfers. Raises ValueError."""
     need(vcd, set(ROWS))
     a0 = _next(vcd, "A0", 1, vcd.start_ns + 1)
-    ready = _next(vcd, "FL2", 1, a0)  # in the set-up coefficients are read with A0 high, but offered to nobody
+    ready = _next(vcd, "FL2", 1, a0)  # in the set-up coefficients are read with A0 high, but offered to no one
     a0 = int([t for t in vcd.wires["A0"].edges_ns(1).tolist() if t < ready][-1])
     transfers, at = [], a0
     for rf in ("RFX", "RFY", "RFZ"):

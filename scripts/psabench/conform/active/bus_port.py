@@ -97,7 +97,7 @@ def a_write_cycle_and_its_answer(s: Subject) -> str:
 @proves("BUS-PORT-04")
 @trial(needs={"bus"})
 def refused_lines_say_why(s: Subject) -> str:
-    """Lines that are none, numbers that are none, addresses that nobody has, rights."""
+    """Lines that are none, numbers that are none, addresses that no one has, rights."""
     of = registers(s)
     ro = next(a for a, access in of.values() if access == "ro")
     a = f"{quiet(s):02X}h"

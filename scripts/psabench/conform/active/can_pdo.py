@@ -46,7 +46,7 @@ def _readings(t: Talk, count: int) -> tuple[int, int, int]:
         t.s.run_for(0.002)
         now, end = t.look(COUNTERS, READINGS)
     else:
-        raise TooLittle(f"{now - begin} readings in 4 s; {count} are wanted")
+        raise TooLittle(f"{now - begin} readings in 4 s; expected {count}")
     return now - begin, at, end
 
 

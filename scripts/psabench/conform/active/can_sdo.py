@@ -183,7 +183,7 @@ def a_silent_client_is_given_up(s: Subject) -> str:
 @proves("BUS-SDO-07")
 @trial()
 def unknown_commands_are_refused(s: Subject) -> str:
-    """Block transfers, a command that nobody has defined, a segment of no transfer."""
+    """Block transfers, a command that no one has defined, a segment of no transfer."""
     code = _row("BUS-SDO-07").limit("abort_code")
     commands = (0xA0, 0xC0, 0xE0, 0x60, 0x00)
     with talk(s) as t:
@@ -261,7 +261,7 @@ def the_wrong_length_is_refused(s: Subject) -> str:
             t.refused(write(index, sub, bytes([1] * n)), row.limit(code), f"{n} bytes to {index:04X}h:{sub}")
         if t.upload(HEARTBEAT) != before:
             raise Broken("1017h has changed", "what it was")
-    return "too long and too short are told apart"
+    return "too long and too short are distinguished"
 
 
 @proves("BUS-SDO-12")

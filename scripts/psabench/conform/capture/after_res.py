@@ -1,4 +1,4 @@
-"""What came first after Res: the boot-up message, and how many readings may have passed before one was told."""
+"""What came first after Res: the boot-up message, and how many readings may have passed before one was reported."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def booted(e: Evidence, heartbeat: str) -> CanFrame:
 
 
 def late_readings(e: Evidence, heartbeat: str, name: str, first_s: float, period_s: float) -> int:
-    """How many readings may have passed before the first that was told, a host that starts it late being no fault.
+    """How many readings may have passed before the first that was reported, a host that starts it late being no fault.
 
     first_s: from Res to the first reading. The fact "prompt": the host was in time for it. Raises TooLittle.
     """

@@ -35,7 +35,7 @@ class CanFrame:
     sent: bool = False  # by us, not received
     extended: bool = False  # identifier of 29 bits
     remote: bool = False
-    brs: bool | None = None  # data at the second bit rate, of an FD frame; None: nobody told
+    brs: bool | None = None  # data at the second bit rate, of an FD frame; None: no one told
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -158,7 +158,7 @@ def heartbeats_keep_their_period(e: Evidence) -> str:
     keep = np.array([f.data != b"\0" for f in beats[1:]], bool)  # from one to a boot-up there is no period
     apart_s = np.diff(t_s)[keep] if len(t_s) > 1 else t_s[:0]
     if len(apart_s) < 2:
-        raise TooLittle(f"{len(apart_s)} intervals between heartbeats; 2 are wanted")
+        raise TooLittle(f"{len(apart_s)} intervals between heartbeats; expected 2")
     off_s = np.abs(apart_s - due_s)
     if off_s.max() > late_s + due_s * e.clock_ppm * PPM:
         worst = float(apart_s[off_s.argmax()])
@@ -351,7 +351,7 @@ def frames_of_a_sample_keep_their_order(e: Evidence) -> str:
 def no_more_than_its_queue_waits(e: Evidence) -> str:
     """Count the readings that were kept when the bus was filled: those that come before the gap in the numbers."""
     if "flood" not in e.marks:
-        raise TooLittle("nobody filled the bus")
+        raise TooLittle("no node filled the bus")
     most = int(row_for(e, "BUS-LOAD-02").limit("queue_frames"))
     order = {i + e.node for i in pdos(e.variant.family).values()}
     at = int(e.marks["flood"])

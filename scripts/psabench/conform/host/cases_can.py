@@ -283,7 +283,7 @@ CASES: Mapping[str, Case] = {
         Case(name="delayed", title="frames come 30 ms late", play=_delayed),
         Case(
             name="corrupt",
-            title="a bit of a frame is wrong and nobody notices",
+            title="a bit of a frame is wrong without a CRC error",
             play=_hit("link.corrupt", (ZT, XY, ZT, XY)),
         ),
         Case(name="fast", title="frame form 1, and three frames are lost", play=_fast, form=1, busy=30),

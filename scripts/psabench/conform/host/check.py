@@ -93,7 +93,7 @@ class HostEvidence:
         if not self.streamed or not self.bus.samples:
             raise Broken(f"no stream was started{self.last_words()}", "NMT start after the set-up has been read")
         if not self.told.samples:
-            raise Broken(f"no sample was told{self.last_words()}", f"{len(self.bus.samples)} samples")
+            raise Broken(f"no sample was reported{self.last_words()}", f"{len(self.bus.samples)} samples")
         m = self.match
         if m.strange:
             s = m.strange[0]

@@ -144,7 +144,7 @@ def the_stream_is_started_after_the_registers_are_known(e: HostEvidence) -> str:
     _all_are_read(e, before_s=start_s)
     if not any(_answered(e, index, None, start_s) for index in IDENTITY):
         raise Broken(
-            f"NMT start at {start_s:.6f} s, and nobody asked who is there", "1000h, 1008h or 1018h read before"
+            f"NMT start at {start_s:.6f} s, without an identity read before it", "1000h, 1008h or 1018h read before"
         )
     return f"identity and {len(REGISTERS)} registers, then NMT start at {start_s:.3f} s"
 
@@ -291,7 +291,7 @@ def other_nodes_and_error_frames_are_let_by(e: HostEvidence) -> str:
 @proves("HOST-RANGE-01")
 @judges("over_range")
 def each_axis_is_told_as_over_range(e: HostEvidence) -> str:
-    """X, Y, Z, up and down, at 9.9 V and beyond the range: what is told, against the codes at their limits."""
+    """X, Y, Z, up and down, at 9.9 V and beyond the range: what is reported, against the codes at their limits."""
     m = e.samples()
     due: list[tuple[str, str]] = []
     over = [False] * 3

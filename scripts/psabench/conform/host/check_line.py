@@ -102,7 +102,7 @@ def a_clock_that_is_off_is_no_fault(e: HostEvidence) -> str:
 
 
 def _instants(e: HostEvidence) -> str:
-    """Raises Broken when the falls of INT are told otherwise than they were."""
+    """Raises Broken when the falls of INT are reported otherwise than they were."""
     bound_us = float(limits("HOST-LINE-01").limit("instant_tolerance_us"))
     falls = falls_us(LINE_CASES[e.case], form_of(e.profile))
     pairs = _pairs(e, NO_BITS)

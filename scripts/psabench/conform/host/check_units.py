@@ -22,7 +22,7 @@ def _told(e: HostEvidence) -> list[Reading]:
     if not e.streamed:
         raise Broken(f"no stream was started{e.last_words()}", "NMT start")
     if not e.told.readings:
-        raise Broken(f"no reading was told{e.last_words()}", '{"reading": ...}')
+        raise Broken(f"no reading was reported{e.last_words()}", '{"reading": ...}')
     return e.told.readings
 
 
@@ -170,7 +170,7 @@ def _numbered(told: Sequence[Reading], played: Sequence[State]) -> list[tuple[Re
 @proves("HOST-PMKA-03")
 @judges("pmka_lost")
 def what_is_lost_is_told_and_not_made_up(e: HostEvidence) -> str:
-    """One reading is lost, then three; input X stands beyond the range for half a second."""
+    """One reading is lost, then three; input X is beyond the range for half a second."""
     if not e.streamed:
         raise Broken(f"no stream was started{e.last_words()}", "NMT start")
     played = states(e.bus)
@@ -185,13 +185,13 @@ def what_is_lost_is_told_and_not_made_up(e: HostEvidence) -> str:
         raise Broken(f"an integral of reading {made[0].number}, which was at its limit", "none")
     if whole := [(a, b) for a, b in itertools.pairwise(e.told.readings) if _over_a_gap(a, b, played)]:
         (a, b) = whole[0]
-        raise Broken(f"integrals of readings {a.number} and {b.number}, with lost ones between", "sums that begin anew")
+        raise Broken(f"integrals of readings {a.number} and {b.number}, with lost ones between", "sums from 0")
     return f"lost {gaps}, over-range told, nothing made up"
 
 
 def _over_a_gap(a: Reading, b: Reading, played: Sequence[State]) -> bool:
     """Whether a sum went on from one to the other although what lies between them is not known."""
-    if not any(b.values):  # it has begun anew
+    if not any(b.values):  # it has begun again
         return False
     between = [s for s in played if a.number < s.seq <= b.number]
     return len(between) != b.number - a.number or any(s.over for s in between)
@@ -242,7 +242,7 @@ def _sums(e: HostEvidence, played: Sequence[Pulses]) -> str:
 @proves("HOST-PIK-03")
 @judges("pik_over")
 def a_channel_that_cannot_keep_up_is_told(e: HostEvidence) -> str:
-    """Each channel beyond its range, up and down: what is told against SAT."""
+    """Each channel beyond its range, up and down: what is reported against SAT."""
     _told(e)
     due: list[tuple[str, str]] = []
     before: frozenset[str] = frozenset()

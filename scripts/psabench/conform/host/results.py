@@ -74,7 +74,7 @@ class Reading:
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Anything else. at: number of samples and readings that were told before it."""
+    """Anything else. at: number of samples and readings that were reported before it."""
 
     name: str
     value: Any

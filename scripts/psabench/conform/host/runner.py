@@ -38,7 +38,7 @@ MODULES = (can_checks, line_checks, unit_checks)  # imported, they have register
 class Play:
     """How a host is played to. command "": it is started by hand, and tells into the file `results`."""
 
-    folder: Path  # for logs and what was told
+    folder: Path  # for logs and what was reported
     board: str = "psa2"
     profile: str = "article"
     command: str = ""

@@ -32,7 +32,7 @@ from psabench.link.control import Control
 
 STEP_S = 0.005  # simulated, between looks at the wall's clock
 COME_S = 60.0  # patience for a host to come: it may be an interpreter
-BY_HAND_S = 3600.0  # likewise, where somebody has to start it
+BY_HAND_S = 3600.0  # the same, where a person starts it
 STUCK_S = 30.0  # patience for a host that reads nothing
 END_S = 20.0  # patience for a host to end after its link has ended
 READY_S = 3.0  # simulated, for a host to start the stream
@@ -114,7 +114,7 @@ class ByHand:
     """
 
     results: Path
-    kept: Path  # a copy of what was told
+    kept: Path  # a copy of what was reported
     invite: Callable[[], None]  # says that it is time
     terminal: TextIO | None = None  # where Enter is looked for
     come_s: float = BY_HAND_S

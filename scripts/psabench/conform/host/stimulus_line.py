@@ -15,7 +15,7 @@ from psabench.conform.host.stimulus import STUCK_S, ByHand, Program
 from psabench.errors import TimeOut
 from psabench.link.lineport import INT
 
-HELD = 1 << 17  # bytes: more than the kernel keeps of what nobody reads
+HELD = 1 << 17  # bytes: more than the kernel keeps of what no one reads
 # Rest of the line, 16 ms: when it has been taken, all before it has been read; its own end may be lost.
 TAIL = bytes([INT]) * HELD
 

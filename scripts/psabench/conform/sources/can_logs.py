@@ -20,7 +20,7 @@ from psabench.errors import BadInput
 TEXT = (".log", ".asc", ".trc", ".csv")
 BINARY = (".blf", ".mf4")
 MOST_LINE = 1 << 16  # characters of a line of a text log
-EPOCH_S = 1e6  # stamps beyond are of a calendar: they are told from the first one on
+EPOCH_S = 1e6  # stamps beyond are of a calendar: they are reported from the first one on
 MOST_S = 1e11  # of a stamp
 
 

@@ -160,7 +160,7 @@ def _of_lines(log: LineLog, beat: Beat, period_s: float) -> Ratio | None:
 def _of_counter(e: Evidence, beat: Beat, period_s: float) -> Ratio | None:
     count, t_s, bits = _signal(e, beat.message, beat.counter)
     steps = np.diff(count) % (1 << bits)
-    cuts = np.flatnonzero((steps == 0) | (steps > 1 << bits - 1)) + 1  # begun anew
+    cuts = np.flatnonzero((steps == 0) | (steps > 1 << bits - 1)) + 1  # begun again
     k = max(range(len(cuts) + 1), key=lambda i: np.diff([0, *cuts, len(count)])[i])
     begin, end = [0, *cuts][k], [*cuts, len(count)][k]
     beats = np.concatenate(([0], np.cumsum(steps[begin : max(begin, end - 1)])))[: end - begin]

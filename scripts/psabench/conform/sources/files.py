@@ -60,7 +60,7 @@ def _read(path: Path, family: str, bounds: Bounds) -> CanTake | LineTake:
             f"{' '.join(LINE_ENDINGS)} recordings of lines"
         )
     if not path.exists() or path.is_dir():
-        raise BadInput(f"{path}: no such file" if not path.exists() else f"{path}: a folder; a file is wanted")
+        raise BadInput(f"{path}: no such file" if not path.exists() else f"{path}: a folder; expected a file")
     try:
         if ending == ".vcd":
             return read_vcd_file(path, bounds)

@@ -25,7 +25,7 @@ LINES: Mapping[str, Sequence[str]] = {  # as psa-emu --vcd names them: docs/wave
 
 
 class Recorded(LineLog):
-    """Lines of a recording: what nobody recorded is not absent, and nothing is said about it."""
+    """Lines of a recording: what no one recorded is not absent, and nothing is said about it."""
 
     def __contains__(self, name: str) -> bool:
         if not super().__contains__(name):

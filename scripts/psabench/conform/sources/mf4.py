@@ -1,7 +1,7 @@
 """MF4 logs, made safe: a process of its own makes a log of candump of one, within bounds of memory and time.
 
-python-can reads them by asammdf, which follows any address that stands in a file, in circles, too. As python-can loads
-asammdf whenever it is loaded itself, which takes seconds, asammdf may stand in a folder that this process alone looks
+python-can reads them by asammdf, which follows any address that is in a file, in circles, too. As python-can loads
+asammdf whenever it is loaded itself, which takes seconds, asammdf may be in a folder that this process alone looks
 into.
 """
 
@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import IO, TextIO
 
 FOLDER = Path(sys.prefix) / "mf4"  # tools/setup puts asammdf there
-BEGINS = (b"MDF     ", b"UnFinMF ")  # the second: nobody closed it
+BEGINS = (b"MDF     ", b"UnFinMF ")  # the second: no one closed it
 MOST_MEMORY = 2 << 30  # bytes of that process
 MOST_CPU_S = 60  # of reading
 MOST_LOG = 1 << 30  # bytes
@@ -47,7 +47,7 @@ def candump_of(path: Path, max_s: float, most_frames: int) -> tuple[IO[bytes], s
     with (
         tempfile.TemporaryDirectory() as scratch,
         tempfile.TemporaryFile() as words,
-    ):  # asammdf copies what nobody closed
+    ):  # asammdf copies what no one closed
         bounds = [str(n) for n in (max_s, most_frames, MOST_MEMORY, MOST_CPU_S)]
         status = subprocess.run(
             [sys.executable, "-P", "-W", "ignore", __file__, str(path), *bounds],

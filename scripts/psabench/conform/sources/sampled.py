@@ -21,7 +21,7 @@ Samples = npt.NDArray[np.uint64]
 
 
 class Sampler:
-    """Sample k stands at k / sample_hz; an edge stands at the first sample that shows it."""
+    """Sample k is at k / sample_hz; an edge is at the first sample that shows it."""
 
     def __init__(self, names: Sequence[str], bits: Sequence[int], sample_hz: float, max_s: float) -> None:
         """bits: which bit of a sample each name is."""

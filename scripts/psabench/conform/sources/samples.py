@@ -28,7 +28,7 @@ PORT_LINES: Mapping[str, Sequence[str]] = {
 
 
 def line_log(data: bytes, family: str, sample_hz: float) -> LineLog:
-    """Edges of the lines; sample 0 is the instant 0. An edge stands at the first sample that shows it."""
+    """Edges of the lines; sample 0 is the instant 0. An edge is at the first sample that shows it."""
     x = np.frombuffer(data, np.uint8)
     end_ns = round(len(x) / sample_hz * NS)
     names = PORT_LINES[family]

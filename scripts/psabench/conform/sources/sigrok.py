@@ -73,7 +73,7 @@ def _device(path: Path, text: str) -> Mapping[str, str]:
 def _number(path: Path, device: Mapping[str, str], key: str, least: int, most: int) -> int:
     text = device.get(key, "")
     if not (text.isascii() and text.isdigit() and len(text) < 6 and least <= int(text) <= most):
-        raise BadInput(f"{path}: metadata: {key} is {text[:20]!r}; {least} to {most} is wanted")
+        raise BadInput(f"{path}: metadata: {key} is {text[:20]!r}; expected {least} to {most}")
     return int(text)
 
 
@@ -121,7 +121,7 @@ def _feed(archive: zipfile.ZipFile, parts: list[zipfile.ZipInfo], width: int, sa
 
 
 def _check_sum(archive: zipfile.ZipFile, part: zipfile.ZipInfo) -> None:
-    """Read to its end, where the sum stands: of a member that is damaged no sample is sure. Raises as zipfile does."""
+    """Read to its end, where the sum is: of a member that is damaged no sample is sure. Raises as zipfile does."""
     with archive.open(part) as file:
         while file.read(BLOCK):
             pass

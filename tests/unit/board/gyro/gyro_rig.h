@@ -92,12 +92,12 @@ static inline void rig_reading(void *ctx, const struct gyro_reading *reading, in
     if (r->readings < RIG_READINGS) r->reading[r->readings++] = *reading;
 }
 
-static inline void rig_condition(void *ctx, enum gyro_flag what, bool stands, int64_t t_ns)
+static inline void rig_condition(void *ctx, enum gyro_flag what, bool active, int64_t t_ns)
 {
     struct rig *r = ctx;
     (void)t_ns;
-    assert_true(((r->conditions & what) != 0) != stands); /* told once each */
-    r->conditions = stands ? r->conditions | what : r->conditions & ~(unsigned)what;
+    assert_true(((r->conditions & what) != 0) != active); /* told once each */
+    r->conditions = active ? r->conditions | what : r->conditions & ~(unsigned)what;
 }
 
 /* No error but the drifts. */

@@ -74,7 +74,7 @@ static void on_for(double s)
     rig_run(&r, s);
 }
 
-/* Seconds until the flag stands; -1: not by then. */
+/* Seconds until the flag is set; -1: not by then. */
 static double until(enum gyro_flag what, double limit_s)
 {
     for (double s = 1.0; s <= limit_s; s += 1.0) {
@@ -186,7 +186,7 @@ static void a_track_told_ahead_or_late_is_none(void **state)
     aid();
     on_for(900.0);
     assert_int_equal(r.b.counters.encoder_faults, 0);
-    tell(50.0, 0.0, 300.0); /* of a vehicle that stands a track says nothing */
+    tell(50.0, 0.0, 300.0); /* of a vehicle that is parked a track says nothing */
     platform_stick(&r.p, true, r.s.now_ns);
     on_for(900.0);
     tell(50.0, 0.0, 30.0);
@@ -372,7 +372,7 @@ static void conditions_are_counted_with_their_last_step(void **state)
     on_for(5.0);
     r.mute = false;
     on_for(0.02);
-    rig_mode(&r, GYRO_NAVIGATE); /* the loss still stands: it is the first of the new mode */
+    rig_mode(&r, GYRO_NAVIGATE); /* the loss is still active: it is the first of the new mode */
     assert_int_equal(lost->begun, 1);
     on_for(5.0);
     rig_mode(&r, GYRO_NAVIGATE);

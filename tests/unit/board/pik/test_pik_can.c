@@ -192,7 +192,7 @@ static bool same_digest(void)
     return strcmp(hex[0], hex[1]) == 0;
 }
 
-static void nobody(void *ctx, const struct trace_step *s, unsigned n)
+static void ignore_steps(void *ctx, const struct trace_step *s, unsigned n)
 {
     (void)ctx;
     (void)s;
@@ -205,7 +205,7 @@ static void digest_is_of_the_state_not_of_who_looks(void **state)
     rig_up(&r, NULL, NULL);
     rig_up(&other, NULL, NULL);
     r.v[0] = other.v[0] = 3.0;
-    struct trace_sink ear = {.mask = PIK_PULSE_LINES, .steps = nobody};
+    struct trace_sink ear = {.mask = PIK_PULSE_LINES, .steps = ignore_steps};
     run(&r, 2345678);
     trace_attach(&r.b.trace, &ear);
     run(&r, 10000000);

@@ -44,7 +44,7 @@ static void a_reading_that_nobody_took_is_told(void **state)
     (void)state;
     up();
     (void)rig_read(&rig, K);
-    assert_int_equal(rig_read(&rig, STATUS) & 3, 2); /* those before nobody has taken */
+    assert_int_equal(rig_read(&rig, STATUS) & 3, 2); /* those before no one has taken */
     assert_int_equal(rig_read(&rig, STATUS) & 3, 0);
     rig_readings(&rig, 301);
     assert_int_equal(rig_read(&rig, STATUS) & 3, 1);

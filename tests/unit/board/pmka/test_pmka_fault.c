@@ -153,7 +153,7 @@ static void a_bit_of_the_rom(void **state)
     assert_int_equal(rig.b.rom[5], w5 ^ 0x8102);
 }
 
-/* Res: the integrators go on with what they have, all else begins anew. */
+/* Res: the integrators go on with what they have, all else begins again. */
 static void res(void **state)
 {
     (void)state;
@@ -266,7 +266,7 @@ static void more_than_full_scale(void **state)
     }
 }
 
-/* Who changes the physics says so before: up to then the old input counts, though nobody has sampled. */
+/* Who changes the physics says so before: up to then the old input counts, though no one has sampled. */
 static void the_input_may_change_abruptly(void **state)
 {
     (void)state;

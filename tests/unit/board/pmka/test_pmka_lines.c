@@ -54,7 +54,7 @@ static void watch(struct rig *r)
     rig_init(r, &p);
     inputs(r);
     trace_attach(&r->b.trace, &sink);
-    edges = 0; /* the levels it was told first */
+    edges = 0; /* the levels it was given first */
     pmka_board.power_up(&r->b, 0);
 }
 

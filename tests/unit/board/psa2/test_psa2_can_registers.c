@@ -98,7 +98,7 @@ static void a_client_that_gives_up_finds_the_port_busy_until_the_board_is_done(v
     r->count = 0;
     fake_done(r, PSA2_OK);
     settle(r);
-    assert_int_equal(r->count, 0); /* nobody waits for it */
+    assert_int_equal(r->count, 0); /* no client waits for it */
     ask(r, 0x40, 0x2000, 3, 0);
     fake_done(r, PSA2_OK);
     settle(r);

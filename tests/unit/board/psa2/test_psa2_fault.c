@@ -77,8 +77,7 @@ static void each_event_is_told_at_its_edge(void **state)
     psa2_reset(&rig.b, rig.s.now_ns);
     rig_run(&rig, 200000000);
     trace_advance(&rig.b.trace, rig.s.now_ns);
-    const int64_t end_ns =
-        rig.s.now_ns - 100000; /* a frame that has only begun was told of, and its fall drawn later */
+    const int64_t end_ns = rig.s.now_ns - 100000; /* the start of a frame was reported, and its fall is drawn later */
     match(PSA2_EV_RES, PSA2_LINE_RES, false, end_ns);
     match(PSA2_EV_SYNC_A, PSA2_LINE_SYNC_A, true, end_ns);
     match(PSA2_EV_SYNC_T, PSA2_LINE_SYNC_T, true, end_ns);

@@ -63,7 +63,7 @@ static uint64_t settled(void)
     return lines;
 }
 
-/* At once and, since the looking goes on for a while, up to the end of a frame; then nobody looks again. */
+/* At once and, since the looking goes on for a while, up to the end of a frame; then no one looks again. */
 static void look(struct rng *rng, const char *profile)
 {
     trace_attach(&fresh.b.trace, &fresh.sink);
@@ -118,7 +118,7 @@ static void a_late_look_tells_what_an_early_one_knows(void **state)
     assert_true(high[PSA2_LINE_DOUTX] > 50 && high[PSA2_LINE_DOUTY] > 50 && high[PSA2_LINE_DOUTZ] > 50);
 }
 
-/* The frame under way at a first look is told whole: Int, and every bit of it that comes after what the trace has closed. */
+/* The frame under way at a first look is reported whole: Int, and every bit of it that comes after what the trace has closed. */
 static void a_frame_under_way_is_told_from_its_beginning(void **state)
 {
     (void)state;

@@ -42,7 +42,7 @@ static void a_read_that_is_not_over_at_drd_a_is_an_overrun(void **state)
     assert_int_equal(marked, rig.b.counters.overruns);
 }
 
-/* A converter that is silent: the request fails 100 ms + t_DR (163.1 ms) after the last DRD_A, one fault is told, and when
+/* A converter that is silent: the request fails 100 ms + t_DR (163.1 ms) after the last DRD_A, one fault is reported, and when
  * the converter comes back all goes on. */
 static void a_silent_converter_is_a_time_out_and_a_fault(void **state)
 {

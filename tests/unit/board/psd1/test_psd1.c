@@ -132,7 +132,7 @@ static void a_change_at_the_instant_of_the_rise_is_late(void **state)
     assert_int_equal(rig.events[PSD1_EV_A0], a0);
     rig_until(&rig, rise_ns + 800);
     assert_int_equal(rig.events[PSD1_EV_A0], a0 + 1);
-    /* off before the edge: no cycle; off at the edge, even if it is told first: it begins all the same */
+    /* off before the edge: no cycle; off at the edge, even if it is reported first: it still begins */
     for (int64_t early_ns = 0; early_ns < 2; early_ns++) {
         rig_up(&rig, &p);
         rig_run(&rig, 5000000);

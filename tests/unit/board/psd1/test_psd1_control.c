@@ -107,7 +107,7 @@ static void commands_come_one_after_the_other_and_between_cycles(void **state)
     assert_int_equal(psd1_request(&rig.b, &q, &why, rig.s.now_ns), BOARD_CYCLE_OFF);
 }
 
-/* Nobody reads: after a millisecond the command cuts the cycle. */
+/* No one reads: after a millisecond the command cuts the cycle. */
 static void a_command_does_not_wait_for_a_host_that_never_comes(void **state)
 {
     (void)state;

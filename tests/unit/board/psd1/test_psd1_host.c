@@ -99,7 +99,7 @@ static void a_word_is_taken_once(void **state)
     const unsigned strobes = rig.events[PSD1_EV_STROBE];
     assert_int_equal(rig_bus(&rig, false, 0, 0, 200), BOARD_CYCLE_OK);
     assert_true(rig.b.fl2);
-    assert_int_equal(rig_bus(&rig, false, 0, 0, 0), BOARD_CYCLE_NOT_READY); /* though FL2 stands */
+    assert_int_equal(rig_bus(&rig, false, 0, 0, 0), BOARD_CYCLE_NOT_READY); /* though FL2 is active */
     assert_int_equal(rig.events[PSD1_EV_STROBE], strobes + 1);
 }
 
@@ -124,7 +124,7 @@ static void the_bus_takes_one_cycle_at_a_time(void **state)
     assert_int_equal(rig.result, BOARD_CYCLE_OFF);
 }
 
-/* While the built-in host strobes, somebody else's cycle waits; while somebody else is on the bus, the host does. */
+/* While the built-in host strobes, another client's cycle waits; while another client is on the bus, the host waits. */
 static void the_built_in_host_shares_the_bus(void **state)
 {
     (void)state;
@@ -145,7 +145,7 @@ static void the_built_in_host_shares_the_bus(void **state)
     assert_int_equal(rig.cycle[rig.cycles - 1].word[2], 65208);
 }
 
-/* Nobody gets a word before the built-in host, not even in the time from FL2 to its strobe. */
+/* No one gets a word before the built-in host, not even in the time from FL2 to its strobe. */
 static void words_are_the_built_in_hosts_alone(void **state)
 {
     (void)state;
@@ -183,7 +183,7 @@ static void a_host_that_is_late_stretches_the_cycle(void **state)
     assert_int_equal(rig.b.counters.lost_x, 9);
     assert_int_equal(rig.b.counters.lost_y, 9);
     assert_int_equal(rig.b.counters.lost_z, 10);
-    /* X's word waits: the next begins at once; what is lost is told once */
+    /* X's word waits: the next begins at once; what is lost is reported once */
     assert_int_equal(rig.b.due_ns - rig.cycle[0].t_end_ns, 400);
     for (unsigned i = 0; i < 3; i++) (void)take(&rig, 0);
     rig_await(&rig, PSD1_IDLE);

@@ -282,7 +282,7 @@ static void heard_the_same(const struct rig *all, struct rig *got, unsigned firs
     assert_int_equal(at, got->edges);
 }
 
-/* Attaches; the levels that it is told at once are its beginning, if the trace has moved on to now. */
+/* Attaches; the levels that it is given at once are its beginning, if the trace has moved on to now. */
 static unsigned join(struct rig *board, struct rig *ear, uint64_t mask, bool *level, bool now)
 {
     ear->sink = (struct trace_sink){.mask = mask, .steps = rig_steps, .ctx = ear};

@@ -83,7 +83,7 @@ static void read_back(unsigned axis, int64_t t_ns)
     if (q.word != 0x020013) fail_msg("axis %u at %lld ns: %06X", axis, (long long)t_ns, (unsigned)q.word);
 }
 
-/* Nobody takes the words: each waits, is announced, replaced, or comes while RFx is low or just between two frames. */
+/* No one takes the words: each waits, is announced, replaced, or comes while RFx is low or just between two frames. */
 static void a_control_word_is_read_at_any_phase(void **state)
 {
     (void)state;

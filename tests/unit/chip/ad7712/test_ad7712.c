@@ -267,7 +267,7 @@ static void writes_while_sync_is_low_wait_for_it(void **state)
     assert_int_equal(r.a.n.calibrations, 1);
 }
 
-/* STANDBY low: nothing runs, the port is deaf; registers live on, conversions begin anew with its rise. */
+/* STANDBY low: nothing runs, the port is deaf; registers live on, conversions begin again with its rise. */
 static void standby_stops_all_and_keeps_the_registers(void **state)
 {
     (void)state;

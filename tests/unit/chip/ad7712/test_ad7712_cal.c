@@ -145,7 +145,7 @@ static void system_offset_takes_the_zero_from_the_pins(void **state)
     near(r.a.full[0], 4194304 / ((2.5 + 0.4) * 0.97 / 2.5), 1);
 }
 
-/* 101: the zero is taken anew before each word, so that it follows; the span stays. */
+/* 101: the zero is taken again before each word, so that it follows; the span stays. */
 static void background_calibration_follows_the_zero(void **state)
 {
     (void)state;
@@ -171,7 +171,7 @@ static void background_calibration_follows_the_zero(void **state)
     r.a.cfg.offset_v[0] = 0.0;
     write_control(&r, CAL(0, 20));
     await_fall(&r);
-    near(volts(&r), 1.05 * 0.97, 1e-5); /* nobody corrects it now */
+    near(volts(&r), 1.05 * 0.97, 1e-5); /* no one corrects it now */
 }
 
 /* An unread background word pulses DRDY before the next one, six periods later. */

@@ -37,7 +37,7 @@ static void output_rate_by_code_and_clock(void **state)
     near(1e7 / 512 / 2000, 9.77, 0.01);
 }
 
-/* A word that nobody reads: DRDY rises 500 tau before the next, which replaces it. */
+/* A word that is not read: DRDY rises 500 tau before the next, which replaces it. */
 static void an_unread_word_pulses_drdy_and_is_an_overrun(void **state)
 {
     (void)state;
@@ -248,7 +248,7 @@ static void the_input_is_looked_at_in_the_middle_of_cells(void **state)
     assert_int_equal(r.looks, 12);
     for (unsigned i = 0; i < 12; i++) assert_int_equal(r.look_ns[i], start_ns + 121600 + i * 243200);
     wait_ns(&r, 500000);
-    assert_int_equal(r.looks, 12); /* nobody asked */
+    assert_int_equal(r.looks, 12); /* no one asked */
     ad7712_sample_until(&r.a, r.s.now_ns);
     assert_int_equal(r.looks, 14);
     ad7712_sample_until(&r.a, r.s.now_ns);

@@ -198,7 +198,7 @@ static void words_that_come_while_rfs_is_low_are_lost(void **state)
     }
 }
 
-/* RFS may go high between the bytes of a word; the read goes on where it was. A new word in between begins anew: torn. */
+/* RFS may go high between the bytes of a word; the read goes on where it was. A new word in between begins again: torn. */
 static void rfs_may_rise_between_bytes(void **state)
 {
     (void)state;

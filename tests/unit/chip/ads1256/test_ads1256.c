@@ -2,7 +2,7 @@
 #include "ads1256_rig.h"
 
 /* Reset value, what FFh and 00h leave behind. DRDY is high in STATUS: FFh there set ACAL and changed BUFEN. DIO of IO
- * shows inputs that nobody drives. */
+ * shows inputs that no one drives. */
 static const struct {
     const char *name;
     uint8_t reset, ones, zeros;

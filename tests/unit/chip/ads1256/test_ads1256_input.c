@@ -158,7 +158,7 @@ static void ads1255_has_two_inputs_and_aincom(void **state)
     struct rig r;
     up(&r, &cfg);
     for (unsigned i = 0; i < 9; i++) r.v[i] = 0.25 * (i + 1);
-    for (unsigned i = 2; i < 8; i++) r.ohm[i] = 1e5; /* nobody's */
+    for (unsigned i = 2; i < 8; i++) r.ohm[i] = 1e5; /* no one's */
     for (unsigned p = 0; p < 16; p++) {
         for (unsigned n = 0; n < 16; n++) {
             const uint32_t before = r.a.n.bad_mux;

@@ -294,7 +294,7 @@ static void three_chips_on_one_clock_stay_in_step(void **state)
 
 /* ---- Reserved codes ---- */
 
-/* DR 101, 110, 111 with each filter that has a rate: nobody knows what the part does. */
+/* DR 101, 110, 111 with each filter that has a rate: no one knows what the part does. */
 static void reserved_rates_stop_the_converter_and_are_counted(void **state)
 {
     (void)state;

@@ -72,7 +72,7 @@ static void a_calibration_raises_drdy_until_it_is_done(void **state)
     assert_int_equal(r.a.count.conversions, 1 + 1); /* the readings between are no words */
 }
 
-/* A word that nobody has read when a calibration begins is gone. */
+/* A word that no one has read when a calibration begins is gone. */
 static void a_calibration_forgets_the_word(void **state)
 {
     (void)state;

@@ -122,7 +122,7 @@ static void a_slow_clock_stretches_what_comes_and_nothing_that_was(void **state)
     assert_int_equal(r->a.next.t_ns, clk_edge_ns(&r->a.clk, r->a.next.k));
     assert_int_equal(ads1282_period_ns(&r->a), clk_span_ns(4091904, 4096));
     const int64_t second_ns = to_fall(r);
-    near((double)(second_ns - r->rise_ns), 4.0 / 4091904.0 * 1e9, 1.0); /* nobody has read */
+    near((double)(second_ns - r->rise_ns), 4.0 / 4091904.0 * 1e9, 1.0); /* no one has read */
     near((double)(second_ns - first_ns), PERIOD_NS / 2 + PERIOD_NS / 2 * 4096000.0 / 4091904.0, 2.0);
     int64_t last_ns = second_ns;
     for (int i = 0; i < 1000; i++) last_ns = to_fall(r);

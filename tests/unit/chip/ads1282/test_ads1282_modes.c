@@ -45,7 +45,7 @@ static void only_a_sync_out_of_step_restarts(void **state)
     }
 }
 
-/* E2E 621415: C2h, 250 words/s, and 250 Hz from another clock: DOUT stays 0 for ever. 20 ppm off here. */
+/* E2E 621415: C2h, 250 words/s, and 250 Hz from another clock: DOUT stays 0 without end. 20 ppm off here. */
 static void a_sync_that_drifts_keeps_dout_at_zero_for_ever(void **state)
 {
     (void)state;

@@ -156,7 +156,7 @@ static double decoded(const struct bits *b, unsigned n)
     return 3 * m0[2] - 6 * m0[3] + 4 * m0[4] + 9 * (m1[0] - 2 * m1[1] + m1[2]);
 }
 
-/* Four running means of 64 leave only the input: full scale stands for 2/3 of the bits' range. */
+/* Four running means of 64 leave only the input: full scale represents 2/3 of the bits' range. */
 static void the_published_formula_recovers_the_input_from_the_bits(void **state)
 {
     (void)state;

@@ -61,7 +61,7 @@ static const double frequencies[] = {0.003, 0.05, 0.1, 0.2, 0.3, 0.375, 0.4, 0.4
 
 enum { SETTLED = 70, WORDS = 1070, MOD_WORDS = 400 };
 
-/* Block b of data period p ends it when b = 31; the word of period p stands at p. */
+/* Block b of data period p ends it when b = 31; the word of period p is at p. */
 static void words_of_a_sine_have_the_response_of_the_coefficients_to_1e_9(void **state)
 {
     (void)state;

@@ -39,7 +39,7 @@ def _columns(can: CanLog, board: str, node: int, least: int) -> Mapping[str, Flo
 
 
 def vertical_degph(latitude_deg: float) -> float:
-    """Wz of a vehicle that stands still."""
+    """Wz of a vehicle that is parked still."""
     return EARTH_DEGPH * float(np.sin(np.radians(latitude_deg)))
 
 

@@ -245,7 +245,7 @@ def windows_show_the_rate_of_the_earth(e: Evidence) -> str:
 @proves("GYRO-LAW-05", "GYRO-LAW-06")
 @check("limits", needs={"can"})
 def rates_are_limited_and_say_so(e: Evidence) -> str:
-    """Look at U1, U2 and SATURATED when the level is told wrongly and the loop is stiff."""
+    """Look at U1, U2 and SATURATED when the level is reported wrongly and the loop is stiff."""
     c, most = columns(e), row_for(e, *LIMITS).limit("rate_max_dps") * 3600
     top = np.maximum(np.abs(c["U1"]), np.abs(c["U2"]))
     near = row_for(e, *LIMITS).limit("tolerance_degph")

@@ -105,7 +105,7 @@ def power_on(s: Subject) -> Evidence:
 
 @scene("level", boards=("gyro",))
 def level(s: Subject) -> Evidence:
-    """Mode 1, for as long as the platform may take to get level from where it stands."""
+    """Mode 1, for as long as the platform may take to get level from where it is."""
     calm(s)
     with s.take(lines=False) as take:
         s.unit.start()

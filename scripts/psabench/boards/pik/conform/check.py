@@ -29,7 +29,7 @@ COEFFICIENT = ("PIK-LAW-02", "PIK-LAW-03")
 def _told(e: Evidence, name: str, least: int = LEAST) -> CanLog:
     log = e.frames_of(name)
     if len(log) < least:
-        raise TooLittle(f"{len(log)} messages {name} came; {least} are wanted")
+        raise TooLittle(f"{len(log)} messages {name} came; expected {least}")
     bad = [f for f in log.frames if len(f.data) != int(message(name).length)]
     if bad:
         raise TooLittle(f"{name} of {len(bad[0].data)} bytes")
@@ -54,7 +54,7 @@ def rates(e: Evidence) -> dict[str, tuple[float, float]]:
     t_s, n = totals(e)
     took_s = float(t_s[-1] - t_s[0])
     if took_s <= 0.0 or not e.inputs_v:
-        raise TooLittle("inputs that are known, and stamps that go on, are wanted")
+        raise TooLittle("expected inputs that are known, and stamps that go on")
     mine = {a: k for k, a in enumerate("xyz") if a in e.inputs_v}
     return {a: (e.inputs_v[a], float(n[-1, k] - n[0, k]) / took_s) for a, k in mine.items()}
 
@@ -143,7 +143,7 @@ def nothing_saturates_below_full_scale(e: Evidence) -> str:
     """Look for SAT bits in a minute."""
     most = row_for(e, "PIK-SAT-02").limit("input_max_v")
     if any(abs(v) > most for v in e.inputs_v.values()):
-        raise TooLittle(f"inputs of {most:g} V at most are wanted")
+        raise TooLittle(f"expected inputs of {most:g} V at most")
     raw = _told(e, "PIK_COUNTS").raw("PIK_COUNTS")
     for axis in "XYZ":
         if raw[f"SAT_{axis}"].any():

@@ -27,10 +27,10 @@ def columns(e: Evidence, least: int = 10) -> dict[str, Floats]:
 def _columns(can: CanLog, board: str, node: int, least: int) -> Mapping[str, Floats]:
     codes, states = can.of(CODES, board, node), can.of(STATE, board, node)
     if min(len(codes), len(states)) < least:
-        raise TooLittle(f"{len(codes)} PMKA_CODES, {len(states)} PMKA_STATE came; {least} of each are wanted")
+        raise TooLittle(f"{len(codes)} PMKA_CODES, {len(states)} PMKA_STATE came; expected {least} of each")
     pairs = _pairs(can, codes.frames[0].can_id, states.frames[0].can_id)
     if len(pairs) < least:
-        raise TooLittle(f"{len(pairs)} PMKA_CODES had their PMKA_STATE; {least} are wanted")
+        raise TooLittle(f"{len(pairs)} PMKA_CODES had their PMKA_STATE; expected {least}")
     found: dict[str, Floats] = {}
     try:
         for name, frames in ((CODES, [p[0] for p in pairs]), (STATE, [p[1] for p in pairs])):
@@ -80,7 +80,7 @@ class Run:
         first, last = self.ends
         took_s = self.rom.ts_s * (last - first)
         if took_s < row.limit("duration_s"):
-            raise TooLittle(f"{took_s:.1f} s were recorded; {row.limit('duration_s'):g} s are wanted")
+            raise TooLittle(f"{took_s:.1f} s were recorded; expected {row.limit('duration_s'):g} s")
         due_vs = np.array([self.inputs_v[a] for a in "xyz"]) * took_s
         error_vs = integral_vs[last] - integral_vs[first] - due_vs
         return np.asarray(error_vs * row.limit("g_mps2") / row.limit("ma_v_per_g") * MILLI, np.float64)

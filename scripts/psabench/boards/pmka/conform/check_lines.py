@@ -34,7 +34,7 @@ def samples(e: Evidence, least: int = LEAST) -> tuple[Ints, Ints]:
     begins = np.flatnonzero(np.diff(rises, prepend=log.start_ns) > pause_ns)  # what comes before is a part of a reading
     rises = rises[int(begins[0]) :] if len(begins) else rises[:0]
     if len(rises) < 4 * least:
-        raise TooLittle(f"{len(rises)} samples were recorded; {4 * least} are wanted")
+        raise TooLittle(f"{len(rises)} samples were recorded; expected {4 * least}")
     return rises, bus_word(e, "MUX", 2, rises - 1 - round(e.slack_ns(0.0)))
 
 

@@ -19,7 +19,7 @@ from psabench.conform.verdict import Broken, TooLittle
 from psabench.link.signals import Floats, Ints
 
 BEAT_OF_AXIS = {2: 0, 3: 1, 4: 2}  # beat to the axis that the spare serves
-HOME = (1, 2, 3, 0)  # SERVES of X, Y, Z, K with nobody out of work but the spare
+HOME = (1, 2, 3, 0)  # SERVES of X, Y, Z, K with no one out of work but the spare
 
 
 def _periods(e: Evidence) -> est.Periods:
@@ -60,7 +60,7 @@ def readings_are_counted_without_gaps(e: Evidence) -> str:
 @proves("PMKA-CAN-02")
 @check("power_on", needs={"can"})
 def readings_begin_with_0_after_res(e: Evidence) -> str:
-    """Look at SEQ of the first reading after Res; one that was told late counts those before it."""
+    """Look at SEQ of the first reading after Res; one that was reported late counts those before it."""
     first = int(row_for(e, "PMKA-CAN-02").limit("first"))
     seq = int(columns(e, 3)["SEQ"][0])
     late = late_readings(
@@ -84,7 +84,7 @@ def res_begins_with_beat_0(e: Evidence) -> str:
     seq, tau = int(c["SEQ"][0]), int(c["TAU"][0])
     resets = [int(c[f"RESET_{name}"][0]) for name in est.INTEGRATORS]
     if seq >= requirements()["PMKA-CAL-03"].limit("beat_periods"):
-        raise TooLittle(f"the first reading that was told has SEQ {seq}")
+        raise TooLittle(f"the first reading that was reported has SEQ {seq}")
     if tau not in (0, *([1] if seq else [])) or (any(resets) and not seq):
         raise Broken(f"SEQ {seq}, TAU {tau}, resets {resets} first", "TAU 0, no reset")
     return f"TAU {tau} in the first reading, SEQ {seq}"
@@ -156,7 +156,7 @@ def nothing_saturates_below_full_scale(e: Evidence) -> str:
     """Look for SATURATED and CLIPPED in a minute."""
     most, c = row_for(e, "PMKA-INT-04").limit("full_scale_v"), columns(e)
     if any(abs(v) > most for v in e.inputs_v.values()):
-        raise TooLittle(f"inputs of {most:g} V at most are wanted")
+        raise TooLittle(f"expected inputs of {most:g} V at most")
     for flag in ("SATURATED", "CLIPPED"):
         if c[flag].any():
             raise Broken(f"{flag} in {np.count_nonzero(c[flag])} of {len(c[flag])} readings", f"none up to {most:g} V")
@@ -182,7 +182,7 @@ def resets_follow_codes_beyond_uc(e: Evidence) -> str:
             )
         count += int((reset[sure] != 0).sum())
     if count < 10:
-        raise TooLittle(f"{count} resets were told")
+        raise TooLittle(f"{count} resets were reported")
     return f"{count} resets, each after a code beyond {uc:g} V"
 
 
@@ -305,7 +305,7 @@ def a_sum_across_hand_overs_is_wrong(e: Evidence) -> str:
 @proves("PMKA-CAL-01")
 @check("minute", needs={"can"})
 def calibration_is_first_of_zero_then_of_resets(e: Evidence) -> str:
-    """Follow CAL in each beat, and look who serves nobody meanwhile."""
+    """Follow CAL in each beat, and look who serves no one meanwhile."""
     c, p = columns(e), _periods(e)
     beats = np.flatnonzero(np.diff(c["TAU"])) + 1
     busy = p.cal != 0
@@ -313,7 +313,7 @@ def calibration_is_first_of_zero_then_of_resets(e: Evidence) -> str:
     if not busy.any():
         raise TooLittle("no calibration in the recording")
     if (idle[busy] != 1).any():
-        raise Broken("CAL without one integrator that serves nobody", "one")
+        raise Broken("CAL without one integrator that serves no axis", "one")
     count = 0
     for a, b in pairwise(beats):
         cal = p.cal[a:b]

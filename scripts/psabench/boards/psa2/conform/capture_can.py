@@ -68,7 +68,7 @@ def pairs(e: Evidence, least: int = 20) -> Pairs:
     """Raises TooLittle for fewer than `least`, Broken for one of another length."""
     first, second = _halves(e)
     if len(first) < least:
-        raise TooLittle(f"{len(first)} samples came as PSA2_XY and PSA2_ZT; {least} are wanted")
+        raise TooLittle(f"{len(first)} samples came as PSA2_XY and PSA2_ZT; expected {least}")
     try:
         xy, zt = CanLog(frames=tuple(first)).raw("PSA2_XY"), CanLog(frames=tuple(second)).raw("PSA2_ZT")
     except ValueError as err:

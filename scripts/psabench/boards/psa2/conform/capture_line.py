@@ -73,7 +73,7 @@ def transfers(log: LineLog) -> Transfers:
             raise TooLittle(f"the recording has no line {name}")
     fall, rise = log.pulses("Int", 0)
     if len(fall) < LEAST:
-        raise TooLittle(f"{len(fall)} transfers were recorded; {LEAST} are wanted")
+        raise TooLittle(f"{len(fall)} transfers were recorded; expected {LEAST}")
     return Transfers(fall_ns=fall, rise_ns=rise, clk_rise_ns=log.rises("CLK"), clk_fall_ns=log.falls("CLK"), log=log)
 
 

@@ -135,7 +135,7 @@ def transfers_keep_the_limits_of_the_temperature_converter(e: Evidence) -> str:
     at = np.concatenate([b.rise_ns[1:] for b in found])
     least(e, period, at, tau_ns(e, row.limit("t1_min_tau")), "a period of SClk", TEMP)
     _setup_hold(e, found, "DInT", falls=True, due_ns=row.limit("setup_min_ns"))
-    gated = e.variant["gate_sclk"]  # without gates nobody waits for anything (docs/boards/psa2.md, profile ungated)
+    gated = e.variant["gate_sclk"]  # without gates no client waits for anything (docs/boards/psa2.md, profile ungated)
     said = (
         least(e, *rdata_gaps(e), tau_ns(e, row.limit("t6_min_tau")), "from RDATA to its data", TEMP)
         if gated

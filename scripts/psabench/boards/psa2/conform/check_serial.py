@@ -37,7 +37,7 @@ def port_bursts(e: Evidence, *, temp: bool) -> list[Burst]:
     found = [b for b in port_traffic(e).bursts if b.temp == temp and len(b.fall_ns) == b.bits]
     if len(found) < LEAST:
         port = "temperature" if temp else "accelerometer"
-        raise TooLittle(f"{len(found)} bursts on the {port} port; {LEAST} are wanted")
+        raise TooLittle(f"{len(found)} bursts on the {port} port; expected {LEAST}")
     return found
 
 
@@ -45,7 +45,7 @@ def temp_messages(e: Evidence) -> list[Message]:
     """Raises TooLittle where there are few."""
     found = port_traffic(e).of(temp=True)
     if len(found) < LEAST:
-        raise TooLittle(f"{len(found)} messages on the temperature port; {LEAST} are wanted")
+        raise TooLittle(f"{len(found)} messages on the temperature port; expected {LEAST}")
     return found
 
 
@@ -137,7 +137,7 @@ def _quiet(e: Evidence, quiet_ns: float) -> Ints:
     gap = np.diff(edges)
     middle: Ints = (edges[:-1] + gap // 2)[gap > 2 * quiet_ns]
     if len(middle) < LEAST:
-        raise TooLittle(f"{len(middle)} quiet instants in the recording; {LEAST} are wanted")
+        raise TooLittle(f"{len(middle)} quiet instants in the recording; expected {LEAST}")
     return middle
 
 

@@ -174,7 +174,7 @@ def a_reset_brings_all_lines_to_rest(e: Evidence) -> str:
         if len(moves):
             raise Broken(f"{line} moves before the set-up is over", "rest", at_ns=int(moves[0]), lines=("Res", line))
     if not s.steps or s.steps[0].line != "DIn":
-        raise Broken("the set-up does not begin anew", "its first message", at_ns=s.res_ns, lines=ACCEL)
+        raise Broken("the set-up does not begin again", "its first message", at_ns=s.res_ns, lines=ACCEL)
     return f"Res came {'in a frame' if in_frame else 'between frames'}; all lines at rest, then the set-up"
 
 

@@ -45,8 +45,8 @@ def xy_and_zt_alternate(e: Evidence) -> str:
     ids = {int(message(n).frame_id) - 5 + e.node: n for n in MESSAGES}
     found = [f for f in e.can.frames if f.can_id in ids and not f.error]
     if len(found) < 2 * LEAST:
-        if e.scene == "recording":  # nobody says that it was started, nor for how long
-            raise TooLittle(f"{len(found)} frames of samples in the log; {2 * LEAST} are wanted")
+        if e.scene == "recording":  # no one says that it was started, nor for how long
+            raise TooLittle(f"{len(found)} frames of samples in the log; expected {2 * LEAST}")
         raise Broken(f"{len(found)} frames of samples", "two of each sample", frames=e.can.frames[:10])
     for k, (a, b) in enumerate(itertools.pairwise(found)):
         names = ids[a.can_id], ids[b.can_id]

@@ -169,7 +169,7 @@ def _converted(e: Evidence, b: Beside) -> tuple[Ints, Ints]:
             channel.append(now)
     new = np.flatnonzero(b.samples.new)
     before = np.searchsorted(np.array(read_ns, np.int64), b.fall_ns[new]) - 1
-    new, before = new[before > 0], before[before > 0]  # of the first read nobody saw which input it is of
+    new, before = new[before > 0], before[before > 0]  # of the first read no one saw which input it is of
     if len(new) < 2 * len(channels):
         raise TooLittle(f"{len(new)} temperatures were seen from the choice of their input to their frame")
     return new, np.array(channel, np.int64)[before]

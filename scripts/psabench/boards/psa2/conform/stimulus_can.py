@@ -44,7 +44,7 @@ class Answer:
 
 
 def ask(s: Subject, index: int, sub: int = 0) -> Answer:
-    """Read an object. Raises LinkError where nobody answers."""
+    """Read an object. Raises LinkError where no one answers."""
     try:
         return Answer(s.unit.node.read(index, sub))
     except DeviceError as e:
@@ -286,7 +286,7 @@ def rates(s: Subject) -> Evidence:
 def sync(s: Subject) -> Evidence:
     """SYNC in sample mode 1, then with 2024h = 1. Cuts "SYNC 0" ... before each, "pulse" before the last.
 
-    facts: paced, False where nobody knows how long after one another they were sent.
+    facts: paced, False where no one knows how long after one another they were sent.
     """
     with changed(s), s.take() as take:
         tell(s, MODE, 0, 1)

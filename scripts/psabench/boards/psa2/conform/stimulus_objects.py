@@ -26,7 +26,7 @@ def objects(s: Subject) -> Evidence:
         for axis in (1, 2, 3):
             tell(s, 0x2210, axis, axis - 1)
             tell(s, 0x2211, axis, 2)
-        tell(s, ACCEL[0], CONFIG0, 0x46)  # 250 SPS: a sample stands for 4 ms
+        tell(s, ACCEL[0], CONFIG0, 0x46)  # 250 SPS: a sample lasts 4 ms
         s.run_for(0.4)
         s.unit.start()
         s.run_for(0.02)
@@ -39,7 +39,7 @@ def objects(s: Subject) -> Evidence:
             *((i, k) for i in (0x6130, 0x9130) for k in (1, 2, 3)),
         ):
             found.append(_of_one_sample(s, index, sub))
-        for _ in range(CHANNEL_LOOKS):  # every temperature channel stands in one of them
+        for _ in range(CHANNEL_LOOKS):  # every temperature channel is in one of them
             s.run_for(TEMP_PERIOD_S)
             found.append(_of_one_sample(s, 0x2202, 2))
         s.run_for(0.02)

@@ -58,7 +58,7 @@ def _coefficients(s: Subject) -> list[int]:
 
 
 def _cycles(s: Subject, count: int) -> Readings:
-    """Words of the next cycles, as they are told; of more in real time, where a busy machine is late."""
+    """Words of the next cycles, as they are reported; of more in real time, where a busy machine is late."""
     s.unit.frames.forget()
     s.unit.start()
     run_cycles(s, count)
@@ -257,7 +257,7 @@ def the_gain_is_where_the_table_has_it(s: Subject) -> str:
     row = requirements()["PSD1-CHIP-01"]
     wide = [k for k in range(3) if abs(one[k]) > row.limit("input_min_codes")]
     if not wide:
-        raise TooLittle(f"inputs of {row.limit('input_min_codes'):g} codes and more are wanted")
+        raise TooLittle(f"expected inputs of {row.limit('input_min_codes'):g} codes and more")
     for k in wide:
         if abs(two[k] - 2 * one[k]) > row.limit("tolerance_codes"):
             raise Broken(f"{one[k]:.0f} codes on {'XYZ'[k]}, with gain 2 {two[k]:.0f}", "twice as many")
@@ -306,7 +306,7 @@ def words_beyond_full_scale_are_marked(s: Subject) -> str:
     full_v = requirements()["PSD1-WORD-01"].limit("full_scale_v") / (1 << CLIP_GAIN)
     beyond = {a: v for a, v in s.inputs_v.items() if abs(v) > (1 + row.limit("margin_pct") / 100) * full_v}
     if not any(v > 0 for v in beyond.values()) or not any(v < 0 for v in beyond.values()):
-        raise TooLittle(f"an input beyond {full_v:g} V and one below -{full_v:g} V are wanted")
+        raise TooLittle(f"expected an input beyond {full_v:g} V and one below -{full_v:g} V")
     calm(s)
     plain = _cycles(s, 6)
     _set(s, CLIP_GAIN << GAIN_SHIFT)
@@ -326,13 +326,13 @@ def words_beyond_full_scale_are_marked(s: Subject) -> str:
 @proves("PSD1-WORD-03")
 @trial(needs={"can", "inputs"})
 def a_word_at_0_alone_is_marked(s: Subject) -> str:
-    """Make the converters unipolar: negative inputs give 0000h, positive ones lie within, and CLIP stands."""
+    """Make the converters unipolar: negative inputs give 0000h, positive ones lie within, and CLIP is."""
     row, zero = requirements()["PSD1-WORD-03"], requirements()["PSD1-WORD-01"]
     least_v = row.limit("unipolar_min_v")
     below = [a for a, v in s.inputs_v.items() if v < -least_v]
     within = [a for a, v in s.inputs_v.items() if least_v < v < zero.limit("full_scale_v") - least_v]
     if not below or len(below) + len(within) != len("xyz"):
-        raise TooLittle(f"inputs of more than {least_v:g} V either way, one of them negative, are wanted")
+        raise TooLittle(f"expected inputs of more than {least_v:g} V either way, one of them negative")
     calm(s)
     uc1, uc2 = _control(s)
     s.unit.node.write(UC1, 0, uc1 | UNIPOLAR)
@@ -370,7 +370,7 @@ def late_begins_at_its_time(s: Subject) -> str:
     sure, may = int((waited > late_ns + slack_ns).sum()), int((waited > late_ns - slack_ns).sum())
     near = np.abs(waited - late_ns) < late_ns / 2
     if not (near & (waited > late_ns)).any() or not (near & (waited < late_ns)).any():
-        raise TooLittle(f"strobes {waited.min()} to {waited.max()} ns after FL2; some about {late_ns:g} ns are wanted")
+        raise TooLittle(f"strobes {waited.min()} to {waited.max()} ns after FL2; expected some about {late_ns:g} ns")
     calm(s)
     if not sure <= told <= may:
         raise Broken(f"{told} late strobes counted", f"{sure}, those later than {late_ns:g} ns", lines=LINES)
@@ -441,7 +441,7 @@ def a_stretched_cycle_is_told(s: Subject) -> str:
     """Leave X unread for five periods, look at MIXED and Stretched cycles."""
     cycles, counted = _stay_away(s)
     mixed = [int(v) for v in cycles["MIXED"]]
-    hasty = any(mixed[:2]) if s.lockstep else False  # elsewhere nobody knows how long our own reading takes
+    hasty = any(mixed[:2]) if s.lockstep else False  # elsewhere no one knows how long our own reading takes
     if mixed[2] != 1 or hasty or counted["Stretched cycles"] < 1:
         raise Broken(f"MIXED {mixed}, {counted['Stretched cycles']} counted", "1 in the third, counted")
     return f"MIXED {mixed}, {counted['Stretched cycles']} counted"

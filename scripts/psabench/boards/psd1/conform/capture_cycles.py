@@ -78,7 +78,7 @@ def transfers(e: Evidence) -> list[Transfer]:
     if found and found[-1].clear < 0:
         found.pop()  # the recording ends in it
     if len(found) < 3 * LEAST:
-        raise TooLittle(f"{len(found)} words were read in the recording; {3 * LEAST} are wanted")
+        raise TooLittle(f"{len(found)} words were read in the recording; expected {3 * LEAST}")
     return found
 
 
@@ -107,7 +107,7 @@ def cycles(e: Evidence) -> list[tuple[Transfer, Transfer, Transfer]]:
         raise TooLittle(f"no whole cycles to measure: {found.saw}")
     whole = [(words[k], words[k + 1], words[k + 2]) for k in range(0, len(words) - 2, 3)]
     if len(whole) < LEAST:
-        raise TooLittle(f"{len(whole)} whole cycles were recorded; {LEAST} are wanted")
+        raise TooLittle(f"{len(whole)} whole cycles were recorded; expected {LEAST}")
     return whole
 
 

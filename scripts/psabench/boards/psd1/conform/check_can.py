@@ -20,7 +20,7 @@ ALL = ("PSD1_CYCLE", *BEGUN)
 def _told(e: Evidence, name: str, least: int = 3) -> CanLog:
     log = e.frames_of(name)
     if len(log) < least:
-        raise TooLittle(f"{len(log)} messages {name} came; {least} are wanted")
+        raise TooLittle(f"{len(log)} messages {name} came; expected {least}")
     due = int(message(name).length)
     bad = [f for f in log.frames if len(f.data) != due]
     if bad:

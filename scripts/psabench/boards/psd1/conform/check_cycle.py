@@ -167,7 +167,7 @@ def a_cycle_begins_only_after_the_last_has_ended(e: Evidence) -> str:
     first_bad(early, at_ns[1:], ["A0 rises before FL2 is cleared"] * len(early), "after the last FL2", LINES)
     just = at_ns - 1 - round(e.slack_ns(0.0))
     waits = e.wires["FL2"].at(just) == fl2_level(e)
-    first_bad(waits, at_ns, ["FL2 stands when A0 rises"] * len(waits), "no word waits", LINES)
+    first_bad(waits, at_ns, ["FL2 is active when A0 rises"] * len(waits), "no word waits", LINES)
     together(e, at_ns, e.wires.rises("CLK_1M25"), row_for(e, "PSD1-CYC-03").limit("tolerance_ns"), "A0 and 1M25", START)
     return f"{len(at_ns)} cycles, the next {int((at_ns[1:] - ends[:-1]).min())} ns after the last or later"
 
@@ -239,7 +239,7 @@ def lines_rest_at_their_levels(e: Evidence) -> str:
 @proves("PSD1-FL2-05")
 @check("stream", needs={"line"})
 def fl2_rests_at_its_level(e: Evidence) -> str:
-    """Look at FL2 while a word is transferred, and how long it stands at each level."""
+    """Look at FL2 while a word is transferred, and how long it is at each level."""
     words = transfers(e)
     due = 1 - fl2_level(e)
     level = e.wires["FL2"].at(of(words, "fall") + round(e.slack_ns(0.0)) + 100)

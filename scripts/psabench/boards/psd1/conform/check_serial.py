@@ -100,7 +100,7 @@ def told_words(e: Evidence) -> np.ndarray:
 
 
 def _found(seen: np.ndarray, told: np.ndarray) -> str:
-    """The words that were told are some in a row of those seen; what came before or after the recording is left out."""
+    """The reported words are consecutive words of those seen; words outside the recording are left out."""
     n, m = len(seen), len(told)
     for shift in range(-(m - 1), n):
         a, b = max(0, shift), min(n, shift + m)

@@ -142,7 +142,7 @@ def the_first_message_comes_in_time(e: Evidence) -> str:
     if not told or len(told[0].data) != CYCLE_BYTES:
         raise TooLittle("no whole PSD1_CYCLE after the boot-up message")
     took_ms, period_ms, modulo = (told[0].t_s - boot.t_s) * 1e3, period_s(e.variant) * 1e3, _modulo(e)
-    cnt = told[0].data[CNT_AT]  # one that is told late, because the host was, counts those before it
+    cnt = told[0].data[CNT_AT]  # one that is reported late, because the host was, counts those before it
     before = cnt + modulo * round(((took_ms - due_ms) / period_ms - cnt) / modulo)
     if abs(took_ms - due_ms - before * period_ms) > row.limit("tolerance_ms"):
         due = f"{due_ms + before * period_ms:g} +- {row.limit('tolerance_ms'):g} ms"
@@ -314,10 +314,10 @@ def status_tells_the_word_that_waits(e: Evidence) -> str:
     row = row_for(e, "PSD1-BUS-14")
     mask = int(row.limit("axis_mask"))
     begin = _reads_of_status(e)
-    stands = e.wires["FL2"].at(begin - 1) == fl2_level(e)
+    ready = e.wires["FL2"].at(begin - 1) == fl2_level(e)
     saw = (bus_word(e, "D", len(DATA), begin + round(e.slack_ns(0.0))) & int(row.limit("fl2_mask"))) != 0
-    first_bad(saw != stands, begin, [f"bit {int(v)}" for v in saw], "FL2 as the line is", ("FL2", "CS"))
-    begin = begin[stands]
+    first_bad(saw != ready, begin, [f"bit {int(v)}" for v in saw], "FL2 as the line is", ("FL2", "CS"))
+    begin = begin[ready]
     if not len(begin):
         raise TooLittle("no read of STATUS while a word waited")
     latest = np.stack([before(e.wires.rises(n), begin) for n in FRAMES], axis=1)
@@ -353,7 +353,7 @@ def the_bus_stands_in_a_strobe_and_rests_at_0(e: Evidence) -> str:
     free = end[e.wires["CS"].at(end + slack) == 1]  # another strobe may begin where one ends
     for name in ("RW", *ADDRESS, *DATA):
         moved = after(edges(e, name), begin + slack) < end - slack
-        first_bad(moved, begin, [f"{name} moves in a strobe"] * len(moved), "it stands", ("CS", name))
+        first_bad(moved, begin, [f"{name} moves in a strobe"] * len(moved), "it is", ("CS", name))
         rest = 1 if name == "RW" else 0
         high = e.wires[name].at(free + slack) != rest
         first_bad(high, free, [f"{name} {1 - rest} with CS high"] * len(high), f"{rest}", ("CS", name))
