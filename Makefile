@@ -24,7 +24,7 @@ TESTS     ?= $(if $(filter check,$(MAKECMDGOALS)),$(if $(T),$(foreach t,$(T),$(i
 VERSION := $(shell sed -n 's/^version = "\(.*\)"/\1/p' pyproject.toml)
 ABI_psabench     := $(shell sed -n 's/^\#define PSABENCH_ABI \([0-9]*\)/\1/p' emu/api/psabench.h)
 ABI_psabench-nav := $(shell sed -n 's/^\#define NAV_ABI \([0-9]*\)$$/\1/p' emu/nav/nav.h)
-# What correctness needs stands before the user's CFLAGS. -ffp-contract=off: the same bytes on every machine. All objects are
+# What correctness needs is before the user's CFLAGS. -ffp-contract=off: the same bytes on every machine. All objects are
 # fit for the shared library: -fPIC with hidden symbols costs the emulator nothing that can be measured.
 STD   := -std=c11 -ffp-contract=off -fPIC -fvisibility=hidden -DPSABENCH_VERSION=$(VERSION)
 WARN  := -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wundef -Wstrict-prototypes -Wmissing-prototypes $(if $(WERROR),-Werror)

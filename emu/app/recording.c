@@ -17,7 +17,7 @@ static bool do_vcd_flush(void *ctx, char *why)
 {
     struct service *s = ctx;
     if (s->bench->recording) vcd_flush(&s->bench->vcd);
-    else snprintf(why, CONTROL_WHY_MAX, "nothing is being recorded; --vcd FILE or vcd.start is wanted");
+    else snprintf(why, CONTROL_WHY_MAX, "nothing is being recorded; expected --vcd FILE or vcd.start");
     return s->bench->recording;
 }
 

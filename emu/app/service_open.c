@@ -14,7 +14,7 @@ static bool do_run(void *ctx, int64_t for_ns, uint64_t after_tx, char *why)
 {
     struct service *s = ctx;
     if (s->o->pace != PACE_STEP) {
-        snprintf(why, CONTROL_WHY_MAX, "time moves by itself in %s pace; --pace step is wanted", pace_name(s->o->pace));
+        snprintf(why, CONTROL_WHY_MAX, "run requires --pace step (current pace: %s)", pace_name(s->o->pace));
         return false;
     }
     if (loop_step(&s->loop, for_ns, after_tx)) return true;
@@ -162,7 +162,7 @@ static void run_done(void *ctx)
     s->runner = NULL;
 }
 
-/* Lateness of a frame: real time now against the instant its end stands on the bus. */
+/* Lateness of a frame: real time now against the instant its end is on the bus. */
 static void on_frame(void *ctx, const struct can_msg *m, int64_t t_ns)
 {
     struct service *s = ctx;

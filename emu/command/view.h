@@ -13,7 +13,7 @@
 /* One client of a CAN adapter, or the sum of those who left. */
 struct control_client {
     const char *adapter, *name;
-    uint32_t came;  /* its number, in order of coming, for ever */
+    uint32_t came;  /* its number, in order of coming, without end */
     uint32_t place; /* came of the first at its place on the bus: another than its own if it took over from a ghost */
     uint64_t delivered, taken, dropped, overrun, refused;
 };

@@ -1,4 +1,4 @@
-"""Does the conformance suite cry wolf? It is run on boards that conform: seeds, profiles, clocks that are off."""
+"""False alarms of the conformance suite. It runs on boards that conform: seeds, profiles, clocks that are off."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ examples (in the root of a checkout, with PYTHONPATH=tools):
   python -m tests.false_positives.run --full        every error of the clocks with every seed
   python -m tests.false_positives.run --load        in real time, with all cores busy
 
-What was run stands in build/false_positives.json and is not run again, but for what alarmed before the sources
+What was run is in build/false_positives.json and is not run again, but for what alarmed before the sources
 changed. Exit status: 0 no false alarm in all that was asked for and has been run, 1 there is one, 2 bad input, 130
 ended by Ctrl-C.
 """
@@ -68,7 +68,7 @@ def seeds(text: str) -> range:
     """`A-B`, both included. Raises ArgumentTypeError."""
     first, _, last = text.partition("-")
     if not (first.isdecimal() and last.isdecimal() and SEEDS.start <= int(first) <= int(last) < SEEDS.stop):
-        raise argparse.ArgumentTypeError(f"{text}: A-B of {SEEDS.start} to {SEEDS.stop - 1} is wanted")
+        raise argparse.ArgumentTypeError(f"{text}: expected A-B of {SEEDS.start} to {SEEDS.stop - 1}")
     return range(int(first), int(last) + 1)
 
 

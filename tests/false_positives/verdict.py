@@ -53,7 +53,7 @@ class Result:
     took_s: float = 0.0
 
     def row(self) -> dict[str, Any]:
-        """As it stands in false_positives.json."""
+        """As it is in false_positives.json."""
         return asdict(self)
 
     @classmethod

@@ -65,7 +65,7 @@ class Dim:
     start_ns: int
     end_row: str
     end_ns: int
-    text: str  # stands after the interval's length
+    text: str  # is after the interval's length
     lane: int
 
     @property
@@ -342,7 +342,7 @@ def rdata_picture(vcd: Vcd) -> str:
 def main(argv: Sequence[str] | None = None) -> int:
     """Command line; 2 for bad input, with one line that says what would be right."""
     args = list(sys.argv[1:] if argv is None else argv)
-    from psabench.boards.psd1 import waveform as waveform_psd1  # which draws with what stands above
+    from psabench.boards.psd1 import waveform as waveform_psd1  # which draws with what is above
 
     pictures = {
         "frame": frame_picture,

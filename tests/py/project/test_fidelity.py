@@ -14,7 +14,7 @@ import pytest
 from find_tests import collected_in_python, registered_in_c
 
 ROOT = Path(__file__).resolve().parents[3]
-PYTHON_FOLDERS = ("tests/py", "tests/golden", "tests/e2e")  # as pytest is told in pyproject.toml
+PYTHON_FOLDERS = ("tests/py", "tests/golden", "tests/e2e")  # as pytest is reported in pyproject.toml
 
 
 def load_generator() -> ModuleType:
@@ -166,7 +166,7 @@ GOOD = {"id": "1.4-gap", "state": "modelled", "grade": "E2", "tests": ["test_ads
         ({"tests": "test_ads1282.c:x"}, "is no list of texts"),
         ({"value": 24}, "value: 24 is no text; put it in quotes"),
         ({"also": ["1.4-nothing"]}, "also: 1.4-nothing is not in facts.yaml"),
-        ({"also": ["1.4-gap"]}, "1.4-gap stands in two rows"),
+        ({"also": ["1.4-gap"]}, "1.4-gap is in two rows"),
         ({"proof": "x"}, "unknown proof; there are also, fact,"),
     ],
 )

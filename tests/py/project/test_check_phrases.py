@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from check_phrases import PHRASES, Phrase, check, files, main
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 
 
 @pytest.fixture
