@@ -9,8 +9,10 @@
 #include <stdint.h>
 
 struct co_node;
+struct board_type;
 struct board_can_cfg {
     const char *name;                                              /* kept by pointer */
+    const struct board_type *type;                                 /* of the board */
     uint8_t node_id;                                               /* 1..127 */
     void (*refused)(void *ctx, const char *name, const char *why); /* a setting was refused, in words; may be NULL */
     void *ctx;

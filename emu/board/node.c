@@ -39,7 +39,7 @@ static const uint32_t aborts[] = {
     [BOARD_CYCLE_OFF] = CO_AB_STATE,
 };
 
-void board_node_refuse(struct board_node *n, const char *why)
+void board_node_reject(struct board_node *n, const char *why)
 {
     (void)snprintf(n->refusal, sizeof n->refusal, "refused: %s", why);
 }
@@ -50,11 +50,11 @@ uint32_t board_node_abort_of(enum board_cycle_result r)
     return aborts[r];
 }
 
-static void tell_refusal(struct board_node *n, const struct board_cycle *c, enum board_cycle_result r)
+static void record_rejection(struct board_node *n, const struct board_cycle *c, enum board_cycle_result r)
 {
     char why[BOARD_CYCLE_WHY_MAX];
-    board_cycle_why(n->type->board->bus, n->board, c, r, why);
-    board_node_refuse(n, why);
+    board_cycle_why(n->cfg.type->bus, n->board, c, r, why);
+    board_node_reject(n, why);
     n->cycles_refused++;
 }
 
@@ -64,13 +64,13 @@ static void cycle_done(void *ctx, struct board_cycle *c, enum board_cycle_result
     struct board_node *n = ctx;
     n->cycle_busy = false;
     if (r == BOARD_CYCLE_OK) n->cycles++;
-    else tell_refusal(n, c, r);
+    else record_rejection(n, c, r);
     const uint32_t abort = r == BOARD_CYCLE_OFF ? CO_AB_TRANSFER : board_node_abort_of(r);
     const struct co_value v = {.number = c->data};
     co_sdo_answer(&n->node.sdo, n->ticket, abort, &v, t_ns);
 }
 
-static uint32_t submit(struct board_node *n, bool write, uint8_t address, uint16_t data, int64_t t_ns)
+static uint32_t submit_cycle(struct board_node *n, bool write, uint8_t address, uint16_t data, int64_t t_ns)
 {
     struct board_cycle c = {
         .write = write, .address = address, .data = data, .strobe_ns = n->strobe_ns, .done = cycle_done, .ctx = n};
@@ -79,23 +79,23 @@ static uint32_t submit(struct board_node *n, bool write, uint8_t address, uint16
         n->cycle = c;
         n->ticket = n->node.sdo.ticket;
         n->cycle_busy = true;
-        r = n->type->board->bus->submit(n->board, &n->cycle, t_ns);
+        r = n->cfg.type->bus->submit(n->board, &n->cycle, t_ns);
         if (r == BOARD_CYCLE_OK) return CO_PENDING;
         n->cycle_busy = false;
     }
-    tell_refusal(n, &c, r);
+    record_rejection(n, &c, r);
     return board_node_abort_of(r);
 }
 
 static uint32_t read_bus(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
 {
     (void)v;
-    return submit(n, false, (uint8_t)(e->sub - 1), 0, t_ns);
+    return submit_cycle(n, false, (uint8_t)(e->sub - 1), 0, t_ns);
 }
 
 static uint32_t write_bus(struct board_node *n, const struct co_entry *e, const struct co_value *v, int64_t t_ns)
 {
-    return submit(n, true, (uint8_t)(e->sub - 1), (uint16_t)v->number, t_ns);
+    return submit_cycle(n, true, (uint8_t)(e->sub - 1), (uint16_t)v->number, t_ns);
 }
 
 static uint32_t read_strobe(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
@@ -116,14 +116,14 @@ static uint32_t write_strobe(struct board_node *n, const struct co_entry *e, con
 
 /* ---- counters and identity ---- */
 
-static const struct board_part *controller(const struct board_node *n)
+static const struct board_part *controller_part(const struct board_node *n)
 {
-    return &n->type->board->parts[0];
+    return &n->cfg.type->parts[0];
 }
 
 static const struct board_counter *counter_named(const struct board_node *n, const char *name)
 {
-    const struct board_part *p = controller(n);
+    const struct board_part *p = controller_part(n);
     for (unsigned i = 0; i < p->counter_count; i++) {
         if (strcmp(p->counters[i].name, name) == 0) return &p->counters[i];
     }
@@ -134,7 +134,7 @@ static uint32_t board_counter_value(const struct board_node *n, unsigned i)
 {
     const struct board_counter *c = counter_named(n, n->type->device->counters[i]);
     uint32_t value = 0;
-    memcpy(&value, (const char *)n->board + controller(n)->offset + c->offset, sizeof value);
+    memcpy(&value, (const char *)n->board + controller_part(n)->offset + c->offset, sizeof value);
     return value;
 }
 
@@ -177,14 +177,14 @@ static uint32_t read_serial(struct board_node *n, const struct co_entry *e, stru
 /* ---- whether the bus can carry the stream ---- */
 
 /* Bit k: TPDO k + 1 goes with each reading; those that wait for SYNC have the host's pace. */
-static unsigned flowing(const struct board_node *n)
+static unsigned flowing_tpdos(const struct board_node *n)
 {
     unsigned mask = 0;
     for (unsigned k = 0; k < n->type->device->tpdos; k++) mask |= (unsigned)co_pdo_flows(&n->node, k) << k;
     return mask;
 }
 
-static bool fits(const struct board_node *n, unsigned tpdos, int64_t period_ns, char why[BOARD_NODE_TEXT])
+static bool stream_fits(const struct board_node *n, unsigned tpdos, int64_t period_ns, char why[BOARD_NODE_TEXT])
 {
     int64_t need_ns = 0;
     unsigned frames = 0;
@@ -201,9 +201,9 @@ static bool fits(const struct board_node *n, unsigned tpdos, int64_t period_ns, 
 static uint32_t read_text(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
 {
     (void)t_ns;
-    char reason[BOARD_NODE_TEXT];
+    char present[BOARD_NODE_TEXT];
     const char *text = e->index == REFUSAL ? n->refusal : n->remark;
-    if (e->index == REFUSAL && !fits(n, n->fit_tpdos, n->fit_period_ns, reason)) text = reason;
+    if (e->index == REFUSAL && !stream_fits(n, n->fit_tpdos, n->fit_period_ns, present)) text = present;
     v->len = (uint16_t)strlen(text);
     memcpy(v->text, text, (size_t)v->len + 1);
     return CO_OK;
@@ -226,7 +226,7 @@ static const struct board_object common[] = {
     {REFUSAL, read_text, NULL},    {REMARK, read_text, write_remark}, {STROBE_NS, read_strobe, write_strobe},
 };
 
-static const struct board_object *find(const struct board_object *objects, size_t count, uint16_t index)
+static const struct board_object *find_object(const struct board_object *objects, size_t count, uint16_t index)
 {
     for (size_t i = 0; i < count; i++) {
         if (objects[i].index == index) return &objects[i];
@@ -235,39 +235,40 @@ static const struct board_object *find(const struct board_object *objects, size_
 }
 
 /* The board's own come first: it may answer for a common object itself. */
-static const struct board_object *handler(const struct board_node *n, uint16_t index)
+static const struct board_object *find_handler(const struct board_node *n, uint16_t index)
 {
-    const struct board_object *own = find(n->type->objects, n->type->object_count, index);
-    return own ? own : find(common, sizeof common / sizeof common[0], index);
+    const struct board_object *own = find_object(n->type->objects, n->type->object_count, index);
+    return own ? own : find_object(common, sizeof common / sizeof common[0], index);
 }
 
 static uint32_t on_read(void *ctx, const struct co_entry *e, struct co_value *v, int64_t t_ns)
 {
     struct board_node *n = ctx;
-    const struct board_object *o = handler(n, e->index);
+    const struct board_object *o = find_handler(n, e->index);
     return o && o->read ? o->read(n, e, v, t_ns) : CO_AB_NO_OBJECT;
 }
 
 static uint32_t on_write(void *ctx, const struct co_entry *e, const struct co_value *v, int64_t t_ns)
 {
     struct board_node *n = ctx;
-    const struct board_object *o = handler(n, e->index);
+    const struct board_object *o = find_handler(n, e->index);
     return o && o->write ? o->write(n, e, v, t_ns) : CO_AB_NO_OBJECT;
 }
 
 /* ---- stream ---- */
 
-/* Tells only changes. */
-static void judge(struct board_node *n, int64_t t_ns)
+/* Reports only changes. */
+static void check_stream(struct board_node *n, int64_t t_ns)
 {
     char why[BOARD_NODE_TEXT];
-    const int64_t period_ns = n->type->period_ns ? n->type->period_ns(n->board) : 0;
-    const unsigned tpdos = flowing(n);
+    if (!n->type->period_ns) return;
+    const int64_t period_ns = n->type->period_ns(n->board);
+    const unsigned tpdos = flowing_tpdos(n);
     if (period_ns == n->fit_period_ns && tpdos == n->fit_tpdos) return;
     const bool fitted = n->fits;
     n->fit_period_ns = period_ns;
     n->fit_tpdos = tpdos;
-    n->fits = fits(n, tpdos, period_ns, why);
+    n->fits = stream_fits(n, tpdos, period_ns, why);
     if (n->fits) {
         co_node_error_end(&n->node, STREAM_REFUSED, t_ns);
         return;
@@ -276,7 +277,7 @@ static void judge(struct board_node *n, int64_t t_ns)
     co_node_error(&n->node, STREAM_REFUSED, REG_DEVICE, SOURCE_STREAM, t_ns);
 }
 
-static void lost(struct board_node *n, int64_t t_ns)
+static void drop_reading(struct board_node *n, int64_t t_ns)
 {
     n->dropped++;
     n->drop_ns = t_ns;
@@ -287,36 +288,48 @@ void board_node_stream(struct board_node *n, unsigned first, struct can_msg *m, 
 {
     n->readings++;
     if (n->node.state != CO_OPERATIONAL) return;
-    judge(n, t_ns);
+    check_stream(n, t_ns);
     if (!n->fits) {
         n->dropped++;
         return;
     }
     if (!co_pdo_room(&n->node, frames)) { /* a reading is sent whole or not at all */
-        lost(n, t_ns);
+        drop_reading(n, t_ns);
         return;
     }
     for (unsigned i = 0; i < frames; i++) (void)co_pdo_offer(&n->node, first + i, &m[i], t_ns);
     if (t_ns - n->drop_ns >= BOARD_NODE_CALM_NS) co_node_error_end(&n->node, CAN_OVERRUN, t_ns);
 }
 
-void board_node_say(struct board_node *n, const char *why)
+void board_node_notify_reject(struct board_node *n, const char *why)
 {
     if (strcmp(n->refusal, why) == 0) return;
     (void)snprintf(n->refusal, sizeof n->refusal, "%s", why);
     if (n->cfg.refused) n->cfg.refused(n->cfg.ctx, n->cfg.name, n->refusal);
 }
 
-/* ---- what the node tells, life ---- */
+void board_node_reject_stream(struct board_node *n, const char *why, int64_t t_ns)
+{
+    board_node_notify_reject(n, why);
+    co_node_error(&n->node, STREAM_REFUSED, REG_DEVICE, SOURCE_STREAM, t_ns);
+}
 
-static void defaults(struct board_node *n)
+void board_node_accept_stream(struct board_node *n, int64_t t_ns)
+{
+    n->refusal[0] = '\0';
+    co_node_error_end(&n->node, STREAM_REFUSED, t_ns);
+}
+
+/* ---- events of the node, life ---- */
+
+static void restore_defaults(struct board_node *n)
 {
     n->strobe_ns = (uint32_t)board_node_default(n, STROBE_NS, 0);
     if (n->type->defaults) n->type->defaults(n);
 }
 
-/* Not judged yet: no period is negative. */
-static void unjudge(struct board_node *n)
+/* To be checked: no period is negative. */
+static void invalidate_fit(struct board_node *n)
 {
     n->fit_period_ns = -1;
     n->fits = true;
@@ -326,17 +339,19 @@ static void on_event(void *ctx, enum co_event ev, int64_t t_ns)
 {
     struct board_node *n = ctx;
     if (ev == CO_EV_RESET_NODE) {
-        defaults(n);
-        n->type->board->reset(n->board, t_ns);
-        n->refusal[0] = '\0'; /* a cycle that it has cut is of no interest any more */
+        restore_defaults(n);
+        n->cfg.type->reset(n->board, t_ns);
+        n->refusal[0] = '\0'; /* drops the reason of a cycle that the reset has cut */
     }
-    if (ev != CO_EV_STATE) {
+    if (n->type->restart) {
+        n->type->restart(n);
+    } else if (ev != CO_EV_STATE) {
         co_pdo_select(&n->node, (1u << n->type->device->tpdos) - 1u);
         co_pdo_switch_off(&n->node, n->type->device->tpdo_off);
-        unjudge(n);
+        invalidate_fit(n);
     }
     if (ev != CO_EV_STATE || n->node.state != CO_OPERATIONAL) return;
-    judge(n, t_ns);
+    check_stream(n, t_ns);
     if (n->type->started) n->type->started(n, t_ns);
 }
 
@@ -346,10 +361,10 @@ static void on_sync(void *ctx, int64_t t_ns)
     if (n->type->sync) n->type->sync(n, t_ns);
 }
 
-static void on_heard(void *ctx, const struct can_msg *m, int64_t t_ns)
+static void on_rx_other(void *ctx, const struct can_msg *m, int64_t t_ns)
 {
     struct board_node *n = ctx;
-    n->type->heard(n, m, t_ns);
+    n->type->rx_other(n, m, t_ns);
 }
 
 void board_node_init(struct board_node *n, const struct board_node_type *type, const struct board_can_cfg *cfg,
@@ -364,10 +379,10 @@ void board_node_init(struct board_node *n, const struct board_node_type *type, c
     n->drop_ns = -BOARD_NODE_CALM_NS;
     for (unsigned i = 0; i < d->counter_count; i++) assert(counter_named(n, d->counters[i]));
     const struct co_node_cfg node = {.name = cfg->name, .id = cfg->node_id, .od = d->od, .tpdos = d->tpdos};
-    const struct co_node_io io = {n, on_read, on_write, on_event, on_sync, type->heard ? on_heard : NULL};
+    const struct co_node_io io = {n, on_read, on_write, on_event, on_sync, type->rx_other ? on_rx_other : NULL};
     co_node_init(&n->node, &node, &io, bus, s);
-    unjudge(n);
-    defaults(n);
+    invalidate_fit(n);
+    restore_defaults(n);
 }
 
 void board_node_power_up(void *can, int64_t t_ns)
@@ -381,7 +396,7 @@ void board_node_power_down(void *can)
 {
     struct board_node *n = can;
     co_node_power_down(&n->node);
-    defaults(n);
+    restore_defaults(n);
     n->refusal[0] = n->remark[0] = '\0';
     n->drop_ns = -BOARD_NODE_CALM_NS;
 }

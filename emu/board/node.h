@@ -1,14 +1,14 @@
-/* A board's unit on CAN, as all boards but PSA-2 have it (docs/reference/protocol_<board>.md): ties a board to a CANopen-shaped node.
+/* A board's unit on CAN, as all boards have it (docs/reference/protocol_<board>.md): ties a board to a CANopen-shaped node.
  *
  * What every unit has is answered here: identity, counters (2030h, the board's own from board_part[0]), the parallel bus
- * as objects (2002h: sub-index = address + 1, answered when the cycle is done; strobe length 2051h), the last refusal in
- * words (2031h), a remark (2040h); the stream is judged against the bus before it flows. The rest of proto/<board>.yaml a
+ * as objects (2002h: sub-index = address + 1, answered when the cycle is done; strobe length 2051h), the reason of the last
+ * rejection (2031h), a remark (2040h); the stream is checked against the bus before it flows. The rest of proto/<board>.yaml a
  * board answers by a table of handlers. Owned by the caller, never moved after init, one thread, no allocation. A board's
  * <board>_can.c, in the order of proto/<board>.yaml:
  *
  *     struct psd1_can { struct board_node node; ...settings of its own... };     // the node first
  *     static const struct board_object objects[] = {{PSD1_OD_CODES, read_codes, NULL}, ...};
- *     static const struct board_node_type type = {.board = &psd1_board, .device = &psd1_device, .objects = objects,
+ *     static const struct board_node_type type = {.device = &psd1_device, .objects = objects,
  *                                                 .object_count = 7, .serial = serial_of, .period_ns = period_of};
  *     const struct board_can psd1_can = {.size = sizeof(struct psd1_can), .init = init, .power_up = board_node_power_up,
  *                                        .power_down = board_node_power_down, .node = board_node_co};
@@ -39,20 +39,22 @@ struct board_object {
 };
 
 struct board_node_type {
-    const struct board_type *board;
     const struct co_device *device;
     const struct board_object *objects;
     unsigned object_count;
-    uint32_t (*serial)(const void *board);
-    int64_t (*period_ns)(const void *board);             /* of the stream as it is set now; NULL: not judged */
+    uint32_t (*serial)(const void *board); /* object 1018h sub 4; NULL: the board's own objects answer */
+    /* Of the stream as it is set now; NULL: the board checks its stream itself and sets `fits`. */
+    int64_t (*period_ns)(const void *board);
+    /* After each event of the node: selects the TPDOs. NULL: all of the device, after a reset. */
+    void (*restart)(struct board_node *n);
     void (*defaults)(struct board_node *n);              /* settings of its own, also at init; or NULL */
     void (*sync)(struct board_node *n, int64_t t_ns);    /* SYNC came; or NULL */
     void (*started)(struct board_node *n, int64_t t_ns); /* the node became operational; or NULL */
-    /* co_node_io.heard: another node's frame; or NULL. */
-    void (*heard)(struct board_node *n, const struct can_msg *m, int64_t t_ns);
+    void (*rx_other)(struct board_node *n, const struct can_msg *m,
+                     int64_t t_ns); /* a frame of another node; or NULL */
 };
 
-/* Read-only outside board/node.c. */
+/* Read-only outside board/node.c, but for what a board without period_ns does. */
 struct board_node {
     const struct board_node_type *type;
     struct board_can_cfg cfg;
@@ -60,9 +62,9 @@ struct board_node {
     struct can_bus *bus;
     struct co_node node;
     /* stream */
-    int64_t fit_period_ns; /* fits holds for this period and these TPDOs */
+    int64_t fit_period_ns; /* `fits` holds for this period and these TPDOs */
     unsigned fit_tpdos;
-    bool fits; /* false: the stream stops, EMCY FF03h is active */
+    bool fits; /* false: the stream is stopped, EMCY FF03h is active */
     uint32_t readings, dropped;
     int64_t drop_ns; /* last */
     /* bus cycle under way */
@@ -86,13 +88,15 @@ struct co_node *board_node_co(void *can);
 /* A reading: m[i] (data and len) goes as TPDO first + i, all or none. Counted also where nothing is sent. */
 void board_node_stream(struct board_node *n, unsigned first, struct can_msg *m, unsigned frames, int64_t t_ns);
 
-/* A setting of the board's own was refused: the sentence becomes object 2031h, and the bench hears it once. */
-void board_node_say(struct board_node *n, const char *why);
+/* A setting of the board was rejected: object 2031h has the reason. _notify_: with a notification of the bench, once. */
+void board_node_reject(struct board_node *n, const char *why);
+void board_node_notify_reject(struct board_node *n, const char *why);
 
-/* A setting of the board's own was refused: object 2031h says why. */
-void board_node_refuse(struct board_node *n, const char *why);
+/* The bus cannot carry the stream, or can again: 2031h, EMCY FF03h; the bench is notified once. */
+void board_node_reject_stream(struct board_node *n, const char *why, int64_t t_ns);
+void board_node_accept_stream(struct board_node *n, int64_t t_ns);
 
-/* SDO abort code of a refused cycle: sources can 3.3. */
+/* SDO abort code of a rejected cycle: sources can 3.3. */
 uint32_t board_node_abort_of(enum board_cycle_result r);
 
 /* Default of an entry as proto/<board>.yaml has it. */

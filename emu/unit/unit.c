@@ -193,8 +193,10 @@ void unit_init(struct unit *u, const struct unit_cfg *cfg, struct lab *lab, stru
 
 void unit_connect(struct unit *u, const struct board_can_cfg *cfg, struct can_bus *bus, struct sched *s)
 {
+    struct board_can_cfg typed = *cfg;
+    typed.type = u->type;
     u->can = &u->can_store;
-    u->type->can->init(u->can, cfg, u->board, bus, s);
+    u->type->can->init(u->can, &typed, u->board, bus, s);
 }
 
 void unit_power_up(struct unit *u, int64_t t_ns)

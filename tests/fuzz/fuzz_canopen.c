@@ -50,6 +50,8 @@ static void reset(void *ctx, int64_t t_ns)
     answer(ctx, PSA2_TIMEOUT);
 }
 
+static const struct board_type board = {.reset = reset};
+
 static void info(void *ctx, struct psa2_can_info *out)
 {
     *out = ((struct world *)ctx)->info;
@@ -122,7 +124,7 @@ static void op_frame(struct world *w, struct script *s)
 static void op_sdo(struct world *w, struct script *s)
 {
     static const uint8_t begin[] = {0x40, 0x2F, 0x2B, 0x23, 0x21, 0x22, 0x20, 0x27};
-    const struct co_od *od = w->can.node.cfg.od;
+    const struct co_od *od = w->can.node.node.cfg.od;
     const struct co_entry *e = &od->entry[script_uint(s, 2) % od->count];
     struct can_msg m = {.id = 0x600 + NODE, .len = 8, .data = {begin[script_byte(s) % 8]}};
     bits_put_le(m.data + 1, e->index, 2);
@@ -178,12 +180,12 @@ static void op_samples(struct world *w, struct script *s)
 
 static void check(const struct world *w)
 {
-    const struct co_sdo *sdo = &w->can.node.sdo;
+    const struct co_sdo *sdo = &w->can.node.node.sdo;
     assert(w->sdo_answers <= w->sdo_requests + sdo->timeouts);
     assert(sdo->requests <= w->sdo_requests);
     assert(sched_next_ns(&w->s) >= w->s.now_ns);
-    assert(w->can.node.services.queued <= CAN_QUEUE_MAX && w->can.node.stream.queued <= CO_PDO_BACKLOG + 2);
-    assert(w->can.node.history_count <= CO_HISTORY);
+    assert(w->can.node.node.services.queued <= CAN_QUEUE_MAX && w->can.node.node.stream.queued <= CO_PDO_BACKLOG + 2);
+    assert(w->can.node.node.history_count <= CO_HISTORY);
     assert(memchr(w->can.refusal, 0, sizeof w->can.refusal) && memchr(w->can.remark, 0, sizeof w->can.remark));
 }
 
@@ -198,10 +200,10 @@ static void power_up(struct world *w, uint8_t choice)
     can_bus_init(&w->bus, &bus[choice & 3], &w->s);
     w->host = (struct can_node){.name = "host", .fd = true, .rx = hear, .ctx = w};
     can_attach(&w->bus, &w->host);
-    const struct psa2_can_port port = {w, submit, reset, info};
-    const struct board_can_cfg cfg = {.name = "unit", .node_id = NODE, .refused = refused, .ctx = w};
+    const struct psa2_can_port port = {w, submit, info};
+    const struct board_can_cfg cfg = {.name = "unit", .type = &board, .node_id = NODE, .refused = refused, .ctx = w};
     psa2_can_init(&w->can, &cfg, &port, &w->bus, &w->s);
-    psa2_can_power_up(&w->can, 0);
+    board_node_power_up(&w->can, 0);
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)

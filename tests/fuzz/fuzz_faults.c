@@ -5,6 +5,7 @@
 #include "listener.h"
 
 #include "base/can_fault.h"
+#include "board/psa2/board.h"
 #include "board/psa2/can.h"
 
 #include <string.h>
@@ -87,7 +88,7 @@ static void run(struct world *w, int64_t ns)
         trace_advance(&w->b.trace, w->s.now_ns - TRACE_LAG_NS);
     }
     assert(w->b.trace.late == 0 && w->b.trace.dropped == 0);
-    assert(w->can.node.services.tec <= 256 + 8);
+    assert(w->can.node.node.services.tec <= 256 + 8);
 }
 
 static void power(struct world *w, bool on)
@@ -96,7 +97,7 @@ static void power(struct world *w, bool on)
     w->powered = on;
     if (on) {
         psa2_power_up(&w->b, w->s.now_ns);
-        psa2_can_power_up(&w->can, w->s.now_ns);
+        board_node_power_up(&w->can, w->s.now_ns);
     } else {
         psa2_power_down(&w->b, w->s.now_ns);
         psa2_can_power_down(&w->can);
@@ -151,8 +152,8 @@ static void bus(struct world *w, struct script *s)
     w->added[i] = b & 4;
     if (!w->added[i]) return;
     struct can_fault f = {.kind = (enum can_fault_kind)(script_byte(s) % 6), .probability = script_byte(s) / 255.0};
-    f.from = b & 8 ? &w->host : b & 16 ? &w->can.node.services : NULL;
-    f.to = b & 32 && f.kind != CAN_FAULT_ERROR ? b & 64 ? &w->host : &w->can.node.services : NULL;
+    f.from = b & 8 ? &w->host : b & 16 ? &w->can.node.node.services : NULL;
+    f.to = b & 32 && f.kind != CAN_FAULT_ERROR ? b & 64 ? &w->host : &w->can.node.node.services : NULL;
     f.delay_ns = 1 + script_span_ns(s);
     f.limit = b & 128 ? script_byte(s) : 0;
     f.rng = rng_stream(1, b, "fault");
@@ -198,7 +199,7 @@ static void op(struct world *w, struct script *s)
         bus(w, s);
         return;
     case 5:
-        can_bus_off(&w->bus, b & 0x80 || !w->powered ? &w->host : &w->can.node.stream, w->s.now_ns);
+        can_bus_off(&w->bus, b & 0x80 || !w->powered ? &w->host : &w->can.node.node.stream, w->s.now_ns);
         return;
     case 6:
         talk(w, s);
@@ -240,7 +241,7 @@ static void lift(struct world *w)
     run(w, UP_NS);
     assert(psa2_ready(&w->b) && w->frames > frames + 40 && w->got > got + 2 * 40);
     /* The board's counters began again with its power; the host's fall by what it sends, and it has sent little. */
-    assert(w->can.node.services.now == CAN_ACTIVE && w->host.now != CAN_BUS_OFF);
+    assert(w->can.node.node.services.now == CAN_ACTIVE && w->host.now != CAN_BUS_OFF);
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
@@ -258,7 +259,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     psa2_attach(&w.b, &(struct psa2_host){.ctx = &w, .frame = on_frame, .fault = on_fault});
     can_bus_init(&w.bus, &(struct can_bus_cfg){.bitrate_hz = script_byte(&s) & 1 ? 1000000 : 500000}, &w.s);
     const struct psa2_can_port port = psa2_can_port(&w.b);
-    psa2_can_init(&w.can, &(struct board_can_cfg){.name = "a", .node_id = NODE}, &port, &w.bus, &w.s);
+    psa2_can_init(&w.can, &(struct board_can_cfg){.name = "a", .type = &psa2_board, .node_id = NODE}, &port, &w.bus,
+                  &w.s);
     w.host = (struct can_node){.name = "host", .rx = on_rx, .error = on_error, .ctx = &w};
     w.ear.sink = (struct trace_sink){.mask = LINE_MASK, .steps = listener_steps, .ctx = &w.ear};
     can_attach(&w.bus, &w.host);

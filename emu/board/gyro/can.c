@@ -1,6 +1,5 @@
 #include "board/gyro/can.h"
 
-#include "board/gyro/board.h"
 #include "board/gyro/gyro.h"
 #include "gen/gyro_od.h"
 #include "gen/psabench_can.h"
@@ -141,7 +140,7 @@ static uint32_t read_setting(struct board_node *n, const struct co_entry *e, str
 static uint32_t reject_setting(struct board_node *n, uint32_t abort, const char *why)
 {
     ((struct gyro *)n->board)->counters.refused++;
-    board_node_refuse(n, why);
+    board_node_reject(n, why);
     return abort;
 }
 
@@ -173,7 +172,7 @@ static uint32_t write_mode(struct board_node *n, const struct co_entry *e, const
     const char *why = gyro_set_mode(n->board, (enum gyro_mode)v->number, t_ns);
     (void)e;
     if (!why) return CO_OK;
-    board_node_refuse(n, why);
+    board_node_reject(n, why);
     return CO_AB_STATE;
 }
 
@@ -222,7 +221,7 @@ static uint32_t begin_self_test(struct board_node *n, const struct co_entry *e, 
     const char *why = v->number != 0.0 ? gyro_self_test(n->board, t_ns) : NULL;
     (void)e;
     if (!why) return CO_OK;
-    board_node_refuse(n, why);
+    board_node_reject(n, why);
     return CO_AB_STATE;
 }
 
@@ -252,13 +251,12 @@ static int64_t period_ns(const void *board)
     return ((const struct gyro *)board)->profile.step_ns;
 }
 
-static const struct board_node_type type = {.board = &gyro_board,
-                                            .device = &gyro_device,
+static const struct board_node_type type = {.device = &gyro_device,
                                             .objects = objects,
                                             .object_count = sizeof objects / sizeof *objects,
                                             .serial = serial_of,
                                             .period_ns = period_ns,
-                                            .heard = on_level_frame};
+                                            .rx_other = on_level_frame};
 
 static void init_can(void *can, const struct board_can_cfg *cfg, void *board, struct can_bus *bus, struct sched *s)
 {

@@ -1,7 +1,6 @@
 #include "board/pik/can.h"
 
 #include "base/bits.h"
-#include "board/pik/board.h"
 #include "board/pik/pik.h"
 #include "gen/pik_od.h"
 
@@ -104,8 +103,7 @@ static int64_t period_ns(const void *board)
     return pik_period_ns(board);
 }
 
-static const struct board_node_type type = {.board = &pik_board,
-                                            .device = &pik_device,
+static const struct board_node_type type = {.device = &pik_device,
                                             .objects = objects,
                                             .object_count = sizeof objects / sizeof *objects,
                                             .serial = serial_of,

@@ -1,6 +1,5 @@
 #include "board/pmka/can.h"
 
-#include "board/pmka/board.h"
 #include "board/pmka/pmka.h"
 #include "gen/pmka_od.h"
 #include "gen/psabench_can.h"
@@ -85,8 +84,7 @@ static int64_t period_ns(const void *board)
     return ((const struct pmka *)board)->profile.ts_ns;
 }
 
-static const struct board_node_type type = {.board = &pmka_board,
-                                            .device = &pmka_device,
+static const struct board_node_type type = {.device = &pmka_device,
                                             .objects = objects,
                                             .object_count = sizeof objects / sizeof *objects,
                                             .serial = serial_of,

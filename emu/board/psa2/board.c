@@ -189,38 +189,6 @@ static void digest(const void *board, struct sha256 *s)
     add_ads1256(s, &b->tadc);
 }
 
-/* ---- CAN ---- */
-
-static void can_init(void *can, const struct board_can_cfg *cfg, void *board, struct can_bus *bus, struct sched *s)
-{
-    const struct psa2_can_port port = psa2_can_port(board);
-    psa2_can_init(can, cfg, &port, bus, s);
-    psa2_attach(board, &(struct psa2_host){.ctx = can, .frame = psa2_can_frame, .fault = psa2_can_fault});
-}
-
-static void can_power_up(void *can, int64_t t_ns)
-{
-    psa2_can_power_up(can, t_ns);
-}
-
-static void can_power_down(void *can)
-{
-    psa2_can_power_down(can);
-}
-
-static struct co_node *can_node(void *can)
-{
-    return &((struct psa2_can *)can)->node;
-}
-
-static const struct board_can can_side = {
-    .size = sizeof(struct psa2_can),
-    .init = can_init,
-    .power_up = can_power_up,
-    .power_down = can_power_down,
-    .node = can_node,
-};
-
 static const char *const port_lines[] = {"Int", "Data", "CLK", NULL};
 
 const struct board_type psa2_board = {
@@ -249,7 +217,7 @@ const struct board_type psa2_board = {
     .parts = parts,
     .part_count = PARTS,
     .wrongs = BOARD_WRONG_SKIP_SYNC_T | BOARD_WRONG_SETUP_ORDER | BOARD_WRONG_FROZEN_WORDS,
-    .can = &can_side,
+    .can = &psa2_can,
     .init = init,
     .power_up = power_up,
     .power_down = power_down,

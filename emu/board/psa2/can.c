@@ -1,14 +1,65 @@
 #include "board/psa2/can.h"
 
-#include "board/psa2/can_internal.h"
-
 #include <string.h>
 
-struct psa2_can_info psa2_can_info(const struct psa2_can *c)
+enum { REG_DEVICE = 0x81, SOURCE_ACCEL_PORT = 1, SOURCE_TEMP_PORT = 2 };
+enum { NS_PER_TICK = 4000, NS_PER_US = 1000, AXES = 3 };
+
+static const double volt_per_lsb = 10.0 / 8388608.0; /* nominal, at the load */
+
+static struct psa2_can *can_of(struct board_node *n)
+{
+    return (struct psa2_can *)n;
+}
+
+static struct psa2_can_info info_of(const struct psa2_can *c)
 {
     struct psa2_can_info info = {0};
     c->port.info(c->port.ctx, &info);
     return info;
+}
+
+/* ---- whether the bus can carry the stream ---- */
+
+/* fDATA = fCLK / (16384 >> DR) in the FIR modes (sources 1.8); other modes and DR 5..7 the board refuses. */
+static int64_t config0_period_ns(uint32_t fclk_hz, uint8_t config0)
+{
+    const unsigned dr = config0 >> 3 & 7u;
+    if (dr > 4 || (config0 & 3u) < 2 || fclk_hz == 0) return 0;
+    return (INT64_C(16384) >> dr) * NS_PER_S / fclk_hz;
+}
+
+/* EMCY and object 2031h follow these settings: set where they do not fit, cleared where they do. */
+static bool check_stream(struct psa2_can *c, const struct psa2_can_settings *set, int64_t period_ns, int64_t t_ns)
+{
+    char why[BOARD_NODE_TEXT];
+    if (psa2_form_fits(&c->node.bus->cfg, set, period_ns, why)) {
+        board_node_accept_stream(&c->node, t_ns);
+        return true;
+    }
+    board_node_reject_stream(&c->node, why, t_ns);
+    return false;
+}
+
+/* The present settings at the present data period: the stream flows or stops. While nothing changes, the last rejection of a
+ * setting stays readable. */
+static void recheck_stream(struct psa2_can *c, int64_t t_ns)
+{
+    char why[BOARD_NODE_TEXT];
+    const int64_t period_ns = info_of(c).period_ns;
+    const bool fitted = c->node.fits;
+    c->checked_period_ns = period_ns;
+    c->node.fits = psa2_form_fits(&c->node.bus->cfg, &c->set, period_ns, why);
+    if (!c->node.fits || !fitted) (void)check_stream(c, &c->set, period_ns, t_ns);
+}
+
+/* Discards a block that is partly filled and selects the TPDOs of the present form. */
+static void restart_stream(struct board_node *n)
+{
+    struct psa2_can *c = can_of(n);
+    c->block.samples = 0;
+    c->sync_armed = false;
+    co_pdo_select(&n->node, psa2_form_tpdos(c->set.form));
 }
 
 /* ---- the controller's serial port ---- */
@@ -36,8 +87,10 @@ static uint32_t abort_of(enum psa2_result result)
 static void port_fault(struct psa2_can *c, enum psa2_group group, bool active, int64_t t_ns)
 {
     const uint16_t code = group == PSA2_ACCEL ? PSA2_EMCY_ACCEL_PORT : PSA2_EMCY_TEMP_PORT;
-    if (active) co_node_error(&c->node, code, 0x81, group == PSA2_ACCEL ? 1 : 2, t_ns);
-    else co_node_error_end(&c->node, code, t_ns);
+    if (active)
+        co_node_error(&c->node.node, code, REG_DEVICE, group == PSA2_ACCEL ? SOURCE_ACCEL_PORT : SOURCE_TEMP_PORT,
+                      t_ns);
+    else co_node_error_end(&c->node.node, code, t_ns);
 }
 
 static void request_done(void *ctx, struct psa2_request *r, enum psa2_result result, int64_t t_ns)
@@ -45,22 +98,22 @@ static void request_done(void *ctx, struct psa2_request *r, enum psa2_result res
     struct psa2_can *c = ctx;
     c->request_busy = false;
     /* A reset of the node has given the request up, and the board says time-out: that is no fault. */
-    const bool given_up = c->node.state == CO_INITIALISING;
+    const bool given_up = c->node.node.state == CO_INITIALISING;
     if (!given_up && (result == PSA2_OK || result == PSA2_TIMEOUT))
         port_fault(c, r->group, result == PSA2_TIMEOUT, t_ns);
     const struct co_value v = {.number = r->answer[c->request_axis]};
-    co_sdo_answer(&c->node.sdo, c->ticket, abort_of(result), &v, t_ns);
-    if (result == PSA2_OK && r->op != PSA2_READ_REG) psa2_can_rejudge(c, t_ns);
+    co_sdo_answer(&c->node.node.sdo, c->ticket, abort_of(result), &v, t_ns);
+    if (result == PSA2_OK && r->op != PSA2_READ_REG) recheck_stream(c, t_ns);
 }
 
-uint32_t psa2_can_submit(struct psa2_can *c, enum psa2_group group, enum psa2_op op, uint8_t addr, uint8_t value,
-                         unsigned axis, int64_t t_ns)
+static uint32_t submit_request(struct psa2_can *c, enum psa2_group group, enum psa2_op op, uint8_t addr, uint8_t value,
+                               unsigned axis, int64_t t_ns)
 {
     if (c->request_busy) return CO_AB_STATE; /* of a client that has given up; the board still has it */
     c->request =
         (struct psa2_request){.group = group, .op = op, .addr = addr, .value = value, .done = request_done, .ctx = c};
     c->request_axis = (uint8_t)axis;
-    c->ticket = c->node.sdo.ticket;
+    c->ticket = c->node.node.sdo.ticket;
     c->request_busy = true;
     const enum psa2_result result = c->port.submit(c->port.ctx, &c->request, t_ns);
     if (result == PSA2_OK) return CO_PENDING;
@@ -84,11 +137,244 @@ static void pulse_sync_pin(struct psa2_can *c, int64_t t_ns)
     if (!c->pulse_busy) c->syncs_missed++;
 }
 
-/* ---- what the node tells ---- */
+/* ---- settings ---- */
 
-static void on_sync(void *ctx, int64_t t_ns)
+static void restore_settings(struct board_node *n)
 {
-    struct psa2_can *c = ctx;
+    struct psa2_can *c = can_of(n);
+    c->set = (struct psa2_can_settings){
+        .form = (uint8_t)board_node_default(n, PSA2_OD_FRAME_FORM, 0),
+        .sample_mode = (uint8_t)board_node_default(n, PSA2_OD_SAMPLE_MODE, 0),
+        .nth = (uint16_t)board_node_default(n, PSA2_OD_SAMPLE_NTH, 0),
+        .sync_pin = board_node_default(n, PSA2_OD_SYNC_PIN, 0) != 0.0,
+    };
+    for (unsigned i = 0; i < AXES; i++) {
+        c->set.zero_v[i] = (float)board_node_default(n, PSA2_OD_ZERO_V, (uint8_t)(i + 1));
+        c->set.scale_v_per_g[i] = (float)board_node_default(n, PSA2_OD_SCALE_V_PER_G, (uint8_t)(i + 1));
+    }
+}
+
+/* Form, sample mode, N: a setting of the stream holds only if the bus can carry what it asks for. */
+static uint32_t write_stream(struct board_node *n, const struct co_entry *e, const struct co_value *v, int64_t t_ns)
+{
+    struct psa2_can *c = can_of(n);
+    const int64_t period_ns = info_of(c).period_ns;
+    struct psa2_can_settings set = c->set;
+    if (e->index == PSA2_OD_FRAME_FORM) set.form = (uint8_t)v->number;
+    if (e->index == PSA2_OD_SAMPLE_MODE) set.sample_mode = (uint8_t)v->number;
+    if (e->index == PSA2_OD_SAMPLE_NTH) set.nth = (uint16_t)v->number;
+    if (!check_stream(c, &set, period_ns, t_ns)) return CO_AB_STATE;
+    c->set = set;
+    c->checked_period_ns = period_ns;
+    n->fits = true;
+    restart_stream(n);
+    return CO_OK;
+}
+
+static uint32_t read_settings(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
+{
+    const struct psa2_can *c = can_of(n);
+    (void)t_ns;
+    switch (e->index) {
+    case PSA2_OD_FRAME_FORM:
+        v->number = c->set.form;
+        return CO_OK;
+    case PSA2_OD_SAMPLE_MODE:
+        v->number = c->set.sample_mode;
+        return CO_OK;
+    case PSA2_OD_SAMPLE_NTH:
+        v->number = c->set.nth;
+        return CO_OK;
+    case PSA2_OD_SYNC_PIN:
+        v->number = c->set.sync_pin;
+        return CO_OK;
+    case PSA2_OD_ZERO_V:
+        v->number = (double)c->set.zero_v[e->sub - 1];
+        return CO_OK;
+    case PSA2_OD_SCALE_V_PER_G:
+        v->number = (double)c->set.scale_v_per_g[e->sub - 1];
+        return CO_OK;
+    default:
+        return CO_AB_NO_OBJECT;
+    }
+}
+
+static uint32_t write_plain(struct board_node *n, const struct co_entry *e, const struct co_value *v, int64_t t_ns)
+{
+    struct psa2_can *c = can_of(n);
+    (void)t_ns;
+    switch (e->index) {
+    case PSA2_OD_SYNC_PIN:
+        c->set.sync_pin = v->number != 0.0;
+        return CO_OK;
+    case PSA2_OD_ZERO_V:
+        c->set.zero_v[e->sub - 1] = (float)v->number;
+        return CO_OK;
+    case PSA2_OD_SCALE_V_PER_G:
+        c->set.scale_v_per_g[e->sub - 1] = (float)v->number;
+        return CO_OK;
+    default:
+        return CO_AB_NO_OBJECT;
+    }
+}
+
+/* ---- registers and opcodes ---- */
+
+/* Whose registers an object is; the sub-index is the address plus one. */
+static unsigned axis_of(uint16_t index)
+{
+    return index == PSA2_OD_REG_Y ? 1 : index == PSA2_OD_REG_Z ? 2 : 0;
+}
+
+static enum psa2_group group_of(const struct co_entry *e)
+{
+    if (e->index == PSA2_OD_OPCODE) return e->sub == 1 ? PSA2_ACCEL : PSA2_TEMP;
+    return e->index == PSA2_OD_REG_T ? PSA2_TEMP : PSA2_ACCEL;
+}
+
+static uint32_t read_register(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
+{
+    struct psa2_can *c = can_of(n);
+    (void)v;
+    return submit_request(c, group_of(e), PSA2_READ_REG, (uint8_t)(e->sub - 1), 0, axis_of(e->index), t_ns);
+}
+
+static uint32_t write_register(struct board_node *n, const struct co_entry *e, const struct co_value *v, int64_t t_ns)
+{
+    struct psa2_can *c = can_of(n);
+    const uint8_t addr = (uint8_t)(e->sub - 1);
+    const uint8_t value = (uint8_t)v->number;
+    const enum psa2_group group = group_of(e);
+    if (group == PSA2_ACCEL && addr == ADS1282_CONFIG0) {
+        const int64_t period_ns = config0_period_ns(info_of(c).fclk_hz, value);
+        if (period_ns > 0 && !check_stream(c, &c->set, period_ns, t_ns)) return CO_AB_STATE;
+    }
+    return submit_request(c, group, PSA2_WRITE_REG, addr, value, 0, t_ns);
+}
+
+static uint32_t write_opcode(struct board_node *n, const struct co_entry *e, const struct co_value *v, int64_t t_ns)
+{
+    struct psa2_can *c = can_of(n);
+    return submit_request(c, group_of(e), PSA2_OPCODE, 0, (uint8_t)v->number, 0, t_ns);
+}
+
+/* ---- counters and identity ---- */
+
+/* Sub-indices in order; TEC, REC and state (5..7) stay 0: no errors on the wire are modelled. */
+static uint32_t read_counter(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
+{
+    const struct psa2_can *c = can_of(n);
+    enum { LOAD = 4 };
+    const struct psa2_counters k = info_of(c).counters;
+    const uint32_t value[] = {0,
+                              k.frames,
+                              k.overruns,
+                              n->dropped + n->node.pdo_lost,
+                              0,
+                              0,
+                              0,
+                              0,
+                              k.int_late,
+                              k.timeouts,
+                              n->node.pdo_inhibited,
+                              n->node.syncs,
+                              c->syncs_missed,
+                              n->node.sdo.aborts,
+                              n->node.malformed + n->node.sdo.malformed};
+    if (e->sub >= sizeof value / sizeof value[0]) return CO_AB_NO_SUB;
+    v->number = e->sub == LOAD ? (double)can_load_since(&n->load, n->bus, t_ns) : (double)value[e->sub];
+    return CO_OK;
+}
+
+static uint32_t read_unit(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
+{
+    const struct psa2_can *c = can_of(n);
+    (void)t_ns;
+    const struct psa2_can_info info = info_of(c);
+    v->number = e->index == PSA2_OD_IDENTITY ? (double)info.serial : (double)info.word_bits;
+    return CO_OK;
+}
+
+/* ---- latest sample ---- */
+
+static double accel_g(const struct psa2_can *c, unsigned axis)
+{
+    const double v = c->latest.code[axis] * volt_per_lsb;
+    return (v - (double)c->set.zero_v[axis]) / (double)c->set.scale_v_per_g[axis];
+}
+
+static double frame_head(const struct psa2_frame *f, uint8_t sub)
+{
+    switch (sub) {
+    case 1:
+        return (uint16_t)f->seq;
+    case 2:
+        return (uint8_t)((f->status & 0x0F) | f->temp_channel << 4);
+    case 3:
+        return (uint16_t)((uint64_t)f->t_sample_ns / NS_PER_TICK);
+    case 4:
+        return (int16_t)f->temp_code;
+    default:
+        return (uint32_t)((uint64_t)f->t_sample_ns / NS_PER_US);
+    }
+}
+
+static uint32_t read_latest(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
+{
+    const struct psa2_can *c = can_of(n);
+    (void)t_ns;
+    const struct psa2_frame *f = &c->latest;
+    const unsigned axis = (unsigned)e->sub - 1;
+    switch (e->index) {
+    case PSA2_OD_CODES:
+        v->number = axis < AXES ? f->code[axis] : (int16_t)f->temp_code;
+        return CO_OK;
+    case PSA2_OD_RAW_WORDS:
+        v->number = (int32_t)f->raw[axis];
+        return CO_OK;
+    case PSA2_OD_FRAME_HEAD:
+        v->number = frame_head(f, e->sub);
+        return CO_OK;
+    case PSA2_OD_ACCEL_G:
+        v->number = accel_g(c, axis);
+        return CO_OK;
+    case PSA2_OD_ACCEL_UG:
+        v->number = 1e6 * accel_g(c, axis);
+        return CO_OK;
+    default:
+        return CO_AB_NO_OBJECT;
+    }
+}
+
+/* ---- which function answers for an object ---- */
+
+static const struct board_object objects[] = {
+    {PSA2_OD_IDENTITY, read_unit, NULL},
+    {PSA2_OD_REG_X, read_register, write_register},
+    {PSA2_OD_REG_Y, read_register, write_register},
+    {PSA2_OD_REG_Z, read_register, write_register},
+    {PSA2_OD_REG_T, read_register, write_register},
+    {PSA2_OD_OPCODE, NULL, write_opcode},
+    {PSA2_OD_FRAME_FORM, read_settings, write_stream},
+    {PSA2_OD_WORD_BITS, read_unit, NULL},
+    {PSA2_OD_SAMPLE_MODE, read_settings, write_stream},
+    {PSA2_OD_SAMPLE_NTH, read_settings, write_stream},
+    {PSA2_OD_SYNC_PIN, read_settings, write_plain},
+    {PSA2_OD_COUNTERS, read_counter, NULL},
+    {PSA2_OD_CODES, read_latest, NULL},
+    {PSA2_OD_RAW_WORDS, read_latest, NULL},
+    {PSA2_OD_FRAME_HEAD, read_latest, NULL},
+    {PSA2_OD_ZERO_V, read_settings, write_plain},
+    {PSA2_OD_SCALE_V_PER_G, read_settings, write_plain},
+    {PSA2_OD_ACCEL_G, read_latest, NULL},
+    {PSA2_OD_ACCEL_UG, read_latest, NULL},
+};
+
+/* ---- notifications of the node and of the board ---- */
+
+static void on_sync(struct board_node *n, int64_t t_ns)
+{
+    struct psa2_can *c = can_of(n);
     c->sync_armed = true;
     c->sync_ns = t_ns;
     if (!c->set.sync_pin) return;
@@ -96,16 +382,33 @@ static void on_sync(void *ctx, int64_t t_ns)
     else pulse_sync_pin(c, t_ns);
 }
 
-static void on_event(void *ctx, enum co_event ev, int64_t t_ns)
+static void on_started(struct board_node *n, int64_t t_ns)
+{
+    recheck_stream(can_of(n), t_ns);
+}
+
+static bool is_due(struct psa2_can *c, const struct psa2_frame *f)
+{
+    if (c->set.sample_mode == PSA2_EVERY_NTH) return f->seq % c->set.nth == 0;
+    if (c->set.sample_mode != PSA2_ON_SYNC) return true;
+    if (!c->sync_armed || f->t_sample_ns < c->sync_ns) return false;
+    c->sync_armed = false;
+    return true;
+}
+
+void psa2_can_frame(void *ctx, const struct psa2_frame *f, int64_t t_ns)
 {
     struct psa2_can *c = ctx;
-    if (ev == CO_EV_RESET_NODE) {
-        psa2_can_defaults(c);
-        c->refusal[0] = '\0';
-        c->port.reset(c->port.ctx, t_ns);
-    }
-    psa2_can_stream_restart(c);
-    if (ev == CO_EV_STATE && c->node.state == CO_OPERATIONAL) psa2_can_rejudge(c, t_ns);
+    struct board_node *n = &c->node;
+    struct can_msg m[PSA2_FORM_FRAMES_MAX] = {{0}, {0}};
+    c->latest = *f;
+    co_node_error_end(&n->node, PSA2_EMCY_ACCEL_PORT, t_ns);
+    if (f->status & PSA2_ST_TEMP_NEW) co_node_error_end(&n->node, PSA2_EMCY_TEMP_PORT, t_ns);
+    /* A rate that rose by a way of its own, say a RESET opcode, is checked by what it is. */
+    if (info_of(c).period_ns != c->checked_period_ns) recheck_stream(c, t_ns);
+    if (n->node.state != CO_OPERATIONAL || !is_due(c, f)) return;
+    const unsigned frames = n->fits ? psa2_form_pack(c->set.form, &c->block, f, m) : 0;
+    if (frames > 0 || !n->fits) board_node_stream(n, psa2_form_first_tpdo(c->set.form), m, frames, t_ns);
 }
 
 void psa2_can_fault(void *ctx, uint16_t code, int64_t t_ns)
@@ -113,7 +416,7 @@ void psa2_can_fault(void *ctx, uint16_t code, int64_t t_ns)
     struct psa2_can *c = ctx;
     if (code == PSA2_FAULT_ACCEL_PORT) port_fault(c, PSA2_ACCEL, true, t_ns);
     else if (code == PSA2_FAULT_TEMP_PORT) port_fault(c, PSA2_TEMP, true, t_ns);
-    else if (code != 0) co_node_error(&c->node, code, 0x81, 0, t_ns);
+    else if (code != 0) co_node_error(&c->node.node, code, REG_DEVICE, 0, t_ns);
 }
 
 /* ---- life ---- */
@@ -121,32 +424,26 @@ void psa2_can_fault(void *ctx, uint16_t code, int64_t t_ns)
 void psa2_can_init(struct psa2_can *c, const struct board_can_cfg *cfg, const struct psa2_can_port *port,
                    struct can_bus *bus, struct sched *s)
 {
+    static const struct co_device device = {.od = &psa2_od, .tpdos = PSA2_TPDOS};
+    static const struct board_node_type type = {.device = &device,
+                                                .objects = objects,
+                                                .object_count = sizeof objects / sizeof *objects,
+                                                .defaults = restore_settings,
+                                                .restart = restart_stream,
+                                                .sync = on_sync,
+                                                .started = on_started};
     memset(c, 0, sizeof *c);
-    c->cfg = *cfg;
     c->port = *port;
-    c->bus = bus;
-    c->fits = true;
-    c->drop_ns = -PSA2_CAN_CALM_NS;
-    const struct co_node_cfg node = {.name = cfg->name, .id = cfg->node_id, .od = &psa2_od, .tpdos = PSA2_TPDOS};
-    const struct co_node_io io = {c, psa2_can_read, psa2_can_write, on_event, on_sync, NULL};
-    co_node_init(&c->node, &node, &io, bus, s);
-    psa2_can_defaults(c);
+    board_node_init(&c->node, &type, cfg, port->ctx, bus, s);
 }
 
-void psa2_can_power_up(struct psa2_can *c, int64_t t_ns)
+void psa2_can_power_down(void *can)
 {
-    co_node_power_up(&c->node, t_ns);
-}
-
-void psa2_can_power_down(struct psa2_can *c)
-{
-    co_node_power_down(&c->node);
-    psa2_can_defaults(c);
-    c->refusal[0] = c->remark[0] = '\0';
+    struct psa2_can *c = can;
+    board_node_power_down(can);
     c->latest = (struct psa2_frame){0};
     c->checked_period_ns = 0;
-    c->fits = true;
-    c->drop_ns = -PSA2_CAN_CALM_NS;
+    c->node.fits = true;
 }
 
 /* ---- a real board ---- */
@@ -154,11 +451,6 @@ void psa2_can_power_down(struct psa2_can *c)
 static enum psa2_result board_submit(void *ctx, struct psa2_request *r, int64_t t_ns)
 {
     return psa2_submit(ctx, r, t_ns);
-}
-
-static void board_reset(void *ctx, int64_t t_ns)
-{
-    psa2_reset(ctx, t_ns);
 }
 
 static void board_info(void *ctx, struct psa2_can_info *out)
@@ -173,5 +465,18 @@ static void board_info(void *ctx, struct psa2_can_info *out)
 
 struct psa2_can_port psa2_can_port(struct psa2 *b)
 {
-    return (struct psa2_can_port){b, board_submit, board_reset, board_info};
+    return (struct psa2_can_port){b, board_submit, board_info};
 }
+
+static void init_can(void *can, const struct board_can_cfg *cfg, void *board, struct can_bus *bus, struct sched *s)
+{
+    const struct psa2_can_port port = psa2_can_port(board);
+    psa2_can_init(can, cfg, &port, bus, s);
+    psa2_attach(board, &(struct psa2_host){.ctx = can, .frame = psa2_can_frame, .fault = psa2_can_fault});
+}
+
+const struct board_can psa2_can = {.size = sizeof(struct psa2_can),
+                                   .init = init_can,
+                                   .power_up = board_node_power_up,
+                                   .power_down = psa2_can_power_down,
+                                   .node = board_node_co};

@@ -1,6 +1,5 @@
 #include "board/psd1/can.h"
 
-#include "board/psd1/board.h"
 #include "gen/psabench_can.h"
 #include "gen/psd1_od.h"
 
@@ -110,7 +109,7 @@ static uint32_t request(struct board_node *n, uint8_t command, uint32_t word, in
     can->ticket = n->node.sdo.ticket;
     const enum board_cycle_result r = psd1_request(board_of(n), &can->request, &why, t_ns);
     can->busy = r == BOARD_CYCLE_OK;
-    if (why) board_node_refuse(n, why);
+    if (why) board_node_reject(n, why);
     return can->busy ? CO_PENDING : board_node_abort_of(r);
 }
 
@@ -176,8 +175,7 @@ static int64_t period_ns(const void *board)
     return ad7712_period_ns(&((const struct psd1 *)board)->adc[0]);
 }
 
-static const struct board_node_type type = {.board = &psd1_board,
-                                            .device = &psd1_device,
+static const struct board_node_type type = {.device = &psd1_device,
                                             .objects = objects,
                                             .object_count = sizeof objects / sizeof objects[0],
                                             .serial = serial,

@@ -158,8 +158,7 @@ static inline struct rig *rig_of_device(const struct co_device *d, uint32_t bitr
                                .counters = counters,
                                .counter_count = d->counter_count};
     board = (struct board_type){.parts = &part, .part_count = 1, .bus = &bus, .reset = fake_reset};
-    type = (struct board_node_type){.board = &board,
-                                    .device = d,
+    type = (struct board_node_type){.device = d,
                                     .objects = own,
                                     .object_count = sizeof own / sizeof own[0],
                                     .serial = fake_serial,
@@ -172,7 +171,7 @@ static inline struct rig *rig_of_device(const struct co_device *d, uint32_t bitr
     r->host = (struct can_node){.name = "host", .rx = on_rx, .ctx = r};
     can_attach(&r->bus, &r->host);
     r->board.period_ns = NS_PER_S / 1000;
-    const struct board_can_cfg cfg = {.name = "unit", .node_id = NODE, .refused = on_refused, .ctx = r};
+    const struct board_can_cfg cfg = {.name = "unit", .type = &board, .node_id = NODE, .refused = on_refused, .ctx = r};
     board_node_init(&r->can, &type, &cfg, &r->board, &r->bus, &r->s);
     board_node_power_up(&r->can, 0);
     settle(r);

@@ -71,7 +71,7 @@ static void rig_up(struct rig *rig, const char *key, const char *value)
     rig->host = (struct can_node){.name = "host", .rx = on_rx, .ctx = rig};
     can_attach(&rig->bus, &rig->host);
     pik_board.init(&rig->b, &p, &cfg, &io, &rig->s);
-    const struct board_can_cfg node = {.name = "p", .node_id = NODE};
+    const struct board_can_cfg node = {.name = "p", .type = &pik_board, .node_id = NODE};
     pik_board.can->init(&rig->can, &node, &rig->b, &rig->bus, &rig->s);
     pik_board.power_up(&rig->b, 0);
     pik_board.can->power_up(&rig->can, 0);

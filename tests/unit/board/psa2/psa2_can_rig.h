@@ -26,7 +26,7 @@ struct rig {
     uint32_t seq;
     /* the listener */
     unsigned refusals;
-    char told[PSA2_CAN_TEXT + 16];
+    char told[BOARD_NODE_TEXT + 16];
 };
 static struct rig rig;
 
@@ -57,6 +57,8 @@ static inline void fake_reset(void *ctx, int64_t t_ns)
     r->resets++;
     if (r->request) fake_done(r, PSA2_TIMEOUT);
 }
+
+static const struct board_type fake_type = {.reset = fake_reset};
 
 static inline void fake_info(void *ctx, struct psa2_can_info *out)
 {
@@ -95,15 +97,15 @@ static inline void nmt(struct rig *r, uint8_t command)
     r->count = 0;
 }
 
-static inline void join_bus(struct rig *r, const struct psa2_can_port *port, uint32_t bitrate_hz,
-                            uint32_t data_bitrate_hz)
+static inline void join_bus(struct rig *r, const struct board_type *type, const struct psa2_can_port *port,
+                            uint32_t bitrate_hz, uint32_t data_bitrate_hz)
 {
     sched_init(&r->s);
     const struct can_bus_cfg bus = {bitrate_hz, data_bitrate_hz};
     can_bus_init(&r->bus, &bus, &r->s);
     r->host = (struct can_node){.name = "host", .fd = true, .rx = on_rx, .ctx = r};
     can_attach(&r->bus, &r->host);
-    const struct board_can_cfg cfg = {.name = "unit", .node_id = NODE, .refused = on_refused, .ctx = r};
+    const struct board_can_cfg cfg = {.name = "unit", .type = type, .node_id = NODE, .refused = on_refused, .ctx = r};
     psa2_can_init(&r->can, &cfg, port, &r->bus, &r->s);
 }
 
@@ -114,9 +116,9 @@ static inline struct rig *rig_up(uint32_t bitrate_hz, uint32_t data_bitrate_hz, 
     memset(r, 0, sizeof *r);
     r->info =
         (struct psa2_can_info){.period_ns = NS_PER_S / data_hz, .fclk_hz = FCLK_HZ, .serial = 1234, .word_bits = 32};
-    const struct psa2_can_port port = {r, fake_submit, fake_reset, fake_info};
-    join_bus(r, &port, bitrate_hz, data_bitrate_hz);
-    psa2_can_power_up(&r->can, 0);
+    const struct psa2_can_port port = {r, fake_submit, fake_info};
+    join_bus(r, &fake_type, &port, bitrate_hz, data_bitrate_hz);
+    board_node_power_up(&r->can, 0);
     settle(r);
     nmt(r, 1);
     return r;

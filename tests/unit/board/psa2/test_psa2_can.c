@@ -1,6 +1,8 @@
 /* PSA-2 on CAN: frame forms, sample modes, mirrors, two units, a real board. */
 #include "psa2_can_rig.h"
 
+#include "board/psa2/board.h"
+
 static uint32_t write_u16(struct rig *r, uint16_t index, uint8_t sub, uint16_t value)
 {
     ask(r, 0x2B, index, sub, value);
@@ -201,10 +203,10 @@ static void two_units_share_a_bus_by_their_identifiers(void **state)
     (void)state;
     struct rig *r = rig_up(1000000, 0, 1000);
     static struct psa2_can other;
-    const struct psa2_can_port port = {r, fake_submit, fake_reset, fake_info};
-    const struct board_can_cfg cfg = {.name = "other", .node_id = 7};
+    const struct psa2_can_port port = {r, fake_submit, fake_info};
+    const struct board_can_cfg cfg = {.name = "other", .type = &fake_type, .node_id = 7};
     psa2_can_init(&other, &cfg, &port, &r->bus, &r->s);
-    psa2_can_power_up(&other, r->s.now_ns);
+    board_node_power_up(&other, r->s.now_ns);
     settle(r);
     assert_non_null(seen_id(r, 0x707));
     host_sends(r, 0, 2, (const uint8_t[]){1, 0});
@@ -231,7 +233,7 @@ static struct rig *real_up(void)
     memset(r, 0, sizeof *r);
     memset(&real, 0, sizeof real);
     const struct psa2_can_port port = psa2_can_port(&real.store.psa2);
-    join_bus(r, &port, 1000000, 0);
+    join_bus(r, &psa2_board, &port, 1000000, 0);
     struct unit_cfg cfg = unit_default("unit");
     static struct psa2_profile profile;
     profile = psa2_profile_default();
@@ -243,7 +245,7 @@ static struct rig *real_up(void)
     unit_init(&real, &cfg, &lab, &r->s);
     psa2_attach(real.board, &(struct psa2_host){&r->can, psa2_can_frame, psa2_can_fault});
     psa2_power_up(real.board, 0);
-    psa2_can_power_up(&r->can, 0);
+    board_node_power_up(&r->can, 0);
     return r;
 }
 

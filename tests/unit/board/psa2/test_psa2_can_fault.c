@@ -1,5 +1,6 @@
 /* A unit whose CAN controller or power fails, as a host on the bus sees it. */
 #include "base/can_fault.h"
+#include "board/psa2/board.h"
 #include "board/psa2/can.h"
 #include "unit/unit.h"
 
@@ -65,12 +66,13 @@ static struct bench *up(void)
     unit_init(&r->unit, &cfg, &r->lab, &r->s);
     can_bus_init(&r->bus, &(struct can_bus_cfg){.bitrate_hz = 1000000}, &r->s);
     const struct psa2_can_port port = psa2_can_port(r->unit.board);
-    psa2_can_init(&r->can, &(struct board_can_cfg){.name = "a", .node_id = NODE}, &port, &r->bus, &r->s);
+    psa2_can_init(&r->can, &(struct board_can_cfg){.name = "a", .type = &psa2_board, .node_id = NODE}, &port, &r->bus,
+                  &r->s);
     psa2_attach(r->unit.board, &(struct psa2_host){&r->can, psa2_can_frame, psa2_can_fault});
     r->host = (struct can_node){.name = "host", .rx = on_any, .error = on_any, .ctx = r};
     can_attach(&r->bus, &r->host);
     psa2_power_up(r->unit.board, 0);
-    psa2_can_power_up(&r->can, 0);
+    board_node_power_up(&r->can, 0);
     run(r, 1000000);
     start(r);
     run(r, 200000000);
@@ -120,7 +122,7 @@ static void without_power_the_unit_is_off_the_bus_and_forgets(void **state)
     run(r, 100000000);
     assert_int_equal(r->count, from);
     psa2_power_up(r->unit.board, r->s.now_ns);
-    psa2_can_power_up(&r->can, r->s.now_ns);
+    board_node_power_up(&r->can, r->s.now_ns);
     run(r, 1000000);
     assert_int_equal(seen(r, 0x700 + NODE, from), 1); /* boot-up */
     start(r);
@@ -144,7 +146,7 @@ static void a_request_under_way_dies_with_the_power(void **state)
         run(r, 10000000);
         assert_false(r->can.request_busy);
         psa2_power_up(r->unit.board, r->s.now_ns);
-        psa2_can_power_up(&r->can, r->s.now_ns);
+        board_node_power_up(&r->can, r->s.now_ns);
         run(r, 200000000);
         assert_int_equal(seen(r, 0x80 + NODE, from), 0); /* no EMCY of the old life */
         assert_int_equal(seen(r, 0x580 + NODE, from), 0);
@@ -158,7 +160,7 @@ static void a_frame_on_the_wire_breaks_off_with_the_power(void **state)
 {
     (void)state;
     struct bench *r = up();
-    while (r->bus.phase != CAN_FRAME || r->bus.sender != &r->can.node.stream)
+    while (r->bus.phase != CAN_FRAME || r->bus.sender != &r->can.node.node.stream)
         sched_run_until(&r->s, sched_next_ns(&r->s));
     run(r, 20000);
     const unsigned from = r->count;
@@ -177,7 +179,7 @@ static void a_unit_that_comes_back_from_bus_off_says_so(void **state)
     run(r, 300000);
     const unsigned from = r->count;
     const int64_t off_ns = r->s.now_ns;
-    can_bus_off(&r->bus, &r->can.node.stream, off_ns); /* either queue: they have one controller */
+    can_bus_off(&r->bus, &r->can.node.node.stream, off_ns); /* either queue: they have one controller */
     run(r, 1407 * BIT_NS);
     assert_int_equal(r->count, from);
     run(r, 20000000);
@@ -193,10 +195,10 @@ static void an_error_passive_unit_says_so_and_when_it_is_over(void **state)
 {
     (void)state;
     struct bench *r = up();
-    can_bus_off(&r->bus, &r->can.node.services, r->s.now_ns);
+    can_bus_off(&r->bus, &r->can.node.node.services, r->s.now_ns);
     run(r, 20000000);
     struct can_fault f = {.kind = CAN_FAULT_ERROR,
-                          .from = &r->can.node.services,
+                          .from = &r->can.node.node.services,
                           .probability = 1.0,
                           .limit = 18,
                           .rng = rng_stream(1, 1, "fault")};
@@ -211,7 +213,7 @@ static void an_error_passive_unit_says_so_and_when_it_is_over(void **state)
     assert_true(errors(r, from) >= 18);
     run(r, 100000000);
     can_fault_remove(&r->bus, &f, r->s.now_ns);
-    assert_int_equal(r->can.node.services.tec, 0);
+    assert_int_equal(r->can.node.node.services.tec, 0);
 }
 
 int main(void)

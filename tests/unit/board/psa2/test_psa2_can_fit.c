@@ -147,14 +147,14 @@ static void samples_the_bus_does_not_take_are_counted_and_told(void **state)
     can_attach(&r->bus, &jammer);
     r->count = 0;
     struct can_msg single = {.len = 8}; /* an odd backlog: room for one half only, at the end */
-    assert_int_equal(co_pdo_offer(&r->can.node, PSA2_XY_TPDO, &single, r->s.now_ns), CO_PDO_SENT);
+    assert_int_equal(co_pdo_offer(&r->can.node.node, PSA2_XY_TPDO, &single, r->s.now_ns), CO_PDO_SENT);
     for (unsigned i = 0; i < 100; i++) {
         const struct can_msg m = {.id = 0x001, .len = 8};
         while (can_room(&jammer) > 0) assert_int_equal(can_send(&r->bus, &jammer, &m, r->s.now_ns), CAN_OK);
         board_sends(r, 1);
     }
-    assert_true(r->can.dropped > 80);
-    assert_true(co_node_has_error(&r->can.node, PSA2_EMCY_CAN_OVERRUN));
+    assert_true(r->can.node.dropped > 80);
+    assert_true(co_node_has_error(&r->can.node.node, PSA2_EMCY_CAN_OVERRUN));
     can_detach(&r->bus, &jammer);
     settle(r);
     assert_int_equal(count_id(r, 0x085), 1);

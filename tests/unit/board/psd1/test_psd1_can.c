@@ -42,7 +42,8 @@ static void start(const struct psd1_profile *p, uint32_t bitrate_hz)
     can_bus_init(&wire.bus, &(struct can_bus_cfg){.bitrate_hz = bitrate_hz}, &rig.s);
     wire.host = (struct can_node){.name = "host", .rx = on_frame};
     can_attach(&wire.bus, &wire.host);
-    psd1_board.can->init(&wire.can, &(struct board_can_cfg){.name = "a", .node_id = NODE}, &rig.b, &wire.bus, &rig.s);
+    psd1_board.can->init(&wire.can, &(struct board_can_cfg){.name = "a", .type = &psd1_board, .node_id = NODE}, &rig.b,
+                         &wire.bus, &rig.s);
     wire.stream = rig.b.host;
     psd1_attach(&rig.b, &(struct psd1_host){.ctx = &rig, .cycle = tee, .fault = NULL});
     rig.b.host.fault = NULL;
