@@ -7,8 +7,8 @@
 /* Bits: what follows a sender that stops in the middle (6 until the others detect it, flag, delimiter); what bus-off
  * waits for. */
 enum { BROKEN_BITS = 6 + 6 + 8, OFF_BITS = 11, OFF_TIMES = 128 };
-enum { SENDER_COST = 8, PASSIVE_ABOVE = 127, OFF_ABOVE = 255, REC_AFTER_PASSIVE = 120 };
-enum { CLASS_COUNTS = 0x200, RX_PASSIVE = 0x10, TX_PASSIVE = 0x20, ACTIVE_AGAIN = 0x40, BIT_SENT = 0x81, STUFF = 0x04 };
+enum { SENDER_COST = 8, WARNING_FROM = 96, PASSIVE_ABOVE = 127, OFF_ABOVE = 255, REC_AFTER_PASSIVE = 120 };
+enum { CLASS_COUNTS = 0x200, BIT_SENT = 0x81, STUFF = 0x04 };
 enum { IDEAL_HZ = 1000000 };
 
 int64_t can_nominal_ns(const struct can_bus *b, int64_t bits)
@@ -117,13 +117,18 @@ static void enter_bus_off(struct can_node *c, int64_t t_ns)
 static enum can_state error_state(const struct can_node *c)
 {
     if (c->tec > OFF_ABOVE) return CAN_STATE_BUS_OFF;
-    return c->tec > PASSIVE_ABOVE || c->rec > PASSIVE_ABOVE ? CAN_STATE_ERROR_PASSIVE : CAN_STATE_ERROR_ACTIVE;
+    if (c->tec > PASSIVE_ABOVE || c->rec > PASSIVE_ABOVE) return CAN_STATE_ERROR_PASSIVE;
+    return c->tec >= WARNING_FROM || c->rec >= WARNING_FROM ? CAN_STATE_ERROR_WARNING : CAN_STATE_ERROR_ACTIVE;
 }
 
 static uint8_t error_state_bits(const struct can_node *c)
 {
-    if (c->error_state == CAN_STATE_ERROR_ACTIVE) return ACTIVE_AGAIN;
-    return (uint8_t)((c->tec > PASSIVE_ABOVE ? TX_PASSIVE : 0) | (c->rec > PASSIVE_ABOVE ? RX_PASSIVE : 0));
+    if (c->error_state == CAN_STATE_ERROR_ACTIVE) return CAN_CONTROLLER_ACTIVE;
+    if (c->error_state == CAN_STATE_ERROR_PASSIVE)
+        return (uint8_t)((c->tec > PASSIVE_ABOVE ? CAN_CONTROLLER_TX_PASSIVE : 0) |
+                         (c->rec > PASSIVE_ABOVE ? CAN_CONTROLLER_RX_PASSIVE : 0));
+    return (uint8_t)((c->tec >= WARNING_FROM ? CAN_CONTROLLER_TX_WARNING : 0) |
+                     (c->rec >= WARNING_FROM ? CAN_CONTROLLER_RX_WARNING : 0));
 }
 
 /* After a change of the controller's counters. */

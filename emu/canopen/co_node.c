@@ -110,13 +110,14 @@ void co_node_error_end(struct co_node *n, uint16_t code, int64_t t_ns)
     if (co_node_error_register(n) == 0) send_emcy(n, 0, 0, t_ns);
 }
 
-/* CiA 301, table 26. While the controller is off the bus the messages wait in its queue. */
+/* CiA 301, table 26, which has no code for error warning: error-passive ends there. In bus-off the messages wait in the
+ * controller's queue. */
 static void controller_state(void *ctx, enum can_state s, int64_t t_ns)
 {
     struct co_node *n = ctx;
     if (s == CAN_STATE_ERROR_PASSIVE) co_node_error(n, EMCY_PASSIVE, EMCY_CAN_REGISTER, 3, t_ns);
     if (s == CAN_STATE_BUS_OFF) n->was_off = true;
-    if (s != CAN_STATE_ERROR_ACTIVE) return;
+    if (s > CAN_STATE_ERROR_WARNING) return;
     if (n->was_off) co_node_error(n, EMCY_RECOVERED, EMCY_CAN_REGISTER, 3, t_ns);
     n->was_off = false;
     co_node_error_end(n, EMCY_PASSIVE, t_ns);

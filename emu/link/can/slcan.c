@@ -82,3 +82,11 @@ size_t slcan_encode(const struct can_msg *m, char *out, size_t cap)
     for (size_t i = 0; i < bytes; i++) hex_put(out + 2 + id_digits + 2 * i, m->data[i], 2);
     return len;
 }
+
+uint8_t slcan_error_status(const struct can_msg *m)
+{
+    if (m->id & CAN_CLASS_PROTOCOL) return SLCAN_STATUS_BUS_ERROR;
+    if (!(m->id & CAN_CLASS_CONTROLLER)) return SLCAN_STATUS_PASSIVE; /* bus-off, or back from it */
+    if (m->data[1] & (CAN_CONTROLLER_RX_WARNING | CAN_CONTROLLER_TX_WARNING)) return SLCAN_STATUS_WARNING;
+    return m->data[1] & (CAN_CONTROLLER_RX_PASSIVE | CAN_CONTROLLER_TX_PASSIVE) ? SLCAN_STATUS_PASSIVE : 0;
+}

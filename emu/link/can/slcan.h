@@ -30,6 +30,18 @@ enum slcan_err slcan_decode(const char *line, size_t len, struct can_msg *out);
 /* Text without CR; 0 when cap is too small, the frame is not valid, or it is an error frame. */
 size_t slcan_encode(const struct can_msg *m, char *out, size_t cap);
 
+/* Bits of the answer to F. */
+enum {
+    SLCAN_STATUS_RX_FULL = 0x01,
+    SLCAN_STATUS_WARNING = 0x04,
+    SLCAN_STATUS_OVERRUN = 0x08,
+    SLCAN_STATUS_PASSIVE = 0x20, /* error-passive or bus-off */
+    SLCAN_STATUS_BUS_ERROR = 0x80
+};
+
+/* Those that an error message (can_error.h) sets. */
+uint8_t slcan_error_status(const struct can_msg *m);
+
 /* DLC of a data length (the next larger one for an odd length), and back (dlc 0..15). */
 uint8_t slcan_dlc(uint8_t len);
 uint8_t slcan_len(uint8_t dlc);

@@ -8,7 +8,6 @@
 #include <string.h>
 
 enum { OUT_MAX = 4 << 20, OUT_HIGH = 1 << 18 };
-enum { STATUS_RX_FULL = 0x01, STATUS_OVERRUN = 0x08, STATUS_PASSIVE = 0x20, STATUS_BUS_ERROR = 0x80 };
 
 static const uint32_t bitrate_hz[] = {10000, 20000, 50000, 100000, 125000, 250000, 500000, 800000, 1000000};
 
@@ -45,7 +44,7 @@ static void on_frame(void *ctx, const struct can_msg *m, int64_t t_ns)
         return;
     }
     s->can.dropped++;
-    s->status |= STATUS_RX_FULL | STATUS_OVERRUN;
+    s->status |= SLCAN_STATUS_RX_FULL | SLCAN_STATUS_OVERRUN;
     if (!s->lost_told) say(s, "slcan: the client reads too slowly, frames are being dropped");
     s->lost_told = true;
 }
@@ -54,7 +53,7 @@ static void on_error(void *ctx, const struct can_msg *m, int64_t t_ns)
 {
     struct slcan_pty *s = ctx;
     (void)t_ns;
-    s->status |= m->id & CAN_CLASS_PROTOCOL ? STATUS_BUS_ERROR : STATUS_PASSIVE;
+    s->status |= slcan_error_status(m);
 }
 
 static void on_stall(struct can_client *can)

@@ -3,7 +3,9 @@
  * Commands: S0..S8 bit rate and Y0..Y8 data bit rate in Mbit/s (accepted when the bus has that rate or none), O open, L
  * open to listen only, C close, V v version, N serial number, F status, Z0 Z1 time stamps (ms of the simulated minute),
  * and frames. Answers: CR done, z CR and Z CR frame queued, BEL refused. Refused: s (bit timing registers), M m
- * (acceptance filters), X, U. The protocol has no error frames: F shows them, bits 5 (passive or off the bus) and 7. The channel closes when the last program closes the port. */
+ * (acceptance filters), X, U. The protocol has no error frames: F shows
+ * them, bits 2 (error warning), 5 (error-passive or bus-off) and 7. The channel closes when the last program closes the
+ * port. */
 #ifndef PSABENCH_LINK_CAN_SLCAN_PTY_H
 #define PSABENCH_LINK_CAN_SLCAN_PTY_H
 

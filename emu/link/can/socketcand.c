@@ -141,12 +141,14 @@ const char *socketcand_strerror(enum socketcand_err err)
     return text[err];
 }
 
-const char *socketcand_class(uint32_t class)
+const char *socketcand_error_text(const struct can_msg *m)
 {
-    if (class & CAN_CLASS_BUS_OFF) return "this node is off the bus";
-    if (class & CAN_CLASS_RESTARTED) return "this node is back from bus-off";
-    if (class & CAN_CLASS_PROTOCOL) return "an error frame on the bus";
-    return "the state of this node's controller has changed";
+    if (m->id & CAN_CLASS_BUS_OFF) return "this node is off the bus";
+    if (m->id & CAN_CLASS_RESTARTED) return "this node is back from bus-off";
+    if (m->id & CAN_CLASS_PROTOCOL) return "an error frame on the bus";
+    if (m->data[1] & CAN_CONTROLLER_ACTIVE) return "this node is error-active";
+    const bool warning = m->data[1] & (CAN_CONTROLLER_RX_WARNING | CAN_CONTROLLER_TX_WARNING);
+    return warning ? "this node is in error warning" : "this node is error-passive";
 }
 
 /* Appends text; false when it does not fit. */

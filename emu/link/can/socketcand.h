@@ -46,8 +46,8 @@ struct socketcand_msg {
 /* msg is everything before the closing '>'; blanks around '<' are tolerated. out is untouched on error. */
 enum socketcand_err socketcand_decode(const char *msg, size_t len, struct socketcand_msg *out);
 
-/* Words for an error class of the bus. */
-const char *socketcand_class(uint32_t class);
+/* Text for an error message of the bus (can_error.h). */
+const char *socketcand_error_text(const struct can_msg *m);
 
 /* What is wrong and what would be right, without '<' and '>'. */
 const char *socketcand_strerror(enum socketcand_err err);

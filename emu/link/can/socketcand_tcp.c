@@ -99,7 +99,7 @@ static void on_error(void *ctx, const struct can_msg *m, int64_t t_ns)
     struct client *c = ctx;
     char text[80];
     if (c->phase == PHASE_LEAVING) return;
-    snprintf(text, sizeof text, "%s, TEC %u REC %u", socketcand_class(m->id), m->data[6], m->data[7]);
+    snprintf(text, sizeof text, "%s, TEC %u REC %u", socketcand_error_text(m), m->data[6], m->data[7]);
     tell_error(c, SOCKETCAND_ERROR_FLAG | m->id, text, t_ns);
 }
 

@@ -11,7 +11,7 @@
 enum { LOG_MAX = 1024, BIT_NS = 2000 }; /* 500 kbit/s */
 
 struct got {
-    char who, what; /* r: received, s: sent, e: error message, a p o: state */
+    char who, what; /* r: received, s: sent, e: error message, a w p o: state */
     struct can_msg m;
     int64_t t_ns;
 };
@@ -58,7 +58,7 @@ static inline void on_error(void *ctx, const struct can_msg *m, int64_t t_ns)
 
 static inline void on_state(void *ctx, enum can_state s, int64_t t_ns)
 {
-    note(ctx, "apo"[s], NULL, t_ns);
+    note(ctx, "awpo"[s], NULL, t_ns);
 }
 
 static inline void join(struct bench *r, struct station *st, char name, struct can_node *of)

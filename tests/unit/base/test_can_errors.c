@@ -34,7 +34,7 @@ static void a_destroyed_frame_is_sent_again(void **state)
     assert_false(r->bus.degraded);
 }
 
-/* 16 errors: 128, error-passive; 32: 256, off the bus; 128 x 11 bits: back, and what has waited goes. */
+/* 12 errors: 96, error warning; 16: 128, error-passive; 32: 256, off the bus; 128 x 11 bits: back, and what has waited goes. */
 static void a_node_whose_frames_all_fail_leaves_the_bus_and_comes_back(void **state)
 {
     (void)state;
@@ -46,7 +46,10 @@ static void a_node_whose_frames_all_fail_leaves_the_bus_and_comes_back(void **st
     send(r, &r->second, 0x100); /* the other queue of the same controller */
     run(r, 30000000);
     assert_int_equal(r->bus.error_frames, 32);
+    assert_int_equal(count(r, 'A', 'w'), 1);
+    assert_int_equal(entry(r, 'A', 'w', 0)->t_ns, entry(r, 'B', 'e', 11)->t_ns);
     assert_int_equal(count(r, 'A', 'p'), 1);
+    assert_int_equal(entry(r, 'A', 'p', 0)->t_ns, entry(r, 'B', 'e', 15)->t_ns);
     assert_int_equal(count(r, 'A', 'o'), 1);
     assert_int_equal(count(r, 'S', 'o'), 1);
     assert_int_equal(entry(r, 'A', 'o', 0)->t_ns, entry(r, 'B', 'e', 31)->t_ns);
@@ -73,12 +76,82 @@ static void the_states_are_told_in_classes_of_the_kernel(void **state)
     for (unsigned k = 0; k < count(r, 'A', 'e'); k++) {
         const struct can_msg *m = &entry(r, 'A', 'e', k)->m;
         seen |= m->id;
-        if (m->id == (CAN_CLASS_CONTROLLER | 0x200)) assert_int_equal(m->data[1], 0x20);
-        if (m->id == (CAN_CLASS_CONTROLLER | 0x200)) assert_int_equal(m->data[6], 128);
+        if (m->id == (CAN_CLASS_CONTROLLER | 0x200)) assert_int_equal(m->data[1], m->data[6] == 96 ? 0x08 : 0x20);
+        if (m->id == (CAN_CLASS_CONTROLLER | 0x200)) assert_true(m->data[6] == 96 || m->data[6] == 128);
         if (m->id == (CAN_CLASS_RESTARTED | 0x200)) assert_int_equal(m->data[1], 0x40);
     }
     assert_int_equal(seen, 0x200 | CAN_CLASS_CONTROLLER | CAN_CLASS_PROTOCOL | CAN_CLASS_BUS_ERROR | CAN_CLASS_BUS_OFF |
                                CAN_CLASS_RESTARTED);
+    can_fault_remove(&r->bus, &f, r->s.now_ns);
+}
+
+/* The k-th message to this station about the state of its controller. */
+static const struct can_msg *controller_message(const struct bench *r, char who, unsigned k)
+{
+    for (unsigned i = 0; i < count(r, who, 'e'); i++) {
+        const struct can_msg *m = &entry(r, who, 'e', i)->m;
+        if (m->id == (CAN_CLASS_CONTROLLER | 0x200) && k-- == 0) return m;
+    }
+    fail_msg("%c: no such message", who);
+    return NULL;
+}
+
+static void send_some(struct bench *r, struct station *st, unsigned frames)
+{
+    for (unsigned i = 0; i < frames; i++) send(r, st, 0x100);
+    run(r, 20000000);
+}
+
+/* A sender: 11 errors 88, 12 errors 96; a frame that passes gives 95. */
+static void transmit_errors_cross_96_up_and_down(void **state)
+{
+    (void)state;
+    struct bench *r = up(500000);
+    struct can_fault f = fault(CAN_FAULT_ERROR);
+    f.from = &r->a.node;
+    f.limit = 11;
+    can_fault_add(&r->bus, &f);
+    send_some(r, &r->a, 1);
+    assert_int_equal(r->a.node.tec, 87);
+    assert_int_equal(count(r, 'A', 'w'), 0);
+    f.limit = 12;
+    send_some(r, &r->a, 1); /* 95 */
+    assert_int_equal(count(r, 'A', 'w'), 0);
+    f.limit = 13;
+    send_some(r, &r->a, 1); /* 94 + 8 = 102, 101 */
+    assert_int_equal(r->a.node.error_state, CAN_STATE_ERROR_WARNING);
+    assert_int_equal(count(r, 'A', 'w'), 1);
+    assert_int_equal(count(r, 'S', 'w'), 1); /* the other queue of the same controller */
+    assert_int_equal(controller_message(r, 'A', 0)->data[1], CAN_CONTROLLER_TX_WARNING);
+    send_some(r, &r->a, 5);
+    assert_int_equal(r->a.node.tec, 96);
+    assert_int_equal(r->a.node.error_state, CAN_STATE_ERROR_WARNING);
+    send_some(r, &r->a, 1);
+    assert_int_equal(r->a.node.error_state, CAN_STATE_ERROR_ACTIVE);
+    assert_int_equal(count(r, 'A', 'a'), 1);
+    assert_int_equal(controller_message(r, 'A', 1)->data[1], CAN_CONTROLLER_ACTIVE);
+    assert_int_equal(controller_message(r, 'A', 1)->data[6], 95);
+    can_fault_remove(&r->bus, &f, r->s.now_ns);
+}
+
+/* A receiver: 95 + 1 = 96; error-passive goes back to 120, which is in warning. */
+static void receive_errors_cross_96_and_end_error_passive_in_warning(void **state)
+{
+    (void)state;
+    struct bench *r = up(500000);
+    struct can_fault f = fault(CAN_FAULT_ERROR);
+    f.limit = 1;
+    can_fault_add(&r->bus, &f);
+    r->b.node.rec = 95;
+    r->c.node.rec = 127;
+    send_some(r, &r->a, 1);
+    assert_int_equal(controller_message(r, 'B', 0)->data[1], CAN_CONTROLLER_RX_WARNING);
+    assert_int_equal(controller_message(r, 'B', 0)->data[7], 96);
+    assert_int_equal(controller_message(r, 'B', 1)->data[1], CAN_CONTROLLER_ACTIVE);
+    assert_int_equal(controller_message(r, 'C', 0)->data[1], CAN_CONTROLLER_RX_PASSIVE);
+    assert_int_equal(controller_message(r, 'C', 1)->data[1], CAN_CONTROLLER_RX_WARNING);
+    assert_int_equal(controller_message(r, 'C', 1)->data[7], 120);
+    assert_int_equal(r->c.node.error_state, CAN_STATE_ERROR_WARNING);
     can_fault_remove(&r->bus, &f, r->s.now_ns);
 }
 
@@ -204,6 +277,8 @@ int main(void)
         cmocka_unit_test(a_destroyed_frame_is_sent_again),
         cmocka_unit_test(a_node_whose_frames_all_fail_leaves_the_bus_and_comes_back),
         cmocka_unit_test(the_states_are_told_in_classes_of_the_kernel),
+        cmocka_unit_test(transmit_errors_cross_96_up_and_down),
+        cmocka_unit_test(receive_errors_cross_96_and_end_error_passive_in_warning),
         cmocka_unit_test(an_error_passive_sender_waits_eight_bits_more),
         cmocka_unit_test(bus_off_counts_eleven_bits_at_each_end_of_a_frame),
         cmocka_unit_test(a_sender_that_goes_off_the_bus_breaks_its_frame),

@@ -230,6 +230,27 @@ static void emcy_tells_a_condition_once_and_its_end(void **state)
     assert_int_equal(m->data[2], 0);
 }
 
+/* CiA 301 has no emergency for error warning; error-passive ends there. */
+static void error_warning_sends_no_emcy_and_ends_error_passive(void **state)
+{
+    (void)state;
+    struct rig *r = rig_up();
+    struct can_node *n = &r->node.services;
+    n->state(n->ctx, CAN_STATE_ERROR_WARNING, r->s.now_ns);
+    settle(r);
+    r->at = 1; /* after boot-up */
+    assert_null(next(r));
+    n->state(n->ctx, CAN_STATE_ERROR_PASSIVE, r->s.now_ns);
+    settle(r);
+    assert_int_equal(bits_get_le(next(r)->data, 2), 0x8120);
+    n->state(n->ctx, CAN_STATE_ERROR_WARNING, r->s.now_ns);
+    settle(r);
+    assert_int_equal(bits_get_le(next(r)->data, 2), 0);
+    n->state(n->ctx, CAN_STATE_ERROR_ACTIVE, r->s.now_ns);
+    settle(r);
+    assert_null(next(r));
+}
+
 static void error_history_has_the_latest_first_and_can_be_cleared(void **state)
 {
     (void)state;
@@ -443,6 +464,7 @@ int main(void)
         cmocka_unit_test(stopped_is_deaf_to_all_but_nmt),
         cmocka_unit_test(stopping_ends_a_transfer),
         cmocka_unit_test(emcy_tells_a_condition_once_and_its_end),
+        cmocka_unit_test(error_warning_sends_no_emcy_and_ends_error_passive),
         cmocka_unit_test(error_history_has_the_latest_first_and_can_be_cleared),
         cmocka_unit_test(every_object_can_be_read_and_read_only_ones_not_written),
         cmocka_unit_test(constants_that_name_the_node_carry_its_id),

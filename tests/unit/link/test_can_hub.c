@@ -144,6 +144,30 @@ static void an_error_frame_is_told_in_words_and_class(void **state)
     down(r);
 }
 
+static void a_client_reads_the_state_of_its_controller(void **state)
+{
+    (void)state;
+    static const char *const text_of[] = {"this node is in error warning, TEC 0 REC 96",
+                                          "this node is error-passive, TEC 0 REC 128"};
+    struct bench *r = up();
+    struct can_fault f = {.kind = CAN_FAULT_ERROR, .probability = 1.0, .limit = 1, .rng = rng_stream(1, 1, "fault")};
+    char text[1024];
+    can_fault_add(&r->bus, &f);
+    for (unsigned i = 0; i < COUNT(text_of); i++) {
+        client(r)->node.rec = (uint16_t)(i ? 127 : 95);
+        f.limit = i + 1;
+        send_other(r, 0x123);
+        turn(r);
+        read_text(r->fd, text, sizeof text);
+        assert_non_null(strstr(text, "< error 20000204 "));
+        assert_non_null(strstr(text, text_of[i]));
+        assert_non_null(
+            strstr(text, i ? "in error warning, TEC 0 REC 120" : "this node is error-active, TEC 0 REC 95"));
+    }
+    can_fault_remove(&r->bus, &f, r->s.now_ns);
+    down(r);
+}
+
 static void a_client_off_the_bus_hears_it_and_comes_back(void **state)
 {
     (void)state;
@@ -211,6 +235,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(an_error_frame_is_told_in_words_and_class),
+        cmocka_unit_test(a_client_reads_the_state_of_its_controller),
         cmocka_unit_test(a_client_off_the_bus_hears_it_and_comes_back),
         cmocka_unit_test(a_stalled_client_gets_nothing_and_nobody_waits_for_it),
         cmocka_unit_test(a_stall_that_lasts_loses_frames_and_counts_them),

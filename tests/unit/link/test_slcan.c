@@ -131,6 +131,28 @@ static void dlc_and_length_follow_the_fd_table(void **state)
     assert_int_equal(slcan_dlc(9), 9); /* the next larger one */
 }
 
+static void status_bits_show_the_controller_state(void **state)
+{
+    (void)state;
+    static const struct {
+        uint32_t id;
+        uint8_t controller, status;
+    } status_rows[] = {
+        {CAN_CLASS_PROTOCOL | CAN_CLASS_BUS_ERROR, 0, 0x80},
+        {CAN_CLASS_CONTROLLER, CAN_CONTROLLER_RX_WARNING, 0x04},
+        {CAN_CLASS_CONTROLLER, CAN_CONTROLLER_TX_WARNING, 0x04},
+        {CAN_CLASS_CONTROLLER, CAN_CONTROLLER_RX_PASSIVE, 0x20},
+        {CAN_CLASS_CONTROLLER, CAN_CONTROLLER_TX_PASSIVE, 0x20},
+        {CAN_CLASS_CONTROLLER, CAN_CONTROLLER_ACTIVE, 0x00},
+        {CAN_CLASS_BUS_OFF, 0, 0x20},
+        {CAN_CLASS_RESTARTED, CAN_CONTROLLER_ACTIVE, 0x20},
+    };
+    for (size_t i = 0; i < COUNT(status_rows); i++) {
+        const struct can_msg m = {.id = status_rows[i].id, .flags = CAN_ERROR, .len = 8, .data = {0, status_rows[i].controller}};
+        assert_int_equal(slcan_error_status(&m), status_rows[i].status);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -140,6 +162,7 @@ int main(void)
         cmocka_unit_test(what_is_no_frame_has_no_text),
         cmocka_unit_test(random_bytes_are_refused_or_round_trip),
         cmocka_unit_test(dlc_and_length_follow_the_fd_table),
+        cmocka_unit_test(status_bits_show_the_controller_state),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
