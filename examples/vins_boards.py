@@ -12,9 +12,11 @@ from collections.abc import Iterable
 from typing import Any, Protocol
 
 import numpy as np
+from psabench.boards.pik.device import Pik
 from psabench.boards.pmka import estimate as est
+from psabench.boards.pmka.device import Pmka
+from psabench.boards.psd1.device import Psd1
 from psabench.boards.readings import Readings
-from psabench.boards.registry import Pik, Pmka, Psd1
 from psabench.errors import LinkError
 from psabench.link.busport import BusPort
 from psabench.link.can_host import CanHost, WallClock, open_bus

@@ -21,7 +21,7 @@ sys.path[:0] = [str(ROOT / "scripts")]
 
 from psabench import Bench  # noqa: E402 of this tree
 from psabench.boards.pmka import estimate as est  # noqa: E402
-from psabench.boards.registry import Pmka  # noqa: E402
+from psabench.boards.pmka.device import Pmka  # noqa: E402
 from psabench.link.signals import Floats  # noqa: E402
 from psabench.report import plots as report_plots  # noqa: E402 of this tree
 

@@ -26,8 +26,9 @@ from typing import Any, TypeVar
 
 from can.interfaces.slcan import slcanBus
 
-from psabench.board_names import DBC_NODE
-from psabench.boards.registry import Psa2, identify, of_board
+from psabench.boards.devices import identify, of_board
+from psabench.boards.psa2.device import Psa2
+from psabench.boards.registry import DBC_NODE
 from psabench.boards.unit import Unit
 from psabench.emulator import Emulator, Forked
 from psabench.errors import BadInput, BenchError, ControlError, TimeOut

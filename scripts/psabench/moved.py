@@ -10,12 +10,10 @@ from types import ModuleType
 
 NAMES = {
     "device": "boards.psa2.device",
-    "devices": "boards.registry",
+    "devices": "boards.devices",
     "frames": "boards.psa2.frames",
     "readings": "boards.readings",
     "unit": "boards.unit",
-    "estimate.pik": "boards.pik.estimate",
-    "estimate.pmka": "boards.pmka.estimate",
     "busport": "link.busport",
     "can_host": "link.can_host",
     "can_log": "link.can_log",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from psabench.board_names import ALIASES, BOARDS
+from psabench.boards.registry import NAMES, of_name
 from psabench.errors import BadInput
 
 LINE_HZ = 8_000_000.0  # psabench.link.lineport.SAMPLE_HZ, without loading NumPy
@@ -64,10 +64,10 @@ def positive(text: str) -> float:
 
 def board_name(text: str) -> str:
     """A board; another name of it, as psa1 or pik5, is that of the board."""
-    board = ALIASES.get(text, text)
-    if board not in BOARDS:
-        raise argparse.ArgumentTypeError(f"{text!r}; expected {', '.join([*BOARDS, *ALIASES])}")
-    return board
+    board = of_name(text)
+    if board is None:
+        raise argparse.ArgumentTypeError(f"{text!r}; expected {', '.join(NAMES)}")
+    return board.name
 
 
 def node_id(text: str) -> int:
@@ -78,7 +78,7 @@ def node_id(text: str) -> int:
 
 def add_board(p: argparse.ArgumentParser, what: str) -> None:
     """--board and --node of the unit `what`."""
-    names = ", ".join([*BOARDS, *ALIASES])
+    names = ", ".join(NAMES)
     text = f"board of the unit {what}: {names} (%(default)s)"
     p.add_argument("--board", type=board_name, metavar="BOARD", default="psa2", help=text)
     p.add_argument("--node", type=node_id, help=f"node {what} (the board's usual one)")

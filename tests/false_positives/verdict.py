@@ -17,8 +17,9 @@ from pathlib import Path
 from typing import Any
 
 from psabench.bench import scpi_addresses
+from psabench.boards.registry import BUS_BOARDS
 from psabench.conform import runner
-from psabench.conform.dut import BUS_BOARDS, INPUTS_V, UNIT, Addresses, Subject, scenario
+from psabench.conform.dut import INPUTS_V, UNIT, Addresses, Subject, scenario
 from psabench.conform.profile import variant
 from psabench.conform.verdict import Outcome, Verdict
 from psabench.emulator import Emulator

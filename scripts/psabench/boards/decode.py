@@ -12,9 +12,10 @@ import can
 import numpy as np
 from can.io.player import MESSAGE_READERS
 
+from psabench.boards.devices import of_board, reader_of
+from psabench.boards.psa2.device import Psa2
 from psabench.boards.psa2.frames import FrameReader, Frames
 from psabench.boards.readings import ReadingReader, Readings
-from psabench.boards.registry import Psa2, of_board, reader_of
 from psabench.errors import BadInput
 from psabench.link.lineport import LineDecoder, LineFormat, decode_stream
 from psabench.link.protocol_files import dbc_node, message

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from psabench.boards.registry import BUS_BOARDS, NAMES, PLAYED
 from psabench.conform.defaults import LINKS, MAX_S, OUT
 from psabench.options import BUS_HELP, LINE_HZ, Help, Parser
 
@@ -87,7 +88,7 @@ def _add_device(suites: Any) -> None:
     at.add_argument("--can", metavar="BUS", help=BUS_HELP)
     at.add_argument("--lines", type=Path, metavar="PORT", help="line port: pseudo-terminal or adapter of that kind")
     at.add_argument("--line-hz", type=float, default=LINE_HZ, metavar="HZ", help="its samples a second (%(default)g)")
-    at.add_argument("--bus-port", type=Path, metavar="PORT", help="bus port of PSD-1, PMKA and PIK")
+    at.add_argument("--bus-port", type=Path, metavar="PORT", help=f"bus port of {', '.join(BUS_BOARDS)}")
     at.add_argument(
         "--scpi", action="append", default=[], metavar="NAME=ADDRESS", help="an instrument: supply=TCPIP::..."
     )
@@ -161,9 +162,7 @@ def _add_host(suites: Any) -> None:
     how.add_argument("--manual", choices=list(LINKS), help="it is started by hand when we say so, at this link")
     p.add_argument("--results", type=Path, metavar="FILE", help="with --manual: the file that the program tells into")
     p.add_argument("--port", type=int, default=29536, help="with --manual can: of socketcand, each time (%(default)s)")
-    p.add_argument(
-        "--board", default="psa2", help="that is played: psa2, psa1, psd1, pmka, pik, pik5, pik6 (%(default)s)"
-    )
+    p.add_argument("--board", default="psa2", help=f"that is played: {', '.join(PLAYED)} (%(default)s)")
     p.add_argument("--profile", help="of the board (article for psa2, else of its own name)")
     p.add_argument("--only", nargs="+", default=[], metavar="ID", help="requirements, or beginnings: HOST-LOST")
     p.add_argument("--case", nargs="+", default=[], metavar="NAME", help="these cases alone (docs/conform_host.md)")
@@ -184,7 +183,7 @@ def _add_list(suites: Any) -> None:
 
 
 def _add_board(p: argparse.ArgumentParser) -> None:
-    p.add_argument("--board", required=True, help="psa2, psa1, psd1, pmka, pik, pik5, pik6 or gyro")
+    p.add_argument("--board", required=True, help=", ".join(NAMES))
     p.add_argument("--profile", help="which of its profiles it is said to have (psa-emu --list-profiles)")
 
 

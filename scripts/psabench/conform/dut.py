@@ -16,7 +16,8 @@ from types import TracebackType
 from typing import Any
 
 from psabench.bench import Bench
-from psabench.boards.registry import of_board
+from psabench.boards.devices import of_board
+from psabench.boards.registry import BOARDS
 from psabench.boards.unit import Unit
 from psabench.conform.capture.log import CanFrame, CanLog, Evidence, LineLog, Marks, apart
 from psabench.conform.probes import LineProbe, PinProbe, PortProbe
@@ -34,9 +35,6 @@ HOSTLESS_SETUP_S = 0.3  # of a board that is not read: nothing tells that it is 
 INPUTS_V: Mapping[str, float] = {"x": 2.0101, "y": -1.3007, "z": 0.7003}
 # Links of python-can whose time stamps are this machine's: they say when it looked, not when the frame passed.
 BY_THE_HOST_S_CLOCK = ("slcanBus", "SocketcanBus", "UdpMulticastBus", "VirtualBus", "SerialBus")
-BUS_BOARDS = ("psd1", "pmka", "pik")  # boards with a parallel bus
-OVERDRIVE_V_PER_G = 9.0  # of the accelerometer X of a PIK, which a dividing head can turn
-THERMOMETERS = ("psa2", "pmka")  # boards whose temperatures are compared with a chamber's
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -275,7 +273,7 @@ class Subject:
             line, bus = folder / "line", folder / "bus"
             extra: list[str | Path] = ["--vcd-unit", "1"]
             extra += ["--line", line]  # which samples nothing while no one has it open
-            extra += ["--bus-port", f"{UNIT}:{bus}"] if variant.family in BUS_BOARDS else []
+            extra += ["--bus-port", f"{UNIT}:{bus}"] if BOARDS[variant.family].bus else []
             bench = Bench.start(path, seed=seed, can=at.adapter, extra=extra)
             stack.callback(bench.close)
             probe: LineProbe
@@ -285,22 +283,13 @@ class Subject:
             else:
                 probe = pins = PinProbe(bench, UNIT)
                 stack.callback(pins.close)
-            port = stack.enter_context(BusPort(bus, advance=bench.wait)) if variant.family in BUS_BOARDS else None
-            inputs_v = {} if variant.family == "gyro" else at.inputs_v
+            port = stack.enter_context(BusPort(bus, advance=bench.wait)) if BOARDS[variant.family].bus else None
+            inputs_v = at.inputs_v if BOARDS[variant.family].has_inputs else {}
             subject = cls(bench, variant, probe, port, inputs_v, line_port)
             subject._stack = stack.pop_all()
         return subject
 
 
-# Frequencies of a profile that follow from the board's own clocks: an error of its clocks scales them. Of the others a
-# profile cannot say it: PIK's clock is whole Hz, the steps of a gyro unit are what it counts its seconds by.
-CLOCKS: Mapping[str, tuple[str, ...]] = {
-    "psa2": ("fclk_hz", "temp_clkin_hz", "sclk_hz", "line_hz"),
-    "psd1": ("adc_clkin_hz",),
-    "pmka": ("ts_ns",),  # a period
-}
-AT_THEIR_FASTEST = ("psd1",)  # the part's clock is at its limit
-CRYSTALS: Mapping[str, str] = {"pik": "clock_tol_ppm"}  # what a specimen's clock is off by, drawn
 SENSITIVITIES = ("kx_v_per_g", "ky_v_per_g", "kz_v_per_g", "kxy_v_per_g2", "drift_v_per_s", "reading_noise_v")
 PPM = 1e-6
 # What a gyro unit is on: the platform without errors, as it was left; the PSA-2 that measures its level.
@@ -329,7 +318,8 @@ LEVEL: Mapping[str, Any] = {
 
 def has_clock(variant: Variant, clock_ppm: float) -> bool:
     """Whether a profile of this board can have clocks that are fast by as much."""
-    return variant.family in CLOCKS and not (clock_ppm > 0.0 and variant.family in AT_THEIR_FASTEST)
+    board = BOARDS[variant.family]
+    return bool(board.clocks) and not (clock_ppm > 0.0 and board.clock_at_limit)
 
 
 def scenario(
@@ -342,19 +332,20 @@ def scenario(
     """
     axes = {axis: {"sensor": "mems", "u0_v": v, **dict.fromkeys(SENSITIVITIES, 0.0)} for axis, v in inputs_v.items()}
     unit: dict[str, Any] = {"name": UNIT, "board": variant.family, "profile": variant.profile, "axes": axes}
-    clocks: dict[str, float] = {CRYSTALS[variant.family]: 0.0} if still and variant.family in CRYSTALS else {}
+    board = BOARDS[variant.family]
+    clocks: dict[str, float] = {board.crystal: 0.0} if still and board.crystal else {}
     if clock_ppm:
-        clocks |= {key: _off(key, variant[key], clock_ppm) for key in CLOCKS[variant.family]}
+        clocks |= {key: _off(key, variant[key], clock_ppm) for key in board.clocks}
     if clocks:
         unit["profile_set"] = clocks
-    if variant.family == "gyro":
+    if not board.has_inputs:
         del unit["axes"]
         return {"supply": {}, "start": True, **PLATFORM, "units": [unit | {"level": LEVEL["name"]}, LEVEL]}
-    around: dict[str, Any] = {"chamber": {}} if variant.family in THERMOMETERS else {}
-    if variant.family == "psd1":  # it has gyros
+    around: dict[str, Any] = {"chamber": {}} if board.has_thermometer else {}
+    if board.on_table:
         unit["on"], around["table"] = "table", {}
-    if variant.family == "pik" and "x" in axes:  # nothing at 0 deg; beyond full scale at -90 deg
-        axes["x"]["kx_v_per_g"], around["head"] = OVERDRIVE_V_PER_G, {}
+    if board.overdrive_v_per_g and "x" in axes:  # nothing at 0 deg; beyond full scale at -90 deg
+        axes["x"]["kx_v_per_g"], around["head"] = board.overdrive_v_per_g, {}
     return {"supply": {}, **around, "units": [unit]}
 
 

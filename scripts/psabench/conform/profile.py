@@ -12,11 +12,9 @@ from typing import Any
 
 import yaml
 
-from psabench.board_names import ALIASES, BOARDS
+from psabench.boards.registry import ALIASES, NAMES, of_name
 from psabench.errors import BadInput
 from psabench.places import proto_file
-
-FIRST: Mapping[str, str] = {"psa2": "article"}  # profile of a board where none is named; others: of the same name
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,10 +40,11 @@ class Variant:
 
 def variant(board: str, profile: str | None = None) -> Variant:
     """Raises BadInput for a board or a profile that there is not, or a profile of another board."""
-    family = ALIASES.get(board, board)
-    if family not in BOARDS:
-        raise BadInput(f"no such board: {board}; there are {', '.join([*BOARDS, *ALIASES])}")
-    name = profile or FIRST.get(board, board)
+    known = of_name(board)
+    if known is None:
+        raise BadInput(f"no such board: {board}; there are {', '.join(NAMES)}")
+    family = known.name
+    name = profile or (known.profile if board == family and known.profile else board)
     figures = _figures(name)
     of = figures.get("board", "psa2")
     if ALIASES.get(of, of) != family:

@@ -12,8 +12,8 @@ import can
 from can.io.generic import MessageWriter
 from can.io.logger import MESSAGE_WRITERS
 
+from psabench.boards.devices import reader_of
 from psabench.boards.psa2.frames import FrameCounters
-from psabench.boards.registry import reader_of
 from psabench.errors import BadInput, LinkError
 from psabench.link.can_host import CanHost, Message, WallClock
 

@@ -13,7 +13,7 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
-from psabench.board_names import DBC_NODE
+from psabench.boards.registry import DBC_NODE
 from psabench.errors import BadInput
 from psabench.instruments import EXAMPLES
 from psabench.options import Help, Parser, natural, node_id, positive, yes_no

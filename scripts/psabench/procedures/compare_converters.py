@@ -16,10 +16,12 @@ import numpy.typing as npt
 
 from psabench.bench import Bench
 from psabench.boards.pik import estimate as pik
+from psabench.boards.pik.device import Pik
 from psabench.boards.pmka import estimate as pmka
-from psabench.boards.psd1.device import FULL_SCALE_V, OFFSET_BINARY, volts
+from psabench.boards.pmka.device import Pmka
+from psabench.boards.psa2.device import Psa2
+from psabench.boards.psd1.device import FULL_SCALE_V, OFFSET_BINARY, Psd1, volts
 from psabench.boards.readings import Readings
-from psabench.boards.registry import Pik, Pmka, Psa2, Psd1
 from psabench.boards.unit import Unit
 from psabench.errors import BadInput, LinkError
 from psabench.procedures.head_bench import Progress

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from psabench.bench import Bench
-from psabench.boards.registry import Gyro
+from psabench.boards.gyro.device import Gyro
 from psabench.errors import BadInput
 from psabench.procedures import gyrocompass, heading_hold
 from psabench.procedures.gyro_params import ReadingParams

@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from psabench.boards.gyro.device import Flag, Mode
+from psabench.boards.gyro.device import Flag, Gyro, Mode
+from psabench.boards.psa2.device import Psa2
 from psabench.boards.psa2.frames import Frames
 from psabench.boards.readings import Readings
-from psabench.boards.registry import Gyro, Psa2
 from psabench.boards.unit import NMT_PREOP
 from psabench.errors import LinkError
 from psabench.link.can_log import Logged

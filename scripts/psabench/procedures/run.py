@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from psabench.bench import Bench
-from psabench.board_names import DBC_NODE
+from psabench.boards.registry import DBC_NODE
 from psabench.errors import BadInput
 from psabench.instruments import EXAMPLES
 from psabench.procedures.head_bench import Progress, Watch

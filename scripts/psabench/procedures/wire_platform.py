@@ -14,10 +14,10 @@ import numpy as np
 import numpy.typing as npt
 
 from psabench.bench import Bench
-from psabench.boards.gyro.device import Flag, Mode, Phase
+from psabench.boards.gyro.device import Flag, Gyro, Mode, Phase
 from psabench.boards.gyro.watch import FLAG_WORDS, NavigationWatch
+from psabench.boards.psa2.device import Psa2
 from psabench.boards.readings import Readings
-from psabench.boards.registry import Gyro, Psa2
 from psabench.errors import BenchError, LinkError
 from psabench.estimate.angles import wrapped_deg
 from psabench.link import signals as bits

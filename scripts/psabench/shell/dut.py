@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from psabench.bench import Bench
+from psabench.boards.psa2.device import Psa2
 from psabench.boards.psa2.frames import Form, Frames
 from psabench.boards.readings import Readings
-from psabench.boards.registry import Psa2
 from psabench.boards.unit import BANKS, Unit
 from psabench.errors import CycleRefused
 from psabench.shell import registers

@@ -12,8 +12,9 @@ from pathlib import Path
 
 import pytest
 from psabench.bench import scpi_addresses
+from psabench.boards.registry import BUS_BOARDS
 from psabench.conform import suite
-from psabench.conform.dut import BUS_BOARDS, INPUTS_V, UNIT, Addresses, Subject, scenario
+from psabench.conform.dut import INPUTS_V, UNIT, Addresses, Subject, scenario
 from psabench.conform.profile import Variant, variant
 from psabench.conform.runner import run
 from psabench.conform.verdict import Outcome, Verdict

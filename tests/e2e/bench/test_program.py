@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from psabench import Bench
 from psabench.bench import NS
-from psabench.boards.registry import Psa2
+from psabench.boards.psa2.device import Psa2
 from psabench.emulator import Emulator
 from psabench.errors import BadInput, BenchError, ControlError, InstrumentError, TimeOut
 from psabench.estimate.face import Face

@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 from board_units import NODES, SCENARIO, SETUP_S
 from canopen.objectdictionary import ODArray, ODRecord
-from psabench.boards.registry import Pik, Pmka, Psd1
+from psabench.boards.pik.device import Pik
+from psabench.boards.pmka.device import Pmka
+from psabench.boards.psd1.device import Psd1
 from psabench.boards.unit import BusUnit, Unit
 from psabench.errors import CycleRefused, DeviceError, LinkError
 from psabench.link.busport import BusPort, Cycle

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from psabench import Bench
 from psabench.boards.pmka import estimate as est
-from psabench.boards.registry import Pmka
+from psabench.boards.pmka.device import Pmka
 from psabench.errors import CycleRefused
 from rig import HERE
 

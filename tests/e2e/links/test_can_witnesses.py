@@ -20,7 +20,11 @@ import canopen
 import pytest
 from canopen.objectdictionary.datatypes import NUMBER_TYPES
 from cantools.database import Database
-from psabench.boards.registry import Gyro, Pik, Pmka, Psa2, Psd1
+from psabench.boards.gyro.device import Gyro
+from psabench.boards.pik.device import Pik
+from psabench.boards.pmka.device import Pmka
+from psabench.boards.psa2.device import Psa2
+from psabench.boards.psd1.device import Psd1
 from psabench.boards.unit import NMT_PREOP, NMT_START, TPDO_OFF, Unit
 from psabench.emulator import Emulator
 from psabench.errors import DeviceError

@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 from psabench import cli
 from psabench.bench import Bench
-from psabench.boards.gyro.device import Mode
-from psabench.boards.registry import Gyro, Psa2
+from psabench.boards.gyro.device import Gyro, Mode
+from psabench.boards.psa2.device import Psa2
 from psabench.errors import DeviceError, LinkError
 from psabench.places import proto_file
 from psabench.procedures import gyrocompass as g

@@ -9,8 +9,7 @@ from typing import Any
 
 import pytest
 from psabench import Bench
-from psabench.boards.gyro.device import Flag, Mode, SelfTest
-from psabench.boards.registry import Gyro
+from psabench.boards.gyro.device import Flag, Gyro, Mode, SelfTest
 from psabench.errors import DeviceError, LinkError
 from psabench.places import proto_file
 from psabench.procedures import gyrocompass

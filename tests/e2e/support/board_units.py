@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from psabench.boards.registry import Pik, Pmka, Psa2, Psd1
+from psabench.boards.pik.device import Pik
+from psabench.boards.pmka.device import Pmka
+from psabench.boards.psa2.device import Psa2
+from psabench.boards.psd1.device import Psd1
 from psabench.boards.unit import Unit
 from rig import HERE
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from psabench.boards.registry import of_board
+from psabench.boards.devices import of_board
 from psabench.boards.unit import Unit
 from psabench.emulator import Emulator
 from psabench.link.can_host import CanHost, Message, StepClock, open_bus

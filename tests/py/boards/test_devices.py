@@ -8,11 +8,14 @@ from typing import Any
 import can
 import numpy as np
 import pytest
-from psabench.boards import registry as devices
-from psabench.boards import unit
-from psabench.boards.psd1.device import volts
+from psabench.boards import devices, unit
+from psabench.boards.devices import all_devices, identify, of_board
+from psabench.boards.gyro.device import Gyro
+from psabench.boards.pik.device import Pik
+from psabench.boards.pmka.device import Pmka
+from psabench.boards.psa2.device import Psa2
+from psabench.boards.psd1.device import Psd1, volts
 from psabench.boards.readings import Readings
-from psabench.boards.registry import BOARDS, Gyro, Pik, Pmka, Psa2, Psd1, identify, of_board
 from psabench.boards.unit import Unit
 from psabench.errors import CycleRefused, DeviceError
 from psabench.link.can_host import CanHost, WallClock
@@ -78,7 +81,7 @@ def at_node(kind: type[Unit], node_id: int, values: Mapping[tuple[int, int], int
     return kind(CanHost(node, WallClock()), node_id), node
 
 
-@pytest.mark.parametrize("kind", BOARDS.values(), ids=lambda kind: kind.board)
+@pytest.mark.parametrize("kind", all_devices().values(), ids=lambda kind: kind.board)
 def test_a_unit_says_itself_what_it_is(kind: type[Unit]) -> None:
     host = CanHost(Node(33, {(0x1008, 0): kind.title}), WallClock())
     assert identify(host, 33) is kind
@@ -114,8 +117,8 @@ def test_a_board_that_nobody_knows_is_a_bad_argument() -> None:
 
 
 def test_default_nodes() -> None:
-    assert {board: dbc_node(board) for board in BOARDS} == {"psa2": 5, "psd1": 6, "pmka": 7, "pik": 8, "gyro": 9}
-    assert [kind(CanHost(FakeBus(), WallClock())).node.node_id for kind in BOARDS.values()] == [5, 6, 7, 8, 9]
+    assert {board: dbc_node(board) for board in all_devices()} == {"psa2": 5, "psd1": 6, "pmka": 7, "pik": 8, "gyro": 9}
+    assert [kind(CanHost(FakeBus(), WallClock())).node.node_id for kind in all_devices().values()] == [5, 6, 7, 8, 9]
 
 
 def test_registers_by_the_names_of_the_eds() -> None:

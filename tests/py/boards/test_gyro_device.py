@@ -6,8 +6,7 @@ import struct
 from typing import Any
 
 import pytest
-from psabench.boards.gyro.device import SETTINGS, Began, Flag, Mode, Phase, SelfTest
-from psabench.boards.registry import Gyro
+from psabench.boards.gyro.device import SETTINGS, Began, Flag, Gyro, Mode, Phase, SelfTest
 from psabench.errors import BadInput, DeviceError
 
 from tests.py.boards.test_devices import at_node

@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import cast
 
 import pytest
-from psabench.boards.gyro.device import Began, Flag, Mode
+from psabench.boards.gyro.device import Began, Flag, Gyro, Mode
 from psabench.boards.gyro.watch import FLAG_WORDS, NavigationWatch
-from psabench.boards.registry import Gyro
 
 STEP_S = 0.02
 LOST, STUCK = FLAG_WORDS[Flag.LEVEL_LOST], FLAG_WORDS[Flag.ENCODER_FAULT]

@@ -8,13 +8,14 @@ from collections.abc import Iterator
 import can
 import numpy as np
 import pytest
+from psabench.boards.devices import all_devices
+from psabench.boards.psa2.device import Psa2
 from psabench.boards.readings import ReadingLayout, ReadingReader
-from psabench.boards.registry import BOARDS, Psa2
 from psabench.link.protocol_files import dbc_node, message
 
 from tests.py.boards.test_frames import seed
 
-LAYOUTS = [kind.layout for kind in BOARDS.values() if kind is not Psa2]
+LAYOUTS = [kind.layout for kind in all_devices().values() if kind is not Psa2]
 TWO = ReadingLayout(board="pmka", messages=("PMKA_CODES", "PMKA_STATE"), counter="SEQ")
 
 

@@ -10,10 +10,9 @@ from typing import Any
 import can
 import numpy as np
 import pytest
-from psabench.boards.gyro.device import Phase
+from psabench.boards.gyro.device import Gyro, Phase
 from psabench.boards.psa2.frames import FrameReader, Frames
 from psabench.boards.readings import ReadingReader, Readings
-from psabench.boards.registry import Gyro
 from psabench.errors import LinkError
 from psabench.procedures.wire_platform import _ahead, _LevelScale, _Tape
 

@@ -6,8 +6,9 @@ from typing import Any
 
 import canopen
 import pytest
+from psabench.boards.psa2.device import Psa2
 from psabench.boards.psa2.frames import Form
-from psabench.boards.registry import Psa2, Psd1
+from psabench.boards.psd1.device import Psd1
 from psabench.boards.unit import BANKS, Unit
 from psabench.places import proto_file
 from psabench.shell import dut, registers, render

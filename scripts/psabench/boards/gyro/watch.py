@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from psabench.boards.gyro.device import Began, Flag, Mode
-from psabench.boards.registry import Gyro
+from psabench.boards.gyro.device import Began, Flag, Gyro, Mode
 
 FLAG_WORDS: Mapping[Flag, str] = {
     Flag.SATURATED: "a torquer is at its limit",

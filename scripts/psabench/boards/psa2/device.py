@@ -8,8 +8,8 @@ with CanHost(open_bus("socketcand:127.0.0.1:29536"), WallClock()) as host:
 
 from __future__ import annotations
 
-from psabench.board_names import DBC_NODE
 from psabench.boards.psa2.frames import Form, FrameReader, Frames
+from psabench.boards.registry import DBC_NODE
 from psabench.boards.unit import Unit
 from psabench.errors import LinkError
 from psabench.link.can_host import CanHost

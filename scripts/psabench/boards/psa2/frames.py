@@ -14,7 +14,7 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 
-from psabench.board_names import DBC_NODE
+from psabench.boards.registry import DBC_NODE
 from psabench.link import signals
 from psabench.link.can_host import Message
 from psabench.link.protocol_files import message

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from psabench.boards.board import Bus
+from psabench.boards.registry import BOARDS
 from psabench.conform.capture.log import LineLog
 from psabench.conform.dut import Subject
 from psabench.conform.verdict import Broken, TooLittle
@@ -13,14 +15,9 @@ from psabench.link.signals import Ints
 
 ADDRESS, DATA = tuple(f"AB{k}" for k in range(4)), tuple(f"D{k}" for k in range(16))
 LINES = ("CS", "RW", *ADDRESS)
-BUS_BOARDS = ("psd1", "pmka", "pik")
 BUS = 0x2002
 EACH_S = 20e-6  # that a cycle takes at the most without a strobe of its own
 TAIL_S = 5e-3  # after what a recording of the lines must have: its end may lie behind the present
-# A register of each board that takes a write and is none the worse for it, and the word; None: the one that it has.
-HARMLESS = {"psd1": ("TEMP", 0), "pmka": ("INDEX", 0), "pik": ("PERIOD", None)}
-# One that can be read at any time, and whose reading moves nothing.
-QUIET = {"psd1": "STATUS", "pmka": "MODE", "pik": "PERIOD"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,14 +71,21 @@ def registers(s: Subject) -> dict[str, tuple[int, str]]:
 
 def harmless(s: Subject) -> tuple[int, int]:
     """Address of a register that may be written, and with what."""
-    name, word = HARMLESS[s.variant.family]
-    address = registers(s)[name][0]
-    return address, s.unit.bus_read(address) if word is None else word
+    bus = _bus(s)
+    address = registers(s)[bus.harmless][0]
+    return address, s.unit.bus_read(address) if bus.harmless_word is None else bus.harmless_word
 
 
 def quiet(s: Subject) -> int:
     """Address of a register that can be read at any time."""
-    return registers(s)[QUIET[s.variant.family]][0]
+    return registers(s)[_bus(s).quiet][0]
+
+
+def _bus(s: Subject) -> Bus:
+    bus = BOARDS[s.variant.family].bus
+    if bus is None:
+        raise TooLittle(f"a {s.variant.family} has no parallel bus")
+    return bus
 
 
 def say(s: Subject, *lines: str, dwell_s: float = 0.0) -> list[str]:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-from psabench.boards.registry import of_board
+from psabench.boards.devices import of_board
 from psabench.conform.capture.canbits import frame_bits
 from psabench.conform.capture.log import CanFrame, Evidence
 from psabench.conform.limits import row_for

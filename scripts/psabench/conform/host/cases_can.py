@@ -54,6 +54,7 @@ class Case:
     form: int = 0  # frame form that the host has to ask for
     busy: int = BUSY  # frames in 50 ms that say that the stream runs; 0: there is none until it is played
     ready_s: float = READY_S  # simulated, for a host to start it
+    ends: bool = False  # what the host tells at the end of the link is judged, too
 
 
 def _good(s: Stage) -> None:

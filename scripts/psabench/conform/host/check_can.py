@@ -7,13 +7,14 @@ import itertools
 import numpy as np
 
 from psabench.conform.host.capture import SDO_RX, SDO_TX, SEQS, WRAP_US, Frame, number
+from psabench.conform.host.cases_units import UNIT_CASES
 from psabench.conform.host.check import HostEvidence, Unseen, enough, judges, limits, proves
 from psabench.conform.verdict import Broken
 
 READ, ABORT = 0x40, 0x80  # command specifiers of SDO
 FAST, TOG = 0x380, 63  # PSA2_FAST, and the bit of it that tells the frame's number, even or odd
 REGISTERS = ((0x2000, 2), (0x2003, 2), (0x2004, 2), (0x2001, 1), (0x2001, 4))  # CONFIG0 of X, Y, Z; STATUS, DRATE
-ENDS = ("line_good", "psd1_good", "psd1_bus", "pmka_lost", "pik_lost", "pik_bus")  # cases of the other boards and links
+ENDS = ("line_good", *(name for name, case in UNIT_CASES.items() if case.ends))  # cases of other boards and links
 IDENTITY = (0x1000, 0x1008, 0x1018)  # any of them says who is there
 
 

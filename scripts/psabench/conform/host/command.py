@@ -6,7 +6,7 @@ import argparse
 import sys
 from functools import partial
 
-from psabench.board_names import ALIASES
+from psabench.boards.registry import ALIASES
 from psabench.conform import report
 from psabench.conform.defaults import LINKS
 from psabench.conform.host import runner

@@ -12,11 +12,10 @@ from typing import TextIO
 
 from psabench.conform.host import check_can as can_checks
 from psabench.conform.host import check_line as line_checks
-from psabench.conform.host import check_units as unit_checks
 from psabench.conform.host.capture import Bus, read_log
 from psabench.conform.host.cases_can import CASES, NODE, Case
 from psabench.conform.host.cases_line import LINE_CASES, LineCase, samples
-from psabench.conform.host.cases_units import UNIT_CASES
+from psabench.conform.host.cases_units import UNIT_CASES, load_checks
 from psabench.conform.host.check import HostEvidence, Judged, Unseen, judged
 from psabench.conform.host.line_waves import form_of
 from psabench.conform.host.stimulus import READY_S, ByHand, Program, Stage, drain, expand
@@ -31,7 +30,8 @@ from psabench.procedures.head_bench import Progress
 
 Say = Callable[[str], None]
 ALL: Mapping[str, Case | LineCase] = {**CASES, **LINE_CASES, **UNIT_CASES}
-MODULES = (can_checks, line_checks, unit_checks)  # imported, they have registered their tests
+load_checks()
+MODULES = (can_checks, line_checks)  # imported, they have registered their tests
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -10,7 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from psabench.boards.board import Beat
 from psabench.boards.psa2.conform.capture_line import transfers
+from psabench.boards.registry import BOARDS
 from psabench.conform.capture.log import CanLog, Evidence, LineLog
 from psabench.conform.profile import Variant
 from psabench.conform.requirements import requirements
@@ -29,37 +31,7 @@ CODE_BITS = 24
 CAN_RESOLUTION_S = 1e-6  # of stamps: candump's digits
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Beat:
-    """What a board does once a period: rows that give it (µs), the edge that shows it, the number that counts it."""
-
-    rows: Mapping[str, str]  # requirement: limit
-    line: str
-    level: int
-    message: str
-    counter: str
-    stamp: tuple[str, str] = ("", "")  # message and signal of the board's own time
-
-
-BEATS: Mapping[str, Beat] = {
-    "psa2": Beat(
-        rows={"PSA2-READ-06": "period_us"},
-        line="Int",
-        level=0,
-        message="PSA2_XY",
-        counter="SEQ",
-        stamp=("PSA2_ZT", "TSTAMP"),
-    ),
-    "psd1": Beat(
-        rows={"PSD1-CYC-12": "period_us", "PSD1-CYC-13": "period_us"},
-        line="RFX",
-        level=0,
-        message="PSD1_CYCLE",
-        counter="CNT",
-    ),
-    "pmka": Beat(rows={"PMKA-SAMP-01": "ts_us"}, line="SH", level=1, message="PMKA_STATE", counter="SEQ"),
-    "gyro": Beat(rows={"GYRO-CAN-02": "period_us"}, line="STEP", level=1, message="GYRO_ANGLES", counter="STEP"),
-}
+BEATS: Mapping[str, Beat] = {name: board.beat for name, board in BOARDS.items() if board.beat}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from psabench.boards.registry import BOARDS
 from psabench.conform.capture.log import LineLog
 from psabench.conform.sources.samples import PORT_LINES
 from psabench.conform.sources.taken import LineTake
@@ -11,17 +12,7 @@ from psabench.conform.verdict import TooLittle
 from psabench.errors import BadInput
 from psabench.link.vcd import Vcd, Wire
 
-_PARALLEL = ("CS", "RW", *(f"AB{k}" for k in range(4)), *(f"D{k}" for k in range(16)))
-LINES: Mapping[str, Sequence[str]] = {  # as psa-emu --vcd names them: docs/waveforms.md and the boards' pages
-    "psa2": ("SYNC_A SClk DRD_A DIn DOutX DOutY DOutZ SYNC_T CST DRD_T DInT DOutT Res Data CLK Int").split(),
-    "psd1": (*"A0 INT0 FL1 FL2 DR RFX RFY RFZ TFS SCLK SDAT CLK_1M25".split(), *_PARALLEL),
-    "pmka": (
-        *"KL1 KL2 KL3 KL4 TAU0 TAU1 TAU2 RP1 RN1 RP2 RN2 RP3 RN3 RP4 RN4 SH CONV MUX0 MUX1".split(),
-        *_PARALLEL,
-    ),
-    "pik": (*"CLK LATCH FXP FXN FYP FYN FZP FZN".split(), *_PARALLEL),
-    "gyro": PORT_LINES["gyro"],
-}
+LINES: Mapping[str, Sequence[str]] = {name: board.lines for name, board in BOARDS.items()}
 
 
 class Recorded(LineLog):

@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
+from psabench.boards.registry import BOARDS
 from psabench.conform.capture.log import LineLog
 from psabench.link.vcd import Vcd, Wire
 
@@ -18,13 +19,7 @@ GAP = 0x80
 BLOCK = 1 << 22  # samples looked at together: bounds the memory
 
 # Lines of the port, bit 0 first, by the names that recordings of all pins have (docs/lineport.md).
-PORT_LINES: Mapping[str, Sequence[str]] = {
-    "psa2": ("Int", "Data", "CLK"),
-    "psd1": ("RFX", "RFY", "RFZ", "SCLK", "SDAT", "FL2", "CS"),
-    "pmka": ("KL1", "KL2", "KL3", "KL4", "SH", "MUX0", "MUX1"),
-    "pik": ("FXP", "FXN", "FYP", "FYN", "FZP", "FZN", "LATCH"),
-    "gyro": ("STEP", "READY", "SLEW", "SETTLE", "WINDOW", "FAULT"),
-}
+PORT_LINES: Mapping[str, Sequence[str]] = {name: board.port_lines for name, board in BOARDS.items()}
 
 
 def line_log(data: bytes, family: str, sample_hz: float) -> LineLog:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from psabench.boards.registry import BOARDS
 from psabench.conform.capture.log import Evidence
 from psabench.conform.dut import Subject
 from psabench.conform.plan import scene
@@ -9,7 +10,6 @@ from psabench.conform.raw_can import NMT_START, OFF, TPDO, Talk, read, talk
 from psabench.conform.stimulus.flood import flood
 from psabench.conform.verdict import Broken, TooLittle
 
-BOARDS = ("psa2", "psd1", "pmka", "pik", "gyro")
 BEATS_S, STREAM_S = 3.3, 0.2
 FLOOD_S, TRIES = 0.15, 5  # each flood twice as long as the one before
 CALM_S = 2.0  # an overload is over after one second

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from psabench.boards.registry import BOARDS
 from psabench.conform.capture.log import Evidence
 from psabench.conform.dut import Subject
 from psabench.conform.plan import scene
@@ -14,7 +15,7 @@ from psabench.link.lineport import SAMPLE_HZ
 LOOK_S, TAIL_S = 0.06, 0.02
 
 
-@scene("line_port", boards=("psa2", "psd1", "pmka", "pik", "gyro"))
+@scene("line_port", boards=BOARDS)
 def line_port(s: Subject) -> Evidence:
     """The line port, beside all pins where they are there. Facts: `bytes` of the port, its edges as `port`."""
     if s.line_port is None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from psabench.boards.registry import Pmka
+from psabench.boards.pmka.device import Pmka
 from psabench.conform.bus_host import line
 from psabench.conform.capture.log import Evidence
 from psabench.conform.dut import Subject

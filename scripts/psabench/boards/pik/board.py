@@ -1,0 +1,18 @@
+"""PIK, PIK-5 and PIK-6 as the rest of the package knows it."""
+
+from __future__ import annotations
+
+from psabench.boards.board import PARALLEL_BUS, Board, Bus
+from psabench.boards.pik.fields import FIELDS
+
+BOARD = Board(
+    name="pik",
+    device="Pik",
+    aliases=("pik5", "pik6"),
+    lines=(*"CLK LATCH FXP FXN FYP FYN FZP FZN".split(), *PARALLEL_BUS),
+    port_lines=("FXP", "FXN", "FYP", "FYN", "FZP", "FZN", "LATCH"),
+    bus=Bus(quiet="PERIOD", harmless="PERIOD", harmless_word=None),
+    crystal="clock_tol_ppm",  # its clock is whole Hz: a profile cannot say an error of it
+    overdrive_v_per_g=9.0,
+    fields=FIELDS,
+)
