@@ -60,7 +60,7 @@ static void info(void *ctx, struct psa2_can_info *out)
 static void refused(void *ctx, const char *name, const char *why)
 {
     (void)ctx;
-    assert(strcmp(name, "unit") == 0 && strlen(why) > 0 && strlen(why) < PSA2_CAN_TEXT);
+    assert(strcmp(name, "unit") == 0 && strlen(why) > 0 && strlen(why) < BOARD_NODE_TEXT);
 }
 
 /* ---- what the node sends ---- */
@@ -186,7 +186,8 @@ static void check(const struct world *w)
     assert(sched_next_ns(&w->s) >= w->s.now_ns);
     assert(w->can.node.node.services.queued <= CAN_QUEUE_MAX && w->can.node.node.stream.queued <= CO_PDO_BACKLOG + 2);
     assert(w->can.node.node.history_count <= CO_HISTORY);
-    assert(memchr(w->can.refusal, 0, sizeof w->can.refusal) && memchr(w->can.remark, 0, sizeof w->can.remark));
+    assert(memchr(w->can.node.refusal, 0, sizeof w->can.node.refusal) &&
+           memchr(w->can.node.remark, 0, sizeof w->can.node.remark));
 }
 
 static void power_up(struct world *w, uint8_t choice)

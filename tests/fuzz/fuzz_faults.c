@@ -241,7 +241,7 @@ static void lift(struct world *w)
     run(w, UP_NS);
     assert(psa2_ready(&w->b) && w->frames > frames + 40 && w->got > got + 2 * 40);
     /* The board's counters began again with its power; the host's fall by what it sends, and it has sent little. */
-    assert(w->can.node.node.services.now == CAN_ACTIVE && w->host.now != CAN_BUS_OFF);
+    assert(w->can.node.node.services.error_state == CAN_STATE_ERROR_ACTIVE && w->host.error_state != CAN_STATE_BUS_OFF);
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
