@@ -26,7 +26,7 @@ bool bus_ports_check(const struct bench *b, const struct options *o, char *why, 
         const struct options_bus *p = &o->bus[i];
         const unsigned unit = find_unit(b, p->unit);
         if (unit == b->scenario.unit_count && p->unit[0])
-            return why_fail(why, cap, "--bus-port %s: no unit \"%s\" in the scenario", p->arg, p->unit);
+            return why_fail(why, cap, "--bus-port %s: expected a unit of the scenario, got \"%s\"", p->arg, p->unit);
         if (unit == b->scenario.unit_count)
             return why_fail(why, cap, "--bus-port %s: no unit of the scenario has a parallel bus", p->arg);
         if (!type_of(b, unit)->bus) {
@@ -81,7 +81,7 @@ static bool open_one(struct bus_ports *all, struct links *links, struct bench *b
     }
     free(p);
     if (err == -EEXIST)
-        return why_fail(why, cap, "--bus-port %s: exists and is no symbolic link to a pty; expected another name",
+        return why_fail(why, cap, "--bus-port %s: expected a new name or a symbolic link to a pty, got another file",
                         o->arg);
     return why_fail(why, cap, "--bus-port %s: %s", o->arg, strerror(-err));
 }

@@ -70,7 +70,7 @@ static bool open_port(struct instruments *all, const struct scpi_kind *kind, con
                       unsigned offset, bool many, char *why, size_t cap)
 {
     if (all->count == INSTRUMENTS_MAX)
-        return why_fail(why, cap, "--scpi %s: up to %u addresses", o->arg, INSTRUMENTS_MAX);
+        return why_fail(why, cap, "--scpi %s: expected up to %u addresses", o->arg, INSTRUMENTS_MAX);
     struct instrument *i = calloc(1, sizeof *i);
     if (!i) return why_fail(why, cap, "--scpi %s: no memory", o->arg);
     i->all = all;
@@ -87,9 +87,10 @@ static bool open_port(struct instruments *all, const struct scpi_kind *kind, con
     }
     free(i);
     if (err == -EADDRINUSE)
-        return why_fail(why, cap, "--scpi %s: port %u is taken on 127.0.0.1; expected another one, or 0", o->arg, port);
+        return why_fail(why, cap, "--scpi %s: port %u is in use on 127.0.0.1; choose another, or 0 for any free port",
+                        o->arg, port);
     if (err == -EEXIST)
-        return why_fail(why, cap, "--scpi %s: %s exists and is no symbolic link to a pty; expected another name",
+        return why_fail(why, cap, "--scpi %s: expected a new name or a symbolic link to a pty, got another file at %s",
                         o->arg, name);
     return why_fail(why, cap, "--scpi %s: %s", o->arg, strerror(-err));
 }
@@ -116,7 +117,7 @@ bool instruments_check(const struct instruments *all, const struct options *o, c
         const struct options_scpi *s = &o->scpi[i];
         const struct scpi_kind *kind = scpi_kind(s->kind);
         if (strcmp(s->kind, "all") == 0) continue;
-        if (!kind) return why_fail(why, cap, "--scpi %s: expected head, table, chamber, supply or all", s->arg);
+        if (!kind) return why_expected(why, cap, "--scpi", WHY_TEXT(s->arg), "head, table, chamber, supply or all");
         if (!kind->present(all->control->bench))
             return why_fail(why, cap, "--scpi %s: the scenario has no %s", s->arg, kind->name);
     }

@@ -105,6 +105,8 @@ struct target {
     size_t cap;
 };
 
+#define expected(t, option, got, ...) why_expected((t)->why, (t)->cap, option, WHY_TEXT(got), __VA_ARGS__)
+
 /* Length of "can1=" at the beginning; 0: there is none. */
 static size_t bus_prefix(const char *arg)
 {
@@ -118,8 +120,7 @@ static bool set_can(struct target *t, const char *arg)
     struct options *o = t->o;
     o->can_given = true;
     if (strcmp(arg, "none") == 0) return true;
-    if (o->can_count == OPTIONS_CAN_MAX)
-        return why_fail(t->why, t->cap, "--can %s: up to %u adapters", arg, OPTIONS_CAN_MAX);
+    if (o->can_count == OPTIONS_CAN_MAX) return expected(t, "--can", arg, "up to %u adapters", OPTIONS_CAN_MAX);
     struct options_can *c = &o->can[o->can_count];
     const char *kind = arg + bus_prefix(arg);
     const char *colon = strchr(kind, ':');
@@ -131,7 +132,7 @@ static bool set_can(struct target *t, const char *arg)
     if (len == 10 && strncmp(kind, "socketcand", 10) == 0) {
         c->kind = OPTIONS_SOCKETCAND;
         if (rest && !parse_u64(rest, 65535, &port)) {
-            return why_fail(t->why, t->cap, "--can %s: \"%s\" is no port, 0 to 65535 (0: a free one)", arg, rest);
+            return expected(t, "--can", arg, "a port from 0 (any free port) to 65535");
         }
         c->port = (uint16_t)port;
     } else if (len == 5 && strncmp(kind, "slcan", 5) == 0) {
@@ -141,9 +142,7 @@ static bool set_can(struct target *t, const char *arg)
     } else if (len == 3 && strncmp(kind, "log", 3) == 0 && rest) {
         c->kind = OPTIONS_CAN_LOG;
     } else {
-        return why_fail(
-            t->why, t->cap,
-            "--can: expected socketcand[:PORT], slcan[:LINK], socketcan:IFACE, log:FILE or none, got \"%s\"", arg);
+        return expected(t, "--can", arg, "socketcand[:PORT], slcan[:LINK], socketcan:IFACE, log:FILE or none");
     }
     o->can_count++;
     return true;
@@ -153,20 +152,17 @@ static bool set_can(struct target *t, const char *arg)
 static bool set_scpi(struct target *t, const char *arg)
 {
     struct options *o = t->o;
-    if (o->scpi_count == OPTIONS_SCPI_MAX)
-        return why_fail(t->why, t->cap, "--scpi %s: up to %u instruments", arg, OPTIONS_SCPI_MAX);
+    if (o->scpi_count == OPTIONS_SCPI_MAX) return expected(t, "--scpi", arg, "up to %u instruments", OPTIONS_SCPI_MAX);
     struct options_scpi *i = &o->scpi[o->scpi_count++];
     const size_t len = strcspn(arg, ":");
     const char *rest = arg[len] ? arg + len + 1 : "0";
     uint64_t port = 0;
     *i = (struct options_scpi){.arg = arg, .pty = strcmp(rest, "pty") == 0 || strncmp(rest, "pty:", 4) == 0};
     snprintf(i->kind, sizeof i->kind, "%.*s", (int)len, arg);
-    if (len == 0 || len >= sizeof i->kind)
-        return why_fail(t->why, t->cap, "--scpi: expected head, table, chamber, supply or all, got \"%s\"", arg);
+    if (len == 0 || len >= sizeof i->kind) return expected(t, "--scpi", arg, "head, table, chamber, supply or all");
     if (i->pty && rest[3] && rest[4]) i->link = rest + 4;
     if (!i->pty && !parse_u64(rest, 65535, &port)) {
-        return why_fail(t->why, t->cap,
-                        "--scpi %s: \"%s\" is neither pty[:LINK] nor a port, 0 to 65535 (0: a free one)", arg, rest);
+        return expected(t, "--scpi", arg, "pty[:LINK] or a port from 0 (any free port) to 65535");
     }
     i->port = (uint16_t)port;
     return true;
@@ -186,7 +182,7 @@ bool options_cans(struct options *o, char *text, char *why, size_t cap)
 static bool set_truth_every(struct target *t, const char *arg)
 {
     if (options_duration(arg, &t->o->truth_every_ns) && t->o->truth_every_ns >= 1000) return true;
-    return why_fail(t->why, t->cap, "--truth-every: expected a time of 1us or more, as 10ms, got \"%s\"", arg);
+    return expected(t, "--truth-every", arg, "a time of 1us or more, such as 10ms");
 }
 
 static bool set_pace(struct target *t, const char *arg)
@@ -195,39 +191,38 @@ static bool set_pace(struct target *t, const char *arg)
         t->o->pace = (enum pace_kind)k;
         if (strcmp(arg, pace_name(t->o->pace)) == 0) return true;
     }
-    return why_fail(t->why, t->cap, "--pace: expected wall, step or free, got \"%s\"", arg);
+    return expected(t, "--pace", arg, "wall, step or free");
 }
 
 static bool set_for(struct target *t, const char *arg)
 {
     if (options_duration(arg, &t->o->for_ns)) return true;
-    return why_fail(t->why, t->cap, "--for: expected a time, as 300ms, 10s or 2min, up to 1e6 s, got \"%s\"", arg);
+    return expected(t, "--for", arg, "a time such as 300ms, 10s or 2min, up to 1e6 s");
 }
 
 static bool set_seed(struct target *t, const char *arg)
 {
     t->o->seed_given = parse_u64(arg, UINT64_MAX, &t->o->seed);
-    return t->o->seed_given ||
-           why_fail(t->why, t->cap, "--seed: expected an integer from 0 to 2^64 - 1, got \"%s\"", arg);
+    return t->o->seed_given || expected(t, "--seed", arg, "an integer from 0 to 2^64 - 1");
 }
 
 static bool set_rate(struct target *t, const char *arg, const char *name, uint32_t *hz, bool *given)
 {
     uint64_t v;
     *given = parse_u64(arg, 8000000, &v) && (v == 0 || v >= 10000);
-    if (!*given) return why_fail(t->why, t->cap, "--%s: expected 0 or 10000 to 8000000 bit/s, got \"%s\"", name, arg);
+    if (!*given) return expected(t, name, arg, "0 or 10000 to 8000000 bit/s");
     *hz = (uint32_t)v;
     return true;
 }
 
 static bool set_bitrate(struct target *t, const char *arg)
 {
-    return set_rate(t, arg, "bitrate", &t->o->bitrate_hz, &t->o->bitrate_given);
+    return set_rate(t, arg, "--bitrate", &t->o->bitrate_hz, &t->o->bitrate_given);
 }
 
 static bool set_data_bitrate(struct target *t, const char *arg)
 {
-    return set_rate(t, arg, "data-bitrate", &t->o->data_bitrate_hz, &t->o->data_bitrate_given);
+    return set_rate(t, arg, "--data-bitrate", &t->o->data_bitrate_hz, &t->o->data_bitrate_given);
 }
 
 static bool set_epoch(struct target *t, const char *arg)
@@ -235,8 +230,7 @@ static bool set_epoch(struct target *t, const char *arg)
     char *end;
     const double s = strtod(arg, &end);
     if (end == arg || *end || !(s >= 0 && s <= 9e9)) {
-        return why_fail(t->why, t->cap, "--epoch: expected seconds, 0 to 9e9 (date +%%s gives today's), got \"%s\"",
-                        arg);
+        return expected(t, "--epoch", arg, "seconds from 0 to 9e9, as date +%%s prints them");
     }
     t->o->epoch_ns = (int64_t)nearbyint(s) * 1000000000 + (int64_t)nearbyint((s - nearbyint(s)) * 1e9);
     return true;
@@ -247,7 +241,7 @@ static bool set_vcd_unit(struct target *t, const char *arg)
     uint64_t v;
     bool power = parse_u64(arg, 100000000, &v) && v > 0;
     for (uint64_t x = power ? v : 1; x > 1; x /= 10) power = power && x % 10 == 0;
-    if (!power) return why_fail(t->why, t->cap, "--vcd-unit: expected 1, 10, 100 ... 100000000 ns, got \"%s\"", arg);
+    if (!power) return expected(t, "--vcd-unit", arg, "1, 10, 100 ... 100000000 ns");
     t->o->vcd_unit_ns = (uint32_t)v;
     return true;
 }
@@ -256,7 +250,7 @@ static bool set_line_hz(struct target *t, const char *arg)
 {
     uint64_t v;
     if (!parse_u64(arg, 100000000, &v) || v < 1000) {
-        return why_fail(t->why, t->cap, "--line-hz: expected 1000 to 100000000 samples a second, got \"%s\"", arg);
+        return expected(t, "--line-hz", arg, "1000 to 100000000 samples per second");
     }
     t->o->line_hz = (int64_t)v;
     return true;
@@ -267,34 +261,33 @@ static bool set_bus_port(struct target *t, const char *arg)
 {
     static const char plain[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_";
     struct options *o = t->o;
-    if (o->bus_count == OPTIONS_BUS_MAX)
-        return why_fail(t->why, t->cap, "--bus-port %s: up to %u bus ports", arg, OPTIONS_BUS_MAX);
+    if (o->bus_count == OPTIONS_BUS_MAX) return expected(t, "--bus-port", arg, "up to %u bus ports", OPTIONS_BUS_MAX);
     struct options_bus *b = &o->bus[o->bus_count++];
     const size_t len = strspn(arg, plain);
     const bool named = len > 0 && arg[len] == ':';
     const char *link = named ? arg + len + 1 : arg;
     *b = (struct options_bus){.arg = arg, .link = strcmp(link, "-") == 0 ? NULL : link};
     if (!*link || (named && len >= sizeof b->unit))
-        return why_fail(t->why, t->cap, "--bus-port: expected [UNIT:]LINK, LINK a path or -, got \"%s\"", arg);
+        return expected(t, "--bus-port", arg, "[UNIT:]LINK, where LINK is a path or -");
     if (named) snprintf(b->unit, sizeof b->unit, "%.*s", (int)len, arg);
     return true;
 }
 
 static bool set_path(struct target *t, const char *name, const char *arg, const char **path)
 {
-    if (!*arg) return why_fail(t->why, t->cap, "--%s: expected a path", name);
+    if (!*arg) return expected(t, name, arg, "a path");
     *path = arg;
     return true;
 }
 
 // clang-format off
-static bool set_control(struct target *t, const char *arg) { return set_path(t, "control", arg, &t->o->control); }
-static bool set_truth(struct target *t, const char *arg)   { return set_path(t, "truth", arg, &t->o->truth); }
-static bool set_restore(struct target *t, const char *arg) { return set_path(t, "restore", arg, &t->o->restore); }
-static bool set_truth_log(struct target *t, const char *arg) { return set_path(t, "truth-log", arg, &t->o->truth_log); }
-static bool set_unit(struct target *t, const char *arg)    { return set_path(t, "unit", arg, &t->o->unit); }
-static bool set_vcd(struct target *t, const char *arg)     { return set_path(t, "vcd", arg, &t->o->vcd); }
-static bool set_line(struct target *t, const char *arg)    { return set_path(t, "line", arg, &t->o->line); }
+static bool set_control(struct target *t, const char *arg) { return set_path(t, "--control", arg, &t->o->control); }
+static bool set_truth(struct target *t, const char *arg)   { return set_path(t, "--truth", arg, &t->o->truth); }
+static bool set_restore(struct target *t, const char *arg) { return set_path(t, "--restore", arg, &t->o->restore); }
+static bool set_truth_log(struct target *t, const char *arg) { return set_path(t, "--truth-log", arg, &t->o->truth_log); }
+static bool set_unit(struct target *t, const char *arg)    { return set_path(t, "--unit", arg, &t->o->unit); }
+static bool set_vcd(struct target *t, const char *arg)     { return set_path(t, "--vcd", arg, &t->o->vcd); }
+static bool set_line(struct target *t, const char *arg)    { return set_path(t, "--line", arg, &t->o->line); }
 static bool set_wait(struct target *t, const char *arg)    { (void)arg; return t->o->wait_client = true; }
 static bool set_until_eof(struct target *t, const char *arg) { (void)arg; return t->o->until_eof = true; }
 static bool set_start(struct target *t, const char *arg)   { (void)arg; return t->o->start = true; }
@@ -305,7 +298,7 @@ static bool set_profiles(struct target *t, const char *arg) { (void)arg; t->o->a
 static bool set_scenarios(struct target *t, const char *arg) { (void)arg; t->o->action = OPTIONS_LIST_SCENARIOS; return true; }
 static bool set_keys(struct target *t, const char *arg) { (void)arg; t->o->action = OPTIONS_LIST_KEYS; return true; }
 static bool set_dump(struct target *t, const char *arg) { (void)arg; t->o->action = OPTIONS_DUMP; return true; }
-static bool set_resolved(struct target *t, const char *arg) { return set_path(t, "resolved", arg, &t->o->resolved); }
+static bool set_resolved(struct target *t, const char *arg) { return set_path(t, "--resolved", arg, &t->o->resolved); }
 static bool set_commands(struct target *t, const char *arg) { (void)arg; t->o->action = OPTIONS_LIST_COMMANDS; return true; }
 
 static bool set_list_scpi(struct target *t, const char *arg) { (void)arg; t->o->action = OPTIONS_LIST_SCPI; return true; }
@@ -341,15 +334,14 @@ static const struct {
 
 static bool set_scenario(struct target *t, const char *arg)
 {
-    if (t->o->scenario)
-        return why_fail(t->why, t->cap, "%s: one scenario is enough, %s was given before", arg, t->o->scenario);
+    if (t->o->scenario) return why_fail(t->why, t->cap, "SCENARIO: expected one, got %s and %s", t->o->scenario, arg);
     return set_path(t, "SCENARIO", arg, &t->o->scenario);
 }
 
 static bool unknown(struct target *t, const char *word, int c)
 {
-    if (c == ':') return why_fail(t->why, t->cap, "%s: an argument is missing (psa-emu --help)", word);
-    return why_fail(t->why, t->cap, "%s: unknown option or unwanted argument (psa-emu --help)", word);
+    if (c == ':') return why_fail(t->why, t->cap, "%s: expected an argument, got none (psa-emu --help)", word);
+    return why_fail(t->why, t->cap, "%s: unknown option, or an argument it does not take (psa-emu --help)", word);
 }
 
 static bool parse_all(struct target *t, int argc, char *const argv[])
@@ -377,13 +369,15 @@ bool options_parse(int argc, char *const argv[], struct options *o, char *why, s
     struct target t = {o, why, cap};
     if (!parse_all(&t, argc, argv)) return false;
     if (o->pace == PACE_STEP && !o->control) {
-        return why_fail(why, cap, "--pace step: needs --control PATH, by which time is moved");
+        return why_fail(why, cap, "--pace step: expected --control PATH, whose commands advance the time, got none");
     }
     if (o->wait_client && o->pace == PACE_STEP) {
-        return why_fail(why, cap, "--wait-client: in step pace time waits for the control socket anyway");
+        return why_fail(why, cap, "--wait-client: not with --pace step, where only commands advance the time");
     }
     if (o->restore && (o->scenario || o->seed_given || o->bitrate_given || o->data_bitrate_given || o->start)) {
-        return why_fail(why, cap, "--restore %s: scenario, seed, bit rates and start are the snapshot's", o->restore);
+        return why_fail(why, cap,
+                        "--restore %s: SCENARIO, --seed, --bitrate, --data-bitrate and --start come from the snapshot",
+                        o->restore);
     }
     if (!o->can_given)
         o->can[o->can_count++] = (struct options_can){.kind = OPTIONS_SOCKETCAND, .port = SOCKETCAND_PORT};

@@ -15,9 +15,9 @@ static bool open_socketcand(struct can_hub *hub, struct ports_can *c, const stru
     const int err = socketcand_listen(&c->socketcand, hub, c->hubs, o->port);
     if (!err) return true;
     if (err == -EADDRINUSE) {
-        return why_fail(
-            why, cap, "--can socketcand:%u: the port is taken on 127.0.0.1; expected another one, or 0 for a free one",
-            o->port);
+        return why_fail(why, cap,
+                        "--can socketcand:%u: the port is in use on 127.0.0.1; choose another, or 0 for any free port",
+                        o->port);
     }
     return why_fail(why, cap, "--can socketcand:%u: %s", o->port, strerror(-err));
 }
@@ -27,7 +27,7 @@ static bool open_slcan(struct can_hub *hub, struct ports_can *c, const struct op
     const int err = slcan_pty_open(&c->slcan, hub, o->arg);
     if (!err) return true;
     if (err == -EEXIST)
-        return why_fail(why, cap, "--can slcan:%s: exists and is no symbolic link to a pty; expected another name",
+        return why_fail(why, cap, "--can slcan:%s: expected a new name or a symbolic link to a pty, got another file",
                         o->arg);
     return why_fail(why, cap, "--can slcan%s%s: %s", o->arg ? ":" : "", o->arg ? o->arg : "", strerror(-err));
 }
@@ -42,10 +42,11 @@ static bool open_socketcan(struct can_hub *hub, struct ports_can *c, const struc
                         o->arg, o->arg, o->arg);
     }
     if (err == -ENETDOWN)
-        return why_fail(why, cap, "--can socketcan:%s: is down; as root: ip link set %s up", o->arg, o->arg);
+        return why_fail(why, cap, "--can socketcan:%s: the interface is down; as root: ip link set %s up", o->arg,
+                        o->arg);
     if (err == -EAFNOSUPPORT || err == -EPROTONOSUPPORT) {
-        return why_fail(
-            why, cap, "--can socketcan:%s: this kernel has no CAN; --can socketcand and --can slcan need none", o->arg);
+        return why_fail(why, cap, "--can socketcan:%s: this kernel has no CAN; use --can socketcand or --can slcan",
+                        o->arg);
     }
     return why_fail(why, cap, "--can socketcan:%s: %s", o->arg, strerror(-err));
 }
@@ -136,7 +137,8 @@ static bool open_line(struct ports *p, struct bench *b, const struct options *o,
     free(p->line);
     p->line = NULL;
     if (err == -EEXIST)
-        return why_fail(why, cap, "--line %s: exists and is no symbolic link to a pty; expected another name", o->line);
+        return why_fail(why, cap, "--line %s: expected a new name or a symbolic link to a pty, got another file",
+                        o->line);
     return why_fail(why, cap, "--line %s: %s", o->line, strerror(-err));
 }
 
@@ -149,9 +151,8 @@ static bool open_socket(struct ctl_server *s, const char *option, const char *pa
     if (!err) return true;
     if (err == -EADDRINUSE) return why_fail(why, cap, "--%s %s: another process listens there", option, path);
     if (err == -EEXIST)
-        return why_fail(why, cap, "--%s %s: exists and is no socket; expected another path", option, path);
-    if (err == -ENAMETOOLONG)
-        return why_fail(why, cap, "--%s %s: a path of a socket has up to 107 bytes", option, path);
+        return why_fail(why, cap, "--%s %s: expected a new path or a socket, got another file", option, path);
+    if (err == -ENAMETOOLONG) return why_fail(why, cap, "--%s %s: expected a path of up to 107 bytes", option, path);
     return why_fail(why, cap, "--%s %s: %s", option, path, strerror(-err));
 }
 
@@ -161,7 +162,7 @@ static bool open_vcd(struct ports *p, struct bench *b, const struct options *o, 
     p->vcd = fopen(o->vcd, "wbe");
     if (!p->vcd) return why_fail(why, cap, "--vcd %s: %s", o->vcd, strerror(errno));
     return bench_record(b, b->watched, p->vcd, o->vcd_unit_ns) ||
-           why_fail(why, cap, "--vcd-unit %u: no unit of VCD", o->vcd_unit_ns);
+           why_fail(why, cap, "--vcd-unit %u: not a time unit of VCD", o->vcd_unit_ns);
 }
 
 void ports_init(struct ports *p, struct bench *b, const struct options *o)

@@ -17,7 +17,7 @@ static bool do_vcd_flush(void *ctx, char *why)
 {
     struct service *s = ctx;
     if (s->bench->recording) vcd_flush(&s->bench->vcd);
-    else snprintf(why, CONTROL_WHY_MAX, "nothing is being recorded; expected --vcd FILE or vcd.start");
+    else snprintf(why, CONTROL_WHY_MAX, "no recording; start one with --vcd FILE or vcd.start");
     return s->bench->recording;
 }
 
@@ -25,7 +25,7 @@ static bool do_vcd_start(void *ctx, const char *path, unsigned unit, char *why)
 {
     struct service *s = ctx;
     if (s->bench->recording) {
-        snprintf(why, CONTROL_WHY_MAX, "a recording goes on already; vcd.stop ends it");
+        snprintf(why, CONTROL_WHY_MAX, "a recording is running; stop it with vcd.stop");
         return false;
     }
     FILE *file = fopen(path, "wbe");
@@ -42,11 +42,11 @@ static bool do_vcd_stop(void *ctx, char *why)
 {
     struct service *s = ctx;
     if (!s->bench->recording) {
-        snprintf(why, CONTROL_WHY_MAX, "nothing is being recorded");
+        snprintf(why, CONTROL_WHY_MAX, "no recording");
         return false;
     }
     bench_record_end(s->bench);
-    service_recording_error(s, "the recording is not complete");
+    service_recording_error(s, "the recording is incomplete");
     fclose(s->ports.vcd);
     s->ports.vcd = NULL;
     return true;

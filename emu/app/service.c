@@ -74,10 +74,10 @@ void service_close(struct service *s)
 {
     const bool recorded = s->bench->recording;
     bench_finish(s->bench);
-    if (recorded) service_recording_error(s, "the recording is not complete");
+    if (recorded) service_recording_error(s, "the recording is incomplete");
     if (s->loop.started && !s->o->quiet) print_counters(s);
     if (!truth_log_close(&s->truth_log)) {
-        fprintf(stderr, "psa-emu: --truth-log %s: is not complete\n", s->o->truth_log);
+        fprintf(stderr, "psa-emu: --truth-log %s: the file is incomplete\n", s->o->truth_log);
         s->vcd_failed = true;
     }
     service_sweep(s, true);

@@ -18,7 +18,7 @@ static bool do_run(void *ctx, int64_t for_ns, uint64_t after_tx, char *why)
         return false;
     }
     if (loop_step(&s->loop, for_ns, after_tx)) return true;
-    snprintf(why, CONTROL_WHY_MAX, "another run is under way");
+    snprintf(why, CONTROL_WHY_MAX, "another run is in progress");
     return false;
 }
 
@@ -152,7 +152,7 @@ static void moved(void *ctx, int64_t now_ns)
     journal_moved(&s->journal);
     service_sweep(s, false);
     snapshot_let_go(&s->ears, s->bench);
-    if (s->bench->recording) service_recording_error(s, "the recording ends here, the run goes on");
+    if (s->bench->recording) service_recording_error(s, "the recording ends here, the run continues");
 }
 
 static void run_done(void *ctx)

@@ -45,9 +45,9 @@ static bool check_event(const struct scenario *s, const struct control_bench *vi
         snprintf(text, sizeof text, "unknown command%s%s", near ? "; nearest: " : "", near ? near : "");
         return fail(s, e, what, text, why, cap);
     }
-    if (!row->changes) return fail(s, e, what, "changes nothing on the bench; expected a command that does", why, cap);
+    if (!row->changes) return fail(s, e, what, "expected a command that changes the bench", why, cap);
     const char *section = missing(s, e->cmd);
-    if (section) snprintf(text, sizeof text, "there is none on this bench: expected a section %s", section);
+    if (section) snprintf(text, sizeof text, "expected a section %s in the scenario, got none", section);
     if (section) return fail(s, e, what, text, why, cap);
     cJSON *args = cJSON_Parse(e->args);
     const bool ok = control_check(control_tables, view, e->cmd, args, text);

@@ -25,22 +25,33 @@ struct target {
     struct control_refusal *why;
 };
 
+/* What is wrong with the argument: its code, what was got, what is expected. */
+#define EXPECTED(t, code, got, ...) control_expected((t)->why, code, (t)->arg->name, got, __VA_ARGS__)
+
 static bool in_range(const struct target *t, double x, double min, double max)
 {
-    const char *unit = t->arg->unit;
+    const char *unit = t->arg->unit ? t->arg->unit : "", *gap = t->arg->unit ? " " : "";
     const double least = t->arg->least;
     if (x >= min && x <= max && !(x != 0.0 && fabs(x) < least)) return true;
-    if (least > 0.0) {
-        return control_refuse_in(t->why, "range", "%s: %.10g is outside %.10g ... %.10g and %.10g ... %.10g%s%s",
-                                 t->arg->name, x, min, -least, least, max, unit ? " " : "", unit ? unit : "");
-    }
-    return control_refuse_in(t->why, "range", "%s: %.10g is outside %.10g ... %.10g%s%s", t->arg->name, x, min, max,
-                             unit ? " " : "", unit ? unit : "");
+    if (least <= 0.0) return EXPECTED(t, "range", WHY_REAL(x), "%.10g to %.10g%s%s", min, max, gap, unit);
+    return EXPECTED(t, "range", WHY_REAL(x), "%.10g to %.10g or %.10g to %.10g%s%s", min, -least, least, max, gap,
+                    unit);
+}
+
+/* What came in the place of another type. */
+static const char *json_kind(const cJSON *j)
+{
+    return cJSON_IsNumber(j)   ? "a number"
+           : cJSON_IsString(j) ? "a string"
+           : cJSON_IsBool(j)   ? (cJSON_IsTrue(j) ? "true" : "false")
+           : cJSON_IsArray(j)  ? "a list"
+           : cJSON_IsObject(j) ? "an object"
+                               : "null";
 }
 
 static bool parse_real(const struct target *t, const cJSON *j, struct control_value *v)
 {
-    if (!cJSON_IsNumber(j)) return control_refuse_in(t->why, "type", "%s: expected a number", t->arg->name);
+    if (!cJSON_IsNumber(j)) return EXPECTED(t, "type", json_kind(j), "a number");
     v->real = j->valuedouble;
     return in_range(t, v->real, t->arg->min, t->arg->max);
 }
@@ -48,26 +59,25 @@ static bool parse_real(const struct target *t, const cJSON *j, struct control_va
 static bool parse_count(const struct target *t, const cJSON *j, struct control_value *v)
 {
     if (!parse_real(t, j, v)) return false;
-    if (v->real != floor(v->real))
-        return control_refuse_in(t->why, "type", "%s: %.10g is not an integer", t->arg->name, v->real);
+    if (v->real != floor(v->real)) return EXPECTED(t, "type", WHY_REAL(v->real), "an integer");
     v->count = (uint64_t)v->real;
     return true;
 }
 
 static bool parse_bool(const struct target *t, const cJSON *j, struct control_value *v)
 {
-    if (!cJSON_IsBool(j)) return control_refuse_in(t->why, "type", "%s: expected true or false", t->arg->name);
+    if (!cJSON_IsBool(j)) return EXPECTED(t, "type", json_kind(j), "true or false");
     v->on = cJSON_IsTrue(j);
     return true;
 }
 
 static bool parse_text(const struct target *t, const cJSON *j, struct control_value *v)
 {
-    if (!cJSON_IsString(j)) return control_refuse_in(t->why, "type", "%s: expected a string", t->arg->name);
+    if (!cJSON_IsString(j)) return EXPECTED(t, "type", json_kind(j), "a string");
     v->text = j->valuestring;
     if (strlen(v->text) > TEXT_MAX_BYTES)
-        return control_refuse_in(t->why, "range", "%s: longer than %d bytes", t->arg->name, TEXT_MAX_BYTES);
-    return *v->text || control_refuse_in(t->why, "range", "%s: is empty", t->arg->name);
+        return EXPECTED(t, "range", WHY_TEXT(v->text), "up to %d bytes", TEXT_MAX_BYTES);
+    return *v->text || EXPECTED(t, "range", WHY_TEXT(v->text), "a text");
 }
 
 static bool parse_name(const struct target *t, const cJSON *j, struct control_value *v)
@@ -75,9 +85,8 @@ static bool parse_name(const struct target *t, const cJSON *j, struct control_va
     if (!parse_text(t, j, v)) return false;
     bool good = strlen(v->text) <= NAME_MAX_BYTES;
     for (const char *s = v->text; *s; s++) good = good && *s > ' ' && *s <= '~';
-    return good ||
-           control_refuse_in(t->why, "range", "%s: \"%.40s\" is no name: up to %d printable characters without spaces",
-                             t->arg->name, v->text, NAME_MAX_BYTES);
+    return good || EXPECTED(t, "range", WHY_TEXT(v->text), "a name of up to %d printable characters without spaces",
+                            NAME_MAX_BYTES);
 }
 
 static bool parse_choice(const struct target *t, const cJSON *j, struct control_value *v)
@@ -90,9 +99,9 @@ static bool parse_choice(const struct target *t, const cJSON *j, struct control_
             v->text = word;
             return true;
         }
-        control_list_add(words, sizeof words, word);
+        why_list_add(words, sizeof words, word);
     }
-    return control_refuse_in(t->why, "range", "%s: \"%.40s\" is none of %s", t->arg->name, v->text, words);
+    return EXPECTED(t, "range", WHY_TEXT(v->text), "one of %s", words);
 }
 
 static bool parse_unit(const struct target *t, const cJSON *j, struct control_value *v)
@@ -101,28 +110,25 @@ static bool parse_unit(const struct target *t, const cJSON *j, struct control_va
     char names[160] = "";
     for (v->unit = 0; v->unit < t->bench->units; v->unit++) {
         if (strcmp(t->bench->unit_name[v->unit], v->text) == 0) return true;
-        control_list_add(names, sizeof names, t->bench->unit_name[v->unit]);
+        why_list_add(names, sizeof names, t->bench->unit_name[v->unit]);
     }
     v->unit = 0;
-    return control_refuse_in(t->why, "range", "%s: no unit \"%.40s\"; there is %s", t->arg->name, v->text, names);
+    return EXPECTED(t, "range", WHY_TEXT(v->text), "a unit: %s", names[0] ? names : "there is none");
 }
 
 static bool parse_reals(const struct target *t, const cJSON *j, struct control_value *v)
 {
     const cJSON *item;
-    if (!cJSON_IsArray(j)) return control_refuse_in(t->why, "type", "%s: expected a list of numbers", t->arg->name);
+    if (!cJSON_IsArray(j)) return EXPECTED(t, "type", json_kind(j), "a list of numbers");
     v->n = 0;
     cJSON_ArrayForEach(item, j)
     {
-        if (v->n == CONTROL_REALS_MAX)
-            return control_refuse_in(t->why, "range", "%s: more than %u numbers", t->arg->name, CONTROL_REALS_MAX);
-        if (!cJSON_IsNumber(item))
-            return control_refuse_in(t->why, "type", "%s: expected a list of numbers", t->arg->name);
+        if (v->n == CONTROL_REALS_MAX) return EXPECTED(t, "range", "more", "1 to %u numbers", CONTROL_REALS_MAX);
+        if (!cJSON_IsNumber(item)) return EXPECTED(t, "type", json_kind(item), "a list of numbers");
         if (!in_range(t, item->valuedouble, t->arg->min, t->arg->max)) return false;
         v->reals[v->n++] = item->valuedouble;
     }
-    return v->n > 0 ||
-           control_refuse_in(t->why, "range", "%s: expected 1 to %u numbers", t->arg->name, CONTROL_REALS_MAX);
+    return v->n > 0 || EXPECTED(t, "range", "none", "1 to %u numbers", CONTROL_REALS_MAX);
 }
 
 /* ---- and back */
@@ -202,8 +208,8 @@ static const struct control_arg *find_arg(const struct control_command *row, con
 static bool refuse_unknown(struct control_refusal *why, const struct control_command *row, const char *name)
 {
     char known[160] = "";
-    for (unsigned i = 0; i < control_arg_count(row); i++) control_list_add(known, sizeof known, row->arg[i].name);
-    return control_refuse_in(why, "argument", "no argument \"%.40s\"; it takes %s", name, known[0] ? known : "none");
+    for (unsigned i = 0; i < control_arg_count(row); i++) why_list_add(known, sizeof known, row->arg[i].name);
+    return control_expected(why, "argument", "args", WHY_TEXT(name), "%s", known[0] ? known : "no arguments");
 }
 
 void control_arg_limits(const struct control_bench *b, const struct control_arg *a, const struct control_value *v,
@@ -230,21 +236,21 @@ bool control_args(const struct control_bench *b, const struct control_command *r
                   struct control_value v[CONTROL_ARGS_MAX], struct control_refusal *why)
 {
     memset(v, 0, CONTROL_ARGS_MAX * sizeof *v);
-    if (args && !cJSON_IsObject(args)) return control_refuse_in(why, "syntax", "args: expected an object");
+    if (args && !cJSON_IsObject(args)) return control_expected(why, "syntax", "args", json_kind(args), "an object");
     const cJSON *j;
     cJSON_ArrayForEach(j, args)
     {
         const struct control_arg *a = find_arg(row, j->string);
         if (!a) return refuse_unknown(why, row, j->string);
         struct control_value *value = &v[a - row->arg];
-        if (value->given) return control_refuse_in(why, "argument", "%s is given twice", a->name);
+        if (value->given) return control_expected(why, "argument", a->name, "two", "one value");
         if (!types[a->type].parse(&(struct target){b, a, why}, j, value)) return false;
         value->given = true;
     }
     for (unsigned i = 0; i < control_arg_count(row); i++) {
         const struct control_arg *a = &row->arg[i];
         if (!v[i].given && !a->optional)
-            return control_refuse_in(why, "argument", "%s is missing: %s", a->name, a->what);
+            return control_expected(why, "argument", a->name, "nothing", "a value (%s)", a->what);
         if (!within_limits(&(struct target){b, a, why}, v, &v[i])) return false;
     }
     return !row->check || row->check(b, v, why);

@@ -1,8 +1,6 @@
 #include "command/error.h"
 
-#include <stdarg.h>
 #include <stdio.h>
-#include <string.h>
 
 bool control_refuse_in(struct control_refusal *r, const char *code, const char *format, ...)
 {
@@ -14,8 +12,13 @@ bool control_refuse_in(struct control_refusal *r, const char *code, const char *
     return false;
 }
 
-void control_list_add(char *list, size_t cap, const char *word)
+bool control_expected(struct control_refusal *r, const char *code, const char *where, const char *got,
+                      const char *expected, ...)
 {
-    const size_t at = strlen(list);
-    snprintf(list + at, cap - at, "%s%s", at ? ", " : "", word);
+    va_list ap;
+    va_start(ap, expected);
+    why_vexpected(r->why, sizeof r->why, where, got, expected, ap);
+    va_end(ap);
+    r->code = code;
+    return false;
 }

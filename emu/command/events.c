@@ -36,13 +36,13 @@ bool control_event_find(const struct control_bench *b, unsigned unit, const char
                         unsigned *event, struct control_refusal *why)
 {
     char known[160] = "";
-    if (unit >= b->units) return control_refuse_in(why, "state", "%s: there is no unit", arg);
+    if (unit >= b->units) return control_expected(why, "state", arg, "no unit", "an event of a unit");
     const struct board_type *t = b->unit[unit]->type;
     for (*event = 0; *event < t->event_count; ++*event) {
         const char *other = t->events[*event];
         if (strcmp(other, name) == 0) return true;
-        control_list_add(known, sizeof known, other);
+        why_list_add(known, sizeof known, other);
     }
-    return control_refuse_in(why, "range", "%s: no event \"%.20s\" on %s, a %s; there is %s", arg, name,
-                             b->unit_name[unit], t->title, known);
+    return control_expected(why, "range", arg, WHY_TEXT(name), "an event of %s, a %s: %s", b->unit_name[unit], t->title,
+                            known);
 }

@@ -26,7 +26,7 @@ static enum control_outcome do_run(struct control *c, const struct control_value
 {
     (void)result;
     (void)t_ns;
-    if (c->waiting) return control_refuse(c, "state", "another run is under way");
+    if (c->waiting) return control_refuse(c, "state", "another run is in progress");
     const int64_t for_ns = (int64_t)nearbyint(v[0].real * 1e9);
     if (c->bench->sim.run(c->bench->ctx, for_ns, v[1].count, c->refusal.why)) return CONTROL_LATER;
     c->refusal.code = "state";
@@ -45,7 +45,7 @@ static enum control_outcome do_unit_reset(struct control *c, const struct contro
 {
     (void)result;
     if (!v[0].given && c->bench->units != 1) {
-        return control_refuse(c, "argument", "unit is missing: there are %u units", c->bench->units);
+        return control_refuse(c, "argument", "unit: expected one of %u units, got nothing", c->bench->units);
     }
     const struct unit *u = c->bench->unit[v[0].unit];
     u->type->reset(u->board, t_ns);

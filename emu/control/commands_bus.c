@@ -29,8 +29,8 @@ static enum control_outcome do_cycle(struct control *c, const struct control_val
 {
     const struct control_value *strobe = &v[write ? WRITE_STROBE : READ_STROBE];
     struct control_cycle *k = control_cycle_free(c);
-    if (!k) return control_refuse(c, "state", "%u cycles are under way", CONTROL_CYCLES_MAX);
-    if (c->waiting && c->client) return control_refuse(c, "state", "another run is under way");
+    if (!k) return control_refuse(c, "state", "expected up to %u cycles in progress", CONTROL_CYCLES_MAX);
+    if (c->waiting && c->client) return control_refuse(c, "state", "another run is in progress");
     *k = (struct control_cycle){.control = c, .client = c->client, .unit = v[UNIT].unit};
     k->cycle = (struct board_cycle){.write = write,
                                     .address = (uint8_t)v[ADDRESS].count,
@@ -57,8 +57,8 @@ static bool has_bus(const struct control_bench *b, const struct control_value *v
 {
     const struct board_type *t = b->unit[v[UNIT].unit]->type;
     if (t->bus) return true;
-    return control_refuse_in(why, "range", "unit: %s is a %s, which has no parallel bus", b->unit_name[v[UNIT].unit],
-                             t->title);
+    return control_refuse_in(why, "range", "unit: expected a board with a parallel bus, got %s, a %s",
+                             b->unit_name[v[UNIT].unit], t->title);
 }
 
 // clang-format off

@@ -21,11 +21,12 @@ static bool can_be_sent(const struct control_bench *b, const struct control_valu
 {
     struct can_msg m;
     if (!can_text_get(v[FRAME].text, &m))
-        return control_refuse_in(
-            why, "range", "frame: \"%.140s\" is no frame; as 609#2F00210104, 12345678#R4 or 123##01122", v[FRAME].text);
+        return control_expected(why, "range", "frame", WHY_TEXT(v[FRAME].text),
+                                "a frame such as 609#2F00210104, 12345678#R4 or 123##01122");
     const unsigned bus = bus_of(b, v);
     if (bus < b->buses && b->host[bus]) return true;
-    return control_refuse_in(why, "range", "bus: there is no %s", v[BUS].given ? v[BUS].text : "bus on this bench");
+    return control_expected(why, "range", "bus", v[BUS].given ? WHY_TEXT(v[BUS].text) : "nothing",
+                            "a bus of this bench");
 }
 
 static enum control_outcome do_send(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
@@ -38,9 +39,9 @@ static enum control_outcome do_send(struct control *c, const struct control_valu
     case CAN_OK:
         return CONTROL_DONE;
     case CAN_FULL:
-        return control_refuse(c, "state", "%u frames of the bench wait for the bus already", CAN_QUEUE_MAX);
+        return control_refuse(c, "state", "the queue of %u frames to send is full", CAN_QUEUE_MAX);
     default:
-        return control_refuse(c, "state", "the bus does not carry such a frame");
+        return control_refuse(c, "state", "this bus does not carry frames of this format");
     }
 }
 

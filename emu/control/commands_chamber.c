@@ -36,7 +36,7 @@ static enum control_outcome answer(struct control *c, cJSON *result, int64_t t_n
 
 static enum control_outcome no_chamber(struct control *c)
 {
-    return control_refuse(c, "state", "there is no thermal chamber in this scenario");
+    return control_refuse(c, "state", "this scenario has no thermal chamber");
 }
 
 static enum control_outcome do_set(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
@@ -44,7 +44,8 @@ static enum control_outcome do_set(struct control *c, const struct control_value
     if (!has_chamber(c->bench)) return no_chamber(c);
     control_settle_inputs(c->bench, t_ns);
     if (chamber_set(&c->bench->lab->chamber, v[0].real, t_ns) == CHAMBER_OK) return answer(c, result, t_ns);
-    return control_refuse(c, "range", "temp_degc: %.10g is not what the chamber can", v[0].real);
+    return control_refuse(c, "range", "temp_degc: expected a temperature that the chamber reaches, got %.10g",
+                          v[0].real);
 }
 
 static enum control_outcome do_ramp(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
@@ -52,8 +53,8 @@ static enum control_outcome do_ramp(struct control *c, const struct control_valu
     if (!has_chamber(c->bench)) return no_chamber(c);
     control_settle_inputs(c->bench, t_ns);
     if (chamber_ramp(&c->bench->lab->chamber, v[0].real, t_ns) == CHAMBER_OK) return answer(c, result, t_ns);
-    return control_refuse(c, "range", "ramp_k_per_min: %.10g is not what the chamber can: above 0, up to %.10g K/min",
-                          v[0].real, chamber_ramp_max_k_per_min(&c->bench->lab->chamber));
+    return control_refuse(c, "range", "ramp_k_per_min: expected above 0, up to %.10g K/min, got %.10g",
+                          chamber_ramp_max_k_per_min(&c->bench->lab->chamber), v[0].real);
 }
 
 static enum control_outcome do_read(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)

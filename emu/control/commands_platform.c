@@ -10,8 +10,7 @@ static struct platform *platform_of(const struct control_bench *b)
 static bool has_vehicle(const struct control_bench *b, const struct control_value *v, struct control_refusal *why)
 {
     (void)v;
-    return platform_of(b) ||
-           control_refuse_in(why, "state", "there is no platform in this scenario, and no vehicle under it");
+    return platform_of(b) || control_refuse_in(why, "state", "this scenario has no platform and no vehicle");
 }
 
 static enum control_outcome do_attitude(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
@@ -57,7 +56,7 @@ static bool has_modes(const struct control_bench *b, const struct control_value 
 {
     const struct unit *u = b->unit[v[0].unit];
     return u->type->set_mode ||
-           control_refuse_in(why, "state", "%s is a %s: a gyro unit has modes", u->cfg.name, u->type->title);
+           control_refuse_in(why, "state", "unit: expected a gyro unit, got %s, a %s", u->cfg.name, u->type->title);
 }
 
 static enum control_outcome do_mode(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)

@@ -3,7 +3,7 @@
 
 static enum control_outcome refuse_without(struct control *c)
 {
-    return control_refuse(c, "state", "this bench cannot be saved or doubled");
+    return control_refuse(c, "state", "not available on this bench");
 }
 
 static enum control_outcome do_snapshot(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)

@@ -39,13 +39,13 @@ static void add_supply(const struct control *c, cJSON *result, int64_t t_ns)
 
 static enum control_outcome no_supply(struct control *c)
 {
-    return control_refuse(c, "state", "there is no supply in this scenario; the boards are always fed");
+    return control_refuse(c, "state", "this scenario has no power supply; its boards are always powered");
 }
 
 /* After a command: the boards that it feeds may go off or come back. */
 static enum control_outcome answer(struct control *c, enum supply_result r, cJSON *result, int64_t t_ns)
 {
-    if (r != SUPPLY_OK) return control_refuse(c, "range", "that is not what the supply can");
+    if (r != SUPPLY_OK) return control_refuse(c, "range", "outside the range of the supply");
     if (c->bench->sim.supply_changed) c->bench->sim.supply_changed(c->bench->ctx, t_ns);
     add_supply(c, result, t_ns);
     return CONTROL_DONE;

@@ -57,7 +57,7 @@ static void add_axis(const struct control *c, const struct control_value *v, cJS
 
 static enum control_outcome no_table(struct control *c)
 {
-    return control_refuse(c, "state", "there is no rate table in this scenario");
+    return control_refuse(c, "state", "this scenario has no rate table");
 }
 
 static enum control_outcome refuse(struct control *c, enum motion_result r, const struct control_value *v)
@@ -111,7 +111,8 @@ static enum control_outcome do_sine(struct control *c, const struct control_valu
 static enum control_outcome do_profile(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
 {
     if (!has_table(c->bench)) return no_table(c);
-    if (v[1].n != v[2].n) return control_refuse(c, "range", "%u times and %u rates; as many of each", v[1].n, v[2].n);
+    if (v[1].n != v[2].n)
+        return control_refuse(c, "range", "rates_dps: expected %u rates, one for each time, got %u", v[1].n, v[2].n);
     struct table t = c->bench->lab->table;
     const enum motion_result r = table_profile(&t, axis_index(v), v[1].reals, v[2].reals, v[1].n, t_ns);
     return take(c, &t, r, v, result, t_ns);

@@ -31,7 +31,7 @@ enum control_outcome control_call(struct control *c, const char *cmd, const cJSO
 {
     struct control_value v[CONTROL_ARGS_MAX];
     const struct control_command *row = control_find(c->tables, cmd);
-    if (!row) return control_refuse(c, "command", "\"%.40s\": unknown command; help lists them", cmd);
+    if (!row) return control_refuse(c, "command", "\"%.40s\": unknown command; see help", cmd);
     if (!control_args(c->bench, row, args, v, &c->refusal)) return CONTROL_REFUSED;
     return control_do(c, row, v, result, t_ns);
 }
@@ -79,21 +79,21 @@ void control_run_forget(struct control *c)
 static enum control_outcome dispatch(struct control *c, const cJSON *request, cJSON *result, int64_t t_ns)
 {
     if (!cJSON_IsObject(request)) {
-        return control_refuse(c, "syntax",
-                              "not a JSON object: one {\"id\":1,\"cmd\":\"help\"} a line, up to 4095 bytes");
+        return control_refuse(
+            c, "syntax", "expected a JSON object such as {\"id\":1,\"cmd\":\"help\"} in a line of up to 4095 bytes");
     }
     const cJSON *j;
     cJSON_ArrayForEach(j, request)
     {
         if (strcmp(j->string, "id") != 0 && strcmp(j->string, "cmd") != 0 && strcmp(j->string, "args") != 0) {
-            return control_refuse(c, "syntax", "\"%.40s\": unknown member; a command has id, cmd and args", j->string);
+            return control_refuse(c, "syntax", "expected the members id, cmd and args, got \"%.40s\"", j->string);
         }
         if (cJSON_GetObjectItemCaseSensitive(request, j->string) != j) {
-            return control_refuse(c, "syntax", "%s is given twice", j->string);
+            return control_refuse(c, "syntax", "%s: expected one value, got two", j->string);
         }
     }
     const cJSON *name = cJSON_GetObjectItemCaseSensitive(request, "cmd");
-    if (!cJSON_IsString(name)) return control_refuse(c, "syntax", "cmd: expected a command's name; help lists them");
+    if (!cJSON_IsString(name)) return control_refuse(c, "syntax", "cmd: expected the name of a command; see help");
     return control_call(c, name->valuestring, cJSON_GetObjectItemCaseSensitive(request, "args"), result, t_ns);
 }
 

@@ -25,7 +25,7 @@ enum control_outcome control_cycle_refuse(struct control *c, const struct contro
 static enum control_outcome put_result(struct control *c, const struct control_cycle *k, cJSON *result)
 {
     const struct board_bus *bus = c->bench->unit[k->unit]->type->bus;
-    if (!k->over) return control_refuse(c, "state", "the cycle has not come to its end");
+    if (!k->over) return control_refuse(c, "state", "the cycle did not complete");
     if (k->result != BOARD_CYCLE_OK) return control_cycle_refuse(c, k, k->result);
     const char *name = bus->name(k->cycle.address);
     if (name) cJSON_AddStringToObject(result, "name", name);

@@ -41,16 +41,16 @@ static bool find_kind(const char *name, const struct fault_kind **kind, struct c
     const char *dot = strchr(name, '.');
     const size_t layer = dot ? (size_t)(dot - name) + 1 : 0;
     for (unsigned i = 0; (k = fault_kind(i)) != NULL; i++) {
-        if (layer && strncmp(k->name, name, layer) == 0) control_list_add(known, sizeof known, k->name);
+        if (layer && strncmp(k->name, name, layer) == 0) why_list_add(known, sizeof known, k->name);
     }
-    if (!known[0]) return control_refuse_in(why, "range", "kind: no \"%.40s\"; fault.kinds lists them", name);
-    return control_refuse_in(why, "range", "kind: no \"%.40s\"; there is %s", name, known);
+    if (!known[0]) return control_expected(why, "range", "kind", WHY_TEXT(name), "a name that fault.kinds lists");
+    return control_expected(why, "range", "kind", WHY_TEXT(name), "one of %s", known);
 }
 
 static bool find_point(const struct control_bench *b, const char *text, struct fault *f, struct control_refusal *why)
 {
     if (fault_point_find(b, text, &f->point, f->name)) return true;
-    return control_refuse_in(why, "range", "point: no \"%.40s\" on this bench; fault.points lists them", text);
+    return control_expected(why, "range", "point", WHY_TEXT(text), "a name that fault.points lists");
 }
 
 static bool has_unit(enum fault_place place)
@@ -66,7 +66,7 @@ static void join_places(const struct control_bench *b, const struct fault *f, ch
     const struct fault_types t = on_board ? fault_type_of(b->unit[f->point.unit]->type) : fault_types_of(b);
     for (unsigned p = 0; p < FAULT_PLACES; p++) {
         for (unsigned i = 0; f->kind->places & FAULT_BIT(p) && fault_place_name(&t, (enum fault_place)p, i, name); i++)
-            control_list_add(out, cap, name);
+            why_list_add(out, cap, name);
     }
 }
 
@@ -75,9 +75,9 @@ bool fault_fits(const struct control_bench *b, const struct fault *f, char *why)
     char places[120] = "";
     if (f->kind->places & FAULT_BIT(f->point.place)) return !f->kind->fits || f->kind->fits(b, f, why);
     join_places(b, f, places, sizeof places);
-    if (!places[0]) snprintf(places, sizeof places, "other boards");
-    snprintf(why, CONTROL_WHY_MAX, "%s: not on %s, which is %s; it works on %s", f->kind->name, f->name,
-             fault_place_what(f->point.place), places);
+    if (!places[0]) snprintf(places, sizeof places, "another board");
+    snprintf(why, CONTROL_WHY_MAX, "%s: expected a point on %s, got %s, which is %s", f->kind->name, places, f->name,
+             fault_place_what(f->point.place));
     return false;
 }
 
@@ -95,20 +95,20 @@ bool fault_values_fit(const struct fault *f, struct control_refusal *why)
         const char *name = fault_args[i].name;
         const bool given = fault_given(f, (enum fault_arg)i);
         if (given && i != FAULT_FOR_S && !((k->need | k->may) & FAULT_BIT(i))) {
-            return control_refuse_in(why, "argument", "%s: %s takes no such value", name, k->name);
+            return control_refuse_in(why, "argument", "%s: not an argument of %s", name, k->name);
         }
         if (!given && (k->need & FAULT_BIT(i))) {
-            return control_refuse_in(why, "argument", "%s is missing: %s", name, fault_args[i].what);
+            return control_expected(why, "argument", name, "nothing", "a value (%s)", fault_args[i].what);
         }
         if (given && (k->nonzero & FAULT_BIT(i)) && f->value[i] == 0.0) {
-            return control_refuse_in(why, "range", "%s: 0 would change nothing", name);
+            return control_expected(why, "range", name, "0", "a value other than 0");
         }
         if ((i == FAULT_FOR_S || i == FAULT_HOLD_S) && f->value[i] > 0.0 && ns(f->value[i]) == 0) {
-            return control_refuse_in(why, "range", "%s: %.10g: less than a nanosecond", name, f->value[i]);
+            return control_expected(why, "range", name, WHY_REAL(f->value[i]), "0 or at least 1e-9 s");
         }
     }
     return !k->once || !fault_given(f, FAULT_FOR_S) ||
-           control_refuse_in(why, "argument", "for_s: %s is over as soon as it is done", k->name);
+           control_refuse_in(why, "argument", "for_s: %s is instantaneous and takes no duration", k->name);
 }
 
 /* ---- when */
@@ -134,14 +134,14 @@ static bool set_trigger(const struct control_bench *b, const struct control_valu
     for (unsigned i = 0; !v[FAULT_AFTER].given && i < sizeof of_events / sizeof *of_events; i++) {
         const char *name = fault_args[of_events[i]].name;
         if (v[of_events[i]].given)
-            return control_refuse_in(why, "argument", "%s: only with after, an event's name", name);
+            return control_refuse_in(why, "argument", "%s: requires after, the name of an event", name);
     }
     if (!v[FAULT_AFTER].given) return true;
     if (!v[FAULT_UNIT].given && !has_unit(f->point.place) && b->units != 1)
-        return control_refuse_in(why, "argument", "unit is missing: whose events count");
+        return control_expected(why, "argument", "unit", "nothing", "the unit whose events count");
     if (!find_event(b, f->unit, &v[FAULT_AFTER], "after", &after, why)) return false;
     if (!find_event(b, f->unit, &v[FAULT_SINCE], "since", &since, why)) return false;
-    if (after == since) return control_refuse_in(why, "range", "since: is after itself");
+    if (after == since) return control_expected(why, "range", "since", "the event of after", "another event");
     f->trigger = fault_trigger(after, since, v[FAULT_COUNT].given ? (unsigned)v[FAULT_COUNT].count : 1);
     return true;
 }

@@ -70,7 +70,7 @@ static bool has_clock(const struct control_bench *b, const struct fault *f, char
     const double ppm = f->value[FAULT_CLOCK_PPM];
     if (!has_fault(b, f, why)) return false;
     if (ppm == nearbyint(ppm)) return true;
-    snprintf(why, CONTROL_WHY_MAX, "clock_ppm: %.10g: expected whole ppm", ppm);
+    snprintf(why, CONTROL_WHY_MAX, "clock_ppm: expected whole ppm, got %.10g", ppm);
     return false;
 }
 
@@ -79,8 +79,8 @@ static bool has_register(const struct control_bench *b, const struct fault *f, c
     const struct board_part *p = part_of(b, f);
     if (p->registers == 0) return lacks(f, NULL, why);
     if (f->value[FAULT_REGISTER] < p->registers) return true;
-    snprintf(why, CONTROL_WHY_MAX, "register: %.0f: %s has 0 to %u", f->value[FAULT_REGISTER], f->name,
-             p->registers - 1);
+    snprintf(why, CONTROL_WHY_MAX, "register: expected 0 to %u for %s, got %.0f", p->registers - 1, f->name,
+             f->value[FAULT_REGISTER]);
     return false;
 }
 

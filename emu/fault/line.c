@@ -46,7 +46,8 @@ static bool has_pulse(const struct control_bench *b, const struct fault *f, char
         return false;
     }
     if (f->value[FAULT_PULSE] <= pulses) return true;
-    snprintf(why, CONTROL_WHY_MAX, "pulse: %.0f: a frame of this board has 1 to %u", f->value[FAULT_PULSE], pulses);
+    snprintf(why, CONTROL_WHY_MAX, "pulse: expected 1 to %u (pulses in a frame of this board), got %.0f", pulses,
+             f->value[FAULT_PULSE]);
     return false;
 }
 

@@ -48,8 +48,8 @@ static double least_ppm(const struct unit *u)
 static bool at_least(const struct fault *f, enum fault_arg arg, double least, const char *unit, char *why)
 {
     if (fabs(f->value[arg]) >= least) return true;
-    snprintf(why, CONTROL_WHY_MAX, "%s: %.10g: a code of this board is %.4g %s, a smaller value has no effect",
-             fault_args[arg].name, f->value[arg], least, unit);
+    snprintf(why, CONTROL_WHY_MAX, "%s: expected at least %.4g %s, one code of this board, got %.10g",
+             fault_args[arg].name, least, unit, f->value[arg]);
     return false;
 }
 
@@ -69,8 +69,9 @@ static bool passes(const struct control_bench *b, const struct fault *f, enum fa
     const struct unit *u = b->unit[f->point.unit];
     const double most_v = fmin(u->cfg.board.afe[f->point.index].clip_v, range_v(u)); /* buffer, converter */
     if (!fault_given(f, limit) || fabs(f->value[limit]) < most_v) return true;
-    snprintf(why, CONTROL_WHY_MAX, "%s: %.10g: the chain passes %.10g ... %.10g V, this limit has no effect",
-             fault_args[limit].name, f->value[limit], -most_v, most_v);
+    snprintf(why, CONTROL_WHY_MAX,
+             "%s: expected a limit within %.10g to %.10g V, which the analog chain passes, got %.10g",
+             fault_args[limit].name, -most_v, most_v, f->value[limit]);
     return false;
 }
 
@@ -90,14 +91,14 @@ static bool has_limits(const struct control_bench *b, const struct fault *f, cha
 {
     if (!has_sensor(b, f, why)) return false;
     if (!fault_given(f, FAULT_LOW_V) && !fault_given(f, FAULT_HIGH_V)) {
-        snprintf(why, CONTROL_WHY_MAX, "low_v or high_v is missing: where the output stops");
+        snprintf(why, CONTROL_WHY_MAX, "expected low_v or high_v, where the output stops, got neither");
         return false;
     }
     if (!passes(b, f, FAULT_LOW_V, why) || !passes(b, f, FAULT_HIGH_V, why)) return false;
     if (!fault_given(f, FAULT_LOW_V) || !fault_given(f, FAULT_HIGH_V)) return true;
     if (f->value[FAULT_LOW_V] < f->value[FAULT_HIGH_V]) return true;
-    snprintf(why, CONTROL_WHY_MAX, "low_v: %.10g is not below high_v, %.10g", f->value[FAULT_LOW_V],
-             f->value[FAULT_HIGH_V]);
+    snprintf(why, CONTROL_WHY_MAX, "low_v: expected less than high_v, %.10g, got %.10g", f->value[FAULT_HIGH_V],
+             f->value[FAULT_LOW_V]);
     return false;
 }
 
@@ -179,7 +180,7 @@ static bool has_error(const struct control_bench *b, const struct fault *f, char
     const double grown_ppm = f->value[FAULT_DRIFT_PPM_PER_S] * (double)f->for_ns / (double)NS_PER_S;
     const bool drifts = f->value[FAULT_DRIFT_PPM_PER_S] != 0.0;
     if (f->value[FAULT_REFERENCE_PPM] == 0.0 && !drifts) {
-        snprintf(why, CONTROL_WHY_MAX, "reference_ppm or drift_ppm_per_s is missing, or reference_ppm is 0");
+        snprintf(why, CONTROL_WHY_MAX, "expected reference_ppm other than 0, or drift_ppm_per_s, got neither");
         return false;
     }
     if (!drifts) return at_least(f, FAULT_REFERENCE_PPM, least, "ppm", why);

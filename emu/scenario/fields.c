@@ -1,5 +1,6 @@
 #include "scenario/fields.h"
 
+#include "base/why.h"
 #include "command/exact.h"
 
 #include <errno.h>
@@ -55,10 +56,9 @@ static bool load_real(struct yaml_file *f, const struct yaml_node *node, const s
     const char *text = yaml_scalar(node);
     char *end = NULL;
     if (text) *v = strtod(text, &end);
-    if (!text || end == text || *end || !isfinite(*v))
-        return yaml_file_fail(f, node, d->key, "\"%s\" is not a number", text ? text : "a list or mapping");
+    if (!text || end == text || *end || !isfinite(*v)) return yaml_file_expected(f, node, d->key, "a number");
     if (*v >= d->min && *v <= d->max) return true;
-    return yaml_file_fail(f, node, d->key, "%s is outside %.10g ... %.10g", text, d->min, d->max);
+    return yaml_file_expected(f, node, d->key, "%.10g to %.10g", d->min, d->max);
 }
 
 static bool load_integer(struct yaml_file *f, const struct yaml_node *node, const struct yaml_field *d, uint64_t *v)
@@ -68,16 +68,16 @@ static bool load_integer(struct yaml_file *f, const struct yaml_node *node, cons
     errno = 0;
     *v = strtoull(text, &end, 0);
     if (text[0] < '0' || text[0] > '9' || *end || errno)
-        return yaml_file_fail(f, node, d->key, "\"%s\" is not an integer of 0 or more", text);
+        return yaml_file_expected(f, node, d->key, "an integer of 0 or more");
     if (d->type == YAML_U64 || ((double)*v >= d->min && (double)*v <= d->max)) return true;
-    return yaml_file_fail(f, node, d->key, "%s is outside %.10g ... %.10g", text, d->min, d->max);
+    return yaml_file_expected(f, node, d->key, "%.10g to %.10g", d->min, d->max);
 }
 
 static bool load_bool(struct yaml_file *f, const struct yaml_node *node, const struct yaml_field *d, bool *v)
 {
     const char *text = yaml_scalar(node);
     *v = strcmp(text, "true") == 0;
-    return *v || strcmp(text, "false") == 0 || yaml_file_fail(f, node, d->key, "\"%s\": expected true or false", text);
+    return *v || strcmp(text, "false") == 0 || yaml_file_expected(f, node, d->key, "true or false");
 }
 
 static bool load_text(struct yaml_file *f, const struct yaml_node *node, const struct yaml_field *d, char *v)
@@ -85,7 +85,7 @@ static bool load_text(struct yaml_file *f, const struct yaml_node *node, const s
     const char *text = yaml_scalar(node);
     const size_t len = strlen(text);
     if (len < 1 || len + 1 > (size_t)d->max)
-        return yaml_file_fail(f, node, d->key, "expected 1 to %d characters", (int)d->max - 1);
+        return yaml_file_expected(f, node, d->key, "1 to %d characters", (int)d->max - 1);
     memcpy(v, text, len + 1);
     return true;
 }
@@ -110,7 +110,8 @@ static bool load_choice(struct yaml_file *f, const struct yaml_node *node, const
     }
     list_choices(d, all, sizeof all);
     const char *near = text ? yaml_nearest(text, choice_at, d->choices) : NULL;
-    return yaml_file_fail(f, node, d->key, "expected %s%s%s", all, near ? "; nearest: " : "", near ? near : "");
+    return yaml_file_expected(f, node, d->key, "%s%s%s%s", all, near ? " (nearest: " : "", near ? near : "",
+                              near ? ")" : "");
 }
 
 static bool load_reals(struct yaml_file *f, const struct yaml_node *node, const struct yaml_field *d, double *v)
@@ -122,8 +123,8 @@ static bool load_reals(struct yaml_file *f, const struct yaml_node *node, const 
         return true;
     }
     if (node->kind != YAML_SEQUENCE || yaml_count(node) != d->count) {
-        return yaml_file_fail(f, node, d->key, "expected %s%u numbers: %s",
-                              d->type == YAML_EACH ? "one value or a list of " : "a list of ", d->count, d->what);
+        return yaml_file_expected(f, node, d->key, "%s%u numbers (%s)",
+                                  d->type == YAML_EACH ? "one value or a list of " : "a list of ", d->count, d->what);
     }
     for (const struct yaml_item *i = node->first; i; i = i->next)
         if (!load_real(f, i->value, d, &v[n++])) return false;
@@ -155,7 +156,7 @@ bool yaml_load_value(struct yaml_file *f, const struct yaml_node *node, const st
     if (d->type == YAML_REALS || d->type == YAML_EACH) return load_reals(f, node, d, at);
     if (d->type == YAML_CHOICE) return load_choice(f, node, d, at);
     if (!yaml_scalar(node))
-        return yaml_file_fail(f, node, d->key, "expected one value of up to %u characters", YAML_FILE_TEXT);
+        return yaml_file_expected(f, node, d->key, "one value of up to %u characters", YAML_FILE_TEXT);
     if (d->type == YAML_REAL) return load_real(f, node, d, at);
     if (d->type == YAML_BOOL) return load_bool(f, node, d, at);
     if (d->type == YAML_TEXT) return load_text(f, node, d, at);
@@ -168,14 +169,11 @@ static bool fail_unknown(struct yaml_file *f, const struct yaml_node *key, const
 {
     char known[600] = "";
     const char *name;
-    for (size_t i = 0; (name = key_at(t, i)); i++) {
-        const size_t at = strlen(known);
-        snprintf(known + at, sizeof known - at, "%s%s", at ? ", " : "", name);
-    }
+    for (size_t i = 0; (name = key_at(t, i)); i++) why_list_add(known, sizeof known, name);
     const char *text = yaml_scalar(key), *near = text ? yaml_nearest(text, key_at, t) : NULL;
     const bool unit = near && strncmp(near, text, strlen(text)) == 0 && *yaml_unit(near);
-    return yaml_file_fail(f, key, text ? text : "?", "unknown key; %s%s%sknown here: %s", near ? "nearest: " : "",
-                          near ? near : "", near ? (unit ? " (its unit is part of the name); " : "; ") : "", known);
+    return yaml_file_fail(f, key, text ? text : "?", "unknown key%s%s%s; expected one of %s", near ? ", nearest: " : "",
+                          near ? near : "", unit ? " (its unit is part of the name)" : "", known);
 }
 
 static bool comes_again(const struct yaml_node *node, const struct yaml_item *of, const char *name)
@@ -193,7 +191,7 @@ static bool load_pair(struct yaml_file *f, const struct yaml_node *node, const s
     size_t offset;
     for (size_t i = 0; name && (d = yaml_row(t, i, &offset)); i++) {
         if (strcmp(d->key, name) != 0) continue;
-        if (comes_again(node, pair, name)) return yaml_file_fail(f, pair->key, name, "comes twice");
+        if (comes_again(node, pair, name)) return yaml_file_fail(f, pair->key, name, "given twice");
         return yaml_load_value(f, pair->value, d, section + offset);
     }
     return fail_unknown(f, pair->key, t);
@@ -203,8 +201,7 @@ bool yaml_load(struct yaml_file *f, const struct yaml_node *node, const char *na
                void *section)
 {
     const size_t outer = strlen(f->where);
-    if (node->kind != YAML_MAPPING)
-        return yaml_file_fail(f, node, *name ? name : NULL, "expected a mapping `key: value`");
+    if (node->kind != YAML_MAPPING) return yaml_file_expected(f, node, *name ? name : NULL, "a mapping `key: value`");
     if (*name) snprintf(f->where + outer, sizeof f->where - outer, "%s.", name);
     for (const struct yaml_item *i = node->first; i; i = i->next)
         if (!load_pair(f, node, i, t, section)) return false;
@@ -315,7 +312,7 @@ static cJSON *json_node(struct yaml_file *f, const struct yaml_node *node, unsig
 {
     if (node->kind == YAML_SCALAR) {
         const char *text = yaml_scalar(node);
-        if (!text) yaml_file_fail(f, node, "args", "expected a value of up to %u characters", YAML_FILE_TEXT);
+        if (!text) yaml_file_expected(f, node, "args", "a value of up to %u characters", YAML_FILE_TEXT);
         return text ? json_scalar(node, text) : NULL;
     }
     cJSON *j = node->kind == YAML_MAPPING ? cJSON_CreateObject() : cJSON_CreateArray();
@@ -324,7 +321,7 @@ static cJSON *json_node(struct yaml_file *f, const struct yaml_node *node, unsig
         bool fits = key && depth < JSON_DEPTH_MAX && ++*items <= JSON_ITEMS_MAX;
         if (!fits) yaml_file_fail(f, i->value, "args", "nested deeper or longer than arguments are");
         if (fits && i->key && cJSON_HasObjectItem(j, key)) {
-            yaml_file_fail(f, i->key, key, "comes twice");
+            yaml_file_fail(f, i->key, key, "given twice");
             fits = false;
         }
         cJSON *v = fits ? json_node(f, i->value, depth + 1, items) : NULL;

@@ -79,8 +79,7 @@ static void tell_names(const char *folder, const char *name, char *why, size_t c
     char(*names)[FIND_NAME_MAX];
     unsigned count;
     if (!find_proto_folder(folder, path, why, cap) || !find_names(path, &names, &count, why, cap)) return;
-    int at =
-        snprintf(why, cap, "%.60s: no such file in proto/%s; expected a path, or a name from there:", name, folder);
+    int at = snprintf(why, cap, "%.60s: expected a path or a name from proto/%s:", name, folder);
     for (unsigned i = 0; i < count && at >= 0 && (size_t)at < cap; i++)
         at += snprintf(why + at, cap - (size_t)at, "%s %s", i ? "," : "", names[i]);
     free(names);

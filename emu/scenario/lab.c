@@ -30,7 +30,7 @@ bool scenario_load_site(struct yaml_file *f, const struct yaml_node *node, void 
     for (size_t i = 2; i < scenario_site_fields.count && !site->placed; i++) {
         const char *key = site_rows[i].key;
         if (yaml_get(node, key))
-            return yaml_file_fail(f, yaml_get(node, key), "site", "%s without latitude_deg: expected both", key);
+            return yaml_file_fail(f, yaml_get(node, key), "site", "expected latitude_deg beside %s, got none", key);
     }
     return true;
 }
@@ -135,8 +135,8 @@ static bool check_axis(struct yaml_file *f, const struct yaml_node *node, const 
 {
     const bool endless = a->angle_min_deg == 0.0 && a->angle_max_deg == 0.0;
     return endless || a->angle_min_deg < a->angle_max_deg ||
-           yaml_file_fail(f, node, "axes", "angle_min_deg %.10g is not below angle_max_deg %.10g", a->angle_min_deg,
-                          a->angle_max_deg);
+           yaml_file_fail(f, node, "axes", "expected angle_min_deg below angle_max_deg %.10g, got %.10g",
+                          a->angle_max_deg, a->angle_min_deg);
 }
 
 static bool load_axes(struct yaml_file *f, const struct yaml_node *node, void *section)
@@ -145,7 +145,7 @@ static bool load_axes(struct yaml_file *f, const struct yaml_node *node, void *s
     const struct yaml_field number = {.key = "axes", .type = YAML_U32, .min = 1, .max = TABLE_AXES_MAX};
     uint32_t n = yaml_count(node);
     if (node->kind == YAML_SCALAR && !yaml_load_value(f, node, &number, &n)) return false;
-    if (n < 1 || n > TABLE_AXES_MAX) return yaml_file_fail(f, node, "axes", "expected 1 to %u axes", TABLE_AXES_MAX);
+    if (n < 1 || n > TABLE_AXES_MAX) return yaml_file_expected(f, node, "axes", "1 to %u axes", TABLE_AXES_MAX);
     const struct table_cfg model = table_default(n);
     memcpy(t->axis, model.axis, sizeof t->axis);
     t->axes = n;
@@ -201,15 +201,16 @@ bool scenario_check_lab(struct yaml_file *f, const struct yaml_node *root, const
     const struct supply_cfg *s = &lab->supply;
     if (!(c->min_degc <= c->start_degc && c->start_degc <= c->max_degc)) {
         return yaml_file_fail(f, at(root, "chamber", "start_degc"), "chamber.start_degc",
-                              "%.10g is outside min_degc %.10g ... max_degc %.10g", c->start_degc, c->min_degc,
-                              c->max_degc);
+                              "expected %.10g to %.10g (min_degc to max_degc), got %.10g", c->min_degc, c->max_degc,
+                              c->start_degc);
     }
     if (s->volt_v > s->volt_max_v)
-        return yaml_file_fail(f, at(root, "supply", "volt_v"), "supply.volt_v", "%.10g is above volt_max_v %.10g",
-                              s->volt_v, s->volt_max_v);
+        return yaml_file_fail(f, at(root, "supply", "volt_v"), "supply.volt_v",
+                              "expected up to %.10g (volt_max_v), got %.10g", s->volt_max_v, s->volt_v);
     if (s->ripple_v > s->ripple_max_v || s->ripple_hz > s->ripple_max_hz)
-        return yaml_file_fail(f, at(root, "supply", "ripple_v"), "supply.ripple_v",
-                              "the ripple is above ripple_max_v %.10g or ripple_max_hz %.10g", s->ripple_max_v,
-                              s->ripple_max_hz);
+        return yaml_file_fail(
+            f, at(root, "supply", "ripple_v"), "supply.ripple_v",
+            "expected up to %.10g V (ripple_max_v) and %.10g Hz (ripple_max_hz), got %.10g V and %.10g Hz",
+            s->ripple_max_v, s->ripple_max_hz, s->ripple_v, s->ripple_hz);
     return true;
 }

@@ -54,8 +54,7 @@ const struct yaml_fields scenario_vehicle_fields = YAML_FIELDS(vehicle_rows);
 bool scenario_load_vehicle(struct yaml_file *f, const struct yaml_node *node, void *section)
 {
     if (!yaml_get(f->root, "platform"))
-        return yaml_file_fail(f, node, "vehicle",
-                              "is under a platform, and there is none: expected a section platform");
+        return yaml_file_fail(f, node, "vehicle", "expected a section platform for the vehicle to carry, got none");
     return yaml_load(f, node, "vehicle", &scenario_vehicle_fields, &((struct scenario *)section)->lab.vehicle);
 }
 
@@ -81,13 +80,15 @@ static bool check_level(struct yaml_file *f, const struct yaml_node *units, cons
     if (!u->level[0]) return true;
     const struct scenario_unit *level = unit_named(s, u->level);
     if (!level || level->cfg.type != board_types[0])
-        return yaml_file_fail(f, units, "units", "%s: level: \"%s\" is not the name of a PSA-2", u->name, u->level);
+        return yaml_file_fail(f, units, "units", "%s: level: expected the name of a PSA-2, got \"%s\"", u->name,
+                              u->level);
     if (level->bus != u->bus)
-        return yaml_file_fail(f, units, "units", "%s: level: %s is on bus %s; expected %s, the bus of the gyro unit",
-                              u->name, level->name, level->bus_name, u->bus_name);
+        return yaml_file_fail(f, units, "units",
+                              "%s: level: expected a PSA-2 on bus %s, which the gyro unit receives, got %s on %s",
+                              u->name, u->bus_name, level->name, level->bus_name);
     return level->cfg.seat.on == LAB_PLATFORM ||
-           yaml_file_fail(f, units, "units", "%s: level: %s does not sit on the platform; expected on: platform",
-                          u->name, level->name);
+           yaml_file_fail(f, units, "units", "%s: level: expected a PSA-2 with on: platform, got %s", u->name,
+                          level->name);
 }
 
 bool scenario_check_platform(struct yaml_file *f, const struct yaml_node *root, const struct scenario *s)
@@ -96,15 +97,15 @@ bool scenario_check_platform(struct yaml_file *f, const struct yaml_node *root, 
     const struct scenario_unit *gyro = NULL;
     const bool present = s->lab.platform.present;
     if (present && !s->site.placed)
-        return yaml_file_fail(f, platform, "platform", "expected site.latitude_deg: north is where the Earth turns");
+        return yaml_file_fail(f, platform, "platform", "expected site.latitude_deg, which defines north, got none");
     for (unsigned i = 0; i < s->unit_count; i++) {
         const struct scenario_unit *u = &s->units[i];
         const bool controls = u->cfg.type->knobs & BOARD_KNOB_LEVEL;
         if (!present && controls)
-            return yaml_file_fail(f, units, "units",
-                                  "%s controls a platform, and there is none: expected a section platform", u->name);
+            return yaml_file_fail(f, units, "units", "%s: expected a section platform for it to control, got none",
+                                  u->name);
         if (controls && gyro)
-            return yaml_file_fail(f, units, "units", "%s and %s: there is one platform, and it has one gyro unit",
+            return yaml_file_fail(f, units, "units", "expected one gyro unit on the platform, got %s and %s",
                                   gyro->name, u->name);
         if (controls) gyro = u;
         if (controls && !check_level(f, units, s, u)) return false;

@@ -1,5 +1,6 @@
 #include "scenario/profile.h"
 
+#include "base/why.h"
 #include "command/exact.h"
 
 #include <stdio.h>
@@ -20,7 +21,7 @@ static bool set(struct yaml_file *f, const struct yaml_node *node, const char *k
     char why[WHY];
     const struct board_type *t = fill->type;
     const char *text = yaml_scalar(node);
-    if (!text) return yaml_file_fail(f, node, key, "expected one value of up to %u characters", YAML_FILE_TEXT);
+    if (!text) return yaml_file_expected(f, node, key, "one value of up to %u characters", YAML_FILE_TEXT);
     if (board_field_set(t->fields, t->field_count, fill->profile, key, index, text, why, sizeof why)) return true;
     /* The setter names the key itself; the line is ours to add. */
     return yaml_file_fail(f, node, NULL, "%s", why);
@@ -33,8 +34,8 @@ static bool set_sequence(struct yaml_file *f, const struct yaml_node *node, cons
     for (const struct yaml_item *i = node->first; i; i = i->next)
         if (!set(f, i->value, field->key, index++, fill)) return false;
     if (field->count && index != field->count)
-        return yaml_file_fail(f, node, field->key, "%u elements; expected %u", index, field->count);
-    return index > 0 || yaml_file_fail(f, node, field->key, "expected at least one element");
+        return yaml_file_fail(f, node, field->key, "expected %u elements, got %u", field->count, index);
+    return index > 0 || yaml_file_fail(f, node, field->key, "expected at least one element, got none");
 }
 
 static const char *key_at(const void *ctx, size_t i)
@@ -47,27 +48,23 @@ static bool fail_unknown(struct yaml_file *f, const struct yaml_node *key_node, 
                          const struct board_type *t)
 {
     char known[400] = "";
-    for (size_t i = 0; i < t->field_count; i++) {
-        const size_t at = strlen(known);
-        snprintf(known + at, sizeof known - at, "%s%s", at ? ", " : "", t->fields[i].key);
-    }
+    for (size_t i = 0; i < t->field_count; i++) why_list_add(known, sizeof known, t->fields[i].key);
     const char *near = yaml_nearest(key, key_at, t);
-    return yaml_file_fail(f, key_node, key, "unknown key; %s%s%sknown here: %s", near ? "nearest: " : "",
-                          near ? near : "", near ? "; " : "", known);
+    return yaml_file_fail(f, key_node, key, "unknown key%s%s; expected one of %s", near ? ", nearest: " : "",
+                          near ? near : "", known);
 }
 
 static bool load_pair(struct yaml_file *f, const struct yaml_item *pair, struct fill *fill)
 {
     const char *key = yaml_scalar(pair->key);
-    if (!key) return yaml_file_fail(f, pair->key, NULL, "a key is one word");
+    if (!key) return yaml_file_expected(f, pair->key, NULL, "a key of one word");
     const struct board_field *field = board_field_find(fill->type->fields, fill->type->field_count, key);
     if (!field) return fail_unknown(f, pair->key, key, fill->type);
     bool *seen = &fill->seen[field - fill->type->fields];
-    if (*seen) return yaml_file_fail(f, pair->key, key, "comes twice");
+    if (*seen) return yaml_file_fail(f, pair->key, key, "given twice");
     *seen = true;
     if (!board_field_is_list(field)) return set(f, pair->value, key, 0, fill);
-    if (pair->value->kind != YAML_SEQUENCE)
-        return yaml_file_fail(f, pair->value, key, "expected a sequence: %s", field->what);
+    if (pair->value->kind != YAML_SEQUENCE) return yaml_file_expected(f, pair->value, key, "a list (%s)", field->what);
     return set_sequence(f, pair->value, field, fill);
 }
 
@@ -76,7 +73,7 @@ static bool load_fields(struct yaml_file *f, const struct yaml_node *mapping, co
                         void *profile, bool file)
 {
     struct fill fill = {.type = type, .profile = profile};
-    if (mapping->kind != YAML_MAPPING) return yaml_file_fail(f, mapping, NULL, "expected a mapping `key: value`");
+    if (mapping->kind != YAML_MAPPING) return yaml_file_expected(f, mapping, NULL, "a mapping `key: value`");
     for (const struct yaml_item *i = mapping->first; i; i = i->next) {
         const char *key = yaml_scalar(i->key);
         if (file && key && strcmp(key, "board") == 0) continue;
@@ -127,7 +124,7 @@ static const struct board_name *find_board(struct yaml_file *f)
     const char *name = node ? yaml_scalar(node) : board_names[0].name;
     const struct board_name *found = name ? board_name_find(name) : NULL;
     profile_yaml_boards(known, sizeof known);
-    if (!found) (void)yaml_file_fail(f, node, "board", "no such board; expected %s", known);
+    if (!found) (void)yaml_file_expected(f, node, "board", "%s", known);
     return found;
 }
 

@@ -18,7 +18,7 @@ static bool check_rate(struct yaml_file *f, const struct yaml_node *node, const 
 {
     if (!b->cfg.bitrate_hz || b->cfg.bitrate_hz >= 10000) return true;
     const struct yaml_node *at = yaml_get(node, "bitrate_hz");
-    return yaml_file_fail(f, at ? at : node, "bitrate_hz", "%u is below 10000; 0 is a bus on which frames take no time",
+    return yaml_file_fail(f, at ? at : node, "bitrate_hz", "expected 10000 or more, or 0 (frames take no time), got %u",
                           b->cfg.bitrate_hz);
 }
 
@@ -37,22 +37,23 @@ static bool check_bus(struct yaml_file *f, const struct yaml_node *node, const s
     const char *name = s->bus[i].name;
     static const char letters[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_";
     if (name[strspn(name, letters)])
-        return yaml_file_fail(f, node, "name", "\"%s\": expected letters, digits and _", name);
+        return yaml_file_fail(f, node, "name", "expected letters, digits and _, got \"%s\"", name);
     for (unsigned k = 0; k < i; k++)
         if (strcmp(s->bus[k].name, name) == 0)
-            return yaml_file_fail(f, node, "name", "\"%s\" is taken by another bus", name);
+            return yaml_file_fail(f, node, "name", "expected a name of its own, got \"%s\", which another bus has",
+                                  name);
     return check_rate(f, node, &s->bus[i]);
 }
 
 static bool load_buses(struct yaml_file *f, const struct yaml_node *node, struct scenario *s)
 {
-    if (node->kind != YAML_SEQUENCE || !node->first)
-        return yaml_file_fail(f, node, "buses", "expected a sequence of buses");
+    if (node->kind != YAML_SEQUENCE || !node->first) return yaml_file_expected(f, node, "buses", "a list of buses");
     s->bus_count = 0;
     for (const struct yaml_item *i = node->first; i; i = i->next) {
         char where[40];
         const unsigned n = s->bus_count;
-        if (n == SCENARIO_BUSES_MAX) return yaml_file_fail(f, i->value, "buses", "up to %u", SCENARIO_BUSES_MAX);
+        if (n == SCENARIO_BUSES_MAX)
+            return yaml_file_fail(f, i->value, "buses", "expected up to %u buses, got more", SCENARIO_BUSES_MAX);
         s->bus[n] = (struct scenario_bus){.cfg = {.bitrate_hz = 1000000, .data_bitrate_hz = 5000000}};
         snprintf(s->bus[n].name, sizeof s->bus[n].name, "can%u", n);
         snprintf(where, sizeof where, "buses.%s", s->bus[n].name);
@@ -70,7 +71,7 @@ static bool buses_are_loaded(struct yaml_file *f, const struct yaml_node *node, 
 {
     (void)section;
     if (!yaml_get(f->root, "bus")) return true;
-    return yaml_file_fail(f, node, "buses", "is beside bus, which is short for one; expected one of the two");
+    return yaml_file_fail(f, node, "buses", "expected bus or buses, got both");
 }
 
 static void dump_buses(const struct yaml_field *d, const void *section, cJSON *to)
@@ -156,12 +157,13 @@ static bool print_args(struct yaml_file *f, const struct yaml_node *node, cJSON 
     if (fits) snprintf(e->args, sizeof e->args, "%s", line);
     free(line);
     cJSON_Delete(args);
-    return fits || yaml_file_fail(f, node, NULL, "expected arguments of up to %u characters", SCENARIO_ARGS_MAX - 1);
+    return fits ||
+           yaml_file_fail(f, node, NULL, "expected arguments of up to %u characters, got more", SCENARIO_ARGS_MAX - 1);
 }
 
 static bool load_args(struct yaml_file *f, const struct yaml_node *node, void *section)
 {
-    if (node->kind != YAML_MAPPING) return yaml_file_fail(f, node, "args", "expected a mapping `name: value`");
+    if (node->kind != YAML_MAPPING) return yaml_file_expected(f, node, "args", "a mapping `name: value`");
     cJSON *args = yaml_json(f, node);
     return args && print_args(f, node, args, section);
 }
@@ -184,7 +186,7 @@ static struct scenario_event *new_event(struct yaml_file *f, const struct yaml_n
                                         struct scenario_events *events)
 {
     if (events->count == SCENARIO_EVENTS_MAX) {
-        yaml_file_fail(f, node, list, "expected up to %u entries", SCENARIO_EVENTS_MAX);
+        yaml_file_fail(f, node, list, "expected up to %u entries, got more", SCENARIO_EVENTS_MAX);
         return NULL;
     }
     struct scenario_event *e = &events->event[events->count];
@@ -195,13 +197,13 @@ static struct scenario_event *new_event(struct yaml_file *f, const struct yaml_n
 static bool load_timeline(struct yaml_file *f, const struct yaml_node *node, void *section)
 {
     struct scenario_events *t = &((struct scenario *)section)->timeline;
-    if (node->kind != YAML_SEQUENCE) return yaml_file_fail(f, node, "timeline", "expected a sequence of commands");
+    if (node->kind != YAML_SEQUENCE) return yaml_file_expected(f, node, "timeline", "a list of commands");
     for (const struct yaml_item *i = node->first; i; i = i->next) {
         char where[32];
         struct scenario_event *e = new_event(f, i->value, "timeline", t);
         snprintf(where, sizeof where, "timeline[%u]", t->count);
         if (!e || !yaml_load(f, i->value, where, &scenario_event_fields, e)) return false;
-        if (!e->cmd[0]) return yaml_file_fail(f, i->value, where, "cmd is missing: expected a command");
+        if (!e->cmd[0]) return yaml_file_fail(f, i->value, where, "expected cmd, a command, got none");
         t->count++;
     }
     return true;
@@ -210,12 +212,12 @@ static bool load_timeline(struct yaml_file *f, const struct yaml_node *node, voi
 static bool load_faults(struct yaml_file *f, const struct yaml_node *node, void *section)
 {
     struct scenario_events *t = &((struct scenario *)section)->faults;
-    if (node->kind != YAML_SEQUENCE) return yaml_file_fail(f, node, "faults", "expected a sequence of faults");
+    if (node->kind != YAML_SEQUENCE) return yaml_file_expected(f, node, "faults", "a list of faults");
     for (const struct yaml_item *i = node->first; i; i = i->next) {
         struct scenario_event *e = new_event(f, i->value, "faults", t);
         if (!e) return false;
         if (i->value->kind != YAML_MAPPING)
-            return yaml_file_fail(f, i->value, "faults", "expected a mapping with the arguments of fault.add");
+            return yaml_file_expected(f, i->value, "faults", "a mapping with the arguments of fault.add");
         snprintf(e->cmd, sizeof e->cmd, "fault.add");
         cJSON *args = yaml_json(f, i->value);
         if (!args || !print_args(f, i->value, args, e)) return false;
@@ -247,7 +249,7 @@ static void dump_faults(const struct yaml_field *d, const void *section, cJSON *
 static bool load_version(struct yaml_file *f, const struct yaml_node *node, void *section)
 {
     (void)section;
-    return yaml_scalar(node) || yaml_file_fail(f, node, "version", "expected a word");
+    return yaml_scalar(node) || yaml_file_expected(f, node, "version", "a word");
 }
 
 static void dump_version(const struct yaml_field *d, const void *section, cJSON *to)
@@ -297,7 +299,7 @@ static bool load(struct yaml_file *f, struct scenario *s)
     if (!yaml_load(f, f->root, "", &scenario_fields, s)) return false;
     if (!scenario_check_lab(f, f->root, &s->lab) || !scenario_check_seats(f, f->root, s)) return false;
     if (!scenario_check_platform(f, f->root, s)) return false;
-    return s->unit_count > 0 || yaml_file_fail(f, NULL, "units", "expected at least one unit");
+    return s->unit_count > 0 || yaml_file_fail(f, NULL, "units", "expected at least one unit, got none");
 }
 
 bool scenario_parse(const char *path, const char *text, size_t len, struct scenario *s, char *why, size_t cap)

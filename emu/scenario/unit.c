@@ -1,4 +1,5 @@
-/* Keys of a unit, and one entry that represents many. */
+/* Keys of a unit, and one entry for many units. */
+#include "base/why.h"
 #include "scenario/keys.h"
 
 #include "scenario/profile.h"
@@ -16,7 +17,7 @@ static bool fail_board(struct yaml_file *f, const struct yaml_node *node)
 {
     char known[160];
     profile_yaml_boards(known, sizeof known);
-    return yaml_file_fail(f, node, "board", "expected %s", known);
+    return yaml_file_expected(f, node, "board", "%s", known);
 }
 
 /* What is wrong within the profile is reported with its line there, that it is another board's with the line here. */
@@ -29,8 +30,7 @@ static bool find_profile(struct yaml_file *f, const struct yaml_node *node, cons
         return yaml_file_fail(f, node, "profile", "%s", why);
     if (!profile_yaml_load(path, &of, &u->profile, f->why, f->cap)) return false;
     if (!board_name_takes(u->board, of)) {
-        return yaml_file_fail(f, node, "profile",
-                              "expected a profile of %s (board: %s), got %s, a profile of %s (board: %s)",
+        return yaml_file_fail(f, node, "profile", "expected a profile of %s (board: %s), got %s, one of %s (board: %s)",
                               u->board->title, u->board->name, name, of->title, of->name);
     }
     if (type->cfg_profiled) type->cfg_profiled(&u->cfg.board, &u->profile);
@@ -51,7 +51,7 @@ static bool begin_unit(struct yaml_file *f, const struct yaml_node *node, const 
     u->cfg.node = (uint8_t)(u->cfg.node + before);
     if (!profile) return !found->profile || find_profile(f, node, found->profile, u);
     name = yaml_scalar(profile);
-    if (!name) return yaml_file_fail(f, profile, "profile", "expected a name of proto/profiles or a path");
+    if (!name) return yaml_file_expected(f, profile, "profile", "a name of proto/profiles or a path");
     return find_profile(f, profile, name, u);
 }
 
@@ -75,7 +75,7 @@ static bool load_profile_set(struct yaml_file *f, const struct yaml_node *node, 
     struct scenario_unit *u = section;
     const struct board_type *type = u->board->type;
     const size_t outer = strlen(f->where);
-    if (node->kind != YAML_MAPPING) return yaml_file_fail(f, node, "profile_set", "expected a mapping `key: value`");
+    if (node->kind != YAML_MAPPING) return yaml_file_expected(f, node, "profile_set", "a mapping `key: value`");
     snprintf(f->where + outer, sizeof f->where - outer, "profile_set.");
     if (!profile_yaml_fields(f, node, type, &u->profile)) return false;
     snprintf(f->where + outer, sizeof f->where - outer, "profile_set: "); /* a whole sentence follows */
@@ -207,11 +207,11 @@ static bool check_keys(struct yaml_file *f, const struct yaml_node *node, const 
     for (unsigned i = 0; i < SOME_HAVE; i++) {
         const struct yaml_node *value = yaml_get(node, some_have[i].key);
         if (value && !has_key(t, i))
-            return yaml_file_fail(f, value, some_have[i].key, "a %s has no such setting", t->title);
+            return yaml_file_fail(f, value, some_have[i].key, "not a setting of a %s", t->title);
     }
     if (u->frame_form && u->frame_form >= t->frame_forms)
-        return yaml_file_fail(f, yaml_get(node, "frame_form"), "frame_form", "%u: a %s has 0 to %u", u->frame_form,
-                              t->title, t->frame_forms - 1);
+        return yaml_file_expected(f, yaml_get(node, "frame_form"), "frame_form", "0 to %u for a %s", t->frame_forms - 1,
+                                  t->title);
     return true;
 }
 
@@ -228,8 +228,8 @@ static bool check_inputs(struct yaml_file *f, const struct yaml_node *node, cons
 {
     for (unsigned i = 0; i < UNIT_AXES; i++) {
         if (u->cfg.axis[i].sensor == UNIT_QUARTZ && u->cfg.board.afe[i].input != AFE_CURRENT) {
-            return yaml_file_fail(f, at(node, "axes"), "axes",
-                                  "%c: a quartz sensor gives a current: afe: {input: current}", "xyz"[i]);
+            return yaml_file_fail(f, at(node, "axes"), "axes", "%c: expected afe: {input: current} for a quartz sensor",
+                                  "xyz"[i]);
         }
     }
     return true;
@@ -240,18 +240,20 @@ static bool check_unit(struct yaml_file *f, const struct yaml_node *node, const 
                        const struct scenario_unit *u)
 {
     if (!plain(u->name))
-        return yaml_file_fail(f, at(node, "name"), "name", "\"%s\": expected letters, digits and _", u->name);
+        return yaml_file_fail(f, at(node, "name"), "name", "expected letters, digits and _, got \"%s\"", u->name);
     if (!check_inputs(f, node, u)) return false;
     for (const struct scenario_unit *other = s->units; other < s->units + s->unit_count; other++) {
         if (strcmp(other->name, u->name) == 0)
-            return yaml_file_fail(f, at(node, "name"), "name", "\"%s\" is taken by another unit", u->name);
+            return yaml_file_fail(f, at(node, "name"), "name",
+                                  "expected a name of its own, got \"%s\", which another unit has", u->name);
         if (other->cfg.node == u->cfg.node && other->bus == u->bus) {
-            return yaml_file_fail(f, at(node, "node"), "node", "%u is taken by unit %s; each needs its own",
+            return yaml_file_fail(f, at(node, "node"), "node", "expected a node of its own, got %u, which unit %s has",
                                   u->cfg.node, other->name);
         }
         if (other->cfg.board.serial == u->cfg.board.serial) {
-            return yaml_file_fail(f, at(node, "serial"), "serial", "%u is taken by unit %s; each needs its own",
-                                  u->cfg.board.serial, other->name);
+            return yaml_file_fail(f, at(node, "serial"), "serial",
+                                  "expected a number of its own, got %u, which unit %s has", u->cfg.board.serial,
+                                  other->name);
         }
     }
     return true;
@@ -281,12 +283,11 @@ static bool find_bus(struct yaml_file *f, const struct yaml_node *node, const st
     if (!u->bus_name[0]) snprintf(u->bus_name, sizeof u->bus_name, "%s", s->bus[0].name);
     for (u->bus = 0; u->bus < s->bus_count; u->bus++) {
         if (strcmp(s->bus[u->bus].name, u->bus_name) == 0) return true;
-        const size_t end = strlen(known);
-        snprintf(known + end, sizeof known - end, "%s%s", end ? ", " : "", s->bus[u->bus].name);
+        why_list_add(known, sizeof known, s->bus[u->bus].name);
     }
     const char *near = yaml_nearest(u->bus_name, bus_at, s);
-    return yaml_file_fail(f, at(node, "bus"), "bus", "no bus \"%s\"; %s%s%sthere is %s", u->bus_name,
-                          near ? "nearest: " : "", near ? near : "", near ? "; " : "", known);
+    return yaml_file_fail(f, at(node, "bus"), "bus", "expected one of %s%s%s%s, got \"%s\"", known,
+                          near ? " (nearest: " : "", near ? near : "", near ? ")" : "", u->bus_name);
 }
 
 /* The number n in a pattern like u%02u; false if there is not exactly one place for it. */
@@ -324,19 +325,19 @@ static bool place_unit(struct yaml_file *f, const struct yaml_node *node, const 
                        struct scenario *s)
 {
     if (s->unit_count == SCENARIO_UNITS_MAX)
-        return yaml_file_fail(f, node, "count", "expected up to %u units in all", SCENARIO_UNITS_MAX);
+        return yaml_file_fail(f, node, "count", "expected up to %u units in all, got more", SCENARIO_UNITS_MAX);
     struct scenario_unit *u = &s->units[s->unit_count];
     *u = e->unit;
     if (e->count && !number_name(e->unit.name, k + 1, u->name, sizeof u->name)) {
-        return yaml_file_fail(f, at(node, "name"), "name", "\"%s\": with count a number is in it, as in u%%02u",
+        return yaml_file_fail(f, at(node, "name"), "name", "expected a place for the number, as in u%%02u, got \"%s\"",
                               e->unit.name);
     }
     const unsigned id = e->unit.cfg.node + k;
-    if (id > 127) return yaml_file_fail(f, at(node, "node"), "node", "%u is outside 1 ... 127", id);
+    if (id > 127) return yaml_file_fail(f, at(node, "node"), "node", "expected 1 to 127, got %u", id);
     u->cfg.node = (uint8_t)id;
     u->cfg.board.serial = e->unit.cfg.board.serial + k;
     if (u->cfg.board.serial < e->unit.cfg.board.serial || u->cfg.board.serial == 0)
-        return yaml_file_fail(f, at(node, "serial"), "serial", "counts beyond 4294967295");
+        return yaml_file_fail(f, at(node, "serial"), "serial", "expected up to 4294967295, got more by count");
     if (!check_unit(f, node, s, u)) return false;
     s->unit_count++;
     return true;
@@ -364,7 +365,7 @@ static bool load_entry(struct yaml_file *f, const struct yaml_node *node, struct
 
 bool scenario_load_units(struct yaml_file *f, const struct yaml_node *node, struct scenario *s)
 {
-    if (node->kind != YAML_SEQUENCE) return yaml_file_fail(f, node, "units", "expected a sequence of units");
+    if (node->kind != YAML_SEQUENCE) return yaml_file_expected(f, node, "units", "a list of units");
     for (const struct yaml_item *i = node->first; i; i = i->next)
         if (!load_entry(f, i->value, s)) return false;
     return true;
@@ -380,7 +381,7 @@ bool scenario_check_seats(struct yaml_file *f, const struct yaml_node *root, con
         const char *on = lab_mount_name(u->cfg.seat.on);
         if (!there)
             return yaml_file_fail(f, yaml_get(root, "units"), "units",
-                                  "%s is on the %s, and there is none: expected a section %s", u->name, on, on);
+                                  "%s: expected a section %s to mount it on, got none", u->name, on);
     }
     return true;
 }

@@ -1,24 +1,54 @@
 #include "scenario/yaml_file.h"
 
 #include "base/text.h"
+#include "base/why.h"
 
 #include <ctype.h>
 #include <errno.h>
 #include <libfyaml.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+/* "path:12:11: units.a.node: " */
+static size_t put_where(struct yaml_file *f, const struct yaml_node *node, const char *key)
+{
+    const int n = snprintf(f->why, f->cap, "%s:%u:%u: %s%s%s", f->path, node ? node->line : 1, node ? node->column : 1,
+                           f->where, key ? key : "", key ? ": " : "");
+    return n >= 0 && (size_t)n < f->cap ? (size_t)n : f->cap;
+}
+
 bool yaml_file_fail(struct yaml_file *f, const struct yaml_node *node, const char *key, const char *format, ...)
 {
     va_list ap;
-    const int n = snprintf(f->why, f->cap, "%s:%u:%u: %s%s%s", f->path, node ? node->line : 1, node ? node->column : 1,
-                           f->where, key ? key : "", key ? ": " : "");
+    const size_t n = put_where(f, node, key);
     va_start(ap, format);
-    if (n >= 0 && (size_t)n < f->cap) vsnprintf(f->why + n, f->cap - (size_t)n, format, ap);
+    vsnprintf(f->why + n, f->cap - n, format, ap);
     va_end(ap);
     text_one_line(f->why);
+    return false;
+}
+
+/* Numbers as they are written, other words in quotes. */
+static const char *describe_node(const struct yaml_node *node, char out[WHY_TEXT_MAX])
+{
+    if (node->kind != YAML_SCALAR) return node->kind == YAML_MAPPING ? "a mapping" : "a list";
+    if (node->len > YAML_FILE_TEXT || strlen(node->text) != node->len) return "a text too long or with a NUL";
+    if (!node->plain || !strchr("+-.0123456789", node->text[0]) || node->len > 20) return why_text(out, node->text);
+    return node->text;
+}
+
+bool yaml_file_expected(struct yaml_file *f, const struct yaml_node *node, const char *key, const char *expected, ...)
+{
+    char where[640], got[WHY_TEXT_MAX];
+    va_list ap;
+    (void)put_where(f, node, key);
+    snprintf(where, sizeof where, "%.630s", f->why);
+    const size_t len = strlen(where);
+    if (len >= 2 && strcmp(where + len - 2, ": ") == 0) where[len - 2] = '\0';
+    va_start(ap, expected);
+    why_vexpected(f->why, f->cap, where, node ? describe_node(node, got) : NULL, expected, ap);
+    va_end(ap);
     return false;
 }
 
@@ -75,7 +105,7 @@ static bool append(struct builder *b, struct yaml_node *value)
 static bool place(struct builder *b, struct yaml_node *n)
 {
     if (b->depth == 0) {
-        if (b->f->root) return yaml_file_fail(b->f, n, NULL, "a second document; expected one");
+        if (b->f->root) return yaml_file_fail(b->f, n, NULL, "a second document; a file has one");
         b->f->root = n;
         return true;
     }
@@ -189,7 +219,7 @@ static bool build(struct yaml_file *f, struct fy_parser *p, struct fy_diag *diag
         fy_parser_event_free(p, e);
     }
     if (ok && fy_parser_get_stream_error(p)) return tell_parser(f, diag);
-    if (ok && !f->root) return yaml_file_fail(f, NULL, NULL, "empty: expected a mapping `key: value`");
+    if (ok && !f->root) return yaml_file_fail(f, NULL, NULL, "expected a mapping `key: value`, got an empty file");
     return ok;
 }
 
@@ -223,7 +253,7 @@ static bool check_bytes(struct yaml_file *f, const char *text, size_t len)
         if (order_mark(text, len, i)) return yaml_file_fail(f, &at, NULL, "a byte order mark within the text");
         if (text[i] == '%' && at.column == 1) return yaml_file_fail(f, &at, NULL, "a directive: there are none here");
         if (explicit_key(text, len, i))
-            return yaml_file_fail(f, &at, NULL, "a ? of its own, an explicit key: expected `key: value`");
+            return yaml_file_fail(f, &at, NULL, "expected `key: value`, got an explicit key (?)");
         const bool ends = text[i] == '\n' || text[i] == '\r';
         at.column = ends ? 1 : at.column + 1;
         at.line += text[i] == '\n';

@@ -1,8 +1,8 @@
 /* A YAML 1.2 file as the loaders see it: a tree whose nodes know their line and column, and errors of one line,
  *
- *     proto/scenarios/quiet.yaml:12:11: units.a.node: 200 is outside 1 ... 127
+ *     proto/scenarios/quiet.yaml:12:11: units.a.node: expected 1 to 127, got 200
  *
- * what, where, and what would be right. The first error counts; the loader stops there. An alias is the node of its
+ * where, what was expected and what was there. The first error counts; the loader stops there. An alias is the node of its
  * anchor. JSON is YAML 1.2: a dumped scenario is read by the same functions. */
 #ifndef PSABENCH_SCENARIO_YAML_FILE_H
 #define PSABENCH_SCENARIO_YAML_FILE_H
@@ -50,6 +50,10 @@ void yaml_file_close(struct yaml_file *f);
 /* Writes the error and returns false. node may be NULL, key too. */
 __attribute__((format(printf, 4, 5))) bool yaml_file_fail(struct yaml_file *f, const struct yaml_node *node,
                                                           const char *key, const char *format, ...);
+
+/* The same as `key: expected ..., got` what the node has. */
+__attribute__((format(printf, 4, 5))) bool yaml_file_expected(struct yaml_file *f, const struct yaml_node *node,
+                                                              const char *key, const char *expected, ...);
 
 /* Text of a scalar, NULL for anything else, for one longer than YAML_FILE_TEXT and for one with a NUL in it. */
 const char *yaml_scalar(const struct yaml_node *node);

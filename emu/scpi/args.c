@@ -6,16 +6,6 @@
 #include <stdio.h>
 #include <string.h>
 
-__attribute__((format(printf, 3, 4))) static cJSON *fail(struct scpi_failure *why, int code, const char *format, ...)
-{
-    va_list ap;
-    va_start(ap, format);
-    vsnprintf(why->what, sizeof why->what, format, ap);
-    va_end(ap);
-    why->code = code;
-    return NULL;
-}
-
 static bool word_is(struct scpi_text t, const char *mnemonic)
 {
     return scpi_is(mnemonic, strlen(mnemonic), t);
@@ -54,33 +44,47 @@ struct source {
     struct scpi_failure *why;
 };
 
+/* The error of a parameter: NULL. */
+__attribute__((format(printf, 3, 4))) static cJSON *reject(const struct source *s, int code, const char *expected, ...)
+{
+    const struct scpi_param *p = s->param;
+    char got[WHY_TEXT_MAX];
+    va_list ap;
+    if (p->form == SCPI_NUMBER) snprintf(got, sizeof got, "%.10g%s", p->number, p->text.n ? " " : "");
+    else snprintf(got, sizeof got, "\"");
+    const size_t at = strlen(got);
+    snprintf(got + at, sizeof got - at, "%.*s%s", (int)(p->text.n < 60 ? p->text.n : 60), p->text.p ? p->text.p : "",
+             p->form == SCPI_NUMBER ? "" : "\"");
+    va_start(ap, expected);
+    why_vexpected(s->why->what, sizeof s->why->what, s->row->arg[s->arg].name, got, expected, ap);
+    va_end(ap);
+    s->why->code = code;
+    return NULL;
+}
+
 static cJSON *to_number(const struct source *s)
 {
     const struct control_arg *a = &s->row->arg[s->arg];
     double x;
-    if (s->param->form == SCPI_STRING) return fail(s->why, -158, "%s: expected a number", a->name);
+    if (s->param->form == SCPI_STRING) return reject(s, -158, "a number");
     if (s->param->form == SCPI_WORD) {
         if (scpi_limit(s->bench, s->row, s->arg, s->suffix, s->param->text, &x)) return cJSON_CreateNumber(x);
-        return fail(s->why, -148, "%s: expected a number, MIN, MAX or DEF", a->name);
+        return reject(s, -148, "a number, MIN, MAX or DEF");
     }
     const int err = scpi_to_unit(a->unit, s->param->text, s->param->number, &x);
-    if (err) {
-        return fail(s->why, err, "%s is in %s, not %.*s", a->name, a->unit ? a->unit : "no unit", (int)s->param->text.n,
-                    s->param->text.p);
-    }
+    if (err) return a->unit ? reject(s, err, "a value in %s", a->unit) : reject(s, err, "a value without a unit");
     return cJSON_CreateNumber(x);
 }
 
 static cJSON *to_bool(const struct source *s)
 {
-    const struct control_arg *a = &s->row->arg[s->arg];
     const struct scpi_param *p = s->param;
-    if (p->form == SCPI_STRING) return fail(s->why, -158, "%s: expected ON, OFF, 1 or 0", a->name);
-    if (p->form == SCPI_NUMBER && p->text.n) return fail(s->why, -138, "%s: expected ON, OFF, 1 or 0", a->name);
+    if (p->form == SCPI_STRING) return reject(s, -158, "ON, OFF, 1 or 0");
+    if (p->form == SCPI_NUMBER && p->text.n) return reject(s, -138, "ON, OFF, 1 or 0");
     if (p->form == SCPI_NUMBER) return cJSON_CreateBool(p->number >= 0.5 || p->number <= -0.5);
     if (word_is(p->text, "ON")) return cJSON_CreateTrue();
     if (word_is(p->text, "OFF")) return cJSON_CreateFalse();
-    return fail(s->why, -224, "%s: expected ON, OFF, 1 or 0", a->name);
+    return reject(s, -224, "ON, OFF, 1 or 0");
 }
 
 static bool same_word(struct scpi_text t, const char *word, size_t len)
@@ -116,14 +120,11 @@ static cJSON *to_choice(const struct source *s)
 {
     const struct control_arg *a = &s->row->arg[s->arg];
     char words[160] = "";
-    size_t at = 0;
-    if (s->param->form == SCPI_NUMBER) return fail(s->why, -128, "%s: expected a word", a->name);
+    if (s->param->form == SCPI_NUMBER) return reject(s, -128, "a word");
     const char *found = find_choice(a, s->param->text);
     if (found) return cJSON_CreateString(found);
-    for (unsigned i = 0; a->choices[i] && at < sizeof words; i++) {
-        at += (size_t)snprintf(words + at, sizeof words - at, "%s%s", i ? ", " : "", a->choices[i]);
-    }
-    return fail(s->why, -224, "%s: expected one of %s", a->name, words);
+    for (unsigned i = 0; a->choices[i]; i++) why_list_add(words, sizeof words, a->choices[i]);
+    return reject(s, -224, "one of %s", words);
 }
 
 static cJSON *to_string(const struct source *s)
@@ -131,7 +132,7 @@ static cJSON *to_string(const struct source *s)
     const struct scpi_param *p = s->param;
     char text[SCPI_LINE_MAX];
     size_t n = 0;
-    if (p->form == SCPI_NUMBER) return fail(s->why, -128, "%s: expected a string", s->row->arg[s->arg].name);
+    if (p->form == SCPI_NUMBER) return reject(s, -128, "a string");
     for (size_t i = 0; i < p->text.n && n < sizeof text - 1; i++) {
         text[n++] = p->text.p[i];
         if (p->form == SCPI_STRING && i + 1 < p->text.n && p->text.p[i] == p->text.p[-1] &&
@@ -162,8 +163,9 @@ static bool suffix_fits(const struct control_bench *b, const struct control_comm
     (void)scpi_limit(b, row, arg, suffix, (struct scpi_text){"MIN", 3}, &min);
     (void)scpi_limit(b, row, arg, suffix, (struct scpi_text){"MAX", 3}, &max);
     if (suffix[arg] >= min && suffix[arg] <= max) return true;
-    fail(why, -114, "%s: %u is outside %.10g ... %.10g", row->arg[arg].name, suffix[arg], min, max);
-    return false;
+    why->code = -114;
+    return why_expected(why->what, sizeof why->what, row->arg[arg].name, WHY_REAL(suffix[arg]), "%.10g to %.10g", min,
+                        max);
 }
 
 /* Which argument the i-th parameter is: lists are dealt in turn, time, rate, time, rate. -1: there is none. */
@@ -200,7 +202,11 @@ cJSON *scpi_args(const struct control_bench *b, const struct control_command *ro
     }
     for (unsigned i = 0; i < u->params && good; i++) {
         const int arg = arg_of_param(row, suffixes, i);
-        if (arg < 0) fail(why, -108, "%u parameters are enough", control_arg_count(row) - suffixes);
+        if (arg < 0) {
+            why->code = -108;
+            why_expected(why->what, sizeof why->what, how->header, WHY_REAL(u->params), "up to %u parameters",
+                         control_arg_count(row) - suffixes);
+        }
         good = arg >= 0 && add_param(&(struct source){b, row, (unsigned)arg, suffix, &u->param[i], why}, args);
     }
     if (good) return args;

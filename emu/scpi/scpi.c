@@ -74,9 +74,9 @@ static const struct scpi_command *find_common(struct scpi_text header, bool quer
 
 static bool do_common(struct scpi *s, const struct scpi_command *row, const struct scpi_unit *u, int64_t t_ns)
 {
-    char range[48];
+    char range[80];
     const struct scpi_param *p = u->param;
-    snprintf(range, sizeof range, "expected an integer from 0 to %u", row->max);
+    snprintf(range, sizeof range, "%s: expected an integer from 0 to %u", row->pattern, row->max);
     if (u->params > (row->max > 0)) return fail(s, -108, NULL);
     if (u->params < (row->max > 0)) return fail(s, -109, range);
     if (row->max && p->form != SCPI_NUMBER) return fail(s, p->form == SCPI_WORD ? -148 : -158, range);
@@ -163,7 +163,7 @@ void scpi_close(struct scpi *s)
 void scpi_line(struct scpi *s, const char *text, size_t len, int64_t t_ns)
 {
     if (!text || len > sizeof s->line) {
-        scpi_error(&s->status, -363, "a message has up to 4096 bytes");
+        scpi_error(&s->status, -363, "expected a message of up to 4096 bytes");
         return;
     }
     memcpy(s->line, text, len);

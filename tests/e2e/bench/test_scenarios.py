@@ -72,10 +72,13 @@ def test_a_dump_runs_to_the_same_bytes(name: str, tmp_path: Path) -> None:
     ("text", "says"),
     [
         ("timeline: [{cmd: head.trun}]", ":1:12: timeline: head.trun: unknown command; nearest: head.turn"),
-        ("timeline: [{cmd: head.read}]", ":1:12: timeline: head.read: changes nothing on the bench"),
-        ("timeline:\n  - {cmd: head.turn}", ":2:5: timeline: head.turn: angle_deg is missing"),
-        ("timeline: [{cmd: head.turn, args: {angle_deg: 9999}}]", "angle_deg: 9999 is outside -3600 ... 3600"),
-        ("timeline: [{cmd: table.rate, args: {axis: 1, rate_dps: 5}}]", ":1:12: timeline: table.rate: there is none"),
+        ("timeline: [{cmd: head.read}]", ":1:12: timeline: head.read: expected a command that changes the bench"),
+        ("timeline:\n  - {cmd: head.turn}", ":2:5: timeline: head.turn: angle_deg: expected a value"),
+        ("timeline: [{cmd: head.turn, args: {angle_deg: 9999}}]", "angle_deg: expected -3600 to 3600 deg, got 9999"),
+        (
+            "timeline: [{cmd: table.rate, args: {axis: 1, rate_dps: 5}}]",
+            ":1:12: timeline: table.rate: expected a section table",
+        ),
         ("faults: [{kind: sensor.bias, point: a.sensor.x}]", ":1:10: faults: fault.add: "),
         ("faults: [{kind: sensor.bias, point: b.sensor.x, bias_v: 1}]", ":1:10: faults: fault.add: "),
     ],

@@ -200,11 +200,11 @@ def test_the_step_of_the_integration_is_the_user_s_to_choose(tmp_path: Path) -> 
 @pytest.mark.parametrize(
     ("keys", "says"),
     [
-        ({"platform": "step_ns: 999999"}, "platform.step_ns: 999999 is outside"),
-        ({"platform": "step_ns: 20000001"}, "platform.step_ns: 20000001 is outside"),
-        ({"vehicle": "sway: {east_mg: -0.3, east_s: 20}"}, "vehicle.sway.east_mg: -0.3 is outside"),
-        ({"vehicle": "sway: {north_mg: 101}"}, "vehicle.sway.north_mg: 101 is outside"),
-        ({"vehicle": "sway: {north_s: 1001}"}, "vehicle.sway.north_s: 1001 is outside"),
+        ({"platform": "step_ns: 999999"}, "platform.step_ns: expected "),
+        ({"platform": "step_ns: 20000001"}, "platform.step_ns: expected "),
+        ({"vehicle": "sway: {east_mg: -0.3, east_s: 20}"}, "vehicle.sway.east_mg: expected "),
+        ({"vehicle": "sway: {north_mg: 101}"}, "vehicle.sway.north_mg: expected "),
+        ({"vehicle": "sway: {north_s: 1001}"}, "vehicle.sway.north_s: expected "),
         ({"vehicle": "sway: {east_ug: 300}"}, "vehicle.sway.east_ug: unknown key"),
     ],
     ids=lambda x: " ".join(x.values()) if isinstance(x, dict) else "",

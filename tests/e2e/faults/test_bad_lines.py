@@ -301,7 +301,7 @@ def test_a_run_ends_with_the_program_that_asked_for_it(make_rig: MakeRig) -> Non
         s.connect(str(rig.emulator.control_path))
         s.sendall(b'{"id": 1, "cmd": "run", "args": {"for_s": 1, "after_tx": 1000000}}\n')  # which will never be sent
         until(lambda: rig.control.call("counters").result["control"]["commands"] > 2, "the command to be taken")
-        with pytest.raises(ControlError, match="another run is under way"):
+        with pytest.raises(ControlError, match="another run is in progress"):
             rig.control.call("run", for_s=1)
 
     def is_free() -> bool:

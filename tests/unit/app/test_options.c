@@ -74,32 +74,32 @@ static const struct {
     const char *line, *why;
 } bad[] = {
     {"--fly", "--fly: unknown option"},
-    {"--help=yes", "--help=yes: unknown option or unwanted argument"},
-    {"--seed", "--seed: an argument is missing"},
-    {"--seed -1", "--seed: expected an integer from 0"},
+    {"--help=yes", "--help=yes: unknown option, or an argument it does not take"},
+    {"--seed", "--seed: expected an argument, got none"},
+    {"--seed -1", "--seed: expected an integer from 0 to 2^64 - 1, got \"-1\""},
     {"--seed 18446744073709551616", "--seed: expected an integer"},
     {"--seed 1x", "--seed: expected an integer"},
-    {"--pace slow", "--pace: expected wall, step or free"},
-    {"--pace step", "--pace step: needs --control PATH"},
-    {"--pace step --control c --wait-client", "--wait-client: in step pace"},
-    {"--for 3parsec", "--for: expected a time"},
-    {"--for -1s", "--for: expected a time"},
-    {"--for nan", "--for: expected a time"},
-    {"--for 1e7s", "--for: expected a time, as 300ms, 10s or 2min, up to 1e6 s"},
-    {"--can", "--can: an argument is missing"},
-    {"--can can0", "--can: expected socketcand[:PORT], slcan[:LINK], socketcan:IFACE, log:FILE or none"},
+    {"--pace slow", "--pace: expected wall, step or free, got \"slow\""},
+    {"--pace step", "--pace step: expected --control PATH"},
+    {"--pace step --control c --wait-client", "--wait-client: not with --pace step"},
+    {"--for 3parsec", "--for: expected a time such as 300ms, 10s or 2min, up to 1e6 s, got \"3parsec\""},
+    {"--for -1s", "--for: expected a time such as 300ms, 10s or 2min, up to 1e6 s, got \"-1s\""},
+    {"--for nan", "--for: expected a time such as 300ms, 10s or 2min, up to 1e6 s, got \"nan\""},
+    {"--for 1e7s", "--for: expected a time such as 300ms, 10s or 2min, up to 1e6 s, got \"1e7s\""},
+    {"--can", "--can: expected an argument, got none"},
+    {"--can can0", "--can: expected socketcand[:PORT], slcan[:LINK], socketcan:IFACE, log:FILE or none, got \"can0\""},
     {"--can socketcan", "--can: expected socketcand[:PORT]"},
     {"--can socketcan:", "--can: expected socketcand[:PORT]"},
-    {"--can socketcand:65536", "--can socketcand:65536: \"65536\" is no port"},
-    {"--can socketcand:http", "--can socketcand:http: \"http\" is no port"},
+    {"--can socketcand:65536", "--can: expected a port from 0 (any free port) to 65535, got \"socketcand:65536\""},
+    {"--can socketcand:http", "--can: expected a port from 0 (any free port) to 65535, got \"socketcand:http\""},
     {"--bitrate 9999", "--bitrate: expected 0 or 10000"},
     {"--data-bitrate 1e6", "--data-bitrate: expected 0 or 10000"},
     {"--vcd-unit 20", "--vcd-unit: expected 1, 10, 100"},
     {"--vcd-unit 0", "--vcd-unit: expected 1, 10, 100"},
     {"--line-hz 999", "--line-hz: expected 1000 to"},
-    {"--epoch -1", "--epoch: expected seconds"},
-    {"a b", "b: one scenario is enough, a was given before"},
-    {"a b\nc", "b?c: one scenario is enough, a was given before"}, /* a message is one line */
+    {"--epoch -1", "--epoch: expected seconds from 0 to 9e9, as date +%s prints them, got \"-1\""},
+    {"a b", "SCENARIO: expected one, got a and b"},
+    {"a b\nc", "SCENARIO: expected one, got a and b?c"}, /* a message is one line */
 };
 
 static void what_cannot_be_used_is_refused_in_one_line(void **state)
@@ -113,7 +113,7 @@ static void what_cannot_be_used_is_refused_in_one_line(void **state)
     const char *nine =
         "--can slcan --can slcan --can slcan --can slcan --can slcan --can slcan --can slcan --can slcan --can slcan";
     assert_false(parse(nine));
-    assert_string_equal(why, "--can slcan: up to 8 adapters");
+    assert_string_equal(why, "--can: expected up to 8 adapters, got \"slcan\"");
 }
 
 static void durations_have_units(void **state)

@@ -18,29 +18,31 @@ static void a_reply_has_id_time_and_barrier(void **state)
 static const struct {
     const char *line, *code, *text;
 } refusals[] = {
-    {"", "syntax", "not a JSON object"},
-    {"garbage", "syntax", "not a JSON object"},
-    {"[1,2]", "syntax", "not a JSON object"},
-    {"{\"id\":1", "syntax", "not a JSON object"},
-    {"{\"cmd\":\"time\"} {\"cmd\":\"quit\"}", "syntax", "not a JSON object"},
-    {"{\"cmd\":\"time\",\"cmd\":\"quit\"}", "syntax", "cmd is given twice"},
-    {"{\"id\":1}", "syntax", "cmd: expected a command's name"},
-    {"{\"cmd\":5}", "syntax", "cmd: expected a command's name"},
-    {"{\"cmd\":\"time\",\"ards\":{}}", "syntax", "\\\"ards\\\": unknown member"},
-    {"{\"cmd\":\"time\",\"args\":[1]}", "syntax", "args: expected an object"},
-    {"{\"cmd\":\"fly\"}", "command", "\\\"fly\\\": unknown command; help lists them"},
-    {"{\"cmd\":\"time\",\"args\":{\"x\":1}}", "argument", "no argument \\\"x\\\"; it takes none"},
-    {"{\"cmd\":\"head.turn\",\"args\":{\"angle\":1}}", "argument", "no argument \\\"angle\\\"; it takes angle_deg"},
-    {"{\"cmd\":\"head.turn\"}", "argument", "angle_deg is missing: degrees on the head's scale"},
+    {"", "syntax", "expected a JSON object"},
+    {"garbage", "syntax", "expected a JSON object"},
+    {"[1,2]", "syntax", "expected a JSON object"},
+    {"{\"id\":1", "syntax", "expected a JSON object"},
+    {"{\"cmd\":\"time\"} {\"cmd\":\"quit\"}", "syntax", "expected a JSON object"},
+    {"{\"cmd\":\"time\",\"cmd\":\"quit\"}", "syntax", "cmd: expected one value, got two"},
+    {"{\"id\":1}", "syntax", "cmd: expected the name of a command"},
+    {"{\"cmd\":5}", "syntax", "cmd: expected the name of a command"},
+    {"{\"cmd\":\"time\",\"ards\":{}}", "syntax", "expected the members id, cmd and args, got \\\"ards\\\""},
+    {"{\"cmd\":\"time\",\"args\":[1]}", "syntax", "args: expected an object, got a list"},
+    {"{\"cmd\":\"fly\"}", "command", "\\\"fly\\\": unknown command; see help"},
+    {"{\"cmd\":\"time\",\"args\":{\"x\":1}}", "argument", "args: expected no arguments, got \\\"x\\\""},
+    {"{\"cmd\":\"head.turn\",\"args\":{\"angle\":1}}", "argument",
+     "args: expected angle_deg, got \\\"angle\\\""},
+    {"{\"cmd\":\"head.turn\"}", "argument", "angle_deg: expected a value (degrees on the head's scale), got nothing"},
     {"{\"cmd\":\"head.turn\",\"args\":{\"angle_deg\":\"5\"}}", "type", "angle_deg: expected a number"},
-    {"{\"cmd\":\"head.turn\",\"args\":{\"angle_deg\":3600.5}}", "range", "angle_deg: 3600.5 is outside -3600 ... 3600"},
+    {"{\"cmd\":\"head.turn\",\"args\":{\"angle_deg\":3600.5}}", "range",
+     "angle_deg: expected -3600 to 3600 deg, got 3600.5"},
     {"{\"cmd\":\"head.mount\",\"args\":{\"face\":\"up\"}}", "range",
-     "is none of direct, reversed, side, side_reversed"},
+     "expected one of direct, reversed, side, side_reversed"},
     {"{\"cmd\":\"head.mount\",\"args\":{\"face\":2}}", "type", "face: expected a string"},
-    {"{\"cmd\":\"run\",\"args\":{\"for_s\":-0.1}}", "range", "for_s: -0.1 is outside 0 ... 86400"},
-    {"{\"cmd\":\"run\",\"args\":{\"for_s\":1,\"after_tx\":1.5}}", "type", "after_tx: 1.5 is not an integer"},
-    {"{\"cmd\":\"unit.reset\"}", "argument", "unit is missing: there are 2 units"},
-    {"{\"cmd\":\"unit.reset\",\"args\":{\"unit\":\"c\"}}", "range", "no unit \\\"c\\\"; there is a, b"},
+    {"{\"cmd\":\"run\",\"args\":{\"for_s\":-0.1}}", "range", "for_s: expected 0 to 86400 s, got -0.1"},
+    {"{\"cmd\":\"run\",\"args\":{\"for_s\":1,\"after_tx\":1.5}}", "type", "after_tx: expected an integer, got 1.5"},
+    {"{\"cmd\":\"unit.reset\"}", "argument", "unit: expected one of 2 units, got nothing"},
+    {"{\"cmd\":\"unit.reset\",\"args\":{\"unit\":\"c\"}}", "range", "unit: expected a unit: a, b, got \\\"c\\\""},
     {"{\"cmd\":\"counters\",\"args\":{\"unit\":5}}", "type", "unit: expected a string"},
     {"{\"cmd\":\"vcd.flush\"}", "state", "no recording"},
     {"{\"cmd\":\"truth\"}", "command", "unknown command"}, /* not on this port */
@@ -75,7 +77,7 @@ static void run_is_answered_when_it_is_over(void **state)
     assert_null(say("{\"id\":9,\"cmd\":\"run\",\"args\":{\"for_s\":0.01,\"after_tx\":3}}"));
     assert_int_equal(asked.for_ns, 10000000);
     assert_int_equal(asked.after_tx, 3);
-    assert_says("{\"id\":10,\"cmd\":\"run\",\"args\":{\"for_s\":1}}", "another run is under way");
+    assert_says("{\"id\":10,\"cmd\":\"run\",\"args\":{\"for_s\":1}}", "another run is in progress");
     assert_int_equal(asked.runs, 1);
     assert_string_equal(control_run_done(&control, 10000000),
                         "{\"id\":9,\"ok\":true,\"t_ns\":10000000,\"can_rx\":42,\"rx\":{\"3\":42},\"result\":{}}");
@@ -91,7 +93,7 @@ static void run_until_ends_at_the_very_event(void **state)
     int64_t first_ns;
     assert_null(say("{\"id\":1,\"cmd\":\"run.until\",\"args\":{\"event\":\"DRD_A\",\"unit\":\"b\",\"limit_s\":2}}"));
     assert_int_equal(asked.for_ns, 2000000000);
-    assert_says("{\"cmd\":\"run\",\"args\":{\"for_s\":1}}", "another run is under way");
+    assert_says("{\"cmd\":\"run\",\"args\":{\"for_s\":1}}", "another run is in progress");
     sched_run_until(&bench->sched, 2000000000);
     assert_int_equal(asked.stops, 1);
     first_ns = asked.stop_ns;
@@ -109,7 +111,7 @@ static void run_until_ends_at_the_very_event(void **state)
     assert_says("{\"cmd\":\"run.until\",\"args\":{\"event\":\"RES\"}}", "not now");
     assert_null(bench->unit[0].listeners);
     assert_says("{\"cmd\":\"run.until\",\"args\":{\"event\":\"FLY\"}}",
-                "event: no event \\\"FLY\\\" on a, a PSA-2; there is RES, SETUP_DONE, SYNC_A");
+                "event: expected an event of a, a PSA-2: RES, SETUP_DONE, SYNC_A");
 }
 
 static unsigned in_union(const char *name)
@@ -188,7 +190,7 @@ static void recordings_go_to_the_bench(void **state)
     assert_says("{\"cmd\":\"vcd.stop\"}", "\"ok\":true");
     asked.refuse = true;
     assert_says("{\"cmd\":\"vcd.start\",\"args\":{\"path\":\"x.vcd\"}}", "\"text\":\"no room\"");
-    assert_says("{\"cmd\":\"vcd.start\",\"args\":{\"path\":\"\"}}", "path: is empty");
+    assert_says("{\"cmd\":\"vcd.start\",\"args\":{\"path\":\"\"}}", "path: expected a text");
 }
 
 static void what_changes_the_bench_goes_into_the_journal(void **state)
@@ -221,7 +223,7 @@ static void a_command_can_be_checked_without_being_carried_out(void **state)
     char why[CONTROL_WHY_MAX];
     assert_true(check("head.turn", "{\"angle_deg\":90}", why));
     assert_false(check("head.turn", "{\"angle_deg\":4000}", why));
-    assert_string_equal(why, "angle_deg: 4000 is outside -3600 ... 3600 deg");
+    assert_string_equal(why, "angle_deg: expected -3600 to 3600 deg, got 4000");
     assert_false(check("head.fly", "{}", why));
     assert_string_equal(why, "\"head.fly\": unknown command");
     assert_true(check("unit.reset", "{\"unit\":\"b\"}", why));
@@ -230,9 +232,9 @@ static void a_command_can_be_checked_without_being_carried_out(void **state)
     assert_false(check("table.profile", "{\"axis\":1,\"times_s\":[],\"rates_dps\":[1]}", why));
     assert_false(check("table.profile", "{\"axis\":1,\"times_s\":[\"0\"],\"rates_dps\":[1]}", why));
     assert_false(check("supply.output", "{\"on\":1}", why));
-    assert_string_equal(why, "on: expected true or false");
+    assert_string_equal(why, "on: expected true or false, got a number");
     assert_false(check("run.until", "{\"event\":\"DRD_A\",\"event\":\"RES\"}", why));
-    assert_string_equal(why, "event is given twice");
+    assert_string_equal(why, "event: expected one value, got two");
     assert_true(head_at_rest(&bench->lab.head, 0));
 }
 

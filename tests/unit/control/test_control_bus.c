@@ -150,7 +150,7 @@ static void in_step_pace_time_moves_until_the_cycle_is_done(void **state)
     assert_null(say(&me, READ_0));
     assert_int_equal(r.runs, 1);
     assert_true(r.control.waiting);
-    assert_has(say(&me, READ_0), "another run is under way");
+    assert_has(say(&me, READ_0), "another run is in progress");
     sched_run_until(&r.s, FAKE_STROBE_NS);
     assert_int_equal(r.stops, 1);
     assert_int_equal(r.stopped_ns, FAKE_STROBE_NS);
@@ -168,7 +168,7 @@ static void a_run_that_ends_before_the_cycle_is_refused_and_the_cycle_goes_its_w
     int me;
     r.by_step = true;
     assert_null(say(&me, READ_0));
-    assert_has(control_run_done(&r.control, 100), "has not come to its end");
+    assert_has(control_run_done(&r.control, 100), "the cycle did not complete");
     assert_null(say(&me, "{'cmd':'run','args':{'for_s':1}}"));
     sched_run_until(&r.s, FAKE_STROBE_NS);
     assert_int_equal(r.stops + r.replies, 0);
@@ -204,13 +204,15 @@ static void a_refusal_has_the_code_of_its_reason(void **state)
         {"{'cmd':'bus.write','args':{'unit':'f','address':2,'data':13}}",
          "\"value\",\"text\":\"f: write of 13 to address 02h (level), strobe 800 ns: the register does not take this "
          "value: it takes 2\""},
-        {"{'cmd':'bus.read','args':{'unit':'p','address':0}}", "p is a PSA-2, which has no parallel bus"},
-        {"{'cmd':'bus.read','args':{'unit':'f','address':16}}", "outside 0 ... 15"},
-        {"{'cmd':'bus.read','args':{'address':1}}", "unit is missing"},
-        {"{'cmd':'bus.write','args':{'unit':'f','address':3}}", "data is missing"},
-        {"{'cmd':'bus.write','args':{'unit':'f','address':3,'data':65536}}", "outside 0 ... 65535"},
-        {"{'cmd':'bus.read','args':{'unit':'f','address':3,'strobe_ns':0}}", "outside 1 ... "},
-        {"{'cmd':'bus.read','args':{'unit':'f','address':3,'data':0}}", "no argument"},
+        {"{'cmd':'bus.read','args':{'unit':'p','address':0}}",
+         "unit: expected a board with a parallel bus, got p, a PSA-2"},
+        {"{'cmd':'bus.read','args':{'unit':'f','address':16}}", "expected 0 to 15"},
+        {"{'cmd':'bus.read','args':{'address':1}}", "unit: expected a value"},
+        {"{'cmd':'bus.write','args':{'unit':'f','address':3}}", "data: expected a value"},
+        {"{'cmd':'bus.write','args':{'unit':'f','address':3,'data':65536}}", "expected 0 to 65535"},
+        {"{'cmd':'bus.read','args':{'unit':'f','address':3,'strobe_ns':0}}", "expected 1 to "},
+        {"{'cmd':'bus.read','args':{'unit':'f','address':3,'data':0}}",
+         "args: expected unit, address, strobe_ns, got"},
     };
     for (int step = 0; step < 2; step++) {
         r.by_step = step;

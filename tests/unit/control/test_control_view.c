@@ -5,9 +5,9 @@
 static void instruments_that_are_not_there_are_refused(void **state)
 {
     (void)state;
-    assert_says("{\"cmd\":\"table.read\",\"args\":{\"axis\":1}}", "there is no rate table in this scenario");
-    assert_says("{\"cmd\":\"chamber.read\"}", "there is no thermal chamber in this scenario");
-    assert_says("{\"cmd\":\"supply.read\"}", "there is no supply in this scenario");
+    assert_says("{\"cmd\":\"table.read\",\"args\":{\"axis\":1}}", "this scenario has no rate table");
+    assert_says("{\"cmd\":\"chamber.read\"}", "this scenario has no thermal chamber");
+    assert_says("{\"cmd\":\"supply.read\"}", "this scenario has no power supply");
     assert_says("{\"cmd\":\"supply.reset\"}", "\"code\":\"state\"");
 }
 

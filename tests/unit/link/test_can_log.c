@@ -143,8 +143,8 @@ static void a_frame_that_cannot_be_sent_is_refused_in_words(void **state)
     static const struct {
         const char *args, *words;
     } rows[] = {
-        {"{'frame':'609#0'}", "is no frame"},
-        {"{'frame':'609#00','bus':'can7'}", "there is no can7"},
+        {"{'frame':'609#0'}", "frame: expected a frame such as"},
+        {"{'frame':'609#00','bus':'can7'}", "bus: expected a bus of this bench"},
         {"{'frame':'609##000'}", "does not carry"},
         {"{}", "frame"},
     };
@@ -157,9 +157,9 @@ static void a_frame_that_cannot_be_sent_is_refused_in_words(void **state)
         if (!strstr(reply, rows[i].words)) fail_msg("%s does not say %s", reply, rows[i].words);
     }
     for (unsigned i = 0; i < CAN_QUEUE_MAX; i++) (void)say("{'cmd':'can.put','args':{'frame':'609#00'}}");
-    assert_non_null(strstr(say("{'cmd':'can.put','args':{'frame':'609#00'}}"), "wait for the bus already"));
+    assert_non_null(strstr(say("{'cmd':'can.put','args':{'frame':'609#00'}}"), "frames to send is full"));
     r.view.buses = 0;
-    assert_non_null(strstr(say("{'cmd':'can.put','args':{'frame':'609#00'}}"), "no bus on this bench"));
+    assert_non_null(strstr(say("{'cmd':'can.put','args':{'frame':'609#00'}}"), "bus: expected a bus of this bench"));
 }
 
 /* ---- the file */

@@ -133,7 +133,7 @@ static void an_error_tells_what_is_the_matter_and_the_permitted_range(void **sta
 {
     (void)state;
     say("ANGL 5000");
-    SAYS("SYST:ERR?", "-222,\"Data out of range;angle_deg: 5000 is outside -3600 ... 3600 deg\"");
+    SAYS("SYST:ERR?", "-222,\"Data out of range;angle_deg: expected -3600 to 3600 deg, got 5000\"");
     SAYS("SYST:ERR?", "0,\"No error\"");
     say("FLY:HIGH");
     SAYS("SYST:ERR?", "-113,\"Undefined header;FLY:HIGH\"");
@@ -156,8 +156,8 @@ static void a_full_queue_ends_in_overflow(void **state)
     SAYS("SYST:ERR:COUNT?", "0");
     say("FLY;*ESE 1");
     say("ANGL 5000");
-    SAYS("SYSTEM:ERROR:ALL?", "-113,\"Undefined header;FLY\",-222,\"Data out of range;angle_deg: 5000 is outside -3600 "
-                              "... 3600 deg\"");
+    SAYS("SYSTEM:ERROR:ALL?", "-113,\"Undefined header;FLY\",-222,\"Data out of range;angle_deg: expected -3600 "
+                              "to 3600 deg, got 5000\"");
     SAYS("SYST:ERR:ALL?", "0,\"No error\"");
 }
 

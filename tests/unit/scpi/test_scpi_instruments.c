@@ -155,9 +155,9 @@ static void limits_of_a_table_are_its_axes_own(void **state)
     rig.lab.table.cfg.axis[1].rate_max_dps = 100;
     SAYS("AXIS1:RATE? MAX;RATE? MIN;:AXIS2:RATE? MAX", "720;-720;100");
     say("AXIS2:RATE 101");
-    SAYS("SYST:ERR?", "-222,\"Data out of range;rate_dps: 101 is outside -100 ... 100 deg/s\"");
+    SAYS("SYST:ERR?", "-222,\"Data out of range;rate_dps: expected -100 to 100 deg/s, got 101\"");
     say("AXIS3:RATE 1");
-    SAYS("SYST:ERR?", "-114,\"Header suffix out of range;axis: 3 is outside 1 ... 2\"");
+    SAYS("SYST:ERR?", "-114,\"Header suffix out of range;axis: expected 1 to 2, got 3\"");
     say("AXIS0:RATE 1");
     assert_int_equal(error(), -114);
     SAYS("AXIS3:RATE?", "");
@@ -181,7 +181,7 @@ static void limits_of_an_axis_follow_its_readout(void **state)
     say("AXIS1:POS MAX;POS MIN");
     assert_int_equal(error(), 0);
     say("AXIS1:POS -11");
-    SAYS("SYST:ERR?", "-222,\"Data out of range;angle_deg: -11 is outside -10 ... 190 deg\"");
+    SAYS("SYST:ERR?", "-222,\"Data out of range;angle_deg: expected -10 to 190 deg, got -11\"");
 }
 
 /* An axis that would take longer than there is time never gets there. */
@@ -270,7 +270,7 @@ static void a_chamber_goes_to_its_set_point(void **state)
     say("TEMP 300 K");
     SAYS("TEMP:SETP?", "26.85");
     say("TEMP 100");
-    SAYS("SYST:ERR?", "-222,\"Data out of range;temp_degc: 100 is outside -60 ... 85 degC\"");
+    SAYS("SYST:ERR?", "-222,\"Data out of range;temp_degc: expected -60 to 85 degC, got 100\"");
     say("RAMP 6");
     assert_int_equal(error(), -222);
     say("*RST");
