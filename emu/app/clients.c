@@ -5,12 +5,12 @@
 #include <stdio.h>
 
 /* The client of any bus that came next after `came`; NULL: the last. */
-static const struct can_client *client_after(const struct ports *p, uint32_t came)
+static const struct can_client *client_after(const struct ports *p, uint32_t connection)
 {
     const struct can_client *next = NULL;
     for (unsigned i = 0; i < p->hubs; i++) {
         for (const struct can_client *c = p->hub[i].clients; c; c = c->next)
-            if (c->came > came && (!next || c->came < next->came)) next = c;
+            if (c->connection > connection && (!next || c->connection < next->connection)) next = c;
     }
     return next;
 }
@@ -19,7 +19,7 @@ static uint64_t do_can_rx(void *ctx)
 {
     const struct ports *p = &((struct service *)ctx)->ports;
     const struct can_client *c = client_after(p, 0);
-    while (c && c->leaving) c = client_after(p, c->came);
+    while (c && c->leaving) c = client_after(p, c->connection);
     return c ? c->delivered : 0;
 }
 
@@ -27,8 +27,8 @@ static void put_client(const struct can_client *c, struct control_client *out)
 {
     *out = (struct control_client){.adapter = c->adapter,
                                    .name = c->name,
-                                   .came = c->came,
-                                   .place = c->place,
+                                   .connection = c->connection,
+                                   .slot = c->slot,
                                    .delivered = c->delivered,
                                    .taken = c->taken,
                                    .dropped = c->dropped,
@@ -40,7 +40,7 @@ static void put_client(const struct can_client *c, struct control_client *out)
 static const struct can_client *client_at(const struct service *s, unsigned i)
 {
     const struct can_client *c = client_after(&s->ports, 0);
-    while (c && i--) c = client_after(&s->ports, c->came);
+    while (c && i--) c = client_after(&s->ports, c->connection);
     return c;
 }
 
@@ -51,11 +51,11 @@ static bool do_client(void *ctx, unsigned i, struct control_client *out)
     return c != NULL;
 }
 
-static struct can_node *do_client_node(void *ctx, uint32_t place)
+static struct can_node *do_client_node(void *ctx, uint32_t slot)
 {
     const struct service *s = ctx;
     const struct can_client *c = client_after(&s->ports, 0);
-    while (c && c->place != place) c = client_after(&s->ports, c->came);
+    while (c && c->slot != slot) c = client_after(&s->ports, c->connection);
     return c ? &((struct can_client *)c)->node : NULL;
 }
 
@@ -107,14 +107,14 @@ bool service_taken(void *ctx, uint64_t count)
     return sum >= count || !room;
 }
 
-void service_sweep(struct service *s, bool all)
+void service_sweep_detached(struct service *s, bool all)
 {
-    for (unsigned i = 0; i < s->ports.hubs; i++) can_hub_sweep(&s->ports.hub[i], all);
+    for (unsigned i = 0; i < s->ports.hubs; i++) can_hub_sweep_detached(&s->ports.hub[i], all);
 }
 
 void service_print_clients(const struct service *s)
 {
-    for (const struct can_client *c = client_after(&s->ports, 0); c; c = client_after(&s->ports, c->came)) {
+    for (const struct can_client *c = client_after(&s->ports, 0); c; c = client_after(&s->ports, c->connection)) {
         fprintf(stderr,
                 "psa-emu: %s %s: delivered %" PRIu64 ", taken %" PRIu64 ", dropped %" PRIu64 ", overrun %" PRIu64
                 ", refused %" PRIu64 "\n",

@@ -1,6 +1,6 @@
 /* fork(2) of a running emulator: the child has the whole bench in memory and goes on from the same instant.
  *
- * It gives up all that the parent has open: programs on the parent's buses stay the parent's, in the child ghosts send what
+ * It gives up all that the parent has open: programs on the parent's buses stay the parent's, in the child detached clients send what
  * they had queued. It opens the endpoints it was given, and ends with its own `quit` or SIGTERM, whatever becomes of the
  * parent. Its files are not the parent's: a recording goes on in the parent alone. */
 #ifndef PSABENCH_APP_FORK_H

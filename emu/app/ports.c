@@ -176,7 +176,7 @@ void ports_init(struct ports *p, struct bench *b, const struct options *o)
         h->name = b->scenario.bus[i].name;
         h->bus = &b->bus[i];
         h->links = &p->links;
-        h->comings = &p->comings;
+        h->connections = &p->connections;
         h->lossless = o->pace != PACE_WALL;
         h->epoch_ns = o->epoch_ns;
     }

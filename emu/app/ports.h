@@ -30,7 +30,7 @@ struct ports {
     struct links links;
     struct can_hub hub[SCENARIO_BUSES_MAX]; /* one a bus */
     unsigned hubs;
-    uint32_t comings; /* clients of all hubs so far */
+    uint32_t connections; /* clients of all hubs so far */
     struct ports_can *can[OPTIONS_CAN_MAX];
     unsigned can_count;
     struct line_pty *line;

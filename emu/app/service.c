@@ -80,7 +80,7 @@ void service_close(struct service *s)
         fprintf(stderr, "psa-emu: --truth-log %s: the file is incomplete\n", s->o->truth_log);
         s->vcd_failed = true;
     }
-    service_sweep(s, true);
+    service_sweep_detached(s, true);
     if (!ports_logs_whole(&s->ports, service_say)) s->vcd_failed = true;
     ports_close(&s->ports);
     control_run_forget(&s->control);

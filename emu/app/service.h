@@ -31,7 +31,7 @@ struct service {
     const char *scenario; /* resolved, one line of JSON */
     bool powered;         /* the bench comes from a snapshot */
     bool refused;         /* bad input: a snapshot that cannot be done again, a bus or instrument that is not there */
-    uint32_t comings;     /* CAN clients that came before time began: of the snapshot */
+    uint32_t connections; /* connections of CAN clients before time began: of the snapshot */
     struct truth_log truth_log;
     struct snapshot_ears ears;
     struct link input; /* --until-eof */
@@ -63,8 +63,8 @@ void service_power_up(struct service *s);      /* bench, faults and timeline of 
 
 /* clients.c */
 extern const struct control_clients service_clients;
-bool service_taken(void *ctx, uint64_t count);   /* for loop.taken */
-void service_sweep(struct service *s, bool all); /* ghosts */
+bool service_taken(void *ctx, uint64_t count);            /* for loop.taken */
+void service_sweep_detached(struct service *s, bool all); /* see can_hub.h */
 void service_print_clients(const struct service *s);
 
 /* recording.c */

@@ -141,7 +141,7 @@ static void on_truth_gone(void *ctx, struct ctl_client *c)
 static bool may_start(void *ctx)
 {
     const struct service *s = ctx;
-    return !s->o->wait_client || s->ports.comings > s->comings;
+    return !s->o->wait_client || s->ports.connections > s->connections;
 }
 
 static void moved(void *ctx, int64_t now_ns)
@@ -150,7 +150,7 @@ static void moved(void *ctx, int64_t now_ns)
     (void)now_ns;
     bench_follow(s->bench);
     journal_moved(&s->journal);
-    service_sweep(s, false);
+    service_sweep_detached(s, false);
     snapshot_let_go(&s->ears, s->bench);
     if (s->bench->recording) service_recording_error(s, "the recording ends here, the run continues");
 }

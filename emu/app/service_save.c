@@ -38,7 +38,7 @@ bool service_restore(struct service *s, const struct snapshot *from, char *why, 
         snprintf(why, cap, "%s: %s", s->o->restore, what);
         return false;
     }
-    s->comings = s->ports.comings;
+    s->connections = s->ports.connections;
     if (s->loop.end_ns < SCHED_NEVER) s->loop.end_ns += s->bench->sched.now_ns;
     return true;
 }
@@ -48,7 +48,7 @@ bool service_restore(struct service *s, const struct snapshot *from, char *why, 
 void service_abandon(struct service *s)
 {
     struct bench *b = s->bench;
-    for (unsigned i = 0; i < s->ports.hubs; i++) can_hub_haunt_all(&s->ports.hub[i]);
+    for (unsigned i = 0; i < s->ports.hubs; i++) can_hub_detach_all(&s->ports.hub[i]);
     snapshot_listen(&s->ears, b);
     for (unsigned i = 0; i < CONTROL_SUBS_MAX; i++) {
         if (s->control.watch.sub[i].control) control_gone(&s->control, s->control.watch.sub[i].client);

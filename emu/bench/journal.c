@@ -84,18 +84,18 @@ static void plain(const char *name, char *out, size_t cap)
     out[n] = '\0';
 }
 
-static void on_deed(void *ctx, const struct can_hub *h, const struct can_client *c, enum can_hub_deed deed,
-                    const struct can_msg *m)
+static void on_bus_event(void *ctx, const struct can_hub *h, const struct can_client *c, enum can_hub_event event,
+                         const struct can_msg *m)
 {
     const struct journal_tap *tap = ctx;
     struct journal *j = tap->journal;
     char text[160];
     (void)h;
-    if (deed == CAN_HUB_CAME) {
+    if (event == CAN_HUB_JOINED) {
         plain(c->name, text, sizeof c->name);
         add(j, now_ns(j), "\"bus\":%u,\"came\":%" PRIu32 ",\"heir_of\":%" PRIu32 ",\"name\":\"%s\",\"fd\":%s}\n",
-            tap->bus, c->number, c->heir_of, text, c->node.fd ? "true" : "false");
-    } else if (deed == CAN_HUB_WENT) {
+            tap->bus, c->number, c->adopts, text, c->node.fd ? "true" : "false");
+    } else if (event == CAN_HUB_LEFT) {
         add(j, now_ns(j), "\"bus\":%u,\"went\":%" PRIu32 "}\n", tap->bus, c->number);
     } else {
         can_text_put(m, text);
@@ -127,7 +127,7 @@ void journal_follow(struct journal *j, struct can_hub *h, unsigned bus)
     struct journal_tap *tap = &j->tap[bus];
     *tap = (struct journal_tap){.journal = j, .bus = bus};
     tap->ear = (struct can_node){.name = "journal", .fd = true, .rx = on_heard, .ctx = tap};
-    h->tap = (struct can_hub_tap){.deed = on_deed, .ctx = tap};
+    h->tap = (struct can_hub_tap){.event = on_bus_event, .ctx = tap};
     can_attach(h->bus, &tap->ear);
 }
 
@@ -194,12 +194,12 @@ static bool get_count(const cJSON *json, const char *name, double max, double *o
 
 static bool read_came(const cJSON *json, struct journal_entry *e)
 {
-    double heir_of;
+    double adopts;
     const cJSON *name = cJSON_GetObjectItemCaseSensitive(json, "name");
     const cJSON *fd = cJSON_GetObjectItemCaseSensitive(json, "fd");
     if (!cJSON_IsString(name) || !cJSON_IsBool(fd)) return false;
-    if (!get_count(json, "heir_of", UINT32_MAX, &heir_of)) return false;
-    e->heir_of = (uint32_t)heir_of;
+    if (!get_count(json, "heir_of", UINT32_MAX, &adopts)) return false;
+    e->adopts = (uint32_t)adopts;
     snprintf(e->name, sizeof e->name, "%.31s", name->valuestring);
     e->fd = cJSON_IsTrue(fd);
     return true;

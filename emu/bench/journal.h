@@ -71,7 +71,7 @@ struct journal_entry {
     int64_t t_ns;
     bool ran;
     unsigned bus, unit;
-    uint32_t client, heir_of; /* heir_of: whose place, and frames that wait, it took over; 0: no one's */
+    uint32_t client, adopts; /* adopts: the detached client whose slot it adopted; 0: none */
     uint64_t watch;
     bool fd;
     char name[32];

@@ -316,10 +316,10 @@ static struct can_client *find_client(const struct can_hub *h, uint32_t number)
 
 static bool do_came(struct replay *r, struct can_hub *h, const struct journal_entry *e)
 {
-    struct can_client *before = e->heir_of ? find_client(h, e->heir_of) : NULL;
-    if (e->heir_of && !before) return why_fail(r->why, WHY_MAX, "program %" PRIu32 " is not on the bus", e->heir_of);
-    if (before) before->vacant = true;
-    return can_hub_ghost(h, e->client, e->name, e->fd) || why_fail(r->why, WHY_MAX, "no memory");
+    struct can_client *before = e->adopts ? find_client(h, e->adopts) : NULL;
+    if (e->adopts && !before) return why_fail(r->why, WHY_MAX, "program %" PRIu32 " is not on the bus", e->adopts);
+    if (before) before->slot_free = true;
+    return can_hub_add_detached(h, e->client, e->name, e->fd) || why_fail(r->why, WHY_MAX, "no memory");
 }
 
 static bool do_client(struct replay *r, const struct journal_entry *e)
@@ -331,7 +331,7 @@ static bool do_client(struct replay *r, const struct journal_entry *e)
         return why_fail(r->why, WHY_MAX, "program %" PRIu32 " %s on the bus", e->client, c ? "is already" : "is not");
     }
     if (e->kind == JOURNAL_CAME) return do_came(r, h, e);
-    if (e->kind == JOURNAL_WENT) can_hub_dismiss(h, c);
+    if (e->kind == JOURNAL_WENT) can_hub_remove_detached(h, c);
     else if (!can_hub_send(h, c, &e->m, e->t_ns)) return why_fail(r->why, WHY_MAX, "the bus does not take the frame");
     return true;
 }
@@ -401,6 +401,6 @@ bool snapshot_replay(const struct snapshot *s, const struct snapshot_world *w, c
         good =
             why_fail(why, cap, "makes another bench than the one it was taken of: another build or machine wrote it");
     }
-    for (unsigned i = 0; i < w->buses && good; i++) can_hub_vacate(w->hub[i]);
+    for (unsigned i = 0; i < w->buses && good; i++) can_hub_free_slots(w->hub[i]);
     return good;
 }

@@ -58,7 +58,7 @@ struct snapshot_world {
     struct snapshot_ears *ears; /* on afterwards */
 };
 
-/* Does it again up to the instant of the snapshot and compares the state. The programs that were on the bus are ghosts
+/* Does it again up to the instant of the snapshot and compares the state. The programs that were on the bus are detached clients
  * afterwards, whose places are free until time moves. False with one line in why. */
 bool snapshot_replay(const struct snapshot *s, const struct snapshot_world *w, char *why, size_t cap);
 

@@ -13,8 +13,9 @@
 /* One client of a CAN adapter, or the sum of those who left. */
 struct control_client {
     const char *adapter, *name;
-    uint32_t came;  /* its number, in order of coming, without end */
-    uint32_t place; /* came of the first at its place on the bus: another than its own if it took over from a ghost */
+    uint32_t connection; /* connection number */
+    uint32_t
+        slot; /* position on the bus: connection number of the first client there, whose slot it may have adopted */
     uint64_t delivered, taken, dropped, overrun, refused;
 };
 
@@ -60,7 +61,7 @@ struct control_clients {           /* programs on the CAN buses */
     uint64_t (*can_rx)(void *ctx); /* frames delivered to the client that has been on the bus longest */
     bool (*nth)(void *ctx, unsigned i, struct control_client *out); /* in order of coming; false past the last */
     void (*gone)(void *ctx, struct control_client *out);
-    struct can_node *(*node)(void *ctx, uint32_t place);              /* of the client there; NULL: it has left */
+    struct can_node *(*node)(void *ctx, uint32_t slot);               /* of the client there; NULL: it has left */
     bool (*stall)(void *ctx, const struct can_node *client, bool on); /* it reads nothing; false: it has gone */
 };
 

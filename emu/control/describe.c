@@ -72,7 +72,7 @@ void describe_clients(const struct control_bench *b, cJSON *to)
         cJSON *j = cJSON_CreateObject();
         cJSON_AddStringToObject(j, "adapter", k.adapter);
         cJSON_AddStringToObject(j, "name", k.name);
-        add_count(j, "came", k.came);
+        add_count(j, "came", k.connection);
         add_client(&k, j);
         cJSON_AddItemToArray(list, j);
     }

@@ -31,7 +31,7 @@ static void add_rx(const struct control *c, cJSON *reply)
     cJSON_AddNumberToObject(reply, "can_rx", (double)c->bench->clients.can_rx(c->bench->ctx));
     cJSON *rx = cJSON_AddObjectToObject(reply, "rx");
     for (unsigned i = 0; c->bench->clients.nth(c->bench->ctx, i, &k); i++) {
-        snprintf(number, sizeof number, "%" PRIu32, k.came);
+        snprintf(number, sizeof number, "%" PRIu32, k.connection);
         cJSON_AddNumberToObject(rx, number, (double)k.delivered);
     }
 }

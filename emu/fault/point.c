@@ -158,8 +158,8 @@ bool fault_point(const struct control_bench *b, unsigned n, struct fault_point *
     if (n < programs) {
         struct control_client c = {0};
         (void)b->clients.nth(b->ctx, n, &c);
-        *p = (struct fault_point){.place = FAULT_AT_CLIENT, .index = c.place};
-        snprintf(name, FAULT_POINT_MAX, "client.%" PRIu32, c.came);
+        *p = (struct fault_point){.place = FAULT_AT_CLIENT, .index = c.slot};
+        snprintf(name, FAULT_POINT_MAX, "client.%" PRIu32, c.connection);
         return true;
     }
     return n == programs ? point_of_supply(p, name) : point_of_platform(b, n - programs - 1, p, name);

@@ -14,7 +14,7 @@ enum fault_place {
     FAULT_AT_LINE,       /* a.line.Int */
     FAULT_AT_NODE,       /* a.can */
     FAULT_AT_BUS,        /* bus.can0 */
-    FAULT_AT_CLIENT,     /* client.1, by struct control_client.came */
+    FAULT_AT_CLIENT,     /* client.1, by struct control_client.connection */
     FAULT_AT_SUPPLY,     /* supply */
     FAULT_AT_TORQUER,    /* platform.level, platform.azimuth: by enum platform_axis */
     FAULT_AT_ENCODER,    /* platform.encoder */
@@ -23,7 +23,7 @@ enum fault_place {
 
 struct fault_point {
     enum fault_place place;
-    unsigned unit, index; /* index: axis, part, line or bus, from 0; of a client its control_client.place */
+    unsigned unit, index; /* index: axis, part, line or bus, from 0; of a client its control_client.slot */
 };
 
 #define FAULT_TYPES_MAX 8u /* of boards */

@@ -68,15 +68,15 @@ static bool client(void *ctx, unsigned i, struct control_client *out)
     const struct can_client *c = nth_client(ctx, i);
     if (c) {
         *out = (struct control_client){
-            .adapter = c->adapter, .name = c->name, .came = c->came, .place = c->place, .taken = c->taken};
+            .adapter = c->adapter, .name = c->name, .connection = c->connection, .slot = c->slot, .taken = c->taken};
     }
     return c != NULL;
 }
 
-static struct can_node *client_node(void *ctx, uint32_t place)
+static struct can_node *client_node(void *ctx, uint32_t slot)
 {
     struct can_client *c = ((struct world *)ctx)->hub.clients;
-    while (c && c->place != place) c = c->next;
+    while (c && c->slot != slot) c = c->next;
     return c ? &c->node : NULL;
 }
 
@@ -179,8 +179,8 @@ static void up(struct world *w, bool watched)
 
 static void down(struct world *w)
 {
-    for (unsigned i = 0; i < CLIENTS; i++) can_hub_down(&w->hub, &w->client[i]);
-    can_hub_sweep(&w->hub, true);
+    for (unsigned i = 0; i < CLIENTS; i++) can_hub_leave(&w->hub, &w->client[i]);
+    can_hub_sweep_detached(&w->hub, true);
     snapshot_let_go(&w->ears, &w->bench);
     control_run_forget(&w->control);
     journal_free(&w->journal);
@@ -199,12 +199,12 @@ static void do_client(struct world *w, struct script *s)
 {
     struct can_client *c = &w->client[script_byte(s) % CLIENTS];
     if (c->up) {
-        can_hub_down(&w->hub, c);
+        can_hub_leave(&w->hub, c);
         return;
     }
     *c = (struct can_client){.adapter = "fuzz", .name = "fuzz"};
     c->node = (struct can_node){.order = CAN_ORDER_FIFO, .fd = script_byte(s) & 1};
-    can_hub_up(&w->hub, c);
+    can_hub_join(&w->hub, c);
 }
 
 static void do_frame(struct world *w, struct script *s)

@@ -5,11 +5,12 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-static const char ghostly[] = "ghost"; /* adapter of a ghost */
+static const char detached_adapter[] = "detached";
 
-static void tell(const struct can_hub *h, const struct can_client *c, enum can_hub_deed deed, const struct can_msg *m)
+static void notify_tap(const struct can_hub *h, const struct can_client *c, enum can_hub_event event,
+                       const struct can_msg *m)
 {
-    if (h->tap.deed) h->tap.deed(h->tap.ctx, h, c, deed, m);
+    if (h->tap.event) h->tap.event(h->tap.ctx, h, c, event, m);
 }
 
 static void start_counters(struct can_client *c)
@@ -31,8 +32,8 @@ void can_hub_restart(struct can_hub *h, struct can_client *c)
     start_counters(c);
 }
 
-/* by: who takes its place in the list, or NULL. */
-static void unlist(struct can_hub *h, struct can_client *c, struct can_client *by)
+/* by: the client that takes its slot, or NULL. */
+static void unlist_client(struct can_hub *h, struct can_client *c, struct can_client *by)
 {
     for (struct can_client **p = &h->clients; *p; p = &(*p)->next) {
         if (*p != c) continue;
@@ -42,19 +43,19 @@ static void unlist(struct can_hub *h, struct can_client *c, struct can_client *b
     }
 }
 
-/* The first place that is free for who comes next, or NULL. */
-static struct can_client *vacancy(const struct can_hub *h)
+/* The client in the first free slot, or NULL. */
+static struct can_client *find_free_slot(const struct can_hub *h)
 {
-    struct can_client *g = h->clients;
-    while (g && !g->vacant) g = g->next;
-    return g;
+    struct can_client *d = h->clients;
+    while (d && !d->slot_free) d = d->next;
+    return d;
 }
 
-/* On the bus the client is what the ghost was, but calls are its own. */
-static void inherit(struct can_hub *h, struct can_client *g, struct can_client *c)
+/* The client continues the detached client's node with callbacks of its own. */
+static void adopt_slot(struct can_hub *h, struct can_client *d, struct can_client *c)
 {
     const struct can_node own = c->node;
-    can_replace(h->bus, &g->node, &c->node);
+    can_replace(h->bus, &d->node, &c->node);
     c->node.order = own.order;
     c->node.fd = own.fd;
     c->node.rx = own.rx;
@@ -62,14 +63,14 @@ static void inherit(struct can_hub *h, struct can_client *g, struct can_client *
     c->node.error = own.error;
     c->node.state = own.state;
     c->node.ctx = own.ctx;
-    c->place = g->place;
-    unlist(h, g, c);
-    keep_counters(h, g);
-    h->gone.refused += g->refused;
-    free(g);
+    c->slot = d->slot;
+    unlist_client(h, d, c);
+    keep_counters(h, d);
+    h->gone.refused += d->refused;
+    free(d);
 }
 
-static void append(struct can_hub *h, struct can_client *c)
+static void append_client(struct can_hub *h, struct can_client *c)
 {
     struct can_client **p = &h->clients;
     while (*p) p = &(*p)->next;
@@ -78,109 +79,109 @@ static void append(struct can_hub *h, struct can_client *c)
     can_attach(h->bus, &c->node);
 }
 
-void can_hub_up(struct can_hub *h, struct can_client *c)
+void can_hub_join(struct can_hub *h, struct can_client *c)
 {
-    struct can_client *place = vacancy(h);
+    struct can_client *free_slot = find_free_slot(h);
     start_counters(c);
-    c->heir_of = place ? place->number : 0;
-    if (place) inherit(h, place, c);
-    else append(h, c);
+    c->adopts = free_slot ? free_slot->number : 0;
+    if (free_slot) adopt_slot(h, free_slot, c);
+    else append_client(h, c);
     c->node.name = c->name;
     c->up = true;
-    c->leaving = c->vacant = false;
+    c->leaving = c->slot_free = false;
     c->number = ++h->clients_seen;
-    c->came = h->comings ? ++*h->comings : c->number;
-    if (!place) c->place = c->came;
-    can_hub_stall(c, false); /* a fault of whoever was here before */
-    tell(h, c, CAN_HUB_CAME, NULL);
+    c->connection = h->connections ? ++*h->connections : c->number;
+    if (!free_slot) c->slot = c->connection;
+    can_hub_stall(c, false); /* a fault of the previous client of this slot */
+    notify_tap(h, c, CAN_HUB_JOINED, NULL);
 }
 
-void can_hub_down(struct can_hub *h, struct can_client *c)
+void can_hub_leave(struct can_hub *h, struct can_client *c)
 {
     if (!c->up) return;
-    unlist(h, c, NULL);
+    unlist_client(h, c, NULL);
     keep_counters(h, c);
     h->gone.refused += c->refused;
     c->refused = 0;
     c->up = false;
     can_detach(h->bus, &c->node);
     can_fault_forget(h->bus, &c->node);
-    tell(h, c, CAN_HUB_WENT, NULL);
+    notify_tap(h, c, CAN_HUB_LEFT, NULL);
 }
 
-/* ---- ghosts */
+/* ---- detached clients */
 
-static void silence(struct can_client *g)
+static void set_detached(struct can_client *d)
 {
-    g->adapter = ghostly;
-    g->leaving = true;
-    g->node.name = g->name;
-    g->node.rx = NULL;
-    g->node.sent = NULL;
-    g->node.error = NULL;
-    g->node.state = NULL;
-    g->stalled = false;
-    g->stall = NULL;
-    g->node.ctx = NULL;
+    d->adapter = detached_adapter;
+    d->leaving = true;
+    d->node.name = d->name;
+    d->node.rx = NULL;
+    d->node.sent = NULL;
+    d->node.error = NULL;
+    d->node.state = NULL;
+    d->stalled = false;
+    d->stall = NULL;
+    d->node.ctx = NULL;
 }
 
-bool can_hub_haunt(struct can_hub *h, struct can_client *c)
+bool can_hub_detach(struct can_hub *h, struct can_client *c)
 {
-    struct can_client *g = c->up ? malloc(sizeof *g) : NULL;
-    if (!g) {
-        can_hub_down(h, c);
+    struct can_client *d = c->up ? malloc(sizeof *d) : NULL;
+    if (!d) {
+        can_hub_leave(h, c);
         return false;
     }
-    *g = *c;
-    unlist(h, c, g);
-    can_replace(h->bus, &c->node, &g->node);
-    silence(g);
-    g->vacant = true;
+    *d = *c;
+    unlist_client(h, c, d);
+    can_replace(h->bus, &c->node, &d->node);
+    set_detached(d);
+    d->slot_free = true;
     c->up = false;
     c->refused = 0;
     return true;
 }
 
-void can_hub_haunt_all(struct can_hub *h)
+void can_hub_detach_all(struct can_hub *h)
 {
     for (struct can_client *c = h->clients, *next; c; c = next) {
         next = c->next;
-        if (c->adapter != ghostly) can_hub_haunt(h, c);
+        if (c->adapter != detached_adapter) can_hub_detach(h, c);
     }
 }
 
-struct can_client *can_hub_ghost(struct can_hub *h, uint32_t number, const char *name, bool fd)
+struct can_client *can_hub_add_detached(struct can_hub *h, uint32_t number, const char *name, bool fd)
 {
-    struct can_client *g = calloc(1, sizeof *g);
-    if (!g) return NULL;
-    snprintf(g->name, sizeof g->name, "%.31s", name);
-    g->node.order = CAN_ORDER_FIFO;
-    g->node.fd = fd;
-    silence(g);
+    struct can_client *d = calloc(1, sizeof *d);
+    if (!d) return NULL;
+    snprintf(d->name, sizeof d->name, "%.31s", name);
+    d->node.order = CAN_ORDER_FIFO;
+    d->node.fd = fd;
+    set_detached(d);
     h->clients_seen = number - 1;
-    can_hub_up(h, g);
-    g->leaving = true;
-    return g;
+    can_hub_join(h, d);
+    d->leaving = true;
+    return d;
 }
 
-void can_hub_dismiss(struct can_hub *h, struct can_client *ghost)
+void can_hub_remove_detached(struct can_hub *h, struct can_client *detached)
 {
-    can_hub_down(h, ghost);
-    free(ghost);
+    can_hub_leave(h, detached);
+    free(detached);
 }
 
-void can_hub_sweep(struct can_hub *h, bool all)
+void can_hub_sweep_detached(struct can_hub *h, bool all)
 {
     for (struct can_client *c = h->clients, *next; c; c = next) {
         next = c->next;
-        c->vacant = false;
-        if (c->adapter == ghostly && (c->node.queued == 0 || all)) can_hub_dismiss(h, c);
+        c->slot_free = false;
+        if (c->adapter == detached_adapter && (c->node.queued == 0 || all)) can_hub_remove_detached(h, c);
     }
 }
 
-void can_hub_vacate(struct can_hub *h)
+void can_hub_free_slots(struct can_hub *h)
 {
-    for (struct can_client *c = h->clients; c; c = c->next) c->vacant = c->adapter == ghostly;
+    for (struct can_client *c = h->clients; c; c = c->next) c->slot_free = c->adapter == detached_adapter;
 }
 
 void can_hub_stall(struct can_client *c, bool on)
@@ -202,6 +203,6 @@ bool can_hub_send(struct can_hub *h, struct can_client *c, const struct can_msg 
     }
     c->taken++;
     h->taken++;
-    tell(h, c, CAN_HUB_SENT, m);
+    notify_tap(h, c, CAN_HUB_SENT, m);
     return true;
 }

@@ -74,7 +74,7 @@ static bool cmd_open(struct slcan_pty *s, const char *arg, int64_t t_ns)
     s->closing = s->can.leaving = s->lost_told = false;
     s->status = 0;
     if (s->can.up) can_hub_restart(s->hub, &s->can);
-    else can_hub_up(s->hub, &s->can);
+    else can_hub_join(s->hub, &s->can);
     return true;
 }
 
@@ -209,7 +209,7 @@ static void on_flush(struct link *l, int64_t t_ns)
     }
     if (s->closing && !s->can.node.queued) {
         s->closing = false;
-        can_hub_down(s->hub, &s->can);
+        can_hub_leave(s->hub, &s->can);
     }
     text_link_flush(l, t_ns);
 }
@@ -259,7 +259,7 @@ int slcan_pty_open(struct slcan_pty *s, struct can_hub *hub, const char *name)
 
 void slcan_pty_close(struct slcan_pty *s)
 {
-    can_hub_down(s->hub, &s->can);
+    can_hub_leave(s->hub, &s->can);
     text_link_free(&s->io);
     s->io.link.gone = true;
     pty_close(&s->pty);

@@ -216,14 +216,14 @@ int socketcan_open(struct socketcan *s, struct can_hub *hub, const char *interfa
         (struct can_node){.order = CAN_ORDER_FIFO, .fd = fd_frames, .rx = on_frame, .error = on_error, .ctx = s};
     s->can.stall = on_stall;
     s->virtual = strncmp(interface, "vcan", 4) == 0 || strncmp(interface, "vxcan", 5) == 0;
-    can_hub_up(hub, &s->can);
+    can_hub_join(hub, &s->can);
     links_add_first(hub->links, &s->link);
     return 0;
 }
 
 void socketcan_close(struct socketcan *s)
 {
-    can_hub_down(s->hub, &s->can);
+    can_hub_leave(s->hub, &s->can);
     if (s->link.fd >= 0) close(s->link.fd);
     s->link.fd = -1;
     s->link.gone = true;

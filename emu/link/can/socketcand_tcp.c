@@ -158,7 +158,7 @@ static void do_rawmode(struct client *c, int64_t t_ns)
     c->phase = PHASE_HOLD;
     c->io.hold = true;
     c->io.link.timer_ms = SOCKETCAND_HOLD_MS;
-    can_hub_up(c->hub, &c->can);
+    can_hub_join(c->hub, &c->can);
     say(c, "connected");
 }
 
@@ -219,7 +219,7 @@ static void leave(struct client *c)
     if (c->can.up) {
         if (c->can.node.queued) return; /* frames of a client that sent and left still go out */
         say(c, "gone");
-        can_hub_down(c->hub, &c->can);
+        can_hub_leave(c->hub, &c->can);
     }
     c->server->clients--;
     c->io.link.gone = true;
@@ -268,7 +268,7 @@ static void on_timer(struct link *l, int64_t t_ns)
 static void on_release(struct link *l)
 {
     struct client *c = (struct client *)l;
-    can_hub_down(c->hub, &c->can);
+    can_hub_leave(c->hub, &c->can);
     text_link_free(&c->io);
     free(c);
 }

@@ -67,7 +67,7 @@ static inline void on_frame(void *ctx, const struct psa2_frame *f, int64_t t_ns)
 static inline bool on_client(void *ctx, unsigned i, struct control_client *out)
 {
     (void)ctx;
-    *out = (struct control_client){.adapter = "socketcand", .name = "can0", .came = r.came[i], .place = r.came[i]};
+    *out = (struct control_client){.adapter = "socketcand", .name = "can0", .connection = r.came[i], .slot = r.came[i]};
     return r.came[i] != 0;
 }
 
