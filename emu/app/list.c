@@ -36,7 +36,7 @@ static void list_profile(FILE *out, const char *path, const char *comment)
     }
     char about[256];
     board->type->about(&p, about, sizeof about);
-    fprintf(out, "%-12s %s: %s\n", board_profile_name(board->type, &p), board->title, about);
+    fprintf(out, "%-12s %s: %s\n", board_profile_name(board->type, &p), board_name_title(board), about);
     if (*comment) fprintf(out, "             %s\n", comment);
 }
 

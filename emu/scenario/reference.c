@@ -131,8 +131,8 @@ static void print_boards(FILE *out)
                  "profile of the same board; `psa2` and `pik` take those of their other names, too.\n\n| `board` | "
                  "board | profile | `node` of the first |\n|---|---|---|---|\n");
     for (const struct board_name *n = board_names; n->name; n++)
-        fprintf(out, "| `%s` | %s | `%s` | %u |\n", n->name, n->title, n->profile ? n->profile : n->type->profile_name,
-                n->type->node);
+        fprintf(out, "| `%s` | %s | `%s` | %u |\n", n->name, board_name_title(n),
+                n->profile ? n->profile : n->type->profile_name, n->type->node);
     fprintf(out, "\n");
 }
 

@@ -31,7 +31,7 @@ static bool find_profile(struct yaml_file *f, const struct yaml_node *node, cons
     if (!profile_yaml_load(path, &of, &u->profile, f->why, f->cap)) return false;
     if (!board_name_takes(u->board, of)) {
         return yaml_file_fail(f, node, "profile", "expected a profile of %s (board: %s), got %s, one of %s (board: %s)",
-                              u->board->title, u->board->name, name, of->title, of->name);
+                              board_name_title(u->board), u->board->name, name, board_name_title(of), of->name);
     }
     if (type->cfg_profiled) type->cfg_profiled(&u->cfg.board, &u->profile);
     return true;

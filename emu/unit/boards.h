@@ -2,16 +2,18 @@
 #ifndef PSABENCH_UNIT_BOARDS_H
 #define PSABENCH_UNIT_BOARDS_H
 
-#include "board/board.h"
-#include "board/gyro/can.h"
-#include "board/gyro/gyro.h"
-#include "board/pik/can.h"
-#include "board/pik/pik.h"
-#include "board/pmka/can.h"
-#include "board/pmka/pmka.h"
-#include "board/psa2/can.h"
-#include "board/psd1/can.h"
-#include "board/psd1/psd1.h"
+#include "board/gyro/board.h"
+#include "board/pik/board.h"
+#include "board/pmka/board.h"
+#include "board/psa2/board.h"
+#include "board/psd1/board.h"
+
+/* The types, the default one first. X(NAME): board/NAME/board.h has struct NAME, struct NAME_can, struct NAME_profile and the
+ * board_type NAME_board. */
+#define BOARD_TYPES(X) X(psa2) X(psd1) X(pmka) X(pik) X(gyro)
+
+/* Other names for a type with one of its profiles. X(name, type, title); the profile is proto/profiles/<name>.yaml. */
+#define BOARD_ALIASES(X) X(psa1, psa2, "PSA-1") X(pik5, pik, "PIK-5") X(pik6, pik, "PIK-6")
 
 extern const struct board_type *const board_types[]; /* up to NULL */
 
@@ -19,13 +21,14 @@ extern const struct board_type *const board_types[]; /* up to NULL */
 struct board_name {
     const char *name;
     const struct board_type *type;
-    const char *profile; /* in proto/profiles; NULL: the type's default */
-    const char *title;   /* "PIK-5" */
+    const char *profile;     /* in proto/profiles; NULL: the type's default */
+    const char *alias_title; /* "PIK-5"; NULL: the type's */
 };
 extern const struct board_name board_names[]; /* up to a NULL name; the types' own first */
 
 const struct board_type *board_find(const char *name); /* a type by its own name; NULL: none */
 const struct board_name *board_name_find(const char *name);
+const char *board_name_title(const struct board_name *n);
 
 /* Whether a board of the one name can have a profile of the other: a type's own name takes any of the type. */
 bool board_name_takes(const struct board_name *board, const struct board_name *profile);
@@ -33,28 +36,17 @@ bool board_name_takes(const struct board_name *board, const struct board_name *p
 /* The profile's field "name". */
 const char *board_profile_name(const struct board_type *type, const void *profile);
 
+#define BOARD_STORE(NAME)         struct NAME NAME;
+#define BOARD_CAN_STORE(NAME)     struct NAME##_can NAME;
+#define BOARD_PROFILE_STORE(NAME) struct NAME##_profile NAME;
 union board_store {
-    struct psa2 psa2;
-    struct psd1 psd1;
-    struct pmka pmka;
-    struct pik pik;
-    struct gyro gyro;
+    BOARD_TYPES(BOARD_STORE)
 };
-
 union board_can_store {
-    struct psa2_can psa2;
-    struct psd1_can psd1;
-    struct pmka_can pmka;
-    struct pik_can pik;
-    struct gyro_can gyro;
+    BOARD_TYPES(BOARD_CAN_STORE)
 };
-
 union board_profile_store {
-    struct psa2_profile psa2;
-    struct psd1_profile psd1;
-    struct pmka_profile pmka;
-    struct pik_profile pik;
-    struct gyro_profile gyro;
+    BOARD_TYPES(BOARD_PROFILE_STORE)
 };
 
 #endif

@@ -7,7 +7,7 @@ import cantools
 from cantools.database.can.c_source import generate
 
 from protogen.dbc import dbc
-from protogen.model import BOARDS, BUS, BUS_REGISTERS, Entry, Object, Protocol, resolved
+from protogen.model import BUS, BUS_REGISTERS, Entry, Object, Protocol, resolved
 
 
 def c_string(text: str) -> str:
@@ -39,7 +39,7 @@ def od_source(p: Protocol) -> str:
     lines = [f"/* {p.generated} */", f'#include "gen/{p.key}_od.h"', "", "#include <stddef.h>", "",
              "static const struct co_entry entry[] = {", *rows, "};", "",
              f"const struct co_od {p.key}_od = {{entry, sizeof entry / sizeof entry[0]}};", ""]  # fmt: skip
-    return "\n".join(lines + (device_source(p) if p.key in BOARDS else []))
+    return "\n".join(lines + (device_source(p) if p.unit else []))
 
 
 def device_source(p: Protocol) -> list[str]:
@@ -66,7 +66,7 @@ def enum(name: str, rows: list[str]) -> list[str]:
 def od_header(p: Protocol) -> str:
     key, upper = p.key, p.key.upper()
     guard = f"PSABENCH_GEN_{upper}_OD_H"
-    include = "co_device" if key in BOARDS else "co_od"
+    include = "co_device" if p.unit else "co_od"
     what = f"/* Object dictionary of a {p.device['name']} unit; {p.generated} */"
     out = [what, f"#ifndef {guard}", f"#define {guard}", "",
            f'#include "canopen/{include}.h"', ""]  # fmt: skip
@@ -80,7 +80,7 @@ def od_header(p: Protocol) -> str:
         out += [f"#define {upper}_FORMS {len(p.forms)}u",
                 f"#define {upper}_BLOCK_SAMPLES {max(f['samples'] for f in p.forms)}u"]  # fmt: skip
     out += ["", f"extern const struct co_od {key}_od;"]
-    if key in BOARDS:
+    if p.unit:
         out.append(f"extern const struct co_device {key}_device;")
     return "\n".join([*out, "", "#endif", ""])
 

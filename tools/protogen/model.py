@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[2]
-BOARDS = ("psd1", "pmka", "pik", "gyro")  # proto/<board>.yaml each; in the order of the DBC
 
 # CiA 301 table 44: data types by name: code, least and greatest value.
 TYPES: dict[str, tuple[int, float, float]] = {
@@ -108,6 +107,7 @@ class Protocol:
     tpdos: list[dict[str, Any]]
     counters: tuple[str, ...] = ()  # C names, in the order of the last sub-indices of 2030h
     about: str = ""
+    unit: bool = False  # on the common node, emu/board/node.c: it has a struct co_device
 
     @property
     def generated(self) -> str:

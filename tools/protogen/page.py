@@ -2,7 +2,7 @@
 
 import re
 
-from protogen.model import BOARDS, ROOT, Entry, Message, Protocol, resolved
+from protogen.model import ROOT, Entry, Message, Protocol, resolved
 
 RATES_HZ = (250, 500, 1000, 2000, 4000)
 BUS = 0x2002  # the parallel bus, of units that have one
@@ -98,7 +98,7 @@ def page(p: Protocol) -> str:
         "emcy": emcy_table(p),
         "about": [p.about.rstrip(), ""] if p.about else [],
     }
-    unit = p.key in BOARDS
+    unit = p.unit
     head = ROOT / ("proto/protocol_unit_head.md" if unit else "proto/protocol_head.md")
     text = head.read_text()
     if unit:

@@ -6,7 +6,7 @@ from typing import Any
 
 import yaml
 
-from protogen.model import BOARDS, BUS, BUS_REGISTERS, ROOT, Entry, Message, Object, Protocol, Signal
+from protogen.model import BUS, BUS_REGISTERS, ROOT, Entry, Message, Object, Protocol, Signal
 
 SOURCE = ROOT / "proto/psabench.yaml"
 UNIT_SOURCE = ROOT / "proto/unit.yaml"
@@ -158,10 +158,9 @@ def unit_objects(source: dict[str, Any], base: Protocol) -> list[Object]:
     return objects + [read_object(o, source) for o in source.get("objects", [])]
 
 
-def load_unit(key: str, base: Protocol) -> Protocol:
-    """A board of proto/<key>.yaml; base: PSA-2, whose services and communication objects it shares."""
-    path = ROOT / f"proto/{key}.yaml"
-    source = yaml.safe_load(path.read_text())
+def load_unit(path: Path, source: dict[str, Any], base: Protocol) -> Protocol:
+    """A board of proto/<board>.yaml; base: PSA-2, whose services and communication objects it shares."""
+    key = path.stem
     objects = unit_objects(source, base) + tpdo_objects(source["tpdos"], source.get("forms", []))
     for t in source["tpdos"]:
         if unknown := set(t) - {"message", "cob", "map", "optional"}:
@@ -182,10 +181,13 @@ def load_unit(key: str, base: Protocol) -> Protocol:
         tpdos=source["tpdos"],
         counters=tuple(c.get("counter", c["name"].lower().replace(" ", "_")) for c in source["counters"]),
         about=source.get("about", ""),
+        unit=True,
     )
 
 
 def load_all() -> list[Protocol]:
-    """PSA-2 first, then the other boards."""
+    """PSA-2 first, then each proto/*.yaml with a device, by its default node."""
     base = load()
-    return [base, *(load_unit(key, base) for key in BOARDS)]
+    sources = {path: yaml.safe_load(path.read_text()) for path in (ROOT / "proto").glob("*.yaml") if path != SOURCE}
+    units = [(path, source) for path, source in sources.items() if "device" in source]
+    return [base, *(load_unit(path, s, base) for path, s in sorted(units, key=lambda u: u[1]["device"]["node"]))]

@@ -2,7 +2,8 @@
 #ifndef PSABENCH_BOARD_GYRO_BOARD_H
 #define PSABENCH_BOARD_GYRO_BOARD_H
 
-#include "board/board.h"
+#include "board/gyro/can.h"
+#include "board/gyro/gyro.h"
 
 extern const struct board_type gyro_board;
 

@@ -2,7 +2,8 @@
 #ifndef PSABENCH_BOARD_PIK_BOARD_H
 #define PSABENCH_BOARD_PIK_BOARD_H
 
-#include "board/board.h"
+#include "board/pik/can.h"
+#include "board/pik/pik.h"
 
 extern const struct board_type pik_board;
 

@@ -7,7 +7,7 @@ the wires. Figures that a test needs are in its `limits`, so that they be in one
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -30,8 +30,11 @@ SOURCE = re.compile(
 )
 TABLE = re.compile(r"(docs|proto)/[\w/]+\.(yaml|md)#[^#]+")
 TEST = re.compile(r"tests/(unit/(\w+/)*test_\w+\.c:\w+|(py|e2e|golden)/(\w+/)*test_\w+\.py:test_\w+)")
-INDEX_FIELDS = {"version", "grades", "observe", "kinds", "boards", "groups", "retired"}
-GROUP_FIELDS = {"title", "prefixes"}
+INDEX_FIELDS = {"version", "grades", "observe", "kinds", "groups", "retired"}
+GROUP_FIELDS = {"title", "prefixes", "boards", "rows"}
+GROUP_OPTIONS = {"traits"}
+TRAITS = frozenset({"parallel_bus"})
+EVERY_BOARD, TAKEN_AWAY = "all", "!"  # in a list of boards
 ROW_FIELDS = {"id", "text", "source", "grade", "kind"}
 ROW_OPTIONS = {"original", "boards", "profiles", "observe", "unobservable", "limits", "table", "note", "proved_by"}
 
@@ -139,16 +142,18 @@ def load(index: Path) -> Requirements:
     """Read an index, and the groups and profiles in the folders beside it. Raises RequirementsError."""
     data = _mapping(_read(index), INDEX_FIELDS - {"retired"}, {"retired"}, index.name)
     where = index.name
-    grades, ways, kinds, boards = (_words(data[k], f"{where}: {k}") for k in ("grades", "observe", "kinds", "boards"))
+    grades, ways, kinds = (_words(data[k], f"{where}: {k}") for k in ("grades", "observe", "kinds"))
+    files = _group_files(index.parent / "requirements", _texts(data["groups"], f"{where}: groups"))
+    boards, traits = _boards(files)
     profiles = _profiles(index.parent / "profiles", boards)
     retired = set(_texts(data.get("retired", []), f"{where}: retired"))
     if type(data["version"]) is not int or data["version"] < 1:
         raise RequirementsError(f"{where}: version {data['version']!r} is no number from 1 on")
-    words = _Words(frozenset(grades), frozenset(ways), frozenset(kinds), frozenset(boards), profiles)
-    groups = _groups(data["groups"], where)
+    words = _Words(frozenset(grades), frozenset(ways), frozenset(kinds), tuple(boards), traits, profiles)
+    groups = _groups(files)
     rows: dict[str, Requirement] = {}
     for group in groups:
-        for row in _rows(index.parent / "requirements" / f"{group.name}.yaml", group, words):
+        for row in _rows(f"{group.name}.yaml", files[group.name], group, words):
             if row.id in rows:
                 raise RequirementsError(f"{group.name}.yaml: {row.id}: this id occurs twice")
             if row.id in retired:
@@ -171,8 +176,19 @@ class _Words:
     grades: frozenset[str]
     ways: frozenset[str]
     kinds: frozenset[str]
-    boards: frozenset[str]
+    boards: tuple[str, ...]
+    traits: Mapping[str, frozenset[str]]  # trait to the boards that have it
     profiles: Mapping[str, str]
+
+    def known_boards(self, raw: Any, at: str) -> tuple[str, ...]:
+        """Of a list of boards, traits and `all`, without those with a "!". Raises RequirementsError."""
+        named = _texts(raw, at)
+        some = [n for n in named if not n.startswith(TAKEN_AWAY)]
+        away = {_one(n.removeprefix(TAKEN_AWAY), self.boards, at) for n in named if n.startswith(TAKEN_AWAY)}
+        if not any(n == EVERY_BOARD or n in self.traits for n in some):
+            return tuple(_one(n, (*self.boards, *self.traits, EVERY_BOARD), at) for n in some if n not in away)
+        meant = {b for n in some for b in self.traits.get(n, self.boards if n == EVERY_BOARD else (n,))}
+        return tuple(b for b in self.boards if b in meant - away)
 
 
 def _read(path: Path) -> Any:
@@ -196,34 +212,55 @@ def _profiles(folder: Path, boards: Mapping[str, str]) -> dict[str, str]:
     return found
 
 
-def _groups(raw: Any, where: str) -> tuple[Group, ...]:
-    if not isinstance(raw, dict) or not raw:
-        raise RequirementsError(f"{where}: groups is a mapping of names to title and prefixes")
+def _group_files(folder: Path, first: Sequence[str]) -> dict[str, dict[str, Any]]:
+    """Group to what its file says: the first ones in this order, then all others of the folder by name."""
+    others = sorted({path.stem for path in folder.glob("*.yaml")} - set(first))
+    paths = [folder / f"{name}.yaml" for name in (*first, *others)]
+    return {path.stem: _mapping(_read(path), GROUP_FIELDS, GROUP_OPTIONS, path.name) for path in paths}
+
+
+def _boards(files: Mapping[str, dict[str, Any]]) -> tuple[dict[str, str], dict[str, frozenset[str]]]:
+    """Every board with one line of explanation, and which of them have each trait."""
+    boards: dict[str, str] = {}
+    traits: dict[str, set[str]] = {trait: set() for trait in TRAITS}
+    for name, data in files.items():
+        own = _words(data["boards"], f"{name}.yaml: boards") if isinstance(data["boards"], dict) else {}
+        if twice := boards.keys() & own.keys():
+            raise RequirementsError(f"{name}.yaml: boards: {', '.join(twice)} belongs to another group")
+        boards |= own
+        for trait in _known(data.get("traits", []), TRAITS, f"{name}.yaml: traits"):
+            traits[trait] |= own.keys()
+    if not boards:
+        raise RequirementsError("requirements: no group file defines a board")
+    return boards, {trait: frozenset(having) for trait, having in traits.items()}
+
+
+def _groups(files: Mapping[str, dict[str, Any]]) -> tuple[Group, ...]:
     groups: list[Group] = []
-    for name, entry in raw.items():
-        entry = _mapping(entry, GROUP_FIELDS, set(), f"{where}: group {name}")
-        prefixes = _texts(entry["prefixes"], f"{where}: group {name}: prefixes")
+    for name, data in files.items():
+        prefixes = _texts(data["prefixes"], f"{name}.yaml: prefixes")
         if taken := {p for g in groups for p in g.prefixes} & set(prefixes):
-            raise RequirementsError(f"{where}: group {name}: prefix {', '.join(taken)} belongs to another group")
-        groups.append(Group(str(name), _text(entry["title"], f"{where}: group {name}: title"), prefixes))
+            raise RequirementsError(f"{name}.yaml: prefix {', '.join(taken)} belongs to another group")
+        groups.append(Group(name, _text(data["title"], f"{name}.yaml: title"), prefixes))
     return tuple(groups)
 
 
-def _rows(path: Path, group: Group, words: _Words) -> Iterator[Requirement]:
-    data = _mapping(_read(path), {"boards", "rows"}, set(), path.name)
-    boards = _known(data["boards"], words.boards, f"{path.name}: boards")
+def _rows(file: str, data: dict[str, Any], group: Group, words: _Words) -> Iterator[Requirement]:
+    boards = words.known_boards(
+        list(data["boards"]) if isinstance(data["boards"], dict) else data["boards"], f"{file}: boards"
+    )
     if not isinstance(data["rows"], list) or not data["rows"]:
-        raise RequirementsError(f"{path.name}: rows is no list of requirements")
+        raise RequirementsError(f"{file}: rows is no list of requirements")
     for number, raw in enumerate(data["rows"], start=1):
         key = raw.get("id", f"row {number}") if isinstance(raw, dict) else f"row {number}"
-        yield _row(_mapping(raw, ROW_FIELDS, ROW_OPTIONS, f"{path.name}: {key}"), group, boards, words, path.name)
+        yield _row(_mapping(raw, ROW_FIELDS, ROW_OPTIONS, f"{file}: {key}"), group, boards, words, file)
 
 
 def _row(raw: dict[str, Any], group: Group, boards: tuple[str, ...], words: _Words, file: str) -> Requirement:
     at = f"{file}: {raw['id']}"
     if not isinstance(raw["id"], str) or not (m := ID.fullmatch(raw["id"])) or m[1] not in group.prefixes:
         raise RequirementsError(f"{at}: an id is {' or '.join(group.prefixes)}, a topic and two figures: PSA2-FRAME-03")
-    boards = _known(raw.get("boards", list(boards)), words.boards, f"{at}: boards")
+    boards = words.known_boards(raw.get("boards", list(boards)), f"{at}: boards")
     profiles = _known(raw.get("profiles", []), frozenset(words.profiles), f"{at}: profiles")
     if strange := [p for p in profiles if words.profiles[p] not in boards]:
         raise RequirementsError(f"{at}: profile {', '.join(strange)} is of none of its boards ({', '.join(boards)})")
@@ -300,7 +337,7 @@ def _texts(raw: Any, at: str) -> tuple[str, ...]:
     return found
 
 
-def _one(raw: Any, known: frozenset[str], at: str) -> str:
+def _one(raw: Any, known: Collection[str], at: str) -> str:
     if raw not in known:
         raise RequirementsError(f"{at}: {raw!r} is not among: {', '.join(sorted(known))}")
     return str(raw)

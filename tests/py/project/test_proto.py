@@ -12,6 +12,7 @@ import canopen
 import cantools
 import gen_proto
 import pytest
+import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from protogen import c_tables, page, source
@@ -34,7 +35,7 @@ PROTOCOLS = source.load_all()
 UNITS = PROTOCOLS[1:]
 EACH = pytest.mark.parametrize("protocol", PROTOCOLS, ids=lambda p: p.key)
 EACH_UNIT = pytest.mark.parametrize("protocol", UNITS, ids=lambda p: p.key)
-WITH_BUS = [p for p in UNITS if p.key != "gyro"]
+WITH_BUS = [p for p in UNITS if any(o.const == "BUS" for o in p.objects)]
 EACH_WITH_BUS = pytest.mark.parametrize("protocol", WITH_BUS, ids=lambda p: p.key)
 DATABASE = load_database()
 XY = DATABASE.get_message_by_name("PSA2_XY")
@@ -255,10 +256,8 @@ counters: [{name: Two words}]
 
 
 def unit_of(monkeypatch: pytest.MonkeyPatch, folder: Path, more: str) -> Any:
-    (folder / "proto").mkdir()
-    (folder / "proto/test.yaml").write_text(UNIT + more)
     monkeypatch.setattr(source, "ROOT", folder)
-    return source.load_unit("test", PROTOCOL)
+    return source.load_unit(folder / "proto/test.yaml", yaml.safe_load(UNIT + more), PROTOCOL)
 
 
 def test_the_least_that_a_unit_needs(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

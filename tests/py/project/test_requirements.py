@@ -22,10 +22,10 @@ INDEX: dict[str, Any] = {
     "grades": {"E0": "ours", "E1": "article"},
     "observe": {"can": "frames", "line": "samples"},
     "kinds": {"value": "a number", "edge": "an edge"},
-    "boards": {"psa2": "one", "psd1": "another"},
-    "groups": {"psa2": {"title": "PSA-2", "prefixes": ["PSA2"]}},
+    "groups": ["psa2"],
     "retired": [],
 }
+GROUP: dict[str, Any] = {"title": "PSA-2", "prefixes": ["PSA2"], "boards": {"psa2": "one"}}
 ROW: dict[str, Any] = {
     "id": "PSA2-FRAME-03",
     "text": "Int shall be low for 74 us.",
@@ -36,13 +36,24 @@ ROW: dict[str, Any] = {
 }
 
 
+HEAD = yaml.safe_dump(GROUP)
+OTHER_GROUP: dict[str, Any] = {
+    "title": "PSD-1",
+    "prefixes": ["PSD1"],
+    "boards": {"psd1": "another"},
+    "traits": "parallel_bus",
+    "rows": [ROW | {"id": "PSD1-CYC-01"}],
+}
+
+
 def write(folder: Path, rows: list[Any], index: dict[str, Any] | None = None, **group: Any) -> Path:
     """A folder as proto is, with two profiles; the path of its index."""
     (folder / "requirements").mkdir(exist_ok=True)
     (folder / "profiles").mkdir(exist_ok=True)
     (folder / "profiles/article.yaml").write_text("name: article\n")
     (folder / "profiles/psd1.yaml").write_text("board: psd1\n")
-    data = {"boards": ["psa2"], "rows": rows} | group
+    (folder / "requirements/psd1.yaml").write_text(yaml.safe_dump(OTHER_GROUP))
+    data = GROUP | {"rows": rows} | group
     (folder / "requirements/psa2.yaml").write_text(yaml.safe_dump(data, allow_unicode=True), encoding="utf-8")
     path = folder / "requirements.yaml"
     path.write_text(yaml.safe_dump(index or INDEX), encoding="utf-8")
@@ -59,8 +70,9 @@ def test_a_row_has_what_its_file_says(tmp_path: Path) -> None:
     reqs = load(
         write(tmp_path, [ROW | more, ROW | {"id": "PSA2-FRAME-04", "boards": ["psa2", "psd1"], "profiles": "psd1"}])
     )
-    first, second = reqs
-    assert len(reqs) == 2
+    first, second, other = reqs
+    assert len(reqs) == 3
+    assert (other.group, other.boards) == ("psd1", ("psd1",))
     assert reqs["PSA2-FRAME-03"] is first
     assert (first.group, first.boards, first.profiles, first.grade) == ("psa2", ("psa2",), (), "E1")
     assert first.original == "не менее 74 мкс"
@@ -71,7 +83,7 @@ def test_a_row_has_what_its_file_says(tmp_path: Path) -> None:
 
 
 def test_a_requirement_applies_to_its_boards_and_profiles(tmp_path: Path) -> None:
-    every, one = load(write(tmp_path, [ROW, ROW | {"id": "PSA2-FRAME-04", "profiles": ["article"]}]))
+    every, one, _ = load(write(tmp_path, [ROW, ROW | {"id": "PSA2-FRAME-04", "profiles": ["article"]}]))
     assert every.applies("psa2", "article")
     assert every.applies("psa2", "a_profile_of_tomorrow")
     assert not every.applies("psd1", "psd1")
@@ -83,7 +95,7 @@ def test_a_requirement_applies_to_its_boards_and_profiles(tmp_path: Path) -> Non
 def test_those_of_a_board_and_a_profile(tmp_path: Path) -> None:
     reqs = load(write(tmp_path, [ROW, ROW | {"id": "PSA2-FRAME-04", "boards": ["psd1"]}]))
     assert [r.id for r in reqs.of("psa2", "article")] == ["PSA2-FRAME-03"]
-    assert [r.id for r in reqs.of("psd1", "psd1")] == ["PSA2-FRAME-04"]
+    assert [r.id for r in reqs.of("psd1", "psd1")] == ["PSA2-FRAME-04", "PSD1-CYC-01"]
     with pytest.raises(ValueError, match="psa2 has no profile psd1; there are: article"):
         reqs.of("psa2", "psd1")
 
@@ -127,7 +139,7 @@ def test_what_was_read_cannot_be_changed(tmp_path: Path) -> None:
         ({"grade": "E1"}, "grade E1 needs the article's sentence"),
         ({"original": "слово"}, "`original` needs the article among its sources"),
         ({"kind": "mood"}, "kind: 'mood' is not among: edge, value"),
-        ({"boards": ["pig"]}, "boards: 'pig' is not among: psa2, psd1"),
+        ({"boards": ["pig"]}, "boards: 'pig' is not among: all, parallel_bus, psa2, psd1"),
         ({"profiles": ["w99"]}, "profiles: 'w99' is not among: article, psd1"),
         ({"profiles": ["psd1"]}, "profile psd1 is of none of its boards (psa2)"),
         ({"observe": {"nose": "smell"}}, "observe: 'nose' is not among: can, line"),
@@ -147,7 +159,7 @@ def test_what_was_read_cannot_be_changed(tmp_path: Path) -> None:
 def test_a_bad_row_is_told_in_one_line_with_its_file_and_id(change: dict[str, Any], says: str, tmp_path: Path) -> None:
     path = write(tmp_path, [ROW | change])
     if not says:
-        assert len(load(path)) == 1
+        assert len(load(path)) == 2
         return
     with pytest.raises(RequirementsError) as e:
         load(path)
@@ -176,11 +188,8 @@ def test_an_id_stands_once_and_does_not_come_back(tmp_path: Path) -> None:
         ({"version": 0}, "version 0 is no number from 1 on"),
         ({"version": True}, "version True is no number"),
         ({"grades": []}, "grades: no mapping of words"),
-        ({"groups": {}}, "groups is a mapping"),
-        ({"groups": {"psa2": {"title": "t"}}}, "group psa2: prefixes is missing"),
-        ({"groups": {n: {"title": n, "prefixes": "PSA2"} for n in ("psa2", "more")}}, "prefix PSA2 belongs to another"),
-        ({"groups": {"gone": {"title": "t", "prefixes": ["GONE"]}}}, "gone.yaml: No such file"),
-        ({"boards": {"psa2": "one"}}, "profiles/psd1.yaml: board 'psd1' is not among: psa2"),
+        ({"groups": [5]}, "groups: 5 is no text"),
+        ({"groups": ["gone"]}, "gone.yaml: No such file"),
         ({"colour": "red"}, "unknown colour"),
     ],
 )
@@ -190,12 +199,43 @@ def test_a_bad_index_is_told(change: dict[str, Any], says: str, tmp_path: Path) 
     assert says in str(e.value)
 
 
+def test_a_list_of_boards_names_all_a_trait_and_exceptions(tmp_path: Path) -> None:
+    lists = ["all", ["all", "!psa2"], "parallel_bus", ["parallel_bus", "psa2"], ["psd1", "psa2"]]
+    rows = [ROW | {"id": f"PSA2-FRAME-1{k}", "boards": boards} for k, boards in enumerate(lists)]
+    found = [r.boards for r in load(write(tmp_path, rows)) if r.group == "psa2"]
+    assert found == [("psa2", "psd1"), ("psd1",), ("psd1",), ("psa2", "psd1"), ("psd1", "psa2")]
+
+
+def test_a_group_that_the_index_does_not_name_follows_those_that_it_names(tmp_path: Path) -> None:
+    path = write(tmp_path, [ROW])
+    assert [g.name for g in load(path).groups] == ["psa2", "psd1"]
+    path.write_text(yaml.safe_dump(INDEX | {"groups": ["psd1"]}))
+    assert [g.name for g in load(path).groups] == ["psd1", "psa2"]
+
+
+@pytest.mark.parametrize(
+    ("group", "says"),
+    [
+        ({"prefixes": "PSD1"}, "psd1.yaml: prefix PSD1 belongs to another group"),
+        ({"boards": {"psd1": "once more"}}, "psd1.yaml: boards: psd1 belongs to another group"),
+        ({"boards": {"psa1": "one"}}, "profiles/article.yaml: board 'psa2' is not among: psa1, psd1"),
+        ({"traits": "wings"}, "psa2.yaml: traits: 'wings' is not among: parallel_bus"),
+        ({"colour": "red"}, "psa2.yaml: unknown colour"),
+    ],
+)
+def test_a_bad_group_is_reported(group: dict[str, Any], says: str, tmp_path: Path) -> None:
+    with pytest.raises(RequirementsError) as e:
+        load(write(tmp_path, [ROW], **group))
+    assert says in str(e.value)
+
+
 @pytest.mark.parametrize(
     ("text", "says"),
     [
         ("boards: [psa2]\nboards: [psa2]\nrows: []\n", "psa2.yaml: line 1: boards occurs twice"),
-        ("boards: [psa2]\nrows: []\n", "psa2.yaml: rows is no list"),
-        ("boards: [psa2]\nrows: [5]\n", "psa2.yaml: row 1: no mapping"),
+        (HEAD + "rows: []\n", "psa2.yaml: rows is no list"),
+        (HEAD + "rows: [5]\n", "psa2.yaml: row 1: no mapping"),
+        ("rows: [5]\n", "psa2.yaml: boards, prefixes, title is missing"),
         ("boards: [\n", "psa2.yaml: "),
         ("5\n", "psa2.yaml: no mapping"),
         ("boards: [psa2]\nrows:\n- {id: A, id: B}\n", "line 3: id occurs twice"),
@@ -343,6 +383,8 @@ def checkout(tmp_path: Path) -> Path:
         ROW | {"id": "PSA2-FRAME-05", "source": "docs/a.md", "observe": {}, "unobservable": "inside"},
     ]
     write(proto, rows)
+    for name in ("requirements/psd1.yaml", "profiles/psd1.yaml"):
+        (proto / name).unlink()
     (proto / "t.yaml").write_text("key: 1\n")
     files = {
         "docs/a.md": "# A\n\n## Heading\n",

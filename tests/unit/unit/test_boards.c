@@ -79,11 +79,11 @@ static void names_lead_to_types_and_their_profiles(void **state)
         assert_non_null(own);
         assert_ptr_equal(own->type, *t);
         assert_null(own->profile);
-        assert_string_equal(own->title, (*t)->title);
+        assert_string_equal(board_name_title(own), (*t)->title);
     }
     for (const struct board_name *n = board_names; n->name; n++) assert_ptr_equal(board_name_find(n->name), n);
     assert_string_equal(board_name_find("psa1")->profile, "psa1");
-    assert_string_equal(board_name_find("psa1")->title, "PSA-1");
+    assert_string_equal(board_name_title(board_name_find("psa1")), "PSA-1");
     assert_null(board_name_find("psa3"));
 }
 
