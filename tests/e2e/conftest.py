@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import logging
+import os
 import re
+import shutil
 import signal
+import subprocess
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
@@ -14,7 +17,7 @@ from psabench.boards.psa2.device import Psa2
 from psabench.emulator import Emulator
 from psabench.link.can_host import CanHost, StepClock, WallClock, open_bus
 from psabench.link.control import Control
-from rig import ADAPTERS, BENCH, HOST, PATIENCE_S, SLC, SLC0, VCAN, MakeRig, Rig, bus_spec, need
+from rig import ADAPTERS, BENCH, HOST, PATIENCE_S, ROOT, SLC, SLC0, VCAN, MakeRig, Rig, bus_spec, need
 
 logging.getLogger("can").setLevel(logging.ERROR)  # a warning for every message that a read has cut in two
 
@@ -32,6 +35,17 @@ def transport(request: pytest.FixtureRequest) -> str:
     name = str(request.param)
     need(name)
     return name
+
+
+@pytest.fixture(scope="session")
+def main_job(tmp_path_factory: pytest.TempPathFactory) -> tuple[subprocess.CompletedProcess[str], Path]:
+    """`make run`, once for all tests that look at what it prints, and a copy of what it leaves in build/run."""
+    shutil.rmtree(ROOT / "build/run", ignore_errors=True)
+    env = {k: v for k, v in os.environ.items() if k not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")}
+    done = subprocess.run(["make", "run"], cwd=ROOT, env=env, stdout=subprocess.PIPE, text=True, timeout=550)
+    out = tmp_path_factory.mktemp("main") / "run"
+    shutil.copytree(ROOT / "build/run", out)  # other commands of a page write there, too
+    return done, out
 
 
 @pytest.fixture

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import subprocess
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -20,9 +19,8 @@ from psabench.procedures.reversal import ReversalParams, reversal
 from psabench.procedures.wire_bench import WireBench
 from psabench.report.grading import ARTICLE, as_printed
 
-pytestmark = pytest.mark.host
+pytestmark = [pytest.mark.host, pytest.mark.timeout(600)]
 
-ROOT = Path(__file__).resolve().parents[3]
 ALPHA0_DEG, KY_V_PER_G = 0.1121, 0.0098  # of both scenarios
 
 Found = Mapping[tuple[str, str], Mapping[str, Mapping[str, Any]]]
@@ -54,18 +52,11 @@ def first_seed() -> int:
     return seed
 
 
-def psabench(*args: str | Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "psabench.cli", *map(str, args)], cwd=ROOT, capture_output=True, text=True, timeout=300
-    )
-
-
 @pytest.fixture(scope="module")
-def report(tmp_path_factory: pytest.TempPathFactory) -> Found:
+def report(main_job: tuple[subprocess.CompletedProcess[str], Path]) -> Found:
     """Estimates of `psabench run all` by (procedure, condition) and name: one run serves the tests below."""
-    out = tmp_path_factory.mktemp("run")
-    done = psabench("run", "all", "--out", out)
-    assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
+    done, out = main_job
+    assert done.returncode == 0, done.stdout[-3000:]
     page = (out / "report.html").read_text()
     assert "within their limits of the truth" in page
     assert len(list(out.glob("*.csv"))) == 6
