@@ -7,6 +7,7 @@
 #include "board/gyro/internal.h"
 
 #include <math.h>
+#include <string.h>
 
 #define CHECK_NS INT64_C(500000000) /* over which the angle sensor is held against the torquer */
 
@@ -29,7 +30,35 @@
 #define NOD_REST_NS INT64_C(700000000) /* before the next: not in step with a sway */
 #define NODS        3u
 
-static void report_encoder_fault(struct gyro *b, int64_t t_ns)
+/* ---- conditions ---- */
+
+/* For observers that poll. */
+static void record_flag(struct gyro *b, enum gyro_flag what)
+{
+    for (unsigned i = 0; i < GYRO_FLAGS; i++) {
+        if (what != 1U << i) continue;
+        b->past[i].begun++;
+        b->past[i].step = b->number + 1;
+    }
+}
+
+void gyro_past_begin(struct gyro *b)
+{
+    memset(b->past, 0, sizeof b->past);
+    for (unsigned i = 0; i < GYRO_FLAGS; i++)
+        if (b->standing & 1U << i) record_flag(b, (enum gyro_flag)(1U << i));
+}
+
+void gyro_condition(struct gyro *b, enum gyro_flag what, bool active, int64_t t_ns)
+{
+    if (active == ((b->standing & what) != 0)) return;
+    b->standing = active ? b->standing | what : b->standing & ~(unsigned)what;
+    if (active) record_flag(b, what);
+    if (active) gyro_notify_event(b, GYRO_EV_FAULT, t_ns);
+    if (b->host.condition) b->host.condition(b->host.ctx, what, active, t_ns);
+}
+
+void gyro_report_encoder_fault(struct gyro *b, int64_t t_ns)
 {
     if (b->standing & GYRO_ENCODER_FAULT) return;
     b->counters.encoder_faults++;
@@ -39,18 +68,16 @@ static void report_encoder_fault(struct gyro *b, int64_t t_ns)
 /* ---- servoed ---- */
 
 /* Half a second of driving without the angle sensor moving: it is stuck, or the torquer is dead. */
-static void check_servo(struct gyro *b, int64_t t_ns)
+static bool servo_fails(struct gyro *b)
 {
     struct gyro_check *c = &b->check;
     c->turned_rad += b->u_radps[1] * (1e-9 * b->profile.step_ns);
-    if ((int64_t)++c->steps * b->profile.step_ns < CHECK_NS) return;
+    if ((int64_t)++c->steps * b->profile.step_ns < CHECK_NS) return false;
     const double moved_rad = gyro_wrap_rad(b->servo_rad - c->from_rad);
     const bool dead = fabs(c->turned_rad) > b->profile.stuck_turn_deg * GYRO_RAD_PER_DEG &&
                       fabs(moved_rad) < b->profile.stuck_moved_deg * GYRO_RAD_PER_DEG;
     *c = (struct gyro_check){.from_rad = b->servo_rad};
-    if (!dead) return;
-    gyro_run_stop(b, GYRO_LEVEL);
-    report_encoder_fault(b, t_ns);
+    return dead;
 }
 
 /* ---- in navigation ---- */
@@ -84,7 +111,7 @@ static void check_torquer(struct gyro *b, int64_t t_ns)
     w->turned_rad = 0.0;
     w->from_rad = b->servo_rad;
     w->track_deg = b->set.track_deg;
-    if (w->against >= BLOCKS_DEAD) report_encoder_fault(b, t_ns);
+    if (w->against >= BLOCKS_DEAD) gyro_report_encoder_fault(b, t_ns);
 }
 
 /* The sensor: it stands still while the reported track turns. */
@@ -99,7 +126,7 @@ static void check_aided(struct gyro *b, int64_t t_ns)
     if (t_ns - w->still_ns < LATE_NS) w->told_deg = b->set.track_deg;
     const bool told = fabs(told_rad(b->set.track_deg, w->told_deg)) > TOLD_DEG * GYRO_RAD_PER_DEG;
     if (!told) w->told_ns = t_ns;
-    else if (t_ns - w->told_ns >= AHEAD_NS) report_encoder_fault(b, t_ns);
+    else if (t_ns - w->told_ns >= AHEAD_NS) gyro_report_encoder_fault(b, t_ns);
 }
 
 /* The horizon: as long off the level as a run would wait for it. */
@@ -111,13 +138,14 @@ static void check_level(struct gyro *b, int64_t t_ns)
     if (off_s > b->set.settle_s + b->set.settle_limit_s) gyro_condition(b, GYRO_NOT_SETTLED, true, t_ns);
 }
 
-void gyro_check_step(struct gyro *b, int64_t t_ns)
+bool gyro_check_step(struct gyro *b, int64_t t_ns)
 {
-    if (b->run.servoed) check_servo(b, t_ns);
-    if (b->run.mode != GYRO_NAVIGATE) return;
+    if (b->run.servoed && servo_fails(b)) return false;
+    if (b->run.mode != GYRO_NAVIGATE) return true;
     check_torquer(b, t_ns);
     check_aided(b, t_ns);
     check_level(b, t_ns);
+    return true;
 }
 
 /* ---- a nod ---- */
@@ -148,7 +176,7 @@ static void evaluate_nod(struct gyro *b, int64_t t_ns)
     n->way = follows || n->nods == NODS ? GYRO_NOD_NONE : GYRO_NOD_REST;
     if (n->way != GYRO_NOD_NONE) return;
     n->result = follows ? GYRO_TEST_PASSED : n->stayed == NODS ? GYRO_TEST_FAILED : GYRO_TEST_UNCLEAR;
-    if (n->result == GYRO_TEST_FAILED) report_encoder_fault(b, t_ns);
+    if (n->result == GYRO_TEST_FAILED) gyro_report_encoder_fault(b, t_ns);
 }
 
 double gyro_nod_radps(struct gyro *b, int64_t t_ns)

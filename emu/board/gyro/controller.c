@@ -102,32 +102,6 @@ static bool take_inlet(struct gyro *b, int64_t t_ns)
 
 /* ---- conditions ---- */
 
-/* For observers that poll. */
-static void record_flag(struct gyro *b, enum gyro_flag what)
-{
-    for (unsigned i = 0; i < GYRO_FLAGS; i++) {
-        if (what != 1U << i) continue;
-        b->past[i].begun++;
-        b->past[i].step = b->number + 1;
-    }
-}
-
-void gyro_past_begin(struct gyro *b)
-{
-    memset(b->past, 0, sizeof b->past);
-    for (unsigned i = 0; i < GYRO_FLAGS; i++)
-        if (b->standing & 1U << i) record_flag(b, (enum gyro_flag)(1U << i));
-}
-
-void gyro_condition(struct gyro *b, enum gyro_flag what, bool active, int64_t t_ns)
-{
-    if (active == ((b->standing & what) != 0)) return;
-    b->standing = active ? b->standing | what : b->standing & ~(unsigned)what;
-    if (active) record_flag(b, what);
-    if (active) gyro_notify_event(b, GYRO_EV_FAULT, t_ns);
-    if (b->host.condition) b->host.condition(b->host.ctx, what, active, t_ns);
-}
-
 /* One that comes and goes ends when it has not come for a while. */
 static void update_intermittent(struct gyro *b, enum gyro_flag what, bool now, int64_t *calm_ns, int64_t t_ns)
 {
@@ -151,7 +125,10 @@ static void drive_torquers(struct gyro *b, int64_t t_ns)
     const bool one = clamp_rate(&b->u_radps[0], limit_radps), two = clamp_rate(&b->u_radps[1], limit_radps);
     if (one || two) b->flags |= GYRO_SATURATED;
     b->counters.saturated += one || two;
-    gyro_check_step(b, t_ns);
+    if (!gyro_check_step(b, t_ns)) {
+        gyro_run_stop(b, GYRO_LEVEL);
+        gyro_report_encoder_fault(b, t_ns);
+    }
     if (b->io.torque) b->io.torque(b->io.ctx, b->u_radps[0], b->u_radps[1], t_ns);
 }
 

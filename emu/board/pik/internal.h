@@ -6,9 +6,17 @@
 
 #define PIK_PULSE_LINES (UINT64_C(0x3F) << PIK_LINE_FXP)
 
-/* pik.c */
-int64_t pik_tick_at(const struct pik *b, int64_t t_ns); /* the last at or before */
-int64_t pik_tick_ns(const struct pik *b, int64_t tick);
+static inline int64_t pik_tick_at(const struct pik *b, int64_t t_ns) /* the last at or before */
+{
+    return b->first_tick + clk_count_at(&b->clk, t_ns + 1) - 1;
+}
+
+static inline int64_t pik_tick_ns(const struct pik *b, int64_t tick)
+{
+    return clk_edge_ns(&b->clk, tick - b->first_tick);
+}
+
+/* pik/sample.c; pik_sample_until() */
 uint64_t pik_count_plus(const struct pik_channel *c); /* as the counter has it */
 uint64_t pik_count_minus(const struct pik_channel *c);
 

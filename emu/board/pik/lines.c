@@ -1,4 +1,5 @@
 /* Edges for the trace: computed only while a line is watched, pulse by pulse, period by period of CLK. */
+#include "board/bus_lines.h"
 #include "board/pik/internal.h"
 
 #define BIT(line)    (UINT64_C(1) << (line))
@@ -6,6 +7,23 @@
 #define REST_HIGH    (BIT(PIK_LINE_LATCH) | BIT(PIK_LINE_CS) | BIT(PIK_LINE_RW))
 #define EVERY_LINE   (BIT(PIK_LINES) - 1)
 #define STUCK_OF(ax) (UINT64_C(3) << (PIK_LINE_FXP + 2 * (ax)))
+
+const struct board_line pik_lines[PIK_LINES] = {
+    [PIK_LINE_CLK] = {"CLK", false}, [PIK_LINE_LATCH] = {"LATCH", true}, [PIK_LINE_CS] = {"CS", true},
+    [PIK_LINE_RW] = {"RW", true},    [PIK_LINE_FXP] = {"FXP", false},    [PIK_LINE_FXN] = {"FXN", false},
+    [PIK_LINE_FYP] = {"FYP", false}, [PIK_LINE_FYN] = {"FYN", false},    [PIK_LINE_FZP] = {"FZP", false},
+    [PIK_LINE_FZN] = {"FZN", false}, BUS_LINES_AB(PIK_LINE_AB0),         BUS_LINES_D(PIK_LINE_D0),
+};
+const char *const pik_events[PIK_EVENTS] = {
+    [PIK_EV_RES] = "RES",
+    [PIK_EV_LATCH] = "LATCH",
+    [PIK_EV_FX] = "FX",
+    [PIK_EV_FY] = "FY",
+    [PIK_EV_FZ] = "FZ",
+    [PIK_EV_SATURATED] = "SATURATED",
+    [PIK_EV_POWER_DOWN] = "POWER_DOWN",
+    [PIK_EV_POWER_UP] = "POWER_UP",
+};
 
 static uint64_t stuck_lines(const struct pik *b)
 {

@@ -312,20 +312,6 @@ static void accel_vin_row_v(void *ctx, unsigned mux, const int64_t *t_ns, unsign
 
 /* ---- life ---- */
 
-const struct board_line psa2_lines[PSA2_LINES] = {
-    [PSA2_LINE_SYNC_A] = {"SYNC_A", false}, [PSA2_LINE_SCLK] = {"SClk", false},    [PSA2_LINE_DRD_A] = {"DRD_A", true},
-    [PSA2_LINE_DIN] = {"DIn", false},       [PSA2_LINE_DOUTX] = {"DOutX", false},  [PSA2_LINE_DOUTY] = {"DOutY", false},
-    [PSA2_LINE_DOUTZ] = {"DOutZ", false},   [PSA2_LINE_SYNC_T] = {"SYNC_T", true}, [PSA2_LINE_CST] = {"CST", true},
-    [PSA2_LINE_DRD_T] = {"DRD_T", true},    [PSA2_LINE_DINT] = {"DInT", false},    [PSA2_LINE_DOUTT] = {"DOutT", false},
-    [PSA2_LINE_RES] = {"Res", false},       [PSA2_LINE_DATA] = {"Data", false},    [PSA2_LINE_CLK] = {"CLK", false},
-    [PSA2_LINE_INT] = {"Int", true},
-};
-
-const char *psa2_line_name(enum psa2_line line)
-{
-    return psa2_lines[line].name;
-}
-
 static void wake(void *ctx, uint64_t mask)
 {
     const uint32_t out_lines = 1u << PSA2_LINE_INT | 1u << PSA2_LINE_DATA | 1u << PSA2_LINE_CLK;

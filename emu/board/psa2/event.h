@@ -1,4 +1,4 @@
-/* What happens on a PSA-2 board, told at the very instant, and the faults of its controller: included by board/psa2/psa2.h. */
+/* Events of a PSA-2 board, notified at their instants, and the faults of its controller: included by board/psa2/psa2.h. */
 #ifndef PSABENCH_BOARD_PSA2_EVENT_H
 #define PSABENCH_BOARD_PSA2_EVENT_H
 

@@ -1,12 +1,91 @@
 #include "board/psa2/profile.h"
 
 #include "base/clk.h"
-#include "board/psa2/profile_internal.h"
 #include "chip/ads1282/ads1282.h"
 
+#include <ctype.h>
 #include <stdarg.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
+
+/* ---- fields: output words and steps of the set-up as text ---- */
+
+static const char words[PSA2_WORDS + 1] = {
+    [PSA2_WORD_X] = 'X', [PSA2_WORD_Y] = 'Y', [PSA2_WORD_Z] = 'Z', [PSA2_WORD_T] = 'T'};
+static const char *const events[] = {[PSA2_ON_DRD_A] = "DRD_A", [PSA2_ON_DRD_T] = "DRD_T"};
+static const char *const actions[] = {
+    [PSA2_WRITE_A] = "write_A", [PSA2_WRITE_T] = "write_T", [PSA2_SYNC_A] = "sync_A", [PSA2_SYNC_T] = "sync_T"};
+
+static bool parse_word(void *profile, unsigned i, const char *text)
+{
+    struct psa2_profile *p = profile;
+    const char *at = text[0] && !text[1] ? strchr(words, text[0]) : NULL;
+    if (at) p->word[i] = (enum psa2_word)(at - words);
+    return at != NULL;
+}
+
+static bool word_text(const void *profile, unsigned i, char *out, size_t cap)
+{
+    const struct psa2_profile *p = profile;
+    if (i >= PSA2_WORDS) return false;
+    (void)snprintf(out, cap, "%c", words[p->word[i]]);
+    return true;
+}
+
+static const char *skip_word(const char *text, const char *word)
+{
+    const size_t len = strlen(word);
+    if (strncmp(text, word, len) != 0 || (text[len] && text[len] != ' ')) return NULL;
+    for (text += len; *text == ' ';) text++;
+    return text;
+}
+
+static bool parse_bytes(const char *text, struct psa2_setup_step *s)
+{
+    while (*text) {
+        char *end;
+        if (s->count == sizeof s->bytes || !isxdigit((unsigned char)*text)) return false;
+        const unsigned long v = strtoul(text, &end, 16);
+        if (v > 0xFF || end - text > 2 || (*end && *end != ' ')) return false;
+        s->bytes[s->count++] = (uint8_t)v;
+        for (text = end; *text == ' ';) text++;
+    }
+    return true;
+}
+
+/* "DRD_A write_A 41 00 56": event, action, bytes in hexadecimal. */
+static bool parse_step(void *profile, unsigned i, const char *text)
+{
+    struct psa2_profile *p = profile;
+    struct psa2_setup_step s = {.count = 0};
+    const char *rest = NULL;
+    for (unsigned k = 0; k < 2 && !rest; k++)
+        if ((rest = skip_word(text, events[k]))) s.on = (enum psa2_setup_event)k;
+    if (!rest) return false;
+    text = rest;
+    rest = NULL;
+    for (unsigned k = 0; k < 4 && !rest; k++)
+        if ((rest = skip_word(text, actions[k]))) s.action = (enum psa2_setup_action)k;
+    if (!rest || !parse_bytes(rest, &s)) return false;
+    if ((s.count > 0) != (s.action == PSA2_WRITE_A || s.action == PSA2_WRITE_T)) return false;
+    p->setup[i] = s;
+    p->setup_count = i + 1;
+    return true;
+}
+
+static bool step_text(const void *profile, unsigned i, char *out, size_t cap)
+{
+    const struct psa2_profile *p = profile;
+    const struct psa2_setup_step *s = &p->setup[i];
+    if (i >= p->setup_count) return false;
+    (void)snprintf(out, cap, "%s %s", events[s->on], actions[s->action]);
+    for (unsigned k = 0; k < s->count; k++) {
+        const size_t at = strlen(out);
+        (void)snprintf(out + at, cap - at, " %02X", s->bytes[k]);
+    }
+    return true;
+}
 
 #define OFF(member) offsetof(struct psa2_profile, member)
 #define ROW(name, kind, lo, hi, words)                                                                                 \
@@ -25,7 +104,7 @@ const struct board_field psa2_fields[PSA2_FIELDS] = {
     ROW(word_bits, UINT, 16, 32, "Bits of an output word: 16, 24 or 32."),
     ROW(lead_in_clk, UINT, 0, 255, "CLK periods from the fall of INT to the first bit."),
     {.key = "word", .type = BOARD_FIELD_LIST, .offset = OFF(word), .min = 0, .max = 3, .what = "Order of the words X, Y, Z, T, lowest address first.",
-     .count = PSA2_WORDS, .like = "one of X, Y, Z, T", .parse = psa2_parse_word, .text = psa2_word_text},
+     .count = PSA2_WORDS, .like = "one of X, Y, Z, T", .parse = parse_word, .text = word_text},
     ROW(code_bits, UINT, 16, 32, "Significant bits of a code in its word: 16, 24 or 32."),
     ROW(read_bits, UINT, 24, 32, "SClk pulses of one accelerometer read: 24 or 32."),
     ROW(gate_sclk, BOOL, 0, 1, "SClk reaches only the group addressed."),
@@ -37,7 +116,7 @@ const struct board_field psa2_fields[PSA2_FIELDS] = {
     ROW(temp_sensor_a_per_k, REAL, 0, 1e-3, "Current of a temperature sensor per kelvin of absolute temperature."),
     ROW(temp_load_ohm, REAL, 0, 1e6, "Load resistor RTD of a temperature sensor."),
     {.key = "setup", .type = BOARD_FIELD_LIST, .offset = OFF(setup), .min = 1, .max = PSA2_SETUP_MAX, .what = "Transfers after Res, each on its data-ready event.",
-     .like = "like \"DRD_A write_A 41 00 56\" or \"DRD_T sync_T\"", .parse = psa2_parse_step, .text = psa2_step_text},
+     .like = "like \"DRD_A write_A 41 00 56\" or \"DRD_T sync_T\"", .parse = parse_step, .text = step_text},
 };
 // clang-format on
 
@@ -108,9 +187,9 @@ int64_t psa2_profile_period_ns(const struct psa2_profile *p)
     return clk_span_ns(p->fclk_hz, 4 * (int64_t)fmod_periods / decimation);
 }
 
-/* Writes the sentence and is false, so that a check reads `return no(...)`. */
-static bool no(char *why, size_t cap, const char *format, ...) __attribute__((format(printf, 3, 4)));
-static bool no(char *why, size_t cap, const char *format, ...)
+/* Writes the sentence and is false, so that a check reads `return set_error(...)`. */
+static bool set_error(char *why, size_t cap, const char *format, ...) __attribute__((format(printf, 3, 4)));
+static bool set_error(char *why, size_t cap, const char *format, ...)
 {
     va_list args;
     va_start(args, format);
@@ -126,29 +205,31 @@ static bool is_width(unsigned bits)
 
 static bool check_words(const struct psa2_profile *p, char *why, size_t cap)
 {
-    if (!is_width(p->word_bits)) return no(why, cap, "word_bits = %u: use 16, 24 or 32", p->word_bits);
-    if (!is_width(p->code_bits)) return no(why, cap, "code_bits = %u: use 16, 24 or 32", p->code_bits);
-    if (p->read_bits != 24 && p->read_bits != 32) return no(why, cap, "read_bits = %u: use 24 or 32", p->read_bits);
+    if (!is_width(p->word_bits)) return set_error(why, cap, "word_bits = %u: use 16, 24 or 32", p->word_bits);
+    if (!is_width(p->code_bits)) return set_error(why, cap, "code_bits = %u: use 16, 24 or 32", p->code_bits);
+    if (p->read_bits != 24 && p->read_bits != 32)
+        return set_error(why, cap, "read_bits = %u: use 24 or 32", p->read_bits);
     if (p->code_bits > p->word_bits)
-        return no(why, cap, "code_bits = %u do not fit into word_bits = %u: use code_bits <= %u or longer words",
-                  p->code_bits, p->word_bits, p->word_bits);
+        return set_error(why, cap, "code_bits = %u do not fit into word_bits = %u: use code_bits <= %u or longer words",
+                         p->code_bits, p->word_bits, p->word_bits);
     if (p->code_bits > p->read_bits)
-        return no(why, cap, "code_bits = %u but only read_bits = %u are read: use read_bits >= %u", p->code_bits,
-                  p->read_bits, p->code_bits);
+        return set_error(why, cap, "code_bits = %u but only read_bits = %u are read: use read_bits >= %u", p->code_bits,
+                         p->read_bits, p->code_bits);
     unsigned seen = 0;
     for (unsigned i = 0; i < PSA2_WORDS; i++)
         if ((unsigned)p->word[i] < PSA2_WORDS) seen |= 1u << p->word[i];
-    return seen == 0xF || no(why, cap, "word: each of X, Y, Z, T must be sent once");
+    return seen == 0xF || set_error(why, cap, "word: each of X, Y, Z, T must be sent once");
 }
 
 static bool check_setup(const struct psa2_profile *p, char *why, size_t cap)
 {
     if (p->setup_count == 0 || p->setup_count > PSA2_SETUP_MAX)
-        return no(why, cap, "setup has %u steps: use 1 to %u", p->setup_count, PSA2_SETUP_MAX);
+        return set_error(why, cap, "setup has %u steps: use 1 to %u", p->setup_count, PSA2_SETUP_MAX);
     for (unsigned i = 0; i < p->setup_count; i++) {
         const bool write = p->setup[i].action == PSA2_WRITE_A || p->setup[i].action == PSA2_WRITE_T;
         if (write != (p->setup[i].count > 0) || p->setup[i].count > sizeof p->setup[i].bytes)
-            return no(why, cap, "setup step %u has %u bytes: a write has 1 to 8, a pulse none", i, p->setup[i].count);
+            return set_error(why, cap, "setup step %u has %u bytes: a write has 1 to 8, a pulse none", i,
+                             p->setup[i].count);
     }
     return true;
 }
@@ -157,8 +238,9 @@ static bool check_mode(const struct psa2_profile *p, char *why, size_t cap)
 {
     const uint8_t config0 = config0_of(p);
     return ads1282_models(config0) ||
-           no(why, cap, "setup: KPSA cannot read CONFIG0 = %02Xh: use pulse sync (bit 7 = 0), DR 000 to 100, FILTR 10",
-              config0);
+           set_error(why, cap,
+                     "setup: KPSA cannot read CONFIG0 = %02Xh: use pulse sync (bit 7 = 0), DR 000 to 100, FILTR 10",
+                     config0);
 }
 
 /* SClk limits: ADS128x period 2..16 tCLK (M75), ADS1256 period >= 4 tau (M90): sources 1.4, 2.4. */
@@ -167,19 +249,21 @@ static bool check_sclk(const struct psa2_profile *p, char *why, size_t cap)
     const uint32_t max_a = p->fclk_hz / 2;
     const uint32_t max_t = p->temp_clkin_hz / 4;
     if (p->sclk_hz > max_a)
-        return no(why, cap, "sclk_hz = %u > fclk_hz / 2 = %u: use a slower SClk", p->sclk_hz, max_a);
+        return set_error(why, cap, "sclk_hz = %u > fclk_hz / 2 = %u: use a slower SClk", p->sclk_hz, max_a);
     if (p->sclk_hz > max_t)
-        return no(why, cap, "sclk_hz = %u > temp_clkin_hz / 4 = %u: use a slower SClk", p->sclk_hz, max_t);
+        return set_error(why, cap, "sclk_hz = %u > temp_clkin_hz / 4 = %u: use a slower SClk", p->sclk_hz, max_t);
     if (p->sclk_hz < p->fclk_hz / 16)
-        return no(why, cap, "sclk_hz = %u < fclk_hz / 16 = %u: use a faster SClk", p->sclk_hz, p->fclk_hz / 16);
+        return set_error(why, cap, "sclk_hz = %u < fclk_hz / 16 = %u: use a faster SClk", p->sclk_hz, p->fclk_hz / 16);
     return true;
 }
 
 static bool check_gain(const struct psa2_profile *p, char *why, size_t cap)
 {
-    if (p->adc_pga & (p->adc_pga - 1)) return no(why, cap, "adc_pga = %u: use 1, 2, 4, 8, 16, 32 or 64", p->adc_pga);
+    if (p->adc_pga & (p->adc_pga - 1))
+        return set_error(why, cap, "adc_pga = %u: use 1, 2, 4, 8, 16, 32 or 64", p->adc_pga);
     if (p->adc_is_1281 && p->adc_pga != 1)
-        return no(why, cap, "adc_pga = %u: the ADS1281 has no gain stage, use 1 or adc_is_1281: false", p->adc_pga);
+        return set_error(why, cap, "adc_pga = %u: the ADS1281 has no gain stage, use 1 or adc_is_1281: false",
+                         p->adc_pga);
     return true;
 }
 
@@ -198,7 +282,7 @@ static bool check_int_low(const struct psa2_profile *p, char *why, size_t cap)
     const int64_t need = (PSA2_INT_LOW_MIN_NS * (int64_t)p->line_hz + one - 1) / one;
     const int64_t all = (int64_t)psa2_frame_clks(p) * 1000000000;
     const int64_t div = (PSA2_INT_LOW_MIN_NS * (int64_t)p->line_hz + all - 1) / all;
-    return no(
+    return set_error(
         why, cap,
         "INT low = (%u + 4*%u + 3*%u) CLK / %.3f MHz = %.3f us < 74 us: use lead_in_clk >= %lld or line_div >= %lld",
         p->lead_in_clk, p->word_bits, PSA2_GAP_CLK, line_mhz(p), 1e-3 * (double)low_ns, (long long)(need - data),
@@ -209,18 +293,19 @@ static bool check_times(const struct psa2_profile *p, char *why, size_t cap)
 {
     const int64_t word_ns = line_ns(p, p->word_bits);
     if (word_ns > PSA2_WORD_NS_MAX)
-        return no(why, cap, "a word lasts %u CLK / %.3f MHz = %.3f us > %.0f us: use a faster CLK", p->word_bits,
-                  line_mhz(p), 1e-3 * (double)word_ns, 1e-3 * PSA2_WORD_NS_MAX);
+        return set_error(why, cap, "a word lasts %u CLK / %.3f MHz = %.3f us > %.0f us: use a faster CLK", p->word_bits,
+                         line_mhz(p), 1e-3 * (double)word_ns, 1e-3 * PSA2_WORD_NS_MAX);
     /* From DRD_A: up to 2 SClk periods to the first edge, the bits, up to 1 CLK period to the grid of the line. */
     const int64_t read_ns = clk_span_ns(p->sclk_hz, p->read_bits + 2) + line_ns(p, 1);
     const int64_t low_ns = psa2_int_low_ns(p);
     const int64_t period_ns = psa2_profile_period_ns(p);
     return read_ns + low_ns <= period_ns ||
-           no(why, cap,
-              "reading %u bits at %.3f MHz (%.3f us) and INT low (%.3f us) make %.3f us > data period %.3f us: use "
-              "a faster sclk_hz or CLK, or a lower data rate in setup",
-              p->read_bits, 1e-6 * (double)p->sclk_hz, 1e-3 * (double)read_ns, 1e-3 * (double)low_ns,
-              1e-3 * (double)(read_ns + low_ns), 1e-3 * (double)period_ns);
+           set_error(
+               why, cap,
+               "reading %u bits at %.3f MHz (%.3f us) and INT low (%.3f us) make %.3f us > data period %.3f us: use "
+               "a faster sclk_hz or CLK, or a lower data rate in setup",
+               p->read_bits, 1e-6 * (double)p->sclk_hz, 1e-3 * (double)read_ns, 1e-3 * (double)low_ns,
+               1e-3 * (double)(read_ns + low_ns), 1e-3 * (double)period_ns);
 }
 
 bool psa2_profile_check(const struct psa2_profile *p, char *why, size_t cap)
@@ -228,4 +313,9 @@ bool psa2_profile_check(const struct psa2_profile *p, char *why, size_t cap)
     return board_field_check(psa2_fields, PSA2_FIELDS, p, why, cap) && check_words(p, why, cap) &&
            check_setup(p, why, cap) && check_mode(p, why, cap) && check_sclk(p, why, cap) && check_gain(p, why, cap) &&
            check_int_low(p, why, cap) && check_times(p, why, cap);
+}
+
+bool psa2_profile_set(struct psa2_profile *p, const char *key, unsigned index, const char *text, char *why, size_t cap)
+{
+    return board_field_set(psa2_fields, PSA2_FIELDS, p, key, index, text, why, cap);
 }
