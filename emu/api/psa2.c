@@ -176,9 +176,9 @@ static void attach(struct part_psa2 *s)
     struct trace_sink *new = &s->sink[s->attached];
     *new = (struct trace_sink){.mask = want, .steps = on_steps, .ctx = s};
     s->attaching = true;
-    if (want) trace_attach(&s->board.trace, new);
+    if (want) trace_attach(&s->board.base.trace, new);
     s->attaching = false;
-    trace_detach(&s->board.trace, old);
+    trace_detach(&s->board.base.trace, old);
     old->mask = 0;
 }
 
@@ -188,7 +188,7 @@ static void advance(struct psabench_part *p, int64_t t_ns)
     if (p->inside) return;
     attach(s);
     p->inside++;
-    trace_advance(&s->board.trace, t_ns);
+    trace_advance(&s->board.base.trace, t_ns);
     p->inside--;
 }
 
@@ -380,8 +380,8 @@ static const struct api_counter counters[] = {
     API_COUNTER("timeouts", part_psa2, board.counters.timeouts),
     API_COUNTER("overruns", part_psa2, board.counters.overruns),
     API_COUNTER("int_late", part_psa2, board.counters.int_late),
-    API_COUNTER("edges_dropped", part_psa2, board.trace.dropped),
-    API_COUNTER("edges_late", part_psa2, board.trace.late),
+    API_COUNTER("edges_dropped", part_psa2, board.base.trace.dropped),
+    API_COUNTER("edges_late", part_psa2, board.base.trace.late),
 };
 
 const struct api_kind api_psa2 = {

@@ -1,8 +1,8 @@
 /* What every board gives the bench: one const table a type. The bench, links, control, faults, snapshots and scenarios know
  * boards only through it; unit/boards.c lists the types.
  *
- * A board is a plain struct that its unit owns, one thread, no allocation. `board` is a pointer to that struct, `can` one to
- * its CAN side, `profile` one to its profile struct. Times are simulated ns since power-on of the bench. */
+ * A board is a plain struct that its unit owns, one thread, no allocation; its first member is a struct board. `can` points to
+ * its CAN side, `profile` to its profile struct. Times are simulated ns since power-on of the bench. */
 #ifndef PSABENCH_BOARD_BOARD_H
 #define PSABENCH_BOARD_BOARD_H
 
@@ -16,22 +16,24 @@
 #include "trace/line_fault.h"
 #include "trace/trace.h"
 
-/* Faults of a controller, kinds controller.*: bits of board_type.wrongs. */
-enum board_wrong {
-    BOARD_WRONG_SKIP_SYNC_T = 1,  /* PSA-2: never a pulse on SYNC_T */
-    BOARD_WRONG_SETUP_ORDER = 2,  /* PSA-2: the set-up's steps in reverse order, from the next Res on */
-    BOARD_WRONG_FROZEN_WORDS = 4, /* the words of the frame (cycle, period) before, over and over */
-    BOARD_WRONG_CAPACITOR = 8,    /* PMKA: the capacitor of integrator X has lost 30 % */
-    BOARD_WRONG_STUCK_RESET = 16, /* PMKA: the positive reset of integrator X never ends */
-    BOARD_WRONG_STUCK_KEY = 32    /* PMKA: the key of K never closes */
+struct board {
+    const struct board_type *type; /* set by the unit */
+    struct trace trace;            /* lines numbered as in board_type.lines */
+    struct line_faults line;
+    uint32_t faults; /* of the controller: bits of board_type.controller_faults; outlive resets and power */
+    bool observed;   /* board_io.event has a subscriber */
 };
 
-/* Parts of board_cfg that not every board has: bits of board_type.knobs. */
-enum board_knob {
-    BOARD_KNOB_CHAIN = 1,      /* adc_chain */
-    BOARD_KNOB_TEMP_ADC = 2,   /* temp_adc_offset_v, temp_adc_gain_error */
-    BOARD_KNOB_TEMP_NOISE = 4, /* temp_noise_scale */
-    BOARD_KNOB_LEVEL = 8       /* level_node */
+/* Fault of the controller, "controller.frozen_words", and its bit in board.faults. */
+struct board_controller_fault {
+    const char *kind;
+    uint32_t bit;
+};
+
+/* Operations on the gyro-stabilised platform that the board controls. */
+struct board_platform {
+    const char *(*set_mode)(struct board *b, unsigned mode,
+                            int64_t t_ns); /* enum gyro_mode; NULL, or why it is rejected */
 };
 
 typedef void board_truth_fn(void *ctx, const char *name, double value);
@@ -50,46 +52,53 @@ struct board_type {
     void (*about)(const void *profile, char *out, size_t cap);        /* a line for lists of profiles */
     void (*cfg_default)(struct board_cfg *cfg);                       /* its usual analog chain; may be NULL */
     void (*cfg_profiled)(struct board_cfg *cfg, const void *profile); /* after it, what the profile says; may be NULL */
-    uint32_t knobs;                            /* enum board_knob: what else of board_cfg it heeds */
-    uint8_t node;                              /* default node id on CAN */
-    uint8_t frame_forms;                       /* values of object 2020h; 0: it has no such object */
+    const char *const *capabilities; /* keys of a scenario's unit that not every board has, up to NULL; may be NULL */
+    uint8_t node;                    /* default node id on CAN */
+    uint8_t frame_forms;             /* values of object 2020h; 0: it has no such object */
     int64_t (*period_ns)(const void *profile); /* of its frames (cycles, readings) */
     /* what is on it */
     const struct board_line *lines;
     unsigned line_count;
-    const char *const *port_lines;         /* bits 0.. of the line port's byte, up to 7 names, then NULL */
-    unsigned frame_line;                   /* whose falls begin a frame */
-    unsigned pulse_line;                   /* whose pulses have their number in a frame */
-    unsigned (*pulses)(const void *board); /* how many of them; NULL: no line has such pulses */
+    const char *const *port_lines;             /* bits 0.. of the line port's byte, up to 7 names, then NULL */
+    unsigned frame_line;                       /* whose falls begin a frame */
+    unsigned pulse_line;                       /* whose pulses have their number in a frame */
+    unsigned (*pulses)(const struct board *b); /* how many of them; NULL: no line has such pulses */
     /* what a fault of a sensor must come to, to be seen */
-    double (*code_v)(const void *board); /* a code at the load, V (of an integrator: a count in a second); NULL: 2 uV */
-    double (*range_v)(const void *board); /* full scale at the load; NULL: 10 V */
+    double (*code_v)(
+        const struct board *b); /* a code at the load, V (of an integrator: a count in a second); NULL: 2 uV */
+    double (*range_v)(const struct board *b); /* full scale at the load; NULL: 10 V */
     const char *const *events;
     unsigned event_count;
     const struct board_part *parts; /* [0] is the controller */
     unsigned part_count;
-    uint32_t wrongs; /* enum board_wrong */
+    const struct board_controller_fault *controller_faults; /* up to a NULL kind */
     const struct board_can *can;
-    const struct board_bus *bus; /* NULL: no parallel bus */
-    /* Of a gyro unit, enum gyro_mode: NULL, or why it is refused. NULL itself: a board without modes. */
-    const char *(*set_mode)(void *board, unsigned mode, int64_t t_ns);
+    const struct board_bus *bus;           /* NULL: no parallel bus */
+    const struct board_platform *platform; /* NULL: it controls none */
     /* life */
-    void (*init)(void *board, const void *profile, const struct board_cfg *cfg, const struct board_io *io,
+    void (*init)(struct board *b, const void *profile, const struct board_cfg *cfg, const struct board_io *io,
                  struct sched *s);
-    void (*power_up)(void *board, int64_t t_ns);
-    void (*power_down)(void *board, int64_t t_ns);
-    void (*reset)(void *board, int64_t t_ns);
-    bool (*ready)(const void *board);
-    void (*sample_until)(void *board,
-                         int64_t t_ns);          /* takes its inputs up to now; the physics may change abruptly after */
-    void (*wrong)(void *board, uint32_t wrongs); /* from now on; outlives resets and power */
-    void (*listen)(void *board, bool on);        /* somebody wants board_io.event, or no one does */
-    struct trace *(*trace)(void *board);
-    struct line_faults *(*line)(void *board);
-    struct afe *(*afe)(void *board, unsigned axis);      /* for faults: sample_until() first; NULL: no analog inputs */
-    void (*digest)(const void *board, struct sha256 *s); /* of all that its future depends on */
-    void (*truth)(const void *board, board_truth_fn *put,
+    void (*power_up)(struct board *b, int64_t t_ns);
+    void (*power_down)(struct board *b, int64_t t_ns);
+    void (*reset)(struct board *b, int64_t t_ns);
+    bool (*ready)(const struct board *b);
+    void (*sample_until)(struct board *b,
+                         int64_t t_ns); /* takes its inputs up to now; the physics may change abruptly after */
+    void (*set_faults)(struct board *b, uint32_t faults); /* where more than board.faults changes; may be NULL */
+    void (*observe)(struct board *b, bool on);            /* board.observed is about to change; may be NULL */
+    struct afe *(*afe)(struct board *b, unsigned axis);   /* for faults: sample_until() first; NULL: no analog inputs */
+    void (*digest)(const struct board *b, struct sha256 *s); /* of all that its future depends on */
+    void (*truth)(const struct board *b, board_truth_fn *put,
                   void *ctx); /* hidden parameters of the specimen; may be NULL */
 };
+
+/* The base of a board: its trace with these lines, no faults. */
+void board_init(struct board *b, const struct board_line *lines, unsigned count);
+
+bool board_has(const struct board_type *t, const char *capability);
+uint32_t board_fault_bit(const struct board_type *t,
+                         const char *kind);              /* of a kind controller.*; 0: it cannot have it */
+void board_set_faults(struct board *b, uint32_t faults); /* of the controller, from now on */
+void board_observe(struct board *b, bool on);            /* events are reported, or no more */
 
 #endif

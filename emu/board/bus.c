@@ -36,7 +36,7 @@ static void addresses(const struct board_bus *bus, char *out, size_t cap)
     if (last > 0) (void)snprintf(out, cap, "; 00h to %02Xh do", last - 1);
 }
 
-static void right(const struct board_bus *bus, const void *board, const struct board_cycle *c,
+static void right(const struct board_bus *bus, const struct board *board, const struct board_cycle *c,
                   enum board_cycle_result r, char *out, size_t cap)
 {
     char wanted[DETAIL] = "";
@@ -48,7 +48,7 @@ static void right(const struct board_bus *bus, const void *board, const struct b
     if (wanted[0]) (void)snprintf(out, cap, r == BOARD_CYCLE_BAD_VALUE ? ": %s" : "; %s", wanted);
 }
 
-void board_cycle_why(const struct board_bus *bus, const void *board, const struct board_cycle *c,
+void board_cycle_why(const struct board_bus *bus, const struct board *board, const struct board_cycle *c,
                      enum board_cycle_result r, char out[BOARD_CYCLE_WHY_MAX])
 {
     char what[24] = "read of", detail[DETAIL];

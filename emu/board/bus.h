@@ -38,21 +38,24 @@ struct board_strobe {
     int64_t own_ns, least_ns; /* where the host gives none; the shortest that the board takes */
 };
 
+struct board;
+
 struct board_bus {
     /* BOARD_CYCLE_OK: done() will be called later, never from inside; else it will not. */
-    enum board_cycle_result (*submit)(void *board, struct board_cycle *c, int64_t t_ns);
+    enum board_cycle_result (*submit)(struct board *board, struct board_cycle *c, int64_t t_ns);
     unsigned addresses;
     const char *(*name)(unsigned address); /* of what is there: "X"; NULL: nothing */
-    struct board_strobe (*strobe)(const void *board);
+    struct board_strobe (*strobe)(const struct board *board);
     /* Of a cycle refused as BAD_VALUE or NOT_READY, what would be right, a clause: "it takes 0 to 3". May write nothing. */
-    void (*wanted)(const void *board, const struct board_cycle *c, enum board_cycle_result r, char *out, size_t cap);
+    void (*wanted)(const struct board *board, const struct board_cycle *c, enum board_cycle_result r, char *out,
+                   size_t cap);
 };
 
 #define BOARD_CYCLE_WHY_MAX 190u
 
 /* Why a cycle was refused, and what would be right, for a human: "read of address 0Ah (TEMP), strobe 50 ns: ...". An address is
  * written so wherever one is: two hexadecimal digits and h. */
-void board_cycle_why(const struct board_bus *bus, const void *board, const struct board_cycle *c,
+void board_cycle_why(const struct board_bus *bus, const struct board *board, const struct board_cycle *c,
                      enum board_cycle_result r, char out[BOARD_CYCLE_WHY_MAX]);
 
 #endif

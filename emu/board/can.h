@@ -8,6 +8,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+struct board;
 struct co_node;
 struct board_type;
 struct board_can_cfg {
@@ -20,7 +21,7 @@ struct board_can_cfg {
 struct board_can {
     size_t size;
     /* Wires itself to the board's callbacks; the board has been initialised. */
-    void (*init)(void *can, const struct board_can_cfg *cfg, void *board, struct can_bus *bus, struct sched *s);
+    void (*init)(void *can, const struct board_can_cfg *cfg, struct board *board, struct can_bus *bus, struct sched *s);
     void (*power_up)(void *can, int64_t t_ns); /* after the board's */
     void (*power_down)(void *can);
     struct co_node *(*node)(void *can);

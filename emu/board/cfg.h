@@ -3,11 +3,18 @@
 #define PSABENCH_BOARD_CFG_H
 
 #include "board/afe.h"
-#include "chip/ads1282/ads1282.h"
 
 #include <stdint.h>
 
 #define BOARD_AXES 3u
+
+/* What a board can reach of the gyro-stabilised platform, phys/motion/platform.h; ctx is that of board_io. */
+struct board_platform_io {
+    void (*torque)(void *ctx, double u1_radps, double u2_radps, int64_t t_ns); /* rates for its torquers */
+    void (*reposition)(void *ctx, int64_t t_ns);                               /* a new setting */
+    double (*servo_rad)(void *ctx, int64_t t_ns);   /* its angle sensor, as the servo has it */
+    double (*encoder_rad)(void *ctx, int64_t t_ns); /* and as the encoder has it */
+};
 
 /* What a board can reach of the world. */
 struct board_io {
@@ -20,19 +27,14 @@ struct board_io {
     void (*event)(void *ctx, unsigned event, int64_t t_ns);         /* number in board_type.events; may be NULL */
     /* The voltage that feeds the unit, to its nominal one. NULL: the bench has no supply. */
     double (*supply_ratio)(void *ctx, int64_t t_ns);
-    /* Of the gyro-stabilised platform, phys/motion/platform.h: rates for its torquers, a new setting, its angle sensor as the servo and
-     * as the encoder has it. NULL: there is none. */
-    void (*torque)(void *ctx, double u1_radps, double u2_radps, int64_t t_ns);
-    void (*reposition)(void *ctx, int64_t t_ns);
-    double (*servo_rad)(void *ctx, int64_t t_ns);
-    double (*encoder_rad)(void *ctx, int64_t t_ns);
+    const struct board_platform_io *platform; /* NULL: there is none */
 };
 
 /* One specimen: what differs between two boards of a profile. */
 struct board_cfg {
     struct afe_cfg afe[BOARD_AXES];
     double adc_noise_scale, temp_noise_scale;      /* 1 published, 0 none */
-    enum ads1282_chain adc_chain;                  /* PSA-2 */
+    unsigned adc_chain;                            /* PSA-2: enum ads1282_chain */
     double temp_adc_offset_v, temp_adc_gain_error; /* PSA-2 */
     uint64_t seed;
     uint32_t serial;

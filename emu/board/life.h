@@ -1,9 +1,9 @@
-/* The functions of a board_type that only give a pointer its type, written once.
+/* The functions of a board_type that only give a pointer its type, written once for a board whose struct is struct NAME, with a
+ * struct board as its first member, and whose functions are NAME_init() and so on.
  *
- * BOARD_STROBE(NAME) defines strobe, of board_bus, by the profile's strobe_ns and strobe_min_ns.
- *
- * BOARD_LIFE(NAME) at the file's top level defines init, power_up, power_down, reset, sample_until, trace and line for a board
- * whose struct is struct NAME, with members trace and line, and whose functions are NAME_init() and so on. */
+ * BOARD_LIFE(NAME) at the file's top level defines init, power_up, power_down, reset and sample_until, which
+ * BOARD_LIFE_FUNCTIONS puts into the board_type. BOARD_BUS(NAME) defines strobe, by the profile's strobe_ns and strobe_min_ns,
+ * and submit, of board_bus. */
 #ifndef PSABENCH_BOARD_LIFE_H
 #define PSABENCH_BOARD_LIFE_H
 
@@ -11,20 +11,23 @@
 
 // clang-format off
 #define BOARD_LIFE(NAME)                                                                                               \
-    static void init(void *board, const void *profile, const struct board_cfg *cfg, const struct board_io *io,         \
-                     struct sched *s) { NAME##_init(board, profile, cfg, io, s); }                                     \
-    static void power_up(void *board, int64_t t_ns) { NAME##_power_up(board, t_ns); }                                  \
-    static void power_down(void *board, int64_t t_ns) { NAME##_power_down(board, t_ns); }                              \
-    static void reset(void *board, int64_t t_ns) { NAME##_reset(board, t_ns); }                                        \
-    static void sample_until(void *board, int64_t t_ns) { NAME##_sample_until(board, t_ns); }                          \
-    static struct trace *trace(void *board) { return &((struct NAME *)board)->trace; }                                 \
-    static struct line_faults *line(void *board) { return &((struct NAME *)board)->line; }                             \
+    static void init(struct board *board, const void *profile, const struct board_cfg *cfg, const struct board_io *io, \
+                     struct sched *s) { NAME##_init((struct NAME *)board, profile, cfg, io, s); }                      \
+    static void power_up(struct board *board, int64_t t_ns) { NAME##_power_up((struct NAME *)board, t_ns); }           \
+    static void power_down(struct board *board, int64_t t_ns) { NAME##_power_down((struct NAME *)board, t_ns); }       \
+    static void reset(struct board *board, int64_t t_ns) { NAME##_reset((struct NAME *)board, t_ns); }                 \
+    static void sample_until(struct board *board, int64_t t_ns) { NAME##_sample_until((struct NAME *)board, t_ns); }   \
     struct NAME /* so that a semicolon has to follow */
+#define BOARD_LIFE_FUNCTIONS .init = init, .power_up = power_up, .power_down = power_down, .reset = reset, .sample_until = sample_until
 
-#define BOARD_STROBE(NAME)                                                                                             \
-    static struct board_strobe strobe(const void *board)                                                               \
+#define BOARD_BUS(NAME)                                                                                                \
+    static enum board_cycle_result submit(struct board *board, struct board_cycle *c, int64_t t_ns)                    \
     {                                                                                                                  \
-        const struct NAME *b = board;                                                                                  \
+        return NAME##_submit((struct NAME *)board, c, t_ns);                                                           \
+    }                                                                                                                  \
+    static struct board_strobe strobe(const struct board *board)                                                       \
+    {                                                                                                                  \
+        const struct NAME *b = (const struct NAME *)board;                                                             \
         return (struct board_strobe){b->profile.strobe_ns, b->profile.strobe_min_ns};                                  \
     }                                                                                                                  \
     struct NAME /* so that a semicolon has to follow */

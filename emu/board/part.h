@@ -8,6 +8,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
+struct board;
+
 struct board_line {
     const char *name; /* article's, "Int" */
     bool level;       /* before the first power-up and at rest */
@@ -17,6 +19,11 @@ struct board_counter {
     const char *name;
     size_t offset; /* of a uint32_t in the part */
 };
+#define BOARD_COUNTER(type, name, field)                                                                               \
+    {                                                                                                                  \
+#name, offsetof(struct type, field)                                                                            \
+    }
+#define BOARD_COUNTERS(table) .counters = (table), .counter_count = sizeof(table) / sizeof *(table)
 
 /* Which members of struct chip_fault a part has; board_part.unless says why not the others. */
 enum board_chip_fault_bit { BOARD_FAULT_DRDY = 1, BOARD_FAULT_DOUT = 2, BOARD_FAULT_SYNC = 4, BOARD_FAULT_CLOCK = 8 };
@@ -32,8 +39,9 @@ struct board_part {
     const char *unless; /* why it has not the others, one sentence; or NULL */
     unsigned registers; /* that can be flipped, from 0 */
     /* f: the sum of the faults that are active on it */
-    void (*fault)(void *board, unsigned part, const struct chip_fault *f, int64_t t_ns);
-    bool (*flip)(void *board, unsigned part, unsigned reg, uint8_t mask, int64_t t_ns); /* false: without power */
+    void (*fault)(struct board *board, unsigned part, const struct chip_fault *f, int64_t t_ns);
+    bool (*flip)(struct board *board, unsigned part, unsigned reg, uint8_t mask,
+                 int64_t t_ns); /* false: without power */
 };
 
 #endif

@@ -55,7 +55,7 @@ static const char *const modes[] = {"off", "level", "hold", "slew", "gyrocompass
 static bool has_modes(const struct control_bench *b, const struct control_value *v, struct control_refusal *why)
 {
     const struct unit *u = b->unit[v[0].unit];
-    return u->type->set_mode ||
+    return u->type->platform ||
            control_refuse_in(why, "state", "unit: expected a gyro unit, got %s, a %s", u->cfg.name, u->type->title);
 }
 
@@ -63,7 +63,7 @@ static enum control_outcome do_mode(struct control *c, const struct control_valu
 {
     struct unit *u = c->bench->unit[v[0].unit];
     (void)result;
-    const char *why = u->type->set_mode(u->board, v[1].choice, t_ns);
+    const char *why = u->type->platform->set_mode(u->board, v[1].choice, t_ns);
     return why ? control_refuse(c, "state", "%s", why) : CONTROL_DONE;
 }
 

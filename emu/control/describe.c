@@ -147,11 +147,11 @@ void describe_units(const struct control_bench *b, cJSON *to)
     }
 }
 
-static void add_counters(const struct board_part *p, const char *board, cJSON *to)
+static void add_counters(const struct board_part *p, const struct board *board, cJSON *to)
 {
     for (unsigned i = 0; i < p->counter_count; i++) {
         uint32_t n;
-        memcpy(&n, board + p->offset + p->counters[i].offset, sizeof n);
+        memcpy(&n, (const char *)board + p->offset + p->counters[i].offset, sizeof n);
         add_count(to, p->counters[i].name, n);
     }
 }

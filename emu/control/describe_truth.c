@@ -77,14 +77,14 @@ static void put_hidden(void *ctx, const char *name, double value)
 }
 
 /* Of boards that heed them. */
-static void add_knobs(const struct unit *u, cJSON *to)
+static void add_noise(const struct unit *u, cJSON *to)
 {
     const struct board_cfg *c = &u->cfg.board;
-    const uint32_t knobs = u->type->knobs;
+    const struct board_type *t = u->type;
     add_real(to, "adc_noise_scale", c->adc_noise_scale);
-    if (knobs & BOARD_KNOB_TEMP_NOISE) add_real(to, "temp_noise_scale", c->temp_noise_scale);
-    if (knobs & BOARD_KNOB_TEMP_ADC) add_real(to, "temp_adc_offset_v", c->temp_adc_offset_v);
-    if (knobs & BOARD_KNOB_TEMP_ADC) add_real(to, "temp_adc_gain_error", c->temp_adc_gain_error);
+    if (board_has(t, "temp_noise_scale")) add_real(to, "temp_noise_scale", c->temp_noise_scale);
+    if (board_has(t, "temp_adc_offset_v")) add_real(to, "temp_adc_offset_v", c->temp_adc_offset_v);
+    if (board_has(t, "temp_adc_gain_error")) add_real(to, "temp_adc_gain_error", c->temp_adc_gain_error);
 }
 
 static void add_axis(struct unit *u, unsigned i, cJSON *to, int64_t t_ns)
@@ -106,7 +106,7 @@ static void add_unit_truth(struct unit *u, cJSON *to, int64_t t_ns)
     add_count(to, "serial", u->cfg.board.serial);
     add_count(to, "node", u->cfg.node);
     cJSON_AddStringToObject(to, "profile", u->profile);
-    add_knobs(u, to);
+    add_noise(u, to);
     if (u->type->truth) u->type->truth(u->board, put_hidden, cJSON_AddObjectToObject(to, "specimen"));
     cJSON *temps = cJSON_AddArrayToObject(to, "temp_degc");
     for (unsigned i = 0; i < UNIT_TEMPS; i++) cJSON_AddItemToArray(temps, cJSON_CreateNumber(u->cfg.temp_degc[i]));

@@ -1,4 +1,4 @@
-/* Faults of the chips and of the controller of a board, as its table says (board_type.parts, board_type.wrongs). Those of a
+/* Faults of the chips and of the controller of a board, as its table says (board_type.parts, board_type.controller_faults). Those of a
  * chip add up: its hook is given the sum of what is active. */
 #include "fault/internal.h"
 
@@ -106,7 +106,7 @@ static const struct fault_kind chip[] = {
 // clang-format on
 const struct fault_table fault_chip = {chip, sizeof chip / sizeof *chip};
 
-/* ---- controller; the variant of a kind is its bit of enum board_wrong */
+/* ---- controller */
 
 static void refresh_controller(struct fault *f, int64_t t_ns)
 {
@@ -115,9 +115,9 @@ static void refresh_controller(struct fault *f, int64_t t_ns)
     (void)t_ns;
     for (unsigned i = 0; i < FAULTS_MAX; i++) {
         const struct fault *other = &f->engine->fault[i];
-        if (here(f, other)) all |= other->kind->variant;
+        if (here(f, other)) all |= board_fault_bit(u->type, other->kind->name);
     }
-    u->type->wrong(u->board, all);
+    board_set_faults(u->board, all);
 }
 
 static bool apply_controller(struct fault *f, int64_t t_ns)
@@ -126,26 +126,26 @@ static bool apply_controller(struct fault *f, int64_t t_ns)
     return true;
 }
 
-static bool may_be_wrong(const struct control_bench *b, const struct fault *f, char *why)
+static bool can_have_fault(const struct control_bench *b, const struct fault *f, char *why)
 {
-    return b->unit[f->point.unit]->type->wrongs & f->kind->variant || lacks(f, NULL, why);
+    return board_fault_bit(b->unit[f->point.unit]->type, f->kind->name) || lacks(f, NULL, why);
 }
 
 // clang-format off
-#define WRONG(v) .variant = (v), .places = FAULT_BIT(FAULT_AT_CONTROLLER), .apply = apply_controller, .lift = refresh_controller, .fits = may_be_wrong
+#define CONTROLLER .places = FAULT_BIT(FAULT_AT_CONTROLLER), .apply = apply_controller, .lift = refresh_controller, .fits = can_have_fault
 static const struct fault_kind controller[] = {
     {"controller.skip_sync_t", "The controller gives no pulse on SYNC_T.", "SYNC_T rests; temperature codes come every 10.00 ms at 100 SPS instead of every 10.25 ms",
-     WRONG(BOARD_WRONG_SKIP_SYNC_T), .unless = "no SYNC_T on the board", .lacks = "the controller of this board has no SYNC_T to give a pulse on"},
+     CONTROLLER, .unless = "no SYNC_T on the board", .lacks = "the controller of this board has no SYNC_T to give a pulse on"},
     {"controller.setup_order", "The controller carries out the steps of the set-up in reverse order, from the next Res on.", "after Res the registers of the converters differ from those of the article",
-     WRONG(BOARD_WRONG_SETUP_ORDER), .unless = "no set-up of several steps", .lacks = "the controller of this board has no set-up whose order matters"},
+     CONTROLLER, .unless = "no set-up of several steps", .lacks = "the controller of this board has no set-up whose order matters"},
     {"controller.frozen_words", "The controller sends the codes of the frame before, over and over.", "numbers and times of the frames go on, their codes stand still to the bit",
-     WRONG(BOARD_WRONG_FROZEN_WORDS), .unless = "the controller keeps no words", .lacks = "the controller of this board keeps no words that could freeze"},
+     CONTROLLER, .unless = "the controller keeps no words", .lacks = "the controller of this board keeps no words that could freeze"},
     {"controller.capacitor", "The capacitor of integrator X has lost 30 %.", "its codes grow, and its resets jump, by 1/0.7; what is summed of them does not change but for the converter's steps",
-     WRONG(BOARD_WRONG_CAPACITOR), .unless = "no integrators that are sampled", .lacks = "this board has no integrator whose capacitor a host could tell"},
+     CONTROLLER, .unless = "no integrators that are sampled", .lacks = "this board has no integrator whose capacitor a host could tell"},
     {"controller.stuck_reset", "The positive reset of integrator X never ends.", "the code of integrator X runs to its limit and the reading says saturated",
-     WRONG(BOARD_WRONG_STUCK_RESET), .unless = "no precision resets", .lacks = "this board has no precision reset that could stay on"},
+     CONTROLLER, .unless = "no precision resets", .lacks = "this board has no precision reset that could stay on"},
     {"controller.stuck_key", "The key of the spare integrator never closes.", "the axis that the spare has stands still while it does",
-     WRONG(BOARD_WRONG_STUCK_KEY), .unless = "no spare integrator", .lacks = "this board has no spare integrator with a key"},
+     CONTROLLER, .unless = "no spare integrator", .lacks = "this board has no spare integrator with a key"},
 };
 // clang-format on
 const struct fault_table fault_controller = {controller, sizeof controller / sizeof *controller};

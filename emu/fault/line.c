@@ -8,7 +8,7 @@ _Static_assert(LINE_FAULTS_MAX >= FAULTS_MAX, "each fault of a line that was acc
 static struct line_faults *lines(const struct fault *f)
 {
     const struct unit *u = fault_unit(f);
-    return u->type->line(u->board);
+    return &u->board->line;
 }
 
 static bool apply_line(struct fault *f, int64_t t_ns)

@@ -84,7 +84,7 @@ static const struct board_part *part_at(unsigned n, const struct board_type **ty
 
 static bool has(const struct board_type *t, const struct board_part *p, const struct fault_kind *k)
 {
-    if (p == t->parts) return k->places & FAULT_BIT(FAULT_AT_CONTROLLER) && t->wrongs & k->variant;
+    if (p == t->parts) return k->places & FAULT_BIT(FAULT_AT_CONTROLLER) && board_fault_bit(t, k->name);
     if (!(k->places & FAULT_BIT(FAULT_AT_CHIP))) return false;
     return k->once ? p->registers > 0 : (p->faults & k->variant) != 0;
 }

@@ -100,7 +100,7 @@ bool scenario_check_platform(struct yaml_file *f, const struct yaml_node *root, 
         return yaml_file_fail(f, platform, "platform", "expected site.latitude_deg, which defines north, got none");
     for (unsigned i = 0; i < s->unit_count; i++) {
         const struct scenario_unit *u = &s->units[i];
-        const bool controls = u->cfg.type->knobs & BOARD_KNOB_LEVEL;
+        const bool controls = board_has(u->cfg.type, "level");
         if (!present && controls)
             return yaml_file_fail(f, units, "units", "%s: expected a section platform for it to control, got none",
                                   u->name);

@@ -181,24 +181,23 @@ static bool plain(const char *name)
 /* Keys of settings that not every board has. */
 static const struct {
     const char *key;
-    enum { OF_FORMS, OF_INPUTS, OF_KNOB } of;
-    uint32_t knob;
+    enum { OF_FORMS, OF_INPUTS, OF_CAPABILITY } of;
 } some_have[] = {
-    {"frame_form", OF_FORMS, 0},
-    {"axes", OF_INPUTS, 0},
-    {"adc_noise_scale", OF_INPUTS, 0},
-    {"level", OF_KNOB, BOARD_KNOB_LEVEL},
-    {"adc_chain", OF_KNOB, BOARD_KNOB_CHAIN},
-    {"temp_noise_scale", OF_KNOB, BOARD_KNOB_TEMP_NOISE},
-    {"temp_adc_offset_v", OF_KNOB, BOARD_KNOB_TEMP_ADC},
-    {"temp_adc_gain_error", OF_KNOB, BOARD_KNOB_TEMP_ADC},
+    {"frame_form", OF_FORMS},
+    {"axes", OF_INPUTS},
+    {"adc_noise_scale", OF_INPUTS},
+    {"level", OF_CAPABILITY},
+    {"adc_chain", OF_CAPABILITY},
+    {"temp_noise_scale", OF_CAPABILITY},
+    {"temp_adc_offset_v", OF_CAPABILITY},
+    {"temp_adc_gain_error", OF_CAPABILITY},
 };
 enum { SOME_HAVE = sizeof some_have / sizeof *some_have };
 
 static bool has_key(const struct board_type *t, unsigned i)
 {
     if (some_have[i].of == OF_INPUTS) return t->afe;
-    return some_have[i].of == OF_KNOB ? t->knobs & some_have[i].knob : t->frame_forms > 0;
+    return some_have[i].of == OF_CAPABILITY ? board_has(t, some_have[i].key) : t->frame_forms > 0;
 }
 
 static bool check_keys(struct yaml_file *f, const struct yaml_node *node, const struct scenario_unit *u)

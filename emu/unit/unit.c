@@ -22,7 +22,7 @@ enum { WARM_STEP_NS = 10000000 }; /* 10 mK at most in a chamber of 60 K/min, wit
 
 /* Of the sensor's element, where the sensor minds it; as it was at the latest whole step, whoever looks how often. Without a
  * chamber a quartz's case is as warm as its element. */
-static void warm(struct unit *u, unsigned axis, int64_t t_ns)
+static void warm_sensor(struct unit *u, unsigned axis, int64_t t_ns)
 {
     struct mems *m = &u->mems[axis];
     struct quartz *q = &u->quartz[axis];
@@ -43,7 +43,7 @@ static double accel_signal(void *ctx, unsigned axis, int64_t t_ns)
     if (u->cfg.axis[axis].sensor == UNIT_NO_SENSOR) return 0.0;
     double a_mps2[3];
     unit_gravity_mps2(u, axis, t_ns, a_mps2);
-    warm(u, axis, t_ns);
+    warm_sensor(u, axis, t_ns);
     const double out = u->cfg.axis[axis].sensor == UNIT_QUARTZ ? quartz_out_a(&u->quartz[axis], a_mps2, t_ns)
                                                                : mems_out_v(&u->mems[axis], a_mps2, t_ns);
     return u->sensor_faults[axis] ? sensor_fault_out(u->sensor_faults[axis], out, t_ns) : out;
@@ -68,29 +68,32 @@ static double supply_ratio(void *ctx, int64_t t_ns)
 
 /* ---- the platform, for a gyro unit */
 
-static void torque(void *ctx, double u1_radps, double u2_radps, int64_t t_ns)
+static void torque_platform(void *ctx, double u1_radps, double u2_radps, int64_t t_ns)
 {
     const struct unit *u = ctx;
     (void)platform_torque(&u->lab->platform, u1_radps, u2_radps, t_ns);
 }
 
-static void reposition(void *ctx, int64_t t_ns)
+static void reposition_platform(void *ctx, int64_t t_ns)
 {
     const struct unit *u = ctx;
     platform_reposition(&u->lab->platform, t_ns);
 }
 
-static double servo_rad(void *ctx, int64_t t_ns)
+static double read_servo_rad(void *ctx, int64_t t_ns)
 {
     const struct unit *u = ctx;
     return platform_servo_rad(&u->lab->platform, t_ns);
 }
 
-static double encoder_rad(void *ctx, int64_t t_ns)
+static double read_encoder_rad(void *ctx, int64_t t_ns)
 {
     const struct unit *u = ctx;
     return platform_encoder_rad(&u->lab->platform, t_ns);
 }
+
+static const struct board_platform_io platform_io = {torque_platform, reposition_platform, read_servo_rad,
+                                                     read_encoder_rad};
 
 /* A listener may end its own or another's listening: the cursor lives in the unit, where unit_unlisten() sees it. */
 static void on_event(void *ctx, unsigned event, int64_t t_ns)
@@ -110,7 +113,7 @@ void unit_listen(struct unit *u, struct unit_listener *l)
     while (*at) at = &(*at)->next;
     l->next = NULL;
     *at = l;
-    u->type->listen(u->board, true);
+    board_observe(u->board, true);
 }
 
 void unit_unlisten(struct unit *u, struct unit_listener *l)
@@ -121,7 +124,7 @@ void unit_unlisten(struct unit *u, struct unit_listener *l)
     if (u->told_next == l) u->told_next = l->next;
     *at = l->next;
     l->next = NULL;
-    if (!u->listeners) u->type->listen(u->board, false);
+    if (!u->listeners) board_observe(u->board, false);
 }
 
 struct unit_cfg unit_default(const char *name)
@@ -148,12 +151,7 @@ static void init_board(struct unit *u, struct sched *s)
     struct board_io io = {
         .ctx = u, .accel = accel_signal, .temp_degc = temp_degc, .rate_radps = rate_radps, .event = on_event};
     if (u->lab->supply.cfg.present) io.supply_ratio = supply_ratio;
-    if (u->lab->platform.cfg.present) {
-        io.torque = torque;
-        io.reposition = reposition;
-        io.servo_rad = servo_rad;
-        io.encoder_rad = encoder_rad;
-    }
+    if (u->lab->platform.cfg.present) io.platform = &platform_io;
     union board_profile_store defaults;
     const void *profile = u->cfg.profile;
     if (!profile) {
@@ -163,6 +161,7 @@ static void init_board(struct unit *u, struct sched *s)
     }
     snprintf(u->profile, sizeof u->profile, "%s", board_profile_name(u->type, profile));
     u->type->init(u->board, profile, &u->cfg.board, &io, s);
+    u->board->type = u->type;
 }
 
 void unit_init(struct unit *u, const struct unit_cfg *cfg, struct lab *lab, struct sched *s)
@@ -172,7 +171,7 @@ void unit_init(struct unit *u, const struct unit_cfg *cfg, struct lab *lab, stru
     u->cfg = *cfg;
     u->lab = lab;
     u->type = cfg->type;
-    u->board = &u->store;
+    u->board = (struct board *)&u->store;
     u->can = NULL;
     u->listeners = u->told_next = NULL;
     for (unsigned i = 0; i < UNIT_AXES; i++) {
@@ -218,7 +217,7 @@ void unit_sample_until(struct unit *u, int64_t t_ns)
 
 struct trace *unit_trace(const struct unit *u)
 {
-    return u->type->trace(u->board);
+    return &u->board->trace;
 }
 
 struct can_node *unit_node(const struct unit *u)
@@ -240,7 +239,7 @@ double unit_sensor_out(struct unit *u, unsigned axis, int64_t t_ns)
     if (u->cfg.axis[axis].sensor == UNIT_NO_SENSOR) return 0.0;
     double a_mps2[3];
     unit_gravity_mps2(u, axis, t_ns, a_mps2);
-    warm(u, axis, t_ns);
+    warm_sensor(u, axis, t_ns);
     if (u->cfg.axis[axis].sensor == UNIT_QUARTZ) return quartz_true_a(&u->quartz[axis], a_mps2);
     return mems_true_v(&u->mems[axis], a_mps2, t_ns);
 }

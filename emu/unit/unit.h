@@ -51,9 +51,9 @@ struct unit {
     struct chamber_body body;
     int64_t warm_step[UNIT_AXES]; /* at which the sensor's temperature was taken */
     const struct board_type *type;
-    void *board;      /* in store, of the type */
-    void *can;        /* in can_store; NULL: on no bus */
-    char profile[32]; /* its name */
+    struct board *board; /* in store, of the type */
+    void *can;           /* in can_store; NULL: on no bus */
+    char profile[32];    /* its name */
     struct mems mems[UNIT_AXES];
     struct quartz quartz[UNIT_AXES];
     struct sensor_fault *sensor_faults[UNIT_AXES]; /* unit_sample_until() before each change */

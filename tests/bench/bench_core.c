@@ -120,7 +120,7 @@ static void record(struct bench *n)
     if (!out) abort();
     const struct vcd_cfg cfg = {
         .out = out, .scope = "psa2", .unit_ns = VCD_UNIT_NS, .mask = (UINT32_C(1) << PSA2_LINES) - 1};
-    (void)vcd_open(&n->vcd, &cfg, &n->b.trace);
+    (void)vcd_open(&n->vcd, &cfg, &n->b.base.trace);
 }
 
 static void run_frames(struct bench *n, uint64_t frames)
@@ -136,9 +136,9 @@ static void run_frames(struct bench *n, uint64_t frames)
 static void tape_then_record(struct bench *n)
 {
     struct trace_sink sink = {.mask = (UINT32_C(1) << PSA2_LINES) - 1, .steps = to_tape, .ctx = n};
-    trace_attach(&n->b.trace, &sink);
+    trace_attach(&n->b.base.trace, &sink);
     run_frames(n, 100);
-    trace_detach(&n->b.trace, &sink);
+    trace_detach(&n->b.base.trace, &sink);
     record(n);
 }
 
@@ -183,7 +183,7 @@ static void power_up(struct bench *n, enum ads1282_chain chain)
     sched_init(&n->s);
     psa2_init(&n->b, &p, &u, &io, &n->s);
     psa2_attach(&n->b, &(struct psa2_host){.ctx = n, .frame = frame});
-    n->trace = &n->b.trace;
+    n->trace = &n->b.base.trace;
     psa2_power_up(&n->b, 0);
     run_frames(n, 1);
 }
@@ -202,7 +202,7 @@ static void power_up_psd1(struct bench *n, enum ads1282_chain chain)
     sched_init(&n->s);
     psd1_init(&n->d, &p, &u, &io, &n->s);
     psd1_attach(&n->d, &(struct psd1_host){.ctx = n, .cycle = cycle});
-    n->trace = &n->d.trace;
+    n->trace = &n->d.base.trace;
     psd1_power_up(&n->d, 0);
     run_frames(n, 1);
 }

@@ -96,7 +96,7 @@ static void steps(void *ctx, const struct trace_step *s, unsigned n)
 static void step(struct words *w)
 {
     sched_run_until(&w->s, w->s.now_ns + STEP_NS);
-    trace_advance(&w->b.trace, w->s.now_ns - TRACE_LAG_NS);
+    trace_advance(&w->b.base.trace, w->s.now_ns - TRACE_LAG_NS);
 }
 
 static void power_up(struct words *w)
@@ -119,7 +119,7 @@ static void power_up(struct words *w)
 /* From half a period after a conversion's end on, in whole conversions. */
 static void run(struct words *w, unsigned cycles)
 {
-    trace_attach(&w->b.trace, &w->sink);
+    trace_attach(&w->b.base.trace, &w->sink);
     while (w->s.now_ns < 20000000) step(w); /* the set-up is over */
     const int64_t period_ns = ad7712_period_ns(&w->b.adc[0]), last_ns = w->dr_ns;
     w->from_ns = last_ns + period_ns + HALF_NS;

@@ -122,7 +122,7 @@ static void steps(void *ctx, const struct trace_step *s, unsigned n)
 static void step(struct words *w)
 {
     sched_run_until(&w->s, w->s.now_ns + STEP_NS);
-    trace_advance(&w->b.trace, w->s.now_ns - TRACE_LAG_NS);
+    trace_advance(&w->b.base.trace, w->s.now_ns - TRACE_LAG_NS);
 }
 
 /* To a place between two frames. */
@@ -148,13 +148,13 @@ static void power_up(struct words *w)
 static void run(struct words *w, unsigned frames)
 {
     w->sink = (struct trace_sink){.mask = (UINT32_C(1) << PSA2_LINES) - 1, .steps = steps, .ctx = w};
-    trace_attach(&w->b.trace, &w->sink);
+    trace_attach(&w->b.base.trace, &w->sink);
     do frame_over(w);
     while (w->level[PSA2_LINE_DOUTX] || w->level[PSA2_LINE_DOUTY] || w->level[PSA2_LINE_DOUTZ]);
     instant_over(w);
     w->counting = true; /* the models, too, begin with their lines low */
     while (w->frames < frames) step(w);
-    trace_advance(&w->b.trace, w->s.now_ns);
+    trace_advance(&w->b.base.trace, w->s.now_ns);
     instant_over(w);
 }
 

@@ -123,7 +123,7 @@ static void on_event(void *ctx, unsigned e, int64_t t_ns)
     const struct ads1282 *adc = &((const struct psa2 *)u->board)->adc[0];
     assert(t_ns <= s->world->bench.sched.now_ns);
     if (s->world->odd) return;
-    if (e == PSA2_EV_RES) check_reset(u->board);
+    if (e == PSA2_EV_RES) check_reset(&u->store.psa2);
     if (e == PSA2_EV_DRD_A) assert(adc->period != s->period || adc->sync_count != s->sync_count);
     s->period = adc->period;
     s->sync_count = adc->sync_count;
@@ -135,7 +135,7 @@ static void check_counters(struct world *w)
     w->frames = w->bench.bus[0].frames;
     for (unsigned i = 0; i < 2; i++) {
         struct seen *s = &w->seen[i];
-        const struct psa2 *b = w->bench.unit[i].board;
+        const struct psa2 *b = &w->bench.unit[i].store.psa2;
         const struct can_node *n = unit_node(&w->bench.unit[i]);
         assert(b->counters.frames >= s->board.frames && b->counters.resets >= s->board.resets);
         assert(b->counters.requests >= s->board.requests && b->counters.timeouts >= s->board.timeouts);

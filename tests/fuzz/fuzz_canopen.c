@@ -44,10 +44,10 @@ static void answer(struct world *w, enum psa2_result result)
 }
 
 /* As psa2.h has it: a reset ends a request with a time-out. */
-static void reset(void *ctx, int64_t t_ns)
+static void reset(struct board *board, int64_t t_ns)
 {
     (void)t_ns;
-    answer(ctx, PSA2_TIMEOUT);
+    answer((struct world *)board, PSA2_TIMEOUT); /* the port's context */
 }
 
 static const struct board_type board = {.reset = reset};

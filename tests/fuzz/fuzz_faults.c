@@ -23,7 +23,6 @@ struct world {
     uint32_t line_fault;
     struct chip_fault adc[3];
     struct chip_fault tadc;
-    struct psa2_controller_fault kpsa;
     struct listener ear;
     bool attached, powered;
     unsigned frames, events, got;
@@ -85,9 +84,9 @@ static void run(struct world *w, int64_t ns)
     const int64_t end_ns = w->s.now_ns + ns;
     while (w->s.now_ns < end_ns) {
         sched_run_until(&w->s, end_ns - w->s.now_ns < 100000 ? end_ns : w->s.now_ns + 100000);
-        trace_advance(&w->b.trace, w->s.now_ns - TRACE_LAG_NS);
+        trace_advance(&w->b.base.trace, w->s.now_ns - TRACE_LAG_NS);
     }
-    assert(w->b.trace.late == 0 && w->b.trace.dropped == 0);
+    assert(w->b.base.trace.late == 0 && w->b.base.trace.dropped == 0);
     assert(w->can.node.node.services.tec <= 256 + 8);
 }
 
@@ -130,7 +129,7 @@ static void line(struct world *w, struct script *s)
 {
     const uint8_t b = script_byte(s);
     if (b & 0x80) {
-        line_fault_end(&w->b.line, b & 0x7F ? b & 0x7F : w->line_fault, w->s.now_ns);
+        line_fault_end(&w->b.base.line, b & 0x7F ? b & 0x7F : w->line_fault, w->s.now_ns);
         return;
     }
     struct line_fault f = {.kind = (enum line_fault_kind)(b % 7), .line = script_byte(s) % PSA2_LINES};
@@ -141,7 +140,7 @@ static void line(struct world *w, struct script *s)
     f.frame_line = script_byte(s) % PSA2_LINES;
     f.rate_hz = 1.0 + (double)script_byte(s) * 1000.0;
     f.rng = rng_stream(1, b, "fault");
-    w->line_fault = line_fault_add(&w->b.line, &f);
+    w->line_fault = line_fault_add(&w->b.base.line, &f);
 }
 
 static void bus(struct world *w, struct script *s)
@@ -189,8 +188,8 @@ static void op(struct world *w, struct script *s)
         chip(w, s);
         return;
     case 2:
-        w->kpsa = (struct psa2_controller_fault){b & 0x80, b & 0x40, b & 0x20};
-        psa2_fault_set(&w->b, &w->kpsa);
+        w->b.base.faults = (b & 0x80 ? PSA2_FAULT_SKIP_SYNC_T : 0u) | (b & 0x40 ? PSA2_FAULT_SETUP_ORDER : 0u) |
+                           (b & 0x20 ? PSA2_FAULT_FROZEN_WORDS : 0u);
         return;
     case 3:
         line(w, s);
@@ -205,14 +204,14 @@ static void op(struct world *w, struct script *s)
         talk(w, s);
         return;
     case 7:
-        if (w->attached) trace_detach(&w->b.trace, &w->ear.sink);
+        if (w->attached) trace_detach(&w->b.base.trace, &w->ear.sink);
         else w->ear.known = 0;
         w->attached = !w->attached;
-        if (w->attached) trace_attach(&w->b.trace, &w->ear.sink);
+        if (w->attached) trace_attach(&w->b.base.trace, &w->ear.sink);
         return;
     case 8:
         w->b.io.event = on_event;
-        psa2_listen(&w->b, b & 0x80);
+        w->b.base.observed = b & 0x80;
         return;
     case 9:
         psa2_reset(&w->b, w->s.now_ns);
@@ -228,12 +227,12 @@ static void lift(struct world *w)
 {
     for (unsigned i = 0; i < 3; i++) ads1282_fault(&w->b.adc[i], &(struct chip_fault){.clock_ppm = 0}, w->s.now_ns);
     ads1256_fault(&w->b.tadc, &(struct chip_fault){.clock_ppm = 0}, w->s.now_ns);
-    psa2_fault_set(&w->b, &(struct psa2_controller_fault){.frozen_words = false});
-    for (uint32_t id = 1; id <= w->b.line.last_id; id++) line_fault_end(&w->b.line, id, w->s.now_ns);
+    w->b.base.faults = 0;
+    for (uint32_t id = 1; id <= w->b.base.line.last_id; id++) line_fault_end(&w->b.base.line, id, w->s.now_ns);
     for (unsigned i = 0; i < CAN_FAULTS; i++) can_fault_remove(&w->bus, &w->can_fault[i], w->s.now_ns);
     power(w, false);
     run(w, 20000000); /* a host off the bus comes back, lines follow again */
-    assert(!w->b.trace.filter);
+    assert(!w->b.base.trace.filter);
     power(w, true);
     run(w, 1000000);
     host_sends(w, 0, (const uint8_t[]){1, 0}, 2);

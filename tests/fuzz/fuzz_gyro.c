@@ -72,7 +72,7 @@ static double encoder(void *ctx, int64_t t_ns)
 static void on_event(void *ctx, unsigned e, int64_t t_ns)
 {
     const struct world *w = ctx;
-    assert(e < GYRO_EVENTS && t_ns == w->s.now_ns && w->b.told);
+    assert(e < GYRO_EVENTS && t_ns == w->s.now_ns && w->b.base.observed);
 }
 
 static void on_reading(void *ctx, const struct gyro_reading *r, int64_t t_ns)
@@ -82,13 +82,13 @@ static void on_reading(void *ctx, const struct gyro_reading *r, int64_t t_ns)
     assert(r->step == (w->any ? w->last.step + 1 : 1));
     assert(r->mode < GYRO_MODES && r->phase <= GYRO_WINDOW && r->position <= GYRO_RUN_MAX && r->flags < 16);
     const bool runs = r->mode == GYRO_COMPASS || r->mode == GYRO_CALIBRATE;
-    if (!(w->b.wrongs & BOARD_WRONG_FROZEN_WORDS)) {
+    if (!(w->b.base.faults & GYRO_FAULT_FROZEN_WORDS)) {
         assert(runs || r->phase == GYRO_IDLE || (r->mode == GYRO_SLEW && r->phase != GYRO_WINDOW));
         assert((r->mode == GYRO_COMPASS) == (r->position > 0));
     }
     assert(isfinite(r->beta_rad) && isfinite(r->gamma_rad) && fabs(r->encoder_rad) <= 3.15);
     assert(r->mode == GYRO_NAVIGATE || (w->b.nod.way == GYRO_NOD_NONE && w->b.nod.result == GYRO_TEST_NONE) ||
-           (w->b.wrongs & BOARD_WRONG_FROZEN_WORDS));
+           (w->b.base.faults & GYRO_FAULT_FROZEN_WORDS));
     for (unsigned i = 0; i < GYRO_FLAGS; i++) {
         assert(w->b.past[i].step <= r->step + 1 && (w->b.past[i].begun > 0) == (w->b.past[i].step > 0));
         assert(!(w->conditions & 1U << i) || w->b.past[i].begun > 0);
@@ -183,8 +183,8 @@ static void op_angle(struct world *w, struct script *s)
 static void op_power(struct world *w, struct script *s)
 {
     (void)s;
-    if (w->b.on) gyro_board.power_down(&w->b, w->s.now_ns);
-    else gyro_board.power_up(&w->b, w->s.now_ns);
+    if (w->b.on) gyro_board.power_down(&w->b.base, w->s.now_ns);
+    else gyro_board.power_up(&w->b.base, w->s.now_ns);
     w->any = false;
     w->conditions = 0;
 }
@@ -192,7 +192,7 @@ static void op_power(struct world *w, struct script *s)
 static void op_reset(struct world *w, struct script *s)
 {
     (void)s;
-    gyro_board.reset(&w->b, w->s.now_ns);
+    gyro_board.reset(&w->b.base, w->s.now_ns);
     if (!w->b.on) return;
     w->any = false;
     w->conditions = 0;
@@ -200,7 +200,7 @@ static void op_reset(struct world *w, struct script *s)
 
 static void op_wrong(struct world *w, struct script *s)
 {
-    gyro_board.wrong(&w->b, (uint32_t)script_byte(s) & gyro_board.wrongs);
+    w->b.base.faults = (uint32_t)script_byte(s) & GYRO_FAULT_FROZEN_WORDS;
 }
 
 /* Half a second with frames that go on, so that runs get somewhere. */
@@ -210,7 +210,7 @@ static void op_go(struct world *w, struct script *s)
     for (unsigned i = 0; i < 50; i++) {
         if (w->b.on) gyro_take_level(&w->b, 0, y, ++w->seq, w->s.now_ns);
         sched_run_until(&w->s, w->s.now_ns + w->b.profile.step_ns);
-        trace_advance(&w->b.trace, w->s.now_ns - TRACE_LAG_NS);
+        trace_advance(&w->b.base.trace, w->s.now_ns - TRACE_LAG_NS);
     }
 }
 
@@ -220,37 +220,34 @@ static void (*const ops[])(struct world *w, struct script *s) = {
 };
 
 /* Only of the watched board, and no byte of the script: what it does must change nothing. */
+static const struct board_platform_io platform = {torque, reposition, servo, encoder};
+
 static void listen(struct world *w, uint8_t how)
 {
-    gyro_board.listen(&w->b, how & 1);
+    w->b.base.observed = how & 1;
     if ((how & 2) && !w->attached) {
         w->ear.sink.mask = how & 4 ? TRACE_FIRST(GYRO_LINES) : TRACE_BIT(GYRO_LINE_WINDOW);
         w->ear.known = 0;
-        trace_attach(&w->b.trace, &w->ear.sink);
+        trace_attach(&w->b.base.trace, &w->ear.sink);
         w->attached = true;
     } else if (!(how & 2) && w->attached) {
-        trace_detach(&w->b.trace, &w->ear.sink);
+        trace_detach(&w->b.base.trace, &w->ear.sink);
         w->attached = false;
     }
 }
 
 static void begin(struct world *w)
 {
-    const struct board_io io = {.ctx = w,
-                                .event = on_event,
-                                .torque = torque,
-                                .reposition = reposition,
-                                .servo_rad = servo,
-                                .encoder_rad = encoder};
+    const struct board_io io = {.ctx = w, .event = on_event, .platform = &platform};
     const struct board_cfg cfg = {.seed = 3, .serial = 4, .level_node = 5};
     struct gyro_profile p;
     memset(w, 0, sizeof *w);
     sched_init(&w->s);
     gyro_profile_default(&p);
-    gyro_board.init(&w->b, &p, &cfg, &io, &w->s);
+    gyro_board.init(&w->b.base, &p, &cfg, &io, &w->s);
     gyro_attach(&w->b, &(struct gyro_host){.ctx = w, .reading = on_reading, .condition = on_condition});
     w->ear.sink = (struct trace_sink){.steps = listener_steps, .ctx = &w->ear};
-    gyro_board.power_up(&w->b, 0);
+    gyro_board.power_up(&w->b.base, 0);
 }
 
 static void same_digest(const struct world *a, const struct world *b)
@@ -260,7 +257,7 @@ static void same_digest(const struct world *a, const struct world *b)
     for (unsigned i = 0; i < 2; i++) {
         struct sha256 s;
         sha256_init(&s);
-        gyro_board.digest(&both[i]->b, &s);
+        gyro_board.digest(&both[i]->b.base, &s);
         sha256_hex(&s, hex[i]);
     }
     assert(strcmp(hex[0], hex[1]) == 0);
@@ -269,8 +266,8 @@ static void same_digest(const struct world *a, const struct world *b)
 static void run(struct world *w, int64_t ns)
 {
     sched_run_until(&w->s, w->s.now_ns + ns);
-    trace_advance(&w->b.trace, w->s.now_ns - TRACE_LAG_NS);
-    assert(w->b.trace.late == 0 && w->b.trace.dropped == 0);
+    trace_advance(&w->b.base.trace, w->s.now_ns - TRACE_LAG_NS);
+    assert(w->b.base.trace.late == 0 && w->b.base.trace.dropped == 0);
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)

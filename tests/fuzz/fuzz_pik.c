@@ -51,7 +51,7 @@ static double degc(void *ctx, unsigned channel, int64_t t_ns)
 static void on_event(void *ctx, unsigned e, int64_t t_ns)
 {
     const struct world *w = ctx;
-    assert(e < PIK_EVENTS && t_ns == w->s.now_ns && w->b.heard);
+    assert(e < PIK_EVENTS && t_ns == w->s.now_ns && w->b.base.observed);
 }
 
 static void on_reading(void *ctx, const struct pik_reading *r, int64_t t_ns)
@@ -60,7 +60,7 @@ static void on_reading(void *ctx, const struct pik_reading *r, int64_t t_ns)
     assert(t_ns == w->s.now_ns && r->t_ns == t_ns && r->seq > 0 && r->status & PIK_ST_NEW);
     if (w->any && r->seq > 1) assert(r->seq == w->last.seq + 1 && t_ns > w->last.t_ns);
     for (unsigned i = 0; i < PIK_AXES; i++) {
-        if (!w->b.frozen) assert((uint32_t)r->total[i] == (uint32_t)(r->plus[i] - r->minus[i]));
+        if (!w->b.base.faults) assert((uint32_t)r->total[i] == (uint32_t)(r->plus[i] - r->minus[i]));
         mix(w, (uint64_t)r->total[i] << 16 ^ (uint16_t)r->increment[i]);
         mix(w, r->plus[i] ^ r->status);
     }
@@ -90,7 +90,7 @@ static void on_done(void *ctx, struct board_cycle *c, enum board_cycle_result r,
 
 static void check(struct world *w)
 {
-    twin_counters(&w->seen, &w->b.counters, sizeof w->seen, &w->b.trace);
+    twin_counters(&w->seen, &w->b.counters, sizeof w->seen, &w->b.base.trace);
     for (unsigned i = 0; i < PIK_AXES; i++) {
         const struct pik_axis *a = &w->b.channel[i].axis;
         assert(a->begun_tick <= a->tick);
@@ -100,7 +100,7 @@ static void check(struct world *w)
 
 static void run(struct world *w, int64_t ns)
 {
-    twin_run_until(&w->s, &w->b.trace, w->s.now_ns + ns, 100000);
+    twin_run_until(&w->s, &w->b.base.trace, w->s.now_ns + ns, 100000);
 }
 
 static void op_input(struct world *w, struct script *s)
@@ -164,7 +164,7 @@ static void op_flip(struct world *w, struct script *s)
 static void op_freeze(struct world *w, struct script *s)
 {
     (void)s;
-    w->b.frozen = !w->b.frozen;
+    w->b.base.faults ^= PIK_FAULT_FROZEN_WORDS;
 }
 
 static void (*const ops[])(struct world *w, struct script *s) = {
@@ -174,14 +174,14 @@ static void (*const ops[])(struct world *w, struct script *s) = {
 /* Only of the watched board, and no byte of the script: what it does must change nothing. */
 static void listen(struct world *w, uint8_t how)
 {
-    pik_listen(&w->b, how & 1);
+    pik_observe(&w->b, how & 1);
     if ((how & 2) && !w->attached) {
         w->ear.sink.mask = how & 4 ? UINT64_MAX >> (64 - PIK_LINES) : UINT64_C(0x55);
         w->ear.known = 0;
-        trace_attach(&w->b.trace, &w->ear.sink);
+        trace_attach(&w->b.base.trace, &w->ear.sink);
         w->attached = true;
     } else if (!(how & 2) && w->attached) {
-        trace_detach(&w->b.trace, &w->ear.sink);
+        trace_detach(&w->b.base.trace, &w->ear.sink);
         w->attached = false;
     }
 }

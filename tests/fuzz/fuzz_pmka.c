@@ -52,7 +52,7 @@ static double degc(void *ctx, unsigned channel, int64_t t_ns)
 static void on_event(void *ctx, unsigned e, int64_t t_ns)
 {
     const struct world *w = ctx;
-    assert(e < PMKA_EVENTS && t_ns == w->s.now_ns && w->b.told);
+    assert(e < PMKA_EVENTS && t_ns == w->s.now_ns && w->b.base.observed);
 }
 
 static void on_reading(void *ctx, const struct pmka_reading *r, int64_t t_ns)
@@ -88,7 +88,7 @@ static void on_done(void *ctx, struct board_cycle *c, enum board_cycle_result r,
 
 static void check(struct world *w)
 {
-    twin_counters(&w->seen, &w->b.counters, sizeof w->seen, &w->b.trace);
+    twin_counters(&w->seen, &w->b.counters, sizeof w->seen, &w->b.base.trace);
     for (unsigned i = 0; i < PMKA_INTS; i++) {
         const struct pmka_channel *c = &w->b.channel[i];
         const double most_c = c->integrator.cfg.limit_v * c->integrator.cap_f / c->integrator.cap_left * 1.5;
@@ -104,13 +104,13 @@ static void check(struct world *w)
 
 static void run(struct world *w, int64_t ns)
 {
-    twin_run_until(&w->s, &w->b.trace, w->s.now_ns + ns, 100000);
+    twin_run_until(&w->s, &w->b.base.trace, w->s.now_ns + ns, 100000);
 }
 
 static void op_input(struct world *w, struct script *s)
 {
     const uint8_t axis = script_byte(s) % 3;
-    pmka_board.sample_until(&w->b, w->s.now_ns);
+    pmka_board.sample_until(&w->b.base, w->s.now_ns);
     w->v[axis] = (double)(int8_t)script_byte(s) / 10.0;
 }
 
@@ -142,21 +142,22 @@ static void op_turn(struct world *w, struct script *s)
 static void op_power(struct world *w, struct script *s)
 {
     (void)s;
-    if (w->b.life == PMKA_OFF) pmka_board.power_up(&w->b, w->s.now_ns);
-    else pmka_board.power_down(&w->b, w->s.now_ns);
+    if (w->b.life == PMKA_OFF) pmka_board.power_up(&w->b.base, w->s.now_ns);
+    else pmka_board.power_down(&w->b.base, w->s.now_ns);
     w->any = false;
 }
 
 static void op_reset(struct world *w, struct script *s)
 {
     (void)s;
-    pmka_board.reset(&w->b, w->s.now_ns);
+    pmka_board.reset(&w->b.base, w->s.now_ns);
     if (w->b.life != PMKA_OFF) w->any = false;
 }
 
 static void op_wrong(struct world *w, struct script *s)
 {
-    pmka_board.wrong(&w->b, (uint32_t)script_byte(s) & pmka_board.wrongs);
+    const uint32_t all = PMKA_FAULT_FROZEN_WORDS | PMKA_FAULT_CAPACITOR | PMKA_FAULT_STUCK_RESET | PMKA_FAULT_STUCK_KEY;
+    pmka_set_faults(&w->b, (uint32_t)script_byte(s) & all);
 }
 
 static void op_chip(struct world *w, struct script *s)
@@ -164,9 +165,10 @@ static void op_chip(struct world *w, struct script *s)
     const uint8_t b = script_byte(s);
     const struct board_part *adc = &pmka_board.parts[1], *rom = &pmka_board.parts[2];
     if (b & 1)
-        adc->fault(&w->b, 1, &(struct chip_fault){.dout = b & 2 ? b & 4 ? CHIP_STUCK_HIGH : CHIP_STUCK_LOW : CHIP_FREE},
+        adc->fault(&w->b.base, 1,
+                   &(struct chip_fault){.dout = b & 2 ? b & 4 ? CHIP_STUCK_HIGH : CHIP_STUCK_LOW : CHIP_FREE},
                    w->s.now_ns);
-    else assert(rom->flip(&w->b, 2, script_byte(s) % rom->registers, b, w->s.now_ns));
+    else assert(rom->flip(&w->b.base, 2, script_byte(s) % rom->registers, b, w->s.now_ns));
 }
 
 static void (*const ops[])(struct world *w, struct script *s) = {
@@ -176,14 +178,14 @@ static void (*const ops[])(struct world *w, struct script *s) = {
 /* Only of the watched board, and no byte of the script: what it does must change nothing. */
 static void listen(struct world *w, uint8_t how)
 {
-    pmka_board.listen(&w->b, how & 1);
+    w->b.base.observed = how & 1;
     if ((how & 2) && !w->attached) {
         w->ear.sink.mask = how & 4 ? UINT64_MAX >> (64 - PMKA_LINES) : UINT64_C(0x15555);
         w->ear.known = 0;
-        trace_attach(&w->b.trace, &w->ear.sink);
+        trace_attach(&w->b.base.trace, &w->ear.sink);
         w->attached = true;
     } else if (!(how & 2) && w->attached) {
-        trace_detach(&w->b.trace, &w->ear.sink);
+        trace_detach(&w->b.base.trace, &w->ear.sink);
         w->attached = false;
     }
 }
@@ -196,7 +198,7 @@ static void begin(struct world *w, const struct pmka_profile *p)
     for (unsigned i = 0; i < 3; i++) cfg.afe[i] = afe_nominal(AFE_VOLTAGE);
     pmka_board.cfg_default(&cfg);
     sched_init(&w->s);
-    pmka_board.init(&w->b, p, &cfg, &io, &w->s);
+    pmka_board.init(&w->b.base, p, &cfg, &io, &w->s);
     pmka_attach(&w->b, &(struct pmka_host){.ctx = w, .reading = on_reading});
     w->ear.sink = (struct trace_sink){.steps = listener_steps, .ctx = &w->ear};
 }
@@ -222,10 +224,10 @@ static void same_digest(const struct world *a, const struct world *b)
     char hex[2][SHA256_HEX];
     struct sha256 s;
     sha256_init(&s);
-    pmka_board.digest(&a->b, &s);
+    pmka_board.digest(&a->b.base, &s);
     sha256_hex(&s, hex[0]);
     sha256_init(&s);
-    pmka_board.digest(&b->b, &s);
+    pmka_board.digest(&b->b.base, &s);
     sha256_hex(&s, hex[1]);
     assert(strcmp(hex[0], hex[1]) == 0);
 }
@@ -237,8 +239,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     const struct pmka_profile p = profile_of(&s);
     begin(&heard, &p);
     begin(&deaf, &p);
-    pmka_board.power_up(&heard.b, 0);
-    pmka_board.power_up(&deaf.b, 0);
+    pmka_board.power_up(&heard.b.base, 0);
+    pmka_board.power_up(&deaf.b.base, 0);
     while (script_more(&s) && deaf.s.now_ns < RUN_NS) {
         const uint8_t b = script_byte(&s);
         const int64_t ns = script_span_ns(&s);

@@ -91,14 +91,14 @@ static void on_done(void *ctx, struct psa2_request *r, enum psa2_result result, 
 
 static void check(struct world *w)
 {
-    twin_counters(&w->seen, &w->b.counters, sizeof w->seen, &w->b.trace);
+    twin_counters(&w->seen, &w->b.counters, sizeof w->seen, &w->b.base.trace);
     assert(sched_next_ns(&w->s) > w->s.now_ns);
     for (unsigned i = 0; i < 3; i++) assert(w->b.adc[i].count.torn_reads == 0 || !w->clean);
 }
 
 static void run_until(struct world *w, int64_t t_ns)
 {
-    twin_run_until(&w->s, &w->b.trace, t_ns, 100000);
+    twin_run_until(&w->s, &w->b.base.trace, t_ns, 100000);
 }
 
 static void op_submit(struct world *w, struct script *s)
@@ -158,11 +158,11 @@ static void op_watch(struct world *w, struct script *s)
 {
     const uint32_t mask = script_byte(s) & 1 ? 0xFFFF : script_byte(s) * UINT32_C(0x0101);
     if (!w->ear.sink.steps) return;
-    trace_detach(&w->b.trace, &w->ear.sink);
+    trace_detach(&w->b.base.trace, &w->ear.sink);
     w->ear.known = 0;
     w->ear.edge_ns = 0;
     w->ear.sink.mask = mask;
-    if (mask) trace_attach(&w->b.trace, &w->ear.sink);
+    if (mask) trace_attach(&w->b.base.trace, &w->ear.sink);
 }
 
 static void step(struct world *w, struct script *s)
@@ -208,8 +208,8 @@ static void prepare(void)
 
 static void restore(struct world *to, const struct world *from)
 {
-    assert(from->b.trace.pending_count == 0);
-    twin_restore(to, from, sizeof *to, offsetof(struct world, b.trace.pending));
+    assert(from->b.base.trace.pending_count == 0);
+    twin_restore(to, from, sizeof *to, offsetof(struct world, b.base.trace.pending));
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)

@@ -98,7 +98,7 @@ static void on_request(void *ctx, struct psd1_request *q, enum board_cycle_resul
 
 static void check(struct world *w)
 {
-    twin_counters(&w->seen, &w->b.counters, sizeof w->seen, &w->b.trace);
+    twin_counters(&w->seen, &w->b.counters, sizeof w->seen, &w->b.base.trace);
     assert(sched_next_ns(&w->s) > w->s.now_ns);
     assert(w->b.phase != PSD1_OFF || (!w->waiting && !w->asking));
     for (unsigned i = 0; i < 3; i++) {
@@ -109,7 +109,7 @@ static void check(struct world *w)
 
 static void run_until(struct world *w, int64_t t_ns)
 {
-    twin_run_until(&w->s, &w->b.trace, t_ns, 1000000);
+    twin_run_until(&w->s, &w->b.base.trace, t_ns, 1000000);
 }
 
 static void op_cycle(struct world *w, struct script *s)
@@ -211,11 +211,11 @@ static void op_watch(struct world *w, struct script *s)
     const uint64_t mask =
         (script_byte(s) & 1 ? UINT64_MAX : script_byte(s) * UINT64_C(0x0101010101010101)) & TRACE_FIRST(PSD1_LINES);
     if (!w->ear.sink.steps) return;
-    trace_detach(&w->b.trace, &w->ear.sink);
+    trace_detach(&w->b.base.trace, &w->ear.sink);
     w->ear.known = 0;
     w->ear.edge_ns = 0;
     w->ear.sink.mask = mask;
-    if (mask) trace_attach(&w->b.trace, &w->ear.sink);
+    if (mask) trace_attach(&w->b.base.trace, &w->ear.sink);
 }
 
 static void op_fault(struct world *w, struct script *s)
@@ -273,8 +273,8 @@ static void prepare(void)
 
 static void restore(struct world *to, const struct world *from)
 {
-    assert(from->b.trace.pending_count == 0);
-    twin_restore(to, from, sizeof *to, offsetof(struct world, b.trace.pending));
+    assert(from->b.base.trace.pending_count == 0);
+    twin_restore(to, from, sizeof *to, offsetof(struct world, b.base.trace.pending));
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)

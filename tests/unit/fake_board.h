@@ -21,12 +21,11 @@ struct fake_chip {
 };
 
 struct fake_board {
+    struct board base;
     struct sched *sched;
-    struct trace trace;
-    struct line_faults line;
     struct afe afe[BOARD_AXES];
-    bool on, listened;
-    uint32_t cycles, wrongs, resets;
+    bool on;
+    uint32_t cycles, resets;
     int64_t sampled_ns;
     struct fake_chip chip[FAKE_PARTS - 1];
     struct board_cycle *cycle;
@@ -46,9 +45,9 @@ static void fake_end(void *ctx, int64_t t_ns)
 }
 
 /* 0: read alone, not before its word waits; 1: written alone; 2: both, but not 13; 3: both. */
-static enum board_cycle_result fake_submit(void *board, struct board_cycle *c, int64_t t_ns)
+static enum board_cycle_result fake_submit(struct board *board, struct board_cycle *c, int64_t t_ns)
 {
-    struct fake_board *b = board;
+    struct fake_board *b = (struct fake_board *)board;
     const int64_t strobe_ns = c->strobe_ns ? c->strobe_ns : FAKE_STROBE_NS;
     b->cycles++;
     if (!b->on) return BOARD_CYCLE_OFF;
@@ -69,22 +68,22 @@ static const char *fake_name(unsigned address)
     return address < 4 ? name[address] : NULL;
 }
 
-static struct board_strobe fake_strobe(const void *board)
+static struct board_strobe fake_strobe(const struct board *board)
 {
     (void)board;
     return (struct board_strobe){FAKE_STROBE_NS, FAKE_STROBE_NS / 2 + 1};
 }
 
-static void fake_wanted(const void *board, const struct board_cycle *c, enum board_cycle_result r, char *out,
+static void fake_wanted(const struct board *board, const struct board_cycle *c, enum board_cycle_result r, char *out,
                         size_t cap)
 {
     (void)board;
     (void)snprintf(out, cap, r == BOARD_CYCLE_BAD_VALUE ? "it takes %u" : "wait for %u", c->address);
 }
 
-static void fake_reset(void *board, int64_t t_ns)
+static void fake_reset(struct board *board, int64_t t_ns)
 {
-    struct fake_board *b = board;
+    struct fake_board *b = (struct fake_board *)board;
     struct board_cycle *c = b->cycle;
     b->resets++;
     b->cycle = NULL;
@@ -92,74 +91,54 @@ static void fake_reset(void *board, int64_t t_ns)
     if (c) c->done(c->ctx, c, BOARD_CYCLE_OFF, t_ns);
 }
 
-static bool fake_ready(const void *board)
+static bool fake_ready(const struct board *board)
 {
     return ((const struct fake_board *)board)->on;
 }
 
-static void fake_sample(void *board, int64_t t_ns)
+static void fake_sample(struct board *board, int64_t t_ns)
 {
     ((struct fake_board *)board)->sampled_ns = t_ns;
 }
 
-static void fake_wrong(void *board, uint32_t wrongs)
-{
-    ((struct fake_board *)board)->wrongs = wrongs;
-}
-
-static void fake_listen(void *board, bool on)
-{
-    ((struct fake_board *)board)->listened = on;
-}
-
-static struct trace *fake_trace(void *board)
-{
-    return &((struct fake_board *)board)->trace;
-}
-
-static struct line_faults *fake_line(void *board)
-{
-    return &((struct fake_board *)board)->line;
-}
-
-static struct afe *fake_afe(void *board, unsigned axis)
+static struct afe *fake_afe(struct board *board, unsigned axis)
 {
     return &((struct fake_board *)board)->afe[axis];
 }
 
-static void fake_truth(const void *board, board_truth_fn *put, void *ctx)
+static void fake_truth(const struct board *board, board_truth_fn *put, void *ctx)
 {
     (void)board;
     put(ctx, "capacitor_error_ppm", 250.0);
 }
 
-static void fake_chip_fault(void *board, unsigned part, const struct chip_fault *f, int64_t t_ns)
+static void fake_chip_fault(struct board *board, unsigned part, const struct chip_fault *f, int64_t t_ns)
 {
     (void)t_ns;
     ((struct fake_board *)board)->chip[part - 1].fault = *f;
 }
 
-static bool fake_flip(void *board, unsigned part, unsigned reg, uint8_t mask, int64_t t_ns)
+static bool fake_flip(struct board *board, unsigned part, unsigned reg, uint8_t mask, int64_t t_ns)
 {
-    struct fake_board *b = board;
+    struct fake_board *b = (struct fake_board *)board;
     (void)t_ns;
     if (b->on) b->chip[part - 1].flipped = 256 * reg + mask;
     return b->on;
 }
 
-static unsigned fake_pulses(const void *board)
+static unsigned fake_pulses(const struct board *board)
 {
     (void)board;
     return FAKE_PULSES;
 }
 
-static double fake_code_v(const void *board)
+static double fake_code_v(const struct board *board)
 {
     (void)board;
     return FAKE_CODE_V;
 }
 
-static double fake_range_v(const void *board)
+static double fake_range_v(const struct board *board)
 {
     (void)board;
     return 5.0;
@@ -188,6 +167,9 @@ static const struct board_part fake_parts[FAKE_PARTS] = {
     [FAKE_ROM] = {.name = "rom", .label = "memory", FAKE_CHIP(2)},
     [FAKE_LAMP] = {.name = "lamp", .label = "lamp", FAKE_CHIP(3)},
 };
+#define FAKE_FAULT_FROZEN_WORDS 4u
+static const struct board_controller_fault fake_faults[] = {{"controller.frozen_words", FAKE_FAULT_FROZEN_WORDS},
+                                                            {NULL, 0}};
 static const struct board_bus fake_bus = {
     .submit = fake_submit, .addresses = 4, .name = fake_name, .strobe = fake_strobe, .wanted = fake_wanted};
 
@@ -206,15 +188,11 @@ static const struct board_type fake_type = {
     .event_count = 2,
     .parts = fake_parts,
     .part_count = FAKE_PARTS,
-    .wrongs = BOARD_WRONG_FROZEN_WORDS,
+    .controller_faults = fake_faults,
     .bus = &fake_bus,
     .reset = fake_reset,
     .ready = fake_ready,
     .sample_until = fake_sample,
-    .wrong = fake_wrong,
-    .listen = fake_listen,
-    .trace = fake_trace,
-    .line = fake_line,
     .afe = fake_afe,
     .truth = fake_truth,
 };
@@ -226,15 +204,14 @@ static inline void fake_unit(struct unit *u, struct fake_board *b, const char *n
     b->sched = s;
     b->on = true;
     sched_ev(&b->end, fake_end, b);
-    trace_init(&b->trace);
-    for (unsigned i = 0; i < fake_type.line_count; i++) trace_add(&b->trace, fake_lines[i].name, fake_lines[i].level);
-    line_faults_init(&b->line, &b->trace);
+    board_init(&b->base, fake_lines, fake_type.line_count);
+    b->base.type = &fake_type;
     u->cfg = unit_default(name);
     u->cfg.type = &fake_type;
     for (unsigned i = 0; i < UNIT_AXES; i++) u->cfg.axis[i].sensor = UNIT_MEMS;
     u->lab = lab;
     u->type = &fake_type;
-    u->board = b;
+    u->board = &b->base;
     snprintf(u->profile, sizeof u->profile, "usual");
 }
 

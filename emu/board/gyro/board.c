@@ -23,44 +23,27 @@ static void about(const void *profile, char *out, size_t cap)
 
 /* ---- what is on it ---- */
 
-#define COUNT(field)                                                                                                   \
-    {                                                                                                                  \
-#field, offsetof(struct gyro_counters, field)                                                                  \
-    }
+#define COUNT(field) BOARD_COUNTER(gyro_counters, field, field)
 
 static const struct board_counter counters[] = {
     COUNT(steps),     COUNT(res),     COUNT(level_frames), COUNT(level_lost),     COUNT(level_silent),
     COUNT(saturated), COUNT(windows), COUNT(unsettled),    COUNT(encoder_faults), COUNT(refused)};
 
-static const struct board_part parts[] = {{.name = "controller",
-                                           .label = "board",
-                                           .offset = offsetof(struct gyro, counters),
-                                           .counters = counters,
-                                           .counter_count = sizeof counters / sizeof *counters}};
+static const struct board_part parts[] = {
+    {.name = "controller", .label = "board", .offset = offsetof(struct gyro, counters), BOARD_COUNTERS(counters)}};
 
 /* ---- life ---- */
 
 BOARD_LIFE(gyro);
 
-static bool ready(const void *board)
+static bool ready(const struct board *board)
 {
     return ((const struct gyro *)board)->ready;
 }
 
-static void wrong(void *board, uint32_t wrongs)
+static const char *set_mode(struct board *board, unsigned mode, int64_t t_ns)
 {
-    ((struct gyro *)board)->wrongs = wrongs;
-}
-
-static void listen(void *board, bool on)
-{
-    struct gyro *b = board;
-    b->told = on && b->io.event;
-}
-
-static const char *set_mode(void *board, unsigned mode, int64_t t_ns)
-{
-    return gyro_set_mode(board, (enum gyro_mode)mode, t_ns);
+    return gyro_set_mode((struct gyro *)board, (enum gyro_mode)mode, t_ns);
 }
 
 /* ---- digest ---- */
@@ -106,9 +89,9 @@ static void add_inlet(struct sha256 *s, const struct gyro_inlet *in)
     board_digest_u64(s, (uint64_t)in->last_ns);
 }
 
-static void digest(const void *board, struct sha256 *s)
+static void digest(const struct board *board, struct sha256 *s)
 {
-    const struct gyro *b = board;
+    const struct gyro *b = (const struct gyro *)board;
     board_digest_u64(s, (uint64_t)b->on << 2 | (uint64_t)b->ready << 1 | b->silent);
     board_digest_u64(s, (uint64_t)b->number << 32 | (uint64_t)b->standing << 8 | b->latest.flags);
     add_reals(s, (const double *)(const void *)&b->set, sizeof b->set / sizeof(double));
@@ -118,14 +101,21 @@ static void digest(const void *board, struct sha256 *s)
     add_reals(s, (const double[]){b->level.sin_b, b->level.sin_g, b->servo_rad, b->check.turned_rad, b->check.from_rad},
               5);
     add_reals(s, (const double[]){b->u_radps[0], b->u_radps[1], b->latest.u1_radps, b->latest.encoder_rad}, 4);
-    board_digest_u64(s, b->wrongs);
+    board_digest_u64(s, b->base.faults);
     board_digest_u64(s, b->check.steps);
     board_digest_u64(s, (uint64_t)b->calm_ns[0]);
     board_digest_u64(s, (uint64_t)b->calm_ns[1]);
     sha256_add(s, &b->counters, sizeof b->counters);
 }
 
+static const struct board_platform platform = {.set_mode = set_mode};
 static const char *const port_lines[] = {"STEP", "READY", "SLEW", "SETTLE", "WINDOW", "FAULT", NULL};
+
+static const struct board_controller_fault controller_faults[] = {
+    {"controller.frozen_words", GYRO_FAULT_FROZEN_WORDS},
+    {NULL, 0},
+};
+static const char *const capabilities[] = {"level", NULL};
 
 const struct board_type gyro_board = {
     .name = "gyro",
@@ -138,7 +128,7 @@ const struct board_type gyro_board = {
     .profile_default = gyro_profile_default,
     .profile_check = gyro_profile_check,
     .about = about,
-    .knobs = BOARD_KNOB_LEVEL,
+    .capabilities = capabilities,
     .node = 9,
     .period_ns = period_ns,
     .lines = gyro_lines,
@@ -150,18 +140,10 @@ const struct board_type gyro_board = {
     .event_count = GYRO_EVENTS,
     .parts = parts,
     .part_count = sizeof parts / sizeof *parts,
-    .wrongs = BOARD_WRONG_FROZEN_WORDS,
+    .controller_faults = controller_faults,
     .can = &gyro_can,
-    .set_mode = set_mode,
-    .init = init,
-    .power_up = power_up,
-    .power_down = power_down,
-    .reset = reset,
+    .platform = &platform,
+    BOARD_LIFE_FUNCTIONS,
     .ready = ready,
-    .sample_until = sample_until,
-    .wrong = wrong,
-    .listen = listen,
-    .trace = trace,
-    .line = line,
     .digest = digest,
 };

@@ -258,10 +258,11 @@ static const struct board_node_type type = {.device = &gyro_device,
                                             .period_ns = period_ns,
                                             .rx_other = on_level_frame};
 
-static void init_can(void *can, const struct board_can_cfg *cfg, void *board, struct can_bus *bus, struct sched *s)
+static void init_can(void *can, const struct board_can_cfg *cfg, struct board *board, struct can_bus *bus,
+                     struct sched *s)
 {
     struct gyro_can *c = can;
-    struct gyro *b = board;
+    struct gyro *b = (struct gyro *)board;
     board_node_init(can, &type, cfg, board, bus, s);
     c->level_id = b->cfg.level_node ? (uint32_t)XY_COB + b->cfg.level_node : 0;
     gyro_attach(b, &(struct gyro_host){.ctx = can, .reading = on_reading, .condition = on_condition});

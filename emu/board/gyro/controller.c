@@ -129,7 +129,7 @@ static void drive_torquers(struct gyro *b, int64_t t_ns)
         gyro_run_stop(b, GYRO_LEVEL);
         gyro_report_encoder_fault(b, t_ns);
     }
-    if (b->io.torque) b->io.torque(b->io.ctx, b->u_radps[0], b->u_radps[1], t_ns);
+    if (b->io.platform) b->io.platform->torque(b->io.ctx, b->u_radps[0], b->u_radps[1], t_ns);
 }
 
 static void put_lines(struct gyro *b, int64_t t_ns)
@@ -141,8 +141,8 @@ static void put_lines(struct gyro *b, int64_t t_ns)
     const uint64_t all = TRACE_FIRST(GYRO_LINES);
     const uint64_t level = TRACE_BIT(GYRO_LINE_STEP) | TRACE_BIT(GYRO_LINE_READY) | of_phase[b->run.phase] |
                            (b->latest.flags ? TRACE_BIT(GYRO_LINE_FAULT) : 0);
-    trace_put(&b->trace, all, level, t_ns);
-    trace_set(&b->trace, GYRO_LINE_STEP, false, t_ns + GYRO_STEP_PULSE_NS);
+    trace_put(&b->base.trace, all, level, t_ns);
+    trace_set(&b->base.trace, GYRO_LINE_STEP, false, t_ns + GYRO_STEP_PULSE_NS);
 }
 
 static struct gyro_reading make_reading(const struct gyro *b, int64_t t_ns)
@@ -154,7 +154,7 @@ static struct gyro_reading make_reading(const struct gyro *b, int64_t t_ns)
         .flags = b->flags | (b->standing & (GYRO_ENCODER_FAULT | GYRO_NOT_SETTLED)),
         .u1_radps = b->u_radps[0],
         .u2_radps = b->u_radps[1],
-        .encoder_rad = b->io.encoder_rad ? b->io.encoder_rad(b->io.ctx, t_ns) : 0.0,
+        .encoder_rad = b->io.platform ? b->io.platform->encoder_rad(b->io.ctx, t_ns) : 0.0,
         .beta_rad = b->level.beta_rad,
         .gamma_rad = b->level.gamma_rad,
         .level_seq = b->inlet.seq,
@@ -164,7 +164,7 @@ static struct gyro_reading make_reading(const struct gyro *b, int64_t t_ns)
 static void publish_reading(struct gyro *b, int64_t t_ns)
 {
     b->number++;
-    if (!(b->wrongs & BOARD_WRONG_FROZEN_WORDS)) b->latest = make_reading(b, t_ns);
+    if (!(b->base.faults & GYRO_FAULT_FROZEN_WORDS)) b->latest = make_reading(b, t_ns);
     b->latest.step = b->number;
     put_lines(b, t_ns);
     gyro_notify_event(b, GYRO_EV_STEP, t_ns);
@@ -186,7 +186,7 @@ static void run_step(void *ctx, int64_t t_ns)
     b->ready = true;
     b->counters.steps++;
     b->flags = take_inlet(b, t_ns) ? 0 : GYRO_LEVEL_LOST;
-    b->servo_rad = b->io.servo_rad ? b->io.servo_rad(b->io.ctx, t_ns) : 0.0;
+    b->servo_rad = b->io.platform ? b->io.platform->servo_rad(b->io.ctx, t_ns) : 0.0;
     gyro_run_step(b, t_ns);
     drive_torquers(b, t_ns);
     const bool at_work = b->run.mode != GYRO_OFF;
@@ -207,9 +207,7 @@ void gyro_init(struct gyro *b, const struct gyro_profile *p, const struct board_
     b->io = *io;
     b->sched = s;
     sched_ev(&b->step, run_step, b);
-    trace_init(&b->trace);
-    for (unsigned i = 0; i < GYRO_LINES; i++) (void)trace_add(&b->trace, gyro_lines[i].name, gyro_lines[i].level);
-    line_faults_init(&b->line, &b->trace);
+    board_init(&b->base, gyro_lines, GYRO_LINES);
 }
 
 void gyro_attach(struct gyro *b, const struct gyro_host *host)
@@ -234,8 +232,8 @@ static void reset_state(struct gyro *b, int64_t t_ns)
     b->latest = (struct gyro_reading){.step = 0};
     b->number = 0;
     gyro_past_begin(b);
-    trace_put(&b->trace, TRACE_FIRST(GYRO_LINES), 0, t_ns);
-    if (b->io.torque) b->io.torque(b->io.ctx, 0.0, 0.0, t_ns);
+    trace_put(&b->base.trace, TRACE_FIRST(GYRO_LINES), 0, t_ns);
+    if (b->io.platform) b->io.platform->torque(b->io.ctx, 0.0, 0.0, t_ns);
 }
 
 void gyro_power_up(struct gyro *b, int64_t t_ns)

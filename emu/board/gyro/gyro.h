@@ -11,8 +11,6 @@
 #include "board/board.h"
 #include "board/gyro/law.h"
 #include "board/gyro/profile.h"
-#include "trace/line_fault.h"
-#include "trace/trace.h"
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -96,6 +94,11 @@ struct gyro_host {
 };
 
 #include "board/gyro/state.h" /* struct gyro, read-only outside the board's own files */
+
+/* Faults of the controller: bits of board.faults. */
+enum gyro_controller_fault {
+    GYRO_FAULT_FROZEN_WORDS = 4 /* the reading before, over and over */
+};
 
 extern const char *const gyro_events[GYRO_EVENTS];
 extern const struct board_line gyro_lines[GYRO_LINES];

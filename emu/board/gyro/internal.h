@@ -6,7 +6,7 @@
 
 static inline void gyro_notify_event(const struct gyro *b, enum gyro_event e, int64_t t_ns)
 {
-    if (b->told) b->io.event(b->io.ctx, e, t_ns);
+    if (b->base.observed) b->io.event(b->io.ctx, e, t_ns);
 }
 
 /* gyro/run.c: the phases at this step, before the rates are computed; then the rates asked, u1 and u2. */

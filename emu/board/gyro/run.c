@@ -44,7 +44,7 @@ static void begin_turn(struct gyro *b, double to_deg, int64_t t_ns)
     b->run.turn =
         gyro_turn_of(b->run.q_ref_rad, to_deg * GYRO_RAD_PER_DEG, fmin(b->set.slew_dps * GYRO_RAD_PER_DEG, limit_radps),
                      b->set.slew_dps2 * GYRO_RAD_PER_DEG, t_ns);
-    if (b->io.reposition) b->io.reposition(b->io.ctx, t_ns);
+    if (b->io.platform) b->io.platform->reposition(b->io.ctx, t_ns);
     enter_phase(b, GYRO_SLEWING, t_ns);
     gyro_notify_event(b, GYRO_EV_SLEW, t_ns);
 }

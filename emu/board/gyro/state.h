@@ -57,14 +57,12 @@ struct gyro_past {
 };
 
 struct gyro {
+    struct board base;
     struct gyro_profile profile;
     struct board_cfg cfg;
     struct board_io io;
     struct gyro_host host;
     struct sched *sched;
-    struct trace trace;
-    struct line_faults line;
-    bool told; /* io.event has a subscriber */
     struct gyro_counters counters;
 
     bool on, ready;
@@ -83,7 +81,6 @@ struct gyro {
     struct gyro_past past[GYRO_FLAGS];
     double u_radps[2];  /* asked of the torquers, as limited */
     unsigned flags;     /* of this step */
-    uint32_t wrongs;    /* enum board_wrong */
     bool silent;        /* the level unit */
     unsigned standing;  /* conditions notified to the host */
     int64_t calm_ns[2]; /* last time the level was lost, a rate limited */

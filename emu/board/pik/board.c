@@ -54,10 +54,7 @@ static void cfg_profiled(struct board_cfg *cfg, const void *profile)
 
 /* ---- what is on it ---- */
 
-#define OF(type, name, field)                                                                                          \
-    {                                                                                                                  \
-#name, offsetof(struct type, field)                                                                            \
-    }
+#define OF BOARD_COUNTER
 
 // clang-format off
 static const struct board_counter controller_counters[] = {
@@ -69,24 +66,23 @@ static const struct board_counter converter_counters[] = {
     OF(pik_channel, opposed, opposed), OF(pik_channel, pulses_lost, lost),
 };
 // clang-format on
-#define COUNTERS(table) .counters = (table), .counter_count = sizeof(table) / sizeof *(table)
 
 enum { PART_CONTROLLER, PART_X, PART_Y, PART_Z, PART_CLOCK, PARTS };
 
-static void converter_fault(void *board, unsigned part, const struct chip_fault *f, int64_t t_ns)
+static void converter_fault(struct board *board, unsigned part, const struct chip_fault *f, int64_t t_ns)
 {
-    pik_stick(board, part - PART_X, f, t_ns);
+    pik_stick((struct pik *)board, part - PART_X, f, t_ns);
 }
 
-static void clock_fault(void *board, unsigned part, const struct chip_fault *f, int64_t t_ns)
+static void clock_fault(struct board *board, unsigned part, const struct chip_fault *f, int64_t t_ns)
 {
     (void)part;
-    pik_clock(board, f->clock_ppm, t_ns);
+    pik_clock((struct pik *)board, f->clock_ppm, t_ns);
 }
 
-static bool flip(void *board, unsigned part, unsigned reg, uint8_t mask, int64_t t_ns)
+static bool flip(struct board *board, unsigned part, unsigned reg, uint8_t mask, int64_t t_ns)
 {
-    return pik_flip(board, part - PART_X, reg, mask, t_ns);
+    return pik_flip((struct pik *)board, part - PART_X, reg, mask, t_ns);
 }
 
 #define NO_CHIP "a channel has no data-ready pin, no synchronisation and no clock of its own; its pulses are its output"
@@ -94,15 +90,16 @@ static bool flip(void *board, unsigned part, unsigned reg, uint8_t mask, int64_t
 #define PART(axis, nr)                                                                                                 \
     {                                                                                                                  \
         .name = "conv." axis, .label = "conv_" axis,                                                                   \
-        .offset = offsetof(struct pik, channel) + (nr) * sizeof(struct pik_channel), COUNTERS(converter_counters),     \
-        .faults = BOARD_FAULT_DOUT, .unless = NO_CHIP, .registers = 4, .fault = converter_fault, .flip = flip          \
+        .offset = offsetof(struct pik, channel) + (nr) * sizeof(struct pik_channel),                                   \
+        BOARD_COUNTERS(converter_counters), .faults = BOARD_FAULT_DOUT, .unless = NO_CHIP, .registers = 4,             \
+        .fault = converter_fault, .flip = flip                                                                         \
     }
 
 static const struct board_part parts[PARTS] = {
     [PART_CONTROLLER] = {.name = "controller",
                          .label = "board",
                          .offset = offsetof(struct pik, counters),
-                         COUNTERS(controller_counters)},
+                         BOARD_COUNTERS(controller_counters)},
     [PART_X] = PART("x", 0),
     [PART_Y] = PART("y", 1),
     [PART_Z] = PART("z", 2),
@@ -112,12 +109,7 @@ static const struct board_part parts[PARTS] = {
 
 static const char *const port_lines[] = {"FXP", "FXN", "FYP", "FYN", "FZP", "FZN", "LATCH", NULL};
 
-static enum board_cycle_result submit(void *board, struct board_cycle *c, int64_t t_ns)
-{
-    return pik_submit(board, c, t_ns);
-}
-
-BOARD_STROBE(pik);
+BOARD_BUS(pik);
 
 static const struct board_bus bus = {
     .submit = submit, .addresses = PIK_REGISTERS, .name = pik_register_name, .strobe = strobe, .wanted = pik_wanted};
@@ -125,12 +117,12 @@ static const struct board_bus bus = {
 /* ---- what faults are measured by ---- */
 
 /* One pulse in a second. */
-static double code_v(const void *board)
+static double code_v(const struct board *board)
 {
     return pik_profile_quantum_vs(&((const struct pik *)board)->profile);
 }
 
-static double range_v(const void *board)
+static double range_v(const struct board *board)
 {
     const struct pik_profile *p = &((const struct pik *)board)->profile;
     return pik_profile_limit_hz(p) * pik_profile_quantum_vs(p);
@@ -140,30 +132,25 @@ static double range_v(const void *board)
 
 BOARD_LIFE(pik);
 
-static bool ready(const void *board)
+static bool ready(const struct board *board)
 {
-    const struct pik *b = board;
+    const struct pik *b = (const struct pik *)board;
     return b->on && (b->any || b->period_100us == 0);
 }
 
-static void wrong(void *board, uint32_t wrongs)
+static void observe(struct board *board, bool on)
 {
-    ((struct pik *)board)->frozen = wrongs & BOARD_WRONG_FROZEN_WORDS;
+    pik_observe((struct pik *)board, on);
 }
 
-static void listen(void *board, bool on)
-{
-    pik_listen(board, on);
-}
-
-static struct afe *afe(void *board, unsigned axis)
+static struct afe *afe(struct board *board, unsigned axis)
 {
     return &((struct pik *)board)->channel[axis].afe;
 }
 
-static void truth(const void *board, board_truth_fn *put, void *ctx)
+static void truth(const struct board *board, board_truth_fn *put, void *ctx)
 {
-    const struct pik *b = board;
+    const struct pik *b = (const struct pik *)board;
     static const char *const plus[] = {"x_plus_hz_per_v", "y_plus_hz_per_v", "z_plus_hz_per_v"};
     static const char *const minus[] = {"x_minus_hz_per_v", "y_minus_hz_per_v", "z_minus_hz_per_v"};
     static const char *const tc[] = {"x_tc_ppm_per_k", "y_tc_ppm_per_k", "z_tc_ppm_per_k"};
@@ -203,9 +190,9 @@ static void add_channel(struct sha256 *s, const struct pik *b, unsigned i)
     board_digest_noise(s, &c->noise);
 }
 
-static void digest(const void *board, struct sha256 *s)
+static void digest(const struct board *board, struct sha256 *s)
 {
-    const struct pik *b = board;
+    const struct pik *b = (const struct pik *)board;
     const struct pik_reading *r = &b->latched;
     board_digest_u64(s, (uint64_t)b->on << 32 | (uint64_t)b->any << 1 | b->saturated);
     board_digest_u64(s, (uint64_t)b->look_tick);
@@ -217,6 +204,11 @@ static void digest(const void *board, struct sha256 *s)
     for (unsigned i = 0; i < PIK_AXES; i++) board_digest_u64(s, (uint64_t)r->total[i]);
     for (unsigned i = 0; i < PIK_AXES; i++) add_channel(s, b, i);
 }
+
+static const struct board_controller_fault controller_faults[] = {
+    {"controller.frozen_words", PIK_FAULT_FROZEN_WORDS},
+    {NULL, 0},
+};
 
 const struct board_type pik_board = {
     .name = "pik",
@@ -243,19 +235,12 @@ const struct board_type pik_board = {
     .range_v = range_v,
     .parts = parts,
     .part_count = PARTS,
-    .wrongs = BOARD_WRONG_FROZEN_WORDS,
+    .controller_faults = controller_faults,
     .can = &pik_can_side,
     .bus = &bus,
-    .init = init,
-    .power_up = power_up,
-    .power_down = power_down,
-    .reset = reset,
+    BOARD_LIFE_FUNCTIONS,
     .ready = ready,
-    .sample_until = sample_until,
-    .wrong = wrong,
-    .listen = listen,
-    .trace = trace,
-    .line = line,
+    .observe = observe,
     .afe = afe,
     .digest = digest,
     .truth = truth,

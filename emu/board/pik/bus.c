@@ -77,7 +77,7 @@ static void cycle_end(void *ctx, int64_t t_ns)
     struct board_cycle *c = b->cycle;
     b->cycle = NULL;
     b->counters.cycles++;
-    bus_lines_end(&b->trace, &bus_lines, t_ns);
+    bus_lines_end(&b->base.trace, &bus_lines, t_ns);
     if (c->write) write_word(b, c, t_ns);
     c->done(c->ctx, c, BOARD_CYCLE_OK, t_ns);
 }
@@ -88,10 +88,11 @@ static bool accepts_value(const struct pik *b, const struct board_cycle *c)
     return c->address != PIK_REG_CLEAR || c->data < 1u << PIK_AXES;
 }
 
-void pik_wanted(const void *board, const struct board_cycle *c, enum board_cycle_result r, char *out, size_t cap)
+void pik_wanted(const struct board *board, const struct board_cycle *c, enum board_cycle_result r, char *out,
+                size_t cap)
 {
     unsigned least, most;
-    pik_period_range(board, &least, &most);
+    pik_period_range((const struct pik *)board, &least, &most);
     if (r == BOARD_CYCLE_NOT_READY)
         (void)snprintf(out, cap, "a write to LATCH (0Bh) latches, PERIOD (0Ch) does so without end");
     else if (c->address == PIK_REG_PERIOD) (void)snprintf(out, cap, "it takes 0 and %u to %u", least, most);
@@ -120,7 +121,7 @@ enum board_cycle_result pik_submit(struct pik *b, struct board_cycle *c, int64_t
     }
     b->cycle = c;
     if (!c->write) c->data = word_at(b, c->address);
-    bus_lines_begin(&b->trace, &bus_lines, c, c->data, t_ns);
+    bus_lines_begin(&b->base.trace, &bus_lines, c, c->data, t_ns);
     sched_at(b->sched, &b->cycle_end, t_ns + (c->strobe_ns ? c->strobe_ns : b->profile.strobe_ns));
     return BOARD_CYCLE_OK;
 }
@@ -132,7 +133,7 @@ void pik_bus_cut(struct pik *b, int64_t t_ns)
     b->cycle = NULL;
     sched_cancel(b->sched, &b->cycle_end);
     b->counters.cycles_refused++;
-    bus_lines_end(&b->trace, &bus_lines, t_ns);
+    bus_lines_end(&b->base.trace, &bus_lines, t_ns);
     c->done(c->ctx, c, BOARD_CYCLE_OFF, t_ns);
 }
 

@@ -109,10 +109,11 @@ static const struct board_node_type type = {.device = &pik_device,
                                             .serial = serial_of,
                                             .period_ns = period_ns};
 
-static void init_can(void *can, const struct board_can_cfg *cfg, void *board, struct can_bus *bus, struct sched *s)
+static void init_can(void *can, const struct board_can_cfg *cfg, struct board *board, struct can_bus *bus,
+                     struct sched *s)
 {
     board_node_init(can, &type, cfg, board, bus, s);
-    pik_attach(board, &(struct pik_host){.ctx = can, .reading = on_reading, .saturated = on_saturated});
+    pik_attach((struct pik *)board, &(struct pik_host){.ctx = can, .reading = on_reading, .saturated = on_saturated});
 }
 
 const struct board_can pik_can_side = {.size = sizeof(struct pik_can),

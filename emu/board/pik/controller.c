@@ -152,10 +152,10 @@ void pik_reset(struct pik *b, int64_t t_ns)
     pik_latch_restart(b, t_ns);
 }
 
-void pik_listen(struct pik *b, bool on)
+void pik_observe(struct pik *b, bool on)
 {
-    if (on && !b->heard) b->heard_ns = b->sched->now_ns; /* earlier events are not notified */
-    b->heard = on;
+    if (on && !b->base.observed) b->heard_ns = b->sched->now_ns; /* earlier events are not notified */
+    b->base.observed = on;
 }
 
 /* ---- faults ---- */

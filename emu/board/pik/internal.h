@@ -22,7 +22,7 @@ uint64_t pik_count_minus(const struct pik_channel *c);
 
 static inline void pik_notify_event(const struct pik *b, enum pik_event e, int64_t t_ns)
 {
-    if (b->heard) b->io.event(b->io.ctx, e, t_ns);
+    if (b->base.observed) b->io.event(b->io.ctx, e, t_ns);
 }
 
 /* pik/specimen.c */

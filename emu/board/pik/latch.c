@@ -10,7 +10,7 @@ int64_t pik_period_ns(const struct pik *b)
 
 static void latch_line(struct pik *b, bool level, int64_t t_ns)
 {
-    trace_set(&b->trace, PIK_LINE_LATCH, level, t_ns);
+    trace_set(&b->base.trace, PIK_LINE_LATCH, level, t_ns);
 }
 
 static void latch_end(void *ctx, int64_t t_ns)
@@ -38,7 +38,7 @@ void pik_latch_now(struct pik *b, int64_t t_ns)
     r->status = PIK_ST_NEW;
     for (unsigned i = 0; i < PIK_AXES; i++) {
         struct pik_channel *c = &b->channel[i];
-        latch_channel(c, r, i, b->frozen);
+        latch_channel(c, r, i, b->base.faults & PIK_FAULT_FROZEN_WORDS);
         if (c->saturated) r->status |= (uint8_t)(PIK_ST_SATURATED_X << i);
         c->saturated = false;
     }

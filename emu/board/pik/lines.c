@@ -41,14 +41,14 @@ static uint64_t stuck_level(const struct pik *b)
 
 void pik_lines_rest(struct pik *b, bool power, int64_t t_ns)
 {
-    trace_put(&b->trace, EVERY_LINE, power ? REST_HIGH | stuck_level(b) : 0, t_ns);
+    trace_put(&b->base.trace, EVERY_LINE, power ? REST_HIGH | stuck_level(b) : 0, t_ns);
 }
 
 /* A level that was there before the trace can take an edge is shown from the first instant that it can. */
 static void put_from(struct pik *b, uint64_t lines, bool level, int64_t t_ns)
 {
-    const int64_t from_ns = t_ns > b->trace.done_ns ? t_ns : b->trace.done_ns;
-    trace_steps(&b->trace, &(struct trace_step){from_ns, lines, level ? lines : 0}, 1);
+    const int64_t from_ns = t_ns > b->base.trace.done_ns ? t_ns : b->base.trace.done_ns;
+    trace_steps(&b->base.trace, &(struct trace_step){from_ns, lines, level ? lines : 0}, 1);
 }
 
 void pik_lines_pulse(struct pik *b, unsigned axis, int64_t from_ns)
@@ -63,7 +63,7 @@ void pik_lines_pulse(struct pik *b, unsigned axis, int64_t from_ns)
 
 void pik_lines_stuck(struct pik *b, unsigned axis, int64_t t_ns)
 {
-    if (b->on) trace_put(&b->trace, STUCK_OF(axis), stuck_level(b), t_ns);
+    if (b->on) trace_put(&b->base.trace, STUCK_OF(axis), stuck_level(b), t_ns);
 }
 
 /* ---- CLK ---- */
@@ -72,7 +72,7 @@ void pik_lines_stuck(struct pik *b, unsigned axis, int64_t t_ns)
 static int64_t report_clk(struct pik *b, int64_t t_ns)
 {
     const int64_t period = b->profile.grid;
-    if (!b->on || !trace_watched(&b->trace, BIT(PIK_LINE_CLK))) return t_ns;
+    if (!b->on || !trace_watched(&b->base.trace, BIT(PIK_LINE_CLK))) return t_ns;
     for (unsigned n = 0;; n++, b->clk_shown_tick += period) {
         const int64_t rise_ns = pik_tick_ns(b, b->clk_shown_tick);
         if (rise_ns > t_ns) return t_ns;
@@ -80,7 +80,7 @@ static int64_t report_clk(struct pik *b, int64_t t_ns)
         const int64_t fall_ns = rise_ns + (pik_tick_ns(b, b->clk_shown_tick + period) - rise_ns) / 2;
         const struct trace_step steps[2] = {{rise_ns, BIT(PIK_LINE_CLK), BIT(PIK_LINE_CLK)},
                                             {fall_ns, BIT(PIK_LINE_CLK), 0}};
-        trace_steps(&b->trace, steps, 2);
+        trace_steps(&b->base.trace, steps, 2);
     }
 }
 
@@ -98,7 +98,7 @@ void pik_lines_clock(struct pik *b, int64_t t_ns)
 
 static void wake_clk(struct pik *b)
 {
-    const int64_t period = b->profile.grid, known_ns = b->trace.done_ns;
+    const int64_t period = b->profile.grid, known_ns = b->base.trace.done_ns;
     const int64_t from_ns = known_ns > b->clk.t0_ns ? known_ns : b->clk.t0_ns;
     b->clk_shown_tick = (pik_tick_at(b, from_ns) + period) / period * period;
     put_from(b, BIT(PIK_LINE_CLK), false, known_ns); /* low until its next rise */
@@ -118,14 +118,12 @@ static void wake_lines(void *ctx, uint64_t mask)
 {
     struct pik *b = ctx;
     if (!b->on) return;
-    if (mask & BIT(PIK_LINE_CLK) && !trace_watched(&b->trace, BIT(PIK_LINE_CLK))) wake_clk(b);
+    if (mask & BIT(PIK_LINE_CLK) && !trace_watched(&b->base.trace, BIT(PIK_LINE_CLK))) wake_clk(b);
     if (mask & PIK_PULSE_LINES) wake_pulses(b);
 }
 
 void pik_lines_init(struct pik *b)
 {
-    trace_init(&b->trace);
-    for (unsigned i = 0; i < PIK_LINES; i++) (void)trace_add(&b->trace, pik_lines[i].name, pik_lines[i].level);
-    line_faults_init(&b->line, &b->trace);
-    b->trace.source = (struct trace_source){.wake = wake_lines, .report = report_lines, .ctx = b};
+    board_init(&b->base, pik_lines, PIK_LINES);
+    b->base.trace.source = (struct trace_source){.wake = wake_lines, .report = report_lines, .ctx = b};
 }

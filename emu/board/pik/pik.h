@@ -12,13 +12,9 @@
 #include "base/clk.h"
 #include "base/sched.h"
 #include "board/afe.h"
-#include "board/bus.h"
-#include "board/cfg.h"
-#include "board/part.h"
+#include "board/board.h"
 #include "board/pik/converter.h"
 #include "board/pik/profile.h"
-#include "trace/line_fault.h"
-#include "trace/trace.h"
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -105,6 +101,11 @@ struct pik_counters {
 
 #include "board/pik/state.h"
 
+/* Faults of the controller: bits of board.faults. */
+enum pik_controller_fault {
+    PIK_FAULT_FROZEN_WORDS = 4 /* the words of the reading before, over and over */
+};
+
 void pik_init(struct pik *b, const struct pik_profile *p, const struct board_cfg *cfg, const struct board_io *io,
               struct sched *s);
 void pik_attach(struct pik *b, const struct pik_host *host); /* copied */
@@ -112,7 +113,7 @@ void pik_power_up(struct pik *b, int64_t t_ns);
 void pik_power_down(struct pik *b, int64_t t_ns);
 void pik_reset(struct pik *b, int64_t t_ns);              /* counters and registers; the integrators run on */
 void pik_sample_until(struct pik *b, int64_t t_ns);       /* takes its inputs, and counts what they give */
-void pik_listen(struct pik *b, bool on);                  /* subscribes to io.event */
+void pik_observe(struct pik *b, bool on);                 /* subscribes to io.event */
 void pik_clock(struct pik *b, int32_t ppm, int64_t t_ns); /* the generator is off by so much, beside its own error */
 void pik_stick(struct pik *b, unsigned axis, const struct chip_fault *f, int64_t t_ns);
 bool pik_flip(struct pik *b, unsigned axis, unsigned reg, uint8_t mask, int64_t t_ns);
@@ -120,7 +121,7 @@ bool pik_flip(struct pik *b, unsigned axis, unsigned reg, uint8_t mask, int64_t 
 /* As board_bus.submit. */
 enum board_cycle_result pik_submit(struct pik *b, struct board_cycle *c, int64_t t_ns);
 const char *pik_register_name(unsigned address);
-void pik_wanted(const void *board, const struct board_cycle *c, enum board_cycle_result r, char *out,
+void pik_wanted(const struct board *board, const struct board_cycle *c, enum board_cycle_result r, char *out,
                 size_t cap);                /* as board_bus.wanted */
 int64_t pik_period_ns(const struct pik *b); /* of the readings, as the register has it */
 

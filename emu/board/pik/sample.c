@@ -65,7 +65,7 @@ uint64_t pik_count_minus(const struct pik_channel *c)
 static void advance_pulses(struct pik *b, unsigned i, int64_t tick, int64_t t_ns)
 {
     struct pik_axis *a = &b->channel[i].axis;
-    const bool watched = trace_watched(&b->trace, PIK_PULSE_LINES), each = b->heard || watched;
+    const bool watched = trace_watched(&b->base.trace, PIK_PULSE_LINES), each = b->base.observed || watched;
     for (int64_t next; each && (next = pik_axis_next(a)) <= tick;) {
         pik_axis_advance(a, next);
         const int64_t begun_ns = pik_tick_ns(b, next);

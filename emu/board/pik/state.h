@@ -28,17 +28,16 @@ struct pik_channel {
 };
 
 struct pik {
+    struct board base;
     struct pik_profile profile;
     struct board_cfg cfg;
     struct board_io io;
     struct pik_host host;
     struct sched *sched;
-    struct trace trace;
-    struct line_faults line;
     struct pik_specimen specimen;
     struct pik_channel channel[PIK_AXES];
     struct pik_counters counters;
-    bool on, heard, frozen;
+    bool on;
     int32_t clock_fault_ppm;
     /* time: tick first_tick lies at edge 0 of clk */
     struct clk clk;

@@ -43,19 +43,16 @@ static void cfg_default(struct board_cfg *cfg)
 
 /* ---- what is on it ---- */
 
-#define COUNT(field)                                                                                                   \
-    {                                                                                                                  \
-#field, offsetof(struct pmka_counters, field)                                                                  \
-    }
+#define COUNT(field) BOARD_COUNTER(pmka_counters, field, field)
 
 static const struct board_counter counters[] = {
     COUNT(readings),      COUNT(res),   COUNT(resets_plus), COUNT(resets_minus), COUNT(calibration_resets),
     COUNT(handovers),     COUNT(beats), COUNT(saturations), COUNT(clips),        COUNT(cycles),
     COUNT(cycles_refused)};
 
-static void adc_fault(void *board, unsigned part, const struct chip_fault *f, int64_t t_ns)
+static void adc_fault(struct board *board, unsigned part, const struct chip_fault *f, int64_t t_ns)
 {
-    struct pmka *b = board;
+    struct pmka *b = (struct pmka *)board;
     (void)part;
     (void)t_ns;
     b->adc_stuck = f->dout != CHIP_FREE;
@@ -63,9 +60,9 @@ static void adc_fault(void *board, unsigned part, const struct chip_fault *f, in
 }
 
 /* The ROM keeps its words without power, damaged or not. */
-static bool rom_flip(void *board, unsigned part, unsigned reg, uint8_t mask, int64_t t_ns)
+static bool rom_flip(struct board *board, unsigned part, unsigned reg, uint8_t mask, int64_t t_ns)
 {
-    struct pmka *b = board;
+    struct pmka *b = (struct pmka *)board;
     (void)part;
     (void)t_ns;
     b->rom[reg / 2] ^= (uint16_t)((unsigned)mask << (reg % 2 ? 8 : 0));
@@ -78,8 +75,7 @@ static const struct board_part parts[PARTS] = {
     [PART_CONTROLLER] = {.name = "controller",
                          .label = "board",
                          .offset = offsetof(struct pmka, counters),
-                         .counters = counters,
-                         .counter_count = sizeof counters / sizeof *counters},
+                         BOARD_COUNTERS(counters)},
     [PART_ADC] = {.name = "adc",
                   .label = "adc",
                   .faults = BOARD_FAULT_DOUT,
@@ -96,48 +92,37 @@ static const struct board_part parts[PARTS] = {
 
 BOARD_LIFE(pmka);
 
-static bool ready(const void *board)
+static bool ready(const struct board *board)
 {
-    return pmka_ready(board);
+    return pmka_ready((const struct pmka *)board);
 }
 
-static void wrong(void *board, uint32_t wrongs)
+static void set_faults(struct board *board, uint32_t faults)
 {
-    pmka_wrong(board, wrongs);
+    pmka_set_faults((struct pmka *)board, faults);
 }
 
-static void listen(void *board, bool on)
-{
-    struct pmka *b = board;
-    b->told = on && b->io.event;
-}
-
-static struct afe *afe(void *board, unsigned axis)
+static struct afe *afe(struct board *board, unsigned axis)
 {
     return &((struct pmka *)board)->afe[axis];
 }
 
-static enum board_cycle_result submit(void *board, struct board_cycle *c, int64_t t_ns)
-{
-    return pmka_submit(board, c, t_ns);
-}
-
 /* ---- what faults are measured by ---- */
 
-static unsigned pulses(const void *board)
+static unsigned pulses(const struct board *board)
 {
     (void)board;
     return PMKA_INTS;
 }
 
 /* That a reset in each period balances. */
-static double range_v(const void *board)
+static double range_v(const struct board *board)
 {
     return ((const struct pmka *)board)->profile.uref_v;
 }
 
 /* One in a second. */
-static double code_v(const void *board)
+static double code_v(const struct board *board)
 {
     return code_vs(&((const struct pmka *)board)->profile);
 }
@@ -172,9 +157,9 @@ static void put_integrator(const struct pmka *b, unsigned i, board_truth_fn *put
 }
 
 /* At the temperature of the present period. */
-static void truth(const void *board, board_truth_fn *put, void *ctx)
+static void truth(const struct board *board, board_truth_fn *put, void *ctx)
 {
-    const struct pmka *b = board;
+    const struct pmka *b = (const struct pmka *)board;
     put(ctx, "temp_noise_scale", b->cfg.temp_noise_scale);
     put(ctx, "uref_v", b->uref_v);
     put(ctx, "adc_offset_lsb", b->specimen.adc_offset_lsb);
@@ -211,12 +196,12 @@ static void add_rotation(struct sha256 *s, const struct pmka_rotation *r)
     board_digest_u64(s, (uint64_t)r->beat_periods << 32 | r->zero_periods);
 }
 
-static void digest(const void *board, struct sha256 *s)
+static void digest(const struct board *board, struct sha256 *s)
 {
-    const struct pmka *b = board;
+    const struct pmka *b = (const struct pmka *)board;
     board_digest_u64(s, (uint64_t)b->life << 32 | (uint64_t)b->stage);
     board_digest_u64(s, (uint64_t)b->set_ns);
-    board_digest_u64(s, (uint64_t)b->next.seq << 32 | b->wrongs);
+    board_digest_u64(s, (uint64_t)b->next.seq << 32 | b->base.faults);
     board_digest_u64(s, (uint64_t)b->adc_stuck << 1 | b->adc_stuck_level);
     for (unsigned i = 0; i < PMKA_INTS; i++) add_channel(s, &b->channel[i]);
     for (unsigned i = 0; i < PMKA_INTS; i++)
@@ -233,11 +218,20 @@ static void digest(const void *board, struct sha256 *s)
     sha256_add(s, &b->counters, sizeof b->counters);
 }
 
-BOARD_STROBE(pmka);
+BOARD_BUS(pmka);
 
 static const struct board_bus bus = {
     .submit = submit, .addresses = PMKA_ADDRESSES, .name = pmka_register_name, .strobe = strobe, .wanted = pmka_wanted};
 static const char *const port_lines[] = {"KL1", "KL2", "KL3", "KL4", "SH", "MUX0", "MUX1", NULL};
+
+static const struct board_controller_fault controller_faults[] = {
+    {"controller.frozen_words", PMKA_FAULT_FROZEN_WORDS},
+    {"controller.capacitor", PMKA_FAULT_CAPACITOR},
+    {"controller.stuck_reset", PMKA_FAULT_STUCK_RESET},
+    {"controller.stuck_key", PMKA_FAULT_STUCK_KEY},
+    {NULL, 0},
+};
+static const char *const capabilities[] = {"temp_noise_scale", NULL};
 
 const struct board_type pmka_board = {
     .name = "pmka",
@@ -251,7 +245,7 @@ const struct board_type pmka_board = {
     .profile_check = pmka_profile_check,
     .about = about,
     .cfg_default = cfg_default,
-    .knobs = BOARD_KNOB_TEMP_NOISE,
+    .capabilities = capabilities,
     .node = 7,
     .period_ns = period_ns,
     .lines = pmka_lines,
@@ -266,19 +260,12 @@ const struct board_type pmka_board = {
     .event_count = PMKA_EVENTS,
     .parts = parts,
     .part_count = PARTS,
-    .wrongs = BOARD_WRONG_FROZEN_WORDS | BOARD_WRONG_CAPACITOR | BOARD_WRONG_STUCK_RESET | BOARD_WRONG_STUCK_KEY,
+    .controller_faults = controller_faults,
     .can = &pmka_can,
     .bus = &bus,
-    .init = init,
-    .power_up = power_up,
-    .power_down = power_down,
-    .reset = reset,
+    BOARD_LIFE_FUNCTIONS,
     .ready = ready,
-    .sample_until = sample_until,
-    .wrong = wrong,
-    .listen = listen,
-    .trace = trace,
-    .line = line,
+    .set_faults = set_faults,
     .afe = afe,
     .digest = digest,
     .truth = truth,

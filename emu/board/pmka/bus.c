@@ -175,9 +175,10 @@ static void expected_value(const struct pmka *b, unsigned address, char *out, si
                        INDEX_ROM + PMKA_ROM_WORDS - 1);
 }
 
-void pmka_wanted(const void *board, const struct board_cycle *c, enum board_cycle_result r, char *out, size_t cap)
+void pmka_wanted(const struct board *board, const struct board_cycle *c, enum board_cycle_result r, char *out,
+                 size_t cap)
 {
-    if (r == BOARD_CYCLE_BAD_VALUE) expected_value(board, c->address, out, cap);
+    if (r == BOARD_CYCLE_BAD_VALUE) expected_value((const struct pmka *)board, c->address, out, cap);
     else (void)snprintf(out, cap, "STATUS (08h) has bit 0 when the first reading is there");
 }
 
@@ -208,7 +209,7 @@ enum board_cycle_result pmka_submit(struct pmka *b, struct board_cycle *c, int64
     }
     b->bus.cycle = c;
     if (!c->write) b->bus.answer = registers[c->address].read(b, c->address);
-    bus_lines_begin(&b->trace, &bus_lines, c, c->write ? c->data : b->bus.answer, t_ns);
+    bus_lines_begin(&b->base.trace, &bus_lines, c, c->write ? c->data : b->bus.answer, t_ns);
     sched_at(b->sched, &b->bus.end, t_ns + (c->strobe_ns ? c->strobe_ns : b->profile.strobe_ns));
     return BOARD_CYCLE_OK;
 }
@@ -217,7 +218,7 @@ static void finish_cycle(struct pmka *b, enum board_cycle_result r, int64_t t_ns
 {
     struct board_cycle *c = b->bus.cycle;
     b->bus.cycle = NULL;
-    if (b->life != PMKA_OFF) bus_lines_end(&b->trace, &bus_lines, t_ns);
+    if (b->life != PMKA_OFF) bus_lines_end(&b->base.trace, &bus_lines, t_ns);
     if (r == BOARD_CYCLE_OK) b->counters.cycles++;
     else b->counters.cycles_refused++;
     if (c->done) c->done(c->ctx, c, r, t_ns);

@@ -90,10 +90,11 @@ static const struct board_node_type type = {.device = &pmka_device,
                                             .serial = serial_of,
                                             .period_ns = period_ns};
 
-static void init_can(void *can, const struct board_can_cfg *cfg, void *board, struct can_bus *bus, struct sched *s)
+static void init_can(void *can, const struct board_can_cfg *cfg, struct board *board, struct can_bus *bus,
+                     struct sched *s)
 {
     board_node_init(can, &type, cfg, board, bus, s);
-    pmka_attach(board, &(struct pmka_host){.ctx = can, .reading = on_reading});
+    pmka_attach((struct pmka *)board, &(struct pmka_host){.ctx = can, .reading = on_reading});
 }
 
 const struct board_can pmka_can = {.size = sizeof(struct pmka_can),

@@ -126,7 +126,7 @@ static void begin_set(struct pmka *b, int64_t t_ns)
 static void end_set(struct pmka *b, int64_t t_ns)
 {
     pmka_notify_event(b, PMKA_EV_READING, t_ns);
-    if (b->wrongs & BOARD_WRONG_FROZEN_WORDS && b->any) memcpy(b->next.code, b->latest.code, sizeof b->next.code);
+    if (b->base.faults & PMKA_FAULT_FROZEN_WORDS && b->any) memcpy(b->next.code, b->latest.code, sizeof b->next.code);
     b->bus.overrun |= b->bus.fresh;
     b->bus.fresh = b->any = true;
     b->latest = b->next;
@@ -203,10 +203,8 @@ static void wake_lines(void *ctx, uint64_t mask)
 
 static void init_trace(struct pmka *b)
 {
-    trace_init(&b->trace);
-    b->trace.source = (struct trace_source){.wake = wake_lines, .ctx = b};
-    line_faults_init(&b->line, &b->trace);
-    for (unsigned i = 0; i < PMKA_LINES; i++) (void)trace_add(&b->trace, pmka_lines[i].name, pmka_lines[i].level);
+    board_init(&b->base, pmka_lines, PMKA_LINES);
+    b->base.trace.source = (struct trace_source){.wake = wake_lines, .ctx = b};
 }
 
 void pmka_init(struct pmka *b, const struct pmka_profile *p, const struct board_cfg *cfg, const struct board_io *io,
@@ -332,11 +330,11 @@ void pmka_sample_until(struct pmka *b, int64_t t_ns)
     for (unsigned a = 0; a < BOARD_AXES; a++) pmka_integrate_axis(b, a, t_ns);
 }
 
-void pmka_wrong(struct pmka *b, uint32_t wrongs)
+void pmka_set_faults(struct pmka *b, uint32_t faults)
 {
     const int64_t t_ns = b->sched->now_ns;
     pmka_sample_until(b, t_ns);
-    b->wrongs = wrongs;
-    b->channel[0].integrator.cap_left = wrongs & BOARD_WRONG_CAPACITOR ? 0.7 : 1.0;
+    b->base.faults = faults;
+    b->channel[0].integrator.cap_left = faults & PMKA_FAULT_CAPACITOR ? 0.7 : 1.0;
     if (b->life != PMKA_OFF) pmka_key_stuck(b, t_ns);
 }

@@ -6,12 +6,12 @@
 
 static inline void pmka_notify_event(const struct pmka *b, enum pmka_event e, int64_t t_ns)
 {
-    if (b->told) b->io.event(b->io.ctx, e, t_ns);
+    if (b->base.observed) b->io.event(b->io.ctx, e, t_ns);
 }
 
 static inline void pmka_line(struct pmka *b, unsigned line, bool level, int64_t t_ns)
 {
-    trace_set(&b->trace, line, level && b->life != PMKA_OFF, t_ns);
+    trace_set(&b->base.trace, line, level && b->life != PMKA_OFF, t_ns);
 }
 
 static inline int64_t pmka_half_ns(const struct pmka *b)
@@ -35,7 +35,7 @@ bool pmka_rotation_turns(const struct pmka *b);       /* a hand-over comes in th
 void pmka_release_axis(struct pmka *b, int64_t t_ns); /* K gives its axis back */
 void pmka_take_axis(struct pmka *b, int64_t t_ns);    /* K takes the next one */
 void pmka_keys_home(struct pmka *b, int64_t t_ns);    /* each axis on its own integrator */
-void pmka_key_stuck(struct pmka *b, int64_t t_ns);    /* b->wrongs has changed */
+void pmka_key_stuck(struct pmka *b, int64_t t_ns);    /* b->base.faults has changed */
 
 /* pmka/bus.c */
 void pmka_bus_init(struct pmka *b);

@@ -18,8 +18,6 @@
 #include "board/pmka/integrator.h"
 #include "board/pmka/profile.h"
 #include "board/pmka/rom.h"
-#include "trace/line_fault.h"
-#include "trace/trace.h"
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -95,6 +93,14 @@ struct pmka_host {
 
 #include "board/pmka/state.h" /* struct pmka, read-only outside the board's own files */
 
+/* Faults of the controller: bits of board.faults. */
+enum pmka_controller_fault {
+    PMKA_FAULT_FROZEN_WORDS = 4, /* the words of the period before, over and over */
+    PMKA_FAULT_CAPACITOR = 8,    /* the capacitor of integrator X has lost 30 % */
+    PMKA_FAULT_STUCK_RESET = 16, /* the positive reset of integrator X never ends */
+    PMKA_FAULT_STUCK_KEY = 32    /* the key of K never closes */
+};
+
 extern const char *const pmka_events[PMKA_EVENTS];
 extern const struct board_line pmka_lines[PMKA_LINES];
 
@@ -105,8 +111,8 @@ void pmka_power_up(struct pmka *b, int64_t t_ns); /* integrators empty, controll
 void pmka_power_down(struct pmka *b, int64_t t_ns);
 void pmka_reset(struct pmka *b, int64_t t_ns); /* of the controller; the integrators go on */
 void pmka_sample_until(struct pmka *b, int64_t t_ns);
-void pmka_wrong(struct pmka *b, uint32_t wrongs); /* enum board_wrong; outlives resets and power */
-bool pmka_ready(const struct pmka *b);            /* sampling */
+void pmka_set_faults(struct pmka *b, uint32_t faults); /* enum pmka_controller_fault; outlive resets and power */
+bool pmka_ready(const struct pmka *b);                 /* sampling */
 
 /* The program of the computer: the next hand-over leads to beat tau (1..5), the one out of work is calibrated so from then on
  * (of the present beat: from the next period on). False in autonomous mode. */
@@ -116,7 +122,7 @@ void pmka_set_mode(struct pmka *b, enum pmka_mode mode);
 /* Parallel bus: pmka/bus.c. */
 enum board_cycle_result pmka_submit(struct pmka *b, struct board_cycle *c, int64_t t_ns);
 const char *pmka_register_name(unsigned address);
-void pmka_wanted(const void *board, const struct board_cycle *c, enum board_cycle_result r, char *out,
+void pmka_wanted(const struct board *board, const struct board_cycle *c, enum board_cycle_result r, char *out,
                  size_t cap); /* as board_bus.wanted */
 #define PMKA_ADDRESSES 16u
 

@@ -42,7 +42,7 @@ bool pmka_rotation_turns(const struct pmka *b)
 /* The key of K may be stuck: the controller does not know. */
 static bool key_closes(const struct pmka *b, unsigned i)
 {
-    return !(i == PMKA_K && b->wrongs & BOARD_WRONG_STUCK_KEY);
+    return !(i == PMKA_K && b->base.faults & PMKA_FAULT_STUCK_KEY);
 }
 
 static void put_key_line(struct pmka *b, unsigned i, int64_t t_ns)

@@ -42,7 +42,7 @@ void pmka_integrate_axis(struct pmka *b, unsigned axis, int64_t t_ns)
 
 static void apply_reset(const struct pmka *b, struct pmka_channel *c, int64_t from_ns, int64_t until_ns)
 {
-    if (b->wrongs & BOARD_WRONG_STUCK_RESET && c == &b->channel[0]) {
+    if (b->base.faults & PMKA_FAULT_STUCK_RESET && c == &b->channel[0]) {
         pmka_int_reset(&c->integrator, PMKA_PLUS, b->uref_v, until_ns - from_ns);
         return;
     }
@@ -138,7 +138,7 @@ static int16_t to_code(struct pmka *b, double out_v, bool *clipped)
 
 static void report_step(struct pmka *b, int64_t t_ns, uint64_t lines, uint64_t level)
 {
-    trace_steps(&b->trace, &(struct trace_step){later_ns(t_ns, b->trace.done_ns), lines, level}, 1);
+    trace_steps(&b->base.trace, &(struct trace_step){later_ns(t_ns, b->base.trace.done_ns), lines, level}, 1);
 }
 
 /* Its end is known as it begins; should the board stop before, the lines fall the sooner. */
@@ -158,7 +158,7 @@ static void report_hold(struct pmka *b)
 void pmka_converter_wake(struct pmka *b, int64_t t_ns)
 {
     const int64_t begins_ns = b->sampled_ns + b->profile.hold_ns, ends_ns = b->sampled_ns + b->profile.convert_ns;
-    if (b->life != PMKA_RUNNING || t_ns >= ends_ns || trace_watched(&b->trace, SH | CONV)) return;
+    if (b->life != PMKA_RUNNING || t_ns >= ends_ns || trace_watched(&b->base.trace, SH | CONV)) return;
     report_hold(b);
     if (begins_ns > t_ns) return;
     sched_cancel(b->sched, &b->conversion);
@@ -180,7 +180,7 @@ static void hold_sample(struct pmka *b, unsigned i, int64_t t_ns)
     b->sampled_ns = t_ns;
     pmka_line(b, PMKA_LINE_MUX0, next & 1u, t_ns);
     pmka_line(b, PMKA_LINE_MUX1, next >> 1 & 1u, t_ns);
-    if (trace_watched(&b->trace, SH | CONV)) report_hold(b);
+    if (trace_watched(&b->base.trace, SH | CONV)) report_hold(b);
 }
 
 void pmka_sample(struct pmka *b, unsigned i, int64_t t_ns)

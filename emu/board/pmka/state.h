@@ -62,19 +62,16 @@ struct pmka_bus {
 };
 
 struct pmka {
+    struct board base;
     struct pmka_profile profile;
     struct board_cfg cfg;
     struct board_io io;
     struct pmka_host host;
     struct sched *sched;
-    struct trace trace;
-    struct line_faults line;
     struct afe afe[BOARD_AXES];
     struct pmka_specimen specimen;
     uint16_t rom[PMKA_ROM_WORDS];
     struct rng adc_noise, temp_noise;
-    uint32_t wrongs;
-    bool told; /* io.event has a subscriber */
     bool adc_stuck, adc_stuck_level;
     struct pmka_counters counters;
 

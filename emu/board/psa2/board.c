@@ -34,10 +34,7 @@ static void about(const void *profile, char *out, size_t cap)
 
 /* ---- what is on it ---- */
 
-#define OF(type, name, field)                                                                                          \
-    {                                                                                                                  \
-#name, offsetof(struct type, field)                                                                            \
-    }
+#define OF          BOARD_COUNTER
 #define ADC(field)  OF(ads1282, field, count.field)
 #define TADC(field) OF(ads1256, field, n.field)
 #define KPSA(field) OF(psa2_counters, field, field)
@@ -58,31 +55,30 @@ static const struct board_counter temp_counters[] = {
     OF(ads1256, bad_register, regs.bad_access), OF(ads1256, unmodelled_bit, regs.unimp_access), OF(ads1256, read_only_write, regs.ro_write),
 };
 // clang-format on
-#define COUNTERS(table) .counters = (table), .counter_count = sizeof(table) / sizeof *(table)
 
 enum { PART_KPSA, PART_ADC_X, PART_ADC_Y, PART_ADC_Z, PART_TADC, PARTS };
 
-static void adc_fault(void *board, unsigned part, const struct chip_fault *f, int64_t t_ns)
+static void adc_fault(struct board *board, unsigned part, const struct chip_fault *f, int64_t t_ns)
 {
     ads1282_fault(&((struct psa2 *)board)->adc[part - PART_ADC_X], f, t_ns);
 }
 
-static void tadc_fault(void *board, unsigned part, const struct chip_fault *f, int64_t t_ns)
+static void tadc_fault(struct board *board, unsigned part, const struct chip_fault *f, int64_t t_ns)
 {
     (void)part;
     ads1256_fault(&((struct psa2 *)board)->tadc, f, t_ns);
 }
 
 /* Registers without power hold nothing. */
-static bool adc_flip(void *board, unsigned part, unsigned reg, uint8_t mask, int64_t t_ns)
+static bool adc_flip(struct board *board, unsigned part, unsigned reg, uint8_t mask, int64_t t_ns)
 {
-    struct psa2 *b = board;
+    struct psa2 *b = (struct psa2 *)board;
     return b->mode != PSA2_OFF && ads1282_flip(&b->adc[part - PART_ADC_X], reg, mask, t_ns);
 }
 
-static bool tadc_flip(void *board, unsigned part, unsigned reg, uint8_t mask, int64_t t_ns)
+static bool tadc_flip(struct board *board, unsigned part, unsigned reg, uint8_t mask, int64_t t_ns)
 {
-    struct psa2 *b = board;
+    struct psa2 *b = (struct psa2 *)board;
     (void)part;
     return b->mode != PSA2_OFF && ads1256_flip(&b->tadc, reg, mask, t_ns);
 }
@@ -94,11 +90,11 @@ static const struct board_part parts[PARTS] = {
     [PART_KPSA] = {.name = "kpsa",
                    .label = "board",
                    .offset = offsetof(struct psa2, counters),
-                   COUNTERS(kpsa_counters)},
+                   BOARD_COUNTERS(kpsa_counters)},
 #define ADC_PART(nr, axis, faults_of, why_not)                                                                         \
     {                                                                                                                  \
         .name = "adc." axis, .label = "adc_" axis,                                                                     \
-        .offset = offsetof(struct psa2, adc) + (nr) * sizeof(struct ads1282), COUNTERS(adc_counters),                  \
+        .offset = offsetof(struct psa2, adc) + (nr) * sizeof(struct ads1282), BOARD_COUNTERS(adc_counters),            \
         .faults = (faults_of), .unless = (why_not), .registers = ADS1282_REGS, .fault = adc_fault, .flip = adc_flip    \
     }
     [PART_ADC_X] = ADC_PART(0, "x", EVERY_FAULT, NULL),
@@ -107,46 +103,33 @@ static const struct board_part parts[PARTS] = {
     [PART_TADC] = {.name = "tadc",
                    .label = "adc_temp",
                    .offset = offsetof(struct psa2, tadc),
-                   COUNTERS(temp_counters),
+                   BOARD_COUNTERS(temp_counters),
                    .faults = EVERY_FAULT,
                    .registers = ADS1256_REGS,
                    .fault = tadc_fault,
                    .flip = tadc_flip},
 };
 
-static unsigned pulses(const void *board)
+static unsigned pulses(const struct board *board)
 {
     return PSA2_WORDS * ((const struct psa2 *)board)->profile.word_bits;
-}
-
-static void wrong(void *board, uint32_t wrongs)
-{
-    const struct psa2_controller_fault f = {.skip_sync_t = wrongs & BOARD_WRONG_SKIP_SYNC_T,
-                                            .wrong_setup_order = wrongs & BOARD_WRONG_SETUP_ORDER,
-                                            .frozen_words = wrongs & BOARD_WRONG_FROZEN_WORDS};
-    psa2_fault_set(board, &f);
 }
 
 /* ---- life ---- */
 
 BOARD_LIFE(psa2);
 
-static bool ready(const void *board)
+static bool ready(const struct board *board)
 {
-    return psa2_ready(board);
+    return psa2_ready((const struct psa2 *)board);
 }
 
-static void listen(void *board, bool on)
-{
-    psa2_listen(board, on);
-}
-
-static struct afe *afe(void *board, unsigned axis)
+static struct afe *afe(struct board *board, unsigned axis)
 {
     return &((struct psa2 *)board)->afe[axis];
 }
 
-static void truth(const void *board, board_truth_fn *put, void *ctx)
+static void truth(const struct board *board, board_truth_fn *put, void *ctx)
 {
     const struct board_cfg *c = &((const struct psa2 *)board)->cfg;
     put(ctx, "temp_noise_scale", c->temp_noise_scale);
@@ -175,9 +158,9 @@ static void add_ads1256(struct sha256 *s, const struct ads1256 *a)
     board_digest_u64(s, (uint64_t)a->word);
 }
 
-static void digest(const void *board, struct sha256 *s)
+static void digest(const struct board *board, struct sha256 *s)
 {
-    const struct psa2 *b = board;
+    const struct psa2 *b = (const struct psa2 *)board;
     const struct psa2_counters *c = &b->counters;
     board_digest_u64(s, (uint64_t)b->mode << 32 | b->seq);
     board_digest_u64(s, (uint64_t)b->drd_a_ns);
@@ -191,6 +174,15 @@ static void digest(const void *board, struct sha256 *s)
 
 static const char *const port_lines[] = {"Int", "Data", "CLK", NULL};
 
+static const struct board_controller_fault controller_faults[] = {
+    {"controller.skip_sync_t", PSA2_FAULT_SKIP_SYNC_T},
+    {"controller.setup_order", PSA2_FAULT_SETUP_ORDER},
+    {"controller.frozen_words", PSA2_FAULT_FROZEN_WORDS},
+    {NULL, 0},
+};
+static const char *const capabilities[] = {"adc_chain", "temp_adc_offset_v", "temp_adc_gain_error", "temp_noise_scale",
+                                           NULL};
+
 const struct board_type psa2_board = {
     .name = "psa2",
     .title = "PSA-2",
@@ -202,7 +194,7 @@ const struct board_type psa2_board = {
     .profile_default = profile_default,
     .profile_check = profile_check,
     .about = about,
-    .knobs = BOARD_KNOB_CHAIN | BOARD_KNOB_TEMP_ADC | BOARD_KNOB_TEMP_NOISE,
+    .capabilities = capabilities,
     .node = 5,
     .frame_forms = 4,
     .period_ns = period_ns,
@@ -216,18 +208,10 @@ const struct board_type psa2_board = {
     .event_count = PSA2_EVENTS,
     .parts = parts,
     .part_count = PARTS,
-    .wrongs = BOARD_WRONG_SKIP_SYNC_T | BOARD_WRONG_SETUP_ORDER | BOARD_WRONG_FROZEN_WORDS,
+    .controller_faults = controller_faults,
     .can = &psa2_can,
-    .init = init,
-    .power_up = power_up,
-    .power_down = power_down,
-    .reset = reset,
+    BOARD_LIFE_FUNCTIONS,
     .ready = ready,
-    .sample_until = sample_until,
-    .wrong = wrong,
-    .listen = listen,
-    .trace = trace,
-    .line = line,
     .afe = afe,
     .digest = digest,
     .truth = truth,

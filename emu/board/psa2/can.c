@@ -468,11 +468,13 @@ struct psa2_can_port psa2_can_port(struct psa2 *b)
     return (struct psa2_can_port){b, board_submit, board_info};
 }
 
-static void init_can(void *can, const struct board_can_cfg *cfg, void *board, struct can_bus *bus, struct sched *s)
+static void init_can(void *can, const struct board_can_cfg *cfg, struct board *board, struct can_bus *bus,
+                     struct sched *s)
 {
-    const struct psa2_can_port port = psa2_can_port(board);
+    struct psa2 *b = (struct psa2 *)board;
+    const struct psa2_can_port port = psa2_can_port(b);
     psa2_can_init(can, cfg, &port, bus, s);
-    psa2_attach(board, &(struct psa2_host){.ctx = can, .frame = psa2_can_frame, .fault = psa2_can_fault});
+    psa2_attach(b, &(struct psa2_host){.ctx = can, .frame = psa2_can_frame, .fault = psa2_can_fault});
 }
 
 const struct board_can psa2_can = {.size = sizeof(struct psa2_can),

@@ -21,7 +21,7 @@ static void pulse_edge(struct psa2 *b, bool level, int64_t t_ns)
         ads1256_sync_pin(&b->tadc, level, t_ns);
         return;
     }
-    trace_set(&b->trace, PSA2_LINE_SYNC_A, level, t_ns);
+    trace_set(&b->base.trace, PSA2_LINE_SYNC_A, level, t_ns);
     for (unsigned i = 0; i < 3; i++) ads1282_sync_pin(&b->adc[i], level, t_ns);
 }
 
@@ -50,7 +50,7 @@ void psa2_pulse(struct psa2 *b, enum psa2_group group, void (*done)(struct psa2 
     const int64_t k = clk_count_at(&half, t_ns + 1);
     b->pulse.busy = true;
     b->pulse.active = false;
-    b->pulse.skipped = group == PSA2_TEMP && b->wrong.skip_sync_t;
+    b->pulse.skipped = group == PSA2_TEMP && b->base.faults & PSA2_FAULT_SKIP_SYNC_T;
     b->pulse.group = group;
     b->pulse.done = done;
     sched_at(b->sched, &b->pulse.ev, clk_edge_ns(&half, k | 1));
@@ -65,7 +65,7 @@ static void pulse_stop(struct psa2 *b, int64_t t_ns)
 
 static void res_pin(struct psa2 *b, bool level, int64_t t_ns)
 {
-    trace_set(&b->trace, PSA2_LINE_RES, level, t_ns);
+    trace_set(&b->base.trace, PSA2_LINE_RES, level, t_ns);
     for (unsigned i = 0; i < 3; i++) ads1282_reset_pin(&b->adc[i], level, t_ns);
     ads1256_reset_pin(&b->tadc, level, t_ns);
 }
@@ -170,7 +170,7 @@ static void read_done(struct psa2 *b, int64_t t_ns)
     struct psa2_frame *f = &b->latest; /* in place: copies of what has just been written are slow */
     f->seq = b->sample.seq;
     f->t_sample_ns = b->sample.t_ns;
-    if (!b->wrong.frozen_words) take_codes(b, f);
+    if (!(b->base.faults & PSA2_FAULT_FROZEN_WORDS)) take_codes(b, f);
     f->status = status_of(b, f);
     for (unsigned i = 0; i < PSA2_WORDS; i++) f->word[i] = 0; /* until it is sent */
     b->sample.reading = b->sample.overrun = b->temp.fresh = false;
@@ -273,7 +273,7 @@ static void accel_drdy(void *ctx, bool level, int64_t t_ns)
 {
     const struct psa2_port *port = ctx;
     struct psa2 *b = port->b;
-    if (!level) trace_set(&b->trace, PSA2_LINE_DOUTX + port->axis, spi_miso(&b->adc[port->axis].spi), t_ns);
+    if (!level) trace_set(&b->base.trace, PSA2_LINE_DOUTX + port->axis, spi_miso(&b->adc[port->axis].spi), t_ns);
     if (port->axis != 0) return;
     psa2_line(b, PSA2_LINE_DRD_A, level, t_ns);
     if (level || b->mode == PSA2_OFF) return;
@@ -321,11 +321,9 @@ static void wake(void *ctx, uint64_t mask)
 
 static void init_trace(struct psa2 *b)
 {
-    trace_init(&b->trace);
-    b->trace.source = (struct trace_source){.wake = wake, .ctx = b};
-    line_faults_init(&b->line, &b->trace);
-    for (unsigned i = 0; i < PSA2_LINES; i++) (void)trace_add(&b->trace, psa2_lines[i].name, psa2_lines[i].level);
-    b->idle_lines = b->trace.level;
+    board_init(&b->base, psa2_lines, PSA2_LINES);
+    b->base.trace.source = (struct trace_source){.wake = wake, .ctx = b};
+    b->idle_lines = b->base.trace.level;
 }
 
 static void init_accel(struct psa2 *b)
@@ -336,7 +334,7 @@ static void init_accel(struct psa2 *b)
                                     .clk_hz = b->profile.fclk_hz,
                                     .vref_v = b->profile.adc_vref_v,
                                     .noise_scale = b->cfg.adc_noise_scale,
-                                    .chain = b->cfg.adc_chain};
+                                    .chain = (enum ads1282_chain)b->cfg.adc_chain};
     for (unsigned i = 0; i < 3; i++) {
         b->port[i] = (struct psa2_port){b, i};
         const struct ads1282_io io = {
@@ -362,7 +360,7 @@ static void res_up(void *ctx, int64_t t_ns)
 {
     struct psa2 *b = ctx;
     b->mode = PSA2_SETUP;
-    b->reversed = b->wrong.wrong_setup_order;
+    b->reversed = b->base.faults & PSA2_FAULT_SETUP_ORDER;
     res_pin(b, true, t_ns);
     await_step(b, t_ns);
 }
@@ -417,7 +415,7 @@ static void light_up(struct psa2 *b, int64_t t_ns)
 {
     const uint32_t all = (UINT32_C(1) << PSA2_LINES) - 1;
     b->dark = false;
-    trace_steps(&b->trace, &(struct trace_step){t_ns, all, b->idle_lines}, 1);
+    trace_steps(&b->base.trace, &(struct trace_step){t_ns, all, b->idle_lines}, 1);
 }
 
 void psa2_power_up(struct psa2 *b, int64_t t_ns)
@@ -447,7 +445,7 @@ void psa2_power_down(struct psa2 *b, int64_t t_ns)
     stop_all(b, t_ns);
     for (unsigned i = 0; i < 3; i++) ads1282_power_off(&b->adc[i], t_ns);
     ads1256_power_off(&b->tadc, t_ns);
-    trace_steps(&b->trace, &(struct trace_step){t_ns, (UINT32_C(1) << PSA2_LINES) - 1, 0}, 1);
+    trace_steps(&b->base.trace, &(struct trace_step){t_ns, (UINT32_C(1) << PSA2_LINES) - 1, 0}, 1);
     b->stream = true;
     b->latest = (struct psa2_frame){0};
     psa2_tell(b, PSA2_EV_RES, t_ns);
@@ -458,16 +456,6 @@ void psa2_power_down(struct psa2 *b, int64_t t_ns)
 void psa2_attach(struct psa2 *b, const struct psa2_host *h)
 {
     b->host = *h;
-}
-
-void psa2_listen(struct psa2 *b, bool on)
-{
-    b->heard = on && b->io.event;
-}
-
-void psa2_fault_set(struct psa2 *b, const struct psa2_controller_fault *f)
-{
-    b->wrong = *f;
 }
 
 bool psa2_ready(const struct psa2 *b)

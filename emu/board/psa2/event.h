@@ -26,11 +26,11 @@ const char *psa2_event_name(enum psa2_event e);
 /* Of that name, or -1. */
 int psa2_event_find(const char *name);
 
-/* What the controller KPSA does wrong, while it does. */
-struct psa2_controller_fault {
-    bool skip_sync_t;       /* never a pulse on SYNC_T: temperature words come every data period, settled or not */
-    bool wrong_setup_order; /* the set-up's steps of each data-ready event in reverse order; from the next Res on */
-    bool frozen_words;      /* the codes of the frame before, over and over; number and time go on */
+/* Faults of the controller: bits of board.faults. */
+enum psa2_controller_fault {
+    PSA2_FAULT_SKIP_SYNC_T = 1, /* never a pulse on SYNC_T: temperature words come every data period, settled or not */
+    PSA2_FAULT_SETUP_ORDER = 2, /* the set-up's steps of each data-ready event in reverse order; from the next Res on */
+    PSA2_FAULT_FROZEN_WORDS = 4 /* the codes of the frame before, over and over; number and time go on */
 };
 
 #endif

@@ -40,7 +40,7 @@ static void report_word(struct psa2 *b, int64_t until_ns)
     const struct clk_step one = o->one;
     struct clk_pos at = o->at;
     o->at = clk_on(o->at, &o->word_gap);
-    struct trace_step *const step = trace_room(&b->trace, 3 * 32 + 1), *p = step;
+    struct trace_step *const step = trace_room(&b->base.trace, 3 * 32 + 1), *p = step;
     if (!step) return;
     uint64_t level = (uint64_t)word << PSA2_LINE_DATA; /* beside DATA it means nothing */
     uint64_t changes = word ^ (uint64_t)word << 1;     /* DATA rests low before the first bit and after the last */
@@ -54,11 +54,11 @@ static void report_word(struct psa2 *b, int64_t until_ns)
     }
     *p++ = (struct trace_step){at.t_ns, changes & 1 ? DATA : 0, 0};
     if (at.t_ns <= until_ns) {
-        trace_commit_run(&b->trace, (unsigned)(p - step), CLK | DATA);
+        trace_commit_run(&b->base.trace, (unsigned)(p - step), CLK | DATA);
         return;
     }
     while (p > step && p[-1].t_ns > until_ns) p--;
-    trace_commit(&b->trace, (unsigned)(p - step));
+    trace_commit(&b->base.trace, (unsigned)(p - step));
 }
 
 static void skip_word(struct psa2_out *o)
@@ -70,7 +70,7 @@ static void skip_word(struct psa2_out *o)
 static void report_int(struct psa2 *b, int64_t t_ns)
 {
     struct psa2_out *o = &b->out;
-    trace_set(&b->trace, PSA2_LINE_INT, false, t_ns);
+    trace_set(&b->base.trace, PSA2_LINE_INT, false, t_ns);
     o->watched_words = 0;
     o->at = clk_on(o->start, &o->lead);
 }
@@ -97,9 +97,9 @@ void psa2_out_wake(struct psa2 *b, int64_t t_ns)
     if (!o->busy || o->watched_words >= 0 || o->word.queued) return;
     int64_t next_ns = o->f.t_int_fall_ns;
     if (next_ns <= t_ns) {
-        const int64_t known_ns = b->trace.done_ns;
-        if (next_ns < known_ns) trace_set(&b->trace, PSA2_LINE_INT, false, known_ns); /* a level, no edge */
-        else trace_steps(&b->trace, &(struct trace_step){next_ns, UINT32_C(1) << PSA2_LINE_INT, 0}, 1);
+        const int64_t known_ns = b->base.trace.done_ns;
+        if (next_ns < known_ns) trace_set(&b->base.trace, PSA2_LINE_INT, false, known_ns); /* a level, no edge */
+        else trace_steps(&b->base.trace, &(struct trace_step){next_ns, UINT32_C(1) << PSA2_LINE_INT, 0}, 1);
         o->watched_words = 0;
         o->at = clk_on(o->start, &o->lead);
         while ((unsigned)o->watched_words < PSA2_WORDS && o->at.t_ns < known_ns) skip_word(o);
@@ -118,7 +118,7 @@ static void finish_watched(struct psa2 *b, int64_t t_ns)
     if (o->watched_words < 0) return;
     while ((unsigned)o->watched_words < PSA2_WORDS && o->at.t_ns <= t_ns) report_word(b, t_ns);
     const uint32_t idle = b->mode == PSA2_OFF ? 0 : UINT32_C(1) << PSA2_LINE_INT;
-    trace_steps(&b->trace, &(struct trace_step){t_ns, out_lines, idle}, 1);
+    trace_steps(&b->base.trace, &(struct trace_step){t_ns, out_lines, idle}, 1);
     o->watched_words = -1;
 }
 
@@ -167,8 +167,8 @@ void psa2_out_start(struct psa2 *b, int64_t t_ns)
     f->t_int_rise_ns = clk_on(o->start, &o->frame).t_ns;
     pack_words(&b->profile, f);
     sched_at(b->sched, &o->rise, f->t_int_rise_ns);
-    if (trace_watched(&b->trace, out_lines)) sched_at(b->sched, &o->word, f->t_int_fall_ns);
-    if (b->heard) sched_at(b->sched, &o->fall, f->t_int_fall_ns);
+    if (trace_watched(&b->base.trace, out_lines)) sched_at(b->sched, &o->word, f->t_int_fall_ns);
+    if (b->base.observed) sched_at(b->sched, &o->fall, f->t_int_fall_ns);
     o->f = *f;
 }
 

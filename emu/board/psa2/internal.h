@@ -12,13 +12,13 @@ void psa2_service(struct psa2 *b, int64_t t_ns);
 
 static inline void psa2_tell(const struct psa2 *b, enum psa2_event e, int64_t t_ns)
 {
-    if (b->heard) b->io.event(b->io.ctx, e, t_ns);
+    if (b->base.observed) b->io.event(b->io.ctx, e, t_ns);
 }
 
 /* A line that follows the controller or a converter: without power all are low. */
 static inline void psa2_line(struct psa2 *b, enum psa2_line line, bool level, int64_t t_ns)
 {
-    trace_set(&b->trace, line, level && b->mode != PSA2_OFF, t_ns);
+    trace_set(&b->base.trace, line, level && b->mode != PSA2_OFF, t_ns);
 }
 
 /* Whether span_ns from now on end before the next DRD_A, or no period is long enough for them, or no data come. */

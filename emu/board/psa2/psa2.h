@@ -11,14 +11,11 @@
 #include "base/clk.h"
 #include "base/sched.h"
 #include "board/afe.h"
-#include "board/cfg.h"
-#include "board/part.h"
+#include "board/board.h"
 #include "board/psa2/event.h"
 #include "board/psa2/profile.h"
 #include "chip/ads1256/ads1256.h"
 #include "chip/ads1282/ads1282.h"
-#include "trace/line_fault.h"
-#include "trace/trace.h"
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -116,7 +113,6 @@ struct psa2_counters {
 void psa2_init(struct psa2 *b, const struct psa2_profile *p, const struct board_cfg *cfg, const struct board_io *io,
                struct sched *s);
 void psa2_attach(struct psa2 *b, const struct psa2_host *h); /* from the next frame on; no one after psa2_init() */
-void psa2_listen(struct psa2 *b, bool on); /* io->event is reported; a frame that is about to begin may begin untold */
 void psa2_power_up(struct psa2 *b, int64_t t_ns); /* supplies good: chips power up, Res released, set-up begins */
 void psa2_reset(struct psa2 *b, int64_t t_ns);    /* a pulse on Res */
 
@@ -124,8 +120,6 @@ void psa2_reset(struct psa2 *b, int64_t t_ns);    /* a pulse on Res */
  * controller forget everything but the counters. psa2_power_up() begins again. Without power it does nothing. */
 void psa2_power_down(struct psa2 *b, int64_t t_ns);
 
-/* From now on; all false: none. Outlives resets and power. */
-void psa2_fault_set(struct psa2 *b, const struct psa2_controller_fault *f);
 bool psa2_ready(const struct psa2 *b);                /* the set-up has been carried out */
 void psa2_stream(struct psa2 *b, bool on);            /* frames on the line and to the host; on after power-up */
 void psa2_sample_until(struct psa2 *b, int64_t t_ns); /* the converters take their inputs up to now */

@@ -93,7 +93,7 @@ void psa2_spi_start(struct psa2 *b, const struct psa2_xfer *x, int64_t t_ns)
     s->at = 0;
     memset(s->rx, 0, sizeof s->rx);
     if (x->group == PSA2_TEMP) {
-        trace_set(&b->trace, PSA2_LINE_CST, false, t_ns);
+        trace_set(&b->base.trace, PSA2_LINE_CST, false, t_ns);
         ads1256_cs_pin(&b->tadc, false, t_ns);
     }
     /* One SClk period first: DOut is valid within 100 ns of DRD_A, DIn needs its set-up. */
@@ -156,7 +156,7 @@ static void report_byte(struct psa2 *b, uint32_t next)
     const uint32_t on_fall = clocks_accel(b) ? accel_lines & ~sclk : 0;
     const uint32_t on_rise = temp ? temp_lines & ~sclk : 0;
     const uint32_t accel = accel_bytes(s), temps = temp_bytes(s);
-    struct trace_step *const step = trace_room(&b->trace, HALF_BYTE + 2), *p = step;
+    struct trace_step *const step = trace_room(&b->base.trace, HALF_BYTE + 2), *p = step;
     if (!step) return;
     const struct clk_step one = s->one;
     struct clk_pos at = clk_on(s->first, &s->back);
@@ -172,7 +172,7 @@ static void report_byte(struct psa2 *b, uint32_t next)
     }
     at = clk_on(at, &one);
     if (temp && s->at + 1u == s->x.count) *p++ = (struct trace_step){at.t_ns, UINT32_C(1) << PSA2_LINE_DINT, 0};
-    trace_commit(&b->trace, (unsigned)(p - step));
+    trace_commit(&b->base.trace, (unsigned)(p - step));
 }
 
 /* The same byte unwatched: only where the lines come to rest, for whoever looks later. */
@@ -189,7 +189,7 @@ static void keep_levels(struct psa2 *b, int64_t t_ns)
         lines |= temp_lines;
         level |= (temp_bytes(s) >> 8 & 1) << PSA2_LINE_DOUTT | (last ? 0 : temp_bytes(s) & 1) << PSA2_LINE_DINT;
     }
-    trace_put(&b->trace, lines, level, t_ns);
+    trace_put(&b->base.trace, lines, level, t_ns);
 }
 
 static void end_xfer(struct psa2 *b, int64_t t_ns)
@@ -201,7 +201,7 @@ static void end_xfer(struct psa2 *b, int64_t t_ns)
 static void end_byte(struct psa2 *b, int64_t t_ns)
 {
     struct psa2_spi *s = &b->spi;
-    if (trace_watched(&b->trace, accel_lines | temp_lines)) report_byte(b, dout_now(b));
+    if (trace_watched(&b->base.trace, accel_lines | temp_lines)) report_byte(b, dout_now(b));
     else keep_levels(b, t_ns);
     const int64_t next_ns = t_ns + s->x.gap_ns[s->at];
     if (++s->at < s->x.count) {
@@ -218,7 +218,7 @@ static void pass_bytes(struct psa2 *b)
 {
     struct psa2_spi *s = &b->spi;
     for (; s->at + 1u < s->x.count; s->at++, s->first = clk_on(s->first, &s->byte)) {
-        if (!trace_watched(&b->trace, accel_lines)) continue;
+        if (!trace_watched(&b->base.trace, accel_lines)) continue;
         uint32_t next = 0;
         for (unsigned i = 0; i < 3; i++) next |= (uint32_t)s->rx[i][s->at + 1] >> 7 << i;
         report_byte(b, next);
@@ -271,7 +271,7 @@ static void cst_up(struct psa2 *b, int64_t t_ns)
 {
     ads1256_cs_pin(&b->tadc, true, t_ns);
     psa2_line(b, PSA2_LINE_CST, true, t_ns);
-    trace_set(&b->trace, PSA2_LINE_DOUTT, false, t_ns); /* high impedance, drawn low */
+    trace_set(&b->base.trace, PSA2_LINE_DOUTT, false, t_ns); /* high impedance, drawn low */
 }
 
 static void rest(struct psa2 *b, int64_t t_ns)

@@ -95,15 +95,13 @@ struct psa2_port { /* which converter a callback came from */
 };
 
 struct psa2 {
+    struct board base;
     struct psa2_profile profile;
     struct board_cfg cfg;
     struct board_io io;
     struct psa2_host host;
-    bool heard; /* somebody listens to io.event */
     struct sched *sched;
-    struct trace trace;      /* lines numbered by enum psa2_line */
-    struct line_faults line; /* line_fault_add(&b->line, ...): by whoever injects them */
-    uint64_t idle_lines;     /* levels at rest */
+    uint64_t idle_lines; /* levels at rest */
     struct ads1282 adc[3];
     struct ads1256 tadc;
     struct afe afe[3];
@@ -114,7 +112,6 @@ struct psa2 {
     enum psa2_mode mode;
     bool dark;     /* the lines lie low since a power-down */
     unsigned step; /* of the set-up */
-    struct psa2_controller_fault wrong;
     bool reversed; /* the present set-up goes the wrong way */
     bool stream;
     struct psa2_spi spi;

@@ -26,10 +26,7 @@ static void cfg_default(struct board_cfg *cfg)
 
 /* ---- what is on it ---- */
 
-#define OF(type, name, field)                                                                                          \
-    {                                                                                                                  \
-#name, offsetof(struct type, field)                                                                            \
-    }
+#define OF          BOARD_COUNTER
 #define KPSD(field) OF(psd1_counters, field, field)
 #define ADC(field)  OF(ad7712, field, n.field)
 
@@ -45,18 +42,17 @@ static const struct board_counter adc_counters[] = {
     ADC(sdata_violations), ADC(frame_violations), ADC(power_downs),
 };
 // clang-format on
-#define COUNTERS(table) .counters = (table), .counter_count = sizeof(table) / sizeof *(table)
 
 enum { PART_KPSD, PART_ADC_X, PART_ADC_Y, PART_ADC_Z, PARTS };
 
-static void adc_fault(void *board, unsigned part, const struct chip_fault *f, int64_t t_ns)
+static void adc_fault(struct board *board, unsigned part, const struct chip_fault *f, int64_t t_ns)
 {
     ad7712_fault(&((struct psd1 *)board)->adc[part - PART_ADC_X], f, t_ns);
 }
 
-static bool adc_flip(void *board, unsigned part, unsigned reg, uint8_t mask, int64_t t_ns)
+static bool adc_flip(struct board *board, unsigned part, unsigned reg, uint8_t mask, int64_t t_ns)
 {
-    struct psd1 *b = board;
+    struct psd1 *b = (struct psd1 *)board;
     return b->phase != PSD1_OFF && ad7712_flip(&b->adc[part - PART_ADC_X], reg, mask, t_ns);
 }
 
@@ -69,11 +65,11 @@ static const struct board_part parts[PARTS] = {
     [PART_KPSD] = {.name = "kpsd",
                    .label = "board",
                    .offset = offsetof(struct psd1, counters),
-                   COUNTERS(kpsd_counters)},
+                   BOARD_COUNTERS(kpsd_counters)},
 #define ADC_PART(nr, axis, faults_of, why_not)                                                                         \
     {                                                                                                                  \
         .name = "adc." axis, .label = "adc_" axis,                                                                     \
-        .offset = offsetof(struct psd1, adc) + (nr) * sizeof(struct ad7712), COUNTERS(adc_counters),                   \
+        .offset = offsetof(struct psd1, adc) + (nr) * sizeof(struct ad7712), BOARD_COUNTERS(adc_counters),             \
         .faults = (faults_of), .unless = (why_not), .registers = AD7712_FLIP_REGS, .fault = adc_fault,                 \
         .flip = adc_flip                                                                                               \
     }
@@ -86,46 +82,30 @@ static const struct board_part parts[PARTS] = {
 
 BOARD_LIFE(psd1);
 
-static bool ready(const void *board)
+static bool ready(const struct board *board)
 {
     return ((const struct psd1 *)board)->ready;
 }
 
-static void wrong(void *board, uint32_t wrongs)
-{
-    ((struct psd1 *)board)->wrongs = wrongs;
-}
-
-static void listen(void *board, bool on)
-{
-    struct psd1 *b = board;
-    b->told = on && b->io.event;
-}
-
-static struct afe *afe(void *board, unsigned axis)
+static struct afe *afe(struct board *board, unsigned axis)
 {
     return &((struct psd1 *)board)->afe[axis];
 }
 
-static enum board_cycle_result submit(void *board, struct board_cycle *c, int64_t t_ns)
-{
-    return psd1_submit(board, c, t_ns);
-}
-
 /* ---- what faults are measured by ---- */
 
-static unsigned pulses(const void *board)
+static unsigned pulses(const struct board *board)
 {
     (void)board;
     return BOARD_AXES * 16u;
 }
 
-static double range_v(const void *board)
+static double range_v(const struct board *board)
 {
     return psd1_profile_full_scale_v(&((const struct psd1 *)board)->profile);
 }
 
-static double code_v(const void *board)
+static double code_v(const struct board *board)
 {
     return range_v(board) / 32768.0;
 }
@@ -153,9 +133,9 @@ static void put_axis(const struct psd1 *b, unsigned i, board_truth_fn *put, void
     }
 }
 
-static void truth(const void *board, board_truth_fn *put, void *ctx)
+static void truth(const struct board *board, board_truth_fn *put, void *ctx)
 {
-    const struct psd1 *b = board;
+    const struct psd1 *b = (const struct psd1 *)board;
     put(ctx, "vref_error", b->vref_error);
     put(ctx, "vref_tc_per_k", b->vref_tc_per_k);
     put(ctx, "supply_v", b->supply_v);
@@ -196,9 +176,9 @@ static void add_registers(struct sha256 *s, const struct psd1 *b)
                          (uint64_t)b->latest.word[i] << 32 | (uint64_t)b->now.word[i] << 16 | (uint16_t)b->now.rate[i]);
 }
 
-static void digest(const void *board, struct sha256 *s)
+static void digest(const struct board *board, struct sha256 *s)
 {
-    const struct psd1 *b = board;
+    const struct psd1 *b = (const struct psd1 *)board;
     board_digest_u64(s, (uint64_t)b->phase << 32 | b->seq);
     board_digest_u64(s, (uint64_t)b->t0_ns);
     board_digest_u64(s, (uint64_t)b->due_ns);
@@ -214,11 +194,16 @@ static void digest(const void *board, struct sha256 *s)
     sha256_add(s, &b->counters, sizeof b->counters);
 }
 
-BOARD_STROBE(psd1);
+BOARD_BUS(psd1);
 
 static const struct board_bus bus = {
     .submit = submit, .addresses = PSD1_REGS, .name = psd1_register_name, .strobe = strobe, .wanted = psd1_wanted};
 static const char *const port_lines[] = {"RFX", "RFY", "RFZ", "SCLK", "SDAT", "FL2", "CS", NULL};
+
+static const struct board_controller_fault controller_faults[] = {
+    {"controller.frozen_words", PSD1_FAULT_FROZEN_WORDS},
+    {NULL, 0},
+};
 
 const struct board_type psd1_board = {
     .name = "psd1",
@@ -246,19 +231,11 @@ const struct board_type psd1_board = {
     .event_count = PSD1_EVENTS,
     .parts = parts,
     .part_count = PARTS,
-    .wrongs = BOARD_WRONG_FROZEN_WORDS,
+    .controller_faults = controller_faults,
     .can = &psd1_can,
     .bus = &bus,
-    .init = init,
-    .power_up = power_up,
-    .power_down = power_down,
-    .reset = reset,
+    BOARD_LIFE_FUNCTIONS,
     .ready = ready,
-    .sample_until = sample_until,
-    .wrong = wrong,
-    .listen = listen,
-    .trace = trace,
-    .line = line,
     .afe = afe,
     .digest = digest,
     .truth = truth,

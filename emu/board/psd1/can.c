@@ -181,10 +181,10 @@ static const struct board_node_type type = {.device = &psd1_device,
                                             .serial = serial,
                                             .period_ns = period_ns};
 
-static void init(void *can, const struct board_can_cfg *cfg, void *board, struct can_bus *bus, struct sched *s)
+static void init(void *can, const struct board_can_cfg *cfg, struct board *board, struct can_bus *bus, struct sched *s)
 {
     struct psd1_can *c = can;
-    struct psd1 *b = board;
+    struct psd1 *b = (struct psd1 *)board;
     board_node_init(&c->node, &type, cfg, board, bus, s);
     c->busy = false;
     psd1_attach(b, &(struct psd1_host){.ctx = can, .cycle = on_cycle, .fault = on_fault});

@@ -236,10 +236,8 @@ static uint64_t rest_levels(const struct psd1 *b)
 
 static void init_trace(struct psd1 *b)
 {
-    trace_init(&b->trace);
-    line_faults_init(&b->line, &b->trace);
-    const uint64_t level = rest_levels(b);
-    for (unsigned i = 0; i < PSD1_LINES; i++) (void)trace_add(&b->trace, psd1_lines[i].name, level >> i & 1);
+    board_init(&b->base, psd1_lines, PSD1_LINES);
+    b->base.trace.level = rest_levels(b);
     psd1_wave_init(b);
 }
 
@@ -339,7 +337,7 @@ void psd1_power_up(struct psd1 *b, int64_t t_ns)
     psd1_tell(b, PSD1_EV_POWER_UP, t_ns);
     b->t0_ns = t_ns;
     b->phase = PSD1_IN_RESET;
-    trace_put(&b->trace, TRACE_FIRST(PSD1_LINES), rest_levels(b), t_ns);
+    trace_put(&b->base.trace, TRACE_FIRST(PSD1_LINES), rest_levels(b), t_ns);
     psd1_wave_power(b, true, t_ns);
     psd1_aux_power_up(b, t_ns);
     enter_reset(b, t_ns);
@@ -364,7 +362,7 @@ void psd1_power_down(struct psd1 *b, int64_t t_ns)
     b->fault_told = false;
     for (unsigned i = 0; i < 3; i++) ad7712_power_off(&b->adc[i], t_ns);
     b->dr = true;
-    trace_put(&b->trace, TRACE_FIRST(PSD1_LINES), 0, t_ns);
+    trace_put(&b->base.trace, TRACE_FIRST(PSD1_LINES), 0, t_ns);
     psd1_tell(b, PSD1_EV_RES, t_ns);
     psd1_tell(b, PSD1_EV_POWER_DOWN, t_ns);
 }

@@ -52,7 +52,7 @@ int64_t psd1_rf_fall(struct psd1 *b, int64_t t_ns)
 static uint16_t word_of(struct psd1 *b)
 {
     psd1_rk_take_word(&b->rk, b->frame.word, 16);
-    if (b->wrongs & BOARD_WRONG_FROZEN_WORDS) psd1_rk_take_word(&b->rk, b->latest.word[b->axis], 16);
+    if (b->base.faults & PSD1_FAULT_FROZEN_WORDS) psd1_rk_take_word(&b->rk, b->latest.word[b->axis], 16);
     return (uint16_t)b->rk.bits;
 }
 

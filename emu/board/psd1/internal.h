@@ -26,12 +26,12 @@ void psd1_frame_end(struct psd1 *b, int64_t t_ns); /* also of one that is cut */
 static inline void psd1_put(struct psd1 *b, uint64_t lines, uint64_t level, int64_t t_ns)
 {
     if (b->wave.on) psd1_wave_catch_up(b, t_ns);
-    trace_put(&b->trace, lines, level, t_ns);
+    trace_put(&b->base.trace, lines, level, t_ns);
 }
 
 static inline void psd1_tell(const struct psd1 *b, enum psd1_event e, int64_t t_ns)
 {
-    if (b->told) b->io.event(b->io.ctx, e, t_ns);
+    if (b->base.observed) b->io.event(b->io.ctx, e, t_ns);
 }
 
 /* First edge of 1M25 strictly after t_ns: what moves at the very instant of an edge is seen by the next (E0). */

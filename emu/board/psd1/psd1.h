@@ -14,15 +14,11 @@
 #include "base/rng.h"
 #include "base/sched.h"
 #include "board/afe.h"
-#include "board/bus.h"
-#include "board/cfg.h"
-#include "board/part.h"
+#include "board/board.h"
 #include "board/psd1/names.h"
 #include "board/psd1/profile.h"
 #include "board/psd1/shift.h"
 #include "chip/ad7712/ad7712.h"
-#include "trace/line_fault.h"
-#include "trace/trace.h"
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -90,6 +86,11 @@ struct psd1_counters {
 
 #include "board/psd1/state.h" /* struct psd1, read-only outside the board's own files */
 
+/* Faults of the controller: bits of board.faults. */
+enum psd1_controller_fault {
+    PSD1_FAULT_FROZEN_WORDS = 4 /* the words of the cycle before, over and over */
+};
+
 void psd1_init(struct psd1 *b, const struct psd1_profile *p, const struct board_cfg *cfg, const struct board_io *io,
                struct sched *s);
 void psd1_attach(struct psd1 *b, const struct psd1_host *host);
@@ -108,7 +109,7 @@ enum board_cycle_result psd1_request(struct psd1 *b, struct psd1_request *r, con
 void psd1_flags(struct psd1 *b, bool int0, bool fl1, int64_t t_ns);
 
 const char *psd1_register_name(unsigned address); /* NULL: none */
-void psd1_wanted(const void *board, const struct board_cycle *c, enum board_cycle_result r, char *out,
+void psd1_wanted(const struct board *board, const struct board_cycle *c, enum board_cycle_result r, char *out,
                  size_t cap); /* as board_bus.wanted */
 
 #endif

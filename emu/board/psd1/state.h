@@ -2,6 +2,7 @@
 #ifndef PSABENCH_BOARD_PSD1_STATE_H
 #define PSABENCH_BOARD_PSD1_STATE_H
 
+#include "board/board.h"
 #include "board/psd1/wave.h"
 
 struct psd1;
@@ -73,14 +74,12 @@ struct psd1_port { /* which converter a callback came from */
 };
 
 struct psd1 {
+    struct board base;
     struct psd1_profile profile;
     struct board_cfg unit;
     struct board_io io;
-    bool told; /* somebody wants io.event */
     struct psd1_host host;
     struct sched *sched;
-    struct trace trace;
-    struct line_faults line;
     struct ad7712 adc[3];
     struct afe afe[3];
     struct psd1_port port[3];
@@ -94,10 +93,9 @@ struct psd1 {
     enum psd1_phase phase;
     int64_t due_ns; /* of the phase; SCHED_NEVER */
     struct sched_ev ev;
-    bool stepping; /* inside the event: it arms itself */
-    bool ready;    /* the set-up has been carried out */
-    bool dark;     /* the lines lie low since a power-down */
-    uint32_t wrongs;
+    bool stepping;       /* inside the event: it arms itself */
+    bool ready;          /* the set-up has been carried out */
+    bool dark;           /* the lines lie low since a power-down */
     bool int0, fl1, fl2; /* active */
     bool drdy[3], dr;    /* levels */
     int64_t dr_ns;       /* latest fall of DR */

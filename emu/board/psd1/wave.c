@@ -68,7 +68,7 @@ static bool report_frame(struct psd1 *b, int64_t t_ns)
     const struct psd1_wave_form *f = form_of(b);
     const int64_t t0_ns = b->frame.t_ns;
     const bool whole = w->next == 0 && t_ns >= t0_ns + forms[b->frame.form].len_ns;
-    struct trace_step *const room = trace_room(&b->trace, f->count - w->next), *p = room;
+    struct trace_step *const room = trace_room(&b->base.trace, f->count - w->next), *p = room;
     const uint32_t word = left_justified(&b->frame);
     unsigned i = w->next, sdat = w->sdat;
     for (; i < f->count && t0_ns + f->step[i].s.t_ns <= t_ns && room; i++) {
@@ -80,8 +80,9 @@ static bool report_frame(struct psd1 *b, int64_t t_ns)
     }
     w->next = room ? i : f->count;
     w->sdat = sdat;
-    if (room && whole) trace_commit_run(&b->trace, (unsigned)(p - room), w->clock_on ? SCLK | SDAT | CLK : SCLK | SDAT);
-    else if (room) trace_commit(&b->trace, (unsigned)(p - room));
+    if (room && whole)
+        trace_commit_run(&b->base.trace, (unsigned)(p - room), w->clock_on ? SCLK | SDAT | CLK : SCLK | SDAT);
+    else if (room) trace_commit(&b->base.trace, (unsigned)(p - room));
     return w->next == f->count;
 }
 
@@ -92,20 +93,20 @@ static void report_clock(struct psd1 *b, int64_t t_ns)
     const int64_t due = (t_ns - w->clock_ns) / PSD1_HALF_NS + 1;
     const bool rises = (w->clock_ns - b->t0_ns) % PSD1_PERIOD_NS == 0;
     const unsigned n = !rises || due == 1 ? 1 : (due < CLOCK_CHUNK ? (unsigned)due : CLOCK_CHUNK) & ~1u;
-    struct trace_step *const room = trace_room(&b->trace, n), *const end = room + n;
+    struct trace_step *const room = trace_room(&b->base.trace, n), *const end = room + n;
     int64_t at_ns = w->clock_ns;
     w->clock_ns += (int64_t)n * PSD1_HALF_NS;
     if (!room) return;
     if (n == 1) {
         *room = (struct trace_step){at_ns, CLK, rises ? CLK : 0};
-        trace_commit(&b->trace, 1);
+        trace_commit(&b->base.trace, 1);
         return;
     }
     for (struct trace_step *p = room; p < end; p += 2, at_ns += PSD1_PERIOD_NS) {
         p[0] = (struct trace_step){at_ns, CLK, CLK};
         p[1] = (struct trace_step){at_ns + PSD1_HALF_NS, CLK, 0};
     }
-    trace_commit_run(&b->trace, n, CLK);
+    trace_commit_run(&b->base.trace, n, CLK);
 }
 
 static void report_until(struct psd1 *b, int64_t t_ns)
@@ -128,9 +129,9 @@ void psd1_wave_catch_up(struct psd1 *b, int64_t t_ns)
     while (w->clock_on && t_ns - w->clock_ns > piece_ns) {
         const int64_t to_ns = w->clock_ns + piece_ns;
         report_until(b, to_ns);
-        trace_advance(&b->trace, to_ns - TRACE_LAG_NS);
+        trace_advance(&b->base.trace, to_ns - TRACE_LAG_NS);
     }
-    if (b->trace.pending_count > TRACE_PENDING_MAX / 2) trace_advance(&b->trace, t_ns - TRACE_LAG_NS);
+    if (b->base.trace.pending_count > TRACE_PENDING_MAX / 2) trace_advance(&b->base.trace, t_ns - TRACE_LAG_NS);
     report_until(b, t_ns);
 }
 
@@ -139,7 +140,7 @@ void psd1_frame_begin(struct psd1 *b, enum psd1_form form, uint32_t word, int64_
     struct psd1_wave *w = &b->wave;
     if (w->on) psd1_wave_catch_up(b, t_ns);
     b->frame = (struct psd1_frame){true, form, word, t_ns};
-    if (!trace_watched(&b->trace, SCLK | SDAT)) return;
+    if (!trace_watched(&b->base.trace, SCLK | SDAT)) return;
     w->on = w->frame_on = true;
     w->next = 0;
     w->sdat = false;
@@ -154,7 +155,7 @@ void psd1_frame_end(struct psd1 *b, int64_t t_ns)
     w->frame_on = false; /* cut */
     w->on = w->clock_on;
     w->clock_ns = t_ns + PSD1_HALF_NS - (t_ns - b->t0_ns) % PSD1_HALF_NS;
-    trace_put(&b->trace, SCLK | SDAT, 0, t_ns);
+    trace_put(&b->base.trace, SCLK | SDAT, 0, t_ns);
 }
 
 /* ---- who listens ---- */
@@ -173,7 +174,7 @@ static void join_frame(struct psd1 *b, int64_t t_ns)
         else if (s->s.lines == SCLK) sclk = s->s.level != 0;
     }
     w->on = w->frame_on = true;
-    trace_put(&b->trace, SCLK | SDAT, (sclk ? SCLK : 0) | (w->sdat ? SDAT : 0), t_ns);
+    trace_put(&b->base.trace, SCLK | SDAT, (sclk ? SCLK : 0) | (w->sdat ? SDAT : 0), t_ns);
 }
 
 static void join_clock(struct psd1 *b, int64_t t_ns)
@@ -182,7 +183,7 @@ static void join_clock(struct psd1 *b, int64_t t_ns)
     const int64_t since_ns = t_ns - b->t0_ns;
     w->on = w->clock_on = true;
     w->clock_ns = t_ns + PSD1_HALF_NS - since_ns % PSD1_HALF_NS;
-    trace_put(&b->trace, CLK, since_ns % PSD1_PERIOD_NS < PSD1_HALF_NS ? CLK : 0, t_ns);
+    trace_put(&b->base.trace, CLK, since_ns % PSD1_PERIOD_NS < PSD1_HALF_NS ? CLK : 0, t_ns);
 }
 
 static void wake(void *ctx, uint64_t mask)
@@ -201,7 +202,7 @@ static int64_t report(void *ctx, int64_t t_ns)
 {
     struct psd1 *b = ctx;
     struct psd1_wave *w = &b->wave;
-    if (w->clock_on && !w->frame_on && !trace_watched(&b->trace, CLK)) w->on = w->clock_on = false;
+    if (w->clock_on && !w->frame_on && !trace_watched(&b->base.trace, CLK)) w->on = w->clock_on = false;
     if (!w->on) return t_ns;
     const int64_t room_ns = w->clock_on && !w->frame_on ? w->clock_ns + CLOCK_CHUNK * (int64_t)PSD1_HALF_NS : t_ns;
     const int64_t now_ns = t_ns < b->sched->now_ns ? t_ns : b->sched->now_ns;
@@ -214,7 +215,7 @@ void psd1_wave_init(struct psd1 *b)
     for (unsigned i = 0; i < PSD1_FORMS; i++)
         for (unsigned clock = 0; clock < 2; clock++)
             lay_out(&b->wave.form[i][clock], &b->profile, (enum psd1_form)i, clock);
-    b->trace.source = (struct trace_source){.wake = wake, .report = report, .ctx = b};
+    b->base.trace.source = (struct trace_source){.wake = wake, .report = report, .ctx = b};
 }
 
 void psd1_wave_power(struct psd1 *b, bool on, int64_t t_ns)
@@ -222,5 +223,5 @@ void psd1_wave_power(struct psd1 *b, bool on, int64_t t_ns)
     struct psd1_wave *w = &b->wave;
     if (w->on) psd1_wave_catch_up(b, t_ns);
     w->on = w->clock_on = w->frame_on = false;
-    if (on && trace_watched(&b->trace, CLK)) join_clock(b, t_ns);
+    if (on && trace_watched(&b->base.trace, CLK)) join_clock(b, t_ns);
 }

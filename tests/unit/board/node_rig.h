@@ -33,9 +33,9 @@ struct rig {
 };
 static struct rig rig;
 
-static inline enum board_cycle_result fake_submit(void *board, struct board_cycle *c, int64_t t_ns)
+static inline enum board_cycle_result fake_submit(struct board *board, struct board_cycle *c, int64_t t_ns)
 {
-    struct fake *f = board;
+    struct fake *f = (struct fake *)board;
     (void)t_ns;
     f->submits++;
     if (f->accept != BOARD_CYCLE_OK) return f->accept;
@@ -50,9 +50,9 @@ static inline const char *fake_name(unsigned address)
 }
 
 /* As board.h has it: a reset cuts the cycle under way. */
-static inline void fake_reset(void *board, int64_t t_ns)
+static inline void fake_reset(struct board *board, int64_t t_ns)
 {
-    struct fake *f = board;
+    struct fake *f = (struct fake *)board;
     struct board_cycle *c = f->cycle;
     f->resets++;
     f->cycle = NULL;
@@ -84,7 +84,7 @@ static inline struct rig *rig_of(struct board_node *n)
     return (struct rig *)((char *)n - offsetof(struct rig, can));
 }
 
-static inline struct board_strobe fake_strobe(const void *board)
+static inline struct board_strobe fake_strobe(const struct board *board)
 {
     (void)board;
     return (struct board_strobe){800, 200};

@@ -134,7 +134,7 @@ static void a_cycle_that_a_reset_cuts_says_so(void **state)
     (void)state;
     struct rig *r = rig_up();
     ask(r, 0x40, PSD1_OD_BUS, 1, 0);
-    fake_reset(&r->board, r->s.now_ns); /* by the control socket, or a brown-out */
+    fake_reset((struct board *)&r->board, r->s.now_ns); /* by the control socket, or a brown-out */
     settle(r);
     assert_int_equal(answer(r), 0x08000020);
     assert_int_equal(upload(r, PSD1_OD_COUNTERS, CYCLES_REFUSED), 1);

@@ -91,10 +91,10 @@ static void events_may_be_those_of_another_unit(void **state)
         add("{'kind':'sensor.bias','point':'a.sensor.x','bias_v':1,'after':'RES','count':1,'unit':'b'}");
     run_to(200 * MS);
     assert_int_equal(r.changes, 0);
-    psa2_reset(r.unit[0].board, r.s.now_ns);
+    psa2_reset(&r.unit[0].store.psa2, r.s.now_ns);
     run_to(201 * MS);
     assert_int_equal(r.changes, 0);
-    psa2_reset(r.unit[1].board, r.s.now_ns);
+    psa2_reset(&r.unit[1].store.psa2, r.s.now_ns);
     run_to(202 * MS);
     assert_change(0, id, FAULT_ACTIVE, 201 * MS);
     assert_null(r.unit[1].listeners);

@@ -196,8 +196,8 @@ static void the_least_that_is_seen_is_accepted(void **state)
     assert_int_equal(r.board.sampled_ns, 5);
     assert_non_null(r.unit[0].sensor_faults[1]);
     assert_non_null(r.board.afe[0].faults);
-    assert_int_equal(r.board.line.slot[0].f.frame_line, fake_type.frame_line);
-    assert_int_equal(r.board.line.slot[0].f.line, fake_type.pulse_line);
+    assert_int_equal(r.board.base.line.slot[0].f.frame_line, fake_type.frame_line);
+    assert_int_equal(r.board.base.line.slot[0].f.line, fake_type.pulse_line);
 }
 
 static void faults_reach_the_part_that_they_are_for(void **state)
@@ -217,9 +217,9 @@ static void faults_reach_the_part_that_they_are_for(void **state)
     assert_says(ADD("'kind':'chip.flip','point':'f.conv.a','register':2,'mask':5"), "'id':5");
     assert_int_equal(r.board.chip[FAKE_CONV_A - 1].flipped, 2 * 256 + 5);
     assert_says(ADD("'kind':'controller.frozen_words','point':'f.ctl'"), "'id':6");
-    assert_int_equal(r.board.wrongs, BOARD_WRONG_FROZEN_WORDS);
+    assert_int_equal(r.board.base.faults, FAKE_FAULT_FROZEN_WORDS);
     assert_says("{'cmd':'fault.clear'}", "'cleared':6");
-    assert_int_equal(r.board.wrongs, 0);
+    assert_int_equal(r.board.base.faults, 0);
     assert_true(!b->dout && a->clock_ppm == 0);
     r.board.on = false;
     assert_says(ADD("'kind':'chip.flip','point':'f.conv.a','register':0,'mask':1"), "'id':7");
@@ -238,14 +238,14 @@ static void its_events_bring_faults_about_and_end_runs(void **state)
 {
     (void)state;
     assert_says(ADD("'kind':'sensor.bias','point':'f.sensor.x','bias_v':1,'after':'TOCK','count':2"), "'id':1");
-    assert_true(r.board.listened);
+    assert_true(r.board.base.observed);
     assert_says("{'cmd':'fault.list'}", "'after':'TOCK','count':2,'unit':'f','bias_v':1");
     tock();
     assert_int_equal(fault_find(&r.engine, 1)->state, FAULT_LISTENING);
     tock();
     sched_run_until(&r.s, 1);
     assert_int_equal(fault_find(&r.engine, 1)->state, FAULT_ACTIVE);
-    assert_false(r.board.listened);
+    assert_false(r.board.base.observed);
     assert_null(say(&r.control, "{'cmd':'run.until','args':{'event':'TOCK'}}"));
     tock();
     assert_non_null(strstr(control_run_done(&r.control, 1), "\"result\":{\"reached\":true,\"seen\":1}"));
@@ -306,7 +306,7 @@ static void every_kind_of_chips_lines_and_sensors_fits_a_board_and_every_part_ha
     }
     const struct board_part *part;
     for (const struct board_type *const *t = board_types; *t; t++) {
-        assert_true((*t)->wrongs != 0 && (*t)->parts[0].name);
+        assert_true((*t)->controller_faults[0].kind && (*t)->parts[0].name);
         for (unsigned i = 1; i < (*t)->part_count; i++) {
             part = &(*t)->parts[i];
             if (!part->name) continue;
@@ -337,7 +337,7 @@ static void it_tells_its_type_its_counters_its_lines_and_its_truth(void **state)
         "{'cmd':'counters','args':{'unit':'f'}}",
         "'result':{'board':{'cycles':3},'conv_a':{'conversions':0,'lost':0},'conv_b':{'conversions':17,'lost':2},"
         "'memory':{'conversions':0,'lost':0},'lamp':{'conversions':0,'lost':0},'trace':{'late':0,'dropped':0}}");
-    trace_set(&r.board.trace, 1, true, 0);
+    trace_set(&r.board.base.trace, 1, true, 0);
     assert_says("{'cmd':'lines','args':{'unit':'f'}}", "'lines':{'BEAT':1,'CK':1,'MARK':0}");
     assert_says("{'cmd':'truth'}", "'f':{'board':'fake','serial':1,");
     assert_says("{'cmd':'truth'}", "'specimen':{'capacitor_error_ppm':250}");

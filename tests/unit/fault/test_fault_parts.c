@@ -84,7 +84,7 @@ static void a_flip_in_a_board_without_power_is_void(void **state)
                                        "{'kind':'chip.flip','point':'b.tadc','register':2,'mask':1}"};
     (void)state;
     run_to(400 * MS);
-    psa2_power_down(r.unit[1].board, r.s.now_ns);
+    psa2_power_down(&r.unit[1].store.psa2, r.s.now_ns);
     for (size_t i = 0; i < COUNT(args); i++) {
         const uint32_t id = add(args[i]);
         assert_true(id != 0);

@@ -19,8 +19,8 @@ static void every_pointer_is_there(const struct board_type *t)
     assert_true(t->fields && t->field_count && t->profile_name && t->profile_default && t->profile_check && t->about);
     assert_true(t->period_ns && t->lines && t->line_count && t->port_lines && t->frame_line < t->line_count);
     assert_true(t->events && t->event_count && t->parts && t->part_count && t->node);
-    assert_true(t->init && t->power_up && t->power_down && t->reset && t->ready && t->sample_until && t->wrong);
-    assert_true(t->listen && t->trace && t->line && t->digest);
+    assert_true(t->init && t->power_up && t->power_down && t->reset && t->ready && t->sample_until);
+    assert_true(t->controller_faults && t->digest);
     const struct board_can *c = t->can;
     assert_true(c && c->init && c->power_up && c->power_down && c->node);
     assert_true(c->size > 0 && c->size <= sizeof(union board_can_store));
@@ -228,7 +228,7 @@ static void the_lines_are_those_of_the_table(void **state)
         const struct clk clock = {.hz = SAMPLER_HZ, .div = 1};
         assert_true(sampler_start(&w.sampler, unit_trace(&w.u), (*t)->port_lines, &clock));
         sampler_stop(&w.sampler);
-        assert_ptr_equal((*t)->line(w.u.board)->trace, trace);
+        assert_ptr_equal(w.u.board->line.trace, trace);
     }
 }
 
@@ -279,7 +279,7 @@ static void count_truth(void *ctx, const char *name, double value)
     ++*(unsigned *)ctx;
 }
 
-static void truth_and_wrongs_may_be_asked_at_any_time(void **state)
+static void truth_and_faults_may_be_asked_at_any_time(void **state)
 {
     (void)state;
     for (const struct board_type *const *t = board_types; *t; t++) {
@@ -287,11 +287,13 @@ static void truth_and_wrongs_may_be_asked_at_any_time(void **state)
         unsigned told = 0;
         if ((*t)->truth) (*t)->truth(w.u.board, count_truth, &told);
         assert_true(!(*t)->truth || told > 0);
-        for (uint32_t bit = 1; bit && bit <= (*t)->wrongs; bit <<= 1) {
-            if ((*t)->wrongs & bit) (*t)->wrong(w.u.board, bit);
+        for (const struct board_controller_fault *f = (*t)->controller_faults; f->kind; f++) {
+            board_set_faults(w.u.board, board_fault_bit(*t, f->kind));
+            assert_int_equal(w.u.board->faults, f->bit);
             sched_run_until(&w.s, w.s.now_ns + 50000000);
         }
-        (*t)->wrong(w.u.board, 0);
+        board_set_faults(w.u.board, board_fault_bit(*t, "controller.none"));
+        assert_int_equal(w.u.board->faults, 0);
         sched_run_until(&w.s, w.s.now_ns + 50000000);
         for (unsigned axis = 0; (*t)->afe && axis < BOARD_AXES; axis++) assert_non_null((*t)->afe(w.u.board, axis));
         unit_sample_until(&w.u, w.s.now_ns);
@@ -435,7 +437,7 @@ int main(void)
         cmocka_unit_test(the_lines_are_those_of_the_table),
         cmocka_unit_test(each_comes_up_tells_of_it_and_goes_down),
         cmocka_unit_test(the_digest_tells_states_apart_and_nothing_else),
-        cmocka_unit_test(truth_and_wrongs_may_be_asked_at_any_time),
+        cmocka_unit_test(truth_and_faults_may_be_asked_at_any_time),
         cmocka_unit_test(each_address_of_a_bus_answers_or_refuses),
         cmocka_unit_test(a_refusal_says_what_would_be_right),
         cmocka_unit_test(who_is_too_early_learns_when),

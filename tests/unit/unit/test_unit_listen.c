@@ -40,7 +40,7 @@ static void listen(struct ear *e)
 
 static bool heard(void)
 {
-    return ((const struct psa2 *)unit.board)->heard;
+    return unit.board->observed;
 }
 
 static void up(void)
@@ -62,7 +62,7 @@ static void listeners_hear_in_order_of_coming(void **state)
     struct ear a = ear(), b = ear();
     listen(&a);
     listen(&b);
-    psa2_power_up(unit.board, 0);
+    psa2_power_up(&unit.store.psa2, 0);
     assert_int_equal(a.heard, 1);
     assert_int_equal(b.heard, 1);
     assert_true(a.order < b.order);
@@ -83,7 +83,7 @@ static void the_board_computes_no_events_for_nobody(void **state)
     assert_true(heard());
     unit_unlisten(&unit, &a.l);
     assert_false(heard());
-    psa2_power_up(unit.board, 0);
+    psa2_power_up(&unit.store.psa2, 0);
     assert_int_equal(a.heard, 0);
 }
 
@@ -97,12 +97,12 @@ static void a_listener_may_end_its_own_listening_or_the_next(void **state)
     listen(&c);
     a.ends = &b; /* who is next */
     c.ends = &c;
-    psa2_power_up(unit.board, 0);
+    psa2_power_up(&unit.store.psa2, 0);
     assert_int_equal(a.heard, 1);
     assert_int_equal(b.heard, 0);
     assert_int_equal(c.heard, 1);
     a.ends = &a;
-    psa2_power_down(unit.board, 0); /* Res, and the power */
+    psa2_power_down(&unit.store.psa2, 0); /* Res, and the power */
     assert_int_equal(a.heard, 2);
     assert_int_equal(c.heard, 1);
     assert_false(heard());

@@ -110,16 +110,13 @@ static inline struct platform_cfg rig_platform(void)
     return c;
 }
 
+static const struct board_platform_io rig_platform_io = {rig_torque, rig_reposition, rig_servo, rig_encoder};
+
 /* The check case: latitude 50, heading 40, pitch 5, roll -4. */
 static inline void rig_up(struct rig *r, const struct platform_cfg *platform, double latitude_deg)
 {
     const struct board_cfg cfg = {.seed = 7, .serial = 3, .level_node = 5};
-    const struct board_io io = {.ctx = r,
-                                .event = rig_event,
-                                .torque = rig_torque,
-                                .reposition = rig_reposition,
-                                .servo_rad = rig_servo,
-                                .encoder_rad = rig_encoder};
+    const struct board_io io = {.ctx = r, .event = rig_event, .platform = &rig_platform_io};
     const struct site site = earth_site(latitude_deg * GYRO_RAD_PER_DEG, 0.0, 0.0, 0.0);
     struct vehicle_cfg vehicle = vehicle_default();
     struct gyro_profile profile;
@@ -132,7 +129,7 @@ static inline void rig_up(struct rig *r, const struct platform_cfg *platform, do
     platform_init(&r->p, platform, &vehicle, &site, 7);
     gyro_profile_default(&profile);
     gyro_init(&r->b, &profile, &cfg, &io, &r->s);
-    gyro_board.listen(&r->b, true);
+    r->b.base.observed = true;
     gyro_attach(&r->b, &(struct gyro_host){.ctx = r, .reading = rig_reading, .condition = rig_condition});
     sched_ev(&r->feed, rig_feed, r);
     sched_at(&r->s, &r->feed, 1000000);
@@ -141,7 +138,7 @@ static inline void rig_up(struct rig *r, const struct platform_cfg *platform, do
     r->b.set.latitude_deg = latitude_deg;
     r->b.set.scale_x_v_per_g = r->b.set.scale_y_v_per_g = -1.2 * GAIN;
     gyro_settings_changed(&r->b);
-    assert_true(gyro_board.ready(&r->b));
+    assert_true(gyro_board.ready(&r->b.base));
 }
 
 static inline void rig_run(struct rig *r, double for_s)

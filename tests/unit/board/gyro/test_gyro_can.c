@@ -65,8 +65,8 @@ static int up(void **state)
     can_attach(&wire.bus, &wire.level);
     gyro_init(&r.b, &profile, &cfg, &io, &r.s);
     const struct board_can_cfg can = {.name = "g", .type = &gyro_board, .node_id = NODE, .refused = said};
-    gyro_can.init(&wire.can, &can, &r.b, &wire.bus, &r.s);
-    gyro_board.power_up(&r.b, 0);
+    gyro_can.init(&wire.can, &can, &r.b.base, &wire.bus, &r.s);
+    gyro_board.power_up(&r.b.base, 0);
     gyro_can.power_up(&wire.can, 0);
     sched_ev(&wire.feed, feed, NULL);
     sched_at(&r.s, &wire.feed, 1000000);

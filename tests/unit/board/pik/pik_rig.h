@@ -178,9 +178,9 @@ static inline void rig_run_until(struct rig *r, int64_t t_ns)
     while (r->s.now_ns < t_ns) { /* as the main loop does: the trace lags behind */
         const int64_t step_ns = t_ns - r->s.now_ns;
         sched_run_until(&r->s, r->s.now_ns + (step_ns < 100000 ? step_ns : 100000));
-        trace_advance(&r->b.trace, r->s.now_ns - TRACE_LAG_NS);
-        assert_int_equal(r->b.trace.late, 0);
-        assert_int_equal(r->b.trace.dropped, 0);
+        trace_advance(&r->b.base.trace, r->s.now_ns - TRACE_LAG_NS);
+        assert_int_equal(r->b.base.trace.late, 0);
+        assert_int_equal(r->b.base.trace.dropped, 0);
     }
 }
 

@@ -58,15 +58,15 @@ static void watched_or_heard_the_counts_are_the_same(void **state)
     p.clock_tol_ppm = 20.0;
     rig_up(&r, &p, 5);
     rig_up(&other, &p, 5);
-    trace_attach(&r.b.trace, &r.sink);
+    trace_attach(&r.b.base.trace, &r.sink);
     for (unsigned i = 0; i < PIK_AXES; i++)
         r.input[i] = other.input[i] =
             (struct rig_input){.v = 0.4 * i, .sines = 1, .sine = {{.v = 4.0, .hz = 3.0 + 150.0 * i}}};
     for (unsigned step = 1; step <= 40; step++) {
         const int64_t t_ns = step * INT64_C(7654321);
-        pik_listen(&r.b, step % 3 == 0);
-        if (step == 20) trace_detach(&r.b.trace, &r.sink);
-        if (step == 30) trace_attach(&r.b.trace, &r.sink);
+        pik_observe(&r.b, step % 3 == 0);
+        if (step == 20) trace_detach(&r.b.base.trace, &r.sink);
+        if (step == 30) trace_attach(&r.b.base.trace, &r.sink);
         if (step % 7 == 0) {
             pik_sample_until(&r.b, r.s.now_ns);
             pik_sample_until(&other.b, other.s.now_ns);
@@ -257,7 +257,7 @@ static void saturation_is_counted_and_told(void **state)
     (void)state;
     const struct pik_profile p = rig_pik();
     rig_up(&r, &p, 1);
-    pik_listen(&r.b, true);
+    pik_observe(&r.b, true);
     r.input[0].v = -10.49; /* below the clip of the chain */
     r.input[1].v = 9.9;
     rig_run_until(&r, NS_PER_S);
@@ -379,7 +379,7 @@ static void frozen_words_repeat_while_time_goes_on(void **state)
     rig_up(&r, &p, 1);
     r.input[0].v = 5.0;
     rig_run_until(&r, 100000001);
-    r.b.frozen = true;
+    r.b.base.faults = PIK_FAULT_FROZEN_WORDS;
     rig_run_until(&r, 200000001);
     const struct pik_reading *a = &r.reading[9], *b = &r.reading[19];
     assert_int_equal(a->total[0], b->total[0]);
@@ -395,7 +395,7 @@ static void power_and_reset(void **state)
     rig_init(&r, &p, 1);
     pik_reset(&r.b, 0); /* without power it does nothing */
     pik_power_down(&r.b, 0);
-    pik_listen(&r.b, true);
+    pik_observe(&r.b, true);
     rig_run_until(&r, 5000000);
     assert_int_equal(r.b.counters.resets, 0);
     pik_power_up(&r.b, 5000000);

@@ -70,10 +70,10 @@ static void rig_up(struct rig *rig, const char *key, const char *value)
     can_bus_init(&rig->bus, &(struct can_bus_cfg){1000000, 0}, &rig->s);
     rig->host = (struct can_node){.name = "host", .rx = on_rx, .ctx = rig};
     can_attach(&rig->bus, &rig->host);
-    pik_board.init(&rig->b, &p, &cfg, &io, &rig->s);
+    pik_board.init(&rig->b.base, &p, &cfg, &io, &rig->s);
     const struct board_can_cfg node = {.name = "p", .type = &pik_board, .node_id = NODE};
-    pik_board.can->init(&rig->can, &node, &rig->b, &rig->bus, &rig->s);
-    pik_board.power_up(&rig->b, 0);
+    pik_board.can->init(&rig->can, &node, &rig->b.base, &rig->bus, &rig->s);
+    pik_board.power_up(&rig->b.base, 0);
     pik_board.can->power_up(&rig->can, 0);
     run(rig, 1000000);
 }
@@ -186,7 +186,7 @@ static bool same_digest(void)
     for (unsigned i = 0; i < 2; i++) {
         struct sha256 s;
         sha256_init(&s);
-        pik_board.digest(&rigs[i]->b, &s);
+        pik_board.digest(&rigs[i]->b.base, &s);
         sha256_hex(&s, hex[i]);
     }
     return strcmp(hex[0], hex[1]) == 0;
@@ -207,7 +207,7 @@ static void digest_is_of_the_state_not_of_who_looks(void **state)
     r.v[0] = other.v[0] = 3.0;
     struct trace_sink ear = {.mask = PIK_PULSE_LINES, .steps = ignore_steps};
     run(&r, 2345678);
-    trace_attach(&r.b.trace, &ear);
+    trace_attach(&r.b.base.trace, &ear);
     run(&r, 10000000);
     run(&other, 12345678);
     assert_true(same_digest());
@@ -234,16 +234,16 @@ static void what_the_table_says(void **state)
     (void)state;
     char text[200];
     rig_up(&r, "latch_us", "0");
-    assert_true(pik_board.ready(&r.b)); /* it waits for strobes */
+    assert_true(pik_board.ready(&r.b.base)); /* it waits for strobes */
     assert_int_equal(pik_board.period_ns(&r.b.profile), 0);
     rig_up(&r, NULL, NULL);
-    assert_false(pik_board.ready(&r.b));
+    assert_false(pik_board.ready(&r.b.base));
     run(&r, 10000000);
-    assert_true(pik_board.ready(&r.b));
+    assert_true(pik_board.ready(&r.b.base));
     pik_board.about(&r.b.profile, text, sizeof text);
     assert_string_equal(text, "174 Hz/V, a pulse of 5.747 mV s, at most 1.796 kHz, TCLK 287.4 us, latched every 10 ms");
     truths = 0;
-    pik_board.truth(&r.b, on_truth, NULL);
+    pik_board.truth(&r.b.base, on_truth, NULL);
     assert_int_equal(truths, 20);
     assert_true(truth_of_x == pik_true_k_hz_per_v(&r.b, 0, 1, 25.0));
     struct board_cfg cfg = {.seed = 1};
@@ -253,13 +253,13 @@ static void what_the_table_says(void **state)
     assert_true(cfg.afe[2].load_ohm == 735.0 && cfg.afe[0].divider_ratio == 1.0);
     pik_board.cfg_profiled(&cfg, &p);
     assert_true(cfg.afe[1].load_ohm == 768.0);
-    pik_board.wrong(&r.b, BOARD_WRONG_FROZEN_WORDS);
-    assert_true(r.b.frozen);
-    pik_board.wrong(&r.b, 0);
-    assert_false(r.b.frozen);
-    assert_ptr_equal(pik_board.afe(&r.b, 2), &r.b.channel[2].afe);
+    r.b.base.faults = PIK_FAULT_FROZEN_WORDS;
+    assert_true(r.b.base.faults);
+    r.b.base.faults = 0;
+    assert_false(r.b.base.faults);
+    assert_ptr_equal(pik_board.afe(&r.b.base, 2), &r.b.channel[2].afe);
     for (unsigned i = 0; pik_board.port_lines[i]; i++)
-        assert_true(trace_find(&r.b.trace, pik_board.port_lines[i]) >= 0);
+        assert_true(trace_find(&r.b.base.trace, pik_board.port_lines[i]) >= 0);
 }
 
 /* Faults of parts go where their names say. */
@@ -270,11 +270,11 @@ static void faults_of_parts(void **state)
     rig_up(&r, NULL, NULL);
     assert_int_equal(pik_board.part_count, COUNT(names));
     for (unsigned i = 0; i < COUNT(names); i++) assert_string_equal(pik_board.parts[i].name, names[i]);
-    pik_board.parts[3].fault(&r.b, 3, &(struct chip_fault){.dout = CHIP_STUCK_LOW}, r.s.now_ns);
+    pik_board.parts[3].fault(&r.b.base, 3, &(struct chip_fault){.dout = CHIP_STUCK_LOW}, r.s.now_ns);
     assert_true(r.b.channel[2].stuck && !r.b.channel[0].stuck && !r.b.channel[1].stuck);
-    pik_board.parts[4].fault(&r.b, 4, &(struct chip_fault){.clock_ppm = 77}, r.s.now_ns);
+    pik_board.parts[4].fault(&r.b.base, 4, &(struct chip_fault){.clock_ppm = 77}, r.s.now_ns);
     assert_int_equal(r.b.clock_fault_ppm, 77);
-    assert_true(pik_board.parts[1].flip(&r.b, 1, 0, 4, r.s.now_ns));
+    assert_true(pik_board.parts[1].flip(&r.b.base, 1, 0, 4, r.s.now_ns));
     r.v[0] = r.v[1] = 10.0;
     run(&r, 30000000);
     const char *part = (const char *)&r.b + pik_board.parts[2].offset;

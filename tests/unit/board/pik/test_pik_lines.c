@@ -26,7 +26,7 @@ static void pulses_are_what_the_counters_count(void **state)
     (void)state;
     const struct pik_profile p = rig_pik6();
     rig_init(&r, &p, 1);
-    trace_attach(&r.b.trace, &r.sink);
+    trace_attach(&r.b.base.trace, &r.sink);
     pik_power_up(&r.b, 0);
     r.input[0].v = 3.0;
     r.input[1] = (struct rig_input){.sines = 1, .sine = {{.v = 9.0, .hz = 40.0}}};
@@ -55,7 +55,7 @@ static void a_pulse_rises_where_the_integral_is_at_uc(void **state)
     const struct pik_profile p = rig_pik6();
     const double uc = pik_profile_threshold(&p);
     rig_init(&r, &p, 1);
-    trace_attach(&r.b.trace, &r.sink);
+    trace_attach(&r.b.base.trace, &r.sink);
     pik_power_up(&r.b, 0);
     r.input[0] = (struct rig_input){.sines = 1, .sine = {{.v = 10.0, .hz = 397.0}}};
     rig_run_until(&r, NS_PER_S);
@@ -78,7 +78,7 @@ static void clk_and_latch(void **state)
     (void)state;
     const struct pik_profile p = rig_pik();
     rig_init(&r, &p, 1);
-    trace_attach(&r.b.trace, &r.sink);
+    trace_attach(&r.b.base.trace, &r.sink);
     pik_power_up(&r.b, 0);
     rig_run_until(&r, 51 * INT64_C(1000000));
     assert_in_range(rises_of(PIK_LINE_CLK, 0, 50000000), 173, 174);
@@ -102,7 +102,7 @@ static void clk_and_latch(void **state)
     assert_in_range(rises_of(PIK_LINE_CLK, from_ns, from_ns + 499000000), 1737, 1739);
     pik_power_down(&r.b, r.s.now_ns);
     rig_run_until(&r, r.s.now_ns + 1000000);
-    assert_int_equal(r.b.trace.level, 0);
+    assert_int_equal(r.b.base.trace.level, 0);
 }
 
 /* Whoever comes in the middle of a pulse hears that it is under way, and when it ends. */
@@ -116,7 +116,7 @@ static void late_listeners_hear_true_levels(void **state)
         r.input[0].v = 7.0;
         r.input[1].v = -5.0;
         rig_run_until(&r, 20000000 + n * 37000);
-        trace_attach(&r.b.trace, &r.sink);
+        trace_attach(&r.b.base.trace, &r.sink);
         rig_run_until(&r, r.s.now_ns + 5000000);
         uint64_t level = 0;
         int64_t rose_ns[2] = {-1, -1};
@@ -145,19 +145,19 @@ static void a_listener_of_some_lines_and_one_of_others(void **state)
     struct trace_sink clk = {.mask = 1u << PIK_LINE_CLK, .steps = rig_steps, .ctx = &r};
     rig_up(&r, &p, 1);
     r.input[0].v = 1.0;
-    trace_attach(&r.b.trace, &clk);
+    trace_attach(&r.b.base.trace, &clk);
     rig_run_until(&r, 10000000);
     assert_int_equal(rises_of(PIK_LINE_FXP, 0, 10000000), 0); /* not even known */
-    trace_detach(&r.b.trace, &clk);
+    trace_detach(&r.b.base.trace, &clk);
     rig_run_until(&r, 20000000);
     r.edges = 0;
-    trace_attach(&r.b.trace, &clk);
+    trace_attach(&r.b.base.trace, &clk);
     rig_run_until(&r, 30000000);
     assert_int_equal(rises_of(PIK_LINE_CLK, 20000000 - TRACE_LAG_NS, 29000000), 368); /* all that the trace can take */
     r.sink.mask = PIK_PULSE_LINES;
-    trace_attach(&r.b.trace, &r.sink);
+    trace_attach(&r.b.base.trace, &r.sink);
     rig_run_until(&r, 40000000);
-    trace_detach(&r.b.trace, &r.sink);
+    trace_detach(&r.b.base.trace, &r.sink);
     rig_run_until(&r, 50000000);
     assert_in_range(rises_of(PIK_LINE_FXP, 30000000, 39700000), 38, 40); /* for each of the two listeners */
 }
@@ -167,7 +167,7 @@ static void a_stuck_output_shows_on_its_lines(void **state)
     (void)state;
     const struct pik_profile p = rig_pik6();
     rig_init(&r, &p, 1);
-    trace_attach(&r.b.trace, &r.sink);
+    trace_attach(&r.b.base.trace, &r.sink);
     pik_power_up(&r.b, 0);
     r.input[0].v = r.input[1].v = 5.0;
     rig_run_until(&r, 10000000);
@@ -177,7 +177,7 @@ static void a_stuck_output_shows_on_its_lines(void **state)
     rig_run_until(&r, 20000000);
     assert_int_equal(edge_of(0, PIK_LINE_FYP, true), r.edges);
     assert_int_equal(edge_of(0, PIK_LINE_FYN, false), r.edges);
-    assert_true(r.b.trace.level >> PIK_LINE_FYP & 1);
+    assert_true(r.b.base.trace.level >> PIK_LINE_FYP & 1);
     assert_true(edge_of(0, PIK_LINE_FXP, true) < r.edges);
     pik_stick(&r.b, 1, &(struct chip_fault){.dout = CHIP_FREE}, r.s.now_ns);
     rig_run_until(&r, 30000000);
@@ -292,7 +292,7 @@ static void a_cycle_takes_its_strobe_and_ends_with_the_power(void **state)
     (void)state;
     const struct pik_profile p = rig_pik();
     rig_init(&r, &p, 1);
-    trace_attach(&r.b.trace, &r.sink);
+    trace_attach(&r.b.base.trace, &r.sink);
     pik_power_up(&r.b, 0);
     rig_run_until(&r, 1000000);
     assert_int_equal(rig_submit(&r, true, PIK_REG_CLEAR, 0, 5000), BOARD_CYCLE_OK);

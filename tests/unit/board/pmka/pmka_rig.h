@@ -119,8 +119,8 @@ static inline void rig_init(struct rig *r, const struct pmka_profile *p)
     memset(r, 0, sizeof *r);
     r->degc = 25.0;
     sched_init(&r->s);
-    pmka_board.init(&r->b, p, &cfg, &io, &r->s);
-    pmka_board.listen(&r->b, true);
+    pmka_board.init(&r->b.base, p, &cfg, &io, &r->s);
+    r->b.base.observed = true;
     pmka_attach(&r->b, &(struct pmka_host){.ctx = r, .reading = rig_reading});
 }
 
@@ -130,7 +130,7 @@ static inline void rig_run(struct rig *r, int64_t ns)
     while (r->s.now_ns < end_ns) { /* as the main loop does: the trace lags behind */
         const int64_t step_ns = end_ns - r->s.now_ns;
         sched_run_until(&r->s, r->s.now_ns + (step_ns < 100000 ? step_ns : 100000));
-        trace_advance(&r->b.trace, r->s.now_ns - TRACE_LAG_NS);
+        trace_advance(&r->b.base.trace, r->s.now_ns - TRACE_LAG_NS);
     }
 }
 
@@ -147,7 +147,7 @@ static inline void rig_readings(struct rig *r, unsigned n)
 static inline void rig_up(struct rig *r, const struct pmka_profile *p)
 {
     rig_init(r, p);
-    pmka_board.power_up(&r->b, 0);
+    pmka_board.power_up(&r->b.base, 0);
 }
 
 /* Codes of one reset of integrator i by the truth, at t_s. */
@@ -213,7 +213,7 @@ static inline enum board_cycle_result rig_cycle(struct rig *r, bool write, unsig
 {
     struct board_cycle c = {.write = write, .address = (uint8_t)address, .data = *data, .done = rig_done, .ctx = r};
     r->answered = false;
-    const enum board_cycle_result refused = pmka_board.bus->submit(&r->b, &c, r->s.now_ns);
+    const enum board_cycle_result refused = pmka_board.bus->submit(&r->b.base, &c, r->s.now_ns);
     if (refused != BOARD_CYCLE_OK) return refused;
     assert_false(r->answered); /* never from inside */
     sched_run_until(&r->s, r->s.now_ns + r->b.profile.strobe_ns);

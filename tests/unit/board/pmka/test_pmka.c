@@ -45,7 +45,7 @@ static void a_random_input_is_integrated_through_many_rotations(void **state)
     for (uint64_t seed = 1; seed <= 3; seed++) {
         rig_init(&rig, &p);
         random_inputs(&rig, seed, 40.0);
-        pmka_board.power_up(&rig.b, 0);
+        pmka_board.power_up(&rig.b.base, 0);
         rig_readings(&rig, 6002); /* 60 turns of five beats: 120 hand-overs an axis, two codes each */
         assert_in_range(rig.b.counters.handovers, 355, 365);
         compare(&rig, 0, 6000, 25.0); /* random: sqrt(2 x 240 / 12) = 6 codes rms */
@@ -62,7 +62,7 @@ static void no_hand_over_costs_more_than_its_codes(void **state)
     p.zero_periods = 2;
     rig_init(&rig, &p);
     random_inputs(&rig, 9, 30.0);
-    pmka_board.power_up(&rig.b, 0);
+    pmka_board.power_up(&rig.b.base, 0);
     rig_readings(&rig, 402);
     for (unsigned k = 3; k + 3 < 400; k++) compare(&rig, k, k + 3, 3.0);
 }
@@ -78,7 +78,7 @@ static void constants_of_the_specimen_are_all_there_is(void **state)
     p.zero_periods = 20;
     rig_init(&rig, &p);
     random_inputs(&rig, 4, 10.0);
-    pmka_board.power_up(&rig.b, 0);
+    pmka_board.power_up(&rig.b.base, 0);
     rig_readings(&rig, 2002);
     compare(&rig, 0, 2000, 20.0);
 }
@@ -91,7 +91,7 @@ static void full_scale_is_a_reset_a_period(void **state)
     for (int sign = -1; sign <= 1; sign += 2) {
         rig_init(&rig, &p);
         for (unsigned a = 0; a < 3; a++) rig.input[a].mean_v = 10.0 * sign;
-        pmka_board.power_up(&rig.b, 0);
+        pmka_board.power_up(&rig.b.base, 0);
         rig_readings(&rig, 300);
         unsigned resets = 0;
         for (unsigned k = 100; k < 200; k++) {
@@ -126,11 +126,11 @@ static void sampling_instants(void **state)
     (void)state;
     const struct pmka_profile p = rig_ideal();
     rig_up(&rig, &p);
-    assert_false(pmka_board.ready(&rig.b));
+    assert_false(pmka_board.ready(&rig.b.base));
     rig_run(&rig, p.start_ns - 1);
-    assert_false(pmka_board.ready(&rig.b));
+    assert_false(pmka_board.ready(&rig.b.base));
     rig_run(&rig, 1);
-    assert_true(pmka_board.ready(&rig.b));
+    assert_true(pmka_board.ready(&rig.b.base));
     assert_int_equal(rig.event_ns[PMKA_EV_START], 10000000);
     rig_readings(&rig, 50);
     for (unsigned k = 0; k < 50; k++) {
@@ -170,7 +170,7 @@ static void the_threshold_of_the_comparators(void **state)
     for (int sign = -1; sign <= 1; sign += 2) {
         rig_init(&rig, &p);
         rig.input[1].mean_v = 0.03 * sign;
-        pmka_board.power_up(&rig.b, 0);
+        pmka_board.power_up(&rig.b.base, 0);
         rig_readings(&rig, 280);
         unsigned resets = 0;
         for (unsigned k = 1; k < 280; k++) {
@@ -189,7 +189,7 @@ static void a_code_is_a_voltage(void **state)
     rig_init(&rig, &p);
     rig.input[0].mean_v = 10.0;
     rig.input[1].mean_v = -9.99;
-    pmka_board.power_up(&rig.b, 0);
+    pmka_board.power_up(&rig.b.base, 0);
     rig_readings(&rig, 2);
     assert_int_equal(rig.reading[1].code[0], 16733);
     assert_int_equal(rig.reading[1].code[1], -17064); /* 100 us later */

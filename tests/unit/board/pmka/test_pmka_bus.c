@@ -142,7 +142,7 @@ static void the_rom_has_the_factory_s_error(void **state)
             cfg.serial = n + 1;
             rig_init(&rig, &p);
             const struct board_io io = {.ctx = &rig, .accel = rig_accel, .temp_degc = rig_degc, .event = rig_event};
-            pmka_board.init(&rig.b, &p, &cfg, &io, &rig.s);
+            pmka_board.init(&rig.b.base, &p, &cfg, &io, &rig.s);
             for (unsigned i = 0; i < PMKA_INTS; i++) {
                 const double e = 1e6 * ct_error(i);
                 sum += e;
@@ -257,7 +257,7 @@ static void too_early_without_power_and_cut(void **state)
     uint16_t data = 0;
     rig_init(&rig, &p);
     assert_int_equal(rig_cycle(&rig, false, STATUS, &data), BOARD_CYCLE_OFF);
-    pmka_board.power_up(&rig.b, 0);
+    pmka_board.power_up(&rig.b.base, 0);
     const unsigned of_reading[] = {X, Y, Z, K, RESETS, ROTATION, SEQ, TEMPERATURE};
     for (size_t k = 0; k < COUNT(of_reading); k++)
         assert_int_equal(rig_cycle(&rig, false, of_reading[k], &data), BOARD_CYCLE_NOT_READY);
@@ -267,13 +267,13 @@ static void too_early_without_power_and_cut(void **state)
     struct board_cycle c = {.address = X, .strobe_ns = 1000, .done = rig_done, .ctx = &rig};
     assert_int_equal(pmka_submit(&rig.b, &c, rig.s.now_ns), BOARD_CYCLE_OK);
     rig.answered = false;
-    pmka_board.reset(&rig.b, rig.s.now_ns);
+    pmka_board.reset(&rig.b.base, rig.s.now_ns);
     assert_true(rig.answered);
     assert_int_equal(rig.result, BOARD_CYCLE_OFF);
     assert_int_equal(rig_cycle(&rig, false, X, &data), BOARD_CYCLE_NOT_READY);
     c.address = STATUS;
     assert_int_equal(pmka_submit(&rig.b, &c, rig.s.now_ns), BOARD_CYCLE_OK);
-    pmka_board.power_down(&rig.b, rig.s.now_ns);
+    pmka_board.power_down(&rig.b.base, rig.s.now_ns);
     assert_int_equal(rig.result, BOARD_CYCLE_OFF);
     assert_int_equal(pmka_submit(&rig.b, &c, rig.s.now_ns), BOARD_CYCLE_OFF);
 }

@@ -44,11 +44,11 @@ static void start(int64_t bitrate_hz)
     can_bus_init(&wire.bus, &(struct can_bus_cfg){.bitrate_hz = (uint32_t)bitrate_hz}, &rig.s);
     wire.host = (struct can_node){.name = "host", .rx = on_frame};
     can_attach(&wire.bus, &wire.host);
-    pmka_board.can->init(&wire.can, &(struct board_can_cfg){.name = "a", .type = &pmka_board, .node_id = NODE}, &rig.b,
-                         &wire.bus, &rig.s);
+    pmka_board.can->init(&wire.can, &(struct board_can_cfg){.name = "a", .type = &pmka_board, .node_id = NODE},
+                         &rig.b.base, &wire.bus, &rig.s);
     wire.stream = rig.b.host;
     pmka_attach(&rig.b, &(struct pmka_host){.ctx = &rig, .reading = tee});
-    pmka_board.power_up(&rig.b, 0);
+    pmka_board.power_up(&rig.b.base, 0);
     pmka_board.can->power_up(&wire.can, 0);
 }
 

@@ -20,7 +20,7 @@ static void up(struct rig *r, const struct pmka_profile *p, double volts)
 {
     rig_init(r, p);
     for (unsigned a = 0; a < 3; a++) r->input[a].mean_v = volts;
-    pmka_board.power_up(&r->b, 0);
+    pmka_board.power_up(&r->b.base, 0);
 }
 
 /* Charge stays, so that the code of X jumps by 1 / 0.7, and its slope and its resets grow alike; none of the others. */
@@ -31,12 +31,12 @@ static void a_capacitor_that_has_lost_some(void **state)
     p.rotation = PMKA_PROGRAM;
     up(&rig, &p, 0.8);
     rig_readings(&rig, 6);
-    pmka_board.wrong(&rig.b, BOARD_WRONG_CAPACITOR);
+    pmka_set_faults(&rig.b, PMKA_FAULT_CAPACITOR);
     rig_readings(&rig, 30);
     const struct pmka_reading *r = rig.reading;
     near(r[6].code[0] * 0.7, r[6].code[1] - 0.8e-4 / 20e3 / 0.47e-6 * 3276.8, 2.0); /* Y is sampled 0.1 ms later */
     near((r[9].code[0] - r[8].code[0]) * 0.7, r[9].code[1] - r[8].code[1], 2.0);
-    pmka_board.wrong(&rig.b, 0);
+    pmka_set_faults(&rig.b, 0);
     rig_readings(&rig, 32);
     near(r[31].code[0] - r[30].code[0], r[31].code[1] - r[30].code[1], 1.0);
 }
@@ -49,13 +49,13 @@ static void a_reset_that_sticks(void **state)
     up(&rig, &p, 2.0);
     rig_readings(&rig, 5);
     assert_int_equal(rig.b.counters.saturations, 0);
-    pmka_board.wrong(&rig.b, BOARD_WRONG_STUCK_RESET);
+    pmka_set_faults(&rig.b, PMKA_FAULT_STUCK_RESET);
     rig_readings(&rig, 20);
     assert_int_equal(rig.reading[15].code[0], -32768);
     assert_true(rig.reading[15].saturated[0] && rig.reading[15].clipped[0]);
     assert_false(rig.reading[15].saturated[1] || rig.reading[15].clipped[1]);
     assert_int_equal(rig.reading[15].reset[0], -1); /* in vain */
-    pmka_board.wrong(&rig.b, 0);
+    pmka_set_faults(&rig.b, 0);
     rig_readings(&rig, 60);
     assert_false(rig.reading[59].saturated[0]);
 }
@@ -66,7 +66,7 @@ static void a_key_that_sticks(void **state)
     (void)state;
     const struct pmka_profile p = short_beats();
     up(&rig, &p, 2.0);
-    pmka_board.wrong(&rig.b, BOARD_WRONG_STUCK_KEY);
+    pmka_set_faults(&rig.b, PMKA_FAULT_STUCK_KEY);
     rig_readings(&rig, 40);
     unsigned served = 0;
     for (unsigned k = 15; k < 40; k++) {
@@ -76,17 +76,17 @@ static void a_key_that_sticks(void **state)
         assert_in_range(r->code[3] - rig.reading[k - 1].code[3] + 1, 0, 2);
     }
     assert_true(served > 15);
-    assert_false(rig.b.trace.level >> PMKA_LINE_KL4 & 1);
+    assert_false(rig.b.base.trace.level >> PMKA_LINE_KL4 & 1);
     for (unsigned k = 15; k < 40; k++) { /* X back at work does not get what was lost */
         const struct pmka_reading *r = &rig.reading[k];
         if (r->serves[0] == 0 || r->reset[0] != 0) continue;
         assert_in_range(r->code[0] - rig.reading[k - 1].code[0], 0, 3347);
     }
     while (rig.b.channel[3].said_axis < 0) rig_run(&rig, 1000000);
-    pmka_board.wrong(&rig.b, 0); /* closes again, if K is to have an axis */
-    assert_true(rig.b.trace.level >> PMKA_LINE_KL4 & 1);
+    pmka_set_faults(&rig.b, 0); /* closes again, if K is to have an axis */
+    assert_true(rig.b.base.trace.level >> PMKA_LINE_KL4 & 1);
     assert_int_equal(rig.b.channel[3].axis, rig.b.channel[3].said_axis);
-    pmka_board.wrong(&rig.b, BOARD_WRONG_STUCK_KEY);
+    pmka_set_faults(&rig.b, PMKA_FAULT_STUCK_KEY);
     assert_int_equal(rig.b.channel[3].axis, -1);
 }
 
@@ -96,13 +96,13 @@ static void words_that_freeze(void **state)
     const struct pmka_profile p = short_beats();
     up(&rig, &p, 3.0);
     rig_readings(&rig, 10);
-    pmka_board.wrong(&rig.b, BOARD_WRONG_FROZEN_WORDS);
+    pmka_set_faults(&rig.b, PMKA_FAULT_FROZEN_WORDS);
     rig_readings(&rig, 20);
     for (unsigned k = 10; k < 20; k++) {
         assert_memory_equal(rig.reading[k].code, rig.reading[9].code, 8);
         assert_int_equal(rig.reading[k].seq, k);
     }
-    pmka_board.wrong(&rig.b, 0);
+    pmka_set_faults(&rig.b, 0);
     rig_readings(&rig, 21);
     assert_memory_not_equal(rig.reading[20].code, rig.reading[9].code, 8);
 }
@@ -125,12 +125,12 @@ static void data_of_the_converter_that_stick(void **state)
     const struct board_part *adc = part("adc", &number);
     assert_int_equal(adc->faults, BOARD_FAULT_DOUT);
     for (int level = 0; level <= 1; level++) {
-        adc->fault(&rig.b, number, &(struct chip_fault){.dout = level ? CHIP_STUCK_HIGH : CHIP_STUCK_LOW},
+        adc->fault(&rig.b.base, number, &(struct chip_fault){.dout = level ? CHIP_STUCK_HIGH : CHIP_STUCK_LOW},
                    rig.s.now_ns);
         rig_readings(&rig, 20 + 10 * (unsigned)level);
         for (unsigned i = 0; i < 4; i++) assert_int_equal(rig.reading[rig.readings - 1].code[i], -level);
     }
-    adc->fault(&rig.b, number, &(struct chip_fault){.dout = CHIP_FREE}, rig.s.now_ns);
+    adc->fault(&rig.b.base, number, &(struct chip_fault){.dout = CHIP_FREE}, rig.s.now_ns);
     rig_readings(&rig, 40);
     assert_true(rig.reading[39].code[1] != -1 && rig.reading[39].code[1] != 0);
 }
@@ -144,12 +144,12 @@ static void a_bit_of_the_rom(void **state)
     const struct board_part *rom = part("rom", &number);
     assert_int_equal(rom->registers, 2 * PMKA_ROM_WORDS);
     const uint16_t w5 = rig.b.rom[5];
-    assert_true(rom->flip(&rig.b, number, 11, 0x81, 0));
+    assert_true(rom->flip(&rig.b.base, number, 11, 0x81, 0));
     assert_int_equal(rig.b.rom[5], w5 ^ 0x8100);
-    assert_true(rom->flip(&rig.b, number, 10, 0x02, 0));
+    assert_true(rom->flip(&rig.b.base, number, 10, 0x02, 0));
     assert_int_equal(rig.b.rom[5], w5 ^ 0x8102);
-    pmka_board.power_down(&rig.b, 0);
-    pmka_board.power_up(&rig.b, 0);
+    pmka_board.power_down(&rig.b.base, 0);
+    pmka_board.power_up(&rig.b.base, 0);
     assert_int_equal(rig.b.rom[5], w5 ^ 0x8102);
 }
 
@@ -165,8 +165,8 @@ static void res(void **state)
     const unsigned before = rig.readings;
     const double charge_c = rig.b.channel[1].integrator.charge_c;
     assert_true(fabs(charge_c) > 1e-8);
-    pmka_board.reset(&rig.b, t_ns);
-    assert_false(pmka_board.ready(&rig.b));
+    pmka_board.reset(&rig.b.base, t_ns);
+    assert_false(pmka_board.ready(&rig.b.base));
     assert_int_equal(rig.events[PMKA_EV_RES], 1);
     assert_int_equal(rig.b.counters.res, 1);
     for (unsigned i = 0; i < 3; i++) assert_int_equal(rig.b.channel[i].axis, i);
@@ -191,11 +191,11 @@ static void res_cuts_a_reset(void **state)
     const int16_t was = rig.b.next.code[0];
     const int64_t t_ns = rig.b.channel[0].reset_from_ns + 1200000;
     rig_run(&rig, t_ns - rig.s.now_ns);
-    assert_true(rig.b.trace.level >> PMKA_LINE_RP1 & 1);
+    assert_true(rig.b.base.trace.level >> PMKA_LINE_RP1 & 1);
     assert_true(rig.b.channel[0].count[0] > 0);
     const unsigned before = rig.readings;
-    pmka_board.reset(&rig.b, t_ns);
-    assert_false(rig.b.trace.level >> PMKA_LINE_RP1 & 1);
+    pmka_board.reset(&rig.b.base, t_ns);
+    assert_false(rig.b.base.trace.level >> PMKA_LINE_RP1 & 1);
     assert_int_equal(rig.b.channel[0].count[0], 0);
     rig_readings(&rig, before + 2);
     const struct pmka_reading *r = &rig.reading[rig.readings - 2];
@@ -213,7 +213,7 @@ static void a_fault_has_its_instant(void **state)
     up(&rig, &p, 0.0);
     rig_readings(&rig, 3);
     sched_run_until(&rig.s, rig.reading[2].t_ns + 3600000);
-    pmka_board.wrong(&rig.b, BOARD_WRONG_STUCK_RESET);
+    pmka_set_faults(&rig.b, PMKA_FAULT_STUCK_RESET);
     rig_readings(&rig, 4);
     near(rig.reading[3].code[0], -20.0 * 1.2e-3 / 20e3 / 0.47e-6 * 3276.8, 1.0);
 }
@@ -225,15 +225,15 @@ static void power(void **state)
     const struct pmka_profile p = short_beats();
     up(&rig, &p, 5.0);
     rig_readings(&rig, 33);
-    pmka_board.power_down(&rig.b, rig.s.now_ns);
+    pmka_board.power_down(&rig.b.base, rig.s.now_ns);
     assert_int_equal(rig.events[PMKA_EV_POWER_DOWN], 1);
     rig_run(&rig, 50000000);
     assert_int_equal(rig.readings, 33);
-    pmka_board.sample_until(&rig.b, rig.s.now_ns);
-    pmka_board.reset(&rig.b, rig.s.now_ns); /* nothing */
+    pmka_board.sample_until(&rig.b.base, rig.s.now_ns);
+    pmka_board.reset(&rig.b.base, rig.s.now_ns); /* nothing */
     assert_int_equal(rig.b.counters.res, 0);
-    pmka_board.power_up(&rig.b, rig.s.now_ns);
-    pmka_board.power_up(&rig.b, rig.s.now_ns);
+    pmka_board.power_up(&rig.b.base, rig.s.now_ns);
+    pmka_board.power_up(&rig.b.base, rig.s.now_ns);
     assert_int_equal(rig.events[PMKA_EV_POWER_UP], 2);
     rig_readings(&rig, 35);
     assert_int_equal(rig.reading[33].seq, 0);
@@ -276,7 +276,7 @@ static void the_input_may_change_abruptly(void **state)
     rig_readings(&rig, 2);
     const int64_t t_ns = rig.reading[1].t_ns + 3456789;
     sched_run_until(&rig.s, t_ns);
-    pmka_board.sample_until(&rig.b, t_ns);
+    pmka_board.sample_until(&rig.b.base, t_ns);
     for (unsigned a = 0; a < 3; a++) rig.input[a].mean_v = -1.0;
     rig_readings(&rig, 3);
     const double want_vs = 3456.789e-6 - (4800e-6 - 3456.789e-6);
@@ -288,7 +288,7 @@ static void hex_of(const struct rig *r, char hex[SHA256_HEX])
 {
     struct sha256 s;
     sha256_init(&s);
-    pmka_board.digest(&r->b, &s);
+    pmka_board.digest(&r->b.base, &s);
     sha256_hex(&s, hex);
 }
 
@@ -319,7 +319,7 @@ static void the_digest_sees_everything(void **state)
     SHOWS(b->rotation.age++, b->rotation.age--);
     SHOWS(b->rotation.beat_periods++, b->rotation.beat_periods--);
     SHOWS(b->rom[40] ^= 1, b->rom[40] ^= 1);
-    SHOWS(b->wrongs ^= 4, b->wrongs ^= 4);
+    SHOWS(b->base.faults ^= 4, b->base.faults ^= 4);
     SHOWS(b->bus.index++, b->bus.index--);
     SHOWS(b->adc_noise.s[2]++, b->adc_noise.s[2]--);
     SHOWS(b->temp_noise.s[0]++, b->temp_noise.s[0]--);
@@ -346,8 +346,8 @@ static void the_truth(void **state)
     const struct pmka_profile p = rig_profile();
     up(&rig, &p, 2.0);
     rig_readings(&rig, 101);
-    pmka_board.sample_until(&rig.b, rig.s.now_ns);
-    pmka_board.truth(&rig.b, on_truth, NULL);
+    pmka_board.sample_until(&rig.b.base, rig.s.now_ns);
+    pmka_board.truth(&rig.b.base, on_truth, NULL);
     assert_int_equal(truths, 5 + 4 * 9 + 3);
     near(truth_of_uref, rig.b.specimen.uref_v, 0.0);
     near(truth_of_integral, 2.0 * 1e-9 * (double)(rig.s.now_ns - 10000000), 1e-9);
@@ -366,7 +366,7 @@ static void specimens(void **state)
     struct board_cfg cfg = rig_cfg();
     const struct board_io io = {.ctx = &other, .accel = rig_accel, .temp_degc = rig_degc};
     cfg.serial++;
-    pmka_board.init(&other.b, &p, &cfg, &io, &other.s);
+    pmka_board.init(&other.b.base, &p, &cfg, &io, &other.s);
     unsigned same = 0;
     for (unsigned w = 6; w < PMKA_ROM_WORDS; w++) same += rig.b.rom[w] == other.b.rom[w];
     assert_true(same < 8);
@@ -381,7 +381,7 @@ static void the_zero(void **state)
     p.zero_tc_sd_v_per_k = 1e-6;
     rig_init(&rig, &p);
     rig.degc = 65.0;
-    pmka_board.power_up(&rig.b, 0);
+    pmka_board.power_up(&rig.b.base, 0);
     rig_readings(&rig, 1001);
     for (unsigned i = 0; i < 4; i++) {
         const struct pmka_int_cfg *c = &rig.b.channel[i].integrator.cfg;
@@ -402,7 +402,7 @@ static void the_board_warms_up(void **state)
     p.cap_tc_ppm_per_k = -1000.0;
     rig_init(&rig, &p);
     rig.degc_per_s = 10.0;
-    pmka_board.power_up(&rig.b, 0);
+    pmka_board.power_up(&rig.b.base, 0);
     rig_readings(&rig, 1000);
     for (unsigned k = 900; k < 1000; k++) {
         const struct pmka_reading *r = &rig.reading[k];
@@ -419,7 +419,7 @@ static void the_thermometer(void **state)
     const struct pmka_profile p = rig_profile();
     rig_init(&rig, &p);
     rig.degc = -17.25;
-    pmka_board.power_up(&rig.b, 0);
+    pmka_board.power_up(&rig.b.base, 0);
     rig_readings(&rig, 200);
     double sum = 0.0, square = 0.0;
     for (unsigned k = 0; k < 200; k++) {

@@ -53,9 +53,9 @@ static void watch(struct rig *r)
     const struct pmka_profile p = short_beats();
     rig_init(r, &p);
     inputs(r);
-    trace_attach(&r->b.trace, &sink);
+    trace_attach(&r->b.base.trace, &sink);
     edges = 0; /* the levels it was given first */
-    pmka_board.power_up(&r->b, 0);
+    pmka_board.power_up(&r->b.base, 0);
 }
 
 /* SH: 50 us from each sampling instant on; CONV: its last 48 us. The multiplexer moves when the sample is held. */
@@ -87,7 +87,7 @@ static void the_converter_on_its_lines(void **state)
         at = next_edge(PMKA_LINE_MUX1, at + 1);
         assert_int_equal(edge[at++].t_ns, 10000000 + n * INT64_C(4800000) + 300000);
     }
-    assert_int_equal(rig.b.trace.late, 0);
+    assert_int_equal(rig.b.base.trace.late, 0);
 }
 
 /* Each reset that a reading tells is a pulse of half a period on its line, from the sampling instant before. */
@@ -137,7 +137,7 @@ static void keys_and_beats_on_their_lines(void **state)
 
 static uint64_t levels(const struct rig *r)
 {
-    const struct trace *t = &r->b.trace;
+    const struct trace *t = &r->b.base.trace;
     uint64_t level = t->level;
     for (unsigned i = t->first; i < t->first + t->pending_count && t->pending[i].t_ns <= r->s.now_ns; i++)
         level = (level & ~t->pending[i].lines) | (t->pending[i].level & t->pending[i].lines);
@@ -149,9 +149,9 @@ static void disturb(unsigned n)
     struct rig *const rigs[] = {&rig, &other};
     for (unsigned k = 0; k < 2; k++) {
         const int64_t t_ns = rigs[k]->s.now_ns;
-        if (n % 50 == 30) pmka_board.reset(&rigs[k]->b, t_ns);
-        if (n % 100 == 60) pmka_board.power_down(&rigs[k]->b, t_ns);
-        if (n % 100 == 62) pmka_board.power_up(&rigs[k]->b, t_ns);
+        if (n % 50 == 30) pmka_board.reset(&rigs[k]->b.base, t_ns);
+        if (n % 100 == 60) pmka_board.power_down(&rigs[k]->b.base, t_ns);
+        if (n % 100 == 62) pmka_board.power_up(&rigs[k]->b.base, t_ns);
     }
 }
 
@@ -165,13 +165,13 @@ static void a_late_look_tells_what_an_early_one_knows(void **state)
     watch(&rig);
     rig_init(&other, &p);
     inputs(&other);
-    pmka_board.power_up(&other.b, 0);
+    pmka_board.power_up(&other.b.base, 0);
     for (unsigned n = 0; n < 3000; n++) {
         const int64_t ns = n % 3 ? (int64_t)(rng_uniform(&rng) * 9600000) : (int64_t)(rng_uniform(&rng) * 60000);
         rig_run(&rig, ns);
         rig_run(&other, ns);
         disturb(n);
-        trace_attach(&other.b.trace, &late);
+        trace_attach(&other.b.base.trace, &late);
         const uint64_t want = levels(&rig), got = levels(&other);
         if (want != got)
             fail_msg("look %u at %lld ns: %llx, not %llx", n, (long long)rig.s.now_ns, (unsigned long long)got,
@@ -179,15 +179,15 @@ static void a_late_look_tells_what_an_early_one_knows(void **state)
         converting += want >> PMKA_LINE_CONV & 1;
         resetting += (want >> PMKA_LINE_RP1 & 0xFF) != 0;
         edges = 0;
-        trace_advance(&other.b.trace, other.s.now_ns);
+        trace_advance(&other.b.base.trace, other.s.now_ns);
         for (unsigned k = 1; k < edges; k++) /* no pulse that was over long ago */
             for (unsigned j = 0; j < k; j++) assert_int_not_equal(edge[k].line, edge[j].line);
-        trace_detach(&other.b.trace, &late);
+        trace_detach(&other.b.base.trace, &late);
         edges = 0;
     }
     assert_true(converting > 20 && resetting > 300);
-    assert_int_equal(other.b.trace.late, 0);
-    assert_int_equal(rig.b.trace.late, 0);
+    assert_int_equal(other.b.base.trace.late, 0);
+    assert_int_equal(rig.b.base.trace.late, 0);
 }
 
 static void looking_changes_nothing(void **state)
@@ -197,9 +197,9 @@ static void looking_changes_nothing(void **state)
     watch(&rig);
     rig_run(&rig, 600 * INT64_C(4800000));
     rig_init(&other, &p);
-    pmka_board.listen(&other.b, false);
+    other.b.base.observed = false;
     inputs(&other);
-    pmka_board.power_up(&other.b, 0);
+    pmka_board.power_up(&other.b.base, 0);
     rig_run(&other, 600 * INT64_C(4800000));
     assert_int_equal(rig.readings, other.readings);
     for (unsigned k = 0; k < rig.readings; k++) assert_memory_equal(rig.reading[k].code, other.reading[k].code, 8);
@@ -207,8 +207,8 @@ static void looking_changes_nothing(void **state)
     char hex_a[SHA256_HEX], hex_b[SHA256_HEX];
     sha256_init(&a);
     sha256_init(&b);
-    pmka_board.digest(&rig.b, &a);
-    pmka_board.digest(&other.b, &b);
+    pmka_board.digest(&rig.b.base, &a);
+    pmka_board.digest(&other.b.base, &b);
     sha256_hex(&a, hex_a);
     sha256_hex(&b, hex_b);
     assert_string_equal(hex_a, hex_b);
@@ -221,12 +221,12 @@ static void power_on_the_lines(void **state)
     (void)state;
     watch(&rig);
     rig_run(&rig, 53 * INT64_C(4800000) + 1000);
-    pmka_board.power_down(&rig.b, rig.s.now_ns);
+    pmka_board.power_down(&rig.b.base, rig.s.now_ns);
     assert_int_equal(levels(&rig), 0);
     rig_run(&rig, 20000000);
     assert_int_equal(levels(&rig), 0);
-    assert_false(pmka_board.ready(&rig.b));
-    pmka_board.power_up(&rig.b, rig.s.now_ns);
+    assert_false(pmka_board.ready(&rig.b.base));
+    pmka_board.power_up(&rig.b.base, rig.s.now_ns);
     assert_int_equal(levels(&rig), 7 | TRACE_BIT(PMKA_LINE_CS) | TRACE_BIT(PMKA_LINE_RW));
 }
 

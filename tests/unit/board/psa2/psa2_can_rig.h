@@ -50,9 +50,9 @@ static inline void fake_done(struct rig *r, enum psa2_result result)
 }
 
 /* As psa2.h has it: a reset ends a request with a time-out. */
-static inline void fake_reset(void *ctx, int64_t t_ns)
+static inline void fake_reset(struct board *board, int64_t t_ns)
 {
-    struct rig *r = ctx;
+    struct rig *r = (struct rig *)board; /* the port's context */
     (void)t_ns;
     r->resets++;
     if (r->request) fake_done(r, PSA2_TIMEOUT);

@@ -105,7 +105,7 @@ static inline void rig_run(struct rig *r, int64_t ns)
     while (r->s.now_ns < end_ns) { /* as the main loop does: the trace lags behind */
         const int64_t step_ns = end_ns - r->s.now_ns;
         sched_run_until(&r->s, r->s.now_ns + (step_ns < 100000 ? step_ns : 100000));
-        trace_advance(&r->b.trace, r->s.now_ns - TRACE_LAG_NS);
+        trace_advance(&r->b.base.trace, r->s.now_ns - TRACE_LAG_NS);
     }
 }
 

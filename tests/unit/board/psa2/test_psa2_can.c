@@ -243,8 +243,8 @@ static struct rig *real_up(void)
     lab_cfg.head.turn_s = 1.0;
     lab_init(&lab, &lab_cfg, 1);
     unit_init(&real, &cfg, &lab, &r->s);
-    psa2_attach(real.board, &(struct psa2_host){&r->can, psa2_can_frame, psa2_can_fault});
-    psa2_power_up(real.board, 0);
+    psa2_attach(&real.store.psa2, &(struct psa2_host){&r->can, psa2_can_frame, psa2_can_fault});
+    psa2_power_up(&real.store.psa2, 0);
     board_node_power_up(&r->can, 0);
     return r;
 }
@@ -254,7 +254,7 @@ static void the_article_s_set_up_is_read_back_through_can(void **state)
     (void)state;
     struct rig *r = real_up();
     sched_run_until(&r->s, 2 * NS_PER_S);
-    assert_true(psa2_ready(real.board));
+    assert_true(psa2_ready(&real.store.psa2));
     assert_int_equal(upload(r, 0x2000, 2) & 0xFF, 0x56); /* CONFIG0 */
     assert_int_equal(upload(r, 0x2004, 2) & 0xFF, 0x56);
     assert_int_equal(write_u8(r, 0x2003, 4, 0x77), 0); /* HPF0 through Y */

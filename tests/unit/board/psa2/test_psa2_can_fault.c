@@ -65,13 +65,13 @@ static struct bench *up(void)
     lab_init(&r->lab, &world, 1);
     unit_init(&r->unit, &cfg, &r->lab, &r->s);
     can_bus_init(&r->bus, &(struct can_bus_cfg){.bitrate_hz = 1000000}, &r->s);
-    const struct psa2_can_port port = psa2_can_port(r->unit.board);
+    const struct psa2_can_port port = psa2_can_port(&r->unit.store.psa2);
     psa2_can_init(&r->can, &(struct board_can_cfg){.name = "a", .type = &psa2_board, .node_id = NODE}, &port, &r->bus,
                   &r->s);
-    psa2_attach(r->unit.board, &(struct psa2_host){&r->can, psa2_can_frame, psa2_can_fault});
+    psa2_attach(&r->unit.store.psa2, &(struct psa2_host){&r->can, psa2_can_frame, psa2_can_fault});
     r->host = (struct can_node){.name = "host", .rx = on_any, .error = on_any, .ctx = r};
     can_attach(&r->bus, &r->host);
-    psa2_power_up(r->unit.board, 0);
+    psa2_power_up(&r->unit.store.psa2, 0);
     board_node_power_up(&r->can, 0);
     run(r, 1000000);
     start(r);
@@ -115,13 +115,13 @@ static void without_power_the_unit_is_off_the_bus_and_forgets(void **state)
     assert_int_equal(r->can.set.form, FAST);
     assert_true(seen(r, 0x380 + NODE, 0) > 5);
     run(r, 300000); /* away from a frame */
-    psa2_power_down(r->unit.board, r->s.now_ns);
+    psa2_power_down(&r->unit.store.psa2, r->s.now_ns);
     psa2_can_power_down(&r->can);
     const unsigned from = r->count;
     start(r);
     run(r, 100000000);
     assert_int_equal(r->count, from);
-    psa2_power_up(r->unit.board, r->s.now_ns);
+    psa2_power_up(&r->unit.store.psa2, r->s.now_ns);
     board_node_power_up(&r->can, r->s.now_ns);
     run(r, 1000000);
     assert_int_equal(seen(r, 0x700 + NODE, from), 1); /* boot-up */
@@ -140,12 +140,12 @@ static void a_request_under_way_dies_with_the_power(void **state)
         host_sends(r, 0x600 + NODE, 8, (const uint8_t[]){SDO_READ, 0x01, 0x20, 1, 0, 0, 0, 0});
         while (!r->can.request_busy) sched_run_until(&r->s, sched_next_ns(&r->s));
         if (order) psa2_can_power_down(&r->can);
-        psa2_power_down(r->unit.board, r->s.now_ns);
+        psa2_power_down(&r->unit.store.psa2, r->s.now_ns);
         if (!order) psa2_can_power_down(&r->can);
         const unsigned from = r->count;
         run(r, 10000000);
         assert_false(r->can.request_busy);
-        psa2_power_up(r->unit.board, r->s.now_ns);
+        psa2_power_up(&r->unit.store.psa2, r->s.now_ns);
         board_node_power_up(&r->can, r->s.now_ns);
         run(r, 200000000);
         assert_int_equal(seen(r, 0x80 + NODE, from), 0); /* no EMCY of the old life */
@@ -164,7 +164,7 @@ static void a_frame_on_the_wire_breaks_off_with_the_power(void **state)
         sched_run_until(&r->s, sched_next_ns(&r->s));
     run(r, 20000);
     const unsigned from = r->count;
-    psa2_power_down(r->unit.board, r->s.now_ns);
+    psa2_power_down(&r->unit.store.psa2, r->s.now_ns);
     psa2_can_power_down(&r->can);
     run(r, 10000000);
     assert_int_equal(errors(r, from), 1);

@@ -26,8 +26,8 @@ static void init(bool watched, bool events)
     rig_init(&rig, &p, 1.0);
     tolds = 0;
     rig.b.io.event = on_event;
-    psa2_listen(&rig.b, events);
-    if (watched) trace_attach(&rig.b.trace, &rig.sink);
+    rig.b.base.observed = events;
+    if (watched) trace_attach(&rig.b.base.trace, &rig.sink);
     rig.edges = 0; /* without the levels at the beginning */
 }
 
@@ -76,7 +76,7 @@ static void each_event_is_told_at_its_edge(void **state)
     rig_run(&rig, 200000000);
     psa2_reset(&rig.b, rig.s.now_ns);
     rig_run(&rig, 200000000);
-    trace_advance(&rig.b.trace, rig.s.now_ns);
+    trace_advance(&rig.b.base.trace, rig.s.now_ns);
     const int64_t end_ns = rig.s.now_ns - 100000; /* the start of a frame was reported, and its fall is drawn later */
     match(PSA2_EV_RES, PSA2_LINE_RES, false, end_ns);
     match(PSA2_EV_SYNC_A, PSA2_LINE_SYNC_A, true, end_ns);
@@ -133,8 +133,8 @@ static void an_event_has_one_name_and_a_name_one_event(void **state)
 
 static void assert_dark(void)
 {
-    trace_advance(&rig.b.trace, rig.s.now_ns);
-    assert_int_equal(rig.b.trace.level, 0);
+    trace_advance(&rig.b.base.trace, rig.s.now_ns);
+    assert_int_equal(rig.b.base.trace.level, 0);
     assert_true(sched_next_ns(&rig.s) == SCHED_NEVER); /* nothing goes on */
     assert_false(psa2_ready(&rig.b));
     assert_int_equal(rig.b.tadc.mode, ADS1256_OFF);
@@ -162,7 +162,7 @@ static void power_fails_in_the_middle_of_a_frame(void **state)
     while (events(PSA2_EV_INT_FALL) == falls) sched_run_until(&rig.s, sched_next_ns(&rig.s));
     const int64_t fall_ns = rig.s.now_ns;
     up_to(fall_ns + 30000);
-    trace_advance(&rig.b.trace, fall_ns - 1);
+    trace_advance(&rig.b.base.trace, fall_ns - 1);
     rig.edges = 0;
     const uint32_t frames = rig.b.counters.frames;
     psa2_power_down(&rig.b, rig.s.now_ns);
@@ -279,16 +279,16 @@ static void without_sync_t_the_pin_rests_and_the_scan_goes_on(void **state)
     psa2_power_up(&rig.b, 0);
     await_frames(20);
     assert_true(events(PSA2_EV_SYNC_T) > 0);
-    psa2_fault_set(&rig.b, &(struct psa2_controller_fault){.skip_sync_t = true});
+    rig.b.base.faults = PSA2_FAULT_SKIP_SYNC_T;
     rig_run(&rig, 1000000); /* a pulse that had begun ends */
     const unsigned pulses = events(PSA2_EV_SYNC_T), words = events(PSA2_EV_DRD_T);
-    trace_advance(&rig.b.trace, rig.s.now_ns);
+    trace_advance(&rig.b.base.trace, rig.s.now_ns);
     rig.edges = 0;
     rig_run(&rig, 300000000);
     assert_int_equal(events(PSA2_EV_SYNC_T), pulses);
     assert_true(events(PSA2_EV_DRD_T) >= words + 20);
     for (unsigned i = 0; i < rig.edges; i++) assert_int_not_equal(rig.edge[i].sig, PSA2_LINE_SYNC_T);
-    psa2_fault_set(&rig.b, &(struct psa2_controller_fault){.skip_sync_t = false});
+    rig.b.base.faults = 0;
     rig_run(&rig, 100000000);
     assert_true(events(PSA2_EV_SYNC_T) > pulses);
     assert_int_equal(rig.faults, 0);
@@ -302,7 +302,7 @@ static void without_sync_t_nothing_waits_for_the_filter(void **state)
         init(false, true);
         psa2_power_up(&rig.b, 0);
         await_frames(20);
-        psa2_fault_set(&rig.b, &(struct psa2_controller_fault){.skip_sync_t = k == 1});
+        rig.b.base.faults = k == 1 ? PSA2_FAULT_SKIP_SYNC_T : 0;
         rig_run(&rig, 30000000);
         tolds = 0;
         rig_run(&rig, 100000000);
@@ -323,10 +323,10 @@ static void the_wrong_way_round_the_last_step_comes_first(void **state)
     static struct rig_byte bytes[4096];
     static const uint8_t want[] = {0x53, 0x00, 0x82, 0x50, 0x00, 0x04, 0x50, 0x00, 0x02, 0x41, 0x00, 0x56};
     init(true, true);
-    psa2_fault_set(&rig.b, &(struct psa2_controller_fault){.wrong_setup_order = true});
+    rig.b.base.faults = PSA2_FAULT_SETUP_ORDER;
     psa2_power_up(&rig.b, 0);
     await_frames(1);
-    trace_advance(&rig.b.trace, rig.s.now_ns);
+    trace_advance(&rig.b.base.trace, rig.s.now_ns);
     const unsigned n = rig_decode_spi(&rig, bytes, COUNT(bytes));
     assert_true(n > COUNT(want));
     for (size_t i = 0; i < COUNT(want); i++) assert_int_equal(bytes[i].mosi, want[i]);
@@ -338,7 +338,7 @@ static void the_wrong_way_round_the_last_step_comes_first(void **state)
     struct psa2_request q = {.group = PSA2_TEMP, .op = PSA2_READ_REG, .addr = ADS1256_STATUS};
     assert_int_equal(rig_request(&rig, &q), PSA2_OK);
     assert_int_equal(q.answer[0] & 0x06, ADS1256_STATUS_BUFEN); /* and not ACAL */
-    psa2_fault_set(&rig.b, &(struct psa2_controller_fault){.wrong_setup_order = false});
+    rig.b.base.faults = 0;
     psa2_reset(&rig.b, rig.s.now_ns);
     rig_run(&rig, 200000000);
     assert_int_equal(rig_request(&rig, &q), PSA2_OK);
@@ -352,7 +352,7 @@ static void frozen_words_stay_while_numbers_go_on(void **state)
     rig.volts[0] = 1.0;
     psa2_power_up(&rig.b, 0);
     await_frames(70);
-    psa2_fault_set(&rig.b, &(struct psa2_controller_fault){.frozen_words = true});
+    rig.b.base.faults = PSA2_FAULT_FROZEN_WORDS;
     const unsigned from = rig.frames;
     rig.volts[0] = 2.0;
     await_frames(from + 100);
@@ -362,7 +362,7 @@ static void frozen_words_stay_while_numbers_go_on(void **state)
         assert_int_equal(rig.frame[i].temp_code, rig.frame[from - 1].temp_code);
         assert_int_equal(rig.frame[i].seq, rig.frame[i - 1].seq + 1);
     }
-    psa2_fault_set(&rig.b, &(struct psa2_controller_fault){.frozen_words = false});
+    rig.b.base.faults = 0;
     await_frames(rig.frames + 2);
     assert_true(rig.frame[rig.frames - 1].code[0] > rig.frame[from - 1].code[0] + 100000);
 }

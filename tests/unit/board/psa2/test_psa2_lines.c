@@ -14,12 +14,12 @@ static void watched_run(struct rig *r, const char *profile, int64_t ns)
     r->volts[0] = 2.4882;
     r->volts[1] = -7.0;
     r->volts[2] = 9.9;
-    trace_attach(&r->b.trace, &r->sink);
+    trace_attach(&r->b.base.trace, &r->sink);
     psa2_power_up(&r->b, 0);
     rig_run(r, ns);
-    trace_advance(&r->b.trace, r->s.now_ns);
-    assert_int_equal(r->b.trace.late, 0);
-    assert_int_equal(r->b.trace.dropped, 0);
+    trace_advance(&r->b.base.trace, r->s.now_ns);
+    assert_int_equal(r->b.base.trace.late, 0);
+    assert_int_equal(r->b.base.trace.dropped, 0);
     assert_true(r->edges < RIG_EDGES);
 }
 
@@ -253,12 +253,12 @@ static void watching_changes_nothing(void **state)
                 struct rig *r = rigs[i];
                 rig_init(r, &profile, 1.0);
                 r->volts[0] = 2.4882;
-                if (i && !late) trace_attach(&r->b.trace, &r->sink);
+                if (i && !late) trace_attach(&r->b.base.trace, &r->sink);
                 psa2_power_up(&r->b, 0);
                 rig_run(r, 200030000);
-                if (i && late) trace_attach(&r->b.trace, &r->sink);
+                if (i && late) trace_attach(&r->b.base.trace, &r->sink);
                 rig_run(r, 20000000);
-                if (i && late) trace_detach(&r->b.trace, &r->sink);
+                if (i && late) trace_detach(&r->b.base.trace, &r->sink);
                 rig_run(r, 20000000);
             }
             assert_int_equal(rig.edges, 0);

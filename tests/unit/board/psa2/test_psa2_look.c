@@ -12,7 +12,7 @@ static struct rig watched, fresh;
 /* As the command `lines` takes them: what was delivered and what is due. */
 static uint64_t levels(const struct rig *r)
 {
-    const struct trace *t = &r->b.trace;
+    const struct trace *t = &r->b.base.trace;
     uint64_t level = t->level;
     for (unsigned i = t->first; i < t->first + t->pending_count && t->pending[i].t_ns <= r->s.now_ns; i++) {
         level = (level & ~t->pending[i].lines) | (t->pending[i].level & t->pending[i].lines);
@@ -30,7 +30,7 @@ static void start(const char *profile)
         r->volts[0] = 2.4882;
         r->volts[1] = -7.0;
         r->volts[2] = 9.9;
-        if (i == 0) trace_attach(&r->b.trace, &r->sink);
+        if (i == 0) trace_attach(&r->b.base.trace, &r->sink);
         psa2_power_up(&r->b, 0);
     }
 }
@@ -55,7 +55,7 @@ static void same_levels(const char *profile, uint64_t lines)
 /* All lines but those that a byte just ended still moves, within a period of SClk. */
 static uint64_t settled(void)
 {
-    const struct trace *t = &watched.b.trace;
+    const struct trace *t = &watched.b.base.trace;
     uint64_t lines = ALL_LINES;
     for (unsigned i = t->first; i < t->first + t->pending_count; i++) {
         if (t->pending[i].t_ns > watched.s.now_ns) lines &= ~t->pending[i].lines;
@@ -66,15 +66,15 @@ static uint64_t settled(void)
 /* At once and, since the looking goes on for a while, up to the end of a frame; then no one looks again. */
 static void look(struct rng *rng, const char *profile)
 {
-    trace_attach(&fresh.b.trace, &fresh.sink);
+    trace_attach(&fresh.b.base.trace, &fresh.sink);
     same_levels(profile, settled());
     for (int k = 0; k < 4; k++) {
         both_run((int64_t)(rng_uniform(rng) * 40000));
         same_levels(profile, settled());
     }
-    trace_detach(&fresh.b.trace, &fresh.sink);
-    assert_int_equal(fresh.b.trace.late, 0);
-    assert_int_equal(fresh.b.trace.dropped, 0);
+    trace_detach(&fresh.b.base.trace, &fresh.sink);
+    assert_int_equal(fresh.b.base.trace.late, 0);
+    assert_int_equal(fresh.b.base.trace.dropped, 0);
 }
 
 /* Between two bytes of a command. */
@@ -128,7 +128,7 @@ static void a_frame_under_way_is_told_from_its_beginning(void **state)
     while (!fresh.b.out.busy || fresh.s.now_ns < fresh.b.out.f.t_int_fall_ns + 30000) both_run(1000);
     fresh.edges = 0;
     const int64_t from_ns = fresh.b.out.f.t_int_fall_ns;
-    trace_attach(&fresh.b.trace, &fresh.sink);
+    trace_attach(&fresh.b.base.trace, &fresh.sink);
     const unsigned levels_told = fresh.edges;
     both_run(500000);
     assert_true(watched.frames > frames);
@@ -156,12 +156,12 @@ static void a_frame_that_is_closed_in_part_goes_on(void **state)
     both_run(200000000);
     while (!fresh.b.out.busy || fresh.s.now_ns < fresh.b.out.f.t_int_fall_ns + 30000) both_run(1000);
     const struct psa2_frame f = fresh.b.out.f;
-    trace_advance(&fresh.b.trace, fresh.s.now_ns); /* in the second word: 22 ... 38 us */
-    trace_attach(&fresh.b.trace, &fresh.sink);
+    trace_advance(&fresh.b.base.trace, fresh.s.now_ns); /* in the second word: 22 ... 38 us */
+    trace_attach(&fresh.b.base.trace, &fresh.sink);
     assert_int_equal(levels(&fresh) & OUT_LINES, 0);
     fresh.edges = 0;
     both_run(500000);
-    assert_int_equal(fresh.b.trace.late, 0);
+    assert_int_equal(fresh.b.base.trace.late, 0);
     unsigned clocks = 0;
     for (unsigned i = 0; i < fresh.edges; i++) {
         const struct rig_edge *e = &fresh.edge[i];

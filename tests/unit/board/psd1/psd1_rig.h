@@ -151,7 +151,7 @@ static inline void rig_init(struct rig *r, const struct psd1_profile *p, double 
     r->volts[2] = 9.9;
     sched_init(&r->s);
     psd1_init(&r->b, p, &u, &io, &r->s);
-    r->b.told = true;
+    r->b.base.observed = true;
     sched_ev(&r->stopper, rig_stop_int0, r);
     psd1_attach(&r->b, &(struct psd1_host){.ctx = r, .cycle = rig_cycle, .fault = rig_fault});
     r->sink = (struct trace_sink){.mask = TRACE_FIRST(PSD1_LINES), .steps = rig_steps, .ctx = r};
@@ -160,7 +160,7 @@ static inline void rig_init(struct rig *r, const struct psd1_profile *p, double 
 static inline void rig_watch(struct rig *r, uint64_t mask)
 {
     r->sink.mask = mask;
-    trace_attach(&r->b.trace, &r->sink);
+    trace_attach(&r->b.base.trace, &r->sink);
     r->edges = 0; /* not the levels it begins with */
 }
 
@@ -170,7 +170,7 @@ static inline void rig_until(struct rig *r, int64_t t_ns)
     while (r->s.now_ns < t_ns) {
         const int64_t step_ns = t_ns - r->s.now_ns;
         sched_run_until(&r->s, r->s.now_ns + (step_ns < 1000000 ? step_ns : 1000000));
-        trace_advance(&r->b.trace, r->s.now_ns - TRACE_LAG_NS);
+        trace_advance(&r->b.base.trace, r->s.now_ns - TRACE_LAG_NS);
     }
 }
 

@@ -193,12 +193,12 @@ static void a0_may_fall_where_rfz_rises(void **state)
         rig_up(&rig, &p);
         rig_await(&rig, PSD1_READY);
         rig_watch(&rig, TRACE_BIT(PSD1_LINE_A0));
-        const unsigned before = rig.b.trace.level & 1;
+        const unsigned before = rig.b.base.trace.level & 1;
         (void)take(&rig, 0);
         (void)take(&rig, 0);
         rig_await(&rig, PSD1_READY);
         rig_run(&rig, 5000);
-        trace_advance(&rig.b.trace, rig.s.now_ns);
+        trace_advance(&rig.b.base.trace, rig.s.now_ns);
         assert_int_equal(before, 1);
         assert_int_equal(rig.edges, early);
         if (early) assert_int_equal(rig.edge[0].t_ns, rig.b.fl2_ns);
@@ -240,11 +240,11 @@ static void frozen_words_repeat(void **state)
     const struct psd1_profile p = rig_exact();
     rig_up(&rig, &p);
     rig_run(&rig, 5000000);
-    rig.b.wrongs = BOARD_WRONG_FROZEN_WORDS;
+    rig.b.base.faults = PSD1_FAULT_FROZEN_WORDS;
     rig.volts[0] = 0.0;
     rig_run(&rig, 10000000);
     assert_int_equal(rig.cycle[rig.cycles - 1].word[0], 40921);
-    rig.b.wrongs = 0;
+    rig.b.base.faults = 0;
     rig_run(&rig, 2000000);
     assert_int_equal(rig.cycle[rig.cycles - 1].word[0], 32768);
 }
@@ -281,11 +281,11 @@ static void resets_and_power_cuts_in_every_phase(void **state)
             else psd1_reset(&rig.b, rig.s.now_ns);
             assert_int_equal(rig.b.counters.cut, cycle);
             assert_int_equal(rig.b.counters.resets, !cut);
-            trace_advance(&rig.b.trace, rig.s.now_ns);
+            trace_advance(&rig.b.base.trace, rig.s.now_ns);
             const uint64_t steady = ~TRACE_BIT(PSD1_LINE_CLK) & ~TRACE_BIT(PSD1_LINE_DR);
             uint64_t rest = 0;
             for (unsigned i = 0; i < PSD1_LINES && !cut; i++) rest |= (uint64_t)psd1_lines[i].level << i;
-            assert_true((rig.b.trace.level & steady) == (rest & steady));
+            assert_true((rig.b.base.trace.level & steady) == (rest & steady));
             rig.cycles = 0;
             rig_run(&rig, 5000000);
             if (cut) assert_int_equal(rig.cycles, 0);
@@ -294,7 +294,7 @@ static void resets_and_power_cuts_in_every_phase(void **state)
             assert_true(rig.cycles > 4);
             assert_int_equal(rig.cycle[0].seq, 0);
             assert_int_equal(rig.cycle[rig.cycles - 1].word[1], 9830);
-            assert_int_equal(rig.b.trace.late + rig.b.trace.dropped, 0);
+            assert_int_equal(rig.b.base.trace.late + rig.b.base.trace.dropped, 0);
         }
     }
 }

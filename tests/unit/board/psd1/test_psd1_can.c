@@ -42,12 +42,12 @@ static void start(const struct psd1_profile *p, uint32_t bitrate_hz)
     can_bus_init(&wire.bus, &(struct can_bus_cfg){.bitrate_hz = bitrate_hz}, &rig.s);
     wire.host = (struct can_node){.name = "host", .rx = on_frame};
     can_attach(&wire.bus, &wire.host);
-    psd1_board.can->init(&wire.can, &(struct board_can_cfg){.name = "a", .type = &psd1_board, .node_id = NODE}, &rig.b,
-                         &wire.bus, &rig.s);
+    psd1_board.can->init(&wire.can, &(struct board_can_cfg){.name = "a", .type = &psd1_board, .node_id = NODE},
+                         &rig.b.base, &wire.bus, &rig.s);
     wire.stream = rig.b.host;
     psd1_attach(&rig.b, &(struct psd1_host){.ctx = &rig, .cycle = tee, .fault = NULL});
     rig.b.host.fault = NULL;
-    psd1_board.power_up(&rig.b, 0);
+    psd1_board.power_up(&rig.b.base, 0);
     psd1_board.can->power_up(&wire.can, 0);
     while (!rig.b.ready) rig_run(&rig, 1000000);
 }
@@ -309,15 +309,15 @@ static void every_part_and_counter_has_its_place(void **state)
         }
     }
     const struct chip_fault fault = {.dout = CHIP_STUCK_HIGH};
-    psd1_board.parts[2].fault(&rig.b, 2, &fault, rig.s.now_ns);
+    psd1_board.parts[2].fault(&rig.b.base, 2, &fault, rig.s.now_ns);
     rig_run(&rig, 3000000);
     assert_int_equal(rig.b.latest.word[1], 0xFFFF);
     assert_int_equal(rig.b.latest.word[0], 40921);
-    assert_true(psd1_board.parts[3].flip(&rig.b, 3, 0, 0x04, rig.s.now_ns)); /* gain 2 */
+    assert_true(psd1_board.parts[3].flip(&rig.b.base, 3, 0, 0x04, rig.s.now_ns)); /* gain 2 */
     rig_run(&rig, 10000000);
     assert_int_equal(rig.b.adc[2].control >> 16 & 0xFF, 0x06);
-    psd1_board.power_down(&rig.b, rig.s.now_ns);
-    assert_false(psd1_board.parts[3].flip(&rig.b, 3, 0, 0x04, rig.s.now_ns));
+    psd1_board.power_down(&rig.b.base, rig.s.now_ns);
+    assert_false(psd1_board.parts[3].flip(&rig.b.base, 3, 0, 0x04, rig.s.now_ns));
 }
 
 int main(void)

@@ -15,8 +15,8 @@ static void one_cycle(struct rig *r, const struct psd1_profile *p)
     const unsigned before = r->cycles;
     while (r->cycles == before) rig_run(r, 100000);
     rig_run(r, 100000);
-    trace_advance(&r->b.trace, r->s.now_ns);
-    assert_int_equal(r->b.trace.late + r->b.trace.dropped, 0);
+    trace_advance(&r->b.base.trace, r->s.now_ns);
+    assert_int_equal(r->b.base.trace.late + r->b.base.trace.dropped, 0);
     assert_true(r->edges < RIG_EDGES);
 }
 
@@ -143,7 +143,7 @@ static void clock_runs_without_a_gap(void **state)
         rig_watch(&rig, with ? ALL : TRACE_BIT(PSD1_LINE_CLK));
         psd1_power_up(&rig.b, 123457);
         rig_until(&rig, 15000000);
-        trace_advance(&rig.b.trace, rig.s.now_ns);
+        trace_advance(&rig.b.base.trace, rig.s.now_ns);
         int64_t due_ns = 123457;
         bool level = true;
         for (unsigned i = 0; i < rig.edges; i++) {
@@ -154,7 +154,7 @@ static void clock_runs_without_a_gap(void **state)
             level = !level;
         }
         assert_in_range(due_ns, 15000000, 15000400);
-        assert_int_equal(rig.b.trace.late + rig.b.trace.dropped, 0);
+        assert_int_equal(rig.b.base.trace.late + rig.b.base.trace.dropped, 0);
     }
 }
 
@@ -195,7 +195,7 @@ static void coefficients_on_the_line(void **state)
     rig_await(&rig, PSD1_COEF_A0);
     const int64_t a0_ns = rig.b.due_ns, tfs_ns = rig.event_ns[PSD1_EV_UC];
     rig_run(&rig, 100000);
-    trace_advance(&rig.b.trace, rig.s.now_ns);
+    trace_advance(&rig.b.base.trace, rig.s.now_ns);
     assert_true(has_edge(&rig, PSD1_LINE_SDAT, true, tfs_ns)); /* C20013h: its first bit with TFS */
     assert_true(has_edge(&rig, PSD1_LINE_SDAT, false, tfs_ns + 1900));
     assert_true(has_edge(&rig, PSD1_LINE_A0, true, a0_ns));
@@ -219,7 +219,7 @@ static void writes_show_the_hosts_data(void **state)
     rig_watch(&rig, ALL & ~TRACE_BIT(PSD1_LINE_CLK));
     const int64_t t_ns = rig.s.now_ns;
     rig_write(&rig, PSD1_REG_UC_LOW, 0xA5C3);
-    trace_advance(&rig.b.trace, rig.s.now_ns);
+    trace_advance(&rig.b.base.trace, rig.s.now_ns);
     unsigned data = 0;
     for (unsigned i = 0; i < 16; i++) data |= (unsigned)level_at(&rig, PSD1_LINE_D0 + i, t_ns + 799) << i;
     assert_int_equal(data, 0xA5C3);
@@ -230,7 +230,7 @@ static void writes_show_the_hosts_data(void **state)
     const int64_t again_ns = rig.s.now_ns;
     assert_int_equal(rig_bus(&rig, false, 1, 0, 0), BOARD_CYCLE_TAKEN);
     rig_run(&rig, 2000);
-    trace_advance(&rig.b.trace, rig.s.now_ns);
+    trace_advance(&rig.b.base.trace, rig.s.now_ns);
     assert_true(has_edge(&rig, PSD1_LINE_CS, false, again_ns));
     assert_true(has_edge(&rig, PSD1_LINE_CS, true, again_ns + 800));
     assert_true(has_edge(&rig, PSD1_LINE_AB0, true, again_ns));
@@ -287,8 +287,8 @@ static unsigned join(struct rig *board, struct rig *ear, uint64_t mask, bool *le
 {
     ear->sink = (struct trace_sink){.mask = mask, .steps = rig_steps, .ctx = ear};
     ear->edges = 0;
-    if (now) trace_advance(&board->b.trace, board->s.now_ns);
-    trace_attach(&board->b.trace, &ear->sink);
+    if (now) trace_advance(&board->b.base.trace, board->s.now_ns);
+    trace_attach(&board->b.base.trace, &ear->sink);
     for (unsigned i = 0; i < ear->edges; i++) level[ear->edge[i].sig] = ear->edge[i].level;
     return ear->edges;
 }
@@ -310,7 +310,7 @@ static void late_listeners_hear_the_same(void **state)
     rig_watch(&rig, ALL);
     psd1_power_up(&rig.b, 0);
     rig_until(&rig, 12000000);
-    trace_advance(&rig.b.trace, rig.s.now_ns);
+    trace_advance(&rig.b.base.trace, rig.s.now_ns);
     for (unsigned k = 0; k < 300; k++) {
         const bool inside = k % 4 < 3; /* of a cycle */
         const int64_t from_ns =
@@ -325,10 +325,10 @@ static void late_listeners_hear_the_same(void **state)
         rig_until(&other, from_ns);
         const unsigned first = join(&other, &other, masks[k % COUNT(masks)], level[0], now);
         rig_until(&other, 12000000);
-        trace_advance(&other.b.trace, other.s.now_ns);
+        trace_advance(&other.b.base.trace, other.s.now_ns);
         if (now) heard_the_same(&rig, &other, first, from_ns, level[0]);
         if (two) heard_the_same(&rig, &third, before, early_ns, level[1]);
-        assert_int_equal(other.b.trace.late + other.b.trace.dropped, 0);
+        assert_int_equal(other.b.base.trace.late + other.b.base.trace.dropped, 0);
     }
     cycles_equal(&rig, &other);
 }
@@ -344,22 +344,22 @@ static void listeners_come_and_go(void **state)
     second.mask = TRACE_BIT(PSD1_LINE_SDAT);
     rig_await(&rig, PSD1_RF_RISE);
     rig_until(&rig, rig.b.frame.t_ns + 5000);
-    trace_attach(&rig.b.trace, &second);
+    trace_attach(&rig.b.base.trace, &second);
     rig_run(&rig, 5000);
-    trace_detach(&rig.b.trace, &rig.sink);
-    trace_detach(&rig.b.trace, &second);
+    trace_detach(&rig.b.base.trace, &rig.sink);
+    trace_detach(&rig.b.base.trace, &second);
     rig_run(&rig, 3000000);
     assert_false(rig.b.wave.on);
     rig.edges = 0;
     rig_await(&rig, PSD1_IDLE);
     rig_run(&rig, 200000);
-    trace_attach(&rig.b.trace, &rig.sink);
+    trace_attach(&rig.b.base.trace, &rig.sink);
     rig.edges = 0;
     rig_run(&rig, 972800 * 2);
-    trace_advance(&rig.b.trace, rig.s.now_ns);
+    trace_advance(&rig.b.base.trace, rig.s.now_ns);
     assert_int_equal(count_edges(&rig, PSD1_LINE_SCLK), 192);
     assert_in_range(count_edges(&rig, PSD1_LINE_CLK), 2 * 2431, 2 * 2433);
-    assert_int_equal(rig.b.trace.late + rig.b.trace.dropped, 0);
+    assert_int_equal(rig.b.base.trace.late + rig.b.base.trace.dropped, 0);
 }
 
 /* Ten milliseconds and more without trace_advance(): nothing is dropped. */
@@ -371,8 +371,8 @@ static void long_ways_drop_nothing(void **state)
     rig_watch(&rig, ALL);
     psd1_power_up(&rig.b, 0);
     sched_run_until(&rig.s, 40000000);
-    trace_advance(&rig.b.trace, rig.s.now_ns);
-    assert_int_equal(rig.b.trace.late + rig.b.trace.dropped, 0);
+    trace_advance(&rig.b.base.trace, rig.s.now_ns);
+    assert_int_equal(rig.b.base.trace.late + rig.b.base.trace.dropped, 0);
     assert_int_equal(count_edges(&rig, PSD1_LINE_CLK), 100001);
 }
 

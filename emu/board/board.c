@@ -1,0 +1,36 @@
+#include "board/board.h"
+
+#include <string.h>
+
+void board_init(struct board *b, const struct board_line *lines, unsigned count)
+{
+    memset(b, 0, sizeof *b);
+    line_faults_init(&b->line, &b->trace);
+    for (unsigned i = 0; i < count; i++) (void)trace_add(&b->trace, lines[i].name, lines[i].level);
+}
+
+bool board_has(const struct board_type *t, const char *capability)
+{
+    for (const char *const *c = t->capabilities; c && *c; c++)
+        if (strcmp(*c, capability) == 0) return true;
+    return false;
+}
+
+uint32_t board_fault_bit(const struct board_type *t, const char *kind)
+{
+    for (const struct board_controller_fault *f = t->controller_faults; f && f->kind; f++)
+        if (strcmp(f->kind, kind) == 0) return f->bit;
+    return 0;
+}
+
+void board_set_faults(struct board *b, uint32_t faults)
+{
+    if (b->type->set_faults) b->type->set_faults(b, faults);
+    else b->faults = faults;
+}
+
+void board_observe(struct board *b, bool on)
+{
+    if (b->type->observe) b->type->observe(b, on);
+    b->observed = on;
+}
