@@ -10,7 +10,7 @@ extern const struct control_table commands_bench, commands_head, commands_table,
 /* "unit" of commands that need to be told only where there is more than one. */
 #define CONTROL_UNIT_ARG(is_optional)                                                                                  \
     {                                                                                                                  \
-        .name = "unit", .type = CONTROL_UNIT, .optional = (is_optional), .what = "name of a unit of the scenario"      \
+        .name = "unit", .type = CONTROL_UNIT, .optional = (is_optional), .what = "unit of the scenario"      \
     }
 
 /* The largest integer that JSON carries without loss. */

@@ -100,16 +100,16 @@ static enum control_outcome do_quit(struct control *c, const struct control_valu
 // clang-format off
 static const struct control_command rows[] = {
     {"help", "Lists the commands with their arguments.", NULL, .run = do_help},
-    {"time", "Tells the simulated time and the pace.", NULL, .run = do_time},
-    {"run", "Moves the time in step pace; the answer comes when everything due has run and all output is with the kernel.",
-     CONTROL_ARGS({"for_s", CONTROL_REAL, false, "s", 0, 86400, .what = "simulated seconds"},
-      {"after_tx", CONTROL_COUNT, true, NULL, 0, CONTROL_COUNT_MAX, .what = "start once this many frames have been taken from CAN clients, or one has filled its queue of 128"}), .run = do_run},
-    {"frames", "Counts the CAN frames of each client, with its number in order of coming (came): delivered to it, taken from it, dropped, lost in the kernel, refused.", NULL, .run = do_frames},
-    {"counters", "Tells the counters of pace, bus, clients and units; with a unit, that unit's alone.", CONTROL_ARGS(CONTROL_UNIT_ARG(true)), .run = do_counters},
-    {"units", "Lists the units: name, type of board, serial number, CAN node, board profile.", NULL, .run = do_units},
-    {"endpoints", "Tells where programs connect, as the ready lines do: CAN adapters, instruments, line port, sockets.", NULL, .run = do_endpoints},
-    {"unit.reset", "Resets a unit, on PSA-2 by a pulse on Res.", CONTROL_ARGS(CONTROL_UNIT_ARG(true)), .run = do_unit_reset, .changes = true},
-    {"quit", "Ends the emulator as SIGTERM does.", NULL, .run = do_quit},
+    {"time", "Reads the simulated time and the pace.", NULL, .run = do_time},
+    {"run", "Advances the time in step pace; replies when every event up to then has run and all output is delivered to the kernel.",
+     CONTROL_ARGS({"for_s", CONTROL_REAL, false, "s", 0, 86400, .what = "simulated time to run"},
+      {"after_tx", CONTROL_COUNT, true, NULL, 0, CONTROL_COUNT_MAX, .what = "total of frames received from CAN clients before the run starts (or one client's queue of 128 is full)"}), .run = do_run},
+    {"frames", "Reads the frame counters of each CAN client and its connection number (came): delivered, taken (received), dropped, overrun (lost in the kernel), refused.", NULL, .run = do_frames},
+    {"counters", "Reads the counters of pace, bus, clients and units, or of one unit.", CONTROL_ARGS(CONTROL_UNIT_ARG(true)), .run = do_counters},
+    {"units", "Lists the units: name, board type, serial number, CAN node, profile.", NULL, .run = do_units},
+    {"endpoints", "Lists the endpoints as the ready lines do: CAN adapters, instruments, line port, sockets.", NULL, .run = do_endpoints},
+    {"unit.reset", "Resets a unit (PSA-2: a pulse on Res).", CONTROL_ARGS(CONTROL_UNIT_ARG(true)), .run = do_unit_reset, .changes = true},
+    {"quit", "Terminates the emulator as SIGTERM does.", NULL, .run = do_quit},
 };
 // clang-format on
 const struct control_table commands_bench = {rows, sizeof rows / sizeof *rows};

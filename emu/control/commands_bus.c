@@ -62,11 +62,11 @@ static bool has_bus(const struct control_bench *b, const struct control_value *v
 }
 
 // clang-format off
-#define STROBE {"strobe_ns", CONTROL_COUNT, true, "ns", 1, 1e9, .what = "length of the strobe; else the one of the board's profile"}
-#define WHERE CONTROL_UNIT_ARG(false), {"address", CONTROL_COUNT, false, NULL, 0, 15, .what = "A3..A0"}
+#define STROBE {"strobe_ns", CONTROL_COUNT, true, "ns", 1, 1e9, .what = "strobe length; default: the profile's"}
+#define WHERE CONTROL_UNIT_ARG(false), {"address", CONTROL_COUNT, false, NULL, 0, 15, .what = "address on A3..A0"}
 
 static const struct control_command rows[] = {
-    {"bus.read", "One read cycle on the parallel bus of a board; the answer comes when the cycle is done, for which time moves in step pace.",
+    {"bus.read", "Makes one read cycle on the parallel bus of a board; replies at the end of the cycle; step pace advances the time until then.",
      CONTROL_ARGS(WHERE, STROBE), .run = do_read, .changes = true, .check = has_bus},
     {"bus.write", "Makes one write cycle on the parallel bus of a board; see bus.read.",
      CONTROL_ARGS(WHERE, {"data", CONTROL_COUNT, false, NULL, 0, 65535, .what = "word to write"}, STROBE), .run = do_write, .changes = true, .check = has_bus},

@@ -47,9 +47,9 @@ static enum control_outcome do_send(struct control *c, const struct control_valu
 
 // clang-format off
 static const struct control_command rows[] = {
-    {"can.put", "Puts a frame on a bus as a program there would: a host's part in scenarios without one.",
-     CONTROL_ARGS({"frame", CONTROL_TEXT, .what = "as cansend of can-utils takes it, capital digits: 609#2F00210104"},
-      {"bus", CONTROL_NAME, .optional = true, .what = "name of a bus of the scenario; else the first"}),
+    {"can.put", "Sends a CAN frame as a host would, in scenarios without a host.",
+     CONTROL_ARGS({"frame", CONTROL_TEXT, .what = "cansend notation (can-utils), capital digits: 609#2F00210104"},
+      {"bus", CONTROL_NAME, .optional = true, .what = "bus of the scenario; default: the first"}),
      .run = do_send, .changes = true, .check = can_be_sent},
 };
 // clang-format on

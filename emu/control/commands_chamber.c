@@ -78,16 +78,16 @@ static enum control_outcome do_reset(struct control *c, const struct control_val
 
 // clang-format off
 static const struct control_command rows[] = {
-    {"chamber.set", "Gives the air of the chamber a new set point, to be reached with the present ramp.",
+    {"chamber.set", "Sets the temperature set point; the air follows at the current ramp.",
      CONTROL_ARGS({"temp_degc", CONTROL_REAL, false, "degC", -200, 300, .what = "set point", .def = 25, .limits = temp_limits}),
      .run = do_set, .changes = true, .scpi = {{"TEMPerature", NULL}}},
-    {"chamber.ramp", "Limits how fast the air changes.",
-     CONTROL_ARGS({"ramp_k_per_min", CONTROL_REAL, false, "K/min", 1e-6, 1000, .what = "ramp, both ways", .def = 1, .limits = ramp_limits}),
+    {"chamber.ramp", "Sets the ramp, the limit of the rate of change.",
+     CONTROL_ARGS({"ramp_k_per_min", CONTROL_REAL, false, "K/min", 1e-6, 1000, .what = "rate of change, heating and cooling", .def = 1, .limits = ramp_limits}),
      .run = do_ramp, .changes = true, .scpi = {{"RAMP", NULL}}},
-    {"chamber.read", "Reads the chamber: air by its thermometer, set point, ramp, whether the air is there and in how many seconds.", NULL,
+    {"chamber.read", "Reads the chamber: measured air temperature, set point, ramp, stable or not, time until stable.", NULL,
      .run = do_read, .scpi = {{"TEMPerature?", "temp_degc"}, {"TEMPerature:SETPoint?", "set_degc"}, {"RAMP?", "ramp_k_per_min"},
                               {"STABle?", "stable"}}},
-    {"chamber.reset", "Back to set point and ramp of power-on.", NULL, .run = do_reset, .changes = true, .scpi = {{"*RST", NULL}}},
+    {"chamber.reset", "Restores set point and ramp of power-on.", NULL, .run = do_reset, .changes = true, .scpi = {{"*RST", NULL}}},
 };
 // clang-format on
 const struct control_table commands_chamber = {rows, sizeof rows / sizeof *rows};

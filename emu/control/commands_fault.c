@@ -173,10 +173,10 @@ static enum control_outcome do_list(struct control *c, const struct control_valu
 // clang-format off
 static const struct control_command rows[] = {
     {"fault.add", "Injects a fault now, at a time or after an event; see fault.kinds for its parameters.", fault_args, .run = do_add, .changes = true, .check = check_add},
-    {"fault.clear", "Lifts a fault, or all of them, and forgets it.", CONTROL_ARGS({"id", CONTROL_COUNT, true, NULL, 1, 4294967295.0, .what = "what fault.add told"}), .run = do_clear, .changes = true},
-    {"fault.list", "Lists the faults: waiting, listening for their event, active, over, or void (the point was gone).", NULL, .run = do_list},
-    {"fault.kinds", "Lists the kinds of faults: what they do, how a host sees them, where they can be and what they take.", NULL, .run = do_kinds},
-    {"fault.points", "Lists the points of the bench at which faults can be.", CONTROL_ARGS({"kind", CONTROL_NAME, true, .what = "only those for this kind"}), .run = do_points},
+    {"fault.clear", "Removes a fault, or all faults.", CONTROL_ARGS({"id", CONTROL_COUNT, true, NULL, 1, 4294967295.0, .what = "id from fault.add; default: all"}), .run = do_clear, .changes = true},
+    {"fault.list", "Lists the faults with state: waiting (for its time), listening (for its event), active, over, void (its point no longer exists).", NULL, .run = do_list},
+    {"fault.kinds", "Lists the kinds of faults: effect, symptom at the host, points, parameters.", NULL, .run = do_kinds},
+    {"fault.points", "Lists the fault points of the bench.", CONTROL_ARGS({"kind", CONTROL_NAME, true, .what = "points for this kind; default: all"}), .run = do_points},
 };
 // clang-format on
 const struct control_table commands_fault = {rows, sizeof rows / sizeof *rows};

@@ -42,11 +42,11 @@ static enum control_outcome do_read(struct control *c, const struct control_valu
 
 // clang-format off
 static const struct control_command rows[] = {
-    {"head.turn", "Turns the dividing head; it takes the scenario's turn_s.",
-     CONTROL_ARGS({"angle_deg", CONTROL_REAL, false, "deg", -3600, 3600, .what = "degrees on the head's scale"}), .run = do_turn, .changes = true, .scpi = {{"ANGLe", NULL}}},
-    {"head.mount", "Puts the units on the head's mount with another face.",
-     CONTROL_ARGS({"face", CONTROL_CHOICE, .what = "how the units sit on the mount", .choices = faces}), .run = do_mount, .changes = true, .scpi = {{"FACE", NULL}}},
-    {"head.read", "Reads the head's scale.", NULL, .run = do_read,
+    {"head.turn", "Turns the dividing head to an angle, in turn_s of the scenario.",
+     CONTROL_ARGS({"angle_deg", CONTROL_REAL, false, "deg", -3600, 3600, .what = "angle on the head's scale"}), .run = do_turn, .changes = true, .scpi = {{"ANGLe", NULL}}},
+    {"head.mount", "Remounts the units on another face of the head's mount.",
+     CONTROL_ARGS({"face", CONTROL_CHOICE, .what = "face of the mount", .choices = faces}), .run = do_mount, .changes = true, .scpi = {{"FACE", NULL}}},
+    {"head.read", "Reads the head: angle, face, at rest or not, time until rest.", NULL, .run = do_read,
      .scpi = {{"ANGLe?", "angle_deg"}, {"FACE?", "face"}, {"REST?", "at_rest"}}},
 };
 // clang-format on

@@ -27,12 +27,12 @@ static enum control_outcome do_fork(struct control *c, const struct control_valu
 
 // clang-format off
 static const struct control_command rows[] = {
-    {"snapshot", "Saves the bench as it is now to a file, for psa-emu --restore.",
-     CONTROL_ARGS({"path", CONTROL_TEXT, .what = "file to write; one of that name is replaced"}), .run = do_snapshot},
-    {"fork", "Doubles the emulator: a second process goes on from this instant, with endpoints of its own; ends with its own quit.",
-     CONTROL_ARGS({"control", CONTROL_TEXT, .what = "path of its control socket"},
-      {"can", CONTROL_TEXT, true, .what = "its CAN adapters as for --can, with spaces between them (none)"},
-      {"truth", CONTROL_TEXT, true, .what = "path of its truth port (none)"}), .run = do_fork},
+    {"snapshot", "Saves the state of the bench to a file for psa-emu --restore.",
+     CONTROL_ARGS({"path", CONTROL_TEXT, .what = "file to write; an existing file is replaced"}), .run = do_snapshot},
+    {"fork", "Forks the emulator: a child continues from the current state with its own endpoints, until its own quit.",
+     CONTROL_ARGS({"control", CONTROL_TEXT, .what = "path of the child's control socket"},
+      {"can", CONTROL_TEXT, true, .what = "child's CAN adapters as for --can, separated by spaces; default: none"},
+      {"truth", CONTROL_TEXT, true, .what = "path of the child's truth port; default: none"}), .run = do_fork},
 };
 // clang-format on
 const struct control_table commands_snapshot = {rows, sizeof rows / sizeof *rows};

@@ -95,18 +95,18 @@ static enum control_outcome do_reset(struct control *c, const struct control_val
 
 // clang-format off
 static const struct control_command rows[] = {
-    {"supply.set", "Sets the voltage of the supply.",
-     CONTROL_ARGS({"volt_v", CONTROL_REAL, false, "V", 0, 1000, .what = "voltage", .def = 12, .limits = volt_limits}),
+    {"supply.set", "Sets the supply voltage.",
+     CONTROL_ARGS({"volt_v", CONTROL_REAL, false, "V", 0, 1000, .what = "output voltage", .def = 12, .limits = volt_limits}),
      .run = do_set, .changes = true, .scpi = {{"VOLTage", NULL}}},
-    {"supply.output", "Switches its output.", CONTROL_ARGS({"on", CONTROL_BOOL, .what = "whether it feeds the boards"}),
+    {"supply.output", "Switches the supply output.", CONTROL_ARGS({"on", CONTROL_BOOL, .what = "output on"}),
      .run = do_output, .changes = true, .scpi = {{"OUTPut", NULL}}},
-    {"supply.ripple", "Puts a sine on the voltage.",
-     CONTROL_ARGS({"amplitude_v", CONTROL_REAL, false, "V", 0, 1000, .what = "from the middle; 0: none", .limits = ripple_limits},
-      {"frequency_hz", CONTROL_REAL, false, "Hz", 1e-3, 1e6, .what = "of the sine", .def = 100, .limits = frequency_limits}),
+    {"supply.ripple", "Adds a sinusoidal ripple to the voltage.",
+     CONTROL_ARGS({"amplitude_v", CONTROL_REAL, false, "V", 0, 1000, .what = "ripple amplitude; 0: no ripple", .limits = ripple_limits},
+      {"frequency_hz", CONTROL_REAL, false, "Hz", 1e-3, 1e6, .what = "ripple frequency", .def = 100, .limits = frequency_limits}),
      .run = do_ripple, .changes = true, .scpi = {{"RIPPle", NULL}}},
-    {"supply.read", "Reads the supply: voltage as set and as measured at its output, output on or off, ripple.", NULL, .run = do_read,
+    {"supply.read", "Reads the supply: voltage set and measured, output state, ripple.", NULL, .run = do_read,
      .scpi = {{"VOLTage?", "volt_v"}, {"MEASure:VOLTage?", "measured_v"}, {"OUTPut?", "on"}, {"RIPPle?", "ripple_v,ripple_hz"}}},
-    {"supply.reset", "Back to voltage and ripple of power-on, output on.", NULL, .run = do_reset, .changes = true, .scpi = {{"*RST", NULL}}},
+    {"supply.reset", "Restores voltage and ripple of power-on, output on.", NULL, .run = do_reset, .changes = true, .scpi = {{"*RST", NULL}}},
 };
 // clang-format on
 const struct control_table commands_supply = {rows, sizeof rows / sizeof *rows};

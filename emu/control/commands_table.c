@@ -152,29 +152,29 @@ static enum control_outcome do_reset(struct control *c, const struct control_val
 }
 
 // clang-format off
-#define AXIS {"axis", CONTROL_COUNT, false, NULL, 1, TABLE_AXES_MAX, .what = "1 is the outermost", .def = 1, .limits = axis_limits}
+#define AXIS {"axis", CONTROL_COUNT, false, NULL, 1, TABLE_AXES_MAX, .what = "axis number; 1 is the outermost", .def = 1, .limits = axis_limits}
 
 static const struct control_command rows[] = {
-    {"table.position", "Turns an axis to an angle of its readout and holds it there.",
-     CONTROL_ARGS(AXIS, {"angle_deg", CONTROL_REAL, false, "deg", -3.6e6, 3.6e6, .what = "where to", .limits = angle_limits},
-      {"rate_dps", CONTROL_REAL, true, "deg/s", 0, 1e5, .what = "no faster than this; 0: as fast as it can", .limits = rate_limits}),
+    {"table.position", "Turns an axis to a readout angle and holds it.",
+     CONTROL_ARGS(AXIS, {"angle_deg", CONTROL_REAL, false, "deg", -3.6e6, 3.6e6, .what = "target angle", .limits = angle_limits},
+      {"rate_dps", CONTROL_REAL, true, "deg/s", 0, 1e5, .what = "maximum rate; 0: as fast as possible", .limits = rate_limits}),
      .run = do_position, .changes = true, .scpi = {{"AXIS#:POSition", NULL}}},
-    {"table.rate", "Turns an axis at a rate until the next command.",
-     CONTROL_ARGS(AXIS, {"rate_dps", CONTROL_REAL, false, "deg/s", -1e5, 1e5, .what = "rate of turn", .limits = rate_limits}),
+    {"table.rate", "Turns an axis at a constant rate until the next command.",
+     CONTROL_ARGS(AXIS, {"rate_dps", CONTROL_REAL, false, "deg/s", -1e5, 1e5, .what = "angular rate", .limits = rate_limits}),
      .run = do_rate, .changes = true, .scpi = {{"AXIS#:RATE", NULL}}},
-    {"table.sine", "Swings an axis about the angle at which it would stop.",
-     CONTROL_ARGS(AXIS, {"amplitude_deg", CONTROL_REAL, false, "deg", 0, 360, .what = "from the middle"},
-      {"frequency_hz", CONTROL_REAL, false, "Hz", 0, 1000, .what = "of the swing"}),
+    {"table.sine", "Oscillates an axis about the angle at which it would stop.",
+     CONTROL_ARGS(AXIS, {"amplitude_deg", CONTROL_REAL, false, "deg", 0, 360, .what = "amplitude"},
+      {"frequency_hz", CONTROL_REAL, false, "Hz", 0, 1000, .what = "frequency"}),
      .run = do_sine, .changes = true, .scpi = {{"AXIS#:SINE", NULL}}},
-    {"table.profile", "Runs an axis through rates; the last one goes on.",
-     CONTROL_ARGS(AXIS, {"times_s", CONTROL_REALS, false, "s", 0, 1e6, .what = "from now, rising: when the axis starts towards each rate"},
-      {"rates_dps", CONTROL_REALS, false, "deg/s", -1e5, 1e5, .what = "as many as times", .limits = rate_limits}),
+    {"table.profile", "Runs an axis through a profile of rates; the last rate continues.",
+     CONTROL_ARGS(AXIS, {"times_s", CONTROL_REALS, false, "s", 0, 1e6, .what = "start times from now, ascending"},
+      {"rates_dps", CONTROL_REALS, false, "deg/s", -1e5, 1e5, .what = "angular rates, one for each time", .limits = rate_limits}),
      .run = do_profile, .changes = true, .scpi = {{"AXIS#:PROFile", NULL}}},
     {"table.stop", "Brings an axis to rest.", CONTROL_ARGS(AXIS), .run = do_stop, .changes = true, .scpi = {{"AXIS#:STOP", NULL}}},
-    {"table.zero", "From now on the readout of an axis shows this angle where the axis is.",
-     CONTROL_ARGS(AXIS, {"angle_deg", CONTROL_REAL, false, "deg", -360, 360, .what = "what to show"}),
+    {"table.zero", "Sets the readout of an axis at its present position.",
+     CONTROL_ARGS(AXIS, {"angle_deg", CONTROL_REAL, false, "deg", -360, 360, .what = "readout angle"}),
      .run = do_zero, .changes = true, .scpi = {{"AXIS#:ZERO", NULL}}},
-    {"table.read", "Reads an axis: angle, rate, mode, whether it is at rest and in how many seconds (null: never).", CONTROL_ARGS(AXIS), .run = do_read,
+    {"table.read", "Reads an axis: angle, rate, mode, at rest or not, time until rest (null: never).", CONTROL_ARGS(AXIS), .run = do_read,
      .scpi = {{"AXIS#:POSition?", "angle_deg"}, {"AXIS#:RATE?", "rate_dps"}, {"AXIS#:MODE?", "mode"}, {"AXIS#:REST?", "at_rest"}}},
     {"table.reset", "Brings all axes to rest.", NULL, .run = do_reset, .changes = true, .scpi = {{"*RST", NULL}}},
 };

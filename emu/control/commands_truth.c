@@ -25,10 +25,10 @@ static enum control_outcome do_state(struct control *c, const struct control_val
 
 static const struct control_command rows[] = {
     {"help", "Lists the commands with their arguments.", NULL, .run = do_help},
-    {"truth", "Tells the hidden parameters of the bench: for graders, after the estimate is made.", NULL,
+    {"truth", "Reads the hidden parameters of the bench, for graders after the estimate.", NULL,
      .run = do_truth},
     {"truth.state",
-     "Tells the true state of this instant: angles, rates, temperatures, supply, and what a unit and its sensors feel.",
-     CONTROL_ARGS({"unit", CONTROL_UNIT, true, .what = "name of a unit; else the first"}), .run = do_state},
+     "Reads the true state now: angles, rates, temperatures, supply, and the kinematics and sensor outputs of a unit.",
+     CONTROL_ARGS({"unit", CONTROL_UNIT, true, .what = "unit; default: the first"}), .run = do_state},
 };
 const struct control_table commands_truth = {rows, sizeof rows / sizeof *rows};

@@ -92,24 +92,24 @@ static enum control_outcome do_vcd_flush(struct control *c, const struct control
 }
 
 // clang-format off
-#define FIRST_UNIT {"unit", CONTROL_UNIT, true, .what = "name of a unit; else the first"}
+#define FIRST_UNIT {"unit", CONTROL_UNIT, true, .what = "unit; default: the first"}
 
 static const struct control_command rows[] = {
-    {"run.until", "As run, but ends at the instant of an event of a board; tells whether it was reached and how many were seen.",
-     CONTROL_ARGS({"event", CONTROL_EVENT, .what = "of the board, one that it has"}, FIRST_UNIT,
-      {"count", CONTROL_COUNT, true, NULL, 1, CONTROL_COUNT_MAX, .what = "of such events from now on; else 1", .def = 1},
-      {"limit_s", CONTROL_REAL, true, "s", 0, 86400, .what = "give up after this; else 60", .def = 60},
-      {"after_tx", CONTROL_COUNT, true, NULL, 0, CONTROL_COUNT_MAX, .what = "as of run"}), .run = do_until, .check = check_until},
-    {"subscribe", "From now on this client gets a line for each event, fault or status.",
-     CONTROL_ARGS({"what", CONTROL_CHOICE, .what = "kind of lines", .choices = control_topics},
-      {"every_s", CONTROL_REAL, true, "s", 1e-3, 3600, .what = "simulated time between lines of status; else 0.1", .def = 0.1}), .run = do_subscribe},
-    {"unsubscribe", "Ends subscriptions of this client: of one kind, or all.",
-     CONTROL_ARGS({"what", CONTROL_CHOICE, true, .what = "kind of lines", .choices = control_topics}), .run = do_unsubscribe},
-    {"lines", "Tells the levels of a unit's lines now; with a fault on a line, those of 0.2 ms ago.", CONTROL_ARGS(FIRST_UNIT), .run = do_lines},
-    {"vcd.start", "Records the lines of a unit into a VCD file from now on. A word on a converter's port or a pulse of STEP in progress at the start is left out.",
-     CONTROL_ARGS({"path", CONTROL_TEXT, .what = "file to write; one of that name is replaced"}, FIRST_UNIT), .run = do_vcd_start},
-    {"vcd.stop", "Ends the recording, 0.2 ms before now: later edges are not all known.", NULL, .run = do_vcd_stop},
-    {"vcd.flush", "Writes to the VCD file what has been recorded so far, with a closing time; in its first 0.2 ms that is a header.", NULL, .run = do_vcd_flush},
+    {"run.until", "Runs until an event of a board; returns whether it was reached and the number of events seen.",
+     CONTROL_ARGS({"event", CONTROL_EVENT, .what = "event of the unit's board"}, FIRST_UNIT,
+      {"count", CONTROL_COUNT, true, NULL, 1, CONTROL_COUNT_MAX, .what = "number of events to wait for; default: 1", .def = 1},
+      {"limit_s", CONTROL_REAL, true, "s", 0, 86400, .what = "timeout; default: 60", .def = 60},
+      {"after_tx", CONTROL_COUNT, true, NULL, 0, CONTROL_COUNT_MAX, .what = "as in run"}), .run = do_until, .check = check_until},
+    {"subscribe", "Subscribes this client to events, faults or status.",
+     CONTROL_ARGS({"what", CONTROL_CHOICE, .what = "topic", .choices = control_topics},
+      {"every_s", CONTROL_REAL, true, "s", 1e-3, 3600, .what = "interval of status in simulated time; default: 0.1", .def = 0.1}), .run = do_subscribe},
+    {"unsubscribe", "Ends this client's subscription to one topic, or to all.",
+     CONTROL_ARGS({"what", CONTROL_CHOICE, true, .what = "topic", .choices = control_topics}), .run = do_unsubscribe},
+    {"lines", "Reads the levels of a unit's lines (0.2 ms ago if a line has a fault).", CONTROL_ARGS(FIRST_UNIT), .run = do_lines},
+    {"vcd.start", "Starts recording the lines of a unit to a VCD file. A word on a converter's port or a pulse of STEP in progress at the start is left out.",
+     CONTROL_ARGS({"path", CONTROL_TEXT, .what = "file to write; an existing file is replaced"}, FIRST_UNIT), .run = do_vcd_start},
+    {"vcd.stop", "Stops the recording; it ends 0.2 ms before now, since later edges are not final.", NULL, .run = do_vcd_stop},
+    {"vcd.flush", "Flushes the recording to the VCD file with a closing time (in the first 0.2 ms: the header only).", NULL, .run = do_vcd_flush},
 };
 // clang-format on
 const struct control_table commands_watch = {rows, sizeof rows / sizeof *rows};

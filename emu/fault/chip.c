@@ -87,19 +87,19 @@ static bool has_register(const struct control_bench *b, const struct fault *f, c
 // clang-format off
 #define CHIP(v) .variant = (v), .places = FAULT_BIT(FAULT_AT_CHIP), .apply = apply_chip, .lift = refresh_chip
 static const struct fault_kind chip[] = {
-    {"chip.drdy_stuck", "The data-ready pin stays at level; inside, conversions go on.", "no frames, or no new values of that chip, and an EMCY that says so",
+    {"chip.drdy_stuck", "The data-ready pin is stuck at level; conversions continue.", "no frames, or no new values of that chip, and an EMCY that says so",
      CHIP(BOARD_FAULT_DRDY), .need = FAULT_BIT(FAULT_LEVEL), .unless = "the controller does not use the pin of that chip", .fits = has_fault,
      .lacks = "this chip has no data-ready pin that anybody hears"},
-    {"chip.dout_dead", "The data pin stays at level.", "all ones or all zeros in the words of that chip",
+    {"chip.dout_dead", "The data pin is stuck at level.", "all ones or all zeros in the words of that chip",
      CHIP(BOARD_FAULT_DOUT), .need = FAULT_BIT(FAULT_LEVEL), .unless = "no data pin", .fits = has_fault,
      .lacks = "this chip has no data pin"},
-    {"chip.lost_sync", "The chip does not hear SYNC, neither pin nor command.", "after a pulse on SYNC the chip goes on in its old phase: no gap in the frames if they follow that chip, another answer to a step than the other axes if they do not",
+    {"chip.lost_sync", "The chip ignores SYNC, pin and command.", "after a pulse on SYNC the chip goes on in its old phase: no gap in the frames if they follow that chip, another answer to a step than the other axes if they do not",
      CHIP(BOARD_FAULT_SYNC), .unless = "nothing synchronises that chip", .fits = has_fault,
      .lacks = "nothing synchronises this chip"},
-    {"chip.clock", "The clock of the chip is off by clock_ppm (negative: slow).", "the data rate is off by as much if the frames follow that chip, or the axis answers to a step in another time than the others",
+    {"chip.clock", "The chip's clock is off by clock_ppm.", "the data rate is off by as much if the frames follow that chip, or the axis answers to a step in another time than the others",
      CHIP(BOARD_FAULT_CLOCK), .need = FAULT_BIT(FAULT_CLOCK_PPM), .nonzero = FAULT_BIT(FAULT_CLOCK_PPM), .unless = "no clock of its own; clock_ppm is no whole number", .fits = has_clock,
      .lacks = "this chip has no clock of its own"},
-    {"chip.flip", "Bits of a register are inverted, once.", "the register reads otherwise, and the chip does what it now says",
+    {"chip.flip", "Inverts bits of a register once.", "the register reads differently, and the chip behaves accordingly",
      .places = FAULT_BIT(FAULT_AT_CHIP), .need = FAULT_BIT(FAULT_REGISTER) | FAULT_BIT(FAULT_MASK),
      .once = true, .unless = "no such register", .fits = has_register, .apply = flip, .lacks = "this chip has no registers"},
 };
@@ -134,17 +134,17 @@ static bool can_have_fault(const struct control_bench *b, const struct fault *f,
 // clang-format off
 #define CONTROLLER .places = FAULT_BIT(FAULT_AT_CONTROLLER), .apply = apply_controller, .lift = refresh_controller, .fits = can_have_fault
 static const struct fault_kind controller[] = {
-    {"controller.skip_sync_t", "The controller gives no pulse on SYNC_T.", "SYNC_T rests; temperature codes come every 10.00 ms at 100 SPS instead of every 10.25 ms",
+    {"controller.skip_sync_t", "The controller omits the pulse on SYNC_T.", "SYNC_T rests; temperature codes come every 10.00 ms at 100 SPS instead of every 10.25 ms",
      CONTROLLER, .unless = "no SYNC_T on the board", .lacks = "the controller of this board has no SYNC_T to give a pulse on"},
     {"controller.setup_order", "The controller carries out the steps of the set-up in reverse order, from the next Res on.", "after Res the registers of the converters differ from those of the article",
      CONTROLLER, .unless = "no set-up of several steps", .lacks = "the controller of this board has no set-up whose order matters"},
-    {"controller.frozen_words", "The controller sends the codes of the frame before, over and over.", "numbers and times of the frames go on, their codes stand still to the bit",
+    {"controller.frozen_words", "The controller repeats the codes of the previous frame.", "numbers and times of the frames go on, their codes stand still to the bit",
      CONTROLLER, .unless = "the controller keeps no words", .lacks = "the controller of this board keeps no words that could freeze"},
     {"controller.capacitor", "The capacitor of integrator X has lost 30 %.", "its codes grow, and its resets jump, by 1/0.7; what is summed of them does not change but for the converter's steps",
      CONTROLLER, .unless = "no integrators that are sampled", .lacks = "this board has no integrator whose capacitor a host could tell"},
     {"controller.stuck_reset", "The positive reset of integrator X never ends.", "the code of integrator X runs to its limit and the reading says saturated",
      CONTROLLER, .unless = "no precision resets", .lacks = "this board has no precision reset that could stay on"},
-    {"controller.stuck_key", "The key of the spare integrator never closes.", "the axis that the spare has stands still while it does",
+    {"controller.stuck_key", "The switch of the spare integrator never closes.", "the axis that the spare has stands still while it does",
      CONTROLLER, .unless = "no spare integrator", .lacks = "this board has no spare integrator with a key"},
 };
 // clang-format on

@@ -54,17 +54,17 @@ static bool has_pulse(const struct control_bench *b, const struct fault *f, char
 // clang-format off
 #define LINE(v) .variant = (v), .places = FAULT_BIT(FAULT_AT_LINE), .apply = apply_line, .lift = lift_line
 static const struct fault_kind line[] = {
-    {"line.stuck", "The line stays at level.", "no edge on it",
+    {"line.stuck", "The line is stuck at level.", "no edge on it",
      LINE(LINE_STUCK_LOW), .need = FAULT_BIT(FAULT_LEVEL)},
     {"line.swapped", "The wires A and B of the pair are swapped.", "the line is inverted",
      LINE(LINE_INVERTED)},
-    {"line.glitch", "One pulse of width_ns, the other way round.", "a pulse of that width where none belongs",
+    {"line.glitch", "One inverted pulse of width_ns.", "a spurious pulse of that width",
      LINE(LINE_GLITCH), .need = FAULT_BIT(FAULT_WIDTH_NS), .once = true},
-    {"line.missing_pulse", "The pulse of that number is missing in each frame.", "one clock less in a frame; its bits are shifted from there on",
+    {"line.missing_pulse", "Each frame lacks the pulse of that number.", "one clock less in a frame; its bits are shifted from there on",
      LINE(LINE_MISSING_PULSE), .need = FAULT_BIT(FAULT_PULSE), .unless = "any line but the one whose pulses a frame counts (CLK, SCLK); more pulses than a frame has", .fits = has_pulse},
     {"line.extra_pulse", "A pulse of width_ns follows the pulse of that number in each frame.", "one clock more in a frame; its bits are shifted from there on",
      LINE(LINE_EXTRA_PULSE), .need = FAULT_BIT(FAULT_PULSE) | FAULT_BIT(FAULT_WIDTH_NS), .unless = "any line but the one whose pulses a frame counts (CLK, SCLK); more pulses than a frame has", .fits = has_pulse},
-    {"line.noise", "Pulses of width_ns at random, rate_hz of them a second.", "pulses of that width at no place of the protocol",
+    {"line.noise", "Random pulses of width_ns, rate_hz per second on average.", "spurious pulses of that width",
      LINE(LINE_NOISE), .need = FAULT_BIT(FAULT_RATE_HZ) | FAULT_BIT(FAULT_WIDTH_NS)},
 };
 // clang-format on

@@ -103,7 +103,7 @@ static bool has_bits(const struct control_bench *b, const struct fault *f, char 
 
 // clang-format off
 static const struct fault_kind link[] = {
-    {"link.drop", "Frames are not received, though their sender thinks so.", "gaps in the numbers of the frames; the counters of the board know of no loss",
+    {"link.drop", "Frames are lost after a successful transmission.", "gaps in the frame numbers; the board counts no loss",
      FRAMES(CAN_FAULT_DROP), .places = ANY_FRAME, .may = WHICH},
     {"link.duplicate", "Frames are received twice.", "the same frame twice in a row",
      FRAMES(CAN_FAULT_DUPLICATE), .places = ANY_FRAME, .may = WHICH},
@@ -111,13 +111,13 @@ static const struct fault_kind link[] = {
      FRAMES(CAN_FAULT_REORDER), .places = ANY_FRAME, .may = WHICH | HOLD},
     {"link.delay", "Frames are received hold_s later.", "frames come later after the instant of their sample than the bus explains",
      FRAMES(CAN_FAULT_DELAY), .places = ANY_FRAME, .need = HOLD, .nonzero = HOLD, .may = WHICH},
-    {"link.corrupt", "Inverts a data bit of frames without a CRC error, as a faulty gateway does.", "codes, numbers or times that cannot be",
+    {"link.corrupt", "Inverts a data bit of frames without a CRC error, as a faulty gateway does.", "impossible codes, numbers or times",
      FRAMES(CAN_FAULT_ALTER), .places = ANY_FRAME, .may = WHICH},
-    {"link.error_frame", "Frames are destroyed by an error frame and sent again, until their sender is off the bus.", "error frames (socketcand and SocketCAN show them; slcan has none), frames later than they were due",
+    {"link.error_frame", "Error frames destroy frames; the sender repeats them until it is bus-off.", "error frames (socketcand and SocketCAN show them; slcan has none), frames later than they were due",
      FRAMES(CAN_FAULT_ERROR), .places = AT(NODE) | AT(BUS), .may = WHICH, .unless = "the bus is ideal, bitrate_hz 0: no bits", .fits = has_bits},
-    {"link.bus_off", "The controller of the node goes off the bus, and comes back after 128 times 11 recessive bits.", "silence of the node for that long (1.4 ms at 1 Mbit/s), then what has waited",
+    {"link.bus_off", "The node's controller goes bus-off and recovers after 128 times 11 recessive bits.", "silence of the node for that long (1.4 ms at 1 Mbit/s), then what has waited",
      .variant = BUS_OFF, .places = AT(NODE), .once = true, .unless = "the bus is ideal, bitrate_hz 0: no bits", .fits = has_bits, .apply = bus_off},
-    {"link.stall", "The program reads nothing.", "nothing arrives at that program; what comes for it is kept while there is room, then dropped and counted",
+    {"link.stall", "The client stops reading.", "nothing arrives at that program; what comes for it is kept while there is room, then dropped and counted",
      .variant = STALL, .places = AT(CLIENT), .apply = stall, .lift = lift_stall},
 };
 // clang-format on

@@ -148,17 +148,17 @@ static void lift_sensor(struct fault *f, int64_t t_ns)
 // clang-format off
 #define SENSOR(v) .variant = (v), .places = FAULT_BIT(FAULT_AT_SENSOR), .apply = apply_sensor, .lift = lift_sensor
 static const struct fault_kind sensor[] = {
-    {"sensor.stuck", "The output stays at out_v, or at what it is at that instant.", "the codes of the axis stand still but for the converter's noise, whatever the head does",
+    {"sensor.stuck", "The sensor output freezes at out_v (default: its present value).", "the axis shows a constant plus converter noise at any head angle",
      SENSOR(SENSOR_STUCK), .may = FAULT_BIT(FAULT_OUT_V), .unless = "the channel has no sensor", .fits = has_sensor},
-    {"sensor.bias", "bias_v is added to the output.", "the codes of the axis step and stay there",
+    {"sensor.bias", "Adds bias_v to the sensor output.", "a step in the codes of the axis",
      SENSOR(SENSOR_BIAS), .need = FAULT_BIT(FAULT_BIAS_V), .nonzero = FAULT_BIT(FAULT_BIAS_V), .unless = "the channel has no sensor; it is less than a code of the board", .fits = seen_volts},
-    {"sensor.drift", "The output runs away.", "the codes of the axis have a slope",
+    {"sensor.drift", "The sensor output drifts by drift_v_per_s.", "a slope in the codes of the axis",
      SENSOR(SENSOR_DRIFT), .need = FAULT_BIT(FAULT_DRIFT_V_PER_S), .nonzero = FAULT_BIT(FAULT_DRIFT_V_PER_S), .unless = "the channel has no sensor; it ends before it has come to a code", .fits = grows},
-    {"sensor.scale", "The deviation of the output from its zero is wrong by scale_ppm.", "the codes of the axis are wrong in proportion to what the axis feels",
+    {"sensor.scale", "The scale factor of the sensor changes by scale_ppm.", "an error of the axis proportional to its specific force",
      SENSOR(SENSOR_SCALE), .need = FAULT_BIT(FAULT_SCALE_PPM), .nonzero = FAULT_BIT(FAULT_SCALE_PPM), .unless = "the channel has no sensor; it is less than a code of the board", .fits = seen_scale},
-    {"sensor.noise", "White noise is added; it gives a settled reading at 1000 SPS the rms rms_v.", "the codes of the axis scatter more",
+    {"sensor.noise", "Adds white noise of rms rms_v in a settled reading at 1000 SPS.", "more scatter in the codes of the axis",
      SENSOR(SENSOR_NOISE), .need = FAULT_BIT(FAULT_RMS_V), .unless = "the channel has no sensor; it is less than a code of the board", .fits = seen_volts},
-    {"sensor.saturation", "The output does not leave low_v ... high_v.", "the codes of the axis stop at a limit that is not the converter's",
+    {"sensor.saturation", "The sensor output saturates at low_v and high_v.", "the codes of the axis stop below the converter's full scale",
      SENSOR(SENSOR_SATURATION), .may = FAULT_BIT(FAULT_LOW_V) | FAULT_BIT(FAULT_HIGH_V), .unless = "the channel has no sensor; low_v is not below high_v; a limit is beyond what the chain passes", .fits = has_limits},
 };
 // clang-format on
@@ -217,13 +217,13 @@ static void lift_afe(struct fault *f, int64_t t_ns)
 // clang-format off
 #define CHAIN(v) .variant = (v), .places = FAULT_BIT(FAULT_AT_AFE), .apply = apply_afe, .lift = lift_afe
 static const struct fault_kind analog[] = {
-    {"analog.load_open", "The load resistor of a current-output sensor is open: the buffer goes to its limit.", "the codes of the axis stand at the limit, status CLIP",
+    {"analog.load_open", "The load resistor of a current-output sensor is open; the buffer saturates.", "full-scale codes of the axis, status CLIP",
      CHAIN(AFE_LOAD_OPEN), .unless = "the sensor has voltage output: no load resistor", .fits = has_load},
-    {"analog.load_short", "The load resistor of a current-output sensor is shorted: no volts.", "the codes of the axis stand near 0, whatever the head does",
+    {"analog.load_short", "The load resistor of a current-output sensor is shorted; the input is 0 V.", "codes of the axis near 0 at any head angle",
      CHAIN(AFE_LOAD_SHORT), .unless = "the sensor has voltage output: no load resistor", .fits = has_load},
-    {"analog.reference", "The converter's reference is wrong by reference_ppm and runs away by drift_ppm_per_s.", "the codes of the axis are too small in proportion, offset and all",
+    {"analog.reference", "The converter's reference voltage is off by reference_ppm and drifts by drift_ppm_per_s.", "all codes of the axis scaled, offset included",
      CHAIN(AFE_REFERENCE), .may = FAULT_BIT(FAULT_REFERENCE_PPM) | FAULT_BIT(FAULT_DRIFT_PPM_PER_S), .unless = "neither is given; the error is less than a code of the board, or a drift ends before it has come to one", .fits = has_error},
-    {"analog.ripple", "A sine of the supply comes through the buffer, amplitude at the load.", "the codes of the axis carry a line at frequency_hz",
+    {"analog.ripple", "Supply ripple couples through the buffer, as a sine of amplitude_v at the load.", "a spectral line at frequency_hz in the codes of the axis",
      CHAIN(AFE_RIPPLE), .need = FAULT_BIT(FAULT_AMPLITUDE_V) | FAULT_BIT(FAULT_FREQUENCY_HZ), .unless = "it is less than a code of the board", .fits = ripples},
 };
 // clang-format on

@@ -260,10 +260,10 @@ static void dump_version(const struct yaml_field *d, const void *section, cJSON 
 
 // clang-format off
 static const struct yaml_field scenario_rows[] = {
-    {.key = "version", .type = YAML_CUSTOM, .load = load_version, .dump = dump_version, .what = "of the program that wrote the file; not looked at"},
-    {.key = "seed",  .type = YAML_U64, .offset = SCENARIO(seed), .max = 18446744073709551615.0, .what = "of all noise; each unit and source has its own stream"},
+    {.key = "version", .type = YAML_CUSTOM, .load = load_version, .dump = dump_version, .what = "version of the program that wrote the file; ignored"},
+    {.key = "seed",  .type = YAML_U64, .offset = SCENARIO(seed), .max = 18446744073709551615.0, .what = "random seed; each unit and noise source has its own stream"},
     {.key = "start", .type = YAML_BOOL, .offset = SCENARIO(start), .what = "the bench's own node writes the frame forms and starts the units, 1 ms after power-on"},
-    {.key = "bus",   .type = YAML_CUSTOM, .load = load_bus, .what = "short for one bus, `can0`"},
+    {.key = "bus",   .type = YAML_CUSTOM, .load = load_bus, .what = "the only bus, `can0`"},
     {.key = "buses", .type = YAML_CUSTOM, .load = buses_are_loaded, .dump = dump_buses, .what = "a sequence of up to 8 buses"},
     {.key = "site",  .type = YAML_CUSTOM, .load = scenario_load_site, .dump = scenario_dump_site, .what = "where the bench is"},
     {.key = "head",  .type = YAML_SECTION, .offset = SCENARIO(lab.head), .sub = &scenario_head_fields, .what = "the dividing head"},
@@ -272,9 +272,9 @@ static const struct yaml_field scenario_rows[] = {
     {.key = "supply", .type = YAML_SECTION, .offset = SCENARIO(lab.supply), .sub = &scenario_supply_fields, .present = SCENARIO(lab.supply.present), .what = "the power supply; without it the boards are always fed"},
     {.key = "platform", .type = YAML_SECTION, .offset = SCENARIO(lab.platform), .sub = &scenario_platform_fields, .present = SCENARIO(lab.platform.present), .what = "the gyro-stabilised platform; without it there is none"},
     {.key = "vehicle", .type = YAML_CUSTOM, .load = scenario_load_vehicle, .dump = scenario_dump_vehicle, .what = "what the platform is on"},
-    {.key = "spread", .type = YAML_CUSTOM, .load = load_spread, .dump = dump_spread, .what = "production spread: standard deviations of what differs from unit to unit"},
+    {.key = "spread", .type = YAML_CUSTOM, .load = load_spread, .dump = dump_spread, .what = "production spread: standard deviations from unit to unit"},
     {.key = "units", .type = YAML_CUSTOM, .load = load_units, .dump = dump_units, .what = "a sequence of up to 64 units"},
-    {.key = "timeline", .type = YAML_CUSTOM, .load = load_timeline, .dump = dump_timeline, .what = "a sequence of commands that the bench gives itself, each at its time"},
+    {.key = "timeline", .type = YAML_CUSTOM, .load = load_timeline, .dump = dump_timeline, .what = "a sequence of commands, each at its time"},
     {.key = "faults", .type = YAML_CUSTOM, .load = load_faults, .dump = dump_faults, .what = "a sequence of faults: the arguments of fault.add, given before power-on"},
 };
 const struct yaml_fields scenario_fields = YAML_FIELDS(scenario_rows);

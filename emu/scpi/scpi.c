@@ -216,7 +216,7 @@ bool scpi_markdown(const struct scpi_kind *kind, unsigned line, char *out, size_
     const struct scpi_command *common = kind ? NULL : scpi_common(line - 2);
     if (line == 0)
         snprintf(out, cap,
-                 kind ? "| header | parameters, answer | command | what it does |"
+                 kind ? "| header | parameters, response | command | what it does |"
                       : "| header | parameter | what it does |");
     if (line == 1) snprintf(out, cap, kind ? "|---|---|---|---|" : "|---|---|---|");
     if (line < 2) return true;
@@ -226,7 +226,7 @@ bool scpi_markdown(const struct scpi_kind *kind, unsigned line, char *out, size_
     if (!kind) return common != NULL;
     const struct control_scpi *how = nth_header(kind, line - 2, &row);
     if (!how) return false;
-    if (how->result) snprintf(params, sizeof params, "answers %s", how->result);
+    if (how->result) snprintf(params, sizeof params, "returns %s", how->result);
     else markdown_params(row, scpi_suffixes(how->header), params, sizeof params);
     snprintf(out, cap, "| `%s` | %s | `%s` | %s |", how->header, params, row->name, row->what);
     return true;

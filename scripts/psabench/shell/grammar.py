@@ -148,7 +148,7 @@ def _count(a: Arg, text: str) -> int:
 
 
 def describe(a: Arg) -> str:
-    """`degrees on the head's scale, deg, -3600 to 3600`."""
+    """`angle on the head's scale, deg, -3600 to 3600`."""
     return ", ".join(x for x in (a.what, a.range) if x) or a.kind.value
 
 

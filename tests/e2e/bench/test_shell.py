@@ -76,13 +76,13 @@ def test_a_session_at_the_keyboard(env: dict[str, str], tmp_path: Path) -> None:
         t.wait_for(r"0\.000 s step")  # the status bar
         t.say("head.turn 30", r"angle_deg +30")
         t.type("head.tu")
-        t.wait_for(r"degrees on the head's scale|Turns the dividing head")  # the menu, or the line below
+        t.wait_for(r"angle on the head's scale|Turns the dividing head")  # the menu, or the line below
         t.type(" \x15")  # away with it
         t.say("wait 250ms", "")
         t.say("time", r"t_s +0\.25")
         t.say("dut.ready", "")
         t.say("dut.register x CONFIG0", r"SYNC 0 pulse, DR 2 1000 /s, PHASE 1 minimum, FILTR 2 sinc \+ FIR")
-        t.say("head.turn 4000", r"angle_deg: 4000 is out of range; degrees on the head's scale, deg, -3600 to 3600")
+        t.say("head.turn 4000", r"angle_deg: 4000 is out of range; angle on the head's scale, deg, -3600 to 3600")
         t.say(f"save {script}", r"lines +\d")
         emulators = children(t.pid)
         assert emulators

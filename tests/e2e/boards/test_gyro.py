@@ -248,7 +248,7 @@ units:
         ("site: {latitude_deg: 50}" + UNITS, "level: expected a section platform to mount it on"),
         ("site: {latitude_deg: 50}\nunits: [{board: gyro}]", "a: expected a section platform for it to control"),
         ("vehicle: {heading_deg: 3}\nunits: [{}]", "vehicle: expected a section platform"),
-        ("site: {latitude_deg: 50}\nplatform: {}\nunits: [{board: gyro, level: b}, {name: b}]", "a: level: expected a PSA-2 with on: platform, got b"),
+        ("site: {latitude_deg: 50}\nplatform: {}\nunits: [{board: gyro, level: b}, {name: b}]", "expected a PSA-2 with on: platform"),
         ("site: {latitude_deg: 50}\nplatform: {}\nunits: [{board: gyro, level: c}]", 'expected the name of a PSA-2, got "c"'),
         ("site: {latitude_deg: 50}\nplatform: {}\nunits: [{board: gyro}, {board: gyro}]", "expected one gyro unit on the platform"),
         ("units: [{level: b}]", "level: not a setting of a PSA-2"),
