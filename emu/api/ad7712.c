@@ -12,12 +12,12 @@ struct part_ad7712 {
     struct ad7712 chip;
 };
 
-static struct ad7712 *chip(struct psabench_part *p)
+static struct ad7712 *chip_of(struct psabench_part *p)
 {
     return &((struct part_ad7712 *)p)->chip;
 }
 
-static const struct ad7712 *cchip(const struct psabench_part *p)
+static const struct ad7712 *const_chip_of(const struct psabench_part *p)
 {
     return &((const struct part_ad7712 *)p)->chip;
 }
@@ -66,13 +66,14 @@ static bool get_sdata(const struct psabench_part *p, unsigned arg)
 {
     (void)arg;
     const int64_t now_ns = p->bench->sched.now_ns;
-    return ad7712_sdata_driven(cchip(p), now_ns) ? ad7712_sdata(cchip(p), now_ns) : cchip(p)->port.sdata;
+    return ad7712_sdata_driven(const_chip_of(p), now_ns) ? ad7712_sdata(const_chip_of(p), now_ns)
+                                                         : const_chip_of(p)->port.sdata;
 }
 
 static bool get_sclk(const struct psabench_part *p, unsigned arg)
 {
     (void)arg;
-    return cchip(p)->port.mode ? ad7712_sclk(cchip(p)) : cchip(p)->port.sclk;
+    return const_chip_of(p)->port.mode ? ad7712_sclk(const_chip_of(p)) : const_chip_of(p)->port.sclk;
 }
 
 static const struct api_pin pins[] = {
@@ -135,19 +136,19 @@ static bool open_ad7712(struct psabench_part *p, char *why, size_t cap)
                                  .drdy = api_ignore_edge,
                                  .sdata = api_ignore_edge,
                                  .sclk = api_ignore_edge};
-    ad7712_init(chip(p), &cfg, &io, &p->bench->sched, api_noise(p, "adc"));
-    ad7712_power_up(chip(p), p->bench->sched.now_ns);
+    ad7712_init(chip_of(p), &cfg, &io, &p->bench->sched, api_noise(p, "adc"));
+    ad7712_power_up(chip_of(p), p->bench->sched.now_ns);
     return true;
 }
 
 static void before_input(struct psabench_part *p, int64_t t_ns)
 {
-    ad7712_sample_until(chip(p), t_ns);
+    ad7712_sample_until(chip_of(p), t_ns);
 }
 
-static int peek(const struct psabench_part *p, unsigned address)
+static int peek_register(const struct psabench_part *p, unsigned address)
 {
-    const struct ad7712 *a = cchip(p);
+    const struct ad7712 *a = const_chip_of(p);
     const uint32_t word[] = {a->control, a->zero[0], a->full[0], a->zero[1], a->full[1], a->word};
     if (address >= 3 * sizeof word / sizeof *word) return -1;
     return (int)(word[address / 3] >> (16 - 8 * (address % 3)) & 0xFF);
@@ -155,12 +156,12 @@ static int peek(const struct psabench_part *p, unsigned address)
 
 static uint64_t sampling_hz(const struct psabench_part *p)
 {
-    return ad7712_sampling_hz(cchip(p));
+    return ad7712_sampling_hz(const_chip_of(p));
 }
 
 static uint64_t iout_na(const struct psabench_part *p)
 {
-    return (uint64_t)(ad7712_iout_a(cchip(p)) * 1e9 + 0.5);
+    return (uint64_t)(ad7712_iout_a(const_chip_of(p)) * 1e9 + 0.5);
 }
 
 #define N(field) API_COUNTER(#field, part_ad7712, chip.n.field)
@@ -179,7 +180,7 @@ static const struct api_counter counters[] = {
     .size = sizeof(struct part_ad7712), .options = options, .option_count = sizeof options / sizeof *options,          \
     .options_text = OPTIONS(API_OPTION_TEXT), .pins = pins, .pin_count = sizeof pins / sizeof *pins,                   \
     .counters = counters, .counter_count = sizeof counters / sizeof *counters, .spi = API_NO_SPI, .open = open_ad7712, \
-    .before_input = before_input, .peek = peek
+    .before_input = before_input, .peek = peek_register
 
 const struct api_kind api_ad7710 = {COMMON, .name = "ad7710", .inputs = 0xF, .fn_inputs = 0xF};
 const struct api_kind api_ad7711 = {COMMON, .name = "ad7711", .inputs = 0x7, .fn_inputs = 0x7};

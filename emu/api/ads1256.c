@@ -15,12 +15,12 @@ struct part_ads1256 {
     struct ads1256 chip;
 };
 
-static struct ads1256 *chip(struct psabench_part *p)
+static struct ads1256 *chip_of(struct psabench_part *p)
 {
     return &((struct part_ads1256 *)p)->chip;
 }
 
-static const struct ads1256 *cchip(const struct psabench_part *p)
+static const struct ads1256 *const_chip_of(const struct psabench_part *p)
 {
     return &((const struct part_ads1256 *)p)->chip;
 }
@@ -59,7 +59,7 @@ API_SET_PIN(set_reset, part_ads1256, ads1256_reset_pin);
 
 static void set_gpio(struct psabench_part *p, unsigned d, bool level, int64_t t_ns)
 {
-    ads1256_gpio_pin(chip(p), d, level, t_ns);
+    ads1256_gpio_pin(chip_of(p), d, level, t_ns);
 }
 
 API_GET_PIN(get_drdy, part_ads1256, ads1256_drdy);
@@ -68,7 +68,7 @@ API_GET_PIN(get_dout, part_ads1256, ads1256_dout);
 /* D0 as CLKOUT is drawn low: its edges are no events (counter clkout_hz). */
 static bool get_gpio(const struct psabench_part *p, unsigned d)
 {
-    return !(d == 0 && ads1256_clkout_hz(cchip(p))) && ads1256_gpio(cchip(p), d);
+    return !(d == 0 && ads1256_clkout_hz(const_chip_of(p))) && ads1256_gpio(const_chip_of(p), d);
 }
 
 /* The ADS1255 has the first nine. */
@@ -120,19 +120,19 @@ static bool open_ads1256(struct psabench_part *p, char *why, size_t cap)
                                     .strict_cs = s->strict_cs};
     const struct ads1256_io io = {
         .ctx = p, .ain_v = ain_v, .drdy = api_ignore_edge, .source_ohm = s->source_ohm > 0.0 ? source_ohm : NULL};
-    ads1256_init(chip(p), &cfg, &io, &p->bench->sched, api_noise(p, "adc"));
-    ads1256_power_up(chip(p), p->bench->sched.now_ns);
+    ads1256_init(chip_of(p), &cfg, &io, &p->bench->sched, api_noise(p, "adc"));
+    ads1256_power_up(chip_of(p), p->bench->sched.now_ns);
     return true;
 }
 
-static int peek(const struct psabench_part *p, unsigned address)
+static int peek_register(const struct psabench_part *p, unsigned address)
 {
-    return api_peek_reg(&cchip(p)->regs, address);
+    return api_peek_reg(&const_chip_of(p)->regs, address);
 }
 
 static uint64_t clkout_hz(const struct psabench_part *p)
 {
-    return ads1256_clkout_hz(cchip(p));
+    return ads1256_clkout_hz(const_chip_of(p));
 }
 
 #define N(field) API_COUNTER(#field, part_ads1256, chip.n.field)
@@ -151,7 +151,8 @@ static const struct api_counter counters[] = {
 #define COMMON                                                                                                         \
     .size = sizeof(struct part_ads1256), .options = options, .option_count = sizeof options / sizeof *options,         \
     .options_text = OPTIONS(API_OPTION_TEXT), .pins = pins, .counters = counters,                                      \
-    .counter_count = sizeof counters / sizeof *counters, .spi = API_SPI_MODE1, .open = open_ads1256, .peek = peek
+    .counter_count = sizeof counters / sizeof *counters, .spi = API_SPI_MODE1, .open = open_ads1256,                   \
+    .peek = peek_register
 
 const struct api_kind api_ads1255 = {COMMON, .name = "ads1255", .pin_count = PINS_1255, .inputs = 0x103,
                                      .fn_inputs = 0x103};

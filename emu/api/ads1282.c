@@ -22,12 +22,12 @@ struct part_ads1282 {
     struct ads1282 chip;
 };
 
-static struct ads1282 *chip(struct psabench_part *p)
+static struct ads1282 *chip_of(struct psabench_part *p)
 {
     return &((struct part_ads1282 *)p)->chip;
 }
 
-static const struct part_ads1282 *cself(const struct psabench_part *p)
+static const struct part_ads1282 *const_part_of(const struct psabench_part *p)
 {
     return (const struct part_ads1282 *)p;
 }
@@ -87,7 +87,7 @@ API_GET_PIN(get_mflag, part_ads1282, ads1282_mflag);
 
 static bool get_modulator(const struct psabench_part *p, unsigned arg)
 {
-    const struct part_ads1282 *s = cself(p);
+    const struct part_ads1282 *s = const_part_of(p);
     return arg == 0 ? s->m0 : arg == 1 ? s->m1 : s->mclk;
 }
 
@@ -167,12 +167,12 @@ static bool open_ads1282(struct psabench_part *p, char *why, size_t cap)
 
 static void before_input(struct psabench_part *p, int64_t t_ns)
 {
-    ads1282_sample_until(chip(p), t_ns);
+    ads1282_sample_until(chip_of(p), t_ns);
 }
 
-static int peek(const struct psabench_part *p, unsigned address)
+static int peek_register(const struct psabench_part *p, unsigned address)
 {
-    return api_peek_reg(&cself(p)->chip.regs, address);
+    return api_peek_reg(&const_part_of(p)->chip.regs, address);
 }
 
 #define N(field) API_COUNTER(#field, part_ads1282, chip.count.field)
@@ -191,7 +191,7 @@ static const struct api_counter counters[] = {
 #define COMMON                                                                                                         \
     .size = sizeof(struct part_ads1282), .pins = pins, .counters = counters,                                           \
     .counter_count = sizeof counters / sizeof *counters, .spi = API_SPI_MODE0, .open = open_ads1282,                   \
-    .before_input = before_input, .peek = peek
+    .before_input = before_input, .peek = peek_register
 
 const struct api_kind api_ads1281 = {COMMON,
                                      .name = "ads1281",

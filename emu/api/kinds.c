@@ -51,7 +51,7 @@ static int check_name(psabench *b, const char *name)
 }
 
 /* Not on the list yet. */
-static struct psabench_part *make(psabench *b, const struct api_kind *k, const char *name)
+static struct psabench_part *allocate_part(psabench *b, const struct api_kind *k, const char *name)
 {
     struct psabench_part *p = calloc(1, k->size);
     if (!p) {
@@ -78,7 +78,7 @@ psabench_part *psabench_part_new(psabench *b, const char *part, const char *name
                        psabench_parts());
         return NULL;
     }
-    struct psabench_part *p = make(b, k, name);
+    struct psabench_part *p = allocate_part(b, k, name);
     if (!p) return NULL;
     if (!api_options(p, options, why, sizeof why) || !k->open(p, why, sizeof why)) {
         (void)api_fail(b, PSABENCH_BAD_ARGUMENT, "%s: %s", name, why);

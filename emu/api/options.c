@@ -6,8 +6,8 @@
 
 enum { KEY = 32, VALUE = 64 };
 
-static bool no(char *why, size_t cap, const char *format, ...) __attribute__((format(printf, 3, 4)));
-static bool no(char *why, size_t cap, const char *format, ...)
+static bool fail_option(char *why, size_t cap, const char *format, ...) __attribute__((format(printf, 3, 4)));
+static bool fail_option(char *why, size_t cap, const char *format, ...)
 {
     va_list args;
     va_start(args, format);
@@ -63,8 +63,8 @@ static bool set_number(void *at, const struct api_option *o, const char *text, c
     double v;
     const bool good = parse_number(text, &v) && v >= o->min && v <= o->max;
     if (!good || (o->type == API_UINT && v != (double)(uint32_t)v))
-        return no(why, cap, "option %s=%s: use %s from %.10g to %.10g", o->key, text,
-                  o->type == API_UINT ? "a whole number" : "a number", o->min, o->max);
+        return fail_option(why, cap, "option %s=%s: use %s from %.10g to %.10g", o->key, text,
+                           o->type == API_UINT ? "a whole number" : "a number", o->min, o->max);
     const uint32_t u = o->type == API_UINT ? (uint32_t)v : 0;
     if (o->type == API_UINT) memcpy(at, &u, sizeof u);
     else memcpy(at, &v, sizeof v);
@@ -73,7 +73,8 @@ static bool set_number(void *at, const struct api_option *o, const char *text, c
 
 static bool set_bool(void *at, const struct api_option *o, const char *text, char *why, size_t cap)
 {
-    if (strcmp(text, "0") != 0 && strcmp(text, "1") != 0) return no(why, cap, "option %s=%s: use 0 or 1", o->key, text);
+    if (strcmp(text, "0") != 0 && strcmp(text, "1") != 0)
+        return fail_option(why, cap, "option %s=%s: use 0 or 1", o->key, text);
     const bool v = text[0] == '1';
     memcpy(at, &v, sizeof v);
     return true;
@@ -92,10 +93,10 @@ static bool set_choice(void *at, const struct api_option *o, const char *text, c
         }
         c = bar ? bar + 1 : NULL;
     }
-    return no(why, cap, "option %s=%s: use one of %s", o->key, text, o->choices);
+    return fail_option(why, cap, "option %s=%s: use one of %s", o->key, text, o->choices);
 }
 
-static bool set(struct psabench_part *p, const struct api_option *o, const char *text, char *why, size_t cap)
+static bool set_option(struct psabench_part *p, const struct api_option *o, const char *text, char *why, size_t cap)
 {
     void *at = (char *)p + o->offset;
     if (o->type == API_BOOL) return set_bool(at, o, text, why, cap);
@@ -103,20 +104,20 @@ static bool set(struct psabench_part *p, const struct api_option *o, const char 
     return set_number(at, o, text, why, cap);
 }
 
-static const struct api_option *find(const struct api_kind *k, const char *key)
+static const struct api_option *find_option(const struct api_kind *k, const char *key)
 {
     for (unsigned i = 0; i < k->option_count; i++)
         if (strcmp(k->options[i].key, key) == 0) return &k->options[i];
     return NULL;
 }
 
-static bool unknown(const struct api_kind *k, const char *key, char *why, size_t cap)
+static bool fail_unknown(const struct api_kind *k, const char *key, char *why, size_t cap)
 {
     char list[API_WHY] = "";
     size_t len = 0;
     for (unsigned i = 0; i < k->option_count && len < sizeof list; i++)
         len += (size_t)snprintf(list + len, sizeof list - len, " %s", k->options[i].key);
-    return no(why, cap, "no option %s of %s: there are%s", key, k->name, list);
+    return fail_option(why, cap, "no option %s of %s: there are%s", key, k->name, list);
 }
 
 /* One word "key=value". */
@@ -125,24 +126,24 @@ static bool take_word(struct psabench_part *p, const char *word, size_t len, cha
     char key[KEY];
     char value[VALUE];
     const char *equals = memchr(word, '=', len);
-    if (!equals) return no(why, cap, "option %.*s: write key=value", (int)(len < KEY ? len : KEY), word);
+    if (!equals) return fail_option(why, cap, "option %.*s: write key=value", (int)(len < KEY ? len : KEY), word);
     const size_t n = (size_t)(equals - word);
     const size_t m = len - n - 1;
     if (n >= sizeof key || m >= sizeof value)
-        return no(why, cap, "option %.*s...: keys have up to %d characters, values up to %d", KEY - 1, word, KEY - 1,
-                  VALUE - 1);
+        return fail_option(why, cap, "option %.*s...: keys have up to %d characters, values up to %d", KEY - 1, word,
+                           KEY - 1, VALUE - 1);
     memcpy(key, word, n);
     key[n] = '\0';
     memcpy(value, equals + 1, m);
     value[m] = '\0';
-    const struct api_option *o = find(p->kind, key);
-    return o ? set(p, o, value, why, cap) : unknown(p->kind, key, why, cap);
+    const struct api_option *o = find_option(p->kind, key);
+    return o ? set_option(p, o, value, why, cap) : fail_unknown(p->kind, key, why, cap);
 }
 
 bool api_options(struct psabench_part *p, const char *text, char *why, size_t cap)
 {
     for (unsigned i = 0; i < p->kind->option_count; i++)
-        if (!set(p, &p->kind->options[i], p->kind->options[i].standard, why, cap)) return false;
+        if (!set_option(p, &p->kind->options[i], p->kind->options[i].standard, why, cap)) return false;
     for (const char *word = text ? text : ""; *(word += strspn(word, " "));) {
         const size_t len = strcspn(word, " ");
         if (!take_word(p, word, len, why, cap)) return false;

@@ -21,12 +21,12 @@ struct part_psa2 {
     enum psa2_result result;
 };
 
-static struct part_psa2 *self(struct psabench_part *p)
+static struct part_psa2 *part_of(struct psabench_part *p)
 {
     return (struct part_psa2 *)p;
 }
 
-static const struct part_psa2 *cself(const struct psabench_part *p)
+static const struct part_psa2 *const_part_of(const struct psabench_part *p)
 {
     return (const struct part_psa2 *)p;
 }
@@ -104,7 +104,7 @@ static int64_t now_ns(const struct psabench_part *p)
 #define GET_LINE(name, expression)                                                                                     \
     static bool get_##name(const struct psabench_part *p, unsigned arg)                                                \
     {                                                                                                                  \
-        const struct psa2 *b = &cself(p)->board;                                                                       \
+        const struct psa2 *b = &const_part_of(p)->board;                                                               \
         (void)arg;                                                                                                     \
         return expression;                                                                                             \
     }                                                                                                                  \
@@ -121,7 +121,7 @@ GET_LINE(res, b->mode != PSA2_IN_RESET);
 /* INT falls on the grid of CLK, which is no event without observers. */
 static int64_t next_ns(const struct psabench_part *p)
 {
-    const struct psa2_out *out = &cself(p)->board.out;
+    const struct psa2_out *out = &const_part_of(p)->board.out;
     return out->busy && now_ns(p) < out->f.t_int_fall_ns ? out->f.t_int_fall_ns : INT64_MAX;
 }
 
@@ -129,7 +129,7 @@ static int64_t next_ns(const struct psabench_part *p)
 static void set_res(struct psabench_part *p, unsigned arg, bool level, int64_t t_ns)
 {
     (void)arg;
-    if (!level && get_res(p, 0)) psa2_reset(&self(p)->board, t_ns);
+    if (!level && get_res(p, 0)) psa2_reset(&part_of(p)->board, t_ns);
 }
 
 static const struct api_pin pins[PSA2_LINES] = {
@@ -167,7 +167,7 @@ static void on_steps(void *ctx, const struct trace_step *step, unsigned n)
 
 /* The lines heeded go to one sink. Another set of lines: a new sink is attached before the old one goes, for a trace
  * without sinks throws away what it still holds back. */
-static void attach(struct part_psa2 *s)
+static void attach_sink(struct part_psa2 *s)
 {
     const uint32_t want = s->part.watched | s->part.recorded;
     struct trace_sink *old = &s->sink[s->attached];
@@ -182,24 +182,24 @@ static void attach(struct part_psa2 *s)
     old->mask = 0;
 }
 
-static void advance(struct psabench_part *p, int64_t t_ns)
+static void advance_trace(struct psabench_part *p, int64_t t_ns)
 {
-    struct part_psa2 *s = self(p);
+    struct part_psa2 *s = part_of(p);
     if (p->inside) return;
-    attach(s);
+    attach_sink(s);
     p->inside++;
     trace_advance(&s->board.base.trace, t_ns);
     p->inside--;
 }
 
-static void follow(struct psabench_part *p, int64_t t_ns)
+static void follow_trace(struct psabench_part *p, int64_t t_ns)
 {
-    advance(p, t_ns - TRACE_LAG_NS);
+    advance_trace(p, t_ns - TRACE_LAG_NS);
 }
 
 /* ---- the board ---- */
 
-static double accel(void *ctx, unsigned axis, int64_t t_ns)
+static double accel_input(void *ctx, unsigned axis, int64_t t_ns)
 {
     return api_input(ctx, axis, t_ns);
 }
@@ -233,7 +233,7 @@ static void on_frame(void *ctx, const struct psa2_frame *f, int64_t t_ns)
 
 static bool open_psa2(struct psabench_part *p, char *why, size_t cap)
 {
-    struct part_psa2 *s = self(p);
+    struct part_psa2 *s = part_of(p);
     struct psa2_profile profile;
     if (!api_psa2_profile(s->profile, &profile, why, cap)) return false;
     const uint64_t serial = api_serial(p);
@@ -244,7 +244,7 @@ static bool open_psa2(struct psabench_part *p, char *why, size_t cap)
                              .serial = (uint32_t)(serial ^ serial >> 32)};
     for (unsigned i = 0; i < 3; i++) unit.afe[i] = afe_nominal(s->input == 0 ? AFE_VOLTAGE : AFE_CURRENT);
     for (unsigned i = 0; i < TEMPS; i++) p->volts[TEMP_INPUT + i] = s->temp_degc;
-    const struct board_io io = {.ctx = p, .accel = accel, .temp_degc = temp_degc};
+    const struct board_io io = {.ctx = p, .accel = accel_input, .temp_degc = temp_degc};
     psa2_init(&s->board, &profile, &unit, &io, &p->bench->sched);
     psa2_attach(&s->board, &(struct psa2_host){.ctx = p, .frame = on_frame});
     psa2_power_up(&s->board, now_ns(p));
@@ -253,13 +253,13 @@ static bool open_psa2(struct psabench_part *p, char *why, size_t cap)
 
 static void before_input(struct psabench_part *p, int64_t t_ns)
 {
-    psa2_sample_until(&self(p)->board, t_ns);
+    psa2_sample_until(&part_of(p)->board, t_ns);
 }
 
 /* Group 0..2 X, Y, Z, 3 temperature, above the eight bits of the register's address. */
-static int peek(const struct psabench_part *p, unsigned address)
+static int peek_register(const struct psabench_part *p, unsigned address)
 {
-    const struct psa2 *b = &cself(p)->board;
+    const struct psa2 *b = &const_part_of(p)->board;
     const unsigned group = address >> 8;
     const struct reg_file *f = group < 3 ? &b->adc[group].regs : &b->tadc.regs;
     return group < 4 && (address & 0xFF) < f->count ? reg_peek(f, address & 0xFF) : -1;
@@ -267,7 +267,7 @@ static int peek(const struct psabench_part *p, unsigned address)
 
 /* ---- registers through the controller ---- */
 
-static void done(void *ctx, struct psa2_request *r, enum psa2_result result, int64_t t_ns)
+static void on_request_done(void *ctx, struct psa2_request *r, enum psa2_result result, int64_t t_ns)
 {
     (void)r;
     (void)t_ns;
@@ -277,7 +277,7 @@ static void done(void *ctx, struct psa2_request *r, enum psa2_result result, int
 }
 
 /* Hands the request over, once the board has finished its set-up and whatever was asked before. */
-static enum psa2_result submit(struct part_psa2 *s, const struct psa2_request *r, int64_t end_ns)
+static enum psa2_result submit_request(struct part_psa2 *s, const struct psa2_request *r, int64_t end_ns)
 {
     psabench *b = s->part.bench;
     for (;;) {
@@ -297,7 +297,7 @@ static enum psa2_result carry_out(struct part_psa2 *s, const struct psa2_request
     psabench *b = s->part.bench;
     const int64_t end_ns = b->sched.now_ns + timeout_ns;
     b->inside++;
-    enum psa2_result result = submit(s, r, end_ns);
+    enum psa2_result result = submit_request(s, r, end_ns);
     if (result == PSA2_OK) {
         s->pending = true;
         while (s->pending && sched_next_ns(&b->sched) <= end_ns) api_move(b, sched_next_ns(&b->sched));
@@ -340,15 +340,18 @@ static int result_of(const struct part_psa2 *s, enum psa2_result result, unsigne
 
 static struct psa2_request request_of(struct part_psa2 *s, enum psa2_op op, unsigned group, unsigned address)
 {
-    return (struct psa2_request){
-        .group = group < 3 ? PSA2_ACCEL : PSA2_TEMP, .op = op, .addr = (uint8_t)address, .done = done, .ctx = s};
+    return (struct psa2_request){.group = group < 3 ? PSA2_ACCEL : PSA2_TEMP,
+                                 .op = op,
+                                 .addr = (uint8_t)address,
+                                 .done = on_request_done,
+                                 .ctx = s};
 }
 
 int psabench_board_read(psabench_part *p, unsigned group, unsigned address, int64_t timeout_ns)
 {
     const int bad = no_access(p, group, address, timeout_ns, "psabench_board_read()");
     if (bad) return bad;
-    struct part_psa2 *s = self(p);
+    struct part_psa2 *s = part_of(p);
     const struct psa2_request r = request_of(s, PSA2_READ_REG, group, address);
     const int code = result_of(s, carry_out(s, &r, timeout_ns), group, address);
     return code ? code : s->request.answer[group % 3];
@@ -358,7 +361,7 @@ int psabench_board_write(psabench_part *p, unsigned group, unsigned address, uin
 {
     const int bad = no_access(p, group, address, timeout_ns, "psabench_board_write()");
     if (bad) return bad;
-    struct part_psa2 *s = self(p);
+    struct part_psa2 *s = part_of(p);
     struct psa2_request r = request_of(s, PSA2_WRITE_REG, group, address);
     r.value = value;
     return result_of(s, carry_out(s, &r, timeout_ns), group, address);
@@ -399,9 +402,9 @@ const struct api_kind api_psa2 = {
     .spi = API_NO_SPI,
     .open = open_psa2,
     .before_input = before_input,
-    .follow = follow,
-    .finish = advance,
-    .peek = peek,
+    .follow = follow_trace,
+    .finish = advance_trace,
+    .peek = peek_register,
     .next_ns = next_ns,
     .lag_ns = TRACE_LAG_NS,
     .board = true,

@@ -18,13 +18,13 @@ static void to_half(struct burst *u, int64_t half)
     api_move(u->p->bench, clk_edge_ns(&u->half, half) + u->offset_ns);
 }
 
-static void drive(struct burst *u, unsigned pin, bool level)
+static void drive_pin(struct burst *u, unsigned pin, bool level)
 {
     api_drive(u->p, pin, level);
     api_tell(u->p->bench);
 }
 
-static bool dout(const struct burst *u)
+static bool read_dout(const struct burst *u)
 {
     const struct api_pin *row = &u->p->kind->pins[u->p->dout];
     return row->get(u->p, row->arg);
@@ -32,30 +32,30 @@ static bool dout(const struct burst *u)
 
 /* SCLK rests low, rises in the middle of a bit's period and falls at its end. Mode 0: DIN is there half a period before the
  * rise that samples both lines. Mode 1: DIN changes with the rise, the fall samples. */
-static bool bit(struct burst *u, int64_t half, bool mosi)
+static bool exchange_bit(struct burst *u, int64_t half, bool mosi)
 {
     const bool mode0 = u->p->kind->spi == API_SPI_MODE0;
     bool miso = false;
     to_half(u, half);
-    if (mode0) drive(u, u->p->din, mosi);
+    if (mode0) drive_pin(u, u->p->din, mosi);
     to_half(u, half + 1);
-    if (mode0) miso = dout(u);
-    drive(u, u->p->sclk, true);
-    if (!mode0) drive(u, u->p->din, mosi);
+    if (mode0) miso = read_dout(u);
+    drive_pin(u, u->p->sclk, true);
+    if (!mode0) drive_pin(u, u->p->din, mosi);
     to_half(u, half + 2);
-    if (!mode0) miso = dout(u);
-    drive(u, u->p->sclk, false);
+    if (!mode0) miso = read_dout(u);
+    drive_pin(u, u->p->sclk, false);
     return miso;
 }
 
-static uint8_t byte(struct burst *u, int64_t half, uint8_t mosi)
+static uint8_t exchange_byte(struct burst *u, int64_t half, uint8_t mosi)
 {
     uint8_t miso = 0;
-    for (int i = 0; i < 8; i++) miso = (uint8_t)(miso << 1 | bit(u, half + 2 * i, mosi >> (7 - i) & 1));
+    for (int i = 0; i < 8; i++) miso = (uint8_t)(miso << 1 | exchange_bit(u, half + 2 * i, mosi >> (7 - i) & 1));
     return miso;
 }
 
-static int check(psabench_part *p, size_t n)
+static int check_exchange(psabench_part *p, size_t n)
 {
     psabench *b = p->bench;
     if (p->kind->spi == API_NO_SPI)
@@ -73,12 +73,12 @@ static int check(psabench_part *p, size_t n)
 int psabench_spi(psabench_part *p, const uint8_t *tx, uint8_t *rx, size_t n)
 {
     if (!p) return PSABENCH_BAD_ARGUMENT;
-    const int bad = check(p, n);
+    const int bad = check_exchange(p, n);
     if (bad) return bad;
     struct burst u = {.p = p, .half = {.t0_ns = p->bench->sched.now_ns, .hz = 2 * (int64_t)p->sclk_hz, .div = 1}};
     p->bench->inside++;
     for (size_t i = 0; i < n; i++) {
-        const uint8_t miso = byte(&u, 16 * (int64_t)i, tx ? tx[i] : 0);
+        const uint8_t miso = exchange_byte(&u, 16 * (int64_t)i, tx ? tx[i] : 0);
         if (rx) rx[i] = miso;
         u.offset_ns += p->gap_ns;
     }

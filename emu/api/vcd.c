@@ -15,7 +15,7 @@ struct api_vcd {
     bool dirty;         /* a change is after it */
 };
 
-static void put(struct api_vcd *v, const char *text)
+static void put_text(struct api_vcd *v, const char *text)
 {
     const size_t len = strlen(text);
     errno = 0;
@@ -26,7 +26,7 @@ static void put_time(struct api_vcd *v, int64_t t_ns)
 {
     char text[24];
     (void)snprintf(text, sizeof text, "#%lld\n", (long long)t_ns);
-    put(v, text);
+    put_text(v, text);
     v->written_ns = t_ns;
     v->dirty = false;
 }
@@ -44,8 +44,8 @@ static void put_level(struct api_vcd *v, const struct psabench_part *p, unsigned
 {
     char text[12] = {level ? '1' : '0'};
     code_of(p->first_code + pin, text + 1);
-    put(v, text);
-    put(v, "\n");
+    put_text(v, text);
+    put_text(v, "\n");
 }
 
 static void put_change(struct api_vcd *v, const struct psabench_part *p, const struct api_edge *e)
@@ -58,7 +58,7 @@ static void put_change(struct api_vcd *v, const struct psabench_part *p, const s
 
 /* ---- queues ---- */
 
-static bool grow(struct api_queue *q)
+static bool grow_queue(struct api_queue *q)
 {
     const size_t cap = q->cap ? 2 * q->cap : 256;
     struct api_edge *edge = realloc(q->edge, cap * sizeof *edge);
@@ -77,14 +77,14 @@ void api_vcd_put(struct psabench_part *p, unsigned pin, bool level, int64_t t_ns
         memmove(q->edge, q->edge + q->head, q->len * sizeof *q->edge);
         q->head = 0;
     }
-    if (q->len == q->cap && !grow(q)) {
+    if (q->len == q->cap && !grow_queue(q)) {
         p->bench->vcd->error = ENOMEM;
         return;
     }
     q->edge[q->len++] = (struct api_edge){t_ns, (uint8_t)pin, level};
 }
 
-static struct psabench_part *earliest(const psabench *b)
+static struct psabench_part *earliest_part(const psabench *b)
 {
     struct psabench_part *first = NULL;
     for (struct psabench_part *p = b->parts; p; p = p->next) {
@@ -97,7 +97,7 @@ static struct psabench_part *earliest(const psabench *b)
 
 static void write_until(psabench *b, int64_t t_ns)
 {
-    for (struct psabench_part *p; (p = earliest(b)) && p->queue.edge[p->queue.head].t_ns <= t_ns;)
+    for (struct psabench_part *p; (p = earliest_part(b)) && p->queue.edge[p->queue.head].t_ns <= t_ns;)
         put_change(b->vcd, p, &p->queue.edge[p->queue.head++]);
 }
 
@@ -130,35 +130,35 @@ static void begin_part(struct psabench_part *p, unsigned first_code)
 static void put_scope(struct api_vcd *v, const struct psabench_part *p)
 {
     char code[8];
-    put(v, "$scope module ");
-    put(v, p->name);
-    put(v, " $end\n");
+    put_text(v, "$scope module ");
+    put_text(v, p->name);
+    put_text(v, " $end\n");
     for (unsigned i = 0; i < p->kind->pin_count; i++) {
         code_of(p->first_code + i, code);
-        put(v, "$var wire 1 ");
-        put(v, code);
-        put(v, " ");
-        put(v, p->kind->pins[i].name);
-        put(v, " $end\n");
+        put_text(v, "$var wire 1 ");
+        put_text(v, code);
+        put_text(v, " ");
+        put_text(v, p->kind->pins[i].name);
+        put_text(v, " $end\n");
     }
-    put(v, "$upscope $end\n");
+    put_text(v, "$upscope $end\n");
 }
 
-static void begin(psabench *b)
+static void write_header(psabench *b)
 {
     unsigned code = 0;
-    put(b->vcd, "$version psabench $end\n$timescale 1 ns $end\n");
+    put_text(b->vcd, "$version psabench $end\n$timescale 1 ns $end\n");
     for (struct psabench_part *p = b->parts; p; p = p->next) {
         begin_part(p, code);
         code += p->kind->pin_count;
         put_scope(b->vcd, p);
     }
-    put(b->vcd, "$enddefinitions $end\n");
+    put_text(b->vcd, "$enddefinitions $end\n");
     put_time(b->vcd, b->sched.now_ns);
-    put(b->vcd, "$dumpvars\n");
+    put_text(b->vcd, "$dumpvars\n");
     for (const struct psabench_part *p = b->parts; p; p = p->next)
         for (unsigned i = 0; i < p->kind->pin_count; i++) put_level(b->vcd, p, i, p->level >> i & 1);
-    put(b->vcd, "$end\n");
+    put_text(b->vcd, "$end\n");
 }
 
 int api_vcd_begin(psabench *b, const char *path)
@@ -174,7 +174,7 @@ int api_vcd_begin(psabench *b, const char *path)
     v->out = out;
     b->vcd = v;
     b->inside++;
-    begin(b);
+    write_header(b);
     b->inside--;
     return 0;
 }

@@ -39,7 +39,7 @@ void afe_init(struct afe *a, const struct afe_cfg *cfg, struct rng noise)
     *a = (struct afe){.cfg = *cfg, .scale = scale_at(cfg, NOMINAL_DEGC), .noise = noise, .t_ns = -1, .dt_ns = -10};
 }
 
-static double clip(double v, double limit_v)
+static double clip_v(double v, double limit_v)
 {
     return v > limit_v ? limit_v : v < -limit_v ? -limit_v : v;
 }
@@ -47,7 +47,7 @@ static double clip(double v, double limit_v)
 /* Signal -> load, if it is a current -> buffer. */
 static double load_v(const struct afe_cfg *c, const struct afe_scale *s, double signal)
 {
-    return clip(signal * s->load + c->buffer_offset_v + s->drift_v, c->clip_v);
+    return clip_v(signal * s->load + c->buffer_offset_v + s->drift_v, c->clip_v);
 }
 
 double afe_static_v(const struct afe_cfg *cfg, double signal, double temp_degc)
@@ -57,7 +57,7 @@ double afe_static_v(const struct afe_cfg *cfg, double signal, double temp_degc)
 }
 
 /* Constants of a step of dt: they change only when the converter changes its pace. */
-static void retune(struct afe *a, int64_t dt_ns)
+static void set_step(struct afe *a, int64_t dt_ns)
 {
     const double dt_s = (double)dt_ns / (double)NS_PER_S;
     const double x = TWO_PI * a->cfg.filter_hz * dt_s;
@@ -85,7 +85,7 @@ static double step_v(struct afe *a, double signal, double ripple_v, double temp_
     const bool first = a->t_ns < 0;
     const int64_t dt_ns = first ? FIRST_PULL_NS : t_ns - a->t_ns;
     if (dt_ns <= 0) return a->state_v;
-    if (!same_step(a, dt_ns)) retune(a, dt_ns);
+    if (!same_step(a, dt_ns)) set_step(a, dt_ns);
     if (temp_degc != a->scale.degc) a->scale = scale_at(&a->cfg, temp_degc);
     double v = load_v(&a->cfg, &a->scale, signal) + ripple_v;
     if (a->noise_v > 0.0) v += a->noise_v * rng_gauss(&a->noise);
@@ -137,23 +137,26 @@ static void load_short(const struct afe *a, const struct afe_fault *f, double fo
     out->signal = 0.0;
 }
 
-static void reference(const struct afe *a, const struct afe_fault *f, double for_s, struct faulty *out)
+static void apply_reference(const struct afe *a, const struct afe_fault *f, double for_s, struct faulty *out)
 {
     (void)a;
     out->reference *= 1.0 + f->value + f->rate_per_s * for_s;
 }
 
-static void ripple(const struct afe *a, const struct afe_fault *f, double for_s, struct faulty *out)
+static void apply_ripple(const struct afe *a, const struct afe_fault *f, double for_s, struct faulty *out)
 {
     const double turns = f->frequency_hz * for_s;
     (void)a;
     out->ripple_v += f->value * det_sin(TWO_PI * (turns - floor(turns)));
 }
 
-static struct faulty faulty(const struct afe *a, double signal, int64_t t_ns)
+static struct faulty apply_faults(const struct afe *a, double signal, int64_t t_ns)
 {
-    static void (*const effect[AFE_FAULTS])(const struct afe *, const struct afe_fault *, double, struct faulty *) = {
-        [AFE_LOAD_OPEN] = load_open, [AFE_LOAD_SHORT] = load_short, [AFE_REFERENCE] = reference, [AFE_RIPPLE] = ripple};
+    static void (*const effect[AFE_FAULTS])(const struct afe *, const struct afe_fault *, double,
+                                            struct faulty *) = {[AFE_LOAD_OPEN] = load_open,
+                                                                [AFE_LOAD_SHORT] = load_short,
+                                                                [AFE_REFERENCE] = apply_reference,
+                                                                [AFE_RIPPLE] = apply_ripple};
     struct faulty out = {.signal = signal, .reference = 1.0};
     for (const struct afe_fault *f = a->faults; f; f = f->next) {
         if (t_ns >= f->from_ns) effect[f->kind](a, f, (double)(t_ns - f->from_ns) / (double)NS_PER_S, &out);
@@ -164,12 +167,12 @@ static struct faulty faulty(const struct afe *a, double signal, int64_t t_ns)
 static double any_out_v(struct afe *a, double signal, double temp_degc, int64_t t_ns)
 {
     if (!a->faults) return step_v(a, signal, 0.0, temp_degc, t_ns);
-    const struct faulty f = faulty(a, signal, t_ns);
+    const struct faulty f = apply_faults(a, signal, t_ns);
     return step_v(a, f.signal, f.ripple_v, temp_degc, t_ns) / f.reference;
 }
 
 /* A step and a temperature like the last, no noise, no fault: the constants hold. */
-static bool usual(const struct afe *a, double temp_degc, int64_t t_ns)
+static bool is_quiet_step(const struct afe *a, double temp_degc, int64_t t_ns)
 {
     const int64_t dt_ns = t_ns - a->t_ns;
     return dt_ns > 0 && same_step(a, dt_ns) && temp_degc == a->scale.degc && !(a->noise_v > 0.0) && !a->faults;
@@ -177,7 +180,7 @@ static bool usual(const struct afe *a, double temp_degc, int64_t t_ns)
 
 double afe_out_v(struct afe *a, double signal, double temp_degc, int64_t t_ns)
 {
-    if (!usual(a, temp_degc, t_ns)) return any_out_v(a, signal, temp_degc, t_ns);
+    if (!is_quiet_step(a, temp_degc, t_ns)) return any_out_v(a, signal, temp_degc, t_ns);
     return filtered_v(a, load_v(&a->cfg, &a->scale, signal) / a->scale.divider, t_ns);
 }
 
@@ -198,7 +201,7 @@ static unsigned usual_row(struct afe *a, double *row, const int64_t *t_ns, unsig
 void afe_out_row_v(struct afe *a, double *signal_to_v, double temp_degc, const int64_t *t_ns, unsigned n)
 {
     for (unsigned i = 0; i < n;) {
-        if (usual(a, temp_degc, t_ns[i])) {
+        if (is_quiet_step(a, temp_degc, t_ns[i])) {
             i += usual_row(a, signal_to_v + i, t_ns + i, n - i);
         } else {
             signal_to_v[i] = any_out_v(a, signal_to_v[i], temp_degc, t_ns[i]);

@@ -29,19 +29,19 @@ const char *board_cycle_word(enum board_cycle_result r)
 }
 
 /* "; 00h to 0Dh do": each board's are in a row. */
-static void addresses(const struct board_bus *bus, char *out, size_t cap)
+static void describe_addresses(const struct board_bus *bus, char *out, size_t cap)
 {
     unsigned last = bus->addresses;
     while (last > 0 && !bus->name(last - 1)) last--;
     if (last > 0) (void)snprintf(out, cap, "; 00h to %02Xh do", last - 1);
 }
 
-static void right(const struct board_bus *bus, const struct board *board, const struct board_cycle *c,
-                  enum board_cycle_result r, char *out, size_t cap)
+static void describe_expected(const struct board_bus *bus, const struct board *board, const struct board_cycle *c,
+                              enum board_cycle_result r, char *out, size_t cap)
 {
     char wanted[DETAIL] = "";
     out[0] = '\0';
-    if (r == BOARD_CYCLE_NO_ADDRESS) addresses(bus, out, cap);
+    if (r == BOARD_CYCLE_NO_ADDRESS) describe_addresses(bus, out, cap);
     if (r == BOARD_CYCLE_TOO_SHORT) (void)snprintf(out, cap, ", at least %" PRId64 " ns", bus->strobe(board).least_ns);
     if ((r == BOARD_CYCLE_BAD_VALUE || r == BOARD_CYCLE_NOT_READY) && bus->wanted)
         bus->wanted(board, c, r, wanted, sizeof wanted);
@@ -56,7 +56,7 @@ void board_cycle_why(const struct board_bus *bus, const struct board *board, con
     const int64_t strobe_ns = c->strobe_ns > 0 ? c->strobe_ns : bus->strobe(board).own_ns;
     assert((size_t)r < sizeof results / sizeof *results);
     if (c->write) (void)snprintf(what, sizeof what, "write of %u to", c->data);
-    right(bus, board, c, r, detail, sizeof detail);
+    describe_expected(bus, board, c, r, detail, sizeof detail);
     (void)snprintf(out, BOARD_CYCLE_WHY_MAX, "%s address %02Xh (%s), strobe %" PRId64 " ns: %s%s", what, c->address,
                    name ? name : "nothing", strobe_ns, results[r].why, detail);
 }

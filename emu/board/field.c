@@ -95,7 +95,7 @@ static bool is_number(const struct board_field *f)
     return f->type == BOARD_FIELD_UINT || f->type == BOARD_FIELD_REAL || f->type == BOARD_FIELD_REALS;
 }
 
-static void append(char *out, size_t cap, const char *separator, const char *word)
+static void append_word(char *out, size_t cap, const char *separator, const char *word)
 {
     const size_t at = strlen(out);
     (void)snprintf(out + at, cap - at, "%s%s", at ? separator : "", word);
@@ -105,7 +105,7 @@ static void not_a_value(const struct board_field *f, const char *text, char *why
 {
     char words[200] = "";
     for (unsigned i = 0; f->type == BOARD_FIELD_CHOICE && f->choices[i]; i++)
-        append(words, sizeof words, f->choices[i + 1] ? ", " : " or ", f->choices[i]);
+        append_word(words, sizeof words, f->choices[i + 1] ? ", " : " or ", f->choices[i]);
     const char *like = f->type == BOARD_FIELD_CHOICE ? words
                        : f->type == BOARD_FIELD_LIST ? f->like
                                                      : types[f->type].like;
@@ -140,7 +140,7 @@ bool board_field_set(const struct board_field *fields, unsigned n, void *profile
     return done;
 }
 
-static double number(const struct board_field *f, const void *profile, unsigned index)
+static double number_of(const struct board_field *f, const void *profile, unsigned index)
 {
     const char *at = (const char *)profile + f->offset + index * types[f->type].element;
     unsigned u;
@@ -156,7 +156,7 @@ static double number(const struct board_field *f, const void *profile, unsigned 
 static bool check_numbers(const struct board_field *f, const void *profile, char *why, size_t cap)
 {
     for (unsigned i = 0; is_number(f) && i < board_field_elements(f); i++) {
-        const double v = number(f, profile, i);
+        const double v = number_of(f, profile, i);
         if (v >= f->min && v <= f->max) continue;
         (void)snprintf(why, cap, "%s = %.10g is outside %.10g .. %.10g", f->key, v, f->min, f->max);
         return false;

@@ -51,7 +51,7 @@ void ad7712_init(struct ad7712 *a, const struct ad7712_cfg *cfg, const struct ad
     ad7712_conv_init(a);
 }
 
-static void reset(struct ad7712 *a, int64_t t_ns)
+static void reset_registers(struct ad7712 *a, int64_t t_ns)
 {
     ad7712_freeze(a, AD7712_OFF, t_ns);
     ad7712_port_forget(a, t_ns);
@@ -65,14 +65,14 @@ static void reset(struct ad7712 *a, int64_t t_ns)
 
 void ad7712_power_up(struct ad7712 *a, int64_t t_ns)
 {
-    reset(a, t_ns);
+    reset_registers(a, t_ns);
     a->state = AD7712_DOWN; /* until the pins say otherwise, at once */
     ad7712_follow_pins(a, t_ns);
 }
 
 void ad7712_power_off(struct ad7712 *a, int64_t t_ns)
 {
-    reset(a, t_ns);
+    reset_registers(a, t_ns);
 }
 
 void ad7712_sync_pin(struct ad7712 *a, bool level, int64_t t_ns)

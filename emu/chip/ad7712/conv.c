@@ -107,7 +107,7 @@ static void await_ready(struct ad7712 *a)
         sched_at(a->sched, &a->pulse_ev, clk_on(a->due, &a->pulse_step).t_ns);
 }
 
-static void measure(struct ad7712 *a)
+static void select_input(struct ad7712 *a)
 {
     const unsigned channel = ad7712_channel(a);
     const double full_v = a->cfg.vref_v * ad7712_attenuation(a, channel) / (double)(1u << ad7712_gain_log2(a));
@@ -124,7 +124,7 @@ static void start_run(struct ad7712 *a, enum phase phase, int64_t start_tau)
     a->phase = (uint8_t)phase;
     a->start_tau = start_tau;
     ad7712_set_path(a);
-    measure(a);
+    select_input(a);
     ad7712_sinc3_start(&a->filter, code, ad7712_cells(code, a->cfg.cells_max));
     const int64_t cell_tau = period_tau / a->filter.cells;
     a->look = clk_pos(&a->clkin, start_tau + cell_tau / 2);
@@ -135,7 +135,7 @@ static void start_run(struct ad7712 *a, enum phase phase, int64_t start_tau)
     await_ready(a);
 }
 
-static void stop(struct ad7712 *a)
+static void cancel_events(struct ad7712 *a)
 {
     sched_cancel(a->sched, &a->ready_ev);
     sched_cancel(a->sched, &a->pulse_ev);
@@ -145,7 +145,7 @@ static void stop(struct ad7712 *a)
 void ad7712_freeze(struct ad7712 *a, enum ad7712_state state, int64_t t_ns)
 {
     ad7712_sample_until(a, t_ns);
-    stop(a);
+    cancel_events(a);
     a->state = state;
     a->unread = false;
     ad7712_set_drdy(a, true, t_ns);

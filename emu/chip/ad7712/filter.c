@@ -52,7 +52,7 @@ double ad7712_noise_v(unsigned code, unsigned gain_log2)
 /* Three boxcars of M looks, one after the other, have the zeros. Between them and the sinc3 of N modulator periods is the
  * droop of a look's own cell, (M sin(x/M) / (N sin(x/N)))^3 with x = pi f / fout; three more weights c, 1 - 2c, c with
  * c = (1 - M^2/N^2) / 8 make it to second order. With M = N nothing is left to make. */
-static void weigh(struct ad7712_sinc3 *f)
+static void compute_weights(struct ad7712_sinc3 *f)
 {
     const int m = (int)f->cells;
     const double ratio = (double)f->cells / f->code;
@@ -74,14 +74,14 @@ void ad7712_sinc3_start(struct ad7712_sinc3 *f, unsigned code, unsigned cells)
     if (f->code != code || f->cells != cells) {
         f->code = code;
         f->cells = cells;
-        weigh(f);
+        compute_weights(f);
     }
     f->i = 0;
     f->middle = f->oldest = f->oldest_next = f->out = 0.0;
     memset(f->sum, 0, sizeof f->sum);
 }
 
-static void output(struct ad7712_sinc3 *f)
+static void shift_sums(struct ad7712_sinc3 *f)
 {
     f->out = f->sum[0] + f->middle + f->oldest;
     f->middle = f->sum[1];
@@ -95,7 +95,7 @@ bool ad7712_sinc3_push(struct ad7712_sinc3 *f, double x)
 {
     for (unsigned k = 0; k < 3; k++) f->sum[k] += f->weight[k][f->i] * x;
     if (++f->i < f->cells) return false;
-    output(f);
+    shift_sums(f);
     return true;
 }
 
@@ -114,7 +114,7 @@ void ad7712_sinc3_row(struct ad7712_sinc3 *f, const double *x, unsigned n)
         f->sum[1] = sum1;
         f->sum[2] = sum2;
         f->i += take;
-        if (f->i == f->cells) output(f);
+        if (f->i == f->cells) shift_sums(f);
         x += take;
         n -= take;
     }
@@ -140,7 +140,7 @@ double ad7712_sinc3_ideal(unsigned code, double freq)
     return h * h * h;
 }
 
-static double limited(double v, double max, bool *beyond)
+static double limit_coefficient(double v, double max, bool *beyond)
 {
     if (v >= 0.0 && v <= max) return v;
     *beyond = true;
@@ -154,12 +154,12 @@ uint32_t ad7712_code(double x, uint32_t zero, uint32_t full, bool unipolar, bool
     const double zeroed = x - ((double)zero - AD7712_ZERO_IDEAL) / COEF_LSB;
     const double scaled = zeroed * ((double)full / COEF_LSB);
     const double code = unipolar ? 16777216.0 * scaled : 8388608.0 * (1.0 + scaled);
-    return (uint32_t)limited(nearbyint(code), 16777215.0, clipped);
+    return (uint32_t)limit_coefficient(nearbyint(code), 16777215.0, clipped);
 }
 
 uint32_t ad7712_cal_zero(double x, bool *clamped)
 {
-    return (uint32_t)limited(nearbyint(AD7712_ZERO_IDEAL + x * COEF_LSB), 16777215.0, clamped);
+    return (uint32_t)limit_coefficient(nearbyint(AD7712_ZERO_IDEAL + x * COEF_LSB), 16777215.0, clamped);
 }
 
 /* A span of zero or less gives the upper end. */
@@ -167,5 +167,5 @@ uint32_t ad7712_cal_full(double x, uint32_t zero, bool *clamped)
 {
     const double span = x - ((double)zero - AD7712_ZERO_IDEAL) / COEF_LSB;
     const double full = span > 0.0 ? nearbyint(COEF_LSB / span) : 16777216.0;
-    return (uint32_t)limited(full, 16777215.0, clamped);
+    return (uint32_t)limit_coefficient(full, 16777215.0, clamped);
 }

@@ -95,7 +95,7 @@ bool ad7712_sclk(const struct ad7712 *a)
 /* ---- whole words ---- */
 
 /* All limits of the edges are kept, so that each bit is what the register holds. */
-static bool comfortable(const struct ad7712 *a, unsigned bits, const struct ad7712_sclk *c)
+static bool within_limits(const struct ad7712 *a, unsigned bits, const struct ad7712_sclk *c)
 {
     const struct ad7712_port *p = &a->port;
     const int64_t pulse_ns = ad7712_tau_ns(a, 2);
@@ -121,7 +121,7 @@ static uint32_t read_edges(struct ad7712 *a, unsigned bits, const struct ad7712_
 uint32_t ad7712_read_word(struct ad7712 *a, unsigned bits, const struct ad7712_sclk *c)
 {
     struct ad7712_port *p = &a->port;
-    if (!comfortable(a, bits, c)) return read_edges(a, bits, c);
+    if (!within_limits(a, bits, c)) return read_edges(a, bits, c);
     const uint32_t all = bits == 24 ? 0xFFFFFFu : 0xFFFFu;
     const uint32_t word = p->garbled ? all : p->shift >> (24 - bits) & all;
     p->rise_ns = c->first_rise_ns + (int64_t)(bits - 1) * c->period_ns;

@@ -35,7 +35,7 @@ void ad7712_show(struct ad7712 *a, bool driven, bool level, int64_t at_ns, int64
 }
 
 /* Counts a breach; a strict chip garbles the frame. */
-static void judge(struct ad7712 *a, bool bad, uint32_t *counter)
+static void count_violation(struct ad7712 *a, bool bad, uint32_t *counter)
 {
     if (!bad) return;
     ++*counter;
@@ -71,7 +71,7 @@ void ad7712_begin_read(struct ad7712 *a, int64_t t_ns)
         return;
     }
     p->garbled = false;
-    judge(a, t_ns - p->a0_ns < ad7712_tau_ns(a, A0_TAU), &a->n.a0_violations);
+    count_violation(a, t_ns - p->a0_ns < ad7712_tau_ns(a, A0_TAU), &a->n.a0_violations);
     if (!p->reading) choose_source(a); /* else it goes on where RFS interrupted it */
     p->reading = true;
     p->clocked = false;
@@ -84,7 +84,7 @@ void ad7712_end_read(struct ad7712 *a, int64_t t_ns)
     struct ad7712_port *p = &a->port;
     ad7712_stop_clock(a, t_ns);
     if (!p->reading) return;
-    judge(a, t_ns - p->fall_ns < RFS_NS, &a->n.frame_violations);
+    count_violation(a, t_ns - p->fall_ns < RFS_NS, &a->n.frame_violations);
     p->reading = p->index > 0 && p->index < p->width;
     ad7712_show(a, false, false, t_ns + ad7712_tau_ns(a, HIZ_TAU), t_ns);
 }
@@ -124,7 +124,7 @@ void ad7712_end_write(struct ad7712 *a, int64_t t_ns)
     p->writing = false;
     a->n.dropped += p->taken < 24;
     const bool early = p->taken >= 24 && t_ns - p->fall_ns < ad7712_tau_ns(a, TFS_TAU);
-    judge(a, early, &a->n.frame_violations);
+    count_violation(a, early, &a->n.frame_violations);
     if (!early || !a->load_ev.queued || !a->cfg.strict_timing) return;
     sched_cancel(a->sched, &a->load_ev);
     a->n.dropped++;
@@ -138,7 +138,7 @@ void ad7712_clock_rise(struct ad7712 *a, int64_t t_ns)
     const bool in_frame = (!p->rfs && p->reading) || p->writing;
     if (!in_frame) return;
     const bool fast = period_ns < ad7712_tau_ns(a, SCLK_TAU) || low_ns < ad7712_tau_ns(a, PULSE_TAU);
-    judge(a, fast && !p->mode, &a->n.sclk_violations);
+    count_violation(a, fast && !p->mode, &a->n.sclk_violations);
     p->clocked = true;
     if (p->writing && p->taken < 24) p->in = p->in << 1 | p->sdata;
 }
@@ -188,14 +188,14 @@ void ad7712_clock_fall(struct ad7712 *a, int64_t t_ns)
     p->fall_ns = t_ns;
     if (!p->clocked) return;
     p->clocked = false;
-    judge(a, !p->mode && high_ns < ad7712_tau_ns(a, PULSE_TAU), &a->n.sclk_violations);
+    count_violation(a, !p->mode && high_ns < ad7712_tau_ns(a, PULSE_TAU), &a->n.sclk_violations);
     if (!p->writing) {
         shift_out(a, t_ns);
         return;
     }
     /* Set-up is 2 tau less the high time, to the rise: 2 tau to the fall. What came after the rise is the next bit's. */
     const bool late = p->sdata_ns <= p->rise_ns && t_ns - p->sdata_ns < ad7712_tau_ns(a, DATA_TAU);
-    judge(a, !p->mode && late, &a->n.sdata_violations);
+    count_violation(a, !p->mode && late, &a->n.sdata_violations);
     shift_in(a, t_ns);
 }
 

@@ -99,7 +99,7 @@ int64_t ads1256_mean_change(struct ads1256_mean *m, const struct ads1256_rate *r
 
 /* Five boxcars of one word each, seen at the middle of five cells: the quartic B-spline at half-integers. Its response
  * differs from the sinc5 by the aliases only, below 0.2 % up to the -3 dB point of the fastest rate. */
-static double spline(const double tap[5])
+static double quartic_spline(const double tap[5])
 {
     return (230.0 * tap[2] + 76.0 * (tap[1] + tap[3]) + (tap[0] + tap[4])) / 384.0;
 }
@@ -110,7 +110,7 @@ void ads1256_mean_push(struct ads1256_mean *m, double x)
         for (unsigned i = 4; i > 0; i--) m->tap[i] = m->tap[i - 1];
         m->tap[0] = x;
         if (m->filled < 5 && ++m->filled < 5) return;
-        x = spline(m->tap);
+        x = quartic_spline(m->tap);
     } else {
         m->tap[0] = x;
     }
@@ -140,7 +140,7 @@ int32_t ads1256_code(double raw, int32_t ofc, uint32_t fsc, bool *clipped)
     return code < 0.0 ? -8388608 : 8388607;
 }
 
-static double limited(double v, double min, double max, bool *clamped)
+static double limit_coefficient(double v, double min, double max, bool *clamped)
 {
     if (v >= min && v <= max) return v;
     *clamped = true;
@@ -149,11 +149,11 @@ static double limited(double v, double min, double max, bool *clamped)
 
 int32_t ads1256_cal_ofc(double raw_zero, bool *clamped)
 {
-    return (int32_t)limited(nearbyint(raw_zero), -8388608.0, 8388607.0, clamped);
+    return (int32_t)limit_coefficient(nearbyint(raw_zero), -8388608.0, 8388607.0, clamped);
 }
 
 /* 0/0 cannot be: alpha and the ideal FSC are no zeros, and a span of zero gives the upper end. */
 uint32_t ads1256_cal_fsc(const struct ads1256_rate *r, double raw_span, bool *clamped)
 {
-    return (uint32_t)limited(nearbyint((double)r->alpha * r->fsc_ideal / raw_span), 0.0, 16777215.0, clamped);
+    return (uint32_t)limit_coefficient(nearbyint((double)r->alpha * r->fsc_ideal / raw_span), 0.0, 16777215.0, clamped);
 }

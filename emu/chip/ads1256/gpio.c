@@ -5,22 +5,22 @@ static unsigned pins_of(const struct ads1256 *a)
     return a->cfg.part == ADS1256_PART_1255 ? 2 : ADS1256_GPIOS;
 }
 
-static unsigned exist(const struct ads1256 *a)
+static unsigned pin_mask(const struct ads1256 *a)
 {
     return (1u << pins_of(a)) - 1;
 }
 
 /* D0 is a pin of the IO register only while CLKOUT is off (M70). */
-static unsigned outputs(const struct ads1256 *a)
+static unsigned output_mask(const struct ads1256 *a)
 {
     const unsigned clock = ads1256_value(a, ADS1256_ADCON) & ADS1256_ADCON_CLK ? 1 : 0;
-    return ~(unsigned)ads1256_value(a, ADS1256_IO) >> 4 & exist(a) & ~clock;
+    return ~(unsigned)ads1256_value(a, ADS1256_IO) >> 4 & pin_mask(a) & ~clock;
 }
 
-static void tell(struct ads1256 *a, unsigned levels, int64_t t_ns)
+static void notify_levels(struct ads1256 *a, unsigned levels, int64_t t_ns)
 {
-    const unsigned changed = (levels ^ a->dio_told) & outputs(a);
-    a->dio_told = (uint8_t)((a->dio_told & ~outputs(a)) | (levels & outputs(a)));
+    const unsigned changed = (levels ^ a->dio_told) & output_mask(a);
+    a->dio_told = (uint8_t)((a->dio_told & ~output_mask(a)) | (levels & output_mask(a)));
     if (!a->io.gpio) return;
     for (unsigned d = 0; d < ADS1256_GPIOS; d++) {
         if (changed >> d & 1) a->io.gpio(a->io.ctx, d, levels >> d & 1, t_ns);
@@ -31,10 +31,10 @@ static void tell(struct ads1256 *a, unsigned levels, int64_t t_ns)
 void ads1256_gpio_show(struct ads1256 *a, int64_t t_ns)
 {
     const unsigned io = ads1256_value(a, ADS1256_IO);
-    const unsigned in = io >> 4 & exist(a);
+    const unsigned in = io >> 4 & pin_mask(a);
     const unsigned levels = (a->dio_latch & ~in) | (a->dio_in & in);
     reg_poke(&a->regs, ADS1256_IO, (uint8_t)((io & ~ADS1256_IO_DIO) | levels));
-    tell(a, levels, t_ns);
+    notify_levels(a, levels, t_ns);
 }
 
 void ads1256_gpio_written(void *chip, uint8_t was, uint8_t now, int64_t t_ns)
@@ -70,7 +70,7 @@ bool ads1256_gpio(const struct ads1256 *a, unsigned d)
 
 bool ads1256_gpio_is_output(const struct ads1256 *a, unsigned d)
 {
-    return d < ADS1256_GPIOS && ((outputs(a) >> d & 1) || (d == 0 && ads1256_clkout_hz(a)));
+    return d < ADS1256_GPIOS && ((output_mask(a) >> d & 1) || (d == 0 && ads1256_clkout_hz(a)));
 }
 
 /* Runs through standby, stops with the oscillator (SBAS288 p. 23). */

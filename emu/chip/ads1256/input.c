@@ -16,7 +16,7 @@ static const struct {
 
 static const double detect_a[] = {0.0, 0.5e-6, 2e-6, 10e-6};
 
-static bool absent(const struct ads1256 *a, unsigned ain)
+static bool is_absent(const struct ads1256 *a, unsigned ain)
 {
     return a->cfg.part == ADS1256_PART_1255 && ain > 1 && ain < ADS1256_AINCOM;
 }
@@ -30,25 +30,25 @@ static inline unsigned ain_of(unsigned select)
 static inline double open_v(struct ads1256 *a, unsigned select, int64_t t_ns)
 {
     const unsigned ain = ain_of(select);
-    if (absent(a, ain)) {
+    if (is_absent(a, ain)) {
         a->n.bad_mux++;
         return 0.0;
     }
     return a->io.ain_v(a->io.ctx, ain, t_ns);
 }
 
-static inline bool beyond(const struct ads1256 *a, double v)
+static inline bool is_out_of_range(const struct ads1256 *a, double v)
 {
     return v < -BEYOND_V || v > a->cfg.avdd_v + BEYOND_V;
 }
 
-static double ohm(const struct ads1256 *a, unsigned select, int64_t t_ns)
+static double source_ohm(const struct ads1256 *a, unsigned select, int64_t t_ns)
 {
-    if (!a->io.source_ohm || absent(a, ain_of(select))) return 0.0;
+    if (!a->io.source_ohm || is_absent(a, ain_of(select))) return 0.0;
     return a->io.source_ohm(a->io.ctx, ain_of(select), t_ns);
 }
 
-static double buffered(struct ads1256 *a, double v)
+static double buffer_v(struct ads1256 *a, double v)
 {
     const double max_v = a->cfg.avdd_v - AVDD_LESS_V;
     if (v >= 0.0 && v <= max_v) return v;
@@ -81,15 +81,15 @@ double ads1256_input_v(struct ads1256 *a, int64_t t_ns)
     const unsigned n = ads1256_value(a, ADS1256_MUX) & 15;
     const double p_v = open_v(a, p, t_ns);
     const double n_v = open_v(a, n, t_ns);
-    if (beyond(a, p_v) || beyond(a, n_v)) a->n.range_exceeded++;
+    if (is_out_of_range(a, p_v) || is_out_of_range(a, n_v)) a->n.range_exceeded++;
     const unsigned detect = (ads1256_value(a, ADS1256_ADCON) & ADS1256_ADCON_SDCS) >> 3;
     if (detect) {
         /* The current flows out of AINP and into AINN, and the buffer is on, whatever BUFEN says (SBAS288 p. 15); an open
          * input goes to the end of its range. */
-        const double drop_v = detect_a[detect] * (ohm(a, p, t_ns) + RMUX_OHM);
-        const double rise_v = detect_a[detect] * (ohm(a, n, t_ns) + RMUX_OHM);
-        return buffered(a, p_v + drop_v) - buffered(a, n_v - rise_v);
+        const double drop_v = detect_a[detect] * (source_ohm(a, p, t_ns) + RMUX_OHM);
+        const double rise_v = detect_a[detect] * (source_ohm(a, n, t_ns) + RMUX_OHM);
+        return buffer_v(a, p_v + drop_v) - buffer_v(a, n_v - rise_v);
     }
-    if (ads1256_value(a, ADS1256_STATUS) & ADS1256_STATUS_BUFEN) return buffered(a, p_v) - buffered(a, n_v);
-    return a->io.source_ohm ? loaded_v(a, p_v, ohm(a, p, t_ns), n_v, ohm(a, n, t_ns)) : p_v - n_v;
+    if (ads1256_value(a, ADS1256_STATUS) & ADS1256_STATUS_BUFEN) return buffer_v(a, p_v) - buffer_v(a, n_v);
+    return a->io.source_ohm ? loaded_v(a, p_v, source_ohm(a, p, t_ns), n_v, source_ohm(a, n, t_ns)) : p_v - n_v;
 }

@@ -56,7 +56,7 @@ static bool too_long(const struct ads1256 *a, int64_t span_ns, int64_t periods)
 }
 
 /* An SCLK that stops in the middle of a byte: counted, and a strict chip forgets the byte and its command (E0). */
-static bool stopped(struct ads1256 *a, bool slow, int64_t t_ns)
+static bool check_sclk_stop(struct ads1256 *a, bool slow, int64_t t_ns)
 {
     if (!a->pins.open || !out_of_bounds(a, slow)) return false;
     ads1256_port_drop(a);
@@ -64,7 +64,7 @@ static bool stopped(struct ads1256 *a, bool slow, int64_t t_ns)
     return true;
 }
 
-static void rise(struct ads1256 *a, int64_t t_ns)
+static void sclk_rise(struct ads1256 *a, int64_t t_ns)
 {
     struct ads1256_pins *p = &a->pins;
     const int64_t low_ns = t_ns - p->fall_ns;
@@ -72,7 +72,7 @@ static void rise(struct ads1256 *a, int64_t t_ns)
     p->rise_ns = t_ns;
     p->lost = false;
     if (a->cs || ads1256_deaf(a)) return;
-    stopped(a, too_long(a, period_ns, T1_PERIODS), t_ns);
+    check_sclk_stop(a, too_long(a, period_ns, T1_PERIODS), t_ns);
     p->lost = out_of_bounds(a, period_ns < ads1256_tau_ns(a, T1_TAU) || low_ns < T2_NS);
     if (low_ns < ads1256_tau_ns(a, T13_TAU)) p->pattern = 0;
     if (p->lost) return;
@@ -107,7 +107,7 @@ static bool taken_bit(struct ads1256 *a, int64_t t_ns)
     return late && a->cfg.strict_bus ? a->pins.din_was : a->pins.din;
 }
 
-static void fall(struct ads1256 *a, int64_t t_ns)
+static void sclk_fall(struct ads1256 *a, int64_t t_ns)
 {
     struct ads1256_pins *p = &a->pins;
     const int64_t high_ns = t_ns - p->rise_ns;
@@ -119,7 +119,7 @@ static void fall(struct ads1256 *a, int64_t t_ns)
         ads1256_go(a, t_ns);
         return;
     }
-    if (stopped(a, too_long(a, high_ns, T2H_PERIODS), t_ns)) return;
+    if (check_sclk_stop(a, too_long(a, high_ns, T2H_PERIODS), t_ns)) return;
     if (out_of_bounds(a, high_ns < T2_NS) || p->lost) return;
     if (!p->open) spi_first(&a->spi, t_ns); /* CS fell while SCLK was high */
     spi_sample(&a->spi, taken_bit(a, t_ns), t_ns);
@@ -132,8 +132,8 @@ void ads1256_sclk_pin(struct ads1256 *a, bool level, int64_t t_ns)
 {
     if (level == a->pins.sclk) return;
     a->pins.sclk = level;
-    if (level) rise(a, t_ns);
-    else fall(a, t_ns);
+    if (level) sclk_rise(a, t_ns);
+    else sclk_fall(a, t_ns);
 }
 
 void ads1256_din_pin(struct ads1256 *a, bool level, int64_t t_ns)

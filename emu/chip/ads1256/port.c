@@ -225,7 +225,7 @@ static void on_word(struct ads1256 *a, uint8_t mosi, int64_t t_ns)
     }
 }
 
-static uint8_t reversed(uint8_t v)
+static uint8_t reverse_bits(uint8_t v)
 {
     uint8_t r = 0;
     for (unsigned i = 0; i < 8; i++) r = (uint8_t)(r << 1 | ((v >> i) & 1));
@@ -238,7 +238,7 @@ static uint8_t out_byte(const struct ads1256 *a)
     if (a->garbled) return ADS1256_GARBLED;
     if (a->port == ADS1256_READ) v = reg_peek(&a->regs, a->addr);
     else if (a->word_left) v = (uint8_t)((uint32_t)a->word >> (8 * (a->word_left - 1)));
-    return ads1256_value(a, ADS1256_STATUS) & ADS1256_STATUS_ORDER ? reversed(v) : v;
+    return ads1256_value(a, ADS1256_STATUS) & ADS1256_STATUS_ORDER ? reverse_bits(v) : v;
 }
 
 static void shift_word(struct ads1256 *a, int64_t t_ns)

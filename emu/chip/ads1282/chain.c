@@ -57,7 +57,7 @@ static unsigned log2_of(unsigned power_of_two)
 /* ---- Input ---- */
 
 /* Volts, as a number of full scale 2^34, to the modulator, which saturates. Rounds to nearest without a call into libm. */
-static int64_t saturated(double x)
+static int64_t saturate_lsb(double x)
 {
     const double max = ADS1282_SATURATION * (double)FS_LSB;
     if (!(x < max)) x = max; /* not a number saturates too */
@@ -65,14 +65,14 @@ static int64_t saturated(double x)
     return (int64_t)(x + 0x1p36 + 0.5) - (INT64_C(1) << 36);
 }
 
-static int64_t saturate(struct ads1282 *a, double x)
+static int64_t saturate_input(struct ads1282 *a, double x)
 {
-    return a->last_lsb = saturated(x);
+    return a->last_lsb = saturate_lsb(x);
 }
 
 /* Zero mean, unit rms after division by DRAW_SD. Four uniforms are enough: the chain averages more than 50 blocks, which
  * leaves the output an excess kurtosis below 0.006, at a seventh of the cost of a Gaussian draw. */
-static inline double draw(struct rng *r)
+static inline double draw_noise(struct rng *r)
 {
     const uint64_t u = rng_u64(r);
     const uint32_t sum =
@@ -98,12 +98,12 @@ static void input_row_v(const struct ads1282 *a, const int64_t *t_ns, unsigned n
 static int64_t noisy_input(struct ads1282 *a)
 {
     double x = input_v(a) * a->lsb_per_v;
-    if (a->noise_lsb > 0.0) x += a->noise_lsb * draw(&a->noise);
-    return saturate(a, x);
+    if (a->noise_lsb > 0.0) x += a->noise_lsb * draw_noise(&a->noise);
+    return saturate_input(a, x);
 }
 
 /* To the next sample. */
-static void advance(struct ads1282 *a)
+static void next_sample(struct ads1282 *a)
 {
     a->index++;
     a->next = clk_on(a->next, &a->step);
@@ -112,21 +112,21 @@ static void advance(struct ads1282 *a)
 /* ---- Ideal modulator, sinc by held blocks ---- */
 
 /* As noisy_input(), for n samples whose volts are known: the generator's state stays in registers. */
-static void modulate(struct ads1282 *a, const double *vin_v, unsigned n, int64_t *lsb)
+static void modulate_block(struct ads1282 *a, const double *vin_v, unsigned n, int64_t *lsb)
 {
     const double lsb_per_v = a->lsb_per_v, noise_lsb = a->noise_lsb;
     struct rng noise = a->noise;
     for (unsigned i = 0; i < n; i++) {
         double x = vin_v[i] * lsb_per_v;
-        if (noise_lsb > 0.0) x += noise_lsb * draw(&noise);
-        lsb[i] = saturated(x);
+        if (noise_lsb > 0.0) x += noise_lsb * draw_noise(&noise);
+        lsb[i] = saturate_lsb(x);
     }
     a->noise = noise;
     a->last_lsb = lsb[n - 1];
 }
 
 /* The instants of the next samples up to until_ns, at most n; returns how many. */
-static unsigned pass(struct ads1282 *a, int64_t until_ns, unsigned n, int64_t *t_ns)
+static unsigned sample_times(struct ads1282 *a, int64_t until_ns, unsigned n, int64_t *t_ns)
 {
     const struct clk_step step = a->step;
     struct clk_pos next = a->next;
@@ -145,9 +145,9 @@ static void sample_fir(struct ads1282 *a, int64_t until_ns)
         const unsigned period = (unsigned)(a->index / ADS1282_BLOCKS);
         int64_t t_ns[ADS1282_BLOCKS];
         double vin_v[ADS1282_BLOCKS];
-        const unsigned n = pass(a, until_ns, ADS1282_BLOCKS - slot, t_ns);
+        const unsigned n = sample_times(a, until_ns, ADS1282_BLOCKS - slot, t_ns);
         input_row_v(a, t_ns, n, vin_v);
-        modulate(a, vin_v, n, a->sinc + slot);
+        modulate_block(a, vin_v, n, a->sinc + slot);
         if (slot + n == ADS1282_BLOCKS)
             a->result[period % ADS1282_RESULTS] = ads1282_filter_period(&a->filter, a->sinc);
     }
@@ -163,7 +163,7 @@ static void sample_sinc(struct ads1282 *a, int64_t until_ns)
         int64_t high, low;
         const int64_t x = noisy_input(a);
         const int64_t x_high = bits_round_shift(x, LOW);
-        advance(a);
+        next_sample(a);
         (void)ads1282_cic_take(&a->cic_low, x - x_high * (1 << LOW), &low);
         if (!ads1282_cic_take(&a->cic, x_high, &high)) continue;
         const unsigned k = (unsigned)a->block++;
@@ -198,7 +198,7 @@ static void sample_bit_true(struct ads1282 *a, int64_t until_ns)
         const bool decoded = a->index >= ADS1282_MOD_DELAY;
         int64_t y;
         ads1282_mod_step(&a->mod, noisy_input(a));
-        advance(a);
+        next_sample(a);
         if (decoded && ads1282_cic_take(&a->cic, ads1282_mod_decode(&a->mod), &y))
             take_sinc(a, sinc_lsb(y, a->cic.ratio));
     }
@@ -209,7 +209,7 @@ static void sample_bits(struct ads1282 *a, int64_t until_ns)
     while (a->next.t_ns <= until_ns) {
         const int64_t t_ns = a->next.t_ns;
         ads1282_mod_step(&a->mod, noisy_input(a));
-        advance(a);
+        next_sample(a);
         if (a->io.modulator) a->io.modulator(a->io.ctx, a->mod.m0 & 1, a->mod.m1 & 1, t_ns);
     }
 }
@@ -259,10 +259,10 @@ static void sample_direct(struct ads1282 *a, int64_t until_ns)
 {
     while (a->next.t_ns <= until_ns) {
         const unsigned k = (unsigned)a->index;
-        double y = (double)saturate(a, input_v(a) * a->lsb_per_v) * a->direct_gain;
+        double y = (double)saturate_input(a, input_v(a) * a->lsb_per_v) * a->direct_gain;
         if (a->noise_lsb > 0.0) y += a->noise_lsb * rng_gauss(&a->noise);
         a->result[k % ADS1282_RESULTS] = (int64_t)(y + 0x1p36 + 0.5) - (INT64_C(1) << 36);
-        advance(a);
+        next_sample(a);
     }
 }
 
@@ -292,7 +292,9 @@ static void time_samples(struct ads1282 *a)
     }
 }
 
-static void (*chain_of(const struct ads1282 *a))(struct ads1282 *, int64_t)
+typedef void sample_fn(struct ads1282 *a, int64_t t_ns);
+
+static sample_fn *chain_of(const struct ads1282 *a)
 {
     if (!a->running) return sample_nothing;
     if (ads1282_bits_only(a)) return a->io.modulator || a->io.mflag ? sample_bits : sample_nothing;
@@ -313,7 +315,7 @@ void ads1282_chain_configure(struct ads1282 *a)
 }
 
 /* n over 9. */
-static double choose9(double n)
+static double binomial9(double n)
 {
     double c = 1.0;
     for (int i = 0; i < 9; i++) c *= (n - i) / (9 - i);
@@ -327,7 +329,7 @@ static double sinc_noise_gain(double n)
     static const double choose10[5] = {1, -10, 45, -120, 210};
     double sum = 0.0;
     for (int j = 0; j < 5; j++)
-        if (5 * (n - 1) - j * n >= 0) sum += choose10[j] * choose9(5 * (n - 1) - j * n + 9);
+        if (5 * (n - 1) - j * n >= 0) sum += choose10[j] * binomial9(5 * (n - 1) - j * n + 9);
     return sqrt(sum / (n * n * n * n * n * n * n * n * n));
 }
 

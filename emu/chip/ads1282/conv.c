@@ -22,7 +22,7 @@ bool ads1282_models(uint8_t config0)
     return rate <= 4 && (config0 & (ADS1282_CONFIG0_SYNC | ADS1282_CONFIG0_FILTR)) == 0x02;
 }
 
-static bool continuous(const struct ads1282 *a)
+static bool is_continuous(const struct ads1282 *a)
 {
     return a->config0 & ADS1282_CONFIG0_SYNC;
 }
@@ -58,14 +58,14 @@ static uint8_t config0_of_pins(const struct ads1282_mode_pins *m)
                      (m->minimum_phase ? ADS1282_CONFIG0_PHASE : 0) | (m->high_pass ? 3u : 2u));
 }
 
-static bool known(const struct ads1282 *a)
+static bool has_known_delay(const struct ads1282 *a)
 {
     return rate_of(a) <= 4 || ads1282_bits_only(a);
 }
 
 static void choose_special(struct ads1282 *a)
 {
-    a->special = continuous(a) || high_pass(a) || ads1282_sinc_only(a) || a->cal.kind != ADS1282_CAL_NONE;
+    a->special = is_continuous(a) || high_pass(a) || ads1282_sinc_only(a) || a->cal.kind != ADS1282_CAL_NONE;
 }
 
 /* Scale, multiplexer and noise from CONFIG1. */
@@ -85,7 +85,7 @@ void ads1282_configure_input(struct ads1282 *a)
 void ads1282_configure(struct ads1282 *a)
 {
     a->config0 = a->cfg.pin_mode ? config0_of_pins(&a->mode) : a->reg_value[ADS1282_CONFIG0];
-    a->running = a->alive && !a->standby && known(a);
+    a->running = a->alive && !a->standby && has_known_delay(a);
     a->delivers = a->running && !ads1282_bits_only(a);
     time_periods(a);
     ads1282_chain_configure(a);
@@ -126,31 +126,31 @@ static int64_t due_tclk(const struct ads1282 *a, int64_t p)
     return a->timing.first_tclk + p * a->timing.period_tclk;
 }
 
-static uint32_t get24(const struct ads1282 *a, unsigned low_byte)
+static uint32_t get_reg24(const struct ads1282 *a, unsigned low_byte)
 {
     return (uint32_t)bits_get_le(&a->reg_value[low_byte], 3);
 }
 
-static void put24(struct ads1282 *a, unsigned low_byte, uint32_t v)
+static void put_reg24(struct ads1282 *a, unsigned low_byte, uint32_t v)
 {
     for (unsigned i = 0; i < 3; i++) reg_poke(&a->regs, low_byte + i, (uint8_t)(v >> (8 * i)));
 }
 
-static int64_t corrected(const struct ads1282 *a, int64_t y)
+static int64_t correct_code(const struct ads1282 *a, int64_t y)
 {
-    return ads1282_correct(y, bits_sign_extend(get24(a, ADS1282_OFC0), 24), get24(a, ADS1282_FSC0));
+    return ads1282_correct(y, bits_sign_extend(get_reg24(a, ADS1282_OFC0), 24), get_reg24(a, ADS1282_FSC0));
 }
 
 static uint32_t fir_word(struct ads1282 *a, int64_t y)
 {
     bool clipped;
-    const uint32_t word = ads1282_word(corrected(a, y), &clipped);
+    const uint32_t word = ads1282_word(correct_code(a, y), &clipped);
     a->count.clipped += clipped;
     return word;
 }
 
 /* A word, settled or, in continuous synchronisation, 0. */
-static void announce(struct ads1282 *a, uint32_t word, int64_t t_ns)
+static void deliver_word(struct ads1282 *a, uint32_t word, int64_t t_ns)
 {
     ads1282_serial_deliver(a, word, t_ns);
     a->update_ns = clk_on(a->ended, &a->pulse_step).t_ns;
@@ -159,14 +159,14 @@ static void announce(struct ads1282 *a, uint32_t word, int64_t t_ns)
 }
 
 /* True while it is going on. At its end the word is already the corrected one (E0). */
-static bool calibrating(struct ads1282 *a, int64_t y)
+static bool calibrate_word(struct ads1282 *a, int64_t y)
 {
     struct ads1282_cal *c = &a->cal;
     if (c->kind == ADS1282_CAL_NONE) return false;
-    if (!ads1282_cal_take(c, a->cfg.cal_corrected ? corrected(a, y) : y)) return true;
-    const int32_t ofc = a->cfg.cal_corrected ? 0 : bits_sign_extend(get24(a, ADS1282_OFC0), 24);
-    if (c->kind == ADS1282_CAL_OFFSET) put24(a, ADS1282_OFC0, (uint32_t)ads1282_cal_ofc(c));
-    else put24(a, ADS1282_FSC0, ads1282_cal_fsc(c, ofc));
+    if (!ads1282_cal_take(c, a->cfg.cal_corrected ? correct_code(a, y) : y)) return true;
+    const int32_t ofc = a->cfg.cal_corrected ? 0 : bits_sign_extend(get_reg24(a, ADS1282_OFC0), 24);
+    if (c->kind == ADS1282_CAL_OFFSET) put_reg24(a, ADS1282_OFC0, (uint32_t)ads1282_cal_ofc(c));
+    else put_reg24(a, ADS1282_FSC0, ads1282_cal_fsc(c, ofc));
     a->count.calibrations++;
     c->kind = ADS1282_CAL_NONE;
     choose_special(a);
@@ -178,13 +178,13 @@ static void special_word(struct ads1282 *a, int64_t y, bool settled, int64_t t_n
 {
     if (high_pass(a)) y = ads1282_hpf_step(&a->hpf, y, (uint16_t)bits_get_le(&a->reg_value[ADS1282_HPF0], 2));
     if (!settled) {
-        if (continuous(a)) announce(a, 0, t_ns);
+        if (is_continuous(a)) deliver_word(a, 0, t_ns);
         return;
     }
-    if (calibrating(a, y)) return;
+    if (calibrate_word(a, y)) return;
     a->count.conversions++;
     /* The sinc's word is right-justified, neither corrected nor clipped: sources 1.7; without correction: E0. */
-    announce(a, ads1282_sinc_only(a) ? (uint32_t)y : fir_word(a, y), t_ns);
+    deliver_word(a, ads1282_sinc_only(a) ? (uint32_t)y : fir_word(a, y), t_ns);
 }
 
 /* End of a data period. While nothing delivers words it only measures how long SCLK rests. */
@@ -206,7 +206,7 @@ static void on_due(void *ctx, int64_t t_ns)
     }
     if (!settled) return;
     a->count.conversions++;
-    announce(a, fir_word(a, y), t_ns);
+    deliver_word(a, fir_word(a, y), t_ns);
 }
 
 static void on_pulse(void *ctx, int64_t t_ns)
@@ -272,7 +272,7 @@ void ads1282_sync(struct ads1282 *a, int64_t t_ns)
     if (!a->running || a->fault.lost_sync) return;
     int64_t edge = clk_count_at(&a->clk, t_ns);
     if (a->cfg.strict_sync && clk_edge_ns(&a->clk, edge) - t_ns < SYNC_KEEPOUT_NS) edge++;
-    if (continuous(a) && a->in_phase && in_phase(a, edge)) return;
+    if (is_continuous(a) && a->in_phase && in_phase(a, edge)) return;
     a->count.restarts++;
     restart_at(a, edge, t_ns);
     a->in_phase = true;
@@ -322,7 +322,7 @@ bool ads1282_running(const struct ads1282 *a)
 
 static bool has_words(const struct ads1282 *a)
 {
-    return known(a) && !ads1282_bits_only(a);
+    return has_known_delay(a) && !ads1282_bits_only(a);
 }
 
 int64_t ads1282_settle_ns(const struct ads1282 *a)

@@ -34,7 +34,7 @@ static unsigned log2_of(unsigned power_of_two)
 }
 
 /* Convolves g, of len entries, in place with taps spaced by step entries; returns the new length. */
-static unsigned convolve(double *g, unsigned len, const int32_t *tap, unsigned taps, unsigned step, double scale)
+static unsigned convolve_taps(double *g, unsigned len, const int32_t *tap, unsigned taps, unsigned step, double scale)
 {
     for (unsigned n = len; n-- > 0;) {
         const double v = g[n] * scale;
@@ -48,11 +48,11 @@ static double noise_gain(const struct ads1282_filter *f)
 {
     double g[2048] = {1.0};
     const double n2 = (double)f->sinc_ratio * f->sinc_ratio;
-    unsigned len = convolve(g, 1, f->sinc_tap, ADS1282_SINC_TAPS, 1, 1.0 / (n2 * n2));
+    unsigned len = convolve_taps(g, 1, f->sinc_tap, ADS1282_SINC_TAPS, 1, 1.0 / (n2 * n2));
     unsigned step = 1;
     for (int s = 0; s < ADS1282_FIR_STAGES; s++) {
         const struct ads1282_fir *fir = &ads1282_fir[f->phase][s];
-        len = convolve(g, len, fir->tap, fir->taps, step, ldexp(1.0, -(int)fir->scale_log2));
+        len = convolve_taps(g, len, fir->tap, fir->taps, step, ldexp(1.0, -(int)fir->scale_log2));
         step *= fir->decim;
     }
     assert(len <= sizeof g / sizeof g[0] && step == ADS1282_BLOCKS);
@@ -86,7 +86,7 @@ double ads1282_filter_noise_gain(const struct ads1282_filter *f)
 /* The stages run over one data period. A line holds the taps - 1 newest samples of the past and then the new ones; x points
  * at the newest sample of an output. Sums of integers, in whatever order is cheap. */
 
-static void forget(int64_t *line, unsigned fresh, unsigned taps)
+static void shift_line(int64_t *line, unsigned fresh, unsigned taps)
 {
     memmove(line, line + fresh, (taps - 1) * sizeof *line);
 }
@@ -100,7 +100,7 @@ void ads1282_filter_sinc(struct ads1282_filter *f, const int64_t block[ADS1282_B
     memcpy(f->sinc + ADS1282_SINC_TAPS - 1, block, ADS1282_BLOCKS * sizeof *block);
     for (unsigned n = 0; n < 32; n++, x++)
         out[n] = bits_round_shift(t0 * x[0] + t1 * x[-1] + t2 * x[-2] + t3 * x[-3] + t4 * x[-4], shift);
-    forget(f->sinc, 32, ADS1282_SINC_TAPS);
+    shift_line(f->sinc, 32, ADS1282_SINC_TAPS);
 }
 
 /* Half-band: symmetric, every second tap zero but the middle one. */
@@ -112,7 +112,7 @@ static void stage_1(const struct ads1282_fir *fir, int64_t *line, int64_t *out)
         const int64_t sum = t0 * (x[0] + x[-10]) + t2 * (x[-2] + x[-8]) + t4 * (x[-4] + x[-6]) + t5 * x[-5];
         out[n] = bits_round_shift(sum, fir_shift[0]);
     }
-    forget(line, 32, 11);
+    shift_line(line, 32, 11);
 }
 
 static void stage_2(const struct ads1282_fir *fir, int64_t *line, int64_t *out)
@@ -124,10 +124,10 @@ static void stage_2(const struct ads1282_fir *fir, int64_t *line, int64_t *out)
             t0 * (x[0] + x[-14]) + t2 * (x[-2] + x[-12]) + t4 * (x[-4] + x[-10]) + t6 * (x[-6] + x[-8]) + t7 * x[-7];
         out[n] = bits_round_shift(sum, fir_shift[1]);
     }
-    forget(line, 16, 15);
+    shift_line(line, 16, 15);
 }
 
-static int64_t dot(const int32_t *tap, unsigned taps, const int64_t *x)
+static int64_t dot_product(const int32_t *tap, unsigned taps, const int64_t *x)
 {
     int64_t sum = 0;
     for (; taps >= 4; taps -= 4, tap += 4, x -= 4)
@@ -136,11 +136,11 @@ static int64_t dot(const int32_t *tap, unsigned taps, const int64_t *x)
     return sum;
 }
 
-static void stage(const struct ads1282_fir *fir, unsigned shift, int64_t *line, unsigned fresh, int64_t *out)
+static void decimate_stage(const struct ads1282_fir *fir, unsigned shift, int64_t *line, unsigned fresh, int64_t *out)
 {
     for (unsigned end = fir->decim; end <= fresh; end += fir->decim)
-        *out++ = bits_round_shift(dot(fir->tap, fir->taps, &line[fir->taps + end - 2]), shift);
-    forget(line, fresh, fir->taps);
+        *out++ = bits_round_shift(dot_product(fir->tap, fir->taps, &line[fir->taps + end - 2]), shift);
+    shift_line(line, fresh, fir->taps);
 }
 
 /* The data period's sinc outputs stand behind the past in f->fir1. */
@@ -150,8 +150,8 @@ static int64_t fir_stages(struct ads1282_filter *f)
     int64_t out = 0;
     stage_1(&fir[0], f->fir1, f->fir2 + fir[1].taps - 1);
     stage_2(&fir[1], f->fir2, f->fir3 + fir[2].taps - 1);
-    stage(&fir[2], fir_shift[2], f->fir3, 8, f->fir4 + fir[3].taps - 1);
-    stage(&fir[3], fir_shift[3], f->fir4, 2, &out);
+    decimate_stage(&fir[2], fir_shift[2], f->fir3, 8, f->fir4 + fir[3].taps - 1);
+    decimate_stage(&fir[3], fir_shift[3], f->fir4, 2, &out);
     return out;
 }
 

@@ -23,13 +23,13 @@ void ads1282_mod_step(struct ads1282_mod *m, int64_t x)
     m->m1 = (m->m1 << 1 | (m1 > 0)) & 0x1F;
 }
 
-static int32_t bit(unsigned bits, unsigned ago)
+static int32_t bit_sign(unsigned bits, unsigned ago)
 {
     return (bits >> ago & 1) ? 1 : -1;
 }
 
 int32_t ads1282_mod_decode(const struct ads1282_mod *m)
 {
-    return 3 * bit(m->m0, 2) - 6 * bit(m->m0, 3) + 4 * bit(m->m0, 4) +
-           9 * (bit(m->m1, 0) - 2 * bit(m->m1, 1) + bit(m->m1, 2));
+    return 3 * bit_sign(m->m0, 2) - 6 * bit_sign(m->m0, 3) + 4 * bit_sign(m->m0, 4) +
+           9 * (bit_sign(m->m1, 0) - 2 * bit_sign(m->m1, 1) + bit_sign(m->m1, 2));
 }

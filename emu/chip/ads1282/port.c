@@ -146,17 +146,17 @@ static const struct ads1282_opcode *find_opcode(uint8_t byte)
     return NULL;
 }
 
-static bool allowed(const struct ads1282 *a, const struct ads1282_opcode *op)
+static bool is_allowed(const struct ads1282 *a, const struct ads1282_opcode *op)
 {
     return !a->rdatac || ((!a->cfg.strict_sdatac || (op->rights & ALWAYS)) && !(op->rights & NEEDS_SDATAC));
 }
 
 /* Carries out the command whose last byte has come, or refuses it. */
-static void execute(struct ads1282 *a, int64_t t_ns)
+static void execute_command(struct ads1282 *a, int64_t t_ns)
 {
     const struct ads1282_opcode *op = a->op;
     if (!(op->rights & TWO_BYTES)) a->op = NULL;
-    if (allowed(a, op)) {
+    if (is_allowed(a, op)) {
         op->run(a, t_ns);
         return;
     }
@@ -171,14 +171,14 @@ static void opcode_byte(struct ads1282 *a, uint8_t byte, int64_t t_ns)
     a->op_byte = byte;
     a->op_stage = ADS1282_COUNT;
     if (!a->op) a->count.bad_opcodes++;
-    else if (!(a->op->rights & TWO_BYTES)) execute(a, t_ns);
+    else if (!(a->op->rights & TWO_BYTES)) execute_command(a, t_ns);
 }
 
 static void count_byte(struct ads1282 *a, uint8_t byte, int64_t t_ns)
 {
     a->reg_addr = a->op_byte & 0x1F;
     a->regs_left = (uint8_t)((byte & 0x1F) + 1);
-    execute(a, t_ns);
+    execute_command(a, t_ns);
 }
 
 /* One byte of WREG data, or of a refused WREG. */
