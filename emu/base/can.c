@@ -130,7 +130,7 @@ static int64_t ifs_ns(const struct can_bus_cfg *cfg)
 }
 
 /* Frame that the node offers to the bus; among equal identifiers the older one. */
-static unsigned offered(const struct can_node *n)
+static unsigned pick_offered(const struct can_node *n)
 {
     unsigned best = 0;
     for (unsigned i = 1; n->order == CAN_ORDER_PRIORITY && i < n->queued; i++) {
@@ -149,12 +149,12 @@ static bool goes_before(const struct can_bus *b, const struct can_waiting *x, co
 }
 
 /* Of an arbitration now, among all nodes but those of one controller, or NULL. */
-static struct can_node *winner(const struct can_bus *b, const struct can_node *without, unsigned *slot)
+static struct can_node *arbitration_winner(const struct can_bus *b, const struct can_node *without, unsigned *slot)
 {
     struct can_node *best = NULL;
     for (struct can_node *n = b->nodes; n; n = n->next) {
         if (n->queued == 0 || n->silent || (without && can_shares(n, without))) continue;
-        const unsigned i = b->cfg.bitrate_hz ? offered(n) : 0;
+        const unsigned i = b->cfg.bitrate_hz ? pick_offered(n) : 0;
         if (best && !goes_before(b, &n->queue[i], &best->queue[*slot])) continue;
         best = n;
         *slot = i;
@@ -167,7 +167,7 @@ static bool suspend_tx(struct can_bus *b, struct can_node **n, unsigned *slot, i
 {
     const struct can_node *suspended = can_suspended(b, *n);
     if (!suspended) return false;
-    *n = winner(b, suspended, slot);
+    *n = arbitration_winner(b, suspended, slot);
     if (*n) return false;
     b->phase = CAN_ARBITRATION;
     sched_at(b->sched, &b->step, t_ns + can_nominal_ns(b, SUSPEND_BITS));
@@ -185,10 +185,10 @@ static bool start_degraded(struct can_bus *b, const struct can_waiting *w, int64
     return true;
 }
 
-static void arbitrate(struct can_bus *b, int64_t t_ns)
+static void arbitrate_bus(struct can_bus *b, int64_t t_ns)
 {
     unsigned slot = 0;
-    struct can_node *n = winner(b, NULL, &slot);
+    struct can_node *n = arbitration_winner(b, NULL, &slot);
     if (b->degraded && suspend_tx(b, &n, &slot, t_ns)) return;
     b->phase = n ? CAN_FRAME : CAN_IDLE;
     if (!n) return;
@@ -268,7 +268,7 @@ static void end_phase(void *ctx, int64_t t_ns)
     }
     if (b->phase == CAN_IFS) b->busy_ns += t_ns - b->start_ns;
     if (b->degraded && b->phase == CAN_IFS) can_error_recessive(b, t_ns);
-    arbitrate(b, t_ns);
+    arbitrate_bus(b, t_ns);
 }
 
 int64_t can_busy_ns(const struct can_bus *b, int64_t t_ns)

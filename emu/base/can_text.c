@@ -34,7 +34,7 @@ size_t can_text_put(const struct can_msg *m, char out[CAN_TEXT_MAX])
 
 /* ---- reading ---- */
 
-static int digit(char c)
+static int digit_value(char c)
 {
     if (c >= '0' && c <= '9') return c - '0';
     return c >= 'A' && c <= 'F' ? c - 'A' + 10 : -1;
@@ -43,8 +43,8 @@ static int digit(char c)
 static bool get_data(const char *text, struct can_msg *m)
 {
     for (; text[0]; text += 2) {
-        if (m->len == sizeof m->data || digit(text[0]) < 0 || digit(text[1]) < 0) return false;
-        m->data[m->len++] = (uint8_t)(digit(text[0]) << 4 | digit(text[1]));
+        if (m->len == sizeof m->data || digit_value(text[0]) < 0 || digit_value(text[1]) < 0) return false;
+        m->data[m->len++] = (uint8_t)(digit_value(text[0]) << 4 | digit_value(text[1]));
     }
     return true;
 }
@@ -55,8 +55,8 @@ bool can_text_get(const char *text, struct can_msg *m)
     *m = (struct can_msg){.flags = digits == 8 ? CAN_EXT : 0};
     if ((digits != 3 && digits != 8) || text[digits] != '#') return false;
     for (size_t i = 0; i < digits; i++) {
-        if (digit(text[i]) < 0) return false;
-        m->id = m->id << 4 | (uint32_t)digit(text[i]);
+        if (digit_value(text[i]) < 0) return false;
+        m->id = m->id << 4 | (uint32_t)digit_value(text[i]);
     }
     text += digits + 1;
     if (*text == '#') {
@@ -65,7 +65,7 @@ bool can_text_get(const char *text, struct can_msg *m)
         text += 2;
     } else if (*text == 'R') {
         m->flags |= CAN_RTR;
-        m->len = (uint8_t)digit(text[1]);
+        m->len = (uint8_t)digit_value(text[1]);
         return text[1] >= '0' && text[1] <= '8' && !text[2] && can_valid(m);
     }
     return get_data(text, m) && can_valid(m);

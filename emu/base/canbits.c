@@ -59,7 +59,7 @@ static inline struct stream put_four(struct stream s, unsigned four)
     return s;
 }
 
-static inline struct stream put(struct stream s, uint64_t value, unsigned bits)
+static inline struct stream put_bits(struct stream s, uint64_t value, unsigned bits)
 {
     for (; bits % 4 != 0; bits--) s = put_bit(s, (unsigned)(value >> (bits - 1)) & 1u);
     for (; bits > 0; bits -= 4) s = put_four(s, (unsigned)(value >> (bits - 4)) & 15u);
@@ -76,17 +76,17 @@ static inline struct stream put_data(struct stream s, const struct can_msg *m)
 static inline struct stream put_head(const struct can_msg *m, unsigned more, unsigned bits)
 {
     const unsigned rtr = m->flags & CAN_RTR ? 1 : 0;
-    if (!(m->flags & CAN_EXT)) return put(idle, (2u << 13 | m->id << 2 | rtr << 1) << bits | more, 15 + bits);
+    if (!(m->flags & CAN_EXT)) return put_bits(idle, (2u << 13 | m->id << 2 | rtr << 1) << bits | more, 15 + bits);
     const uint64_t id = (m->id >> 18) << 21 | 3u << 19 | (m->id & 0x3FFFFu) << 1 | rtr;
-    return put(idle, (UINT64_C(2) << 32 | id) << bits | more, 34 + bits);
+    return put_bits(idle, (UINT64_C(2) << 32 | id) << bits | more, 34 + bits);
 }
 
-static struct can_bits classic(const struct can_msg *m)
+static struct can_bits classic_bits(const struct can_msg *m)
 {
     const unsigned reserved = m->flags & CAN_EXT ? 2 : 1; /* r1, r0 */
     struct stream s = put_head(m, can_dlc(m->len), reserved + 4);
     if (!(m->flags & CAN_RTR)) s = put_data(s, m);
-    s = put(s, (s.crc & 0x7FFFu) << 1 | 1u, 16); /* with its delimiter, and the stuff bit between them */
+    s = put_bits(s, (s.crc & 0x7FFFu) << 1 | 1u, 16); /* with its delimiter, and the stuff bit between them */
     return (struct can_bits){s.bits - 1 + TAIL_BITS, 0};
 }
 
@@ -97,12 +97,12 @@ static unsigned fd_crc_bits(unsigned len)
     return bits + (bits + 3u) / 4u;
 }
 
-static struct can_bits fd(const struct can_msg *m)
+static struct can_bits fd_bits(const struct can_msg *m)
 {
     const unsigned brs = m->flags & CAN_BRS ? 1 : 0;
     struct stream s = put_head(m, 4 | brs, 3); /* FDF, res, BRS */
     const unsigned arbitration = s.bits;
-    s = put_data(put(s, can_dlc(m->len), 5), m); /* ESI 0 */
+    s = put_data(put_bits(s, can_dlc(m->len), 5), m); /* ESI 0 */
     /* No stuff bit after the last data bit: the fixed one is there. */
     const unsigned fast = s.bits - arbitration + fd_crc_bits(m->len);
     return brs ? (struct can_bits){arbitration + TAIL_BITS, fast}
@@ -111,7 +111,7 @@ static struct can_bits fd(const struct can_msg *m)
 
 struct can_bits can_bits_exact(const struct can_msg *m)
 {
-    return m->flags & CAN_FD ? fd(m) : classic(m);
+    return m->flags & CAN_FD ? fd_bits(m) : classic_bits(m);
 }
 
 /* At most one stuff bit after the first five bits and one after every four that follow. */
@@ -120,7 +120,7 @@ static unsigned most_stuff(unsigned bits)
     return (bits - 1u) / 4u;
 }
 
-static struct can_bits bound(uint8_t flags, uint8_t len, bool stuffed)
+static struct can_bits frame_bound(uint8_t flags, uint8_t len, bool stuffed)
 {
     const unsigned id = flags & CAN_EXT ? 33u : 14u; /* SOF .. IDE, or .. RTR of an extended frame */
     const unsigned data = flags & CAN_RTR ? 0u : 8u * len;
@@ -139,12 +139,12 @@ static struct can_bits bound(uint8_t flags, uint8_t len, bool stuffed)
 
 struct can_bits can_bits_least(uint8_t flags, uint8_t len)
 {
-    return bound(flags, len, false);
+    return frame_bound(flags, len, false);
 }
 
 struct can_bits can_bits_worst(uint8_t flags, uint8_t len)
 {
-    return bound(flags, len, true);
+    return frame_bound(flags, len, true);
 }
 
 static int64_t bits_ns(unsigned bits, uint32_t hz)

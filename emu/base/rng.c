@@ -35,7 +35,7 @@ double rng_uniform(struct rng *r)
     return ((double)(rng_u64(r) >> 12) + 0.5) * 0x1p-52;
 }
 
-static double ratio(const double *num, const double *den, double x)
+static double poly_ratio(const double *num, const double *den, double x)
 {
     const double n =
         ((((((num[7] * x + num[6]) * x + num[5]) * x + num[4]) * x + num[3]) * x + num[2]) * x + num[1]) * x + num[0];
@@ -66,9 +66,9 @@ static double inverse_normal(double p)
                                 7.86869131145613259100e-4, 1.84631831751005468180e-5, 1.42151175831644588870e-7,
                                 2.04426310338993978564e-15};
     const double q = p - 0.5;
-    if (fabs(q) <= 0.425) return q * ratio(a, b, 0.180625 - q * q);
+    if (fabs(q) <= 0.425) return q * poly_ratio(a, b, 0.180625 - q * q);
     const double r = sqrt(-det_log(q < 0.0 ? p : 1.0 - p));
-    const double z = r <= 5.0 ? ratio(c, d, r - 1.6) : ratio(e, f, r - 5.0);
+    const double z = r <= 5.0 ? poly_ratio(c, d, r - 1.6) : poly_ratio(e, f, r - 5.0);
     return q < 0.0 ? -z : z;
 }
 

@@ -6,7 +6,7 @@
 /* The queue is a list in order. A board has a dozen events, near ones (edges) and far ones (patience), so the place of a
  * new one is looked for from both ends at once: cheaper than a heap up to hundreds of events. Behind its equals: the order
  * of scheduling. */
-static void insert(struct sched *s, struct sched_ev *e)
+static void insert_event(struct sched *s, struct sched_ev *e)
 {
     struct sched_ev *after = s->last;
     struct sched_ev *before = s->first;
@@ -45,7 +45,7 @@ void sched_at(struct sched *s, struct sched_ev *e, int64_t t_ns)
     assert(e->fn);
     sched_cancel(s, e);
     e->due_ns = t_ns < s->now_ns ? s->now_ns : t_ns;
-    insert(s, e);
+    insert_event(s, e);
 }
 
 void sched_cancel(struct sched *s, struct sched_ev *e)

@@ -26,7 +26,7 @@ static uint32_t get_be(const uint8_t *p)
 }
 
 /* 6.2.2, step 1. */
-static void expand(const uint8_t *block, uint32_t w[64])
+static void expand_schedule(const uint8_t *block, uint32_t w[64])
 {
     for (unsigned i = 0; i < 16; i++) w[i] = get_be(block + (size_t)4 * i);
     for (unsigned i = 16; i < 64; i++) {
@@ -37,10 +37,10 @@ static void expand(const uint8_t *block, uint32_t w[64])
 }
 
 /* 6.2.2, steps 2 to 4; v[0] is a, v[7] is h. */
-static void compress(struct sha256 *s)
+static void compress_block(struct sha256 *s)
 {
     uint32_t w[64], v[8];
-    expand(s->block, w);
+    expand_schedule(s->block, w);
     memcpy(v, s->h, sizeof v);
     for (unsigned i = 0; i < 64; i++) {
         const uint32_t s1 = ror(v[4], 6) ^ ror(v[4], 11) ^ ror(v[4], 25);
@@ -73,12 +73,12 @@ void sha256_add(struct sha256 *s, const void *bytes, size_t n)
         s->len += take;
         p += take;
         n -= take;
-        if (at + take == sizeof s->block) compress(s);
+        if (at + take == sizeof s->block) compress_block(s);
     }
 }
 
 /* 5.1.1: a one bit, zeros, and the length in bits. */
-static void pad(struct sha256 *s)
+static void pad_message(struct sha256 *s)
 {
     const uint64_t bits = s->len * 8;
     static const uint8_t tail[64] = {0x80};
@@ -91,7 +91,7 @@ static void pad(struct sha256 *s)
 void sha256_hex(struct sha256 *s, char out[SHA256_HEX])
 {
     static const char digit[] = "0123456789abcdef";
-    pad(s);
+    pad_message(s);
     for (unsigned i = 0; i < 64; i++) out[i] = digit[s->h[i / 8] >> (28 - 4 * (i % 8)) & 15];
     out[64] = '\0';
 }

@@ -19,7 +19,7 @@ enum { ERROR_REGISTER = 0x1001, ERROR_HISTORY = 0x1003, HEARTBEAT_TIME = 0x1017 
 enum { EMCY_PASSIVE = 0x8120, EMCY_RECOVERED = 0x8140, EMCY_CAN_REGISTER = 0x11 /* generic, communication */ };
 enum { TPDO_FIRST = 0x1800, TPDO_LAST = TPDO_FIRST + (int)CO_TPDO_MAX - 1, NS_PER_MS = 1000000, NS_PER_US = 1000 };
 
-static void send(struct co_node *n, uint32_t id, const uint8_t *data, uint8_t len, int64_t t_ns)
+static void send_frame(struct co_node *n, uint32_t id, const uint8_t *data, uint8_t len, int64_t t_ns)
 {
     struct can_msg m = {.id = id, .len = len};
     memcpy(m.data, data, len);
@@ -31,7 +31,7 @@ static void send(struct co_node *n, uint32_t id, const uint8_t *data, uint8_t le
 static void send_heartbeat(struct co_node *n, enum co_state state, int64_t t_ns)
 {
     const uint8_t data = (uint8_t)state;
-    send(n, (uint32_t)ID_HEARTBEAT + n->cfg.id, &data, 1, t_ns);
+    send_frame(n, (uint32_t)ID_HEARTBEAT + n->cfg.id, &data, 1, t_ns);
 }
 
 static void arm_heartbeat(struct co_node *n, int64_t t_ns)
@@ -82,10 +82,10 @@ static void send_emcy(struct co_node *n, uint16_t code, uint8_t source, int64_t 
     data[2] = co_node_error_register(n);
     data[3] = source;
     bits_put_le(&data[4], (uint64_t)(t_ns / NS_PER_US), 4);
-    send(n, (uint32_t)ID_EMCY + n->cfg.id, data, sizeof data, t_ns);
+    send_frame(n, (uint32_t)ID_EMCY + n->cfg.id, data, sizeof data, t_ns);
 }
 
-static void remember(struct co_node *n, uint16_t code, uint8_t source)
+static void add_history(struct co_node *n, uint16_t code, uint8_t source)
 {
     memmove(&n->history[1], &n->history[0], (CO_HISTORY - 1) * sizeof n->history[0]);
     n->history[0] = (uint32_t)source << 16 | code;
@@ -98,7 +98,7 @@ void co_node_error(struct co_node *n, uint16_t code, uint8_t reg, uint8_t source
     if (co_node_has_error(n, code)) return;
     struct co_error *slot = find_error(n, 0);
     if (slot) *slot = (struct co_error){code, reg};
-    remember(n, code, source);
+    add_history(n, code, source);
     send_emcy(n, code, source, t_ns);
 }
 
@@ -173,12 +173,12 @@ static uint32_t write_object(void *ctx, const struct co_entry *e, const struct c
 static void send_sdo(void *ctx, const uint8_t frame[8], int64_t t_ns)
 {
     struct co_node *n = ctx;
-    send(n, (uint32_t)ID_SDO_ANSWER + n->cfg.id, frame, 8, t_ns);
+    send_frame(n, (uint32_t)ID_SDO_ANSWER + n->cfg.id, frame, 8, t_ns);
 }
 
 /* ---- network management ---- */
 
-static void enter(struct co_node *n, enum co_state state, int64_t t_ns)
+static void enter_state(struct co_node *n, enum co_state state, int64_t t_ns)
 {
     if (n->state == state) return;
     if (state == CO_STOPPED) co_sdo_reset(&n->sdo);
@@ -209,10 +209,10 @@ void co_node_reset(struct co_node *n, enum co_event what, int64_t t_ns)
     n->io.event(n->io.ctx, what, t_ns);
     send_heartbeat(n, CO_INITIALISING, t_ns); /* boot-up */
     arm_heartbeat(n, t_ns);
-    enter(n, CO_PRE_OPERATIONAL, t_ns);
+    enter_state(n, CO_PRE_OPERATIONAL, t_ns);
 }
 
-static void nmt(struct co_node *n, const struct can_msg *m, int64_t t_ns)
+static void on_nmt(struct co_node *n, const struct can_msg *m, int64_t t_ns)
 {
     if (m->len != 2) {
         n->malformed++;
@@ -221,13 +221,13 @@ static void nmt(struct co_node *n, const struct can_msg *m, int64_t t_ns)
     if (m->data[1] != 0 && m->data[1] != n->cfg.id) return;
     switch (m->data[0]) {
     case NMT_START:
-        enter(n, CO_OPERATIONAL, t_ns);
+        enter_state(n, CO_OPERATIONAL, t_ns);
         return;
     case NMT_STOP:
-        enter(n, CO_STOPPED, t_ns);
+        enter_state(n, CO_STOPPED, t_ns);
         return;
     case NMT_PRE_OPERATIONAL:
-        enter(n, CO_PRE_OPERATIONAL, t_ns);
+        enter_state(n, CO_PRE_OPERATIONAL, t_ns);
         return;
     case NMT_RESET_NODE:
         co_node_reset(n, CO_EV_RESET_NODE, t_ns);
@@ -241,7 +241,7 @@ static void nmt(struct co_node *n, const struct can_msg *m, int64_t t_ns)
     }
 }
 
-static void sync(struct co_node *n, const struct can_msg *m, int64_t t_ns)
+static void on_sync(struct co_node *n, const struct can_msg *m, int64_t t_ns)
 {
     if (m->len > 1) {
         n->malformed++;
@@ -252,23 +252,23 @@ static void sync(struct co_node *n, const struct can_msg *m, int64_t t_ns)
     co_pdo_sync(n, t_ns);
 }
 
-static void receive(void *ctx, const struct can_msg *m, int64_t t_ns)
+static void on_frame(void *ctx, const struct can_msg *m, int64_t t_ns)
 {
     struct co_node *n = ctx;
     if (m->flags & CAN_EXT || n->state == CO_INITIALISING) return;
     const bool talks = n->state != CO_STOPPED;
     const bool is_sdo = m->id == (uint32_t)ID_SDO_REQUEST + n->cfg.id;
     if (m->id != ID_NMT && m->id != ID_SYNC && !is_sdo) {
-        if (n->io.heard && !(m->flags & (CAN_RTR | CAN_FD))) n->io.heard(n->io.ctx, m, t_ns);
+        if (n->io.rx_other && !(m->flags & (CAN_RTR | CAN_FD))) n->io.rx_other(n->io.ctx, m, t_ns);
         return;
     }
     if (m->flags & (CAN_RTR | CAN_FD)) {
         n->malformed++;
         return;
     }
-    if (m->id == ID_NMT) nmt(n, m, t_ns);
+    if (m->id == ID_NMT) on_nmt(n, m, t_ns);
     else if (talks && is_sdo) co_sdo_request(&n->sdo, m->data, m->len, t_ns);
-    else if (talks) sync(n, m, t_ns);
+    else if (talks) on_sync(n, m, t_ns);
 }
 
 /* ---- life ---- */
@@ -286,7 +286,7 @@ void co_node_init(struct co_node *n, const struct co_node_cfg *cfg, const struct
     const struct co_sdo_io sdo = {n, read_object, write_object, send_sdo};
     co_sdo_init(&n->sdo, cfg->od, &sdo, sched);
     n->services =
-        (struct can_node){.name = cfg->name, .order = CAN_ORDER_PRIORITY, .fd = true, .rx = receive, .ctx = n};
+        (struct can_node){.name = cfg->name, .order = CAN_ORDER_PRIORITY, .fd = true, .rx = on_frame, .ctx = n};
     n->services.state = controller_state;
     n->stream = (struct can_node){.name = cfg->name, .order = CAN_ORDER_FIFO, .fd = true, .of = &n->services, .ctx = n};
 }

@@ -45,7 +45,7 @@ struct co_node_io {
     void (*event)(void *ctx, enum co_event ev, int64_t t_ns);
     void (*sync)(void *ctx, int64_t t_ns); /* SYNC received in pre-operational or operational */
     /* A classic data frame that is for no service of this node, in whatever state it is: somebody's PDO. May be NULL. */
-    void (*heard)(void *ctx, const struct can_msg *m, int64_t t_ns);
+    void (*rx_other)(void *ctx, const struct can_msg *m, int64_t t_ns);
 };
 
 struct co_error {

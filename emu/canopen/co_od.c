@@ -71,7 +71,7 @@ void co_default(const struct co_entry *e, uint8_t node_id, struct co_value *v)
     set_text(v, e->text ? e->text : "", e->text ? strlen(e->text) : 0);
 }
 
-static int64_t clipped(const struct co_entry *e, double number)
+static int64_t clip_number(const struct co_entry *e, double number)
 {
     const unsigned bits = 8u * (unsigned)co_type_size(e->type);
     const bool is_signed = type_is_signed(e->type);
@@ -95,7 +95,7 @@ size_t co_encode(const struct co_entry *e, const struct co_value *v, uint8_t *ou
         const float f = (float)v->number;
         memcpy(&raw, &f, sizeof raw);
     } else {
-        raw = (uint32_t)clipped(e, v->number);
+        raw = (uint32_t)clip_number(e, v->number);
     }
     bits_put_le(out, raw, n);
     return n;

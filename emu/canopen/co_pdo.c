@@ -46,7 +46,7 @@ void co_pdo_select(struct co_node *n, unsigned mask)
     }
 }
 
-static bool valid(const struct co_pdo *p)
+static bool is_valid(const struct co_pdo *p)
 {
     return p->selected && !p->off;
 }
@@ -58,7 +58,7 @@ void co_pdo_switch_off(struct co_node *n, unsigned mask)
 
 bool co_pdo_flows(const struct co_node *n, unsigned k)
 {
-    return valid(&n->pdo[k]) && n->pdo[k].type > TYPE_SYNC_MAX;
+    return is_valid(&n->pdo[k]) && n->pdo[k].type > TYPE_SYNC_MAX;
 }
 
 bool co_pdo_room(const struct co_node *n, unsigned frames)
@@ -66,7 +66,7 @@ bool co_pdo_room(const struct co_node *n, unsigned frames)
     return n->stream.queued + frames <= CO_PDO_BACKLOG;
 }
 
-static enum co_pdo_result transmit(struct co_node *n, struct co_pdo *p, int64_t t_ns)
+static enum co_pdo_result send_pdo(struct co_node *n, struct co_pdo *p, int64_t t_ns)
 {
     if (!co_pdo_room(n, 1) || can_send(n->bus, &n->stream, &p->latest, t_ns) != CAN_OK) return CO_PDO_FULL;
     p->fresh = false;
@@ -78,7 +78,7 @@ static enum co_pdo_result transmit(struct co_node *n, struct co_pdo *p, int64_t 
 enum co_pdo_result co_pdo_offer(struct co_node *n, unsigned k, struct can_msg *m, int64_t t_ns)
 {
     struct co_pdo *p = &n->pdo[k];
-    if (!valid(p) || n->state != CO_OPERATIONAL) return CO_PDO_OFF;
+    if (!is_valid(p) || n->state != CO_OPERATIONAL) return CO_PDO_OFF;
     m->id = p->cob;
     p->latest = *m;
     p->fresh = true;
@@ -87,7 +87,7 @@ enum co_pdo_result co_pdo_offer(struct co_node *n, unsigned k, struct can_msg *m
         n->pdo_inhibited++;
         return CO_PDO_INHIBITED;
     }
-    return transmit(n, p, t_ns);
+    return send_pdo(n, p, t_ns);
 }
 
 /* CiA 301 table 72: type 0 sends at SYNC what is new, type n at every n-th SYNC whatever there is. */
@@ -103,8 +103,8 @@ void co_pdo_sync(struct co_node *n, int64_t t_ns)
     if (n->state != CO_OPERATIONAL) return;
     for (unsigned k = 0; k < n->cfg.tpdos; k++) {
         struct co_pdo *p = &n->pdo[k];
-        if (!valid(p) || p->type > TYPE_SYNC_MAX || !sync_due(p)) continue;
-        if (transmit(n, p, t_ns) == CO_PDO_FULL) n->pdo_lost++;
+        if (!is_valid(p) || p->type > TYPE_SYNC_MAX || !sync_due(p)) continue;
+        if (send_pdo(n, p, t_ns) == CO_PDO_FULL) n->pdo_lost++;
     }
 }
 
@@ -115,7 +115,7 @@ uint32_t co_pdo_read(const struct co_node *n, const struct co_entry *e, struct c
     const struct co_pdo *p = &n->pdo[k];
     switch (e->sub) {
     case COB_SUB:
-        v->number = (double)(p->cob | COB_NO_RTR | (valid(p) ? 0 : COB_INVALID));
+        v->number = (double)(p->cob | COB_NO_RTR | (is_valid(p) ? 0 : COB_INVALID));
         return CO_OK;
     case TYPE_SUB:
         v->number = p->type;
@@ -129,7 +129,7 @@ uint32_t co_pdo_read(const struct co_node *n, const struct co_entry *e, struct c
 }
 
 /* CiA 301 table 74: identifiers that no PDO may take. */
-static bool restricted(uint32_t id)
+static bool is_restricted(uint32_t id)
 {
     static const struct {
         uint16_t first, last;
@@ -145,9 +145,9 @@ static uint32_t write_cob(struct co_pdo *p, uint32_t word)
 {
     const bool off = word & COB_INVALID;
     const uint32_t id = word & ~(COB_INVALID | COB_NO_RTR);
-    if (!(word & COB_NO_RTR) || id > 0x7FF || restricted(id)) return CO_AB_VALUE;
-    if (!off && !p->selected) return CO_AB_STATE;             /* the frame form does not feed it */
-    if (!off && valid(p) && id != p->cob) return CO_AB_VALUE; /* switch it off first */
+    if (!(word & COB_NO_RTR) || id > 0x7FF || is_restricted(id)) return CO_AB_VALUE;
+    if (!off && !p->selected) return CO_AB_STATE;                /* the frame form does not feed it */
+    if (!off && is_valid(p) && id != p->cob) return CO_AB_VALUE; /* switch it off first */
     p->cob = (uint16_t)id;
     p->off = off;
     return CO_OK;

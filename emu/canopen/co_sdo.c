@@ -16,7 +16,7 @@ enum {
 enum { BIT_SIZE = 0x01, BIT_EXPEDITED = 0x02, BIT_TOGGLE = 0x10, BIT_LAST = 0x01 };
 enum { EXPEDITED_MAX = 4, SEGMENT_MAX = 7 };
 
-static void finish(struct co_sdo *s)
+static void finish_transfer(struct co_sdo *s)
 {
     s->state = CO_SDO_IDLE;
     s->ticket++;
@@ -30,7 +30,7 @@ static void send_abort(struct co_sdo *s, uint32_t code, int64_t t_ns)
     frame[3] = s->sub;
     bits_put_le(&frame[4], code, 4);
     s->aborts++;
-    finish(s);
+    finish_transfer(s);
     s->io.send(s->io.ctx, frame, t_ns);
 }
 
@@ -52,7 +52,7 @@ void co_sdo_init(struct co_sdo *s, const struct co_od *od, const struct co_sdo_i
 
 void co_sdo_reset(struct co_sdo *s)
 {
-    finish(s);
+    finish_transfer(s);
 }
 
 static void wait_in(struct co_sdo *s, enum co_sdo_state state, int64_t t_ns)
@@ -74,7 +74,7 @@ static void send_value(struct co_sdo *s, const struct co_value *v, int64_t t_ns)
     if (s->size > 0 && s->size <= EXPEDITED_MAX) {
         frame[0] = (uint8_t)(SCS_UPLOAD | BIT_EXPEDITED | BIT_SIZE | (EXPEDITED_MAX - s->size) << 2);
         memcpy(&frame[4], s->buffer, s->size);
-        finish(s);
+        finish_transfer(s);
     } else {
         bits_put_le(&frame[4], s->size, 4);
         wait_in(s, CO_SDO_UPLOAD, t_ns);
@@ -82,7 +82,7 @@ static void send_value(struct co_sdo *s, const struct co_value *v, int64_t t_ns)
     s->io.send(s->io.ctx, frame, t_ns);
 }
 
-static void upload(struct co_sdo *s, int64_t t_ns)
+static void begin_upload(struct co_sdo *s, int64_t t_ns)
 {
     if (s->entry->access == CO_WO) {
         send_abort(s, CO_AB_WRITE_ONLY, t_ns);
@@ -113,7 +113,7 @@ static void upload_segment(struct co_sdo *s, uint8_t command, int64_t t_ns)
     memcpy(&frame[1], &s->buffer[s->at], n);
     s->at = (uint16_t)(s->at + n);
     s->toggle = !s->toggle;
-    if (n == left) finish(s);
+    if (n == left) finish_transfer(s);
     else wait_in(s, CO_SDO_UPLOAD, t_ns);
     s->io.send(s->io.ctx, frame, t_ns);
 }
@@ -129,7 +129,7 @@ static void confirm_write(struct co_sdo *s, int64_t t_ns)
     } else {
         frame[0] = (uint8_t)(SCS_DOWNLOAD_SEGMENT | (s->toggle ? BIT_TOGGLE : 0));
     }
-    finish(s);
+    finish_transfer(s);
     s->io.send(s->io.ctx, frame, t_ns);
 }
 
@@ -157,7 +157,7 @@ static void download_expedited(struct co_sdo *s, const uint8_t *data, int64_t t_
     write_buffer(s, t_ns);
 }
 
-static void download(struct co_sdo *s, const uint8_t *data, int64_t t_ns)
+static void begin_download(struct co_sdo *s, const uint8_t *data, int64_t t_ns)
 {
     if (s->entry->access == CO_RO || s->entry->access == CO_CONST) {
         send_abort(s, CO_AB_READ_ONLY, t_ns);
@@ -212,16 +212,16 @@ static void download_segment(struct co_sdo *s, const uint8_t *data, int64_t t_ns
 /* ---- requests ---- */
 
 /* A client that begins again has given up whatever was under way. */
-static void begin(struct co_sdo *s, const uint8_t *data, int64_t t_ns)
+static void begin_transfer(struct co_sdo *s, const uint8_t *data, int64_t t_ns)
 {
-    finish(s);
+    finish_transfer(s);
     s->index = (uint16_t)bits_get_le(&data[1], 2);
     s->sub = data[3];
     uint32_t abort = CO_OK;
     s->entry = co_find(s->od, s->index, s->sub, &abort);
     if (!s->entry) send_abort(s, abort, t_ns);
-    else if (data[0] >> 5 == CCS_UPLOAD) upload(s, t_ns);
-    else download(s, data, t_ns);
+    else if (data[0] >> 5 == CCS_UPLOAD) begin_upload(s, t_ns);
+    else begin_download(s, data, t_ns);
 }
 
 void co_sdo_request(struct co_sdo *s, const uint8_t *data, size_t len, int64_t t_ns)
@@ -234,7 +234,7 @@ void co_sdo_request(struct co_sdo *s, const uint8_t *data, size_t len, int64_t t
     switch (data[0] >> 5) {
     case CCS_DOWNLOAD:
     case CCS_UPLOAD:
-        begin(s, data, t_ns);
+        begin_transfer(s, data, t_ns);
         return;
     case CCS_DOWNLOAD_SEGMENT:
         download_segment(s, data, t_ns);
@@ -243,7 +243,7 @@ void co_sdo_request(struct co_sdo *s, const uint8_t *data, size_t len, int64_t t
         upload_segment(s, data[0], t_ns);
         return;
     case CS_ABORT:
-        finish(s);
+        finish_transfer(s);
         return;
     default: /* block transfer and what no one has defined */
         s->index = (uint16_t)bits_get_le(&data[1], 2);

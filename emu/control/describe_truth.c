@@ -186,12 +186,12 @@ static void add_platform(struct lab *l, cJSON *to, int64_t t_ns)
 static void add_unit_state(struct unit *u, cJSON *to, int64_t t_ns)
 {
     static const double origin_m[3];
-    struct felt felt;
+    struct kinematics kin;
     const struct chamber *k = &u->lab->chamber;
-    lab_feel(u->lab, &u->cfg.seat, origin_m, t_ns, &felt);
+    lab_kinematics(u->lab, &u->cfg.mounting, origin_m, t_ns, &kin);
     cJSON_AddStringToObject(to, "name", u->cfg.name);
-    cJSON_AddItemToObject(to, "f_mps2", cJSON_CreateDoubleArray(felt.f_mps2, 3));
-    cJSON_AddItemToObject(to, "w_radps", cJSON_CreateDoubleArray(felt.w_radps, 3));
+    cJSON_AddItemToObject(to, "f_mps2", cJSON_CreateDoubleArray(kin.f_mps2, 3));
+    cJSON_AddItemToObject(to, "w_radps", cJSON_CreateDoubleArray(kin.w_radps, 3));
     if (k->cfg.present) add_real(to, "case_degc", chamber_case_degc(k, &u->body, t_ns));
     if (k->cfg.present) add_real(to, "element_degc", chamber_element_degc(k, &u->body, t_ns));
     if (!k->cfg.present) cJSON_AddItemToObject(to, "temp_degc", cJSON_CreateDoubleArray(u->cfg.temp_degc, UNIT_TEMPS));

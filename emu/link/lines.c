@@ -15,7 +15,7 @@ void lines_reset(struct lines *l)
     l->skipping = false;
 }
 
-static void store(struct lines *l, const char *in, size_t n)
+static void store_bytes(struct lines *l, const char *in, size_t n)
 {
     if (l->skipping) return;
     if (n > l->cap - 1 - l->fill) {
@@ -26,7 +26,7 @@ static void store(struct lines *l, const char *in, size_t n)
     l->fill += n;
 }
 
-static enum lines_result finish(struct lines *l)
+static enum lines_result finish_line(struct lines *l)
 {
     const bool overlong = l->skipping;
     l->len = overlong ? 0 : l->fill;
@@ -41,7 +41,7 @@ enum lines_result lines_feed(struct lines *l, const char *in, size_t n, size_t *
 {
     const char *end = n ? memchr(in, l->end, n) : NULL;
     const size_t take = end ? (size_t)(end - in) : n;
-    if (take) store(l, in, take);
+    if (take) store_bytes(l, in, take);
     *used = end ? take + 1 : take;
-    return end ? finish(l) : LINES_MORE;
+    return end ? finish_line(l) : LINES_MORE;
 }

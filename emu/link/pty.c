@@ -102,7 +102,7 @@ static int open_pair(struct pty *p)
 }
 
 /* Watches who opens the slave; not fatal where inotify is not to be had. */
-static void watch(struct pty *p)
+static void watch_opens(struct pty *p)
 {
     p->watch = (struct link){
         .fd = inotify_init1(IN_NONBLOCK | IN_CLOEXEC), .want_read = true, .readable = on_watch, .timer = on_ask};
@@ -124,7 +124,7 @@ int pty_open(struct pty *p, const char *name)
         return err;
     }
     p->name = name;
-    watch(p);
+    watch_opens(p);
     return 0;
 }
 

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <unistd.h>
 
-static void refresh(struct text_link *t)
+static void refresh_link(struct text_link *t)
 {
     t->link.pending = t->stall ? 0 : outbuf_pending(&t->out);
     t->link.full = t->link.pending > t->out_high;
@@ -12,7 +12,7 @@ static void refresh(struct text_link *t)
     t->link.want_read = t->in_pos == t->in_len && !t->eof;
 }
 
-static void end(struct text_link *t, int64_t t_ns)
+static void end_link(struct text_link *t, int64_t t_ns)
 {
     if (t->ended) return;
     t->ended = true;
@@ -31,7 +31,7 @@ static void take_lines(struct text_link *t, int64_t t_ns)
         if (r != LINES_MORE) t->ops->line(t, r, t->lines.buf, t->lines.len, t_ns);
     }
     t->taking = false;
-    if (t->in_pos == t->in_len && t->eof) end(t, t_ns);
+    if (t->in_pos == t->in_len && t->eof) end_link(t, t_ns);
 }
 
 static void on_readable(struct link *l, int64_t t_ns)
@@ -45,7 +45,7 @@ static void on_readable(struct link *l, int64_t t_ns)
     t->in_len = n > 0 ? (size_t)n : 0;
     t->eof = n <= 0;
     take_lines(t, t_ns);
-    refresh(t);
+    refresh_link(t);
 }
 
 void text_link_flush(struct link *l, int64_t t_ns)
@@ -56,9 +56,9 @@ void text_link_flush(struct link *l, int64_t t_ns)
     if (!t->hold && !t->stall && outbuf_pending(&t->out) && outbuf_flush(&t->out, l->fd) < 0) {
         outbuf_clear(&t->out); /* no one will read it; what the peer had sent before is still taken */
         t->eof = true;
-        if (t->in_pos == t->in_len) end(t, t_ns);
+        if (t->in_pos == t->in_len) end_link(t, t_ns);
     }
-    refresh(t);
+    refresh_link(t);
 }
 
 bool text_link_init(struct text_link *t, const struct text_link_cfg *cfg, const struct text_link_ops *ops)
@@ -87,20 +87,20 @@ void text_link_free(struct text_link *t)
 bool text_link_put(struct text_link *t, const char *text, size_t n)
 {
     const bool fits = outbuf_put(&t->out, text, n);
-    refresh(t);
+    refresh_link(t);
     return fits;
 }
 
 void text_link_stall(struct text_link *t, bool on)
 {
     t->stall = on;
-    refresh(t);
+    refresh_link(t);
 }
 
 void text_link_forget_output(struct text_link *t)
 {
     outbuf_clear(&t->out);
-    refresh(t);
+    refresh_link(t);
 }
 
 void text_link_forget(struct text_link *t)

@@ -31,8 +31,8 @@ fit_design fit_rows(const struct nav_position *p, int count, const struct nav_gy
 }
 
 /* Of one pair of windows, not scaled. */
-static double pair(const struct nav_position *a, const struct nav_position *b, const struct nav_noise *n,
-                   double wz_radps)
+static double pair_covariance(const struct nav_position *a, const struct nav_position *b, const struct nav_noise *n,
+                              double wz_radps)
 {
     const double gm = n->gm_sigma_radps > 0.0 ? nav_gm_window_cov(n->gm_sigma_radps, n->gm_tau_s, a->window_s,
                                                                   b->window_s, b->t_mid_s - a->t_mid_s)
@@ -50,7 +50,7 @@ fit_square fit_covariance(const struct nav_position *p, int count, const struct 
     const struct nav_earth e = nav_earth_at(latitude_rad);
     for (int i = 0; i < count; i++)
         for (int j = 0; j <= i; j++)
-            c(i, j) = c(j, i) = pair(&p[i], &p[j], noise, e.wz_radps) / (e.we_radps * e.we_radps);
+            c(i, j) = c(j, i) = pair_covariance(&p[i], &p[j], noise, e.wz_radps) / (e.we_radps * e.we_radps);
     return c;
 }
 

@@ -103,7 +103,7 @@ int nav_gyrocompass_check(const struct nav_position *p, int count, const struct 
 }
 
 /* (17) to (19) with the errata, for We = 1: row 1 of the inverse is s, row 2 c, and the drift the mean of what is left. */
-static bool cramer(const fit_design &rows, fit_gain *gain)
+static bool solve_cramer(const fit_design &rows, fit_gain *gain)
 {
     const double c1 = rows(0, FIT_S) - rows(1, FIT_S);
     const double c2 = rows(1, FIT_S) - rows(2, FIT_S);
@@ -153,13 +153,13 @@ static fit_square with_latitude(const struct equations *e, double s, double c)
 
 /* An error of the latitude lies in the plane of the rows of s and c, gamma_i being a sine over the positions: no weights tell it
  * from them in a free fit. On the circle they do, and there it is weighed, at the s and c that the free fit found. */
-static bool solve(const struct equations *e, struct solution *x)
+static bool solve_equations(const struct equations *e, struct solution *x)
 {
     const struct nav_noise *noise = &e->cfg->noise;
     const int method = e->cfg->method;
     fit_square whitener = fit_whitener(e->covariance, noise, method);
     fit_gain free_gain;
-    if (!(method == NAV_CLOSED3 ? cramer(e->rows, &free_gain) : fit_gain_of(e->rows, whitener, &free_gain)))
+    if (!(method == NAV_CLOSED3 ? solve_cramer(e->rows, &free_gain) : fit_gain_of(e->rows, whitener, &free_gain)))
         return false;
     x->free = free_gain * e->y;
     from_free(free_gain, x);
@@ -179,7 +179,7 @@ static bool solve(const struct equations *e, struct solution *x)
 }
 
 /* Standard deviations and covariance by the gain, whatever the weights were: honest for every method. */
-static void spread(const struct solution *x, const struct equations *e, struct nav_compass *out)
+static void set_spread(const struct solution *x, const struct equations *e, struct nav_compass *out)
 {
     const struct nav_position *p = e->p;
     const int count = (int)e->rows.rows();
@@ -224,7 +224,7 @@ int nav_gyrocompass(const struct nav_position *p, int count, const struct nav_gy
                           fit_covariance(p, count, &cfg->noise, cfg->latitude_rad)};
     for (int i = 0; i < count; i++) e.y(i) = p[i].s_radps / we;
     struct solution x;
-    if (!solve(&e, &x) || !std::isfinite(x.params.sum() + x.free.sum())) return NAV_SINGULAR;
+    if (!solve_equations(&e, &x) || !std::isfinite(x.params.sum() + x.free.sum())) return NAV_SINGULAR;
     out->alpha1_rad = x.params(0);
     out->drift1_radps = x.params(1) * we;
     out->ramp_radps2 = cfg->ramp ? x.params(2) * we / fit_time_scale(p, count) : 0.0;
@@ -233,7 +233,7 @@ int nav_gyrocompass(const struct nav_position *p, int count, const struct nav_gy
     out->quality = std::fabs(std::sqrt(out->s * out->s + out->c * out->c) - 1.0);
     out->geometry = fit_geometry(e.rows);
     out->iterations = x.iterations;
-    spread(&x, &e, out);
+    set_spread(&x, &e, out);
     fit_unknowns full = x.free;
     if (fit_is_constrained(cfg->method)) {
         full(FIT_S) = nav_sin(out->alpha1_rad);

@@ -172,7 +172,7 @@ int nav_mc_check(const struct nav_mc_cfg *cfg, int model, struct nav_refusal *wh
 }
 
 /* Fixed sizes: Eigen has the cofactors of these. */
-static bool invert(const fit_small &normal, fit_small *inverse)
+static bool invert_small(const fit_small &normal, fit_small *inverse)
 {
     Eigen::Matrix4d m = Eigen::Matrix4d::Identity();
     m.topLeftCorner(normal.rows(), normal.cols()) = normal;
@@ -196,7 +196,7 @@ int mc_linear_make(const struct nav_mc_cfg *cfg, struct mc_linear *lin)
     fit_gain weighted = white_rows.transpose().lazyProduct(whitener);
     fit_small normal = weighted.lazyProduct(rows);
     fit_small inverse;
-    if (!invert(normal, &inverse)) return NAV_SINGULAR;
+    if (!invert_small(normal, &inverse)) return NAV_SINGULAR;
     lin->count = cfg->count;
     lin->unknowns = (int)rows.cols();
     lin->constrained = fit_is_constrained(cfg->fit.method);

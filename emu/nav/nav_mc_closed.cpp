@@ -139,7 +139,7 @@ struct lanes {
 };
 
 /* Four numbers give the uniform draws and, in the lowest bits of the first, the signs; then come the Gaussian ones. */
-INLINE void draw(int gaussians, uint64_t seed, uint64_t first_run, struct lanes *x)
+INLINE void draw_lanes(int gaussians, uint64_t seed, uint64_t first_run, struct lanes *x)
 {
     for (int l = 0; l < LANES; l++) {
         const uint64_t start = random_run(seed, first_run + (uint64_t)l);
@@ -261,7 +261,7 @@ INLINE void add_sines(const struct closed_plan *plan, struct lanes *x)
         }
 }
 
-INLINE void solve(const struct closed_plan *plan, struct lanes *x)
+INLINE void solve_lanes(const struct closed_plan *plan, struct lanes *x)
 {
     const struct mc_linear *lin = &plan->lin;
     if (!lin->constrained) {
@@ -285,16 +285,16 @@ INLINE void solve(const struct closed_plan *plan, struct lanes *x)
 
 /* One run a lane; COUNT and UNKNOWNS 0: as the plan says. */
 template <int COUNT, int UNKNOWNS>
-INLINE void compute(const struct closed_plan *plan, uint64_t seed, uint64_t first_run, struct lanes *x)
+INLINE void compute_lanes(const struct closed_plan *plan, uint64_t seed, uint64_t first_run, struct lanes *x)
 {
-    draw(COUNT ? COUNT + UNKNOWNS : plan->lin.count + plan->lin.unknowns, seed, first_run, x);
+    draw_lanes(COUNT ? COUNT + UNKNOWNS : plan->lin.count + plan->lin.unknowns, seed, first_run, x);
     scale_draws(plan, x);
     for (int l = 0; l < LANES; l++) random_direction(x->turn_a[l], &x->cos_a[l], &x->sin_a[l]);
     for (int l = 0; l < LANES; l++) random_direction(x->turn_q[l], &x->cos_q[l], &x->sin_q[l]);
     add_levels<UNKNOWNS>(plan, x);
     add_angles<COUNT, UNKNOWNS>(plan, x);
     add_sines(plan, x);
-    solve(plan, x);
+    solve_lanes(plan, x);
     const double to_drift = plan->lin.we_radps / plan->swell;
     for (int l = 0; l < LANES; l++) {
         x->platform[l] = x->alpha[l] - x->first[l];
@@ -307,7 +307,7 @@ INLINE void compute(const struct closed_plan *plan, uint64_t seed, uint64_t firs
 #define COMPUTE(name, target, count, unknowns)                                                                         \
     target static void name(const struct closed_plan *plan, uint64_t seed, uint64_t first_run, struct lanes *x)        \
     {                                                                                                                  \
-        compute<count, unknowns>(plan, seed, first_run, x);                                                            \
+        compute_lanes<count, unknowns>(plan, seed, first_run, x);                                                      \
     }
 COMPUTE(three_any, , 3, 3)
 COMPUTE(three_wide, TARGET_WIDE, 3, 3)
@@ -316,18 +316,18 @@ COMPUTE(more_any, , 0, 0)
 COMPUTE(more_wide, TARGET_WIDE, 0, 0)
 COMPUTE(more_widest, TARGET_WIDEST, 0, 0)
 
-static void put(double *array, uint64_t at, int n, const double *lane)
+static void put_lanes(double *array, uint64_t at, int n, const double *lane)
 {
     if (array) memcpy(array + at, lane, (size_t)n * sizeof *array);
 }
 
 static void put_all(const struct nav_mc_out *out, const struct lanes *x, uint64_t at, int n)
 {
-    put(out->platform_rad, at, n, x->platform);
-    put(out->heading_rad, at, n, x->alpha);
-    put(out->drift_radps, at, n, x->drift);
-    put(out->alpha1_rad, at, n, x->turn_a);
-    put(out->quality, at, n, x->quality);
+    put_lanes(out->platform_rad, at, n, x->platform);
+    put_lanes(out->heading_rad, at, n, x->alpha);
+    put_lanes(out->drift_radps, at, n, x->drift);
+    put_lanes(out->alpha1_rad, at, n, x->turn_a);
+    put_lanes(out->quality, at, n, x->quality);
 }
 
 int nav_mc_closed(const struct nav_mc_cfg *cfg, uint64_t seed, uint64_t first_run, uint64_t runs,

@@ -166,7 +166,8 @@ static double window_error(const struct nav_mc_cfg *cfg, const struct mc_linear 
 }
 
 /* The gyrocompassing, to first order as in nav_mc_closed(), with the random drift's means drawn one after the other. */
-static struct hold_start calibrate(const struct hold_plan *plan, uint64_t start_of_stream, struct random_stream *rnd)
+static struct hold_start calibrate_start(const struct hold_plan *plan, uint64_t start_of_stream,
+                                         struct random_stream *rnd)
 {
     const struct nav_mc_cfg *cfg = &plan->cfg->start;
     const struct mc_linear *lin = &plan->lin;
@@ -200,9 +201,9 @@ static struct hold_start calibrate(const struct hold_plan *plan, uint64_t start_
     return start;
 }
 
-static struct hold_start begin(const struct hold_plan *plan, uint64_t start_of_stream, struct random_stream *rnd)
+static struct hold_start begin_hold(const struct hold_plan *plan, uint64_t start_of_stream, struct random_stream *rnd)
 {
-    if (plan->cfg->axis2 != NAV_AXIS2_FIXED) return calibrate(plan, start_of_stream, rnd);
+    if (plan->cfg->axis2 != NAV_AXIS2_FIXED) return calibrate_start(plan, start_of_stream, rnd);
     /* The sum of the article: an error that grows away from zero. */
     return {plan->cfg->heading_rad, -plan->cfg->drift_error_radps, gm_begin(&plan->cfg->start, rnd)};
 }
@@ -220,10 +221,11 @@ static double flight_rate(const struct hold_plan *plan, struct random_stream *rn
 }
 
 /* (alpha estimated) less alpha grows by the drift that was not compensated. */
-static void run(const struct hold_plan *plan, uint64_t start_of_stream, const struct nav_mc_hold_out *out, uint64_t k)
+static void run_hold(const struct hold_plan *plan, uint64_t start_of_stream, const struct nav_mc_hold_out *out,
+                     uint64_t k)
 {
     struct random_stream rnd(start_of_stream);
-    struct hold_start start = begin(plan, start_of_stream, &rnd);
+    struct hold_start start = begin_hold(plan, start_of_stream, &rnd);
     const double rate = flight_rate(plan, &rnd) - start.drift_radps;
     const double step_s = plan->cfg->hours * 3600.0 / (double)plan->steps;
     gm_go(&start.axis2, &plan->wait, &rnd);
@@ -245,6 +247,6 @@ int nav_mc_hold(const struct nav_mc_hold_cfg *cfg, uint64_t seed, uint64_t first
     struct hold_plan plan = {};
     const int refused = plan_make(cfg, &plan);
     if (refused) return refused;
-    for (uint64_t k = 0; k < runs; k++) run(&plan, random_run(seed, first_run + k), out, k);
+    for (uint64_t k = 0; k < runs; k++) run_hold(&plan, random_run(seed, first_run + k), out, k);
     return NAV_OK;
 }

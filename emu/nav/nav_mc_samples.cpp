@@ -95,7 +95,7 @@ static double mean_of_samples(struct random_stream *rnd, double sd, uint64_t cou
  * after the last. One stretch would wait for itself. */
 typedef double eight __attribute__((vector_size(8 * sizeof(double))));
 
-INLINE void stretches(const double *noise, int steps, double rho, double *sums, double *ends)
+INLINE void draw_stretches(const double *noise, int steps, double rho, double *sums, double *ends)
 {
     eight w[2] = {};
     eight s[2] = {};
@@ -113,17 +113,17 @@ INLINE void stretches(const double *noise, int steps, double rho, double *sums, 
 
 static void stretches_any(const double *noise, int steps, double rho, double *sums, double *ends)
 {
-    stretches(noise, steps, rho, sums, ends);
+    draw_stretches(noise, steps, rho, sums, ends);
 }
 
 TARGET_WIDE static void stretches_wide(const double *noise, int steps, double rho, double *sums, double *ends)
 {
-    stretches(noise, steps, rho, sums, ends);
+    draw_stretches(noise, steps, rho, sums, ends);
 }
 
 TARGET_WIDEST static void stretches_widest(const double *noise, int steps, double rho, double *sums, double *ends)
 {
-    stretches(noise, steps, rho, sums, ends);
+    draw_stretches(noise, steps, rho, sums, ends);
 }
 
 /* Sum of n samples of the drift w, which comes back as it is after the last. Each is computed, as noise started from zero and
@@ -168,7 +168,7 @@ static double drift_mean(const struct samples_plan *plan, struct instrument *u, 
 }
 
 /* A window in position i: settled algebra with the means of all errors, which enter S to first order. */
-static struct nav_position measure(const struct samples_plan *plan, struct instrument *u, int i)
+static struct nav_position measure_position(const struct samples_plan *plan, struct instrument *u, int i)
 {
     const struct nav_mc_cfg *cfg = plan->cfg;
     const uint64_t draws = cfg->per_sample ? plan->per_window : 1;
@@ -217,12 +217,12 @@ static int correct_gimbal(const struct nav_mc_cfg *cfg, double q1_rad, struct na
     return refused;
 }
 
-static int run(const struct samples_plan *plan, uint64_t start, const struct nav_mc_out *out, uint64_t k)
+static int run_samples(const struct samples_plan *plan, uint64_t start, const struct nav_mc_out *out, uint64_t k)
 {
     const struct nav_mc_cfg *cfg = plan->cfg;
     struct instrument u = instrument_draw(cfg, start);
     struct nav_position p[NAV_MAX_POSITIONS];
-    for (int i = 0; i < cfg->count; i++) p[i] = measure(plan, &u, i);
+    for (int i = 0; i < cfg->count; i++) p[i] = measure_position(plan, &u, i);
     if (cfg->cardan == NAV_CARDAN_CORRECTED) {
         const int refused = correct_gimbal(cfg, u.q1_rad, p);
         if (refused) return refused;
@@ -245,6 +245,7 @@ int nav_mc_samples(const struct nav_mc_cfg *cfg, uint64_t seed, uint64_t first_r
 {
     struct samples_plan plan;
     int refused = plan_make(cfg, &plan);
-    for (uint64_t k = 0; k < runs && !refused; k++) refused = run(&plan, random_run(seed, first_run + k), out, k);
+    for (uint64_t k = 0; k < runs && !refused; k++)
+        refused = run_samples(&plan, random_run(seed, first_run + k), out, k);
     return refused;
 }

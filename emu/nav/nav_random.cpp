@@ -1,6 +1,6 @@
 #include "nav/nav_random.hpp"
 
-INLINE void fill(uint64_t state, int n, double *out)
+INLINE void fill_uniform(uint64_t state, int n, double *out)
 {
     const int half = n / 2;
     for (int k = 0; k < half; k++)
@@ -9,17 +9,17 @@ INLINE void fill(uint64_t state, int n, double *out)
 
 static void fill_any(uint64_t state, int n, double *out)
 {
-    fill(state, n, out);
+    fill_uniform(state, n, out);
 }
 
 TARGET_WIDE static void fill_wide(uint64_t state, int n, double *out)
 {
-    fill(state, n, out);
+    fill_uniform(state, n, out);
 }
 
 TARGET_WIDEST static void fill_widest(uint64_t state, int n, double *out)
 {
-    fill(state, n, out);
+    fill_uniform(state, n, out);
 }
 
 uint64_t random_fill(uint64_t state, int n, double *out)

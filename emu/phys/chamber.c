@@ -25,7 +25,7 @@ struct chamber_cfg chamber_default(void)
 
 /* ---- lags */
 
-static double decay(double t_s, double tau_s)
+static double decay_factor(double t_s, double tau_s)
 {
     if (tau_s <= 0.0 || t_s > GONE * tau_s) return t_s > 0.0 ? 0.0 : 1.0;
     return det_exp(-t_s / tau_s);
@@ -35,7 +35,7 @@ static double decay(double t_s, double tau_s)
 static double mean_decay(double d)
 {
     if (d < 1e-4) return 1.0 - d * (0.5 - d / 6.0);
-    return (1.0 - decay(d, 1.0)) / d;
+    return (1.0 - decay_factor(d, 1.0)) / d;
 }
 
 /* What a lag of 1 at the case leaves in the element: tau_c (exp(-t/tau_c) - exp(-t/tau_e)) / (tau_c - tau_e), written so that
@@ -43,10 +43,10 @@ static double mean_decay(double d)
 static double passed_on(double t_s, double tau_c_s, double tau_e_s)
 {
     if (tau_c_s <= 0.0) return 0.0;
-    if (tau_e_s <= 0.0) return decay(t_s, tau_c_s);
+    if (tau_e_s <= 0.0) return decay_factor(t_s, tau_c_s);
     const double slow_s = fmax(tau_c_s, tau_e_s);
     const double fast_s = fmin(tau_c_s, tau_e_s);
-    return decay(t_s, slow_s) * (t_s / tau_e_s) * mean_decay(t_s * (slow_s - fast_s) / (slow_s * fast_s));
+    return decay_factor(t_s, slow_s) * (t_s / tau_e_s) * mean_decay(t_s * (slow_s - fast_s) / (slow_s * fast_s));
 }
 
 /* A straight piece of the air's course: air_degc at its start and slope; the body as it was there. */
@@ -59,7 +59,7 @@ static double case_after(const struct chamber_body *b, const struct piece *p, do
 {
     const double behind_k = p->slope_kps * b->tau_case_s;
     return p->air_degc + p->slope_kps * t_s - behind_k +
-           (p->case_degc - p->air_degc + behind_k) * decay(t_s, b->tau_case_s);
+           (p->case_degc - p->air_degc + behind_k) * decay_factor(t_s, b->tau_case_s);
 }
 
 static double element_after(const struct chamber_body *b, const struct piece *p, double t_s)
@@ -68,7 +68,7 @@ static double element_after(const struct chamber_body *b, const struct piece *p,
     const double behind_k = case_behind_k + p->slope_kps * b->tau_element_s;
     return p->air_degc + p->slope_kps * t_s - behind_k +
            (p->case_degc - p->air_degc + case_behind_k) * passed_on(t_s, b->tau_case_s, b->tau_element_s) +
-           (p->element_degc - p->air_degc + behind_k) * decay(t_s, b->tau_element_s);
+           (p->element_degc - p->air_degc + behind_k) * decay_factor(t_s, b->tau_element_s);
 }
 
 /* ---- the air */
@@ -157,7 +157,7 @@ void chamber_put_in(struct chamber *c, struct chamber_body *b, double tau_case_s
 /* ---- commands */
 
 /* Everything starts again from where it is. */
-static void plan(struct chamber *c, double set_degc, int64_t t_ns)
+static void plan_ramp(struct chamber *c, double set_degc, int64_t t_ns)
 {
     const double air_degc = chamber_air_degc(c, t_ns);
     for (struct chamber_body *b = c->bodies; b; b = b->next) {
@@ -187,7 +187,7 @@ void chamber_init(struct chamber *c, const struct chamber_cfg *cfg)
 enum chamber_result chamber_set(struct chamber *c, double degc, int64_t t_ns)
 {
     if (!(degc >= c->cfg.min_degc && degc <= c->cfg.max_degc)) return CHAMBER_OUT_OF_RANGE;
-    plan(c, degc, t_ns);
+    plan_ramp(c, degc, t_ns);
     return CHAMBER_OK;
 }
 
@@ -196,6 +196,6 @@ enum chamber_result chamber_ramp(struct chamber *c, double k_per_min, int64_t t_
     if (!(k_per_min >= CHAMBER_RAMP_MIN_K_PER_MIN && k_per_min <= chamber_ramp_max_k_per_min(c)))
         return CHAMBER_OUT_OF_RANGE;
     c->ramp_k_per_min = k_per_min;
-    plan(c, c->set_degc, t_ns);
+    plan_ramp(c, c->set_degc, t_ns);
     return CHAMBER_OK;
 }

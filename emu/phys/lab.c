@@ -31,13 +31,13 @@ static bool is_zero(const double v[3])
 }
 
 /* How the case is in the mount: the face of the head or the tilt of the level sensors, then the misalignment. */
-static struct pose case_in_mount(const struct lab *l, const struct lab_seat *seat, int64_t t_ns)
+static struct pose case_in_mount(const struct lab *l, const struct lab_mounting *mounting, int64_t t_ns)
 {
     struct pose p;
     pose_start(&p, &(struct site){0});
-    if (seat->on == LAB_PLATFORM) p = *platform_level(&l->platform, t_ns);
-    if (seat->on == LAB_HEAD) pose_turn(&p, POSE_X, head_face_rad(head_face(&l->head, t_ns)), 0.0, 0.0);
-    pose_tilt(&p, seat->misalignment_rad);
+    if (mounting->on == LAB_PLATFORM) p = *platform_level(&l->platform, t_ns);
+    if (mounting->on == LAB_HEAD) pose_turn(&p, POSE_X, head_face_rad(head_face(&l->head, t_ns)), 0.0, 0.0);
+    pose_tilt(&p, mounting->misalignment_rad);
     return p;
 }
 
@@ -50,7 +50,7 @@ static void head_pose(const struct lab *l, int64_t t_ns, struct pose *p)
 }
 
 /* At the centre exactly; a lever arm adds the centripetal part, with the rate as if it were constant. */
-static void platform_feels(struct platform *platform, const double r_m[3], int64_t t_ns, struct felt *out)
+static void platform_kinematics(struct platform *platform, const double r_m[3], int64_t t_ns, struct kinematics *out)
 {
     struct pose p;
     double f_mps2[3];
@@ -62,12 +62,13 @@ static void platform_feels(struct platform *platform, const double r_m[3], int64
 }
 
 /* In the mount's axes, at r_m from the instrument's centre. */
-static void mount_feels(struct lab *l, enum lab_mount on, const double r_m[3], int64_t t_ns, struct felt *out)
+static void mount_kinematics(struct lab *l, enum lab_mount on, const double r_m[3], int64_t t_ns,
+                             struct kinematics *out)
 {
     struct pose turned;
     const struct pose *p = &l->bench;
     if (on == LAB_PLATFORM) {
-        platform_feels(&l->platform, r_m, t_ns, out);
+        platform_kinematics(&l->platform, r_m, t_ns, out);
         return;
     }
     if (on == LAB_TABLE) p = table_pose(&l->table, t_ns);
@@ -79,71 +80,72 @@ static void mount_feels(struct lab *l, enum lab_mount on, const double r_m[3], i
     memcpy(out->w_radps, p->w_ib_b_radps, sizeof out->w_radps);
 }
 
-void lab_feel(struct lab *l, const struct lab_seat *seat, const double at_m[3], int64_t t_ns, struct felt *out)
+void lab_kinematics(struct lab *l, const struct lab_mounting *mounting, const double at_m[3], int64_t t_ns,
+                    struct kinematics *out)
 {
-    const struct pose in_mount = case_in_mount(l, seat, t_ns);
+    const struct pose in_mount = case_in_mount(l, mounting, t_ns);
     double r_m[3];
     pose_out_of(&in_mount, at_m, r_m);
-    for (unsigned k = 0; k < 3; k++) r_m[k] += seat->lever_m[k];
-    mount_feels(l, seat->on, r_m, t_ns, out);
+    for (unsigned k = 0; k < 3; k++) r_m[k] += mounting->lever_m[k];
+    mount_kinematics(l, mounting->on, r_m, t_ns, out);
     pose_into(&in_mount, out->f_mps2, out->f_mps2);
     pose_into(&in_mount, out->w_radps, out->w_radps);
 }
 
 /* -f in the mount's axes, by way of the poses. */
-static void mount_senses(struct lab *l, const struct lab_seat *seat, const double at_m[3], int64_t t_ns,
-                         double mount[3])
+static void mount_reaction(struct lab *l, const struct lab_mounting *mounting, const double at_m[3], int64_t t_ns,
+                           double mount[3])
 {
-    const struct pose in_mount = case_in_mount(l, seat, t_ns);
-    struct felt felt;
+    const struct pose in_mount = case_in_mount(l, mounting, t_ns);
+    struct kinematics kin;
     double r_m[3];
     pose_out_of(&in_mount, at_m, r_m);
-    for (unsigned k = 0; k < 3; k++) r_m[k] += seat->lever_m[k];
-    mount_feels(l, seat->on, r_m, t_ns, &felt);
-    for (unsigned k = 0; k < 3; k++) mount[k] = -felt.f_mps2[k];
+    for (unsigned k = 0; k < 3; k++) r_m[k] += mounting->lever_m[k];
+    mount_kinematics(l, mounting->on, r_m, t_ns, &kin);
+    for (unsigned k = 0; k < 3; k++) mount[k] = -kin.f_mps2[k];
 }
 
-static void turn_askew(const struct lab_seat *seat, double a_mps2[3])
+static void apply_misalignment(const struct lab_mounting *mounting, double a_mps2[3])
 {
-    struct pose askew;
-    pose_start(&askew, &(struct site){0});
-    pose_tilt(&askew, seat->misalignment_rad);
-    pose_into(&askew, a_mps2, a_mps2);
+    struct pose misaligned;
+    pose_start(&misaligned, &(struct site){0});
+    pose_tilt(&misaligned, mounting->misalignment_rad);
+    pose_into(&misaligned, a_mps2, a_mps2);
 }
 
 /* Without lever arms the platform's own arithmetic, then the turn of the level sensors' block. */
-static void sensor_on_platform(struct lab *l, const struct lab_seat *seat, const double at_m[3], double cos_alpha0,
-                               double sin_alpha0, int64_t t_ns, double a_mps2[3])
+static void sensor_on_platform(struct lab *l, const struct lab_mounting *mounting, const double at_m[3],
+                               double cos_alpha0, double sin_alpha0, int64_t t_ns, double a_mps2[3])
 {
     double mount[3];
-    if (is_zero(at_m) && is_zero(seat->lever_m)) {
+    if (is_zero(at_m) && is_zero(mounting->lever_m)) {
         platform_force_mps2(&l->platform, t_ns, mount);
         for (unsigned k = 0; k < 3; k++) mount[k] = -mount[k];
     } else {
-        mount_senses(l, seat, at_m, t_ns, mount);
+        mount_reaction(l, mounting, at_m, t_ns, mount);
     }
     pose_into(platform_level(&l->platform, t_ns), mount, mount);
     head_sensor_mps2(HEAD_DIRECT, cos_alpha0, sin_alpha0, mount, a_mps2);
-    if (!is_zero(seat->misalignment_rad)) turn_askew(seat, a_mps2);
+    if (!is_zero(mounting->misalignment_rad)) apply_misalignment(mounting, a_mps2);
 }
 
-void lab_sensor_mps2(struct lab *l, const struct lab_seat *seat, const double at_m[3], double cos_alpha0,
+void lab_sensor_mps2(struct lab *l, const struct lab_mounting *mounting, const double at_m[3], double cos_alpha0,
                      double sin_alpha0, int64_t t_ns, double a_mps2[3])
 {
-    if (seat->on == LAB_PLATFORM) {
-        sensor_on_platform(l, seat, at_m, cos_alpha0, sin_alpha0, t_ns, a_mps2);
+    if (mounting->on == LAB_PLATFORM) {
+        sensor_on_platform(l, mounting, at_m, cos_alpha0, sin_alpha0, t_ns, a_mps2);
         return;
     }
     double mount[3];
-    const bool on_head = seat->on == LAB_HEAD;
-    const bool square = is_zero(seat->misalignment_rad);
-    if (on_head && square && is_zero(at_m) && is_zero(seat->lever_m)) {
+    const bool on_head = mounting->on == LAB_HEAD;
+    const bool square = is_zero(mounting->misalignment_rad);
+    if (on_head && square && is_zero(at_m) && is_zero(mounting->lever_m)) {
         head_gravity_mps2(&l->head, t_ns, mount);
     } else {
-        mount_senses(l, seat, at_m, t_ns, mount);
+        mount_reaction(l, mounting, at_m, t_ns, mount);
     }
     head_sensor_mps2(on_head ? head_face(&l->head, t_ns) : HEAD_DIRECT, cos_alpha0, sin_alpha0, mount, a_mps2);
-    if (!square) turn_askew(seat, a_mps2);
+    if (!square) apply_misalignment(mounting, a_mps2);
 }
 
 static const char *const mounts[] = {

@@ -1,6 +1,6 @@
-/* Everything around the boards: the Earth, the instruments, and what a unit on one of them feels.
+/* Everything around the boards: the Earth, the instruments, and the kinematics of a unit on one of them.
  *
- * A unit sits on the dividing head, on the rate table, on the gyro-stabilised platform or on the bench itself. Its seat says
+ * A unit sits on the dividing head, on the rate table, on the gyro-stabilised platform or on the bench itself. Its mounting says
  * where: the lever arm from the instrument's centre (where the axes meet) to the unit's origin, in the mount's axes, and how
  * its case is askew there. Mount's axes: of the head x and y in the plane of turning, z its axis (head.h); of the table t
  * (table.h); of the bench x towards the site's azimuth and z down; of the platform p (platform.h), where the case is turned by
@@ -39,14 +39,14 @@ struct lab {
 };
 
 /* A unit's place. All zero: in the centre of the head, square. */
-struct lab_seat {
+struct lab_mounting {
     enum lab_mount on;
     double lever_m[3];          /* from the instrument's centre to the unit's origin, mount's axes */
     double misalignment_rad[3]; /* turns of the case about its x, then y, then z, after the face */
 };
 
 /* Specific force and rate relative to inertial space at a point of the unit, in the axes of its case. */
-struct felt {
+struct kinematics {
     double f_mps2[3];
     double w_radps[3];
 };
@@ -58,12 +58,13 @@ struct lab_cfg lab_default(void);
 void lab_init(struct lab *l, const struct lab_cfg *cfg, uint64_t seed);
 
 /* At at_m from the unit's origin, in its case's axes. */
-void lab_feel(struct lab *l, const struct lab_seat *seat, const double at_m[3], int64_t t_ns, struct felt *out);
+void lab_kinematics(struct lab *l, const struct lab_mounting *mounting, const double at_m[3], int64_t t_ns,
+                    struct kinematics *out);
 
 /* What an accelerometer at at_m measures by the convention of mems.h, a = -f, if it is set in the unit with the error alpha0
  * (by cosine and sine): a turn about the mount's z before the face. On the head without lever arms it is the head's own
  * arithmetic, and the fast way. */
-void lab_sensor_mps2(struct lab *l, const struct lab_seat *seat, const double at_m[3], double cos_alpha0,
+void lab_sensor_mps2(struct lab *l, const struct lab_mounting *mounting, const double at_m[3], double cos_alpha0,
                      double sin_alpha0, int64_t t_ns, double a_mps2[3]);
 
 /* "head", "table", "fixed", "platform"; NULL and -1 for none. */

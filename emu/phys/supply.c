@@ -87,7 +87,7 @@ double supply_shown_v(const struct supply *s, int64_t t_ns)
 
 /* ---- commands */
 
-static void change(struct supply *s, double set_v, bool on, int64_t t_ns)
+static void change_output(struct supply *s, double set_v, bool on, int64_t t_ns)
 {
     s->from_v = steady_v(s, t_ns);
     s->from_ns = t_ns;
@@ -98,13 +98,13 @@ static void change(struct supply *s, double set_v, bool on, int64_t t_ns)
 enum supply_result supply_set(struct supply *s, double volt_v, int64_t t_ns)
 {
     if (!(volt_v >= 0.0 && volt_v <= s->cfg.volt_max_v)) return SUPPLY_OUT_OF_RANGE;
-    change(s, volt_v, s->on, t_ns);
+    change_output(s, volt_v, s->on, t_ns);
     return SUPPLY_OK;
 }
 
 void supply_output(struct supply *s, bool on, int64_t t_ns)
 {
-    change(s, s->set_v, on, t_ns);
+    change_output(s, s->set_v, on, t_ns);
 }
 
 enum supply_result supply_ripple(struct supply *s, double amplitude_v, double frequency_hz, int64_t t_ns)

@@ -47,7 +47,8 @@ void scenario_bind(struct scenario *s)
         u->cfg.name = u->name;
         u->cfg.profile = &u->profile;
         u->cfg.board.seed = s->seed;
-        for (unsigned k = 0; k < 3; k++) u->cfg.seat.misalignment_rad[k] = u->misalignment_arcsec[k] * RAD_PER_ARCSEC;
+        for (unsigned k = 0; k < 3; k++)
+            u->cfg.mounting.misalignment_rad[k] = u->misalignment_arcsec[k] * RAD_PER_ARCSEC;
         scenario_bind_level(s, u);
         if (u->spread) draw_unit(s, u);
     }

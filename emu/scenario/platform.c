@@ -86,7 +86,7 @@ static bool check_level(struct yaml_file *f, const struct yaml_node *units, cons
         return yaml_file_fail(f, units, "units",
                               "%s: level: expected a PSA-2 on bus %s, which the gyro unit receives, got %s on %s",
                               u->name, u->bus_name, level->name, level->bus_name);
-    return level->cfg.seat.on == LAB_PLATFORM ||
+    return level->cfg.mounting.on == LAB_PLATFORM ||
            yaml_file_fail(f, units, "units", "%s: level: expected a PSA-2 with on: platform, got %s", u->name,
                           level->name);
 }

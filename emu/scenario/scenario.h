@@ -44,7 +44,7 @@ struct scenario_unit {
     const struct board_name *board; /* as the key says: of one type, several names */
     union board_profile_store profile;
     struct unit_cfg cfg; /* name and profile point into this struct once it is in its place: scenario_bind() */
-    double misalignment_arcsec[3]; /* to cfg.seat by scenario_bind() */
+    double misalignment_arcsec[3]; /* to cfg.mounting by scenario_bind() */
     char bus_name[16];
     char level[32];     /* of a gyro unit: the unit that reads its level sensors; "": none */
     unsigned bus;       /* index into the buses */

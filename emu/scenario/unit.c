@@ -149,8 +149,8 @@ static const struct yaml_field unit_rows[] = {
     {.key = "spread", .type = YAML_BOOL, .offset = UNIT(spread), .what = "its parameters are drawn from the scenario's `spread`"},
     {.key = "axes",   .type = YAML_SECTION, .sub = &axes_fields, .what = "the channels `x`, `y`, `z`"},
     {.key = "level",  .type = YAML_TEXT, .offset = UNIT(level), .max = 32, .what = "of a gyro unit: name of the PSA-2 on the platform that reads its level sensors"},
-    {.key = "on",     .type = YAML_CHOICE, .offset = UNIT(cfg.seat.on), .choices = mounts, .what = "where it is mounted"},
-    {.key = "lever_arm_m", .type = YAML_REALS, .offset = UNIT(cfg.seat.lever_m), .count = 3, .min = -10, .max = 10, .what = "from the instrument's centre to the unit, mount's x, y, z"},
+    {.key = "on",     .type = YAML_CHOICE, .offset = UNIT(cfg.mounting.on), .choices = mounts, .what = "where it is mounted"},
+    {.key = "lever_arm_m", .type = YAML_REALS, .offset = UNIT(cfg.mounting.lever_m), .count = 3, .min = -10, .max = 10, .what = "from the instrument's centre to the unit, mount's x, y, z"},
     {.key = "misalignment_arcsec", .type = YAML_REALS, .offset = UNIT(misalignment_arcsec), .count = 3, .min = -36000, .max = 36000, .what = "of its case in the mount, about x, y, z"},
     {.key = "tau_case_s", .type = YAML_REAL, .offset = UNIT(cfg.tau_case_s), .max = 1e5, .what = "in the chamber; 0: the chamber's own"},
     {.key = "tau_element_s", .type = YAML_REAL, .offset = UNIT(cfg.tau_element_s), .max = 1e5, .what = "in the chamber; 0: the chamber's own"},
@@ -374,10 +374,10 @@ bool scenario_check_seats(struct yaml_file *f, const struct yaml_node *root, con
 {
     for (unsigned i = 0; i < s->unit_count; i++) {
         const struct scenario_unit *u = &s->units[i];
-        const bool there = u->cfg.seat.on == LAB_TABLE      ? s->lab.table.axes > 0
-                           : u->cfg.seat.on == LAB_PLATFORM ? s->lab.platform.present
-                                                            : true;
-        const char *on = lab_mount_name(u->cfg.seat.on);
+        const bool there = u->cfg.mounting.on == LAB_TABLE      ? s->lab.table.axes > 0
+                           : u->cfg.mounting.on == LAB_PLATFORM ? s->lab.platform.present
+                                                                : true;
+        const char *on = lab_mount_name(u->cfg.mounting.on);
         if (!there)
             return yaml_file_fail(f, yaml_get(root, "units"), "units",
                                   "%s: expected a section %s to mount it on, got none", u->name, on);

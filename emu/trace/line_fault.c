@@ -34,7 +34,7 @@ static int64_t due_ns(const struct line_fault_slot *s)
     return s->next_ns < s->f.until_ns ? s->next_ns : s->f.until_ns;
 }
 
-static void begin(struct line_fault_slot *s, int64_t t_ns)
+static void begin_fault(struct line_fault_slot *s, int64_t t_ns)
 {
     s->began = true;
     s->next_ns = NEVER;
@@ -44,7 +44,7 @@ static void begin(struct line_fault_slot *s, int64_t t_ns)
     s->next_ns = t_ns + s->f.width_ns;
 }
 
-static void turn(struct line_fault_slot *s, int64_t t_ns)
+static void toggle_fault(struct line_fault_slot *s, int64_t t_ns)
 {
     s->flip = !s->flip;
     if (s->flip) s->next_ns = t_ns + s->f.width_ns;
@@ -52,15 +52,15 @@ static void turn(struct line_fault_slot *s, int64_t t_ns)
     if (!s->flip && s->f.kind == LINE_GLITCH) s->id = 0;
 }
 
-static void run(struct line_fault_slot *s, int64_t t_ns)
+static void run_fault(struct line_fault_slot *s, int64_t t_ns)
 {
-    if (!s->began) begin(s, t_ns);
+    if (!s->began) begin_fault(s, t_ns);
     else if (t_ns >= s->f.until_ns) s->id = 0;
-    else turn(s, t_ns);
+    else toggle_fault(s, t_ns);
 }
 
 /* A step of the board's: frames begin, pulses are counted. */
-static void look(struct line_fault_slot *s, const struct trace_step *step)
+static void watch_step(struct line_fault_slot *s, const struct trace_step *step)
 {
     if (s->id == 0 || !s->began) return;
     const bool missing = s->f.kind == LINE_MISSING_PULSE;
@@ -76,7 +76,7 @@ static void look(struct line_fault_slot *s, const struct trace_step *step)
 
 /* ---- all faults of a trace ---- */
 
-static uint64_t shown(const struct line_faults *l)
+static uint64_t faulty_levels(const struct line_faults *l)
 {
     uint64_t level = l->level, high = 0, low = 0;
     for (const struct line_fault_slot *s = l->slot; s < l->slot + LINE_FAULTS_MAX; s++) {
@@ -88,18 +88,18 @@ static uint64_t shown(const struct line_faults *l)
     return (level | high) & ~low;
 }
 
-static void flush(const struct line_faults *l, struct out *o)
+static void flush_steps(const struct line_faults *l, struct out *o)
 {
     if (o->n > 0) trace_emit(l->trace, o->step, o->n);
     o->n = 0;
 }
 
-static void show(struct line_faults *l, struct out *o, int64_t t_ns)
+static void report_levels(struct line_faults *l, struct out *o, int64_t t_ns)
 {
-    const uint64_t level = shown(l);
+    const uint64_t level = faulty_levels(l);
     const uint64_t lines = level ^ l->filter.level;
     if (!lines) return;
-    if (o->n == ROOM) flush(l, o);
+    if (o->n == ROOM) flush_steps(l, o);
     o->step[o->n++] = (struct trace_step){t_ns, lines, level};
     l->filter.level = level;
 }
@@ -118,18 +118,18 @@ static void run_until(struct line_faults *l, struct out *o, int64_t t_ns)
 {
     for (int64_t at_ns; (at_ns = next_due_ns(l)) <= t_ns;) {
         for (struct line_fault_slot *s = l->slot; s < l->slot + LINE_FAULTS_MAX; s++)
-            if (due_ns(s) == at_ns) run(s, at_ns);
-        if (at_ns < t_ns) show(l, o, at_ns < l->done_ns ? l->done_ns : at_ns);
+            if (due_ns(s) == at_ns) run_fault(s, at_ns);
+        if (at_ns < t_ns) report_levels(l, o, at_ns < l->done_ns ? l->done_ns : at_ns);
     }
 }
 
-static void take(struct line_faults *l, const struct trace_step *step)
+static void take_step(struct line_faults *l, const struct trace_step *step)
 {
     l->level = (l->level & ~step->lines) | (step->level & step->lines);
-    for (struct line_fault_slot *s = l->slot; s < l->slot + LINE_FAULTS_MAX; s++) look(s, step);
+    for (struct line_fault_slot *s = l->slot; s < l->slot + LINE_FAULTS_MAX; s++) watch_step(s, step);
 }
 
-static bool any(const struct line_faults *l)
+static bool any_active(const struct line_faults *l)
 {
     for (unsigned i = 0; i < LINE_FAULTS_MAX; i++)
         if (l->slot[i].id) return true;
@@ -146,14 +146,14 @@ static void on_steps(void *ctx, uint64_t before, const struct trace_step *s, uns
     for (const struct trace_step *const end = s + n; s < end;) {
         const int64_t t_ns = s->t_ns;
         run_until(l, &o, t_ns);
-        take(l, s++);
-        show(l, &o, t_ns); /* step by step, as without a filter: when it is put in and taken out leaves no trace */
+        take_step(l, s++);
+        report_levels(l, &o, t_ns); /* step by step: installing and removing the filter leaves no trace */
     }
     run_until(l, &o, until_ns);
-    show(l, &o, until_ns);
-    flush(l, &o);
+    report_levels(l, &o, until_ns);
+    flush_steps(l, &o);
     l->done_ns = until_ns;
-    if (!any(l)) l->trace->filter = NULL;
+    if (!any_active(l)) l->trace->filter = NULL;
 }
 
 /* ---- for the owner ---- */

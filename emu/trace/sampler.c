@@ -7,7 +7,7 @@ static size_t min_size(size_t a, size_t b)
     return a < b ? a : b;
 }
 
-static void append(struct sampler *s, uint8_t byte, size_t n)
+static void append_run(struct sampler *s, uint8_t byte, size_t n)
 {
     while (n > 0) {
         const size_t at = (s->head + s->len) % SAMPLER_RING;
@@ -19,13 +19,13 @@ static void append(struct sampler *s, uint8_t byte, size_t n)
 }
 
 /* Makes n samples of the present levels, as far as the ring has room. */
-static void emit(struct sampler *s, int64_t n)
+static void emit_samples(struct sampler *s, int64_t n)
 {
     const int64_t room = (int64_t)(SAMPLER_RING - s->len);
     const int64_t kept = n < room ? n : room;
     if (kept > 0) {
-        append(s, s->level | s->gap, 1);
-        append(s, s->level, (size_t)kept - 1);
+        append_run(s, s->level | s->gap, 1);
+        append_run(s, s->level, (size_t)kept - 1);
         s->gap = 0;
     }
     if (kept < n) s->gap = SAMPLER_GAP;
@@ -37,10 +37,10 @@ static void sample_until(struct sampler *s, int64_t t_ns)
 {
     if (t_ns < s->clock.t0_ns) return;
     const int64_t count = clk_count_at(&s->clock, t_ns);
-    if (count > s->next) emit(s, count - s->next);
+    if (count > s->next) emit_samples(s, count - s->next);
 }
 
-static void steps(void *ctx, const struct trace_step *step, unsigned n)
+static void on_steps(void *ctx, const struct trace_step *step, unsigned n)
 {
     struct sampler *s = ctx;
     for (const struct trace_step *const end = step + n; step < end; step++) {
@@ -52,7 +52,7 @@ static void steps(void *ctx, const struct trace_step *step, unsigned n)
     }
 }
 
-static void advance(void *ctx, int64_t t_ns)
+static void on_advance(void *ctx, int64_t t_ns)
 {
     sample_until(ctx, t_ns);
 }
@@ -72,7 +72,7 @@ bool sampler_start(struct sampler *s, struct trace *t, const char *const *names,
         mask |= TRACE_BIT(sig);
     }
     s->first = s->next = clk_count_at(&own, t->done_ns);
-    s->sink = (struct trace_sink){.mask = mask, .steps = steps, .advance = advance, .ctx = s};
+    s->sink = (struct trace_sink){.mask = mask, .steps = on_steps, .advance = on_advance, .ctx = s};
     trace_attach(t, &s->sink);
     return true;
 }

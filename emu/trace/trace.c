@@ -4,7 +4,7 @@
 #include <string.h>
 
 /* Leaves of n reports what really changes. */
-static void filter(struct trace *t, struct trace_step *s, uint64_t n)
+static void filter_steps(struct trace *t, struct trace_step *s, uint64_t n)
 {
     uint64_t level = t->level;
     for (const struct trace_step *const end = s + n; s < end; s++) {
@@ -23,14 +23,14 @@ static void filter_due(struct trace *t, struct trace_step *s, unsigned n)
     t->gone += n;
     for (; k < t->runs && t->run[k].at + t->run[k].n <= t->gone; k++) {
         const struct trace_run *r = &t->run[k];
-        filter(t, s, r->at - at);
+        filter_steps(t, s, r->at - at);
         s += r->at - at;
         at = r->at;
         if (t->level & r->lines) continue; /* with what follows */
         s += r->n;
         at += r->n;
     }
-    filter(t, s, t->gone - at);
+    filter_steps(t, s, t->gone - at);
     k += k < t->runs && t->run[k].at < t->gone; /* only begun */
     t->runs -= k;
     if (k > 0 && t->runs > 0) memmove(t->run, t->run + k, t->runs * sizeof *t->run);
@@ -187,7 +187,7 @@ void trace_each(const struct trace_step *s, unsigned n, uint64_t mask, trace_cha
         }
 }
 
-static void advance(struct trace *t, int64_t t_ns)
+static void advance_sinks(struct trace *t, int64_t t_ns)
 {
     deliver_until(t, t_ns);
     if (t_ns <= t->done_ns) return;
@@ -199,6 +199,6 @@ static void advance(struct trace *t, int64_t t_ns)
 void trace_advance(struct trace *t, int64_t t_ns)
 {
     if (t->source.report && t_ns > t->done_ns)
-        for (int64_t known_ns; (known_ns = t->source.report(t->source.ctx, t_ns)) < t_ns;) advance(t, known_ns);
-    advance(t, t_ns);
+        for (int64_t known_ns; (known_ns = t->source.report(t->source.ctx, t_ns)) < t_ns;) advance_sinks(t, known_ns);
+    advance_sinks(t, t_ns);
 }

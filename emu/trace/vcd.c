@@ -18,7 +18,7 @@ static void write_out(struct vcd *v)
     v->len = 0;
 }
 
-static void put(struct vcd *v, const char *text)
+static void put_text(struct vcd *v, const char *text)
 {
     for (; *text; text++) {
         if (v->len == VCD_BUF) write_out(v);
@@ -34,14 +34,14 @@ static void put_u64(struct vcd *v, uint64_t n)
     do {
         *--p = (char)('0' + n % 10);
     } while ((n /= 10) > 0);
-    put(v, p);
+    put_text(v, p);
 }
 
 static void put_time(struct vcd *v, int64_t t_units)
 {
-    put(v, "#");
+    put_text(v, "#");
     put_u64(v, (uint64_t)t_units);
-    put(v, "\n");
+    put_text(v, "\n");
     v->t_units = t_units;
 }
 
@@ -84,7 +84,7 @@ static char *level_lines(char *p, uint64_t lines, uint64_t level)
 }
 
 /* The path of every edge. */
-static void step(struct vcd *v, const struct trace_step *s, uint64_t lines)
+static void write_step(struct vcd *v, const struct trace_step *s, uint64_t lines)
 {
     if (VCD_BUF - v->len < STEP_MAX_LEN) write_out(v);
     const int64_t t_units = s->t_ns / v->unit_ns;
@@ -101,16 +101,16 @@ static void step(struct vcd *v, const struct trace_step *s, uint64_t lines)
     v->t_units = v->edge_units = t_units;
 }
 
-static void steps(void *ctx, const struct trace_step *s, unsigned n)
+static void on_steps(void *ctx, const struct trace_step *s, unsigned n)
 {
     struct vcd *v = ctx;
     for (const struct trace_step *const end = s + n; s < end; s++) {
         const uint64_t lines = s->lines & v->sink.mask;
-        if (lines) step(v, s, lines);
+        if (lines) write_step(v, s, lines);
     }
 }
 
-static void advance(void *ctx, int64_t t_ns)
+static void on_advance(void *ctx, int64_t t_ns)
 {
     struct vcd *v = ctx;
     v->seen_units = t_ns / v->unit_ns;
@@ -120,24 +120,24 @@ static void put_levels(struct vcd *v, uint64_t lines, uint64_t level)
 {
     char text[3 * TRACE_SIGNALS_MAX + 1];
     *level_lines(text, lines & v->sink.mask, level) = '\0';
-    put(v, text);
+    put_text(v, text);
 }
 
 /* From here on the file has edges. What a line did at from_ns before it was asked for is in its first level. */
-static void begin(struct vcd *v)
+static void begin_edges(struct vcd *v)
 {
     const uint64_t first = v->before ^ ((v->before ^ v->found) & v->moved);
     put_time(v, v->from_ns / v->unit_ns);
-    put(v, "$dumpvars\n");
+    put_text(v, "$dumpvars\n");
     put_levels(v, UINT64_MAX, first);
-    put(v, "$end\n");
+    put_text(v, "$end\n");
     put_levels(v, first ^ v->level, v->level);
     v->edge_units = v->seen_units = v->t_units;
-    v->sink.steps = steps;
-    v->sink.advance = advance;
+    v->sink.steps = on_steps;
+    v->sink.advance = on_advance;
 }
 
-static uint64_t after(uint64_t level, const struct trace_step *s)
+static uint64_t levels_after(uint64_t level, const struct trace_step *s)
 {
     return (level & ~s->lines) | (s->level & s->lines);
 }
@@ -145,19 +145,19 @@ static uint64_t after(uint64_t level, const struct trace_step *s)
 static void steps_before(void *ctx, const struct trace_step *s, unsigned n)
 {
     struct vcd *v = ctx;
-    for (; n > 0 && s->t_ns < v->from_ns; n--, s++) v->before = v->level = after(v->level, s);
-    for (; n > 0 && s->t_ns == v->from_ns; n--, s++) v->level = after(v->level, s);
+    for (; n > 0 && s->t_ns < v->from_ns; n--, s++) v->before = v->level = levels_after(v->level, s);
+    for (; n > 0 && s->t_ns == v->from_ns; n--, s++) v->level = levels_after(v->level, s);
     if (n == 0) return;
-    begin(v);
-    steps(v, s, n);
+    begin_edges(v);
+    on_steps(v, s, n);
 }
 
 static void advance_before(void *ctx, int64_t t_ns)
 {
     struct vcd *v = ctx;
     if (t_ns < v->from_ns) return;
-    begin(v);
-    advance(v, t_ns);
+    begin_edges(v);
+    on_advance(v, t_ns);
 }
 
 /* The first that the trace tells: how its lines are at done_ns. */
@@ -172,7 +172,7 @@ static void present_levels(void *ctx, const struct trace_step *s, unsigned n)
 static void begin_and_end(struct vcd *v)
 {
     if (!v->trace->filter) v->before = v->level = v->found;
-    begin(v);
+    begin_edges(v);
 }
 
 /* VCD knows 1, 10 and 100 of ns, us and ms here. */
@@ -182,9 +182,9 @@ static bool put_timescale(struct vcd *v, uint32_t unit_ns)
     uint32_t ns = 1;
     for (size_t i = 0; i < sizeof unit / sizeof *unit; i++, ns *= 10) {
         if (ns != unit_ns) continue;
-        put(v, "$version psabench $end\n$timescale ");
-        put(v, unit[i]);
-        put(v, " $end\n");
+        put_text(v, "$version psabench $end\n$timescale ");
+        put_text(v, unit[i]);
+        put_text(v, " $end\n");
         return true;
     }
     return false;
@@ -192,19 +192,19 @@ static bool put_timescale(struct vcd *v, uint32_t unit_ns)
 
 static void put_names(struct vcd *v, const char *scope, uint64_t mask)
 {
-    put(v, "$scope module ");
-    put(v, scope);
-    put(v, " $end\n");
+    put_text(v, "$scope module ");
+    put_text(v, scope);
+    put_text(v, " $end\n");
     for (unsigned i = 0; i < v->trace->count; i++) {
         if (!(mask >> i & 1)) continue;
         const char code[2] = {code_of(i), '\0'};
-        put(v, "$var wire 1 ");
-        put(v, code);
-        put(v, " ");
-        put(v, v->trace->name[i]);
-        put(v, " $end\n");
+        put_text(v, "$var wire 1 ");
+        put_text(v, code);
+        put_text(v, " ");
+        put_text(v, v->trace->name[i]);
+        put_text(v, " $end\n");
     }
-    put(v, "$upscope $end\n$enddefinitions $end\n");
+    put_text(v, "$upscope $end\n$enddefinitions $end\n");
 }
 
 bool vcd_open(struct vcd *v, const struct vcd_cfg *cfg, struct trace *t)
@@ -221,7 +221,7 @@ bool vcd_open(struct vcd *v, const struct vcd_cfg *cfg, struct trace *t)
     v->sink.steps = steps_before;
     v->found = trace_known(t, v->from_ns);
     v->moved = v->found ^ trace_known(t, v->from_ns - 1);
-    if (v->from_ns == t->done_ns) begin(v);
+    if (v->from_ns == t->done_ns) begin_edges(v);
     return true;
 }
 
@@ -236,7 +236,7 @@ void vcd_flush(struct vcd *v)
 void vcd_close(struct vcd *v, int64_t t_ns)
 {
     trace_detach(v->trace, &v->sink);
-    if (v->sink.steps != steps) begin_and_end(v);
+    if (v->sink.steps != on_steps) begin_and_end(v);
     const int64_t end_units = t_ns / v->unit_ns;
     v->seen_units = end_units > v->edge_units ? end_units : v->edge_units + 1;
     vcd_flush(v);
@@ -244,7 +244,7 @@ void vcd_close(struct vcd *v, int64_t t_ns)
 
 int vcd_error(struct vcd *v)
 {
-    if (v->told) return 0;
-    v->told = v->error != 0;
+    if (v->reported) return 0;
+    v->reported = v->error != 0;
     return v->error;
 }

@@ -43,7 +43,7 @@ struct vcd { /* read-only outside vcd.c */
     unsigned prefix_len;
     char prefix[24]; /* ... and four more */
     int error;       /* errno of the first write that failed */
-    bool told;
+    bool reported;
     uint64_t changes;
     size_t len;
     char buf[VCD_BUF];

@@ -54,9 +54,9 @@ static void rate_radps(void *ctx, int64_t t_ns, double w_ib_b[3])
 {
     static const double origin_m[3] = {0.0, 0.0, 0.0};
     const struct unit *u = ctx;
-    struct felt felt;
-    lab_feel(u->lab, &u->cfg.seat, origin_m, t_ns, &felt);
-    for (unsigned i = 0; i < 3; i++) w_ib_b[i] = felt.w_radps[i];
+    struct kinematics kin;
+    lab_kinematics(u->lab, &u->cfg.mounting, origin_m, t_ns, &kin);
+    for (unsigned i = 0; i < 3; i++) w_ib_b[i] = kin.w_radps[i];
 }
 
 /* To what the scenario has it at power-on. */
@@ -230,7 +230,8 @@ struct can_node *unit_node(const struct unit *u)
 void unit_gravity_mps2(struct unit *u, unsigned axis, int64_t t_ns, double a_mps2[3])
 {
     double a[3];
-    lab_sensor_mps2(u->lab, &u->cfg.seat, u->cfg.axis[axis].at_m, u->cos_alpha0[axis], u->sin_alpha0[axis], t_ns, a);
+    lab_sensor_mps2(u->lab, &u->cfg.mounting, u->cfg.axis[axis].at_m, u->cos_alpha0[axis], u->sin_alpha0[axis], t_ns,
+                    a);
     for (unsigned i = 0; i < 3; i++) a_mps2[i] = a[(i + axis) % 3];
 }
 

@@ -1,4 +1,4 @@
-/* One unit of the bench: a board of any type, the sensors on its three channels, and its seat on an instrument of the lab.
+/* One unit of the bench: a board of any type, the sensors on its three channels, and its mounting on an instrument of the lab.
  *
  * The unit wires sensors to the board (board_io) and, if asked, the board's CAN side to a bus. A
  * sensor on channel X has the unit's axes (x, y, z), on Y (y, z, x), on Z (z, x, y). Several units share a lab. Owned
@@ -34,7 +34,7 @@ struct unit_cfg {
     struct unit_axis_cfg axis[UNIT_AXES];
     double temp_degc[UNIT_TEMPS];     /* where the lab has no chamber */
     double tau_case_s, tau_element_s; /* in the chamber; 0: the chamber's own */
-    struct lab_seat seat;
+    struct lab_mounting mounting;
     uint8_t node; /* CAN node id, for those above */
 };
 

@@ -11,12 +11,12 @@ enum { OUT_MAX = 4 << 20, OUT_HIGH = 1 << 18 };
 
 static const uint32_t bitrate_hz[] = {10000, 20000, 50000, 100000, 125000, 250000, 500000, 800000, 1000000};
 
-static void reply(struct slcan_pty *s, const char *text)
+static void send_reply(struct slcan_pty *s, const char *text)
 {
     text_link_put(&s->io, text, strlen(text));
 }
 
-static void say(const struct slcan_pty *s, const char *text)
+static void log_line(const struct slcan_pty *s, const char *text)
 {
     s->hub->say(s->hub->say_ctx, text);
 }
@@ -45,8 +45,8 @@ static void on_frame(void *ctx, const struct can_msg *m, int64_t t_ns)
     }
     s->can.dropped++;
     s->status |= SLCAN_STATUS_RX_FULL | SLCAN_STATUS_OVERRUN;
-    if (!s->lost_told) say(s, "slcan: the client reads too slowly, frames are being dropped");
-    s->lost_told = true;
+    if (!s->lost_reported) log_line(s, "slcan: the client reads too slowly, frames are being dropped");
+    s->lost_reported = true;
 }
 
 static void on_error(void *ctx, const struct can_msg *m, int64_t t_ns)
@@ -71,7 +71,7 @@ static bool cmd_open(struct slcan_pty *s, const char *arg, int64_t t_ns)
     s->listen_only = false;
     if (s->open) return true; /* python-can opens twice when it sets the bit rate */
     s->open = true;
-    s->closing = s->can.leaving = s->lost_told = false;
+    s->closing = s->can.leaving = s->lost_reported = false;
     s->status = 0;
     if (s->can.up) can_hub_restart(s->hub, &s->can);
     else can_hub_join(s->hub, &s->can);
@@ -115,21 +115,21 @@ static bool cmd_data_bitrate(struct slcan_pty *s, const char *arg, int64_t t_ns)
 static bool cmd_version(struct slcan_pty *s, const char *arg, int64_t t_ns)
 {
     (void)t_ns;
-    if (!*arg) reply(s, "V1013");
+    if (!*arg) send_reply(s, "V1013");
     return !*arg;
 }
 
 static bool cmd_version_long(struct slcan_pty *s, const char *arg, int64_t t_ns)
 {
     (void)t_ns;
-    if (!*arg) reply(s, "vpsabench");
+    if (!*arg) send_reply(s, "vpsabench");
     return !*arg;
 }
 
 static bool cmd_serial(struct slcan_pty *s, const char *arg, int64_t t_ns)
 {
     (void)t_ns;
-    if (!*arg) reply(s, "NPSAB");
+    if (!*arg) send_reply(s, "NPSAB");
     return !*arg;
 }
 
@@ -139,7 +139,7 @@ static bool cmd_status(struct slcan_pty *s, const char *arg, int64_t t_ns)
     if (*arg || !s->open) return false;
     char text[4] = {'F', '0', '0', '\0'};
     hex_put(text + 1, s->status, 2);
-    reply(s, text);
+    send_reply(s, text);
     s->status = 0;
     return true;
 }
@@ -171,7 +171,7 @@ static bool do_command(struct slcan_pty *s, const char *line, int64_t t_ns)
 static bool do_frame(struct slcan_pty *s, const struct can_msg *m, int64_t t_ns)
 {
     if (!s->open || s->listen_only || !can_hub_send(s->hub, &s->can, m, t_ns)) return false;
-    reply(s, m->flags & CAN_EXT ? "Z" : "z");
+    send_reply(s, m->flags & CAN_EXT ? "Z" : "z");
     return true;
 }
 
@@ -189,7 +189,7 @@ static void on_line(struct text_link *t, enum lines_result r, const char *line, 
                       : err == SLCAN_NO_FRAME && strlen(line) == len ? do_command(s, line, t_ns)
                                                                      : false;
     if (!done) s->can.refused++;
-    reply(s, done ? "\r" : "\a");
+    send_reply(s, done ? "\r" : "\a");
 }
 
 static bool on_ready(struct text_link *t)
@@ -218,7 +218,7 @@ static void on_opened(void *ctx, bool open, int64_t t_ns)
 {
     struct slcan_pty *s = ctx;
     (void)t_ns;
-    say(s, open ? "slcan: port opened" : "slcan: port closed");
+    log_line(s, open ? "slcan: port opened" : "slcan: port closed");
     if (!open) return; /* its last bytes may still be on their way: on_flush closes the channel after them */
     text_link_forget(&s->io);
     pty_discard(&s->pty);

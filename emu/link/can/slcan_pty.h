@@ -19,7 +19,7 @@ struct slcan_pty {
     struct can_client can;
     struct can_hub *hub;
     bool open, listen_only, stamps, closing;
-    bool lost_told;
+    bool lost_reported;
     uint8_t status; /* F: bits 0, 3, 5 and 7 as a CAN232 has them */
 };
 

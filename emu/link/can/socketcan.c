@@ -14,7 +14,7 @@
 
 enum { RETRY_MS = 1, DOWN_RETRY_MS = 200, RCVBUF = 8 << 20 };
 
-static void say(const struct socketcan *s, const char *what)
+static void log_line(const struct socketcan *s, const char *what)
 {
     char line[128];
     snprintf(line, sizeof line, "socketcan: %s: %s", s->can.name, what);
@@ -49,7 +49,7 @@ static struct can_msg from_kernel(const struct canfd_frame *f, bool fd)
 
 /* ---- bus to kernel */
 
-static void refresh(struct socketcan *s)
+static void refresh_link(struct socketcan *s)
 {
     s->link.pending = s->can.stalled ? 0 : s->len;
     s->link.full = s->link.pending > SOCKETCAN_QUEUE / 2;
@@ -63,11 +63,11 @@ static void on_frame(void *ctx, const struct can_msg *m, int64_t t_ns)
         s->queue[(s->head + s->len++) % SOCKETCAN_QUEUE] = *m;
         can_hub_delivered(&s->can);
     } else {
-        if (!s->lost_told) say(s, "the interface does not take the frames, they are being dropped");
-        s->lost_told = true;
+        if (!s->lost_reported) log_line(s, "the interface does not take the frames, they are being dropped");
+        s->lost_reported = true;
         s->can.dropped++;
     }
-    refresh(s);
+    refresh_link(s);
 }
 
 /* Only to an interface that cannot take it for a frame to send. */
@@ -76,12 +76,12 @@ static void on_error(void *ctx, const struct can_msg *m, int64_t t_ns)
     struct socketcan *s = ctx;
     (void)t_ns;
     if (s->virtual && s->len < SOCKETCAN_QUEUE) s->queue[(s->head + s->len++) % SOCKETCAN_QUEUE] = *m;
-    refresh(s);
+    refresh_link(s);
 }
 
 static void on_stall(struct can_client *can)
 {
-    refresh(can->node.ctx);
+    refresh_link(can->node.ctx);
 }
 
 /* One frame to the kernel. 0 gone, else errno. */
@@ -92,22 +92,22 @@ static int write_one(struct socketcan *s, const struct can_msg *m)
     return write(s->link.fd, &f, size) == (ssize_t)size ? 0 : errno ? errno : EIO;
 }
 
-static void pop(struct socketcan *s)
+static void pop_frame(struct socketcan *s)
 {
     s->head = (s->head + 1) % SOCKETCAN_QUEUE;
     s->len--;
 }
 
 /* The interface is down, or refuses the frame: it is lost as on an unplugged cable, so that no client waits for it. */
-static void lose(struct socketcan *s, int err)
+static void drop_frame(struct socketcan *s, int err)
 {
-    if (!s->down_told) say(s, strerror(err));
-    s->down_told = true;
+    if (!s->down_reported) log_line(s, strerror(err));
+    s->down_reported = true;
     if (!(s->queue[s->head].flags & CAN_ERROR)) {
         s->can.delivered--;
         s->can.dropped++;
     }
-    pop(s);
+    pop_frame(s);
 }
 
 static void on_flush(struct link *l, int64_t t_ns)
@@ -122,13 +122,13 @@ static void on_flush(struct link *l, int64_t t_ns)
         if (err == ENOBUFS) l->timer_ms = RETRY_MS; /* a full transmit queue does not signal POLLOUT */
         if (err == EAGAIN || err == ENOBUFS) break;
         if (err) {
-            lose(s, err);
+            drop_frame(s, err);
             continue;
         }
-        s->down_told = false;
-        pop(s);
+        s->down_reported = false;
+        pop_frame(s);
     }
-    refresh(s);
+    refresh_link(s);
 }
 
 /* ---- kernel to bus */
@@ -140,7 +140,7 @@ static void note_overflow(struct socketcan *s, struct msghdr *h)
         uint32_t total;
         memcpy(&total, CMSG_DATA(c), sizeof total);
         if (total == s->rxq_ovfl) continue;
-        if (!s->can.overrun) say(s, "the kernel lost frames before we read them");
+        if (!s->can.overrun) log_line(s, "the kernel lost frames before we read them");
         s->can.overrun += total - s->rxq_ovfl;
         s->rxq_ovfl = total;
     }

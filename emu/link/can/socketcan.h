@@ -17,7 +17,7 @@ struct socketcan {
     struct can_msg queue[SOCKETCAN_QUEUE]; /* waits for the kernel */
     unsigned head, len;
     uint32_t rxq_ovfl; /* the kernel's counter of frames it lost before we read them */
-    bool lost_told, down_told;
+    bool lost_reported, down_reported;
     bool virtual; /* by its name, vcan or vxcan: error frames are shown there; a real one would send them */
 };
 

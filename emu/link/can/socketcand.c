@@ -99,7 +99,7 @@ static const char *const other_modes[] = {
     "filter",  "subscribe", "unsubscribe", "statistics", "sendpdu",
 };
 
-static enum socketcand_err unknown(const char *word, size_t len)
+static enum socketcand_err unknown_word(const char *word, size_t len)
 {
     for (unsigned i = 0; i < sizeof other_modes / sizeof other_modes[0]; i++) {
         if (word_is(word, len, other_modes[i])) return SOCKETCAND_MODE;
@@ -122,7 +122,7 @@ enum socketcand_err socketcand_decode(const char *msg, size_t len, struct socket
         if (!err) *out = m;
         return err;
     }
-    return unknown(word, n);
+    return unknown_word(word, n);
 }
 
 const char *socketcand_strerror(enum socketcand_err err)
@@ -152,7 +152,7 @@ const char *socketcand_error_text(const struct can_msg *m)
 }
 
 /* Appends text; false when it does not fit. */
-static bool put(char **p, const char *end, const char *text, size_t len)
+static bool put_text(char **p, const char *end, const char *text, size_t len)
 {
     if ((size_t)(end - *p) < len) return false;
     memcpy(*p, text, len);
@@ -174,7 +174,7 @@ static bool put_time(char **p, const char *end, int64_t t_ns)
         us /= 10;
     } while (us);
     *--d = ' ';
-    return put(p, end, d, (size_t)(digits + sizeof digits - d));
+    return put_text(p, end, d, (size_t)(digits + sizeof digits - d));
 }
 
 /* Closes the message that began at out; 0 when it does not fit. */
@@ -196,10 +196,10 @@ size_t socketcand_frame(const struct can_msg *m, int64_t t_ns, size_t pad, char 
     char id[8];
     const size_t id_digits = m->flags & CAN_EXT ? 8 : 3;
     hex_put(id, m->id, id_digits);
-    if (!put(&p, end, "< frame ", 8) || !put(&p, end, id, id_digits) || !put_time(&p, end, t_ns)) return 0;
+    if (!put_text(&p, end, "< frame ", 8) || !put_text(&p, end, id, id_digits) || !put_time(&p, end, t_ns)) return 0;
     char data[16];
     for (unsigned i = 0; i < m->len; i++) hex_put(data + 2 * i, m->data[i], 2);
-    if (!put(&p, end, data, 2u * m->len)) return 0;
+    if (!put_text(&p, end, data, 2u * m->len)) return 0;
     return close_message(out, p, end, pad);
 }
 
@@ -209,7 +209,7 @@ size_t socketcand_error(uint32_t class, int64_t t_ns, const char *text, size_t p
     const char *end = out + cap;
     char id[8];
     hex_put(id, class, 8);
-    if (!put(&p, end, "< error ", 8) || !put(&p, end, id, 8) || !put_time(&p, end, t_ns)) return 0;
-    if (!put(&p, end, text, strlen(text))) return 0;
+    if (!put_text(&p, end, "< error ", 8) || !put_text(&p, end, id, 8) || !put_time(&p, end, t_ns)) return 0;
+    if (!put_text(&p, end, text, strlen(text))) return 0;
     return close_message(out, p, end, pad);
 }

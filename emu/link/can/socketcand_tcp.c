@@ -25,7 +25,7 @@ struct client {
     enum phase phase;
     unsigned held; /* hold periods so far */
     uint64_t lost; /* frames dropped since the client was last told */
-    bool fd_told;
+    bool fd_reported;
 };
 
 /* The kernel's own buffer is kept small: else it grows to megabytes and hides how far behind a client is. */
@@ -36,12 +36,12 @@ static size_t pad_of(const struct client *c)
     return c->hub->lossless ? SOCKETCAND_PAD : 0;
 }
 
-static int64_t stamp(const struct client *c, int64_t t_ns)
+static int64_t time_stamp(const struct client *c, int64_t t_ns)
 {
     return t_ns + c->hub->epoch_ns;
 }
 
-static void say(const struct client *c, const char *what)
+static void log_client(const struct client *c, const char *what)
 {
     char line[160];
     snprintf(line, sizeof line, "socketcand: client %s: %s", c->can.name[0] ? c->can.name : "(no channel)", what);
@@ -49,23 +49,23 @@ static void say(const struct client *c, const char *what)
 }
 
 /* Before rawmode a client compares answers for equality: no padding. */
-static void answer(struct client *c, const char *text)
+static void send_answer(struct client *c, const char *text)
 {
     text_link_put(&c->io, text, strlen(text));
 }
 
-static void tell_error(struct client *c, uint32_t class, const char *text, int64_t t_ns)
+static void send_error(struct client *c, uint32_t class, const char *text, int64_t t_ns)
 {
     char msg[2 * SOCKETCAND_MSG_MAX];
     const size_t n =
-        socketcand_error(class, stamp(c, t_ns), text, c->phase == PHASE_RAW ? pad_of(c) : 0, msg, sizeof msg);
+        socketcand_error(class, time_stamp(c, t_ns), text, c->phase == PHASE_RAW ? pad_of(c) : 0, msg, sizeof msg);
     if (n) text_link_put(&c->io, msg, n);
 }
 
-static void refuse(struct client *c, const char *text, int64_t t_ns)
+static void reject_message(struct client *c, const char *text, int64_t t_ns)
 {
     c->can.refused++;
-    tell_error(c, SOCKETCAND_REFUSED, text, t_ns);
+    send_error(c, SOCKETCAND_REFUSED, text, t_ns);
 }
 
 /* ---- bus to client */
@@ -75,7 +75,7 @@ static void tell_lost(struct client *c, int64_t t_ns)
     char text[80];
     snprintf(text, sizeof text, "%llu frames lost here: the client reads too slowly", (unsigned long long)c->lost);
     c->lost = 0;
-    tell_error(c, SOCKETCAND_LOST, text, t_ns);
+    send_error(c, SOCKETCAND_LOST, text, t_ns);
 }
 
 static void on_frame(void *ctx, const struct can_msg *m, int64_t t_ns)
@@ -84,11 +84,11 @@ static void on_frame(void *ctx, const struct can_msg *m, int64_t t_ns)
     char msg[SOCKETCAND_MSG_MAX];
     if (c->phase == PHASE_LEAVING) return;
     if (c->lost && outbuf_pending(&c->io.out) < OUT_HIGH) tell_lost(c, t_ns);
-    const size_t n = socketcand_frame(m, stamp(c, t_ns), pad_of(c), msg, sizeof msg);
+    const size_t n = socketcand_frame(m, time_stamp(c, t_ns), pad_of(c), msg, sizeof msg);
     if (n && !c->lost && text_link_put(&c->io, msg, n)) {
         can_hub_delivered(&c->can);
     } else if (n) {
-        if (!c->lost++) say(c, "reads too slowly, frames are being dropped");
+        if (!c->lost++) log_client(c, "reads too slowly, frames are being dropped");
         c->can.dropped++;
     }
 }
@@ -100,7 +100,7 @@ static void on_error(void *ctx, const struct can_msg *m, int64_t t_ns)
     char text[80];
     if (c->phase == PHASE_LEAVING) return;
     snprintf(text, sizeof text, "%s, TEC %u REC %u", socketcand_error_text(m), m->data[6], m->data[7]);
-    tell_error(c, SOCKETCAND_ERROR_FLAG | m->id, text, t_ns);
+    send_error(c, SOCKETCAND_ERROR_FLAG | m->id, text, t_ns);
 }
 
 static void on_stall(struct can_client *can)
@@ -130,42 +130,42 @@ static bool choose_bus(struct client *c, const char *channel, int64_t t_ns)
         snprintf(text + at, sizeof text - at, "%s %s", i ? "," : "", s->hub[i].name);
     }
     c->hub = s->hub;
-    refuse(c, text, t_ns);
+    reject_message(c, text, t_ns);
     return false;
 }
 
 static void do_open(struct client *c, const struct socketcand_msg *m, int64_t t_ns)
 {
     if (c->phase != PHASE_HELLO) {
-        refuse(c, "a channel is open already", t_ns);
+        reject_message(c, "a channel is open already", t_ns);
         return;
     }
     if (!choose_bus(c, m->channel, t_ns)) return;
     memcpy(c->can.name, m->channel, sizeof c->can.name);
     c->phase = PHASE_OPEN;
-    answer(c, "< ok >");
+    send_answer(c, "< ok >");
 }
 
 static void do_rawmode(struct client *c, int64_t t_ns)
 {
     if (c->phase != PHASE_OPEN) {
-        refuse(c, c->phase == PHASE_HELLO ? "rawmode before open CHANNEL" : "rawmode already", t_ns);
+        reject_message(c, c->phase == PHASE_HELLO ? "rawmode before open CHANNEL" : "rawmode already", t_ns);
         return;
     }
-    answer(c, "< ok >");
+    send_answer(c, "< ok >");
     c->io.link.flush(&c->io.link, t_ns); /* now, as a segment of its own */
     if (c->phase == PHASE_LEAVING) return;
     c->phase = PHASE_HOLD;
     c->io.hold = true;
     c->io.link.timer_ms = SOCKETCAND_HOLD_MS;
     can_hub_join(c->hub, &c->can);
-    say(c, "connected");
+    log_client(c, "connected");
 }
 
 static void do_send(struct client *c, const struct can_msg *m, int64_t t_ns)
 {
     if (!c->can.up) {
-        refuse(c, "send before open CHANNEL and rawmode", t_ns);
+        reject_message(c, "send before open CHANNEL and rawmode", t_ns);
         return;
     }
     can_hub_send(c->hub, &c->can, m, t_ns);
@@ -176,13 +176,13 @@ static void on_line(struct text_link *t, enum lines_result r, const char *line, 
     struct client *c = (struct client *)t;
     struct socketcand_msg m;
     if (r == LINES_OVERLONG) {
-        refuse(c, "message too long: up to 200 characters from bracket to bracket", t_ns);
+        reject_message(c, "message too long: up to 200 characters from bracket to bracket", t_ns);
         return;
     }
     const enum socketcand_err err = socketcand_decode(line, len, &m);
     release_hold(c); /* it speaks, so it has read its < ok > */
     if (err) {
-        refuse(c, socketcand_strerror(err), t_ns);
+        reject_message(c, socketcand_strerror(err), t_ns);
         return;
     }
     switch (m.verb) {
@@ -196,7 +196,7 @@ static void on_line(struct text_link *t, enum lines_result r, const char *line, 
         do_send(c, &m.frame, t_ns);
         break;
     case SOCKETCAND_ECHO:
-        answer(c, "< echo >");
+        send_answer(c, "< echo >");
         break;
     }
 }
@@ -214,11 +214,11 @@ static void on_read(struct text_link *t)
 
 /* ---- coming and going */
 
-static void leave(struct client *c)
+static void begin_leaving(struct client *c)
 {
     if (c->can.up) {
         if (c->can.node.queued) return; /* frames of a client that sent and left still go out */
-        say(c, "gone");
+        log_client(c, "gone");
         can_hub_leave(c->hub, &c->can);
     }
     c->server->clients--;
@@ -235,19 +235,19 @@ static void on_closed(struct text_link *t, int64_t t_ns)
     t->link.pending = 0;
     close(t->link.fd);
     t->link.fd = -1;
-    leave(c);
+    begin_leaving(c);
 }
 
 static void on_flush(struct link *l, int64_t t_ns)
 {
     struct client *c = (struct client *)l;
     if (c->phase == PHASE_LEAVING) {
-        if (!l->gone) leave(c);
+        if (!l->gone) begin_leaving(c);
         return;
     }
-    if (c->can.node.fd_refused && !c->fd_told && c->phase == PHASE_RAW) {
-        c->fd_told = true;
-        tell_error(c, SOCKETCAND_REFUSED, "FD frames are on the bus that socketcand cannot carry", t_ns);
+    if (c->can.node.fd_refused && !c->fd_reported && c->phase == PHASE_RAW) {
+        c->fd_reported = true;
+        send_error(c, SOCKETCAND_REFUSED, "FD frames are on the bus that socketcand cannot carry", t_ns);
     }
     text_link_flush(l, t_ns);
 }
@@ -312,7 +312,7 @@ static void on_connection(struct link *l, int64_t t_ns)
     }
     s->clients++;
     links_add_first(s->hub->links, &c->io.link);
-    answer(c, "< hi >");
+    send_answer(c, "< hi >");
     c->io.link.flush(&c->io.link, t_ns);
 }
 

@@ -6,16 +6,17 @@
 
 enum { OUT_MAX = 1 << 20 };
 
-static void put(struct bus_pty *p, const char *text, size_t n)
+static void put_text(struct bus_pty *p, const char *text, size_t n)
 {
     text_link_put(&p->io, text, n);
 }
 
-static void refuse(struct bus_pty *p, const struct bus_request *r, unsigned fields, const char *code, int64_t t_ns)
+static void reject_request(struct bus_pty *p, const struct bus_request *r, unsigned fields, const char *code,
+                           int64_t t_ns)
 {
     char text[BUS_TEXT_MAX];
     p->refused++;
-    put(p, text, bus_text_refused(r, fields, code, t_ns, text));
+    put_text(p, text, bus_text_refused(r, fields, code, t_ns, text));
 }
 
 static void say_who(struct bus_pty *p, int64_t t_ns)
@@ -27,7 +28,7 @@ static void say_who(struct bus_pty *p, int64_t t_ns)
         if (name && n + 40 < sizeof text) n += (size_t)snprintf(text + n, sizeof text - n, " %02Xh=%.11s", a, name);
     }
     n += (size_t)snprintf(text + n, sizeof text - n, " t=%" PRId64 "\n", t_ns);
-    put(p, text, n);
+    put_text(p, text, n);
 }
 
 static void on_line(struct text_link *t, enum lines_result r, const char *line, size_t len, int64_t t_ns)
@@ -37,7 +38,7 @@ static void on_line(struct text_link *t, enum lines_result r, const char *line, 
     unsigned fields = 0;
     const enum bus_text_err err = r == LINES_LINE ? bus_text_parse(line, len, &request, &fields) : BUS_TEXT_OVERLONG;
     if (err != BUS_TEXT_OK) {
-        refuse(p, &request, fields, bus_text_code(err), t_ns);
+        reject_request(p, &request, fields, bus_text_code(err), t_ns);
         return;
     }
     if (request.op == BUS_WHO) {
@@ -46,7 +47,7 @@ static void on_line(struct text_link *t, enum lines_result r, const char *line, 
     }
     const char *const code = p->ops.submit(p->ops.ctx, &request, t_ns);
     if (code) {
-        refuse(p, &request, fields, code, t_ns);
+        reject_request(p, &request, fields, code, t_ns);
         return;
     }
     p->request = request;
@@ -65,14 +66,14 @@ void bus_pty_done(struct bus_pty *p, uint16_t data, int64_t t_ns)
     if (!p->busy) return;
     p->busy = false;
     p->cycles++;
-    if (!p->orphan) put(p, text, bus_text_done(&p->request, data, t_ns, text));
+    if (!p->orphan) put_text(p, text, bus_text_done(&p->request, data, t_ns, text));
 }
 
 void bus_pty_failed(struct bus_pty *p, const char *code, int64_t t_ns)
 {
     if (!p->busy) return;
     p->busy = false;
-    if (!p->orphan) refuse(p, &p->request, 2, code, t_ns);
+    if (!p->orphan) reject_request(p, &p->request, 2, code, t_ns);
 }
 
 /* No program has it open. */

@@ -14,7 +14,7 @@ static void skip_blanks(struct text *t)
 }
 
 /* The next field without its blanks; empty at the end of the line. */
-static struct text field(struct text *t)
+static struct text next_field(struct text *t)
 {
     skip_blanks(t);
     struct text f = {t->at, t->at};
@@ -23,12 +23,12 @@ static struct text field(struct text *t)
     return f;
 }
 
-static bool empty(struct text f)
+static bool is_empty(struct text f)
 {
     return f.at == f.end;
 }
 
-static int digit(char c)
+static int digit_value(char c)
 {
     if (c >= '0' && c <= '9') return c - '0';
     if (c >= 'a' && c <= 'f') return c - 'a' + 10;
@@ -44,12 +44,12 @@ static struct text without_h(struct text f)
 }
 
 /* A number of at most `most` digits. */
-static bool number(struct text f, int base, unsigned most, uint32_t *out)
+static bool parse_number(struct text f, int base, unsigned most, uint32_t *out)
 {
     uint32_t v = 0;
-    if (empty(f) || (size_t)(f.end - f.at) > most) return false;
+    if (is_empty(f) || (size_t)(f.end - f.at) > most) return false;
     for (; f.at < f.end; f.at++) {
-        const int d = digit(*f.at);
+        const int d = digit_value(*f.at);
         if (d >= base) return false;
         v = v * (uint32_t)base + (uint32_t)d;
     }
@@ -72,10 +72,10 @@ static bool op_of(struct text f, enum bus_op *op)
 
 static enum bus_text_err parse_data(struct text *t, struct bus_request *out)
 {
-    const struct text f = field(t);
+    const struct text f = next_field(t);
     uint32_t v = 0;
-    if (empty(f)) return BUS_TEXT_SYNTAX;
-    if (!number(f, 16, 4, &v)) return BUS_TEXT_NUMBER;
+    if (is_empty(f)) return BUS_TEXT_SYNTAX;
+    if (!parse_number(f, 16, 4, &v)) return BUS_TEXT_NUMBER;
     out->data = (uint16_t)v;
     return BUS_TEXT_OK;
 }
@@ -83,10 +83,10 @@ static enum bus_text_err parse_data(struct text *t, struct bus_request *out)
 /* May be missing; 0 would mean the board's own. */
 static enum bus_text_err parse_strobe(struct text *t, struct bus_request *out)
 {
-    const struct text f = field(t);
+    const struct text f = next_field(t);
     uint32_t v = 0;
-    if (empty(f)) return BUS_TEXT_OK;
-    if (!number(f, 10, 9, &v) || v == 0) return BUS_TEXT_NUMBER;
+    if (is_empty(f)) return BUS_TEXT_OK;
+    if (!parse_number(f, 10, 9, &v) || v == 0) return BUS_TEXT_NUMBER;
     out->strobe_ns = v;
     return BUS_TEXT_OK;
 }
@@ -98,20 +98,20 @@ enum bus_text_err bus_text_parse(const char *line, size_t len, struct bus_reques
     *fields = 0;
     if (len > BUS_TEXT_LINE_MAX) return BUS_TEXT_OVERLONG;
     if (len && t.end[-1] == '\r') t.end--;
-    if (!op_of(field(&t), &out->op)) return BUS_TEXT_SYNTAX;
+    if (!op_of(next_field(&t), &out->op)) return BUS_TEXT_SYNTAX;
     *fields = 1;
     if (out->op != BUS_WHO) {
-        const struct text f = field(&t);
+        const struct text f = next_field(&t);
         uint32_t address = 0;
-        if (empty(f)) return BUS_TEXT_SYNTAX;
-        if (!number(without_h(f), 16, 2, &address)) return BUS_TEXT_NUMBER;
+        if (is_empty(f)) return BUS_TEXT_SYNTAX;
+        if (!parse_number(without_h(f), 16, 2, &address)) return BUS_TEXT_NUMBER;
         out->address = (uint8_t)address;
         *fields = 2;
         enum bus_text_err err = out->op == BUS_WRITE ? parse_data(&t, out) : BUS_TEXT_OK;
         if (err == BUS_TEXT_OK) err = parse_strobe(&t, out);
         if (err != BUS_TEXT_OK) return err;
     }
-    return empty(field(&t)) ? BUS_TEXT_OK : BUS_TEXT_SYNTAX;
+    return is_empty(next_field(&t)) ? BUS_TEXT_OK : BUS_TEXT_SYNTAX;
 }
 
 const char *bus_text_code(enum bus_text_err err)

@@ -2,7 +2,7 @@
 
 #include <unistd.h>
 
-static void refresh(struct line_pty *p)
+static void refresh_link(struct line_pty *p)
 {
     const size_t waiting = p->sampling ? p->source.waiting(p->source.ctx) : 0;
     p->link.pending = p->len - p->pos + waiting;
@@ -25,7 +25,7 @@ static void on_flush(struct link *l, int64_t t_ns)
         p->pos += (size_t)n;
         p->sent += (uint64_t)n;
     }
-    refresh(p);
+    refresh_link(p);
 }
 
 /* What a reader types means nothing here. */
@@ -44,7 +44,7 @@ static void on_opened(void *ctx, bool open, int64_t t_ns)
     p->sent = 0;
     pty_discard(&p->pty);
     p->sampling = open && p->source.start(p->source.ctx, t_ns);
-    refresh(p);
+    refresh_link(p);
 }
 
 int line_pty_open(struct line_pty *p, struct links *links, const struct line_source *source, const char *name)

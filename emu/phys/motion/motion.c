@@ -13,7 +13,7 @@
 
 /* ---- evaluation */
 
-static struct motion_state coast(const struct motion_state *from, double t_s)
+static struct motion_state coast_from(const struct motion_state *from, double t_s)
 {
     return (struct motion_state){
         from->angle_rad + (from->rate_radps + 0.5 * from->accel_radps2 * t_s) * t_s,
@@ -23,7 +23,7 @@ static struct motion_state coast(const struct motion_state *from, double t_s)
 }
 
 /* From the lowest point, where the rate is zero. Whole cycles are taken off before the sine. */
-static struct motion_state swing(const struct motion_plan *p, const struct motion_state *lowest, double t_s)
+static struct motion_state swing_at(const struct motion_plan *p, const struct motion_state *lowest, double t_s)
 {
     const double cycles = p->sine_hz * t_s;
     const double phase_rad = TURN_RAD * (cycles - floor(cycles));
@@ -51,8 +51,8 @@ struct motion_state motion_at(const struct motion *m, int64_t t_ns)
     unsigned i = p->count - 1;
     while (i > 0 && p->piece[i].t_s > t_s) i--;
     const struct motion_piece *piece = &p->piece[i];
-    if (p->sine_hz > 0.0 && i == p->count - 1) return swing(p, &piece->from, t_s - piece->t_s);
-    return coast(&piece->from, t_s - piece->t_s);
+    if (p->sine_hz > 0.0 && i == p->count - 1) return swing_at(p, &piece->from, t_s - piece->t_s);
+    return coast_from(&piece->from, t_s - piece->t_s);
 }
 
 int64_t motion_rest_ns(const struct motion *m)
@@ -100,7 +100,7 @@ static void run_for(struct draft *d, double accel_radps2, double t_s)
 {
     if (t_s <= 0.0) return;
     add_piece(d, accel_radps2);
-    d->now = coast(&d->now, t_s);
+    d->now = coast_from(&d->now, t_s);
     d->t_s += t_s;
 }
 
@@ -152,7 +152,7 @@ static void go_on(struct draft *d, const struct motion_limits *l, double rate_ra
     }
 }
 
-static void accept(struct motion *m, const struct draft *d)
+static void accept_draft(struct motion *m, const struct draft *d)
 {
     if (m->plan[m->latest].start_ns < d->plan.start_ns) m->latest = (m->latest + 1) % MOTION_HISTORY;
     m->plan[m->latest] = d->plan;
@@ -171,7 +171,7 @@ void motion_init(struct motion *m, const struct motion_limits *limits)
     }
 }
 
-static bool within(const struct motion_limits *l, double angle_rad)
+static bool within_limits(const struct motion_limits *l, double angle_rad)
 {
     if (!l->bounded) return fabs(angle_rad) <= FAR_RAD;
     return angle_rad >= l->min_rad && angle_rad <= l->max_rad;
@@ -181,10 +181,10 @@ enum motion_result motion_position(struct motion *m, double angle_rad, double ra
 {
     const double cap = rate_radps != 0.0 ? fabs(rate_radps) : m->limits.rate_radps;
     if (!(cap <= m->limits.rate_radps)) return MOTION_RATE_LIMIT;
-    if (!within(&m->limits, angle_rad)) return MOTION_ANGLE_LIMIT;
+    if (!within_limits(&m->limits, angle_rad)) return MOTION_ANGLE_LIMIT;
     struct draft d = draft_from(m, MOTION_POSITION, t_ns);
     move_to(&d, angle_rad, cap);
-    accept(m, &d);
+    accept_draft(m, &d);
     return MOTION_OK;
 }
 
@@ -194,7 +194,7 @@ enum motion_result motion_rate(struct motion *m, double rate_radps, int64_t t_ns
     struct draft d = draft_from(m, MOTION_RATE, t_ns);
     if (!m->limits.bounded || rate_radps == 0.0) ramp_to(&d, rate_radps);
     go_on(&d, &m->limits, rate_radps);
-    accept(m, &d);
+    accept_draft(m, &d);
     return MOTION_OK;
 }
 
@@ -205,8 +205,8 @@ static bool stays_within(const struct motion_limits *l, const struct draft *d)
         const struct motion_state *from = &d->plan.piece[i].from;
         const double end_s = (i + 1 < d->plan.count ? d->plan.piece[i + 1].t_s : d->t_s) - d->plan.piece[i].t_s;
         const double turn_s = from->accel_radps2 != 0.0 ? -from->rate_radps / from->accel_radps2 : 0.0;
-        if (!within(l, coast(from, end_s).angle_rad)) return false;
-        if (turn_s > 0.0 && turn_s < end_s && !within(l, coast(from, turn_s).angle_rad)) return false;
+        if (!within_limits(l, coast_from(from, end_s).angle_rad)) return false;
+        if (turn_s > 0.0 && turn_s < end_s && !within_limits(l, coast_from(from, turn_s).angle_rad)) return false;
     }
     return true;
 }
@@ -233,9 +233,9 @@ enum motion_result motion_profile(struct motion *m, const double *times_s, const
         run_for(&d, 0.0, times_s[i] - d.t_s);
         ramp_to(&d, rates_radps[i]);
     }
-    if (!stays_within(&m->limits, &d) || !within(&m->limits, stopping_rad(&d))) return MOTION_ANGLE_LIMIT;
+    if (!stays_within(&m->limits, &d) || !within_limits(&m->limits, stopping_rad(&d))) return MOTION_ANGLE_LIMIT;
     go_on(&d, &m->limits, rates_radps[n - 1]);
-    accept(m, &d);
+    accept_draft(m, &d);
     return MOTION_OK;
 }
 
@@ -247,14 +247,15 @@ enum motion_result motion_sine(struct motion *m, double amplitude_rad, double fr
     if (amplitude_rad * w * w > m->limits.accel_radps2) return MOTION_ACCEL_LIMIT;
     struct draft d = draft_from(m, MOTION_SINE, t_ns);
     const double centre_rad = stopping_rad(&d);
-    if (!within(&m->limits, centre_rad - amplitude_rad) || !within(&m->limits, centre_rad + amplitude_rad)) {
+    if (!within_limits(&m->limits, centre_rad - amplitude_rad) ||
+        !within_limits(&m->limits, centre_rad + amplitude_rad)) {
         return MOTION_ANGLE_LIMIT;
     }
     move_to(&d, centre_rad - amplitude_rad, m->limits.rate_radps);
     d.plan.ends = false;
     d.plan.sine_rad = amplitude_rad;
     d.plan.sine_hz = frequency_hz;
-    accept(m, &d);
+    accept_draft(m, &d);
     return MOTION_OK;
 }
 
@@ -264,7 +265,7 @@ void motion_stop(struct motion *m, int64_t t_ns)
     const double angle_rad = stopping_rad(&d);
     ramp_to(&d, 0.0);
     rest_at(&d, angle_rad);
-    accept(m, &d);
+    accept_draft(m, &d);
 }
 
 /* ---- names */

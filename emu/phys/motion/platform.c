@@ -62,7 +62,7 @@ static struct tilt tilt_of(const struct trig *t, const double z_c[3])
 }
 
 /* Equations (3) of the article solved for the rates of alpha and beta, with the whole rate of l (sources instruments 1.4). */
-static void solve(const struct ground *on, const struct trig *t, const double w_radps[2], double rate_radps[2])
+static void solve_rates(const struct ground *on, const struct trig *t, const double w_radps[2], double rate_radps[2])
 {
     const struct tilt g = tilt_of(t, on->z_c);
     const double *w_l = on->w_l_radps;
@@ -132,7 +132,7 @@ static void gyro_rates(const struct platform *p, const struct platform_node *n, 
     }
 }
 
-static void afresh(struct platform_node *n)
+static void invalidate_node(struct platform_node *n)
 {
     n->sin_a = det_sin(n->alpha_rad);
     n->cos_a = det_cos(n->alpha_rad);
@@ -150,7 +150,7 @@ static void drift_on(const struct platform *p, struct platform_node *n)
 }
 
 /* Runge and Kutta's fourth-order step. */
-static void advance(struct platform *p)
+static void advance_step(struct platform *p)
 {
     const int64_t t_ns = p->newest * p->cfg.step_ns;
     struct platform_node *from = node_at(p, p->newest);
@@ -162,18 +162,18 @@ static void advance(struct platform *p)
     const struct trig now = {from->sin_a, from->cos_a, from->sin_b, from->cos_b};
     double w[2], k1[2], k2[2], k3[2], k4[2];
     gyro_rates(p, from, w);
-    solve(&start, &now, w, k1);
+    solve_rates(&start, &now, w, k1);
     struct trig t = trig_at(from, 0.5 * h * k1[0], 0.5 * h * k1[1]);
-    solve(&middle, &t, w, k2);
+    solve_rates(&middle, &t, w, k2);
     t = trig_at(from, 0.5 * h * k2[0], 0.5 * h * k2[1]);
-    solve(&middle, &t, w, k3);
+    solve_rates(&middle, &t, w, k3);
     t = trig_at(from, h * k3[0], h * k3[1]);
-    solve(&end, &t, w, k4);
+    solve_rates(&end, &t, w, k4);
     const double da_rad = h / 6.0 * (k1[0] + 2.0 * (k2[0] + k3[0]) + k4[0]);
     const double db_rad = h / 6.0 * (k1[1] + 2.0 * (k2[1] + k3[1]) + k4[1]);
     memcpy(from->rate_radps, k1, sizeof k1);
     t = trig_at(from, da_rad, db_rad);
-    solve(&end, &t, w, from->rate_end_radps);
+    solve_rates(&end, &t, w, from->rate_end_radps);
     *to = *from;
     to->alpha_rad += da_rad;
     to->beta_rad += db_rad;
@@ -184,16 +184,16 @@ static void advance(struct platform *p)
     p->newest++;
     if (fabs(to->beta_rad) > STOP_RAD) {
         to->beta_rad = to->beta_rad > 0.0 ? STOP_RAD : -STOP_RAD;
-        afresh(to);
+        invalidate_node(to);
     } else if (p->newest % AFRESH_EVERY == 0) {
-        afresh(to);
+        invalidate_node(to);
     }
     drift_on(p, to);
 }
 
 static void advance_to(struct platform *p, int64_t k)
 {
-    while (p->newest < k) advance(p);
+    while (p->newest < k) advance_step(p);
 }
 
 /* The node from which on something is to be changed at t_ns; what was computed behind it is done again when it is asked for. */
@@ -252,7 +252,7 @@ void platform_init(struct platform *p, const struct platform_cfg *cfg, const str
     n->alpha_rad = cfg->alpha0_deg * RAD_PER_DEG;
     n->beta_rad = cfg->beta0_deg * RAD_PER_DEG;
     n->torquer_gain[PLATFORM_LEVEL] = n->torquer_gain[PLATFORM_AZIMUTH] = 1.0;
-    afresh(n);
+    invalidate_node(n);
     start_drift(p, n, seed);
 }
 
@@ -338,7 +338,7 @@ static struct look look_at(struct platform *p, int64_t t_ns)
 }
 
 /* Columns x_p = x1 cos g - z2 sin g, y_p, z_p = z2 cos g + x1 sin g. */
-static void axes(const struct trig *t, const struct tilt *g, double C_lp[3][3])
+static void platform_axes(const struct trig *t, const struct tilt *g, double C_lp[3][3])
 {
     const double x1[3] = {t->cos_a, t->sin_a, 0.0};
     const double z2[3] = {t->sin_b * t->sin_a, -t->sin_b * t->cos_a, t->cos_b};
@@ -355,10 +355,10 @@ static void axes_at(const struct look *l, const struct vehicle_state *v, double 
 {
     const double z_c[3] = {v->C_lc[0][2], v->C_lc[1][2], v->C_lc[2][2]};
     const struct tilt g = tilt_of(&l->trig, z_c);
-    axes(&l->trig, &g, C_lp);
+    platform_axes(&l->trig, &g, C_lp);
 }
 
-static double dot(const double a[3], const double b[3])
+static double dot_product(const double a[3], const double b[3])
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
@@ -375,8 +375,9 @@ static double gamma_radps(const struct vehicle_state *v, const struct trig *t, c
     const double y1[3] = {-t->sin_a, t->cos_a, 0.0};
     const double y2[3] = {-t->cos_b * t->sin_a, t->cos_b * t->cos_a, t->sin_b};
     const double z2[3] = {t->sin_b * t->sin_a, -t->sin_b * t->cos_a, t->cos_b};
-    const double across = rate_radps[0] * dot(y1, z_c) + dot(x1, moves);
-    const double along = rate_radps[0] * t->sin_b * dot(x1, z_c) - rate_radps[1] * dot(y2, z_c) + dot(z2, moves);
+    const double across = rate_radps[0] * dot_product(y1, z_c) + dot_product(x1, moves);
+    const double along =
+        rate_radps[0] * t->sin_b * dot_product(x1, z_c) - rate_radps[1] * dot_product(y2, z_c) + dot_product(z2, moves);
     return (across * g->cos_g - along * g->sin_g) * g->inverse;
 }
 
@@ -403,7 +404,7 @@ void platform_at(struct platform *p, int64_t t_ns, struct platform_state *out)
     double w_radps[2];
     double rate_radps[2];
     gyro_rates(p, l.node, w_radps);
-    solve(&on, &l.trig, w_radps, rate_radps);
+    solve_rates(&on, &l.trig, w_radps, rate_radps);
     const double gamma = gamma_radps(&p->ground, &l.trig, &g, rate_radps);
     *out = (struct platform_state){
         .alpha_rad = l.alpha_rad,
@@ -413,7 +414,7 @@ void platform_at(struct platform *p, int64_t t_ns, struct platform_state *out)
         .beta_radps = rate_radps[1],
         .gamma_radps = gamma,
     };
-    axes(&l.trig, &g, out->C_lp);
+    platform_axes(&l.trig, &g, out->C_lp);
     out->q_rad = gimbal_rad(&p->ground, (const double(*)[3])out->C_lp);
     into_p((const double(*)[3])out->C_lp, on.w_l_radps, out->w_ip_p_radps);
     out->w_ip_p_radps[0] += rate_radps[1] * g.cos_g - rate_radps[0] * l.trig.cos_b * g.sin_g;

@@ -70,7 +70,7 @@ static double axis_rad(const struct table *t, unsigned axis, double shown_deg)
     return angle_rad;
 }
 
-static enum motion_result moved(struct table *t, enum motion_result r)
+static enum motion_result drop_cache(struct table *t, enum motion_result r)
 {
     t->cached_to_ns = -1;
     return r;
@@ -79,13 +79,13 @@ static enum motion_result moved(struct table *t, enum motion_result r)
 enum motion_result table_position(struct table *t, unsigned axis, double angle_deg, double rate_dps, int64_t t_ns)
 {
     if (axis >= t->cfg.axes) return MOTION_NO_AXIS;
-    return moved(t, motion_position(&t->axis[axis], axis_rad(t, axis, angle_deg), rate_dps * RAD_PER_DEG, t_ns));
+    return drop_cache(t, motion_position(&t->axis[axis], axis_rad(t, axis, angle_deg), rate_dps * RAD_PER_DEG, t_ns));
 }
 
 enum motion_result table_rate(struct table *t, unsigned axis, double rate_dps, int64_t t_ns)
 {
     if (axis >= t->cfg.axes) return MOTION_NO_AXIS;
-    return moved(t, motion_rate(&t->axis[axis], rate_dps * RAD_PER_DEG, t_ns));
+    return drop_cache(t, motion_rate(&t->axis[axis], rate_dps * RAD_PER_DEG, t_ns));
 }
 
 enum motion_result table_profile(struct table *t, unsigned axis, const double *times_s, const double *rates_dps,
@@ -95,20 +95,20 @@ enum motion_result table_profile(struct table *t, unsigned axis, const double *t
     if (axis >= t->cfg.axes) return MOTION_NO_AXIS;
     if (n > MOTION_PROFILE_MAX) return MOTION_BAD_PROFILE;
     for (unsigned i = 0; i < n; i++) rates_radps[i] = rates_dps[i] * RAD_PER_DEG;
-    return moved(t, motion_profile(&t->axis[axis], times_s, rates_radps, n, t_ns));
+    return drop_cache(t, motion_profile(&t->axis[axis], times_s, rates_radps, n, t_ns));
 }
 
 enum motion_result table_sine(struct table *t, unsigned axis, double amplitude_deg, double frequency_hz, int64_t t_ns)
 {
     if (axis >= t->cfg.axes) return MOTION_NO_AXIS;
-    return moved(t, motion_sine(&t->axis[axis], amplitude_deg * RAD_PER_DEG, frequency_hz, t_ns));
+    return drop_cache(t, motion_sine(&t->axis[axis], amplitude_deg * RAD_PER_DEG, frequency_hz, t_ns));
 }
 
 enum motion_result table_stop(struct table *t, unsigned axis, int64_t t_ns)
 {
     if (axis >= t->cfg.axes) return MOTION_NO_AXIS;
     motion_stop(&t->axis[axis], t_ns);
-    return moved(t, MOTION_OK);
+    return drop_cache(t, MOTION_OK);
 }
 
 enum motion_result table_zero(struct table *t, unsigned axis, double angle_deg, int64_t t_ns)
@@ -171,7 +171,7 @@ struct motion_state table_axis(const struct table *t, unsigned axis, int64_t t_n
 
 /* The cone: turns about the two axes across by w cos(n angle + phase) and w sin(n angle + phase). det_sin() takes up to 1e6
  * rad: whole turns are taken off a table that has been turning for long. */
-static void wobble(struct pose *p, const struct table_axis_cfg *c, const struct motion_state *s)
+static void apply_wobble(struct pose *p, const struct table_axis_cfg *c, const struct motion_state *s)
 {
     const double w_rad = c->wobble_arcsec * RAD_PER_ARCSEC;
     if (w_rad == 0.0) return;
@@ -189,7 +189,7 @@ static void wobble(struct pose *p, const struct table_axis_cfg *c, const struct 
 }
 
 /* The axis across both this one and the one outside: a turn about it changes the angle between them. */
-static enum pose_axis across(enum pose_axis a, enum pose_axis b)
+static enum pose_axis axis_across(enum pose_axis a, enum pose_axis b)
 {
     return a == b ? (enum pose_axis)((a + 1u) % 3u) : (enum pose_axis)(3u - a - b);
 }
@@ -203,10 +203,10 @@ static void set_pose(const struct table *t, int64_t t_ns, struct pose *p)
         const struct table_axis_cfg *c = &t->cfg.axis[i];
         const struct motion_state s = motion_at(&t->axis[i], t_ns);
         if (i > 0) {
-            pose_turn(p, across(c->along, t->cfg.axis[i - 1].along), c->nonorthogonality_arcsec * RAD_PER_ARCSEC, 0.0,
-                      0.0);
+            pose_turn(p, axis_across(c->along, t->cfg.axis[i - 1].along), c->nonorthogonality_arcsec * RAD_PER_ARCSEC,
+                      0.0, 0.0);
         }
-        wobble(p, c, &s);
+        apply_wobble(p, c, &s);
         pose_turn(p, c->along, s.angle_rad, s.rate_radps, s.accel_radps2);
     }
 }

@@ -40,7 +40,7 @@ static struct value ramp_at(const struct vehicle_ramp *r, int64_t t_ns)
     return (struct value){r->from + r->rate * s, r->rate};
 }
 
-static struct vehicle_ramp ramp(double from, double to, double rate, int64_t t_ns)
+static struct vehicle_ramp make_ramp(double from, double to, double rate, int64_t t_ns)
 {
     return (struct vehicle_ramp){t_ns, from, to, to < from ? -rate : rate};
 }
@@ -53,19 +53,19 @@ static struct value sine_at(const struct vehicle_sine *s, int64_t t_ns)
     return (struct value){s->amplitude * det_sin(phase_rad), s->amplitude * s->rate_radps * det_cos(phase_rad)};
 }
 
-static struct vehicle_sine sine(double amplitude, double period_s, int64_t t_ns)
+static struct vehicle_sine make_sine(double amplitude, double period_s, int64_t t_ns)
 {
     const bool swings = amplitude != 0.0 && period_s > 0.0;
     return swings ? (struct vehicle_sine){t_ns, amplitude, TURN_RAD / period_s} : (struct vehicle_sine){t_ns, 0.0, 0.0};
 }
 
 /* Each sine begins at its zero. */
-static void swing(struct vehicle_plan *p, const struct vehicle_sway *sway, int64_t t_ns)
+static void start_sway(struct vehicle_plan *p, const struct vehicle_sway *sway, int64_t t_ns)
 {
-    p->pitch_sway = sine(sway->pitch_arcmin * RAD_PER_ARCMIN, sway->pitch_s, t_ns);
-    p->roll_sway = sine(sway->roll_arcmin * RAD_PER_ARCMIN, sway->roll_s, t_ns);
-    p->push[0] = sine(sway->east_mg * VEHICLE_MG_MPS2, sway->east_s, t_ns);
-    p->push[1] = sine(sway->north_mg * VEHICLE_MG_MPS2, sway->north_s, t_ns);
+    p->pitch_sway = make_sine(sway->pitch_arcmin * RAD_PER_ARCMIN, sway->pitch_s, t_ns);
+    p->roll_sway = make_sine(sway->roll_arcmin * RAD_PER_ARCMIN, sway->roll_s, t_ns);
+    p->push[0] = make_sine(sway->east_mg * VEHICLE_MG_MPS2, sway->east_s, t_ns);
+    p->push[1] = make_sine(sway->north_mg * VEHICLE_MG_MPS2, sway->north_s, t_ns);
 }
 
 /* ---- latitude */
@@ -79,7 +79,7 @@ static double northwards_m(double v, double a, double h, double w, double d_s)
     return ((v + a * d_s) * det_sin(end) - v * det_sin(h) + a / w * (det_cos(end) - ahead)) / w;
 }
 
-static int64_t earlier(int64_t a_ns, int64_t b_ns)
+static int64_t earlier_ns(int64_t a_ns, int64_t b_ns)
 {
     return a_ns < b_ns ? a_ns : b_ns;
 }
@@ -95,11 +95,11 @@ static double latitude_rad(const struct vehicle_plan *p, int64_t t_ns)
     if (p->speed_mps.from == 0.0 && p->speed_mps.to == 0.0) return p->latitude_rad;
     const int64_t speed_ns = ramp_end_ns(&p->speed_mps);
     const int64_t turn_ns = ramp_end_ns(&p->heading_rad);
-    const int64_t ends[] = {earlier(speed_ns, turn_ns), speed_ns < turn_ns ? turn_ns : speed_ns, t_ns};
+    const int64_t ends[] = {earlier_ns(speed_ns, turn_ns), speed_ns < turn_ns ? turn_ns : speed_ns, t_ns};
     int64_t from_ns = p->from_ns;
     double north_m = 0.0;
     for (unsigned i = 0; i < 3; i++) {
-        const int64_t to_ns = earlier(ends[i], t_ns);
+        const int64_t to_ns = earlier_ns(ends[i], t_ns);
         if (to_ns <= from_ns) continue;
         const struct value v = ramp_at(&p->speed_mps, from_ns);
         const struct value h = ramp_at(&p->heading_rad, from_ns);
@@ -139,12 +139,12 @@ static void turn_to(const struct vehicle *v, struct vehicle_plan *p, double head
 {
     const double from_rad = ramp_at(&p->heading_rad, t_ns).at;
     const double way_rad = wrap_rad(heading_deg * RAD_PER_DEG - from_rad);
-    p->heading_rad = ramp(wrap_rad(from_rad), wrap_rad(from_rad) + way_rad, v->cfg.turn_dps * RAD_PER_DEG, t_ns);
+    p->heading_rad = make_ramp(wrap_rad(from_rad), wrap_rad(from_rad) + way_rad, v->cfg.turn_dps * RAD_PER_DEG, t_ns);
 }
 
 static void tilt_to(const struct vehicle *v, struct vehicle_ramp *angle, double from_rad, double to_rad, int64_t t_ns)
 {
-    *angle = ramp(from_rad, to_rad, v->cfg.tilt_dps * RAD_PER_DEG, t_ns);
+    *angle = make_ramp(from_rad, to_rad, v->cfg.tilt_dps * RAD_PER_DEG, t_ns);
 }
 
 struct vehicle_cfg vehicle_default(void)
@@ -167,7 +167,7 @@ void vehicle_init(struct vehicle *v, const struct vehicle_cfg *cfg, const struct
         .speed_mps = at_rest(0.0),
         .latitude_rad = site->latitude_rad,
     };
-    swing(&v->plan[0], &cfg->sway, 0);
+    start_sway(&v->plan[0], &cfg->sway, 0);
 }
 
 void vehicle_attitude(struct vehicle *v, double heading_deg, double pitch_deg, double roll_deg, int64_t t_ns)
@@ -186,19 +186,19 @@ void vehicle_sway(struct vehicle *v, const struct vehicle_sway *sway, int64_t t_
     const double roll_rad = ramp_at(&p->roll_rad, t_ns).at + sine_at(&p->roll_sway, t_ns).at;
     tilt_to(v, &p->pitch_rad, pitch_rad, p->pitch_rad.to, t_ns);
     tilt_to(v, &p->roll_rad, roll_rad, p->roll_rad.to, t_ns);
-    swing(p, sway, t_ns);
+    start_sway(p, sway, t_ns);
 }
 
 void vehicle_fly(struct vehicle *v, double speed_mps, double track_deg, int64_t t_ns)
 {
     struct vehicle_plan *p = next_plan(v, t_ns);
     turn_to(v, p, track_deg, t_ns);
-    p->speed_mps = ramp(ramp_at(&p->speed_mps, t_ns).at, speed_mps, v->cfg.accel_mps2, t_ns);
+    p->speed_mps = make_ramp(ramp_at(&p->speed_mps, t_ns).at, speed_mps, v->cfg.accel_mps2, t_ns);
 }
 
 /* ---- state */
 
-static void cross(const double a[3], const double b[3], double out[3])
+static void cross_product(const double a[3], const double b[3], double out[3])
 {
     for (unsigned k = 0; k < 3; k++) {
         const unsigned i = (k + 1) % 3;
@@ -241,7 +241,7 @@ static void set_flight(struct vehicle_state *s, const struct site *site, double 
         s->w_il_l_radps[k] = w_ie[k] + w_el[k];
         twice[k] = 2.0 * w_ie[k] + w_el[k];
     }
-    cross(twice, v_l, s->accel_l_mps2);
+    cross_product(twice, v_l, s->accel_l_mps2);
     s->accel_l_mps2[0] += accel_mps2 * sh + s->speed_mps * turn_radps * ch;
     s->accel_l_mps2[1] += accel_mps2 * ch - s->speed_mps * turn_radps * sh;
 }
@@ -276,7 +276,7 @@ void vehicle_at(const struct vehicle *v, int64_t t_ns, struct vehicle_state *out
     add_push(p, t_ns, out->accel_l_mps2);
 }
 
-static bool sways(const struct vehicle_plan *p)
+static bool has_sway(const struct vehicle_plan *p)
 {
     return p->pitch_sway.amplitude != 0.0 || p->roll_sway.amplitude != 0.0 || p->push[0].amplitude != 0.0 ||
            p->push[1].amplitude != 0.0;
@@ -290,6 +290,6 @@ static bool ramp_over(const struct vehicle_ramp *r, int64_t t_ns)
 bool vehicle_steady(const struct vehicle *v, int64_t t_ns)
 {
     const struct vehicle_plan *p = &v->plan[v->commands % VEHICLE_HISTORY];
-    return t_ns >= p->from_ns && !sways(p) && p->speed_mps.to == 0.0 && ramp_over(&p->speed_mps, t_ns) &&
+    return t_ns >= p->from_ns && !has_sway(p) && p->speed_mps.to == 0.0 && ramp_over(&p->speed_mps, t_ns) &&
            ramp_over(&p->heading_rad, t_ns) && ramp_over(&p->pitch_rad, t_ns) && ramp_over(&p->roll_rad, t_ns);
 }

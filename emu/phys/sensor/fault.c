@@ -24,32 +24,32 @@ void sensor_fault_remove(struct sensor_fault **list, struct sensor_fault *f)
     if (*list) *list = f->next;
 }
 
-static double stuck(struct sensor_fault *f, double out, int64_t t_ns)
+static double apply_stuck(struct sensor_fault *f, double out, int64_t t_ns)
 {
     (void)out;
     (void)t_ns;
     return f->value;
 }
 
-static double bias(struct sensor_fault *f, double out, int64_t t_ns)
+static double apply_bias(struct sensor_fault *f, double out, int64_t t_ns)
 {
     (void)t_ns;
     return out + f->value;
 }
 
-static double drift(struct sensor_fault *f, double out, int64_t t_ns)
+static double apply_drift(struct sensor_fault *f, double out, int64_t t_ns)
 {
     return out + f->value * ((double)(t_ns - f->from_ns) / (double)NS_PER_S);
 }
 
-static double scale(struct sensor_fault *f, double out, int64_t t_ns)
+static double apply_scale(struct sensor_fault *f, double out, int64_t t_ns)
 {
     (void)t_ns;
     return out + f->value * (out - f->zero);
 }
 
 /* White noise of one-sided density d, averaged over dt, has the variance d^2 / (2 dt), as in phys/sensor/mems.c. */
-static double noise(struct sensor_fault *f, double out, int64_t t_ns)
+static double apply_noise(struct sensor_fault *f, double out, int64_t t_ns)
 {
     const int64_t dt_ns = f->held_ns < 0 ? FIRST_PULL_NS : t_ns - f->held_ns;
     if (dt_ns > 0) {
@@ -59,7 +59,7 @@ static double noise(struct sensor_fault *f, double out, int64_t t_ns)
     return out + f->held;
 }
 
-static double saturation(struct sensor_fault *f, double out, int64_t t_ns)
+static double apply_saturation(struct sensor_fault *f, double out, int64_t t_ns)
 {
     (void)t_ns;
     return out < f->value ? f->value : out > f->value_high ? f->value_high : out;
@@ -68,8 +68,8 @@ static double saturation(struct sensor_fault *f, double out, int64_t t_ns)
 double sensor_fault_out(struct sensor_fault *list, double out, int64_t t_ns)
 {
     static double (*const effect[SENSOR_FAULTS])(struct sensor_fault *, double, int64_t) = {
-        [SENSOR_STUCK] = stuck, [SENSOR_BIAS] = bias,   [SENSOR_DRIFT] = drift,
-        [SENSOR_SCALE] = scale, [SENSOR_NOISE] = noise, [SENSOR_SATURATION] = saturation,
+        [SENSOR_STUCK] = apply_stuck, [SENSOR_BIAS] = apply_bias,   [SENSOR_DRIFT] = apply_drift,
+        [SENSOR_SCALE] = apply_scale, [SENSOR_NOISE] = apply_noise, [SENSOR_SATURATION] = apply_saturation,
     };
     for (struct sensor_fault *f = list; f; f = f->next) {
         if (t_ns >= f->from_ns) out = effect[f->kind](f, out, t_ns);

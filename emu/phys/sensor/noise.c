@@ -28,7 +28,7 @@ void noise_init(struct noise *n, const struct noise_cfg *cfg, struct rng rng)
     }
 }
 
-static void step(struct noise *n)
+static void step_noise(struct noise *n)
 {
     if (n->cfg.bias_instability_u > 0.0) {
         for (unsigned i = 0; i < NOISE_MARKOVS; i++) {
@@ -43,7 +43,7 @@ double noise_slow_u(struct noise *n, int64_t t_ns)
 {
     double sum_u = n->cfg.ramp_u_per_s * ((double)t_ns / (double)NS_PER_S);
     if (!n->moves) return sum_u;
-    while (n->step < t_ns / NOISE_STEP_NS) step(n);
+    while (n->step < t_ns / NOISE_STEP_NS) step_noise(n);
     for (unsigned i = 0; i < NOISE_MARKOVS; i++) sum_u += n->markov_u[i];
     return sum_u + n->walk_u;
 }

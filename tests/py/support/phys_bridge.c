@@ -98,17 +98,17 @@ EXPORT void bridge_head(struct lab *l, double deg, int face, int64_t t_ns)
     head_mount(&l->head, (enum head_face)face, t_ns);
 }
 
-static struct lab_seat seat_of(const double seat[7])
+static struct lab_mounting seat_of(const double seat[7])
 {
-    return (struct lab_seat){(enum lab_mount)seat[0], {seat[1], seat[2], seat[3]}, {seat[4], seat[5], seat[6]}};
+    return (struct lab_mounting){(enum lab_mount)seat[0], {seat[1], seat[2], seat[3]}, {seat[4], seat[5], seat[6]}};
 }
 
 /* seat: mount, lever arm m, misalignment rad. out: f, w */
 EXPORT void bridge_feel(struct lab *l, const double seat[7], const double at_m[3], int64_t t_ns, double out[6])
 {
-    const struct lab_seat s = seat_of(seat);
+    const struct lab_mounting s = seat_of(seat);
     struct felt felt;
-    lab_feel(l, &s, at_m, t_ns, &felt);
+    lab_kinematics(l, &s, at_m, t_ns, &felt);
     for (unsigned k = 0; k < 3; k++) {
         out[k] = felt.f_mps2[k];
         out[3 + k] = felt.w_radps[k];
@@ -119,7 +119,7 @@ EXPORT void bridge_feel(struct lab *l, const double seat[7], const double at_m[3
 EXPORT double bridge_accelerometer(struct lab *l, const double seat[7], const double at_m[3], double u0_v,
                                    const double k[3], int64_t t_ns)
 {
-    const struct lab_seat s = seat_of(seat);
+    const struct lab_mounting s = seat_of(seat);
     const struct mems_cfg c = {.u0_v = u0_v, .k_v_per_mps2 = {k[0], k[1], k[2]}};
     double a_mps2[3];
     lab_sensor_mps2(l, &s, at_m, 1.0, 0.0, t_ns, a_mps2);

@@ -53,7 +53,7 @@ static void on_the_head_without_lever_arm_it_is_the_heads_own_arithmetic(void **
             double got[3];
             head_gravity_mps2(&h, t_ns, mount);
             head_sensor_mps2((enum head_face)face, c0, s0, mount, want);
-            lab_sensor_mps2(&l, &(struct lab_seat){0}, origin, c0, s0, t_ns, got);
+            lab_sensor_mps2(&l, &(struct lab_mounting){0}, origin, c0, s0, t_ns, got);
             assert_memory_equal(got, want, sizeof got);
         }
     }
@@ -65,20 +65,20 @@ static void a_vanishing_lever_arm_changes_nothing(void **state)
     (void)state;
     for (unsigned face = 0; face < HEAD_FACES; face++) {
         struct lab l = up();
-        const struct lab_seat square = {LAB_HEAD, {0}, {0}};
-        const struct lab_seat nearly = {LAB_HEAD, {1e-300, 0, 0}, {0}};
+        const struct lab_mounting square = {LAB_HEAD, {0}, {0}};
+        const struct lab_mounting nearly = {LAB_HEAD, {1e-300, 0, 0}, {0}};
         head_mount(&l.head, (enum head_face)face, 0);
         head_turn(&l.head, -77.0, 0);
         for (int64_t t_ns = 0; t_ns < 3 * NS_PER_S; t_ns += NS_PER_S / 7) {
             double a[3];
             double b[3];
-            struct felt felt;
+            struct kinematics kin;
             lab_sensor_mps2(&l, &square, origin, det_cos(0.01), det_sin(0.01), t_ns, a);
             lab_sensor_mps2(&l, &nearly, origin, det_cos(0.01), det_sin(0.01), t_ns, b);
             near3(a, b, 1e-13);
             lab_sensor_mps2(&l, &square, origin, 1.0, 0.0, t_ns, a);
-            lab_feel(&l, &square, origin, t_ns, &felt);
-            for (unsigned k = 0; k < 3; k++) near(felt.f_mps2[k], -a[k], 1e-13);
+            lab_kinematics(&l, &square, origin, t_ns, &kin);
+            for (unsigned k = 0; k < 3; k++) near(kin.f_mps2[k], -a[k], 1e-13);
         }
     }
 }
@@ -89,18 +89,18 @@ static void misalignment_turns_what_the_case_feels(void **state)
     const double small = 1e-3;
     for (unsigned on = LAB_HEAD; on <= LAB_FIXED; on++) {
         struct lab l = up();
-        struct felt square;
-        struct felt askew;
+        struct kinematics square;
+        struct kinematics askew;
         double a[3];
-        struct lab_seat seat = {.on = (enum lab_mount)on};
-        lab_feel(&l, &seat, origin, 0, &square);
-        seat.misalignment_rad[2] = small; /* about z */
-        lab_feel(&l, &seat, origin, 0, &askew);
+        struct lab_mounting mounting = {.on = (enum lab_mount)on};
+        lab_kinematics(&l, &mounting, origin, 0, &square);
+        mounting.misalignment_rad[2] = small; /* about z */
+        lab_kinematics(&l, &mounting, origin, 0, &askew);
         const double f[3] = {square.f_mps2[0] * cos(small) + square.f_mps2[1] * sin(small),
                              square.f_mps2[1] * cos(small) - square.f_mps2[0] * sin(small), square.f_mps2[2]};
         near3(askew.f_mps2, f, 1e-14);
         near(askew.w_radps[2], square.w_radps[2], 0.0);
-        lab_sensor_mps2(&l, &seat, origin, 1.0, 0.0, 0, a);
+        lab_sensor_mps2(&l, &mounting, origin, 1.0, 0.0, 0, a);
         for (unsigned k = 0; k < 3; k++) near(a[k], -f[k], 1e-14);
     }
 }
@@ -112,30 +112,30 @@ static void mounts_feel_gravity_down_their_own_axes(void **state)
     const double g = l.site.g_mps2;
     const double down_z[3] = {0.0, 0.0, -g};
     const double down_y[3] = {0.0, g, 0.0}; /* of the head at 0 deg: y points up */
-    struct felt felt;
-    lab_feel(&l, &(struct lab_seat){.on = LAB_FIXED}, origin, 0, &felt);
-    near3(felt.f_mps2, down_z, 1e-12);
+    struct kinematics kin;
+    lab_kinematics(&l, &(struct lab_mounting){.on = LAB_FIXED}, origin, 0, &kin);
+    near3(kin.f_mps2, down_z, 1e-12);
     l.table.cfg.axis[0].wobble_arcsec = l.table.cfg.axis[1].wobble_arcsec = l.table.cfg.axis[2].wobble_arcsec = 0.0;
-    lab_feel(&l, &(struct lab_seat){.on = LAB_TABLE}, origin, 0, &felt);
-    near3(felt.f_mps2, down_z, 1e-12);
-    lab_feel(&l, &(struct lab_seat){.on = LAB_HEAD}, origin, 0, &felt);
-    near3(felt.f_mps2, down_y, 1e-12);
-    lab_feel(&l, &(struct lab_seat){.on = LAB_FIXED}, (const double[3]){10.0, 0.0, 0.0}, 0, &felt);
-    near(felt.f_mps2[0], -10.0 * EARTH_RATE_RADPS * EARTH_RATE_RADPS, 6e-8); /* of the Earth, a part across the axis */
+    lab_kinematics(&l, &(struct lab_mounting){.on = LAB_TABLE}, origin, 0, &kin);
+    near3(kin.f_mps2, down_z, 1e-12);
+    lab_kinematics(&l, &(struct lab_mounting){.on = LAB_HEAD}, origin, 0, &kin);
+    near3(kin.f_mps2, down_y, 1e-12);
+    lab_kinematics(&l, &(struct lab_mounting){.on = LAB_FIXED}, (const double[3]){10.0, 0.0, 0.0}, 0, &kin);
+    near(kin.f_mps2[0], -10.0 * EARTH_RATE_RADPS * EARTH_RATE_RADPS, 6e-8); /* of the Earth, a part across the axis */
 }
 
 static void a_spinning_table_presses_outwards(void **state)
 {
     (void)state;
     struct lab l = up();
-    const struct lab_seat seat = {.on = LAB_TABLE, .lever_m = {0.2, 0.0, 0.0}};
-    struct felt felt;
+    const struct lab_mounting mounting = {.on = LAB_TABLE, .lever_m = {0.2, 0.0, 0.0}};
+    struct kinematics kin;
     assert_int_equal(table_rate(&l.table, 0, 360.0, 0), MOTION_OK);
-    lab_feel(&l, &seat, (const double[3]){0.1, 0.0, 0.0}, NS_PER_S / 2, &felt); /* 200 deg/s, 400 deg/s^2 */
+    lab_kinematics(&l, &mounting, (const double[3]){0.1, 0.0, 0.0}, NS_PER_S / 2, &kin); /* 200 deg/s, 400 deg/s^2 */
     const double w = 200.0 * RAD_PER_DEG;
-    near(felt.f_mps2[0], -0.3 * w * w, 1e-3);
-    near(felt.f_mps2[1], 0.3 * 400.0 * RAD_PER_DEG, 1e-3);
-    near(felt.w_radps[2] / RAD_PER_DEG, 200.0, 0.005);
+    near(kin.f_mps2[0], -0.3 * w * w, 1e-3);
+    near(kin.f_mps2[1], 0.3 * 400.0 * RAD_PER_DEG, 1e-3);
+    near(kin.w_radps[2] / RAD_PER_DEG, 200.0, 0.005);
 }
 
 static void mounts_have_names(void **state)

@@ -222,35 +222,36 @@ static void force_is_gravity_in_the_axes_of_the_platform(void **state)
     c.platform.level_tilt_arcmin[1] = -7.0;
     c.vehicle = parked(40.0, 5.0, -4.0);
     lab_init(&l, &c, 1);
-    const struct lab_seat seat = {.on = LAB_PLATFORM};
+    const struct lab_mounting mounting = {.on = LAB_PLATFORM};
     const double origin[3] = {0.0, 0.0, 0.0};
     const struct platform_state s = look(&l.platform, 0.0);
     const double g = l.site.g_mps2;
     double f[3];
     double a[3];
-    struct felt felt;
+    struct kinematics kin;
     platform_force_mps2(&l.platform, 0, f);
     near(f[0], -g * sin(s.gamma_rad) * cos(s.beta_rad), 1e-14);
     near(f[1], g * sin(s.beta_rad), 1e-14);
     near(f[2], g * cos(s.gamma_rad) * cos(s.beta_rad), 1e-14);
-    lab_feel(&l, &seat, origin, 0, &felt);
-    lab_sensor_mps2(&l, &seat, origin, 1.0, 0.0, 0, a);
-    for (unsigned k = 0; k < 3; k++) near(felt.f_mps2[k], -a[k], 1e-14);
+    lab_kinematics(&l, &mounting, origin, 0, &kin);
+    lab_sensor_mps2(&l, &mounting, origin, 1.0, 0.0, 0, a);
+    for (unsigned k = 0; k < 3; k++) near(kin.f_mps2[k], -a[k], 1e-14);
     const double tb = 10.0 * RAD_PER_ARCMIN, tg = -7.0 * RAD_PER_ARCMIN;
-    near(felt.f_mps2[1], f[1] * cos(tb) + f[2] * sin(tb), 1e-14);
-    near(felt.f_mps2[0], f[0] * cos(tg) - (f[2] * cos(tb) - f[1] * sin(tb)) * sin(tg), 1e-14);
-    near(asin(felt.f_mps2[1] / g), 2.0 * RAD_PER_DEG + tb, 1e-5); /* a level sensor shows so much more beta, */
-    near(asin(-felt.f_mps2[0] / g / cos(s.beta_rad)), s.gamma_rad + tg,
+    near(kin.f_mps2[1], f[1] * cos(tb) + f[2] * sin(tb), 1e-14);
+    near(kin.f_mps2[0], f[0] * cos(tg) - (f[2] * cos(tb) - f[1] * sin(tb)) * sin(tg), 1e-14);
+    near(asin(kin.f_mps2[1] / g), 2.0 * RAD_PER_DEG + tb, 1e-5); /* a level sensor shows so much more beta, */
+    near(asin(-kin.f_mps2[0] / g / cos(s.beta_rad)), s.gamma_rad + tg,
          1e-5); /* and gamma; gamma's own turn is second order */
-    near(felt.w_radps[2], s.w_ip_p_radps[2], 1e-6);
-    const struct lab_seat askew = {.on = LAB_PLATFORM, .misalignment_rad = {1e-3, -2e-3, 3e-3}};
-    lab_feel(&l, &askew, origin, 0, &felt);
+    near(kin.w_radps[2], s.w_ip_p_radps[2], 1e-6);
+    const struct lab_mounting askew = {.on = LAB_PLATFORM, .misalignment_rad = {1e-3, -2e-3, 3e-3}};
+    lab_kinematics(&l, &askew, origin, 0, &kin);
     lab_sensor_mps2(&l, &askew, origin, 1.0, 0.0, 0, a);
-    for (unsigned k = 0; k < 3; k++) near(felt.f_mps2[k], -a[k], 1e-14);
-    lab_sensor_mps2(&l, &seat, origin, cos(3e-3), sin(3e-3), 0,
+    for (unsigned k = 0; k < 3; k++) near(kin.f_mps2[k], -a[k], 1e-14);
+    lab_sensor_mps2(&l, &mounting, origin, cos(3e-3), sin(3e-3), 0,
                     a); /* a sensor's alpha0 is a turn about z of the block */
-    lab_feel(&l, &(struct lab_seat){.on = LAB_PLATFORM, .misalignment_rad = {0.0, 0.0, 3e-3}}, origin, 0, &felt);
-    for (unsigned k = 0; k < 3; k++) near(felt.f_mps2[k], -a[k], 1e-14);
+    lab_kinematics(&l, &(struct lab_mounting){.on = LAB_PLATFORM, .misalignment_rad = {0.0, 0.0, 3e-3}}, origin, 0,
+                   &kin);
+    for (unsigned k = 0; k < 3; k++) near(kin.f_mps2[k], -a[k], 1e-14);
 }
 
 static void a_lever_arm_feels_the_rate(void **state)
@@ -262,14 +263,14 @@ static void a_lever_arm_feels_the_rate(void **state)
     c.vehicle = parked(0.0, 0.0, 0.0);
     lab_init(&l, &c, 1);
     platform_torque(&l.platform, 0.0, 0.3, 0);
-    struct felt felt;
+    struct kinematics kin;
     double a[3];
-    const struct lab_seat seat = {.on = LAB_PLATFORM, .lever_m = {0.1, 0.0, 0.0}};
-    lab_feel(&l, &seat, (const double[3]){0.1, 0.0, 0.0}, ns(1.0), &felt);
-    near(felt.f_mps2[0], -0.2 * 0.3 * 0.3, 1e-12);
-    lab_sensor_mps2(&l, &seat, (const double[3]){0.1, 0.0, 0.0}, 1.0, 0.0, ns(1.0), a);
-    for (unsigned k = 0; k < 3; k++) near(felt.f_mps2[k], -a[k], 1e-14);
-    near(felt.w_radps[2], 0.3, 1e-15);
+    const struct lab_mounting mounting = {.on = LAB_PLATFORM, .lever_m = {0.1, 0.0, 0.0}};
+    lab_kinematics(&l, &mounting, (const double[3]){0.1, 0.0, 0.0}, ns(1.0), &kin);
+    near(kin.f_mps2[0], -0.2 * 0.3 * 0.3, 1e-12);
+    lab_sensor_mps2(&l, &mounting, (const double[3]){0.1, 0.0, 0.0}, 1.0, 0.0, ns(1.0), a);
+    for (unsigned k = 0; k < 3; k++) near(kin.f_mps2[k], -a[k], 1e-14);
+    near(kin.w_radps[2], 0.3, 1e-15);
 }
 
 static void a_flight_is_felt_on_the_platform(void **state)

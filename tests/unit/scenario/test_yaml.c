@@ -140,7 +140,8 @@ static const struct {
     {"units: [{temp_degc: 200}]\n", "dir/s.yaml:1:21: units.a.temp_degc: expected -60 to 125, got 200"},
     {"units:\n  - axes:\n      x:\n        sensor: gyro\n",
      "dir/s.yaml:4:17: units.a.axes.x.sensor: expected none, mems or quartz"},
-    {"units:\n  - axes: {x: {sensor: quartz}}\n", "dir/s.yaml:2:11: units.a.axes: x: expected afe: {input: current} for a quartz sensor"},
+    {"units:\n  - axes: {x: {sensor: quartz}}\n",
+     "dir/s.yaml:2:11: units.a.axes: x: expected afe: {input: current} for a quartz sensor"},
     {"units:\n  - axes:\n      x:\n        u0_v: 2,5\n",
      "dir/s.yaml:4:15: units.a.axes.x.u0_v: expected a number, got 2,5"},
     {"units:\n  - axes:\n      x:\n        u0_v: nan\n",
@@ -331,7 +332,8 @@ static void a_dump_has_every_bit_of_a_number_and_every_unit_of_a_count(void **st
     assert_string_equal(again.units[2].name, "u03");
     assert_int_equal(again.units[2].bus, 1);
     assert_int_equal(again.units[2].cfg.node, 7);
-    for (unsigned k = 0; k < 3; k++) assert_true(again.units[1].cfg.seat.lever_m[k] == s.units[0].cfg.seat.lever_m[k]);
+    for (unsigned k = 0; k < 3; k++)
+        assert_true(again.units[1].cfg.mounting.lever_m[k] == s.units[0].cfg.mounting.lever_m[k]);
     cJSON_free(text);
     cJSON_Delete(j);
 }
