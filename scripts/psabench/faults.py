@@ -11,10 +11,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from psabench.bench import Bench
+from psabench.link.control import HasControl
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +44,7 @@ class Fault:
 class Faults:
     """Raises BenchError on a real bench; ControlError with the reason when the emulator refuses."""
 
-    def __init__(self, bench: Bench) -> None:
+    def __init__(self, bench: HasControl) -> None:
         self._bench = bench
 
     def kinds(self) -> list[dict[str, Any]]:

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from psabench.bench import Bench
+from psabench.link.control import HasControl
 
 
 class Probe:
     """Of an emulated bench; a real one wants a logic analyser. Raises BenchError there, ControlError when refused."""
 
-    def __init__(self, bench: Bench) -> None:
+    def __init__(self, bench: HasControl) -> None:
         self._bench = bench
 
     def lines(self, unit: str | None = None) -> dict[str, int]:

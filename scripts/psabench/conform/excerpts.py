@@ -8,7 +8,7 @@ from pathlib import Path
 
 from psabench.conform.capture.log import CanFrame, Evidence, LineLog
 from psabench.conform.verdict import Broken
-from psabench.report.waveform import Panel, Section, render
+from psabench.report.drawing import Panel, Section, render
 from psabench.report.whole_file import replace_file
 
 BEFORE_NS, AFTER_NS = 30_000, 120_000

@@ -9,7 +9,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from psabench.conform.requirements import requirements
+from psabench.conform.capture.log import Evidence
+from psabench.conform.requirements import Requirement, requirements
 
 Test = TypeVar("Test", bound=Callable[..., Any])
 
@@ -42,3 +43,13 @@ def proves(*ids: str) -> Callable[[Test], Test]:
 def proofs() -> tuple[Proof, ...]:
     """Every test that was registered so far, in the order in which its module was imported."""
     return tuple(_proofs)
+
+
+def row_for(e: Evidence, *ids: str) -> Requirement:
+    """The one of these requirements that holds for the variant. Raises ValueError when none does."""
+    v = e.variant
+    for i in ids:
+        row = requirements().rows[i]
+        if row.applies(v.board, v.profile):
+            return row
+    raise ValueError(f"none of {', '.join(ids)} holds for {v.name}")

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
+from psabench.conform.capture.canbits import frame_bits
 from psabench.conform.capture.log import CanFrame
 from psabench.conform.dut import Subject, Take
 from psabench.conform.requirements import requirements
@@ -26,6 +27,10 @@ FIRST_S, LONGEST_S = 0.0005, 0.05  # steps of the board's time while waiting
 # An emulator takes no more than 128 frames while its time stands still: so many, then so long for them to pass.
 BURST, BURST_S = 50, 0.02
 LEAST = 5  # readings that a judgement wants
+# A flood: frames of the highest priority, so many that nothing else goes out meanwhile.
+FLOOD_ID, FLOOD_DATA = 0x001, bytes(range(0x55, 0x5D))
+BIT_S, SPACE_BITS = 1e-6, 3  # of a bus of 1 Mbit/s; on a slower one they take longer
+AHEAD, STEP_S = 60, 0.004  # frames that wait always; an emulator takes no more than 128 while its time stands still
 
 
 class Talk:
@@ -340,3 +345,21 @@ def words(data: bytes) -> str:
 def ids(frames: Sequence[CanFrame]) -> str:
     """Identifiers of frames, each once, for a failure's words."""
     return ", ".join(dict.fromkeys(f"{f.can_id:03X}h" for f in frames)) or "none"
+
+
+def flood(t: Talk, dwell_s: float) -> None:
+    """Fill the bus for this long, in real time for at least so long; the board's time passes."""
+    frame_s = (frame_bits(FLOOD_ID, FLOOD_DATA) + SPACE_BITS) * BIT_S
+    if not t.s.lockstep:
+        for _ in range(round(dwell_s / frame_s)):
+            t.host.send(FLOOD_ID, FLOOD_DATA)
+        t.s.run_for(dwell_s)
+        return
+    sent, passed_s = 0, 0.0
+    while passed_s < dwell_s:
+        while sent < AHEAD + passed_s / frame_s:
+            t.host.send(FLOOD_ID, FLOOD_DATA)
+            sent += 1
+        t.s.run_for(STEP_S)
+        passed_s += STEP_S
+    t.s.run_for(AHEAD * frame_s)

@@ -1,4 +1,4 @@
-"""What a run of a suite came to: for the terminal, as JSON, as JUnit's XML, as a page (`report_html`)."""
+"""What a run of a suite came to: for the terminal, as JSON, as JUnit's XML, as an HTML page."""
 
 from __future__ import annotations
 
@@ -6,13 +6,14 @@ import json
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from html import escape
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
 
-from psabench.conform import report_html
 from psabench.conform.requirements import Requirement, requirements
 from psabench.conform.verdict import Outcome, Verdict, conforms
+from psabench.report.page import whole_page
 from psabench.report.whole_file import replace_file
 
 FORMAT = 1  # of conform.json
@@ -24,6 +25,14 @@ MARKS = {
     Verdict.NOT_OBSERVABLE: "unseen",
     Verdict.NOT_APPLICABLE: "n/a",
 }
+
+STYLE = """<style>
+.v-passed { color: var(--good); } .v-failed { color: var(--bad); font-weight: 650; }
+.v-inconclusive { color: var(--s2); } .v-other { color: var(--muted); }
+td.id { white-space: nowrap; font-weight: 600; } .orig { color: var(--muted);
+  font-size: .85em; } .sign td { height: 3.2rem; min-width: 14rem; vertical-align: bottom; }
+</style>"""
+CSS = {Verdict.PASSED: "v-passed", Verdict.FAILED: "v-failed", Verdict.INCONCLUSIVE: "v-inconclusive"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -115,7 +124,7 @@ def write(folder: Path, run: Run) -> Path:
     replace_file(folder / "conform.json", text + "\n")
     replace_file(folder / "junit.xml", junit(run))
     page = folder / "report.html"
-    replace_file(page, report_html.page(run, folder))
+    replace_file(page, html_page(run, folder))
     return page
 
 
@@ -160,3 +169,74 @@ _JUNIT = {
     Verdict.NOT_OBSERVABLE: "skipped",
     Verdict.NOT_APPLICABLE: "skipped",
 }
+
+
+# ---- the page: who was tested, every requirement with its verdict, a place to sign
+
+
+def html_page(run: Run, folder: Path) -> str:
+    """One file, nothing loaded from elsewhere; pictures are those of the folder. Same input, same bytes."""
+    body = [
+        STYLE,
+        _verdict(run),
+        *(_failure(o, folder) for o in run.outcomes if o.verdict is Verdict.FAILED),
+        _table(run),
+        _signed(run),
+    ]
+    return whole_page(f"Conformance of {run.subject}", run.facts, body)
+
+
+def _verdict(run: Run) -> str:
+    why = "".join(f"<li>{count} not observable: {escape(reason)}</li>" for reason, count in unseen(run).items())
+    return (
+        f"<p class='verdict {'good' if run.conforms else 'bad'}'>{escape(summary(run))}</p><ul class=small>{why}</ul>"
+    )
+
+
+def _failure(o: Outcome, folder: Path) -> str:
+    rows = requirements().rows
+    due = "".join(f"<p><b>{i}</b> {escape(rows[i].text)}</p>{_original(rows[i].original)}" for i in o.requirements)
+    at = "" if o.at_ns is None else f" at {o.at_ns * 1e-6:.6f} ms"
+    pictures = "".join(
+        f"<figure>{(folder / name).read_text(encoding='utf-8')}</figure>"
+        for name in o.exhibits
+        if name.endswith(".svg")
+    )
+    files = ", ".join(f"<a href='{escape(name)}'>{escape(name)}</a>" for name in o.exhibits)
+    return (
+        f"<section><h2>{escape(o.title)}</h2>{due}<p>Saw <b>{escape(o.saw)}</b>{at}; due {escape(o.due)}.</p>"
+        f"{pictures}{f'<p class=small>{files}</p>' if files else ''}</section>"
+    )
+
+
+def _original(text: str) -> str:
+    return f"<p class=orig>{escape(text)}</p>" if text else ""
+
+
+def _table(run: Run) -> str:
+    by_id: dict[str, list[Outcome]] = {}
+    for o in run.outcomes:
+        for i in o.requirements:
+            by_id.setdefault(i, []).append(o)
+    verdicts = run.verdicts()
+    rows = "".join(
+        f"<tr><td class=id>{r.id}</td><td class={CSS.get(verdicts[r.id], 'v-other')}>{verdicts[r.id].value}</td>"
+        f"<td>{escape(r.text)}{_original(r.original)}</td><td>{escape('; '.join(r.source))}</td><td>{r.grade}</td>"
+        f"<td>{_seen(by_id.get(r.id, []), r.unobservable)}</td></tr>"
+        for r in run.rows
+    )
+    head = "".join(f"<th>{h}</th>" for h in ("", "verdict", "requirement", "source", "grade", "seen"))
+    return (
+        "<section><h2>Requirements</h2><div class=scroll><table>"
+        f"<thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div></section>"
+    )
+
+
+def _seen(outcomes: list[Outcome], unobservable: str) -> str:
+    told = [f"{escape(o.title)} {escape(o.saw or o.reason)}" for o in outcomes]
+    return "<br>".join(told) or escape(unobservable)
+
+
+def _signed(run: Run) -> str:
+    lines = "".join(f"<tr><td>{what}</td><td></td></tr>" for what in ("Carried out by", "Checked by", "Date, place"))
+    return f"<section><h2>Signatures</h2><table class=sign>{lines}</table></section>" if run.suite != "host" else ""

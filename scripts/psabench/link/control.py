@@ -8,7 +8,7 @@ from collections import deque
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import Any, Protocol
 
 from psabench.errors import ControlError, LinkError
 
@@ -124,3 +124,12 @@ def read_truth(path: Path) -> dict[str, Any]:
     """Hidden parameters of the bench, from the truth port. For graders only, after the estimate is made."""
     with Control(path) as port:
         return port.call("truth").result
+
+
+class HasControl(Protocol):
+    """A bench with a control socket."""
+
+    @property
+    def control(self) -> Control:
+        """Raises BenchError on a real bench."""
+        ...

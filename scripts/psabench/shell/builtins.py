@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from psabench.bench import NS, Bench
 from psabench.errors import BadInput, BenchError
@@ -19,10 +19,7 @@ from psabench.shell.commands import EVENTS, OBJECTS, Arg, Command, Kind
 from psabench.shell.expect import USAGE, Expectation
 from psabench.shell.grammar import describe
 from psabench.shell.lexer import Wrong
-from psabench.shell.row import Args, Handler, Row, number
-
-if TYPE_CHECKING:
-    from psabench.shell.session import Session
+from psabench.shell.row import Args, Context, Handler, Row, number
 
 SLICE_NS = NS // 10  # of a wait, between two looks at Ctrl-C and the status
 SHOWN = 32  # CAN frames that are listed
@@ -33,7 +30,7 @@ FRAME_USAGE = "ID#DATA in hexadecimal, as 605#4018100400000000; an FD frame with
 # ---- time
 
 
-def pass_time(session: Session, for_s: float) -> None:
+def pass_time(session: Context, for_s: float) -> None:
     """Let the bench's time pass, in slices."""
     left_ns = round(for_s * NS)
     while left_ns > 0:
@@ -43,12 +40,12 @@ def pass_time(session: Session, for_s: float) -> None:
         session.tick()
 
 
-def _wait(session: Session, args: Args) -> Mapping[str, Any]:
+def _wait(session: Context, args: Args) -> Mapping[str, Any]:
     pass_time(session, number(args, "for_s"))
     return {}
 
 
-def _at(session: Session, args: Args) -> Mapping[str, Any]:
+def _at(session: Context, args: Args) -> Mapping[str, Any]:
     now_ns = session.now_ns()
     assert now_ns is not None
     left_ns = round(number(args, "t_s") * NS) - now_ns
@@ -57,7 +54,7 @@ def _at(session: Session, args: Args) -> Mapping[str, Any]:
     return {"late_s": -left_ns / NS} if left_ns < 0 else {}
 
 
-def _until(session: Session, args: Args) -> Mapping[str, Any]:
+def _until(session: Context, args: Args) -> Mapping[str, Any]:
     unit = args.get("unit")
     session.bench.run_until(
         str(args["event"]),
@@ -68,7 +65,7 @@ def _until(session: Session, args: Args) -> Mapping[str, Any]:
     return _time(session, {})
 
 
-def _time(session: Session, _: Args) -> Mapping[str, Any]:
+def _time(session: Context, _: Args) -> Mapping[str, Any]:
     t_ns = session.now_ns()
     return {"t_s": time.monotonic() if t_ns is None else t_ns / NS, "pace": session.bench.pace}
 
@@ -76,7 +73,7 @@ def _time(session: Session, _: Args) -> Mapping[str, Any]:
 # ---- as it is
 
 
-def _listen(session: Session, args: Args) -> Mapping[str, Any]:
+def _listen(session: Context, args: Args) -> Mapping[str, Any]:
     heard: list[Message] = []
     host = session.dut.host
     host.listeners.append(heard.append)
@@ -96,7 +93,7 @@ def _frame_row(m: Message, boards: Mapping[int, str]) -> dict[str, Any]:
     return {"t_s": m.timestamp, "id": f"{m.arbitration_id:03X}", "data": bytes(m.data).hex().upper(), "name": name}
 
 
-def _send(session: Session, args: Args) -> Mapping[str, Any]:
+def _send(session: Context, args: Args) -> Mapping[str, Any]:
     text = str(args["frame"])
     m = FRAME.fullmatch(text)
     data = bytes.fromhex(m["data"].replace(".", "")) if m else b""
@@ -106,7 +103,7 @@ def _send(session: Session, args: Args) -> Mapping[str, Any]:
     return _listen(session, {"for_s": LISTEN_S})
 
 
-def instrument(session: Session, name: str) -> Instrument:
+def instrument(session: Context, name: str) -> Instrument:
     """An instrument with an address."""
     if name not in session.bench.addresses:
         raise Wrong(f"instrument: {name!r}; those with an address: {', '.join(session.bench.addresses)}")
@@ -114,7 +111,7 @@ def instrument(session: Session, name: str) -> Instrument:
     return found
 
 
-def _scpi(session: Session, args: Args) -> Mapping[str, Any]:
+def _scpi(session: Context, args: Args) -> Mapping[str, Any]:
     on, line = instrument(session, str(args["instrument"])), str(args["line"])
     if "?" in re.sub(r'"[^"]*"|\'[^\']*\'', "", line):
         return {"answer": on.query(line)}
@@ -125,12 +122,12 @@ def _scpi(session: Session, args: Args) -> Mapping[str, Any]:
 # ---- the session
 
 
-def _expect(session: Session, args: Args) -> Mapping[str, Any]:
+def _expect(session: Context, args: Args) -> Mapping[str, Any]:
     failed = Expectation.parse(str(args["check"])).failure(session.latest)
     return {"failed": failed} if failed else {}
 
 
-def _save(session: Session, args: Args) -> Mapping[str, Any]:
+def _save(session: Context, args: Args) -> Mapping[str, Any]:
     path = Path(str(args["file"]))
     text = session.transcript.script()
     try:
@@ -140,7 +137,7 @@ def _save(session: Session, args: Args) -> Mapping[str, Any]:
     return {"file": str(path), "lines": text.count("\n")}
 
 
-def _help(session: Session, args: Args) -> Mapping[str, Any]:
+def _help(session: Context, args: Args) -> Mapping[str, Any]:
     commands, wanted = session.vocabulary.commands, str(args.get("command", ""))
     if not wanted:
         absent = [{"object": n, "about": f"not here: {why}"} for n, why in session.vocabulary.absent.items()]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -18,10 +18,7 @@ from psabench.errors import CycleRefused
 from psabench.shell import registers
 from psabench.shell.commands import Arg, Command, Kind
 from psabench.shell.lexer import Wrong
-from psabench.shell.row import Args, Handler, Row, number
-
-if TYPE_CHECKING:
-    from psabench.shell.session import Session
+from psabench.shell.row import Args, Context, Handler, Row, number
 
 CONVERTERS = tuple(BANKS)
 A_WORD = "a word, as A55Ah"
@@ -42,7 +39,7 @@ def _unit_names(dut: Unit, converter: str) -> dict[int, str]:
         raise Wrong(f"converter: {e}") from e
 
 
-def _psa2(session: Session) -> Psa2:
+def _psa2(session: Context) -> Psa2:
     """The unit, for what only a PSA-2 has."""
     if isinstance(session.dut, Psa2):
         return session.dut
@@ -60,7 +57,7 @@ def of_unit(command: Command, unit: Unit) -> Command:
     return replace(command, args=tuple(replace(a, **changes.get(a.name, {})) for a in command.args))
 
 
-def _address(session: Session, args: Args) -> tuple[str, int, str]:
+def _address(session: Context, args: Args) -> tuple[str, int, str]:
     converter, wanted = str(args["converter"]), str(args["register"])
     names = _unit_names(session.dut, converter)
     for address, name in names.items():
@@ -69,7 +66,7 @@ def _address(session: Session, args: Args) -> tuple[str, int, str]:
     raise Wrong(f"register: {wanted!r}; converter {converter} has {', '.join(names.values())}, or an address as 01h")
 
 
-def _register_row(session: Session, converter: str, address: int, name: str) -> dict[str, Any]:
+def _register_row(session: Context, converter: str, address: int, name: str) -> dict[str, Any]:
     value = session.dut.register(converter, address)
     return {
         "address": f"{address:02X}h",
@@ -79,7 +76,7 @@ def _register_row(session: Session, converter: str, address: int, name: str) -> 
     }
 
 
-def _row_or_refusal(session: Session, converter: str, address: int, name: str) -> dict[str, Any]:
+def _row_or_refusal(session: Context, converter: str, address: int, name: str) -> dict[str, Any]:
     """In a list of all of them a cycle that the board refuses now is one of the things to see."""
     try:
         return _register_row(session, converter, address, name)
@@ -87,17 +84,17 @@ def _row_or_refusal(session: Session, converter: str, address: int, name: str) -
         return {"address": f"{address:02X}h", "register": name, "value": "-", "fields": e.text}
 
 
-def _registers(session: Session, args: Args) -> Mapping[str, Any]:
+def _registers(session: Context, args: Args) -> Mapping[str, Any]:
     converter = str(args.get("converter", next(iter(session.dut.banks), BUS)))
     names = _unit_names(session.dut, converter)
     return {"registers": [_row_or_refusal(session, converter, a, n) for a, n in names.items()]}
 
 
-def _register(session: Session, args: Args) -> Mapping[str, Any]:
+def _register(session: Context, args: Args) -> Mapping[str, Any]:
     return _register_row(session, *_address(session, args))
 
 
-def _write(session: Session, args: Args) -> Mapping[str, Any]:
+def _write(session: Context, args: Args) -> Mapping[str, Any]:
     converter, address, name = _address(session, args)
     text = str(args["value"])
     if converter == BUS:
@@ -108,12 +105,12 @@ def _write(session: Session, args: Args) -> Mapping[str, Any]:
     return _register_row(session, converter, address, name)
 
 
-def _opcode(session: Session, args: Args) -> Mapping[str, Any]:
+def _opcode(session: Context, args: Args) -> Mapping[str, Any]:
     _psa2(session).opcode(str(args["group"]), int(number(args, "code")))
     return {}
 
 
-def _read_object(session: Session, args: Args) -> Mapping[str, Any]:
+def _read_object(session: Context, args: Args) -> Mapping[str, Any]:
     value = session.dut.node.read(int(number(args, "index")), int(number(args, "sub")))
     return {"value": value.hex() if isinstance(value, bytes) else value}
 
@@ -128,7 +125,7 @@ def _object_value(text: str) -> int | float:
         return float(text)
 
 
-def _write_object(session: Session, args: Args) -> Mapping[str, Any]:
+def _write_object(session: Context, args: Args) -> Mapping[str, Any]:
     index, sub, text = int(number(args, "index")), int(number(args, "sub")), str(args["value"])
     try:
         session.dut.node.write(index, sub, text if session.dut.node.is_text(index, sub) else _object_value(text))
@@ -137,7 +134,7 @@ def _write_object(session: Session, args: Args) -> Mapping[str, Any]:
     return {}
 
 
-def _stream(session: Session, args: Args) -> Mapping[str, Any]:
+def _stream(session: Context, args: Args) -> Mapping[str, Any]:
     taken = session.dut.stream(int(number(args, "count", 100)))
     lost = session.dut.frames.counters.lost
     return _of_frames(taken, lost) if isinstance(taken, Frames) else _of_readings(taken, lost)
@@ -182,13 +179,13 @@ def _of_frames(frames: Frames, lost: int) -> Mapping[str, Any]:
     }
 
 
-def _form(session: Session, args: Args) -> Mapping[str, Any]:
+def _form(session: Context, args: Args) -> Mapping[str, Any]:
     if "form" in args:
         _psa2(session).form = Form[str(args["form"]).upper()]
     return {"form": _psa2(session).form.name.lower()}
 
 
-def _use(session: Session, args: Args) -> Mapping[str, Any]:
+def _use(session: Context, args: Args) -> Mapping[str, Any]:
     name = str(args.get("unit", session.dut_name))
     if name not in session.bench.units:
         raise Wrong(f"unit: {name!r}; there is {', '.join(session.bench.units)}")
@@ -197,7 +194,7 @@ def _use(session: Session, args: Args) -> Mapping[str, Any]:
 
 
 def _simple(call: Callable[[Unit], object]) -> Handler:
-    def run(session: Session, _: Args) -> Mapping[str, Any]:
+    def run(session: Context, _: Args) -> Mapping[str, Any]:
         call(session.dut)
         return {}
 

@@ -4,17 +4,37 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 from psabench.bench import Bench
-from psabench.shell.commands import Command
+from psabench.boards.unit import Unit
+from psabench.shell.commands import Command, Vocabulary
 from psabench.shell.grammar import Value
-
-if TYPE_CHECKING:
-    from psabench.shell.session import Session
+from psabench.shell.transcript import Transcript
 
 Args = Mapping[str, Value]
-Handler = Callable[["Session", Args], Mapping[str, Any]]
+
+
+class Context(Protocol):
+    """What a handler may ask of the session that calls it."""
+
+    vocabulary: Vocabulary
+    transcript: Transcript
+    latest: Mapping[str, Any]  # result that `expect` looks at
+
+    @property
+    def tick(self) -> Callable[[], None]: ...
+    @property
+    def bench(self) -> Bench: ...
+    @property
+    def dut_name(self) -> str: ...
+    @property
+    def dut(self) -> Unit: ...
+    def use(self, name: str) -> None: ...
+    def now_ns(self) -> int | None: ...
+
+
+Handler = Callable[[Context, Args], Mapping[str, Any]]
 
 
 def _always(_: Bench) -> bool:

@@ -156,3 +156,62 @@ def test_circles_of_symbols_are_found(tmp_path: Path) -> None:
     assert found == ["circle: a, b", "circle: c/p, c/q"]
     assert check_symbols.circle_breaches(tmp_path, objects, limits=(1, 0)) == found[1:]
     assert check_symbols.circle_breaches(tmp_path, objects, limits=(1, 1)) == []
+
+
+# ---- the shape of the project
+
+SHAPE = {
+    "scripts/psabench/__init__.py": "",
+    "scripts/psabench/a.py": "from psabench.b import f\n",
+    "scripts/psabench/b.py": "def read_b():\n    return 0x00FF\n\n\nf = read_b\n",
+    "scripts/psabench/boards/pmka/__init__.py": "NAME = 'pmka'\n",
+    "emu/a.c": "\n",
+}
+
+
+def check_shape(root: Path, files: dict[str, str]) -> subprocess.CompletedProcess[str]:
+    for name, text in (SHAPE | files).items():
+        path = root / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    command = [sys.executable, str(ROOT / "tools/check_shape.py"), "--root", str(root)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=60, env={"GIT_CEILING_DIRECTORIES": "/"})
+
+
+def test_a_small_project_has_its_shape(tmp_path: Path) -> None:
+    done = check_shape(tmp_path, {})
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "shape: import-circles 0 (limit 0)" in done.stdout
+    assert "shape: tracked-files 5 (limit " in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("files", "says"),
+    [
+        (
+            {"b.py": "import psabench.a\nf = 0\n"},
+            "import-circles: expected at most 0, got 1\n  psabench.a <-> psabench.b",
+        ),
+        ({"b.py": "def f():\n    from psabench import a\n    return a\n"}, "import-circles: expected at most 0, got 1"),
+        (
+            {"b.py": "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from psabench.a import f\n"},
+            "import-circles: expected at most 0, got 1",
+        ),
+        ({f"c{k}.py": "f = (0x2030, 0x1018)\n" for k in range(120)}, "object-numbers: expected at most "),
+        ({f"m{k}.py": "" for k in range(12)}, "loose-modules: expected at most 12, got 14"),
+        ({f"{k}/m.py": "# PMKA\n" for k in range(4)}, "modules-that-name-pmka: expected at most 3, got 4"),
+        ({f"{d}/m{k}.py": "" for k in range(31) for d in ("link", "shell")}, "link: 31 files"),
+    ],
+)
+def test_a_breach_of_the_shape_is_reported(tmp_path: Path, files: dict[str, str], says: str) -> None:
+    done = check_shape(tmp_path, {f"scripts/psabench/{name}": text for name, text in files.items()})
+    assert done.returncode == 1
+    assert says in done.stderr
+
+
+def test_what_a_metric_counts_is_listed(capsys: pytest.CaptureFixture[str]) -> None:
+    shape = importlib.import_module("check_shape")
+    assert shape.main(["--list", "loose-modules"]) == 0
+    assert "cli.py" in capsys.readouterr().out.splitlines()
+    assert shape.main(["--list", "nothing"]) == 2
+    assert capsys.readouterr().err.startswith("--list: expected import-circles, ")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from psabench.link.vcd import parse_vcd, read_vcd, scale_name
-from psabench.report import waveform
+from psabench.report import drawing, waveform
 
 HEAD = "$timescale 10 ns $end\n$scope module psa2 $end\n"
 FILE = (
@@ -117,17 +117,17 @@ def test_the_command_draws(tmp_path: Path) -> None:
 
 
 def test_an_interval_is_drawn_with_its_length() -> None:
-    dims = (waveform.Dim("Int", 100, "CLK", 200, ", at most 110", 0), waveform.Dim("Int", 100, "Int", 1_250, "", 1))
-    panel = waveform.Panel(("Int", "CLK"), (waveform.Section(50, 1_300, 100),), dims=dims)
-    svg = waveform.render(parse_vcd(FILE), [panel], "")
+    dims = (drawing.Dim("Int", 100, "CLK", 200, ", at most 110", 0), drawing.Dim("Int", 100, "Int", 1_250, "", 1))
+    panel = drawing.Panel(("Int", "CLK"), (drawing.Section(50, 1_300, 100),), dims=dims)
+    svg = drawing.render(parse_vcd(FILE), [panel], "")
     assert ">100 ns, at most 110<" in svg
     assert ">1 150 ns<" in svg
     assert svg.count('class="guide"') == 4
 
 
 def test_sections_cut_waves_at_their_ends() -> None:
-    section = waveform.Section(100, 200, 100)
-    svg = waveform.render(parse_vcd(FILE), [waveform.Panel(("Int", "CLK"), (section,))], "a & b")
+    section = drawing.Section(100, 200, 100)
+    svg = drawing.render(parse_vcd(FILE), [drawing.Panel(("Int", "CLK"), (section,))], "a & b")
     assert "<title>a &amp; b</title>" in svg
     assert svg.count('class="wave"') == 2
     assert "V" not in svg.split('class="wave" d="')[1].split('"')[0]  # Int does not change inside

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from psabench.shell.complete import argument, candidates
 from psabench.shell.grammar import parse
 from psabench.shell.lexer import Wrong
-from shell_words import vocabulary
+from shell_bench import vocabulary
 
 V = vocabulary()
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from psabench.shell import units
 from psabench.shell.grammar import parse
 from psabench.shell.lexer import Word, Wrong, quote, split
-from shell_words import vocabulary
+from shell_bench import vocabulary
 
 V = vocabulary()
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from psabench.link.vcd import Vcd
-from psabench.report.waveform import Dim, Panel, Section, Tag, need, render
+from psabench.report.drawing import Dim, Panel, Section, Tag, need, render
 
 ROWS = ("CLK_1M25", "DR", "A0", "RFX", "RFY", "RFZ", "SCLK", "SDAT", "FL2", "CS")
 

@@ -11,9 +11,8 @@ from psabench.conform.capture.log import CanFrame
 from psabench.conform.dut import Subject
 from psabench.conform.plan import trial
 from psabench.conform.proves import proves
-from psabench.conform.raw_can import COUNTERS, NMT_START, OFF, TPDO, Talk, talk, words, write
+from psabench.conform.raw_can import COUNTERS, NMT_START, OFF, TPDO, Talk, flood, talk, words, write
 from psabench.conform.requirements import requirements
-from psabench.conform.stimulus.flood import flood
 from psabench.conform.verdict import Broken, TooLittle
 
 READINGS, PATIENCE_S = 1, 5.0  # sub-index of 2030h

@@ -12,9 +12,8 @@ import yaml
 from psabench.boards.devices import of_board
 from psabench.conform.capture.canbits import frame_bits
 from psabench.conform.capture.log import CanFrame, Evidence
-from psabench.conform.limits import row_for
 from psabench.conform.plan import check
-from psabench.conform.proves import proves
+from psabench.conform.proves import proves, row_for
 from psabench.conform.requirements import requirements
 from psabench.conform.verdict import Broken, TooLittle
 from psabench.link.protocol_files import database, dbc_node, message

@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 
 from psabench.conform.capture.log import Evidence, LineLog
-from psabench.conform.limits import row_for
 from psabench.conform.plan import check
-from psabench.conform.proves import proves
+from psabench.conform.proves import proves, row_for
 from psabench.conform.sources.samples import PORT_LINES
 from psabench.conform.verdict import Broken, TooLittle
 from psabench.link.signals import Ints

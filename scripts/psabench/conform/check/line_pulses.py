@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from psabench.conform.capture.log import Evidence
 from psabench.conform.capture.pulses import all_move, bus_moves, none_is_too_short
-from psabench.conform.limits import row_for
 from psabench.conform.plan import check
-from psabench.conform.proves import proves
+from psabench.conform.proves import proves, row_for
 
 MOVES = ("PSD1-SIG-02", "PMKA-SIG-03", "PIK-SIG-02", "GYRO-SIG-02")
 SHORT = ("PSA2-SIG-18", "PSD1-SIG-03", "PMKA-SIG-04", "PIK-SIG-03", "PIK-SIG-04", "GYRO-SIG-03")

@@ -6,8 +6,7 @@ from psabench.boards.registry import BOARDS
 from psabench.conform.capture.log import Evidence
 from psabench.conform.dut import Subject
 from psabench.conform.plan import scene
-from psabench.conform.raw_can import NMT_START, OFF, TPDO, Talk, read, talk
-from psabench.conform.stimulus.flood import flood
+from psabench.conform.raw_can import NMT_START, OFF, TPDO, Talk, flood, read, talk
 from psabench.conform.verdict import Broken, TooLittle
 
 BEATS_S, STREAM_S = 3.3, 0.2

@@ -8,13 +8,11 @@ import numpy as np
 
 from psabench.boards.gyro.conform.capture_readings import EARTH_DEGPH, EMCY, MESSAGES, columns, setting, vertical_degph
 from psabench.boards.gyro.device import Mode, Phase
-from psabench.conform.capture.after_res import late_readings
 from psabench.conform.capture.intervals import interval, wires_needed
 from psabench.conform.capture.log import CanLog, Evidence
-from psabench.conform.capture.messages import as_laid_out, emergencies, in_turn
-from psabench.conform.limits import row_for
+from psabench.conform.capture.messages import as_laid_out, emergencies, in_turn, late_readings
 from psabench.conform.plan import check
-from psabench.conform.proves import proves
+from psabench.conform.proves import proves, row_for
 from psabench.conform.verdict import Broken, TooLittle
 from psabench.estimate.angles import wrapped_deg
 from psabench.link.protocol_files import dbc_node, message

@@ -9,9 +9,8 @@ import numpy as np
 from psabench.boards.gyro.conform.capture_readings import columns, setting
 from psabench.boards.gyro.device import Mode, Phase
 from psabench.conform.capture.log import CanLog, Evidence
-from psabench.conform.limits import row_for
 from psabench.conform.plan import check
-from psabench.conform.proves import proves
+from psabench.conform.proves import proves, row_for
 from psabench.conform.verdict import Broken, TooLittle
 from psabench.estimate.angles import wrapped_deg
 from psabench.link.signals import Floats

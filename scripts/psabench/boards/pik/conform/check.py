@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from psabench.conform.capture.after_res import late_readings
 from psabench.conform.capture.intervals import before, edges, first_bad, interval, wires_needed
 from psabench.conform.capture.log import CanLog, Evidence, LineLog
-from psabench.conform.capture.messages import as_laid_out, emergencies, in_turn
-from psabench.conform.limits import row_for
+from psabench.conform.capture.messages import as_laid_out, emergencies, in_turn, late_readings
 from psabench.conform.plan import check
-from psabench.conform.proves import proves
+from psabench.conform.proves import proves, row_for
 from psabench.conform.verdict import Broken, TooLittle
 from psabench.link.protocol_files import message
 from psabench.link.signals import Floats, Ints, unwrap

@@ -10,7 +10,7 @@ import numpy as np
 
 from psabench.boards.pmka import estimate as est
 from psabench.conform.capture.log import CanFrame, CanLog, Evidence
-from psabench.conform.limits import row_for
+from psabench.conform.proves import row_for
 from psabench.conform.verdict import Broken, TooLittle
 from psabench.link.signals import Floats
 

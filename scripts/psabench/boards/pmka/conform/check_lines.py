@@ -7,9 +7,8 @@ import numpy as np
 from psabench.boards.pmka.conform.capture_readings import columns
 from psabench.conform.capture.intervals import after, bus_word, first_bad, interval, nearest, wires_needed
 from psabench.conform.capture.log import Evidence
-from psabench.conform.limits import row_for
 from psabench.conform.plan import check
-from psabench.conform.proves import proves
+from psabench.conform.proves import proves, row_for
 from psabench.conform.verdict import Broken, TooLittle
 from psabench.link.signals import Ints
 

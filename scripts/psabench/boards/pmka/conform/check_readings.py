@@ -8,12 +8,10 @@ import numpy as np
 
 from psabench.boards.pmka import estimate as est
 from psabench.boards.pmka.conform.capture_readings import CODES, STATE, columns, largest, run_of
-from psabench.conform.capture.after_res import booted, late_readings
 from psabench.conform.capture.log import Evidence
-from psabench.conform.capture.messages import as_laid_out, in_turn
-from psabench.conform.limits import row_for
+from psabench.conform.capture.messages import as_laid_out, booted, in_turn, late_readings
 from psabench.conform.plan import check
-from psabench.conform.proves import proves
+from psabench.conform.proves import proves, row_for
 from psabench.conform.requirements import requirements
 from psabench.conform.verdict import Broken, TooLittle
 from psabench.link.signals import Floats, Ints

@@ -1,18 +1,58 @@
-"""What a host of PMKA must have told of each case."""
+"""What a host of PMKA must have told of each case.
+
+What the unit sent is read from the emulator's log by rules of its protocol page alone.
+"""
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
+from dataclasses import dataclass
 
-from psabench.boards.pmka.conform.host_capture import State, states
-from psabench.conform.host.capture import SDO_RX, SDO_TX, number
+from psabench.conform.host.capture import SDO_RX, SDO_TX, Bus, number
+from psabench.conform.host.capture_units import SECOND, frames_of
 from psabench.conform.host.cases_units import INPUT_V
 from psabench.conform.host.check import HostEvidence, enough, judges, limits, proves
 from psabench.conform.host.check_units import readings_told
 from psabench.conform.host.results import Reading
 from psabench.conform.profile import variant
 from psabench.conform.verdict import Broken
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class State:
+    """PMKA_STATE. serves: axis 1..3 of each integrator, 0: none; bad: integrators that were saturated or clipped."""
+
+    seq: int
+    serves: tuple[int, int, int, int]
+    bad: int
+
+    @property
+    def home(self) -> bool:
+        """Each axis is on its own integrator, and was so for the whole period."""
+        return self.serves == (1, 2, 3, 0)
+
+    @property
+    def over(self) -> frozenset[str]:
+        """Axes whose integrator was at a limit."""
+        return frozenset("xyz"[a - 1] for i, a in enumerate(self.serves) if a and self.bad >> i & 1)
+
+
+def states(bus: Bus) -> list[State]:
+    """Of PMKA, from the first NMT start on."""
+    found = []
+    for f in frames_of(bus, SECOND):
+        bits = number(f.data)
+        serves = tuple(bits >> (24 + 2 * i) & 3 for i in range(4))
+        found.append(
+            State(
+                seq=bits & 0xFFFF,
+                serves=(serves[0], serves[1], serves[2], serves[3]),
+                bad=(bits >> 40 | bits >> 44) & 0x0F,
+            )
+        )
+    return found
+
 
 INDEX, DATA = (0x2002, 14), (0x2002, 15)  # what its ROM is read by
 ROM_WORDS = 6 + 1  # head and sum, at least

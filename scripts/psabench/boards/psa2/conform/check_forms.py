@@ -11,9 +11,8 @@ from psabench.boards.psa2.conform.check_serial import LEAST
 from psabench.boards.psa2.conform.check_stream import MESSAGES, US, number, unit_us
 from psabench.boards.psa2.conform.stimulus_can import Answer
 from psabench.conform.capture.log import CanLog, Evidence
-from psabench.conform.limits import row_for
 from psabench.conform.plan import check
-from psabench.conform.proves import proves
+from psabench.conform.proves import proves, row_for
 from psabench.conform.requirements import Requirement
 from psabench.conform.verdict import Broken, TooLittle
 from psabench.link import signals

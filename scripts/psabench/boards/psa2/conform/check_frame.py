@@ -6,9 +6,8 @@ import numpy as np
 
 from psabench.boards.psa2.conform.capture_line import WORDS, Transfers, transfers
 from psabench.conform.capture.log import Evidence
-from psabench.conform.limits import row_for
 from psabench.conform.plan import check
-from psabench.conform.proves import proves
+from psabench.conform.proves import proves, row_for
 from psabench.conform.requirements import Requirement
 from psabench.conform.verdict import Broken, TooLittle
 from psabench.link.signals import Floats, Ints

@@ -10,9 +10,8 @@ from psabench.boards.psa2.conform.check_registers import fact
 from psabench.boards.psa2.conform.check_stream import number, unit_us
 from psabench.boards.psa2.conform.stimulus_objects import Row
 from psabench.conform.capture.log import Evidence
-from psabench.conform.limits import row_for
 from psabench.conform.plan import check
-from psabench.conform.proves import proves
+from psabench.conform.proves import proves, row_for
 from psabench.conform.verdict import Broken, TooLittle
 from psabench.link.canopen_host import Described
 

@@ -19,9 +19,8 @@ from psabench.boards.psa2.conform.check_serial import (
 )
 from psabench.boards.psa2.conform.check_setup import ACCEL, TEMP, port_traffic
 from psabench.conform.capture.log import Evidence
-from psabench.conform.limits import row_for
 from psabench.conform.plan import check
-from psabench.conform.proves import proves
+from psabench.conform.proves import proves, row_for
 from psabench.conform.verdict import Broken, TooLittle
 
 # ---- limits of the parts

@@ -28,9 +28,8 @@ from psabench.boards.psa2.conform.stimulus_can import (
     Answer,
 )
 from psabench.conform.capture.log import Evidence
-from psabench.conform.limits import row_for
 from psabench.conform.plan import check
-from psabench.conform.proves import proves
+from psabench.conform.proves import proves, row_for
 from psabench.conform.verdict import Broken, TooLittle
 from psabench.places import proto_file
 

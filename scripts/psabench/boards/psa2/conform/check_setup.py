@@ -9,9 +9,8 @@ import numpy as np
 from psabench.boards.psa2.conform.capture_line import transfers
 from psabench.boards.psa2.conform.capture_spi import Traffic, traffic
 from psabench.conform.capture.log import Evidence
-from psabench.conform.limits import row_for
 from psabench.conform.plan import check
-from psabench.conform.proves import proves
+from psabench.conform.proves import proves, row_for
 from psabench.conform.requirements import Requirement, requirements
 from psabench.conform.verdict import Broken, TooLittle
 from psabench.link.signals import Ints

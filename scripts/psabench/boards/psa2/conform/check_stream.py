@@ -11,9 +11,8 @@ from psabench.boards.psa2.conform.capture_line import transfers
 from psabench.boards.psa2.conform.check_serial import LEAST
 from psabench.boards.psa2.conform.stimulus_can import FRAMES, OVERRUNS, Answer
 from psabench.conform.capture.log import CanLog, Evidence
-from psabench.conform.limits import row_for
 from psabench.conform.plan import check
-from psabench.conform.proves import proves
+from psabench.conform.proves import proves, row_for
 from psabench.conform.verdict import Broken, TooLittle
 from psabench.link.protocol_files import message
 

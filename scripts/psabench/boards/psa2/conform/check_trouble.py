@@ -9,9 +9,8 @@ from psabench.boards.psa2.conform.check_setup import port_traffic
 from psabench.boards.psa2.conform.check_stream import number
 from psabench.boards.psa2.conform.stimulus_can import FORM, TIMEOUTS, Answer
 from psabench.conform.capture.log import CanFrame, Evidence
-from psabench.conform.limits import row_for
 from psabench.conform.plan import check
-from psabench.conform.proves import proves
+from psabench.conform.proves import proves, row_for
 from psabench.conform.verdict import Broken, TooLittle
 from psabench.link.protocol_files import message
 

@@ -12,9 +12,8 @@ from psabench.boards.psa2.conform.check_serial import LEAST
 from psabench.boards.psa2.conform.check_setup import port_traffic
 from psabench.boards.psa2.conform.check_stream import FORMATS, LINES
 from psabench.conform.capture.log import Evidence
-from psabench.conform.limits import row_for
 from psabench.conform.plan import check
-from psabench.conform.proves import proves
+from psabench.conform.proves import proves, row_for
 from psabench.conform.verdict import Broken, TooLittle
 from psabench.link.signals import Ints
 

@@ -7,9 +7,8 @@ import numpy as np
 from psabench.boards.psd1.conform.host import BEGUN
 from psabench.conform.capture.log import CanLog, Evidence
 from psabench.conform.capture.messages import as_laid_out
-from psabench.conform.limits import row_for
 from psabench.conform.plan import check
-from psabench.conform.proves import proves
+from psabench.conform.proves import proves, row_for
 from psabench.conform.verdict import Broken, TooLittle
 from psabench.link.protocol_files import message
 from psabench.link.signals import Floats

@@ -21,9 +21,8 @@ from psabench.boards.psd1.conform.capture_cycles import (
 )
 from psabench.conform.capture.intervals import after, before, edges, first_bad, interval, together, wires_needed
 from psabench.conform.capture.log import Evidence
-from psabench.conform.limits import row_for
 from psabench.conform.plan import check
-from psabench.conform.proves import proves
+from psabench.conform.proves import proves, row_for
 from psabench.conform.verdict import Broken, TooLittle
 from psabench.link.signals import Ints
 

@@ -26,9 +26,8 @@ from psabench.conform.capture.intervals import (
     wires_needed,
 )
 from psabench.conform.capture.log import Evidence
-from psabench.conform.limits import row_for
 from psabench.conform.plan import check
-from psabench.conform.proves import proves
+from psabench.conform.proves import proves, row_for
 from psabench.conform.verdict import Broken, TooLittle
 
 SERIAL = (*FRAMES, "SCLK", "SDAT", "CLK_1M25")

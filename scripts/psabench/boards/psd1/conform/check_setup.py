@@ -17,7 +17,6 @@ from psabench.boards.psd1.conform.capture_cycles import (
     starts,
 )
 from psabench.boards.psd1.conform.host import period_s
-from psabench.conform.capture.after_res import booted, late_readings
 from psabench.conform.capture.intervals import (
     after,
     before,
@@ -29,9 +28,9 @@ from psabench.conform.capture.intervals import (
     wires_needed,
 )
 from psabench.conform.capture.log import Evidence
-from psabench.conform.limits import row_for
+from psabench.conform.capture.messages import booted, late_readings
 from psabench.conform.plan import check
-from psabench.conform.proves import proves
+from psabench.conform.proves import proves, row_for
 from psabench.conform.requirements import requirements
 from psabench.conform.verdict import Broken, TooLittle
 from psabench.link.signals import Ints

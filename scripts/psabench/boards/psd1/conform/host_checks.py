@@ -1,15 +1,47 @@
-"""What a host of PSD-1 must have told of each case."""
+"""What a host of PSD-1 must have told of each case.
+
+What the unit sent is read from the emulator's log by rules of its protocol page alone.
+"""
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
+from dataclasses import dataclass
 
-from psabench.boards.psd1.conform.host_capture import Cycle, cycles
+from psabench.conform.host.capture import Bus, number
+from psabench.conform.host.capture_units import FIRST, frames_of
 from psabench.conform.host.check import HostEvidence, enough, judges, limits, proves
 from psabench.conform.host.check_units import readings_told
 from psabench.conform.host.results import Reading
 from psabench.conform.verdict import Broken
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cycle:
+    """PSD1_CYCLE."""
+
+    cnt: int
+    words: tuple[int, int, int]
+    read: bool  # all three by a strobe
+    overrun: bool
+    late: bool
+    mixed: bool
+
+
+def cycles(bus: Bus) -> list[Cycle]:
+    """Of PSD-1, from the first NMT start on."""
+    return [
+        Cycle(
+            cnt=f.data[6],
+            words=(number(f.data[0:2]), number(f.data[2:4]), number(f.data[4:6])),
+            read=f.data[7] & 0x07 == 0x07,
+            overrun=bool(f.data[7] & 0x08),
+            late=bool(f.data[7] & 0x10),
+            mixed=bool(f.data[7] & 0x20),
+        )
+        for f in frames_of(bus, FIRST)
+    ]
 
 
 def _same(told: Sequence[Reading], due: Sequence[Cycle]) -> None:
