@@ -140,11 +140,24 @@ def load(root: Path = ROOT) -> Ledger:
             Group(name, g["title"], tuple(expand(root, g["files"])), tuple(expand_tests(root, g["tests"])))
             for name, g in data["groups"].items()
         )
+        groups += tuple(board_group(root, b) for b in boards(root) if b not in data["groups"])
         rungs = {test: (rung, why) for rung, rows in data["rungs"].items() for test, why in rows.items()}
         claims = tuple(Claim(c["subject"], c["claim"], c["rung"], tuple(c["tests"])) for c in data["claims"])
         return Ledger(data["ladder"], groups, rungs, claims)
     except (OSError, yaml.YAMLError, KeyError, TypeError, AttributeError) as e:
         raise EvidenceError(f"{LEDGER}: {' '.join(str(e).split())}") from e
+
+
+def boards(root: Path) -> list[str]:
+    return sorted(folder.name for folder in (root / "emu/board").glob("*/"))
+
+
+def board_group(root: Path, board: str) -> Group:
+    """Of a board that the ledger does not name."""
+    patterns = (f"emu/board/{board}/*.[ch]", f"proto/{board}.yaml", f"proto/profiles/{board}*.yaml")
+    files = [p.relative_to(root).as_posix() for pattern in patterns for p in sorted(root.glob(pattern))]
+    tests = [p.relative_to(root).as_posix() for p in sorted(root.glob(f"tests/unit/board/{board}/test_*.c"))]
+    return Group(board, board.upper(), tuple(files), (*tests, f"conform {board} {board}"))
 
 
 def expand(root: Path, patterns: Iterable[str]) -> Iterator[str]:

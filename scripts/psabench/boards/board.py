@@ -57,6 +57,15 @@ class Bus:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Setting:
+    """An object that sets something of the board itself, none of communication, and a value that is not its default."""
+
+    index: int
+    sub: int
+    value: bytes
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Board:
     """A type of board. Profiles with another name on the plate (`aliases`) are the same board."""
 
@@ -68,6 +77,7 @@ class Board:
     port_lines: tuple[str, ...]  # lines of the line port, bit 0 first (docs/lineport.md)
     bus: Bus | None = None  # parallel bus
     beat: Beat | None = None  # None: no regular period that is known
+    setting: Setting | None = None  # None, and a bus: object 2051h, its strobe
     # Fields of registers by group and name. Groups: converters "accel" and "temp"; of a parallel bus the board's name.
     fields: Mapping[tuple[str, str], tuple[Bits, ...]] = field(default_factory=dict)
     # Frequencies of a profile that follow from the board's clocks: an error of its clocks scales them.

@@ -124,6 +124,17 @@ def write(root: Path, ledger: dict[str, Any]) -> Path:
     return root
 
 
+def test_a_board_that_the_ledger_does_not_name_has_a_group(tree: Path) -> None:
+    files = ("emu/board/toy/toy.c", "proto/toy.yaml", "proto/profiles/toy.yaml", "proto/profiles/toy2.yaml")
+    for name in (*files, "emu/board/toy/notes.txt", "tests/unit/board/toy/test_toy.c"):
+        (tree / name).parent.mkdir(parents=True, exist_ok=True)
+        (tree / name).write_text("")
+    ledger = evidence.load(tree)
+    found = {g.name: g for g in ledger.groups}["toy"]
+    assert (found.files, found.tests) == (files, ("tests/unit/board/toy/test_toy.c", "conform toy toy"))
+    assert not list(evidence.faults(tree, ledger))
+
+
 def passes(_root: Path, _tests: list[str]) -> str:
     return ""
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from psabench.boards.board import Beat, Board
+from psabench.boards.board import Beat, Board, Setting
 from psabench.boards.psa2.fields import FIELDS
 
 BOARD = Board(
@@ -22,5 +22,6 @@ BOARD = Board(
     ),
     clocks=("fclk_hz", "temp_clkin_hz", "sclk_hz", "line_hz"),
     has_thermometer=True,
+    setting=Setting(index=0x2023, sub=0, value=bytes([3, 0])),
     fields=FIELDS,
 )

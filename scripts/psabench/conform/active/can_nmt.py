@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import itertools
 
+from psabench.boards.board import Setting
+from psabench.boards.registry import BOARDS
 from psabench.conform.dut import Subject
 from psabench.conform.plan import trial
 from psabench.conform.proves import proves
@@ -216,9 +218,14 @@ def _settings(t: Talk) -> dict[tuple[int, int], bytes]:
     return {(HEARTBEAT, 0): (777).to_bytes(2, "little"), (TPDO, 2): bytes([7]), (TPDO, 3): (9).to_bytes(2, "little")}
 
 
-# A setting of the board itself, none of communication: object, sub, another value than the default.
-OWN = {"psa2": (0x2023, 0, (3).to_bytes(2, "little")), "gyro": (0x2102, 1, bytes([2]))}
-STROBE = (0x2051, 0, (5000).to_bytes(4, "little"))
+STROBE = Setting(index=0x2051, sub=0, value=(5000).to_bytes(4, "little"))  # of a board with a bus
+
+
+def _own_settings(s: Subject) -> dict[tuple[int, int], bytes]:
+    """A setting of the board itself; empty for a board that has none."""
+    board = BOARDS[s.variant.family]
+    own = board.setting or (STROBE if board.bus else None)
+    return {(own.index, own.sub): own.value} if own else {}
 
 
 @proves("BUS-NMT-04")
@@ -226,8 +233,7 @@ STROBE = (0x2051, 0, (5000).to_bytes(4, "little"))
 def reset_node_restores_the_defaults(s: Subject) -> str:
     """Write settings, NMT 81h, read them again; count readings before and after."""
     with talk(s, reset=True) as t:
-        index, sub, other = OWN.get(s.variant.family, STROBE)
-        settings = {**_settings(t), (index, sub): other}
+        settings = _settings(t) | _own_settings(s)
         _write(t, settings)
         t.reset(_limit("BUS-NMT-04", "command_code"))
         _are_defaults(t, settings, "NMT 81h")
@@ -260,17 +266,18 @@ def reset_communication_leaves_the_board_alone(s: Subject) -> str:
     """Write settings of communication and of the board, NMT 82h, read both again; readings go on being counted."""
     with talk(s, reset=True) as t:
         s.wait_ready()
-        index, sub, other = OWN.get(s.variant.family, STROBE)
-        _write(t, _settings(t))
-        _write(t, {(index, sub): other})
+        own = _own_settings(s)
+        _write(t, _settings(t) | own)
         count = t.number(COUNTERS, 1)
         t.reset(_limit("BUS-NMT-05", "command_code"))
         _are_defaults(t, _settings(t), "NMT 82h")
-        if t.upload(index, sub) != other:
-            raise Broken(f"{index:04X}h:{sub} is {t.number(index, sub)} after NMT 82h", "what was written")
+        for (index, sub), written in own.items():
+            if t.upload(index, sub) != written:
+                raise Broken(f"{index:04X}h:{sub} is {t.number(index, sub)} after NMT 82h", "what was written")
         if t.number(COUNTERS, 1) < count:
             raise Broken("the count of readings fell with NMT 82h", "that it goes on")
-    return f"{len(_settings(t))} communication parameters have their defaults, {index:04X}h:{sub} has what was written"
+    kept = ", ".join(f"{index:04X}h:{sub} has what was written" for index, sub in own) or "the board has no settings"
+    return f"{len(_settings(t))} communication parameters have their defaults, {kept}"
 
 
 @proves("BUS-NMT-06")
