@@ -20,7 +20,7 @@ static int32_t code_of(double value, double per_code, int32_t low, int32_t high)
 
 /* ---- laser gyros and rate sensors ---- */
 
-static void rate(struct psd1 *b, int64_t t_ns, double w_radps[3])
+static void read_rates(struct psd1 *b, int64_t t_ns, double w_radps[3])
 {
     w_radps[0] = w_radps[1] = w_radps[2] = 0.0;
     if (b->io.rate_radps) b->io.rate_radps(b->io.ctx, t_ns, w_radps);
@@ -47,7 +47,7 @@ static void integrate_to(struct psd1 *b, int64_t t_ns)
     struct psd1_gyros *g = &b->gyros;
     const double dt_s = since_s(g, t_ns);
     double w_radps[3];
-    rate(b, t_ns, w_radps);
+    read_rates(b, t_ns, w_radps);
     for (unsigned i = 0; i < 3; i++) {
         struct psd1_gyro *a = &g->axis[i];
         const double w = measured_radps(a, w_radps[i]);
@@ -58,19 +58,19 @@ static void integrate_to(struct psd1 *b, int64_t t_ns)
     g->stale = false;
 }
 
-static void walk(struct psd1_gyros *g)
+static void walk_step(struct psd1_gyros *g)
 {
     for (unsigned i = 0; i < 3; i++)
         if (g->axis[i].arw_rad > 0.0) g->axis[i].angle_rad += g->axis[i].arw_rad * rng_gauss(&g->axis[i].noise);
 }
 
-/* Always at the points of the grid, whoever looks when. */
-static void integrate(struct psd1 *b, int64_t t_ns)
+/* Always at the points of the grid, independent of readers. */
+static void integrate_gyros(struct psd1 *b, int64_t t_ns)
 {
     struct psd1_gyros *g = &b->gyros;
     for (; g->grid_ns <= t_ns; g->grid_ns += b->profile.gyro_grid_ns) {
         integrate_to(b, g->grid_ns);
-        if (++g->points % WALK_POINTS == 0) walk(g);
+        if (++g->points % WALK_POINTS == 0) walk_step(g);
     }
 }
 
@@ -86,8 +86,8 @@ void psd1_aux_latch(struct psd1 *b, struct psd1_cycle *c, int64_t t_ns)
     const double count_rad = b->profile.gyro_arcsec_per_count * RAD_PER_ARCSEC;
     const double code_radps = b->profile.rate_dps_per_code * RAD_PER_DEG;
     double w_radps[3];
-    integrate(b, t_ns);
-    rate(b, t_ns, w_radps);
+    integrate_gyros(b, t_ns);
+    read_rates(b, t_ns, w_radps);
     const double dt_s = since_s(g, t_ns);
     for (unsigned i = 0; i < 3; i++) {
         const struct psd1_gyro *a = &g->axis[i];
@@ -100,7 +100,7 @@ void psd1_aux_latch(struct psd1 *b, struct psd1_cycle *c, int64_t t_ns)
 void psd1_aux_until(struct psd1 *b, int64_t t_ns)
 {
     if (b->phase == PSD1_OFF) return;
-    integrate(b, t_ns);
+    integrate_gyros(b, t_ns);
     if (t_ns > b->gyros.t_ns) integrate_to(b, t_ns);
     b->gyros.stale = true;
 }

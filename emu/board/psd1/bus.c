@@ -39,7 +39,7 @@ static uint16_t read_status(struct psd1 *b, unsigned address, int64_t t_ns)
 }
 
 /* Latched at A0: of the cycle under way, else of the latest. */
-static const struct psd1_cycle *latched(const struct psd1 *b)
+static const struct psd1_cycle *latched_cycle(const struct psd1 *b)
 {
     return b->phase >= PSD1_RF_FALL && b->phase <= PSD1_CLEAR ? &b->now : &b->latest;
 }
@@ -47,13 +47,13 @@ static const struct psd1_cycle *latched(const struct psd1 *b)
 static uint16_t read_gyro(struct psd1 *b, unsigned address, int64_t t_ns)
 {
     (void)t_ns;
-    return (uint16_t)latched(b)->gyro[address - PSD1_REG_GYRO_X];
+    return (uint16_t)latched_cycle(b)->gyro[address - PSD1_REG_GYRO_X];
 }
 
 static uint16_t read_rate(struct psd1 *b, unsigned address, int64_t t_ns)
 {
     (void)t_ns;
-    return (uint16_t)latched(b)->rate[address - PSD1_REG_RATE_X];
+    return (uint16_t)latched_cycle(b)->rate[address - PSD1_REG_RATE_X];
 }
 
 static uint16_t read_temp(struct psd1 *b, unsigned address, int64_t t_ns)
@@ -142,7 +142,7 @@ static void write_flags(struct psd1 *b, uint16_t data, int64_t t_ns)
 /* ---- register COMMAND ---- */
 
 /* What a command shows at once in UC_HIGH and UC_LOW; false: it is none of those. */
-static bool shown(const struct psd1 *b, unsigned command, uint32_t *word)
+static bool show_word(const struct psd1 *b, unsigned command, uint32_t *word)
 {
     const unsigned axis = command & PSD1_CMD_AXIS, kind = command - axis;
     const bool uc = command == PSD1_CMD_SHOW_UC1 || command == PSD1_CMD_SHOW_UC2;
@@ -157,7 +157,7 @@ static enum board_cycle_result check_command(const struct psd1 *b, uint16_t data
     const char *why = NULL;
     uint32_t word;
     if (data > 255) return BOARD_CYCLE_BAD_VALUE;
-    if (shown(b, data, &word)) return BOARD_CYCLE_OK;
+    if (show_word(b, data, &word)) return BOARD_CYCLE_OK;
     return psd1_request_check(b, (uint8_t)data, b->staged, &why);
 }
 
@@ -174,7 +174,7 @@ static void write_command(struct psd1 *b, uint16_t data, int64_t t_ns)
     const char *why = NULL;
     b->last_command = (uint8_t)data;
     b->job.failed = false;
-    if (shown(b, data, &b->staged)) return;
+    if (show_word(b, data, &b->staged)) return;
     b->job.own = (struct psd1_request){.command = (uint8_t)data, .word = b->staged, .done = own_done, .ctx = b};
     b->job.failed = psd1_request(b, &b->job.own, &why, t_ns) != BOARD_CYCLE_OK; /* another client's came meanwhile */
 }
@@ -208,7 +208,7 @@ const char *psd1_register_name(unsigned address)
     return address < PSD1_REGS ? registers[address].name : NULL;
 }
 
-static const char *wanted_value(const struct psd1 *b, const struct board_cycle *c)
+static const char *expected_value(const struct psd1 *b, const struct board_cycle *c)
 {
     const char *why = NULL;
     if (registers[c->address].check == two_bits) return "it takes 0 to 3";
@@ -220,42 +220,42 @@ static const char *wanted_value(const struct psd1 *b, const struct board_cycle *
 void psd1_wanted(const struct board *board, const struct board_cycle *c, enum board_cycle_result r, char *out,
                  size_t cap)
 {
-    const char *const why = r == BOARD_CYCLE_BAD_VALUE ? wanted_value((const struct psd1 *)board, c)
+    const char *const why = r == BOARD_CYCLE_BAD_VALUE ? expected_value((const struct psd1 *)board, c)
                                                        : "STATUS (03h) has bit 0 while one does, its axis in bits 1, 2";
     if (why) (void)snprintf(out, cap, "%s", why);
 }
 
 /* ---- strobes ---- */
 
-static void lines_begin(struct psd1 *b, bool write, unsigned address, uint16_t data, int64_t t_ns)
+static void put_strobe(struct psd1 *b, bool write, unsigned address, uint16_t data, int64_t t_ns)
 {
     psd1_put(b, PSD1_BUS,
              (write ? 0 : PSD1_BIT(RW)) | (uint64_t)address << PSD1_LINE_AB0 | (uint64_t)data << PSD1_LINE_D0, t_ns);
 }
 
-static void lines_end(struct psd1 *b, int64_t t_ns)
+static void release_bus(struct psd1 *b, int64_t t_ns)
 {
     psd1_put(b, PSD1_BUS, PSD1_BIT(CS) | PSD1_BIT(RW), t_ns);
 }
 
 /* The word that waits is being read. */
-static void take(struct psd1 *b, int64_t t_ns)
+static void begin_read(struct psd1 *b, int64_t t_ns)
 {
     b->bus.takes = b->taken = true;
     if (t_ns - b->fl2_ns > b->profile.late_ns) {
         b->counters.late++;
         b->now.status |= PSD1_CY_LATE;
     }
-    psd1_tell(b, PSD1_EV_STROBE, t_ns);
+    psd1_notify_event(b, PSD1_EV_STROBE, t_ns);
 }
 
-static void took(struct psd1 *b)
+static void end_read(struct psd1 *b)
 {
     b->bus.takes = false;
     b->now.status |= (uint8_t)(1u << b->axis);
 }
 
-static enum board_cycle_result refusal(const struct psd1 *b, const struct board_cycle *c, int64_t len_ns)
+static enum board_cycle_result check_cycle(const struct psd1 *b, const struct board_cycle *c, int64_t len_ns)
 {
     if (b->phase == PSD1_OFF || b->phase == PSD1_IN_RESET) return BOARD_CYCLE_OFF;
     if (c->address >= PSD1_REGS) return BOARD_CYCLE_NO_ADDRESS;
@@ -267,42 +267,42 @@ static enum board_cycle_result refusal(const struct psd1 *b, const struct board_
     return b->fl2 && !b->taken && b->axis == c->address ? BOARD_CYCLE_OK : BOARD_CYCLE_NOT_READY;
 }
 
-static void count_refusal(struct psd1 *b, enum board_cycle_result r)
+static void count_rejected(struct psd1 *b, enum board_cycle_result r)
 {
     b->counters.refused++;
     b->counters.too_short += r == BOARD_CYCLE_TOO_SHORT;
 }
 
-/* A refused strobe moves CS, R/W and the address, too. */
-static enum board_cycle_result begin(struct psd1 *b, struct board_cycle *c, int64_t t_ns)
+/* A rejected strobe moves CS, R/W and the address, too. */
+static enum board_cycle_result begin_strobe(struct psd1 *b, struct board_cycle *c, int64_t t_ns)
 {
     struct psd1_strobe *s = &b->bus;
     const int64_t len_ns = c->strobe_ns > 0 ? c->strobe_ns : b->profile.strobe_ns;
-    const enum board_cycle_result r = refusal(b, c, len_ns);
+    const enum board_cycle_result r = check_cycle(b, c, len_ns);
     if (r == BOARD_CYCLE_OFF || r == BOARD_CYCLE_NO_ADDRESS) {
-        count_refusal(b, r);
+        count_rejected(b, r);
         return r;
     }
-    if (r != BOARD_CYCLE_OK) count_refusal(b, r);
+    if (r != BOARD_CYCLE_OK) count_rejected(b, r);
     else if (!c->write) c->data = registers[c->address].read(b, c->address, t_ns);
     const bool data = c->write || r == BOARD_CYCLE_OK;
     s->busy = true;
     s->cycle = r == BOARD_CYCLE_OK ? c : NULL;
     s->end_ns = t_ns + len_ns;
-    lines_begin(b, c->write, c->address, data ? c->data : 0, t_ns);
+    put_strobe(b, c->write, c->address, data ? c->data : 0, t_ns);
     sched_at(b->sched, &s->ev, s->end_ns);
     if (r != BOARD_CYCLE_OK || c->write || c->address > PSD1_REG_Z) return r;
-    take(b, t_ns);
+    begin_read(b, t_ns);
     return r;
 }
 
 /* The one that has waited for its turn. */
-static void next(struct psd1 *b, int64_t t_ns)
+static void begin_waiting(struct psd1 *b, int64_t t_ns)
 {
     struct board_cycle *c = b->bus.waiting;
     b->bus.waiting = NULL;
     if (!c) return;
-    const enum board_cycle_result r = begin(b, c, t_ns);
+    const enum board_cycle_result r = begin_strobe(b, c, t_ns);
     if (r != BOARD_CYCLE_OK) c->done(c->ctx, c, r, t_ns);
 }
 
@@ -313,9 +313,9 @@ static void strobe_end(void *ctx, int64_t t_ns)
     struct board_cycle *c = s->cycle;
     s->busy = false;
     s->cycle = NULL;
-    lines_end(b, t_ns);
+    release_bus(b, t_ns);
     if (s->takes) {
-        took(b);
+        end_read(b);
         psd1_due(b, PSD1_CLEAR, psd1_next_fall(b, t_ns));
     }
     if (c) {
@@ -323,40 +323,51 @@ static void strobe_end(void *ctx, int64_t t_ns)
         if (c->write) registers[c->address].write(b, c->data, t_ns);
         c->done(c->ctx, c, BOARD_CYCLE_OK, t_ns);
     }
-    if (!s->busy) next(b, t_ns); /* unless done() has begun another */
+    if (!s->busy) begin_waiting(b, t_ns); /* unless done() has begun another */
 }
 
 enum board_cycle_result psd1_submit(struct psd1 *b, struct board_cycle *c, int64_t t_ns)
 {
     if (b->phase == PSD1_OFF) return BOARD_CYCLE_OFF;
     if (b->bus.cycle || b->bus.waiting) return BOARD_CYCLE_BUSY;
-    if (!b->bus.busy) return begin(b, c, t_ns);
+    if (!b->bus.busy) return begin_strobe(b, c, t_ns);
     b->bus.waiting = c;
     return BOARD_CYCLE_OK;
 }
 
 /* ---- the built-in host ---- */
 
-bool psd1_bus_free(const struct psd1 *b)
-{
-    return !b->bus.busy;
-}
-
-void psd1_bus_host(struct psd1 *b, int64_t t_ns)
+static void host_strobe_begin(struct psd1 *b, int64_t t_ns)
 {
     b->bus.busy = true;
     b->bus.end_ns = t_ns + b->profile.strobe_ns;
-    lines_begin(b, false, b->axis, psd1_rk_bus(&b->rk), t_ns);
-    take(b, t_ns);
+    put_strobe(b, false, b->axis, psd1_rk_bus(&b->rk), t_ns);
+    begin_read(b, t_ns);
 }
 
-void psd1_bus_over(struct psd1 *b, int64_t t_ns)
+static void host_strobe_end(struct psd1 *b, int64_t t_ns)
 {
     b->bus.busy = false;
     b->counters.bus_cycles++;
-    lines_end(b, t_ns);
-    took(b);
-    next(b, t_ns);
+    release_bus(b, t_ns);
+    end_read(b);
+    begin_waiting(b, t_ns);
+}
+
+/* If the bus is busy: after that strobe. */
+int64_t psd1_host_strobe(struct psd1 *b, int64_t t_ns)
+{
+    if (b->bus.busy) return b->bus.end_ns > t_ns ? b->bus.end_ns : t_ns + PSD1_PERIOD_NS;
+    host_strobe_begin(b, t_ns);
+    b->phase = PSD1_STROBE_END;
+    return b->bus.end_ns;
+}
+
+int64_t psd1_host_end(struct psd1 *b, int64_t t_ns)
+{
+    host_strobe_end(b, t_ns);
+    b->phase = PSD1_CLEAR;
+    return psd1_next_fall(b, t_ns);
 }
 
 /* ---- life ---- */
@@ -366,7 +377,7 @@ void psd1_bus_init(struct psd1 *b)
     sched_ev(&b->bus.ev, strobe_end, b);
 }
 
-static void cut(struct board_cycle **of, int64_t t_ns)
+static void cut_cycle(struct board_cycle **of, int64_t t_ns)
 {
     struct board_cycle *c = *of;
     *of = NULL;
@@ -377,8 +388,8 @@ void psd1_bus_stop(struct psd1 *b, int64_t t_ns)
 {
     struct psd1_strobe *s = &b->bus;
     sched_cancel(b->sched, &s->ev);
-    if (s->busy) lines_end(b, t_ns);
+    if (s->busy) release_bus(b, t_ns);
     s->busy = s->takes = false;
-    cut(&s->cycle, t_ns);
-    cut(&s->waiting, t_ns);
+    cut_cycle(&s->cycle, t_ns);
+    cut_cycle(&s->waiting, t_ns);
 }

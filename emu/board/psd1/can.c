@@ -100,7 +100,7 @@ static void request_done(void *ctx, struct psd1_request *r, enum board_cycle_res
 }
 
 /* One of a client that has given up is still the board's. */
-static uint32_t request(struct board_node *n, uint8_t command, uint32_t word, int64_t t_ns)
+static uint32_t submit_request(struct board_node *n, uint8_t command, uint32_t word, int64_t t_ns)
 {
     struct psd1_can *can = (struct psd1_can *)n;
     const char *why = NULL;
@@ -122,13 +122,13 @@ static uint32_t read_uc(struct board_node *n, const struct co_entry *e, struct c
 
 static uint32_t write_uc(struct board_node *n, const struct co_entry *e, const struct co_value *v, int64_t t_ns)
 {
-    return request(n, e->index == PSD1_OD_UC1 ? PSD1_CMD_UC1 : PSD1_CMD_UC2, (uint32_t)v->number, t_ns);
+    return submit_request(n, e->index == PSD1_OD_UC1 ? PSD1_CMD_UC1 : PSD1_CMD_UC2, (uint32_t)v->number, t_ns);
 }
 
 static uint32_t read_control(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
 {
     (void)v;
-    return request(n, (uint8_t)(PSD1_CMD_CONTROL + e->sub - 1), 0, t_ns);
+    return submit_request(n, (uint8_t)(PSD1_CMD_CONTROL + e->sub - 1), 0, t_ns);
 }
 
 /* As latched or stored: no traffic. */
@@ -165,7 +165,7 @@ static const struct board_object objects[] = {
     {PSD1_OD_GYRO_LOW, read_stored, NULL},  {PSD1_OD_RATE, read_stored, NULL},
 };
 
-static uint32_t serial(const void *board)
+static uint32_t serial_of(const void *board)
 {
     return ((const struct psd1 *)board)->unit.serial;
 }
@@ -178,10 +178,11 @@ static int64_t period_ns(const void *board)
 static const struct board_node_type type = {.device = &psd1_device,
                                             .objects = objects,
                                             .object_count = sizeof objects / sizeof objects[0],
-                                            .serial = serial,
+                                            .serial = serial_of,
                                             .period_ns = period_ns};
 
-static void init(void *can, const struct board_can_cfg *cfg, struct board *board, struct can_bus *bus, struct sched *s)
+static void init_can(void *can, const struct board_can_cfg *cfg, struct board *board, struct can_bus *bus,
+                     struct sched *s)
 {
     struct psd1_can *c = can;
     struct psd1 *b = (struct psd1 *)board;
@@ -191,7 +192,7 @@ static void init(void *can, const struct board_can_cfg *cfg, struct board *board
 }
 
 const struct board_can psd1_can = {.size = sizeof(struct psd1_can),
-                                   .init = init,
+                                   .init = init_can,
                                    .power_up = board_node_power_up,
                                    .power_down = board_node_power_down,
                                    .node = board_node_co};

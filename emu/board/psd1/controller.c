@@ -8,7 +8,7 @@
 /* ---- the controller's event ---- */
 
 /* SYNC of the three converters: Res drives it, so that they are in step after it (article: synchronised; how is E0). */
-static void sync(struct psd1 *b, bool level, int64_t t_ns)
+static void put_sync(struct psd1 *b, bool level, int64_t t_ns)
 {
     for (unsigned i = 0; i < 3; i++) ad7712_sync_pin(&b->adc[i], level, t_ns);
 }
@@ -16,12 +16,12 @@ static void sync(struct psd1 *b, bool level, int64_t t_ns)
 /* Power and resets are over: the set-up begins. */
 static int64_t reset_over(struct psd1 *b, int64_t t_ns)
 {
-    sync(b, true, t_ns);
+    put_sync(b, true, t_ns);
     psd1_job_setup(b);
     return psd1_job_next(b, t_ns);
 }
 
-static int64_t nothing(struct psd1 *b, int64_t t_ns)
+static int64_t no_step(struct psd1 *b, int64_t t_ns)
 {
     (void)b;
     (void)t_ns;
@@ -29,9 +29,9 @@ static int64_t nothing(struct psd1 *b, int64_t t_ns)
 }
 
 static psd1_step *const steps[PSD1_PHASES] = {
-    [PSD1_OFF] = nothing,
+    [PSD1_OFF] = no_step,
     [PSD1_IN_RESET] = reset_over,
-    [PSD1_IDLE] = nothing,
+    [PSD1_IDLE] = no_step,
     [PSD1_START] = psd1_cycle_start,
     [PSD1_RF_FALL] = psd1_rf_fall,
     [PSD1_RF_RISE] = psd1_rf_rise,
@@ -46,97 +46,54 @@ static psd1_step *const steps[PSD1_PHASES] = {
     [PSD1_COEF_RISE] = psd1_coef_rise,
 };
 
+static void setup_done(struct psd1 *b, int64_t t_ns)
+{
+    b->ready = true;
+    b->lost = psd1_lost(b);
+    psd1_notify_event(b, PSD1_EV_SETUP_DONE, t_ns);
+    if (b->profile.int0 == PSD1_INT0_AUTO) psd1_flags(b, true, true, t_ns);
+}
+
+/* After a step or a notification: if the controller is idle, the next thing begins. Before the set-up is over it is not. */
+static void start_next(struct psd1 *b, int64_t t_ns)
+{
+    if (b->phase != PSD1_IDLE) return;
+    if (!b->ready) setup_done(b, t_ns);
+    psd1_try_start(b, t_ns);
+}
+
+static int64_t run_step(struct psd1 *b, int64_t t_ns)
+{
+    b->due_ns = steps[b->phase](b, t_ns);
+    start_next(b, t_ns);
+    return b->due_ns;
+}
+
 static void step_event(void *ctx, int64_t t_ns)
 {
     struct psd1 *b = ctx;
     b->stepping = true;
-    do t_ns = b->due_ns = steps[b->phase](b, t_ns);
+    do t_ns = run_step(b, t_ns);
     while (t_ns != SCHED_NEVER && sched_go_on(b->sched, t_ns));
     b->stepping = false;
     if (t_ns != SCHED_NEVER) sched_at(b->sched, &b->ev, t_ns);
 }
 
-void psd1_due(struct psd1 *b, enum psd1_phase phase, int64_t t_ns)
-{
-    b->phase = phase;
-    b->due_ns = t_ns;
-    if (b->stepping) return;
-    if (t_ns == SCHED_NEVER) sched_cancel(b->sched, &b->ev);
-    else sched_at(b->sched, &b->ev, t_ns);
-}
-
-/* ---- pins ---- */
-
-void psd1_a0(struct psd1 *b, bool level, int64_t t_ns)
-{
-    psd1_put(b, PSD1_BIT(A0), level ? PSD1_BIT(A0) : 0, t_ns);
-    for (unsigned i = 0; i < 3; i++) ad7712_a0_pin(&b->adc[i], level, t_ns);
-}
-
-void psd1_rf(struct psd1 *b, unsigned axis, bool level, int64_t t_ns)
-{
-    const uint64_t line = PSD1_BIT(RFX) << axis;
-    psd1_put(b, line, level ? line : 0, t_ns);
-    ad7712_rfs_pin(&b->adc[axis], level, t_ns);
-}
-
-/* ---- conditions of a cycle ---- */
-
-static bool conditions(const struct psd1 *b)
-{
-    return b->ready && b->int0 && b->fl1 && !b->dr;
-}
-
-void psd1_try_start(struct psd1 *b, int64_t t_ns)
-{
-    if (b->phase != PSD1_IDLE || psd1_job_waits(b, t_ns) || !conditions(b)) return;
-    psd1_due(b, PSD1_START, psd1_next_rise(b, t_ns));
-}
-
-/* One of them has changed. What changes at the very instant of the rise is too late for it. */
-static void look_again(struct psd1 *b, int64_t t_ns)
-{
-    if (b->phase == PSD1_IDLE) psd1_try_start(b, t_ns);
-    else if (b->phase == PSD1_START && !conditions(b) && b->due_ns > t_ns) psd1_due(b, PSD1_IDLE, SCHED_NEVER);
-}
-
-void psd1_flags(struct psd1 *b, bool int0, bool fl1, int64_t t_ns)
-{
-    if (b->phase == PSD1_OFF) return;
-    b->int0 = int0;
-    b->fl1 = fl1;
-    psd1_put(b, PSD1_BIT(INT0) | PSD1_BIT(FL1), (int0 ? PSD1_BIT(INT0) : 0) | (fl1 ? 0 : PSD1_BIT(FL1)), t_ns);
-    look_again(b, t_ns);
-}
-
-void psd1_setup_done(struct psd1 *b, int64_t t_ns)
-{
-    b->ready = true;
-    b->lost = psd1_lost(b);
-    psd1_tell(b, PSD1_EV_SETUP_DONE, t_ns);
-    if (b->profile.int0 == PSD1_INT0_AUTO) psd1_flags(b, true, true, t_ns);
-}
-
 /* ---- data-ready and patience ---- */
 
-void psd1_arm_patience(struct psd1 *b, int64_t t_ns)
-{
-    b->patience_ns = t_ns + PSD1_PATIENCE_NS + 12 * ad7712_period_ns(&b->adc[0]);
-    if (!b->patience.queued || b->patience.due_ns > b->patience_ns) sched_at(b->sched, &b->patience, b->patience_ns);
-}
-
-/* A host that does not read keeps DR low: nothing is wrong with the converters then. */
-static void out_of_patience(void *ctx, int64_t t_ns)
+/* A host that does not read keeps DR low: that is no fault of the converters. */
+static void on_dr_timeout(void *ctx, int64_t t_ns)
 {
     struct psd1 *b = ctx;
-    if (t_ns < b->patience_ns) {
-        sched_at(b->sched, &b->patience, b->patience_ns);
+    if (t_ns < b->timeout_ns) {
+        sched_at(b->sched, &b->timeout, b->timeout_ns);
         return;
     }
     b->counters.timeouts++;
-    if (!b->fault_told && b->host.fault) b->host.fault(b->host.ctx, PSD1_FAULT_DR, t_ns);
-    b->fault_told = true;
-    psd1_job_patience(b, t_ns);
+    if (!b->fault_notified && b->host.fault) b->host.fault(b->host.ctx, PSD1_FAULT_DR, t_ns);
+    b->fault_notified = true;
+    psd1_job_timeout(b, t_ns);
+    start_next(b, t_ns);
 }
 
 static void refresh_degc(struct psd1 *b, int64_t t_ns)
@@ -152,11 +109,12 @@ static void dr_fell(struct psd1 *b, int64_t t_ns)
 {
     b->dr_ns = t_ns;
     refresh_degc(b, t_ns);
-    psd1_arm_patience(b, t_ns);
-    if (b->fault_told && b->host.fault) b->host.fault(b->host.ctx, 0, t_ns);
-    b->fault_told = false;
-    psd1_tell(b, PSD1_EV_DR, t_ns);
+    psd1_arm_timeout(b, t_ns);
+    if (b->fault_notified && b->host.fault) b->host.fault(b->host.ctx, 0, t_ns);
+    b->fault_notified = false;
+    psd1_notify_event(b, PSD1_EV_DR, t_ns);
     psd1_job_dr(b, t_ns);
+    start_next(b, t_ns);
 }
 
 static bool dr_of(const struct psd1 *b)
@@ -176,7 +134,7 @@ static void on_drdy(void *ctx, bool level, int64_t t_ns)
     b->dr = dr;
     psd1_put(b, PSD1_BIT(DR), dr ? PSD1_BIT(DR) : 0, t_ns);
     if (!dr) dr_fell(b, t_ns);
-    look_again(b, t_ns);
+    psd1_recheck_start(b, t_ns);
 }
 
 /* The signal is on the profile's input; the other one is not connected. The reference's error is its inverse on the input. */
@@ -285,7 +243,7 @@ void psd1_init(struct psd1 *b, const struct psd1_profile *p, const struct board_
                struct sched *s)
 {
     assert(io->accel && io->temp_degc);
-    memset(b, 0, sizeof *b); /* nothing of an earlier life, above all no time of it */
+    memset(b, 0, sizeof *b); /* no state of an earlier run */
     b->profile = *p;
     b->unit = *cfg;
     b->io = *io;
@@ -293,7 +251,7 @@ void psd1_init(struct psd1 *b, const struct psd1_profile *p, const struct board_
     b->due_ns = SCHED_NEVER;
     b->dr = true;
     sched_ev(&b->ev, step_event, b);
-    sched_ev(&b->patience, out_of_patience, b);
+    sched_ev(&b->timeout, on_dr_timeout, b);
     init_trace(b);
     init_adc(b);
     psd1_bus_init(b);
@@ -307,7 +265,7 @@ void psd1_attach(struct psd1 *b, const struct psd1_host *host)
     b->host = *host;
 }
 
-/* Everything under way ends, the lines that the controller drives go to rest, it forgets. */
+/* Ends all activity; its lines go to rest; its state is cleared. */
 static void stop_all(struct psd1 *b, enum board_cycle_result why, int64_t t_ns)
 {
     psd1_cut(b, t_ns);
@@ -326,15 +284,15 @@ static void stop_all(struct psd1 *b, enum board_cycle_result why, int64_t t_ns)
 static void enter_reset(struct psd1 *b, int64_t t_ns)
 {
     stop_all(b, BOARD_CYCLE_OFF, t_ns);
-    sync(b, false, t_ns);
+    put_sync(b, false, t_ns);
     psd1_due(b, PSD1_IN_RESET, t_ns + b->profile.reset_ns);
-    psd1_arm_patience(b, t_ns);
+    psd1_arm_timeout(b, t_ns);
 }
 
 void psd1_power_up(struct psd1 *b, int64_t t_ns)
 {
     if (b->phase != PSD1_OFF) return;
-    psd1_tell(b, PSD1_EV_POWER_UP, t_ns);
+    psd1_notify_event(b, PSD1_EV_POWER_UP, t_ns);
     b->t0_ns = t_ns;
     b->phase = PSD1_IN_RESET;
     trace_put(&b->base.trace, TRACE_FIRST(PSD1_LINES), rest_levels(b), t_ns);
@@ -349,7 +307,7 @@ void psd1_reset(struct psd1 *b, int64_t t_ns)
     if (b->phase == PSD1_OFF) return;
     b->counters.resets++;
     enter_reset(b, t_ns);
-    psd1_tell(b, PSD1_EV_RES, t_ns);
+    psd1_notify_event(b, PSD1_EV_RES, t_ns);
 }
 
 void psd1_power_down(struct psd1 *b, int64_t t_ns)
@@ -358,13 +316,13 @@ void psd1_power_down(struct psd1 *b, int64_t t_ns)
     stop_all(b, BOARD_CYCLE_OFF, t_ns);
     psd1_wave_power(b, false, t_ns);
     psd1_due(b, PSD1_OFF, SCHED_NEVER);
-    sched_cancel(b->sched, &b->patience);
-    b->fault_told = false;
+    sched_cancel(b->sched, &b->timeout);
+    b->fault_notified = false;
     for (unsigned i = 0; i < 3; i++) ad7712_power_off(&b->adc[i], t_ns);
     b->dr = true;
     trace_put(&b->base.trace, TRACE_FIRST(PSD1_LINES), 0, t_ns);
-    psd1_tell(b, PSD1_EV_RES, t_ns);
-    psd1_tell(b, PSD1_EV_POWER_DOWN, t_ns);
+    psd1_notify_event(b, PSD1_EV_RES, t_ns);
+    psd1_notify_event(b, PSD1_EV_POWER_DOWN, t_ns);
 }
 
 void psd1_sample_until(struct psd1 *b, int64_t t_ns)

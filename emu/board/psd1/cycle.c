@@ -9,14 +9,14 @@ uint32_t psd1_lost(struct psd1 *b)
     return sum;
 }
 
-static uint32_t conversions(const struct psd1 *b)
+static uint32_t conversion_count(const struct psd1 *b)
 {
     uint32_t sum = 0;
     for (unsigned i = 0; i < 3; i++) sum += b->adc[i].n.conversions + b->adc[i].n.lost_words;
     return sum;
 }
 
-static void fl2(struct psd1 *b, bool active, int64_t t_ns)
+static void put_fl2(struct psd1 *b, bool active, int64_t t_ns)
 {
     b->fl2 = active;
     psd1_put(b, PSD1_BIT(FL2), active == (b->profile.fl2 == PSD1_ACTIVE_HIGH) ? PSD1_BIT(FL2) : 0, t_ns);
@@ -28,10 +28,10 @@ int64_t psd1_cycle_start(struct psd1 *b, int64_t t_ns)
 {
     b->axis = 0;
     b->now = (struct psd1_cycle){.seq = b->seq++, .t_dr_ns = b->dr_ns, .t_a0_ns = t_ns};
-    b->conversions = conversions(b);
+    b->conversions = conversion_count(b);
     psd1_a0(b, true, t_ns);
     psd1_aux_latch(b, &b->now, t_ns);
-    psd1_tell(b, PSD1_EV_A0, t_ns);
+    psd1_notify_event(b, PSD1_EV_A0, t_ns);
     b->phase = PSD1_RF_FALL;
     return t_ns + PSD1_HALF_NS;
 }
@@ -44,7 +44,7 @@ int64_t psd1_rf_fall(struct psd1 *b, int64_t t_ns)
     psd1_rf(b, axis, false, t_ns);
     const uint32_t word = ad7712_read_word(&b->adc[axis], 16, &sclk);
     psd1_frame_begin(b, PSD1_FORM_READ16, word, t_ns);
-    psd1_tell(b, PSD1_EV_RFX + axis, t_ns);
+    psd1_notify_event(b, PSD1_EV_RFX + axis, t_ns);
     b->phase = PSD1_RF_RISE;
     return t_ns + PSD1_READ16_NS;
 }
@@ -62,29 +62,13 @@ int64_t psd1_rf_rise(struct psd1 *b, int64_t t_ns)
     psd1_frame_end(b, t_ns);
     psd1_rf(b, axis, true, t_ns);
     b->now.word[axis] = word_of(b);
-    fl2(b, true, t_ns);
+    put_fl2(b, true, t_ns);
     b->fl2_ns = t_ns;
     b->taken = false;
     if (axis == 2 && b->profile.a0_release == PSD1_A0_RFZ) psd1_a0(b, false, t_ns);
     b->phase = PSD1_READY;
-    psd1_tell(b, PSD1_EV_FL2, t_ns);
+    psd1_notify_event(b, PSD1_EV_FL2, t_ns);
     return b->profile.host_strobe_ns ? t_ns + b->profile.host_strobe_ns : SCHED_NEVER;
-}
-
-/* Unless somebody else is on the bus: then after him. */
-int64_t psd1_host_strobe(struct psd1 *b, int64_t t_ns)
-{
-    if (!psd1_bus_free(b)) return b->bus.end_ns > t_ns ? b->bus.end_ns : t_ns + PSD1_PERIOD_NS;
-    psd1_bus_host(b, t_ns);
-    b->phase = PSD1_STROBE_END;
-    return b->bus.end_ns;
-}
-
-int64_t psd1_host_end(struct psd1 *b, int64_t t_ns)
-{
-    psd1_bus_over(b, t_ns);
-    b->phase = PSD1_CLEAR;
-    return psd1_next_fall(b, t_ns);
 }
 
 static uint8_t status_of(struct psd1 *b)
@@ -93,7 +77,7 @@ static uint8_t status_of(struct psd1 *b)
     const uint32_t lost = psd1_lost(b);
     uint8_t status = c->status;
     if (lost != b->lost) status |= PSD1_CY_OVERRUN;
-    if (conversions(b) != b->conversions) status |= PSD1_CY_MIXED;
+    if (conversion_count(b) != b->conversions) status |= PSD1_CY_MIXED;
     for (unsigned i = 0; i < 3; i++)
         if (c->word[i] == 0 || c->word[i] == 0xFFFF) status |= PSD1_CY_CLIP;
     b->lost = lost;
@@ -110,15 +94,14 @@ static int64_t cycle_end(struct psd1 *b, int64_t t_ns)
     b->counters.cycles++;
     b->latest = *c;
     b->phase = PSD1_IDLE;
-    psd1_tell(b, PSD1_EV_CYCLE, t_ns);
+    psd1_notify_event(b, PSD1_EV_CYCLE, t_ns);
     if (b->host.cycle) b->host.cycle(b->host.ctx, &b->latest, t_ns);
-    psd1_try_start(b, t_ns);
     return b->due_ns;
 }
 
 int64_t psd1_clear(struct psd1 *b, int64_t t_ns)
 {
-    fl2(b, false, t_ns);
+    put_fl2(b, false, t_ns);
     b->due_ns = SCHED_NEVER;
     if (b->axis == 2) return cycle_end(b, t_ns);
     b->axis++;
@@ -139,6 +122,6 @@ void psd1_cut(struct psd1 *b, int64_t t_ns)
     b->counters.cut++;
     if (b->frame.active) psd1_frame_end(b, t_ns);
     psd1_rf(b, b->axis, true, t_ns);
-    fl2(b, false, t_ns);
+    put_fl2(b, false, t_ns);
     psd1_a0(b, false, t_ns);
 }

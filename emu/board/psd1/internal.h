@@ -5,15 +5,15 @@
 #include "board/board.h"
 #include "board/psd1/psd1.h"
 
-#define PSD1_BIT(line)   TRACE_BIT(PSD1_LINE_##line)
-#define PSD1_AB          (UINT64_C(0xF) << PSD1_LINE_AB0)
-#define PSD1_D           (UINT64_C(0xFFFF) << PSD1_LINE_D0)
-#define PSD1_BUS         (PSD1_BIT(CS) | PSD1_BIT(RW) | PSD1_AB | PSD1_D)
-#define PSD1_HALF_NS     (PSD1_PERIOD_NS / 2)
-#define PSD1_SCLK_NS     700 /* RFx fall to the first SCLK rise: article, section 4 */
-#define PSD1_READ16_NS   13600
-#define PSD1_FRAME24_NS  20000
-#define PSD1_PATIENCE_NS 100000000
+#define PSD1_BIT(line)  TRACE_BIT(PSD1_LINE_##line)
+#define PSD1_AB         (UINT64_C(0xF) << PSD1_LINE_AB0)
+#define PSD1_D          (UINT64_C(0xFFFF) << PSD1_LINE_D0)
+#define PSD1_BUS        (PSD1_BIT(CS) | PSD1_BIT(RW) | PSD1_AB | PSD1_D)
+#define PSD1_HALF_NS    (PSD1_PERIOD_NS / 2)
+#define PSD1_SCLK_NS    700 /* RFx fall to the first SCLK rise: article, section 4 */
+#define PSD1_READ16_NS  13600
+#define PSD1_FRAME24_NS 20000
+#define PSD1_TIMEOUT_NS 100000000
 
 /* ---- psd1/wave.c ---- */
 void psd1_wave_init(struct psd1 *b);
@@ -29,7 +29,7 @@ static inline void psd1_put(struct psd1 *b, uint64_t lines, uint64_t level, int6
     trace_put(&b->base.trace, lines, level, t_ns);
 }
 
-static inline void psd1_tell(const struct psd1 *b, enum psd1_event e, int64_t t_ns)
+static inline void psd1_notify_event(const struct psd1 *b, enum psd1_event e, int64_t t_ns)
 {
     if (b->base.observed) b->io.event(b->io.ctx, e, t_ns);
 }
@@ -53,17 +53,41 @@ static inline struct ad7712_sclk psd1_sclk(int64_t t_ns)
     return (struct ad7712_sclk){t_ns + PSD1_SCLK_NS, PSD1_PERIOD_NS, PSD1_HALF_NS};
 }
 
-/* ---- psd1.c ---- */
-void psd1_a0(struct psd1 *b, bool level, int64_t t_ns);
-void psd1_rf(struct psd1 *b, unsigned axis, bool level, int64_t t_ns);
-void psd1_due(struct psd1 *b, enum psd1_phase phase, int64_t t_ns); /* from outside of the controller's event */
-void psd1_try_start(struct psd1 *b, int64_t t_ns); /* idle: a cycle or a command, if there is reason to */
-void psd1_arm_patience(struct psd1 *b, int64_t t_ns);
-void psd1_setup_done(struct psd1 *b, int64_t t_ns);
+/* ---- pins and events that all parts move ---- */
+static inline void psd1_a0(struct psd1 *b, bool level, int64_t t_ns)
+{
+    psd1_put(b, PSD1_BIT(A0), level ? PSD1_BIT(A0) : 0, t_ns);
+    for (unsigned i = 0; i < 3; i++) ad7712_a0_pin(&b->adc[i], level, t_ns);
+}
+
+static inline void psd1_rf(struct psd1 *b, unsigned axis, bool level, int64_t t_ns)
+{
+    const uint64_t line = PSD1_BIT(RFX) << axis;
+    psd1_put(b, line, level ? line : 0, t_ns);
+    ad7712_rfs_pin(&b->adc[axis], level, t_ns);
+}
+
+/* The next event of the controller; inside a step it is scheduled by the controller. */
+static inline void psd1_due(struct psd1 *b, enum psd1_phase phase, int64_t t_ns)
+{
+    b->phase = phase;
+    b->due_ns = t_ns;
+    if (b->stepping) return;
+    if (t_ns == SCHED_NEVER) sched_cancel(b->sched, &b->ev);
+    else sched_at(b->sched, &b->ev, t_ns);
+}
+
+/* A fault if DR does not fall in time. */
+static inline void psd1_arm_timeout(struct psd1 *b, int64_t t_ns)
+{
+    b->timeout_ns = t_ns + PSD1_TIMEOUT_NS + 12 * ad7712_period_ns(&b->adc[0]);
+    if (!b->timeout.queued || b->timeout.due_ns > b->timeout_ns) sched_at(b->sched, &b->timeout, b->timeout_ns);
+}
 
 /* ---- steps: at the instant of the phase; the next one's is returned, the phase set ---- */
 typedef int64_t psd1_step(struct psd1 *b, int64_t t_ns);
-psd1_step psd1_cycle_start, psd1_rf_fall, psd1_rf_rise, psd1_host_strobe, psd1_host_end, psd1_clear; /* psd1/cycle.c */
+psd1_step psd1_cycle_start, psd1_rf_fall, psd1_rf_rise, psd1_clear; /* psd1/cycle.c */
+psd1_step psd1_host_strobe, psd1_host_end;                          /* psd1/bus.c, of the built-in host */
 psd1_step psd1_tfs_fall, psd1_tfs_rise, psd1_await_dr, psd1_coef_a0, psd1_coef_fall, psd1_coef_rise; /* psd1/job.c */
 psd1_step psd1_job_next; /* begins the operation that is due */
 
@@ -76,15 +100,13 @@ void psd1_job_init(struct psd1 *b);
 enum board_cycle_result psd1_request_check(const struct psd1 *b, uint8_t command, uint32_t word, const char **why);
 void psd1_job_setup(struct psd1 *b); /* the row of the set-up; its first step is due */
 void psd1_job_stop(struct psd1 *b, enum board_cycle_result result, int64_t t_ns);
-bool psd1_job_waits(struct psd1 *b, int64_t t_ns);    /* idle: a command that has waited for the cycle's end begins */
-void psd1_job_patience(struct psd1 *b, int64_t t_ns); /* no DR for too long */
-void psd1_job_dr(struct psd1 *b, int64_t t_ns);       /* DR has fallen */
+void psd1_job_timeout(struct psd1 *b, int64_t t_ns);   /* no DR for too long */
+void psd1_job_dr(struct psd1 *b, int64_t t_ns);        /* DR has fallen */
+void psd1_try_start(struct psd1 *b, int64_t t_ns);     /* idle: a command or a cycle, if its conditions are met */
+void psd1_recheck_start(struct psd1 *b, int64_t t_ns); /* one of the conditions has changed */
 
 /* ---- psd1/bus.c ---- */
 void psd1_bus_init(struct psd1 *b);
-bool psd1_bus_free(const struct psd1 *b);         /* for the built-in host */
-void psd1_bus_host(struct psd1 *b, int64_t t_ns); /* its strobe begins */
-void psd1_bus_over(struct psd1 *b, int64_t t_ns); /* it ends */
 void psd1_bus_stop(struct psd1 *b, int64_t t_ns);
 
 /* ---- psd1/aux.c ---- */

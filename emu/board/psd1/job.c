@@ -1,4 +1,4 @@
-/* The controller's own business between cycles: control words UC1 and UC2 by TFS, coefficients and control words back.
+/* Operations of the controller between cycles: control words UC1 and UC2 by TFS, coefficients and control words back.
  *
  * The article names the words, their way through РК, and that the converters calibrate themselves and keep the coefficients;
  * order and instants are ours (E0): frames as those of the cycle, of 24 SCLK, A0 low for control words. */
@@ -31,7 +31,7 @@ static const struct psd1_job_step look[] = {{.op = CONTROL}, {.op = END}};
 
 /* ---- rows ---- */
 
-static int64_t finish(struct psd1 *b, int64_t t_ns)
+static int64_t finish_job(struct psd1 *b, int64_t t_ns)
 {
     struct psd1_job *j = &b->job;
     struct psd1_request *r = j->request;
@@ -39,9 +39,7 @@ static int64_t finish(struct psd1 *b, int64_t t_ns)
     j->request = NULL;
     b->phase = PSD1_IDLE;
     b->due_ns = SCHED_NEVER;
-    if (!b->ready) psd1_setup_done(b, t_ns);
     if (r) r->done(r->ctx, r, BOARD_CYCLE_OK, t_ns);
-    psd1_try_start(b, t_ns);
     return b->due_ns;
 }
 
@@ -62,7 +60,7 @@ int64_t psd1_job_next(struct psd1 *b, int64_t t_ns)
         b->phase = PSD1_TFS_FALL;
         return psd1_next_fall(b, t_ns);
     case AWAIT:
-        psd1_arm_patience(b, t_ns);
+        psd1_arm_timeout(b, t_ns);
         b->phase = PSD1_AWAIT_DR;
         return t_ns + clk_span_ns(b->profile.adc_clkin_hz, IGNORE_TAU);
     case COEF:
@@ -73,11 +71,11 @@ int64_t psd1_job_next(struct psd1 *b, int64_t t_ns)
         j->axis = j->request->command & PSD1_CMD_AXIS;
         return word_first(b, t_ns);
     default:
-        return finish(b, t_ns);
+        return finish_job(b, t_ns);
     }
 }
 
-static int64_t go_on(struct psd1 *b, int64_t t_ns)
+static int64_t next_operation(struct psd1 *b, int64_t t_ns)
 {
     b->job.at++;
     return psd1_job_next(b, t_ns);
@@ -102,7 +100,7 @@ int64_t psd1_tfs_fall(struct psd1 *b, int64_t t_ns)
         ad7712_write_word(&b->adc[i], psd1_rk_give_word(&b->rk), PSD1_RK_BITS, &sclk);
     }
     psd1_frame_begin(b, PSD1_FORM_WRITE24, word, t_ns);
-    psd1_tell(b, PSD1_EV_UC, t_ns);
+    psd1_notify_event(b, PSD1_EV_UC, t_ns);
     b->phase = PSD1_TFS_RISE;
     return t_ns + PSD1_FRAME24_NS;
 }
@@ -117,18 +115,18 @@ int64_t psd1_tfs_rise(struct psd1 *b, int64_t t_ns)
 {
     psd1_frame_end(b, t_ns);
     tfs_up(b, t_ns);
-    return go_on(b, t_ns);
+    return next_operation(b, t_ns);
 }
 
 int64_t psd1_await_dr(struct psd1 *b, int64_t t_ns)
 {
-    return b->dr ? SCHED_NEVER : go_on(b, t_ns);
+    return b->dr ? SCHED_NEVER : next_operation(b, t_ns);
 }
 
 void psd1_job_dr(struct psd1 *b, int64_t t_ns)
 {
     if (b->phase != PSD1_AWAIT_DR || b->due_ns != SCHED_NEVER) return;
-    const int64_t due_ns = go_on(b, t_ns);
+    const int64_t due_ns = next_operation(b, t_ns);
     psd1_due(b, b->phase, due_ns);
 }
 
@@ -186,13 +184,13 @@ int64_t psd1_coef_rise(struct psd1 *b, int64_t t_ns)
     if (j->at->op == COEF && keep_coef(b)) return t_ns + PSD1_PERIOD_NS;
     if (j->at->op == CONTROL) j->request->word = b->rk.bits;
     psd1_a0(b, false, t_ns);
-    return go_on(b, t_ns);
+    return next_operation(b, t_ns);
 }
 
 /* ---- requests ---- */
 
 /* What is wrong with a control word, or NULL. */
-static const char *wrong_word(uint8_t command, uint32_t word)
+static const char *check_word(uint8_t command, uint32_t word)
 {
     const unsigned md = word >> 21, fs = word & AD7712_CTL_FS;
     if (word & AD7712_CTL_WL) return "WL must be 0: RK takes words of 16 bits in a cycle";
@@ -210,7 +208,7 @@ static const struct psd1_job_step *row_of(uint8_t command)
     return command >= PSD1_CMD_CONTROL && command < PSD1_CMD_CONTROL + 3 ? look : NULL;
 }
 
-static void begin(struct psd1 *b, int64_t t_ns)
+static void begin_job(struct psd1 *b, int64_t t_ns)
 {
     struct psd1_job *j = &b->job;
     j->waits = false;
@@ -227,7 +225,7 @@ enum board_cycle_result psd1_request_check(const struct psd1 *b, uint8_t command
 {
     const struct psd1_job_step *row = row_of(command);
     *why = row ? NULL : "there is no such command";
-    if (row && row != look) *why = wrong_word(command, word);
+    if (row && row != look) *why = check_word(command, word);
     if (*why) return BOARD_CYCLE_BAD_VALUE;
     if (b->phase == PSD1_OFF || b->phase == PSD1_IN_RESET) return BOARD_CYCLE_OFF;
     return b->job.at || b->job.request ? BOARD_CYCLE_BUSY : BOARD_CYCLE_OK;
@@ -240,13 +238,13 @@ enum board_cycle_result psd1_request(struct psd1 *b, struct psd1_request *r, con
     if (result != BOARD_CYCLE_OK) return result;
     j->request = r;
     j->waits = true;
-    if (b->phase == PSD1_IDLE || b->phase == PSD1_START) begin(b, t_ns);
+    if (b->phase == PSD1_IDLE || b->phase == PSD1_START) begin_job(b, t_ns);
     else sched_at(b->sched, &j->ev, t_ns + JOB_WAIT_NS);
     return BOARD_CYCLE_OK;
 }
 
 /* The cycle has not ended: if it only waits for its host, it is cut. */
-static void out_of_patience(void *ctx, int64_t t_ns)
+static void on_wait_timeout(void *ctx, int64_t t_ns)
 {
     struct psd1 *b = ctx;
     if (b->phase != PSD1_READY || (b->bus.busy && b->bus.takes)) {
@@ -254,12 +252,12 @@ static void out_of_patience(void *ctx, int64_t t_ns)
         return;
     }
     psd1_cut(b, t_ns);
-    begin(b, t_ns);
+    begin_job(b, t_ns);
 }
 
 void psd1_job_init(struct psd1 *b)
 {
-    sched_ev(&b->job.ev, out_of_patience, b);
+    sched_ev(&b->job.ev, on_wait_timeout, b);
 }
 
 void psd1_job_setup(struct psd1 *b)
@@ -267,16 +265,8 @@ void psd1_job_setup(struct psd1 *b)
     b->job.at = calibrate;
 }
 
-/* For psd1_try_start(): a request that has waited for the cycle's end begins. */
-bool psd1_job_waits(struct psd1 *b, int64_t t_ns)
-{
-    if (!b->job.waits) return false;
-    begin(b, t_ns);
-    return true;
-}
-
-/* No DR: the set-up waits on, a request has failed. */
-void psd1_job_patience(struct psd1 *b, int64_t t_ns)
+/* No DR: the set-up waits on, a request fails. */
+void psd1_job_timeout(struct psd1 *b, int64_t t_ns)
 {
     struct psd1_request *r = b->job.request;
     if (b->phase != PSD1_AWAIT_DR || !r) return;
@@ -284,7 +274,6 @@ void psd1_job_patience(struct psd1 *b, int64_t t_ns)
     b->job.request = NULL;
     psd1_due(b, PSD1_IDLE, SCHED_NEVER);
     r->done(r->ctx, r, BOARD_CYCLE_NOT_READY, t_ns);
-    psd1_try_start(b, t_ns);
 }
 
 void psd1_job_stop(struct psd1 *b, enum board_cycle_result result, int64_t t_ns)
@@ -300,4 +289,41 @@ void psd1_job_stop(struct psd1 *b, enum board_cycle_result result, int64_t t_ns)
     j->request = NULL;
     j->waits = j->data_first = false;
     if (r) r->done(r->ctx, r, result, t_ns);
+}
+
+/* ---- idle: what begins next ---- */
+
+/* A request that has waited for the end of the cycle begins. */
+static bool start_waiting(struct psd1 *b, int64_t t_ns)
+{
+    if (!b->job.waits) return false;
+    begin_job(b, t_ns);
+    return true;
+}
+
+static bool cycle_allowed(const struct psd1 *b)
+{
+    return b->ready && b->int0 && b->fl1 && !b->dr;
+}
+
+void psd1_try_start(struct psd1 *b, int64_t t_ns)
+{
+    if (b->phase != PSD1_IDLE || start_waiting(b, t_ns) || !cycle_allowed(b)) return;
+    psd1_due(b, PSD1_START, psd1_next_rise(b, t_ns));
+}
+
+/* One of them has changed. What changes at the very instant of the rise is too late for it. */
+void psd1_recheck_start(struct psd1 *b, int64_t t_ns)
+{
+    if (b->phase == PSD1_IDLE) psd1_try_start(b, t_ns);
+    else if (b->phase == PSD1_START && !cycle_allowed(b) && b->due_ns > t_ns) psd1_due(b, PSD1_IDLE, SCHED_NEVER);
+}
+
+void psd1_flags(struct psd1 *b, bool int0, bool fl1, int64_t t_ns)
+{
+    if (b->phase == PSD1_OFF) return;
+    b->int0 = int0;
+    b->fl1 = fl1;
+    psd1_put(b, PSD1_BIT(INT0) | PSD1_BIT(FL1), (int0 ? PSD1_BIT(INT0) : 0) | (fl1 ? 0 : PSD1_BIT(FL1)), t_ns);
+    psd1_recheck_start(b, t_ns);
 }

@@ -42,7 +42,7 @@ struct psd1_cycle {
     uint8_t status;  /* enum psd1_cycle_status */
 };
 
-/* EMCY code of psd1_host.fault: told once, again only after DR has come. */
+/* EMCY code of psd1_host.fault: notified once, again only after DR has come. */
 #define PSD1_FAULT_DR 0xFF01 /* no DR for 100 ms beyond the settling time */
 
 /* Commands of register COMMAND, and what the CAN side asks for. Those with an axis have it in the low bits. */
@@ -66,7 +66,7 @@ struct psd1_request {
     void *ctx;
 };
 
-/* Who hears of what the board does; any may be NULL. */
+/* Receiver of notifications; any may be NULL. */
 struct psd1_host {
     void *ctx;
     void (*cycle)(void *ctx, const struct psd1_cycle *c, int64_t t_ns);

@@ -39,7 +39,7 @@ struct psd1_strobe {
 
 struct psd1_job_step;
 
-/* The controller's own business between cycles: a row of operations. */
+/* A row of operations between cycles. */
 struct psd1_job {
     const struct psd1_job_step *at; /* NULL: none */
     struct psd1_request *request;   /* under way or waiting; NULL: none, or the set-up's */
@@ -49,7 +49,7 @@ struct psd1_job {
     bool data_first;                /* its word is read, that its control word can be */
     int64_t word_ns;                /* when that was over */
     bool failed;                    /* the latest of register COMMAND */
-    struct sched_ev ev;             /* the end of its patience with the cycle */
+    struct sched_ev ev;             /* its timeout while it waits for the cycle */
 };
 
 struct psd1_gyro {                     /* one laser gyro and its rate sensor */
@@ -95,7 +95,6 @@ struct psd1 {
     struct sched_ev ev;
     bool stepping;       /* inside the event: it arms itself */
     bool ready;          /* the set-up has been carried out */
-    bool dark;           /* the lines lie low since a power-down */
     bool int0, fl1, fl2; /* active */
     bool drdy[3], dr;    /* levels */
     int64_t dr_ns;       /* latest fall of DR */
@@ -118,10 +117,10 @@ struct psd1 {
     uint32_t zero[3], full[3]; /* coefficients as read after the latest calibration */
     bool coef_known;
     uint8_t last_command, temp_channel, service_channel;
-    /* patience with DR */
-    int64_t patience_ns;
-    bool fault_told;
-    struct sched_ev patience;
+    /* timeout of DR */
+    int64_t timeout_ns;
+    bool fault_notified;
+    struct sched_ev timeout;
 };
 
 #endif

@@ -1,4 +1,4 @@
-/* What moves all the time or in long rows: 1M25, and SCLK and SDAT of a frame. Reported while somebody looks, from forms that
+/* What moves all the time or in long rows: 1M25, and SCLK and SDAT of a frame. Reported while watched, from forms that
  * are laid out once: a copy with the word's bits in it, a few instructions an edge. */
 #include "board/psd1/wave.h"
 
@@ -23,7 +23,7 @@ static const struct {
 
 /* ---- forms ---- */
 
-static void add(struct psd1_wave_form *f, int64_t t_ns, uint64_t lines, uint64_t level, int8_t bit)
+static void add_edges(struct psd1_wave_form *f, int64_t t_ns, uint64_t lines, uint64_t level, int8_t bit)
 {
     struct psd1_wave_step *at = f->step + f->count++;
     for (; at > f->step && at[-1].s.t_ns > t_ns; at--) at[0] = at[-1];
@@ -40,13 +40,13 @@ static void lay_out(struct psd1_wave_form *f, const struct psd1_profile *p, enum
     f->count = 0;
     for (unsigned i = 0; i < bits; i++) {
         const int64_t rise_ns = PSD1_SCLK_NS + (int64_t)i * PSD1_PERIOD_NS, fall_ns = rise_ns + PSD1_HALF_NS;
-        add(f, i ? fall_ns - PSD1_PERIOD_NS + later_ns : first_ns, SDAT, 0, (int8_t)i);
-        add(f, rise_ns, SCLK, SCLK, NO_BIT);
-        add(f, fall_ns, SCLK, 0, NO_BIT);
+        add_edges(f, i ? fall_ns - PSD1_PERIOD_NS + later_ns : first_ns, SDAT, 0, (int8_t)i);
+        add_edges(f, rise_ns, SCLK, SCLK, NO_BIT);
+        add_edges(f, fall_ns, SCLK, 0, NO_BIT);
     }
     for (int64_t t_ns = PSD1_HALF_NS; clock && t_ns <= forms[form].len_ns; t_ns += PSD1_HALF_NS)
-        add(f, t_ns, CLK, t_ns % PSD1_PERIOD_NS ? CLK : 0, NO_BIT);
-    add(f, forms[form].len_ns, SDAT, 0, (int8_t)bits);
+        add_edges(f, t_ns, CLK, t_ns % PSD1_PERIOD_NS ? CLK : 0, NO_BIT);
+    add_edges(f, forms[form].len_ns, SDAT, 0, (int8_t)bits);
 }
 
 /* ---- reporting ---- */
@@ -158,7 +158,7 @@ void psd1_frame_end(struct psd1 *b, int64_t t_ns)
     trace_put(&b->base.trace, SCLK | SDAT, 0, t_ns);
 }
 
-/* ---- who listens ---- */
+/* ---- observers ---- */
 
 /* SCLK and SDAT of the frame under way as they are at t_ns, and where its report goes on. */
 static void join_frame(struct psd1 *b, int64_t t_ns)
@@ -186,7 +186,7 @@ static void join_clock(struct psd1 *b, int64_t t_ns)
     trace_put(&b->base.trace, CLK, since_ns % PSD1_PERIOD_NS < PSD1_HALF_NS ? CLK : 0, t_ns);
 }
 
-static void wake(void *ctx, uint64_t mask)
+static void wake_lines(void *ctx, uint64_t mask)
 {
     struct psd1 *b = ctx;
     const int64_t t_ns = b->sched->now_ns;
@@ -198,7 +198,7 @@ static void wake(void *ctx, uint64_t mask)
     if (b->frame.active && (b->wave.frame_on ? clock : frame)) join_frame(b, t_ns);
 }
 
-static int64_t report(void *ctx, int64_t t_ns)
+static int64_t report_lines(void *ctx, int64_t t_ns)
 {
     struct psd1 *b = ctx;
     struct psd1_wave *w = &b->wave;
@@ -215,7 +215,7 @@ void psd1_wave_init(struct psd1 *b)
     for (unsigned i = 0; i < PSD1_FORMS; i++)
         for (unsigned clock = 0; clock < 2; clock++)
             lay_out(&b->wave.form[i][clock], &b->profile, (enum psd1_form)i, clock);
-    b->base.trace.source = (struct trace_source){.wake = wake, .report = report, .ctx = b};
+    b->base.trace.source = (struct trace_source){.wake = wake_lines, .report = report_lines, .ctx = b};
 }
 
 void psd1_wave_power(struct psd1 *b, bool on, int64_t t_ns)

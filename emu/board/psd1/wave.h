@@ -23,7 +23,7 @@ struct psd1_wave_form {
 };
 enum psd1_form { PSD1_FORM_READ16, PSD1_FORM_READ24, PSD1_FORM_WRITE24, PSD1_FORMS };
 
-/* What of the lines is computed while somebody looks. */
+/* What of the lines is computed while watched. */
 struct psd1_wave {
     struct psd1_wave_form form[PSD1_FORMS][2]; /* without and with 1M25 */
     bool on;                                   /* clock_on or frame_on */
