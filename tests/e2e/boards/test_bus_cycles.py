@@ -96,7 +96,7 @@ def test_each_refusal_has_its_code_and_is_counted() -> None:
 
 def test_a_board_without_a_bus_says_so() -> None:
     with Emulator("quiet", pace="step") as emulator, control_of(emulator) as control:
-        with pytest.raises(ControlError, match="unit: a is a PSA-2, which has no parallel bus") as e:
+        with pytest.raises(ControlError, match="unit: expected a board with a parallel bus, got a, a PSA-2") as e:
             control.call("bus.read", unit="a", address=0)
         assert e.value.code == "range"
 
