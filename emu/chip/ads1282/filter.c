@@ -179,3 +179,79 @@ uint32_t ads1282_word(int64_t y_lsb, bool *clipped)
     const uint32_t sign = y < 0;
     return ((uint32_t)y << 1) | (*clipped ? !sign : sign);
 }
+
+/* ---- Sinc5 at the modulator's rate ---- */
+
+void ads1282_cic_init(struct ads1282_cic *c, unsigned ratio)
+{
+    *c = (struct ads1282_cic){.ratio = ratio};
+}
+
+bool ads1282_cic_take(struct ads1282_cic *c, int64_t x, int64_t *y)
+{
+    uint64_t sum = (uint64_t)x;
+    for (int s = 0; s < 5; s++) sum = c->integrator[s] += sum;
+    if (++c->n < c->ratio) return false;
+    c->n = 0;
+    for (int s = 0; s < 5; s++) {
+        const uint64_t was = c->comb[s];
+        c->comb[s] = sum;
+        sum -= was;
+    }
+    memcpy(y, &sum, sizeof sum); /* two's complement, whatever the compiler makes of a cast */
+    return true;
+}
+
+/* ---- High-pass ---- */
+
+#define FRACTION 20 /* bits of the state below the LSB */
+#define SPLIT    28 /* y d has up to 87 bits: taken in two parts */
+
+void ads1282_hpf_clear(struct ads1282_hpf *h)
+{
+    *h = (struct ads1282_hpf){0, 0};
+}
+
+/* y d / 2^33, rounded to nearest, for |y| < 2^55 and 0 <= d <= 2^32. */
+static int64_t fraction_of(int64_t y, int64_t d)
+{
+    const int64_t high = bits_round_shift(y - (INT64_C(1) << (SPLIT - 1)), SPLIT); /* floor */
+    const int64_t low = y - high * (INT64_C(1) << SPLIT);
+    const int64_t carry = (low * d + (INT64_C(1) << 32)) >> SPLIT; /* a half for the rounding */
+    return bits_round_shift(high * d + carry - (1 << (33 - SPLIT - 1)), 33 - SPLIT);
+}
+
+int64_t ads1282_hpf_step(struct ads1282_hpf *h, int64_t x, uint16_t hpf)
+{
+    const int64_t g = 131072 - hpf;                     /* (2 - a)/2 in 2^-17 */
+    const int64_t left = 65536 - hpf;                   /* 1 - a in 2^-16 */
+    const int64_t d = (INT64_C(1) << 32) - left * left; /* 1 - b in 2^-33 */
+    h->y += (x - h->x) * g * (1 << (FRACTION - 17)) - fraction_of(h->y, d);
+    h->x = x;
+    return bits_round_shift(h->y, FRACTION);
+}
+
+/* ---- Calibration ---- */
+
+#define LOG2_READINGS 4
+#define OFC_LSB       128 /* one count of OFC, in LSB of 2^-30 full scale */
+
+bool ads1282_cal_take(struct ads1282_cal *c, int64_t y_lsb)
+{
+    c->sum += y_lsb;
+    return --c->left == 0;
+}
+
+int32_t ads1282_cal_ofc(const struct ads1282_cal *c)
+{
+    return (int32_t)bits_clip(bits_round_shift(c->sum, LOG2_READINGS + 7), 24);
+}
+
+/* 400000h full scale / mean = 2^22 2^30 16 / sum. */
+uint32_t ads1282_cal_fsc(const struct ads1282_cal *c, int32_t ofc)
+{
+    const int64_t sum = c->sum - (int64_t)ofc * OFC_LSB * ADS1282_CAL_READINGS;
+    if (sum <= 0) return 0xFFFFFF;
+    const int64_t fsc = ((INT64_C(1) << 56) + sum / 2) / sum;
+    return fsc > 0xFFFFFF ? 0xFFFFFF : (uint32_t)fsc;
+}

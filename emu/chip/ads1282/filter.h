@@ -1,4 +1,5 @@
-/* Signal path of the ADS1281 / ADS1282 behind the modulator: sinc5, four FIR stages, OFC/FSC, output word.
+/* Signal path of the ADS1281 / ADS1282 behind the modulator: sinc5, four FIR stages, high-pass, OFC/FSC,
+ * output word, calibration.
  *
  * Bit-true in integers; pure but for the delay lines in the caller's struct; equal on every machine. The modulator is
  * ideal and its input is held over one sinc block (N modulator clocks), so that a block enters the fifth-order sinc as
@@ -15,11 +16,12 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#define ADS1282_BLOCKS     32u                /* sinc blocks in a data period: the stages decimate 2, 2, 4, 2 */
-#define ADS1282_BLOCK_LOG2 34u                /* input full scale: 2^34 */
-#define ADS1282_FS_LSB     (INT64_C(1) << 30) /* full scale of the 31-bit result */
-#define ADS1282_SATURATION 1.06               /* of full scale; the modulator clips there (103..106 %, E1/M70) */
-#define ADS1282_SINC_TAPS  5
+#define ADS1282_BLOCKS       32u                /* sinc blocks in a data period: the stages decimate 2, 2, 4, 2 */
+#define ADS1282_BLOCK_LOG2   34u                /* input full scale: 2^34 */
+#define ADS1282_FS_LSB       (INT64_C(1) << 30) /* full scale of the 31-bit result */
+#define ADS1282_SATURATION   1.06               /* of full scale; the modulator clips there (103..106 %, E1/M70) */
+#define ADS1282_SINC_TAPS    5
+#define ADS1282_CAL_READINGS 16 /* M80 */
 
 enum ads1282_phase { ADS1282_LINEAR, ADS1282_MINIMUM };
 
@@ -60,5 +62,52 @@ int64_t ads1282_correct(int64_t y_lsb, int32_t ofc, uint32_t fsc);
 
 /* Output word of the FIR modes: 31 bits left-justified, bit 0 repeats the sign unless clipped. */
 uint32_t ads1282_word(int64_t y_lsb, bool *clipped);
+
+/* Sinc5 at the modulator's rate: five integrators at CLK/4, decimation by N, five combs.
+ *
+ * Pure but for the state in the caller's struct; arithmetic modulo 2^64, as such filters are built: exact as long as the
+ * output fits. Sources 1.8. */
+struct ads1282_cic {
+    unsigned ratio, n; /* N; samples taken since the last output */
+    uint64_t integrator[5], comb[5];
+};
+
+void ads1282_cic_init(struct ads1282_cic *c, unsigned ratio); /* 8, 16, 32, 64, 128; clears the past */
+
+/* One sample. True each N: *y is the output, of gain N^5; |x| N^5 < 2^63. */
+bool ads1282_cic_take(struct ads1282_cic *c, int64_t x, int64_t *y);
+
+/* One-pole high-pass (FILTR = 11), the last filter of the chain. Sources 1.7.
+ *
+ * With a = HPF[1:0] / 65536: H(z) = (2 - a)/2 (1 - z^-1)/(1 - b z^-1), b = (1 + (1 - a)^2)/2; for a corner fHP the data
+ * sheet gives a = 1 - sqrt(1 - 2c), c = (cos w + sin w - 1)/cos w, w = 2 pi fHP/fDATA. Both factors are whole numbers of
+ * 2^-17 and 2^-33: the arithmetic here is exact but for one rounding a word to 2^-20 LSB (E0: the chip's own width is not
+ * known). Pure but for the state. */
+struct ads1282_hpf {
+    int64_t x; /* last input */
+    int64_t y; /* last output, in 2^-20 */
+};
+
+/* Forgets the past. */
+void ads1282_hpf_clear(struct ads1282_hpf *h);
+
+/* One word, |x| < 2^33; hpf is the register pair. Returns the output rounded to nearest. */
+int64_t ads1282_hpf_step(struct ads1282_hpf *h, int64_t x, uint16_t hpf);
+
+/* OFSCAL and GANCAL: the mean of sixteen readings becomes OFC or FSC. Sources 1.7. Pure. */
+struct ads1282_cal {
+    enum { ADS1282_CAL_NONE, ADS1282_CAL_OFFSET, ADS1282_CAL_GAIN } kind;
+    unsigned left; /* readings still to come */
+    int64_t sum;   /* of those taken, in LSB of 2^-30 full scale */
+};
+
+/* Takes a reading; true when it was the last. */
+bool ads1282_cal_take(struct ads1282_cal *c, int64_t y_lsb);
+
+/* OFC that makes the mean zero: 24 bits, saturating. */
+int32_t ads1282_cal_ofc(const struct ads1282_cal *c);
+
+/* FSC that makes the mean, less ofc, full scale: saturates at FFFFFFh, also where it would not be positive (E0). */
+uint32_t ads1282_cal_fsc(const struct ads1282_cal *c, int32_t ofc);
 
 #endif

@@ -8,11 +8,8 @@
 #include "base/rng.h"
 #include "base/sched.h"
 #include "base/spi.h"
-#include "chip/ads1282/cal.h"
 #include "chip/ads1282/cfg.h"
-#include "chip/ads1282/cic.h"
 #include "chip/ads1282/filter.h"
-#include "chip/ads1282/hpf.h"
 #include "chip/ads1282/mod.h"
 
 #include <stdbool.h>

@@ -1,7 +1,7 @@
 /* Arithmetic of OFSCAL and GANCAL (sources 1.7): sums of sixteen readings, in LSB of 2^-30 full scale, to OFC and FSC. */
 #include "rig.h"
 
-#include "chip/ads1282/cal.h"
+#include "chip/ads1282/filter.h"
 
 static const int64_t FULL_SCALE = INT64_C(16) << 30; /* of sixteen readings */
 

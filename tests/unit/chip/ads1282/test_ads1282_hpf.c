@@ -2,7 +2,7 @@
 #include "rig.h"
 
 #include "base/rng.h"
-#include "chip/ads1282/hpf.h"
+#include "chip/ads1282/filter.h"
 
 #include <complex.h>
 #include <math.h>

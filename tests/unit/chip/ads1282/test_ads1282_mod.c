@@ -1,7 +1,7 @@
 /* ADS1281/ADS1282: the bit-true modulator, the sinc at its rate, and the three chains beside each other (sources 1.7 to 1.9). */
 #include "ads1282_rig.h"
 
-#include "chip/ads1282/cic.h"
+#include "chip/ads1282/filter.h"
 #include "chip/ads1282/mod.h"
 
 #define FS (INT64_C(1) << 34)

@@ -2,7 +2,7 @@
 #include "ads1282_rig.h"
 
 #include "base/bits.h"
-#include "chip/ads1282/cic.h"
+#include "chip/ads1282/filter.h"
 
 #include <complex.h>
 
