@@ -48,13 +48,13 @@ static void on_done(void *ctx, const struct board_cycle *c, enum board_cycle_res
     else bus_pty_failed(&p->pty, board_cycle_word(r), t_ns);
 }
 
-static const char *submit(void *ctx, const struct bus_request *r, int64_t t_ns)
+static const char *submit_cycle(void *ctx, const struct bus_request *r, int64_t t_ns)
 {
     struct bus_port *p = ctx;
     const struct board_cycle cycle = {
         .write = r->op == BUS_WRITE, .address = r->address, .data = r->data, .strobe_ns = r->strobe_ns};
-    const struct bench_cycle wanted = {.cycle = cycle, .done = on_done, .ctx = p};
-    const enum board_cycle_result result = bench_cycle(p->bench, p->unit, &wanted, t_ns);
+    const struct bench_cycle request = {.cycle = cycle, .done = on_done, .ctx = p};
+    const enum board_cycle_result result = bench_cycle(p->bench, p->unit, &request, t_ns);
     return result == BOARD_CYCLE_OK ? NULL : board_cycle_word(result);
 }
 
@@ -73,7 +73,7 @@ static bool open_one(struct bus_ports *all, struct links *links, struct bench *b
     p->unit = find_unit(b, o->unit);
     const struct board_type *type = type_of(b, p->unit);
     const struct bus_pty_ops ops = {
-        .ctx = p, .submit = submit, .board = type->name, .addresses = type->bus->addresses, .name = name_of};
+        .ctx = p, .submit = submit_cycle, .board = type->name, .addresses = type->bus->addresses, .name = name_of};
     const int err = bus_pty_open(&p->pty, links, &ops, o->link);
     if (!err) {
         all->port[all->count++] = p;

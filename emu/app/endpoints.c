@@ -26,7 +26,7 @@ void endpoints_add(cJSON *result, char *text)
     for (char *line = strtok_r(text, "\n", &rest); line; line = strtok_r(NULL, "\n", &rest)) add_one(endpoints, line);
 }
 
-bool endpoints_tell(const struct ports *p, const struct options *o, cJSON *result)
+bool endpoints_describe(const struct ports *p, const struct options *o, cJSON *result)
 {
     char *text = NULL;
     size_t len;

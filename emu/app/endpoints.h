@@ -1,4 +1,4 @@
-/* Where programs connect, as JSON: what the `ready` lines tell, for commands. */
+/* The endpoints of the `ready` lines as JSON, for commands. */
 #ifndef PSABENCH_APP_ENDPOINTS_H
 #define PSABENCH_APP_ENDPOINTS_H
 
@@ -10,6 +10,6 @@
 void endpoints_add(cJSON *result, char *text);
 
 /* The same of open ports. False without memory. */
-bool endpoints_tell(const struct ports *p, const struct options *o, cJSON *result);
+bool endpoints_describe(const struct ports *p, const struct options *o, cJSON *result);
 
 #endif

@@ -10,7 +10,7 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { TOLD_MAX = 8192, FD_STDERR = 2 };
+enum { REPLY_MAX = 8192, FD_STDERR = 2 };
 
 static const char failure[] = "fail ";
 
@@ -18,7 +18,7 @@ static const char failure[] = "fail ";
 
 /* Every descriptor of the parent but stderr and `keep` leads nowhere from now on: what the parent's links and files do when
  * they are closed reaches no one. */
-static bool cut_off(int keep)
+static bool redirect_to_null(int keep)
 {
     const int null = open("/dev/null", O_RDWR | O_CLOEXEC);
     DIR *open_fds = opendir("/proc/self/fd");
@@ -33,9 +33,9 @@ static bool cut_off(int keep)
     return true;
 }
 
-static bool take_over(struct service *s, const struct options *o, int told, char *why, size_t cap)
+static bool take_over(struct service *s, const struct options *o, int out_fd, char *why, size_t cap)
 {
-    if (!cut_off(told)) {
+    if (!redirect_to_null(out_fd)) {
         snprintf(why, cap, "/dev/null or /proc: %s", strerror(errno));
         return false;
     }
@@ -43,12 +43,12 @@ static bool take_over(struct service *s, const struct options *o, int told, char
     return service_reopen(s, o, why, cap);
 }
 
-static _Noreturn void live(struct service *s, const struct options *o, int told)
+static _Noreturn void run_child(struct service *s, const struct options *o, int out_fd)
 {
     char why[1024];
-    FILE *out = fdopen(told, "w");
+    FILE *out = fdopen(out_fd, "w");
     if (!out) _exit(SERVICE_MACHINE);
-    if (!take_over(s, o, told, why, sizeof why)) {
+    if (!take_over(s, o, out_fd, why, sizeof why)) {
         fprintf(out, "%s%s\n", failure, why);
         fflush(out);
         _exit(SERVICE_MACHINE);
@@ -73,7 +73,7 @@ static size_t read_all(int fd, char *text, size_t cap)
     return len;
 }
 
-static bool tell(pid_t pid, char *text, cJSON *result, char *why)
+static bool put_result(pid_t pid, char *text, cJSON *result, char *why)
 {
     if (strncmp(text, failure, sizeof failure - 1) == 0 || !strstr(text, "ready all\n")) {
         text[strcspn(text, "\n")] = '\0';
@@ -86,12 +86,12 @@ static bool tell(pid_t pid, char *text, cJSON *result, char *why)
 }
 
 /* What the child will have open. */
-struct wanted {
+struct child_options {
     struct options o;
     char can[1024];
 };
 
-static bool want(struct wanted *w, const struct options *parent, const struct control_fork *f, char *why)
+static bool make_options(struct child_options *w, const struct options *parent, const struct control_fork *f, char *why)
 {
     struct options *o = &w->o;
     *o = *parent;
@@ -110,24 +110,24 @@ static bool want(struct wanted *w, const struct options *parent, const struct co
 
 bool fork_service(struct service *s, const struct control_fork *f, cJSON *result, char *why)
 {
-    char text[TOLD_MAX];
-    int told[2];
-    struct wanted *w = malloc(sizeof *w);
+    char text[REPLY_MAX];
+    int pipe_fd[2];
+    struct child_options *w = malloc(sizeof *w);
     why[0] = '\0';
-    if (!w || !want(w, s->o, f, why) || pipe2(told, O_CLOEXEC) < 0) {
+    if (!w || !make_options(w, s->o, f, why) || pipe2(pipe_fd, O_CLOEXEC) < 0) {
         if (!why[0]) snprintf(why, CONTROL_WHY_MAX, "%s", strerror(errno));
         free(w);
         return false;
     }
     fflush(NULL); /* or both would write what waits */
     const pid_t pid = fork();
-    if (pid == 0) live(s, &w->o, told[1]); /* w is the child's as long as it lives */
+    if (pid == 0) run_child(s, &w->o, pipe_fd[1]); /* w is the child's as long as it lives */
     const int err = errno;
     free(w);
-    close(told[1]);
-    if (pid > 0) read_all(told[0], text, sizeof text);
-    close(told[0]);
-    if (pid > 0) return tell(pid, text, result, why);
+    close(pipe_fd[1]);
+    if (pid > 0) read_all(pipe_fd[0], text, sizeof text);
+    close(pipe_fd[0]);
+    if (pid > 0) return put_result(pid, text, result, why);
     snprintf(why, CONTROL_WHY_MAX, "fork: %s", strerror(err));
     return false;
 }

@@ -51,7 +51,7 @@ static bool step_over(const struct loop *l)
     return l->run == LOOP_RUNNING && l->sched->now_ns == l->until_ns && links_pending(l->links) == 0;
 }
 
-static void advance(struct loop *l)
+static void advance_time(struct loop *l)
 {
     if (!l->started && (!l->may_start || l->may_start(l->ctx))) {
         l->started = true;
@@ -95,7 +95,7 @@ static int64_t patience_ns(const struct loop *l)
 }
 
 /* Input and timers of the links polled; p[i] belongs to the i-th link of the list at the time of the poll. */
-static void serve(struct loop *l, struct link **polled, const struct pollfd *p, unsigned n)
+static void serve_polled(struct loop *l, struct link **polled, const struct pollfd *p, unsigned n)
 {
     const int64_t t_ns = l->sched->now_ns;
     for (unsigned i = 0; i < n; i++) {
@@ -125,7 +125,7 @@ static void serve_timers(struct loop *l)
     }
 }
 
-static unsigned collect(const struct loop *l, struct link **polled, struct pollfd *p)
+static unsigned collect_fds(const struct loop *l, struct link **polled, struct pollfd *p)
 {
     unsigned n = 0;
     for (struct link *k = l->links->first; k && n < LOOP_LINKS_MAX; k = k->next) {
@@ -145,7 +145,7 @@ static void flush_all(struct loop *l)
 }
 
 /* At full speed with no one to hear, the kernel is only asked now and then, for signals. */
-static bool alone(struct loop *l)
+static bool may_skip_poll(struct loop *l)
 {
     enum { TURNS = 64 };
     return !l->links->first && l->started && l->pace->kind == PACE_FREE && l->pace->turns % TURNS != 0;
@@ -155,15 +155,15 @@ static void wait_and_serve(struct loop *l, const sigset_t *unblocked)
 {
     struct link *polled[LOOP_LINKS_MAX];
     struct pollfd p[LOOP_LINKS_MAX];
-    if (alone(l)) return;
+    if (may_skip_poll(l)) return;
     arm_timers(l);
-    const unsigned n = collect(l, polled, p);
+    const unsigned n = collect_fds(l, polled, p);
     const int64_t ns = patience_ns(l);
     const struct timespec t = {.tv_sec = (time_t)(ns / 1000000000), .tv_nsec = (long)(ns % 1000000000)};
     const int ready = ppoll(p, n, ns == SCHED_NEVER ? NULL : &t, unblocked);
     /* Input is stamped with the simulated time of its arrival: first bring the simulation there. */
     if (ready > 0 && l->started && l->pace->kind == PACE_WALL) run_wall(l);
-    if (ready > 0) serve(l, polled, p, n);
+    if (ready > 0) serve_polled(l, polled, p, n);
     serve_timers(l);
     links_reap(l->links);
 }
@@ -192,7 +192,7 @@ void loop_cancel_step(struct loop *l)
 }
 
 /* At the end, and no client waits for an answer. */
-static bool over(const struct loop *l)
+static bool is_over(const struct loop *l)
 {
     return l->sched->now_ns >= l->end_ns && l->run != LOOP_RUNNING;
 }
@@ -203,18 +203,18 @@ void loop_run(struct loop *l, const volatile sig_atomic_t *stop)
     sigprocmask(SIG_SETMASK, NULL, &open);
     sigdelset(&open, SIGINT);
     sigdelset(&open, SIGTERM);
-    while (!l->quit && !*stop && !over(l)) {
+    while (!l->quit && !*stop && !is_over(l)) {
         const bool armed = l->run == LOOP_ARMED;
-        if (!armed) advance(l);
+        if (!armed) advance_time(l);
         flush_all(l);
         if (step_over(l)) {
             l->run = LOOP_IDLE;
             l->run_done(l->ctx);
             flush_all(l);
         }
-        if (over(l)) break;
+        if (is_over(l)) break;
         wait_and_serve(l, &open);
-        if (armed) advance(l);
+        if (armed) advance_time(l);
     }
 }
 
@@ -226,8 +226,8 @@ void loop_drain(struct loop *l, int patience_ms)
         struct link *polled[LOOP_LINKS_MAX];
         struct pollfd p[LOOP_LINKS_MAX];
         arm_timers(l);
-        const unsigned n = collect(l, polled, p);
-        if (poll(p, n, 10) > 0) serve(l, polled, p, n);
+        const unsigned n = collect_fds(l, polled, p);
+        if (poll(p, n, 10) > 0) serve_polled(l, polled, p, n);
         serve_timers(l);
         flush_all(l);
         links_reap(l->links);

@@ -13,13 +13,13 @@
 /* PSABENCH_VERSION comes from pyproject.toml by way of the Makefile. */
 #define VERSION TEXT_OF(PSABENCH_VERSION)
 
-static int complain(int status, const char *why)
+static int print_error(int status, const char *why)
 {
     fprintf(stderr, "psa-emu: %s\n", why);
     return status;
 }
 
-static void override(struct scenario *s, const struct options *o)
+static void override_scenario(struct scenario *s, const struct options *o)
 {
     if (o->seed_given) s->seed = o->seed;
     for (unsigned i = 0; i < s->bus_count; i++) {
@@ -42,15 +42,15 @@ static bool write_resolved(const struct scenario *s, const char *path)
     return ok;
 }
 
-static int dump(const struct options *o, struct scenario *s, struct bench *bench)
+static int dump_scenario(const struct options *o, struct scenario *s, struct bench *bench)
 {
     char why[1024];
     if (!scenario_load(o->scenario ? o->scenario : "calibrate", s, why, sizeof why))
-        return complain(SERVICE_INPUT, why);
-    override(s, o);
+        return print_error(SERVICE_INPUT, why);
+    override_scenario(s, o);
     bench_init(bench, s, 0);
-    if (!timeline_check(bench, why, sizeof why)) return complain(SERVICE_INPUT, why);
-    return write_resolved(s, NULL) ? SERVICE_DONE : complain(SERVICE_MACHINE, "--dump: stdout cannot be written");
+    if (!timeline_check(bench, why, sizeof why)) return print_error(SERVICE_INPUT, why);
+    return write_resolved(s, NULL) ? SERVICE_DONE : print_error(SERVICE_MACHINE, "--dump: stdout cannot be written");
 }
 
 /* The scenario with every key as one line, its numbers to the last bit. The caller free()s it. */
@@ -62,31 +62,32 @@ static char *resolved_line(const struct scenario *s)
     return line;
 }
 
-static bool load(const struct options *o, const struct snapshot *from, struct scenario *s, char *why, size_t cap)
+static bool load_scenario(const struct options *o, const struct snapshot *from, struct scenario *s, char *why,
+                          size_t cap)
 {
     if (from) return scenario_parse(o->restore, from->scenario, from->scenario_len, s, why, cap);
     return scenario_load(o->scenario ? o->scenario : "calibrate", s, why, cap);
 }
 
-static int run(const struct options *o, const struct snapshot *from, struct scenario *scenario, struct bench *bench,
-               struct service *service)
+static int run_bench(const struct options *o, const struct snapshot *from, struct scenario *scenario,
+                     struct bench *bench, struct service *service)
 {
     char why[1024];
-    if (!load(o, from, scenario, why, sizeof why)) return complain(SERVICE_INPUT, why);
-    override(scenario, o);
+    if (!load_scenario(o, from, scenario, why, sizeof why)) return print_error(SERVICE_INPUT, why);
+    override_scenario(scenario, o);
     bench_init(bench, scenario, 0);
-    if (!timeline_check(bench, why, sizeof why)) return complain(SERVICE_INPUT, why);
+    if (!timeline_check(bench, why, sizeof why)) return print_error(SERVICE_INPUT, why);
     if (o->resolved && !write_resolved(scenario, o->resolved)) {
         snprintf(why, sizeof why, "--resolved %s: %s", o->resolved, strerror(errno));
-        return complain(SERVICE_MACHINE, why);
+        return print_error(SERVICE_MACHINE, why);
     }
     const int watched = o->unit ? bench_find_unit(scenario, o->unit) : 0;
     if (watched < 0) {
         snprintf(why, sizeof why, "--unit %s: %s has no unit of that name", o->unit, scenario->path);
-        return complain(SERVICE_INPUT, why);
+        return print_error(SERVICE_INPUT, why);
     }
     char *line = resolved_line(scenario);
-    if (!line) return complain(SERVICE_MACHINE, "no memory");
+    if (!line) return print_error(SERVICE_MACHINE, "no memory");
     bench->watched = (unsigned)watched;
     const struct service_origin origin = {.scenario = line, .snapshot = from};
     const bool open = service_open(service, bench, o, &origin, why, sizeof why);
@@ -94,17 +95,18 @@ static int run(const struct options *o, const struct snapshot *from, struct scen
     const bool refused = service->refused;
     service_close(service);
     free(line);
-    if (!open) return complain(refused ? SERVICE_INPUT : SERVICE_MACHINE, why);
+    if (!open) return print_error(refused ? SERVICE_INPUT : SERVICE_MACHINE, why);
     if (signal_number == SIGINT) return SERVICE_INT;
     return service->vcd_failed ? SERVICE_MACHINE : SERVICE_DONE;
 }
 
-static int restore(const struct options *o, struct scenario *scenario, struct bench *bench, struct service *service)
+static int restore_bench(const struct options *o, struct scenario *scenario, struct bench *bench,
+                         struct service *service)
 {
     char why[1024];
     struct snapshot from;
-    if (!snapshot_load(o->restore, &from, why, sizeof why)) return complain(SERVICE_INPUT, why);
-    const int status = run(o, &from, scenario, bench, service);
+    if (!snapshot_load(o->restore, &from, why, sizeof why)) return print_error(SERVICE_INPUT, why);
+    const int status = run_bench(o, &from, scenario, bench, service);
     snapshot_free(&from);
     return status;
 }
@@ -113,25 +115,25 @@ int main(int argc, char *argv[])
 {
     struct options o;
     char why[1024];
-    if (!options_parse(argc, argv, &o, why, sizeof why)) return complain(SERVICE_INPUT, why);
+    if (!options_parse(argc, argv, &o, why, sizeof why)) return print_error(SERVICE_INPUT, why);
     if (o.action == OPTIONS_HELP) return fputs(options_help(), stdout) < 0;
     if (o.action == OPTIONS_VERSION) return puts("psa-emu " VERSION) < 0;
     if (o.action == OPTIONS_LIST_COMMANDS) list_commands(stdout);
     if (o.action == OPTIONS_LIST_SCPI) list_scpi(stdout);
     if (o.action == OPTIONS_LIST_FAULTS) list_faults(stdout);
     if (o.action == OPTIONS_LIST_PROFILES && !list_profiles(stdout, why, sizeof why))
-        return complain(SERVICE_MACHINE, why);
+        return print_error(SERVICE_MACHINE, why);
     if (o.action == OPTIONS_LIST_SCENARIOS && !list_scenarios(stdout, why, sizeof why))
-        return complain(SERVICE_MACHINE, why);
+        return print_error(SERVICE_MACHINE, why);
     if (o.action == OPTIONS_LIST_KEYS) scenario_keys(stdout);
     if (o.action != OPTIONS_RUN && o.action != OPTIONS_DUMP) return SERVICE_DONE;
     struct scenario *scenario = malloc(sizeof *scenario);
     struct bench *bench = malloc(sizeof *bench);
     struct service *service = malloc(sizeof *service);
-    const int status = !scenario || !bench || !service ? complain(SERVICE_MACHINE, "no memory")
-                       : o.action == OPTIONS_DUMP      ? dump(&o, scenario, bench)
-                       : o.restore                     ? restore(&o, scenario, bench, service)
-                                                       : run(&o, NULL, scenario, bench, service);
+    const int status = !scenario || !bench || !service ? print_error(SERVICE_MACHINE, "no memory")
+                       : o.action == OPTIONS_DUMP      ? dump_scenario(&o, scenario, bench)
+                       : o.restore                     ? restore_bench(&o, scenario, bench, service)
+                                                       : run_bench(&o, NULL, scenario, bench, service);
     free(service);
     free(bench);
     free(scenario);

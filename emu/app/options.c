@@ -338,7 +338,7 @@ static bool set_scenario(struct target *t, const char *arg)
     return set_path(t, "SCENARIO", arg, &t->o->scenario);
 }
 
-static bool unknown(struct target *t, const char *word, int c)
+static bool reject_option(struct target *t, const char *word, int c)
 {
     if (c == ':') return why_fail(t->why, t->cap, "%s: expected an argument, got none (psa-emu --help)", word);
     return why_fail(t->why, t->cap, "%s: unknown option, or an argument it does not take (psa-emu --help)", word);
@@ -353,7 +353,7 @@ static bool parse_all(struct target *t, int argc, char *const argv[])
     optind = 0;
     for (int c; (c = getopt_long(argc, argv, "-:", longs, NULL)) != -1;) {
         const bool is_row = c >= 256;
-        if (!is_row && c != 1) return unknown(t, argv[optind - 1], c);
+        if (!is_row && c != 1) return reject_option(t, argv[optind - 1], c);
         if (is_row ? !rows[c - 256].set(t, optarg) : !set_scenario(t, optarg)) return false;
     }
     while (optind < argc) {

@@ -1,6 +1,6 @@
 /* The only clock: how simulated time follows real time, and how well.
  *
- * wall: simulated time is the time since pace_start(); step: it moves only when told; free: it moves as fast as it goes.
+ * wall: simulated time is the time since pace_start(); step: it moves only by commands; free: it moves as fast as it goes.
  * Nothing of the real clock reaches the simulation in step and free pace. Lateness goes into a histogram of fixed size. */
 #ifndef PSABENCH_APP_PACE_H
 #define PSABENCH_APP_PACE_H

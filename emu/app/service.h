@@ -33,7 +33,7 @@ struct service {
     bool refused;         /* bad input: a snapshot that cannot be done again, a bus or instrument that is not there */
     uint32_t connections; /* connections of CAN clients before time began: of the snapshot */
     struct truth_log truth_log;
-    struct snapshot_ears ears;
+    struct snapshot_observers observers;
     struct link input; /* --until-eof */
 };
 

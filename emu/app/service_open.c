@@ -52,7 +52,7 @@ static bool do_fork(void *ctx, const struct control_fork *f, cJSON *result, char
 static bool do_endpoints(void *ctx, cJSON *result)
 {
     const struct service *s = ctx;
-    return endpoints_tell(&s->ports, s->o, result);
+    return endpoints_describe(&s->ports, s->o, result);
 }
 
 static void do_pace(void *ctx, struct control_pace *out)
@@ -144,14 +144,14 @@ static bool may_start(void *ctx)
     return !s->o->wait_client || s->ports.connections > s->connections;
 }
 
-static void moved(void *ctx, int64_t now_ns)
+static void on_moved(void *ctx, int64_t now_ns)
 {
     struct service *s = ctx;
     (void)now_ns;
     bench_follow(s->bench);
     journal_moved(&s->journal);
     service_sweep_detached(s, false);
-    snapshot_let_go(&s->ears, s->bench);
+    snapshot_let_go(&s->observers, s->bench);
     if (s->bench->recording) service_recording_error(s, "the recording ends here, the run continues");
 }
 
@@ -183,7 +183,7 @@ static void on_cycle(void *ctx, unsigned unit, const struct board_cycle *c)
 
 /* ---- opening */
 
-static void init(struct service *s, struct bench *b, const struct options *o)
+static void init_service(struct service *s, struct bench *b, const struct options *o)
 {
     memset(s, 0, sizeof *s);
     s->o = o;
@@ -207,7 +207,7 @@ static void init(struct service *s, struct bench *b, const struct options *o)
                             .links = &s->ports.links,
                             .end_ns = o->for_ns,
                             .may_start = may_start,
-                            .moved = moved,
+                            .moved = on_moved,
                             .run_done = run_done,
                             .taken = service_taken,
                             .ctx = s};
@@ -218,7 +218,7 @@ static void init(struct service *s, struct bench *b, const struct options *o)
 bool service_open(struct service *s, struct bench *b, const struct options *o, const struct service_origin *from,
                   char *why, size_t cap)
 {
-    init(s, b, o);
+    init_service(s, b, o);
     s->scenario = from->scenario;
     s->refused =
         (from->snapshot && !service_restore(s, from->snapshot, why, cap)) || !ports_check(&s->ports, b, o, why, cap);

@@ -28,8 +28,11 @@ void service_follow(struct service *s)
 
 bool service_restore(struct service *s, const struct snapshot *from, char *why, size_t cap)
 {
-    struct snapshot_world w = {
-        .bench = s->bench, .journal = &s->journal, .buses = s->ports.hubs, .control = &s->control, .ears = &s->ears};
+    struct snapshot_world w = {.bench = s->bench,
+                               .journal = &s->journal,
+                               .buses = s->ports.hubs,
+                               .control = &s->control,
+                               .observers = &s->observers};
     char what[640];
     for (unsigned i = 0; i < w.buses; i++) w.hub[i] = &s->ports.hub[i];
     service_power_up(s);
@@ -49,7 +52,7 @@ void service_abandon(struct service *s)
 {
     struct bench *b = s->bench;
     for (unsigned i = 0; i < s->ports.hubs; i++) can_hub_detach_all(&s->ports.hub[i]);
-    snapshot_listen(&s->ears, b);
+    snapshot_listen(&s->observers, b);
     for (unsigned i = 0; i < CONTROL_SUBS_MAX; i++) {
         if (s->control.watch.sub[i].control) control_gone(&s->control, s->control.watch.sub[i].client);
     }

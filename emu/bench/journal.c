@@ -47,7 +47,7 @@ static bool make_room(struct journal *j, size_t n)
     return true;
 }
 
-static void put(struct journal *j, const char *text, size_t n)
+static void put_text(struct journal *j, const char *text, size_t n)
 {
     if (!make_room(j, n)) return;
     memcpy(j->text + j->len, text, n);
@@ -55,7 +55,7 @@ static void put(struct journal *j, const char *text, size_t n)
 }
 
 /* {"t":...,"ran":true and what follows, up to the closing brace and LF. */
-__attribute__((format(printf, 3, 4))) static void add(struct journal *j, int64_t t_ns, const char *format, ...)
+__attribute__((format(printf, 3, 4))) static void add_line(struct journal *j, int64_t t_ns, const char *format, ...)
 {
     char line[512];
     va_list ap;
@@ -64,7 +64,7 @@ __attribute__((format(printf, 3, 4))) static void add(struct journal *j, int64_t
     va_start(ap, format);
     const int n = vsnprintf(line + at, sizeof line - (size_t)at, format, ap);
     va_end(ap);
-    put(j, line, (size_t)at + (size_t)n);
+    put_text(j, line, (size_t)at + (size_t)n);
     j->last_ns = t_ns;
     j->ran = false;
 }
@@ -75,7 +75,7 @@ static int64_t now_ns(const struct journal *j)
 }
 
 /* A name that can be in quotes as it is. */
-static void plain(const char *name, char *out, size_t cap)
+static void copy_plain(const char *name, char *out, size_t cap)
 {
     size_t n = 0;
     for (; *name && n + 1 < cap; name++) {
@@ -92,19 +92,19 @@ static void on_bus_event(void *ctx, const struct can_hub *h, const struct can_cl
     char text[160];
     (void)h;
     if (event == CAN_HUB_JOINED) {
-        plain(c->name, text, sizeof c->name);
-        add(j, now_ns(j), "\"bus\":%u,\"came\":%" PRIu32 ",\"heir_of\":%" PRIu32 ",\"name\":\"%s\",\"fd\":%s}\n",
-            tap->bus, c->number, c->adopts, text, c->node.fd ? "true" : "false");
+        copy_plain(c->name, text, sizeof c->name);
+        add_line(j, now_ns(j), "\"bus\":%u,\"came\":%" PRIu32 ",\"heir_of\":%" PRIu32 ",\"name\":\"%s\",\"fd\":%s}\n",
+                 tap->bus, c->number, c->adopts, text, c->node.fd ? "true" : "false");
     } else if (event == CAN_HUB_LEFT) {
-        add(j, now_ns(j), "\"bus\":%u,\"went\":%" PRIu32 "}\n", tap->bus, c->number);
+        add_line(j, now_ns(j), "\"bus\":%u,\"went\":%" PRIu32 "}\n", tap->bus, c->number);
     } else {
         can_text_put(m, text);
-        add(j, now_ns(j), "\"bus\":%u,\"from\":%" PRIu32 ",\"frame\":\"%s\"}\n", tap->bus, c->number, text);
+        add_line(j, now_ns(j), "\"bus\":%u,\"from\":%" PRIu32 ",\"frame\":\"%s\"}\n", tap->bus, c->number, text);
     }
 }
 
 /* Multiplication by an odd number and a rotation lose nothing, so a difference stays one. */
-static uint64_t mix(uint64_t sum, uint64_t x)
+static uint64_t mix_hash(uint64_t sum, uint64_t x)
 {
     sum = (sum ^ x) * UINT64_C(0x9E3779B97F4A7C15);
     return sum << 29 | sum >> 35;
@@ -113,11 +113,12 @@ static uint64_t mix(uint64_t sum, uint64_t x)
 static void on_heard(void *ctx, const struct can_msg *m, int64_t t_ns)
 {
     struct journal_tap *tap = ctx;
-    uint64_t sum = mix(mix(tap->traffic, (uint64_t)t_ns), (uint64_t)m->id << 16 | (uint64_t)m->flags << 8 | m->len);
+    uint64_t sum =
+        mix_hash(mix_hash(tap->traffic, (uint64_t)t_ns), (uint64_t)m->id << 16 | (uint64_t)m->flags << 8 | m->len);
     for (unsigned i = 0; i < m->len; i += 8) {
         uint64_t bytes = 0;
         for (unsigned k = 0; k < 8 && i + k < m->len; k++) bytes = bytes << 8 | m->data[i + k];
-        sum = mix(sum, bytes);
+        sum = mix_hash(sum, bytes);
     }
     tap->traffic = sum;
 }
@@ -141,9 +142,9 @@ void journal_command(struct journal *j, const struct control_command *row, const
     if (!text) j->lost = "no memory for the journal";
     else if (n + 128 > JOURNAL_LINE_MAX) j->lost = "a command was longer than a line of the journal (8 KiB)";
     else {
-        add(j, now_ns(j), "%s\"cmd\":\"%s\",\"args\":", done ? "" : "\"refused\":true,", row->name);
-        put(j, text, n);
-        put(j, "}\n", 2);
+        add_line(j, now_ns(j), "%s\"cmd\":\"%s\",\"args\":", done ? "" : "\"refused\":true,", row->name);
+        put_text(j, text, n);
+        put_text(j, "}\n", 2);
     }
     free(text);
 }
@@ -151,8 +152,8 @@ void journal_command(struct journal *j, const struct control_command *row, const
 void journal_cycle(struct journal *j, unsigned unit, const struct board_cycle *c)
 {
     if (j->bench->sched.until_ns >= 0) return; /* inside a run: done again by itself */
-    add(j, now_ns(j), "\"unit\":%u,\"cycle\":%u,\"write\":%s,\"data\":%u,\"strobe_ns\":%" PRId64 "}\n", unit,
-        c->address, c->write ? "true" : "false", c->data, c->strobe_ns);
+    add_line(j, now_ns(j), "\"unit\":%u,\"cycle\":%u,\"write\":%s,\"data\":%u,\"strobe_ns\":%" PRId64 "}\n", unit,
+             c->address, c->write ? "true" : "false", c->data, c->strobe_ns);
 }
 
 void journal_watchers(struct journal *j)
@@ -162,7 +163,7 @@ void journal_watchers(struct journal *j)
         if (watched == j->watched[i]) continue;
         assert((double)watched <= LINES_MAX);
         j->watched[i] = watched;
-        add(j, j->moved_ns, "\"unit\":%u,\"watch\":%" PRIu64 "}\n", i, watched);
+        add_line(j, j->moved_ns, "\"unit\":%u,\"watch\":%" PRIu64 "}\n", i, watched);
     }
 }
 
@@ -175,7 +176,7 @@ void journal_moved(struct journal *j)
 
 /* ---- reading */
 
-__attribute__((format(printf, 3, 4))) static bool fail(char *why, size_t cap, const char *format, ...)
+__attribute__((format(printf, 3, 4))) static bool fail_entry(char *why, size_t cap, const char *format, ...)
 {
     va_list ap;
     va_start(ap, format);
@@ -262,7 +263,7 @@ bool journal_read(const char *line, size_t len, struct journal_entry *e, char *w
     *e = (struct journal_entry){.json = len <= JOURNAL_LINE_MAX ? cJSON_ParseWithLength(line, len) : NULL};
     if (!cJSON_IsObject(e->json)) {
         journal_release(e);
-        return fail(why, cap, "no JSON object of up to %u bytes", JOURNAL_LINE_MAX);
+        return fail_entry(why, cap, "no JSON object of up to %u bytes", JOURNAL_LINE_MAX);
     }
     e->ran = cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(e->json, "ran"));
     if (get_count(e->json, "t", 1e15 * 9, &t_ns) && read_kind(e->json, e)) {
@@ -270,7 +271,7 @@ bool journal_read(const char *line, size_t len, struct journal_entry *e, char *w
         return true;
     }
     journal_release(e);
-    return fail(why, cap, "no entry of a journal");
+    return fail_entry(why, cap, "no entry of a journal");
 }
 
 void journal_release(struct journal_entry *e)

@@ -24,7 +24,7 @@ struct writer {
     bool failed;
 };
 
-static void put(struct writer *w, const char *text, size_t n)
+static void put_bytes(struct writer *w, const char *text, size_t n)
 {
     sha256_add(&w->sum, text, n);
     w->failed |= fwrite(text, 1, n, w->out) != n;
@@ -32,7 +32,7 @@ static void put(struct writer *w, const char *text, size_t n)
 
 static void put_text(struct writer *w, const char *text)
 {
-    put(w, text, strlen(text));
+    put_bytes(w, text, strlen(text));
 }
 
 static uint64_t count_lines(const char *text, size_t n)
@@ -62,7 +62,7 @@ static void put_all(struct writer *w, const struct journal *j, const char *scena
     put_text(w, head);
     put_text(w, scenario);
     put_text(w, "\n");
-    if (j->len) put(w, j->text, j->len);
+    if (j->len) put_bytes(w, j->text, j->len);
     put_end(w, j);
     sha256_hex(&w->sum, sum);
     w->failed |= fprintf(w->out, "{\"sha256\":\"%s\"}\n", sum) < 0;
@@ -180,7 +180,7 @@ static bool check_journal(struct snapshot *s, struct reader *r, char *why, size_
     return r->at == r->end || why_fail(why, cap, "has more entries than it says");
 }
 
-static bool parse(struct snapshot *s, size_t len, char *why, size_t cap)
+static bool parse_snapshot(struct snapshot *s, size_t len, char *why, size_t cap)
 {
     const char *line;
     size_t n;
@@ -205,7 +205,7 @@ static bool parse(struct snapshot *s, size_t len, char *why, size_t cap)
 bool snapshot_parse(char *text, size_t len, struct snapshot *s, char *why, size_t cap)
 {
     *s = (struct snapshot){.text = text};
-    if (parse(s, len, why, cap)) return true;
+    if (parse_snapshot(s, len, why, cap)) return true;
     snapshot_free(s);
     return false;
 }
@@ -271,7 +271,7 @@ static void on_steps(void *ctx, const struct trace_step *s, unsigned n)
     (void)n;
 }
 
-static void hang(struct snapshot_ears *e, struct bench *b, unsigned unit, uint64_t mask)
+static void attach_observer(struct snapshot_observers *e, struct bench *b, unsigned unit, uint64_t mask)
 {
     struct trace *t = unit_trace(&b->unit[unit]);
     struct trace_sink *ear = &e->ear[unit];
@@ -281,15 +281,15 @@ static void hang(struct snapshot_ears *e, struct bench *b, unsigned unit, uint64
     e->on = true;
 }
 
-void snapshot_listen(struct snapshot_ears *e, struct bench *b)
+void snapshot_listen(struct snapshot_observers *e, struct bench *b)
 {
     for (unsigned i = 0; i < b->scenario.unit_count; i++) {
         const uint64_t watched = unit_trace(&b->unit[i])->watched;
-        if (watched) hang(e, b, i, watched);
+        if (watched) attach_observer(e, b, i, watched);
     }
 }
 
-void snapshot_let_go(struct snapshot_ears *e, struct bench *b)
+void snapshot_let_go(struct snapshot_observers *e, struct bench *b)
 {
     for (unsigned i = 0; i < b->scenario.unit_count && e->on; i++) trace_detach(unit_trace(&b->unit[i]), &e->ear[i]);
     e->on = false;
@@ -344,15 +344,15 @@ static bool do_command(struct replay *r, const struct journal_entry *e)
     cJSON *result = cJSON_CreateObject();
     const enum control_outcome outcome = control_call(c, e->cmd, e->args, result, e->t_ns);
     cJSON_Delete(result);
-    if ((outcome == CONTROL_REFUSED) == e->refused) return true; /* a bus cycle is answered later */
-    return why_fail(r->why, WHY_MAX, "%s: %s", e->cmd, e->refused ? "is carried out this time" : c->refusal.why);
+    if ((outcome == CONTROL_REJECTED) == e->refused) return true; /* a bus cycle is answered later */
+    return why_fail(r->why, WHY_MAX, "%s: %s", e->cmd, e->refused ? "is carried out this time" : c->error.why);
 }
 
 static bool do_watch(struct replay *r, const struct journal_entry *e)
 {
     struct bench *b = r->w->bench;
     if (e->unit >= b->scenario.unit_count) return why_fail(r->why, WHY_MAX, "there is no unit %u", e->unit);
-    hang(r->w->ears, b, e->unit, e->watch);
+    attach_observer(r->w->observers, b, e->unit, e->watch);
     return true;
 }
 

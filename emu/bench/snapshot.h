@@ -40,13 +40,13 @@ bool snapshot_parse(char *text, size_t len, struct snapshot *s, char *why, size_
 void snapshot_free(struct snapshot *s);
 
 /* In the place of those who listened to the units' lines: what is on its way to them is kept for who comes next. */
-struct snapshot_ears {
+struct snapshot_observers {
     struct trace_sink ear[CONTROL_UNITS_MAX];
     bool on;
 };
 
-void snapshot_listen(struct snapshot_ears *e, struct bench *b); /* to what somebody listens to now */
-void snapshot_let_go(struct snapshot_ears *e, struct bench *b); /* once time has moved */
+void snapshot_listen(struct snapshot_observers *e, struct bench *b); /* to what somebody listens to now */
+void snapshot_let_go(struct snapshot_observers *e, struct bench *b); /* once time has moved */
 
 /* What a journal is done again with: a bench of the same scenario that has just been powered up. */
 struct snapshot_world {
@@ -54,8 +54,8 @@ struct snapshot_world {
     struct journal *journal; /* follows the hubs: it will hold what was done again */
     struct can_hub *hub[CONTROL_BUSES_MAX];
     unsigned buses;
-    struct control *control;    /* of the commands */
-    struct snapshot_ears *ears; /* on afterwards */
+    struct control *control;              /* of the commands */
+    struct snapshot_observers *observers; /* on afterwards */
 };
 
 /* Does it again up to the instant of the snapshot and compares the state. The programs that were on the bus are detached clients

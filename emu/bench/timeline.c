@@ -13,8 +13,8 @@ static const char *row_at(const void *ctx, size_t i)
     return row ? row->name : NULL;
 }
 
-static bool fail(const struct scenario *s, const struct scenario_event *e, const char *what, const char *text,
-                 char *why, size_t cap)
+static bool fail_event(const struct scenario *s, const struct scenario_event *e, const char *what, const char *text,
+                       char *why, size_t cap)
 {
     snprintf(why, cap, "%s:%u:%u: %s: %s: %s", s->path, e->line, e->column, what, e->cmd, text);
     text_one_line(why);
@@ -22,7 +22,7 @@ static bool fail(const struct scenario *s, const struct scenario_event *e, const
 }
 
 /* An instrument's commands want the instrument: the section of the scenario that is missing, or NULL. */
-static const char *missing(const struct scenario *s, const char *cmd)
+static const char *missing_section(const struct scenario *s, const char *cmd)
 {
     const struct {
         const char *prefix, *section;
@@ -43,16 +43,16 @@ static bool check_event(const struct scenario *s, const struct control_bench *vi
     if (!row) {
         const char *near = yaml_nearest(e->cmd, row_at, NULL);
         snprintf(text, sizeof text, "unknown command%s%s", near ? "; nearest: " : "", near ? near : "");
-        return fail(s, e, what, text, why, cap);
+        return fail_event(s, e, what, text, why, cap);
     }
-    if (!row->changes) return fail(s, e, what, "expected a command that changes the bench", why, cap);
-    const char *section = missing(s, e->cmd);
+    if (!row->changes) return fail_event(s, e, what, "expected a command that changes the bench", why, cap);
+    const char *section = missing_section(s, e->cmd);
     if (section) snprintf(text, sizeof text, "expected a section %s in the scenario, got none", section);
-    if (section) return fail(s, e, what, text, why, cap);
+    if (section) return fail_event(s, e, what, text, why, cap);
     cJSON *args = cJSON_Parse(e->args);
     const bool ok = control_check(control_tables, view, e->cmd, args, text);
     cJSON_Delete(args);
-    return ok || fail(s, e, what, text, why, cap);
+    return ok || fail_event(s, e, what, text, why, cap);
 }
 
 bool timeline_check(struct bench *b, char *why, size_t cap)
@@ -70,9 +70,9 @@ bool timeline_check(struct bench *b, char *why, size_t cap)
 static void carry_out(struct timeline *t, const struct scenario_event *e, const char *what, int64_t t_ns)
 {
     cJSON *args = cJSON_Parse(e->args), *result = cJSON_CreateObject();
-    if (control_call(&t->control, e->cmd, args, result, t_ns) == CONTROL_REFUSED) {
+    if (control_call(&t->control, e->cmd, args, result, t_ns) == CONTROL_REJECTED) {
         char why[CONTROL_WHY_MAX + 640];
-        fail(&t->bench->scenario, e, what, t->control.refusal.why, why, sizeof why);
+        fail_event(&t->bench->scenario, e, what, t->control.error.why, why, sizeof why);
         t->refused++;
         t->say(t->say_ctx, why);
     }

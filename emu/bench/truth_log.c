@@ -10,8 +10,8 @@ static bool write_unit(struct truth_log *l, const char *unit, int64_t t_ns)
     cJSON_AddStringToObject(args, "unit", unit);
     cJSON_AddNumberToObject(line, "t_ns", (double)t_ns);
     cJSON_AddStringToObject(line, "unit", unit);
-    const bool told = control_call(l->truth, "truth.state", args, line, t_ns) == CONTROL_DONE;
-    char *text = told ? exact_line(line) : NULL;
+    const bool ok = control_call(l->truth, "truth.state", args, line, t_ns) == CONTROL_DONE;
+    char *text = ok ? exact_line(line) : NULL;
     const bool written = text && fprintf(l->out, "%s\n", text) > 0;
     free(text);
     cJSON_Delete(line);

@@ -22,7 +22,7 @@ unsigned control_arg_count(const struct control_command *row)
 struct target {
     const struct control_bench *bench;
     const struct control_arg *arg;
-    struct control_refusal *why;
+    struct control_error *why;
 };
 
 /* What is wrong with the argument: its code, what was got, what is expected. */
@@ -133,22 +133,22 @@ static bool parse_reals(const struct target *t, const cJSON *j, struct control_v
 
 /* ---- and back */
 
-static cJSON *number(const struct control_value *v)
+static cJSON *number_json(const struct control_value *v)
 {
     return cJSON_CreateNumber(v->real);
 }
 
-static cJSON *boolean(const struct control_value *v)
+static cJSON *bool_json(const struct control_value *v)
 {
     return cJSON_CreateBool(v->on);
 }
 
-static cJSON *string(const struct control_value *v)
+static cJSON *string_json(const struct control_value *v)
 {
     return cJSON_CreateString(v->text);
 }
 
-static cJSON *numbers(const struct control_value *v)
+static cJSON *numbers_json(const struct control_value *v)
 {
     return cJSON_CreateDoubleArray(v->reals, (int)v->n);
 }
@@ -159,15 +159,15 @@ static const struct {
     cJSON *(*print)(const struct control_value *v);
     bool numeric;
 } types[] = {
-    [CONTROL_REAL] = {"number", parse_real, number, true},
-    [CONTROL_COUNT] = {"integer", parse_count, number, true},
-    [CONTROL_BOOL] = {"boolean", parse_bool, boolean, false},
-    [CONTROL_NAME] = {"string", parse_name, string, false},
-    [CONTROL_TEXT] = {"string", parse_text, string, false},
-    [CONTROL_CHOICE] = {"choice", parse_choice, string, false},
-    [CONTROL_EVENT] = {"choice", parse_name, string, false},
-    [CONTROL_UNIT] = {"unit", parse_unit, string, false},
-    [CONTROL_REALS] = {"numbers", parse_reals, numbers, true},
+    [CONTROL_REAL] = {"number", parse_real, number_json, true},
+    [CONTROL_COUNT] = {"integer", parse_count, number_json, true},
+    [CONTROL_BOOL] = {"boolean", parse_bool, bool_json, false},
+    [CONTROL_NAME] = {"string", parse_name, string_json, false},
+    [CONTROL_TEXT] = {"string", parse_text, string_json, false},
+    [CONTROL_CHOICE] = {"choice", parse_choice, string_json, false},
+    [CONTROL_EVENT] = {"choice", parse_name, string_json, false},
+    [CONTROL_UNIT] = {"unit", parse_unit, string_json, false},
+    [CONTROL_REALS] = {"numbers", parse_reals, numbers_json, true},
 };
 
 const char *control_choice(const struct control_arg *a, unsigned i)
@@ -205,7 +205,7 @@ static const struct control_arg *find_arg(const struct control_command *row, con
     return NULL;
 }
 
-static bool refuse_unknown(struct control_refusal *why, const struct control_command *row, const char *name)
+static bool reject_unknown(struct control_error *why, const struct control_command *row, const char *name)
 {
     char known[160] = "";
     for (unsigned i = 0; i < control_arg_count(row); i++) why_list_add(known, sizeof known, row->arg[i].name);
@@ -220,7 +220,7 @@ void control_arg_limits(const struct control_bench *b, const struct control_arg 
     if (a->limits && b->lab) a->limits(b, v, min, max);
 }
 
-/* What only this bench's instruments can tell; the arguments before this one are good. */
+/* Limits that depend on this bench's instruments; the arguments before this one are valid. */
 static bool within_limits(const struct target *t, const struct control_value *all, const struct control_value *v)
 {
     double min, max;
@@ -233,7 +233,7 @@ static bool within_limits(const struct target *t, const struct control_value *al
 }
 
 bool control_args(const struct control_bench *b, const struct control_command *row, const cJSON *args,
-                  struct control_value v[CONTROL_ARGS_MAX], struct control_refusal *why)
+                  struct control_value v[CONTROL_ARGS_MAX], struct control_error *why)
 {
     memset(v, 0, CONTROL_ARGS_MAX * sizeof *v);
     if (args && !cJSON_IsObject(args)) return control_expected(why, "syntax", "args", json_kind(args), "an object");
@@ -241,7 +241,7 @@ bool control_args(const struct control_bench *b, const struct control_command *r
     cJSON_ArrayForEach(j, args)
     {
         const struct control_arg *a = find_arg(row, j->string);
-        if (!a) return refuse_unknown(why, row, j->string);
+        if (!a) return reject_unknown(why, row, j->string);
         struct control_value *value = &v[a - row->arg];
         if (value->given) return control_expected(why, "argument", a->name, "two", "one value");
         if (!types[a->type].parse(&(struct target){b, a, why}, j, value)) return false;

@@ -9,10 +9,10 @@ bool control_type_numeric(enum control_type type); /* has a range, perhaps a uni
 
 unsigned control_arg_count(const struct control_command *row);
 
-/* Fills v[CONTROL_ARGS_MAX] from a JSON object (NULL: no arguments); strings stay the object's. False with the refusal. Of
+/* Fills v[CONTROL_ARGS_MAX] from a JSON object (NULL: no arguments); strings stay the object's. False with the error. Of
  * the bench it needs unit_name; ranges that depend on the instruments are checked when lab is there. */
 bool control_args(const struct control_bench *b, const struct control_command *row, const cJSON *args,
-                  struct control_value v[CONTROL_ARGS_MAX], struct control_refusal *why);
+                  struct control_value v[CONTROL_ARGS_MAX], struct control_error *why);
 
 /* The i-th word that an argument takes, asked for in order; NULL past the last, and where any will do. */
 const char *control_choice(const struct control_arg *a, unsigned i);

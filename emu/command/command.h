@@ -64,21 +64,21 @@ struct control_scpi {
         }                                                                                                              \
     }
 
-enum control_outcome { CONTROL_DONE, CONTROL_LATER, CONTROL_REFUSED };
+enum control_outcome { CONTROL_DONE, CONTROL_LATER, CONTROL_REJECTED };
 
 struct control;
-struct control_refusal;
+struct control_error;
 
 struct control_command {
     const char *name;
     const char *what;              /* one sentence */
     const struct control_arg *arg; /* up to the one without a name: CONTROL_ARGS(); NULL: none */
-    /* v: the arguments in the order of arg. Adds to result; CONTROL_REFUSED after control_refuse(). */
+    /* v: the arguments in the order of arg. Adds to result; CONTROL_REFUSED after control_reject(). */
     enum control_outcome (*run)(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns);
     bool changes; /* the bench's future: goes into the journal */
     struct control_scpi scpi[CONTROL_SCPI_MAX];
-    /* What the arguments do not say one by one; does nothing. False with the refusal. NULL: nothing more. */
-    bool (*check)(const struct control_bench *b, const struct control_value *v, struct control_refusal *why);
+    /* What the arguments do not say one by one; does nothing. False with the error. NULL: nothing more. */
+    bool (*check)(const struct control_bench *b, const struct control_value *v, struct control_error *why);
 };
 
 struct control_table {
@@ -89,7 +89,7 @@ struct control_table {
 extern const struct control_table *const control_tables[];       /* of the control socket, up to NULL */
 extern const struct control_table *const control_truth_tables[]; /* of the truth port */
 
-struct control_refusal {
+struct control_error {
     const char *code; /* syntax, command, argument, type, range, state, machine */
     char why[CONTROL_WHY_MAX];
 };

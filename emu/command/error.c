@@ -2,7 +2,7 @@
 
 #include <stdio.h>
 
-bool control_refuse_in(struct control_refusal *r, const char *code, const char *format, ...)
+bool control_reject_in(struct control_error *r, const char *code, const char *format, ...)
 {
     va_list ap;
     va_start(ap, format);
@@ -12,7 +12,7 @@ bool control_refuse_in(struct control_refusal *r, const char *code, const char *
     return false;
 }
 
-bool control_expected(struct control_refusal *r, const char *code, const char *where, const char *got,
+bool control_expected(struct control_error *r, const char *code, const char *where, const char *got,
                       const char *expected, ...)
 {
     va_list ap;

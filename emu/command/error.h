@@ -6,11 +6,11 @@
 #include "command/command.h"
 
 /* Writes down the error and returns false. */
-__attribute__((format(printf, 3, 4))) bool control_refuse_in(struct control_refusal *r, const char *code,
+__attribute__((format(printf, 3, 4))) bool control_reject_in(struct control_error *r, const char *code,
                                                              const char *format, ...);
 
 /* The same with a line of why_expected(). */
-__attribute__((format(printf, 5, 6))) bool control_expected(struct control_refusal *r, const char *code,
+__attribute__((format(printf, 5, 6))) bool control_expected(struct control_error *r, const char *code,
                                                             const char *where, const char *got, const char *expected,
                                                             ...);
 

@@ -5,7 +5,7 @@
 
 #include <string.h>
 
-static bool among(const char *const *names, unsigned n, const char *name)
+static bool is_among(const char *const *names, unsigned n, const char *name)
 {
     for (unsigned i = 0; i < n; i++) {
         if (strcmp(names[i], name) == 0) return true;
@@ -17,7 +17,7 @@ static bool among(const char *const *names, unsigned n, const char *name)
 static bool met_before(const struct board_type *const *type, const char *name)
 {
     for (const struct board_type *const *t = board_types; t < type; t++) {
-        if (among((*t)->events, (*t)->event_count, name)) return true;
+        if (is_among((*t)->events, (*t)->event_count, name)) return true;
     }
     return false;
 }
@@ -33,7 +33,7 @@ const char *control_event(unsigned i)
 }
 
 bool control_event_find(const struct control_bench *b, unsigned unit, const char *arg, const char *name,
-                        unsigned *event, struct control_refusal *why)
+                        unsigned *event, struct control_error *why)
 {
     char known[160] = "";
     if (unit >= b->units) return control_expected(why, "state", arg, "no unit", "an event of a unit");

@@ -7,8 +7,8 @@
 /* The i-th name that any type of board has, each once; NULL past the last. */
 const char *control_event(unsigned i);
 
-/* Number among the events of the unit's board; false with the refusal, which has the list of that board. */
+/* Number among the events of the unit's board; false with the error, which lists that board's events. */
 bool control_event_find(const struct control_bench *b, unsigned unit, const char *arg, const char *name,
-                        unsigned *event, struct control_refusal *why);
+                        unsigned *event, struct control_error *why);
 
 #endif

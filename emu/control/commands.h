@@ -7,10 +7,10 @@
 extern const struct control_table commands_bench, commands_head, commands_table, commands_chamber, commands_supply,
     commands_platform, commands_watch, commands_fault, commands_snapshot, commands_bus, commands_can, commands_truth;
 
-/* "unit" of commands that need to be told only where there is more than one. */
+/* "unit" of commands; optional where the bench has one unit. */
 #define CONTROL_UNIT_ARG(is_optional)                                                                                  \
     {                                                                                                                  \
-        .name = "unit", .type = CONTROL_UNIT, .optional = (is_optional), .what = "unit of the scenario"      \
+        .name = "unit", .type = CONTROL_UNIT, .optional = (is_optional), .what = "unit of the scenario"                \
     }
 
 /* The largest integer that JSON carries without loss. */

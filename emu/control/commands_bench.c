@@ -26,11 +26,11 @@ static enum control_outcome do_run(struct control *c, const struct control_value
 {
     (void)result;
     (void)t_ns;
-    if (c->waiting) return control_refuse(c, "state", "another run is in progress");
+    if (c->waiting) return control_reject(c, "state", "another run is in progress");
     const int64_t for_ns = (int64_t)nearbyint(v[0].real * 1e9);
-    if (c->bench->sim.run(c->bench->ctx, for_ns, v[1].count, c->refusal.why)) return CONTROL_LATER;
-    c->refusal.code = "state";
-    return CONTROL_REFUSED;
+    if (c->bench->sim.run(c->bench->ctx, for_ns, v[1].count, c->error.why)) return CONTROL_LATER;
+    c->error.code = "state";
+    return CONTROL_REJECTED;
 }
 
 static enum control_outcome do_units(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
@@ -45,7 +45,7 @@ static enum control_outcome do_unit_reset(struct control *c, const struct contro
 {
     (void)result;
     if (!v[0].given && c->bench->units != 1) {
-        return control_refuse(c, "argument", "unit: expected one of %u units, got nothing", c->bench->units);
+        return control_reject(c, "argument", "unit: expected one of %u units, got nothing", c->bench->units);
     }
     const struct unit *u = c->bench->unit[v[0].unit];
     u->type->reset(u->board, t_ns);
@@ -83,8 +83,8 @@ static enum control_outcome do_endpoints(struct control *c, const struct control
 {
     (void)v;
     (void)t_ns;
-    if (!c->bench->process.endpoints) return control_refuse(c, "state", "this bench has no endpoints");
-    if (!c->bench->process.endpoints(c->bench->ctx, result)) return control_refuse(c, "machine", "no memory");
+    if (!c->bench->process.endpoints) return control_reject(c, "state", "this bench has no endpoints");
+    if (!c->bench->process.endpoints(c->bench->ctx, result)) return control_reject(c, "machine", "no memory");
     return CONTROL_DONE;
 }
 

@@ -7,20 +7,20 @@ enum { UNIT, ADDRESS, READ_STROBE, DATA = READ_STROBE, WRITE_STROBE };
 
 #define PATIENCE_NS (10 * NS_PER_S) /* simulated; a strobe is a second at most */
 
-static enum control_outcome submit(struct control *c, struct control_cycle *k, int64_t t_ns)
+static enum control_outcome submit_cycle(struct control *c, struct control_cycle *k, int64_t t_ns)
 {
     const struct control_bench *b = c->bench;
     const struct unit *u = b->unit[k->unit];
     const enum board_cycle_result r = u->type->bus->submit(u->board, &k->cycle, t_ns);
     if (r != BOARD_CYCLE_OK) {
         k->control = NULL;
-        return control_cycle_refuse(c, k, r);
+        return control_cycle_reject(c, k, r);
     }
     c->started = k;
-    if (k->client && control_by_step(b) && !b->sim.run(b->ctx, PATIENCE_NS, 0, c->refusal.why)) {
-        c->refusal.code = "state";
+    if (k->client && control_by_step(b) && !b->sim.run(b->ctx, PATIENCE_NS, 0, c->error.why)) {
+        c->error.code = "state";
         k->client = NULL; /* it goes its way, no client waits */
-        return CONTROL_REFUSED;
+        return CONTROL_REJECTED;
     }
     return CONTROL_LATER;
 }
@@ -29,8 +29,8 @@ static enum control_outcome do_cycle(struct control *c, const struct control_val
 {
     const struct control_value *strobe = &v[write ? WRITE_STROBE : READ_STROBE];
     struct control_cycle *k = control_cycle_free(c);
-    if (!k) return control_refuse(c, "state", "expected up to %u cycles in progress", CONTROL_CYCLES_MAX);
-    if (c->waiting && c->client) return control_refuse(c, "state", "another run is in progress");
+    if (!k) return control_reject(c, "state", "expected up to %u cycles in progress", CONTROL_CYCLES_MAX);
+    if (c->waiting && c->client) return control_reject(c, "state", "another run is in progress");
     *k = (struct control_cycle){.control = c, .client = c->client, .unit = v[UNIT].unit};
     k->cycle = (struct board_cycle){.write = write,
                                     .address = (uint8_t)v[ADDRESS].count,
@@ -38,7 +38,7 @@ static enum control_outcome do_cycle(struct control *c, const struct control_val
                                     .strobe_ns = strobe->given ? (int64_t)strobe->count : 0,
                                     .done = control_cycle_done,
                                     .ctx = k};
-    return submit(c, k, t_ns);
+    return submit_cycle(c, k, t_ns);
 }
 
 static enum control_outcome do_read(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
@@ -53,11 +53,11 @@ static enum control_outcome do_write(struct control *c, const struct control_val
     return do_cycle(c, v, true, t_ns);
 }
 
-static bool has_bus(const struct control_bench *b, const struct control_value *v, struct control_refusal *why)
+static bool has_bus(const struct control_bench *b, const struct control_value *v, struct control_error *why)
 {
     const struct board_type *t = b->unit[v[UNIT].unit]->type;
     if (t->bus) return true;
-    return control_refuse_in(why, "range", "unit: expected a board with a parallel bus, got %s, a %s",
+    return control_reject_in(why, "range", "unit: expected a board with a parallel bus, got %s, a %s",
                              b->unit_name[v[UNIT].unit], t->title);
 }
 

@@ -17,7 +17,7 @@ static unsigned bus_of(const struct control_bench *b, const struct control_value
     return i;
 }
 
-static bool can_be_sent(const struct control_bench *b, const struct control_value *v, struct control_refusal *why)
+static bool can_be_sent(const struct control_bench *b, const struct control_value *v, struct control_error *why)
 {
     struct can_msg m;
     if (!can_text_get(v[FRAME].text, &m))
@@ -39,9 +39,9 @@ static enum control_outcome do_send(struct control *c, const struct control_valu
     case CAN_OK:
         return CONTROL_DONE;
     case CAN_FULL:
-        return control_refuse(c, "state", "the queue of %u frames to send is full", CAN_QUEUE_MAX);
+        return control_reject(c, "state", "the queue of %u frames to send is full", CAN_QUEUE_MAX);
     default:
-        return control_refuse(c, "state", "this bus does not carry frames of this format");
+        return control_reject(c, "state", "this bus does not carry frames of this format");
     }
 }
 

@@ -22,7 +22,7 @@ static void ramp_limits(const struct control_bench *b, const struct control_valu
     *max = chamber_ramp_max_k_per_min(&b->lab->chamber);
 }
 
-static enum control_outcome answer(struct control *c, cJSON *result, int64_t t_ns)
+static enum control_outcome put_chamber(struct control *c, cJSON *result, int64_t t_ns)
 {
     const struct chamber *k = &c->bench->lab->chamber;
     const bool stable = chamber_stable(k, t_ns);
@@ -36,15 +36,15 @@ static enum control_outcome answer(struct control *c, cJSON *result, int64_t t_n
 
 static enum control_outcome no_chamber(struct control *c)
 {
-    return control_refuse(c, "state", "this scenario has no thermal chamber");
+    return control_reject(c, "state", "this scenario has no thermal chamber");
 }
 
 static enum control_outcome do_set(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
 {
     if (!has_chamber(c->bench)) return no_chamber(c);
     control_settle_inputs(c->bench, t_ns);
-    if (chamber_set(&c->bench->lab->chamber, v[0].real, t_ns) == CHAMBER_OK) return answer(c, result, t_ns);
-    return control_refuse(c, "range", "temp_degc: expected a temperature that the chamber reaches, got %.10g",
+    if (chamber_set(&c->bench->lab->chamber, v[0].real, t_ns) == CHAMBER_OK) return put_chamber(c, result, t_ns);
+    return control_reject(c, "range", "temp_degc: expected a temperature that the chamber reaches, got %.10g",
                           v[0].real);
 }
 
@@ -52,18 +52,18 @@ static enum control_outcome do_ramp(struct control *c, const struct control_valu
 {
     if (!has_chamber(c->bench)) return no_chamber(c);
     control_settle_inputs(c->bench, t_ns);
-    if (chamber_ramp(&c->bench->lab->chamber, v[0].real, t_ns) == CHAMBER_OK) return answer(c, result, t_ns);
-    return control_refuse(c, "range", "ramp_k_per_min: expected above 0, up to %.10g K/min, got %.10g",
+    if (chamber_ramp(&c->bench->lab->chamber, v[0].real, t_ns) == CHAMBER_OK) return put_chamber(c, result, t_ns);
+    return control_reject(c, "range", "ramp_k_per_min: expected above 0, up to %.10g K/min, got %.10g",
                           chamber_ramp_max_k_per_min(&c->bench->lab->chamber), v[0].real);
 }
 
 static enum control_outcome do_read(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
 {
     (void)v;
-    return has_chamber(c->bench) ? answer(c, result, t_ns) : no_chamber(c);
+    return has_chamber(c->bench) ? put_chamber(c, result, t_ns) : no_chamber(c);
 }
 
-/* The chamber limits its ramp by itself; to be told the greater limit is to be free of it. */
+/* The chamber limits its ramp by itself; the greater limit removes the set one. */
 static enum control_outcome do_reset(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
 {
     (void)v;
@@ -73,7 +73,7 @@ static enum control_outcome do_reset(struct control *c, const struct control_val
     control_settle_inputs(c->bench, t_ns);
     chamber_ramp(k, ramp > 0 && ramp < most ? ramp : most, t_ns);
     chamber_set(k, k->cfg.start_degc, t_ns);
-    return answer(c, result, t_ns);
+    return put_chamber(c, result, t_ns);
 }
 
 // clang-format off

@@ -5,7 +5,7 @@
 
 #include <string.h>
 
-static bool check_add(const struct control_bench *b, const struct control_value *v, struct control_refusal *why)
+static bool check_add(const struct control_bench *b, const struct control_value *v, struct control_error *why)
 {
     struct fault f;
     return fault_make(b, v, &f, why);
@@ -15,15 +15,15 @@ static enum control_outcome do_add(struct control *c, const struct control_value
 {
     struct fault_engine *e = c->bench->faults;
     struct fault f;
-    if (!e) return control_refuse(c, "state", "no faults on this bench");
-    if (!fault_make(c->bench, v, &f, &c->refusal)) return CONTROL_REFUSED;
+    if (!e) return control_reject(c, "state", "no faults on this bench");
+    if (!fault_make(c->bench, v, &f, &c->error)) return CONTROL_REJECTED;
     if (v[FAULT_AT_S].given && f.at_ns < t_ns) {
-        return control_refuse(c, "range", "at_s: expected at least %.10g s (now), got %.10g", (double)t_ns * 1e-9,
+        return control_reject(c, "range", "at_s: expected at least %.10g s (now), got %.10g", (double)t_ns * 1e-9,
                               v[FAULT_AT_S].real);
     }
     const uint32_t id = fault_add(e, &f, t_ns);
     if (id == 0) {
-        return control_refuse(c, "state", "expected up to %u faults, waiting or active; remove some with fault.clear",
+        return control_reject(c, "state", "expected up to %u faults, waiting or active; remove some with fault.clear",
                               FAULTS_MAX);
     }
     cJSON_AddNumberToObject(result, "id", id);
@@ -34,9 +34,9 @@ static enum control_outcome do_clear(struct control *c, const struct control_val
 {
     struct fault_engine *e = c->bench->faults;
     unsigned cleared = 0;
-    if (!e) return control_refuse(c, "state", "no faults on this bench");
+    if (!e) return control_reject(c, "state", "no faults on this bench");
     if (v[0].given && !fault_find(e, (uint32_t)v[0].count)) {
-        return control_refuse(c, "range", "id: expected an id that fault.list shows, got %llu",
+        return control_reject(c, "range", "id: expected an id that fault.list shows, got %llu",
                               (unsigned long long)v[0].count);
     }
     for (unsigned i = 0; i < FAULTS_MAX; i++) {
@@ -108,7 +108,7 @@ static enum control_outcome do_points(struct control *c, const struct control_va
     const struct fault_kind *k = v[0].given ? fault_kind_find(v[0].text) : NULL;
     (void)t_ns;
     if (v[0].given && !k)
-        return control_refuse(c, "range", "kind: expected a name that fault.kinds lists, got \"%.40s\"", v[0].text);
+        return control_reject(c, "range", "kind: expected a name that fault.kinds lists, got \"%.40s\"", v[0].text);
     for (unsigned n = 0; fault_point(c->bench, n, &p, name); n++) {
         if (!k || k->places & FAULT_BIT(p.place)) cJSON_AddItemToArray(points, cJSON_CreateString(name));
     }

@@ -15,7 +15,7 @@ static void add_head(const struct head *h, cJSON *result, int64_t t_ns)
 static enum control_outcome do_turn(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
 {
     if (!head_at_rest(&c->bench->lab->head, t_ns)) {
-        return control_refuse(c, "state", "the head is turning, at rest in %.3f s",
+        return control_reject(c, "state", "the head is turning, at rest in %.3f s",
                               (double)(head_rest_ns(&c->bench->lab->head) - t_ns) * 1e-9);
     }
     control_settle_inputs(c->bench, t_ns);
@@ -26,7 +26,7 @@ static enum control_outcome do_turn(struct control *c, const struct control_valu
 
 static enum control_outcome do_mount(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
 {
-    if (!head_at_rest(&c->bench->lab->head, t_ns)) return control_refuse(c, "state", "the head is turning");
+    if (!head_at_rest(&c->bench->lab->head, t_ns)) return control_reject(c, "state", "the head is turning");
     control_settle_inputs(c->bench, t_ns);
     head_mount(&c->bench->lab->head, (enum head_face)v[0].choice, t_ns);
     add_head(&c->bench->lab->head, result, t_ns);

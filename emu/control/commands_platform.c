@@ -7,10 +7,10 @@ static struct platform *platform_of(const struct control_bench *b)
     return b->lab && b->lab->platform.cfg.present ? &b->lab->platform : NULL;
 }
 
-static bool has_vehicle(const struct control_bench *b, const struct control_value *v, struct control_refusal *why)
+static bool has_vehicle(const struct control_bench *b, const struct control_value *v, struct control_error *why)
 {
     (void)v;
-    return platform_of(b) || control_refuse_in(why, "state", "this scenario has no platform and no vehicle");
+    return platform_of(b) || control_reject_in(why, "state", "this scenario has no platform and no vehicle");
 }
 
 static enum control_outcome do_attitude(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
@@ -52,11 +52,11 @@ static enum control_outcome do_fly(struct control *c, const struct control_value
 
 static const char *const modes[] = {"off", "level", "hold", "slew", "gyrocompass", "calibrate", "navigate", NULL};
 
-static bool has_modes(const struct control_bench *b, const struct control_value *v, struct control_refusal *why)
+static bool has_modes(const struct control_bench *b, const struct control_value *v, struct control_error *why)
 {
     const struct unit *u = b->unit[v[0].unit];
     return u->type->platform ||
-           control_refuse_in(why, "state", "unit: expected a gyro unit, got %s, a %s", u->cfg.name, u->type->title);
+           control_reject_in(why, "state", "unit: expected a gyro unit, got %s, a %s", u->cfg.name, u->type->title);
 }
 
 static enum control_outcome do_mode(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
@@ -64,7 +64,7 @@ static enum control_outcome do_mode(struct control *c, const struct control_valu
     struct unit *u = c->bench->unit[v[0].unit];
     (void)result;
     const char *why = u->type->platform->set_mode(u->board, v[1].choice, t_ns);
-    return why ? control_refuse(c, "state", "%s", why) : CONTROL_DONE;
+    return why ? control_reject(c, "state", "%s", why) : CONTROL_DONE;
 }
 
 // clang-format off

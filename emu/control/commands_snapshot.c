@@ -1,28 +1,27 @@
 /* Commands that save the bench or double it. */
 #include "control/commands.h"
 
-static enum control_outcome refuse_without(struct control *c)
+static enum control_outcome reject_unavailable(struct control *c)
 {
-    return control_refuse(c, "state", "not available on this bench");
+    return control_reject(c, "state", "not available on this bench");
 }
 
 static enum control_outcome do_snapshot(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
 {
     (void)t_ns;
-    if (!c->bench->process.snapshot) return refuse_without(c);
-    c->refusal.code = "state";
-    return c->bench->process.snapshot(c->bench->ctx, v[0].text, result, c->refusal.why) ? CONTROL_DONE
-                                                                                        : CONTROL_REFUSED;
+    if (!c->bench->process.snapshot) return reject_unavailable(c);
+    c->error.code = "state";
+    return c->bench->process.snapshot(c->bench->ctx, v[0].text, result, c->error.why) ? CONTROL_DONE : CONTROL_REJECTED;
 }
 
 static enum control_outcome do_fork(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
 {
     (void)t_ns;
-    if (!c->bench->process.fork) return refuse_without(c);
+    if (!c->bench->process.fork) return reject_unavailable(c);
     const struct control_fork f = {
         .control = v[0].text, .can = v[1].given ? v[1].text : "none", .truth = v[2].given ? v[2].text : NULL};
-    c->refusal.code = "machine";
-    return c->bench->process.fork(c->bench->ctx, &f, result, c->refusal.why) ? CONTROL_DONE : CONTROL_REFUSED;
+    c->error.code = "machine";
+    return c->bench->process.fork(c->bench->ctx, &f, result, c->error.why) ? CONTROL_DONE : CONTROL_REJECTED;
 }
 
 // clang-format off

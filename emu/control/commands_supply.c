@@ -39,13 +39,13 @@ static void add_supply(const struct control *c, cJSON *result, int64_t t_ns)
 
 static enum control_outcome no_supply(struct control *c)
 {
-    return control_refuse(c, "state", "this scenario has no power supply; its boards are always powered");
+    return control_reject(c, "state", "this scenario has no power supply; its boards are always powered");
 }
 
 /* After a command: the boards that it feeds may go off or come back. */
-static enum control_outcome answer(struct control *c, enum supply_result r, cJSON *result, int64_t t_ns)
+static enum control_outcome put_supply(struct control *c, enum supply_result r, cJSON *result, int64_t t_ns)
 {
-    if (r != SUPPLY_OK) return control_refuse(c, "range", "outside the range of the supply");
+    if (r != SUPPLY_OK) return control_reject(c, "range", "outside the range of the supply");
     if (c->bench->sim.supply_changed) c->bench->sim.supply_changed(c->bench->ctx, t_ns);
     add_supply(c, result, t_ns);
     return CONTROL_DONE;
@@ -55,7 +55,7 @@ static enum control_outcome do_set(struct control *c, const struct control_value
 {
     if (!has_supply(c->bench)) return no_supply(c);
     control_settle_inputs(c->bench, t_ns);
-    return answer(c, supply_set(&c->bench->lab->supply, v[0].real, t_ns), result, t_ns);
+    return put_supply(c, supply_set(&c->bench->lab->supply, v[0].real, t_ns), result, t_ns);
 }
 
 static enum control_outcome do_output(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
@@ -63,14 +63,14 @@ static enum control_outcome do_output(struct control *c, const struct control_va
     if (!has_supply(c->bench)) return no_supply(c);
     control_settle_inputs(c->bench, t_ns);
     supply_output(&c->bench->lab->supply, v[0].on, t_ns);
-    return answer(c, SUPPLY_OK, result, t_ns);
+    return put_supply(c, SUPPLY_OK, result, t_ns);
 }
 
 static enum control_outcome do_ripple(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
 {
     if (!has_supply(c->bench)) return no_supply(c);
     control_settle_inputs(c->bench, t_ns);
-    return answer(c, supply_ripple(&c->bench->lab->supply, v[0].real, v[1].real, t_ns), result, t_ns);
+    return put_supply(c, supply_ripple(&c->bench->lab->supply, v[0].real, v[1].real, t_ns), result, t_ns);
 }
 
 static enum control_outcome do_read(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
@@ -90,7 +90,7 @@ static enum control_outcome do_reset(struct control *c, const struct control_val
     supply_ripple(s, s->cfg.ripple_v, s->cfg.ripple_hz > 0 ? s->cfg.ripple_hz : s->cfg.ripple_max_hz, t_ns);
     supply_set(s, s->cfg.volt_v, t_ns);
     supply_output(s, true, t_ns);
-    return answer(c, SUPPLY_OK, result, t_ns);
+    return put_supply(c, SUPPLY_OK, result, t_ns);
 }
 
 // clang-format off

@@ -57,22 +57,22 @@ static void add_axis(const struct control *c, const struct control_value *v, cJS
 
 static enum control_outcome no_table(struct control *c)
 {
-    return control_refuse(c, "state", "this scenario has no rate table");
+    return control_reject(c, "state", "this scenario has no rate table");
 }
 
-static enum control_outcome refuse(struct control *c, enum motion_result r, const struct control_value *v)
+static enum control_outcome reject_motion(struct control *c, enum motion_result r, const struct control_value *v)
 {
     const struct table_axis_cfg *a = axis_of(c->bench, v);
-    return control_refuse(c, "range", "axis %u: %s; it has up to %.6g deg/s and %.6g deg/s^2", (unsigned)v[0].count,
+    return control_reject(c, "range", "axis %u: %s; it has up to %.6g deg/s and %.6g deg/s^2", (unsigned)v[0].count,
                           motion_result_text(r), a ? a->rate_max_dps : 0.0, a ? a->accel_max_dps2 : 0.0);
 }
 
 /* Motions are tried on a copy, so that one that is refused leaves no trace; what was before the command is sampled before
  * the copy takes the table's place. */
-static enum control_outcome take(struct control *c, const struct table *tried, enum motion_result r,
-                                 const struct control_value *v, cJSON *result, int64_t t_ns)
+static enum control_outcome take_motion(struct control *c, const struct table *tried, enum motion_result r,
+                                        const struct control_value *v, cJSON *result, int64_t t_ns)
 {
-    if (r != MOTION_OK) return refuse(c, r, v);
+    if (r != MOTION_OK) return reject_motion(c, r, v);
     control_settle_inputs(c->bench, t_ns);
     c->bench->lab->table = *tried;
     add_axis(c, v, result, t_ns);
@@ -89,7 +89,7 @@ static enum control_outcome do_position(struct control *c, const struct control_
     if (!has_table(c->bench)) return no_table(c);
     struct table t = c->bench->lab->table;
     const enum motion_result r = table_position(&t, axis_index(v), v[1].real, v[2].real, t_ns);
-    return take(c, &t, r, v, result, t_ns);
+    return take_motion(c, &t, r, v, result, t_ns);
 }
 
 static enum control_outcome do_rate(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
@@ -97,7 +97,7 @@ static enum control_outcome do_rate(struct control *c, const struct control_valu
     if (!has_table(c->bench)) return no_table(c);
     struct table t = c->bench->lab->table;
     const enum motion_result r = table_rate(&t, axis_index(v), v[1].real, t_ns);
-    return take(c, &t, r, v, result, t_ns);
+    return take_motion(c, &t, r, v, result, t_ns);
 }
 
 static enum control_outcome do_sine(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
@@ -105,17 +105,17 @@ static enum control_outcome do_sine(struct control *c, const struct control_valu
     if (!has_table(c->bench)) return no_table(c);
     struct table t = c->bench->lab->table;
     const enum motion_result r = table_sine(&t, axis_index(v), v[1].real, v[2].real, t_ns);
-    return take(c, &t, r, v, result, t_ns);
+    return take_motion(c, &t, r, v, result, t_ns);
 }
 
 static enum control_outcome do_profile(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
 {
     if (!has_table(c->bench)) return no_table(c);
     if (v[1].n != v[2].n)
-        return control_refuse(c, "range", "rates_dps: expected %u rates, one for each time, got %u", v[1].n, v[2].n);
+        return control_reject(c, "range", "rates_dps: expected %u rates, one for each time, got %u", v[1].n, v[2].n);
     struct table t = c->bench->lab->table;
     const enum motion_result r = table_profile(&t, axis_index(v), v[1].reals, v[2].reals, v[1].n, t_ns);
-    return take(c, &t, r, v, result, t_ns);
+    return take_motion(c, &t, r, v, result, t_ns);
 }
 
 static enum control_outcome do_stop(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
@@ -123,7 +123,7 @@ static enum control_outcome do_stop(struct control *c, const struct control_valu
     if (!has_table(c->bench)) return no_table(c);
     struct table t = c->bench->lab->table;
     const enum motion_result r = table_stop(&t, axis_index(v), t_ns);
-    return take(c, &t, r, v, result, t_ns);
+    return take_motion(c, &t, r, v, result, t_ns);
 }
 
 static enum control_outcome do_zero(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
@@ -131,7 +131,7 @@ static enum control_outcome do_zero(struct control *c, const struct control_valu
     if (!has_table(c->bench)) return no_table(c);
     struct table t = c->bench->lab->table;
     const enum motion_result r = table_zero(&t, axis_index(v), v[1].real, t_ns);
-    return take(c, &t, r, v, result, t_ns);
+    return take_motion(c, &t, r, v, result, t_ns);
 }
 
 static enum control_outcome do_read(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)

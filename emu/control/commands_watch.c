@@ -7,11 +7,11 @@
 static enum control_outcome from_bench(struct control *c, bool done)
 {
     if (done) return CONTROL_DONE;
-    c->refusal.code = "state";
-    return CONTROL_REFUSED;
+    c->error.code = "state";
+    return CONTROL_REJECTED;
 }
 
-static bool check_until(const struct control_bench *b, const struct control_value *v, struct control_refusal *why)
+static bool check_until(const struct control_bench *b, const struct control_value *v, struct control_error *why)
 {
     unsigned event;
     return control_event_find(b, v[1].unit, "event", v[0].text, &event, why);
@@ -25,9 +25,9 @@ static enum control_outcome do_until(struct control *c, const struct control_val
     const uint64_t count = v[2].given ? v[2].count : 1;
     const double limit_s = v[3].given ? v[3].real : 60.0;
     unsigned event;
-    if (c->waiting) return control_refuse(c, "state", "another run is in progress");
-    if (!control_event_find(b, v[1].unit, "event", v[0].text, &event, &c->refusal)) return CONTROL_REFUSED;
-    if (!b->sim.run(b->ctx, (int64_t)nearbyint(limit_s * 1e9), v[4].count, c->refusal.why)) return from_bench(c, false);
+    if (c->waiting) return control_reject(c, "state", "another run is in progress");
+    if (!control_event_find(b, v[1].unit, "event", v[0].text, &event, &c->error)) return CONTROL_REJECTED;
+    if (!b->sim.run(b->ctx, (int64_t)nearbyint(limit_s * 1e9), v[4].count, c->error.why)) return from_bench(c, false);
     control_watch_until(c, event, v[1].unit, count);
     return CONTROL_LATER;
 }
@@ -36,11 +36,11 @@ static enum control_outcome do_subscribe(struct control *c, const struct control
 {
     (void)result;
     const double every_s = v[1].given ? v[1].real : 0.1;
-    if (!c->bench->process.push) return control_refuse(c, "state", "no subscriptions on this bench");
+    if (!c->bench->process.push) return control_reject(c, "state", "no subscriptions on this bench");
     if (control_subscribe(c, c->client, (enum control_topic)v[0].choice, (int64_t)nearbyint(every_s * 1e9), t_ns)) {
         return CONTROL_DONE;
     }
-    return control_refuse(c, "state", "expected up to %u subscriptions", CONTROL_SUBS_MAX);
+    return control_reject(c, "state", "expected up to %u subscriptions", CONTROL_SUBS_MAX);
 }
 
 static enum control_outcome do_unsubscribe(struct control *c, const struct control_value *v, cJSON *result,
@@ -55,7 +55,7 @@ static enum control_outcome do_unsubscribe(struct control *c, const struct contr
 
 static enum control_outcome do_lines(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
 {
-    if (!c->bench->units) return control_refuse(c, "state", "this bench has no unit");
+    if (!c->bench->units) return control_reject(c, "state", "this bench has no unit");
     const uint64_t level = control_lines(c, v[0].unit, t_ns);
     cJSON *lines = cJSON_AddObjectToObject(result, "lines");
     const struct board_type *type = c->bench->unit[v[0].unit]->type;
@@ -70,8 +70,8 @@ static enum control_outcome do_vcd_start(struct control *c, const struct control
     const struct control_bench *b = c->bench;
     (void)result;
     (void)t_ns;
-    if (!b->recording.start || !b->units) return control_refuse(c, "state", "no recordings on this bench");
-    return from_bench(c, b->recording.start(b->ctx, v[0].text, v[1].unit, c->refusal.why));
+    if (!b->recording.start || !b->units) return control_reject(c, "state", "no recordings on this bench");
+    return from_bench(c, b->recording.start(b->ctx, v[0].text, v[1].unit, c->error.why));
 }
 
 static enum control_outcome do_vcd_stop(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
@@ -79,8 +79,8 @@ static enum control_outcome do_vcd_stop(struct control *c, const struct control_
     (void)v;
     (void)result;
     (void)t_ns;
-    if (!c->bench->recording.stop) return control_refuse(c, "state", "no recording");
-    return from_bench(c, c->bench->recording.stop(c->bench->ctx, c->refusal.why));
+    if (!c->bench->recording.stop) return control_reject(c, "state", "no recording");
+    return from_bench(c, c->bench->recording.stop(c->bench->ctx, c->error.why));
 }
 
 static enum control_outcome do_vcd_flush(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
@@ -88,7 +88,7 @@ static enum control_outcome do_vcd_flush(struct control *c, const struct control
     (void)v;
     (void)result;
     (void)t_ns;
-    return from_bench(c, c->bench->recording.flush(c->bench->ctx, c->refusal.why));
+    return from_bench(c, c->bench->recording.flush(c->bench->ctx, c->error.why));
 }
 
 // clang-format off

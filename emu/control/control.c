@@ -21,7 +21,7 @@ enum control_outcome control_do(struct control *c, const struct control_command 
     /* Refused by its handler, too: converters may have taken their inputs by then, which moves their noise. */
     if (row->changes && c->bench->process.journal) {
         cJSON *args = control_args_json(row, v);
-        c->bench->process.journal(c->bench->ctx, row, args, outcome != CONTROL_REFUSED, t_ns);
+        c->bench->process.journal(c->bench->ctx, row, args, outcome != CONTROL_REJECTED, t_ns);
         cJSON_Delete(args);
     }
     return outcome;
@@ -31,8 +31,8 @@ enum control_outcome control_call(struct control *c, const char *cmd, const cJSO
 {
     struct control_value v[CONTROL_ARGS_MAX];
     const struct control_command *row = control_find(c->tables, cmd);
-    if (!row) return control_refuse(c, "command", "\"%.40s\": unknown command; see help", cmd);
-    if (!control_args(c->bench, row, args, v, &c->refusal)) return CONTROL_REFUSED;
+    if (!row) return control_reject(c, "command", "\"%.40s\": unknown command; see help", cmd);
+    if (!control_args(c->bench, row, args, v, &c->error)) return CONTROL_REJECTED;
     return control_do(c, row, v, result, t_ns);
 }
 
@@ -40,10 +40,10 @@ bool control_check(const struct control_table *const *tables, const struct contr
                    const cJSON *args, char *why)
 {
     struct control_value v[CONTROL_ARGS_MAX];
-    struct control_refusal refusal;
+    struct control_error error;
     const struct control_command *row = control_find(tables, cmd);
-    if (row && control_args(b, row, args, v, &refusal)) return true;
-    if (row) snprintf(why, CONTROL_WHY_MAX, "%s", refusal.why);
+    if (row && control_args(b, row, args, v, &error)) return true;
+    if (row) snprintf(why, CONTROL_WHY_MAX, "%s", error.why);
     else snprintf(why, CONTROL_WHY_MAX, "\"%.40s\": unknown command", cmd);
     return false;
 }
@@ -76,24 +76,24 @@ void control_run_forget(struct control *c)
 
 /* ---- one line */
 
-static enum control_outcome dispatch(struct control *c, const cJSON *request, cJSON *result, int64_t t_ns)
+static enum control_outcome dispatch_request(struct control *c, const cJSON *request, cJSON *result, int64_t t_ns)
 {
     if (!cJSON_IsObject(request)) {
-        return control_refuse(
+        return control_reject(
             c, "syntax", "expected a JSON object such as {\"id\":1,\"cmd\":\"help\"} in a line of up to 4095 bytes");
     }
     const cJSON *j;
     cJSON_ArrayForEach(j, request)
     {
         if (strcmp(j->string, "id") != 0 && strcmp(j->string, "cmd") != 0 && strcmp(j->string, "args") != 0) {
-            return control_refuse(c, "syntax", "expected the members id, cmd and args, got \"%.40s\"", j->string);
+            return control_reject(c, "syntax", "expected the members id, cmd and args, got \"%.40s\"", j->string);
         }
         if (cJSON_GetObjectItemCaseSensitive(request, j->string) != j) {
-            return control_refuse(c, "syntax", "%s: expected one value, got two", j->string);
+            return control_reject(c, "syntax", "%s: expected one value, got two", j->string);
         }
     }
     const cJSON *name = cJSON_GetObjectItemCaseSensitive(request, "cmd");
-    if (!cJSON_IsString(name)) return control_refuse(c, "syntax", "cmd: expected the name of a command; see help");
+    if (!cJSON_IsString(name)) return control_reject(c, "syntax", "cmd: expected the name of a command; see help");
     return control_call(c, name->valuestring, cJSON_GetObjectItemCaseSensitive(request, "args"), result, t_ns);
 }
 
@@ -104,7 +104,7 @@ const char *control_line(struct control *c, const char *line, int64_t t_ns)
     cJSON *id = cJSON_DetachItemFromObjectCaseSensitive(request, "id");
     c->commands++;
     c->started = NULL;
-    const enum control_outcome outcome = dispatch(c, request, result, t_ns);
+    const enum control_outcome outcome = dispatch_request(c, request, result, t_ns);
     cJSON_Delete(request);
     if (outcome != CONTROL_LATER) return control_reply(c, id, outcome == CONTROL_DONE, result, t_ns);
     cJSON_Delete(result);

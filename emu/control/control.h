@@ -31,10 +31,10 @@ struct control_cycle {
 struct control {
     const struct control_table *const *tables;
     const struct control_bench *bench;
-    struct control_refusal refusal; /* the latest */
-    uint32_t commands, refused;     /* lines since init */
-    void *client;                   /* who sent the line: the application sets it before control_line() */
-    bool waiting;                   /* a run is under way */
+    struct control_error error; /* the latest */
+    uint32_t commands, refused; /* lines since init */
+    void *client;               /* who sent the line: the application sets it before control_line() */
+    bool waiting;               /* a run is under way */
     cJSON *run_id;
     struct control_cycle cycle[CONTROL_CYCLES_MAX];
     struct control_cycle *started; /* by the line that is being carried out */
@@ -61,7 +61,7 @@ void control_cycles_forget(struct control *c, const void *client); /* the same f
 enum control_outcome control_do(struct control *c, const struct control_command *row, const struct control_value *v,
                                 cJSON *result, int64_t t_ns);
 
-/* Both, by name; the refusal is in c. */
+/* Both, by name; the error is in c. */
 enum control_outcome control_call(struct control *c, const char *cmd, const cJSON *args, cJSON *result, int64_t t_ns);
 
 /* Whether control_call() of a control with these tables would get as far as the handler; does nothing. False with the reason in why[CONTROL_WHY_MAX]. */

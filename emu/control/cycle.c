@@ -14,19 +14,19 @@ static const char *const codes[] = {
     [BOARD_CYCLE_OFF] = "off",
 };
 
-enum control_outcome control_cycle_refuse(struct control *c, const struct control_cycle *k, enum board_cycle_result r)
+enum control_outcome control_cycle_reject(struct control *c, const struct control_cycle *k, enum board_cycle_result r)
 {
     char why[BOARD_CYCLE_WHY_MAX];
     const struct unit *u = c->bench->unit[k->unit];
     board_cycle_why(u->type->bus, u->board, &k->cycle, r, why);
-    return control_refuse(c, codes[r], "%s: %s", c->bench->unit_name[k->unit], why);
+    return control_reject(c, codes[r], "%s: %s", c->bench->unit_name[k->unit], why);
 }
 
 static enum control_outcome put_result(struct control *c, const struct control_cycle *k, cJSON *result)
 {
     const struct board_bus *bus = c->bench->unit[k->unit]->type->bus;
-    if (!k->over) return control_refuse(c, "state", "the cycle did not complete");
-    if (k->result != BOARD_CYCLE_OK) return control_cycle_refuse(c, k, k->result);
+    if (!k->over) return control_reject(c, "state", "the cycle did not complete");
+    if (k->result != BOARD_CYCLE_OK) return control_cycle_reject(c, k, k->result);
     const char *name = bus->name(k->cycle.address);
     if (name) cJSON_AddStringToObject(result, "name", name);
     cJSON_AddNumberToObject(result, "data", k->cycle.data);

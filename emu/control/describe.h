@@ -1,4 +1,4 @@
-/* What the commands tell of the bench, as JSON. Reads only. */
+/* The state of the bench as JSON. Reads only. */
 #ifndef PSABENCH_CONTROL_DESCRIBE_H
 #define PSABENCH_CONTROL_DESCRIBE_H
 
@@ -14,7 +14,7 @@ void describe_unit_counters(const struct control_bench *b, unsigned unit, cJSON 
 /* What an operator sees at a glance: pace, frames, readings of the instruments that are there. */
 void describe_status(const struct control_bench *b, cJSON *to, int64_t t_ns);
 
-/* Hidden parameters: the truth port alone may tell them. */
+/* Hidden parameters: for the truth port only. */
 void describe_truth(const struct control_bench *b, cJSON *to, int64_t t_ns);
 
 /* The true state of this instant: instruments, and what a unit and its sensors feel. */

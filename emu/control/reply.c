@@ -5,17 +5,17 @@
 #include <stdio.h>
 #include <string.h>
 
-enum control_outcome control_refuse(struct control *c, const char *code, const char *format, ...)
+enum control_outcome control_reject(struct control *c, const char *code, const char *format, ...)
 {
     va_list ap;
     va_start(ap, format);
-    vsnprintf(c->refusal.why, sizeof c->refusal.why, format, ap);
+    vsnprintf(c->error.why, sizeof c->error.why, format, ap);
     va_end(ap);
-    c->refusal.code = code;
-    return CONTROL_REFUSED;
+    c->error.code = code;
+    return CONTROL_REJECTED;
 }
 
-static const char *print(struct control *c, cJSON *reply)
+static const char *print_reply(struct control *c, cJSON *reply)
 {
     static const char too_long[] = "{\"ok\":false,\"error\":{\"code\":\"machine\",\"text\":\"reply too long\"}}";
     if (!cJSON_PrintPreallocated(reply, c->reply, (int)sizeof c->reply, 0)) memcpy(c->reply, too_long, sizeof too_long);
@@ -45,12 +45,12 @@ const char *control_reply(struct control *c, cJSON *id, bool ok, cJSON *result, 
     add_rx(c, reply);
     if (ok) {
         cJSON_AddItemToObject(reply, "result", result ? result : cJSON_CreateObject());
-        return print(c, reply);
+        return print_reply(c, reply);
     }
     cJSON_Delete(result);
     c->refused++;
     cJSON *error = cJSON_AddObjectToObject(reply, "error");
-    cJSON_AddStringToObject(error, "code", c->refusal.code);
-    cJSON_AddStringToObject(error, "text", c->refusal.why);
-    return print(c, reply);
+    cJSON_AddStringToObject(error, "code", c->error.code);
+    cJSON_AddStringToObject(error, "text", c->error.why);
+    return print_reply(c, reply);
 }

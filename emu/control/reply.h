@@ -5,7 +5,7 @@
 #include "control/control.h"
 
 /* For handlers: remembers why; returns CONTROL_REFUSED. */
-__attribute__((format(printf, 3, 4))) enum control_outcome control_refuse(struct control *c, const char *code,
+__attribute__((format(printf, 3, 4))) enum control_outcome control_reject(struct control *c, const char *code,
                                                                           const char *format, ...);
 
 /* The reply, valid until the next one; takes over id and result (NULL: empty). Not ok: the error in c. */

@@ -11,7 +11,7 @@ _Static_assert(sizeof control_topics / sizeof *control_topics == CONTROL_TOPICS 
 
 enum { PUSH_MAX = 2048 };
 
-static void push(const struct control_sub *s, const cJSON *event)
+static void push_event(const struct control_sub *s, const cJSON *event)
 {
     char line[PUSH_MAX];
     const struct control_bench *b = s->control->bench;
@@ -20,16 +20,16 @@ static void push(const struct control_sub *s, const cJSON *event)
         b->process.push(b->ctx, s->client, line);
 }
 
-void control_tell(struct control *c, enum control_topic topic, cJSON *event)
+void control_notify(struct control *c, enum control_topic topic, cJSON *event)
 {
     for (unsigned i = 0; i < CONTROL_SUBS_MAX; i++) {
         const struct control_sub *s = &c->watch.sub[i];
-        if (s->control && s->topic == topic) push(s, event);
+        if (s->control && s->topic == topic) push_event(s, event);
     }
     cJSON_Delete(event);
 }
 
-static bool anybody(const struct control *c, enum control_topic topic)
+static bool has_subscriber(const struct control *c, enum control_topic topic)
 {
     for (unsigned i = 0; i < CONTROL_SUBS_MAX; i++) {
         if (c->watch.sub[i].control && c->watch.sub[i].topic == topic) return true;
@@ -40,7 +40,7 @@ static bool anybody(const struct control *c, enum control_topic topic)
 void control_fault_changed(void *ctx, const struct fault *f, int64_t t_ns)
 {
     struct control *c = ctx;
-    if (!anybody(c, CONTROL_FAULTS)) return;
+    if (!has_subscriber(c, CONTROL_FAULTS)) return;
     cJSON *event = cJSON_CreateObject();
     cJSON_AddStringToObject(event, "event", "fault");
     cJSON_AddNumberToObject(event, "t_ns", (double)t_ns);
@@ -48,57 +48,57 @@ void control_fault_changed(void *ctx, const struct fault *f, int64_t t_ns)
     cJSON_AddStringToObject(event, "kind", f->kind->name);
     cJSON_AddStringToObject(event, "point", f->name);
     cJSON_AddStringToObject(event, "state", fault_state_name(f->state));
-    control_tell(c, CONTROL_FAULTS, event);
+    control_notify(c, CONTROL_FAULTS, event);
 }
 
 /* ---- the boards' events */
 
 static void on_event(void *ctx, unsigned e, int64_t t_ns)
 {
-    const struct control_ear *ear = ctx;
-    struct control *c = ear->control;
+    const struct control_observer *observer = ctx;
+    struct control *c = observer->control;
     struct control_until *u = &c->watch.until;
-    if (anybody(c, CONTROL_EVENTS)) {
+    if (has_subscriber(c, CONTROL_EVENTS)) {
         cJSON *event = cJSON_CreateObject();
-        cJSON_AddStringToObject(event, "event", c->bench->unit[ear->unit]->type->events[e]);
-        cJSON_AddStringToObject(event, "unit", c->bench->unit_name[ear->unit]);
+        cJSON_AddStringToObject(event, "event", c->bench->unit[observer->unit]->type->events[e]);
+        cJSON_AddStringToObject(event, "unit", c->bench->unit_name[observer->unit]);
         cJSON_AddNumberToObject(event, "t_ns", (double)t_ns);
-        control_tell(c, CONTROL_EVENTS, event);
+        control_notify(c, CONTROL_EVENTS, event);
     }
-    if (!u->active || u->reached || e != u->event || ear->unit != u->unit) return;
+    if (!u->active || u->reached || e != u->event || observer->unit != u->unit) return;
     u->reached = ++u->seen == u->count;
     if (u->reached) c->bench->sim.run_stop(c->bench->ctx);
 }
 
 /* Listens as long as somebody wants to know. */
-static void refresh_ears(struct control *c)
+static void refresh_observers(struct control *c)
 {
     struct control_watch *w = &c->watch;
-    const bool wanted = w->until.active || anybody(c, CONTROL_EVENTS);
-    if (wanted == w->listening) return;
-    w->listening = wanted;
+    const bool needed = w->until.active || has_subscriber(c, CONTROL_EVENTS);
+    if (needed == w->listening) return;
+    w->listening = needed;
     for (unsigned i = 0; i < c->bench->units; i++) {
-        struct control_ear *ear = &w->ear[i];
-        if (!wanted) {
-            unit_unlisten(c->bench->unit[i], &ear->listener);
+        struct control_observer *observer = &w->observer[i];
+        if (!needed) {
+            unit_unsubscribe(c->bench->unit[i], &observer->listener);
             continue;
         }
-        *ear = (struct control_ear){.listener = {.fn = on_event, .ctx = ear}, .control = c, .unit = i};
-        unit_listen(c->bench->unit[i], &ear->listener);
+        *observer = (struct control_observer){.listener = {.fn = on_event, .ctx = observer}, .control = c, .unit = i};
+        unit_subscribe(c->bench->unit[i], &observer->listener);
     }
 }
 
 void control_watch_until(struct control *c, unsigned event, unsigned unit, uint64_t count)
 {
     c->watch.until = (struct control_until){.active = true, .event = event, .unit = unit, .count = count};
-    refresh_ears(c);
+    refresh_observers(c);
 }
 
 struct control_until control_watch_end(struct control *c)
 {
     const struct control_until was = c->watch.until;
     c->watch.until = (struct control_until){0};
-    refresh_ears(c);
+    refresh_observers(c);
     return was;
 }
 
@@ -111,12 +111,12 @@ static void on_status(void *ctx, int64_t t_ns)
     cJSON_AddStringToObject(event, "event", "status");
     cJSON_AddNumberToObject(event, "t_ns", (double)t_ns);
     describe_status(s->control->bench, event, t_ns);
-    push(s, event);
+    push_event(s, event);
     cJSON_Delete(event);
     sched_at(s->control->bench->sched, &s->ev, t_ns + s->every_ns);
 }
 
-static struct control_sub *find(struct control *c, const void *client, enum control_topic topic)
+static struct control_sub *find_subscription(struct control *c, const void *client, enum control_topic topic)
 {
     struct control_sub *room = NULL;
     for (unsigned i = 0; i < CONTROL_SUBS_MAX; i++) {
@@ -129,7 +129,7 @@ static struct control_sub *find(struct control *c, const void *client, enum cont
 
 bool control_subscribe(struct control *c, void *client, enum control_topic topic, int64_t every_ns, int64_t t_ns)
 {
-    struct control_sub *s = find(c, client, topic);
+    struct control_sub *s = find_subscription(c, client, topic);
     if (!s) return false;
     if (!s->control) {
         *s = (struct control_sub){.control = c, .client = client, .topic = topic};
@@ -137,17 +137,17 @@ bool control_subscribe(struct control *c, void *client, enum control_topic topic
     }
     s->every_ns = every_ns;
     if (topic == CONTROL_STATUS) sched_at(c->bench->sched, &s->ev, t_ns + every_ns);
-    refresh_ears(c);
+    refresh_observers(c);
     return true;
 }
 
 void control_unsubscribe(struct control *c, void *client, enum control_topic topic)
 {
-    struct control_sub *s = find(c, client, topic);
+    struct control_sub *s = find_subscription(c, client, topic);
     if (!s || !s->control) return;
     sched_cancel(c->bench->sched, &s->ev);
     s->control = NULL;
-    refresh_ears(c);
+    refresh_observers(c);
 }
 
 void control_gone(struct control *c, void *client)

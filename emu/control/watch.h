@@ -1,4 +1,4 @@
-/* What happens on the bench, told as it happens: `run.until` waits for an event of a board, subscribers get a line for each.
+/* Notifications of what happens on the bench: `run.until` waits for an event of a board, subscribers get a line for each.
  *
  *   {"event":"DRD_A","unit":"a","t_ns":20000000}
  *   {"event":"status","t_ns":20000000,"pace":"wall",...}
@@ -27,8 +27,8 @@ struct control_sub {
     struct sched_ev ev;
 };
 
-struct control_ear {
-    struct unit_listener listener;
+struct control_observer {
+    struct unit_observer listener;
     struct control *control;
     unsigned unit;
 };
@@ -41,7 +41,7 @@ struct control_until {
 
 struct control_watch { /* read-only outside watch.c */
     struct control_sub sub[CONTROL_SUBS_MAX];
-    struct control_ear ear[CONTROL_UNITS_MAX];
+    struct control_observer observer[CONTROL_UNITS_MAX];
     bool listening;
     struct control_until until;
     struct trace_sink probe[CONTROL_UNITS_MAX]; /* keeps the lines of a unit alive once somebody has looked at them */
@@ -59,7 +59,7 @@ bool control_subscribe(struct control *c, void *client, enum control_topic topic
 void control_unsubscribe(struct control *c, void *client, enum control_topic topic);
 
 /* A line to all who subscribed to the topic; takes over the event. */
-void control_tell(struct control *c, enum control_topic topic, struct cJSON *event);
+void control_notify(struct control *c, enum control_topic topic, struct cJSON *event);
 
 /* For fault_engine.changed; ctx is the control. */
 struct fault;

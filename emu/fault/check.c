@@ -32,7 +32,7 @@ const struct fault_kind *fault_kind_find(const char *name)
 
 /* ---- kind and point */
 
-static bool find_kind(const char *name, const struct fault_kind **kind, struct control_refusal *why)
+static bool find_kind(const char *name, const struct fault_kind **kind, struct control_error *why)
 {
     char known[160] = "";
     const struct fault_kind *k;
@@ -47,7 +47,7 @@ static bool find_kind(const char *name, const struct fault_kind **kind, struct c
     return control_expected(why, "range", "kind", WHY_TEXT(name), "one of %s", known);
 }
 
-static bool find_point(const struct control_bench *b, const char *text, struct fault *f, struct control_refusal *why)
+static bool find_point(const struct control_bench *b, const char *text, struct fault *f, struct control_error *why)
 {
     if (fault_point_find(b, text, &f->point, f->name)) return true;
     return control_expected(why, "range", "point", WHY_TEXT(text), "a name that fault.points lists");
@@ -83,19 +83,19 @@ bool fault_fits(const struct control_bench *b, const struct fault *f, char *why)
 
 /* ---- values */
 
-static int64_t ns(double s)
+static int64_t ns_of_s(double s)
 {
     return (int64_t)nearbyint(s * (double)NS_PER_S);
 }
 
-bool fault_values_fit(const struct fault *f, struct control_refusal *why)
+bool fault_values_fit(const struct fault *f, struct control_error *why)
 {
     const struct fault_kind *k = f->kind;
     for (unsigned i = FAULT_FOR_S; i < FAULT_ARGS; i++) {
         const char *name = fault_args[i].name;
         const bool given = fault_given(f, (enum fault_arg)i);
         if (given && i != FAULT_FOR_S && !((k->need | k->may) & FAULT_BIT(i))) {
-            return control_refuse_in(why, "argument", "%s: not an argument of %s", name, k->name);
+            return control_reject_in(why, "argument", "%s: not an argument of %s", name, k->name);
         }
         if (!given && (k->need & FAULT_BIT(i))) {
             return control_expected(why, "argument", name, "nothing", "a value (%s)", fault_args[i].what);
@@ -103,18 +103,18 @@ bool fault_values_fit(const struct fault *f, struct control_refusal *why)
         if (given && (k->nonzero & FAULT_BIT(i)) && f->value[i] == 0.0) {
             return control_expected(why, "range", name, "0", "a value other than 0");
         }
-        if ((i == FAULT_FOR_S || i == FAULT_HOLD_S) && f->value[i] > 0.0 && ns(f->value[i]) == 0) {
+        if ((i == FAULT_FOR_S || i == FAULT_HOLD_S) && f->value[i] > 0.0 && ns_of_s(f->value[i]) == 0) {
             return control_expected(why, "range", name, WHY_REAL(f->value[i]), "0 or at least 1e-9 s");
         }
     }
     return !k->once || !fault_given(f, FAULT_FOR_S) ||
-           control_refuse_in(why, "argument", "for_s: %s is instantaneous and takes no duration", k->name);
+           control_reject_in(why, "argument", "for_s: %s is instantaneous and takes no duration", k->name);
 }
 
 /* ---- when */
 
 static bool find_event(const struct control_bench *b, unsigned unit, const struct control_value *v, const char *arg,
-                       int *event, struct control_refusal *why)
+                       int *event, struct control_error *why)
 {
     unsigned number;
     *event = FAULT_NO_EVENT;
@@ -125,7 +125,7 @@ static bool find_event(const struct control_bench *b, unsigned unit, const struc
 }
 
 static bool set_trigger(const struct control_bench *b, const struct control_value *v, struct fault *f,
-                        struct control_refusal *why)
+                        struct control_error *why)
 {
     static const enum fault_arg of_events[] = {FAULT_COUNT, FAULT_SINCE, FAULT_UNIT, FAULT_DELAY_S};
     int after, since;
@@ -134,7 +134,7 @@ static bool set_trigger(const struct control_bench *b, const struct control_valu
     for (unsigned i = 0; !v[FAULT_AFTER].given && i < sizeof of_events / sizeof *of_events; i++) {
         const char *name = fault_args[of_events[i]].name;
         if (v[of_events[i]].given)
-            return control_refuse_in(why, "argument", "%s: requires after, the name of an event", name);
+            return control_reject_in(why, "argument", "%s: requires after, the name of an event", name);
     }
     if (!v[FAULT_AFTER].given) return true;
     if (!v[FAULT_UNIT].given && !has_unit(f->point.place) && b->units != 1)
@@ -147,7 +147,7 @@ static bool set_trigger(const struct control_bench *b, const struct control_valu
 }
 
 bool fault_make(const struct control_bench *b, const struct control_value *v, struct fault *out,
-                struct control_refusal *why)
+                struct control_error *why)
 {
     memset(out, 0, sizeof *out);
     for (unsigned i = 0; i < FAULT_ARGS; i++) {
@@ -155,9 +155,9 @@ bool fault_make(const struct control_bench *b, const struct control_value *v, st
         out->given |= FAULT_BIT(i);
         out->value[i] = i == FAULT_LEVEL ? (double)v[i].choice : v[i].real;
     }
-    out->at_ns = ns(out->value[FAULT_AT_S]);
-    out->delay_ns = ns(out->value[FAULT_DELAY_S]);
-    out->for_ns = ns(out->value[FAULT_FOR_S]);
+    out->at_ns = ns_of_s(out->value[FAULT_AT_S]);
+    out->delay_ns = ns_of_s(out->value[FAULT_DELAY_S]);
+    out->for_ns = ns_of_s(out->value[FAULT_FOR_S]);
     if (!find_kind(v[FAULT_KIND].text, &out->kind, why) || !find_point(b, v[FAULT_POINT].text, out, why)) return false;
     if (!set_trigger(b, v, out, why)) return false;
     why->code = "point";

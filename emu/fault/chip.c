@@ -10,7 +10,7 @@ static const struct board_part *part_of(const struct control_bench *b, const str
     return &b->unit[f->point.unit]->type->parts[f->point.index];
 }
 
-static bool here(const struct fault *f, const struct fault *other)
+static bool is_same_point(const struct fault *f, const struct fault *other)
 {
     return other->id != 0 && other->state == FAULT_ACTIVE && !other->kind->once &&
            other->point.place == f->point.place && other->point.unit == f->point.unit &&
@@ -33,7 +33,7 @@ static void refresh_chip(struct fault *f, int64_t t_ns)
     struct chip_fault s = {.clock_ppm = 0};
     double ppm = 0.0;
     for (unsigned i = 0; i < FAULTS_MAX; i++) {
-        if (here(f, &f->engine->fault[i])) add_to_sum(&f->engine->fault[i], &s, &ppm);
+        if (is_same_point(f, &f->engine->fault[i])) add_to_sum(&f->engine->fault[i], &s, &ppm);
     }
     s.clock_ppm = (int32_t)nearbyint(fmin(fmax(ppm, -FAULT_PPM_MAX), FAULT_PPM_MAX));
     part_of(f->engine->bench, f)->fault(fault_unit(f)->board, f->point.index, &s, t_ns);
@@ -45,14 +45,14 @@ static bool apply_chip(struct fault *f, int64_t t_ns)
     return true;
 }
 
-static bool flip(struct fault *f, int64_t t_ns)
+static bool flip_register_bits(struct fault *f, int64_t t_ns)
 {
     const unsigned reg = (unsigned)f->value[FAULT_REGISTER];
     const uint8_t mask = (uint8_t)f->value[FAULT_MASK];
     return part_of(f->engine->bench, f)->flip(fault_unit(f)->board, f->point.index, reg, mask, t_ns);
 }
 
-static bool lacks(const struct fault *f, const char *reason, char *why)
+static bool reject_lacking(const struct fault *f, const char *reason, char *why)
 {
     snprintf(why, CONTROL_WHY_MAX, "%s: %s", f->name, reason ? reason : f->kind->lacks);
     return false;
@@ -61,7 +61,7 @@ static bool lacks(const struct fault *f, const char *reason, char *why)
 static bool has_fault(const struct control_bench *b, const struct fault *f, char *why)
 {
     const struct board_part *p = part_of(b, f);
-    return p->faults & f->kind->variant || lacks(f, p->unless, why);
+    return p->faults & f->kind->variant || reject_lacking(f, p->unless, why);
 }
 
 /* A clock is off by whole ppm. */
@@ -77,7 +77,7 @@ static bool has_clock(const struct control_bench *b, const struct fault *f, char
 static bool has_register(const struct control_bench *b, const struct fault *f, char *why)
 {
     const struct board_part *p = part_of(b, f);
-    if (p->registers == 0) return lacks(f, NULL, why);
+    if (p->registers == 0) return reject_lacking(f, NULL, why);
     if (f->value[FAULT_REGISTER] < p->registers) return true;
     snprintf(why, CONTROL_WHY_MAX, "register: expected 0 to %u for %s, got %.0f", p->registers - 1, f->name,
              f->value[FAULT_REGISTER]);
@@ -101,7 +101,7 @@ static const struct fault_kind chip[] = {
      .lacks = "this chip has no clock of its own"},
     {"chip.flip", "Inverts bits of a register once.", "the register reads differently, and the chip behaves accordingly",
      .places = FAULT_BIT(FAULT_AT_CHIP), .need = FAULT_BIT(FAULT_REGISTER) | FAULT_BIT(FAULT_MASK),
-     .once = true, .unless = "no such register", .fits = has_register, .apply = flip, .lacks = "this chip has no registers"},
+     .once = true, .unless = "no such register", .fits = has_register, .apply = flip_register_bits, .lacks = "this chip has no registers"},
 };
 // clang-format on
 const struct fault_table fault_chip = {chip, sizeof chip / sizeof *chip};
@@ -115,7 +115,7 @@ static void refresh_controller(struct fault *f, int64_t t_ns)
     (void)t_ns;
     for (unsigned i = 0; i < FAULTS_MAX; i++) {
         const struct fault *other = &f->engine->fault[i];
-        if (here(f, other)) all |= board_fault_bit(u->type, other->kind->name);
+        if (is_same_point(f, other)) all |= board_fault_bit(u->type, other->kind->name);
     }
     board_set_faults(u->board, all);
 }
@@ -128,7 +128,7 @@ static bool apply_controller(struct fault *f, int64_t t_ns)
 
 static bool can_have_fault(const struct control_bench *b, const struct fault *f, char *why)
 {
-    return board_fault_bit(b->unit[f->point.unit]->type, f->kind->name) || lacks(f, NULL, why);
+    return board_fault_bit(b->unit[f->point.unit]->type, f->kind->name) || reject_lacking(f, NULL, why);
 }
 
 // clang-format off
@@ -141,7 +141,7 @@ static const struct fault_kind controller[] = {
     {"controller.frozen_words", "The controller repeats the codes of the previous frame.", "numbers and times of the frames go on, their codes stand still to the bit",
      CONTROLLER, .unless = "the controller keeps no words", .lacks = "the controller of this board keeps no words that could freeze"},
     {"controller.capacitor", "The capacitor of integrator X has lost 30 %.", "its codes grow, and its resets jump, by 1/0.7; what is summed of them does not change but for the converter's steps",
-     CONTROLLER, .unless = "no integrators that are sampled", .lacks = "this board has no integrator whose capacitor a host could tell"},
+     CONTROLLER, .unless = "no integrators that are sampled", .lacks = "this board has no integrator whose capacitor a host could observe"},
     {"controller.stuck_reset", "The positive reset of integrator X never ends.", "the code of integrator X runs to its limit and the reading says saturated",
      CONTROLLER, .unless = "no precision resets", .lacks = "this board has no precision reset that could stay on"},
     {"controller.stuck_key", "The switch of the spare integrator never closes.", "the axis that the spare has stands still while it does",

@@ -17,30 +17,30 @@ const char *fault_state_name(enum fault_state state)
     return name[state];
 }
 
-static void tell(struct fault *f, int64_t t_ns)
+static void notify_change(struct fault *f, int64_t t_ns)
 {
     const struct fault_engine *e = f->engine;
     if (e->changed) e->changed(e->ctx, f, t_ns);
 }
 
-static void end(struct fault *f, enum fault_state state, int64_t t_ns)
+static void end_fault(struct fault *f, enum fault_state state, int64_t t_ns)
 {
     f->state = state;
     f->ended_ns = t_ns;
     if (state == FAULT_OVER && !f->kind->once) f->kind->lift(f, t_ns);
-    tell(f, t_ns);
+    notify_change(f, t_ns);
 }
 
-static void begin(struct fault *f, int64_t t_ns)
+static void begin_fault(struct fault *f, int64_t t_ns)
 {
     f->state = FAULT_ACTIVE;
     f->began_ns = t_ns;
     if (!f->kind->apply(f, t_ns)) {
-        end(f, FAULT_VOID, t_ns);
+        end_fault(f, FAULT_VOID, t_ns);
         return;
     }
-    tell(f, t_ns);
-    if (f->kind->once) end(f, FAULT_OVER, t_ns);
+    notify_change(f, t_ns);
+    if (f->kind->once) end_fault(f, FAULT_OVER, t_ns);
     else if (f->for_ns > 0) sched_at(f->engine->sched, &f->ev, t_ns + f->for_ns);
 }
 
@@ -53,33 +53,33 @@ static void on_event(void *ctx, unsigned event, int64_t t_ns)
     sched_at(f->engine->sched, &f->ev, t_ns + f->delay_ns);
 }
 
-static void listen(struct fault *f)
+static void subscribe_events(struct fault *f)
 {
     f->state = FAULT_LISTENING;
     f->listener.fn = on_event;
     f->listener.ctx = f;
-    unit_listen(f->engine->bench->unit[f->unit], &f->listener);
+    unit_subscribe(f->engine->bench->unit[f->unit], &f->listener);
 }
 
-static void unlisten(struct fault *f)
+static void unsubscribe_events(struct fault *f)
 {
-    unit_unlisten(f->engine->bench->unit[f->unit], &f->listener);
+    unit_unsubscribe(f->engine->bench->unit[f->unit], &f->listener);
 }
 
 static void on_due(void *ctx, int64_t t_ns)
 {
     struct fault *f = ctx;
     if (f->state == FAULT_ACTIVE) {
-        end(f, FAULT_OVER, t_ns);
+        end_fault(f, FAULT_OVER, t_ns);
     } else if (f->state == FAULT_WAITING && f->trigger.after != FAULT_NO_EVENT) {
-        listen(f);
+        subscribe_events(f);
     } else {
-        if (f->state == FAULT_LISTENING) unlisten(f);
-        begin(f, t_ns);
+        if (f->state == FAULT_LISTENING) unsubscribe_events(f);
+        begin_fault(f, t_ns);
     }
 }
 
-static bool finished(const struct fault *f)
+static bool is_finished(const struct fault *f)
 {
     return f->state == FAULT_OVER || f->state == FAULT_VOID;
 }
@@ -91,7 +91,7 @@ static struct fault *place_for_one(struct fault_engine *e)
     for (unsigned i = 0; i < FAULTS_MAX; i++) {
         struct fault *f = &e->fault[i];
         if (f->id == 0) return f;
-        if (finished(f) && (!best || f->ended_ns < best->ended_ns)) best = f;
+        if (is_finished(f) && (!best || f->ended_ns < best->ended_ns)) best = f;
     }
     return best;
 }
@@ -124,7 +124,7 @@ void fault_clear(struct fault_engine *e, struct fault *f, int64_t t_ns)
 {
     assert(f->engine == e);
     sched_cancel(e->sched, &f->ev);
-    if (f->state == FAULT_LISTENING) unlisten(f);
-    if (f->state == FAULT_ACTIVE) end(f, FAULT_OVER, t_ns);
+    if (f->state == FAULT_LISTENING) unsubscribe_events(f);
+    if (f->state == FAULT_ACTIVE) end_fault(f, FAULT_OVER, t_ns);
     f->id = 0;
 }

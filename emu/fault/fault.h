@@ -51,7 +51,7 @@ struct fault {
     union fault_body as; /* what hangs in the bench while it is active */
     struct rng random;
     struct fault_engine *engine;
-    struct unit_listener listener;
+    struct unit_observer listener;
     struct sched_ev ev;
 };
 
@@ -97,7 +97,7 @@ const char *fault_state_name(enum fault_state state);
 
 /* Fills in a fault from the arguments of fault.add. False with the reason. Ranges have been checked. */
 bool fault_make(const struct control_bench *b, const struct control_value *v, struct fault *out,
-                struct control_refusal *why);
+                struct control_error *why);
 
 /* Whether a kind may be at a point; false with the reason in why[CONTROL_WHY_MAX]. */
 bool fault_fits(const struct control_bench *b, const struct fault *f, char *why);

@@ -12,7 +12,7 @@ static inline struct unit *fault_unit(const struct fault *f)
     return f->engine->bench->unit[f->point.unit];
 }
 
-/* fault/check.c: whether the values are those of its kind; false with the refusal. */
-bool fault_values_fit(const struct fault *f, struct control_refusal *why);
+/* fault/check.c: whether the values are those of its kind; false with the error. */
+bool fault_values_fit(const struct fault *f, struct control_error *why);
 
 #endif

@@ -5,7 +5,7 @@
 
 _Static_assert(LINE_FAULTS_MAX >= FAULTS_MAX, "each fault of a line that was accepted has room on its board");
 
-static struct line_faults *lines(const struct fault *f)
+static struct line_faults *line_faults_of(const struct fault *f)
 {
     const struct unit *u = fault_unit(f);
     return &u->board->line;
@@ -25,13 +25,13 @@ static bool apply_line(struct fault *f, int64_t t_ns)
                                     .frame_line = fault_unit(f)->type->frame_line,
                                     .rate_hz = f->value[FAULT_RATE_HZ],
                                     .rng = f->random};
-    f->as.line = line_fault_add(lines(f), &what);
+    f->as.line = line_fault_add(line_faults_of(f), &what);
     return f->as.line != 0;
 }
 
 static void lift_line(struct fault *f, int64_t t_ns)
 {
-    line_fault_end(lines(f), f->as.line, t_ns);
+    line_fault_end(line_faults_of(f), f->as.line, t_ns);
 }
 
 /* Only one line has pulses with a place in the frame. */

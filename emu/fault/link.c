@@ -17,7 +17,7 @@ static struct can_bus *bus_of(const struct control_bench *b, const struct can_no
 }
 
 /* The node at the point, NULL for a bus; and the bus. False: it is not on a bus now. */
-static bool find(const struct fault *f, struct can_bus **bus, struct can_node **node)
+static bool find_target(const struct fault *f, struct can_bus **bus, struct can_node **node)
 {
     const struct control_bench *b = f->engine->bench;
     *node = NULL;
@@ -40,7 +40,7 @@ static bool apply_frames(struct fault *f, int64_t t_ns)
     struct can_bus *bus;
     struct can_node *node;
     (void)t_ns;
-    if (!find(f, &bus, &node)) return false;
+    if (!find_target(f, &bus, &node)) return false;
     f->as.can = (struct can_fault){.kind = (enum can_fault_kind)f->kind->variant,
                                    .from = f->point.place == FAULT_AT_NODE ? node : NULL,
                                    .to = f->point.place == FAULT_AT_CLIENT ? node : NULL,
@@ -64,12 +64,12 @@ static bool bus_off(struct fault *f, int64_t t_ns)
 {
     struct can_bus *bus;
     struct can_node *node;
-    if (!find(f, &bus, &node) || !node) return false;
+    if (!find_target(f, &bus, &node) || !node) return false;
     can_bus_off(bus, node->of ? node->of : node, t_ns);
     return true;
 }
 
-static bool stall(struct fault *f, int64_t t_ns)
+static bool stall_client(struct fault *f, int64_t t_ns)
 {
     const struct control_bench *b = f->engine->bench;
     (void)t_ns;
@@ -118,7 +118,7 @@ static const struct fault_kind link[] = {
     {"link.bus_off", "The node's controller goes bus-off and recovers after 128 times 11 recessive bits.", "silence of the node for that long (1.4 ms at 1 Mbit/s), then what has waited",
      .variant = BUS_OFF, .places = AT(NODE), .once = true, .unless = "the bus is ideal, bitrate_hz 0: no bits", .fits = has_bits, .apply = bus_off},
     {"link.stall", "The client stops reading.", "nothing arrives at that program; what comes for it is kept while there is room, then dropped and counted",
-     .variant = STALL, .places = AT(CLIENT), .apply = stall, .lift = lift_stall},
+     .variant = STALL, .places = AT(CLIENT), .apply = stall_client, .lift = lift_stall},
 };
 // clang-format on
 const struct fault_table fault_link = {link, sizeof link / sizeof *link};

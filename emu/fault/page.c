@@ -11,7 +11,7 @@ struct text {
     size_t cap, at;
 };
 
-__attribute__((format(printf, 2, 3))) static void add(struct text *t, const char *format, ...)
+__attribute__((format(printf, 2, 3))) static void add_text(struct text *t, const char *format, ...)
 {
     va_list ap;
     va_start(ap, format);
@@ -25,32 +25,32 @@ static void add_args(struct text *t, const struct fault_kind *k)
     for (unsigned i = FAULT_FOR_S; i < FAULT_ARGS; i++) {
         if (!((k->need | k->may) & FAULT_BIT(i))) continue;
         const char *name = fault_args[i].name;
-        add(t, "%s`%s`%s", any ? ", " : "", name, k->need & FAULT_BIT(i) ? "" : " (optional)");
+        add_text(t, "%s`%s`%s", any ? ", " : "", name, k->need & FAULT_BIT(i) ? "" : " (optional)");
         any = true;
     }
-    if (!any) add(t, "nothing");
+    if (!any) add_text(t, "nothing");
 }
 
 bool fault_markdown(unsigned line, char *out, size_t cap)
 {
     struct text t = {.out = out, .cap = cap};
-    if (line == 0) add(&t, "| kind | what it does | takes | how a host sees it | refused if |");
-    if (line == 1) add(&t, "|---|---|---|---|---|");
+    if (line == 0) add_text(&t, "| kind | what it does | takes | how a host sees it | refused if |");
+    if (line == 1) add_text(&t, "|---|---|---|---|---|");
     if (line < 2) return true;
     const struct fault_kind *k = fault_kind(line - 2);
     if (!k) return false;
-    add(&t, "| `%s` | %s%s | ", k->name, k->what, k->once ? " Over at once." : "");
+    add_text(&t, "| `%s` | %s%s | ", k->name, k->what, k->once ? " Over at once." : "");
     add_args(&t, k);
-    add(&t, " | %s | %s |", k->seen, k->unless ? k->unless : "");
+    add_text(&t, " | %s | %s |", k->seen, k->unless ? k->unless : "");
     return true;
 }
 
 /* In a table a bar has to be escaped. */
 static void add_place(struct text *t, enum fault_place place)
 {
-    add(t, " `");
-    for (const char *s = fault_place_any(place); *s; s++) add(t, *s == '|' ? "\\|" : "%c", *s);
-    add(t, "` |");
+    add_text(t, " `");
+    for (const char *s = fault_place_any(place); *s; s++) add_text(t, *s == '|' ? "\\|" : "%c", *s);
+    add_text(t, "` |");
 }
 
 bool fault_markdown_matrix(unsigned line, char *out, size_t cap)
@@ -58,14 +58,14 @@ bool fault_markdown_matrix(unsigned line, char *out, size_t cap)
     struct text t = {.out = out, .cap = cap};
     const struct fault_kind *k = line < 2 ? NULL : fault_kind(line - 2);
     if (line >= 2 && !k) return false;
-    if (line == 1) add(&t, "|---|");
-    else if (k) add(&t, "| `%s` |", k->name);
-    else add(&t, "| |");
+    if (line == 1) add_text(&t, "|---|");
+    else if (k) add_text(&t, "| `%s` |", k->name);
+    else add_text(&t, "| |");
     for (unsigned i = 0; i < FAULT_PLACES; i++) {
         if (line == 0) add_place(&t, (enum fault_place)i);
-        else if (line == 1) add(&t, "---|");
-        else if (!(k->places & FAULT_BIT(i))) add(&t, " refused |");
-        else add(&t, k->fits ? " seen, or refused (above) |" : " seen |");
+        else if (line == 1) add_text(&t, "---|");
+        else if (!(k->places & FAULT_BIT(i))) add_text(&t, " refused |");
+        else add_text(&t, k->fits ? " seen, or refused (above) |" : " seen |");
     }
     return true;
 }
@@ -82,7 +82,7 @@ static const struct board_part *part_at(unsigned n, const struct board_type **ty
     return NULL;
 }
 
-static bool has(const struct board_type *t, const struct board_part *p, const struct fault_kind *k)
+static bool part_has(const struct board_type *t, const struct board_part *p, const struct fault_kind *k)
 {
     if (p == t->parts) return k->places & FAULT_BIT(FAULT_AT_CONTROLLER) && board_fault_bit(t, k->name);
     if (!(k->places & FAULT_BIT(FAULT_AT_CHIP))) return false;
@@ -94,31 +94,31 @@ bool fault_markdown_boards(unsigned line, char *out, size_t cap)
     struct text t = {.out = out, .cap = cap};
     const struct board_type *type;
     const struct fault_kind *k;
-    if (line == 0) add(&t, "| board | point | kinds it has | why not the others |");
-    if (line == 1) add(&t, "|---|---|---|---|");
+    if (line == 0) add_text(&t, "| board | point | kinds it has | why not the others |");
+    if (line == 1) add_text(&t, "|---|---|---|---|");
     if (line < 2) return true;
     const struct board_part *p = part_at(line - 2, &type);
     if (!p) return false;
-    add(&t, "| %s | `UNIT.%s` |", type->title, p->name);
+    add_text(&t, "| %s | `UNIT.%s` |", type->title, p->name);
     for (unsigned i = 0; (k = fault_kind(i)) != NULL; i++) {
-        if (has(type, p, k)) add(&t, " `%s`", k->name);
+        if (part_has(type, p, k)) add_text(&t, " `%s`", k->name);
     }
-    if (p->registers) add(&t, " (registers 0 to %u)", p->registers - 1);
-    add(&t, " | %s |", p->unless ? p->unless : "");
+    if (p->registers) add_text(&t, " (registers 0 to %u)", p->registers - 1);
+    add_text(&t, " | %s |", p->unless ? p->unless : "");
     return true;
 }
 
 bool fault_markdown_events(unsigned line, char *out, size_t cap)
 {
     struct text t = {.out = out, .cap = cap};
-    if (line == 0) add(&t, "| board | events |");
-    if (line == 1) add(&t, "|---|---|");
+    if (line == 0) add_text(&t, "| board | events |");
+    if (line == 1) add_text(&t, "|---|---|");
     if (line < 2) return true;
     const struct board_type *const *type = board_types;
     for (unsigned left = line - 2; *type && left > 0; left--) type++;
     if (!*type) return false;
-    add(&t, "| %s |", (*type)->title);
-    for (unsigned i = 0; i < (*type)->event_count; i++) add(&t, "%s `%s`", i ? "," : "", (*type)->events[i]);
-    add(&t, " |");
+    add_text(&t, "| %s |", (*type)->title);
+    for (unsigned i = 0; i < (*type)->event_count; i++) add_text(&t, "%s `%s`", i ? "," : "", (*type)->events[i]);
+    add_text(&t, " |");
     return true;
 }

@@ -7,7 +7,7 @@ static struct platform *platform_of(const struct fault *f)
 }
 
 /* What is active of the kind at the point: its number, and the sum of its value. */
-static unsigned active(const struct fault *f, enum fault_arg arg, double *sum)
+static unsigned count_active(const struct fault *f, enum fault_arg arg, double *sum)
 {
     unsigned n = 0;
     *sum = 0.0;
@@ -25,21 +25,21 @@ static unsigned active(const struct fault *f, enum fault_arg arg, double *sum)
 static void refresh_torquer(struct fault *f, int64_t t_ns)
 {
     double unused;
-    const double gain = active(f, FAULT_ID, &unused) ? 0.0 : 1.0;
+    const double gain = count_active(f, FAULT_ID, &unused) ? 0.0 : 1.0;
     platform_set_torquer(platform_of(f), (enum platform_axis)f->point.index, gain, t_ns);
 }
 
 static void refresh_drift(struct fault *f, int64_t t_ns)
 {
     double degph;
-    (void)active(f, FAULT_DRIFT_DEGPH, &degph);
+    (void)count_active(f, FAULT_DRIFT_DEGPH, &degph);
     platform_step_drift(platform_of(f), (enum platform_axis)f->point.index, degph, t_ns);
 }
 
 static void refresh_sensor(struct fault *f, int64_t t_ns)
 {
     double unused;
-    platform_stick(platform_of(f), active(f, FAULT_ID, &unused) > 0, t_ns);
+    platform_stick(platform_of(f), count_active(f, FAULT_ID, &unused) > 0, t_ns);
 }
 
 static bool apply_torquer(struct fault *f, int64_t t_ns)

@@ -63,7 +63,7 @@ static const struct {
 enum { OF_UNIT = sizeof of_unit / sizeof *of_unit };
 
 /* What a point is called behind its infix; NULL: no faults there. */
-static const char *suffix(const struct board_type *t, enum fault_place place, unsigned index)
+static const char *point_suffix(const struct board_type *t, enum fault_place place, unsigned index)
 {
     static const char *const axis[UNIT_AXES] = {"x", "y", "z"};
     switch (place) {
@@ -81,7 +81,7 @@ static const char *suffix(const struct board_type *t, enum fault_place place, un
 }
 
 /* Indices at a place of a board: from `first`, `count` of them. */
-static unsigned indices(const struct board_type *t, enum fault_place place, unsigned *first)
+static unsigned index_count(const struct board_type *t, enum fault_place place, unsigned *first)
 {
     *first = place == FAULT_AT_CHIP;
     switch (place) {
@@ -104,9 +104,9 @@ static bool unit_point(const struct control_bench *b, unsigned unit, unsigned *n
     for (unsigned row = 0; row < OF_UNIT; row++) {
         unsigned first;
         const enum fault_place place = of_unit[row].place;
-        const unsigned count = indices(t, place, &first);
+        const unsigned count = index_count(t, place, &first);
         for (unsigned i = first; i < first + count; i++) {
-            const char *last = suffix(t, place, i);
+            const char *last = point_suffix(t, place, i);
             if (!last || (*n)-- > 0) continue;
             *p = (struct fault_point){.place = place, .unit = unit, .index = i};
             snprintf(name, FAULT_POINT_MAX, "%s.%s%s", b->unit_name[unit], of_unit[row].infix, last);
@@ -118,7 +118,7 @@ static bool unit_point(const struct control_bench *b, unsigned unit, unsigned *n
 
 /* ---- points of a bench */
 
-static unsigned clients(const struct control_bench *b)
+static unsigned client_count(const struct control_bench *b)
 {
     struct control_client c;
     unsigned n = 0;
@@ -154,7 +154,7 @@ bool fault_point(const struct control_bench *b, unsigned n, struct fault_point *
         return true;
     }
     n -= b->buses;
-    const unsigned programs = clients(b);
+    const unsigned programs = client_count(b);
     if (n < programs) {
         struct control_client c = {0};
         (void)b->clients.nth(b->ctx, n, &c);
@@ -185,7 +185,7 @@ bool fault_point_find(const struct control_bench *b, const char *text, struct fa
 /* ---- how points of a place are named */
 
 /* Bytes of a part's name up to its dot: adc.x, adc.y and adc.z are one group, adc.x|y|z. */
-static size_t group(const char *part)
+static size_t group_len(const char *part)
 {
     const char *dot = strchr(part, '.');
     return dot ? (size_t)(dot - part) + 1 : 0;
@@ -193,15 +193,15 @@ static size_t group(const char *part)
 
 static bool same_group(const char *a, const char *b)
 {
-    const size_t n = group(a);
-    return n > 0 && n == group(b) && strncmp(a, b, n) == 0;
+    const size_t n = group_len(a);
+    return n > 0 && n == group_len(b) && strncmp(a, b, n) == 0;
 }
 
 /* The i-th group of parts of a board at a place, or how many there are less than that. */
 static bool part_name(const struct board_type *t, enum fault_place place, unsigned *i, char *name)
 {
     unsigned first;
-    const unsigned count = indices(t, place, &first);
+    const unsigned count = index_count(t, place, &first);
     for (unsigned p = first; p < first + count; p++) {
         const char *part = t->parts[p].name;
         const bool begins = part && (p == first || !t->parts[p - 1].name || !same_group(part, t->parts[p - 1].name));
@@ -209,7 +209,7 @@ static bool part_name(const struct board_type *t, enum fault_place place, unsign
         size_t at = (size_t)snprintf(name, FAULT_POINT_MAX, "UNIT.%s", part);
         for (p++; p < first + count && t->parts[p].name && same_group(part, t->parts[p].name); p++) {
             if (at < FAULT_POINT_MAX)
-                at += (size_t)snprintf(name + at, FAULT_POINT_MAX - at, "|%s", t->parts[p].name + group(part));
+                at += (size_t)snprintf(name + at, FAULT_POINT_MAX - at, "|%s", t->parts[p].name + group_len(part));
         }
         return true;
     }

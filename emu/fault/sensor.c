@@ -64,7 +64,7 @@ static bool seen_scale(const struct control_bench *b, const struct fault *f, cha
     return has_sensor(b, f, why) && at_least(f, FAULT_SCALE_PPM, least_ppm(b->unit[f->point.unit]), "ppm", why);
 }
 
-static bool passes(const struct control_bench *b, const struct fault *f, enum fault_arg limit, char *why)
+static bool passes_chain(const struct control_bench *b, const struct fault *f, enum fault_arg limit, char *why)
 {
     const struct unit *u = b->unit[f->point.unit];
     const double most_v = fmin(u->cfg.board.afe[f->point.index].clip_v, range_v(u)); /* buffer, converter */
@@ -76,7 +76,7 @@ static bool passes(const struct control_bench *b, const struct fault *f, enum fa
 }
 
 /* What has grown to next to nothing when it ends was never seen. */
-static bool grows(const struct control_bench *b, const struct fault *f, char *why)
+static bool grows_enough(const struct control_bench *b, const struct fault *f, char *why)
 {
     const double least = least_v(b->unit[f->point.unit]);
     const double end_v = fabs(f->value[FAULT_DRIFT_V_PER_S]) * (double)f->for_ns / (double)NS_PER_S;
@@ -94,7 +94,7 @@ static bool has_limits(const struct control_bench *b, const struct fault *f, cha
         snprintf(why, CONTROL_WHY_MAX, "expected low_v or high_v, where the output stops, got neither");
         return false;
     }
-    if (!passes(b, f, FAULT_LOW_V, why) || !passes(b, f, FAULT_HIGH_V, why)) return false;
+    if (!passes_chain(b, f, FAULT_LOW_V, why) || !passes_chain(b, f, FAULT_HIGH_V, why)) return false;
     if (!fault_given(f, FAULT_LOW_V) || !fault_given(f, FAULT_HIGH_V)) return true;
     if (f->value[FAULT_LOW_V] < f->value[FAULT_HIGH_V]) return true;
     snprintf(why, CONTROL_WHY_MAX, "low_v: expected less than high_v, %.10g, got %.10g", f->value[FAULT_HIGH_V],
@@ -102,7 +102,7 @@ static bool has_limits(const struct control_bench *b, const struct fault *f, cha
     return false;
 }
 
-static double volts(const struct fault *f, enum fault_arg arg, double otherwise)
+static double value_or(const struct fault *f, enum fault_arg arg, double otherwise)
 {
     return fault_given(f, arg) ? f->value[arg] * signal_per_v(fault_unit(f), f->point.index) : otherwise;
 }
@@ -120,12 +120,12 @@ static bool apply_sensor(struct fault *f, int64_t t_ns)
     const double infinite = (double)INFINITY;
     struct unit *u = settled_unit(f, t_ns);
     const double values[SENSOR_FAULTS][2] = {
-        [SENSOR_STUCK] = {volts(f, FAULT_OUT_V, output_now(f, t_ns))},
-        [SENSOR_BIAS] = {volts(f, FAULT_BIAS_V, 0.0)},
-        [SENSOR_DRIFT] = {volts(f, FAULT_DRIFT_V_PER_S, 0.0)},
+        [SENSOR_STUCK] = {value_or(f, FAULT_OUT_V, output_now(f, t_ns))},
+        [SENSOR_BIAS] = {value_or(f, FAULT_BIAS_V, 0.0)},
+        [SENSOR_DRIFT] = {value_or(f, FAULT_DRIFT_V_PER_S, 0.0)},
         [SENSOR_SCALE] = {f->value[FAULT_SCALE_PPM] * 1e-6},
-        [SENSOR_NOISE] = {mems_density_v_rthz(volts(f, FAULT_RMS_V, 0.0), 1000.0)},
-        [SENSOR_SATURATION] = {volts(f, FAULT_LOW_V, -infinite), volts(f, FAULT_HIGH_V, infinite)},
+        [SENSOR_NOISE] = {mems_density_v_rthz(value_or(f, FAULT_RMS_V, 0.0), 1000.0)},
+        [SENSOR_SATURATION] = {value_or(f, FAULT_LOW_V, -infinite), value_or(f, FAULT_HIGH_V, infinite)},
     };
     const unsigned k = f->kind->variant;
     const bool mems = u->cfg.axis[f->point.index].sensor == UNIT_MEMS; /* others are about 0 without acceleration */
@@ -153,7 +153,7 @@ static const struct fault_kind sensor[] = {
     {"sensor.bias", "Adds bias_v to the sensor output.", "a step in the codes of the axis",
      SENSOR(SENSOR_BIAS), .need = FAULT_BIT(FAULT_BIAS_V), .nonzero = FAULT_BIT(FAULT_BIAS_V), .unless = "the channel has no sensor; it is less than a code of the board", .fits = seen_volts},
     {"sensor.drift", "The sensor output drifts by drift_v_per_s.", "a slope in the codes of the axis",
-     SENSOR(SENSOR_DRIFT), .need = FAULT_BIT(FAULT_DRIFT_V_PER_S), .nonzero = FAULT_BIT(FAULT_DRIFT_V_PER_S), .unless = "the channel has no sensor; it ends before it has come to a code", .fits = grows},
+     SENSOR(SENSOR_DRIFT), .need = FAULT_BIT(FAULT_DRIFT_V_PER_S), .nonzero = FAULT_BIT(FAULT_DRIFT_V_PER_S), .unless = "the channel has no sensor; it ends before it has come to a code", .fits = grows_enough},
     {"sensor.scale", "The scale factor of the sensor changes by scale_ppm.", "an error of the axis proportional to its specific force",
      SENSOR(SENSOR_SCALE), .need = FAULT_BIT(FAULT_SCALE_PPM), .nonzero = FAULT_BIT(FAULT_SCALE_PPM), .unless = "the channel has no sensor; it is less than a code of the board", .fits = seen_scale},
     {"sensor.noise", "Adds white noise of rms rms_v in a settled reading at 1000 SPS.", "more scatter in the codes of the axis",
@@ -190,7 +190,7 @@ static bool has_error(const struct control_bench *b, const struct fault *f, char
     return false;
 }
 
-static bool ripples(const struct control_bench *b, const struct fault *f, char *why)
+static bool ripples_enough(const struct control_bench *b, const struct fault *f, char *why)
 {
     return at_least(f, FAULT_AMPLITUDE_V, least_v(b->unit[f->point.unit]), "V", why);
 }
@@ -224,7 +224,7 @@ static const struct fault_kind analog[] = {
     {"analog.reference", "The converter's reference voltage is off by reference_ppm and drifts by drift_ppm_per_s.", "all codes of the axis scaled, offset included",
      CHAIN(AFE_REFERENCE), .may = FAULT_BIT(FAULT_REFERENCE_PPM) | FAULT_BIT(FAULT_DRIFT_PPM_PER_S), .unless = "neither is given; the error is less than a code of the board, or a drift ends before it has come to one", .fits = has_error},
     {"analog.ripple", "Supply ripple couples through the buffer, as a sine of amplitude_v at the load.", "a spectral line at frequency_hz in the codes of the axis",
-     CHAIN(AFE_RIPPLE), .need = FAULT_BIT(FAULT_AMPLITUDE_V) | FAULT_BIT(FAULT_FREQUENCY_HZ), .unless = "it is less than a code of the board", .fits = ripples},
+     CHAIN(AFE_RIPPLE), .need = FAULT_BIT(FAULT_AMPLITUDE_V) | FAULT_BIT(FAULT_FREQUENCY_HZ), .unless = "it is less than a code of the board", .fits = ripples_enough},
 };
 // clang-format on
 const struct fault_table fault_analog = {analog, sizeof analog / sizeof *analog};

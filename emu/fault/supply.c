@@ -19,7 +19,7 @@ static bool reaches_brownout(const struct control_bench *b, const struct fault *
     return false;
 }
 
-static bool dip(struct fault *f, int64_t t_ns)
+static bool dip_supply(struct fault *f, int64_t t_ns)
 {
     const struct control_bench *b = f->engine->bench;
     char why[CONTROL_WHY_MAX];
@@ -30,7 +30,7 @@ static bool dip(struct fault *f, int64_t t_ns)
 }
 
 /* It ends by itself; one that is cleared ends now. */
-static void lift_dip(struct fault *f, int64_t t_ns)
+static void lift_supply(struct fault *f, int64_t t_ns)
 {
     const struct control_bench *b = f->engine->bench;
     supply_dip_end(&b->lab->supply, f->value[FAULT_DROP_V], f->began_ns, f->for_ns, t_ns);
@@ -41,7 +41,7 @@ static void lift_dip(struct fault *f, int64_t t_ns)
 static const struct fault_kind supply[] = {
     {"supply.brownout", "The supply voltage drops by drop_v for for_s, below the boards' threshold.", "frames break off in the middle; boot-up messages, numbers from 0 and a new set-up when it is back",
      .places = FAULT_BIT(FAULT_AT_SUPPLY), .need = FAULT_BIT(FAULT_DROP_V) | FAULT_BIT(FAULT_FOR_S), .nonzero = FAULT_BIT(FAULT_FOR_S),
-     .unless = "the scenario has no supply; the voltage stays above the threshold of the boards", .fits = reaches_brownout, .apply = dip, .lift = lift_dip},
+     .unless = "the scenario has no supply; the voltage stays above the threshold of the boards", .fits = reaches_brownout, .apply = dip_supply, .lift = lift_supply},
 };
 // clang-format on
 const struct fault_table fault_supply = {supply, sizeof supply / sizeof *supply};

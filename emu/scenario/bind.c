@@ -3,14 +3,14 @@
 
 #include <string.h>
 
-static double clamp(double v, double lo, double hi)
+static double clamp_value(double v, double lo, double hi)
 {
     return v < lo ? lo : v > hi ? hi : v;
 }
 
 /* Each parameter has its own stream: one more in the table does not shift the others. */
-static void draw(const struct yaml_fields *t, const void *deviation, void *value, const struct scenario *s,
-                 uint32_t serial, const char *channel)
+static void draw_parameters(const struct yaml_fields *t, const void *deviation, void *value, const struct scenario *s,
+                            uint32_t serial, const char *channel)
 {
     size_t offset;
     const struct yaml_field *d;
@@ -22,7 +22,7 @@ static void draw(const struct yaml_fields *t, const void *deviation, void *value
         if (!(sd > 0.0)) continue;
         snprintf(stream, sizeof stream, "passport.%s.%s", channel, d->key);
         struct rng r = rng_stream(s->seed, serial, stream);
-        v = clamp(v + sd * rng_gauss(&r), d->min, d->max);
+        v = clamp_value(v + sd * rng_gauss(&r), d->min, d->max);
         memcpy((char *)value + offset + d->offset, &v, sizeof v);
     }
 }
@@ -32,8 +32,8 @@ static void draw_unit(const struct scenario *s, struct scenario_unit *u)
     static const char *const sensor[] = {"x", "y", "z"}, *const chain[] = {"x.afe", "y.afe", "z.afe"};
     for (unsigned i = 0; i < UNIT_AXES; i++) {
         const uint32_t serial = u->cfg.board.serial;
-        draw(&scenario_mems_fields, &s->spread.mems, &u->cfg.axis[i].mems, s, serial, sensor[i]);
-        draw(&scenario_afe_numbers, &s->spread.afe, &u->cfg.board.afe[i], s, serial, chain[i]);
+        draw_parameters(&scenario_mems_fields, &s->spread.mems, &u->cfg.axis[i].mems, s, serial, sensor[i]);
+        draw_parameters(&scenario_afe_numbers, &s->spread.afe, &u->cfg.board.afe[i], s, serial, chain[i]);
     }
 }
 

@@ -212,7 +212,7 @@ bool yaml_load(struct yaml_file *f, const struct yaml_node *node, const char *na
 /* ---- dump */
 
 /* JSON numbers are doubles to many readers; ours reads all 64 bits. */
-static cJSON *integer(uint64_t v)
+static cJSON *integer_json(uint64_t v)
 {
     char digits[24];
     snprintf(digits, sizeof digits, "%" PRIu64, v);
@@ -227,7 +227,7 @@ static cJSON *real_of(double v)
     return cJSON_CreateRaw(digits);
 }
 
-static cJSON *reals(const double *v, unsigned count)
+static cJSON *reals_json(const double *v, unsigned count)
 {
     cJSON *list = cJSON_CreateArray();
     for (unsigned i = 0; i < count; i++) cJSON_AddItemToArray(list, real_of(v[i]));
@@ -254,13 +254,13 @@ cJSON *yaml_dump_value(const struct yaml_field *d, const void *section)
         memcpy(&real, at, sizeof real);
         return real_of(real);
     case YAML_U8:
-        return integer(*(const uint8_t *)at);
+        return integer_json(*(const uint8_t *)at);
     case YAML_U32:
         memcpy(&u32, at, sizeof u32);
-        return integer(u32);
+        return integer_json(u32);
     case YAML_U64:
         memcpy(&u64, at, sizeof u64);
-        return integer(u64);
+        return integer_json(u64);
     case YAML_BOOL:
         return cJSON_CreateBool(*(const bool *)at);
     case YAML_TEXT:
@@ -270,7 +270,7 @@ cJSON *yaml_dump_value(const struct yaml_field *d, const void *section)
         return cJSON_CreateString(d->choices[choice]);
     case YAML_REALS:
     case YAML_EACH:
-        return reals(at, d->count);
+        return reals_json(at, d->count);
     case YAML_SECTION:
         return section_of(d->sub, at);
     case YAML_INLINE:

@@ -70,7 +70,7 @@ void yaml_dump(const struct yaml_fields *t, const void *section, cJSON *to);
 cJSON *yaml_dump_value(const struct yaml_field *d, const void *section);
 
 /* A mapping or sequence as JSON, for arguments that somebody else checks: plain scalars that are numbers, true, false
- * or null become such. NULL, with the error told, when it is deeper or longer than arguments may be. */
+ * or null become such. NULL, with the error in why, when it is deeper or longer than arguments may be. */
 cJSON *yaml_json(struct yaml_file *f, const struct yaml_node *node);
 
 /* "s" of turn_s, "" of a key without a unit. */

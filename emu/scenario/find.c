@@ -8,7 +8,7 @@
 #include <unistd.h>
 
 /* i-th place for protocol files; false past the last. An empty text: this place does not exist here. */
-static bool place(unsigned i, char *dir, size_t cap)
+static bool proto_place(unsigned i, char *dir, size_t cap)
 {
     static const char *const beside_program[] = {"../proto", "../share/psabench/proto"};
     char program[FIND_PATH_MAX];
@@ -43,7 +43,7 @@ static void take_path(const char *name, const char *beside, char *path)
 bool find_proto_folder(const char *folder, char *path, char *why, size_t cap)
 {
     char dir[FIND_PATH_MAX];
-    for (unsigned i = 0; place(i, dir, sizeof dir); i++) {
+    for (unsigned i = 0; proto_place(i, dir, sizeof dir); i++) {
         snprintf(path, FIND_PATH_MAX, "%.440s/%.60s", dir, folder);
         if (dir[0] && access(path, R_OK) == 0) return true;
     }
@@ -73,7 +73,7 @@ bool find_names(const char *path, char (**names)[FIND_NAME_MAX], unsigned *count
     return *names != NULL;
 }
 
-static void tell_names(const char *folder, const char *name, char *why, size_t cap)
+static void list_names(const char *folder, const char *name, char *why, size_t cap)
 {
     char path[FIND_PATH_MAX];
     char(*names)[FIND_NAME_MAX];
@@ -94,10 +94,10 @@ bool find_proto(const char *folder, const char *name, const char *beside, char *
         snprintf(why, cap, "%s: no such file, or not readable", path);
         return false;
     }
-    for (unsigned i = 0; place(i, dir, sizeof dir); i++) {
+    for (unsigned i = 0; proto_place(i, dir, sizeof dir); i++) {
         snprintf(path, FIND_PATH_MAX, "%.380s/%s/%.60s.yaml", dir, folder, name);
         if (dir[0] && access(path, R_OK) == 0) return true;
     }
-    tell_names(folder, name, why, cap);
+    list_names(folder, name, why, cap);
     return false;
 }

@@ -15,8 +15,8 @@ struct fill {
     bool seen[FIELDS_MAX];
 };
 
-static bool set(struct yaml_file *f, const struct yaml_node *node, const char *key, unsigned index,
-                const struct fill *fill)
+static bool set_field(struct yaml_file *f, const struct yaml_node *node, const char *key, unsigned index,
+                      const struct fill *fill)
 {
     char why[WHY];
     const struct board_type *t = fill->type;
@@ -32,7 +32,7 @@ static bool set_sequence(struct yaml_file *f, const struct yaml_node *node, cons
 {
     unsigned index = 0;
     for (const struct yaml_item *i = node->first; i; i = i->next)
-        if (!set(f, i->value, field->key, index++, fill)) return false;
+        if (!set_field(f, i->value, field->key, index++, fill)) return false;
     if (field->count && index != field->count)
         return yaml_file_fail(f, node, field->key, "expected %u elements, got %u", field->count, index);
     return index > 0 || yaml_file_fail(f, node, field->key, "expected at least one element, got none");
@@ -63,7 +63,7 @@ static bool load_pair(struct yaml_file *f, const struct yaml_item *pair, struct 
     bool *seen = &fill->seen[field - fill->type->fields];
     if (*seen) return yaml_file_fail(f, pair->key, key, "given twice");
     *seen = true;
-    if (!board_field_is_list(field)) return set(f, pair->value, key, 0, fill);
+    if (!board_field_is_list(field)) return set_field(f, pair->value, key, 0, fill);
     if (pair->value->kind != YAML_SEQUENCE) return yaml_file_expected(f, pair->value, key, "a list (%s)", field->what);
     return set_sequence(f, pair->value, field, fill);
 }
@@ -89,7 +89,7 @@ bool profile_yaml_fields(struct yaml_file *f, const struct yaml_node *mapping, c
 }
 
 /* Node of the key that a sentence of the check begins with, or the mapping: so that the message has its line. */
-static const struct yaml_node *blame(const struct yaml_node *mapping, const char *sentence)
+static const struct yaml_node *find_blamed(const struct yaml_node *mapping, const char *sentence)
 {
     const size_t len = strcspn(sentence, " :=,");
     for (const struct yaml_item *i = mapping->first; i; i = i->next) {
@@ -104,7 +104,7 @@ bool profile_yaml_check(struct yaml_file *f, const struct yaml_node *mapping, co
 {
     char why[WHY];
     if (type->profile_check(profile, why, sizeof why)) return true;
-    return yaml_file_fail(f, blame(mapping, why), NULL, "%s", why);
+    return yaml_file_fail(f, find_blamed(mapping, why), NULL, "%s", why);
 }
 
 void profile_yaml_boards(char *known, size_t cap)

@@ -106,7 +106,7 @@ static void dump_units(const struct yaml_field *d, const void *section, cJSON *t
 enum { SPREAD_ROWS = 64 };
 
 /* The rows of numbers, each from 0 to the width of its range: deviations. */
-static size_t deviations(const struct yaml_fields *t, struct yaml_field *out)
+static size_t make_deviation_rows(const struct yaml_fields *t, struct yaml_field *out)
 {
     size_t n = 0, offset;
     for (const struct yaml_field *d; (d = yaml_row(t, n, &offset)) && n < SPREAD_ROWS; n++) {
@@ -122,8 +122,8 @@ static bool load_spread(struct yaml_file *f, const struct yaml_node *node, void 
 {
     struct scenario *s = section;
     struct yaml_field afe[SPREAD_ROWS], rows[SPREAD_ROWS + 1];
-    const struct yaml_fields afe_fields = {afe, deviations(&scenario_afe_numbers, afe)};
-    const size_t n = deviations(&scenario_mems_fields, rows);
+    const struct yaml_fields afe_fields = {afe, make_deviation_rows(&scenario_afe_numbers, afe)};
+    const size_t n = make_deviation_rows(&scenario_mems_fields, rows);
     rows[n] = (struct yaml_field){
         .key = "afe", .type = YAML_SECTION, .offset = offsetof(struct scenario_spread, afe), .sub = &afe_fields};
     const struct yaml_fields all = {rows, n + 1};
@@ -291,7 +291,7 @@ void scenario_default(struct scenario *s, const char *path)
     snprintf(s->path, sizeof s->path, "%s", path);
 }
 
-static bool load(struct yaml_file *f, struct scenario *s)
+static bool load_scenario(struct yaml_file *f, struct scenario *s)
 {
     const struct yaml_node *buses = yaml_get(f->root, "buses");
     scenario_default(s, f->path);
@@ -306,7 +306,7 @@ bool scenario_parse(const char *path, const char *text, size_t len, struct scena
 {
     struct yaml_file f;
     if (!yaml_file_parse(&f, path, text, len, why, cap)) return false;
-    const bool ok = load(&f, s);
+    const bool ok = load_scenario(&f, s);
     yaml_file_close(&f);
     return ok;
 }
@@ -316,7 +316,7 @@ bool scenario_load(const char *name, struct scenario *s, char *why, size_t cap)
     struct yaml_file f;
     char path[FIND_PATH_MAX];
     if (!find_proto("scenarios", name, NULL, path, why, cap) || !yaml_file_open(&f, path, why, cap)) return false;
-    const bool ok = load(&f, s);
+    const bool ok = load_scenario(&f, s);
     yaml_file_close(&f);
     return ok;
 }

@@ -56,7 +56,7 @@ static bool begin_unit(struct yaml_file *f, const struct yaml_node *node, const 
 }
 
 /* begin_unit() has. */
-static bool loaded(struct yaml_file *f, const struct yaml_node *node, void *section)
+static bool already_loaded(struct yaml_file *f, const struct yaml_node *node, void *section)
 {
     (void)f;
     (void)node;
@@ -139,8 +139,8 @@ static const char *const chains[] = {
 static const struct yaml_field unit_rows[] = {
     {.key = "name",   .type = YAML_TEXT, .offset = UNIT(name), .max = 32, .what = "letters, digits and _; with `count` a number is in it, `%02u`"},
     {.key = "count",  .type = YAML_CUSTOM, .min = 1, .max = SCENARIO_UNITS_MAX, .load = load_count, .what = "so many units, alike but for name, node and serial, which count up"},
-    {.key = "board",  .type = YAML_CUSTOM, .load = loaded, .dump = dump_board, .what = "type of the board, or a name of one of its profiles: see below"},
-    {.key = "profile", .type = YAML_CUSTOM, .load = loaded, .what = "name in proto/profiles, or a path, relative to the scenario"},
+    {.key = "board",  .type = YAML_CUSTOM, .load = already_loaded, .dump = dump_board, .what = "type of the board, or a name of one of its profiles: see below"},
+    {.key = "profile", .type = YAML_CUSTOM, .load = already_loaded, .what = "name in proto/profiles, or a path, relative to the scenario"},
     {.key = "profile_set", .type = YAML_CUSTOM, .load = load_profile_set, .dump = dump_profile_set, .what = "fields of the profile that differ"},
     {.key = "bus",    .type = YAML_TEXT, .offset = UNIT(bus_name), .max = 16, .what = "name of its bus; the first if it is not given"},
     {.key = "node",   .type = YAML_U8, .offset = UNIT(cfg.node), .min = 1, .max = 127, .what = "CANopen node id; each its own on a bus; the default is the board's, or the next that is free"},
@@ -167,13 +167,13 @@ const struct yaml_fields scenario_unit_fields = YAML_FIELDS(unit_rows);
 /* ---- what no table can say */
 
 /* The node of a key that is wrong, else that of the whole. */
-static const struct yaml_node *at(const struct yaml_node *unit, const char *key)
+static const struct yaml_node *node_at(const struct yaml_node *unit, const char *key)
 {
     const struct yaml_node *value = yaml_get(unit, key);
     return value ? value : unit;
 }
 
-static bool plain(const char *name)
+static bool is_plain(const char *name)
 {
     return name[strspn(name, "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_")] == '\0';
 }
@@ -227,8 +227,8 @@ static bool check_inputs(struct yaml_file *f, const struct yaml_node *node, cons
 {
     for (unsigned i = 0; i < UNIT_AXES; i++) {
         if (u->cfg.axis[i].sensor == UNIT_QUARTZ && u->cfg.board.afe[i].input != AFE_CURRENT) {
-            return yaml_file_fail(f, at(node, "axes"), "axes", "%c: expected afe: {input: current} for a quartz sensor",
-                                  "xyz"[i]);
+            return yaml_file_fail(f, node_at(node, "axes"), "axes",
+                                  "%c: expected afe: {input: current} for a quartz sensor", "xyz"[i]);
         }
     }
     return true;
@@ -238,19 +238,19 @@ static bool check_inputs(struct yaml_file *f, const struct yaml_node *node, cons
 static bool check_unit(struct yaml_file *f, const struct yaml_node *node, const struct scenario *s,
                        const struct scenario_unit *u)
 {
-    if (!plain(u->name))
-        return yaml_file_fail(f, at(node, "name"), "name", "expected letters, digits and _, got \"%s\"", u->name);
+    if (!is_plain(u->name))
+        return yaml_file_fail(f, node_at(node, "name"), "name", "expected letters, digits and _, got \"%s\"", u->name);
     if (!check_inputs(f, node, u)) return false;
     for (const struct scenario_unit *other = s->units; other < s->units + s->unit_count; other++) {
         if (strcmp(other->name, u->name) == 0)
-            return yaml_file_fail(f, at(node, "name"), "name",
+            return yaml_file_fail(f, node_at(node, "name"), "name",
                                   "expected a name of its own, got \"%s\", which another unit has", u->name);
         if (other->cfg.node == u->cfg.node && other->bus == u->bus) {
-            return yaml_file_fail(f, at(node, "node"), "node", "expected a node of its own, got %u, which unit %s has",
-                                  u->cfg.node, other->name);
+            return yaml_file_fail(f, node_at(node, "node"), "node",
+                                  "expected a node of its own, got %u, which unit %s has", u->cfg.node, other->name);
         }
         if (other->cfg.board.serial == u->cfg.board.serial) {
-            return yaml_file_fail(f, at(node, "serial"), "serial",
+            return yaml_file_fail(f, node_at(node, "serial"), "serial",
                                   "expected a number of its own, got %u, which unit %s has", u->cfg.board.serial,
                                   other->name);
         }
@@ -285,7 +285,7 @@ static bool find_bus(struct yaml_file *f, const struct yaml_node *node, const st
         why_list_add(known, sizeof known, s->bus[u->bus].name);
     }
     const char *near = yaml_nearest(u->bus_name, bus_at, s);
-    return yaml_file_fail(f, at(node, "bus"), "bus", "expected one of %s%s%s%s, got \"%s\"", known,
+    return yaml_file_fail(f, node_at(node, "bus"), "bus", "expected one of %s%s%s%s, got \"%s\"", known,
                           near ? " (nearest: " : "", near ? near : "", near ? ")" : "", u->bus_name);
 }
 
@@ -328,15 +328,15 @@ static bool place_unit(struct yaml_file *f, const struct yaml_node *node, const 
     struct scenario_unit *u = &s->units[s->unit_count];
     *u = e->unit;
     if (e->count && !number_name(e->unit.name, k + 1, u->name, sizeof u->name)) {
-        return yaml_file_fail(f, at(node, "name"), "name", "expected a place for the number, as in u%%02u, got \"%s\"",
-                              e->unit.name);
+        return yaml_file_fail(f, node_at(node, "name"), "name",
+                              "expected a place for the number, as in u%%02u, got \"%s\"", e->unit.name);
     }
     const unsigned id = e->unit.cfg.node + k;
-    if (id > 127) return yaml_file_fail(f, at(node, "node"), "node", "expected 1 to 127, got %u", id);
+    if (id > 127) return yaml_file_fail(f, node_at(node, "node"), "node", "expected 1 to 127, got %u", id);
     u->cfg.node = (uint8_t)id;
     u->cfg.board.serial = e->unit.cfg.board.serial + k;
     if (u->cfg.board.serial < e->unit.cfg.board.serial || u->cfg.board.serial == 0)
-        return yaml_file_fail(f, at(node, "serial"), "serial", "expected up to 4294967295, got more by count");
+        return yaml_file_fail(f, node_at(node, "serial"), "serial", "expected up to 4294967295, got more by count");
     if (!check_unit(f, node, s, u)) return false;
     s->unit_count++;
     return true;

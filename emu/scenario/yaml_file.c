@@ -88,7 +88,7 @@ static struct yaml_node *new_node(struct builder *b, enum yaml_kind kind, const 
     return n;
 }
 
-static bool append(struct builder *b, struct yaml_node *value)
+static bool append_item(struct builder *b, struct yaml_node *value)
 {
     const unsigned d = b->depth - 1;
     struct yaml_item *item = calloc(1, sizeof *item);
@@ -102,7 +102,7 @@ static bool append(struct builder *b, struct yaml_node *value)
 }
 
 /* A node is whole as far as its place goes: root, key, or value. */
-static bool place(struct builder *b, struct yaml_node *n)
+static bool place_node(struct builder *b, struct yaml_node *n)
 {
     if (b->depth == 0) {
         if (b->f->root) return yaml_file_fail(b->f, n, NULL, "a second document; a file has one");
@@ -110,7 +110,7 @@ static bool place(struct builder *b, struct yaml_node *n)
         return true;
     }
     const unsigned d = b->depth - 1;
-    if (b->open[d]->kind != YAML_MAPPING || b->key[d]) return append(b, n);
+    if (b->open[d]->kind != YAML_MAPPING || b->key[d]) return append_item(b, n);
     b->key[d] = n;
     return true;
 }
@@ -143,7 +143,7 @@ static bool add_scalar(struct builder *b, const struct fy_event *e, const struct
     const bool quoted = style == FYSS_SINGLE_QUOTED || style == FYSS_DOUBLE_QUOTED;
     n->column -= quoted && n->column > 1; /* the mark is behind the quote */
     set_anchor(b, new_anchor(b, e->scalar.anchor), n);
-    return place(b, n);
+    return place_node(b, n);
 }
 
 static bool add_alias(struct builder *b, const struct fy_event *e, const struct fy_mark *m)
@@ -154,18 +154,18 @@ static bool add_alias(struct builder *b, const struct fy_event *e, const struct 
                                  .column = m && m->column ? (unsigned)m->column : 1}; /* the mark is behind the star */
     for (unsigned i = b->anchors; name && i-- > 0;) {                                 /* the latest of that name */
         const struct anchor *a = &b->anchor[i];
-        if (strlen(a->name) == len && memcmp(a->name, name, len) == 0 && a->node) return place(b, a->node);
+        if (strlen(a->name) == len && memcmp(a->name, name, len) == 0 && a->node) return place_node(b, a->node);
     }
     return yaml_file_fail(b->f, &at, NULL, "*%.*s: no such anchor before this (up to %d, of up to %zu characters)",
                           (int)(len < 40 ? len : 40), name ? name : "", ANCHORS_MAX, sizeof b->anchor->name - 1);
 }
 
-static bool begin(struct builder *b, enum yaml_kind kind, struct fy_token *anchor, const struct fy_mark *m)
+static bool begin_collection(struct builder *b, enum yaml_kind kind, struct fy_token *anchor, const struct fy_mark *m)
 {
     struct yaml_node *n = new_node(b, kind, m, NULL, 0);
     if (!n) return yaml_file_fail(b->f, NULL, NULL, "no memory");
     if (b->depth == YAML_DEPTH_MAX) return yaml_file_fail(b->f, n, NULL, "nested deeper than %u", YAML_DEPTH_MAX);
-    if (!place(b, n)) return false;
+    if (!place_node(b, n)) return false;
     b->open[b->depth] = n;
     b->last[b->depth] = NULL;
     b->key[b->depth] = NULL;
@@ -173,7 +173,7 @@ static bool begin(struct builder *b, enum yaml_kind kind, struct fy_token *ancho
     return true;
 }
 
-static bool end(struct builder *b)
+static bool end_collection(struct builder *b)
 {
     b->depth--;
     set_anchor(b, b->anchor_of[b->depth], b->open[b->depth]);
@@ -189,12 +189,12 @@ static bool add_event(struct builder *b, struct fy_event *e)
     case FYET_ALIAS:
         return add_alias(b, e, m);
     case FYET_SEQUENCE_START:
-        return begin(b, YAML_SEQUENCE, e->sequence_start.anchor, m);
+        return begin_collection(b, YAML_SEQUENCE, e->sequence_start.anchor, m);
     case FYET_MAPPING_START:
-        return begin(b, YAML_MAPPING, e->mapping_start.anchor, m);
+        return begin_collection(b, YAML_MAPPING, e->mapping_start.anchor, m);
     case FYET_SEQUENCE_END:
     case FYET_MAPPING_END:
-        return end(b);
+        return end_collection(b);
     default:
         return true;
     }
@@ -210,7 +210,7 @@ static bool tell_parser(struct yaml_file *f, struct fy_diag *diag)
     return false;
 }
 
-static bool build(struct yaml_file *f, struct fy_parser *p, struct fy_diag *diag)
+static bool build_tree(struct yaml_file *f, struct fy_parser *p, struct fy_diag *diag)
 {
     struct builder b = {.f = f};
     bool ok = true;
@@ -279,7 +279,7 @@ bool yaml_file_parse(struct yaml_file *f, const char *path, const char *text, si
     struct fy_parser *p = diag ? fy_parser_create(&cfg) : NULL;
     bool ok = p && fy_parser_set_string(p, text, len) == 0;
     if (!ok) yaml_file_fail(f, NULL, NULL, "no memory");
-    ok = ok && build(f, p, diag);
+    ok = ok && build_tree(f, p, diag);
     if (p) fy_parser_destroy(p);
     if (diag) fy_diag_destroy(diag);
     if (!ok) yaml_file_close(f);
@@ -345,7 +345,7 @@ unsigned yaml_count(const struct yaml_node *node)
 enum { WORD_MAX = 40 };
 
 /* Edits (insert, leave out, replace, swap of neighbours) that make b of a; both up to WORD_MAX long. */
-static unsigned edits(const char *a, size_t na, const char *b, size_t nb)
+static unsigned edit_distance(const char *a, size_t na, const char *b, size_t nb)
 {
     unsigned before[WORD_MAX + 1] = {0}, row[WORD_MAX + 1], next[WORD_MAX + 1];
     for (size_t j = 0; j <= nb; j++) row[j] = (unsigned)j;
@@ -376,7 +376,7 @@ const char *yaml_nearest(const char *word, const char *(*name)(const void *ctx, 
     for (size_t i = 0; (found = name(ctx, i)); i++) {
         const size_t n = strlen(found);
         if (n > len && strncmp(found, word, len) == 0 && found[len] == '_') return found;
-        const unsigned e = n <= WORD_MAX ? edits(word, len, found, n) : best_edits;
+        const unsigned e = n <= WORD_MAX ? edit_distance(word, len, found, n) : best_edits;
         if (e >= best_edits) continue;
         best_edits = e;
         best = found;

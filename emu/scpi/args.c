@@ -45,7 +45,8 @@ struct source {
 };
 
 /* The error of a parameter: NULL. */
-__attribute__((format(printf, 3, 4))) static cJSON *reject(const struct source *s, int code, const char *expected, ...)
+__attribute__((format(printf, 3, 4))) static cJSON *reject_param(const struct source *s, int code, const char *expected,
+                                                                 ...)
 {
     const struct scpi_param *p = s->param;
     char got[WHY_TEXT_MAX];
@@ -66,25 +67,27 @@ static cJSON *to_number(const struct source *s)
 {
     const struct control_arg *a = &s->row->arg[s->arg];
     double x;
-    if (s->param->form == SCPI_STRING) return reject(s, -158, "a number");
+    if (s->param->form == SCPI_STRING) return reject_param(s, -158, "a number");
     if (s->param->form == SCPI_WORD) {
         if (scpi_limit(s->bench, s->row, s->arg, s->suffix, s->param->text, &x)) return cJSON_CreateNumber(x);
-        return reject(s, -148, "a number, MIN, MAX or DEF");
+        return reject_param(s, -148, "a number, MIN, MAX or DEF");
     }
     const int err = scpi_to_unit(a->unit, s->param->text, s->param->number, &x);
-    if (err) return a->unit ? reject(s, err, "a value in %s", a->unit) : reject(s, err, "a value without a unit");
+    if (err)
+        return a->unit ? reject_param(s, err, "a value in %s", a->unit)
+                       : reject_param(s, err, "a value without a unit");
     return cJSON_CreateNumber(x);
 }
 
 static cJSON *to_bool(const struct source *s)
 {
     const struct scpi_param *p = s->param;
-    if (p->form == SCPI_STRING) return reject(s, -158, "ON, OFF, 1 or 0");
-    if (p->form == SCPI_NUMBER && p->text.n) return reject(s, -138, "ON, OFF, 1 or 0");
+    if (p->form == SCPI_STRING) return reject_param(s, -158, "ON, OFF, 1 or 0");
+    if (p->form == SCPI_NUMBER && p->text.n) return reject_param(s, -138, "ON, OFF, 1 or 0");
     if (p->form == SCPI_NUMBER) return cJSON_CreateBool(p->number >= 0.5 || p->number <= -0.5);
     if (word_is(p->text, "ON")) return cJSON_CreateTrue();
     if (word_is(p->text, "OFF")) return cJSON_CreateFalse();
-    return reject(s, -224, "ON, OFF, 1 or 0");
+    return reject_param(s, -224, "ON, OFF, 1 or 0");
 }
 
 static bool same_word(struct scpi_text t, const char *word, size_t len)
@@ -120,11 +123,11 @@ static cJSON *to_choice(const struct source *s)
 {
     const struct control_arg *a = &s->row->arg[s->arg];
     char words[160] = "";
-    if (s->param->form == SCPI_NUMBER) return reject(s, -128, "a word");
+    if (s->param->form == SCPI_NUMBER) return reject_param(s, -128, "a word");
     const char *found = find_choice(a, s->param->text);
     if (found) return cJSON_CreateString(found);
     for (unsigned i = 0; a->choices[i]; i++) why_list_add(words, sizeof words, a->choices[i]);
-    return reject(s, -224, "one of %s", words);
+    return reject_param(s, -224, "one of %s", words);
 }
 
 static cJSON *to_string(const struct source *s)
@@ -132,7 +135,7 @@ static cJSON *to_string(const struct source *s)
     const struct scpi_param *p = s->param;
     char text[SCPI_LINE_MAX];
     size_t n = 0;
-    if (p->form == SCPI_NUMBER) return reject(s, -128, "a string");
+    if (p->form == SCPI_NUMBER) return reject_param(s, -128, "a string");
     for (size_t i = 0; i < p->text.n && n < sizeof text - 1; i++) {
         text[n++] = p->text.p[i];
         if (p->form == SCPI_STRING && i + 1 < p->text.n && p->text.p[i] == p->text.p[-1] &&
@@ -143,7 +146,7 @@ static cJSON *to_string(const struct source *s)
     return cJSON_CreateString(text);
 }
 
-static cJSON *convert(const struct source *s)
+static cJSON *convert_param(const struct source *s)
 {
     static cJSON *(*const to[])(const struct source *) = {
         [CONTROL_REAL] = to_number, [CONTROL_COUNT] = to_number, [CONTROL_BOOL] = to_bool,
@@ -183,7 +186,7 @@ static int arg_of_param(const struct control_command *row, unsigned suffixes, un
 static bool add_param(const struct source *s, cJSON *args)
 {
     const struct control_arg *a = &s->row->arg[s->arg];
-    cJSON *item = convert(s);
+    cJSON *item = convert_param(s);
     if (!item) return false;
     if (a->type != CONTROL_REALS) return cJSON_AddItemToObject(args, a->name, item);
     cJSON *list = cJSON_GetObjectItemCaseSensitive(args, a->name);

@@ -9,7 +9,7 @@
 
 /* ---- registers of struct scpi_status */
 
-static void *reg(struct scpi *s, const struct scpi_command *row)
+static void *status_reg(struct scpi *s, const struct scpi_command *row)
 {
     return (char *)&s->status + row->offset;
 }
@@ -18,13 +18,13 @@ static void ask_u8(struct scpi *s, const struct scpi_command *row, unsigned valu
 {
     (void)value;
     (void)t_ns;
-    scpi_putf(s, "%u", *(const uint8_t *)reg(s, row));
+    scpi_putf(s, "%u", *(const uint8_t *)status_reg(s, row));
 }
 
 static void set_u8(struct scpi *s, const struct scpi_command *row, unsigned value, int64_t t_ns)
 {
     (void)t_ns;
-    *(uint8_t *)reg(s, row) = (uint8_t)value;
+    *(uint8_t *)status_reg(s, row) = (uint8_t)value;
 }
 
 static void set_sre(struct scpi *s, const struct scpi_command *row, unsigned value, int64_t t_ns)
@@ -37,7 +37,7 @@ static void ask_u16(struct scpi *s, const struct scpi_command *row, unsigned val
     uint16_t v;
     (void)value;
     (void)t_ns;
-    memcpy(&v, reg(s, row), sizeof v);
+    memcpy(&v, status_reg(s, row), sizeof v);
     scpi_putf(s, "%u", v);
 }
 
@@ -45,7 +45,7 @@ static void set_u16(struct scpi *s, const struct scpi_command *row, unsigned val
 {
     const uint16_t v = (uint16_t)(value & 0x7FFF); /* bit 15 is always 0: SCPI-99 volume 1, 9.1 */
     (void)t_ns;
-    memcpy(reg(s, row), &v, sizeof v);
+    memcpy(status_reg(s, row), &v, sizeof v);
 }
 
 /* Event registers are cleared by reading. */
@@ -115,8 +115,8 @@ static void do_rst(struct scpi *s, const struct scpi_command *row, unsigned valu
         scpi_find_row(s, (struct scpi_text){row->pattern, strlen(row->pattern)}, false, &how, suffix);
     if (!reset) return;
     cJSON *result = cJSON_CreateObject();
-    if (control_call(s->control, reset->name, NULL, result, t_ns) == CONTROL_REFUSED) {
-        scpi_error(&s->status, -200, s->control->refusal.why);
+    if (control_call(s->control, reset->name, NULL, result, t_ns) == CONTROL_REJECTED) {
+        scpi_error(&s->status, -200, s->control->error.why);
     }
     cJSON_Delete(result);
 }

@@ -18,14 +18,14 @@ static bool is_digit(char c)
     return c >= '0' && c <= '9';
 }
 
-static char upper(char c)
+static char upper_char(char c)
 {
     return c >= 'a' && c <= 'z' ? (char)(c - 'a' + 'A') : c;
 }
 
 static bool is_alpha(char c)
 {
-    return upper(c) >= 'A' && upper(c) <= 'Z';
+    return upper_char(c) >= 'A' && upper_char(c) <= 'Z';
 }
 
 static bool is_word(char c)
@@ -33,12 +33,12 @@ static bool is_word(char c)
     return is_alpha(c) || is_digit(c) || c == '_';
 }
 
-static char first(const struct scpi_text *t)
+static char first_char(const struct scpi_text *t)
 {
     return t->n ? *t->p : '\0';
 }
 
-static void skip(struct scpi_text *t, size_t n)
+static void skip_text(struct scpi_text *t, size_t n)
 {
     t->p += n;
     t->n -= n;
@@ -46,10 +46,10 @@ static void skip(struct scpi_text *t, size_t n)
 
 static void skip_spaces(struct scpi_text *t)
 {
-    while (t->n && is_space(*t->p)) skip(t, 1);
+    while (t->n && is_space(*t->p)) skip_text(t, 1);
 }
 
-static size_t span(struct scpi_text t, bool (*is)(char))
+static size_t span_of(struct scpi_text t, bool (*is)(char))
 {
     size_t n = 0;
     while (n < t.n && is(t.p[n])) n++;
@@ -60,33 +60,33 @@ static size_t span(struct scpi_text t, bool (*is)(char))
 
 static int lex_mnemonic(struct scpi_text *t)
 {
-    if (!is_alpha(first(t))) return t->n && !is_space(*t->p) && !strchr(";,:?", *t->p) ? -101 : -102;
-    const size_t n = span(*t, is_word);
+    if (!is_alpha(first_char(t))) return t->n && !is_space(*t->p) && !strchr(";,:?", *t->p) ? -101 : -102;
+    const size_t n = span_of(*t, is_word);
     size_t letters = n;
     while (is_digit(t->p[letters - 1])) letters--;
     if (letters > SCPI_MNEMONIC_MAX) return -112;
     if (n - letters > SUFFIX_DIGITS_MAX) return -114;
-    skip(t, n);
+    skip_text(t, n);
     return 0;
 }
 
 static int lex_header(struct scpi_text *t, struct scpi_unit *u)
 {
-    u->rooted = first(t) == ':';
-    if (u->rooted) skip(t, 1);
+    u->rooted = first_char(t) == ':';
+    if (u->rooted) skip_text(t, 1);
     const char *start = t->p;
-    u->common = first(t) == '*';
+    u->common = first_char(t) == '*';
     if (u->common && u->rooted) return -102;
-    if (u->common) skip(t, 1);
+    if (u->common) skip_text(t, 1);
     for (bool more = true; more;) {
         const int err = lex_mnemonic(t);
         if (err) return err;
-        more = !u->common && first(t) == ':';
-        if (more) skip(t, 1);
+        more = !u->common && first_char(t) == ':';
+        if (more) skip_text(t, 1);
     }
     u->header = (struct scpi_text){start, (size_t)(t->p - start)};
-    u->query = first(t) == '?';
-    if (u->query) skip(t, 1);
+    u->query = first_char(t) == '?';
+    if (u->query) skip_text(t, 1);
     if (u->header.n > SCPI_HEADER_MAX) return -112;
     return t->n && !is_space(*t->p) && *t->p != ';' ? -111 : 0;
 }
@@ -103,7 +103,7 @@ static size_t number_length(struct scpi_text t)
     for (; n < t.n && is_digit(t.p[n]); n++) digits++;
     if (!digits) return 0;
     e = n;
-    if (e < t.n && upper(t.p[e]) == 'E') e++;
+    if (e < t.n && upper_char(t.p[e]) == 'E') e++;
     if (e > n && e < t.n && (t.p[e] == '+' || t.p[e] == '-')) e++;
     if (e == n || e >= t.n || !is_digit(t.p[e])) return n;
     while (e < t.n && is_digit(t.p[e])) e++;
@@ -119,10 +119,10 @@ static bool is_suffix(char c)
 static int lex_suffix(struct scpi_text *t, struct scpi_param *p)
 {
     skip_spaces(t);
-    const size_t n = is_alpha(first(t)) || first(t) == '/' ? span(*t, is_suffix) : 0;
+    const size_t n = is_alpha(first_char(t)) || first_char(t) == '/' ? span_of(*t, is_suffix) : 0;
     p->text = (struct scpi_text){t->p, n};
     if (n > SCPI_SUFFIX_MAX) return -134;
-    skip(t, n);
+    skip_text(t, n);
     return 0;
 }
 
@@ -138,7 +138,7 @@ static int lex_decimal(struct scpi_text *t, struct scpi_param *p)
     if (e && labs(strtol(e + 1, NULL, 10)) > EXPONENT_MAX) return -123;
     p->form = SCPI_NUMBER;
     p->number = strtod(digits, NULL);
-    skip(t, n);
+    skip_text(t, n);
     if (!isfinite(p->number)) return -222;
     return lex_suffix(t, p);
 }
@@ -148,11 +148,11 @@ static int lex_nondecimal(struct scpi_text *t, struct scpi_param *p)
 {
     static const char bases[] = "BQH";
     static const int base[] = {2, 8, 16};
-    skip(t, 1);
-    const char *which = t->n && *t->p ? strchr(bases, upper(*t->p)) : NULL;
+    skip_text(t, 1);
+    const char *which = t->n && *t->p ? strchr(bases, upper_char(*t->p)) : NULL;
     if (!which) return t->n && is_digit(*t->p) ? -168 : -102;
-    skip(t, 1);
-    const size_t n = span(*t, is_word);
+    skip_text(t, 1);
+    const size_t n = span_of(*t, is_word);
     char digits[17], *end;
     if (n == 0 || n >= sizeof digits) return n ? -124 : -121;
     memcpy(digits, t->p, n);
@@ -160,21 +160,21 @@ static int lex_nondecimal(struct scpi_text *t, struct scpi_param *p)
     p->form = SCPI_NUMBER;
     p->number = (double)strtoull(digits, &end, base[which - bases]);
     p->text = (struct scpi_text){t->p + n, 0};
-    skip(t, n);
+    skip_text(t, n);
     return *end ? -121 : 0;
 }
 
 static int lex_string(struct scpi_text *t, struct scpi_param *p)
 {
     const char quote = *t->p;
-    skip(t, 1);
+    skip_text(t, 1);
     const char *start = t->p;
     for (;;) {
         if (!t->n) return -151;
         const bool ends = *t->p == quote;
-        skip(t, 1);
-        if (ends && first(t) != quote) break;
-        if (ends) skip(t, 1);
+        skip_text(t, 1);
+        if (ends && first_char(t) != quote) break;
+        if (ends) skip_text(t, 1);
     }
     p->form = SCPI_STRING;
     p->text = (struct scpi_text){start, (size_t)(t->p - start) - 1};
@@ -183,17 +183,17 @@ static int lex_string(struct scpi_text *t, struct scpi_param *p)
 
 static int lex_word(struct scpi_text *t, struct scpi_param *p)
 {
-    const size_t n = span(*t, is_word);
+    const size_t n = span_of(*t, is_word);
     if (n > SCPI_WORD_MAX) return -144;
     p->form = SCPI_WORD;
     p->text = (struct scpi_text){t->p, n};
-    skip(t, n);
+    skip_text(t, n);
     return 0;
 }
 
 static int lex_param(struct scpi_text *t, struct scpi_param *p)
 {
-    const char c = first(t);
+    const char c = first_char(t);
     if (is_alpha(c)) return lex_word(t, p);
     if (c == '#') return lex_nondecimal(t, p);
     if (c == '"' || c == '\'') return lex_string(t, p);
@@ -216,12 +216,12 @@ int scpi_lex_unit(struct scpi_text *t, struct scpi_unit *u)
         if (err) return err;
         skip_spaces(t);
         if (t->n && *t->p != ';' && *t->p != ',') return -103;
-        if (first(t) != ',') continue;
-        skip(t, 1);
+        if (first_char(t) != ',') continue;
+        skip_text(t, 1);
         skip_spaces(t);
         if (!t->n || *t->p == ';') return -102;
     }
-    if (t->n) skip(t, 1);
+    if (t->n) skip_text(t, 1);
     return 0;
 }
 
@@ -230,10 +230,10 @@ int scpi_lex_unit(struct scpi_text *t, struct scpi_unit *u)
 bool scpi_is(const char *mnemonic, size_t len, struct scpi_text text)
 {
     size_t s = 0;
-    while (s < len && mnemonic[s] == upper(mnemonic[s])) s++;
+    while (s < len && mnemonic[s] == upper_char(mnemonic[s])) s++;
     if (!text.n || (text.n != len && text.n != s)) return false;
     for (size_t i = 0; i < text.n; i++) {
-        if (upper(text.p[i]) != upper(mnemonic[i])) return false;
+        if (upper_char(text.p[i]) != upper_char(mnemonic[i])) return false;
     }
     return true;
 }
@@ -254,8 +254,8 @@ static struct scpi_text take_node(struct scpi_text *h)
 {
     struct scpi_text node = {h->p, 0};
     while (node.n < h->n && h->p[node.n] != ':') node.n++;
-    skip(h, node.n);
-    if (h->n) skip(h, 1);
+    skip_text(h, node.n);
+    if (h->n) skip_text(h, 1);
     return node;
 }
 

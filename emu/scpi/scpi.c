@@ -8,8 +8,8 @@
 
 /* ---- a unit of a message */
 
-/* The standard's number for a refusal; an argument that is not there is the only one that can be wrong by then. */
-static int refusal_code(const struct control_refusal *r)
+/* The standard's number of an error; by then only a missing argument can be wrong. */
+static int error_code(const struct control_error *r)
 {
     static const struct {
         const char *code;
@@ -23,7 +23,7 @@ static int refusal_code(const struct control_refusal *r)
 }
 
 /* Command errors are of the form of the message: its rest makes no sense any more. */
-static bool fail(struct scpi *s, int code, const char *what)
+static bool fail_unit(struct scpi *s, int code, const char *what)
 {
     scpi_error(&s->status, code, what);
     return code <= -200;
@@ -34,14 +34,14 @@ static bool do_row(struct scpi *s, const struct control_command *row, const stru
 {
     struct scpi_failure why = {0};
     cJSON *args = scpi_args(s->control->bench, row, how, suffix, u, &why);
-    if (!args) return fail(s, why.code, why.what);
+    if (!args) return fail_unit(s, why.code, why.what);
     cJSON *result = cJSON_CreateObject();
     const bool done = control_call(s->control, row->name, args, result, t_ns) == CONTROL_DONE;
     if (done && how->result) scpi_put_fields(s, result, how->result);
     cJSON_Delete(args);
     cJSON_Delete(result);
     scpi_look(s, t_ns);
-    return done || fail(s, refusal_code(&s->control->refusal), s->control->refusal.why);
+    return done || fail_unit(s, error_code(&s->control->error), s->control->error.why);
 }
 
 /* ANGLe? MAX: what the setting of the same name would take. */
@@ -51,12 +51,12 @@ static bool do_limit(struct scpi *s, struct scpi_text header, const struct scpi_
     unsigned suffix[4] = {1, 1, 1, 1};
     double x;
     const struct control_command *row = scpi_find_row(s, header, false, &how, suffix);
-    if (!row || u->params != 1) return fail(s, -108, NULL);
+    if (!row || u->params != 1) return fail_unit(s, -108, NULL);
     const unsigned arg = scpi_suffixes(how->header);
     const bool numeric = arg < control_arg_count(row) && control_type_numeric(row->arg[arg].type);
     if (!numeric || u->param[0].form != SCPI_WORD ||
         !scpi_limit(s->control->bench, row, arg, suffix, u->param[0].text, &x)) {
-        return fail(s, -224, "expected MIN, MAX or DEF");
+        return fail_unit(s, -224, "expected MIN, MAX or DEF");
     }
     scpi_putf(s, "%.12g", x);
     return true;
@@ -77,11 +77,11 @@ static bool do_common(struct scpi *s, const struct scpi_command *row, const stru
     char range[80];
     const struct scpi_param *p = u->param;
     snprintf(range, sizeof range, "%s: expected an integer from 0 to %u", row->pattern, row->max);
-    if (u->params > (row->max > 0)) return fail(s, -108, NULL);
-    if (u->params < (row->max > 0)) return fail(s, -109, range);
-    if (row->max && p->form != SCPI_NUMBER) return fail(s, p->form == SCPI_WORD ? -148 : -158, range);
-    if (row->max && p->text.n) return fail(s, -138, range);
-    if (row->max && !(p->number > -0.5 && p->number < row->max + 0.5)) return fail(s, -222, range);
+    if (u->params > (row->max > 0)) return fail_unit(s, -108, NULL);
+    if (u->params < (row->max > 0)) return fail_unit(s, -109, range);
+    if (row->max && p->form != SCPI_NUMBER) return fail_unit(s, p->form == SCPI_WORD ? -148 : -158, range);
+    if (row->max && p->text.n) return fail_unit(s, -138, range);
+    if (row->max && !(p->number > -0.5 && p->number < row->max + 0.5)) return fail_unit(s, -222, range);
     scpi_look(s, t_ns);
     row->run(s, row, row->max ? (unsigned)(p->number + 0.5) : 0, t_ns);
     return true;
@@ -108,14 +108,14 @@ static bool do_unit(struct scpi *s, const struct scpi_unit *u, int64_t t_ns)
     struct scpi_text header;
     const struct control_scpi *how;
     unsigned suffix[4] = {1, 1, 1, 1};
-    if (!make_path(s, u, full, &header)) return fail(s, -112, NULL);
+    if (!make_path(s, u, full, &header)) return fail_unit(s, -112, NULL);
     const struct scpi_command *common = find_common(header, u->query);
     if (common) return do_common(s, common, u, t_ns);
     const struct control_command *row = scpi_find_row(s, header, u->query, &how, suffix);
     if (row && u->query && u->params) return do_limit(s, header, u);
     if (row) return do_row(s, row, how, suffix, u, t_ns);
     full[header.n] = '\0';
-    return fail(s, -113, full);
+    return fail_unit(s, -113, full);
 }
 
 /* ---- a message */
@@ -127,7 +127,7 @@ static void go_on(struct scpi *s, int64_t t_ns)
         struct scpi_text rest = {s->line + s->pos, s->len - s->pos};
         const int err = scpi_lex_unit(&rest, &u);
         s->pos = s->len - rest.n;
-        const bool good = err ? fail(s, err, NULL) && false : !u.header.n || do_unit(s, &u, t_ns);
+        const bool good = err ? fail_unit(s, err, NULL) && false : !u.header.n || do_unit(s, &u, t_ns);
         if (!good) s->pos = s->len;
     }
     if (scpi_busy(s)) return;

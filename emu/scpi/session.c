@@ -83,7 +83,7 @@ void scpi_put_fields(struct scpi *s, const cJSON *result, const char *fields)
 
 /* ---- waiting for the end of a motion */
 
-static bool over(const struct scpi *s, int64_t t_ns)
+static bool is_over(const struct scpi *s, int64_t t_ns)
 {
     return s->kind->rest_ns(s->control->bench, t_ns) <= t_ns;
 }
@@ -99,7 +99,7 @@ static void end_wait(struct scpi *s)
 
 void scpi_await(struct scpi *s, int64_t t_ns)
 {
-    if (over(s, t_ns)) end_wait(s);
+    if (is_over(s, t_ns)) end_wait(s);
     else sched_at(s->sched, &s->rest, s->kind->rest_ns(s->control->bench, t_ns));
 }
 

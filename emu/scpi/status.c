@@ -68,7 +68,7 @@ static uint8_t class_bit(int code)
 }
 
 /* The description is in double quotes in the answer. */
-static void unquote(char *text)
+static void unquote_text(char *text)
 {
     for (; *text; text++) {
         if (*text == '"') *text = '\'';
@@ -86,7 +86,7 @@ void scpi_error(struct scpi_status *s, int code, const char *what)
     e->code = code;
     if (what && !full) snprintf(e->text, sizeof e->text, "%s;%s", scpi_error_text(code), what);
     else snprintf(e->text, sizeof e->text, "%s", scpi_error_text(code));
-    unquote(e->text);
+    unquote_text(e->text);
 }
 
 void scpi_error_next(struct scpi_status *s, char *out, size_t cap)

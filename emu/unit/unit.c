@@ -95,30 +95,30 @@ static double read_encoder_rad(void *ctx, int64_t t_ns)
 static const struct board_platform_io platform_io = {torque_platform, reposition_platform, read_servo_rad,
                                                      read_encoder_rad};
 
-/* A listener may end its own or another's listening: the cursor lives in the unit, where unit_unlisten() sees it. */
+/* A listener may end its own or another's listening: the cursor lives in the unit, where unit_unsubscribe() sees it. */
 static void on_event(void *ctx, unsigned event, int64_t t_ns)
 {
     struct unit *u = ctx;
     u->told_next = u->listeners;
     while (u->told_next) {
-        struct unit_listener *l = u->told_next;
+        struct unit_observer *l = u->told_next;
         u->told_next = l->next;
         l->fn(l->ctx, event, t_ns);
     }
 }
 
-void unit_listen(struct unit *u, struct unit_listener *l)
+void unit_subscribe(struct unit *u, struct unit_observer *l)
 {
-    struct unit_listener **at = &u->listeners;
+    struct unit_observer **at = &u->listeners;
     while (*at) at = &(*at)->next;
     l->next = NULL;
     *at = l;
     board_observe(u->board, true);
 }
 
-void unit_unlisten(struct unit *u, struct unit_listener *l)
+void unit_unsubscribe(struct unit *u, struct unit_observer *l)
 {
-    struct unit_listener **at = &u->listeners;
+    struct unit_observer **at = &u->listeners;
     while (*at && *at != l) at = &(*at)->next;
     if (!*at) return;
     if (u->told_next == l) u->told_next = l->next;

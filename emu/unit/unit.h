@@ -39,10 +39,10 @@ struct unit_cfg {
 };
 
 /* Who wants to hear of the board's events. Owned by the listener. */
-struct unit_listener {
+struct unit_observer {
     void (*fn)(void *ctx, unsigned event, int64_t t_ns); /* as board_io.event; it may end any listening */
     void *ctx;
-    struct unit_listener *next;
+    struct unit_observer *next;
 };
 
 struct unit {
@@ -58,8 +58,8 @@ struct unit {
     struct quartz quartz[UNIT_AXES];
     struct sensor_fault *sensor_faults[UNIT_AXES]; /* unit_sample_until() before each change */
     double cos_alpha0[UNIT_AXES], sin_alpha0[UNIT_AXES];
-    struct unit_listener *listeners; /* in order of coming */
-    struct unit_listener *told_next; /* cursor of the event under way */
+    struct unit_observer *listeners; /* in order of coming */
+    struct unit_observer *told_next; /* cursor of the event under way */
     union board_store store;
     union board_can_store can_store;
 };
@@ -83,8 +83,8 @@ struct can_node *unit_node(const struct unit *u); /* NULL: on no bus */
 
 /* From the next event on, after those who listen already; the board computes events only while somebody listens. A frame
  * that is about to begin may begin untold. */
-void unit_listen(struct unit *u, struct unit_listener *l);
-void unit_unlisten(struct unit *u, struct unit_listener *l); /* harmless for one that does not listen */
+void unit_subscribe(struct unit *u, struct unit_observer *l);
+void unit_unsubscribe(struct unit *u, struct unit_observer *l); /* harmless for one that does not listen */
 
 /* What the sensor of a channel measures, a = -f on its own axes: at rest the projections of gravity. Truth. */
 void unit_gravity_mps2(struct unit *u, unsigned axis, int64_t t_ns, double a_mps2[3]);

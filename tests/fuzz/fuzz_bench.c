@@ -24,7 +24,7 @@ static const char scenario_text[] =
 
 /* What a unit had when it was last looked at. */
 struct seen {
-    struct unit_listener ear;
+    struct unit_observer ear;
     struct world *world;
     unsigned unit;
     int64_t period, sync_count; /* of converter X at the last DRD_A */
@@ -38,7 +38,7 @@ struct world {
     struct control_bench view;
     struct fault_engine faults;
     struct journal journal;
-    struct snapshot_ears ears;
+    struct snapshot_observers observers;
     struct can_client client[CLIENTS];
     struct seen seen[2];
     bool odd; /* faults were planned: data-ready and registers may be anything */
@@ -172,8 +172,8 @@ static void up(struct world *w, bool watched)
     bench_power_up(&w->bench);
     for (unsigned i = 0; i < 2 && watched; i++) {
         w->seen[i] = (struct seen){.world = w, .unit = i, .period = -1};
-        w->seen[i].ear = (struct unit_listener){.fn = on_event, .ctx = &w->seen[i]};
-        unit_listen(&w->bench.unit[i], &w->seen[i].ear);
+        w->seen[i].ear = (struct unit_observer){.fn = on_event, .ctx = &w->seen[i]};
+        unit_subscribe(&w->bench.unit[i], &w->seen[i].ear);
     }
 }
 
@@ -181,7 +181,7 @@ static void down(struct world *w)
 {
     for (unsigned i = 0; i < CLIENTS; i++) can_hub_leave(&w->hub, &w->client[i]);
     can_hub_sweep_detached(&w->hub, true);
-    snapshot_let_go(&w->ears, &w->bench);
+    snapshot_let_go(&w->observers, &w->bench);
     control_run_forget(&w->control);
     journal_free(&w->journal);
 }
@@ -294,7 +294,7 @@ static void do_again(struct world *first, struct world *again)
                                      .hub = {&again->hub},
                                      .buses = 1,
                                      .control = &again->control,
-                                     .ears = &again->ears};
+                                     .observers = &again->observers};
     if (!snapshot_replay(&s, &w, why, sizeof why)) {
         fprintf(stderr, "%s\n%.*s", why, (int)s.journal_len, s.journal);
         abort();

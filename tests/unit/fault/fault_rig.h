@@ -34,7 +34,7 @@ static struct {
     struct control_bench view;
     struct fault_engine engine;
     struct control control;
-    struct unit_listener listener;
+    struct unit_observer listener;
     struct heard heard[EVENTS_MAX];
     unsigned events;
     struct change change[CHANGES_MAX];
@@ -126,7 +126,7 @@ static inline int fresh(void **state)
     control_init(&r.control, control_tables, &r.view);
     psa2_attach(&r.unit[0].store.psa2, &(struct psa2_host){.frame = on_frame});
     r.listener.fn = on_event;
-    unit_listen(&r.unit[0], &r.listener);
+    unit_subscribe(&r.unit[0], &r.listener);
     for (unsigned i = 0; i < UNITS; i++) psa2_power_up(&r.unit[i].store.psa2, 0);
     return 0;
 }

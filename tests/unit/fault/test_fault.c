@@ -121,7 +121,7 @@ static void places_are_used_again_but_not_those_of_living_faults(void **state)
         assert_int_equal(add(args), i + 1);
     }
     assert_int_equal(add("{'kind':'sensor.bias','point':'a.sensor.x','bias_v':1}"), 0);
-    assert_non_null(strstr(r.control.refusal.why, "expected up to 64 faults, waiting or active"));
+    assert_non_null(strstr(r.control.error.why, "expected up to 64 faults, waiting or active"));
     r.engine.changed = NULL;
     run_to(30 * MS);
     assert_null(r.unit[0].sensor_faults[0]);
@@ -221,7 +221,7 @@ static void what_does_not_fit_is_refused_with_the_reason(void **state)
     run_to(2 * MS);
     for (size_t k = 0; k < COUNT(rows); k++) {
         if (add(rows[k].args)) fail_msg("%s was accepted", rows[k].args);
-        if (!strstr(r.control.refusal.why, rows[k].why)) fail_msg("%s: %s", rows[k].args, r.control.refusal.why);
+        if (!strstr(r.control.error.why, rows[k].why)) fail_msg("%s: %s", rows[k].args, r.control.error.why);
     }
     assert_int_equal(r.engine.last_id, 0);
 }
@@ -278,7 +278,7 @@ static void refused(const char *cmd, const char *args)
 {
     cJSON *j = cJSON_Parse(args), *result = cJSON_CreateObject();
     assert_non_null(j);
-    assert_int_equal(control_call(&r.control, cmd, j, result, r.s.now_ns), CONTROL_REFUSED);
+    assert_int_equal(control_call(&r.control, cmd, j, result, r.s.now_ns), CONTROL_REJECTED);
     cJSON_Delete(result);
     cJSON_Delete(j);
 }

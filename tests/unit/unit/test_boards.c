@@ -170,7 +170,7 @@ static struct world {
     struct can_bus bus;
     struct can_node host; /* acknowledges */
     struct unit u;
-    struct unit_listener ear;
+    struct unit_observer ear;
     unsigned events;
     struct sampler sampler;
 } w;
@@ -203,7 +203,7 @@ static void live(const struct board_type *t, int64_t until_ns)
     unit_connect(&w.u, &can, &w.bus, &w.s);
     assert_non_null(unit_node(&w.u));
     w.ear.fn = on_event;
-    unit_listen(&w.u, &w.ear);
+    unit_subscribe(&w.u, &w.ear);
     unit_power_up(&w.u, 0);
     sched_run_until(&w.s, until_ns);
     trace_advance(unit_trace(&w.u), w.s.now_ns - TRACE_LAG_NS);
@@ -246,7 +246,7 @@ static void each_comes_up_tells_of_it_and_goes_down(void **state)
         assert_true((*t)->ready(w.u.board));
         unit_power_down(&w.u, w.s.now_ns);
         assert_false((*t)->ready(w.u.board));
-        unit_unlisten(&w.u, &w.ear);
+        unit_unsubscribe(&w.u, &w.ear);
         w.events = 0;
         unit_power_up(&w.u, w.s.now_ns);
         sched_run_until(&w.s, 3 * NS_PER_S);

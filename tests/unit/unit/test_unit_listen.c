@@ -6,7 +6,7 @@
 #include <string.h>
 
 struct ear {
-    struct unit_listener l;
+    struct unit_observer l;
     unsigned heard;
     unsigned order; /* of the latest event among all ears */
     struct ear *ends;
@@ -24,7 +24,7 @@ static void hear(void *ctx, unsigned e, int64_t t_ns)
     assert_int_equal(t_ns, sched.now_ns);
     ear->heard++;
     ear->order = ++order;
-    if (ear->ends) unit_unlisten(&unit, &ear->ends->l);
+    if (ear->ends) unit_unsubscribe(&unit, &ear->ends->l);
 }
 
 static struct ear ear(void)
@@ -35,7 +35,7 @@ static struct ear ear(void)
 static void listen(struct ear *e)
 {
     e->l.ctx = e;
-    unit_listen(&unit, &e->l);
+    unit_subscribe(&unit, &e->l);
 }
 
 static bool heard(void)
@@ -66,8 +66,8 @@ static void listeners_hear_in_order_of_coming(void **state)
     assert_int_equal(a.heard, 1);
     assert_int_equal(b.heard, 1);
     assert_true(a.order < b.order);
-    unit_unlisten(&unit, &a.l);
-    unit_unlisten(&unit, &a.l); /* harmless */
+    unit_unsubscribe(&unit, &a.l);
+    unit_unsubscribe(&unit, &a.l); /* harmless */
     sched_run_until(&sched, 70000000);
     assert_int_equal(a.heard, 1);
     assert_true(b.heard > 1);
@@ -81,7 +81,7 @@ static void the_board_computes_no_events_for_nobody(void **state)
     struct ear a = ear();
     listen(&a);
     assert_true(heard());
-    unit_unlisten(&unit, &a.l);
+    unit_unsubscribe(&unit, &a.l);
     assert_false(heard());
     psa2_power_up(&unit.store.psa2, 0);
     assert_int_equal(a.heard, 0);
