@@ -1,10 +1,10 @@
-/* A CAN frame of ours and the bus that carries it in simulated time.
+/* CAN frames, and a CAN bus in simulated time.
  *
  * A board, a recorder and every client of an adapter is a node. A bus with a bit rate serves one frame at a time: among
  * the nodes that have something to send, the lowest identifier wins (classic arbitration), the frame takes its exact
  * number of bits including stuffing (canbits.h), and at the end of frame every other node receives it; the interframe
  * space follows. Frames sent at one instant all take part in the arbitration of that instant. A bus whose bit rate is 0
- * is ideal: frames pass at once in the order of sending, yet each in its own event, so that a receiver that answers does
+ * is ideal: frames pass at once in the order of sending, each in its own event, so that a receiver that answers does
  * not recurse. Nodes are owned by their owners and linked in; nothing allocates. The wire itself has no errors: they are
  * injected (can_fault.h) and confined by can_error.h; a frame without receivers passes. */
 #ifndef PSABENCH_BASE_CAN_H
@@ -46,20 +46,20 @@ enum can_order { CAN_ORDER_PRIORITY, CAN_ORDER_FIFO };
 struct can_node {
     const char *name;
     enum can_order order;
-    bool fd; /* takes part in FD traffic; a classic node is not given FD frames and counts them */
+    bool fd; /* FD controller; a classic node does not receive FD frames and counts them */
     /* End of another node's frame; may be NULL. */
     void (*rx)(void *ctx, const struct can_msg *m, int64_t t_ns);
-    void (*sent)(void *ctx, const struct can_msg *m, int64_t t_ns);  /* end of frame of one's own; may be NULL */
-    void (*error)(void *ctx, const struct can_msg *m, int64_t t_ns); /* an error frame has passed; may be NULL */
-    void (*state)(void *ctx, enum can_state s, int64_t t_ns);        /* its controller's; may be NULL */
+    void (*sent)(void *ctx, const struct can_msg *m, int64_t t_ns);  /* end of a frame of its own; may be NULL */
+    void (*error)(void *ctx, const struct can_msg *m, int64_t t_ns); /* error message, see can_error.h; may be NULL */
+    void (*state)(void *ctx, enum can_state s, int64_t t_ns);        /* new state of its controller; may be NULL */
     struct can_node *of; /* the node whose controller it shares as a second queue; NULL: it has its own */
     void *ctx;
     /* read-only outside can*.c */
     uint32_t tx_frames, rx_frames, tx_overflow;
-    uint32_t fd_refused; /* FD frames it could not send or was not given */
+    uint32_t fd_refused; /* FD frames that it could not send or receive */
     struct can_waiting queue[CAN_QUEUE_MAX];
     unsigned queued;
-    bool silent; /* off the bus: neither sends nor receives */
+    bool silent; /* bus-off: neither sends nor receives */
     struct can_bus *bus;
     struct can_node *next;
     /* of the controller, where `of` is NULL */

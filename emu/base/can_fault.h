@@ -9,11 +9,11 @@
 #include "base/rng.h"
 
 enum can_fault_kind {
-    CAN_FAULT_DROP,      /* not received, though the sender thinks so */
+    CAN_FAULT_DROP,      /* not received, but acknowledged */
     CAN_FAULT_DUPLICATE, /* received twice: the sender missed the end of its frame and repeats it (one receiver: at once) */
     CAN_FAULT_REORDER, /* received after the next frame that the fault picks, or after delay_ns */
     CAN_FAULT_DELAY,   /* received delay_ns later */
-    CAN_FAULT_ALTER,   /* a data bit is inverted and no one notices: as by a gateway, not by the wire with its CRC */
+    CAN_FAULT_ALTER,   /* a data bit is inverted and the CRC is right: the fault of a gateway, not of the wire */
     CAN_FAULT_ERROR /* destroyed by an error frame, and sent again until the sender is off the bus; none on an ideal bus */
 };
 

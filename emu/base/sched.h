@@ -8,9 +8,10 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#define SCHED_NEVER       INT64_MAX /* due time of an empty queue */
-#define SCHED_AT_ONCE_MAX 100000u   /* more events than this at one instant is a bug: somebody re-arms at zero delay */
-#define NS_PER_S          INT64_C(1000000000)
+#define SCHED_NEVER INT64_MAX /* due time of an empty queue */
+#define SCHED_AT_ONCE_MAX                                                                                              \
+    100000u /* more events than this at one instant is a bug: a callback re-arms itself at zero delay */
+#define NS_PER_S INT64_C(1000000000)
 
 typedef void sched_fn(void *ctx, int64_t t_ns); /* t_ns is the instant the event was due */
 

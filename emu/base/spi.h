@@ -14,7 +14,7 @@ typedef void spi_first_fn(void *chip, int64_t t_ns);
 
 struct spi {
     spi_byte_fn *byte;
-    spi_first_fn *first; /* told of the first falling edge of SCLK in each byte; NULL if the chip does not care */
+    spi_first_fn *first; /* called at the first falling edge of SCLK in each byte; may be NULL */
     void *chip;
     uint8_t out;  /* byte being shifted out */
     uint8_t in;   /* bits taken so far */

@@ -15,7 +15,7 @@
 #include "canopen/co_sdo.h"
 
 #define CO_HISTORY    8u /* entries of 1003h */
-#define CO_ERRORS_MAX 8u /* conditions that may stand at once */
+#define CO_ERRORS_MAX 8u /* errors that may be active at once */
 
 enum co_state { /* as the heartbeat says it */
                 CO_INITIALISING = 0,
@@ -44,7 +44,7 @@ struct co_node_io {
     uint32_t (*write)(void *ctx, const struct co_entry *e, const struct co_value *v, int64_t t_ns);
     void (*event)(void *ctx, enum co_event ev, int64_t t_ns);
     void (*sync)(void *ctx, int64_t t_ns); /* SYNC received in pre-operational or operational */
-    /* A classic data frame that is for no service of this node, in whatever state it is: somebody's PDO. May be NULL. */
+    /* A classic data frame of another node (a PDO), in any NMT state. May be NULL. */
     void (*rx_other)(void *ctx, const struct can_msg *m, int64_t t_ns);
 };
 
@@ -83,11 +83,11 @@ void co_node_power_down(struct co_node *n);
 /* As the NMT commands do; reset node calls the owner for its part. */
 void co_node_reset(struct co_node *n, enum co_event what, int64_t t_ns);
 
-/* A condition begins: 1001h, 1003h, EMCY (not in stopped) with five bytes source and time in us. One that is active
- * already is not told again. */
+/* An error begins: 1001h, 1003h, EMCY (not in stopped) with five bytes source and time in us. An active error is not
+ * reported again. */
 void co_node_error(struct co_node *n, uint16_t code, uint8_t reg, uint8_t source, int64_t t_ns);
 
-/* It ends, or was none; the last to end sends EMCY 0000h. */
+/* The error ends, if it was active; the last one to end sends EMCY 0000h. */
 void co_node_error_end(struct co_node *n, uint16_t code, int64_t t_ns);
 bool co_node_has_error(const struct co_node *n, uint16_t code);
 

@@ -245,7 +245,7 @@ void co_sdo_request(struct co_sdo *s, const uint8_t *data, size_t len, int64_t t
     case CS_ABORT:
         finish_transfer(s);
         return;
-    default: /* block transfer and what no one has defined */
+    default: /* block transfer and undefined commands */
         s->index = (uint16_t)bits_get_le(&data[1], 2);
         s->sub = data[3];
         send_abort(s, CO_AB_COMMAND, t_ns);

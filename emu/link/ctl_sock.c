@@ -16,7 +16,7 @@ struct ctl_client {
     struct ctl_server *server;
     bool due;      /* a reply is */
     bool pushed;   /* lines that are no replies wait: no client waits for those */
-    uint64_t lost; /* of them, since the client was last told */
+    uint64_t lost; /* of them, since the last report to the client */
 };
 
 enum { OUT_MAX = 1 << 20, PUSH_HIGH = OUT_MAX / 2 };
@@ -68,14 +68,14 @@ static void let_run(struct ctl_client *c)
 
 void ctl_push(struct ctl_client *c, const char *line)
 {
-    char told[64];
+    char lost[64];
     if (outbuf_pending(&c->io.out) > PUSH_HIGH) {
         c->lost++;
         return;
     }
     c->pushed = true;
-    const int n = c->lost ? snprintf(told, sizeof told, "{\"event\":\"lost\",\"lines\":%" PRIu64 "}\n", c->lost) : 0;
-    text_link_put(&c->io, told, (size_t)n);
+    const int n = c->lost ? snprintf(lost, sizeof lost, "{\"event\":\"lost\",\"lines\":%" PRIu64 "}\n", c->lost) : 0;
+    text_link_put(&c->io, lost, (size_t)n);
     c->lost = 0;
     text_link_put(&c->io, line, strlen(line));
     text_link_put(&c->io, "\n", 1);
@@ -111,7 +111,7 @@ static void on_connection(struct link *l, int64_t t_ns)
     links_add_last(s->links, &c->io.link);
 }
 
-/* A path that no one answers at is a leftover. 0 when it may be used. */
+/* A socket without a server behind it is stale. 0 when the path may be used. */
 static int clear_path(const struct sockaddr_un *a)
 {
     struct stat st;

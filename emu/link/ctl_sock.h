@@ -24,7 +24,7 @@ struct ctl_server {
 };
 
 /* The callbacks, ctx and links are filled in by the caller; path is kept by pointer. A socket left behind by a process that
- * has ended is replaced. 0, or -errno: -EADDRINUSE somebody listens there, -EEXIST it is no socket, -ENAMETOOLONG. */
+ * has ended is replaced. 0, or -errno: -EADDRINUSE the socket is in use, -EEXIST the path is no socket, -ENAMETOOLONG. */
 int ctl_listen(struct ctl_server *s, const char *path);
 void ctl_close(struct ctl_server *s); /* and removes the path */
 

@@ -27,11 +27,11 @@ static void start_watch(struct pty *p)
     p->watch_id = inotify_add_watch(p->watch.fd, p->path, IN_OPEN | IN_CLOSE_WRITE | IN_CLOSE_NOWRITE);
 }
 
-/* Whether a program has the slave open. Without our own descriptor the kernel reports a hang-up when no one has. */
+/* Whether a program has the slave open. Without our own descriptor the kernel reports a hang-up when none has. */
 static bool in_use(struct pty *p)
 {
     struct pollfd master = {.fd = p->line};
-    inotify_rm_watch(p->watch.fd, p->watch_id); /* what we do here is no one's coming and going */
+    inotify_rm_watch(p->watch.fd, p->watch_id); /* our own open and close are not a client's */
     close(p->slave);
     const bool used = poll(&master, 1, 0) < 1 || !(master.revents & POLLHUP);
     p->slave = open(p->path, O_RDWR | O_NOCTTY | O_CLOEXEC);
@@ -80,7 +80,7 @@ static void points_to(const char *name, char *path, size_t cap)
     path[n > 0 ? n : 0] = '\0';
 }
 
-/* A link to a pty is a leftover of ours; anything else is somebody's. */
+/* A link to a pty is a leftover of ours; anything else belongs to another program. */
 static int make_name(const char *path, const char *name)
 {
     char old[64];

@@ -1,4 +1,4 @@
-/* A pseudo-terminal that represents a serial port: raw, found under a link's name, and told who has it open.
+/* A pseudo-terminal that represents a serial port: raw, with a symbolic link to it; counts the programs that have it open.
  *
  * Our own descriptor of the slave stays open, so that the port and its settings outlive each client and the master never
  * reads an error. Clients are counted by watching the slave's node; where that cannot be done one client is assumed. */

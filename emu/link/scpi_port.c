@@ -133,7 +133,7 @@ static void on_pty_flush(struct link *l, int64_t t_ns)
     text_link_flush(l, t_ns);
 }
 
-/* Somebody new: a session of its own. The last bytes of the one who has left are still carried out in the old one. */
+/* A new client gets a session of its own. The last bytes of the previous client are still executed in the old one. */
 static void on_opened(void *ctx, bool open, int64_t t_ns)
 {
     struct scpi_port *port = ctx;

@@ -54,7 +54,7 @@ void text_link_flush(struct link *l, int64_t t_ns)
     if (t->ended) return;
     if (t->in_pos < t->in_len) take_lines(t, t_ns);
     if (!t->hold && !t->stall && outbuf_pending(&t->out) && outbuf_flush(&t->out, l->fd) < 0) {
-        outbuf_clear(&t->out); /* no one will read it; what the peer had sent before is still taken */
+        outbuf_clear(&t->out); /* the peer is gone; its input is still processed */
         t->eof = true;
         if (t->in_pos == t->in_len) end_link(t, t_ns);
     }

@@ -140,7 +140,7 @@ static void on_steps(void *ctx, uint64_t before, const struct trace_step *s, uns
 {
     struct line_faults *l = ctx;
     struct out o = {.n = 0};
-    /* No one listens any more: what is reported before its time is taken in, but a new listener hears from done_ns on. */
+    /* No sinks are left: early reports are processed, but a new sink gets steps from done_ns on. */
     if (until_ns == INT64_MAX || until_ns < l->done_ns) until_ns = l->done_ns;
     l->level = before; /* lines that no observer to move without a step */
     for (const struct trace_step *const end = s + n; s < end;) {

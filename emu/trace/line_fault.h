@@ -1,4 +1,4 @@
-/* Faults of lines, between a board and whoever watches them: a filter of its trace.
+/* Line faults, a filter between a board's trace and its sinks.
  *
  * The board is not touched: what it does, counts and sends over other ways stays as it is; the VCD file and the line port
  * see the fault. Steps stay in order of time and are real changes. Several faults of a line add up, stuck ones win. Without
@@ -15,10 +15,10 @@ enum line_fault_kind {
     LINE_STUCK_HIGH,
     LINE_STUCK_LOW,
     LINE_INVERTED,      /* wires A and B of the pair swapped */
-    LINE_GLITCH,        /* one pulse of width_ns, the other way round, at from_ns */
+    LINE_GLITCH,        /* one pulse of width_ns, inverted level, at from_ns */
     LINE_MISSING_PULSE, /* the pulse-th high pulse of each frame does not come */
     LINE_EXTRA_PULSE,   /* width_ns after the end of that pulse comes another one, of width_ns */
-    LINE_NOISE          /* pulses of width_ns, the other way round, at random */
+    LINE_NOISE          /* pulses of width_ns, inverted level, at random */
 };
 
 struct line_fault {
@@ -36,7 +36,7 @@ struct line_fault_slot { /* a fault and where it is */
     struct line_fault f;
     uint32_t id;     /* 0: free */
     bool began;      /* from_ns has passed */
-    bool flip;       /* the level is the other way round now */
+    bool flip;       /* the level is inverted now */
     int64_t next_ns; /* when flip changes; INT64_MAX: with a step, or never */
     unsigned pulses; /* of the frame so far */
 };
@@ -52,7 +52,7 @@ struct line_faults {
 
 void line_faults_init(struct line_faults *l, struct trace *t);
 
-/* From f->from_ns on, which is not before what the trace has delivered: now will do. Its number; 0: no room. */
+/* Begins at f->from_ns, which is not before the trace's done_ns; the present instant is valid. Returns its number; 0: no room. */
 uint32_t line_fault_add(struct line_faults *l, const struct line_fault *f);
 
 /* It ends at t_ns; harmless for one that has ended. */

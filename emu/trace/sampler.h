@@ -1,10 +1,10 @@
 /* The line port's sampler: a trace sink that turns the levels of up to seven lines into sampled bytes, the way a bit-bang
- * adapter captures them with its own clock. Which lines, says the board: of PSA-2 they are Int, Data and CLK.
+ * adapter captures them with its own clock. The board selects the lines (PSA-2: INT, DATA, CLK).
  *
  * Sample k is the levels at clk_edge_ns(clock, k), levels valid from that instant on. Between edges the bytes are one
- * memset. They wait in a bounded ring for whoever reads; a reader that is too slow loses the newest samples, which are
- * counted, and the first byte after the hole carries SAMPLER_GAP. Attach it only while somebody reads: the lines are
- * computed for it. Plain struct owned by the caller, no allocation, one thread. */
+ * memset. They wait in a bounded ring for the reader; a slow reader loses the newest samples, which are
+ * counted, and the first byte after the hole carries SAMPLER_GAP. Attach it only while there is a reader: the lines
+ * are computed for it. Plain struct owned by the caller, no allocation, one thread. */
 #ifndef PSABENCH_TRACE_SAMPLER_H
 #define PSABENCH_TRACE_SAMPLER_H
 

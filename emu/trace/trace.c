@@ -119,7 +119,7 @@ void trace_detach(struct trace *t, struct trace_sink *s)
     if (*at) *at = s->next;
     s->next = NULL;
     watch_again(t);
-    if (!t->sinks) deliver_until(t, INT64_MAX); /* to no one: the levels stay right for the next listener */
+    if (!t->sinks) deliver_until(t, INT64_MAX); /* no sinks: the levels stay right for the next one */
 }
 
 uint64_t trace_known(const struct trace *t, int64_t t_ns)

@@ -1,11 +1,12 @@
-/* Named 1-bit signals, and who listens to them.
+/* Named 1-bit signals and their observers (sinks).
  *
  * A board asks trace_watched() before it computes an edge; without a sink nothing is computed. Edges may be reported out
  * of order within TRACE_LAG_NS (a byte's edges are known when it ends, a frame's when it begins); sinks get them in
  * order of time, then of report, and only real changes. One trace per unit. Fixed storage, no allocation, one thread.
  *
- * A listener that comes late hears the levels last reported, and what the board's `wake` adds. So a board that computes no
- * edges for no one still reports where its lines come to rest (trace_put() costs little), and wakes what is under way. */
+ * A sink that is attached late gets the levels last reported, and what the board's `wake` adds. So a board that computes
+ * no edges without sinks still reports the idle levels of its lines (trace_put() costs little), and in `wake` the edges of
+ * what is under way. */
 #ifndef PSABENCH_TRACE_TRACE_H
 #define PSABENCH_TRACE_TRACE_H
 
@@ -51,9 +52,9 @@ struct trace_filter {
     void *ctx;
 };
 
-/* Of a board that keeps things to itself without observers. */
+/* Of a board that reports less without sinks. */
 struct trace_source {
-    void (*wake)(void *ctx, uint64_t mask); /* somebody is about to listen to these signals: report what is under way */
+    void (*wake)(void *ctx, uint64_t mask); /* a sink for these signals is being attached: report what is under way */
     /* For lines that move all the time: report them up to t_ns, or as far as there is room; returns how far. May be NULL. */
     int64_t (*report)(void *ctx, int64_t t_ns);
     void *ctx;
@@ -86,15 +87,14 @@ unsigned trace_add(struct trace *t, const char *name, bool level);
 /* Number of the signal of that name, or -1. */
 int trace_find(const struct trace *t, const char *name);
 
-/* Wakes the source, then the sink first hears the present levels, at t = done_ns. */
+/* Wakes the source, then the sink gets the present levels, at t = done_ns. */
 void trace_attach(struct trace *t, struct trace_sink *s);
-void trace_detach(struct trace *t,
-                  struct trace_sink *s); /* hears nothing more; harmless for one that is not attached */
+void trace_detach(struct trace *t, struct trace_sink *s); /* gets nothing more; harmless for one that is not attached */
 
-/* Levels at t_ns, of lines that somebody listens to, as far as they have been reported; with a filter, those delivered. */
+/* Levels at t_ns, of watched lines, as far as they have been reported; with a filter, those delivered. */
 uint64_t trace_known(const struct trace *t, int64_t t_ns);
 
-/* Whether anybody listens to one of the signals in mask. */
+/* Whether a sink watches one of the signals in mask. */
 static inline bool trace_watched(const struct trace *t, uint64_t mask)
 {
     return (t->watched & mask) != 0;
@@ -131,7 +131,7 @@ typedef void trace_change_fn(void *ctx, unsigned sig, bool level, int64_t t_ns);
 void trace_each(const struct trace_step *s, unsigned n, uint64_t mask, trace_change_fn *change, void *ctx);
 
 /* Delivers everything up to and including t_ns: call with now - TRACE_LAG_NS while running (also without observers, so
- * that done_ns keeps up), with now at the end. Then tells every sink. Going back does nothing. */
+ * that done_ns keeps up), with now at the end. Then calls advance of every sink. A t_ns in the past has no effect. */
 void trace_advance(struct trace *t, int64_t t_ns);
 
 #endif

@@ -1,11 +1,11 @@
 /* Writer of Value Change Dump (IEEE 1364-2005 clause 18): a trace sink that sigrok, PulseView, GTKWave and Surfer open.
  *
  * 1-bit wires only, no date, so that the same run gives the same bytes. Times are rounded down to the file's unit: order is
- * kept and an edge is less than one unit early. The unit is 10 ns unless told otherwise: a half period of CLK (250 ns)
+ * kept and an edge is less than one unit early. The default unit is 10 ns: a half period of CLK (250 ns)
  * is then exact and of SClk (244.14 ns) within 4 %, no datasheet's set-up time (50 ns) collapses into one sample, and
  * sigrok, which makes a sample of every unit, still loads 10 s in seconds (docs/waveforms.md has the figures).
  *
- * The caller owns the struct and the FILE. A failed write is remembered, told once, and everything after it is dropped: a
+ * The caller owns the struct and the FILE. A failed write is remembered, reported once, and everything after it is dropped: a
  * full disk ends the recording, not the run. Fixed buffer, no allocation, one thread. */
 #ifndef PSABENCH_TRACE_VCD_H
 #define PSABENCH_TRACE_VCD_H
@@ -61,7 +61,7 @@ void vcd_flush(struct vcd *v);
  * run up to which the trace has been advanced, or one unit after the change. Then flushes. */
 void vcd_close(struct vcd *v, int64_t t_ns);
 
-/* errno of the first failed write, once; 0 if there is nothing (new) to tell. */
+/* errno of the first failed write, once; 0 if there is none, or none since. */
 int vcd_error(struct vcd *v);
 
 #endif

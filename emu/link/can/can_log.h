@@ -2,9 +2,9 @@
  *
  *     (0000000001.234567) can0 185#15DA1F0100000000
  *
- * Seconds have ten digits, so that lines of frames of one kind are of one length. It only listens and is no client: it
- * changes nothing on the bus, and time does not wait for it but while the kernel takes the text (a file, not a pipe that
- * no one reads). */
+ * Seconds have ten digits, so that lines of frames of one kind are of one length. It is a passive observer, not a client:
+ * it changes nothing on the bus, and time waits for it only while the kernel accepts the text (use a file, not a pipe
+ * without a reader). */
 #ifndef PSABENCH_LINK_CAN_CAN_LOG_H
 #define PSABENCH_LINK_CAN_CAN_LOG_H
 

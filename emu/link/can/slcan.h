@@ -16,7 +16,7 @@
 
 enum slcan_err {
     SLCAN_OK,
-    SLCAN_NO_FRAME, /* the letter does not begin a frame: a command, or garbage */
+    SLCAN_NO_FRAME, /* the letter does not begin a frame */
     SLCAN_SHORT,    /* fewer digits than the letter and the DLC ask for */
     SLCAN_LONG,     /* more digits */
     SLCAN_DIGIT,    /* not hexadecimal */
@@ -39,7 +39,7 @@ enum {
     SLCAN_STATUS_BUS_ERROR = 0x80
 };
 
-/* Those that an error message (can_error.h) sets. */
+/* Status bits that an error message (can_error.h) sets. */
 uint8_t slcan_error_status(const struct can_msg *m);
 
 /* DLC of a data length (the next larger one for an odd length), and back (dlc 0..15). */

@@ -45,7 +45,7 @@ static void on_frame(void *ctx, const struct can_msg *m, int64_t t_ns)
     }
     s->can.dropped++;
     s->status |= SLCAN_STATUS_RX_FULL | SLCAN_STATUS_OVERRUN;
-    if (!s->lost_reported) log_line(s, "slcan: the client reads too slowly, frames are being dropped");
+    if (!s->lost_reported) log_line(s, "slcan: the client reads too slowly, frames are dropped");
     s->lost_reported = true;
 }
 
@@ -95,7 +95,7 @@ static bool cmd_close(struct slcan_pty *s, const char *arg, int64_t t_ns)
     return true;
 }
 
-/* A bus of another bit rate would answer with error frames only: refuse, so that the client hears of it. */
+/* A bus of another bit rate would answer with error frames only: reject, so that the client notices. */
 static bool cmd_bitrate(struct slcan_pty *s, const char *arg, int64_t t_ns)
 {
     (void)t_ns;

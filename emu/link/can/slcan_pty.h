@@ -2,9 +2,9 @@
  *
  * Commands: S0..S8 bit rate and Y0..Y8 data bit rate in Mbit/s (accepted when the bus has that rate or none), O open, L
  * open to listen only, C close, V v version, N serial number, F status, Z0 Z1 time stamps (ms of the simulated minute),
- * and frames. Answers: CR done, z CR and Z CR frame queued, BEL refused. Refused: s (bit timing registers), M m
- * (acceptance filters), X, U. The protocol has no error frames: F shows
- * them, bits 2 (error warning), 5 (error-passive or bus-off) and 7. The channel closes when the last program closes the
+ * and frames. Answers: CR done, z CR and Z CR frame queued, BEL rejected. Rejected: s (bit timing registers), M m
+ * (acceptance filters), X, U. The protocol has no error frames: F shows them,
+ * bits 2 (error warning), 5 (error-passive or bus-off) and 7. The channel closes when the last program closes the
  * port. */
 #ifndef PSABENCH_LINK_CAN_SLCAN_PTY_H
 #define PSABENCH_LINK_CAN_SLCAN_PTY_H
@@ -20,7 +20,7 @@ struct slcan_pty {
     struct can_hub *hub;
     bool open, listen_only, stamps, closing;
     bool lost_reported;
-    uint8_t status; /* F: bits 0, 3, 5 and 7 as a CAN232 has them */
+    uint8_t status; /* F: bits of slcan.h */
 };
 
 /* 0, or -errno. The struct must not move afterwards. name: symbolic link, may be NULL; kept by pointer. */

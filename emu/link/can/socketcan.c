@@ -63,7 +63,7 @@ static void on_frame(void *ctx, const struct can_msg *m, int64_t t_ns)
         s->queue[(s->head + s->len++) % SOCKETCAN_QUEUE] = *m;
         can_hub_delivered(&s->can);
     } else {
-        if (!s->lost_reported) log_line(s, "the interface does not take the frames, they are being dropped");
+        if (!s->lost_reported) log_line(s, "the interface does not accept the frames, they are dropped");
         s->lost_reported = true;
         s->can.dropped++;
     }

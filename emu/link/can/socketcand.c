@@ -129,14 +129,14 @@ const char *socketcand_strerror(enum socketcand_err err)
 {
     static const char *const text[] = {
         [SOCKETCAND_OK] = "no error",
-        [SOCKETCAND_SYNTAX] = "not a message: it begins with an angle bracket and a word",
-        [SOCKETCAND_UNKNOWN] = "unknown word: open, rawmode, send and echo are known",
-        [SOCKETCAND_MODE] = "mode not modelled: only rawmode is",
-        [SOCKETCAND_ARGS] = "wrong number or form of arguments: open CHANNEL, or send ID LENGTH BYTES",
-        [SOCKETCAND_ID] = "bad identifier: 3 digits up to 7FF or 8 digits up to 1FFFFFFF",
-        [SOCKETCAND_FD] = "FD frame refused: socketcand carries at most 8 bytes, use slcan or SocketCAN for FD",
-        [SOCKETCAND_DATA] = "bad data byte: one or two hexadecimal digits each",
-        [SOCKETCAND_LENGTH] = "as many data bytes as announced are needed, remote frames are not carried",
+        [SOCKETCAND_SYNTAX] = "message: expected an opening angle bracket and a word",
+        [SOCKETCAND_UNKNOWN] = "message: expected open, rawmode, send or echo",
+        [SOCKETCAND_MODE] = "mode: expected rawmode; other modes are not modelled",
+        [SOCKETCAND_ARGS] = "arguments: expected open CHANNEL, or send ID LENGTH BYTES",
+        [SOCKETCAND_ID] = "identifier: expected 3 digits up to 7FF or 8 digits up to 1FFFFFFF",
+        [SOCKETCAND_FD] = "length: expected 0 to 8; use slcan or SocketCAN for FD frames",
+        [SOCKETCAND_DATA] = "data: expected bytes of one or two hexadecimal digits",
+        [SOCKETCAND_LENGTH] = "data: expected as many bytes as the length says; remote frames are not supported",
     };
     return text[err];
 }

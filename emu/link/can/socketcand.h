@@ -4,7 +4,7 @@
  *   client: < open can0 >  < rawmode >  < send 605 8 40 8 10 0 0 0 0 0 >  < echo >
  *
  * An identifier of 3 digits is an 11-bit one, of 8 digits a 29-bit one. The time is simulated seconds. An error carries
- * a class of linux/can/error.h, so that python-can shows an error frame, and words for people. Frames are classic only:
+ * a class of linux/can/error.h, so that python-can shows an error frame, and a text. Frames are classic only:
  * the protocol has no remote and no FD form. Broadcast manager, ISO-TP and statistics modes are not modelled. Pure. */
 #ifndef PSABENCH_LINK_CAN_SOCKETCAND_H
 #define PSABENCH_LINK_CAN_SOCKETCAND_H
@@ -14,7 +14,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define SOCKETCAND_MSG_MAX     200u /* python-can gives up on a longer one */
+#define SOCKETCAND_MSG_MAX     200u /* python-can rejects a longer one */
 #define SOCKETCAND_CHANNEL_MAX 32u
 
 enum socketcand_verb { SOCKETCAND_OPEN, SOCKETCAND_RAWMODE, SOCKETCAND_SEND, SOCKETCAND_ECHO };
@@ -22,7 +22,7 @@ enum socketcand_verb { SOCKETCAND_OPEN, SOCKETCAND_RAWMODE, SOCKETCAND_SEND, SOC
 enum socketcand_err {
     SOCKETCAND_OK,
     SOCKETCAND_SYNTAX,  /* no '<' at the start, or no word in it */
-    SOCKETCAND_UNKNOWN, /* a word we do not know */
+    SOCKETCAND_UNKNOWN, /* unknown word */
     SOCKETCAND_MODE,    /* a mode of real socketcand that is not modelled */
     SOCKETCAND_ARGS,    /* too few or too many words */
     SOCKETCAND_ID,
@@ -33,7 +33,7 @@ enum socketcand_err {
 
 /* Error classes of linux/can/error.h in the form < error > carries them. */
 #define SOCKETCAND_LOST    UINT32_C(0x20000004) /* CAN_ERR_CRTL: frames for this client were dropped */
-#define SOCKETCAND_REFUSED UINT32_C(0x20000008) /* CAN_ERR_PROT: a message of this client was refused */
+#define SOCKETCAND_REFUSED UINT32_C(0x20000008) /* CAN_ERR_PROT: a message of this client was rejected */
 
 #define SOCKETCAND_ERROR_FLAG UINT32_C(0x20000000) /* with the classes of can_node.error */
 
@@ -49,7 +49,7 @@ enum socketcand_err socketcand_decode(const char *msg, size_t len, struct socket
 /* Text for an error message of the bus (can_error.h). */
 const char *socketcand_error_text(const struct can_msg *m);
 
-/* What is wrong and what would be right, without '<' and '>'. */
+/* `<where>: expected <what>`, without angle brackets. */
 const char *socketcand_strerror(enum socketcand_err err);
 
 /* Whole messages. pad > 0: blanks before the closing '>' make the length a multiple of pad, so that a client reading

@@ -24,7 +24,7 @@ struct client {
     struct can_hub *hub; /* of the bus it has opened; before that the first */
     enum phase phase;
     unsigned held; /* hold periods so far */
-    uint64_t lost; /* frames dropped since the client was last told */
+    uint64_t lost; /* frames dropped since the last report to the client */
     bool fd_reported;
 };
 
@@ -73,7 +73,7 @@ static void reject_message(struct client *c, const char *text, int64_t t_ns)
 static void tell_lost(struct client *c, int64_t t_ns)
 {
     char text[80];
-    snprintf(text, sizeof text, "%llu frames lost here: the client reads too slowly", (unsigned long long)c->lost);
+    snprintf(text, sizeof text, "%llu frames lost: the client reads too slowly", (unsigned long long)c->lost);
     c->lost = 0;
     send_error(c, SOCKETCAND_LOST, text, t_ns);
 }
@@ -88,7 +88,7 @@ static void on_frame(void *ctx, const struct can_msg *m, int64_t t_ns)
     if (n && !c->lost && text_link_put(&c->io, msg, n)) {
         can_hub_delivered(&c->can);
     } else if (n) {
-        if (!c->lost++) log_client(c, "reads too slowly, frames are being dropped");
+        if (!c->lost++) log_client(c, "reads too slowly, frames are dropped");
         c->can.dropped++;
     }
 }
@@ -122,7 +122,7 @@ static void release_hold(struct client *c)
 static bool choose_bus(struct client *c, const char *channel, int64_t t_ns)
 {
     const struct socketcand_server *s = c->server;
-    char text[160] = "no such bus; there are";
+    char text[160] = "channel: expected";
     for (unsigned i = 0; i < s->hubs; i++) {
         c->hub = &s->hub[i];
         if (s->hubs == 1 || strcmp(s->hub[i].name, channel) == 0) return true;
@@ -137,7 +137,7 @@ static bool choose_bus(struct client *c, const char *channel, int64_t t_ns)
 static void do_open(struct client *c, const struct socketcand_msg *m, int64_t t_ns)
 {
     if (c->phase != PHASE_HELLO) {
-        reject_message(c, "a channel is open already", t_ns);
+        reject_message(c, "open: a channel is already open", t_ns);
         return;
     }
     if (!choose_bus(c, m->channel, t_ns)) return;
@@ -149,7 +149,8 @@ static void do_open(struct client *c, const struct socketcand_msg *m, int64_t t_
 static void do_rawmode(struct client *c, int64_t t_ns)
 {
     if (c->phase != PHASE_OPEN) {
-        reject_message(c, c->phase == PHASE_HELLO ? "rawmode before open CHANNEL" : "rawmode already", t_ns);
+        reject_message(c, c->phase == PHASE_HELLO ? "rawmode: expected open CHANNEL first" : "rawmode: already active",
+                       t_ns);
         return;
     }
     send_answer(c, "< ok >");
@@ -165,7 +166,7 @@ static void do_rawmode(struct client *c, int64_t t_ns)
 static void do_send(struct client *c, const struct can_msg *m, int64_t t_ns)
 {
     if (!c->can.up) {
-        reject_message(c, "send before open CHANNEL and rawmode", t_ns);
+        reject_message(c, "send: expected open CHANNEL and rawmode first", t_ns);
         return;
     }
     can_hub_send(c->hub, &c->can, m, t_ns);
@@ -176,7 +177,7 @@ static void on_line(struct text_link *t, enum lines_result r, const char *line, 
     struct client *c = (struct client *)t;
     struct socketcand_msg m;
     if (r == LINES_OVERLONG) {
-        reject_message(c, "message too long: up to 200 characters from bracket to bracket", t_ns);
+        reject_message(c, "message: expected at most 200 characters from bracket to bracket", t_ns);
         return;
     }
     const enum socketcand_err err = socketcand_decode(line, len, &m);
@@ -247,7 +248,7 @@ static void on_flush(struct link *l, int64_t t_ns)
     }
     if (c->can.node.fd_refused && !c->fd_reported && c->phase == PHASE_RAW) {
         c->fd_reported = true;
-        send_error(c, SOCKETCAND_REFUSED, "FD frames are on the bus that socketcand cannot carry", t_ns);
+        send_error(c, SOCKETCAND_REFUSED, "the bus has FD frames, which socketcand does not support", t_ns);
     }
     text_link_flush(l, t_ns);
 }

@@ -1,6 +1,6 @@
 /* Adapter: the socketcand protocol on 127.0.0.1, for any number of clients up to SOCKETCAND_CLIENTS_MAX.
  *
- * Traps of python-can's client that are minded here: each answer of the handshake is a segment of its own; frames wait
+ * Workarounds for python-can's client: each answer of the handshake is a segment of its own; frames wait
  * until the client has read the < ok > to rawmode; only whole messages are queued; TCP_NODELAY, and TCP_QUICKACK after
  * each read, save it 40 ms a request. A client whose channel is closed stays on the bus until its frames have gone out. */
 #ifndef PSABENCH_LINK_CAN_SOCKETCAND_TCP_H
@@ -28,6 +28,6 @@ struct socketcand_server {
 /* Binds and listens; port 0 takes a free one. 0, or -errno. The server must not move afterwards. */
 int socketcand_listen(struct socketcand_server *s, struct can_hub *hub, unsigned hubs, uint16_t port);
 
-void socketcand_close(struct socketcand_server *s); /* no new clients; those connected go with their links */
+void socketcand_close(struct socketcand_server *s); /* no new clients; connected ones are closed with their links */
 
 #endif

@@ -4,7 +4,7 @@
  *
  *     R <address> [<strobe ns>]           read cycle; address: 1 or 2 hex digits, with or without an h
  *     W <address> <data> [<strobe ns>]    write cycle; data: 1 to 4 hex digits
- *     ?                                   who is there
+ *     ?                                   identification
  *
  * The strobe is decimal, 1 to 999999999; without it, it has the board's own length. To the host, one line for each of its
  * lines, in their order (t: simulated ns at the end of the strobe, or of the refusal;
@@ -38,7 +38,7 @@ struct bus_request {
 
 enum bus_text_err { BUS_TEXT_OK, BUS_TEXT_SYNTAX, BUS_TEXT_NUMBER, BUS_TEXT_OVERLONG };
 
-/* line need not end in NUL. On an error *out has what was understood before it: its op and address may be told. */
+/* line need not end in NUL. On an error *out has the fields decoded before it: its op and address may be answered. */
 enum bus_text_err bus_text_parse(const char *line, size_t len, struct bus_request *out, unsigned *fields);
 
 /* The code word of an error; "" for BUS_TEXT_OK. */

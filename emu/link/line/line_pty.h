@@ -1,6 +1,6 @@
 /* Adapter: the line port, a pseudo-terminal that streams sampled bytes of a unit's lines.
  *
- * Sampling begins when a program opens the port and stops when the last one closes it; meanwhile nothing is computed. In
+ * Sampling begins when a program opens the port and stops when the last one closes it; while it is closed nothing is computed. In
  * wall pace a reader that is too slow loses samples, which the source marks; otherwise time waits for the reader. */
 #ifndef PSABENCH_LINK_LINE_LINE_PTY_H
 #define PSABENCH_LINK_LINE_LINE_PTY_H
@@ -10,7 +10,7 @@
 /* Where the bytes come from: the sampler of a trace, in the application's hands. */
 struct line_source {
     void *ctx;
-    bool (*start)(void *ctx, int64_t t_ns); /* forget what waits and begin; false: it cannot */
+    bool (*start)(void *ctx, int64_t t_ns); /* discard waiting bytes and begin; false: not possible */
     void (*stop)(void *ctx);
     size_t (*take)(void *ctx, uint8_t *buf, size_t cap);
     size_t (*waiting)(void *ctx);

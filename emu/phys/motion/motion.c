@@ -287,8 +287,8 @@ const char *motion_result_text(enum motion_result result)
         [MOTION_RATE_LIMIT] = "exceeds the axis's rate limit",
         [MOTION_ACCEL_LIMIT] = "exceeds the axis's acceleration limit",
         [MOTION_ANGLE_LIMIT] = "leaves the axis's range of angles",
-        [MOTION_BAD_PROFILE] = "a profile has 1 to 32 points whose times rise from 0",
-        [MOTION_BAD_SINE] = "amplitude and frequency are above 0",
+        [MOTION_BAD_PROFILE] = "profile: expected 1 to 32 points with times rising from 0",
+        [MOTION_BAD_SINE] = "sine: expected an amplitude and a frequency above 0",
         [MOTION_NO_AXIS] = "the table has no such axis",
     };
     return texts[result];

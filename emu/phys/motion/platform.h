@@ -6,8 +6,8 @@
  * -alpha), beta about x, gamma about y, in this order. gamma is no state: x_p is across z_c. q, the gimbal angle, is
  * x_p's from x_c about z_c: for a level platform alpha + heading.
  *
- * Integrated on a fixed grid from power-on, by itself, when somebody asks: torques and drifts are held over a step. A command
- * that comes after somebody looked ahead is still in time: the steps behind it are done again. So nothing depends on who asks
+ * Integrated on a fixed grid from power-on, computed on demand: torques and drifts are held over a step. A command
+ * that comes after a look ahead is still in time: the steps after it are computed again. So nothing depends on who asks
  * when. Plain struct, one thread; commands in order of time. An instant up to PLATFORM_HISTORY - 2 steps back is answered. */
 #ifndef PSABENCH_PHYS_MOTION_PLATFORM_H
 #define PSABENCH_PHYS_MOTION_PLATFORM_H

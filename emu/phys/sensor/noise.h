@@ -8,7 +8,7 @@
  * and the quantum of the output, which adds q^2 / 12 to each look if there is noise to cover a step. White noise is the
  * sensor's own (mems.h): it depends on how long a look takes; these do not. Flicker is a sum of Gauss-Markov processes whose
  * times lie a factor of 5 apart, flat within 3 % from 1 s to 300 s. Walk and flicker move in steps of 10 ms counted from
- * t = 0, so that no one changes them by looking. Plain struct, one thread. */
+ * t = 0, so that reading does not change them. Plain struct, one thread. */
 #ifndef PSABENCH_PHYS_SENSOR_NOISE_H
 #define PSABENCH_PHYS_SENSOR_NOISE_H
 

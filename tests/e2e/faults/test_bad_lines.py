@@ -35,27 +35,27 @@ def ask(s: socket.socket, message: bytes, end: bytes = b"< echo >") -> bytes:
 @pytest.mark.parametrize(
     ("message", "says"),
     [
-        (b"nonsense >", "not a message"),
-        (b">", "not a message"),
-        (b"< >", "not a message"),
-        (b"< frobnicate >", "unknown word"),
-        (b"< bcmmode >", "mode not modelled"),
-        (b"< open can0 >", "a channel is open already"),
-        (b"< rawmode >", "rawmode already"),
-        (b"< send >", "wrong number"),
-        (b"< send 1234 0 >", "bad identifier"),
-        (b"< send 800 0 >", "bad identifier"),
-        (b"< send 20000000 0 >", "bad identifier"),
-        (b"< send xyz 0 >", "bad identifier"),
-        (b"< send 123 9 1 2 3 4 5 6 7 8 9 >", "FD frame refused"),
-        (b"< send 123 8 1 2 3 >", "as many data bytes as announced"),
-        (b"< send 123 2 1 2 3 >", "as many data bytes as announced"),
-        (b"< send 123 1 1ff >", "bad data byte"),
-        (b"< send 123 1 g >", "bad data byte"),
-        (b"< send 123 1 \x00 >", "bad data byte"),
-        (b"< send 123 1 \xff\xfe >", "bad data byte"),
-        (b"< send 123 8 " + b"1 " * 300 + b">", "message too long"),
-        (b"x" * 100_000 + b">", "message too long"),
+        (b"nonsense >", "expected an opening angle bracket"),
+        (b">", "expected an opening angle bracket"),
+        (b"< >", "expected an opening angle bracket"),
+        (b"< frobnicate >", "expected open, rawmode, send or echo"),
+        (b"< bcmmode >", "mode: expected rawmode"),
+        (b"< open can0 >", "a channel is already open"),
+        (b"< rawmode >", "rawmode: already active"),
+        (b"< send >", "arguments: expected"),
+        (b"< send 1234 0 >", "identifier: expected"),
+        (b"< send 800 0 >", "identifier: expected"),
+        (b"< send 20000000 0 >", "identifier: expected"),
+        (b"< send xyz 0 >", "identifier: expected"),
+        (b"< send 123 9 1 2 3 4 5 6 7 8 9 >", "length: expected 0 to 8"),
+        (b"< send 123 8 1 2 3 >", "data: expected as many bytes"),
+        (b"< send 123 2 1 2 3 >", "data: expected as many bytes"),
+        (b"< send 123 1 1ff >", "data: expected bytes"),
+        (b"< send 123 1 g >", "data: expected bytes"),
+        (b"< send 123 1 \x00 >", "data: expected bytes"),
+        (b"< send 123 1 \xff\xfe >", "data: expected bytes"),
+        (b"< send 123 8 " + b"1 " * 300 + b">", "message: expected at most 200"),
+        (b"x" * 100_000 + b">", "message: expected at most 200"),
     ],
 )
 def test_a_bad_socketcand_message_is_answered_and_counted_and_does_not_reach_the_bus(
@@ -86,8 +86,8 @@ def test_a_message_cut_off_by_the_end_is_no_message(make_rig: MakeRig) -> None:
 def test_words_before_the_handshake_are_refused(make_rig: MakeRig) -> None:
     rig = make_rig("socketcand")
     with talker(rig.emulator, ()) as s:
-        assert b"send before open" in ask(s, b"< send 123 0 >")
-        assert b"rawmode before open" in ask(s, b"< rawmode >")
+        assert b"send: expected open" in ask(s, b"< send 123 0 >")
+        assert b"rawmode: expected open" in ask(s, b"< rawmode >")
     rig.unit.wait_ready()
 
 
@@ -98,7 +98,7 @@ def test_a_handshake_in_one_piece_is_taken_word_by_word(make_rig: MakeRig) -> No
         got = ask(s, b"< open can0 >< rawmode >< rawmode >< send 7F0 1 1 >")
         assert got.startswith(b"< ok >< ok >< error ")
         assert got.count(b"< error ") == 1
-        assert b"rawmode already" in got
+        assert b"rawmode: already active" in got
         clients = rig.clients()
         assert len(clients) == 2
         assert clients[1]["taken"] == 1
