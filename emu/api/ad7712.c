@@ -61,7 +61,7 @@ API_SET_PIN(set_sync, part_ad7712, ad7712_sync_pin);
 API_SET_PIN(set_standby, part_ad7712, ad7712_standby_pin);
 API_GET_PIN(get_drdy, part_ad7712, ad7712_drdy);
 
-/* Levels on the wires: of whoever drives them. */
+/* Levels on the wires: of the side that drives them. */
 static bool get_sdata(const struct psabench_part *p, unsigned arg)
 {
     (void)arg;

@@ -76,22 +76,22 @@ int api_may_move(psabench *b, const char *function)
     return api_fail(b, PSABENCH_BAD_ARGUMENT, "%s from a callback: time moves only between callbacks", function);
 }
 
-static void tell_part(struct psabench_part *p)
+static void notify_part(struct psabench_part *p)
 {
     const int64_t t_ns = p->bench->sched.now_ns;
-    const uint32_t heeded = p->watched | p->recorded;
-    for (unsigned i = 0; heeded && i < p->kind->pin_count; i++) {
+    const uint32_t observed = p->watched | p->recorded;
+    for (unsigned i = 0; observed && i < p->kind->pin_count; i++) {
         const struct api_pin *pin = &p->kind->pins[i];
-        if (!(heeded >> i & 1) || pin->dir == API_IN || !pin->get || p->kind->lag_ns) continue;
+        if (!(observed >> i & 1) || pin->dir == API_IN || !pin->get || p->kind->lag_ns) continue;
         const bool level = pin->get(p, pin->arg);
         if (level != (p->level >> i & 1)) api_edge(p, i, level, t_ns);
     }
     if (p->kind->follow) p->kind->follow(p, t_ns);
 }
 
-void api_tell(psabench *b)
+void api_notify(psabench *b)
 {
-    for (struct psabench_part *p = b->parts; p; p = p->next) tell_part(p);
+    for (struct psabench_part *p = b->parts; p; p = p->next) notify_part(p);
     if (b->vcd) api_vcd_follow(b);
 }
 
@@ -104,8 +104,8 @@ void api_edge(struct psabench_part *p, unsigned pin, bool level, int64_t t_ns)
     if (w->fn && p->kind->pins[pin].dir != API_IN) w->fn(w->ctx, p, (int)pin, level, t_ns);
 }
 
-/* A board that tells edges late is asked for them often enough, whatever it does meanwhile. */
-static int64_t tell_again_ns(const psabench *b)
+/* A board that reports edges late is asked for them often enough, whatever else happens. */
+static int64_t next_notify_ns(const psabench *b)
 {
     for (const struct psabench_part *p = b->parts; p; p = p->next)
         if (p->kind->lag_ns && (p->watched | p->recorded)) return b->sched.now_ns + API_STEP_NS;
@@ -117,10 +117,10 @@ void api_move(psabench *b, int64_t t_ns)
 {
     while (b->sched.now_ns < t_ns || sched_next_ns(&b->sched) <= t_ns) {
         const int64_t event_ns = sched_next_ns(&b->sched);
-        const int64_t again_ns = tell_again_ns(b);
+        const int64_t again_ns = next_notify_ns(b);
         const int64_t next_ns = event_ns < again_ns ? event_ns : again_ns;
         sched_run_until(&b->sched, next_ns < t_ns ? next_ns : t_ns);
-        api_tell(b);
+        api_notify(b);
     }
 }
 

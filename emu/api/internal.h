@@ -1,8 +1,8 @@
 /* What the files of libpsabench share: the bench and its parts. Not for others.
  *
  * A kind of part is one const row of tables: options, pins, counters, and a handful of functions. Nothing else in here
- * knows a chip. Outputs are compared with what was last told after every stimulus and every instant at which something
- * happened; only the pins that somebody watches or records. */
+ * knows a chip. Outputs are compared with the levels last reported after every stimulus and every event; only
+ * pins that are watched or recorded. */
 #ifndef PSABENCH_API_INTERNAL_H
 #define PSABENCH_API_INTERNAL_H
 
@@ -44,7 +44,7 @@ struct psabench_part {
     psabench *bench;
     struct psabench_part *next; /* in order of making */
     char name[API_NAME];
-    uint32_t level;             /* as told last, outputs; as set last, inputs */
+    uint32_t level;             /* as reported last, outputs; as set last, inputs */
     uint32_t watched, recorded; /* pins */
     struct api_watch watch[API_PINS_MAX];
     unsigned inside; /* a callback from within its own code is running */
@@ -79,11 +79,11 @@ int api_fail(psabench *b, int code, const char *format, ...) __attribute__((form
 /* Whether time may move now; else a noted error. */
 int api_may_move(psabench *b, const char *function);
 
-/* Lets everything up to t_ns happen, each instant told as it comes. The caller has raised b->inside. */
+/* Lets everything up to t_ns happen, each instant reported as it comes. The caller has raised b->inside. */
 void api_move(psabench *b, int64_t t_ns);
 
 /* Reports what has changed since the last report. */
-void api_tell(psabench *b);
+void api_notify(psabench *b);
 
 /* A pin has changed: to the recording, then to its watcher. */
 void api_edge(struct psabench_part *p, unsigned pin, bool level, int64_t t_ns);

@@ -94,7 +94,7 @@ struct api_kind {
     void (*finish)(struct psabench_part *p, int64_t t_ns);       /* like follow, and holds nothing back; may be NULL */
     int (*peek)(const struct psabench_part *p, unsigned address);
     int64_t (*next_ns)(const struct psabench_part *p); /* an output may change then without an event; may be NULL */
-    int64_t lag_ns;                                    /* how late it may tell an edge */
+    int64_t lag_ns;                                    /* how late it may report an edge */
     bool board;                                        /* has frames and a controller */
 };
 

@@ -125,7 +125,7 @@ int psabench_set(psabench_part *p, int pin, int level)
     b->inside++;
     b->nested++;
     api_drive(p, (unsigned)pin, level);
-    api_tell(b);
+    api_notify(b);
     b->nested--;
     b->inside--;
     return PSABENCH_OK;

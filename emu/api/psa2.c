@@ -13,7 +13,7 @@ struct part_psa2 {
     unsigned profile, chain, input;
     double noise_scale, temp_noise_scale, temp_degc;
     struct psa2 board;
-    struct trace_sink sink[2]; /* one is attached, the other takes over when the lines heeded change */
+    struct trace_sink sink[2]; /* one is attached, the other takes over when the observed lines change */
     unsigned attached;         /* sink that is */
     bool attaching;
     struct psa2_request request;
@@ -165,7 +165,7 @@ static void on_steps(void *ctx, const struct trace_step *step, unsigned n)
     trace_each(step, n, s->sink[s->attached].mask, on_edge, ctx);
 }
 
-/* The lines heeded go to one sink. Another set of lines: a new sink is attached before the old one goes, for a trace
+/* The observed lines go to one sink. Another set of lines: a new sink is attached before the old one goes, for a trace
  * without sinks throws away what it still holds back. */
 static void attach_sink(struct part_psa2 *s)
 {

@@ -21,7 +21,7 @@ static void to_half(struct burst *u, int64_t half)
 static void drive_pin(struct burst *u, unsigned pin, bool level)
 {
     api_drive(u->p, pin, level);
-    api_tell(u->p->bench);
+    api_notify(u->p->bench);
 }
 
 static bool read_dout(const struct burst *u)

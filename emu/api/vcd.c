@@ -6,8 +6,8 @@
 #include <string.h>
 
 /* Value Change Dump (IEEE 1364-2005 clause 18) of all parts of a bench, a scope each. Not emu/trace/vcd.c, which writes one
- * trace of up to 64 lines: here as many parts as there are, and edges that a board tells late must wait for those that the
- * chips tell at once. */
+ * trace of up to 64 lines: here as many parts as there are, and edges that a board reports late must wait for those that
+ * the chips report at once. */
 struct api_vcd {
     FILE *out;
     int64_t written_ns; /* the latest time stamp */

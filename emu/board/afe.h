@@ -35,7 +35,7 @@ enum afe_fault_kind {
     AFE_FAULTS
 };
 
-/* One fault, of whoever brings it about, linked in while it lasts. */
+/* One fault, owned by its injector, linked in while it lasts. */
 struct afe_fault {
     enum afe_fault_kind kind;
     double value, rate_per_s, frequency_hz;

@@ -39,13 +39,13 @@ static void describe_addresses(const struct board_bus *bus, char *out, size_t ca
 static void describe_expected(const struct board_bus *bus, const struct board *board, const struct board_cycle *c,
                               enum board_cycle_result r, char *out, size_t cap)
 {
-    char wanted[DETAIL] = "";
+    char expected[DETAIL] = "";
     out[0] = '\0';
     if (r == BOARD_CYCLE_NO_ADDRESS) describe_addresses(bus, out, cap);
     if (r == BOARD_CYCLE_TOO_SHORT) (void)snprintf(out, cap, ", at least %" PRId64 " ns", bus->strobe(board).least_ns);
-    if ((r == BOARD_CYCLE_BAD_VALUE || r == BOARD_CYCLE_NOT_READY) && bus->wanted)
-        bus->wanted(board, c, r, wanted, sizeof wanted);
-    if (wanted[0]) (void)snprintf(out, cap, r == BOARD_CYCLE_BAD_VALUE ? ": %s" : "; %s", wanted);
+    if ((r == BOARD_CYCLE_BAD_VALUE || r == BOARD_CYCLE_NOT_READY) && bus->expected)
+        bus->expected(board, c, r, expected, sizeof expected);
+    if (expected[0]) (void)snprintf(out, cap, r == BOARD_CYCLE_BAD_VALUE ? ": %s" : "; %s", expected);
 }
 
 void board_cycle_why(const struct board_bus *bus, const struct board *board, const struct board_cycle *c,

@@ -47,8 +47,8 @@ struct board_bus {
     const char *(*name)(unsigned address); /* of what is there: "X"; NULL: nothing */
     struct board_strobe (*strobe)(const struct board *board);
     /* Of a cycle refused as BAD_VALUE or NOT_READY, what would be right, a clause: "it takes 0 to 3". May write nothing. */
-    void (*wanted)(const struct board *board, const struct board_cycle *c, enum board_cycle_result r, char *out,
-                   size_t cap);
+    void (*expected)(const struct board *board, const struct board_cycle *c, enum board_cycle_result r, char *out,
+                     size_t cap);
 };
 
 #define BOARD_CYCLE_WHY_MAX 190u

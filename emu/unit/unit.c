@@ -20,7 +20,7 @@ static double temp_degc(void *ctx, unsigned channel, int64_t t_ns)
 
 enum { WARM_STEP_NS = 10000000 }; /* 10 mK at most in a chamber of 60 K/min, without any lag */
 
-/* Of the sensor's element, where the sensor minds it; as it was at the latest whole step, whoever looks how often. Without a
+/* Temperature of the sensor's element, for a sensor that depends on it; as of the latest whole step, however often it is read. Without a
  * chamber a quartz's case is as warm as its element. */
 static void warm_sensor(struct unit *u, unsigned axis, int64_t t_ns)
 {
@@ -95,21 +95,21 @@ static double read_encoder_rad(void *ctx, int64_t t_ns)
 static const struct board_platform_io platform_io = {torque_platform, reposition_platform, read_servo_rad,
                                                      read_encoder_rad};
 
-/* A listener may end its own or another's listening: the cursor lives in the unit, where unit_unsubscribe() sees it. */
+/* An observer may end its own or another's subscription: the cursor lives in the unit, where unit_unsubscribe() sees it. */
 static void on_event(void *ctx, unsigned event, int64_t t_ns)
 {
     struct unit *u = ctx;
-    u->told_next = u->listeners;
-    while (u->told_next) {
-        struct unit_observer *l = u->told_next;
-        u->told_next = l->next;
+    u->next_observer = u->observers;
+    while (u->next_observer) {
+        struct unit_observer *l = u->next_observer;
+        u->next_observer = l->next;
         l->fn(l->ctx, event, t_ns);
     }
 }
 
 void unit_subscribe(struct unit *u, struct unit_observer *l)
 {
-    struct unit_observer **at = &u->listeners;
+    struct unit_observer **at = &u->observers;
     while (*at) at = &(*at)->next;
     l->next = NULL;
     *at = l;
@@ -118,13 +118,13 @@ void unit_subscribe(struct unit *u, struct unit_observer *l)
 
 void unit_unsubscribe(struct unit *u, struct unit_observer *l)
 {
-    struct unit_observer **at = &u->listeners;
+    struct unit_observer **at = &u->observers;
     while (*at && *at != l) at = &(*at)->next;
     if (!*at) return;
-    if (u->told_next == l) u->told_next = l->next;
+    if (u->next_observer == l) u->next_observer = l->next;
     *at = l->next;
     l->next = NULL;
-    if (!u->listeners) board_observe(u->board, false);
+    if (!u->observers) board_observe(u->board, false);
 }
 
 struct unit_cfg unit_default(const char *name)
@@ -173,7 +173,7 @@ void unit_init(struct unit *u, const struct unit_cfg *cfg, struct lab *lab, stru
     u->type = cfg->type;
     u->board = (struct board *)&u->store;
     u->can = NULL;
-    u->listeners = u->told_next = NULL;
+    u->observers = u->next_observer = NULL;
     for (unsigned i = 0; i < UNIT_AXES; i++) {
         u->sensor_faults[i] = NULL;
         u->warm_step[i] = -1;

@@ -38,9 +38,9 @@ struct unit_cfg {
     uint8_t node; /* CAN node id, for those above */
 };
 
-/* Who wants to hear of the board's events. Owned by the listener. */
+/* Subscriber to the events of the board. Owned by the subscriber. */
 struct unit_observer {
-    void (*fn)(void *ctx, unsigned event, int64_t t_ns); /* as board_io.event; it may end any listening */
+    void (*fn)(void *ctx, unsigned event, int64_t t_ns); /* as board_io.event; it may end any subscription */
     void *ctx;
     struct unit_observer *next;
 };
@@ -58,8 +58,8 @@ struct unit {
     struct quartz quartz[UNIT_AXES];
     struct sensor_fault *sensor_faults[UNIT_AXES]; /* unit_sample_until() before each change */
     double cos_alpha0[UNIT_AXES], sin_alpha0[UNIT_AXES];
-    struct unit_observer *listeners; /* in order of coming */
-    struct unit_observer *told_next; /* cursor of the event under way */
+    struct unit_observer *listeners;     /* in order of coming */
+    struct unit_observer *next_observer; /* cursor of the event under way */
     union board_store store;
     union board_can_store can_store;
 };
@@ -81,10 +81,10 @@ void unit_sample_until(struct unit *u, int64_t t_ns); /* before the physics chan
 struct trace *unit_trace(const struct unit *u);
 struct can_node *unit_node(const struct unit *u); /* NULL: on no bus */
 
-/* From the next event on, after those who listen already; the board computes events only while somebody listens. A frame
+/* From the next event on, after the observers there are; the board computes events only while there is an observer. A frame
  * that is about to begin may begin untold. */
 void unit_subscribe(struct unit *u, struct unit_observer *l);
-void unit_unsubscribe(struct unit *u, struct unit_observer *l); /* harmless for one that does not listen */
+void unit_unsubscribe(struct unit *u, struct unit_observer *l); /* harmless without a subscription */
 
 /* What the sensor of a channel measures, a = -f on its own axes: at rest the projections of gravity. Truth. */
 void unit_gravity_mps2(struct unit *u, unsigned axis, int64_t t_ns, double a_mps2[3]);

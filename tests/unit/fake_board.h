@@ -74,8 +74,8 @@ static struct board_strobe fake_strobe(const struct board *board)
     return (struct board_strobe){FAKE_STROBE_NS, FAKE_STROBE_NS / 2 + 1};
 }
 
-static void fake_wanted(const struct board *board, const struct board_cycle *c, enum board_cycle_result r, char *out,
-                        size_t cap)
+static void fake_expected(const struct board *board, const struct board_cycle *c, enum board_cycle_result r, char *out,
+                          size_t cap)
 {
     (void)board;
     (void)snprintf(out, cap, r == BOARD_CYCLE_BAD_VALUE ? "it takes %u" : "wait for %u", c->address);
@@ -171,7 +171,7 @@ static const struct board_part fake_parts[FAKE_PARTS] = {
 static const struct board_controller_fault fake_faults[] = {{"controller.frozen_words", FAKE_FAULT_FROZEN_WORDS},
                                                             {NULL, 0}};
 static const struct board_bus fake_bus = {
-    .submit = fake_submit, .addresses = 4, .name = fake_name, .strobe = fake_strobe, .wanted = fake_wanted};
+    .submit = fake_submit, .addresses = 4, .name = fake_name, .strobe = fake_strobe, .expected = fake_expected};
 
 static const struct board_type fake_type = {
     .name = "fake",

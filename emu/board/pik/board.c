@@ -111,8 +111,11 @@ static const char *const port_lines[] = {"FXP", "FXN", "FYP", "FYN", "FZP", "FZN
 
 BOARD_BUS(pik);
 
-static const struct board_bus bus = {
-    .submit = submit, .addresses = PIK_REGISTERS, .name = pik_register_name, .strobe = strobe, .wanted = pik_wanted};
+static const struct board_bus bus = {.submit = submit,
+                                     .addresses = PIK_REGISTERS,
+                                     .name = pik_register_name,
+                                     .strobe = strobe,
+                                     .expected = pik_expected};
 
 /* ---- what faults are measured by ---- */
 

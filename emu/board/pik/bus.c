@@ -88,8 +88,8 @@ static bool accepts_value(const struct pik *b, const struct board_cycle *c)
     return c->address != PIK_REG_CLEAR || c->data < 1u << PIK_AXES;
 }
 
-void pik_wanted(const struct board *board, const struct board_cycle *c, enum board_cycle_result r, char *out,
-                size_t cap)
+void pik_expected(const struct board *board, const struct board_cycle *c, enum board_cycle_result r, char *out,
+                  size_t cap)
 {
     unsigned least, most;
     pik_period_range((const struct pik *)board, &least, &most);

@@ -220,8 +220,11 @@ static void digest(const struct board *board, struct sha256 *s)
 
 BOARD_BUS(pmka);
 
-static const struct board_bus bus = {
-    .submit = submit, .addresses = PMKA_ADDRESSES, .name = pmka_register_name, .strobe = strobe, .wanted = pmka_wanted};
+static const struct board_bus bus = {.submit = submit,
+                                     .addresses = PMKA_ADDRESSES,
+                                     .name = pmka_register_name,
+                                     .strobe = strobe,
+                                     .expected = pmka_expected};
 static const char *const port_lines[] = {"KL1", "KL2", "KL3", "KL4", "SH", "MUX0", "MUX1", NULL};
 
 static const struct board_controller_fault controller_faults[] = {

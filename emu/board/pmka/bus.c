@@ -175,8 +175,8 @@ static void expected_value(const struct pmka *b, unsigned address, char *out, si
                        INDEX_ROM + PMKA_ROM_WORDS - 1);
 }
 
-void pmka_wanted(const struct board *board, const struct board_cycle *c, enum board_cycle_result r, char *out,
-                 size_t cap)
+void pmka_expected(const struct board *board, const struct board_cycle *c, enum board_cycle_result r, char *out,
+                   size_t cap)
 {
     if (r == BOARD_CYCLE_BAD_VALUE) expected_value((const struct pmka *)board, c->address, out, cap);
     else (void)snprintf(out, cap, "STATUS (08h) has bit 0 when the first reading is there");

@@ -197,7 +197,7 @@ static void digest(const struct board *board, struct sha256 *s)
 BOARD_BUS(psd1);
 
 static const struct board_bus bus = {
-    .submit = submit, .addresses = PSD1_REGS, .name = psd1_register_name, .strobe = strobe, .wanted = psd1_wanted};
+    .submit = submit, .addresses = PSD1_REGS, .name = psd1_register_name, .strobe = strobe, .expected = psd1_expected};
 static const char *const port_lines[] = {"RFX", "RFY", "RFZ", "SCLK", "SDAT", "FL2", "CS", NULL};
 
 static const struct board_controller_fault controller_faults[] = {

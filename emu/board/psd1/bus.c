@@ -217,8 +217,8 @@ static const char *expected_value(const struct psd1 *b, const struct board_cycle
     return why;
 }
 
-void psd1_wanted(const struct board *board, const struct board_cycle *c, enum board_cycle_result r, char *out,
-                 size_t cap)
+void psd1_expected(const struct board *board, const struct board_cycle *c, enum board_cycle_result r, char *out,
+                   size_t cap)
 {
     const char *const why = r == BOARD_CYCLE_BAD_VALUE ? expected_value((const struct psd1 *)board, c)
                                                        : "STATUS (03h) has bit 0 while one does, its axis in bits 1, 2";

@@ -48,7 +48,7 @@ struct ads1256 {
     struct ads1256_cfg cfg;
     struct ads1256_io io;
     struct chip_fault fault;
-    void (*tell_drdy)(void *ctx, bool level, int64_t t_ns); /* io.drdy, which tells no one while DRDY is stuck */
+    void (*notify_drdy)(void *ctx, bool level, int64_t t_ns); /* io.drdy, which is ignored while DRDY is stuck */
     struct sched *sched;
     struct rng noise;
     struct clk clkin;
@@ -57,7 +57,7 @@ struct ads1256 {
 
     struct reg_file regs;
     uint8_t value[ADS1256_REGS];
-    uint8_t dio_latch, dio_in, dio_told; /* D3..D0: written, seen at the pins, levels last told to io.gpio */
+    uint8_t dio_latch, dio_in, dio_notified; /* D3..D0: written, seen at the pins, levels last reported to io.gpio */
 
     /* serial port */
     struct spi spi;
@@ -118,7 +118,7 @@ bool ads1256_dout_driven(const struct ads1256 *a); /* false: high impedance */
 void ads1256_gpio_pin(struct ads1256 *a, unsigned d, bool level, int64_t t_ns); /* what drives an input; at first low */
 bool ads1256_gpio(const struct ads1256 *a, unsigned d);                         /* level on the wire now, CLKOUT too */
 bool ads1256_gpio_is_output(const struct ads1256 *a, unsigned d);
-uint32_t ads1256_clkout_hz(const struct ads1256 *a); /* 0: D0 is no clock. Its edges are not told to io.gpio */
+uint32_t ads1256_clkout_hz(const struct ads1256 *a); /* 0: D0 is no clock. Its edges are not reported to io.gpio */
 
 bool ads1256_drdy(const struct ads1256 *a);
 int64_t ads1256_settle_ns(const struct ads1256 *a); /* t18 of the present DRATE */

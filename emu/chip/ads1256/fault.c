@@ -10,7 +10,7 @@ static void set_clock(struct ads1256 *a, int64_t hz, int64_t t_ns)
     ads1256_retime(a);
 }
 
-static void tell_nobody(void *ctx, bool level, int64_t t_ns)
+static void ignore_drdy(void *ctx, bool level, int64_t t_ns)
 {
     (void)ctx;
     (void)level;
@@ -22,12 +22,12 @@ void ads1256_fault(struct ads1256 *a, const struct chip_fault *f, int64_t t_ns)
     assert(f->clock_ppm >= -500000 && f->clock_ppm <= 500000);
     const bool drdy = ads1256_drdy(a);
     a->fault = *f;
-    a->io.drdy = f->drdy ? tell_nobody : a->tell_drdy;
+    a->io.drdy = f->drdy ? ignore_drdy : a->notify_drdy;
     set_clock(a, chip_fault_hz(f, a->cfg.clkin_hz), t_ns);
     if (f->lost_sync) ads1256_sync_pin(a, true, t_ns); /* the wire is broken, a pull-up holds the pin */
     spi_load(&a->spi, ads1256_on_wire(a, a->spi.out));
     ads1256_pins_refresh(a, t_ns);
-    if (ads1256_drdy(a) != drdy) a->tell_drdy(a->io.ctx, !drdy, t_ns);
+    if (ads1256_drdy(a) != drdy) a->notify_drdy(a->io.ctx, !drdy, t_ns);
 }
 
 bool ads1256_flip(struct ads1256 *a, unsigned reg, uint8_t mask, int64_t t_ns)

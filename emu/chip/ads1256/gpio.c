@@ -19,8 +19,8 @@ static unsigned output_mask(const struct ads1256 *a)
 
 static void notify_levels(struct ads1256 *a, unsigned levels, int64_t t_ns)
 {
-    const unsigned changed = (levels ^ a->dio_told) & output_mask(a);
-    a->dio_told = (uint8_t)((a->dio_told & ~output_mask(a)) | (levels & output_mask(a)));
+    const unsigned changed = (levels ^ a->dio_notified) & output_mask(a);
+    a->dio_notified = (uint8_t)((a->dio_notified & ~output_mask(a)) | (levels & output_mask(a)));
     if (!a->io.gpio) return;
     for (unsigned d = 0; d < ADS1256_GPIOS; d++) {
         if (changed >> d & 1) a->io.gpio(a->io.ctx, d, levels >> d & 1, t_ns);

@@ -69,7 +69,7 @@ void ads1256_pins_release(struct ads1256 *a, int64_t t_ns); /* DOUT to high impe
 /* ---- ads1256/gpio.c ---- */
 
 void ads1256_gpio_written(void *chip, uint8_t was, uint8_t now, int64_t t_ns); /* hook of IO */
-void ads1256_gpio_show(struct ads1256 *a, int64_t t_ns); /* DIO as a read shows it; tells outputs that changed */
+void ads1256_gpio_show(struct ads1256 *a, int64_t t_ns); /* DIO as a read shows it; reports outputs that changed */
 
 /* ---- ads1256/input.c ---- */
 

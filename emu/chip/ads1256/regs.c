@@ -103,7 +103,7 @@ void ads1256_init(struct ads1256 *a, const struct ads1256_cfg *cfg, const struct
     *a = (struct ads1256){.cfg = *cfg, .io = *io, .sched = s, .noise = noise};
     assert(cfg->clkin_hz >= 100000 && cfg->clkin_hz <= 10000000 && cfg->vref_v > 0.0);
     if (cfg->avdd_v <= 0.0) a->cfg.avdd_v = 5.0;
-    a->tell_drdy = io->drdy;
+    a->notify_drdy = io->drdy;
     a->clkin = (struct clk){.hz = cfg->clkin_hz, .div = 1};
     a->regs = (struct reg_file){.map = map, .count = ADS1256_REGS, .value = a->value, .chip = a};
     a->cs = a->sync = a->reset = a->drdy = true;

@@ -18,10 +18,10 @@ void ads1282_fault(struct ads1282 *a, const struct chip_fault *f, int64_t t_ns)
     assert(f->clock_ppm >= -500000 && f->clock_ppm <= 500000);
     const bool drdy = ads1282_drdy(a);
     a->fault = *f;
-    a->io.drdy = f->drdy ? NULL : a->tell_drdy;
+    a->io.drdy = f->drdy ? NULL : a->notify_drdy;
     set_clock(a, chip_fault_hz(f, a->cfg.clk_hz), t_ns);
     ads1282_serial_stuck(a);
-    if (ads1282_drdy(a) != drdy && a->tell_drdy) a->tell_drdy(a->io.ctx, !drdy, t_ns);
+    if (ads1282_drdy(a) != drdy && a->notify_drdy) a->notify_drdy(a->io.ctx, !drdy, t_ns);
 }
 
 bool ads1282_flip(struct ads1282 *a, unsigned reg, uint8_t mask, int64_t t_ns)

@@ -31,7 +31,7 @@ void ads1282_sync(struct ads1282 *a, int64_t t_ns);    /* SYNC: opcode or pin */
 void ads1282_calibrate(struct ads1282 *a, bool gain, int64_t t_ns);
 void ads1282_set_drdy(struct ads1282 *a, bool level, int64_t t_ns);
 void ads1282_retime(struct ads1282 *a); /* the clock's rate has changed */
-void ads1282_tell_mflag(struct ads1282 *a, int64_t t_ns);
+void ads1282_notify_mflag(struct ads1282 *a, int64_t t_ns);
 
 /* ---- Converter column: ads1282/chain.c ---- */
 

@@ -172,7 +172,7 @@ void ads1282_init(struct ads1282 *a, const struct ads1282_cfg *cfg, const struct
     assert(cfg->clk_hz > 0 && cfg->vref_v > 0.0 && cfg->noise_scale >= 0.0 && io->vin_v);
     assert(!cfg->pin_mode || cfg->part == ADS1282_PART_1281);
     *a = (struct ads1282){.cfg = *cfg, .io = *io, .sched = s, .noise = noise, .drdy = true};
-    a->tell_drdy = io->drdy;
+    a->notify_drdy = io->drdy;
     a->pin = (struct ads1282_pins){.reset = true, .pwdn = true};
     a->pin.sclk_rise_ns = a->pin.sclk_fall_ns = a->pin.din_ns = LONG_AGO_NS;
     a->pin.sync_ns = a->pin.reset_ns = a->pin.drdy_ns = LONG_AGO_NS;

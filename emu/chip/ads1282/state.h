@@ -42,7 +42,7 @@ struct ads1282 {
     struct ads1282_cfg cfg;
     struct ads1282_io io;
     struct chip_fault fault;
-    void (*tell_drdy)(void *ctx, bool level, int64_t t_ns); /* io.drdy, which is NULL while DRDY is stuck */
+    void (*notify_drdy)(void *ctx, bool level, int64_t t_ns); /* io.drdy, which is NULL while DRDY is stuck */
     struct sched *sched;
     struct ads1282_counters count;
     struct ads1282_limits limit;
@@ -76,7 +76,7 @@ struct ads1282 {
     bool special;  /* they need more than the plain FIR word: on_due_special() */
     bool in_phase; /* continuous sync: the last restart was a SYNC */
     bool drdy;
-    bool mflag;      /* level told last */
+    bool mflag;      /* level reported last */
     uint8_t config0; /* in force: the register's, or what the mode pins say */
     unsigned mux;
     unsigned lag; /* results that a word waits behind its data period's: latency of the sinc-only mode */
