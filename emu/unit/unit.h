@@ -58,7 +58,7 @@ struct unit {
     struct quartz quartz[UNIT_AXES];
     struct sensor_fault *sensor_faults[UNIT_AXES]; /* unit_sample_until() before each change */
     double cos_alpha0[UNIT_AXES], sin_alpha0[UNIT_AXES];
-    struct unit_observer *listeners;     /* in order of coming */
+    struct unit_observer *observers;     /* in order of subscription */
     struct unit_observer *next_observer; /* cursor of the event under way */
     union board_store store;
     union board_can_store can_store;
