@@ -1,7 +1,7 @@
 """The requirements of proto/requirements.yaml and proto/requirements/<group>.yaml, read once, checked to the letter.
 
 A row says what a board or a host shall do, where that is written, how sure it is and how somebody sees it who has only
-the wires. Figures that a test needs are in its `limits`, so that they be in one place.
+the wires. Figures that a test needs are in its `limits`, so that they are in one place.
 """
 
 from __future__ import annotations

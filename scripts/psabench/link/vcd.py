@@ -127,7 +127,7 @@ _MOST_CODE = 8  # characters of a wire's code, in one 64-bit number
 
 @dataclass(frozen=True, slots=True)
 class Tokens:
-    """The words of a file's body, by where they be in its bytes: a million edges want no loop of Python's."""
+    """The words of a file's body, by their places in its bytes: a million edges want no loop of Python's."""
 
     text: NDArray[np.uint8]
     begin: Ints

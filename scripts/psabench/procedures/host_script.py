@@ -1,6 +1,6 @@
 """A host that is written down: what it would send over CAN, each frame at its instant, and a bench that carries it out.
 
-In free pace time does not wait for a program. So the host's frames be in the scenario's timeline (`can.put`), the
+In free pace time does not wait for a program. So the host's frames are in the scenario's timeline (`can.put`), the
 emulator runs alone from power-on as fast as it goes, and the bus is recorded. What the units answered is in the
 recording, and nothing else is: no truth, no control socket.
 

@@ -56,7 +56,7 @@ def clocked(r: Recording, line: str, temperature: bool) -> list[Byte]:
 
 
 def found(bytes_: list[Byte], *wanted: int) -> list[Byte]:
-    """The first place where these bytes be in a row."""
+    """The first place where these bytes are in a row."""
     values = [b.value for b in bytes_]
     for i in range(len(values)):
         if values[i : i + len(wanted)] == list(wanted):

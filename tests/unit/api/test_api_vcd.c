@@ -45,7 +45,7 @@ static void every_part_has_a_scope_and_every_pin_its_changes(void **state)
     psabench_free(b);
 }
 
-/* Edges that a board tells late be in order of time with those of a chip beside it. */
+/* Edges that a board reports late are in order of time with those of a chip beside it. */
 static void a_board_and_a_chip_share_a_recording(void **state)
 {
     (void)state;

@@ -49,7 +49,7 @@ static void error_counters_read_255_at_most(void **state)
     assert_in_range(rec, 16, 17);
 }
 
-/* The numbers that node.c knows be in every device's table. */
+/* The numbers that node.c knows are in every device's table. */
 static void every_device_has_the_common_objects(void **state)
 {
     (void)state;

@@ -222,7 +222,7 @@ def the_filter_has_its_corner(e: Evidence) -> str:
 @proves("PSA2-READ-10")
 @check("gain")
 def three_axes_move_together(e: Evidence) -> str:
-    """Change the gain of all three converters: does the step be in the three codes of the same frames?"""
+    """Change the gain of all three converters: is the step in the three codes of the same frames?"""
     p, first, y = _step(e)
     part = y[max(first - 2, 0) : first + 70]
     apart = np.abs(part - part[:, :1]).max(axis=0)
