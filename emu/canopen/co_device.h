@@ -1,4 +1,4 @@
-/* A device as its source proto/<device>.yaml describes it: generated const tables, one struct a device. Pure. */
+/* One struct per device of generated const tables, from proto/<device>.yaml. Pure. */
 #ifndef PSABENCH_CANOPEN_CO_DEVICE_H
 #define PSABENCH_CANOPEN_CO_DEVICE_H
 

@@ -1,8 +1,8 @@
 /* CANopen-shaped node (CiA 301): NMT slave, boot-up and heartbeat, EMCY producer, SYNC consumer, SDO server, TPDOs.
  *
- * The node answers the communication objects itself (1001h, 1003h, 1017h, 1800h.., and every const entry) and hands the
+ * The node answers the communication objects itself (1001h, 1003h, 1017h, 1800h.., and every const entry) and passes the
  * rest to its owner. Identifiers follow the predefined connection set. On the bus it is two stations: services send by
- * priority, PDOs in order, so that the halves of a sample never change places. Absent: RPDO, SDO client and block
+ * priority, PDOs in order, so that the halves of a sample keep their order. Absent: RPDO, SDO client and block
  * transfer, TIME, LSS, node guarding, heartbeat consumer, SYNC producer and counter, PDO mapping by the host, RTR.
  * Owned by the caller, never moved after init, one thread, no allocation. */
 #ifndef PSABENCH_CANOPEN_CO_NODE_H
@@ -80,7 +80,7 @@ void co_node_init(struct co_node *n, const struct co_node_cfg *cfg, const struct
 void co_node_power_up(struct co_node *n, int64_t t_ns);
 void co_node_power_down(struct co_node *n);
 
-/* As the NMT commands do; reset node calls the owner for its part. */
+/* Same as the NMT command; reset node resets the application through io.event first. */
 void co_node_reset(struct co_node *n, enum co_event what, int64_t t_ns);
 
 /* An error begins: 1001h, 1003h, EMCY (not in stopped) with five bytes source and time in us. An active error is not

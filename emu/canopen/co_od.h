@@ -1,7 +1,7 @@
-/* Object dictionary: a const table of entries, sorted by index and sub-index, and the values that go in and out.
+/* Object dictionary: a const table of entries, sorted by index and sub-index, and encoding of values.
  *
- * The table says what exists, of which type, with which rights, limits and default; where a value lives is the business
- * of whoever answers the access. Numbers are handled as double, which holds every type here exactly. Pure. Types and
+ * The table says what exists, of which type, with which rights, limits and default; where a value is stored is up to
+ * the function that answers the access. Numbers are handled as double, which holds every type here exactly. Pure. Types and
  * abort codes: CiA 301, 7.4.7 and 7.2.4.3.17. */
 #ifndef PSABENCH_CANOPEN_CO_OD_H
 #define PSABENCH_CANOPEN_CO_OD_H
@@ -46,7 +46,7 @@ struct co_od {
     unsigned count;
 };
 
-/* A value on its way: number, or len characters of text. */
+/* A value: number, or len characters of text. */
 struct co_value {
     double number;
     uint16_t len;
@@ -71,7 +71,7 @@ struct co_value {
 #define CO_AB_TRANSFER   0x08000020u /* could not be transferred to the application */
 #define CO_AB_STATE      0x08000022u /* not in the present device state */
 
-/* The entry, or NULL and in *abort whether it is the object or the sub-index that does not exist. */
+/* The entry, or NULL with *abort: no such object, or no such sub-index. */
 const struct co_entry *co_find(const struct co_od *od, uint16_t index, uint8_t sub, uint32_t *abort);
 
 /* Bytes of a value of the type; 0 for strings. */

@@ -1,8 +1,8 @@
 /* Transmit PDOs of a node: COB-ID, validity, transmission type, inhibit time (1800h..; CiA 301, 7.2.2 and 7.5.2.35).
  *
  * The content is the owner's. A PDO is sent if the owner has selected it and the host has not switched it off: bit 31 of
- * the COB-ID shows both. Types 254 and 255: each time content is offered, unless the inhibit time forbids (then it is
- * counted and not made up for: the next content is a new sample). Types 0 and 1..240: the latest content at SYNC. */
+ * the COB-ID shows both. Types 254 and 255: each time content is offered, unless the inhibit time has not elapsed
+ * (counted, and not sent later: the next content is a new sample). Types 0 and 1..240: the latest content at SYNC. */
 #ifndef PSABENCH_CANOPEN_CO_PDO_H
 #define PSABENCH_CANOPEN_CO_PDO_H
 
@@ -10,7 +10,7 @@
 #include "canopen/co_od.h"
 
 #define CO_TPDO_MAX    8u
-#define CO_PDO_BACKLOG 16u /* frames that may wait: more would only be old */
+#define CO_PDO_BACKLOG 16u /* frames that may wait for the bus */
 
 struct co_node;
 
@@ -31,7 +31,7 @@ enum co_pdo_result { CO_PDO_SENT, CO_PDO_HELD, CO_PDO_INHIBITED, CO_PDO_OFF, CO_
 /* To the defaults of the object dictionary; selection stays. */
 void co_pdo_reset(struct co_node *n);
 
-/* Which TPDOs the application feeds: bit k is TPDO k + 1. */
+/* Selects the TPDOs of the application: bit k is TPDO k + 1. */
 void co_pdo_select(struct co_node *n, unsigned mask);
 
 /* As the host does by bit 31 of the COB-ID: those of the mask, from now to the next reset. */
@@ -40,7 +40,7 @@ void co_pdo_switch_off(struct co_node *n, unsigned mask);
 /* Whether TPDO k would be sent each time content is offered, inhibit time aside. */
 bool co_pdo_flows(const struct co_node *n, unsigned k);
 
-/* New content of TPDO k in m->data, len and flags; the identifier is filled in. Only in operational is anything sent. */
+/* New content of TPDO k in m->data, len and flags; the identifier is filled in. Sent in state operational only. */
 enum co_pdo_result co_pdo_offer(struct co_node *n, unsigned k, struct can_msg *m, int64_t t_ns);
 
 /* Whether `frames` more fit into the backlog. */

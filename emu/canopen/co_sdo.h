@@ -1,8 +1,8 @@
 /* SDO server: expedited and segmented transfer of one object at a time (CiA 301, 7.2.4). No block transfer.
  *
  * The owner answers accesses to entries whose rights have been checked. An access that takes time returns CO_PENDING;
- * the owner keeps the server's ticket and hands in the result with co_sdo_answer(). A client that begins something new
- * in the meantime has given up the old: its answer is dropped. Any bytes at all may arrive. Owned by the caller, one
+ * the owner keeps the server's ticket and hands in the result with co_sdo_answer(). A client that begins a new
+ * transfer in the meantime aborts the old one: its answer is dropped. Any bytes may arrive. Owned by the caller, one
  * thread, no allocation. */
 #ifndef PSABENCH_CANOPEN_CO_SDO_H
 #define PSABENCH_CANOPEN_CO_SDO_H
@@ -30,14 +30,14 @@ struct co_sdo {
     struct sched *sched;
     struct sched_ev timeout;
     enum co_sdo_state state;
-    uint32_t ticket; /* of the transfer under way: changes when it is given up */
-    uint16_t index;  /* the object as it was asked for */
+    uint32_t ticket; /* of the transfer under way: changes when it is aborted */
+    uint16_t index;  /* of the request */
     uint8_t sub;
     const struct co_entry *entry;
     bool toggle;        /* expected next */
-    bool expedited;     /* how the write under way began, hence how it is answered */
+    bool expedited;     /* form of the write under way, and of its answer */
     uint16_t size, at;  /* bytes in the buffer, and how many of them have gone up */
-    uint32_t announced; /* length the client named; 0: none */
+    uint32_t announced; /* length given by the client; 0: none */
     uint8_t buffer[CO_SDO_BUFFER];
     struct co_value value; /* scratch of the access under way */
     uint32_t requests, aborts, timeouts, malformed;
@@ -45,7 +45,7 @@ struct co_sdo {
 
 void co_sdo_init(struct co_sdo *s, const struct co_od *od, const struct co_sdo_io *io, struct sched *sched);
 
-/* Forgets the transfer under way without an answer. Counters stay. */
+/* Drops the transfer under way without an answer. Counters stay. */
 void co_sdo_reset(struct co_sdo *s);
 
 /* Data of a frame to the server. */

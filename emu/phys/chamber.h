@@ -5,8 +5,8 @@
  *
  *   tau_case case' = air - case,   tau_element element' = case - element,
  *
- * both in closed form over the straight pieces of the air's course: temperatures are functions of the instant, whoever asks
- * how often. A command touches every body, which is why bodies are put in. Plain structs, one thread; commands in order of
+ * both in closed form over the straight pieces of the air's course: temperatures are functions of time, independent of
+ * how often they are read. A command updates every body in the chamber. Plain structs, one thread; commands in order of
  * time; an instant before the latest command gets what held at the command. */
 #ifndef PSABENCH_PHYS_CHAMBER_H
 #define PSABENCH_PHYS_CHAMBER_H

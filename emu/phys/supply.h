@@ -1,8 +1,8 @@
-/* Laboratory supply: voltage, output on and off, slewing, ripple, dips; and the threshold below which what it feeds is off.
+/* Laboratory supply: voltage, output on and off, slewing, ripple, dips; and the brown-out threshold of its loads.
  *
- * The volts are a function of the instant. What it feeds goes off when they fall below brownout_v, and on when they are back
- * at brownout_v + hysteresis_v: supply_next_ns() tells the exact nanosecond, so that the bench can arm an event for it instead
- * of looking at the voltage. After any command or dip the instant has to be asked for again. Plain struct, one thread;
+ * The voltage is a function of time. Loads go off when it falls below brownout_v, and on when it is back at brownout_v +
+ * hysteresis_v: supply_next_ns() gives the exact nanosecond, so that the bench can schedule an event instead of polling. After
+ * any command or dip call it again. Plain struct, one thread;
  * commands in order of time; an instant before the latest command gets what held at the command. */
 #ifndef PSABENCH_PHYS_SUPPLY_H
 #define PSABENCH_PHYS_SUPPLY_H
@@ -11,11 +11,11 @@
 #include <stdint.h>
 
 #define SUPPLY_DIPS_MAX      64u
-#define SUPPLY_RIPPLE_MIN_HZ 0.001 /* slower is no ripple */
+#define SUPPLY_RIPPLE_MIN_HZ 0.001 /* less: no ripple */
 #define SUPPLY_SLEW_MIN_VPS  1e-6
 
 struct supply_cfg {
-    bool present;  /* else everything is always fed */
+    bool present;  /* false: loads are always on */
     double volt_v; /* at power-on, output on */
     double volt_max_v;
     double slew_v_per_s;        /* of the output after a command; 0: at once */
@@ -61,7 +61,7 @@ enum supply_result supply_ripple(struct supply *s, double amplitude_v, double fr
 /* A dip from from_ns (not before t_ns, which is now) for for_ns; it may be deeper than the supply is high. */
 enum supply_result supply_dip(struct supply *s, double drop_v, int64_t from_ns, int64_t for_ns, int64_t t_ns);
 
-/* The dip that was so given ends now; harmless if it is over. */
+/* Ends the dip with these arguments; harmless if it is over. */
 void supply_dip_end(struct supply *s, double drop_v, int64_t from_ns, int64_t for_ns, int64_t t_ns);
 
 double supply_volts(const struct supply *s, int64_t t_ns);   /* truth */

@@ -411,17 +411,17 @@ static void enter_reset(struct psa2 *b, int64_t t_ns)
 }
 
 /* After a power-down: the lines that rest high rise. */
-static void light_up(struct psa2 *b, int64_t t_ns)
+static void restore_idle_levels(struct psa2 *b, int64_t t_ns)
 {
     const uint32_t all = (UINT32_C(1) << PSA2_LINES) - 1;
-    b->dark = false;
+    b->unpowered = false;
     trace_steps(&b->base.trace, &(struct trace_step){t_ns, all, b->idle_lines}, 1);
 }
 
 void psa2_power_up(struct psa2 *b, int64_t t_ns)
 {
     psa2_tell(b, PSA2_EV_POWER_UP, t_ns);
-    if (b->dark) light_up(b, t_ns);
+    if (b->unpowered) restore_idle_levels(b, t_ns);
     enter_reset(b, t_ns);
     for (unsigned i = 0; i < 3; i++) ads1282_power_up(&b->adc[i], t_ns);
     ads1256_power_up(&b->tadc, t_ns);
@@ -440,7 +440,7 @@ void psa2_power_down(struct psa2 *b, int64_t t_ns)
 {
     if (b->mode == PSA2_OFF) return;
     b->mode = PSA2_OFF; /* from here on every line is low */
-    b->dark = true;
+    b->unpowered = true;
     sched_cancel(b->sched, &b->res_up);
     stop_all(b, t_ns);
     for (unsigned i = 0; i < 3; i++) ads1282_power_off(&b->adc[i], t_ns);

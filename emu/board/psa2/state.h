@@ -110,9 +110,9 @@ struct psa2 {
     struct psa2_counters counters;
 
     enum psa2_mode mode;
-    bool dark;     /* the lines lie low since a power-down */
-    unsigned step; /* of the set-up */
-    bool reversed; /* the present set-up goes the wrong way */
+    bool unpowered; /* the lines are low since a power-down */
+    unsigned step;  /* of the set-up */
+    bool reversed;  /* the present set-up goes the wrong way */
     bool stream;
     struct psa2_spi spi;
     struct psa2_xfer read; /* of the three codes */

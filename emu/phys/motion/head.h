@@ -1,8 +1,8 @@
 /* Optical dividing head with a unit on its mount, in the gravity of the site.
  *
  * The head turns the mount about a horizontal axis, Oz of the mount; at angle alpha gravity has in the mount the projections
- * (12) of the article: ax = -g sin(alpha + alpha0), ay = -g cos(alpha + alpha0), az = 0. alpha0 belongs to the sensor that
- * looks and tilts it before the face is applied, so that a face turns the sensor about its own axis Ox: this is what makes
+ * (12) of the article: ax = -g sin(alpha + alpha0), ay = -g cos(alpha + alpha0), az = 0. alpha0 belongs to the
+ * sensor and tilts it before the face is applied, so that a face turns the sensor about its own axis Ox: this is what makes
  * reversal separate alpha0 from ky (sources instruments 2.4). Plain struct, one thread. A converter may ask for an instant
  * shortly before the latest command: it gets the state of then, if the command before was over. */
 #ifndef PSABENCH_PHYS_MOTION_HEAD_H

@@ -1,4 +1,4 @@
-/* Rate table of one to three axes, outer to inner, with the errors that a table has.
+/* Rate table of one to three axes, outer to inner, with their errors.
  *
  * Frames: l is the bench's level frame (earth.h); the base is on it with a tilt; each axis turns what it carries about its
  * x, y or z, so that at zero angles all frames are parallel but for the errors; t is what the innermost axis carries, and
@@ -22,8 +22,8 @@ struct table_axis_cfg {
     double wobble_phase_deg;             /* of the cone at angle 0 */
     double readout_noise_arcsec_rms;     /* independent from one nanosecond to the next */
     double readout_resolution_arcsec;    /* 0: none */
-    double readout_delay_s;              /* it shows the angle of so long ago */
-    double readout_zero_arcsec;          /* it shows so much too much */
+    double readout_delay_s;              /* age of the angle that it shows */
+    double readout_zero_arcsec;          /* added to the true angle */
 };
 
 struct table_cfg {
@@ -32,7 +32,7 @@ struct table_cfg {
     struct table_axis_cfg axis[TABLE_AXES_MAX]; /* from the outermost */
 };
 
-/* What the operator sees. */
+/* Readout of an axis. */
 struct table_reading {
     double angle_deg; /* with noise, resolution, delay and zero */
     double rate_dps;  /* of the servo: delayed, without noise */

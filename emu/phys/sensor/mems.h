@@ -6,7 +6,7 @@
  * three terms are ours. n is white noise of a one-sided density: each pull draws one value for the interval since the pull
  * before it, so that what the converter's filter passes does not depend on how often it looks. Zero and scale follow the
  * temperature of the element, slow noise is added (noise.h), and the output stays within its limits and is a multiple of its
- * quantum: each only where its parameters are not zero. Plain struct, one thread. */
+ * resolution: each only where its parameters are not zero. Plain struct, one thread. */
 #ifndef PSABENCH_PHYS_SENSOR_MEMS_H
 #define PSABENCH_PHYS_SENSOR_MEMS_H
 
@@ -17,7 +17,7 @@
 
 #define MEMS_REFERENCE_DEGC 25.0 /* at which u0 and k are given */
 
-/* As a data sheet, a scenario and the article give it: per g. The unit's truth. */
+/* In the units of data sheet, scenario and article: per g. True values. */
 struct mems_g {
     double u0_v;
     double kx_v_per_g, ky_v_per_g, kz_v_per_g;
@@ -25,7 +25,7 @@ struct mems_g {
     double alpha0_deg;      /* error of setting: adds to the angle of the head, before the face (head.h) */
     double drift_v_per_s;   /* linear, from t = 0 of the bench */
     double noise_v_rthz;    /* one-sided white density; 0: take reading_noise_v */
-    double reading_noise_v; /* wanted rms of one settled reading at 1000 SPS, minimum phase: mems_density_v_rthz() */
+    double reading_noise_v; /* specified rms of one settled reading at 1000 SPS, minimum phase: mems_density_v_rthz() */
     double u0_tc_v_per_k;   /* of the zero, from the reference temperature */
     double k_tc_ppm_per_k;  /* of all k */
     double bias_instability_v, walk_v_rts, quantum_v; /* noise.h */
