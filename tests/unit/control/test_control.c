@@ -104,11 +104,11 @@ static void run_until_ends_at_the_very_event(void **state)
     const char *reply = control_run_done(&control, 0);
     assert_non_null(strstr(reply, "\"reached\":false,\"seen\":"));
     assert_null(strstr(reply, "\"seen\":0"));
-    assert_null(bench->unit[0].listeners); /* no client waits any more */
+    assert_null(bench->unit[0].observers); /* no client waits any more */
     assert_int_equal(asked.stops, 1);
     asked.refuse = true;
     assert_says("{\"cmd\":\"run.until\",\"args\":{\"event\":\"RES\"}}", "not now");
-    assert_null(bench->unit[0].listeners);
+    assert_null(bench->unit[0].observers);
     assert_says("{\"cmd\":\"run.until\",\"args\":{\"event\":\"FLY\"}}",
                 "event: expected an event of a, a PSA-2: RES, SETUP_DONE, SYNC_A");
 }
@@ -153,7 +153,7 @@ static void subscribers_are_told_of_events_and_status(void **state)
     assert_string_equal(asked.pushed, "{\"event\":\"RES\",\"unit\":\"b\",\"t_ns\":1}");
     assert_ptr_equal(asked.to, &me);
     say("{\"cmd\":\"unsubscribe\"}");
-    assert_null(bench->unit[1].listeners);
+    assert_null(bench->unit[1].observers);
     asked.pushes = 0;
     control.client = &other;
     assert_says("{\"cmd\":\"subscribe\",\"args\":{\"what\":\"status\",\"every_s\":0.05}}", "\"ok\":true");

@@ -97,7 +97,7 @@ static void events_may_be_those_of_another_unit(void **state)
     psa2_reset(&r.unit[1].store.psa2, r.s.now_ns);
     run_to(202 * MS);
     assert_change(0, id, FAULT_ACTIVE, 201 * MS);
-    assert_null(r.unit[1].listeners);
+    assert_null(r.unit[1].observers);
 }
 
 static void a_fault_that_waits_or_listens_can_be_cleared(void **state)
@@ -105,9 +105,9 @@ static void a_fault_that_waits_or_listens_can_be_cleared(void **state)
     (void)state;
     add("{'kind':'sensor.bias','point':'a.sensor.x','bias_v':1,'at_s':0.3}");
     add("{'kind':'sensor.bias','point':'b.sensor.x','bias_v':1,'after':'DRD_A'}");
-    assert_non_null(r.unit[1].listeners);
+    assert_non_null(r.unit[1].observers);
     for (uint32_t id = 1; id <= 2; id++) fault_clear(&r.engine, fault_find(&r.engine, id), r.s.now_ns);
-    assert_null(r.unit[1].listeners);
+    assert_null(r.unit[1].observers);
     run_to(500 * MS);
     assert_int_equal(r.changes, 0);
 }

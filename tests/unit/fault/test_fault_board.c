@@ -228,7 +228,7 @@ static void faults_reach_the_part_that_they_are_for(void **state)
 
 static void tock(void)
 {
-    for (struct unit_observer *l = r.unit[0].listeners, *next; l; l = next) {
+    for (struct unit_observer *l = r.unit[0].observers, *next; l; l = next) {
         next = l->next;
         l->fn(l->ctx, 1, r.s.now_ns);
     }
