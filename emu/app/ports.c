@@ -67,12 +67,9 @@ static struct can_hub *hub_of(struct ports *p, const char *bus)
 
 static bool fail_bus(const struct ports *p, const char *bus, char *why, size_t cap)
 {
-    why_fail(why, cap, "--can %s=...: no such bus; there is", bus);
-    for (unsigned i = 0; i < p->hubs; i++) {
-        const size_t at = strlen(why);
-        snprintf(why + at, cap - at, "%s %s", i ? "," : "", p->hub[i].name);
-    }
-    return false;
+    char known[160] = "";
+    for (unsigned i = 0; i < p->hubs; i++) why_list_add(known, sizeof known, p->hub[i].name);
+    return why_expected(why, cap, "--can BUS=...", WHY_TEXT(bus), "one of %s", known);
 }
 
 static bool open_can(struct ports *p, const struct options *o, char *why, size_t cap)

@@ -20,7 +20,7 @@ bool why_vexpected(char *why, size_t cap, const char *where, const char *got, co
     size_t at = (size_t)snprintf(why, cap, "%s: expected ", where);
     if (at < cap) at += (size_t)vsnprintf(why + at, cap - at, expected, ap);
     if (at < cap && got) snprintf(why + at, cap - at, ", got %s", got);
-    text_one_line(why);
+    if (cap) text_one_line(why);
     return false;
 }
 

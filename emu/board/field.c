@@ -1,5 +1,7 @@
 #include "board/field.h"
 
+#include "base/why.h"
+
 #include <ctype.h>
 #include <errno.h>
 #include <math.h>
@@ -101,7 +103,7 @@ static void append_word(char *out, size_t cap, const char *separator, const char
     (void)snprintf(out + at, cap - at, "%s%s", at ? separator : "", word);
 }
 
-static void not_a_value(const struct board_field *f, const char *text, char *why, size_t cap)
+static bool reject_value(const struct board_field *f, const char *text, char *why, size_t cap)
 {
     char words[200] = "";
     for (unsigned i = 0; f->type == BOARD_FIELD_CHOICE && f->choices[i]; i++)
@@ -109,35 +111,28 @@ static void not_a_value(const struct board_field *f, const char *text, char *why
     const char *like = f->type == BOARD_FIELD_CHOICE ? words
                        : f->type == BOARD_FIELD_LIST ? f->like
                                                      : types[f->type].like;
-    if (is_number(f))
-        (void)snprintf(why, cap, "%s: \"%.40s\" is not %s of %.10g .. %.10g", f->key, text, like, f->min, f->max);
-    else (void)snprintf(why, cap, "%s: \"%.40s\" is not %s", f->key, text, like);
+    if (!is_number(f)) return why_expected(why, cap, f->key, WHY_TEXT(text), "%s", like);
+    return why_expected(why, cap, f->key, WHY_TEXT(text), "%s from %.10g to %.10g", like, f->min, f->max);
 }
 
-static void not_a_key(const struct board_field *fields, unsigned n, const char *key, char *why, size_t cap)
+static bool reject_key(const struct board_field *fields, unsigned n, const char *key, char *why, size_t cap)
 {
-    int at = snprintf(why, cap, "%.40s: unknown key; known here: ", key);
-    for (unsigned i = 0; i < n && at >= 0 && (size_t)at < cap; i++)
-        at += snprintf(why + at, cap - (size_t)at, "%s%s", i ? ", " : "", fields[i].key);
+    char known[400] = "";
+    for (unsigned i = 0; i < n; i++) why_list_add(known, sizeof known, fields[i].key);
+    return why_fail(why, cap, "%.40s: unknown key; expected one of %s", key, known);
 }
 
 bool board_field_set(const struct board_field *fields, unsigned n, void *profile, const char *key, unsigned index,
                      const char *text, char *why, size_t cap)
 {
     const struct board_field *f = board_field_find(fields, n, key);
-    if (!f) {
-        not_a_key(fields, n, key, why, cap);
-        return false;
-    }
-    if (index >= board_field_elements(f)) {
-        (void)snprintf(why, cap, "%s: more than %u elements", key, board_field_elements(f));
-        return false;
-    }
+    if (!f) return reject_key(fields, n, key, why, cap);
+    if (index >= board_field_elements(f))
+        return why_expected(why, cap, key, "more", "up to %u elements", board_field_elements(f));
     void *value = (char *)profile + f->offset + index * types[f->type].element;
     const bool done =
         f->type == BOARD_FIELD_LIST ? f->parse(profile, index, text) : types[f->type].parse(f, text, value);
-    if (!done) not_a_value(f, text, why, cap);
-    return done;
+    return done || reject_value(f, text, why, cap);
 }
 
 static double number_of(const struct board_field *f, const void *profile, unsigned index)
@@ -158,8 +153,7 @@ static bool check_numbers(const struct board_field *f, const void *profile, char
     for (unsigned i = 0; is_number(f) && i < board_field_elements(f); i++) {
         const double v = number_of(f, profile, i);
         if (v >= f->min && v <= f->max) continue;
-        (void)snprintf(why, cap, "%s = %.10g is outside %.10g .. %.10g", f->key, v, f->min, f->max);
-        return false;
+        return why_expected(why, cap, f->key, WHY_REAL(v), "%.10g to %.10g", f->min, f->max);
     }
     return true;
 }
@@ -168,10 +162,8 @@ bool board_field_check(const struct board_field *fields, unsigned n, const void 
 {
     for (unsigned i = 0; i < n; i++) {
         const struct board_field *f = &fields[i];
-        if (f->type == BOARD_FIELD_STRING && f->min > 0 && !*((const char *)profile + f->offset)) {
-            (void)snprintf(why, cap, "%s is empty: give the profile a name of 1 to 31 characters", f->key);
-            return false;
-        }
+        if (f->type == BOARD_FIELD_STRING && f->min > 0 && !*((const char *)profile + f->offset))
+            return why_expected(why, cap, f->key, "none", "a name of 1 to 31 characters");
         if (!check_numbers(f, profile, why, cap)) return false;
     }
     return true;

@@ -116,7 +116,7 @@ const struct board_field psa2_fields[PSA2_FIELDS] = {
     ROW(temp_sensor_a_per_k, REAL, 0, 1e-3, "Current of a temperature sensor per kelvin of absolute temperature."),
     ROW(temp_load_ohm, REAL, 0, 1e6, "Load resistor RTD of a temperature sensor."),
     {.key = "setup", .type = BOARD_FIELD_LIST, .offset = OFF(setup), .min = 1, .max = PSA2_SETUP_MAX, .what = "Transfers after Res, each on its data-ready event.",
-     .like = "like \"DRD_A write_A 41 00 56\" or \"DRD_T sync_T\"", .parse = parse_step, .text = step_text},
+     .like = "a step such as \"DRD_A write_A 41 00 56\" or \"DRD_T sync_T\"", .parse = parse_step, .text = step_text},
 };
 // clang-format on
 

@@ -116,7 +116,7 @@ def test_a_malformed_profile_is_refused_with_the_arithmetic(
         ("--can slcan:{file}", 3, "expected a new name or a symbolic link to a pty"),
         ("--can slcan:{dir}/no/such", 3, "No such file or directory"),
         ("--can socketcan:none0", 3, "--can socketcan:none0: "),
-        ("--can x=slcan", 2, "--can x=...: no such bus; there is can0"),
+        ("--can x=slcan", 2, '--can BUS=...: expected one of can0, got "x"'),
         ("--scpi oven", 2, '--scpi: expected head, table, chamber, supply or all, got "oven"'),
         ("quiet --scpi table", 2, "--scpi table: the scenario has no table"),
         ("--pace fast", 2, '--pace: expected wall, step or free, got "fast"'),

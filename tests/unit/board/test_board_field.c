@@ -89,23 +89,23 @@ static void what_is_no_such_value_is_refused_and_changes_nothing(void **state)
         unsigned index;
         const char *text, *why;
     } rows[] = {
-        {"name", 0, "", "name: \"\" is not 1 to 31 characters"},
+        {"name", 0, "", "name: expected 1 to 31 characters, got \"\""},
         {"name", 0, "01234567890123456789012345678901", "name: "},
-        {"count", 0, "1", "count: \"1\" is not an integer of 2 .. 9"},
+        {"count", 0, "1", "count: expected an integer from 2 to 9, got \"1\""},
         {"count", 0, "-3", "count: "},
         {"count", 0, "3.0", "count: "},
         {"count", 0, "99999999999999999999", "count: "},
-        {"gain", 0, "1.0000001", "gain: \"1.0000001\" is not a number of -1 .. 1"},
+        {"gain", 0, "1.0000001", "gain: expected a number from -1 to 1, got \"1.0000001\""},
         {"gain", 0, "nan", "gain: "},
         {"gain", 0, "0 ", "gain: "},
-        {"at_m", 3, "1", "at_m: more than 3 elements"},
-        {"at_m", 1, "-1", "at_m: \"-1\" is not a number of 0 .. 5"},
-        {"on", 0, "yes", "on: \"yes\" is not true or false"},
-        {"on", 1, "true", "on: more than 1 elements"},
-        {"mode", 0, "fas", "mode: \"fas\" is not slow, fast or both"},
-        {"steps", 0, "x", "steps: \"x\" is not a digit"},
-        {"steps", 4, "1", "steps: more than 4 elements"},
-        {"gian", 0, "1", "gian: unknown key; known here: name, count, gain, at_m, on, mode, steps"},
+        {"at_m", 3, "1", "at_m: expected up to 3 elements, got more"},
+        {"at_m", 1, "-1", "at_m: expected a number from 0 to 5, got \"-1\""},
+        {"on", 0, "yes", "on: expected true or false, got \"yes\""},
+        {"on", 1, "true", "on: expected up to 1 elements, got more"},
+        {"mode", 0, "fas", "mode: expected slow, fast or both, got \"fas\""},
+        {"steps", 0, "x", "steps: expected a digit, got \"x\""},
+        {"steps", 4, "1", "steps: expected up to 4 elements, got more"},
+        {"gian", 0, "1", "gian: unknown key; expected one of name, count, gain, at_m, on, mode, steps"},
     };
     (void)state;
     const struct profile before = p;
@@ -124,13 +124,13 @@ static void a_check_finds_numbers_out_of_range_and_a_missing_name(void **state)
     assert_true(board_field_check(fields, FIELDS, &p, why, sizeof why));
     p.at[2] = 5.5;
     assert_false(board_field_check(fields, FIELDS, &p, why, sizeof why));
-    assert_string_equal(why, "at_m = 5.5 is outside 0 .. 5");
+    assert_string_equal(why, "at_m: expected 0 to 5, got 5.5");
     p.count = 1;
     assert_false(board_field_check(fields, FIELDS, &p, why, sizeof why));
-    assert_string_equal(why, "count = 1 is outside 2 .. 9");
+    assert_string_equal(why, "count: expected 2 to 9, got 1");
     p.name[0] = '\0';
     assert_false(board_field_check(fields, FIELDS, &p, why, sizeof why));
-    assert_non_null(strstr(why, "name is empty"));
+    assert_non_null(strstr(why, "name: expected a name of 1 to 31 characters, got none"));
     p = (struct profile){.name = "a", .count = 2};
     p.gain = 0.0 / (p.gain * 0.0); /* NaN is in no range */
     assert_false(board_field_check(fields, FIELDS, &p, why, sizeof why));

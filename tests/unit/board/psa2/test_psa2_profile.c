@@ -123,32 +123,33 @@ static void texts_that_are_no_values_leave_the_profile_alone(void **state)
         const char *text, *why;
     } rows[] = {
         {"colour", 0, "red",
-         "colour: unknown key; known here: name, fclk_hz, temp_clkin_hz, sclk_hz, line_hz, line_div, word_bits, "
+         "colour: unknown key; expected one of name, fclk_hz, temp_clkin_hz, sclk_hz, line_hz, line_div, word_bits, "
          "lead_in_clk, word, code_bits, read_bits, gate_sclk, temp_channels, adc_is_1281, adc_vref_v, adc_pga, "
          "temp_vref_v, temp_sensor_a_per_k, temp_load_ohm, setup"},
-        {"fclk_hz", 0, "4100001", "fclk_hz: \"4100001\" is not an integer of 1000000 .. 4100000"},
-        {"word_bits", 0, "thirty", "word_bits: \"thirty\" is not an integer of 16 .. 32"},
-        {"word_bits", 0, "-24", "word_bits: \"-24\" is not an integer of 16 .. 32"},
-        {"word_bits", 0, "33", "word_bits: \"33\" is not an integer of 16 .. 32"},
-        {"adc_vref_v", 0, "nan", "adc_vref_v: \"nan\" is not a number of 0.5 .. 5.5"},
-        {"adc_vref_v", 0, "5 V", "adc_vref_v: \"5 V\" is not a number of 0.5 .. 5.5"},
-        {"gate_sclk", 0, "yes", "gate_sclk: \"yes\" is not true or false"},
-        {"name", 0, "", "name: \"\" is not 1 to 31 characters"},
+        {"fclk_hz", 0, "4100001", "fclk_hz: expected an integer from 1000000 to 4100000, got \"4100001\""},
+        {"word_bits", 0, "thirty", "word_bits: expected an integer from 16 to 32, got \"thirty\""},
+        {"word_bits", 0, "-24", "word_bits: expected an integer from 16 to 32, got \"-24\""},
+        {"word_bits", 0, "33", "word_bits: expected an integer from 16 to 32, got \"33\""},
+        {"adc_vref_v", 0, "nan", "adc_vref_v: expected a number from 0.5 to 5.5, got \"nan\""},
+        {"adc_vref_v", 0, "5 V", "adc_vref_v: expected a number from 0.5 to 5.5, got \"5 V\""},
+        {"gate_sclk", 0, "yes", "gate_sclk: expected true or false, got \"yes\""},
+        {"name", 0, "", "name: expected 1 to 31 characters, got \"\""},
         {"name", 0, "a-name-of-more-than-thirty-one-characters",
-         "name: \"a-name-of-more-than-thirty-one-character\" is not 1 to 31 characters"},
-        {"word", 4, "X", "word: more than 4 elements"},
-        {"word", 0, "XY", "word: \"XY\" is not one of X, Y, Z, T"},
-        {"setup", 16, "DRD_T sync_T", "setup: more than 16 elements"},
+         "name: expected 1 to 31 characters, got \"a-name-of-more-than-thirty-one-characters\""},
+        {"word", 4, "X", "word: expected up to 4 elements, got more"},
+        {"word", 0, "XY", "word: expected one of X, Y, Z, T, got \"XY\""},
+        {"setup", 16, "DRD_T sync_T", "setup: expected up to 16 elements, got more"},
         {"setup", 0, "DRD_A write_A",
-         "setup: \"DRD_A write_A\" is not like \"DRD_A write_A 41 00 56\" or \"DRD_T sync_T\""},
+         "setup: expected a step such as \"DRD_A write_A 41 00 56\" or \"DRD_T sync_T\", got \"DRD_A write_A\""},
         {"setup", 0, "DRD_A write_A 100",
-         "setup: \"DRD_A write_A 100\" is not like \"DRD_A write_A 41 00 56\" or \"DRD_T sync_T\""},
+         "setup: expected a step such as \"DRD_A write_A 41 00 56\" or \"DRD_T sync_T\", got \"DRD_A write_A 100\""},
         {"setup", 0, "DRD_A sync_A 00",
-         "setup: \"DRD_A sync_A 00\" is not like \"DRD_A write_A 41 00 56\" or \"DRD_T sync_T\""},
+         "setup: expected a step such as \"DRD_A write_A 41 00 56\" or \"DRD_T sync_T\", got \"DRD_A sync_A 00\""},
         {"setup", 0, "DRD_B sync_A",
-         "setup: \"DRD_B sync_A\" is not like \"DRD_A write_A 41 00 56\" or \"DRD_T sync_T\""},
+         "setup: expected a step such as \"DRD_A write_A 41 00 56\" or \"DRD_T sync_T\", got \"DRD_B sync_A\""},
         {"setup", 0, "DRD_A write_A 1 2 3 4 5 6 7 8 9",
-         "setup: \"DRD_A write_A 1 2 3 4 5 6 7 8 9\" is not like \"DRD_A write_A 41 00 56\" or \"DRD_T sync_T\""},
+         "setup: expected a step such as \"DRD_A write_A 41 00 56\" or \"DRD_T sync_T\", got \"DRD_A write_A 1 2 3 4 5 "
+         "6 7 8 9\""},
     };
     for (size_t i = 0; i < COUNT(rows); i++) {
         struct psa2_profile p;
