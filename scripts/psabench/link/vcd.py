@@ -1,21 +1,41 @@
-"""Value Change Dump as the emulator writes it: 1-bit wires, read into arrays, cut to windows, written again.
+"""Value Change Dump (IEEE 1364-2001, clause 18): 1-bit wires, read into arrays, cut to windows, written again.
 
-Times are simulated nanoseconds since power-on; the file's unit (10 ns unless asked otherwise) is the resolution.
+`read_vcd` reads files of the emulator and raises at the first damage; `read_vcd_part` reads files of any tool (any
+names, any unit down to 1 fs, scopes, vectors, x and z, which leave a line as it was) and keeps what came before it.
 """
 
 from __future__ import annotations
 
+import io
 import re
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import takewhile
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+Bits = NDArray[np.uint8]
 
+BLOCK = 1 << 22  # bytes read together
+MOST_EDGES = 40_000_000  # of one recording of lines: 0.4 GB
+MOST_NS = 1 << 60  # of a time: 36 years
+_MOST_HEAD = 1 << 22  # bytes before $enddefinitions
+_MOST_REST = 4 * BLOCK  # bytes without a time
+_MOST_WIRES = 1024
+_MOST_CODE = 8  # characters of a wire's code, in one 64-bit number
+_MOST_DIGITS = 18  # of a time: what 64 bits hold
 _SCALE_NS = {"ns": 1, "us": 1_000, "ms": 1_000_000, "s": 1_000_000_000}
+_FS = {"fs": 1, "ps": 10**3, "ns": 10**6, "us": 10**9, "ms": 10**12, "s": 10**15}
+_FS_PER_NS = 10**6
+_TIMESCALE = re.compile(r"\$timescale\s+(1|10|100)\s*(fs|ps|ns|us|ms|s)\s+\$end")
+_NO_WIRE = ("real", "realtime", "string", "event")
+_KEYWORDS = ("$dumpvars", "$dumpall", "$dumpon", "$dumpoff", "$end")
+_VECTORS = np.frombuffer(b"bBrRsS", np.uint8)
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,9 +43,9 @@ class Wire:
     """Level (n) of a line from t_ns (n) on; the first entry is the level at the start of the recording."""
 
     t_ns: Ints
-    level: NDArray[np.uint8]
+    level: Bits
 
-    def at(self, t_ns: Ints | int) -> NDArray[np.uint8]:
+    def at(self, t_ns: Ints | int) -> Bits:
         """Level at each instant, an edge at that very instant included."""
         i = np.searchsorted(self.t_ns, t_ns, "right") - 1
         return np.asarray(self.level[np.maximum(i, 0)], np.uint8)
@@ -86,56 +106,286 @@ def scale_name(unit_ns: int) -> str:
     raise ValueError(f"{unit_ns} ns is no VCD time unit; 1, 10 or 100 of ns, us, ms or s is")
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VcdPart:
+    """What was read of a file. note: where and why reading ended before the end of the file, "" if it did not."""
+
+    head: str  # before $enddefinitions
+    unit_fs: int
+    start_ns: int  # -1: no time in it
+    end_ns: int
+    wires: dict[str, Wire]  # in order of declaration; only those with a level
+    note: str
+
+
 def read_vcd(path: Path) -> Vcd:
-    """Reads a file of 1-bit wires. Raises OSError, or ValueError with the place of what is not understood."""
-    return parse_vcd(path.read_text(encoding="ascii"), str(path))
+    """Reads a file of the emulator. Raises OSError, or ValueError with the place of what is not understood."""
+    with path.open("rb") as file:
+        return _whole(file, str(path))
 
 
 def parse_vcd(text: str, name: str = "VCD") -> Vcd:
     """As `read_vcd`, from text; name is in error messages."""
-    head, found, body = text.partition("$enddefinitions $end")
-    scale = re.search(r"\$timescale\s+(1|10|100)\s*(ns|us|ms|s)\s+\$end", head)
-    if not found or not scale:
-        raise ValueError(f"{name}: no $timescale in ns..s, or no $enddefinitions: not a VCD of ours")
-    unit_ns = int(scale[1]) * _SCALE_NS[scale[2]]
-    code = {m[1]: m[2] for m in re.finditer(r"\$var wire 1 (\S+) (\S+) \$end", head)}
-    tokens = Tokens.of(body)
-    wire = np.full(len(tokens), -1)
-    levels = np.flatnonzero((tokens.first == ord("0")) | (tokens.first == ord("1")))
-    if code:
-        wire[levels] = tokens.looked_up(levels, list(code))
-    hashes = np.flatnonzero(tokens.first == ord("#"))
-    numbers = tokens.numbers(hashes)
-    times = np.zeros(len(tokens), bool)
-    times[hashes] = numbers >= 0
-    tokens.refuse(~times & (wire < 0), times, name)
-    t_units = numbers[numbers >= 0]
-    now = np.cumsum(times)  # times so far, at each token
-    since = np.concatenate((np.array([-1], np.int64), t_units))
-    wires = {}
-    for i, c in enumerate(code):
-        mine = np.flatnonzero(wire == i)
-        if len(mine):
-            wires[code[c]] = Wire(since[now[mine]] * unit_ns, (tokens.first[mine] - ord("0")).astype(np.uint8))
-    start, end = (int(t_units[0]), int(t_units[-1])) if len(t_units) else (-1, -1)
-    return Vcd(unit_ns, start * unit_ns, end * unit_ns, wires)
+    return _whole(io.BytesIO(text.encode()), name)
 
 
-_MOST_DIGITS = 18  # of a time: what 64 bits hold
-_MOST_CODE = 8  # characters of a wire's code, in one 64-bit number
+def _whole(file: BinaryIO, name: str) -> Vcd:
+    part = read_vcd_part(file, name, levels=b"01")
+    if part.note:
+        raise ValueError(f"{name}: {part.note}")
+    if part.unit_fs < _FS_PER_NS:
+        raise ValueError(f"{name}: expected $timescale of 1 ns to 100 s, got {part.unit_fs} fs")
+    unit_ns = part.unit_fs // _FS_PER_NS
+    if part.start_ns < 0:
+        return Vcd(unit_ns, -unit_ns, -unit_ns, {})
+    return Vcd(unit_ns, part.start_ns, part.end_ns, part.wires)
+
+
+def read_vcd_part(file: BinaryIO, name: str, max_ns: float = MOST_NS, levels: bytes = b"01xXzZ") -> VcdPart:
+    """Reads block by block, to max_ns after the first time. Raises ValueError where the head is not that of a VCD."""
+    head, rest = _head(name, file)
+    r = _declared(name, head, min(max_ns, MOST_NS), np.frombuffer(levels, np.uint8))
+    while not r.note:
+        data = file.read(BLOCK)
+        rest += data
+        cut = _before_last_time(rest) if data else len(rest)
+        _body(r, rest[:cut])
+        rest = rest[cut:]
+        if len(rest) > _MOST_REST:
+            r.note = r.note or f"no time in {_MOST_REST} bytes"
+        if not data:
+            break
+    return VcdPart(
+        head=head,
+        unit_fs=r.unit_fs,
+        start_ns=r.start_ns,
+        end_ns=int(r.ns(np.array([r.now]))[0]),
+        wires={r.codes[c]: _wire(r, c) for c in r.codes if c in r.at},
+        note=r.note,
+    )
+
+
+@dataclass(slots=True)
+class _Reader:
+    """codes: names by code, 1-bit wires only; others: codes of all else."""
+
+    codes: Mapping[str, str]
+    others: frozenset[str]
+    unit_fs: int
+    max_ns: float
+    level_chars: Bits
+    now: int = -1  # in units; -1: no time was given yet
+    start_ns: int = -1
+    edges: int = 0
+    note: str = ""
+    comment: bool = False
+    at: dict[str, list[Ints]] = field(default_factory=dict)
+    levels: dict[str, list[Bits]] = field(default_factory=dict)
+
+    def ns(self, t: Ints) -> Ints:
+        """Units to ns, rounded down."""
+        if self.unit_fs >= _FS_PER_NS:
+            return t * (self.unit_fs // _FS_PER_NS)
+        return t // (_FS_PER_NS // self.unit_fs)
+
+
+def _head(name: str, file: BinaryIO) -> tuple[str, bytes]:
+    data = b""
+    while b"$enddefinitions" not in data:
+        more = file.read(1 << 16)
+        if not more or len(data) > _MOST_HEAD:
+            raise ValueError(f"{name}: expected a VCD file, got no $enddefinitions in the first {len(data)} bytes")
+        data += more
+    head, _, rest = data.partition(b"$enddefinitions")
+    while b"$end" not in rest:
+        more = file.read(1 << 16)
+        if not more or len(rest) > _MOST_HEAD:
+            raise ValueError(f"{name}: expected $end after $enddefinitions, got none")
+        rest += more
+    return head.decode("latin-1"), rest.partition(b"$end")[2]
+
+
+def _declared(name: str, head: str, max_ns: float, level_chars: Bits) -> _Reader:
+    scale = _TIMESCALE.search(head)
+    if not scale:
+        raise ValueError(f"{name}: expected $timescale of 1, 10 or 100 fs to s, got none")
+    codes: dict[str, str] = {}
+    others: set[str] = set()
+    scopes: list[str] = []
+    for kind, words in _sections(head):
+        if kind == "$scope":
+            scopes.append(words[-1] if words else "")
+        elif kind == "$upscope":
+            del scopes[-1:]
+        elif kind == "$var" and len(words) >= 4 and words[1] == "1" and words[0] not in _NO_WIRE:
+            if len(words[2]) > _MOST_CODE:
+                raise ValueError(f"{name}: expected a code of at most {_MOST_CODE} characters, got {words[2][:40]}")
+            codes.setdefault(words[2], _name(words[3], scopes, set(codes.values())))
+        elif kind == "$var" and len(words) >= 3:
+            others.add(words[2])
+    if not codes:
+        raise ValueError(f"{name}: expected $var of 1 bit, got none")
+    if len(codes) > _MOST_WIRES:
+        raise ValueError(f"{name}: expected at most {_MOST_WIRES} wires, got {len(codes)}")
+    unit_fs = int(scale[1]) * _FS[scale[2]]
+    return _Reader(codes, frozenset(others - set(codes)), unit_fs, max_ns, level_chars)
+
+
+def _sections(head: str) -> Iterator[tuple[str, list[str]]]:
+    """Each keyword with its words up to $end; a wire's code may begin with $, too."""
+    words = iter(head.split())
+    for kind in words:
+        if kind.startswith("$"):
+            yield kind, list(takewhile(lambda w: w != "$end", words))
+
+
+def _name(name: str, scopes: list[str], taken: set[str]) -> str:
+    """Bare where it is the first of that name, with its scopes otherwise."""
+    bare = name.split("[")[0] if name.endswith("[0]") else name
+    return bare if bare not in taken else ".".join([*scopes, bare])
+
+
+def _before_last_time(data: bytes) -> int:
+    """Where the last time begins: no value and its code are torn there."""
+    end = len(data)
+    while (end := data.rfind(b"#", 0, end)) > 0:
+        if data[end - 1 : end] in (b" ", b"\n", b"\r", b"\t") and data[end + 1 : end + 2].isdigit():
+            return end
+    return 0
+
+
+@dataclass(slots=True)
+class _Words:
+    """Words of a piece, comments left out, and what each is."""
+
+    tokens: _Tokens
+    which: Ints  # (n,) places in tokens
+    wire: Ints  # (n,) index of the code whose level it is, -1: none
+    value: Ints  # (n,) 0 or 1; others: unknown
+    time: Ints  # (n,) in units, -1: none
+    good: Bools  # (n,)
+
+
+def _body(r: _Reader, body: bytes) -> None:
+    """Take a piece, up to the first word that is none of VCD's."""
+    tokens = _Tokens.of(body.decode("ascii", "replace"))
+    which = _without_comments(r, tokens)
+    if not len(which):
+        return
+    codes, kind = list(r.codes), tokens.first[which]
+    level, times = np.isin(kind, r.level_chars), kind == ord("#")
+    wire, value, time = np.full((3, len(which)), -1, np.int64)
+    w = _Words(tokens, which, wire, value, time, kind == ord("$"))
+    w.wire[level] = tokens.looked_up(which[level], codes)
+    w.value[level] = kind[level].astype(np.int64) - ord("0")
+    w.time[times] = tokens.numbers(which[times])
+    w.good |= (w.wire >= 0) | (w.time >= 0)
+    _unknown_dollars(w)
+    _vectors(r, w, codes)
+    end = _first_bad(r, w)
+    _keep(r, codes, w, end)
+
+
+def _without_comments(r: _Reader, tokens: _Tokens) -> Ints:
+    """Places of the words outside $comment ... $end."""
+    keep = np.ones(len(tokens), bool)
+    begin = 0 if r.comment else -1
+    for i in np.flatnonzero(tokens.first == ord("$")).tolist():
+        word = tokens.word(i)
+        if word == "$comment" and begin < 0:
+            begin = i
+        elif word == "$end" and begin >= 0:
+            keep[begin : i + 1] = False
+            begin = -1
+    if begin >= 0:
+        keep[begin:] = False
+    r.comment = begin >= 0
+    return np.flatnonzero(keep)
+
+
+def _unknown_dollars(w: _Words) -> None:
+    for k in np.flatnonzero(w.tokens.first[w.which] == ord("$")).tolist():
+        w.good[k] = w.tokens.word(int(w.which[k])) in _KEYWORDS
+
+
+def _vectors(r: _Reader, w: _Words, codes: list[str]) -> None:
+    """b... CODE, r... CODE and s... CODE: the level of a 1-bit wire, or passed over; so are levels of other codes."""
+    bare = np.flatnonzero(~w.good & (w.time < 0)).tolist()
+    done = -1
+    for k in bare:
+        if k <= done:
+            continue
+        word = w.tokens.word(int(w.which[k]))
+        if w.tokens.first[w.which[k]] not in _VECTORS or k + 1 >= len(w.which):
+            w.good[k] = word[1:] in r.others
+            continue
+        code = w.tokens.word(int(w.which[k + 1]))
+        if code in r.others or code in codes:
+            w.good[k : k + 2], w.wire[k + 1], w.time[k + 1], done = True, -1, -1, k + 1
+        if code in codes and code not in r.others:
+            w.wire[k + 1], w.value[k + 1] = codes.index(code), ord(word[-1]) - ord("0")
+
+
+def _first_bad(r: _Reader, w: _Words) -> int:
+    """How many words are taken; the note says why there are no more."""
+    times = np.flatnonzero(w.time >= 0)
+    t = np.concatenate(([np.int64(r.now)], w.time[times]))
+    most = MOST_NS * _FS_PER_NS // r.unit_fs
+    ends = [
+        (np.flatnonzero(~w.good), "a time or a level of a declared wire"),
+        (times[np.diff(t) < 0], "a time after the one before it"),
+        (times[t[1:] > most], f"a time up to #{most}"),
+    ]
+    found = [(int(at[0]), expected) for at, expected in ends if len(at)]
+    if found:
+        k, expected = min(found)
+        at, got = int(max(w.time[:k].max(initial=-1), r.now)), w.tokens.word(int(w.which[k]))[:40]
+        r.note = f"after #{at}: expected {expected}, got '{got}'"
+        return k
+    return len(w.which)
+
+
+def _keep(r: _Reader, codes: list[str], w: _Words, end: int) -> None:
+    time, wire, value = w.time[:end], w.wire[:end], w.value[:end]
+    stamps = np.concatenate(([np.int64(r.now)], time[time >= 0]))
+    at_ns = r.ns(stamps)[np.cumsum(time >= 0)] if len(time) else np.empty(0, np.int64)
+    if r.start_ns < 0 and len(stamps) > 1:
+        r.start_ns = int(r.ns(stamps[1:2])[0])
+    known = (wire >= 0) & ((value == 0) | (value == 1))
+    late = known & (at_ns > r.start_ns + r.max_ns) if r.start_ns >= 0 else np.zeros(len(time), bool)
+    if late.any():
+        known &= ~late
+        r.note = r.note or f"judged to {r.max_ns / 1e9:g} s"
+        stamps = stamps[r.ns(stamps) <= r.start_ns + r.max_ns]
+    r.now = int(stamps[-1])
+    r.edges += int(known.sum())
+    if r.edges > MOST_EDGES:
+        r.note = r.note or f"judged to its {MOST_EDGES} edges"
+    for i in np.unique(wire[known]).tolist():
+        mine = known & (wire == i)
+        r.at.setdefault(codes[i], []).append(at_ns[mine])
+        r.levels.setdefault(codes[i], []).append(value[mine].astype(np.uint8))
+
+
+def _wire(r: _Reader, code: str) -> Wire:
+    """Real changes only: some tools repeat levels."""
+    t, level = np.maximum(np.concatenate(r.at[code]), r.start_ns), np.concatenate(r.levels[code])
+    moved = np.concatenate(([True], level[1:] != level[:-1]))
+    t, level = t[moved], level[moved]
+    return Wire(np.concatenate(([r.start_ns], t[1:])), level)
 
 
 @dataclass(frozen=True, slots=True)
-class Tokens:
-    """The words of a file's body, by their places in its bytes: a million edges want no loop of Python's."""
+class _Tokens:
+    """The words of a file's body, by where they are in its bytes: no Python loop over a million edges."""
 
-    text: NDArray[np.uint8]
+    text: Bits
     begin: Ints
     end: Ints
-    first: NDArray[np.uint8]  # byte of each
+    first: Bits  # byte of each
 
     @classmethod
-    def of(cls, body: str) -> Tokens:
+    def of(cls, body: str) -> _Tokens:
         text = np.frombuffer(body.encode(), np.uint8)
         blank = (text == 32) | ((text >= 9) & (text <= 13)) | ((text >= 28) & (text <= 31))  # as str.split has it
         edges = np.flatnonzero(np.diff(np.concatenate(([True], blank, [True])).view(np.int8)))
@@ -174,15 +424,3 @@ class Tokens:
         at = order[np.minimum(np.searchsorted(keys[order], key), len(codes) - 1)]
         same = (keys[at] == key) & (np.array([len(c) for c in codes])[at] == size)
         return np.where(same, at, -1)
-
-    def refuse(self, strange: NDArray[np.bool_], times: NDArray[np.bool_], name: str) -> None:
-        """Raises ValueError for the first of these that is none of the two words that may stand there."""
-        for i in np.flatnonzero(strange):
-            word = self.word(int(i))
-            if word in ("$dumpvars", "$end"):
-                continue
-            if word[0] == "#":
-                raise ValueError(f"{name}: '{word}' is no time")
-            before = np.flatnonzero(times[:i])
-            now = int(self.word(int(before[-1]))[1:]) if len(before) else -1
-            raise ValueError(f"{name}: at #{now}: '{word}' is neither a time nor a level of a 1-bit wire")

@@ -27,7 +27,7 @@ def test_a_recording_is_levels_over_time() -> None:
 
 
 def test_codes_of_wires_may_be_long_and_words_apart_by_any_blank() -> None:
-    long = FILE.replace("var wire 1 #", "var wire 1 CLOCKS&!#").replace("0#", "0CLOCKS&!#").replace("1#", "1CLOCKS&!#")
+    long = FILE.replace("var wire 1 #", "var wire 1 CLOCKS&!").replace("0#", "0CLOCKS&!").replace("1#", "1CLOCKS&!")
     v, w = parse_vcd(long.replace("\n", "\r\n\t ")), parse_vcd(FILE)
     assert [x.t_ns.tolist() for x in v.wires.values()] == [x.t_ns.tolist() for x in w.wires.values()]
     assert [x.level.tolist() for x in v.wires.values()] == [x.level.tolist() for x in w.wires.values()]
@@ -62,19 +62,21 @@ def test_a_unit_that_vcd_does_not_know_is_refused() -> None:
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("", "x.vcd: no .timescale"),
-        (FILE.replace("10 ns", "10 fs"), "no .timescale"),
+        ("", "x.vcd: expected a VCD file"),
+        (FILE.replace("10 ns", "10 fs"), "x.vcd: expected .timescale of 1 ns to 100 s, got 10 fs"),
+        (FILE.replace("10 ns", "10 years"), "x.vcd: expected .timescale"),
         (FILE.partition("$enddef")[0], "no .enddefinitions"),
-        (FILE.replace("#20\n1#", "#20\nx#"), "x.vcd: at #20: 'x#' is neither"),
-        (FILE.replace("#20\n1#", "#20\n1?"), "at #20: '1.' is neither"),
-        (FILE.replace("#20\n", "#2a0\n"), "x.vcd: '#2a0' is no time"),
-        (FILE.replace("#20\n", "#\n"), "x.vcd: '#' is no time"),
-        (FILE.replace("#20\n", "#9999999999999999999\n"), "'#9999999999999999999' is no time"),
-        (FILE.replace("#25\n0#", "#25\n0##"), "x.vcd: at #25: '0##' is neither"),
-        (FILE.replace("#25\n0#", "#25\nx#\n#y"), "x.vcd: at #25: 'x#' is neither"),
+        (FILE.replace("#20\n1#", "#20\nx#"), "x.vcd: after #20: expected a time or a level of a declared wire, got 'x#'"),
+        (FILE.replace("#20\n1#", "#20\n1?"), "after #20: expected .*, got '1.'"),
+        (FILE.replace("#20\n", "#2a0\n"), "x.vcd: after #10: expected .*, got '#2a0'"),
+        (FILE.replace("#20\n", "#\n"), "x.vcd: after #10: expected .*, got '#'"),
+        (FILE.replace("#20\n", "#9999999999999999999\n"), "after #10: expected .*, got '#9999999999999999999'"),
+        (FILE.replace("#25\n0#", "#25\n0##"), "x.vcd: after #25: expected .*, got '0##'"),
+        (FILE.replace("#25\n0#", "#25\nx#\n#y"), "x.vcd: after #25: expected .*, got 'x#'"),
+        (FILE.replace("#25\n0#", "#15\n0#"), "x.vcd: after #20: expected a time after the one before it, got '#15'"),
     ],
 )
-def test_what_is_no_recording_of_ours_is_told_with_its_place(text: str, says: str) -> None:
+def test_a_damaged_recording_is_rejected_with_its_place(text: str, says: str) -> None:
     with pytest.raises(ValueError, match=says):
         parse_vcd(text, "x.vcd")
 

@@ -10,11 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 from psabench.conform.sources.samples import GAP
-from psabench.conform.sources.taken import BLOCK, MOST_EDGES, NS, Bounds, LineTake
+from psabench.conform.sources.taken import BLOCK, NS, Bounds, LineTake
 from psabench.errors import BadInput
 from psabench.link.lineport import SAMPLE_HZ
 from psabench.link.signals import Ints
-from psabench.link.vcd import Wire
+from psabench.link.vcd import MOST_EDGES, Wire
 
 T = TypeVar("T", bound=np.generic)
 Samples = npt.NDArray[np.uint64]

@@ -18,11 +18,9 @@ from psabench.link.vcd import Wire
 
 NS = 1e9
 MOST_FRAMES = 2_000_000  # of one log: 0.5 GB
-MOST_EDGES = 40_000_000  # of one recording of lines: 0.4 GB
 MOST_CHANNELS = 64
 MOST_BYTES = 4 << 30  # of a file, unpacked
 BLOCK = 1 << 22  # bytes looked at together
-MOST_NS = 1 << 60  # of a time: 36 years
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
