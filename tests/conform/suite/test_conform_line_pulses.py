@@ -18,8 +18,8 @@ from psabench.boards.psd1.conform.capture_cycles import PINS as PSD1_PINS
 from psabench.conform.capture.log import CanFrame, CanLog, Evidence, LineLog
 from psabench.conform.capture.pulses import all_move, bus_moves, none_is_too_short, shortest
 from psabench.conform.check import line_pulses
-from psabench.conform.proves import row_for
 from psabench.conform.profile import variant
+from psabench.conform.proves import row_for
 from psabench.conform.verdict import Broken, TooLittle
 from psabench.link.busport import Cycle
 from psabench.link.protocol_files import dbc_node, message

@@ -66,7 +66,10 @@ def test_a_unit_that_vcd_does_not_know_is_refused() -> None:
         (FILE.replace("10 ns", "10 fs"), "x.vcd: expected .timescale of 1 ns to 100 s, got 10 fs"),
         (FILE.replace("10 ns", "10 years"), "x.vcd: expected .timescale"),
         (FILE.partition("$enddef")[0], "no .enddefinitions"),
-        (FILE.replace("#20\n1#", "#20\nx#"), "x.vcd: after #20: expected a time or a level of a declared wire, got 'x#'"),
+        (
+            FILE.replace("#20\n1#", "#20\nx#"),
+            "x.vcd: after #20: expected a time or a level of a declared wire, got 'x#'",
+        ),
         (FILE.replace("#20\n1#", "#20\n1?"), "after #20: expected .*, got '1.'"),
         (FILE.replace("#20\n", "#2a0\n"), "x.vcd: after #10: expected .*, got '#2a0'"),
         (FILE.replace("#20\n", "#\n"), "x.vcd: after #10: expected .*, got '#'"),
