@@ -7,61 +7,9 @@
 #include <string.h>
 
 #define RES_LOW_NS   10000 /* E0: length of the pulse on Res */
-#define SYNC_A_TCLK  4     /* E0: SYNC high; the part needs 2 */
-#define SYNC_T_TAU   8     /* E0: SYNC/PDWN low; the part needs 4 */
-#define MARGIN_TCLK  32    /* a read ends 4 tCLK, a command 24 tCLK before the next DRD_A */
 #define CONFIG1_CHOP 0x08  /* chopping on, as after reset; multiplexer 000: AIN1 */
 
 /* ---- pins ---- */
-
-static void pulse_edge(struct psa2 *b, bool level, int64_t t_ns)
-{
-    if (b->pulse.group == PSA2_TEMP) {
-        psa2_line(b, PSA2_LINE_SYNC_T, level, t_ns);
-        ads1256_sync_pin(&b->tadc, level, t_ns);
-        return;
-    }
-    trace_set(&b->base.trace, PSA2_LINE_SYNC_A, level, t_ns);
-    for (unsigned i = 0; i < 3; i++) ads1282_sync_pin(&b->adc[i], level, t_ns);
-}
-
-/* SYNC_A idles low and works on its rise, SYNC_T idles high and works when it is high again. */
-static void pulse_event(void *ctx, int64_t t_ns)
-{
-    struct psa2 *b = ctx;
-    struct psa2_pulse *p = &b->pulse;
-    const bool temp = p->group == PSA2_TEMP;
-    p->active = !p->active;
-    if (!p->skipped) pulse_edge(b, p->active != temp, t_ns);
-    if (!p->skipped && p->active != temp) psa2_tell(b, temp ? PSA2_EV_SYNC_T : PSA2_EV_SYNC_A, t_ns);
-    if (p->active) {
-        sched_at(b->sched, &p->ev, t_ns + (temp ? psa2_tau_ns(b, SYNC_T_TAU) : psa2_tclk_ns(b, SYNC_A_TCLK)));
-        return;
-    }
-    p->busy = false;
-    if (!temp) b->sample.unsettled = 0;
-    p->done(b, t_ns);
-}
-
-/* On a falling edge of fCLK: 122 ns from the rising one, whose keep-out is 30 ns (sources 1.4). */
-void psa2_pulse(struct psa2 *b, enum psa2_group group, void (*done)(struct psa2 *b, int64_t t_ns), int64_t t_ns)
-{
-    const struct clk half = {.hz = 2 * (int64_t)b->profile.fclk_hz, .div = 1};
-    const int64_t k = clk_count_at(&half, t_ns + 1);
-    b->pulse.busy = true;
-    b->pulse.active = false;
-    b->pulse.skipped = group == PSA2_TEMP && b->base.faults & PSA2_FAULT_SKIP_SYNC_T;
-    b->pulse.group = group;
-    b->pulse.done = done;
-    sched_at(b->sched, &b->pulse.ev, clk_edge_ns(&half, k | 1));
-}
-
-static void pulse_stop(struct psa2 *b, int64_t t_ns)
-{
-    sched_cancel(b->sched, &b->pulse.ev);
-    if (b->pulse.active) pulse_edge(b, b->pulse.group == PSA2_TEMP, t_ns);
-    b->pulse.busy = b->pulse.active = false;
-}
 
 static void res_pin(struct psa2 *b, bool level, int64_t t_ns)
 {
@@ -80,9 +28,8 @@ static bool port_free(const struct psa2 *b)
 static void enter_run(struct psa2 *b, int64_t t_ns)
 {
     b->mode = PSA2_RUN;
-    psa2_tell(b, PSA2_EV_SETUP_DONE, t_ns);
-    psa2_arm_patience(b, t_ns);
-    psa2_service(b, t_ns);
+    psa2_notify_event(b, PSA2_EV_SETUP_DONE, t_ns);
+    psa2_arm_timeout(b, t_ns);
 }
 
 /* Beyond the article: the gain. It follows SYNC_A at once, while the filters are empty. */
@@ -96,7 +43,7 @@ static void setup_gain(struct psa2 *b, int64_t t_ns)
     psa2_spi_start(b, &x, t_ns);
 }
 
-/* The step that is due; the wrong way: the last of its event's in place of the first. */
+/* The step that is due; in reverse order: the last of its event in place of the first. */
 static const struct psa2_setup_step *setup_step(const struct psa2 *b)
 {
     const struct psa2_setup_step *const all = b->profile.setup, *due = &all[b->step];
@@ -112,7 +59,7 @@ static const struct psa2_setup_step *setup_step(const struct psa2 *b)
 /* DRD_A is awaited all the time, again after each step: a new CONFIG0 means another settling time. */
 static void await_step(struct psa2 *b, int64_t t_ns)
 {
-    psa2_arm_patience(b, t_ns);
+    psa2_arm_timeout(b, t_ns);
     if (b->profile.setup[b->step].on == PSA2_ON_DRD_T) psa2_temp_await(b, t_ns);
 }
 
@@ -131,7 +78,7 @@ static void setup_event(struct psa2 *b, enum psa2_setup_event on, int64_t t_ns)
     if (b->step >= b->profile.setup_count || !port_free(b)) return;
     const struct psa2_setup_step *s = setup_step(b);
     if (s->on != on) return;
-    if (on == PSA2_ON_DRD_T) psa2_temp_heard(b);
+    if (on == PSA2_ON_DRD_T) psa2_temp_answered(b);
     if (s->action == PSA2_SYNC_A || s->action == PSA2_SYNC_T) {
         psa2_pulse(b, s->action == PSA2_SYNC_T ? PSA2_TEMP : PSA2_ACCEL, setup_done, t_ns);
         return;
@@ -176,7 +123,6 @@ static void read_done(struct psa2 *b, int64_t t_ns)
     b->sample.reading = b->sample.overrun = b->temp.fresh = false;
     if (b->sample.unsettled) b->sample.unsettled--;
     if (b->stream) psa2_out_start(b, t_ns);
-    psa2_service(b, t_ns);
 }
 
 static void read_start(struct psa2 *b, int64_t t_ns)
@@ -197,20 +143,8 @@ static void init_read(struct psa2 *b)
     b->read.done = read_done;
 }
 
-bool psa2_flowing(const struct psa2 *b, int64_t t_ns)
-{
-    return b->drd_a_seen && t_ns - b->drd_a_ns < 2 * b->period_ns;
-}
-
-bool psa2_window(const struct psa2 *b, int64_t span_ns, int64_t t_ns)
-{
-    if (!psa2_flowing(b, t_ns)) return true;
-    const int64_t need_ns = span_ns + psa2_tclk_ns(b, MARGIN_TCLK);
-    const int64_t read_ns = clk_span_ns(b->profile.sclk_hz, b->profile.read_bits + 2);
-    return t_ns + need_ns <= b->drd_a_ns + b->period_ns || read_ns + need_ns > b->period_ns;
-}
-
-void psa2_service(struct psa2 *b, int64_t t_ns)
+/* Carries out what is due on an idle serial port: the read, then a request, then the temperature scan. */
+static void serve_port(struct psa2 *b, int64_t t_ns)
 {
     if (b->mode != PSA2_RUN || !port_free(b)) return;
     if (b->sample.due) {
@@ -231,29 +165,40 @@ static void sample_due(struct psa2 *b, int64_t t_ns)
     s->due = true;
     s->due_ns = t_ns;
     s->due_seq = b->seq++;
-    psa2_service(b, t_ns);
+    serve_port(b, t_ns);
 }
 
-/* ---- data-ready and patience ---- */
+/* ---- data-ready and its timeout ---- */
 
-void psa2_arm_patience(struct psa2 *b, int64_t t_ns)
-{
-    b->patience_ns = t_ns + PSA2_PATIENCE_NS + ads1282_settle_ns(&b->adc[0]);
-    if (!b->patience.queued || b->patience.due_ns > b->patience_ns) sched_at(b->sched, &b->patience, b->patience_ns);
-}
-
-static void out_of_patience(void *ctx, int64_t t_ns)
+static void on_accel_timeout(void *ctx, int64_t t_ns)
 {
     struct psa2 *b = ctx;
-    if (t_ns < b->patience_ns) {
-        sched_at(b->sched, &b->patience, b->patience_ns);
+    if (t_ns < b->timeout_ns) {
+        sched_at(b->sched, &b->timeout, b->timeout_ns);
         return;
     }
     b->counters.timeouts++;
-    if (!b->fault_told && b->host.fault) b->host.fault(b->host.ctx, PSA2_FAULT_ACCEL_PORT, t_ns);
-    b->fault_told = true;
+    if (!b->fault_notified && b->host.fault) b->host.fault(b->host.ctx, PSA2_FAULT_ACCEL_PORT, t_ns);
+    b->fault_notified = true;
     psa2_request_fail(b, PSA2_ACCEL, false, t_ns);
-    psa2_service(b, t_ns);
+    serve_port(b, t_ns);
+}
+
+static void on_temp_timeout(void *ctx, int64_t t_ns)
+{
+    struct psa2 *b = ctx;
+    psa2_temp_timeout(b, t_ns);
+    psa2_request_fail(b, PSA2_TEMP, false, t_ns);
+    serve_port(b, t_ns);
+}
+
+enum psa2_result psa2_submit(struct psa2 *b, struct psa2_request *r, int64_t t_ns)
+{
+    const enum psa2_result result = psa2_request_accept(b, r);
+    if (result != PSA2_OK) return result;
+    if (!b->timeout.queued) psa2_arm_timeout(b, t_ns);
+    serve_port(b, t_ns);
+    return PSA2_OK;
 }
 
 static void drd_a_fell(struct psa2 *b, int64_t t_ns)
@@ -262,8 +207,8 @@ static void drd_a_fell(struct psa2 *b, int64_t t_ns)
     b->period_ns = ads1282_period_ns(&b->adc[0]);
     b->drd_a_seen = true;
     b->drd_a_ns = t_ns;
-    b->fault_told = false;
-    psa2_arm_patience(b, t_ns);
+    b->fault_notified = false;
+    psa2_arm_timeout(b, t_ns);
     if (b->mode == PSA2_SETUP) setup_event(b, PSA2_ON_DRD_A, t_ns);
     else if (b->mode == PSA2_RUN) sample_due(b, t_ns);
 }
@@ -277,8 +222,14 @@ static void accel_drdy(void *ctx, bool level, int64_t t_ns)
     if (port->axis != 0) return;
     psa2_line(b, PSA2_LINE_DRD_A, level, t_ns);
     if (level || b->mode == PSA2_OFF) return;
-    psa2_tell(b, PSA2_EV_DRD_A, t_ns);
+    psa2_notify_event(b, PSA2_EV_DRD_A, t_ns);
     drd_a_fell(b, t_ns);
+}
+
+static void temp_ready(struct psa2 *b, int64_t t_ns)
+{
+    psa2_temp_ready(b);
+    serve_port(b, t_ns);
 }
 
 static void temp_drdy(void *ctx, bool level, int64_t t_ns)
@@ -286,9 +237,9 @@ static void temp_drdy(void *ctx, bool level, int64_t t_ns)
     struct psa2 *b = ctx;
     psa2_line(b, PSA2_LINE_DRD_T, level, t_ns);
     if (level || b->mode == PSA2_OFF) return;
-    psa2_tell(b, PSA2_EV_DRD_T, t_ns);
+    psa2_notify_event(b, PSA2_EV_DRD_T, t_ns);
     if (b->mode == PSA2_SETUP) setup_event(b, PSA2_ON_DRD_T, t_ns);
-    else if (b->mode == PSA2_RUN) psa2_temp_ready(b, t_ns);
+    else if (b->mode == PSA2_RUN) temp_ready(b, t_ns);
 }
 
 /* Input pair 1 carries the channel; pair 2 is not connected. */
@@ -312,7 +263,7 @@ static void accel_vin_row_v(void *ctx, unsigned mux, const int64_t *t_ns, unsign
 
 /* ---- life ---- */
 
-static void wake(void *ctx, uint64_t mask)
+static void wake_lines(void *ctx, uint64_t mask)
 {
     const uint32_t out_lines = 1u << PSA2_LINE_INT | 1u << PSA2_LINE_DATA | 1u << PSA2_LINE_CLK;
     struct psa2 *b = ctx;
@@ -322,7 +273,7 @@ static void wake(void *ctx, uint64_t mask)
 static void init_trace(struct psa2 *b)
 {
     board_init(&b->base, psa2_lines, PSA2_LINES);
-    b->base.trace.source = (struct trace_source){.wake = wake, .ctx = b};
+    b->base.trace.source = (struct trace_source){.wake = wake_lines, .ctx = b};
     b->idle_lines = b->base.trace.level;
 }
 
@@ -369,37 +320,39 @@ void psa2_init(struct psa2 *b, const struct psa2_profile *p, const struct board_
                struct sched *s)
 {
     assert(io->accel && io->temp_degc);
-    memset(b, 0, sizeof *b); /* nothing of an earlier life, above all no time of it */
+    memset(b, 0, sizeof *b); /* no state of an earlier run */
     b->profile = *p;
     b->cfg = *cfg;
     b->io = *io;
     b->sched = s;
     b->stream = true;
+    b->idle = serve_port;
     b->board_degc = io->temp_degc(io->ctx, 3, s->now_ns);
     init_trace(b);
-    sched_ev(&b->pulse.ev, pulse_event, b);
+    psa2_port_init(b);
     sched_ev(&b->res_up, res_up, b);
-    sched_ev(&b->patience, out_of_patience, b);
+    sched_ev(&b->timeout, on_accel_timeout, b);
     psa2_spi_init(b);
     init_read(b);
-    psa2_temp_init(b);
+    sched_ev(&b->temp.timeout, on_temp_timeout, b);
+    psa2_temp_restart(b);
     psa2_out_init(b);
     init_accel(b);
     init_temp(b);
 }
 
-/* Everything under way ends, the lines go idle, the controller forgets. */
+/* Ends all activity; the lines go idle; the controller's state is cleared. */
 static void stop_all(struct psa2 *b, int64_t t_ns)
 {
     b->step = 0;
     b->seq = 0;
-    b->drd_a_seen = b->fault_told = false;
+    b->drd_a_seen = b->fault_notified = false;
     b->sample = (struct psa2_sample){.due = false};
-    sched_cancel(b->sched, &b->patience);
+    sched_cancel(b->sched, &b->timeout);
     psa2_spi_stop(b, t_ns);
     psa2_out_stop(b, t_ns);
     psa2_temp_restart(b);
-    pulse_stop(b, t_ns);
+    psa2_pulse_stop(b, t_ns);
     res_pin(b, false, t_ns);
 }
 
@@ -420,7 +373,7 @@ static void restore_idle_levels(struct psa2 *b, int64_t t_ns)
 
 void psa2_power_up(struct psa2 *b, int64_t t_ns)
 {
-    psa2_tell(b, PSA2_EV_POWER_UP, t_ns);
+    psa2_notify_event(b, PSA2_EV_POWER_UP, t_ns);
     if (b->unpowered) restore_idle_levels(b, t_ns);
     enter_reset(b, t_ns);
     for (unsigned i = 0; i < 3; i++) ads1282_power_up(&b->adc[i], t_ns);
@@ -432,7 +385,7 @@ void psa2_reset(struct psa2 *b, int64_t t_ns)
     if (b->mode == PSA2_OFF) return;
     b->counters.resets++;
     enter_reset(b, t_ns);
-    psa2_tell(b, PSA2_EV_RES, t_ns);
+    psa2_notify_event(b, PSA2_EV_RES, t_ns);
     psa2_request_fail(b, PSA2_ACCEL, true, t_ns);
 }
 
@@ -448,8 +401,8 @@ void psa2_power_down(struct psa2 *b, int64_t t_ns)
     trace_steps(&b->base.trace, &(struct trace_step){t_ns, (UINT32_C(1) << PSA2_LINES) - 1, 0}, 1);
     b->stream = true;
     b->latest = (struct psa2_frame){0};
-    psa2_tell(b, PSA2_EV_RES, t_ns);
-    psa2_tell(b, PSA2_EV_POWER_DOWN, t_ns);
+    psa2_notify_event(b, PSA2_EV_RES, t_ns);
+    psa2_notify_event(b, PSA2_EV_POWER_DOWN, t_ns);
     psa2_request_fail(b, PSA2_ACCEL, true, t_ns);
 }
 

@@ -128,13 +128,13 @@ static void int_rise(void *ctx, int64_t t_ns)
     finish_watched(b, t_ns);
     b->out.busy = false;
     b->counters.frames++;
-    psa2_tell(b, PSA2_EV_INT_RISE, t_ns);
+    psa2_notify_event(b, PSA2_EV_INT_RISE, t_ns);
     if (b->host.frame) b->host.frame(b->host.ctx, &b->out.f, t_ns);
 }
 
 static void int_fall(void *ctx, int64_t t_ns)
 {
-    psa2_tell(ctx, PSA2_EV_INT_FALL, t_ns);
+    psa2_notify_event(ctx, PSA2_EV_INT_FALL, t_ns);
 }
 
 void psa2_out_init(struct psa2 *b)

@@ -5,12 +5,9 @@
 
 #include "board/psa2/psa2.h"
 
-#define PSA2_PATIENCE_NS INT64_C(100000000) /* E0: 100 ms beyond the settling time without data-ready is a fault */
+#define PSA2_TIMEOUT_NS INT64_C(100000000) /* E0: 100 ms beyond the settling time without data-ready is a fault */
 
-/* psa2.c: carries out what is due on an idle serial port: the read, then a request, then the temperature scan. */
-void psa2_service(struct psa2 *b, int64_t t_ns);
-
-static inline void psa2_tell(const struct psa2 *b, enum psa2_event e, int64_t t_ns)
+static inline void psa2_notify_event(const struct psa2 *b, enum psa2_event e, int64_t t_ns)
 {
     if (b->base.observed) b->io.event(b->io.ctx, e, t_ns);
 }
@@ -21,10 +18,13 @@ static inline void psa2_line(struct psa2 *b, enum psa2_line line, bool level, in
     trace_set(&b->base.trace, line, level && b->mode != PSA2_OFF, t_ns);
 }
 
+/* psa2/port.c */
+void psa2_port_init(struct psa2 *b);
+void psa2_pulse_stop(struct psa2 *b, int64_t t_ns);
 /* Whether span_ns from now on end before the next DRD_A, or no period is long enough for them, or no data come. */
 bool psa2_window(const struct psa2 *b, int64_t span_ns, int64_t t_ns);
 bool psa2_flowing(const struct psa2 *b, int64_t t_ns); /* DRD_A came within the last two periods */
-void psa2_arm_patience(struct psa2 *b, int64_t t_ns);
+void psa2_arm_timeout(struct psa2 *b, int64_t t_ns);
 void psa2_pulse(struct psa2 *b, enum psa2_group group, void (*done)(struct psa2 *b, int64_t t_ns), int64_t t_ns);
 
 /* psa2/spi.c */
@@ -39,24 +39,25 @@ struct psa2_xfer psa2_xfer_accel(const struct psa2 *b, const uint8_t *tx, unsign
 struct psa2_xfer psa2_xfer_temp(const struct psa2 *b, const uint8_t *tx, unsigned count); /* gap of 24 tau at the end */
 
 /* psa2/temp.c */
-void psa2_temp_init(struct psa2 *b);
 void psa2_temp_restart(struct psa2 *b);                 /* channel 0, after Res */
 bool psa2_temp_start(struct psa2 *b, int64_t t_ns);     /* starts the transfer that is due, if any */
 void psa2_temp_await(struct psa2 *b, int64_t t_ns);     /* DRD_T is to fall: a fault if it does not */
-void psa2_temp_heard(struct psa2 *b);                   /* it did */
-void psa2_temp_ready(struct psa2 *b, int64_t t_ns);     /* DRD_T fell while the scan runs */
+void psa2_temp_answered(struct psa2 *b);                /* it did */
+void psa2_temp_ready(struct psa2 *b);                   /* DRD_T fell while the scan runs */
+void psa2_temp_timeout(struct psa2 *b, int64_t t_ns);   /* it did not */
 void psa2_temp_disturbed(struct psa2 *b, int64_t t_ns); /* a request changed the converter */
 bool psa2_temp_free(const struct psa2 *b); /* the converter has answered and is not converting for the scan */
 double psa2_temp_ain_v(void *ctx, unsigned ain, int64_t t_ns);
 
 /* psa2/request.c */
+enum psa2_result psa2_request_accept(struct psa2 *b, struct psa2_request *r); /* PSA2_OK: it is due */
 bool psa2_request_start(struct psa2 *b, int64_t t_ns);
 void psa2_request_fail(struct psa2 *b, enum psa2_group group, bool all, int64_t t_ns); /* PSA2_TIMEOUT */
 
 /* psa2/frame.c */
 void psa2_out_init(struct psa2 *b);
 void psa2_out_stop(struct psa2 *b, int64_t t_ns);
-void psa2_out_wake(struct psa2 *b, int64_t t_ns);  /* somebody is about to watch the frame under way */
+void psa2_out_wake(struct psa2 *b, int64_t t_ns);  /* an observer subscribes during a frame */
 void psa2_out_start(struct psa2 *b, int64_t t_ns); /* sends b->latest; dropped and counted if INT is low */
 
 #endif

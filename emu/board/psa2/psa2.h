@@ -3,7 +3,7 @@
  * After Res the controller sets the converters up as its profile says, then reads the three codes at each DRD_A, scans
  * the temperature channels, and sends four words on Int/Data/CLK (article section 5). The host of the bench reaches the
  * registers only through the controller: psa2_submit(). Plain struct owned by the caller, one thread, no allocation.
- * Edges are reported to the trace only while watched, unwatched lines only where they come to rest: a late listener is given
+ * Edges are reported to the trace only while watched, unwatched lines only where they come to rest: a late observer is given
  * true levels. Words, times and counters are the same either way. */
 #ifndef PSABENCH_BOARD_PSA2_PSA2_H
 #define PSABENCH_BOARD_PSA2_PSA2_H
@@ -65,7 +65,7 @@ struct psa2_frame {
     uint32_t word[PSA2_WORDS]; /* as sent, in order */
 };
 
-/* EMCY codes of psa2_host.fault: told once, again only after data-ready has come. */
+/* EMCY codes of psa2_host.fault: notified once, again only after data-ready has come. */
 enum psa2_fault {
     PSA2_FAULT_ACCEL_PORT = 0xFF01, /* no DRD_A for 100 ms beyond the settling time */
     PSA2_FAULT_TEMP_PORT = 0xFF02   /* no DRD_T for the same time */
@@ -79,7 +79,7 @@ enum psa2_result {
     PSA2_READ_ONLY,   /* no writable bit there */
     PSA2_BAD_VALUE,   /* the chip refuses the value (reserved code), or models it not */
     PSA2_BUSY,        /* a request is under way, or the set-up has not finished */
-    PSA2_TIMEOUT      /* no data-ready within the controller's patience */
+    PSA2_TIMEOUT      /* no data-ready within the controller's timeout */
 };
 
 /* One access through the controller's serial port. Owned by the caller until done() has been called. */
@@ -107,7 +107,7 @@ struct psa2_counters {
 
 #include "board/psa2/state.h" /* struct psa2, read-only outside the board's own files */
 
-/* io->accel and io->temp_degc have to be there. io->event, if it is: told when the line has moved and the board has not yet
+/* io->accel and io->temp_degc have to be there. io->event, if it is: called when the line has moved and the board has not yet
  * acted on it, a number of enum psa2_event. Take note, or arm an event for t_ns, which comes before the board's next step:
  * nothing of the board's may be called from inside. */
 void psa2_init(struct psa2 *b, const struct psa2_profile *p, const struct board_cfg *cfg, const struct board_io *io,

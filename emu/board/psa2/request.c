@@ -50,7 +50,7 @@ static bool is_opcode(enum psa2_group group, uint8_t op)
     return false;
 }
 
-static enum psa2_result check(const struct psa2 *b, const struct psa2_request *r)
+static enum psa2_result check_request(const struct psa2 *b, const struct psa2_request *r)
 {
     switch (r->op) {
     case PSA2_READ_REG:
@@ -64,16 +64,14 @@ static enum psa2_result check(const struct psa2 *b, const struct psa2_request *r
     return PSA2_BAD_VALUE;
 }
 
-enum psa2_result psa2_submit(struct psa2 *b, struct psa2_request *r, int64_t t_ns)
+enum psa2_result psa2_request_accept(struct psa2 *b, struct psa2_request *r)
 {
-    const enum psa2_result result = check(b, r);
+    const enum psa2_result result = check_request(b, r);
     if (result != PSA2_OK) return result;
     if (b->mode != PSA2_RUN || b->request) return PSA2_BUSY;
     assert(r->done);
     b->request = r;
     b->counters.requests++;
-    if (!b->patience.queued) psa2_arm_patience(b, t_ns);
-    psa2_service(b, t_ns);
     return PSA2_OK;
 }
 
@@ -84,7 +82,7 @@ static bool touches_registers(const struct psa2_request *r)
     return r->op == PSA2_READ_REG || r->op == PSA2_WRITE_REG;
 }
 
-static void finish(struct psa2 *b, enum psa2_result result, int64_t t_ns)
+static void finish_request(struct psa2 *b, enum psa2_result result, int64_t t_ns)
 {
     struct psa2_request *r = b->request;
     b->request = NULL;
@@ -94,7 +92,7 @@ static void finish(struct psa2 *b, enum psa2_result result, int64_t t_ns)
 void psa2_request_fail(struct psa2 *b, enum psa2_group group, bool all, int64_t t_ns)
 {
     if (!b->request) return;
-    if (all || (b->request->group == group && touches_registers(b->request))) finish(b, PSA2_TIMEOUT, t_ns);
+    if (all || (b->request->group == group && touches_registers(b->request))) finish_request(b, PSA2_TIMEOUT, t_ns);
 }
 
 static void take_answer(struct psa2 *b, struct psa2_request *r)
@@ -114,7 +112,7 @@ static unsigned unsettled_after(const struct psa2 *b, const struct psa2_request 
     return restarts ? 0 : b->sample.unsettled;
 }
 
-static void note_change(struct psa2 *b, const struct psa2_request *r, int64_t t_ns)
+static void record_change(struct psa2 *b, const struct psa2_request *r, int64_t t_ns)
 {
     if (r->op == PSA2_READ_REG) return;
     if (r->group == PSA2_TEMP) {
@@ -122,16 +120,15 @@ static void note_change(struct psa2 *b, const struct psa2_request *r, int64_t t_
         return;
     }
     b->sample.unsettled = unsettled_after(b, r);
-    psa2_arm_patience(b, t_ns);
+    psa2_arm_timeout(b, t_ns);
 }
 
 static void carried_out(struct psa2 *b, int64_t t_ns)
 {
-    assert(b->request); /* a reset ends the burst with the request; patience runs out only between bursts */
+    assert(b->request); /* a reset ends the burst with the request; the timeout expires only between bursts */
     take_answer(b, b->request);
-    note_change(b, b->request, t_ns);
-    finish(b, PSA2_OK, t_ns);
-    psa2_service(b, t_ns);
+    record_change(b, b->request, t_ns);
+    finish_request(b, PSA2_OK, t_ns);
 }
 
 /* SDATAC before RREG and RDATAC after it: sources 1.3, footnote 4 of the command table. WREG needs neither. */

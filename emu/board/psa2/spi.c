@@ -64,7 +64,7 @@ static bool clocks_accel(const struct psa2 *b)
 }
 
 /* The next instant of the byte under way. */
-static void arm(struct psa2 *b, enum psa2_spi_phase phase, int64_t t_ns)
+static void arm_phase(struct psa2 *b, enum psa2_spi_phase phase, int64_t t_ns)
 {
     b->spi.phase = phase;
     b->spi.due_ns = t_ns;
@@ -82,7 +82,7 @@ static void begin_byte(struct psa2 *b, struct clk_pos from)
 {
     struct psa2_spi *s = &b->spi;
     s->first = from.k & 1 ? clk_on(from, &s->one) : from;
-    arm(b, PSA2_SPI_FIRST, after_ns(s, &s->fall));
+    arm_phase(b, PSA2_SPI_FIRST, after_ns(s, &s->fall));
 }
 
 void psa2_spi_start(struct psa2 *b, const struct psa2_xfer *x, int64_t t_ns)
@@ -175,7 +175,7 @@ static void report_byte(struct psa2 *b, uint32_t next)
     trace_commit(&b->base.trace, (unsigned)(p - step));
 }
 
-/* The same byte unwatched: only where the lines come to rest, for whoever looks later. */
+/* The same byte unwatched: only the final levels, for late observers. */
 static void keep_levels(struct psa2 *b, int64_t t_ns)
 {
     const struct psa2_spi *s = &b->spi;
@@ -196,6 +196,7 @@ static void end_xfer(struct psa2 *b, int64_t t_ns)
 {
     b->spi.phase = PSA2_SPI_IDLE;
     b->spi.x.done(b, t_ns);
+    b->idle(b, t_ns);
 }
 
 static void end_byte(struct psa2 *b, int64_t t_ns)
@@ -209,8 +210,8 @@ static void end_byte(struct psa2 *b, int64_t t_ns)
         return;
     }
     s->ready_ns[s->x.group] = next_ns;
-    if (s->x.group == PSA2_TEMP) arm(b, PSA2_SPI_CST_UP, t_ns + psa2_tau_ns(b, CST_TAU));
-    else arm(b, PSA2_SPI_REST, after_ns(s, &s->byte)); /* SClk is low again before CST may move */
+    if (s->x.group == PSA2_TEMP) arm_phase(b, PSA2_SPI_CST_UP, t_ns + psa2_tau_ns(b, CST_TAU));
+    else arm_phase(b, PSA2_SPI_REST, after_ns(s, &s->byte)); /* SClk is low again before CST may move */
 }
 
 /* On to the last byte of a read whose bytes are known; what is reported ends with the byte before. */
@@ -247,8 +248,8 @@ static void first_fall(struct psa2 *b, int64_t t_ns)
         for (unsigned i = 0; i < 3; i++) spi_first(&b->adc[i].spi, t_ns);
     if (b->spi.x.group == PSA2_TEMP) spi_first(&b->tadc.spi, t_ns);
     if (read_at_once(b)) return;
-    if (clocks_accel(b)) arm(b, PSA2_SPI_SAMPLE_A, after_ns(&b->spi, &b->spi.sample_a));
-    else arm(b, PSA2_SPI_SAMPLE_T, after_ns(&b->spi, &b->spi.sample_t));
+    if (clocks_accel(b)) arm_phase(b, PSA2_SPI_SAMPLE_A, after_ns(&b->spi, &b->spi.sample_a));
+    else arm_phase(b, PSA2_SPI_SAMPLE_T, after_ns(&b->spi, &b->spi.sample_t));
 }
 
 /* A burst for the temperature converter that is not gated clocks the accelerometer converters with DIn low. */
@@ -258,7 +259,7 @@ static void sample_accel(struct psa2 *b, int64_t t_ns)
     const bool own = s->x.group == PSA2_ACCEL;
     for (unsigned i = 0; i < 3; i++) s->rx[i][s->at] = spi_byte(&b->adc[i].spi, own ? s->x.tx[s->at] : 0, t_ns);
     if (own) end_byte(b, t_ns);
-    else arm(b, PSA2_SPI_SAMPLE_T, after_ns(s, &s->sample_t));
+    else arm_phase(b, PSA2_SPI_SAMPLE_T, after_ns(s, &s->sample_t));
 }
 
 static void sample_temp(struct psa2 *b, int64_t t_ns)
@@ -274,7 +275,7 @@ static void cst_up(struct psa2 *b, int64_t t_ns)
     trace_set(&b->base.trace, PSA2_LINE_DOUTT, false, t_ns); /* high impedance, drawn low */
 }
 
-static void rest(struct psa2 *b, int64_t t_ns)
+static void end_burst(struct psa2 *b, int64_t t_ns)
 {
     if (b->spi.phase == PSA2_SPI_CST_UP) cst_up(b, t_ns);
     end_xfer(b, t_ns);
@@ -286,8 +287,8 @@ static void on_event(void *ctx, int64_t t_ns)
     static void (*const step[])(struct psa2 * b, int64_t t_ns) = {[PSA2_SPI_FIRST] = first_fall,
                                                                   [PSA2_SPI_SAMPLE_A] = sample_accel,
                                                                   [PSA2_SPI_SAMPLE_T] = sample_temp,
-                                                                  [PSA2_SPI_REST] = rest,
-                                                                  [PSA2_SPI_CST_UP] = rest};
+                                                                  [PSA2_SPI_REST] = end_burst,
+                                                                  [PSA2_SPI_CST_UP] = end_burst};
     struct psa2 *b = ctx;
     struct psa2_spi *s = &b->spi;
     s->due_ns = t_ns;

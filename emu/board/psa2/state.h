@@ -62,10 +62,10 @@ struct psa2_temp {
     uint8_t channel; /* being converted */
     bool hold;       /* a request went to the converter: wait for DRD_T before anything else */
     bool fresh;      /* new code since the previous frame */
-    bool fault_told;
+    bool fault_notified;
     uint8_t code_channel; /* of code */
     uint16_t code;
-    struct sched_ev patience;
+    struct sched_ev timeout;
 };
 
 /* Output line: the frame under way. */
@@ -78,7 +78,7 @@ struct psa2_out {
     bool busy;
     int watched_words; /* words reported to the trace; -1: INT fall not yet reported */
     struct psa2_frame f;
-    struct sched_ev rise, word, fall; /* fall: only while heard */
+    struct sched_ev rise, word, fall; /* fall: only while observed */
 };
 
 /* Accelerometer side: what DRD_A brought and what is being read. */
@@ -110,9 +110,9 @@ struct psa2 {
     struct psa2_counters counters;
 
     enum psa2_mode mode;
-    bool unpowered; /* the lines are low since a power-down */
+    bool unpowered; /* the lines lie low since a power-down */
     unsigned step;  /* of the set-up */
-    bool reversed;  /* the present set-up goes the wrong way */
+    bool reversed;  /* the present set-up runs in reverse order */
     bool stream;
     struct psa2_spi spi;
     struct psa2_xfer read; /* of the three codes */
@@ -120,13 +120,14 @@ struct psa2 {
     struct psa2_temp temp;
     struct psa2_out out;
     struct psa2_sample sample;
-    struct sched_ev res_up, patience;
-    bool fault_told; /* no DRD_A has come since the fault */
+    void (*idle)(struct psa2 *b, int64_t t_ns); /* the controller: a transfer or a pulse has ended */
+    struct sched_ev res_up, timeout;
+    bool fault_notified; /* no DRD_A has come since the fault */
     bool drd_a_seen;
-    int64_t drd_a_ns;    /* last fall */
-    int64_t period_ns;   /* of DRD_A as CONFIG0 is */
-    int64_t patience_ns; /* no DRD_A until then is a fault; `patience` may be due earlier and then waits on */
-    uint32_t seq;        /* of the next DRD_A */
+    int64_t drd_a_ns;   /* last fall */
+    int64_t period_ns;  /* of DRD_A as CONFIG0 is */
+    int64_t timeout_ns; /* no DRD_A until then is a fault; `timeout` may be due earlier and then waits on */
+    uint32_t seq;       /* of the next DRD_A */
     struct psa2_request *request;
     struct psa2_frame latest; /* last complete reading, whether it was sent or not; t_int_* as sent last */
 };

@@ -18,56 +18,46 @@ double psa2_temp_ain_v(void *ctx, unsigned ain, int64_t t_ns)
 
 void psa2_temp_await(struct psa2 *b, int64_t t_ns)
 {
-    sched_at(b->sched, &b->temp.patience, t_ns + PSA2_PATIENCE_NS + 4 * ads1256_settle_ns(&b->tadc));
+    sched_at(b->sched, &b->temp.timeout, t_ns + PSA2_TIMEOUT_NS + 4 * ads1256_settle_ns(&b->tadc));
 }
 
-static void out_of_patience(void *ctx, int64_t t_ns)
+void psa2_temp_timeout(struct psa2 *b, int64_t t_ns)
 {
-    struct psa2 *b = ctx;
     b->counters.timeouts++;
-    if (!b->temp.fault_told && b->host.fault) b->host.fault(b->host.ctx, PSA2_FAULT_TEMP_PORT, t_ns);
-    b->temp.fault_told = true;
+    if (!b->temp.fault_notified && b->host.fault) b->host.fault(b->host.ctx, PSA2_FAULT_TEMP_PORT, t_ns);
+    b->temp.fault_notified = true;
     b->temp.hold = false;
     b->temp.stage = PSA2_SCAN_MUX;
-    psa2_request_fail(b, PSA2_TEMP, false, t_ns);
-    psa2_service(b, t_ns);
-}
-
-void psa2_temp_init(struct psa2 *b)
-{
-    sched_ev(&b->temp.patience, out_of_patience, b);
-    psa2_temp_restart(b);
 }
 
 void psa2_temp_restart(struct psa2 *b)
 {
-    const struct sched_ev patience = b->temp.patience;
-    b->temp = (struct psa2_temp){.patience = patience};
-    sched_cancel(b->sched, &b->temp.patience);
+    const struct sched_ev timeout = b->temp.timeout;
+    b->temp = (struct psa2_temp){.timeout = timeout};
+    sched_cancel(b->sched, &b->temp.timeout);
 }
 
-static void synced(struct psa2 *b, int64_t t_ns)
+static void wait_conversion(struct psa2 *b, int64_t t_ns)
 {
     b->temp.stage = PSA2_SCAN_WAIT;
     psa2_temp_await(b, t_ns);
-    psa2_service(b, t_ns);
 }
 
 static void mux_written(struct psa2 *b, int64_t t_ns)
 {
     b->temp.stage = PSA2_SCAN_SYNC;
-    psa2_pulse(b, PSA2_TEMP, synced, t_ns);
+    psa2_pulse(b, PSA2_TEMP, wait_conversion, t_ns);
 }
 
 static void read_done(struct psa2 *b, int64_t t_ns)
 {
+    (void)t_ns;
     struct psa2_temp *m = &b->temp;
     m->code = (uint16_t)(b->spi.rx[3][1] << 8 | b->spi.rx[3][2]);
     m->code_channel = m->channel;
     m->fresh = true;
     m->channel = (uint8_t)((m->channel + 1u) % b->profile.temp_channels);
     m->stage = PSA2_SCAN_MUX;
-    psa2_service(b, t_ns);
 }
 
 /* KPSA keeps a burst out of the way of the next DRD_A; the profile without gates shows what happens if it does not. */
@@ -93,17 +83,16 @@ bool psa2_temp_start(struct psa2 *b, int64_t t_ns)
     return true;
 }
 
-void psa2_temp_heard(struct psa2 *b)
+void psa2_temp_answered(struct psa2 *b)
 {
-    b->temp.hold = b->temp.fault_told = false;
-    sched_cancel(b->sched, &b->temp.patience);
+    b->temp.hold = b->temp.fault_notified = false;
+    sched_cancel(b->sched, &b->temp.timeout);
 }
 
-void psa2_temp_ready(struct psa2 *b, int64_t t_ns)
+void psa2_temp_ready(struct psa2 *b)
 {
     if (b->temp.stage == PSA2_SCAN_WAIT) b->temp.stage = PSA2_SCAN_READ;
-    psa2_temp_heard(b);
-    psa2_service(b, t_ns);
+    psa2_temp_answered(b);
 }
 
 void psa2_temp_disturbed(struct psa2 *b, int64_t t_ns)

@@ -223,7 +223,7 @@ static void a_faster_rate_is_awaited_shorter(void **state)
     rig_up(&rig, "article", 1.0);
     struct psa2_request q = {.group = PSA2_ACCEL, .op = PSA2_WRITE_REG, .addr = 1, .value = 0x46};
     assert_int_equal(rig_request(&rig, &q), PSA2_OK);
-    rig_run(&rig, 400000000); /* the patience armed at the first of these words */
+    rig_run(&rig, 400000000); /* the timeout armed at the first of these words */
     q.value = 0x66;
     assert_int_equal(rig_request(&rig, &q), PSA2_OK);
     ads1282_reset_pin(&rig.b.adc[0], false, rig.s.now_ns);
