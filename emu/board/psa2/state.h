@@ -110,7 +110,7 @@ struct psa2 {
     struct psa2_counters counters;
 
     enum psa2_mode mode;
-    bool unpowered; /* the lines lie low since a power-down */
+    bool unpowered; /* the lines are low since a power-down */
     unsigned step;  /* of the set-up */
     bool reversed;  /* the present set-up runs in reverse order */
     bool stream;
