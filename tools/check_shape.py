@@ -28,9 +28,10 @@ ROOMS = ("emu", "scripts", "tests", "docs")
 NOT_ROOMS = ("tests/fuzz/corpus", "docs/img")  # recorded data and pictures
 LOOSE_MODULES = 12
 # Numbers of objects of CANopen: the communication area, the boards' own, the profile area of PSA-2.
-OBJECT = re.compile(r"\b0x(?:1[0-9A-Fa-f]{3}|2[0-3][0-9A-Fa-f]{2}|60[0-9A-Fa-f]{2}|61[0-9A-Fa-f]{2})\b")
+OBJECT = re.compile(r"\b0x(?:1[0-9A-Fa-f]{3}|2[0-3][0-9A-Fa-f]{2}|6[01][0-9A-Fa-f]{2}|91[0-9A-Fa-f]{2})\b")
+GENERATED = f"{PACKAGE}/boards/objects.py"  # by tools/gen_proto.py
 BOARD = "pmka"  # the board by which it is measured how far a board's name spreads
-BOARD_PLACES = (f"{PACKAGE}/boards/{BOARD}/", f"{PACKAGE}/boards/registry.py")
+BOARD_PLACES = (f"{PACKAGE}/boards/{BOARD}/", f"{PACKAGE}/boards/registry.py", GENERATED)
 SOURCES = (".c", ".h", ".cpp", ".hpp")
 
 
@@ -108,7 +109,7 @@ def large_folders(files: Iterable[str]) -> list[str]:
 def object_numbers(root: Path) -> list[str]:
     """Numbers of CANopen objects written by hand, by the tokens of the code: comments and texts are free."""
     found = []
-    for path in sorted((root / PACKAGE).rglob("*.py")):
+    for path in sorted(set((root / PACKAGE).rglob("*.py")) - {root / GENERATED}):
         text = path.read_text(encoding="utf-8")
         lines = text.splitlines()
         for node in ast.walk(ast.parse(text)):
@@ -136,7 +137,7 @@ def one_word_functions(root: Path) -> list[str]:
 
 
 def lines_of(root: Path, files: Iterable[str], room: str, endings: tuple[str, ...]) -> int:
-    chosen = [f for f in files if f.startswith(f"{room}/") and f.endswith(endings)]
+    chosen = [f for f in files if f.startswith(f"{room}/") and f.endswith(endings) and f != GENERATED]
     return sum(len((root / f).read_text(encoding="utf-8").splitlines()) for f in chosen)
 
 
@@ -158,11 +159,11 @@ def metrics(root: Path) -> list[Metric]:
 
 LIMITS = {
     "folders-over-30-files": 1,
-    "object-numbers": 231,
+    "object-numbers": 0,
     "one-word-functions-python": 929,
     "lines-emu": 48_900,
-    "lines-scripts": 40_300,
-    "tracked-files": 1_410,
+    "lines-scripts": 40_400,
+    "tracked-files": 1_400,
 }
 
 

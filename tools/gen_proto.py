@@ -2,7 +2,7 @@
 """Everything that follows from proto/psabench.yaml and proto/<board>.yaml, the source of CAN messages and objects.
 
 Usage:
-    gen_proto.py            write proto/psabench.dbc, an EDS and a protocol page a device, which are kept in git
+    gen_proto.py            write what is kept in git: proto/psabench.dbc, boards/objects.py, an EDS and a page a device
     gen_proto.py --check    exit 1 and name the ones that are out of date
     gen_proto.py --out DIR  write the C tables: psabench_can.[ch] (cantools) and an <device>_od.[ch] each
 
@@ -18,13 +18,17 @@ from protogen.c_tables import c_files
 from protogen.dbc import dbc
 from protogen.eds import eds
 from protogen.model import ROOT, Protocol
+from protogen.objects import objects_module
 from protogen.page import page
 from protogen.source import load_all
 
 
 def kept_files(protocols: list[Protocol]) -> dict[Path, str]:
     """Path to text of everything that is kept in git."""
-    files = {ROOT / "proto/psabench.dbc": dbc(protocols)}
+    files = {
+        ROOT / "proto/psabench.dbc": dbc(protocols),
+        ROOT / "scripts/psabench/boards/objects.py": objects_module(protocols),
+    }
     for p in protocols:
         files[ROOT / f"proto/{p.key}.eds"] = eds(p)
         name = "protocol.md" if p.key == "psa2" else f"protocol_{p.key}.md"

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import ClassVar
 
+from psabench.boards.objects import BusObjects, Common, Psa2Objects
 from psabench.boards.psa2.frames import FrameReader, Frames
 from psabench.boards.readings import ReadingLayout, ReadingReader, Readings
 from psabench.errors import CycleRefused, DeviceError, LinkError
@@ -20,10 +21,16 @@ from psabench.places import proto_file
 NMT_START, NMT_STOP, NMT_PREOP, NMT_RESET_NODE, NMT_RESET_COMMUNICATION = 0x01, 0x02, 0x80, 0x81, 0x82
 
 # Objects that are registers, by what they are called here; sub-index = address + 1.
-BANKS: Mapping[str, int] = {"x": 0x2000, "y": 0x2003, "z": 0x2004, "t": 0x2001, "bus": 0x2002}
-ERROR_REGISTER, NAME, IDENTITY = 0x1001, 0x1008, 0x1018
+BANKS: Mapping[str, int] = {
+    "x": Psa2Objects.REG_X,
+    "y": Psa2Objects.REG_Y,
+    "z": Psa2Objects.REG_Z,
+    "t": Psa2Objects.REG_T,
+    "bus": BusObjects.BUS,
+}
+ERROR_REGISTER, NAME, IDENTITY = Common.ERROR_REGISTER, Common.DEVICE_NAME, Common.IDENTITY
 TPDO_OFF = 0x80000000  # bit 31 of 1800h..:1
-COUNTERS, REFUSAL, STROBE_NS = 0x2030, 0x2031, 0x2051
+COUNTERS, REFUSAL, STROBE_NS = Common.COUNTERS, Common.REFUSAL, BusObjects.STROBE_NS
 
 
 class Unit:
@@ -168,7 +175,9 @@ class BusUnit(Unit):
         Raises ValueError for one that the board has not.
         """
         tpdos = {
-            self.node.title(0x1800 + k).partition(":")[0]: 0x1800 + k for k in range(8) if self.node.has(0x1800 + k)
+            self.node.title(Common.TPDO + k).partition(":")[0]: Common.TPDO + k
+            for k in range(8)
+            if self.node.has(Common.TPDO + k)
         }
         for name in messages:
             if name not in tpdos:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Container
 
+from psabench.boards.objects import Area, BusObjects
 from psabench.conform.bus_host import refused
 from psabench.conform.dut import Subject
 from psabench.conform.requirements import requirements
@@ -12,8 +13,8 @@ from psabench.conform.verdict import Broken
 from psabench.link.canopen_host import Described
 
 OWN, BUS, READ_ONLY = (
-    range(0x2000, 0x6000),
-    0x2002,
+    range(Area.MANUFACTURER, Area.PROFILE),
+    BusObjects.BUS,
     0x06010002,
 )  # BUS: cycles of the parallel bus, with rows of their own
 REAL_FORMATS = {4: "<f", 8: "<d"}

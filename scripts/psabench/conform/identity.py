@@ -8,6 +8,7 @@ from contextlib import suppress
 from datetime import datetime
 from importlib.metadata import version
 
+from psabench.boards.objects import Common
 from psabench.conform.dut import Subject
 from psabench.conform.requirements import INDEX, requirements
 from psabench.errors import BenchError
@@ -15,10 +16,10 @@ from psabench.places import find_emulator, proto_file
 
 # Objects of CiA 301 that name a device: what a report calls them.
 OBJECTS: Mapping[str, tuple[int, int]] = {
-    "device": (0x1008, 0),
-    "hardware": (0x1009, 0),
-    "software": (0x100A, 0),
-    "serial number": (0x1018, 4),
+    "device": (Common.DEVICE_NAME, 0),
+    "hardware": (Common.HARDWARE_VERSION, 0),
+    "software": (Common.SOFTWARE_VERSION, 0),
+    "serial number": (Common.IDENTITY, 4),
 }
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
+from psabench.boards.objects import Common
 from psabench.conform.capture.canbits import frame_bits
 from psabench.conform.capture.log import CanFrame
 from psabench.conform.dut import Subject, Take
@@ -19,7 +20,13 @@ from psabench.link.can_host import Message
 
 NMT_START, NMT_STOP, NMT_PREOP, NMT_RESET, NMT_RESET_COMMUNICATION = 0x01, 0x02, 0x80, 0x81, 0x82
 BOOT_UP, STOPPED, OPERATIONAL, PRE_OPERATIONAL = 0x00, 0x04, 0x05, 0x7F
-DEVICE_TYPE, HEARTBEAT, COUNTERS, TPDO, MAPPING = 0x1000, 0x1017, 0x2030, 0x1800, 0x1A00
+DEVICE_TYPE, HEARTBEAT, COUNTERS, TPDO, MAPPING = (
+    Common.DEVICE_TYPE,
+    Common.HEARTBEAT_MS,
+    Common.COUNTERS,
+    Common.TPDO,
+    Common.TPDO_MAPPING,
+)
 UPLOAD, EXPEDITED, ABORT, FINE = 0x40, 0x23, 0x80, 0x60
 OFF = 0x80000000  # bit 31 of 18xxh sub 1
 LOCKSTEP_S, REAL_S = 1.0, 5.0  # patience for an answer, bench time; in real time the machine may be busy

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from psabench.bench import Bench
+from psabench.boards.objects import PikObjects
 from psabench.boards.pik import estimate as pik
 from psabench.boards.pik.device import Pik
 from psabench.boards.pmka import estimate as pmka
@@ -32,7 +33,7 @@ SCENARIO = "converters"
 AMPERE_PER_G = 1.28e-3  # of the accelerometers, from their passport
 SETTLE_S = 4.0  # from power-on until every board of the scenario is set up
 PSA2_LSB_V = 10.0 / 2**23
-PLATE = 0x2210  # of a PIK: type, K in 0.001 Hz/V
+PLATE = PikObjects.PLATE  # of a PIK: type, K in 0.001 Hz/V
 
 Floats = npt.NDArray[np.float64]
 

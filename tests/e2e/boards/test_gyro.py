@@ -248,16 +248,34 @@ units:
         ("site: {latitude_deg: 50}" + UNITS, "level: expected a section platform to mount it on"),
         ("site: {latitude_deg: 50}\nunits: [{board: gyro}]", "a: expected a section platform for it to control"),
         ("vehicle: {heading_deg: 3}\nunits: [{}]", "vehicle: expected a section platform"),
-        ("site: {latitude_deg: 50}\nplatform: {}\nunits: [{board: gyro, level: b}, {name: b}]", "expected a PSA-2 with on: platform"),
-        ("site: {latitude_deg: 50}\nplatform: {}\nunits: [{board: gyro, level: c}]", 'expected the name of a PSA-2, got "c"'),
-        ("site: {latitude_deg: 50}\nplatform: {}\nunits: [{board: gyro}, {board: gyro}]", "expected one gyro unit on the platform"),
+        (
+            "site: {latitude_deg: 50}\nplatform: {}\nunits: [{board: gyro, level: b}, {name: b}]",
+            "expected a PSA-2 with on: platform",
+        ),
+        (
+            "site: {latitude_deg: 50}\nplatform: {}\nunits: [{board: gyro, level: c}]",
+            'expected the name of a PSA-2, got "c"',
+        ),
+        (
+            "site: {latitude_deg: 50}\nplatform: {}\nunits: [{board: gyro}, {board: gyro}]",
+            "expected one gyro unit on the platform",
+        ),
         ("units: [{level: b}]", "level: not a setting of a PSA-2"),
-        ("site: {latitude_deg: 50}\nplatform: {}\nunits: [{board: gyro, axes: {}}]", "axes: not a setting of a Gyro unit"),
+        (
+            "site: {latitude_deg: 50}\nplatform: {}\nunits: [{board: gyro, axes: {}}]",
+            "axes: not a setting of a Gyro unit",
+        ),
         ("platform: {gm_tau_s: 0}\nunits: [{}]", "platform.gm_tau_s: expected "),
-        ("timeline: [{cmd: vehicle.fly, args: {speed_mps: 1, track_deg: 0}}]\nunits: [{}]", "this scenario has no platform"),
-        ("timeline: [{cmd: gyro.mode, args: {unit: a, mode: hold}}]\nunits: [{}]", "unit: expected a gyro unit, got a, a PSA-2"),
+        (
+            "timeline: [{cmd: vehicle.fly, args: {speed_mps: 1, track_deg: 0}}]\nunits: [{}]",
+            "this scenario has no platform",
+        ),
+        (
+            "timeline: [{cmd: gyro.mode, args: {unit: a, mode: hold}}]\nunits: [{}]",
+            "unit: expected a gyro unit, got a, a PSA-2",
+        ),
     ],
-)  # fmt: skip
+)
 def test_scenarios_that_cannot_be_are_refused(text: str, says: str, tmp_path: Path) -> None:
     path = tmp_path / "s.yaml"
     path.write_text(text + "\n")

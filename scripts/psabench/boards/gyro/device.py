@@ -15,6 +15,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum, IntFlag
 
+from psabench.boards.objects import GyroObjects as OD
 from psabench.boards.readings import ReadingLayout
 from psabench.boards.unit import BusUnit
 from psabench.errors import BadInput, DeviceError
@@ -67,40 +68,40 @@ class Began:
     step: int  # in which it did last, as `Gyro.steps`
 
 
-MODE, PHASE, POSITION, FLAGS = (0x2100, 1), (0x2100, 2), (0x2100, 3), (0x2100, 4)
-POSITIONS, POSITIONS_MAX, RUN_MAX = 0x2103, 32, 127
-BEGAN, SELF_TEST, SELF_TEST_RESULT = 0x2108, (0x210B, 1), (0x210B, 2)
-STEP_NS, STEPS = (0x210A, 1), (0x210A, 2)
-LATEST_ENCODER, ENCODER_DEG = (0x2200, 3), 180.0 / 2**31
-LATEST_BETA, LEVEL_DEG = (0x2200, 6), 2e-6
+MODE, PHASE, POSITION, FLAGS = (OD.CONTROL, 1), (OD.CONTROL, 2), (OD.CONTROL, 3), (OD.CONTROL, 4)
+POSITIONS, POSITIONS_MAX, RUN_MAX = OD.POSITIONS, 32, 127
+BEGAN, SELF_TEST, SELF_TEST_RESULT = OD.PAST, (OD.SELF_TEST, 1), (OD.SELF_TEST, 2)
+STEP_NS, STEPS = (OD.CLOCK, 1), (OD.CLOCK, 2)
+LATEST_ENCODER, ENCODER_DEG = (OD.LATEST, 3), 180.0 / 2**31
+LATEST_BETA, LEVEL_DEG = (OD.LATEST, 6), 2e-6
 
 # Settings by the names that this package gives them: object and sub-index.
 SETTINGS: Mapping[str, tuple[int, int]] = {
-    "slew_deg": (0x2101, 1),
-    "slew_dps": (0x2101, 2),
-    "slew_dps2": (0x2101, 3),
-    "settle_s": (0x2101, 4),
-    "settle_limit_s": (0x2101, 5),
-    "tolerance_arcmin": (0x2101, 6),
-    "count": (0x2102, 1),
-    "repeat": (0x2102, 2),
-    "window_s": (0x2102, 3),
-    "calibration_s": (0x2102, 4),
-    "freeze": (0x2102, 5),
-    "m1_per_s": (0x2104, 1),
-    "m2_per_s": (0x2104, 2),
-    "latitude_deg": (0x2105, 1),
-    "speed_mps": (0x2105, 2),
-    "track_deg": (0x2105, 3),
-    "azimuth_deg": (0x2106, 1),
-    "drift1_degph": (0x2107, 1),
-    "drift2_degph": (0x2107, 2),
-    "zero_x_v": (0x2109, 2),
-    "zero_y_v": (0x2109, 3),
-    "scale_x_v_per_g": (0x2109, 4),
-    "scale_y_v_per_g": (0x2109, 5),
+    "slew_deg": (OD.SLEW, 1),
+    "slew_dps": (OD.SLEW, 2),
+    "slew_dps2": (OD.SLEW, 3),
+    "settle_s": (OD.SLEW, 4),
+    "settle_limit_s": (OD.SLEW, 5),
+    "tolerance_arcmin": (OD.SLEW, 6),
+    "count": (OD.RUN, 1),
+    "repeat": (OD.RUN, 2),
+    "window_s": (OD.RUN, 3),
+    "calibration_s": (OD.RUN, 4),
+    "freeze": (OD.RUN, 5),
+    "m1_per_s": (OD.LOOPS, 1),
+    "m2_per_s": (OD.LOOPS, 2),
+    "latitude_deg": (OD.PLACE, 1),
+    "speed_mps": (OD.PLACE, 2),
+    "track_deg": (OD.PLACE, 3),
+    "azimuth_deg": (OD.HEADING, 1),
+    "drift1_degph": (OD.DRIFT, 1),
+    "drift2_degph": (OD.DRIFT, 2),
+    "zero_x_v": (OD.LEVEL, 2),
+    "zero_y_v": (OD.LEVEL, 3),
+    "scale_x_v_per_g": (OD.LEVEL, 4),
+    "scale_y_v_per_g": (OD.LEVEL, 5),
 }
-LEVEL_NODE, HEADING = (0x2109, 1), (0x2106, 2)
+LEVEL_NODE, HEADING = (OD.LEVEL, 1), (OD.HEADING, 2)
 ABORT_RANGE = {0x06090030, 0x06090031, 0x06090032}  # CiA 301, 7.2.4.3.17: value range, too high, too low
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from psabench.boards.board import Beat, Board, Setting
+from psabench.boards.objects import Psa2Objects
 from psabench.boards.psa2.fields import FIELDS
 
 BOARD = Board(
@@ -22,6 +23,6 @@ BOARD = Board(
     ),
     clocks=("fclk_hz", "temp_clkin_hz", "sclk_hz", "line_hz"),
     has_thermometer=True,
-    setting=Setting(index=0x2023, sub=0, value=bytes([3, 0])),
+    setting=Setting(index=Psa2Objects.SAMPLE_NTH, sub=0, value=bytes([3, 0])),
     fields=FIELDS,
 )

@@ -8,6 +8,7 @@ with CanHost(open_bus("socketcand:127.0.0.1:29536"), WallClock()) as host:
 
 from __future__ import annotations
 
+from psabench.boards.objects import Psa2Objects as OD
 from psabench.boards.psa2.frames import Form, FrameReader, Frames
 from psabench.boards.registry import DBC_NODE
 from psabench.boards.unit import Unit
@@ -16,7 +17,7 @@ from psabench.link.can_host import CanHost
 from psabench.link.protocol_files import message
 from psabench.link.signals import layout
 
-REGISTERS = {"x": 0x2000, "t": 0x2001, "y": 0x2003, "z": 0x2004}  # objects; sub-index = register + 1
+REGISTERS = {"x": OD.REG_X, "t": OD.REG_T, "y": OD.REG_Y, "z": OD.REG_Z}  # objects; sub-index = register + 1
 OPCODE = {"accel": 1, "temp": 2}  # sub-index of 2010h
 CONFIG0, DRATE = 0x01, 0x03
 
@@ -45,7 +46,7 @@ class Psa2(Unit):
 
     def opcode(self, group: str, code: int) -> None:
         """Send one command byte to the converters of group "accel" or "temp"."""
-        self.node.write(0x2010, OPCODE[group], code)
+        self.node.write(OD.OPCODE, OPCODE[group], code)
 
     @property
     def data_hz(self) -> int:
@@ -54,11 +55,11 @@ class Psa2(Unit):
 
     @property
     def form(self) -> Form:
-        return Form(int(self.node.read(0x2020)))
+        return Form(int(self.node.read(OD.FRAME_FORM)))
 
     @form.setter
     def form(self, form: Form) -> None:
-        self.node.write(0x2020, 0, int(form))
+        self.node.write(OD.FRAME_FORM, 0, int(form))
 
     def wait_ready(self, patience_s: float = 5.0) -> None:
         """Until the set-up after Res is over: the controller then serves its registers and frames are settled.
@@ -83,5 +84,5 @@ class Psa2(Unit):
         31 significant bits: 9.3 nV a step, where a code of the stream has 1.19 uV. Needs a profile that reads 32 bits.
         """
         full_scale_v = layout(message("PSA2_XY"))["X"].scale * 2**23
-        x, y, z = (int(self.node.read(0x2201, sub)) / 2**31 * full_scale_v for sub in (1, 2, 3))
+        x, y, z = (int(self.node.read(OD.RAW_WORDS, sub)) / 2**31 * full_scale_v for sub in (1, 2, 3))
         return x, y, z

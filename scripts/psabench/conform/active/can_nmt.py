@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 
 from psabench.boards.board import Setting
+from psabench.boards.objects import BusObjects, Common
 from psabench.boards.registry import BOARDS
 from psabench.conform.dut import Subject
 from psabench.conform.plan import trial
@@ -35,7 +36,7 @@ from psabench.conform.verdict import Broken
 
 BEAT_MS, NEW_BEAT_MS = 20, 100
 SETTLE_S = 0.05  # in which a PDO would come, were there one
-REMARK, NAME = 0x2040, 0x1008
+REMARK, NAME = Common.REMARK, Common.DEVICE_NAME
 REQUESTS = 5
 
 
@@ -218,7 +219,7 @@ def _settings(t: Talk) -> dict[tuple[int, int], bytes]:
     return {(HEARTBEAT, 0): (777).to_bytes(2, "little"), (TPDO, 2): bytes([7]), (TPDO, 3): (9).to_bytes(2, "little")}
 
 
-STROBE = Setting(index=0x2051, sub=0, value=(5000).to_bytes(4, "little"))  # of a board with a bus
+STROBE = Setting(index=BusObjects.STROBE_NS, sub=0, value=(5000).to_bytes(4, "little"))  # of a board with a bus
 
 
 def _own_settings(s: Subject) -> dict[tuple[int, int], bytes]:

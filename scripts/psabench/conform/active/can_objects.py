@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from psabench.boards.objects import Common
 from psabench.conform.active.can_sdo import NOWHERE, put
 from psabench.conform.capture.canbits import frame_bits
 from psabench.conform.dut import Subject
@@ -25,8 +26,26 @@ from psabench.conform.verdict import Broken, TooLittle
 from psabench.link.canopen_host import Described
 from psabench.link.protocol_files import message
 
-COMMON = (0x1000, 0x1001, 0x1003, 0x1005, 0x1008, 0x1009, 0x100A, 0x1014, 0x1017, 0x1018, 0x1200)
-EMCY_ID, IDENTITY, SERVER, REMARK, LOAD = 0x1014, 0x1018, 0x1200, 0x2040, "Bus load"
+COMMON = (
+    Common.DEVICE_TYPE,
+    Common.ERROR_REGISTER,
+    Common.ERROR_HISTORY,
+    Common.COB_ID_SYNC,
+    Common.DEVICE_NAME,
+    Common.HARDWARE_VERSION,
+    Common.SOFTWARE_VERSION,
+    Common.COB_ID_EMCY,
+    Common.HEARTBEAT_MS,
+    Common.IDENTITY,
+    Common.SDO_SERVER_PARAMETER,
+)
+EMCY_ID, IDENTITY, SERVER, REMARK, LOAD = (
+    Common.COB_ID_EMCY,
+    Common.IDENTITY,
+    Common.SDO_SERVER_PARAMETER,
+    Common.REMARK,
+    "Bus load",
+)
 SERIAL = 4
 NEAR = 3  # readings before and after an answer that it may be of
 ERRORS_OF_CAN = ("Transmit errors", "Receive errors", "Controller state")

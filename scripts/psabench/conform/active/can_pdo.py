@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import itertools
 
+from psabench.boards.objects import Common
 from psabench.conform.capture.log import CanFrame
 from psabench.conform.dut import Subject
 from psabench.conform.plan import trial
@@ -21,7 +22,7 @@ FREE_ID = 0x1F0  # of no service and no message of a node below 112
 LONG_ID = 0x800  # the first that 11 bits do not hold
 EVENT, SYNC_NEW = 254, 0
 INHIBIT_S = 0.05
-HISTORY, OVERLOADS = 0x1003, 9
+HISTORY, OVERLOADS = Common.ERROR_HISTORY, 9
 FLOOD_S, CALM_S = 0.3, 1.3
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 import struct
 
+from psabench.boards.objects import Absent, Area, BusObjects, Common, Psa2Objects
 from psabench.conform.dut import Subject
 from psabench.conform.plan import trial
 from psabench.conform.proves import proves
@@ -27,8 +28,14 @@ from psabench.conform.requirements import Requirement, requirements
 from psabench.conform.verdict import Broken
 from psabench.link.canopen_host import Described
 
-NAME, ERRORS, IDENTITY, SERVER, REMARK = 0x1008, 0x1003, 0x1018, 0x1200, 0x2040
-NOWHERE = 0x5FFF
+NAME, ERRORS, IDENTITY, SERVER, REMARK = (
+    Common.DEVICE_NAME,
+    Common.ERROR_HISTORY,
+    Common.IDENTITY,
+    Common.SDO_SERVER_PARAMETER,
+    Common.REMARK,
+)
+NOWHERE = Area.PROFILE - 1
 SIZES = {1: 0x4F, 2: 0x4B, 3: 0x47, 4: 0x43}  # commands of expedited answers by their bytes
 SEED = 7  # of the random frames
 HUNDRED = 100
@@ -59,7 +66,12 @@ def short_values_come_expedited(s: Subject) -> str:
     with talk(s) as t:
         for o in s.unit.node.objects():
             size = o.data_bytes
-            if size in SIZES and size not in seen and o.access != "wo" and (o.index < 0x2000 or o.index >= 0x2100):
+            if (
+                size in SIZES
+                and size not in seen
+                and o.access != "wo"
+                and (o.index < Area.MANUFACTURER or o.index >= Area.BOARD_OWN)
+            ):
                 data = t.ask(read(o.index, o.sub))
                 if data[:4] != bytes([SIZES[size]]) + read(o.index, o.sub)[1:4]:
                     raise Broken(
@@ -205,7 +217,11 @@ def no_such_object(s: Subject) -> str:
     """Upload and write objects that there are not."""
     code = _row("BUS-SDO-08").limit("abort_code")
     known = {o.index for o in s.unit.node.objects()}
-    strangers = [i for i in (0x0001, 0x1002, 0x1016, 0x2FFF, NOWHERE, 0xFFFF) if i not in known]
+    strangers = [
+        i
+        for i in (0x0001, Absent.MANUFACTURER_STATUS, Absent.CONSUMER_HEARTBEAT, 0x2FFF, NOWHERE, 0xFFFF)
+        if i not in known
+    ]
     with talk(s) as t:
         for index in strangers:
             t.refused(read(index), code, f"an upload of {index:04X}h")
@@ -241,7 +257,13 @@ def rights_are_kept(s: Subject) -> str:
     return f"{len(locked)} objects are not written, {len(hidden)} are not read"
 
 
-REGISTERS = (0x2000, 0x2001, 0x2002, 0x2003, 0x2004)  # of chips and buses: their own rows
+REGISTERS = (
+    Psa2Objects.REG_X,
+    Psa2Objects.REG_T,
+    BusObjects.BUS,
+    Psa2Objects.REG_Y,
+    Psa2Objects.REG_Z,
+)  # of chips and buses: their own rows
 
 
 @proves("BUS-SDO-11")

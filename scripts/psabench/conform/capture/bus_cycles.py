@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from psabench.boards.board import Bus
+from psabench.boards.objects import BusObjects
 from psabench.boards.registry import BOARDS
 from psabench.conform.capture.log import LineLog
 from psabench.conform.dut import Subject
@@ -15,7 +16,7 @@ from psabench.link.signals import Ints
 
 ADDRESS, DATA = tuple(f"AB{k}" for k in range(4)), tuple(f"D{k}" for k in range(16))
 LINES = ("CS", "RW", *ADDRESS)
-BUS = 0x2002
+BUS = BusObjects.BUS
 EACH_S = 20e-6  # that a cycle takes at the most without a strobe of its own
 TAIL_S = 5e-3  # after what a recording of the lines must have: its end may lie behind the present
 

@@ -6,6 +6,7 @@ import itertools
 
 import numpy as np
 
+from psabench.boards.objects import Common, Psa2Objects
 from psabench.conform.host.capture import SDO_RX, SDO_TX, SEQS, WRAP_US, Frame, number
 from psabench.conform.host.cases_units import UNIT_CASES
 from psabench.conform.host.check import HostEvidence, Unseen, enough, judges, limits, proves
@@ -13,9 +14,15 @@ from psabench.conform.verdict import Broken
 
 READ, ABORT = 0x40, 0x80  # command specifiers of SDO
 FAST, TOG = 0x380, 63  # PSA2_FAST, and the bit of it that tells the frame's number, even or odd
-REGISTERS = ((0x2000, 2), (0x2003, 2), (0x2004, 2), (0x2001, 1), (0x2001, 4))  # CONFIG0 of X, Y, Z; STATUS, DRATE
+REGISTERS = (
+    (Psa2Objects.REG_X, 2),
+    (Psa2Objects.REG_Y, 2),
+    (Psa2Objects.REG_Z, 2),
+    (Psa2Objects.REG_T, 1),
+    (Psa2Objects.REG_T, 4),
+)  # CONFIG0 of X, Y, Z; STATUS, DRATE
 ENDS = ("line_good", *(name for name, case in UNIT_CASES.items() if case.ends))  # cases of other boards and links
-IDENTITY = (0x1000, 0x1008, 0x1018)  # any of them says who is there
+IDENTITY = (Common.DEVICE_TYPE, Common.DEVICE_NAME, Common.IDENTITY)  # any of them says who is there
 
 
 @proves("HOST-RES-01")

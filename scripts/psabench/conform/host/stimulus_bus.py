@@ -16,6 +16,7 @@ from pathlib import Path
 
 import canopen
 
+from psabench.boards.objects import BusObjects
 from psabench.conform.host.stimulus import STUCK_S, ByHand, Program
 from psabench.errors import ControlError, TimeOut
 from psabench.link.control import Control
@@ -25,7 +26,7 @@ CODES = {"address": "no-address", "value": "bad-value"}  # of the control socket
 LONGEST = 80  # characters of a line
 MOST_ADDRESS = 15
 LEAP_CYCLES = 10
-BUS_OBJECT = 0x2002
+BUS_OBJECT = BusObjects.BUS
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from psabench.boards.objects import Common
 from psabench.boards.registry import BOARDS
 from psabench.conform.capture.log import Evidence
 from psabench.conform.dut import Subject
@@ -12,7 +13,7 @@ from psabench.conform.verdict import Broken, TooLittle
 BEATS_S, STREAM_S = 3.3, 0.2
 FLOOD_S, TRIES = 0.15, 5  # each flood twice as long as the one before
 CALM_S = 2.0  # an overload is over after one second
-CALLED = (0x1000, 0x1001, 0x1008, 0x1018, 0x1017, 0x5FFF)
+CALLED = (Common.DEVICE_TYPE, Common.ERROR_REGISTER, Common.DEVICE_NAME, Common.IDENTITY, Common.HEARTBEAT_MS, 0x5FFF)
 
 
 @scene("services", boards=BOARDS)
@@ -51,7 +52,7 @@ def overload(s: Subject) -> Evidence:
                     break
             t.hush()
             take.facts["dropped"] = t.counter("Dropped") - before
-            take.facts["history"] = t.upload(0x1003, 1)
+            take.facts["history"] = t.upload(Common.ERROR_HISTORY, 1)
     if not take.facts["dropped"]:
         _nothing_lost(s)
     return s.evidence("overload", take)

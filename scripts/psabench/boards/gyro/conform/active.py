@@ -5,6 +5,7 @@ from __future__ import annotations
 from psabench.boards.gyro.conform.capture_readings import EMCY, columns
 from psabench.boards.gyro.conform.stimulus import RUN_LIMIT_S, calm, level_unit, levelled, unit, until_mode
 from psabench.boards.gyro.device import Mode, Phase
+from psabench.boards.objects import GyroObjects as OD
 from psabench.conform.bus_host import refused
 from psabench.conform.capture.messages import emergencies
 from psabench.conform.dictionary import as_the_dictionary_says
@@ -14,7 +15,7 @@ from psabench.conform.proves import proves
 from psabench.conform.requirements import requirements
 from psabench.conform.verdict import Broken
 
-FRAMES = (0x2030, 14)  # level frames taken
+FRAMES = (OD.COUNTERS, 14)  # level frames taken
 
 
 @proves("GYRO-MODE-09")
@@ -24,12 +25,12 @@ def modes_that_cannot_be_are_refused(s: Subject) -> str:
     code = requirements()["GYRO-MODE-09"].limit("abort_code")
     s.reset()
     s.run_for(0.01)
-    refused(lambda: s.unit.node.write(0x2100, 1, int(Mode.LEVEL)), code, "mode 1 just after Res")
+    refused(lambda: s.unit.node.write(OD.CONTROL, 1, int(Mode.LEVEL)), code, "mode 1 just after Res")
     reason = s.unit.refusal()
     if not reason:
         raise Broken("no reason in 2031h", "one in words")
     calm(s)
-    s.unit.node.write(0x2100, 1, int(Mode.LEVEL))
+    s.unit.node.write(OD.CONTROL, 1, int(Mode.LEVEL))
     calm(s)
     return f"refused: {reason}"
 
@@ -42,10 +43,10 @@ def a_run_s_settings_stand_while_it_runs(s: Subject) -> str:
     levelled(s)
     unit(s).mode = Mode.GYROCOMPASS
     s.run_for(1.0)
-    refused(lambda: s.unit.node.write(0x2103, 1, 5.0), code, "2103h sub 1 in a run")
-    refused(lambda: s.unit.node.write(0x2102, 1, 2), code, "2102h sub 1 in a run")
+    refused(lambda: s.unit.node.write(OD.POSITIONS, 1, 5.0), code, "2103h sub 1 in a run")
+    refused(lambda: s.unit.node.write(OD.RUN, 1, 2), code, "2102h sub 1 in a run")
     calm(s)
-    s.unit.node.write(0x2103, 1, 5.0)
+    s.unit.node.write(OD.POSITIONS, 1, 5.0)
     calm(s)
     return "both refused"
 
@@ -81,7 +82,7 @@ def frames_of_others_are_not_taken(s: Subject) -> str:
     """Send frames of another node's PSA-2 while the level unit is silent."""
     calm(s)
     level_unit(s, False)
-    node = int(s.unit.node.read(0x2109, 1))
+    node = int(s.unit.node.read(OD.LEVEL, 1))
     before = int(s.unit.node.read(*FRAMES))
     for k in range(20):
         s.host.send(0x180 + (node % 126 + 1 if node % 126 + 1 != s.node else node + 2), bytes([k] * 8))
@@ -97,7 +98,7 @@ def frames_of_others_are_not_taken(s: Subject) -> str:
 @trial(needs={"can"})
 def the_board_says_what_it_is(s: Subject) -> str:
     """Read 1008h and 1018h sub 2."""
-    name, code = s.unit.node.read(0x1008), int(s.unit.node.read(0x1018, 2))
+    name, code = s.unit.node.read(OD.DEVICE_NAME), int(s.unit.node.read(OD.IDENTITY, 2))
     due = int(requirements()["GYRO-CAN-05"].limit("product_code"))
     if (name, code) != ("GYRO", due):
         raise Broken(f"{name}, {code:08X}h", f"GYRO, {due:08X}h")

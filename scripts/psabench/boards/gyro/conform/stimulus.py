@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from psabench.boards.gyro.conform.capture_readings import columns, vertical_degph
 from psabench.boards.gyro.device import SETTINGS, Gyro, Mode, Phase
+from psabench.boards.objects import GyroObjects as OD
 from psabench.boards.unit import NMT_PREOP, NMT_START
 from psabench.conform.capture.log import Evidence
 from psabench.conform.dut import Subject
@@ -42,7 +43,7 @@ def calm(s: Subject) -> None:
 
 def level_unit(s: Subject, on: bool) -> None:
     """Let the level unit stream, or keep it silent."""
-    node = int(s.unit.node.read(0x2109, 1))
+    node = int(s.unit.node.read(OD.LEVEL, 1))
     s.host.send(0x000, bytes([NMT_START if on else NMT_PREOP, node]))
     s.run_for(0.2 if on else 0.02)
 
@@ -50,15 +51,15 @@ def level_unit(s: Subject, on: bool) -> None:
 def settings(s: Subject) -> dict[str, object]:
     """What the laws of the controller want to know."""
     return {name: float(s.unit.node.read(*SETTINGS[name])) for name in FACTS} | {
-        "level_node": int(s.unit.node.read(0x2109, 1)),
-        "positions": [float(s.unit.node.read(0x2103, k)) for k in range(1, 4)],
+        "level_node": int(s.unit.node.read(OD.LEVEL, 1)),
+        "positions": [float(s.unit.node.read(OD.POSITIONS, k)) for k in range(1, 4)],
     }
 
 
 def until_mode(s: Subject, mode: Mode, limit_s: float) -> None:
     """Raises TooLittle where the unit does not come to that mode."""
     left_s = limit_s
-    while int(s.unit.node.read(0x2100, 1)) != mode:
+    while int(s.unit.node.read(OD.CONTROL, 1)) != mode:
         if left_s <= 0:
             raise TooLittle(f"the unit does not come to mode {int(mode)} within {limit_s:g} s")
         s.run_for(WAIT_S)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 
+from psabench.boards.objects import PikObjects as OD
 from psabench.conform.bus_host import burst, line, line_refused
 from psabench.conform.dictionary import as_the_dictionary_says
 from psabench.conform.dut import Subject
@@ -228,7 +229,7 @@ def the_name_plate_is_right(s: Subject) -> str:
     row = requirements()["PIK-CAN-05"]
     kind = "pik6" if s.variant.board == "pik6" else "pik"
     read = s.unit.node.read
-    saw = read(0x2210, 1), int(read(0x2210, 2)), int(read(0x2210, 3)), int(read(0x2210, 4))
+    saw = read(OD.PLATE, 1), int(read(OD.PLATE, 2)), int(read(OD.PLATE, 3)), int(read(OD.PLATE, 4))
     due = s.variant.profile, row.limit(f"{kind}_k_mhz_per_v"), row.limit(f"{kind}_rate_hz"), row.limit(f"{kind}_error")
     part = row.limit("plate_tolerance_ppm") * 1e-6  # a plate made for a clock that is off says so
     if saw[0] != due[0] or any(abs(a - b) > b * part + HALF for a, b in zip(saw[1:], due[1:], strict=True)):
@@ -240,7 +241,7 @@ def the_name_plate_is_right(s: Subject) -> str:
 @trial(needs={"can"})
 def the_board_says_what_it_is(s: Subject) -> str:
     """Read 1008h and 1018h sub 2."""
-    name, code = s.unit.node.read(0x1008), int(s.unit.node.read(0x1018, 2))
+    name, code = s.unit.node.read(OD.DEVICE_NAME), int(s.unit.node.read(OD.IDENTITY, 2))
     due = int(requirements()["PIK-CAN-06"].limit("product_code"))
     if (name, code) != ("PIK", due):
         raise Broken(f"{name}, {code:08X}h", f"PIK, {due:08X}h")

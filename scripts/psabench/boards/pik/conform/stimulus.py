@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from psabench.boards.objects import PikObjects as OD
 from psabench.conform.capture.log import Evidence
 from psabench.conform.dut import Subject
 from psabench.conform.plan import scene
@@ -10,7 +11,7 @@ from psabench.conform.verdict import TooLittle
 
 START_S, STREAM_S, MINUTE_S = 0.06, 1.0, 60.5
 OFF_S = 0.02  # without power
-BUS, PERIOD, SOON = 0x2002, 0x0C, 20  # registers over CAN; 20 times 100 us
+BUS, PERIOD, SOON = OD.BUS, 0x0C, 20  # registers over CAN; 20 times 100 us
 OVERDRIVE_DEG = -90.0  # there the accelerometer X gives more than its channel can follow
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 
+from psabench.boards.objects import PmkaObjects as OD
 from psabench.boards.pmka import estimate as est
 from psabench.boards.pmka.conform.stimulus import START_S, ts_s
 from psabench.conform.bus_host import burst, line, line_refused
@@ -314,7 +315,7 @@ def resets_are_counted(s: Subject) -> str:
 @trial(needs={"can"})
 def the_board_says_what_it_is(s: Subject) -> str:
     """Read 1008h and 1018h sub 2."""
-    name, code = s.unit.node.read(0x1008), int(s.unit.node.read(0x1018, 2))
+    name, code = s.unit.node.read(OD.DEVICE_NAME), int(s.unit.node.read(OD.IDENTITY, 2))
     due = int(requirements()["PMKA-CAN-05"].limit("product_code"))
     if (name, code) != ("PMKA", due):
         raise Broken(f"{name}, {code:08X}h", f"PMKA, {due:08X}h")

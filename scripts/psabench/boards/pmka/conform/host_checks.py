@@ -9,6 +9,7 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from psabench.boards.objects import PmkaObjects as OD
 from psabench.conform.host.capture import SDO_RX, SDO_TX, Bus, number
 from psabench.conform.host.capture_units import SECOND, frames_of
 from psabench.conform.host.cases_units import INPUT_V
@@ -54,7 +55,7 @@ def states(bus: Bus) -> list[State]:
     return found
 
 
-INDEX, DATA = (0x2002, 14), (0x2002, 15)  # what its ROM is read by
+INDEX, DATA = (OD.BUS, 14), (OD.BUS, 15)  # what its ROM is read by
 ROM_WORDS = 6 + 1  # head and sum, at least
 
 

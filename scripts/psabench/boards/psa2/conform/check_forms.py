@@ -6,6 +6,7 @@ import itertools
 
 import numpy as np
 
+from psabench.boards.objects import Psa2Objects as OD
 from psabench.boards.psa2.conform.capture_can import STAMP_BITS, pairs, segment
 from psabench.boards.psa2.conform.check_serial import LEAST
 from psabench.boards.psa2.conform.check_stream import MESSAGES, US, number, unit_us
@@ -161,7 +162,7 @@ def a_form_switches_its_tpdos(e: Evidence) -> str:
         for k, a in enumerate(off):
             if bool(number(a) & mask) == (k in on):
                 raise Broken(
-                    f"{0x1800 + k:04X}h:1 {number(a):08X}h in form {form}", f"bit 31 {'clear' if k in on else 'set'}"
+                    f"{OD.TPDO + k:04X}h:1 {number(a):08X}h in form {form}", f"bit 31 {'clear' if k in on else 'set'}"
                 )
     return "bit 31 clear for what each form sends, set for the others"
 

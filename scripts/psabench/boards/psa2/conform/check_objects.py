@@ -5,6 +5,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Mapping
 
+from psabench.boards.objects import Psa2Objects as OD
 from psabench.boards.psa2.conform.capture_can import Pairs, pairs
 from psabench.boards.psa2.conform.check_registers import fact
 from psabench.boards.psa2.conform.check_stream import number, unit_us
@@ -23,21 +24,21 @@ READ_ONLY, WRITE_ONLY = 0x06010002, 0x06010001
 def the_board_says_who_it_is(e: Evidence) -> str:
     """Read 1008h and 1018h."""
     row, read = row_for(e, "PSA2-CAN-09"), fact(e, "read")
-    name = read[0x1008, 0].value
+    name = read[OD.DEVICE_NAME, 0].value
     if name != "PSA-2":
         raise Broken(f"1008h {name!r}", "'PSA-2'")
     for sub, limit in ((2, "product_code"), (3, "revision_code")):
-        saw, due = number(read[0x1018, sub]), int(row.limit(limit))
+        saw, due = number(read[OD.IDENTITY, sub]), int(row.limit(limit))
         if saw != due:
             raise Broken(f"1018h:{sub} {saw:08X}h", f"{due:08X}h")
-    return f"{name}, product {number(read[0x1018, 2]):08X}h, revision {number(read[0x1018, 3]):08X}h"
+    return f"{name}, product {number(read[OD.IDENTITY, 2]):08X}h, revision {number(read[OD.IDENTITY, 3]):08X}h"
 
 
 @proves("PSA2-CAN-10")
 @check("objects")
 def object_2021h_is_the_word_width(e: Evidence) -> str:
     """Read 2021h."""
-    saw = number(fact(e, "read")[0x2021, 0])
+    saw = number(fact(e, "read")[OD.WORD_BITS, 0])
     due = int(row_for(e, "PSA2-FRAME-06", "PSA2-FRAME-07", "PSA2-FRAME-08").limit("word_bits"))
     if saw != due:
         raise Broken(f"{saw} bits", f"{due} bits")
@@ -50,7 +51,7 @@ def mirrors_show_the_sample(e: Evidence) -> str:
     """Compare the mirrors with the PDO of the same number, or of one of those that came while it was asked for."""
     p, row = pairs(e), row_for(e, "PSA2-CAN-11")
     at = {int(s): k for k, s in enumerate(p.seq)}
-    rounding = {0x6130: row.limit("rounding_g"), 0x9130: row.limit("rounding_ug")}
+    rounding = {OD.ACCEL_G: row.limit("rounding_g"), OD.ACCEL_UG: row.limit("rounding_ug")}
     for index, sub, answer, *numbers in fact(e, "mirrors"):
         first, last = (at.get(number(numbers[k])) for k in (0, -1))
         if first is None or last is None:
@@ -58,9 +59,9 @@ def mirrors_show_the_sample(e: Evidence) -> str:
         saw = answer.value
         if not isinstance(saw, (int, float)):
             raise Broken(f"{index:04X}h:{sub} answered by abort {answer.abort:08X}h", "a value")
-        if index == 0x2201:
+        if index == OD.RAW_WORDS:
             saw = int(saw) >> 8
-        elif (index, sub) == (0x2202, 5):  # us, where TSTAMP has units
+        elif (index, sub) == (OD.FRAME_HEAD, 5):  # us, where TSTAMP has units
             saw = int(saw / unit_us(e)) & 0xFFFF
         due = [_mirrored(e, p, k, index, sub) for k in range(first, last + 1)]
         if not any(abs(saw - d) <= rounding.get(index, 0.0) for d in due):
@@ -76,11 +77,11 @@ def _mirrored(e: Evidence, p: Pairs, k: int, index: int, sub: int) -> float:
     axis, code_v = (sub - 1) % 3, row_for(e, "PSA2-ADC-01").limit("code_uv") * 1e-6
     due_g = (float(p.code[k, axis]) * code_v - axis) / 2.0  # u0 = 0, 1, 2 V, k = 2 V/g
     due: Mapping[int, float] = {
-        0x2200: int(p.code[k, axis]) if sub < 4 else int(p.temp[k]),
-        0x2201: int(p.code[k, axis]),
-        0x2202: {2: status, 4: int(p.temp[k])}.get(sub, int(p.stamp[k]) & 0xFFFF),
-        0x6130: due_g,
-        0x9130: due_g * 1e6,
+        OD.CODES: int(p.code[k, axis]) if sub < 4 else int(p.temp[k]),
+        OD.RAW_WORDS: int(p.code[k, axis]),
+        OD.FRAME_HEAD: {2: status, 4: int(p.temp[k])}.get(sub, int(p.stamp[k]) & 0xFFFF),
+        OD.ACCEL_G: due_g,
+        OD.ACCEL_UG: due_g * 1e6,
     }
     return due[index]
 

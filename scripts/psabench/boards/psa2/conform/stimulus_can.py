@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from psabench.boards.objects import Psa2Objects as OD
 from psabench.boards.psa2.conform.capture_can import CODE_MAX, pairs, segment
 from psabench.boards.psa2.conform.stimulus import PERIOD_S
 from psabench.conform.capture.log import Evidence
@@ -21,11 +22,18 @@ from psabench.conform.plan import scene
 from psabench.conform.verdict import Broken, TooLittle
 from psabench.errors import DeviceError
 
-ACCEL, TEMP = (0x2000, 0x2003, 0x2004), 0x2001  # objects of registers; sub-index = address + 1
+ACCEL, TEMP = (OD.REG_X, OD.REG_Y, OD.REG_Z), OD.REG_T  # objects of registers; sub-index = address + 1
 CONFIG0, CONFIG1, OFC0, FSC0 = 2, 3, 6, 9  # sub-indices
 DRATE = 4
 REGISTERS = range(1, 12)
-COUNTERS, OPCODE, FORM, MODE, NTH, PULSES = 0x2030, 0x2010, 0x2020, 0x2022, 0x2023, 0x2024
+COUNTERS, OPCODE, FORM, MODE, NTH, PULSES = (
+    OD.COUNTERS,
+    OD.OPCODE,
+    OD.FRAME_FORM,
+    OD.SAMPLE_MODE,
+    OD.SAMPLE_NTH,
+    OD.SYNC_PIN,
+)
 FRAMES, OVERRUNS, TIMEOUTS, SYNCS_MISSED = 1, 2, 9, 12
 SYNC = 0x80
 RATES_HZ = (250, 500, 1000, 2000, 4000)  # by DR
@@ -401,12 +409,12 @@ def forms(s: Subject) -> Evidence:
     with changed(s), s.take(lines=False) as take:
         for form in (0, 1, 2, 3):
             take.facts[f"answer {form}"] = tell(s, FORM, 0, form)
-            take.facts[f"off {form}"] = [ask(s, 0x1800 + k, 1) for k in range(5)]
+            take.facts[f"off {form}"] = [ask(s, OD.TPDO + k, 1) for k in range(5)]
             streamed(s, take, f"form {form}", FORM_S[form])
         stamps = []
         for k in range(AGAIN):  # stopped with another number of samples in the block each
             s.run_for(2 * PERIOD_S)
-            stamps.append(ask(s, 0x2202, 5))  # of the latest sample, us, before the start
+            stamps.append(ask(s, OD.FRAME_HEAD, 5))  # of the latest sample, us, before the start
             streamed(s, take, f"again {k}", (20 + k) * PERIOD_S)
         take.facts["stamps"] = stamps
     return s.evidence("forms", take)
@@ -419,14 +427,14 @@ def fit(s: Subject) -> Evidence:
         cut(take, "rate")
         take.facts["rate"] = tell(s, ACCEL[0], CONFIG0, 0x66)  # 4000 SPS in pairs
         s.run_for(5 * PERIOD_S)
-        take.facts["rate text"], take.facts["config0"] = ask(s, 0x2031), ask(s, ACCEL[0], CONFIG0)
+        take.facts["rate text"], take.facts["config0"] = ask(s, OD.REFUSAL), ask(s, ACCEL[0], CONFIG0)
         tell(s, FORM, 0, 1)
         take.facts["fast"] = tell(s, ACCEL[0], CONFIG0, 0x66)
         s.run_for(30 * PERIOD_S)
         cut(take, "form")
         take.facts["form"] = tell(s, FORM, 0, 0)
         s.run_for(5 * PERIOD_S)
-        take.facts["form text"], take.facts["form read"] = ask(s, 0x2031), ask(s, FORM)
+        take.facts["form text"], take.facts["form read"] = ask(s, OD.REFUSAL), ask(s, FORM)
         cut(take, "form end")
     return s.evidence("fit", take)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from psabench.boards.objects import Psa2Objects as OD
 from psabench.boards.psa2.conform.stimulus_can import ACCEL, CONFIG0, TEMP, Answer, ask, changed, tell
 from psabench.conform.capture.log import Evidence
 from psabench.conform.dut import Subject
@@ -18,14 +19,24 @@ TRIES = 6  # in real time, on a busy machine, three answers may not come within 
 @scene("objects", boards=("psa2",))
 def objects(s: Subject) -> Evidence:
     """Identity, width and mirrors. facts: read; mirrors, those of one sample, with its PDO in the log."""
-    wanted = [(0x2200, 1), (0x2200, 2), (0x2200, 3), (0x2200, 4), (0x2202, 2), (0x2202, 3), (0x2202, 4), (0x2202, 5)]
+    wanted = [
+        (OD.CODES, 1),
+        (OD.CODES, 2),
+        (OD.CODES, 3),
+        (OD.CODES, 4),
+        (OD.FRAME_HEAD, 2),
+        (OD.FRAME_HEAD, 3),
+        (OD.FRAME_HEAD, 4),
+        (OD.FRAME_HEAD, 5),
+    ]
     with changed(s), s.take(lines=False) as take:
         take.facts["read"] = {
-            (i, sub): ask(s, i, sub) for i, sub in ((0x1008, 0), (0x1018, 2), (0x1018, 3), (0x2021, 0))
+            (i, sub): ask(s, i, sub)
+            for i, sub in ((OD.DEVICE_NAME, 0), (OD.IDENTITY, 2), (OD.IDENTITY, 3), (OD.WORD_BITS, 0))
         }
         for axis in (1, 2, 3):
-            tell(s, 0x2210, axis, axis - 1)
-            tell(s, 0x2211, axis, 2)
+            tell(s, OD.ZERO_V, axis, axis - 1)
+            tell(s, OD.SCALE_V_PER_G, axis, 2)
         tell(s, ACCEL[0], CONFIG0, 0x46)  # 250 SPS: a sample lasts 4 ms
         s.run_for(0.4)
         s.unit.start()
@@ -33,15 +44,15 @@ def objects(s: Subject) -> Evidence:
         found = []
         for index, sub in (
             *wanted,
-            (0x2201, 1),
-            (0x2201, 2),
-            (0x2201, 3),
-            *((i, k) for i in (0x6130, 0x9130) for k in (1, 2, 3)),
+            (OD.RAW_WORDS, 1),
+            (OD.RAW_WORDS, 2),
+            (OD.RAW_WORDS, 3),
+            *((i, k) for i in (OD.ACCEL_G, OD.ACCEL_UG) for k in (1, 2, 3)),
         ):
             found.append(_of_one_sample(s, index, sub))
         for _ in range(CHANNEL_LOOKS):  # every temperature channel is in one of them
             s.run_for(TEMP_PERIOD_S)
-            found.append(_of_one_sample(s, 0x2202, 2))
+            found.append(_of_one_sample(s, OD.FRAME_HEAD, 2))
         s.run_for(0.02)
         s.unit.stop()
         take.facts["mirrors"] = found
@@ -51,9 +62,9 @@ def objects(s: Subject) -> Evidence:
 def _of_one_sample(s: Subject, index: int, sub: int) -> tuple[int, int, Answer, Answer, Answer]:
     """Object, sub-index, its value and the numbers of the samples that stood there before and after."""
     for _ in range(TRIES):
-        before = ask(s, 0x2202, 1)
+        before = ask(s, OD.FRAME_HEAD, 1)
         value = ask(s, index, sub)
-        after = ask(s, 0x2202, 1)
+        after = ask(s, OD.FRAME_HEAD, 1)
         if before == after:
             break
     return index, sub, value, before, after

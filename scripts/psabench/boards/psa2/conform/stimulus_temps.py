@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from psabench.boards.objects import Psa2Objects as OD
 from psabench.boards.psa2.conform.stimulus import PERIOD_S
 from psabench.boards.psa2.conform.stimulus_can import (
     ACCEL,
@@ -21,7 +22,7 @@ from psabench.conform.capture.log import Evidence
 from psabench.conform.dut import Subject
 from psabench.conform.plan import scene
 
-HISTORY, HISTORY_LOOKS = 0x1003, 4
+HISTORY, HISTORY_LOOKS = OD.ERROR_HISTORY, 4
 
 
 @scene("trouble", boards=("psa2",))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from psabench.boards.objects import Psd1Objects as OD
 from psabench.boards.psd1.conform.host import BOTH, calm, drive, has_host, period_s, run_cycles, status, word
 from psabench.conform.bus_host import SHORT_S, burst, line, line_refused
 from psabench.conform.dut import Subject
@@ -16,7 +17,7 @@ from psabench.errors import CycleRefused
 
 CYCLE = 0x08  # of STATUS
 OTHERS = tuple(f"R {a:X}" for a in range(4, 10))  # gyros and rate sensors
-GYROS = 0x2047
+GYROS = OD.GYRO
 TURN_DPS, TURN_DPS2 = 50.0, 400.0  # of the rate table: its rate, and what it speeds up with
 ATTEMPTS = 40  # to read twice within a millisecond
 ANGLE_DEG = 10.0  # more than half of what 16 bits of arc seconds hold
@@ -62,9 +63,9 @@ def _without_flags(s: Subject) -> str:
     for flags in (0, 1, 2, BOTH):
         line(s, f"W F {flags:04X}")
         s.run_for(period_s(s.variant))
-        before = int(s.unit.node.read(0x2030, 12))
+        before = int(s.unit.node.read(OD.COUNTERS, 12))
         s.run_for(3 * period_s(s.variant))
-        found[flags] = int(s.unit.node.read(0x2030, 12)) - before
+        found[flags] = int(s.unit.node.read(OD.COUNTERS, 12)) - before
     calm(s)
     if any(found[k] for k in (0, 1, 2)) or not found[BOTH]:
         raise Broken(f"cycles with FLAGS 0 to 3: {list(found.values())}", "none but with 3")
@@ -107,7 +108,7 @@ def words_are_answered_at_their_addresses(s: Subject) -> str:
     calm(s)
     for _ in range(4):
         words = [c.data for c in drive(s, 1)]
-        told = [int(s.unit.node.read(0x2200, k)) for k in (1, 2, 3)]
+        told = [int(s.unit.node.read(OD.CODES, k)) for k in (1, 2, 3)]
         if words != told:
             raise Broken(f"{[f'{w:04X}h' for w in words]} on the bus", f"{[f'{w:04X}h' for w in told]} as 2200h tells")
     calm(s)

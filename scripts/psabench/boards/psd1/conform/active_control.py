@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from psabench.boards.objects import Psd1Objects as OD
 from psabench.boards.psd1.conform.capture_cycles import LINES, of, transfers
 from psabench.boards.psd1.conform.host import (
     BOTH,
@@ -28,20 +29,28 @@ from psabench.conform.verdict import Broken, TooLittle
 from psabench.link.busport import Cycle
 from psabench.link.can_host import QUANTUM_S
 
-UC1, UC2, ZERO, FULL, IN_CONVERTERS, COUNTERS, REFUSAL = 0x2042, 0x2043, 0x2044, 0x2045, 0x2046, 0x2030, 0x2031
+UC1, UC2, ZERO, FULL, IN_CONVERTERS, COUNTERS, REFUSAL = (
+    OD.UC1,
+    OD.UC2,
+    OD.ZERO_COEF,
+    OD.FULL_COEF,
+    OD.CONTROL,
+    OD.COUNTERS,
+    OD.REFUSAL,
+)
 AXES = (1, 2, 3)
 FS_MASK, GAIN_SHIFT, GAIN_MASK, MODE_MASK, WL, PD, CALIBRATE = 0xFFF, 18, 7 << 18, 7 << 21, 1 << 15, 1 << 16, 1 << 21
 CLIP_GAIN = 4  # code of gain 16
 STAYS = 24  # cycles through which control words stay
 UNIPOLAR = 1 << 12  # B/U
 LATE_CYCLES, LATE_STEPS, LATE_STEP_S, STROBE_S = 9, 7, 5e-6, 20e-6  # a word comes 15 us after the one before was taken
-HELD = {0x2200: 3, 0x2202: 5, 0x2203: 3, 0x2204: 3}  # objects of the latest cycle, their sub-indices
+HELD = {OD.CODES: 3, OD.CYCLE: 5, OD.GYRO_LOW: 3, OD.RATE: 3}  # objects of the latest cycle, their sub-indices
 # Signals of the messages and the objects that they map (docs/reference/protocol_psd1.md, Objects: 1A00h to 1A03h).
 MAPPED = {
-    "PSD1_CYCLE": {"X": (0x2200, 1), "Y": (0x2200, 2), "Z": (0x2200, 3), "CNT": (0x2202, 1)},
-    "PSD1_TIME": {"TSTAMP": (0x2202, 3), "LENGTH": (0x2202, 4), "WAITED": (0x2202, 5), "CNT": (0x2202, 1)},
-    "PSD1_GYRO": {"X": (0x2203, 1), "Y": (0x2203, 2), "Z": (0x2203, 3), "CNT": (0x2202, 1)},
-    "PSD1_RATE": {"X": (0x2204, 1), "Y": (0x2204, 2), "Z": (0x2204, 3), "CNT": (0x2202, 1)},
+    "PSD1_CYCLE": {"X": (OD.CODES, 1), "Y": (OD.CODES, 2), "Z": (OD.CODES, 3), "CNT": (OD.CYCLE, 1)},
+    "PSD1_TIME": {"TSTAMP": (OD.CYCLE, 3), "LENGTH": (OD.CYCLE, 4), "WAITED": (OD.CYCLE, 5), "CNT": (OD.CYCLE, 1)},
+    "PSD1_GYRO": {"X": (OD.GYRO_LOW, 1), "Y": (OD.GYRO_LOW, 2), "Z": (OD.GYRO_LOW, 3), "CNT": (OD.CYCLE, 1)},
+    "PSD1_RATE": {"X": (OD.RATE, 1), "Y": (OD.RATE, 2), "Z": (OD.RATE, 3), "CNT": (OD.CYCLE, 1)},
 }
 
 
@@ -472,7 +481,7 @@ def messages_tell_what_their_objects_hold(s: Subject) -> str:
     with s.take(lines=False) as take:
         s.unit.start()
         run_cycles(s, 4)
-        node.write_raw(0x2002, FLAGS + 1, bytes(2))  # no further cycle begins
+        node.write_raw(OD.BUS, FLAGS + 1, bytes(2))  # no further cycle begins
         s.run_for(2 * period_s(s.variant))
         s.unit.stop()
     held = {index: [int(node.read(index, k)) for k in range(1, n + 1)] for index, n in HELD.items()}
@@ -495,7 +504,7 @@ def messages_tell_what_their_objects_hold(s: Subject) -> str:
 @trial(needs={"can"})
 def the_board_says_what_it_is(s: Subject) -> str:
     """Read 1008h and 1018h sub 2."""
-    name, code = s.unit.node.read(0x1008), int(s.unit.node.read(0x1018, 2))
+    name, code = s.unit.node.read(OD.DEVICE_NAME), int(s.unit.node.read(OD.IDENTITY, 2))
     due = int(requirements()["PSD1-CAN-07"].limit("product_code"))
     if (name, code) != ("PSD-1", due):
         raise Broken(f"{name}, {code:08X}h", f"PSD-1, {due:08X}h")

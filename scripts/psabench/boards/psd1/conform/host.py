@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from psabench.boards.objects import Psd1Objects as OD
 from psabench.conform.bus_host import code_of, line
 from psabench.conform.dut import Subject
 from psabench.conform.profile import Variant
@@ -13,7 +14,7 @@ from psabench.link.busport import Cycle
 STATUS, COMMAND, FLAGS, UC_HIGH, UC_LOW = 3, 14, 15, 12, 13
 BOTH = 0x0003  # of FLAGS: INT0 and FL1
 BEGUN = ("PSD1_TIME", "PSD1_GYRO", "PSD1_RATE")
-TPDOS = {name: 0x1801 + k for k, name in enumerate(BEGUN)}
+TPDOS = {name: OD.TPDO + 1 + k for k, name in enumerate(BEGUN)}
 OFF = 0x80000000
 
 
