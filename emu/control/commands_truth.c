@@ -25,8 +25,7 @@ static enum control_outcome do_state(struct control *c, const struct control_val
 
 static const struct control_command rows[] = {
     {"help", "Lists the commands with their arguments.", NULL, .run = do_help},
-    {"truth", "Reads the hidden parameters of the bench, for graders after the estimate.", NULL,
-     .run = do_truth},
+    {"truth", "Reads the hidden parameters of the bench, for graders after the estimate.", NULL, .run = do_truth},
     {"truth.state",
      "Reads the true state now: angles, rates, temperatures, supply, and the kinematics and sensor outputs of a unit.",
      CONTROL_ARGS({"unit", CONTROL_UNIT, true, .what = "unit; default: the first"}), .run = do_state},

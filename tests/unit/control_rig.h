@@ -114,7 +114,8 @@ static inline uint64_t on_can_rx(void *ctx)
 static inline bool on_client(void *ctx, unsigned i, struct control_client *out)
 {
     (void)ctx;
-    *out = (struct control_client){.adapter = "socketcand", .name = "can0", .connection = 3, .delivered = 42, .refused = 1};
+    *out = (struct control_client){
+        .adapter = "socketcand", .name = "can0", .connection = 3, .delivered = 42, .refused = 1};
     return i == 0;
 }
 

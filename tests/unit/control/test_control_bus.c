@@ -211,8 +211,7 @@ static void a_refusal_has_the_code_of_its_reason(void **state)
         {"{'cmd':'bus.write','args':{'unit':'f','address':3}}", "data: expected a value"},
         {"{'cmd':'bus.write','args':{'unit':'f','address':3,'data':65536}}", "expected 0 to 65535"},
         {"{'cmd':'bus.read','args':{'unit':'f','address':3,'strobe_ns':0}}", "expected 1 to "},
-        {"{'cmd':'bus.read','args':{'unit':'f','address':3,'data':0}}",
-         "args: expected unit, address, strobe_ns, got"},
+        {"{'cmd':'bus.read','args':{'unit':'f','address':3,'data':0}}", "args: expected unit, address, strobe_ns, got"},
     };
     for (int step = 0; step < 2; step++) {
         r.by_step = step;

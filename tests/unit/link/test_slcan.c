@@ -148,7 +148,8 @@ static void status_bits_show_the_controller_state(void **state)
         {CAN_CLASS_RESTARTED, CAN_CONTROLLER_ACTIVE, 0x20},
     };
     for (size_t i = 0; i < COUNT(status_rows); i++) {
-        const struct can_msg m = {.id = status_rows[i].id, .flags = CAN_ERROR, .len = 8, .data = {0, status_rows[i].controller}};
+        const struct can_msg m = {
+            .id = status_rows[i].id, .flags = CAN_ERROR, .len = 8, .data = {0, status_rows[i].controller}};
         assert_int_equal(slcan_error_status(&m), status_rows[i].status);
     }
 }
