@@ -22,8 +22,12 @@ from tests.e2e.bench.test_snapshot import Desk, at, desk, edges, heard, truth_li
 
 pytestmark = pytest.mark.host
 
-LIST = (ROOT / "emu/unit/boards.c").read_text(encoding="utf-8")
-NAMES = {m[1]: m[2] for m in re.finditer(r'\{"(\w+)", &(\w+)_board, ', LIST)}  # what a scenario may say: the type
+LIST = (ROOT / "emu/unit/boards.h").read_text(encoding="utf-8")
+TYPES = re.findall(r"\bX\((\w+)\)", LIST.partition("#define BOARD_TYPES(X)")[2].partition("\n")[0])
+ALIASES = dict(re.findall(r"\bX\((\w+), (\w+), ", LIST.partition("#define BOARD_ALIASES(X)")[2].partition("\n\n")[0]))
+NAMES = {**{name: name for name in TYPES}, **ALIASES}  # what a scenario may say: the type
+assert len(TYPES) >= 5, "emu/unit/boards.h: expected a list of boards"
+assert ALIASES, "emu/unit/boards.h: expected a list of aliases"
 ALL = sorted(NAMES)
 LINE_BYTES = 190_000  # 0.1 s at 2 MHz, but for what is not known yet at its end
 SETUP_S = 0.4  # of the slowest board
