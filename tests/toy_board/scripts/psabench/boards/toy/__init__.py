@@ -1,0 +1,1 @@
+"""TOY, the board of docs/new_board.md."""

@@ -1,0 +1,1 @@
+"""The conformance tests of TOY: stimulus and check."""

@@ -1,0 +1,22 @@
+"""Stimuli of TOY: from Res, and a second of samples."""
+
+from __future__ import annotations
+
+from psabench.conform.capture.log import Evidence
+from psabench.conform.dut import Subject
+from psabench.conform.plan import scene
+from psabench.conform.stimulus.streamed import from_res, readings
+
+START_S, STREAM_S = 0.06, 1.0
+
+
+@scene("power_on", boards=("toy",))
+def power_on(s: Subject) -> Evidence:
+    """From Res to some samples, streaming as soon as it has booted."""
+    return from_res(s, START_S)
+
+
+@scene("stream", boards=("toy",))
+def stream(s: Subject) -> Evidence:
+    """A second of samples on CAN and on the lines."""
+    return s.evidence("stream", readings(s, START_S, lambda: s.run_for(STREAM_S)))
