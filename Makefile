@@ -101,14 +101,14 @@ $(BUILD)/obj/%.o: %.c Makefile
 
 # Programs of tests: each names its objects, the rest comes from the archive.
 LINK_LIBS = $(LIBS)
-$(BUILD)/obj/tests/%.o: CPPFLAGS += -Itests/unit#                                   rigs that several folders use
+$(BUILD)/obj/tests/%.o: CPPFLAGS += -Itests/unit -Itests/fuzz/support#             rigs that several folders use
 $(BUILD)/obj/tests/bench/%.o: CPPFLAGS += -D_POSIX_C_SOURCE=199309L#                clock_gettime
 $(UNIT_BIN): LINK_LIBS += -lcmocka
 $(FUZZ_BIN): LINK_LIBS += -fsanitize=fuzzer
 $(BUILD)/tests/test_nav: $(BUILD)/libpsabench-nav.a
 $(foreach t,$(UNIT),$(eval $(BUILD)/tests/$(basename $(notdir $(t))): $(BUILD)/obj/$(t:.c=.o)))
 $(foreach t,$(FUZZ),$(eval $(BUILD)/fuzz/fuzz_$(t): $(BUILD)/obj/tests/fuzz/fuzz_$(t).o))
-$(foreach c,ads1282 ads1256 ad7712,$(eval $(filter $(BUILD)/fuzz/fuzz_$(c)_%,$(FUZZ_BIN)): $(BUILD)/obj/tests/fuzz/$(c)_world.o))
+$(foreach c,ads1282 ads1256 ad7712,$(eval $(filter $(BUILD)/fuzz/fuzz_$(c)_%,$(FUZZ_BIN)): $(BUILD)/obj/tests/fuzz/support/$(c)_world.o))
 $(BENCH_BIN): $(BUILD)/bench/%: $(BUILD)/obj/tests/bench/%.o
 $(UNIT_BIN) $(FUZZ_BIN) $(BENCH_BIN): $(BUILD)/lib/emu.a
 	$(call say,LINK)

@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parents[3]
 
 @pytest.fixture(scope="module")
 def tool() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("plot_campaign", ROOT / "tools/plot_campaign.py")
+    spec = importlib.util.spec_from_file_location("plot_campaign", ROOT / "tools/plots/campaign.py")
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
@@ -31,7 +31,7 @@ def computed(tool: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Camp
 
 
 def test_the_tables_of_the_page_are_what_is_computed(tool: ModuleType, computed: Campaign) -> None:
-    """A difference: run tools/plot_campaign.py, and read what the page says of the numbers."""
+    """A difference: run tools/plots/campaign.py, and read what the page says of the numbers."""
     text = tool.PAGE.read_text(encoding="utf-8")
     wanted = tool.with_tables(text, computed)
     assert text.splitlines() == wanted.splitlines()

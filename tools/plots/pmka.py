@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Draw docs/img/pmka_rotation.svg: the four integrators of a PMKA over the beats tau1..tau5 (article, figure 5).
 
-    tools/plot_pmka.py [docs/img/pmka_rotation.svg]
+    tools/plots/pmka.py [docs/img/pmka_rotation.svg]
 
 From a recording over CAN of a unit with short beats. Same bytes each time.
 """
@@ -16,7 +16,7 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "scripts")]
 
 from psabench import Bench  # noqa: E402 of this tree

@@ -4,7 +4,7 @@
 Computes the campaign as `psabench campaign gyrocompass` does, into a store of its own. Same library, same bytes. A
 table is the fenced block, or the Markdown table, after a line `<!-- campaign: STUDY -->`; `claims` names the article's.
 
-    tools/plot_campaign.py [--check]     --check: write nothing, exit status 1 when a table is not what is computed
+    tools/plots/campaign.py [--check]     --check: write nothing, exit status 1 when a table is not what is computed
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from psabench.campaign.page import Campaign
 from psabench.progress import Bar
 from psabench.report import plots as report_plots
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs/procedures/gyrocompass_campaign.md"
 RUNS = 100_000  # a case; the third digit of a p95 is
 IMAGES = ROOT / "docs/img"

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Draw docs/img/shell.svg: a real session of `psabench shell` in a terminal, as it looks while a line is typed.
 
-    tools/plot_shell.py [docs/img/shell.svg]
+    tools/plots/shell.py [docs/img/shell.svg]
 
 The screen is kept by a terminal of a few lines that knows what prompt_toolkit sends: cursor, erase, colours.
 """
@@ -24,7 +24,7 @@ from fcntl import ioctl
 from pathlib import Path
 from xml.sax.saxutils import escape
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 COLUMNS, ROWS = 104, 34
 CELL_W, CELL_H, SIZE = 8.0, 17.0, 13.3
 PATIENCE_S = 20.0

@@ -4,7 +4,7 @@
 The pulses are those of its VCD file; the output of the integrator is computed here from the input and the parts
 of the profile. Prints the table of the procedure's page. Same emulator, same bytes.
 
-    tools/plot_converters.py [docs/img]
+    tools/plots/converters.py [docs/img]
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ def pulses_picture() -> str:
 
 
 def main() -> None:
-    out = Path(sys.argv[1] if len(sys.argv) > 1 else Path(__file__).resolve().parents[1] / "docs/img")
+    out = Path(sys.argv[1] if len(sys.argv) > 1 else Path(__file__).resolve().parents[2] / "docs/img")
     pictures = {"pik_pulses": pulses_picture()}
     with tempfile.TemporaryDirectory() as folder:
         c = comparison.compare(Path(folder), CompareParams(), Bar())

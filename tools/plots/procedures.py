@@ -4,7 +4,7 @@
 The sensor is simulated here from model (1) at the level of readings, without emulator: what a page says of a method is
 then a property of the method. Same seed, same bytes.
 
-    tools/plot_procedures.py [docs/img]
+    tools/plots/procedures.py [docs/img]
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Draw the pictures of docs/instruments.md into docs/img, from emu/phys itself. Same bytes each time.
 
-tools/plot_instruments.py [docs/img]
+tools/plots/instruments.py [docs/img]
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path[:0] = [str(ROOT / "tests/py"), str(ROOT / "scripts")]
+ROOT = Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT / "tests/py/support"), str(ROOT / "scripts")]
 
 import physics  # noqa: E402 the compiled physics: its way is known only now
 from physics import Array, Lab, doubles, ns  # noqa: E402

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Draw docs/img/gyro_run.svg: a gyrocompassing run of three positions, as it comes over CAN and as it is.
 
-    tools/plot_gyro.py [docs/img/gyro_run.svg]
+    tools/plots/gyro.py [docs/img/gyro_run.svg]
 
 From a run of the scenario gyrocompass. Same bytes each time.
 """
@@ -15,7 +15,7 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "scripts")]
 
 from psabench import Bench  # noqa: E402 of this tree
