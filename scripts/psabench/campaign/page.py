@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
@@ -14,8 +13,8 @@ from psabench.campaign import chains, claims, plots
 from psabench.campaign.cases import STUDIES, Case, Study
 from psabench.campaign.claims import Check, Claim, Figures, Found, HoldFigures
 from psabench.campaign.store import Rows
-from psabench.report.page import whole_page
-from psabench.report.whole_file import replace_file
+from psabench.report.page import figure, section, verdict_line, whole_page, write_report
+from psabench.report.page import table as html_table
 
 TITLE = "Gyrocompassing: a campaign"
 FORMAT = 1  # of result.json
@@ -104,12 +103,7 @@ def verdict(c: Campaign) -> str:
 
 def write(folder: Path, c: Campaign) -> Path:
     """result.json and report.html into `folder`, each whole or not at all; returns the page. Raises OSError."""
-    folder.mkdir(parents=True, exist_ok=True)
-    data = json.dumps(result_dict(c), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-    replace_file(folder / "result.json", data)
-    page = folder / "report.html"
-    replace_file(page, html_page(c))
-    return page
+    return write_report(folder, result_dict(c), html_page(c))
 
 
 def result_dict(c: Campaign) -> dict[str, Any]:
@@ -248,7 +242,7 @@ def _studies(c: Campaign) -> list[Study]:
 def html_page(c: Campaign) -> str:
     """The whole page. Same input, same bytes."""
     body = [
-        f"<p class='verdict {'good' if c.within else 'bad'}'>{escape(verdict(c))}</p>",
+        verdict_line(verdict(c), c.within),
         _claims(c),
         _agreements(c),
         _distribution(c),
@@ -259,49 +253,35 @@ def html_page(c: Campaign) -> str:
     return whole_page(TITLE, c.facts, body)
 
 
-def _html_table(head: Sequence[Sequence[str]], rows: Sequence[Sequence[str]], numbers: bool) -> str:
-    kind = " class=num" if numbers else ""
-    heads = "".join(f"<tr>{''.join(f'<th>{escape(x)}</th>' for x in r)}</tr>" for r in head)
-    lines = "".join(
-        f"<tr><th>{escape(r[0])}</th>{''.join(f'<td{kind}>{escape(x)}</td>' for x in r[1:])}</tr>" for r in rows
-    )
-    style = "est" if numbers else "cmp"
-    return f"<div class=scroll><table class={style}><thead>{heads}</thead><tbody>{lines}</tbody></table></div>"
-
-
 def _claims(c: Campaign) -> str:
     if not c.claims:
         return ""
     head = ["the article", "kindest reading", "honest", "improved", "verdict"]
     rows = [[x.says, x.reading, x.honest, x.improved, x.verdict] for x in c.claims]
-    return f"<section><h2>The article's claims</h2>{_html_table([head], rows, numbers=False)}</section>"
+    return section("The article's claims", html_table([head, *rows], numeric=False))
 
 
 def _agreements(c: Campaign) -> str:
-    pictures = "".join(
-        f"<figure>{a.figure}<figcaption>{escape(a.case.name)}, {escape(a.chain)}: {a.runs} runs beside "
-        f"{a.reference_runs}, KS {a.statistic:.4f}, p {a.p:.3f}.</figcaption></figure>"
+    pictures = [
+        figure(
+            a.figure,
+            f"{escape(a.case.name)}, {escape(a.chain)}: {a.runs} runs beside {a.reference_runs}, "
+            f"KS {a.statistic:.4f}, p {a.p:.3f}.",
+        )
         for a in c.agreements
-    )
-    return f"<section><h2>Do the chains agree?</h2>{pictures}</section>" if pictures else ""
+    ]
+    return section("Agreement of the chains", *pictures) if pictures else ""
 
 
 def _distribution(c: Campaign) -> str:
     if not c.distribution:
         return ""
-    return (
-        f"<section><h2>Error of heading beside the claim</h2><figure>{c.distribution}"
-        "<figcaption>R0 literal, R5n the kindest reading, R11+ with the common 6′, improved procedure.</figcaption>"
-        "</figure></section>"
-    )
+    caption = "R0 literal, R5n the kindest reading, R11+ with the common 6′, improved procedure."
+    return section("Error of heading beside the claim", figure(c.distribution, caption))
 
 
 def _study(c: Campaign, study: Study) -> str:
-    rows = table(c, study)
-    return (
-        f"<section><h2>{escape(study.title)}</h2>{_html_table(rows[:2], rows[2:], numbers=True)}"
-        f"<figure>{picture(c, study)}</figure></section>"
-    )
+    return section(study.title, html_table(table(c, study), 2), figure(picture(c, study)))
 
 
 def picture(c: Campaign, study: Study) -> str:
@@ -317,14 +297,13 @@ def picture(c: Campaign, study: Study) -> str:
 
 def _failed(c: Campaign) -> str:
     """Runs without a heading, and headings that the host's procedure doubts."""
-    cases = "".join(f"<p>{escape(line)}.</p>" for line in _failures(c))
-    reasons = _html_table([["first runs", "why"]], _reasons(c), numbers=False) if _reasons(c) else ""
-    return f"<section><h2>No heading, or one in doubt</h2>{cases}{reasons}</section>" if cases else ""
+    cases = [f"<p>{escape(line)}.</p>" for line in _failures(c)]
+    reasons = html_table([("first runs", "reason"), *_reasons(c)], numeric=False) if _reasons(c) else ""
+    return section("No heading, or one in doubt", *cases, reasons) if cases else ""
 
 
 def _checks(c: Campaign) -> str:
     if not c.checks:
         return ""
     rows = [[x.what, f"{x.value:.4g}", f"{x.low:.4g}", f"{x.high:.4g}", "" if x.within else "out"] for x in c.checks]
-    table_ = _html_table([["", "value", "from", "to", ""]], rows, numbers=True)
-    return f"<section><h2>Limits</h2>{table_}</section>"
+    return section("Limits", html_table([["", "value", "from", "to", ""], *rows]))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -13,7 +12,7 @@ from xml.etree import ElementTree as ET
 
 from psabench.conform.requirements import Requirement, requirements
 from psabench.conform.verdict import Outcome, Verdict, conforms
-from psabench.report.page import whole_page
+from psabench.report.page import bullets, figure, html_table, section, verdict_line, whole_page, write_report
 from psabench.report.whole_file import replace_file
 
 FORMAT = 1  # of conform.json
@@ -119,12 +118,8 @@ def unseen(run: Run) -> dict[str, int]:
 
 def write(folder: Path, run: Run) -> Path:
     """conform.json, junit.xml and report.html, each whole or not at all; returns the page. Raises OSError."""
-    folder.mkdir(parents=True, exist_ok=True)
-    text = json.dumps(as_dict(run), indent=1, ensure_ascii=False, allow_nan=False)
-    replace_file(folder / "conform.json", text + "\n")
+    page = write_report(folder, as_dict(run), html_page(run, folder), "conform.json")
     replace_file(folder / "junit.xml", junit(run))
-    page = folder / "report.html"
-    replace_file(page, html_page(run, folder))
     return page
 
 
@@ -187,25 +182,21 @@ def html_page(run: Run, folder: Path) -> str:
 
 
 def _verdict(run: Run) -> str:
-    why = "".join(f"<li>{count} not observable: {escape(reason)}</li>" for reason, count in unseen(run).items())
-    return (
-        f"<p class='verdict {'good' if run.conforms else 'bad'}'>{escape(summary(run))}</p><ul class=small>{why}</ul>"
-    )
+    why = [f"{count} not observable: {escape(reason)}" for reason, count in unseen(run).items()]
+    return verdict_line(summary(run), run.conforms) + bullets(why, "small")
 
 
 def _failure(o: Outcome, folder: Path) -> str:
     rows = requirements().rows
     due = "".join(f"<p><b>{i}</b> {escape(rows[i].text)}</p>{_original(rows[i].original)}" for i in o.requirements)
     at = "" if o.at_ns is None else f" at {o.at_ns * 1e-6:.6f} ms"
-    pictures = "".join(
-        f"<figure>{(folder / name).read_text(encoding='utf-8')}</figure>"
-        for name in o.exhibits
-        if name.endswith(".svg")
-    )
+    pictures = [figure((folder / name).read_text(encoding="utf-8")) for name in o.exhibits if name.endswith(".svg")]
     files = ", ".join(f"<a href='{escape(name)}'>{escape(name)}</a>" for name in o.exhibits)
-    return (
-        f"<section><h2>{escape(o.title)}</h2>{due}<p>Saw <b>{escape(o.saw)}</b>{at}; due {escape(o.due)}.</p>"
-        f"{pictures}{f'<p class=small>{files}</p>' if files else ''}</section>"
+    return section(
+        o.title,
+        f"{due}<p>Saw <b>{escape(o.saw)}</b>{at}; due {escape(o.due)}.</p>",
+        *pictures,
+        f"<p class=small>{files}</p>" if files else "",
     )
 
 
@@ -226,10 +217,7 @@ def _table(run: Run) -> str:
         for r in run.rows
     )
     head = "".join(f"<th>{h}</th>" for h in ("", "verdict", "requirement", "source", "grade", "seen"))
-    return (
-        "<section><h2>Requirements</h2><div class=scroll><table>"
-        f"<thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div></section>"
-    )
+    return section("Requirements", html_table(f"<tr>{head}</tr>", rows))
 
 
 def _seen(outcomes: list[Outcome], unobservable: str) -> str:
@@ -239,4 +227,4 @@ def _seen(outcomes: list[Outcome], unobservable: str) -> str:
 
 def _signed(run: Run) -> str:
     lines = "".join(f"<tr><td>{what}</td><td></td></tr>" for what in ("Carried out by", "Checked by", "Date, place"))
-    return f"<section><h2>Signatures</h2><table class=sign>{lines}</table></section>" if run.suite != "host" else ""
+    return section("Signatures", f"<table class=sign>{lines}</table>") if run.suite != "host" else ""

@@ -6,7 +6,6 @@ write(folder, [Section(label="quiet", result=r, truth=truth)], facts={"seed": "7
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Mapping, Sequence
 from html import escape
@@ -26,8 +25,7 @@ from psabench.report.grading import (
     with_ci,
     within_limits,
 )
-from psabench.report.page import whole_page
-from psabench.report.whole_file import replace_file
+from psabench.report.page import bullets, figure, folded, html_table, section, verdict_line, whole_page, write_report
 
 __all__ = ["Section", "console_table", "html_page", "within_limits", "write"]
 
@@ -44,7 +42,6 @@ def write(folder: Path, sections: Sequence[Section], facts: Mapping[str, str] | 
     if not sections:
         raise ValueError("a report needs at least one section")
     facts = facts or {}
-    folder.mkdir(parents=True, exist_ok=True)
     data = {
         "format": FORMAT,
         "facts": dict(facts),
@@ -52,10 +49,7 @@ def write(folder: Path, sections: Sequence[Section], facts: Mapping[str, str] | 
         "article": {name: printed for name, _, _, printed in ARTICLE},
         "sections": [result_dict(s) for s in sections],
     }
-    replace_file(folder / "result.json", json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
-    page = folder / "report.html"
-    replace_file(page, html_page(sections, facts))
-    return page
+    return write_report(folder, data, html_page(sections, facts))
 
 
 def html_page(sections: Sequence[Section], facts: Mapping[str, str]) -> str:
@@ -72,8 +66,7 @@ def html_page(sections: Sequence[Section], facts: Mapping[str, str]) -> str:
 
 def _verdict(sections: Sequence[Section]) -> str:
     compared = [g for s in sections for g in grade(s) if g.within is not None]
-    kind = "plain" if not compared else "good" if within_limits(sections) else "bad"
-    return f"<p class='verdict {kind}'>{verdict(sections)}</p>"
+    return verdict_line(verdict(sections), within_limits(sections) if compared else None)
 
 
 def _comparison(sections: Sequence[Section]) -> str:
@@ -84,18 +77,16 @@ def _comparison(sections: Sequence[Section]) -> str:
         cells = "".join(f"<td>{_beside(s, name, printed)}</td>" for s in sections)
         first = f"<th>{_symbol(symbol)}</th><td class=num>{printed}</td><td class=unit>{unit}</td>"
         rows.append(f"<tr>{first}{cells}</tr>")
-    return (
-        "<section><h2>Beside the article</h2><div class=scroll><table class=cmp>"
-        "<thead><tr><th></th><th>printed</th><th></th>"
-        f"{head}</tr></thead><tbody>{''.join(rows)}</tbody></table></div>"
+    return section(
+        "Beside the article",
+        html_table(f"<tr><th></th><th>printed</th><th></th>{head}</tr>", "".join(rows), "cmp"),
         "<p class=small>Large: our value with the digits that the article prints (green: the same). "
-        "Below it: the value with its 95 % interval. "
-        f"{_DAGGER} not identifiable from these data.</p></section>"
+        f"Below it: the value with its 95 % interval. {_DAGGER} not identifiable from these data.</p>",
     )
 
 
-def _beside(section: Section, name: str, printed: str) -> str:
-    found = next((e for e in section.result.estimates if e.name == name), None)
+def _beside(s: Section, name: str, printed: str) -> str:
+    found = next((e for e in s.result.estimates if e.name == name), None)
     if found is None:
         return "<span class=none>–</span>"
     ours = as_printed(found.value, printed)
@@ -108,29 +99,25 @@ def _beside(section: Section, name: str, printed: str) -> str:
 def _alpha0(sections: Sequence[Section]) -> str:
     from psabench.report import plots as report_plots  # matplotlib takes a second: the shell and --help do without
 
-    figure = report_plots.alpha0_figure(sections)
-    if figure is None:
+    picture = report_plots.alpha0_figure(sections)
+    if picture is None:
         return ""
-    return (
-        "<section><h2>The mounting error α<sub>0</sub>, 95 % intervals</h2>"
-        f"<figure>{report_plots.svg(figure, 'alpha0')}"
-        "<figcaption>Green: identifiable. Orange: flagged. Dashed: the truth, or the printed value where there is none."
-        "</figcaption></figure></section>"
-    )
+    caption = "Green: identifiable. Orange: flagged. Dashed: the truth, or the printed value where there is none."
+    return section("The mounting error α₀, 95 % intervals", figure(report_plots.svg(picture, "alpha0"), caption))
 
 
-def _section(section: Section, ident: str) -> str:
+def _section(s: Section, ident: str) -> str:
     from psabench.report import plots as report_plots
 
-    r = section.result
-    pictures = [f"<figure>{report_plots.svg(report_plots.turn_figure(section), ident + 'turn')}</figure>"]
+    r = s.result
+    pictures = [figure(report_plots.svg(report_plots.turn_figure(s), ident + "turn"))]
     if r.procedure == "fourier":
-        second = report_plots.svg(report_plots.second_harmonic_figure(section), ident + "second")
-        pictures.append(
-            f"<figure>{second}<figcaption>What is left without zero and first harmonic. "
+        second = report_plots.svg(report_plots.second_harmonic_figure(s), ident + "second")
+        caption = (
+            "Residual without zero and first harmonic. "
             "From one face α<sub>0</sub> is half the arc tangent of the ratio of these two amplitudes."
-            "</figcaption></figure>"
         )
+        pictures.append(figure(second, caption))
     facts = [
         f"channel <b>{escape(r.axis)}</b>",
         f"<b>{len(r.readings)}</b> readings in <b>{r.duration_s:.4g} s</b> of bench time",
@@ -138,30 +125,26 @@ def _section(section: Section, ident: str) -> str:
     ]
     if r.drift is not None:
         facts.append(f"drift of the zero <b>{r.drift.value * 1e6:.3g} ± {r.drift.ci_half * 1e6:.2g} µV/s</b>")
-    notes = "".join(f"<li>{_symbol(escape(n))}</li>" for n in r.notes)
-    summary = ON_THE_HEAD[r.procedure]
-    return (
-        f"<section><h2>{escape(section.title)}</h2><p class=facts>{escape(summary)}<br>{' · '.join(facts)}</p>"
-        f"{_estimates(section)}{f'<ul class=notes>{notes}</ul>' if notes else ''}{''.join(pictures)}"
-        f"{_correlation(section)}</section>"
+    return section(
+        s.title,
+        f"<p class=facts>{escape(ON_THE_HEAD[r.procedure])}<br>{' · '.join(facts)}</p>",
+        _estimates(s),
+        bullets([_symbol(escape(n)) for n in r.notes]),
+        *pictures,
+        _correlation(s),
     )
 
 
-def _estimates(section: Section) -> str:
-    graded = grade(section)
-    truth_head = "<th>truth</th><th>error</th><th>z</th>" if section.truth is not None else ""
-    rows = "".join(_estimate_row(g, section.truth is not None, section.result.g_mps2) for g in graded)
-    why = "".join(
-        f"<li>{_DAGGER} {_symbol(e.symbol)} not identifiable: {_symbol(escape(e.reason))}</li>"
-        for e in section.result.estimates
+def _estimates(s: Section) -> str:
+    truth_head = "<th>truth</th><th>error</th><th>z</th>" if s.truth is not None else ""
+    head = f"<tr><th></th><th>estimate</th><th>± 95 %</th><th>unit</th><th>in SI</th>{truth_head}<th></th></tr>"
+    rows = "".join(_estimate_row(g, s.truth is not None, s.result.g_mps2) for g in grade(s))
+    why = [
+        f"{_DAGGER} {_symbol(e.symbol)} not identifiable: {_symbol(escape(e.reason))}"
+        for e in s.result.estimates
         if e.reason
-    )
-    return (
-        "<div class=scroll><table class=est>"
-        "<thead><tr><th></th><th>estimate</th><th>± 95 %</th><th>unit</th><th>in SI</th>"
-        f"{truth_head}<th></th></tr></thead><tbody>{rows}</tbody></table></div>"
-        f"{f'<ul class=notes>{why}</ul>' if why else ''}"
-    )
+    ]
+    return html_table(head, rows, "est") + bullets(why)
 
 
 def _estimate_row(g: Graded, with_truth: bool, g_mps2: float) -> str:
@@ -192,18 +175,15 @@ def _si(value: float, unit: str, g_mps2: float) -> str:
     return ""
 
 
-def _correlation(section: Section) -> str:
-    c = section.result.correlation
-    symbols = {e.name: _symbol(e.symbol) for e in section.result.estimates}
+def _correlation(s: Section) -> str:
+    c = s.result.correlation
+    symbols = {e.name: _symbol(e.symbol) for e in s.result.estimates}
     head = "".join(f"<th>{symbols[n]}</th>" for n in c.names)
     rows = "".join(
         f"<tr><th>{symbols[n]}</th>{''.join(_correlation_cell(float(v)) for v in row)}</tr>"
         for n, row in zip(c.names, c.matrix, strict=True)
     )
-    return (
-        "<details><summary>Correlation of the estimates</summary><div class=scroll><table><thead><tr><th></th>"
-        f"{head}</tr></thead><tbody>{rows}</tbody></table></div></details>"
-    )
+    return folded("Correlation of the estimates", html_table(f"<tr><th></th>{head}</tr>", rows))
 
 
 def _correlation_cell(v: float) -> str:
@@ -220,8 +200,8 @@ def _symbol(text: str) -> str:
 
 
 def _method() -> str:
-    return (
-        "<section class=method><h2>How to read this</h2>"
+    return section(
+        "How to read this",
         "<p>Voltages are at the load resistor; coefficients are per local g. Intervals are 95 %, by the delta method "
         "from the residual. A measured number is out of limits when it misses the truth by more than "
         f"{LIMIT_CI:g} half widths of its interval and what the chain is allowed. "
@@ -229,5 +209,6 @@ def _method() -> str:
         "<p>Repairs to the article: position 1 of its fig. 2 has a<sub>x</sub> = +g; "
         "(17) needs least squares (80 × 5); "
         "k<sub>xy</sub> of (18) takes the sign of C<sub>3</sub>; "
-        "α<sub>0</sub> = ½ atan(C<sub>4</sub>/C<sub>3</sub>), not atan2.</p></section>"
+        "α<sub>0</sub> = ½ atan(C<sub>4</sub>/C<sub>3</sub>), not atan2.</p>",
+        kind="method",
     )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from html import escape
 from pathlib import Path
 
@@ -10,32 +9,26 @@ import numpy as np
 
 from psabench.procedures import comparison
 from psabench.procedures.comparison import AXES, Comparison
-from psabench.report.page import whole_page
-from psabench.report.whole_file import replace_file
+from psabench.report.page import bullets, figure, section, table, verdict_line, whole_page, write_report
 
 TITLE = "Five generations of converters, one motion"
 
 
 def write(folder: Path, c: Comparison) -> Path:
     """result.json and report.html into `folder`, each whole or not at all; returns the page. Raises OSError."""
-    folder.mkdir(parents=True, exist_ok=True)
-    data = json.dumps(comparison.result_dict(c), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-    replace_file(folder / "result.json", data)
-    page = folder / "report.html"
-    replace_file(page, html_page(c))
-    return page
+    return write_report(folder, comparison.result_dict(c), html_page(c))
 
 
 def html_page(c: Comparison) -> str:
     """The whole page. Same input, same bytes."""
-    pictures = "".join(
-        f"<section><h2>{heading}</h2><figure>{picture}<figcaption>{words}</figcaption></figure></section>"
-        for heading, picture, words in zip(_HEADINGS, figures(c), _CAPTIONS, strict=True)
-    )
+    pictures = zip(_HEADINGS, figures(c), _CAPTIONS, strict=True)
     body = [
-        f"<p class='verdict {'good' if c.within else 'bad'}'>{escape(comparison.verdict(c))}</p>",
-        _tables(c),
-        pictures,
+        verdict_line(comparison.verdict(c), c.within),
+        section("Beside the article", table(comparison.figures_table(c), 2), f"<p class=small>{_ABOUT_FIGURES}</p>"),
+        section(
+            "Beside the exact integral", table(comparison.errors_table(c), 2), f"<p class=small>{_ABOUT_ERRORS}</p>"
+        ),
+        *(section(heading, figure(picture, caption)) for heading, picture, caption in pictures),
         _method(c),
     ]
     return whole_page(TITLE, c.facts, body)
@@ -62,44 +55,16 @@ _ABOUT_ERRORS = (
 )
 
 
-def _tables(c: Comparison) -> str:
-    return _table("Beside the article", comparison.figures_table(c), _ABOUT_FIGURES) + _table(
-        "Beside the exact integral", comparison.errors_table(c), _ABOUT_ERRORS
-    )
-
-
-def _table(heading: str, rows: comparison.Table, about: str) -> str:
-    """The first column is the row's head; a NO is out."""
-    head = "".join(
-        f"<tr>{''.join(f'<th style=text-align:{side}>{escape(x)}</th>' for x, side in _sides(r))}</tr>"
-        for r in rows[:2]
-    )
-    body = "".join(
-        f"<tr><th>{escape(r[0])}</th>"
-        + "".join(f"<td class='num{' bad' if x == 'NO' else ''}'>{escape(x)}</td>" for x in r[1:])
-        + "</tr>"
-        for r in rows[2:]
-    )
-    return (
-        f"<section><h2>{heading}</h2><div class=scroll><table>"
-        f"<thead>{head}</thead><tbody>{body}</tbody></table></div><p class=small>{about}</p></section>"
-    )
-
-
-def _sides(row: tuple[str, ...]) -> list[tuple[str, str]]:
-    return [(x, "left" if i == 0 else "right") for i, x in enumerate(row)]
-
-
 def _method(c: Comparison) -> str:
-    rows = "".join(
-        f"<li><b>{escape(g.figures.track.title)}</b>: {escape(g.article.printed)}; {escape(g.figures.track.note)}; "
+    rows = [
+        f"<b>{escape(g.figures.track.title)}</b>: {escape(g.article.printed)}; {escape(g.figures.track.note)}; "
         f"{g.figures.track.ma_v_per_g:.4g} V/g; its readings are {g.lag_s * 1e3:.2f} ms behind; "
         f"limit: {g.article.scale * 1e2:.3g} % ({g.article.k_source}) and {g.article.zero_v * 1e3:.3g} mV of zero "
         f"({g.article.zero_source})"
-        f"{f'; {escape(g.article.why)}' if g.article.why else ''}</li>"
+        f"{f'; {escape(g.article.why)}' if g.article.why else ''}"
         for g in c.graded
-    )
-    return f"<section class=method><h2>How</h2><ul>{rows}</ul></section>"
+    ]
+    return section("How", bullets(rows), kind="method")
 
 
 def figures(c: Comparison) -> tuple[str, str, str]:
@@ -114,8 +79,8 @@ def _dots(c: Comparison) -> str:
     from psabench.report import plots as plots
 
     with matplotlib.rc_context(plots.STYLE):
-        figure = Figure(figsize=(7.4, 0.9 + 0.36 * len(c.graded)), layout="constrained")
-        ax = figure.subplots()
+        picture = Figure(figsize=(7.4, 0.9 + 0.36 * len(c.graded)), layout="constrained")
+        ax = picture.subplots()
         for i, g in enumerate(c.graded):
             values = (
                 ("quantum", "o", plots.SERIES[0], g.figures.track.quantum_mps(c.g_mps2)),
@@ -134,7 +99,7 @@ def _dots(c: Comparison) -> str:
         ax.set_yticks([-i for i in range(len(c.graded))], [g.figures.track.title for g in c.graded])
         ax.set_ylim(-len(c.graded) + 0.4, 0.6)
         ax.legend(loc="upper center", ncols=5, bbox_to_anchor=(0.45, 1.2), handletextpad=0.1, columnspacing=1.0)
-        return plots.svg(figure, "dots")
+        return plots.svg(picture, "dots")
 
 
 def _errors(c: Comparison) -> str:
@@ -144,8 +109,8 @@ def _errors(c: Comparison) -> str:
     from psabench.report import plots as plots
 
     with matplotlib.rc_context(plots.STYLE):
-        figure = Figure(figsize=(7.4, 1.25 * len(c.graded)), layout="constrained")
-        rows = figure.subplots(len(c.graded), 1, sharex=True)
+        picture = Figure(figsize=(7.4, 1.25 * len(c.graded)), layout="constrained")
+        rows = picture.subplots(len(c.graded), 1, sharex=True)
         for ax, g in zip(np.atleast_1d(rows), c.graded, strict=True):
             t_s = g.figures.track.t_s
             every = max(1, len(t_s) // 1400)
@@ -156,7 +121,7 @@ def _errors(c: Comparison) -> str:
             ax.set_title(g.figures.track.title)
         np.atleast_1d(rows)[0].legend(loc="upper right", ncols=3, bbox_to_anchor=(1.0, 1.35))
         np.atleast_1d(rows)[-1].set_xlabel("time, s")
-        return plots.svg(figure, "errors")
+        return plots.svg(picture, "errors")
 
 
 def _motion(c: Comparison) -> str:
@@ -168,8 +133,8 @@ def _motion(c: Comparison) -> str:
     m = c.motion
     span = (m.t_s >= c.graded[0].figures.track.t_s[0]) & (m.t_s <= c.graded[0].figures.track.t_s[-1])
     with matplotlib.rc_context(plots.STYLE):
-        figure = Figure(figsize=(7.4, 3.2), layout="constrained")
-        top, bottom = figure.subplots(2, 1, sharex=True)
+        picture = Figure(figsize=(7.4, 3.2), layout="constrained")
+        top, bottom = picture.subplots(2, 1, sharex=True)
         for i, colour in enumerate(plots.SERIES[:3]):
             top.plot(m.t_s[span][::5], m.a_mps2[span][::5, i], lw=1.0, color=colour, label=AXES[i])
             bottom.plot(m.t_s[span][::5], (m.v_mps[span] - m.v_mps[span][0])[::5, i], lw=1.0, color=colour)
@@ -177,7 +142,7 @@ def _motion(c: Comparison) -> str:
         bottom.set_ylabel("integral, m/s")
         bottom.set_xlabel("time, s")
         top.legend(loc="upper right", ncols=3, bbox_to_anchor=(1.0, 1.25))
-        return plots.svg(figure, "motion")
+        return plots.svg(picture, "motion")
 
 
 def _unit(largest_mps: float) -> tuple[float, str]:

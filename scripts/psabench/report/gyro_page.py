@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
@@ -14,8 +13,7 @@ from psabench.native.nav import DEGPH
 from psabench.procedures.result import DEG
 from psabench.report import gyro_grading as grading
 from psabench.report.gyro_grading import GyroSection
-from psabench.report.page import whole_page
-from psabench.report.whole_file import replace_file
+from psabench.report.page import bullets, figure, folded, section, table, verdict_line, whole_page, write_report
 
 TITLE = "Gyrocompassing and heading hold"
 FORMAT = 1  # of result.json
@@ -30,24 +28,19 @@ CAPTIONS = {
 
 def write(folder: Path, sections: Sequence[GyroSection], facts: Mapping[str, str]) -> Path:
     """result.json and report.html into `folder`, each whole or not at all; returns the page. Raises OSError."""
-    folder.mkdir(parents=True, exist_ok=True)
     data = {
         "format": FORMAT,
         "facts": dict(facts),
         "within_limits": grading.within_limits(sections),
         "sections": [grading.result_dict(s) for s in sections],
     }
-    replace_file(folder / "result.json", json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
-    page = folder / "report.html"
-    replace_file(page, html_page(sections, facts))
-    return page
+    return write_report(folder, data, html_page(sections, facts))
 
 
 def html_page(sections: Sequence[GyroSection], facts: Mapping[str, str]) -> str:
     """The whole page. Same input, same bytes."""
-    good = grading.within_limits(sections)
     body = [
-        f"<p class='verdict {'good' if good else 'bad'}'>{escape(grading.verdict(sections))}</p>",
+        verdict_line(grading.verdict(sections), grading.within_limits(sections)),
         *(_section(s, f"g{k}") for k, s in enumerate(sections)),
         _method(),
     ]
@@ -55,22 +48,19 @@ def html_page(sections: Sequence[GyroSection], facts: Mapping[str, str]) -> str:
 
 
 def _section(s: GyroSection, ident: str) -> str:
-    doubts = "".join(f"<li class=bad>{escape(d)}</li>" for d in grading.doubts(s))
-    notes = "".join(f"<li>{escape(n)}</li>" for n in s.result.notes)
+    doubts = [f"<span class=bad>{escape(d)}</span>" for d in grading.doubts(s)]
     c = s.result.compass
-    parts = [
-        f"<section><h2>{escape(s.title)}</h2>",
+    return section(
+        s.title,
         f"<p class=facts>|hypot(s, c) − 1| <b>{c.quality:.4f}</b> · determinant <b>{c.geometry:.2f}</b> We²</p>",
-        _table(grading.table(s)),
+        table(grading.table(s)),
         f"<p class=facts>{escape(s.result.latitude.words)}</p>",
-        f"<ul class=notes>{doubts}{notes}</ul>" if doubts or notes else "",
+        bullets([*doubts, *map(escape, s.result.notes)]),
         _figure(rates_figure(s), ident + "rates", CAPTIONS["rates"]),
         _figure(course_figure(s), ident + "course", CAPTIONS["course"]),
         _positions(s),
         _hold(s, ident),
-        "</section>",
-    ]
-    return "".join(parts)
+    )
 
 
 def _hold(s: GyroSection, ident: str) -> str:
@@ -78,18 +68,9 @@ def _hold(s: GyroSection, ident: str) -> str:
         return ""
     return (
         f"<h2>Hold: {s.hold.drift2_radps / DEGPH:.3f} deg/h compensated in azimuth</h2>"
-        f"<p>{escape(grading.hold_summary(s))}</p>{_table(grading.hold_table(s))}"
+        f"<p>{escape(grading.hold_summary(s))}</p>{table(grading.hold_table(s))}"
         f"{_figure(hold_figure(s), ident + 'hold', CAPTIONS['hold'])}"
     )
-
-
-def _table(rows: Sequence[tuple[str, ...]]) -> str:
-    head = "".join(f"<th>{escape(x)}</th>" for x in rows[0])
-    body = "".join(
-        f"<tr><th>{escape(r[0])}</th>" + "".join(f"<td class=num>{escape(x)}</td>" for x in r[1:]) + "</tr>"
-        for r in rows[1:]
-    )
-    return f"<div class=scroll><table class=est><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>"
 
 
 def _positions(s: GyroSection) -> str:
@@ -101,25 +82,26 @@ def _positions(s: GyroSection) -> str:
         numbers = (row.q_rad * DEG, p.delta_rad * DEG, p.s_radps / DEGPH, p.beta_rad * DEG * 60.0, p.gamma_rad * DEG)
         cells = [f"{x:.4f}" for x in numbers]
         rows.append((str(row.number + 1), *cells, f"{row.residual_radps / DEGPH:+.4f}"))
-    return f"<details><summary>Positions</summary>{_table(rows)}</details>"
+    return folded("Positions", table(rows))
 
 
-def _figure(figure: object, ident: str, caption: str) -> str:
+def _figure(picture: object, ident: str, caption: str) -> str:
     from matplotlib.figure import Figure
 
     from psabench.report import plots as plots
 
-    assert isinstance(figure, Figure)
-    return f"<figure>{plots.svg(figure, ident)}<figcaption>{escape(caption)}</figcaption></figure>"
+    assert isinstance(picture, Figure)
+    return figure(plots.svg(picture, ident), escape(caption))
 
 
 def _method() -> str:
-    return (
-        "<section class=method><h2>How to read this</h2><p>limit: two half widths of the 95 % interval and the "
+    return section(
+        "How to read this",
+        "<p>limit: two half widths of the 95 % interval and the "
         "constant errors that no window sees (level sensors, zero of the angle sensor, scale of the torquers). "
         "Intervals count the random drift of the passport as a Gauss-Markov process. The article's figures are of one "
-        "simulated run; what they are worth, and under which reading they hold, is on the page of the procedure.</p>"
-        "</section>"
+        "simulated run; what they are worth, and under which reading they hold, is on the page of the procedure.</p>",
+        kind="method",
     )
 
 
@@ -140,8 +122,8 @@ def rates_figure(s: GyroSection) -> object:
     left = np.array([row.residual_radps / DEGPH for row in r.rows])
     x = np.linspace(-180.0, 180.0, 361)
     with matplotlib.rc_context(plots.STYLE):
-        figure = Figure(figsize=(7.4, 4.4), layout="constrained")
-        top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=[3, 1.4])
+        picture = Figure(figsize=(7.4, 4.4), layout="constrained")
+        top, bottom = picture.subplots(2, 1, sharex=True, height_ratios=[3, 1.4])
         top.plot(x, r.compass.drift1_radps / DEGPH + we_degph * np.sin(np.radians(x)), color=plots.MUTED, lw=1.0)
         top.axhline(r.compass.drift1_radps / DEGPH, color=plots.SERIES[1], lw=0.9, ls="--", label="drift")
         top.plot(alpha, rate, "o", color=plots.SERIES[0], ms=4.5, label="position")
@@ -153,7 +135,7 @@ def rates_figure(s: GyroSection) -> object:
         bottom.set_xlim(-180.0, 180.0)
         bottom.set_xticks(range(-180, 181, 45))
         top.legend(loc="upper left", ncols=2)
-        return figure
+        return picture
 
 
 def course_figure(s: GyroSection) -> object:
@@ -167,8 +149,8 @@ def course_figure(s: GyroSection) -> object:
     run = r.windows[: len(r.params.table.sequence_deg)]
     begun_s = run[0].t_mid_s - run[0].length_s / 2.0
     with matplotlib.rc_context(plots.STYLE):
-        figure = Figure(figsize=(7.4, 2.8), layout="constrained")
-        ax = figure.subplots()
+        picture = Figure(figsize=(7.4, 2.8), layout="constrained")
+        ax = picture.subplots()
         for w in run:
             t = w.t_mid_s - begun_s + w.length_s * (np.arange(len(w.beta_rad)) / len(w.beta_rad) - 0.5)
             every = max(1, len(t) // 200)
@@ -180,7 +162,7 @@ def course_figure(s: GyroSection) -> object:
             ax.plot([middle - half, middle + half], [expected] * 2, color=plots.SERIES[1], lw=1.4)
         ax.set_xlabel("time from the first window, s")
         ax.set_ylabel("S, deg/h")
-        return figure
+        return picture
 
 
 def hold_figure(s: GyroSection) -> object:
@@ -195,8 +177,8 @@ def hold_figure(s: GyroSection) -> object:
     band = np.array([h.half95_rad * DEG for h in s.hold.held])
     errors = np.array(grading.hold_errors_deg(s) or np.full(len(hours), np.nan))
     with matplotlib.rc_context(plots.STYLE):
-        figure = Figure(figsize=(7.4, 3.0), layout="constrained")
-        ax = figure.subplots()
+        picture = Figure(figsize=(7.4, 3.0), layout="constrained")
+        ax = picture.subplots()
         ax.fill_between(hours, -band, band, color=plots.MUTED, alpha=0.18, lw=0)
         for sign in (-1.0, 1.0):
             ax.axhline(sign * grading.HOLD_CLAIM_DEG, color=plots.SERIES[1], lw=0.9, ls="--")
@@ -204,4 +186,4 @@ def hold_figure(s: GyroSection) -> object:
         ax.set_xlabel("time, h")
         ax.set_ylabel("error of heading, deg")
         ax.set_xlim(0.0, float(hours[-1]))
-        return figure
+        return picture

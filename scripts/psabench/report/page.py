@@ -1,9 +1,17 @@
-"""The frame of every report.html: title, facts of the run, sections; style for light, dark and print."""
+"""Builder of every report.html: title, facts, verdict, sections, tables, figures; style for light, dark and print.
+
+Texts given as `str` are HTML where the parameter says so, and are escaped everywhere else.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import json
+from collections.abc import Iterable, Mapping, Sequence
 from html import escape
+from pathlib import Path
+from typing import Any
+
+from psabench.report.whole_file import replace_file
 
 PAGE = """<!doctype html>
 <html lang=en><head><meta charset=utf-8><meta name=viewport content="width=device-width, initial-scale=1">
@@ -51,6 +59,64 @@ sub { font-size: .72em; line-height: 0; }
 @BODY@
 </body></html>
 """
+
+
+def write_report(folder: Path, data: Mapping[str, Any], page: str, json_name: str = "result.json") -> Path:
+    """Writes `data` and report.html into `folder` (made if missing), each whole or not at all; returns the page.
+
+    Raises OSError.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    replace_file(folder / json_name, json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+    replace_file(folder / "report.html", page)
+    return folder / "report.html"
+
+
+def verdict_line(text: str, good: bool | None) -> str:
+    """The verdict, green or red; None: neither."""
+    kind = "plain" if good is None else "good" if good else "bad"
+    return f"<p class='verdict {kind}'>{escape(text)}</p>"
+
+
+def section(heading: str, *parts: str, kind: str = "") -> str:
+    """A card; parts are HTML."""
+    mark = f" class={kind}" if kind else ""
+    return f"<section{mark}><h2>{escape(heading)}</h2>{''.join(parts)}</section>"
+
+
+def table(rows: Sequence[Sequence[str]], heads: int = 1, *, numeric: bool = True) -> str:
+    """Plain text in cells: head rows first, the first column heads its row; numbers right-aligned, NO in red."""
+
+    def cell(tag: str, text: str) -> str:
+        kind = "" if not numeric else " class='num bad'" if text == "NO" else " class=num"
+        return f"<{tag}{kind}>{escape(text)}</{tag}>"
+
+    def row(tag: str, r: Sequence[str]) -> str:
+        return f"<tr><th>{escape(r[0])}</th>{''.join(cell(tag, x) for x in r[1:])}</tr>"
+
+    head, body = "".join(row("th", r) for r in rows[:heads]), "".join(row("td", r) for r in rows[heads:])
+    return html_table(head, body)
+
+
+def html_table(head: str, body: str, kind: str = "") -> str:
+    """A table of rows in HTML."""
+    mark = f" class={kind}" if kind else ""
+    return f"<div class=scroll><table{mark}><thead>{head}</thead><tbody>{body}</tbody></table></div>"
+
+
+def figure(svg: str, caption: str = "") -> str:
+    """A picture with its caption in HTML."""
+    return f"<figure>{svg}{f'<figcaption>{caption}</figcaption>' if caption else ''}</figure>"
+
+
+def folded(summary: str, body: str) -> str:
+    """HTML that opens on a click."""
+    return f"<details><summary>{escape(summary)}</summary>{body}</details>"
+
+
+def bullets(items: Sequence[str], kind: str = "notes") -> str:
+    """A list of HTML items; "" for none."""
+    return f"<ul class={kind}>{''.join(f'<li>{x}</li>' for x in items)}</ul>" if items else ""
 
 
 def whole_page(title: str, facts: Mapping[str, str], sections: Iterable[str]) -> str:
