@@ -117,8 +117,11 @@ def test_a_board_that_nobody_knows_is_a_bad_argument() -> None:
 
 
 def test_default_nodes() -> None:
-    assert {board: dbc_node(board) for board in all_devices()} == {"psa2": 5, "psd1": 6, "pmka": 7, "pik": 8, "gyro": 9}
-    assert [kind(CanHost(FakeBus(), WallClock())).node.node_id for kind in all_devices().values()] == [5, 6, 7, 8, 9]
+    nodes = {board: dbc_node(board) for board in all_devices()}
+    assert nodes | {"psa2": 5, "psd1": 6, "pmka": 7, "pik": 8, "gyro": 9} == nodes
+    assert len(set(nodes.values())) == len(nodes)
+    for board, kind in all_devices().items():
+        assert kind(CanHost(FakeBus(), WallClock())).node.node_id == nodes[board]
 
 
 def test_registers_by_the_names_of_the_eds() -> None:

@@ -92,7 +92,9 @@ def test_identifiers_of_node_5(db: cantools.database.can.Database) -> None:
 
 def test_devices_have_their_default_nodes() -> None:
     """Sources can 3.3."""
-    assert {p.key: p.device["node"] for p in PROTOCOLS} == {"psa2": 5, "psd1": 6, "pmka": 7, "pik": 8, "gyro": 9}
+    nodes = {p.key: p.device["node"] for p in PROTOCOLS}
+    assert nodes | {"psa2": 5, "psd1": 6, "pmka": 7, "pik": 8, "gyro": 9} == nodes
+    assert len(set(nodes.values())) == len(nodes)
     assert len({p.device["product_code"] for p in PROTOCOLS}) == len(PROTOCOLS)
 
 

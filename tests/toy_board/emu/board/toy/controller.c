@@ -3,6 +3,8 @@
 
 #include <math.h>
 
+#define ALL          TRACE_FIRST(TOY_LINES)
+#define STEPS        (2u * TOY_BITS + 1u)
 #define BOARD_SENSOR 3u /* temperature channel of the board itself */
 
 const struct board_line toy_lines[TOY_LINES] = {
@@ -25,7 +27,7 @@ static double input_v(struct toy *b, unsigned axis, int64_t t_ns)
     return afe_out_v(&b->afe[axis], signal, b->io.temp_degc(b->io.ctx, BOARD_SENSOR, t_ns), t_ns);
 }
 
-static int16_t convert(struct toy *b, double volts, bool *clipped)
+static int16_t convert_input(struct toy *b, double volts, bool *clipped)
 {
     const double code = floor(volts / b->profile.lsb_v + 0.5);
     *clipped = code > INT16_MAX || code < INT16_MIN;
@@ -48,26 +50,45 @@ static uint64_t word_of(const struct toy_sample *s)
     return word;
 }
 
-/* All edges of a sample: known when it begins, and shorter than the trace's lag. */
-static void shift_out(struct toy *b, int64_t t_ns)
+/* All edges of the latest sample: known when it begins, and shorter than the trace's lag. */
+static void fill_steps(const struct toy *b, struct trace_step steps[STEPS])
 {
-    const uint64_t all = TRACE_FIRST(TOY_LINES), word = word_of(&b->latest);
-    struct trace_step steps[2 * TOY_BITS + 1];
-    if (!trace_watched(&b->base.trace, all)) return;
+    const uint64_t word = word_of(&b->latest);
     for (int k = 0; k < TOY_BITS; k++) {
         const uint64_t data = word >> (TOY_BITS - 1 - k) & 1 ? TRACE_BIT(TOY_LINE_DATA) : 0;
-        const int64_t fall_ns = t_ns + (int64_t)k * b->profile.bit_ns;
-        steps[2 * k] = (struct trace_step){fall_ns, all, data};
-        steps[2 * k + 1] = (struct trace_step){fall_ns + b->profile.bit_ns / 2, all, data | TRACE_BIT(TOY_LINE_CLK)};
+        const int64_t fall_ns = b->sample_ns + (int64_t)k * b->profile.bit_ns;
+        steps[2 * k] = (struct trace_step){fall_ns, ALL, data};
+        steps[2 * k + 1] = (struct trace_step){fall_ns + b->profile.bit_ns / 2, ALL, data | TRACE_BIT(TOY_LINE_CLK)};
     }
-    steps[2 * TOY_BITS] =
-        (struct trace_step){t_ns + (int64_t)TOY_BITS * b->profile.bit_ns, all, TRACE_BIT(TOY_LINE_FRAME)};
-    trace_steps(&b->base.trace, steps, 2 * TOY_BITS + 1);
+    const int64_t end_ns = b->sample_ns + (int64_t)TOY_BITS * b->profile.bit_ns;
+    steps[STEPS - 1] = (struct trace_step){end_ns, ALL, TRACE_BIT(TOY_LINE_FRAME)};
+}
+
+static void shift_out(struct toy *b)
+{
+    struct trace_step steps[STEPS];
+    if (!trace_watched(&b->base.trace, ALL)) return;
+    fill_steps(b, steps);
+    trace_steps(&b->base.trace, steps, STEPS);
+}
+
+/* A client begins to watch: it gets what is left of the word under way. */
+static void wake_lines(void *ctx, uint64_t mask)
+{
+    struct toy *b = ctx;
+    struct trace_step steps[STEPS];
+    const int64_t from_ns = b->base.trace.done_ns;
+    unsigned first = 0;
+    if (!(mask & ALL) || trace_watched(&b->base.trace, ALL) || b->latest.seq == 0) return;
+    fill_steps(b, steps);
+    while (first < STEPS - 1 && steps[first + 1].t_ns <= from_ns) first++;
+    if (steps[first].t_ns < from_ns) steps[first].t_ns = from_ns;
+    trace_steps(&b->base.trace, steps + first, STEPS - first);
 }
 
 static void rest_lines(struct toy *b, int64_t t_ns)
 {
-    trace_put(&b->base.trace, TRACE_FIRST(TOY_LINES), b->on ? TRACE_BIT(TOY_LINE_FRAME) : 0, t_ns);
+    trace_put(&b->base.trace, ALL, b->on ? TRACE_BIT(TOY_LINE_FRAME) : 0, t_ns);
 }
 
 /* ---- samples ---- */
@@ -84,7 +105,7 @@ static void take_sample(struct toy *b, int64_t t_ns)
     uint8_t clipped = 0;
     for (unsigned i = 0; i < BOARD_AXES; i++) {
         bool at_the_end;
-        const int16_t code = convert(b, input_v(b, i, t_ns), &at_the_end);
+        const int16_t code = convert_input(b, input_v(b, i, t_ns), &at_the_end);
         clipped |= (uint8_t)(at_the_end << i);
         if (!frozen) s->code[i] = read_code(b, code);
     }
@@ -98,7 +119,8 @@ static void sample_periodically(void *ctx, int64_t t_ns)
     struct toy *b = ctx;
     sched_at(b->sched, &b->sample_ev, t_ns + toy_period_ns(&b->profile));
     take_sample(b, t_ns);
-    shift_out(b, t_ns);
+    b->sample_ns = t_ns;
+    shift_out(b);
     notify_event(b, TOY_EV_SAMPLE, t_ns);
     if (b->on_sample) b->on_sample(b->can, &b->latest, t_ns);
 }
@@ -116,6 +138,7 @@ void toy_init(struct toy *b, const struct toy_profile *p, const struct board_cfg
     static const char *const noise[BOARD_AXES] = {"afe.x", "afe.y", "afe.z"};
     *b = (struct toy){.profile = *p, .cfg = *cfg, .io = *io, .sched = s};
     board_init(&b->base, toy_lines, TOY_LINES);
+    b->base.trace.source = (struct trace_source){.wake = wake_lines, .ctx = b};
     sched_ev(&b->sample_ev, sample_periodically, b);
     for (unsigned i = 0; i < BOARD_AXES; i++)
         afe_init(&b->afe[i], &cfg->afe[i], rng_stream(cfg->seed, cfg->serial, noise[i]));

@@ -54,6 +54,7 @@ struct toy {
     enum chip_stuck dout; /* of the converter */
     struct toy_counters counters;
     struct toy_sample latest;
+    int64_t sample_ns; /* its instant */
     bool on;
 };
 
