@@ -61,7 +61,8 @@ static const struct board_node_type type = {
     .period_ns = period_ns,
 };
 
-static void init(void *can, const struct board_can_cfg *cfg, struct board *board, struct can_bus *bus, struct sched *s)
+static void init_can(void *can, const struct board_can_cfg *cfg, struct board *board, struct can_bus *bus,
+                     struct sched *s)
 {
     struct toy *b = (struct toy *)board;
     board_node_init(can, &type, cfg, board, bus, s);
@@ -71,7 +72,7 @@ static void init(void *can, const struct board_can_cfg *cfg, struct board *board
 
 const struct board_can toy_can = {
     .size = sizeof(struct toy_can),
-    .init = init,
+    .init = init_can,
     .power_up = board_node_power_up,
     .power_down = board_node_power_down,
     .node = board_node_co,

@@ -144,7 +144,7 @@ void toy_init(struct toy *b, const struct toy_profile *p, const struct board_cfg
         afe_init(&b->afe[i], &cfg->afe[i], rng_stream(cfg->seed, cfg->serial, noise[i]));
 }
 
-static void restart(struct toy *b, int64_t t_ns)
+static void restart_samples(struct toy *b, int64_t t_ns)
 {
     b->latest = (struct toy_sample){.seq = 0};
     rest_lines(b, t_ns);
@@ -154,7 +154,7 @@ static void restart(struct toy *b, int64_t t_ns)
 void toy_power_up(struct toy *b, int64_t t_ns)
 {
     b->on = true;
-    restart(b, t_ns);
+    restart_samples(b, t_ns);
     notify_event(b, TOY_EV_POWER_UP, t_ns);
 }
 
@@ -170,6 +170,6 @@ void toy_reset(struct toy *b, int64_t t_ns)
 {
     if (!b->on) return;
     b->counters.resets++;
-    restart(b, t_ns);
+    restart_samples(b, t_ns);
     notify_event(b, TOY_EV_RES, t_ns);
 }

@@ -15,7 +15,7 @@ LEAST = 8
 SEQ_MODULO = 256
 
 
-def codes(e: Evidence) -> Ints:
+def sample_codes(e: Evidence) -> Ints:
     """X, Y, Z (n, 3) of the samples. Raises TooLittle for fewer than eight."""
     log = e.frames_of("TOY_SAMPLE")
     if len(log) < LEAST:
@@ -29,7 +29,7 @@ def codes(e: Evidence) -> Ints:
 def codes_are_the_volts_at_the_inputs(e: Evidence) -> str:
     """Divide the known volts at the inputs by the weight of a code."""
     row = row_for(e, "TOY-CAN-01")
-    found = codes(e)
+    found = sample_codes(e)
     due = np.array([e.inputs_v.get(axis, 0.0) for axis in "xyz"]) / row.limit("code_v")
     if np.abs(found - due).max() > row.limit("error_max_codes"):
         raise Broken(f"codes {found[0].tolist()}", f"{due.round(1).tolist()}")
@@ -41,7 +41,7 @@ def codes_are_the_volts_at_the_inputs(e: Evidence) -> str:
 def samples_come_at_their_pace(e: Evidence) -> str:
     """Measure the time from frame to frame, and follow SEQ."""
     row = row_for(e, "TOY-CAN-02")
-    codes(e)
+    sample_codes(e)
     log = e.frames_of("TOY_SAMPLE")
     steps_us = np.diff(log.t_s) * 1e6
     off_us = float(np.abs(steps_us - row.limit("period_us")).max())
@@ -59,7 +59,7 @@ def lines_carry_the_codes(e: Evidence) -> str:
     bits = int(row_for(e, "TOY-LINE-01").limit("bits_count"))
     begins, ends = e.wires.pulses("FRAME", 0)
     rises = e.wires.rises("CLK")
-    sent = [tuple(int(c) for c in row) for row in codes(e)]
+    sent = [tuple(int(c) for c in row) for row in sample_codes(e)]
     found = []
     for begin, end in zip(begins, ends, strict=True):
         at = rises[(rises > begin) & (rises < end)]

@@ -17,6 +17,6 @@ def power_on(s: Subject) -> Evidence:
 
 
 @scene("stream", boards=("toy",))
-def stream(s: Subject) -> Evidence:
+def stream_for_a_second(s: Subject) -> Evidence:
     """A second of samples on CAN and on the lines."""
     return s.evidence("stream", readings(s, START_S, lambda: s.run_for(STREAM_S)))
