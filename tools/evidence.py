@@ -140,7 +140,7 @@ def load(root: Path = ROOT) -> Ledger:
             Group(name, g["title"], tuple(expand(root, g["files"])), tuple(expand_tests(root, g["tests"])))
             for name, g in data["groups"].items()
         )
-        groups += tuple(board_group(root, b) for b in boards(root) if b not in data["groups"])
+        groups += tuple(board_group(root, b) for b in board_folders(root) if b not in data["groups"])
         rungs = {test: (rung, why) for rung, rows in data["rungs"].items() for test, why in rows.items()}
         claims = tuple(Claim(c["subject"], c["claim"], c["rung"], tuple(c["tests"])) for c in data["claims"])
         return Ledger(data["ladder"], groups, rungs, claims)
@@ -148,7 +148,7 @@ def load(root: Path = ROOT) -> Ledger:
         raise EvidenceError(f"{LEDGER}: {' '.join(str(e).split())}") from e
 
 
-def boards(root: Path) -> list[str]:
+def board_folders(root: Path) -> list[str]:
     return sorted(folder.name for folder in (root / "emu/board").glob("*/"))
 
 

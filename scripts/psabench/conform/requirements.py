@@ -144,13 +144,13 @@ def load(index: Path) -> Requirements:
     where = index.name
     grades, ways, kinds = (_words(data[k], f"{where}: {k}") for k in ("grades", "observe", "kinds"))
     files = _group_files(index.parent / "requirements", _texts(data["groups"], f"{where}: groups"))
-    boards, traits = _boards(files)
+    boards, traits = _boards_and_traits(files)
     profiles = _profiles(index.parent / "profiles", boards)
     retired = set(_texts(data.get("retired", []), f"{where}: retired"))
     if type(data["version"]) is not int or data["version"] < 1:
         raise RequirementsError(f"{where}: version {data['version']!r} is no number from 1 on")
     words = _Words(frozenset(grades), frozenset(ways), frozenset(kinds), tuple(boards), traits, profiles)
-    groups = _groups(files)
+    groups = _group_heads(files)
     rows: dict[str, Requirement] = {}
     for group in groups:
         for row in _rows(f"{group.name}.yaml", files[group.name], group, words):
@@ -219,7 +219,7 @@ def _group_files(folder: Path, first: Sequence[str]) -> dict[str, dict[str, Any]
     return {path.stem: _mapping(_read(path), GROUP_FIELDS, GROUP_OPTIONS, path.name) for path in paths}
 
 
-def _boards(files: Mapping[str, dict[str, Any]]) -> tuple[dict[str, str], dict[str, frozenset[str]]]:
+def _boards_and_traits(files: Mapping[str, dict[str, Any]]) -> tuple[dict[str, str], dict[str, frozenset[str]]]:
     """Every board with one line of explanation, and which of them have each trait."""
     boards: dict[str, str] = {}
     traits: dict[str, set[str]] = {trait: set() for trait in TRAITS}
@@ -235,7 +235,7 @@ def _boards(files: Mapping[str, dict[str, Any]]) -> tuple[dict[str, str], dict[s
     return boards, {trait: frozenset(having) for trait, having in traits.items()}
 
 
-def _groups(files: Mapping[str, dict[str, Any]]) -> tuple[Group, ...]:
+def _group_heads(files: Mapping[str, dict[str, Any]]) -> tuple[Group, ...]:
     groups: list[Group] = []
     for name, data in files.items():
         prefixes = _texts(data["prefixes"], f"{name}.yaml: prefixes")
