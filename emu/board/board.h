@@ -1,5 +1,5 @@
 /* What every board gives the bench: one const table a type. The bench, links, control, faults, snapshots and scenarios know
- * boards only through it; unit/boards.c lists the types.
+ * boards only through it; unit/boards.h lists the types.
  *
  * A board is a plain struct that its unit owns, one thread, no allocation; its first member is a struct board. `can` points to
  * its CAN side, `profile` to its profile struct. Times are simulated ns since power-on of the bench. */
