@@ -17,7 +17,7 @@ from psabench.conform.capture.log import LineLog
 from psabench.conform.dut import Addresses, Subject, Take
 from psabench.conform.profile import variant
 from psabench.conform.raw_can import Talk, read, segment, talk, write
-from psabench.conform.verdict import Broken, TooLittle
+from psabench.conform.verdict import Failed, Inconclusive
 from psabench.errors import BenchError, TimeOut
 
 from tests.mutants.declared import Target
@@ -73,7 +73,7 @@ def _requests(s: Subject) -> Iterator[bytes]:
 def _talk(s: Subject, total: Sum) -> None:
     with talk(s) as t:
         for request in _requests(s):
-            with suppress(Broken, TooLittle):
+            with suppress(Failed, Inconclusive):
                 total.add(request, t.ask(request))
         total.add([f.data for f in t.heard])
 
@@ -103,7 +103,7 @@ def _stream(s: Subject, total: Sum) -> None:
 
 
 def _set(t: Talk, total: Sum, index: int, sub: int, value: int, size: int) -> None:
-    with suppress(Broken, TooLittle):
+    with suppress(Failed, Inconclusive):
         total.add(t.ask(write(index, sub, value.to_bytes(size, "little"))))
 
 
@@ -177,7 +177,7 @@ def seen(target: Target) -> str:
             for step in steps:
                 try:
                     step(s, total)
-                except (BenchError, Broken, TooLittle) as e:
+                except (BenchError, Failed, Inconclusive) as e:
                     total.add(step.__name__, type(e).__name__)
     return total.hex()
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from psabench.conform.dut import Subject
-from psabench.conform.verdict import Broken, TooLittle
+from psabench.conform.verdict import Failed, Inconclusive
 from psabench.errors import DeviceError
 from psabench.link.busport import BusPort, Cycle
 
@@ -13,9 +13,9 @@ SHORT_S = 50e-6  # a cycle and some more
 
 
 def port(s: Subject) -> BusPort:
-    """Raises TooLittle where there is none."""
+    """Raises Inconclusive where there is none."""
     if s.port is None:
-        raise TooLittle("no bus port was connected (--bus-port)")
+        raise Inconclusive("no bus port was connected (--bus-port)")
     return s.port
 
 
@@ -35,7 +35,7 @@ def burst(s: Subject, *lines: str) -> list[Cycle]:
             s.run_for(SHORT_S + _strobe_s(text))
         answer = port(s).answer()
         if not isinstance(answer, Cycle):
-            raise Broken(f"{answer} as the answer to {text!r}", "that of a cycle")
+            raise Failed(f"{answer} as the answer to {text!r}", "that of a cycle")
         found.append(answer)
     return found
 
@@ -53,17 +53,17 @@ def code_of(e: DeviceError) -> int:
 
 
 def refused(action: Callable[[], object], code: float, what: str) -> None:
-    """An action that must be refused with this abort code. Raises Broken."""
+    """An action that must be refused with this abort code. Raises Failed."""
     due = f"a refusal with {int(code):08X}h"
     try:
         done = action()
     except DeviceError as e:
         if e.abort_code != int(code):
-            raise Broken(f"{what}: {e}", due) from e
+            raise Failed(f"{what}: {e}", due) from e
         return
-    raise Broken(f"{what}: carried out, {done}" if isinstance(done, Cycle) else f"{what}: carried out", due)
+    raise Failed(f"{what}: carried out, {done}" if isinstance(done, Cycle) else f"{what}: carried out", due)
 
 
 def line_refused(s: Subject, text: str, code: float) -> None:
-    """A line to the bus port that must be refused with this abort code. Raises Broken."""
+    """A line to the bus port that must be refused with this abort code. Raises Failed."""
     refused(lambda: line(s, text), code, text)

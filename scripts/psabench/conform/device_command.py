@@ -11,7 +11,7 @@ from typing import Any
 from psabench.conform import identity, report, runner, suite
 from psabench.conform.defaults import OUT
 from psabench.conform.dut import INPUTS_V, Addresses, Subject
-from psabench.conform.excerpts import Exhibits
+from psabench.conform.excerpts import Excerpts
 from psabench.conform.list_command import requirements_of
 from psabench.conform.profile import Variant, variant
 from psabench.conform.verdict import Outcome
@@ -50,7 +50,7 @@ def device_run(
     recorder_error: float = 0.0,
     clock_ppm: float = 100.0,
 ) -> report.Run:
-    """Judge a board; what shows a failure goes into the folder. Ctrl-C ends it, and what was judged stays.
+    """Check a board; what shows a failure goes into the folder. Ctrl-C ends it, and what was checked stays.
 
     clock_error, recorder_error: ppm by which clocks of an emulator that is started are fast, and its probes'. Raises
     BadInput where `only` selects nothing, LinkError or BenchError where the board cannot be reached.
@@ -63,7 +63,7 @@ def device_run(
     interrupted = False
     with Subject.open(v, at, seed=seed, clock_ppm=clock_error, recorder_ppm=recorder_error) as subject:
         facts = identity.subject_facts(subject) | identity.suite_facts()
-        keep = Exhibits(folder).keep
+        keep = Excerpts(folder).keep
         try:
             runner.run(subject, progress, only=only, clock_ppm=clock_ppm, told=outcomes.append, keep=keep)
         except KeyboardInterrupt:

@@ -9,7 +9,7 @@ from psabench.boards.objects import Area, BusObjects
 from psabench.conform.bus_host import refused
 from psabench.conform.dut import Subject
 from psabench.conform.requirements import requirements
-from psabench.conform.verdict import Broken
+from psabench.conform.verdict import Failed
 from psabench.link.canopen_host import Described
 
 OWN, BUS, READ_ONLY = (
@@ -21,7 +21,7 @@ REAL_FORMATS = {4: "<f", 8: "<d"}
 
 
 def as_the_dictionary_says(s: Subject, eds: str, varies: Container[int] = ()) -> str:
-    """Every object of the board's own; returns what was seen, raises Broken. Just after Res.
+    """Every object of the board's own; returns what was seen, raises Failed. Just after Res.
 
     varies: objects whose default is that of one profile.
     """
@@ -33,10 +33,10 @@ def as_the_dictionary_says(s: Subject, eds: str, varies: Container[int] = ()) ->
             continue
         data = s.unit.node.read_raw(o.index, o.sub)
         if o.data_bytes is not None and len(data) != o.data_bytes:
-            raise Broken(f"{what} has {len(data)} bytes", f"{o.data_bytes}")
+            raise Failed(f"{what} has {len(data)} bytes", f"{o.data_bytes}")
         due = None if o.index in varies else _default(o)
         if due is not None and data != due:
-            raise Broken(f"{what} is {data.hex(' ')} after Res", due.hex(" "))
+            raise Failed(f"{what} is {data.hex(' ')} after Res", due.hex(" "))
     for o in objects:
         what = f"{o.index:04X}h:{o.sub} {o.name}"
         if o.access in ("ro", "const"):

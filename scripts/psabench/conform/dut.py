@@ -1,6 +1,6 @@
 """The device under test: a board at the end of its wires, whether we started an emulator for it or it was there.
 
-What a scene may do: send and receive on CAN, look at the lines, run cycles on the bus port, switch the supply, press
+What a stimulus may do: send and receive on CAN, look at the lines, run cycles on the bus port, switch the supply, press
 Res, and let time pass. Nothing here reads the emulator's truth or plans a fault.
 """
 
@@ -19,7 +19,7 @@ from psabench.bench import Bench
 from psabench.boards.devices import of_board
 from psabench.boards.registry import BOARDS
 from psabench.boards.unit import Unit
-from psabench.conform.capture.log import CanFrame, CanLog, Evidence, LineLog, Marks, apart
+from psabench.conform.capture.log import CanFrame, CanLog, Capture, LineLog, Marks, apart
 from psabench.conform.probes import LineProbe, PinProbe, PortProbe
 from psabench.conform.profile import Variant
 from psabench.errors import BadInput, LinkError
@@ -55,7 +55,7 @@ class Addresses:
 
 @dataclass(slots=True)
 class Take:
-    """What a scene collects while it runs."""
+    """What a stimulus collects while it runs."""
 
     frames: list[CanFrame] = field(default_factory=list)
     cycles: list[Cycle] = field(default_factory=list)
@@ -81,7 +81,7 @@ class Take:
 
 
 class Subject:
-    """See the module. `bench`, `unit` and `port` are for scenes and trials."""
+    """See the module. `bench`, `unit` and `port` are for stimuli and active tests."""
 
     def __init__(
         self,
@@ -153,7 +153,7 @@ class Subject:
         """Until readings come, or would if a host read them.
 
         Raises LinkError where they do not, but once: afterwards the board is looked at as it is, after the time that a
-        set-up takes, so that one which never becomes ready is judged by what it does show.
+        set-up takes, so that one which never becomes ready is checked by what it does show.
         """
         if "stream" not in self.probes or self._never_ready:
             self.run_for(HOSTLESS_SETUP_S)
@@ -185,12 +185,12 @@ class Subject:
         """How far an interval may seem off, by clocks that differ."""
         return apart(interval_s, self.allowed_ppm)
 
-    def evidence(self, scene: str, take: Take) -> Evidence:
+    def capture(self, stimulus: str, take: Take) -> Capture:
         """Of a take that has ended."""
-        return Evidence(
+        return Capture(
             variant=self.variant,
             node=self.node,
-            scene=scene,
+            stimulus=stimulus,
             can=CanLog(frames=tuple(take.frames)),
             lines=take.lines,
             cycles=tuple(take.cycles),

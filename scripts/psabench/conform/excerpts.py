@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from psabench.conform.capture.log import CanFrame, Evidence, LineLog
-from psabench.conform.verdict import Broken
+from psabench.conform.capture.log import CanFrame, Capture, LineLog
+from psabench.conform.verdict import Failed
 from psabench.report.drawing import Panel, Section, render
 from psabench.report.whole_file import replace_file
 
@@ -16,22 +16,22 @@ MOST_LINES, MOST_FRAMES = 12, 200
 
 
 @dataclass(frozen=True, slots=True)
-class Exhibits:
+class Excerpts:
     """Files of a report's folder."""
 
     folder: Path
 
-    def keep(self, test: str, broken: Broken, evidence: Evidence | None) -> tuple[str, ...]:
+    def keep(self, test: str, broken: Failed, capture: Capture | None) -> tuple[str, ...]:
         """Names of the files in the folder. Raises OSError."""
         made: list[str] = []
-        if evidence is not None and evidence.lines is not None and broken.at_ns is not None:
-            made += self._lines(test, broken, evidence.lines, round(broken.at_ns))
+        if capture is not None and capture.lines is not None and broken.at_ns is not None:
+            made += self._lines(test, broken, capture.lines, round(broken.at_ns))
         frames = broken.frames[:MOST_FRAMES]
         if frames:
             made.append(self._write(f"{test}.log", candump(frames)))
         return tuple(made)
 
-    def _lines(self, test: str, broken: Broken, lines: LineLog, at_ns: int) -> list[str]:
+    def _lines(self, test: str, broken: Failed, lines: LineLog, at_ns: int) -> list[str]:
         rows = [n for n in broken.lines or lines.recording.wires if n in lines][:MOST_LINES]
         begin, end = max(lines.start_ns, at_ns - BEFORE_NS), min(lines.end_ns, at_ns + AFTER_NS)
         if not rows or end <= begin:

@@ -1,6 +1,6 @@
 """Probes on the lines of a board: the line port (or an adapter of its kind), all pins of an emulated board.
 
-A probe is started and stopped by the scene; what it saw meanwhile is a `LineLog`.
+A probe is started and stopped by the stimulus; what it saw meanwhile is a `LineLog`.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from psabench.link.lineport import SAMPLE_HZ, open_line
 from psabench.link.vcd import read_vcd
 
 BLOCK = 1 << 16
-MOST = 1 << 30  # samples of one scene: two minutes at 8 MHz
+MOST = 1 << 30  # samples of one stimulus: two minutes at 8 MHz
 
 
 class LineProbe(Protocol):
@@ -88,7 +88,7 @@ class PortProbe:
         self._thread.start()
 
     def stop(self) -> LineLog:
-        """Raises LinkError when the port ended, or gave more than a scene may hold."""
+        """Raises LinkError when the port ended, or gave more than a stimulus may hold."""
         assert self._thread is not None
         assert self._wake is not None
         os.write(self._wake[1], b"x")

@@ -9,21 +9,21 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from psabench.conform.capture.log import Evidence
+from psabench.conform.capture.log import Capture
 from psabench.conform.requirements import Requirement, requirements
 
 Test = TypeVar("Test", bound=Callable[..., Any])
 
 
 @dataclass(frozen=True, slots=True)
-class Proof:
+class SuiteTest:
     """A test of the suite and the ids of what it proves."""
 
     test: Callable[..., Any]
     ids: tuple[str, ...]
 
 
-_proofs: list[Proof] = []
+_suite_tests: list[SuiteTest] = []
 
 
 def proves(*ids: str) -> Callable[[Test], Test]:
@@ -34,18 +34,18 @@ def proves(*ids: str) -> Callable[[Test], Test]:
         raise ValueError(f"proves: no requirement {', '.join(unknown)}")
 
     def register(test: Test) -> Test:
-        _proofs.append(Proof(test, ids))
+        _suite_tests.append(SuiteTest(test, ids))
         return test
 
     return register
 
 
-def proofs() -> tuple[Proof, ...]:
+def suite_tests() -> tuple[SuiteTest, ...]:
     """Every test that was registered so far, in the order in which its module was imported."""
-    return tuple(_proofs)
+    return tuple(_suite_tests)
 
 
-def row_for(e: Evidence, *ids: str) -> Requirement:
+def row_for(e: Capture, *ids: str) -> Requirement:
     """The one of these requirements that holds for the variant. Raises ValueError when none does."""
     v = e.variant
     for i in ids:

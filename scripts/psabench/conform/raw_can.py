@@ -1,6 +1,6 @@
 """Raw frames to a unit and what it says back: requests that python-canopen would not send, answers as they stand.
 
-What a board should answer and does not is `Broken`; nothing here trusts a length or a number that came from it. An
+What a board should answer and does not is `Failed`; nothing here trusts a length or a number that came from it. An
 answer that should not come is waited for with a fence: a good request sent after it, which is answered later, so that
 no clock of ours decides what silence is.
 """
@@ -15,7 +15,7 @@ from psabench.conform.capture.canbits import frame_bits
 from psabench.conform.capture.log import CanFrame
 from psabench.conform.dut import Subject, Take
 from psabench.conform.requirements import requirements
-from psabench.conform.verdict import Broken, TooLittle
+from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.can_host import Message
 
 NMT_START, NMT_STOP, NMT_PREOP, NMT_RESET, NMT_RESET_COMMUNICATION = 0x01, 0x02, 0x80, 0x81, 0x82
@@ -115,15 +115,15 @@ class Talk:
     # ---- SDO
 
     def answer_to(self, request: bytes, patience_s: float | None = None) -> CanFrame:
-        """The answer to a request. Raises Broken when none comes, or one of other than 8 bytes."""
+        """The answer to a request. Raises Failed when none comes, or one of other than 8 bytes."""
         self.drain()
         at = len(self.heard)
         self.send(self.sdo_rx, request)
         answer = self._after(at, self.sdo_tx, patience_s)
         if answer is None:
-            raise Broken(f"no answer to the SDO request {words(request)}", "an answer")
+            raise Failed(f"no answer to the SDO request {words(request)}", "an answer")
         if len(answer.data) != 8:
-            raise Broken(f"an SDO answer of {len(answer.data)} bytes", "8 bytes", frames=[answer])
+            raise Failed(f"an SDO answer of {len(answer.data)} bytes", "8 bytes", frames=[answer])
         return answer
 
     def ask(self, request: bytes) -> bytes:
@@ -136,19 +136,19 @@ class Talk:
         return int.from_bytes(data[4:], "little") if data[0] == ABORT else None
 
     def refused(self, request: bytes, code: float, what: str) -> None:
-        """Raises Broken unless it is refused with this code, in an answer that names its object."""
+        """Raises Failed unless it is refused with this code, in an answer that names its object."""
         answer = self.answer_to(request)
         due = bytes([ABORT]) + request[1:4] + int(code).to_bytes(4, "little")
         if answer.data != due:
-            raise Broken(f"{what} was answered by {words(answer.data)}", words(due), frames=[answer])
+            raise Failed(f"{what} was answered by {words(answer.data)}", words(due), frames=[answer])
 
     def upload(self, index: int, sub: int = 0) -> bytes:
-        """Value of an object, expedited or in segments. Raises Broken."""
+        """Value of an object, expedited or in segments. Raises Failed."""
         data = self.ask(read(index, sub))
         if data[0] == ABORT:
-            raise Broken(f"{index:04X}h:{sub} is refused with {data[7:3:-1].hex().upper()}h", "its value")
+            raise Failed(f"{index:04X}h:{sub} is refused with {data[7:3:-1].hex().upper()}h", "its value")
         if data[0] & 0xE0 != UPLOAD or data[1:4] != read(index, sub)[1:4]:
-            raise Broken(f"{words(data)} as the answer to an upload of {index:04X}h:{sub}", "its value")
+            raise Failed(f"{words(data)} as the answer to an upload of {index:04X}h:{sub}", "its value")
         if data[0] & 2:
             return data[4 : 8 - (data[0] >> 2 & 3)]
         return self._segments(int.from_bytes(data[4:], "little"))
@@ -158,12 +158,12 @@ class Talk:
         while True:
             data = self.ask(segment(toggle))
             if data[0] & 0xF0 != toggle:
-                raise Broken(f"{words(data)} as a segment", f"command {toggle:02X}h to {toggle | 0xF:02X}h")
+                raise Failed(f"{words(data)} as a segment", f"command {toggle:02X}h to {toggle | 0xF:02X}h")
             value += data[1 : 8 - (data[0] >> 1 & 7)]
             if data[0] & 1:
                 return value
             if data[0] & 0xE or len(value) > size:
-                raise Broken(f"segment {words(data)} of a value of {size} bytes", "whole segments up to the last one")
+                raise Failed(f"segment {words(data)} of a value of {size} bytes", "whole segments up to the last one")
             toggle ^= 0x10
 
     def number(self, index: int, sub: int = 0) -> int:
@@ -174,23 +174,23 @@ class Talk:
         """A value of up to 4 bytes, and the place of its answer in what was heard."""
         answer = self.answer_to(read(index, sub))
         if answer.data[0] & 0xE3 != 0x43 or answer.data[1:4] != read(index, sub)[1:4]:
-            raise Broken(f"{words(answer.data)} to an upload of {index:04X}h:{sub}", "its value", frames=[answer])
+            raise Failed(f"{words(answer.data)} to an upload of {index:04X}h:{sub}", "its value", frames=[answer])
         value = int.from_bytes(answer.data[4 : 8 - (answer.data[0] >> 2 & 3)], "little")
         return value, next(k for k in reversed(range(len(self.heard))) if self.heard[k] is answer)
 
     def download(self, index: int, sub: int, data: bytes) -> None:
-        """Write up to 4 bytes. Raises Broken when it is not taken."""
+        """Write up to 4 bytes. Raises Failed when it is not taken."""
         answer = self.answer_to(write(index, sub, data))
         due = bytes([FINE]) + write(index, sub, data)[1:4]
         if answer.data[:4] != due:
-            raise Broken(f"{index:04X}h:{sub} = {data[::-1].hex().upper()}h answered by {words(answer.data)}", "60h")
+            raise Failed(f"{index:04X}h:{sub} = {data[::-1].hex().upper()}h answered by {words(answer.data)}", "60h")
 
     def counter(self, name: str) -> int:
-        """One of 2030h by its name. Raises TooLittle where the board has none of that name."""
+        """One of 2030h by its name. Raises Inconclusive where the board has none of that name."""
         for sub, title in self.s.unit.node.names(COUNTERS).items():
             if title == name:
                 return self.number(COUNTERS, sub)
-        raise TooLittle(f"this board has no counter {name}")
+        raise Inconclusive(f"this board has no counter {name}")
 
     def fence(self) -> list[CanFrame]:
         """What comes before the answer to a good request: all that was caused by what was sent earlier."""
@@ -217,7 +217,7 @@ class Talk:
         self.until(lambda: place() is not None)
         end = place()
         if end is None:
-            raise Broken("no answer to an upload of 1000h", "an answer", frames=self.heard[at:])
+            raise Failed("no answer to an upload of 1000h", "an answer", frames=self.heard[at:])
         return [f for f in self.heard[at:end] if not f.error]
 
     # ---- states
@@ -227,10 +227,10 @@ class Talk:
         self.download(HEARTBEAT, 0, period_ms.to_bytes(2, "little"))
 
     def state(self) -> int:
-        """Of the next heartbeat. Raises Broken when none comes."""
+        """Of the next heartbeat. Raises Failed when none comes."""
         frame = self.next(self.heartbeat)
         if frame is None or len(frame.data) != 1:
-            raise Broken("no heartbeat of one byte", "its state by heartbeat", frames=[frame] if frame else [])
+            raise Failed("no heartbeat of one byte", "its state by heartbeat", frames=[frame] if frame else [])
         return frame.data[0]
 
     def becomes(self, state: int) -> bool:
@@ -243,12 +243,12 @@ class Talk:
         return self.until(said)
 
     def reset(self, command: int = NMT_RESET) -> list[CanFrame]:
-        """NMT 81h or 82h; the frames from there to the answer of a first request. Raises Broken without a boot-up."""
+        """NMT 81h or 82h; the frames from there to the answer of a first request. Raises Failed without a boot-up."""
         self.drain()
         at = len(self.heard)
         self.nmt(command)
         if not self.until(lambda: any(f.can_id == self.heartbeat and f.data == b"\0" for f in self.heard[at:])):
-            raise Broken(f"no boot-up message after NMT {command:02X}h", "one", frames=self.heard[at:])
+            raise Failed(f"no boot-up message after NMT {command:02X}h", "one", frames=self.heard[at:])
         self._fenced(at)
         return [f for f in self.heard[at:] if not f.error]
 
@@ -265,7 +265,7 @@ class Talk:
         return found
 
     def stream(self, count: int = LEAST, can_id: int | None = None) -> list[CanFrame]:
-        """NMT start, and `count` frames of a PDO (the first). Raises Broken when they do not come."""
+        """NMT start, and `count` frames of a PDO (the first). Raises Failed when they do not come."""
         can_id = next(iter(self.pdos.values())) if can_id is None else can_id
         self.drain()
         at = len(self.heard)
@@ -273,18 +273,18 @@ class Talk:
         return self.readings(count, can_id, at=at)
 
     def readings(self, count: int, can_id: int, at: int | None = None) -> list[CanFrame]:
-        """The next `count` frames of an identifier. Raises Broken when they do not come."""
+        """The next `count` frames of an identifier. Raises Failed when they do not come."""
         start = len(self.heard) if at is None else at
 
         def came() -> list[CanFrame]:
             return [f for f in self.heard[start:] if f.can_id == can_id and not f.error]
 
         if not self.until(lambda: len(came()) >= count, self.patience_s + count * self.s.unit.reading_s):
-            raise Broken(f"{len(came())} frames {can_id:03X}h after NMT start", f"{count} and more")
+            raise Failed(f"{len(came())} frames {can_id:03X}h after NMT start", f"{count} and more")
         return came()
 
     def tells(self, code: int, patience_s: float | None = None) -> CanFrame:
-        """The first emergency with this code in what was heard or comes. Raises Broken when none does."""
+        """The first emergency with this code in what was heard or comes. Raises Failed when none does."""
 
         def found() -> CanFrame | None:
             mine = (f for f in self.heard if f.can_id == self.emcy and not f.error)
@@ -293,7 +293,7 @@ class Talk:
         self.until(lambda: found() is not None, patience_s)
         frame = found()
         if frame is None:
-            raise Broken(f"no emergency {code:04X}h", "one", frames=[f for f in self.heard if f.can_id == self.emcy])
+            raise Failed(f"no emergency {code:04X}h", "one", frames=[f for f in self.heard if f.can_id == self.emcy])
         return frame
 
     def hush(self) -> list[CanFrame]:

@@ -1,8 +1,8 @@
 """`psabench conform recording`: the checks of the device suite on files that somebody recorded at a bench.
 
-What a check of a scene relies on is looked for in the recording (`plan.PARTS`); what is not there is not observable,
+What a check of a stimulus relies on is looked for in the recording (`plan.PARTS`); what is not there is not observable,
 never passed. Times are divided by the measured ratio of the recorder's clock to the board's. Rows that say a frequency
-(those with a limit clock_error_ppm) are judged by the recorder's clock as it is, unless a second recorder agrees with
+(those with a limit clock_error_ppm) are checked by the recorder's clock as it is, unless a second recorder agrees with
 the board.
 """
 
@@ -15,17 +15,17 @@ from functools import cached_property
 
 import numpy as np
 
-from psabench.conform.capture.log import CanFrame, CanLog, Evidence, LineLog, Marks
+from psabench.conform.capture.log import CanFrame, CanLog, Capture, LineLog, Marks
 from psabench.conform.plan import Plan, plan_of
 from psabench.conform.profile import Variant
-from psabench.conform.proves import Proof
+from psabench.conform.proves import SuiteTest
 from psabench.conform.requirements import Requirement
 from psabench.conform.runner import MISSING, Keep, wanted
 from psabench.conform.sources import clocks
 from psabench.conform.sources.clocks import BEATS, Clocks, Ratio
 from psabench.conform.sources.files import Recording
 from psabench.conform.sources.lines import Recorded
-from psabench.conform.verdict import Broken, Outcome, TooLittle, Verdict
+from psabench.conform.verdict import Failed, Inconclusive, Outcome, Verdict
 from psabench.errors import BadInput, BenchError
 from psabench.link.signals import Ints
 from psabench.link.vcd import Vcd, Wire
@@ -54,13 +54,13 @@ class Bench:
     inputs_v: Mapping[str, float] = field(default_factory=dict)
 
     @cached_property
-    def raw(self) -> Evidence:
+    def raw(self) -> Capture:
         """By the recorders' own clocks."""
         r = self.recording
-        return Evidence(
+        return Capture(
             variant=self.variant,
             node=self.node,
-            scene="recording",
+            stimulus="recording",
             can=r.can or CanLog(),
             lines=r.lines,
             inputs_v=self.inputs_v,
@@ -92,13 +92,13 @@ class Bench:
         return own is not None and other is not None and own.beyond(limit) and own.usable and other.inside(limit)
 
     @cached_property
-    def corrected(self) -> Evidence:
+    def corrected(self) -> Capture:
         """By the board's clock."""
         c = self.clocks
         return _scaled(self.raw, c.lines if _usable(c.lines) else None, c.can if _usable(c.can) else None)
 
     @cached_property
-    def by_recorders(self) -> Evidence:
+    def by_recorders(self) -> Capture:
         """For rows that say a frequency: as recorded, but by the board's clock where the recorder's is found off."""
         c = self.clocks
         lines = c.lines if self.excused(c.lines, c.can) else None
@@ -126,15 +126,15 @@ class Bench:
 
     # ---- parts
 
-    def part(self, evidence: Evidence, plan: Plan) -> Evidence:
-        """What of the evidence a check judges. Raises TooLittle where the recording has no such part."""
+    def part(self, capture: Capture, plan: Plan) -> Capture:
+        """The part of the capture that a check reads. Raises Inconclusive where the recording has no such part."""
         if plan.on_recording == "all":
-            return evidence
+            return capture
         if plan.on_recording == "stream":
-            return stream(evidence)
+            return stream(capture)
         if plan.on_recording == "boot":
-            return boot(evidence, plan.needs)
-        raise TooLittle(NO_PART[""])
+            return boot(capture, plan.needs)
+        raise Inconclusive(NO_PART[""])
 
 
 def _usable(r: Ratio | None) -> bool:
@@ -145,10 +145,10 @@ def _turned(r: Ratio) -> Ratio:
     return replace(r, ppm=-r.ppm)
 
 
-# ---- evidence by another clock, and parts of it
+# ---- a capture by another clock, and parts of it
 
 
-def _scaled(e: Evidence, lines: Ratio | None, can: Ratio | None) -> Evidence:
+def _scaled(e: Capture, lines: Ratio | None, can: Ratio | None) -> Capture:
     """Times divided by these ratios; what is not known of them widens the limits."""
     found = e
     if lines is not None and isinstance(e.lines, Recorded):
@@ -205,12 +205,12 @@ def _from_power_up(log: LineLog) -> Recorded:
     )
 
 
-def _boots(e: Evidence) -> list[int]:
+def _boots(e: Capture) -> list[int]:
     """Places of the boot-up messages in the log."""
     return [k for k, f in enumerate(e.can.frames) if f.can_id == HEARTBEAT_ID + e.node and f.data == BOOT_UP]
 
 
-def stream(e: Evidence) -> Evidence:
+def stream(e: Capture) -> Capture:
     """The readings after the last boot-up and the last Res: from the first whole one on each of the two."""
     boots = _boots(e)
     frames = e.can.frames[boots[-1] + 1 if boots else 0 :]
@@ -228,15 +228,15 @@ def stream(e: Evidence) -> Evidence:
     return found.with_lines(lines_from(e.lines, max(e.lines.start_ns, int(later[0]) - BEFORE_NS)))
 
 
-def boot(e: Evidence, needs: frozenset[str]) -> Evidence:
-    """All, with the mark of the reset where the log shows it. Raises TooLittle where no reset was recorded."""
+def boot(e: Capture, needs: frozenset[str]) -> Capture:
+    """All, with the mark of the reset where the log shows it. Raises Inconclusive where no reset was recorded."""
     boots = _boots(e)
     if "can" in needs and not boots:
-        raise TooLittle("the log has no boot-up")
+        raise Inconclusive("the log has no boot-up")
     if needs & {"line", "pins"} and e.lines is not None and not len(_resets_ns(e.lines)):
         has_res = "Res" in e.lines.recording.wires or e.variant.family in RES_IS_A_LINE
         if has_res or not boots:
-            raise TooLittle("the recording has no pulse on Res" if has_res else NO_PART["boot"])
+            raise Inconclusive("the recording has no pulse on Res" if has_res else NO_PART["boot"])
     if "line" in needs and "pins" not in needs:
         _reset_amid_readings(e)
     if e.lines is not None and len(_resets_ns(e.lines)) and not e.lines.recording.wires["Res"].level[0]:
@@ -247,14 +247,14 @@ def boot(e: Evidence, needs: frozenset[str]) -> Evidence:
     return replace(e, marks=Marks(at_s={"reset": asked[-1] if asked else e.can.frames[boots[-1]].t_s}))
 
 
-def _reset_amid_readings(e: Evidence) -> None:
-    """Checks that know Res by what Int does want readings before it. Raises TooLittle."""
+def _reset_amid_readings(e: Capture) -> None:
+    """Checks that know Res by what Int does want readings before it. Raises Inconclusive."""
     beat = BEATS.get(e.variant.family)
     ends = np.empty(0, np.int64) if e.lines is None else _resets_ns(e.lines)
     if beat is None or e.lines is None or not len(ends) or beat.line not in e.lines.recording.wires:
-        raise TooLittle("the recording of the lines does not show a Res")
+        raise Inconclusive("the recording of the lines does not show a Res")
     if not (e.lines.recording.wires[beat.line].edges_ns(beat.level) < ends[-1]).any():
-        raise TooLittle("the recording has no readings before Res")
+        raise Inconclusive("the recording has no readings before Res")
 
 
 # ---- the run
@@ -285,7 +285,7 @@ def run(
     told: Callable[[Outcome], None] = lambda _: None,
     keep: Keep = lambda *_: (),
 ) -> list[Outcome]:
-    """Judge everything; told: of each outcome as it comes."""
+    """Check everything; told: of each outcome as it comes."""
     outcomes: list[Outcome] = []
     tests = wanted(bench.variant, only)
     with progress.step(bench.variant.name, max(1, len(tests))) as advance:
@@ -297,11 +297,11 @@ def run(
 
 
 def _outcomes(
-    bench: Bench, tests: Sequence[tuple[Proof, tuple[Requirement, ...]]], only: Sequence[str], keep: Keep
+    bench: Bench, tests: Sequence[tuple[SuiteTest, tuple[Requirement, ...]]], only: Sequence[str], keep: Keep
 ) -> Iterator[Outcome]:
     yield from _clock_outcome(bench, only)
     for proof, rows in tests:
-        yield _judged(bench, proof, rows, keep)
+        yield _outcome_of(bench, proof, rows, keep)
 
 
 def untested(rows: Sequence[Requirement], outcomes: Sequence[Outcome]) -> list[Outcome]:
@@ -331,11 +331,11 @@ def _clock_outcome(bench: Bench, only: Sequence[str]) -> Iterator[Outcome]:
             verdict=Verdict.FAILED,
             saw=bench.whose(),
             due=f"clocks within {bench.clock_ppm:g} ppm of one another",
-            scene="recording",
+            stimulus="recording",
         )
 
 
-def _judged(bench: Bench, proof: Proof, rows: tuple[Requirement, ...], keep: Keep) -> Outcome:
+def _outcome_of(bench: Bench, proof: SuiteTest, rows: tuple[Requirement, ...], keep: Keep) -> Outcome:
     plan = plan_of(proof.test)
     begun_s = time.monotonic()
     found = Outcome(
@@ -343,16 +343,16 @@ def _judged(bench: Bench, proof: Proof, rows: tuple[Requirement, ...], keep: Kee
         title=(proof.test.__doc__ or proof.test.__name__).partition("\n")[0],
         requirements=tuple(r.id for r in rows),
         verdict=Verdict.NOT_OBSERVABLE,
-        scene=plan.scene,
+        stimulus=plan.stimulus,
     )
     missing = plan.needs - bench.probes
-    if plan.is_trial:
+    if plan.is_active:
         return replace(found, reason="it asks the board; a recording cannot be asked")
     if missing:
         return replace(found, reason="; ".join(_missing(bench, m) for m in sorted(missing)))
     frequency = any(MARK in r.limits for r in rows)
-    evidence = bench.by_recorders if frequency else bench.corrected
-    return replace(_carried_out(bench, proof, evidence, found, keep), took_s=time.monotonic() - begun_s)
+    capture = bench.by_recorders if frequency else bench.corrected
+    return replace(_carried_out(bench, proof, capture, found, keep), took_s=time.monotonic() - begun_s)
 
 
 # Where the device suite would name the missing option.
@@ -377,24 +377,24 @@ def _missing(bench: Bench, way: str) -> str:
     return UNRECORDED.get(way) or MISSING.get(way, way)
 
 
-def _carried_out(bench: Bench, proof: Proof, evidence: Evidence, open_: Outcome, keep: Keep) -> Outcome:
+def _carried_out(bench: Bench, proof: SuiteTest, capture: Capture, open_: Outcome, keep: Keep) -> Outcome:
     try:
-        part = bench.part(evidence, plan_of(proof.test))
+        part = bench.part(capture, plan_of(proof.test))
         return replace(open_, verdict=Verdict.PASSED, saw=proof.test(part))
-    except Broken as e:
-        files = keep(open_.test, e, _plain(evidence))
-        words = bench.whose() if evidence is bench.by_recorders else ""
+    except Failed as e:
+        files = keep(open_.test, e, _plain(capture))
+        words = bench.whose() if capture is bench.by_recorders else ""
         saw = f"{e.saw} ({words})" if words else e.saw
-        return replace(open_, verdict=Verdict.FAILED, saw=saw, due=e.due, at_ns=e.at_ns, exhibits=files)
-    except (TooLittle, BenchError) as e:
+        return replace(open_, verdict=Verdict.FAILED, saw=saw, due=e.due, at_ns=e.at_ns, excerpts=files)
+    except (Inconclusive, BenchError) as e:
         return replace(open_, reason=str(e))
     except Exception as e:  # a test that cannot take what a file may hold is ours to mend, and the report goes on
         reason = f"the test itself failed: {type(e).__name__}: {str(e)[:200]}"
         return replace(open_, verdict=Verdict.INCONCLUSIVE, reason=reason)
 
 
-def _plain(e: Evidence) -> Evidence:
-    """For the exhibits, which leave out what was not recorded."""
+def _plain(e: Capture) -> Capture:
+    """For the excerpts, which leave out what was not recorded."""
     lines = e.lines
     if lines is None:
         return e

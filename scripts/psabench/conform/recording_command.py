@@ -1,4 +1,4 @@
-"""`psabench conform recording FILE...`: the recording, judged and reported."""
+"""`psabench conform recording FILE...`: the recording, checked and reported."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import sys
 
 from psabench.conform import identity, recording, report, suite
 from psabench.conform.defaults import OUT
-from psabench.conform.excerpts import Exhibits
+from psabench.conform.excerpts import Excerpts
 from psabench.conform.profile import variant
 from psabench.conform.requirements import requirements
 from psabench.conform.sources.files import read_files
@@ -31,7 +31,7 @@ def handle(args: argparse.Namespace) -> int:
     outcomes: list[Outcome] = []
     interrupted = False
     try:
-        recording.run(bench, Bar(), only=args.only, told=outcomes.append, keep=Exhibits(folder).keep)
+        recording.run(bench, Bar(), only=args.only, told=outcomes.append, keep=Excerpts(folder).keep)
     except KeyboardInterrupt:
         interrupted = True
     outcomes += [] if interrupted else recording.untested(rows, outcomes)

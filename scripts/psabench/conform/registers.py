@@ -10,7 +10,7 @@ import yaml
 
 from psabench.conform.bus_host import line, line_refused, port
 from psabench.conform.dut import Subject
-from psabench.conform.verdict import Broken
+from psabench.conform.verdict import Failed
 from psabench.places import proto_file
 
 NO_ADDRESS, READ_ONLY, WRITE_ONLY = 0x06090011, 0x06010002, 0x06010001  # abort codes (docs/busport.md)
@@ -24,7 +24,7 @@ def table(board: str) -> tuple[Mapping[str, Any], ...]:
 
 
 def names_and_rights(s: Subject, board: str, *, never: Mapping[str, int], writes: Mapping[str, int]) -> str:
-    """Every address read and written; returns what was seen, raises Broken.
+    """Every address read and written; returns what was seen, raises Failed.
 
     never: registers whose read is refused now, with its code; writes: what a writable one takes, where 0 will not do.
     """
@@ -32,7 +32,7 @@ def names_and_rights(s: Subject, board: str, *, never: Mapping[str, int], writes
     who = port(s).who()
     due = {k: str(row["name"]) for k, row in enumerate(rows)}
     if dict(who.names) != due:
-        raise Broken(f"names {dict(who.names)}", f"{due}")
+        raise Failed(f"names {dict(who.names)}", f"{due}")
     for address, row in enumerate(rows):
         _rights(s, address, row, never, writes)
     for address in (*range(len(rows), ADDRESSES), 0x20):

@@ -90,8 +90,8 @@ def told(o: Outcome) -> Iterator[str]:
         at = "" if o.at_ns is None else f" at {o.at_ns * 1e-6:.6f} ms"
         yield f"         saw {o.saw}{at}"
         yield f"         due {o.due}"
-        if o.exhibits:
-            yield f"         see {', '.join(o.exhibits)}"
+        if o.excerpts:
+            yield f"         see {', '.join(o.excerpts)}"
     elif o.reason:
         yield f"         {o.reason}"
     elif o.saw:
@@ -133,8 +133,14 @@ def as_dict(run: Run) -> dict[str, Any]:
         "interrupted": run.interrupted,
         "facts": dict(run.facts),
         "requirements": {i: v.value for i, v in run.verdicts().items()},
-        "tests": [{**asdict(o), "verdict": o.verdict.value} for o in run.outcomes],
+        "tests": [_test_dict(o) for o in run.outcomes],
     }
+
+
+def _test_dict(o: Outcome) -> dict[str, Any]:
+    """Of conform.json: format 1 names the stimulus `stimulus`, the excerpts `excerpts`."""
+    keys = {"stimulus": "scene", "excerpts": "exhibits"}
+    return {keys.get(name, name): value for name, value in asdict(o).items()} | {"verdict": o.verdict.value}
 
 
 def junit(run: Run) -> str:
@@ -190,8 +196,8 @@ def _failure(o: Outcome, folder: Path) -> str:
     rows = requirements().rows
     due = "".join(f"<p><b>{i}</b> {escape(rows[i].text)}</p>{_original(rows[i].original)}" for i in o.requirements)
     at = "" if o.at_ns is None else f" at {o.at_ns * 1e-6:.6f} ms"
-    pictures = [figure((folder / name).read_text(encoding="utf-8")) for name in o.exhibits if name.endswith(".svg")]
-    files = ", ".join(f"<a href='{escape(name)}'>{escape(name)}</a>" for name in o.exhibits)
+    pictures = [figure((folder / name).read_text(encoding="utf-8")) for name in o.excerpts if name.endswith(".svg")]
+    files = ", ".join(f"<a href='{escape(name)}'>{escape(name)}</a>" for name in o.excerpts)
     return section(
         o.title,
         f"{due}<p>Saw <b>{escape(o.saw)}</b>{at}; due {escape(o.due)}.</p>",

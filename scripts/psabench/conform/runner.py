@@ -1,7 +1,7 @@
 """Runs the device suite: every test of every requirement that holds for this board, each with its verdict.
 
-A scene is played when the first check wants it, and its evidence kept. A test whose probe is missing is not observable;
-one whose scene fails is inconclusive. Ctrl-C ends the run; what was judged so far stays.
+A stimulus is applied before the first check of it, and its capture is kept. A test whose probe is missing is not
+observable; one whose stimulus fails is inconclusive. Ctrl-C ends the run; what was checked so far stays.
 """
 
 from __future__ import annotations
@@ -10,13 +10,13 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
-from psabench.conform.capture.log import Evidence
+from psabench.conform.capture.log import Capture
 from psabench.conform.dut import Subject
-from psabench.conform.plan import Plan, plan_of, scenes
+from psabench.conform.plan import Plan, plan_of, stimuli
 from psabench.conform.profile import Variant
-from psabench.conform.proves import Proof, proofs
+from psabench.conform.proves import SuiteTest, suite_tests
 from psabench.conform.requirements import Requirement, requirements
-from psabench.conform.verdict import Broken, Outcome, TooLittle, Verdict
+from psabench.conform.verdict import Failed, Inconclusive, Outcome, Verdict
 from psabench.errors import BenchError, DeviceError
 from psabench.procedures.head_bench import Progress
 
@@ -42,60 +42,60 @@ MISSING = {
 }
 
 
-PLAYS = 4  # of a scene, at most, until its probe has lost no samples
-# Keeps what shows a failure: name of the test, what it found, the evidence it had; tells the files.
-Keep = Callable[[str, Broken, Evidence | None], tuple[str, ...]]
+PLAYS = 4  # of a stimulus, at most, until its probe has lost no samples
+# Keeps what shows a failure: name of the test, what it found, the capture it had; tells the files.
+Keep = Callable[[str, Failed, Capture | None], tuple[str, ...]]
 
 
 @dataclass(slots=True)
-class Stage:
-    """The subject and what its scenes have shown so far."""
+class Captures:
+    """The subject and what its stimuli have shown so far."""
 
     subject: Subject
     keep: Keep
-    shown: dict[str, Evidence | Exception] = field(default_factory=dict)
+    shown: dict[str, Capture | Exception] = field(default_factory=dict)
 
-    def evidence(self, name: str) -> Evidence:
-        """Of a scene, which is played if it has not been. Raises what it raised."""
+    def capture(self, name: str) -> Capture:
+        """Of a stimulus, which is applied if it has not been. Raises what it raised."""
         if name not in self.shown:
-            self.shown[name] = self._play(name)
+            self.shown[name] = self._apply(name)
         found = self.shown[name]
         if isinstance(found, Exception):
             raise found
         return found
 
-    def _play(self, name: str) -> Evidence | Exception:
-        known = scenes(self.subject.variant.family)
+    def _apply(self, name: str) -> Capture | Exception:
+        known = stimuli(self.subject.variant.family)
         if name not in known:
-            return TooLittle(f"there is no scene {name} for this board")
+            return Inconclusive(f"no stimulus {name} for this board")
         try:
             for _ in range(PLAYS):
                 found = known[name].make(self.subject)
                 if found.lines is None or not len(found.lines.gaps_ns):
                     break  # else samples were lost on their way, and no one can tell what they were
             return found
-        except (BenchError, Broken, TooLittle) as e:
+        except (BenchError, Failed, Inconclusive) as e:
             return e
 
 
-def wanted(variant: Variant, only: Sequence[str] = ()) -> list[tuple[Proof, tuple[Requirement, ...]]]:
+def wanted(variant: Variant, only: Sequence[str] = ()) -> list[tuple[SuiteTest, tuple[Requirement, ...]]]:
     """Tests for a variant with those of their requirements that hold for it; only: ids, or beginnings of ids."""
     rows = requirements().rows
     found = []
-    for proof in proofs():
+    for proof in suite_tests():
         boards = plan_of(proof.test).boards
         if boards and variant.family not in boards:
             continue
         mine = tuple(rows[i] for i in proof.ids if rows[i].applies(variant.board, variant.profile))
         if mine and (not only or any(i.startswith(tuple(only)) for i in proof.ids)):
             found.append((proof, mine))
-    order = list(scenes(variant.family))
+    order = list(stimuli(variant.family))
     return sorted(found, key=lambda t: _turn(plan_of(t[0].test), order))
 
 
 def _turn(plan: Plan, order: Sequence[str]) -> int:
-    """Checks first, in the order of their scenes; trials may leave the board otherwise than they found it."""
-    return len(order) if plan.is_trial else order.index(plan.scene) if plan.scene in order else -1
+    """Checks first, in the order of their stimuli; active tests may leave the board otherwise than they found it."""
+    return len(order) if plan.is_active else order.index(plan.stimulus) if plan.stimulus in order else -1
 
 
 def run(
@@ -107,20 +107,20 @@ def run(
     told: Callable[[Outcome], None] = lambda _: None,
     keep: Keep = lambda *_: (),
 ) -> list[Outcome]:
-    """Judge everything; told: of each outcome as it comes. clock_ppm: allowed to all clocks."""
+    """Check everything; told: of each outcome as it comes. clock_ppm: allowed to all clocks."""
     subject.allowed_ppm = clock_ppm
-    stage = Stage(subject, keep)
+    captures = Captures(subject, keep)
     outcomes: list[Outcome] = []
     tests = wanted(subject.variant, only)
     with progress.step(subject.variant.name, max(1, len(tests))) as advance:
         for proof, rows in tests:
-            outcomes.append(_judged(stage, proof, rows))
+            outcomes.append(_outcome_of(captures, proof, rows))
             told(outcomes[-1])
             advance()
     return outcomes
 
 
-def _judged(stage: Stage, proof: Proof, rows: tuple[Requirement, ...]) -> Outcome:
+def _outcome_of(captures: Captures, proof: SuiteTest, rows: tuple[Requirement, ...]) -> Outcome:
     plan = plan_of(proof.test)
     begun_s = time.monotonic()
     found = Outcome(
@@ -128,26 +128,26 @@ def _judged(stage: Stage, proof: Proof, rows: tuple[Requirement, ...]) -> Outcom
         title=(proof.test.__doc__ or proof.test.__name__).partition("\n")[0],
         requirements=tuple(r.id for r in rows),
         verdict=Verdict.NOT_OBSERVABLE,
-        scene=plan.scene,
+        stimulus=plan.stimulus,
     )
-    missing = plan.needs - stage.subject.probes
+    missing = plan.needs - captures.subject.probes
     if missing:
         return replace(found, reason="; ".join(MISSING[m] for m in sorted(missing)))
-    return replace(_carried_out(stage, proof, plan, found), took_s=time.monotonic() - begun_s)
+    return replace(_carried_out(captures, proof, plan, found), took_s=time.monotonic() - begun_s)
 
 
-def _carried_out(stage: Stage, proof: Proof, plan: Plan, open_: Outcome) -> Outcome:
-    evidence = None
+def _carried_out(captures: Captures, proof: SuiteTest, plan: Plan, open_: Outcome) -> Outcome:
+    capture = None
     try:
-        evidence = None if plan.is_trial else stage.evidence(plan.scene)
-        return replace(open_, verdict=Verdict.PASSED, saw=proof.test(evidence or stage.subject))
-    except Broken as e:
-        files = stage.keep(open_.test, e, evidence)
-        return replace(open_, verdict=Verdict.FAILED, saw=e.saw, due=e.due, at_ns=e.at_ns, exhibits=files)
+        capture = None if plan.is_active else captures.capture(plan.stimulus)
+        return replace(open_, verdict=Verdict.PASSED, saw=proof.test(capture or captures.subject))
+    except Failed as e:
+        files = captures.keep(open_.test, e, capture)
+        return replace(open_, verdict=Verdict.FAILED, saw=e.saw, due=e.due, at_ns=e.at_ns, excerpts=files)
     except DeviceError as e:
         return replace(open_, verdict=Verdict.FAILED, saw=str(e), due="no refusal")
-    except (TooLittle, BenchError) as e:
+    except (Inconclusive, BenchError) as e:
         return replace(open_, verdict=Verdict.INCONCLUSIVE, reason=str(e))
     except (ArithmeticError, AssertionError, AttributeError, LookupError, TypeError, ValueError) as e:
-        # an error of the test's own: a board may be worse than anybody thought, and the others are to be judged
+        # an error of the test's own: the other tests still run
         return replace(open_, verdict=Verdict.INCONCLUSIVE, reason=f"the test itself failed: {type(e).__name__}: {e}")

@@ -1,6 +1,6 @@
 """What a test came to, and how a test says so.
 
-A test returns in words what it saw; it raises `Broken` where that is not what was due, and `TooLittle` where what it
+A test returns in words what it saw; it raises `Failed` where that is not what was due, and `Inconclusive` where what it
 got does not suffice to say either.
 """
 
@@ -23,7 +23,7 @@ class Verdict(Enum):
     NOT_APPLICABLE = "not applicable"  # another board or profile
 
 
-class Broken(Exception):
+class Failed(Exception):
     """A requirement is not met."""
 
     def __init__(
@@ -44,7 +44,7 @@ class Broken(Exception):
         self.lines, self.frames = tuple(lines), tuple(frames)
 
 
-class TooLittle(Exception):
+class Inconclusive(Exception):
     """Neither met nor broken: the words say what would be needed."""
 
 
@@ -60,9 +60,9 @@ class Outcome:
     due: str = ""
     reason: str = ""  # of what is neither passed nor failed
     at_ns: float | None = None
-    scene: str = ""
+    stimulus: str = ""
     took_s: float = 0.0
-    exhibits: tuple[str, ...] = ()  # files of the report's folder: VCD excerpt, picture, CAN excerpt
+    excerpts: tuple[str, ...] = ()  # files of the report's folder: VCD excerpt, picture, CAN excerpt
 
 
 def conforms(verdicts: Sequence[Verdict]) -> bool:

@@ -15,7 +15,7 @@ from psabench import cli
 from psabench.conform.host import runner
 from psabench.conform.host.cases_can import CASES
 from psabench.conform.host.cases_line import LINE_CASES
-from psabench.conform.host.check import judged as judged_tests
+from psabench.conform.host.check import case_checks
 from psabench.conform.host.stimulus import expand
 from psabench.errors import BadInput
 
@@ -112,7 +112,7 @@ def test_a_broken_host_of_ours_is_caught(
 
 def test_each_check_has_a_host_that_it_catches() -> None:
     caught = {b.requirement for b in (*BROKEN, *BROKEN_LINES, *BROKEN_BOARDS)} | {"HOST-CAN-09", "HOST-VALUE-01"}
-    assert {i for j in judged_tests() for i in j.ids} == caught
+    assert {i for j in case_checks() for i in j.ids} == caught
 
 
 def test_there_are_twelve_ways_and_more() -> None:

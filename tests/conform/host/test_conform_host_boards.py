@@ -15,7 +15,7 @@ from broken_hosts import ROOT
 from psabench import cli
 from psabench.conform.host import cases_units as unit_cases
 from psabench.conform.host import runner
-from psabench.conform.host.check import judged as judged_tests
+from psabench.conform.host.check import case_checks
 from psabench.conform.host.stimulus import ByHand
 from psabench.conform.host.stimulus_bus import BusBridge
 from psabench.emulator import Emulator
@@ -58,8 +58,8 @@ def test_our_own_host_conforms(board: str, profile: str, place: str, tmp_path: P
     }
     assert (status, bad) == (0, {})
     link = "bus" if place == BUS else "can"
-    played = {t["scene"] for t in told["tests"] if t["scene"]}
-    assert played == {name for name, c in unit_cases.UNIT_CASES.items() if board in c.boards and link in c.links}
+    sent = {t["scene"] for t in told["tests"] if t["scene"]}
+    assert sent == {name for name, c in unit_cases.UNIT_CASES.items() if board in c.boards and link in c.links}
 
 
 @pytest.mark.host
@@ -76,13 +76,13 @@ def test_a_broken_host_of_a_board_is_caught(broken: BrokenBoardHost, tmp_path: P
 
 
 def test_every_requirement_of_these_boards_has_a_broken_host() -> None:
-    ids = {i for j in judged_tests() if j.case in unit_cases.UNIT_CASES for i in j.ids}
+    ids = {i for j in case_checks() if j.case in unit_cases.UNIT_CASES for i in j.ids}
     assert ids == {b.requirement for b in BROKEN_BOARDS}
 
 
 def test_each_case_of_a_board_is_judged_and_on_the_page() -> None:
     page = (ROOT / "docs/conform_host.md").read_text()
-    assert {j.case for j in judged_tests()} == set(runner.ALL)
+    assert {j.case for j in case_checks()} == set(runner.ALL)
     for name in unit_cases.UNIT_CASES:
         assert f"`{name}`" in page
 

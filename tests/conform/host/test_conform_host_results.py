@@ -6,10 +6,10 @@ import random
 
 import pytest
 from psabench.conform.host import results
-from psabench.conform.host.capture import Bus, Played, read_log
-from psabench.conform.host.check import HostEvidence, match
+from psabench.conform.host.capture import Bus, SentSample, read_log
+from psabench.conform.host.check import HostCapture, match
 from psabench.conform.host.results import Told
-from psabench.conform.verdict import Broken
+from psabench.conform.verdict import Failed
 
 FRAME = b'{"frame": 7, "x": 1, "y": -2, "z": 3, "t": 4, "channel": 1, "t_us": 6000.5, "v": [1, 2.5, 3]}\n'
 
@@ -99,12 +99,12 @@ def pair(n: int, delay_s: float = 0.0, stamp_of: int | None = None) -> list[tupl
     ]
 
 
-def played(*frames: tuple[float, str]) -> list[Played]:
+def sent(*frames: tuple[float, str]) -> list[SentSample]:
     return read_log(log((0.0, "705#00"), (0.001, "000#0105"), *frames), 5).samples
 
 
 def test_pairs_are_samples() -> None:
-    found = played(*pair(10), *pair(11), *pair(12, delay_s=0.03))
+    found = sent(*pair(10), *pair(11), *pair(12, delay_s=0.03))
     assert [(p.seq, p.t_us, p.due, p.settled, p.channel) for p in found] == [
         (10, 10000, True, True, 2),
         (11, 11000, True, True, 2),
@@ -116,19 +116,19 @@ def test_pairs_are_samples() -> None:
 def test_halves_of_two_samples_are_none() -> None:
     xy, _ = pair(11)
     _, zt = pair(12)
-    assert [p.seq for p in played(*pair(10), xy, zt, *pair(13))] == [10, 13]
+    assert [p.seq for p in sent(*pair(10), xy, zt, *pair(13))] == [10, 13]
 
 
 def test_a_late_half_may_be_taken_and_need_not() -> None:
     (xy_t, xy), (_, zt) = pair(11)
     late = [(xy_t, xy), (0.0125, zt)]
-    found = played(*pair(10), late[0], *pair(12), (0.01235, zt), *pair(13))
+    found = sent(*pair(10), late[0], *pair(12), (0.01235, zt), *pair(13))
     assert {p.seq: p.due for p in found} == {10: True, 11: False, 12: True, 13: True}
 
 
 def test_what_comes_twice_is_one() -> None:
     xy, zt = pair(11)
-    assert [(p.seq, p.due) for p in played(*pair(10), xy, xy, zt, zt, *pair(12))] == [
+    assert [(p.seq, p.due) for p in sent(*pair(10), xy, xy, zt, zt, *pair(12))] == [
         (10, True),
         (11, True),
         (12, True),
@@ -137,59 +137,59 @@ def test_what_comes_twice_is_one() -> None:
 
 def test_a_restart_begins_anew() -> None:
     second = [(1.0, "705#00"), *[(t + 1.0, f) for t, f in pair(10)]]
-    assert [(p.seq, p.epoch) for p in played(*pair(10), *second)] == [(10, 0), (10, 1)]
+    assert [(p.seq, p.epoch) for p in sent(*pair(10), *second)] == [(10, 0), (10, 1)]
 
 
 def told_of(*numbers: int) -> Told:
     lines = [
         b'{"frame": %d, "x": %d, "y": %d, "z": 3, "t": 4, "channel": 2, "t_us": %d}\n' % (n, *p.codes[:2], n * 1000)
-        for n, p in ((n, played(*pair(n))[0]) for n in numbers)
+        for n, p in ((n, sent(*pair(n))[0]) for n in numbers)
     ]
     return results.read(lines)
 
 
-def evidence(told: Told) -> HostEvidence:
+def capture(told: Told) -> HostCapture:
     bus = read_log(log((0.001, "000#0105"), *pair(10), *pair(11), *pair(12)), 5)
-    return HostEvidence(case="", bus=bus, told=told)
+    return HostCapture(case="", bus=bus, told=told)
 
 
 def test_samples_are_held_against_what_was_played() -> None:
-    assert len(evidence(told_of(10, 11, 12)).samples().pairs) == 3
+    assert len(capture(told_of(10, 11, 12)).samples().pairs) == 3
     for numbers in ((10, 12), (10, 11, 11, 12), (11, 10, 12), (10, 11, 12, 13), (), (10, 11)):
-        with pytest.raises(Broken):
-            evidence(told_of(*numbers)).samples()
+        with pytest.raises(Failed):
+            capture(told_of(*numbers)).samples()
 
 
 def test_other_codes_are_wrong() -> None:
     told = told_of(10, 11, 12)
-    e = evidence(told)
+    e = capture(told)
     told.samples[1] = results.Sample(number=11, codes=(9, 9, 9, 9), t_us=0.0)
     assert [s.number for s, _ in match(told.samples, e.bus.samples).wrong] == [11]
-    with pytest.raises(Broken, match="11"):
+    with pytest.raises(Failed, match="11"):
         e.samples()
 
 
 def test_silence_of_the_stage_is_no_alarm() -> None:
-    e = evidence(results.read([b'{"stale": true}\n']))
-    with pytest.raises(Broken):
+    e = capture(results.read([b'{"stale": true}\n']))
+    with pytest.raises(Failed):
         e.nothing_but()
     e.stood_s = 0.2
     e.nothing_but()
     e.told.events.append(results.Event("torn", 1, 0))
-    with pytest.raises(Broken):
+    with pytest.raises(Failed):
         e.nothing_but()
 
 
 def test_a_slow_machine_is_no_alarm() -> None:
     """Simulated time passes at a quarter of the wall's: a heartbeat every 4 s of the host's own clock."""
-    e = evidence(results.read([b'{"gone": true}\n']))
-    with pytest.raises(Broken):
+    e = capture(results.read([b'{"gone": true}\n']))
+    with pytest.raises(Failed):
         e.nothing_but()
     e.clock = [(0.25 * t, t) for t in range(20)]
     assert (e.wall_s(1.1, 1.9), e.longest_s(1.0)) == (4.0, 4.0)
     e.nothing_but()
     e.clock = [(t / 3, t / 3) for t in range(20)]
-    with pytest.raises(Broken):
+    with pytest.raises(Failed):
         e.nothing_but()
 
 

@@ -1,4 +1,4 @@
-"""A few mutants of `make mutants`, built and judged: the suite's teeth are looked at in every run of the tests."""
+"""A few mutants of `make mutants`, built and checked: the suite's teeth are looked at in every run of the tests."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def chosen() -> list[Mutant]:
 
 
 def looked_at() -> tuple[str, ...]:
-    """Requirements whose tests are run: the same for each, so that the unmutated emulator is judged once."""
+    """Requirements whose tests are run: the same for each, so that the unmutated emulator is checked once."""
     return tuple(i for m in chosen() for i in m.breaks)
 
 

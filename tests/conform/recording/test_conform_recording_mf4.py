@@ -1,4 +1,4 @@
-"""MF4 logs: written by python-can with asammdf, judged by the command as their sources are; damaged ones end in words.
+"""MF4 logs: written by python-can with asammdf, checked by the command as their sources are; damaged ones end in words.
 
 `make test` and `make setup` put asammdf into a folder of its own; without it all but the last tests are skipped.
 """

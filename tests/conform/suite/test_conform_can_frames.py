@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import pytest
 from psabench.conform.capture.canbits import frame_bits
-from psabench.conform.capture.log import CanFrame, CanLog, Evidence, Marks
+from psabench.conform.capture.log import CanFrame, CanLog, Capture, Marks
 from psabench.conform.check import can_frames as c
 from psabench.conform.profile import variant
-from psabench.conform.verdict import Broken, TooLittle
+from psabench.conform.verdict import Failed, Inconclusive
 
 NODE = 5
 BEAT, ANSWER, ASK, EMCY, XY, ZT = 0x705, 0x585, 0x605, 0x085, 0x185, 0x285
@@ -54,13 +54,13 @@ LOST = [
 ]
 
 
-def evidence(frames: list[CanFrame], scene: str = "services", **facts: object) -> Evidence:
-    return Evidence(
+def capture(frames: list[CanFrame], stimulus: str = "services", **facts: object) -> Capture:
+    return Capture(
         variant=variant("psa2"),
         node=NODE,
-        scene=scene,
+        stimulus=stimulus,
         can=CanLog(frames=tuple(frames)),
-        marks=Marks(at_s={"flood": 4.0} if scene == "overload" else {"reset": 0.0}),
+        marks=Marks(at_s={"flood": 4.0} if stimulus == "overload" else {"reset": 0.0}),
         facts=facts,
     )
 
@@ -86,20 +86,20 @@ OVERLOAD = (
 
 
 @pytest.mark.parametrize("check", SERVICES)
-def test_a_good_log_passes(check: Callable[[Evidence], str]) -> None:
-    assert check(evidence(GOOD))
+def test_a_good_log_passes(check: Callable[[Capture], str]) -> None:
+    assert check(capture(GOOD))
 
 
 @pytest.mark.parametrize("check", OVERLOAD)
-def test_a_good_overload_passes(check: Callable[[Evidence], str]) -> None:
-    assert check(evidence(LOST, "overload", dropped=19))
+def test_a_good_overload_passes(check: Callable[[Capture], str]) -> None:
+    assert check(capture(LOST, "overload", dropped=19))
 
 
 def swapped(frames: list[CanFrame], at: int, **change: object) -> list[CanFrame]:
     return [replace(f, **change) if k == at else f for k, f in enumerate(frames)]  # type: ignore[arg-type]
 
 
-BAD: list[tuple[Callable[[Evidence], str], list[CanFrame]]] = [
+BAD: list[tuple[Callable[[Capture], str], list[CanFrame]]] = [
     (c.frames_have_the_identifiers_of_the_node, [*GOOD, frame(4.0, 0x305, bytes(8))]),
     (c.frames_have_the_identifiers_of_the_node, [f for f in GOOD if f.can_id not in (XY, ZT)]),
     (c.no_remote_frames, swapped(GOOD, 8, remote=True)),
@@ -117,16 +117,16 @@ BAD: list[tuple[Callable[[Evidence], str], list[CanFrame]]] = [
 
 
 @pytest.mark.parametrize(("check", "frames"), BAD)
-def test_a_bad_log_does_not(check: Callable[[Evidence], str], frames: list[CanFrame]) -> None:
-    with pytest.raises(Broken):
-        check(evidence(frames))
+def test_a_bad_log_does_not(check: Callable[[Capture], str], frames: list[CanFrame]) -> None:
+    with pytest.raises(Failed):
+        check(capture(frames))
 
 
 def without(code: int) -> list[CanFrame]:
     return [f for f in LOST if f.can_id != EMCY or f.data[:2] != code.to_bytes(2, "little")]
 
 
-BAD_OVERLOAD: list[tuple[Callable[[Evidence], str], list[CanFrame]]] = [
+BAD_OVERLOAD: list[tuple[Callable[[Capture], str], list[CanFrame]]] = [
     (c.emergencies_have_their_form, [*LOST, emergency(3.0, 0x8110, 0x00)]),
     (c.emergencies_have_their_form, [*LOST, frame(3.0, EMCY, bytes(7))]),
     (c.emergencies_have_their_form, [*LOST, emergency(0.5, 0x8110, 0x11)]),
@@ -148,15 +148,15 @@ BAD_OVERLOAD: list[tuple[Callable[[Evidence], str], list[CanFrame]]] = [
 
 
 @pytest.mark.parametrize(("check", "frames"), BAD_OVERLOAD)
-def test_a_bad_overload_does_not(check: Callable[[Evidence], str], frames: list[CanFrame]) -> None:
-    with pytest.raises(Broken):
-        check(evidence(frames, "overload", dropped=19))
+def test_a_bad_overload_does_not(check: Callable[[Capture], str], frames: list[CanFrame]) -> None:
+    with pytest.raises(Failed):
+        check(capture(frames, "overload", dropped=19))
 
 
 @pytest.mark.parametrize("check", [*SERVICES, *OVERLOAD])
-def test_an_empty_log_is_no_pass(check: Callable[[Evidence], str]) -> None:
-    with pytest.raises((TooLittle, Broken)):
-        check(evidence([], check.__name__ and "overload"))
+def test_an_empty_log_is_no_pass(check: Callable[[Capture], str]) -> None:
+    with pytest.raises((Inconclusive, Failed)):
+        check(capture([], check.__name__ and "overload"))
 
 
 def destroyed(count: int, at_s: float = 1.0) -> list[CanFrame]:
@@ -169,22 +169,22 @@ AWAY = [*destroyed(32), replace(emergency(1.0046, 0x8140, 0x11), t_s=BACK_S), em
 
 
 def test_a_controller_s_troubles() -> None:
-    assert "16 error frames" in c.error_passive_is_told(evidence(PASSIVE))
-    assert "1408 bits" in c.coming_back_to_the_bus_is_told(evidence(AWAY))
+    assert "16 error frames" in c.error_passive_is_told(capture(PASSIVE))
+    assert "1408 bits" in c.coming_back_to_the_bus_is_told(capture(AWAY))
     for frames in (PASSIVE[1:], PASSIVE[:-1], PASSIVE[:-2]):
-        with pytest.raises(Broken):
-            c.error_passive_is_told(evidence(frames))
+        with pytest.raises(Failed):
+            c.error_passive_is_told(capture(frames))
     soon = [*AWAY[:-2], replace(AWAY[-2], t_s=BACK_S - 3e-6), AWAY[-1]]
     for frames in (AWAY[:-1], AWAY[32:], soon):
-        with pytest.raises(Broken):
-            c.coming_back_to_the_bus_is_told(evidence(frames))
+        with pytest.raises(Failed):
+            c.coming_back_to_the_bus_is_told(capture(frames))
 
 
 def test_a_stream_that_does_not_fit() -> None:
     stopped = [emergency(1.0, 0xFF03, 0x81), emergency(2.0, 0, 0), *pair(2.1, 1)]
-    assert c.a_stream_that_does_not_fit_stands(evidence(stopped))
-    with pytest.raises(Broken):
-        c.a_stream_that_does_not_fit_stands(evidence([stopped[0], *pair(1.5, 1), *stopped[1:]]))
+    assert c.a_stream_that_does_not_fit_stands(capture(stopped))
+    with pytest.raises(Failed):
+        c.a_stream_that_does_not_fit_stands(capture([stopped[0], *pair(1.5, 1), *stopped[1:]]))
 
 
 def test_bits_of_a_frame() -> None:

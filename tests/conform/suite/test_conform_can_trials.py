@@ -1,4 +1,4 @@
-"""Trials of the services on CAN against an emulator whose frames are tampered with on their way: each must notice."""
+"""Active tests of the services on CAN against an emulator whose frames are altered on their way: each must notice."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from psabench.conform.active import bus_port, can_cycles, can_nmt, can_objects, 
 from psabench.conform.dut import Addresses, Subject
 from psabench.conform.plan import plan_of
 from psabench.conform.profile import variant
-from psabench.conform.proves import proofs
+from psabench.conform.proves import suite_tests
 from psabench.conform.raw_can import Talk
 from psabench.conform.requirements import requirements
-from psabench.conform.verdict import Broken, TooLittle
+from psabench.conform.verdict import Failed, Inconclusive
 from psabench.errors import BenchError
 
 Rule = Callable[[can.Message, Talk], list[can.Message]]
-Trial = Callable[[Subject], str]
+Active = Callable[[Subject], str]
 MODULES = (can_nmt, can_sdo, can_objects, can_pdo, can_cycles)
 SLOW = ("the_history_holds_eight",)
 SEED = 20
@@ -43,15 +43,15 @@ def changed(m: can.Message, data: bytes, t_s: float = 0.0) -> can.Message:
     )
 
 
-def trials(modules: tuple[ModuleType, ...], s: Subject) -> list[Trial]:
+def trials(modules: tuple[ModuleType, ...], s: Subject) -> list[Active]:
     """Those of these modules that can be carried out on this board."""
     rows, v = requirements().rows, s.variant
     names = {m.__name__ for m in modules}
     return [
         p.test
-        for p in proofs()
+        for p in suite_tests()
         if p.test.__module__ in names
-        and plan_of(p.test).is_trial
+        and plan_of(p.test).is_active
         and not plan_of(p.test).needs - s.probes
         and any(rows[i].applies(v.board, v.profile) for i in p.ids)
     ]
@@ -67,7 +67,7 @@ def tampered(monkeypatch: pytest.MonkeyPatch, rule: Rule) -> None:
     monkeypatch.setattr(Talk, "on_message", on_message)
 
 
-# ---- every trial, on a badly broken board
+# ---- every active test, on a badly broken board
 
 
 def mute(m: can.Message, t: Talk) -> list[can.Message]:
@@ -92,20 +92,20 @@ def test_no_trial_passes_on_a_badly_broken_board(board: Subject, monkeypatch: py
     rules: dict[str, Rule] = {"mute": mute, "short": short, "empty": empty, "noise": noise()}
     tampered(monkeypatch, rules[how])
     ways = (can_nmt, can_sdo, can_objects, can_pdo)
-    for trial in trials(ways, board):
-        with pytest.raises((Broken, TooLittle, BenchError)):
-            print(trial.__name__, trial(board))
+    for active in trials(ways, board):
+        with pytest.raises((Failed, Inconclusive, BenchError)):
+            print(active.__name__, active(board))
 
 
 def test_all_pass_as_it_is(board: Subject) -> None:
-    for trial in trials(MODULES, board):
-        if trial.__name__ not in SLOW:
-            assert trial(board), trial.__name__
+    for active in trials(MODULES, board):
+        if active.__name__ not in SLOW:
+            assert active(board), active.__name__
 
 
 def test_a_board_that_beats_on_is_noticed(board: Subject, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Talk, "beat", lambda t, period_ms: None)  # the write never reaches it
-    with pytest.raises(Broken, match="heartbeats with 1017h = 0"):
+    with pytest.raises(Failed, match="heartbeats with 1017h = 0"):
         can_nmt.no_heartbeat_where_the_period_is_0(board)
 
 
@@ -173,7 +173,7 @@ def frozen(d: bytes) -> bytes:
     return d[:4] + bytes([1, 0, 0, 0]) if d[0] == 0x43 else d
 
 
-FAULTS: list[tuple[Trial, Rule]] = [
+FAULTS: list[tuple[Active, Rule]] = [
     (can_nmt.it_listens_at_the_identifiers_of_its_node, answers(0x2030, frozen)),
     (can_nmt.boot_up_is_the_first_frame, of("heartbeat", twice)),
     (can_nmt.boot_up_is_the_first_frame, of("heartbeat", lambda m: [changed(m, b"\1")])),
@@ -228,18 +228,18 @@ FAULTS: list[tuple[Trial, Rule]] = [
 ]
 
 
-@pytest.mark.parametrize(("trial", "rule"), FAULTS, ids=[f"{k}-{t.__name__}" for k, (t, _) in enumerate(FAULTS)])
-def test_a_trial_notices_its_fault(board: Subject, monkeypatch: pytest.MonkeyPatch, trial: Trial, rule: Rule) -> None:
+@pytest.mark.parametrize(("active", "rule"), FAULTS, ids=[f"{k}-{t.__name__}" for k, (t, _) in enumerate(FAULTS)])
+def test_a_trial_notices_its_fault(board: Subject, monkeypatch: pytest.MonkeyPatch, active: Active, rule: Rule) -> None:
     tampered(monkeypatch, rule)
-    with pytest.raises((Broken, TooLittle)):
-        print(trial(board))
+    with pytest.raises((Failed, Inconclusive)):
+        print(active(board))
 
 
 def early_cycles(m: can.Message) -> list[can.Message]:
     return [changed(m, bytes(m.data), -0.0008 if m.data[1:3] == b"\2\x20" else 0.0)]
 
 
-OFF: list[tuple[Trial, Rule]] = [
+OFF: list[tuple[Active, Rule]] = [
     (can_nmt.a_new_period_holds_at_once, of("heartbeat", late(0.002))),
     (can_sdo.a_silent_client_is_given_up, of("sdo_tx", late(0.002))),
     (can_pdo.the_inhibit_time_keeps_tpdos_apart, of("pdo", late(-0.002))),
@@ -247,18 +247,18 @@ OFF: list[tuple[Trial, Rule]] = [
 ]
 
 
-@pytest.mark.parametrize(("trial", "rule"), OFF, ids=[t.__name__ for t, _ in OFF])
+@pytest.mark.parametrize(("active", "rule"), OFF, ids=[t.__name__ for t, _ in OFF])
 def test_clocks_may_lie_as_far_apart_as_the_run_allows(
-    bus_board: Subject, monkeypatch: pytest.MonkeyPatch, trial: Trial, rule: Rule
+    bus_board: Subject, monkeypatch: pytest.MonkeyPatch, active: Active, rule: Rule
 ) -> None:
     tampered(monkeypatch, rule)
-    with pytest.raises(Broken):
-        trial(bus_board)
+    with pytest.raises(Failed):
+        active(bus_board)
     monkeypatch.setattr(bus_board, "allowed_ppm", 50_000.0)
-    assert trial(bus_board)
+    assert active(bus_board)
 
 
-CYCLES: list[tuple[Trial, Rule]] = [
+CYCLES: list[tuple[Active, Rule]] = [
     (can_cycles.an_object_is_a_cycle, answers(0x2002, lambda d: d[:4] + bytes([d[4] ^ 1]) + d[5:])),
     (can_cycles.the_answer_waits_for_the_strobe, answers(0x2002, lambda d: b"\x80" + d[1:])),
     (can_cycles.refusals_have_their_codes, aborts(other_code)),
@@ -273,16 +273,16 @@ CYCLES: list[tuple[Trial, Rule]] = [
 ]
 
 
-@pytest.mark.parametrize(("trial", "rule"), CYCLES, ids=[f"{k}-{t.__name__}" for k, (t, _) in enumerate(CYCLES)])
+@pytest.mark.parametrize(("active", "rule"), CYCLES, ids=[f"{k}-{t.__name__}" for k, (t, _) in enumerate(CYCLES)])
 def test_a_trial_of_cycles_notices(
-    bus_board: Subject, monkeypatch: pytest.MonkeyPatch, trial: Trial, rule: Rule
+    bus_board: Subject, monkeypatch: pytest.MonkeyPatch, active: Active, rule: Rule
 ) -> None:
     tampered(monkeypatch, rule)
-    with pytest.raises((Broken, TooLittle)):
-        print(trial(bus_board))
+    with pytest.raises((Failed, Inconclusive)):
+        print(active(bus_board))
 
 
-PORT: list[tuple[Trial, str, str]] = [
+PORT: list[tuple[Active, str, str]] = [
     (bus_port.each_line_has_its_answer_in_turn, "E syntax", "E number"),
     (bus_port.a_read_cycle_and_its_answer, "h ", " "),
     (bus_port.a_write_cycle_and_its_answer, "W ", "R "),
@@ -297,14 +297,14 @@ PORT: list[tuple[Trial, str, str]] = [
 ]
 
 
-@pytest.mark.parametrize(("trial", "old", "new"), PORT, ids=[t.__name__ for t, *_ in PORT])
+@pytest.mark.parametrize(("active", "old", "new"), PORT, ids=[t.__name__ for t, *_ in PORT])
 def test_a_trial_of_the_port_notices(
-    bus_board: Subject, monkeypatch: pytest.MonkeyPatch, trial: Trial, old: str, new: str
+    bus_board: Subject, monkeypatch: pytest.MonkeyPatch, active: Active, old: str, new: str
 ) -> None:
     port = bus_board.port
     assert port is not None
-    assert trial(bus_board)
+    assert active(bus_board)
     answered = port.answered
     monkeypatch.setattr(port, "answered", lambda *a: answered(*a).replace(old, new))
-    with pytest.raises((Broken, TooLittle)):
-        print(trial(bus_board))
+    with pytest.raises((Failed, Inconclusive)):
+        print(active(bus_board))

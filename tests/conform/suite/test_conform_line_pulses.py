@@ -15,12 +15,12 @@ from psabench.boards.gyro.conform import check as gyro
 from psabench.boards.pik.conform import check as pik
 from psabench.boards.pmka.conform import check_lines as pmka_lines
 from psabench.boards.psd1.conform.capture_cycles import PINS as PSD1_PINS
-from psabench.conform.capture.log import CanFrame, CanLog, Evidence, LineLog
+from psabench.conform.capture.log import CanFrame, CanLog, Capture, LineLog
 from psabench.conform.capture.pulses import all_move, bus_moves, none_is_too_short, shortest
 from psabench.conform.check import line_pulses
 from psabench.conform.profile import variant
 from psabench.conform.proves import row_for
-from psabench.conform.verdict import Broken, TooLittle
+from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.busport import Cycle
 from psabench.link.protocol_files import dbc_node, message
 from psabench.link.vcd import Vcd, Wire
@@ -46,36 +46,36 @@ def wire(*moves: tuple[int, int]) -> Wire:
     return Wire(np.array([t for t, _ in moves], np.int64), np.array([v for _, v in moves], np.uint8))
 
 
-def evidence(board: str, wires: Mapping[str, Wire], resolution_ns: float = 1.0) -> Evidence:
+def capture(board: str, wires: Mapping[str, Wire], resolution_ns: float = 1.0) -> Capture:
     end_ns = max(int(w.t_ns[-1]) for w in wires.values()) + LONG_NS
     lines = LineLog(recording=Vcd(1, 0, end_ns, dict(wires)), resolution_ns=resolution_ns)
-    return Evidence(variant=said(board), node=dbc_node(said(board).family), scene="stream", lines=lines)
+    return Capture(variant=said(board), node=dbc_node(said(board).family), stimulus="stream", lines=lines)
 
 
 def least_ns(board: str, name: str) -> tuple[int, int]:
     """How long it stays low and high at least; long where nothing is said."""
     found = [LONG_NS, LONG_NS]
-    for line, level, ns in shortest(row_for(evidence(board, {"x": wire((0, 0))}), *line_pulses.SHORT)):
+    for line, level, ns in shortest(row_for(capture(board, {"x": wire((0, 0))}), *line_pulses.SHORT)):
         if name.lower() == line or name.lower().rstrip("0123456789") == line:
             found[level] = int(np.ceil(ns))
     return found[0], found[1]
 
 
-def good(board: str, resolution_ns: float = 1.0) -> Evidence:
+def good(board: str, resolution_ns: float = 1.0) -> Capture:
     wires = {}
     for name in PINS[board]:
         low_ns, high_ns = least_ns(board, name)
         steps = np.cumsum([BEGIN_NS, *[high_ns, low_ns] * STAYS])
         wires[name] = wire((0, 0), *((int(t), 1 - k % 2) for k, t in enumerate(steps)))
-    return evidence(board, wires, resolution_ns)
+    return capture(board, wires, resolution_ns)
 
 
-def with_wire(e: Evidence, name: str, w: Wire) -> Evidence:
+def with_wire(e: Capture, name: str, w: Wire) -> Capture:
     old = e.wires.recording
     return e.with_lines(replace(e.wires, recording=replace(old, wires=dict(old.wires) | {name: w})))
 
 
-def disturbed(e: Evidence, name: str, level: int, width_ns: int = GLITCH_NS) -> Evidence:
+def disturbed(e: Capture, name: str, level: int, width_ns: int = GLITCH_NS) -> Capture:
     """With a pulse to this level in the middle of the first stay at the other; before all edges for a high one."""
     w = e.wires[name]
     begin, end = e.wires.pulses(name, 0) if level else e.wires.pulses(name, 1)
@@ -85,7 +85,7 @@ def disturbed(e: Evidence, name: str, level: int, width_ns: int = GLITCH_NS) -> 
     return with_wire(e, name, Wire(t_ns, np.insert(w.level, k, np.array([level, 1 - level], np.uint8))))
 
 
-def short(e: Evidence) -> str:
+def short(e: Capture) -> str:
     return none_is_too_short(e, row_for(e, *line_pulses.SHORT))
 
 
@@ -103,7 +103,7 @@ def test_a_pulse_of_100_ns_is_found_on_every_line(board: str, name: str) -> None
         mine = {lv for line, lv, _ in limits if name.lower() == line or name.lower().rstrip("0123456789") == line}
         assert mine, name
         if level in mine:
-            with pytest.raises(Broken, match=rf"{name} (low|high) for") as found:
+            with pytest.raises(Failed, match=rf"{name} (low|high) for") as found:
                 short(disturbed(e, name, level))
             assert found.value.lines == (name,)
 
@@ -113,38 +113,36 @@ def test_what_begins_before_the_recording_is_whole_is_no_fault(name: str) -> Non
     e = good("pik")
     rest = 1 if name in ("LATCH", "CS") else 0
     assert short(with_wire(e, name, wire((0, rest), (250_000, 1 - rest), (250_100, rest))))
-    with pytest.raises(Broken, match=name):
+    with pytest.raises(Failed, match=name):
         short(with_wire(e, name, wire((0, rest), (350_000, 1 - rest), (350_100, rest))))
 
 
 def test_a_pulse_that_a_gap_cuts_is_no_fault() -> None:
     e = with_wire(good("pik6"), "FXP", wire((0, 0), (500_000, 1), (500_000 + GLITCH_NS, 0)))
     assert short(e.with_lines(replace(e.wires, gaps_ns=np.array([500_050], np.int64))))
-    with pytest.raises(Broken, match="FXP high"):
+    with pytest.raises(Failed, match="FXP high"):
         short(e.with_lines(replace(e.wires, gaps_ns=np.array([600_000], np.int64))))
 
 
 def test_clocks_may_be_off() -> None:
     e = good("pmka")
 
-    def fast(by: float) -> Evidence:
+    def fast(by: float) -> Capture:
         old = e.wires.recording.wires
-        return evidence(
-            "pmka", {n: Wire(np.floor(w.t_ns * (1 - by)).astype(np.int64), w.level) for n, w in old.items()}
-        )
+        return capture("pmka", {n: Wire(np.floor(w.t_ns * (1 - by)).astype(np.int64), w.level) for n, w in old.items()})
 
     assert short(fast(180e-6))
-    with pytest.raises(Broken):
+    with pytest.raises(Failed):
         short(fast(0.01))
 
 
 @pytest.mark.parametrize("board", PINS)
 def test_lines_that_nobody_recorded_or_moved_are_not_judged(board: str) -> None:
-    still = evidence(board, {name: wire((0, 0)) for name in PINS[board]})
-    with pytest.raises(TooLittle, match="moves"):
+    still = capture(board, {name: wire((0, 0)) for name in PINS[board]})
+    with pytest.raises(Inconclusive, match="moves"):
         short(still)
-    with pytest.raises(TooLittle, match="no line"):
-        short(evidence(board, {"x": wire((0, 0))}))
+    with pytest.raises(Inconclusive, match="no line"):
+        short(capture(board, {"x": wire((0, 0))}))
 
 
 @pytest.mark.parametrize("board", MOVES)
@@ -157,14 +155,14 @@ def test_a_line_that_is_stuck_is_found(board: str) -> None:
     assert len(mine) >= len(due)
     for name in mine:
         for level in (0, 1):
-            with pytest.raises(Broken, match=f"0 edges of {name}, always {level}"):
+            with pytest.raises(Failed, match=f"0 edges of {name}, always {level}"):
                 all_move(with_wire(e, name, wire((0, level))), row)
 
 
 def test_the_line_of_control_words_moves_in_the_set_up() -> None:
     e = good("psd1")
     assert line_pulses.lines_of_the_set_up_move(e)
-    with pytest.raises(Broken, match="TFS"):
+    with pytest.raises(Failed, match="TFS"):
         line_pulses.lines_of_the_set_up_move(with_wire(e, "TFS", wire((0, 1))))
 
 
@@ -174,10 +172,10 @@ def test_a_line_of_the_bus_that_a_cycle_does_not_move_is_found(board: str) -> No
     e = replace(good(board), cycles=(write,))
     assert "6 lines" in bus_moves(e)  # CS, RW, AB0, AB2, D0, D15
     for name, level in (("CS", 1), ("RW", 1), ("AB2", 0), ("D15", 1)):
-        with pytest.raises(Broken, match=f"{name} always {level}"):
+        with pytest.raises(Failed, match=f"{name} always {level}"):
             bus_moves(with_wire(e, name, wire((0, level))))
     assert bus_moves(with_wire(e, "D3", wire((0, 0))))
-    with pytest.raises(TooLittle, match="no cycle"):
+    with pytest.raises(Inconclusive, match="no cycle"):
         bus_moves(replace(e, cycles=()))
 
 
@@ -188,16 +186,16 @@ def test_a_clock_that_rests_high_is_upside_down(board: str, tclk_ns: int) -> Non
     off_ns = begin[-1][0] + half
     after = [(off_ns + 20_000_000 + k * half, 1 - k % 2) for k in range(20)]
     moves = [(0, 0), *begin, (off_ns, 0), *after]
-    assert "CLK 0" in pik.the_clock_rests_low(evidence(board, {"CLK": wire(*moves)}))
-    with pytest.raises(Broken, match="CLK 1"):
-        pik.the_clock_rests_low(evidence(board, {"CLK": wire(*((t, 1 - v) for t, v in moves))}))
-    with pytest.raises(TooLittle, match="moves on"):
-        pik.the_clock_rests_low(evidence(board, {"CLK": wire((0, 0), *begin)}))
-    with pytest.raises(TooLittle, match="does not move"):
-        pik.the_clock_rests_low(evidence(board, {"CLK": wire((0, 0))}))
+    assert "CLK 0" in pik.the_clock_rests_low(capture(board, {"CLK": wire(*moves)}))
+    with pytest.raises(Failed, match="CLK 1"):
+        pik.the_clock_rests_low(capture(board, {"CLK": wire(*((t, 1 - v) for t, v in moves))}))
+    with pytest.raises(Inconclusive, match="moves on"):
+        pik.the_clock_rests_low(capture(board, {"CLK": wire((0, 0), *begin)}))
+    with pytest.raises(Inconclusive, match="does not move"):
+        pik.the_clock_rests_low(capture(board, {"CLK": wire((0, 0))}))
 
 
-def unit(lost: range, shown: range, steps: int = 60) -> Evidence:
+def unit(lost: range, shown: range, steps: int = 60) -> Capture:
     """Readings of a gyro unit, LEVEL_LOST in some of them and FAULT high in some."""
     period_ns, high_ns = 10_000_000, 100_000
     frames = []
@@ -210,18 +208,18 @@ def unit(lost: range, shown: range, steps: int = 60) -> Evidence:
             frames.append(CanFrame(t_s=k * 0.01, can_id=m.frame_id, data=bytes(m.encode(told, scaling=False))))
     step = [(0, 0), *((1_000_000 + k * period_ns + h, 1 - int(h > 0)) for k in range(steps) for h in (0, high_ns))]
     fault = [(0, 0), *((1_000_000 + k * period_ns, v) for k, v in ((shown.start, 1), (shown.stop, 0)))]
-    return evidence("gyro", {"STEP": wire(*step), "FAULT": wire(*fault)}).with_can(CanLog(frames=tuple(frames)))
+    return capture("gyro", {"STEP": wire(*step), "FAULT": wire(*fault)}).with_can(CanLog(frames=tuple(frames)))
 
 
 def test_fault_is_high_while_a_flag_is_set() -> None:
     assert "FAULT in 20 steps" in gyro.fault_shows_the_flags(unit(range(10, 30), range(10, 30)))
     e = unit(range(10, 30), range(10, 30))
     for level in (0, 1):
-        with pytest.raises(Broken, match="as the flags tell"):
+        with pytest.raises(Failed, match="as the flags tell"):
             gyro.fault_shows_the_flags(with_wire(e, "FAULT", wire((0, level))))
-    with pytest.raises(Broken):  # upside down
+    with pytest.raises(Failed):  # upside down
         gyro.fault_shows_the_flags(with_wire(e, "FAULT", Wire(e.wires["FAULT"].t_ns, 1 - e.wires["FAULT"].level)))
-    with pytest.raises(Broken):
+    with pytest.raises(Failed):
         gyro.fault_shows_the_flags(unit(range(0), range(10, 30)))
-    with pytest.raises(TooLittle, match="lost"):
+    with pytest.raises(Inconclusive, match="lost"):
         gyro.fault_shows_the_flags(e.with_lines(replace(e.wires, gaps_ns=np.array([5_000_000], np.int64))))

@@ -1,13 +1,13 @@
-"""A board that never becomes ready: the suite waits for it once, and judges what it shows all the same."""
+"""A board that never becomes ready: the suite waits for it once, and checks what it shows all the same."""
 
 from __future__ import annotations
 
 import pytest
 from psabench.conform import runner, suite
 from psabench.conform.dut import Addresses, Subject
-from psabench.conform.plan import Scene, scenes
+from psabench.conform.plan import Stimulus, stimuli
 from psabench.conform.profile import variant
-from psabench.conform.verdict import Broken, Verdict
+from psabench.conform.verdict import Failed, Verdict
 from psabench.errors import LinkError
 from psabench.procedures.head_bench import Silent
 
@@ -25,7 +25,7 @@ def test_it_is_waited_for_once_and_judged_by_what_it_shows(monkeypatch: pytest.M
     with Subject.open(variant("psa2"), Addresses(), seed=3) as s:
         monkeypatch.setattr(s.unit, "wait_ready", never)
         found = runner.run(s, Silent(), only=["PSA2-RES-03", "PSA2-CAN-01", "PSA2-CAN-02", "PSA2-FORM-02"])
-    by_scene = {o.scene: o.verdict for o in found}
+    by_scene = {o.stimulus: o.verdict for o in found}
     assert waits == 1
     assert by_scene == {"power_on": Verdict.INCONCLUSIVE, "stream": Verdict.PASSED, "forms": Verdict.PASSED}
 
@@ -36,11 +36,11 @@ def test_a_scene_that_shows_a_broken_board_is_played_once(monkeypatch: pytest.Mo
     def quiet(_: Subject) -> None:
         nonlocal played
         played += 1
-        raise Broken("nothing", "something")
+        raise Failed("nothing", "something")
 
     with Subject.open(variant("psa2"), Addresses(), seed=3) as s:
-        known = dict(scenes("psa2")) | {"quiet": Scene(name="quiet", boards=("psa2",), make=quiet)}  # type: ignore[arg-type]
-        monkeypatch.setattr(runner, "scenes", lambda _: known)
+        known = dict(stimuli("psa2")) | {"quiet": Stimulus(name="quiet", boards=("psa2",), make=quiet)}  # type: ignore[arg-type]
+        monkeypatch.setattr(runner, "stimuli", lambda _: known)
         found = runner.run(s, Silent(), only=["PSA2-CAN-04", "PSA2-CAN-05"])
     assert played == 1
-    assert {o.verdict for o in found if o.scene == "quiet"} == {Verdict.FAILED}
+    assert {o.verdict for o in found if o.stimulus == "quiet"} == {Verdict.FAILED}

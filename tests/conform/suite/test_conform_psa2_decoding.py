@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from psabench.boards.psa2.conform.capture_can import aligned, pairs, segment, signed
 from psabench.boards.psa2.conform.capture_spi import PINS, traffic
-from psabench.conform.capture.log import CanFrame, CanLog, Evidence, LineLog
+from psabench.conform.capture.log import CanFrame, CanLog, Capture, LineLog
 from psabench.conform.profile import variant
-from psabench.conform.verdict import Broken, TooLittle
+from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.signals import Ints
 from psabench.link.vcd import Vcd, Wire
 
@@ -96,14 +96,14 @@ def test_what_is_cut_is_decoded_as_far_as_it_goes() -> None:
 
 def test_a_recording_without_a_pin_or_without_a_clock_is_too_little() -> None:
     log = Pins().log()
-    with pytest.raises(TooLittle, match="SClk never rises"):
+    with pytest.raises(Inconclusive, match="SClk never rises"):
         traffic(log, HZ)
     wires = {n: w for n, w in log.recording.wires.items() if n != "DIn"}
-    with pytest.raises(TooLittle, match="no line DIn"):
+    with pytest.raises(Inconclusive, match="no line DIn"):
         traffic(replace(log, recording=Vcd(1, 0, 100, wires)), HZ)
 
 
-def log_of(samples: list[tuple[int, int]], node: int = 5) -> Evidence:
+def log_of(samples: list[tuple[int, int]], node: int = 5) -> Capture:
     """Samples (SEQ, TSTAMP) with codes SEQ, -SEQ, 2 SEQ."""
     found = []
     for seq, stamp in samples:
@@ -112,7 +112,7 @@ def log_of(samples: list[tuple[int, int]], node: int = 5) -> Evidence:
         zt = (code[2] | 19539 << 24 | 0x31 << 40 | (stamp & 0xFFFF) << 48).to_bytes(8, "little")
         t_s = seq * 1e-3
         found += [CanFrame(t_s=t_s, can_id=0x180 + node, data=xy), CanFrame(t_s=t_s, can_id=0x280 + node, data=zt)]
-    return Evidence(variant=variant("psa2"), node=node, scene="", can=CanLog(frames=tuple(found)))
+    return Capture(variant=variant("psa2"), node=node, stimulus="", can=CanLog(frames=tuple(found)))
 
 
 def test_pairs_are_arrays_with_stamps_unwrapped() -> None:
@@ -132,22 +132,22 @@ def test_halves_alone_are_left_out_and_short_ones_broken() -> None:
     alone = e.with_can(CanLog(frames=e.can.frames[1:-1]))
     assert len(pairs(alone)) == 28
     cut = e.with_can(CanLog(frames=(replace(e.can.frames[0], data=b"\0"), *e.can.frames[1:])))
-    with pytest.raises(Broken, match="1 bytes"):
+    with pytest.raises(Failed, match="1 bytes"):
         pairs(cut)
-    with pytest.raises(TooLittle, match="0 samples"):
+    with pytest.raises(Inconclusive, match="0 samples"):
         pairs(e.with_can(CanLog()))
 
 
 def test_another_node_is_not_ours() -> None:
     e = log_of([(k, k) for k in range(30)], node=9)
-    with pytest.raises(TooLittle):
+    with pytest.raises(Inconclusive):
         pairs(replace(e, node=5))
 
 
 def test_a_segment_wants_its_cut() -> None:
     e = replace(log_of([(k, k) for k in range(30)]), facts={"cut": {"a": 0, "b": 10}})
     assert len(segment(e, "a", "b").can) == 10
-    with pytest.raises(TooLittle, match="no cut c"):
+    with pytest.raises(Inconclusive, match="no cut c"):
         segment(e, "c")
 
 

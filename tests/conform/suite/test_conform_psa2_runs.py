@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from psabench.conform import runner, suite
 from psabench.conform.dut import Addresses, Subject
-from psabench.conform.plan import scenes
+from psabench.conform.plan import stimuli
 from psabench.conform.profile import Variant, variant
 from psabench.conform.requirements import requirements
 from psabench.conform.verdict import Outcome, Verdict
@@ -73,8 +73,8 @@ def test_a_board_of_another_profile_does_not_conform(wrong: str) -> None:
 
 def test_every_check_has_its_scene() -> None:
     from psabench.conform.plan import plan_of
-    from psabench.conform.proves import proofs
+    from psabench.conform.proves import suite_tests
 
-    known = scenes("psa2")
-    mine = [p.test for p in proofs() if any(i.startswith("PSA") for i in p.ids)]
-    assert not [t.__name__ for t in mine if not plan_of(t).is_trial and plan_of(t).scene not in known]
+    known = stimuli("psa2")
+    mine = [p.test for p in suite_tests() if any(i.startswith("PSA") for i in p.ids)]
+    assert not [t.__name__ for t in mine if not plan_of(t).is_active and plan_of(t).stimulus not in known]

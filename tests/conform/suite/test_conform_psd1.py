@@ -13,16 +13,16 @@ from psabench.boards.psd1.conform import check_can as psd1_can
 from psabench.boards.psd1.conform import check_cycle as psd1_cycle
 from psabench.boards.psd1.conform import check_serial as psd1_serial
 from psabench.boards.psd1.conform.capture_cycles import PINS
-from psabench.conform.capture.log import CanFrame, CanLog, Evidence, LineLog
+from psabench.conform.capture.log import CanFrame, CanLog, Capture, LineLog
 from psabench.conform.dut import Addresses, Subject
 from psabench.conform.profile import variant
-from psabench.conform.verdict import Broken, TooLittle
+from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.vcd import Vcd, Wire
 
 PERIOD, CLOCK, CYCLES = 972_800, 800, 14
 WORDS = (0xA5C3, 0x1234, 0x8001)
 NODE = 6
-Test = Callable[[Evidence], str]
+Test = Callable[[Capture], str]
 
 
 @dataclass
@@ -53,7 +53,7 @@ class Board:
     def put(self, name: str, t: int, level: int) -> None:
         self.edges.setdefault(name, []).append((t, level))
 
-    def evidence(self, profile: str = "psd1", can: CanLog | None = None) -> Evidence:
+    def capture(self, profile: str = "psd1", can: CanLog | None = None) -> Capture:
         rest = {"FL1": 0, "INT0": 1, "DR": 1, "RFX": 1, "RFY": 1, "RFZ": 1, "TFS": 1, "CS": 1, "RW": 1}
         for k in range(CYCLES):
             self.cycle(1_000_000 + k * self.period)
@@ -68,7 +68,7 @@ class Board:
             times = [0, *(t for t, _ in moves)]
             wires[name] = Wire(np.array(times, np.int64), np.array(levels, np.uint8))
         lines = LineLog(recording=Vcd(1, 0, end, wires))
-        return Evidence(variant=variant("psd1", profile), node=NODE, scene="stream", lines=lines, can=can or CanLog())
+        return Capture(variant=variant("psd1", profile), node=NODE, stimulus="stream", lines=lines, can=can or CanLog())
 
     def cycle(self, begin: int) -> None:
         a0 = begin + (400 - begin) % CLOCK
@@ -159,7 +159,7 @@ CHECKS: list[Test] = [
 
 @pytest.mark.parametrize("check", CHECKS, ids=lambda c: c.__name__)
 def test_a_good_board_passes(check: Test) -> None:
-    assert check(Board().evidence())
+    assert check(Board().capture())
 
 
 BAD: list[tuple[Board, Test]] = [
@@ -194,16 +194,16 @@ BAD: list[tuple[Board, Test]] = [
 
 @pytest.mark.parametrize(("board", "check"), BAD, ids=lambda v: getattr(v, "__name__", "board"))
 def test_a_bad_board_is_found(board: Board, check: Test) -> None:
-    with pytest.raises(Broken):
-        check(replace(board, edges={}).evidence())
+    with pytest.raises(Failed):
+        check(replace(board, edges={}).capture())
 
 
 @pytest.mark.parametrize("check", CHECKS, ids=lambda c: c.__name__)
 def test_lines_that_never_move_are_no_pass_and_no_crash(check: Test) -> None:
     wires = {name: Wire(np.zeros(1, np.int64), np.zeros(1, np.uint8)) for name in PINS}
     lines = LineLog(recording=Vcd(1, 0, 10**8, wires))
-    with pytest.raises((Broken, TooLittle)):
-        check(Evidence(variant=variant("psd1"), node=NODE, scene="stream", lines=lines))
+    with pytest.raises((Failed, Inconclusive)):
+        check(Capture(variant=variant("psd1"), node=NODE, stimulus="stream", lines=lines))
 
 
 def frames(words: list[tuple[int, int, int]], flags: int = 7) -> CanLog:
@@ -215,18 +215,18 @@ def frames(words: list[tuple[int, int, int]], flags: int = 7) -> CanLog:
 
 
 def test_words_on_can_are_those_of_sdat() -> None:
-    good = Board().evidence(can=frames([WORDS] * (CYCLES - 2)))
+    good = Board().capture(can=frames([WORDS] * (CYCLES - 2)))
     assert psd1_serial.words_of_the_line_are_those_on_can(good)
     assert psd1_serial.each_cycle_is_told_once(good)
-    other = Board().evidence(can=frames([(1, 2, 3)] * (CYCLES - 2)))
+    other = Board().capture(can=frames([(1, 2, 3)] * (CYCLES - 2)))
     for check in (psd1_serial.words_of_the_line_are_those_on_can, psd1_serial.each_cycle_is_told_once):
-        with pytest.raises(Broken, match="on CAN"):
+        with pytest.raises(Failed, match="on CAN"):
             check(other)
 
 
 def test_strobes_that_are_not_told_are_found() -> None:
-    e = Evidence(variant=variant("psd1"), node=NODE, scene="messages", can=frames([WORDS] * 9, flags=3))
-    with pytest.raises(Broken, match="READ_Z"):
+    e = Capture(variant=variant("psd1"), node=NODE, stimulus="messages", can=frames([WORDS] * 9, flags=3))
+    with pytest.raises(Failed, match="READ_Z"):
         psd1_can.strobes_are_told(e)
     assert psd1_can.strobes_are_told(replace(e, can=frames([WORDS] * 9)))
 
@@ -242,5 +242,5 @@ def test_a_converter_out_of_step_is_found(monkeypatch: pytest.MonkeyPatch) -> No
             return found | {name: found[name] + k for name in ("Lost Y", "Stretched cycles")}
 
         monkeypatch.setattr(s.unit, "counters", off)
-        with pytest.raises(Broken):
+        with pytest.raises(Failed):
             psd1_control.converters_are_in_step_after_res(s)

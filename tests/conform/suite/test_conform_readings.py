@@ -15,13 +15,13 @@ from psabench.boards.pik.conform import check as pik
 from psabench.boards.pik.conform.check import MESSAGES as PIK_MESSAGES
 from psabench.boards.pmka.conform import check_lines as pmka_lines
 from psabench.boards.pmka.conform import check_readings as pmka_readings
-from psabench.conform.capture.log import CanFrame, CanLog, Evidence, LineLog
+from psabench.conform.capture.log import CanFrame, CanLog, Capture, LineLog
 from psabench.conform.profile import variant
-from psabench.conform.verdict import Broken, TooLittle
+from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.protocol_files import dbc_node, message
 from psabench.link.vcd import Vcd, Wire
 
-Test = Callable[[Evidence], str]
+Test = Callable[[Capture], str]
 Row = Mapping[str, float]
 
 
@@ -43,22 +43,22 @@ def lines(moves: Mapping[str, Sequence[tuple[int, int]]], end_ns: int) -> LineLo
     return LineLog(recording=Vcd(1, 0, end_ns, wires))
 
 
-def evidence(board: str, can: CanLog, **more: Any) -> Evidence:
+def capture(board: str, can: CanLog, **more: Any) -> Capture:
     inputs = {"x": 2.0, "y": -1.0, "z": 0.5}
-    return Evidence(
-        variant=variant(board), node=dbc_node(variant(board).family), scene="", can=can, inputs_v=inputs, **more
+    return Capture(
+        variant=variant(board), node=dbc_node(variant(board).family), stimulus="", can=can, inputs_v=inputs, **more
     )
 
 
-def fails(check: Test, e: Evidence) -> None:
-    with pytest.raises(Broken):
+def fails(check: Test, e: Capture) -> None:
+    with pytest.raises(Failed):
         check(e)
 
 
 # ---- PMKA
 
 
-def pmka(n: int = 120, change: Callable[[int, dict[str, float], dict[str, float]], None] = lambda *_: None) -> Evidence:
+def pmka(n: int = 120, change: Callable[[int, dict[str, float], dict[str, float]], None] = lambda *_: None) -> Capture:
     """Integrators at 2, -1 and 0.5 V in a beat 1 that lasts, K at rest in its zero."""
     rows: list[tuple[str, Row]] = []
     code, reset = {"X": 0.0, "Y": 0.0, "Z": 0.0, "K": 5.0}, dict.fromkeys("XYZK", 0)
@@ -71,7 +71,7 @@ def pmka(n: int = 120, change: Callable[[int, dict[str, float], dict[str, float]
         state |= {f"RESET_{a}": v for a, v in reset.items()}
         change(k, codes, state)
         rows += [("PMKA_CODES", codes), ("PMKA_STATE", state)]
-    return evidence("pmka", log("pmka", rows))
+    return capture("pmka", log("pmka", rows))
 
 
 def test_a_good_pmka_passes() -> None:
@@ -90,7 +90,7 @@ def test_a_good_pmka_passes() -> None:
 
 
 def test_a_bad_pmka_is_found() -> None:
-    def of(name: str, value: float) -> Evidence:
+    def of(name: str, value: float) -> Capture:
         return pmka(change=lambda k, _, s: s.update({name: value}) if k == 50 else None)
 
     fails(pmka_readings.readings_are_counted_without_gaps, of("SEQ", 7))
@@ -118,11 +118,11 @@ def test_only_a_late_host_excuses_a_late_first_reading() -> None:
     frames = log("pmka", rows).frames
     later = (replace(f, t_s=f.t_s + 0.0104 + 2 * 0.0048) for f in frames[1:])
     can = CanLog(frames=(replace(frames[0], data=b"\0"), *later))
-    assert pmka_readings.readings_begin_with_0_after_res(evidence("pmka", can))
-    fails(pmka_readings.readings_begin_with_0_after_res, evidence("pmka", can, facts={"prompt": True}))
+    assert pmka_readings.readings_begin_with_0_after_res(capture("pmka", can))
+    fails(pmka_readings.readings_begin_with_0_after_res, capture("pmka", can, facts={"prompt": True}))
 
 
-def samples(step: int = 100_000, period: int = 4_800_000, order: Sequence[int] = (0, 1, 2, 3)) -> Evidence:
+def samples(step: int = 100_000, period: int = 4_800_000, order: Sequence[int] = (0, 1, 2, 3)) -> Capture:
     moves: dict[str, list[tuple[int, int]]] = {"SH": [(0, 0)], "MUX0": [(0, 0)], "MUX1": [(0, 0)]}
     t = 10_000_000
     for _ in range(12):
@@ -132,7 +132,7 @@ def samples(step: int = 100_000, period: int = 4_800_000, order: Sequence[int] =
             moves["MUX0"].append((at, following & 1))
             moves["MUX1"].append((at, following >> 1))
         t += period
-    return evidence("pmka", CanLog(), lines=lines(moves, t))
+    return capture("pmka", CanLog(), lines=lines(moves, t))
 
 
 def test_samples_of_a_pmka() -> None:
@@ -148,7 +148,7 @@ def test_samples_of_a_pmka() -> None:
 
 def counts(
     k_hz_per_v: float = 2000.0, off: float = 0.0, seq_step: int = 1, order: Sequence[int] = (0, 1, 2)
-) -> Evidence:
+) -> Capture:
     rows: list[tuple[str, Row]] = []
     before = [0, 0, 0]
     for k in range(1, 6101):
@@ -161,7 +161,7 @@ def counts(
             ("PIK_TOTAL_Z", {"Z": total[2], "TSTAMP": 10_000 * k}),
         ]
         rows += [three[i] for i in order]
-    return evidence("pik6", log("pik", rows))
+    return capture("pik6", log("pik", rows))
 
 
 def test_counts_of_a_pik() -> None:
@@ -185,13 +185,13 @@ def test_counts_of_a_pik() -> None:
     fails(pik.a_pulse_has_the_printed_weight, counts(k_hz_per_v=2100.0))
 
 
-def pulses(high: int = 25_000, name: str = "FXP", shift: int = 0) -> Evidence:
+def pulses(high: int = 25_000, name: str = "FXP", shift: int = 0) -> Capture:
     moves: dict[str, list[tuple[int, int]]] = {n: [(0, 0)] for n in pik.PULSES}
     moves["CLK"] = [(0, 0), *((t + h, 1 - h // 12_500) for t in range(25_000, 5_000_000, 25_000) for h in (0, 12_500))]
     for k in range(20):
         at = 100_000 + k * 200_000 + (shift if k == 9 else 0)
         moves[name] += [(at, 1), (at + high, 0)]
-    return evidence("pik6", CanLog(), lines=lines(moves, 5_000_000))
+    return capture("pik6", CanLog(), lines=lines(moves, 5_000_000))
 
 
 def test_pulses_of_a_pik() -> None:
@@ -202,12 +202,12 @@ def test_pulses_of_a_pik() -> None:
     fails(pik.signs_have_their_lines, pulses(name="FXN"))
 
 
-def resting(**changed: Sequence[tuple[int, int]]) -> Evidence:
+def resting(**changed: Sequence[tuple[int, int]]) -> Capture:
     """Pulses on FXP from 100 us on, a latch each 10 ms, all else at rest."""
     moves: dict[str, Sequence[tuple[int, int]]] = {n: [(0, int(n in ("LATCH", "CS", "RW")))] for n in pik.PINS}
     moves["FXP"] = [(0, 0), *FXP]
     moves["LATCH"] = [(0, 1), *((t + h, int(h > 0)) for t in (10_000_000, 20_000_000) for h in (0, 10_000))]
-    return evidence("pik6", CanLog(), lines=lines(moves | changed, 25_000_000))
+    return capture("pik6", CanLog(), lines=lines(moves | changed, 25_000_000))
 
 
 FXP = [(t + h, int(not h)) for t in range(100_000, 20_000_000, 400_000) for h in (0, 25_000)]
@@ -222,7 +222,7 @@ def test_lines_of_a_pik_at_rest() -> None:
         level = int(name not in ("LATCH", "CS", "RW"))
         fails(pik.lines_rest_at_their_levels, resting(**{name: [(0, level)]}))
         fails(pik.lines_rest_at_their_levels, resting(**{name: [(0, 1 - level), (0, level)]}))
-    with pytest.raises(TooLittle):
+    with pytest.raises(Inconclusive):
         pik.lines_rest_at_their_levels(resting(FXP=[(0, 0)], LATCH=[(0, 1)]))
 
 
@@ -231,7 +231,7 @@ def test_lines_of_a_pik_at_rest() -> None:
 
 def steps(
     change: Callable[[int, dict[str, float]], None] = lambda *_: None, order: Sequence[int] = (0, 1, 2)
-) -> Evidence:
+) -> Capture:
     """Levelling: U1 = -m1 beta - Wz cos beta sin gamma, U2 = Wz cos beta cos gamma."""
     rows: list[tuple[str, Row]] = []
     wz = 15.041067 * np.sin(np.radians(50.0))
@@ -247,7 +247,7 @@ def steps(
             ("GYRO_LEVEL", {"BETA": round(v["BETA"] / 2e-6), "GAMMA": round(v["GAMMA"] / 2e-6)}),
         ]
         rows += [three[i] for i in order]
-    return evidence("gyro", log("gyro", rows), facts={"m1_per_s": 1.0, "m2_per_s": 2.0, "latitude_deg": 50.0})
+    return capture("gyro", log("gyro", rows), facts={"m1_per_s": 1.0, "m2_per_s": 2.0, "latitude_deg": 50.0})
 
 
 def test_steps_of_a_gyro_unit() -> None:
@@ -275,7 +275,7 @@ def gimbal(at_deg: float, way_deg: float, *, dps: float = 9.0, dps2: float = 20.
     return [float(v) for v in (np.array(angles + angles[-1:] * 50) + 180.0) % 360.0 - 180.0]
 
 
-def turns(ways: Sequence[Sequence[float]], ends: Sequence[float], *, moves_deg: float = 0.0) -> Evidence:
+def turns(ways: Sequence[Sequence[float]], ends: Sequence[float], *, moves_deg: float = 0.0) -> Capture:
     """Turns by mode 3, then mode 2, in which the gimbal goes on moving."""
     parts, frames, rows = [], 0, list[tuple[str, Row]]()
     held = [float(ways[-1][-1] + moves_deg * k / 100) for k in range(100)]
@@ -289,7 +289,7 @@ def turns(ways: Sequence[Sequence[float]], ends: Sequence[float], *, moves_deg: 
         parts.append((to, frames, frames + 3 * len(angles)))
         frames += 3 * len(angles)
     facts = {"turns": parts[:-1], "held": parts[-1][1:]}
-    return evidence("gyro", log("gyro", rows), facts=facts)
+    return capture("gyro", log("gyro", rows), facts=facts)
 
 
 def test_turns_of_a_gyro_unit() -> None:
@@ -305,7 +305,7 @@ def test_turns_of_a_gyro_unit() -> None:
 
 
 def test_u2_of_a_gyro_unit_that_holds() -> None:
-    def held(knows: bool) -> Evidence:
+    def held(knows: bool) -> Capture:
         rows: list[tuple[str, Row]] = []
         for latitude_deg in (50.0, -50.0):
             wz = 15.041067 * np.sin(np.radians(latitude_deg)) if knows else 0.0
@@ -315,14 +315,14 @@ def test_u2_of_a_gyro_unit_that_holds() -> None:
                 ("GYRO_LEVEL", {}),
             ] * 30
         parts = [(50.0, 0, 90), (-50.0, 90, 180)]
-        return evidence("gyro", log("gyro", rows), facts={"m2_per_s": 2.0, "latitudes": parts})
+        return capture("gyro", log("gyro", rows), facts={"m2_per_s": 2.0, "latitudes": parts})
 
     assert gyro.u2_turns_with_the_earth(held(True))
     fails(gyro.u2_turns_with_the_earth, held(False))
 
 
 def test_a_gyro_unit_that_begins_tilted() -> None:
-    def tilted(first_deg: float) -> Evidence:
+    def tilted(first_deg: float) -> Capture:
         """Settling from half a degree, and a window."""
         beta = [0.5 * 0.97**k for k in range(100) if 0.5 * 0.97**k > first_deg]
         rows: list[tuple[str, Row]] = []
@@ -330,38 +330,38 @@ def test_a_gyro_unit_that_begins_tilted() -> None:
             for b in angles:
                 mode = {"MODE": 4, "PHASE": phase, "POSITION": 1}
                 rows += [("GYRO_RATES", {}), ("GYRO_ANGLES", mode), ("GYRO_LEVEL", {"BETA": round(b / 2e-6)})]
-        return evidence("gyro", log("gyro", rows))
+        return capture("gyro", log("gyro", rows))
 
     assert gyro_modes.a_window_waits_for_the_level(tilted(0.08))
     fails(gyro_modes.a_window_waits_for_the_level, tilted(0.09))
 
 
 def test_a_gyro_unit_that_levels() -> None:
-    def levelling(ends_deg: float, mode: int = 1) -> Evidence:
+    def levelling(ends_deg: float, mode: int = 1) -> Capture:
         rows: list[tuple[str, Row]] = []
         for k in range(100):
             beta = round((ends_deg + 0.5 * 0.9**k) / 2e-6)
             rows += [("GYRO_RATES", {}), ("GYRO_ANGLES", {"MODE": mode}), ("GYRO_LEVEL", {"BETA": beta})]
-        return evidence("gyro", log("gyro", rows))
+        return capture("gyro", log("gyro", rows))
 
     assert gyro_modes.mode_1_levels(levelling(0.082))
     fails(gyro_modes.mode_1_levels, levelling(0.085))
     fails(gyro_modes.mode_1_levels, levelling(-0.085))
-    with pytest.raises(TooLittle):
+    with pytest.raises(Inconclusive):
         gyro_modes.mode_1_levels(levelling(0.0, mode=0))
 
 
 def test_a_heading_of_a_gyro_unit() -> None:
-    def kept(moved_deg: float, free_deg: float) -> Evidence:
+    def kept(moved_deg: float, free_deg: float) -> Capture:
         facts = {"drift_degph": 25.0, "moved_deg": moved_deg, "moved_s": 36.0, "free_deg": free_deg, "free_s": 3.6}
-        return evidence("gyro", CanLog(), facts=facts)
+        return capture("gyro", CanLog(), facts=facts)
 
     assert gyro_modes.navigation_keeps_the_azimuth(kept(0.0005, 0.025))
     fails(gyro_modes.navigation_keeps_the_azimuth, kept(0.002, 0.025))
     fails(gyro_modes.navigation_keeps_the_azimuth, kept(0.0, 0.0))  # a heading that stands still
 
 
-def saturated(told: int = 20, over_s: float = 0.15) -> Evidence:
+def saturated(told: int = 20, over_s: float = 0.15) -> Capture:
     """A PIK-6 whose X cannot keep up for 20 readings from the 10th on; FF11h and its end by the board's time."""
     rows: list[tuple[str, Row]] = []
     for k in range(1, 51):
@@ -371,7 +371,7 @@ def saturated(told: int = 20, over_s: float = 0.15) -> Evidence:
         rows += [("PIK_COUNTS", sat | {"SEQ": k}), ("PIK_TOTALS", {}), ("PIK_TOTAL_Z", {"TSTAMP": k * 10_000})]
     if told:
         rows.append(("PIK_EMCY", {"CODE": 0, "T": round((0.01 * (9 + told) + over_s) * 1e6)}))
-    return evidence("pik6", log("pik", rows))
+    return capture("pik6", log("pik", rows))
 
 
 def test_saturation_of_a_pik() -> None:
@@ -381,16 +381,16 @@ def test_saturation_of_a_pik() -> None:
     fails(pik.saturation_is_told, saturated(told=0))
 
 
-def gaps(apart: int) -> Evidence:
+def gaps(apart: int) -> Capture:
     moves: dict[str, list[tuple[int, int]]] = {n: [(0, 0)] for n in pik.PULSES}
     moves["FXP"] += [(t + h, 1 - h // 25_000) for t in range(1000, 4_000_000, apart) for h in (0, 25_000)]
-    return evidence("pik6", CanLog(), lines=lines(moves, 5_000_000))
+    return capture("pik6", CanLog(), lines=lines(moves, 5_000_000))
 
 
 def test_distances_of_pulses_of_a_pik() -> None:
     assert pik.pulses_keep_their_distance(gaps(48_437))
     fails(pik.pulses_keep_their_distance, gaps(46_875))
-    with pytest.raises(TooLittle):
+    with pytest.raises(Inconclusive):
         pik.pulses_keep_their_distance(gaps(80_000))
 
 
@@ -410,10 +410,10 @@ def test_nothing_and_wrong_lengths_are_no_pass_and_no_crash(check: Test, what: s
     ids = [int(message(n).frame_id) for n in names]
     frames = [CanFrame(t_s=k * 1e-3, can_id=i, data=b"\1\2\3") for k in range(40) for i in ids]
     empty = lines({}, 10**9)
-    e = Evidence(
+    e = Capture(
         variant=variant(family, board),
         node=dbc_node(variant(family, board).family),
-        scene="",
+        stimulus="",
         can=CanLog(frames=tuple(frames) if what != "nothing" else ()),
         lines=empty,
         inputs_v={"x": 2.0, "y": -1.0, "z": 0.5},
@@ -421,7 +421,7 @@ def test_nothing_and_wrong_lengths_are_no_pass_and_no_crash(check: Test, what: s
     )
     try:
         check(e)
-    except (Broken, TooLittle):
+    except (Failed, Inconclusive):
         return
     except ValueError as err:
         if "holds for" in str(err):  # a row of another profile: the runner does not ask it

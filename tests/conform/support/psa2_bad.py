@@ -1,4 +1,4 @@
-"""Good evidence made bad on purpose: edges moved, frames dropped, bytes changed, answers exchanged."""
+"""Good capture made bad on purpose: edges moved, frames dropped, bytes changed, answers exchanged."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from psabench.boards.psa2.conform.capture_line import transfers
 from psabench.boards.psa2.conform.check_setup import port_traffic
 from psabench.boards.psa2.conform.check_words import beside
 from psabench.boards.psa2.conform.stimulus_can import Answer
-from psabench.conform.capture.log import CanFrame, CanLog, Evidence
+from psabench.conform.capture.log import CanFrame, CanLog, Capture
 from psabench.link.protocol_files import message
 from psabench.link.signals import Ints, layout
 from psabench.link.vcd import Vcd, Wire
 
 REFUSED, BUSY, NOTHING = Answer(abort=0x06090030), Answer(abort=0x08000022), Answer()
 
-Bad = Callable[[Evidence], Evidence]
+Bad = Callable[[Capture], Capture]
 
 
 # ---- lines
 
 
-def rewired(e: Evidence, name: str, t_ns: Ints, level: Any) -> Evidence:
+def rewired(e: Capture, name: str, t_ns: Ints, level: Any) -> Capture:
     """With another course of one line."""
     old = e.wires.recording
     order = np.argsort(t_ns, kind="stable")
@@ -35,7 +35,7 @@ def rewired(e: Evidence, name: str, t_ns: Ints, level: Any) -> Evidence:
 def without(name: str) -> Bad:
     """A line is not in the recording."""
 
-    def bad(e: Evidence) -> Evidence:
+    def bad(e: Capture) -> Capture:
         old = e.wires.recording
         wires = {n: w for n, w in old.wires.items() if n != name}
         return e.with_lines(replace(e.wires, recording=Vcd(old.unit_ns, old.start_ns, old.end_ns, wires)))
@@ -56,7 +56,7 @@ def still(name: str, level: int) -> Bad:
 def moved(name: str, by_ns: int, level: int | None = None, nth: int | None = None) -> Bad:
     """Edges of a line come so much later: all, those to a level, the nth of them (after the start)."""
 
-    def bad(e: Evidence) -> Evidence:
+    def bad(e: Capture) -> Capture:
         w = e.wires[name]
         which = np.arange(len(w.t_ns)) > 0
         if level is not None:
@@ -68,10 +68,10 @@ def moved(name: str, by_ns: int, level: int | None = None, nth: int | None = Non
     return bad
 
 
-def pulse(name: str, where: Callable[[Evidence], int], long_ns: int = 1000) -> Bad:
+def pulse(name: str, where: Callable[[Capture], int], long_ns: int = 1000) -> Bad:
     """A pulse more on a line that stands still there."""
 
-    def bad(e: Evidence) -> Evidence:
+    def bad(e: Capture) -> Capture:
         w, at = e.wires[name], where(e)
         level = int(w.at(at))
         t = np.concatenate((w.t_ns, [at, at + long_ns]))
@@ -83,7 +83,7 @@ def pulse(name: str, where: Callable[[Evidence], int], long_ns: int = 1000) -> B
 def less(name: str, nth: int, level: int) -> Bad:
     """The nth pulse to a level is missing."""
 
-    def bad(e: Evidence) -> Evidence:
+    def bad(e: Capture) -> Capture:
         w = e.wires[name]
         k = np.flatnonzero((w.level == level) & (np.arange(len(w.t_ns)) > 0))[nth]
         keep = np.ones(len(w.t_ns), bool)
@@ -96,7 +96,7 @@ def less(name: str, nth: int, level: int) -> Bad:
 def swapped(a: str, b: str) -> Bad:
     """Two lines are exchanged."""
 
-    def bad(e: Evidence) -> Evidence:
+    def bad(e: Capture) -> Capture:
         one = rewired(e, a, e.wires[b].t_ns, e.wires[b].level)
         return rewired(one, b, e.wires[a].t_ns, e.wires[a].level)
 
@@ -106,7 +106,7 @@ def swapped(a: str, b: str) -> Bad:
 def slower(ppm: float) -> Bad:
     """All lines run slower."""
 
-    def bad(e: Evidence) -> Evidence:
+    def bad(e: Capture) -> Capture:
         for name, w in e.wires.recording.wires.items():
             e = rewired(e, name, np.rint(w.t_ns * (1 + ppm * 1e-6)).astype(np.int64), w.level)
         return e
@@ -114,7 +114,7 @@ def slower(ppm: float) -> Bad:
     return bad
 
 
-def after_res(e: Evidence) -> int:
+def after_res(e: Capture) -> int:
     """1 ms after the end of Res."""
     return int(e.wires.rises("Res")[-1]) + 1_000_000
 
@@ -122,7 +122,7 @@ def after_res(e: Evidence) -> int:
 def flip(line: str, clock: str, nth: int, *, level: int = 1) -> Bad:
     """Data have the other level at the nth edge of a clock, from half a period before it to half a period after."""
 
-    def bad(e: Evidence) -> Evidence:
+    def bad(e: Capture) -> Capture:
         edges = e.wires[clock].edges_ns(level)
         k = nth % len(edges)
         half = int(edges[k + 1] - edges[k]) // 2 if k + 1 < len(edges) else 100
@@ -148,7 +148,7 @@ def frames(change: Callable[[list[CanFrame]], list[CanFrame]]) -> Bad:
 def each(name: str, change: Callable[[CanFrame], CanFrame], nth: int | None = None) -> Bad:
     """The frames of a message are changed: all, or the nth."""
 
-    def bad(e: Evidence) -> Evidence:
+    def bad(e: Capture) -> Capture:
         ids = {f.can_id for f in e.frames_of(name).frames}
         found = list(e.can.frames)
         at = [k for k, f in enumerate(found) if f.can_id in ids]
@@ -188,7 +188,7 @@ def signal(name: str, s: str, change: Callable[[int], int], nth: int | None = No
 
 
 def told(name: str, change: Callable[[Any], Any]) -> Bad:
-    """A fact of the scene is another."""
+    """A fact of the stimulus is another."""
     return lambda e: replace(e, facts=dict(e.facts) | {name: change(e.facts[name])})
 
 
@@ -200,7 +200,7 @@ def answered(name: str, key: Any, answer: Answer) -> Bad:
 # ---- the board in whole
 
 
-def three_words(e: Evidence) -> Evidence:
+def three_words(e: Capture) -> Capture:
     """CLK stands still while the last word is due."""
     w, ends = e.wires["CLK"], e.wires.rises("Int")
     ahead = ends[np.minimum(np.searchsorted(ends, w.t_ns), len(ends) - 1)] - w.t_ns
@@ -208,7 +208,7 @@ def three_words(e: Evidence) -> Evidence:
     return rewired(e, "CLK", w.t_ns[keep], w.level[keep])
 
 
-def channel_on_the_line_flipped(e: Evidence) -> Evidence:
+def channel_on_the_line_flipped(e: Capture) -> Capture:
     """The lowest bit of the channel in word T is another in a frame with a new temperature."""
     b = beside(e)
     fall_ns = b.fall_ns[np.flatnonzero(b.samples.new)[3]]
@@ -216,18 +216,18 @@ def channel_on_the_line_flipped(e: Evidence) -> Evidence:
     return flip("Data", "CLK", int(np.searchsorted(e.wires.rises("CLK"), fall_ns)) + 3 * bits + 16)(e)
 
 
-def without_sdatac(e: Evidence) -> Evidence:
+def without_sdatac(e: Capture) -> Capture:
     """The first SDATAC is another byte."""
     m = next(m for m in port_traffic(e).of(temp=False) if m.sent == b"\x11")
     return flip("DIn", "SClk", int(np.searchsorted(e.wires.rises("SClk"), m.begin_ns)) + 3)(e)
 
 
-def drd_a_after_cst(e: Evidence) -> Evidence:
+def drd_a_after_cst(e: Capture) -> Capture:
     """A conversion ends 3 us after a burst for the other port."""
     return pulse("DRD_A", lambda x: int(x.wires.rises("CST")[4]) + 3000)(e)
 
 
-def dropped(e: Evidence) -> Evidence:
+def dropped(e: Capture) -> Capture:
     """One sample is missing, with both halves."""
     return gone("PSA2_ZT", 50)(gone("PSA2_XY", 50)(e))
 
@@ -263,17 +263,17 @@ def last_abort(row: tuple[Any, ...]) -> tuple[Any, ...]:
     return (*row[:-1], NOTHING)
 
 
-def no_emcy(e: Evidence) -> Evidence:
+def no_emcy(e: Capture) -> Capture:
     return gone("EMCY")(e)
 
 
-def same_gain(e: Evidence) -> Evidence:
+def same_gain(e: Capture) -> Capture:
     """Codes that no write changes."""
     early = e.can.frames[: e.facts["cut"]["gain"]]  # type: ignore[index]
     return e.with_can(CanLog(frames=early * 4))
 
 
-def late_half(e: Evidence) -> Evidence:
+def late_half(e: Capture) -> Capture:
     """The step is in Z one frame later."""
     found = list(e.frames_of("PSA2_ZT").frames)
     shifted = [found[0], *found[:-1]]
@@ -281,7 +281,7 @@ def late_half(e: Evidence) -> Evidence:
     return each("PSA2_ZT", lambda f: replace(f, data=next(it).data[:3] + f.data[3:]))(e)
 
 
-def boxcar(e: Evidence) -> Evidence:
+def boxcar(e: Capture) -> Capture:
     """A step in the codes without a filter: the first sample until the gain changes, the last one from then on."""
     begin = e.facts["cut"]["gain"]  # type: ignore[index]
     found = list(e.can.frames)
@@ -293,18 +293,18 @@ def boxcar(e: Evidence) -> Evidence:
     return e.with_can(CanLog(frames=tuple(found)))
 
 
-def twice_the_pulses(e: Evidence) -> Evidence:
+def twice_the_pulses(e: Capture) -> Capture:
     return pulse("SYNC_A", lambda x: int(x.wires.rises("SYNC_A")[0]) + 5_000_000)(e)
 
 
-def slower_clk(e: Evidence) -> Evidence:
+def slower_clk(e: Capture) -> Capture:
     """CLK runs slower by a twentieth than its frame allows, from its first rise on."""
     w = e.wires["CLK"]
     t0_ns = w.t_ns[1]
     return rewired(e, "CLK", np.rint(t0_ns + (w.t_ns - t0_ns) * 1.05).astype(np.int64), w.level)
 
 
-def mirrored(e: Evidence) -> Evidence:
+def mirrored(e: Capture) -> Capture:
     """Every word is sent most significant bit first."""
     t = transfers(e.wires)
     bits = int(e.variant["word_bits"])
@@ -316,24 +316,24 @@ def mirrored(e: Evidence) -> Evidence:
     return rewired(e, "Data", np.concatenate(([e.wires.start_ns], edges)), np.concatenate(([0], course)))
 
 
-def swap_axes(e: Evidence) -> Evidence:
+def swap_axes(e: Capture) -> Capture:
     """X and Y are exchanged on CAN."""
     return each("PSA2_XY", lambda f: replace(f, data=f.data[3:6] + f.data[:3] + f.data[6:]))(e)
 
 
-def same_numbers(e: Evidence) -> Evidence:
+def same_numbers(e: Capture) -> Capture:
     """Codes that no register corrects."""
     x = iter([f.data for f in e.frames_of("PSA2_XY").frames[:50]] * 20)
     return each("PSA2_XY", lambda f: replace(f, data=next(x)[:6] + f.data[6:]))(e)
 
 
-def noisier(e: Evidence) -> Evidence:
+def noisier(e: Capture) -> Capture:
     """Twice the noise."""
     middle = int.from_bytes(e.frames_of("PSA2_XY").frames[0].data[:3], "little")
     return signal("PSA2_XY", "X", lambda v: middle + 2 * (v - middle))(e)
 
 
-def steady(e: Evidence) -> Evidence:
+def steady(e: Capture) -> Capture:
     """The codes of all samples are those of the first."""
     x, z = e.frames_of("PSA2_XY").frames[0], e.frames_of("PSA2_ZT").frames[0]
     made = each("PSA2_XY", lambda f: replace(f, data=x.data[:6] + f.data[6:]))(e)

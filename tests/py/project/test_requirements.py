@@ -307,9 +307,9 @@ def test_the_figures_of_a_psd1_transfer_agree_with_each_other() -> None:
 @pytest.fixture
 def registry() -> Iterator[None]:
     """Proofs that a test registers are forgotten after it."""
-    before = list(proof._proofs)
+    before = list(proof._suite_tests)
     yield
-    proof._proofs[:] = before
+    proof._suite_tests[:] = before
 
 
 @pytest.mark.usefixtures("registry")
@@ -318,7 +318,7 @@ def test_a_test_is_registered_under_its_ids() -> None:
     def four_words() -> int:
         return 4
 
-    assert proof.proofs()[-1] == proof.Proof(four_words, ("PSA2-FRAME-01", "PSA2-FRAME-02"))
+    assert proof.suite_tests()[-1] == proof.SuiteTest(four_words, ("PSA2-FRAME-01", "PSA2-FRAME-02"))
     assert four_words() == 4
 
 
@@ -328,10 +328,10 @@ def test_a_test_is_registered_under_its_ids() -> None:
     [((), "wants ids"), (("PSA2-FRAME-01",) * 2, "each once"), (("PSA2-FRAME-99",), "no requirement PSA2-FRAME-99")],
 )
 def test_a_test_of_nothing_known_is_refused(ids: tuple[str, ...], says: str) -> None:
-    before = proof.proofs()
+    before = proof.suite_tests()
     with pytest.raises(ValueError, match=says):
         proof.proves(*ids)
-    assert proof.proofs() == before
+    assert proof.suite_tests() == before
 
 
 SUITE = """

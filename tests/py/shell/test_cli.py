@@ -158,7 +158,7 @@ def test_a_reader_that_has_seen_enough_is_no_error() -> None:
         words = p.stderr.read().decode()
         assert p.wait(60) == 0
     assert "Traceback" not in words
-    assert "Broken pipe" not in words
+    assert "Failed pipe" not in words
 
 
 def help_of(words: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> str:

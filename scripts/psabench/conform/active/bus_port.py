@@ -7,11 +7,11 @@ import re
 
 from psabench.conform.capture.bus_cycles import BUS, LINES, TAIL_S, Strobes, harmless, quiet, registers, say, strobes
 from psabench.conform.dut import Subject
-from psabench.conform.plan import trial
+from psabench.conform.plan import active
 from psabench.conform.proves import proves
 from psabench.conform.raw_can import ABORT, Talk, read, talk, words
 from psabench.conform.requirements import requirements
-from psabench.conform.verdict import Broken, TooLittle
+from psabench.conform.verdict import Failed, Inconclusive
 
 DONE = re.compile(r"([RW]) ([0-9A-F]{2})h ([0-9A-F]{4}) t=(0|[1-9][0-9]*)")
 REFUSED = re.compile(r"E ([a-z-]+) ([RW?-]) ([0-9A-F]{2}h|-) t=(0|[1-9][0-9]*)")
@@ -35,21 +35,21 @@ STROBE_NS = 1000
 
 
 def _cycle(answer: str, letter: str, address: int) -> tuple[int, int]:
-    """Word and time (ns) of a cycle that was carried out. Raises Broken for another answer."""
+    """Word and time (ns) of a cycle that was carried out. Raises Failed for another answer."""
     m = DONE.fullmatch(answer)
     if m is None or m[1] != letter or int(m[2], 16) != address:
-        raise Broken(repr(answer), f"{letter} {address:02X}h DDDD t=NS")
+        raise Failed(repr(answer), f"{letter} {address:02X}h DDDD t=NS")
     return int(m[3], 16), int(m[4])
 
 
 def _refusal(answer: str, code: str, letter: str, address: str) -> None:
     m = REFUSED.fullmatch(answer)
     if m is None or m.groups()[:3] != (code, letter, address):
-        raise Broken(repr(answer), f"E {code} {letter} {address} t=NS")
+        raise Failed(repr(answer), f"E {code} {letter} {address} t=NS")
 
 
 @proves("BUS-PORT-01")
-@trial(needs={"bus"})
+@active(needs={"bus"})
 def each_line_has_its_answer_in_turn(s: Subject) -> str:
     """A hundred lines at once, reads, questions and nonsense."""
     address = quiet(s)
@@ -59,22 +59,22 @@ def each_line_has_its_answer_in_turn(s: Subject) -> str:
     times = []
     for line, answer in zip(lines, answers, strict=True):
         if not answer.startswith(kinds[line]):
-            raise Broken(f"{answer!r} to {line!r}", f"{kinds[line]}...")
+            raise Failed(f"{answer!r} to {line!r}", f"{kinds[line]}...")
         times.append(_time_ns(answer))
     if times != sorted(times):
-        raise Broken("times that fall", "times in the order of the lines")
+        raise Failed("times that fall", "times in the order of the lines")
     return f"{MANY} lines, {MANY} answers in their order"
 
 
 def _time_ns(answer: str) -> int:
     m = re.search(r" t=(\d+)$", answer)
     if m is None:
-        raise Broken(repr(answer), "a time at its end")
+        raise Failed(repr(answer), "a time at its end")
     return int(m[1])
 
 
 @proves("BUS-PORT-02")
-@trial(needs={"bus"})
+@active(needs={"bus"})
 def a_read_cycle_and_its_answer(s: Subject) -> str:
     """R at an address that can always be read."""
     answer = say(s, f"R {quiet(s):X}")[0]
@@ -83,19 +83,19 @@ def a_read_cycle_and_its_answer(s: Subject) -> str:
 
 
 @proves("BUS-PORT-03")
-@trial(needs={"bus"})
+@active(needs={"bus"})
 def a_write_cycle_and_its_answer(s: Subject) -> str:
     """W of what a register has."""
     address, word = harmless(s)
     answer = say(s, f"W {address:X} {word:X}")[0]
     found, _ = _cycle(answer, "W", address)
     if found != word:
-        raise Broken(answer, f"the word {word:04X}")
+        raise Failed(answer, f"the word {word:04X}")
     return answer
 
 
 @proves("BUS-PORT-04")
-@trial(needs={"bus"})
+@active(needs={"bus"})
 def refused_lines_say_why(s: Subject) -> str:
     """Lines that are none, numbers that are none, addresses that no one has, rights."""
     of = registers(s)
@@ -125,22 +125,22 @@ def refused_lines_say_why(s: Subject) -> str:
 
 
 @proves("BUS-PORT-05")
-@trial(needs={"bus"})
+@active(needs={"bus"})
 def it_says_who_is_there(s: Subject) -> str:
     """The line ?"""
     answer = say(s, "?")[0]
     m = WHO.fullmatch(answer)
     if m is None:
-        raise Broken(repr(answer), "I BOARD AAh=NAME ... t=NS")
+        raise Failed(repr(answer), "I BOARD AAh=NAME ... t=NS")
     found = {int(pair.split("h=")[0], 16): pair.split("h=")[1] for pair in m[2].split()}
     due = {address: name for name, (address, _) in registers(s).items()}
     if m[1] != s.variant.family or found != due:
-        raise Broken(answer, f"{s.variant.family} and {due}")
+        raise Failed(answer, f"{s.variant.family} and {due}")
     return answer
 
 
 @proves("BUS-PORT-06")
-@trial(needs={"bus"})
+@active(needs={"bus"})
 def a_long_line_is_refused(s: Subject) -> str:
     """A good line made as long as a line may be by blanks, and one longer."""
     most = int(requirements().rows["BUS-PORT-06"].limit("line_max_chars"))
@@ -148,13 +148,13 @@ def a_long_line_is_refused(s: Subject) -> str:
     answers = say(s, good.ljust(most), good.ljust(most + 1), good)
     _cycle(answers[0], "R", quiet(s))
     if not REFUSED.fullmatch(answers[1]) or not answers[1].startswith("E overlong "):
-        raise Broken(repr(answers[1]), "E overlong")
+        raise Failed(repr(answers[1]), "E overlong")
     _cycle(answers[2], "R", quiet(s))
     return f"{most} characters taken; {answers[1]}"
 
 
 @proves("BUS-PORT-07")
-@trial(needs={"bus"})
+@active(needs={"bus"})
 def spelling_makes_no_difference(s: Subject) -> str:
     """The same line in either case, with h, two digits, blanks, a CR."""
     a = quiet(s)
@@ -162,13 +162,13 @@ def spelling_makes_no_difference(s: Subject) -> str:
     for line, answer in zip(lines, say(s, *lines), strict=True):
         try:
             _cycle(answer, "R", a)
-        except Broken as e:
-            raise Broken(f"{answer!r} to {line!r}", e.due) from e
+        except Failed as e:
+            raise Failed(f"{answer!r} to {line!r}", e.due) from e
     return f"{len(lines)} spellings of one line"
 
 
 @proves("BUS-PORT-08")
-@trial(needs={"bus"})
+@active(needs={"bus"})
 def times_go_on_by_the_strobe(s: Subject) -> str:
     """Three cycles at once with a strobe of 1 ms each: their times."""
     strobe_ns = STROBE_MS * 1_000_000
@@ -176,7 +176,7 @@ def times_go_on_by_the_strobe(s: Subject) -> str:
     times = [_cycle(a, "R", quiet(s))[1] for a in say(s, line, line, line, dwell_s=3.1 * STROBE_MS * 1e-3)]
     apart_ns = [b - a for a, b in itertools.pairwise(times)]
     if min(apart_ns) < strobe_ns:
-        raise Broken(f"{apart_ns} ns apart", f"{strobe_ns} ns and more")
+        raise Failed(f"{apart_ns} ns apart", f"{strobe_ns} ns and more")
     return f"{apart_ns} ns apart"
 
 
@@ -186,25 +186,25 @@ def _strobed(s: Subject, strobe_ns: int) -> tuple[int, Strobes]:
         _, t_ns = _cycle(say(s, f"R {quiet(s):X} {strobe_ns}", dwell_s=1e-4)[0], "R", quiet(s))
         s.run_for(TAIL_S)
     if take.lines is None:
-        raise TooLittle("no lines were recorded")
+        raise Inconclusive("no lines were recorded")
     return t_ns, strobes(take.lines).at(quiet(s))
 
 
 @proves("BUS-PORT-08")
-@trial(needs={"bus", "pins", "exact"})
+@active(needs={"bus", "pins", "exact"})
 def times_are_those_of_cs(s: Subject) -> str:
     """A cycle: its time beside the rise of CS."""
     t_ns, found = _strobed(s, STROBE_NS)
     rises = found.rise_ns.tolist()
     if rises != [t_ns]:
-        raise Broken(
+        raise Failed(
             f"t={t_ns}, CS rises at {rises} ns", "the rise of CS", at_ns=rises[0] if rises else None, lines=LINES
         )
     return f"t={t_ns}, the rise of CS"
 
 
 @proves("BUS-PORT-10")
-@trial(needs={"bus", "pins"})
+@active(needs={"bus", "pins"})
 def a_strobe_is_as_long_as_it_is_told(s: Subject) -> str:
     """A cycle with a strobe of so many ns, in decimal: how long is CS low?"""
     _, found = _strobed(s, STROBE_NS)
@@ -212,12 +212,12 @@ def a_strobe_is_as_long_as_it_is_told(s: Subject) -> str:
     slack_ns = requirements().rows["BUS-PORT-10"].limit("tolerance_ns")
     if len(low_ns) != 1 or abs(low_ns[0] - STROBE_NS) > slack_ns:
         at_ns = int(found.fall_ns[0]) if low_ns else None
-        raise Broken(f"CS low for {low_ns} ns", f"once, {STROBE_NS} +- {slack_ns:g} ns", at_ns=at_ns, lines=LINES)
+        raise Failed(f"CS low for {low_ns} ns", f"once, {STROBE_NS} +- {slack_ns:g} ns", at_ns=at_ns, lines=LINES)
     return f"CS low for {low_ns[0]} ns"
 
 
 @proves("BUS-PORT-09")
-@trial(needs={"bus", "can"})
+@active(needs={"bus", "can"})
 def the_port_reads_what_can_reads(s: Subject) -> str:
     """Each readable register over CAN, by the port, over CAN again; those that stood still."""
     same = []
@@ -227,7 +227,7 @@ def the_port_reads_what_can_reads(s: Subject) -> str:
             if access != "wo" and _read_alike(t, address):
                 same.append(name)
     if not same:
-        raise TooLittle("no register stood still between two reads")
+        raise Inconclusive("no register stood still between two reads")
     return f"{', '.join(same)}: the same"
 
 
@@ -240,7 +240,7 @@ def _read_alike(t: Talk, address: int) -> bool:
             return False
         if _agree(first, answer):
             return True
-    raise Broken(f"{answer!r} where CAN reads {words(first)}", "the same")
+    raise Failed(f"{answer!r} where CAN reads {words(first)}", "the same")
 
 
 def _agree(over_can: bytes, answer: str) -> bool:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from psabench.boards.unit import REFUSAL, STROBE_NS
 from psabench.conform.capture.bus_cycles import BUS, LINES, TAIL_S, harmless, quiet, registers, say, strobes, tell
 from psabench.conform.dut import Subject
-from psabench.conform.plan import trial
+from psabench.conform.plan import active
 from psabench.conform.proves import proves
 from psabench.conform.raw_can import ABORT, DEVICE_TYPE, NMT_RESET, Talk, read, talk, words, write
 from psabench.conform.requirements import requirements
-from psabench.conform.verdict import Broken, TooLittle
+from psabench.conform.verdict import Failed, Inconclusive
 
 DONE, REFUSED = "Bus cycles", "Bus cycles refused"
 LONG_NS, LONGEST_NS = 10_000_000, 100_000_000
@@ -30,7 +30,7 @@ def _read(address: int) -> bytes:
 
 
 @proves("BUS-CYC-01")
-@trial(needs={"can", "pins"})
+@active(needs={"can", "pins"})
 def an_object_is_a_cycle(s: Subject) -> str:
     """Upload every readable register of 2002h and write one; look at the lines of the bus."""
     told = 0
@@ -48,7 +48,7 @@ def an_object_is_a_cycle(s: Subject) -> str:
             found = strobes(take.lines).at(address)
             value = int.from_bytes(answer[4:6], "little")
             if not any(found.data[k] == value and not found.write[k] for k in range(len(found))):
-                raise Broken(
+                raise Failed(
                     f"{len(found)} strobes at address {address:X}h, none of them a read of {value:04X}h",
                     "a strobe with address and word",
                     lines=LINES,
@@ -60,12 +60,12 @@ def an_object_is_a_cycle(s: Subject) -> str:
         assert take.lines is not None
         found = strobes(take.lines).at(where)
         if len(found) != 1 or not found.write[0] or found.data[0] != word:
-            raise Broken(f"{len(found)} strobes at {where:X}h for a write", "one write with its word", lines=LINES)
+            raise Failed(f"{len(found)} strobes at {where:X}h for a write", "one write with its word", lines=LINES)
     return f"{told} reads and a write, each a strobe with its address and word"
 
 
 @proves("BUS-CYC-02")
-@trial(needs={"can", "pins", "exact"})
+@active(needs={"can", "pins", "exact"})
 def a_strobe_is_as_long_as_it_is_set(s: Subject) -> str:
     """Cycles with 2051h at 0, 200, 1234 ns and 1 ms: CS low."""
     told = []
@@ -83,13 +83,13 @@ def a_strobe_is_as_long_as_it_is_set(s: Subject) -> str:
             low = (found.rise_ns - found.fall_ns).tolist()
             if low != [due]:
                 at = int(found.fall_ns[0]) if len(found) else None
-                raise Broken(f"CS low for {low} ns with 2051h = {length_ns}", f"once, {due} ns", at_ns=at, lines=LINES)
+                raise Failed(f"CS low for {low} ns with 2051h = {length_ns}", f"once, {due} ns", at_ns=at, lines=LINES)
             told.append(f"{length_ns}: {due} ns")
     return "; ".join(told)
 
 
 @proves("BUS-CYC-02", "BUS-CYC-03")
-@trial(needs={"can", "stamps"})
+@active(needs={"can", "stamps"})
 def the_answer_waits_for_the_strobe(s: Subject) -> str:
     """A strobe of 10 ms: the time from the answer before to that of the cycle."""
     with talk(s, reset=True) as t:
@@ -98,12 +98,12 @@ def the_answer_waits_for_the_strobe(s: Subject) -> str:
         after = t.answer_to(_read(quiet(s)))
     took_s = after.t_s - before.t_s
     if after.data[0] == ABORT or took_s < LONG_NS * 1e-9 - s.slack_s(LONG_NS * 1e-9):
-        raise Broken(f"{words(after.data)} {took_s:.6f} s later", f"its word after {LONG_NS * 1e-9} s", frames=[after])
+        raise Failed(f"{words(after.data)} {took_s:.6f} s later", f"its word after {LONG_NS * 1e-9} s", frames=[after])
     return f"answered {took_s * 1e3:.3f} ms after the strobe was set to {LONG_NS * 1e-6:g} ms"
 
 
 @proves("BUS-CYC-03")
-@trial(needs={"can", "pins", "lockstep", "stamps"})
+@active(needs={"can", "pins", "lockstep", "stamps"})
 def cs_rises_before_the_answer(s: Subject) -> str:
     """A strobe of 1 ms: the rise of CS beside the answer."""
     with talk(s, reset=True) as t:
@@ -116,12 +116,12 @@ def cs_rises_before_the_answer(s: Subject) -> str:
         found = strobes(take.lines).at(quiet(s))
     if len(found) != 1 or answer.t_s * 1e9 < found.rise_ns[0]:
         rise = found.rise_ns.tolist()
-        raise Broken(f"CS rises at {rise} ns, the answer ends at {answer.t_s * 1e9:.0f} ns", "CS first", lines=LINES)
+        raise Failed(f"CS rises at {rise} ns, the answer ends at {answer.t_s * 1e9:.0f} ns", "CS first", lines=LINES)
     return f"CS rises {answer.t_s * 1e6 - found.rise_ns[0] * 1e-3:.1f} us before the end of the answer"
 
 
 @proves("BUS-CYC-04")
-@trial()
+@active()
 def refusals_have_their_codes(s: Subject) -> str:
     """Cycles at no address, writes to what is read-only, reads of what is write-only: code, counter, text."""
     row = requirements().rows["BUS-CYC-04"]
@@ -139,14 +139,14 @@ def refusals_have_their_codes(s: Subject) -> str:
             before = t.counter(REFUSED)
             t.refused(request, row.limit(code), f"cycle {words(request[:4])}")
             if t.counter(REFUSED) - before != 1:
-                raise Broken(f"{t.counter(REFUSED) - before} refused cycles counted after one", "1")
+                raise Failed(f"{t.counter(REFUSED) - before} refused cycles counted after one", "1")
             if not t.upload(REFUSAL):
-                raise Broken("2031h is empty after a refused cycle", "why")
+                raise Failed("2031h is empty after a refused cycle", "why")
     return f"{len(wrong)} kinds of refusal, each with its code, counted and explained"
 
 
 @proves("BUS-CYC-04")
-@trial(needs={"can", "lockstep"})
+@active(needs={"can", "lockstep"})
 def a_word_that_does_not_wait_is_refused(s: Subject) -> str:
     """Reset node, and the word at address 0 before there is one; no host but one in lockstep is sure to ask so soon."""
     row = requirements().rows["BUS-CYC-04"]
@@ -158,7 +158,7 @@ def a_word_that_does_not_wait_is_refused(s: Subject) -> str:
 
 
 @proves("BUS-CYC-05")
-@trial()
+@active()
 def a_short_strobe_is_refused(s: Subject) -> str:
     """2051h one less than the least, a cycle; the least, a cycle."""
     least, code = int(_limit("BUS-CYC-05", "strobe_min_ns")), _limit("BUS-CYC-05", "abort_code")
@@ -168,25 +168,25 @@ def a_short_strobe_is_refused(s: Subject) -> str:
         _strobe(t, least - 1)
         t.refused(_read(quiet(s)), code, f"a strobe of {least - 1} ns")
         if t.counter(DONE) != done:
-            raise Broken("a cycle was carried out", "none")
+            raise Failed("a cycle was carried out", "none")
         _strobe(t, least)
         t.upload(BUS, quiet(s) + 1)
     return f"{least - 1} ns refused, {least} ns taken"
 
 
 @proves("BUS-CYC-05")
-@trial(needs={"bus"})
+@active(needs={"bus"})
 def a_short_strobe_is_refused_by_the_port(s: Subject) -> str:
     """R with a strobe one less than the least, and with the least."""
     least = int(_limit("BUS-CYC-05", "strobe_min_ns"))
     answers = say(s, f"R {quiet(s):X} {least - 1}", f"R {quiet(s):X} {least}")
     if not answers[0].startswith("E too-short R") or not answers[1].startswith("R "):
-        raise Broken(f"{answers}", "E too-short, then the word")
+        raise Failed(f"{answers}", "E too-short, then the word")
     return "; ".join(answers)
 
 
 @proves("BUS-CYC-06")
-@trial(needs={"can", "bus"})
+@active(needs={"can", "bus"})
 def a_second_cycle_is_refused(s: Subject) -> str:
     """A long cycle over CAN, another by the bus port meanwhile; then the other way round."""
     code = int(_limit("BUS-CYC-06", "abort_code"))
@@ -199,16 +199,16 @@ def a_second_cycle_is_refused(s: Subject) -> str:
         s.run_for(SOON_S)
         answer = say(s, f"R {address:X}")[0]
         if any(f.can_id == t.sdo_tx for f in t.heard[at:]):
-            raise TooLittle("the long cycle was over before the other one began")
+            raise Inconclusive("the long cycle was over before the other one began")
         if not answer.startswith("E busy R"):
-            raise Broken(answer, "E busy")
+            raise Failed(answer, "E busy")
         t.until(lambda: any(f.can_id == t.sdo_tx for f in t.heard[at:]))
         _strobe(t, 0)
         found = _while_the_port_is_busy(t, address)
         s.run_for(1.1 * LONGEST_NS * 1e-9)
         tell(s)
     if found != code:
-        raise Broken(f"{'a word' if found is None else f'{found:08X}h'} while the port's cycle runs", f"{code:08X}h")
+        raise Failed(f"{'a word' if found is None else f'{found:08X}h'} while the port's cycle runs", f"{code:08X}h")
     return f"{answer}; abort {code:08X}h"
 
 
@@ -220,7 +220,7 @@ def _while_the_port_is_busy(t: Talk, address: int) -> int | None:
 
 
 @proves("BUS-CYC-07")
-@trial(needs={"can", "bus"})
+@active(needs={"can", "bus"})
 def a_reset_cuts_a_cycle(s: Subject) -> str:
     """NMT 81h in a strobe of 100 ms of the bus port: the answer, and a cycle after it."""
     with talk(s, reset=True) as t:
@@ -232,14 +232,14 @@ def a_reset_cuts_a_cycle(s: Subject) -> str:
         t.reset(NMT_RESET)
         answer = tell(s)
         if not answer.startswith(f"E off R {address:02X}h"):
-            raise Broken(answer, f"E off R {address:02X}h")
+            raise Failed(answer, f"E off R {address:02X}h")
         s.wait_ready()
         t.upload(BUS, address + 1)
     return f"{answer}; cycles go on"
 
 
 @proves("BUS-CYC-07")
-@trial(needs={"can", "pins"})
+@active(needs={"can", "pins"})
 def a_cut_cycle_leaves_the_lines_at_rest(s: Subject) -> str:
     """NMT 81h in a strobe of 100 ms: CS."""
     with talk(s, reset=True) as t:
@@ -253,12 +253,12 @@ def a_cut_cycle_leaves_the_lines_at_rest(s: Subject) -> str:
         assert take.lines is not None
         low, high = strobes(take.lines).at(quiet(s)), take.lines["CS"].level[-1]
     if not len(low) or not high:
-        raise Broken(f"{len(low)} strobes that ended, CS {'high' if high else 'low'} after the reset", "one, CS high")
+        raise Failed(f"{len(low)} strobes that ended, CS {'high' if high else 'low'} after the reset", "one, CS high")
     return f"CS rises {(low.rise_ns[-1] - low.fall_ns[-1]) * 1e-6:.3f} ms after its fall"
 
 
 @proves("BUS-CYC-08")
-@trial()
+@active()
 def other_lengths_are_no_cycle(s: Subject) -> str:
     """1, 3 and 4 bytes to a register that takes a word."""
     row = requirements().rows["BUS-SDO-11"]
@@ -269,12 +269,12 @@ def other_lengths_are_no_cycle(s: Subject) -> str:
         for n, code in ((1, "short_code"), (3, "long_code"), (4, "long_code")):
             t.refused(write(BUS, sub, bytes(n)), row.limit(code), f"{n} bytes")
         if t.counter(DONE) != before:
-            raise Broken(f"{t.counter(DONE) - before} cycles", "none")
+            raise Failed(f"{t.counter(DONE) - before} cycles", "none")
     return "1, 3 and 4 bytes are refused, and no cycle runs"
 
 
 @proves("BUS-CYC-09")
-@trial()
+@active()
 def cycles_are_counted(s: Subject) -> str:
     """Five reads and three writes."""
     with talk(s, reset=True) as t:
@@ -287,12 +287,12 @@ def cycles_are_counted(s: Subject) -> str:
             t.download(BUS, where + 1, word.to_bytes(2, "little"))
         counted = t.counter(DONE) - before
     if counted != 8:
-        raise Broken(f"{counted} cycles counted after 8", "8")
+        raise Failed(f"{counted} cycles counted after 8", "8")
     return "8 of 8"
 
 
 @proves("BUS-CYC-10")
-@trial()
+@active()
 def a_strobe_that_is_too_long_is_refused(s: Subject) -> str:
     """2051h one more than the most, and the most."""
     row = requirements().rows["BUS-CYC-10"]
@@ -305,7 +305,7 @@ def a_strobe_that_is_too_long_is_refused(s: Subject) -> str:
 
 
 @proves("BUS-CYC-11")
-@trial()
+@active()
 def who_gives_up_finds_the_bus_busy(s: Subject) -> str:
     """Abort a cycle of 100 ms, ask for another at once, and again until the bus is free."""
     code = int(_limit("BUS-CYC-06", "abort_code"))
@@ -317,7 +317,7 @@ def who_gives_up_finds_the_bus_busy(s: Subject) -> str:
         t.send(t.sdo_rx, bytes([ABORT]) + _read(address)[1:])
         found = t.abort_of(_read(address))
         if found != code:
-            raise Broken(f"{'a word' if found is None else f'{found:08X}h'} right after giving up", f"{code:08X}h")
+            raise Failed(f"{'a word' if found is None else f'{found:08X}h'} right after giving up", f"{code:08X}h")
         s.run_for(1.1 * LONGEST_NS * 1e-9)
         _strobe(t, 0)
         t.upload(BUS, address + 1)

@@ -8,7 +8,7 @@ from psabench.boards.board import Setting
 from psabench.boards.objects import BusObjects, Common
 from psabench.boards.registry import BOARDS
 from psabench.conform.dut import Subject
-from psabench.conform.plan import trial
+from psabench.conform.plan import active
 from psabench.conform.proves import proves
 from psabench.conform.raw_can import (
     BOOT_UP,
@@ -32,7 +32,7 @@ from psabench.conform.raw_can import (
     write,
 )
 from psabench.conform.requirements import requirements
-from psabench.conform.verdict import Broken
+from psabench.conform.verdict import Failed
 
 BEAT_MS, NEW_BEAT_MS = 20, 100
 SETTLE_S = 0.05  # in which a PDO would come, were there one
@@ -46,23 +46,23 @@ def _limit(row: str, name: str) -> int:
 
 def _is(state: int, due: int, what: str) -> None:
     if state != due:
-        raise Broken(f"state {state:02X}h {what}", f"{due:02X}h")
+        raise Failed(f"state {state:02X}h {what}", f"{due:02X}h")
 
 
 def _obeyed(t: Talk, state: int, what: str) -> None:
     if not t.becomes(state):
-        raise Broken(f"no heartbeat with state {state:02X}h {what}", f"state {state:02X}h")
+        raise Failed(f"no heartbeat with state {state:02X}h {what}", f"state {state:02X}h")
 
 
 def _no_pdo(t: Talk, dwell_s: float, what: str) -> None:
     known = set(t.pdos.values())
     came = [f for f in t.during(dwell_s) if f.can_id in known]
     if came:
-        raise Broken(f"{len(came)} PDOs {what}: {ids(came)}", "none", frames=came)
+        raise Failed(f"{len(came)} PDOs {what}: {ids(came)}", "none", frames=came)
 
 
 @proves("BUS-ID-02")
-@trial()
+@active()
 def it_listens_at_the_identifiers_of_its_node(s: Subject) -> str:
     """Send NMT, SYNC and an SDO request where a unit of this node takes them."""
     with talk(s) as t:
@@ -70,7 +70,7 @@ def it_listens_at_the_identifiers_of_its_node(s: Subject) -> str:
         t.send(t.sync_id, b"")
         syncs = t.counter("SYNCs") - before
         if syncs != 1:
-            raise Broken(f"{syncs} SYNCs counted after one at {t.sync_id:03X}h", "1")
+            raise Failed(f"{syncs} SYNCs counted after one at {t.sync_id:03X}h", "1")
         t.beat(BEAT_MS)
         t.nmt(NMT_START)
         _obeyed(t, OPERATIONAL, f"after a start at {t.nmt_id:03X}h")
@@ -80,7 +80,7 @@ def it_listens_at_the_identifiers_of_its_node(s: Subject) -> str:
 
 
 @proves("BUS-ID-03")
-@trial()
+@active()
 def requests_to_another_node_stay_unanswered(s: Subject) -> str:
     """Send SDO requests to the identifiers of other nodes, those that differ in one bit among them."""
     with talk(s) as t:
@@ -89,15 +89,15 @@ def requests_to_another_node_stay_unanswered(s: Subject) -> str:
         others = [t.sdo_rx - s.node + n for n in sorted(nodes)]
         came = [f for f in t.after(*((other, read(DEVICE_TYPE)) for other in others)) if f.can_id == t.sdo_tx]
         if came:
-            raise Broken(f"{len(came)} answers to requests to other nodes", "none", frames=came)
+            raise Failed(f"{len(came)} answers to requests to other nodes", "none", frames=came)
         moved = [t.counter(c) for c in ("Malformed requests", "Requests refused")]
     if moved != before:
-        raise Broken(f"counters {before} became {moved}", "no change")
+        raise Failed(f"counters {before} became {moved}", "no change")
     return f"silence after requests at {', '.join(f'{i:03X}h' for i in others)}"
 
 
 @proves("BUS-ID-04")
-@trial(needs={"can", "rtr"})
+@active(needs={"can", "rtr"})
 def remote_frames_stay_unanswered(s: Subject) -> str:
     """Ask for its PDO and its heartbeat by remote frames."""
     with talk(s) as t:
@@ -106,12 +106,12 @@ def remote_frames_stay_unanswered(s: Subject) -> str:
         came = [f for f in t.after(*((i, b"") for i in asked), remote=True) if f.can_id in asked and not f.remote]
         t.beat(1000)
     if came:
-        raise Broken(f"frames {ids(came)} after remote frames", "none", frames=came)
+        raise Failed(f"frames {ids(came)} after remote frames", "none", frames=came)
     return f"no answer to remote frames {', '.join(f'{i:03X}h' for i in asked)}"
 
 
 @proves("BUS-BOOT-01")
-@trial()
+@active()
 def boot_up_is_the_first_frame(s: Subject) -> str:
     """Reset node and reset communication: what comes first."""
     with talk(s, reset=True) as t:
@@ -123,7 +123,7 @@ def boot_up_is_the_first_frame(s: Subject) -> str:
             ]
             if len(boots) != 1 or came[0] is not boots[0]:
                 first = f"{came[0].can_id:03X}h" if came else "nothing"
-                raise Broken(
+                raise Failed(
                     f"{len(boots)} boot-up messages after NMT {command:02X}h, first of all {first}",
                     "one, before anything else",
                     frames=came,
@@ -136,7 +136,7 @@ def _mine(t: Talk, can_id: int) -> bool:
 
 
 @proves("BUS-BOOT-01")
-@trial(needs={"can", "supply"})
+@active(needs={"can", "supply"})
 def boot_up_is_the_first_frame_after_power(s: Subject) -> str:
     """Switch the supply off and on: what comes first."""
     with talk(s) as t:
@@ -148,18 +148,18 @@ def boot_up_is_the_first_frame_after_power(s: Subject) -> str:
         t.until(lambda: any(_mine(t, f.can_id) for f in t.heard[at:]), 5.0)
         first = next((f for f in t.heard[at:] if _mine(t, f.can_id)), None)
         if first is None or (first.can_id, first.data) != (t.heartbeat, bytes([_limit("BUS-BOOT-01", "state_code")])):
-            raise Broken(
+            raise Failed(
                 f"{ids([first]) if first else 'nothing'} after power-on", "the boot-up message", frames=t.heard[at:]
             )
         t.fence()
         boots = [f for f in t.heard[at:] if f.can_id == t.heartbeat and f.data == bytes([BOOT_UP])]
     if len(boots) != 1:
-        raise Broken(f"{len(boots)} boot-up messages after power-on", "one", frames=boots)
+        raise Failed(f"{len(boots)} boot-up messages after power-on", "one", frames=boots)
     return "one boot-up message, before anything else"
 
 
 @proves("BUS-BOOT-02")
-@trial()
+@active()
 def it_waits_pre_operational(s: Subject) -> str:
     """After a reset look at its heartbeat, and for PDOs, until it is set up and longer."""
     with talk(s, reset=True) as t:
@@ -172,7 +172,7 @@ def it_waits_pre_operational(s: Subject) -> str:
 
 
 @proves("BUS-NMT-01")
-@trial(needs={"can", "stream"})
+@active(needs={"can", "stream"})
 def start_makes_it_operational(s: Subject) -> str:
     """NMT start: the heartbeat and the PDOs."""
     row = requirements().rows["BUS-NMT-01"]
@@ -185,7 +185,7 @@ def start_makes_it_operational(s: Subject) -> str:
 
 
 @proves("BUS-NMT-02")
-@trial()
+@active()
 def stop_stops_it(s: Subject) -> str:
     """NMT stop: the heartbeat."""
     row = requirements().rows["BUS-NMT-02"]
@@ -199,7 +199,7 @@ def stop_stops_it(s: Subject) -> str:
 
 
 @proves("BUS-NMT-03")
-@trial(needs={"can", "stream"})
+@active(needs={"can", "stream"})
 def pre_operational_ends_its_pdos(s: Subject) -> str:
     """NMT start, PDOs, NMT 80h: no PDO after it was obeyed."""
     row = requirements().rows["BUS-NMT-03"]
@@ -230,7 +230,7 @@ def _own_settings(s: Subject) -> dict[tuple[int, int], bytes]:
 
 
 @proves("BUS-NMT-04")
-@trial()
+@active()
 def reset_node_restores_the_defaults(s: Subject) -> str:
     """Write settings, NMT 81h, read them again; count readings before and after."""
     with talk(s, reset=True) as t:
@@ -246,23 +246,23 @@ Settings = dict[tuple[int, int], bytes]
 
 
 def _write(t: Talk, settings: Settings) -> None:
-    """Raises Broken where the board does not keep one."""
+    """Raises Failed where the board does not keep one."""
     for at, value in settings.items():
         t.download(*at, value)
         if t.upload(*at) != value:
-            raise Broken(f"{at[0]:04X}h:{at[1]} does not keep what was written", value[::-1].hex().upper() + "h")
+            raise Failed(f"{at[0]:04X}h:{at[1]} does not keep what was written", value[::-1].hex().upper() + "h")
 
 
 def _are_defaults(t: Talk, settings: Settings, what: str) -> None:
-    """Those of the EDS. Raises Broken."""
+    """Those of the EDS. Raises Failed."""
     for at, written in settings.items():
         due = int(t.s.unit.node.default(*at))
         if t.upload(*at) != due.to_bytes(len(written), "little"):
-            raise Broken(f"{at[0]:04X}h:{at[1]} is {t.number(*at)} after {what}", f"{due}")
+            raise Failed(f"{at[0]:04X}h:{at[1]} is {t.number(*at)} after {what}", f"{due}")
 
 
 @proves("BUS-NMT-05")
-@trial()
+@active()
 def reset_communication_leaves_the_board_alone(s: Subject) -> str:
     """Write settings of communication and of the board, NMT 82h, read both again; readings go on being counted."""
     with talk(s, reset=True) as t:
@@ -274,15 +274,15 @@ def reset_communication_leaves_the_board_alone(s: Subject) -> str:
         _are_defaults(t, _settings(t), "NMT 82h")
         for (index, sub), written in own.items():
             if t.upload(index, sub) != written:
-                raise Broken(f"{index:04X}h:{sub} is {t.number(index, sub)} after NMT 82h", "what was written")
+                raise Failed(f"{index:04X}h:{sub} is {t.number(index, sub)} after NMT 82h", "what was written")
         if t.number(COUNTERS, 1) < count:
-            raise Broken("the count of readings fell with NMT 82h", "that it goes on")
+            raise Failed("the count of readings fell with NMT 82h", "that it goes on")
     kept = ", ".join(f"{index:04X}h:{sub} has what was written" for index, sub in own) or "the board has no settings"
     return f"{len(_settings(t))} communication parameters have their defaults, {kept}"
 
 
 @proves("BUS-NMT-06")
-@trial()
+@active()
 def node_0_is_everybody(s: Subject) -> str:
     """NMT commands to node 0 and to another node."""
     with talk(s, reset=True) as t:
@@ -303,7 +303,7 @@ def node_0_is_everybody(s: Subject) -> str:
 
 
 @proves("BUS-NMT-07")
-@trial()
+@active()
 def unknown_commands_change_nothing(s: Subject) -> str:
     """NMT commands 00h, 03h, 7Fh and FFh, operational and pre-operational."""
     commands = (0x00, 0x03, 0x7F, 0xFF)
@@ -320,7 +320,7 @@ def unknown_commands_change_nothing(s: Subject) -> str:
 
 
 @proves("BUS-NMT-08")
-@trial()
+@active()
 def stopped_it_only_beats(s: Subject) -> str:
     """Stopped: SDO requests, SYNCs; then what it says, and what it counted."""
     with talk(s, reset=True) as t:
@@ -335,22 +335,22 @@ def stopped_it_only_beats(s: Subject) -> str:
             t.send(t.sync_id, b"")
             t.send(t.sdo_rx, read(DEVICE_TYPE))
         if not t.until(lambda: len([f for f in t.heard[at:] if f.can_id == t.heartbeat]) > 3):
-            raise Broken("no heartbeat any more", "one every 20 ms")
+            raise Failed("no heartbeat any more", "one every 20 ms")
         t.nmt(NMT_PREOP)
         t.fence()
         known = {t.emcy, *t.pdos.values()}
         came = [f for f in t.heard[at:] if f.can_id in known]
         answers = [f for f in t.heard[at:] if f.can_id == t.sdo_tx][:-1]  # the last one is the fence's
         if came or answers:
-            raise Broken(f"stopped, and it sent {ids([*came, *answers])}", "heartbeats alone", frames=[*came, *answers])
+            raise Failed(f"stopped, and it sent {ids([*came, *answers])}", "heartbeats alone", frames=[*came, *answers])
         counted = t.counter("SYNCs") - syncs
     if counted:
-        raise Broken(f"{counted} SYNCs counted while stopped", "none")
+        raise Failed(f"{counted} SYNCs counted while stopped", "none")
     return "heartbeats alone; no SYNC counted"
 
 
 @proves("BUS-NMT-09")
-@trial()
+@active()
 def a_stop_ends_a_transfer(s: Subject) -> str:
     """Begin a segmented upload, stop, go pre-operational, ask for the next segment."""
     code = _limit("BUS-NMT-09", "abort_code")
@@ -361,12 +361,12 @@ def a_stop_ends_a_transfer(s: Subject) -> str:
         found = t.abort_of(segment(0))
     if found != code:
         saw = "a segment" if found is None else f"abort {found:08X}h"
-        raise Broken(f"{saw} after the stop", f"abort {code:08X}h")
+        raise Failed(f"{saw} after the stop", f"abort {code:08X}h")
     return f"abort {code:08X}h"
 
 
 @proves("BUS-NMT-10")
-@trial()
+@active()
 def requests_are_answered_in_both_states(s: Subject) -> str:
     """Upload 1000h pre-operational and operational."""
     with talk(s) as t:
@@ -379,7 +379,7 @@ def requests_are_answered_in_both_states(s: Subject) -> str:
 
 
 @proves("BUS-HB-02")
-@trial()
+@active()
 def no_heartbeat_where_the_period_is_0(s: Subject) -> str:
     """1017h = 0, then look for heartbeats."""
     row = requirements().rows["BUS-HB-02"]
@@ -387,12 +387,12 @@ def no_heartbeat_where_the_period_is_0(s: Subject) -> str:
         t.beat(0)
         came = [f for f in t.during(row.limit("quiet_s")) if f.can_id == t.heartbeat]
     if came:
-        raise Broken(f"{len(came)} heartbeats with 1017h = 0", "none", frames=came)
+        raise Failed(f"{len(came)} heartbeats with 1017h = 0", "none", frames=came)
     return f"none in {row.limit('quiet_s'):g} s"
 
 
 @proves("BUS-HB-03")
-@trial(needs={"can", "stamps"})
+@active(needs={"can", "stamps"})
 def a_new_period_holds_at_once(s: Subject) -> str:
     """Write 100 ms to 1017h and take the time of the next heartbeats."""
     late_s = requirements().rows["BUS-HB-03"].limit("jitter_max_ms") * 1e-3
@@ -402,11 +402,11 @@ def a_new_period_holds_at_once(s: Subject) -> str:
         beats = [t.next(t.heartbeat), t.next(t.heartbeat)]
     came = [written, *(b for b in beats if b is not None)]
     if len(came) < 3:
-        raise Broken(f"{len(came) - 1} heartbeats with a period of {NEW_BEAT_MS} ms", "one in each")
+        raise Failed(f"{len(came) - 1} heartbeats with a period of {NEW_BEAT_MS} ms", "one in each")
     for a, b in itertools.pairwise(came):
         off_s = b.t_s - a.t_s - period_s
         if abs(off_s) > late_s + s.slack_s(period_s):
-            raise Broken(
+            raise Failed(
                 f"a heartbeat {b.t_s - a.t_s:.6f} s after the one before or the write", f"{period_s} s", frames=came
             )
     return f"{', '.join(f'{(b.t_s - a.t_s) * 1e3:.3f}' for a, b in itertools.pairwise(came))} ms apart"

@@ -6,7 +6,7 @@ from psabench.boards.objects import Common
 from psabench.conform.active.can_sdo import NOWHERE, put
 from psabench.conform.capture.canbits import frame_bits
 from psabench.conform.dut import Subject
-from psabench.conform.plan import trial
+from psabench.conform.plan import active
 from psabench.conform.proves import proves
 from psabench.conform.raw_can import (
     COUNTERS,
@@ -22,7 +22,7 @@ from psabench.conform.raw_can import (
     words,
 )
 from psabench.conform.requirements import requirements
-from psabench.conform.verdict import Broken, TooLittle
+from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.canopen_host import Described
 from psabench.link.protocol_files import message
 
@@ -59,7 +59,7 @@ def _common(o: Described) -> bool:
 
 
 @proves("BUS-OD-01")
-@trial()
+@active()
 def the_common_objects_are_there(s: Subject) -> str:
     """After a reset upload every communication object: its length, its default."""
     seen = 0
@@ -69,10 +69,10 @@ def the_common_objects_are_there(s: Subject) -> str:
             value = t.upload(o.index, o.sub)
             what = f"{o.index:04X}h:{o.sub}"
             if o.data_bytes is not None and len(value) != o.data_bytes:
-                raise Broken(f"{what} has {len(value)} bytes", f"{o.data_bytes}")
+                raise Failed(f"{what} has {len(value)} bytes", f"{o.data_bytes}")
             due = _due(o)
             if due is not None and value != due:
-                raise Broken(f"{what} is {words(value)}", words(due))
+                raise Failed(f"{what} is {words(value)}", words(due))
             seen += 1
     return f"{seen} objects with their types and defaults"
 
@@ -87,19 +87,19 @@ def _due(o: Described) -> bytes | None:
 
 
 @proves("BUS-OD-02")
-@trial()
+@active()
 def device_type(s: Subject) -> str:
     """Upload 1000h."""
     due = int(requirements().rows["BUS-OD-02"].limit("device_type"))
     with talk(s) as t:
         found = t.upload(DEVICE_TYPE)
     if found != due.to_bytes(4, "little"):
-        raise Broken(words(found), f"{due:X}h in 4 bytes")
+        raise Failed(words(found), f"{due:X}h in 4 bytes")
     return f"{due:X}h"
 
 
 @proves("BUS-OD-03")
-@trial()
+@active()
 def serial_number(s: Subject) -> str:
     """Upload 1018h sub 4 before and after a reset."""
     with talk(s, reset=True) as t:
@@ -107,12 +107,12 @@ def serial_number(s: Subject) -> str:
         t.reset()
         after = t.upload(IDENTITY, SERIAL)
     if before != after or len(before) != 4:
-        raise Broken(f"{words(before)}, after a reset {words(after)}", "the same 4 bytes")
+        raise Failed(f"{words(before)}, after a reset {words(after)}", "the same 4 bytes")
     return f"serial number {int.from_bytes(before, 'little')}"
 
 
 @proves("BUS-OD-04")
-@trial(needs={"can", "stream"})
+@active(needs={"can", "stream"})
 def constants_name_the_node(s: Subject) -> str:
     """Upload the objects that name an identifier, and see that it is the one in use."""
     with talk(s, reset=True) as t:
@@ -122,7 +122,7 @@ def constants_name_the_node(s: Subject) -> str:
         for (index, sub), can_id in due.items():
             found = t.number(index, sub) & 0x7FF
             if found != can_id:
-                raise Broken(f"{index:04X}h:{sub} names {found:03X}h", f"{can_id:03X}h")
+                raise Failed(f"{index:04X}h:{sub} names {found:03X}h", f"{can_id:03X}h")
         s.wait_ready()
         for can_id in t.pdos.values():
             t.stream(1, can_id)
@@ -130,7 +130,7 @@ def constants_name_the_node(s: Subject) -> str:
 
 
 @proves("BUS-OD-05")
-@trial()
+@active()
 def the_remark_outlives_a_reset(s: Subject) -> str:
     """Write 2040h, NMT 81h, read it."""
     with talk(s, reset=True) as t:
@@ -139,12 +139,12 @@ def the_remark_outlives_a_reset(s: Subject) -> str:
         found = t.upload(REMARK)
         put(t, REMARK, b"")
     if found != b"kept over Res":
-        raise Broken(f"{found!r} after a reset", "what was written")
+        raise Failed(f"{found!r} after a reset", "what was written")
     return "kept"
 
 
 @proves("BUS-OD-05")
-@trial(needs={"can", "supply"})
+@active(needs={"can", "supply"})
 def the_remark_goes_with_the_power(s: Subject) -> str:
     """Write 2040h, switch the supply off and on, read it."""
     with talk(s) as t:
@@ -152,23 +152,23 @@ def the_remark_goes_with_the_power(s: Subject) -> str:
         power_cycle(t)
         found = t.upload(REMARK)
     if found:
-        raise Broken(f"{found!r} after power-on", "nothing")
+        raise Failed(f"{found!r} after power-on", "nothing")
     return "forgotten"
 
 
 def power_cycle(t: Talk) -> None:
-    """Off, on, until the board boots up. Raises TooLittle when it does not."""
+    """Off, on, until the board boots up. Raises Inconclusive when it does not."""
     t.s.bench.supply.output(False)
     t.s.run_for(1.0)
     t.drain()
     at = len(t.heard)
     t.s.bench.supply.output(True)
     if not t.until(lambda: any(f.can_id == t.heartbeat and f.data == b"\0" for f in t.heard[at:]), 5.0):
-        raise TooLittle("no boot-up message within 5 s of power-on")
+        raise Inconclusive("no boot-up message within 5 s of power-on")
 
 
 @proves("BUS-OD-06")
-@trial()
+@active()
 def mappings_lay_out_the_messages(s: Subject) -> str:
     """Upload each mapping and lay it beside the DBC; try to write it."""
     code = requirements().rows["BUS-SDO-10"].limit("read_only_code")
@@ -185,7 +185,7 @@ def mappings_lay_out_the_messages(s: Subject) -> str:
                 continue  # of no object: the DBC alone has the layout (docs/reference/protocol.md, Objects)
             bits = sum(e & 0xFF for e in entries)
             if bits != 8 * int(message(name).length):
-                raise Broken(f"{MAPPING + k:04X}h maps {bits} bits", f"{8 * int(message(name).length)}, as {name} has")
+                raise Failed(f"{MAPPING + k:04X}h maps {bits} bits", f"{8 * int(message(name).length)}, as {name} has")
             _bounds(name, entries)
             told.append(name)
     return f"{', '.join(told)} as mapped; no mapping is written"
@@ -202,12 +202,12 @@ def _bounds(name: str, entries: list[int]) -> None:
     for entry in entries:
         inside = [x for x in spans if at in x and at != x.start]
         if inside:
-            raise Broken(f"{name} maps {entry >> 16:04X}h at bit {at}", "at the begin of a signal")
+            raise Failed(f"{name} maps {entry >> 16:04X}h at bit {at}", "at the begin of a signal")
         at += entry & 0xFF
 
 
 @proves("BUS-OD-07", "BUS-ID-07")
-@trial(needs={"can", "stream"})
+@active(needs={"can", "stream"})
 def mapped_objects_read_as_the_frames(s: Subject) -> str:
     """While PDOs come upload all that they map; find each value in a frame that came just before or after."""
     compared = 0
@@ -223,7 +223,7 @@ def mapped_objects_read_as_the_frames(s: Subject) -> str:
                 compared += 1
             t.hush()
     if not compared:
-        raise TooLittle("no PDO with a mapping")
+        raise Inconclusive("no PDO with a mapping")
     return f"{compared} mapped objects are what the frames carried"
 
 
@@ -235,7 +235,7 @@ def _compare(t: Talk, can_id: int, entry: int, at: int) -> None:
     near = before + t.readings(NEAR, can_id, at=place)[:NEAR]
     due = {int.from_bytes(f.data, "little") >> at & (1 << bits) - 1 for f in near}
     if found not in due:
-        raise Broken(
+        raise Failed(
             f"{index:04X}h:{sub} is {found:X}h",
             f"bits {at} to {at + bits - 1} of a frame {can_id:03X}h just before or after: "
             + ", ".join(f"{d:X}h" for d in sorted(due)),
@@ -244,7 +244,7 @@ def _compare(t: Talk, can_id: int, entry: int, at: int) -> None:
 
 
 @proves("BUS-CNT-01")
-@trial()
+@active()
 def counters_outlive_a_reset(s: Subject) -> str:
     """Refusals and SYNCs, NMT 81h, the counters again; the readings, which go on, are not less."""
     names = ("Requests refused", "Malformed requests", "SYNCs")
@@ -258,38 +258,38 @@ def counters_outlive_a_reset(s: Subject) -> str:
         t.reset(NMT_RESET)
         after, later = [t.counter(n) for n in names], t.number(COUNTERS, READINGS)
     if later < readings:
-        raise Broken(f"{readings} readings, {later} after NMT 81h", "as many or more")
+        raise Failed(f"{readings} readings, {later} after NMT 81h", "as many or more")
     if after != before or not all(before):
-        raise Broken(f"{', '.join(names)}: {before} became {after}", "the same, none of them 0")
+        raise Failed(f"{', '.join(names)}: {before} became {after}", "the same, none of them 0")
     return f"{', '.join(names)}: {before}, after NMT 81h {after}"
 
 
 @proves("BUS-ERR-02")
-@trial()
+@active()
 def errors_on_the_wire_read_0(s: Subject) -> str:
     """Upload the error counters of the CAN controller."""
     due = int(requirements().rows["BUS-ERR-02"].limit("count"))
     with talk(s) as t:
         found = {name: t.counter(name) for name in ERRORS_OF_CAN}
     if any(v != due for v in found.values()):
-        raise Broken(f"{found}", f"{due}")
+        raise Failed(f"{found}", f"{due}")
     return f"{', '.join(found)} are {due}"
 
 
 @proves("BUS-ERR-01")
-@trial(needs={"can", "errors"})
+@active(needs={"can", "errors"})
 def errors_on_the_wire_are_counted(s: Subject) -> str:
     """Upload the error counters of the CAN controller while frames are destroyed."""
     most = int(requirements().rows["BUS-ERR-01"].limit("count_max"))
     with talk(s) as t:
         found = {name: t.counter(name) for name in ERRORS_OF_CAN[:2]}
     if not any(found.values()) or max(found.values()) > most:
-        raise Broken(f"{found}", f"1 to {most} in one of them")
+        raise Failed(f"{found}", f"1 to {most} in one of them")
     return f"{found}"
 
 
 @proves("BUS-LOAD-01")
-@trial(needs={"can", "stamps", "lockstep", "stream"})
+@active(needs={"can", "stamps", "lockstep", "stream"})
 def the_load_is_the_share_of_the_bus(s: Subject) -> str:
     """Stream for a second between two reads of the load, and count the bits of all frames meanwhile."""
     row = requirements().rows["BUS-LOAD-01"]
@@ -305,12 +305,12 @@ def the_load_is_the_share_of_the_bus(s: Subject) -> str:
     busy_s = sum(frame_bits(f.can_id, f.data) + SPACE_BITS for f in frames if not f.fd) / row.limit("bit_hz")
     due = 100.0 * busy_s / took_s
     if abs(found - due) > row.limit("tolerance_pct"):
-        raise Broken(f"{found:.1f} %", f"{due:.2f} % by {len(frames)} frames in {took_s:.6f} s")
+        raise Failed(f"{found:.1f} %", f"{due:.2f} % by {len(frames)} frames in {took_s:.6f} s")
     return f"{found:.1f} %, {due:.2f} % by the bits of {len(frames)} frames"
 
 
 @proves("BUS-ID-08")
-@trial(needs={"can", "stamps", "exact"})
+@active(needs={"can", "stamps", "exact"})
 def an_answer_waits_for_the_interframe_space(s: Subject) -> str:
     """Take the time from a request on a quiet bus to the end of its answer, and take off the bits of both."""
     row = requirements().rows["BUS-ID-08"]
@@ -326,7 +326,7 @@ def an_answer_waits_for_the_interframe_space(s: Subject) -> str:
             bits = frame_bits(t.sdo_rx, request) + frame_bits(answer.can_id, answer.data)
             found.append((answer.t_s - sent_s) / bit_s - bits)
     if min(found) < least - STAMP_S / bit_s:
-        raise Broken(f"{min(found):.1f} bits between a request and its answer", f"{least} and more")
+        raise Failed(f"{min(found):.1f} bits between a request and its answer", f"{least} and more")
     return f"{', '.join(f'{x:.1f}' for x in found)} bits between requests and answers"
 
 

@@ -1,6 +1,6 @@
 """SYNC, communication parameters of TPDOs, history of errors of every board (CiA 301, 7.5.2).
 
-What is due is counted in readings (2030h sub 1), so that no clock of ours judges.
+What is due is counted in readings (2030h sub 1), so that no clock of ours checks.
 """
 
 from __future__ import annotations
@@ -10,11 +10,11 @@ import itertools
 from psabench.boards.objects import Common
 from psabench.conform.capture.log import CanFrame
 from psabench.conform.dut import Subject
-from psabench.conform.plan import trial
+from psabench.conform.plan import active
 from psabench.conform.proves import proves
 from psabench.conform.raw_can import COUNTERS, NMT_START, OFF, TPDO, Talk, flood, talk, words, write
 from psabench.conform.requirements import requirements
-from psabench.conform.verdict import Broken, TooLittle
+from psabench.conform.verdict import Failed, Inconclusive
 
 READINGS, PATIENCE_S = 1, 5.0  # sub-index of 2030h
 FEW = 4  # readings in which something should come, or nothing
@@ -46,7 +46,7 @@ def _readings(t: Talk, count: int) -> tuple[int, int, int]:
         t.s.run_for(0.002)
         now, end = t.look(COUNTERS, READINGS)
     else:
-        raise TooLittle(f"{now - begin} readings in 4 s; expected {count}")
+        raise Inconclusive(f"{now - begin} readings in 4 s; expected {count}")
     return now - begin, at, end
 
 
@@ -65,7 +65,7 @@ def _begin(t: Talk, kind: int) -> tuple[int, int]:
 
 
 @proves("BUS-SYNC-01")
-@trial()
+@active()
 def syncs_are_counted(s: Subject) -> str:
     """SYNCs without a byte and with a counter of 0, 7 and 255; one of two bytes."""
     with talk(s) as t:
@@ -74,12 +74,12 @@ def syncs_are_counted(s: Subject) -> str:
             t.send(t.sync_id, data)
         counted = t.counter("SYNCs") - before
     if counted != 4:
-        raise Broken(f"{counted} of 4 SYNCs counted", "4")
+        raise Failed(f"{counted} of 4 SYNCs counted", "4")
     return "4 of 4 counted, whatever their counter"
 
 
 @proves("BUS-SYNC-02")
-@trial(needs={"can", "stream"})
+@active(needs={"can", "stream"})
 def event_types_send_each_reading(s: Subject) -> str:
     """Transmission types 254 and 255: frames and readings of the same while."""
     told = []
@@ -89,7 +89,7 @@ def event_types_send_each_reading(s: Subject) -> str:
             count, at, end = _readings(t, 20)
             came = len(_sent(t, at, can_id, end))
             if abs(came - count) > 1:
-                raise Broken(
+                raise Failed(
                     f"{came} frames {can_id:03X}h of {count} readings with type {kind}", f"{count}, give or take 1"
                 )
             told.append(f"{kind}: {came} frames, {count} readings")
@@ -97,7 +97,7 @@ def event_types_send_each_reading(s: Subject) -> str:
 
 
 @proves("BUS-SYNC-03")
-@trial(needs={"can", "stream"})
+@active(needs={"can", "stream"})
 def type_0_sends_new_readings_at_sync(s: Subject) -> str:
     """Transmission type 0: no SYNC; one SYNC after a reading; a burst of SYNCs."""
     with talk(s, reset=True) as t:
@@ -106,12 +106,12 @@ def type_0_sends_new_readings_at_sync(s: Subject) -> str:
         _silent(t, can_id)
         came = _sent_by(t, can_id, t.after((t.sync_id, b"")))
         if came != 1:
-            raise Broken(f"{came} frames at a SYNC after a reading", "1")
+            raise Failed(f"{came} frames at a SYNC after a reading", "1")
         begin = t.number(COUNTERS, READINGS)
         came = _sent_by(t, can_id, t.after(*[(t.sync_id, b"")] * 40))
         count = t.number(COUNTERS, READINGS) - begin
         if came > count + 1:
-            raise Broken(f"{came} frames at 40 SYNCs, while {count} readings were made", f"{count + 1} at most")
+            raise Failed(f"{came} frames at 40 SYNCs, while {count} readings were made", f"{count + 1} at most")
     return f"none without SYNC, 1 at a SYNC, {came} at 40 SYNCs and {count} readings"
 
 
@@ -122,15 +122,15 @@ def _sent_by(t: Talk, can_id: int, frames: list[CanFrame]) -> int:
 
 
 def _silent(t: Talk, can_id: int) -> None:
-    """Raises Broken for a frame while readings are made."""
+    """Raises Failed for a frame while readings are made."""
     count, at, end = _readings(t, FEW)
     came = _sent(t, at, can_id, end)
     if came:
-        raise Broken(f"{len(came)} frames {can_id:03X}h in {count} readings", "none", frames=came)
+        raise Failed(f"{len(came)} frames {can_id:03X}h in {count} readings", "none", frames=came)
 
 
 @proves("BUS-SYNC-04")
-@trial(needs={"can", "stream"})
+@active(needs={"can", "stream"})
 def type_n_sends_at_every_nth_sync(s: Subject) -> str:
     """Transmission types 1, 3 and 240: frames at 6, 9 and 480 SYNCs."""
     told = []
@@ -143,13 +143,13 @@ def type_n_sends_at_every_nth_sync(s: Subject) -> str:
             for k in range(0, syncs, 30):
                 came += _sent_by(t, can_id, t.after(*[(t.sync_id, b"")] * min(30, syncs - k)))
             if came != syncs // n:
-                raise Broken(f"{came} frames at {syncs} SYNCs with type {n}", f"{syncs // n}")
+                raise Failed(f"{came} frames at {syncs} SYNCs with type {n}", f"{syncs // n}")
             told.append(f"{n}: {came} of {syncs}")
     return "; ".join(told)
 
 
 @proves("BUS-SYNC-05")
-@trial()
+@active()
 def reserved_types_are_refused(s: Subject) -> str:
     """Write the transmission types 241 to 253."""
     row = requirements().rows["BUS-SYNC-05"]
@@ -162,7 +162,7 @@ def reserved_types_are_refused(s: Subject) -> str:
 
 
 @proves("BUS-PDO-01")
-@trial(needs={"can", "stream"})
+@active(needs={"can", "stream"})
 def a_tpdo_that_is_off_is_not_sent(s: Subject) -> str:
     """Set bit 31 of 18xxh sub 1 while readings are made, and clear it."""
     off = int(_limit("BUS-PDO-01", "off_mask"))
@@ -179,7 +179,7 @@ def a_tpdo_that_is_off_is_not_sent(s: Subject) -> str:
 
 
 @proves("BUS-PDO-02")
-@trial(needs={"can", "stream"})
+@active(needs={"can", "stream"})
 def the_identifier_of_a_tpdo(s: Subject) -> str:
     """Another identifier while it is valid; services, more than 11 bits, RTR; another one while it is off."""
     code = _limit("BUS-PDO-02", "abort_code")
@@ -200,12 +200,12 @@ def the_identifier_of_a_tpdo(s: Subject) -> str:
         t.readings(FEW, FREE_ID)
         left = _sent(t, at, can_id)
     if left:
-        raise Broken(f"frames {can_id:03X}h after it became {FREE_ID:03X}h", "none", frames=left)
+        raise Failed(f"frames {can_id:03X}h after it became {FREE_ID:03X}h", "none", frames=left)
     return f"{can_id:03X}h became {FREE_ID:03X}h; services are refused, and any while it is valid"
 
 
 @proves("BUS-PDO-03")
-@trial(needs={"can", "stamps", "stream"})
+@active(needs={"can", "stamps", "stream"})
 def the_inhibit_time_keeps_tpdos_apart(s: Subject) -> str:
     """An inhibit time of 50 ms: the time between frames, and the count of those left out."""
     row = requirements().rows["BUS-PDO-03"]
@@ -224,14 +224,14 @@ def the_inhibit_time_keeps_tpdos_apart(s: Subject) -> str:
         least, most = after[0][0] - before[2][0], after[2][0] - before[0][0]  # readings, by looks within and around
     apart_s = [b.t_s - a.t_s for a, b in itertools.pairwise(came)]
     if min(apart_s) < INHIBIT_S - s.slack_s(INHIBIT_S) - late_s:
-        raise Broken(f"{min(apart_s):.6f} s between two frames {can_id:03X}h", f"{INHIBIT_S:g} s and more", frames=came)
+        raise Failed(f"{min(apart_s):.6f} s between two frames {can_id:03X}h", f"{INHIBIT_S:g} s and more", frames=came)
     if not least - 2 <= len(came) + left_out <= most + 2:
-        raise Broken(f"{len(came)} sent, {left_out} left out of {least} to {most} readings", "each sent or counted")
+        raise Failed(f"{len(came)} sent, {left_out} left out of {least} to {most} readings", "each sent or counted")
     return f"{min(apart_s):.6f} s and more apart; of {most} readings {left_out} left out"
 
 
 @proves("BUS-EMCY-04")
-@trial(needs={"can", "stream"})
+@active(needs={"can", "stream"})
 def the_history_of_errors(s: Subject) -> str:
     """An overload; 1003h beside the emergency; empty it."""
     with talk(s, reset=True) as t:
@@ -239,17 +239,17 @@ def the_history_of_errors(s: Subject) -> str:
         count, latest = t.number(HISTORY), t.upload(HISTORY, 1)
         due = told.data[:2] + bytes([told.data[3], 0])
         if count < 1 or latest != due:
-            raise Broken(
+            raise Failed(
                 f"1003h has {count}, the latest {words(latest)}", f"{words(due)}, as the emergency", frames=[told]
             )
         t.download(HISTORY, 0, b"\0")
         if t.number(HISTORY) or any(t.upload(HISTORY, 1)):
-            raise Broken("1003h holds emergencies after writing 0 to sub 0", "none")
+            raise Failed("1003h holds emergencies after writing 0 to sub 0", "none")
     return f"{count}, the latest {words(latest)}; none after the write"
 
 
 @proves("BUS-EMCY-04")
-@trial(needs={"can", "lockstep", "stream"})
+@active(needs={"can", "lockstep", "stream"})
 def the_history_holds_eight(s: Subject) -> str:
     """Nine overloads, one after the other."""
     most = int(_limit("BUS-EMCY-04", "history_count"))
@@ -257,15 +257,15 @@ def the_history_holds_eight(s: Subject) -> str:
         for k in range(OVERLOADS):
             _overload(t)
             if t.number(HISTORY) != min(k + 1, most):
-                raise Broken(f"1003h has {t.number(HISTORY)} after {k + 1} emergencies", f"{min(k + 1, most)}")
+                raise Failed(f"1003h has {t.number(HISTORY)} after {k + 1} emergencies", f"{min(k + 1, most)}")
         empty = [k for k in range(1, most + 1) if not t.number(HISTORY, k)]
     if empty:
-        raise Broken(f"1003h:{empty[0]} is 0", "an emergency")
+        raise Failed(f"1003h:{empty[0]} is 0", "an emergency")
     return f"{most} of {OVERLOADS}"
 
 
 def _overload(t: Talk) -> CanFrame:
-    """Samples lost, and the calm after it. Raises TooLittle where the bus could not be filled."""
+    """Samples lost, and the calm after it. Raises Inconclusive where the bus could not be filled."""
     code = int(_limit("BUS-EMCY-06", "emcy_code"))
     t.s.wait_ready()
     t.nmt(NMT_START)
@@ -278,7 +278,7 @@ def _overload(t: Talk) -> CanFrame:
         dwell_s *= 2.0
     told = _told(t, at, code)
     if not told:
-        raise TooLittle(f"no emergency {code:04X}h on a bus that others fill")
+        raise Inconclusive(f"no emergency {code:04X}h on a bus that others fill")
     t.hush()
     t.s.run_for(CALM_S)
     return told[0]

@@ -7,7 +7,7 @@ import struct
 
 from psabench.boards.objects import Absent, Area, BusObjects, Common, Psa2Objects
 from psabench.conform.dut import Subject
-from psabench.conform.plan import trial
+from psabench.conform.plan import active
 from psabench.conform.proves import proves
 from psabench.conform.raw_can import (
     ABORT,
@@ -25,7 +25,7 @@ from psabench.conform.raw_can import (
     write,
 )
 from psabench.conform.requirements import Requirement, requirements
-from psabench.conform.verdict import Broken
+from psabench.conform.verdict import Failed
 from psabench.link.canopen_host import Described
 
 NAME, ERRORS, IDENTITY, SERVER, REMARK = (
@@ -46,20 +46,20 @@ def _row(name: str) -> Requirement:
 
 
 def put(t: Talk, index: int, text: bytes) -> None:
-    """A segmented download. Raises Broken when it is not taken."""
+    """A segmented download. Raises Failed when it is not taken."""
     answer = t.ask(long_write(index, 0, len(text)))
     if answer[:4] != bytes([FINE]) + index.to_bytes(2, "little") + b"\0":
-        raise Broken(f"{words(answer)} to a download of {len(text)} bytes", "60h")
+        raise Failed(f"{words(answer)} to a download of {len(text)} bytes", "60h")
     toggle, parts = 0, [text[k : k + 7] for k in range(0, len(text), 7)] or [b""]
     for k, part in enumerate(parts):
         answer = t.ask(segment(toggle, part, last=k == len(parts) - 1))
         if answer[0] != 0x20 | toggle:
-            raise Broken(f"{words(answer)} to segment {k} of {len(text)} bytes", f"{0x20 | toggle:02X}h")
+            raise Failed(f"{words(answer)} to segment {k} of {len(text)} bytes", f"{0x20 | toggle:02X}h")
         toggle ^= 0x10
 
 
 @proves("BUS-SDO-01")
-@trial()
+@active()
 def short_values_come_expedited(s: Subject) -> str:
     """Upload an object of each length of 1 to 4 bytes."""
     seen = {}
@@ -74,7 +74,7 @@ def short_values_come_expedited(s: Subject) -> str:
             ):
                 data = t.ask(read(o.index, o.sub))
                 if data[:4] != bytes([SIZES[size]]) + read(o.index, o.sub)[1:4]:
-                    raise Broken(
+                    raise Failed(
                         f"{words(data)} for {o.index:04X}h:{o.sub} of {size} bytes", f"command {SIZES[size]:02X}h"
                     )
                 seen[size] = o.index
@@ -82,7 +82,7 @@ def short_values_come_expedited(s: Subject) -> str:
 
 
 @proves("BUS-SDO-02")
-@trial()
+@active()
 def a_write_is_confirmed(s: Subject) -> str:
     """Write 1017h."""
     code = int(_row("BUS-SDO-02").limit("answer_code"))
@@ -91,12 +91,12 @@ def a_write_is_confirmed(s: Subject) -> str:
         answer = t.ask(request)
     due = bytes([code]) + request[1:4]
     if answer[:4] != due:
-        raise Broken(words(answer), words(due))
+        raise Failed(words(answer), words(due))
     return words(answer)
 
 
 @proves("BUS-SDO-03")
-@trial()
+@active()
 def long_values_come_in_segments(s: Subject) -> str:
     """Upload 1008h, and a remark of 64 characters, segment by segment."""
     most = int(_row("BUS-SDO-03").limit("segment_bytes"))
@@ -108,7 +108,7 @@ def long_values_come_in_segments(s: Subject) -> str:
             if len(due) <= 4:
                 continue
             if first != bytes([0x41]) + read(index)[1:4] + len(due).to_bytes(4, "little"):
-                raise Broken(f"{words(first)} to an upload of {index:04X}h", f"41h and a length of {len(due)}")
+                raise Failed(f"{words(first)} to an upload of {index:04X}h", f"41h and a length of {len(due)}")
             _take_segments(t, due, most)
         put(t, REMARK, b"")
     return f"the name and {len(text)} characters in segments of {most}"
@@ -121,12 +121,12 @@ def _take_segments(t: Talk, due: bytes, most: int) -> None:
         command = toggle | (7 - len(part)) << 1 | (k + most >= len(due))
         data = t.ask(segment(toggle))
         if data[0] != command or data[1 : 1 + len(part)] != part:
-            raise Broken(f"segment {words(data)}", words(bytes([command]) + part))
+            raise Failed(f"segment {words(data)}", words(bytes([command]) + part))
         toggle ^= 0x10
 
 
 @proves("BUS-SDO-04")
-@trial()
+@active()
 def strings_go_down_and_up(s: Subject) -> str:
     """Write remarks of several lengths and read them back."""
     longest = int(_row("BUS-SDO-04").limit("remark_chars"))
@@ -136,13 +136,13 @@ def strings_go_down_and_up(s: Subject) -> str:
             text = bytes(0x21 + (n + 3 * k) % 90 for k in range(n))
             put(t, REMARK, text)
             if t.upload(REMARK) != text:
-                raise Broken(f"a remark of {n} characters reads otherwise than written", text.decode())
+                raise Failed(f"a remark of {n} characters reads otherwise than written", text.decode())
         put(t, REMARK, b"")
     return f"{', '.join(map(str, sizes))} characters"
 
 
 @proves("BUS-SDO-05")
-@trial()
+@active()
 def a_wrong_toggle_bit_is_refused(s: Subject) -> str:
     """Begin with toggle 1; take a segment, and ask for it again; the same of a download."""
     code = _row("BUS-SDO-05").limit("abort_code")
@@ -165,11 +165,11 @@ def _aborted(t: Talk, request: bytes, code: float, what: str, index: int) -> Non
     answer = t.answer_to(request)
     due = bytes([ABORT]) + index.to_bytes(2, "little") + b"\0" + int(code).to_bytes(4, "little")
     if answer.data != due:
-        raise Broken(f"{what} was answered by {words(answer.data)}", words(due), frames=[answer])
+        raise Failed(f"{what} was answered by {words(answer.data)}", words(due), frames=[answer])
 
 
 @proves("BUS-SDO-06")
-@trial(needs={"can", "stamps"})
+@active(needs={"can", "stamps"})
 def a_silent_client_is_given_up(s: Subject) -> str:
     """Begin an upload and a download in segments and ask nothing more."""
     row = _row("BUS-SDO-06")
@@ -182,10 +182,10 @@ def a_silent_client_is_given_up(s: Subject) -> str:
             frame = t.next(t.sdo_tx, 2 * due_s + t.patience_s)
             abort = bytes([ABORT]) + request[1:4] + int(row.limit("abort_code")).to_bytes(4, "little")
             if frame is None or frame.data != abort:
-                raise Broken(words(frame.data) if frame else "nothing", words(abort), frames=[frame] if frame else [])
+                raise Failed(words(frame.data) if frame else "nothing", words(abort), frames=[frame] if frame else [])
             waited.append(frame.t_s - begun.t_s)
             if abs(waited[-1] - due_s) > late_s + s.slack_s(due_s):
-                raise Broken(
+                raise Failed(
                     f"given up after {waited[-1]:.6f} s", f"{due_s:g} s +- {late_s * 1e3:g} ms", frames=[begun, frame]
                 )
         put(t, REMARK, b"")
@@ -193,7 +193,7 @@ def a_silent_client_is_given_up(s: Subject) -> str:
 
 
 @proves("BUS-SDO-07")
-@trial()
+@active()
 def unknown_commands_are_refused(s: Subject) -> str:
     """Block transfers, a command that no one has defined, a segment of no transfer."""
     code = _row("BUS-SDO-07").limit("abort_code")
@@ -204,7 +204,7 @@ def unknown_commands_are_refused(s: Subject) -> str:
             request = bytes([command]) + read(NAME)[1:]
             found = t.abort_of(request)
             if found != code:
-                raise Broken(
+                raise Failed(
                     f"{'no refusal' if found is None else f'{found:08X}h'} of command {command:02X}h",
                     f"{int(code):08X}h",
                 )
@@ -212,7 +212,7 @@ def unknown_commands_are_refused(s: Subject) -> str:
 
 
 @proves("BUS-SDO-08")
-@trial()
+@active()
 def no_such_object(s: Subject) -> str:
     """Upload and write objects that there are not."""
     code = _row("BUS-SDO-08").limit("abort_code")
@@ -230,7 +230,7 @@ def no_such_object(s: Subject) -> str:
 
 
 @proves("BUS-SDO-09")
-@trial()
+@active()
 def no_such_sub_index(s: Subject) -> str:
     """Upload sub-indices that objects have not: one more than the last, FFh, 1 of a variable."""
     code = _row("BUS-SDO-09").limit("abort_code")
@@ -242,7 +242,7 @@ def no_such_sub_index(s: Subject) -> str:
 
 
 @proves("BUS-SDO-10")
-@trial()
+@active()
 def rights_are_kept(s: Subject) -> str:
     """Write everything that is read-only or constant, read everything that is write-only."""
     row = _row("BUS-SDO-10")
@@ -267,7 +267,7 @@ REGISTERS = (
 
 
 @proves("BUS-SDO-11")
-@trial()
+@active()
 def the_wrong_length_is_refused(s: Subject) -> str:
     """Write 4, 3 and 1 bytes to 1017h, and 4 to 1800h sub 2."""
     row = _row("BUS-SDO-11")
@@ -282,12 +282,12 @@ def the_wrong_length_is_refused(s: Subject) -> str:
         ):
             t.refused(write(index, sub, bytes([1] * n)), row.limit(code), f"{n} bytes to {index:04X}h:{sub}")
         if t.upload(HEARTBEAT) != before:
-            raise Broken("1017h has changed", "what it was")
+            raise Failed("1017h has changed", "what it was")
     return "too long and too short are distinguished"
 
 
 @proves("BUS-SDO-12")
-@trial()
+@active()
 def other_than_announced_is_refused(s: Subject) -> str:
     """Announce 10 bytes for 2040h and send 8, and announce 8 and send 10."""
     code = _row("BUS-SDO-12").limit("abort_code")
@@ -298,13 +298,13 @@ def other_than_announced_is_refused(s: Subject) -> str:
             t.ask(segment(0, bytes(range(0x41, 0x48))))
             _aborted(t, segment(0x10, b"HIJ"[: sent - 7], last=True), code, f"{sent} of {announced} bytes", REMARK)
         if t.upload(REMARK) != b"kept":
-            raise Broken(f"2040h is {t.upload(REMARK)!r} after a download that was refused", "what it was")
+            raise Failed(f"2040h is {t.upload(REMARK)!r} after a download that was refused", "what it was")
         put(t, REMARK, b"")
     return f"abort {int(code):08X}h"
 
 
 @proves("BUS-SDO-13")
-@trial()
+@active()
 def limits_are_kept(s: Subject) -> str:
     """Write to each object with limits one less than the lowest and one more than the highest."""
     code = _row("BUS-SDO-13").limit("abort_code")
@@ -318,7 +318,7 @@ def limits_are_kept(s: Subject) -> str:
                 t.refused(write(o.index, o.sub, data), code, f"{beyond:g} to {o.index:04X}h:{o.sub}")
                 tried += 1
     if not tried:
-        raise Broken("no object with limits", "1003h at least")
+        raise Failed("no object with limits", "1003h at least")
     return f"abort {int(code):08X}h to {tried} values outside"
 
 
@@ -328,7 +328,7 @@ def _fits(value: float, o: Described) -> bool:
 
 
 @proves("BUS-SDO-14")
-@trial()
+@active()
 def requests_of_the_wrong_length_are_counted(s: Subject) -> str:
     """Requests of 0 to 7 bytes."""
     size = int(_row("BUS-SDO-14").limit("request_bytes"))
@@ -337,12 +337,12 @@ def requests_of_the_wrong_length_are_counted(s: Subject) -> str:
         came = [f for f in t.after(*((t.sdo_rx, read(DEVICE_TYPE)[:n]) for n in range(size))) if f.can_id == t.sdo_tx]
         counted = t.counter("Malformed requests") - before
     if came or counted != size:
-        raise Broken(f"{len(came)} answers, {counted} counted", f"none, {size} counted", frames=came)
+        raise Failed(f"{len(came)} answers, {counted} counted", f"none, {size} counted", frames=came)
     return f"{size} requests, no answer, all counted"
 
 
 @proves("BUS-SDO-15")
-@trial()
+@active()
 def each_request_has_one_answer(s: Subject) -> str:
     """A hundred requests of several kinds, good and bad, one after the other and all at once."""
     kinds = [read(HEARTBEAT), read(NOWHERE), read(IDENTITY, 2), write(DEVICE_TYPE, 0, bytes(4)), read(IDENTITY, 9)]
@@ -353,15 +353,15 @@ def each_request_has_one_answer(s: Subject) -> str:
             came = t.after(*((t.sdo_rx, request) for request in asked[k : k + 20]))
             answers += [f for f in came if f.can_id == t.sdo_tx]
         if len(answers) != HUNDRED:
-            raise Broken(f"{len(answers)} answers to {HUNDRED} requests", f"{HUNDRED}", frames=answers)
+            raise Failed(f"{len(answers)} answers to {HUNDRED} requests", f"{HUNDRED}", frames=answers)
         for request, answer in zip(asked, answers, strict=True):
             if len(answer.data) != 8 or answer.data[1:4] != request[1:4]:
-                raise Broken(f"{words(answer.data)} to {words(request)}", "its index and sub-index", frames=[answer])
+                raise Failed(f"{words(answer.data)} to {words(request)}", "its index and sub-index", frames=[answer])
     return f"{HUNDRED} requests, {HUNDRED} answers in their order"
 
 
 @proves("BUS-SDO-16")
-@trial()
+@active()
 def a_refusal_changes_nothing(s: Subject) -> str:
     """Refused writes to 1017h and 1800h: their values before and after."""
     with talk(s) as t:
@@ -374,14 +374,14 @@ def a_refusal_changes_nothing(s: Subject) -> str:
         ):
             before = t.upload(index, sub)
             if t.abort_of(write(index, sub, data)) is None:
-                raise Broken(f"{words(data)} to {index:04X}h:{sub} is taken", "a refusal")
+                raise Failed(f"{words(data)} to {index:04X}h:{sub} is taken", "a refusal")
             if t.upload(index, sub) != before:
-                raise Broken(f"{index:04X}h:{sub} has changed with a refused write", words(before))
+                raise Failed(f"{index:04X}h:{sub} has changed with a refused write", words(before))
     return "values stay, and the next request is served"
 
 
 @proves("BUS-SDO-17")
-@trial()
+@active()
 def refusals_are_counted(s: Subject) -> str:
     """Refusals of each kind, and the counter before and after."""
     bad = [
@@ -398,15 +398,15 @@ def refusals_are_counted(s: Subject) -> str:
         before = t.counter("Requests refused")
         for k, request in enumerate(bad, 1):
             if t.abort_of(request) is None:
-                raise Broken(f"{words(request)} is not refused", "an abort")
+                raise Failed(f"{words(request)} is not refused", "an abort")
             counted = t.counter("Requests refused") - before
             if counted != k:
-                raise Broken(f"{counted} refusals counted after {k}, the last of {words(request)}", f"{k}")
+                raise Failed(f"{counted} refusals counted after {k}, the last of {words(request)}", f"{k}")
     return f"{len(bad)} refusals, {len(bad)} counted"
 
 
 @proves("BUS-SDO-18")
-@trial()
+@active()
 def an_abort_of_the_client_ends_it(s: Subject) -> str:
     """Abort an upload of a long value, then ask for its next segment."""
     with talk(s) as t:
@@ -414,17 +414,17 @@ def an_abort_of_the_client_ends_it(s: Subject) -> str:
         t.ask(read(REMARK))
         came = [f for f in t.after((t.sdo_rx, bytes([ABORT]) + read(REMARK)[1:])) if f.can_id == t.sdo_tx]
         if came:
-            raise Broken(f"{words(came[0].data)} to an abort", "silence", frames=came)
+            raise Failed(f"{words(came[0].data)} to an abort", "silence", frames=came)
         t.ask(read(REMARK))
         t.send(t.sdo_rx, bytes([ABORT]) + read(REMARK)[1:])
         if t.abort_of(segment(0)) is None:
-            raise Broken("the transfer goes on after an abort", "a refusal of its next segment")
+            raise Failed("the transfer goes on after an abort", "a refusal of its next segment")
         put(t, REMARK, b"")
     return "silence; the next segment is refused"
 
 
 @proves("BUS-SDO-19")
-@trial()
+@active()
 def garbage_does_not_stop_it(s: Subject) -> str:
     """A thousand random requests, then good ones."""
     count = int(_row("BUS-SDO-19").limit("frames_count"))
@@ -437,7 +437,7 @@ def garbage_does_not_stop_it(s: Subject) -> str:
             t.s.run_for(0.02)
         t.fence()
         if t.ask(read(DEVICE_TYPE))[0] & 0xE0 != UPLOAD:
-            raise Broken("no good answer after random frames", "one")
+            raise Failed("no good answer after random frames", "one")
     return f"{count} random frames; answers go on"
 
 

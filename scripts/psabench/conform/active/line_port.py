@@ -8,12 +8,12 @@ import numpy as np
 
 from psabench.boards.psa2.conform.capture_line import transfers
 from psabench.conform.dut import Subject
-from psabench.conform.plan import trial
+from psabench.conform.plan import active
 from psabench.conform.probes import PortProbe
 from psabench.conform.proves import proves
 from psabench.conform.requirements import requirements
 from psabench.conform.sources.samples import line_log
-from psabench.conform.verdict import Broken, TooLittle
+from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.lineport import SAMPLE_HZ, open_line
 
 WORDS = 4
@@ -23,7 +23,7 @@ SLICE, SLOW_S = 1 << 14, 0.002  # bytes that a slow reader takes, and how long i
 
 def _port(s: Subject) -> PortProbe:
     if s.line_port is None:
-        raise TooLittle("no line port")
+        raise Inconclusive("no line port")
     return s.line_port
 
 
@@ -37,7 +37,7 @@ def _look(s: Subject, dwell_s: float) -> bytes:
 
 
 @proves("LINE-GAP-01")
-@trial(needs={"port"})
+@active(needs={"port"})
 def lost_samples_are_marked(s: Subject) -> str:
     """In real time leave the port unread for long; in lockstep, where nothing is lost, look for marks."""
     mask = int(requirements().rows["LINE-GAP-01"].limit("gap_mask"))
@@ -45,7 +45,7 @@ def lost_samples_are_marked(s: Subject) -> str:
     if s.lockstep:
         x = np.frombuffer(_look(s, LOOK_S), np.uint8)
         if (x & mask).any():
-            raise Broken(f"{int((x & mask).astype(bool).sum())} bytes with bit 7", "none: no sample was lost")
+            raise Failed(f"{int((x & mask).astype(bool).sum())} bytes with bit 7", "none: no sample was lost")
         return f"{len(x)} bytes without bit 7"
     with open_line(_port(s).path) as port:
         s.run_for(PAUSE_S)  # the emulator keeps 131 ms
@@ -54,12 +54,12 @@ def lost_samples_are_marked(s: Subject) -> str:
             data += port.read(1 << 16)
     marks = int((np.frombuffer(data, np.uint8) & mask).astype(bool).sum())
     if not marks:
-        raise Broken(f"no bit 7 in {len(data)} bytes after {PAUSE_S:g} s unread", "a mark after the hole")
+        raise Failed(f"no bit 7 in {len(data)} bytes after {PAUSE_S:g} s unread", "a mark after the hole")
     return f"{marks} marks in {len(data)} bytes"
 
 
 @proves("LINE-GAP-02")
-@trial(needs={"port", "lockstep"})
+@active(needs={"port", "lockstep"})
 def a_slow_reader_loses_nothing(s: Subject) -> str:
     """Read slowly while time is to pass."""
     mask = int(requirements().rows["LINE-GAP-01"].limit("gap_mask"))
@@ -82,15 +82,15 @@ def a_slow_reader_loses_nothing(s: Subject) -> str:
     ready.wait(MOST_S)
     s.run_for(LOOK_S)
     if not enough.wait(MOST_S):
-        raise Broken(f"{len(data)} samples of {LOOK_S:g} s", f"{least:.0f} and more")
+        raise Failed(f"{len(data)} samples of {LOOK_S:g} s", f"{least:.0f} and more")
     lost = (np.frombuffer(bytes(data), np.uint8) & mask).astype(bool)
     if lost.any():
-        raise Broken(f"{int(lost.sum())} holes", "none")
+        raise Failed(f"{int(lost.sum())} holes", "none")
     return f"{len(data)} samples, no hole"
 
 
 @proves("LINE-OPEN-01")
-@trial(needs={"port"})
+@active(needs={"port"})
 def the_port_opens_again(s: Subject) -> str:
     """Open, read, close; open again: frames from the second fall of Int on."""
     s.wait_ready()
@@ -100,5 +100,5 @@ def the_port_opens_again(s: Subject) -> str:
     due = WORDS * int(s.variant["word_bits"])
     torn = [len(r) for r in t.rises[1:] if len(r) != due]
     if torn:
-        raise Broken(f"{len(torn)} frames of {len(t)} with {torn[0]} bits", f"{due}")
+        raise Failed(f"{len(torn)} frames of {len(t)} with {torn[0]} bits", f"{due}")
     return f"{len(t)} whole frames after the second opening"

@@ -11,7 +11,7 @@ from psabench.boards.objects import BusObjects
 from psabench.boards.registry import BOARDS
 from psabench.conform.capture.log import LineLog
 from psabench.conform.dut import Subject
-from psabench.conform.verdict import Broken, TooLittle
+from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.signals import Ints
 
 ADDRESS, DATA = tuple(f"AB{k}" for k in range(4)), tuple(f"D{k}" for k in range(16))
@@ -47,10 +47,10 @@ class Strobes:
 
 
 def strobes(log: LineLog) -> Strobes:
-    """All whole lows of CS. Raises Broken where the lines are not there."""
+    """All whole lows of CS. Raises Failed where the lines are not there."""
     missing = [n for n in (*LINES, *DATA) if n not in log]
     if missing:
-        raise Broken(f"no line {missing[0]}", "the lines of the bus")
+        raise Failed(f"no line {missing[0]}", "the lines of the bus")
     fall, rise = log.pulses("CS", 0)
     end = rise - 1
 
@@ -85,14 +85,14 @@ def quiet(s: Subject) -> int:
 def _bus(s: Subject) -> Bus:
     bus = BOARDS[s.variant.family].bus
     if bus is None:
-        raise TooLittle(f"a {s.variant.family} has no parallel bus")
+        raise Inconclusive(f"a {s.variant.family} has no parallel bus")
     return bus
 
 
 def say(s: Subject, *lines: str, dwell_s: float = 0.0) -> list[str]:
     """Lines all at once, and as many answers. dwell_s: that they take beyond a cycle each."""
     if s.port is None:
-        raise TooLittle("no bus port was connected (--bus-port)")
+        raise Inconclusive("no bus port was connected (--bus-port)")
     s.port.ask("\n".join(lines))
     if s.lockstep:
         s.run_for(len(lines) * EACH_S + dwell_s)
@@ -102,5 +102,5 @@ def say(s: Subject, *lines: str, dwell_s: float = 0.0) -> list[str]:
 def tell(s: Subject) -> str:
     """One answer more: to a line that was sent before."""
     if s.port is None:
-        raise TooLittle("no bus port was connected (--bus-port)")
+        raise Inconclusive("no bus port was connected (--bus-port)")
     return s.port.answered()

@@ -7,38 +7,38 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from psabench.conform.capture.log import Evidence
-from psabench.conform.verdict import Broken, TooLittle
+from psabench.conform.capture.log import Capture
+from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.signals import Ints
 
 Numbers = npt.NDArray[np.int64] | npt.NDArray[np.float64]
 
 
-def wires_needed(e: Evidence, *names: str) -> None:
-    """Raises TooLittle for a line that the recording lacks."""
+def wires_needed(e: Capture, *names: str) -> None:
+    """Raises Inconclusive for a line that the recording lacks."""
     for name in names:
         if name not in e.wires:
-            raise TooLittle(f"the recording has no line {name}")
+            raise Inconclusive(f"the recording has no line {name}")
 
 
 def first_bad(bad: npt.NDArray[np.bool_], at_ns: Ints, saw: Sequence[object], due: str, lines: Sequence[str]) -> None:
-    """Raises Broken for the first of `bad`, saying what was seen there and how many there are."""
+    """Raises Failed for the first of `bad`, saying what was seen there and how many there are."""
     if bad.any():
         k = int(np.flatnonzero(bad)[0])
-        raise Broken(f"{saw[k]} ({int(bad.sum())} of {len(bad)})", due, at_ns=int(at_ns[k]), lines=lines)
+        raise Failed(f"{saw[k]} ({int(bad.sum())} of {len(bad)})", due, at_ns=int(at_ns[k]), lines=lines)
 
 
 def interval(
-    e: Evidence, from_ns: Ints, to_ns: Ints, due_ns: float, tolerance_ns: float, what: str, lines: Sequence[str]
+    e: Capture, from_ns: Ints, to_ns: Ints, due_ns: float, tolerance_ns: float, what: str, lines: Sequence[str]
 ) -> str:
     """(n,) each to_ns - from_ns is due_ns, as far as no samples were lost between. Returns what was seen.
 
-    Raises Broken, TooLittle where there is none.
+    Raises Failed, Inconclusive where there is none.
     """
     known = e.wires.known(np.minimum(from_ns, to_ns), np.maximum(from_ns, to_ns))
     from_ns, to_ns = from_ns[known], to_ns[known]
     if not len(from_ns):
-        raise TooLittle(f"nothing to measure: {what}")
+        raise Inconclusive(f"nothing to measure: {what}")
     took_ns = (to_ns - from_ns).astype(np.float64)
     slack_ns = tolerance_ns + e.slack_ns(due_ns)
     saw = [f"{t:.0f} ns {what}" for t in took_ns]
@@ -69,10 +69,10 @@ def after(edges_ns: Ints, at_ns: Ints) -> Ints:
     return found
 
 
-def together(e: Evidence, at_ns: Ints, edges_ns: Ints, tolerance_ns: float, what: str, lines: Sequence[str]) -> str:
-    """Each instant (n,) is one of these edges. Returns what was seen; raises Broken, TooLittle where there is none."""
+def together(e: Capture, at_ns: Ints, edges_ns: Ints, tolerance_ns: float, what: str, lines: Sequence[str]) -> str:
+    """Each instant (n,) is one of these edges. Returns what was seen; raises Failed, Inconclusive."""
     if not len(at_ns):
-        raise TooLittle(f"nothing to compare: {what}")
+        raise Inconclusive(f"nothing to compare: {what}")
     off_ns = np.abs(at_ns - nearest(edges_ns, at_ns))
     slack_ns = tolerance_ns + e.slack_ns(0.0)
     saw = [f"{min(int(t), 10**9)} ns between {what}" for t in off_ns]
@@ -80,13 +80,13 @@ def together(e: Evidence, at_ns: Ints, edges_ns: Ints, tolerance_ns: float, what
     return f"{len(at_ns)} times, not more than {off_ns.max()} ns between {what}"
 
 
-def edges(e: Evidence, name: str) -> Ints:
+def edges(e: Capture, name: str) -> Ints:
     """All edges of a line in the recording."""
     found: Ints = e.wires[name].t_ns[1:]
     return found
 
 
-def bus_word(e: Evidence, prefix: str, bits: int, at_ns: Ints) -> Ints:
+def bus_word(e: Capture, prefix: str, bits: int, at_ns: Ints) -> Ints:
     """(n,) what the lines prefix0 .. make up at these instants."""
     word = np.zeros(len(at_ns), np.int64)
     for k in range(bits):

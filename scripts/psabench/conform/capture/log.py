@@ -1,6 +1,6 @@
 """What was seen on the wires of a board: CAN frames, levels of its lines, cycles on its bus. All that a check may know.
 
-Evidence comes from a scene of the device suite or from files (`conform.sources`); a check cannot tell which.
+Capture comes from a stimulus of the device suite or from files (`conform.sources`); a check cannot tell which.
 """
 
 from __future__ import annotations
@@ -155,7 +155,7 @@ def _part(w: Wire, begin_ns: int, end_ns: int) -> Wire:
 
 @dataclass(frozen=True, kw_only=True)
 class Marks:
-    """Instants of a scene by name, s in the time of its CAN log: when a reset was asked for, a write answered."""
+    """Instants of a stimulus by name, s in the time of its CAN log: when a reset was asked for, a write answered."""
 
     at_s: Mapping[str, float] = field(default_factory=dict)
 
@@ -167,17 +167,17 @@ class Marks:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Evidence:
-    """All of one scene or recording. lines: None where no probe was there."""
+class Capture:
+    """All of one stimulus or recording. lines: None where no probe was there."""
 
     variant: Variant
     node: int
-    scene: str
+    stimulus: str
     can: CanLog = field(default_factory=CanLog)
     lines: LineLog | None = None
     cycles: tuple[Cycle, ...] = ()
     marks: Marks = field(default_factory=Marks)
-    facts: Mapping[str, object] = field(default_factory=dict)  # what the scene asked for: objects read, refusals
+    facts: Mapping[str, object] = field(default_factory=dict)  # what the stimulus asked for: objects read, refusals
     inputs_v: Mapping[str, float] = field(default_factory=dict)  # volts at the inputs by axis, where they are known
     clock_ppm: float = 100.0  # how far the board's clock and the recording's may lie apart
 
@@ -197,11 +197,11 @@ class Evidence:
         """Frames of a message of the DBC that this board sent."""
         return self.can.of(name, self.variant.family, self.node)
 
-    def with_can(self, can: CanLog) -> Evidence:
+    def with_can(self, can: CanLog) -> Capture:
         """The same with another log of the bus."""
         return replace(self, can=can)
 
-    def with_lines(self, lines: LineLog | None) -> Evidence:
+    def with_lines(self, lines: LineLog | None) -> Capture:
         """The same with other lines."""
         return replace(self, lines=lines)
 

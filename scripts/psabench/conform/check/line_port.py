@@ -6,40 +6,40 @@ from typing import Any
 
 import numpy as np
 
-from psabench.conform.capture.log import Evidence, LineLog
+from psabench.conform.capture.log import Capture, LineLog
 from psabench.conform.plan import check
 from psabench.conform.proves import proves, row_for
 from psabench.conform.sources.samples import PORT_LINES
-from psabench.conform.verdict import Broken, TooLittle
+from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.signals import Ints
 
 NS = 1e9
 WORDS = 4
 
 
-def _bytes(e: Evidence) -> Any:
-    """The bytes (n,). Raises TooLittle for less than a millisecond of them."""
+def _bytes(e: Capture) -> Any:
+    """The bytes (n,). Raises Inconclusive for less than a millisecond of them."""
     found = e.facts.get("bytes")
     if not isinstance(found, np.ndarray) or len(found) < row_for(e, "LINE-RATE-01").limit("sample_hz") * 1e-3:
-        raise TooLittle("no samples of the line port")
+        raise Inconclusive("no samples of the line port")
     return found
 
 
-def _port(e: Evidence) -> LineLog:
+def _port(e: Capture) -> LineLog:
     found = e.facts.get("port")
     if not isinstance(found, LineLog):
-        raise TooLittle("no samples of the line port")
+        raise Inconclusive("no samples of the line port")
     return found
 
 
 @proves("LINE-BYTE-01")
 @check("line_port", needs={"port"})
-def bits_of_a_psa2(e: Evidence) -> str:
+def bits_of_a_psa2(e: Capture) -> str:
     """Look for frames in bits 0 and 2 of the bytes, for data in bit 1, for nothing in bits 3 to 6."""
     x, row = _bytes(e), row_for(e, "LINE-BYTE-01")
     stray = np.flatnonzero(x & int(row.limit("zero_mask")))
     if len(stray):
-        raise Broken(f"byte {x[stray[0]]:02X}h", "bits 3 to 6 zero")
+        raise Failed(f"byte {x[stray[0]]:02X}h", "bits 3 to 6 zero")
     low = (x & int(row.limit("int_mask"))) == 0
     begin, end = _edges(low, 1), _edges(low, 0)
     end = end[np.searchsorted(end, begin[0], "right") :] if len(begin) else end
@@ -49,11 +49,11 @@ def bits_of_a_psa2(e: Evidence) -> str:
     for a, b in zip(begin, end, strict=False):
         count = int(np.searchsorted(rises, b) - np.searchsorted(rises, a))
         if count != bits:
-            raise Broken(f"{count} rises of bit 2 while bit 0 is low", f"{bits}")
+            raise Failed(f"{count} rises of bit 2 while bit 0 is low", f"{bits}")
     if min(len(begin), len(end)) < 2:
-        raise Broken(f"{len(begin)} falls of bit 0", "frames")
+        raise Failed(f"{len(begin)} falls of bit 0", "frames")
     if not 0 < data.sum() < len(x):
-        raise Broken("bit 1 never changes", "data")
+        raise Failed("bit 1 never changes", "data")
     return f"{min(len(begin), len(end))} frames of {bits} bits"
 
 
@@ -63,23 +63,23 @@ def _edges(x: Any, level: int) -> Ints:
     return found
 
 
-def _t0_ns(e: Evidence) -> float:
+def _t0_ns(e: Capture) -> float:
     """Instant of sample 0 in the recording of the pins: a grid point of the sample clock by which all edges agree.
 
-    Raises TooLittle where the board's lines did not move, Broken where none fits.
+    Raises Inconclusive where the board's lines did not move, Failed where none fits.
     """
     port, pins = _port(e), e.wires
     step_ns = NS / row_for(e, "LINE-RATE-01").limit("sample_hz")
     names = [n for n in PORT_LINES[e.variant.family] if n in pins]
     busy = max(names, key=lambda n: len(port[n].t_ns), default="")
     if not busy or len(port[busy].t_ns) < 3:
-        raise TooLittle("no line of the port moved")
+        raise Inconclusive("no line of the port moved")
     seen, there = port[busy].t_ns[1:], pins[busy].t_ns[1:]
     for first in there[: max(1, len(there) - len(seen) + 1)]:
         t0_ns = np.ceil((first - seen[0]) / step_ns) * step_ns
         if all(_agrees(port, pins, n, t0_ns, step_ns) for n in names):
             return float(t0_ns)
-    raise Broken(f"{busy} moves otherwise than at its pin", "samples of the lines of the table", lines=[busy])
+    raise Failed(f"{busy} moves otherwise than at its pin", "samples of the lines of the table", lines=[busy])
 
 
 def _agrees(port: LineLog, pins: LineLog, name: str, t0_ns: float, step_ns: float) -> bool:
@@ -95,7 +95,7 @@ def _agrees(port: LineLog, pins: LineLog, name: str, t0_ns: float, step_ns: floa
 
 @proves("LINE-BYTE-02")
 @check("line_port", needs={"port", "pins", "stream", "exact"})
-def bits_of_the_other_boards(e: Evidence) -> str:
+def bits_of_the_other_boards(e: Capture) -> str:
     """Lay each bit beside the line of the table as the pins show it."""
     _t0_ns(e)
     names = PORT_LINES[e.variant.family]
@@ -105,29 +105,29 @@ def bits_of_the_other_boards(e: Evidence) -> str:
 
 @proves("LINE-RATE-01")
 @check("line_port", needs={"port", "pins", "stream", "exact"})
-def samples_come_at_their_rate(e: Evidence) -> str:
+def samples_come_at_their_rate(e: Capture) -> str:
     """Compare the samples between the first and the last edge of the port with their time at the pins."""
     rate_hz, t0_ns = row_for(e, "LINE-RATE-01").limit("sample_hz"), _t0_ns(e)
     name = max(PORT_LINES[e.variant.family], key=lambda n: len(_port(e)[n].t_ns))
     port, pin = _port(e)[name].t_ns[1:], e.wires[name].t_ns[1:]
     at = np.searchsorted(pin, port[[0, -1]] + t0_ns, "right") - 1 if len(port) > 1 else np.array([-1])
     if (at < 0).any():
-        raise TooLittle("fewer than two edges")
+        raise Inconclusive("fewer than two edges")
     samples = (port[-1] - port[0]) * rate_hz / NS
     took_s = (pin[at[1]] - pin[at[0]]) / NS
     if abs(samples - took_s * rate_hz) > row_for(e, "LINE-RATE-01").limit("tolerance_samples"):
-        raise Broken(f"{samples:.0f} samples in {took_s:.9f} s", f"{took_s * rate_hz:.1f}", lines=[name])
+        raise Failed(f"{samples:.0f} samples in {took_s:.9f} s", f"{took_s * rate_hz:.1f}", lines=[name])
     return f"{samples:.0f} samples in {took_s:.9f} s"
 
 
 @proves("LINE-RATE-02")
 @check("line_port", needs={"port", "pins", "stream", "exact"})
-def samples_are_the_levels_of_their_instants(e: Evidence) -> str:
+def samples_are_the_levels_of_their_instants(e: Capture) -> str:
     """Look up the level of the pin at each sample before and at an edge of the port."""
     t0_ns, port = _t0_ns(e), _port(e)
     edges = sum(len(port[n].t_ns) - 1 for n in PORT_LINES[e.variant.family])
     step_ns = NS / row_for(e, "LINE-RATE-01").limit("sample_hz")
     off = t0_ns % step_ns
     if min(off, step_ns - off) > row_for(e, "LINE-RATE-02").limit("tolerance_ns"):
-        raise Broken(f"sample 0 {off:.0f} ns after an edge of the sample clock", "at an edge")
+        raise Failed(f"sample 0 {off:.0f} ns after an edge of the sample clock", "at an edge")
     return f"{edges} edges, each between the sample before and its own; sample 0 at {t0_ns:.0f} ns"

@@ -1,1 +1,1 @@
-"""The host suite: good and bad boards are played to somebody's program, and what it tells is judged."""
+"""The host suite: good and bad boards are simulated for a program, and what it reports is checked."""

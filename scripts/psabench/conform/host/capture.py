@@ -1,6 +1,6 @@
-"""What was on the bus while a board was played: read from the emulator's log, by rules of the protocol page alone.
+"""What was on the bus in a case: read from the emulator's log, by rules of the protocol page alone.
 
-Written apart from `psabench.boards.psa2.frames`, so that what a host is judged by is not what our own host does.
+Written apart from `psabench.boards.psa2.frames`, so that what a host is checked by is not what our own host does.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class Frame:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Played:
+class SentSample:
     """A sample that both halves came of. due: they came one after the other, once, so that a host must take it."""
 
     seq: int
@@ -57,7 +57,7 @@ class Bus:
 
     frames: list[Frame]
     node: int
-    samples: list[Played] = field(default_factory=list)
+    samples: list[SentSample] = field(default_factory=list)
 
     def of(self, service: int) -> list[Frame]:
         """Frames of a service of the board's node."""
@@ -101,7 +101,7 @@ class _Epoch:
     late: set[int] = field(default_factory=set)  # SEQ of those that came after a later one
 
 
-def _samples(bus: Bus) -> Iterable[Played]:
+def _samples(bus: Bus) -> Iterable[SentSample]:
     if not bus.starts:
         return
     boots = [t for t in bus.boots if t > bus.starts[0]]
@@ -111,14 +111,14 @@ def _samples(bus: Bus) -> Iterable[Played]:
         yield from _of_epoch(epoch, [f for f in mine if len(f.data) == 8], bus.node)
 
 
-def _of_epoch(epoch: int, frames: list[Frame], node: int) -> Iterable[Played]:
+def _of_epoch(epoch: int, frames: list[Frame], node: int) -> Iterable[SentSample]:
     e = _sorted_halves(frames, node)
     for seq, xy in e.xy.items():
         zt = e.zt.get(seq)
         if zt is None:
             continue
         x, y, z, status = signed(xy.data[0:3]), signed(xy.data[3:6]), signed(zt.data[0:3]), zt.data[5]
-        yield Played(
+        yield SentSample(
             seq=seq % SEQS,
             epoch=epoch,
             codes=(x, y, z, signed(zt.data[3:5])),

@@ -1,6 +1,6 @@
 """What a unit sent, from the emulator's log, by rules of its protocol page alone: the part that all boards share.
 
-Written apart from `psabench.boards.readings`, so that what a host is judged by is not what our own host does.
+Written apart from `psabench.boards.readings`, so that what a host is checked by is not what our own host does.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from psabench.conform.host.check import HEARTBEAT_S, limits
-from psabench.conform.host.stimulus import READY_S, Stage
+from psabench.conform.host.stimulus import READY_S, HostBench
 
 NODE = 5
 SCENARIO = f"""\
@@ -34,7 +34,7 @@ XY, ZT, FAST = 0x180 + NODE, 0x280 + NODE, 0x380 + NODE
 STREAM: Mapping[str, int] = {"can_id": 0x080 + NODE, "can_id_mask": 0x4FF}  # these, and no heartbeat or answer
 
 
-def _nothing(s: Stage) -> None:
+def _nothing(s: HostBench) -> None:
     """The board as it is."""
 
 
@@ -44,35 +44,35 @@ class Case:
 
     name: str
     title: str
-    play: Callable[[Stage], None]
-    before: Callable[[Stage], None] = _nothing
+    play: Callable[[HostBench], None]
+    before: Callable[[HostBench], None] = _nothing
     streams: bool = True  # a good host starts the stream
-    boards: tuple[str, ...] = FAMILY  # that it is played with
-    links: tuple[str, ...] = ON_CAN  # that it is played at
+    boards: tuple[str, ...] = FAMILY  # of the case
+    links: tuple[str, ...] = ON_CAN  # of the case
     profile: str = ""  # it wants this one, whatever the user said
     scenario: str = SCENARIO
     form: int = 0  # frame form that the host has to ask for
-    busy: int = BUSY  # frames in 50 ms that say that the stream runs; 0: there is none until it is played
+    busy: int = BUSY  # frames in 50 ms that say that the stream runs; 0: there is none before
     ready_s: float = READY_S  # simulated, for a host to start it
-    ends: bool = False  # what the host tells at the end of the link is judged, too
+    ends: bool = False  # what the host tells at the end of the link is checked, too
 
 
-def _good(s: Stage) -> None:
+def _good(s: HostBench) -> None:
     s.run(0.3)
     s.run(float(limits("HOST-RES-02").limit("duration_s")), speed=0.0)
 
 
-def _just_before_the_wrap(s: Stage) -> None:
+def _just_before_the_wrap(s: HostBench) -> None:
     s.run(float(limits("HOST-CAN-03").limit("seq_modulo")) * 1e-3 - 5.0, speed=0.0)
 
 
-def _drop(s: Stage, frames: int, **only: int) -> None:
+def _drop(s: HostBench, frames: int, **only: int) -> None:
     """The next frames of the stream, or of one identifier, do not reach anybody."""
     s.run_to_quiet()
     s.fault("link.drop", "a.can", frames=frames, **(only or STREAM))
 
 
-def _lost(s: Stage) -> None:
+def _lost(s: HostBench) -> None:
     for frames in (2, 4):
         s.run(0.1)
         _drop(s, frames)
@@ -83,10 +83,10 @@ def _lost(s: Stage) -> None:
     s.run(0.1)
 
 
-def _hit(kind: str, halves: tuple[int, ...], frames: int = 1) -> Callable[[Stage], None]:
+def _hit(kind: str, halves: tuple[int, ...], frames: int = 1) -> Callable[[HostBench], None]:
     """That happens to the next frames with each of these identifiers in turn, a tenth of a second apart."""
 
-    def play(s: Stage) -> None:
+    def play(s: HostBench) -> None:
         for half in halves:
             s.run(0.1)
             s.run_to_quiet()
@@ -96,7 +96,7 @@ def _hit(kind: str, halves: tuple[int, ...], frames: int = 1) -> Callable[[Stage
     return play
 
 
-def _mixed(s: Stage) -> None:
+def _mixed(s: HostBench) -> None:
     """PSA2_ZT of a sample and PSA2_XY of the next one are lost: what is left looks like a pair."""
     s.run(0.2)
     for _ in range(3):
@@ -107,21 +107,21 @@ def _mixed(s: Stage) -> None:
         s.run(0.1)
 
 
-def _delayed(s: Stage) -> None:
+def _delayed(s: HostBench) -> None:
     s.run(0.1)
     s.run_to_quiet()
     s.fault("link.delay", "a.can", hold_s=0.03, **STREAM)
     s.run(0.4)
 
 
-def _fast(s: Stage) -> None:
+def _fast(s: HostBench) -> None:
     """One PSA2_FAST is lost, three times."""
     for _ in range(3):
         _drop(s, 1, can_id=FAST)
         s.run(0.1)
 
 
-def _length(s: Stage) -> None:
+def _length(s: HostBench) -> None:
     """Between two samples a frame that looks like a first half and is too short."""
     for _ in range(2):
         s.run(0.1)
@@ -130,7 +130,7 @@ def _length(s: Stage) -> None:
     s.run(0.1)
 
 
-def _others(s: Stage) -> None:
+def _others(s: HostBench) -> None:
     """A neighbour's samples in the middle of ours, a frame destroyed on the bus, the controller off it and back."""
     s.run(0.1)
     for half in ("186#1122334455660001", "286#1122334455667788", "706#05", "086#01FF8101000000FF"):
@@ -143,7 +143,7 @@ def _others(s: Stage) -> None:
     s.run(0.1)
 
 
-def _over_range(s: Stage) -> None:
+def _over_range(s: HostBench) -> None:
     row = limits("HOST-RANGE-01")
     for axis in "xyz":
         for sign in (1, -1):
@@ -154,7 +154,7 @@ def _over_range(s: Stage) -> None:
             s.run(0.08)
 
 
-def _restart(s: Stage) -> None:
+def _restart(s: HostBench) -> None:
     s.run(0.1)
     s.fault("supply.brownout", "supply", drop_v=6, for_s=0.02)
     s.run(0.05)
@@ -166,7 +166,7 @@ def _restart(s: Stage) -> None:
     s.run(0.1)
 
 
-def _flags(s: Stage) -> None:
+def _flags(s: HostBench) -> None:
     """Somebody writes CONFIG1, and 63 words are not settled; then samples that tell of a conversion that was lost."""
     s.run(0.1)
     s.put(f"{0x600 + NODE:03X}#2F00200309000000")
@@ -188,7 +188,7 @@ def _flags(s: Stage) -> None:
 FIRST_MS = 189.330  # conversion number 0 after power-on (docs/boards/psa2.md, set-up after Res)
 
 
-def _silence(s: Stage) -> None:
+def _silence(s: HostBench) -> None:
     row = limits("HOST-STALE-01")
     s.run(0.1)
     _drop(s, 2 * round(float(row.limit("silent_max_s")) * 1e3))
@@ -203,7 +203,7 @@ def _silence(s: Stage) -> None:
     s.run(0.3, speed=1.0)
 
 
-def _frozen(s: Stage) -> None:
+def _frozen(s: HostBench) -> None:
     s.run(0.1)
     s.fault("controller.frozen_words", "a.kpsa")
     s.run(2.0 * float(limits("HOST-STALE-02").limit("frozen_after_s")))
@@ -211,25 +211,25 @@ def _frozen(s: Stage) -> None:
     s.run(0.2)
 
 
-def _in_wrong_order(s: Stage) -> None:
+def _in_wrong_order(s: HostBench) -> None:
     s.fault("controller.setup_order", "a.kpsa")
     s.control.call("unit.reset", unit="a")
     s.run(0.4, speed=0.0)
 
 
-def _with_a_wrong_register(axis: str) -> Callable[[Stage], None]:
-    def before(s: Stage) -> None:
+def _with_a_wrong_register(axis: str) -> Callable[[HostBench], None]:
+    def before(s: HostBench) -> None:
         s.run(0.3, speed=0.0)
         s.fault("chip.flip", f"a.adc.{axis}", register=1, mask=0x08)
 
     return before
 
 
-def _untouched(s: Stage) -> None:
+def _untouched(s: HostBench) -> None:
     s.run(0.3, speed=1.0)
 
 
-def _rate(s: Stage) -> None:
+def _rate(s: HostBench) -> None:
     row = limits("HOST-RATE-01")
     s.run(0.1)
     for axis in "xyz":
@@ -242,7 +242,7 @@ def _rate(s: Stage) -> None:
     s.run(1.5)
 
 
-def _emcy(s: Stage) -> None:
+def _emcy(s: HostBench) -> None:
     s.run(0.1)
     s.fault("chip.drdy_stuck", "a.adc.x", level="high")
     s.run(0.4, speed=1.0)
@@ -250,7 +250,7 @@ def _emcy(s: Stage) -> None:
     s.run(0.2)
 
 
-def _off(s: Stage) -> None:
+def _off(s: HostBench) -> None:
     """Its supply is switched off and stays so."""
     s.run(0.1)
     s.control.call("supply.output", on=False)
@@ -258,7 +258,7 @@ def _off(s: Stage) -> None:
     s.run(beats * HEARTBEAT_S + 1.0, speed=1.0)
 
 
-def _with_slow_answers(s: Stage) -> None:
+def _with_slow_answers(s: HostBench) -> None:
     s.run(0.3, speed=0.0)
     s.fault(
         "link.delay", "bus.can0", can_id=0x580 + NODE, frames=2, hold_s=0.6 * limits("HOST-CAN-10").limit("patience_s")

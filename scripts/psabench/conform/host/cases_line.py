@@ -1,4 +1,4 @@
-"""What is played to a host on INT, DATA and CLK: frames, whole and broken, of any profile (docs/lineport.md)."""
+"""What is sent to a host on INT, DATA and CLK: frames, whole and broken, of any profile (docs/lineport.md)."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ Frames = list[LineFrame]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LineCase:
-    """title: what is played. first: samples of the line before the first frame; ppm: by which its clock is slow."""
+    """title: what is sent. first: samples of the line before the first frame; ppm: by which its clock is slow."""
 
     name: str
     title: str

@@ -1,11 +1,11 @@
-"""What a case left behind, and the tests that judge it.
+"""What a case left behind, and the tests that check it.
 
     @proves("HOST-CAN-02")
-    @judges("torn")
-    def a_half_is_told_as_torn(e: HostEvidence) -> str: ...
+    @checks("torn")
+    def a_half_is_told_as_torn(e: HostCapture) -> str: ...
 
-A test is a pure function of the evidence of its case, as the device suite's are; it raises `Broken`, `TooLittle`, or
-`Unseen` where the host does not do what could be judged.
+A test is a pure function of the capture of its case, as the device suite's are; it raises `Failed`, `Inconclusive`, or
+`Unseen` where the host does not do what could be checked.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from typing import TypeVar
 
 import numpy as np
 
-from psabench.conform.host.capture import Bus, Played
+from psabench.conform.host.capture import Bus, SentSample
 from psabench.conform.host.results import Sample, Told
 from psabench.conform.host.stimulus_bus import BusCycle
 from psabench.conform.requirements import Requirement, requirements
-from psabench.conform.verdict import Broken, TooLittle
+from psabench.conform.verdict import Failed, Inconclusive
 
 HEARTBEAT_S = 1.0  # 1017h as the board has it
-STOOD_S = 0.04  # the stage may have stood still for so long before a host may take the board for silent
+STOOD_S = 0.04  # the bench may have stood still for so long before a host may take the board for silent
 
 
 class Unseen(Exception):
@@ -34,20 +34,20 @@ class Unseen(Exception):
 
 @dataclass(slots=True)
 class Match:
-    """The host's samples against those that were played, in their order."""
+    """The host's samples against those that were sent, in their order."""
 
-    pairs: list[tuple[Sample, Played]] = field(default_factory=list)
-    strange: list[Sample] = field(default_factory=list)  # never played, told twice, or told out of order
-    missing: list[Played] = field(default_factory=list)  # due, and not told
-    wrong: list[tuple[Sample, Played]] = field(default_factory=list)  # of `pairs`: other codes
+    pairs: list[tuple[Sample, SentSample]] = field(default_factory=list)
+    strange: list[Sample] = field(default_factory=list)  # never sent, told twice, or told out of order
+    missing: list[SentSample] = field(default_factory=list)  # due, and not told
+    wrong: list[tuple[Sample, SentSample]] = field(default_factory=list)  # of `pairs`: other codes
     unsettled: list[Sample] = field(default_factory=list)  # told, and of no use
 
 
-def match(told: Sequence[Sample], played: Sequence[Played]) -> Match:
-    """Each sample told with the next one of that number that was played."""
+def match(told: Sequence[Sample], sent: Sequence[SentSample]) -> Match:
+    """Each sample told with the next one of that number that was sent."""
     found = Match()
     where: dict[int, list[int]] = {}
-    for i, p in enumerate(played):
+    for i, p in enumerate(sent):
         where.setdefault(p.seq, []).append(i)
     last = -1
     taken = set()
@@ -59,27 +59,27 @@ def match(told: Sequence[Sample], played: Sequence[Played]) -> Match:
             continue
         last = places[k]
         taken.add(last)
-        found.pairs.append((s, played[last]))
-        if s.codes != played[last].codes or s.channel not in (-1, played[last].channel):
-            found.wrong.append((s, played[last]))
-        if not played[last].settled:
+        found.pairs.append((s, sent[last]))
+        if s.codes != sent[last].codes or s.channel not in (-1, sent[last].channel):
+            found.wrong.append((s, sent[last]))
+        if not sent[last].settled:
             found.unsettled.append(s)
-    found.missing = [p for i, p in enumerate(played) if p.due and p.settled and i not in taken]
+    found.missing = [p for i, p in enumerate(sent) if p.due and p.settled and i not in taken]
     return found
 
 
 @dataclass
-class HostEvidence:
-    """Of one case. bus: what was played; told: what the host made of it."""
+class HostCapture:
+    """Of one case. bus: what was sent; told: what the host made of it."""
 
     case: str
     bus: Bus
     told: Told
-    profile: str = "article"  # of the board that is played
+    profile: str = "article"  # of the board
     status: int | None = 0  # the host's exit status; None: it had to be ended
     marks: Mapping[str, float] = field(default_factory=dict)  # instants of the case, simulated s
-    stood_s: float = 0.0  # longest that the stage has stood still against the wall's time
-    clock: Sequence[tuple[float, float]] = ()  # simulated and the wall's time, s, about each step of the stage
+    stood_s: float = 0.0  # longest that the bench has stood still against the wall's time
+    clock: Sequence[tuple[float, float]] = ()  # simulated and the wall's time, s, about each step of the bench
     streamed: bool = True  # the host has started the stream
     cycles: Sequence[BusCycle] = ()  # of the host on the board's parallel bus
     errors: str = ""  # what the host has written beside its results
@@ -89,24 +89,24 @@ class HostEvidence:
         return match(self.told.samples, self.bus.samples)
 
     def samples(self) -> Match:
-        """The match of a case in which samples are due. Raises Broken where none came, or the host did not go on."""
+        """The match of a case in which samples are due. Raises Failed where none came, or the host did not go on."""
         if not self.streamed or not self.bus.samples:
-            raise Broken(f"no stream was started{self.last_words()}", "NMT start after the set-up has been read")
+            raise Failed(f"no stream was started{self.last_words()}", "NMT start after the set-up has been read")
         if not self.told.samples:
-            raise Broken(f"no sample was reported{self.last_words()}", f"{len(self.bus.samples)} samples")
+            raise Failed(f"no sample was reported{self.last_words()}", f"{len(self.bus.samples)} samples")
         m = self.match
         if m.strange:
             s = m.strange[0]
-            raise Broken(
-                f"{len(m.strange)} samples that were not played, or twice, or out of order; the first is {s.number}",
+            raise Failed(
+                f"{len(m.strange)} samples that were not sent, or twice, or out of order; the first is {s.number}",
                 "each sample once, in order, and no other",
             )
         if m.wrong:
             s, p = m.wrong[0]
-            raise Broken(f"sample {s.number} with {s.codes} of channel {s.channel}", f"{p.codes} of {p.channel}")
+            raise Failed(f"sample {s.number} with {s.codes} of channel {s.channel}", f"{p.codes} of {p.channel}")
         if m.missing:
             p = m.missing[0]
-            raise Broken(
+            raise Failed(
                 f"{len(m.missing)} samples were not told; the first is {p.seq}, which came at {p.arrived_s:.6f} s",
                 f"all {len(self.bus.samples)} that came whole",
             )
@@ -128,7 +128,7 @@ class HostEvidence:
 
     @property
     def may_seem_silent(self) -> bool:
-        """Whether the stage stood still, or went so slowly, that a host may have taken the board for silent."""
+        """Whether the bench stood still, or went so slowly, that a host may have taken the board for silent."""
         short_s = float(limits("HOST-STALE-01").limit("silent_max_s"))
         return self.stood_s > STOOD_S or self.longest_s(short_s) > short_s + 2 * STOOD_S
 
@@ -141,7 +141,7 @@ class HostEvidence:
         return max(span_s, float((wall_s[last] - wall_s).max()))
 
     def nothing_but(self, *names: str) -> None:
-        """Raises Broken when the host told anything else. Silence that the stage itself made is no false alarm."""
+        """Raises Failed when the host told anything else. Silence that the bench itself made is no false alarm."""
         allowed = {*names, "end"}
         if self.may_seem_silent:
             allowed |= {"stale"}
@@ -149,36 +149,36 @@ class HostEvidence:
             allowed |= {"gone"}
         for event in self.told.events:
             if event.name not in allowed:
-                raise Broken(
+                raise Failed(
                     f'{{"{event.name}": {event.value}}} after {event.at} samples',
-                    "nothing that was not played" if not names else f"{', '.join(names)} at most",
+                    "nothing that was not sent" if not names else f"{', '.join(names)} at most",
                 )
 
     def count(self, name: str, due: int) -> None:
-        """Raises Broken when the numbers told under that name do not come to `due`."""
+        """Raises Failed when the numbers told under that name do not come to `due`."""
         if (saw := self.told.sum(name)) != due:
-            raise Broken(f"{name}: {saw}", f"{name}: {due}")
+            raise Failed(f"{name}: {saw}", f"{name}: {due}")
 
 
-Judge = Callable[[HostEvidence], str]
-Test = TypeVar("Test", bound=Judge)
+HostCheck = Callable[[HostCapture], str]
+Test = TypeVar("Test", bound=HostCheck)
 
 
 @dataclass(frozen=True, slots=True)
-class Judged:
+class CaseCheck:
     """A test with its case and its requirements."""
 
-    test: Judge
+    test: HostCheck
     case: str
     ids: tuple[str, ...]
 
 
-_cases: dict[Judge, tuple[str, ...]] = {}
-_judged: list[Judged] = []
+_cases: dict[HostCheck, tuple[str, ...]] = {}
+_case_checks: list[CaseCheck] = []
 
 
-def judges(*cases: str) -> Callable[[Test], Test]:
-    """The cases whose evidence a test wants; it judges each by itself."""
+def checks(*cases: str) -> Callable[[Test], Test]:
+    """The cases whose capture a test wants; it checks each by itself."""
 
     def register(test: Test) -> Test:
         _cases[test] = cases
@@ -193,15 +193,15 @@ def proves(*ids: str) -> Callable[[Test], Test]:
         raise ValueError(f"proves: no requirement {', '.join(unknown)}")
 
     def register(test: Test) -> Test:
-        _judged.extend(Judged(test, case, ids) for case in _cases[test])
+        _case_checks.extend(CaseCheck(test, case, ids) for case in _cases[test])
         return test
 
     return register
 
 
-def judged() -> tuple[Judged, ...]:
+def case_checks() -> tuple[CaseCheck, ...]:
     """All tests that were registered, in the order of their modules."""
-    return tuple(_judged)
+    return tuple(_case_checks)
 
 
 def limits(key: str) -> Requirement:
@@ -210,6 +210,6 @@ def limits(key: str) -> Requirement:
 
 
 def enough(what: object, words: str) -> None:
-    """Raises TooLittle when the case did not show what it should."""
+    """Raises Inconclusive when the case did not show what it should."""
     if not what:
-        raise TooLittle(f"the case did not show {words}")
+        raise Inconclusive(f"the case did not show {words}")

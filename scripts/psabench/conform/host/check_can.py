@@ -9,8 +9,8 @@ import numpy as np
 from psabench.boards.objects import Common, Psa2Objects
 from psabench.conform.host.capture import SDO_RX, SDO_TX, SEQS, WRAP_US, Frame, number
 from psabench.conform.host.cases_units import UNIT_CASES
-from psabench.conform.host.check import HostEvidence, Unseen, enough, judges, limits, proves
-from psabench.conform.verdict import Broken
+from psabench.conform.host.check import HostCapture, Unseen, checks, enough, limits, proves
+from psabench.conform.verdict import Failed
 
 READ, ABORT = 0x40, 0x80  # command specifiers of SDO
 FAST, TOG = 0x380, 63  # PSA2_FAST, and the bit of it that tells the frame's number, even or odd
@@ -26,57 +26,57 @@ IDENTITY = (Common.DEVICE_TYPE, Common.DEVICE_NAME, Common.IDENTITY)  # any of t
 
 
 @proves("HOST-RES-01")
-@judges("good")
-def every_sample_is_told_once_and_in_order(e: HostEvidence) -> str:
+@checks("good")
+def every_sample_is_told_once_and_in_order(e: HostCapture) -> str:
     """The numbers of the samples told, against those on the bus."""
     return f"{len(e.samples().pairs)} samples"
 
 
 @proves("HOST-RES-02")
-@judges("good")
-def nothing_is_told_that_was_not_played(e: HostEvidence) -> str:
+@checks("good")
+def nothing_is_told_that_was_not_played(e: HostCapture) -> str:
     """Everything told of ten seconds of a good board."""
     e.nothing_but()
     if e.match.strange:
-        raise Broken(f"sample {e.match.strange[0].number}, which was not played", "none")
+        raise Failed(f"sample {e.match.strange[0].number}, which was not sent", "none")
     return f"{len(e.told.samples)} samples and no fault"
 
 
 @proves("HOST-RES-03")
-@judges("good", *ENDS)
-def the_end_is_told(e: HostEvidence) -> str:
+@checks("good", *ENDS)
+def the_end_is_told(e: HostCapture) -> str:
     """The link ends: the last word, and the exit status."""
     if e.told.of("end") != [True] or e.told.events[-1].name != "end" or e.told.events[-1].at != e.told.count:
-        raise Broken(f"{len(e.told.of('end'))} ends", '{"end": true} once, as the last word')
+        raise Failed(f"{len(e.told.of('end'))} ends", '{"end": true} once, as the last word')
     if e.status != 0:
-        raise Broken("it had to be ended" if e.status is None else f"exit status {e.status}", "exit status 0")
+        raise Failed("it had to be ended" if e.status is None else f"exit status {e.status}", "exit status 0")
     return "end told, exit status 0"
 
 
 @proves("HOST-RES-04")
-@judges("good", *ENDS)
-def every_line_is_of_the_results_channel(e: HostEvidence) -> str:
+@checks("good", *ENDS)
+def every_line_is_of_the_results_channel(e: HostCapture) -> str:
     """The lines told, against the words of the results channel."""
     enough(e.told.count or e.told.events or e.told.bad_lines, "a line")
     if e.told.bad_lines:
-        raise Broken(f"{e.told.bad_lines} lines that are none, the first {e.told.bad[0]}", "docs/conform_host.md")
+        raise Failed(f"{e.told.bad_lines} lines that are none, the first {e.told.bad[0]}", "docs/conform_host.md")
     return f"{e.told.count + len(e.told.events)} lines"
 
 
 @proves("HOST-CAN-11")
-@judges("good")
-def codes_are_those_that_were_sent(e: HostEvidence) -> str:
+@checks("good")
+def codes_are_those_that_were_sent(e: HostCapture) -> str:
     """Codes of X, Y, Z and T and the channel of T, each of another size and sign."""
     enough(e.match.pairs, "a sample")
     if e.match.wrong:
         s, p = e.match.wrong[0]
-        raise Broken(f"{s.codes}, channel {s.channel}, of sample {s.number}", f"{p.codes}, channel {p.channel}")
+        raise Failed(f"{s.codes}, channel {s.channel}, of sample {s.number}", f"{p.codes}, channel {p.channel}")
     return f"{len(e.match.pairs)} samples, the last {e.match.pairs[-1][0].codes}"
 
 
 @proves("HOST-CAN-03")
-@judges("good")
-def wraps_are_no_loss_and_no_jump(e: HostEvidence) -> str:
+@checks("good")
+def wraps_are_no_loss_and_no_jump(e: HostCapture) -> str:
     """SEQ goes from 65535 to 0, TSTAMP every 0.262144 s: what is lost, and the times, about them."""
     row = limits("HOST-CAN-03")
     assert (row.limit("seq_modulo"), row.limit("tstamp_wrap_s")) == (SEQS, WRAP_US * 1e-6)
@@ -87,15 +87,15 @@ def wraps_are_no_loss_and_no_jump(e: HostEvidence) -> str:
 
 
 @proves("HOST-TIME-01")
-@judges("delayed")
-def times_are_those_of_the_conversions(e: HostEvidence) -> str:
+@checks("delayed")
+def times_are_those_of_the_conversions(e: HostCapture) -> str:
     """Frames come 30 ms late: the times told of their samples against the instants on the board."""
     m = e.samples()
     return f"{len(m.pairs)} samples, times {_steady(e)}"
 
 
-def _steady(e: HostEvidence) -> str:
-    """Raises Broken when times told, from the first of each epoch on, are not those of the conversions."""
+def _steady(e: HostCapture) -> str:
+    """Raises Failed when times told, from the first of each epoch on, are not those of the conversions."""
     tolerance_us = float(limits("HOST-TIME-01").limit("instant_tolerance_us"))
     worst_us = 0.0
     for epoch in sorted({p.epoch for _, p in e.match.pairs}):
@@ -105,13 +105,13 @@ def _steady(e: HostEvidence) -> str:
         k = int(np.argmax(np.abs(off_us)))
         worst_us = max(worst_us, abs(float(off_us[k])))
         if worst_us > tolerance_us:
-            raise Broken(f"sample {mine[k][0].number} off by {off_us[k]:.0f} us", f"{tolerance_us:g} us at most")
+            raise Failed(f"sample {mine[k][0].number} off by {off_us[k]:.0f} us", f"{tolerance_us:g} us at most")
     return f"right to {worst_us:.0f} us"
 
 
 @proves("HOST-VALUE-01")
-@judges("good")
-def volts_are_codes_times_the_scale(e: HostEvidence) -> str:
+@checks("good")
+def volts_are_codes_times_the_scale(e: HostCapture) -> str:
     """Volts told beside the codes."""
     row = limits("HOST-VALUE-01")
     told = [(s.codes, s.volts) for s in e.told.samples if s.volts is not None]
@@ -121,7 +121,7 @@ def volts_are_codes_times_the_scale(e: HostEvidence) -> str:
     off = np.abs(np.array([v for _, v in told]) - due)
     if (off > np.abs(due) * float(row.limit("tolerance_ppm")) * 1e-6 + 1e-9).any():
         k = int(np.argmax(off.max(axis=1)))
-        raise Broken(f"{told[k][1]} V", f"{tuple(float(v) for v in due[k])} V")
+        raise Failed(f"{told[k][1]} V", f"{tuple(float(v) for v in due[k])} V")
     return f"volts of {len(told)} samples"
 
 
@@ -129,37 +129,37 @@ def volts_are_codes_times_the_scale(e: HostEvidence) -> str:
 
 
 @proves("HOST-SETUP-02")
-@judges("power_on")
-def what_is_refused_during_the_set_up_is_asked_again(e: HostEvidence) -> str:
+@checks("power_on")
+def what_is_refused_during_the_set_up_is_asked_again(e: HostCapture) -> str:
     """Requests from power-on: the board refuses registers with 08000022h until its set-up is done."""
     refused = [f for f in e.bus.of(SDO_TX) if f.data[0] == ABORT]
     e.samples()
     for f in refused:
         again = [r for r in _requests(e) if r.t_s > f.t_s and r.data[1:4] == f.data[1:4]]
         if not again:
-            raise Broken(f"{_named(f)} was refused and never asked for again", "it is, until it is answered")
+            raise Failed(f"{_named(f)} was refused and never asked for again", "it is, until it is answered")
     _all_are_read(e)
     return f"{len(refused)} refusals, all registers read, {len(e.bus.samples)} samples"
 
 
 @proves("HOST-SETUP-03")
-@judges("power_on")
-def the_stream_is_started_after_the_registers_are_known(e: HostEvidence) -> str:
+@checks("power_on")
+def the_stream_is_started_after_the_registers_are_known(e: HostCapture) -> str:
     """The order of the host's requests and of its NMT start."""
     if not e.bus.starts:
-        raise Broken("no NMT start", "one, after identity and registers have been read")
+        raise Failed("no NMT start", "one, after identity and registers have been read")
     start_s = e.bus.starts[0]
     _all_are_read(e, before_s=start_s)
     if not any(_answered(e, index, None, start_s) for index in IDENTITY):
-        raise Broken(
+        raise Failed(
             f"NMT start at {start_s:.6f} s, without an identity read before it", "1000h, 1008h or 1018h read before"
         )
     return f"identity and {len(REGISTERS)} registers, then NMT start at {start_s:.3f} s"
 
 
 @proves("HOST-CAN-10")
-@judges("slow")
-def nothing_is_asked_again_before_its_time(e: HostEvidence) -> str:
+@checks("slow")
+def nothing_is_asked_again_before_its_time(e: HostCapture) -> str:
     """Two answers come after 0.6 s: requests meanwhile."""
     patience_s = float(limits("HOST-CAN-10").limit("patience_s"))
     answers = e.bus.of(SDO_TX)
@@ -169,13 +169,13 @@ def nothing_is_asked_again_before_its_time(e: HostEvidence) -> str:
         slow += answered_s - before.t_s > 0.1
         asked_s = e.wall_s(before.t_s, after.t_s)
         if after.t_s < answered_s and asked_s < 0.95 * patience_s:
-            raise Broken(f"{_named(after)} asked {asked_s:.3f} s after {_named(before)}", "its answer, or 1 s")
+            raise Failed(f"{_named(after)} asked {asked_s:.3f} s after {_named(before)}", "its answer, or 1 s")
     enough(slow, "an answer that took its time")
     e.samples()
     return f"{len(_requests(e))} requests, {slow} of them answered late"
 
 
-def _requests(e: HostEvidence) -> list[Frame]:
+def _requests(e: HostCapture) -> list[Frame]:
     return [f for f in e.bus.of(SDO_RX) if len(f.data) == 8]
 
 
@@ -183,7 +183,7 @@ def _named(f: Frame) -> str:
     return f"{number(f.data[1:3]):04X}h:{f.data[3]}"
 
 
-def _answered(e: HostEvidence, index: int, sub: int | None, before_s: float = float("inf")) -> bool:
+def _answered(e: HostCapture, index: int, sub: int | None, before_s: float = float("inf")) -> bool:
     """Whether the board gave the object before that instant, and the host had asked for it."""
     return any(
         f.data[0] & 0xE0 == READ and number(f.data[1:3]) == index and sub in (None, f.data[3])
@@ -192,20 +192,20 @@ def _answered(e: HostEvidence, index: int, sub: int | None, before_s: float = fl
     )
 
 
-def _all_are_read(e: HostEvidence, before_s: float = float("inf")) -> None:
+def _all_are_read(e: HostCapture, before_s: float = float("inf")) -> None:
     for index, sub in REGISTERS:
         if not _answered(e, index, sub, before_s):
-            raise Broken(f"{index:04X}h:{sub} was not read", "it is, before the stream is started")
+            raise Failed(f"{index:04X}h:{sub} was not read", "it is, before the stream is started")
 
 
 @proves("HOST-SETUP-01")
-@judges("setup_order", "config0_x", "config0_z")
-def a_wrong_set_up_is_told(e: HostEvidence) -> str:
+@checks("setup_order", "config0_x", "config0_z")
+def a_wrong_set_up_is_told(e: HostCapture) -> str:
     """The set-up was carried out backwards, or a bit of CONFIG0 is wrong, in one converter alone."""
     if not e.told.of("wrong_setup"):
-        raise Broken("the set-up was taken for the article's", '{"wrong_setup": ...}')
+        raise Failed("the set-up was taken for the article's", '{"wrong_setup": ...}')
     if e.told.samples:
-        raise Broken(f"{len(e.told.samples)} samples told all the same", "none")
+        raise Failed(f"{len(e.told.samples)} samples told all the same", "none")
     return f"wrong set-up: {e.told.of('wrong_setup')[0]}"
 
 
@@ -213,8 +213,8 @@ def a_wrong_set_up_is_told(e: HostEvidence) -> str:
 
 
 @proves("HOST-LOST-01")
-@judges("lost")
-def lost_samples_are_counted(e: HostEvidence) -> str:
+@checks("lost")
+def lost_samples_are_counted(e: HostCapture) -> str:
     """1, 2 and 1000 samples do not come: the numbers told, each before the sample that follows the gap."""
     m = e.samples()
     seqs = [s.number for s, _ in m.pairs]
@@ -225,7 +225,7 @@ def lost_samples_are_counted(e: HostEvidence) -> str:
         if event.name == "lost":
             told[event.at] = told.get(event.at, 0) + event.value
     if told != gaps:
-        raise Broken(f"lost {_gaps(told)}", f"lost {_gaps(gaps)}")
+        raise Failed(f"lost {_gaps(told)}", f"lost {_gaps(gaps)}")
     e.nothing_but("lost", "stale")
     return f"lost {_gaps(gaps)}"
 
@@ -235,8 +235,8 @@ def _gaps(found: dict[int, int]) -> str:
 
 
 @proves("HOST-CAN-02")
-@judges("torn")
-def a_half_without_the_other_is_torn(e: HostEvidence) -> str:
+@checks("torn")
+def a_half_without_the_other_is_torn(e: HostCapture) -> str:
     """Two second halves and a first one are lost."""
     e.samples()
     e.count("torn", 3)
@@ -245,8 +245,8 @@ def a_half_without_the_other_is_torn(e: HostEvidence) -> str:
 
 
 @proves("HOST-CAN-01")
-@judges("mixed", "order")
-def halves_of_two_samples_are_not_one(e: HostEvidence) -> str:
+@checks("mixed", "order")
+def halves_of_two_samples_are_not_one(e: HostCapture) -> str:
     """Halves are missing so that what is left looks like a pair; or they come in another order."""
     e.samples()
     e.nothing_but("torn", "lost")
@@ -254,22 +254,22 @@ def halves_of_two_samples_are_not_one(e: HostEvidence) -> str:
 
 
 @proves("HOST-CAN-01")
-@judges("corrupt")
-def a_wrong_bit_does_not_end_it(e: HostEvidence) -> str:
+@checks("corrupt")
+def a_wrong_bit_does_not_end_it(e: HostCapture) -> str:
     """A bit of four frames is wrong: the samples of the others."""
     hit = 4
     m = e.match
     if not e.told.samples or len(m.strange) + len(m.missing) + len(m.wrong) > 2 * hit:
-        raise Broken(
-            f"{len(m.missing)} samples not told, {len(m.strange)} that were not played, of {len(e.bus.samples)}",
+        raise Failed(
+            f"{len(m.missing)} samples not told, {len(m.strange)} that were not sent, of {len(e.bus.samples)}",
             f"those of the {hit} frames at most",
         )
     return f"{len(m.pairs)} of {len(e.bus.samples)} samples"
 
 
 @proves("HOST-CAN-08")
-@judges("twice")
-def what_comes_twice_is_one_sample(e: HostEvidence) -> str:
+@checks("twice")
+def what_comes_twice_is_one_sample(e: HostCapture) -> str:
     """Halves of four samples come twice."""
     e.samples()
     e.count("lost", 0)
@@ -278,8 +278,8 @@ def what_comes_twice_is_one_sample(e: HostEvidence) -> str:
 
 
 @proves("HOST-CAN-05")
-@judges("length")
-def a_message_of_the_wrong_length_is_torn(e: HostEvidence) -> str:
+@checks("length")
+def a_message_of_the_wrong_length_is_torn(e: HostCapture) -> str:
     """A PSA2_XY of 7 bytes between two samples, twice."""
     e.samples()
     e.count("torn", 2)
@@ -288,8 +288,8 @@ def a_message_of_the_wrong_length_is_torn(e: HostEvidence) -> str:
 
 
 @proves("HOST-CAN-04")
-@judges("others")
-def other_nodes_and_error_frames_are_let_by(e: HostEvidence) -> str:
+@checks("others")
+def other_nodes_and_error_frames_are_let_by(e: HostCapture) -> str:
     """Frames of node 6 between the halves of ours, two error frames, 1.4 ms off the bus."""
     e.samples()
     e.nothing_but("emcy")
@@ -297,8 +297,8 @@ def other_nodes_and_error_frames_are_let_by(e: HostEvidence) -> str:
 
 
 @proves("HOST-RANGE-01")
-@judges("over_range")
-def each_axis_is_told_as_over_range(e: HostEvidence) -> str:
+@checks("over_range")
+def each_axis_is_told_as_over_range(e: HostCapture) -> str:
     """X, Y, Z, up and down, at 9.9 V and beyond the range: what is reported, against the codes at their limits."""
     m = e.samples()
     due: list[tuple[str, str]] = []
@@ -312,7 +312,7 @@ def each_axis_is_told_as_over_range(e: HostEvidence) -> str:
     told = [(x.name, x.value) for x in e.told.events if x.name in ("over_range", "in_range")]
     if told != due:
         k = next((k for k, (a, b) in enumerate(zip(told, due, strict=False)) if a != b), min(len(told), len(due)))
-        raise Broken(f"{_word(told, k)} as number {k + 1} of {len(told)}", f"{_word(due, k)} of {len(due)}")
+        raise Failed(f"{_word(told, k)} as number {k + 1} of {len(told)}", f"{_word(due, k)} of {len(due)}")
     e.nothing_but("over_range", "in_range", "frozen")
     return f"{len(due) // 2} times over the range and back"
 
@@ -322,17 +322,17 @@ def _word(words: list[tuple[str, str]], k: int) -> str:
 
 
 @proves("HOST-RST-01")
-@judges("restart")
-def a_restart_is_told_and_the_stream_goes_on(e: HostEvidence) -> str:
+@checks("restart")
+def a_restart_is_told_and_the_stream_goes_on(e: HostCapture) -> str:
     """A brown-out and a reset node by somebody else: boot-up messages, numbers from 0."""
     restarts = len([t for t in e.bus.boots if e.bus.starts and t > e.bus.starts[0]])
     enough(restarts, "a boot-up message")
     if len(e.told.of("restart")) != restarts:
-        raise Broken(f"{len(e.told.of('restart'))} restarts", f"{restarts}")
+        raise Failed(f"{len(e.told.of('restart'))} restarts", f"{restarts}")
     e.samples()
     epochs = {p.epoch for _, p in e.match.pairs}
     if epochs != set(range(restarts + 1)):
-        raise Broken(
+        raise Failed(
             f"samples of {len(epochs)} of {restarts + 1} lives of the board", "of all: NMT start after each boot-up"
         )
     e.nothing_but("restart", "stale", "torn", "lost")
@@ -340,19 +340,19 @@ def a_restart_is_told_and_the_stream_goes_on(e: HostEvidence) -> str:
 
 
 @proves("HOST-SETTLE-01")
-@judges("flags")
-def samples_that_have_not_settled_are_not_told(e: HostEvidence) -> str:
+@checks("flags")
+def samples_that_have_not_settled_are_not_told(e: HostCapture) -> str:
     """CONFIG1 is written: 63 words whose SETTLED is 0."""
     m = e.samples()
     enough(sum(not p.settled for p in e.bus.samples) > 10, "words that have not settled")
     if m.unsettled:
-        raise Broken(f"{len(m.unsettled)} of them told, the first {m.unsettled[0].number}", "none")
+        raise Failed(f"{len(m.unsettled)} of them told, the first {m.unsettled[0].number}", "none")
     return f"none of {sum(not p.settled for p in e.bus.samples)}"
 
 
 @proves("HOST-OVER-01")
-@judges("flags")
-def conversions_that_the_board_lost_are_told(e: HostEvidence) -> str:
+@checks("flags")
+def conversions_that_the_board_lost_are_told(e: HostCapture) -> str:
     """Samples with OVERRUN."""
     due = sum(p.overrun for p in e.bus.samples)
     enough(due, "OVERRUN")
@@ -361,8 +361,8 @@ def conversions_that_the_board_lost_are_told(e: HostEvidence) -> str:
 
 
 @proves("HOST-STALE-01")
-@judges("silence")
-def silence_is_told_and_its_end(e: HostEvidence) -> str:
+@checks("silence")
+def silence_is_told_and_its_end(e: HostCapture) -> str:
     """40 ms without a frame, then 0.5 s."""
     e.samples()
     at = sum(p.arrived_s < e.marks["silent"] for _, p in e.match.pairs)
@@ -370,7 +370,7 @@ def silence_is_told_and_its_end(e: HostEvidence) -> str:
     if e.may_seem_silent:  # any other silence may have been real
         told = [t for t in told if t[1] == at]
     if told != [(True, at), (False, at)]:
-        raise Broken(
+        raise Failed(
             ", ".join(f"stale {v} after {n} samples" for v, n in told) or "nothing",
             f"stale after {at} samples, and fresh before the next",
         )
@@ -378,14 +378,14 @@ def silence_is_told_and_its_end(e: HostEvidence) -> str:
 
 
 @proves("HOST-STALE-02")
-@judges("frozen")
-def codes_that_stand_still_are_told(e: HostEvidence) -> str:
+@checks("frozen")
+def codes_that_stand_still_are_told(e: HostCapture) -> str:
     """The controller sends the same codes for two seconds."""
     e.samples()
     if e.told.of("frozen")[:1] != [True]:
-        raise Broken("codes that stood still for 2 s were taken for data", '{"frozen": true}')
+        raise Failed("codes that stood still for 2 s were taken for data", '{"frozen": true}')
     if e.told.of("frozen") != [True, False]:
-        raise Broken(f"frozen {e.told.of('frozen')}", "frozen, and its end")
+        raise Failed(f"frozen {e.told.of('frozen')}", "frozen, and its end")
     first = next(
         i for i, (a, b) in enumerate(zip(e.bus.samples, e.bus.samples[1:], strict=False)) if a.codes[:3] == b.codes[:3]
     )
@@ -393,62 +393,62 @@ def codes_that_stand_still_are_told(e: HostEvidence) -> str:
     row = limits("HOST-STALE-02")
     least, most = (1000 * float(row.limit(name)) for name in ("told_min_s", "told_max_s"))
     if not least <= after <= most:
-        raise Broken(f"frozen told after {after} samples of the same codes", f"after {least:.0f} to {most:.0f}")
+        raise Failed(f"frozen told after {after} samples of the same codes", f"after {least:.0f} to {most:.0f}")
     e.nothing_but("frozen")
     return f"frozen after {after} samples of the same codes"
 
 
 @proves("HOST-RATE-01")
-@judges("rate")
-def a_data_rate_that_is_off_is_told(e: HostEvidence) -> str:
+@checks("rate")
+def a_data_rate_that_is_off_is_told(e: HostCapture) -> str:
     """The converters' clock 100 ppm off for a second, then 2000 ppm."""
     row = limits("HOST-RATE-01")
     e.samples()
     early = sum(p.arrived_s < e.marks["off"] for _, p in e.match.pairs)
     if wrong := [x for x in e.told.events if x.name == "rate_ppm" and x.at < early]:
-        raise Broken(f"{wrong[0].value} ppm told at {row.limit('silent_ppm')} ppm", "nothing")
+        raise Failed(f"{wrong[0].value} ppm told at {row.limit('silent_ppm')} ppm", "nothing")
     told = e.told.of("rate_ppm")
     if not told:
-        raise Broken(f"nothing at {2 * row.limit('report_ppm')} ppm", '{"rate_ppm": ...}')
+        raise Failed(f"nothing at {2 * row.limit('report_ppm')} ppm", '{"rate_ppm": ...}')
     e.nothing_but("rate_ppm")
     return f"{told[-1]} ppm"
 
 
 @proves("HOST-CAN-06")
-@judges("emcy")
-def an_emergency_is_told_and_its_end(e: HostEvidence) -> str:
+@checks("emcy")
+def an_emergency_is_told_and_its_end(e: HostCapture) -> str:
     """Data-ready of X sticks for 0.4 s."""
     due = [number(f.data[0:2]) for f in e.bus.frames if f.can_id == 0x080 + e.bus.node and len(f.data) == 8]
     enough(len(due) >= 2, "an emergency and its end")
     if e.told.of("emcy") != due:
-        raise Broken(f"{[f'{c:04X}h' for c in e.told.of('emcy')]}", f"{[f'{c:04X}h' for c in due]}")
+        raise Failed(f"{[f'{c:04X}h' for c in e.told.of('emcy')]}", f"{[f'{c:04X}h' for c in due]}")
     e.samples()
     return ", ".join(f"{c:04X}h" for c in due)
 
 
 @proves("HOST-CAN-07")
-@judges("off")
-def a_unit_without_heartbeat_is_gone(e: HostEvidence) -> str:
+@checks("off")
+def a_unit_without_heartbeat_is_gone(e: HostCapture) -> str:
     """The supply is switched off; four heartbeats do not come."""
     e.samples()
     if e.told.of("gone") != [True]:
-        raise Broken(f"{len(e.told.of('gone'))} times gone", '{"gone": true} once')
+        raise Failed(f"{len(e.told.of('gone'))} times gone", '{"gone": true} once')
     return "gone"
 
 
 @proves("HOST-CAN-09")
-@judges("fast")
-def a_missing_toggle_is_a_lost_frame(e: HostEvidence) -> str:
+@checks("fast")
+def a_missing_toggle_is_a_lost_frame(e: HostCapture) -> str:
     """Frame form 1, which the host asks for: three frames do not come, each told by TOG alone."""
     words = [number(f.data) for f in e.bus.frames if f.can_id == FAST + e.bus.node and len(f.data) == 8]
     if not e.streamed or not words:
-        raise Broken(f"no frame of form 1{e.last_words()}", "2020h = 1, then NMT start")
+        raise Failed(f"no frame of form 1{e.last_words()}", "2020h = 1, then NMT start")
     gaps = sum(a >> TOG == b >> TOG for a, b in itertools.pairwise(words))
     enough(gaps == 3, "three gaps")
     due = [tuple(float(_signed21(w >> 21 * k)) for k in range(3)) for w in words]
     if (told := [r.values for r in e.told.readings]) != due:
         k = next((k for k, (a, b) in enumerate(zip(told, due, strict=False)) if a != b), min(len(told), len(due)))
-        raise Broken(f"{told[k : k + 1]} as frame {k + 1} of {len(told)}", f"{due[k : k + 1]} of {len(due)}")
+        raise Failed(f"{told[k : k + 1]} as frame {k + 1} of {len(told)}", f"{due[k : k + 1]} of {len(due)}")
     e.count("lost", gaps)
     return f"{len(told)} frames, lost {gaps}"
 

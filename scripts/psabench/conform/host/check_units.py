@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from psabench.conform.host.check import HostEvidence
+from psabench.conform.host.check import HostCapture
 from psabench.conform.host.results import Reading
-from psabench.conform.verdict import Broken
+from psabench.conform.verdict import Failed
 
 
-def readings_told(e: HostEvidence) -> list[Reading]:
+def readings_told(e: HostCapture) -> list[Reading]:
     if not e.streamed:
-        raise Broken(f"no stream was started{e.last_words()}", "NMT start")
+        raise Failed(f"no stream was started{e.last_words()}", "NMT start")
     if not e.told.readings:
-        raise Broken(f"no reading was reported{e.last_words()}", '{"reading": ...}')
+        raise Failed(f"no reading was reported{e.last_words()}", '{"reading": ...}')
     return e.told.readings

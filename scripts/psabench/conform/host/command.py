@@ -10,7 +10,7 @@ from psabench.boards.registry import ALIASES
 from psabench.conform import report
 from psabench.conform.defaults import LINKS
 from psabench.conform.host import runner
-from psabench.conform.host.check import Judged, judged
+from psabench.conform.host.check import CaseCheck, case_checks
 from psabench.conform.identity import suite_facts
 from psabench.conform.profile import Variant, variant
 from psabench.conform.requirements import Requirement, requirements
@@ -97,10 +97,10 @@ def take(outcomes: list[Outcome], outcome: Outcome, *, tell: bool) -> None:
         print(f"  {outcome.verdict.value} {', '.join(outcome.requirements)}: {said}", file=sys.stderr, flush=True)
 
 
-def unseen(rows: list[Requirement], tests: list[Judged], link: str) -> list[Outcome]:
+def unseen(rows: list[Requirement], tests: list[CaseCheck], link: str) -> list[Outcome]:
     """Of the requirements that no case shows at this link."""
     seen = {i for j in tests for i in j.ids}
-    of_forms = {i for j in judged() if wants_form(j.case) and link in runner.ALL[j.case].links for i in j.ids}
+    of_forms = {i for j in case_checks() if wants_form(j.case) and link in runner.ALL[j.case].links for i in j.ids}
     return [
         Outcome(
             test="not_played",

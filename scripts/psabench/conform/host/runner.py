@@ -1,4 +1,4 @@
-"""Plays the cases to a host and has them judged."""
+"""Plays the cases to a host and has them checked."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from psabench.conform.host.capture import Bus, read_log
 from psabench.conform.host.cases_can import CASES, NODE, Case
 from psabench.conform.host.cases_line import LINE_CASES, LineCase, samples
 from psabench.conform.host.cases_units import UNIT_CASES, load_checks
-from psabench.conform.host.check import HostEvidence, Judged, Unseen, judged
+from psabench.conform.host.check import CaseCheck, HostCapture, Unseen, case_checks
 from psabench.conform.host.line_waves import form_of
-from psabench.conform.host.stimulus import READY_S, ByHand, Program, Stage, drain, expand
+from psabench.conform.host.stimulus import READY_S, ByHand, HostBench, Program, drain, expand
 from psabench.conform.host.stimulus_bus import BusBridge
 from psabench.conform.host.stimulus_line import LinePort
 from psabench.conform.profile import variant
-from psabench.conform.verdict import Broken, Outcome, TooLittle, Verdict
+from psabench.conform.verdict import Failed, Inconclusive, Outcome, Verdict
 from psabench.emulator import Emulator
 from psabench.errors import BadInput, BenchError
 from psabench.link.control import Control
@@ -36,7 +36,7 @@ MODULES = (can_checks, line_checks)  # imported, they have registered their test
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Play:
-    """How a host is played to. command "": it is started by hand, and tells into the file `results`."""
+    """How a host is tested. command "": it is started by hand, and tells into the file `results`."""
 
     folder: Path  # for logs and what was reported
     board: str = "psa2"
@@ -54,27 +54,29 @@ class Play:
         return "slcan" if self.link == "pty" else f"socketcand:{self.port}"
 
 
-def wanted(only: Sequence[str] = (), cases: Sequence[str] = (), board: str = "psa2", link: str = "can") -> list[Judged]:
+def wanted(
+    only: Sequence[str] = (), cases: Sequence[str] = (), board: str = "psa2", link: str = "can"
+) -> list[CaseCheck]:
     """Tests of requirements that begin so, of these cases, with that board and link; in the order of the cases."""
     order = [name for name, c in ALL.items() if board in c.boards and link in c.links]
     if unknown := [c for c in cases if c not in order]:
         raise BadInput(f"no such case with {board} at this link: {', '.join(unknown)}; there are {', '.join(order)}")
     found = [
         j
-        for j in judged()
+        for j in case_checks()
         if j.case in (cases or order) and (not only or any(i.startswith(tuple(only)) for i in j.ids))
     ]
     return sorted(found, key=lambda j: order.index(j.case))
 
 
-def run(play: Play, tests: Sequence[Judged], progress: Progress, told: Callable[[Outcome], None]) -> None:
+def run(play: Play, tests: Sequence[CaseCheck], progress: Progress, told: Callable[[Outcome], None]) -> None:
     """Each case once, then its tests; told: of each outcome as it comes."""
     names = list(dict.fromkeys(j.case for j in tests))
     with progress.step("host", max(1, len(names))) as advance:
         for name in names:
             begun_s = time.monotonic()
             try:
-                shown: HostEvidence | Exception = perform(play, name)
+                shown: HostCapture | Exception = perform(play, name)
             except BadInput:
                 raise
             except BenchError as e:
@@ -86,31 +88,33 @@ def run(play: Play, tests: Sequence[Judged], progress: Progress, told: Callable[
             advance()
 
 
-def judge(j: Judged, shown: HostEvidence | Exception, folder: Path) -> Outcome:
-    """One test of the evidence of its case."""
+def judge(j: CaseCheck, shown: HostCapture | Exception, folder: Path) -> Outcome:
+    """One test of the capture of its case."""
     title = f"{(j.test.__doc__ or '').partition(chr(10))[0]}"
-    exhibits = tuple(f"{j.case}.{end}" for end in ("log", "jsonl", "stderr") if (folder / f"{j.case}.{end}").exists())
-    open_ = Outcome(test=j.test.__name__, title=title, requirements=j.ids, verdict=Verdict.INCONCLUSIVE, scene=j.case)
+    excerpts = tuple(f"{j.case}.{end}" for end in ("log", "jsonl", "stderr") if (folder / f"{j.case}.{end}").exists())
+    open_ = Outcome(
+        test=j.test.__name__, title=title, requirements=j.ids, verdict=Verdict.INCONCLUSIVE, stimulus=j.case
+    )
     if isinstance(shown, Exception):
         return replace(open_, reason=str(shown))
     try:
         return replace(open_, verdict=Verdict.PASSED, saw=j.test(shown))
-    except Broken as e:
-        return replace(open_, verdict=Verdict.FAILED, saw=e.saw, due=e.due, exhibits=exhibits)
+    except Failed as e:
+        return replace(open_, verdict=Verdict.FAILED, saw=e.saw, due=e.due, excerpts=excerpts)
     except Unseen as e:
         return replace(open_, verdict=Verdict.NOT_OBSERVABLE, reason=str(e))
-    except TooLittle as e:
+    except Inconclusive as e:
         return replace(open_, reason=str(e))
 
 
-def perform(play: Play, name: str) -> HostEvidence:
-    """Play one case. Raises BenchError where it cannot be played."""
+def perform(play: Play, name: str) -> HostCapture:
+    """Play one case. Raises BenchError where it cannot be carried out."""
     play.folder.mkdir(parents=True, exist_ok=True)
     case = ALL[name]
     return on_line(play, case) if isinstance(case, LineCase) else on_board(play, case)
 
 
-def on_line(play: Play, case: LineCase) -> HostEvidence:
+def on_line(play: Play, case: LineCase) -> HostCapture:
     """Samples on a pseudo-terminal of ours."""
     with ExitStack() as stack:
         port = stack.enter_context(LinePort())
@@ -120,7 +124,7 @@ def on_line(play: Play, case: LineCase) -> HostEvidence:
         port.play((block.tobytes() for block in samples(case, form_of(play.profile))), host)
         port.close()
         status = host.wait()
-        return HostEvidence(
+        return HostCapture(
             case=case.name,
             bus=Bus([], NODE),
             told=host.told(),
@@ -135,7 +139,7 @@ def _form(profile: str) -> dict[str, str]:
     return {"word_bits": str(form.word_bits), "code_bits": str(form.code_bits)}
 
 
-def on_board(play: Play, case: Case) -> HostEvidence:
+def on_board(play: Play, case: Case) -> HostCapture:
     """An emulator in lockstep."""
     log = play.folder / f"{case.name}.log"
     with TemporaryDirectory(prefix="psabench-") as made:
@@ -143,23 +147,23 @@ def on_board(play: Play, case: Case) -> HostEvidence:
         profile = case.profile or play.profile
         text = case.scenario.replace("BOARD", play.board).replace("PROFILE", profile)
         scenario.write_text(text, encoding="utf-8")
-        status, stage, streamed = _perform(play, case, scenario, log)
-    return HostEvidence(
+        status, bench, streamed = _perform(play, case, scenario, log)
+    return HostCapture(
         case=case.name,
         bus=read_log(log.read_text(encoding="ascii").splitlines(), NODE) if log.exists() else Bus([], NODE),
-        told=stage.host.told(),
+        told=bench.host.told(),
         profile=profile,
         status=status,
-        marks=stage.marks,
-        stood_s=stage.stood_s,
-        clock=stage.clock,
+        marks=bench.marks,
+        stood_s=bench.stood_s,
+        clock=bench.clock,
         streamed=streamed,
-        cycles=stage.bridge.cycles if isinstance(stage.bridge, BusBridge) else (),
-        errors=_errors(stage.host),
+        cycles=bench.bridge.cycles if isinstance(bench.bridge, BusBridge) else (),
+        errors=_errors(bench.host),
     )
 
 
-def _perform(play: Play, case: Case, scenario: Path, log: Path) -> tuple[int | None, Stage, bool]:
+def _perform(play: Play, case: Case, scenario: Path, log: Path) -> tuple[int | None, HostBench, bool]:
     with ExitStack() as stack:
         emulator = stack.enter_context(Emulator(scenario, cans=[play.adapter, f"log:{log}"], pace="step"))
         control = stack.enter_context(Control(emulator.control_path or Path()))
@@ -169,30 +173,30 @@ def _perform(play: Play, case: Case, scenario: Path, log: Path) -> tuple[int | N
         where = {"bus": str(bridge.path)} if bridge else _places(emulator, play.link)
         host = _host(play, case.name, case.title, {**where, "form": str(case.form)})
         stack.callback(host.kill)
-        stage = Stage(emulator, control, host, speed=play.speed, node=NODE, bridge=bridge)
-        case.before(stage)
+        bench = HostBench(emulator, control, host, speed=play.speed, node=NODE, bridge=bridge)
+        case.before(bench)
         if bridge:
-            stage.run(READY_S, speed=0.0)
-        stage.stood_s = 0.0
+            bench.run(READY_S, speed=0.0)
+        bench.stood_s = 0.0
         host.start()
-        streamed = bridge is not None or _streams(stage, case)
+        streamed = bridge is not None or _streams(bench, case)
         if streamed:
-            case.play(stage)
+            case.play(bench)
         if bridge:
             bridge.close()
         if play.link == "pty":
             begun_s = time.monotonic()
             drain(Path(emulator.endpoint(can="slcan")["pty"]))
-            stage.stood_s = max(stage.stood_s, time.monotonic() - begun_s)
+            bench.stood_s = max(bench.stood_s, time.monotonic() - begun_s)
         control.close()
         emulator.stop()
-        return host.wait(), stage, streamed
+        return host.wait(), bench, streamed
 
 
-def _streams(stage: Stage, case: Case) -> bool:
+def _streams(bench: HostBench, case: Case) -> bool:
     """Whether the host has come, and has started the stream where there is one."""
-    stage.await_host()
-    return not case.streams or not case.busy or stage.await_stream(case.busy, case.ready_s)
+    bench.await_host()
+    return not case.streams or not case.busy or bench.await_stream(case.busy, case.ready_s)
 
 
 def _errors(host: Program | ByHand) -> str:

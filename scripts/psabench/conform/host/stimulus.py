@@ -1,8 +1,8 @@
-"""A case on the stage: an emulator in lockstep plays the board, the host runs beside it, both logs are kept.
+"""A case on the bench: an emulator in lockstep plays the board, the host runs beside it, both logs are kept.
 
 Simulated time is moved in small steps, no faster than the wall's time unless the case is in haste; on a slow machine it
 passes slower, and it waits for a host that reads slowly. So nothing depends on how fast this machine is, except what a
-host times by a clock of its own; how long the stage has stood still is therefore kept (`stood_s`).
+host times by a clock of its own; how long the bench has stood still is therefore kept (`stood_s`).
 """
 
 from __future__ import annotations
@@ -163,7 +163,7 @@ class Bridge(Protocol):
 
 
 @dataclass(slots=True)
-class Stage:
+class HostBench:
     """What a case plays on. speed: simulated seconds in one of the wall's, at most, while nothing is silent."""
 
     emulator: Emulator

@@ -1,7 +1,7 @@
 """A bus port of our own between a host and the emulated board: each cycle is kept, and moves simulated time.
 
 Lines and answers are those of docs/busport.md. Time stands still but for the host's own cycles, each of which takes so
-much of it: what is judged is what the host does between two words, and not how fast it or this machine is.
+much of it: what is checked is what the host does between two words, and not how fast it or this machine is.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A line port of our own: a pseudo-terminal on which samples are played to a host, none lost, as fast as it reads."""
+"""A line port of our own: a pseudo-terminal on which samples are sent to a host, none lost, as fast as it reads."""
 
 from __future__ import annotations
 

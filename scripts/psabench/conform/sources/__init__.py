@@ -1,1 +1,1 @@
-"""Files and probes to evidence."""
+"""Files and probes to capture."""

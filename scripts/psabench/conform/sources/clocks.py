@@ -13,10 +13,10 @@ import numpy as np
 from psabench.boards.board import Beat
 from psabench.boards.psa2.conform.capture_line import transfers
 from psabench.boards.registry import BOARDS
-from psabench.conform.capture.log import CanLog, Evidence, LineLog
+from psabench.conform.capture.log import CanLog, Capture, LineLog
 from psabench.conform.profile import Variant
 from psabench.conform.requirements import requirements
-from psabench.conform.verdict import TooLittle
+from psabench.conform.verdict import Inconclusive
 from psabench.link import signals
 from psabench.link.protocol_files import message
 from psabench.link.signals import Floats, Ints
@@ -80,7 +80,7 @@ class Clocks:
         return {name: str(r) for name, r in found.items() if r is not None}
 
 
-def estimate(e: Evidence) -> Clocks:
+def estimate(e: Capture) -> Clocks:
     """Of all that the recording has; None where it has too little, or the board no regular period that is known."""
     beat = BEATS.get(e.variant.family)
     period_s = None if beat is None else _period_s(beat, e.variant)
@@ -129,7 +129,7 @@ def _of_lines(log: LineLog, beat: Beat, period_s: float) -> Ratio | None:
     return ratio(beats * period_s, at_s, log.resolution_ns / NS)
 
 
-def _of_counter(e: Evidence, beat: Beat, period_s: float) -> Ratio | None:
+def _of_counter(e: Capture, beat: Beat, period_s: float) -> Ratio | None:
     count, t_s, bits = _signal(e, beat.message, beat.counter)
     steps = np.diff(count) % (1 << bits)
     cuts = np.flatnonzero((steps == 0) | (steps > 1 << bits - 1)) + 1  # begun again
@@ -139,7 +139,7 @@ def _of_counter(e: Evidence, beat: Beat, period_s: float) -> Ratio | None:
     return ratio(beats * period_s, t_s[begin:end], CAN_RESOLUTION_S)
 
 
-def _of_stamps(e: Evidence, beat: Beat) -> Ratio | None:
+def _of_stamps(e: Capture, beat: Beat) -> Ratio | None:
     name, signal = beat.stamp
     if not name:
         return None
@@ -152,19 +152,19 @@ def _of_stamps(e: Evidence, beat: Beat) -> Ratio | None:
     return ratio(stamp_s, t_s, max(CAN_RESOLUTION_S, unit_s)) if (np.diff(stamp_s) > 0).all() else None
 
 
-def _signal(e: Evidence, name: str, signal: str) -> tuple[Ints, Floats, int]:
+def _signal(e: Capture, name: str, signal: str) -> tuple[Ints, Floats, int]:
     """Raw values, time stamps and width of a signal of the frames that have their length."""
     length = int(message(name).length)
     log = CanLog(frames=tuple(f for f in e.frames_of(name).frames if len(f.data) == length and not f.remote))
     return log.raw(name)[signal], log.t_s, signals.layout(message(name))[signal].bits
 
 
-def _of_words(e: Evidence) -> Ratio | None:
+def _of_words(e: Capture) -> Ratio | None:
     """The same words on the lines and on the bus; those that came once on each."""
     bits = int(e.variant["word_bits"])
     try:
         t = transfers(e.wires).of(4 * bits)
-    except TooLittle:
+    except Inconclusive:
         return None
     x, t_xy, _ = _signal(e, "PSA2_XY", "X")
     y = _signal(e, "PSA2_XY", "Y")[0]

@@ -28,7 +28,7 @@ class Recording:
     can: CanLog | None
     lines: Recorded | None
     files: Mapping[str, str]  # path: SHA-256, what was read, where it ended
-    notes: Sequence[str]  # files that were not judged to their end
+    notes: Sequence[str]  # files that were not checked to their end
 
 
 def read_files(paths: Sequence[Path], family: str, told: Mapping[str, str], bounds: Bounds) -> Recording:

@@ -8,7 +8,7 @@ from psabench.boards.registry import BOARDS
 from psabench.conform.capture.log import LineLog
 from psabench.conform.sources.samples import PORT_LINES
 from psabench.conform.sources.taken import LineTake
-from psabench.conform.verdict import TooLittle
+from psabench.conform.verdict import Inconclusive
 from psabench.errors import BadInput
 from psabench.link.vcd import Vcd, Wire
 
@@ -20,12 +20,12 @@ class Recorded(LineLog):
 
     def __contains__(self, name: str) -> bool:
         if not super().__contains__(name):
-            raise TooLittle(f"the recording has no line {name}")
+            raise Inconclusive(f"the recording has no line {name}")
         return True
 
     def __getitem__(self, name: str) -> Wire:
         if name not in self.recording.wires:
-            raise TooLittle(f"the recording has no line {name}")
+            raise Inconclusive(f"the recording has no line {name}")
         return self.recording.wires[name]
 
 

@@ -1,7 +1,7 @@
 """What a reader took from a file, and the bounds within which every reader keeps.
 
 Whatever the bytes of a file are, a reader ends in `BadInput` with the file and the place, or in a take whose `note`
-says where it stopped and why. What came before the damage is judged.
+says where it stopped and why. What came before the damage is checked.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ BLOCK = 1 << 22  # bytes looked at together
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bounds:
-    """How much of a file is judged. line_hz None: the file says it, or edges are as exact as its unit."""
+    """How much of a file is checked. line_hz None: the file says it, or edges are as exact as its unit."""
 
     max_s: float = MAX_S
     line_hz: float | None = None

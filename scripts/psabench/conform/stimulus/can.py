@@ -1,14 +1,14 @@
-"""Scenes of the services that all boards have on CAN."""
+"""Stimuli of the services that all boards have on CAN."""
 
 from __future__ import annotations
 
 from psabench.boards.objects import Common
 from psabench.boards.registry import BOARDS
-from psabench.conform.capture.log import Evidence
+from psabench.conform.capture.log import Capture
 from psabench.conform.dut import Subject
-from psabench.conform.plan import scene
+from psabench.conform.plan import stimulus
 from psabench.conform.raw_can import NMT_START, OFF, TPDO, Talk, flood, read, talk
-from psabench.conform.verdict import Broken, TooLittle
+from psabench.conform.verdict import Failed, Inconclusive
 
 BEATS_S, STREAM_S = 3.3, 0.2
 FLOOD_S, TRIES = 0.15, 5  # each flood twice as long as the one before
@@ -16,8 +16,8 @@ CALM_S = 2.0  # an overload is over after one second
 CALLED = (Common.DEVICE_TYPE, Common.ERROR_REGISTER, Common.DEVICE_NAME, Common.IDENTITY, Common.HEARTBEAT_MS, 0x5FFF)
 
 
-@scene("services", boards=BOARDS)
-def services(s: Subject) -> Evidence:
+@stimulus("services", boards=BOARDS)
+def services(s: Subject) -> Capture:
     """A reset, heartbeats, SDO requests good and bad, a stream."""
     with talk(s) as t, s.take(lines=False) as take:
         t.take = take
@@ -30,11 +30,11 @@ def services(s: Subject) -> Evidence:
         t.nmt(NMT_START)
         s.run_for(STREAM_S)
         t.hush()
-    return s.evidence("services", take)
+    return s.capture("services", take)
 
 
-@scene("overload", boards=BOARDS)
-def overload(s: Subject) -> Evidence:
+@stimulus("overload", boards=BOARDS)
+def overload(s: Subject) -> Capture:
     """Every TPDO switched on, a stream, a bus that others fill until samples are lost, two seconds of calm."""
     with talk(s, reset=True) as t:
         s.wait_ready()
@@ -55,13 +55,13 @@ def overload(s: Subject) -> Evidence:
             take.facts["history"] = t.upload(Common.ERROR_HISTORY, 1)
     if not take.facts["dropped"]:
         _nothing_lost(s)
-    return s.evidence("overload", take)
+    return s.capture("overload", take)
 
 
 def _nothing_lost(s: Subject) -> None:
     if s.lockstep:
-        raise Broken("no sample dropped on a bus that was full for seconds", "samples dropped and counted")
-    raise TooLittle("the bus could not be filled long enough for a sample to be lost")
+        raise Failed("no sample dropped on a bus that was full for seconds", "samples dropped and counted")
+    raise Inconclusive("the bus could not be filled long enough for a sample to be lost")
 
 
 def everything_on(t: Talk) -> None:

@@ -1,25 +1,25 @@
-"""Scenes of the line port."""
+"""Stimuli of the line port."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from psabench.boards.registry import BOARDS
-from psabench.conform.capture.log import Evidence
+from psabench.conform.capture.log import Capture
 from psabench.conform.dut import Subject
-from psabench.conform.plan import scene
+from psabench.conform.plan import stimulus
 from psabench.conform.sources.samples import line_log
-from psabench.conform.verdict import TooLittle
+from psabench.conform.verdict import Inconclusive
 from psabench.link.lineport import SAMPLE_HZ
 
 LOOK_S, TAIL_S = 0.06, 0.02
 
 
-@scene("line_port", boards=BOARDS)
-def line_port(s: Subject) -> Evidence:
+@stimulus("line_port", boards=BOARDS)
+def line_port(s: Subject) -> Capture:
     """The line port, beside all pins where they are there. Facts: `bytes` of the port, its edges as `port`."""
     if s.line_port is None:
-        raise TooLittle("no line port")
+        raise Inconclusive("no line port")
     s.wait_ready()
     both = s.probe is not None and s.probe is not s.line_port
     with s.take(lines=both) as take:
@@ -33,4 +33,4 @@ def line_port(s: Subject) -> Evidence:
     data = s.line_port.data
     take.facts["bytes"] = np.frombuffer(data, np.uint8)
     take.facts["port"] = line_log(data, s.variant.family, SAMPLE_HZ)
-    return s.evidence("line_port", take)
+    return s.capture("line_port", take)

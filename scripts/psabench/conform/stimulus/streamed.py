@@ -1,17 +1,17 @@
-"""What scenes of boards that send readings have in common: from Res to some readings, and a while of them."""
+"""What stimuli of boards that send readings have in common: from Res to some readings, and a while of them."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
-from psabench.conform.capture.log import Evidence
+from psabench.conform.capture.log import Capture
 from psabench.conform.dut import Subject, Take
 
 BOOT_S = 0.002
 
 
-def from_res(s: Subject, dwell_s: float) -> Evidence:
-    """The scene power_on: Res, and readings from as soon as it has booted.
+def from_res(s: Subject, dwell_s: float) -> Capture:
+    """The stimulus power_on: Res, and readings from as soon as it has booted.
 
     facts: prompt, in lockstep alone: the start came before the first reading.
     """
@@ -22,7 +22,7 @@ def from_res(s: Subject, dwell_s: float) -> Evidence:
         s.unit.start()
         s.run_for(dwell_s)
         s.unit.stop()
-    return s.evidence("power_on", take)
+    return s.capture("power_on", take)
 
 
 def readings(s: Subject, begun_s: float, pass_time: Callable[[], object], *, lines: bool = True) -> Take:

@@ -10,16 +10,16 @@ from psabench.conform.bus_host import refused
 from psabench.conform.capture.messages import emergencies
 from psabench.conform.dictionary import as_the_dictionary_says
 from psabench.conform.dut import Subject
-from psabench.conform.plan import trial
+from psabench.conform.plan import active
 from psabench.conform.proves import proves
 from psabench.conform.requirements import requirements
-from psabench.conform.verdict import Broken
+from psabench.conform.verdict import Failed
 
 FRAMES = (OD.COUNTERS, 14)  # level frames taken
 
 
 @proves("GYRO-MODE-09")
-@trial(needs={"can"})
+@active(needs={"can"})
 def modes_that_cannot_be_are_refused(s: Subject) -> str:
     """Ask for a mode just after Res and look for the reason."""
     code = requirements()["GYRO-MODE-09"].limit("abort_code")
@@ -28,7 +28,7 @@ def modes_that_cannot_be_are_refused(s: Subject) -> str:
     refused(lambda: s.unit.node.write(OD.CONTROL, 1, int(Mode.LEVEL)), code, "mode 1 just after Res")
     reason = s.unit.refusal()
     if not reason:
-        raise Broken("no reason in 2031h", "one in words")
+        raise Failed("no reason in 2031h", "one in words")
     calm(s)
     s.unit.node.write(OD.CONTROL, 1, int(Mode.LEVEL))
     calm(s)
@@ -36,7 +36,7 @@ def modes_that_cannot_be_are_refused(s: Subject) -> str:
 
 
 @proves("GYRO-MODE-10")
-@trial(needs={"can"})
+@active(needs={"can"})
 def a_run_s_settings_stand_while_it_runs(s: Subject) -> str:
     """Write 2102h and 2103h in a run."""
     code = requirements()["GYRO-MODE-10"].limit("abort_code")
@@ -52,7 +52,7 @@ def a_run_s_settings_stand_while_it_runs(s: Subject) -> str:
 
 
 @proves("GYRO-ERR-02")
-@trial(needs={"can"})
+@active(needs={"can"})
 def what_does_not_settle_is_told(s: Subject) -> str:
     """Allow a fiftieth of an arc minute and a second, and let a run begin."""
     code = int(requirements()["GYRO-ERR-02"].limit("emcy_code"))
@@ -64,20 +64,20 @@ def what_does_not_settle_is_told(s: Subject) -> str:
         until_mode(s, Mode.HOLD, RUN_LIMIT_S)
         s.run_for(0.1)
         s.unit.stop()
-    e = s.evidence("unsettled", take)
+    e = s.capture("unsettled", take)
     c = columns(e)
     calm(s)
     if (c["PHASE"] == Phase.WINDOW).any() or c["MODE"][-1] != Mode.HOLD or c["NOT_SETTLED"][-1] != 1:
-        raise Broken(
+        raise Failed(
             f"mode {c['MODE'][-1]:g}, NOT_SETTLED {c['NOT_SETTLED'][-1]:g}", "no window, mode 2, NOT_SETTLED 1"
         )
     if code not in [k for k, _ in emergencies(e, EMCY)]:
-        raise Broken(f"emergencies {[f'{k:04X}h' for k, _ in emergencies(e, EMCY)]}", f"{code:04X}h")
+        raise Failed(f"emergencies {[f'{k:04X}h' for k, _ in emergencies(e, EMCY)]}", f"{code:04X}h")
     return "no window, mode 2, NOT_SETTLED, FF23h"
 
 
 @proves("GYRO-LEV-05")
-@trial(needs={"can"})
+@active(needs={"can"})
 def frames_of_others_are_not_taken(s: Subject) -> str:
     """Send frames of another node's PSA-2 while the level unit is silent."""
     calm(s)
@@ -90,23 +90,23 @@ def frames_of_others_are_not_taken(s: Subject) -> str:
     taken = int(s.unit.node.read(*FRAMES)) - before
     calm(s)
     if taken:
-        raise Broken(f"{taken} frames of another node taken", "none")
+        raise Failed(f"{taken} frames of another node taken", "none")
     return "none of 20 frames taken"
 
 
 @proves("GYRO-CAN-05")
-@trial(needs={"can"})
+@active(needs={"can"})
 def the_board_says_what_it_is(s: Subject) -> str:
     """Read 1008h and 1018h sub 2."""
     name, code = s.unit.node.read(OD.DEVICE_NAME), int(s.unit.node.read(OD.IDENTITY, 2))
     due = int(requirements()["GYRO-CAN-05"].limit("product_code"))
     if (name, code) != ("GYRO", due):
-        raise Broken(f"{name}, {code:08X}h", f"GYRO, {due:08X}h")
+        raise Failed(f"{name}, {code:08X}h", f"GYRO, {due:08X}h")
     return f"{name}, {code:08X}h"
 
 
 @proves("GYRO-CAN-04")
-@trial(needs={"can"})
+@active(needs={"can"})
 def objects_are_as_the_dictionary_says(s: Subject) -> str:
     """Read every object of the EDS and write where nothing may be written."""
     calm(s)

@@ -7,8 +7,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from psabench.conform.capture.log import CanLog, Evidence
-from psabench.conform.verdict import TooLittle
+from psabench.conform.capture.log import CanLog, Capture
+from psabench.conform.verdict import Inconclusive
 from psabench.link.protocol_files import message
 from psabench.link.signals import Floats, layout
 
@@ -17,8 +17,8 @@ EMCY = "GYRO_EMCY"
 EARTH_DEGPH = 15.041067  # docs/reference/protocol_gyro.md
 
 
-def columns(e: Evidence, least: int = 20) -> Mapping[str, Floats]:
-    """Signals of whole readings in the units of the DBC. Raises TooLittle."""
+def columns(e: Capture, least: int = 20) -> Mapping[str, Floats]:
+    """Signals of whole readings in the units of the DBC. Raises Inconclusive."""
     return _columns(e.can, e.variant.family, e.node, least)
 
 
@@ -27,14 +27,14 @@ def _columns(can: CanLog, board: str, node: int, least: int) -> Mapping[str, Flo
     logs = [can.of(name, board, node) for name in MESSAGES]
     n = min(len(log) for log in logs)
     if n < least:
-        raise TooLittle(f"{', '.join(f'{len(log)} {name}' for log, name in zip(logs, MESSAGES, strict=True))}")
+        raise Inconclusive(f"{', '.join(f'{len(log)} {name}' for log, name in zip(logs, MESSAGES, strict=True))}")
     found: dict[str, Floats] = {}
     try:
         for name, log in zip(MESSAGES, logs, strict=True):
             raw, scales = CanLog(frames=log.frames[:n]).raw(name), layout(message(name))
             found |= {k: np.asarray(v * scales[k].scale, np.float64) for k, v in raw.items()}
     except ValueError as err:
-        raise TooLittle(str(err)) from err
+        raise Inconclusive(str(err)) from err
     return found
 
 
@@ -43,9 +43,9 @@ def vertical_degph(latitude_deg: float) -> float:
     return EARTH_DEGPH * float(np.sin(np.radians(latitude_deg)))
 
 
-def setting(e: Evidence, name: str) -> float:
-    """A setting of the unit, or what else the scene has read. Raises TooLittle."""
+def setting(e: Capture, name: str) -> float:
+    """A setting of the unit, or what else the stimulus has read. Raises Inconclusive."""
     value = e.facts.get(name)
     if not isinstance(value, int | float):
-        raise TooLittle(f"{name} is not known")
+        raise Inconclusive(f"{name} is not known")
     return float(value)

@@ -9,11 +9,11 @@ import numpy as np
 from psabench.boards.gyro.conform.capture_readings import EARTH_DEGPH, EMCY, MESSAGES, columns, setting, vertical_degph
 from psabench.boards.gyro.device import Mode, Phase
 from psabench.conform.capture.intervals import interval, wires_needed
-from psabench.conform.capture.log import CanLog, Evidence
+from psabench.conform.capture.log import CanLog, Capture
 from psabench.conform.capture.messages import as_laid_out, emergencies, in_turn, late_readings
 from psabench.conform.plan import check
 from psabench.conform.proves import proves, row_for
-from psabench.conform.verdict import Broken, TooLittle
+from psabench.conform.verdict import Failed, Inconclusive
 from psabench.estimate.angles import wrapped_deg
 from psabench.link.protocol_files import dbc_node, message
 from psabench.link.signals import Floats, layout
@@ -27,26 +27,26 @@ LIMITS = ("GYRO-LAW-05", "GYRO-LAW-06")
 
 @proves("GYRO-CAN-01")
 @check("run", needs={"can"})
-def three_messages_make_a_reading(e: Evidence) -> str:
+def three_messages_make_a_reading(e: Capture) -> str:
     """Follow the messages of each step."""
     return in_turn(e, MESSAGES)
 
 
 @proves("GYRO-CAN-02")
 @check("run", needs={"can"})
-def steps_are_counted(e: Evidence) -> str:
+def steps_are_counted(e: Capture) -> str:
     """Look at STEP from reading to reading."""
     step = columns(e)["STEP"].astype(np.int64)
     modulo = int(row_for(e, "GYRO-CAN-02").limit("modulo"))
     bad = np.flatnonzero(np.diff(step) % modulo != 1)
     if len(bad):
-        raise Broken(f"STEP {step[bad[0]]}, then {step[bad[0] + 1]}", "one more")
+        raise Failed(f"STEP {step[bad[0]]}, then {step[bad[0] + 1]}", "one more")
     return f"{len(step)} readings without a gap"
 
 
 @proves("GYRO-CAN-02")
 @check("run", needs={"line"})
-def steps_come_at_their_rate(e: Evidence) -> str:
+def steps_come_at_their_rate(e: Capture) -> str:
     """Measure from one rise of STEP to the next."""
     wires_needed(e, "STEP")
     row, rises = row_for(e, "GYRO-CAN-02"), e.wires.rises("STEP")
@@ -57,21 +57,21 @@ def steps_come_at_their_rate(e: Evidence) -> str:
 
 @proves("GYRO-CAN-03")
 @check("run", needs={"can"})
-def messages_have_their_lengths(e: Evidence) -> str:
+def messages_have_their_lengths(e: Capture) -> str:
     """Look at the lengths of the three messages, and at bits that have no signal."""
     return as_laid_out(e, MESSAGES)
 
 
-def _codes(e: Evidence) -> tuple[np.ndarray, Floats]:
+def _codes(e: Capture) -> tuple[np.ndarray, Floats]:
     """SEQ (n,) and volts X, Y (n, 2) of the level unit's frames."""
     node = int(setting(e, "level_node"))
     log = e.can.of_id(int(message("PSA2_XY").frame_id) - dbc_node("psa2") + node)
     if len(log) < 20:
-        raise TooLittle(f"{len(log)} frames of the level unit came")
+        raise Inconclusive(f"{len(log)} frames of the level unit came")
     try:
         raw = log.raw("PSA2_XY")
     except ValueError as err:
-        raise TooLittle(str(err)) from err
+        raise Inconclusive(str(err)) from err
     scales = layout(message("PSA2_XY"))
     volts = np.stack([raw[a] * scales[a].scale for a in "XY"], axis=1)
     return raw["SEQ"], volts
@@ -79,7 +79,7 @@ def _codes(e: Evidence) -> tuple[np.ndarray, Floats]:
 
 @proves("GYRO-LEV-01")
 @check("run", needs={"can"})
-def level_angles_follow_from_the_codes(e: Evidence) -> str:
+def level_angles_follow_from_the_codes(e: Capture) -> str:
     """Compute BETA and GAMMA from the mean codes of the level unit's frames of each step."""
     row, c = row_for(e, "GYRO-LEV-01"), columns(e)
     seq, volts = _codes(e)
@@ -96,19 +96,19 @@ def level_angles_follow_from_the_codes(e: Evidence) -> str:
         gamma = -np.arcsin(np.clip(g[0] / np.cos(beta), -1, 1))
         off = max(abs(np.degrees(beta) - c["BETA"][k]), abs(np.degrees(gamma) - c["GAMMA"][k])) * 1e6
         if off > row.limit("tolerance_udeg"):
-            raise Broken(
+            raise Failed(
                 f"BETA {c['BETA'][k]:.6f}, GAMMA {c['GAMMA'][k]:.6f} deg",
                 f"{np.degrees(beta):.6f}, {np.degrees(gamma):.6f}",
             )
         worst, count = max(worst, off), count + 1
     if count < 20:
-        raise TooLittle(f"{count} readings whose frames of the level unit are known")
+        raise Inconclusive(f"{count} readings whose frames of the level unit are known")
     return f"{count} readings, {worst:.2f} udeg off at most"
 
 
 @proves("GYRO-LEV-02")
 @check("run", needs={"can"})
-def level_seq_is_that_of_the_last_frame(e: Evidence) -> str:
+def level_seq_is_that_of_the_last_frame(e: Capture) -> str:
     """Compare LEVEL_SEQ with the frames of the level unit that passed before the reading."""
     node = int(setting(e, "level_node"))
     theirs = int(message("PSA2_XY").frame_id) - dbc_node("psa2") + node
@@ -120,10 +120,10 @@ def level_seq_is_that_of_the_last_frame(e: Evidence) -> str:
         elif f.can_id == mine and latest is not None and len(f.data) == 8:
             told = int.from_bytes(f.data[6:], "little")
             if (latest - told) & 0xFFFF > 1:  # a frame may pass between the step and its message
-                raise Broken(f"LEVEL_SEQ {told}", f"{latest}, the last that passed", frames=(f,))
+                raise Failed(f"LEVEL_SEQ {told}", f"{latest}, the last that passed", frames=(f,))
             count += 1
     if count < 20:
-        raise TooLittle(f"{count} readings with frames of the level unit")
+        raise Inconclusive(f"{count} readings with frames of the level unit")
     return f"{count} readings"
 
 
@@ -145,7 +145,7 @@ def _runs(rows: np.ndarray) -> list[tuple[int, ...]]:
 
 @proves("GYRO-LAW-01")
 @check("run", needs={"can"})
-def u1_levels(e: Evidence) -> str:
+def u1_levels(e: Capture) -> str:
     """Compute U1 of readings in which nothing turns from BETA and GAMMA of the same step."""
     c = columns(e)
     mine = _steady(c, Mode.GYROCOMPASS, (Phase.SETTLING, Phase.WINDOW)) | _steady(c, Mode.LEVEL, (Phase.IDLE,))
@@ -158,11 +158,11 @@ def u1_levels(e: Evidence) -> str:
 
 @proves("GYRO-LAW-02")
 @check("run", needs={"can"})
-def u2_holds_the_gimbal(e: Evidence) -> str:
+def u2_holds_the_gimbal(e: Capture) -> str:
     """Compute U2 at each position of a run from ENCODER, BETA and GAMMA; what the sensor is off there is a constant."""
     c, positions = columns(e), e.facts.get("positions")
     if not isinstance(positions, list):
-        raise TooLittle("the positions are not known")
+        raise Inconclusive("the positions are not known")
     mine = _steady(c, Mode.GYROCOMPASS, (Phase.WINDOW,)) & (c["SATURATED"] == 0)
     k = np.clip(c["POSITION"].astype(np.int64) - 1, 0, len(positions) - 1)
     b, g = np.radians(c["BETA"]), np.radians(c["GAMMA"])
@@ -177,16 +177,16 @@ def u2_holds_the_gimbal(e: Evidence) -> str:
 
 @proves("GYRO-LAW-02")
 @check("hold", needs={"can"})
-def u2_turns_with_the_earth(e: Evidence) -> str:
+def u2_turns_with_the_earth(e: Capture) -> str:
     """Turn Wz round by the latitude in mode 2, and compute U2 before and after with one constant for the sensor."""
     parts, row = e.facts.get("latitudes"), row_for(e, "GYRO-LAW-02")
     if not isinstance(parts, list):
-        raise TooLittle("no latitudes in the recording")
+        raise Inconclusive("no latitudes in the recording")
     logs = [columns(e.with_can(CanLog(frames=e.can.frames[a:b]))) for _, a, b in parts]
     c = {name: np.concatenate([log[name] for log in logs]) for name in logs[0]}
     wz = np.repeat([vertical_degph(d) for d, _, _ in parts], [len(log["U2"]) for log in logs])
     if (c["MODE"] != Mode.HOLD).any():
-        raise TooLittle("another mode than 2")
+        raise Inconclusive("another mode than 2")
     b, g = np.radians(c["BETA"]), np.radians(c["GAMMA"])
     moved = wrapped_deg(c["ENCODER"] - c["ENCODER"][0])
     m2 = setting(e, "m2_per_s")
@@ -197,7 +197,7 @@ def u2_turns_with_the_earth(e: Evidence) -> str:
 
 @proves("GYRO-LAW-03")
 @check("run", needs={"can"})
-def u2_runs_free_when_it_levels(e: Evidence) -> str:
+def u2_runs_free_when_it_levels(e: Capture) -> str:
     """Compute U2 of readings in mode 1."""
     c = columns(e)
     b, g = np.radians(c["BETA"]), np.radians(c["GAMMA"])
@@ -209,51 +209,51 @@ def u2_runs_free_when_it_levels(e: Evidence) -> str:
 
 def _as_the_law(saw: Floats, due: Floats, mine: np.ndarray, most: float) -> str:
     if mine.sum() < 20:
-        raise TooLittle(f"{int(mine.sum())} readings in which nothing turns")
+        raise Inconclusive(f"{int(mine.sum())} readings in which nothing turns")
     off = np.abs(saw - due)[mine]
     if off.max() > most:
         k = int(np.flatnonzero(mine)[int(off.argmax())])
-        raise Broken(f"{saw[k]:.3f} deg/h", f"{due[k]:.3f} +- {most:g} deg/h")
+        raise Failed(f"{saw[k]:.3f} deg/h", f"{due[k]:.3f} +- {most:g} deg/h")
     return f"{len(off)} readings, {off.max():.3f} deg/h off at most"
 
 
 @proves("GYRO-LAW-04")
 @check("run", needs={"can"})
-def windows_show_the_rate_of_the_earth(e: Evidence) -> str:
+def windows_show_the_rate_of_the_earth(e: Capture) -> str:
     """Take the means of -m1 beta over the windows; the Earth's part of them goes as the sine of the angle."""
     c, row = columns(e), row_for(e, "GYRO-LAW-04")
     count = int(c["POSITION"].max())
     if count < 3:
-        raise TooLittle(f"{count} positions")
+        raise Inconclusive(f"{count} positions")
     rows, s = [], []
     for k in range(1, count + 1):
         mine = (c["PHASE"] == Phase.WINDOW) & (c["POSITION"] == k) & (c["MODE"] == Mode.GYROCOMPASS)
         if mine.sum() < 100:
-            raise TooLittle(f"no window at position {k}")
+            raise Inconclusive(f"no window at position {k}")
         q = np.radians(float(c["ENCODER"][mine].mean()))
         rows.append([np.sin(q), np.cos(q), 1.0])
         s.append(-setting(e, "m1_per_s") * float(c["BETA"][mine].mean()) * 3600)
     a, b, _ = np.linalg.lstsq(np.array(rows), np.array(s), rcond=None)[0]
     saw, due = float(np.hypot(a, b)), EARTH_DEGPH * float(np.cos(np.radians(setting(e, "latitude_deg"))))
     if abs(saw - due) > row.limit("tolerance_degph"):
-        raise Broken(f"{saw:.4f} deg/h", f"{due:.4f} +- {row.limit('tolerance_degph'):g} deg/h, We")
+        raise Failed(f"{saw:.4f} deg/h", f"{due:.4f} +- {row.limit('tolerance_degph'):g} deg/h, We")
     return f"{saw:.4f} deg/h, We is {due:.4f}"
 
 
 @proves("GYRO-LAW-05", "GYRO-LAW-06")
 @check("limits", needs={"can"})
-def rates_are_limited_and_say_so(e: Evidence) -> str:
+def rates_are_limited_and_say_so(e: Capture) -> str:
     """Look at U1, U2 and SATURATED when the level is reported wrongly and the loop is stiff."""
     c, most = columns(e), row_for(e, *LIMITS).limit("rate_max_dps") * 3600
     top = np.maximum(np.abs(c["U1"]), np.abs(c["U2"]))
     near = row_for(e, *LIMITS).limit("tolerance_degph")
     if top.max() > most + near:
-        raise Broken(f"{top.max() / 3600:.3f} deg/s", f"{most / 3600:g} deg/s at most")
+        raise Failed(f"{top.max() / 3600:.3f} deg/s", f"{most / 3600:g} deg/s at most")
     at_limit = top > most - near
     if not at_limit.any():
-        raise TooLittle(f"{top.max() / 3600:.3f} deg/s at most: nothing was limited")
+        raise Inconclusive(f"{top.max() / 3600:.3f} deg/s at most: nothing was limited")
     if (at_limit != (c["SATURATED"] == 1)).any():
-        raise Broken(
+        raise Failed(
             f"{int((c['SATURATED'] == 1).sum())} readings with SATURATED", f"{int(at_limit.sum())} at the limit"
         )
     return f"{int(at_limit.sum())} readings at {most / 3600:g} deg/s, as many with SATURATED"
@@ -261,7 +261,7 @@ def rates_are_limited_and_say_so(e: Evidence) -> str:
 
 @proves("GYRO-ERR-03")
 @check("limits", needs={"can"})
-def a_limited_rate_is_an_emergency(e: Evidence) -> str:
+def a_limited_rate_is_an_emergency(e: Capture) -> str:
     """Look for EMCY FF24h and for its end a second after the last limited rate."""
     row, c = row_for(e, "GYRO-ERR-03"), columns(e)
     found = emergencies(e, EMCY)
@@ -270,19 +270,19 @@ def a_limited_rate_is_an_emergency(e: Evidence) -> str:
     ended = [t for k, t in found if k == 0]
     steps = c["STEP"][c["SATURATED"] == 1]
     if not len(steps):
-        raise TooLittle("no rate was limited")
+        raise Inconclusive("no rate was limited")
     if len(begun) != 1 or not ended:
-        raise Broken(f"emergencies {[f'{k:04X}h' for k, _ in found]}", f"{code:04X}h once, then 0000h")
+        raise Failed(f"emergencies {[f'{k:04X}h' for k, _ in found]}", f"{code:04X}h once, then 0000h")
     period_s = row_for(e, "GYRO-CAN-02").limit("period_us") * 1e-6
     due = float(steps[-1] - steps[0]) * period_s + row.limit("ends_s")
     if abs(ended[-1] - begun[0] - due) > 2 * period_s:
-        raise Broken(f"ended {ended[-1] - begun[0]:.3f} s after it began", f"{due:.3f} s")
+        raise Failed(f"ended {ended[-1] - begun[0]:.3f} s after it began", f"{due:.3f} s")
     return f"FF24h once, ended {ended[-1] - begun[0]:.3f} s later"
 
 
 @proves("GYRO-LEV-03")
 @check("silence", needs={"can"})
-def missing_frames_are_told(e: Evidence) -> str:
+def missing_frames_are_told(e: Capture) -> str:
     """Look for LEVEL_LOST and EMCY FF21h while the level unit is silent, and for their end."""
     row, c = row_for(e, "GYRO-LEV-03"), columns(e)
     lost = c["LEVEL_LOST"] == 1
@@ -290,7 +290,7 @@ def missing_frames_are_told(e: Evidence) -> str:
     found = emergencies(e, EMCY)
     begun, ended = [t for k, t in found if k == code], [t for k, t in found if k == 0]
     if not lost.any() or lost.all() or not begun or not ended:
-        raise Broken(
+        raise Failed(
             f"LEVEL_LOST in {int(lost.sum())} readings, {[f'{k:04X}h' for k, _ in found]}", f"{code:04X}h, then 0000h"
         )
     steps = c["STEP"][lost]
@@ -298,46 +298,46 @@ def missing_frames_are_told(e: Evidence) -> str:
     due = float(steps[-1] - steps[0]) * period_s + row.limit("ends_s")
     took = ended[-1] - begun[0]
     if abs(took - due) > row.limit("tolerance_s"):
-        raise Broken(f"ended {took:.3f} s after it began", f"{due:.3f} s")
+        raise Failed(f"ended {took:.3f} s after it began", f"{due:.3f} s")
     return f"LEVEL_LOST in {int(lost.sum())} readings, FF21h ended {took:.3f} s after it began"
 
 
 @proves("GYRO-LEV-04")
 @check("silence", needs={"can"})
-def angles_stay_without_the_level_unit(e: Evidence) -> str:
+def angles_stay_without_the_level_unit(e: Capture) -> str:
     """Look at BETA, GAMMA and U1 while the level unit is silent."""
     row, c = row_for(e, "GYRO-LEV-04"), columns(e)
     lost = np.flatnonzero(c["LEVEL_LOST"] == 1)
     silent = round(row.limit("silent_ms") * 1e3 / row_for(e, "GYRO-CAN-02").limit("period_us"))
     if len(lost) < 2 * silent:
-        raise TooLittle(f"{len(lost)} readings without the level unit")
+        raise Inconclusive(f"{len(lost)} readings without the level unit")
     mine = lost[silent:-silent]
     for name in ("BETA", "GAMMA", "U1"):
         if np.ptp(c[name][mine]) > 0:
-            raise Broken(f"{name} moves by {np.ptp(c[name][mine]):g}", "it stays")
+            raise Failed(f"{name} moves by {np.ptp(c[name][mine]):g}", "it stays")
     begun = [k for k, _ in emergencies(e, EMCY) if k == int(row.limit("emcy_code"))]
     if len(begun) != 1:
-        raise Broken(f"{len(begun)} emergencies FF21h", "one")
+        raise Failed(f"{len(begun)} emergencies FF21h", "one")
     return f"{len(mine)} readings with the same angles and U1, one emergency"
 
 
 @proves("GYRO-RES-01")
 @check("power_on", needs={"can"})
-def res_ends_the_mode_and_counts_anew(e: Evidence) -> str:
+def res_ends_the_mode_and_counts_anew(e: Capture) -> str:
     """Look at MODE and STEP after a Res while it levelled."""
     period_s = row_for(e, "GYRO-CAN-02").limit("period_us") * 1e-6
     late = late_readings(e, "GYRO_HEARTBEAT", MESSAGES[0], 0.0, period_s)
     c = columns(e)
     if c["MODE"].any():
-        raise Broken(f"mode {c['MODE'].max():g}", "0")
+        raise Failed(f"mode {c['MODE'].max():g}", "0")
     if c["STEP"][0] > 1 + late:
-        raise Broken(f"STEP {c['STEP'][0]:g} first", f"{1 + late} at most")
+        raise Failed(f"STEP {c['STEP'][0]:g} first", f"{1 + late} at most")
     return f"{len(c['MODE'])} readings of mode 0, STEP from {c['STEP'][0]:g}"
 
 
 @proves("GYRO-SIG-01")
 @check("run", needs={"line", "can"})
-def lines_show_the_phases(e: Evidence) -> str:
+def lines_show_the_phases(e: Capture) -> str:
     """Compare STEP, SLEW, SETTLE and WINDOW with the readings."""
     wires_needed(e, *LINES)
     row, c = row_for(e, "GYRO-SIG-01"), columns(e)
@@ -350,26 +350,26 @@ def lines_show_the_phases(e: Evidence) -> str:
     shown = np.stack([e.wires[name].at(at) for name in PHASES], axis=1).astype(np.int64)
     told = np.stack([c["PHASE"] == phase for phase in PHASES.values()], axis=1).astype(np.int64)
     if _runs(shown) != _runs(told):
-        raise Broken(f"{', '.join(PHASES)} in turn {_runs(shown)}", f"{_runs(told)} as PHASE tells", lines=LINES)
+        raise Failed(f"{', '.join(PHASES)} in turn {_runs(shown)}", f"{_runs(told)} as PHASE tells", lines=LINES)
     if not len(e.wires.gaps_ns):
         off = np.abs(shown.sum(axis=0) - told.sum(axis=0))
         if off.max() > abs(len(rises) - n) + 2:  # steps at the ends of the recording
-            raise Broken(f"{', '.join(PHASES)} high in {shown.sum(axis=0)} steps", f"{told.sum(axis=0)}", lines=LINES)
+            raise Failed(f"{', '.join(PHASES)} high in {shown.sum(axis=0)} steps", f"{told.sum(axis=0)}", lines=LINES)
     if not int(e.wires["READY"].at(e.wires.end_ns)):
-        raise Broken("READY low in a run", "high", lines=LINES)
+        raise Failed("READY low in a run", "high", lines=LINES)
     return f"{seen}; SLEW, SETTLE and WINDOW with their phases"
 
 
 @proves("GYRO-SIG-01")
 @check("silence", needs={"line", "can"})
-def fault_shows_the_flags(e: Evidence) -> str:
+def fault_shows_the_flags(e: Capture) -> str:
     """Compare FAULT with the flags of the readings while the level unit is silent for a while, twice."""
     wires_needed(e, "STEP", "FAULT")
     if len(e.wires.gaps_ns):
-        raise TooLittle("samples were lost: a flag of a single step may be among them")
+        raise Inconclusive("samples were lost: a flag of a single step may be among them")
     c = columns(e)
     shown = e.wires["FAULT"].at(e.wires.rises("STEP") + round(US)).astype(np.int64)[:, None]
     told = np.max([c[name] for name in FLAGS], axis=0).astype(np.int64)[:, None]
     if not len(shown) or _runs(shown) != _runs(told):
-        raise Broken(f"FAULT in turn {_runs(shown)}", f"{_runs(told)} as the flags tell", lines=("STEP", "FAULT"))
+        raise Failed(f"FAULT in turn {_runs(shown)}", f"{_runs(told)} as the flags tell", lines=("STEP", "FAULT"))
     return f"FAULT in {int(shown.sum())} steps, flags in {int(told.sum())} readings"

@@ -1,4 +1,4 @@
-"""Scenes of the gyro unit: from Res, a run of positions, a calibration and navigation, trouble that settings make."""
+"""Stimuli of the gyro unit: from Res, a run of positions, a calibration and navigation, trouble that settings make."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from psabench.boards.gyro.conform.capture_readings import columns, vertical_degp
 from psabench.boards.gyro.device import SETTINGS, Gyro, Mode, Phase
 from psabench.boards.objects import GyroObjects as OD
 from psabench.boards.unit import NMT_PREOP, NMT_START
-from psabench.conform.capture.log import Evidence
+from psabench.conform.capture.log import Capture
 from psabench.conform.dut import Subject
-from psabench.conform.plan import scene
+from psabench.conform.plan import stimulus
 from psabench.conform.requirements import requirements
 from psabench.conform.stimulus.streamed import from_res
-from psabench.conform.verdict import TooLittle
+from psabench.conform.verdict import Inconclusive
 from psabench.estimate.angles import wrapped_deg
 
 READY_S = 0.4
@@ -28,9 +28,9 @@ FACTS = ("m1_per_s", "m2_per_s", "latitude_deg", "zero_x_v", "zero_y_v", "scale_
 
 
 def unit(s: Subject) -> Gyro:
-    """Raises TooLittle where it is none."""
+    """Raises Inconclusive where it is none."""
     if not isinstance(s.unit, Gyro):
-        raise TooLittle("no gyro unit")
+        raise Inconclusive("no gyro unit")
     return s.unit
 
 
@@ -57,17 +57,17 @@ def settings(s: Subject) -> dict[str, object]:
 
 
 def until_mode(s: Subject, mode: Mode, limit_s: float) -> None:
-    """Raises TooLittle where the unit does not come to that mode."""
+    """Raises Inconclusive where the unit does not come to that mode."""
     left_s = limit_s
     while int(s.unit.node.read(OD.CONTROL, 1)) != mode:
         if left_s <= 0:
-            raise TooLittle(f"the unit does not come to mode {int(mode)} within {limit_s:g} s")
+            raise Inconclusive(f"the unit does not come to mode {int(mode)} within {limit_s:g} s")
         s.run_for(WAIT_S)
         left_s -= WAIT_S
 
 
 def levelled(s: Subject) -> None:
-    """As after power-on, and level. Raises TooLittle where it does not get so."""
+    """As after power-on, and level. Raises Inconclusive where it does not get so."""
     row = requirements()["GYRO-MODE-11"]
     calm(s)
     unit(s).mode = Mode.LEVEL
@@ -75,28 +75,28 @@ def levelled(s: Subject) -> None:
     s.run_for(WAIT_S)
     while abs(unit(s).beta_deg) * 60 > row.limit("level_max_arcmin"):
         if left_s <= 0:
-            raise TooLittle(f"the platform is not level after {row.limit('limit_s'):g} s")
+            raise Inconclusive(f"the platform is not level after {row.limit('limit_s'):g} s")
         s.run_for(WAIT_S)
         left_s -= WAIT_S
     s.run_for(REST_S)
 
 
 def slew(s: Subject, to_deg: float) -> None:
-    """Turn there and stand for a second. Raises TooLittle where the turn does not end."""
+    """Turn there and stand for a second. Raises Inconclusive where the turn does not end."""
     unit(s).set(slew_deg=to_deg)
     unit(s).mode = Mode.SLEW
     s.run_for(0.1)
     left_s = TURN_LIMIT_S
     while unit(s).phase == Phase.SLEWING:
         if left_s <= 0:
-            raise TooLittle(f"a turn to {to_deg:g} deg does not end within {TURN_LIMIT_S:g} s")
+            raise Inconclusive(f"a turn to {to_deg:g} deg does not end within {TURN_LIMIT_S:g} s")
         s.run_for(WAIT_S)
         left_s -= WAIT_S
     s.run_for(1.0)
 
 
-@scene("power_on", boards=("gyro",))
-def power_on(s: Subject) -> Evidence:
+@stimulus("power_on", boards=("gyro",))
+def power_on(s: Subject) -> Capture:
     """From Res on while it levels, streaming as soon as it has booted."""
     calm(s)
     unit(s).mode = Mode.LEVEL
@@ -104,8 +104,8 @@ def power_on(s: Subject) -> Evidence:
     return from_res(s, POWER_ON_S)
 
 
-@scene("level", boards=("gyro",))
-def level(s: Subject) -> Evidence:
+@stimulus("level", boards=("gyro",))
+def level(s: Subject) -> Capture:
     """Mode 1, for as long as the platform may take to get level from where it is."""
     calm(s)
     with s.take(lines=False) as take:
@@ -113,11 +113,11 @@ def level(s: Subject) -> Evidence:
         unit(s).mode = Mode.LEVEL
         s.run_for(requirements()["GYRO-MODE-11"].limit("limit_s"))
         s.unit.stop()
-    return s.evidence("level", take)
+    return s.capture("level", take)
 
 
-@scene("run", boards=("gyro",))
-def run(s: Subject) -> Evidence:
+@stimulus("run", boards=("gyro",))
+def run(s: Subject) -> Capture:
     """Levelling, then a run of three positions with the settings of power-on, on the lines and on CAN."""
     levelled(s)
     facts = settings(s)
@@ -129,11 +129,11 @@ def run(s: Subject) -> Evidence:
         s.run_for(2.0)
         s.unit.stop()
     take.facts |= facts
-    return s.evidence("run", take)
+    return s.capture("run", take)
 
 
-@scene("navigation", boards=("gyro",))
-def navigation(s: Subject) -> Evidence:
+@stimulus("navigation", boards=("gyro",))
+def navigation(s: Subject) -> Capture:
     """A calibration, then the drift about z that it gave, navigation with it, and the heading of a parked vehicle."""
     levelled(s)
     facts = settings(s) | {"calibration_s": CALIBRATION_S}
@@ -144,7 +144,7 @@ def navigation(s: Subject) -> Evidence:
         until_mode(s, Mode.HOLD, RUN_LIMIT_S)
         s.unit.stop()
     take.facts |= facts
-    e = s.evidence("navigation", take)
+    e = s.capture("navigation", take)
     c = columns(e)
     window = c["PHASE"] == Phase.WINDOW
     if not window.any():
@@ -158,7 +158,7 @@ def navigation(s: Subject) -> Evidence:
     unit(s).set(drift2_degph=0.0)  # the heading is alive: it shows the drift that nothing cancels
     take.facts["free_deg"], take.facts["free_s"] = _moved(s, FREE_S)
     calm(s)
-    return s.evidence("navigation", take)
+    return s.capture("navigation", take)
 
 
 def _moved(s: Subject, dwell_s: float) -> tuple[float, float]:
@@ -168,8 +168,8 @@ def _moved(s: Subject, dwell_s: float) -> tuple[float, float]:
     return wrapped_deg(unit(s).heading_deg - first_deg), s.bench.time_s - begun_s
 
 
-@scene("turns", boards=("gyro",))
-def turns(s: Subject) -> Evidence:
+@stimulus("turns", boards=("gyro",))
+def turns(s: Subject) -> Capture:
     """Turns of all kinds by mode 3, then mode 2."""
     levelled(s)
     parts: list[tuple[float, int, int]] = []  # angle, first and last frame
@@ -186,11 +186,11 @@ def turns(s: Subject) -> Evidence:
         s.unit.stop()
     take.facts |= {"turns": parts, "held": (begin, len(take.frames))}
     calm(s)
-    return s.evidence("turns", take)
+    return s.capture("turns", take)
 
 
-@scene("hold", boards=("gyro",))
-def hold(s: Subject) -> Evidence:
+@stimulus("hold", boards=("gyro",))
+def hold(s: Subject) -> Capture:
     """Mode 2 with one latitude, then with that of the other hemisphere, which turns Wz round."""
     levelled(s)
     facts = settings(s)
@@ -209,11 +209,11 @@ def hold(s: Subject) -> Evidence:
         s.unit.stop()
     take.facts |= facts | {"latitudes": parts}
     calm(s)
-    return s.evidence("hold", take)
+    return s.capture("hold", take)
 
 
-@scene("tilted", boards=("gyro",))
-def tilted(s: Subject) -> Evidence:
+@stimulus("tilted", boards=("gyro",))
+def tilted(s: Subject) -> Capture:
     """A run that begins half a degree off the level, with a slow loop and no settling time: its first window."""
     levelled(s)
     zero_v, scale_v = unit(s).get("zero_y_v"), unit(s).get("scale_y_v_per_g")
@@ -227,11 +227,11 @@ def tilted(s: Subject) -> Evidence:
         until_mode(s, Mode.HOLD, RUN_LIMIT_S)
         s.unit.stop()
     calm(s)
-    return s.evidence("tilted", take)
+    return s.capture("tilted", take)
 
 
-@scene("limits", boards=("gyro",))
-def limits(s: Subject) -> Evidence:
+@stimulus("limits", boards=("gyro",))
+def limits(s: Subject) -> Capture:
     """A zero of the level sensors that is suddenly told wrongly, with a stiff loop: rates at their limits."""
     levelled(s)
     with s.take(lines=False) as take:
@@ -244,11 +244,11 @@ def limits(s: Subject) -> Evidence:
         s.run_for(8.0)
         s.unit.stop()
     calm(s)
-    return s.evidence("limits", take)
+    return s.capture("limits", take)
 
 
-@scene("silence", boards=("gyro",))
-def silence(s: Subject) -> Evidence:
+@stimulus("silence", boards=("gyro",))
+def silence(s: Subject) -> Capture:
     """The level unit silent for a while, twice: shorter and longer than the unit waits."""
     levelled(s)
     facts = settings(s)
@@ -262,4 +262,4 @@ def silence(s: Subject) -> Evidence:
         s.unit.stop()
     take.facts |= facts
     calm(s)
-    return s.evidence("silence", take)
+    return s.capture("silence", take)

@@ -8,11 +8,11 @@ from psabench.boards.objects import PikObjects as OD
 from psabench.conform.bus_host import burst, line, line_refused
 from psabench.conform.dictionary import as_the_dictionary_says
 from psabench.conform.dut import Subject
-from psabench.conform.plan import trial
+from psabench.conform.plan import active
 from psabench.conform.proves import proves
 from psabench.conform.registers import names_and_rights
 from psabench.conform.requirements import requirements
-from psabench.conform.verdict import Broken, TooLittle
+from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.signals import unwrap
 
 WORD = 0xFFFF
@@ -46,7 +46,7 @@ def signed(word: int, bits: int = 16) -> int:
 
 
 @proves("PIK-CNT-02")
-@trial(needs={"bus", "can"})
+@active(needs={"bus", "can"})
 def the_period_can_be_set(s: Subject) -> str:
     """Set PERIOD 50, then 0 with three writes to LATCH; look at the stamps of the readings."""
     row = requirements()["PIK-CNT-02"]
@@ -56,13 +56,13 @@ def the_period_can_be_set(s: Subject) -> str:
         s.unit.start()
         s.run_for(0.1)
         s.unit.stop()
-    log = s.evidence("period", take).frames_of("PIK_TOTAL_Z")
+    log = s.capture("period", take).frames_of("PIK_TOTAL_Z")
     stamps = unwrap(log.raw("PIK_TOTAL_Z")["TSTAMP"], 32).tolist() if len(log) else []
     due = 0x32 * row.limit("unit_us")
     steps = [int(b - a) for a, b in pairwise(stamps)][1:]
     rounded_us = 2 * requirements()["PIK-CAN-03"].limit("unit_us")  # two stamps
     if len(steps) < 5 or max(abs(v - due) for v in steps) > rounded_us:
-        raise Broken(f"{steps[:6]} us between readings with PERIOD 50", f"{due:g} us")
+        raise Failed(f"{steps[:6]} us between readings with PERIOD 50", f"{due:g} us")
     by_hand(s)
     s.run_for(0.05)
     first = line(s, "R 9").data
@@ -72,12 +72,12 @@ def the_period_can_be_set(s: Subject) -> str:
     made = (line(s, "R 9").data - first) & WORD
     calm(s)
     if made != 3:
-        raise Broken(f"{made} readings with three writes to LATCH and PERIOD 0", "3")
+        raise Failed(f"{made} readings with three writes to LATCH and PERIOD 0", "3")
     return f"{due:g} us with PERIOD 50, three readings by three writes"
 
 
 @proves("PIK-CNT-04")
-@trial(needs={"bus"})
+@active(needs={"bus"})
 def registers_hold_what_was_latched(s: Subject) -> str:
     """Latch by hand, read twice a while apart, latch again."""
     by_hand(s)
@@ -89,14 +89,14 @@ def registers_hold_what_was_latched(s: Subject) -> str:
     later = counters(s)
     calm(s)
     if first != again:
-        raise Broken(f"{first}, then {again}", "the same until the next latch")
+        raise Failed(f"{first}, then {again}", "the same until the next latch")
     if later == first:
-        raise Broken(f"{later} after another latch", "counts that went on")
+        raise Failed(f"{later} after another latch", "counts that went on")
     return f"{first} twice, then {later}"
 
 
 @proves("PIK-CNT-05")
-@trial(needs={"bus"})
+@active(needs={"bus"})
 def a_channel_is_up_minus_down(s: Subject) -> str:
     """Read the nine counters of one latch."""
     by_hand(s)
@@ -107,14 +107,14 @@ def a_channel_is_up_minus_down(s: Subject) -> str:
     modulo = int(requirements()["PIK-CNT-05"].limit("modulo"))
     for k in range(3):
         if c[k] != (c[3 + 2 * k] - c[4 + 2 * k]) % modulo:
-            raise Broken(f"{'XYZ'[k]} {c[k]}, up {c[3 + 2 * k]}, down {c[4 + 2 * k]}", "the difference")
+            raise Failed(f"{'XYZ'[k]} {c[k]}, up {c[3 + 2 * k]}, down {c[4 + 2 * k]}", "the difference")
     if not any(c[3:]):
-        raise Broken("no pulse in any counter", "some")
+        raise Failed("no pulse in any counter", "some")
     return f"{c[:3]} of {c[3:]}"
 
 
 @proves("PIK-CNT-06")
-@trial(needs={"bus"})
+@active(needs={"bus"})
 def counters_can_be_cleared(s: Subject) -> str:
     """Measure rates with two latches, write CLEAR 1 and latch: X has counted since, Y and Z all the time."""
     most = requirements()["PIK-CNT-06"].limit("error_max_pulses")
@@ -131,14 +131,14 @@ def counters_can_be_cleared(s: Subject) -> str:
     made = [signed(after[0])] + [signed(after[k] - before[k]) for k in (1, 2)]
     off = [abs(m - r * t) for m, r, t in zip(made, rate_hz, since_s, strict=True)]
     if abs(signed(before[0])) < 8 * most:
-        raise TooLittle(f"{signed(before[0])} pulses of X before CLEAR")
+        raise Inconclusive(f"{signed(before[0])} pulses of X before CLEAR")
     if max(off) > most or abs(after[3] + after[4] - abs(made[0])) > most:
-        raise Broken(f"{before}, after CLEAR 1 {after}", "X, XP and XN from 0, Y and Z as before")
+        raise Failed(f"{before}, after CLEAR 1 {after}", "X, XP and XN from 0, Y and Z as before")
     return f"{before[:3]}, after CLEAR 1 {after[:3]}"
 
 
 @proves("PIK-RES-01")
-@trial(needs={"bus", "can"})
+@active(needs={"bus", "can"})
 def registers_begin_with_res(s: Subject) -> str:
     """Let it count for a second, press Res, and compare the registers of a reading with its totals on CAN."""
     calm(s)
@@ -154,11 +154,11 @@ def registers_begin_with_res(s: Subject) -> str:
                 seen.append((cycles[0].data, [c.data for c in cycles[1:-1]]))
             s.run_for(0.01)
         s.unit.stop()
-    e = s.evidence("registers", take)
+    e = s.capture("registers", take)
     counts, xy, z = (e.frames_of(name) for name in ("PIK_COUNTS", "PIK_TOTALS", "PIK_TOTAL_Z"))
     n = min(len(counts), len(xy), len(z))
     if not n:
-        raise TooLittle("no reading came")
+        raise Inconclusive("no reading came")
     seq, xy_raw, z_raw = counts.raw("PIK_COUNTS")["SEQ"][:n], xy.raw("PIK_TOTALS"), z.raw("PIK_TOTAL_Z")["Z"][:n]
     told = {
         int(k): (int(a), int(b), int(c))
@@ -170,15 +170,15 @@ def registers_begin_with_res(s: Subject) -> str:
             continue
         due = told[number]
         if [signed(w) for w in words[:3]] != [signed(t & WORD) for t in due] or sum(words[3:]) > 2 * sum(map(abs, due)):
-            raise Broken(f"{words} in reading {number}", f"{list(due)} since Res")
+            raise Failed(f"{words} in reading {number}", f"{list(due)} since Res")
         found += 1
     if not found:
-        raise TooLittle("no reading was seen on the bus and on CAN")
+        raise Inconclusive("no reading was seen on the bus and on CAN")
     return f"{found} readings with the same counts since Res in registers and totals"
 
 
 @proves("PIK-CNT-07")
-@trial(needs={"bus"})
+@active(needs={"bus"})
 def readings_are_numbered_and_status_tells_a_latch(s: Subject) -> str:
     """Latch twice by hand and read SEQ and STATUS."""
     row = requirements()["PIK-CNT-07"]
@@ -187,14 +187,14 @@ def readings_are_numbered_and_status_tells_a_latch(s: Subject) -> str:
     none, first, _, one, again, second = (c.data for c in burst(s, "R A", "R A", "R 9", LATCH, "R A", "R A", "R 9")[1:])
     calm(s)
     if none & latched or not one & latched or again & latched:
-        raise Broken(f"STATUS {none:04X}h, after a latch {one:04X}h, again {again:04X}h", "bit 3 once")
+        raise Failed(f"STATUS {none:04X}h, after a latch {one:04X}h, again {again:04X}h", "bit 3 once")
     if (second - first) & WORD != 1 or (none | one) & saturated:
-        raise Broken(f"SEQ {first}, then {second}; STATUS {one:04X}h", "one more, no channel saturated")
+        raise Failed(f"SEQ {first}, then {second}; STATUS {one:04X}h", "one more, no channel saturated")
     return f"SEQ {first}, then {second}; bit 3 of STATUS once"
 
 
 @proves("PIK-CNT-08")
-@trial(needs={"bus"})
+@active(needs={"bus"})
 def what_cannot_be_is_refused(s: Subject) -> str:
     """An address that is none, a write to what is read, a read of LATCH and CLEAR, X too early, a period of 0.1 ms."""
     row = requirements()["PIK-CNT-08"]
@@ -213,7 +213,7 @@ def what_cannot_be_is_refused(s: Subject) -> str:
 
 
 @proves("PIK-CNT-09")
-@trial(needs={"bus"})
+@active(needs={"bus"})
 def registers_have_their_names_and_rights(s: Subject) -> str:
     """Ask who is there, read and write every address."""
     calm(s)
@@ -223,7 +223,7 @@ def registers_have_their_names_and_rights(s: Subject) -> str:
 
 
 @proves("PIK-CAN-05")
-@trial(needs={"can"})
+@active(needs={"can"})
 def the_name_plate_is_right(s: Subject) -> str:
     """Read 2210h."""
     row = requirements()["PIK-CAN-05"]
@@ -233,23 +233,23 @@ def the_name_plate_is_right(s: Subject) -> str:
     due = s.variant.profile, row.limit(f"{kind}_k_mhz_per_v"), row.limit(f"{kind}_rate_hz"), row.limit(f"{kind}_error")
     part = row.limit("plate_tolerance_ppm") * 1e-6  # a plate made for a clock that is off says so
     if saw[0] != due[0] or any(abs(a - b) > b * part + HALF for a, b in zip(saw[1:], due[1:], strict=True)):
-        raise Broken(f"{saw}", f"{due}")
+        raise Failed(f"{saw}", f"{due}")
     return f"{saw[0]}, {saw[1]} mHz/V, {saw[2]} Hz, {saw[3]} in 0.01 %"
 
 
 @proves("PIK-CAN-06")
-@trial(needs={"can"})
+@active(needs={"can"})
 def the_board_says_what_it_is(s: Subject) -> str:
     """Read 1008h and 1018h sub 2."""
     name, code = s.unit.node.read(OD.DEVICE_NAME), int(s.unit.node.read(OD.IDENTITY, 2))
     due = int(requirements()["PIK-CAN-06"].limit("product_code"))
     if (name, code) != ("PIK", due):
-        raise Broken(f"{name}, {code:08X}h", f"PIK, {due:08X}h")
+        raise Failed(f"{name}, {code:08X}h", f"PIK, {due:08X}h")
     return f"{name}, {code:08X}h"
 
 
 @proves("PIK-CAN-07")
-@trial(needs={"can"})
+@active(needs={"can"})
 def objects_are_as_the_dictionary_says(s: Subject) -> str:
     """Read every object of the EDS and write where nothing may be written."""
     calm(s)

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from psabench.conform.capture.intervals import before, edges, first_bad, interval, wires_needed
-from psabench.conform.capture.log import CanLog, Evidence, LineLog
+from psabench.conform.capture.log import CanLog, Capture, LineLog
 from psabench.conform.capture.messages import as_laid_out, emergencies, in_turn, late_readings
 from psabench.conform.plan import check
 from psabench.conform.proves import proves, row_for
-from psabench.conform.verdict import Broken, TooLittle
+from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.protocol_files import message
 from psabench.link.signals import Floats, Ints, unwrap
 
@@ -24,17 +24,17 @@ LAG_NS = 300_000  # a recording that begins late may have missed an edge of its 
 COEFFICIENT = ("PIK-LAW-02", "PIK-LAW-03")
 
 
-def _told(e: Evidence, name: str, least: int = LEAST) -> CanLog:
+def _told(e: Capture, name: str, least: int = LEAST) -> CanLog:
     log = e.frames_of(name)
     if len(log) < least:
-        raise TooLittle(f"{len(log)} messages {name} came; expected {least}")
+        raise Inconclusive(f"{len(log)} messages {name} came; expected {least}")
     bad = [f for f in log.frames if len(f.data) != int(message(name).length)]
     if bad:
-        raise TooLittle(f"{name} of {len(bad[0].data)} bytes")
+        raise Inconclusive(f"{name} of {len(bad[0].data)} bytes")
     return log
 
 
-def totals(e: Evidence, least: int = LEAST) -> tuple[Floats, Ints]:
+def totals(e: Capture, least: int = LEAST) -> tuple[Floats, Ints]:
     """Instants (n,) s by the board's stamps and totals (n, 3) of whole readings, not wrapped."""
     xy, z = _told(e, "PIK_TOTALS", least).raw("PIK_TOTALS"), _told(e, "PIK_TOTAL_Z", least).raw("PIK_TOTAL_Z")
     n = min(len(xy["X"]), len(z["Z"]))
@@ -47,17 +47,17 @@ def _unwrapped(v: Ints) -> Ints:
     return np.concatenate([v[:1], v[0] + np.cumsum(step)])
 
 
-def rates(e: Evidence) -> dict[str, tuple[float, float]]:
+def rates(e: Capture) -> dict[str, tuple[float, float]]:
     """Volts and pulses a second of each axis whose input is known, over the whole recording."""
     t_s, n = totals(e)
     took_s = float(t_s[-1] - t_s[0])
     if took_s <= 0.0 or not e.inputs_v:
-        raise TooLittle("expected inputs that are known, and stamps that go on")
+        raise Inconclusive("expected inputs that are known, and stamps that go on")
     mine = {a: k for k, a in enumerate("xyz") if a in e.inputs_v}
     return {a: (e.inputs_v[a], float(n[-1, k] - n[0, k]) / took_s) for a, k in mine.items()}
 
 
-def _allowed_hz(e: Evidence, volts: float, part: float) -> float:
+def _allowed_hz(e: Capture, volts: float, part: float) -> float:
     """What a channel's zero, the error of K and a pulse at either end of a minute allow."""
     k = row_for(e, *COEFFICIENT).limit("k_hz_per_v")
     return k * (abs(volts) * part + row_for(e, "PIK-LAW-01").limit("zero_max_v")) + 2.0 / 60.0
@@ -65,35 +65,35 @@ def _allowed_hz(e: Evidence, volts: float, part: float) -> float:
 
 @proves("PIK-LAW-01")
 @check("minute", needs={"can", "inputs"})
-def the_frequency_follows_the_input(e: Evidence) -> str:
+def the_frequency_follows_the_input(e: Capture) -> str:
     """Compare pulses a second with the volts at the inputs."""
     k, seen = row_for(e, *COEFFICIENT).limit("k_hz_per_v"), []
     part = row_for(e, "PIK-LAW-01").limit("pik6_tolerance_pct" if e.variant.board == "pik6" else "tolerance_pct") / 100
     for axis, (volts, hz) in rates(e).items():
         most = _allowed_hz(e, volts, part)
         if abs(hz - k * volts) > most:
-            raise Broken(f"{hz:.3f} Hz at {volts:g} V on {axis.upper()}", f"{k * volts:.3f} +- {most:.3f} Hz")
+            raise Failed(f"{hz:.3f} Hz at {volts:g} V on {axis.upper()}", f"{k * volts:.3f} +- {most:.3f} Hz")
         seen.append(f"{hz:.2f}")
     return f"{', '.join(seen)} Hz"
 
 
 @proves("PIK-LAW-02", "PIK-LAW-03")
 @check("minute", needs={"can", "inputs"})
-def the_coefficient_is_the_printed_one(e: Evidence) -> str:
+def the_coefficient_is_the_printed_one(e: Capture) -> str:
     """Take the coefficient from the pulses of a minute."""
     row = row_for(e, *COEFFICIENT)
     k, part, seen = row.limit("k_hz_per_v"), row.limit("error_max_pct") / 100, []
     for axis, (volts, hz) in rates(e).items():
         most = _allowed_hz(e, volts, part + e.clock_ppm * 1e-6)
         if abs(hz - k * volts) > most:
-            raise Broken(f"{hz / volts:.4f} Hz/V on {axis.upper()}", f"{k:g} Hz/V, {most / abs(volts):.4f} off at most")
+            raise Failed(f"{hz / volts:.4f} Hz/V on {axis.upper()}", f"{k:g} Hz/V, {most / abs(volts):.4f} off at most")
         seen.append(f"{hz / volts:.4f}")
     return f"{', '.join(seen)} Hz/V"
 
 
 @proves("PIK-LAW-04")
 @check("minute", needs={"can", "inputs"})
-def the_count_is_the_integral(e: Evidence) -> str:
+def the_count_is_the_integral(e: Capture) -> str:
     """Compare the totals of a minute at a still input with a straight line."""
     most = row_for(e, "PIK-LAW-04").limit("error_max_pulses")
     t_s, n = totals(e, 100)
@@ -102,14 +102,14 @@ def the_count_is_the_integral(e: Evidence) -> str:
         slope, at_0 = np.polyfit(t_s - t_s[0], n[:, k].astype(np.float64), 1)
         off = float(np.abs(n[:, k] - (slope * (t_s - t_s[0]) + at_0)).max())
         if off > most:
-            raise Broken(f"{off:.2f} pulses from a straight line on {axis}", f"{most:g} at most")
+            raise Failed(f"{off:.2f} pulses from a straight line on {axis}", f"{most:g} at most")
         worst = max(worst, off)
     return f"{len(n)} readings, {worst:.2f} pulses from a straight line at most"
 
 
 @proves("PIK-LAW-05")
 @check("minute", needs={"can", "inputs"})
-def a_pulse_has_the_printed_weight(e: Evidence) -> str:
+def a_pulse_has_the_printed_weight(e: Capture) -> str:
     """Take the weight from the measured coefficient and the accelerometer's volts a g on the load of the profile."""
     row = row_for(e, "PIK-LAW-05")
     due = row.limit(f"{e.variant.board}_mps")
@@ -117,13 +117,13 @@ def a_pulse_has_the_printed_weight(e: Evidence) -> str:
     ma_v_per_g = row.limit("current_a_per_g") * float(e.variant["ra_ohm"])
     weight = row.limit("g_mps2") * volts / hz / ma_v_per_g if hz else 0.0
     if abs(weight / due - 1) > row.limit("tolerance_pct") / 100:
-        raise Broken(f"{weight * 1e3:.3f} mm/s a pulse", f"{due * 1e3:g} mm/s +- {row.limit('tolerance_pct'):g} %")
+        raise Failed(f"{weight * 1e3:.3f} mm/s a pulse", f"{due * 1e3:g} mm/s +- {row.limit('tolerance_pct'):g} %")
     return f"{weight * 1e3:.3f} mm/s a pulse"
 
 
 @proves("PIK-LAW-09")
 @check("minute", needs={"can", "inputs"})
-def the_law_is_linear(e: Evidence) -> str:
+def the_law_is_linear(e: Capture) -> str:
     """Compare the coefficients of the three channels, whose inputs are not alike."""
     row = row_for(e, "PIK-LAW-09")
     found = rates(e)
@@ -131,27 +131,27 @@ def the_law_is_linear(e: Evidence) -> str:
     zero = row_for(e, "PIK-LAW-01").limit("zero_max_v") / min(abs(v) for v, _ in found.values())
     spread, most = float(np.ptp(k) / k.mean()), row.limit("spread_max_pct") / 100 + 2 * zero
     if len(k) < 2 or spread > most:
-        raise Broken(f"coefficients {spread * 100:.3f} % apart", f"{most * 100:.3f} % at most")
+        raise Failed(f"coefficients {spread * 100:.3f} % apart", f"{most * 100:.3f} % at most")
     return f"coefficients {spread * 100:.4f} % apart at {', '.join(f'{v:g}' for v, _ in found.values())} V"
 
 
 @proves("PIK-SAT-02")
 @check("minute", needs={"can", "inputs"})
-def nothing_saturates_below_full_scale(e: Evidence) -> str:
+def nothing_saturates_below_full_scale(e: Capture) -> str:
     """Look for SAT bits in a minute."""
     most = row_for(e, "PIK-SAT-02").limit("input_max_v")
     if any(abs(v) > most for v in e.inputs_v.values()):
-        raise TooLittle(f"expected inputs of {most:g} V at most")
+        raise Inconclusive(f"expected inputs of {most:g} V at most")
     raw = _told(e, "PIK_COUNTS").raw("PIK_COUNTS")
     for axis in "XYZ":
         if raw[f"SAT_{axis}"].any():
-            raise Broken(f"SAT_{axis}", f"none up to {most:g} V")
+            raise Failed(f"SAT_{axis}", f"none up to {most:g} V")
     return f"{len(raw['X'])} readings without SAT"
 
 
 @proves("PIK-LAW-07")
 @check("stream", needs={"line", "inputs"})
-def signs_have_their_lines(e: Evidence) -> str:
+def signs_have_their_lines(e: Capture) -> str:
     """Count pulses on the lines P and N of each channel."""
     wires_needed(e, *PULSES)
     seen = []
@@ -159,14 +159,14 @@ def signs_have_their_lines(e: Evidence) -> str:
         p, n = (len(e.wires.rises(f"F{axis.upper()}{sign}")) for sign in "PN")
         mine, other = (p, n) if volts > 0 else (n, p)
         if not mine or other:
-            raise Broken(f"{p} pulses on F{axis.upper()}P, {n} on F{axis.upper()}N at {volts:g} V", "on one of them")
+            raise Failed(f"{p} pulses on F{axis.upper()}P, {n} on F{axis.upper()}N at {volts:g} V", "on one of them")
         seen.append(f"{p} and {n}")
     return f"pulses on P and N: {', '.join(seen)}"
 
 
 @proves("PIK-LAW-08")
 @check("stream", needs={"line"})
-def a_reset_lasts_its_time(e: Evidence) -> str:
+def a_reset_lasts_its_time(e: Capture) -> str:
     """Measure the pulses."""
     wires_needed(e, *PULSES)
     due_ns = _tclk_ns(e)
@@ -179,18 +179,18 @@ def a_reset_lasts_its_time(e: Evidence) -> str:
         if len(up):
             seen = interval(e, up, down, due_ns, slack_ns, f"of {name} high", (name,))
     if not seen:
-        raise TooLittle("no pulse was recorded")
+        raise Inconclusive("no pulse was recorded")
     return seen
 
 
-def _tclk_ns(e: Evidence) -> float:
+def _tclk_ns(e: Capture) -> float:
     row = row_for(e, "PIK-LAW-08")
     return row.limit("pik6_us" if e.variant.board == "pik6" else "pik_us") * US
 
 
 @proves("PIK-LAW-10")
 @check("stream", needs={"pins"})
-def pulses_begin_on_their_grid(e: Evidence) -> str:
+def pulses_begin_on_their_grid(e: Capture) -> str:
     """Compare the rises of pulses with the clock, and measure from pulse to pulse."""
     wires_needed(e, "CLK", *PULSES)
     row, tclk_ns = row_for(e, "PIK-LAW-10"), _tclk_ns(e)
@@ -221,13 +221,13 @@ def pulses_begin_on_their_grid(e: Evidence) -> str:
         )
         count += len(inside)
     if count < LEAST:
-        raise TooLittle(f"{count} pulses were recorded")
+        raise Inconclusive(f"{count} pulses were recorded")
     return f"{count} pulses on a grid of {tick_ns:.1f} ns"
 
 
 @proves("PIK-LAW-10")
 @check("overdrive", needs={"line", "head"})
-def pulses_keep_their_distance(e: Evidence) -> str:
+def pulses_keep_their_distance(e: Capture) -> str:
     """Measure from pulse to pulse of a channel that cannot keep up with its input."""
     wires_needed(e, *PULSES)
     row, tclk_ns = row_for(e, "PIK-LAW-10"), _tclk_ns(e)
@@ -242,13 +242,13 @@ def pulses_keep_their_distance(e: Evidence) -> str:
         first_bad(gaps_ns < least_ns - slack_ns, at, saw, f"{least_ns:.0f} ns", (name,))
         seen += gaps_ns.tolist()
     if not seen or min(seen) > least_ns + 2 * tclk_ns / row.limit("grid_per_tclk"):
-        raise TooLittle(f"pulses {min(seen, default=0)} ns apart: no channel is at its limit")
+        raise Inconclusive(f"pulses {min(seen, default=0)} ns apart: no channel is at its limit")
     return f"{len(seen)} gaps between pulses, {min(seen)} ns and more"
 
 
 @proves("PIK-SAT-01")
 @check("overdrive", needs={"can", "head"})
-def saturation_is_told(e: Evidence) -> str:
+def saturation_is_told(e: Capture) -> str:
     """Look for SAT and EMCY FF11h while a channel cannot keep up, and for their end."""
     row, raw = row_for(e, "PIK-SAT-01"), _told(e, "PIK_COUNTS").raw("PIK_COUNTS")
     stamps = unwrap(_told(e, "PIK_TOTAL_Z").raw("PIK_TOTAL_Z")["TSTAMP"], 32) * 1e-6
@@ -256,27 +256,27 @@ def saturation_is_told(e: Evidence) -> str:
     code = int(row.limit("emcy_code"))
     found = [(k, t) for k, t in emergencies(e, "PIK_EMCY") if k in (0, code)]
     if not sat.any() and not found:
-        raise TooLittle("no channel was at its limit")
+        raise Inconclusive("no channel was at its limit")
     if not sat.any() or sat[-1].any() or [k for k, _ in found] != [code, 0]:
         told = [f"{k:04X}h" for k, _ in found]
-        raise Broken(f"SAT in {int(sat.any(axis=1).sum())} readings, emergencies {told}", f"{code:04X}h, 0000h")
+        raise Failed(f"SAT in {int(sat.any(axis=1).sum())} readings, emergencies {told}", f"{code:04X}h, 0000h")
     last_s = float(stamps[np.flatnonzero(sat.any(axis=1))[-1]])
     took_ms, due_ms = (found[1][1] - last_s) * 1e3, row.limit("ends_ms")
     period_ms = float(np.median(np.diff(stamps))) * 1e3  # the last loss was within the reading before
     if not due_ms - period_ms <= took_ms <= due_ms + row.limit("tolerance_ms"):
-        raise Broken(f"it ends {took_ms:.1f} ms after the last reading with SAT", f"{due_ms:g} ms after the last loss")
+        raise Failed(f"it ends {took_ms:.1f} ms after the last reading with SAT", f"{due_ms:g} ms after the last loss")
     return f"SAT in {int(sat.any(axis=1).sum())} readings, FF11h, over {took_ms:.1f} ms after the last of them"
 
 
 @proves("PIK-CNT-01")
 @check("stream", needs={"line", "can"})
-def counts_are_the_pulses(e: Evidence) -> str:
+def counts_are_the_pulses(e: Capture) -> str:
     """Count pulses between falls of LATCH and compare them with the readings."""
     wires_needed(e, *PULSES, "LATCH")
     log = e.wires.unbroken()
     latch = log.falls("LATCH")
     if len(latch) < LEAST:
-        raise TooLittle(f"{len(latch)} latches were recorded")
+        raise Inconclusive(f"{len(latch)} latches were recorded")
     seen = np.stack([_between(log, f"F{a}P", latch) - _between(log, f"F{a}N", latch) for a in "XYZ"], axis=1)
     raw = _told(e, "PIK_COUNTS").raw("PIK_COUNTS")
     told = np.stack([raw[a] for a in "XYZ"], axis=1)
@@ -288,7 +288,7 @@ def counts_are_the_pulses(e: Evidence) -> str:
         off = (seen[a:b] - told[a - shift : b - shift]).cumsum(axis=0)
         if np.abs(off).max() <= 1:
             return f"{b - a} readings, {np.abs(seen[a:b]).sum(axis=0).tolist()} pulses on X, Y, Z"
-    raise Broken(
+    raise Failed(
         f"{told[:4].tolist()} told", f"{seen[:4].tolist()} seen", at_ns=int(latch[0]), lines=("LATCH", *PULSES)
     )
 
@@ -300,7 +300,7 @@ def _between(log: LineLog, name: str, latch: Ints) -> Ints:
 
 @proves("PIK-CNT-02")
 @check("stream", needs={"line"})
-def counters_are_latched_every_period(e: Evidence) -> str:
+def counters_are_latched_every_period(e: Capture) -> str:
     """Measure from one fall of LATCH to the next."""
     wires_needed(e, "LATCH")
     row, falls = row_for(e, "PIK-CNT-02"), e.wires.falls("LATCH")
@@ -310,7 +310,7 @@ def counters_are_latched_every_period(e: Evidence) -> str:
 
 @proves("PIK-CNT-03")
 @check("stream", needs={"line"})
-def latch_is_low_for_its_time(e: Evidence) -> str:
+def latch_is_low_for_its_time(e: Capture) -> str:
     """Measure the lows of LATCH."""
     wires_needed(e, "LATCH")
     row = row_for(e, "PIK-CNT-03")
@@ -320,14 +320,14 @@ def latch_is_low_for_its_time(e: Evidence) -> str:
 
 @proves("PIK-CAN-01")
 @check("stream", needs={"can"})
-def three_messages_make_a_reading(e: Evidence) -> str:
+def three_messages_make_a_reading(e: Capture) -> str:
     """Follow the messages of each reading."""
     return in_turn(e, MESSAGES)
 
 
 @proves("PIK-CAN-02")
 @check("stream", needs={"can"})
-def counts_are_differences_of_totals(e: Evidence) -> str:
+def counts_are_differences_of_totals(e: Capture) -> str:
     """Compare PIK_COUNTS with the totals of this reading and the one before."""
     _, n = totals(e)
     raw = _told(e, "PIK_COUNTS").raw("PIK_COUNTS")
@@ -335,35 +335,35 @@ def counts_are_differences_of_totals(e: Evidence) -> str:
     bad = np.flatnonzero((np.diff(n, axis=0) != counts[1 : len(n)]).any(axis=1))
     if len(bad):
         k = int(bad[0])
-        raise Broken(f"counts {counts[k + 1].tolist()}", f"{np.diff(n, axis=0)[k].tolist()}, difference of the totals")
+        raise Failed(f"counts {counts[k + 1].tolist()}", f"{np.diff(n, axis=0)[k].tolist()}, difference of the totals")
     return f"{len(counts)} readings"
 
 
 @proves("PIK-CAN-03")
 @check("stream", needs={"can"})
-def readings_are_numbered_and_stamped(e: Evidence) -> str:
+def readings_are_numbered_and_stamped(e: Capture) -> str:
     """Look at SEQ and TSTAMP from reading to reading."""
     row, due = row_for(e, "PIK-CAN-03"), row_for(e, "PIK-CNT-02").limit("default_us")
     seq, stamps = _told(e, "PIK_COUNTS").raw("PIK_COUNTS")["SEQ"], _told(e, "PIK_TOTAL_Z").raw("PIK_TOTAL_Z")["TSTAMP"]
     if (np.diff(seq) % int(row.limit("modulo")) != 1).any():
-        raise Broken(f"SEQ {seq[:6].tolist()} ...", "one more each time")
+        raise Failed(f"SEQ {seq[:6].tolist()} ...", "one more each time")
     took = np.diff(unwrap(stamps, 32)) * row.limit("unit_us")
     off = np.abs(took - due).max()
     if off > 2 * row.limit("unit_us") + due * e.clock_ppm * 1e-6:
-        raise Broken(f"{took.min():.0f} to {took.max():.0f} us between stamps", f"{due:g} us")
+        raise Failed(f"{took.min():.0f} to {took.max():.0f} us between stamps", f"{due:g} us")
     return f"{len(seq)} readings, {took.min():.0f} to {took.max():.0f} us apart"
 
 
 @proves("PIK-CAN-04")
 @check("stream", needs={"can"})
-def messages_have_their_lengths(e: Evidence) -> str:
+def messages_have_their_lengths(e: Capture) -> str:
     """Look at lengths and at bits without a signal."""
     return as_laid_out(e, MESSAGES)
 
 
 @proves("PIK-RES-01")
 @check("power_on", needs={"can"})
-def counters_begin_with_res(e: Evidence) -> str:
+def counters_begin_with_res(e: Capture) -> str:
     """Look at SEQ and the totals of the first reading after Res."""
     row, period_s = row_for(e, "PIK-RES-01"), row_for(e, "PIK-CNT-02").limit("default_us") * 1e-6
     raw = _told(e, "PIK_COUNTS", 2).raw("PIK_COUNTS")
@@ -371,51 +371,51 @@ def counters_begin_with_res(e: Evidence) -> str:
     seq, counts = int(raw["SEQ"][0]), [int(raw[a][0]) for a in "XYZ"]
     late = late_readings(e, "PIK_HEARTBEAT", "PIK_COUNTS", period_s, period_s)
     if not 1 <= seq <= 1 + late or (seq == 1 and n[0].tolist() != counts):
-        raise Broken(f"SEQ {seq}, totals {n[0].tolist()}, counts {counts}", "SEQ 1, totals as the counts")
+        raise Failed(f"SEQ {seq}, totals {n[0].tolist()}, counts {counts}", "SEQ 1, totals as the counts")
     each = (n[-1] - n[0]) / (len(n) - 1)  # of inputs that are known to stand still
     if e.inputs_v and np.abs(n[0] - seq * each).max() > row.limit("error_max_pulses"):
-        raise Broken(f"totals {n[0].tolist()} in reading {seq}", f"{(seq * each).round(1).tolist()} since Res")
+        raise Failed(f"totals {n[0].tolist()} in reading {seq}", f"{(seq * each).round(1).tolist()} since Res")
     return f"SEQ {seq}, totals {n[0].tolist()}"
 
 
 @proves("PIK-SIG-01")
 @check("power_on", needs={"pins"})
-def lines_rest_at_their_levels(e: Evidence) -> str:
+def lines_rest_at_their_levels(e: Capture) -> str:
     """Look at every line before the first pulse or latch that comes when nothing has moved for longer than a pulse."""
     wires_needed(e, *PINS)
     row, at = row_for(e, "PIK-SIG-01"), _at_rest_ns(e)
     for name in PINS:
         due = int(row.limits.get(f"{name.lower()}_level", 0))
         if int(e.wires[name].at(at)) != due:
-            raise Broken(f"{name} {1 - due} at rest", f"{due}", at_ns=at, lines=(name, *PULSES))
+            raise Failed(f"{name} {1 - due} at rest", f"{due}", at_ns=at, lines=(name, *PULSES))
     return f"{len(PINS)} lines at rest"
 
 
-def _at_rest_ns(e: Evidence) -> int:
-    """An instant at which nothing has moved for longer than a pulse lasts, before one begins. Raises TooLittle."""
+def _at_rest_ns(e: Capture) -> int:
+    """An instant at which nothing has moved for longer than a pulse lasts, before one begins. Raises Inconclusive."""
     tclk_ns = _tclk_ns(e)
     moves = np.unique(np.concatenate([edges(e, name) for name in PINS]))
     begins = np.concatenate([*(edges(e, name) for name in PULSES), e.wires.falls("LATCH")])
     still = np.diff(moves, prepend=e.wires.start_ns) > tclk_ns + ROUNDED_NS + e.slack_ns(tclk_ns)
     found = moves[still & np.isin(moves, begins)]
     if not len(found):
-        raise TooLittle("no pulse and no latch after Res, or too many for the lines to be at rest")
+        raise Inconclusive("no pulse and no latch after Res, or too many for the lines to be at rest")
     return int(found[0]) - 1 - round(e.slack_ns(0.0))
 
 
 @proves("PIK-SIG-01")
 @check("power_cycle", needs={"pins", "supply"})
-def the_clock_rests_low(e: Evidence) -> str:
+def the_clock_rests_low(e: Capture) -> str:
     """Look at CLK while the board has no power: the longest time without an edge of it."""
     wires_needed(e, "CLK")
     ends = e.wires["CLK"].t_ns
     if len(ends) < 3:
-        raise TooLittle("CLK does not move")
+        raise Inconclusive("CLK does not move")
     k = int(np.argmax(np.diff(ends)))
     still_ns = int(ends[k + 1] - ends[k])
     if still_ns < 2 * _tclk_ns(e):
-        raise TooLittle(f"CLK moves on: {still_ns} ns without an edge at most")
+        raise Inconclusive(f"CLK moves on: {still_ns} ns without an edge at most")
     level, due = int(e.wires["CLK"].level[k]), int(row_for(e, "PIK-SIG-01").limits.get("clk_level", 0))
     if level != due:
-        raise Broken(f"CLK {level} for {still_ns} ns", f"{due} at rest", at_ns=int(ends[k]), lines=("CLK",))
+        raise Failed(f"CLK {level} for {still_ns} ns", f"{due} at rest", at_ns=int(ends[k]), lines=("CLK",))
     return f"CLK {level} for {still_ns} ns without power"

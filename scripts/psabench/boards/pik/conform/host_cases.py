@@ -5,7 +5,7 @@ from __future__ import annotations
 from psabench.conform.host.cases_can import NODE, Case
 from psabench.conform.host.cases_units import scenario
 from psabench.conform.host.check import limits
-from psabench.conform.host.stimulus import Stage
+from psabench.conform.host.stimulus import HostBench
 
 PIKS = ("pik", "pik5", "pik6")
 NEAR_RANGE_V = float(limits("HOST-PIK-02").limit("input_v"))
@@ -13,7 +13,7 @@ BEYOND_V = float(limits("HOST-PIK-03").limit("input_v"))
 BUS = ("bus",)
 
 
-def _pik_lost(s: Stage) -> None:
+def _pik_lost(s: HostBench) -> None:
     """Increments are lost with their frames: one, two in a row, thirty."""
     for frames in (1, 2, 30):
         s.run(0.3)
@@ -21,7 +21,7 @@ def _pik_lost(s: Stage) -> None:
     s.run(1.0)
 
 
-def _pik_over(s: Stage) -> None:
+def _pik_over(s: HostBench) -> None:
     for axis in "xyz":
         for sign in (1, -1):
             s.fault("sensor.stuck", f"a.sensor.{axis}", out_v=sign * BEYOND_V)

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 from psabench.conform.host.capture import Bus, Frame, signed
 from psabench.conform.host.capture_units import FIRST, SECOND, THIRD, after_start
-from psabench.conform.host.check import HostEvidence, enough, judges, limits, proves
+from psabench.conform.host.check import HostCapture, checks, enough, limits, proves
 from psabench.conform.host.check_units import readings_told
-from psabench.conform.verdict import Broken
+from psabench.conform.verdict import Failed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,47 +49,47 @@ SUM_WRAP = 1 << 32  # of PIK's totals
 
 
 @proves("HOST-PIK-01")
-@judges("pik_lost")
-def increments_that_are_lost_come_back(e: HostEvidence) -> str:
+@checks("pik_lost")
+def increments_that_are_lost_come_back(e: HostCapture) -> str:
     """PIK_COUNTS of 1, 2 and 30 readings do not come: sums of pulses against the totals."""
-    played = pulses(e.bus)
-    enough(sum(not p.told for p in played) == 33, "33 increments that were lost")
-    return _sums(e, played)
+    sent = pulses(e.bus)
+    enough(sum(not p.told for p in sent) == 33, "33 increments that were lost")
+    return _sums(e, sent)
 
 
 @proves("HOST-PIK-02")
-@judges("pik_bus")
-def counters_are_taken_over_their_wraps(e: HostEvidence) -> str:
+@checks("pik_bus")
+def counters_are_taken_over_their_wraps(e: HostCapture) -> str:
     """A minute at 9 V and -9 V by the registers of 16 bits: sums of pulses against the totals on CAN."""
-    played = pulses(e.bus)
+    sent = pulses(e.bus)
     modulo = int(limits("HOST-PIK-02").limit("modulo"))
-    turns = [abs(played[-1].totals[k] - played[0].totals[k]) // modulo for k in range(2)] if played else [0]
+    turns = [abs(sent[-1].totals[k] - sent[0].totals[k]) // modulo for k in range(2)] if sent else [0]
     enough(min(turns) >= 1, "a wrap in both directions")
-    return f"{_sums(e, played)}, {turns[0]} and {turns[1]} wraps"
+    return f"{_sums(e, sent)}, {turns[0]} and {turns[1]} wraps"
 
 
-def _sums(e: HostEvidence, played: Sequence[Pulses]) -> str:
-    """Raises Broken when a sum told does not differ from the first as the totals of the same reading do."""
+def _sums(e: HostCapture, sent: Sequence[Pulses]) -> str:
+    """Raises Failed when a sum told does not differ from the first as the totals of the same reading do."""
     told = readings_told(e)
     at, first = -1, None
     for r in told:
-        at = next((k for k in range(at + 1, len(played)) if played[k].seq == r.number % 256), -1)
+        at = next((k for k in range(at + 1, len(sent)) if sent[k].seq == r.number % 256), -1)
         if at < 0:
-            raise Broken(f"reading {r.number}, which was not played, or not then", "each once, in order")
-        first = (r, played[at]) if first is None else first
+            raise Failed(f"reading {r.number}, which was not played, or not then", "each once, in order")
+        first = (r, sent[at]) if first is None else first
         for k, axis in enumerate("xyz"):
             saw = round(r.values[k] - first[0].values[k])
-            due = played[at].totals[k] - first[1].totals[k]
+            due = sent[at].totals[k] - first[1].totals[k]
             if (saw - due) % SUM_WRAP:
-                raise Broken(f"{saw} pulses of {axis} up to reading {r.number}", f"{due}")
-    if at < len(played) - 10:
-        raise Broken(f"nothing after reading {told[-1].number}{e.last_words()}", f"{len(played) - 1 - at} more came")
+                raise Failed(f"{saw} pulses of {axis} up to reading {r.number}", f"{due}")
+    if at < len(sent) - 10:
+        raise Failed(f"nothing after reading {told[-1].number}{e.last_words()}", f"{len(sent) - 1 - at} more came")
     return f"{len(told)} readings, {round(told[-1].values[0] - told[0].values[0])} pulses of x"
 
 
 @proves("HOST-PIK-03")
-@judges("pik_over")
-def a_channel_that_cannot_keep_up_is_told(e: HostEvidence) -> str:
+@checks("pik_over")
+def a_channel_that_cannot_keep_up_is_told(e: HostCapture) -> str:
     """Each channel beyond its range, up and down: what is reported against SAT."""
     readings_told(e)
     due: list[tuple[str, str]] = []
@@ -100,5 +100,5 @@ def a_channel_that_cannot_keep_up_is_told(e: HostEvidence) -> str:
     enough(len(due) >= 12, "each channel beyond its range twice")
     told = [(x.name, x.value) for x in e.told.events if x.name in ("over_range", "in_range")]
     if told != due:
-        raise Broken(f"{told}", f"{due}")
+        raise Failed(f"{told}", f"{due}")
     return f"{len(due) // 2} times over the range and back"

@@ -1,13 +1,13 @@
-"""Scenes of PIK, PIK-5 and PIK-6: from Res, a second on the lines, a minute of readings."""
+"""Stimuli of PIK, PIK-5 and PIK-6: from Res, a second on the lines, a minute of readings."""
 
 from __future__ import annotations
 
 from psabench.boards.objects import PikObjects as OD
-from psabench.conform.capture.log import Evidence
+from psabench.conform.capture.log import Capture
 from psabench.conform.dut import Subject
-from psabench.conform.plan import scene
+from psabench.conform.plan import stimulus
 from psabench.conform.stimulus.streamed import from_res, readings
-from psabench.conform.verdict import TooLittle
+from psabench.conform.verdict import Inconclusive
 
 START_S, STREAM_S, MINUTE_S = 0.06, 1.0, 60.5
 OFF_S = 0.02  # without power
@@ -15,29 +15,29 @@ BUS, PERIOD, SOON = OD.BUS, 0x0C, 20  # registers over CAN; 20 times 100 us
 OVERDRIVE_DEG = -90.0  # there the accelerometer X gives more than its channel can follow
 
 
-@scene("power_on", boards=("pik",))
-def power_on(s: Subject) -> Evidence:
+@stimulus("power_on", boards=("pik",))
+def power_on(s: Subject) -> Capture:
     """From Res to some readings, streaming as soon as it has booted."""
     return from_res(s, START_S)
 
 
-@scene("stream", boards=("pik",))
-def stream(s: Subject) -> Evidence:
+@stimulus("stream", boards=("pik",))
+def stream(s: Subject) -> Capture:
     """A second of pulses and readings."""
-    return s.evidence("stream", readings(s, START_S, lambda: s.run_for(STREAM_S)))
+    return s.capture("stream", readings(s, START_S, lambda: s.run_for(STREAM_S)))
 
 
-@scene("minute", boards=("pik",))
-def minute(s: Subject) -> Evidence:
+@stimulus("minute", boards=("pik",))
+def minute(s: Subject) -> Capture:
     """A minute of readings at still inputs."""
-    return s.evidence("minute", readings(s, START_S, lambda: s.run_for(MINUTE_S), lines=False))
+    return s.capture("minute", readings(s, START_S, lambda: s.run_for(MINUTE_S), lines=False))
 
 
-@scene("overdrive", boards=("pik",))
-def overdrive(s: Subject) -> Evidence:
+@stimulus("overdrive", boards=("pik",))
+def overdrive(s: Subject) -> Capture:
     """The accelerometer X turned by a dividing head until its channel cannot keep up, and back; a reading each 2 ms."""
     if "head" not in s.probes:
-        raise TooLittle("no dividing head was connected")
+        raise Inconclusive("no dividing head was connected")
     s.reset()
     s.run_for(START_S)
     s.unit.node.write_raw(BUS, PERIOD + 1, SOON.to_bytes(2, "little"))
@@ -55,15 +55,15 @@ def overdrive(s: Subject) -> Evidence:
     take.lines = looked.lines
     s.reset()
     s.run_for(START_S)
-    return s.evidence("overdrive", take)
+    return s.capture("overdrive", take)
 
 
-@scene("power_cycle", boards=("pik",))
-def power_cycle(s: Subject) -> Evidence:
+@stimulus("power_cycle", boards=("pik",))
+def power_cycle(s: Subject) -> Capture:
     """Readings, no power for a while, and its first periods afterwards."""
     s.reset()
     s.run_for(START_S)
     with s.take() as take:
         s.power_cycle(OFF_S)
         s.run_for(START_S)
-    return s.evidence("power_cycle", take)
+    return s.capture("power_cycle", take)

@@ -11,11 +11,11 @@ from psabench.conform.bus_host import burst, line, line_refused
 from psabench.conform.capture.log import CanLog
 from psabench.conform.dictionary import as_the_dictionary_says
 from psabench.conform.dut import Subject
-from psabench.conform.plan import trial
+from psabench.conform.plan import active
 from psabench.conform.proves import proves
 from psabench.conform.registers import names_and_rights
 from psabench.conform.requirements import requirements
-from psabench.conform.verdict import Broken, TooLittle
+from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.busport import Cycle
 
 STATUS, MODE, COMMAND, BEAT, ZERO = 8, 9, 10, 11, 12
@@ -35,14 +35,14 @@ def calm(s: Subject) -> None:
 
 
 @proves("PMKA-SAMP-04")
-@trial(needs={"bus", "can"})
+@active(needs={"bus", "can"})
 def codes_of_the_bus_are_those_on_can(s: Subject) -> str:
     """Read 00h to 03h within a period, and find these codes on CAN."""
     return _as_on_can(s, 0, 4)
 
 
 @proves("PMKA-BUS-02")
-@trial(needs={"bus", "can"})
+@active(needs={"bus", "can"})
 def state_registers_are_the_messages(s: Subject) -> str:
     """Read 04h, 05h and 07h within a period, and find resets, rotation and temperature on CAN."""
     return _as_on_can(s, 4, 7)
@@ -61,7 +61,7 @@ def _as_on_can(s: Subject, first: int, end: int) -> str:
             s.run_for(0.3 * ts_s())
         s.run_for(3 * ts_s())
         s.unit.stop()
-    e = s.evidence("registers", take)
+    e = s.capture("registers", take)
     told = {}
     codes, states = e.frames_of("PMKA_CODES"), e.frames_of("PMKA_STATE")
     for a, b in zip(codes.frames, states.frames, strict=False):
@@ -78,15 +78,15 @@ def _as_on_can(s: Subject, first: int, end: int) -> str:
             int.from_bytes(state[6:8], "little"),
         ]
         if words[first:end] != due[first:end]:
-            raise Broken(f"{[f'{v:04X}' for v in words[first:end]]}", f"{[f'{v:04X}' for v in due[first:end]]}")
+            raise Failed(f"{[f'{v:04X}' for v in words[first:end]]}", f"{[f'{v:04X}' for v in due[first:end]]}")
         found += 1
     if found < 5:
-        raise TooLittle(f"{found} readings were seen on the bus and on CAN")
+        raise Inconclusive(f"{found} readings were seen on the bus and on CAN")
     return f"{found} readings as on CAN"
 
 
 @proves("PMKA-BUS-02")
-@trial(needs={"bus"})
+@active(needs={"bus"})
 def registers_have_their_names_and_rights(s: Subject) -> str:
     """Ask who is there, read and write every address."""
     calm(s)
@@ -97,7 +97,7 @@ def registers_have_their_names_and_rights(s: Subject) -> str:
 
 
 @proves("PMKA-CAL-02")
-@trial(needs={"bus", "can"})
+@active(needs={"bus", "can"})
 def the_computer_turns_the_calibration(s: Subject) -> str:
     """Set mode program, command beats and calibrations, look at TAU, CAL and SERVES."""
     calm(s)
@@ -110,30 +110,30 @@ def the_computer_turns_the_calibration(s: Subject) -> str:
         serves = [rotation >> 2 * k & 3 for k in range(4)]
         resting = tau - 2 if 2 <= tau <= 4 else 3
         if saw != (tau, cal) or serves[resting] != 0:
-            raise Broken(f"beat {saw[0]}, calibration {saw[1]}, serves {serves}", f"beat {tau}, calibration {cal}")
+            raise Failed(f"beat {saw[0]}, calibration {saw[1]}, serves {serves}", f"beat {tau}, calibration {cal}")
     calm(s)
     return "five beats and calibrations as commanded"
 
 
 @proves("PMKA-ROM-01")
-@trial(needs={"bus"})
+@active(needs={"bus"})
 def the_rom_can_be_read(s: Subject) -> str:
     """Read all words of the ROM by INDEX and DATA."""
     rom = _rom(s)
     if rom.ts_s != ts_s() or len(rom.degc) < 2 or rom.serial != s.unit.serial() & 0xFFFF:
-        raise Broken(f"Ts {rom.ts_s * 1e3:g} ms, {len(rom.degc)} points, serial {rom.serial}", "those of the board")
+        raise Failed(f"Ts {rom.ts_s * 1e3:g} ms, {len(rom.degc)} points, serial {rom.serial}", "those of the board")
     return f"{len(rom.degc)} points from {rom.degc[0]:g} to {rom.degc[-1]:g} degC, serial number {rom.serial}"
 
 
 @proves("PMKA-ROM-02")
-@trial(needs={"bus"})
+@active(needs={"bus"})
 def the_sum_of_the_rom_is_0(s: Subject) -> str:
     """Add all words."""
     row = requirements()["PMKA-ROM-02"]
     words = _rom_words(s)
     total = sum(words) & 0xFFFF
     if total != row.limit("sum") or words[0] != row.limit("layout"):
-        raise Broken(f"sum {total:04X}h, layout {words[0]}", f"{int(row.limit('sum')):04X}h, {row.limit('layout'):g}")
+        raise Failed(f"sum {total:04X}h, layout {words[0]}", f"{int(row.limit('sum')):04X}h, {row.limit('layout'):g}")
     return f"{len(words)} words, sum 0"
 
 
@@ -151,11 +151,11 @@ def _rom(s: Subject) -> est.Rom:
     try:
         return est.rom_of(_rom_words(s))
     except ValueError as err:
-        raise Broken(str(err), "a ROM that is whole") from err
+        raise Failed(str(err), "a ROM that is whole") from err
 
 
 @proves("PMKA-ROM-03")
-@trial(needs={"bus"})
+@active(needs={"bus"})
 def the_temperature_stands_still(s: Subject) -> str:
     """Read TEMPERATURE over a second: it stands still to its noise, within the range of the table of the ROM."""
     row, rom = requirements()["PMKA-ROM-03"], _rom(s)
@@ -165,7 +165,7 @@ def the_temperature_stands_still(s: Subject) -> str:
         seen.append(_degc(s))
         s.run_for(0.05)
     if max(seen) - min(seen) > row.limit("offset_max_k") or not rom.degc[0] <= seen[0] <= rom.degc[-1]:
-        raise Broken(f"{min(seen):.3f} to {max(seen):.3f} degC", "the temperature of the board, still")
+        raise Failed(f"{min(seen):.3f} to {max(seen):.3f} degC", "the temperature of the board, still")
     return f"{min(seen):.3f} to {max(seen):.3f} degC"
 
 
@@ -175,7 +175,7 @@ def _degc(s: Subject) -> float:
 
 
 @proves("PMKA-ROM-03")
-@trial(needs={"bus", "chamber"})
+@active(needs={"bus", "chamber"})
 def the_temperature_is_that_of_the_chamber(s: Subject) -> str:
     """Compare TEMPERATURE with the chamber at rest; heat the air for a minute, and see it follow."""
     row = requirements()["PMKA-ROM-03"]
@@ -183,7 +183,7 @@ def the_temperature_is_that_of_the_chamber(s: Subject) -> str:
     chamber = s.bench.chamber
     air, first, ramp = chamber.temp_degc, _degc(s), chamber.ramp_k_per_min
     if abs(first - air) > row.limit("offset_max_k"):
-        raise Broken(f"{first:.3f} degC", f"{air:.3f} degC in the chamber")
+        raise Failed(f"{first:.3f} degC", f"{air:.3f} degC in the chamber")
     try:
         chamber.ramp(HEAT_K_PER_MIN)
         chamber.set(air + HEAT_K)
@@ -194,12 +194,12 @@ def the_temperature_is_that_of_the_chamber(s: Subject) -> str:
         chamber.ramp(ramp)
     calm(s)
     if not first + row.limit("offset_max_k") < later < hot:
-        raise Broken(f"{first:.3f}, later {later:.3f} degC", f"more, and less than the air's {hot:.3f} degC")
+        raise Failed(f"{first:.3f}, later {later:.3f} degC", f"more, and less than the air's {hot:.3f} degC")
     return f"{first:.3f} degC at {air:.3f} degC; {later:.3f} degC while the air has {hot:.3f} degC"
 
 
 @proves("PMKA-BUS-03")
-@trial(needs={"bus"})
+@active(needs={"bus"})
 def a_reading_that_nobody_took_is_told(s: Subject) -> str:
     """Read STATUS with and without a read of K in the period before."""
     row = requirements()["PMKA-BUS-03"]
@@ -211,10 +211,10 @@ def a_reading_that_nobody_took_is_told(s: Subject) -> str:
         if before == after:
             break
     else:
-        raise TooLittle("five cycles on the bus last longer than a period")
+        raise Inconclusive("five cycles on the bus last longer than a period")
     first, _, taken = found
     if not first & waits or not first & missed or taken & (waits | missed):
-        raise Broken(f"STATUS {first:04X}h before K was read, {taken:04X}h after", "it waits, one was missed; neither")
+        raise Failed(f"STATUS {first:04X}h before K was read, {taken:04X}h after", "it waits, one was missed; neither")
     pause = f"R 9 {round(0.6 * ts_s() * 1e9)}"  # a strobe so long: the bridge keeps time, whatever its host does
     for _ in range(ATTEMPTS):
         cycles = burst(s, "R 3", "R 8", *(pause, "R 3") * 4, "R 8")
@@ -222,9 +222,9 @@ def a_reading_that_nobody_took_is_told(s: Subject) -> str:
         if max(took_s) < 0.9 * ts_s():
             break
     else:
-        raise TooLittle("cycles on the bus last longer than a period")
+        raise Inconclusive("cycles on the bus last longer than a period")
     if cycles[-1].data & missed:
-        raise Broken(f"STATUS {cycles[-1].data:04X}h with K read in each period", "no reading missed")
+        raise Failed(f"STATUS {cycles[-1].data:04X}h with K read in each period", "no reading missed")
     return "bit 0 until K is read, bit 1 where one was not taken"
 
 
@@ -234,7 +234,7 @@ def _periods(a: Cycle, b: Cycle) -> float:
 
 
 @proves("PMKA-BUS-04")
-@trial(needs={"bus"})
+@active(needs={"bus"})
 def a_read_is_of_its_strobe_s_beginning(s: Subject) -> str:
     """Read SEQ with a strobe of 20 ms, and at once afterwards."""
     calm(s)
@@ -243,12 +243,12 @@ def a_read_is_of_its_strobe_s_beginning(s: Subject) -> str:
     whole = int(_periods(long, after) + STROBE_NS * 1e-9 / ts_s())
     saw = f"SEQ {long.data} with a strobe of 20 ms, {after.data} after it"
     if made not in (whole, whole + 1):
-        raise Broken(saw, f"{whole} or {whole + 1} readings more, that of its beginning")
+        raise Failed(saw, f"{whole} or {whole + 1} readings more, that of its beginning")
     return saw
 
 
 @proves("PMKA-BUS-04")
-@trial(needs={"bus", "can"})
+@active(needs={"bus", "can"})
 def a_write_acts_at_the_end_of_its_strobe(s: Subject) -> str:
     """Write MODE with a strobe of 20 ms and look from which reading on AUTONOMOUS has changed."""
     calm(s)
@@ -260,19 +260,19 @@ def a_write_acts_at_the_end_of_its_strobe(s: Subject) -> str:
         s.run_for(3 * ts_s())
         s.unit.stop()
     calm(s)
-    states: CanLog = s.evidence("mode", take).frames_of("PMKA_STATE")
+    states: CanLog = s.capture("mode", take).frames_of("PMKA_STATE")
     changed = [int.from_bytes(f.data[:2], "little") for f in states.frames if (f.data[4] >> 5 & 1) != was]
     if not changed:
-        raise Broken("AUTONOMOUS never changes", "after the strobe")
+        raise Failed("AUTONOMOUS never changes", "after the strobe")
     readings, whole = (changed[0] - first.data) & 0xFFFF, int(_periods(first, written))
     saw = f"AUTONOMOUS changes {readings} readings after the beginning of a strobe of 20 ms"
     if not whole <= readings <= whole + 2:
-        raise Broken(saw, f"{whole} to {whole + 2}: at its end")
+        raise Failed(saw, f"{whole} to {whole + 2}: at its end")
     return saw
 
 
 @proves("PMKA-BUS-05")
-@trial(needs={"bus"})
+@active(needs={"bus"})
 def what_cannot_be_is_refused(s: Subject) -> str:
     """Read an address that is none, command in mode autonomous, set a beat too short, read before the first reading."""
     row = requirements()["PMKA-BUS-05"]
@@ -290,7 +290,7 @@ def what_cannot_be_is_refused(s: Subject) -> str:
 
 
 @proves("PMKA-BUS-06")
-@trial(needs={"bus", "can"})
+@active(needs={"bus", "can"})
 def resets_are_counted(s: Subject) -> str:
     """Count resets in the readings of a second, and compare them with INDEX 0 to 7."""
     s.reset()
@@ -303,27 +303,27 @@ def resets_are_counted(s: Subject) -> str:
     for index in range(8):
         line(s, f"W D {COUNTS_AT + index:X}")
         counted.append(line(s, "R E").data)
-    log = s.evidence("resets", take).frames_of("PMKA_STATE")
+    log = s.capture("resets", take).frames_of("PMKA_STATE")
     made = [[SIGNS.get(f.data[2] >> 2 * k & 3, 0) for k in range(4)] for f in log.frames if len(f.data) == 8]
     told = [sum(row[k] == sign for row in made) for k in range(4) for sign in (1, -1)]
     if any(not 0 <= c - t <= 2 for c, t in zip(counted, told, strict=True)) or not any(told):
-        raise Broken(f"{counted} counted", f"{told} told, and those since")
+        raise Failed(f"{counted} counted", f"{told} told, and those since")
     return f"{counted} counted, {told} told"
 
 
 @proves("PMKA-CAN-05")
-@trial(needs={"can"})
+@active(needs={"can"})
 def the_board_says_what_it_is(s: Subject) -> str:
     """Read 1008h and 1018h sub 2."""
     name, code = s.unit.node.read(OD.DEVICE_NAME), int(s.unit.node.read(OD.IDENTITY, 2))
     due = int(requirements()["PMKA-CAN-05"].limit("product_code"))
     if (name, code) != ("PMKA", due):
-        raise Broken(f"{name}, {code:08X}h", f"PMKA, {due:08X}h")
+        raise Failed(f"{name}, {code:08X}h", f"PMKA, {due:08X}h")
     return f"{name}, {code:08X}h"
 
 
 @proves("PMKA-CAN-06")
-@trial(needs={"can"})
+@active(needs={"can"})
 def objects_are_as_the_dictionary_says(s: Subject) -> str:
     """Read every object of the EDS and write where nothing may be written."""
     calm(s)

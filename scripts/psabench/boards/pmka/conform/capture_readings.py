@@ -9,17 +9,17 @@ from functools import lru_cache
 import numpy as np
 
 from psabench.boards.pmka import estimate as est
-from psabench.conform.capture.log import CanFrame, CanLog, Evidence
+from psabench.conform.capture.log import CanFrame, CanLog, Capture
 from psabench.conform.proves import row_for
-from psabench.conform.verdict import Broken, TooLittle
+from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.signals import Floats
 
 CODES, STATE = "PMKA_CODES", "PMKA_STATE"
 MILLI = 1e3
 
 
-def columns(e: Evidence, least: int = 10) -> dict[str, Floats]:
-    """Signals of whole readings, codes in V and T in degC as the DBC has them. Raises TooLittle, Broken."""
+def columns(e: Capture, least: int = 10) -> dict[str, Floats]:
+    """Signals of whole readings, codes in V and T in degC as the DBC has them. Raises Inconclusive, Failed."""
     return dict(_columns(e.can, e.variant.family, e.node, least))
 
 
@@ -27,16 +27,16 @@ def columns(e: Evidence, least: int = 10) -> dict[str, Floats]:
 def _columns(can: CanLog, board: str, node: int, least: int) -> Mapping[str, Floats]:
     codes, states = can.of(CODES, board, node), can.of(STATE, board, node)
     if min(len(codes), len(states)) < least:
-        raise TooLittle(f"{len(codes)} PMKA_CODES, {len(states)} PMKA_STATE came; expected {least} of each")
+        raise Inconclusive(f"{len(codes)} PMKA_CODES, {len(states)} PMKA_STATE came; expected {least} of each")
     pairs = _pairs(can, codes.frames[0].can_id, states.frames[0].can_id)
     if len(pairs) < least:
-        raise TooLittle(f"{len(pairs)} PMKA_CODES had their PMKA_STATE; expected {least}")
+        raise Inconclusive(f"{len(pairs)} PMKA_CODES had their PMKA_STATE; expected {least}")
     found: dict[str, Floats] = {}
     try:
         for name, frames in ((CODES, [p[0] for p in pairs]), (STATE, [p[1] for p in pairs])):
             found |= {k: v.astype(np.float64) for k, v in CanLog(frames=tuple(frames)).raw(name).items()}
     except ValueError as err:
-        raise TooLittle(f"messages of a wrong length: {err}") from err
+        raise Inconclusive(f"messages of a wrong length: {err}") from err
     for axis in est.INTEGRATORS:
         found[axis] = found[axis] * est.CODE_V
     found["T"] = found["T"] / 128.0
@@ -71,39 +71,39 @@ class Run:
         home = self.periods.serves[:, 3] == 0
         both = np.flatnonzero(home & np.roll(home, 1))[1:]
         if len(both) < 2:
-            raise TooLittle("the spare is never free")
+            raise Inconclusive("the spare is never free")
         return int(both[0]), int(both[-1])
 
-    def error_mmps(self, e: Evidence, integral_vs: Floats) -> Floats:
-        """Of integrals (n, 3) between the ends against the known input, mm/s by axis. Raises TooLittle if too short."""
+    def error_mmps(self, e: Capture, integral_vs: Floats) -> Floats:
+        """Of integrals (n, 3) between the ends against the known input, mm/s by axis. Raises Inconclusive."""
         row = row_for(e, "PMKA-INT-02")
         first, last = self.ends
         took_s = self.rom.ts_s * (last - first)
         if took_s < row.limit("duration_s"):
-            raise TooLittle(f"{took_s:.1f} s were recorded; expected {row.limit('duration_s'):g} s")
+            raise Inconclusive(f"{took_s:.1f} s were recorded; expected {row.limit('duration_s'):g} s")
         due_vs = np.array([self.inputs_v[a] for a in "xyz"]) * took_s
         error_vs = integral_vs[last] - integral_vs[first] - due_vs
         return np.asarray(error_vs * row.limit("g_mps2") / row.limit("ma_v_per_g") * MILLI, np.float64)
 
 
-def run_of(e: Evidence) -> Run:
-    """Raises TooLittle where calibrations, ROM or inputs are missing, Broken where readings are."""
+def run_of(e: Capture) -> Run:
+    """Raises Inconclusive where calibrations, ROM or inputs are missing, Failed where readings are."""
     words = e.facts.get("rom")
     if not isinstance(words, list) or len(e.inputs_v) < 3:
-        raise TooLittle("the ROM, or the volts at the three inputs, are not known")
+        raise Inconclusive("the ROM, or the volts at the three inputs, are not known")
     try:
         rom = est.rom_of(words)
         periods = est.periods_of(columns(e))
         calibrations = [est.calibrate(periods, i) for i in range(4)]
     except ValueError as err:
-        raise TooLittle(str(err)) from err
+        raise Inconclusive(str(err)) from err
     return Run(periods=periods, calibrations=calibrations, rom=rom, inputs_v=e.inputs_v)
 
 
-def largest(e: Evidence, run: Run, integral_vs: Floats, most_mmps: float) -> str:
-    """Raises Broken where an axis is off by more than that."""
+def largest(e: Capture, run: Run, integral_vs: Floats, most_mmps: float) -> str:
+    """Raises Failed where an axis is off by more than that."""
     error = run.error_mmps(e, integral_vs)
     saw = f"{', '.join(f'{v:.2f}' for v in error)} mm/s on X, Y, Z"
     if not np.abs(error).max() <= most_mmps:
-        raise Broken(saw, f"{most_mmps:g} mm/s at most")
+        raise Failed(saw, f"{most_mmps:g} mm/s at most")
     return saw

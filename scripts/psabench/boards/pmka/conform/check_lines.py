@@ -6,10 +6,10 @@ import numpy as np
 
 from psabench.boards.pmka.conform.capture_readings import columns
 from psabench.conform.capture.intervals import after, bus_word, first_bad, interval, nearest, wires_needed
-from psabench.conform.capture.log import Evidence
+from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import proves, row_for
-from psabench.conform.verdict import Broken, TooLittle
+from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.signals import Ints
 
 KEYS = ("KL1", "KL2", "KL3", "KL4")
@@ -24,8 +24,8 @@ LEAST = 8
 SPARE = 3
 
 
-def samples(e: Evidence, least: int = LEAST) -> tuple[Ints, Ints]:
-    """Instants of the rises of SH and the integrator that each samples: MUX just before it. Raises TooLittle."""
+def samples(e: Capture, least: int = LEAST) -> tuple[Ints, Ints]:
+    """Instants of the rises of SH and the integrator that each samples: MUX just before it. Raises Inconclusive."""
     wires_needed(e, "SH", *MUX)
     log = e.wires.unbroken()
     rises = log.rises("SH")
@@ -33,13 +33,13 @@ def samples(e: Evidence, least: int = LEAST) -> tuple[Ints, Ints]:
     begins = np.flatnonzero(np.diff(rises, prepend=log.start_ns) > pause_ns)  # what comes before is a part of a reading
     rises = rises[int(begins[0]) :] if len(begins) else rises[:0]
     if len(rises) < 4 * least:
-        raise TooLittle(f"{len(rises)} samples were recorded; expected {4 * least}")
+        raise Inconclusive(f"{len(rises)} samples were recorded; expected {4 * least}")
     return rises, bus_word(e, "MUX", 2, rises - 1 - round(e.slack_ns(0.0)))
 
 
 @proves("PMKA-SAMP-01")
 @check("stream", needs={"line"})
-def integrators_are_sampled_every_ts(e: Evidence) -> str:
+def integrators_are_sampled_every_ts(e: Capture) -> str:
     """Measure from one sample of an integrator to its next."""
     row = row_for(e, "PMKA-SAMP-01")
     rises, which = samples(e)
@@ -56,7 +56,7 @@ def integrators_are_sampled_every_ts(e: Evidence) -> str:
 
 @proves("PMKA-SAMP-02")
 @check("stream", needs={"line"})
-def four_samples_follow_one_another(e: Evidence) -> str:
+def four_samples_follow_one_another(e: Capture) -> str:
     """Follow MUX from X to K and measure the steps."""
     row = row_for(e, "PMKA-SAMP-02")
     rises, which = samples(e)
@@ -70,14 +70,14 @@ def four_samples_follow_one_another(e: Evidence) -> str:
 
 @proves("PMKA-SAMP-03")
 @check("stream", needs={"pins"})
-def samples_are_held_and_converted(e: Evidence) -> str:
+def samples_are_held_and_converted(e: Capture) -> str:
     """Measure SH, and CONV from it."""
     wires_needed(e, *SAMPLE)
     row = row_for(e, "PMKA-SAMP-03")
     up, down = e.wires.pulses("SH", 1)
     begin, end = after(e.wires.rises("CONV"), up - 1), after(e.wires.falls("CONV"), up)
     if len(up) < LEAST:
-        raise TooLittle(f"{len(up)} samples were recorded")
+        raise Inconclusive(f"{len(up)} samples were recorded")
     tolerance_ns, hold_ns = row.limit("tolerance_us") * US, row.limit("hold_us") * US
     interval(e, up, begin, row.limit("convert_from_us") * US, tolerance_ns, "from SH to CONV", SAMPLE)
     interval(e, up, end, hold_ns, tolerance_ns, "from SH to the end of CONV", SAMPLE)
@@ -86,7 +86,7 @@ def samples_are_held_and_converted(e: Evidence) -> str:
 
 @proves("PMKA-RST-02")
 @check("stream", needs={"pins"})
-def resets_last_half_a_period(e: Evidence) -> str:
+def resets_last_half_a_period(e: Capture) -> str:
     """Measure RP1 to RN4, and compare their begin with the samples of their integrators."""
     wires_needed(e, *RESETS)
     row = row_for(e, "PMKA-RST-02")
@@ -103,13 +103,13 @@ def resets_last_half_a_period(e: Evidence) -> str:
             seen = interval(e, up, down, row.limit("reset_us") * US, tolerance_ns, f"of {name} high", (name, *SAMPLE))
             interval(e, nearest(mine, up), up, 0.0, tolerance_ns, f"from the sample to {name}", (name, *SAMPLE))
     if count < LEAST:
-        raise TooLittle(f"{count} resets were recorded")
+        raise Inconclusive(f"{count} resets were recorded")
     return f"{count} resets; {seen}"
 
 
 @proves("PMKA-RST-05")
 @check("stream", needs={"pins", "can"})
-def resets_are_told_with_their_signs(e: Evidence) -> str:
+def resets_are_told_with_their_signs(e: Capture) -> str:
     """Count positive and negative resets of each integrator on the lines and in the readings."""
     wires_needed(e, *RESETS)
     c = columns(e)
@@ -118,16 +118,16 @@ def resets_are_told_with_their_signs(e: Evidence) -> str:
         for sign, wire in ((1, f"RP{k + 1}"), (-1, f"RN{k + 1}")):
             told, real = int((c[f"RESET_{name}"] == sign).sum()), len(e.wires.rises(wire))
             if abs(told - real) > 1:  # at the ends of the recording
-                raise Broken(f"{told} resets of sign {sign} of {name} told", f"{real} on {wire}")
+                raise Failed(f"{told} resets of sign {sign} of {name} told", f"{real} on {wire}")
             seen.append(real)
     if sum(seen) < LEAST:
-        raise TooLittle(f"{sum(seen)} resets were recorded")
+        raise Inconclusive(f"{sum(seen)} resets were recorded")
     return f"{sum(seen)} resets on the lines, as many told"
 
 
 @proves("PMKA-CAL-01")
 @check("stream", needs={"pins"})
-def a_calibrated_integrator_is_off_its_sensor(e: Evidence) -> str:
+def a_calibrated_integrator_is_off_its_sensor(e: Capture) -> str:
     """Look for alternating resets, which only a calibration makes, while the key is closed."""
     wires_needed(e, *KEYS, *RESETS)
     off, ts_ns = 0, row_for(e, "PMKA-SAMP-01").limit("ts_us") * US
@@ -142,26 +142,26 @@ def a_calibrated_integrator_is_off_its_sensor(e: Evidence) -> str:
         )
         off += int((level == 0).sum())
     if not off:
-        raise TooLittle("no calibration of resets in the recording")
+        raise Inconclusive("no calibration of resets in the recording")
     return f"{off} resets in turn, all with the key open"
 
 
 @proves("PMKA-ROT-04")
 @check("stream", needs={"line"})
-def three_keys_are_closed_at_any_instant(e: Evidence) -> str:
+def three_keys_are_closed_at_any_instant(e: Capture) -> str:
     """Count closed keys at every edge, and half a microsecond after."""
     wires_needed(e, *KEYS)
     at_ns = np.unique(np.concatenate([e.wires[k].t_ns for k in KEYS])) + round(e.slack_ns(0.0))
     closed = sum((e.wires[k].at(at_ns).astype(np.int64) for k in KEYS), np.zeros(len(at_ns), np.int64))
     first_bad(closed != 3, at_ns, [f"{n} keys closed" for n in closed], "3: an integrator for each axis", KEYS)
     if len(at_ns) < 4:
-        raise TooLittle("no hand-over in the recording")
+        raise Inconclusive("no hand-over in the recording")
     return f"{len(at_ns) - 1} moves of keys, three closed at any instant"
 
 
 @proves("PMKA-ROT-05")
 @check("stream", needs={"pins"})
-def keys_move_about_the_sample_of_the_spare(e: Evidence) -> str:
+def keys_move_about_the_sample_of_the_spare(e: Capture) -> str:
     """Measure from each closing of a key to the sample of K."""
     wires_needed(e, *KEYS)
     row = row_for(e, "PMKA-ROT-05")
@@ -185,12 +185,12 @@ def keys_move_about_the_sample_of_the_spare(e: Evidence) -> str:
 
 @proves("PMKA-BUS-01")
 @check("strobes", needs={"pins", "bus"})
-def cycles_are_on_the_bus(e: Evidence) -> str:
+def cycles_are_on_the_bus(e: Capture) -> str:
     """Compare address, R/W and data of each strobe with the cycles that were made."""
     wires_needed(e, "CS", "RW", *ADDRESS, *DATA)
     begin, end = e.wires.pulses("CS", 0)
     if len(begin) != len(e.cycles) or not len(begin):
-        raise Broken(
+        raise Failed(
             f"{len(begin)} strobes on CS", f"{len(e.cycles)} cycles", at_ns=int(begin[0]) if len(begin) else None
         )
     at = begin + round(e.slack_ns(0.0))
@@ -210,7 +210,7 @@ def cycles_are_on_the_bus(e: Evidence) -> str:
 
 @proves("PMKA-SIG-01")
 @check("power_on", needs={"pins"})
-def lines_rest_at_their_levels(e: Evidence) -> str:
+def lines_rest_at_their_levels(e: Capture) -> str:
     """Look at every line before the first sample after Res."""
     wires_needed(e, *PINS)
     row = row_for(e, "PMKA-SIG-01")
@@ -219,19 +219,19 @@ def lines_rest_at_their_levels(e: Evidence) -> str:
     for name in PINS:
         due = int(row.limits.get(f"{name.lower()}_level", 0))
         if int(e.wires[name].at(at)) != due:
-            raise Broken(f"{name} {1 - due} before the first sample", f"{due}", at_ns=at, lines=(name, "SH"))
+            raise Failed(f"{name} {1 - due} before the first sample", f"{due}", at_ns=at, lines=(name, "SH"))
     return f"{len(PINS)} lines at rest"
 
 
 @proves("PMKA-ERR-02")
 @check("power_on", needs={"pins"})
-def res_ends_resets(e: Evidence) -> str:
+def res_ends_resets(e: Capture) -> str:
     """Look at RP1 to RN4 and the beat between Res and the first sample."""
     wires_needed(e, *RESETS, *TAU)
     rises, which = samples(e, 1)
     for name in (*RESETS, *TAU):
         if int(e.wires[name].at(int(rises[0]) - 1 - round(e.slack_ns(0.0)))):
-            raise Broken(f"{name} high before the first sample", "low", at_ns=int(rises[0]), lines=(name, "SH"))
+            raise Failed(f"{name} high before the first sample", "low", at_ns=int(rises[0]), lines=(name, "SH"))
     if int(which[0]) != 0:
-        raise Broken(f"{'XYZK'[int(which[0])]} sampled first", "X", at_ns=int(rises[0]), lines=SAMPLE)
+        raise Failed(f"{'XYZK'[int(which[0])]} sampled first", "X", at_ns=int(rises[0]), lines=SAMPLE)
     return "no reset, beat 0, X sampled first"

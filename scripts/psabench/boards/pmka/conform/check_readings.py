@@ -8,24 +8,24 @@ import numpy as np
 
 from psabench.boards.pmka import estimate as est
 from psabench.boards.pmka.conform.capture_readings import CODES, STATE, columns, largest, run_of
-from psabench.conform.capture.log import Evidence
+from psabench.conform.capture.log import Capture
 from psabench.conform.capture.messages import as_laid_out, booted, in_turn, late_readings
 from psabench.conform.plan import check
 from psabench.conform.proves import proves, row_for
 from psabench.conform.requirements import requirements
-from psabench.conform.verdict import Broken, TooLittle
+from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.signals import Floats, Ints
 
 BEAT_OF_AXIS = {2: 0, 3: 1, 4: 2}  # beat to the axis that the spare serves
 HOME = (1, 2, 3, 0)  # SERVES of X, Y, Z, K with no one out of work but the spare
 
 
-def _periods(e: Evidence) -> est.Periods:
-    """Raises TooLittle where readings are missing or at their limits."""
+def _periods(e: Capture) -> est.Periods:
+    """Raises Inconclusive where readings are missing or at their limits."""
     try:
         return est.periods_of(columns(e))
     except ValueError as err:
-        raise TooLittle(str(err)) from err
+        raise Inconclusive(str(err)) from err
 
 
 def _steady(tau: Floats) -> np.ndarray:
@@ -37,27 +37,27 @@ def _steady(tau: Floats) -> np.ndarray:
 
 @proves("PMKA-CAN-01")
 @check("stream", needs={"can"})
-def codes_and_state_alternate(e: Evidence) -> str:
+def codes_and_state_alternate(e: Capture) -> str:
     """Follow the two messages of each reading."""
     return in_turn(e, (CODES, STATE))
 
 
 @proves("PMKA-CAN-02")
 @check("minute", needs={"can"})
-def readings_are_counted_without_gaps(e: Evidence) -> str:
+def readings_are_counted_without_gaps(e: Capture) -> str:
     """Look at SEQ from reading to reading."""
     modulo = int(row_for(e, "PMKA-CAN-02").limit("modulo"))
     seq = columns(e)["SEQ"].astype(np.int64)
     gaps = np.flatnonzero(np.diff(seq) % modulo != 1)
     if len(gaps):
         k = int(gaps[0])
-        raise Broken(f"SEQ {seq[k]}, then {seq[k + 1]} ({len(gaps)} gaps)", "one more")
+        raise Failed(f"SEQ {seq[k]}, then {seq[k + 1]} ({len(gaps)} gaps)", "one more")
     return f"{len(seq)} readings, SEQ {seq[0]} to {seq[-1]}"
 
 
 @proves("PMKA-CAN-02")
 @check("power_on", needs={"can"})
-def readings_begin_with_0_after_res(e: Evidence) -> str:
+def readings_begin_with_0_after_res(e: Capture) -> str:
     """Look at SEQ of the first reading after Res; one that was reported late counts those before it."""
     first = int(row_for(e, "PMKA-CAN-02").limit("first"))
     seq = int(columns(e, 3)["SEQ"][0])
@@ -69,51 +69,51 @@ def readings_begin_with_0_after_res(e: Evidence) -> str:
         row_for(e, "PMKA-SAMP-01").limit("ts_us") * 1e-6,
     )
     if not first <= seq <= first + late:
-        raise Broken(f"SEQ {seq} first", f"{first}" if not late else f"{first} to {first + late}")
+        raise Failed(f"SEQ {seq} first", f"{first}" if not late else f"{first} to {first + late}")
     return f"SEQ {seq} first"
 
 
 @proves("PMKA-ERR-02")
 @check("power_on", needs={"can"})
-def res_begins_with_beat_0(e: Evidence) -> str:
+def res_begins_with_beat_0(e: Capture) -> str:
     """Look at TAU of the first reading after Res, and whether anything was reset before it; later at beat 1."""
     booted(e, "PMKA_HEARTBEAT")
     c = columns(e, 3)
     seq, tau = int(c["SEQ"][0]), int(c["TAU"][0])
     resets = [int(c[f"RESET_{name}"][0]) for name in est.INTEGRATORS]
     if seq >= requirements()["PMKA-CAL-03"].limit("beat_periods"):
-        raise TooLittle(f"the first reading that was reported has SEQ {seq}")
+        raise Inconclusive(f"the first reading that was reported has SEQ {seq}")
     if tau not in (0, *([1] if seq else [])) or (any(resets) and not seq):
-        raise Broken(f"SEQ {seq}, TAU {tau}, resets {resets} first", "TAU 0, no reset")
+        raise Failed(f"SEQ {seq}, TAU {tau}, resets {resets} first", "TAU 0, no reset")
     return f"TAU {tau} in the first reading, SEQ {seq}"
 
 
 @proves("PMKA-CAN-03")
 @check("stream", needs={"can"})
-def messages_have_their_lengths(e: Evidence) -> str:
+def messages_have_their_lengths(e: Capture) -> str:
     """Look at lengths and at bits without a signal."""
     return as_laid_out(e, (CODES, STATE))
 
 
 @proves("PMKA-CAN-04")
 @check("power_on", needs={"stamps"})
-def the_first_sample_comes_in_time(e: Evidence) -> str:
+def the_first_sample_comes_in_time(e: Capture) -> str:
     """Measure from the boot-up message to the first PMKA_CODES."""
     row = row_for(e, "PMKA-CAN-04")
     boot, log = booted(e, "PMKA_HEARTBEAT"), e.frames_of(CODES)
     if not len(log):
-        raise TooLittle("no PMKA_CODES came")
+        raise Inconclusive("no PMKA_CODES came")
     seq, ts_ms = int(columns(e, 3)["SEQ"][0]), row_for(e, "PMKA-SAMP-01").limit("ts_us") * 1e-3
     took_ms, due_ms = float(log.t_s[0] - boot.t_s) * 1e3, row.limit("start_ms") + seq * ts_ms
     if abs(took_ms - due_ms) > row.limit("tolerance_ms"):
         due = f"{due_ms:g} +- {row.limit('tolerance_ms'):g} ms"
-        raise Broken(f"{took_ms:.3f} ms with SEQ {seq}", due, frames=(boot, log.frames[0]))
+        raise Failed(f"{took_ms:.3f} ms with SEQ {seq}", due, frames=(boot, log.frames[0]))
     return f"{took_ms:.3f} ms from boot-up to the codes of SEQ {seq}"
 
 
 @proves("PMKA-INT-01")
 @check("stream", needs={"can", "inputs"})
-def an_integrator_moves_with_its_input(e: Evidence) -> str:
+def an_integrator_moves_with_its_input(e: Capture) -> str:
     """Compare steps of codes without a reset with the volts at the input."""
     row, c = row_for(e, "PMKA-INT-01"), columns(e)
     steady, seen = _steady(c["TAU"])[1:], []
@@ -121,10 +121,10 @@ def an_integrator_moves_with_its_input(e: Evidence) -> str:
         volts = e.inputs_v.get(axis.lower(), 0.0)
         mine = steady & (c[f"RESET_{axis}"][1:] == 0) & (c[f"SERVES_{axis}"][1:] == k + 1)
         if abs(volts) < 0.1 or mine.sum() < 10:
-            raise TooLittle(f"{volts} V at {axis}, {int(mine.sum())} periods without a reset")
+            raise Inconclusive(f"{volts} V at {axis}, {int(mine.sum())} periods without a reset")
         per_v = float(np.diff(c[axis])[mine].mean()) / volts
         if abs(per_v / row.limit("v_per_v") - 1) > row.limit("tolerance_pct") / 100:
-            raise Broken(
+            raise Failed(
                 f"{per_v:.4f} V a period for 1 V on {axis}",
                 f"{row.limit('v_per_v')} V +- {row.limit('tolerance_pct'):g} %",
             )
@@ -134,7 +134,7 @@ def an_integrator_moves_with_its_input(e: Evidence) -> str:
 
 @proves("PMKA-INT-04")
 @check("minute", needs={"can", "inputs"})
-def resets_are_as_many_as_the_input_wants(e: Evidence) -> str:
+def resets_are_as_many_as_the_input_wants(e: Capture) -> str:
     """Count the resets of each axis in a minute: one a period at full scale."""
     full_v, p = row_for(e, "PMKA-INT-04").limit("full_scale_v"), _periods(e)
     seen = []
@@ -143,27 +143,27 @@ def resets_are_as_many_as_the_input_wants(e: Evidence) -> str:
         made = float((p.reset * serving).sum()) / len(p) * full_v
         volts = e.inputs_v.get("xyz"[axis], 0.0)
         if abs(made - volts) > row_for(e, "PMKA-INT-04").limit("tolerance_v"):
-            raise Broken(f"resets for {made:.3f} V on {'XYZ'[axis]}", f"{volts:.3f} V")
+            raise Failed(f"resets for {made:.3f} V on {'XYZ'[axis]}", f"{volts:.3f} V")
         seen.append(f"{made:.3f}")
     return f"resets for {', '.join(seen)} V"
 
 
 @proves("PMKA-INT-04")
 @check("minute", needs={"can", "inputs"})
-def nothing_saturates_below_full_scale(e: Evidence) -> str:
+def nothing_saturates_below_full_scale(e: Capture) -> str:
     """Look for SATURATED and CLIPPED in a minute."""
     most, c = row_for(e, "PMKA-INT-04").limit("full_scale_v"), columns(e)
     if any(abs(v) > most for v in e.inputs_v.values()):
-        raise TooLittle(f"expected inputs of {most:g} V at most")
+        raise Inconclusive(f"expected inputs of {most:g} V at most")
     for flag in ("SATURATED", "CLIPPED"):
         if c[flag].any():
-            raise Broken(f"{flag} in {np.count_nonzero(c[flag])} of {len(c[flag])} readings", f"none up to {most:g} V")
+            raise Failed(f"{flag} in {np.count_nonzero(c[flag])} of {len(c[flag])} readings", f"none up to {most:g} V")
     return f"{len(c['SEQ'])} readings without SATURATED and CLIPPED"
 
 
 @proves("PMKA-RST-01")
 @check("stream", needs={"can"})
-def resets_follow_codes_beyond_uc(e: Evidence) -> str:
+def resets_follow_codes_beyond_uc(e: Capture) -> str:
     """Look for the reset after each code beyond Uc, and for none after one within."""
     row, c = row_for(e, "PMKA-RST-01"), columns(e)
     uc, tol, count = row.limit("uc_v"), row.limit("uc_tolerance_v"), 0
@@ -175,38 +175,38 @@ def resets_follow_codes_beyond_uc(e: Evidence) -> str:
         bad = np.flatnonzero(sure & (reset != due))
         if len(bad):
             k = int(bad[0])
-            raise Broken(
+            raise Failed(
                 f"RESET_{name} {int(reset[k])} after a code of {code[k]:.4f} V", f"{int(due[k])}: Uc is {uc:g} V"
             )
         count += int((reset[sure] != 0).sum())
     if count < 10:
-        raise TooLittle(f"{count} resets were reported")
+        raise Inconclusive(f"{count} resets were reported")
     return f"{count} resets, each after a code beyond {uc:g} V"
 
 
 @proves("PMKA-RST-03")
 @check("minute", needs={"can"})
-def a_reset_moves_the_code_by_its_size(e: Evidence) -> str:
+def a_reset_moves_the_code_by_its_size(e: Capture) -> str:
     """Take the steps of calibrated integrators."""
     row, p = row_for(e, "PMKA-RST-03"), _periods(e)
     due, part = row.limit("nr_codes"), row.limit("tolerance_pct") / 100
     sizes = _sizes(p)
     if np.abs(sizes / due - 1).max() > part:
-        raise Broken(f"{', '.join(f'{v:.1f}' for v in sizes.reshape(-1))} codes", f"{due:g} +- {part:.0%}")
+        raise Failed(f"{', '.join(f'{v:.1f}' for v in sizes.reshape(-1))} codes", f"{due:g} +- {part:.0%}")
     return f"{sizes.min():.1f} to {sizes.max():.1f} codes against the sign of the reset"
 
 
 def _sizes(p: est.Periods) -> Floats:
-    """(4, 2) mean Nr by integrator and sign. Raises TooLittle."""
+    """(4, 2) mean Nr by integrator and sign. Raises Inconclusive."""
     try:
         return np.array([est.calibrate(p, k).nr.mean(axis=0) for k in range(4)])
     except ValueError as err:
-        raise TooLittle(str(err)) from err
+        raise Inconclusive(str(err)) from err
 
 
 @proves("PMKA-RST-04")
 @check("minute", needs={"can"})
-def the_input_stays_connected_in_a_reset(e: Evidence) -> str:
+def the_input_stays_connected_in_a_reset(e: Capture) -> str:
     """Compare increments of periods with a reset, Nr added, with those without."""
     row, p = row_for(e, "PMKA-RST-04"), _periods(e)
     sizes, seen = _sizes(p), []
@@ -216,28 +216,28 @@ def the_input_stays_connected_in_a_reset(e: Evidence) -> str:
         plain = home & (reset == 0)
         hit = home & (reset != 0)
         if plain.sum() < 10 or hit.sum() < 10:
-            raise TooLittle(f"{int(hit.sum())} periods with a reset on {'XYZ'[k]}")
+            raise Inconclusive(f"{int(hit.sum())} periods with a reset on {'XYZ'[k]}")
         whole = step + np.where(reset > 0, sizes[k, 0], 0.0) - np.where(reset < 0, sizes[k, 1], 0.0)
         with_reset, without = float(whole[hit].mean()), float(step[plain].mean())
         if abs(with_reset / without - 1) > row.limit("increment_tolerance_pct") / 100:
-            raise Broken(f"{with_reset:.2f} codes with a reset on {'XYZ'[k]}, {without:.2f} without", "the same")
+            raise Failed(f"{with_reset:.2f} codes with a reset on {'XYZ'[k]}, {without:.2f} without", "the same")
         seen.append(f"{with_reset:.1f} and {without:.1f}")
     return f"increments with and without a reset: {'; '.join(seen)} codes"
 
 
 @proves("PMKA-RST-07")
 @check("minute", needs={"can"})
-def the_two_signs_have_sizes_of_their_own(e: Evidence) -> str:
+def the_two_signs_have_sizes_of_their_own(e: Capture) -> str:
     """Compare the ratio of Nr(+) and Nr(-) with that of CT(+) and CT(-) in the ROM."""
     row, run = row_for(e, "PMKA-RST-07"), run_of(e)
     sizes, degc = _sizes(run.periods), run.periods.degc.mean(keepdims=True)
     nr = sizes[:, 0] / sizes[:, 1] - 1
     ct = np.array([float(run.rom.ct_at(k, 0, degc)[0] / run.rom.ct_at(k, 1, degc)[0]) - 1 for k in range(4)])
     if not np.any(run.rom.ct[:, :, 0] != run.rom.ct[:, :, 1]):
-        raise Broken("CT(+) is CT(-) in the whole ROM", "two of them")
+        raise Failed("CT(+) is CT(-) in the whole ROM", "two of them")
     off = np.abs(nr - ct) * 1e6
     if off.max() > row.limit("ratio_tolerance_ppm"):
-        raise Broken(
+        raise Failed(
             f"Nr(+)/Nr(-) off by {off.max():.1f} ppm", f"{row.limit('ratio_tolerance_ppm'):g} ppm of CT(+)/CT(-)"
         )
     return f"Nr(+)/Nr(-) - 1 = {', '.join(f'{v * 1e6:.0f}' for v in nr)} ppm, as the ROM says"
@@ -245,20 +245,20 @@ def the_two_signs_have_sizes_of_their_own(e: Evidence) -> str:
 
 @proves("PMKA-INT-03")
 @check("minute", needs={"can"})
-def a_code_is_worth_what_the_article_says(e: Evidence) -> str:
+def a_code_is_worth_what_the_article_says(e: Capture) -> str:
     """Take Sr / Nr of a calibration."""
     row, p = row_for(e, "PMKA-INT-03"), _periods(e)
     ts_s = row_for(e, "PMKA-SAMP-01").limit("ts_us") * 1e-6
     quanta = np.array([est.quantum_vs(float(nr), ts_s) for nr in _sizes(p).reshape(-1)])
     due, part = row.limit("quantum_vs"), row.limit("tolerance_pct") / 100
     if np.abs(quanta / due - 1).max() > part:
-        raise Broken(f"{quanta.min():.4g} to {quanta.max():.4g} V s a code", f"{due:g} +- {part:.0%}")
+        raise Failed(f"{quanta.min():.4g} to {quanta.max():.4g} V s a code", f"{due:g} +- {part:.0%}")
     return f"{quanta.min():.4g} to {quanta.max():.4g} V s a code"
 
 
 @proves("PMKA-INT-02")
 @check("minute", needs={"can", "inputs"})
-def a_minute_is_integrated_without_a_gap(e: Evidence) -> str:
+def a_minute_is_integrated_without_a_gap(e: Capture) -> str:
     """Sum all increments of a minute by the article's equations and compare them with the input."""
     run = run_of(e)
     integral = est.integrals_vs(run.periods, run.rom, run.calibrations)
@@ -267,7 +267,7 @@ def a_minute_is_integrated_without_a_gap(e: Evidence) -> str:
 
 @proves("PMKA-RST-06")
 @check("minute", needs={"can", "inputs"})
-def the_capacitor_does_not_matter(e: Evidence) -> str:
+def the_capacitor_does_not_matter(e: Capture) -> str:
     """The same where capacitors lose some of their value, which the size of resets must show."""
     run = run_of(e)
     took_h = (run.calibrations[0].nr_at[-1] - run.calibrations[0].nr_at[0]) * run.rom.ts_s / 3600
@@ -275,7 +275,7 @@ def the_capacitor_does_not_matter(e: Evidence) -> str:
     grown = float(run.calibrations[0].nr[-1].mean() / run.calibrations[0].nr[0].mean()) - 1
     due = -float(e.variant["cap_ageing_per_h"]) * took_h
     if abs(grown - due) > row.limit("growth_tolerance_pct") / 100 * due:
-        raise Broken(f"Nr grows by {grown * 1e6:.0f} ppm", f"{due * 1e6:.0f} ppm")
+        raise Failed(f"Nr grows by {grown * 1e6:.0f} ppm", f"{due * 1e6:.0f} ppm")
     integral = est.integrals_vs(run.periods, run.rom, run.calibrations)
     seen = largest(e, run, integral, row.limit("velocity_error_max_mmps"))
     return f"Nr grows by {grown * 1e6:.0f} ppm; {seen}"
@@ -283,7 +283,7 @@ def the_capacitor_does_not_matter(e: Evidence) -> str:
 
 @proves("PMKA-ROT-07")
 @check("minute", needs={"can", "inputs"})
-def a_sum_across_hand_overs_is_wrong(e: Evidence) -> str:
+def a_sum_across_hand_overs_is_wrong(e: Capture) -> str:
     """Sum the codes as if one integrator had the axis all the time, and as they should be."""
     row, run = row_for(e, "PMKA-ROT-07"), run_of(e)
     p, out = run.periods, np.zeros((len(run.periods), 3))
@@ -295,60 +295,60 @@ def a_sum_across_hand_overs_is_wrong(e: Evidence) -> str:
         out[:, axis] = np.cumsum(steps / nr + p.reset[rows, has]) * est.UREF_V * run.rom.ts_s
     wrong = np.abs(run.error_mmps(e, out)).max()
     if wrong < row.limit("wrong_min_mmps"):
-        raise Broken(f"{wrong:.1f} mm/s", f"more than {row.limit('wrong_min_mmps'):g} mm/s")
+        raise Failed(f"{wrong:.1f} mm/s", f"more than {row.limit('wrong_min_mmps'):g} mm/s")
     right = est.integrals_vs(p, run.rom, run.calibrations)
     return f"{wrong:.0f} mm/s off; as they should be {largest(e, run, right, row.limit('right_max_mmps'))}"
 
 
 @proves("PMKA-CAL-01")
 @check("minute", needs={"can"})
-def calibration_is_first_of_zero_then_of_resets(e: Evidence) -> str:
+def calibration_is_first_of_zero_then_of_resets(e: Capture) -> str:
     """Follow CAL in each beat, and look who serves no one meanwhile."""
     c, p = columns(e), _periods(e)
     beats = np.flatnonzero(np.diff(c["TAU"])) + 1
     busy = p.cal != 0
     idle = (p.serves == 0).sum(axis=1)
     if not busy.any():
-        raise TooLittle("no calibration in the recording")
+        raise Inconclusive("no calibration in the recording")
     if (idle[busy] != 1).any():
-        raise Broken("CAL without one integrator that serves no axis", "one")
+        raise Failed("CAL without one integrator that serves no axis", "one")
     count = 0
     for a, b in pairwise(beats):
         cal = p.cal[a:b]
         order = cal[cal != 0]
         if len(order) and (np.diff(order) < 0).any():
-            raise Broken("a zero after resets in a beat", "zero first")
+            raise Failed("a zero after resets in a beat", "zero first")
         count += len(order) > 0
     return f"{count} beats, first the zero, then resets"
 
 
 @proves("PMKA-CAL-03")
 @check("minute", needs={"can"})
-def beats_have_their_lengths(e: Evidence) -> str:
+def beats_have_their_lengths(e: Capture) -> str:
     """Count the periods of each beat, and those of its zero and its resets."""
     row, c = row_for(e, "PMKA-CAL-03"), columns(e)
     turns = np.flatnonzero(np.diff(c["TAU"])) + 1
     if len(turns) < 3:
-        raise TooLittle(f"{len(turns)} changes of the beat")
+        raise Inconclusive(f"{len(turns)} changes of the beat")
     due = [int(row.limit(n)) for n in ("beat_periods", "zero_periods", "reset_periods")]
     for a, b in pairwise(turns):
         cal = c["CAL"][a:b]
         saw = [int(b - a), int((cal == est.CAL_ZERO).sum()), int((cal == est.CAL_RESETS).sum())]
         if saw != due or c["TAU"][b] != c["TAU"][a] % 5 + 1:
-            raise Broken(f"beat {int(c['TAU'][a])} of {saw} periods, then {int(c['TAU'][b])}", f"{due}, beats in turn")
+            raise Failed(f"beat {int(c['TAU'][a])} of {saw} periods, then {int(c['TAU'][b])}", f"{due}, beats in turn")
     return f"{len(turns) - 1} beats of {due[0]} periods, {due[1]} for the zero, {due[2]} for resets"
 
 
 @proves("PMKA-ROT-01")
 @check("minute", needs={"can"})
-def in_beat_1_the_spare_is_free(e: Evidence) -> str:
+def in_beat_1_the_spare_is_free(e: Capture) -> str:
     """Look at SERVES in the middle of beat 1."""
     return _serves(e, 1, HOME)
 
 
 @proves("PMKA-ROT-02")
 @check("minute", needs={"can"})
-def the_spare_serves_x_y_z_in_turn(e: Evidence) -> str:
+def the_spare_serves_x_y_z_in_turn(e: Capture) -> str:
     """Look at SERVES in the middle of beats 2, 3 and 4."""
     seen = ""
     for tau, axis in BEAT_OF_AXIS.items():
@@ -360,26 +360,26 @@ def the_spare_serves_x_y_z_in_turn(e: Evidence) -> str:
 
 @proves("PMKA-ROT-03")
 @check("minute", needs={"can"})
-def in_beat_5_the_spare_is_free(e: Evidence) -> str:
+def in_beat_5_the_spare_is_free(e: Capture) -> str:
     """Look at SERVES in the middle of beat 5."""
     return _serves(e, 5, HOME)
 
 
-def _serves(e: Evidence, tau: int, due: tuple[int, ...]) -> str:
+def _serves(e: Capture, tau: int, due: tuple[int, ...]) -> str:
     c = columns(e)
     mine = _steady(c["TAU"]) & (c["TAU"] == tau)
     if not mine.any():
-        raise TooLittle(f"no reading of beat {tau}")
+        raise Inconclusive(f"no reading of beat {tau}")
     serves = np.column_stack([c[f"SERVES_{n}"] for n in est.INTEGRATORS]).astype(np.int64)[mine]
     bad = np.flatnonzero((serves != np.array(due)).any(axis=1))
     if len(bad):
-        raise Broken(f"SERVES {serves[int(bad[0])].tolist()} in beat {tau}", f"{list(due)} of X, Y, Z, K")
+        raise Failed(f"SERVES {serves[int(bad[0])].tolist()} in beat {tau}", f"{list(due)} of X, Y, Z, K")
     return f"{int(mine.sum())} readings of beat {tau}, SERVES {list(due)}"
 
 
 @proves("PMKA-ROT-04")
 @check("minute", needs={"can"})
-def each_axis_has_an_integrator(e: Evidence) -> str:
+def each_axis_has_an_integrator(e: Capture) -> str:
     """Look for each axis in SERVES of each reading: once, twice around a hand-over."""
     p, c = _periods(e), columns(e)
     steady, twice = _steady(c["TAU"]), 0
@@ -388,7 +388,7 @@ def each_axis_has_an_integrator(e: Evidence) -> str:
         bad = np.flatnonzero((count < 1) | (count > 2) | (steady & (count != 1)))
         if len(bad):
             k = int(bad[0])
-            raise Broken(
+            raise Failed(
                 f"SERVES {p.serves[k].tolist()}, TAU {int(c['TAU'][k])}", "each axis once, twice around a hand-over"
             )
         twice += int((count == 2).sum())
@@ -397,7 +397,7 @@ def each_axis_has_an_integrator(e: Evidence) -> str:
 
 @proves("PMKA-ROT-06")
 @check("minute", needs={"can", "inputs"})
-def nothing_is_lost_in_a_hand_over(e: Evidence) -> str:
+def nothing_is_lost_in_a_hand_over(e: Capture) -> str:
     """Sum the increments of both integrators in the readings of hand-overs."""
     row, run = row_for(e, "PMKA-ROT-06"), run_of(e)
     p = run.periods
@@ -418,9 +418,9 @@ def nothing_is_lost_in_a_hand_over(e: Evidence) -> str:
                 / est.quantum_vs(float(run.calibrations[axis].nr.mean()), run.rom.ts_s)
             )
         if (p.cal[both] != 0).any():
-            raise Broken("CAL in the period of a hand-over", "0")
+            raise Failed("CAL in the period of a hand-over", "0")
     if len(off) < 6:
-        raise TooLittle(f"{len(off)} hand-overs were recorded")
+        raise Inconclusive(f"{len(off)} hand-overs were recorded")
     if np.abs(off).max() > row.limit("tolerance_codes"):
-        raise Broken(f"{np.abs(off).max():.1f} codes off", f"{row.limit('tolerance_codes'):g} codes at most")
+        raise Failed(f"{np.abs(off).max():.1f} codes off", f"{row.limit('tolerance_codes'):g} codes at most")
     return f"{len(off)} hand-overs, {np.abs(off).max():.1f} codes off at most"

@@ -5,19 +5,19 @@ from __future__ import annotations
 from psabench.conform.host.cases_can import STREAM, Case
 from psabench.conform.host.cases_units import INPUT_V, scenario
 from psabench.conform.host.check import limits
-from psabench.conform.host.stimulus import Stage
+from psabench.conform.host.stimulus import HostBench
 
 ROM_S = 30.0  # simulated, for a host to read the correction ROM word by word
 COLD_DEGC = float(limits("HOST-PMKA-02").limit("cold_degc"))
 WARM_DEGC = float(limits("HOST-PMKA-01").limit("warm_degc"))
 
 
-def _minute(s: Stage) -> None:
+def _minute(s: HostBench) -> None:
     """And as long before and after as the rotation takes to bring every axis back to its own integrator."""
     s.run(float(limits("HOST-PMKA-01").limit("duration_s")) + 6.0, speed=0.0)
 
 
-def _pmka_lost(s: Stage) -> None:
+def _pmka_lost(s: HostBench) -> None:
     for readings in (1, 3):
         s.run(0.5)
         s.run_between()

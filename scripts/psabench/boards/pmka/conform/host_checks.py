@@ -13,11 +13,11 @@ from psabench.boards.objects import PmkaObjects as OD
 from psabench.conform.host.capture import SDO_RX, SDO_TX, Bus, number
 from psabench.conform.host.capture_units import SECOND, frames_of
 from psabench.conform.host.cases_units import INPUT_V
-from psabench.conform.host.check import HostEvidence, enough, judges, limits, proves
+from psabench.conform.host.check import HostCapture, checks, enough, limits, proves
 from psabench.conform.host.check_units import readings_told
 from psabench.conform.host.results import Reading
 from psabench.conform.profile import variant
-from psabench.conform.verdict import Broken
+from psabench.conform.verdict import Failed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,25 +60,25 @@ ROM_WORDS = 6 + 1  # head and sum, at least
 
 
 @proves("HOST-PMKA-01")
-@judges("pmka_warm")
-def a_minute_of_rotation_is_right(e: HostEvidence) -> str:
+@checks("pmka_warm")
+def a_minute_of_rotation_is_right(e: HostCapture) -> str:
     """Integrals of steady inputs over a minute in which integrators are calibrated in turn."""
     return _integrals(e, 1.0)
 
 
 @proves("HOST-PMKA-02")
-@judges("pmka_cold")
-def corrections_of_the_rom_are_used(e: HostEvidence) -> str:
+@checks("pmka_cold")
+def corrections_of_the_rom_are_used(e: HostCapture) -> str:
     """The ROM is read, and a minute at -10 °C with inputs of the other sign is right."""
     asked = [f for f in e.bus.of(SDO_TX) if f.data[0] & 0xE0 == 0x40 and (number(f.data[1:3]), f.data[3]) == DATA]
     chosen = [f for f in e.bus.of(SDO_RX) if f.data[0] & 0xE0 == 0x20 and (number(f.data[1:3]), f.data[3]) == INDEX]
     if min(len(asked), len(chosen)) < ROM_WORDS:
-        raise Broken(f"{len(asked)} words of the ROM were read{e.last_words()}", "all of them, by INDEX and DATA")
+        raise Failed(f"{len(asked)} words of the ROM were read{e.last_words()}", "all of them, by INDEX and DATA")
     return f"{len(asked)} words of the ROM; {_integrals(e, -1.0)}"
 
 
-def _integrals(e: HostEvidence, sign: float) -> str:
-    """Raises Broken when the volt seconds told, between readings with all axes at home, are not the inputs'."""
+def _integrals(e: HostCapture, sign: float) -> str:
+    """Raises Failed when the volt seconds told, between readings with all axes at home, are not the inputs'."""
     row = limits("HOST-PMKA-01")
     ts_s = float(variant("pmka", e.profile)["ts_ns"]) * 1e-9
     numbered = _numbered(readings_told(e), states(e.bus))
@@ -87,53 +87,53 @@ def _integrals(e: HostEvidence, sign: float) -> str:
     (first, at), (last, end) = home[0], home[-1]
     span_s = (end - at) * ts_s
     if span_s < float(row.limit("duration_s")):
-        raise Broken(f"integrals over {span_s:.1f} s", f"{row.limit('duration_s')} s")
+        raise Failed(f"integrals over {span_s:.1f} s", f"{row.limit('duration_s')} s")
     worst_mmps = 0.0
     for axis, volts in enumerate(INPUT_V):
         off_vs = last.values[axis] - first.values[axis] - sign * volts * span_s
         off_mmps = off_vs * float(row.limit("g_mps2")) / float(row.limit("ma_v_per_g")) * 1e3
         worst_mmps = max(worst_mmps, abs(off_mmps))
         if worst_mmps > float(row.limit("velocity_error_max_mmps")):
-            raise Broken(f"{off_mmps:.2f} mm/s wrong on {'xyz'[axis]}", f"{row.limit('velocity_error_max_mmps')} mm/s")
+            raise Failed(f"{off_mmps:.2f} mm/s wrong on {'xyz'[axis]}", f"{row.limit('velocity_error_max_mmps')} mm/s")
     return f"{span_s:.1f} s, right to {worst_mmps:.2f} mm/s"
 
 
-def _numbered(told: Sequence[Reading], played: Sequence[State]) -> list[tuple[Reading, int, State]]:
-    """Each reading told with the one that was played, and its place. Raises Broken for one that was not."""
+def _numbered(told: Sequence[Reading], sent: Sequence[State]) -> list[tuple[Reading, int, State]]:
+    """Each reading told with the one that was sent, and its place. Raises Failed for one that was not."""
     found = []
-    place = {s.seq: k for k, s in enumerate(played)}  # none is played for so long that SEQ wraps
+    place = {s.seq: k for k, s in enumerate(sent)}  # none is sent for so long that SEQ wraps
     for r in told:
         if r.number not in place:
-            raise Broken(f"reading {r.number}, which was not played", "none")
-        found.append((r, place[r.number], played[place[r.number]]))
+            raise Failed(f"reading {r.number}, which was not played", "none")
+        found.append((r, place[r.number], sent[place[r.number]]))
     return found
 
 
 @proves("HOST-PMKA-03")
-@judges("pmka_lost")
-def what_is_lost_is_told_and_not_made_up(e: HostEvidence) -> str:
+@checks("pmka_lost")
+def what_is_lost_is_told_and_not_made_up(e: HostCapture) -> str:
     """One reading is lost, then three; input X is beyond the range for half a second."""
     if not e.streamed:
-        raise Broken(f"no stream was started{e.last_words()}", "NMT start")
-    played = states(e.bus)
-    gaps = [(b.seq - a.seq - 1) % 65536 for a, b in itertools.pairwise(played) if b.seq != (a.seq + 1) % 65536]
+        raise Failed(f"no stream was started{e.last_words()}", "NMT start")
+    sent = states(e.bus)
+    gaps = [(b.seq - a.seq - 1) % 65536 for a, b in itertools.pairwise(sent) if b.seq != (a.seq + 1) % 65536]
     enough(len(gaps) == 2, "two gaps")
     if e.told.of("lost") != gaps:
-        raise Broken(f"lost {e.told.of('lost')}", f"{gaps}")
-    enough(any(s.over for s in played), "an integrator at its limit")
+        raise Failed(f"lost {e.told.of('lost')}", f"{gaps}")
+    enough(any(s.over for s in sent), "an integrator at its limit")
     if e.told.of("over_range")[:1] != ["x"] or e.told.of("in_range")[-1:] != ["x"]:
-        raise Broken(f"over-range {e.told.of('over_range')}, in range {e.told.of('in_range')}", "x, and its end")
-    if made := [r for r, _, s in _numbered(e.told.readings, played) if s.over]:
-        raise Broken(f"an integral of reading {made[0].number}, which was at its limit", "none")
-    if whole := [(a, b) for a, b in itertools.pairwise(e.told.readings) if _over_a_gap(a, b, played)]:
+        raise Failed(f"over-range {e.told.of('over_range')}, in range {e.told.of('in_range')}", "x, and its end")
+    if made := [r for r, _, s in _numbered(e.told.readings, sent) if s.over]:
+        raise Failed(f"an integral of reading {made[0].number}, which was at its limit", "none")
+    if whole := [(a, b) for a, b in itertools.pairwise(e.told.readings) if _over_a_gap(a, b, sent)]:
         (a, b) = whole[0]
-        raise Broken(f"integrals of readings {a.number} and {b.number}, with lost ones between", "sums from 0")
+        raise Failed(f"integrals of readings {a.number} and {b.number}, with lost ones between", "sums from 0")
     return f"lost {gaps}, over-range told, nothing made up"
 
 
-def _over_a_gap(a: Reading, b: Reading, played: Sequence[State]) -> bool:
+def _over_a_gap(a: Reading, b: Reading, sent: Sequence[State]) -> bool:
     """Whether a sum went on from one to the other although what lies between them is not known."""
     if not any(b.values):  # it has begun again
         return False
-    between = [s for s in played if a.number < s.seq <= b.number]
+    between = [s for s in sent if a.number < s.seq <= b.number]
     return len(between) != b.number - a.number or any(s.over for s in between)

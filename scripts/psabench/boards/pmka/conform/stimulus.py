@@ -1,19 +1,19 @@
-"""Scenes of PMKA: its start, a rotation on the lines, a minute of readings, strobes on its bus."""
+"""Stimuli of PMKA: its start, a rotation on the lines, a minute of readings, strobes on its bus."""
 
 from __future__ import annotations
 
 from psabench.boards.pmka.device import Pmka
 from psabench.conform.bus_host import line
-from psabench.conform.capture.log import Evidence
+from psabench.conform.capture.log import Capture
 from psabench.conform.dut import Subject
-from psabench.conform.plan import scene
+from psabench.conform.plan import stimulus
 from psabench.conform.requirements import requirements
 from psabench.conform.stimulus.streamed import from_res, readings
-from psabench.conform.verdict import TooLittle
+from psabench.conform.verdict import Inconclusive
 from psabench.link.busport import Cycle
 
 BEAT, ZERO, RESETS = 200, 120, 78  # periods, as the board turns itself (PMKA-CAL-03)
-SHORT = (40, 20, 12)  # a beat of a scene where the computer turns it
+SHORT = (40, 20, 12)  # a beat of a stimulus where the computer turns it
 ROTATION, MINUTE = 5, 69  # beats; the minute begins and ends with the spare at rest, up to three beats from its ends
 START_S = 0.02
 
@@ -23,9 +23,9 @@ def ts_s() -> float:
 
 
 def unit(s: Subject) -> Pmka:
-    """Raises TooLittle where it is none."""
+    """Raises Inconclusive where it is none."""
     if not isinstance(s.unit, Pmka):
-        raise TooLittle("no PMKA")
+        raise Inconclusive("no PMKA")
     return s.unit
 
 
@@ -44,30 +44,30 @@ def turn(s: Subject, beats: int, lengths: tuple[int, int, int]) -> None:
             s.run_for(length * ts_s())
 
 
-@scene("power_on", boards=("pmka",))
-def power_on(s: Subject) -> Evidence:
+@stimulus("power_on", boards=("pmka",))
+def power_on(s: Subject) -> Capture:
     """From Res to some readings, streaming as soon as it has booted."""
     return from_res(s, START_S + 6 * ts_s())
 
 
-@scene("stream", boards=("pmka",))
-def stream(s: Subject) -> Evidence:
+@stimulus("stream", boards=("pmka",))
+def stream(s: Subject) -> Capture:
     """A rotation and some more, on the lines and on CAN."""
-    return s.evidence("stream", readings(s, START_S, lambda: turn(s, ROTATION + 1, SHORT)))
+    return s.capture("stream", readings(s, START_S, lambda: turn(s, ROTATION + 1, SHORT)))
 
 
-@scene("minute", boards=("pmka",))
-def minute(s: Subject) -> Evidence:
+@stimulus("minute", boards=("pmka",))
+def minute(s: Subject) -> Capture:
     """A minute of readings through many rotations, and the words of the ROM."""
     take = readings(s, START_S, lambda: turn(s, MINUTE, (BEAT, ZERO, RESETS)), lines=False)
     take.facts["rom"] = unit(s).rom_words()
     s.reset()
     s.run_for(START_S)
-    return s.evidence("minute", take)
+    return s.capture("minute", take)
 
 
-@scene("strobes", boards=("pmka",))
-def strobes(s: Subject) -> Evidence:
+@stimulus("strobes", boards=("pmka",))
+def strobes(s: Subject) -> Capture:
     """Reads and writes of registers over the bus port, while readings come."""
     cycles: list[Cycle] = []
 
@@ -79,4 +79,4 @@ def strobes(s: Subject) -> Evidence:
 
     take = readings(s, START_S, strobe)
     take.cycles += cycles
-    return s.evidence("strobes", take)
+    return s.capture("strobes", take)

@@ -6,8 +6,8 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from psabench.conform.capture.log import Bools, CanFrame, CanLog, Evidence
-from psabench.conform.verdict import Broken, TooLittle
+from psabench.conform.capture.log import Bools, CanFrame, CanLog, Capture
+from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link import signals
 from psabench.link.signals import Ints
 
@@ -44,35 +44,35 @@ class Pairs:
         return Pairs(**columns, frames=tuple(f for f, k in zip(self.frames, keep, strict=True) if k))
 
     def unbroken(self) -> None:
-        """Raises Broken for the first gap of SEQ."""
+        """Raises Failed for the first gap of SEQ."""
         bad = np.flatnonzero(self.steps != 1)
         if len(bad):
             k = int(bad[0])
-            raise Broken(f"SEQ {self.seq[k]}, then {self.seq[k + 1]}", "one more", frames=self.about(k))
+            raise Failed(f"SEQ {self.seq[k]}, then {self.seq[k + 1]}", "one more", frames=self.about(k))
 
     def about(self, k: int) -> tuple[CanFrame, ...]:
         """Frames around sample k, for a report."""
         return self.frames[max(0, k - 2) : k + 3]
 
 
-def segment(e: Evidence, begin: str, end: str | None = None) -> Evidence:
-    """The same with the part of the CAN log between two cuts of the scene (facts["cut"])."""
+def segment(e: Capture, begin: str, end: str | None = None) -> Capture:
+    """The same with the part of the CAN log between two cuts of the stimulus (facts["cut"])."""
     cuts = e.facts.get("cut")
     if not isinstance(cuts, dict) or begin not in cuts or (end is not None and end not in cuts):
-        raise TooLittle(f"the scene has no cut {begin} or {end}")
+        raise Inconclusive(f"the scene has no cut {begin} or {end}")
     frames = e.can.frames[cuts[begin] : None if end is None else cuts[end]]
     return e.with_can(CanLog(frames=frames))
 
 
-def pairs(e: Evidence, least: int = 20) -> Pairs:
-    """Raises TooLittle for fewer than `least`, Broken for one of another length."""
+def pairs(e: Capture, least: int = 20) -> Pairs:
+    """Raises Inconclusive for fewer than `least`, Failed for one of another length."""
     first, second = _halves(e)
     if len(first) < least:
-        raise TooLittle(f"{len(first)} samples came as PSA2_XY and PSA2_ZT; expected {least}")
+        raise Inconclusive(f"{len(first)} samples came as PSA2_XY and PSA2_ZT; expected {least}")
     try:
         xy, zt = CanLog(frames=tuple(first)).raw("PSA2_XY"), CanLog(frames=tuple(second)).raw("PSA2_ZT")
     except ValueError as err:
-        raise Broken(str(err), "messages of their length", frames=first[:4]) from err
+        raise Failed(str(err), "messages of their length", frames=first[:4]) from err
     return Pairs(
         seq=xy["SEQ"],
         code=np.stack((xy["X"], xy["Y"], zt["Z"]), axis=1),
@@ -87,8 +87,8 @@ def pairs(e: Evidence, least: int = 20) -> Pairs:
     )
 
 
-def _halves(e: Evidence) -> tuple[list[CanFrame], list[CanFrame]]:
-    """Both halves of each sample; halves without the other are left out (PSA2-CAN-06 judges them)."""
+def _halves(e: Capture) -> tuple[list[CanFrame], list[CanFrame]]:
+    """Both halves of each sample; halves without the other are left out (PSA2-CAN-06 checks them)."""
     ids = [f.frames[0].can_id for f in (e.frames_of("PSA2_XY"), e.frames_of("PSA2_ZT")) if len(f)]
     if len(ids) < 2:
         return [], []

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from psabench.conform.capture.log import Bools, LineLog
-from psabench.conform.verdict import TooLittle
+from psabench.conform.verdict import Inconclusive
 from psabench.link.signals import Floats, Ints
 
 WORDS = 4  # a transfer (article, section 5: protocol of exchange)
@@ -67,13 +67,13 @@ class Transfers:
 
 
 def transfers(log: LineLog) -> Transfers:
-    """Raises TooLittle where the recording has too few, or no such lines."""
+    """Raises Inconclusive where the recording has too few, or no such lines."""
     for name in ("Int", "Data", "CLK"):
         if name not in log:
-            raise TooLittle(f"the recording has no line {name}")
+            raise Inconclusive(f"the recording has no line {name}")
     fall, rise = log.pulses("Int", 0)
     if len(fall) < LEAST:
-        raise TooLittle(f"{len(fall)} transfers were recorded; expected {LEAST}")
+        raise Inconclusive(f"{len(fall)} transfers were recorded; expected {LEAST}")
     return Transfers(fall_ns=fall, rise_ns=rise, clk_rise_ns=log.rises("CLK"), clk_fall_ns=log.falls("CLK"), log=log)
 
 

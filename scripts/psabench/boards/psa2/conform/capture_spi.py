@@ -14,7 +14,7 @@ from functools import lru_cache
 import numpy as np
 
 from psabench.conform.capture.log import LineLog
-from psabench.conform.verdict import TooLittle
+from psabench.conform.verdict import Inconclusive
 from psabench.link.signals import Ints
 
 PINS = ("SClk", "DIn", "DOutX", "DOutY", "DOutZ", "CST", "DInT", "DOutT", "DRD_A", "DRD_T", "SYNC_A", "SYNC_T", "Res")
@@ -60,13 +60,13 @@ class Message:
 
 
 def bursts(log: LineLog, period_ns: float) -> list[Burst]:
-    """All of them in order. Raises TooLittle where the recording lacks a pin, or SClk never moves."""
+    """All of them in order. Raises Inconclusive where the recording lacks a pin, or SClk never moves."""
     for pin in PINS:
         if pin not in log:
-            raise TooLittle(f"the recording has no line {pin}")
+            raise Inconclusive(f"the recording has no line {pin}")
     rise, fall = log.rises("SClk"), log.falls("SClk")
     if not len(rise):
-        raise TooLittle("SClk never rises in the recording")
+        raise Inconclusive("SClk never rises in the recording")
     fall = fall[np.searchsorted(fall, rise[0], "right") :]
     at_rise = {pin: log[pin].at(rise) for pin in ("DIn", *AXES, "CST")}
     at_fall = {pin: log[pin].at(fall) for pin in ("DInT", "DOutT")}
@@ -183,5 +183,5 @@ def _decoded(key: _Same, period_ns: float) -> Traffic:
 
 
 def traffic(log: LineLog, sclk_hz: float) -> Traffic:
-    """Both ports decoded, once a recording. Raises TooLittle."""
+    """Both ports decoded, once a recording. Raises Inconclusive."""
     return _decoded(_Same(log), 1e9 / sclk_hz)

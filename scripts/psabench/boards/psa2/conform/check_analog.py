@@ -9,27 +9,27 @@ from psabench.boards.psa2.conform.check_registers import fact
 from psabench.boards.psa2.conform.check_serial import LEAST
 from psabench.boards.psa2.conform.check_stream import number
 from psabench.boards.psa2.conform.stimulus_can import FACTOR, OFFSET, Answer
-from psabench.conform.capture.log import Evidence
+from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import proves, row_for
-from psabench.conform.verdict import Broken, TooLittle
+from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.signals import Floats
 
 AXES = "xyz"
 ZERO_K = 273.15
 
 
-def _inputs(e: Evidence) -> dict[int, float]:
-    """Volts by number of the axis. Raises TooLittle where none are known."""
+def _inputs(e: Capture) -> dict[int, float]:
+    """Volts by number of the axis. Raises Inconclusive where none are known."""
     found = {k: e.inputs_v[a] for k, a in enumerate(AXES) if a in e.inputs_v}
     if not found:
-        raise TooLittle("the volts at the inputs are not known")
+        raise Inconclusive("the volts at the inputs are not known")
     return found
 
 
 @proves("PSA2-ADC-01", "PSA1-ADC-01")
 @check("quiet", needs={"inputs"})
-def codes_are_volts(e: Evidence) -> str:
+def codes_are_volts(e: Capture) -> str:
     """Compare the mean code of each axis with the volts at its load."""
     p, row = pairs(e, 100), row_for(e, "PSA2-ADC-01")
     said = []
@@ -38,39 +38,39 @@ def codes_are_volts(e: Evidence) -> str:
         due = volt_v * 1e6 / row.limit("code_uv") * row.limit("filter_gain")
         slack = abs(due) * row.limit("tolerance_pct") / 100 + row.limit("tolerance_codes")
         if abs(saw - due) > slack:
-            raise Broken(f"{'XYZ'[k]} {saw:.0f} at {volt_v:g} V", f"{due:.0f} +- {slack:.0f}", frames=p.about(0))
+            raise Failed(f"{'XYZ'[k]} {saw:.0f} at {volt_v:g} V", f"{due:.0f} +- {slack:.0f}", frames=p.about(0))
         said.append(f"{'XYZ'[k]} {saw:.0f} at {volt_v:g} V")
     return ", ".join(said)
 
 
 @proves("PSA2-ADC-02")
 @check("quiet", needs={"inputs"})
-def codes_have_the_sign_of_the_volts(e: Evidence) -> str:
+def codes_have_the_sign_of_the_volts(e: Capture) -> str:
     """Compare signs."""
     p = pairs(e)
     least = row_for(e, "PSA2-ADC-02").limit("least_v")
     seen = {k: v for k, v in _inputs(e).items() if abs(v) >= least}
     if not seen:
-        raise TooLittle(f"no input is {least:g} V or more from zero")
+        raise Inconclusive(f"no input is {least:g} V or more from zero")
     for k, volt_v in seen.items():
         if np.sign(np.median(p.code[:, k])) != np.sign(volt_v):
-            raise Broken(
+            raise Failed(
                 f"{'XYZ'[k]} {np.median(p.code[:, k]):.0f} at {volt_v:g} V", "the same sign", frames=p.about(0)
             )
     return f"{len(seen)} axes of the sign of their input"
 
 
-def _settled(e: Evidence, name: str, least: int = LEAST) -> Pairs:
-    """The samples of a part of scene "numbers", whose writes must have been taken."""
+def _settled(e: Capture, name: str, least: int = LEAST) -> Pairs:
+    """The samples of a part of stimulus "numbers", whose writes must have been taken."""
     refused = [a for a in fact(e, name) if a != Answer()]
     if refused:
-        raise Broken(f"a write of OFC or FSC answered by {refused[0].abort:08X}h", "it is taken")
+        raise Failed(f"a write of OFC or FSC answered by {refused[0].abort:08X}h", "it is taken")
     return pairs(segment(e, name, f"{name} end"), least)
 
 
 @proves("PSA2-CHIP-05")
 @check("numbers")
-def ofc_and_fsc_act_as_they_should(e: Evidence) -> str:
+def ofc_and_fsc_act_as_they_should(e: Capture) -> str:
     """Write an offset and a factor, and compare the codes with those before."""
     row = row_for(e, "PSA2-CHIP-05")
     before = _settled(e, "as it was")
@@ -86,7 +86,7 @@ def ofc_and_fsc_act_as_they_should(e: Evidence) -> str:
         off = np.abs(saw.mean(axis=0) - due)
         if (off > slack).any():
             k = int(np.argmax(off - slack))
-            raise Broken(
+            raise Failed(
                 f"{'XYZ'[k]} {saw[:, k].mean():.1f} with {name}",
                 f"{due[k]:.1f} +- {slack[k]:.1f}",
                 frames=_settled(e, name).frames[:3],
@@ -97,56 +97,56 @@ def ofc_and_fsc_act_as_they_should(e: Evidence) -> str:
 
 @proves("PSA2-ADC-03")
 @check("numbers", needs={"inputs"})
-def clip_tells_of_any_axis(e: Evidence) -> str:
+def clip_tells_of_any_axis(e: Capture) -> str:
     """Drive one axis beyond full scale, the others not: the code of that one at its limit, and CLIP."""
     row, said = row_for(e, "PSA2-ADC-03"), []
     alone = fact(e, "alone")
     if set(alone) != {"one high", "one low"}:
-        raise TooLittle("the inputs of the three axes lie too near to each other for one to be driven beyond alone")
+        raise Inconclusive("the inputs of the three axes lie too near to each other for one to be driven beyond alone")
     for name, limit in (("one high", "code_max"), ("one low", "code_min")):
         p, axis, due = _settled(e, name), alone[name], int(row.limit(limit))
         others = np.delete(p.code, axis, axis=1)
         bad = (p.code[:, axis] != due) | (others == due).any(axis=1) | ~p.clip
         if bad.any():
             k = int(np.flatnonzero(bad)[0])
-            raise Broken(f"{p.code[k]}, CLIP {int(p.clip[k])}", f"{'XYZ'[axis]} {due} and CLIP 1", frames=p.about(k))
+            raise Failed(f"{p.code[k]}, CLIP {int(p.clip[k])}", f"{'XYZ'[axis]} {due} and CLIP 1", frames=p.about(k))
         said.append(f"{'XYZ'[axis]} {due}")
     return f"{', then '.join(said)} alone at its limit, with CLIP"
 
 
 @proves("PSA2-ADC-03")
 @check("numbers")
-def codes_stop_at_their_limits(e: Evidence) -> str:
+def codes_stop_at_their_limits(e: Capture) -> str:
     """Drive the codes beyond full scale, either way, by OFC and FSC: the code at its limit, CLIP, no wrap."""
     row = row_for(e, "PSA2-ADC-03")
     if _settled(e, "as it was").clip.any():
-        raise Broken("CLIP at an input within range", "0", frames=_settled(e, "as it was").frames[:3])
+        raise Failed("CLIP at an input within range", "0", frames=_settled(e, "as it was").frames[:3])
     for name, limit in (("high", "code_max"), ("low", "code_min")):
         p, due = _settled(e, name), int(row.limit(limit))
         bad = (p.code != due).any(axis=1) | ~p.clip
         if bad.any():
             k = int(np.flatnonzero(bad)[0])
-            raise Broken(f"{p.code[k]}, CLIP {int(p.clip[k])}", f"{due} and CLIP 1", frames=p.about(k))
+            raise Failed(f"{p.code[k]}, CLIP {int(p.clip[k])}", f"{due} and CLIP 1", frames=p.about(k))
     return f"{int(row.limit('code_max'))} and {int(row.limit('code_min'))}, with CLIP"
 
 
 # ---- the filter, by the step that a change of the gain makes
 
 
-def _step(e: Evidence) -> tuple[Pairs, int, Floats]:
+def _step(e: Capture) -> tuple[Pairs, int, Floats]:
     """Samples, number of the first that the change reached, and the step response of each axis, 0 to 1.
 
-    Raises Broken where the codes do not change, TooLittle where too few came.
+    Raises Failed where the codes do not change, Inconclusive where too few came.
     """
     if fact(e, "answer") != Answer():
-        raise Broken(f"CONFIG1 answered by {fact(e, 'answer').abort:08X}h", "it is taken")
+        raise Failed(f"CONFIG1 answered by {fact(e, 'answer').abort:08X}h", "it is taken")
     p = pairs(e, 200)
     tail = np.median(p.code[-50:], axis=0)
     head = np.median(p.code[:50], axis=0)
     swing = tail - head
     row = row_for(e, "PSA2-REG-08")
     if (np.abs(swing) < row.limit("swing_min_codes")).any():
-        raise Broken(
+        raise Failed(
             f"codes {head.round()} before, {tail.round()} after", "another gain shows in all codes", frames=p.about(0)
         )
     y = (p.code - head) / swing
@@ -157,7 +157,7 @@ def _step(e: Evidence) -> tuple[Pairs, int, Floats]:
 
 @proves("PSA2-ADC-06")
 @check("gain")
-def a_step_settles_in_its_time(e: Evidence) -> str:
+def a_step_settles_in_its_time(e: Capture) -> str:
     """Change the gain while frames flow: after how many frames do the codes stand?"""
     p, first, y = _step(e)
     row = row_for(e, "PSA2-ADC-06")
@@ -168,20 +168,20 @@ def a_step_settles_in_its_time(e: Evidence) -> str:
     late = off[first + due :] > noise + row.limit("settled_ppm") * 1e-6 * swing
     if late.any():
         k = first + due + int(np.flatnonzero(late.any(axis=1))[0])
-        raise Broken(
+        raise Failed(
             f"off by {off[k].max():.0f} codes after {k - first} frames", f"settled after {due}", frames=p.about(k)
         )
     half = int(np.argmax(y[:, 0] > 0.5)) - first
     if half > row.limit("half_max_frames"):
         due_half = f"at most {int(row.limit('half_max_frames'))}, as the minimum-phase filter"
-        raise Broken(f"half of the step after {half} frames", due_half, frames=p.about(first + half))
+        raise Failed(f"half of the step after {half} frames", due_half, frames=p.about(first + half))
     early = np.abs(y[first + int(row.limit("moving_min_frames"))] - 1.0)
     if (early < row.limit("settled_ppm") * 1e-6).all():
-        raise Broken("settled at once", "as a filter does", frames=p.about(first))
+        raise Failed("settled at once", "as a filter does", frames=p.about(first))
     return f"settled {due} frames after the change, to {off[first + due :].max():.0f} codes of {swing.max():.0f}"
 
 
-def _response_db(e: Evidence, per_rate: float) -> float:
+def _response_db(e: Capture, per_rate: float) -> float:
     """Response of the filter at a frequency in units of the data rate, from the step response of axis X, dB."""
     _, first, y = _step(e)
     begin, end = max(first - 1, 0), min(first + 70, len(y) - 1)
@@ -193,19 +193,19 @@ def _response_db(e: Evidence, per_rate: float) -> float:
 
 @proves("PSA2-ADC-07")
 @check("gain")
-def the_filter_stops_above_its_band(e: Evidence) -> str:
+def the_filter_stops_above_its_band(e: Capture) -> str:
     """Response to a step of the gain: how much of half the data rate is left?"""
     row = row_for(e, "PSA2-ADC-07")
     band_db = _response_db(e, row.limit("passband_per_rate"))
     stop_db = _response_db(e, row.limit("stop_per_rate"))
     if band_db - stop_db < row.limit("stop_min_db"):
-        raise Broken(f"{stop_db - band_db:.1f} dB at half the data rate", f"-{row.limit('stop_min_db'):g} dB or less")
+        raise Failed(f"{stop_db - band_db:.1f} dB at half the data rate", f"-{row.limit('stop_min_db'):g} dB or less")
     return f"{band_db:.2f} dB in the pass band, {stop_db:.0f} dB at half the data rate"
 
 
 @proves("PSA2-CHIP-06")
 @check("gain")
-def the_filter_has_its_corner(e: Evidence) -> str:
+def the_filter_has_its_corner(e: Capture) -> str:
     """Response to a step of the gain at the corner and in the pass band."""
     row = row_for(e, "PSA2-CHIP-06")
     corner = (row.limit("corner_per_rate"), row.limit("corner_db"), row.limit("tolerance_db"))
@@ -213,7 +213,7 @@ def the_filter_has_its_corner(e: Evidence) -> str:
     for per_rate, due_db, slack_db in (corner, *((f, 0.0, row.limit("passband_db")) for f in inside)):
         saw_db = _response_db(e, per_rate)
         if abs(saw_db - due_db) > slack_db:
-            raise Broken(f"{saw_db:.3f} dB at {per_rate:g} of the data rate", f"{due_db:g} +- {slack_db:g} dB")
+            raise Failed(f"{saw_db:.3f} dB at {per_rate:g} of the data rate", f"{due_db:g} +- {slack_db:g} dB")
     return (
         f"{_response_db(e, row.limit('corner_per_rate')):.3f} dB at {row.limit('corner_per_rate'):g} of the data rate"
     )
@@ -221,7 +221,7 @@ def the_filter_has_its_corner(e: Evidence) -> str:
 
 @proves("PSA2-READ-10")
 @check("gain")
-def three_axes_move_together(e: Evidence) -> str:
+def three_axes_move_together(e: Capture) -> str:
     """Change the gain of all three converters: is the step in the three codes of the same frames?"""
     p, first, y = _step(e)
     part = y[max(first - 2, 0) : first + 70]
@@ -232,38 +232,38 @@ def three_axes_move_together(e: Evidence) -> str:
     noise = row.limit("noise_max_sigma") * p.code[-50:].std(axis=0) * (1 / swing + 1 / swing[0])
     if (apart > most + noise).any():
         k = int(np.argmax(apart))
-        raise Broken(f"{'XYZ'[k]} {apart[k]:.5f} of the step away from X", f"at most {most:.5f}", frames=p.about(first))
+        raise Failed(f"{'XYZ'[k]} {apart[k]:.5f} of the step away from X", f"at most {most:.5f}", frames=p.about(first))
     return f"steps of three axes alike to {apart.max() * 1e6:.0f} ppm"
 
 
 @proves("PSA2-ADC-08")
 @check("gain")
-def settled_tells_of_a_new_gain(e: Evidence) -> str:
+def settled_tells_of_a_new_gain(e: Capture) -> str:
     """Count the frames without SETTLED after a write of CONFIG1."""
     p, due = pairs(e, 100), int(row_for(e, "PSA2-ADC-08").limit("unsettled_frames"))
     off = np.flatnonzero(~p.settled)
     if len(off) != due or (len(off) and off[-1] - off[0] + 1 != due):
-        raise Broken(
+        raise Failed(
             f"{len(off)} frames without SETTLED", f"{due} in a row", frames=p.about(int(off[0]) if len(off) else 0)
         )
     _, first, _ = _step(e)
     if first < off[0]:
-        raise Broken("codes moved while SETTLED was 1", "0 from the change on", frames=p.about(first))
+        raise Failed("codes moved while SETTLED was 1", "0 from the change on", frames=p.about(first))
     return f"{len(off)} frames without SETTLED in a row"
 
 
 @proves("PSA2-REG-08")
 @check("gain")
-def a_write_changes_all_codes(e: Evidence) -> str:
+def a_write_changes_all_codes(e: Capture) -> str:
     """Write CONFIG1 through 2000h: the registers and the codes of all axes."""
     p, _, _ = _step(e)
     row = row_for(e, "PSA2-REG-08")
     for a in fact(e, "read"):
         if number(a) != int(row.limit("config1_code")):
-            raise Broken(f"CONFIG1 {number(a):02X}h", "0Ah on each converter")
+            raise Failed(f"CONFIG1 {number(a):02X}h", "0Ah on each converter")
     ratio = np.median(p.code[-50:], axis=0) / np.median(p.code[:50], axis=0)
     if (np.abs(ratio - row.limit("ratio")) > row.limit("tolerance_ratio")).any():
-        raise Broken(f"codes grew by {ratio.round(4)}", "2, on each axis", frames=p.about(len(p) - 3))
+        raise Failed(f"codes grew by {ratio.round(4)}", "2, on each axis", frames=p.about(len(p) - 3))
     return f"codes of all axes grew by {ratio.round(5)}"
 
 
@@ -272,7 +272,7 @@ def a_write_changes_all_codes(e: Evidence) -> str:
 
 @proves("PSA2-CHIP-07", "PSA1-CHIP-01")
 @check("quiet", needs={"can", "inputs"})
-def noise_is_the_published_one(e: Evidence) -> str:
+def noise_is_the_published_one(e: Capture) -> str:
     """Standard deviation of the codes at quiet inputs; words that another port damaged are left out."""
     row = row_for(e, "PSA2-CHIP-07", "PSA1-CHIP-01")
     p = pairs(e, int(row.limit("readings_count")))
@@ -282,11 +282,11 @@ def noise_is_the_published_one(e: Evidence) -> str:
         saw_uv = float(p.code[sound, k].std()) * code_uv
         due_uv = row.limit("noise_uv")
         if abs(saw_uv - due_uv) > due_uv * row.limit("tolerance_pct") / 100:
-            raise Broken(f"{saw_uv:.2f} uV on {'XYZ'[k]}", f"{due_uv:g} uV +- {row.limit('tolerance_pct'):g} %")
+            raise Failed(f"{saw_uv:.2f} uV on {'XYZ'[k]}", f"{due_uv:g} uV +- {row.limit('tolerance_pct'):g} %")
     return f"{(p.code[sound].std(axis=0) * code_uv).round(2)} uV on X, Y, Z"
 
 
-def _sound(e: Evidence, p: Pairs) -> np.ndarray:
+def _sound(e: Capture, p: Pairs) -> np.ndarray:
     """(n,) samples near the middle of their axis: within what no noise leaves."""
     off = np.abs(p.code - np.median(p.code, axis=0))
     most = row_for(e, "PSA2-SIG-12", "PSA2-SIG-13").limit("noise_max_mad")
@@ -297,13 +297,13 @@ def _sound(e: Evidence, p: Pairs) -> np.ndarray:
 
 @proves("PSA2-SIG-12")
 @check("quiet", needs={"can", "inputs"})
-def no_word_is_damaged_by_the_other_port(e: Evidence) -> str:
+def no_word_is_damaged_by_the_other_port(e: Capture) -> str:
     """Look for single codes far from the others while temperatures are scanned."""
     p = pairs(e, 100)
     bad = np.flatnonzero(~_sound(e, p))
     if len(bad):
         k = int(bad[0])
-        raise Broken(
+        raise Failed(
             f"{p.code[k]} among {np.median(p.code, axis=0).astype(int)} ({len(bad)} of {len(p)})",
             "no code off by more than noise",
             frames=p.about(k),
@@ -313,27 +313,27 @@ def no_word_is_damaged_by_the_other_port(e: Evidence) -> str:
 
 @proves("PSA2-SIG-13")
 @check("quiet", needs={"can", "inputs"})
-def bursts_damage_words_where_nothing_gates_them(e: Evidence) -> str:
+def bursts_damage_words_where_nothing_gates_them(e: Capture) -> str:
     """Count single codes far from the others."""
     p, row = pairs(e, 100), row_for(e, "PSA2-SIG-13")
     bad = int((~_sound(e, p)).sum())
     if bad < row.limit("wrong_min_frames") or bad > row.limit("wrong_max_pct") / 100 * len(p):
         due = f"{row.limit('wrong_min_frames')} and more, at most {row.limit('wrong_max_pct'):g} %"
-        raise Broken(f"{bad} wrong frames of {len(p)}", due, frames=p.about(0))
+        raise Failed(f"{bad} wrong frames of {len(p)}", due, frames=p.about(0))
     return f"{bad} wrong frames of {len(p)}"
 
 
 @proves("PSA2-TEMP-04")
 @check("chamber", needs={"chamber"})
-def temperature_codes_are_kelvins(e: Evidence) -> str:
+def temperature_codes_are_kelvins(e: Capture) -> str:
     """Compare the code of the converter board's sensor with the temperature of the chamber."""
     p, row = pairs(e), row_for(e, "PSA2-TEMP-04")
     temp_degc = fact(e, "temp_degc")
     codes = p.temp[(p.channel == int(row.limit("channel_code"))) & (p.temp != 0)]
     if not len(codes):
-        raise Broken("no temperature of the converter board", "one every four", frames=p.about(0))
+        raise Failed("no temperature of the converter board", "one every four", frames=p.about(0))
     due = row.limit("codes_per_k") * (temp_degc + ZERO_K)
     saw, slack = float(np.median(codes)), due * row.limit("tolerance_pct") / 100
     if abs(saw - due) > slack:
-        raise Broken(f"{saw:.0f} at {temp_degc:.2f} degC", f"{due:.0f} +- {slack:.0f}", frames=p.about(0))
+        raise Failed(f"{saw:.0f} at {temp_degc:.2f} degC", f"{due:.0f} +- {slack:.0f}", frames=p.about(0))
     return f"{saw:.0f} at {temp_degc:.2f} degC"

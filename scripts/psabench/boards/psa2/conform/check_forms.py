@@ -11,11 +11,11 @@ from psabench.boards.psa2.conform.capture_can import STAMP_BITS, pairs, segment
 from psabench.boards.psa2.conform.check_serial import LEAST
 from psabench.boards.psa2.conform.check_stream import MESSAGES, US, number, unit_us
 from psabench.boards.psa2.conform.stimulus_can import Answer
-from psabench.conform.capture.log import CanLog, Evidence
+from psabench.conform.capture.log import CanLog, Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import proves, row_for
 from psabench.conform.requirements import Requirement
-from psabench.conform.verdict import Broken, TooLittle
+from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link import signals
 from psabench.link.protocol_files import message
 from psabench.link.signals import Floats, Ints
@@ -23,30 +23,30 @@ from psabench.link.signals import Floats, Ints
 # ---- frame forms
 
 
-def _form(e: Evidence, form: int, name: str, least: int = LEAST) -> CanLog:
-    """The frames of a form, and no others of the stream. Raises Broken, TooLittle."""
+def _form(e: Capture, form: int, name: str, least: int = LEAST) -> CanLog:
+    """The frames of a form, and no others of the stream. Raises Failed, Inconclusive."""
     answer = e.facts.get(f"answer {form}")
     if answer != Answer():
-        raise Broken(f"form {form} answered by {answer}", "it is taken")
+        raise Failed(f"form {form} answered by {answer}", "it is taken")
     part = segment(e, f"form {form}", f"form {form} end")
     log = part.frames_of(name)
     other = [
         f for n in MESSAGES if n != name and not (form == 0 and n in MESSAGES[:2]) for f in part.frames_of(n).frames
     ]
     if other:
-        raise Broken(f"{len(other)} frames of another form", f"{name} alone", frames=other[:5])
+        raise Failed(f"{len(other)} frames of another form", f"{name} alone", frames=other[:5])
     if len(log) < least:
-        raise Broken(f"{len(log)} frames {name}", "one a sample", frames=part.can.frames[:10])
+        raise Failed(f"{len(log)} frames {name}", "one a sample", frames=part.can.frames[:10])
     due = int(message(name).length)
     bad = [f for f in log.frames if len(f.data) != due]
     if bad:
-        raise Broken(f"{name} of {len(bad[0].data)} bytes", f"{due}", frames=bad[:3])
+        raise Failed(f"{name} of {len(bad[0].data)} bytes", f"{due}", frames=bad[:3])
     return log
 
 
 @proves("PSA2-FORM-01")
 @check("forms")
-def the_fast_form_drops_bits(e: Evidence) -> str:
+def the_fast_form_drops_bits(e: Capture) -> str:
     """Compare the codes of form 1 with those of form 0 at the same inputs."""
     row = row_for(e, "PSA2-FORM-01")
     raw = _form(e, 1, "PSA2_FAST").raw("PSA2_FAST")
@@ -59,7 +59,7 @@ def the_fast_form_drops_bits(e: Evidence) -> str:
         due = (lo - around) >> int(row.limit("shift_bits")), (hi + around) >> int(row.limit("shift_bits"))
         bad = (fast[:, k] < due[0]) | (fast[:, k] > due[1])
         if bad.sum() > len(bad) * (0.0 if e.variant["gate_sclk"] else row.limit("damaged_max_share")):
-            raise Broken(
+            raise Failed(
                 f"{'XYZ'[k]} {fast[bad, k][0]}",
                 f"{due[0]} to {due[1]}, codes of form 0 shifted by 3 bits",
                 frames=_form(e, 1, "PSA2_FAST").frames[:3],
@@ -68,7 +68,7 @@ def the_fast_form_drops_bits(e: Evidence) -> str:
         step = 1 << int(row.limit("shift_bits"))
         off, error = _apart(fast[~bad, k] + 0.5, pair.code[sound, k] / step)
         if abs(off) > max(row.limit("mean_max_codes"), row.limit("sigmas") * error):
-            raise Broken(f"{'XYZ'[k]} {off:+.2f} codes from the middle of its step", "rounded towards minus infinity")
+            raise Failed(f"{'XYZ'[k]} {off:+.2f} codes from the middle of its step", "rounded towards minus infinity")
     return f"{len(fast)} frames, X, Y, Z those of form 0 shifted"
 
 
@@ -79,28 +79,28 @@ def _apart(a: Floats, b: Floats) -> tuple[float, float]:
 
 @proves("PSA2-FORM-02")
 @check("forms")
-def tog_alternates(e: Evidence) -> str:
+def tog_alternates(e: Capture) -> str:
     """Follow TOG through the frames of form 1."""
     log = _form(e, 1, "PSA2_FAST")
     tog = log.raw("PSA2_FAST")["TOG"]
     bad = np.flatnonzero(np.diff(tog) == 0)
     if len(bad):
-        raise Broken(f"TOG {tog[bad[0]]} twice", "0 and 1 in turn", frames=log.frames[bad[0] : bad[0] + 3])
+        raise Failed(f"TOG {tog[bad[0]]} twice", "0 and 1 in turn", frames=log.frames[bad[0] : bad[0] + 3])
     return f"TOG alternates in {len(tog)} frames"
 
 
 def _fd(log: CanLog, name: str) -> None:
     classic = [f for f in log.frames if not f.fd]
     if classic:
-        raise Broken(f"{name} in a classic frame", "an FD frame", frames=classic[:3])
+        raise Failed(f"{name} in a classic frame", "an FD frame", frames=classic[:3])
     slow = [f for f in log.frames if f.brs is False]
     if slow:
-        raise Broken(f"{name} without bit rate switch", "with it", frames=slow[:3])
+        raise Failed(f"{name} without bit rate switch", "with it", frames=slow[:3])
 
 
 @proves("PSA2-FORM-03")
 @check("forms", needs={"fd"})
-def form_2_is_one_fd_frame_a_sample(e: Evidence) -> str:
+def form_2_is_one_fd_frame_a_sample(e: Capture) -> str:
     """Look at the frames of form 2: form, length, time stamps."""
     log = _form(e, 2, "PSA2_FRAME")
     _fd(log, "PSA2_FRAME")
@@ -109,7 +109,7 @@ def form_2_is_one_fd_frame_a_sample(e: Evidence) -> str:
 
 @proves("PSA2-FORM-04")
 @check("forms", needs={"fd"})
-def form_3_is_one_fd_frame_every_five_samples(e: Evidence) -> str:
+def form_3_is_one_fd_frame_every_five_samples(e: Capture) -> str:
     """Look at the frames of form 3: form, length, time stamps."""
     log = _form(e, 3, "PSA2_BLOCK")
     _fd(log, "PSA2_BLOCK")
@@ -118,50 +118,50 @@ def form_3_is_one_fd_frame_every_five_samples(e: Evidence) -> str:
     return f"{len(log)} FD frames, {_evenly(e, row, log.raw('PSA2_BLOCK')['TSTAMP'], samples)}"
 
 
-def _evenly(e: Evidence, row: Requirement, stamp_us: Ints, samples: int) -> str:
-    """Time stamps, us, so many samples apart. Raises Broken."""
+def _evenly(e: Capture, row: Requirement, stamp_us: Ints, samples: int) -> str:
+    """Time stamps, us, so many samples apart. Raises Failed."""
     step = np.diff(signals.unwrap(stamp_us, 32))
     due = samples * row_for(e, "PSA2-READ-06").limit("period_us")
     slack_us = row.limit("tolerance_us") + e.slack_ns(due * 1e3) * 1e-3
     if (np.abs(step - due) > slack_us).any():
-        raise Broken(f"{step[np.argmax(np.abs(step - due))]} us from frame to frame", f"{due:.0f} us")
+        raise Failed(f"{step[np.argmax(np.abs(step - due))]} us from frame to frame", f"{due:.0f} us")
     return f"{due:.0f} us apart"
 
 
 @proves("PSA2-FORM-05")
 @check("forms", needs={"fd"})
-def a_block_begins_anew_after_a_stop(e: Evidence) -> str:
+def a_block_begins_anew_after_a_stop(e: Capture) -> str:
     """Stop the stream and start it: is the first sample of the block one after the start?"""
     stamps = e.facts.get("stamps")
     if not isinstance(stamps, list):
-        raise TooLittle("the scene started no stream again")
+        raise Inconclusive("the scene started no stream again")
     for k, stamp in enumerate(stamps):
         log = segment(e, f"again {k}", f"again {k} end").frames_of("PSA2_BLOCK")
         if not len(log):
-            raise Broken("no block after the start", "one every five samples")
+            raise Failed("no block after the start", "one every five samples")
         try:
             before_us, first_us = number(stamp), int(log.raw("PSA2_BLOCK")["TSTAMP"][0])
         except ValueError as err:
-            raise Broken(str(err), "messages of their length", frames=log.frames[:1]) from err
+            raise Failed(str(err), "messages of their length", frames=log.frames[:1]) from err
         if (first_us - before_us) % (1 << 32) >= 1 << 31 or first_us == before_us:
             saw = f"a sample of {first_us} us in the first block"
-            raise Broken(saw, f"after {before_us} us", frames=log.frames[:1])
+            raise Failed(saw, f"after {before_us} us", frames=log.frames[:1])
     return f"in {len(stamps)} starts the first sample of the first block comes after the stop"
 
 
 @proves("PSA2-FORM-06")
 @check("forms")
-def a_form_switches_its_tpdos(e: Evidence) -> str:
+def a_form_switches_its_tpdos(e: Capture) -> str:
     """Read bit 31 of the TPDOs in each form."""
     mask = int(row_for(e, "PSA2-FORM-06").limit("off_mask"))
     sends = {0: (0, 1), 1: (2,), 2: (4,), 3: (3,)}
     for form, on in sends.items():
         off = e.facts.get(f"off {form}")
         if not isinstance(off, list):
-            raise TooLittle("the scene read no TPDOs")
+            raise Inconclusive("the scene read no TPDOs")
         for k, a in enumerate(off):
             if bool(number(a) & mask) == (k in on):
-                raise Broken(
+                raise Failed(
                     f"{OD.TPDO + k:04X}h:1 {number(a):08X}h in form {form}", f"bit 31 {'clear' if k in on else 'set'}"
                 )
     return "bit 31 clear for what each form sends, set for the others"
@@ -169,12 +169,12 @@ def a_form_switches_its_tpdos(e: Evidence) -> str:
 
 @proves("PSA2-FORM-08")
 @check("forms", needs={"fd"})
-def fd_frames_are_those_of_two_forms(e: Evidence) -> str:
+def fd_frames_are_those_of_two_forms(e: Capture) -> str:
     """Look at the form of every frame."""
     fd = {int(message(n).frame_id) - 5 + e.node for n in ("PSA2_FRAME", "PSA2_BLOCK")}
     wrong = [f for f in e.can.frames if f.fd and f.can_id not in fd]
     if wrong:
-        raise Broken(f"{wrong[0].can_id:03X}h in an FD frame", "PSA2_FRAME and PSA2_BLOCK only", frames=wrong[:3])
+        raise Failed(f"{wrong[0].can_id:03X}h in an FD frame", "PSA2_FRAME and PSA2_BLOCK only", frames=wrong[:3])
     return f"{sum(f.fd for f in e.can.frames)} FD frames of {len(e.can)}, all of the two forms"
 
 
@@ -183,26 +183,26 @@ def fd_frames_are_those_of_two_forms(e: Evidence) -> str:
 
 @proves("PSA2-SAMP-02")
 @check("sync")
-def each_sync_takes_one_sample(e: Evidence) -> str:
+def each_sync_takes_one_sample(e: Capture) -> str:
     """Send SYNC frames in sample mode 1: one sample each, sampled at or after it."""
     cuts = [f"SYNC {k}" for k in range(10)] + ["SYNC end"]
     for a, b in itertools.pairwise(cuts):
         part = segment(e, a, b)
         n = len(part.frames_of("PSA2_XY"))
         if n != 1:
-            raise Broken(f"{n} samples after a SYNC", "one", frames=part.can.frames[:10])
+            raise Failed(f"{n} samples after a SYNC", "one", frames=part.can.frames[:10])
     begin = segment(e, cuts[0], cuts[-1])
     p = pairs(begin, LEAST)
     gaps = p.steps
     far = e.facts.get("paced", True) and (gaps > int(row_for(e, "PSA2-SAMP-02").limit("apart_max_frames"))).any()
     if (gaps < 1).any() or far:
-        raise Broken(f"SEQ {p.seq.tolist()}", "rising, one for each SYNC", frames=p.frames)
+        raise Failed(f"SEQ {p.seq.tolist()}", "rising, one for each SYNC", frames=p.frames)
     return f"one sample for each of {len(p)} SYNCs"
 
 
 @proves("PSA2-SAMP-02")
 @check("sync", needs={"lockstep"})
-def a_sample_of_a_sync_is_not_older_than_it(e: Evidence) -> str:
+def a_sample_of_a_sync_is_not_older_than_it(e: Capture) -> str:
     """Compare TSTAMP with the instant at which SYNC was sent."""
     wrap_us = unit_us(e) * (1 << STAMP_BITS)
     for k in range(10):
@@ -210,48 +210,48 @@ def a_sample_of_a_sync_is_not_older_than_it(e: Evidence) -> str:
         since = (p.stamp[0] * unit_us(e) - e.marks[f"SYNC {k}"] / US) % wrap_us
         most_us = row_for(e, "PSA2-SAMP-02").limit("after_max_us")
         if since > most_us:
-            raise Broken(f"a sample {wrap_us - since:.0f} us before its SYNC", "at or after it", frames=p.frames)
+            raise Failed(f"a sample {wrap_us - since:.0f} us before its SYNC", "at or after it", frames=p.frames)
     return "every sample at or after its SYNC, within a period"
 
 
 @proves("PSA2-SAMP-03")
 @check("rates")
-def every_nth_frame_is_sent(e: Evidence) -> str:
+def every_nth_frame_is_sent(e: Capture) -> str:
     """Sample mode 2 with N = 4: SEQ of what comes, at every data rate."""
     seen = 0
     for dr in range(5):
         part = segment(e, f"DR {dr}", f"DR {dr} end")
         p = pairs(part, 3)
         if (p.seq % 4).any() or (p.steps != 4).any():
-            raise Broken(f"SEQ {p.seq[:6].tolist()}", "multiples of 4, each", frames=p.frames[:6])
+            raise Failed(f"SEQ {p.seq[:6].tolist()}", "multiples of 4, each", frames=p.frames[:6])
         seen += len(p)
     return f"{seen} samples, SEQ a multiple of 4"
 
 
 @proves("PSA2-READ-08")
 @check("rates")
-def the_frame_period_follows_dr(e: Evidence) -> str:
+def the_frame_period_follows_dr(e: Capture) -> str:
     """Write CONFIG0 with each DR and measure TSTAMP against SEQ."""
     row, said = row_for(e, "PSA2-READ-08"), []
     for dr in range(5):
         if e.facts.get(f"answer {dr}") != Answer():
-            raise Broken(f"CONFIG0 with DR {dr:03b} answered by {e.facts.get(f'answer {dr}')}", "it is taken")
+            raise Failed(f"CONFIG0 with DR {dr:03b} answered by {e.facts.get(f'answer {dr}')}", "it is taken")
         p = pairs(segment(e, f"DR {dr}", f"DR {dr} end"), 3)
         frames = int(p.steps.sum())
         if frames <= 0:
-            raise Broken(f"SEQ {p.seq.tolist()}", "it rises", frames=p.frames[:4])
+            raise Failed(f"SEQ {p.seq.tolist()}", "it rises", frames=p.frames[:4])
         period_us = float(p.stamp[-1] - p.stamp[0]) * unit_us(e) / frames
         due_us = row.limit(f"dr_{dr:03b}_us")
         slack_us = e.slack_ns(due_us * 1e3) * 1e-3 + unit_us(e) / frames
         if abs(period_us - due_us) > slack_us:
-            raise Broken(f"{period_us:.3f} us with DR {dr:03b}", f"{due_us} +- {slack_us:.3f} us", frames=p.frames[:4])
+            raise Failed(f"{period_us:.3f} us with DR {dr:03b}", f"{due_us} +- {slack_us:.3f} us", frames=p.frames[:4])
         said.append(f"{period_us:.2f}")
     return f"{', '.join(said)} us"
 
 
 @proves("PSA2-SAMP-04")
 @check("sync")
-def sync_starts_the_filters_anew(e: Evidence) -> str:
+def sync_starts_the_filters_anew(e: Capture) -> str:
     """SYNC with 2024h = 1: the pause in TSTAMP, and SEQ after it."""
     row, ended = row_for(e, "PSA2-SAMP-04"), len(segment(e, "pulse", "pulse end").frames_of("PSA2_ZT"))
     p = pairs(segment(e, "SYNC end", "pulse end"), LEAST)
@@ -261,19 +261,19 @@ def sync_starts_the_filters_anew(e: Evidence) -> str:
     period_ms = row_for(e, "PSA2-READ-06").limit("period_us") * 1e-3
     lo, hi = row.limit("settling_min_ms"), row.limit("settling_max_ms") + period_ms
     if not lo <= pause_ms[k] <= hi:
-        raise Broken(f"the longest pause is {pause_ms[k]:.3f} ms", f"{lo} to {hi} ms", frames=p.about(k))
+        raise Failed(f"the longest pause is {pause_ms[k]:.3f} ms", f"{lo} to {hi} ms", frames=p.about(k))
     p.unbroken()
     return f"a pause of {pause_ms[k]:.3f} ms, SEQ goes on"
 
 
 @proves("PSA2-SAMP-04")
 @check("sync", needs={"pins"})
-def sync_pulses_sync_a(e: Evidence) -> str:
+def sync_pulses_sync_a(e: Capture) -> str:
     """SYNC with 2024h = 1: the pulse on SYNC_A, and the fall of DRD_A after it."""
     up, _down = e.wires.pulses("SYNC_A", 1)
     row = row_for(e, "PSA2-SAMP-04")
     if len(up) != 1:
-        raise Broken(
+        raise Failed(
             f"{len(up)} pulses on SYNC_A",
             "one, for the SYNC with 2024h = 1",
             at_ns=int(up[0]) if len(up) else e.wires.end_ns,
@@ -284,7 +284,7 @@ def sync_pulses_sync_a(e: Evidence) -> str:
     settled_ms = (float(later[0]) - float(up[0])) * 1e-6 if len(later) else np.inf
     slack_ms = e.slack_ns(settled_ms * 1e6) * 1e-6 if len(later) else 0.0
     if not row.limit("settling_min_ms") - slack_ms <= settled_ms <= row.limit("settling_max_ms") + slack_ms:
-        raise Broken(
+        raise Failed(
             f"DRD_A falls {settled_ms:.3f} ms after SYNC_A",
             f"{row.limit('settling_min_ms')} to {row.limit('settling_max_ms')} ms",
             at_ns=int(up[0]),
@@ -295,13 +295,13 @@ def sync_pulses_sync_a(e: Evidence) -> str:
 
 @proves("PSA2-CHIP-04")
 @check("rates", needs={"pins"})
-def filters_settle_in_their_time_at_each_rate(e: Evidence) -> str:
+def filters_settle_in_their_time_at_each_rate(e: Capture) -> str:
     """Pulse SYNC_A at each data rate and measure the next fall of DRD_A."""
     row = row_for(e, "PSA2-CHIP-04")
     up, _ = e.wires.pulses("SYNC_A", 1)
     falls = e.wires.falls("DRD_A")
     if len(up) != 5:
-        raise Broken(
+        raise Failed(
             f"{len(up)} pulses on SYNC_A",
             "one at each of five data rates",
             at_ns=int(up[0]) if len(up) else e.wires.end_ns,
@@ -311,7 +311,7 @@ def filters_settle_in_their_time_at_each_rate(e: Evidence) -> str:
     for dr, at in enumerate(up):
         earlier, later = falls[falls < at][-1 - LEAST :], falls[falls > at]
         if len(earlier) <= LEAST or not len(later):
-            raise Broken(f"DRD_A stands still with DR {dr:03b}", "it falls", at_ns=int(at), lines=("SYNC_A", "DRD_A"))
+            raise Failed(f"DRD_A stands still with DR {dr:03b}", "it falls", at_ns=int(at), lines=("SYNC_A", "DRD_A"))
         period_ns = (
             float(earlier[-1] - earlier[0]) / LEAST
         )  # in the board's own clock: no crystal is off against itself
@@ -321,7 +321,7 @@ def filters_settle_in_their_time_at_each_rate(e: Evidence) -> str:
         edge_tclk = e.slack_ns(0.0) / period_ns * period_tclk
         slack_tclk = row.limit("tolerance_tclk") + edge_tclk * (1.0 + row.limit("settling_periods") / LEAST)
         if abs(saw_tclk - due_tclk) > slack_tclk:
-            raise Broken(
+            raise Failed(
                 f"{saw_tclk:.2f} tCLK with DR {dr:03b}",
                 f"{due_tclk:.2f} +- {slack_tclk:.2f} tCLK",
                 at_ns=int(at),

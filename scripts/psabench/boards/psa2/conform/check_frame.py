@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from psabench.boards.psa2.conform.capture_line import WORDS, Transfers, transfers
-from psabench.conform.capture.log import Evidence
+from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import proves, row_for
 from psabench.conform.requirements import Requirement
-from psabench.conform.verdict import Broken, TooLittle
+from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.signals import Floats, Ints
 
 LINES = ("Int", "Data", "CLK")
@@ -17,47 +17,47 @@ FORMATS = ("PSA2-FRAME-06", "PSA2-FRAME-07", "PSA2-FRAME-08")
 LOWS = ("PSA2-INT-04", "PSA2-INT-05", "PSA2-INT-06")
 
 
-def _word_bits(e: Evidence) -> int:
+def _word_bits(e: Capture) -> int:
     return int(row_for(e, *FORMATS).limit("word_bits"))
 
 
-def _clk_ns(e: Evidence) -> float:
+def _clk_ns(e: Capture) -> float:
     return 1e9 / row_for(e, *FORMATS).limit("clk_hz")
 
 
-def _whole(e: Evidence) -> Transfers:
-    """The transfers, each of which must have all its bits. Raises Broken for the first that has not."""
+def _whole(e: Capture) -> Transfers:
+    """The transfers, each of which must have all its bits. Raises Failed for the first that has not."""
     t = transfers(e.wires)
     due = WORDS * _word_bits(e)
     for fall, rises in zip(t.fall_ns, t.rises, strict=True):
         if len(rises) != due:
-            raise Broken(f"{len(rises)} pulses of CLK in a transfer", f"{due}", at_ns=int(fall), lines=LINES)
+            raise Failed(f"{len(rises)} pulses of CLK in a transfer", f"{due}", at_ns=int(fall), lines=LINES)
     return t
 
 
 def _first(bad: np.ndarray, at_ns: Ints, saw: Floats, due: str, unit: str = "ns") -> None:
-    """Raises Broken for the first of `bad`."""
+    """Raises Failed for the first of `bad`."""
     if bad.any():
         k = int(np.flatnonzero(bad)[0])
-        raise Broken(f"{saw[k]:.3f} {unit} ({int(bad.sum())} of {len(bad)})", due, at_ns=int(at_ns[k]), lines=LINES)
+        raise Failed(f"{saw[k]:.3f} {unit} ({int(bad.sum())} of {len(bad)})", due, at_ns=int(at_ns[k]), lines=LINES)
 
 
 @proves("PSA2-FRAME-01")
 @check("stream", needs={"line"})
-def a_transfer_has_four_words(e: Evidence) -> str:
+def a_transfer_has_four_words(e: Capture) -> str:
     """Count the groups of pulses of CLK in each transfer that pauses set apart."""
     t, row = transfers(e.wires), row_for(e, "PSA2-FRAME-01")
     due, apart_ns = int(row.limit("words_count")), row.limit("apart_min_clk") * _clk_ns(e)
     for fall, rises in zip(t.fall_ns, t.rises, strict=True):
         count = int((np.diff(rises) > apart_ns).sum()) + (len(rises) > 0)
         if count != due:
-            raise Broken(f"{count} words in a transfer", f"{due}", at_ns=int(fall), lines=LINES)
+            raise Failed(f"{count} words in a transfer", f"{due}", at_ns=int(fall), lines=LINES)
     return f"{len(t)} transfers of {due} words"
 
 
 @proves("PSA2-FRAME-06", "PSA2-FRAME-07", "PSA2-FRAME-08")
 @check("stream", needs={"line"})
-def words_have_their_bits_at_their_clock(e: Evidence) -> str:
+def words_have_their_bits_at_their_clock(e: Capture) -> str:
     """Count the pulses of CLK in each transfer and measure their period."""
     t, clk_ns = _whole(e), _clk_ns(e)
     rises, bits = t.grid_ns(_word_bits(e)), _word_bits(e)
@@ -70,7 +70,7 @@ def words_have_their_bits_at_their_clock(e: Evidence) -> str:
 
 @proves("PSA2-FRAME-02")
 @check("stream", needs={"line"})
-def words_are_apart(e: Evidence) -> str:
+def words_are_apart(e: Capture) -> str:
     """Measure the pauses between the words of a transfer."""
     t, clk_ns, bits = _whole(e), _clk_ns(e), _word_bits(e)
     row = row_for(e, "PSA2-FRAME-02")
@@ -85,7 +85,7 @@ def words_are_apart(e: Evidence) -> str:
 
 @proves("PSA2-FRAME-09", "PSA2-INT-01")
 @check("stream", needs={"line"})
-def clk_runs_only_with_data(e: Evidence) -> str:
+def clk_runs_only_with_data(e: Capture) -> str:
     """Look for pulses of CLK outside transfers, and for more or fewer than one a bit within them."""
     t = _whole(e)
     first, last = t.fall_ns[0], t.rise_ns[-1]
@@ -93,13 +93,13 @@ def clk_runs_only_with_data(e: Evidence) -> str:
     inside = np.searchsorted(t.fall_ns, rises, "right") - np.searchsorted(t.rise_ns, rises, "left") == 1
     stray = rises[~inside & e.wires.known(np.full(len(rises), first), rises)]
     if len(stray):
-        raise Broken(f"{len(stray)} pulses of CLK with Int high", "none", at_ns=int(stray[0]), lines=LINES)
+        raise Failed(f"{len(stray)} pulses of CLK with Int high", "none", at_ns=int(stray[0]), lines=LINES)
     return f"{len(rises)} pulses, all within {len(t)} transfers"
 
 
 @proves("PSA2-FRAME-10")
 @check("stream", needs={"line"})
-def data_stand_still_around_each_rise_of_clk(e: Evidence) -> str:
+def data_stand_still_around_each_rise_of_clk(e: Capture) -> str:
     """Look for changes of Data near a rise of CLK."""
     t, clk_ns = _whole(e), _clk_ns(e)
     row = row_for(e, "PSA2-FRAME-10")
@@ -107,7 +107,7 @@ def data_stand_still_around_each_rise_of_clk(e: Evidence) -> str:
     keep_ns = (row.limit("hold_clk") - row.limit("tolerance_clk")) * clk_ns - e.slack_ns(clk_ns)
     rises = t.clk_rise_ns
     if not len(changes):
-        raise Broken("a Data line that never changes", "data", at_ns=int(t.fall_ns[0]), lines=LINES)
+        raise Failed("a Data line that never changes", "data", at_ns=int(t.fall_ns[0]), lines=LINES)
     after = np.searchsorted(rises, changes)
     to_next = np.where(after < len(rises), rises[np.minimum(after, len(rises) - 1)] - changes, np.inf)
     since = np.where(after > 0, changes - rises[np.maximum(after - 1, 0)], np.inf)
@@ -116,7 +116,7 @@ def data_stand_still_around_each_rise_of_clk(e: Evidence) -> str:
     return f"{len(changes)} changes of Data, none nearer than {near_ns.min():.1f} ns to a rise of CLK"
 
 
-def _rests_low(e: Evidence, line: str, row: Requirement) -> str:
+def _rests_low(e: Capture, line: str, row: Requirement) -> str:
     t, clk_ns, bits = _whole(e), _clk_ns(e), _word_bits(e)
     rises = t.grid_ns(bits)
     pauses = (rises[:, bits - 1 : -1 : bits] + row.limit("look_in_pause_clk") * clk_ns).reshape(-1)
@@ -124,32 +124,32 @@ def _rests_low(e: Evidence, line: str, row: Requirement) -> str:
     at_ns = np.concatenate((pauses, after)).astype(np.int64)
     high = e.wires[line].at(at_ns).astype(bool)
     if high.any():
-        raise Broken(f"{line} high between words", "low", at_ns=int(at_ns[np.flatnonzero(high)[0]]), lines=LINES)
+        raise Failed(f"{line} high between words", "low", at_ns=int(at_ns[np.flatnonzero(high)[0]]), lines=LINES)
     return f"low in {len(pauses)} pauses and after {len(after)} transfers"
 
 
 @proves("PSA2-FRAME-11")
 @check("stream", needs={"line"})
-def data_rest_low(e: Evidence) -> str:
+def data_rest_low(e: Capture) -> str:
     """Look at Data in the pauses and between transfers."""
     return _rests_low(e, "Data", row_for(e, "PSA2-FRAME-11"))
 
 
 @proves("PSA2-FRAME-12")
 @check("stream", needs={"line"})
-def clk_rests_low(e: Evidence) -> str:
+def clk_rests_low(e: Capture) -> str:
     """Look at CLK in the pauses and between transfers."""
     return _rests_low(e, "CLK", row_for(e, "PSA2-FRAME-12"))
 
 
 @proves("PSA2-FRAME-13")
 @check("stream", needs={"pins"})
-def clk_is_high_for_half_of_its_period(e: Evidence) -> str:
+def clk_is_high_for_half_of_its_period(e: Capture) -> str:
     """Measure the pulses of CLK."""
     row, clk_ns = row_for(e, "PSA2-FRAME-13"), _clk_ns(e)
     up, down = e.wires.pulses("CLK", 1)
     if not len(up):
-        raise TooLittle("no pulse on CLK was recorded")
+        raise Inconclusive("no pulse on CLK was recorded")
     high_ns = (down - up).astype(np.float64)
     due_ns, slack_ns = row.limit("high_clk") * clk_ns, row.limit("tolerance_clk") * clk_ns + e.slack_ns(clk_ns)
     _first(np.abs(high_ns - due_ns) > slack_ns, up, high_ns, f"{due_ns:.1f} +- {slack_ns:.1f} ns high")
@@ -158,7 +158,7 @@ def clk_is_high_for_half_of_its_period(e: Evidence) -> str:
 
 @proves("PSA2-INT-02")
 @check("stream", needs={"line"})
-def int_is_low_long_enough(e: Evidence) -> str:
+def int_is_low_long_enough(e: Capture) -> str:
     """Measure the lows of Int."""
     t = _whole(e)
     low_ns = (t.rise_ns - t.fall_ns).astype(np.float64)
@@ -169,7 +169,7 @@ def int_is_low_long_enough(e: Evidence) -> str:
 
 @proves("PSA2-INT-04", "PSA2-INT-05", "PSA2-INT-06")
 @check("stream", needs={"line"})
-def int_is_low_for_its_periods_of_clk(e: Evidence) -> str:
+def int_is_low_for_its_periods_of_clk(e: Capture) -> str:
     """Measure the lows of Int, and the lead-in before the first bit."""
     t, row, clk_ns = _whole(e), row_for(e, *LOWS), _clk_ns(e)
     low_ns = (t.rise_ns - t.fall_ns).astype(np.float64)
@@ -184,16 +184,16 @@ def int_is_low_for_its_periods_of_clk(e: Evidence) -> str:
 
 
 def _clk_falls(t: Transfers) -> tuple[Floats, Floats]:
-    """First and last fall (n,) of CLK in each transfer. Raises Broken where there is none."""
+    """First and last fall (n,) of CLK in each transfer. Raises Failed where there is none."""
     for rise, falls in zip(t.rise_ns, t.falls, strict=True):
         if not len(falls):
-            raise Broken("no fall of CLK in a transfer", "one a bit", at_ns=int(rise), lines=LINES)
+            raise Failed("no fall of CLK in a transfer", "one a bit", at_ns=int(rise), lines=LINES)
     return np.array([f[0] for f in t.falls], np.float64), np.array([f[-1] for f in t.falls], np.float64)
 
 
 @proves("PSA2-INT-03")
 @check("stream", needs={"line"})
-def int_rises_with_the_last_fall_of_clk(e: Evidence) -> str:
+def int_rises_with_the_last_fall_of_clk(e: Capture) -> str:
     """Compare the rise of Int with the last falling edge of CLK."""
     t, clk_ns, row = _whole(e), _clk_ns(e), row_for(e, "PSA2-INT-03")
     _first_ns, last_ns = _clk_falls(t)
@@ -205,20 +205,20 @@ def int_rises_with_the_last_fall_of_clk(e: Evidence) -> str:
 
 @proves("PSA2-INT-09")
 @check("stream", needs={"line"})
-def int_rests_high(e: Evidence) -> str:
+def int_rests_high(e: Capture) -> str:
     """Look at Int where CLK has long been still."""
     for name in LINES:
         if name not in e.wires:
-            raise TooLittle(f"the recording has no line {name}")
+            raise Inconclusive(f"the recording has no line {name}")
     edges = e.wires["CLK"].t_ns[1:]
     still_ns = np.diff(edges)
     long = (still_ns > 2 * row_for(e, "PSA2-INT-09").limit("quiet_us") * 1e3) & e.wires.known(edges[:-1], edges[1:])
     at_ns = (edges[:-1] + still_ns // 2)[long]
     if not len(at_ns):
-        raise TooLittle("CLK never runs and then stands still")
+        raise Inconclusive("CLK never runs and then stands still")
     low = e.wires["Int"].at(at_ns) == 0
     if low.any():
-        raise Broken(
+        raise Failed(
             f"Int low between frames ({int(low.sum())} of {len(low)})", "high", at_ns=int(at_ns[low][0]), lines=LINES
         )
     return f"high in {len(at_ns)} pauses between frames"
@@ -226,7 +226,7 @@ def int_rests_high(e: Evidence) -> str:
 
 @proves("PSA2-INT-10")
 @check("stream", needs={"line"})
-def int_changes_on_the_grid_of_clk(e: Evidence) -> str:
+def int_changes_on_the_grid_of_clk(e: Capture) -> str:
     """Measure from both edges of Int to the first fall of CLK: whole periods of CLK?"""
     t, clk_ns = _whole(e), _clk_ns(e)
     first_ns, _last_ns = _clk_falls(t)

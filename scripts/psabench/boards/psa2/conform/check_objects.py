@@ -10,10 +10,10 @@ from psabench.boards.psa2.conform.capture_can import Pairs, pairs
 from psabench.boards.psa2.conform.check_registers import fact
 from psabench.boards.psa2.conform.check_stream import number, unit_us
 from psabench.boards.psa2.conform.stimulus_objects import Row
-from psabench.conform.capture.log import Evidence
+from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import proves, row_for
-from psabench.conform.verdict import Broken, TooLittle
+from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.canopen_host import Described
 
 READ_ONLY, WRITE_ONLY = 0x06010002, 0x06010001
@@ -21,33 +21,33 @@ READ_ONLY, WRITE_ONLY = 0x06010002, 0x06010001
 
 @proves("PSA2-CAN-09")
 @check("objects")
-def the_board_says_who_it_is(e: Evidence) -> str:
+def the_board_says_who_it_is(e: Capture) -> str:
     """Read 1008h and 1018h."""
     row, read = row_for(e, "PSA2-CAN-09"), fact(e, "read")
     name = read[OD.DEVICE_NAME, 0].value
     if name != "PSA-2":
-        raise Broken(f"1008h {name!r}", "'PSA-2'")
+        raise Failed(f"1008h {name!r}", "'PSA-2'")
     for sub, limit in ((2, "product_code"), (3, "revision_code")):
         saw, due = number(read[OD.IDENTITY, sub]), int(row.limit(limit))
         if saw != due:
-            raise Broken(f"1018h:{sub} {saw:08X}h", f"{due:08X}h")
+            raise Failed(f"1018h:{sub} {saw:08X}h", f"{due:08X}h")
     return f"{name}, product {number(read[OD.IDENTITY, 2]):08X}h, revision {number(read[OD.IDENTITY, 3]):08X}h"
 
 
 @proves("PSA2-CAN-10")
 @check("objects")
-def object_2021h_is_the_word_width(e: Evidence) -> str:
+def object_2021h_is_the_word_width(e: Capture) -> str:
     """Read 2021h."""
     saw = number(fact(e, "read")[OD.WORD_BITS, 0])
     due = int(row_for(e, "PSA2-FRAME-06", "PSA2-FRAME-07", "PSA2-FRAME-08").limit("word_bits"))
     if saw != due:
-        raise Broken(f"{saw} bits", f"{due} bits")
+        raise Failed(f"{saw} bits", f"{due} bits")
     return f"{saw} bits"
 
 
 @proves("PSA2-CAN-11")
 @check("objects")
-def mirrors_show_the_sample(e: Evidence) -> str:
+def mirrors_show_the_sample(e: Capture) -> str:
     """Compare the mirrors with the PDO of the same number, or of one of those that came while it was asked for."""
     p, row = pairs(e), row_for(e, "PSA2-CAN-11")
     at = {int(s): k for k, s in enumerate(p.seq)}
@@ -55,23 +55,23 @@ def mirrors_show_the_sample(e: Evidence) -> str:
     for index, sub, answer, *numbers in fact(e, "mirrors"):
         first, last = (at.get(number(numbers[k])) for k in (0, -1))
         if first is None or last is None:
-            raise TooLittle(f"the sample of {index:04X}h:{sub} is not in the log")
+            raise Inconclusive(f"the sample of {index:04X}h:{sub} is not in the log")
         saw = answer.value
         if not isinstance(saw, (int, float)):
-            raise Broken(f"{index:04X}h:{sub} answered by abort {answer.abort:08X}h", "a value")
+            raise Failed(f"{index:04X}h:{sub} answered by abort {answer.abort:08X}h", "a value")
         if index == OD.RAW_WORDS:
             saw = int(saw) >> 8
         elif (index, sub) == (OD.FRAME_HEAD, 5):  # us, where TSTAMP has units
             saw = int(saw / unit_us(e)) & 0xFFFF
         due = [_mirrored(e, p, k, index, sub) for k in range(first, last + 1)]
         if not any(abs(saw - d) <= rounding.get(index, 0.0) for d in due):
-            raise Broken(
+            raise Failed(
                 f"{index:04X}h:{sub} {saw}", f"{due} of SEQ {p.seq[first]} to {p.seq[last]}", frames=p.about(first)
             )
     return f"{len(fact(e, 'mirrors'))} objects as in the PDO of their sample"
 
 
-def _mirrored(e: Evidence, p: Pairs, k: int, index: int, sub: int) -> float:
+def _mirrored(e: Capture, p: Pairs, k: int, index: int, sub: int) -> float:
     """What an object shows of sample k."""
     status = int(p.settled[k]) | p.clip[k] << 1 | p.overrun[k] << 2 | p.new[k] << 3 | int(p.channel[k]) << 4
     axis, code_v = (sub - 1) % 3, row_for(e, "PSA2-ADC-01").limit("code_uv") * 1e-6
@@ -98,7 +98,7 @@ def encoded(d: Described) -> bytes:
 
 @proves("PSA2-CAN-12")
 @check("dictionary")
-def objects_have_type_rights_default_and_limits(e: Evidence) -> str:
+def objects_have_type_rights_default_and_limits(e: Capture) -> str:
     """Read every object of the EDS, and write what it must refuse."""
     rows: list[Row] = fact(e, "rows")
     beyond = int(row_for(e, "PSA2-FORM-07").limit("abort_code"))
@@ -106,15 +106,15 @@ def objects_have_type_rights_default_and_limits(e: Evidence) -> str:
         d, name = r.due, f"{r.due.index:04X}h:{r.due.sub} {r.due.name}"
         if d.access == "wo":
             if r.abort != WRITE_ONLY:
-                raise Broken(f"{name} read: abort {r.abort:08X}h", f"{WRITE_ONLY:08X}h")
+                raise Failed(f"{name} read: abort {r.abort:08X}h", f"{WRITE_ONLY:08X}h")
             continue
         if r.abort:
-            raise Broken(f"{name} read: abort {r.abort:08X}h", "its value")
+            raise Failed(f"{name} read: abort {r.abort:08X}h", "its value")
         if d.data_bytes is not None and len(r.raw) != d.data_bytes:
-            raise Broken(f"{name} of {len(r.raw)} bytes", f"{d.data_bytes}")
+            raise Failed(f"{name} of {len(r.raw)} bytes", f"{d.data_bytes}")
         if d.access in ("const", "rw") and d.default is not None and r.raw != encoded(d):
-            raise Broken(f"{name} {r.raw[::-1].hex().upper()}h", f"{d.default}")
+            raise Failed(f"{name} {r.raw[::-1].hex().upper()}h", f"{d.default}")
         if r.write is not None and r.write != (READ_ONLY if d.access in ("ro", "const") else beyond):
             due = READ_ONLY if d.access in ("ro", "const") else beyond
-            raise Broken(f"a write to {name} answered by {r.write:08X}h", f"abort {due:08X}h")
+            raise Failed(f"a write to {name} answered by {r.write:08X}h", f"abort {due:08X}h")
     return f"{len(rows)} objects"

@@ -18,26 +18,26 @@ from psabench.boards.psa2.conform.check_serial import (
     temp_messages,
 )
 from psabench.boards.psa2.conform.check_setup import ACCEL, TEMP, port_traffic
-from psabench.conform.capture.log import Evidence
+from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import proves, row_for
-from psabench.conform.verdict import Broken, TooLittle
+from psabench.conform.verdict import Failed, Inconclusive
 
 # ---- limits of the parts
 
 
 def _known(
-    e: Evidence,
+    e: Capture,
     found: Sequence[Message],
     known: Sequence[int],
     register: tuple[int, ...],
     lines: Sequence[str],
     last: int,
 ) -> str:
-    """Every message is a command of the table, with the bytes that it wants. Raises Broken."""
+    """Every message is a command of the table, with the bytes that it wants. Raises Failed."""
     for m in found:
         if any(b.bits % 8 for b in m.bursts):
-            raise Broken(
+            raise Failed(
                 f"{sum(b.bits for b in m.bursts)} clocks of {m.name}", "whole bytes", at_ns=m.begin_ns, lines=lines
             )
         code = m.sent[0]
@@ -46,21 +46,21 @@ def _known(
         else:
             good = code in known
         if not good:
-            raise Broken(m.name, "a command of the table with its bytes", at_ns=m.begin_ns, lines=lines)
+            raise Failed(m.name, "a command of the table with its bytes", at_ns=m.begin_ns, lines=lines)
     kinds = sorted({m.sent[0] for m in found})
     return f"{len(found)} commands: {', '.join(f'{k:02X}h' for k in kinds)}"
 
 
 @proves("PSA2-CHIP-02")
 @check("registers", needs={"pins"}, on_recording="all")
-def accelerometer_converters_get_commands_that_they_have(e: Evidence) -> str:
+def accelerometer_converters_get_commands_that_they_have(e: Capture) -> str:
     """Decode every burst on DIn."""
     found = port_traffic(e).of(temp=False)
     if not found:
-        raise TooLittle("no command was recorded")
+        raise Inconclusive("no command was recorded")
     for b in port_traffic(e).reads:
         if "1" in b.sent:
-            raise Broken("DIn high in a read", "low", at_ns=int(b.rise_ns[0]), lines=ACCEL)
+            raise Failed("DIn high in a read", "low", at_ns=int(b.rise_ns[0]), lines=ACCEL)
     row = row_for(e, "PSA2-CHIP-02")
     known = (0x00, 0x01, 0x04, 0x05, 0x06, 0x07, 0x10, 0x11)  # sources 1.3, those that a read survives
     return _known(e, found[:-1], known, (0x20, 0x40), ACCEL, int(row.limit("last_register")))
@@ -68,7 +68,7 @@ def accelerometer_converters_get_commands_that_they_have(e: Evidence) -> str:
 
 @proves("PSA2-CHIP-08")
 @check("registers", needs={"pins"}, on_recording="all")
-def the_temperature_converter_gets_commands_that_it_has(e: Evidence) -> str:
+def the_temperature_converter_gets_commands_that_it_has(e: Capture) -> str:
     """Decode every burst on DInT."""
     row = row_for(e, "PSA2-CHIP-08")
     found = temp_messages(e)[:-1]
@@ -78,12 +78,12 @@ def the_temperature_converter_gets_commands_that_it_has(e: Evidence) -> str:
     )
 
 
-def _setup_hold(e: Evidence, found: Sequence[Burst], line: str, *, falls: bool, due_ns: float) -> str:
-    """A data line stands still around the edges that take it. Raises Broken."""
+def _setup_hold(e: Capture, found: Sequence[Burst], line: str, *, falls: bool, due_ns: float) -> str:
+    """A data line stands still around the edges that take it. Raises Failed."""
     edges = np.sort(np.concatenate([b.fall_ns if falls else b.rise_ns for b in found]))
     t = e.wires[line].t_ns[1:]
     if not len(t):
-        raise TooLittle(f"{line} never changes")
+        raise Inconclusive(f"{line} never changes")
     after = np.searchsorted(edges, t)
     ahead = np.where(after < len(edges), edges[np.minimum(after, len(edges) - 1)] - t, 1 << 60)
     since = np.where(after > 0, t - edges[np.maximum(after - 1, 0)], 1 << 60)
@@ -92,13 +92,13 @@ def _setup_hold(e: Evidence, found: Sequence[Burst], line: str, *, falls: bool, 
     return least(e, near_ns, t, due_ns, f"between a change of {line} and a {edge} of SClk", ("SClk", line, "CST"))
 
 
-def _widths(e: Evidence, found: Sequence[Burst], lo_ns: float, hi_ns: float) -> None:
+def _widths(e: Capture, found: Sequence[Burst], lo_ns: float, hi_ns: float) -> None:
     for b in found:
         high = b.fall_ns - b.rise_ns
         low = b.rise_ns[1:] - b.fall_ns[:-1]
         for w in (high, low):
             if len(w) and (w.min() < lo_ns - e.slack_ns(lo_ns) or w.max() > hi_ns + e.slack_ns(hi_ns)):
-                raise Broken(
+                raise Failed(
                     f"SClk high or low for {w.min()} to {w.max()} ns",
                     f"{lo_ns:.0f} to {hi_ns:.0f} ns",
                     at_ns=int(b.rise_ns[0]),
@@ -108,14 +108,14 @@ def _widths(e: Evidence, found: Sequence[Burst], lo_ns: float, hi_ns: float) -> 
 
 @proves("PSA2-CHIP-03")
 @check("registers", needs={"pins"}, on_recording="all")
-def transfers_keep_the_limits_of_the_accelerometer_converters(e: Evidence) -> str:
+def transfers_keep_the_limits_of_the_accelerometer_converters(e: Capture) -> str:
     """Measure SClk and DIn against the limits of the part."""
     row, found = row_for(e, "PSA2-CHIP-03"), port_bursts(e, temp=False)
     _widths(e, found, tclk_ns(e, row.limit("width_min_tclk")), tclk_ns(e, row.limit("width_max_tclk")))
     period = np.concatenate([np.diff(b.rise_ns) for b in found]).astype(np.float64)
     lo, hi = tclk_ns(e, row.limit("period_min_tclk")), tclk_ns(e, row.limit("period_max_tclk"))
     if period.min() < lo - e.slack_ns(lo) or period.max() > hi + e.slack_ns(hi):
-        raise Broken(
+        raise Failed(
             f"periods of SClk of {period.min():.0f} to {period.max():.0f} ns",
             f"{lo:.0f} to {hi:.0f} ns",
             at_ns=int(found[0].rise_ns[0]),
@@ -127,7 +127,7 @@ def transfers_keep_the_limits_of_the_accelerometer_converters(e: Evidence) -> st
 
 @proves("PSA2-CHIP-09")
 @check("registers", needs={"pins"}, on_recording="all")
-def transfers_keep_the_limits_of_the_temperature_converter(e: Evidence) -> str:
+def transfers_keep_the_limits_of_the_temperature_converter(e: Capture) -> str:
     """Measure SClk, DInT and CST against the limits t1, t4, t5, t6, t10 and t11 of the part."""
     row, found, told = row_for(e, "PSA2-CHIP-09"), port_bursts(e, temp=True), temp_messages(e)
     period = np.concatenate([np.diff(b.rise_ns) for b in found]).astype(np.float64)

@@ -27,10 +27,10 @@ from psabench.boards.psa2.conform.stimulus_can import (
     TEMP,
     Answer,
 )
-from psabench.conform.capture.log import Evidence
+from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import proves, row_for
-from psabench.conform.verdict import Broken, TooLittle
+from psabench.conform.verdict import Failed, Inconclusive
 from psabench.places import proto_file
 
 READ_ONLY, WRITE_ONLY = 0x06010002, 0x06010001
@@ -38,15 +38,15 @@ STATUS = 1
 SCANNED = (STATUS, 2)  # of the temperature converter: DRDY is a level, MUX is the scan's
 
 
-def fact(e: Evidence, name: str) -> Any:
-    """What the scene has of this. Raises TooLittle where it has none."""
+def fact(e: Capture, name: str) -> Any:
+    """What the stimulus has of this. Raises Inconclusive where it has none."""
     if name not in e.facts:
-        raise TooLittle(f"the scene has no {name}")
+        raise Inconclusive(f"the scene has no {name}")
     return e.facts[name]
 
 
-def register(e: Evidence, index: int, sub: int) -> int:
-    """A register as the scene read it. Raises Broken for a refusal."""
+def register(e: Capture, index: int, sub: int) -> int:
+    """A register as the stimulus read it. Raises Failed for a refusal."""
     return number(fact(e, "read")[index, sub])
 
 
@@ -57,16 +57,16 @@ def table(part: str) -> tuple[tuple[str, int], ...]:
     return tuple((r["name"], int(r["reset"])) for r in doc["registers"][part])
 
 
-def _all(e: Evidence, sub: int, due: int, what: str, mask: int = 0xFF) -> str:
-    """A register of all three accelerometer converters. Raises Broken."""
+def _all(e: Capture, sub: int, due: int, what: str, mask: int = 0xFF) -> str:
+    """A register of all three accelerometer converters. Raises Failed."""
     for index in ACCEL:
         saw = register(e, index, sub) & mask
         if saw != due:
-            raise Broken(f"{what} {saw:02X}h at {index:04X}h", f"{due:02X}h")
+            raise Failed(f"{what} {saw:02X}h at {index:04X}h", f"{due:02X}h")
     return f"{what} {due:02X}h on three converters"
 
 
-def _number24(e: Evidence, sub: int, due: int, what: str) -> str:
+def _number24(e: Capture, sub: int, due: int, what: str) -> str:
     for k in range(3):
         _all(e, sub + k, due >> 8 * k & 0xFF, f"{what}{k}")
     return f"{what} {due:06X}h on three converters"
@@ -74,50 +74,50 @@ def _number24(e: Evidence, sub: int, due: int, what: str) -> str:
 
 @proves("PSA2-RES-01")
 @check("registers")
-def ofc_is_zero(e: Evidence) -> str:
+def ofc_is_zero(e: Capture) -> str:
     """Read the offset registers after the set-up."""
     return _number24(e, OFC0, int(row_for(e, "PSA2-RES-01").limit("ofc_code")), "OFC")
 
 
 @proves("PSA2-RES-02")
 @check("registers")
-def fsc_is_one(e: Evidence) -> str:
+def fsc_is_one(e: Capture) -> str:
     """Read the full-scale registers after the set-up."""
     return _number24(e, FSC0, int(row_for(e, "PSA2-RES-02").limit("fsc_code")), "FSC")
 
 
 @proves("PSA2-REG-01")
 @check("registers")
-def config0_is_the_articles(e: Evidence) -> str:
+def config0_is_the_articles(e: Capture) -> str:
     """Read CONFIG0 after the set-up."""
     return _all(e, CONFIG0, int(row_for(e, "PSA2-REG-01").limit("config0_code")), "CONFIG0")
 
 
 @proves("PSA2-REG-02", "PSA2-REG-03")
 @check("registers")
-def status_is_what_its_writes_left(e: Evidence) -> str:
+def status_is_what_its_writes_left(e: Capture) -> str:
     """Read STATUS of the temperature converter after the set-up."""
     row = row_for(e, "PSA2-REG-02", "PSA2-REG-03")
     mask, due = int(row.limit("mask_bits")), int(row.limit("value_bits"))
     saw = register(e, TEMP, STATUS) & mask
     if saw != due:
-        raise Broken(f"ACAL and BUFEN {saw:02X}h", f"{due:02X}h")
+        raise Failed(f"ACAL and BUFEN {saw:02X}h", f"{due:02X}h")
     return f"ACAL and BUFEN {saw:02X}h"
 
 
 @proves("PSA2-REG-04")
 @check("registers")
-def drate_is_100_a_second(e: Evidence) -> str:
+def drate_is_100_a_second(e: Capture) -> str:
     """Read DRATE of the temperature converter after the set-up."""
     saw, due = register(e, TEMP, DRATE), int(row_for(e, "PSA2-REG-04").limit("drate_code"))
     if saw != due:
-        raise Broken(f"DRATE {saw:02X}h", f"{due:02X}h")
+        raise Failed(f"DRATE {saw:02X}h", f"{due:02X}h")
     return f"DRATE {saw:02X}h"
 
 
 @proves("PSA2-REG-05", "PSA1-REG-01")
 @check("registers")
-def config1_is_the_boards(e: Evidence) -> str:
+def config1_is_the_boards(e: Capture) -> str:
     """Read CONFIG1 after the set-up."""
     return _all(e, CONFIG1, int(row_for(e, "PSA2-REG-05", "PSA1-REG-01").limit("config1_code")), "CONFIG1")
 
@@ -127,7 +127,7 @@ def config1_is_the_boards(e: Evidence) -> str:
 
 @proves("PSA2-REG-06", "PSA2-CHIP-01")
 @check("opcodes")
-def accelerometer_converters_have_their_reset_values(e: Evidence) -> str:
+def accelerometer_converters_have_their_reset_values(e: Capture) -> str:
     """RESET by opcode, then every register beside the table."""
     for k, (name, due) in enumerate(table("ads1282")):
         _all(e, k + 1, due, name, 0x0F if name == "ID" else 0xFF)
@@ -136,70 +136,70 @@ def accelerometer_converters_have_their_reset_values(e: Evidence) -> str:
 
 @proves("PSA2-REG-07")
 @check("opcodes")
-def the_temperature_converter_has_its_reset_values(e: Evidence) -> str:
+def the_temperature_converter_has_its_reset_values(e: Capture) -> str:
     """RESET by opcode, then every register beside the table (OFC and FSC are what the calibration leaves)."""
     own = [(k + 1, n, v) for k, (n, v) in enumerate(table("ads1256")) if n[:3] not in ("OFC", "FSC")]
     for sub, name, due in own:
         mask = 0xFE if sub == STATUS else 0x00 if sub == 2 else 0xF0 if name == "IO" else 0xFF
         saw = register(e, TEMP, sub)
         if saw & mask != due & mask:
-            raise Broken(f"{name} {saw:02X}h", f"{due:02X}h")
+            raise Failed(f"{name} {saw:02X}h", f"{due:02X}h")
     return f"{len(own)} registers"
 
 
-def _written(e: Evidence, *, temp: bool) -> list[tuple[int, int, int, Answer, list[Answer]]]:
+def _written(e: Capture, *, temp: bool) -> list[tuple[int, int, int, Answer, list[Answer]]]:
     return [w for w in fact(e, "written") if (w[0] == TEMP) == temp]
 
 
-def _keeps(e: Evidence, *, temp: bool, part: str) -> str:
+def _keeps(e: Capture, *, temp: bool, part: str) -> str:
     found = _written(e, temp=temp)
     for index, sub, value, answer, read in found:
         name = table(part)[sub - 1][0]
         if answer != Answer():
-            raise Broken(f"{name} = {value:02X}h at {index:04X}h answered by abort {answer.abort:08X}h", "it is taken")
+            raise Failed(f"{name} = {value:02X}h at {index:04X}h answered by abort {answer.abort:08X}h", "it is taken")
         for a in read:
             if number(a) != value:
-                raise Broken(f"{name} {number(a):02X}h after a write of {value:02X}h", f"{value:02X}h")
+                raise Failed(f"{name} {number(a):02X}h after a write of {value:02X}h", f"{value:02X}h")
     return f"{len(found)} registers read as they were written"
 
 
 @proves("PSA2-REG-06")
 @check("writes")
-def accelerometer_converters_keep_what_is_written(e: Evidence) -> str:
+def accelerometer_converters_keep_what_is_written(e: Capture) -> str:
     """Write every writable register and read it on all three converters."""
     return _keeps(e, temp=False, part="ads1282")
 
 
 @proves("PSA2-REG-07")
 @check("writes")
-def the_temperature_converter_keeps_what_is_written(e: Evidence) -> str:
+def the_temperature_converter_keeps_what_is_written(e: Capture) -> str:
     """Write the registers that no scan touches and read them."""
     return _keeps(e, temp=True, part="ads1256")
 
 
 @proves("PSA2-REG-07")
 @check("writes")
-def the_part_of_the_temperature_converter_cannot_be_written(e: Evidence) -> str:
+def the_part_of_the_temperature_converter_cannot_be_written(e: Capture) -> str:
     """Write every bit of STATUS: those that name the part stay."""
     mask = int(row_for(e, "PSA2-REG-07").limit("status_id_mask"))
     before, *after = (number(a) for a in fact(e, "status"))
     for saw in after:
         if (saw ^ before) & mask:
-            raise Broken(f"STATUS {saw:02X}h, {before:02X}h before", f"bits {mask:02X}h as they were")
+            raise Failed(f"STATUS {saw:02X}h, {before:02X}h before", f"bits {mask:02X}h as they were")
     return f"STATUS {', '.join(f'{v:02X}h' for v in (before, *after))}"
 
 
 @proves("PSA2-SIG-03", "PSA2-ACC-10")
 @check("writes")
-def one_write_reaches_three_converters(e: Evidence) -> str:
+def one_write_reaches_three_converters(e: Capture) -> str:
     """Write through 2000h and read 2000h, 2003h and 2004h."""
     found = _written(e, temp=False)
     if not found:
-        raise TooLittle("nothing was written")
+        raise Inconclusive("nothing was written")
     for _, sub, value, answer, read in found:
         saw = [number(a) for a in read]
         if answer == Answer() and len(set(saw)) != 1:
-            raise Broken(
+            raise Failed(
                 f"register {sub - 1:02X}h is {', '.join(f'{v:02X}h' for v in saw)} on X, Y, Z", f"{value:02X}h on each"
             )
     return f"{len(found)} writes, each the same on three converters"
@@ -207,7 +207,7 @@ def one_write_reaches_three_converters(e: Evidence) -> str:
 
 @proves("PSA2-ACC-01")
 @check("registers", needs={"pins"})
-def a_register_read_is_what_the_converter_says(e: Evidence) -> str:
+def a_register_read_is_what_the_converter_says(e: Capture) -> str:
     """Compare SDO answers with the bytes on DOutX, DOutY, DOutZ and DOutT."""
     found = port_traffic(e).messages
     read = fact(e, "read")
@@ -228,10 +228,10 @@ def a_register_read_is_what_the_converter_says(e: Evidence) -> str:
             seen += 1
             continue
         lines = TEMP_LINES if m.temp else (*ACCEL_LINES, "DOutX", "DOutY", "DOutZ")
-        raise Broken(f"{m.name} gave {saw}, the SDO {told}", "the same", at_ns=m.begin_ns, lines=lines)
+        raise Failed(f"{m.name} gave {saw}, the SDO {told}", "the same", at_ns=m.begin_ns, lines=lines)
     due = len(ACCEL) * len(REGISTERS) + len(REGISTERS)
     if seen < due:
-        raise Broken(
+        raise Failed(
             f"{seen} reads of registers on the ports for {due} SDO uploads",
             "one for each",
             at_ns=e.wires.end_ns,
@@ -240,7 +240,7 @@ def a_register_read_is_what_the_converter_says(e: Evidence) -> str:
     return f"{seen} reads, each told as the converter said"
 
 
-def _between_its_opcodes(e: Evidence) -> None:
+def _between_its_opcodes(e: Capture) -> None:
     """A converter that reads continuously answers to RREG after SDATAC alone, and goes on after RDATAC."""
     row, found = row_for(e, "PSA2-ACC-01"), port_traffic(e).of(temp=False)
     stop, go = (bytes([int(row.limit(name))]) for name in ("sdatac_code", "rdatac_code"))
@@ -248,18 +248,18 @@ def _between_its_opcodes(e: Evidence) -> None:
         if m.sent[0] & 0xF0 == 0x20 and (before.sent, after.sent) != (stop, go):
             saw = f"{m.name} between {before.name} and {after.name}"
             due = f"between {stop.hex().upper()} and {go.hex().upper()}"
-            raise Broken(saw, due, at_ns=m.begin_ns, lines=ACCEL_LINES)
+            raise Failed(saw, due, at_ns=m.begin_ns, lines=ACCEL_LINES)
 
 
-def _no_overrun(e: Evidence) -> None:
+def _no_overrun(e: Capture) -> None:
     lost = number(fact(e, "after")[OVERRUNS]) - number(fact(e, "before")[OVERRUNS])
     if lost:
-        raise Broken(f"{lost} overruns counted", "none")
+        raise Failed(f"{lost} overruns counted", "none")
 
 
 @proves("PSA2-ACC-02")
 @check("registers")
-def register_reads_cost_no_conversion(e: Evidence) -> str:
+def register_reads_cost_no_conversion(e: Capture) -> str:
     """Read all registers while frames flow: SEQ and the counter of overruns."""
     p = pairs(e)
     p.unbroken()
@@ -269,20 +269,20 @@ def register_reads_cost_no_conversion(e: Evidence) -> str:
 
 @proves("PSA2-ACC-02")
 @check("busy")
-def register_reads_cost_no_conversion_at_the_highest_rate(e: Evidence) -> str:
+def register_reads_cost_no_conversion_at_the_highest_rate(e: Capture) -> str:
     """Read registers again and again while 4000 frames a second flow: TOG, and the counter of overruns."""
     refused = [a for a in fact(e, "answers") if a != Answer()]
     if refused:
-        raise Broken(f"4000 SPS in the fast form answered by {refused[0].abort:08X}h", "it is taken")
+        raise Failed(f"4000 SPS in the fast form answered by {refused[0].abort:08X}h", "it is taken")
     log = e.frames_of("PSA2_FAST")
     if len(log) < LEAST:
-        raise TooLittle(f"{len(log)} frames PSA2_FAST came")
+        raise Inconclusive(f"{len(log)} frames PSA2_FAST came")
     try:
         twice = np.flatnonzero(np.diff(log.raw("PSA2_FAST")["TOG"]) == 0)
     except ValueError as err:
-        raise Broken(str(err), "messages of their length", frames=log.frames[:4]) from err
+        raise Failed(str(err), "messages of their length", frames=log.frames[:4]) from err
     if len(twice):
-        raise Broken("TOG twice the same", "0 and 1 in turn", frames=log.frames[twice[0] : twice[0] + 3])
+        raise Failed("TOG twice the same", "0 and 1 in turn", frames=log.frames[twice[0] : twice[0] + 3])
     _no_overrun(e)
     return f"{len(log)} frames without a gap"
 
@@ -291,15 +291,15 @@ def register_reads_cost_no_conversion_at_the_highest_rate(e: Evidence) -> str:
 
 
 def _refused(answer: Answer, due: int, what: str) -> None:
-    """Raises Broken for another answer than this abort."""
+    """Raises Failed for another answer than this abort."""
     if answer.abort != due:
         saw = "taken" if answer == Answer() else f"answered by {answer.abort:08X}h {answer.value or ''}".rstrip()
-        raise Broken(f"{what} {saw}", f"abort {due:08X}h")
+        raise Failed(f"{what} {saw}", f"abort {due:08X}h")
 
 
 @proves("PSA2-ACC-03")
 @check("refusals")
-def a_read_only_register_is_not_written(e: Evidence) -> str:
+def a_read_only_register_is_not_written(e: Capture) -> str:
     """Write to ID."""
     due = int(row_for(e, "PSA2-ACC-03").limit("abort_code"))
     for index, sub, _, answer in fact(e, "read-only"):
@@ -309,20 +309,20 @@ def a_read_only_register_is_not_written(e: Evidence) -> str:
 
 @proves("PSA2-ACC-04")
 @check("refusals")
-def reserved_values_are_refused(e: Evidence) -> str:
+def reserved_values_are_refused(e: Capture) -> str:
     """Write values that the parts reserve, and read the registers again."""
     due = int(row_for(e, "PSA2-ACC-04").limit("abort_code"))
     found = fact(e, "reserved")
     for index, sub, value, before, answer, after in found:
         _refused(answer, due, f"{value:02X}h to {index:04X}h:{sub}")
         if before != after:
-            raise Broken(f"{index:04X}h:{sub} is {number(after):02X}h after a refusal", f"{number(before):02X}h")
+            raise Failed(f"{index:04X}h:{sub} is {number(after):02X}h after a refusal", f"{number(before):02X}h")
     return f"{len(found)} values refused and not stored"
 
 
 @proves("PSA2-ACC-08")
 @check("refusals")
-def opcodes_that_want_more_are_refused(e: Evidence) -> str:
+def opcodes_that_want_more_are_refused(e: Capture) -> str:
     """Write them to 2010h."""
     due = int(row_for(e, "PSA2-ACC-08").limit("abort_code"))
     found = fact(e, "opcodes")
@@ -333,12 +333,12 @@ def opcodes_that_want_more_are_refused(e: Evidence) -> str:
 
 @proves("PSA2-ACC-08")
 @check("refusals", needs={"pins"})
-def refused_opcodes_never_reach_a_converter(e: Evidence) -> str:
+def refused_opcodes_never_reach_a_converter(e: Capture) -> str:
     """Look for them on DIn and DInT."""
     sent = {1: {m.sent for m in port_traffic(e).of(temp=False)}, 2: {m.sent for m in port_traffic(e).of(temp=True)}}
     for _, sub, value, _ in fact(e, "opcodes"):
         if bytes([value]) in sent[sub]:
-            raise Broken(
+            raise Failed(
                 f"opcode {value:02X}h on {'DIn' if sub == 1 else 'DInT'}",
                 "nothing",
                 at_ns=e.wires.start_ns,
@@ -349,7 +349,7 @@ def refused_opcodes_never_reach_a_converter(e: Evidence) -> str:
 
 @proves("PSA2-FORM-07")
 @check("refusals")
-def an_unknown_form_is_refused(e: Evidence) -> str:
+def an_unknown_form_is_refused(e: Capture) -> str:
     """Write 4 to 2020h."""
     due, answer = int(row_for(e, "PSA2-FORM-07").limit("abort_code")), fact(e, "form")
     _refused(answer, due, "form 4")
@@ -358,7 +358,7 @@ def an_unknown_form_is_refused(e: Evidence) -> str:
 
 @proves("PSA2-ACC-05")
 @check("early")
-def no_access_before_the_set_up_is_over(e: Evidence) -> str:
+def no_access_before_the_set_up_is_over(e: Capture) -> str:
     """Read registers right after a reset."""
     due = int(row_for(e, "PSA2-ACC-05").limit("abort_code"))
     for a in fact(e, "early"):
@@ -368,21 +368,21 @@ def no_access_before_the_set_up_is_over(e: Evidence) -> str:
 
 @proves("PSA2-ACC-05")
 @check("early")
-def one_access_at_a_time(e: Evidence) -> str:
+def one_access_at_a_time(e: Capture) -> str:
     """Read a register while a read that its client gave up is under way."""
     due, saw = int(row_for(e, "PSA2-ACC-05").limit("abort_code")), fact(e, "busy")
     if due not in saw:
-        raise Broken(f"aborts {', '.join(f'{a:08X}h' for a in saw) or 'none'}", f"{due:08X}h at least once")
+        raise Failed(f"aborts {', '.join(f'{a:08X}h' for a in saw) or 'none'}", f"{due:08X}h at least once")
     return f"abort {due:08X}h {saw.count(due)} times"
 
 
 @proves("PSA2-SAMP-05")
 @check("early")
-def a_sync_that_could_not_pulse_is_counted(e: Evidence) -> str:
+def a_sync_that_could_not_pulse_is_counted(e: Capture) -> str:
     """SYNC with 2024h = 1 while the set-up runs."""
     before, after = (number(a) for a in fact(e, "missed"))
     if after != before + 1:
-        raise Broken(f"2030h:{SYNCS_MISSED} {before}, then {after}", "one more")
+        raise Failed(f"2030h:{SYNCS_MISSED} {before}, then {after}", "one more")
     return f"2030h:{SYNCS_MISSED} {before}, then {after}"
 
 
@@ -391,26 +391,26 @@ def a_sync_that_could_not_pulse_is_counted(e: Evidence) -> str:
 
 @proves("PSA2-ACC-07")
 @check("opcodes")
-def opcodes_are_taken(e: Evidence) -> str:
+def opcodes_are_taken(e: Capture) -> str:
     """RESET to both groups: answered, and CONFIG0 and DRATE are those of the parts afterwards."""
     for group, answer in zip(("accelerometer", "temperature"), fact(e, "answers"), strict=True):
         if answer != Answer():
-            raise Broken(f"RESET to the {group} converters answered by {answer.abort:08X}h", "it is taken")
+            raise Failed(f"RESET to the {group} converters answered by {answer.abort:08X}h", "it is taken")
     code = dict(table("ads1256"))["DRATE"]
     if register(e, TEMP, DRATE) != code:
-        raise Broken(f"DRATE {register(e, TEMP, DRATE):02X}h after RESET", f"{code:02X}h")
+        raise Failed(f"DRATE {register(e, TEMP, DRATE):02X}h after RESET", f"{code:02X}h")
     return _all(e, CONFIG0, dict(table("ads1282"))["CONFIG0"], "CONFIG0")
 
 
 @proves("PSA2-ACC-07")
 @check("opcodes", needs={"pins"})
-def opcodes_are_sent_to_their_group(e: Evidence) -> str:
+def opcodes_are_sent_to_their_group(e: Capture) -> str:
     """Look for RESET on DIn and DInT."""
     for code, temp in ((0x06, False), (0xFE, True)):
         n = sum(m.sent == bytes([code]) for m in port_traffic(e).of(temp=temp))
         if n != 1:
             line = "DInT" if temp else "DIn"
-            raise Broken(
+            raise Failed(
                 f"{code:02X}h {n} times on {line}", "once", at_ns=e.wires.start_ns, lines=("SClk", line, "CST")
             )
     return "06h on DIn, FEh on DInT"
@@ -418,7 +418,7 @@ def opcodes_are_sent_to_their_group(e: Evidence) -> str:
 
 @proves("PSA2-ACC-09")
 @check("opcodes")
-def a_reset_opcode_is_followed_by_no_set_up(e: Evidence) -> str:
+def a_reset_opcode_is_followed_by_no_set_up(e: Capture) -> str:
     """CONFIG0 and CONFIG1 after RESET by opcode."""
     row = row_for(e, "PSA2-ACC-09")
     _all(e, CONFIG0, int(row.limit("config0_code")), "CONFIG0")

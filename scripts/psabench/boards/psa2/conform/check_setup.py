@@ -8,11 +8,11 @@ import numpy as np
 
 from psabench.boards.psa2.conform.capture_line import transfers
 from psabench.boards.psa2.conform.capture_spi import Traffic, traffic
-from psabench.conform.capture.log import Evidence
+from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import proves, row_for
 from psabench.conform.requirements import Requirement, requirements
-from psabench.conform.verdict import Broken, TooLittle
+from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.signals import Ints
 
 ACCEL = ("Res", "SClk", "DIn", "DRD_A", "SYNC_A", "CST")
@@ -56,31 +56,31 @@ class SetUp:
         for k, s in enumerate(self.steps):
             if s.line == "SYNC_A":
                 return self.steps[: k + 1]
-        raise Broken("no pulse on SYNC_A after Res", "one that ends the set-up", at_ns=self.res_ns, lines=ACCEL)
+        raise Failed("no pulse on SYNC_A after Res", "one that ends the set-up", at_ns=self.res_ns, lines=ACCEL)
 
     def ready(self, step: Step) -> Ints:
         """Falls of the data-ready line that a step waits for."""
         return self.drd_a if DATA_READY[step.line] == "DRD_A" else self.drd_t
 
     def nth(self, line: str, n: int) -> Step:
-        """The n-th thing done on a line after Res. Raises Broken where there are fewer."""
+        """The n-th thing done on a line after Res. Raises Failed where there are fewer."""
         found = [s for s in self.steps if s.line == line]
         if len(found) <= n:
-            raise Broken(f"{len(found)} on {line} after Res", f"{n + 1}", at_ns=self.res_ns, lines=ACCEL + TEMP)
+            raise Failed(f"{len(found)} on {line} after Res", f"{n + 1}", at_ns=self.res_ns, lines=ACCEL + TEMP)
         return found[n]
 
 
-def port_traffic(e: Evidence) -> Traffic:
-    """Both serial ports. Raises TooLittle."""
+def port_traffic(e: Capture) -> Traffic:
+    """Both serial ports. Raises Inconclusive."""
     return traffic(e.wires, row_for(e, "PSA2-SIG-09").limit("sclk_hz"))
 
 
-def set_up(e: Evidence) -> SetUp:
-    """After the last pulse on Res that the recording has whole. Raises TooLittle where there is none."""
+def set_up(e: Capture) -> SetUp:
+    """After the last pulse on Res that the recording has whole. Raises Inconclusive where there is none."""
     t = port_traffic(e)
     ends = e.wires.pulses("Res", 0)[1]
     if not len(ends):
-        raise TooLittle("the recording has no pulse on Res")
+        raise Inconclusive("the recording has no pulse on Res")
     res_ns = int(ends[-1])
     steps = [Step(m.begin_ns, m.end_ns, "DInT" if m.temp else "DIn", m.sent) for m in t.messages]
     for line, active in (("SYNC_A", 1), ("SYNC_T", 0)):
@@ -95,7 +95,7 @@ def sent_by(row: Requirement) -> bytes:
     return bytes(int(row.limit(f"byte_{k}")) for k in range(3))
 
 
-def demanded(e: Evidence) -> list[tuple[str, bytes]]:
+def demanded(e: Capture) -> list[tuple[str, bytes]]:
     """Line and bytes of each step of the article's set-up in this profile; b"": a pulse."""
     rows = [requirements().rows[i] for i in SET_UP]
     here = [r for r in rows if r.applies(e.variant.board, e.variant.profile)]
@@ -106,17 +106,17 @@ def demanded(e: Evidence) -> list[tuple[str, bytes]]:
 def _is(step: Step, row: Requirement, what: str) -> str:
     due = sent_by(row).hex(" ").upper()
     if step.sent != sent_by(row):
-        raise Broken(step.name, f"{due} as {what}", at_ns=step.begin_ns, lines=ACCEL + TEMP)
+        raise Failed(step.name, f"{due} as {what}", at_ns=step.begin_ns, lines=ACCEL + TEMP)
     return f"{due} {step.begin_ns * 1e-6:.3f} ms"
 
 
 def _after(s: SetUp, step: Step, before: Step | None) -> None:
-    """A step waits for a fall of its own data-ready line after the step before it. Raises Broken."""
+    """A step waits for a fall of its own data-ready line after the step before it. Raises Failed."""
     since_ns = s.res_ns if before is None else before.end_ns
     falls = s.ready(step)
     if not ((falls > since_ns) & (falls <= step.begin_ns)).any():
         line = DATA_READY[step.line]
-        raise Broken(
+        raise Failed(
             f"{step.name} without a fall of {line} before it",
             f"a fall of {line} after the step before",
             at_ns=step.begin_ns,
@@ -124,42 +124,42 @@ def _after(s: SetUp, step: Step, before: Step | None) -> None:
         )
 
 
-def _span(e: Evidence, row: Requirement, begin_ns: float, end_ns: float, lo: str, hi: str, what: str) -> str:
-    """An interval within the limits of a row, in ms. Raises Broken."""
+def _span(e: Capture, row: Requirement, begin_ns: float, end_ns: float, lo: str, hi: str, what: str) -> str:
+    """An interval within the limits of a row, in ms. Raises Failed."""
     saw_ns, slack_ns = end_ns - begin_ns, e.slack_ns(end_ns - begin_ns)
     lo_ns, hi_ns = row.limit(lo) * MS - slack_ns, row.limit(hi) * MS + slack_ns
     if not lo_ns <= saw_ns <= hi_ns:
         due = f"{lo_ns / MS:.4f} to {hi_ns / MS:.4f} ms"
-        raise Broken(f"{saw_ns / MS:.4f} ms {what}", due, at_ns=end_ns, lines=ACCEL + TEMP)
+        raise Failed(f"{saw_ns / MS:.4f} ms {what}", due, at_ns=end_ns, lines=ACCEL + TEMP)
     return f"{saw_ns / MS:.4f} ms {what}"
 
 
 def first_fall(falls: Ints, after_ns: float, line: str) -> int:
-    """Raises Broken where the line does not fall any more."""
+    """Raises Failed where the line does not fall any more."""
     later = falls[falls > after_ns]
     if not len(later):
-        raise Broken(f"{line} does not fall", f"a fall of {line}", at_ns=after_ns, lines=ACCEL + TEMP)
+        raise Failed(f"{line} does not fall", f"a fall of {line}", at_ns=after_ns, lines=ACCEL + TEMP)
     return int(later[0])
 
 
 @proves("PSA2-RES-03")
 @check("power_on", needs={"pins"})
-def res_rests_high_and_acts_low(e: Evidence) -> str:
+def res_rests_high_and_acts_low(e: Capture) -> str:
     """Look at Res before and after the reset."""
     low, high = e.wires.pulses("Res", 0)
     if not len(low):
-        raise Broken("no low pulse on Res", "one", at_ns=e.wires.start_ns, lines=("Res",))
+        raise Failed("no low pulse on Res", "one", at_ns=e.wires.start_ns, lines=("Res",))
     total_ns = int((high - low).sum())
     if not e.wires["Res"].at(e.wires.end_ns):
-        raise Broken("Res low at the end", "high", at_ns=e.wires.end_ns, lines=("Res",))
+        raise Failed("Res low at the end", "high", at_ns=e.wires.end_ns, lines=("Res",))
     if total_ns > row_for(e, "PSA2-RES-03").limit("low_max_share") * (e.wires.end_ns - e.wires.start_ns):
-        raise Broken("Res low most of the time", "high", at_ns=int(low[0]), lines=("Res",))
+        raise Failed("Res low most of the time", "high", at_ns=int(low[0]), lines=("Res",))
     return f"{len(low)} low pulse of {total_ns * 1e-3:.1f} us, high otherwise"
 
 
 @proves("PSA2-RES-04")
 @check("power_on", needs={"pins"})
-def a_reset_brings_all_lines_to_rest(e: Evidence) -> str:
+def a_reset_brings_all_lines_to_rest(e: Capture) -> str:
     """Press Res, in a frame where that can be timed, and look at Int, Data and CLK until the set-up is over."""
     s = set_up(e)
     res_ns = int(e.wires.falls("Res")[-1])
@@ -167,34 +167,34 @@ def a_reset_brings_all_lines_to_rest(e: Evidence) -> str:
     in_frame = e.wires["Int"].at(res_ns - 1) == 0
     for line, rest in (("Int", 1), ("Data", 0), ("CLK", 0)):
         if e.wires[line].at(s.res_ns) != rest:
-            raise Broken(f"{line} {1 - rest} at the end of Res", f"{rest}", at_ns=s.res_ns, lines=("Res", line))
+            raise Failed(f"{line} {1 - rest} at the end of Res", f"{rest}", at_ns=s.res_ns, lines=("Res", line))
         moves = e.wires[line].t_ns
         moves = moves[(moves > s.res_ns) & (moves < quiet_ns)]
         if len(moves):
-            raise Broken(f"{line} moves before the set-up is over", "rest", at_ns=int(moves[0]), lines=("Res", line))
+            raise Failed(f"{line} moves before the set-up is over", "rest", at_ns=int(moves[0]), lines=("Res", line))
     if not s.steps or s.steps[0].line != "DIn":
-        raise Broken("the set-up does not begin again", "its first message", at_ns=s.res_ns, lines=ACCEL)
+        raise Failed("the set-up does not begin again", "its first message", at_ns=s.res_ns, lines=ACCEL)
     return f"Res came {'in a frame' if in_frame else 'between frames'}; all lines at rest, then the set-up"
 
 
 @proves("PSA2-SETUP-01")
 @check("power_on", needs={"pins"})
-def the_set_up_is_made_once(e: Evidence) -> str:
+def the_set_up_is_made_once(e: Capture) -> str:
     """Look for messages of the set-up after it."""
     s = set_up(e)
     own = {sent for _, sent in demanded(e) if sent}
     end_ns = s.until_sync_a()[-1].end_ns
     again = [x for x in s.steps if x.begin_ns > end_ns and x.sent in own]
     if again:
-        raise Broken(f"{again[0].name} after the set-up", "none", at_ns=again[0].begin_ns, lines=ACCEL + TEMP)
+        raise Failed(f"{again[0].name} after the set-up", "none", at_ns=again[0].begin_ns, lines=ACCEL + TEMP)
     if not any(x.sent in own for x in s.steps):
-        raise Broken("no message of the set-up after Res", "all of them", at_ns=s.res_ns, lines=ACCEL + TEMP)
+        raise Failed("no message of the set-up after Res", "all of them", at_ns=s.res_ns, lines=ACCEL + TEMP)
     return f"no message of the set-up in {(e.wires.end_ns - end_ns) / MS:.0f} ms after it"
 
 
 @proves("PSA2-SETUP-02")
 @check("power_on", needs={"pins"})
-def config0_is_written_first(e: Evidence) -> str:
+def config0_is_written_first(e: Capture) -> str:
     """Decode the first message to the accelerometer converters after Res."""
     s = set_up(e)
     step = s.nth("DIn", 0)
@@ -202,13 +202,13 @@ def config0_is_written_first(e: Evidence) -> str:
     falls = s.drd_a[s.drd_a <= step.begin_ns]
     if len(falls) != 1:
         due = "on the first"
-        raise Broken(f"it comes after {len(falls)} falls of DRD_A", due, at_ns=step.begin_ns, lines=ACCEL)
+        raise Failed(f"it comes after {len(falls)} falls of DRD_A", due, at_ns=step.begin_ns, lines=ACCEL)
     if s.steps[0] is not step:
-        raise Broken(f"{s.steps[0].name} first", step.name, at_ns=s.steps[0].begin_ns, lines=ACCEL + TEMP)
+        raise Failed(f"{s.steps[0].name} first", step.name, at_ns=s.steps[0].begin_ns, lines=ACCEL + TEMP)
     return said
 
 
-def _status_write(e: Evidence, row: str, n: int) -> str:
+def _status_write(e: Capture, row: str, n: int) -> str:
     s = set_up(e)
     step = s.nth("DInT", n)
     said = _is(step, row_for(e, row), f"message {n + 1} to the temperature converter")
@@ -218,75 +218,75 @@ def _status_write(e: Evidence, row: str, n: int) -> str:
 
 @proves("PSA2-SETUP-03")
 @check("power_on", needs={"pins"})
-def bufen_is_written_second(e: Evidence) -> str:
+def bufen_is_written_second(e: Capture) -> str:
     """Decode the first message to the temperature converter."""
     return _status_write(e, "PSA2-SETUP-03", 0)
 
 
 @proves("PSA2-SETUP-04")
 @check("power_on", needs={"pins"})
-def acal_is_written_third(e: Evidence) -> str:
+def acal_is_written_third(e: Capture) -> str:
     """Decode the second message to the temperature converter."""
     return _status_write(e, "PSA2-SETUP-04", 1)
 
 
 @proves("PSA2-SETUP-05")
 @check("power_on", needs={"pins"})
-def one_message_writes_bufen_and_acal(e: Evidence) -> str:
+def one_message_writes_bufen_and_acal(e: Capture) -> str:
     """Decode the first message to the temperature converter, and look for another one to STATUS."""
     said = _status_write(e, "PSA2-SETUP-05", 0)
     register = sent_by(row_for(e, "PSA2-SETUP-05"))[0]
     more = [x for x in set_up(e).steps if x.line == "DInT" and x.sent[:1] == bytes([register])]
     if len(more) != 1:
-        raise Broken(f"{len(more)} writes to STATUS", "one", at_ns=more[-1].begin_ns, lines=TEMP)
+        raise Failed(f"{len(more)} writes to STATUS", "one", at_ns=more[-1].begin_ns, lines=TEMP)
     return said
 
 
 @proves("PSA2-SETUP-06")
 @check("power_on", needs={"pins"})
-def drate_is_written_after_status(e: Evidence) -> str:
+def drate_is_written_after_status(e: Capture) -> str:
     """Decode the message after the writes to STATUS."""
     return _status_write(e, "PSA2-SETUP-06", sum(line == "DInT" for line, _ in demanded(e)) - 1)
 
 
 @proves("PSA2-SETUP-07")
 @check("power_on", needs={"pins"})
-def sync_t_follows_the_write_to_drate(e: Evidence) -> str:
+def sync_t_follows_the_write_to_drate(e: Capture) -> str:
     """Find the first pulse on SYNC_T after Res, and the fall of DRD_T before it."""
     s = set_up(e)
     drate, pulse = s.nth("DInT", sum(line == "DInT" for line, _ in demanded(e)) - 1), s.nth("SYNC_T", 0)
     if pulse.begin_ns < drate.end_ns:
-        raise Broken("SYNC_T before the write to DRATE", "after it", at_ns=pulse.begin_ns, lines=TEMP)
+        raise Failed("SYNC_T before the write to DRATE", "after it", at_ns=pulse.begin_ns, lines=TEMP)
     _after(s, pulse, drate)
     between = s.drd_t[(s.drd_t > drate.end_ns) & (s.drd_t <= pulse.begin_ns)]
     if len(between) != 1:
-        raise Broken(f"SYNC_T after {len(between)} falls of DRD_T", "on the next", at_ns=pulse.begin_ns, lines=TEMP)
+        raise Failed(f"SYNC_T after {len(between)} falls of DRD_T", "on the next", at_ns=pulse.begin_ns, lines=TEMP)
     return f"SYNC_T {(pulse.begin_ns - between[-1]) * 1e-3:.2f} us after the next fall of DRD_T"
 
 
 @proves("PSA2-SETUP-08")
 @check("power_on", needs={"pins"})
-def sync_a_ends_the_set_up(e: Evidence) -> str:
+def sync_a_ends_the_set_up(e: Capture) -> str:
     """Count the falls of DRD_A before the first pulse on SYNC_A."""
     s = set_up(e)
     pulse, sync_t = s.nth("SYNC_A", 0), s.nth("SYNC_T", 0)
     if pulse.begin_ns < sync_t.end_ns:
-        raise Broken("SYNC_A before SYNC_T", "after it", at_ns=pulse.begin_ns, lines=("SYNC_A", "SYNC_T"))
+        raise Failed("SYNC_A before SYNC_T", "after it", at_ns=pulse.begin_ns, lines=("SYNC_A", "SYNC_T"))
     falls = s.drd_a[s.drd_a <= pulse.begin_ns]
     if len(falls) != 2:
-        raise Broken(f"SYNC_A after {len(falls)} falls of DRD_A", "on the second", at_ns=pulse.begin_ns, lines=ACCEL)
+        raise Failed(f"SYNC_A after {len(falls)} falls of DRD_A", "on the second", at_ns=pulse.begin_ns, lines=ACCEL)
     return f"SYNC_A {(pulse.begin_ns - falls[-1]) * 1e-3:.3f} us after the second fall of DRD_A"
 
 
 @proves("PSA2-SETUP-09")
 @check("power_on", needs={"pins"})
-def each_step_waits_for_its_event(e: Evidence) -> str:
+def each_step_waits_for_its_event(e: Capture) -> str:
     """Compare each step of the set-up with the falls of its data-ready line."""
     s = set_up(e)
     before: Step | None = None
     for step in s.until_sync_a():
         if before is not None and step.begin_ns <= before.end_ns:
-            raise Broken(
+            raise Failed(
                 f"{step.name} before {before.name} has ended",
                 "one after the other",
                 at_ns=step.begin_ns,
@@ -299,7 +299,7 @@ def each_step_waits_for_its_event(e: Evidence) -> str:
 
 @proves("PSA2-SETUP-10")
 @check("power_on", needs={"pins"})
-def the_write_to_drate_calibrates(e: Evidence) -> str:
+def the_write_to_drate_calibrates(e: Capture) -> str:
     """Measure how long DRD_T does not fall after the write to DRATE."""
     s = set_up(e)
     drate = s.nth("DInT", sum(line == "DInT" for line, _ in demanded(e)) - 1)
@@ -310,7 +310,7 @@ def the_write_to_drate_calibrates(e: Evidence) -> str:
 
 @proves("PSA2-SETUP-11")
 @check("power_on", needs={"pins"})
-def drd_a_falls_after_res(e: Evidence) -> str:
+def drd_a_falls_after_res(e: Capture) -> str:
     """Measure Res to the first fall of DRD_A."""
     s = set_up(e)
     fall_ns = first_fall(s.drd_a, s.res_ns, "DRD_A")
@@ -319,7 +319,7 @@ def drd_a_falls_after_res(e: Evidence) -> str:
 
 @proves("PSA2-SETUP-12")
 @check("power_on", needs={"pins"})
-def config0_restarts_the_converters(e: Evidence) -> str:
+def config0_restarts_the_converters(e: Capture) -> str:
     """Measure the write of CONFIG0 to the next fall of DRD_A."""
     s = set_up(e)
     step = s.nth("DIn", 0)
@@ -330,7 +330,7 @@ def config0_restarts_the_converters(e: Evidence) -> str:
 
 @proves("PSA2-SETUP-13")
 @check("power_on", needs={"pins"})
-def the_first_frame_comes_when_the_filters_have_settled(e: Evidence) -> str:
+def the_first_frame_comes_when_the_filters_have_settled(e: Capture) -> str:
     """Measure SYNC_A to the next fall of DRD_A, and look for the frame that follows it."""
     s = set_up(e)
     begin_ns = s.nth("SYNC_A", 0).begin_ns
@@ -340,7 +340,7 @@ def the_first_frame_comes_when_the_filters_have_settled(e: Evidence) -> str:
     frame_ns = first_fall(e.wires.falls("Int"), begin_ns, "Int")
     second = s.drd_a[s.drd_a > fall_ns]
     if frame_ns < fall_ns or (len(second) and frame_ns > second[0]):
-        raise Broken(
+        raise Failed(
             f"the first frame {(frame_ns - fall_ns) * 1e-3:.1f} us after that fall",
             "it follows at once",
             at_ns=frame_ns,
@@ -351,31 +351,31 @@ def the_first_frame_comes_when_the_filters_have_settled(e: Evidence) -> str:
 
 @proves("PSA2-SETUP-14")
 @check("power_on", needs={"pins"})
-def the_gain_is_written_after_the_set_up(e: Evidence) -> str:
+def the_gain_is_written_after_the_set_up(e: Capture) -> str:
     """Decode the message to the accelerometer converters that follows SYNC_A."""
     s = set_up(e)
     step = s.nth("DIn", 1)
     if step.begin_ns < s.nth("SYNC_A", 0).begin_ns:
-        raise Broken(f"{step.name} before SYNC_A", "after it", at_ns=step.begin_ns, lines=ACCEL)
+        raise Failed(f"{step.name} before SYNC_A", "after it", at_ns=step.begin_ns, lines=ACCEL)
     return _is(step, row_for(e, "PSA2-SETUP-14"), "the message after SYNC_A")
 
 
 @proves("PSA2-SETUP-15")
 @check("power_on", needs={"pins"})
-def no_frame_before_the_set_up_is_over(e: Evidence) -> str:
+def no_frame_before_the_set_up_is_over(e: Capture) -> str:
     """Look for falls of Int between Res and the first fall of DRD_A after SYNC_A."""
     s = set_up(e)
     until_ns = first_fall(s.drd_a, s.nth("SYNC_A", 0).begin_ns, "DRD_A")
     falls = e.wires.falls("Int")
     early = falls[(falls > s.res_ns) & (falls < until_ns)]
     if len(early):
-        raise Broken(f"{len(early)} falls of Int", "none", at_ns=int(early[0]), lines=("Int", "SYNC_A", "DRD_A"))
+        raise Failed(f"{len(early)} falls of Int", "none", at_ns=int(early[0]), lines=("Int", "SYNC_A", "DRD_A"))
     return f"Int high for {(until_ns - s.res_ns) / MS:.1f} ms after Res"
 
 
 @proves("PSA2-SETUP-15")
 @check("power_on", needs={"line"})
-def int_is_quiet_while_the_set_up_lasts(e: Evidence) -> str:
+def int_is_quiet_while_the_set_up_lasts(e: Capture) -> str:
     """Press Res while frames flow: how long until Int falls again?"""
     falls = transfers(e.wires).fall_ns
     quiet_ns = np.diff(falls)
@@ -383,38 +383,38 @@ def int_is_quiet_while_the_set_up_lasts(e: Evidence) -> str:
     due_ns = row_for(e, "PSA2-SETUP-15").limit("quiet_min_ms") * MS
     if quiet_ns[k] < due_ns - e.slack_ns(due_ns):
         if len(e.wires.gaps_ns):
-            raise TooLittle("the line port lost samples, and with them time")
+            raise Inconclusive("the line port lost samples, and with them time")
         saw = f"Int falls again after {quiet_ns[k] / MS:.2f} ms"
-        raise Broken(saw, f"{due_ns / MS:g} ms or more", at_ns=int(falls[k + 1]), lines=("Int", "Res"))
+        raise Failed(saw, f"{due_ns / MS:g} ms or more", at_ns=int(falls[k + 1]), lines=("Int", "Res"))
     return f"no fall of Int for {quiet_ns[k] / MS:.2f} ms"
 
 
 @proves("PSA2-SETUP-16")
 @check("power_on", needs={"pins"})
-def nothing_but_the_set_up_is_sent(e: Evidence) -> str:
+def nothing_but_the_set_up_is_sent(e: Capture) -> str:
     """List all that is sent between Res and SYNC_A."""
     s = set_up(e)
     saw, due = s.until_sync_a(), demanded(e)
     for k, step in enumerate(saw):
         if k >= len(due) or (step.line, step.sent) != due[k]:
-            raise Broken(
+            raise Failed(
                 f"{step.name} as step {k + 1}", _names(due[k : k + 1]), at_ns=step.begin_ns, lines=ACCEL + TEMP
             )
     if len(saw) < len(due):
-        raise Broken(f"{len(saw)} steps", _names(due), at_ns=s.res_ns, lines=ACCEL + TEMP)
+        raise Failed(f"{len(saw)} steps", _names(due), at_ns=s.res_ns, lines=ACCEL + TEMP)
     return "; ".join(x.name for x in saw)
 
 
 @proves("PSA1-SETUP-01")
 @check("power_on", needs={"pins"})
-def the_accelerometer_converters_get_one_message(e: Evidence) -> str:
+def the_accelerometer_converters_get_one_message(e: Capture) -> str:
     """List all that is sent to the accelerometer converters from Res to the first frames."""
     s = set_up(e)
     saw = [x for x in s.steps if x.line == "DIn"]
     due = sent_by(row_for(e, "PSA2-SETUP-02"))
     if [x.sent for x in saw] != [due]:
         names = "; ".join(x.name for x in saw) or "nothing"
-        raise Broken(names, due.hex(" "), at_ns=saw[-1].begin_ns if saw else s.res_ns, lines=ACCEL)
+        raise Failed(names, due.hex(" "), at_ns=saw[-1].begin_ns if saw else s.res_ns, lines=ACCEL)
     return saw[0].name
 
 
@@ -424,21 +424,21 @@ def _names(due: list[tuple[str, bytes]]) -> str:
 
 @proves("PSA2-ERR-04")
 @check("power_cycle", needs={"supply"})
-def power_up_begins_anew(e: Evidence) -> str:
+def power_up_begins_anew(e: Capture) -> str:
     """Switch the supply off, in a frame where that can be timed, and on: what comes first on CAN and on the lines?"""
     boot = [f for f in e.can.of_id(0x700 + e.node).frames if f.data[:1] == b"\0"]
     if not boot:
-        raise Broken("no boot-up message", "one after power-up", frames=e.can.frames[:20])
+        raise Failed("no boot-up message", "one after power-up", frames=e.can.frames[:20])
     after = [f for f in e.frames_of("PSA2_XY").frames if f.t_s > boot[-1].t_s]
     if not after:
-        raise TooLittle("no PSA2_XY came after power-up")
+        raise Inconclusive("no PSA2_XY came after power-up")
     seq = int.from_bytes(after[0].data[6:8], "little")
     if seq != 0:
-        raise Broken(f"SEQ {seq} first", "0", frames=after[:4])
+        raise Failed(f"SEQ {seq} first", "0", frames=after[:4])
     return "boot-up, then SEQ 0" + (_cut_on_the_line(e) if e.lines is not None else "")
 
 
-def _cut_on_the_line(e: Evidence) -> str:
+def _cut_on_the_line(e: Capture) -> str:
     """No frame goes on after the supply has gone: there is a long time without one, and whole frames after it."""
     t = transfers(e.wires)
     pause_ns = np.diff(t.fall_ns)
@@ -447,7 +447,7 @@ def _cut_on_the_line(e: Evidence) -> str:
     whole = max(bits)
     short = [i for i, b in enumerate(bits) if b != whole and i != k]
     if short:
-        raise Broken(f"{bits[short[0]]} bits in a frame", f"{whole}", at_ns=int(t.fall_ns[short[0]]), lines=("Int",))
+        raise Failed(f"{bits[short[0]]} bits in a frame", f"{whole}", at_ns=int(t.fall_ns[short[0]]), lines=("Int",))
     clk = t.clk_rise_ns
     most_ns = row_for(e, "PSA2-ERR-04").limit("pause_max_us") * 1e3
     late = np.flatnonzero(np.diff(t.rises[k]) > most_ns)
@@ -455,5 +455,5 @@ def _cut_on_the_line(e: Evidence) -> str:
     end_ns = int(cut[-1]) if len(cut) else int(t.fall_ns[k])
     stray = clk[(clk > end_ns) & (clk < t.fall_ns[k + 1])]
     if len(stray):
-        raise Broken("CLK without power", "none", at_ns=int(stray[0]), lines=("Int", "CLK"))
+        raise Failed("CLK without power", "none", at_ns=int(stray[0]), lines=("Int", "CLK"))
     return f"; the last frame before it had {len(cut)} of {whole} bits, then {pause_ns[k] / MS:.0f} ms of silence"

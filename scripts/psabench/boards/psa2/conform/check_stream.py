@@ -10,10 +10,10 @@ from psabench.boards.psa2.conform.capture_can import SEQ_BITS, STAMP_BITS, pairs
 from psabench.boards.psa2.conform.capture_line import transfers
 from psabench.boards.psa2.conform.check_serial import LEAST
 from psabench.boards.psa2.conform.stimulus_can import FRAMES, OVERRUNS, Answer
-from psabench.conform.capture.log import CanLog, Evidence
+from psabench.conform.capture.log import CanLog, Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import proves, row_for
-from psabench.conform.verdict import Broken, TooLittle
+from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.protocol_files import message
 
 LINES = ("Int", "Data", "CLK")
@@ -23,13 +23,13 @@ US = 1e-6
 
 
 def number(a: object) -> int:
-    """Value of an answer. Raises Broken where it is a refusal."""
+    """Value of an answer. Raises Failed where it is a refusal."""
     if not isinstance(a, Answer) or not isinstance(a.value, int):
-        raise Broken(f"abort {a.abort:08X}h" if isinstance(a, Answer) else "no answer", "a value")
+        raise Failed(f"abort {a.abort:08X}h" if isinstance(a, Answer) else "no answer", "a value")
     return a.value
 
 
-def unit_us(e: Evidence) -> float:
+def unit_us(e: Capture) -> float:
     """Of TSTAMP."""
     return row_for(e, "PSA2-CAN-05").limit("unit_us")
 
@@ -39,18 +39,18 @@ def unit_us(e: Evidence) -> float:
 
 @proves("PSA2-CAN-01")
 @check("stream")
-def xy_and_zt_alternate(e: Evidence) -> str:
+def xy_and_zt_alternate(e: Capture) -> str:
     """Look at the order of the two messages of a sample, and for others of the stream."""
     ids = {int(message(n).frame_id) - 5 + e.node: n for n in MESSAGES}
     found = [f for f in e.can.frames if f.can_id in ids and not f.error]
     if len(found) < 2 * LEAST:
-        if e.scene == "recording":  # no one says that it was started, nor for how long
-            raise TooLittle(f"{len(found)} frames of samples in the log; expected {2 * LEAST}")
-        raise Broken(f"{len(found)} frames of samples", "two of each sample", frames=e.can.frames[:10])
+        if e.stimulus == "recording":  # no one says that it was started, nor for how long
+            raise Inconclusive(f"{len(found)} frames of samples in the log; expected {2 * LEAST}")
+        raise Failed(f"{len(found)} frames of samples", "two of each sample", frames=e.can.frames[:10])
     for k, (a, b) in enumerate(itertools.pairwise(found)):
         names = ids[a.can_id], ids[b.can_id]
         if names not in (("PSA2_XY", "PSA2_ZT"), ("PSA2_ZT", "PSA2_XY")):
-            raise Broken(
+            raise Failed(
                 f"{names[0]}, then {names[1]}", "PSA2_XY and PSA2_ZT in turn", frames=found[max(0, k - 2) : k + 3]
             )
     return f"{len(found)} frames, PSA2_XY and PSA2_ZT in turn"
@@ -58,7 +58,7 @@ def xy_and_zt_alternate(e: Evidence) -> str:
 
 @proves("PSA2-CAN-01")
 @check("stream", needs={"can", "stamps"})
-def xy_comes_before_its_zt(e: Evidence) -> str:
+def xy_comes_before_its_zt(e: Capture) -> str:
     """Measure from each of the two messages to the other: those of a sample follow each other at once."""
     ids = {int(message(n).frame_id) - 5 + e.node: n for n in MESSAGES[:2]}
     found = [f for f in e.can.frames if f.can_id in ids and not f.error]
@@ -67,17 +67,17 @@ def xy_comes_before_its_zt(e: Evidence) -> str:
         if a.can_id != b.can_id:
             apart_s[ids[a.can_id]].append(b.t_s - a.t_s)
     if min(len(times) for times in apart_s.values()) < LEAST:
-        raise TooLittle(f"{len(found)} frames PSA2_XY and PSA2_ZT came")
+        raise Inconclusive(f"{len(found)} frames PSA2_XY and PSA2_ZT came")
     after_xy_us, after_zt_us = (float(np.median(apart_s[n])) / US for n in MESSAGES[:2])
     if after_xy_us > after_zt_us:
         saw = f"PSA2_ZT {after_xy_us:.0f} us after PSA2_XY, PSA2_XY {after_zt_us:.0f} us after PSA2_ZT"
-        raise Broken(saw, "PSA2_ZT follows PSA2_XY, not the other way", frames=found[:4])
+        raise Failed(saw, "PSA2_ZT follows PSA2_XY, not the other way", frames=found[:4])
     return f"PSA2_ZT {after_xy_us:.0f} us after PSA2_XY"
 
 
 @proves("PSA2-CAN-02")
 @check("stream")
-def messages_have_their_lengths(e: Evidence) -> str:
+def messages_have_their_lengths(e: Capture) -> str:
     """Compare lengths, forms and ranges of all messages with the table."""
     seen = 0
     for name in MESSAGES:
@@ -85,18 +85,18 @@ def messages_have_their_lengths(e: Evidence) -> str:
         due = int(message(name).length)
         bad = [f for f in log.frames if len(f.data) != due]
         if bad:
-            raise Broken(f"{name} of {len(bad[0].data)} bytes", f"{due}", frames=bad)
+            raise Failed(f"{name} of {len(bad[0].data)} bytes", f"{due}", frames=bad)
         seen += len(log)
     p = pairs(e)
     if (p.channel >= int(row_for(e, "PSA2-TEMP-01").limit("channels_count"))).any():
         k = int(np.argmax(p.channel))
-        raise Broken(f"CHANNEL {p.channel[k]}", "a channel that there is", frames=p.about(k))
+        raise Failed(f"CHANNEL {p.channel[k]}", "a channel that there is", frames=p.about(k))
     return f"{seen} frames of their length"
 
 
 @proves("PSA2-CAN-03")
 @check("stream", needs={"pins", "stamps", "lockstep"})
-def no_frame_before_its_transfer_has_ended(e: Evidence) -> str:
+def no_frame_before_its_transfer_has_ended(e: Capture) -> str:
     """Compare the time of each PSA2_XY on the bus with TSTAMP, and with the rise of Int."""
     p, row = pairs(e), row_for(e, "PSA2-CAN-03")
     stamp_us = p.stamp * unit_us(e)
@@ -109,18 +109,18 @@ def no_frame_before_its_transfer_has_ended(e: Evidence) -> str:
     bad = after_us < least_us
     if bad.any():
         n = int(np.flatnonzero(bad)[0])
-        raise Broken(f"PSA2_XY {after_us[n]:.0f} us after its sample", f"{least_us:.0f} us or more", frames=p.about(n))
+        raise Failed(f"PSA2_XY {after_us[n]:.0f} us after its sample", f"{least_us:.0f} us or more", frames=p.about(n))
     if not len(since_us):
-        raise Broken("no rise of Int before any PSA2_XY", "one before each", at_ns=e.wires.start_ns, lines=LINES)
+        raise Failed("no rise of Int before any PSA2_XY", "one before each", at_ns=e.wires.start_ns, lines=LINES)
     if since_us.max() > row.limit("after_int_max_us"):
         n = int(np.argmax(since_us)) + int((k == 0).sum())
-        raise Broken(f"PSA2_XY {since_us.max():.0f} us after Int", "it follows at once", frames=p.about(n))
+        raise Failed(f"PSA2_XY {since_us.max():.0f} us after Int", "it follows at once", frames=p.about(n))
     return f"PSA2_XY {after_us.min():.0f} us and more after the sample, {since_us.min():.0f} us after Int"
 
 
 @proves("PSA2-CAN-04")
 @check("quiet")
-def seq_rises_by_one(e: Evidence) -> str:
+def seq_rises_by_one(e: Capture) -> str:
     """Look for gaps of SEQ."""
     p = pairs(e)
     p.unbroken()
@@ -129,7 +129,7 @@ def seq_rises_by_one(e: Evidence) -> str:
 
 @proves("PSA2-SAMP-01")
 @check("quiet")
-def every_conversion_becomes_a_sample(e: Evidence) -> str:
+def every_conversion_becomes_a_sample(e: Capture) -> str:
     """Measure TSTAMP from sample to sample: one data period each?"""
     p = pairs(e)
     period_us = row_for(e, "PSA2-READ-06").limit("period_us")
@@ -138,29 +138,29 @@ def every_conversion_becomes_a_sample(e: Evidence) -> str:
     bad = np.flatnonzero(np.abs(step_us - period_us) > slack_us)
     if len(bad):
         saw = f"{step_us[bad[0]]:.0f} us from sample to sample ({len(bad)} of {len(step_us)})"
-        raise Broken(saw, f"{period_us:.0f} +- {slack_us:.1f} us", frames=p.about(int(bad[0])))
+        raise Failed(saw, f"{period_us:.0f} +- {slack_us:.1f} us", frames=p.about(int(bad[0])))
     return f"{len(p)} samples, each {step_us.min():.0f} to {step_us.max():.0f} us after the one before"
 
 
 @proves("PSA2-CAN-05")
 @check("quiet")
-def tstamp_goes_by_the_data_period(e: Evidence) -> str:
+def tstamp_goes_by_the_data_period(e: Capture) -> str:
     """Compare TSTAMP with SEQ times the data period."""
     p = pairs(e, 100)
     row = row_for(e, "PSA2-CAN-05")
     period_us = row_for(e, "PSA2-READ-06").limit("period_us")
     n = np.concatenate(([0], np.cumsum(p.steps)))
     if not n[-1]:
-        raise Broken(f"SEQ stands still at {p.seq[0]}", "one more a sample", frames=p.about(0))
+        raise Failed(f"SEQ stands still at {p.seq[0]}", "one more a sample", frames=p.about(0))
     t_us = (p.stamp - p.stamp[0]) * unit_us(e)
     mean_us = float(t_us[-1]) / float(n[-1])
     slack_us = e.slack_ns(period_us * 1e3) * 1e-3 + unit_us(e) / n[-1]
     if abs(mean_us - period_us) > slack_us:
-        raise Broken(f"{mean_us:.4f} us a sample", f"{period_us:.1f} +- {slack_us:.4f} us", frames=p.about(0))
+        raise Failed(f"{mean_us:.4f} us a sample", f"{period_us:.1f} +- {slack_us:.4f} us", frames=p.about(0))
     off_us = np.abs(t_us - n * mean_us)
     k = int(np.argmax(off_us))
     if off_us[k] > row.limit("jitter_max_us") + unit_us(e):
-        raise Broken(
+        raise Failed(
             f"TSTAMP off by {off_us[k]:.1f} us",
             f"at most {row.limit('jitter_max_us'):g} us and its own unit",
             frames=p.about(k),
@@ -170,17 +170,17 @@ def tstamp_goes_by_the_data_period(e: Evidence) -> str:
 
 @proves("PSA2-CAN-05")
 @check("stream", needs={"pins", "exact"})
-def tstamp_is_the_fall_of_drd_a(e: Evidence) -> str:
+def tstamp_is_the_fall_of_drd_a(e: Capture) -> str:
     """Compare TSTAMP with the falls of DRD_A."""
     p = pairs(e)
     falls = e.wires.falls("DRD_A")
     if len(falls) < LEAST:
-        raise TooLittle(f"{len(falls)} falls of DRD_A were recorded")
+        raise Inconclusive(f"{len(falls)} falls of DRD_A were recorded")
     due = np.unique(falls // round(unit_us(e) * 1e3) % (1 << STAMP_BITS))
     bad = ~np.isin(p.stamp % (1 << STAMP_BITS), due)
     if bad.sum() > row_for(e, "PSA2-CAN-05").limit("edge_max_frames"):
         k = int(np.flatnonzero(bad)[0])
-        raise Broken(
+        raise Failed(
             f"TSTAMP {p.stamp[k] % (1 << STAMP_BITS)} at no fall of DRD_A", "the instant of one", frames=p.about(k)
         )
     return f"{len(p)} time stamps, each a fall of DRD_A"
@@ -188,32 +188,32 @@ def tstamp_is_the_fall_of_drd_a(e: Evidence) -> str:
 
 @proves("PSA2-CAN-06")
 @check("starts")
-def samples_come_whole(e: Evidence) -> str:
+def samples_come_whole(e: Capture) -> str:
     """Start and stop the stream at all phases of a sample: is there a second half without a first?"""
     first, second = (int(message(n).frame_id) - 5 + e.node for n in ("PSA2_XY", "PSA2_ZT"))
     halves = [f for f in e.can.frames if f.can_id in (first, second) and not f.error]
     if len(halves) < LEAST:
-        raise TooLittle(f"{len(halves)} halves of samples came")
+        raise Inconclusive(f"{len(halves)} halves of samples came")
     for k, f in enumerate(halves):
         if f.can_id == second and (k == 0 or halves[k - 1].can_id == second):
-            raise Broken("a PSA2_ZT without its PSA2_XY", "both", frames=halves[max(0, k - 2) : k + 2])
+            raise Failed("a PSA2_ZT without its PSA2_XY", "both", frames=halves[max(0, k - 2) : k + 2])
     torn = sum(a.can_id == b.can_id == first for a, b in itertools.pairwise(halves))
     starts = int(row_for(e, "PSA2-CAN-06").limit("starts_count"))
     if torn > starts:
-        raise Broken(f"{torn} PSA2_XY without PSA2_ZT in {starts} stops", "at most one a stop")
+        raise Failed(f"{torn} PSA2_XY without PSA2_ZT in {starts} stops", "at most one a stop")
     return f"{len(halves)} halves, {torn} cut by a stop"
 
 
 @proves("PSA2-CAN-08")
 @check("quiet")
-def overrun_tells_of_lost_conversions(e: Evidence) -> str:
+def overrun_tells_of_lost_conversions(e: Capture) -> str:
     """Compare OVERRUN with the gaps of SEQ and with the counter of overruns."""
     p = pairs(e)
     gap = np.concatenate(([False], p.steps != 1))
     wrong = np.flatnonzero(p.overrun[1:] != gap[1:]) + 1
     if len(wrong):
         k = int(wrong[0])
-        raise Broken(
+        raise Failed(
             f"OVERRUN {int(p.overrun[k])} {'at a gap' if gap[k] else 'without a gap'} of SEQ",
             "OVERRUN after a gap, and only there",
             frames=p.about(k),
@@ -221,70 +221,70 @@ def overrun_tells_of_lost_conversions(e: Evidence) -> str:
     return f"{int(p.overrun.sum())} of {len(p)} samples with OVERRUN, {int(gap.sum())} gaps"
 
 
-def _counted(e: Evidence, sub: int) -> int:
+def _counted(e: Capture, sub: int) -> int:
     before, after = e.facts.get("before"), e.facts.get("after")
     if not isinstance(before, dict) or not isinstance(after, dict):
-        raise TooLittle("the scene has no counters")
+        raise Inconclusive("the scene has no counters")
     return number(after[sub]) - number(before[sub])
 
 
-def _meanwhile(e: Evidence, sub: int) -> Evidence:
+def _meanwhile(e: Capture, sub: int) -> Capture:
     """The log between the two answers that told a counter: the bus has them in their order, whoever was late.
 
-    Raises TooLittle where it lacks one.
+    Raises Inconclusive where it lacks one.
     """
     answer, what = int(row_for(e, "BUS-ID-01").limit("sdo_tx_id")) + e.node, bytes([0x30, 0x20, sub])
     at = [k for k, f in enumerate(e.can.frames) if f.can_id == answer and f.data[1:4] == what and not f.sent]
     if len(at) < 2:
-        raise TooLittle("the answers that told the counter are not in the log")
+        raise Inconclusive("the answers that told the counter are not in the log")
     return e.with_can(CanLog(frames=e.can.frames[at[0] : at[-1]]))
 
 
 @proves("PSA2-CNT-01")
 @check("quiet")
-def frames_are_counted(e: Evidence) -> str:
+def frames_are_counted(e: Capture) -> str:
     """Compare the counter of frames with SEQ."""
     p, counted = pairs(_meanwhile(e, FRAMES)), _counted(e, FRAMES)
     span = int((p.seq[-1] - p.seq[0]) % (1 << SEQ_BITS)) + 1
     row = row_for(e, "PSA2-CNT-01")
     fewer, more = int(row.limit("on_its_way_max_frames")), int(row.limit("edge_max_frames"))
     if not span - fewer <= counted <= span + more:
-        raise Broken(f"{counted} frames counted, {span} by SEQ", f"{fewer} less to {more} more, at the ends")
+        raise Failed(f"{counted} frames counted, {span} by SEQ", f"{fewer} less to {more} more, at the ends")
     return f"{counted} frames counted, {span} by SEQ"
 
 
 @proves("PSA2-CNT-02")
 @check("quiet")
-def overruns_are_counted(e: Evidence) -> str:
+def overruns_are_counted(e: Capture) -> str:
     """Compare the counter of overruns with OVERRUN."""
     counted = _counted(e, OVERRUNS)
     late = int(row_for(e, "PSA2-CNT-02").limit("told_late_max_frames"))  # those were counted before
     told = int(pairs(_meanwhile(e, OVERRUNS)).overrun[late:].sum())
     if counted < told or (counted and not pairs(e).overrun.any()):
-        raise Broken(f"{counted} overruns counted, {told} told by OVERRUN", "as many")
+        raise Failed(f"{counted} overruns counted, {told} told by OVERRUN", "as many")
     return f"{counted} overruns counted, {told} told by OVERRUN"
 
 
 @proves("PSA2-RES-05")
 @check("power_on")
-def seq_begins_with_0(e: Evidence) -> str:
+def seq_begins_with_0(e: Capture) -> str:
     """Look at the first sample after the reset."""
     boots = [k for k, f in enumerate(e.can.frames) if f.can_id == 0x700 + e.node and f.data[:1] == b"\0"]
     if not boots:
-        raise Broken("no boot-up message after the reset", "one", frames=e.can.frames[:10])
+        raise Failed("no boot-up message after the reset", "one", frames=e.can.frames[:10])
     log = CanLog(frames=e.can.frames[boots[-1] :])
     first = e.with_can(log).frames_of("PSA2_XY").frames[:1]
     if not first or len(first[0].data) != 8:
-        raise TooLittle("no PSA2_XY came after the reset")
+        raise Inconclusive("no PSA2_XY came after the reset")
     seq = int.from_bytes(first[0].data[6:8], "little")
     if seq:
-        raise Broken(f"SEQ {seq} first", "0", frames=log.frames[:6])
+        raise Failed(f"SEQ {seq} first", "0", frames=log.frames[:6])
     return "SEQ 0 first"
 
 
 @proves("PSA2-READ-06")
 @check("stream", needs={"line"})
-def frames_come_every_data_period(e: Evidence) -> str:
+def frames_come_every_data_period(e: Capture) -> str:
     """Measure the falls of Int."""
     t = transfers(e.wires)
     period_ns = row_for(e, "PSA2-READ-06").limit("period_us") * 1e3
@@ -294,7 +294,7 @@ def frames_come_every_data_period(e: Evidence) -> str:
     bad = np.flatnonzero((np.abs(step_ns - period_ns) > slack_ns) & e.wires.known(t.fall_ns[:-1], t.fall_ns[1:]))
     if len(bad) and e.variant["gate_sclk"]:  # without gates a burst for the other port may delay a read
         k = int(bad[0])
-        raise Broken(
+        raise Failed(
             f"{step_ns[k] * 1e-3:.2f} us to the next frame",
             f"{period_ns * 1e-3:.1f} us, to a period of CLK",
             at_ns=int(t.fall_ns[k]),
@@ -303,7 +303,7 @@ def frames_come_every_data_period(e: Evidence) -> str:
     mean_ns = float(step_ns.mean())
     allowed_ns = e.slack_ns(period_ns) + clk_ns / len(step_ns)
     if abs(mean_ns - period_ns) > allowed_ns and not len(e.wires.gaps_ns):
-        raise Broken(
+        raise Failed(
             f"{mean_ns * 1e-3:.4f} us from frame to frame",
             f"{period_ns * 1e-3:.1f} us +- {allowed_ns:.0f} ns",
             at_ns=int(t.fall_ns[0]),

@@ -11,23 +11,23 @@ from psabench.boards.psa2.conform.capture_line import transfers
 from psabench.boards.psa2.conform.check_serial import LEAST
 from psabench.boards.psa2.conform.check_setup import port_traffic
 from psabench.boards.psa2.conform.check_stream import FORMATS, LINES
-from psabench.conform.capture.log import Evidence
+from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import proves, row_for
-from psabench.conform.verdict import Broken, TooLittle
+from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.signals import Ints
 
 # ---- words on the line beside CAN
 
 
-def _words(e: Evidence) -> Ints:
-    """(n, 4) words of the line, sign-extended. Raises Broken for a transfer without all its bits."""
+def _words(e: Capture) -> Ints:
+    """(n, 4) words of the line, sign-extended. Raises Failed for a transfer without all its bits."""
     t = transfers(e.wires)
     bits = int(row_for(e, *FORMATS).limit("word_bits"))
     due = 4 * bits
     for fall, rises in zip(t.fall_ns, t.rises, strict=True):
         if len(rises) != due:
-            raise Broken(f"{len(rises)} pulses of CLK in a transfer", f"{due}", at_ns=int(fall), lines=LINES)
+            raise Failed(f"{len(rises)} pulses of CLK in a transfer", f"{due}", at_ns=int(fall), lines=LINES)
     return signed(t.words(bits), bits)
 
 
@@ -49,8 +49,8 @@ class Beside:
     samples: Pairs
 
 
-def beside(e: Evidence) -> Beside:
-    """Both logs laid beside each other where most samples agree in an axis; the other axes are what is judged."""
+def beside(e: Capture) -> Beside:
+    """Both logs laid beside each other where most samples agree in an axis; the other axes are what is checked."""
     words, p = _words(e), pairs(e)
     row = row_for(e, *WORDS)
     lost = WORDS[row.id]
@@ -59,7 +59,7 @@ def beside(e: Evidence) -> Beside:
     best = max((aligned(line[:, [k]], code[:, [j]]) for k in range(3) for j in range(3)), key=lambda r: r[1])
     shift, same = best
     if same < LEAST:
-        raise Broken(
+        raise Failed(
             "no word of the line is a code on CAN",
             "codes, least significant bit first, word X first",
             at_ns=int(e.wires.falls("Int")[0]),
@@ -69,26 +69,26 @@ def beside(e: Evidence) -> Beside:
     i = np.arange(len(p)) + shift
     keep = (i >= 0) & (i < len(words))
     if keep.sum() < LEAST:
-        raise TooLittle("the recording and the log have few samples in common")
+        raise Inconclusive("the recording and the log have few samples in common")
     at = i[keep]
     return Beside(
         line=line[at] << max(lost, 0), words=words[at], fall_ns=transfers(e.wires).fall_ns[at], samples=p.where(keep)
     )
 
 
-def _codes_due(e: Evidence, p: Pairs) -> Ints:
+def _codes_due(e: Capture, p: Pairs) -> Ints:
     """(n, 3) the codes of CAN with the bits that a word has."""
     lost = WORDS[row_for(e, *WORDS).id]
     return p.code >> lost << lost if lost > 0 else p.code
 
 
 def _same(saw: Ints, due: Ints, p: Pairs, what: str) -> str:
-    """Raises Broken for the first row that differs."""
+    """Raises Failed for the first row that differs."""
     bad = saw != due
     bad = bad.any(axis=1) if bad.ndim > 1 else bad
     if bad.any():
         k = int(np.flatnonzero(bad)[0])
-        raise Broken(
+        raise Failed(
             f"{saw[k]} on the line ({int(bad.sum())} of {len(bad)})", f"{due[k]}, {what} on CAN", frames=p.about(k)
         )
     return f"{len(bad)} frames, {what} as on CAN"
@@ -96,15 +96,15 @@ def _same(saw: Ints, due: Ints, p: Pairs, what: str) -> str:
 
 @proves("PSA2-FRAME-03")
 @check("stream", needs={"line"})
-def words_come_least_significant_bit_first(e: Evidence) -> str:
+def words_come_least_significant_bit_first(e: Capture) -> str:
     """Read the words either way round: which way do they hold the codes of CAN?"""
     t, p = transfers(e.wires.unbroken()), pairs(e)
     bits = int(row_for(e, *FORMATS).limit("word_bits"))
     t = t.of(4 * bits)
     if len(t) < LEAST and len(e.wires.gaps_ns):
-        raise TooLittle(f"{len(t)} frames between two losses of samples")
+        raise Inconclusive(f"{len(t)} frames between two losses of samples")
     if len(t) < LEAST:
-        raise Broken(f"{len(t)} transfers of {4 * bits} bits", "all", at_ns=int(e.wires.falls("Int")[0]), lines=LINES)
+        raise Failed(f"{len(t)} transfers of {4 * bits} bits", "all", at_ns=int(e.wires.falls("Int")[0]), lines=LINES)
     lost = WORDS[row_for(e, *WORDS).id]
     code = (p.code >> lost if lost >= 0 else p.code) & 0xFFFF
     count = {}
@@ -113,13 +113,13 @@ def words_come_least_significant_bit_first(e: Evidence) -> str:
         count[name] = max(aligned(words[:, [k]], code[:, [j]])[1] for k in range(4) for j in range(3))
     if count["least"] < min(len(t), len(p)) // 2:
         saw = f"{count['most']} words read most significant bit first are codes, {count['least']} the other way"
-        raise Broken(saw, f"{len(p)}, least significant bit first", at_ns=int(t.fall_ns[0]), lines=LINES)
+        raise Failed(saw, f"{len(p)}, least significant bit first", at_ns=int(t.fall_ns[0]), lines=LINES)
     return f"{count['least']} words are codes, read so; {count['most']} the other way round"
 
 
 @proves("PSA2-WORD-01", "PSA2-WORD-02", "PSA2-WORD-03", "PSA2-WORD-04")
 @check("stream", needs={"line"})
-def words_are_the_codes(e: Evidence) -> str:
+def words_are_the_codes(e: Capture) -> str:
     """Compare the words X, Y and Z of each frame with the codes of the same frame on CAN."""
     b = beside(e)
     due = _codes_due(e, b.samples)
@@ -128,7 +128,7 @@ def words_are_the_codes(e: Evidence) -> str:
 
 @proves("PSA2-FRAME-04")
 @check("stream", needs={"line"})
-def the_first_word_is_that_of_the_lowest_address(e: Evidence) -> str:
+def the_first_word_is_that_of_the_lowest_address(e: Capture) -> str:
     """Compare the first word with the code of X on CAN."""
     b = beside(e)
     return _same(b.line[:, 0], _codes_due(e, b.samples)[:, 0], b.samples, "X first")
@@ -136,7 +136,7 @@ def the_first_word_is_that_of_the_lowest_address(e: Evidence) -> str:
 
 @proves("PSA2-FRAME-05")
 @check("stream", needs={"line"})
-def words_are_in_their_order(e: Evidence) -> str:
+def words_are_in_their_order(e: Capture) -> str:
     """Compare the order of the words with X, Y, Z and T on CAN."""
     b = beside(e)
     mask = (1 << int(row_for(e, "PSA2-WORD-05").limit("code_bits"))) - 1
@@ -147,7 +147,7 @@ def words_are_in_their_order(e: Evidence) -> str:
 
 @proves("PSA2-CAN-07")
 @check("stream", needs={"line"})
-def can_and_line_carry_the_same(e: Evidence) -> str:
+def can_and_line_carry_the_same(e: Capture) -> str:
     """Compare all that a frame carries on the line with its pair on CAN."""
     b = beside(e)
     mask = (1 << int(row_for(e, "PSA2-WORD-05").limit("code_bits"))) - 1
@@ -157,14 +157,14 @@ def can_and_line_carry_the_same(e: Evidence) -> str:
 
 @proves("PSA2-WORD-05", "PSA2-WORD-08")
 @check("stream", needs={"line"})
-def word_t_has_the_temperature_code(e: Evidence) -> str:
+def word_t_has_the_temperature_code(e: Capture) -> str:
     """Compare the lower bits of word T with T on CAN."""
     b = beside(e)
     mask = (1 << int(row_for(e, "PSA2-WORD-05").limit("code_bits"))) - 1
     return _same(b.words[:, 3] & mask, b.samples.temp & mask, b.samples, "T")
 
 
-def channel_on_the_line(e: Evidence, b: Beside) -> Ints:
+def channel_on_the_line(e: Capture, b: Beside) -> Ints:
     """(n,) the channel that word T has."""
     row = row_for(e, "PSA2-WORD-06")
     return b.words[:, 3] >> int(row.limit("channel_shift_bits")) & ((1 << int(row.limit("channel_bits"))) - 1)
@@ -172,7 +172,7 @@ def channel_on_the_line(e: Evidence, b: Beside) -> Ints:
 
 @proves("PSA2-WORD-06")
 @check("stream", needs={"line"})
-def word_t_has_the_channel(e: Evidence) -> str:
+def word_t_has_the_channel(e: Capture) -> str:
     """Compare bits 19 to 16 of word T with CHANNEL on CAN."""
     b = beside(e)
     return _same(channel_on_the_line(e, b), b.samples.channel, b.samples, "CHANNEL")
@@ -180,7 +180,7 @@ def word_t_has_the_channel(e: Evidence) -> str:
 
 @proves("PSA2-WORD-07")
 @check("stream", needs={"line"})
-def word_t_has_the_status(e: Evidence) -> str:
+def word_t_has_the_status(e: Capture) -> str:
     """Compare bits 23 to 20 of word T with the status bits on CAN."""
     b, row = beside(e), row_for(e, "PSA2-WORD-07")
     p = b.samples
@@ -195,24 +195,24 @@ def word_t_has_the_status(e: Evidence) -> str:
 # ---- the words that were read
 
 
-def _read_words(e: Evidence) -> Ints:
+def _read_words(e: Capture) -> Ints:
     """(n, 3) upper 24 bits of what DOutX, DOutY and DOutZ had at each read."""
     reads = [b for b in port_traffic(e).reads if b.bits >= 24]
     if len(reads) < LEAST:
-        raise TooLittle(f"{len(reads)} reads were recorded")
+        raise Inconclusive(f"{len(reads)} reads were recorded")
     return signed(np.array([[int(w[:24], 2) for w in b.got] for b in reads], np.int64), 24)
 
 
 @proves("PSA2-READ-04")
 @check("stream", needs={"pins"})
-def three_axes_are_read_at_once(e: Evidence) -> str:
+def three_axes_are_read_at_once(e: Capture) -> str:
     """Decode DOutX, DOutY and DOutZ by the same pulses of SClk, beside the codes on CAN."""
     read, p = _read_words(e), pairs(e)
     shift, same = aligned(read, p.code)
     if same < len(p) - int(row_for(e, "PSA2-READ-04").limit("edge_max_frames")):
         i = np.arange(len(p)) + shift
         at = np.flatnonzero([not (0 <= k < len(read)) or (read[k] != c).any() for k, c in zip(i, p.code, strict=True)])
-        raise Broken(
+        raise Failed(
             f"{len(p) - same} of {len(p)} samples on CAN were not read so",
             "the words of one burst of SClk",
             frames=p.about(int(at[0]) if len(at) else 0),
@@ -223,7 +223,7 @@ def three_axes_are_read_at_once(e: Evidence) -> str:
 
 @proves("PSA2-READ-05")
 @check("stream", needs={"pins"})
-def a_frame_has_the_codes_of_the_read_before_it(e: Evidence) -> str:
+def a_frame_has_the_codes_of_the_read_before_it(e: Capture) -> str:
     """Compare the words of each frame with the read that ended before Int fell."""
     words, t = _words(e), transfers(e.wires)
     read = _read_words(e)
@@ -231,7 +231,7 @@ def a_frame_has_the_codes_of_the_read_before_it(e: Evidence) -> str:
     k = np.searchsorted(ends, t.fall_ns) - 1
     for n, at in enumerate(k):
         if at >= 0 and (words[n, :3] != read[at]).any():
-            raise Broken(
+            raise Failed(
                 f"{words[n, :3]} sent",
                 f"{read[at]}, as read before",
                 at_ns=int(t.fall_ns[n]),

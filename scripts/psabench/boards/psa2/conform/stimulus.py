@@ -1,10 +1,10 @@
-"""Scenes of PSA-2 and PSA-1."""
+"""Stimuli of PSA-2 and PSA-1."""
 
 from __future__ import annotations
 
-from psabench.conform.capture.log import Evidence
+from psabench.conform.capture.log import Capture
 from psabench.conform.dut import Subject, Take
-from psabench.conform.plan import scene
+from psabench.conform.plan import stimulus
 
 SETUP_S = 0.22  # Res to the first frames takes 0.19 s
 STREAM_S = 0.4
@@ -21,8 +21,8 @@ def into_a_frame(s: Subject, take: Take, lead_s: float = 0.0) -> None:
     s.run_for(ahead_s)
 
 
-@scene("power_on", boards=("psa2",))
-def power_on(s: Subject) -> Evidence:
+@stimulus("power_on", boards=("psa2",))
+def power_on(s: Subject) -> Capture:
     """Res in the middle of a frame, then until frames come: the set-up on all lines, boot-up, the first frames."""
     s.wait_ready()
     with s.take() as take:
@@ -34,11 +34,11 @@ def power_on(s: Subject) -> Evidence:
         s.unit.start()
         s.run_for(SETUP_S)
         s.unit.stop()
-    return s.evidence("power_on", take)
+    return s.capture("power_on", take)
 
 
-@scene("power_cycle", boards=("psa2",))
-def power_cycle(s: Subject) -> Evidence:
+@stimulus("power_cycle", boards=("psa2",))
+def power_cycle(s: Subject) -> Capture:
     """The supply off in the middle of a frame, and on again until frames come."""
     s.wait_ready()
     with s.take() as take:
@@ -52,15 +52,15 @@ def power_cycle(s: Subject) -> Evidence:
         s.unit.start()
         s.run_for(SETUP_S)
         s.unit.stop()
-    return s.evidence("power_cycle", take)
+    return s.capture("power_cycle", take)
 
 
-@scene("stream", boards=("psa2",))
-def stream(s: Subject) -> Evidence:
+@stimulus("stream", boards=("psa2",))
+def stream(s: Subject) -> Capture:
     """Some hundred frames, on the lines and on CAN."""
     s.wait_ready()
     with s.take() as take:
         s.unit.start()
         s.run_for(STREAM_S)
         s.unit.stop()
-    return s.evidence("stream", take)
+    return s.capture("stream", take)

@@ -1,6 +1,6 @@
-"""Scenes of PSA-2 and PSA-1 that ask for something over CAN: objects, registers, forms, modes, settings.
+"""Stimuli of PSA-2 and PSA-1 that ask for something over CAN: objects, registers, forms, modes, settings.
 
-What was answered is in `facts`: "cut" has the number of CAN frames at named moments, the rest is said at each scene.
+What was answered is in `facts`: "cut" has the number of CAN frames at named moments, the rest is said at each stimulus.
 Settings are put back by a reset.
 """
 
@@ -16,10 +16,10 @@ import numpy as np
 from psabench.boards.objects import Psa2Objects as OD
 from psabench.boards.psa2.conform.capture_can import CODE_MAX, pairs, segment
 from psabench.boards.psa2.conform.stimulus import PERIOD_S
-from psabench.conform.capture.log import Evidence
+from psabench.conform.capture.log import Capture
 from psabench.conform.dut import Subject, Take
-from psabench.conform.plan import scene
-from psabench.conform.verdict import Broken, TooLittle
+from psabench.conform.plan import stimulus
+from psabench.conform.verdict import Failed, Inconclusive
 from psabench.errors import DeviceError
 
 ACCEL, TEMP = (OD.REG_X, OD.REG_Y, OD.REG_Z), OD.REG_T  # objects of registers; sub-index = address + 1
@@ -106,8 +106,8 @@ def split(index: int, sub: int, value: int) -> list[tuple[int, int, int]]:
     return [(index, sub + k, value >> 8 * k & 0xFF) for k in range(3)]
 
 
-@scene("quiet", boards=("psa2",))
-def quiet(s: Subject) -> Evidence:
+@stimulus("quiet", boards=("psa2",))
+def quiet(s: Subject) -> Capture:
     """Frames for two and a half seconds, on CAN alone; counters meanwhile: the log has them among the frames."""
     s.wait_ready()
     with s.take(lines=False) as take:
@@ -118,11 +118,11 @@ def quiet(s: Subject) -> Evidence:
         take.facts["after"] = counters(s, after=True)
         s.run_for(10 * PERIOD_S)
         s.unit.stop()
-    return s.evidence("quiet", take)
+    return s.capture("quiet", take)
 
 
-@scene("registers", boards=("psa2",))
-def registers(s: Subject) -> Evidence:
+@stimulus("registers", boards=("psa2",))
+def registers(s: Subject) -> Capture:
     """All registers read while frames flow. facts: read, by index and sub-index; counters before and after."""
     s.wait_ready()
     with s.take() as take:
@@ -133,11 +133,11 @@ def registers(s: Subject) -> Evidence:
         s.run_for(10 * PERIOD_S)
         s.unit.stop()
         take.facts["after"] = counters(s, after=True)
-    return s.evidence("registers", take)
+    return s.capture("registers", take)
 
 
-@scene("busy", boards=("psa2",))
-def busy(s: Subject) -> Evidence:
+@stimulus("busy", boards=("psa2",))
+def busy(s: Subject) -> Capture:
     """All registers read again and again at 4000 SPS in the fast form. facts: answers; counters before and after."""
     with changed(s), s.take() as take:
         take.facts["answers"] = [tell(s, FORM, 0, 1), tell(s, ACCEL[0], CONFIG0, 0x46 | 4 << 3)]
@@ -151,7 +151,7 @@ def busy(s: Subject) -> Evidence:
         s.run_for(10 * PERIOD_S)
         s.unit.stop()
         take.facts["after"] = counters(s, after=True)
-    return s.evidence("busy", take)
+    return s.capture("busy", take)
 
 
 PATTERNS: Sequence[tuple[int, int, int]] = (  # object, sub-index, value that the part takes
@@ -164,8 +164,8 @@ PATTERNS: Sequence[tuple[int, int, int]] = (  # object, sub-index, value that th
 STATUS_WRITES = (0xF6, 0x04)  # all but ORDER, which turns the bits of an answer; what the set-up writes
 
 
-@scene("writes", boards=("psa2",))
-def writes(s: Subject) -> Evidence:
+@stimulus("writes", boards=("psa2",))
+def writes(s: Subject) -> Capture:
     """Registers written and read again. facts: written, list of object, sub-index, value, answer, what reads then.
 
     status: of the temperature converter, before and after each of STATUS_WRITES.
@@ -181,18 +181,18 @@ def writes(s: Subject) -> Evidence:
             tell(s, TEMP, 1, value)
             status.append(ask(s, TEMP, 1))
         take.facts["status"] = status
-    return s.evidence("writes", take)
+    return s.capture("writes", take)
 
 
-@scene("opcodes", boards=("psa2",))
-def opcodes(s: Subject) -> Evidence:
+@stimulus("opcodes", boards=("psa2",))
+def opcodes(s: Subject) -> Capture:
     """RESET as an opcode to both groups, then all registers. facts: answers, read; cuts around the opcode."""
     with changed(s), s.take() as take:
         s.run_for(5 * PERIOD_S)
         take.facts["answers"] = [tell(s, OPCODE, 1, 0x06), tell(s, OPCODE, 2, 0xFE)]
         s.run_for(0.1)
         take.facts["read"] = {(i, sub): ask(s, i, sub) for i in (*ACCEL, TEMP) for sub in REGISTERS}
-    return s.evidence("opcodes", take)
+    return s.capture("opcodes", take)
 
 
 # What is refused: object, sub-index, value.
@@ -211,8 +211,8 @@ OPCODES_REFUSED: Sequence[tuple[int, int, int]] = (
 )
 
 
-@scene("refusals", boards=("psa2",))
-def refusals(s: Subject) -> Evidence:
+@stimulus("refusals", boards=("psa2",))
+def refusals(s: Subject) -> Capture:
     """Values that the board refuses. facts: reserved, (object, sub, value, answer, before, after); opcodes; others."""
     reserved = [*RESERVED, *([RESERVED_GAIN] if s.variant.board == "psa2" else [])]
     with changed(s), s.take() as take:
@@ -222,7 +222,7 @@ def refusals(s: Subject) -> Evidence:
         take.facts["opcodes"] = [(i, sub, v, tell(s, i, sub, v)) for i, sub, v in OPCODES_REFUSED]
         take.facts["read-only"] = [(i, 1, 0x55, tell_raw(s, i, 1, 0x55)) for i in ACCEL]
         take.facts["form"] = tell_raw(s, FORM, 0, 4)
-    return s.evidence("refusals", take)
+    return s.capture("refusals", take)
 
 
 def tell_raw(s: Subject, index: int, sub: int, value: int) -> Answer:
@@ -234,8 +234,8 @@ def tell_raw(s: Subject, index: int, sub: int, value: int) -> Answer:
     return Answer()
 
 
-@scene("early", boards=("psa2",))
-def early(s: Subject) -> Evidence:
+@stimulus("early", boards=("psa2",))
+def early(s: Subject) -> Capture:
     """Asked before the set-up is over, and while another request is under way. facts: early, busy, missed."""
     s.wait_ready()
     with s.take(lines=False) as take:
@@ -252,7 +252,7 @@ def early(s: Subject) -> Evidence:
         take.facts["busy"] = _busy(s, take)
         s.reset()
         s.run_for(PERIOD_S)
-    return s.evidence("early", take)
+    return s.capture("early", take)
 
 
 def _busy(s: Subject, take: Take) -> list[int]:
@@ -273,8 +273,8 @@ def _busy(s: Subject, take: Take) -> list[int]:
     return found
 
 
-@scene("rates", boards=("psa2",))
-def rates(s: Subject) -> Evidence:
+@stimulus("rates", boards=("psa2",))
+def rates(s: Subject) -> Capture:
     """Each data rate: frames (every fourth as a PDO), then a pulse on SYNC_A by SYNC. Cuts "DR 0" ... "DR 4"."""
     with changed(s), s.take() as take:
         tell(s, NTH, 0, 4)
@@ -287,11 +287,11 @@ def rates(s: Subject) -> Evidence:
             s.host.send(SYNC, b"")
             s.run_for(SETTLE_PERIODS / rate_hz + 0.005)
             tell(s, PULSES, 0, 0)
-    return s.evidence("rates", take)
+    return s.capture("rates", take)
 
 
-@scene("sync", boards=("psa2",))
-def sync(s: Subject) -> Evidence:
+@stimulus("sync", boards=("psa2",))
+def sync(s: Subject) -> Capture:
     """SYNC in sample mode 1, then with 2024h = 1. Cuts "SYNC 0" ... before each, "pulse" before the last.
 
     facts: paced, False where no one knows how long after one another they were sent.
@@ -317,7 +317,7 @@ def sync(s: Subject) -> Evidence:
         s.unit.stop()
         cut(take, "pulse end")
         take.facts["after"] = ask(s, COUNTERS, SYNCS_MISSED)
-    return s.evidence("sync", take)
+    return s.capture("sync", take)
 
 
 LATE_S = 2.0  # real time that a busy machine may be late
@@ -327,15 +327,15 @@ def _wait_for_a_sample(s: Subject, take: Take, since: str) -> None:
     """In real time until one has come since the cut: a busy machine is late. In lockstep it has, or never will."""
 
     def came() -> bool:
-        return len(segment(s.evidence("sync", take), since).frames_of("PSA2_ZT")) > 0
+        return len(segment(s.capture("sync", take), since).frames_of("PSA2_ZT")) > 0
 
     if not s.lockstep:
         take.facts["paced"] = False
         s.host.pump_until(came, LATE_S)
 
 
-@scene("gain", boards=("psa2",))
-def gain(s: Subject) -> Evidence:
+@stimulus("gain", boards=("psa2",))
+def gain(s: Subject) -> Capture:
     """CONFIG1 written while frames flow: gain 4 for 2. Cuts "before", "gain"; facts: answer, read on all three."""
     with changed(s), s.take(lines=False) as take:
         cut(take, "before")
@@ -346,7 +346,7 @@ def gain(s: Subject) -> Evidence:
         s.run_for(0.2)
         s.unit.stop()
         take.facts["read"] = [ask(s, i, CONFIG1) for i in ACCEL]
-    return s.evidence("gain", take)
+    return s.capture("gain", take)
 
 
 OFFSET = 0x012345  # codes; positive
@@ -354,8 +354,8 @@ FACTOR = 0x500000  # 1.25
 APART_CODES = 2000  # of two axes, so that one can be beyond its limit alone, whatever the noise
 
 
-@scene("numbers", boards=("psa2",))
-def numbers(s: Subject) -> Evidence:
+@stimulus("numbers", boards=("psa2",))
+def numbers(s: Subject) -> Capture:
     """OFC and FSC written through 2000h: as they were, an offset, a factor, both limits. Cuts by these names.
 
     At last one axis alone is driven beyond either limit. facts: alone, its number by "one high" and "one low", where
@@ -375,19 +375,19 @@ def numbers(s: Subject) -> Evidence:
             streamed(s, take, name, 0.06)
         alone: dict[str, int] = {}
         take.facts["alone"] = alone
-        for name, (axis, ofc) in _alone(s.evidence("numbers", take)).items():
+        for name, (axis, ofc) in _alone(s.capture("numbers", take)).items():
             alone[name] = axis
             take.facts[name] = [tell(s, *x) for x in split(ACCEL[0], OFC0, ofc & 0xFFFFFF)]
             s.run_for(3 * PERIOD_S)
             streamed(s, take, name, 0.06)
-    return s.evidence("numbers", take)
+    return s.capture("numbers", take)
 
 
-def _alone(e: Evidence) -> dict[str, tuple[int, int]]:
+def _alone(e: Capture) -> dict[str, tuple[int, int]]:
     """The axis and the OFC that drives it beyond a limit while the others stay below, FSC being at its highest."""
     try:
         codes = np.median(pairs(segment(e, "as it was", "as it was end"), 3).code, axis=0)
-    except (Broken, TooLittle):
+    except (Failed, Inconclusive):
         return {}
     lowest, middle, highest = np.sort(codes)
     order = np.argsort(codes)
@@ -400,8 +400,8 @@ def _alone(e: Evidence) -> dict[str, tuple[int, int]]:
     return found
 
 
-@scene("forms", boards=("psa2",))
-def forms(s: Subject) -> Evidence:
+@stimulus("forms", boards=("psa2",))
+def forms(s: Subject) -> Capture:
     """Every frame form for a while, the last one several times. Cuts "form 0" ..., "again 0" ...
 
     facts: answer of each, bit 31 of the TPDOs, stamps before each time.
@@ -417,11 +417,11 @@ def forms(s: Subject) -> Evidence:
             stamps.append(ask(s, OD.FRAME_HEAD, 5))  # of the latest sample, us, before the start
             streamed(s, take, f"again {k}", (20 + k) * PERIOD_S)
         take.facts["stamps"] = stamps
-    return s.evidence("forms", take)
+    return s.capture("forms", take)
 
 
-@scene("fit", boards=("psa2",))
-def fit(s: Subject) -> Evidence:
+@stimulus("fit", boards=("psa2",))
+def fit(s: Subject) -> Capture:
     """What the bus cannot carry. facts: words of 2031h, answers, CONFIG0 after; cuts "form", "rate"."""
     with changed(s), s.take() as take:
         cut(take, "rate")
@@ -436,11 +436,11 @@ def fit(s: Subject) -> Evidence:
         s.run_for(5 * PERIOD_S)
         take.facts["form text"], take.facts["form read"] = ask(s, OD.REFUSAL), ask(s, FORM)
         cut(take, "form end")
-    return s.evidence("fit", take)
+    return s.capture("fit", take)
 
 
-@scene("starts", boards=("psa2",))
-def starts(s: Subject) -> Evidence:
+@stimulus("starts", boards=("psa2",))
+def starts(s: Subject) -> Capture:
     """The stream started and stopped many times, at all phases of a sample."""
     s.wait_ready()
     with s.take(lines=False) as take:
@@ -448,4 +448,4 @@ def starts(s: Subject) -> Evidence:
             s.unit.start()
             s.run_for((4 + 0.13 * k) * PERIOD_S)
             s.unit.stop()
-    return s.evidence("starts", take)
+    return s.capture("starts", take)

@@ -1,4 +1,4 @@
-"""Scenes of PSA-2 and PSA-1 that read objects: identity, mirrors of a sample, the whole dictionary."""
+"""Stimuli of PSA-2 and PSA-1 that read objects: identity, mirrors of a sample, the whole dictionary."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 from psabench.boards.objects import Psa2Objects as OD
 from psabench.boards.psa2.conform.stimulus_can import ACCEL, CONFIG0, TEMP, Answer, ask, changed, tell
-from psabench.conform.capture.log import Evidence
+from psabench.conform.capture.log import Capture
 from psabench.conform.dut import Subject
-from psabench.conform.plan import scene
+from psabench.conform.plan import stimulus
 from psabench.errors import DeviceError
 from psabench.link.canopen_host import Described
 
@@ -16,8 +16,8 @@ TEMP_PERIOD_S, CHANNEL_LOOKS = 10.25e-3, 4
 TRIES = 6  # in real time, on a busy machine, three answers may not come within one sample of 4 ms
 
 
-@scene("objects", boards=("psa2",))
-def objects(s: Subject) -> Evidence:
+@stimulus("objects", boards=("psa2",))
+def objects(s: Subject) -> Capture:
     """Identity, width and mirrors. facts: read; mirrors, those of one sample, with its PDO in the log."""
     wanted = [
         (OD.CODES, 1),
@@ -56,7 +56,7 @@ def objects(s: Subject) -> Evidence:
         s.run_for(0.02)
         s.unit.stop()
         take.facts["mirrors"] = found
-    return s.evidence("objects", take)
+    return s.capture("objects", take)
 
 
 def _of_one_sample(s: Subject, index: int, sub: int) -> tuple[int, int, Answer, Answer, Answer]:
@@ -70,12 +70,12 @@ def _of_one_sample(s: Subject, index: int, sub: int) -> tuple[int, int, Answer, 
     return index, sub, value, before, after
 
 
-@scene("dictionary", boards=("psa2",))
-def dictionary(s: Subject) -> Evidence:
+@stimulus("dictionary", boards=("psa2",))
+def dictionary(s: Subject) -> Capture:
     """Every object of the EDS but the registers read, and written where a write is refused. facts: rows."""
     with changed(s), s.take(lines=False) as take:
         take.facts["rows"] = [_row(s, d) for d in s.unit.node.objects() if not (d.index in (*ACCEL, TEMP) and d.sub)]
-    return s.evidence("dictionary", take)
+    return s.capture("dictionary", take)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""Scenes of the temperature converter of PSA-2 and PSA-1: silenced, calibrated, beside a chamber's temperature."""
+"""Stimuli of the temperature converter of PSA-2 and PSA-1: silenced, calibrated, beside a chamber's temperature."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from psabench.boards.psa2.conform.stimulus_can import (
     cut,
     tell,
 )
-from psabench.conform.capture.log import Evidence
+from psabench.conform.capture.log import Capture
 from psabench.conform.dut import Subject
-from psabench.conform.plan import scene
+from psabench.conform.plan import stimulus
 
 HISTORY, HISTORY_LOOKS = OD.ERROR_HISTORY, 4
 
 
-@scene("trouble", boards=("psa2",))
-def trouble(s: Subject) -> Evidence:
+@stimulus("trouble", boards=("psa2",))
+def trouble(s: Subject) -> Capture:
     """The temperature converter silenced by its SYNC command without WAKEUP, a form refused before and after it.
 
     facts: access, counters, history of errors.
@@ -46,7 +46,7 @@ def trouble(s: Subject) -> Evidence:
         cut(take, "silent end")
         _refused_form(s)
         take.facts["history"] = [ask(s, HISTORY, sub) for sub in range(1, 1 + HISTORY_LOOKS)]
-    return s.evidence("trouble", take)
+    return s.capture("trouble", take)
 
 
 def _refused_form(s: Subject) -> None:
@@ -60,8 +60,8 @@ def _refused_form(s: Subject) -> None:
     tell(s, FORM, 0, 0)
 
 
-@scene("selfcal", boards=("psa2",))
-def selfcal(s: Subject) -> Evidence:
+@stimulus("selfcal", boards=("psa2",))
+def selfcal(s: Subject) -> Capture:
     """SELFCAL to the temperature converter while it is scanned. Cuts "before", "selfcal"."""
     with changed(s), s.take(lines=False) as take:
         cut(take, "before")
@@ -71,11 +71,11 @@ def selfcal(s: Subject) -> Evidence:
         take.facts["opcode"] = tell(s, OPCODE, 2, 0xF0)
         s.run_for(0.15)
         s.unit.stop()
-    return s.evidence("selfcal", take)
+    return s.capture("selfcal", take)
 
 
-@scene("chamber", boards=("psa2",))
-def chamber(s: Subject) -> Evidence:
+@stimulus("chamber", boards=("psa2",))
+def chamber(s: Subject) -> Capture:
     """Temperature codes beside the temperature of the chamber. facts: temp_degc."""
     s.wait_ready()
     with s.take(lines=False) as take:
@@ -83,4 +83,4 @@ def chamber(s: Subject) -> Evidence:
         s.unit.start()
         s.run_for(0.1)
         s.unit.stop()
-    return s.evidence("chamber", take)
+    return s.capture("chamber", take)

@@ -8,11 +8,11 @@ from psabench.boards.objects import Psd1Objects as OD
 from psabench.boards.psd1.conform.host import BOTH, calm, drive, has_host, period_s, run_cycles, status, word
 from psabench.conform.bus_host import SHORT_S, burst, line, line_refused
 from psabench.conform.dut import Subject
-from psabench.conform.plan import trial
+from psabench.conform.plan import active
 from psabench.conform.proves import proves
 from psabench.conform.registers import names_and_rights
 from psabench.conform.requirements import requirements
-from psabench.conform.verdict import Broken
+from psabench.conform.verdict import Failed
 from psabench.errors import CycleRefused
 
 CYCLE = 0x08  # of STATUS
@@ -39,7 +39,7 @@ def _waiting(s: Subject, axis: int = 0) -> None:
 
 
 @proves("PSD1-CYC-02")
-@trial(needs={"bus"})
+@active(needs={"bus"})
 def no_cycle_without_int0_and_fl1(s: Subject) -> str:
     """Write FLAGS 0, 1 and 2, look for a running cycle after each, then write 3."""
     calm(s)
@@ -49,10 +49,10 @@ def no_cycle_without_int0_and_fl1(s: Subject) -> str:
         line(s, f"W F {flags:04X}")
         s.run_for(3 * period_s(s.variant))
         if status(s) & CYCLE:
-            raise Broken(f"a cycle with FLAGS {flags}", "none without both INT0 and FL1")
+            raise Failed(f"a cycle with FLAGS {flags}", "none without both INT0 and FL1")
     _waiting(s)
     if not status(s) & CYCLE:
-        raise Broken("no cycle with FLAGS 3", "one")
+        raise Failed("no cycle with FLAGS 3", "one")
     calm(s)
     return "no cycle with FLAGS 0, 1 and 2, one with 3"
 
@@ -68,12 +68,12 @@ def _without_flags(s: Subject) -> str:
         found[flags] = int(s.unit.node.read(OD.COUNTERS, 12)) - before
     calm(s)
     if any(found[k] for k in (0, 1, 2)) or not found[BOTH]:
-        raise Broken(f"cycles with FLAGS 0 to 3: {list(found.values())}", "none but with 3")
+        raise Failed(f"cycles with FLAGS 0 to 3: {list(found.values())}", "none but with 3")
     return f"no cycle with FLAGS 0, 1 and 2, {found[BOTH]} with 3"
 
 
 @proves("PSD1-CYC-05")
-@trial(needs={"bus"})
+@active(needs={"bus"})
 def a_cycle_goes_on_without_its_conditions(s: Subject) -> str:
     """Write FLAGS 0 while X waits, read the three words, look for another cycle."""
     _waiting(s)
@@ -81,13 +81,13 @@ def a_cycle_goes_on_without_its_conditions(s: Subject) -> str:
     words = [word(s, axis).data for axis in range(3)]
     s.run_for(4 * period_s(s.variant))
     if status(s) & CYCLE:
-        raise Broken("another cycle", "none with INT0 and FL1 away")
+        raise Failed("another cycle", "none with INT0 and FL1 away")
     calm(s)
     return f"words {' '.join(f'{w:04X}h' for w in words)}, then no cycle"
 
 
 @proves("PSD1-FL2-06")
-@trial(needs={"bus"})
+@active(needs={"bus"})
 def a_word_waits_for_its_strobe(s: Subject) -> str:
     """Leave X unread for a second, then read X, Y and Z."""
     _waiting(s)
@@ -95,14 +95,14 @@ def a_word_waits_for_its_strobe(s: Subject) -> str:
     s.run_for(1.0)
     after = line(s, "R 3").data & 0x07
     if (before, after) != (1, 1):
-        raise Broken(f"bits 2..0 of STATUS {before:03b} and, a second later, {after:03b}", "X waits: 001")
+        raise Failed(f"bits 2..0 of STATUS {before:03b} and, a second later, {after:03b}", "X waits: 001")
     words = [word(s, axis).data for axis in range(3)]
     calm(s)
     return f"X waited for a second, then {' '.join(f'{w:04X}h' for w in words)}"
 
 
 @proves("PSD1-BUS-02")
-@trial(needs={"bus", "can"})
+@active(needs={"bus", "can"})
 def words_are_answered_at_their_addresses(s: Subject) -> str:
     """Read X, Y and Z at 00h, 01h and 02h, and compare them with what the board tells of that cycle."""
     calm(s)
@@ -110,13 +110,13 @@ def words_are_answered_at_their_addresses(s: Subject) -> str:
         words = [c.data for c in drive(s, 1)]
         told = [int(s.unit.node.read(OD.CODES, k)) for k in (1, 2, 3)]
         if words != told:
-            raise Broken(f"{[f'{w:04X}h' for w in words]} on the bus", f"{[f'{w:04X}h' for w in told]} as 2200h tells")
+            raise Failed(f"{[f'{w:04X}h' for w in words]} on the bus", f"{[f'{w:04X}h' for w in told]} as 2200h tells")
     calm(s)
     return "four cycles, the words at 00h, 01h and 02h"
 
 
 @proves("PSD1-BUS-03")
-@trial(needs={"bus"})
+@active(needs={"bus"})
 def a_strobe_for_another_word_is_refused(s: Subject) -> str:
     """Read Y and Z while X waits, then X; read X before there is a cycle."""
     code = requirements()["PSD1-BUS-03"].limit("abort_code")
@@ -127,13 +127,13 @@ def a_strobe_for_another_word_is_refused(s: Subject) -> str:
     line_refused(s, "R 1", code)
     first = line(s, "R 0").data
     if first == 0:
-        raise Broken("0000h from X after refusals", "its word")
+        raise Failed("0000h from X after refusals", "its word")
     calm(s)
     return f"refused, and X gave {first:04X}h afterwards"
 
 
 @proves("PSD1-BUS-04")
-@trial(needs={"bus"})
+@active(needs={"bus"})
 def a_word_is_taken_once(s: Subject) -> str:
     """Read X twice."""
     code = requirements()["PSD1-BUS-04"].limit("abort_code")
@@ -145,7 +145,7 @@ def a_word_is_taken_once(s: Subject) -> str:
 
 
 @proves("PSD1-BUS-05")
-@trial(needs={"bus"})
+@active(needs={"bus"})
 def words_of_the_built_in_host_are_refused(s: Subject) -> str:
     """Read X, Y and Z while the board reads them itself, each time a little earlier in the cycle."""
     code = requirements()["PSD1-BUS-05"].limit("abort_code")
@@ -174,7 +174,7 @@ def _a_period_later(s: Subject, less_s: float) -> None:
 
 
 @proves("PSD1-BUS-06")
-@trial(needs={"bus"})
+@active(needs={"bus"})
 def registers_have_their_names_and_rights(s: Subject) -> str:
     """Ask who is there, read and write every address."""
     words = {"X": 0x08000022, "Y": 0x08000022, "Z": 0x08000022}
@@ -185,7 +185,7 @@ def registers_have_their_names_and_rights(s: Subject) -> str:
 
 
 @proves("PSD1-BUS-10")
-@trial(needs={"bus"})
+@active(needs={"bus"})
 def channels_come_back_with_their_codes(s: Subject) -> str:
     """Write each channel to TEMP and SERVICE and read it back."""
     row = requirements()["PSD1-BUS-10"]
@@ -197,13 +197,13 @@ def channels_come_back_with_their_codes(s: Subject) -> str:
             line(s, f"W {address} {channel:04X}")
             got = line(s, f"R {address}").data
             if got >> bits != channel:
-                raise Broken(f"{got:04X}h at 0{address}h", f"channel {channel} above {bits} bits")
+                raise Failed(f"{got:04X}h at 0{address}h", f"channel {channel} above {bits} bits")
             seen.append(f"{got & (1 << bits) - 1:03X}h")
     return f"codes {' '.join(seen)}"
 
 
 @proves("PSD1-BUS-11")
-@trial(needs={"bus"})
+@active(needs={"bus"})
 def the_other_signals_are_there(s: Subject) -> str:
     """Read gyros, rate sensors, temperatures and service signals."""
     calm(s)
@@ -215,15 +215,15 @@ def the_other_signals_are_there(s: Subject) -> str:
         line(s, f"W B {channel:04X}")
         service.append(line(s, "R B").data & 0xFFF)
     if not service[0] or not service[1]:
-        raise Broken(f"codes of supply and reference {service[0]}, {service[1]}", "neither is 0 V")
+        raise Failed(f"codes of supply and reference {service[0]}, {service[1]}", "neither is 0 V")
     self_test = service[3]
     if self_test & 0x1F != 0x1F:
-        raise Broken(f"self-test {self_test:03X}h", "converters 0..2, coefficients and set-up: bits 0 to 4")
+        raise Failed(f"self-test {self_test:03X}h", "converters 0..2, coefficients and set-up: bits 0 to 4")
     return f"gyros {gyros}, rates {rates}, service {service}"
 
 
 @proves("PSD1-BUS-11")
-@trial(needs={"bus", "supply"})
+@active(needs={"bus", "supply"})
 def the_service_signal_follows_the_supply(s: Subject) -> str:
     """Lower the supply by a twentieth and read its code before and after."""
     row = requirements()["PSD1-BUS-11"]
@@ -241,12 +241,12 @@ def the_service_signal_follows_the_supply(s: Subject) -> str:
         supply.set(volts)
         s.run_for(0.2)
     if abs(after / max(before, 1) - row.limit("lowered_part")) > row.limit("tolerance_pct") / 100:
-        raise Broken(f"code {before}, at 95 % of the supply {after}", "95 % of it")
+        raise Failed(f"code {before}, at 95 % of the supply {after}", "95 % of it")
     return f"code {before}, at 95 % of the supply {after}"
 
 
 @proves("PSD1-BUS-12")
-@trial(needs={"bus"})
+@active(needs={"bus"})
 def gyros_are_latched_with_the_cycle(s: Subject) -> str:
     """Read the registers of gyros and rate sensors twice in a cycle; where there is a rate table it turns meanwhile."""
     table = s.bench.table if "table" in s.probes else None
@@ -260,12 +260,12 @@ def gyros_are_latched_with_the_cycle(s: Subject) -> str:
             table.stop()
     calm(s)
     if table is not None and first[:3] == later[:3]:
-        raise Broken(f"gyros {first[:3]} in two cycles of a board that turns", "counts that go on")
+        raise Failed(f"gyros {first[:3]} in two cycles of a board that turns", "counts that go on")
     return f"{first} twice in a cycle" + (f", then {later}" if table is not None else "")
 
 
 def _latched(s: Subject) -> list[int]:
-    """04h to 09h, each as it was read twice in one cycle. Raises Broken for one that no cycle shows twice alike."""
+    """04h to 09h, each as it was read twice in one cycle. Raises Failed for one that no cycle shows twice alike."""
     calm(s)
     if not has_host(s.variant):
         _waiting(s)  # for its host: this cycle lasts
@@ -277,7 +277,7 @@ def _latched(s: Subject) -> list[int]:
                 break
             s.run_for(period_s(s.variant) * (0.1 + 0.07 * attempt))  # a cycle may have passed between
         else:
-            raise Broken(f"{first}, then {again} from {text}", "the same in one cycle")
+            raise Failed(f"{first}, then {again} from {text}", "the same in one cycle")
         found.append(first)
     return found
 
@@ -292,7 +292,7 @@ def _twice(s: Subject, text: str) -> tuple[int, int]:
 
 
 @proves("PSD1-BUS-13")
-@trial(needs={"bus", "can", "table"})
+@active(needs={"bus", "can", "table"})
 def gyros_count_arc_seconds(s: Subject) -> str:
     """Turn a rate table by ten degrees and back; compare counts with its readout, and 04h to 06h with the counts."""
     row = requirements()["PSD1-BUS-13"]
@@ -310,16 +310,16 @@ def gyros_count_arc_seconds(s: Subject) -> str:
         mine = max(range(3), key=lambda k: abs(moved[k]))
         others = [abs(m) for k, m in enumerate(moved) if k != mine]
         if abs(abs(moved[mine]) - abs(due)) > most or max(others) > ASKEW * abs(due):
-            raise Broken(f"{moved} counts", f"{abs(due):.1f} +- {most:.1f} of one of them")
+            raise Failed(f"{moved} counts", f"{abs(due):.1f} +- {most:.1f} of one of them")
         seen.append((mine, moved[mine]))
         words = [c.data for c in burst(s, *OTHERS[:3])]
         off = [(c - w + modulo // 2) % modulo - modulo // 2 for c, w in zip(counts, words, strict=True)]
         if max(map(abs, off)) > row.limit("tolerance_counts"):
-            raise Broken(f"{words} at 04h to 06h", f"{counts} modulo {modulo}")
+            raise Failed(f"{words} at 04h to 06h", f"{counts} modulo {modulo}")
     table.stop()
     calm(s)
     if seen[0][0] != seen[1][0] or seen[0][1] * seen[1][1] > 0:
-        raise Broken(f"{seen[0][1]} counts one way, {seen[1][1]} the other", "signs that differ")
+        raise Failed(f"{seen[0][1]} counts one way, {seen[1][1]} the other", "signs that differ")
     return f"{seen[0][1]} and {seen[1][1]} counts of gyro {'XYZ'[seen[0][0]]} for {ANGLE_DEG:g} deg and back"
 
 
@@ -330,7 +330,7 @@ def _gyros(s: Subject) -> list[int]:
 
 
 @proves("PSD1-LATE-04")
-@trial(needs={"bus", "can"})
+@active(needs={"bus", "can"})
 def refusals_are_counted(s: Subject) -> str:
     """Strobe what is refused, and words that seldom wait; look at the counters."""
     calm(s)
@@ -339,7 +339,7 @@ def refusals_are_counted(s: Subject) -> str:
     now = s.unit.counters()
     told = now["Refused strobes"] - counters["Refused strobes"], now["Short strobes"] - counters["Short strobes"]
     if told != (refused, 2) or refused < 3:  # a word may just wait, one write and two short strobes are always refused
-        raise Broken(f"{refused} refused; counted {told[0]}, too short {told[1]}", "3 to 6, as many, 2")
+        raise Failed(f"{refused} refused; counted {told[0]}, too short {told[1]}", "3 to 6, as many, 2")
     return f"{refused} refusals counted, two of them too short"
 
 

@@ -22,10 +22,10 @@ from psabench.conform.bus_host import line, line_refused, port, refused
 from psabench.conform.capture.bus_cycles import TAIL_S
 from psabench.conform.dictionary import as_the_dictionary_says
 from psabench.conform.dut import Subject
-from psabench.conform.plan import trial
+from psabench.conform.plan import active
 from psabench.conform.proves import proves
 from psabench.conform.requirements import requirements
-from psabench.conform.verdict import Broken, TooLittle
+from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.busport import Cycle
 from psabench.link.can_host import QUANTUM_S
 
@@ -76,35 +76,35 @@ def _cycles(s: Subject, count: int) -> Readings:
     s.unit.stop()
     found = s.unit.frames.take()
     if not isinstance(found, Readings) or len(found["X"]) < 2:
-        raise Broken("no PSD1_CYCLE", f"{count} cycles")
+        raise Failed("no PSD1_CYCLE", f"{count} cycles")
     return found
 
 
 @proves("PSD1-UC-02")
-@trial(needs={"can"})
+@active(needs={"can"})
 def control_words_are_read_as_they_are(s: Subject) -> str:
     """Read 2042h and 2043h after Res."""
     calm(s)
     row = requirements()["PSD1-UC-02"]
     due = int(row.limit("uc1_code")), int(row.limit("uc2_code"))
     if _control(s) != due:
-        raise Broken("{:06X}h, {:06X}h".format(*_control(s)), "{:06X}h, {:06X}h".format(*due))
+        raise Failed("{:06X}h, {:06X}h".format(*_control(s)), "{:06X}h, {:06X}h".format(*due))
     return "UC1 {:06X}h, UC2 {:06X}h".format(*due)
 
 
 @proves("PSD1-SETUP-01")
-@trial(needs={"can"})
+@active(needs={"can"})
 def coefficients_are_kept(s: Subject) -> str:
     """Read 2044h and 2045h after the set-up, twice."""
     calm(s)
     first, again = _coefficients(s), _coefficients(s)
     if not all(first) or first != again:
-        raise Broken(f"{first}, then {again}", "six that are not 0, and the same again")
+        raise Failed(f"{first}, then {again}", "six that are not 0, and the same again")
     return f"zero {first[:3]}, full scale {first[3:]}"
 
 
 @proves("PSD1-SETUP-01")
-@trial(needs={"bus", "can"})
+@active(needs={"bus", "can"})
 def coefficients_are_shown_on_the_bus(s: Subject) -> str:
     """Read the six by COMMAND, UC_HIGH and UC_LOW, and compare them with 2044h and 2045h."""
     calm(s)
@@ -112,12 +112,12 @@ def coefficients_are_shown_on_the_bus(s: Subject) -> str:
         line(s, f"W E {command:X}")
         got = line(s, "R C").data << 16 | line(s, "R D").data
         if got != due:
-            raise Broken(f"{got:06X}h by COMMAND {command:02X}h", f"{due:06X}h as on CAN")
+            raise Failed(f"{got:06X}h by COMMAND {command:02X}h", f"{due:06X}h as on CAN")
     return "six by COMMAND as on CAN"
 
 
 @proves("PSD1-SETUP-04")
-@trial(needs={"can"})
+@active(needs={"can"})
 def converters_are_in_step_after_res(s: Subject) -> str:
     """Press Res at six instants of a period and look at what each converter lost in the cycles that follow."""
     seen = []
@@ -131,15 +131,15 @@ def converters_are_in_step_after_res(s: Subject) -> str:
         stretched = now["Stretched cycles"] - before["Stretched cycles"]
         # A host that is late in real time: a cycle in which a conversion ends loses it for the words still to come.
         if max(lost) - min(lost) > (0 if s.lockstep else stretched):
-            raise Broken(f"lost X, Y, Z {lost}, {stretched} cycles stretched", "all alike but for those")
+            raise Failed(f"lost X, Y, Z {lost}, {stretched} cycles stretched", "all alike but for those")
         if has_host(s.variant) and (lost[0] or stretched):
-            raise Broken(f"lost X, Y, Z {lost}, or a conversion inside a cycle", "none")
+            raise Failed(f"lost X, Y, Z {lost}, or a conversion inside a cycle", "none")
         seen.append(lost[0])
     return f"six times, lost words of X: {seen}, as many of the others"
 
 
 @proves("PSD1-UC-03")
-@trial(needs={"can"})
+@active(needs={"can"})
 def uc1_calibrates_anew(s: Subject) -> str:
     """Write 2042h and 2043h as they are, look at the coefficients and at the time that each answer takes."""
     calm(s)
@@ -153,17 +153,17 @@ def uc1_calibrates_anew(s: Subject) -> str:
         took.append(s.bench.time_s - begun_s)
     after = _coefficients(s)
     if before == after:
-        raise Broken(f"coefficients {before} before and after", "new ones")
+        raise Failed(f"coefficients {before} before and after", "new ones")
     if s.lockstep and took[0] > most_s:
-        raise Broken(f"an answer after {took[0] * 1e3:.1f} ms", f"{most_s * 1e3:.1f} ms at most")
+        raise Failed(f"an answer after {took[0] * 1e3:.1f} ms", f"{most_s * 1e3:.1f} ms at most")
     if s.lockstep and took[0] < row.limit("answer_min_periods") * period_s(s.variant):
-        raise Broken(f"an answer after {took[0] * 1e3:.1f} ms", "when the calibration is done")
+        raise Failed(f"an answer after {took[0] * 1e3:.1f} ms", "when the calibration is done")
     calm(s)
     return f"answers after {took[0] * 1e3:.1f} and {took[1] * 1e3:.1f} ms, six new coefficients"
 
 
 @proves("PSD1-UC-04")
-@trial(needs={"can"})
+@active(needs={"can"})
 def control_words_that_cannot_be_are_refused(s: Subject) -> str:
     """Write WL, PD, codes out of range, UC1 without and UC2 with a calibration."""
     row = requirements()["PSD1-UC-04"]
@@ -185,15 +185,15 @@ def control_words_that_cannot_be_are_refused(s: Subject) -> str:
     for index, value in wrong:
         refused(lambda i=index, v=value: s.unit.node.write(i, 0, v), code, f"{value:06X}h to {index:04X}h")  # type: ignore[misc]
         if not s.unit.refusal():
-            raise Broken(f"no reason in 2031h after {value:06X}h to {index:04X}h", "one in words")
+            raise Failed(f"no reason in 2031h after {value:06X}h to {index:04X}h", "one in words")
     if _control(s) != (uc1, uc2):
-        raise Broken("{:06X}h, {:06X}h".format(*_control(s)), "the control words as before")
+        raise Failed("{:06X}h, {:06X}h".format(*_control(s)), "the control words as before")
     _cycles(s, 4)
     return f"{len(wrong)} control words refused, each with its reason"
 
 
 @proves("PSD1-UC-05")
-@trial(needs={"bus"})
+@active(needs={"bus"})
 def commands_come_one_after_the_other(s: Subject) -> str:
     """Write COMMAND 1 twice."""
     calm(s)
@@ -210,13 +210,13 @@ def commands_come_one_after_the_other(s: Subject) -> str:
         told = port(s).answer()
         busy = told.data if isinstance(told, Cycle) else 0
     if not busy & 0x8000:
-        raise Broken(f"COMMAND {busy:04X}h", "bit 15, under way")
+        raise Failed(f"COMMAND {busy:04X}h", "bit 15, under way")
     calm(s)
     return "the second is refused while the first is under way"
 
 
 @proves("PSD1-UC-06")
-@trial(needs={"bus", "can"})
+@active(needs={"bus", "can"})
 def a_command_cuts_a_cycle_that_waits(s: Subject) -> str:
     """Write 2043h while X waits for a host, look at Cut cycles and at the time."""
     calm(s)
@@ -229,15 +229,15 @@ def a_command_cuts_a_cycle_that_waits(s: Subject) -> str:
     took_s = s.bench.time_s - begun_s
     cut = int(s.unit.node.read(COUNTERS, 24)) - before
     if cut != 1:
-        raise Broken(f"{cut} cycles cut", "1")
+        raise Failed(f"{cut} cycles cut", "1")
     if s.lockstep and took_s < patience_s:
-        raise Broken(f"an answer after {took_s * 1e3:.2f} ms", f"{patience_s * 1e3:g} ms of patience first")
+        raise Failed(f"an answer after {took_s * 1e3:.2f} ms", f"{patience_s * 1e3:g} ms of patience first")
     calm(s)
     return f"one cycle cut, answer after {took_s * 1e3:.1f} ms"
 
 
 @proves("PSD1-UC-07")
-@trial(needs={"can"})
+@active(needs={"can"})
 def control_words_are_read_back(s: Subject) -> str:
     """Read 2046h and compare it with 2043h, some cycles after the set-up and with another code."""
     calm(s)
@@ -248,13 +248,13 @@ def control_words_are_read_back(s: Subject) -> str:
             s.unit.node.write(UC2, 0, value)
         got = [int(s.unit.node.read(IN_CONVERTERS, k)) for k in AXES]
         if got != [value & ~MODE_MASK] * 3:
-            raise Broken(f"{[f'{g:06X}h' for g in got]}", f"{value & ~MODE_MASK:06X}h three times")
+            raise Failed(f"{[f'{g:06X}h' for g in got]}", f"{value & ~MODE_MASK:06X}h three times")
     calm(s)
     return f"as set up {STAYS} cycles later, another as written"
 
 
 @proves("PSD1-CHIP-01")
-@trial(needs={"can", "inputs"})
+@active(needs={"can", "inputs"})
 def the_gain_is_where_the_table_has_it(s: Subject) -> str:
     """Set gain 2 by G2..0 in both control words and compare the words with those of gain 1."""
     calm(s)
@@ -266,10 +266,10 @@ def the_gain_is_where_the_table_has_it(s: Subject) -> str:
     row = requirements()["PSD1-CHIP-01"]
     wide = [k for k in range(3) if abs(one[k]) > row.limit("input_min_codes")]
     if not wide:
-        raise TooLittle(f"expected inputs of {row.limit('input_min_codes'):g} codes and more")
+        raise Inconclusive(f"expected inputs of {row.limit('input_min_codes'):g} codes and more")
     for k in wide:
         if abs(two[k] - 2 * one[k]) > row.limit("tolerance_codes"):
-            raise Broken(f"{one[k]:.0f} codes on {'XYZ'[k]}, with gain 2 {two[k]:.0f}", "twice as many")
+            raise Failed(f"{one[k]:.0f} codes on {'XYZ'[k]}, with gain 2 {two[k]:.0f}", "twice as many")
     return f"codes {', '.join(f'{v:.0f}' for v in one)}, with gain 2 {', '.join(f'{v:.0f}' for v in two)}"
 
 
@@ -284,7 +284,7 @@ def _set(s: Subject, bits: int) -> None:
 
 
 @proves("PSD1-CHIP-02")
-@trial(needs={"can", "pins"})
+@active(needs={"can", "pins"})
 def the_rate_is_that_of_the_code(s: Subject) -> str:
     """Set codes 19, 100, 195 and 2000 and measure from fall to fall of DR."""
     row = requirements()["PSD1-CHIP-02"]
@@ -297,43 +297,43 @@ def the_rate_is_that_of_the_code(s: Subject) -> str:
         with s.take() as take:
             s.run_for(3.3 * due_s)
         if take.lines is None or "DR" not in take.lines:
-            raise TooLittle("the recording has no line DR")
+            raise Inconclusive("the recording has no line DR")
         took_ns = np.diff(take.lines.falls("DR"))
         slack_ns = due_s * 1e3 * row.limit("clock_error_ppm") + 2 * take.lines.resolution_ns
         if not len(took_ns) or np.abs(took_ns - due_s * 1e9).max() > slack_ns:
-            raise Broken(f"{took_ns.tolist()} ns from DR to DR with code {code}", f"{due_s * 1e9:.0f} ns")
+            raise Failed(f"{took_ns.tolist()} ns from DR to DR with code {code}", f"{due_s * 1e9:.0f} ns")
         seen.append(f"{code}: {took_ns.mean() * 1e-3:.1f} us")
     calm(s)
     return ", ".join(seen)
 
 
 @proves("PSD1-WORD-03")
-@trial(needs={"can", "inputs"})
+@active(needs={"can", "inputs"})
 def words_beyond_full_scale_are_marked(s: Subject) -> str:
     """Set gain 16, which makes the inputs larger than full scale, and look at words and CLIP."""
     row = requirements()["PSD1-WORD-03"]
     full_v = requirements()["PSD1-WORD-01"].limit("full_scale_v") / (1 << CLIP_GAIN)
     beyond = {a: v for a, v in s.inputs_v.items() if abs(v) > (1 + row.limit("margin_pct") / 100) * full_v}
     if not any(v > 0 for v in beyond.values()) or not any(v < 0 for v in beyond.values()):
-        raise TooLittle(f"expected an input beyond {full_v:g} V and one below -{full_v:g} V")
+        raise Inconclusive(f"expected an input beyond {full_v:g} V and one below -{full_v:g} V")
     calm(s)
     plain = _cycles(s, 6)
     _set(s, CLIP_GAIN << GAIN_SHIFT)
     words = _cycles(s, 6)
     calm(s)
     if np.any(plain["CLIP"]):
-        raise Broken("CLIP with words within full scale", "0")
+        raise Failed("CLIP with words within full scale", "0")
     for axis, volts in beyond.items():
         due = int(row.limit("code_max" if volts > 0 else "code_min"))
         if np.any(words[axis.upper()][1:] != due):
-            raise Broken(f"{int(words[axis.upper()][-1]):04X}h on {axis.upper()}", f"{due:04X}h")
+            raise Failed(f"{int(words[axis.upper()][-1]):04X}h on {axis.upper()}", f"{due:04X}h")
     if not np.all(words["CLIP"][1:]):
-        raise Broken("CLIP 0 with words at their limit", "1")
+        raise Failed("CLIP 0 with words at their limit", "1")
     return f"{', '.join(beyond)} at their limits, CLIP 1"
 
 
 @proves("PSD1-WORD-03")
-@trial(needs={"can", "inputs"})
+@active(needs={"can", "inputs"})
 def a_word_at_0_alone_is_marked(s: Subject) -> str:
     """Make the converters unipolar: negative inputs give 0000h, positive ones lie within, and CLIP is."""
     row, zero = requirements()["PSD1-WORD-03"], requirements()["PSD1-WORD-01"]
@@ -341,7 +341,7 @@ def a_word_at_0_alone_is_marked(s: Subject) -> str:
     below = [a for a, v in s.inputs_v.items() if v < -least_v]
     within = [a for a, v in s.inputs_v.items() if least_v < v < zero.limit("full_scale_v") - least_v]
     if not below or len(below) + len(within) != len("xyz"):
-        raise TooLittle(f"expected inputs of more than {least_v:g} V either way, one of them negative")
+        raise Inconclusive(f"expected inputs of more than {least_v:g} V either way, one of them negative")
     calm(s)
     uc1, uc2 = _control(s)
     s.unit.node.write(UC1, 0, uc1 | UNIPOLAR)
@@ -350,14 +350,14 @@ def a_word_at_0_alone_is_marked(s: Subject) -> str:
     calm(s)
     low = [a for a in below if np.any(words[a.upper()][1:] != row.limit("code_min"))]
     if low or not all(0 < int(w) < row.limit("code_max") for a in within for w in words[a.upper()][1:]):
-        raise Broken(f"{[f'{int(words[a][-1]):04X}h' for a in 'XYZ']}", f"0000h on {', '.join(below)} alone")
+        raise Failed(f"{[f'{int(words[a][-1]):04X}h' for a in 'XYZ']}", f"0000h on {', '.join(below)} alone")
     if not np.all(words["CLIP"][1:]):
-        raise Broken("CLIP 0 with a word at 0000h", "1")
+        raise Failed("CLIP 0 with a word at 0000h", "1")
     return f"0000h on {', '.join(below)} alone, CLIP 1"
 
 
 @proves("PSD1-LATE-01")
-@trial(needs={"bus", "can", "line", "lockstep"})
+@active(needs={"bus", "can", "line", "lockstep"})
 def late_begins_at_its_time(s: Subject) -> str:
     """Read words sooner and later; count the strobes that the lines show to begin too long after FL2."""
     row = requirements()["PSD1-LATE-01"]
@@ -373,16 +373,16 @@ def late_begins_at_its_time(s: Subject) -> str:
         line(s, "W F 0000")
         s.run_for(TAIL_S)
     told = int(s.unit.node.read(COUNTERS, 16)) - before
-    words = transfers(s.evidence("late", take))
+    words = transfers(s.capture("late", take))
     waited = of(words, "cs_fall") - of(words, "fl2")
     slack_ns = 0.0 if take.lines is None else take.lines.resolution_ns
     sure, may = int((waited > late_ns + slack_ns).sum()), int((waited > late_ns - slack_ns).sum())
     near = np.abs(waited - late_ns) < late_ns / 2
     if not (near & (waited > late_ns)).any() or not (near & (waited < late_ns)).any():
-        raise TooLittle(f"strobes {waited.min()} to {waited.max()} ns after FL2; expected some about {late_ns:g} ns")
+        raise Inconclusive(f"strobes {waited.min()} to {waited.max()} ns after FL2; expected some about {late_ns:g} ns")
     calm(s)
     if not sure <= told <= may:
-        raise Broken(f"{told} late strobes counted", f"{sure}, those later than {late_ns:g} ns", lines=LINES)
+        raise Failed(f"{told} late strobes counted", f"{sure}, those later than {late_ns:g} ns", lines=LINES)
     return f"{told} of {len(waited)} strobes late, {waited.min()} to {waited.max()} ns after FL2"
 
 
@@ -396,7 +396,7 @@ def _word_after(s: Subject, axis: int, wait_s: float) -> None:
 
 
 @proves("PSD1-LATE-01")
-@trial(needs={"bus", "can"})
+@active(needs={"bus", "can"})
 def late_strobes_are_told(s: Subject) -> str:
     """Read words as they come, then some 0.2 ms late; look at LATE and Late strobes."""
     late_s = requirements()["PSD1-LATE-01"].limit("late_ns") * 1e-9
@@ -409,10 +409,10 @@ def late_strobes_are_told(s: Subject) -> str:
     cycles = s.unit.frames.take()
     told = int(s.unit.node.read(COUNTERS, 16)) - before
     if not isinstance(cycles, Readings) or not np.all(cycles["LATE"]) or told != strobes:
-        raise Broken(f"{told} late strobes counted", f"LATE in each cycle, {strobes} counted")
+        raise Failed(f"{told} late strobes counted", f"LATE in each cycle, {strobes} counted")
     status = line(s, "R 3").data
     if not status & 1 << 11:
-        raise Broken(f"STATUS {status:04X}h", "bit 11, late")
+        raise Failed(f"STATUS {status:04X}h", "bit 11, late")
     calm(s)
     return f"LATE in {len(cycles['LATE'])} cycles, {told} late strobes counted"
 
@@ -440,24 +440,24 @@ def _stay_away(s: Subject) -> tuple[Readings, dict[str, int]]:
     cycles, after = s.unit.frames.take(), _counted(s)
     calm(s)
     if not isinstance(cycles, Readings) or len(cycles["MIXED"]) != 4:
-        raise Broken("not four cycles on CAN", "four")
+        raise Failed("not four cycles on CAN", "four")
     return cycles, {k: after[k] - before[k] for k in after}
 
 
 @proves("PSD1-LATE-02")
-@trial(needs={"bus", "can"})
+@active(needs={"bus", "can"})
 def a_stretched_cycle_is_told(s: Subject) -> str:
     """Leave X unread for five periods, look at MIXED and Stretched cycles."""
     cycles, counted = _stay_away(s)
     mixed = [int(v) for v in cycles["MIXED"]]
     hasty = any(mixed[:2]) if s.lockstep else False  # elsewhere no one knows how long our own reading takes
     if mixed[2] != 1 or hasty or counted["Stretched cycles"] < 1:
-        raise Broken(f"MIXED {mixed}, {counted['Stretched cycles']} counted", "1 in the third, counted")
+        raise Failed(f"MIXED {mixed}, {counted['Stretched cycles']} counted", "1 in the third, counted")
     return f"MIXED {mixed}, {counted['Stretched cycles']} counted"
 
 
 @proves("PSD1-LATE-03")
-@trial(needs={"bus", "can"})
+@active(needs={"bus", "can"})
 def lost_conversions_are_told(s: Subject) -> str:
     """Leave X unread for five periods, look at OVERRUN and Lost X, Y, Z."""
     cycles, counted = _stay_away(s)
@@ -467,12 +467,12 @@ def lost_conversions_are_told(s: Subject) -> str:
     apart = max(lost) - min(lost)
     hasty = bool(overrun[1]) if s.lockstep else False
     if overrun[2] != 1 or hasty or min(lost) < row.limit("lost_min") or apart > row.limit("apart_max"):
-        raise Broken(f"OVERRUN {overrun}, lost {lost}", "1 in the third, five or more lost of each")
+        raise Failed(f"OVERRUN {overrun}, lost {lost}", "1 in the third, five or more lost of each")
     return f"OVERRUN {overrun}, lost {lost}"
 
 
 @proves("PSD1-CAN-02")
-@trial(needs={"can"})
+@active(needs={"can"})
 def messages_tell_what_their_objects_hold(s: Subject) -> str:
     """Switch all messages on, let cycles end, and compare the last with 2200h, 2202h, 2203h and 2204h."""
     calm(s)
@@ -485,34 +485,34 @@ def messages_tell_what_their_objects_hold(s: Subject) -> str:
         s.run_for(2 * period_s(s.variant))
         s.unit.stop()
     held = {index: [int(node.read(index, k)) for k in range(1, n + 1)] for index, n in HELD.items()}
-    e = s.evidence("messages", take)
+    e = s.capture("messages", take)
     last = {}
     for name in MAPPED:
         log = e.frames_of(name)
         if not len(log):
-            raise Broken(f"no {name}", "one for each cycle")
+            raise Failed(f"no {name}", "one for each cycle")
         last[name] = {k: int(v[-1]) for k, v in log.raw(name).items()}
     calm(s)
     for name, objects in MAPPED.items():
         for signal, (index, sub) in objects.items():
             if last[name][signal] != held[index][sub - 1]:
-                raise Broken(f"{signal} {last[name][signal]} in {name}", f"{held[index][sub - 1]}, {index:04X}h:{sub}")
+                raise Failed(f"{signal} {last[name][signal]} in {name}", f"{held[index][sub - 1]}, {index:04X}h:{sub}")
     return f"{sum(map(len, MAPPED.values()))} signals as their objects hold them"
 
 
 @proves("PSD1-CAN-07")
-@trial(needs={"can"})
+@active(needs={"can"})
 def the_board_says_what_it_is(s: Subject) -> str:
     """Read 1008h and 1018h sub 2."""
     name, code = s.unit.node.read(OD.DEVICE_NAME), int(s.unit.node.read(OD.IDENTITY, 2))
     due = int(requirements()["PSD1-CAN-07"].limit("product_code"))
     if (name, code) != ("PSD-1", due):
-        raise Broken(f"{name}, {code:08X}h", f"PSD-1, {due:08X}h")
+        raise Failed(f"{name}, {code:08X}h", f"PSD-1, {due:08X}h")
     return f"{name}, {code:08X}h"
 
 
 @proves("PSD1-CAN-08")
-@trial(needs={"can"})
+@active(needs={"can"})
 def objects_are_as_the_dictionary_says(s: Subject) -> str:
     """Read every object of the EDS and write where nothing may be written."""
     calm(s)

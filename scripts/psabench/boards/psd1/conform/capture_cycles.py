@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from psabench.conform.capture.intervals import wires_needed
-from psabench.conform.capture.log import Evidence
-from psabench.conform.verdict import Broken, TooLittle
+from psabench.conform.capture.log import Capture
+from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.signals import Ints
 
 FRAMES = ("RFX", "RFY", "RFZ")
@@ -35,13 +35,13 @@ class Transfer:
     cs_rise: int
 
 
-def fl2_level(e: Evidence) -> int:
+def fl2_level(e: Capture) -> int:
     """The level that says "a word waits" in this profile."""
     return 0 if e.variant["fl2"] == "low" else 1
 
 
-def transfers(e: Evidence) -> list[Transfer]:
-    """All words in their order, whole ones. Raises TooLittle where a line or words are missing."""
+def transfers(e: Capture) -> list[Transfer]:
+    """All words in their order, whole ones. Raises Inconclusive where a line or words are missing."""
     wires_needed(e, *LINES)
     log = e.wires.unbroken()
     active = fl2_level(e)
@@ -78,20 +78,20 @@ def transfers(e: Evidence) -> list[Transfer]:
     if found and found[-1].clear < 0:
         found.pop()  # the recording ends in it
     if len(found) < 3 * LEAST:
-        raise TooLittle(f"{len(found)} words were read in the recording; expected {3 * LEAST}")
+        raise Inconclusive(f"{len(found)} words were read in the recording; expected {3 * LEAST}")
     return found
 
 
-def trouble(words: Sequence[Transfer]) -> Broken | None:
+def trouble(words: Sequence[Transfer]) -> Failed | None:
     """What keeps words from being cycles X, Y, Z of 16 bits with an FL2 each; None: nothing."""
     for k, t in enumerate(words):
         if t.axis != k % 3:
-            return Broken(f"{FRAMES[t.axis]} low", f"{FRAMES[k % 3]}: X, Y, Z in turn", at_ns=t.fall, lines=LINES)
+            return Failed(f"{FRAMES[t.axis]} low", f"{FRAMES[k % 3]}: X, Y, Z in turn", at_ns=t.fall, lines=LINES)
         if t.clear < 0 or t.fl2 < 0:
             saw = "no FL2 after a word" if t.fl2 < 0 else "an FL2 that is not cleared"
-            return Broken(saw, "FL2 set, read and cleared", at_ns=t.rise, lines=LINES)
+            return Failed(saw, "FL2 set, read and cleared", at_ns=t.rise, lines=LINES)
         if len(t.rises) != BITS or len(t.falls) != BITS:
-            return Broken(f"{len(t.rises)} pulses of SCLK", f"{BITS}", at_ns=t.fall, lines=LINES)
+            return Failed(f"{len(t.rises)} pulses of SCLK", f"{BITS}", at_ns=t.fall, lines=LINES)
     return None
 
 
@@ -100,14 +100,14 @@ def from_x(words: list[Transfer]) -> list[Transfer]:
     return words[next((k for k, t in enumerate(words) if t.axis == 0), 0) :]
 
 
-def cycles(e: Evidence) -> list[tuple[Transfer, Transfer, Transfer]]:
-    """Whole cycles X, Y, Z. Raises TooLittle where words make none, which the tests of that requirement tell."""
+def cycles(e: Capture) -> list[tuple[Transfer, Transfer, Transfer]]:
+    """Whole cycles X, Y, Z. Raises Inconclusive where words make none, which the tests of that requirement tell."""
     words = from_x(transfers(e))
     if found := trouble(words):
-        raise TooLittle(f"no whole cycles to measure: {found.saw}")
+        raise Inconclusive(f"no whole cycles to measure: {found.saw}")
     whole = [(words[k], words[k + 1], words[k + 2]) for k in range(0, len(words) - 2, 3)]
     if len(whole) < LEAST:
-        raise TooLittle(f"{len(whole)} whole cycles were recorded; expected {LEAST}")
+        raise Inconclusive(f"{len(whole)} whole cycles were recorded; expected {LEAST}")
     return whole
 
 
@@ -116,7 +116,7 @@ def of(words: Sequence[Transfer], name: str) -> Ints:
     return np.array([getattr(t, name) for t in words], np.int64)
 
 
-def serial_words(e: Evidence, words: Sequence[Transfer]) -> Ints:
+def serial_words(e: Capture, words: Sequence[Transfer]) -> Ints:
     """(n,) what stood on SDAT at the rises of SCLK, most significant bit first."""
     at_ns = np.array([t.rises for t in words], np.int64).reshape(-1, BITS)
     levels = e.wires["SDAT"].at(at_ns).astype(np.int64)
@@ -124,14 +124,14 @@ def serial_words(e: Evidence, words: Sequence[Transfer]) -> Ints:
     return made
 
 
-def starts(e: Evidence, whole: Sequence[tuple[Transfer, Transfer, Transfer]]) -> Ints:
-    """(n,) the rise of A0 of each cycle: the last before RFX falls. Raises Broken where there is none."""
+def starts(e: Capture, whole: Sequence[tuple[Transfer, Transfer, Transfer]]) -> Ints:
+    """(n,) the rise of A0 of each cycle: the last before RFX falls. Raises Failed where there is none."""
     wires_needed(e, "A0", "CLK_1M25")
     rises = e.wires.rises("A0")
     falls = np.array([c[0].fall for c in whole], np.int64)
     k = np.searchsorted(rises, falls, "right") - 1
     if not len(rises) or (k < 0).any():
-        raise Broken("RFX low without a rise of A0 before it", "A0 = 1", at_ns=int(falls[0]), lines=("A0", "RFX", "DR"))
+        raise Failed("RFX low without a rise of A0 before it", "A0 = 1", at_ns=int(falls[0]), lines=("A0", "RFX", "DR"))
     found: Ints = rises[k]
     return found
 

@@ -5,31 +5,31 @@ from __future__ import annotations
 import numpy as np
 
 from psabench.boards.psd1.conform.host import BEGUN
-from psabench.conform.capture.log import CanLog, Evidence
+from psabench.conform.capture.log import CanLog, Capture
 from psabench.conform.capture.messages import as_laid_out
 from psabench.conform.plan import check
 from psabench.conform.proves import proves, row_for
-from psabench.conform.verdict import Broken, TooLittle
+from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.protocol_files import message
 from psabench.link.signals import Floats
 
 ALL = ("PSD1_CYCLE", *BEGUN)
 
 
-def _told(e: Evidence, name: str, least: int = 3) -> CanLog:
+def _told(e: Capture, name: str, least: int = 3) -> CanLog:
     log = e.frames_of(name)
     if len(log) < least:
-        raise TooLittle(f"{len(log)} messages {name} came; expected {least}")
+        raise Inconclusive(f"{len(log)} messages {name} came; expected {least}")
     due = int(message(name).length)
     bad = [f for f in log.frames if len(f.data) != due]
     if bad:
-        raise Broken(f"{name} of {len(bad[0].data)} bytes", f"{due}", frames=bad)
+        raise Failed(f"{name} of {len(bad[0].data)} bytes", f"{due}", frames=bad)
     return log
 
 
 @proves("PSD1-CAN-02")
 @check("messages", needs={"can"})
-def messages_have_their_lengths(e: Evidence) -> str:
+def messages_have_their_lengths(e: Capture) -> str:
     """Look at the lengths of the four messages, and at bits that have no signal."""
     for name in ALL:
         _told(e, name)
@@ -38,16 +38,16 @@ def messages_have_their_lengths(e: Evidence) -> str:
 
 @proves("PSD1-CAN-03")
 @check("messages", needs={"can"})
-def cnt_rises_by_one(e: Evidence) -> str:
+def cnt_rises_by_one(e: Capture) -> str:
     """Look at CNT of PSD1_CYCLE from cycle to cycle, and in all messages of a cycle."""
     modulo = int(row_for(e, "PSD1-CAN-03").limit("modulo"))
     log = _told(e, "PSD1_CYCLE")
     cnt = log.raw("PSD1_CYCLE")["CNT"]
     parts = np.flatnonzero(np.diff(cnt) % modulo != 1)
-    allowed = 1  # between the two stretches of the scene
+    allowed = 1  # between the two stretches of the stimulus
     if len(parts) > allowed:
         k = int(parts[0])
-        raise Broken(f"CNT {cnt[k]}, then {cnt[k + 1]}", "one more", frames=log.frames[k : k + 2])
+        raise Failed(f"CNT {cnt[k]}, then {cnt[k + 1]}", "one more", frames=log.frames[k : k + 2])
     latest = -1
     names = {_told(e, name, 1).frames[0].can_id: name for name in ALL}
     for f in e.can.frames:
@@ -58,39 +58,39 @@ def cnt_rises_by_one(e: Evidence) -> str:
         if name == "PSD1_CYCLE":
             latest = number
         elif latest >= 0 and number != latest:
-            raise Broken(f"CNT {number} in {name} after {latest} in PSD1_CYCLE", "the same", frames=(f,))
+            raise Failed(f"CNT {number} in {name} after {latest} in PSD1_CYCLE", "the same", frames=(f,))
     return f"{len(cnt)} cycles, CNT {cnt[0]} to {cnt[-1]}"
 
 
 @proves("PSD1-CAN-04")
 @check("messages", needs={"can"})
-def further_messages_are_off_until_wanted(e: Evidence) -> str:
+def further_messages_are_off_until_wanted(e: Capture) -> str:
     """Look for PSD1_TIME, PSD1_GYRO and PSD1_RATE before and after they were switched on."""
     before = int(str(e.facts.get("before", 0)))
     early = CanLog(frames=e.can.frames[:before])
     for name in BEGUN:
         stray = early.of(name, e.variant.family, e.node)
         if len(stray):
-            raise Broken(f"{name} before it was switched on", "none", frames=stray.frames)
+            raise Failed(f"{name} before it was switched on", "none", frames=stray.frames)
         if not len(e.frames_of(name)):
-            raise Broken(f"no {name} after it was switched on", "one for each cycle")
+            raise Failed(f"no {name} after it was switched on", "one for each cycle")
     return "none before, all three after"
 
 
 @proves("PSD1-CAN-05")
 @check("messages", needs={"can"})
-def strobes_are_told(e: Evidence) -> str:
+def strobes_are_told(e: Capture) -> str:
     """Look at READ_X, READ_Y and READ_Z of complete cycles."""
     log = _told(e, "PSD1_CYCLE")
     raw = log.raw("PSD1_CYCLE")
     for axis in "XYZ":
         bad = np.flatnonzero(raw[f"READ_{axis}"] != 1)
         if len(bad):
-            raise Broken(f"READ_{axis} 0", "1", frames=(log.frames[int(bad[0])],))
+            raise Failed(f"READ_{axis} 0", "1", frames=(log.frames[int(bad[0])],))
     return f"{len(log)} cycles, all three read"
 
 
-def volts(e: Evidence, log: CanLog) -> Floats:
+def volts(e: Capture, log: CanLog) -> Floats:
     """(n, 3) by the words of PSD1_CYCLE."""
     row = row_for(e, "PSD1-WORD-01")
     raw = log.raw("PSD1_CYCLE")
@@ -100,20 +100,20 @@ def volts(e: Evidence, log: CanLog) -> Floats:
 
 @proves("PSD1-WORD-01")
 @check("words", needs={"can", "inputs"})
-def words_are_offset_binary(e: Evidence) -> str:
+def words_are_offset_binary(e: Capture) -> str:
     """Compare the means of many words with the volts at the inputs."""
     row, v = row_for(e, "PSD1-WORD-01"), volts(e, _told(e, "PSD1_CYCLE", 16))
     quiet = e.variant.profile == "psd1_quiet"
     most_v = row.limit("quiet_tolerance_pct" if quiet else "tolerance_pct") / 100 * row.limit("full_scale_v")
     for axis, mean in zip("xyz", v.mean(axis=0), strict=True):
         if axis in e.inputs_v and abs(mean - e.inputs_v[axis]) > most_v:
-            raise Broken(f"{mean:.4f} V on {axis.upper()}", f"{e.inputs_v[axis]:g} +- {most_v:.4f} V")
+            raise Failed(f"{mean:.4f} V on {axis.upper()}", f"{e.inputs_v[axis]:g} +- {most_v:.4f} V")
     return f"{len(v)} words, means {', '.join(f'{m:.4f}' for m in v.mean(axis=0))} V"
 
 
 @proves("PSD1-CHIP-04")
 @check("words", needs={"can", "inputs"})
-def noise_is_that_of_the_table(e: Evidence) -> str:
+def noise_is_that_of_the_table(e: Capture) -> str:
     """Take the standard deviation of a thousand words of each axis."""
     row = row_for(e, "PSD1-CHIP-04")
     v = volts(e, _told(e, "PSD1_CYCLE", int(row.limit("readings_count"))))
@@ -121,5 +121,5 @@ def noise_is_that_of_the_table(e: Evidence) -> str:
     due, part = row.limit("noise_mv"), row.limit("tolerance_pct") / 100
     for axis, mv in zip("XYZ", noise_mv, strict=True):
         if abs(mv / due - 1) > part:
-            raise Broken(f"{mv:.2f} mV rms on {axis}", f"{due:g} mV +- {part:.0%}")
+            raise Failed(f"{mv:.2f} mV rms on {axis}", f"{due:g} mV +- {part:.0%}")
     return f"{len(v)} words, {', '.join(f'{m:.2f}' for m in noise_mv)} mV rms"

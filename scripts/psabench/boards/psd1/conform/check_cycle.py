@@ -20,10 +20,10 @@ from psabench.boards.psd1.conform.capture_cycles import (
     trouble,
 )
 from psabench.conform.capture.intervals import after, before, edges, first_bad, interval, together, wires_needed
-from psabench.conform.capture.log import Evidence
+from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import proves, row_for
-from psabench.conform.verdict import Broken, TooLittle
+from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.signals import Ints
 
 START = ("CLK_1M25", "INT0", "FL1", "DR", "A0", "RFX")
@@ -33,7 +33,7 @@ RATES = ("PSD1-CYC-12", "PSD1-CYC-13")
 
 @proves("PSD1-CYC-01")
 @check("stream", needs={"line"})
-def words_are_read_in_turn(e: Evidence) -> str:
+def words_are_read_in_turn(e: Capture) -> str:
     """Follow RFX, RFY, RFZ and the strobe that takes each word before the next transfer."""
     words = from_x(transfers(e))
     if found := trouble(words):
@@ -47,7 +47,7 @@ def words_are_read_in_turn(e: Evidence) -> str:
 
 @proves("PSD1-CYC-02")
 @check("stream", needs={"pins"})
-def a_cycle_begins_with_its_three_conditions(e: Evidence) -> str:
+def a_cycle_begins_with_its_three_conditions(e: Capture) -> str:
     """Look at INT0, FL1 and DR just before each rise of A0."""
     wires_needed(e, *START)
     at_ns = starts(e, cycles(e))
@@ -60,7 +60,7 @@ def a_cycle_begins_with_its_three_conditions(e: Evidence) -> str:
 
 @proves("PSD1-CYC-03")
 @check("stream", needs={"pins"})
-def a0_rises_with_the_clock(e: Evidence) -> str:
+def a0_rises_with_the_clock(e: Capture) -> str:
     """Compare each rise of A0 with the rises of 1M25."""
     at_ns = starts(e, cycles(e))
     return together(
@@ -75,7 +75,7 @@ def a0_rises_with_the_clock(e: Evidence) -> str:
 
 @proves("PSD1-CYC-04")
 @check("stream", needs={"pins"})
-def a0_rises_with_the_first_clock_that_it_can(e: Evidence) -> str:
+def a0_rises_with_the_first_clock_that_it_can(e: Capture) -> str:
     """Look whether the rise of 1M25 before that of A0 came too early for all conditions."""
     wires_needed(e, *START)
     whole = cycles(e)
@@ -91,14 +91,14 @@ def a0_rises_with_the_first_clock_that_it_can(e: Evidence) -> str:
     return f"{len(at_ns) - 1} cycles, A0 {waited[1:].min()} to {waited[1:].max()} ns after the last condition"
 
 
-def _held(e: Evidence) -> tuple[Ints, Ints, Ints]:
+def _held(e: Capture) -> tuple[Ints, Ints, Ints]:
     """Edges at which each condition became true."""
     return e.wires.rises("INT0"), e.wires.falls("FL1"), e.wires.falls("DR")
 
 
 @proves("PSD1-CYC-06")
 @check("stream", needs={"pins"})
-def rfx_falls_half_a_clock_after_a0(e: Evidence) -> str:
+def rfx_falls_half_a_clock_after_a0(e: Capture) -> str:
     """Measure from the rise of A0 to the fall of RFX, and compare that with the falls of 1M25."""
     row, whole = row_for(e, "PSD1-CYC-06"), cycles(e)
     falls, tolerance_ns = of([c[0] for c in whole], "fall"), row.limit("tolerance_ns")
@@ -108,14 +108,14 @@ def rfx_falls_half_a_clock_after_a0(e: Evidence) -> str:
 
 @proves("PSD1-CYC-07")
 @check("stream", needs={"pins"})
-def the_clock_runs_without_a_gap(e: Evidence) -> str:
+def the_clock_runs_without_a_gap(e: Capture) -> str:
     """Measure every period of 1M25 and its high half."""
     wires_needed(e, "CLK_1M25")
     row = row_for(e, "PSD1-CYC-07")
     rises = e.wires.rises("CLK_1M25")
     up, down = e.wires.pulses("CLK_1M25", 1)
     if len(rises) < LEAST:
-        raise TooLittle(f"{len(rises)} rises of 1M25 were recorded")
+        raise Inconclusive(f"{len(rises)} rises of 1M25 were recorded")
     tolerance_ns = row.limit("tolerance_ns")
     interval(e, up, down, row.limit("high_ns"), tolerance_ns, "of 1M25 high", ("CLK_1M25",))
     return interval(
@@ -125,7 +125,7 @@ def the_clock_runs_without_a_gap(e: Evidence) -> str:
 
 @proves("PSD1-CYC-08")
 @check("stream", needs={"pins"})
-def a0_falls_where_the_profile_says(e: Evidence) -> str:
+def a0_falls_where_the_profile_says(e: Capture) -> str:
     """Compare the fall of A0 with the rise of RFZ and the end of the last FL2."""
     whole = cycles(e)
     early = e.variant["a0_release"] == "rfz"
@@ -144,7 +144,7 @@ def a0_falls_where_the_profile_says(e: Evidence) -> str:
 
 @proves("PSD1-CYC-09")
 @check("stream", needs={"pins"})
-def a_cycle_has_its_length(e: Evidence) -> str:
+def a_cycle_has_its_length(e: Capture) -> str:
     """Measure from the rise of A0 to the end of the last FL2."""
     row, whole = row_for(e, "PSD1-CYC-09"), cycles(e)
     begin, end = starts(e, whole), of([c[2] for c in whole], "clear")
@@ -158,7 +158,7 @@ def a_cycle_has_its_length(e: Evidence) -> str:
 
 @proves("PSD1-CYC-10")
 @check("stream", needs={"pins"})
-def a_cycle_begins_only_after_the_last_has_ended(e: Evidence) -> str:
+def a_cycle_begins_only_after_the_last_has_ended(e: Capture) -> str:
     """Look for A0 and FL2 at rest before each rise of A0, and for a rise of 1M25 since."""
     whole = cycles(e)
     at_ns, ends = starts(e, whole), of([c[2] for c in whole], "clear")
@@ -173,7 +173,7 @@ def a_cycle_begins_only_after_the_last_has_ended(e: Evidence) -> str:
 
 @proves("PSD1-CYC-11")
 @check("stream", needs={"pins"})
-def nothing_moves_between_cycles(e: Evidence) -> str:
+def nothing_moves_between_cycles(e: Capture) -> str:
     """Look for edges of any other line but 1M25 and DR between the last FL2 and the next A0."""
     wires_needed(e, *PINS)
     whole = cycles(e)
@@ -190,7 +190,7 @@ def nothing_moves_between_cycles(e: Evidence) -> str:
 
 @proves("PSD1-CYC-12", "PSD1-CYC-13")
 @check("stream", needs={"line"})
-def cycles_come_at_their_rate(e: Evidence) -> str:
+def cycles_come_at_their_rate(e: Capture) -> str:
     """Measure from one fall of RFX to the next."""
     row = row_for(e, *RATES)
     falls = of([c[0] for c in cycles(e)], "fall")
@@ -201,12 +201,12 @@ def cycles_come_at_their_rate(e: Evidence) -> str:
 
 @proves("PSD1-CYC-12")
 @check("stream", needs={"pins"})
-def a_cycle_follows_each_fall_of_dr(e: Evidence) -> str:
+def a_cycle_follows_each_fall_of_dr(e: Capture) -> str:
     """Count the falls of DR and the rises of A0 in turn."""
     wires_needed(e, "DR", "A0")
     falls, rises = e.wires.falls("DR"), e.wires.rises("A0")
     if len(rises) < LEAST or not len(falls):
-        raise TooLittle(f"{len(falls)} falls of DR, {len(rises)} rises of A0 were recorded")
+        raise Inconclusive(f"{len(falls)} falls of DR, {len(rises)} rises of A0 were recorded")
     inside = rises[rises > falls[0]]
     n = min(len(inside), len(falls))
     answers = after(rises, falls[:n])
@@ -217,13 +217,13 @@ def a_cycle_follows_each_fall_of_dr(e: Evidence) -> str:
 
 @proves("PSD1-SIG-01")
 @check("power_on", needs={"pins"})
-def lines_rest_at_their_levels(e: Evidence) -> str:
+def lines_rest_at_their_levels(e: Capture) -> str:
     """Look at every line after Res, before the first control word goes out."""
     wires_needed(e, *PINS)
     moves = edges(e, "TFS")
     moves = moves[moves > e.wires.start_ns]
     if not len(moves):
-        raise TooLittle("TFS never moves after Res")
+        raise Inconclusive("TFS never moves after Res")
     row = row_for(e, "PSD1-SIG-01")
     at = np.array([int(moves[0]) - 1 - round(e.slack_ns(0.0))], np.int64)
     for name in PINS:
@@ -231,13 +231,13 @@ def lines_rest_at_their_levels(e: Evidence) -> str:
             continue
         due = int(row.limits.get(f"{name.lower()}_level", 0))
         if int(e.wires[name].at(at)[0]) != due:
-            raise Broken(f"{name} {1 - due} at rest", f"{due}", at_ns=int(at[0]), lines=(name, "TFS"))
+            raise Failed(f"{name} {1 - due} at rest", f"{due}", at_ns=int(at[0]), lines=(name, "TFS"))
     return f"{len(PINS) - 2} lines at rest"
 
 
 @proves("PSD1-FL2-05")
 @check("stream", needs={"line"})
-def fl2_rests_at_its_level(e: Evidence) -> str:
+def fl2_rests_at_its_level(e: Capture) -> str:
     """Look at FL2 while a word is transferred, and how long it is at each level."""
     words = transfers(e)
     due = 1 - fl2_level(e)

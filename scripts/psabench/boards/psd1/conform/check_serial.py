@@ -25,22 +25,22 @@ from psabench.conform.capture.intervals import (
     together,
     wires_needed,
 )
-from psabench.conform.capture.log import Evidence
+from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import proves, row_for
-from psabench.conform.verdict import Broken, TooLittle
+from psabench.conform.verdict import Failed, Inconclusive
 
 SERIAL = (*FRAMES, "SCLK", "SDAT", "CLK_1M25")
 HAND = (*FRAMES, "FL2", "CS", "CLK_1M25")
 
 
-def _words(e: Evidence) -> list[Transfer]:
+def _words(e: Capture) -> list[Transfer]:
     return [t for c in cycles(e) for t in c]
 
 
 @proves("PSD1-SER-01")
 @check("stream", needs={"pins"})
-def the_first_bit_comes_in_time(e: Evidence) -> str:
+def the_first_bit_comes_in_time(e: Capture) -> str:
     """Look at SDAT 400 ns after the fall of RFx and up to the first rise of SCLK."""
     words, row = _words(e), row_for(e, "PSD1-SER-01")
     due = of(words, "fall") + round(row.limit("access_max_ns") + e.slack_ns(row.limit("access_max_ns")))
@@ -55,13 +55,13 @@ def the_first_bit_comes_in_time(e: Evidence) -> str:
     )
     ones = int(e.wires["SDAT"].at(first).sum())
     if not ones:
-        raise TooLittle("no word begins with a 1")
+        raise Inconclusive("no word begins with a 1")
     return f"{len(words)} words, {ones} of them begin with a 1"
 
 
 @proves("PSD1-SER-02")
 @check("stream", needs={"pins"})
-def the_most_significant_bit_comes_first(e: Evidence) -> str:
+def the_most_significant_bit_comes_first(e: Capture) -> str:
     """Compare the bits of SDAT at the rises of SCLK with the word on D0..D15."""
     words = _words(e)
     return _same_words(e, words, "bits of SDAT")
@@ -69,32 +69,32 @@ def the_most_significant_bit_comes_first(e: Evidence) -> str:
 
 @proves("PSD1-SER-02")
 @check("stream", needs={"line", "can"})
-def words_of_the_line_are_those_on_can(e: Evidence) -> str:
+def words_of_the_line_are_those_on_can(e: Capture) -> str:
     """Look for the words of PSD1_CYCLE among those of SDAT, most significant bit first."""
     seen, told = serial_words(e, _words(e)).reshape(-1, 3), told_words(e)
     known = {tuple(w) for w in seen.tolist()}
     both = sum(tuple(w) in known for w in told.tolist())
     if both < min(len(told), len(seen)) // 2:
-        raise Broken(f"{_hex(told[0])} on CAN, {_hex(seen[0])} on SDAT, {both} alike", "the same words", lines=LINES)
+        raise Failed(f"{_hex(told[0])} on CAN, {_hex(seen[0])} on SDAT, {both} alike", "the same words", lines=LINES)
     return f"{both} cycles with the same words on SDAT and on CAN"
 
 
 @proves("PSD1-CAN-01")
 @check("stream", needs={"line", "can"})
-def each_cycle_is_told_once(e: Evidence) -> str:
+def each_cycle_is_told_once(e: Capture) -> str:
     """Look for the words of PSD1_CYCLE, in their order and none left out, among those of SDAT."""
     return _found(serial_words(e, _words(e)).reshape(-1, 3), told_words(e))
 
 
-def told_words(e: Evidence) -> np.ndarray:
-    """(n, 3) of PSD1_CYCLE. Raises TooLittle for fewer than two, Broken for frames of another length."""
+def told_words(e: Capture) -> np.ndarray:
+    """(n, 3) of PSD1_CYCLE. Raises Inconclusive for fewer than two, Failed for frames of another length."""
     log = e.frames_of("PSD1_CYCLE")
     if len(log) < 3:
-        raise TooLittle(f"{len(log)} messages PSD1_CYCLE came")
+        raise Inconclusive(f"{len(log)} messages PSD1_CYCLE came")
     try:
         raw = log.raw("PSD1_CYCLE")
     except ValueError as err:
-        raise Broken(str(err), "8 bytes", frames=log.frames) from err
+        raise Failed(str(err), "8 bytes", frames=log.frames) from err
     return np.stack([raw[a] for a in "XYZ"], axis=1)
 
 
@@ -105,7 +105,7 @@ def _found(seen: np.ndarray, told: np.ndarray) -> str:
         a, b = max(0, shift), min(n, shift + m)
         if b - a >= min(n, m) - 2 and b - a >= 3 and np.array_equal(seen[a:b], told[a - shift : b - shift]):
             return f"{b - a} cycles, their words on SDAT and on CAN"
-    raise Broken(
+    raise Failed(
         f"{_hex(told[0])} on CAN, {_hex(seen[0])} on SDAT, never alike", "the same words in order", lines=LINES
     )
 
@@ -116,7 +116,7 @@ def _hex(words: np.ndarray) -> str:
 
 @proves("PSD1-SER-03")
 @check("stream", needs={"line"})
-def the_first_edge_of_sclk_is_a_rise(e: Evidence) -> str:
+def the_first_edge_of_sclk_is_a_rise(e: Capture) -> str:
     """Measure from the fall of RFx to the first edge of SCLK."""
     words, row = _words(e), row_for(e, "PSD1-SER-03")
     falls = of(words, "fall")
@@ -130,7 +130,7 @@ def the_first_edge_of_sclk_is_a_rise(e: Evidence) -> str:
 
 @proves("PSD1-SER-04")
 @check("stream", needs={"pins"})
-def sclk_is_the_clock_delayed(e: Evidence) -> str:
+def sclk_is_the_clock_delayed(e: Capture) -> str:
     """Measure from each rise of 1M25 to the rise of SCLK that follows it, and from rise to rise."""
     wires_needed(e, "CLK_1M25")
     words, row = _words(e), row_for(e, "PSD1-SER-04")
@@ -146,7 +146,7 @@ def sclk_is_the_clock_delayed(e: Evidence) -> str:
 
 @proves("PSD1-SER-05")
 @check("stream", needs={"line"})
-def a_transfer_has_its_pulses(e: Evidence) -> str:
+def a_transfer_has_its_pulses(e: Capture) -> str:
     """Count the rises and falls of SCLK in each transfer."""
     due = int(row_for(e, "PSD1-SER-05").limit("pulses_count"))
     words = transfers(e)
@@ -158,7 +158,7 @@ def a_transfer_has_its_pulses(e: Evidence) -> str:
 
 @proves("PSD1-SER-06")
 @check("stream", needs={"pins"})
-def bits_change_after_the_fall_of_sclk(e: Evidence) -> str:
+def bits_change_after_the_fall_of_sclk(e: Capture) -> str:
     """Measure from the fall of SCLK to the change of SDAT that follows, up to the last bit."""
     words, row = _words(e), row_for(e, "PSD1-SER-06")
     moves = edges(e, "SDAT")
@@ -167,11 +167,11 @@ def bits_change_after_the_fall_of_sclk(e: Evidence) -> str:
         inside = moves[(moves > t.rises[0]) & (moves <= t.rises[-1])]
         late.extend((inside - t.falls[np.searchsorted(t.falls, inside, "right") - 1]).tolist())
     if not late:
-        raise Broken("a SDAT that never moves in a word", "bits", at_ns=words[0].fall, lines=SERIAL)
+        raise Failed("a SDAT that never moves in a word", "bits", at_ns=words[0].fall, lines=SERIAL)
     took, slack_ns = np.array(late), e.slack_ns(row.limit("change_max_ns"))
     bad = (took < row.limit("hold_min_ns") - slack_ns) | (took > row.limit("change_max_ns") + slack_ns)
     if bad.any():
-        raise Broken(
+        raise Failed(
             f"SDAT moves {took[bad][0]} ns after a fall of SCLK ({int(bad.sum())} of {len(took)})",
             f"{row.limit('hold_min_ns'):g} to {row.limit('change_max_ns'):g} ns after one",
             at_ns=words[0].fall,
@@ -182,7 +182,7 @@ def bits_change_after_the_fall_of_sclk(e: Evidence) -> str:
 
 @proves("PSD1-SER-07")
 @check("stream", needs={"line"})
-def rfx_is_low_for_its_time(e: Evidence) -> str:
+def rfx_is_low_for_its_time(e: Capture) -> str:
     """Measure the lows of RFX, RFY and RFZ, and look for the 16th pulse before their end."""
     words, row = _words(e), row_for(e, "PSD1-SER-07")
     last = np.array([t.falls[-1] if len(t.falls) else t.rise + 1 for t in words], np.int64)
@@ -201,7 +201,7 @@ def rfx_is_low_for_its_time(e: Evidence) -> str:
 
 @proves("PSD1-SER-07")
 @check("stream", needs={"pins"})
-def rfx_rises_with_a_fall_of_the_clock(e: Evidence) -> str:
+def rfx_rises_with_a_fall_of_the_clock(e: Capture) -> str:
     """Compare the rises of RFX, RFY and RFZ with the falls of 1M25."""
     wires_needed(e, "CLK_1M25")
     tolerance_ns = row_for(e, "PSD1-SER-07").limit("tolerance_ns")
@@ -210,7 +210,7 @@ def rfx_rises_with_a_fall_of_the_clock(e: Evidence) -> str:
 
 @proves("PSD1-SER-08")
 @check("stream", needs={"line"})
-def fl2_is_set_as_rfx_rises(e: Evidence) -> str:
+def fl2_is_set_as_rfx_rises(e: Capture) -> str:
     """Compare FL2 with the rises of RFX, RFY and RFZ."""
     words = transfers(e)
     tolerance_ns = row_for(e, "PSD1-SER-08").limit("tolerance_ns")
@@ -219,7 +219,7 @@ def fl2_is_set_as_rfx_rises(e: Evidence) -> str:
 
 @proves("PSD1-SER-09")
 @check("stream", needs={"line"})
-def one_converter_at_a_time(e: Evidence) -> str:
+def one_converter_at_a_time(e: Capture) -> str:
     """Look for two of RFX, RFY and RFZ low at once."""
     wires_needed(e, *FRAMES)
     at_ns = np.unique(np.concatenate([e.wires[n].t_ns for n in FRAMES]))
@@ -230,7 +230,7 @@ def one_converter_at_a_time(e: Evidence) -> str:
 
 @proves("PSD1-SER-10")
 @check("stream", needs={"line"})
-def sclk_rests_low(e: Evidence) -> str:
+def sclk_rests_low(e: Capture) -> str:
     """Look for pulses of SCLK outside transfers."""
     words = transfers(e)
     rises = e.wires.rises("SCLK")
@@ -249,7 +249,7 @@ def sclk_rests_low(e: Evidence) -> str:
 
 @proves("PSD1-SER-11")
 @check("stream", needs={"pins"})
-def dr_rises_after_the_last_bit_of_x(e: Evidence) -> str:
+def dr_rises_after_the_last_bit_of_x(e: Capture) -> str:
     """Look at DR 110 ns after the 16th fall of SCLK under RFX."""
     wires_needed(e, "DR")
     row = row_for(e, "PSD1-SER-11")
@@ -268,19 +268,19 @@ def dr_rises_after_the_last_bit_of_x(e: Evidence) -> str:
 
 @proves("PSD1-FL2-01")
 @check("stream", needs={"pins"})
-def fl2_is_cleared_by_the_clock_after_the_strobe(e: Evidence) -> str:
+def fl2_is_cleared_by_the_clock_after_the_strobe(e: Capture) -> str:
     """Compare the end of FL2 with the first fall of 1M25 strictly after that of the strobe."""
     return _cleared(e, transfers(e), row_for(e, "PSD1-FL2-01").limit("tolerance_ns"))
 
 
 @proves("PSD1-FL2-04")
 @check("stream", needs={"pins"})
-def fl2_of_z_is_cleared_likewise(e: Evidence) -> str:
+def fl2_of_z_is_cleared_likewise(e: Capture) -> str:
     """The same for the third strobe of each cycle."""
     return _cleared(e, [c[2] for c in cycles(e)], row_for(e, "PSD1-FL2-01").limit("tolerance_ns"))
 
 
-def _cleared(e: Evidence, words: list[Transfer], tolerance_ns: float) -> str:
+def _cleared(e: Capture, words: list[Transfer], tolerance_ns: float) -> str:
     wires_needed(e, "CLK_1M25")
     none = of(words, "cs_fall") < 0
     first_bad(none, of(words, "rise"), ["FL2 cleared without a strobe"] * len(words), "by a strobe", HAND)
@@ -292,19 +292,19 @@ def _cleared(e: Evidence, words: list[Transfer], tolerance_ns: float) -> str:
 
 @proves("PSD1-FL2-02")
 @check("stream", needs={"line"})
-def rfy_falls_as_fl2_of_x_is_cleared(e: Evidence) -> str:
+def rfy_falls_as_fl2_of_x_is_cleared(e: Capture) -> str:
     """Measure from the end of FL2 of X to the fall of RFY."""
     return _handed(e, 1, row_for(e, "PSD1-FL2-02").limit("tolerance_ns"))
 
 
 @proves("PSD1-FL2-03")
 @check("stream", needs={"line"})
-def rfz_falls_as_fl2_of_y_is_cleared(e: Evidence) -> str:
+def rfz_falls_as_fl2_of_y_is_cleared(e: Capture) -> str:
     """Measure from the end of FL2 of Y to the fall of RFZ."""
     return _handed(e, 2, row_for(e, "PSD1-FL2-03").limit("tolerance_ns"))
 
 
-def _handed(e: Evidence, axis: int, tolerance_ns: float) -> str:
+def _handed(e: Capture, axis: int, tolerance_ns: float) -> str:
     whole = cycles(e)
     clear, fall = of([c[axis - 1] for c in whole], "clear"), of([c[axis] for c in whole], "fall")
     return interval(e, clear, fall, 0.0, tolerance_ns, f"from the end of FL2 to {FRAMES[axis]}", HAND)
@@ -312,7 +312,7 @@ def _handed(e: Evidence, axis: int, tolerance_ns: float) -> str:
 
 @proves("PSD1-FL2-07")
 @check("stream", needs={"pins"})
-def the_built_in_host_keeps_its_times(e: Evidence) -> str:
+def the_built_in_host_keeps_its_times(e: Capture) -> str:
     """Measure from FL2 to the strobe, and the strobe."""
     words, row = _words(e), row_for(e, "PSD1-FL2-07")
     slow = "slow_" if e.variant.profile == "psd1_slow" else ""
@@ -324,7 +324,7 @@ def the_built_in_host_keeps_its_times(e: Evidence) -> str:
 
 @proves("PSD1-BUS-01")
 @check("stream", needs={"pins"})
-def words_are_on_the_bus_at_their_address(e: Evidence) -> str:
+def words_are_on_the_bus_at_their_address(e: Capture) -> str:
     """Look at D0..D15, AB0..AB3 and R/W in the strobe that takes each word."""
     words = _words(e)
     seen = _same_words(e, words, "bits of SDAT")
@@ -337,7 +337,7 @@ def words_are_on_the_bus_at_their_address(e: Evidence) -> str:
     return f"{seen}, at the addresses of their axes"
 
 
-def _same_words(e: Evidence, words: list[Transfer], what: str) -> str:
+def _same_words(e: Capture, words: list[Transfer], what: str) -> str:
     wires_needed(e, "RW", *ADDRESS, *DATA)
     at_ns = of(words, "cs_fall")
     first_bad(at_ns < 0, of(words, "rise"), ["no strobe"] * len(words), "a strobe for each word", LINES)

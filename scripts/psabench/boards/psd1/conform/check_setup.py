@@ -27,12 +27,12 @@ from psabench.conform.capture.intervals import (
     together,
     wires_needed,
 )
-from psabench.conform.capture.log import Evidence
+from psabench.conform.capture.log import Capture
 from psabench.conform.capture.messages import booted, late_readings
 from psabench.conform.plan import check
 from psabench.conform.proves import proves, row_for
 from psabench.conform.requirements import requirements
-from psabench.conform.verdict import Broken, TooLittle
+from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.signals import Ints
 
 WRITE = ("TFS", "A0", "SCLK", "SDAT", "CLK_1M25", "DR")
@@ -54,10 +54,10 @@ class Frame:
     falls: Ints
 
 
-def frames(e: Evidence) -> list[Frame]:
+def frames(e: Capture) -> list[Frame]:
     """From the first control word on, in their order: what is before are words of a board that was running.
 
-    Raises TooLittle where a line or a control word is missing.
+    Raises Inconclusive where a line or a control word is missing.
     """
     wires_needed(e, *WRITE, *FRAMES)
     log = e.wires
@@ -70,18 +70,18 @@ def frames(e: Evidence) -> list[Frame]:
             found.append(Frame(name, int(a), int(b), rises, falls))
     begin = min((f.fall for f in found if f.line == "TFS"), default=None)
     if begin is None:
-        raise TooLittle("no control word in the recording")
+        raise Inconclusive("no control word in the recording")
     return sorted((f for f in found if f.fall >= begin), key=lambda f: f.fall)
 
 
-def controls(e: Evidence) -> list[Frame]:
+def controls(e: Capture) -> list[Frame]:
     """The control words."""
     return [f for f in frames(e) if f.line == "TFS"]
 
 
 @proves("PSD1-SETUP-02")
 @check("power_on", needs={"pins"})
-def the_set_up_goes_in_its_order(e: Evidence) -> str:
+def the_set_up_goes_in_its_order(e: Capture) -> str:
     """Follow TFS, DR and the transfers of 24 bits from Res to the first word."""
     found = frames(e)
     first_word = next((k for k, f in enumerate(found) if f.line != "TFS" and len(f.rises) != CONTROL_BITS), len(found))
@@ -89,36 +89,36 @@ def the_set_up_goes_in_its_order(e: Evidence) -> str:
     sent = [f for f in setup if f.line == "TFS"]
     read = [f for f in setup if f.line != "TFS"]
     if setup[-1].line != "TFS" or len(sent) < 2:
-        raise Broken(
+        raise Failed(
             f"{setup[-1].line} last, {len(sent)} control words",
             "two control words or more, one of them last",
             at_ns=setup[0].fall,
             lines=SETUP,
         )
     if [f.line for f in read] != [*FRAMES] * (COEFFICIENTS // len(FRAMES)):
-        raise Broken(
+        raise Failed(
             " ".join(f.line for f in read) or "no coefficient read", "X Y Z X Y Z", at_ns=setup[0].fall, lines=SETUP
         )
     low = [f for f in read if int(e.wires["A0"].at(f.fall)) != 1]
     if low:
-        raise Broken("A0 low while a coefficient is read", "high", at_ns=low[0].fall, lines=SETUP)
+        raise Failed("A0 low while a coefficient is read", "high", at_ns=low[0].fall, lines=SETUP)
     dr = after(e.wires.falls("DR"), np.array([sent[0].rise], np.int64))
     if not sent[0].rise < int(dr[0]) < setup[1].fall:
-        raise Broken("the next transfer before DR falls", "DR first", at_ns=setup[1].fall, lines=SETUP)
+        raise Failed("the next transfer before DR falls", "DR first", at_ns=setup[1].fall, lines=SETUP)
     if first_word < len(found) and int(e.wires["DR"].at(found[first_word].fall - 1)) != 0:
-        raise Broken("a word read with DR high", "DR awaited", at_ns=found[first_word].fall, lines=SETUP)
+        raise Failed("a word read with DR high", "DR awaited", at_ns=found[first_word].fall, lines=SETUP)
     return f"{len(sent)} control words, {len(read)} coefficients, DR after the first and before the first word"
 
 
 @proves("PSD1-SETUP-03")
 @check("power_on", needs={"pins"})
-def the_first_cycle_comes_in_time(e: Evidence) -> str:
+def the_first_cycle_comes_in_time(e: Capture) -> str:
     """Measure from the first control word after Res to A0 of the first cycle."""
     row, due = row_for(e, "PSD1-SETUP-03"), _first_cycle_ms(e)
     found = frames(e)
     word = next((f for f in found if f.line == "RFX" and len(f.rises) != CONTROL_BITS), None)
     if word is None:
-        raise Broken("no cycle in the recording", f"one {due:g} ms after Res", at_ns=found[0].fall, lines=SETUP)
+        raise Failed("no cycle in the recording", f"one {due:g} ms after Res", at_ns=found[0].fall, lines=SETUP)
     first, cycle = np.array([found[0].fall]), np.array([word.fall])
     return interval(
         e,
@@ -133,34 +133,34 @@ def the_first_cycle_comes_in_time(e: Evidence) -> str:
 
 @proves("PSD1-SETUP-03")
 @check("power_on", needs={"stamps"})
-def the_first_message_comes_in_time(e: Evidence) -> str:
+def the_first_message_comes_in_time(e: Capture) -> str:
     """Measure from the boot-up message to the first PSD1_CYCLE."""
     row, due_ms = row_for(e, "PSD1-SETUP-03"), _first_cycle_ms(e)
     boot = booted(e, "PSD1_HEARTBEAT")
     told = [f for f in e.frames_of("PSD1_CYCLE").frames if f.t_s > boot.t_s]
     if not told or len(told[0].data) != CYCLE_BYTES:
-        raise TooLittle("no whole PSD1_CYCLE after the boot-up message")
+        raise Inconclusive("no whole PSD1_CYCLE after the boot-up message")
     took_ms, period_ms, modulo = (told[0].t_s - boot.t_s) * 1e3, period_s(e.variant) * 1e3, _modulo(e)
     cnt = told[0].data[CNT_AT]  # one that is reported late, because the host was, counts those before it
     before = cnt + modulo * round(((took_ms - due_ms) / period_ms - cnt) / modulo)
     if abs(took_ms - due_ms - before * period_ms) > row.limit("tolerance_ms"):
         due = f"{due_ms + before * period_ms:g} +- {row.limit('tolerance_ms'):g} ms"
-        raise Broken(f"{took_ms:.3f} ms, CNT {cnt}", due, frames=(boot, told[0]))
+        raise Failed(f"{took_ms:.3f} ms, CNT {cnt}", due, frames=(boot, told[0]))
     return f"{took_ms:.3f} ms from boot-up to the first message, CNT {cnt}"
 
 
-def _first_cycle_ms(e: Evidence) -> float:
+def _first_cycle_ms(e: Capture) -> float:
     row = requirements()["PSD1-SETUP-03"]
     return row.limit("quiet_first_cycle_ms" if e.variant.profile == "psd1_quiet" else "first_cycle_ms")
 
 
-def _modulo(e: Evidence) -> int:
+def _modulo(e: Capture) -> int:
     return int(row_for(e, "PSD1-CAN-03").limit("modulo"))
 
 
 @proves("PSD1-UC-01")
 @check("power_on", needs={"pins"})
-def control_words_go_out_in_their_time(e: Evidence) -> str:
+def control_words_go_out_in_their_time(e: Capture) -> str:
     """Measure TFS and the pulses of SCLK in it."""
     row, sent = row_for(e, "PSD1-UC-01"), controls(e)
     tolerance_ns, count = row.limit("tolerance_ns"), int(row.limit("pulses_count"))
@@ -176,44 +176,44 @@ def control_words_go_out_in_their_time(e: Evidence) -> str:
 
 @proves("PSD1-UC-02")
 @check("power_on", needs={"pins"})
-def the_control_words_are_those_of_the_page(e: Evidence) -> str:
+def the_control_words_are_those_of_the_page(e: Capture) -> str:
     """Read the first and the last control word of the set-up off SDAT."""
     row, found = row_for(e, "PSD1-UC-02"), controls(e)
     words = [_word(e, f) for f in (found[0], found[-1])]
     due = [int(row.limit("uc1_code")), int(row.limit("uc2_code"))]
     if words != due:
         saw = " ".join(f"{w:06X}h" for w in words)
-        raise Broken(saw, " ".join(f"{w:06X}h" for w in due), at_ns=found[0].fall, lines=WRITE)
+        raise Failed(saw, " ".join(f"{w:06X}h" for w in due), at_ns=found[0].fall, lines=WRITE)
     return f"{words[0]:06X}h first, {words[1]:06X}h last"
 
 
-def _word(e: Evidence, f: Frame) -> int:
+def _word(e: Capture, f: Frame) -> int:
     return int("".join(map(str, e.wires["SDAT"].at(f.rises).tolist())) or "0", 2)
 
 
 @proves("PSD1-SER-12")
 @check("power_on", needs={"pins"})
-def the_register_has_its_four_modes(e: Evidence) -> str:
+def the_register_has_its_four_modes(e: Capture) -> str:
     """Count pulses of SCLK of control words, coefficients and words, and look for words on the bus."""
     row, found = row_for(e, "PSD1-SER-12"), frames(e)
     word, control = int(row.limit("word_bits")), int(row.limit("control_bits"))
     counts = {name: {len(f.rises) for f in found if (f.line == "TFS") == (name == "TFS")} for name in ("TFS", "RFx")}
     at = found[0].fall
     if counts["TFS"] != {control}:
-        raise Broken(f"{sorted(counts['TFS'])} bits under TFS", f"{control}", at_ns=at, lines=SETUP)
+        raise Failed(f"{sorted(counts['TFS'])} bits under TFS", f"{control}", at_ns=at, lines=SETUP)
     due = {word, control} if e.variant["host_strobe_ns"] else {control}
     if counts["RFx"] != due:
-        raise Broken(f"{sorted(counts['RFx'])} bits under RFx", f"{sorted(due)}", at_ns=at, lines=SETUP)
+        raise Failed(f"{sorted(counts['RFx'])} bits under RFx", f"{sorted(due)}", at_ns=at, lines=SETUP)
     wires_needed(e, *DATA)
     strobes = e.wires.pulses("CS", 0)[0]
     if e.variant["host_strobe_ns"] and not bus_word(e, "D", len(DATA), strobes).any():
-        raise Broken("no word on D0..D15", "the words", at_ns=at, lines=SETUP)
+        raise Failed("no word on D0..D15", "the words", at_ns=at, lines=SETUP)
     return f"{control} bits out, {control} and {word} bits in, words out to the bus"
 
 
 @proves("PSD1-CHIP-03")
 @check("power_on", needs={"pins"})
-def the_converters_limits_are_kept(e: Evidence) -> str:
+def the_converters_limits_are_kept(e: Capture) -> str:
     """Measure A0, RFS, TFS, SCLK and SDAT against the limits of the part."""
     row, found = row_for(e, "PSD1-CHIP-03"), frames(e)
     log = e.wires
@@ -229,16 +229,16 @@ def the_converters_limits_are_kept(e: Evidence) -> str:
         for name, took in widths:
             least = row.limit(name)
             if len(took) and took.min() < least - e.slack_ns(least):
-                raise Broken(f"{int(took.min())} ns, {name}", f"{least:g} ns or more", at_ns=f.fall, lines=SETUP)
+                raise Failed(f"{int(took.min())} ns, {name}", f"{least:g} ns or more", at_ns=f.fall, lines=SETUP)
         if f.line == "TFS":
             held = row.limit("write_hold_min_ns") - e.slack_ns(0.0)
             after_rise = after(data, f.rises) - f.rises
             if (after_rise < held).any() or int(log["A0"].at(f.fall)) or ((a0 > f.fall) & (a0 < f.rise)).any():
-                raise Broken("SDAT not held, or A0 not low", f"held {held:g} ns, A0 low", at_ns=f.fall, lines=WRITE)
+                raise Failed("SDAT not held, or A0 not low", f"held {held:g} ns, A0 low", at_ns=f.fall, lines=WRITE)
             continue
         moved = a0[(a0 > f.fall - row.limit("a0_rfs_min_ns") + e.slack_ns(0.0)) & (a0 < f.rise - e.slack_ns(0.0))]
         if len(moved):
-            raise Broken(
+            raise Failed(
                 "A0 moves about RFx",
                 f"{row.limit('a0_rfs_min_ns'):g} ns before it, not in it",
                 at_ns=f.fall,
@@ -246,13 +246,13 @@ def the_converters_limits_are_kept(e: Evidence) -> str:
             )
         free = round(row.limit("hiz_max_ns") + e.slack_ns(0.0))
         if int(log["SDAT"].at(f.rise + free)):
-            raise Broken("SDAT driven after RFx", f"released within {free} ns", at_ns=f.rise, lines=SETUP)
+            raise Failed("SDAT driven after RFx", f"released within {free} ns", at_ns=f.rise, lines=SETUP)
     return f"{len(found)} transfers within the limits of the part"
 
 
 @proves("PSD1-ERR-02")
 @check("power_on", needs={"pins"})
-def res_brings_lines_to_rest_and_the_set_up(e: Evidence) -> str:
+def res_brings_lines_to_rest_and_the_set_up(e: Capture) -> str:
     """Look for the set-up after a Res while cycles run, and no word before it has ended."""
     found = frames(e)
     last = next((k for k in reversed(range(len(found))) if found[k].line == "TFS"), 0)
@@ -260,13 +260,13 @@ def res_brings_lines_to_rest_and_the_set_up(e: Evidence) -> str:
     begun = e.wires.start_ns + 1_000_000  # the pulse itself may cut a cycle
     stray = [f for f in stray if f.fall > begun]
     if stray:
-        raise Broken("a word in the set-up", "none before its end", at_ns=stray[0].fall, lines=SETUP)
+        raise Failed("a word in the set-up", "none before its end", at_ns=stray[0].fall, lines=SETUP)
     return f"{last + 1} transfers of the set-up, then words"
 
 
 @proves("PSD1-ERR-02")
 @check("power_on", needs={"can"})
-def cycles_are_counted_from_0_after_res(e: Evidence) -> str:
+def cycles_are_counted_from_0_after_res(e: Capture) -> str:
     """Look at CNT of the first PSD1_CYCLE after Res."""
     boot = booted(e, "PSD1_HEARTBEAT")
     told = [f for f in e.frames_of("PSD1_CYCLE").frames if f.t_s > boot.t_s]
@@ -275,13 +275,13 @@ def cycles_are_counted_from_0_after_res(e: Evidence) -> str:
     late = late_readings(e, "PSD1_HEARTBEAT", "PSD1_CYCLE", _first_cycle_ms(e) * 1e-3, period_s(e.variant))
     first = told[0].data
     if len(first) != CYCLE_BYTES or first[CNT_AT] > late:
-        raise Broken(f"{first.hex(' ')} first", f"CNT {late} at most", frames=told[:3])
+        raise Failed(f"{first.hex(' ')} first", f"CNT {late} at most", frames=told[:3])
     return f"CNT {first[CNT_AT]} first"
 
 
 @proves("PSD1-BUS-07")
 @check("strobes", needs={"pins", "bus"})
-def status_tells_the_lines(e: Evidence) -> str:
+def status_tells_the_lines(e: Capture) -> str:
     """Compare what is read from STATUS with the lines as its strobe begins."""
     wires_needed(e, *PINS)
     row = row_for(e, "PSD1-BUS-07")
@@ -307,7 +307,7 @@ def status_tells_the_lines(e: Evidence) -> str:
 
 @proves("PSD1-BUS-14")
 @check("strobes", needs={"pins", "bus"})
-def status_tells_the_word_that_waits(e: Evidence) -> str:
+def status_tells_the_word_that_waits(e: Capture) -> str:
     """Compare bits 2..0 of STATUS with FL2 and the axis whose word waits."""
     wires_needed(e, *PINS)
     row = row_for(e, "PSD1-BUS-14")
@@ -318,7 +318,7 @@ def status_tells_the_word_that_waits(e: Evidence) -> str:
     first_bad(saw != ready, begin, [f"bit {int(v)}" for v in saw], "FL2 as the line is", ("FL2", "CS"))
     begin = begin[ready]
     if not len(begin):
-        raise TooLittle("no read of STATUS while a word waited")
+        raise Inconclusive("no read of STATUS while a word waited")
     latest = np.stack([before(e.wires.rises(n), begin) for n in FRAMES], axis=1)
     due = latest.argmax(axis=1)
     axis = (bus_word(e, "D", len(DATA), begin + round(e.slack_ns(0.0))) & mask) >> 1
@@ -326,7 +326,7 @@ def status_tells_the_word_that_waits(e: Evidence) -> str:
     return f"{len(begin)} reads of STATUS while X, Y or Z waited, {len(set(due.tolist()))} axes"
 
 
-def _reads_of_status(e: Evidence) -> Ints:
+def _reads_of_status(e: Capture) -> Ints:
     """Begins of strobes that read STATUS, none at an edge of what it tells."""
     begin: Ints = e.wires.pulses("CS", 0)[0]
     at = begin + round(e.slack_ns(0.0))
@@ -336,18 +336,18 @@ def _reads_of_status(e: Evidence) -> Ints:
         moves = edges(e, name)
         begin = begin[after(moves, begin - 3 - round(2 * e.slack_ns(0.0))) > begin + 2 + round(2 * e.slack_ns(0.0))]
     if len(begin) < 8:
-        raise TooLittle(f"{len(begin)} reads of STATUS were recorded")
+        raise Inconclusive(f"{len(begin)} reads of STATUS were recorded")
     return begin
 
 
 @proves("PSD1-BUS-08")
 @check("strobes", needs={"pins", "bus"})
-def the_bus_stands_in_a_strobe_and_rests_at_0(e: Evidence) -> str:
+def the_bus_stands_in_a_strobe_and_rests_at_0(e: Capture) -> str:
     """Look for changes of address, data and R/W within strobes, and for their levels between them."""
     wires_needed(e, "CS", "RW", *ADDRESS, *DATA)
     begin, end = e.wires.pulses("CS", 0)
     if len(begin) < 8:
-        raise TooLittle(f"{len(begin)} strobes were recorded")
+        raise Inconclusive(f"{len(begin)} strobes were recorded")
     slack = round(e.slack_ns(0.0))
     free = end[e.wires["CS"].at(end + slack) == 1]  # another strobe may begin where one ends
     for name in ("RW", *ADDRESS, *DATA):
@@ -358,26 +358,26 @@ def the_bus_stands_in_a_strobe_and_rests_at_0(e: Evidence) -> str:
         first_bad(high, free, [f"{name} {1 - rest} with CS high"] * len(high), f"{rest}", ("CS", name))
     seen = sum(int(e.wires[name].at(begin + slack).any()) for name in DATA)
     if not seen:
-        raise Broken("D0..D15 all 0 in every strobe", "data", at_ns=int(begin[0]), lines=("CS", *DATA))
+        raise Failed("D0..D15 all 0 in every strobe", "data", at_ns=int(begin[0]), lines=("CS", *DATA))
     writes = int((e.wires["RW"].at(begin + slack) == 0).sum())
     if not writes:
-        raise Broken("R/W high in every strobe", "low in writes", at_ns=int(begin[0]), lines=("CS", "RW"))
+        raise Failed("R/W high in every strobe", "low in writes", at_ns=int(begin[0]), lines=("CS", "RW"))
     return f"{len(begin)} strobes, {writes} of them writes"
 
 
 @proves("PSD1-CAN-06")
 @check("messages", needs={"pins", "can"})
-def psd1_time_tells_the_cycle(e: Evidence) -> str:
+def psd1_time_tells_the_cycle(e: Capture) -> str:
     """Compare TSTAMP, LENGTH and WAITED of PSD1_TIME with A0, FL2 and DR."""
     wires_needed(e, "DR")
     row, whole = row_for(e, "PSD1-CAN-06"), cycles(e)
     log = e.frames_of("PSD1_TIME")
     if len(log) < 4:
-        raise TooLittle(f"{len(log)} messages PSD1_TIME came")
+        raise Inconclusive(f"{len(log)} messages PSD1_TIME came")
     try:
         raw = log.raw("PSD1_TIME")
     except ValueError as err:
-        raise Broken(str(err), "8 bytes", frames=log.frames) from err
+        raise Failed(str(err), "8 bytes", frames=log.frames) from err
     period_ns = row.limit("period_ns")
     begin, end = starts(e, whole), np.array([c[2].clear for c in whole], np.int64)
     falls = e.wires.falls("DR")
@@ -404,4 +404,4 @@ def psd1_time_tells_the_cycle(e: Evidence) -> str:
             return f"{b - a} messages, LENGTH {int(t[0, 1])}, WAITED {int(t[:, 2].min())} to {int(t[:, 2].max())}"
     saw = f"LENGTH {int(told[0, 1])}, WAITED {int(told[0, 2])}, {told[1, 0] - told[0, 0]:.0f} ns between TSTAMPs"
     due = f"{int(seen[0, 1])}, {int(seen[0, 2])}, {seen[1, 0] - seen[0, 0]:.0f} ns" if n > 1 else "those of the lines"
-    raise Broken(saw, due, at_ns=int(begin[0]), lines=("DR", "A0", "FL2"), frames=log.frames[:4])
+    raise Failed(saw, due, at_ns=int(begin[0]), lines=("DR", "A0", "FL2"), frames=log.frames[:4])

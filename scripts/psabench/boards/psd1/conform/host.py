@@ -7,7 +7,7 @@ from psabench.conform.bus_host import code_of, line
 from psabench.conform.dut import Subject
 from psabench.conform.profile import Variant
 from psabench.conform.requirements import requirements
-from psabench.conform.verdict import Broken, TooLittle
+from psabench.conform.verdict import Failed, Inconclusive
 from psabench.errors import CycleRefused
 from psabench.link.busport import Cycle
 
@@ -60,7 +60,7 @@ def run_cycles(s: Subject, count: int) -> None:
 
 
 def drive(s: Subject, count: int, slow_s: float = 0.0) -> list[Cycle]:
-    """Let count cycles run and read their words, slow_s after they come. Raises Broken where none comes."""
+    """Let count cycles run and read their words, slow_s after they come. Raises Failed where none comes."""
     line(s, f"W F {BOTH:04X}")
     words = []
     for k in range(3 * count):
@@ -73,7 +73,7 @@ def drive(s: Subject, count: int, slow_s: float = 0.0) -> list[Cycle]:
 def word(s: Subject, axis: int, slow_s: float = 0.0) -> Cycle:
     """The next word of an axis as soon as it waits."""
     if s.port is None:
-        raise TooLittle("a board without a built-in host wants a bus port to be read")
+        raise Inconclusive("a board without a built-in host wants a bus port to be read")
     wait_s = period_s(s.variant) / 20
     if slow_s:
         s.run_for(slow_s)
@@ -84,4 +84,4 @@ def word(s: Subject, axis: int, slow_s: float = 0.0) -> Cycle:
             if code_of(e) != requirements()["PSD1-BUS-03"].limit("abort_code"):
                 raise
         s.run_for(wait_s)
-    raise Broken(f"no word of {'XYZ'[axis]} on the bus within four periods", "a word that waits")
+    raise Failed(f"no word of {'XYZ'[axis]} on the bus within four periods", "a word that waits")

@@ -5,12 +5,12 @@ from __future__ import annotations
 from psabench.conform.host.cases_can import NODE, Case
 from psabench.conform.host.cases_units import scenario
 from psabench.conform.host.check import limits
-from psabench.conform.host.stimulus import Stage
+from psabench.conform.host.stimulus import HostBench
 
 BUS = ("bus",)
 
 
-def _lost_cycles(s: Stage) -> None:
+def _lost_cycles(s: HostBench) -> None:
     """1, 2 and 100 of PSD1_CYCLE do not arrive."""
     for frames in (1, 2, 100):
         s.run(0.1)
@@ -18,8 +18,8 @@ def _lost_cycles(s: Stage) -> None:
     s.run(0.3)
 
 
-def _strobed(s: Stage) -> None:
-    """The stage strobes the words itself: in time, late, after the next conversion, and for a while not at all."""
+def _strobed(s: HostBench) -> None:
+    """The bench strobes the words itself: in time, late, after the next conversion, and for a while not at all."""
     late_s = 1.5e-6 * float(limits("HOST-PSD1-02").limit("late_us"))
     s.run(0.2)
     _cycle(s, write=15, data=3)  # INT0 and FL1
@@ -39,7 +39,7 @@ def _strobed(s: Stage) -> None:
     _strobe(s, 20)
 
 
-def _strobe(s: Stage, cycles: int) -> None:
+def _strobe(s: HostBench, cycles: int) -> None:
     """Words read as soon as they wait."""
     for _ in range(cycles):
         for axis in range(3):
@@ -47,14 +47,14 @@ def _strobe(s: Stage, cycles: int) -> None:
             _cycle(s, read=axis)
 
 
-def _cycle(s: Stage, *, read: int | None = None, write: int = 0, data: int = 0) -> int:
+def _cycle(s: HostBench, *, read: int | None = None, write: int = 0, data: int = 0) -> int:
     if read is not None:
         return int(s.control.call("bus.read", unit="a", address=read).result["data"])
     s.control.call("bus.write", unit="a", address=write, data=data)
     return data
 
 
-def _await_word(s: Stage, axis: int) -> None:
+def _await_word(s: HostBench, axis: int) -> None:
     for _ in range(5000):
         status = _cycle(s, read=3)
         if status & 1 and status >> 1 & 3 == axis:

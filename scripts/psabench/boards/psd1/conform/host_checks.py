@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 from psabench.conform.host.capture import Bus, number
 from psabench.conform.host.capture_units import FIRST, frames_of
-from psabench.conform.host.check import HostEvidence, enough, judges, limits, proves
+from psabench.conform.host.check import HostCapture, checks, enough, limits, proves
 from psabench.conform.host.check_units import readings_told
 from psabench.conform.host.results import Reading
-from psabench.conform.verdict import Broken
+from psabench.conform.verdict import Failed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,85 +45,85 @@ def cycles(bus: Bus) -> list[Cycle]:
 
 
 def _same(told: Sequence[Reading], due: Sequence[Cycle]) -> None:
-    """Raises Broken where a reading is not the cycle that was played, or not once, or one is missing."""
+    """Raises Failed where a reading is not the cycle that was sent, or not once, or one is missing."""
     for k, (r, c) in enumerate(itertools.zip_longest(told, due)):
         if r is None or c is None or (r.number, r.values) != (c.cnt, c.words):
-            raise Broken(
+            raise Failed(
                 "nothing more" if r is None else f"reading {r.number} with {r.values}, the {k + 1}th",
                 "nothing more" if c is None else f"{c.cnt} with {c.words}",
             )
 
 
 @proves("HOST-PSD1-04")
-@judges("psd1_good")
-def each_cycle_is_told_once(e: HostEvidence) -> str:
+@checks("psd1_good")
+def each_cycle_is_told_once(e: HostCapture) -> str:
     """Words and CNT of a second of cycles."""
-    played = cycles(e.bus)
-    _same(readings_told(e), [c for c in played if not c.mixed])
+    sent = cycles(e.bus)
+    _same(readings_told(e), [c for c in sent if not c.mixed])
     e.count("lost", 0)
     return f"{len(e.told.readings)} cycles"
 
 
 @proves("HOST-PSD1-05")
-@judges("psd1_lost")
-def cycles_that_do_not_come_are_counted(e: HostEvidence) -> str:
+@checks("psd1_lost")
+def cycles_that_do_not_come_are_counted(e: HostCapture) -> str:
     """1, 2 and 100 of them: the numbers told, each before the cycle that follows the gap."""
-    played = [c for c in cycles(e.bus) if not c.mixed]
-    _same(readings_told(e), played)
+    sent = [c for c in cycles(e.bus) if not c.mixed]
+    _same(readings_told(e), sent)
     gaps = {
         i: (b.cnt - a.cnt - 1) % 256
-        for i, (a, b) in enumerate(itertools.pairwise(played), 1)
+        for i, (a, b) in enumerate(itertools.pairwise(sent), 1)
         if b.cnt != (a.cnt + 1) % 256
     }
     enough(len(gaps) == 3, "three gaps")
     told = {x.at: x.value for x in e.told.events if x.name == "lost"}
     if told != gaps:
-        raise Broken(f"lost {told} (readings before: cycles)", f"{gaps}")
+        raise Failed(f"lost {told} (readings before: cycles)", f"{gaps}")
     return ", ".join(map(str, gaps.values()))
 
 
 @proves("HOST-PSD1-03")
-@judges("psd1_flags")
-def flags_of_cycles_are_told(e: HostEvidence) -> str:
+@checks("psd1_flags")
+def flags_of_cycles_are_told(e: HostCapture) -> str:
     """Words were read late, after the next conversion, and not at all for a while."""
-    played = cycles(e.bus)
-    due = {name: sum(getattr(c, name) for c in played) for name in ("overrun", "late", "mixed")}
+    sent = cycles(e.bus)
+    due = {name: sum(getattr(c, name) for c in sent) for name in ("overrun", "late", "mixed")}
     enough(all(due.values()), "each of the flags")
-    _same(readings_told(e), [c for c in played if not c.mixed])
+    _same(readings_told(e), [c for c in sent if not c.mixed])
     for name, n in due.items():
         e.count(name, n)
     return ", ".join(f"{name} {n}" for name, n in due.items())
 
 
 @proves("HOST-PSD1-01")
-@judges("psd1_bus")
-def each_word_is_read_at_its_address(e: HostEvidence) -> str:
+@checks("psd1_bus")
+def each_word_is_read_at_its_address(e: HostCapture) -> str:
     """The host's cycles on the bus: each word once, X, Y, Z in order, and nothing refused but for no word yet."""
     odd = [c for c in e.cycles if c.code not in ("", "not-ready")]
     if odd:
-        raise Broken(f"address {odd[0].address:02X}h was refused: {odd[0].code}", "none but not-ready")
+        raise Failed(f"address {odd[0].address:02X}h was refused: {odd[0].code}", "none but not-ready")
     order = [c.address for c in e.cycles if c.address <= 2 and not c.code and not c.write]
     enough(cycles(e.bus) or not order, "a cycle")
     if wrong := [k for k, a in enumerate(order) if a != k % 3]:
-        raise Broken(f"address {order[wrong[0]]} as word {wrong[0] + 1}", f"{wrong[0] % 3}")
-    played = [c.words for c in cycles(e.bus)]
+        raise Failed(f"address {order[wrong[0]]} as word {wrong[0] + 1}", f"{wrong[0] % 3}")
+    sent = [c.words for c in cycles(e.bus)]
     told = [r.values for r in readings_told(e)]
-    if told != played[: len(told)] or len(told) < len(played) - 1:
-        k = next((k for k, (t, p) in enumerate(zip(told, played, strict=False)) if t != p), len(told))
-        raise Broken(f"{told[k : k + 1]} as cycle {k + 1}", f"{played[k : k + 1]}, of {len(played)}")
+    if told != sent[: len(told)] or len(told) < len(sent) - 1:
+        k = next((k for k, (t, p) in enumerate(zip(told, sent, strict=False)) if t != p), len(told))
+        raise Failed(f"{told[k : k + 1]} as cycle {k + 1}", f"{sent[k : k + 1]}, of {len(sent)}")
     return f"{len(told)} cycles, {len(order)} words"
 
 
 @proves("HOST-PSD1-02")
-@judges("psd1_bus")
-def strobes_are_in_time(e: HostEvidence) -> str:
+@checks("psd1_bus")
+def strobes_are_in_time(e: HostCapture) -> str:
     """LATE and MIXED of the cycles that the host made."""
-    played = cycles(e.bus)
-    enough(len(played) > 10, "ten cycles")
-    late, mixed = sum(c.late for c in played), sum(c.mixed for c in played[1:])  # the first may have waited
+    sent = cycles(e.bus)
+    enough(len(sent) > 10, "ten cycles")
+    late, mixed = sum(c.late for c in sent), sum(c.mixed for c in sent[1:])  # the first may have waited
     if late or mixed:
-        raise Broken(
-            f"{late} late and {mixed} mixed of {len(played)} cycles",
+        raise Failed(
+            f"{late} late and {mixed} mixed of {len(sent)} cycles",
             f"none: the strobe within {limits('HOST-PSD1-02').limit('late_us')} us of FL2",
         )
-    return f"{len(played)} cycles, none late"
+    return f"{len(sent)} cycles, none late"

@@ -1,37 +1,37 @@
-"""Scenes of PSD-1: its set-up, its cycles, all its messages, strobes of another host."""
+"""Stimuli of PSD-1: its set-up, its cycles, all its messages, strobes of another host."""
 
 from __future__ import annotations
 
 from psabench.boards.psd1.conform.host import calm, has_host, messages_on, period_s, run_cycles, setup_s, word
 from psabench.conform.bus_host import line
-from psabench.conform.capture.log import Evidence
+from psabench.conform.capture.log import Capture
 from psabench.conform.dut import Subject
-from psabench.conform.plan import scene
+from psabench.conform.plan import stimulus
 from psabench.conform.stimulus.streamed import from_res
 
-CYCLES = 24  # of a scene
+CYCLES = 24  # of a stimulus
 MANY, FAST_S = 1030, 0.002  # readings that a noise wants; a word sooner than that
 
 
-@scene("power_on", boards=("psd1",))
-def power_on(s: Subject) -> Evidence:
+@stimulus("power_on", boards=("psd1",))
+def power_on(s: Subject) -> Capture:
     """From Res to the first cycles, streaming as soon as it has booted."""
     return from_res(s, setup_s(s.variant))
 
 
-@scene("stream", boards=("psd1",))
-def stream(s: Subject) -> Evidence:
+@stimulus("stream", boards=("psd1",))
+def stream(s: Subject) -> Capture:
     """Cycles as the built-in host reads them, or as we do over the bus where there is none."""
     calm(s)
     with s.take() as take:
         s.unit.start()
         run_cycles(s, CYCLES)
         s.unit.stop()
-    return s.evidence("stream", take)
+    return s.capture("stream", take)
 
 
-@scene("words", boards=("psd1",))
-def words(s: Subject) -> Evidence:
+@stimulus("words", boards=("psd1",))
+def words(s: Subject) -> Capture:
     """A thousand words at still inputs where the board reads them itself and is not slow, a few elsewhere."""
     calm(s)
     fast = has_host(s.variant) and period_s(s.variant) < FAST_S
@@ -39,11 +39,11 @@ def words(s: Subject) -> Evidence:
         s.unit.start()
         run_cycles(s, MANY if fast else 2 * CYCLES)
         s.unit.stop()
-    return s.evidence("words", take)
+    return s.capture("words", take)
 
 
-@scene("messages", boards=("psd1",))
-def messages(s: Subject) -> Evidence:
+@stimulus("messages", boards=("psd1",))
+def messages(s: Subject) -> Capture:
     """The same with all messages switched on, and the objects that they map read afterwards."""
     calm(s)
     with s.take() as take:
@@ -57,11 +57,11 @@ def messages(s: Subject) -> Evidence:
         run_cycles(s, CYCLES)
         s.unit.stop()
     messages_on(s, False)
-    return s.evidence("messages", take)
+    return s.capture("messages", take)
 
 
-@scene("strobes", boards=("psd1",))
-def strobes(s: Subject) -> Evidence:
+@stimulus("strobes", boards=("psd1",))
+def strobes(s: Subject) -> Capture:
     """Reads of STATUS, and reads and writes of registers, all through some cycles; words are left waiting."""
     calm(s)
     own = has_host(s.variant)
@@ -77,4 +77,4 @@ def strobes(s: Subject) -> Evidence:
                 take.cycles.append(word(s, k // 8 % 3))
     if not own:
         calm(s)
-    return s.evidence("strobes", take)
+    return s.capture("strobes", take)

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from psabench.conform.capture.log import Evidence
+from psabench.conform.capture.log import Capture
 from psabench.conform.dut import Subject
-from psabench.conform.plan import scene
+from psabench.conform.plan import stimulus
 from psabench.conform.stimulus.streamed import from_res, readings
 
 START_S, STREAM_S = 0.06, 1.0
 
 
-@scene("power_on", boards=("toy",))
-def power_on(s: Subject) -> Evidence:
+@stimulus("power_on", boards=("toy",))
+def power_on(s: Subject) -> Capture:
     """From Res to some samples, streaming as soon as it has booted."""
     return from_res(s, START_S)
 
 
-@scene("stream", boards=("toy",))
-def stream_for_a_second(s: Subject) -> Evidence:
+@stimulus("stream", boards=("toy",))
+def stream_for_a_second(s: Subject) -> Capture:
     """A second of samples on CAN and on the lines."""
-    return s.evidence("stream", readings(s, START_S, lambda: s.run_for(STREAM_S)))
+    return s.capture("stream", readings(s, START_S, lambda: s.run_for(STREAM_S)))
