@@ -1,8 +1,9 @@
-"""What the words of the command line may be; each function returns the value or raises ArgumentTypeError."""
+"""Options that commands share, and values of options: each type returns the value or raises ArgumentTypeError."""
 
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 from typing import Any
 
 from psabench.boards.registry import NAMES, of_name
@@ -74,6 +75,33 @@ def node_id(text: str) -> int:
     if not text.isdecimal() or not 1 <= int(text) <= 127:
         raise argparse.ArgumentTypeError(f"{text!r}; expected a CANopen node, 1 to 127")
     return int(text)
+
+
+def add_scpi(p: Any, what: str) -> None:
+    """--scpi NAME=ADDRESS, which may be repeated."""
+    p.add_argument("--scpi", action="append", default=[], metavar="NAME=ADDRESS", help=what)
+
+
+def add_inputs(p: Any) -> None:
+    text = "voltage at an input during the test: x=2.5"
+    p.add_argument("--input", action="append", default=[], metavar="AXIS=V", help=text)
+
+
+def add_clock_ppm(p: Any) -> None:
+    text = "tolerance of all clocks (%(default)g)"
+    p.add_argument("--clock-ppm", type=float, default=100.0, metavar="PPM", help=text)
+
+
+def add_default_node(p: Any) -> None:
+    """--node ID, none unless it is given."""
+    p.add_argument("--node", type=int, metavar="ID", help="CANopen node (the board's default)")
+
+
+def add_selection(p: Any, beginning: str, out: str, default: Path | None = None) -> None:
+    """--only, --out and --verbose of a conformance suite. beginning: of ids; out: the folder, for the help."""
+    p.add_argument("--only", nargs="+", default=[], metavar="ID", help=f"requirement ids or prefixes: {beginning}")
+    p.add_argument("--out", type=Path, default=default, metavar="FOLDER", help=f"folder of the report ({out})")
+    p.add_argument("-v", "--verbose", action="store_true", help="list passed requirements as well")
 
 
 def add_board(p: argparse.ArgumentParser, what: str) -> None:

@@ -9,7 +9,17 @@ from typing import Any
 
 from psabench.boards.registry import BUS_BOARDS, NAMES, PLAYED
 from psabench.conform.defaults import LINKS, MAX_S, OUT
-from psabench.options import BUS_HELP, LINE_HZ, Help, Parser
+from psabench.options import (
+    BUS_HELP,
+    LINE_HZ,
+    Help,
+    Parser,
+    add_clock_ppm,
+    add_default_node,
+    add_inputs,
+    add_scpi,
+    add_selection,
+)
 
 EPILOG = """\
 examples:
@@ -89,14 +99,10 @@ def _add_device(suites: Any) -> None:
     at.add_argument("--lines", type=Path, metavar="PORT", help="line port: pseudo-terminal or adapter of that kind")
     at.add_argument("--line-hz", type=float, default=LINE_HZ, metavar="HZ", help="its samples a second (%(default)g)")
     at.add_argument("--bus-port", type=Path, metavar="PORT", help=f"bus port of {', '.join(BUS_BOARDS)}")
-    at.add_argument(
-        "--scpi", action="append", default=[], metavar="NAME=ADDRESS", help="an instrument: supply=TCPIP::..."
-    )
+    add_scpi(at, "an instrument: supply=TCPIP::...")
     at.add_argument("--control", type=Path, metavar="SOCKET", help="control socket of an emulator: lockstep")
-    at.add_argument("--node", type=int, metavar="ID", help="CANopen node (the board's default)")
-    at.add_argument(
-        "--input", action="append", default=[], metavar="AXIS=V", help="volts at an input while it is tested: x=2.5"
-    )
+    add_default_node(at)
+    add_inputs(at)
     own = p.add_argument_group("of the emulator that is started")
     own.add_argument(
         "--adapter", default="socketcand:0", metavar="KIND", help="its CAN adapter (%(default)s), or slcan"
@@ -108,51 +114,40 @@ def _add_device(suites: Any) -> None:
         "--recorder-error", type=float, default=0.0, metavar="PPM", help="by which the clock of the probes is fast"
     )
     what = p.add_argument_group("what is tested, and where it is")
-    what.add_argument(
-        "--clock-ppm", type=float, default=100.0, metavar="PPM", help="allowed to all clocks (%(default)g)"
-    )
-    what.add_argument("--only", nargs="+", default=[], metavar="ID", help="requirements, or beginnings: PSA2-FRAME")
-    what.add_argument("--out", type=Path, metavar="FOLDER", help=f"for the report ({OUT}/BOARD-PROFILE)")
-    what.add_argument("-v", "--verbose", action="store_true", help="tell what passed, too")
+    add_clock_ppm(what)
+    add_selection(what, "PSA2-FRAME", f"{OUT}/BOARD-PROFILE")
 
 
 def _add_recording(suites: Any) -> None:
     p = suites.add_parser(
         "recording",
         help="files that were recorded at a bench",
-        description="Judge recordings of a board's CAN bus and lines.",
+        description="Check recordings of a board's CAN bus and lines.",
         formatter_class=Help,
         epilog=RECORDING_EPILOG,
     )
     p.set_defaults(handler=_recording)
     p.add_argument("files", nargs="+", type=Path, metavar="FILE")
     _add_board(p)
-    p.add_argument("--node", type=int, metavar="ID", help="CANopen node (the board's default)")
+    add_default_node(p)
     p.add_argument(
         "--line", action="append", default=[], metavar="LINE=CHANNEL", help="a line by the analyser's name: Int=D0"
     )
     p.add_argument(
         "--line-hz", type=float, metavar="HZ", help="samples a second of the lines (of .bin 8e6, else the file's)"
     )
-    p.add_argument("--input", action="append", default=[], metavar="AXIS=V", help="volts at an input meanwhile: x=2.5")
-    p.add_argument(
-        "--max-seconds",
-        type=float,
-        default=MAX_S,
-        metavar="S",
-        help="of each file, from its begin (%(default)g)",
-    )
-    p.add_argument("--clock-ppm", type=float, default=100.0, metavar="PPM", help="allowed between clocks (%(default)g)")
-    p.add_argument("--only", nargs="+", default=[], metavar="ID", help="requirements, or beginnings: PSA2-FRAME")
-    p.add_argument("--out", type=Path, metavar="FOLDER", help=f"for the report ({OUT}/recording-BOARD-PROFILE)")
-    p.add_argument("-v", "--verbose", action="store_true", help="tell what passed, too")
+    add_inputs(p)
+    text = "check at most this much of each file, from its start (%(default)g)"
+    p.add_argument("--max-seconds", type=float, default=MAX_S, metavar="S", help=text)
+    add_clock_ppm(p)
+    add_selection(p, "PSA2-FRAME", f"{OUT}/recording-BOARD-PROFILE")
 
 
 def _add_host(suites: Any) -> None:
     p = suites.add_parser(
         "host",
         help="a program that takes a board's data",
-        description="Play good and bad boards to a program and judge what it tells.",
+        description="Simulate good and bad boards for a program and check what it reports.",
         formatter_class=Help,
         epilog=HOST_EPILOG.replace("%", "%%"),
     )
@@ -162,13 +157,11 @@ def _add_host(suites: Any) -> None:
     how.add_argument("--manual", choices=list(LINKS), help="it is started by hand when we say so, at this link")
     p.add_argument("--results", type=Path, metavar="FILE", help="with --manual: the file that the program tells into")
     p.add_argument("--port", type=int, default=29536, help="with --manual can: of socketcand, each time (%(default)s)")
-    p.add_argument("--board", default="psa2", help=f"that is played: {', '.join(PLAYED)} (%(default)s)")
+    p.add_argument("--board", default="psa2", help=f"simulated board: {', '.join(PLAYED)} (%(default)s)")
     p.add_argument("--profile", help="of the board (article for psa2, else of its own name)")
-    p.add_argument("--only", nargs="+", default=[], metavar="ID", help="requirements, or beginnings: HOST-LOST")
     p.add_argument("--case", nargs="+", default=[], metavar="NAME", help="these cases alone (docs/conform_host.md)")
     p.add_argument("--speed", type=float, default=1.0, metavar="X", help="times real time, while nothing is silent")
-    p.add_argument("--out", type=Path, default=OUT / "host", metavar="FOLDER", help="for the report (%(default)s)")
-    p.add_argument("-v", "--verbose", action="store_true", help="tell what passed, too")
+    add_selection(p, "HOST-LOST", f"{OUT}/host", OUT / "host")
 
 
 def _add_list(suites: Any) -> None:

@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from psabench.options import BUS_HELP, Help, Parser, node_id
+from psabench.options import BUS_HELP, Help, Parser, add_scpi, node_id
 
 SHELL_EPILOG = """\
 examples:
@@ -70,15 +70,9 @@ def parse_script(words: Sequence[str]) -> argparse.Namespace:
 def _add_common(p: argparse.ArgumentParser) -> None:
     p.add_argument("--seed", type=int, help="of the emulator's noise, instead of the scenario's")
     p.add_argument("--can", help=f"{BUS_HELP}; without it that of an emulator: there, or started")
-    p.add_argument(
-        "--scpi",
-        action="append",
-        default=[],
-        metavar="NAME=ADDRESS",
-        help="VISA address of an instrument; may be repeated",
-    )
+    add_scpi(p, "VISA address of an instrument; may be repeated")
     p.add_argument("--node", type=node_id, help="CANopen node of the unit (what the emulator tells, else 5)")
-    p.add_argument("--json", action="store_true", help="one JSON object a line instead of text")
+    p.add_argument("--json", action="store_true", help="print one JSON object per line instead of text")
 
 
 def _shell(args: argparse.Namespace) -> int:
