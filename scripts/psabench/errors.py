@@ -6,6 +6,11 @@ Every message says what, where, and what would be right. Bad arguments of functi
 from __future__ import annotations
 
 
+def expected(what: str, got: object, where: str = "") -> str:
+    """The text of an error: `<where>: expected <what>, got <value>`; the caller's prefix may say where."""
+    return f"{where}: expected {what}, got {got}" if where else f"expected {what}, got {got}"
+
+
 class BenchError(Exception):
     """A device or the bench failed; the base of all others."""
 

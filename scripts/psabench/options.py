@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from psabench.boards.registry import NAMES, of_name
-from psabench.errors import BadInput
+from psabench.errors import BadInput, expected
 
 LINE_HZ = 8_000_000.0  # psabench.link.lineport.SAMPLE_HZ, without loading NumPy
 BUS_HELP = """\
@@ -44,12 +44,12 @@ def yes_no(text: str) -> bool:
         return True
     if text.lower() in ("0", "no", "false", "off"):
         return False
-    raise argparse.ArgumentTypeError(f"{text!r}; expected yes or no")
+    raise argparse.ArgumentTypeError(expected("yes or no", repr(text)))
 
 
 def natural(text: str) -> int:
     if not text.isdecimal():
-        raise argparse.ArgumentTypeError(f"{text!r}; expected an integer of 0 or more")
+        raise argparse.ArgumentTypeError(expected("an integer of 0 or more", repr(text)))
     return int(text)
 
 
@@ -59,7 +59,7 @@ def positive(text: str) -> float:
     except ValueError:
         value = 0.0
     if not 0.0 < value < float("inf"):
-        raise argparse.ArgumentTypeError(f"{text!r}; expected a number above 0")
+        raise argparse.ArgumentTypeError(expected("a number above 0", repr(text)))
     return value
 
 
@@ -67,13 +67,13 @@ def board_name(text: str) -> str:
     """A board; another name of it, as psa1 or pik5, is that of the board."""
     board = of_name(text)
     if board is None:
-        raise argparse.ArgumentTypeError(f"{text!r}; expected {', '.join(NAMES)}")
+        raise argparse.ArgumentTypeError(expected(", ".join(NAMES), repr(text)))
     return board.name
 
 
 def node_id(text: str) -> int:
     if not text.isdecimal() or not 1 <= int(text) <= 127:
-        raise argparse.ArgumentTypeError(f"{text!r}; expected a CANopen node, 1 to 127")
+        raise argparse.ArgumentTypeError(expected("a CANopen node, 1 to 127", repr(text)))
     return int(text)
 
 

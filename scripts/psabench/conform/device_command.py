@@ -15,7 +15,7 @@ from psabench.conform.excerpts import Excerpts
 from psabench.conform.list_command import requirements_of
 from psabench.conform.profile import Variant, variant
 from psabench.conform.verdict import Outcome
-from psabench.errors import BadInput
+from psabench.errors import BadInput, expected
 from psabench.procedures.head_bench import Progress
 from psabench.progress import Bar
 
@@ -106,7 +106,7 @@ def _pairs(words: list[str], option: str, kind: Callable[[str], Any]) -> dict[st
         try:
             found[name] = kind(value)
         except ValueError as e:
-            raise BadInput(f"{option} {word}: {value!r} is no number") from e
+            raise BadInput(expected("a number", repr(value), f"{option} {word}")) from e
         if not equals or not name or not value:
-            raise BadInput(f"{option} {word}: expected NAME=VALUE")
+            raise BadInput(expected("NAME=VALUE", repr(word), option))
     return found

@@ -13,7 +13,7 @@ from psabench.conform.requirements import requirements
 from psabench.conform.sources.files import read_files
 from psabench.conform.sources.taken import Bounds
 from psabench.conform.verdict import Outcome
-from psabench.errors import BadInput
+from psabench.errors import BadInput, expected
 from psabench.link.protocol_files import dbc_node
 from psabench.progress import Bar
 
@@ -50,7 +50,7 @@ def _bench(args: argparse.Namespace) -> recording.Bench:
     v = variant(args.board, args.profile)
     for name, value in (("--line-hz", args.line_hz), ("--max-seconds", args.max_seconds)):
         if value is not None and not 0.0 < value < 1e12:
-            raise BadInput(f"{name} {value:g}: expected more than 0")
+            raise BadInput(expected("more than 0", f"{value:g}", name))
     node = dbc_node(v.family) if args.node is None else args.node
     told = dict(_pair(word, "--line") for word in args.line)
     inputs = {axis: _volts(value, axis) for axis, value in (_pair(word, "--input") for word in args.input)}
@@ -76,7 +76,7 @@ def _about(bench: recording.Bench) -> list[str]:
 def _pair(word: str, option: str) -> tuple[str, str]:
     name, _, value = word.partition("=")
     if not name or not value:
-        raise BadInput(f"{option} {word}: expected NAME=VALUE")
+        raise BadInput(expected("NAME=VALUE", repr(word), option))
     return name, value
 
 

@@ -17,6 +17,8 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from psabench.errors import expected
+
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 Bits = NDArray[np.uint8]
@@ -134,7 +136,7 @@ def _whole(file: BinaryIO, name: str) -> Vcd:
     if part.note:
         raise ValueError(f"{name}: {part.note}")
     if part.unit_fs < _FS_PER_NS:
-        raise ValueError(f"{name}: expected $timescale of 1 ns to 100 s, got {part.unit_fs} fs")
+        raise ValueError(expected("$timescale of 1 ns to 100 s", f"{part.unit_fs} fs", name))
     unit_ns = part.unit_fs // _FS_PER_NS
     if part.start_ns < 0:
         return Vcd(unit_ns, -unit_ns, -unit_ns, {})
@@ -194,13 +196,13 @@ def _head(name: str, file: BinaryIO) -> tuple[str, bytes]:
     while b"$enddefinitions" not in data:
         more = file.read(1 << 16)
         if not more or len(data) > _MOST_HEAD:
-            raise ValueError(f"{name}: expected a VCD file, got no $enddefinitions in the first {len(data)} bytes")
+            raise ValueError(expected("a VCD file", f"no $enddefinitions in the first {len(data)} bytes", name))
         data += more
     head, _, rest = data.partition(b"$enddefinitions")
     while b"$end" not in rest:
         more = file.read(1 << 16)
         if not more or len(rest) > _MOST_HEAD:
-            raise ValueError(f"{name}: expected $end after $enddefinitions, got none")
+            raise ValueError(expected("$end after $enddefinitions", "none", name))
         rest += more
     return head.decode("latin-1"), rest.partition(b"$end")[2]
 
@@ -208,7 +210,7 @@ def _head(name: str, file: BinaryIO) -> tuple[str, bytes]:
 def _declared(name: str, head: str, max_ns: float, level_chars: Bits) -> _Reader:
     scale = _TIMESCALE.search(head)
     if not scale:
-        raise ValueError(f"{name}: expected $timescale of 1, 10 or 100 fs to s, got none")
+        raise ValueError(expected("$timescale of 1, 10 or 100 fs to s", "none", name))
     codes: dict[str, str] = {}
     others: set[str] = set()
     scopes: list[str] = []
@@ -219,14 +221,14 @@ def _declared(name: str, head: str, max_ns: float, level_chars: Bits) -> _Reader
             del scopes[-1:]
         elif kind == "$var" and len(words) >= 4 and words[1] == "1" and words[0] not in _NO_WIRE:
             if len(words[2]) > _MOST_CODE:
-                raise ValueError(f"{name}: expected a code of at most {_MOST_CODE} characters, got {words[2][:40]}")
+                raise ValueError(expected(f"a code of at most {_MOST_CODE} characters", words[2][:40], name))
             codes.setdefault(words[2], _name(words[3], scopes, set(codes.values())))
         elif kind == "$var" and len(words) >= 3:
             others.add(words[2])
     if not codes:
-        raise ValueError(f"{name}: expected $var of 1 bit, got none")
+        raise ValueError(expected("$var of 1 bit", "none", name))
     if len(codes) > _MOST_WIRES:
-        raise ValueError(f"{name}: expected at most {_MOST_WIRES} wires, got {len(codes)}")
+        raise ValueError(expected(f"at most {_MOST_WIRES} wires", len(codes), name))
     unit_fs = int(scale[1]) * _FS[scale[2]]
     return _Reader(codes, frozenset(others - set(codes)), unit_fs, max_ns, level_chars)
 
@@ -336,11 +338,11 @@ def _first_bad(r: _Reader, w: _Words) -> int:
         (times[np.diff(t) < 0], "a time after the one before it"),
         (times[t[1:] > most], f"a time up to #{most}"),
     ]
-    found = [(int(at[0]), expected) for at, expected in ends if len(at)]
+    found = [(int(at[0]), due) for at, due in ends if len(at)]
     if found:
-        k, expected = min(found)
+        k, due = min(found)
         at, got = int(max(w.time[:k].max(initial=-1), r.now)), w.tokens.word(int(w.which[k]))[:40]
-        r.note = f"after #{at}: expected {expected}, got '{got}'"
+        r.note = expected(due, f"'{got}'", f"after #{at}")
         return k
     return len(w.which)
 

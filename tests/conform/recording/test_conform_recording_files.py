@@ -367,7 +367,7 @@ def test_holes_of_a_capture_are_kept(tmp_path: Path) -> None:
         (["a.vcd", "--line", "Nix=Int"], "a psa2 has no line Nix"),
         (["a.vcd", "--line", "Int=D9"], "has no channel D9; it has Int Data CLK"),
         (["a.log", "--node", "9"], "no frame of node 9; nodes with frames: 5"),
-        (["a.log", "--max-seconds", "0"], "--max-seconds 0: expected more than 0"),
+        (["a.log", "--max-seconds", "0"], "--max-seconds: expected more than 0, got 0"),
         (["a.log", "--only", "XYZ"], "no requirement of psa2"),
         (["a.log", "--input", "x=much"], "'much' is no number"),
     ],
