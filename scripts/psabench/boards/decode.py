@@ -16,7 +16,7 @@ from psabench.boards.devices import of_board, reader_of
 from psabench.boards.psa2.device import Psa2
 from psabench.boards.psa2.frames import FrameReader, Frames
 from psabench.boards.readings import ReadingReader, Readings
-from psabench.errors import BadInput
+from psabench.errors import BadInput, expected
 from psabench.link.lineport import LineDecoder, LineFormat, decode_stream
 from psabench.link.protocol_files import dbc_node, message
 
@@ -68,7 +68,7 @@ def _senders(ids: set[int], board: str) -> set[int]:
 def _check_there(path: Path) -> None:
     """Before the table's head is printed."""
     if not path.exists() or path.is_dir():
-        raise BadInput(f"{path}: no such file" if not path.exists() else f"{path}: a folder; expected a file")
+        raise BadInput(expected("a file", "a folder", str(path)) if path.exists() else f"{path}: no such file")
 
 
 def _chunks(path: Path, reader: FrameReader | ReadingReader, ids: set[int]) -> Iterator[Frames | Readings]:

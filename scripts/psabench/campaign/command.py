@@ -16,7 +16,7 @@ from psabench.campaign.runner import Plan
 from psabench.campaign.setup import Setup
 from psabench.campaign.store import Store
 from psabench.campaign.workers import reach, workers
-from psabench.errors import BadInput
+from psabench.errors import BadInput, expected
 from psabench.options import Help, Parser, natural
 from psabench.procedures.head_bench import Progress
 from psabench.progress import Bar
@@ -190,11 +190,11 @@ def _plans(options: Options) -> list[Plan]:
     """The closed form beside another chain, then the chain that was asked for."""
     runs = DEFAULT_RUNS[options.chain] if options.runs is None else options.runs
     if not 1 <= runs <= MOST_RUNS:
-        raise BadInput(f"--runs {runs}: expected 1 to {MOST_RUNS}")
+        raise BadInput(expected(f"1 to {MOST_RUNS}", runs, "--runs"))
     if options.seed > MOST_SEED:
-        raise BadInput(f"--seed {options.seed}: expected 0 to {MOST_SEED}")
+        raise BadInput(expected(f"0 to {MOST_SEED}", options.seed, "--seed"))
     if options.workers is not None and not 1 <= options.workers <= 1024:
-        raise BadInput(f"--workers {options.workers}: expected 1 to 1024")
+        raise BadInput(expected("1 to 1024", options.workers, "--workers"))
     if options.workers is not None and options.dask is not None:
         raise BadInput("--workers: the cluster at --dask has its own number of workers")
     cases = _cases(options)

@@ -18,7 +18,7 @@ from typing import Any, Protocol
 import can
 from can.interfaces.socketcan import SocketcanBus
 
-from psabench.errors import BadInput, LinkError
+from psabench.errors import BadInput, LinkError, expected
 from psabench.link.control import Control, Reply
 
 BARRIER_S = 10.0  # patience for a frame that the emulator says it has sent
@@ -252,12 +252,12 @@ def _bus_arguments(spec: str | None) -> dict[str, Any]:
     head, *pairs = spec.split(",")
     interface, _, channel = head.partition(":")
     if not channel or not all("=" in p for p in pairs):
-        raise BadInput(f"--can {spec}: expected INTERFACE:CHANNEL[,key=value], e.g. socketcand:127.0.0.1:29536")
+        raise BadInput(expected("INTERFACE:CHANNEL[,key=value], e.g. socketcand:127.0.0.1:29536", repr(spec), "--can"))
     arguments: dict[str, Any] = {"interface": interface, "channel": channel}
     if interface == "socketcand":
         host, _, port = channel.rpartition(":")
         if not port.isdecimal():
-            raise BadInput(f"--can {spec}: expected socketcand:HOST:PORT, e.g. socketcand:127.0.0.1:29536")
+            raise BadInput(expected("socketcand:HOST:PORT, e.g. socketcand:127.0.0.1:29536", repr(spec), "--can"))
         arguments |= {"channel": "can0", "host": host, "port": int(port), "tcp_tune": True}
     if interface == "slcan":
         arguments["sleep_after_open"] = 0.0  # an emulator needs no 2 s to wake up

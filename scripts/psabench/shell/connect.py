@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from psabench.bench import NONE, Bench
-from psabench.errors import BadInput
+from psabench.errors import BadInput, expected
 from psabench.instruments import KINDS
 from psabench.shell.commands import Arg, Command, Kind, Vocabulary
 from psabench.shell.grammar import parse
@@ -85,6 +85,6 @@ def addresses(pairs: list[str]) -> dict[str, str]:
     for pair in pairs:
         name, equals, address = pair.partition("=")
         if name not in KINDS or not equals or not address:
-            raise BadInput(f"--scpi {pair}: expected NAME=VISA-ADDRESS, NAME one of {', '.join(KINDS)}")
+            raise BadInput(expected(f"NAME=VISA-ADDRESS, NAME one of {', '.join(KINDS)}", repr(pair), "--scpi"))
         found[name] = address
     return found

@@ -43,9 +43,9 @@ def test_settings_change_the_instrument_of_every_study() -> None:
 MISTAKES = [
     ("--study stars", "--study stars: no such study; readings, sources, step"),
     ("--case R99", "--case R99: no such case; R0, R1"),
-    ("--runs 0", "--runs 0: expected 1 to 100000000"),
+    ("--runs 0", "--runs: expected 1 to 100000000, got 0"),
     ("--seed 99999999999999999999", "expected 0 to"),
-    ("--workers 0", "--workers 0: expected 1 to 1024"),
+    ("--workers 0", "--workers: expected 1 to 1024, got 0"),
     ("--workers 2 --dask tcp://127.0.0.1:9", "--workers: the cluster at --dask has its own number"),
     ("--set latitude_deg", "--set latitude_deg: expected NAME=VALUE with a name of latitude_deg, "),
     ("--set latitude=3", "--set latitude=3: no such setting; latitude_deg, tilt_deg? --list names all"),

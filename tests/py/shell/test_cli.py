@@ -46,7 +46,7 @@ MISTAKES: list[tuple[str, str]] = [
     ("decode --line nothing.bin", "nothing.bin: no such file"),
     ("decode --line x.bin --board psd1 --out x.csv", "--line: line frames are PSA-2's; of a psd1 a CAN log is decoded"),
     ("decode --line nothing.bin --board psa1", "nothing.bin: no such file"),
-    ("decode --line /", "/: a folder; expected a file"),
+    ("decode --line /", "/: expected a file, got a folder"),
     ("decode --line /dev/null --word-bits 17", "word_bits is 17; a PSA-2 sends words of 16, 24 or 32 bits"),
     ("decode --line /dev/null --out /dev/null/x.csv", "/dev/null/x.csv: "),
 ]

@@ -15,7 +15,7 @@ from psabench.conform.sources.samples import PORT_LINES
 from psabench.conform.sources.sigrok import read_sr
 from psabench.conform.sources.taken import BLOCK, NS, Bounds, CanTake, LineTake
 from psabench.conform.sources.vcd_file import read_vcd_file
-from psabench.errors import BadInput
+from psabench.errors import BadInput, expected
 
 CAN_ENDINGS = (*can_logs.TEXT, *can_logs.BINARY)
 LINE_ENDINGS = (".vcd", ".sr", ".bin")
@@ -60,7 +60,7 @@ def _read(path: Path, family: str, bounds: Bounds) -> CanTake | LineTake:
             f"{' '.join(LINE_ENDINGS)} recordings of lines"
         )
     if not path.exists() or path.is_dir():
-        raise BadInput(f"{path}: no such file" if not path.exists() else f"{path}: a folder; expected a file")
+        raise BadInput(expected("a file", "a folder", str(path)) if path.exists() else f"{path}: no such file")
     try:
         if ending == ".vcd":
             return read_vcd_file(path, bounds)

@@ -16,7 +16,7 @@ import numpy as np
 
 from psabench.conform.sources.sampled import Sampler
 from psabench.conform.sources.taken import BLOCK, MOST_BYTES, MOST_CHANNELS, Bounds, LineTake
-from psabench.errors import BadInput
+from psabench.errors import BadInput, expected
 
 MOST_METADATA = 1 << 16
 MOST_MEMBERS = 100_000
@@ -73,7 +73,7 @@ def _device(path: Path, text: str) -> Mapping[str, str]:
 def _number(path: Path, device: Mapping[str, str], key: str, least: int, most: int) -> int:
     text = device.get(key, "")
     if not (text.isascii() and text.isdigit() and len(text) < 6 and least <= int(text) <= most):
-        raise BadInput(f"{path}: metadata: {key} is {text[:20]!r}; expected {least} to {most}")
+        raise BadInput(expected(f"{least} to {most}", repr(text[:20]), f"{path}: metadata: {key}"))
     return int(text)
 
 
