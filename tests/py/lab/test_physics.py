@@ -101,9 +101,9 @@ def test_a_gyro_at_rest_reads_the_earths_rate(lib: ctypes.CDLL, latitude_deg: fl
     north = [math.cos(azimuth), -math.sin(azimuth), 0]  # in the bench's axes: x ahead, y right, z down
     want = 15.041067 * (math.cos(latitude) * np.array(north) - math.sin(latitude) * np.array([0, 0, 1]))
     for on in (FIXED, TABLE):
-        _, w = lab.feel(on, 1.0)
+        _, w = lab.kinematics(on, 1.0)
         assert np.degrees(w) * 3600 == pytest.approx(want, abs=1e-6)
-    _, w = lab.feel(HEAD, 1.0)  # x ahead, y up, z to the right
+    _, w = lab.kinematics(HEAD, 1.0)  # x ahead, y up, z to the right
     assert np.degrees(w) * 3600 == pytest.approx([want[0], -want[2], want[1]], abs=1e-6)
 
 
@@ -182,7 +182,7 @@ def test_table_kinematics_and_lever_arm_by_numerical_differentiation(lib: ctypes
     lever, at, askew = np.array([0.11, -0.07, 0.2]), np.array([0.03, 0.02, -0.015]), [0.01, -0.02, 0.005]
     c_tb = turn(0, askew[0]) @ turn(1, askew[1]) @ turn(2, askew[2])
     f, w = numerical_feel(lambda t: own_attitude(lab, t), lab.g_mps2, lever + c_tb @ at, t_s)
-    got_f, got_w = lab.feel(TABLE, t_s, lever_m=lever.tolist(), askew_rad=askew, at_m=at.tolist())
+    got_f, got_w = lab.kinematics(TABLE, t_s, lever_m=lever.tolist(), askew_rad=askew, at_m=at.tolist())
     assert got_w == pytest.approx(c_tb.T @ w, abs=2e-9)
     assert got_f == pytest.approx(c_tb.T @ f, abs=2e-6)
     assert float(np.linalg.norm(f)) > lab.g_mps2 * 0.5  # something is measured at all
@@ -204,7 +204,7 @@ def test_head_and_lever_arm_by_numerical_differentiation(lib: ctypes.CDLL, t_s: 
     c_mb = turn(0, quarter * math.pi / 2)
     lever, at = np.array([0.05, 0.12, -0.03]), np.array([0.01, -0.02, 0.03])
     f, w = numerical_feel(attitude, lab.g_mps2, lever + c_mb @ at, t_s)
-    got_f, got_w = lab.feel(HEAD, t_s, lever_m=lever.tolist(), at_m=at.tolist())
+    got_f, got_w = lab.kinematics(HEAD, t_s, lever_m=lever.tolist(), at_m=at.tolist())
     assert got_w == pytest.approx(c_mb.T @ w, abs=2e-9)
     assert got_f == pytest.approx(c_mb.T @ f, abs=2e-7)
 
@@ -230,7 +230,7 @@ def test_six_positions_close(lib: ctypes.CDLL) -> None:
         t_s = 100.0 * i
         for axis, deg in enumerate(angles):
             assert lib.bridge_position(lab.lab, axis, float(deg), 0.0, ns(t_s)) == 0
-        f, w = lab.feel(TABLE, t_s + 99)
+        f, w = lab.kinematics(TABLE, t_s + 99)
         want = np.zeros(3)
         want[which[0]] = -which[1] * lab.g_mps2
         assert f == pytest.approx(want, abs=1e-12)

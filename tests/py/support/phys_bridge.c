@@ -98,28 +98,28 @@ EXPORT void bridge_head(struct lab *l, double deg, int face, int64_t t_ns)
     head_mount(&l->head, (enum head_face)face, t_ns);
 }
 
-static struct lab_mounting seat_of(const double seat[7])
+static struct lab_mounting mounting_of(const double mounting[7])
 {
-    return (struct lab_mounting){(enum lab_mount)seat[0], {seat[1], seat[2], seat[3]}, {seat[4], seat[5], seat[6]}};
+    return (struct lab_mounting){(enum lab_mount)mounting[0], {mounting[1], mounting[2], mounting[3]}, {mounting[4], mounting[5], mounting[6]}};
 }
 
-/* seat: mount, lever arm m, misalignment rad. out: f, w */
-EXPORT void bridge_feel(struct lab *l, const double seat[7], const double at_m[3], int64_t t_ns, double out[6])
+/* mounting: mount, lever arm m, misalignment rad. out: f, w */
+EXPORT void bridge_kinematics(struct lab *l, const double mounting[7], const double at_m[3], int64_t t_ns, double out[6])
 {
-    const struct lab_mounting s = seat_of(seat);
-    struct felt felt;
-    lab_kinematics(l, &s, at_m, t_ns, &felt);
+    const struct lab_mounting s = mounting_of(mounting);
+    struct kinematics motion;
+    lab_kinematics(l, &s, at_m, t_ns, &motion);
     for (unsigned k = 0; k < 3; k++) {
-        out[k] = felt.f_mps2[k];
-        out[3 + k] = felt.w_radps[k];
+        out[k] = motion.f_mps2[k];
+        out[3 + k] = motion.w_radps[k];
     }
 }
 
 /* An accelerometer of a unit, model (1): volts. k in V per m/s^2. */
-EXPORT double bridge_accelerometer(struct lab *l, const double seat[7], const double at_m[3], double u0_v,
+EXPORT double bridge_accelerometer(struct lab *l, const double mounting[7], const double at_m[3], double u0_v,
                                    const double k[3], int64_t t_ns)
 {
-    const struct lab_mounting s = seat_of(seat);
+    const struct lab_mounting s = mounting_of(mounting);
     const struct mems_cfg c = {.u0_v = u0_v, .k_v_per_mps2 = {k[0], k[1], k[2]}};
     double a_mps2[3];
     lab_sensor_mps2(l, &s, at_m, 1.0, 0.0, t_ns, a_mps2);

@@ -32,7 +32,7 @@ SIGNATURES: dict[str, tuple[object, list[object]]] = {
     "readout_deg": (ctypes.c_double, [LAB, ctypes.c_uint, T_NS]),
     "attitude": (None, [LAB, T_NS, DOUBLES]),
     "head": (None, [LAB, ctypes.c_double, ctypes.c_int, T_NS]),
-    "feel": (None, [LAB, DOUBLES, DOUBLES, T_NS, DOUBLES]),
+    "kinematics": (None, [LAB, DOUBLES, DOUBLES, T_NS, DOUBLES]),
     "accelerometer": (ctypes.c_double, [LAB, DOUBLES, DOUBLES, ctypes.c_double, DOUBLES, T_NS]),
     "oven": (LAB, [ctypes.c_double] * 5),
     "oven_free": (None, [LAB]),
@@ -114,7 +114,7 @@ class Lab:
         self.lib.bridge_attitude(self.lab, ns(t_s), out)
         return np.array(out).reshape(3, 3)
 
-    def feel(
+    def kinematics(
         self,
         on: int,
         t_s: float,
@@ -125,7 +125,7 @@ class Lab:
     ) -> tuple[Array, Array]:
         """Specific force, m/s^2, and inertial rate, rad/s, in the case's axes."""
         out = (ctypes.c_double * 6)()
-        self.lib.bridge_feel(self.lab, doubles([on, *lever_m, *askew_rad]), doubles(at_m), ns(t_s), out)
+        self.lib.bridge_kinematics(self.lab, doubles([on, *lever_m, *askew_rad]), doubles(at_m), ns(t_s), out)
         return np.array(out[:3]), np.array(out[3:])
 
     def accelerometer_v(self, on: int, t_s: float, u0_v: float, k: Sequence[float]) -> float:
