@@ -68,9 +68,9 @@ struct api_counter {
     {                                                                                                                  \
         name, offsetof(struct part, member), NULL                                                                      \
     }
-#define API_COUNTER_GET(name)                                                                                          \
+#define API_COUNTER_GET(member)                                                                                        \
     {                                                                                                                  \
-#name, .get = name                                                                                             \
+        .name = #member, .get = (member)                                                                               \
     }
 
 enum api_spi { API_NO_SPI, API_SPI_MODE0, API_SPI_MODE1 };
