@@ -98,7 +98,7 @@ static inline void rig_vcd_path(struct rig_vcd *v)
 /* Reads the file and removes it. The pin's name is found by its code. */
 static inline void rig_vcd_read(struct rig_vcd *v)
 {
-    static char names[1000][48]; /* "code part.pin" */
+    static char names[1000][64]; /* "code part.pin" */
     char line[100];
     char scope[32] = "";
     unsigned count = 0;

@@ -41,7 +41,7 @@ static inline struct psa2_profile psa2_profile_file(const char *name)
             psa2_set(&p, key, item++, text + 2);
         } else if (colon) {
             *colon = '\0';
-            (void)snprintf(key, sizeof key, "%s", text);
+            (void)snprintf(key, sizeof key, "%.39s", text);
             item = 0;
             char *value = psa2_trim(colon + 1);
             if (strcmp(key, "board") == 0) continue; /* whose it is; not the profile's */

@@ -100,11 +100,13 @@ EXPORT void bridge_head(struct lab *l, double deg, int face, int64_t t_ns)
 
 static struct lab_mounting mounting_of(const double mounting[7])
 {
-    return (struct lab_mounting){(enum lab_mount)mounting[0], {mounting[1], mounting[2], mounting[3]}, {mounting[4], mounting[5], mounting[6]}};
+    return (struct lab_mounting){
+        (enum lab_mount)mounting[0], {mounting[1], mounting[2], mounting[3]}, {mounting[4], mounting[5], mounting[6]}};
 }
 
 /* mounting: mount, lever arm m, misalignment rad. out: f, w */
-EXPORT void bridge_kinematics(struct lab *l, const double mounting[7], const double at_m[3], int64_t t_ns, double out[6])
+EXPORT void bridge_kinematics(struct lab *l, const double mounting[7], const double at_m[3], int64_t t_ns,
+                              double out[6])
 {
     const struct lab_mounting s = mounting_of(mounting);
     struct kinematics motion;

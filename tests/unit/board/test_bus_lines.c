@@ -74,7 +74,7 @@ static uint64_t lines_named(const char *stem, unsigned count)
 {
     uint64_t mask = 0;
     for (unsigned i = 0; i < count; i++) {
-        char name[8];
+        char name[16];
         (void)snprintf(name, sizeof name, "%s%u", stem, i);
         const int sig = trace_find(unit_trace(&w.u), name);
         assert_true(sig >= 0);
