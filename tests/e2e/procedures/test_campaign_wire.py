@@ -66,7 +66,7 @@ def test_runs_are_the_same_each_time_and_resume(tmp_path: Path, quiet: Bar) -> N
     assert [a.chain for a in found.agreements] == ["emulated"]
     assert found.checks == []  # limits are for the algebra
     text = page.write(out, found).read_text(encoding="utf-8")
-    assert "Do the chains agree?" in text
+    assert "Agreement of the chains" in text
 
 
 # ---- free pace beside live
