@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import subprocess
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -53,13 +54,18 @@ def first_seed() -> int:
 
 
 @pytest.fixture(scope="module")
-def report(main_job: tuple[subprocess.CompletedProcess[str], Path]) -> Found:
-    """Estimates of `psabench run all` by (procedure, condition) and name: one run serves the tests below."""
-    done, out = main_job
+def report(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Found:
+    """Estimates by (procedure, condition) and name: of `psabench run all`, in tier `test` of `psabench run fourier`."""
+    if request.config.getoption("tier") == "test":
+        out, series = tmp_path_factory.mktemp("fourier"), 2
+        command = [sys.executable, "-m", "psabench.cli", "run", "fourier", "--out", str(out)]
+        done = subprocess.run(command, stdout=subprocess.PIPE, text=True, timeout=550)
+    else:
+        (done, out), series = request.getfixturevalue("main_job"), 6
     assert done.returncode == 0, done.stdout[-3000:]
     page = (out / "report.html").read_text()
     assert "within their limits of the truth" in page
-    assert len(list(out.glob("*.csv"))) == 6
+    assert len(list(out.glob("*.csv"))) == series
     for label in ("quiet", "realistic"):
         assert json.loads((out / f"scenario-{label}.json").read_text())["units"]
     sections = json.loads((out / "result.json").read_text())["sections"]
