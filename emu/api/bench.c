@@ -73,7 +73,8 @@ int64_t psabench_next_ns(const psabench *b)
 int api_may_move(psabench *b, const char *function)
 {
     if (!b->inside) return PSABENCH_OK;
-    return api_fail(b, PSABENCH_BAD_ARGUMENT, "%s from a callback: time moves only between callbacks", function);
+    return api_fail(b, PSABENCH_BAD_ARGUMENT, "%s: expected a call outside callbacks, where time may advance",
+                    function);
 }
 
 static void notify_part(struct psabench_part *p)
@@ -130,8 +131,8 @@ int psabench_run_until(psabench *b, int64_t t_ns)
     const int may = api_may_move(b, "psabench_run_until()");
     if (may) return may;
     if (t_ns < b->sched.now_ns || t_ns > API_TIME_MAX_NS)
-        return api_fail(b, PSABENCH_BAD_ARGUMENT, "time %lld ns: it is %lld ns now, and time goes up to %lld ns",
-                        (long long)t_ns, (long long)b->sched.now_ns, (long long)API_TIME_MAX_NS);
+        return api_fail(b, PSABENCH_BAD_ARGUMENT, "time: expected %lld ns (now) to %lld ns, got %lld ns",
+                        (long long)b->sched.now_ns, (long long)API_TIME_MAX_NS, (long long)t_ns);
     b->inside++;
     api_move(b, t_ns);
     b->inside--;
@@ -142,8 +143,8 @@ int psabench_run_for(psabench *b, int64_t dt_ns)
 {
     if (!b) return PSABENCH_BAD_ARGUMENT;
     if (dt_ns < 0 || dt_ns > API_TIME_MAX_NS)
-        return api_fail(b, PSABENCH_BAD_ARGUMENT, "a span of %lld ns: use 0 to %lld ns", (long long)dt_ns,
-                        (long long)API_TIME_MAX_NS);
+        return api_fail(b, PSABENCH_BAD_ARGUMENT, "time span: expected 0 to %lld ns, got %lld ns",
+                        (long long)API_TIME_MAX_NS, (long long)dt_ns);
     return psabench_run_until(b, b->sched.now_ns + dt_ns);
 }
 
@@ -157,14 +158,14 @@ int psabench_vcd_close(psabench *b)
     b->inside++;
     const int error = api_vcd_end(b);
     b->inside--;
-    return error ? api_fail(b, PSABENCH_SYSTEM, "the recording is not complete: %s", strerror(error)) : PSABENCH_OK;
+    return error ? api_fail(b, PSABENCH_SYSTEM, "recording: incomplete: %s", strerror(error)) : PSABENCH_OK;
 }
 
 int psabench_vcd(psabench *b, const char *path)
 {
     const int closed = psabench_vcd_close(b);
     if (closed) return closed;
-    if (!path) return api_fail(b, PSABENCH_BAD_ARGUMENT, "psabench_vcd(): no path");
+    if (!path) return api_fail(b, PSABENCH_BAD_ARGUMENT, "psabench_vcd(): expected a path, got NULL");
     const int error = api_vcd_begin(b, path);
     return error ? api_fail(b, PSABENCH_SYSTEM, "%.200s: %s", path, strerror(error)) : PSABENCH_OK;
 }

@@ -41,11 +41,12 @@ static int check_name(psabench *b, const char *name)
     size_t len = 0;
     while (name && name[len] && len < API_NAME && is_name_char(name[len])) len++;
     if (!name || len == 0 || len >= API_NAME || name[len])
-        return api_fail(b, PSABENCH_BAD_ARGUMENT, "name %.40s: use 1 to %d of the characters A-Z a-z 0-9 _ - .",
-                        name ? name : "(NULL)", API_NAME - 1);
+        return api_fail(b, PSABENCH_BAD_ARGUMENT,
+                        "name: expected 1 to %d of the characters A-Z a-z 0-9 _ - ., got %.40s", API_NAME - 1,
+                        name ? name : "NULL");
     for (const struct psabench_part *p = b->parts; p; p = p->next)
         if (strcmp(p->name, name) == 0)
-            return api_fail(b, PSABENCH_BAD_ARGUMENT, "name %s: a part on this bench has it already, use another",
+            return api_fail(b, PSABENCH_BAD_ARGUMENT, "name: expected one that no part of this bench has, got %s",
                             name);
     return PSABENCH_OK;
 }
@@ -55,7 +56,7 @@ static struct psabench_part *allocate_part(psabench *b, const struct api_kind *k
 {
     struct psabench_part *p = calloc(1, k->size);
     if (!p) {
-        (void)api_fail(b, PSABENCH_SYSTEM, "part %s: no memory", name);
+        (void)api_fail(b, PSABENCH_SYSTEM, "part %s: out of memory", name);
         return NULL;
     }
     p->kind = k;
@@ -74,8 +75,8 @@ psabench_part *psabench_part_new(psabench *b, const char *part, const char *name
     if (!b || api_may_move(b, "psabench_part_new()") || check_name(b, name)) return NULL;
     const struct api_kind *k = find_kind(part);
     if (!k) {
-        (void)api_fail(b, PSABENCH_BAD_ARGUMENT, "no part %.40s: there are %s", part ? part : "(NULL)",
-                       psabench_parts());
+        (void)api_fail(b, PSABENCH_BAD_ARGUMENT, "part: expected one of %s, got %.40s", psabench_parts(),
+                       part ? part : "NULL");
         return NULL;
     }
     struct psabench_part *p = allocate_part(b, k, name);

@@ -42,8 +42,8 @@ static int no_such_pin(const psabench_part *p, const char *name)
     size_t len = 0;
     for (unsigned i = 0; i < p->kind->pin_count && len < sizeof list; i++)
         len += (size_t)snprintf(list + len, sizeof list - len, " %s", p->kind->pins[i].name);
-    return api_fail(p->bench, PSABENCH_BAD_ARGUMENT, "%s: no pin %.40s of %s: there are%s", p->name,
-                    name ? name : "(NULL)", p->kind->name, list);
+    return api_fail(p->bench, PSABENCH_BAD_ARGUMENT, "%s: pin of %s: expected one of%s, got %.40s", p->name,
+                    p->kind->name, list, name ? name : "NULL");
 }
 
 int psabench_pin(const psabench_part *p, const char *name)
@@ -61,8 +61,8 @@ static const struct api_pin *pin_of(const psabench_part *p, int pin)
 static int no_pin(const psabench_part *p, int pin)
 {
     if (!p) return PSABENCH_BAD_ARGUMENT;
-    return api_fail(p->bench, PSABENCH_BAD_ARGUMENT, "%s: no pin number %d: 0 to %u", p->name, pin,
-                    p->kind->pin_count - 1);
+    return api_fail(p->bench, PSABENCH_BAD_ARGUMENT, "%s: pin number: expected 0 to %u, got %d", p->name,
+                    p->kind->pin_count - 1, pin);
 }
 
 const char *psabench_pin_name(const psabench_part *p, int pin)
@@ -91,8 +91,8 @@ static bool is_late(const struct api_pin *row)
 
 static int too_late(const psabench_part *p, const struct api_pin *row)
 {
-    return api_fail(p->bench, PSABENCH_NOT_HERE, "%s: %s is known when its burst is over: watch or record it", p->name,
-                    row->name);
+    return api_fail(p->bench, PSABENCH_NOT_HERE, "%s: %s: the level is known only after the burst; watch or record it",
+                    p->name, row->name);
 }
 
 int psabench_get(const psabench_part *p, int pin)
@@ -117,11 +117,12 @@ int psabench_set(psabench_part *p, int pin, int level)
     if (!row) return no_pin(p, pin);
     psabench *b = p->bench;
     if (row->dir == API_OUT || (level != 0 && level != 1))
-        return api_fail(b, PSABENCH_BAD_ARGUMENT, "%s: %s = %d: %s", p->name, row->name, level,
-                        row->dir == API_OUT ? "it is an output" : "a level is 0 or 1");
+        return api_fail(b, PSABENCH_BAD_ARGUMENT, "%s: %s: expected %s, got %d", p->name, row->name,
+                        row->dir == API_OUT ? "an input" : "0 or 1", level);
     if (p->inside || b->nested >= NESTED_MAX)
-        return api_fail(b, PSABENCH_BAD_ARGUMENT, "%s: %s set from %s", p->name, row->name,
-                        p->inside ? "a callback that the same part is waiting for" : "callbacks of psabench_set()");
+        return api_fail(b, PSABENCH_BAD_ARGUMENT, "%s: %s: expected a call outside %s", p->name, row->name,
+                        p->inside ? "a callback that the same part is waiting for"
+                                  : "nested callbacks of psabench_set()");
     b->inside++;
     b->nested++;
     api_drive(p, (unsigned)pin, level);
@@ -136,7 +137,8 @@ int psabench_watch(psabench_part *p, int pin, psabench_watch_fn *fn, void *ctx)
     const struct api_pin *row = pin_of(p, pin);
     if (!row) return no_pin(p, pin);
     if (row->dir == API_IN)
-        return api_fail(p->bench, PSABENCH_BAD_ARGUMENT, "%s: %s is an input: who sets it knows", p->name, row->name);
+        return api_fail(p->bench, PSABENCH_BAD_ARGUMENT, "%s: %s: expected an output, got an input", p->name,
+                        row->name);
     const uint32_t bit = UINT32_C(1) << pin;
     if (row->get && !((p->watched | p->recorded) & bit)) { /* changes count from now */
         p->level = row->get(p, row->arg) ? p->level | bit : p->level & ~bit;
@@ -164,8 +166,9 @@ int psabench_run_until_level(psabench_part *p, int pin, int level, int64_t timeo
     if (may) return may;
     if (is_late(row)) return too_late(p, row);
     if ((level != 0 && level != 1) || timeout_ns < 0 || timeout_ns > API_TIME_MAX_NS - b->sched.now_ns)
-        return api_fail(b, PSABENCH_BAD_ARGUMENT, "%s: %s to be %d within %lld ns: a level is 0 or 1, a span >= 0",
-                        p->name, row->name, level, (long long)timeout_ns);
+        return api_fail(b, PSABENCH_BAD_ARGUMENT,
+                        "%s: %s: expected a level of 0 or 1 and a span >= 0, got %d and %lld ns", p->name, row->name,
+                        level, (long long)timeout_ns);
     const int64_t end_ns = b->sched.now_ns + timeout_ns;
     b->inside++;
     while (level_now(p, pin) != level && b->sched.now_ns < end_ns) {
@@ -174,7 +177,7 @@ int psabench_run_until_level(psabench_part *p, int pin, int level, int64_t timeo
     }
     b->inside--;
     if (level_now(p, pin) == level) return PSABENCH_OK;
-    return api_fail(b, PSABENCH_TIMEOUT, "%s: %s did not become %d within %lld ns", p->name, row->name, level,
+    return api_fail(b, PSABENCH_TIMEOUT, "%s: %s: expected %d within %lld ns, got no change", p->name, row->name, level,
                     (long long)timeout_ns);
 }
 
@@ -194,8 +197,9 @@ double api_input(struct psabench_part *p, unsigned input, int64_t t_ns)
 static int before_input(struct psabench_part *p, const char *function)
 {
     if (p->inside)
-        return api_fail(p->bench, PSABENCH_BAD_ARGUMENT, "%s: %s from a callback that the same part is waiting for",
-                        p->name, function);
+        return api_fail(p->bench, PSABENCH_BAD_ARGUMENT,
+                        "%s: %s: expected a call outside a callback that the same part is waiting for", p->name,
+                        function);
     p->bench->inside++;
     if (p->kind->before_input) p->kind->before_input(p, p->bench->sched.now_ns);
     p->bench->inside--;
@@ -219,8 +223,8 @@ static int no_such_input(const psabench_part *p, int input)
     size_t len = 0;
     for (unsigned i = 0; i < API_INPUTS_MAX && len < sizeof list; i++)
         if (p->kind->inputs >> i & 1) len += (size_t)snprintf(list + len, sizeof list - len, " %u", i);
-    return api_fail(p->bench, PSABENCH_BAD_ARGUMENT, "%s: no input %d of %s: there are%s", p->name, input,
-                    p->kind->name, list);
+    return api_fail(p->bench, PSABENCH_BAD_ARGUMENT, "%s: input of %s: expected one of%s, got %d", p->name,
+                    p->kind->name, list, input);
 }
 
 int psabench_set_volts(psabench_part *p, int input, double volts)
@@ -228,7 +232,8 @@ int psabench_set_volts(psabench_part *p, int input, double volts)
     if (!p) return PSABENCH_BAD_ARGUMENT;
     if (input < 0 || input >= API_INPUTS_MAX || !(p->kind->inputs >> input & 1)) return no_such_input(p, input);
     if (!(volts >= -API_VOLTS_MAX && volts <= API_VOLTS_MAX))
-        return api_fail(p->bench, PSABENCH_BAD_ARGUMENT, "%s: input %d: not a number of volts", p->name, input);
+        return api_fail(p->bench, PSABENCH_BAD_ARGUMENT, "%s: input %d: expected volts within +-%g, got %g", p->name,
+                        input, (double)API_VOLTS_MAX, volts);
     const int bad = before_input(p, "psabench_set_volts()");
     if (bad) return bad;
     p->volts[input] = volts;
@@ -255,7 +260,8 @@ int psabench_peek(const psabench_part *p, unsigned address)
     if (!p) return PSABENCH_BAD_ARGUMENT;
     const int value = p->kind->peek(p, address);
     if (value >= 0) return value;
-    return api_fail(p->bench, PSABENCH_BAD_ARGUMENT, "%s: no register %03Xh of %s", p->name, address, p->kind->name);
+    return api_fail(p->bench, PSABENCH_BAD_ARGUMENT, "%s: expected a register of %s, got %03Xh", p->name, p->kind->name,
+                    address);
 }
 
 const char *psabench_counter(const psabench_part *p, int i, uint64_t *value)

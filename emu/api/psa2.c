@@ -312,11 +312,12 @@ static int no_access(psabench_part *p, unsigned group, unsigned address, int64_t
 {
     if (!p) return PSABENCH_BAD_ARGUMENT;
     if (!p->kind->board)
-        return api_fail(p->bench, PSABENCH_NOT_HERE, "%s: %s is no board: %s", p->name, p->kind->name, function);
+        return api_fail(p->bench, PSABENCH_NOT_HERE, "%s: %s: expected a board, got %s", p->name, function,
+                        p->kind->name);
     if (group > 3 || address > 0xFF || timeout_ns < 0 || timeout_ns > API_TIME_MAX_NS - now_ns(p))
         return api_fail(p->bench, PSABENCH_BAD_ARGUMENT,
-                        "%s: %s: group %u, register %u, within %lld ns: groups are 0 to 3, registers bytes", p->name,
-                        function, group, address, (long long)timeout_ns);
+                        "%s: %s: expected a group of 0 to 3, a register of 0 to 255 and a time, got %u, %u, %lld ns",
+                        p->name, function, group, address, (long long)timeout_ns);
     return api_may_move(p->bench, function);
 }
 
@@ -327,11 +328,11 @@ static int result_of(const struct part_psa2 *s, enum psa2_result result, unsigne
         const char *text;
     } row[] = {
         [PSA2_OK] = {PSABENCH_OK, ""},
-        [PSA2_NO_SUCH_REG] = {PSABENCH_BAD_ARGUMENT, "the converter has no such register"},
-        [PSA2_READ_ONLY] = {PSABENCH_REFUSED, "no bit there can be written"},
-        [PSA2_BAD_VALUE] = {PSABENCH_REFUSED, "the converter does not take the value"},
+        [PSA2_NO_SUCH_REG] = {PSABENCH_BAD_ARGUMENT, "no such register in the converter"},
+        [PSA2_READ_ONLY] = {PSABENCH_REFUSED, "read-only"},
+        [PSA2_BAD_VALUE] = {PSABENCH_REFUSED, "value rejected by the converter"},
         [PSA2_BUSY] = {PSABENCH_TIMEOUT, "not within the time given"},
-        [PSA2_TIMEOUT] = {PSABENCH_TIMEOUT, "the converter's data-ready did not come"},
+        [PSA2_TIMEOUT] = {PSABENCH_TIMEOUT, "no data-ready of the converter"},
     };
     if (result == PSA2_OK) return PSABENCH_OK;
     return api_fail(s->part.bench, row[result].code, "%s: group %u, register %02Xh: %s", s->part.name, group, address,
@@ -370,7 +371,9 @@ int psabench_board_write(psabench_part *p, unsigned group, unsigned address, uin
 int psabench_on_frame(psabench_part *p, psabench_frame_fn *fn, void *ctx)
 {
     if (!p) return PSABENCH_BAD_ARGUMENT;
-    if (!p->kind->board) return api_fail(p->bench, PSABENCH_NOT_HERE, "%s: %s has no frames", p->name, p->kind->name);
+    if (!p->kind->board)
+        return api_fail(p->bench, PSABENCH_NOT_HERE, "%s: expected a board with frames, got %s", p->name,
+                        p->kind->name);
     p->frame = fn;
     p->frame_ctx = ctx;
     return PSABENCH_OK;

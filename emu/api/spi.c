@@ -59,14 +59,15 @@ static int check_exchange(psabench_part *p, size_t n)
 {
     psabench *b = p->bench;
     if (p->kind->spi == API_NO_SPI)
-        return api_fail(b, PSABENCH_NOT_HERE, "%s: %s has no SPI port of its own", p->name, p->kind->name);
+        return api_fail(b, PSABENCH_NOT_HERE, "%s: expected a part with an SPI port, got %s", p->name, p->kind->name);
     const int may = api_may_move(b, "psabench_spi()");
     if (may) return may;
     if (p->level >> p->sclk & 1)
-        return api_fail(b, PSABENCH_BAD_ARGUMENT, "%s: SCLK is high: psabench_spi() begins with SCLK low", p->name);
+        return api_fail(b, PSABENCH_BAD_ARGUMENT, "%s: psabench_spi(): expected SCLK low, got high", p->name);
     const int64_t byte_ns = clk_span_ns(p->sclk_hz, 8) + 1 + p->gap_ns;
     if (n > (uint64_t)((API_TIME_MAX_NS - b->sched.now_ns) / byte_ns))
-        return api_fail(b, PSABENCH_BAD_ARGUMENT, "%s: %zu bytes would take longer than there is time", p->name, n);
+        return api_fail(b, PSABENCH_BAD_ARGUMENT, "%s: expected fewer bytes (they end after the last time), got %zu",
+                        p->name, n);
     return PSABENCH_OK;
 }
 
@@ -90,11 +91,12 @@ int psabench_spi_clock(psabench_part *p, uint32_t sclk_hz, int64_t gap_ns)
 {
     if (!p) return PSABENCH_BAD_ARGUMENT;
     if (p->kind->spi == API_NO_SPI)
-        return api_fail(p->bench, PSABENCH_NOT_HERE, "%s: %s has no SPI port of its own", p->name, p->kind->name);
+        return api_fail(p->bench, PSABENCH_NOT_HERE, "%s: expected a part with an SPI port, got %s", p->name,
+                        p->kind->name);
     if (sclk_hz < 1 || sclk_hz > SCLK_HZ_MAX || gap_ns < 0 || gap_ns > GAP_NS_MAX)
         return api_fail(p->bench, PSABENCH_BAD_ARGUMENT,
-                        "%s: SCLK of %lu Hz, %lld ns between bytes: use 1 to %d Hz, 0 to %lld ns", p->name,
-                        (unsigned long)sclk_hz, (long long)gap_ns, SCLK_HZ_MAX, (long long)GAP_NS_MAX);
+                        "%s: expected SCLK of 1 to %d Hz and a gap of 0 to %lld ns, got %lu Hz and %lld ns", p->name,
+                        SCLK_HZ_MAX, (long long)GAP_NS_MAX, (unsigned long)sclk_hz, (long long)gap_ns);
     p->sclk_hz = sclk_hz;
     p->gap_ns = gap_ns;
     return PSABENCH_OK;

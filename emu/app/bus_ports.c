@@ -28,14 +28,14 @@ bool bus_ports_check(const struct bench *b, const struct options *o, char *why, 
         if (unit == b->scenario.unit_count && p->unit[0])
             return why_fail(why, cap, "--bus-port %s: expected a unit of the scenario, got \"%s\"", p->arg, p->unit);
         if (unit == b->scenario.unit_count)
-            return why_fail(why, cap, "--bus-port %s: no unit of the scenario has a parallel bus", p->arg);
+            return why_fail(why, cap, "--bus-port %s: expected a scenario with a unit that has a parallel bus", p->arg);
         if (!type_of(b, unit)->bus) {
-            return why_fail(why, cap, "--bus-port %s: unit %s is a %s, which has no parallel bus", p->arg, p->unit,
-                            type_of(b, unit)->title);
+            return why_fail(why, cap, "--bus-port %s: expected a unit with a parallel bus, got %s, a %s", p->arg,
+                            p->unit, type_of(b, unit)->title);
         }
         for (unsigned k = 0; k < i; k++)
             if (find_unit(b, o->bus[k].unit) == unit)
-                return why_fail(why, cap, "--bus-port %s: unit %s has a bus port already", p->arg,
+                return why_fail(why, cap, "--bus-port %s: expected one bus port per unit, got a second for %s", p->arg,
                                 b->scenario.units[unit].name);
     }
     return true;
@@ -68,7 +68,7 @@ static bool open_one(struct bus_ports *all, struct links *links, struct bench *b
                      char *why, size_t cap)
 {
     struct bus_port *p = calloc(1, sizeof *p);
-    if (!p) return why_fail(why, cap, "--bus-port %s: no memory", o->arg);
+    if (!p) return why_fail(why, cap, "--bus-port %s: out of memory", o->arg);
     p->bench = b;
     p->unit = find_unit(b, o->unit);
     const struct board_type *type = type_of(b, p->unit);

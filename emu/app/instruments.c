@@ -72,7 +72,7 @@ static bool open_port(struct instruments *all, const struct scpi_kind *kind, con
     if (all->count == INSTRUMENTS_MAX)
         return why_fail(why, cap, "--scpi %s: expected up to %u addresses", o->arg, INSTRUMENTS_MAX);
     struct instrument *i = calloc(1, sizeof *i);
-    if (!i) return why_fail(why, cap, "--scpi %s: no memory", o->arg);
+    if (!i) return why_fail(why, cap, "--scpi %s: out of memory", o->arg);
     i->all = all;
     i->kind = kind;
     i->port = (struct scpi_port){
@@ -87,7 +87,8 @@ static bool open_port(struct instruments *all, const struct scpi_kind *kind, con
     }
     free(i);
     if (err == -EADDRINUSE)
-        return why_fail(why, cap, "--scpi %s: port %u is in use on 127.0.0.1; choose another, or 0 for any free port",
+        return why_fail(why, cap,
+                        "--scpi %s: expected a free port of 127.0.0.1 or 0 (any free port), got %u, which is in use",
                         o->arg, port);
     if (err == -EEXIST)
         return why_fail(why, cap, "--scpi %s: expected a new name or a symbolic link to a pty, got another file at %s",
@@ -119,7 +120,7 @@ bool instruments_check(const struct instruments *all, const struct options *o, c
         if (strcmp(s->kind, "all") == 0) continue;
         if (!kind) return why_expected(why, cap, "--scpi", WHY_TEXT(s->arg), "head, table, chamber, supply or all");
         if (!kind->present(all->control->bench))
-            return why_fail(why, cap, "--scpi %s: the scenario has no %s", s->arg, kind->name);
+            return why_fail(why, cap, "--scpi %s: expected a scenario with a %s", s->arg, kind->name);
     }
     return true;
 }

@@ -3,6 +3,7 @@
 #include "app/options.h"
 #include "app/service.h"
 #include "base/text.h"
+#include "base/why.h"
 #include "command/exact.h"
 
 #include <errno.h>
@@ -83,11 +84,11 @@ static int run_bench(const struct options *o, const struct snapshot *from, struc
     }
     const int watched = o->unit ? bench_find_unit(scenario, o->unit) : 0;
     if (watched < 0) {
-        snprintf(why, sizeof why, "--unit %s: %s has no unit of that name", o->unit, scenario->path);
+        why_expected(why, sizeof why, "--unit", WHY_TEXT(o->unit), "a unit of the scenario");
         return print_error(SERVICE_INPUT, why);
     }
     char *line = resolved_line(scenario);
-    if (!line) return print_error(SERVICE_MACHINE, "no memory");
+    if (!line) return print_error(SERVICE_MACHINE, "out of memory");
     bench->watched = (unsigned)watched;
     const struct service_origin origin = {.scenario = line, .snapshot = from};
     const bool open = service_open(service, bench, o, &origin, why, sizeof why);
@@ -130,7 +131,7 @@ int main(int argc, char *argv[])
     struct scenario *scenario = malloc(sizeof *scenario);
     struct bench *bench = malloc(sizeof *bench);
     struct service *service = malloc(sizeof *service);
-    const int status = !scenario || !bench || !service ? print_error(SERVICE_MACHINE, "no memory")
+    const int status = !scenario || !bench || !service ? print_error(SERVICE_MACHINE, "out of memory")
                        : o.action == OPTIONS_DUMP      ? dump_scenario(&o, scenario, bench)
                        : o.restore                     ? restore_bench(&o, scenario, bench, service)
                                                        : run_bench(&o, NULL, scenario, bench, service);

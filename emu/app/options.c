@@ -341,7 +341,7 @@ static bool set_scenario(struct target *t, const char *arg)
 static bool reject_option(struct target *t, const char *word, int c)
 {
     if (c == ':') return why_fail(t->why, t->cap, "%s: expected an argument, got none (psa-emu --help)", word);
-    return why_fail(t->why, t->cap, "%s: unknown option, or an argument it does not take (psa-emu --help)", word);
+    return why_fail(t->why, t->cap, "expected an option that --help lists, got %s", word);
 }
 
 static bool parse_all(struct target *t, int argc, char *const argv[])
@@ -372,12 +372,13 @@ bool options_parse(int argc, char *const argv[], struct options *o, char *why, s
         return why_fail(why, cap, "--pace step: expected --control PATH, whose commands advance the time, got none");
     }
     if (o->wait_client && o->pace == PACE_STEP) {
-        return why_fail(why, cap, "--wait-client: not with --pace step, where only commands advance the time");
+        return why_fail(why, cap, "--wait-client: expected --pace wall or free, got step");
     }
     if (o->restore && (o->scenario || o->seed_given || o->bitrate_given || o->data_bitrate_given || o->start)) {
-        return why_fail(why, cap,
-                        "--restore %s: SCENARIO, --seed, --bitrate, --data-bitrate and --start come from the snapshot",
-                        o->restore);
+        return why_fail(
+            why, cap,
+            "--restore %s: expected no SCENARIO, --seed, --bitrate, --data-bitrate and --start: the snapshot has them",
+            o->restore);
     }
     if (!o->can_given)
         o->can[o->can_count++] = (struct options_can){.kind = OPTIONS_SOCKETCAND, .port = SOCKETCAND_PORT};

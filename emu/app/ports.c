@@ -16,7 +16,7 @@ static bool open_socketcand(struct can_hub *hub, struct ports_can *c, const stru
     if (!err) return true;
     if (err == -EADDRINUSE) {
         return why_fail(why, cap,
-                        "--can socketcand:%u: the port is in use on 127.0.0.1; choose another, or 0 for any free port",
+                        "--can socketcand:%u: expected a free port of 127.0.0.1 or 0 (any free port), got one in use",
                         o->port);
     }
     return why_fail(why, cap, "--can socketcand:%u: %s", o->port, strerror(-err));
@@ -38,14 +38,17 @@ static bool open_socketcan(struct can_hub *hub, struct ports_can *c, const struc
     if (!err) return true;
     if (err == -ENODEV) {
         return why_fail(why, cap,
-                        "--can socketcan:%s: no such interface; as root: ip link add %s type vcan && ip link set %s up",
+                        "--can socketcan:%s: expected a CAN interface, got none; as root: ip link add %s type vcan && "
+                        "ip link set %s up",
                         o->arg, o->arg, o->arg);
     }
     if (err == -ENETDOWN)
-        return why_fail(why, cap, "--can socketcan:%s: the interface is down; as root: ip link set %s up", o->arg,
-                        o->arg);
+        return why_fail(
+            why, cap,
+            "--can socketcan:%s: expected an interface that is up, got one that is down; as root: ip link set %s up",
+            o->arg, o->arg);
     if (err == -EAFNOSUPPORT || err == -EPROTONOSUPPORT) {
-        return why_fail(why, cap, "--can socketcan:%s: this kernel has no CAN; use --can socketcand or --can slcan",
+        return why_fail(why, cap, "--can socketcan:%s: expected a kernel with CAN; use --can socketcand or --can slcan",
                         o->arg);
     }
     return why_fail(why, cap, "--can socketcan:%s: %s", o->arg, strerror(-err));
@@ -81,7 +84,7 @@ static bool open_can(struct ports *p, const struct options *o, char *why, size_t
                                     [OPTIONS_CAN_LOG] = open_log};
     for (unsigned i = 0; i < o->can_count; i++) {
         struct ports_can *c = calloc(1, sizeof *c);
-        if (!c) return why_fail(why, cap, "--can: no memory");
+        if (!c) return why_fail(why, cap, "--can: out of memory");
         struct can_hub *hub = hub_of(p, o->can[i].bus);
         c->kind = o->can[i].kind;
         const bool all = c->kind == OPTIONS_SOCKETCAND && !o->can[i].bus[0];
@@ -146,7 +149,8 @@ static bool open_socket(struct ctl_server *s, const char *option, const char *pa
     if (!path) return true;
     const int err = ctl_listen(s, path);
     if (!err) return true;
-    if (err == -EADDRINUSE) return why_fail(why, cap, "--%s %s: another process listens there", option, path);
+    if (err == -EADDRINUSE)
+        return why_fail(why, cap, "--%s %s: expected a free path, got one that another process uses", option, path);
     if (err == -EEXIST)
         return why_fail(why, cap, "--%s %s: expected a new path or a socket, got another file", option, path);
     if (err == -ENAMETOOLONG) return why_fail(why, cap, "--%s %s: expected a path of up to 107 bytes", option, path);
@@ -159,7 +163,7 @@ static bool open_vcd(struct ports *p, struct bench *b, const struct options *o, 
     p->vcd = fopen(o->vcd, "wbe");
     if (!p->vcd) return why_fail(why, cap, "--vcd %s: %s", o->vcd, strerror(errno));
     return bench_record(b, b->watched, p->vcd, o->vcd_unit_ns) ||
-           why_fail(why, cap, "--vcd-unit %u: not a time unit of VCD", o->vcd_unit_ns);
+           why_fail(why, cap, "--vcd-unit: expected a time unit of VCD, got %u", o->vcd_unit_ns);
 }
 
 void ports_init(struct ports *p, struct bench *b, const struct options *o)

@@ -11,7 +11,7 @@ bool why_fail(char *why, size_t cap, const char *format, ...)
     va_start(ap, format);
     vsnprintf(why, cap, format, ap);
     va_end(ap);
-    text_one_line(why);
+    if (cap) text_one_line(why);
     return false;
 }
 

@@ -39,7 +39,7 @@ static bool make_room(struct journal *j, size_t n)
     if (cap == j->cap) return true;
     char *text = realloc(j->text, cap);
     if (!text) {
-        j->lost = "no memory for the journal";
+        j->lost = "out of memory for the input log";
         return false;
     }
     j->text = text;
@@ -139,7 +139,7 @@ void journal_command(struct journal *j, const struct control_command *row, const
     char *text = copy ? exact_line(copy) : NULL;
     const size_t n = text ? strlen(text) : 0;
     cJSON_Delete(copy);
-    if (!text) j->lost = "no memory for the journal";
+    if (!text) j->lost = "out of memory for the input log";
     else if (n + 128 > JOURNAL_LINE_MAX) j->lost = "a command was longer than a line of the journal (8 KiB)";
     else {
         add_line(j, now_ns(j), "%s\"cmd\":\"%s\",\"args\":", done ? "" : "\"refused\":true,", row->name);
@@ -263,7 +263,7 @@ bool journal_read(const char *line, size_t len, struct journal_entry *e, char *w
     *e = (struct journal_entry){.json = len <= JOURNAL_LINE_MAX ? cJSON_ParseWithLength(line, len) : NULL};
     if (!cJSON_IsObject(e->json)) {
         journal_release(e);
-        return fail_entry(why, cap, "no JSON object of up to %u bytes", JOURNAL_LINE_MAX);
+        return fail_entry(why, cap, "expected a JSON object of up to %u bytes", JOURNAL_LINE_MAX);
     }
     e->ran = cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(e->json, "ran"));
     if (get_count(e->json, "t", 1e15 * 9, &t_ns) && read_kind(e->json, e)) {
@@ -271,7 +271,7 @@ bool journal_read(const char *line, size_t len, struct journal_entry *e, char *w
         return true;
     }
     journal_release(e);
-    return fail_entry(why, cap, "no entry of a journal");
+    return fail_entry(why, cap, "expected an entry of an input log");
 }
 
 void journal_release(struct journal_entry *e)

@@ -74,12 +74,12 @@ bool snapshot_write(const char *path, struct journal *j, const char *scenario, c
     journal_watchers(j);
     if (j->lost) return why_fail(why, cap, "%s: %s", path, j->lost);
     if (strchr(scenario, '\n') || strlen(scenario) > SNAPSHOT_SCENARIO_MAX)
-        return why_fail(why, cap, "%s: the scenario is not one line of up to 8 MiB", path);
+        return why_fail(why, cap, "%s: expected a scenario of one line and up to 8 MiB", path);
     if ((size_t)snprintf(part, sizeof part, "%s.%ld.part", path, (long)getpid()) >= sizeof part)
-        return why_fail(why, cap, "%.80s...: the path is too long", path);
+        return why_fail(why, cap, "%.80s...: expected a shorter path", path);
     struct stat there; /* a device or a pipe would be replaced, too */
     if (lstat(path, &there) == 0 && !S_ISREG(there.st_mode) && !S_ISDIR(there.st_mode))
-        return why_fail(why, cap, "%s: is there and is no file", path);
+        return why_fail(why, cap, "%s: expected a file or a new name, got another kind of file", path);
     struct writer w = {.out = fopen(part, "wbe")};
     if (!w.out) return why_fail(why, cap, "%s: %s", path, strerror(errno));
     put_all(&w, j, scenario);
@@ -119,10 +119,10 @@ static bool check_head(const char *line, size_t n, char *why, size_t cap)
     bool good = true;
     if (!cJSON_IsString(what) || strcmp(what->valuestring, "snapshot") != 0 || !cJSON_IsNumber(format) ||
         !cJSON_IsString(version)) {
-        good = why_fail(why, cap, "is no snapshot of psa-emu");
+        good = why_fail(why, cap, "expected a snapshot of psa-emu, got another file");
     } else if (format->valuedouble != SNAPSHOT_FORMAT || strcmp(version->valuestring, VERSION) != 0) {
-        good = why_fail(why, cap, "was written by version %.40s, this is %s: only the same one can do the run again",
-                        version->valuestring, VERSION);
+        good = why_fail(why, cap, "expected a snapshot of version %s and format %d, got version %.40s and format %g",
+                        VERSION, SNAPSHOT_FORMAT, version->valuestring, format->valuedouble);
     }
     cJSON_Delete(j);
     return good;
@@ -170,14 +170,15 @@ static bool check_journal(struct snapshot *s, struct reader *r, char *why, size_
     int64_t last_ns = 0;
     for (uint64_t i = 0; i < s->entries; i++) {
         struct journal_entry e;
-        if (!next_line(r, &line, &n)) return why_fail(why, cap, "has fewer entries than it says");
+        if (!next_line(r, &line, &n)) return why_fail(why, cap, "expected as many entries as its head says, got fewer");
         if (!journal_read(line, n, &e, what, sizeof what)) return why_fail(why, cap, "line %u: %s", r->line - 1, what);
         const int64_t t_ns = e.t_ns;
         journal_release(&e);
-        if (t_ns < last_ns || t_ns > s->end_ns) return why_fail(why, cap, "line %u: time goes back", r->line - 1);
+        if (t_ns < last_ns || t_ns > s->end_ns)
+            return why_fail(why, cap, "line %u: expected a time after that of the line before", r->line - 1);
         last_ns = t_ns;
     }
-    return r->at == r->end || why_fail(why, cap, "has more entries than it says");
+    return r->at == r->end || why_fail(why, cap, "expected as many entries as its head says, got more");
 }
 
 static bool parse_snapshot(struct snapshot *s, size_t len, char *why, size_t cap)
@@ -185,18 +186,18 @@ static bool parse_snapshot(struct snapshot *s, size_t len, char *why, size_t cap
     const char *line;
     size_t n;
     struct reader r = {.at = s->text, .end = s->text + len, .line = 1};
-    if (!next_line(&r, &line, &n)) return why_fail(why, cap, "is no snapshot of psa-emu");
+    if (!next_line(&r, &line, &n)) return why_fail(why, cap, "expected a snapshot of psa-emu, got another file");
     if (!check_head(line, n, why, cap)) return false;
     const char *end = check_sum(s->text, len);
-    if (!end) return why_fail(why, cap, "is damaged: its SHA-256 is not the one it ends with");
+    if (!end) return why_fail(why, cap, "expected the SHA-256 that it ends with, got another: the file is damaged");
     r.end = end;
     if (!next_line(&r, &s->scenario, &s->scenario_len) || s->scenario_len > SNAPSHOT_SCENARIO_MAX)
-        return why_fail(why, cap, "has no scenario");
+        return why_fail(why, cap, "expected a scenario, got none");
     s->text[s->scenario + s->scenario_len - s->text] = '\0';
     s->journal = r.at;
     const char *last = end - 1; /* the LF before the sum */
     while (last > r.at && last[-1] != '\n') last--;
-    if (last < r.at || !read_end(last, (size_t)(end - last), s)) return why_fail(why, cap, "has no end");
+    if (last < r.at || !read_end(last, (size_t)(end - last), s)) return why_fail(why, cap, "expected an end, got none");
     r.end = last;
     s->journal_len = (size_t)(last - s->journal);
     return check_journal(s, &r, why, cap);
@@ -236,7 +237,7 @@ static char *read_file(const char *path, size_t *len, char *why, size_t cap)
         return text;
     }
     free(text);
-    why_fail(why, cap, bad ? "%s: cannot be read" : "%s: is larger than a snapshot can be", path);
+    why_fail(why, cap, bad ? "%s: read error" : "%s: expected a snapshot, got a larger file", path);
     return NULL;
 }
 
@@ -317,22 +318,23 @@ static struct can_client *find_client(const struct can_hub *h, uint32_t number)
 static bool do_came(struct replay *r, struct can_hub *h, const struct journal_entry *e)
 {
     struct can_client *before = e->adopts ? find_client(h, e->adopts) : NULL;
-    if (e->adopts && !before) return why_fail(r->why, WHY_MAX, "program %" PRIu32 " is not on the bus", e->adopts);
+    if (e->adopts && !before)
+        return why_fail(r->why, WHY_MAX, "expected client %" PRIu32 " on the bus, got none", e->adopts);
     if (before) before->slot_free = true;
-    return can_hub_add_detached(h, e->client, e->name, e->fd) || why_fail(r->why, WHY_MAX, "no memory");
+    return can_hub_add_detached(h, e->client, e->name, e->fd) || why_fail(r->why, WHY_MAX, "out of memory");
 }
 
 static bool do_client(struct replay *r, const struct journal_entry *e)
 {
-    if (e->bus >= r->w->buses) return why_fail(r->why, WHY_MAX, "there is no bus %u", e->bus);
+    if (e->bus >= r->w->buses) return why_fail(r->why, WHY_MAX, "expected a bus of the scenario, got %u", e->bus);
     struct can_hub *h = r->w->hub[e->bus];
     struct can_client *c = find_client(h, e->client);
     if (!c != (e->kind == JOURNAL_CAME)) {
-        return why_fail(r->why, WHY_MAX, "program %" PRIu32 " %s on the bus", e->client, c ? "is already" : "is not");
+        return why_fail(r->why, WHY_MAX, "client %" PRIu32 " %s on the bus", e->client, c ? "is already" : "is not");
     }
     if (e->kind == JOURNAL_CAME) return do_came(r, h, e);
     if (e->kind == JOURNAL_WENT) can_hub_remove_detached(h, c);
-    else if (!can_hub_send(h, c, &e->m, e->t_ns)) return why_fail(r->why, WHY_MAX, "the bus does not take the frame");
+    else if (!can_hub_send(h, c, &e->m, e->t_ns)) return why_fail(r->why, WHY_MAX, "frame rejected by the bus");
     return true;
 }
 
@@ -340,18 +342,20 @@ static bool do_command(struct replay *r, const struct journal_entry *e)
 {
     struct control *c = r->w->control;
     const struct control_command *row = control_find(c->tables, e->cmd);
-    if (!row || !row->changes) return why_fail(r->why, WHY_MAX, "\"%.40s\" is no command that changes a bench", e->cmd);
+    if (!row || !row->changes)
+        return why_fail(r->why, WHY_MAX, "expected a command that changes the bench, got \"%.40s\"", e->cmd);
     cJSON *result = cJSON_CreateObject();
     const enum control_outcome outcome = control_call(c, e->cmd, e->args, result, e->t_ns);
     cJSON_Delete(result);
     if ((outcome == CONTROL_REJECTED) == e->refused) return true; /* a bus cycle is answered later */
-    return why_fail(r->why, WHY_MAX, "%s: %s", e->cmd, e->refused ? "is carried out this time" : c->error.why);
+    return why_fail(r->why, WHY_MAX, "%s: %s", e->cmd, e->refused ? "expected an error, got success" : c->error.why);
 }
 
 static bool do_watch(struct replay *r, const struct journal_entry *e)
 {
     struct bench *b = r->w->bench;
-    if (e->unit >= b->scenario.unit_count) return why_fail(r->why, WHY_MAX, "there is no unit %u", e->unit);
+    if (e->unit >= b->scenario.unit_count)
+        return why_fail(r->why, WHY_MAX, "expected a unit of the scenario, got %u", e->unit);
     attach_observer(r->w->observers, b, e->unit, e->watch);
     return true;
 }
@@ -359,8 +363,9 @@ static bool do_watch(struct replay *r, const struct journal_entry *e)
 static bool do_cycle(struct replay *r, const struct journal_entry *e)
 {
     struct bench *b = r->w->bench;
-    if (e->unit >= b->scenario.unit_count) return why_fail(r->why, WHY_MAX, "there is no unit %u", e->unit);
-    if (!b->unit[e->unit].type->bus) return why_fail(r->why, WHY_MAX, "unit %u has no bus", e->unit);
+    if (e->unit >= b->scenario.unit_count)
+        return why_fail(r->why, WHY_MAX, "expected a unit of the scenario, got %u", e->unit);
+    if (!b->unit[e->unit].type->bus) return why_fail(r->why, WHY_MAX, "expected a unit with a bus, got %u", e->unit);
     (void)bench_cycle(b, e->unit, &(struct bench_cycle){.cycle = e->cycle}, e->t_ns); /* refused again, if it was */
     return true;
 }
@@ -394,12 +399,11 @@ bool snapshot_replay(const struct snapshot *s, const struct snapshot_world *w, c
 {
     struct replay r = {.w = w};
     char state[SHA256_HEX];
-    bool good = do_all(&r, s) || why_fail(why, cap, "cannot be done again: %s", r.why);
+    bool good = do_all(&r, s) || why_fail(why, cap, "replay failed: %s", r.why);
     journal_watchers(w->journal);
     digest_bench(w->bench, w->journal, state);
     if (good && strcmp(state, s->state) != 0) {
-        good =
-            why_fail(why, cap, "makes another bench than the one it was taken of: another build or machine wrote it");
+        good = why_fail(why, cap, "the replay ends in another state: another build or machine wrote it");
     }
     for (unsigned i = 0; i < w->buses && good; i++) can_hub_free_slots(w->hub[i]);
     return good;

@@ -84,7 +84,7 @@ static enum control_outcome do_endpoints(struct control *c, const struct control
     (void)v;
     (void)t_ns;
     if (!c->bench->process.endpoints) return control_reject(c, "state", "this bench has no endpoints");
-    if (!c->bench->process.endpoints(c->bench->ctx, result)) return control_reject(c, "machine", "no memory");
+    if (!c->bench->process.endpoints(c->bench->ctx, result)) return control_reject(c, "machine", "out of memory");
     return CONTROL_DONE;
 }
 

@@ -191,7 +191,8 @@ static bool load_pair(struct yaml_file *f, const struct yaml_node *node, const s
     size_t offset;
     for (size_t i = 0; name && (d = yaml_row(t, i, &offset)); i++) {
         if (strcmp(d->key, name) != 0) continue;
-        if (comes_again(node, pair, name)) return yaml_file_fail(f, pair->key, name, "given twice");
+        if (comes_again(node, pair, name))
+            return yaml_file_fail(f, pair->key, name, "expected the key once, got it twice");
         return yaml_load_value(f, pair->value, d, section + offset);
     }
     return fail_unknown(f, pair->key, t);
@@ -319,9 +320,9 @@ static cJSON *json_node(struct yaml_file *f, const struct yaml_node *node, unsig
     for (const struct yaml_item *i = node->first; i; i = i->next) {
         const char *key = i->key ? yaml_scalar(i->key) : "";
         bool fits = key && depth < JSON_DEPTH_MAX && ++*items <= JSON_ITEMS_MAX;
-        if (!fits) yaml_file_fail(f, i->value, "args", "nested deeper or longer than arguments are");
+        if (!fits) yaml_file_fail(f, i->value, "args", "expected fewer or less deeply nested arguments");
         if (fits && i->key && cJSON_HasObjectItem(j, key)) {
-            yaml_file_fail(f, i->key, key, "given twice");
+            yaml_file_fail(f, i->key, key, "expected the key once, got it twice");
             fits = false;
         }
         cJSON *v = fits ? json_node(f, i->value, depth + 1, items) : NULL;

@@ -47,8 +47,8 @@ bool find_proto_folder(const char *folder, char *path, char *why, size_t cap)
         snprintf(path, FIND_PATH_MAX, "%.440s/%.60s", dir, folder);
         if (dir[0] && access(path, R_OK) == 0) return true;
     }
-    snprintf(why, cap, "proto/%s: not found here or beside the program; PSABENCH_PROTO=DIR names the folder proto",
-             folder);
+    snprintf(why, cap,
+             "proto/%s: expected a file here or beside the program; PSABENCH_PROTO=DIR names the folder proto", folder);
     return false;
 }
 

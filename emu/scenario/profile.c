@@ -61,7 +61,7 @@ static bool load_pair(struct yaml_file *f, const struct yaml_item *pair, struct 
     const struct board_field *field = board_field_find(fill->type->fields, fill->type->field_count, key);
     if (!field) return fail_unknown(f, pair->key, key, fill->type);
     bool *seen = &fill->seen[field - fill->type->fields];
-    if (*seen) return yaml_file_fail(f, pair->key, key, "given twice");
+    if (*seen) return yaml_file_fail(f, pair->key, key, "expected the key once, got it twice");
     *seen = true;
     if (!board_field_is_list(field)) return set_field(f, pair->value, key, 0, fill);
     if (pair->value->kind != YAML_SEQUENCE) return yaml_file_expected(f, pair->value, key, "a list (%s)", field->what);

@@ -206,7 +206,8 @@ static bool check_keys(struct yaml_file *f, const struct yaml_node *node, const 
     for (unsigned i = 0; i < SOME_HAVE; i++) {
         const struct yaml_node *value = yaml_get(node, some_have[i].key);
         if (value && !has_key(t, i))
-            return yaml_file_fail(f, value, some_have[i].key, "not a setting of a %s", t->title);
+            return yaml_file_fail(f, value, some_have[i].key, "expected a key of a %s, got one of another board",
+                                  t->title);
     }
     if (u->frame_form && u->frame_form >= t->frame_forms)
         return yaml_file_expected(f, yaml_get(node, "frame_form"), "frame_form", "0 to %u for a %s", t->frame_forms - 1,

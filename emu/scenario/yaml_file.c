@@ -92,7 +92,7 @@ static bool append_item(struct builder *b, struct yaml_node *value)
 {
     const unsigned d = b->depth - 1;
     struct yaml_item *item = calloc(1, sizeof *item);
-    if (!item) return yaml_file_fail(b->f, value, NULL, "no memory");
+    if (!item) return yaml_file_fail(b->f, value, NULL, "out of memory");
     *item = (struct yaml_item){.key = b->key[d], .value = value};
     b->key[d] = NULL;
     if (b->last[d]) b->last[d]->next = item;
@@ -105,7 +105,7 @@ static bool append_item(struct builder *b, struct yaml_node *value)
 static bool place_node(struct builder *b, struct yaml_node *n)
 {
     if (b->depth == 0) {
-        if (b->f->root) return yaml_file_fail(b->f, n, NULL, "a second document; a file has one");
+        if (b->f->root) return yaml_file_fail(b->f, n, NULL, "expected one document, got a second");
         b->f->root = n;
         return true;
     }
@@ -137,7 +137,7 @@ static bool add_scalar(struct builder *b, const struct fy_event *e, const struct
     size_t len = 0;
     const char *text = e->scalar.value ? fy_token_get_text(e->scalar.value, &len) : NULL;
     struct yaml_node *n = new_node(b, YAML_SCALAR, m, text, text ? len : 0);
-    if (!n) return yaml_file_fail(b->f, NULL, NULL, "no memory");
+    if (!n) return yaml_file_fail(b->f, NULL, NULL, "out of memory");
     const enum fy_scalar_style style = e->scalar.value ? fy_token_scalar_style(e->scalar.value) : FYSS_ANY;
     n->plain = style == FYSS_PLAIN;
     const bool quoted = style == FYSS_SINGLE_QUOTED || style == FYSS_DOUBLE_QUOTED;
@@ -156,15 +156,17 @@ static bool add_alias(struct builder *b, const struct fy_event *e, const struct 
         const struct anchor *a = &b->anchor[i];
         if (strlen(a->name) == len && memcmp(a->name, name, len) == 0 && a->node) return place_node(b, a->node);
     }
-    return yaml_file_fail(b->f, &at, NULL, "*%.*s: no such anchor before this (up to %d, of up to %zu characters)",
+    return yaml_file_fail(b->f, &at, NULL,
+                          "*%.*s: expected an anchor before this (up to %d, of up to %zu characters), got none",
                           (int)(len < 40 ? len : 40), name ? name : "", ANCHORS_MAX, sizeof b->anchor->name - 1);
 }
 
 static bool begin_collection(struct builder *b, enum yaml_kind kind, struct fy_token *anchor, const struct fy_mark *m)
 {
     struct yaml_node *n = new_node(b, kind, m, NULL, 0);
-    if (!n) return yaml_file_fail(b->f, NULL, NULL, "no memory");
-    if (b->depth == YAML_DEPTH_MAX) return yaml_file_fail(b->f, n, NULL, "nested deeper than %u", YAML_DEPTH_MAX);
+    if (!n) return yaml_file_fail(b->f, NULL, NULL, "out of memory");
+    if (b->depth == YAML_DEPTH_MAX)
+        return yaml_file_fail(b->f, n, NULL, "expected up to %u levels, got more", YAML_DEPTH_MAX);
     if (!place_node(b, n)) return false;
     b->open[b->depth] = n;
     b->last[b->depth] = NULL;
@@ -249,9 +251,10 @@ static bool check_bytes(struct yaml_file *f, const char *text, size_t len)
 {
     struct yaml_node at = {.line = 1, .column = 1};
     for (size_t i = 0; i < len; i++) {
-        if (text[i] == '\0') return yaml_file_fail(f, &at, NULL, "not YAML: a NUL byte");
-        if (order_mark(text, len, i)) return yaml_file_fail(f, &at, NULL, "a byte order mark within the text");
-        if (text[i] == '%' && at.column == 1) return yaml_file_fail(f, &at, NULL, "a directive: there are none here");
+        if (text[i] == '\0') return yaml_file_fail(f, &at, NULL, "expected YAML, got a NUL byte");
+        if (order_mark(text, len, i))
+            return yaml_file_fail(f, &at, NULL, "expected no byte order mark within the text");
+        if (text[i] == '%' && at.column == 1) return yaml_file_fail(f, &at, NULL, "expected no directive");
         if (explicit_key(text, len, i))
             return yaml_file_fail(f, &at, NULL, "expected `key: value`, got an explicit key (?)");
         const bool ends = text[i] == '\n' || text[i] == '\r';
@@ -278,7 +281,7 @@ bool yaml_file_parse(struct yaml_file *f, const char *path, const char *text, si
         .search_path = "", .flags = FYPCF_QUIET | FYPCF_DEFAULT_VERSION_1_2 | FYPCF_JSON_NONE, .diag = diag};
     struct fy_parser *p = diag ? fy_parser_create(&cfg) : NULL;
     bool ok = p && fy_parser_set_string(p, text, len) == 0;
-    if (!ok) yaml_file_fail(f, NULL, NULL, "no memory");
+    if (!ok) yaml_file_fail(f, NULL, NULL, "out of memory");
     ok = ok && build_tree(f, p, diag);
     if (p) fy_parser_destroy(p);
     if (diag) fy_diag_destroy(diag);

@@ -31,7 +31,7 @@ from psabench.boards.psa2.device import Psa2
 from psabench.boards.registry import DBC_NODE
 from psabench.boards.unit import Unit
 from psabench.emulator import Emulator, Forked
-from psabench.errors import BadInput, BenchError, ControlError, TimeOut
+from psabench.errors import BadInput, BenchError, ControlError, TimeOut, expected
 from psabench.faults import Fault, Faults
 from psabench.instruments import KINDS, Chamber, Head, Instrument, Supply, Table, open_instrument, visa_address
 from psabench.link.can_host import QUANTUM_S, CanHost, StepClock, WallClock, open_bus
@@ -164,7 +164,7 @@ class Bench:
         """
         unknown = set(scpi or {}) - set(KINDS)
         if unknown:
-            raise BadInput(f"scpi: no such instrument: {', '.join(sorted(unknown))}; there are {', '.join(KINDS)}")
+            raise BadInput(expected(", ".join(KINDS), ", ".join(sorted(unknown)), "scpi"))
         told = _endpoints(Path(control)) if control else []
         one: Mapping[str, str | None]
         if can is None and control:
@@ -210,7 +210,7 @@ class Bench:
     def control(self) -> Control:
         """The emulator's control socket. Raises BenchError on a bench without one."""
         if self._control is None:
-            raise BenchError("this bench has no control socket: a real one has none, psa-emu has with --control")
+            raise BenchError("bench: no control socket; start psa-emu with --control")
         return self._control
 
     @property
@@ -218,7 +218,7 @@ class Bench:
         """This program's end of the first bus; `hosts` has all by name."""
         for host in self.hosts.values():
             return host
-        raise BenchError("this bench was connected without a CAN bus")
+        raise BenchError("bench: connected without a CAN bus")
 
     @property
     def unit(self) -> Psa2:
@@ -228,14 +228,16 @@ class Bench:
     def board(self, kind: type[Board], name: str | None = None) -> Board:
         """The first unit with such a board, `bench.board(Psd1)`, or the one of that name if it has."""
         if not self.units:
-            raise BenchError("this bench has no unit on a bus that was connected")
+            raise BenchError("bench: no unit on the connected buses")
         if name is not None and name not in self.units:
-            raise BenchError(f"this bench has no unit {name}; there is {', '.join(self.units)}")
+            raise BenchError(expected(", ".join(self.units), name, "unit"))
         for unit in self.units.values() if name is None else [self.units[name]]:
             if isinstance(unit, kind):
                 return unit
         what = ", ".join(f"{n}: {u.title}" for n, u in self.units.items())
-        raise BenchError(f"this bench has no {kind.title} {'' if name is None else f'called {name}'}; there is {what}")
+        raise BenchError(
+            expected(f"a {kind.title}", what if name is None else f"{name}: {self.units[name].title}", "unit")
+        )
 
     @property
     def head(self) -> Head:
@@ -256,7 +258,7 @@ class Bench:
     def _instrument(self, name: str, kind: type[Kind]) -> Kind:
         """Opened when first asked for. Raises BenchError that says why there is none."""
         if name not in self.addresses:
-            raise BenchError(f"this bench has no {name}: {self._why_absent(name)}")
+            raise BenchError(f"bench: no {name}: {self._why_absent(name)}")
         if name not in self._open:
             self._open[name] = open_instrument(name, self.addresses[name], kind, self.wait)
         found = self._open[name]
@@ -375,7 +377,7 @@ class Bench:
         else:
             reply = self._watch(event, count, unit, limit_s)
         if not reply.result.get("reached", True):
-            raise TimeOut(f"{event}: {reply.result.get('seen', 0)} of {count} came within {limit_s:g} s")
+            raise TimeOut(expected(f"{count} within {limit_s:g} s", reply.result.get("seen", 0), str(event)))
         return self.time_s
 
     def _watch(self, event: str, count: int, unit: str | None, limit_s: float) -> Reply:
@@ -438,7 +440,7 @@ class Bench:
 
     def _ask_truth(self, command: str, **args: object) -> dict[str, Any]:
         if self.truth_path is None:
-            raise BenchError("this bench has no truth port: a real one has none, psa-emu has with --truth")
+            raise BenchError("bench: no truth port; start psa-emu with --truth")
         with Control(self.truth_path) as port:
             return port.call(command, **args).result
 

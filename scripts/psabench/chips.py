@@ -30,7 +30,7 @@ from os import PathLike, fspath
 from types import TracebackType
 from typing import Any
 
-from psabench.errors import BadInput, BenchError, TimeOut
+from psabench.errors import BadInput, BenchError, TimeOut, expected
 from psabench.native.clib import FRAME, INPUT, WATCH, FrameStruct, library
 
 NEVER_NS = 2**63 - 1
@@ -48,7 +48,7 @@ def options(part: str) -> str:
     """What `Bench.part` takes for it: a line "key=default  meaning, unit, range" for each option."""
     text = library().options(part.encode())
     if text is None:
-        raise BadInput(f"{part}: no such part; there are {', '.join(parts())}")
+        raise BadInput(expected(", ".join(parts()), part, "part"))
     return str(text.decode())
 
 
@@ -97,7 +97,7 @@ class Bench:
         self._handle = self._lib.new(seed)
         self._parts: list[Part] = []  # C calls what they hold
         if self._handle is None:
-            raise BenchError("no memory for a bench")
+            raise BenchError("bench: out of memory")
 
     def __enter__(self) -> Bench:
         return self
@@ -111,7 +111,7 @@ class Bench:
     def close(self) -> None:
         """Frees the bench with its parts and ends the recording; they cannot be used any more. Twice is allowed."""
         if self.inside:  # the library would go on with what it no longer has
-            raise BenchError("close() from a callback: a bench is closed between calls")
+            raise BenchError("bench: close() called from a callback; call it between steps")
         handle, self._handle = self._handle, None
         if handle:
             self._lib.free(handle)
@@ -165,7 +165,7 @@ class Bench:
     def live(self) -> int:
         """The handle, while there is one."""
         if self._handle is None:
-            raise BenchError("the bench is closed")
+            raise BenchError("bench: closed")
         return self._handle
 
     def done(self, result: int, *, allow: int = 0) -> int:
@@ -216,7 +216,7 @@ class _Pins(dict[str, Pin]):
         self._part = part.name
 
     def __missing__(self, name: str) -> Pin:
-        raise BadInput(f"{self._part}: no pin {name}; there are {' '.join(self)}")
+        raise BadInput(expected(" ".join(self), name, f"pin of {self._part}"))
 
 
 class Part:
@@ -269,7 +269,7 @@ class Part:
             if self.bench.done(result, allow=TIMEOUT) != TIMEOUT:
                 return
         if self.bench.done(self._lib.run_until_level(self.live(), number, level, left_ns), allow=TIMEOUT) == TIMEOUT:
-            raise TimeOut(f"{self.name}: {pin} is not {level} after {timeout_s:g} s")
+            raise TimeOut(expected(f"{level} within {timeout_s:g} s", "no change", f"{self.name}: {pin}"))
 
     # Inside
 
@@ -345,7 +345,7 @@ def _frame(f: FrameStruct) -> Frame:
 def _word(what: str, value: int, bits: int = 32) -> int:
     """The number, if it fits into an unsigned word; ctypes would cut it without a word."""
     if not isinstance(value, int) or not 0 <= value < 1 << bits:
-        raise BadInput(f"{what} {value!r}: must be a whole number, 0 to {(1 << bits) - 1}")
+        raise BadInput(expected(f"a whole number, 0 to {(1 << bits) - 1}", repr(value), what))
     return value
 
 

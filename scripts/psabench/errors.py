@@ -6,9 +6,13 @@ Every message says what, where, and what would be right. Bad arguments of functi
 from __future__ import annotations
 
 
-def expected(what: str, got: object, where: str = "") -> str:
-    """The text of an error: `<where>: expected <what>, got <value>`; the caller's prefix may say where."""
-    return f"{where}: expected {what}, got {got}" if where else f"expected {what}, got {got}"
+def expected(what: str, got: object = None, where: object = "") -> str:
+    """The text of an error about an input: `<where>: expected <what>, got <value>`.
+
+    got: None leaves the last part out. where: "" when the caller's prefix says it.
+    """
+    text = f"expected {what}" if got is None else f"expected {what}, got {got}"
+    return f"{where}: {text}" if where else text
 
 
 class BenchError(Exception):
@@ -32,7 +36,7 @@ class LinkError(BenchError):
 
 
 class ControlError(BenchError):
-    """The emulator's control socket refused a command; nothing has changed."""
+    """The emulator's control socket rejected a command; nothing has changed."""
 
     def __init__(self, command: str, code: str, text: str) -> None:
         super().__init__(f"{command}: {text} ({code})")
@@ -41,7 +45,7 @@ class ControlError(BenchError):
 
 
 class InstrumentError(BenchError):
-    """An instrument refused a command: number and text of its error queue (SCPI 1999, chapter 21)."""
+    """An instrument rejected a command: number and text of its error queue (SCPI 1999, chapter 21)."""
 
     def __init__(self, instrument: str, command: str, number: int, text: str) -> None:
         super().__init__(f"{instrument}: {command}: {text} ({number})")
@@ -49,7 +53,7 @@ class InstrumentError(BenchError):
 
 
 class DeviceError(BenchError):
-    """The board refused an access: CiA 301 abort code, with the board's own words where it has any."""
+    """The board aborted an access: CiA 301 abort code, with the board's own text where it has any."""
 
     def __init__(self, what: str, abort_code: int, text: str) -> None:
         super().__init__(f"{what}: abort {abort_code:08X}h, {text}")
@@ -59,4 +63,4 @@ class DeviceError(BenchError):
 
 
 class CycleRefused(DeviceError):
-    """The board refused a cycle on its parallel bus, or did not finish it; the text is the board's (object 2031h)."""
+    """The board rejected a cycle on its parallel bus, or did not finish it; the text is the board's (object 2031h)."""

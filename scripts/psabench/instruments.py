@@ -19,7 +19,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from psabench.errors import BadInput, InstrumentError, LinkError, TimeOut
+from psabench.errors import BadInput, InstrumentError, LinkError, TimeOut, expected
 from psabench.estimate.face import Face
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ class Instrument:
         try:
             return tuple(float(x) for x in answer.replace(";", ",").split(","))
         except ValueError as e:
-            raise LinkError(f"{self.name}: {command}: the answer is {answer!r}; numbers were expected") from e
+            raise LinkError(expected("numbers", repr(answer), f"{self.name}: {command}")) from e
 
     def _number(self, command: str) -> float:
         return self.numbers(command)[0]
@@ -83,7 +83,7 @@ class Instrument:
         waited_s = 0.0
         while not done():
             if waited_s >= limit_s:
-                raise TimeOut(f"{self.name}: {what} not reached in {limit_s:g} s")
+                raise TimeOut(f"{self.name}: {what} not reached within {limit_s:g} s")
             self._wait(self.poll_s)
             waited_s += self.poll_s
 
@@ -95,7 +95,7 @@ class Instrument:
             return self._resource.query(message).strip()
         except VisaIOError as e:
             if e.error_code == StatusCode.error_timeout:
-                raise TimeOut(f"{self.name} at {self.address}: {command}: no answer in {REPLY_S:g} s") from e
+                raise TimeOut(f"{self.name} at {self.address}: {command}: no answer within {REPLY_S:g} s") from e
             raise LinkError(f"{self.name} at {self.address}: {command}: {e.description}") from e
         except (OSError, UnicodeDecodeError) as e:
             raise LinkError(f"{self.name} at {self.address}: {command}: {e}") from e
@@ -104,7 +104,7 @@ class Instrument:
         """`error` is the oldest entry of the error queue: -222,"Data out of range;..."; the younger ones go with it."""
         number, _, text = error.partition(",")
         if not number.lstrip("+-").isdecimal():
-            raise LinkError(f"{self.name}: SYST:ERR?: the answer is {error!r}; a number and a text were expected")
+            raise LinkError(expected("a number and a text", repr(error), f"{self.name}: SYST:ERR?"))
         if int(number) == 0:
             return
         for _ in range(100):  # a queue has an end; an instrument that says something else each time has none
@@ -175,7 +175,7 @@ class Table(Instrument):
     def profile(self, times_s: Sequence[float], rates_dps: Sequence[float], *, axis: int = 1) -> None:
         """Run through rates: rates_dps[k] at times_s[k] from now, linear between them."""
         if len(times_s) != len(rates_dps):
-            raise ValueError(f"{len(times_s)} times and {len(rates_dps)} rates; expected as many of each")
+            raise ValueError(expected("as many times as rates", f"{len(times_s)} and {len(rates_dps)}"))
         pairs = ",".join(f"{t!r},{r!r}" for t, r in zip(times_s, rates_dps, strict=True))
         self.write(f"AXIS{axis}:PROF {pairs}")
 
@@ -287,7 +287,7 @@ def open_instrument(name: str, address: str, kind: type[Kind], wait: Wait) -> Ki
             address, read_termination="\n", write_termination="\n", timeout=round(REPLY_S * 1000)
         )
     except (ValueError, Error) as e:
-        raise BadInput(f"{name} at {address}: {e}; expected a VISA address: {EXAMPLES}") from e
+        raise BadInput(expected(f"a VISA address as {EXAMPLES}", f"{address} ({e})", name)) from e
     except LinkError:
         raise
     except Exception as e:  # PyVISA-py raises bare ones for what it cannot open
@@ -318,7 +318,7 @@ def _knock(name: str, address: str) -> None:
     if len(words) != 4 or words[3].upper() != "SOCKET":
         return
     if not words[2].isdecimal():
-        raise ValueError(f"{words[2]!r} is no port")
+        raise ValueError(expected("a port", repr(words[2])))
     try:
         socket.create_connection((words[1], int(words[2])), CONNECT_S).close()
     except (OSError, OverflowError) as e:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import argparse
+import difflib
+import re
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 from psabench.boards.registry import NAMES, of_name
 from psabench.errors import BadInput, expected
 
+LISTED = 12  # options that an error lists
 LINE_HZ = 8_000_000.0  # psabench.link.lineport.SAMPLE_HZ, without loading NumPy
 BUS_HELP = """\
 the bus: INTERFACE:CHANNEL[,key=value...] of python-can. Examples: socketcand:127.0.0.1:29536, slcan:/dev/pts/7,
@@ -17,19 +21,46 @@ CAN_HELP = f"""\
 {BUS_HELP}. Without it python-can's own configuration is used ($CAN_INTERFACE, $CAN_CHANNEL, ~/.canrc)"""
 
 
+# argparse's messages: what to make of the parts that each pattern finds, in the form of `expected`.
+_VALUES = {"int": "an integer", "float": "a number", "Path": "a path"}
+_MESSAGES: tuple[tuple[str, Callable[[re.Match[str]], str]], ...] = (
+    (r"invalid (\w+) value: (.*)", lambda m: expected(_VALUES.get(m[1], f"a value ({m[1]})"), m[2])),
+    (r"invalid choice: (.*) \(choose from (.*)\)", lambda m: expected(m[2].replace("'", ""), m[1])),
+    (r"expected one argument", lambda m: expected("a value", "none")),
+    (r"expected at least one argument", lambda m: expected("at least one value", "none")),
+    (r"ignored explicit argument (.*)", lambda m: expected("no value", m[1])),
+    (r"not allowed with argument (.*)", lambda m: expected(f"one of it and {m[1]}", "both")),
+    (r"the following arguments are required: (.*)", lambda m: expected(m[1], "none")),
+    (r"one of the arguments (.*) is required", lambda m: expected(f"one of {m[1].replace(' ', ', ')}", "none")),
+    (r"ambiguous option: (.*) could match (.*)", lambda m: expected(f"one of {m[2]}", m[1])),
+)
+
+
 class Parser(argparse.ArgumentParser):
-    """A parser that refuses a word it does not know in one line, with what there is instead of it."""
+    """A parser whose errors are BadInput of one line, `<where>: expected <what>, got <value>`."""
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """Raises BadInput."""
+        """Raises BadInput, for an unknown argument as well."""
         found, rest = super().parse_known_args(args, namespace)
+        if rest and not rest[0].startswith("-"):
+            raise BadInput(expected("no more arguments", repr(rest[0]), self._name()))
         if rest:
-            name = self.prog.removeprefix("psabench ").removeprefix("run ")
-            if not rest[0].startswith("-"):
-                raise BadInput(f"{rest[0]}: one word too many for {name}")
-            options = (a.option_strings[-1] for a in self._actions if a.option_strings and a.dest != "help")
-            raise BadInput(f"{rest[0].partition('=')[0]}: {name} has no such parameter; it has {', '.join(options)}")
+            given = rest[0].partition("=")[0]
+            options = [a.option_strings[-1] for a in self._actions if a.option_strings and a.dest != "help"]
+            hint = "".join(f" (did you mean {o}?)" for o in difflib.get_close_matches(given, options, 1))
+            known = ", ".join(options) if len(options) <= LISTED else "an option that --help lists"
+            raise BadInput(expected(known, f"{given}{hint}", self._name()))
         return found, rest
+
+    def error(self, message: str) -> NoReturn:
+        """Raises BadInput: argparse's message in the form of `expected`."""
+        option, text = re.match(r"(?:argument ([^:]+): )?(.*)", message, re.DOTALL).groups()  # type: ignore[union-attr]
+        where = option.rpartition("/")[2] if option else self._name()
+        texts = (make(m) for pattern, make in _MESSAGES if (m := re.fullmatch(pattern, text)))
+        raise BadInput(f"{where}: {next(texts, text)}")
+
+    def _name(self) -> str:
+        return self.prog.removeprefix("psabench ").removeprefix("run ")
 
 
 class Help(argparse.RawDescriptionHelpFormatter):

@@ -11,7 +11,7 @@ import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from psabench.errors import BadInput
+from psabench.errors import BadInput, expected
 
 PACKAGE = Path(__file__).resolve().parent
 BUNDLE = PACKAGE / "bundle"
@@ -50,7 +50,7 @@ def proto_file(name: str) -> Path:
     for folder in folders:
         if (folder / name).is_file():
             return folder / name
-    raise BadInput(f"{name}: not in {' or '.join(str(p) for p in folders)}; PSABENCH_PROTO names another folder")
+    raise BadInput(expected(f"a file in {' or '.join(str(p) for p in folders)} (or PSABENCH_PROTO)", "none", name))
 
 
 def _find(what: str, variable: str, ours: Sequence[Path], more: Sequence[Path], fits: Callable[[Path], bool]) -> Path:
@@ -59,4 +59,4 @@ def _find(what: str, variable: str, ours: Sequence[Path], more: Sequence[Path], 
         if fits(place):
             return place
     where = f"{variable}={named}" if named else f"{' or '.join(str(p) for p in ours)} or on the PATH"
-    raise BadInput(f"{what}: not found at {where}; `make` builds it")
+    raise BadInput(expected(f"a file at {where} (make builds it)", "none", what))

@@ -38,7 +38,7 @@ bool gyro_profile_check(const void *profile, char *why, size_t cap)
     const struct gyro_profile *p = profile;
     if (!board_field_check(gyro_fields, GYRO_FIELDS, p, why, cap)) return false;
     if (p->stuck_moved_deg < p->stuck_turn_deg) return true;
-    (void)snprintf(why, cap, "stuck_moved_deg = %g: use less than stuck_turn_deg = %g", p->stuck_moved_deg,
-                   p->stuck_turn_deg);
+    (void)snprintf(why, cap, "stuck_moved_deg: expected less than stuck_turn_deg = %g, got %g", p->stuck_turn_deg,
+                   p->stuck_moved_deg);
     return false;
 }

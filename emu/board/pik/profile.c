@@ -1,7 +1,6 @@
 #include "board/pik/profile.h"
 
-#include <stdarg.h>
-#include <stdio.h>
+#include "base/why.h"
 
 #define OFF(member) offsetof(struct pik_profile, member)
 #define ROW(name, kind, lo, hi, words)                                                                                 \
@@ -111,33 +110,23 @@ int64_t pik_profile_period_ns(const struct pik_profile *p)
     return (int64_t)p->latch_us * 1000;
 }
 
-/* Writes the sentence and is false, so that a check reads `return set_error(...)`. */
-static bool set_error(char *why, size_t cap, const char *format, ...) __attribute__((format(printf, 3, 4)));
-static bool set_error(char *why, size_t cap, const char *format, ...)
-{
-    va_list args;
-    va_start(args, format);
-    if (cap > 0) (void)vsnprintf(why, cap, format, args);
-    va_end(args);
-    return false;
-}
-
 /* Below half a pulse a reset ends beyond the other threshold and causes the opposite one, endlessly. */
 static bool check_integrator(const struct pik_profile *p, char *why, size_t cap)
 {
     const double step_v = pik_profile_step_v(p);
     if (p->uc_v < 0.505 * step_v)
-        return set_error(
+        return why_fail(
             why, cap,
-            "uc_v = %g: a reset moves the integrator by %.3f V, so that Uc below %.3f V would call for the "
-            "opposite reset at once",
-            p->uc_v, step_v, 0.505 * step_v);
+            "uc_v: expected %.3f V or more (a reset moves the integrator by %.3f V and would cause the opposite one), "
+            "got %g",
+            0.505 * step_v, step_v, p->uc_v);
     if (p->rail_v < p->uc_v + 1.05 * step_v)
-        return set_error(why, cap,
-                         "rail_v = %g: less than Uc = %g V and a step of %.3f V: saturation would not be noticed",
-                         p->rail_v, p->uc_v, step_v);
+        return why_fail(
+            why, cap,
+            "rail_v: expected more than Uc = %g V and a step of %.3f V (else saturation is not detected), got %g",
+            p->uc_v, step_v, p->rail_v);
     if (p->rail_v > 16.0 * step_v)
-        return set_error(why, cap, "rail_v = %g: more than 16 steps of %.3f V", p->rail_v, step_v);
+        return why_fail(why, cap, "rail_v: expected 16 steps of %.3f V at most, got %g", step_v, p->rail_v);
     return true;
 }
 
@@ -145,35 +134,39 @@ static bool check_time(const struct pik_profile *p, char *why, size_t cap)
 {
     const double tclk_ns = 1e9 / p->clock_hz;
     if ((double)p->clock_hz * p->grid > 990e3)
-        return set_error(why, cap,
-                         "grid = %u: %u instants in each of %u periods a second are more than 990000 a second", p->grid,
-                         p->grid, p->clock_hz);
+        return why_fail(why, cap, "grid: expected 990000 instants a second at most, got %u in each of %u periods",
+                        p->grid, p->clock_hz);
     if (p->clock_hz * p->grid > PIK_LOOKS_HZ_MAX * (double)p->look_ticks)
-        return set_error(why, cap, "look_ticks = %u: more than %u looks a second at the input", p->look_ticks,
-                         PIK_LOOKS_HZ_MAX);
+        return why_fail(why, cap, "look_ticks: expected %u samples of the input a second at most, got more with %u",
+                        PIK_LOOKS_HZ_MAX, p->look_ticks);
     if ((p->look_ticks - 1) * tclk_ns / p->grid > PIK_LATE_NS_MAX)
-        return set_error(why, cap, "look_ticks = %u: a pulse would be known %.0f us late, more than %.0f us",
-                         p->look_ticks, (p->look_ticks - 1) * tclk_ns / p->grid * 1e-3, PIK_LATE_NS_MAX * 1e-3);
+        return why_fail(why, cap, "look_ticks: expected pulses %.0f us late at most, got %.0f us with %u",
+                        PIK_LATE_NS_MAX * 1e-3, (p->look_ticks - 1) * tclk_ns / p->grid * 1e-3, p->look_ticks);
     if (p->switch_on_ns >= tclk_ns)
-        return set_error(why, cap, "switch_on_ns = %g: longer than the reset, %.0f ns", p->switch_on_ns, tclk_ns);
+        return why_fail(why, cap, "switch_on_ns: expected less than the reset, %.0f ns, got %g", tclk_ns,
+                        p->switch_on_ns);
     if (p->switch_off_ns >= tclk_ns)
-        return set_error(why, cap, "switch_off_ns = %g: longer than the reset, %.0f ns", p->switch_off_ns, tclk_ns);
+        return why_fail(why, cap, "switch_off_ns: expected less than the reset, %.0f ns, got %g", tclk_ns,
+                        p->switch_off_ns);
     if (p->input_off_ns > tclk_ns)
-        return set_error(why, cap, "input_off_ns = %g: longer than the reset, %.0f ns", p->input_off_ns, tclk_ns);
+        return why_fail(why, cap, "input_off_ns: expected up to the reset, %.0f ns, got %g", tclk_ns, p->input_off_ns);
     return true;
 }
 
 /* An increment has 16 bits, and a period longer than what it takes in them would wrap unseen. */
 static bool check_reading(const struct pik_profile *p, char *why, size_t cap)
 {
-    if (p->latch_us > 0 && p->latch_us < 200) return set_error(why, cap, "latch_us = %u: below 200 us", p->latch_us);
+    if (p->latch_us > 0 && p->latch_us < 200)
+        return why_fail(why, cap, "latch_us: expected 0 or at least 200, got %u", p->latch_us);
     if (p->latch_us * 1e-6 * pik_profile_limit_hz(p) > 32767.0)
-        return set_error(why, cap, "latch_us = %u: up to %.0f pulses would not fit into 16 bits", p->latch_us,
-                         p->latch_us * 1e-6 * pik_profile_limit_hz(p));
+        return why_fail(why, cap,
+                        "latch_us: expected a period whose pulses fit into 16 bits, got up to %.0f pulses in %u us",
+                        p->latch_us * 1e-6 * pik_profile_limit_hz(p), p->latch_us);
     if (p->latch_us > 0 && p->latch_ns >= p->latch_us * 1000.0)
-        return set_error(why, cap, "latch_ns = %u: no shorter than the period", p->latch_ns);
+        return why_fail(why, cap, "latch_ns: expected less than the period, got %u", p->latch_ns);
     if (p->strobe_ns < p->strobe_min_ns)
-        return set_error(why, cap, "strobe_ns = %u: shorter than strobe_min_ns = %u", p->strobe_ns, p->strobe_min_ns);
+        return why_fail(why, cap, "strobe_ns: expected strobe_min_ns = %u or more, got %u", p->strobe_min_ns,
+                        p->strobe_ns);
     return true;
 }
 
@@ -182,7 +175,7 @@ bool pik_profile_check(const struct pik_profile *p, char *why, size_t cap)
     const double k = pik_profile_k_hz_per_v(p);
     if (!board_field_check(pik_fields, PIK_FIELDS, p, why, cap)) return false;
     if (k > 20e3 || k < 1.0)
-        return set_error(why, cap, "rr_ohm = %g: K = Rr/(RIN UREF TCLK) = %g Hz/V is not within 1..20000", p->rr_ohm,
-                         k);
+        return why_fail(why, cap, "rr_ohm: expected K = Rr/(RIN UREF TCLK) of 1 to 20000 Hz/V, got %g Hz/V with %g", k,
+                        p->rr_ohm);
     return check_integrator(p, why, cap) && check_time(p, why, cap) && check_reading(p, why, cap);
 }

@@ -1,6 +1,6 @@
 #include "board/pmka/profile.h"
 
-#include <stdio.h>
+#include "base/why.h"
 
 #define AT(field) .offset = offsetof(struct pmka_profile, field)
 #define NS(field, low, high, text)                                                                                     \
@@ -99,31 +99,25 @@ void pmka_profile_default(void *profile)
     };
 }
 
-/* Writes the sentence and is false, so that a check reads `return set_error(...)`. */
-static bool set_error(char *why, size_t cap, const char *sentence, double a, double b)
-{
-    if (cap > 0) (void)snprintf(why, cap, sentence, a, b);
-    return false;
-}
-
 static bool check_time(const struct pmka_profile *p, char *why, size_t cap)
 {
-    if (p->ts_ns % 2) return set_error(why, cap, "ts_ns = %.0f is odd: a reset lasts half of it", p->ts_ns, 0);
+    if (p->ts_ns % 2)
+        return why_fail(why, cap, "ts_ns: expected an even number (a reset lasts half of it), got %u", p->ts_ns);
     if (p->hold_ns >= p->convert_ns)
-        return set_error(why, cap, "hold_ns = %.0f: conversion begins before the code is there, after %.0f ns",
-                         p->hold_ns, p->convert_ns);
+        return why_fail(why, cap, "hold_ns: expected less than convert_ns = %u, got %u", p->convert_ns, p->hold_ns);
     if (p->convert_ns > p->mux_step_ns)
-        return set_error(why, cap, "convert_ns = %.0f: the next integrator is sampled after mux_step_ns = %.0f",
-                         p->convert_ns, p->mux_step_ns);
+        return why_fail(why, cap,
+                        "convert_ns: expected up to mux_step_ns = %u, when the next integrator is sampled, got %u",
+                        p->mux_step_ns, p->convert_ns);
     if (p->key_gap_ns >= p->convert_ns)
-        return set_error(why, cap,
-                         "key_gap_ns = %.0f: use less than convert_ns = %.0f, keys rest when the reading is complete",
-                         p->key_gap_ns, p->convert_ns);
+        return why_fail(
+            why, cap, "key_gap_ns: expected less than convert_ns = %u (keys rest when the reading is complete), got %u",
+            p->convert_ns, p->key_gap_ns);
     if (4.0 * p->mux_step_ns > 0.5 * p->ts_ns)
-        return set_error(why, cap, "mux_step_ns = %.0f: four of them are longer than a reset, %.0f ns", p->mux_step_ns,
-                         0.5 * p->ts_ns);
+        return why_fail(why, cap, "mux_step_ns: expected up to a quarter of a reset of %.0f ns, got %u", 0.5 * p->ts_ns,
+                        p->mux_step_ns);
     return p->strobe_ns >= p->strobe_min_ns ||
-           set_error(why, cap, "strobe_ns = %.0f is shorter than strobe_min_ns = %.0f", p->strobe_ns, p->strobe_min_ns);
+           why_fail(why, cap, "strobe_ns: expected strobe_min_ns = %u or more, got %u", p->strobe_min_ns, p->strobe_ns);
 }
 
 /* A reset that leads beyond the comparator of the other sign would cause one of that sign, endlessly. */
@@ -132,19 +126,21 @@ static bool check_reset(const struct pmka_profile *p, char *why, size_t cap)
     const double ur_v = p->uref_v * (0.5e-9 * p->ts_ns) / (p->rr_ohm * p->cap_f);
     const double ct = p->r_in_ohm / (2.0 * p->rr_ohm);
     if (p->uc_v * 2.0 <= ur_v)
-        return set_error(why, cap, "uc_v = %.3f: a reset is Ur = %.3f V, use more than half of it", p->uc_v, ur_v);
+        return why_fail(why, cap, "uc_v: expected more than half of a reset, Ur = %.3f V, got %.3f", ur_v, p->uc_v);
     if (p->uc_v + ur_v >= p->adc_range_v)
-        return set_error(why, cap, "uc_v = %.3f: with Ur = %.3f V above it the converter is at its end", p->uc_v, ur_v);
+        return why_fail(why, cap,
+                        "uc_v: expected a value that with Ur = %.3f V is within the converter's range, got %.3f", ur_v,
+                        p->uc_v);
     return (ct > 0.997 && ct < 1.003) ||
-           set_error(why, cap, "r_in_ohm: RIN / (2 Rr) = %.5f, the ROM holds CT of 0.997 .. 1.003", ct, 0);
+           why_fail(why, cap, "r_in_ohm: expected RIN / (2 Rr) of 0.997 to 1.003 (CT in the ROM), got %.5f", ct);
 }
 
 static bool check_beat(const struct pmka_profile *p, char *why, size_t cap)
 {
     return p->zero_periods + PMKA_BEAT_SPARE <= p->beat_periods ||
-           set_error(why, cap,
-                     "zero_periods = %.0f: use at most beat_periods - 6 = %.0f, the resets are calibrated after it",
-                     p->zero_periods, (double)p->beat_periods - PMKA_BEAT_SPARE);
+           why_fail(why, cap,
+                    "zero_periods: expected up to beat_periods - 6 = %.0f (the resets are calibrated after it), got %u",
+                    (double)p->beat_periods - PMKA_BEAT_SPARE, p->zero_periods);
 }
 
 bool pmka_profile_check(const void *profile, char *why, size_t cap)

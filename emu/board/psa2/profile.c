@@ -1,10 +1,10 @@
 #include "board/psa2/profile.h"
 
 #include "base/clk.h"
+#include "base/why.h"
 #include "chip/ads1282/ads1282.h"
 
 #include <ctype.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -187,17 +187,6 @@ int64_t psa2_profile_period_ns(const struct psa2_profile *p)
     return clk_span_ns(p->fclk_hz, 4 * (int64_t)fmod_periods / decimation);
 }
 
-/* Writes the sentence and is false, so that a check reads `return set_error(...)`. */
-static bool set_error(char *why, size_t cap, const char *format, ...) __attribute__((format(printf, 3, 4)));
-static bool set_error(char *why, size_t cap, const char *format, ...)
-{
-    va_list args;
-    va_start(args, format);
-    if (cap > 0) (void)vsnprintf(why, cap, format, args);
-    va_end(args);
-    return false;
-}
-
 static bool is_width(unsigned bits)
 {
     return bits == 16 || bits == 24 || bits == 32;
@@ -205,31 +194,29 @@ static bool is_width(unsigned bits)
 
 static bool check_words(const struct psa2_profile *p, char *why, size_t cap)
 {
-    if (!is_width(p->word_bits)) return set_error(why, cap, "word_bits = %u: use 16, 24 or 32", p->word_bits);
-    if (!is_width(p->code_bits)) return set_error(why, cap, "code_bits = %u: use 16, 24 or 32", p->code_bits);
+    if (!is_width(p->word_bits)) return why_fail(why, cap, "word_bits: expected 16, 24 or 32, got %u", p->word_bits);
+    if (!is_width(p->code_bits)) return why_fail(why, cap, "code_bits: expected 16, 24 or 32, got %u", p->code_bits);
     if (p->read_bits != 24 && p->read_bits != 32)
-        return set_error(why, cap, "read_bits = %u: use 24 or 32", p->read_bits);
+        return why_fail(why, cap, "read_bits: expected 24 or 32, got %u", p->read_bits);
     if (p->code_bits > p->word_bits)
-        return set_error(why, cap, "code_bits = %u do not fit into word_bits = %u: use code_bits <= %u or longer words",
-                         p->code_bits, p->word_bits, p->word_bits);
+        return why_fail(why, cap, "code_bits: expected up to word_bits = %u, got %u", p->word_bits, p->code_bits);
     if (p->code_bits > p->read_bits)
-        return set_error(why, cap, "code_bits = %u but only read_bits = %u are read: use read_bits >= %u", p->code_bits,
-                         p->read_bits, p->code_bits);
+        return why_fail(why, cap, "code_bits: expected up to read_bits = %u, got %u", p->read_bits, p->code_bits);
     unsigned seen = 0;
     for (unsigned i = 0; i < PSA2_WORDS; i++)
         if ((unsigned)p->word[i] < PSA2_WORDS) seen |= 1u << p->word[i];
-    return seen == 0xF || set_error(why, cap, "word: each of X, Y, Z, T must be sent once");
+    return seen == 0xF || why_fail(why, cap, "word: expected each of X, Y, Z, T once");
 }
 
 static bool check_setup(const struct psa2_profile *p, char *why, size_t cap)
 {
     if (p->setup_count == 0 || p->setup_count > PSA2_SETUP_MAX)
-        return set_error(why, cap, "setup has %u steps: use 1 to %u", p->setup_count, PSA2_SETUP_MAX);
+        return why_fail(why, cap, "setup: expected 1 to %u steps, got %u", PSA2_SETUP_MAX, p->setup_count);
     for (unsigned i = 0; i < p->setup_count; i++) {
         const bool write = p->setup[i].action == PSA2_WRITE_A || p->setup[i].action == PSA2_WRITE_T;
         if (write != (p->setup[i].count > 0) || p->setup[i].count > sizeof p->setup[i].bytes)
-            return set_error(why, cap, "setup step %u has %u bytes: a write has 1 to 8, a pulse none", i,
-                             p->setup[i].count);
+            return why_fail(why, cap, "setup: step %u: expected 1 to 8 bytes of a write and none of a pulse, got %u", i,
+                            p->setup[i].count);
     }
     return true;
 }
@@ -237,10 +224,10 @@ static bool check_setup(const struct psa2_profile *p, char *why, size_t cap)
 static bool check_mode(const struct psa2_profile *p, char *why, size_t cap)
 {
     const uint8_t config0 = config0_of(p);
-    return ads1282_models(config0) ||
-           set_error(why, cap,
-                     "setup: KPSA cannot read CONFIG0 = %02Xh: use pulse sync (bit 7 = 0), DR 000 to 100, FILTR 10",
-                     config0);
+    return ads1282_models(config0) || why_fail(why, cap,
+                                               "setup: CONFIG0: expected pulse sync (bit 7 = 0), DR 000 to 100 and "
+                                               "FILTR 10, which KPSA reads, got %02Xh",
+                                               config0);
 }
 
 /* SClk limits: ADS128x period 2..16 tCLK (M75), ADS1256 period >= 4 tau (M90): sources 1.4, 2.4. */
@@ -249,21 +236,21 @@ static bool check_sclk(const struct psa2_profile *p, char *why, size_t cap)
     const uint32_t max_a = p->fclk_hz / 2;
     const uint32_t max_t = p->temp_clkin_hz / 4;
     if (p->sclk_hz > max_a)
-        return set_error(why, cap, "sclk_hz = %u > fclk_hz / 2 = %u: use a slower SClk", p->sclk_hz, max_a);
+        return why_fail(why, cap, "sclk_hz: expected up to fclk_hz / 2 = %u, got %u", max_a, p->sclk_hz);
     if (p->sclk_hz > max_t)
-        return set_error(why, cap, "sclk_hz = %u > temp_clkin_hz / 4 = %u: use a slower SClk", p->sclk_hz, max_t);
+        return why_fail(why, cap, "sclk_hz: expected up to temp_clkin_hz / 4 = %u, got %u", max_t, p->sclk_hz);
     if (p->sclk_hz < p->fclk_hz / 16)
-        return set_error(why, cap, "sclk_hz = %u < fclk_hz / 16 = %u: use a faster SClk", p->sclk_hz, p->fclk_hz / 16);
+        return why_fail(why, cap, "sclk_hz: expected fclk_hz / 16 = %u or more, got %u", p->fclk_hz / 16, p->sclk_hz);
     return true;
 }
 
 static bool check_gain(const struct psa2_profile *p, char *why, size_t cap)
 {
     if (p->adc_pga & (p->adc_pga - 1))
-        return set_error(why, cap, "adc_pga = %u: use 1, 2, 4, 8, 16, 32 or 64", p->adc_pga);
+        return why_fail(why, cap, "adc_pga: expected 1, 2, 4, 8, 16, 32 or 64, got %u", p->adc_pga);
     if (p->adc_is_1281 && p->adc_pga != 1)
-        return set_error(why, cap, "adc_pga = %u: the ADS1281 has no gain stage, use 1 or adc_is_1281: false",
-                         p->adc_pga);
+        return why_fail(why, cap, "adc_pga: expected 1 (the ADS1281 has no gain stage), or adc_is_1281: false, got %u",
+                        p->adc_pga);
     return true;
 }
 
@@ -282,30 +269,31 @@ static bool check_int_low(const struct psa2_profile *p, char *why, size_t cap)
     const int64_t need = (PSA2_INT_LOW_MIN_NS * (int64_t)p->line_hz + one - 1) / one;
     const int64_t all = (int64_t)psa2_frame_clks(p) * 1000000000;
     const int64_t div = (PSA2_INT_LOW_MIN_NS * (int64_t)p->line_hz + all - 1) / all;
-    return set_error(
-        why, cap,
-        "INT low = (%u + 4*%u + 3*%u) CLK / %.3f MHz = %.3f us < 74 us: use lead_in_clk >= %lld or line_div >= %lld",
-        p->lead_in_clk, p->word_bits, PSA2_GAP_CLK, line_mhz(p), 1e-3 * (double)low_ns, (long long)(need - data),
-        (long long)div);
+    return why_fail(why, cap,
+                    "INT low: expected 74 us or more (lead_in_clk >= %lld or line_div >= %lld), got (%u + 4*%u + 3*%u) "
+                    "CLK / %.3f MHz "
+                    "= %.3f us",
+                    (long long)(need - data), (long long)div, p->lead_in_clk, p->word_bits, PSA2_GAP_CLK, line_mhz(p),
+                    1e-3 * (double)low_ns);
 }
 
 static bool check_times(const struct psa2_profile *p, char *why, size_t cap)
 {
     const int64_t word_ns = line_ns(p, p->word_bits);
     if (word_ns > PSA2_WORD_NS_MAX)
-        return set_error(why, cap, "a word lasts %u CLK / %.3f MHz = %.3f us > %.0f us: use a faster CLK", p->word_bits,
-                         line_mhz(p), 1e-3 * (double)word_ns, 1e-3 * PSA2_WORD_NS_MAX);
+        return why_fail(why, cap, "word: expected up to %.0f us (a faster CLK), got %u CLK / %.3f MHz = %.3f us",
+                        1e-3 * PSA2_WORD_NS_MAX, p->word_bits, line_mhz(p), 1e-3 * (double)word_ns);
     /* From DRD_A: up to 2 SClk periods to the first edge, the bits, up to 1 CLK period to the grid of the line. */
     const int64_t read_ns = clk_span_ns(p->sclk_hz, p->read_bits + 2) + line_ns(p, 1);
     const int64_t low_ns = psa2_int_low_ns(p);
     const int64_t period_ns = psa2_profile_period_ns(p);
     return read_ns + low_ns <= period_ns ||
-           set_error(
-               why, cap,
-               "reading %u bits at %.3f MHz (%.3f us) and INT low (%.3f us) make %.3f us > data period %.3f us: use "
-               "a faster sclk_hz or CLK, or a lower data rate in setup",
-               p->read_bits, 1e-6 * (double)p->sclk_hz, 1e-3 * (double)read_ns, 1e-3 * (double)low_ns,
-               1e-3 * (double)(read_ns + low_ns), 1e-3 * (double)period_ns);
+           why_fail(why, cap,
+                    "frame: expected up to the data period, %.3f us (a faster sclk_hz or CLK, or a lower data rate in "
+                    "setup), got "
+                    "%u bits at %.3f MHz (%.3f us) and INT low (%.3f us), %.3f us in all",
+                    1e-3 * (double)period_ns, p->read_bits, 1e-6 * (double)p->sclk_hz, 1e-3 * (double)read_ns,
+                    1e-3 * (double)low_ns, 1e-3 * (double)(read_ns + low_ns));
 }
 
 bool psa2_profile_check(const struct psa2_profile *p, char *why, size_t cap)

@@ -138,8 +138,8 @@ bool psd1_profile_check(const void *profile, char *why, size_t cap)
 {
     const struct psd1_profile *p = profile;
     if (!board_field_check(psd1_fields, PSD1_FIELDS, profile, why, cap)) return false;
-    const char *const no = 1u << gain_log2(p) != p->adc_gain ? "adc_gain must be 1, 2, 4 ... 128"
-                           : p->strobe_ns < p->strobe_min_ns ? "strobe_ns must not be less than strobe_min_ns"
+    const char *const no = 1u << gain_log2(p) != p->adc_gain ? "adc_gain: expected 1, 2, 4 ... 128"
+                           : p->strobe_ns < p->strobe_min_ns ? "strobe_ns: expected strobe_min_ns or more"
                                                              : NULL;
     if (no && cap > 0) (void)snprintf(why, cap, "%s", no);
     return !no;

@@ -35,9 +35,7 @@ def decode_can(path: Path, node: int, out: IO[str], board: str = "psa2") -> Fram
     node, with the nodes whose frames it has.
     """
     if path.suffix not in MESSAGE_READERS:
-        raise BadInput(
-            f"{path}: ending {path.suffix or 'missing'}; python-can reads {' '.join(sorted(MESSAGE_READERS))}"
-        )
+        raise BadInput(expected(f"an ending of {' '.join(sorted(MESSAGE_READERS))}", path.suffix or "none", path))
     _check_there(path)
     reader, ids = reader_of(board, node), set[int]()
     table = csv.writer(out, lineterminator="\n")
@@ -48,13 +46,13 @@ def decode_can(path: Path, node: int, out: IO[str], board: str = "psa2") -> Fram
             begun = True
         table.writerows(_rows(frames) if isinstance(frames, Frames) else _reading_rows(frames))
     if not begun:
-        raise BadInput(f"{path}: {_no_frame(node, _senders(ids, board))}")
+        raise BadInput(expected(f"frames of node {node}", _no_frame(node, _senders(ids, board)), path))
     return reader
 
 
 def _no_frame(node: int, senders: set[int]) -> str:
     others = ", ".join(map(str, sorted(senders - {node}))) or "none"
-    what = f"only parts of frames of node {node}; others" if node in senders else f"no frame of node {node}; nodes"
+    what = "only parts of them; other nodes" if node in senders else "none; nodes"
     return f"{what} with frames: {others}"
 
 
@@ -68,7 +66,7 @@ def _senders(ids: set[int], board: str) -> set[int]:
 def _check_there(path: Path) -> None:
     """Before the table's head is printed."""
     if not path.exists() or path.is_dir():
-        raise BadInput(expected("a file", "a folder", str(path)) if path.exists() else f"{path}: no such file")
+        raise BadInput(expected("a file", "a folder", path) if path.exists() else f"{path}: no such file")
 
 
 def _chunks(path: Path, reader: FrameReader | ReadingReader, ids: set[int]) -> Iterator[Frames | Readings]:
@@ -86,7 +84,7 @@ def _chunks(path: Path, reader: FrameReader | ReadingReader, ids: set[int]) -> I
         raise BadInput(f"{path}: {e.strerror}") from e
     except (ValueError, IndexError, KeyError, EOFError, struct.error) as e:
         yield reader.take()  # what came before the damage is good
-        raise BadInput(f"{path}: message {read + 1} cannot be read ({e}); the {read} before it are decoded") from e
+        raise BadInput(f"{path}: message {read + 1} is damaged ({e}); the {read} messages before it are decoded") from e
     yield reader.take()
 
 
@@ -134,5 +132,5 @@ def decode_line(path: Path, fmt: LineFormat, out: IO[str]) -> LineDecoder:
             fall_s, rise_s = frames.fall / fmt.sample_hz, frames.rise / fmt.sample_hz
             table.writerows(zip(fall_s.tolist(), rise_s.tolist(), *frames.words.T.tolist(), strict=True))
     if not begun:
-        raise BadInput(f"{path}: no frame of {fmt.word_bits}-bit words ({decoder.counts})")
+        raise BadInput(expected(f"frames of {fmt.word_bits}-bit words", f"none ({decoder.counts})", path))
     return decoder

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from psabench.errors import BadInput
+from psabench.errors import BadInput, expected
 from psabench.options import LINE_HZ, Help, Parser, add_board, node_of, positive
 
 EPILOG = """\
@@ -41,7 +41,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
 
 def _decode(args: argparse.Namespace) -> int:
     if args.line and args.board != "psa2":
-        raise BadInput(f"--line: line frames are PSA-2's; of a {args.board} a CAN log is decoded: leave --line out")
+        raise BadInput(expected("a CAN log for this board (leave --line out)", args.board, "--line"))
     with args.out.open("w", encoding="utf-8") if args.out else _Stdout() as out:
         return _decode_line(args, out) if args.line else _decode_can(args, out)
 

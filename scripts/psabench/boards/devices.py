@@ -12,7 +12,7 @@ from psabench.boards.psa2.frames import FrameReader
 from psabench.boards.readings import ReadingReader
 from psabench.boards.registry import BOARDS, of_name
 from psabench.boards.unit import NAME, Unit
-from psabench.errors import LinkError
+from psabench.errors import LinkError, expected
 from psabench.link.can_host import CanHost
 from psabench.link.canopen_host import CanopenNode
 from psabench.places import proto_file
@@ -24,7 +24,7 @@ def of_board(board: str) -> type[Unit]:
     """The class of a board as the emulator calls it. Raises ValueError for one that this package does not know."""
     known = of_name(board)
     if known is None:
-        raise ValueError(f"no such board: {board}; there are {', '.join(BOARDS)}")
+        raise ValueError(expected(", ".join(BOARDS), repr(board), "board"))
     kind: type[Unit] = getattr(import_module(f"psabench.boards.{known.name}.device"), known.device)
     return kind
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from psabench.boards.psa2.frames import FrameCounters
+from psabench.errors import expected
 from psabench.link import signals
 from psabench.link.can_host import Message
 from psabench.link.protocol_files import dbc_node, message
@@ -51,7 +52,7 @@ class Readings:
     def __getitem__(self, name: str) -> Floats:
         """A column. Raises KeyError, with the names that there are."""
         if name not in self.columns:
-            raise KeyError(f"{name}; a reading has {', '.join(self.columns)}")
+            raise KeyError(expected(", ".join(self.columns), name, "column"))
         return self.columns[name]
 
     def head(self, count: int) -> Readings:

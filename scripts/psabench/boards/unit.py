@@ -12,7 +12,7 @@ from typing import ClassVar
 from psabench.boards.objects import BusObjects, Common, Psa2Objects
 from psabench.boards.psa2.frames import FrameReader, Frames
 from psabench.boards.readings import ReadingLayout, ReadingReader, Readings
-from psabench.errors import CycleRefused, DeviceError, LinkError
+from psabench.errors import CycleRefused, DeviceError, LinkError, expected
 from psabench.link.can_host import CanHost
 from psabench.link.canopen_host import CanopenNode
 from psabench.link.protocol_files import dbc_node
@@ -77,7 +77,7 @@ class Unit:
 
     def _bank(self, bank: str) -> int:
         if bank not in self.banks:
-            raise ValueError(f"{bank!r}; a {self.title} has {', '.join(self.banks) or 'no registers'}")
+            raise ValueError(expected(", ".join(self.banks) or "no bank", repr(bank), f"bank of a {self.title}"))
         return self.banks[bank]
 
     # ---- the parallel bus
@@ -98,7 +98,7 @@ class Unit:
         """A write cycle. Raises CycleRefused."""
         self._strobe(strobe_ns)
         if not 0 <= value <= 0xFFFF:
-            raise ValueError(f"value is {value}; a word of the bus has 16 bits")
+            raise ValueError(expected("a 16-bit word", value, "value"))
         try:
             self.node.write_raw(self._bank("bus"), address + 1, value.to_bytes(2, "little"))
         except DeviceError as e:
@@ -181,7 +181,7 @@ class BusUnit(Unit):
         }
         for name in messages:
             if name not in tpdos:
-                raise ValueError(f"{name!r}; a {self.title} sends {', '.join(tpdos)}")
+                raise ValueError(expected(", ".join(tpdos), repr(name), f"message of a {self.title}"))
             self.node.write(tpdos[name], 1, int(self.node.read(tpdos[name], 1)) & ~TPDO_OFF)
         wanted = {*self.frames.layout.messages, *messages}
         self.host.listeners.remove(self.frames.on_message)

@@ -21,7 +21,7 @@ import numpy as np
 from psabench.campaign import builds
 from psabench.campaign.setup import Hold, Setup, as_input
 from psabench.campaign.store import CELL, Origin, Part, Rows
-from psabench.errors import BadInput
+from psabench.errors import BadInput, expected
 from psabench.native import nav, nav_mc
 from psabench.native.navlib import library
 
@@ -100,7 +100,7 @@ def _computed(w: Wanted) -> Rows:
     if w.hold is None:
         return chain.compute(w.setup, _seed(w), w.first_run, w.runs)
     if not chain.holds:
-        raise BadInput(f"--chain {w.chain}: the hold is not computed by it; {' and '.join(_holding())} do")
+        raise BadInput(expected(f"{' or '.join(_holding())} for a hold", w.chain, "--chain"))
     found = nav_mc.hold(hold_config(w.setup, w.hold), _seed(w), first_run=w.first_run, runs=w.runs)
     return _columns(np.degrees(found.end_rad), np.degrees(found.max_rad))
 

@@ -196,7 +196,7 @@ def _plans(options: Options) -> list[Plan]:
     if options.workers is not None and not 1 <= options.workers <= 1024:
         raise BadInput(expected("1 to 1024", options.workers, "--workers"))
     if options.workers is not None and options.dask is not None:
-        raise BadInput("--workers: the cluster at --dask has its own number of workers")
+        raise BadInput(expected("none with --dask: the cluster has its own workers", options.workers, "--workers"))
     cases = _cases(options)
     plan = Plan(cases=cases, chain=options.chain, runs=runs, seed=options.seed)
     if options.chain == "closed":
@@ -212,19 +212,19 @@ def _cases(options: Options) -> list[Case]:
     names = options.studies or (usual if options.case is None else tuple(STUDIES))
     for name in names:
         if name not in STUDIES:
-            raise BadInput(f"--study {name}: no such study; {', '.join(STUDIES)}")
+            raise BadInput(expected(", ".join(STUDIES), name, "--study"))
     cases = [c for name in dict.fromkeys(names) for c in STUDIES[name].cases(base)]
     if options.case is not None:
         there = ", ".join(c.name for c in cases)
         cases = [c for c in cases if c.name == options.case]
         if not cases:
-            raise BadInput(f"--case {options.case}: no such case; {there}")
+            raise BadInput(expected(there, options.case, "--case"))
     if emulates:
         from psabench.campaign import emulated
 
         for c in cases:
             if c.hold is not None:
-                raise BadInput(f"--chain {options.chain}: {c.name}: the hold is computed by closed and samples")
+                raise BadInput(expected(f"closed or samples for the hold of {c.name}", options.chain, "--chain"))
             emulated.params(c.setup)
     settings.rehearse(cases, options.settings)
     return cases
@@ -235,9 +235,9 @@ def _base(options: Options) -> Setup:
     if options.scenario is None:
         return Setup()
     if not chains.CHAINS[options.chain].emulates:
-        raise BadInput(f"--scenario {options.scenario}: --chain {options.chain} has no bench; emulated and wire have")
+        raise BadInput(expected("--chain emulated or wire with --scenario", options.chain, "--chain"))
     if options.case is not None or any(name != "own" for name in options.studies):
-        raise BadInput(f"--scenario {options.scenario}: other studies than own bring errors of their own")
+        raise BadInput(expected("no --case, and no --study but own", options.scenario, "--scenario"))
     from psabench.campaign import emulated
 
     return emulated.setup_of(options.scenario)

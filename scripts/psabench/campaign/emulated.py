@@ -25,7 +25,7 @@ import numpy as np
 from psabench.bench import Bench
 from psabench.campaign.setup import BEFORE_S, Setup, level_white_degph_rts
 from psabench.campaign.store import CELL, Rows
-from psabench.errors import BadInput, DeviceError, LinkError
+from psabench.errors import BadInput, DeviceError, LinkError, expected
 from psabench.estimate.angles import wrapped_deg
 from psabench.native.nav import DEGPH
 from psabench.places import find_emulator, proto_file
@@ -73,26 +73,26 @@ def instrument(setup: Setup, seed: int, run: int) -> Instrument:
 def check(setup: Setup) -> None:
     """Raises BadInput for what an instrument cannot be told to be."""
     white = level_white_degph_rts(setup.window_s, setup.m1_per_s)
-    reasons = (
-        (setup.slew_dps <= 0.0, "its turns take time: expected slew_dps"),
-        (setup.m2_per_s <= 0.0, "its azimuth loop has a gain: expected m2_per_s, as 2"),
-        (setup.gimbal == "alpha", "its platform turns about the gimbal: gimbal is uncorrected or corrected"),
-        (setup.angle_sys in ("increment", "accumulates"), "its angle sensor has one zero: angle_sys is none or common"),
-        (setup.slew_dps2 not in (0.0, UNIT_DPS2), f"its turns accelerate with slew_dps2={UNIT_DPS2:g}"),
-        (setup.per_sample, "its errors are drawn once a position"),
+    beta, gamma = setup.beta_random_arcmin, setup.gamma_random_arcmin
+    wrong = (
+        (setup.slew_dps <= 0.0, "slew_dps", "a rate above 0 (a turn takes time)", setup.slew_dps),
+        (setup.m2_per_s <= 0.0, "m2_per_s", "the gain of the azimuth loop, as 2", setup.m2_per_s),
+        (setup.gimbal == "alpha", "gimbal", "uncorrected or corrected", setup.gimbal),
+        (setup.angle_sys in ("increment", "accumulates"), "angle_sys", "none or common", setup.angle_sys),
+        (setup.slew_dps2 not in (0.0, UNIT_DPS2), "slew_dps2", f"0 or {UNIT_DPS2:g}", setup.slew_dps2),
+        (setup.per_sample, "per_sample", "no (errors are drawn once a position)", "yes"),
         (
             not setup.scenario and setup.white_degph_rts not in (0.0, white),
-            f"its noise is that of sensors and converters, white_degph_rts={white}, or 0",
+            "white_degph_rts",
+            f"{white} (the noise of the sensors and converters) or 0",
+            setup.white_degph_rts,
         ),
-        (setup.random_sign, "the signs of its systematic errors are those given"),
-        (
-            setup.beta_random_arcmin != setup.gamma_random_arcmin,
-            "both its level sensors have the same random error",
-        ),
+        (setup.random_sign, "random_sign", "no (systematic errors keep their signs)", "yes"),
+        (beta != gamma, "beta_random_arcmin", f"gamma_random_arcmin = {gamma:g} (the level sensors are alike)", beta),
     )
-    for wrong, reason in reasons:
-        if wrong:
-            raise BadInput(f"{OPTION}: {reason}")
+    for found, name, what, value in wrong:
+        if found:
+            raise BadInput(expected(what, value, f"{OPTION}: {name}"))
 
 
 # ---- scenarios
@@ -117,10 +117,10 @@ def setup_of(path: Path) -> Setup:
     s: Scenario = json.loads(text)
     boards = {u["board"] for u in s.get("units", [])}
     if "platform" not in s or not {"gyro", "psa2"} <= boards:
-        raise BadInput(f"--scenario {path}: expected a platform, a gyro unit and the PSA-2 of its level sensors in it")
+        raise BadInput(expected("a platform, a gyro unit and the PSA-2 of its levels", None, f"--scenario {path}"))
     p = s["platform"]
     if p["torquer_scale"][0] != p["torquer_scale"][1]:
-        raise BadInput(f"--scenario {path}: torquer_scale of the axes differs; the algebra beside it has one")
+        raise BadInput(expected("one torquer_scale for both axes", p["torquer_scale"], f"--scenario {path}"))
     return Setup(
         scenario=text,
         latitude_deg=s["site"]["latitude_deg"],

@@ -95,4 +95,6 @@ def run(wanted: Sequence[Wanted], store: Store, workers: Workers, progress: Prog
 def _of_this_build(parts: Sequence[Part], wanted: Wanted) -> None:
     """A part's origin is what its worker says: where the code changed under a campaign, no one would find it again."""
     if any(p.origin.build != wanted.origin.build for p in parts):
-        raise BenchError("a worker computes with another build than this: it changed on the way; start again")
+        raise BenchError(
+            "campaign: psabench was rebuilt during the run, so the workers disagree; start the campaign again"
+        )

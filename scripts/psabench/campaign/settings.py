@@ -15,7 +15,7 @@ from psabench.campaign import chains
 from psabench.campaign.cases import Case
 from psabench.campaign.chains import Wanted
 from psabench.campaign.setup import ANY, CHOICES, Setup, changed
-from psabench.errors import BadInput
+from psabench.errors import BadInput, expected
 from psabench.native.navlib import library
 
 
@@ -80,7 +80,7 @@ def base(words: Sequence[str], start: Setup | None = None) -> Setup:
     for word in words:
         name = word.partition("=")[0]
         if near := difflib.get_close_matches(name, SETTINGS, 3) if name not in SETTINGS else []:
-            raise BadInput(f"--set {word}: no such setting; {', '.join(near)}? --list names all")
+            raise BadInput(expected(f"a setting that --list names ({', '.join(near)}?)", name, f"--set {word}"))
         setup = changed(setup, [word])
         if reason := out_of_range(setup, name):
             raise BadInput(f"--set {word}: {reason}")
@@ -93,10 +93,10 @@ def out_of_range(setup: Setup, name: str) -> str:
     if value is None or isinstance(value, str | bool):
         return ""
     if name == "angles_deg" and not 3 <= len(value) <= 64:
-        return f"{name} has {len(value)} positions; it must have 3 to 64"
+        return expected("3 to 64 positions", len(value), name)
     for x in value if isinstance(value, tuple) else (value,):
         if not s.low <= x <= s.high:
-            return f"{name} is {x:g}; it must lie within {s.low:g} to {s.high:g}{s.unit and ' '}{s.unit}"
+            return expected(f"{s.low:g} to {s.high:g}{s.unit and ' '}{s.unit}", f"{x:g}", name)
     return ""
 
 

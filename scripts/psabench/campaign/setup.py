@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from psabench.errors import BadInput
+from psabench.errors import BadInput, expected
 
 CHOICES: dict[str, tuple[str, ...]] = {
     "tilt": ("uniform", "corners"),
@@ -107,7 +107,7 @@ def _check_choices(value: Setup | Hold) -> None:
     for name, allowed in CHOICES.items():
         given = getattr(value, name, allowed[0])
         if given not in allowed:
-            raise ValueError(f"{name} is {given!r}; it must be {', '.join(allowed)}")
+            raise ValueError(expected(", ".join(allowed), repr(given), name))
 
 
 def as_input(setup: Setup, hold: Hold | None) -> dict[str, Any]:
@@ -124,7 +124,7 @@ def changed(setup: Setup, words: Sequence[str]) -> Setup:
         name, equals, text = word.partition("=")
         if not equals or name not in kinds or name == "scenario":
             names = ", ".join(k for k in kinds if k != "scenario")
-            raise BadInput(f"--set {word}: expected NAME=VALUE with a name of {names}")
+            raise BadInput(expected(f"NAME=VALUE with a name of {names}", repr(word), "--set"))
         try:
             setup = dataclasses.replace(setup, **{name: _value(text, kinds[name])})
         except ValueError as e:
@@ -135,7 +135,7 @@ def changed(setup: Setup, words: Sequence[str]) -> Setup:
 def _value(text: str, kind: Any) -> Any:
     if kind is bool:
         if text not in ("yes", "no"):
-            raise ValueError("expected yes or no")
+            raise ValueError(expected("yes or no", repr(text)))
         return text == "yes"
     if isinstance(kind, types.GenericAlias):  # tuple of numbers
         return tuple(_number(x) for x in text.split(","))
@@ -147,5 +147,5 @@ def _value(text: str, kind: Any) -> Any:
 def _number(text: str) -> float:
     value = float(text)
     if not -1e12 < value < 1e12:
-        raise ValueError(f"{text!r} is not a number of this world")
+        raise ValueError(expected("a number within +-1e12", repr(text)))
     return value

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from psabench.errors import BadInput
+from psabench.errors import BadInput, expected
 
 FORMAT = 2  # of the tables below, the file's user_version; 1 had no build in the key
 APPLICATION = 0x70736162  # "psab", the file's application_id: `file` and we know what it is
@@ -104,7 +104,7 @@ class Store:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._db = sqlite3.connect(path, timeout=PATIENCE_S, isolation_level=None)
         except (OSError, sqlite3.Error) as e:
-            raise BadInput(f"{path}: cannot be opened as a store of results ({e})") from e
+            raise BadInput(expected("a store of results (SQLite)", e, path)) from e
         try:
             self._prepare()
         except BaseException:
@@ -130,12 +130,12 @@ class Store:
                 self._do(f"PRAGMA application_id = {APPLICATION}")
                 self._do(f"PRAGMA user_version = {FORMAT}")
             elif application != APPLICATION:
-                raise BadInput(f"{self.path}: an SQLite file of another program, not a store of results")
+                raise BadInput(expected("a store of results", "an SQLite file of another program", self.path))
             elif (found := int(self._one("PRAGMA user_version"))) == 1:
                 # The same tables, but a series may hold runs of several builds: kept under its old key, for no one.
                 self._do(f"PRAGMA user_version = {FORMAT}")
             elif found != FORMAT:
-                raise BadInput(f"{self.path}: a store of format {found}; this psabench reads format {FORMAT}")
+                raise BadInput(expected(f"a store of format {FORMAT}", f"format {found}", self.path))
         self._do("PRAGMA foreign_keys = ON")
 
     # ---- what there is
@@ -167,11 +167,11 @@ class Store:
                 break
             whole = len(data) == count * width * CELL.itemsize and hashlib.sha256(data).digest() == digest
             if not whole:
-                raise BadInput(f"{self.path}: runs {first} to {first + count - 1} of {origin.kind} are damaged")
+                raise BadInput(expected(f"runs {first} to {first + count - 1} of {origin.kind}", "damage", self.path))
             found.append(np.frombuffer(data, CELL).reshape(count, width)[at - first :])
             at = max(at, first + count)
         if at < runs:
-            raise BadInput(f"{self.path}: {origin.kind}: {at} runs of {runs}")
+            raise BadInput(expected(f"{runs} runs", at, f"{self.path}: {origin.kind}"))
         return np.concatenate([*found, np.empty((0, width), CELL)])[:runs]
 
     def origins(self) -> list[Origin]:
@@ -200,7 +200,7 @@ class Store:
     def _put(self, part: Part) -> None:
         o = part.origin
         if part.rows.ndim != 2 or part.rows.shape[1] != len(o.columns):
-            raise ValueError(f"{o.kind}: rows of shape {part.rows.shape} for {len(o.columns)} columns")
+            raise ValueError(expected(f"rows of {len(o.columns)} columns", f"shape {part.rows.shape}", o.kind))
         data = np.ascontiguousarray(part.rows, CELL).tobytes()
         self._do(
             "INSERT INTO series (key, kind, input, seed, version, columns, build) VALUES (?, ?, ?, ?, ?, ?, ?)"
@@ -237,7 +237,7 @@ class Store:
         except sqlite3.OperationalError as e:  # locked, read-only, disk full
             raise BadInput(f"{self.path}: {e}") from e
         except sqlite3.DatabaseError as e:
-            raise BadInput(f"{self.path}: not a store of results, or damaged ({e})") from e
+            raise BadInput(expected("a store of results", f"a damaged or other file ({e})", self.path)) from e
 
 
 class _Transaction:

@@ -16,7 +16,7 @@ from itertools import islice
 from multiprocessing import resource_tracker
 from typing import Any, Protocol, TypeVar
 
-from psabench.errors import BadInput, BenchError, LinkError
+from psabench.errors import BadInput, BenchError, LinkError, expected
 
 CONNECT_S = 20.0
 AHEAD = 3  # tasks handed to each worker beyond what it computes: enough to keep it busy, few enough to hold in memory
@@ -173,11 +173,11 @@ def _same_psabench(client: Any, address: str, chain: str) -> None:
     except TimeoutError as e:
         raise LinkError(f"--dask {address}: the scheduler has no workers") from e
     except Exception as e:
-        raise BadInput(f"--dask {address}: a worker cannot compute: {type(e).__name__}: {e}") from e
+        raise BadInput(f"--dask {address}: {type(e).__name__} in a worker: {e}") from e
     mine = own_build(chain)
     others = sorted({theirs for theirs in found.values() if theirs != mine})
     if others:
-        raise BadInput(f"--dask {address}: its workers have {'; '.join(others)}. This is {mine}")
+        raise BadInput(expected(f"workers with {mine}", "; ".join(others), f"--dask {address}"))
 
 
 def spread(weights_s: Sequence[float], task_s: float) -> list[slice]:

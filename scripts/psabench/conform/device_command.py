@@ -57,7 +57,7 @@ def device_run(
     """
     rows = [r for r in requirements_of(v) if not only or r.id.startswith(tuple(only))]
     if not rows:
-        raise BadInput(f"--only {' '.join(only)}: no requirement of {v.name} begins so; psabench conform list has them")
+        raise BadInput(expected(f"ids or prefixes of {v.name} (psabench conform list)", " ".join(only), "--only"))
     suite.load()
     outcomes: list[Outcome] = []
     interrupted = False
@@ -83,7 +83,7 @@ def _told(run: report.Run, folder: Path, *, everything: bool) -> int:
 
 def _addresses(args: argparse.Namespace) -> Addresses:
     if args.can is None and (args.lines or args.bus_port or args.control or args.scpi):
-        raise BadInput("--lines, --bus-port, --control and --scpi are of a board that is there: --can says where")
+        raise BadInput(expected("--can with --lines, --bus-port, --control and --scpi", "no --can", "conform device"))
     inputs = _pairs(args.input, "--input", float)
     return Addresses(
         can=args.can,

@@ -22,7 +22,7 @@ from psabench.boards.unit import Unit
 from psabench.conform.capture.log import CanFrame, CanLog, Capture, LineLog, Marks, apart
 from psabench.conform.probes import LineProbe, PinProbe, PortProbe
 from psabench.conform.profile import Variant
-from psabench.errors import BadInput, LinkError
+from psabench.errors import BadInput, LinkError, expected
 from psabench.link.busport import BusPort, Cycle
 from psabench.link.can_host import CanHost, Message
 from psabench.link.lineport import SAMPLE_HZ
@@ -102,7 +102,7 @@ class Subject:
         found = next((u for u in bench.units.values() if isinstance(u, kind)), None)
         if found is None:
             there = ", ".join(u.title for u in bench.units.values()) or "none"
-            raise BadInput(f"no {kind.title} answers on this bus; boards there: {there}")
+            raise BadInput(expected(f"a {kind.title} on this bus", there, "--can"))
         self.unit: Unit = found
         self.node = found.node.node_id
         self.allowed_ppm = 100.0  # how far the board's clocks and the recorder's may lie apart: a run says it

@@ -22,6 +22,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeVar
 
 from psabench.conform.capture.log import Capture
+from psabench.errors import expected
 
 if TYPE_CHECKING:
     from psabench.conform.dut import Subject
@@ -103,7 +104,7 @@ def check(
     """
     part = STIMULUS_ON_RECORDING.get(stimulus, "") if on_recording is None else on_recording
     if part not in PARTS:
-        raise ValueError(f"on_recording is {part!r}; there are {', '.join(map(repr, PARTS))}")
+        raise ValueError(expected(", ".join(map(repr, PARTS)), repr(part), "on_recording"))
 
     def register(test: Check) -> Check:
         _plans[test] = Plan(stimulus=stimulus, needs=_ways(needs), on_recording=part, boards=frozenset(boards))
@@ -135,7 +136,7 @@ def stimulus(name: str, *, boards: Iterable[str]) -> Callable[[StimulusOf], Stim
 def plan_of(test: Callable[..., str]) -> Plan:
     """Raises ValueError for a test without @check and without @active."""
     if test not in _plans:
-        raise ValueError(f"{test.__name__} is neither @check nor @active")
+        raise ValueError(expected("@check or @active", "neither", test.__name__))
     return _plans[test]
 
 
@@ -147,5 +148,5 @@ def stimuli(family: str) -> Mapping[str, Stimulus]:
 def _ways(needs: Iterable[str]) -> frozenset[str]:
     found = frozenset(needs)
     if found - WAYS:
-        raise ValueError(f"needs {', '.join(sorted(found - WAYS))}; there are {', '.join(sorted(WAYS))}")
+        raise ValueError(expected(", ".join(sorted(WAYS)), ", ".join(sorted(found - WAYS)), "needs"))
     return found

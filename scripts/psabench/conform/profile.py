@@ -13,7 +13,7 @@ from typing import Any
 import yaml
 
 from psabench.boards.registry import ALIASES, NAMES, of_name
-from psabench.errors import BadInput
+from psabench.errors import BadInput, expected
 from psabench.places import proto_file
 
 
@@ -29,7 +29,7 @@ class Variant:
     def __getitem__(self, key: str) -> Any:
         """A figure of the profile. Raises BadInput where it has none."""
         if key not in self.figures:
-            raise BadInput(f"profile {self.profile} has no {key}")
+            raise BadInput(expected(f"a profile with {key}", "none", f"profile {self.profile}"))
         return self.figures[key]
 
     @property
@@ -42,24 +42,24 @@ def variant(board: str, profile: str | None = None) -> Variant:
     """Raises BadInput for a board or a profile that there is not, or a profile of another board."""
     known = of_name(board)
     if known is None:
-        raise BadInput(f"no such board: {board}; there are {', '.join(NAMES)}")
+        raise BadInput(expected(", ".join(NAMES), repr(board), "board"))
     family = known.name
     name = profile or (known.profile if board == family and known.profile else board)
     figures = _figures(name)
     of = figures.get("board", "psa2")
     if ALIASES.get(of, of) != family:
-        raise BadInput(f"profile {name} is one of {of}, not of {board}")
+        raise BadInput(expected(f"one of {board}", f"{name}, one of {of}", "profile"))
     return Variant(board=board, family=family, profile=name, figures=figures)
 
 
 def _figures(profile: str) -> Mapping[str, Any]:
     if not profile.isidentifier():
-        raise BadInput(f"{profile}: no name of a profile; psa-emu --list-profiles has them")
+        raise BadInput(expected("a name that psa-emu --list-profiles prints", repr(profile), "profile"))
     try:
         text = proto_file(f"profiles/{profile}.yaml").read_text(encoding="utf-8")
     except BadInput as e:
-        raise BadInput(f"no such profile: {profile}; psa-emu --list-profiles has them") from e
+        raise BadInput(expected("a name that psa-emu --list-profiles prints", repr(profile), "profile")) from e
     found = yaml.safe_load(text)
     if not isinstance(found, dict):
-        raise BadInput(f"profile {profile} is no mapping")
+        raise BadInput(expected("a mapping", type(found).__name__, f"profile {profile}"))
     return found

@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 
 from psabench.conform.capture.log import Capture
 from psabench.conform.requirements import Requirement, requirements
+from psabench.errors import expected
 
 Test = TypeVar("Test", bound=Callable[..., Any])
 
@@ -29,9 +30,9 @@ _suite_tests: list[SuiteTest] = []
 def proves(*ids: str) -> Callable[[Test], Test]:
     """Register a test under ids of requirements. Raises ValueError for none, for one twice and for an unknown one."""
     if not ids or len(set(ids)) != len(ids):
-        raise ValueError(f"proves: wants ids of requirements, each once, not {ids}")
+        raise ValueError(expected("ids of requirements, each once", ids, "proves"))
     if unknown := [i for i in ids if i not in requirements().rows]:
-        raise ValueError(f"proves: no requirement {', '.join(unknown)}")
+        raise ValueError(expected("ids of requirements", ", ".join(unknown), "proves"))
 
     def register(test: Test) -> Test:
         _suite_tests.append(SuiteTest(test, ids))
@@ -52,4 +53,4 @@ def row_for(e: Capture, *ids: str) -> Requirement:
         row = requirements().rows[i]
         if row.applies(v.board, v.profile):
             return row
-    raise ValueError(f"none of {', '.join(ids)} holds for {v.name}")
+    raise ValueError(expected(f"an id that holds for {v.name}", ", ".join(ids), "proves"))

@@ -26,7 +26,7 @@ from psabench.conform.sources.clocks import BEATS, Clocks, Ratio
 from psabench.conform.sources.files import Recording
 from psabench.conform.sources.lines import Recorded
 from psabench.conform.verdict import Failed, Inconclusive, Outcome, Verdict
-from psabench.errors import BadInput, BenchError
+from psabench.errors import BadInput, BenchError, expected
 from psabench.link.signals import Ints
 from psabench.link.vcd import Vcd, Wire
 from psabench.procedures.head_bench import Progress
@@ -39,7 +39,7 @@ BEFORE_NS = 300_000  # lines at rest before the first beat, with the read that i
 MARK = "clock_error_ppm"  # limit of rows that say a frequency
 NO_PART = {
     "boot": "the recording has no Res and no boot-up",
-    "": "it wants a stimulus that a recording does not have for certain",
+    "": "it needs a stimulus, which a recording may not contain",
 }
 
 
@@ -266,8 +266,7 @@ def check_node(recording: Recording, variant: Variant, node: int) -> None:
         return
     nodes = sorted({f.can_id & 0x7F for f in recording.can.frames if f.can_id & 0x7F and _of_node(f, f.can_id & 0x7F)})
     raise BadInput(
-        f"the log of the CAN bus has no frame of node {node}; nodes with frames: "
-        f"{', '.join(map(str, nodes[:20])) or 'none'} (--node)"
+        expected(f"frames of node {node} (--node)", f"frames of {', '.join(map(str, nodes[:20])) or 'none'}", "CAN log")
     )
 
 

@@ -24,7 +24,7 @@ def handle(args: argparse.Namespace) -> int:
     rows = [r for r in requirements() if r.group != "host" and r.applies(v.board, v.profile)]
     rows = [r for r in rows if not args.only or r.id.startswith(tuple(args.only))]
     if not rows:
-        raise BadInput(f"--only {' '.join(args.only)}: no requirement of {v.name} begins so")
+        raise BadInput(expected(f"ids or prefixes of {v.name} (psabench conform list)", " ".join(args.only), "--only"))
     bench = _bench(args)
     suite.load()
     folder = args.out or OUT / f"recording-{v.board}-{v.profile}"
@@ -84,4 +84,4 @@ def _volts(text: str, axis: str) -> float:
     try:
         return float(text)
     except ValueError as e:
-        raise BadInput(f"--input {axis}={text}: {text!r} is no number") from e
+        raise BadInput(expected("a number", repr(text), f"--input {axis}")) from e

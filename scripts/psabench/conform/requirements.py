@@ -16,7 +16,7 @@ from typing import Any
 
 import yaml
 
-from psabench.errors import BadInput
+from psabench.errors import BadInput, expected
 from psabench.places import proto_file
 
 Limit = int | float
@@ -73,7 +73,7 @@ class Requirement:
     def limit(self, name: str) -> Limit:
         """A figure by name; its name ends in its unit. Raises KeyError with the names there are."""
         if name not in self.limits:
-            raise KeyError(f"{self.id}: no limit {name}; there are: {', '.join(self.limits) or 'none'}")
+            raise KeyError(expected(", ".join(self.limits) or "no limit", repr(name), f"{self.id}: limit"))
         return self.limits[name]
 
 
@@ -101,7 +101,7 @@ class Requirements:
 
     def __getitem__(self, key: str) -> Requirement:
         if key not in self.rows:
-            raise KeyError(f"no requirement {key}")
+            raise KeyError(expected("the id of a requirement", repr(key)))
         return self.rows[key]
 
     def __iter__(self) -> Iterator[Requirement]:
@@ -114,7 +114,7 @@ class Requirements:
         """Those that hold for a board with a shipped profile. Raises ValueError when there is no such pair."""
         if self.profiles.get(profile) != board:
             mine = [p for p, b in self.profiles.items() if b == board]
-            raise ValueError(f"{board} has no profile {profile}; there are: {', '.join(mine) or 'none'}")
+            raise ValueError(expected(", ".join(mine) or "no profile", repr(profile), f"profile of {board}"))
         return tuple(r for r in self if r.applies(board, profile))
 
 
@@ -128,7 +128,7 @@ class _Loader(_Base):  # type: ignore[misc]
         keys = [self.construct_object(k, deep=True) for k, _ in node.value]
         for key in keys:
             if keys.count(key) > 1:
-                raise yaml.YAMLError(f"line {node.start_mark.line + 1}: {key} occurs twice")
+                raise yaml.YAMLError(expected("each key once", f"{key} twice", f"line {node.start_mark.line + 1}"))
         return dict(super().construct_mapping(node, deep))
 
 
@@ -148,16 +148,16 @@ def load(index: Path) -> Requirements:
     profiles = _profiles(index.parent / "profiles", boards)
     retired = set(_texts(data.get("retired", []), f"{where}: retired"))
     if type(data["version"]) is not int or data["version"] < 1:
-        raise RequirementsError(f"{where}: version {data['version']!r} is no number from 1 on")
+        raise RequirementsError(expected("a number from 1 on", repr(data["version"]), f"{where}: version"))
     words = _Words(frozenset(grades), frozenset(ways), frozenset(kinds), tuple(boards), traits, profiles)
     groups = _group_heads(files)
     rows: dict[str, Requirement] = {}
     for group in groups:
         for row in _rows(f"{group.name}.yaml", files[group.name], group, words):
             if row.id in rows:
-                raise RequirementsError(f"{group.name}.yaml: {row.id}: this id occurs twice")
+                raise RequirementsError(expected("each id once", f"{row.id} twice", f"{group.name}.yaml"))
             if row.id in retired:
-                raise RequirementsError(f"{group.name}.yaml: {row.id}: this id is retired and cannot come back")
+                raise RequirementsError(expected("a new id", f"{row.id} (retired)", f"{group.name}.yaml"))
             rows[row.id] = row
     return Requirements(
         version=data["version"],
@@ -207,7 +207,7 @@ def _profiles(folder: Path, boards: Mapping[str, str]) -> dict[str, str]:
         data = _read(path)
         board = data.get("board", "psa2") if isinstance(data, dict) else ""
         if board not in boards:
-            raise RequirementsError(f"profiles/{path.name}: board {board!r} is not among: {', '.join(boards)}")
+            raise RequirementsError(expected(", ".join(boards), repr(board), f"profiles/{path.name}: board"))
         found[path.stem] = board
     return found
 
@@ -226,12 +226,12 @@ def _boards_and_traits(files: Mapping[str, dict[str, Any]]) -> tuple[dict[str, s
     for name, data in files.items():
         own = _words(data["boards"], f"{name}.yaml: boards") if isinstance(data["boards"], dict) else {}
         if twice := boards.keys() & own.keys():
-            raise RequirementsError(f"{name}.yaml: boards: {', '.join(twice)} belongs to another group")
+            raise RequirementsError(expected("boards of no other group", ", ".join(twice), f"{name}.yaml: boards"))
         boards |= own
         for trait in _known(data.get("traits", []), TRAITS, f"{name}.yaml: traits"):
             traits[trait] |= own.keys()
     if not boards:
-        raise RequirementsError("requirements: no group file defines a board")
+        raise RequirementsError(expected("a group file that defines a board", "none", "requirements"))
     return boards, {trait: frozenset(having) for trait, having in traits.items()}
 
 
@@ -240,7 +240,7 @@ def _group_heads(files: Mapping[str, dict[str, Any]]) -> tuple[Group, ...]:
     for name, data in files.items():
         prefixes = _texts(data["prefixes"], f"{name}.yaml: prefixes")
         if taken := {p for g in groups for p in g.prefixes} & set(prefixes):
-            raise RequirementsError(f"{name}.yaml: prefix {', '.join(taken)} belongs to another group")
+            raise RequirementsError(expected("prefixes of no other group", ", ".join(taken), f"{name}.yaml: prefixes"))
         groups.append(Group(name, _text(data["title"], f"{name}.yaml: title"), prefixes))
     return tuple(groups)
 
@@ -250,7 +250,7 @@ def _rows(file: str, data: dict[str, Any], group: Group, words: _Words) -> Itera
         list(data["boards"]) if isinstance(data["boards"], dict) else data["boards"], f"{file}: boards"
     )
     if not isinstance(data["rows"], list) or not data["rows"]:
-        raise RequirementsError(f"{file}: rows is no list of requirements")
+        raise RequirementsError(expected("a list of requirements", None, f"{file}: rows"))
     for number, raw in enumerate(data["rows"], start=1):
         key = raw.get("id", f"row {number}") if isinstance(raw, dict) else f"row {number}"
         yield _row(_mapping(raw, ROW_FIELDS, ROW_OPTIONS, f"{file}: {key}"), group, boards, words, file)
@@ -259,11 +259,11 @@ def _rows(file: str, data: dict[str, Any], group: Group, words: _Words) -> Itera
 def _row(raw: dict[str, Any], group: Group, boards: tuple[str, ...], words: _Words, file: str) -> Requirement:
     at = f"{file}: {raw['id']}"
     if not isinstance(raw["id"], str) or not (m := ID.fullmatch(raw["id"])) or m[1] not in group.prefixes:
-        raise RequirementsError(f"{at}: an id is {' or '.join(group.prefixes)}, a topic and two figures: PSA2-FRAME-03")
+        raise RequirementsError(expected(f"{' or '.join(group.prefixes)}, a topic, two digits", repr(raw["id"]), at))
     boards = words.known_boards(raw.get("boards", list(boards)), f"{at}: boards")
     profiles = _known(raw.get("profiles", []), frozenset(words.profiles), f"{at}: profiles")
     if strange := [p for p in profiles if words.profiles[p] not in boards]:
-        raise RequirementsError(f"{at}: profile {', '.join(strange)} is of none of its boards ({', '.join(boards)})")
+        raise RequirementsError(expected(f"profiles of {', '.join(boards)}", ", ".join(strange), f"{at}: profiles"))
     row = Requirement(
         id=raw["id"],
         group=group.name,
@@ -283,7 +283,7 @@ def _row(raw: dict[str, Any], group: Group, boards: tuple[str, ...], words: _Wor
     )
     for wrong, why in _WRONG:
         if wrong(row):
-            raise RequirementsError(f"{at}: {why}")
+            raise RequirementsError(expected(why, None, at))
     return row
 
 
@@ -291,41 +291,41 @@ def _row(raw: dict[str, Any], group: Group, boards: tuple[str, ...], words: _Wor
 _WRONG: Sequence[tuple[Callable[[Requirement], bool], str]] = (
     (
         lambda r: " shall " not in r.text or not r.text.endswith("."),
-        "text is a sentence with shall and a full stop",
+        "a sentence with shall and a full stop as text",
     ),
-    (lambda r: not r.source, "source is missing"),
-    (lambda r: r.grade == "E1" and not r.original, "grade E1 needs the article's sentence, `original`"),
+    (lambda r: not r.source, "a source"),
+    (lambda r: r.grade == "E1" and not r.original, "the article's sentence, `original`, with grade E1"),
     (
         lambda r: bool(r.original) and not any(s.startswith("article") for s in r.source),
-        "`original` needs the article among its sources",
+        "the article among the sources of a row with `original`",
     ),
-    (lambda r: bool(r.observe) == bool(r.unobservable), "it needs either `observe` or the reason `unobservable`"),
+    (lambda r: bool(r.observe) == bool(r.unobservable), "either `observe` or the reason `unobservable`"),
     (
         lambda r: bool(r.table) and not TABLE.fullmatch(r.table),
-        "table is like proto/psd1.yaml#bus",
+        "a table like proto/psd1.yaml#bus",
     ),
 )
 
 
 def _mapping(raw: Any, needed: set[str], more: set[str], at: str) -> dict[str, Any]:
     if not isinstance(raw, dict):
-        raise RequirementsError(f"{at}: no mapping")
+        raise RequirementsError(expected("a mapping", type(raw).__name__, at))
     if unknown := [str(k) for k in raw if k not in needed | more]:
-        raise RequirementsError(f"{at}: unknown {', '.join(unknown)}; there are {', '.join(sorted(needed | more))}")
+        raise RequirementsError(expected(", ".join(sorted(needed | more)), ", ".join(unknown), at))
     if missing := sorted(needed - raw.keys()):
-        raise RequirementsError(f"{at}: {', '.join(missing)} is missing")
+        raise RequirementsError(expected(", ".join(missing), "none", at))
     return raw
 
 
 def _words(raw: Any, at: str) -> dict[str, str]:
     if not isinstance(raw, dict) or not raw:
-        raise RequirementsError(f"{at}: no mapping of words to what they mean")
+        raise RequirementsError(expected("a mapping of words to their meaning", type(raw).__name__, at))
     return {_text(k, at): _text(v, f"{at}: {k}") for k, v in raw.items()}
 
 
 def _text(raw: Any, at: str, empty: bool = False) -> str:
     if not isinstance(raw, str) or not (raw.strip() or empty):
-        raise RequirementsError(f"{at}: {raw!r} is no text")
+        raise RequirementsError(expected("a text", repr(raw), at))
     return " ".join(raw.split())
 
 
@@ -333,13 +333,13 @@ def _texts(raw: Any, at: str) -> tuple[str, ...]:
     texts = raw if isinstance(raw, list) else [raw]
     found = tuple(_text(t, at) for t in texts)
     if len(set(found)) != len(found):
-        raise RequirementsError(f"{at}: something occurs twice")
+        raise RequirementsError(expected("each item once", "one twice", at))
     return found
 
 
 def _one(raw: Any, known: Collection[str], at: str) -> str:
     if raw not in known:
-        raise RequirementsError(f"{at}: {raw!r} is not among: {', '.join(sorted(known))}")
+        raise RequirementsError(expected(", ".join(sorted(known)), repr(raw), at))
     return str(raw)
 
 
@@ -350,22 +350,22 @@ def _known(raw: Any, known: frozenset[str], at: str) -> tuple[str, ...]:
 def _matching(raw: Any, pattern: re.Pattern[str], at: str) -> tuple[str, ...]:
     found = _texts(raw, at)
     if strange := [t for t in found if not pattern.fullmatch(t)]:
-        raise RequirementsError(f"{at}: {strange[0]!r} is not of the form {pattern.pattern}")
+        raise RequirementsError(expected(f"the form {pattern.pattern}", repr(strange[0]), at))
     return found
 
 
 def _observe(raw: Any, ways: frozenset[str], at: str) -> Mapping[str, str]:
     if not isinstance(raw, dict):
-        raise RequirementsError(f"{at}: no mapping of ways to phrases")
+        raise RequirementsError(expected("a mapping of ways to phrases", type(raw).__name__, at))
     return MappingProxyType({_one(k, ways, at): _text(v, f"{at}: {k}") for k, v in raw.items()})
 
 
 def _limits(raw: Any, at: str) -> Mapping[str, Limit]:
     if not isinstance(raw, dict):
-        raise RequirementsError(f"{at}: no mapping of names to numbers")
+        raise RequirementsError(expected("a mapping of names to numbers", type(raw).__name__, at))
     for name, value in raw.items():
         if not isinstance(name, str) or not NAME.fullmatch(name):
-            raise RequirementsError(f"{at}: {name!r} is no name like int_low_min_us")
+            raise RequirementsError(expected("a name like int_low_min_us", repr(name), at))
         if type(value) not in (int, float):
-            raise RequirementsError(f"{at}: {name}: {value!r} is no number")
+            raise RequirementsError(expected("a number", repr(value), f"{at}: {name}"))
     return MappingProxyType(dict(raw))

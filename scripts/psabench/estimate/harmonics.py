@@ -12,6 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from psabench.errors import expected
+
 Array = npt.NDArray[np.float64]
 
 HARMONICS = 5  # C0..C4
@@ -49,7 +51,7 @@ def design_matrix(alpha_rad: Array, t_s: Array | None = None) -> Array:
 def _span_s(t_s: Array) -> float:
     span_s = float(np.ptp(t_s))
     if not span_s > 0.0:
-        raise ValueError("a drift column needs readings at different times: all readings carry the same t_s")
+        raise ValueError(expected("different times for a drift column", "one t_s in all readings", "t_s"))
     return span_s
 
 
@@ -61,13 +63,13 @@ def fit(alpha_rad: Array, u_v: Array, t_s: Array | None = None) -> HarmonicFit:
     """
     m, p = alpha_rad.size, HARMONICS + (t_s is not None)
     if m <= p:
-        raise ValueError(f"{m} readings for {p} unknowns: at least {p + 1} are needed for a residual")
+        raise ValueError(expected(f"at least {p + 1} readings for {p} unknowns and a residual", m))
     a = design_matrix(alpha_rad, t_s)
     if not (np.isfinite(a).all() and np.isfinite(u_v).all()):
-        raise ValueError("angles, times and voltages must be finite")
+        raise ValueError(expected("finite angles, times and voltages", "inf or NaN"))
     condition = float(np.linalg.cond(a))
     if condition > MAX_CONDITION:
-        raise ValueError(f"the angles do not separate the harmonics (condition {condition:.1e}): spread them out")
+        raise ValueError(expected("angles that separate the harmonics: spread them out", f"condition {condition:.1e}"))
     q, r = np.linalg.qr(a)
     x = np.linalg.solve(r, q.T @ u_v)
     residual_v = u_v - a @ x

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 
-from psabench.errors import CycleRefused, LinkError
+from psabench.errors import CycleRefused, LinkError, expected
 
 PATIENCE_S = 5.0  # for an answer
 QUANTUM_S = 0.001  # step of the bench's time while waiting for an answer
@@ -105,7 +105,7 @@ class BusPort:
     def write(self, address: int, data: int, strobe_ns: int | None = None) -> Cycle:
         """A write cycle. data: 16 bits."""
         if not 0 <= data <= 0xFFFF:
-            raise ValueError(f"data is {data}; a word of the bus has 16 bits")
+            raise ValueError(expected("a 16-bit word", data, "data"))
         return self._cycle(f"W {address:X} {data:X}", strobe_ns)
 
     def who(self) -> Who:
@@ -113,14 +113,14 @@ class BusPort:
         self.ask("?")
         answer = self.answer()
         if not isinstance(answer, Who):
-            raise LinkError(f"{self.path}: {answer} where the board should have said who it is")
+            raise LinkError(expected("the board's name and registers", str(answer), self.path))
         return answer
 
     def _cycle(self, line: str, strobe_ns: int | None) -> Cycle:
         self.ask(line if strobe_ns is None else f"{line} {strobe_ns}")
         answer = self.answer()
         if not isinstance(answer, Cycle):
-            raise LinkError(f"{self.path}: {answer} where the answer to {line!r} should be")
+            raise LinkError(expected(f"an answer to {line!r}", str(answer), self.path))
         return answer
 
     def ask(self, line: str) -> None:
@@ -135,7 +135,7 @@ class BusPort:
             except OSError as e:
                 raise self._gone() from e
             if data and time.monotonic() >= deadline_s:
-                raise LinkError(f"{self.path}: takes nothing for {PATIENCE_S:g} s")
+                raise LinkError(f"{self.path}: no input accepted for {PATIENCE_S:g} s")
 
     def answer(self, patience_s: float = PATIENCE_S) -> Cycle | Who:
         """The answer to the oldest line that has none yet."""
@@ -150,7 +150,7 @@ class BusPort:
         left_s = patience_s
         while b"\n" not in self._input:
             if len(self._input) > LINE_MAX:
-                raise LinkError(f"{self.path}: {len(self._input)} characters without an end of line")
+                raise LinkError(expected("an end of line", f"{len(self._input)} characters without", self.path))
             if left_s <= 0.0:
                 raise LinkError(f"{self.path}: no answer within {patience_s:g} s")
             left_s -= self._receive(left_s)
@@ -204,5 +204,5 @@ def parse(line: str) -> Cycle | Who:
         code, what = m[1], f"{m[2]} {m[3]} at {int(m[4]) * 1e-9:.9f} s"
         if code in CODES:
             raise CycleRefused(what, *CODES[code])
-        raise LinkError(f"{what}: the bus port does not understand: {code}")
-    raise LinkError(f"{line!r} is nothing that a bus port says")
+        raise LinkError(f"{what}: rejected by the bus port: {code}")
+    raise LinkError(expected("an answer of a bus port", repr(line)))

@@ -105,7 +105,7 @@ def _receive_all(host: CanHost, sent: int) -> None:
     """Receive until the host has all frames that the emulator has sent it."""
     while (missing := sent - host.received) > 0:
         if not host.receive(BARRIER_S):
-            raise LinkError(f"CAN: {missing} frames that the emulator has sent did not arrive in {BARRIER_S:g} s")
+            raise LinkError(f"CAN: {missing} frames sent by the emulator did not arrive within {BARRIER_S:g} s")
     while host.shared and host.receive(0.0):
         pass  # frames of others were counted for the emulator's; all of its own are with our kernel by now
 
@@ -143,7 +143,7 @@ class CanHost:
         deadline_s = time.monotonic() + timeout_s
         while (message := self._take(min(timeout_s, LOOK_S))) is None:
             if _hung_up(self.bus):
-                raise LinkError("CAN: the connection was closed; the emulator or adapter has gone away")
+                raise LinkError("CAN: connection closed by the emulator or adapter")
             timeout_s = deadline_s - time.monotonic()
             if timeout_s <= 0.0:
                 return False
@@ -205,7 +205,7 @@ def open_bus(spec: str | None) -> can.BusABC:
             _enlarge_buffer(bus.socket)
         return bus
     except (can.CanInterfaceNotImplementedError, ValueError, TypeError) as e:
-        raise BadInput(f"--can {spec}: {e}; expected INTERFACE:CHANNEL[,key=value]") from e
+        raise BadInput(expected("INTERFACE:CHANNEL[,key=value]", e, f"--can {spec}")) from e
     except (can.CanError, OSError) as e:
         raise LinkError(f"--can {spec}: {e}") from e
 
@@ -218,7 +218,7 @@ def _greet(host: str, port: int) -> None:
     except OSError as e:
         raise LinkError(f"--can socketcand:{host}:{port}: {e.strerror or e}; is psa-emu running there?") from e
     if hello != b"< hi >":
-        raise LinkError(f"--can socketcand:{host}:{port}: what listens there is no socketcand server")
+        raise LinkError(expected("a socketcand server", "another answer", f"--can socketcand:{host}:{port}"))
 
 
 def _reason(e: BaseException) -> str:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from psabench.errors import LinkError
+from psabench.errors import LinkError, expected
 from psabench.link.signals import Floats, Ints, Signal
 
 STAMP = 20  # "(0000000001.234567) "
@@ -66,7 +66,7 @@ def read(text: bytes, ids: Iterable[int]) -> Logged:
 def _lines(text: bytes) -> npt.NDArray[np.uint8]:
     """Those of our frames, (n, length), newline included."""
     if text and text[-1] != NEWLINE:
-        raise LinkError("the log of the bus is cut short")
+        raise LinkError(expected("a whole log", "one that is cut short", "bus log"))
     all_bytes = np.frombuffer(text, dtype=np.uint8)
     ends = np.flatnonzero(all_bytes == NEWLINE) + 1
     starts = np.concatenate([[0], ends[:-1]])
@@ -85,7 +85,7 @@ def _lines(text: bytes) -> npt.NDArray[np.uint8]:
 def _hex(digits: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
     value = _NIBBLE[digits]
     if value.size and value.max() > 15:
-        raise LinkError("the log of the bus has other letters than hexadecimal digits")
+        raise LinkError(expected("hexadecimal digits", "other characters", "bus log"))
     return value
 
 

@@ -36,7 +36,7 @@ class _Network(canopen.Network):
 
     def send_message(self, can_id: int, data: bytes, remote: bool = False) -> None:
         if remote:
-            raise ValueError("no remote frames on this bus: several transports lose them")
+            raise ValueError("CAN: remote frames are not supported: several transports lose them")
         self.host.send(can_id, bytes(data))
 
 
@@ -193,4 +193,4 @@ class CanopenNode:
         except SdoAbortedError as e:
             raise DeviceError(f"node {self.node_id}: {what}", e.code, str(e).partition(",")[2].strip()) from e
         except SdoCommunicationError as e:
-            raise LinkError(f"node {self.node_id}: {what}: {e}; is it powered and on this bus?") from e
+            raise LinkError(f"node {self.node_id}: {what}: {e}; is the unit powered and on this bus?") from e

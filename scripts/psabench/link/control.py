@@ -10,7 +10,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Protocol
 
-from psabench.errors import ControlError, LinkError
+from psabench.errors import ControlError, LinkError, expected
 
 REPLY_S = 600.0  # a long `run` in step pace answers when it is done
 EVENTS_KEPT = 100_000  # of subscriptions, until somebody takes them; older ones go first
@@ -62,7 +62,7 @@ class Control:
         try:
             self._socket.sendall(json.dumps(request).encode() + b"\n")
         except OSError as e:
-            raise LinkError(f"control socket: {command}: the emulator has gone ({e.strerror or e})") from e
+            raise LinkError(f"control socket: {command}: connection lost ({e.strerror or e})") from e
         while True:
             line = self._line(command, REPLY_S)
             try:
@@ -72,7 +72,7 @@ class Control:
                 elif not self._is_of_old(answer):
                     return self._parse(command, answer)
             except (ValueError, KeyError, TypeError, AttributeError) as e:
-                raise LinkError(f"control socket: {command}: what came back is no reply: {line[:80]!r}") from e
+                raise LinkError(expected("a reply", repr(line[:80]), f"control socket: {command}")) from e
 
     def next_event(self, timeout_s: float) -> dict[str, Any] | None:
         """The next line of a subscription; None when none comes within timeout_s of real time."""
@@ -92,11 +92,11 @@ class Control:
             except TimeoutError:
                 if timeout_s < REPLY_S:
                     raise
-                raise LinkError(f"control socket: {command}: no reply in {REPLY_S:g} s") from None
+                raise LinkError(f"control socket: {command}: no reply within {REPLY_S:g} s") from None
             except OSError as e:
                 raise LinkError(f"control socket: {command}: {e}") from e
             if not more:
-                raise LinkError(f"control socket: the emulator closed it during {command}")
+                raise LinkError(f"control socket: {command}: connection closed by the emulator")
             self._bytes += more
         line, _, rest = bytes(self._bytes).partition(b"\n")
         self._bytes = bytearray(rest)
@@ -109,7 +109,7 @@ class Control:
 
     def _parse(self, command: str, reply: dict[str, Any]) -> Reply:
         if reply.get("id") != self._id:
-            raise LinkError(f"control socket: {command}: reply to request {reply.get('id')}, expected {self._id}")
+            raise LinkError(expected(f"the reply to request {self._id}", reply.get("id"), f"control socket: {command}"))
         if not reply["ok"]:
             raise ControlError(command, reply["error"]["code"], reply["error"]["text"])
         return Reply(

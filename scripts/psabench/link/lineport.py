@@ -20,6 +20,8 @@ from typing import BinaryIO, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from psabench.errors import expected
+
 INT, DATA, CLK, GAP = 0x01, 0x02, 0x04, 0x80
 SAMPLE_HZ = 8_000_000.0
 WORDS = 4
@@ -49,11 +51,11 @@ class LineFormat:
 
     def __post_init__(self) -> None:
         if self.word_bits not in (16, 24, 32):
-            raise ValueError(f"word_bits is {self.word_bits}; a PSA-2 sends words of 16, 24 or 32 bits")
+            raise ValueError(expected("16, 24 or 32", self.word_bits, "word_bits"))
         if not self.sample_hz > 0:
-            raise ValueError(f"sample_hz is {self.sample_hz}; it must be positive")
+            raise ValueError(expected("a positive rate", self.sample_hz, "sample_hz"))
         if self.period_s is not None and not 0 <= self.tolerance_s < self.period_s / 2:
-            raise ValueError(f"tolerance_s is {self.tolerance_s}; it must be below half of period_s = {self.period_s}")
+            raise ValueError(expected(f"less than period_s / 2 = {self.period_s / 2}", self.tolerance_s, "tolerance_s"))
 
     @property
     def bits(self) -> int:

@@ -14,7 +14,7 @@ from can.io.logger import MESSAGE_WRITERS
 
 from psabench.boards.devices import reader_of
 from psabench.boards.psa2.frames import FrameCounters
-from psabench.errors import BadInput, LinkError
+from psabench.errors import BadInput, LinkError, expected
 from psabench.link.can_host import CanHost, Message, WallClock
 
 LOOK_S = 0.2  # real time between looks whether Ctrl-C was pressed
@@ -43,7 +43,7 @@ def record(
     Raises BadInput for an ending that python-can does not know.
     """
     if path.suffix not in FORMATS:
-        raise BadInput(f"{path}: ending {path.suffix or 'missing'}; python-can writes {' '.join(FORMATS)}")
+        raise BadInput(expected(f"an ending of {' '.join(FORMATS)}", path.suffix or "none", path))
     reader = reader_of(board, node)
     stamps: list[float] = []  # of the first and the last message
     messages = 0

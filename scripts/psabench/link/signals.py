@@ -14,6 +14,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from psabench.errors import expected
+
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
@@ -35,7 +37,7 @@ def layout(message: Any) -> Mapping[str, Signal]:
     found = {}
     for s in message.signals:
         if s.byte_order != "little_endian":
-            raise ValueError(f"{message.name}.{s.name} is big-endian; this decoder takes little-endian signals only")
+            raise ValueError(expected("a little-endian signal", "a big-endian one", f"{message.name}.{s.name}"))
         found[s.name] = Signal(
             start_bit=s.start,
             bits=s.length,

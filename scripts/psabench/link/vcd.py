@@ -105,7 +105,7 @@ def scale_name(unit_ns: int) -> str:
         for factor in (1, 10, 100):
             if unit_ns == factor * ns:
                 return f"{factor} {name}"
-    raise ValueError(f"{unit_ns} ns is no VCD time unit; 1, 10 or 100 of ns, us, ms or s is")
+    raise ValueError(expected("1, 10 or 100 of ns, us, ms or s", f"{unit_ns} ns", "VCD time unit"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -6,7 +6,7 @@ import ctypes as c
 from functools import cache
 from typing import Any
 
-from psabench.errors import BadInput
+from psabench.errors import BadInput, expected
 from psabench.places import find_library
 
 ABI = 0  # PSABENCH_ABI of the header that PROTOTYPES was written from
@@ -82,17 +82,17 @@ class Library:
         try:
             so = c.CDLL(path)
         except OSError as e:
-            raise BadInput(f"{path}: not a library that can be loaded ({e}); PSABENCH_LIB names another") from None
+            raise BadInput(expected("a shared library (PSABENCH_LIB names another)", e, path)) from None
         try:
             abi = int(so.psabench_abi())
             if abi != ABI:
-                raise BadInput(f"{path}: speaks ABI {abi}, this psabench speaks {ABI}; PSABENCH_LIB names another")
+                raise BadInput(expected(f"ABI {ABI} (PSABENCH_LIB names another library)", abi, path))
             for name, (result, *arguments) in PROTOTYPES.items():
                 function = getattr(so, f"psabench_{name}")
                 function.restype, function.argtypes = result, arguments
                 setattr(self, name, function)
         except AttributeError as e:
-            raise BadInput(f"{path}: older than this psabench ({e}); PSABENCH_LIB names another") from None
+            raise BadInput(expected("a library of this version (or PSABENCH_LIB)", e, path)) from None
 
     def __getattr__(self, name: str) -> Any:  # for the type checker: __init__ has set them all
         raise AttributeError(name)
@@ -106,5 +106,5 @@ def library() -> Library:
         try:
             return Library(NAME)
         except BadInput:
-            raise BadInput(f"{NAME}: not in this package, its checkout or the system; `make` builds it") from None
+            raise BadInput(expected("a library here or in the system (make builds it)", "none", NAME)) from None
     return Library(str(path))

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from psabench.errors import BadInput
+from psabench.errors import BadInput, expected
 from psabench.native.navlib import (
     AttitudeStruct,
     CompassStruct,
@@ -322,7 +322,7 @@ def _array(values: npt.ArrayLike) -> Floats:
 def _same_length(a: npt.ArrayLike, b: npt.ArrayLike) -> tuple[Floats, Floats]:
     first, second = _array(a), _array(b)
     if len(first) != len(second):
-        raise ValueError(f"{len(first)} and {len(second)} numbers: want as many of one as of the other")
+        raise ValueError(expected("arrays of the same length", f"{len(first)} and {len(second)} numbers"))
     return first, second
 
 

@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from psabench.errors import expected
 from psabench.native.nav import ARCMIN, DEGPH, Floats, Method, Noise, Refused
 from psabench.native.navlib import (
     MAX_POSITIONS,
@@ -189,7 +190,7 @@ def _checked(cfg: McConfig, model: Model) -> McStruct:
 def config_struct(cfg: McConfig) -> McStruct:
     """The structure that the library takes."""
     if len(cfg.angles_rad) > MAX_POSITIONS:
-        raise ValueError(f"{len(cfg.angles_rad)} positions: {MAX_POSITIONS} at most")
+        raise ValueError(expected(f"{MAX_POSITIONS} positions at most", len(cfg.angles_rad)))
     struct = McStruct()
     for name, *_ in McStruct._fields_:
         if name not in ("count", "angle_rad", "fit"):
@@ -225,9 +226,9 @@ def _ranges(
     """Calls the function for pieces of the range in threads; ctypes gives the interpreter's lock back meanwhile."""
     seed, first, runs = what
     if min(seed, first, runs) < 0 or threads < 0:
-        raise ValueError("seed, first_run, runs and threads are not negative")
+        raise ValueError(expected("0 or more", min(seed, first, runs, threads), "seed, first_run, runs, threads"))
     if any(a.shape != (runs,) or a.dtype != np.float64 or not a.flags.c_contiguous for a in out.values()):
-        raise ValueError(f"into: want arrays of {runs} doubles")
+        raise ValueError(expected(f"arrays of {runs} doubles", None, "into"))
     workers = min(threads or os.cpu_count() or 1, max(runs, 1))
     edges = [runs * k // workers for k in range(workers + 1)]
 

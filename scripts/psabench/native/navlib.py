@@ -6,7 +6,7 @@ import ctypes as c
 from functools import cache
 from typing import Any
 
-from psabench.errors import BadInput
+from psabench.errors import BadInput, expected
 from psabench.places import find_library
 
 ABI = 1  # NAV_ABI of the header that this was written from
@@ -198,17 +198,17 @@ class NavLibrary:
         try:
             so = c.CDLL(path)
         except OSError as e:
-            raise BadInput(f"{path}: not a library that can be loaded ({e}); PSABENCH_NAV_LIB names another") from None
+            raise BadInput(expected("a shared library (PSABENCH_NAV_LIB names another)", e, path)) from None
         try:
             abi = int(so.nav_abi())
             if abi != ABI:
-                raise BadInput(f"{path}: speaks ABI {abi}, this psabench speaks {ABI}; PSABENCH_NAV_LIB names another")
+                raise BadInput(expected(f"ABI {ABI} (PSABENCH_NAV_LIB names another library)", abi, path))
             for name, (result, *arguments) in PROTOTYPES.items():
                 function = getattr(so, f"nav_{name}")
                 function.restype, function.argtypes = result, arguments
                 setattr(self, name, function)
         except AttributeError as e:
-            raise BadInput(f"{path}: older than this psabench ({e}); PSABENCH_NAV_LIB names another") from None
+            raise BadInput(expected("a library of this version (or PSABENCH_NAV_LIB)", e, path)) from None
 
     def __getattr__(self, name: str) -> Any:  # for the type checker: __init__ has set them all
         raise AttributeError(name)
@@ -222,5 +222,5 @@ def library() -> NavLibrary:
         try:
             return NavLibrary(NAME)
         except BadInput:
-            raise BadInput(f"{NAME}: not in this package, its checkout or the system; `make` builds it") from None
+            raise BadInput(expected("a library here or in the system (make builds it)", "none", NAME)) from None
     return NavLibrary(str(path))

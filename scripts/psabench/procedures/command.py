@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from psabench.boards.registry import DBC_NODE
-from psabench.errors import BadInput
+from psabench.errors import BadInput, expected
 from psabench.instruments import EXAMPLES
 from psabench.options import Help, Parser, natural, node_id, positive, yes_no
 from psabench.procedures.run_table import COMPARE, CONDITIONS, G_MPS2, ON_THE_HEAD, ON_THE_PLATFORM
@@ -224,8 +224,8 @@ def _without_procedure(args: argparse.Namespace) -> int:
         return 0
     known = f"{', '.join(COMMANDS)} or {SCRIPT}"
     if args.procedure is None:
-        raise BadInput(f"run: which procedure? {known}; psabench run --help tells of each")
-    raise BadInput(f"run {args.procedure}: no such procedure; {known}")
+        raise BadInput(expected(f"{known} (psabench run --help explains them)", "none", "run"))
+    raise BadInput(expected(known, repr(args.procedure), "run"))
 
 
 def _params(args: argparse.Namespace) -> dict[str, Any]:

@@ -24,7 +24,7 @@ from psabench.boards.psa2.device import Psa2
 from psabench.boards.psd1.device import FULL_SCALE_V, OFFSET_BINARY, Psd1, volts
 from psabench.boards.readings import Readings
 from psabench.boards.unit import Unit
-from psabench.errors import BadInput, LinkError
+from psabench.errors import BadInput, LinkError, expected
 from psabench.procedures.head_bench import Progress
 
 NAME = "compare-converters"
@@ -48,7 +48,7 @@ class CompareParams:
 
     def __post_init__(self) -> None:
         if not 0.0 < self.rest_s < self.seconds:
-            raise ValueError(f"rest_s is {self.rest_s}; it must lie between 0 and seconds, {self.seconds}")
+            raise ValueError(expected(f"0 to seconds, {self.seconds}", self.rest_s, "rest_s"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -179,7 +179,7 @@ def _track(unit: Unit, name: str) -> Track:
     gen = GENERATIONS[name]
     lost = unit.frames.counters.lost + unit.frames.counters.torn
     if lost:
-        raise LinkError(f"{name}: {lost} readings were lost between the unit and this program")
+        raise LinkError(f"{name}: {lost} readings lost between the unit and this program")
     if isinstance(unit, Psa2):
         return _psa2(unit, gen, name)
     readings = unit.frames.take()
@@ -211,10 +211,7 @@ def record(bench: Bench, p: CompareParams, progress: Progress) -> tuple[Track, .
     """
     missing = [name for name, gen in GENERATIONS.items() if not isinstance(bench.units.get(name), gen.board)]
     if missing:
-        raise BadInput(
-            f"the scenario has no unit {', '.join(missing)} of the board of that name; "
-            f"copy {SCENARIO}.yaml (psa-emu --list-scenarios) and change what is around them"
-        )
+        raise BadInput(expected(f"units {', '.join(missing)} as in {SCENARIO}.yaml", "none", "--scenario"))
     units = {name: bench.units[name] for name in GENERATIONS}
     bench.wait(max(0.0, SETTLE_S - bench.time_s))
     slices = max(1, round(p.seconds / p.slice_s))

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from psabench.bench import Bench
-from psabench.errors import BenchError
+from psabench.errors import BenchError, expected
 from psabench.procedures import compare_converters as measured
 from psabench.procedures.compare_converters import CompareParams, Figures, Track
 from psabench.procedures.head_bench import Progress
@@ -171,7 +171,7 @@ def read_truth(path: Path, unit: str) -> Motion:
                 t_s.append(state["t_ns"] * 1e-9)
                 a.append([-x for x in state["unit"]["f_mps2"]])
     if len(t_s) < 3:
-        raise BenchError(f"{path}: no course of unit {unit} in the truth log")
+        raise BenchError(expected(f"the truth of unit {unit}", "none", path))
     t, a_mps2 = np.array(t_s), np.array(a)
     return Motion(t_s=t, a_mps2=a_mps2, v_mps=integrate(t, a_mps2))
 

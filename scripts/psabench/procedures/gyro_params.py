@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from psabench.errors import expected
 from psabench.procedures import gyrocompass, heading_hold
 from psabench.procedures.gyrocompass import GyrocompassParams
 from psabench.procedures.heading_hold import HoldParams
@@ -24,9 +25,7 @@ class ReadingParams:
 
     def __post_init__(self) -> None:
         if self.reading not in (*gyrocompass.READINGS, BOTH):
-            raise ValueError(
-                f"reading is {self.reading!r}; it must be one of {', '.join(gyrocompass.READINGS)}, {BOTH}"
-            )
+            raise ValueError(expected(f"{', '.join(gyrocompass.READINGS)} or {BOTH}", repr(self.reading), "reading"))
 
     @property
     def readings(self) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ from typing import Any
 
 from psabench.bench import Bench
 from psabench.boards.gyro.device import Gyro
-from psabench.errors import BadInput
+from psabench.errors import BadInput, expected
 from psabench.procedures import gyrocompass, heading_hold
 from psabench.procedures.gyro_params import ReadingParams
 from psabench.procedures.gyrocompass import GyrocompassParams, GyrocompassResult
@@ -79,7 +79,7 @@ def _holds(options: GyroOptions) -> bool:
 def _one(label: str, hold_params: HoldParams | None, options: GyroOptions, progress: Progress) -> GyroSection:
     with _bench(options) as bench:
         if options.scenario and not any(isinstance(u, Gyro) for u in bench.units.values()):
-            raise BadInput(f"--scenario {options.scenario}: it has no gyro unit; {SCENARIO} has one")
+            raise BadInput(expected(f"a scenario with a gyro unit, as {SCENARIO}", options.scenario, "--scenario"))
         given = {**_site(options), **_part(GyrocompassParams, options.params)}
         p = gyrocompass.params_of(label, given)
         platform = WirePlatform(bench, signals=p.signals)

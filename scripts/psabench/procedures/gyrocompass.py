@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from psabench.errors import LinkError
+from psabench.errors import LinkError, expected
 from psabench.estimate.uncertainty import Estimate
 from psabench.native import nav
 from psabench.native.nav import ARCMIN, DEGPH
@@ -93,7 +93,7 @@ class GyrocompassResult:
         for e in self.estimates:
             if e.name == name:
                 return e
-        raise KeyError(f"{name}; there are {', '.join(e.name for e in self.estimates)}")
+        raise KeyError(expected(", ".join(e.name for e in self.estimates), name, "estimate"))
 
     @property
     def duration_s(self) -> float:

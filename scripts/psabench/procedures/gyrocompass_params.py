@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from psabench.errors import BadInput
+from psabench.errors import BadInput, expected
 from psabench.native import nav
 from psabench.native.nav import ARCMIN, DEGPH, EARTH_RADPS, Method
 from psabench.procedures.platform_bench import Table
@@ -70,15 +70,19 @@ class GyrocompassParams:
     def __post_init__(self) -> None:
         for name, known in (("method", tuple(METHODS)), ("angles", ANGLES), ("signals", SIGNALS)):
             if getattr(self, name) not in known:
-                raise ValueError(f"{name} is {getattr(self, name)!r}; it must be one of {', '.join(known)}")
+                raise ValueError(expected(", ".join(known), repr(getattr(self, name)), name))
         for f in fields(self):
             value = getattr(self, f.name)
             if isinstance(value, float) and f.name not in SIGNED and not 0.0 <= value < math.inf:
-                raise ValueError(f"{f.name} is {value}; it must not be negative")
+                raise ValueError(expected("0 or more", value, f.name))
         if not math.isfinite(self.drift2_degph):
-            raise ValueError(f"drift2_degph is {self.drift2_degph}; it must be a number")
+            raise ValueError(expected("a finite number", self.drift2_degph, "drift2_degph"))
         if self.window_s < WINDOW_LEAST_S or self.repeat < 1:
-            raise ValueError(f"window_s is {self.window_s}, repeat {self.repeat}; at least {WINDOW_LEAST_S:g} and 1")
+            raise ValueError(
+                expected(
+                    f"at least {WINDOW_LEAST_S:g} s and 1", f"{self.window_s} s and {self.repeat}", "window_s, repeat"
+                )
+            )
         rehearse(self)
 
     @property
@@ -87,9 +91,9 @@ class GyrocompassParams:
         try:
             found = tuple(float(x) for x in self.sequence.split(","))
         except ValueError:
-            raise ValueError(f"sequence is {self.sequence!r}; it must be angles in degrees, as 0,90,180") from None
+            raise ValueError(expected("angles in degrees, as 0,90,180", repr(self.sequence), "sequence")) from None
         if not all(abs(a) <= 360.0 for a in found):
-            raise ValueError(f"sequence is {self.sequence!r}; each must lie within +-360 deg")
+            raise ValueError(expected("angles within +-360 deg", repr(self.sequence), "sequence"))
         return found
 
     @property
@@ -140,7 +144,7 @@ READINGS: Mapping[str, Mapping[str, Any]] = {
 def params_of(reading: str, given: Mapping[str, Any] | None = None) -> GyrocompassParams:
     """The parameters of a reading, with those given in their place. Raises BadInput."""
     if reading not in READINGS:
-        raise BadInput(f"reading is {reading!r}; it must be one of {', '.join(READINGS)}")
+        raise BadInput(expected(", ".join(READINGS), repr(reading), "reading"))
     try:
         return GyrocompassParams(**{**READINGS[reading], **(given or {})})
     except ValueError as e:
@@ -151,7 +155,7 @@ def rehearse(p: GyrocompassParams) -> None:
     """Whether these positions can tell a heading at all, before anything moves. Raises BadInput with the reason."""
     angles = np.radians(Table(angles_deg=p.angles_deg, repeat=p.repeat).sequence_deg)
     if not abs(p.latitude_deg) <= 90.0:
-        raise BadInput(f"{NAME}: latitude_deg is {p.latitude_deg:g}; it must lie within +-90")
+        raise BadInput(expected("-90 to 90 deg", f"{p.latitude_deg:g}", f"{NAME}: latitude_deg"))
     _patient(p)
     pace_s = p.window_s + p.settle_s
     rows = [
@@ -169,8 +173,7 @@ def _patient(p: GyrocompassParams) -> None:
             continue
         need = f"at least {SETTLED / m:.3g}" if m > 0.0 else "a loop"
         raise BadInput(
-            f"{NAME}: settle_s is {p.settle_s:g}, {name} {m:g}: the platform is not at rest when its window begins; "
-            f"it takes {SETTLED:g}/{name}, {need}{way_out}"
+            expected(f"{need} with {name} {m:g} ({SETTLED:g}/{name}){way_out}", p.settle_s, f"{NAME}: settle_s")
         )
 
 

@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from psabench.errors import LinkError
+from psabench.errors import LinkError, expected
 from psabench.estimate.angles import wrapped
 from psabench.native import nav
 from psabench.native.nav import DEGPH, EARTH_RADIUS_M, LATITUDE_LIMIT_RAD
@@ -43,11 +43,11 @@ class HoldParams:
 
     def __post_init__(self) -> None:
         if self.compensate not in DRIFTS:
-            raise ValueError(f"compensate is {self.compensate!r}; it must be one of {', '.join(DRIFTS)}")
+            raise ValueError(expected(", ".join(DRIFTS), repr(self.compensate), "compensate"))
         if not 0.0 < self.look_s <= self.hours * 3600.0:
-            raise ValueError(f"look_s is {self.look_s}; it must lie between 0 and hours, {self.hours:g} h")
+            raise ValueError(expected(f"0 to hours, {self.hours:g} h", self.look_s, "look_s"))
         if self.speed_kmh < 0.0:
-            raise ValueError(f"speed_kmh is {self.speed_kmh}; it must not be negative")
+            raise ValueError(expected("0 or more", self.speed_kmh, "speed_kmh"))
 
     @property
     def speed_mps(self) -> float:
@@ -140,7 +140,7 @@ def hold(
     """
     first = bench.look()
     if first.faults:
-        raise LinkError(f"{NAME}: navigation cannot begin: {'; '.join(first.faults)}")
+        raise LinkError(f"{NAME}: navigation did not begin: {'; '.join(first.faults)}")
     azimuth_rad = _alpha(start, first)
     drift1_radps, latitude_rad = start.compass.drift1_radps, start.params.latitude_rad
     drift2_radps = {"torquer": start.drift2_radps, "axis1": drift1_radps, "none": 0.0}[p.compensate]

@@ -151,7 +151,7 @@ class ScriptedBench:
 
     def _keep(self, request: _Request, data: bytes) -> None:
         if self._plates.known.setdefault(request.key, data) != data:
-            raise LinkError(f"{request.what}: another value than of the runs before")
+            raise LinkError(f"{request.what}: the value differs from that of earlier runs")
 
 
 @cache

@@ -15,6 +15,8 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
+from psabench.errors import expected
+
 Floats = npt.NDArray[np.float64]
 
 
@@ -61,7 +63,7 @@ class Window:
 
     def __post_init__(self) -> None:
         if not len(self.beta_rad):
-            raise ValueError("a window needs readings")
+            raise ValueError(expected("readings in the window", "none"))
 
     @property
     def length_s(self) -> float:

@@ -17,7 +17,7 @@ from psabench.boards.psa2.device import Psa2
 from psabench.boards.psa2.frames import Frames
 from psabench.boards.readings import Readings
 from psabench.boards.unit import NMT_PREOP
-from psabench.errors import LinkError
+from psabench.errors import LinkError, expected
 from psabench.link.can_log import Logged
 from psabench.link.protocol_files import dbc_node, message
 from psabench.link.signals import Floats, Ints, layout
@@ -63,7 +63,9 @@ class RecordedPlatform(WirePlatform):
         """Level for a time that is enough; whether it was, the recording tells later. Raises LinkError."""
         length_s = LEVEL_TIMES / self._m1_per_s + LEVEL_LOOK_S
         if length_s > patience_s:
-            raise LinkError(f"levelling takes {length_s:.3g} s with m1 = {self._m1_per_s:g} 1/s: it never settles")
+            raise LinkError(
+                expected(f"levelling within {patience_s:g} s", f"{length_s:.3g} s (m1 {self._m1_per_s:g} 1/s)")
+            )
         self._begin(Mode.LEVEL)
         self.gyro.get("tolerance_arcmin")
         self._script.bench.wait(length_s - LEVEL_LOOK_S)
@@ -93,13 +95,13 @@ class RecordedPlatform(WirePlatform):
         r = self._script.readings(ended_s)
         seen = np.abs(r["BETA"][r.t_rx_s >= begun_s])
         if not seen.size or seen.max() >= self.gyro.get("tolerance_arcmin") / 60.0:
-            raise LinkError("the platform was not level when the run began: it never settles")
+            raise LinkError(expected("a level platform at the beginning", "one that never settles"))
 
     def navigate(self, c: Compensation) -> None:
-        raise LinkError("a hold of hours is looked at while it goes on: it wants a live bench")
+        raise LinkError("heading-hold needs a live bench: it reads the heading during the hold")
 
     def look(self) -> Look:
-        raise LinkError("a hold of hours is looked at while it goes on: it wants a live bench")
+        raise LinkError("heading-hold needs a live bench: it reads the heading during the hold")
 
 
 def _longest_s(table: Table, first_turn_deg: float, accel_dps2: float) -> float:
@@ -121,7 +123,7 @@ class _Units:
         listed = [(u, boards[u["board"]]) for u in scenario["units"] if u["board"] in boards]
         gyros = [u["bus"] for u, _ in listed if u["board"] == "gyro"]
         if not gyros:
-            raise LinkError("the scenario has no gyro unit")
+            raise LinkError(expected("a gyro unit", "none", "scenario"))
         made = [(u["name"], make(self, int(u["node"]))) for u, make in listed if u["bus"] == gyros[0]]
         self.units: dict[str, Gyro | Psa2] = dict(made)
         heard = frozenset(i for u in self.units.values() for i in u.frames.ids)  # type: ignore[union-attr]

@@ -9,6 +9,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import IO
 
+from psabench.errors import expected
 from psabench.estimate.face import Face
 from psabench.procedures.head_bench import Reading
 
@@ -61,7 +62,7 @@ def load_csv(path: Path) -> tuple[Reading, ...]:
     complete = text[: text.rfind("\n") + 1]
     rows = list(csv.reader(complete.splitlines()))
     if not rows or tuple(rows[0]) != COLUMNS:
-        raise ValueError(f"{path}:1: expected the columns {','.join(COLUMNS)}")
+        raise ValueError(expected(f"the columns {','.join(COLUMNS)}", None, f"{path}:1"))
     return tuple(_reading(path, n, row) for n, row in enumerate(rows[1:], start=2))
 
 
@@ -78,4 +79,4 @@ def _reading(path: Path, line: int, row: Sequence[str]) -> Reading:
             u_v=float(u_v),
         )
     except ValueError as err:
-        raise ValueError(f"{path}:{line}: {err}; a row is {','.join(COLUMNS)}") from err
+        raise ValueError(expected(",".join(COLUMNS), err, f"{path}:{line}")) from err

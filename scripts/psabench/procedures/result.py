@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from psabench.errors import expected
 from psabench.estimate.face import Face
 from psabench.estimate.uncertainty import Correlation, Estimate
 from psabench.procedures.head_bench import Reading
@@ -57,7 +58,7 @@ class ProcedureResult:
         for e in self.estimates:
             if e.name == name:
                 return e
-        raise KeyError(f"{self.procedure} has no estimate {name}; it has {', '.join(e.name for e in self.estimates)}")
+        raise KeyError(expected(", ".join(e.name for e in self.estimates), name, f"estimate of {self.procedure}"))
 
     @property
     def duration_s(self) -> float:

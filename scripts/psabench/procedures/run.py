@@ -15,7 +15,7 @@ from typing import Any
 
 from psabench.bench import Bench
 from psabench.boards.registry import DBC_NODE
-from psabench.errors import BadInput
+from psabench.errors import BadInput, expected
 from psabench.instruments import EXAMPLES
 from psabench.procedures.head_bench import Progress, Watch
 from psabench.procedures.recording import CsvRecorder
@@ -100,7 +100,7 @@ def _there(options: RunOptions) -> bool:
 def _bench(condition: Condition, options: RunOptions) -> Bench:
     if _there(options):
         if not options.head and not options.control:
-            raise BadInput(f"--head is missing: the VISA address of the dividing head, such as {EXAMPLES}")
+            raise BadInput(expected(f"the VISA address of the dividing head, as {EXAMPLES}", "none", "--head"))
         there = {"head": options.head} if options.head else {}
         return Bench.connect(options.can, scpi=there, control=options.control, truth=options.truth, node=options.node)
     scenario = options.scenario or condition.scenario

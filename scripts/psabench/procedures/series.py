@@ -9,6 +9,7 @@ from itertools import groupby
 import numpy as np
 import numpy.typing as npt
 
+from psabench.errors import expected
 from psabench.estimate import harmonics
 from psabench.estimate.face import Face
 from psabench.estimate.uncertainty import Estimate, lack_of_fit_p
@@ -33,14 +34,14 @@ class SeriesParams:
 
     def __post_init__(self) -> None:
         if self.axis not in ("x", "y", "z"):
-            raise ValueError(f"axis is {self.axis!r}; it must be x, y or z")
+            raise ValueError(expected("x, y or z", repr(self.axis), "axis"))
         for name, least in (("realisations", 1), ("positions", 6), ("readings", 1)):
             if getattr(self, name) < least:
-                raise ValueError(f"{name} is {getattr(self, name)}; it must be at least {least}")
+                raise ValueError(expected(f"at least {least}", getattr(self, name), name))
         if not 0.0 < abs(self.step_deg) < 180.0:
-            raise ValueError(f"step_deg is {self.step_deg}; it must lie between 0 and 180 deg, either way")
+            raise ValueError(expected("0 to 180 deg, either way", self.step_deg, "step_deg"))
         if self.dwell_s < 0.0:
-            raise ValueError(f"dwell_s is {self.dwell_s}; it must not be negative")
+            raise ValueError(expected("0 or more", self.dwell_s, "dwell_s"))
 
 
 def read_position(

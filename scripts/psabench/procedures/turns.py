@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from psabench.errors import expected
 from psabench.estimate import model
 from psabench.estimate.angles import wrapped_deg
 from psabench.estimate.face import Face
@@ -61,15 +62,15 @@ class TurnsParams:
 
     def __post_init__(self) -> None:
         if self.axis not in ("x", "y", "z"):
-            raise ValueError(f"axis is {self.axis!r}; it must be x, y or z")
+            raise ValueError(expected("x, y or z", repr(self.axis), "axis"))
         if self.realisations < 2:
-            raise ValueError(f"realisations is {self.realisations}; at least 2 are needed for an interval")
+            raise ValueError(expected("at least 2 (for an interval)", self.realisations, "realisations"))
         if self.readings < 1:
-            raise ValueError(f"readings is {self.readings}; it must be at least 1")
+            raise ValueError(expected("at least 1", self.readings, "readings"))
         if not 0.0 <= self.search_deg <= 10.0:
-            raise ValueError(f"search_deg is {self.search_deg}; it must lie in 0..10 deg (a parabola is fitted)")
+            raise ValueError(expected("0 to 10 deg (a parabola is fitted)", self.search_deg, "search_deg"))
         if self.dwell_s < 0.0:
-            raise ValueError(f"dwell_s is {self.dwell_s}; it must not be negative")
+            raise ValueError(expected("0 or more", self.dwell_s, "dwell_s"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -123,7 +124,7 @@ def estimate_turns(readings: Sequence[Reading], p: TurnsParams, g_mps2: float) -
         if h.sum_v.size >= 2:
             halves[pair.axis] = h
         elif pair.axis == "x":
-            raise ValueError(f"{h.sum_v.size} complete realisations of the x pair: at least 2 are needed")
+            raise ValueError(expected("at least 2 complete realisations of the x pair", h.sum_v.size))
         else:
             notes.append(f"no k{pair.axis}: {h.sum_v.size} complete realisations of its pair")
     estimates = _estimates(halves)

@@ -18,7 +18,7 @@ from psabench.boards.gyro.device import Flag, Gyro, Mode, Phase
 from psabench.boards.gyro.watch import FLAG_WORDS, NavigationWatch
 from psabench.boards.psa2.device import Psa2
 from psabench.boards.readings import Readings
-from psabench.errors import BenchError, LinkError
+from psabench.errors import BenchError, LinkError, expected
 from psabench.estimate.angles import wrapped_deg
 from psabench.link import signals as bits
 from psabench.native.nav import DEGPH
@@ -76,7 +76,7 @@ class WirePlatform:
         for unit in self._bench.units.values():
             if isinstance(unit, Psa2) and unit.node.node_id == node:
                 return unit
-        raise LinkError(f"the gyro unit's level sensors are read by node {node}; there is no PSA-2 at it")
+        raise LinkError(expected(f"a PSA-2 at node {node} that reads the level sensors", "none", "platform"))
 
     # ---- PlatformBench
 
@@ -112,9 +112,7 @@ class WirePlatform:
         while looks < LEVEL_LOOKS:
             if self.t_s >= deadline_s:
                 off_arcmin = 60.0 * abs(self.gyro.beta_deg)
-                raise LinkError(
-                    f"the platform was not level after {limit_s:g} s: it never settles; it is off by {off_arcmin:.1f}'"
-                )
+                raise LinkError(expected(f"a level platform within {limit_s:g} s", f"{off_arcmin:.1f}' off"))
             self.wait(LEVEL_LOOK_S)
             self._raise_for(self.gyro.flags & ~Flag.SATURATED, "levelling")
             looks = looks + 1 if abs(self.gyro.beta_deg) < tolerance_deg else 0
@@ -341,7 +339,7 @@ class _Tape:
         count = np.bincount(step_of, minlength=len(edges) - 1)
         empty = count == 0
         if empty.all():
-            raise LinkError("no frame of the level unit came in a window")
+            raise LinkError(expected("frames of the level unit in the window", "none"))
         sums = [np.bincount(step_of, self._u_v[ours, k], minlength=len(count)) for k in (0, 1)]
         x_v, y_v = (s / np.maximum(count, 1) for s in sums)
         x_v[empty], y_v[empty] = x_v[~empty].mean(), y_v[~empty].mean()

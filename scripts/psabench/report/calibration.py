@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
 
+from psabench.errors import expected
 from psabench.procedures.result import LIMIT_CI
 from psabench.procedures.run_table import ON_THE_HEAD
 from psabench.report.grading import (
@@ -40,7 +41,7 @@ def write(folder: Path, sections: Sequence[Section], facts: Mapping[str, str] | 
     OSError from the disk.
     """
     if not sections:
-        raise ValueError("a report needs at least one section")
+        raise ValueError(expected("at least one section", "none", "report"))
     facts = facts or {}
     data = {
         "format": FORMAT,

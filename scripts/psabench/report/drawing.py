@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from html import escape
 
+from psabench.errors import expected
 from psabench.link.vcd import Vcd, Wire
 
 WIDTH, LEFT, RIGHT = 1120, 76, 18  # px: picture, column of names, margin
@@ -209,4 +210,4 @@ def render(vcd: Vcd, panels: Sequence[Panel], title: str) -> str:
 def need(vcd: Vcd, rows: set[str]) -> None:
     missing = sorted(rows - set(vcd.wires))
     if missing:
-        raise ValueError(f"the recording has no line {', '.join(missing)}; it has {', '.join(vcd.wires)}")
+        raise ValueError(expected(f"the lines {', '.join(missing)}", ", ".join(vcd.wires)))

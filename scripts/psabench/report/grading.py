@@ -10,6 +10,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 
+from psabench.errors import expected
 from psabench.estimate.model import Sensor
 from psabench.estimate.uncertainty import Estimate
 from psabench.procedures.registry import PROCEDURES
@@ -57,7 +58,7 @@ def sensor_of(truth: Mapping[str, float]) -> Sensor:
     """
     missing = [name for name in ("u0_v", "kx_v_per_g") if name not in truth]
     if missing:
-        raise ValueError(f"truth has no {' and no '.join(missing)}; it has {', '.join(sorted(truth))}")
+        raise ValueError(expected(f"truth with {' and '.join(missing)}", ", ".join(sorted(truth))))
     known = {f.name: float(truth[f.name]) for f in fields(Sensor) if f.name in truth}
     if "alpha0_deg" in truth:
         known["alpha0_rad"] = math.radians(truth["alpha0_deg"])

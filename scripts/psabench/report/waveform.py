@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from psabench.boards.psd1 import waveform as waveform_psd1
+from psabench.errors import expected
 from psabench.link.vcd import Vcd, read_vcd
 from psabench.report.drawing import Panel, Section, Tag, need, render
 
@@ -44,7 +45,7 @@ def _first_frame(vcd: Vcd, bits: int) -> tuple[int, int]:
         for rise_ns in rises[rises > fall_ns].tolist()[:1]:
             if np.count_nonzero((clk > fall_ns) & (clk < rise_ns)) == bits:
                 return fall_ns, rise_ns
-    raise ValueError(f"no whole frame in it: no INT low with {bits} pulses of CLK")
+    raise ValueError(expected(f"a whole frame: Int low with {bits} pulses of CLK", "none"))
 
 
 def frame_picture(vcd: Vcd, word_bits: int = 32) -> str:
@@ -108,7 +109,7 @@ def setup_picture(vcd: Vcd) -> str:
         if len(pulse) == 2:
             parts.append((pulse[0], pulse[1], 2 * (pulse[1] - pulse[0]), 0.6))
     if not parts:
-        raise ValueError("no transfer of the set-up in it")
+        raise ValueError(expected("a transfer of the set-up", "none"))
     parts.sort()
     sections = [
         Section(start - margin, end + margin, start, f"{n}. {start / 1e6:.3f} ms")
@@ -136,7 +137,7 @@ def rdata_picture(vcd: Vcd) -> str:
         tags = [Tag("DIN", sent[0].start_ns, sent[0].end_ns, "01 RDATA"), *word]
         section = Section(start - 2 * margin, end + margin, start)
         return render(vcd, (Panel(rows, (section,), tags),), f"RDATA at t = {start / 1e6:.3f} ms: code {signed}")
-    raise ValueError("no RDATA of four bytes in it")
+    raise ValueError(expected("an RDATA of four bytes", "none"))
 
 
 def main(argv: Sequence[str] | None = None) -> int:

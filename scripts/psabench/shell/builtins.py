@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from psabench.bench import NS, Bench
-from psabench.errors import BadInput, BenchError
+from psabench.errors import BadInput, BenchError, expected
 from psabench.instruments import KINDS, Instrument
 from psabench.link.can_host import Message
 from psabench.link.protocol_files import message_name
@@ -98,7 +98,7 @@ def _send(session: Context, args: Args) -> Mapping[str, Any]:
     m = FRAME.fullmatch(text)
     data = bytes.fromhex(m["data"].replace(".", "")) if m else b""
     if not m or int(m["id"], 16) > 0x7FF or len(data) > (64 if m["fd"] else 8):
-        raise Wrong(f"frame: {text!r}; expected {FRAME_USAGE}")
+        raise Wrong(expected(FRAME_USAGE, repr(text), "frame"))
     session.dut.host.send(int(m["id"], 16), data, fd=bool(m["fd"]))
     return _listen(session, {"for_s": LISTEN_S})
 
@@ -106,7 +106,7 @@ def _send(session: Context, args: Args) -> Mapping[str, Any]:
 def instrument(session: Context, name: str) -> Instrument:
     """An instrument with an address."""
     if name not in session.bench.addresses:
-        raise Wrong(f"instrument: {name!r}; those with an address: {', '.join(session.bench.addresses)}")
+        raise Wrong(expected(", ".join(session.bench.addresses) or "no name", repr(name), "instrument"))
     found: Instrument = getattr(session.bench, name)
     return found
 
@@ -140,16 +140,16 @@ def _save(session: Context, args: Args) -> Mapping[str, Any]:
 def _help(session: Context, args: Args) -> Mapping[str, Any]:
     commands, wanted = session.vocabulary.commands, str(args.get("command", ""))
     if not wanted:
-        absent = [{"object": n, "about": f"not here: {why}"} for n, why in session.vocabulary.absent.items()]
+        absent = [{"object": n, "about": f"not available: {why}"} for n, why in session.vocabulary.absent.items()]
         here = {c.split(".")[0] for c in commands if "." in c}
         things = [{"object": n, "about": OBJECTS.get(n, "")} for n in OBJECTS if n in here]
         plain = [{"command": c.usage, "about": c.what} for n, c in commands.items() if "." not in n]
         return {"objects": things + absent, "commands": plain}
     if wanted in session.vocabulary.absent:
-        raise BenchError(f"{wanted} is not here: {session.vocabulary.absent[wanted]}")
+        raise BenchError(f"{wanted}: not available: {session.vocabulary.absent[wanted]}")
     found = [c for n, c in sorted(commands.items()) if n == wanted or n.startswith(f"{wanted}.")]
     if not found:
-        raise Wrong(f"help {wanted}: no such command or object; help alone lists them")
+        raise Wrong(expected("a command or object that help lists", repr(wanted), "help"))
     if len(found) > 1:
         return {"commands": [{"command": c.usage, "about": c.what} for c in found]}
     rows = [{"argument": a.name, "needed": not a.optional, "about": describe(a)} for a in found[0].args]

@@ -6,7 +6,7 @@ import argparse
 import signal
 import sys
 
-from psabench.errors import BadInput
+from psabench.errors import BadInput, expected
 from psabench.shell.connect import Opening, addresses
 from psabench.shell.script import Voice, run_file, run_lines, run_stream
 from psabench.shell.session import Session
@@ -28,7 +28,7 @@ def run_shell(args: argparse.Namespace) -> int:
     """Handler of `psabench shell`."""
     typed = sys.stdin.isatty() and sys.stdout.isatty() and not args.command
     if typed and args.json:
-        raise BadInput("--json: for --command and pipes; at a terminal the shell talks to people")
+        raise BadInput(expected("--command or a pipe with --json", "a terminal", "--json"))
     opening = _opening(args, "wall" if typed else "step")
     for number in (signal.SIGTERM, signal.SIGHUP):  # Ctrl-C ends a command; these end the shell, and its emulator
         signal.signal(number, _leave)

@@ -64,7 +64,7 @@ def _names(prefix: str, vocabulary: Vocabulary) -> Iterator[Candidate]:
             yield Candidate(f"{thing}.", len(prefix), OBJECTS.get(thing, ""))
     for thing, why in sorted(vocabulary.absent.items()):
         if prefix.startswith(f"{thing}.") or (prefix and thing.startswith(prefix)):
-            yield Candidate(prefix, len(prefix), f"{thing} is not here: {why}")
+            yield Candidate(prefix, len(prefix), f"{thing}: not available: {why}")
 
 
 def _free(command: Command, words: list[str]) -> list[Arg]:

@@ -59,9 +59,7 @@ class Opening:
         if not self.there:
             return Bench.start(self.scenario or "calibrate", pace=self.pace or "step", seed=self.seed, node=self.node)
         if self.scenario is not None:
-            raise BadInput(
-                f"{self.scenario}: a scenario is for an emulator that is started; --connect and --can find one"
-            )
+            raise BadInput(expected("no scenario with --connect or --can", repr(self.scenario), "SCENARIO"))
         can = self.can or (None if self.connect else NONE)  # an emulator tells its own
         return Bench.connect(can, control=self.connect, scpi=self.scpi, node=self.node)
 

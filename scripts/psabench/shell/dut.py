@@ -14,7 +14,7 @@ from psabench.boards.psa2.device import Psa2
 from psabench.boards.psa2.frames import Form, Frames
 from psabench.boards.readings import Readings
 from psabench.boards.unit import BANKS, Unit
-from psabench.errors import CycleRefused
+from psabench.errors import CycleRefused, expected
 from psabench.shell import registers
 from psabench.shell.commands import Arg, Command, Kind
 from psabench.shell.lexer import Wrong
@@ -43,7 +43,7 @@ def _psa2(session: Context) -> Psa2:
     """The unit, for what only a PSA-2 has."""
     if isinstance(session.dut, Psa2):
         return session.dut
-    raise Wrong(f"{session.dut_name} is a {session.dut.title}: only a PSA-2 has this")
+    raise Wrong(expected("a PSA-2 for this command", f"{session.dut_name}, a {session.dut.title}", "unit"))
 
 
 def of_unit(command: Command, unit: Unit) -> Command:
@@ -63,7 +63,7 @@ def _address(session: Context, args: Args) -> tuple[str, int, str]:
     for address, name in names.items():
         if wanted.upper() == name.upper() or wanted.upper() == f"{address:02X}H":
             return converter, address, name
-    raise Wrong(f"register: {wanted!r}; converter {converter} has {', '.join(names.values())}, or an address as 01h")
+    raise Wrong(expected(f"{', '.join(names.values())} or an address (01h)", repr(wanted), f"register of {converter}"))
 
 
 def _register_row(session: Context, converter: str, address: int, name: str) -> dict[str, Any]:
@@ -188,7 +188,7 @@ def _form(session: Context, args: Args) -> Mapping[str, Any]:
 def _use(session: Context, args: Args) -> Mapping[str, Any]:
     name = str(args.get("unit", session.dut_name))
     if name not in session.bench.units:
-        raise Wrong(f"unit: {name!r}; there is {', '.join(session.bench.units)}")
+        raise Wrong(expected(", ".join(session.bench.units), repr(name), "unit"))
     session.use(name)
     return {"unit": name, "node": session.dut.node.node_id}
 

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from psabench.errors import expected
 from psabench.shell.lexer import Wrong, split
 
 _FORM = re.compile(r"(?P<path>\S+)\s+(?P<op>=|!=|<=|>=|<|>)\s+(?P<value>.+?)(?:\s+\+-\s+(?P<within>\S+))?\s*")
@@ -37,14 +38,14 @@ class Expectation:
         said = split(text)
         m = _FORM.fullmatch(text[: said[-1].end] if said else "")  # without a comment
         if not m:
-            raise Wrong(f"expect {text}: expected {USAGE}")
+            raise Wrong(expected(USAGE, repr(text), "expect"))
         value = literal(m["value"])
         within = literal(m["within"]) if m["within"] else None
         number = _is_number(value) and (within is None or _is_number(within))
         if (within is not None and (m["op"] != "=" or not number)) or (
             m["op"] in "<=>=" and m["op"] != "=" and not number
         ):
-            raise Wrong(f"expect {text}: {m['op']} wants a number, +- wants = and numbers")
+            raise Wrong(expected(f"a number after {m['op']}; +- with = and numbers only", repr(text), "expect"))
         return cls(m["path"], m["op"], value, float(within) if within is not None else None)
 
     def failure(self, result: Mapping[str, Any]) -> str:
@@ -85,9 +86,9 @@ def look(result: Any, path: str) -> Any:
         elif isinstance(here, list) and step.isdecimal() and int(step) < len(here):
             here = here[int(step)]
         elif isinstance(here, Mapping):
-            raise KeyError(f"the latest result has no {step}; it has {', '.join(map(str, here)) or 'nothing'}")
+            raise KeyError(expected(", ".join(map(str, here)) or "no field", step, "latest result"))
         else:
-            raise KeyError(f"the latest result has no {step} there")
+            raise KeyError(expected("no further field", step, "latest result"))
     return here
 
 

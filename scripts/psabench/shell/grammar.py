@@ -8,6 +8,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from psabench.errors import expected
 from psabench.shell import units
 from psabench.shell.commands import Arg, Command, Kind, Vocabulary
 from psabench.shell.lexer import Word, Wrong, quote, split
@@ -54,7 +55,7 @@ def unknown(word: Word, vocabulary: Vocabulary) -> Wrong:
     """Why there is no such command."""
     thing = word.text.split(".")[0]
     if thing in vocabulary.absent:
-        return Wrong(f"{thing} is not here: {vocabulary.absent[thing]}", word.column)
+        return Wrong(f"{thing}: not available: {vocabulary.absent[thing]}", word.column)
     near = vocabulary.nearest(word.text)
     mine = [c for c in vocabulary.commands if c.startswith(f"{thing}.")]
     right = f"did you mean {' or '.join(near)}?" if near else f"it has {', '.join(mine)}" if mine else "help lists them"
@@ -80,7 +81,7 @@ def _arguments(command: Command, words: Sequence[Word], end: int) -> dict[str, V
     for word in words:
         a, of = _which(command, word, values)
         if a.name in values:
-            raise Wrong(f"{a.name} is given twice", word.column)
+            raise Wrong(expected("the argument once", f"{word.raw} as well", a.name), word.column)
         values[a.name] = value(a, of)
     for a in command.args:
         if not a.optional and a.name not in values:
@@ -89,7 +90,7 @@ def _arguments(command: Command, words: Sequence[Word], end: int) -> dict[str, V
 
 
 def _missing(command: Command, a: Arg, end: int) -> Wrong:
-    return Wrong(f"{a.name} is missing: {describe(a)}; usage: {command.usage}", end + 1)
+    return Wrong(f"{expected(f'a value ({describe(a)})', 'none', a.name)}; usage: {command.usage}", end + 1)
 
 
 def _which(command: Command, word: Word, values: dict[str, Value]) -> tuple[Arg, Word]:
@@ -100,14 +101,14 @@ def _which(command: Command, word: Word, values: dict[str, Value]) -> tuple[Arg,
         if a is None:
             known = ", ".join(x.name for x in command.args) or "no argument"
             near = difflib.get_close_matches(named[1], [x.name for x in command.args], 1)
-            hint = f"; did you mean {near[0]}?" if near else ""
-            raise Wrong(f"{command.name} has no argument {named[1]}; it takes {known}{hint}", word.column)
+            hint = f" (did you mean {near[0]}?)" if near else ""
+            raise Wrong(expected(known, f"{named[1]}{hint}", f"argument of {command.name}"), word.column)
         cut = len(named.group())
         return a, Word(word.text[cut:], word.raw[cut:], word.start + cut)
     for a in command.args:
         if a.name not in values:
             return a, word
-    raise Wrong(f"{word.raw}: one word too many; usage: {command.usage}", word.column)
+    raise Wrong(expected(command.usage, f"one more argument, {word.raw}", command.name), word.column)
 
 
 def value(a: Arg, word: Word) -> Value:
@@ -120,30 +121,30 @@ def value(a: Arg, word: Word) -> Value:
         if a.kind is Kind.COUNT:
             return _count(a, word.text)
     except ValueError as e:
-        raise Wrong(f"{a.name}: {e}; {describe(a)}", word.column) from None
+        raise Wrong(f"{a.name}: {e} ({describe(a)})", word.column) from None
     if a.kind is Kind.BOOL:
         if word.text.lower() not in _BOOLS:
-            raise Wrong(f"{a.name}: {word.text!r}; on or off is right", word.column)
+            raise Wrong(expected("on or off", repr(word.text), a.name), word.column)
         return _BOOLS[word.text.lower()]
     if a.choices and a.strict and word.text not in a.choices:
         near = difflib.get_close_matches(word.text, a.choices, 1)
-        hint = f"did you mean {near[0]}? " if near else ""
-        known = f"there is {', '.join(a.choices)}" if len(a.choices) <= LISTED or not near else "Tab lists them"
-        raise Wrong(f"{a.name}: {word.text!r}; {hint}{known}", word.column)
+        hint = f" (did you mean {near[0]}?)" if near else ""
+        known = ", ".join(a.choices) if len(a.choices) <= LISTED or not near else "a value that Tab lists"
+        raise Wrong(expected(known, f"{word.text!r}{hint}", a.name), word.column)
     return word.text
 
 
 def _number(a: Arg, text: str) -> float:
     x = units.number(text, a.unit)
     if not (a.low <= x <= a.high) or math.isinf(x) or 0 < abs(x) < a.least:
-        raise ValueError(f"{x:.10g} is out of range")
+        raise ValueError(expected("a number in range", f"{x:.10g}"))
     return x
 
 
 def _count(a: Arg, text: str) -> int:
     x = _number(a, text)
     if x != math.floor(x):
-        raise ValueError(f"{x:.10g} is no integer")
+        raise ValueError(expected("an integer", f"{x:.10g}"))
     return int(x)
 
 

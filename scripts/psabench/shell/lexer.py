@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from psabench.errors import BadInput
+from psabench.errors import BadInput, expected
 
 # A word: quoted parts and others, up to a blank. A quote that is not closed runs to the end of the line.
 _WORD = re.compile(r"""(?:"(?:[^"\\]|\\.)*"?|'[^']*'?|[^\s"'])+""")
@@ -62,7 +62,7 @@ def _unquote(raw: str, start: int) -> str:
         if m["plain"]:
             parts.append(text)
         elif len(text) < 2 or text[-1] != text[0]:
-            raise Wrong(f"{text}: a quote is not closed", start + m.start() + 1)
+            raise Wrong(expected("a closing quote", text), start + m.start() + 1)
         else:
             parts.append(re.sub(r"\\(.)", r"\1", text[1:-1]) if m["double"] else text[1:-1])
     return "".join(parts)

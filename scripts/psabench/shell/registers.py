@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 
+from psabench.errors import expected
 from psabench.shell.fields import FIELDS
 from psabench.shell.lexer import Wrong
 
@@ -36,10 +37,10 @@ def changed(converter: str, name: str, value: int, text: str) -> int:
         rows = {b.name: b for b in FIELDS.get((group(converter), name), ())}
         bits = rows.get(field)
         if bits is None:
-            raise Wrong(f"{name} has no field {field}; it has {', '.join(rows) or 'none: write the whole byte'}")
+            raise Wrong(expected(", ".join(rows) or "the whole byte: it has no fields", field, f"field of {name}"))
         n = number(digits)
         if n is None or n > bits.mask >> bits.shift:
-            raise Wrong(f"{name}.{field}: {digits!r}; 0 to {bits.mask >> bits.shift} is right")
+            raise Wrong(expected(f"0 to {bits.mask >> bits.shift}", repr(digits), f"{name}.{field}"))
         value = (value & ~bits.mask) | (n << bits.shift)
     return value
 
@@ -47,7 +48,7 @@ def changed(converter: str, name: str, value: int, text: str) -> int:
 def _byte(name: str, text: str) -> int:
     n = number(text)
     if n is None or n > 0xFF:
-        raise Wrong(f"{name}: {text!r}; expected a byte (56h, 0x56, 86), or fields (DR=3,PHASE=0)")
+        raise Wrong(expected("a byte (56h, 0x56, 86) or fields (DR=3,PHASE=0)", repr(text), name))
     return n
 
 
@@ -55,7 +56,7 @@ def word(name: str, text: str) -> int:
     """A word for a register on a bus: a number up to FFFFh. Raises Wrong."""
     n = number(text)
     if n is None or n > 0xFFFF:
-        raise Wrong(f"{name}: {text!r}; expected a word (A55Ah, 0xA55A, 42330)")
+        raise Wrong(expected("a word (A55Ah, 0xA55A, 42330)", repr(text), name))
     return n
 
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from psabench.errors import BadInput, BenchError
+from psabench.errors import BadInput, BenchError, expected
 from psabench.shell import render
 from psabench.shell.connect import Opening
 from psabench.shell.expect import Expectation
@@ -55,14 +55,14 @@ def run_file(path: Path, opening: Opening, voice: Voice) -> int:
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as e:
-        raise BadInput(f"{path}: {getattr(e, 'strerror', None) or 'not UTF-8 text'}") from e
+        raise BadInput(f"{path}: {getattr(e, 'strerror', None) or expected('UTF-8 text', 'other bytes')}") from e
     first = next((n for n, line in enumerate(lines) if line.strip() and not line.lstrip().startswith("#")), 0)
     try:
         opening = opening.of_script(lines[first] if lines else "")
     except Wrong as e:
         raise _at(path, first, e) from e
     if not opening.given:
-        raise BadInput(f"{path}: which bench? A first line `start SCENARIO`, or --scenario, --control or --can")
+        raise BadInput(expected("a first line `start SCENARIO`, or --scenario, --control or --can", "none", path))
     if lines and lines[first].split()[:1] == ["start"]:
         lines[first] = ""
     with opening.open() as bench:

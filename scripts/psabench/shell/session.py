@@ -24,8 +24,8 @@ NOT_NOW = 0x08000022  # CiA 301: the state of the device does not allow it
 QUIT = "quit"
 MOVE_TIME = {"bus.read", "bus.write"}  # of the bench's own commands; to the end of the cycle
 PATHS = {"path"}  # arguments that name files of this machine, relative to where we are
-NO_CONTROL = "it wants the control socket of an emulator (--connect PATH); this bench has none"
-NO_CAN = "it wants a bus (--can SPEC, as socketcand:127.0.0.1:29536); this bench was opened without one"
+NO_CONTROL = "it needs the control socket of an emulator (--connect PATH)"
+NO_CAN = "it needs a bus (--can SPEC, as socketcand:127.0.0.1:29536)"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

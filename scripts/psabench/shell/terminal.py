@@ -21,7 +21,7 @@ from prompt_toolkit.input import Input
 from prompt_toolkit.output import Output
 from prompt_toolkit.shortcuts import CompleteStyle
 
-from psabench.errors import BenchError
+from psabench.errors import BenchError, expected
 from psabench.shell import render
 from psabench.shell.complete import argument, candidates
 from psabench.shell.grammar import describe
@@ -160,7 +160,9 @@ class Terminal:
         else:
             absent = self.session.vocabulary.absent
             why = (
-                f"{words[0]} is not here: {absent[words[0]]}" if words[0] in absent else f"{words[0]} takes no argument"
+                f"{words[0]}: not available: {absent[words[0]]}"
+                if words[0] in absent
+                else f"{words[0]} takes no argument"
             )
             raise Wrong(why)
         return True
@@ -168,7 +170,7 @@ class Terminal:
     def _enter_scpi(self, words: list[str]) -> None:
         there = self.session.bench.addresses
         if len(words) != 1 or words[0] not in there:
-            raise Wrong(f"scpi INSTRUMENT: which? {', '.join(there)}", 6)
+            raise Wrong(expected(", ".join(there), " ".join(words) or "none", "scpi"), 6)
         self.mode = words[0]
 
     def _python(self) -> None:

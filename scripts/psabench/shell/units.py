@@ -7,6 +7,8 @@ import re
 from collections.abc import Mapping
 from fractions import Fraction
 
+from psabench.errors import expected
+
 _RAD = Fraction(180 / math.pi)  # degrees
 # Unit: quantity and how many of the quantity's first unit it is. Exact, so that 63ms is the number 0.063.
 _UNITS: Mapping[str, tuple[str, Fraction]] = {
@@ -53,7 +55,7 @@ def number(text: str, unit: str) -> float:
         return float(int(m[1] or m[2], 16))
     m = _NUMBER.match(text)
     if not m:
-        raise ValueError(f"{text!r} is no number")
+        raise ValueError(expected("a number", repr(text)))
     value, suffix = Fraction(m.group()), text[m.end() :]
     return float(value * _ratio(suffix, unit)) if suffix else float(m.group())
 
@@ -70,5 +72,5 @@ def _ratio(given: str, wanted: str) -> Fraction:
         return Fraction(1)
     if given not in alike(wanted):
         known = " ".join(alike(wanted))
-        raise ValueError(f"unit {given!r}; " + (f"one of {known} is right" if known else "expected a bare number"))
+        raise ValueError(expected(f"one of {known}" if known else "a bare number", repr(given), "unit"))
     return _UNITS[given][1] / _UNITS[wanted][1]

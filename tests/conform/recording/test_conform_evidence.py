@@ -51,7 +51,7 @@ def test_a_line_without_an_edge_has_no_pulse() -> None:
 
 
 def test_a_line_that_is_not_there_is_named_with_those_that_are() -> None:
-    with pytest.raises(KeyError, match="CLK; the recording has L"):
+    with pytest.raises(KeyError, match="line: expected L, got CLK"):
         log_of([(0, 1)])["CLK"]
 
 
@@ -85,5 +85,5 @@ def test_frames_are_found_by_message_and_node() -> None:
 
 def test_a_frame_of_another_length_is_no_such_message() -> None:
     log = CanLog(frames=(CanFrame(t_s=0.5, can_id=0x185, data=bytes(7)),))
-    with pytest.raises(ValueError, match=r"PSA2_XY at 0\.500000 s has 7 bytes; it has 8"):
+    with pytest.raises(ValueError, match=r"PSA2_XY at 0\.500000 s: expected 8 bytes, got 7"):
         log.raw("PSA2_XY")

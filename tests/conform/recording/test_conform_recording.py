@@ -144,7 +144,7 @@ def test_channels_of_an_analyser_are_told(psa2: Made, tmp_path: Path, capsys: py
     told = ["--line", "INT=D2", "--line", "Data=D0", "--line", "clk=D1"]
     assert judge(tmp_path, path, *told).passed >= LINE_ROWS
     assert main(["conform", "recording", str(path), "--board", "psa2"]) == 2
-    assert "none of its channels is a line of a psa2: D2, D0, D1" in capsys.readouterr().err
+    assert "expected channels named as lines, or --line LINE=CHANNEL, got D2, D0, D1" in capsys.readouterr().err
 
 
 def test_a_capture_of_the_line_port_conforms(psa2: Made, tmp_path: Path) -> None:

@@ -270,7 +270,7 @@ def test_what_is_no_mf4_is_refused_before_asammdf_sees_it(tmp_path: Path, monkey
     monkeypatch.setattr("subprocess.run", None)
     path = tmp_path / "run.mf4"
     path.write_bytes(b"MD")
-    with pytest.raises(BadInput, match=r"run\.mf4: no MF4 file: it does not begin with MDF"):
+    with pytest.raises(BadInput, match=r"run\.mf4: expected MDF at the beginning, got another file"):
         read_can(path, Bounds())
 
 

@@ -67,7 +67,7 @@ def test_a_table_turns_at_a_rate_that_the_unit_feels(bench: Bench) -> None:
     bench.wait(0.5)
     assert bench.table.angle_deg() - from_deg == pytest.approx(45.0, abs=0.01)
     assert not bench.table.read().at_rest
-    with pytest.raises(TimeOut, match=r"rest of axis 1 not reached in 0\.3 s"):
+    with pytest.raises(TimeOut, match=r"rest of axis 1 not reached within 0\.3 s"):
         bench.table.wait_rest(limit_s=0.3)
     bench.table.stop()
     assert bench.table.read().at_rest
@@ -162,5 +162,8 @@ def test_a_refusal_is_raised_where_it_was_asked_and_changes_nothing(
 
 
 def test_what_a_scenario_has_not_is_said() -> None:
-    with Bench.start("quiet") as b, pytest.raises(BenchError, match="no table: the scenario has no section table"):
+    with (
+        Bench.start("quiet") as b,
+        pytest.raises(BenchError, match="bench: no table: the scenario has no section table"),
+    ):
         _ = b.table

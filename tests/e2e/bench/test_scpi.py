@@ -302,7 +302,7 @@ def test_a_wrong_option_is_one_line(tmp_path: Path, given: str, want: str) -> No
 
 def test_an_instrument_that_the_scenario_lacks_is_refused(tmp_path: Path) -> None:
     with (
-        pytest.raises(BadInput, match="the scenario has no table"),
+        pytest.raises(BadInput, match="expected a scenario with a table"),
         Emulator("quiet", cans=["none"], extra=["--scpi", "table"]),
     ):
         pass

@@ -82,7 +82,10 @@ def test_a_session_at_the_keyboard(env: dict[str, str], tmp_path: Path) -> None:
         t.say("time", r"t_s +0\.25")
         t.say("dut.ready", "")
         t.say("dut.register x CONFIG0", r"SYNC 0 pulse, DR 2 1000 /s, PHASE 1 minimum, FILTR 2 sinc \+ FIR")
-        t.say("head.turn 4000", r"angle_deg: 4000 is out of range; angle on the head's scale, deg, -3600 to 3600")
+        t.say(
+            "head.turn 4000",
+            r"angle_deg: expected a number in range, got 4000 \(angle on the head's scale, deg, -3600 to 3600\)",
+        )
         t.say(f"save {script}", r"lines +\d")
         emulators = children(t.pid)
         assert emulators
@@ -90,7 +93,7 @@ def test_a_session_at_the_keyboard(env: dict[str, str], tmp_path: Path) -> None:
     until(lambda: not any(Path(f"/proc/{p}").exists() for p in emulators), "the end of the emulator")
     text = script.read_text()
     assert "start quiet\nhead.turn 30\n" in text
-    assert "# head.turn 4000   refused: angle_deg: 4000 is out of range" in text
+    assert "# head.turn 4000   error: angle_deg: expected a number in range, got 4000" in text
     again = shell(env, "run", "script", script, "--json")
     assert again.returncode == 0, again.stderr
     results = {o["line"]: o["result"] for o in objects(again.stdout)}
@@ -219,9 +222,9 @@ STATUSES = [
     ("start quiet\nhead.turn 5\nexpect angle_deg = 5 +- 0.001\n", 0, ""),
     ("start quiet\nhead.turn 5\nexpect angle_deg = 6\nhead.read\n", 1, ""),
     ("start quiet\nhead.turn 5\nhead.spin\n", 2, ":3:1: head.spin: unknown command"),
-    ("start quiet\nhead.turn 5 6\n", 2, ":2:13: 6: one word too many"),
+    ("start quiet\nhead.turn 5 6\n", 2, ":2:13: head.turn: expected head.turn angle_deg, got one more argument, 6"),
     ("start nosuch\n", 2, "nosuch"),
-    ("head.turn 5\n", 2, "which bench?"),
+    ("head.turn 5\n", 2, "expected a first line `start SCENARIO`"),
     ("start quiet\ndut.register x CONFIG0\n", 3, ":2: node 5: read 2000h:2: abort"),  # not set up yet
 ]
 
@@ -260,7 +263,7 @@ def test_an_emulator_that_is_there(env: dict[str, str], make_rig: MakeRig) -> No
     lines = ("--command", "head.turn 7", "--command", "dut.ready")
     done = shell(env, "shell", "--connect", control, "--can", "none", *lines)
     assert done.returncode == 2
-    assert "dut is not here: it wants a bus (--can SPEC" in done.stderr
+    assert "dut: not available: it needs a bus (--can SPEC" in done.stderr
     assert rig.control.call("head.read").result["angle_deg"] == pytest.approx(0.0)  # checked before anything is done
     done = shell(env, "shell", "--connect", control, "--can", rig.spec, *lines)
     assert done.returncode == 0, done.stderr
@@ -289,7 +292,7 @@ def test_a_device_without_a_control_socket(env: dict[str, str], make_rig: MakeRi
     for thing in ("head.turn 5", "faults.list"):
         done = shell(env, "shell", "--can", rig.spec, "--command", thing)
         assert done.returncode == 2
-        assert f"{thing.split('.')[0]} is not here: it wants the control socket of an emulator" in done.stderr
+        assert f"{thing.split('.')[0]}: not available: it needs the control socket of an emulator" in done.stderr
 
 
 def test_where_nothing_is_there_one_line_says_so(env: dict[str, str], tmp_path: Path) -> None:

@@ -227,21 +227,21 @@ def make_snapshot(path: Path) -> str:
 
 
 BAD_FILES: list[tuple[str, Callable[[str], str], str]] = [
-    ("nothing", lambda t: "", "is no snapshot of psa-emu"),
-    ("a scenario", lambda t: "seed: 1\nunits: [{name: a}]\n", "is no snapshot of psa-emu"),
-    ("another version", lambda t: seal(t.replace('"version":"', '"version":"9', 1)), "was written by version 9"),
-    ("another format", lambda t: seal(t.replace('"format":1', '"format":2', 1)), "was written by version"),
-    ("one bit", lambda t: seal(t).replace("12.5", "12.4", 1), "is damaged"),
-    ("half", lambda t: seal(t)[: len(t) // 2], "is damaged"),
-    ("another frame", lambda t: seal(t.replace("4018100100", "4018100300", 1)), "makes another bench"),
-    ("another angle", lambda t: seal(t.replace("12.5", "12.50001", 1)), "makes another bench"),
-    ("another seed", lambda t: seal(t.replace('"seed":1', '"seed":2', 1)), "makes another bench"),
-    ("no such command", lambda t: seal(t.replace("head.turn", "head.tern", 1)), "is no command that changes a bench"),
-    ("a file written", lambda t: seal(t.replace("head.turn", "snapshot", 1)), "is no command that changes a bench"),
+    ("nothing", lambda t: "", "expected a snapshot of psa-emu, got another file"),
+    ("a scenario", lambda t: "seed: 1\nunits: [{name: a}]\n", "expected a snapshot of psa-emu, got another file"),
+    ("another version", lambda t: seal(t.replace('"version":"', '"version":"9', 1)), "got version 9"),
+    ("another format", lambda t: seal(t.replace('"format":1', '"format":2', 1)), "and format 2"),
+    ("one bit", lambda t: seal(t).replace("12.5", "12.4", 1), "the file is damaged"),
+    ("half", lambda t: seal(t)[: len(t) // 2], "the file is damaged"),
+    ("another frame", lambda t: seal(t.replace("4018100100", "4018100300", 1)), "replay ends in another state"),
+    ("another angle", lambda t: seal(t.replace("12.5", "12.50001", 1)), "replay ends in another state"),
+    ("another seed", lambda t: seal(t.replace('"seed":1', '"seed":2', 1)), "replay ends in another state"),
+    ("no such command", lambda t: seal(t.replace("head.turn", "head.tern", 1)), "a command that changes the bench"),
+    ("a file written", lambda t: seal(t.replace("head.turn", "snapshot", 1)), "a command that changes the bench"),
     ("out of range", lambda t: seal(t.replace("12.5", "1e9", 1)), "head.turn: angle_deg"),
-    ("no such bus", lambda t: seal(t.replace('"bus":0', '"bus":5', 1)), "there is no bus 5"),
-    ("a stranger", lambda t: seal(t.replace('"from":1', '"from":7', 1)), "program 7 is not on the bus"),
-    ("an entry less", lambda t: seal(re.sub('.*"from".*\n', "", t)), "has fewer entries"),
+    ("no such bus", lambda t: seal(t.replace('"bus":0', '"bus":5', 1)), "a bus of the scenario, got 5"),
+    ("a stranger", lambda t: seal(t.replace('"from":1', '"from":7', 1)), "client 7 is not on the bus"),
+    ("an entry less", lambda t: seal(re.sub('.*"from".*\n', "", t)), "as many entries as its head says"),
 ]  # fmt: skip
 
 
@@ -277,7 +277,7 @@ def test_a_snapshot_replaces_files_and_nothing_else(tmp_path: Path) -> None:
     link.symlink_to(file)
     with Emulator(BENCH) as emulator, at(emulator) as d:
         for path in (pipe, link):
-            with pytest.raises(ControlError, match="is there and is no file"):
+            with pytest.raises(ControlError, match="expected a file or a new name"):
                 d.control.call("snapshot", path=str(path))
         assert pipe.is_fifo()
         assert link.is_symlink()
@@ -353,7 +353,7 @@ def test_a_fork_that_cannot_have_its_endpoints_is_refused(tmp_path: Path) -> Non
     with Emulator(BENCH) as emulator, at(emulator) as d:
         path = emulator.control_path
         for args, why in (
-            ({"control": str(path)}, "another process listens there"),
+            ({"control": str(path)}, "expected a free path, got one that another process uses"),
             ({"control": str(tmp_path / "c"), "can": "carrier"}, '--can: expected .*, got "carrier"'),
             ({"control": str(tmp_path / "no" / "c")}, "No such file"),
         ):

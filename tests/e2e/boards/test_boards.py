@@ -107,7 +107,7 @@ def test_settings_that_a_board_has_not_are_refused(tmp_path: Path) -> None:
         path.write_text(f"units:\n  - board: {board}\n    adc_chain: exact\n")
         done = psa_emu(path, "--dump")
         assert done.returncode == 2
-        assert "units.a.adc_chain: not a setting of a " in one_line(done.stderr, "psa-emu")
+        assert "units.a.adc_chain: expected a key of a " in one_line(done.stderr, "psa-emu")
         assert ":3:16:" in done.stderr
         path.write_text(f"units:\n  - board: {board}\n    profile: article\n")
         done = psa_emu(path, "--dump")
@@ -223,8 +223,8 @@ def test_the_line_port_samples_the_lines_of_the_board(board: str, tmp_path: Path
 
 def test_a_bus_port_is_refused_where_there_is_no_bus(tmp_path: Path) -> None:
     for args, says in (
-        (("-",), "--bus-port -: no unit of the scenario has a parallel bus"),
-        (("psa2:-",), "--bus-port psa2:-: unit psa2 is a PSA-2, which has no parallel bus"),
+        (("-",), "--bus-port -: expected a scenario with a unit that has a parallel bus"),
+        (("psa2:-",), "--bus-port psa2:-: expected a unit with a parallel bus, got psa2, a PSA-2"),
         (("b:-",), '--bus-port b:-: expected a unit of the scenario, got "b"'),
         (("psa2:",), "--bus-port: expected [UNIT:]LINK"),
     ):
@@ -235,7 +235,7 @@ def test_a_bus_port_is_refused_where_there_is_no_bus(tmp_path: Path) -> None:
     assert boards, "no board has a bus"
     done = psa_emu(scenario(tmp_path, boards[0]), "--bus-port", "-", "--bus-port", f"{boards[0]}:-", "--can", "none")
     assert done.returncode == 2
-    assert f"unit {boards[0]} has a bus port already" in one_line(done.stderr, "psa-emu")
+    assert f"expected one bus port per unit, got a second for {boards[0]}" in one_line(done.stderr, "psa-emu")
 
 
 def talk(port: BusPort, control: Control) -> int:

@@ -121,7 +121,7 @@ def test_recordings_of_other_boards_are_counted_and_decoded(tmp_path: Path) -> N
         assert len(rows) == reader.counters.frames >= least
         assert set(rows[0]) > {"t_rx_s", "t_sample_s", kind.layout.counter, *(f"{axis}_{unit}" for axis in "XYZ")}
         assert all(("." in row[f"X_{unit}"]) == (unit == "V") for row in rows), "codes and counts are whole numbers"
-    with pytest.raises(BadInput, match=r"no frame of node 9; nodes with frames: .*6"):
+    with pytest.raises(BadInput, match=r"expected frames of node 9, got none; nodes with frames: .*6"):
         decode_can(log, 9, io.StringIO(), "psd1")
 
 

@@ -260,10 +260,10 @@ units:
             "site: {latitude_deg: 50}\nplatform: {}\nunits: [{board: gyro}, {board: gyro}]",
             "expected one gyro unit on the platform",
         ),
-        ("units: [{level: b}]", "level: not a setting of a PSA-2"),
+        ("units: [{level: b}]", "level: expected a key of a PSA-2"),
         (
             "site: {latitude_deg: 50}\nplatform: {}\nunits: [{board: gyro, axes: {}}]",
-            "axes: not a setting of a Gyro unit",
+            "axes: expected a key of a Gyro unit",
         ),
         ("platform: {gm_tau_s: 0}\nunits: [{}]", "platform.gm_tau_s: expected "),
         (

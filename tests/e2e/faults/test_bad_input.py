@@ -26,7 +26,7 @@ UNIT = "units: [{name: a, node: 5, axes: {x: {sensor: mems}}}]\n"
     [
         ("not YAML", "units: [", "{file}:2:1: not YAML"),
         ("empty", "", "{file}:1:1: expected a mapping `key: value`, got an empty file"),
-        ("bytes", "\x00\x01\x7f", "{file}:1:1: not YAML: a NUL byte"),
+        ("bytes", "\x00\x01\x7f", "{file}:1:1: expected YAML, got a NUL byte"),
         ("a list", "- 1\n- 2\n", "{file}:1:1: expected a mapping"),
         ("no units", "seed: 1\n", "units: expected at least one unit"),
         (
@@ -34,7 +34,7 @@ UNIT = "units: [{name: a, node: 5, axes: {x: {sensor: mems}}}]\n"
             UNIT + "sead: 1\n",
             "{file}:2:1: sead: unknown key, nearest: seed; expected one of version, seed",
         ),
-        ("twice", "seed: 1\nseed: 2\n" + UNIT, "{file}:2:1: seed: given twice"),
+        ("twice", "seed: 1\nseed: 2\n" + UNIT, "{file}:2:1: seed: expected the key once"),
         (
             "word for a number",
             "bus: {bitrate_hz: fast}\n" + UNIT,
@@ -81,7 +81,12 @@ def test_a_malformed_scenario_is_refused_with_file_and_line(tmp_path: Path, what
 @pytest.mark.parametrize(
     ("what", "was", "now", "says"),
     [
-        ("too fast a line", "line_hz: 2000000 ", "line_hz: 3000000 ", "< 74 us: use lead_in_clk"),
+        (
+            "too fast a line",
+            "line_hz: 2000000 ",
+            "line_hz: 3000000 ",
+            "INT low: expected 74 us or more (lead_in_clk >= ",
+        ),
         ("word width", "word_bits: 32 ", "word_bits: 20 ", "word_bits"),
         ("unknown word", "[X, Y, Z, T]", "[X, Y, Z, Q]", "Q"),
         ("set-up by an unknown line", "DRD_A write_A", "DRD_B write_A", "DRD_B"),
@@ -118,7 +123,7 @@ def test_a_malformed_profile_is_refused_with_the_arithmetic(
         ("--can socketcan:none0", 3, "--can socketcan:none0: "),
         ("--can x=slcan", 2, '--can BUS=...: expected one of can0, got "x"'),
         ("--scpi oven", 2, '--scpi: expected head, table, chamber, supply or all, got "oven"'),
-        ("quiet --scpi table", 2, "--scpi table: the scenario has no table"),
+        ("quiet --scpi table", 2, "--scpi table: expected a scenario with a table"),
         ("--pace fast", 2, '--pace: expected wall, step or free, got "fast"'),
         ("--pace step", 2, "expected --control PATH"),
         ("--for soon", 2, "expected a time such as"),
@@ -130,11 +135,11 @@ def test_a_malformed_profile_is_refused_with_the_arithmetic(
         ("--vcd {dir}/no/such.vcd", 3, "No such file or directory"),
         ("--vcd {dir}", 3, "Is a directory"),
         ("--line {file}", 3, "expected a new name or a symbolic link to a pty"),
-        ("--unit q", 2, "no unit of that name"),
+        ("--unit q", 2, '--unit: expected a unit of the scenario, got "q"'),
         ("--control {file}", 3, "expected a new path or a socket, got another file"),
         ("--control {long}", 3, "up to 107 bytes"),
         ("--truth {dir}/no/such", 3, "No such file or directory"),
-        ("--frobnicate", 2, "--frobnicate: unknown option"),
+        ("--frobnicate", 2, "expected an option that --help lists, got --frobnicate"),
         ("--vcd", 2, "--vcd: expected an argument, got none"),
         ("no-such-scenario", 2, "no-such-scenario"),
         ("quiet stream", 2, "SCENARIO: expected one, got quiet and stream"),
@@ -162,11 +167,11 @@ def test_an_occupied_port_and_an_occupied_control_socket_are_refused(tmp_path: P
         port = emulator.endpoints[0]["port"]
         done = psa_emu(BENCH, "--can", f"socketcand:{port}")
         assert done.returncode == 3
-        assert f"socketcand:{port}: the port is in use on 127.0.0.1" in one_line(done.stderr, "psa-emu")
+        assert f"socketcand:{port}: expected a free port of 127.0.0.1" in one_line(done.stderr, "psa-emu")
         assert emulator.control_path is not None
         done = psa_emu(BENCH, "--can", "none", "--control", emulator.control_path)
         assert done.returncode == 3
-        assert "another process listens there" in one_line(done.stderr, "psa-emu")
+        assert "expected a free path, got one that another process uses" in one_line(done.stderr, "psa-emu")
         with Control(emulator.control_path) as control:  # the first one lost nothing by it
             assert control.call("time").result["pace"] == "step"
 
@@ -175,7 +180,9 @@ def test_an_occupied_port_and_an_occupied_control_socket_are_refused(tmp_path: P
 def test_an_interface_that_is_not_there_is_refused_with_the_command_that_makes_it() -> None:
     done = psa_emu(BENCH, "--can", "socketcan:none0")
     assert done.returncode == 3
-    assert "no such interface; as root: ip link add none0 type vcan" in one_line(done.stderr, "psa-emu")
+    assert "expected a CAN interface, got none; as root: ip link add none0 type vcan" in one_line(
+        done.stderr, "psa-emu"
+    )
 
 
 @pytest.mark.vcan
@@ -211,9 +218,9 @@ def test_a_full_disk_ends_the_trace_and_not_the_run(for_time: str) -> None:
         (
             "run frobnicate",
             2,
-            "no such procedure; turns, fourier, reversal, all, compare-converters, gyrocompass, heading-hold or script",
+            "run: expected turns, fourier, reversal, all, compare-converters, gyrocompass, heading-hold or script",
         ),
-        ("run fourier --can socketcand:127.0.0.1:{port}", 2, "--head is missing: the VISA address"),
+        ("run fourier --can socketcand:127.0.0.1:{port}", 2, "--head: expected the VISA address"),
         ("run fourier --positions 1 --condition quiet --out {dir}", 2, "fourier: "),
         ("run fourier --scenario {dir}/no.yaml --out {dir}", 2, "no.yaml: no such file"),
         (
@@ -228,10 +235,14 @@ def test_a_full_disk_ends_the_trace_and_not_the_run(for_time: str) -> None:
         ("record --can frobnicate:x {dir}/x.log", 2, "frobnicate"),
         ("record --can socketcan:none0 {dir}/x.log", 3, "none0"),
         ("record --can slcan:{dir}/none {dir}/x.log", 3, "none"),
-        ("record --can socketcand:127.0.0.1:{port} {dir}/x.xyz", 2, "ending .xyz; python-can writes"),
+        (
+            "record --can socketcand:127.0.0.1:{port} {dir}/x.xyz",
+            2,
+            "expected an ending of .asc .blf .csv .db .log .mf4 .trc .txt, got .xyz",
+        ),
         ("record --can socketcand:127.0.0.1:{port} {dir}/no/x.log", 2, "No such file or directory"),
         ("decode {dir}/no.log", 2, "no.log: no such file"),
-        ("decode {file}", 2, "the 0 before it are decoded"),
+        ("decode {file}", 2, "the 0 messages before it are decoded"),
     ],
 )
 def test_a_command_that_cannot_be_carried_out_is_refused_in_one_line(
@@ -270,7 +281,7 @@ def test_what_is_no_socketcand_server_is_told_and_not_waited_for() -> None:
             finally:
                 command.kill()
     assert command.returncode == 3
-    assert "is no socketcand server" in one_line(err, "psabench")
+    assert "expected a socketcand server" in one_line(err, "psabench")
 
 
 @HOST

@@ -37,9 +37,9 @@ def test_seven_units_one_motion(tmp_path: Path, capsys: pytest.CaptureFixture[st
 def test_another_bench_is_bad_input(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["run", "compare-converters", "--scenario", "nowhere.yaml", "--out", str(tmp_path)]) == 2
     assert cli.main(["run", "compare-converters", "--scenario", "quiet", "--out", str(tmp_path)]) == 2
-    assert "no unit pik, pik5, pik6, pmka, psd1, psa1, psa2 of" in capsys.readouterr().err
+    assert "expected units pik, pik5, pik6, pmka, psd1, psa1, psa2 as in converters.yaml" in capsys.readouterr().err
     other = tmp_path / "other.yaml"
     text = (ROOT / "proto/scenarios/converters.yaml").read_text(encoding="utf-8")
     other.write_text(text.replace("board: pik5\n", "board: psa2\n"), encoding="utf-8")
     assert cli.main(["run", "compare-converters", "--scenario", str(other), "--out", str(tmp_path)]) == 2
-    assert "no unit pik5 of the board of that name" in capsys.readouterr().err
+    assert "expected units pik5 as in converters.yaml" in capsys.readouterr().err

@@ -159,10 +159,10 @@ def test_rom_words() -> None:
 @pytest.mark.parametrize(
     ("change", "says"),
     [
-        (lambda w: [2, *w[1:]], "layout 2: expected layout 1"),
-        (lambda w: [], "layout none"),
-        (lambda w: w[:-1], "42 words: expected 43"),
-        (lambda w: [*w[:20], w[20] ^ 0x40, *w[21:]], "damaged"),
+        (lambda w: [2, *w[1:]], "expected layout 1, got 2"),
+        (lambda w: [], "expected layout 1, got none"),
+        (lambda w: w[:-1], "expected 43 words for 3 points, got 42"),
+        (lambda w: [*w[:20], w[20] ^ 0x40, *w[21:]], "expected words with the sum 0"),
     ],
 )
 def test_a_rom_that_is_none(change: object, says: str) -> None:
@@ -172,12 +172,12 @@ def test_a_rom_that_is_none(change: object, says: str) -> None:
 
 def test_what_is_lost_is_not_made_up() -> None:
     c = columns(waves(60))
-    with pytest.raises(ValueError, match="1 gaps in the readings, the first after SEQ 29"):
+    with pytest.raises(ValueError, match="expected every reading once, got 1 gaps, the first after SEQ 29"):
         est.periods_of({k: np.delete(v, 30) for k, v in c.items()})
     for flag in ("SATURATED", "CLIPPED"):
         bad = c[flag].copy()
         bad[17] = 4.0
-        with pytest.raises(ValueError, match=f"{flag} in 1 readings, the first with SEQ 17"):
+        with pytest.raises(ValueError, match=f"{flag}: expected 0 in all readings, got 1 in 1, the first with SEQ 17"):
             est.periods_of(c | {flag: bad})
     wrapped = c | {"SEQ": (c["SEQ"] + 65500) % 65536}
     assert len(est.periods_of(wrapped)) == 60
@@ -186,10 +186,10 @@ def test_what_is_lost_is_not_made_up() -> None:
 def test_without_calibration_there_is_no_answer() -> None:
     p = est.periods_of(columns(waves(2100)))
     nothing = replace(p, cal=np.zeros_like(p.cal))
-    with pytest.raises(ValueError, match="resets of integrator Y have not been calibrated"):
+    with pytest.raises(ValueError, match="integrator Y: expected a run of both signs"):
         est.calibrate(nothing, 1)
     no_zero = replace(p, cal=np.where(p.cal == est.CAL_ZERO, 0, p.cal))
-    with pytest.raises(ValueError, match="zero of integrator K has not been calibrated"):
+    with pytest.raises(ValueError, match="integrator K: expected a run at rest"):
         est.calibrate(no_zero, 3)
 
 

@@ -40,7 +40,7 @@ def test_positions_are_written_with_their_count() -> None:
     assert [(at[0], at[1]) for at in node.wrote] == [(0x2103, 1), (0x2103, 2), (0x2103, 3), (0x2102, 1)]
     assert [real32(w[2]) for w in node.wrote[:3]] == [0.0, 180.0, 90.0]
     for angles in ((), tuple(range(33))):
-        with pytest.raises(BadInput, match=f"{len(angles)} positions; the unit has room for 1 to 32"):
+        with pytest.raises(BadInput, match=f"positions: expected 1 to 32 positions, got {len(angles)}"):
             gyro.positions_deg = angles
 
 

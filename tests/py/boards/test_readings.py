@@ -160,6 +160,6 @@ def test_the_first_of_many_and_a_column_that_is_not_there() -> None:
     taken = reader.take().head(2)
     assert len(taken) == 2
     assert np.array_equal(taken["SEQ"], [0, 1])
-    with pytest.raises(KeyError, match="a reading has X, Y"):
+    with pytest.raises(KeyError, match="expected X, Y"):
         taken["W"]
     assert len(reader.take()) == 0

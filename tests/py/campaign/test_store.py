@@ -124,11 +124,11 @@ def test_parts_may_overlap(tmp_path: Path) -> None:
 def test_missing_and_damaged_runs_are_refused(tmp_path: Path) -> None:
     with Store(tmp_path / "s") as store:
         store.put([part(0, 10), part(20, 10)])
-        with pytest.raises(BadInput, match="10 runs of 30"):
+        with pytest.raises(BadInput, match="expected 30 runs, got 10"):
             store.rows(ORIGIN, 30)
         with sqlite3.connect(tmp_path / "s") as db:
             db.execute("UPDATE part SET data = CAST(substr(data, 1, 79) || x'FF' AS BLOB) WHERE first_run = 0")
-        with pytest.raises(BadInput, match="runs 0 to 9 of dice are damaged"):
+        with pytest.raises(BadInput, match="expected runs 0 to 9 of dice, got damage"):
             store.rows(ORIGIN, 10)
 
 
@@ -139,7 +139,7 @@ def test_what_is_not_finite_is_no_input() -> None:
 
 def test_rows_that_do_not_fit_the_columns_change_nothing(tmp_path: Path) -> None:
     with Store(tmp_path / "s") as store:
-        with pytest.raises(ValueError, match="for 2 columns"):
+        with pytest.raises(ValueError, match="expected rows of 2 columns"):
             store.put([part(0, 3), replace(part(3, 3), rows=np.zeros((3, 1), np.float32))])
         assert store.runs(ORIGIN) == {}
         assert store.origins() == []
@@ -163,10 +163,10 @@ def _newer(path: Path) -> None:
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (_text, "not a store of results"),
+        (_text, "expected a store of results"),
         (_foreign, "an SQLite file of another program"),
-        (_newer, f"a store of format {FORMAT + 1}; this psabench reads format {FORMAT}"),
-        (Path.mkdir, "cannot be opened"),
+        (_newer, f"expected a store of format {FORMAT}, got format {FORMAT + 1}"),
+        (Path.mkdir, "expected a store of results .SQLite."),
     ],
 )
 def test_a_file_that_is_no_store_is_refused_and_left_alone(tmp_path: Path, make: object, words: str) -> None:

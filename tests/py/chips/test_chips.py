@@ -123,25 +123,27 @@ def fake_library(path: Path, source: str) -> str:
 
 def test_a_library_of_another_abi_is_refused(tmp_path: Path) -> None:
     path = fake_library(tmp_path / "other.so", "int psabench_abi(void) { return 99; }")
-    with pytest.raises(BadInput, match=rf"^{path}: speaks ABI 99, this psabench speaks 0; PSABENCH_LIB names another$"):
+    with pytest.raises(BadInput, match=rf"^{path}: expected ABI 0 \(PSABENCH_LIB names another library\), got 99$"):
         clib.Library(path)
 
 
 def test_a_library_that_lacks_a_function_is_refused(tmp_path: Path) -> None:
     path = fake_library(tmp_path / "old.so", "int psabench_abi(void) { return 0; } int psabench_version(void);")
-    with pytest.raises(BadInput, match=r"older than this psabench .*psabench_version"):
+    with pytest.raises(BadInput, match=r"expected a library of this version .*psabench_version"):
         clib.Library(path)
 
 
 def test_the_environment_names_one_library_and_no_other(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("PSABENCH_LIB", "/nowhere/libpsabench.so.0")
     monkeypatch.setattr(places, "CHECKOUT", tmp_path)  # nor is one there
-    with pytest.raises(BadInput, match=r"not found at PSABENCH_LIB=/nowhere/libpsabench.so.0; `make` builds it"):
+    with pytest.raises(
+        BadInput, match=r"expected a file at PSABENCH_LIB=/nowhere/libpsabench.so.0 \(make builds it\), got none"
+    ):
         clib.library.__wrapped__()
     text = tmp_path / "text"
     text.write_text("not a library")
     monkeypatch.setenv("PSABENCH_LIB", str(text))
-    with pytest.raises(BadInput, match=r"text: not a library that can be loaded"):
+    with pytest.raises(BadInput, match=r"text: expected a shared library"):
         clib.library.__wrapped__()
 
 
@@ -187,7 +189,7 @@ def test_numbers_that_c_would_cut_are_refused(adc: Part, number: int) -> None:
         "value": lambda: adc.board_write(0, 0, number),
     }
     for what, call in calls.items():
-        with pytest.raises(BadInput, match=rf"^{what} {number!r}: must be a whole number, 0 to "):
+        with pytest.raises(BadInput, match=rf"^{what}: expected a whole number, 0 to .*, got {number!r}$"):
             call()
 
 
@@ -262,7 +264,7 @@ def test_what_does_not_happen_in_time_is_a_timeout(adc: Part, monkeypatch: pytes
     monkeypatch.setattr(chips, "SLICE_NS", 1_000)
     adc.pins["RESET"].set(0)  # no conversions any more
     began_ns = adc.bench.now_ns
-    with pytest.raises(TimeOut, match=r"^adc: DRDY is not 0 after 1e-05 s$"):
+    with pytest.raises(TimeOut, match=r"^adc: DRDY: expected 0 within 1e-05 s, got no change$"):
         adc.run_until_level("DRDY", 0, timeout_s=1e-5)
     assert adc.bench.now_ns == began_ns + 10_000
 
@@ -336,7 +338,7 @@ def test_what_a_callback_raises_comes_out_of_the_call_once(adc: Part) -> None:
 
 def test_a_callback_cannot_move_time(adc: Part) -> None:
     adc.pins["DRDY"].watch(lambda level, t_ns: adc.bench.run_for(1e-6))
-    with pytest.raises(BadInput, match=r"from a callback: time moves only between callbacks"):
+    with pytest.raises(BadInput, match=r"expected a call outside callbacks, where time may advance"):
         adc.bench.run_for(1e-3)
 
 
@@ -393,15 +395,15 @@ def test_pins_know_their_direction_and_level(bench: Bench, part: str) -> None:
 def test_mistakes_are_told_in_one_line(bench: Bench, adc: Part) -> None:
     mistakes: dict[str, Callable[[], object]] = {
         "ads1299": lambda: bench.part("ads1299"),
-        "ads1299: no such part": lambda: chips.options("ads1299"),
-        "no option vref": lambda: bench.part("ads1256", name="b", vref=2.5),
+        "part: expected ads1281, .*, got ads1299": lambda: chips.options("ads1299"),
+        "option of ads1256: expected one of .*, got vref": lambda: bench.part("ads1256", name="b", vref=2.5),
         "adc": lambda: bench.part("ads1256", name="adc"),
-        "adc: no pin DRYD; there are .*DRDY": lambda: adc.pins["DRYD"],
+        "pin of adc: expected .*DRDY.*, got DRYD": lambda: adc.pins["DRYD"],
         "input": lambda: adc.set_volts(9, 1.0),
         "2": lambda: adc.pins["CS"].set(2),
         "frames|board": lambda: adc.board_read(0, 0),
         "SPI": lambda: bench.part("psa2").spi(b"\0"),
-        "SClk is known when its burst is over": lambda: bench.part("psa2", name="c").pins["SClk"].level,
+        "SClk: the level is known only after the burst": lambda: bench.part("psa2", name="c").pins["SClk"].level,
     }
     for says, mistake in mistakes.items():
         with pytest.raises(BadInput, match=says) as caught:
@@ -460,7 +462,7 @@ def test_a_closed_bench_says_so(adc: Part) -> None:
         lambda: adc.peek(0),
         lambda: adc.counters,
     ):
-        with pytest.raises(BenchError, match="the bench is closed"):
+        with pytest.raises(BenchError, match="bench: closed"):
             use()
 
 

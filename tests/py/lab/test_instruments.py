@@ -152,7 +152,7 @@ def test_a_face_is_a_word() -> None:
 def test_what_does_not_come_to_rest_is_told() -> None:
     with instrument("table", {"AXIS1:REST?": "0"}) as (table, _, waits):
         assert isinstance(table, Table)
-        with pytest.raises(TimeOut, match=r"table: rest of axis 1 not reached in 0\.5 s"):
+        with pytest.raises(TimeOut, match=r"table: rest of axis 1 not reached within 0\.5 s"):
             table.wait_rest(limit_s=0.5)
     assert sum(waits) == pytest.approx(0.5)
 
@@ -186,7 +186,7 @@ def test_a_refusal_has_number_and_text_and_empties_the_queue() -> None:
 def test_a_profile_needs_as_many_times_as_rates() -> None:
     with instrument("table", {}) as (table, wire, _):
         assert isinstance(table, Table)
-        with pytest.raises(ValueError, match="2 times and 1 rates"):
+        with pytest.raises(ValueError, match="expected as many times as rates, got 2 and 1"):
             table.profile([0.0, 1.0], [1.0])
     assert wire.told == []
 
@@ -205,14 +205,14 @@ def test_a_mute_instrument_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(instruments, "REPLY_S", 0.2)
     with (
         instrument("supply", {"SYST:ERR?": None}) as (supply, _, _),
-        pytest.raises(TimeOut, match=r"supply at TCPIP::.*: VOLT 5.0: no answer in 0.2 s"),
+        pytest.raises(TimeOut, match=r"supply at TCPIP::.*: VOLT 5.0: no answer within 0.2 s"),
     ):
         supply.write("VOLT 5.0")
 
 
 @pytest.mark.parametrize(
     ("answers", "says"),
-    [({"VOLT?": "lots"}, "numbers were expected"), ({"SYST:ERR?": "fine"}, "a number and a text were expected")],
+    [({"VOLT?": "lots"}, "expected numbers"), ({"SYST:ERR?": "fine"}, "expected a number and a text")],
 )
 def test_an_answer_that_makes_no_sense_is_a_broken_link(answers: Answers, says: str) -> None:
     with instrument("supply", answers) as (supply, _, _), pytest.raises(LinkError, match=says):
@@ -228,7 +228,7 @@ def test_an_instrument_that_is_not_there_is_told_at_once() -> None:
 
 @pytest.mark.parametrize("address", ["", "localhost:5025", "TCPIP::127.0.0.1::x::SOCKET", "FOO::1::INSTR"])
 def test_what_is_no_address_is_bad_input(address: str) -> None:
-    with pytest.raises(BadInput, match=r"expected a VISA address: TCPIP::127\.0\.0\.1::5025::SOCKET"):
+    with pytest.raises(BadInput, match=r"expected a VISA address as TCPIP::127\.0\.0\.1::5025::SOCKET"):
         open_instrument("head", address, Head, lambda _: None)
 
 

@@ -108,7 +108,7 @@ def test_what_is_no_answer_is_a_broken_link(line: str) -> None:
 def test_a_line_without_an_end_is_no_bus_port() -> None:
     with port(lambda _: "x" * 3000) as (p, _):
         p.ask("R 0\nR 1\nR 2")
-        with pytest.raises(LinkError, match="without an end of line"):
+        with pytest.raises(LinkError, match="expected an end of line"):
             p.answer()
 
 
@@ -144,14 +144,14 @@ def test_a_path_that_is_not_there_is_a_broken_link() -> None:
 
 
 def test_a_word_that_has_no_place_is_a_bad_argument() -> None:
-    with port(lambda _: "") as (p, board), pytest.raises(ValueError, match="16 bits"):
+    with port(lambda _: "") as (p, board), pytest.raises(ValueError, match="expected a 16-bit word"):
         p.write(0, 0x10000)
     assert board.lines == []
 
 
 def test_an_answer_to_another_question_is_a_broken_link() -> None:
-    with port(lambda _: "I psd1 0=X t=7\n") as (p, _), pytest.raises(LinkError, match="should be"):
+    with port(lambda _: "I psd1 0=X t=7\n") as (p, _), pytest.raises(LinkError, match="expected an answer to 'R 0'"):
         p.read(0)
-    with port(lambda _: "R 0 0000 t=7\n") as (p, _), pytest.raises(LinkError, match="who it is"):
+    with port(lambda _: "R 0 0000 t=7\n") as (p, _), pytest.raises(LinkError, match="expected the board's name"):
         p.who()
     assert isinstance(parse("I psd1 t=7"), Who)

@@ -60,7 +60,7 @@ def test_signals_are_cut_out_with_their_signs() -> None:
     ("text", "reason"),
     [
         (b"(0000000001.000001) can0 189#00112233445566", "cut short"),
-        (b"(0000000001.000001) can0 189#0011223344556z77\n", "other letters"),
+        (b"(0000000001.000001) can0 189#0011223344556z77\n", "expected hexadecimal digits"),
     ],
 )
 def test_a_damaged_log_is_refused(text: bytes, reason: str) -> None:

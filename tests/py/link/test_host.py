@@ -108,11 +108,11 @@ def test_a_refusal_carries_code_and_text(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("reply", "says"),
     [
-        (b"", "closed it during time"),
-        (b'{"id": 99, "ok": true}\n', "reply to request 99, expected 1"),
-        (b"nonsense\n", "time: what came back is no reply"),
-        (b"[]\n", "time: what came back is no reply"),
-        (b'{"id": 1, "ok": true}\n', "time: what came back is no reply"),
+        (b"", "time: connection closed by the emulator"),
+        (b'{"id": 99, "ok": true}\n', "expected the reply to request 1, got 99"),
+        (b"nonsense\n", "time: expected a reply"),
+        (b"[]\n", "time: expected a reply"),
+        (b'{"id": 1, "ok": true}\n', "time: expected a reply"),
     ],
 )
 def test_what_is_no_reply_is_a_broken_link(tmp_path: Path, reply: bytes, says: str) -> None:
@@ -132,7 +132,7 @@ def test_what_was_subscribed_stands_between_replies_and_waits(tmp_path: Path) ->
         assert [e["t_ns"] for e in port.events] == [1]
         assert port.next_event(10.0) == {"event": "DRD_A", "unit": "a", "t_ns": 1}
         assert port.next_event(0.01) is None  # half a line has come
-        with pytest.raises(LinkError, match="closed it during time"):
+        with pytest.raises(LinkError, match="time: connection closed by the emulator"):
             port.call("time")  # the other half, and the end
         assert len(port.events) == 1
 
@@ -190,7 +190,7 @@ def test_a_step_whose_frames_do_not_come_is_a_broken_link(tmp_path: Path, monkey
     with (
         control(tmp_path, *replies) as (port, _),
         CanHost(FakeBus([frame(1)]), StepClock(port)) as host,
-        pytest.raises(LinkError, match="2 frames that the emulator has sent did not arrive"),
+        pytest.raises(LinkError, match="2 frames sent by the emulator did not arrive"),
     ):
         host.advance(0.001)
 
@@ -336,7 +336,7 @@ def listener(*say: bytes) -> Iterator[int]:
 
 @pytest.mark.parametrize("words", [b"220 mail ready\r\n", b"", b"< hi ><"])
 def test_what_is_no_socketcand_server_is_refused_at_once(words: bytes) -> None:
-    with listener(words) as port, pytest.raises(LinkError, match="is no socketcand server"):
+    with listener(words) as port, pytest.raises(LinkError, match="expected a socketcand server"):
         open_bus(f"socketcand:127.0.0.1:{port}")
 
 
@@ -354,7 +354,8 @@ def test_a_server_that_says_nothing_is_given_up(monkeypatch: pytest.MonkeyPatch)
 
 
 @pytest.mark.parametrize(
-    ("how", "says"), [("close", "the connection was closed"), ("reset", r"^CAN: Connection reset by peer; [^\n]*$")]
+    ("how", "says"),
+    [("close", "connection closed by the emulator"), ("reset", r"^CAN: Connection reset by peer; [^\n]*$")],
 )
 def test_a_server_that_leaves_is_noticed_after_its_last_frame(how: str, says: str) -> None:
     """python-can's own client takes the end of a connection for silence."""
@@ -448,5 +449,5 @@ def test_one_that_does_not_listen_to_a_request_is_ended_by_force(
 
 def test_an_emulator_that_was_named_and_is_not_there_is_bad_input(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PSA_EMU", "/nowhere/psa-emu")
-    with pytest.raises(BadInput, match=r"not found at PSA_EMU=/nowhere/psa-emu; `make` builds it"):
+    with pytest.raises(BadInput, match=r"expected a file at PSA_EMU=/nowhere/psa-emu \(make builds it\), got none"):
         find_emulator()

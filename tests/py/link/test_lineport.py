@@ -251,7 +251,7 @@ def test_a_stream_is_read_to_its_end() -> None:
     [
         ({"word_bits": 12}, "16, 24 or 32"),
         ({"sample_hz": 0.0}, "positive"),
-        ({"tolerance_s": 0.5e-3}, "half of period_s"),
+        ({"tolerance_s": 0.5e-3}, "expected less than period_s"),
     ],
 )
 def test_a_format_that_cannot_be_is_refused(kw: dict[str, float], says: str) -> None:

@@ -51,10 +51,25 @@ def test_drift_column_takes_a_linear_drift_out_whole() -> None:
 @pytest.mark.parametrize(
     ("alpha_rad", "u_v", "t_s", "why"),
     [
-        (np.radians(np.arange(5) * 72.0), np.zeros(5), None, "5 readings for 5 unknowns"),
-        (np.radians(np.arange(6) * 60.0), np.zeros(6), np.arange(6.0), "6 readings for 6 unknowns"),
-        (np.zeros(20), np.zeros(20), None, "do not separate"),
-        (np.radians(np.arange(20) * 90.0), np.zeros(20), None, "do not separate"),  # sin 2a is 0 at all
+        (
+            np.radians(np.arange(5) * 72.0),
+            np.zeros(5),
+            None,
+            "expected at least 6 readings for 5 unknowns and a residual, got 5",
+        ),
+        (
+            np.radians(np.arange(6) * 60.0),
+            np.zeros(6),
+            np.arange(6.0),
+            "expected at least 7 readings for 6 unknowns and a residual, got 6",
+        ),
+        (np.zeros(20), np.zeros(20), None, "expected angles that separate the harmonics"),
+        (
+            np.radians(np.arange(20) * 90.0),
+            np.zeros(20),
+            None,
+            "expected angles that separate the harmonics",
+        ),  # sin 2a is 0 at all
         (TURN_RAD, np.full(80, np.nan), None, "finite"),
         (TURN_RAD, np.zeros(80), np.zeros(80), "different times"),
     ],

@@ -96,7 +96,7 @@ def test_navigation_does_not_begin_on_a_platform_with_a_fault() -> None:
             return replace(super().look(), faults=("the level sensors are silent",))
 
     bench = Faulty()
-    with pytest.raises(LinkError, match="navigation cannot begin: the level sensors are silent"):
+    with pytest.raises(LinkError, match="navigation did not begin: the level sensors are silent"):
         held(bench, HoldParams())
 
 
@@ -152,9 +152,9 @@ def _turned(look: Look, by_rad: float) -> Look:
     ("given", "why"),
     [
         ({"compensate": "all"}, "torquer, axis1, none"),
-        ({"look_s": 0.0}, "between 0 and hours"),
-        ({"hours": 0.01}, "between 0 and hours"),
-        ({"speed_kmh": -1.0}, "not be negative"),
+        ({"look_s": 0.0}, "expected 0 to hours"),
+        ({"hours": 0.01}, "expected 0 to hours"),
+        ({"speed_kmh": -1.0}, "expected 0 or more"),
     ],
 )
 def test_params(given: dict[str, object], why: str) -> None:

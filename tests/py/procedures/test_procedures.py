@@ -294,9 +294,18 @@ def test_a_file_that_is_not_a_recording_is_refused_with_its_line(tmp_path: Path,
 @pytest.mark.parametrize(
     ("estimate", "why"),
     [
-        (lambda r: estimate_fourier(r, FourierParams(), 9.81), "face direct: 5 readings for 6 unknowns"),
-        (lambda r: estimate_reversal(r, ReversalParams(), 9.81), "face direct: 5 readings for 6 unknowns"),
-        (lambda r: estimate_turns(r, TurnsParams(), 9.81), "0 complete realisations of the x pair"),
+        (
+            lambda r: estimate_fourier(r, FourierParams(), 9.81),
+            "face direct: expected at least 7 readings for 6 unknowns and a residual, got 5",
+        ),
+        (
+            lambda r: estimate_reversal(r, ReversalParams(), 9.81),
+            "face direct: expected at least 7 readings for 6 unknowns and a residual, got 5",
+        ),
+        (
+            lambda r: estimate_turns(r, TurnsParams(), 9.81),
+            "expected at least 2 complete realisations of the x pair, got 0",
+        ),
     ],
 )
 def test_too_few_readings_are_refused_with_the_count(estimate: Callable[[list[Reading]], object], why: str) -> None:
@@ -329,13 +338,13 @@ def test_progress_counts_every_position_of_every_face() -> None:
 @pytest.mark.parametrize(
     ("make", "why"),
     [
-        (lambda: FourierParams(axis="w"), "axis is 'w'; it must be x, y or z"),
-        (lambda: FourierParams(positions=3), "positions is 3; it must be at least 6"),
-        (lambda: FourierParams(step_deg=0.0), "step_deg is 0.0"),
-        (lambda: FourierParams(dwell_s=-1.0), "dwell_s is -1.0"),
-        (lambda: ReversalParams(realisations=0), "realisations is 0"),
+        (lambda: FourierParams(axis="w"), "axis: expected x, y or z, got 'w'"),
+        (lambda: FourierParams(positions=3), "positions: expected at least 6, got 3"),
+        (lambda: FourierParams(step_deg=0.0), "step_deg: expected 0 to 180 deg, either way, got 0.0"),
+        (lambda: FourierParams(dwell_s=-1.0), "dwell_s: expected 0 or more, got -1.0"),
+        (lambda: ReversalParams(realisations=0), "realisations: expected at least 1, got 0"),
         (lambda: TurnsParams(realisations=1), "at least 2"),
-        (lambda: TurnsParams(search_deg=45.0), "0..10 deg"),
+        (lambda: TurnsParams(search_deg=45.0), "search_deg: expected 0 to 10 deg"),
     ],
 )
 def test_parameters_out_of_range_are_refused_with_the_range(make: Callable[[], object], why: str) -> None:

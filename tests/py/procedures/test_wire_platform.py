@@ -118,7 +118,7 @@ def test_no_frame_at_all_is_a_failure() -> None:
     tape.add(*streams(0, 40, window, frozenset(range(3 * 40))))
     span = tape.window()
     assert span is not None
-    with pytest.raises(LinkError, match="no frame of the level unit"):
+    with pytest.raises(LinkError, match="expected frames of the level unit"):
         tape.means(span)
 
 

@@ -194,7 +194,7 @@ def test_as_printed_keeps_the_decimals_of_the_article(value: float, printed: str
 
 
 def test_truth_without_its_main_names_is_refused_with_what_it_has() -> None:
-    with pytest.raises(ValueError, match=r"no kx_v_per_g; it has alpha0_deg, u0_v"):
+    with pytest.raises(ValueError, match=r"expected truth with kx_v_per_g, got alpha0_deg, u0_v"):
         sensor_of({"u0_v": 1.0, "alpha0_deg": 0.0})
 
 

@@ -23,31 +23,43 @@ from tests.py.link.test_lineport import lines
 MISTAKES: list[tuple[str, str]] = [
     (
         "run",
-        "run: which procedure? turns, fourier, reversal, all, compare-converters, gyrocompass, heading-hold or script",
+        "run: expected turns, fourier, reversal, all, compare-converters, gyrocompass, heading-hold or script (",
     ),
-    ("run --out turns", "run: which procedure? turns"),
-    ("run spin", "run spin: no such procedure; turns, fourier, reversal, all, compare-converters, gyrocompass, "),
-    ("run spin --positions 80", "run spin: no such procedure; turns"),
-    ("run turns --positions 80", "--positions: turns has no such parameter; it has --axis, --realisations, "),
-    ("run --positions=80 turns", "--positions: turns has no such parameter; it has --axis"),
-    ("run turns fourier", "fourier: one word too many for turns"),
-    ("run gyrocompass --node 5", "--node: gyrocompass has no such parameter; it has --reading, --sequence"),
-    ("run gyrocompass --hours 4", "--hours: gyrocompass has no such parameter"),
-    ("run heading-hold --average 16", "--average: heading-hold has no such parameter; it has --reading, --hours"),
-    ("run compare-converters --real-time", "--real-time: compare-converters has no such parameter; it has --scenario"),
-    ("run gyrocompass --window-s 0", "gyrocompass: window_s is 0.0"),
-    ("run script nothing.psa --axis x", "--axis: script has no such parameter; it has --scenario"),
-    ("record run.log --speed 3", "--speed: record has no such parameter; it has --can"),
-    ("run all --axis w", "turns: axis is 'w'; it must be x, y or z"),
+    ("run --out turns", "run: expected turns"),
+    ("run spin", "run: expected turns, fourier, reversal, all, compare-converters, gyrocompass, "),
+    ("run spin --positions 80", "heading-hold or script, got 'spin'"),
+    (
+        "run turns --positions 80",
+        "turns: expected an option that --help lists, got --positions (did you mean --condition?)",
+    ),
+    ("run --positions=80 turns", "turns: expected an option that --help lists, got --positions"),
+    ("run turns fourier", "turns: expected no more arguments, got 'fourier'"),
+    ("run gyrocompass --node 5", "gyrocompass: expected an option that --help lists, got --node"),
+    ("run gyrocompass --hours 4", "gyrocompass: expected an option that --help lists, got --hours"),
+    ("run heading-hold --average 16", "heading-hold: expected an option that --help lists, got --average"),
+    (
+        "run compare-converters --real-time",
+        "compare-converters: expected --scenario, --seed, --out, --verbose, got --real-time",
+    ),
+    ("run gyrocompass --window-s 0", "gyrocompass: window_s, repeat: expected at least 0.1 s and 1, got 0.0 s and 1"),
+    (
+        "run script nothing.psa --axis x",
+        "script: expected --scenario, --pace, --control, --seed, --can, --scpi, --node, --json, got --axis",
+    ),
+    ("record run.log --speed 3", "record: expected --can, --board, --node, --for, --count, got --speed"),
+    ("run all --axis w", "turns: axis: expected x, y or z, got 'w'"),
     ("run turns --out /dev/null/x", "/dev/null/x: "),
-    ("run turns --can socketcand:127.0.0.1:1", "--head is missing"),
+    ("run turns --can socketcand:127.0.0.1:1", "--head: expected the VISA address of the dividing head"),
     ("decode nothing.log", "nothing.log: no such file"),
-    ("decode README.md", "README.md: ending .md; python-can reads"),
+    ("decode README.md", "README.md: expected an ending of .asc .blf"),
     ("decode --line nothing.bin", "nothing.bin: no such file"),
-    ("decode --line x.bin --board psd1 --out x.csv", "--line: line frames are PSA-2's; of a psd1 a CAN log is decoded"),
+    (
+        "decode --line x.bin --board psd1 --out x.csv",
+        "--line: expected a CAN log for this board (leave --line out), got psd1",
+    ),
     ("decode --line nothing.bin --board psa1", "nothing.bin: no such file"),
     ("decode --line /", "/: expected a file, got a folder"),
-    ("decode --line /dev/null --word-bits 17", "word_bits is 17; a PSA-2 sends words of 16, 24 or 32 bits"),
+    ("decode --line /dev/null --word-bits 17", "word_bits: expected 16, 24 or 32, got 17"),
     ("decode --line /dev/null --out /dev/null/x.csv", "/dev/null/x.csv: "),
 ]
 
@@ -100,16 +112,16 @@ def test_another_name_of_a_board_is_taken_as_the_board(
 
 
 LOGS: list[tuple[str, str, str]] = [
-    ("empty", "", "no frame of node 5; nodes with frames: none"),
-    ("no samples", "(0.1) can0 705#00\n(0.2) can0 000#0100\n", "no frame of node 5; nodes with frames: none"),
+    ("empty", "", "none; nodes with frames: none"),
+    ("no samples", "(0.1) can0 705#00\n(0.2) can0 000#0100\n", "none; nodes with frames: none"),
     (
         "pair, FD frame, block and fast form of others",
         "(0.1) can0 187#15DA1F0100000000\n(0.2) can0 287#000000534C19E4B8\n(0.3) can0 201##100\n(0.4) can0 489##100\n"
         "(0.5) can0 3FF#0000000000000000\n",
-        "no frame of node 5; nodes with frames: 1, 7, 9, 127",
+        "none; nodes with frames: 1, 7, 9, 127",
     ),
-    ("29-bit, remote", "(0.1) can0 00000187#00\n(0.2) can0 187#R\n", "no frame of node 5; nodes with frames: none"),
-    ("half a pair", "(0.1) can0 185#15DA1F0100000000\n", "only parts of frames of node 5; others with frames: none"),
+    ("29-bit, remote", "(0.1) can0 00000187#00\n(0.2) can0 187#R\n", "none; nodes with frames: none"),
+    ("half a pair", "(0.1) can0 185#15DA1F0100000000\n", "only parts of them; other nodes with frames: none"),
 ]
 
 
@@ -120,7 +132,7 @@ def test_a_log_without_a_frame_of_the_node_gets_one_line_and_status_2(
     monkeypatch.chdir(tmp_path)
     Path("bus.log").write_text(log)
     assert cli.main(["decode", "bus.log"]) == 2
-    assert capsys.readouterr() == ("", f"psabench: bus.log: {words}\n")
+    assert capsys.readouterr() == ("", f"psabench: bus.log: expected frames of node 5, got {words}\n")
 
 
 def test_a_log_with_a_frame_of_the_node_is_a_table(
@@ -142,7 +154,7 @@ def test_a_capture_without_a_frame_gets_one_line_and_status_2(
     Path("x.bin").write_bytes(b"\x01\x00\x01")
     assert cli.main(["decode", "--line", "x.bin"]) == 2
     counts = "samples=3 frames=0 torn=1 lost=0 late=0 early=0 gaps=0"
-    assert capsys.readouterr() == ("", f"psabench: x.bin: no frame of 32-bit words ({counts})\n")
+    assert capsys.readouterr() == ("", f"psabench: x.bin: expected frames of 32-bit words, got none ({counts})\n")
 
 
 def test_a_reader_that_has_seen_enough_is_no_error() -> None:

@@ -55,7 +55,7 @@ def test_a_number_is_offered_with_its_unit_and_range() -> None:
 
 def test_an_object_that_is_not_here_says_why() -> None:
     (c,) = candidates("chamber.", V)
-    assert (c.text, c.about) == ("chamber.", "chamber is not here: the scenario has no chamber")
+    assert (c.text, c.about) == ("chamber.", "chamber: not available: the scenario has no chamber")
 
 
 ARGUMENTS: list[tuple[str, str | None]] = [

@@ -121,8 +121,8 @@ def test_a_register_is_written_whole_or_by_fields(text: str, value: int) -> None
     [
         ("256", "expected a byte"),
         ("zz", "expected a byte"),
-        ("DR=8", "CONFIG0.DR: '8'; 0 to 7 is right"),
-        ("RATE=1", "CONFIG0 has no field RATE; it has SYNC, DR, PHASE, FILTR"),
+        ("DR=8", "CONFIG0.DR: expected 0 to 7, got '8'"),
+        ("RATE=1", "field of CONFIG0: expected SYNC, DR, PHASE, FILTR, got RATE"),
     ],
 )
 def test_what_cannot_be_written(text: str, words: str) -> None:
@@ -180,8 +180,8 @@ FAILED = [
     ("angle_deg < 30", "expected < 30"),
     ("at_rest = 1 +- 2", "at_rest is true"),
     ("face > 3", "face is side"),
-    ("angel_deg = 3", "the latest result has no angel_deg; it has angle_deg, at_rest, face, clients, none, value"),
-    ("clients.1.lost = 3", "the latest result has no 1 there"),
+    ("angel_deg = 3", "latest result: expected angle_deg, at_rest, face, clients, none, value, got angel_deg"),
+    ("clients.1.lost = 3", "latest result: expected no further field, got 1"),
 ]
 
 
@@ -215,7 +215,7 @@ def test_a_session_in_real_time_is_saved_with_its_instants() -> None:
         "at 1.0",
         "head.turn 5",
         "head.read",
-        "# head.spin   refused: head.spin: unknown command",
+        "# head.spin   error: head.spin: unknown command",
         "at 1.2",
         "wait 1",
         "at 2.250000001",

@@ -49,10 +49,10 @@ def test_what_the_bench_does_not_have_is_refused_with_the_reason() -> None:
     _, it = fake("real")
     session = Session(it)
     for line, words in [
-        ("head.turn 1", "head is not here: it wants the control socket of an emulator"),
-        ("dut.ready", "dut is not here: it wants a bus (--can"),
-        ("faults.add a b", "faults is not here: it wants the control socket"),
-        ("scpi.send table *IDN?", "scpi is not here: no instrument has an address"),
+        ("head.turn 1", "head: not available: it needs the control socket of an emulator"),
+        ("dut.ready", "dut: not available: it needs a bus (--can"),
+        ("faults.add a b", "faults: not available: it needs the control socket"),
+        ("scpi.send table *IDN?", "scpi: not available: no instrument has an address"),
         ("at 1", "at: unknown command"),
     ]:
         with pytest.raises(Wrong) as e:
@@ -74,7 +74,7 @@ def test_a_session_is_saved_as_a_script_that_does_the_same(tmp_path: Path) -> No
         "at 0.0",
         "head.turn 5",
         "wait 0.5",
-        "# head.spin   refused: head.spin: unknown command; did you mean head.turn or head.mount?",
+        "# head.spin   error: head.spin: unknown command; did you mean head.turn or head.mount?",
         "at 0.5",
         "expect angle_deg = 5",
     ]
@@ -153,10 +153,10 @@ def test_an_error_in_json_has_its_status() -> None:
 def test_a_script_without_a_bench_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "x.psa"
     for text, words in [
-        ("head.turn 5", "which bench?"),
-        ("", "which bench?"),
-        ("start", "x.psa:1:6: scenario is missing"),
-        ("# a\nstart quiet seed=-1", "x.psa:2:18: seed: -1 is out of range"),
+        ("head.turn 5", "expected a first line `start SCENARIO`"),
+        ("", "expected a first line `start SCENARIO`"),
+        ("start", "x.psa:1:6: scenario: expected a value ("),
+        ("# a\nstart quiet seed=-1", "x.psa:2:18: seed: expected a number in range, got -1"),
     ]:
         path.write_text(text)
         with pytest.raises(BadInput) as e:

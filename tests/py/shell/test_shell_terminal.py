@@ -72,7 +72,7 @@ def test_a_wrong_line_is_marked_where_it_is_wrong(pipe: Any, capsys: pytest.Capt
     session(pipe, f"head.turn 5V{ENTER}{CTRL_D}")
     mark, text = capsys.readouterr().out.splitlines()[1:]
     assert mark == " " * len("psa> head.turn ") + "^"
-    assert text.startswith("angle_deg: unit 'V'; one of deg")
+    assert text.startswith("angle_deg: unit: expected one of deg")
 
 
 def test_a_refusal_does_not_end_the_shell(pipe: Any, capsys: pytest.CaptureFixture[str]) -> None:
@@ -89,8 +89,8 @@ def test_ctrl_c_drops_the_line_or_ends_the_command_not_the_shell(pipe: Any, caps
 def test_modes_that_the_bench_has_not_say_why(pipe: Any, capsys: pytest.CaptureFixture[str]) -> None:
     session(pipe, f"can{ENTER}scpi table{ENTER}{CTRL_D}")
     said = [line for line in capsys.readouterr().out.splitlines()[1:] if line.strip() != "^"]
-    assert said[0].startswith("can is not here: it wants a bus")
-    assert said[1].startswith("scpi is not here: no instrument has an address")
+    assert said[0].startswith("can: not available: it needs a bus")
+    assert said[1].startswith("scpi: not available: no instrument has an address")
 
 
 def test_what_is_typed_in_a_mode_is_a_line_of_the_shell(pipe: Any) -> None:

@@ -91,30 +91,30 @@ static void what_is_wrong_with_options_is_said(void **state)
     static const struct {
         const char *options, *says;
     } rows[] = {
-        {"vref_v", "write key=value"},
-        {"vref=2.5", "no option vref of ads1256: there are clkin_hz"},
-        {"noise_scale=1 =5", "no option  of"},
-        {"vref_v=", "use a number from 0.5 to 5.5"},
-        {"vref_v=2,5", "use a number"},
-        {"vref_v=nan", "use a number"},
-        {"vref_v=inf", "use a number"},
-        {"vref_v=0x2", "use a number"},
-        {"vref_v=2.5V", "use a number"},
-        {"vref_v=2.5.0", "use a number"},
-        {"vref_v=--2", "use a number"},
-        {"vref_v=2e", "use a number"},
-        {"vref_v=2e99", "use a number"},
-        {"vref_v=2e999999999999999999999", "use a number"},
-        {"offset_v=1e-1.5", "use a number"},
-        {"offset_v=1e-30", "use a number"},             /* its power of ten is not exact */
-        {"vref_v=2.50000000000000000", "use a number"}, /* more digits than are exact */
-        {"clkin_hz=7680000.5", "use a whole number from 100000 to 10000000"},
-        {"strict_cs=yes", "use 0 or 1"},
-        {"start=later", "use one of at_once|clock|crystal"},
-        {"start=at_once|clock", "use one of"},
-        {"start=at", "use one of"},
-        {"a_key_that_is_longer_than_any_key_of_ours=1", "up to 31 characters"},
-        {"vref_v=22222222222222222222222222222222222222222222222222222222222222222222", "values up to 63"},
+        {"vref_v", "expected key=value, got vref_v"},
+        {"vref=2.5", "option of ads1256: expected one of clkin_hz"},
+        {"noise_scale=1 =5", "option of ads1256: expected one of"},
+        {"vref_v=", "expected a number from 0.5 to 5.5"},
+        {"vref_v=2,5", "expected a number from"},
+        {"vref_v=nan", "expected a number from"},
+        {"vref_v=inf", "expected a number from"},
+        {"vref_v=0x2", "expected a number from"},
+        {"vref_v=2.5V", "expected a number from"},
+        {"vref_v=2.5.0", "expected a number from"},
+        {"vref_v=--2", "expected a number from"},
+        {"vref_v=2e", "expected a number from"},
+        {"vref_v=2e99", "expected a number from"},
+        {"vref_v=2e999999999999999999999", "expected a number from"},
+        {"offset_v=1e-1.5", "expected a number from"},
+        {"offset_v=1e-30", "expected a number from"},             /* its power of ten is not exact */
+        {"vref_v=2.50000000000000000", "expected a number from"}, /* more digits than are exact */
+        {"clkin_hz=7680000.5", "expected a whole number from 100000 to 10000000"},
+        {"strict_cs=yes", "expected 0 or 1, got yes"},
+        {"start=later", "start: expected one of at_once|clock|crystal, got later"},
+        {"start=at_once|clock", "expected one of at_once"},
+        {"start=at", "expected one of at_once"},
+        {"a_key_that_is_longer_than_any_key_of_ours=1", "expected a key of up to 31"},
+        {"vref_v=22222222222222222222222222222222222222222222222222222222222222222222", "a value of up to 63"},
     };
     char why[500];
     for (size_t i = 0; i < COUNT(rows); i++) {
@@ -143,7 +143,7 @@ static void names_are_short_words_and_unique(void **state)
     static const char *const bad[] = {NULL, "", "a b", "a$b", "a\n", "n234567890123456789012345678901234567890"};
     for (size_t i = 0; i < COUNT(bad); i++) {
         assert_null(psabench_part_new(b, "ads1256", bad[i], NULL));
-        assert_non_null(strstr(psabench_error_text(b), "use 1 to 31 of the characters"));
+        assert_non_null(strstr(psabench_error_text(b), "expected 1 to 31 of the characters"));
         assert_null(strchr(psabench_error_text(b), '\n'));
     }
     psabench_part *p = part(b, "ads1256", "n123456789.123456789-12345678_0", NULL);
@@ -151,7 +151,7 @@ static void names_are_short_words_and_unique(void **state)
     assert_ptr_equal(psabench_of(p), b);
     assert_null(psabench_part_new(b, "psa2", "n123456789.123456789-12345678_0", NULL));
     assert_null(psabench_part_new(b, "psa3", "x", NULL));
-    assert_non_null(strstr(psabench_error_text(b), "no part psa3: there are "));
+    assert_non_null(strstr(psabench_error_text(b), "part: expected one of "));
     assert_null(psabench_part_new(b, NULL, "x", NULL));
     psabench_free(b);
 }
@@ -211,42 +211,42 @@ static void bad_arguments_are_refused_and_named(void **state)
     const int drdy = pin(p, "DRDY");
     const int cs = pin(p, "CS");
     REFUSED(psabench_pin(p, "cs"), -1,
-            "u: no pin cs of ads1256: there are DRDY DOUT SCLK DIN CS SYNC RESET D0 D1 D2 D3");
-    REFUSED(psabench_pin(p, NULL), -1, "no pin");
-    REFUSED(psabench_pin(p, "C\nS"), -1, "no pin C?S of"); /* one line, whatever is quoted */
-    REFUSED(psabench_pin_is_input(p, 11), -1, "u: no pin number 11: 0 to 10");
-    REFUSED(psabench_get(p, -1), -1, "no pin number -1");
-    REFUSED(psabench_set(p, 99, 0), -1, "no pin number 99");
-    REFUSED(psabench_set(p, drdy, 0), -1, "u: DRDY = 0: it is an output");
-    REFUSED(psabench_set(p, cs, 2), -1, "CS = 2: a level is 0 or 1");
-    REFUSED(psabench_set(p, cs, -1), -1, "a level is 0 or 1");
-    REFUSED(psabench_watch(p, cs, NULL, NULL), -1, "CS is an input");
-    REFUSED(psabench_watch(p, 11, NULL, NULL), -1, "no pin number");
-    REFUSED(psabench_run_until_level(p, drdy, 2, 0), -1, "a level is 0 or 1");
+            "u: pin of ads1256: expected one of DRDY DOUT SCLK DIN CS SYNC RESET D0 D1 D2 D3, got cs");
+    REFUSED(psabench_pin(p, NULL), -1, "got NULL");
+    REFUSED(psabench_pin(p, "C\nS"), -1, ", got C?S"); /* one line, whatever is quoted */
+    REFUSED(psabench_pin_is_input(p, 11), -1, "u: pin number: expected 0 to 10, got 11");
+    REFUSED(psabench_get(p, -1), -1, "pin number: expected 0 to 10, got -1");
+    REFUSED(psabench_set(p, 99, 0), -1, "pin number: expected 0 to 10, got 99");
+    REFUSED(psabench_set(p, drdy, 0), -1, "u: DRDY: expected an input");
+    REFUSED(psabench_set(p, cs, 2), -1, "CS: expected 0 or 1, got 2");
+    REFUSED(psabench_set(p, cs, -1), -1, "expected 0 or 1, got -1");
+    REFUSED(psabench_watch(p, cs, NULL, NULL), -1, "CS: expected an output, got an input");
+    REFUSED(psabench_watch(p, 11, NULL, NULL), -1, "pin number: expected");
+    REFUSED(psabench_run_until_level(p, drdy, 2, 0), -1, "expected a level of 0 or 1");
     REFUSED(psabench_run_until_level(p, drdy, 0, -1), -1, "a span >= 0");
-    REFUSED(psabench_run_until_level(p, drdy, 0, INT64_MAX), -1, "within");
-    REFUSED(psabench_run_until_level(p, 11, 0, 0), -1, "no pin number");
-    REFUSED(psabench_run_until(b, MS - 1), -1, "it is 1000000 ns now");
-    REFUSED(psabench_run_until(b, INT64_MAX), -1, "time goes up to");
-    REFUSED(psabench_run_for(b, -1), -1, "a span of -1 ns");
-    REFUSED(psabench_run_for(b, INT64_MAX), -1, "a span of");
-    REFUSED(psabench_set_volts(p, 9, 0.0), -1, "u: no input 9 of ads1256: there are 0 1 2 3 4 5 6 7 8");
-    REFUSED(psabench_set_volts(p, -1, 0.0), -1, "no input -1");
-    REFUSED(psabench_set_volts(p, 0, (double)NAN), -1, "not a number of volts");
-    REFUSED(psabench_set_volts(p, 0, (double)INFINITY), -1, "not a number of volts");
-    REFUSED(psabench_spi_clock(p, 0, 0), -1, "SCLK of 0 Hz");
-    REFUSED(psabench_spi_clock(p, 50000001, 0), -1, "use 1 to 50000000 Hz");
-    REFUSED(psabench_spi_clock(p, 1000000, -1), -1, "-1 ns between bytes");
-    REFUSED(psabench_peek(p, 11), -1, "no register 00Bh");
-    REFUSED(psabench_on_frame(p, NULL, NULL), PSABENCH_NOT_HERE, "ads1256 has no frames");
-    REFUSED(psabench_board_read(p, 0, 0, 0), PSABENCH_NOT_HERE, "ads1256 is no board");
-    REFUSED(psabench_board_write(p, 0, 0, 0, 0), PSABENCH_NOT_HERE, "ads1256 is no board");
-    REFUSED(psabench_vcd(b, NULL), -1, "no path");
+    REFUSED(psabench_run_until_level(p, drdy, 0, INT64_MAX), -1, "a span >= 0");
+    REFUSED(psabench_run_until_level(p, 11, 0, 0), -1, "pin number: expected");
+    REFUSED(psabench_run_until(b, MS - 1), -1, "expected 1000000 ns (now) to");
+    REFUSED(psabench_run_until(b, INT64_MAX), -1, "time: expected");
+    REFUSED(psabench_run_for(b, -1), -1, "time span: expected 0 to ");
+    REFUSED(psabench_run_for(b, INT64_MAX), -1, "time span: expected");
+    REFUSED(psabench_set_volts(p, 9, 0.0), -1, "u: input of ads1256: expected one of 0 1 2 3 4 5 6 7 8, got 9");
+    REFUSED(psabench_set_volts(p, -1, 0.0), -1, ", got -1");
+    REFUSED(psabench_set_volts(p, 0, (double)NAN), -1, "u: input 0: expected volts within");
+    REFUSED(psabench_set_volts(p, 0, (double)INFINITY), -1, "u: input 0: expected volts within");
+    REFUSED(psabench_spi_clock(p, 0, 0), -1, "got 0 Hz");
+    REFUSED(psabench_spi_clock(p, 50000001, 0), -1, "expected SCLK of 1 to 50000000 Hz");
+    REFUSED(psabench_spi_clock(p, 1000000, -1), -1, "and -1 ns");
+    REFUSED(psabench_peek(p, 11), -1, "u: expected a register of ads1256, got 00Bh");
+    REFUSED(psabench_on_frame(p, NULL, NULL), PSABENCH_NOT_HERE, "expected a board with frames, got ads1256");
+    REFUSED(psabench_board_read(p, 0, 0, 0), PSABENCH_NOT_HERE, "expected a board, got ads1256");
+    REFUSED(psabench_board_write(p, 0, 0, 0, 0), PSABENCH_NOT_HERE, "expected a board, got ads1256");
+    REFUSED(psabench_vcd(b, NULL), -1, "expected a path, got NULL");
     REFUSED(psabench_vcd(b, "/there/is/no/such/folder/x.vcd"), PSABENCH_SYSTEM, "/there/is/no/such/folder/x.vcd: ");
     good(b, psabench_spi_clock(p, 1, 0));
-    REFUSED(psabench_spi(p, NULL, NULL, SIZE_MAX), -1, "bytes would take longer");
+    REFUSED(psabench_spi(p, NULL, NULL, SIZE_MAX), -1, "expected fewer bytes");
     set(p, "SCLK", 1);
-    REFUSED(psabench_spi(p, NULL, NULL, 1), -1, "SCLK is high");
+    REFUSED(psabench_spi(p, NULL, NULL, 1), -1, "expected SCLK low, got high");
     assert_true(psabench_now_ns(b) == MS); /* nothing of this moved time */
     assert_null(psabench_pin_name(p, 11));
     assert_null(psabench_pin_name(p, -1));

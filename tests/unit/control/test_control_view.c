@@ -107,7 +107,7 @@ static void endpoints_are_told_by_the_bench(void **state)
     (void)state;
     assert_says("{\"cmd\":\"endpoints\"}", "\"result\":{\"endpoints\":[]}");
     asked.refuse = true;
-    assert_says("{\"cmd\":\"endpoints\"}", "{\"code\":\"machine\",\"text\":\"no memory\"}");
+    assert_says("{\"cmd\":\"endpoints\"}", "{\"code\":\"machine\",\"text\":\"out of memory\"}");
     view.process.endpoints = NULL;
     assert_says("{\"cmd\":\"endpoints\"}", "{\"code\":\"state\",\"text\":\"this bench has no endpoints\"}");
 }

@@ -18,7 +18,7 @@ from enum import IntEnum, IntFlag
 from psabench.boards.objects import GyroObjects as OD
 from psabench.boards.readings import ReadingLayout
 from psabench.boards.unit import BusUnit
-from psabench.errors import BadInput, DeviceError
+from psabench.errors import BadInput, DeviceError, expected
 
 
 class Mode(IntEnum):
@@ -127,7 +127,7 @@ class Gyro(BusUnit):
         except DeviceError as e:
             words = self.refusal() or e.text
             if e.abort_code in ABORT_RANGE:
-                raise BadInput(f"{name} = {value:g}: {words}") from e
+                raise BadInput(f"{name}: {value:g} rejected by the unit: {words}") from e
             raise DeviceError(e.what, e.abort_code, words) from e
 
     @property
@@ -138,7 +138,7 @@ class Gyro(BusUnit):
     @positions_deg.setter
     def positions_deg(self, angles_deg: Sequence[float]) -> None:
         if not 1 <= len(angles_deg) <= POSITIONS_MAX:
-            raise BadInput(f"{len(angles_deg)} positions; the unit has room for 1 to {POSITIONS_MAX}")
+            raise BadInput(expected(f"1 to {POSITIONS_MAX} positions", len(angles_deg), "positions"))
         for k, angle_deg in enumerate(angles_deg):
             self._write(f"position {k + 1}", POSITIONS, 1 + k, angle_deg)
         self.set(count=len(angles_deg))

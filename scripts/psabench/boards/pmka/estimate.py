@@ -19,6 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from psabench.errors import expected
+
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
@@ -57,12 +59,12 @@ def rom_of(words: Sequence[int]) -> Rom:
     """The ROM from its 16-bit words. Raises ValueError for one that is damaged or of another layout."""
     w = np.asarray(words, dtype=np.int64) & 0xFFFF
     if len(w) < ROM_HEAD or w[0] != ROM_LAYOUT:
-        raise ValueError(f"ROM of {len(w)} words, layout {w[0] if len(w) else 'none'}: expected layout {ROM_LAYOUT}")
+        raise ValueError(expected(f"layout {ROM_LAYOUT}", f"{w[0] if len(w) else 'none'} in {len(w)} words", "ROM"))
     points = int(w[2])
     if len(w) != ROM_HEAD + 4 * ROM_ROW * points + 1:
-        raise ValueError(f"ROM of {len(w)} words: expected {ROM_HEAD + 4 * ROM_ROW * points + 1} for {points} points")
+        raise ValueError(expected(f"{ROM_HEAD + 4 * ROM_ROW * points + 1} words for {points} points", len(w), "ROM"))
     if int(w.sum()) & 0xFFFF:
-        raise ValueError(f"ROM is damaged: the sum of its words is {int(w.sum()) & 0xFFFF:04X}h, not 0")
+        raise ValueError(expected("words with the sum 0", f"{int(w.sum()) & 0xFFFF:04X}h", "ROM"))
     signed = np.where(w > 0x7FFF, w - 0x10000, w).astype(np.float64)
     table = signed[ROM_HEAD:-1].reshape(4, points, ROM_ROW)
     return Rom(
@@ -97,11 +99,11 @@ def periods_of(columns: Mapping[str, Floats]) -> Periods:
     seq = columns["SEQ"].astype(np.int64)
     gaps = np.flatnonzero(np.diff(seq) % 0x10000 != 1)
     if len(gaps):
-        raise ValueError(f"{len(gaps)} gaps in the readings, the first after SEQ {seq[gaps[0]]}")
+        raise ValueError(expected("every reading once", f"{len(gaps)} gaps, the first after SEQ {seq[gaps[0]]}", "SEQ"))
     for flag in ("SATURATED", "CLIPPED"):
         bad = np.flatnonzero(columns[flag])
         if len(bad):
-            raise ValueError(f"{flag} in {len(bad)} readings, the first with SEQ {seq[bad[0]]}")
+            raise ValueError(expected("0 in all readings", f"1 in {len(bad)}, the first with SEQ {seq[bad[0]]}", flag))
     return Periods(
         code=np.rint(np.column_stack([columns[i] for i in INTEGRATORS]) / CODE_V),
         reset=np.column_stack([columns[f"RESET_{i}"] for i in INTEGRATORS]).astype(np.int64),
@@ -172,11 +174,11 @@ def calibrate(p: Periods, integrator: int) -> Calibration:
             nr_at.append((first + last) / 2)
             nr.append(size)
     if not nr:
-        raise ValueError(f"the resets of integrator {name} have not been calibrated: expected a run of both signs")
+        raise ValueError(expected("a run of both signs", "no calibrated reset", f"integrator {name}"))
     sizes = (np.array(nr_at), np.array(nr))
     zero_at, zeros = _zero_of_runs(p, integrator, sizes)
     if not len(zeros):
-        raise ValueError(f"the zero of integrator {name} has not been calibrated")
+        raise ValueError(expected("a run at rest", "no calibrated zero", f"integrator {name}"))
     return Calibration(nr_at=sizes[0], nr=sizes[1], zero_at=zero_at, zero=zeros)
 
 

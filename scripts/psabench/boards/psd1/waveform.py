@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from psabench.errors import expected
 from psabench.link.vcd import Vcd
 from psabench.report.drawing import Dim, Panel, Section, Tag, need, render
 
@@ -32,7 +33,7 @@ def _next(vcd: Vcd, line: str, level: int, t_ns: int) -> int:
     edges = vcd.wires[line].edges_ns(level)
     later = edges[edges >= t_ns]
     if later.size == 0:
-        raise ValueError(f"no whole cycle in it: {line} does not go to {level} after {t_ns} ns")
+        raise ValueError(expected(f"a whole cycle: a change to {level} after {t_ns} ns", "none", line))
     return int(later[0])
 
 
@@ -42,7 +43,7 @@ def _transfer(vcd: Vcd, rf: str, from_ns: int) -> _Transfer:
     sclk = vcd.wires["SCLK"]
     rises, falls = (t[(t > fall) & (t < rise)].tolist() for t in (sclk.edges_ns(1), sclk.edges_ns(0)))
     if len(rises) != 16:
-        raise ValueError(f"{rf} is low for {len(rises)} pulses of SCLK, not 16")
+        raise ValueError(expected("16 pulses of SCLK in a low", len(rises), rf))
     bits = vcd.wires["SDAT"].at(np.array(rises)).tolist()
     cs = _next(vcd, "CS", 0, rise)
     word = int("".join(map(str, bits)), 2)

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from psabench.conform.profile import Variant
+from psabench.errors import expected
 from psabench.link import signals
 from psabench.link.busport import Cycle
 from psabench.link.protocol_files import dbc_node, message
@@ -65,7 +66,7 @@ class CanLog:
         length = int(message(name).length)
         for f in self.frames:
             if len(f.data) != length:
-                raise ValueError(f"{name} at {f.t_s:.6f} s has {len(f.data)} bytes; it has {length}")
+                raise ValueError(expected(f"{length} bytes", len(f.data), f"{name} at {f.t_s:.6f} s"))
         bits = signals.payload([f.data for f in self.frames], length)
         return {s: signals.raw(bits, at) for s, at in signals.layout(message(name)).items()}
 
@@ -84,7 +85,7 @@ class LineLog:
     def __getitem__(self, name: str) -> Wire:
         """A line by its name. Raises KeyError, with the lines that there are."""
         if name not in self.recording.wires:
-            raise KeyError(f"{name}; the recording has {', '.join(self.recording.wires)}")
+            raise KeyError(expected(", ".join(self.recording.wires), name, "line"))
         return self.recording.wires[name]
 
     @property
@@ -185,7 +186,7 @@ class Capture:
     def wires(self) -> LineLog:
         """The lines; for checks that need them. Raises ValueError where no probe was there."""
         if self.lines is None:
-            raise ValueError("no lines were recorded")
+            raise ValueError(expected("recorded lines", "none"))
         return self.lines
 
     def slack_ns(self, interval_ns: float, edges: int = 2) -> float:

@@ -23,6 +23,7 @@ from psabench.conform.host.results import Sample, Told
 from psabench.conform.host.stimulus_bus import BusCycle
 from psabench.conform.requirements import Requirement, requirements
 from psabench.conform.verdict import Failed, Inconclusive
+from psabench.errors import expected
 
 HEARTBEAT_S = 1.0  # 1017h as the board has it
 STOOD_S = 0.04  # the bench may have stood still for so long before a host may take the board for silent
@@ -190,7 +191,7 @@ def checks(*cases: str) -> Callable[[Test], Test]:
 def proves(*ids: str) -> Callable[[Test], Test]:
     """As `psabench.conform.proves.proves`, for tests of hosts. Raises ValueError for an unknown id."""
     if unknown := [i for i in ids if i not in requirements().rows]:
-        raise ValueError(f"proves: no requirement {', '.join(unknown)}")
+        raise ValueError(expected("ids of requirements", ", ".join(unknown), "proves"))
 
     def register(test: Test) -> Test:
         _case_checks.extend(CaseCheck(test, case, ids) for case in _cases[test])

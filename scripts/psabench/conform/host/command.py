@@ -15,7 +15,7 @@ from psabench.conform.identity import suite_facts
 from psabench.conform.profile import Variant, variant
 from psabench.conform.requirements import Requirement, requirements
 from psabench.conform.verdict import Outcome, Verdict
-from psabench.errors import BadInput
+from psabench.errors import BadInput, expected
 from psabench.procedures.head_bench import Silent
 from psabench.progress import Bar
 
@@ -24,22 +24,20 @@ def link_of(args: argparse.Namespace) -> str:
     """The place that the program takes the board at. Raises BadInput for none and for two."""
     if args.manual:
         if args.results is None:
-            raise BadInput("--manual wants --results FILE, the file that the program tells into")
+            raise BadInput(expected("--results FILE, which the program writes to", "none", "--manual"))
         return str(args.manual)
     named = [place for place in LINKS if f"{{{place}}}" in args.command]
     if len(named) != 1:
-        raise BadInput(
-            f"--command {args.command}: one of {', '.join(f'{{{p}}}' for p in LINKS)} says where the board is"
-        )
+        raise BadInput(expected(f"one of {', '.join(f'{{{p}}}' for p in LINKS)}", repr(args.command), "--command"))
     return named[0]
 
 
 def host(args: argparse.Namespace) -> int:
     """Handler of `conform host`."""
     if not 0.01 <= args.speed <= 1000:
-        raise BadInput(f"--speed {args.speed:g}: from 0.01 to 1000")
+        raise BadInput(expected("0.01 to 1000", f"{args.speed:g}", "--speed"))
     if not 0 <= args.port <= 65535:
-        raise BadInput(f"--port {args.port}: from 0 to 65535")
+        raise BadInput(expected("0 to 65535", args.port, "--port"))
     link = link_of(args)
     v = variant(args.board, args.profile)
     refuse(v, link)
@@ -50,7 +48,7 @@ def host(args: argparse.Namespace) -> int:
     rows = [r for r in rows if not args.only or r.id.startswith(tuple(args.only))]
     rows = [r for r in rows if not args.case or any(r.id in j.ids for j in tests)]
     if not rows:
-        raise BadInput("--only, --case: nothing to judge; docs/conform_host.md has the cases")
+        raise BadInput(expected("requirements or cases with a check (docs/conform_host.md)", "none", "--only"))
     outcomes = list(unseen(rows, tests, link))
     play = runner.Play(
         folder=args.out,
@@ -117,10 +115,7 @@ def unseen(rows: list[Requirement], tests: list[CaseCheck], link: str) -> list[O
 def refuse(v: Variant, link: str) -> None:
     """Raises BadInput for a board that has no such link, or none that a host could take words at."""
     if not any(v.board in c.boards and link in c.links for c in runner.ALL.values()):
-        raise BadInput(f"no case with {v.board} at {LINKS[link]}")
+        raise BadInput(expected(f"a board that has a case at {LINKS[link]}", v.board, "--board"))
     if v.family == "psd1" and (v["host_strobe_ns"] == 0) != (link == "bus"):
-        raise BadInput(
-            f"profile {v.profile}: its words wait for a host on the bus, {{bus}}"
-            if link != "bus"
-            else f"profile {v.profile} has a built-in host that takes each word: --profile psd1_host has none"
-        )
+        other = "without" if link == "bus" else "with"
+        raise BadInput(expected(f"a profile {other} a built-in host", v.profile, "--profile"))

@@ -24,7 +24,7 @@ from psabench.conform.host.stimulus_line import LinePort
 from psabench.conform.profile import variant
 from psabench.conform.verdict import Failed, Inconclusive, Outcome, Verdict
 from psabench.emulator import Emulator
-from psabench.errors import BadInput, BenchError
+from psabench.errors import BadInput, BenchError, expected
 from psabench.link.control import Control
 from psabench.procedures.head_bench import Progress
 
@@ -60,7 +60,7 @@ def wanted(
     """Tests of requirements that begin so, of these cases, with that board and link; in the order of the cases."""
     order = [name for name, c in ALL.items() if board in c.boards and link in c.links]
     if unknown := [c for c in cases if c not in order]:
-        raise BadInput(f"no such case with {board} at this link: {', '.join(unknown)}; there are {', '.join(order)}")
+        raise BadInput(expected(f"a case of {board} at this link: {', '.join(order)}", ", ".join(unknown), "--case"))
     found = [
         j
         for j in case_checks()

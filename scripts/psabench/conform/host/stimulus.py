@@ -27,7 +27,7 @@ from typing import Protocol, TextIO
 from psabench.conform.host import results
 from psabench.conform.host.results import Told
 from psabench.emulator import Emulator
-from psabench.errors import BadInput, TimeOut
+from psabench.errors import BadInput, TimeOut, expected
 from psabench.link.control import Control
 
 STEP_S = 0.005  # simulated, between looks at the wall's clock
@@ -47,12 +47,12 @@ def expand(command: str, places: Mapping[str, str]) -> list[str]:
     except ValueError as e:
         raise BadInput(f"--command {command}: {e}") from e
     if not words:
-        raise BadInput("--command is empty")
+        raise BadInput(expected("the host's command line", "none", "--command"))
     try:
         return [w.format_map(dict(places)) for w in words]
     except (KeyError, IndexError, ValueError) as e:
         known = ", ".join(f"{{{p}}}" for p in PLACES)
-        raise BadInput(f"--command {command}: {e}: there are {known}; a brace itself is {{{{ or }}}}") from e
+        raise BadInput(expected(f"{known}; a brace itself is {{{{ or }}}}", e, f"--command {command}")) from e
 
 
 @dataclass(slots=True)
@@ -124,7 +124,7 @@ class ByHand:
         if self.results.exists():
             with self.results.open("rb") as lines:
                 if results.read(lines).bad_lines:
-                    raise BadInput(f"{self.results}: holds other things than a host tells; it would be emptied")
+                    raise BadInput(expected("results of a host, or no file", "other lines", self.results))
         self.results.parent.mkdir(parents=True, exist_ok=True)
         self.results.write_bytes(b"")
         self.invite()

@@ -10,6 +10,8 @@ import struct
 import zlib
 from pathlib import Path
 
+from psabench.errors import expected
+
 HEADER_BYTES = 144
 BASE = struct.Struct("<4sHHLL")  # signature, header size and version, object size, type
 CONTAINER = struct.Struct("<H6xL4x")  # method, unpacked size
@@ -24,10 +26,10 @@ def safe_blf(path: Path) -> tuple[io.BytesIO, str]:
     with path.open("rb") as file:
         header = file.read(HEADER_BYTES)
         if len(header) < HEADER_BYTES or header[:4] != b"LOGG":
-            raise ValueError("no BLF header")
+            raise ValueError(expected("a BLF header", repr(header[:4])))
         size = struct.unpack_from("<L", header, 4)[0]
         if not HEADER_BYTES <= size <= 1 << 16:
-            raise ValueError(f"its header is said to have {size} bytes")
+            raise ValueError(expected(f"a header of {HEADER_BYTES} to {1 << 16} bytes", size))
         file.seek(size)
         objects, trouble = _unpacked(file)
     end, odd = _sound(objects)

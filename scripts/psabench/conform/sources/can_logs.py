@@ -15,7 +15,7 @@ from psabench.conform.capture.log import CanFrame
 from psabench.conform.sources.blf import safe_blf
 from psabench.conform.sources.mf4 import candump_of
 from psabench.conform.sources.taken import BLOCK, MOST_FRAMES, Bounds, CanTake
-from psabench.errors import BadInput
+from psabench.errors import BadInput, expected
 
 TEXT = (".log", ".asc", ".trc", ".csv")
 BINARY = (".blf", ".mf4")
@@ -52,7 +52,7 @@ def read_can(path: Path, bounds: Bounds) -> CanTake:
         note = f"its last line is cut; the {len(frames)} frames before it are judged"
     note = note or trouble
     if not frames:
-        raise BadInput(f"{path}: {note or 'no frame in it'}; nothing in it can be judged")
+        raise BadInput(f"{path}: {note}" if note else expected("CAN frames", "none", path))
     return CanTake(frames=_from_begin(frames), note=note)
 
 
@@ -110,10 +110,10 @@ def _check_lines(path: Path) -> None:
         while data := file.read(BLOCK):
             ends = [k for k in (data.find(b"\n"),) if k >= 0]
             if (where + ends[0] if ends else where + len(data)) - begin > MOST_LINE:
-                raise BadInput(f"{path}: byte {begin}: a line of more than {MOST_LINE} characters: no log")
+                raise BadInput(expected(f"lines of {MOST_LINE} characters at most", "more", f"{path}: byte {begin}"))
             longest = max(map(len, data.split(b"\n")), default=0)
             if longest > MOST_LINE:
-                raise BadInput(f"{path}: after byte {where}: a line of more than {MOST_LINE} characters: no log")
+                raise BadInput(expected(f"lines of {MOST_LINE} characters at most", "more", f"{path}: byte {where}"))
             where += len(data)
             last = data.rfind(b"\n")
             begin = where - len(data) + last + 1 if last >= 0 else begin

@@ -48,19 +48,16 @@ def read_files(paths: Sequence[Path], family: str, told: Mapping[str, str], boun
         files[str(path)] = f"{what}; SHA-256 {_sha256(path)}" + (f"; {take.note}" if take.note else "")
         notes += [f"{path}: {take.note}"] if take.note else []
     if told and lines is None:
-        raise BadInput("--line is of a recording of lines (.vcd, .sr, .bin), and there is none")
+        raise BadInput(expected("a recording of lines (.vcd, .sr, .bin)", "none", "--line"))
     return Recording(can=can, lines=lines, files=files, notes=notes)
 
 
 def _read(path: Path, family: str, bounds: Bounds) -> CanTake | LineTake:
     ending = path.suffix.lower()
     if ending not in CAN_ENDINGS + LINE_ENDINGS:
-        raise BadInput(
-            f"{path}: ending {ending or 'missing'}; {' '.join(CAN_ENDINGS)} are logs of a CAN bus, "
-            f"{' '.join(LINE_ENDINGS)} recordings of lines"
-        )
+        raise BadInput(expected(f"an ending of {' '.join(CAN_ENDINGS + LINE_ENDINGS)}", ending or "none", path))
     if not path.exists() or path.is_dir():
-        raise BadInput(expected("a file", "a folder", str(path)) if path.exists() else f"{path}: no such file")
+        raise BadInput(expected("a file", "a folder", path) if path.exists() else f"{path}: no such file")
     try:
         if ending == ".vcd":
             return read_vcd_file(path, bounds)
@@ -73,7 +70,7 @@ def _read(path: Path, family: str, bounds: Bounds) -> CanTake | LineTake:
 
 def _one(path: Path, before: object, what: str) -> None:
     if before is not None:
-        raise BadInput(f"{path}: a second {what}; one recording has one")
+        raise BadInput(expected(f"one {what}", "a second", path))
 
 
 def _span_of_can(take: CanTake) -> str:

@@ -6,10 +6,9 @@ from collections.abc import Mapping, Sequence
 
 from psabench.boards.registry import BOARDS
 from psabench.conform.capture.log import LineLog
-from psabench.conform.sources.samples import PORT_LINES
 from psabench.conform.sources.taken import LineTake
 from psabench.conform.verdict import Inconclusive
-from psabench.errors import BadInput
+from psabench.errors import BadInput, expected
 from psabench.link.vcd import Vcd, Wire
 
 LINES: Mapping[str, Sequence[str]] = {name: board.lines for name, board in BOARDS.items()}
@@ -36,10 +35,7 @@ def log_of(take: LineTake, family: str, told: Mapping[str, str], where: str) -> 
     """
     chosen = _told(take, family, told, where) if told else _by_name(take, family)
     if not chosen:
-        raise BadInput(
-            f"{where}: none of its channels is a line of a {family}: {', '.join(take.channels)}; "
-            f"say which is which: --line {PORT_LINES[family][0]}=CHANNEL"
-        )
+        raise BadInput(expected("channels named as lines, or --line LINE=CHANNEL", ", ".join(take.channels), where))
     wires = {line: take.channels[channel] for line, channel in chosen.items()}
     return Recorded(
         recording=Vcd(1, take.start_ns, take.end_ns, wires), resolution_ns=take.resolution_ns, gaps_ns=take.gaps_ns
@@ -58,10 +54,8 @@ def _told(take: LineTake, family: str, told: Mapping[str, str], where: str) -> d
     found = {}
     for name, channel in told.items():
         if name.lower() not in lines:
-            raise BadInput(f"--line {name}={channel}: a {family} has no line {name}; it has {' '.join(LINES[family])}")
+            raise BadInput(expected(" ".join(LINES[family]), name, f"--line {name}={channel}"))
         if channel not in take.channels:
-            raise BadInput(
-                f"--line {name}={channel}: {where} has no channel {channel}; it has {' '.join(take.channels)}"
-            )
+            raise BadInput(expected(" ".join(take.channels), channel, f"--line {name}={channel}"))
         found[lines[name.lower()]] = channel
     return found

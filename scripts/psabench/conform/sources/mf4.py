@@ -17,6 +17,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import IO, TextIO
 
+from psabench.errors import expected
+
 FOLDER = Path(sys.prefix) / "mf4"  # tools/setup puts asammdf there
 BEGINS = (b"MDF     ", b"UnFinMF ")  # the second: no one closed it
 MOST_MEMORY = 2 << 30  # bytes of that process
@@ -37,11 +39,10 @@ def candump_of(path: Path, max_s: float, most_frames: int) -> tuple[IO[bytes], s
     """
     with path.open("rb") as file:
         if file.read(8) not in BEGINS:
-            raise ValueError("no MF4 file: it does not begin with MDF")
+            raise ValueError(expected("MDF at the beginning", "another file"))
     if not asammdf_is_there():
         raise ValueError(
-            "MF4 logs are read by asammdf, which is not there: make setup, or pip install asammdf, or where it is "
-            f"can_logconvert {path.name} {path.stem}.log makes a log that is read here"
+            expected(f"asammdf (tools/setup) or a log: can_logconvert {path.name} {path.stem}.log", "none")
         )
     log = tempfile.TemporaryFile()  # noqa: SIM115 (the reader closes it)
     with (

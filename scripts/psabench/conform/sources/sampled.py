@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from psabench.conform.sources.samples import GAP
 from psabench.conform.sources.taken import BLOCK, NS, Bounds, LineTake
-from psabench.errors import BadInput
+from psabench.errors import BadInput, expected
 from psabench.link.lineport import SAMPLE_HZ
 from psabench.link.signals import Ints
 from psabench.link.vcd import MOST_EDGES, Wire
@@ -103,5 +103,5 @@ def read_samples(path: Path, names: Sequence[str], bounds: Bounds) -> LineTake:
             x = np.frombuffer(data, np.uint8)
             sampler.feed(x.astype(np.uint64), np.flatnonzero(x & GAP))
     if not sampler.samples:
-        raise BadInput(f"{path}: the file is empty")
+        raise BadInput(expected("samples", "an empty file", path))
     return sampler.take()

@@ -32,28 +32,30 @@ def read_sr(path: Path, bounds: Bounds) -> LineTake:
         with zipfile.ZipFile(path) as archive:
             return _session(path, archive, bounds)
     except (zipfile.BadZipFile, EOFError, NotImplementedError, RuntimeError, ValueError, zlib.error) as e:
-        raise BadInput(f"{path}: no sigrok session: {e}; is it cut short?") from e
+        raise BadInput(expected("a whole sigrok session", e, path)) from e
 
 
 def _session(path: Path, archive: zipfile.ZipFile, bounds: Bounds) -> LineTake:
     members = archive.infolist()
     size = sum(m.file_size for m in members)
     if len(members) > MOST_MEMBERS or size > min(MOST_BYTES, MOST_RATIO * max(1, path.stat().st_size)):
-        raise BadInput(f"{path}: claims {len(members)} members of {size} bytes in all: more than a session can have")
+        raise BadInput(
+            expected(f"at most {MOST_MEMBERS} members, {MOST_BYTES} bytes", f"{len(members)}, {size} bytes", path)
+        )
     if odd := [m.filename for m in members if m.compress_type not in PLAIN or m.flag_bits & 1]:
-        raise BadInput(f"{path}: {odd[0][:40]!r} is packed in a way that sigrok does not use")
+        raise BadInput(expected("members packed as sigrok does (stored or deflated)", repr(odd[0][:40]), path))
     by_name = {m.filename: m for m in members}
     if "metadata" not in by_name or by_name["metadata"].file_size > MOST_METADATA:
-        raise BadInput(f"{path}: no metadata, or more than {MOST_METADATA} bytes of them: no sigrok session")
+        raise BadInput(expected(f"metadata of {MOST_METADATA} bytes at most", "none or more", path))
     device = _device(path, archive.read("metadata").decode("utf-8", "replace"))
     names, bits = _probes(path, device)
     width = _number(path, device, "unitsize", 1, 8)
     sampler = Sampler(names, bits, bounds.line_hz or _rate(path, device), bounds.max_s)
     if max(bits) >= 8 * width:
-        raise BadInput(f"{path}: metadata: probe {max(bits) + 1} does not fit into samples of {width} bytes")
+        raise BadInput(expected(f"probes in {width} bytes", f"probe {max(bits) + 1}", f"{path}: metadata"))
     broken = _feed(archive, _chunks(path, by_name, device.get("capturefile", "logic-1")), width, sampler)
     if not sampler.samples:
-        raise BadInput(f"{path}: no samples{broken and f' ({broken})'}")
+        raise BadInput(expected("samples", f"none{broken and f' ({broken})'}", path))
     sampler.note = sampler.note or broken
     return sampler.take()
 
@@ -66,7 +68,7 @@ def _device(path: Path, text: str) -> Mapping[str, str]:
         raise BadInput(f"{path}: metadata: {str(e).splitlines()[0]}") from e
     with_probes = [s for s in parser.sections() if s.startswith("device") and "capturefile" in parser[s]]
     if not with_probes:
-        raise BadInput(f"{path}: metadata: no device with logic samples (capturefile)")
+        raise BadInput(expected("a device with logic samples (capturefile)", "none", f"{path}: metadata"))
     return dict(parser[with_probes[0]])
 
 
@@ -81,7 +83,7 @@ def _probes(path: Path, device: Mapping[str, str]) -> tuple[list[str], list[int]
     total = _number(path, device, "total probes", 1, MOST_CHANNELS)
     found = [(device[f"probe{k}"].strip(), k - 1) for k in range(1, total + 1) if f"probe{k}" in device]
     if not found or len({n for n, _ in found}) != len(found):
-        raise BadInput(f"{path}: metadata: probes without names, or two of one name")
+        raise BadInput(expected("probes with names, each once", "none or one twice", f"{path}: metadata"))
     return [n for n, _ in found], [b for _, b in found]
 
 
@@ -90,7 +92,7 @@ def _rate(path: Path, device: Mapping[str, str]) -> float:
     m = RATE.fullmatch(text)
     hz = float(m[1]) * UNITS[m[2].lower()] if m else 0.0
     if not 0.0 < hz <= 1e12:
-        raise BadInput(f"{path}: metadata: samplerate is {text[:20]!r}; say it with --line-hz")
+        raise BadInput(expected("a sample rate, or --line-hz", repr(text[:20]), f"{path}: metadata: samplerate"))
     return hz
 
 
@@ -100,9 +102,9 @@ def _chunks(path: Path, by_name: Mapping[str, zipfile.ZipInfo], base: str) -> li
     parts = sorted((int(m[1]), name) for name in by_name if (m := numbered.fullmatch(name)))
     names = [n for _, n in parts] or [n for n in (base,) if n in by_name]
     if not names:
-        raise BadInput(f"{path}: no member {base} or {base}-1: no samples")
+        raise BadInput(expected(f"a member {base} or {base}-1 with samples", "none", path))
     if parts and [k for k, _ in parts] != list(range(1, len(parts) + 1)):
-        raise BadInput(f"{path}: of the members {base}-1, -2, ... some are missing")
+        raise BadInput(expected(f"all members {base}-1, -2, ...", "gaps in their numbers", path))
     return [by_name[n] for n in names]
 
 

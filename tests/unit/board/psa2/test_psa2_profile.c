@@ -62,34 +62,41 @@ static void what_a_board_cannot_run_is_refused_in_words(void **state)
         const char *why;
     } rows[] = {
         {{{"lead_in_clk", "7"}},
-         "INT low = (7 + 4*32 + 3*4) CLK / 2.000 MHz = 73.500 us < 74 us: use lead_in_clk >= 8 or line_div >= 2"},
+         "INT low: expected 74 us or more (lead_in_clk >= 8 or line_div >= 2), got (7 + 4*32 + 3*4) CLK / 2.000 MHz = "
+         "73.500 us"},
         {{{"line_hz", "2048000"}, {"lead_in_clk", "0"}},
-         "INT low = (0 + 4*32 + 3*4) CLK / 2.048 MHz = 68.359 us < 74 us: use lead_in_clk >= 12 or line_div >= 2"},
+         "INT low: expected 74 us or more (lead_in_clk >= 12 or line_div >= 2), got (0 + 4*32 + 3*4) CLK / 2.048 MHz = "
+         "68.359 us"},
         {{{"word_bits", "16"}, {"code_bits", "16"}},
-         "INT low = (8 + 4*16 + 3*4) CLK / 2.000 MHz = 42.000 us < 74 us: use lead_in_clk >= 72 or line_div >= 2"},
+         "INT low: expected 74 us or more (lead_in_clk >= 72 or line_div >= 2), got (8 + 4*16 + 3*4) CLK / 2.000 MHz = "
+         "42.000 us"},
         {{{"word_bits", "24"}},
-         "INT low = (8 + 4*24 + 3*4) CLK / 2.000 MHz = 58.000 us < 74 us: use lead_in_clk >= 40 or line_div >= 2"},
-        {{{"word_bits", "16"}}, "code_bits = 24 do not fit into word_bits = 16: use code_bits <= 16 or longer words"},
-        {{{"word_bits", "20"}}, "word_bits = 20: use 16, 24 or 32"},
-        {{{"code_bits", "32"}}, "code_bits = 32 but only read_bits = 24 are read: use read_bits >= 32"},
-        {{{"sclk_hz", "2048000"}}, "sclk_hz = 2048000 > temp_clkin_hz / 4 = 1920000: use a slower SClk"},
+         "INT low: expected 74 us or more (lead_in_clk >= 40 or line_div >= 2), got (8 + 4*24 + 3*4) CLK / 2.000 MHz = "
+         "58.000 us"},
+        {{{"word_bits", "16"}}, "code_bits: expected up to word_bits = 16, got 24"},
+        {{{"word_bits", "20"}}, "word_bits: expected 16, 24 or 32, got 20"},
+        {{{"code_bits", "32"}}, "code_bits: expected up to read_bits = 24, got 32"},
+        {{{"sclk_hz", "2048000"}}, "sclk_hz: expected up to temp_clkin_hz / 4 = 1920000, got 2048000"},
         {{{"line_hz", "2000300"}},
-         "INT low = (8 + 4*32 + 3*4) CLK / 2.000 MHz = 73.988 us < 74 us: use lead_in_clk >= 9 or line_div >= 2"},
-        {{{"fclk_hz", "1500000"}}, "sclk_hz = 1024000 > fclk_hz / 2 = 750000: use a slower SClk"},
-        {{{"sclk_hz", "200000"}}, "sclk_hz = 200000 < fclk_hz / 16 = 256000: use a faster SClk"},
-        {{{"adc_pga", "3"}}, "adc_pga = 3: use 1, 2, 4, 8, 16, 32 or 64"},
-        {{{"adc_is_1281", "true"}}, "adc_pga = 2: the ADS1281 has no gain stage, use 1 or adc_is_1281: false"},
-        {{{"line_div", "10"}}, "a word lasts 32 CLK / 0.200 MHz = 160.000 us > 150 us: use a faster CLK"},
-        {{{"word", "Y"}}, "word: each of X, Y, Z, T must be sent once"},
+         "INT low: expected 74 us or more (lead_in_clk >= 9 or line_div >= 2), got (8 + 4*32 + 3*4) CLK / 2.000 MHz = "
+         "73.988 us"},
+        {{{"fclk_hz", "1500000"}}, "sclk_hz: expected up to fclk_hz / 2 = 750000, got 1024000"},
+        {{{"sclk_hz", "200000"}}, "sclk_hz: expected fclk_hz / 16 = 256000 or more, got 200000"},
+        {{{"adc_pga", "3"}}, "adc_pga: expected 1, 2, 4, 8, 16, 32 or 64, got 3"},
+        {{{"adc_is_1281", "true"}},
+         "adc_pga: expected 1 (the ADS1281 has no gain stage), or adc_is_1281: false, got 2"},
+        {{{"line_div", "10"}}, "word: expected up to 150 us (a faster CLK), got 32 CLK / 0.200 MHz = 160.000 us"},
+        {{{"word", "Y"}}, "word: expected each of X, Y, Z, T once"},
         {{{"setup", "DRD_A write_A 41 00 51"}},
-         "setup: KPSA cannot read CONFIG0 = 51h: use pulse sync (bit 7 = 0), DR 000 to 100, FILTR 10"},
+         "setup: CONFIG0: expected pulse sync (bit 7 = 0), DR 000 to 100 and FILTR 10, which KPSA reads, got 51h"},
         {{{"setup", "DRD_A write_A 41 00 D6"}},
-         "setup: KPSA cannot read CONFIG0 = D6h: use pulse sync (bit 7 = 0), DR 000 to 100, FILTR 10"},
+         "setup: CONFIG0: expected pulse sync (bit 7 = 0), DR 000 to 100 and FILTR 10, which KPSA reads, got D6h"},
         {{{"setup", "DRD_A write_A 41 00 6E"}},
-         "setup: KPSA cannot read CONFIG0 = 6Eh: use pulse sync (bit 7 = 0), DR 000 to 100, FILTR 10"},
+         "setup: CONFIG0: expected pulse sync (bit 7 = 0), DR 000 to 100 and FILTR 10, which KPSA reads, got 6Eh"},
         {{{"setup", "DRD_A write_A 41 00 66"}, {"line_div", "4"}},
-         "reading 24 bits at 1.024 MHz (27.390 us) and INT low (296.000 us) make 323.390 us > data period 250.000 us: "
-         "use a faster sclk_hz or CLK, or a lower data rate in setup"},
+         "frame: expected up to the data period, 250.000 us (a faster sclk_hz or CLK, or a lower data rate in setup), "
+         "got "
+         "24 bits at 1.024 MHz (27.390 us) and INT low (296.000 us), 323.390 us in all"},
     };
     for (size_t i = 0; i < COUNT(rows); i++) {
         struct psa2_profile p = psa2_profile_default();
