@@ -42,7 +42,7 @@ def candump_of(path: Path, max_s: float, most_frames: int) -> tuple[IO[bytes], s
             raise ValueError(expected("MDF at the beginning", "another file"))
     if not asammdf_is_there():
         raise ValueError(
-            expected(f"asammdf (tools/setup) or a log: can_logconvert {path.name} {path.stem}.log", "none")
+            expected(f"asammdf (pip install asammdf), or can_logconvert {path.name} {path.stem}.log", "none")
         )
     log = tempfile.TemporaryFile()  # noqa: SIM115 (the reader closes it)
     with (
