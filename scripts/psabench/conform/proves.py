@@ -7,20 +7,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from psabench.conform.capture.log import Capture
 from psabench.conform.requirements import Requirement, requirements
 from psabench.errors import expected
 
-Test = TypeVar("Test", bound=Callable[..., Any])
+Test = TypeVar("Test", bound=Callable[..., str])
 
 
 @dataclass(frozen=True, slots=True)
 class SuiteTest:
     """A test of the suite and the ids of what it proves."""
 
-    test: Callable[..., Any]
+    test: Callable[..., str]
     ids: tuple[str, ...]
 
 

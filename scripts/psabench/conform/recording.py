@@ -25,7 +25,7 @@ from psabench.conform.sources import clocks
 from psabench.conform.sources.clocks import BEATS, Clocks, Ratio
 from psabench.conform.sources.files import Recording
 from psabench.conform.sources.lines import Recorded
-from psabench.conform.verdict import Failed, Inconclusive, Outcome, Verdict
+from psabench.conform.verdict import Failed, Inconclusive, Outcome, Unseen, Verdict, decide, not_decided
 from psabench.errors import BadInput, BenchError, expected
 from psabench.link.signals import Ints
 from psabench.link.vcd import Vcd, Wire
@@ -337,13 +337,7 @@ def _clock_outcome(bench: Bench, only: Sequence[str]) -> Iterator[Outcome]:
 def _outcome_of(bench: Bench, proof: SuiteTest, rows: tuple[Requirement, ...], keep: Keep) -> Outcome:
     plan = plan_of(proof.test)
     begun_s = time.monotonic()
-    found = Outcome(
-        test=proof.test.__name__,
-        title=(proof.test.__doc__ or proof.test.__name__).partition("\n")[0],
-        requirements=tuple(r.id for r in rows),
-        verdict=Verdict.NOT_OBSERVABLE,
-        stimulus=plan.stimulus,
-    )
+    found = not_decided(proof.test, [r.id for r in rows], plan.stimulus)
     missing = plan.needs - bench.probes
     if plan.is_active:
         return replace(found, reason="it asks the board; a recording cannot be asked")
@@ -351,7 +345,19 @@ def _outcome_of(bench: Bench, proof: SuiteTest, rows: tuple[Requirement, ...], k
         return replace(found, reason="; ".join(_missing(bench, m) for m in sorted(missing)))
     frequency = any(MARK in r.limits for r in rows)
     capture = bench.by_recorders if frequency else bench.corrected
-    return replace(_carried_out(bench, proof, capture, found, keep), took_s=time.monotonic() - begun_s)
+    words = bench.whose() if frequency else ""
+
+    def test() -> str:
+        try:
+            return proof.test(bench.part(capture, plan))
+        except Failed as e:
+            e.saw += f" ({words})" if words else ""
+            raise
+        except (Inconclusive, BenchError) as e:  # what a recording lacks cannot be asked for
+            raise Unseen(str(e)) from e
+
+    found = decide(found, test, lambda e: keep(found.test, e, _plain(capture)))
+    return replace(found, took_s=time.monotonic() - begun_s)
 
 
 # Where the device suite would name the missing option.
@@ -374,22 +380,6 @@ def _missing(bench: Bench, way: str) -> str:
     if way in ("line", "pins"):
         return "no lines were recorded"
     return UNRECORDED.get(way) or MISSING.get(way, way)
-
-
-def _carried_out(bench: Bench, proof: SuiteTest, capture: Capture, open_: Outcome, keep: Keep) -> Outcome:
-    try:
-        part = bench.part(capture, plan_of(proof.test))
-        return replace(open_, verdict=Verdict.PASSED, saw=proof.test(part))
-    except Failed as e:
-        files = keep(open_.test, e, _plain(capture))
-        words = bench.whose() if capture is bench.by_recorders else ""
-        saw = f"{e.saw} ({words})" if words else e.saw
-        return replace(open_, verdict=Verdict.FAILED, saw=saw, due=e.due, at_ns=e.at_ns, excerpts=files)
-    except (Inconclusive, BenchError) as e:
-        return replace(open_, reason=str(e))
-    except Exception as e:  # a test that cannot take what a file may hold is ours to mend, and the report goes on
-        reason = f"the test itself failed: {type(e).__name__}: {str(e)[:200]}"
-        return replace(open_, verdict=Verdict.INCONCLUSIVE, reason=reason)
 
 
 def _plain(e: Capture) -> Capture:

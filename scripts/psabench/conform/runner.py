@@ -16,8 +16,8 @@ from psabench.conform.plan import Plan, plan_of, stimuli
 from psabench.conform.profile import Variant
 from psabench.conform.proves import SuiteTest, suite_tests
 from psabench.conform.requirements import Requirement, requirements
-from psabench.conform.verdict import Failed, Inconclusive, Outcome, Verdict
-from psabench.errors import BenchError, DeviceError
+from psabench.conform.verdict import Failed, Inconclusive, Outcome, decide, not_decided
+from psabench.errors import BenchError
 from psabench.procedures.head_bench import Progress
 
 MISSING = {
@@ -123,31 +123,16 @@ def run(
 def _outcome_of(captures: Captures, proof: SuiteTest, rows: tuple[Requirement, ...]) -> Outcome:
     plan = plan_of(proof.test)
     begun_s = time.monotonic()
-    found = Outcome(
-        test=proof.test.__name__,
-        title=(proof.test.__doc__ or proof.test.__name__).partition("\n")[0],
-        requirements=tuple(r.id for r in rows),
-        verdict=Verdict.NOT_OBSERVABLE,
-        stimulus=plan.stimulus,
-    )
+    found = not_decided(proof.test, [r.id for r in rows], plan.stimulus)
     missing = plan.needs - captures.subject.probes
     if missing:
         return replace(found, reason="; ".join(MISSING[m] for m in sorted(missing)))
-    return replace(_carried_out(captures, proof, plan, found), took_s=time.monotonic() - begun_s)
+    capture: Capture | None = None
 
-
-def _carried_out(captures: Captures, proof: SuiteTest, plan: Plan, open_: Outcome) -> Outcome:
-    capture = None
-    try:
+    def test() -> str:
+        nonlocal capture
         capture = None if plan.is_active else captures.capture(plan.stimulus)
-        return replace(open_, verdict=Verdict.PASSED, saw=proof.test(capture or captures.subject))
-    except Failed as e:
-        files = captures.keep(open_.test, e, capture)
-        return replace(open_, verdict=Verdict.FAILED, saw=e.saw, due=e.due, at_ns=e.at_ns, excerpts=files)
-    except DeviceError as e:
-        return replace(open_, verdict=Verdict.FAILED, saw=str(e), due="no refusal")
-    except (Inconclusive, BenchError) as e:
-        return replace(open_, verdict=Verdict.INCONCLUSIVE, reason=str(e))
-    except (ArithmeticError, AssertionError, AttributeError, LookupError, TypeError, ValueError) as e:
-        # an error of the test's own: the other tests still run
-        return replace(open_, verdict=Verdict.INCONCLUSIVE, reason=f"the test itself failed: {type(e).__name__}: {e}")
+        return proof.test(capture or captures.subject)
+
+    found = decide(found, test, lambda e: captures.keep(found.test, e, capture))
+    return replace(found, took_s=time.monotonic() - begun_s)

@@ -1,16 +1,18 @@
 """What a test came to, and how a test says so.
 
-A test returns in words what it saw; it raises `Failed` where that is not what was due, and `Inconclusive` where what it
-got does not suffice to say either.
+A test returns in words what it saw. It raises `Failed` where that is not what was due, `Inconclusive` where what it got
+does not suffice to say either, and `Unseen` where there is nothing to look at. Only `decide` turns this into a verdict:
+for a board, a recording and a host.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from enum import Enum
 
 from psabench.conform.capture.log import CanFrame
+from psabench.errors import BenchError, DeviceError
 
 
 class Verdict(Enum):
@@ -48,6 +50,10 @@ class Inconclusive(Exception):
     """Neither met nor broken: the words say what would be needed."""
 
 
+class Unseen(Exception):
+    """Not observable in what was captured: the words say why."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
     """Of one test on one board."""
@@ -63,6 +69,37 @@ class Outcome:
     stimulus: str = ""
     took_s: float = 0.0
     excerpts: tuple[str, ...] = ()  # files of the report's folder: VCD excerpt, picture, CAN excerpt
+
+
+def not_decided(test: Callable[..., str], ids: Sequence[str], stimulus: str) -> Outcome:
+    """The outcome of a test before it runs."""
+    title = (test.__doc__ or test.__name__).partition("\n")[0]
+    return Outcome(
+        test=test.__name__,
+        title=title,
+        requirements=tuple(ids),
+        verdict=Verdict.NOT_OBSERVABLE,
+        stimulus=stimulus,
+    )
+
+
+def decide(open_: Outcome, test: Callable[[], str], keep: Callable[[Failed], tuple[str, ...]]) -> Outcome:
+    """Run a test and take its verdict; keep: writes the excerpts that show a failure. Raises OSError."""
+    try:
+        return replace(open_, verdict=Verdict.PASSED, saw=test())
+    except Failed as e:
+        return replace(open_, verdict=Verdict.FAILED, saw=e.saw, due=e.due, at_ns=e.at_ns, excerpts=keep(e))
+    except DeviceError as e:
+        return replace(open_, verdict=Verdict.FAILED, saw=str(e), due="no error from the board")
+    except Unseen as e:
+        return replace(open_, verdict=Verdict.NOT_OBSERVABLE, reason=str(e))
+    except (Inconclusive, BenchError) as e:
+        return replace(open_, verdict=Verdict.INCONCLUSIVE, reason=str(e))
+    except OSError:
+        raise
+    except Exception as e:  # an error of the test's own: the other tests still run
+        reason = f"the test itself failed: {type(e).__name__}: {str(e)[:200]}"
+        return replace(open_, verdict=Verdict.INCONCLUSIVE, reason=reason)
 
 
 def conforms(verdicts: Sequence[Verdict]) -> bool:

@@ -29,10 +29,6 @@ HEARTBEAT_S = 1.0  # 1017h as the board has it
 STOOD_S = 0.04  # the bench may have stood still for so long before a host may take the board for silent
 
 
-class Unseen(Exception):
-    """Not observable with this host: the words say why."""
-
-
 @dataclass(slots=True)
 class Match:
     """The host's samples against those that were sent, in their order."""

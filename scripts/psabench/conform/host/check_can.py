@@ -9,8 +9,8 @@ import numpy as np
 from psabench.boards.objects import Common, Psa2Objects
 from psabench.conform.host.capture import SDO_RX, SDO_TX, SEQS, WRAP_US, Frame, number
 from psabench.conform.host.cases_units import UNIT_CASES
-from psabench.conform.host.check import HostCapture, Unseen, checks, enough, limits, proves
-from psabench.conform.verdict import Failed
+from psabench.conform.host.check import HostCapture, checks, enough, limits, proves
+from psabench.conform.verdict import Failed, Unseen
 
 READ, ABORT = 0x40, 0x80  # command specifiers of SDO
 FAST, TOG = 0x380, 63  # PSA2_FAST, and the bit of it that tells the frame's number, even or odd

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from psabench.conform.host.cases_line import LINE_CASES, due, falls_us
-from psabench.conform.host.check import HostCapture, Unseen, checks, limits, proves
+from psabench.conform.host.check import HostCapture, checks, limits, proves
 from psabench.conform.host.line_waves import LineFrame, form_of
 from psabench.conform.host.results import Sample
-from psabench.conform.verdict import Failed
+from psabench.conform.verdict import Failed, Unseen
 
 ALL_BITS, LOW_BITS, NO_BITS = -1, 0xFF, 0  # of codes that are held against each other
 

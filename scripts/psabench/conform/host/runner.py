@@ -16,13 +16,13 @@ from psabench.conform.host.capture import Bus, read_log
 from psabench.conform.host.cases_can import CASES, NODE, Case
 from psabench.conform.host.cases_line import LINE_CASES, LineCase, samples
 from psabench.conform.host.cases_units import UNIT_CASES, load_checks
-from psabench.conform.host.check import CaseCheck, HostCapture, Unseen, case_checks
+from psabench.conform.host.check import CaseCheck, HostCapture, case_checks
 from psabench.conform.host.line_waves import form_of
 from psabench.conform.host.stimulus import READY_S, ByHand, HostBench, Program, drain, expand
 from psabench.conform.host.stimulus_bus import BusBridge
 from psabench.conform.host.stimulus_line import LinePort
 from psabench.conform.profile import variant
-from psabench.conform.verdict import Failed, Inconclusive, Outcome, Verdict
+from psabench.conform.verdict import Inconclusive, Outcome, decide, not_decided
 from psabench.emulator import Emulator
 from psabench.errors import BadInput, BenchError, expected
 from psabench.link.control import Control
@@ -90,21 +90,14 @@ def run(play: Play, tests: Sequence[CaseCheck], progress: Progress, told: Callab
 
 def judge(j: CaseCheck, shown: HostCapture | Exception, folder: Path) -> Outcome:
     """One test of the capture of its case."""
-    title = f"{(j.test.__doc__ or '').partition(chr(10))[0]}"
     excerpts = tuple(f"{j.case}.{end}" for end in ("log", "jsonl", "stderr") if (folder / f"{j.case}.{end}").exists())
-    open_ = Outcome(
-        test=j.test.__name__, title=title, requirements=j.ids, verdict=Verdict.INCONCLUSIVE, stimulus=j.case
-    )
-    if isinstance(shown, Exception):
-        return replace(open_, reason=str(shown))
-    try:
-        return replace(open_, verdict=Verdict.PASSED, saw=j.test(shown))
-    except Failed as e:
-        return replace(open_, verdict=Verdict.FAILED, saw=e.saw, due=e.due, excerpts=excerpts)
-    except Unseen as e:
-        return replace(open_, verdict=Verdict.NOT_OBSERVABLE, reason=str(e))
-    except Inconclusive as e:
-        return replace(open_, reason=str(e))
+
+    def test() -> str:
+        if isinstance(shown, Exception):
+            raise Inconclusive(str(shown))
+        return j.test(shown)
+
+    return decide(not_decided(j.test, j.ids, j.case), test, lambda _: excerpts)
 
 
 def perform(play: Play, name: str) -> HostCapture:
