@@ -38,7 +38,7 @@ CONFORM = "psa2:article psa2:lab32 psa1:psa1 psd1:psd1 psd1:psd1_host pmka:pmka 
 SIM_S = 2.0  # of each run in free pace
 STEPS: list[
     tuple[str, dict[str, Any]]
-] = [  # what a snapshot has behind it; a command that a bench refuses changes nothing
+] = [  # what a snapshot has behind it; a command that a bench rejects changes nothing
     ("run", {"for_s": 0.2}),
     ("head.turn", {"angle_deg": 30}),
     ("table.rate", {"axis": 1, "rate_dps": 5}),

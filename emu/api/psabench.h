@@ -57,7 +57,7 @@ enum psabench_error {
         -1,                 /* no such pin, input, register, option; a level that is not 0 or 1; time that runs back;
                                    not allowed from a callback */
     PSABENCH_NOT_HERE = -2, /* this part has nothing of the kind: SPI of a board, frames of a chip */
-    PSABENCH_REFUSED = -3,  /* a board refuses to write a register: read-only, or a value its chip does not take */
+    PSABENCH_REFUSED = -3,  /* a board rejects a register write: read-only, or a value its chip does not take */
     PSABENCH_TIMEOUT = -4,  /* it did not happen within the time given */
     PSABENCH_SYSTEM = -5    /* file, memory */
 };
@@ -151,7 +151,7 @@ PSABENCH_API int psabench_spi_clock(psabench_part *p, uint32_t sclk_hz, int64_t 
 
 /* Register, 0..255, or an error. psa2: 256 * group + address, groups as in psabench_board_read(). */
 PSABENCH_API int psabench_peek(const psabench_part *p, unsigned address);
-/* Counters of what the part did, suffered and refused: name of number i, NULL behind the last. */
+/* Counters of what the part did, suffered and rejected: name of number i, NULL behind the last. */
 PSABENCH_API const char *psabench_counter(const psabench_part *p, int i, uint64_t *value);
 
 /* ---- Frames of a board ---- */

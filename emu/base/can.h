@@ -72,7 +72,7 @@ struct can_node {
 
 struct can_bus_cfg {
     uint32_t bitrate_hz;      /* nominal phase; 0: ideal bus, no time passes */
-    uint32_t data_bitrate_hz; /* data phase of FD frames with BRS; 0: a classic bus, FD frames are refused */
+    uint32_t data_bitrate_hz; /* data phase of FD frames with BRS; 0: a classic bus, FD frames are rejected */
 };
 
 enum can_phase { CAN_IDLE, CAN_ARBITRATION, CAN_FRAME, CAN_ERROR_FRAME, CAN_IFS };

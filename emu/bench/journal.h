@@ -3,7 +3,7 @@
  *     {"t":1000,"bus":0,"came":1,"heir_of":0,"name":"can0","fd":false}     a program is on the bus, the first one
  *     {"t":2500,"bus":0,"from":1,"frame":"605#4018100100000000"}     it sent a frame (can-utils' notation; ## for FD)
  *     {"t":2500,"ran":true,"cmd":"head.turn","args":{"angle_deg":90}}     a command that changes the bench was carried out
- *     {"t":2500,"refused":true,"cmd":"supply.set",...}     one was refused on the spot: even that moves noise
+ *     {"t":2500,"refused":true,"cmd":"supply.set",...}     one was rejected on the spot: even that moves noise
  *     {"t":9000,"bus":0,"went":1}     the program has left
  *     {"t":2500,"unit":0,"cycle":3,"write":true,"data":9029,"strobe_ns":800}     one on the bus of a unit, at address 3
  *     {"t":9000,"unit":0,"watch":16383}     somebody listens to these lines of a unit (0: no one)
@@ -49,7 +49,7 @@ void journal_free(struct journal *j);
 /* Listens to the clients of a bus; before power-up. */
 void journal_follow(struct journal *j, struct can_hub *h, unsigned bus);
 
-/* A command was carried out, or its handler refused it (done: false). Those that the bench gives itself while time moves are
+/* A command was carried out, or its handler rejected it (done: false). Those that the bench gives itself while time moves are
  * left out. */
 void journal_command(struct journal *j, const struct control_command *row, const cJSON *args, bool done);
 

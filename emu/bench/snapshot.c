@@ -366,7 +366,7 @@ static bool do_cycle(struct replay *r, const struct journal_entry *e)
     if (e->unit >= b->scenario.unit_count)
         return why_fail(r->why, WHY_MAX, "expected a unit of the scenario, got %u", e->unit);
     if (!b->unit[e->unit].type->bus) return why_fail(r->why, WHY_MAX, "expected a unit with a bus, got %u", e->unit);
-    (void)bench_cycle(b, e->unit, &(struct bench_cycle){.cycle = e->cycle}, e->t_ns); /* refused again, if it was */
+    (void)bench_cycle(b, e->unit, &(struct bench_cycle){.cycle = e->cycle}, e->t_ns); /* rejected again, if it was */
     return true;
 }
 

@@ -7,7 +7,7 @@
  *     {"sha256":"..."}                        of all bytes before this line
  *
  * To restore is to do it again, at the pace of the machine; nothing of the present state is stored, so a file is small and
- * can be read, and what it makes is the same bench to the last bit or is refused. One thread. */
+ * can be read, and what it makes is the same bench to the last bit or is rejected. One thread. */
 #ifndef PSABENCH_BENCH_SNAPSHOT_H
 #define PSABENCH_BENCH_SNAPSHOT_H
 

@@ -16,7 +16,7 @@ struct timeline {
     unsigned order[SCENARIO_EVENTS_MAX]; /* by time, then as written */
     unsigned next;
     uint32_t refused;
-    void (*say)(void *ctx, const char *text); /* an entry was refused: one line */
+    void (*say)(void *ctx, const char *text); /* an entry was rejected: one line */
     void *say_ctx;
 };
 

@@ -46,14 +46,14 @@ struct board_bus {
     unsigned addresses;
     const char *(*name)(unsigned address); /* of what is there: "X"; NULL: nothing */
     struct board_strobe (*strobe)(const struct board *board);
-    /* Of a cycle refused as BAD_VALUE or NOT_READY, what would be right, a clause: "it takes 0 to 3". May write nothing. */
+    /* Of a cycle rejected as BAD_VALUE or NOT_READY, what would be right, a clause: "it takes 0 to 3". May write nothing. */
     void (*expected)(const struct board *board, const struct board_cycle *c, enum board_cycle_result r, char *out,
                      size_t cap);
 };
 
 #define BOARD_CYCLE_WHY_MAX 190u
 
-/* Why a cycle was refused, and what would be right, for a human: "read of address 0Ah (TEMP), strobe 50 ns: ...". An address is
+/* Why a cycle was rejected, and what would be right, for a human: "read of address 0Ah (TEMP), strobe 50 ns: ...". An address is
  * written so wherever one is: two hexadecimal digits and h. */
 void board_cycle_why(const struct board_bus *bus, const struct board *board, const struct board_cycle *c,
                      enum board_cycle_result r, char out[BOARD_CYCLE_WHY_MAX]);

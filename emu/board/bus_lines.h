@@ -1,6 +1,6 @@
 /* Lines of a board's parallel bus while a cycle is under way: CS and R/W low as its strobe and its direction say, A3..A0, and
  * D15..D0, driven by the host or by the board from the beginning of the strobe to its end; 0 in between (PSD-1's convention,
- * E0). A cycle that is refused at once is none: nothing moves. */
+ * E0). A cycle that is rejected at once is none: nothing moves. */
 #ifndef PSABENCH_BOARD_BUS_LINES_H
 #define PSABENCH_BOARD_BUS_LINES_H
 

@@ -15,7 +15,7 @@ struct board_can_cfg {
     const char *name;                                              /* kept by pointer */
     const struct board_type *type;                                 /* of the board */
     uint8_t node_id;                                               /* 1..127 */
-    void (*refused)(void *ctx, const char *name, const char *why); /* a setting was refused, in words; may be NULL */
+    void (*refused)(void *ctx, const char *name, const char *why); /* a setting was rejected, in words; may be NULL */
     void *ctx;
 };
 struct board_can {

@@ -67,7 +67,7 @@ static enum control_outcome reject_motion(struct control *c, enum motion_result 
                           motion_result_text(r), a ? a->rate_max_dps : 0.0, a ? a->accel_max_dps2 : 0.0);
 }
 
-/* Motions are tried on a copy, so that one that is refused leaves no trace; what was before the command is sampled before
+/* Motions are tried on a copy, so that one that is rejected leaves no trace; what was before the command is sampled before
  * the copy takes the table's place. */
 static enum control_outcome take_motion(struct control *c, const struct table *tried, enum motion_result r,
                                         const struct control_value *v, cJSON *result, int64_t t_ns)

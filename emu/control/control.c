@@ -18,7 +18,7 @@ enum control_outcome control_do(struct control *c, const struct control_command 
                                 cJSON *result, int64_t t_ns)
 {
     const enum control_outcome outcome = row->run(c, v, result, t_ns);
-    /* Refused by its handler, too: converters may have taken their inputs by then, which moves their noise. */
+    /* Rejected by its handler, too: converters may have taken their inputs by then, which moves their noise. */
     if (row->changes && c->bench->process.journal) {
         cJSON *args = control_args_json(row, v);
         c->bench->process.journal(c->bench->ctx, row, args, outcome != CONTROL_REJECTED, t_ns);

@@ -4,8 +4,8 @@
  *   {"id":1,"ok":true,"t_ns":20000000,"can_rx":12,"rx":{"1":12},"result":{...}}
  *   {"id":1,"ok":false,"t_ns":20000000,"can_rx":12,"rx":{"1":12},"error":{"code":"range","text":"..."}}
  *
- * Every command is a row {name, one sentence, arguments with unit and range, handler}; JSON, SCPI, help, the refusals and the
- * pages of the manual come from the same rows. Arguments are checked before a handler runs: a refused command changes
+ * Every command is a row {name, one sentence, arguments with unit and range, handler}; JSON, SCPI, help, the rejections and the
+ * pages of the manual come from the same rows. Arguments are checked before a handler runs: a rejected command changes
  * nothing. The bench is reached through struct control_bench; the application fills it in and moves the time. One thread. */
 #ifndef PSABENCH_CONTROL_CONTROL_H
 #define PSABENCH_CONTROL_CONTROL_H

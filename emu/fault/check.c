@@ -1,4 +1,4 @@
-/* Which faults are refused, and why: the kind, the point, the values, the instant. */
+/* Which faults are rejected, and why: the kind, the point, the values, the instant. */
 #include "fault/internal.h"
 
 #include "command/args.h"

@@ -3,7 +3,7 @@
  * A kind of fault is a row of a table (fault_tables): its layer, the places it can happen at, the arguments it takes, and
  * how it is injected and cleared. A fault is a kind at a point, `a.sensor.x`, begun at an instant of simulated time or
  * by an event of a board, and lifted after a time or by command. Random ones draw from rng_stream(seed, id, "fault").
- * What a point does not support is refused with the reason. Several faults may be at one point. One thread; owned by the
+ * What a point does not support is rejected with the reason. Several faults may be at one point. One thread; owned by the
  * application, never moved after fault_init(). */
 #ifndef PSABENCH_FAULT_FAULT_H
 #define PSABENCH_FAULT_FAULT_H
@@ -59,7 +59,7 @@ struct fault_kind {
     const char *name;   /* layer.name */
     const char *what;   /* one sentence */
     const char *seen;   /* how a host sees it, one sentence */
-    const char *unless; /* what `fits` refuses, for the page; NULL: nothing */
+    const char *unless; /* what `fits` rejects, for the page; NULL: nothing */
     unsigned variant;   /* which of its layer's, for apply */
     uint64_t places;    /* bits of enum fault_place */
     uint64_t need, may; /* bits of enum fault_arg: the values it must be given, those it may */

@@ -34,7 +34,7 @@ static void add_args(struct text *t, const struct fault_kind *k)
 bool fault_markdown(unsigned line, char *out, size_t cap)
 {
     struct text t = {.out = out, .cap = cap};
-    if (line == 0) add_text(&t, "| kind | what it does | takes | how a host sees it | refused if |");
+    if (line == 0) add_text(&t, "| kind | what it does | takes | how a host sees it | rejected if |");
     if (line == 1) add_text(&t, "|---|---|---|---|---|");
     if (line < 2) return true;
     const struct fault_kind *k = fault_kind(line - 2);
@@ -64,8 +64,8 @@ bool fault_markdown_matrix(unsigned line, char *out, size_t cap)
     for (unsigned i = 0; i < FAULT_PLACES; i++) {
         if (line == 0) add_place(&t, (enum fault_place)i);
         else if (line == 1) add_text(&t, "---|");
-        else if (!(k->places & FAULT_BIT(i))) add_text(&t, " refused |");
-        else add_text(&t, k->fits ? " seen, or refused (above) |" : " seen |");
+        else if (!(k->places & FAULT_BIT(i))) add_text(&t, " rejected |");
+        else add_text(&t, k->fits ? " seen, or rejected (above) |" : " seen |");
     }
     return true;
 }

@@ -34,7 +34,7 @@ static double range_v(const struct unit *u)
     return u->type->range_v ? u->type->range_v(u->board) : 10.0;
 }
 
-/* What a board tells apart: less is refused. */
+/* What a board tells apart: less is rejected. */
 static double least_v(const struct unit *u)
 {
     return u->type->code_v ? fmax(FAULT_LEAST_V, u->type->code_v(u->board)) : FAULT_LEAST_V;

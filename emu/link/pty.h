@@ -23,7 +23,7 @@ struct pty {
 };
 
 /* Opens the pair; the caller adds the watch to the loop's links. name: symbolic link to make (an old link to a pty is
- * replaced, anything else is refused with -EEXIST); may be
+ * replaced, anything else is rejected with -EEXIST); may be
  * NULL. 0, or -errno with nothing left behind. */
 int pty_open(struct pty *p, const char *name);
 

@@ -5,7 +5,7 @@
  * right, y_c forward; psi clockwise from north, pitch nose up, roll right wing down. q is the angle of the gimbal about z_c:
  * x_p = cos q x_c + sin q y_c. Equations (1) to (19) are the article's, with the errata of docs/nav.md.
  * All functions are pure: no state, no allocation, nothing printed, any thread. Angles in rad, rates in rad/s. Functions that
- * return int return NAV_OK or a refusal below zero and then leave their outputs as they were; those that return double give
+ * return int return NAV_OK or a rejection below zero and then leave their outputs as they were; those that return double give
  * NaN for an angle that is not finite or beyond 1e6 rad, and for what has no answer. */
 #ifndef PSABENCH_NAV_H
 #define PSABENCH_NAV_H
@@ -35,7 +35,7 @@ enum nav_status {
 };
 NAV_API const char *nav_status_text(int status); /* one sentence */
 
-/* Why a call would be refused, for a person: "field is value; want". */
+/* Why a call would be rejected, for a person: "field is value; want". */
 struct nav_refusal {
     int status;        /* enum nav_status; NAV_OK: it would not be */
     int position;      /* whose field it is, from 0; -1: of the configuration */

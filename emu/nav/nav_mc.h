@@ -67,7 +67,7 @@ struct nav_mc_out {
 
 /* Errors of first order in jointly Gaussian means of the windows: the algebra once, then nanoseconds a run. Tilts enter
  * through the gimbal's error and times the errors of level sensors, latitude and torquer; errors beyond that order are
- * refused with NAV_RANGE (nav_mc_check()). */
+ * rejected with NAV_RANGE (nav_mc_check()). */
 NAV_API int nav_mc_closed(const struct nav_mc_cfg *cfg, uint64_t seed, uint64_t first_run, uint64_t runs,
                           const struct nav_mc_out *out);
 /* Drift and noise sample by sample, settled algebra of rest, nav_gyrocompass() at the end of each run. */

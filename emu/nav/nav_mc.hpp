@@ -8,7 +8,7 @@
 
 /* Middles and lengths of the windows, angles as increments; S, beta and gamma 0. The first window begins at t = 0. */
 void mc_schedule(const struct nav_mc_cfg *cfg, struct nav_position *p);
-/* Of nav_mc_samples(), and what the models of first order refuse besides. */
+/* Of nav_mc_samples(), and what the models of first order reject besides. */
 int mc_refusal(const struct nav_mc_cfg *cfg, struct nav_refusal *why);
 int mc_first_order_refusal(const struct nav_mc_cfg *cfg, struct nav_refusal *why);
 double mc_samples_per_window(const struct nav_mc_cfg *cfg);

@@ -122,7 +122,7 @@ static int angles_refusal(const struct nav_mc_cfg *c, struct nav_refusal *why)
     return NAV_OK;
 }
 
-/* Choices and signs; what the estimator refuses is left to it. Runs may draw either sign of the latitude's error. */
+/* Choices and signs; what the estimator rejects is left to it. Runs may draw either sign of the latitude's error. */
 int mc_refusal(const struct nav_mc_cfg *c, struct nav_refusal *why)
 {
     if (c->count < 3) return check_refuse(why, NAV_TOO_FEW, "count", c->count, "3 positions at least");

@@ -279,7 +279,7 @@ class Part:
 
     @property
     def counters(self) -> dict[str, int]:
-        """What the part did, suffered and refused so far."""
+        """What the part did, suffered and rejected so far."""
         handle, value, found = self.live(), ctypes.c_uint64(), dict[str, int]()
         while name := self._lib.counter(handle, len(found), value):
             found[name.decode()] = value.value

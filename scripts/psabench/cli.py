@@ -15,30 +15,30 @@ from psabench.options import Help, Parser
 
 # Help line of each command. Its module and libraries are loaded when it is called (`parse`).
 COMMANDS: Mapping[str, str] = {
-    "run": "run a procedure over the wire, grade and report it; psabench run --help names them",
-    "record": "record the bus into a log file",
-    "decode": "a log or a line capture to CSV in SI units",
-    "campaign": "a procedure with thousands of virtual instruments",
-    "conform": "does a board conform to its requirements?",
-    "shell": "talk to a bench: instruments, device, faults, with completion",
+    "run": "run a calibration or gyrocompassing procedure and report it; psabench run --help lists them",
+    "record": "record the CAN bus to a log file",
+    "decode": "convert a log or a line capture to CSV in SI units",
+    "campaign": "run a procedure on thousands of virtual instruments",
+    "conform": "check a board, a recording or a host program against the requirements",
+    "shell": "open an interactive shell: instruments, device, faults",
 }
 
 ABOUT = """\
-The host's end of the bench: talks to a converter board over CAN or the line port, whether it is psa-emu or a real one.
+Host tools for a converter board on CAN or the line port, emulated (psa-emu) or real.
 """
 
 TOP_EPILOG = """\
-a first hour:
-  psabench run all                  calibrate an accelerometer on an emulator started for it; build/run/report.html
-  psabench run gyrocompass          a gyro platform finds north; psabench run --help names all procedures
-  psa-emu stream &                  a board on the bus, 1000 frames a second, until Ctrl-C
+examples:
+  psabench run all                  calibrate an accelerometer on an emulator; report: build/run/report.html
+  psabench run gyrocompass          find north with a gyro platform
+  psa-emu stream &                  emulate a board that sends 1000 frames a second
   psabench record run.log --can socketcand:127.0.0.1:29536 --for 10
-  psabench decode run.log --out run.csv   volts against time
-  psabench shell                    registers, instruments and faults at the keyboard
-  psabench campaign gyrocompass     thousands of virtual gyrocompasses; build/campaign/report.html
-  psabench conform device --board psa2   does a board do what its documents say? build/conform/psa2-article/report.html
+  psabench decode run.log --out run.csv   convert the log to volts against time
+  psabench shell                    read registers, move instruments, inject faults
+  psabench campaign gyrocompass     Monte-Carlo study; report: build/campaign/report.html
+  psabench conform device --board psa2   check a board; report: build/conform/psa2-article/report.html
 
-psabench COMMAND --help says more. Exit status: 0 done and within limits, 1 done and out of limits, 2 bad input,
+psabench COMMAND --help lists the options. Exit status: 0 done and within limits, 1 done and out of limits, 2 bad input,
 3 the bench or a link failed, 130 ended by Ctrl-C.
 """
 

@@ -42,7 +42,7 @@ class Fault:
 
 
 class Faults:
-    """Raises BenchError on a real bench; ControlError with the reason when the emulator refuses."""
+    """Raises BenchError on a real bench; ControlError with the reason when the emulator rejects."""
 
     def __init__(self, bench: HasControl) -> None:
         self._bench = bench

@@ -4,7 +4,7 @@
     head.turn(90.0)  # returns when it stands still, with what its scale shows, deg
 
 The address is VISA's, so the same script runs with an instrument on a network, a serial line or a bus adapter. After
-each setting the instrument's error queue is read: a refusal is raised where it happened, and in lockstep the setting
+each setting the instrument's error queue is read: a rejection is raised where it happened, and in lockstep the setting
 has been made when the call returns. Nothing blocks on `*OPC?`, which would block where time moves only
 when the host says so: the state is asked, and the bench's time moves in between. The only file that imports PyVISA.
 
@@ -56,7 +56,7 @@ class Instrument:
         self.write("*RST")
 
     def write(self, command: str) -> None:
-        """Send a command that has no answer. Raises InstrumentError when the instrument refuses it."""
+        """Send a command that has no answer. Raises InstrumentError when the instrument rejects it."""
         self._raise_error(command, self._ask(f"{command}\nSYST:ERR?", command))
 
     def query(self, command: str) -> str:
@@ -313,7 +313,7 @@ def _manager() -> Any:
 
 
 def _knock(name: str, address: str) -> None:
-    """Make sure that somebody listens at a socket: PyVISA-py takes a refused connection for an open one."""
+    """Make sure that somebody listens at a socket: PyVISA-py takes a rejected connection for an open one."""
     words = address.split("::")
     if len(words) != 4 or words[3].upper() != "SOCKET":
         return

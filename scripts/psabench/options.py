@@ -15,10 +15,10 @@ from psabench.errors import BadInput, expected
 LISTED = 12  # options that an error lists
 LINE_HZ = 8_000_000.0  # psabench.link.lineport.SAMPLE_HZ, without loading NumPy
 BUS_HELP = """\
-the bus: INTERFACE:CHANNEL[,key=value...] of python-can. Examples: socketcand:127.0.0.1:29536, slcan:/dev/pts/7,
+CAN bus, as INTERFACE:CHANNEL[,key=value...] of python-can: socketcand:127.0.0.1:29536, slcan:/dev/pts/7,
 socketcan:vcan0,fd=true"""
 CAN_HELP = f"""\
-{BUS_HELP}. Without it python-can's own configuration is used ($CAN_INTERFACE, $CAN_CHANNEL, ~/.canrc)"""
+{BUS_HELP}. Default: python-can's configuration ($CAN_INTERFACE, $CAN_CHANNEL, ~/.canrc)"""
 
 
 # argparse's messages: what to make of the parts that each pattern finds, in the form of `expected`.
@@ -138,9 +138,9 @@ def add_selection(p: Any, beginning: str, out: str, default: Path | None = None)
 def add_board(p: argparse.ArgumentParser, what: str) -> None:
     """--board and --node of the unit `what`."""
     names = ", ".join(NAMES)
-    text = f"board of the unit {what}: {names} (%(default)s)"
+    text = f"board {what}: {names} (%(default)s)"
     p.add_argument("--board", type=board_name, metavar="BOARD", default="psa2", help=text)
-    p.add_argument("--node", type=node_id, help=f"node {what} (the board's usual one)")
+    p.add_argument("--node", type=node_id, help=f"CANopen node {what} (the board's default)")
 
 
 def node_of(args: argparse.Namespace) -> int:

@@ -9,7 +9,7 @@ from psabench.link.control import HasControl
 
 
 class Probe:
-    """Of an emulated bench; a real one wants a logic analyser. Raises BenchError there, ControlError when refused."""
+    """Of an emulated bench; a real one wants a logic analyser. Raises BenchError there, ControlError when rejected."""
 
     def __init__(self, bench: HasControl) -> None:
         self._bench = bench

@@ -25,7 +25,7 @@ def od_row(p: Protocol, e: Entry) -> str:
 
 
 def c_entries(o: Object) -> list[Entry]:
-    """The entries as the SDO server judges them: a cycle on the bus is for the board to refuse, not for a table."""
+    """The entries as the SDO server judges them: a cycle on the bus is for the board to reject, not for a table."""
     if o.index != BUS:
         return list(o.entries)
     named = {e.sub: e for e in o.entries}

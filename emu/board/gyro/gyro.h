@@ -119,11 +119,11 @@ struct gyro_settings gyro_settings_default(void);
 /* Takes over what was written to set. */
 void gyro_settings_changed(struct gyro *b);
 
-/* NULL, or why it is refused. */
+/* NULL, or why it is rejected. */
 const char *gyro_set_mode(struct gyro *b, enum gyro_mode mode, int64_t t_ns);
 
 /* In navigation: nods once or up to three times, a tenth of a degree there and back, and looks whether the angle sensor follows;
- * b->nod.result. NULL, or why it is refused. */
+ * b->nod.result. NULL, or why it is rejected. */
 const char *gyro_self_test(struct gyro *b, int64_t t_ns);
 bool gyro_running(const struct gyro *b); /* a run of positions, or a calibration */
 

@@ -21,7 +21,7 @@ static struct psa2_can_info info_of(const struct psa2_can *c)
 
 /* ---- whether the bus can carry the stream ---- */
 
-/* fDATA = fCLK / (16384 >> DR) in the FIR modes (sources 1.8); other modes and DR 5..7 the board refuses. */
+/* fDATA = fCLK / (16384 >> DR) in the FIR modes (sources 1.8); other modes and DR 5..7 the board rejects. */
 static int64_t config0_period_ns(uint32_t fclk_hz, uint8_t config0)
 {
     const unsigned dr = config0 >> 3 & 7u;

@@ -77,7 +77,7 @@ enum psa2_result {
     PSA2_OK,
     PSA2_NO_SUCH_REG, /* address the part does not have */
     PSA2_READ_ONLY,   /* no writable bit there */
-    PSA2_BAD_VALUE,   /* the chip refuses the value (reserved code), or models it not */
+    PSA2_BAD_VALUE,   /* the chip rejects the value (reserved code), or models it not */
     PSA2_BUSY,        /* a request is under way, or the set-up has not finished */
     PSA2_TIMEOUT      /* no data-ready within the controller's timeout */
 };

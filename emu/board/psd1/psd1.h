@@ -79,7 +79,7 @@ struct psd1_counters {
     uint32_t stretched;              /* cycles inside which a conversion ended */
     uint32_t lost_x, lost_y, lost_z; /* conversions that no one has read, as of the latest cycle or DR */
     uint32_t bus_cycles;             /* on the bus carried out, the built-in host's too */
-    uint32_t refused;                /* strobes without their word, and other cycles that were refused */
+    uint32_t refused;                /* strobes without their word, and other cycles that were rejected */
     uint32_t too_short;              /* of these: strobes shorter than strobe_min_ns */
     uint32_t cut;                    /* cycles that a reset, a command or the supply ended */
 };
@@ -99,7 +99,7 @@ void psd1_power_down(struct psd1 *b, int64_t t_ns);
 void psd1_reset(struct psd1 *b, int64_t t_ns);
 void psd1_sample_until(struct psd1 *b, int64_t t_ns);
 
-/* As board_bus.submit. While the built-in host strobes, a cycle waits its turn; its refusal then comes by done(). */
+/* As board_bus.submit. While the built-in host strobes, a cycle waits its turn; its rejection then comes by done(). */
 enum board_cycle_result psd1_submit(struct psd1 *b, struct board_cycle *c, int64_t t_ns);
 
 /* BOARD_CYCLE_OK: done() comes later, never from inside. BUSY, BAD_VALUE (with a sentence in *why), OFF. */

@@ -32,7 +32,7 @@ enum psd1_phase {
 struct psd1_strobe {
     bool busy;
     bool takes;                          /* it reads the word that waits */
-    struct board_cycle *cycle, *waiting; /* under way (NULL: the built-in host's, or refused), waits for its end */
+    struct board_cycle *cycle, *waiting; /* under way (NULL: the built-in host's, or rejected), waits for its end */
     int64_t end_ns;
     struct sched_ev ev; /* its end, but for the built-in host's */
 };

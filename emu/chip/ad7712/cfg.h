@@ -82,7 +82,7 @@ struct ad7712_io {
     void (*sclk)(void *ctx, bool level, int64_t t_ns);  /* NULL, or changes of SCLK in self-clocking mode */
 };
 
-/* What the host asked for and the chip refused or suffered. */
+/* What the host asked for and the chip rejected or suffered. */
 struct ad7712_counters {
     uint32_t conversions; /* words that reached the output register */
     uint32_t calibrations, restarts, power_downs;

@@ -77,7 +77,7 @@ struct ads1256_io {
     void (*gpio)(void *ctx, unsigned d, bool level, int64_t t_ns); /* NULL, or changes of D0..D3 as outputs */
 };
 
-/* What the bus asked for and the chip refused or suffered. Rights violations are in regs (reg.h). */
+/* What the bus asked for and the chip rejected or suffered. Rights violations are in regs (reg.h). */
 struct ads1256_counters {
     uint32_t conversions, calibrations, restarts, power_downs;
     uint32_t overruns;        /* a word was replaced before it was read */

@@ -72,7 +72,7 @@ struct ads1282_io {
     void (*modulator)(void *ctx, bool m0, bool m1, int64_t t_ns);
 };
 
-/* What the bus asked for and the chip refused or suffered. Never cleared. */
+/* What the bus asked for and the chip rejected or suffered. Never cleared. */
 struct ads1282_counters {
     uint32_t conversions, overruns; /* settled words; overrun: a word was replaced before it was read */
     uint32_t torn_reads;            /* a word was replaced while it was being read */

@@ -119,7 +119,7 @@ enum { TWO_BYTES = 1, NEEDS_SDATAC = 2, ALWAYS = 4 /* obeyed in RDATAC even by a
 /* SBAS378 p. 30; NEEDS_SDATAC is its footnote 4. */
 struct ads1282_opcode {
     uint8_t mask, match, rights;
-    uint8_t skip; /* 1: when refused, its data bytes are still data and not opcodes */
+    uint8_t skip; /* 1: when rejected, its data bytes are still data and not opcodes */
     void (*run)(struct ads1282 *a, int64_t t_ns);
 };
 
@@ -151,7 +151,7 @@ static bool is_allowed(const struct ads1282 *a, const struct ads1282_opcode *op)
     return !a->rdatac || ((!a->cfg.strict_sdatac || (op->rights & ALWAYS)) && !(op->rights & NEEDS_SDATAC));
 }
 
-/* Carries out the command whose last byte has come, or refuses it. */
+/* Carries out the command whose last byte has come, or rejects it. */
 static void execute_command(struct ads1282 *a, int64_t t_ns)
 {
     const struct ads1282_opcode *op = a->op;
@@ -181,7 +181,7 @@ static void count_byte(struct ads1282 *a, uint8_t byte, int64_t t_ns)
     execute_command(a, t_ns);
 }
 
-/* One byte of WREG data, or of a refused WREG. */
+/* One byte of WREG data, or of a rejected WREG. */
 static void data_byte(struct ads1282 *a, uint8_t byte, int64_t t_ns)
 {
     if (a->op_stage == ADS1282_WRITE) reg_write(&a->regs, a->reg_addr++, byte, t_ns);

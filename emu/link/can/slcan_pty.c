@@ -62,7 +62,7 @@ static void on_stall(struct can_client *can)
     text_link_stall(&s->io, can->stalled);
 }
 
-/* ---- commands: true is acknowledged with CR, false refused with BEL */
+/* ---- commands: true is acknowledged with CR, false rejected with BEL */
 
 static bool cmd_open(struct slcan_pty *s, const char *arg, int64_t t_ns)
 {

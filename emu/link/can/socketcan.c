@@ -98,7 +98,7 @@ static void pop_frame(struct socketcan *s)
     s->len--;
 }
 
-/* The interface is down, or refuses the frame: it is lost as on an unplugged cable, so that no client waits for it. */
+/* The interface is down, or rejects the frame: it is lost as on an unplugged cable, so that no client waits for it. */
 static void drop_frame(struct socketcan *s, int err)
 {
     if (!s->down_reported) log_line(s, strerror(err));

@@ -15,7 +15,7 @@
 struct bus_pty_ops {
     void *ctx;
     /* Begins a cycle (never BUS_WHO). NULL: it is under way, bus_pty_done() or bus_pty_failed() comes later, not from
-     * inside; else the code word of the refusal. */
+     * inside; else the code word of the rejection. */
     const char *(*submit)(void *ctx, const struct bus_request *r, int64_t t_ns);
     const char *board;                                /* "psd1" */
     unsigned addresses;                               /* from 0 */

@@ -7,7 +7,7 @@
  *     ?                                   identification
  *
  * The strobe is decimal, 1 to 999999999; without it, it has the board's own length. To the host, one line for each of its
- * lines, in their order (t: simulated ns at the end of the strobe, or of the refusal;
+ * lines, in their order (t: simulated ns at the end of the strobe, or of the rejection;
  * an address: two hex digits and h):
  *
  *     R <address> <data> t=<ns>           data: 4 hex digits

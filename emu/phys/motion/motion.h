@@ -2,7 +2,7 @@
  *
  * A command makes a plan: pieces of constant acceleration, then rest, a constant rate or a sine. Angle, rate and acceleration
  * are closed forms of time; a command in mid-motion starts from the angle and rate of that instant, so both are continuous.
- * A refused command changes nothing. The axis knows its last MOTION_HISTORY plans: an instant before the latest command gets
+ * A rejected command changes nothing. The axis knows its last MOTION_HISTORY plans: an instant before the latest command gets
  * the state of then. Plain struct, one thread; commands in order of time. */
 #ifndef PSABENCH_PHYS_MOTION_MOTION_H
 #define PSABENCH_PHYS_MOTION_MOTION_H

@@ -17,7 +17,7 @@ examples:
   psabench decode run.blf --node 7 | head
   psabench decode --line capture.bin           words from INT/DATA/CLK samples; capture: cat LINK > capture.bin
 
-Counters stand on stderr at the end: frames, lost, torn (CAN); also late, early, gaps with --line.
+Counters on stderr at the end: frames, lost, torn (CAN); also late, early, gaps with --line.
 """
 
 
@@ -25,15 +25,15 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     """What follows `psabench decode`. Raises BadInput."""
     p = Parser(
         prog="psabench decode",
-        description="Frames of one node from a CAN log, or words from a capture of the line port, as CSV.",
+        description="Convert the frames of one node in a CAN log, or the words in a capture of the line port, to CSV.",
         formatter_class=Help,
         epilog=EPILOG,
     )
     p.set_defaults(handler=_decode)
-    p.add_argument("file", type=Path, help="CAN log of python-can, or samples of the line port with --line")
+    p.add_argument("file", type=Path, help="CAN log (python-can formats), or line port samples with --line")
     p.add_argument("--out", type=Path, help="CSV file (standard output)")
     add_board(p, "to decode")
-    p.add_argument("--line", action="store_true", help="the file holds INT/DATA/CLK samples, one byte each")
+    p.add_argument("--line", action="store_true", help="read INT/DATA/CLK samples, one byte each")
     p.add_argument("--word-bits", type=int, default=32, help="word width on the line: 16, 24 or 32 (%(default)s)")
     p.add_argument("--sample-hz", type=positive, default=LINE_HZ, help="sample rate of the capture (%(default)g)")
     return p.parse_args(words)

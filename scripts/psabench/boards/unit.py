@@ -36,7 +36,7 @@ COUNTERS, REFUSAL, STROBE_NS = Common.COUNTERS, Common.REFUSAL, BusObjects.STROB
 class Unit:
     """One unit on the bus; a board's class says what its readings are.
 
-    Raises DeviceError with the unit's abort code when it refuses, LinkError when it does not answer.
+    Raises DeviceError with the unit's abort code when it rejects, LinkError when it does not answer.
     """
 
     board: ClassVar[str]  # as the EDS and the emulator call it: "psd1"
@@ -112,7 +112,7 @@ class Unit:
         return CycleRefused(e.what, e.abort_code, self.refusal() or e.text)
 
     def refusal(self) -> str:
-        """Object 2031h: why a bus cycle or a setting was refused last, in words; "": nothing was."""
+        """Object 2031h: why a bus cycle or a setting was rejected last, in words; "": nothing was."""
         return str(self.node.read(REFUSAL))
 
     # ---- as a whole

@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from psabench.campaign.page import Campaign
 
 ABOUT = """\
-Runs a procedure on thousands of virtual instruments, each with errors of its own, on all cores or on a Dask cluster:
-how often the article's claims hold, which error does it, and what better would be.
+Run a procedure on thousands of virtual instruments, each with its own errors, on all cores or on a Dask cluster.
+The report shows how often the article's claims hold, which errors matter, and what would improve them.
 """
 EPILOG = """\
 A study is a list of cases, a case an instrument with its schedule of positions (--list names all):
@@ -83,40 +83,39 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
         epilog=EPILOG.format(studies=_studies(), settings="\n".join(settings.lines())),
     )
     p.set_defaults(handler=_main)
-    p.add_argument("procedure", choices=["gyrocompass"], help="gyrocompass")
-    p.add_argument("--list", action="store_true", help="name the studies, their cases and the settings")
-    p.add_argument("--study", action="append", default=[], help="which; may be repeated (all but own; emulated: wire)")
-    p.add_argument("--case", help="only the cases of this name")
-    p.add_argument("--chain", choices=list(DEFAULT_RUNS), default="closed", help="how runs are computed (%(default)s)")
+    p.add_argument("procedure", choices=["gyrocompass"], help="procedure")
+    p.add_argument("--list", action="store_true", help="list the studies, their cases and the settings")
+    p.add_argument("--study", action="append", default=[], help="study; may be repeated (all but own; emulated: wire)")
+    p.add_argument("--case", help="run only the cases of this name")
+    p.add_argument("--chain", choices=list(DEFAULT_RUNS), default="closed", help="method of computation (%(default)s)")
     p.add_argument(
         "--scenario",
         type=Path,
         metavar="FILE",
-        help="bench of --chain emulated or wire, study own: its units, buses, sway, timeline and faults, its latitude "
-        "and its platform's errors; the campaign draws the seed, the vehicle's attitude and where the platform was "
-        "left, --set overrides the rest, and the schedule is the settings' own",
+        help="bench of --chain emulated or wire, study own; the campaign draws the seed, the attitude and the "
+        "platform's initial angle, --set overrides other values, and the schedule is that of the settings",
     )
     p.add_argument(
         "--runs",
         type=natural,
-        help=f"of each case ({DEFAULT_RUNS['closed']}; emulated: 200, wire: {DEFAULT_RUNS['wire']})",
+        help=f"runs of each case ({DEFAULT_RUNS['closed']}; emulated: 200, wire: {DEFAULT_RUNS['wire']})",
     )
-    p.add_argument("--seed", type=natural, default=1, help="of all random numbers (%(default)s)")
+    p.add_argument("--seed", type=natural, default=1, help="random seed (%(default)s)")
     p.add_argument(
         "--set",
         action="append",
         default=[],
         metavar="NAME=VALUE",
-        help="instead of the article's error set; the names stand below",
+        help="override a setting of the article's error set; names below",
     )
-    p.add_argument("--workers", type=natural, help="processes (one a core when it is worth it); 1: none but this one")
+    p.add_argument("--workers", type=natural, help="processes (one per core for long runs); 1: this process alone")
     p.add_argument(
-        "--dask", metavar="ADDRESS", help="Dask scheduler whose workers compute, such as tcp://192.0.2.7:8786"
+        "--dask", metavar="ADDRESS", help="compute on the workers of this Dask scheduler, as tcp://192.0.2.7:8786"
     )
-    p.add_argument("--store", type=Path, help="file of results (OUT/store.sqlite)")
+    p.add_argument("--store", type=Path, help="database of results (OUT/store.sqlite)")
     p.add_argument("--out", type=Path, default=Path("build/campaign"), help="folder of the report (%(default)s)")
-    p.add_argument("--fresh", action="store_true", help="compute again what the store has")
-    p.add_argument("--forget-others", action="store_true", help="remove what other builds have computed of these cases")
+    p.add_argument("--fresh", action="store_true", help="compute stored results again")
+    p.add_argument("--forget-others", action="store_true", help="delete results of other builds")
     return p.parse_args(words)
 
 

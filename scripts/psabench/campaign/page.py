@@ -107,7 +107,7 @@ def write(folder: Path, c: Campaign) -> Path:
 
 
 def result_dict(c: Campaign) -> dict[str, Any]:
-    """For result.json. Numbers that are not finite (a case in which every run was refused) are null."""
+    """For result.json. Numbers that are not finite (a case in which every run was rejected) are null."""
     return {
         "format": FORMAT,
         "facts": dict(c.facts),

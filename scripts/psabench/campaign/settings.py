@@ -1,7 +1,7 @@
 """What `--set` takes: a line a field of `Setup`, its range, and what it means to a person who has not read the code.
 
-A value out of its range is refused by name before anything is computed; what only the algebra sees (positions that
-coincide, a latitude that leaves no horizontal rate) it refuses itself, told with the case.
+A value out of its range is rejected by name before anything is computed; what only the algebra sees (positions that
+coincide, a latitude that leaves no horizontal rate) it rejects itself, told with the case.
 """
 
 from __future__ import annotations
@@ -38,37 +38,37 @@ def _word(about: str) -> Setting:
 
 
 SETTINGS: Mapping[str, Setting] = {
-    "latitude_deg": _number("deg", -90, 90, "where it is"),
-    "latitude_error_arcmin": _number("arcmin", -599, 599, "of what the host is reported"),
+    "latitude_deg": _number("deg", -90, 90, "latitude of the instrument"),
+    "latitude_error_arcmin": _number("arcmin", -599, 599, "error of the latitude that the host gets"),
     "tilt_deg": _number("deg", 0, 30, "pitch and roll of the parked vehicle"),
-    "tilt": _word("within +-tilt_deg, or at the corners"),
-    "alpha1_deg": _number("deg", -360, 360, "of the platform in position 1"),
-    "gimbal": _word("steps about the vertical, or of the gimbal: uncorrected, corrected"),
+    "tilt": _word("tilt drawn within +-tilt_deg, or at the corners"),
+    "alpha1_deg": _number("deg", -360, 360, "platform azimuth in position 1"),
+    "gimbal": _word("steps about the vertical (alpha) or of the gimbal angle (uncorrected, corrected)"),
     "drift_degph": _number("deg/h", -1e4, 1e4, "mean drift about the measuring axis"),
-    "gm_sigma_degph": _number("deg/h", 0, 1e4, "random drift, sd of a Gauss-Markov process"),
-    "gm_tau_s": _number("s", 0.1, 1e9, "its correlation time"),
-    "gm_from_zero": _word("it begins at zero instead of anywhere"),
+    "gm_sigma_degph": _number("deg/h", 0, 1e4, "random drift, standard deviation of a Gauss-Markov process"),
+    "gm_tau_s": _number("s", 0.1, 1e9, "correlation time of the random drift"),
+    "gm_from_zero": _word("random drift begins at zero"),
     "torquer_scale": _number("", -0.2, 0.2, "relative error of the torquer"),
-    "beta_sys_arcmin": _number("arcmin", -299, 299, "level sensors, constant"),
-    "gamma_sys_arcmin": _number("arcmin", -299, 299, "the same, other axis"),
-    "beta_random_arcmin": _number("arcmin", 0, 600, "level sensors, new in each position"),
-    "gamma_random_arcmin": _number("arcmin", 0, 600, "the same, other axis"),
-    "angle_sys_arcmin": _number("arcmin", -600, 600, "of the set angle"),
-    "angle_sys": _word("how it is read"),
-    "angle_random_arcmin": _number("arcmin", 0, 600, "of the set angle or the encoder, new in each position"),
-    "encoder": _word("the encoder is read (through the wire; the algebra is the same)"),
-    "random_sign": _word("constant errors have a sign drawn for each run"),
-    "per_sample": _word("random errors are drawn each 10 ms and average"),
+    "beta_sys_arcmin": _number("arcmin", -299, 299, "constant error of the level sensor of beta"),
+    "gamma_sys_arcmin": _number("arcmin", -299, 299, "constant error of the level sensor of gamma"),
+    "beta_random_arcmin": _number("arcmin", 0, 600, "random error of the level sensor of beta, new in each position"),
+    "gamma_random_arcmin": _number("arcmin", 0, 600, "random error of the level sensor of gamma, new in each position"),
+    "angle_sys_arcmin": _number("arcmin", -600, 600, "constant error of the set angle"),
+    "angle_sys": _word("how the constant angle error acts"),
+    "angle_random_arcmin": _number("arcmin", 0, 600, "random error of an angle, new in each position"),
+    "encoder": _word("read the encoder (through the wire; the algebra is the same)"),
+    "random_sign": _word("draw the sign of constant errors for each run"),
+    "per_sample": _word("draw random errors every 10 ms, so that they average"),
     "white_degph_rts": _number("deg/h sqrt(s)", 0, 1e4, "white noise of the levelling rate"),
-    "angles_deg": _number("deg", -36000, 36000, "positions in their order, 3 to 64"),
-    "window_s": _number("s", 0.01, 86400, "measurement in a position"),
-    "gap_s": _number("s", 0, 86400, "between windows, where slew_dps is 0"),
-    "slew_dps": _number("deg/s", 0, 1000, "rate of the turns; 0: gap_s instead"),
-    "slew_dps2": _number("deg/s2", 0, 1000, "their acceleration; 0: at once"),
-    "m1_per_s": _number("1/s", 0.01, 20, "levelling loop"),
-    "m2_per_s": _number("1/s", 0, 20, "azimuth loop, which is off by drift/m2; 0: an ideal one (algebra only)"),
-    "gm_before_s": _number("s", 0, 1e6, "with gm_from_zero: from power-on to the first window"),
-    "settle_s": _number("s", 0, 86400, "from a turn to its window, with slew_dps"),
+    "angles_deg": _number("deg", -36000, 36000, "positions in order, 3 to 64"),
+    "window_s": _number("s", 0.01, 86400, "measuring time in a position"),
+    "gap_s": _number("s", 0, 86400, "time between windows if slew_dps is 0"),
+    "slew_dps": _number("deg/s", 0, 1000, "rate of the turns; 0: use gap_s"),
+    "slew_dps2": _number("deg/s2", 0, 1000, "acceleration of the turns; 0: infinite"),
+    "m1_per_s": _number("1/s", 0.01, 20, "gain of the levelling loop"),
+    "m2_per_s": _number("1/s", 0, 20, "gain of the azimuth loop (error drift/m2); 0: ideal (algebra only)"),
+    "gm_before_s": _number("s", 0, 1e6, "time from power-on to the first window, for gm_from_zero"),
+    "settle_s": _number("s", 0, 86400, "time from a turn to its window, with slew_dps"),
     "method": _word("estimator"),
     "simplified": _word("eq. (14) instead of (13)"),
 }
@@ -88,7 +88,7 @@ def base(words: Sequence[str], start: Setup | None = None) -> Setup:
 
 
 def out_of_range(setup: Setup, name: str) -> str:
-    """Why the field's value is refused, "": it is not."""
+    """Why the field's value is rejected, "": it is not."""
     s, value = SETTINGS.get(name, Setting(about="")), getattr(setup, name)
     if value is None or isinstance(value, str | bool):
         return ""
@@ -101,7 +101,7 @@ def out_of_range(setup: Setup, name: str) -> str:
 
 
 def rehearse(cases: Sequence[Case], words: Sequence[str]) -> None:
-    """One run of each case: what the algebra refuses is reported before any worker starts. Raises BadInput."""
+    """One run of each case: what the algebra rejects is reported before any worker starts. Raises BadInput."""
     library()  # where there is none, that is no case's fault
     for case in cases:
         try:

@@ -241,7 +241,7 @@ class Store:
 
 
 class _Transaction:
-    """All between enter and exit, or nothing; takes the right to write at once, so that it cannot be refused later."""
+    """All between enter and exit, or nothing; takes the right to write at once, so that it cannot be rejected later."""
 
     def __init__(self, store: Store) -> None:
         self._do = store._do

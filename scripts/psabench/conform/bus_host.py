@@ -53,7 +53,7 @@ def code_of(e: DeviceError) -> int:
 
 
 def refused(action: Callable[[], object], code: float, what: str) -> None:
-    """An action that must be refused with this abort code. Raises Failed."""
+    """An action that must be rejected with this abort code. Raises Failed."""
     due = f"a refusal with {int(code):08X}h"
     try:
         done = action()
@@ -65,5 +65,5 @@ def refused(action: Callable[[], object], code: float, what: str) -> None:
 
 
 def line_refused(s: Subject, text: str, code: float) -> None:
-    """A line to the bus port that must be refused with this abort code. Raises Failed."""
+    """A line to the bus port that must be rejected with this abort code. Raises Failed."""
     refused(lambda: line(s, text), code, text)

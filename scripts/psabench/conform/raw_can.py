@@ -131,12 +131,12 @@ class Talk:
         return self.answer_to(request).data
 
     def abort_of(self, request: bytes) -> int | None:
-        """The code with which it is refused; None: it is not."""
+        """The code with which it is rejected; None: it is not."""
         data = self.ask(request)
         return int.from_bytes(data[4:], "little") if data[0] == ABORT else None
 
     def refused(self, request: bytes, code: float, what: str) -> None:
-        """Raises Failed unless it is refused with this code, in an answer that names its object."""
+        """Raises Failed unless it is rejected with this code, in an answer that names its object."""
         answer = self.answer_to(request)
         due = bytes([ABORT]) + request[1:4] + int(code).to_bytes(4, "little")
         if answer.data != due:

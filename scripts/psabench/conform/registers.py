@@ -26,7 +26,7 @@ def table(board: str) -> tuple[Mapping[str, Any], ...]:
 def names_and_rights(s: Subject, board: str, *, never: Mapping[str, int], writes: Mapping[str, int]) -> str:
     """Every address read and written; returns what was seen, raises Failed.
 
-    never: registers whose read is refused now, with its code; writes: what a writable one takes, where 0 will not do.
+    never: registers whose read is rejected now, with its code; writes: what a writable one takes, where 0 will not do.
     """
     rows = table(board)
     who = port(s).who()

@@ -5,7 +5,7 @@
         port.read(3).data          # a read cycle at address 3
         port.write(15, 0x0003)     # a write cycle
 
-Lines as docs/busport.md has them: `R 3` is answered by `R 03h 8000 t=1234567`, or refused by `E not-ready R 03h t=...`.
+Lines as docs/busport.md has them: `R 3` is answered by `R 03h 8000 t=1234567`, or by `E not-ready R 03h t=...`.
 Answers come in the order of the lines, so that many can be on their way: `ask` and `answer`.
 """
 
@@ -28,7 +28,7 @@ QUANTUM_S = 0.001  # step of the bench's time while waiting for an answer
 LOOK_S = 0.02  # real time that an answer which is there needs to come through
 LINE_MAX = 4096  # characters without an end of line: that is no bus port
 
-# Code words of a refusal by the board: its abort code over CAN (docs/reference/protocol_psd1.md) and meaning.
+# Code words of a rejection by the board: its abort code over CAN (docs/reference/protocol_psd1.md) and meaning.
 CODES: Mapping[str, tuple[int, str]] = {
     "no-address": (0x06090011, "nothing answers at this address"),
     "read-only": (0x06010002, "this register is read-only"),
@@ -71,7 +71,7 @@ class BusPort:
     """One end of a bus port. Leaving its context closes it.
 
     advance: lets the bench's time pass, seconds, where it stands still unless told (step pace); None: it passes by
-    itself. Raises CycleRefused for what the board refuses, LinkError where the other end has gone, is silent, or says
+    itself. Raises CycleRefused for what the board rejects, LinkError where the other end has gone, is silent, or says
     what no bus port says.
     """
 
@@ -194,7 +194,7 @@ class BusPort:
 
 
 def parse(line: str) -> Cycle | Who:
-    """An answer. Raises CycleRefused for a refusal of the board, LinkError for one of the port or what is none."""
+    """An answer. Raises CycleRefused for a rejection of the board, LinkError for one of the port or what is none."""
     if m := CYCLE.fullmatch(line):
         return Cycle(write=m[1] == "W", address=int(m[2], 16), data=int(m[3], 16), t_s=int(m[4]) * 1e-9)
     if m := WHO.fullmatch(line):

@@ -147,7 +147,7 @@ class CanHost:
             timeout_s = deadline_s - time.monotonic()
             if timeout_s <= 0.0:
                 return False
-        self.received += not message.is_error_frame  # socketcand reports a refusal as one; it was on no bus
+        self.received += not message.is_error_frame  # socketcand reports a rejection as one; it was on no bus
         for listener in self.listeners:
             listener(message)
         return True

@@ -29,7 +29,7 @@ class Reply:
 class Control:
     """`with Control(path) as ctl: ctl.call("run", for_s=0.1)`.
 
-    Raises LinkError when the emulator is not there or goes away, ControlError when it refuses a command. A call that
+    Raises LinkError when the emulator is not there or goes away, ControlError when it rejects a command. A call that
     Ctrl-C has interrupted leaves the connection usable: its reply is passed over when it comes.
     """
 

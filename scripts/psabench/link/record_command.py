@@ -13,12 +13,12 @@ FORMATS = ".asc .blf .csv .db .log .mf4 .trc .txt"  # of python-can, without loa
 
 EPILOG = """\
 examples:
-  psabench record run.log --can socketcand:127.0.0.1:29536         until Ctrl-C, in candump's format
-  psabench record run.blf --can slcan:/dev/ttyACM0 --for 60        a minute, for CANalyzer
+  psabench record run.log --can socketcand:127.0.0.1:29536         until Ctrl-C, candump -L format
+  psabench record run.blf --can slcan:/dev/ttyACM0 --for 60        one minute, for CANalyzer
   psabench record run.asc --can socketcan:vcan0,fd=true --count 1000
 
-Ends with --for, --count, Ctrl-C, SIGTERM or when the link breaks (exit status 3); the file is complete each time.
-lost: frame numbers missing; torn: halves of a frame without the other; overruns: conversions the board itself missed.
+Stops at --for, --count, Ctrl-C, SIGTERM or when the link fails (exit status 3); the file is complete in each case.
+lost: missing frame numbers; torn: frames with one half only; overruns: conversions that the board missed.
 """
 
 
@@ -26,16 +26,16 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     """What follows `psabench record`. Raises BadInput."""
     p = Parser(
         prog="psabench record",
-        description="Record all that is on the bus; count what the stream of one node lost.",
+        description="Record all frames of a CAN bus and count the frames that one node lost.",
         formatter_class=Help,
         epilog=EPILOG,
     )
     p.set_defaults(handler=_record)
-    p.add_argument("file", type=Path, help=f"its extension selects the format: {FORMATS}")
+    p.add_argument("file", type=Path, help=f"log file; its extension selects the format: {FORMATS}")
     p.add_argument("--can", help=CAN_HELP)
     add_board(p, "whose frames are counted")
-    p.add_argument("--for", dest="for_s", type=positive, metavar="SECONDS", help="end after this much wall time")
-    p.add_argument("--count", type=natural, help="end after this many CAN messages")
+    p.add_argument("--for", dest="for_s", type=positive, metavar="SECONDS", help="stop after this wall time")
+    p.add_argument("--count", type=natural, help="stop after this number of CAN messages")
     return p.parse_args(words)
 
 

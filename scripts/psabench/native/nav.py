@@ -29,7 +29,7 @@ from psabench.native.navlib import (
 )
 
 EARTH_RADPS = 7.292115e-5  # WGS 84: sources 5.1
-LATITUDE_LIMIT_RAD = math.radians(85.0)  # beyond it the library refuses
+LATITUDE_LIMIT_RAD = math.radians(85.0)  # beyond it the library rejects
 EARTH_RADIUS_M = 6371e3  # of the sphere that transport rates are over, as nav_transport_radps() has it
 DEGPH = math.radians(1.0) / 3600.0  # 1 deg/h in rad/s
 ARCMIN = math.radians(1.0 / 60.0)  # 1' in rad
@@ -48,7 +48,7 @@ class Method(enum.IntEnum):
 
 
 class Status(enum.IntEnum):
-    """Why the library refuses (enum nav_status)."""
+    """Why the library rejects (enum nav_status)."""
 
     TOO_FEW = -1
     COINCIDENT = -2
@@ -70,7 +70,7 @@ class Flag(enum.IntFlag):
 
 
 class Refused(BadInput):
-    """The library refused: `status` says why, `field` which field of nav.h or nav_mc.h is the cause ("": none alone),
+    """The library rejected: `status` says why, `field` which field of nav.h or nav_mc.h is the cause ("": none alone),
     `position` whose from 0 (None: of the configuration); the message has them in words, with what would be right."""
 
     def __init__(self, what: str, status: int, why: RefusalStruct | None = None) -> None:
@@ -184,7 +184,7 @@ def gyrocompass(
     ramp: bool = False,
     noise: Noise = _NO_NOISE,
 ) -> Compass:
-    """Alpha at position 1 and the drift about the measuring axis, (12)-(19) corrected. Raises Refused."""
+    """Alpha at position 1 and the drift about the measuring axis, (12)-(19) corrected. Raises Rejected."""
     rows = _rows(positions)
     fit = FitStruct(latitude_rad, int(method), int(simplified), int(ramp), _noise(noise))
     out = CompassStruct()
@@ -198,7 +198,7 @@ def gyrocompass(
 
 
 def gyrocompass_printed(positions: Sequence[Position], latitude_rad: float) -> tuple[float, float]:
-    """(alpha, drift) by (18), (19) and S1 + S3 as printed: wrong, for negative tests only. Raises Refused."""
+    """(alpha, drift) by (18), (19) and S1 + S3 as printed: wrong, for negative tests only. Raises Rejected."""
     alpha_rad, drift_radps = c.c_double(), c.c_double()
     if len(positions) != 3:
         raise Refused("gyrocompass_printed", Status.TOO_FEW)
@@ -210,7 +210,7 @@ def gyrocompass_printed(positions: Sequence[Position], latitude_rad: float) -> t
 def attitude_from_level(
     q_rad: npt.ArrayLike, gamma_rad: npt.ArrayLike, beta_rad: npt.ArrayLike | None = None, *, bias: bool = False
 ) -> Attitude:
-    """Pitch and roll from gamma at several gimbal angles; bias: gamma's constant error as well. Raises Refused."""
+    """Pitch and roll from gamma at several gimbal angles; bias: gamma's constant error as well. Raises Rejected."""
     q, gamma = _same_length(q_rad, gamma_rad)
     beta = None if beta_rad is None else _same_length(q_rad, beta_rad)[1]
     out = AttitudeStruct()
@@ -234,7 +234,7 @@ def gamma(
 
 
 def cardan(q_rad: npt.ArrayLike, *, pitch_rad: float, roll_rad: float, beta_rad: npt.ArrayLike | None = None) -> Floats:
-    """Increments of alpha since the first gimbal angle, exactly. Raises Refused."""
+    """Increments of alpha since the first gimbal angle, exactly. Raises Rejected."""
     q = _array(q_rad)
     beta = None if beta_rad is None else _same_length(q_rad, beta_rad)[1]
     out = np.empty_like(q)
@@ -250,7 +250,7 @@ def heading(
 
 
 def window_slope(beta_n_rad: npt.ArrayLike, s_radps: npt.ArrayLike, dt_s: float) -> float:
-    """S [rad/s] of a window: negative slope of beta_n less the integral of the levelling command. Raises Refused."""
+    """S [rad/s] of a window: negative slope of beta_n less the integral of the levelling command. Raises Rejected."""
     beta, s = _same_length(beta_n_rad, s_radps)
     out = c.c_double()
     _check("window_slope", library().window_slope(_ptr(beta), _ptr(s), len(beta), dt_s, c.byref(out)))

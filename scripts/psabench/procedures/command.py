@@ -1,6 +1,6 @@
 """`psabench run`: a parser for each procedure with its own options, and what is printed.
 
-`run turns` is one command of two words (`words`): each procedure has its own help, and refuses the options of others.
+`run turns` is one command of two words (`words`): each procedure has its own help, and rejects the options of others.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from psabench.progress import Bar
 from psabench.shell import command_line
 
 EPILOG = """\
-psabench run PROCEDURE --help tells its options, with units and defaults, and examples.
+psabench run PROCEDURE --help lists its options with units and defaults, and examples.
 
 Exit status: 0 done and within limits, 1 something measured misses the truth by more than its limits or is in doubt,
 2 bad input, 3 the bench or a link failed, 130 ended by Ctrl-C.
 """
 
 NOTES_HEAD = """
-Without --head or --control an emulator is started for each condition. Ctrl-C ends a run; the readings taken so far stay
+Without --head or --control an emulator is started for each condition. Ctrl-C ends a run; the readings so far stay
 in OUT/PROCEDURE-CONDITION.csv. Exit status 1: something measured misses the truth by more than its limits.
 """
 
@@ -47,34 +47,33 @@ COMMON: Mapping[str, Mapping[str, Any]] = {
     "--condition": {
         "choices": [*CONDITIONS, "both"],
         "default": "both",
-        "help": "on which emulated bench (%(default)s)",
+        "help": "emulated bench (%(default)s)",
     },
-    "--scenario": {"type": Path, "metavar": "FILE", "help": "scenario for the emulator, instead of the usual one"},
+    "--scenario": {"type": Path, "metavar": "FILE", "help": "scenario of the emulator (the procedure's default)"},
     "--can": {
         "metavar": "BUS",
-        "help": "the bus of a bench that is there: INTERFACE:CHANNEL[,key=value...] of python-can, such as "
-        "socketcand:127.0.0.1:29536, slcan:/dev/pts/7, socketcan:vcan0,fd=true. Without it --control tells",
+        "help": "CAN bus of an existing bench, as INTERFACE:CHANNEL[,key=value...] of python-can: "
+        "socketcand:127.0.0.1:29536, slcan:/dev/pts/7, socketcan:vcan0,fd=true. Default: the bus that --control names",
     },
     "--head": {
         "metavar": "VISA-ADDRESS",
-        "help": f"the dividing head, real or emulated: {EXAMPLES}. With it alone the bus is that of python-can's own "
-        "configuration",
+        "help": f"dividing head, real or emulated: {EXAMPLES}. Bus without --can: python-can's configuration",
     },
     "--control": {
         "type": Path,
         "metavar": "SOCKET",
-        "help": "control socket of an emulator that is there: tells its bus and instruments, moves time",
+        "help": "control socket of a running emulator; its bus and instruments are used",
     },
     "--truth": {
         "type": Path,
         "metavar": "SOCKET",
-        "help": "truth socket of an emulator, asked after the run to grade it",
+        "help": "truth socket of an emulator, read after the run to grade it",
     },
     "--node": {"type": node_id, "default": DBC_NODE, "metavar": "N", "help": "CANopen node of the unit (%(default)s)"},
     "--average": {
         "type": natural,
         "metavar": "N",
-        "help": f"samples in a reading; 0: whole 32-bit words by SDO (quiet {CONDITIONS['quiet'].average}, "
+        "help": f"samples per reading; 0: whole 32-bit words by SDO (quiet {CONDITIONS['quiet'].average}, "
         f"else {CONDITIONS['realistic'].average})",
     },
     "--gravity": {
@@ -82,10 +81,10 @@ COMMON: Mapping[str, Mapping[str, Any]] = {
         "metavar": "M/S2",
         "help": f"local g, m/s^2 (the scenario's, else {G_MPS2})",
     },
-    "--seed": {"type": int, "metavar": "N", "help": "seed of the emulator's noise, instead of the scenario's"},
-    "--real-time": {"action": "store_true", "help": "at wall-clock pace, as a real bench would take"},
-    "--out": {"type": Path, "default": Path("build/run"), "metavar": "FOLDER", "help": "of the report (%(default)s)"},
-    "--verbose": {"action": "store_true", "help": "print the tables of results, too"},
+    "--seed": {"type": int, "metavar": "N", "help": "random seed; overrides the scenario"},
+    "--real-time": {"action": "store_true", "help": "run at wall-clock pace"},
+    "--out": {"type": Path, "default": Path("build/run"), "metavar": "FOLDER", "help": "report folder (%(default)s)"},
+    "--verbose": {"action": "store_true", "help": "print the tables of results as well"},
 }
 
 
@@ -132,7 +131,7 @@ def _parser() -> Parser:
         epilog=EPILOG,
     )
     p.set_defaults(handler=_without_procedure)
-    p.add_argument("--list", action="store_true", help="name the procedures and their parameters")
+    p.add_argument("--list", action="store_true", help="list the procedures and their parameters")
     p.add_argument("procedure", nargs="?", metavar="PROCEDURE", help=argparse.SUPPRESS)
     return p
 

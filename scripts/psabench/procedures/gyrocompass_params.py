@@ -1,4 +1,4 @@
-"""Parameters of the gyrocompass procedure, its two readings, and what is refused before anything moves."""
+"""Parameters of the gyrocompass procedure, its two readings, and what is rejected before anything moves."""
 
 from __future__ import annotations
 
@@ -37,35 +37,33 @@ class GyrocompassParams:
     """Parameters of `gyrocompass`; the defaults are the article's reading, READINGS has the others."""
 
     sequence: str = option("0,90,180", "deg", "gimbal angles in the order of measurement, 32 at most")
-    repeat: int = option(1, "", "times over")
-    window_s: float = option(10.0, "s", "measurement in each position")
-    settle_s: float = option(10.0, "s", "from the end of a turn to its window")
+    repeat: int = option(1, "", "repetitions of the sequence")
+    window_s: float = option(10.0, "s", "measuring time in each position")
+    settle_s: float = option(10.0, "s", "time from the end of a turn to its window")
     slew_dps: float = option(9.0, "deg/s", "rate of the turns")
-    m1_per_s: float = option(1.0, "1/s", "levelling loop")
-    m2_per_s: float = option(2.0, "1/s", "azimuth loop")
-    freeze: bool = option(False, "", "no azimuth servo in the windows")
-    latitude_deg: float = option(50.0, "deg", "as the operator gives it; of a scenario, its site's")
+    m1_per_s: float = option(1.0, "1/s", "gain of the levelling loop")
+    m2_per_s: float = option(2.0, "1/s", "gain of the azimuth loop")
+    freeze: bool = option(False, "", "stop the azimuth servo in the windows")
+    latitude_deg: float = option(50.0, "deg", "latitude that the operator gives (the scenario's site)")
     latitude_sd_arcmin: float = option(0.1, "arcmin", "error of the latitude")
-    method: str = option("closed3", "", f"one of {', '.join(METHODS)}")
-    angles: str = option("set", "", "which angle is trusted: set or encoder")
+    method: str = option("closed3", "", f"estimator: {', '.join(METHODS)}")
+    angles: str = option("set", "", "angle that the estimate uses: set or encoder")
     cardan: bool = option(True, "", "correct the angles for the tilt of the outer axis")
-    simplified: bool = option(True, "", "eq. (14) instead of (13)")
-    slope: bool = option(False, "", "the levelling rate as a slope instead of a mean")
+    simplified: bool = option(True, "", "use eq. (14) instead of (13)")
+    slope: bool = option(False, "", "estimate the levelling rate as a slope instead of a mean")
     signals: str = option(
         "frames", "", "level angles from the frames of the level unit, or from the readings of the gyro unit"
     )
     calibrate_s: float = option(60.0, "s", "window of the azimuth axis after the run; 0: none")
     gm_sigma_degph: float = option(0.2, "deg/h", "random drift, from the passport")
-    gm_tau_s: float = option(1000.0, "s", "its correlation time")
+    gm_tau_s: float = option(1000.0, "s", "correlation time of the random drift")
     angle_sd_arcmin: float = option(3.0, "arcmin", "error of an angle, new in each position")
     level_sd_arcmin: float = option(1.0, "arcmin", "error of the level angles, new in each position")
-    level_zero_arcmin: float = option(10.0, "arcmin", "their constant error, for the drift's limits")
-    angle_zero_arcmin: float = option(
-        6.0, "arcmin", "of the angle sensor against the vehicle, for the heading's limits"
-    )
+    level_zero_arcmin: float = option(10.0, "arcmin", "constant error of the level angles, for the drift's limits")
+    angle_zero_arcmin: float = option(6.0, "arcmin", "mounting error of the angle sensor, for the heading's limits")
     torquer_scale: float = option(1e-3, "", "error of the torquers, for the drift's limits and the vehicle's turns")
-    drift2_degph: float = option(0.0, "deg/h", "drift of the azimuth axis, from the passport: it tells the latitude")
-    drift2_limit_degph: float = option(0.0, "deg/h", "what that may be off by; 0: no passport")
+    drift2_degph: float = option(0.0, "deg/h", "drift of the azimuth axis, from the passport; gives the latitude")
+    drift2_limit_degph: float = option(0.0, "deg/h", "limit of the error of drift2_degph; 0: no passport")
 
     def __post_init__(self) -> None:
         for name, known in (("method", tuple(METHODS)), ("angles", ANGLES), ("signals", SIGNALS)):

@@ -33,13 +33,13 @@ UNDER_WAY_S = 120.0  # after which it is on its track
 class HoldParams:
     """Parameters of `heading-hold`, besides those of `gyrocompass`."""
 
-    hours: float = option(4.0, "h", "how long heading is kept")
-    look_s: float = option(300.0, "s", "between two looks at the instrument")
+    hours: float = option(4.0, "h", "time of the heading hold")
+    look_s: float = option(300.0, "s", "interval between two readings of the heading")
     compensate: str = option(
         "torquer", "", f"drift of the azimuth axis: {', '.join(DRIFTS)}; axis1 is the article's trap"
     )
     speed_kmh: float = option(0.0, "km/h", "ground speed; 0: parked")
-    track_deg: float = option(90.0, "deg", "of the flight")
+    track_deg: float = option(90.0, "deg", "track of the flight")
 
     def __post_init__(self) -> None:
         if self.compensate not in DRIFTS:

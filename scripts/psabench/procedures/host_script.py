@@ -113,7 +113,7 @@ class ScriptedBench:
     # ---- what came
 
     def recording(self, until_s: float) -> Logged:
-        """All that came until then, and perhaps more. Raises DeviceError where a unit refused something."""
+        """All that came until then, and perhaps more. Raises DeviceError where a unit rejected something."""
         if self._recording is None or self._recorded_s < until_s:
             self._record(until_s)
         assert self._recording is not None
@@ -173,7 +173,7 @@ def run(scenario: Scenario, for_s: float, bus: str) -> tuple[bytes, float]:
     """The log of a bus of a scenario from power-on, and the processor time that the emulator took.
 
     Nothing is left behind, whatever ends it: scenario and log are files without a name, and the process ends by itself.
-    Raises BadInput for a scenario that is refused, BenchError where the machine refused something.
+    Raises BadInput for a scenario that is rejected, BenchError where the machine rejected something.
     """
     with _nameless("scenario") as given, _nameless("log") as log:
         os.write(given, json.dumps(scenario).encode())  # YAML 1.2, too
@@ -197,7 +197,9 @@ def run(scenario: Scenario, for_s: float, bus: str) -> tuple[bytes, float]:
         if done.returncode:
             raise (BadInput if done.returncode == BadInput.exit_status else BenchError)(words or "the emulator failed")
         if words:
-            raise LinkError(words)  # a command of the timeline that was refused, a frame form that the bus cannot carry
+            raise LinkError(
+                words
+            )  # a command of the timeline that was rejected, a frame form that the bus cannot carry
         return _contents(log), _processor_s() - used_s
 
 

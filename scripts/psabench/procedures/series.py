@@ -25,7 +25,7 @@ class SeriesParams:
     """A series of the article: 5 realisations of 80 positions, 5 deg apart (400 deg of turn)."""
 
     axis: str = option("x", "", "channel of the board that the accelerometer is wired to: x, y or z")
-    realisations: int = option(5, "", "how often the whole series is repeated")
+    realisations: int = option(5, "", "repetitions of the whole series")
     positions: int = option(80, "", "positions in one series")
     step_deg: float = option(5.0, "deg", "turn of the head between positions")
     readings: int = option(1, "", "readings at each position")

@@ -51,7 +51,7 @@ class TurnsParams:
     """Parameters of `turns`."""
 
     axis: str = option("x", "", "channel of the board that the accelerometer is wired to: x, y or z")
-    realisations: int = option(5, "", "n of eqs (4), (5), (8), (11)")
+    realisations: int = option(5, "", "repetitions, n of eqs (4), (5), (8), (11)")
     readings: int = option(16, "", "readings at each position, averaged")
     search_deg: float = option(
         0.0,

@@ -175,7 +175,7 @@ class WirePlatform:
     # ---- a run
 
     def _begin(self, mode: Mode) -> None:
-        """Into a mode; while the gyroscope runs up the unit refuses, and this waits."""
+        """Into a mode; while the gyroscope runs up the unit rejects, and this waits."""
         deadline_s = self.t_s + READY_S
         while True:
             try:

@@ -23,7 +23,7 @@ from psabench.shell.row import Args, Context, Handler, Row, number
 CONVERTERS = tuple(BANKS)
 A_WORD = "a word, as A55Ah"
 PSA2_ONLY = ("dut.opcode", "dut.form")
-BUS = "bus"  # the board's parallel bus: a read is a cycle, which the board may refuse
+BUS = "bus"  # the board's parallel bus: a read is a cycle, which the board may reject
 
 
 def here(bench: Bench) -> bool:
@@ -77,7 +77,7 @@ def _register_row(session: Context, converter: str, address: int, name: str) -> 
 
 
 def _row_or_refusal(session: Context, converter: str, address: int, name: str) -> dict[str, Any]:
-    """In a list of all of them a cycle that the board refuses now is one of the things to see."""
+    """In a list of all of them a cycle that the board rejects now is one of the things to see."""
     try:
         return _register_row(session, converter, address, name)
     except CycleRefused as e:

@@ -1,7 +1,7 @@
 """Lines from a file, a pipe or the command line: plain text or JSON out, an exit status at the end.
 
 0: all done and every expectation held; 1: an expectation did not hold; 2: a line is wrong (nothing was done if the
-grammar sees it); 3: the bench refused, or a link failed. A script ends at the first error of kind 2 or 3.
+grammar sees it); 3: the bench rejected, or a link failed. A script ends at the first error of kind 2 or 3.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ from psabench.shell.grammar import Call, parse
 from psabench.shell.lexer import Wrong
 from psabench.shell.transcript import Transcript
 
-# The bench understood these codes of a refusal to mean: the line is wrong. Others: not now, not here.
+# The bench understood these codes of a rejection to mean: the line is wrong. Others: not now, not here.
 WRONG_CODES = {"syntax", "command", "argument", "type", "range"}
 NOT_NOW = 0x08000022  # CiA 301: the state of the device does not allow it
 QUIT = "quit"
@@ -80,7 +80,7 @@ class Session:
         """Carry out one line; None for a blank or a comment.
 
         Raises Wrong for a line that cannot be understood or carried out as it is, other BenchErrors for what
-        the bench refuses now or for a link that fails. Whatever happens is in the transcript.
+        the bench rejects now or for a link that fails. Whatever happens is in the transcript.
         """
         t_ns = self.now_ns()
         try:

@@ -10,7 +10,7 @@ HEADER = "# A session of psabench shell. Again: psabench run script FILE"
 
 @dataclass(frozen=True, slots=True)
 class Said:
-    """A line; t_ns: simulated time when it was given, None where no one tells it; wrong: why it was refused."""
+    """A line; t_ns: simulated time when it was given, None where no one tells it; wrong: why it was rejected."""
 
     line: str
     t_ns: int | None
@@ -29,7 +29,7 @@ class Transcript:
         self.said.append(Said(line, t_ns, wrong))
 
     def script(self) -> str:
-        """The session as a script. What was refused is in comments."""
+        """The session as a script. What was rejected is in comments."""
         lines = [HEADER, *([self.start] if self.start else [])]
         for said in self.said:
             if said.wrong:

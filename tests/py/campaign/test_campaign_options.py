@@ -106,7 +106,7 @@ def test_the_list_names_all(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["campaign", "gyrocompass", "--list"]) == 0
     out = capsys.readouterr().out
     assert all(f"{s.name}: {s.title}\n" in out for s in STUDIES.values())
-    assert re.search(r"  gm_sigma_degph=0.2 +deg/h; random drift, sd of a Gauss-Markov process\n", out)
+    assert re.search(r"  gm_sigma_degph=0.2 +deg/h; random drift, standard deviation of a Gauss-Markov process\n", out)
     assert "(closed3, lsq, constrained, gls, gls_constrained)\n" in out
 
 

@@ -106,7 +106,7 @@ ABORT_RANGE = {0x06090030, 0x06090031, 0x06090032}  # CiA 301, 7.2.4.3.17: value
 
 
 class Gyro(BusUnit):
-    """One unit on the bus. What it refuses raises with its own words (object 2031h)."""
+    """One unit on the bus. What it rejects raises with its own words (object 2031h)."""
 
     board = "gyro"
     title = "GYRO"

@@ -30,7 +30,7 @@ SETUP_S = 0.5  # after Res: self-calibrations of the temperature converter, then
 class Psa2(Unit):
     """One unit on the bus.
 
-    Raises DeviceError with the unit's abort code when it refuses, LinkError when it does not answer.
+    Raises DeviceError with the unit's abort code when it rejects, LinkError when it does not answer.
     """
 
     board = "psa2"

@@ -19,7 +19,7 @@ WHO = re.compile(r"I (\S+)((?: [0-9A-F]{2}h=\S+)+) t=(0|[1-9][0-9]*)")
 NOWHERE = 0x20
 MANY = 100  # lines at once
 LOOKS = 8
-# Refusals of the port by what they are over CAN (docs/busport.md, Answers).
+# Rejections of the port by what they are over CAN (docs/busport.md, Answers).
 ABORTS = {
     "no-address": 0x06090011,
     "read-only": 0x06010002,

@@ -178,7 +178,7 @@ class Capture:
     lines: LineLog | None = None
     cycles: tuple[Cycle, ...] = ()
     marks: Marks = field(default_factory=Marks)
-    facts: Mapping[str, object] = field(default_factory=dict)  # what the stimulus asked for: objects read, refusals
+    facts: Mapping[str, object] = field(default_factory=dict)  # what the stimulus asked for: objects read, rejections
     inputs_v: Mapping[str, float] = field(default_factory=dict)  # volts at the inputs by axis, where they are known
     clock_ppm: float = 100.0  # how far the board's clock and the recording's may lie apart
 

@@ -131,7 +131,7 @@ def volts_are_codes_times_the_scale(e: HostCapture) -> str:
 @proves("HOST-SETUP-02")
 @checks("power_on")
 def what_is_refused_during_the_set_up_is_asked_again(e: HostCapture) -> str:
-    """Requests from power-on: the board refuses registers with 08000022h until its set-up is done."""
+    """Requests from power-on: the board rejects registers with 08000022h until its set-up is done."""
     refused = [f for f in e.bus.of(SDO_TX) if f.data[0] == ABORT]
     e.samples()
     for f in refused:

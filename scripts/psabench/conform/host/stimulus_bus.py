@@ -31,7 +31,7 @@ BUS_OBJECT = BusObjects.BUS
 
 @dataclass(frozen=True, slots=True)
 class BusCycle:
-    """What a host did on the bus. code: why it was refused, "": it was not; data: what was read or written."""
+    """What a host did on the bus. code: why it was rejected, "": it was not; data: what was read or written."""
 
     write: bool
     address: int

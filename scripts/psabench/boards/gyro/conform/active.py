@@ -1,4 +1,4 @@
-"""The gyro unit asked over CAN: modes, turns, refusals, what never settles."""
+"""The gyro unit asked over CAN: modes, turns, rejections, what never settles."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""PMKA asked over its bus and over CAN: registers, refusals, its ROM, the computer's program of calibration."""
+"""PMKA asked over its bus and over CAN: registers, rejections, its ROM, the computer's program of calibration."""
 
 from __future__ import annotations
 

@@ -99,7 +99,7 @@ def encoded(d: Described) -> bytes:
 @proves("PSA2-CAN-12")
 @check("dictionary")
 def objects_have_type_rights_default_and_limits(e: Capture) -> str:
-    """Read every object of the EDS, and write what it must refuse."""
+    """Read every object of the EDS, and write what it must reject."""
     rows: list[Row] = fact(e, "rows")
     beyond = int(row_for(e, "PSA2-FORM-07").limit("abort_code"))
     for r in rows:

@@ -1,4 +1,4 @@
-"""Registers, opcodes, refusals, objects and trouble of PSA-2 and PSA-1, as SDO answers tell them."""
+"""Registers, opcodes, rejections, objects and trouble of PSA-2 and PSA-1, as SDO answers tell them."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def fact(e: Capture, name: str) -> Any:
 
 
 def register(e: Capture, index: int, sub: int) -> int:
-    """A register as the stimulus read it. Raises Failed for a refusal."""
+    """A register as the stimulus read it. Raises Failed for a rejection."""
     return number(fact(e, "read")[index, sub])
 
 
@@ -287,7 +287,7 @@ def register_reads_cost_no_conversion_at_the_highest_rate(e: Capture) -> str:
     return f"{len(log)} frames without a gap"
 
 
-# ---- refusals
+# ---- rejections
 
 
 def _refused(answer: Answer, due: int, what: str) -> None:

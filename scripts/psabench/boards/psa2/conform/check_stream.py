@@ -23,7 +23,7 @@ US = 1e-6
 
 
 def number(a: object) -> int:
-    """Value of an answer. Raises Failed where it is a refusal."""
+    """Value of an answer. Raises Failed where it is a rejection."""
     if not isinstance(a, Answer) or not isinstance(a.value, int):
         raise Failed(f"abort {a.abort:08X}h" if isinstance(a, Answer) else "no answer", "a value")
     return a.value

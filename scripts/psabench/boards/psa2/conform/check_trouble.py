@@ -1,4 +1,4 @@
-"""What PSA-2 and PSA-1 refuse for want of room on the bus, and what they tell of trouble."""
+"""What PSA-2 and PSA-1 reject for want of room on the bus, and what they tell of trouble."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def a_refused_rate_never_reaches_the_converters(e: Capture) -> str:
 @proves("PSA2-FIT-04")
 @check("fit")
 def worst_case_times_are_those_of_the_table(e: Capture) -> str:
-    """Read 2031h after a refusal."""
+    """Read 2031h after a rejection."""
     due = f"{row_for(e, 'PSA2-FIT-04').limit('pair_us'):.3f} us"
     for name in ("rate text", "form text"):
         text = fact(e, name).value

@@ -195,7 +195,7 @@ def opcodes(s: Subject) -> Capture:
     return s.capture("opcodes", take)
 
 
-# What is refused: object, sub-index, value.
+# What is rejected: object, sub-index, value.
 RESERVED: Sequence[tuple[int, int, int]] = (
     *((ACCEL[0], CONFIG0, v) for v in (0x6E, 0x76, 0x7E)),  # DR 101..111
     (ACCEL[0], CONFIG0, 0x55),  # sinc alone
@@ -213,7 +213,7 @@ OPCODES_REFUSED: Sequence[tuple[int, int, int]] = (
 
 @stimulus("refusals", boards=("psa2",))
 def refusals(s: Subject) -> Capture:
-    """Values that the board refuses. facts: reserved, (object, sub, value, answer, before, after); opcodes; others."""
+    """Values that the board rejects. facts: reserved, (object, sub, value, answer, before, after); opcodes; others."""
     reserved = [*RESERVED, *([RESERVED_GAIN] if s.variant.board == "psa2" else [])]
     with changed(s), s.take() as take:
         take.facts["reserved"] = [

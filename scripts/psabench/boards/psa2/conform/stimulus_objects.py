@@ -72,7 +72,7 @@ def _of_one_sample(s: Subject, index: int, sub: int) -> tuple[int, int, Answer, 
 
 @stimulus("dictionary", boards=("psa2",))
 def dictionary(s: Subject) -> Capture:
-    """Every object of the EDS but the registers read, and written where a write is refused. facts: rows."""
+    """Every object of the EDS but the registers read, and written where a write is rejected. facts: rows."""
     with changed(s), s.take(lines=False) as take:
         take.facts["rows"] = [_row(s, d) for d in s.unit.node.objects() if not (d.index in (*ACCEL, TEMP) and d.sub)]
     return s.capture("dictionary", take)

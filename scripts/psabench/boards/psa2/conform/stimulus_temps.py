@@ -27,7 +27,7 @@ HISTORY, HISTORY_LOOKS = OD.ERROR_HISTORY, 4
 
 @stimulus("trouble", boards=("psa2",))
 def trouble(s: Subject) -> Capture:
-    """The temperature converter silenced by its SYNC command without WAKEUP, a form refused before and after it.
+    """The temperature converter silenced by its SYNC command without WAKEUP, a form rejected before and after it.
 
     facts: access, counters, history of errors.
     """
@@ -50,7 +50,7 @@ def trouble(s: Subject) -> Capture:
 
 
 def _refused_form(s: Subject) -> None:
-    """An emergency of another kind: pairs at 4000 SPS, asked for and refused, then everything as it was."""
+    """An emergency of another kind: pairs at 4000 SPS, asked for and rejected, then everything as it was."""
     tell(s, FORM, 0, 1)
     tell(s, ACCEL[0], CONFIG0, 0x46 | 4 << 3)
     s.run_for(SETTLE_PERIODS / RATES_HZ[4])

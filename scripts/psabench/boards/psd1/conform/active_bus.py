@@ -1,4 +1,4 @@
-"""PSD-1's parallel bus through the bus port: registers, refusals, channels, what is latched."""
+"""PSD-1's parallel bus through the bus port: registers, rejections, channels, what is latched."""
 
 from __future__ import annotations
 
@@ -332,13 +332,13 @@ def _gyros(s: Subject) -> list[int]:
 @proves("PSD1-LATE-04")
 @active(needs={"bus", "can"})
 def refusals_are_counted(s: Subject) -> str:
-    """Strobe what is refused, and words that seldom wait; look at the counters."""
+    """Strobe what is rejected, and words that seldom wait; look at the counters."""
     calm(s)
     counters = s.unit.counters()
     refused = sum(_is_refused(s, text) for text in ("R 0", "R 1", "R 2", "W 3 0", "R 3 100", "R 4 150"))
     now = s.unit.counters()
     told = now["Refused strobes"] - counters["Refused strobes"], now["Short strobes"] - counters["Short strobes"]
-    if told != (refused, 2) or refused < 3:  # a word may just wait, one write and two short strobes are always refused
+    if told != (refused, 2) or refused < 3:  # a word may just wait, one write and two short strobes are always rejected
         raise Failed(f"{refused} refused; counted {told[0]}, too short {told[1]}", "3 to 6, as many, 2")
     return f"{refused} refusals counted, two of them too short"
 

@@ -98,7 +98,7 @@ def flags_of_cycles_are_told(e: HostCapture) -> str:
 @proves("HOST-PSD1-01")
 @checks("psd1_bus")
 def each_word_is_read_at_its_address(e: HostCapture) -> str:
-    """The host's cycles on the bus: each word once, X, Y, Z in order, and nothing refused but for no word yet."""
+    """The host's cycles on the bus: each word once, X, Y, Z in order, and nothing rejected but for no word yet."""
     odd = [c for c in e.cycles if c.code not in ("", "not-ready")]
     if odd:
         raise Failed(f"address {odd[0].address:02X}h was refused: {odd[0].code}", "none but not-ready")
