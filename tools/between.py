@@ -19,7 +19,7 @@ def spliced(text: str, between: tuple[str, str], body: str, page: str = "page") 
     head, _, rest = text.partition(f"{begin}\n")
     _, closed, tail = rest.partition(end)
     if text.count(begin) != 1 or not closed:
-        raise ValueError(f"{page}: wanted once, on a line of its own, {begin} and after it {end}")
+        raise ValueError(f"{page}: expected one line {begin} and after it {end}, got none or several")
     return f"{head}{begin}\n{body}\n{end}{tail}"
 
 

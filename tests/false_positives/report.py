@@ -14,7 +14,7 @@ from tests.false_positives.design import ERRORS_PPM, SEEDS, profiles
 from tests.false_positives.verdict import Alarm, Result, worst
 
 FORMAT = 1  # of false_positives.json
-MARKS = "<!-- result: made by `make alarms`, do not edit -->", "<!-- end of result -->"
+MARKS = "<!-- result: made by `make false-positives`, do not edit -->", "<!-- end of result -->"
 
 
 def read(path: Path) -> dict[str, Result]:

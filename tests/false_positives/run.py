@@ -24,7 +24,7 @@ from tests.mutants.run import state
 from tests.mutants.tree import ROOT, copy
 
 OUT = ROOT / "build" / "false_positives.json"
-PAGE = ROOT / "docs" / "alarms.md"
+PAGE = ROOT / "docs/reference/false_positives.md"
 
 EPILOG = """\
 examples (in the root of a checkout, with PYTHONPATH=tools):

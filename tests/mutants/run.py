@@ -24,7 +24,7 @@ from tests.mutants.tree import ROOT, BuildError, Tree
 from tests.mutants.verdict import WRONG, Judge, Result
 
 OUT = ROOT / "build" / "mutants.json"
-PAGE = ROOT / "docs" / "mutants.md"
+PAGE = ROOT / "docs/reference/mutants.md"
 DECLARED_RATE, RANDOM_RATE = 0.95, 0.85  # what the suite must reach
 
 EPILOG = """\

@@ -10,8 +10,11 @@ import pytest
 from psabench.conform.profile import variant
 from psabench.conform.requirements import requirements
 
+from tests.false_positives import report as false_report
+from tests.false_positives import run as false_run
 from tests.mutants import random_mutants as chance
 from tests.mutants import report
+from tests.mutants import run as mutants_run
 from tests.mutants.declared import ListError, Mutant, Target, load, problems
 from tests.mutants.results import Book
 from tests.mutants.run import sample, status
@@ -156,3 +159,9 @@ def test_a_target_is_read_and_written(text: str, board: str, profile: str | None
     target = Target.of(text)
     assert (target.board, target.profile, target.adapter) == (board, profile, adapter)
     assert str(target) == text
+
+
+@pytest.mark.parametrize(("page", "marks"), [(mutants_run.PAGE, report.MARKS), (false_run.PAGE, false_report.MARKS)])
+def test_the_page_that_a_run_writes_has_room_for_its_tables(page: Path, marks: tuple[str, str]) -> None:
+    text = page.read_text(encoding="utf-8")
+    assert [text.count(mark) for mark in marks] == [1, 1]
