@@ -195,7 +195,7 @@ def test_the_table_stands_between_its_marks_and_nothing_else_changes() -> None:
     begin, end = gen_docs.MARKS
     text = f"before\n{begin}\nold\n{end}\nafter\n"
     assert gen_docs.page(text, "new") == f"before\n{begin}\nnew\n{end}\nafter\n"
-    with pytest.raises(gen_docs.FidelityError, match=r"page: wanted once.* <!-- fidelity:begin -->"):
+    with pytest.raises(gen_docs.FidelityError, match=r"page: expected one line <!-- fidelity:begin -->"):
         gen_docs.page("no marks", "new")
 
 
