@@ -64,7 +64,7 @@ static bool apply_sensor(struct fault *f, int64_t t_ns)
 static const struct fault_kind platform[] = {
     {"platform.torquer", "The torquer of the axis gives no torque.", "the gyro unit's windows do not come: level: it does not settle (EMCY FF23h); azimuth: the angle sensor does not follow (EMCY FF22h)",
      .places = FAULT_BIT(FAULT_AT_TORQUER), .apply = apply_torquer, .lift = refresh_torquer},
-    {"platform.drift_step", "The gyroscope drift about the axis changes by drift_degph.", "the levelling rate (azimuth: the rate of the azimuth torquer) is another by so much",
+    {"platform.drift_step", "The gyroscope drift about the axis changes by drift_degph.", "the levelling rate (azimuth: the rate of the azimuth torquer) changes by drift_degph",
      .places = FAULT_BIT(FAULT_AT_TORQUER), .need = FAULT_BIT(FAULT_DRIFT_DEGPH), .nonzero = FAULT_BIT(FAULT_DRIFT_DEGPH), .apply = apply_drift, .lift = refresh_drift},
     {"platform.encoder_stuck", "The angle sensor of the outer gimbal freezes at its last value.", "ENCODER is constant; during a turn the unit reports it (EMCY FF22h)",
      .places = FAULT_BIT(FAULT_AT_ENCODER), .apply = apply_sensor, .lift = refresh_sensor},

@@ -153,7 +153,7 @@ static const struct fault_kind sensor[] = {
     {"sensor.bias", "Adds bias_v to the sensor output.", "a step in the codes of the axis",
      SENSOR(SENSOR_BIAS), .need = FAULT_BIT(FAULT_BIAS_V), .nonzero = FAULT_BIT(FAULT_BIAS_V), .unless = "the channel has no sensor; it is less than a code of the board", .fits = seen_volts},
     {"sensor.drift", "The sensor output drifts by drift_v_per_s.", "a slope in the codes of the axis",
-     SENSOR(SENSOR_DRIFT), .need = FAULT_BIT(FAULT_DRIFT_V_PER_S), .nonzero = FAULT_BIT(FAULT_DRIFT_V_PER_S), .unless = "the channel has no sensor; it ends before it has come to a code", .fits = grows_enough},
+     SENSOR(SENSOR_DRIFT), .need = FAULT_BIT(FAULT_DRIFT_V_PER_S), .nonzero = FAULT_BIT(FAULT_DRIFT_V_PER_S), .unless = "the channel has no sensor; the total drift is less than a code of the board", .fits = grows_enough},
     {"sensor.scale", "The scale factor of the sensor changes by scale_ppm.", "an error of the axis proportional to its specific force",
      SENSOR(SENSOR_SCALE), .need = FAULT_BIT(FAULT_SCALE_PPM), .nonzero = FAULT_BIT(FAULT_SCALE_PPM), .unless = "the channel has no sensor; it is less than a code of the board", .fits = seen_scale},
     {"sensor.noise", "Adds white noise of rms rms_v in a settled reading at 1000 SPS.", "more scatter in the codes of the axis",
@@ -222,7 +222,7 @@ static const struct fault_kind analog[] = {
     {"analog.load_short", "The load resistor of a current-output sensor is shorted; the input is 0 V.", "codes of the axis near 0 at any head angle",
      CHAIN(AFE_LOAD_SHORT), .unless = "the sensor has voltage output: no load resistor", .fits = has_load},
     {"analog.reference", "The converter's reference voltage is off by reference_ppm and drifts by drift_ppm_per_s.", "all codes of the axis scaled, offset included",
-     CHAIN(AFE_REFERENCE), .may = FAULT_BIT(FAULT_REFERENCE_PPM) | FAULT_BIT(FAULT_DRIFT_PPM_PER_S), .unless = "neither is given; the error is less than a code of the board, or a drift ends before it has come to one", .fits = has_error},
+     CHAIN(AFE_REFERENCE), .may = FAULT_BIT(FAULT_REFERENCE_PPM) | FAULT_BIT(FAULT_DRIFT_PPM_PER_S), .unless = "neither is given; the error or total drift is less than a code of the board", .fits = has_error},
     {"analog.ripple", "Supply ripple couples through the buffer, as a sine of amplitude_v at the load.", "a spectral line at frequency_hz in the codes of the axis",
      CHAIN(AFE_RIPPLE), .need = FAULT_BIT(FAULT_AMPLITUDE_V) | FAULT_BIT(FAULT_FREQUENCY_HZ), .unless = "it is less than a code of the board", .fits = ripples_enough},
 };

@@ -7,13 +7,13 @@
 
 // clang-format off
 static const struct yaml_field bus_rows[] = {
-    {.key = "bitrate_hz",      .type = YAML_U32, .offset = BUS(bitrate_hz),      .max = 1e6, .what = "0, or 10000 and more; 0: frames take no time"},
-    {.key = "data_bitrate_hz", .type = YAML_U32, .offset = BUS(data_bitrate_hz), .max = 8e6, .what = "of FD frames with bit rate switch; 0: a classic bus"},
+    {.key = "bitrate_hz",      .type = YAML_U32, .offset = BUS(bitrate_hz),      .max = 1e6, .what = "bit rate, 10000 or more; 0: frames take no time"},
+    {.key = "data_bitrate_hz", .type = YAML_U32, .offset = BUS(data_bitrate_hz), .max = 8e6, .what = "data bit rate of FD frames with bit rate switch; 0: classic bus"},
 };
 const struct yaml_fields scenario_bus_fields = YAML_FIELDS(bus_rows);
 
 static const struct yaml_field buses_rows[] = {
-    {.key = "name", .type = YAML_TEXT, .offset = offsetof(struct scenario_bus, name), .max = 16, .what = "letters, digits and _; what `bus` of a unit and `open` of socketcand say"},
+    {.key = "name", .type = YAML_TEXT, .offset = offsetof(struct scenario_bus, name), .max = 16, .what = "letters, digits and _; the name for `bus` of a unit and `open` of socketcand"},
     {.type = YAML_INLINE, .offset = offsetof(struct scenario_bus, cfg), .sub = &scenario_bus_fields},
 };
 const struct yaml_fields scenario_buses_fields = YAML_FIELDS(buses_rows);
@@ -27,15 +27,15 @@ static const struct yaml_field mems_rows[] = {
     ROW(kxy_v_per_g2,    -1, 1,   "cross term"),
     ROW(kxx_v_per_g2,    -1, 1,   "square of the acceleration along the axis"),
     ROW(kyy_v_per_g2,    -1, 1,   "square of the acceleration across"),
-    ROW(alpha0_deg,      -10, 10, "error of setting: adds to the angle of the head"),
+    ROW(alpha0_deg,      -10, 10, "setting error, added to the angle of the head"),
     ROW(drift_v_per_s,   -1, 1,   "linear drift of the output from power-on"),
-    ROW(noise_v_rthz,    0, 1,    "white noise, one-sided density; 0: reading_noise_v counts"),
+    ROW(noise_v_rthz,    0, 1,    "white noise, one-sided density; 0: use reading_noise_v"),
     ROW(reading_noise_v, 0, 1,    "white noise, rms of one settled reading at 1000 SPS"),
     ROW(u0_tc_v_per_k,   -1, 1,   "temperature coefficient of the output without acceleration, from 25 °C"),
     ROW(k_tc_ppm_per_k,  -1e5, 1e5, "temperature coefficient of the sensitivities"),
     ROW(bias_instability_v, 0, 1, "flicker, B of IEEE Std 952"),
     ROW(walk_v_rts,      0, 1,    "random walk, K of IEEE Std 952"),
-    ROW(quantum_v,       0, 1,    "the output is a multiple of it; 0: none"),
+    ROW(quantum_v,       0, 1,    "resolution of the output; 0: none"),
     ROW(low_v,           -15, 15, "lowest output; low_v and high_v both 0: no limits"),
     ROW(high_v,          -15, 15, "highest output"),
 #undef ROW
@@ -46,20 +46,20 @@ const struct yaml_fields scenario_mems_fields = YAML_FIELDS(mems_rows);
 static const struct yaml_field quartz_rows[] = {
 #define ROW(name, lo, hi, words) {.key = #name, .type = YAML_REAL, .offset = QUARTZ(name), .min = (lo), .max = (hi), .what = (words)}
     ROW(scale_a_per_g,      -1, 1,      "current for one g at 30 °C"),
-    ROW(scale_tc_ppm_per_k, -1e4, 1e4,  "its temperature coefficient"),
-    ROW(zero_ug,            -1e6, 1e6,  "zero signal at 30 °C but for the curve, millionths of g"),
-    ROW(curve_ug,           -1e6, 1e6,  "greatest deviation of the zero signal over temperature, hot side"),
+    ROW(scale_tc_ppm_per_k, -1e4, 1e4,  "temperature coefficient"),
+    ROW(zero_ug,            -1e6, 1e6,  "bias at 30 °C without the curve, millionths of g"),
+    ROW(curve_ug,           -1e6, 1e6,  "greatest deviation of the bias over temperature, hot side"),
     ROW(curve_centre_degc,  -100, 200,  "where the deviation changes sign"),
-    ROW(curve_width_k,      1, 1000,    "from there to the greatest deviation"),
-    ROW(slope_ug_per_k,     -1e4, 1e4,  "linear part of the zero signal over temperature"),
+    ROW(curve_width_k,      1, 1000,    "distance from the centre to the greatest deviation"),
+    ROW(slope_ug_per_k,     -1e4, 1e4,  "linear part of the bias over temperature"),
     ROW(play_k,             0, 100,     "half the width of the hysteresis over temperature"),
-    ROW(gradient_ug_per_k,  -1e4, 1e4,  "zero signal by the case being warmer than the element"),
+    ROW(gradient_ug_per_k,  -1e4, 1e4,  "bias per kelvin that the case is warmer than the element"),
     ROW(tilt_y_mrad,        -100, 100,  "input axis towards the sensor's y"),
     ROW(tilt_z_mrad,        -100, 100,  "input axis towards the sensor's z"),
     ROW(square_ug_per_g2,   -1e5, 1e5,  "square of the acceleration"),
-    ROW(alpha0_deg,         -10, 10,    "error of setting: adds to the angle of the head"),
-    ROW(natural_hz,         0, 1e5,     "natural frequency of the loop; 0: answers at once"),
-    ROW(damping,            0, 0.999,   "its damping ratio"),
+    ROW(alpha0_deg,         -10, 10,    "setting error, added to the angle of the head"),
+    ROW(natural_hz,         0, 1e5,     "natural frequency of the loop; 0: no lag"),
+    ROW(damping,            0, 0.999,   "damping ratio of the loop"),
     ROW(noise_a_rthz,       0, 1,       "white noise, one-sided density"),
     ROW(limit_a,            0, 10,      "largest current of either sign; 0: none"),
 #undef ROW
@@ -68,14 +68,14 @@ const struct yaml_fields scenario_quartz_fields = YAML_FIELDS(quartz_rows);
 
 static const struct yaml_field afe_numbers[] = {
 #define ROW(name, lo, hi, words) {.key = #name, .type = YAML_REAL, .offset = AFE(name), .min = (lo), .max = (hi), .what = (words)}
-    ROW(load_ohm,                 1, 1e6,      "load resistor of a current"),
-    ROW(load_tol_ppm,             -1e5, 1e5,   "its deviation"),
-    ROW(load_tc_ppm_per_k,        -1e4, 1e4,   "its temperature coefficient, from 25 °C"),
+    ROW(load_ohm,                 1, 1e6,      "load resistor of a current output"),
+    ROW(load_tol_ppm,             -1e5, 1e5,   "deviation from the nominal value"),
+    ROW(load_tc_ppm_per_k,        -1e4, 1e4,   "temperature coefficient, from 25 °C"),
     ROW(divider_ratio,            1, 1000,     "volts at the load to volts at the converter"),
-    ROW(divider_tol_ppm,          -1e5, 1e5,   "its deviation"),
-    ROW(divider_tc_ppm_per_k,     -1e4, 1e4,   "its temperature coefficient"),
+    ROW(divider_tol_ppm,          -1e5, 1e5,   "deviation from the nominal value"),
+    ROW(divider_tc_ppm_per_k,     -1e4, 1e4,   "temperature coefficient"),
     ROW(buffer_offset_v,          -1, 1,       "offset of the buffer, referred to the load"),
-    ROW(buffer_offset_tc_v_per_k, -1e-2, 1e-2, "its temperature coefficient"),
+    ROW(buffer_offset_tc_v_per_k, -1e-2, 1e-2, "temperature coefficient"),
     ROW(clip_v,                   0.1, 100,    "largest voltage at the load"),
     ROW(filter_hz,                0, 1e6,      "corner of the anti-alias filter; 0: none"),
     ROW(noise_v_rthz,             0, 1e-2,     "white noise at the load, one-sided density"),
@@ -85,7 +85,7 @@ const struct yaml_fields scenario_afe_numbers = YAML_FIELDS(afe_numbers);
 
 static const char *const inputs[] = {[AFE_CURRENT] = "current", [AFE_VOLTAGE] = "voltage", NULL};
 static const struct yaml_field afe_rows[] = {
-    {.key = "input", .type = YAML_CHOICE, .offset = AFE(input), .choices = inputs, .what = "what the sensor gives"},
+    {.key = "input", .type = YAML_CHOICE, .offset = AFE(input), .choices = inputs, .what = "output of the sensor"},
     {.type = YAML_INLINE, .sub = &scenario_afe_numbers},
 };
 const struct yaml_fields scenario_afe_fields = YAML_FIELDS(afe_rows);

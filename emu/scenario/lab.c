@@ -11,11 +11,11 @@
 
 // clang-format off
 static const struct yaml_field site_rows[] = {
-    {.key = "g_mps2",        .type = YAML_REAL, .offset = SITE(g_mps2), .min = 0.001, .max = 20, .what = "local gravity; with a latitude and without this key: normal gravity of the place"},
-    {.key = "latitude_deg",  .type = YAML_REAL, .offset = SITE(latitude_deg), .min = -90, .max = 90, .what = "geodetic; without it the Earth does not turn"},
-    {.key = "longitude_deg", .type = YAML_REAL, .offset = SITE(longitude_deg), .min = -180, .max = 360, .what = "east"},
-    {.key = "height_m",      .type = YAML_REAL, .offset = SITE(height_m), .min = -500, .max = 9000, .what = "above the ellipsoid"},
-    {.key = "azimuth_deg",   .type = YAML_REAL, .offset = SITE(azimuth_deg), .min = -360, .max = 360, .what = "of the bench's x axis from north, clockwise"},
+    {.key = "g_mps2",        .type = YAML_REAL, .offset = SITE(g_mps2), .min = 0.001, .max = 20, .what = "local gravity (with a latitude: its normal gravity)"},
+    {.key = "latitude_deg",  .type = YAML_REAL, .offset = SITE(latitude_deg), .min = -90, .max = 90, .what = "geodetic latitude; without it the Earth does not rotate"},
+    {.key = "longitude_deg", .type = YAML_REAL, .offset = SITE(longitude_deg), .min = -180, .max = 360, .what = "longitude, positive east"},
+    {.key = "height_m",      .type = YAML_REAL, .offset = SITE(height_m), .min = -500, .max = 9000, .what = "height above the ellipsoid"},
+    {.key = "azimuth_deg",   .type = YAML_REAL, .offset = SITE(azimuth_deg), .min = -360, .max = 360, .what = "azimuth of the bench's x axis from north, clockwise"},
 };
 const struct yaml_fields scenario_site_fields = YAML_FIELDS(site_rows);
 // clang-format on
@@ -61,39 +61,39 @@ struct site scenario_site(const struct scenario_site *s)
 // clang-format off
 static const struct yaml_field head_rows[] = {
     {.key = "resolution_arcsec",        .type = YAML_REAL, .offset = HEAD(resolution_arcsec),        .max = 3600, .what = "step of the scale; 0: none"},
-    {.key = "setting_error_arcsec_rms", .type = YAML_REAL, .offset = HEAD(setting_error_arcsec_rms), .max = 3600, .what = "drawn at each turn"},
+    {.key = "setting_error_arcsec_rms", .type = YAML_REAL, .offset = HEAD(setting_error_arcsec_rms), .max = 3600, .what = "setting error, drawn at each turn"},
     {.key = "periodic_arcsec",          .type = YAML_REAL, .offset = HEAD(periodic_arcsec),          .max = 3600, .what = "error of the divided circle, amplitude"},
-    {.key = "periodic_order",           .type = YAML_U32,  .offset = HEAD(periodic_order),           .max = 3600, .what = "its periods in a turn; 0 is taken as 1"},
+    {.key = "periodic_order",           .type = YAML_U32,  .offset = HEAD(periodic_order),           .max = 3600, .what = "periods of that error per turn; 0: 1"},
     {.key = "mount_error_arcsec_rms",   .type = YAML_REAL, .offset = HEAD(mount_error_arcsec_rms),   .max = 3600, .what = "tilt of the unit, drawn at each mounting"},
     {.key = "turn_s",                   .type = YAML_REAL, .offset = HEAD(turn_s),                   .max = 3600, .what = "duration of a turn; 0: at once"},
 };
 const struct yaml_fields scenario_head_fields = YAML_FIELDS(head_rows);
 
 static const struct yaml_field chamber_rows[] = {
-    {.key = "start_degc",            .type = YAML_REAL, .offset = CHAMBER(start_degc), .min = -100, .max = 200, .what = "of air and units, and set point, at power-on"},
+    {.key = "start_degc",            .type = YAML_REAL, .offset = CHAMBER(start_degc), .min = -100, .max = 200, .what = "temperature of air and units, and set point, at power-on"},
     {.key = "min_degc",              .type = YAML_REAL, .offset = CHAMBER(min_degc), .min = -100, .max = 200, .what = "lowest set point"},
     {.key = "max_degc",              .type = YAML_REAL, .offset = CHAMBER(max_degc), .min = -100, .max = 200, .what = "highest set point"},
     {.key = "heating_max_k_per_min", .type = YAML_REAL, .offset = CHAMBER(heating_max_k_per_min), .min = 0.001, .max = 100, .what = "fastest rise of the air"},
-    {.key = "cooling_max_k_per_min", .type = YAML_REAL, .offset = CHAMBER(cooling_max_k_per_min), .min = 0.001, .max = 100, .what = "fastest fall"},
-    {.key = "ramp_k_per_min",        .type = YAML_REAL, .offset = CHAMBER(ramp_k_per_min), .min = 0.001, .max = 100, .what = "at power-on; the air takes the lesser of ramp and limit"},
+    {.key = "cooling_max_k_per_min", .type = YAML_REAL, .offset = CHAMBER(cooling_max_k_per_min), .min = 0.001, .max = 100, .what = "fastest fall of the air"},
+    {.key = "ramp_k_per_min",        .type = YAML_REAL, .offset = CHAMBER(ramp_k_per_min), .min = 0.001, .max = 100, .what = "ramp at power-on; the lesser of ramp and limit applies"},
     {.key = "tau_case_s",            .type = YAML_REAL, .offset = CHAMBER(tau_case_s), .max = 1e5, .what = "lag of a unit's case behind the air; 0: none"},
     {.key = "tau_element_s",         .type = YAML_REAL, .offset = CHAMBER(tau_element_s), .max = 1e5, .what = "lag of a sensor's element behind the case; 0: none"},
-    {.key = "readout_offset_k",      .type = YAML_REAL, .offset = CHAMBER(readout_offset_k), .min = -10, .max = 10, .what = "error of its thermometer"},
-    {.key = "readout_resolution_k",  .type = YAML_REAL, .offset = CHAMBER(readout_resolution_k), .max = 10, .what = "step of its thermometer; 0: none"},
+    {.key = "readout_offset_k",      .type = YAML_REAL, .offset = CHAMBER(readout_offset_k), .min = -10, .max = 10, .what = "error of the chamber's thermometer"},
+    {.key = "readout_resolution_k",  .type = YAML_REAL, .offset = CHAMBER(readout_resolution_k), .max = 10, .what = "resolution of the chamber's thermometer; 0: none"},
 };
 const struct yaml_fields scenario_chamber_fields = YAML_FIELDS(chamber_rows);
 
 static const struct yaml_field supply_rows[] = {
-    {.key = "volt_v",               .type = YAML_REAL, .offset = SUPPLY(volt_v), .max = 100, .what = "at power-on, output on"},
-    {.key = "volt_max_v",           .type = YAML_REAL, .offset = SUPPLY(volt_max_v), .min = 0.1, .max = 100, .what = "largest voltage it can be set to"},
-    {.key = "slew_v_per_s",         .type = YAML_REAL, .offset = SUPPLY(slew_v_per_s), .max = 1e6, .what = "of the output after a command; 0: at once"},
+    {.key = "volt_v",               .type = YAML_REAL, .offset = SUPPLY(volt_v), .max = 100, .what = "voltage at power-on, with the output on"},
+    {.key = "volt_max_v",           .type = YAML_REAL, .offset = SUPPLY(volt_max_v), .min = 0.1, .max = 100, .what = "highest voltage setting"},
+    {.key = "slew_v_per_s",         .type = YAML_REAL, .offset = SUPPLY(slew_v_per_s), .max = 1e6, .what = "slew rate after a command; 0: infinite"},
     {.key = "ripple_v",             .type = YAML_REAL, .offset = SUPPLY(ripple_v), .max = 100, .what = "amplitude of the ripple at power-on; 0: none"},
-    {.key = "ripple_hz",            .type = YAML_REAL, .offset = SUPPLY(ripple_hz), .max = 1e6, .what = "its frequency"},
-    {.key = "ripple_max_v",         .type = YAML_REAL, .offset = SUPPLY(ripple_max_v), .max = 100, .what = "largest amplitude it can be set to"},
-    {.key = "ripple_max_hz",        .type = YAML_REAL, .offset = SUPPLY(ripple_max_hz), .max = 1e6, .what = "highest frequency"},
-    {.key = "brownout_v",           .type = YAML_REAL, .offset = SUPPLY(brownout_v), .max = 100, .what = "below it the boards are off"},
-    {.key = "hysteresis_v",         .type = YAML_REAL, .offset = SUPPLY(hysteresis_v), .min = 1e-6, .max = 100, .what = "so much above it they are on again"},
-    {.key = "readout_resolution_v", .type = YAML_REAL, .offset = SUPPLY(readout_resolution_v), .max = 10, .what = "step of its voltmeter; 0: none"},
+    {.key = "ripple_hz",            .type = YAML_REAL, .offset = SUPPLY(ripple_hz), .max = 1e6, .what = "frequency of the ripple"},
+    {.key = "ripple_max_v",         .type = YAML_REAL, .offset = SUPPLY(ripple_max_v), .max = 100, .what = "largest ripple amplitude"},
+    {.key = "ripple_max_hz",        .type = YAML_REAL, .offset = SUPPLY(ripple_max_hz), .max = 1e6, .what = "highest ripple frequency"},
+    {.key = "brownout_v",           .type = YAML_REAL, .offset = SUPPLY(brownout_v), .max = 100, .what = "voltage below which the boards are off"},
+    {.key = "hysteresis_v",         .type = YAML_REAL, .offset = SUPPLY(hysteresis_v), .min = 1e-6, .max = 100, .what = "hysteresis: boards turn on at brownout_v + hysteresis_v"},
+    {.key = "readout_resolution_v", .type = YAML_REAL, .offset = SUPPLY(readout_resolution_v), .max = 10, .what = "resolution of the supply's voltmeter; 0: none"},
 };
 const struct yaml_fields scenario_supply_fields = YAML_FIELDS(supply_rows);
 
@@ -104,19 +104,19 @@ const struct yaml_fields scenario_supply_fields = YAML_FIELDS(supply_rows);
 
 static const char *const along[] = {[POSE_X] = "x", [POSE_Y] = "y", [POSE_Z] = "z", NULL};
 static const struct yaml_field axis_rows[] = {
-    {.key = "along",                    .type = YAML_CHOICE, .offset = AXIS(along), .choices = along, .what = "axis of the frame that carries it; z points down"},
+    {.key = "along",                    .type = YAML_CHOICE, .offset = AXIS(along), .choices = along, .what = "direction of the axis in the frame that carries it; z points down"},
     {.key = "rate_max_dps",             .type = YAML_REAL, .offset = AXIS(rate_max_dps), .min = 1e-6, .max = 1e5, .what = "largest rate"},
     {.key = "accel_max_dps2",           .type = YAML_REAL, .offset = AXIS(accel_max_dps2), .min = 1e-6, .max = 1e6, .what = "largest acceleration"},
-    {.key = "angle_min_deg",            .type = YAML_REAL, .offset = AXIS(angle_min_deg), .min = -36000, .max = 36000, .what = "lowest angle; both 0: without end"},
+    {.key = "angle_min_deg",            .type = YAML_REAL, .offset = AXIS(angle_min_deg), .min = -36000, .max = 36000, .what = "lowest angle; both 0: unlimited rotation"},
     {.key = "angle_max_deg",            .type = YAML_REAL, .offset = AXIS(angle_max_deg), .min = -36000, .max = 36000, .what = "highest angle"},
-    {.key = "nonorthogonality_arcsec",  .type = YAML_REAL, .offset = AXIS(nonorthogonality_arcsec), .min = -3600, .max = 3600, .what = "off square to the axis outside it"},
-    {.key = "wobble_arcsec",            .type = YAML_REAL, .offset = AXIS(wobble_arcsec), .max = 3600, .what = "half-angle of the cone the axis describes as it turns"},
-    {.key = "wobble_order",             .type = YAML_U32,  .offset = AXIS(wobble_order), .max = 3600, .what = "times a turn; 0 is taken as 1"},
-    {.key = "wobble_phase_deg",         .type = YAML_REAL, .offset = AXIS(wobble_phase_deg), .min = -360, .max = 360, .what = "of the cone at angle 0"},
-    {.key = "readout_noise_arcsec_rms", .type = YAML_REAL, .offset = AXIS(readout_noise_arcsec_rms), .max = 3600, .what = "of the angle shown"},
-    {.key = "readout_resolution_arcsec", .type = YAML_REAL, .offset = AXIS(readout_resolution_arcsec), .max = 3600, .what = "its step; 0: none"},
-    {.key = "readout_delay_s",          .type = YAML_REAL, .offset = AXIS(readout_delay_s), .max = 1, .what = "it shows the angle of so long ago"},
-    {.key = "readout_zero_arcsec",      .type = YAML_REAL, .offset = AXIS(readout_zero_arcsec), .min = -3600, .max = 3600, .what = "it shows so much too much"},
+    {.key = "nonorthogonality_arcsec",  .type = YAML_REAL, .offset = AXIS(nonorthogonality_arcsec), .min = -3600, .max = 3600, .what = "deviation from a right angle to the outer axis"},
+    {.key = "wobble_arcsec",            .type = YAML_REAL, .offset = AXIS(wobble_arcsec), .max = 3600, .what = "half-angle of the cone that the axis describes during a turn"},
+    {.key = "wobble_order",             .type = YAML_U32,  .offset = AXIS(wobble_order), .max = 3600, .what = "wobble periods per turn; 0: 1"},
+    {.key = "wobble_phase_deg",         .type = YAML_REAL, .offset = AXIS(wobble_phase_deg), .min = -360, .max = 360, .what = "phase of the wobble at angle 0"},
+    {.key = "readout_noise_arcsec_rms", .type = YAML_REAL, .offset = AXIS(readout_noise_arcsec_rms), .max = 3600, .what = "noise of the readout"},
+    {.key = "readout_resolution_arcsec", .type = YAML_REAL, .offset = AXIS(readout_resolution_arcsec), .max = 3600, .what = "resolution of the readout; 0: none"},
+    {.key = "readout_delay_s",          .type = YAML_REAL, .offset = AXIS(readout_delay_s), .max = 1, .what = "delay of the readout"},
+    {.key = "readout_zero_arcsec",      .type = YAML_REAL, .offset = AXIS(readout_zero_arcsec), .min = -3600, .max = 3600, .what = "offset of the readout"},
 };
 const struct yaml_fields scenario_axis_of_table_fields = YAML_FIELDS(axis_rows);
 
@@ -124,9 +124,9 @@ static bool load_axes(struct yaml_file *f, const struct yaml_node *node, void *s
 static void dump_axes(const struct yaml_field *d, const void *section, cJSON *to);
 
 static const struct yaml_field table_rows[] = {
-    {.key = "base_tilt_x_arcsec", .type = YAML_REAL, .offset = TABLE(base_tilt_x_arcsec), .min = -36000, .max = 36000, .what = "of its base about the bench's x"},
-    {.key = "base_tilt_y_arcsec", .type = YAML_REAL, .offset = TABLE(base_tilt_y_arcsec), .min = -36000, .max = 36000, .what = "about y"},
-    {.key = "axes", .type = YAML_CUSTOM, .load = load_axes, .dump = dump_axes, .what = "1 to 3 for so many axes of the model, or a sequence of them, from the outermost"},
+    {.key = "base_tilt_x_arcsec", .type = YAML_REAL, .offset = TABLE(base_tilt_x_arcsec), .min = -36000, .max = 36000, .what = "tilt of the base about the bench's x"},
+    {.key = "base_tilt_y_arcsec", .type = YAML_REAL, .offset = TABLE(base_tilt_y_arcsec), .min = -36000, .max = 36000, .what = "tilt of the base about the bench's y"},
+    {.key = "axes", .type = YAML_CUSTOM, .load = load_axes, .dump = dump_axes, .what = "number of axes, 1 to 3, or a sequence of axes from the outermost"},
 };
 const struct yaml_fields scenario_table_fields = YAML_FIELDS(table_rows);
 // clang-format on

@@ -143,7 +143,7 @@ static const struct yaml_field spread_afe_rows[] = {
 static const struct yaml_fields spread_afe_fields = YAML_FIELDS(spread_afe_rows);
 static const struct yaml_field spread_rows[] = {
     {.type = YAML_INLINE, .offset = offsetof(struct scenario_spread, mems), .sub = &scenario_mems_fields},
-    {.key = "afe", .type = YAML_SECTION, .offset = offsetof(struct scenario_spread, afe), .sub = &spread_afe_fields, .what = "of the analog chain"},
+    {.key = "afe", .type = YAML_SECTION, .offset = offsetof(struct scenario_spread, afe), .sub = &spread_afe_fields, .what = "parameters of the analog chain"},
 };
 const struct yaml_fields scenario_spread_fields = YAML_FIELDS(spread_rows);
 // clang-format on
@@ -177,7 +177,7 @@ static void dump_args(const struct yaml_field *d, const void *section, cJSON *to
 static const struct yaml_field event_rows[] = {
     {.key = "at_s", .type = YAML_REAL, .offset = offsetof(struct scenario_event, at_s), .max = 1e6, .what = "simulated time since power-on"},
     {.key = "cmd",  .type = YAML_TEXT, .offset = offsetof(struct scenario_event, cmd), .max = 32, .what = "a command of the control socket"},
-    {.key = "args", .type = YAML_CUSTOM, .load = load_args, .dump = dump_args, .what = "its arguments, a mapping"},
+    {.key = "args", .type = YAML_CUSTOM, .load = load_args, .dump = dump_args, .what = "arguments of the command, a mapping"},
 };
 const struct yaml_fields scenario_event_fields = YAML_FIELDS(event_rows);
 // clang-format on
@@ -262,16 +262,16 @@ static void dump_version(const struct yaml_field *d, const void *section, cJSON 
 static const struct yaml_field scenario_rows[] = {
     {.key = "version", .type = YAML_CUSTOM, .load = load_version, .dump = dump_version, .what = "version of the program that wrote the file; ignored"},
     {.key = "seed",  .type = YAML_U64, .offset = SCENARIO(seed), .max = 18446744073709551615.0, .what = "random seed; each unit and noise source has its own stream"},
-    {.key = "start", .type = YAML_BOOL, .offset = SCENARIO(start), .what = "the bench's own node writes the frame forms and starts the units, 1 ms after power-on"},
+    {.key = "start", .type = YAML_BOOL, .offset = SCENARIO(start), .what = "write the frame forms and start the units from the bench's own node, 1 ms after power-on"},
     {.key = "bus",   .type = YAML_CUSTOM, .load = load_bus, .what = "the only bus, `can0`"},
     {.key = "buses", .type = YAML_CUSTOM, .load = buses_are_loaded, .dump = dump_buses, .what = "a sequence of up to 8 buses"},
-    {.key = "site",  .type = YAML_CUSTOM, .load = scenario_load_site, .dump = scenario_dump_site, .what = "where the bench is"},
+    {.key = "site",  .type = YAML_CUSTOM, .load = scenario_load_site, .dump = scenario_dump_site, .what = "location of the bench"},
     {.key = "head",  .type = YAML_SECTION, .offset = SCENARIO(lab.head), .sub = &scenario_head_fields, .what = "the dividing head"},
     {.key = "table", .type = YAML_CUSTOM, .load = scenario_load_table, .dump = scenario_dump_table, .what = "the rate table; without it there is none"},
     {.key = "chamber", .type = YAML_SECTION, .offset = SCENARIO(lab.chamber), .sub = &scenario_chamber_fields, .present = SCENARIO(lab.chamber.present), .what = "the thermal chamber; without it there is none"},
-    {.key = "supply", .type = YAML_SECTION, .offset = SCENARIO(lab.supply), .sub = &scenario_supply_fields, .present = SCENARIO(lab.supply.present), .what = "the power supply; without it the boards are always fed"},
+    {.key = "supply", .type = YAML_SECTION, .offset = SCENARIO(lab.supply), .sub = &scenario_supply_fields, .present = SCENARIO(lab.supply.present), .what = "the power supply; without it the boards are always powered"},
     {.key = "platform", .type = YAML_SECTION, .offset = SCENARIO(lab.platform), .sub = &scenario_platform_fields, .present = SCENARIO(lab.platform.present), .what = "the gyro-stabilised platform; without it there is none"},
-    {.key = "vehicle", .type = YAML_CUSTOM, .load = scenario_load_vehicle, .dump = scenario_dump_vehicle, .what = "what the platform is on"},
+    {.key = "vehicle", .type = YAML_CUSTOM, .load = scenario_load_vehicle, .dump = scenario_dump_vehicle, .what = "the vehicle that carries the platform"},
     {.key = "spread", .type = YAML_CUSTOM, .load = load_spread, .dump = dump_spread, .what = "production spread: standard deviations from unit to unit"},
     {.key = "units", .type = YAML_CUSTOM, .load = load_units, .dump = dump_units, .what = "a sequence of up to 64 units"},
     {.key = "timeline", .type = YAML_CUSTOM, .load = load_timeline, .dump = dump_timeline, .what = "a sequence of commands, each at its time"},

@@ -111,12 +111,12 @@ static bool load_count(struct yaml_file *f, const struct yaml_node *node, void *
 static const char *const sensors[] = {[UNIT_NO_SENSOR] = "none", [UNIT_MEMS] = "mems", [UNIT_QUARTZ] = "quartz", NULL};
 #define AXIS(i)                                                                                                        \
     {.key = "sensor", .type = YAML_CHOICE, .offset = UNIT(cfg.axis[i].sensor), .choices = sensors,                     \
-     .what = "`none`: the channel is shorted"},                                                                        \
+     .what = "type of the sensor; `none`: the channel is shorted"},                                                                        \
     {.type = YAML_INLINE, .offset = UNIT(cfg.axis[i].mems), .sub = &scenario_mems_fields},                             \
     {.key = "quartz", .type = YAML_SECTION, .offset = UNIT(cfg.axis[i].quartz), .sub = &scenario_quartz_fields,        \
      .present = UNIT(cfg.axis[i].quartz_given), .what = "parameters of a quartz sensor; its afe.input is current"},    \
     {.key = "at_m", .type = YAML_REALS, .offset = UNIT(cfg.axis[i].at_m), .count = 3, .min = -10, .max = 10,           \
-     .what = "where the sensor is in the unit, its case's x, y, z"},                                                   \
+     .what = "position of the sensor in the unit's case, x, y, z"},                                                   \
     {.key = "afe", .type = YAML_SECTION, .offset = UNIT(cfg.board.afe[i]), .sub = &scenario_afe_fields,                \
      .what = "the analog chain"}
 static const struct yaml_field axis_x_rows[] = {AXIS(0)}, axis_y_rows[] = {AXIS(1)}, axis_z_rows[] = {AXIS(2)};
@@ -137,29 +137,29 @@ static const char *const chains[] = {
     [ADS1282_CHAIN_EXACT] = "exact", [ADS1282_CHAIN_MODULATOR] = "modulator", [ADS1282_CHAIN_DIRECT] = "direct", NULL};
 
 static const struct yaml_field unit_rows[] = {
-    {.key = "name",   .type = YAML_TEXT, .offset = UNIT(name), .max = 32, .what = "letters, digits and _; with `count` a number is in it, `%02u`"},
-    {.key = "count",  .type = YAML_CUSTOM, .min = 1, .max = SCENARIO_UNITS_MAX, .load = load_count, .what = "so many units, alike but for name, node and serial, which count up"},
+    {.key = "name",   .type = YAML_TEXT, .offset = UNIT(name), .max = 32, .what = "letters, digits and _; with `count` it includes a number format, `%02u`"},
+    {.key = "count",  .type = YAML_CUSTOM, .min = 1, .max = SCENARIO_UNITS_MAX, .load = load_count, .what = "number of equal units; name, node and serial count up"},
     {.key = "board",  .type = YAML_CUSTOM, .load = already_loaded, .dump = dump_board, .what = "type of the board, or a name of one of its profiles: see below"},
     {.key = "profile", .type = YAML_CUSTOM, .load = already_loaded, .what = "name in proto/profiles, or a path, relative to the scenario"},
     {.key = "profile_set", .type = YAML_CUSTOM, .load = load_profile_set, .dump = dump_profile_set, .what = "fields of the profile that differ"},
-    {.key = "bus",    .type = YAML_TEXT, .offset = UNIT(bus_name), .max = 16, .what = "name of its bus; the first if it is not given"},
-    {.key = "node",   .type = YAML_U8, .offset = UNIT(cfg.node), .min = 1, .max = 127, .what = "CANopen node id; each its own on a bus; the default is the board's, or the next that is free"},
-    {.key = "serial", .type = YAML_U32, .offset = UNIT(cfg.board.serial), .min = 1, .max = 4294967295.0, .what = "serial number; each its own, its noise and its spread are drawn by it"},
+    {.key = "bus",    .type = YAML_TEXT, .offset = UNIT(bus_name), .max = 16, .what = "name of the unit's bus (the first)"},
+    {.key = "node",   .type = YAML_U8, .offset = UNIT(cfg.node), .min = 1, .max = 127, .what = "CANopen node id, unique on a bus (the board's default, or the next free one)"},
+    {.key = "serial", .type = YAML_U32, .offset = UNIT(cfg.board.serial), .min = 1, .max = 4294967295.0, .what = "serial number, unique; noise and spread are drawn from it"},
     {.key = "frame_form", .type = YAML_U8, .offset = UNIT(frame_form), .max = 3, .what = "0 pair, 1 fast, 2 FD frame, 3 FD block; written to object 2020h at the start"},
-    {.key = "spread", .type = YAML_BOOL, .offset = UNIT(spread), .what = "its parameters are drawn from the scenario's `spread`"},
+    {.key = "spread", .type = YAML_BOOL, .offset = UNIT(spread), .what = "draw parameters from the scenario's `spread`"},
     {.key = "axes",   .type = YAML_SECTION, .sub = &axes_fields, .what = "the channels `x`, `y`, `z`"},
-    {.key = "level",  .type = YAML_TEXT, .offset = UNIT(level), .max = 32, .what = "of a gyro unit: name of the PSA-2 on the platform that reads its level sensors"},
-    {.key = "on",     .type = YAML_CHOICE, .offset = UNIT(cfg.mounting.on), .choices = mounts, .what = "where it is mounted"},
+    {.key = "level",  .type = YAML_TEXT, .offset = UNIT(level), .max = 32, .what = "gyro unit: name of the PSA-2 that reads its level sensors"},
+    {.key = "on",     .type = YAML_CHOICE, .offset = UNIT(cfg.mounting.on), .choices = mounts, .what = "mounting place"},
     {.key = "lever_arm_m", .type = YAML_REALS, .offset = UNIT(cfg.mounting.lever_m), .count = 3, .min = -10, .max = 10, .what = "from the instrument's centre to the unit, mount's x, y, z"},
-    {.key = "misalignment_arcsec", .type = YAML_REALS, .offset = UNIT(misalignment_arcsec), .count = 3, .min = -36000, .max = 36000, .what = "of its case in the mount, about x, y, z"},
-    {.key = "tau_case_s", .type = YAML_REAL, .offset = UNIT(cfg.tau_case_s), .max = 1e5, .what = "in the chamber; 0: the chamber's own"},
-    {.key = "tau_element_s", .type = YAML_REAL, .offset = UNIT(cfg.tau_element_s), .max = 1e5, .what = "in the chamber; 0: the chamber's own"},
-    {.key = "temp_degc", .type = YAML_EACH, .offset = UNIT(cfg.temp_degc), .count = UNIT_TEMPS, .min = -60, .max = 125, .what = "of X, Y, Z and the board, where there is no chamber"},
-    {.key = "adc_chain", .type = YAML_CHOICE, .offset = UNIT(cfg.board.adc_chain), .choices = chains, .what = "of the accelerometer converters: [ADS1282](chips/ads1282.md)"},
-    {.key = "adc_noise_scale", .type = YAML_REAL, .offset = UNIT(cfg.board.adc_noise_scale), .max = 1000, .what = "1: published noise, 0: none"},
-    {.key = "temp_noise_scale", .type = YAML_REAL, .offset = UNIT(cfg.board.temp_noise_scale), .max = 1000, .what = "the same of the temperature converter"},
-    {.key = "temp_adc_offset_v", .type = YAML_REAL, .offset = UNIT(cfg.board.temp_adc_offset_v), .min = -0.1, .max = 0.1, .what = "of the temperature converter before its calibration"},
-    {.key = "temp_adc_gain_error", .type = YAML_REAL, .offset = UNIT(cfg.board.temp_adc_gain_error), .min = -0.1, .max = 0.1, .what = "relative, before its calibration"},
+    {.key = "misalignment_arcsec", .type = YAML_REALS, .offset = UNIT(misalignment_arcsec), .count = 3, .min = -36000, .max = 36000, .what = "misalignment of the case in the mount, about x, y, z"},
+    {.key = "tau_case_s", .type = YAML_REAL, .offset = UNIT(cfg.tau_case_s), .max = 1e5, .what = "time constant in the chamber; 0: the chamber's"},
+    {.key = "tau_element_s", .type = YAML_REAL, .offset = UNIT(cfg.tau_element_s), .max = 1e5, .what = "time constant in the chamber; 0: the chamber's"},
+    {.key = "temp_degc", .type = YAML_EACH, .offset = UNIT(cfg.temp_degc), .count = UNIT_TEMPS, .min = -60, .max = 125, .what = "temperature of X, Y, Z and the board without a chamber"},
+    {.key = "adc_chain", .type = YAML_CHOICE, .offset = UNIT(cfg.board.adc_chain), .choices = chains, .what = "model of the accelerometer converters: [ADS1282](chips/ads1282.md)"},
+    {.key = "adc_noise_scale", .type = YAML_REAL, .offset = UNIT(cfg.board.adc_noise_scale), .max = 1000, .what = "scale of the converters' noise; 1: published noise, 0: none"},
+    {.key = "temp_noise_scale", .type = YAML_REAL, .offset = UNIT(cfg.board.temp_noise_scale), .max = 1000, .what = "scale of the temperature converter's noise"},
+    {.key = "temp_adc_offset_v", .type = YAML_REAL, .offset = UNIT(cfg.board.temp_adc_offset_v), .min = -0.1, .max = 0.1, .what = "offset of the temperature converter before calibration"},
+    {.key = "temp_adc_gain_error", .type = YAML_REAL, .offset = UNIT(cfg.board.temp_adc_gain_error), .min = -0.1, .max = 0.1, .what = "relative gain error of the temperature converter before calibration"},
 };
 const struct yaml_fields scenario_unit_fields = YAML_FIELDS(unit_rows);
 // clang-format on

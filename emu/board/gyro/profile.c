@@ -10,13 +10,13 @@
 
 // clang-format off
 const struct board_field gyro_fields[GYRO_FIELDS] = {
-    ROW(name, STRING, 1, 31, "of the profile"),
+    ROW(name, STRING, 1, 31, "name of the profile"),
     ROW(step_ns, UINT, 1000000, 20000000, "period of the controller: 100 a second (E0; the article simulates with 10 ms)"),
-    ROW(start_ns, UINT, 1000000, 900000000, "from Res or power-up to the first step: the gyroscope runs (E0)"),
-    ROW(silent_ns, UINT, 10000000, 1000000000, "without a frame of the level unit: it is lost (E0)"),
-    ROW(torquer_limit_dps, REAL, 0.1, 50, "to which the controller limits both rates (E0)"),
-    ROW(stuck_turn_deg, REAL, 0.1, 90, "driven so far in half a second ... (E0)"),
-    ROW(stuck_moved_deg, REAL, 0, 45, "... the angle sensor has to move so far, or it or the torquer is dead (E0)"),
+    ROW(start_ns, UINT, 1000000, 900000000, "time from Res or power-up to the first step (gyroscope run-up, E0)"),
+    ROW(silent_ns, UINT, 10000000, 1000000000, "time without a frame of the level unit after which it is lost (E0)"),
+    ROW(torquer_limit_dps, REAL, 0.1, 50, "limit of both rates in the controller (E0)"),
+    ROW(stuck_turn_deg, REAL, 0.1, 90, "angle driven in half a second for the stuck check (E0)"),
+    ROW(stuck_moved_deg, REAL, 0, 45, "least motion of the angle sensor for that drive; less: sensor or torquer fault (E0)"),
 };
 // clang-format on
 

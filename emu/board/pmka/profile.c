@@ -17,21 +17,21 @@ static const char *const rotations[] = {"program", "autonomous", NULL};
 
 // clang-format off
 const struct board_field pmka_fields[PMKA_FIELDS] = {
-    {.key = "name", .type = BOARD_FIELD_STRING, AT(name), .min = 1, .max = 31, .what = "of the profile"},
+    {.key = "name", .type = BOARD_FIELD_STRING, AT(name), .min = 1, .max = 31, .what = "name of the profile"},
     NS(ts_ns, 1000000, 20000000, "sample period Ts, even; a reset lasts half of it (article 3: 4.8 ms, E1)"),
     NS(mux_step_ns, 10000, 500000, "between the sampling instants of X, Y, Z and K, one converter serves all (E0)"),
-    NS(hold_ns, 100, 100000, "from the sampling instant to the start of conversion (E0)"),
-    NS(convert_ns, 1000, 100000, "from the sampling instant to the code (E0)"),
+    NS(hold_ns, 100, 100000, "time from the sampling instant to the start of conversion (E0)"),
+    NS(convert_ns, 1000, 100000, "time from the sampling instant to the code (E0)"),
     NS(key_gap_ns, 1000, 100000, "keys move this long before and after K is sampled (E0)"),
     NS(start_ns, 1000, 1000000000, "from Res or power-up to the first sampling instant (E0)"),
-    NS(strobe_ns, 10, 1000000, "strobe of the parallel bus, where the host says nothing else (E0)"),
+    NS(strobe_ns, 10, 1000000, "default strobe of the parallel bus (E0)"),
     NS(strobe_min_ns, 10, 1000000, "shortest strobe that is answered (E0)"),
     REAL(uref_v, 1, 20, "UREF (article 3: 10 V, E1)"),
     REAL(r_in_ohm, 1e3, 1e6, "RIN (E3: twice Rr, so that (3) and (6) hold)"),
     REAL(rr_ohm, 1e3, 1e6, "Rr (article 3: 10 kohm, E1)"),
     REAL(cap_f, 1e-9, 1e-5, "CINT (article 3: 0.47 uF, E1)"),
     REAL(uc_v, 0.1, 20, "Uc of the comparators, both signs (E0: above Ur / 2 and below adc_range_v - Ur with +-20 % of CINT)"),
-    REAL(limit_v, 1, 30, "swing of the integrators' amplifiers (E0)"),
+    REAL(limit_v, 1, 30, "output limit of the integrators' amplifiers (E0)"),
     REAL(adc_range_v, 1, 20, "of the converter, both signs, 2^15 codes each (article 3: 16 bits, E1; 10 V: E3, the printed quantum)"),
     REAL(reset_asymmetry_ppm, -2000, 2000, "Rr(-) over Rr(+), beside their tolerances (E0; that it is there: E1)"),
     REAL(cap_tol_sd, 0, 0.05, "CINT, relative (E0)"),
@@ -51,9 +51,9 @@ const struct board_field pmka_fields[PMKA_FIELDS] = {
     REAL(temp_offset_sd_k, 0, 1, "thermometer (E0)"),
     REAL(rom_ct_sd_ppm, 0, 100, "error of CT as the factory measured it (E0), beside the ROM's resolution of 0.24 ppm"),
     {.key = "rotation", .type = BOARD_FIELD_CHOICE, AT(rotation), .choices = rotations,
-     .what = "who turns the calibration after Res: the computer's program (E1) or the board itself (E0)"},
+     .what = "control of the calibration after Res: the computer's program (E1) or the board itself (E0)"},
     COUNT(beat_periods, 8, 60000, "length of a beat tau, in Ts (E0)"),
-    COUNT(zero_periods, 1, 60000, "of these with the input at ground for the zero (E0)"),
+    COUNT(zero_periods, 1, 60000, "Ts of a beat with the input at ground, for the zero (E0)"),
 };
 // clang-format on
 

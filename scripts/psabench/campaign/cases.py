@@ -305,7 +305,7 @@ def _wire(base: Setup) -> Iterator[Case]:
 
 
 def _own(base: Setup) -> Iterator[Case]:
-    yield Case(study="own", name="own", title="as --set says", setup=base)
+    yield Case(study="own", name="own", title="as set with --set", setup=base)
 
 
 def _scan(study: str, curve: str, x: float, setup: Setup) -> Case:
@@ -319,21 +319,33 @@ def _with(base: Setup, change: Mapping[str, object]) -> Setup:
 STUDIES: Mapping[str, Study] = {
     s.name: s
     for s in (
-        Study(name="readings", title="The article's sentence, read in each way", cases=_readings),
+        Study(name="readings", title="Each reading of the article's sentence", cases=_readings),
         Study(name="sources", title="One source of error at a time", cases=_sources),
-        Study(name="step", title="Error against step", cases=_step, axis="step, deg", figure="sd", log_y=True),
+        Study(
+            name="step",
+            title="Error against step",
+            cases=_step,
+            axis="step of the gimbal, deg",
+            figure="sd",
+            log_y=True,
+        ),
         Study(name="latitude", title="Error against latitude", cases=_latitude, axis="latitude, deg", figure="sd"),
         Study(
             name="tilt", title="Error against tilt", cases=_tilt, axis="pitch and roll, deg", figure="sd", log_y=True
         ),
         Study(
-            name="time", title="Error against averaging time", cases=_time, axis="window, s", figure="sd", log_y=True
+            name="time",
+            title="Error against averaging time",
+            cases=_time,
+            axis="averaging window, s",
+            figure="sd",
+            log_y=True,
         ),
         Study(name="order", title="Number and order of positions", cases=_order),
         Study(name="improved", title="The improved procedure, with the time that turns take", cases=_improved),
-        Study(name="slew", title="Error against the time it may take", cases=_slew, axis="whole run, s"),
+        Study(name="slew", title="Error against the duration of the run", cases=_slew, axis="duration of the run, s"),
         Study(name="hold", title="Heading after 4 h of hold", cases=_hold),
-        Study(name="wire", title="What goes through the wire as well", cases=_wire),
+        Study(name="wire", title="Cases that also run through the wire", cases=_wire),
         Study(name="own", title="As set on the command line", cases=_own),
     )
 }

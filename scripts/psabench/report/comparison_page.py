@@ -93,9 +93,9 @@ def _dots(c: Comparison) -> str:
                     ax.plot(value, -i, marker, color=colour, ms=5, label=label if i == 0 else None, ls="none")
             if g.article.pulse_mps:  # a ring: the quantum lies in it
                 ring = ax.plot(g.article.pulse_mps, -i, "o", color=plots.INK, ls="none", ms=10, mfc="none", mew=1.0)
-                ring[0].set_label("printed quantum" if i == 0 else "_")
+                ring[0].set_label("printed velocity resolution" if i == 0 else "_")
         ax.set_xscale("log")
-        ax.set_xlabel("m/s")
+        ax.set_xlabel("velocity, m/s")
         ax.set_yticks([-i for i in range(len(c.graded))], [g.figures.track.title for g in c.graded])
         ax.set_ylim(-len(c.graded) + 0.4, 0.6)
         ax.legend(loc="upper center", ncols=5, bbox_to_anchor=(0.45, 1.2), handletextpad=0.1, columnspacing=1.0)
@@ -138,7 +138,7 @@ def _motion(c: Comparison) -> str:
         for i, colour in enumerate(plots.SERIES[:3]):
             top.plot(m.t_s[span][::5], m.a_mps2[span][::5, i], lw=1.0, color=colour, label=AXES[i])
             bottom.plot(m.t_s[span][::5], (m.v_mps[span] - m.v_mps[span][0])[::5, i], lw=1.0, color=colour)
-        top.set_ylabel("m/s²")
+        top.set_ylabel("acceleration, m/s²")
         bottom.set_ylabel("integral, m/s")
         bottom.set_xlabel("time, s")
         top.legend(loc="upper right", ncols=3, bbox_to_anchor=(1.0, 1.25))

@@ -75,7 +75,7 @@ def _hold(s: GyroSection, ident: str) -> str:
 
 def _positions(s: GyroSection) -> str:
     rows: list[tuple[str, ...]] = [
-        ("position", "gimbal, deg", "turn of α, deg", "S, deg/h", "β, ′", "γ, deg", "left, deg/h")
+        ("position", "gimbal, deg", "turn of α, deg", "S, deg/h", "β, ′", "γ, deg", "residual, deg/h")
     ]
     for row in s.result.rows:
         p = row.position
@@ -129,9 +129,9 @@ def rates_figure(s: GyroSection) -> object:
         top.plot(alpha, rate, "o", color=plots.SERIES[0], ms=4.5, label="position")
         bottom.plot(alpha, left, "o", color=plots.SERIES[0], ms=4.0)
         bottom.axhline(0.0, color=plots.MUTED, lw=0.8)
-        top.set_ylabel("S, deg/h")
-        bottom.set_ylabel("left, deg/h")
-        bottom.set_xlabel("α, deg")
+        top.set_ylabel("levelling rate S, deg/h")
+        bottom.set_ylabel("residual, deg/h")
+        bottom.set_xlabel("gimbal azimuth α, deg")
         bottom.set_xlim(-180.0, 180.0)
         bottom.set_xticks(range(-180, 181, 45))
         top.legend(loc="upper left", ncols=2)
@@ -161,7 +161,7 @@ def course_figure(s: GyroSection) -> object:
             expected = (p.s_radps - row.residual_radps) / DEGPH
             ax.plot([middle - half, middle + half], [expected] * 2, color=plots.SERIES[1], lw=1.4)
         ax.set_xlabel("time from the first window, s")
-        ax.set_ylabel("S, deg/h")
+        ax.set_ylabel("levelling rate S, deg/h")
         return picture
 
 
@@ -184,6 +184,6 @@ def hold_figure(s: GyroSection) -> object:
             ax.axhline(sign * grading.HOLD_CLAIM_DEG, color=plots.SERIES[1], lw=0.9, ls="--")
         ax.plot(hours, errors, color=plots.SERIES[0], lw=1.4)
         ax.set_xlabel("time, h")
-        ax.set_ylabel("error of heading, deg")
+        ax.set_ylabel("heading error, deg")
         ax.set_xlim(0.0, float(hours[-1]))
         return picture

@@ -92,7 +92,7 @@ def turn_figure(section: Section) -> Figure:
         top.set_ylabel("output, V")
         top.legend(loc="upper center", ncols=4, bbox_to_anchor=(0.5, 1.16), handletextpad=0.3)
         bottom.set_ylabel(f"residual, {unit}")
-        bottom.set_xlabel("angle of the head, deg")
+        bottom.set_xlabel("head angle, deg")
         bottom.set_xticks(range(0, 406, 45))
         return figure
 
@@ -126,11 +126,11 @@ def second_harmonic_figure(section: Section) -> Figure:
         first = harmonics.evaluate(np.array([c[0], c[1], c[2], 0.0, 0.0]), np.radians(s.alpha_deg))
         left_v = np.array([(s.u_v - first)[set_deg == a].mean() for a in at])
         fine = np.linspace(0, 395, 400)
-        ax.plot(at, left_v * 1e3, "o", ms=3, color=SERIES[0], label="mean of the realisations")
+        ax.plot(at, left_v * 1e3, "o", ms=3, color=SERIES[0], label="mean of realisations")
         ax.plot(fine, c[3] * np.sin(np.radians(2 * fine)) * 1e3, lw=1.2, color=SERIES[0], label="$C_3$ sin 2α")
         ax.plot(fine, c[4] * np.cos(np.radians(2 * fine)) * 1e3, lw=1.6, color=SERIES[1], label="$C_4$ cos 2α")
         ax.set_ylabel("second harmonic, mV")
-        ax.set_xlabel("angle of the head, deg")
+        ax.set_xlabel("head angle, deg")
         ax.set_xticks(range(0, 406, 45))
         ax.legend(loc="upper center", ncols=3, bbox_to_anchor=(0.5, 1.2), handletextpad=0.4)
         return figure
@@ -157,7 +157,7 @@ def alpha0_figure(sections: Sequence[Section]) -> Figure | None:
             ax.grid(axis="y", visible=False)
         axes[0].set_yticks([-i for i in range(len(rows))], [s.title for s, _ in rows])
         axes[0].tick_params(axis="y", length=0, labelcolor=INK)
-        axes[0].set_title("all of it")
+        axes[0].set_title("whole interval")
         axes[1].tick_params(axis="y", length=0)
         axes[1].set_title("near " + ("the truth" if truth is not None else "the printed value"))
         axes[1].set_xlim(centre_deg - 0.02, centre_deg + 0.02)

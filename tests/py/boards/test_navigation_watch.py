@@ -109,7 +109,7 @@ def test_another_host_may_take_it_out_of_navigation() -> None:
     unit, watch = watched()
     unit.passes(10.0)
     unit.mode = Mode.HOLD
-    assert watch.faults(1010.0) == ("the unit left navigation, its mode is hold: somebody else gave it another",)
+    assert watch.faults(1010.0) == ("the unit left navigation, its mode is hold: another client set it",)
     unit.counts = dict.fromkeys(Flag, Began(0, 0))
     unit.mode = Mode.NAVIGATE
     assert watch.faults(1010.0) == ()

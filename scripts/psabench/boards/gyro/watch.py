@@ -63,6 +63,6 @@ class NavigationWatch:
             self._reset = f"reset, or without power for a while, {at_s:.0f} s into navigation"
             self._seen = dict.fromkeys(self._seen, 0)
         if mode is not Mode.NAVIGATE:
-            why = self._reset or "somebody else gave it another"
+            why = self._reset or "another client set it"
             return [f"the unit left navigation, its mode is {mode.name.lower()}: {why}"]
         return [f"the unit was {self._reset}: what it was given is lost"] if self._reset else []
