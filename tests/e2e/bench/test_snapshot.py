@@ -290,7 +290,7 @@ def test_restore_takes_nothing_that_the_snapshot_fixes(tmp_path: Path) -> None:
     for extra in (["--seed", "2"], ["--start"], ["quiet"], ["--bitrate", "0"]):
         done = psa_emu("--restore", tmp_path / "x", *extra)
         assert done.returncode == 2
-        assert "come from the snapshot" in one_line(done.stderr, "psa-emu")
+        assert "the snapshot has them" in one_line(done.stderr, "psa-emu")
     with pytest.raises(BadInput):
         Emulator(extra=("--restore", tmp_path / "x")).__enter__()
 

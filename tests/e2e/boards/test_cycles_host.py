@@ -75,9 +75,9 @@ def test_the_shell_s_words_for_the_device_go_for_every_board() -> None:
         stream = say("dut.stream 5")
         assert [r["signal"] for r in stream["signals"]][:4] == ["X", "Y", "Z", "K"]
         for line, why in (
-            ("dut.opcode accel 4", "only a PSA-2"),
-            ("dut.form", "only a PSA-2"),
-            ("dut.registers x", "a PMKA has bus"),
+            ("dut.opcode accel 4", "expected a PSA-2 for this command, got pmka"),
+            ("dut.form", "expected a PSA-2 for this command, got pmka"),
+            ("dut.registers x", "bank of a PMKA: expected bus, got 'x'"),
             ("dut.write bus MODE 10000h", "expected a word"),
             ("dut.register bus COMMAND", "write-only"),
         ):
@@ -132,9 +132,9 @@ def test_a_bench_finds_units_by_their_boards() -> None:
         assert bench.unit is bench.units["psa2"]
         assert bench.board(Psd1) is bench.units["psd1"]
         assert bench.board(Psd1, "psd1_host").node.node_id == 16
-        with pytest.raises(BenchError, match="no PIK called psd1"):
+        with pytest.raises(BenchError, match="expected a PIK, got psd1"):
             bench.board(Pik, "psd1")
-        with pytest.raises(BenchError, match="no unit nosuch"):
+        with pytest.raises(BenchError, match="unit: expected psa2, psd1, .*got nosuch"):
             bench.board(Pik, "nosuch")
         told = bench.control.call("units").result["units"]
         assert {u["name"]: u["board"] for u in told} == {n: kind.board for n, (kind, _) in NODES.items()}

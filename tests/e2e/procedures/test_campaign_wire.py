@@ -244,8 +244,11 @@ def test_a_scenario_of_ones_own_is_the_bench_and_the_algebra_beside_it(tmp_path:
     assert case.setup.m1_per_s == 2.0
     (figures,) = found.found.values()
     assert figures.refused == 0  # type: ignore[union-attr]
-    for wrong in (replace(options, chain="closed"), replace(options, studies=["wire"])):
-        with pytest.raises(BadInput, match=r"--scenario .*own\.yaml"):
+    for wrong, why in (
+        (replace(options, chain="closed"), "--chain: expected --chain emulated or wire with --scenario"),
+        (replace(options, studies=["wire"]), r"--scenario: expected no --case, .*own\.yaml"),
+    ):
+        with pytest.raises(BadInput, match=why):
             command.campaign(wrong, quiet)
 
 

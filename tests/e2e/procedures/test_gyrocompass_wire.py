@@ -135,12 +135,12 @@ def test_a_flight_needs_the_rate_of_transport(tmp_path: Path) -> None:
         (["--sequence", "0,90"], "too few positions"),
         (["--sequence", "30,30,30"], "coincide"),
         (["--latitude-deg", "90"], "latitude beyond 85"),
-        (["--settle-s", "3"], "it takes 7/m1_per_s"),
-        (["--m2-per-s", "0.1", "--slope", "yes"], "it takes 7/m2_per_s"),
-        (["--reading", "best"], "article, improved, both"),
-        (["--head", "x"], "no such parameter"),
-        (["--realisations", "3"], "no such parameter"),
-        (["--scenario", "quiet"], "no gyro unit"),
+        (["--settle-s", "3"], "at least 7 with m1_per_s 1"),
+        (["--m2-per-s", "0.1", "--slope", "yes"], "at least 70 with m2_per_s 0.1"),
+        (["--reading", "best"], "article, improved or both"),
+        (["--head", "x"], "expected an option that --help lists"),
+        (["--realisations", "3"], "expected an option that --help lists"),
+        (["--scenario", "quiet"], "expected a scenario with a gyro unit"),
     ],
 )
 def test_bad_input(option: list[str], why: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
