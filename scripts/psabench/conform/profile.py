@@ -16,6 +16,13 @@ from psabench.boards.registry import ALIASES, NAMES, of_name
 from psabench.errors import BadInput, expected
 from psabench.places import proto_file
 
+YAML_LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # libyaml's where there is one: ten times faster
+
+
+def proto_yaml(name: str) -> Any:
+    """Contents of a YAML file of proto/. Raises BadInput where there is none."""
+    return yaml.load(proto_file(name).read_text(encoding="utf-8"), YAML_LOADER)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Variant:
@@ -56,10 +63,9 @@ def _figures(profile: str) -> Mapping[str, Any]:
     if not profile.isidentifier():
         raise BadInput(expected("a name that psa-emu --list-profiles prints", repr(profile), "profile"))
     try:
-        text = proto_file(f"profiles/{profile}.yaml").read_text(encoding="utf-8")
+        found = proto_yaml(f"profiles/{profile}.yaml")
     except BadInput as e:
         raise BadInput(expected("a name that psa-emu --list-profiles prints", repr(profile), "profile")) from e
-    found = yaml.safe_load(text)
     if not isinstance(found, dict):
         raise BadInput(expected("a mapping", type(found).__name__, f"profile {profile}"))
     return found

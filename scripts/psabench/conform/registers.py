@@ -6,12 +6,10 @@ from collections.abc import Mapping
 from functools import cache
 from typing import Any
 
-import yaml
-
 from psabench.conform.bus_host import line, line_refused, port
 from psabench.conform.dut import Subject
+from psabench.conform.profile import proto_yaml
 from psabench.conform.verdict import Failed
-from psabench.places import proto_file
 
 NO_ADDRESS, READ_ONLY, WRITE_ONLY = 0x06090011, 0x06010002, 0x06010001  # abort codes (docs/busport.md)
 ADDRESSES = 16
@@ -20,7 +18,7 @@ ADDRESSES = 16
 @cache
 def table(board: str) -> tuple[Mapping[str, Any], ...]:
     """Rows of the registers, the address is the number of the row."""
-    return tuple(yaml.safe_load(proto_file(f"{board}.yaml").read_text(encoding="utf-8"))["bus"])
+    return tuple(proto_yaml(f"{board}.yaml")["bus"])
 
 
 def names_and_rights(s: Subject, board: str, *, never: Mapping[str, int], writes: Mapping[str, int]) -> str:

@@ -16,6 +16,7 @@ from typing import Any
 
 import yaml
 
+from psabench.conform.profile import YAML_LOADER
 from psabench.errors import BadInput, expected
 from psabench.places import proto_file
 
@@ -118,10 +119,7 @@ class Requirements:
         return tuple(r for r in self if r.applies(board, profile))
 
 
-_Base: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # libyaml's where there is one: ten times faster
-
-
-class _Loader(_Base):  # type: ignore[misc]
+class _Loader(YAML_LOADER):  # type: ignore[misc]
     """As SafeLoader, but a key that occurs twice is an error and not a value that vanishes."""
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:

@@ -7,18 +7,17 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-import yaml
 
 from psabench.boards.devices import of_board
 from psabench.conform.capture.canbits import frame_bits
 from psabench.conform.capture.log import CanFrame, Capture
 from psabench.conform.plan import check
+from psabench.conform.profile import proto_yaml
 from psabench.conform.proves import proves, row_for
 from psabench.conform.requirements import requirements
 from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.protocol_files import database, dbc_node, message
 from psabench.link.signals import unwrap
-from psabench.places import proto_file
 
 SERVICES = ("EMCY", "SDO_TX", "SDO_RX", "HEARTBEAT")
 HEARTBEAT_TIME = bytes([0x17, 0x10, 0])  # index and sub-index as on the wire
@@ -44,7 +43,7 @@ def _sender(m: Any) -> str:
 @cache
 def _yaml(board: str) -> Any:
     name = "psabench.yaml" if board == "psa2" else f"{board}.yaml"
-    return yaml.safe_load(proto_file(name).read_text(encoding="utf-8"))
+    return proto_yaml(name)
 
 
 @cache

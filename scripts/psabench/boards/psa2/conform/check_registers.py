@@ -6,7 +6,6 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-import yaml
 
 from psabench.boards.psa2.conform.capture_can import pairs
 from psabench.boards.psa2.conform.check_serial import LEAST
@@ -29,9 +28,9 @@ from psabench.boards.psa2.conform.stimulus_can import (
 )
 from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
+from psabench.conform.profile import proto_yaml
 from psabench.conform.proves import proves, row_for
 from psabench.conform.verdict import Failed, Inconclusive
-from psabench.places import proto_file
 
 READ_ONLY, WRITE_ONLY = 0x06010002, 0x06010001
 STATUS = 1
@@ -53,7 +52,7 @@ def register(e: Capture, index: int, sub: int) -> int:
 @cache
 def table(part: str) -> tuple[tuple[str, int], ...]:
     """Name and reset value of each register of a part, by the table that the row names."""
-    doc = yaml.safe_load(proto_file("psabench.yaml").read_text(encoding="utf-8"))
+    doc = proto_yaml("psabench.yaml")
     return tuple((r["name"], int(r["reset"])) for r in doc["registers"][part])
 
 
