@@ -29,7 +29,7 @@ MAY_INCLUDE = {
     "unit": _MODELS | {"board/*"},
     "command": _MODELS | {"unit"},
     "fault": _MODELS | {"unit", "command"},
-    "control": _MODELS | {"unit", "command", "fault"},
+    "control": _MODELS | {"unit", "command", "fault", "scenario"},
     "scpi": _MODELS | {"unit", "command", "fault", "control"},
     "scenario": _COMMANDS,
     "bench": _COMMANDS | {"scenario", "control", "scpi", "link"},

@@ -1,8 +1,6 @@
 #define _GNU_SOURCE /* pipe2 */
 #include "app/fork.h"
 
-#include "app/endpoints.h"
-
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -81,7 +79,7 @@ static bool put_result(pid_t pid, char *text, cJSON *result, char *why)
         return false;
     }
     cJSON_AddNumberToObject(result, "pid", pid);
-    endpoints_add(result, text);
+    ports_add_endpoints(result, text);
     return true;
 }
 

@@ -1,3 +1,4 @@
+#define _GNU_SOURCE /* open_memstream, strtok_r */
 #include "app/ports.h"
 
 #include "base/why.h"
@@ -292,4 +293,41 @@ void ports_abandon(struct ports *p)
     bus_ports_abandon(&p->bus);
     p->control.path = p->truth.path = "";
     close_all(p);
+}
+
+/* ---- the ready lines as JSON */
+
+/* ready key=value key=value: an object. */
+static void add_one(cJSON *endpoints, char *line)
+{
+    char *rest = NULL;
+    cJSON *e = cJSON_CreateObject();
+    for (char *word = strtok_r(line, " ", &rest); word; word = strtok_r(NULL, " ", &rest)) {
+        char *value = strchr(word, '=');
+        if (!value) continue;
+        *value = '\0';
+        cJSON_AddStringToObject(e, word, value + 1);
+    }
+    if (e->child) cJSON_AddItemToArray(endpoints, e);
+    else cJSON_Delete(e);
+}
+
+void ports_add_endpoints(cJSON *result, char *text)
+{
+    char *rest = NULL;
+    cJSON *endpoints = cJSON_AddArrayToObject(result, "endpoints");
+    for (char *line = strtok_r(text, "\n", &rest); line; line = strtok_r(NULL, "\n", &rest)) add_one(endpoints, line);
+}
+
+bool ports_describe(const struct ports *p, const struct options *o, cJSON *result)
+{
+    char *text = NULL;
+    size_t len;
+    FILE *out = open_memstream(&text, &len);
+    if (!out) return false;
+    ports_ready(p, o, out);
+    const bool whole = fclose(out) == 0;
+    if (whole) ports_add_endpoints(result, text);
+    free(text);
+    return whole;
 }

@@ -14,6 +14,8 @@
 #include "link/ctl_sock.h"
 #include "link/line/line_pty.h"
 
+#include <cjson/cJSON.h>
+
 struct ports_can {
     enum options_can_kind kind;
     const char *bus; /* its bus where there are several; NULL: all of them, or the only one */
@@ -58,5 +60,11 @@ void ports_close(struct ports *p);
 
 /* In the child of a fork: closes all, but leaves the names of sockets and links to the parent, and the hubs as they are. */
 void ports_abandon(struct ports *p);
+
+/* Adds an array "endpoints", an object for each `ready key=value ...` line of text, which is cut up. */
+void ports_add_endpoints(cJSON *result, char *text);
+
+/* The same of open ports. False without memory. */
+bool ports_describe(const struct ports *p, const struct options *o, cJSON *result);
 
 #endif

@@ -1,12 +1,12 @@
 /* A service is put together: what the commands may do, the sockets, what the loop calls. */
 #include "app/service.h"
 
-#include "app/endpoints.h"
 #include "app/fork.h"
-#include "app/until_eof.h"
 
+#include <errno.h>
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 
 /* ---- what the commands may do */
 
@@ -52,7 +52,7 @@ static bool do_fork(void *ctx, const struct control_fork *f, cJSON *result, char
 static bool do_endpoints(void *ctx, cJSON *result)
 {
     const struct service *s = ctx;
-    return endpoints_describe(&s->ports, s->o, result);
+    return ports_describe(&s->ports, s->o, result);
 }
 
 static void do_pace(void *ctx, struct control_pace *out)
@@ -213,6 +213,26 @@ static void init_service(struct service *s, struct bench *b, const struct option
                             .ctx = s};
     ports_init(&s->ports, b, o);
     service_follow(s);
+}
+
+/* ---- standard input */
+
+static void on_readable(struct link *l, int64_t t_ns)
+{
+    char passed_over[256];
+    (void)t_ns;
+    const ssize_t n = read(l->fd, passed_over, sizeof passed_over);
+    if (n > 0 || (n < 0 && (errno == EINTR || errno == EAGAIN))) return;
+    l->gone = true;
+    *(bool *)l->ctx = true;
+}
+
+/* --until-eof: a program that starts an emulator keeps the other end of the pipe. However that program ends, killed or
+ * crashed, no emulator is left behind. What comes before the end is passed over. */
+static void until_eof(struct link *l, struct links *ls, bool *quit)
+{
+    *l = (struct link){.fd = STDIN_FILENO, .want_read = true, .readable = on_readable, .ctx = quit};
+    links_add_last(ls, l);
 }
 
 bool service_open(struct service *s, struct bench *b, const struct options *o, const struct service_origin *from,

@@ -14,10 +14,4 @@ void describe_unit_counters(const struct control_bench *b, unsigned unit, cJSON 
 /* What an operator sees at a glance: pace, frames, readings of the instruments that are there. */
 void describe_status(const struct control_bench *b, cJSON *to, int64_t t_ns);
 
-/* Hidden parameters: for the truth port only. */
-void describe_truth(const struct control_bench *b, cJSON *to, int64_t t_ns);
-
-/* The true state of this instant: instruments, and what a unit and its sensors feel. */
-void describe_state(const struct control_bench *b, unsigned unit, cJSON *to, int64_t t_ns);
-
 #endif

@@ -1,7 +1,7 @@
 #define _GNU_SOURCE /* accept4 */
 #include "link/scpi_port.h"
 
-#include "link/tcp_listen.h"
+#include "link/tcp.h"
 
 #include <errno.h>
 #include <netinet/in.h>

@@ -1,7 +1,7 @@
 #include "chip/ads1282/internal.h"
 
 #include "base/bits.h"
-#include "chip/ads1282/noise.h"
+#include "base/detmath.h"
 
 /* Sources 1.6: t_DR = 62.98046875 data periods + 468 tCLK, which is 251/2 N + 468 tCLK and 62 data periods of 128 N. */
 #define FIR_LATENCY_TCLK    468
@@ -68,6 +68,25 @@ static void choose_special(struct ads1282 *a)
     a->special = is_continuous(a) || high_pass(a) || ads1282_sinc_only(a) || a->cal.kind != ADS1282_CAL_NONE;
 }
 
+/* SNR in dB by rate and gain, chopping on. Column 1: E2 for 250 and 500 words/s, M90 below; other columns M60. */
+// clang-format off
+static const uint8_t snr_db[5][7] = {
+    {130, 130, 129, 128, 125, 119, 114},
+    {127, 127, 126, 125, 122, 116, 111},
+    {124, 124, 123, 122, 119, 113, 108},
+    {121, 121, 120, 119, 116, 110, 105},
+    {118, 118, 117, 115, 112, 107, 101},
+};
+// clang-format on
+
+/* Output noise of the FIR modes in volts rms at the input; rate 0..4 (250..4000 words/s), pga_log2 0..6. From the SNR of a
+ * full-scale sine at VREF 5 V (sources 1.9); with another reference the volts stay: they are thermal (E0). */
+static double noise_v(unsigned rate, unsigned pga_log2)
+{
+    const double fs_rms_v = 2.5 / (1 << pga_log2) * 0.70710678118654752440;
+    return fs_rms_v * det_exp(-0.11512925464970228420 * snr_db[rate][pga_log2]);
+}
+
 /* Scale, multiplexer and noise from CONFIG1. */
 void ads1282_configure_input(struct ads1282 *a)
 {
@@ -79,7 +98,7 @@ void ads1282_configure_input(struct ads1282 *a)
     a->lsb_per_v = block_fs * 2.0 * (1 << pga_log2) / a->cfg.vref_v;
     if (!a->running) return;
     const unsigned rate = rate_of(a) <= 4 ? rate_of(a) : 2;
-    a->noise_lsb = ads1282_chain_noise_lsb(a, a->cfg.noise_scale * ads1282_noise_v(rate, pga_log2) * a->lsb_per_v);
+    a->noise_lsb = ads1282_chain_noise_lsb(a, a->cfg.noise_scale * noise_v(rate, pga_log2) * a->lsb_per_v);
 }
 
 void ads1282_configure(struct ads1282 *a)

@@ -2,8 +2,7 @@
 #include "link/can/socketcand_tcp.h"
 
 #include "link/can/socketcand.h"
-#include "link/tcp_listen.h"
-#include "link/tcp_peer.h"
+#include "link/tcp.h"
 #include "link/text_link.h"
 
 #include <errno.h>

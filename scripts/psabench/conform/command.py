@@ -197,6 +197,9 @@ def _host(args: argparse.Namespace) -> int:
 
 
 def _list(args: argparse.Namespace) -> int:
-    from psabench.conform import list_command
+    from psabench.conform.device_command import requirements_of
+    from psabench.conform.profile import variant
 
-    return list_command.list_requirements(args)
+    for r in requirements_of(variant(args.board, args.profile)):
+        print(f"{r.id:16} {r.grade} {'/'.join(r.observe) or '-':16} {r.text}")
+    return 0

@@ -12,8 +12,8 @@ from psabench.conform import identity, report, runner, suite
 from psabench.conform.defaults import OUT
 from psabench.conform.dut import INPUTS_V, Addresses, Subject
 from psabench.conform.excerpts import Excerpts
-from psabench.conform.list_command import requirements_of
 from psabench.conform.profile import Variant, variant
+from psabench.conform.requirements import Requirement, requirements
 from psabench.conform.verdict import Outcome
 from psabench.errors import BadInput, expected
 from psabench.procedures.head_bench import Progress
@@ -36,6 +36,11 @@ def device(args: argparse.Namespace) -> int:
         clock_ppm=args.clock_ppm,
     )
     return _told(run, folder, everything=args.verbose)
+
+
+def requirements_of(v: Variant) -> list[Requirement]:
+    """Those of a board in a profile, without those of its hosts."""
+    return [r for r in requirements() if r.group != "host" and r.applies(v.board, v.profile)]
 
 
 def device_run(

@@ -1,12 +1,19 @@
-"""Registers with their fields named, read and written. Names and addresses come from the EDS, fields from `fields`."""
+"""Registers with their fields named, read and written. Names and addresses: the EDS; fields: the boards."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 
+from psabench.boards.board import Bits
+from psabench.boards.registry import BOARDS
 from psabench.errors import expected
-from psabench.shell.fields import FIELDS
 from psabench.shell.lexer import Wrong
+
+# By group ("accel" and "temp": converters; a board's name: its bus) and register. One that is not here is a number.
+FIELDS: Mapping[tuple[str, str], tuple[Bits, ...]] = {
+    key: fields for board in BOARDS.values() for key, fields in board.fields.items()
+}
 
 
 def group(converter: str) -> str:

@@ -400,7 +400,7 @@ def test_the_bus_port_refuses_with_the_codes_of_can(ported: tuple[Rig, BusPort])
     assert unit.counters()["Refused strobes"] == 2 * len(cases)
     for line in ("R", "X 1", "R 1 2 3", "R zz", "R 1" + " " * 100, "R 1 -5", "W 1", "W 1 10000"):
         port.ask(line)
-        with pytest.raises(LinkError, match="rejected by the bus port: (syntax|number|overlong)$"):
+        with pytest.raises(LinkError, match=r"rejected by the bus port: (syntax|number|overlong)$"):
             port.answer()
     port.ask("r f")
     answer = port.answer()

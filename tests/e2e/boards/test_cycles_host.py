@@ -134,7 +134,7 @@ def test_a_bench_finds_units_by_their_boards() -> None:
         assert bench.board(Psd1, "psd1_host").node.node_id == 16
         with pytest.raises(BenchError, match="expected a PIK, got psd1"):
             bench.board(Pik, "psd1")
-        with pytest.raises(BenchError, match="unit: expected psa2, psd1, .*got nosuch"):
+        with pytest.raises(BenchError, match=r"unit: expected psa2, psd1, .*got nosuch"):
             bench.board(Pik, "nosuch")
         told = bench.control.call("units").result["units"]
         assert {u["name"]: u["board"] for u in told} == {n: kind.board for n, (kind, _) in NODES.items()}

@@ -205,5 +205,5 @@ def test_without_calibration_there_is_no_answer(bench: Bench) -> None:
     unit.reset()
     bench.wait(0.05)
     periods = est.periods_of(unit.stream(50).columns)
-    with pytest.raises(ValueError, match="integrator X: .*got no calibrated reset"):
+    with pytest.raises(ValueError, match=r"integrator X: .*got no calibrated reset"):
         est.calibrate(periods, 0)

@@ -32,6 +32,9 @@ def test_what_stands_between_the_marks_is_written_and_nothing_else(tmp_path: Pat
 def test_marks_that_are_not_there_once_are_told(text: str, tmp_path: Path) -> None:
     page = tmp_path / "page.md"
     page.write_text(text)
-    with pytest.raises(ValueError, match=r"^page\.md: expected one line <!-- a:begin --> and after it <!-- a:end -->, got none or several$"):
+    with pytest.raises(
+        ValueError,
+        match=r"^page\.md: expected one line <!-- a:begin --> and after it <!-- a:end -->, got none or several$",
+    ):
         between.write(page, A, "new")
     assert page.read_text() == text

@@ -15,9 +15,9 @@ from psabench.shell import dut, registers, render
 from psabench.shell.commands import Command, Vocabulary
 from psabench.shell.complete import candidates
 from psabench.shell.expect import Expectation
-from psabench.shell.fields import FIELDS
 from psabench.shell.grammar import describe, parse
 from psabench.shell.lexer import Wrong
+from psabench.shell.registers import FIELDS
 from psabench.shell.transcript import Transcript, seconds
 
 EXPLAINED = [

@@ -9,9 +9,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from psabench.conform.host.capture import Bus, Frame, signed
-from psabench.conform.host.capture_units import FIRST, SECOND, THIRD, after_start
 from psabench.conform.host.check import HostCapture, checks, enough, limits, proves
-from psabench.conform.host.check_units import readings_told
+from psabench.conform.host.units import FIRST, SECOND, THIRD, after_start, readings_told
 from psabench.conform.verdict import Failed
 
 

@@ -11,11 +11,10 @@ from dataclasses import dataclass
 
 from psabench.boards.objects import PmkaObjects as OD
 from psabench.conform.host.capture import SDO_RX, SDO_TX, Bus, number
-from psabench.conform.host.capture_units import SECOND, frames_of
 from psabench.conform.host.cases_units import INPUT_V
 from psabench.conform.host.check import HostCapture, checks, enough, limits, proves
-from psabench.conform.host.check_units import readings_told
 from psabench.conform.host.results import Reading
+from psabench.conform.host.units import SECOND, frames_of, readings_told
 from psabench.conform.profile import variant
 from psabench.conform.verdict import Failed
 

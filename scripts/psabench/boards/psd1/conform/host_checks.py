@@ -10,10 +10,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from psabench.conform.host.capture import Bus, number
-from psabench.conform.host.capture_units import FIRST, frames_of
 from psabench.conform.host.check import HostCapture, checks, enough, limits, proves
-from psabench.conform.host.check_units import readings_told
 from psabench.conform.host.results import Reading
+from psabench.conform.host.units import FIRST, frames_of, readings_told
 from psabench.conform.verdict import Failed
 
 

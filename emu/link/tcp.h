@@ -1,0 +1,13 @@
+/* TCP on 127.0.0.1 and nowhere else: a server's descriptor, and what a peer has not read yet. */
+#ifndef PSABENCH_LINK_TCP_H
+#define PSABENCH_LINK_TCP_H
+
+#include <stdint.h>
+
+/* Listens, non-blocking, at *port; 0: a free one, which is reported. The descriptor, or -errno. */
+int tcp_listen(uint16_t *port);
+
+/* Bytes in the receive queue of the other end of a connection: only the kernel of both ends knows. -1: not known. */
+long tcp_peer_unread(int fd);
+
+#endif
