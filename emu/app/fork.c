@@ -1,5 +1,5 @@
 #define _GNU_SOURCE /* pipe2 */
-#include "app/fork.h"
+#include "app/service.h"
 
 #include <dirent.h>
 #include <errno.h>

@@ -1,8 +1,6 @@
 /* A service is put together: what the commands may do, the sockets, what the loop calls. */
 #include "app/service.h"
 
-#include "app/fork.h"
-
 #include <errno.h>
 #include <stdio.h>
 #include <string.h>

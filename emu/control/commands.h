@@ -2,7 +2,7 @@
 #ifndef PSABENCH_CONTROL_COMMANDS_H
 #define PSABENCH_CONTROL_COMMANDS_H
 
-#include "control/reply.h"
+#include "control/internal.h"
 
 extern const struct control_table commands_bench, commands_head, commands_table, commands_chamber, commands_supply,
     commands_platform, commands_watch, commands_fault, commands_snapshot, commands_bus, commands_can, commands_truth;

@@ -1,7 +1,7 @@
 /* Cycles on the parallel bus of a board that has one. */
 #include "command/args.h"
 #include "control/commands.h"
-#include "control/cycle.h"
+#include "control/internal.h"
 
 enum { UNIT, ADDRESS, READ_STROBE, DATA = READ_STROBE, WRITE_STROBE };
 

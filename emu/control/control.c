@@ -2,7 +2,7 @@
 
 #include "command/args.h"
 #include "control/commands.h"
-#include "control/cycle.h"
+#include "control/internal.h"
 
 #include <stdio.h>
 #include <string.h>

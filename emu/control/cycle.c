@@ -1,6 +1,4 @@
-#include "control/cycle.h"
-
-#include "control/reply.h"
+#include "control/internal.h"
 
 static const char *const codes[] = {
     [BOARD_CYCLE_NO_ADDRESS] = "address",

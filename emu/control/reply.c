@@ -1,4 +1,4 @@
-#include "control/reply.h"
+#include "control/internal.h"
 
 #include <inttypes.h>
 #include <stdarg.h>
