@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import can
 import canopen
 from canopen.sdo.client import SdoClient
 from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
@@ -32,7 +33,11 @@ class _Network(canopen.Network):
     def __init__(self, host: CanHost) -> None:
         super().__init__()
         self.host = host
-        host.listeners.append(lambda m: self.notify(m.arbitration_id, m.data, m.timestamp))
+        host.listeners.append(self._on_message)
+
+    def _on_message(self, m: can.Message) -> None:
+        if m.arbitration_id in self.subscribers:  # asked here: of a stream, hardly any frame is for this program
+            self.notify(m.arbitration_id, m.data, m.timestamp)
 
     def send_message(self, can_id: int, data: bytes, remote: bool = False) -> None:
         if remote:

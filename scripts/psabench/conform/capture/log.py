@@ -39,9 +39,9 @@ class CanFrame:
     brs: bool | None = None  # data at the second bit rate, of an FD frame; None: no one told
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class CanLog:
-    """Frames in the order in which they passed."""
+    """Frames in the order in which they passed. Equal to itself alone: a hash over 100,000 frames costs 0.1 s."""
 
     frames: tuple[CanFrame, ...] = ()
 
