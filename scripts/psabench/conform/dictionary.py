@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Container
 
-from psabench.boards.objects import Area, BusObjects
+from psabench.boards.objects import Area, BusObjects, Common
 from psabench.conform.bus_host import refused
 from psabench.conform.dut import Subject
 from psabench.conform.requirements import requirements
@@ -45,6 +45,15 @@ def as_the_dictionary_says(s: Subject, eds: str, varies: Container[int] = ()) ->
         elif (data_beyond := _beyond(o)) is not None:
             refused(lambda o=o, d=data_beyond: s.unit.node.write_raw(o.index, o.sub, d), beyond, f"too much to {what}")  # type: ignore[misc]
     return f"{len(objects)} objects of {eds}.eds"
+
+
+def identity(s: Subject, requirement: str, name: str) -> str:
+    """Device name (1008h) and product code (1018h sub 2) against a requirement's limit; raises Failed."""
+    saw, code = s.unit.node.read(Common.DEVICE_NAME), int(s.unit.node.read(Common.IDENTITY, 2))
+    due = int(requirements()[requirement].limit("product_code"))
+    if (saw, code) != (name, due):
+        raise Failed(f"{saw}, {code:08X}h", f"{name}, {due:08X}h")
+    return f"{saw}, {code:08X}h"
 
 
 def _default(o: Described) -> bytes | None:

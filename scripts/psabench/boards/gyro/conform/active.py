@@ -8,7 +8,7 @@ from psabench.boards.gyro.device import Mode, Phase
 from psabench.boards.objects import GyroObjects as OD
 from psabench.conform.bus_host import refused
 from psabench.conform.capture.messages import emergencies
-from psabench.conform.dictionary import as_the_dictionary_says
+from psabench.conform.dictionary import as_the_dictionary_says, identity
 from psabench.conform.dut import Subject
 from psabench.conform.plan import active
 from psabench.conform.proves import proves
@@ -98,11 +98,7 @@ def frames_of_others_are_not_taken(s: Subject) -> str:
 @active(needs={"can"})
 def the_board_says_what_it_is(s: Subject) -> str:
     """Read 1008h and 1018h sub 2."""
-    name, code = s.unit.node.read(OD.DEVICE_NAME), int(s.unit.node.read(OD.IDENTITY, 2))
-    due = int(requirements()["GYRO-CAN-05"].limit("product_code"))
-    if (name, code) != ("GYRO", due):
-        raise Failed(f"{name}, {code:08X}h", f"GYRO, {due:08X}h")
-    return f"{name}, {code:08X}h"
+    return identity(s, "GYRO-CAN-05", "GYRO")
 
 
 @proves("GYRO-CAN-04")

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 from psabench.boards.objects import PikObjects as OD
 from psabench.conform.bus_host import burst, line, line_refused
-from psabench.conform.dictionary import as_the_dictionary_says
+from psabench.conform.dictionary import as_the_dictionary_says, identity
 from psabench.conform.dut import Subject
 from psabench.conform.plan import active
 from psabench.conform.proves import proves
@@ -241,11 +241,7 @@ def the_name_plate_is_right(s: Subject) -> str:
 @active(needs={"can"})
 def the_board_says_what_it_is(s: Subject) -> str:
     """Read 1008h and 1018h sub 2."""
-    name, code = s.unit.node.read(OD.DEVICE_NAME), int(s.unit.node.read(OD.IDENTITY, 2))
-    due = int(requirements()["PIK-CAN-06"].limit("product_code"))
-    if (name, code) != ("PIK", due):
-        raise Failed(f"{name}, {code:08X}h", f"PIK, {due:08X}h")
-    return f"{name}, {code:08X}h"
+    return identity(s, "PIK-CAN-06", "PIK")
 
 
 @proves("PIK-CAN-07")

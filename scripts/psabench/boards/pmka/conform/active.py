@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from itertools import pairwise
 
-from psabench.boards.objects import PmkaObjects as OD
 from psabench.boards.pmka import estimate as est
 from psabench.boards.pmka.conform.stimulus import START_S, ts_s
 from psabench.conform.bus_host import burst, line, line_refused
 from psabench.conform.capture.log import CanLog
-from psabench.conform.dictionary import as_the_dictionary_says
+from psabench.conform.dictionary import as_the_dictionary_says, identity
 from psabench.conform.dut import Subject
 from psabench.conform.plan import active
 from psabench.conform.proves import proves
@@ -315,11 +314,7 @@ def resets_are_counted(s: Subject) -> str:
 @active(needs={"can"})
 def the_board_says_what_it_is(s: Subject) -> str:
     """Read 1008h and 1018h sub 2."""
-    name, code = s.unit.node.read(OD.DEVICE_NAME), int(s.unit.node.read(OD.IDENTITY, 2))
-    due = int(requirements()["PMKA-CAN-05"].limit("product_code"))
-    if (name, code) != ("PMKA", due):
-        raise Failed(f"{name}, {code:08X}h", f"PMKA, {due:08X}h")
-    return f"{name}, {code:08X}h"
+    return identity(s, "PMKA-CAN-05", "PMKA")
 
 
 @proves("PMKA-CAN-06")

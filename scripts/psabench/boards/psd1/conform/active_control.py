@@ -20,7 +20,7 @@ from psabench.boards.psd1.conform.host import (
 from psabench.boards.readings import Readings
 from psabench.conform.bus_host import line, line_refused, port, refused
 from psabench.conform.capture.bus_cycles import TAIL_S
-from psabench.conform.dictionary import as_the_dictionary_says
+from psabench.conform.dictionary import as_the_dictionary_says, identity
 from psabench.conform.dut import Subject
 from psabench.conform.plan import active
 from psabench.conform.proves import proves
@@ -504,11 +504,7 @@ def messages_tell_what_their_objects_hold(s: Subject) -> str:
 @active(needs={"can"})
 def the_board_says_what_it_is(s: Subject) -> str:
     """Read 1008h and 1018h sub 2."""
-    name, code = s.unit.node.read(OD.DEVICE_NAME), int(s.unit.node.read(OD.IDENTITY, 2))
-    due = int(requirements()["PSD1-CAN-07"].limit("product_code"))
-    if (name, code) != ("PSD-1", due):
-        raise Failed(f"{name}, {code:08X}h", f"PSD-1, {due:08X}h")
-    return f"{name}, {code:08X}h"
+    return identity(s, "PSD1-CAN-07", "PSD-1")
 
 
 @proves("PSD1-CAN-08")
