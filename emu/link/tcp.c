@@ -44,7 +44,7 @@ static bool row_unread(const char *row, const struct sockaddr_in *peer, const st
 
 long tcp_peer_unread(int fd)
 {
-    struct sockaddr_in own, peer;
+    struct sockaddr_in own = {0}, peer = {0};
     socklen_t own_len = sizeof own, peer_len = sizeof peer;
     if (getsockname(fd, (struct sockaddr *)&own, &own_len) < 0) return -1;
     if (getpeername(fd, (struct sockaddr *)&peer, &peer_len) < 0) return -1;
