@@ -149,7 +149,7 @@ static void on_moved(void *ctx, int64_t now_ns)
     bench_follow(s->bench);
     journal_moved(&s->journal);
     service_sweep_detached(s, false);
-    snapshot_let_go(&s->observers, s->bench);
+    snapshot_release_lines(&s->observers, s->bench);
     if (s->bench->recording) service_recording_error(s, "the recording ends here, the run continues");
 }
 

@@ -52,7 +52,7 @@ void service_abandon(struct service *s)
 {
     struct bench *b = s->bench;
     for (unsigned i = 0; i < s->ports.hubs; i++) can_hub_detach_all(&s->ports.hub[i]);
-    snapshot_listen(&s->observers, b);
+    snapshot_observe_lines(&s->observers, b);
     for (unsigned i = 0; i < CONTROL_SUBS_MAX; i++) {
         if (s->control.watch.sub[i].control) control_gone(&s->control, s->control.watch.sub[i].client);
     }

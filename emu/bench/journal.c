@@ -110,7 +110,7 @@ static uint64_t mix_hash(uint64_t sum, uint64_t x)
     return sum << 29 | sum >> 35;
 }
 
-static void on_heard(void *ctx, const struct can_msg *m, int64_t t_ns)
+static void on_rx_other(void *ctx, const struct can_msg *m, int64_t t_ns)
 {
     struct journal_tap *tap = ctx;
     uint64_t sum =
@@ -127,9 +127,9 @@ void journal_follow(struct journal *j, struct can_hub *h, unsigned bus)
 {
     struct journal_tap *tap = &j->tap[bus];
     *tap = (struct journal_tap){.journal = j, .bus = bus};
-    tap->ear = (struct can_node){.name = "journal", .fd = true, .rx = on_heard, .ctx = tap};
+    tap->observer = (struct can_node){.name = "journal", .fd = true, .rx = on_rx_other, .ctx = tap};
     h->tap = (struct can_hub_tap){.event = on_bus_event, .ctx = tap};
-    can_attach(h->bus, &tap->ear);
+    can_attach(h->bus, &tap->observer);
 }
 
 void journal_command(struct journal *j, const struct control_command *row, const cJSON *args, bool done)

@@ -6,7 +6,7 @@
  *     {"t":2500,"refused":true,"cmd":"supply.set",...}     one was rejected on the spot: even that moves noise
  *     {"t":9000,"bus":0,"went":1}     the program has left
  *     {"t":2500,"unit":0,"cycle":3,"write":true,"data":9029,"strobe_ns":800}     one on the bus of a unit, at address 3
- *     {"t":9000,"unit":0,"watch":16383}     somebody listens to these lines of a unit (0: no one)
+ *     {"t":9000,"unit":0,"watch":16383}     a client observes these lines of a unit (0: none)
  *
  * An entry comes after everything that was due before its instant; with "ran", also after everything due at it. Nothing
  * that happens inside the bench is here (timeline, faults under way, answers). Kept in memory, up to a limit; one
@@ -27,7 +27,7 @@ struct journal;
 struct journal_tap {
     struct journal *journal;
     unsigned bus;
-    struct can_node ear;
+    struct can_node observer;
     uint64_t traffic; /* sum of all frames and their instants: two runs that differ in one differ in it */
 };
 
@@ -59,7 +59,7 @@ void journal_cycle(struct journal *j, unsigned unit, const struct board_cycle *c
 /* Time has moved: call after each run of the scheduler, before anything else comes in. */
 void journal_moved(struct journal *j);
 
-/* Who began or ceased to listen to lines since time last moved; before the text is used. */
+/* Clients that began or ceased to observe lines since time last moved; before the text is used. */
 void journal_watchers(struct journal *j);
 
 /* ---- reading */

@@ -275,14 +275,14 @@ static void on_steps(void *ctx, const struct trace_step *s, unsigned n)
 static void attach_observer(struct snapshot_observers *e, struct bench *b, unsigned unit, uint64_t mask)
 {
     struct trace *t = unit_trace(&b->unit[unit]);
-    struct trace_sink *ear = &e->ear[unit];
-    trace_detach(t, ear);
-    *ear = (struct trace_sink){.mask = mask, .steps = on_steps};
-    if (mask) trace_attach(t, ear);
+    struct trace_sink *observer = &e->observer[unit];
+    trace_detach(t, observer);
+    *observer = (struct trace_sink){.mask = mask, .steps = on_steps};
+    if (mask) trace_attach(t, observer);
     e->on = true;
 }
 
-void snapshot_listen(struct snapshot_observers *e, struct bench *b)
+void snapshot_observe_lines(struct snapshot_observers *e, struct bench *b)
 {
     for (unsigned i = 0; i < b->scenario.unit_count; i++) {
         const uint64_t watched = unit_trace(&b->unit[i])->watched;
@@ -290,9 +290,10 @@ void snapshot_listen(struct snapshot_observers *e, struct bench *b)
     }
 }
 
-void snapshot_let_go(struct snapshot_observers *e, struct bench *b)
+void snapshot_release_lines(struct snapshot_observers *e, struct bench *b)
 {
-    for (unsigned i = 0; i < b->scenario.unit_count && e->on; i++) trace_detach(unit_trace(&b->unit[i]), &e->ear[i]);
+    for (unsigned i = 0; i < b->scenario.unit_count && e->on; i++)
+        trace_detach(unit_trace(&b->unit[i]), &e->observer[i]);
     e->on = false;
 }
 

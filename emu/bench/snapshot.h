@@ -39,14 +39,14 @@ bool snapshot_load(const char *path, struct snapshot *s, char *why, size_t cap);
 bool snapshot_parse(char *text, size_t len, struct snapshot *s, char *why, size_t cap);
 void snapshot_free(struct snapshot *s);
 
-/* In the place of those who listened to the units' lines: what is on its way to them is kept for who comes next. */
+/* Observers of the units' lines in place of the detached clients: edges under way to them are kept for the next client. */
 struct snapshot_observers {
-    struct trace_sink ear[CONTROL_UNITS_MAX];
+    struct trace_sink observer[CONTROL_UNITS_MAX];
     bool on;
 };
 
-void snapshot_listen(struct snapshot_observers *e, struct bench *b); /* to what somebody listens to now */
-void snapshot_let_go(struct snapshot_observers *e, struct bench *b); /* once time has moved */
+void snapshot_observe_lines(struct snapshot_observers *e, struct bench *b); /* to the lines that clients observe now */
+void snapshot_release_lines(struct snapshot_observers *e, struct bench *b); /* once time has moved */
 
 /* What a journal is done again with: a bench of the same scenario that has just been powered up. */
 struct snapshot_world {

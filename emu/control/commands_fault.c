@@ -174,7 +174,7 @@ static enum control_outcome do_list(struct control *c, const struct control_valu
 static const struct control_command rows[] = {
     {"fault.add", "Injects a fault now, at a time or after an event; see fault.kinds for its parameters.", fault_args, .run = do_add, .changes = true, .check = check_add},
     {"fault.clear", "Removes a fault, or all faults.", CONTROL_ARGS({"id", CONTROL_COUNT, true, NULL, 1, 4294967295.0, .what = "id from fault.add; default: all"}), .run = do_clear, .changes = true},
-    {"fault.list", "Lists the faults with state: waiting (for its time), listening (for its event), active, over, void (its point no longer exists).", NULL, .run = do_list},
+    {"fault.list", "Lists the faults with state: waiting (for its time), listening (for its event), active, over, void (could have no effect when it was due).", NULL, .run = do_list},
     {"fault.kinds", "Lists the kinds of faults: effect, symptom at the host, points, parameters.", NULL, .run = do_kinds},
     {"fault.points", "Lists the fault points of the bench.", CONTROL_ARGS({"kind", CONTROL_NAME, true, .what = "points for this kind; default: all"}), .run = do_points},
 };

@@ -42,7 +42,7 @@ static enum control_outcome do_read(struct control *c, const struct control_valu
 
 // clang-format off
 static const struct control_command rows[] = {
-    {"head.turn", "Turns the dividing head to an angle, in turn_s of the scenario.",
+    {"head.turn", "Turns the dividing head to an angle; takes turn_s of the scenario.",
      CONTROL_ARGS({"angle_deg", CONTROL_REAL, false, "deg", -3600, 3600, .what = "angle on the head's scale"}), .run = do_turn, .changes = true, .scpi = {{"ANGLe", NULL}}},
     {"head.mount", "Remounts the units on another face of the head's mount.",
      CONTROL_ARGS({"face", CONTROL_CHOICE, .what = "face of the mount", .choices = faces}), .run = do_mount, .changes = true, .scpi = {{"FACE", NULL}}},

@@ -23,7 +23,7 @@ enum fault_state {
     FAULT_LISTENING, /* for its event */
     FAULT_ACTIVE,
     FAULT_OVER,
-    FAULT_VOID /* when it was due, its point was no longer there */
+    FAULT_VOID /* when it was due, it could have no effect: its point was no longer there */
 };
 
 struct fault_engine;

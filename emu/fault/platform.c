@@ -62,7 +62,7 @@ static bool apply_sensor(struct fault *f, int64_t t_ns)
 
 // clang-format off
 static const struct fault_kind platform[] = {
-    {"platform.torquer", "The torquer of the axis gives no torque.", "the gyro unit's windows do not come: level: it does not settle (EMCY FF23h); azimuth: the angle sensor does not follow (EMCY FF22h)",
+    {"platform.torquer", "The torquer of the axis gives no torque.", "the gyro unit gives no windows. Level: it does not settle (EMCY FF23h). Azimuth: the angle sensor does not follow (EMCY FF22h)",
      .places = FAULT_BIT(FAULT_AT_TORQUER), .apply = apply_torquer, .lift = refresh_torquer},
     {"platform.drift_step", "The gyroscope drift about the axis changes by drift_degph.", "the levelling rate (azimuth: the rate of the azimuth torquer) changes by drift_degph",
      .places = FAULT_BIT(FAULT_AT_TORQUER), .need = FAULT_BIT(FAULT_DRIFT_DEGPH), .nonzero = FAULT_BIT(FAULT_DRIFT_DEGPH), .apply = apply_drift, .lift = refresh_drift},

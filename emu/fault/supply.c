@@ -39,7 +39,7 @@ static void lift_supply(struct fault *f, int64_t t_ns)
 
 // clang-format off
 static const struct fault_kind supply[] = {
-    {"supply.brownout", "The supply voltage drops by drop_v for for_s, below the boards' threshold.", "frames break off in the middle; boot-up messages, numbers from 0 and a new set-up when it is back",
+    {"supply.brownout", "The supply voltage drops by drop_v for for_s, below the boards' threshold.", "frames break off; after the supply returns: boot-up message, set-up, frame numbers from 0",
      .places = FAULT_BIT(FAULT_AT_SUPPLY), .need = FAULT_BIT(FAULT_DROP_V) | FAULT_BIT(FAULT_FOR_S), .nonzero = FAULT_BIT(FAULT_FOR_S),
      .unless = "the scenario has no supply; the voltage stays above the threshold of the boards", .fits = reaches_brownout, .apply = dip_supply, .lift = lift_supply},
 };

@@ -10,7 +10,7 @@
 // clang-format off
 static const struct yaml_field platform_rows[] = {
     {.key = "step_ns",         .type = YAML_U32, .offset = PLATFORM(step_ns), .min = 1e6, .max = 2e7, .what = "integration step (E1: 10 ms); torques act from the next step"},
-    {.key = "alpha0_deg",      .type = YAML_REAL, .offset = PLATFORM(alpha0_deg), .min = -360, .max = 360, .what = "azimuth angle alpha at power-on, counter-clockwise from above: the azimuth of y is its negative"},
+    {.key = "alpha0_deg",      .type = YAML_REAL, .offset = PLATFORM(alpha0_deg), .min = -360, .max = 360, .what = "platform azimuth angle alpha at power-on, counter-clockwise from above; the azimuth of its y axis is -alpha"},
     {.key = "beta0_deg",       .type = YAML_REAL, .offset = PLATFORM(beta0_deg), .min = -10, .max = 10, .what = "beta at power-on, before it is levelled"},
     {.key = "drift_degph",     .type = YAML_REALS, .offset = PLATFORM(drift_degph), .count = PLATFORM_AXES, .min = -1000, .max = 1000, .what = "systematic drift about x and about z (25: E1 about x, E0 about z)"},
     {.key = "gm_sigma_degph",  .type = YAML_REAL, .offset = PLATFORM(gm_sigma_degph), .max = 100, .what = "random drift of each axis, Gauss-Markov, standard deviation (E1); 0: none"},

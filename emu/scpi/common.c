@@ -199,7 +199,7 @@ static const struct scpi_command rows[] = {
     {"*IDN?", "Identification: manufacturer, model, serial number 0, version.", do_idn, 0, 0},
     {"*OPC", "Operation complete: sets bit 0 of the event status register at the end of the motion.", do_opc, 0, 0},
     {"*OPC?", "Operation complete query: returns 1 at the end of the motion.", do_opc_query, 0, 0},
-    {"*RST", "Reset: see below.", do_rst, 0, 0},
+    {"*RST", "Resets the instrument to its power-on settings.", do_rst, 0, 0},
     {"*SRE", "Service request enable register.", set_sre, 255, REG(sre)},
     {"*SRE?", "Service request enable register.", ask_u8, 0, REG(sre)},
     {"*STB?", "Status byte.", do_stb, 0, 0},

@@ -24,7 +24,7 @@ static const char scenario_text[] =
 
 /* What a unit had when it was last looked at. */
 struct seen {
-    struct unit_observer ear;
+    struct unit_observer observer;
     struct world *world;
     unsigned unit;
     int64_t period, sync_count; /* of converter X at the last DRD_A */
@@ -172,8 +172,8 @@ static void up(struct world *w, bool watched)
     bench_power_up(&w->bench);
     for (unsigned i = 0; i < 2 && watched; i++) {
         w->seen[i] = (struct seen){.world = w, .unit = i, .period = -1};
-        w->seen[i].ear = (struct unit_observer){.fn = on_event, .ctx = &w->seen[i]};
-        unit_subscribe(&w->bench.unit[i], &w->seen[i].ear);
+        w->seen[i].observer = (struct unit_observer){.fn = on_event, .ctx = &w->seen[i]};
+        unit_subscribe(&w->bench.unit[i], &w->seen[i].observer);
     }
 }
 
@@ -181,7 +181,7 @@ static void down(struct world *w)
 {
     for (unsigned i = 0; i < CLIENTS; i++) can_hub_leave(&w->hub, &w->client[i]);
     can_hub_sweep_detached(&w->hub, true);
-    snapshot_let_go(&w->observers, &w->bench);
+    snapshot_release_lines(&w->observers, &w->bench);
     control_run_forget(&w->control);
     journal_free(&w->journal);
 }

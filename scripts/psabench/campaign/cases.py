@@ -345,7 +345,7 @@ STUDIES: Mapping[str, Study] = {
         Study(name="improved", title="The improved procedure, with the time that turns take", cases=_improved),
         Study(name="slew", title="Error against the duration of the run", cases=_slew, axis="duration of the run, s"),
         Study(name="hold", title="Heading after 4 h of hold", cases=_hold),
-        Study(name="wire", title="Cases that also run through the wire", cases=_wire),
+        Study(name="wire", title="Cases that also run on an emulated board", cases=_wire),
         Study(name="own", title="As set on the command line", cases=_own),
     )
 }

@@ -33,7 +33,7 @@ A study is a list of cases, a case an instrument with its schedule of positions 
 {studies}
 
 examples:
-  psabench campaign gyrocompass                                  20000 runs a case; build/campaign/report.html
+  psabench campaign gyrocompass                                  20000 runs per case; build/campaign/report.html
   psabench campaign gyrocompass --study readings --runs 1000000
   psabench campaign gyrocompass --study step --chain samples     sample by sample, beside the closed form
   psabench campaign gyrocompass --case article --chain emulated  200 runs, each by an emulator and the host's procedure
@@ -45,7 +45,7 @@ examples:
 NAME=VALUE of --set, with the article's values; lists with commas, yes or no. A study's own settings win over them:
 {settings}
 
-Results lie in the store (docs/store.md): the same command computes only what is missing, Ctrl-C keeps what is done.
+Results are in the store (docs/store.md): the same command computes only what is missing, Ctrl-C keeps what is done.
 Exit status: 0 done and within limits, 1 done and out of limits, 2 bad input, 3 the cluster or the bench failed, 130
 ended by Ctrl-C.
 """

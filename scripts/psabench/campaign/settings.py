@@ -56,7 +56,7 @@ SETTINGS: Mapping[str, Setting] = {
     "angle_sys_arcmin": _number("arcmin", -600, 600, "constant error of the set angle"),
     "angle_sys": _word("how the constant angle error acts"),
     "angle_random_arcmin": _number("arcmin", 0, 600, "random error of an angle, new in each position"),
-    "encoder": _word("read the encoder (through the wire; the algebra is the same)"),
+    "encoder": _word("read the encoder (on an emulated board; the algebra is the same)"),
     "random_sign": _word("draw the sign of constant errors for each run"),
     "per_sample": _word("draw random errors every 10 ms, so that they average"),
     "white_degph_rts": _number("deg/h sqrt(s)", 0, 1e4, "white noise of the levelling rate"),

@@ -51,7 +51,7 @@ Exit status: 0 conforms, 1 does not, 2 bad input, 130 ended by Ctrl-C.
 HOST_EPILOG = """\
 The program is started once for each case, after power-on of the board; it must exit when its link closes. In COMMAND
   {can}      127.0.0.1:PORT of a socketcand server          {node}     CANopen node of the board
-  {form}     frame form to ask for, for hosts that take 1, too
+  {form}     frame form to select, for hosts that support form 1
   {pty}      pseudo-terminal of an slcan adapter            {results}  file for results (default: standard output)
   {line}     pseudo-terminal of the lines, one byte per sample; {word_bits}, {code_bits}: of its words and codes
   {bus}      pseudo-terminal of a bus port: PSD-1, PIK
@@ -61,7 +61,7 @@ examples:
   psabench conform host --command "build/host {can} {node}"
   psabench conform host --command "build/host_line {line}" --only HOST-TORN
   psabench conform host --board pik --command ".venv/bin/python examples/vins_boards.py pik socketcand:{can} {node}"
-  psabench conform host --manual can --results build/told.jsonl     start it by hand, case by case
+  psabench conform host --manual can --results build/results.jsonl     start it by hand, case by case
 
 OUT has report.html, junit.xml and conform.json, and for each case the bus log and the reported results.
 Exit status: 0 conforms, 1 does not, 2 bad input, 3 the bench failed, 130 ended by Ctrl-C.
@@ -72,7 +72,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     """What follows `psabench conform`. Raises BadInput."""
     p = Parser(
         prog="psabench conform",
-        description="Check a board against docs/reference/requirements.md, over its interfaces alone.",
+        description="Check a board against docs/reference/requirements.md, using only its external interfaces.",
         formatter_class=Help,
         epilog=EPILOG,
     )

@@ -24,18 +24,18 @@ from psabench.shell import command_line
 EPILOG = """\
 psabench run PROCEDURE --help lists its options with units and defaults, and examples.
 
-Exit status: 0 done and within limits, 1 something measured misses the truth by more than its limits or is in doubt,
+Exit status: 0 done and within limits, 1 a result is off by more than its limits or is doubtful,
 2 bad input, 3 the bench or a link failed, 130 ended by Ctrl-C.
 """
 
 NOTES_HEAD = """
 Without --head or --control an emulator is started for each condition. Ctrl-C ends a run; the readings so far stay
-in OUT/PROCEDURE-CONDITION.csv. Exit status 1: something measured misses the truth by more than its limits.
+in OUT/PROCEDURE-CONDITION.csv. Exit status 1: a result is off by more than its limits.
 """
 
 NOTES_PLATFORM = """
 Without --can or --control an emulator is started for each reading, with the scenario gyrocompass. Exit status 1:
-something measured misses the truth by more than its limits, or is in doubt, which is printed with its reason.
+a result is off by more than its limits, or is doubtful; the reason is printed.
 """
 
 ALL = "all"
@@ -67,7 +67,7 @@ COMMON: Mapping[str, Mapping[str, Any]] = {
     "--truth": {
         "type": Path,
         "metavar": "SOCKET",
-        "help": "truth socket of an emulator, read after the run to grade it",
+        "help": "truth socket of an emulator, read after the run to compare the results",
     },
     "--node": {"type": node_id, "default": DBC_NODE, "metavar": "N", "help": "CANopen node of the unit (%(default)s)"},
     "--average": {
@@ -126,7 +126,8 @@ def _parser() -> Parser:
     p = Parser(
         prog="psabench run",
         usage="psabench run [-h] [--list] PROCEDURE [option...]",
-        description="Run a procedure over the wire, grade it where the truth is known, and report.\n\n" + _table(),
+        description="Run a procedure over CAN, compare its results with the truth where it is known, and write a report.\n\n"
+        + _table(),
         formatter_class=Help,
         epilog=EPILOG,
     )

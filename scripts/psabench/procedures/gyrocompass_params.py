@@ -62,7 +62,9 @@ class GyrocompassParams:
     level_zero_arcmin: float = option(10.0, "arcmin", "constant error of the level angles, for the drift's limits")
     angle_zero_arcmin: float = option(6.0, "arcmin", "mounting error of the angle sensor, for the heading's limits")
     torquer_scale: float = option(1e-3, "", "error of the torquers, for the drift's limits and the vehicle's turns")
-    drift2_degph: float = option(0.0, "deg/h", "drift of the azimuth axis, from the passport; gives the latitude")
+    drift2_degph: float = option(
+        0.0, "deg/h", "drift of the azimuth axis, from the passport; used to check the latitude"
+    )
     drift2_limit_degph: float = option(0.0, "deg/h", "limit of the error of drift2_degph; 0: no passport")
 
     def __post_init__(self) -> None:

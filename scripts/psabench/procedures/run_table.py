@@ -8,11 +8,11 @@ from dataclasses import dataclass
 ON_THE_HEAD: Mapping[str, str] = {
     "turns": "test turns, eqs (1)-(11): u0, kx, ky, kz from six positions",
     "fourier": "Fourier series over a turn, eqs (12)-(18): u0, alpha0, kx, ky, kxy",
-    "reversal": "two Fourier series with the sensor reversed about Ox: the one to trust",
+    "reversal": "two Fourier series with the sensor reversed about Ox: the reliable procedure",
 }
 ON_THE_PLATFORM: Mapping[str, str] = {
-    "gyrocompass": "a gyro platform finds north and its drifts from several positions, the article's way and a better "
-    "one",
+    "gyrocompass": "north and the drifts of a gyro platform from several positions: the article's method and an "
+    "improved one",
     "heading-hold": "gyrocompassing, then heading kept for hours with the drifts compensated",
 }
 COMPARE = (

@@ -56,7 +56,7 @@ class TurnsParams:
     search_deg: float = option(
         0.0,
         "deg",
-        "look for the extreme output of Ox within this of the vertical (0: do not)",
+        "search range about the vertical for the extreme output of Ox; 0: no search",
     )
     dwell_s: float = option(0.0, "s", "extra rest at each position before it is read")
 
