@@ -24,6 +24,10 @@ TESTS     ?= $(if $(filter check,$(MAKECMDGOALS)),$(if $(T),$(foreach t,$(T),$(i
 VERSION := $(shell sed -n 's/^version = "\(.*\)"/\1/p' pyproject.toml)
 ABI_psabench     := $(shell sed -n 's/^\#define PSABENCH_ABI \([0-9]*\)/\1/p' emu/api/psabench.h)
 ABI_psabench-nav := $(shell sed -n 's/^\#define NAV_ABI \([0-9]*\)$$/\1/p' emu/nav/nav.h)
+# Each module of Python is compiled once, not by each of the hundreds of programs that tests start, also where the user asks for
+# no bytecode beside the sources: it is kept in build/.
+export PYTHONPYCACHEPREFIX ?= $(CURDIR)/build/pycache
+unexport PYTHONDONTWRITEBYTECODE
 # What correctness needs is before the user's CFLAGS. -ffp-contract=off: the same bytes on every machine. All objects are
 # fit for the shared library: -fPIC with hidden symbols costs the emulator nothing that can be measured.
 STD   := -std=c11 -ffp-contract=off -fPIC -fvisibility=hidden -DPSABENCH_VERSION=$(VERSION)
@@ -102,6 +106,8 @@ $(BUILD)/obj/%.o: %.c Makefile
 # Programs of tests: each names its objects, the rest comes from the archive.
 LINK_LIBS = $(LIBS)
 $(BUILD)/obj/tests/%.o: CPPFLAGS += -Itests/unit -Itests/fuzz/support#             rigs that several folders use
+# Under sanitizers without optimisation: half the time of a build; what the tests run is optimised all the same.
+$(BUILD)/obj/tests/unit/%.o: CFLAGS := $(if $(SAN),$(CFLAGS:-O1=-O0),$(CFLAGS))
 $(BUILD)/obj/tests/bench/%.o: CPPFLAGS += -D_POSIX_C_SOURCE=199309L#                clock_gettime
 $(UNIT_BIN): LINK_LIBS += -lcmocka
 $(FUZZ_BIN): LINK_LIBS += -fsanitize=fuzzer

@@ -96,8 +96,9 @@ def in_test(table: Table, tests: Sequence[tuple[Path, str, str, Hashable]]) -> l
     """
     seen: Counter[Hashable] = Counter()
     chosen = []
+    rows = {path: table.row(path) or Row() for path in {test[0] for test in tests}}  # once a file, not once a test
     for path, function, case, group in tests:
-        row = table.row(path) or Row()
+        row = rows[path]
         name = f"{function}[{case}]" if case else function
         # Brackets are literal here: names of cases are full of them.
         out = row.tier == "all" or any(
