@@ -8,6 +8,7 @@ machines give equal bytes only while no result depends on a libm whose last digi
 
 import subprocess
 import sys
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 FREE_FOLDERS = {"link", "app", "bench", "scenario"}
@@ -37,31 +38,49 @@ FORBIDDEN = {
 }
 
 
-def undefined(objects: Path) -> list[str]:
-    out = subprocess.run(["nm", "-u", "--format=posix", objects], capture_output=True, text=True, check=True).stdout
-    return [line.split()[0].split("@")[0] for line in out.splitlines()]
-
-
-def mutable(objects: Path) -> list[str]:
-    """Names of data objects in writable sections; .data.rel.ro is constant after loading."""
-    out = subprocess.run(["objdump", "-t", objects], capture_output=True, text=True, check=True).stdout
-    names = []
+def tables(command: Sequence[str], objects: Sequence[Path]) -> Iterator[tuple[Path, str]]:
+    """Lines of nm -A, each with its object; one process for all, since starting one for each takes most of the time."""
+    if not objects:  # nm would look for a.out
+        return
+    out = subprocess.run([*command, *objects], capture_output=True, text=True, check=True).stdout
     for line in out.splitlines():
+        path, _, rest = line.partition(": ")
+        yield Path(path), rest
+
+
+def undefined(objects: Sequence[Path]) -> dict[Path, list[str]]:
+    """Names that each object needs."""
+    names: dict[Path, list[str]] = {path: [] for path in objects}
+    for path, line in tables(["nm", "-A", "-u", "--format=posix"], objects):
+        names[path].append(line.split()[0].split("@")[0])
+    return names
+
+
+def mutable(objects: Sequence[Path]) -> dict[Path, list[str]]:
+    """Names of data objects in writable sections of each object; .data.rel.ro is constant after loading."""
+    names: dict[Path, list[str]] = {path: [] for path in objects}
+    if not objects:
+        return names
+    out = subprocess.run(["objdump", "-t", *objects], capture_output=True, text=True, check=True).stdout
+    path = objects[0]
+    for line in out.splitlines():
+        name, header, _ = line.partition(":     file format ")
+        if header:
+            path = Path(name)
+            continue
         fields = line.split()
         section = next((f for f in fields if f in {"*COM*"} or f.startswith((".data", ".bss", ".tbss", ".tdata"))), "")
         is_object = " O " in line[:30] or section == "*COM*"
         if is_object and section and not section.startswith(".data.rel.ro"):
-            names.append(fields[-1])
+            names[path].append(fields[-1])
     return names
 
 
-def calls(objects: list[Path]) -> dict[Path, set[Path]]:
+def calls(objects: Sequence[Path]) -> dict[Path, set[Path]]:
     """Each object with the others that define what it needs."""
-    home: dict[str, Path] = {}
-    for path in objects:
-        out = subprocess.run(["nm", "-g", "--defined-only", "--format=posix", path], capture_output=True, text=True)
-        home |= {line.split()[0]: path for line in out.stdout.splitlines()}
-    return {path: {home[n] for n in undefined(path) if n in home} - {path} for path in objects}
+    defined = tables(["nm", "-A", "-g", "--defined-only", "--format=posix"], objects)
+    home = {line.split()[0]: path for path, line in defined}
+    return {path: {home[n] for n in names if n in home} - {path} for path, names in undefined(objects).items()}
 
 
 def circles(graph: dict[Path, set[Path]]) -> list[list[Path]]:
@@ -92,14 +111,15 @@ def circle_breaches(root: Path, objects: list[Path], limits: tuple[int, int] = C
 def main(root: Path) -> int:
     breaches = []
     objects = sorted((root / "emu").rglob("*.o"))
+    needed, writable = undefined(objects), mutable(objects)
     for path in objects:
         room = path.parent.relative_to(root / "emu")
         folder = room.parts[0]
         if folder in FREE_FOLDERS:
             continue
         source = f"emu/{room}/{path.stem}.{'cpp' if folder in CXX_FOLDERS else 'c'}"
-        breaches += [f"{source}: mutable global {name}" for name in mutable(path)]
-        for name in undefined(path):
+        breaches += [f"{source}: mutable global {name}" for name in writable[path]]
+        for name in needed[path]:
             if name in FORBIDDEN and not (folder in ALLOCATOR_FOLDERS and FORBIDDEN[name] == "allocates"):
                 breaches.append(f"{source}: calls {name}(), which {FORBIDDEN[name]}")
     breaches += circle_breaches(root, objects)
