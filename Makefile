@@ -51,6 +51,9 @@ Q   = $(if $(V),,@)
 say = @mkdir -p $(@D)$(if $(V),,; echo '  $(1)	$@')
 # build/gen/gen.mk is made from proto/psabench.yaml before anything is compiled and names the generated sources in GEN_SRC.
 PY     := .venv/bin/python
+# Compiled Python is kept, in build/, whatever the user's setting: else each program that a test starts compiles numpy again.
+unexport PYTHONDONTWRITEBYTECODE
+export PYTHONPYCACHEPREFIX := $(CURDIR)/build/pycache
 NO_GEN := setup run test test-all quick bench mutants clean help uninstall lock
 include $(if $(filter-out $(NO_GEN),$(or $(MAKECMDGOALS),all)),build/gen/gen.mk)
 

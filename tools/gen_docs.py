@@ -27,6 +27,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import fast_yaml
 import yaml
 from between import marks, spliced
 
@@ -86,7 +87,7 @@ class Section:
 
 def read_yaml(path: Path) -> Any:
     try:
-        return yaml.safe_load(path.read_text(encoding="utf-8"))
+        return fast_yaml.parse(path.read_text(encoding="utf-8"))
     except yaml.YAMLError as e:
         raise FidelityError(f"{path.name}: {' '.join(str(e).split())}") from None
 

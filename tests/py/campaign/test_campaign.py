@@ -12,6 +12,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from html import escape
 from pathlib import Path
@@ -47,15 +48,22 @@ def computed(p: Plan, store: Store, at_work: Any = None) -> list[Rows]:
     return [p.rows(store, c) for c in p.cases]
 
 
-@pytest.fixture(scope="module")
-def cluster() -> Iterator[str]:
-    """A Dask cluster that somebody else runs: its address."""
+@contextmanager
+def local_cluster(count: int) -> Iterator[str]:
+    """A Dask cluster that somebody else runs, with so many workers: its address."""
     from distributed import LocalCluster
 
     with LocalCluster(  # type: ignore[no-untyped-call]
-        n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0"
+        n_workers=count, threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0"
     ) as there:
         yield there.scheduler_address
+
+
+@pytest.fixture(scope="module")
+def worker() -> Iterator[str]:
+    """A cluster of one: each worker takes seconds to start."""
+    with local_cluster(1) as address:
+        yield address
 
 
 # ---- cutting the work
@@ -105,7 +113,12 @@ def test_a_run_is_the_same_in_every_part() -> None:
         assert not np.array_equal(whole.rows, other.rows)
 
 
-def test_processes_and_a_cluster_at_an_address_give_the_same_bytes(tmp_path: Path, cluster: str) -> None:
+def test_processes_and_a_cluster_at_an_address_give_the_same_bytes(tmp_path: Path) -> None:
+    with local_cluster(2) as cluster:
+        compare_workers(tmp_path, cluster)
+
+
+def compare_workers(tmp_path: Path, cluster: str) -> None:
     found = {}
     for name, options in {
         "one": Options(workers=1),
@@ -212,12 +225,12 @@ def test_a_wrong_address_is_told_where_nothing_is_missing_and_nothing_is_forgott
 
 
 def test_a_cluster_with_another_psabench_is_refused(
-    cluster: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    worker: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     mine = workers.own_build("closed")
     monkeypatch.setattr(chains, "versions", lambda: "psabench 8")  # here, and not in the workers
     with pytest.raises(BadInput, match=rf"expected workers with psabench 8, build .*, got {re.escape(mine)}$"):
-        command.campaign(Options(case="R0", dask=cluster, out=tmp_path), QUIET)
+        command.campaign(Options(case="R0", dask=worker, out=tmp_path), QUIET)
 
 
 def _broken(_: object) -> None:
@@ -228,8 +241,8 @@ def _refusing(_: object) -> None:
     raise BadInput("two positions")
 
 
-def test_what_goes_wrong_in_a_worker_is_told(cluster: str) -> None:
-    with workers.workers(address=cluster) as there:
+def test_what_goes_wrong_in_a_worker_is_told(worker: str) -> None:
+    with workers.workers(address=worker) as there:
         assert isinstance(there, Dask)
         with pytest.raises(BenchError, match="a worker failed: RuntimeError: the disk of the worker is full"):
             list(there.map(_broken, [1]))

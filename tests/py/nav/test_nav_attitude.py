@@ -94,12 +94,12 @@ def closed_loop(
     s_true: float, m1: float, noise_rad: float, count: int, rng: np.random.Generator
 ) -> tuple[Floats, Floats]:
     """beta_n and the command of a levelling loop, 100 Hz, that has been at work for 8 s."""
-    beta, measured, commands = -s_true / m1, np.empty(count + 800), np.empty(count + 800)
-    for k in range(count + 800):
-        measured[k] = beta + noise_rad * rng.standard_normal()
-        commands[k] = -m1 * measured[k]
-        beta += 0.01 * (commands[k] - s_true)
-    return measured[800:], commands[800:]
+    beta, measured, commands = -s_true / m1, list[float](), list[float]()
+    for noise in (noise_rad * rng.standard_normal(count + 800)).tolist():  # plain floats: ten times faster than numpy's
+        measured.append(beta + noise)
+        commands.append(-m1 * measured[-1])
+        beta += 0.01 * (commands[-1] - s_true)
+    return np.array(measured[800:]), np.array(commands[800:])
 
 
 def test_the_slope_of_a_window_obeys_its_noise_law_and_the_mean_its_own() -> None:

@@ -21,7 +21,7 @@ ENV = {
     k: v
     for k, v in os.environ.items()
     if k not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL", "PYTHONPATH", "PSA_EMU", "PSABENCH_LIB", "PSABENCH_PROTO")
-}
+} | {"PYTHONDONTWRITEBYTECODE": "1"}  # the environment is gone after the tests: nothing of it in build/pycache
 
 
 def run(command: Sequence[str | Path], cwd: Path, timeout_s: float = 100.0) -> str:

@@ -191,12 +191,12 @@ class HostBench:
             step_s = min(STEP_S if pace else 0.05, left_s)
             begun_s = time.monotonic()
             with _Watchdog(self.host):
-                self.control.call("run", for_s=step_s)
+                now_s = self.control.call("run", for_s=step_s).t_ns * 1e-9
             if pace and (rest_s := step_s / pace - (time.monotonic() - begun_s)) > 0:
                 time.sleep(rest_s)
             ended_s = time.monotonic()
             self.stood_s = max(self.stood_s, ended_s - begun_s)
-            self.clock += [(self.now_s - step_s, begun_s), (self.now_s, ended_s)]
+            self.clock += [(now_s - step_s, begun_s), (now_s, ended_s)]
             left_s -= step_s
 
     def serve(self, for_s: float, *, cycle_s: float, leap_s: float = 0.0) -> None:
