@@ -26,9 +26,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import fast_yaml
 import yaml
 from find_tests import collected_in_python, registered_in_c
+from protogen.source import parse_yaml
 
 ROOT = Path(__file__).resolve().parents[1]
 LEDGER, LOCK = "docs/evidence.yaml", "docs/evidence.lock"
@@ -90,7 +90,7 @@ def tokens(source: str) -> Iterator[str]:
 def normalised(name: str, text: str) -> str:
     """What of a file has a meaning: tokens of C, values of YAML."""
     if name.endswith((".yaml", ".yml")):
-        return json.dumps(fast_yaml.parse(text), sort_keys=True, default=str)
+        return json.dumps(parse_yaml(text), sort_keys=True, default=str)
     return "\0".join(tokens(text))
 
 
@@ -136,7 +136,7 @@ class Ledger:
 def load(root: Path = ROOT) -> Ledger:
     """The ledger, with the files of each group as they are now. Raises EvidenceError."""
     try:
-        data: dict[str, Any] = fast_yaml.parse((root / LEDGER).read_text(encoding="utf-8"))
+        data: dict[str, Any] = parse_yaml((root / LEDGER).read_text(encoding="utf-8"))
         groups = tuple(
             Group(name, g["title"], tuple(expand(root, g["files"])), tuple(expand_tests(root, g["tests"])))
             for name, g in data["groups"].items()

@@ -27,9 +27,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import fast_yaml
 import yaml
 from between import marks, spliced
+from protogen.source import parse_yaml
 
 ROOT = Path(__file__).resolve().parents[1]
 CHIPS = ROOT / "docs/chips"
@@ -87,7 +87,7 @@ class Section:
 
 def read_yaml(path: Path) -> Any:
     try:
-        return fast_yaml.parse(path.read_text(encoding="utf-8"))
+        return parse_yaml(path.read_text(encoding="utf-8"))
     except yaml.YAMLError as e:
         raise FidelityError(f"{path.name}: {' '.join(str(e).split())}") from None
 

@@ -17,8 +17,8 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
-import fast_yaml
 from between import marks, spliced
+from protogen.source import parse_yaml
 from psabench.conform.profile import variant
 from psabench.conform.requirements import requirements
 
@@ -45,7 +45,7 @@ class Row:
 def load(path: Path = TABLE) -> tuple[Row, ...]:
     """Raises ValueError for a row that says neither or both, and for a requirement that its board has not."""
     rows = []
-    for board, entries in fast_yaml.parse(path.read_text(encoding="utf-8")).items():
+    for board, entries in parse_yaml(path.read_text(encoding="utf-8")).items():
         for e in entries:
             row = Row(
                 board=board,

@@ -22,8 +22,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
 from pathlib import Path
 
-import fast_yaml
 from find_tests import collected_in_python, proved_in_python, registered_in_c
+from protogen.source import parse_yaml
 from psabench.conform.requirements import Requirement, Requirements, RequirementsError, load
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -83,7 +83,7 @@ def cited_place(root: Path, place: str) -> bool:
 @cache
 def parts(path: Path) -> frozenset[str]:
     """What a YAML file has: its keys, or the sections of docs/chips/facts.yaml."""
-    data = fast_yaml.parse(text_of(path))
+    data = parse_yaml(text_of(path))
     return frozenset(str(d["section"]) for d in data) if isinstance(data, list) else frozenset(map(str, data))
 
 

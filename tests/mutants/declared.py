@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-import fast_yaml
+from protogen.source import parse_yaml
 
 LIST = Path(__file__).with_name("mutants.yaml")
 KEYS = {"id", "kind", "in", "old", "new", "run", "breaks"}
@@ -106,7 +106,7 @@ def _mutant(row: Mapping[str, Any]) -> Mutant:
 
 def load(path: Path = LIST) -> list[Mutant]:
     """Raises ListError."""
-    rows = fast_yaml.parse(path.read_text(encoding="utf-8"))
+    rows = parse_yaml(path.read_text(encoding="utf-8"))
     if not isinstance(rows, list):
         raise ListError(f"{path}: expected a list of rows")
     return [_mutant(row) for row in rows]

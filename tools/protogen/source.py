@@ -4,7 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import fast_yaml
+import yaml
 
 from protogen.model import BUS, BUS_REGISTERS, ROOT, Entry, Message, Object, Protocol, Signal
 
@@ -16,6 +16,13 @@ PDO_INVALID_NO_RTR = 0xC0000000
 SERVICES = ("EMCY", "SDO_TX", "SDO_RX", "HEARTBEAT")
 COMMON_OBJECTS_END, REMARK = 0x1800, 0x2040
 HIGHEST = "Highest sub-index supported"
+
+YAML_LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # libyaml's where there is one: ten times faster
+
+
+def parse_yaml(text: str) -> Any:
+    """The values of a document. Raises yaml.YAMLError."""
+    return yaml.load(text, YAML_LOADER)
 
 
 def read_message(m: dict[str, Any]) -> Message:
@@ -83,7 +90,7 @@ def tpdo_objects(tpdos: list[dict[str, Any]], forms: list[dict[str, Any]]) -> li
 
 def load(path: Path = SOURCE) -> Protocol:
     """PSA-2, read and expanded; raises KeyError or TypeError where the source does not have the expected shape."""
-    source = fast_yaml.parse(path.read_text())
+    source = parse_yaml(path.read_text())
     objects = [read_object(o, source) for o in source["objects"]]
     objects += tpdo_objects(source["tpdos"], source["forms"])
     return Protocol(
@@ -146,7 +153,7 @@ def unit_objects(source: dict[str, Any], base: Protocol) -> list[Object]:
         for o in base.objects
         if o.index < COMMON_OBJECTS_END or o.index == REMARK
     ]
-    for o in fast_yaml.parse(UNIT_SOURCE.read_text())["objects"]:
+    for o in parse_yaml(UNIT_SOURCE.read_text())["objects"]:
         if o.pop("bus", False) and "bus" not in source:
             continue
         if o["const"] == "COUNTERS":
@@ -188,6 +195,6 @@ def load_unit(path: Path, source: dict[str, Any], base: Protocol) -> Protocol:
 def load_all() -> list[Protocol]:
     """PSA-2 first, then each proto/*.yaml with a device, by its default node."""
     base = load()
-    sources = {path: fast_yaml.parse(path.read_text()) for path in (ROOT / "proto").glob("*.yaml") if path != SOURCE}
+    sources = {path: parse_yaml(path.read_text()) for path in (ROOT / "proto").glob("*.yaml") if path != SOURCE}
     units = [(path, source) for path, source in sources.items() if "device" in source]
     return [base, *(load_unit(path, s, base) for path, s in sorted(units, key=lambda u: u[1]["device"]["node"]))]
