@@ -24,9 +24,7 @@ TESTS     ?= $(if $(filter check,$(MAKECMDGOALS)),$(if $(T),$(foreach t,$(T),$(i
 VERSION := $(shell sed -n 's/^version = "\(.*\)"/\1/p' pyproject.toml)
 ABI_psabench     := $(shell sed -n 's/^\#define PSABENCH_ABI \([0-9]*\)/\1/p' emu/api/psabench.h)
 ABI_psabench-nav := $(shell sed -n 's/^\#define NAV_ABI \([0-9]*\)$$/\1/p' emu/nav/nav.h)
-# Each module of Python is compiled once, not by each of the hundreds of programs that tests start, also where the user asks for
-# no bytecode beside the sources: it is kept in build/.
-export PYTHONPYCACHEPREFIX ?= $(CURDIR)/build/pycache
+export PYTHONPYCACHEPREFIX ?= $(CURDIR)/build/pycache#   else each program that a test starts compiles numpy again
 unexport PYTHONDONTWRITEBYTECODE
 # What correctness needs is before the user's CFLAGS. -ffp-contract=off: the same bytes on every machine. All objects are
 # fit for the shared library: -fPIC with hidden symbols costs the emulator nothing that can be measured.
@@ -51,9 +49,6 @@ Q   = $(if $(V),,@)
 say = @mkdir -p $(@D)$(if $(V),,; echo '  $(1)	$@')
 # build/gen/gen.mk is made from proto/psabench.yaml before anything is compiled and names the generated sources in GEN_SRC.
 PY     := .venv/bin/python
-# Compiled Python is kept, in build/, whatever the user's setting: else each program that a test starts compiles numpy again.
-unexport PYTHONDONTWRITEBYTECODE
-export PYTHONPYCACHEPREFIX := $(CURDIR)/build/pycache
 NO_GEN := setup run test test-all quick bench mutants clean help uninstall lock
 include $(if $(filter-out $(NO_GEN),$(or $(MAKECMDGOALS),all)),build/gen/gen.mk)
 
@@ -72,7 +67,7 @@ BENCH_BIN := $(patsubst tests/bench/%.c,$(BUILD)/bench/%,$(sort $(wildcard tests
 
 .SECONDARY:
 .DELETE_ON_ERROR:
-.PHONY: FORCE all lib setup run quick test test-all bench bench-bin mutants fault-matrix false-positives alarms check pytest san builds e2e e2e-san e2e-vcan e2e-slc0 uml soak fuzz fuzz-check fuzz-long fuzz-bin fuzz-each lint format golden docs prove install uninstall wheel clean help lock
+.PHONY: FORCE all lib setup run quick test test-all bench bench-bin mutants fault-matrix false-positives check pytest builds e2e e2e-san e2e-vcan e2e-slc0 uml soak fuzz fuzz-check fuzz-long fuzz-bin fuzz-each lint format golden docs prove install uninstall wheel clean help lock
 all: $(if $(MAIN),$(BUILD)/psa-emu,$(LIB_OBJ)) $(if $(API_OBJ),lib) ## the emulator build/psa-emu and the libraries (CC=clang: in build-clang, SAN=address,undefined: in build-san)
 lib: $(foreach l,psabench psabench-nav,$(BUILD)/lib$(l).so $(BUILD)/lib$(l).a $(BUILD)/$(l).pc) ## libpsabench and libpsabench-nav, shared and static, and their pkg-config files
 $(BUILD)/psa-emu: $(filter-out $(API_OBJ),$(OBJ))
@@ -109,8 +104,7 @@ $(BUILD)/obj/%.o: %.c Makefile
 # Programs of tests: each names its objects, the rest comes from the archive.
 LINK_LIBS = $(LIBS)
 $(BUILD)/obj/tests/%.o: CPPFLAGS += -Itests/unit -Itests/fuzz/support#             rigs that several folders use
-# Under sanitizers without optimisation: half the time of a build; what the tests run is optimised all the same.
-$(BUILD)/obj/tests/unit/%.o: CFLAGS := $(if $(SAN),$(CFLAGS:-O1=-O0),$(CFLAGS))
+$(BUILD)/obj/tests/unit/%.o: CFLAGS := $(if $(SAN),$(CFLAGS:-O1=-O0),$(CFLAGS))#   tested code is at -O1
 $(BUILD)/obj/tests/bench/%.o: CPPFLAGS += -D_POSIX_C_SOURCE=199309L#                clock_gettime
 $(UNIT_BIN): LINK_LIBS += -lcmocka
 $(FUZZ_BIN): LINK_LIBS += -fsanitize=fuzzer
@@ -138,10 +132,8 @@ test: ## set-up, build, and the tests of tier `test` (tests/tiers.toml), ten min
 	@tools/setup test && python3 tools/test_all.py test
 test-all: ## set-up, and every test: all compilers, sanitizers, links, pages, fuzz corpus, long runs
 	@tools/setup test && python3 tools/test_all.py all
-check: $(TESTS:%=$(BUILD)/tests/%) ## the C unit tests (one: make check T=test_sched)
+check: $(TESTS:%=$(BUILD)/tests/%) ## the C unit tests (one: make check T=test_sched; under ASan and UBSan: make check SAN=address,undefined)
 	@python3 tools/run_c_tests.py $^
-san: ## the C unit tests under AddressSanitizer and UBSan
-	@$(MAKE) --no-print-directory SAN=address,undefined check
 PYTESTS = $(if $(T),$(foreach t,$(T),$(or $(shell find tests -name '$(t).py'),$(error no file $(t).py in tests))),tests/py tests/conform tests/golden)
 pytest: $(if $(T),all,bench-bin) ## the Python tests, golden traces included (a file: make pytest T=test_frames)
 	$(PY) -m pytest --tier $(TIER) $(PYTESTS)
@@ -165,8 +157,7 @@ golden: all ## rewrite the golden traces; review the difference like code
 mutants: | $(PY) ## broken boards that the conformance suite must find, docs/reference/mutants.md (some: make mutants MUTANTS='pik- sdo-')
 	@PYTHONPATH=tools $(PY) -m tests.mutants.run $(MUTANTS)
 false-positives: all ## conforming boards that the suite must pass, docs/reference/false_positives.md (some: ARGS='w24 --minutes 5')
-	@PYTHONPATH=tools $(PY) -m tests.false_positives.run $(ARGS) $(ALARMS)
-alarms: false-positives # its earlier name
+	@PYTHONPATH=tools $(PY) -m tests.false_positives.run $(ARGS)
 fault-matrix: all ## every fault at every point, and the requirements that it breaks (docs/faults.md)
 	PSABENCH_FAULTS=all $(PY) -m pytest tests/conform/suite/test_conform_faults.py
 bench: ## speed beside Verilog models of the same board and against the targets, into docs/reference/performance.md

@@ -42,7 +42,7 @@ class Case:
     def command(self) -> str:
         """What somebody types to have this run again."""
         if self.load:
-            return f"make alarms ALARMS='--load --seeds {self.seed}-{self.seed} --anew {self.profile}'"
+            return f"make false-positives ARGS='--load --seeds {self.seed}-{self.seed} --anew {self.profile}'"
         words = f"psabench conform device --board {self.board} --profile {self.profile} --seed {self.seed}"
         words += f" --clock-error {self.board_ppm:g}" if self.board_ppm else ""
         return words + (f" --recorder-error {self.probes_ppm:g}" if self.probes_ppm else "")

@@ -1,4 +1,4 @@
-"""False alarms: the design of `make alarms`, what it does with what it finds, and a few of its runs each time.
+"""False alarms: the design of `make false-positives`, what it does with what it finds, and a few of its runs each time.
 
 Which profiles and seeds are run follows from the sources: others after each change, the same again for the same state.
 """

@@ -51,7 +51,7 @@ def test_a_phrase_is_found_in_any_text(
     [
         "Time stands still.\n",
         "assert stream_that_stands_is_seen()\n",
-        "make alarms ALARMS=--anew\n",
+        "make false-positives ARGS=--anew\n",
         "an unwanted argument\n",
     ],
 )
