@@ -74,6 +74,20 @@ static const struct {
     [BOARD_FIELD_LIST] = {NULL, 0, NULL},
 };
 
+static void set_default(const struct board_field *f, void *value)
+{
+    if (f->type == BOARD_FIELD_STRING) memcpy(value, f->standard_name, strlen(f->standard_name) + 1);
+    else if (f->type == BOARD_FIELD_UINT) *(unsigned *)value = (unsigned)f->standard;
+    else if (f->type == BOARD_FIELD_REAL) *(double *)value = f->standard;
+    else if (f->type == BOARD_FIELD_CHOICE) *(int *)value = (int)f->standard;
+    else if (f->type == BOARD_FIELD_BOOL) *(bool *)value = f->standard != 0.0;
+}
+
+void board_field_defaults(const struct board_field *fields, unsigned n, void *profile)
+{
+    for (unsigned i = 0; i < n; i++) set_default(&fields[i], (char *)profile + fields[i].offset);
+}
+
 const struct board_field *board_field_find(const struct board_field *fields, unsigned n, const char *key)
 {
     for (unsigned i = 0; i < n; i++)

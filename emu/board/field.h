@@ -27,7 +27,29 @@ struct board_field {
     /* LIST: element i from its text (element 0 empties the list first); its text, false past the last. */
     bool (*parse)(void *profile, unsigned i, const char *text);
     bool (*text)(const void *profile, unsigned i, char *out, size_t cap);
+    double standard;           /* default of a number, BOOL or CHOICE */
+    const char *standard_name; /* STRING: its default */
 };
+
+/* Rows of a board's table: the name of its profile; a number or BOOL; a choice of a list. */
+#define BOARD_FIELD_NAME(profile, name_, words)                                                                        \
+    {                                                                                                                  \
+        .key = "name", .type = BOARD_FIELD_STRING, .offset = offsetof(profile, name), .min = 1, .max = 31,             \
+        .what = (words), .standard_name = (name_)                                                                      \
+    }
+#define BOARD_FIELD_ROW(profile, member, kind, value, lo, hi, words)                                                   \
+    {                                                                                                                  \
+        .key = #member, .type = BOARD_FIELD_##kind, .offset = offsetof(profile, member), .standard = (value),          \
+        .min = (lo), .max = (hi), .what = (words)                                                                      \
+    }
+#define BOARD_FIELD_PICK(profile, member, value, list, words)                                                          \
+    {                                                                                                                  \
+        .key = #member, .type = BOARD_FIELD_CHOICE, .offset = offsetof(profile, member), .standard = (value),          \
+        .choices = (list), .what = (words)                                                                             \
+    }
+
+/* Sets all fields but sequences to their defaults. */
+void board_field_defaults(const struct board_field *fields, unsigned n, void *profile);
 
 /* Sets one field from its text, as YAML, the command line and tests have it; index: element of a sequence, else 0. False with
  * a sentence in why, and the profile untouched, if the key is unknown or the text no such value. */

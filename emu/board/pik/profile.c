@@ -2,82 +2,52 @@
 
 #include "base/why.h"
 
-#define OFF(member) offsetof(struct pik_profile, member)
-#define ROW(name, kind, lo, hi, words)                                                                                 \
-    {                                                                                                                  \
-        .key = #name, .type = BOARD_FIELD_##kind, .offset = OFF(name), .min = (lo), .max = (hi), .what = (words)       \
-    }
+#define NAME(standard, words) BOARD_FIELD_NAME(struct pik_profile, standard, words)
+#define ROW(name, kind, standard, lo, hi, words)                                                                       \
+    BOARD_FIELD_ROW(struct pik_profile, name, kind, standard, lo, hi, words)
 
 // clang-format off
 const struct board_field pik_fields[PIK_FIELDS] = {
-    ROW(name, STRING, 1, 31, "Name of the profile."),
-    ROW(uref_v, REAL, 0.1, 100, "UREF, either sign: what the reset applies. E0 (10 V is PMKA's)."),
-    ROW(rr_ohm, REAL, 10, 1e8, "Rr, from UREF to the integrator. E0."),
-    ROW(rin_ohm, REAL, 10, 1e8, "RIN, from the input to the integrator. E0."),
-    ROW(clock_hz, UINT, 100, 1000000, "1/TCLK: a reset lasts one period. E0, K = Rr/(RIN UREF TCLK) is the article's."),
-    ROW(grid, UINT, 1, 64, "Instants in TCLK at which a reset may begin: the control unit's faster clock. E0."),
-    ROW(recovery_ticks, UINT, 0, 1024, "Rest of a reference after its reset, in TCLK/grid: 15 of 16 allow 3 % more than F at 10 V. E0."),
-    ROW(switch_on_ns, REAL, 0, 1e6, "Delay of switching the reference on. E0."),
-    ROW(switch_off_ns, REAL, 0, 1e6, "Delay of switching it off; only the difference enters the charge. E0."),
-    ROW(input_off_ns, REAL, 0, 1e6, "Time for which a reset disconnects the input; the article's does not. E0."),
-    ROW(c_int_nf, REAL, 0.01, 1e5, "Capacitor of the integrator; no count depends on it. E0."),
-    ROW(uc_v, REAL, 0.01, 100, "Uc, either sign: where a reset begins. E0."),
-    ROW(rail_v, REAL, 0.1, 200, "Limit of the integrator's output, either sign. E0."),
-    ROW(ra_ohm, REAL, 1, 1e6, "Ra, load of a sensor with current output, if the scenario gives none: 0.94 and 0.98 V/g of 1.28 mA/g. E0."),
-    ROW(look_ticks, UINT, 1, 100000, "TCLK/grid between two samples of the model's input. E0."),
-    ROW(latch_us, UINT, 0, 1000000, "Period at which the counters are latched and sent; 0: only by strobe. E0."),
-    ROW(strobe_ns, UINT, 20, 1000000, "Default strobe length of a bus cycle. E0."),
-    ROW(strobe_min_ns, UINT, 0, 1000000, "Shortest strobe that reads or writes. E0."),
-    ROW(latch_ns, UINT, 1, 1000000, "Length of the pulse on LATCH. E0."),
-    ROW(k_error_pct, REAL, 0, 10, "Error of the coefficient that a specimen keeps from -10 to 60 degC; 0: no limit. E1, range E0."),
-    ROW(uref_tol_ppm, REAL, 0, 1e5, "Standard deviation of UREF. E0."),
-    ROW(uref_tc_ppm_per_k, REAL, 0, 1e4, "Standard deviation of its temperature coefficient. E0."),
-    ROW(ratio_tol_ppm, REAL, 0, 1e5, "Standard deviation of Rr/RIN. E0."),
-    ROW(ratio_tc_ppm_per_k, REAL, 0, 1e4, "Standard deviation of its temperature coefficient. E0."),
-    ROW(asymmetry_ppm, REAL, 0, 1e5, "Standard deviation of half the difference of the two signs. E0."),
-    ROW(clock_tol_ppm, REAL, 0, 1000, "Standard deviation of the crystal. E0."),
-    ROW(c_tol_pct, REAL, 0, 20, "Standard deviation of the capacitor. E0."),
-    ROW(c_tc_ppm_per_k, REAL, 0, 1e4, "Temperature coefficient of the capacitor. E0."),
-    ROW(zero_v, REAL, 0, 1, "Standard deviation of the zero drift, at the input. E0."),
-    ROW(zero_tc_v_per_k, REAL, 0, 0.01, "Standard deviation of its temperature coefficient. E0."),
-    ROW(noise_v_rthz, REAL, 0, 1, "White noise of the integrator, at the input, one-sided. E0."),
-    ROW(saturated_ms, REAL, 0, 1e5, "Time without saturation after which its flag and EMCY end. E0."),
+    NAME("pik", "Name of the profile."),
+    ROW(uref_v, REAL, 10.0, 0.1, 100, "UREF, either sign: what the reset applies. E0 (10 V is PMKA's)."),
+    ROW(rr_ohm, REAL, 10e3, 10, 1e8, "Rr, from UREF to the integrator. E0."),
+    ROW(rin_ohm, REAL, 20e3, 10, 1e8, "RIN, from the input to the integrator. E0."),
+    ROW(clock_hz, UINT, 3480, 100, 1000000, "1/TCLK: a reset lasts one period. E0, K = Rr/(RIN UREF TCLK) is the article's."),
+    ROW(grid, UINT, 16, 1, 64, "Instants in TCLK at which a reset may begin: the control unit's faster clock. E0."),
+    ROW(recovery_ticks, UINT, 15, 0, 1024, "Rest of a reference after its reset, in TCLK/grid: 15 of 16 allow 3 % more than F at 10 V. E0."),
+    ROW(switch_on_ns, REAL, 0, 0, 1e6, "Delay of switching the reference on. E0."),
+    ROW(switch_off_ns, REAL, 0, 0, 1e6, "Delay of switching it off; only the difference enters the charge. E0."),
+    ROW(input_off_ns, REAL, 0, 0, 1e6, "Time for which a reset disconnects the input; the article's does not. E0."),
+    ROW(c_int_nf, REAL, 56.0, 0.01, 1e5, "Capacitor of the integrator; no count depends on it. E0."),
+    ROW(uc_v, REAL, 3.75, 0.01, 100, "Uc, either sign: where a reset begins. E0."),
+    ROW(rail_v, REAL, 12.0, 0.1, 200, "Limit of the integrator's output, either sign. E0."),
+    ROW(ra_ohm, REAL, 735.0, 1, 1e6, "Ra, load of a sensor with current output, if the scenario gives none: 0.94 and 0.98 V/g of 1.28 mA/g. E0."),
+    ROW(look_ticks, UINT, 10, 1, 100000, "TCLK/grid between two samples of the model's input. E0."),
+    ROW(latch_us, UINT, 10000, 0, 1000000, "Period at which the counters are latched and sent; 0: only by strobe. E0."),
+    ROW(strobe_ns, UINT, 1000, 20, 1000000, "Default strobe length of a bus cycle. E0."),
+    ROW(strobe_min_ns, UINT, 200, 0, 1000000, "Shortest strobe that reads or writes. E0."),
+    ROW(latch_ns, UINT, 10000, 1, 1000000, "Length of the pulse on LATCH. E0."),
+    ROW(k_error_pct, REAL, 0.15, 0, 10, "Error of the coefficient that a specimen keeps from -10 to 60 degC; 0: no limit. E1, range E0."),
+    ROW(uref_tol_ppm, REAL, 300.0, 0, 1e5, "Standard deviation of UREF. E0."),
+    ROW(uref_tc_ppm_per_k, REAL, 6.0, 0, 1e4, "Standard deviation of its temperature coefficient. E0."),
+    ROW(ratio_tol_ppm, REAL, 250.0, 0, 1e5, "Standard deviation of Rr/RIN. E0."),
+    ROW(ratio_tc_ppm_per_k, REAL, 5.0, 0, 1e4, "Standard deviation of its temperature coefficient. E0."),
+    ROW(asymmetry_ppm, REAL, 60.0, 0, 1e5, "Standard deviation of half the difference of the two signs. E0."),
+    ROW(clock_tol_ppm, REAL, 20.0, 0, 1000, "Standard deviation of the crystal. E0."),
+    ROW(c_tol_pct, REAL, 3.0, 0, 20, "Standard deviation of the capacitor. E0."),
+    ROW(c_tc_ppm_per_k, REAL, 100.0, 0, 1e4, "Temperature coefficient of the capacitor. E0."),
+    ROW(zero_v, REAL, 200e-6, 0, 1, "Standard deviation of the zero drift, at the input. E0."),
+    ROW(zero_tc_v_per_k, REAL, 5e-6, 0, 0.01, "Standard deviation of its temperature coefficient. E0."),
+    ROW(noise_v_rthz, REAL, 5e-6, 0, 1, "White noise of the integrator, at the input, one-sided. E0."),
+    ROW(saturated_ms, REAL, 100.0, 0, 1e5, "Time without saturation after which its flag and EMCY end. E0."),
 };
 // clang-format on
 
 struct pik_profile pik_profile_default(void)
 {
-    return (struct pik_profile){
-        .name = "pik",
-        .uref_v = 10.0,
-        .rr_ohm = 10e3,
-        .rin_ohm = 20e3,
-        .clock_hz = 3480,
-        .grid = 16,
-        .recovery_ticks = 15,
-        .c_int_nf = 56.0,
-        .uc_v = 3.75,
-        .rail_v = 12.0,
-        .ra_ohm = 735.0,
-        .look_ticks = 10,
-        .latch_us = 10000,
-        .strobe_ns = 1000,
-        .strobe_min_ns = 200,
-        .latch_ns = 10000,
-        .k_error_pct = 0.15,
-        .uref_tol_ppm = 300.0,
-        .uref_tc_ppm_per_k = 6.0,
-        .ratio_tol_ppm = 250.0,
-        .ratio_tc_ppm_per_k = 5.0,
-        .asymmetry_ppm = 60.0,
-        .clock_tol_ppm = 20.0,
-        .c_tol_pct = 3.0,
-        .c_tc_ppm_per_k = 100.0,
-        .zero_v = 200e-6,
-        .zero_tc_v_per_k = 5e-6,
-        .noise_v_rthz = 5e-6,
-        .saturated_ms = 100.0,
-    };
+    struct pik_profile p = {.name = ""};
+    board_field_defaults(pik_fields, PIK_FIELDS, &p);
+    return p;
 }
 
 double pik_profile_k_hz_per_v(const struct pik_profile *p)

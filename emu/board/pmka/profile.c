@@ -2,101 +2,59 @@
 
 #include "base/why.h"
 
-#define AT(field) .offset = offsetof(struct pmka_profile, field)
-#define NS(field, low, high, text)                                                                                     \
-    {                                                                                                                  \
-        .key = #field, .type = BOARD_FIELD_UINT, AT(field), .min = (low), .max = (high), .what = (text)                \
-    }
-#define COUNT(field, low, high, text) NS(field, low, high, text)
-#define REAL(field, low, high, text)                                                                                   \
-    {                                                                                                                  \
-        .key = #field, .type = BOARD_FIELD_REAL, AT(field), .min = (low), .max = (high), .what = (text)                \
-    }
+#define NAME(standard, words) BOARD_FIELD_NAME(struct pmka_profile, standard, words)
+#define ROW(name, kind, standard, lo, hi, words)                                                                       \
+    BOARD_FIELD_ROW(struct pmka_profile, name, kind, standard, lo, hi, words)
+#define PICK(name, standard, list, words) BOARD_FIELD_PICK(struct pmka_profile, name, standard, list, words)
 
 static const char *const rotations[] = {"program", "autonomous", NULL};
 
 // clang-format off
 const struct board_field pmka_fields[PMKA_FIELDS] = {
-    {.key = "name", .type = BOARD_FIELD_STRING, AT(name), .min = 1, .max = 31, .what = "name of the profile"},
-    NS(ts_ns, 1000000, 20000000, "sample period Ts, even; a reset lasts half of it (article 3: 4.8 ms, E1)"),
-    NS(mux_step_ns, 10000, 500000, "between the sampling instants of X, Y, Z and K, one converter serves all (E0)"),
-    NS(hold_ns, 100, 100000, "time from the sampling instant to the start of conversion (E0)"),
-    NS(convert_ns, 1000, 100000, "time from the sampling instant to the code (E0)"),
-    NS(key_gap_ns, 1000, 100000, "keys move this long before and after K is sampled (E0)"),
-    NS(start_ns, 1000, 1000000000, "from Res or power-up to the first sampling instant (E0)"),
-    NS(strobe_ns, 10, 1000000, "default strobe of the parallel bus (E0)"),
-    NS(strobe_min_ns, 10, 1000000, "shortest strobe that is answered (E0)"),
-    REAL(uref_v, 1, 20, "UREF (article 3: 10 V, E1)"),
-    REAL(r_in_ohm, 1e3, 1e6, "RIN (E3: twice Rr, so that (3) and (6) hold)"),
-    REAL(rr_ohm, 1e3, 1e6, "Rr (article 3: 10 kohm, E1)"),
-    REAL(cap_f, 1e-9, 1e-5, "CINT (article 3: 0.47 uF, E1)"),
-    REAL(uc_v, 0.1, 20, "Uc of the comparators, both signs (E0: above Ur / 2 and below adc_range_v - Ur with +-20 % of CINT)"),
-    REAL(limit_v, 1, 30, "output limit of the integrators' amplifiers (E0)"),
-    REAL(adc_range_v, 1, 20, "of the converter, both signs, 2^15 codes each (article 3: 16 bits, E1; 10 V: E3, the printed quantum)"),
-    REAL(reset_asymmetry_ppm, -2000, 2000, "Rr(-) over Rr(+), beside their tolerances (E0; that it is there: E1)"),
-    REAL(cap_tol_sd, 0, 0.05, "CINT, relative (E0)"),
-    REAL(cap_tc_ppm_per_k, -1000, 1000, "CINT (E0)"),
-    REAL(cap_ageing_per_h, -0.5, 0.5, "CINT, relative to new, from power-on of the bench (E0; 0.2 in the test of drift)"),
-    REAL(r_tol_sd_ppm, 0, 500, "each RIN and Rr (E0)"),
-    REAL(r_tc_sd_ppm_per_k, 0, 10, "each RIN and Rr (E0)"),
-    REAL(uref_tol_sd_ppm, 0, 500, "UREF (E0)"),
-    REAL(uref_tc_sd_ppm_per_k, 0, 10, "UREF (E0)"),
-    REAL(zero_sd_v, 0, 100e-6, "zero of an integrator, as if at its input (E0)"),
-    REAL(zero_tc_sd_v_per_k, 0, 1e-6, "its temperature coefficient (E0)"),
-    REAL(uc_sd_v, 0, 0.1, "each comparator (E0)"),
-    REAL(adc_noise_lsb, 0, 10, "converter, rms; times the unit's adc_noise_scale (E0)"),
-    REAL(adc_offset_sd_lsb, 0, 100, "converter (E0); cancels in increments"),
-    REAL(adc_gain_sd_ppm, 0, 10000, "converter (E0); cancels against Nr"),
-    REAL(temp_noise_k, 0, 10, "thermometer, rms; times the unit's temp_noise_scale (E0)"),
-    REAL(temp_offset_sd_k, 0, 1, "thermometer (E0)"),
-    REAL(rom_ct_sd_ppm, 0, 100, "error of CT as the factory measured it (E0), beside the ROM's resolution of 0.24 ppm"),
-    {.key = "rotation", .type = BOARD_FIELD_CHOICE, AT(rotation), .choices = rotations,
-     .what = "control of the calibration after Res: the computer's program (E1) or the board itself (E0)"},
-    COUNT(beat_periods, 8, 60000, "length of a beat tau, in Ts (E0)"),
-    COUNT(zero_periods, 1, 60000, "Ts of a beat with the input at ground, for the zero (E0)"),
+    NAME("pmka", "name of the profile"),
+    ROW(ts_ns, UINT, 4800000, 1000000, 20000000, "sample period Ts, even; a reset lasts half of it (article 3: 4.8 ms, E1)"),
+    ROW(mux_step_ns, UINT, 100000, 10000, 500000, "between the sampling instants of X, Y, Z and K, one converter serves all (E0)"),
+    ROW(hold_ns, UINT, 2000, 100, 100000, "time from the sampling instant to the start of conversion (E0)"),
+    ROW(convert_ns, UINT, 50000, 1000, 100000, "time from the sampling instant to the code (E0)"),
+    ROW(key_gap_ns, UINT, 20000, 1000, 100000, "keys move this long before and after K is sampled (E0)"),
+    ROW(start_ns, UINT, 10000000, 1000, 1000000000, "from Res or power-up to the first sampling instant (E0)"),
+    ROW(strobe_ns, UINT, 800, 10, 1000000, "default strobe of the parallel bus (E0)"),
+    ROW(strobe_min_ns, UINT, 200, 10, 1000000, "shortest strobe that is answered (E0)"),
+    ROW(uref_v, REAL, 10.0, 1, 20, "UREF (article 3: 10 V, E1)"),
+    ROW(r_in_ohm, REAL, 20e3, 1e3, 1e6, "RIN (E3: twice Rr, so that (3) and (6) hold)"),
+    ROW(rr_ohm, REAL, 10e3, 1e3, 1e6, "Rr (article 3: 10 kohm, E1)"),
+    ROW(cap_f, REAL, 0.47e-6, 1e-9, 1e-5, "CINT (article 3: 0.47 uF, E1)"),
+    ROW(uc_v, REAL, 3.5, 0.1, 20, "Uc of the comparators, both signs (E0: above Ur / 2 and below adc_range_v - Ur with +-20 % of CINT)"),
+    ROW(limit_v, REAL, 12.0, 1, 30, "output limit of the integrators' amplifiers (E0)"),
+    ROW(adc_range_v, REAL, 10.0, 1, 20, "of the converter, both signs, 2^15 codes each (article 3: 16 bits, E1; 10 V: E3, the printed quantum)"),
+    ROW(reset_asymmetry_ppm, REAL, 200.0, -2000, 2000, "Rr(-) over Rr(+), beside their tolerances (E0; that it is there: E1)"),
+    ROW(cap_tol_sd, REAL, 0.01, 0, 0.05, "CINT, relative (E0)"),
+    ROW(cap_tc_ppm_per_k, REAL, -120.0, -1000, 1000, "CINT (E0)"),
+    ROW(cap_ageing_per_h, REAL, 0.0, -0.5, 0.5, "CINT, relative to new, from power-on of the bench (E0; 0.2 in the test of drift)"),
+    ROW(r_tol_sd_ppm, REAL, 100.0, 0, 500, "each RIN and Rr (E0)"),
+    ROW(r_tc_sd_ppm_per_k, REAL, 1.0, 0, 10, "each RIN and Rr (E0)"),
+    ROW(uref_tol_sd_ppm, REAL, 100.0, 0, 500, "UREF (E0)"),
+    ROW(uref_tc_sd_ppm_per_k, REAL, 1.0, 0, 10, "UREF (E0)"),
+    ROW(zero_sd_v, REAL, 50e-6, 0, 100e-6, "zero of an integrator, as if at its input (E0)"),
+    ROW(zero_tc_sd_v_per_k, REAL, 0.5e-6, 0, 1e-6, "its temperature coefficient (E0)"),
+    ROW(uc_sd_v, REAL, 0.01, 0, 0.1, "each comparator (E0)"),
+    ROW(adc_noise_lsb, REAL, 0.3, 0, 10, "converter, rms; times the unit's adc_noise_scale (E0)"),
+    ROW(adc_offset_sd_lsb, REAL, 2.0, 0, 100, "converter (E0); cancels in increments"),
+    ROW(adc_gain_sd_ppm, REAL, 200.0, 0, 10000, "converter (E0); cancels against Nr"),
+    ROW(temp_noise_k, REAL, 0.02, 0, 10, "thermometer, rms; times the unit's temp_noise_scale (E0)"),
+    ROW(temp_offset_sd_k, REAL, 0.05, 0, 1, "thermometer (E0)"),
+    ROW(rom_ct_sd_ppm, REAL, 0.2, 0, 100, "error of CT as the factory measured it (E0), beside the ROM's resolution of 0.24 ppm"),
+    PICK(rotation, PMKA_AUTONOMOUS, rotations,
+         "control of the calibration after Res: the computer's program (E1) or the board itself (E0)"),
+    ROW(beat_periods, UINT, 200, 8, 60000, "length of a beat tau, in Ts (E0)"),
+    ROW(zero_periods, UINT, 120, 1, 60000, "Ts of a beat with the input at ground, for the zero (E0)"),
 };
 // clang-format on
 
 void pmka_profile_default(void *profile)
 {
-    *(struct pmka_profile *)profile = (struct pmka_profile){
-        .name = "pmka",
-        .ts_ns = 4800000,
-        .mux_step_ns = 100000,
-        .hold_ns = 2000,
-        .convert_ns = 50000,
-        .key_gap_ns = 20000,
-        .start_ns = 10000000,
-        .strobe_ns = 800,
-        .strobe_min_ns = 200,
-        .uref_v = 10.0,
-        .r_in_ohm = 20e3,
-        .rr_ohm = 10e3,
-        .cap_f = 0.47e-6,
-        .uc_v = 3.5,
-        .limit_v = 12.0,
-        .adc_range_v = 10.0,
-        .reset_asymmetry_ppm = 200.0,
-        .cap_tol_sd = 0.01,
-        .cap_tc_ppm_per_k = -120.0,
-        .cap_ageing_per_h = 0.0,
-        .r_tol_sd_ppm = 100.0,
-        .r_tc_sd_ppm_per_k = 1.0,
-        .uref_tol_sd_ppm = 100.0,
-        .uref_tc_sd_ppm_per_k = 1.0,
-        .zero_sd_v = 50e-6,
-        .zero_tc_sd_v_per_k = 0.5e-6,
-        .uc_sd_v = 0.01,
-        .adc_noise_lsb = 0.3,
-        .adc_offset_sd_lsb = 2.0,
-        .adc_gain_sd_ppm = 200.0,
-        .temp_noise_k = 0.02,
-        .temp_offset_sd_k = 0.05,
-        .rom_ct_sd_ppm = 0.2,
-        .rotation = PMKA_AUTONOMOUS,
-        .beat_periods = 200,
-        .zero_periods = 120,
-    };
+    *(struct pmka_profile *)profile = (struct pmka_profile){.name = ""};
+    board_field_defaults(pmka_fields, PMKA_FIELDS, profile);
 }
 
 static bool check_time(const struct pmka_profile *p, char *why, size_t cap)

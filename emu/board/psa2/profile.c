@@ -87,60 +87,41 @@ static bool step_text(const void *profile, unsigned i, char *out, size_t cap)
     return true;
 }
 
-#define OFF(member) offsetof(struct psa2_profile, member)
-#define ROW(name, kind, lo, hi, words)                                                                                 \
-    {                                                                                                                  \
-        .key = #name, .type = BOARD_FIELD_##kind, .offset = OFF(name), .min = (lo), .max = (hi), .what = (words)       \
-    }
+#define NAME(standard, words) BOARD_FIELD_NAME(struct psa2_profile, standard, words)
+#define ROW(name, kind, standard, lo, hi, words)                                                                       \
+    BOARD_FIELD_ROW(struct psa2_profile, name, kind, standard, lo, hi, words)
 
 // clang-format off
 const struct board_field psa2_fields[PSA2_FIELDS] = {
-    ROW(name, STRING, 1, 31, "Name of the profile."),
-    ROW(fclk_hz, UINT, 1e6, 4.1e6, "Crystal GOCh, clock of the accelerometer converters: 4.096 MHz at most by their data sheet, and the tolerance of a crystal above it."),
-    ROW(temp_clkin_hz, UINT, 1e5, 1e7, "Clock of the temperature converter."),
-    ROW(sclk_hz, UINT, 64e3, 2.048e6, "SClk of both serial ports."),
-    ROW(line_hz, UINT, 1e5, 1e9, "The output CLK is line_hz / line_div."),
-    ROW(line_div, UINT, 1, 65536, "Divider of the output CLK."),
-    ROW(word_bits, UINT, 16, 32, "Bits of an output word: 16, 24 or 32."),
-    ROW(lead_in_clk, UINT, 0, 255, "CLK periods from the fall of INT to the first bit."),
-    {.key = "word", .type = BOARD_FIELD_LIST, .offset = OFF(word), .min = 0, .max = 3, .what = "Order of the words X, Y, Z, T, lowest address first.",
+    NAME("article", "Name of the profile."),
+    ROW(fclk_hz, UINT, 4096000, 1e6, 4.1e6, "Crystal GOCh, clock of the accelerometer converters: 4.096 MHz at most by their data sheet, and the tolerance of a crystal above it."),
+    ROW(temp_clkin_hz, UINT, 7680000, 1e5, 1e7, "Clock of the temperature converter."),
+    ROW(sclk_hz, UINT, 1024000, 64e3, 2.048e6, "SClk of both serial ports."),
+    ROW(line_hz, UINT, 2000000, 1e5, 1e9, "The output CLK is line_hz / line_div."),
+    ROW(line_div, UINT, 1, 1, 65536, "Divider of the output CLK."),
+    ROW(word_bits, UINT, 32, 16, 32, "Bits of an output word: 16, 24 or 32."),
+    ROW(lead_in_clk, UINT, 8, 0, 255, "CLK periods from the fall of INT to the first bit."),
+    {.key = "word", .type = BOARD_FIELD_LIST, .offset = offsetof(struct psa2_profile, word), .min = 0, .max = 3, .what = "Order of the words X, Y, Z, T, lowest address first.",
      .count = PSA2_WORDS, .like = "one of X, Y, Z, T", .parse = parse_word, .text = word_text},
-    ROW(code_bits, UINT, 16, 32, "Significant bits of a code in its word: 16, 24 or 32."),
-    ROW(read_bits, UINT, 24, 32, "SClk pulses of one accelerometer read: 24 or 32."),
-    ROW(gate_sclk, BOOL, 0, 1, "SClk reaches only the group addressed."),
-    ROW(temp_channels, UINT, 0, 8, "Temperature inputs scanned in turn; 0: none."),
-    ROW(adc_is_1281, BOOL, 0, 1, "ADS1281 (no gain stage) instead of ADS1282."),
-    ROW(adc_vref_v, REAL, 0.5, 5.5, "Reference of the accelerometer converters."),
-    ROW(adc_pga, UINT, 1, 64, "Gain written to CONFIG1 after the article's set-up; 1: not written."),
-    ROW(temp_vref_v, REAL, 0.5, 5.5, "Reference of the temperature converter."),
-    ROW(temp_sensor_a_per_k, REAL, 0, 1e-3, "Current of a temperature sensor per kelvin of absolute temperature."),
-    ROW(temp_load_ohm, REAL, 0, 1e6, "Load resistor RTD of a temperature sensor."),
-    {.key = "setup", .type = BOARD_FIELD_LIST, .offset = OFF(setup), .min = 1, .max = PSA2_SETUP_MAX, .what = "Transfers after Res, each on its data-ready event.",
+    ROW(code_bits, UINT, 24, 16, 32, "Significant bits of a code in its word: 16, 24 or 32."),
+    ROW(read_bits, UINT, 24, 24, 32, "SClk pulses of one accelerometer read: 24 or 32."),
+    ROW(gate_sclk, BOOL, true, 0, 1, "SClk reaches only the group addressed."),
+    ROW(temp_channels, UINT, 4, 0, 8, "Temperature inputs scanned in turn; 0: none."),
+    ROW(adc_is_1281, BOOL, false, 0, 1, "ADS1281 (no gain stage) instead of ADS1282."),
+    ROW(adc_vref_v, REAL, 5.0, 0.5, 5.5, "Reference of the accelerometer converters."),
+    ROW(adc_pga, UINT, 2, 1, 64, "Gain written to CONFIG1 after the article's set-up; 1: not written."),
+    ROW(temp_vref_v, REAL, 2.5, 0.5, 5.5, "Reference of the temperature converter."),
+    ROW(temp_sensor_a_per_k, REAL, 1e-6, 0, 1e-3, "Current of a temperature sensor per kelvin of absolute temperature."),
+    ROW(temp_load_ohm, REAL, 10e3, 0, 1e6, "Load resistor RTD of a temperature sensor."),
+    {.key = "setup", .type = BOARD_FIELD_LIST, .offset = offsetof(struct psa2_profile, setup), .min = 1, .max = PSA2_SETUP_MAX, .what = "Transfers after Res, each on its data-ready event.",
      .like = "a step such as \"DRD_A write_A 41 00 56\" or \"DRD_T sync_T\"", .parse = parse_step, .text = step_text},
 };
 // clang-format on
 
 struct psa2_profile psa2_profile_default(void)
 {
-    return (struct psa2_profile){
-        .name = "article",
-        .fclk_hz = 4096000,
-        .temp_clkin_hz = 7680000,
-        .sclk_hz = 1024000,
-        .line_hz = 2000000,
-        .line_div = 1,
-        .word_bits = 32,
-        .lead_in_clk = 8,
+    struct psa2_profile p = {
         .word = {PSA2_WORD_X, PSA2_WORD_Y, PSA2_WORD_Z, PSA2_WORD_T},
-        .code_bits = 24,
-        .read_bits = 24,
-        .gate_sclk = true,
-        .temp_channels = 4,
-        .adc_vref_v = 5.0,
-        .adc_pga = 2,
-        .temp_vref_v = 2.5,
-        .temp_sensor_a_per_k = 1e-6,
-        .temp_load_ohm = 10e3,
         .setup = {{PSA2_ON_DRD_A, PSA2_WRITE_A, {0x41, 0x00, 0x56}, 3},
                   {PSA2_ON_DRD_T, PSA2_WRITE_T, {0x50, 0x00, 0x02}, 3},
                   {PSA2_ON_DRD_T, PSA2_WRITE_T, {0x50, 0x00, 0x04}, 3},
@@ -149,6 +130,8 @@ struct psa2_profile psa2_profile_default(void)
                   {PSA2_ON_DRD_A, PSA2_SYNC_A, {0}, 0}},
         .setup_count = 6,
     };
+    board_field_defaults(psa2_fields, PSA2_FIELDS, &p);
+    return p;
 }
 
 unsigned psa2_frame_clks(const struct psa2_profile *p)

@@ -5,15 +5,10 @@
 
 #include <stdio.h>
 
-#define OFF(member) offsetof(struct psd1_profile, member)
-#define ROW(name, kind, lo, hi, words)                                                                                 \
-    {                                                                                                                  \
-        .key = #name, .type = BOARD_FIELD_##kind, .offset = OFF(name), .min = (lo), .max = (hi), .what = (words)       \
-    }
-#define PICK(name, list, words)                                                                                        \
-    {                                                                                                                  \
-        .key = #name, .type = BOARD_FIELD_CHOICE, .offset = OFF(name), .what = (words), .choices = (list)              \
-    }
+#define NAME(standard, words) BOARD_FIELD_NAME(struct psd1_profile, standard, words)
+#define ROW(name, kind, standard, lo, hi, words)                                                                       \
+    BOARD_FIELD_ROW(struct psd1_profile, name, kind, standard, lo, hi, words)
+#define PICK(name, standard, list, words) BOARD_FIELD_PICK(struct psd1_profile, name, standard, list, words)
 
 static const char *const parts[] = {"ad7712", "ad7710", "ad7711", NULL};
 static const char *const polarities[] = {"high", "low", NULL};
@@ -23,81 +18,49 @@ static const char *const int0s[] = {"auto", "host", NULL};
 
 // clang-format off
 const struct board_field psd1_fields[PSD1_FIELDS] = {
-    ROW(name, STRING, 1, 31, "Name of the profile."),
-    PICK(part, parts, "Converters of the channels."),
-    ROW(adc_clkin_hz, UINT, 8e6, 10e6, "Their clock; below 8 MHz TFS would rise too early after the last SCLK."),
-    ROW(adc_vref_v, REAL, 0.5, 5, "Reference of the converters."),
-    ROW(adc_input, UINT, 1, 2, "Input of the converters: 1 is AIN1, 2 is AIN2."),
-    ROW(adc_gain, UINT, 1, 128, "Gain of the converters: a power of two."),
-    ROW(adc_fs, UINT, 19, 2000, "Their filter's code: a word every 512 code / adc_clkin_hz seconds."),
-    PICK(dr, drs, "Line DR: DRDY of converter X, low while all are low, or low while any is."),
-    PICK(int0, int0s, "INT0 and FL1: auto, active from the set-up on; host, by register FLAGS alone."),
-    PICK(fl2, polarities, "Active level of FL2."),
-    PICK(a0_release, releases, "A0 falls with the last FL2, or where RFZ rises."),
-    ROW(rfs_access_ns, UINT, 1, 400, "From RFx to the first bit on SDAT; the part needs 4 of its clocks at most."),
-    ROW(bit_access_ns, UINT, 10, 220, "From a fall of SCLK to the next bit on SDAT; the part needs 2 clocks and 20 ns at most."),
-    ROW(drdy_rise_ns, UINT, 1, 110, "From the last fall of SCLK to DRDY high; the part needs a clock and 10 ns at most."),
-    ROW(strobe_ns, UINT, 1, 1e8, "Default length of a strobe."),
-    ROW(strobe_min_ns, UINT, 1, 1e6, "A shorter strobe is rejected."),
-    ROW(host_strobe_ns, UINT, 0, 1e8, "The built-in host reads a word this long after FL2; 0: there is no such host."),
-    ROW(late_ns, UINT, 0, 1e9, "A strobe that begins longer than this after FL2 is late."),
-    ROW(reset_ns, UINT, 1000, 1e8, "Time from power or reset to the first control word."),
-    ROW(gyro_grid_ns, UINT, 1000, 1e7, "Steps in which the laser gyros integrate."),
-    ROW(gyro_arcsec_per_count, REAL, 0.01, 1000, "Angle per count."),
-    ROW(gyro_bias_sd_degph, REAL, 0, 1000, "Standard deviation of a gyro's bias among specimens."),
-    ROW(gyro_scale_sd_ppm, REAL, 0, 1e4, "Standard deviation of the gyro's scale."),
-    ROW(gyro_arw_deg_rth, REAL, 0, 10, "Angular random walk of a gyro."),
-    ROW(rate_dps_per_code, REAL, 1e-6, 10, "Rate sensors: deg/s per code."),
-    ROW(rate_offset_sd_dps, REAL, 0, 10, "Standard deviation of the rate sensors' bias among specimens."),
-    ROW(rate_scale_sd_ppm, REAL, 0, 1e5, "Standard deviation of the rate sensors' scale."),
-    ROW(temp_k_per_code, REAL, 0.05, 10, "Thermometers: K per code."),
-    ROW(temp_offset_sd_k, REAL, 0, 10, "Standard deviation of the thermometers' offset among specimens."),
-    ROW(service_v_per_code, REAL, 1e-3, 1, "Service signals: V per code."),
-    ROW(supply_v, REAL, 0, 10, "Nominal supply of the board as the service signal shows it; with a supply in the scenario, at its volt_v."),
-    ROW(supply_sd_v, REAL, 0, 1, "Standard deviation of the supply signal's error among specimens."),
-    ROW(vref_sd_ppm, REAL, 0, 1e4, "Standard deviation of the reference's error among specimens."),
-    ROW(vref_tc_sd_ppm_per_k, REAL, 0, 1000, "Standard deviation of the reference's temperature coefficient."),
-    ROW(adc_offset_sd_v, REAL, 0, 0.1, "Standard deviation of a converter's zero before calibration, at its input."),
-    ROW(adc_gain_sd_ppm, REAL, 0, 1e5, "Standard deviation of the converter's gain."),
+    NAME("psd1", "Name of the profile."),
+    PICK(part, PSD1_AD7712, parts, "Converters of the channels."),
+    ROW(adc_clkin_hz, UINT, 10000000, 8e6, 10e6, "Their clock; below 8 MHz TFS would rise too early after the last SCLK."),
+    ROW(adc_vref_v, REAL, 2.5, 0.5, 5, "Reference of the converters."),
+    ROW(adc_input, UINT, 2, 1, 2, "Input of the converters: 1 is AIN1, 2 is AIN2."),
+    ROW(adc_gain, UINT, 1, 1, 128, "Gain of the converters: a power of two."),
+    ROW(adc_fs, UINT, 19, 19, 2000, "Their filter's code: a word every 512 code / adc_clkin_hz seconds."),
+    PICK(dr, 0, drs, "Line DR: DRDY of converter X, low while all are low, or low while any is."),
+    PICK(int0, 0, int0s, "INT0 and FL1: auto, active from the set-up on; host, by register FLAGS alone."),
+    PICK(fl2, 0, polarities, "Active level of FL2."),
+    PICK(a0_release, 0, releases, "A0 falls with the last FL2, or where RFZ rises."),
+    ROW(rfs_access_ns, UINT, 300, 1, 400, "From RFx to the first bit on SDAT; the part needs 4 of its clocks at most."),
+    ROW(bit_access_ns, UINT, 100, 10, 220, "From a fall of SCLK to the next bit on SDAT; the part needs 2 clocks and 20 ns at most."),
+    ROW(drdy_rise_ns, UINT, 100, 1, 110, "From the last fall of SCLK to DRDY high; the part needs a clock and 10 ns at most."),
+    ROW(strobe_ns, UINT, 800, 1, 1e8, "Default length of a strobe."),
+    ROW(strobe_min_ns, UINT, 200, 1, 1e6, "A shorter strobe is rejected."),
+    ROW(host_strobe_ns, UINT, 1000, 0, 1e8, "The built-in host reads a word this long after FL2; 0: there is no such host."),
+    ROW(late_ns, UINT, 20000, 0, 1e9, "A strobe that begins longer than this after FL2 is late."),
+    ROW(reset_ns, UINT, 100000, 1000, 1e8, "Time from power or reset to the first control word."),
+    ROW(gyro_grid_ns, UINT, 500000, 1000, 1e7, "Steps in which the laser gyros integrate."),
+    ROW(gyro_arcsec_per_count, REAL, 1.0, 0.01, 1000, "Angle per count."),
+    ROW(gyro_bias_sd_degph, REAL, 0.02, 0, 1000, "Standard deviation of a gyro's bias among specimens."),
+    ROW(gyro_scale_sd_ppm, REAL, 5.0, 0, 1e4, "Standard deviation of the gyro's scale."),
+    ROW(gyro_arw_deg_rth, REAL, 0.002, 0, 10, "Angular random walk of a gyro."),
+    ROW(rate_dps_per_code, REAL, 0.02, 1e-6, 10, "Rate sensors: deg/s per code."),
+    ROW(rate_offset_sd_dps, REAL, 0.02, 0, 10, "Standard deviation of the rate sensors' bias among specimens."),
+    ROW(rate_scale_sd_ppm, REAL, 1000.0, 0, 1e5, "Standard deviation of the rate sensors' scale."),
+    ROW(temp_k_per_code, REAL, 0.0625, 0.05, 10, "Thermometers: K per code."),
+    ROW(temp_offset_sd_k, REAL, 0.2, 0, 10, "Standard deviation of the thermometers' offset among specimens."),
+    ROW(service_v_per_code, REAL, 0.002, 1e-3, 1, "Service signals: V per code."),
+    ROW(supply_v, REAL, 5.0, 0, 10, "Nominal supply of the board as the service signal shows it; with a supply in the scenario, at its volt_v."),
+    ROW(supply_sd_v, REAL, 0.02, 0, 1, "Standard deviation of the supply signal's error among specimens."),
+    ROW(vref_sd_ppm, REAL, 200.0, 0, 1e4, "Standard deviation of the reference's error among specimens."),
+    ROW(vref_tc_sd_ppm_per_k, REAL, 3.0, 0, 1000, "Standard deviation of the reference's temperature coefficient."),
+    ROW(adc_offset_sd_v, REAL, 1e-3, 0, 0.1, "Standard deviation of a converter's zero before calibration, at its input."),
+    ROW(adc_gain_sd_ppm, REAL, 1000.0, 0, 1e5, "Standard deviation of the converter's gain."),
 };
 // clang-format on
 
 void psd1_profile_default(void *profile)
 {
-    *(struct psd1_profile *)profile = (struct psd1_profile){
-        .name = "psd1",
-        .part = PSD1_AD7712,
-        .adc_clkin_hz = 10000000,
-        .adc_vref_v = 2.5,
-        .adc_input = 2,
-        .adc_gain = 1,
-        .adc_fs = 19,
-        .rfs_access_ns = 300,
-        .bit_access_ns = 100,
-        .drdy_rise_ns = 100,
-        .strobe_ns = 800,
-        .strobe_min_ns = 200,
-        .host_strobe_ns = 1000,
-        .late_ns = 20000,
-        .reset_ns = 100000,
-        .gyro_grid_ns = 500000,
-        .gyro_arcsec_per_count = 1.0,
-        .gyro_bias_sd_degph = 0.02,
-        .gyro_scale_sd_ppm = 5.0,
-        .gyro_arw_deg_rth = 0.002,
-        .rate_dps_per_code = 0.02,
-        .rate_offset_sd_dps = 0.02,
-        .rate_scale_sd_ppm = 1000.0,
-        .temp_k_per_code = 0.0625,
-        .temp_offset_sd_k = 0.2,
-        .service_v_per_code = 0.002,
-        .supply_v = 5.0,
-        .supply_sd_v = 0.02,
-        .vref_sd_ppm = 200.0,
-        .vref_tc_sd_ppm_per_k = 3.0,
-        .adc_offset_sd_v = 1e-3,
-        .adc_gain_sd_ppm = 1000.0,
-    };
+    *(struct psd1_profile *)profile = (struct psd1_profile){.name = ""};
+    board_field_defaults(psd1_fields, PSD1_FIELDS, profile);
 }
 
 static unsigned gain_log2(const struct psd1_profile *p)

@@ -34,12 +34,12 @@ static bool step_text(const void *profile, unsigned i, char *out, size_t cap)
 #define OF(m) offsetof(struct profile, m)
 static const char *const modes[] = {"slow", "fast", "both", NULL};
 static const struct board_field fields[] = {
-    {.key = "name", .type = BOARD_FIELD_STRING, .offset = OF(name), .min = 1, .max = 31},
-    {.key = "count", .type = BOARD_FIELD_UINT, .offset = OF(count), .min = 2, .max = 9},
-    {.key = "gain", .type = BOARD_FIELD_REAL, .offset = OF(gain), .min = -1, .max = 1},
+    {.key = "name", .type = BOARD_FIELD_STRING, .offset = OF(name), .min = 1, .max = 31, .standard_name = "new"},
+    {.key = "count", .type = BOARD_FIELD_UINT, .offset = OF(count), .min = 2, .max = 9, .standard = 3},
+    {.key = "gain", .type = BOARD_FIELD_REAL, .offset = OF(gain), .min = -1, .max = 1, .standard = -0.5},
     {.key = "at_m", .type = BOARD_FIELD_REALS, .offset = OF(at), .min = 0, .max = 5, .count = 3},
-    {.key = "on", .type = BOARD_FIELD_BOOL, .offset = OF(on)},
-    {.key = "mode", .type = BOARD_FIELD_CHOICE, .offset = OF(mode), .choices = modes},
+    {.key = "on", .type = BOARD_FIELD_BOOL, .offset = OF(on), .standard = true},
+    {.key = "mode", .type = BOARD_FIELD_CHOICE, .offset = OF(mode), .choices = modes, .standard = 1},
     {.key = "steps", .type = BOARD_FIELD_LIST, .max = 4, .like = "a digit", .parse = parse_step, .text = step_text},
 };
 enum { FIELDS = COUNT(fields) };
@@ -148,6 +148,17 @@ static void lists_know_how_many_they_take(void **state)
     assert_null(board_field_find(fields, FIELDS, "nam"));
 }
 
+static void defaults_set_all_but_sequences(void **state)
+{
+    (void)state;
+    p.steps = 2;
+    board_field_defaults(fields, FIELDS, &p);
+    assert_string_equal(p.name, "new");
+    assert_int_equal(p.count, 3);
+    assert_true(p.gain == -0.5 && p.on && p.mode == 1);
+    assert_true(p.at[0] == 1 && p.steps == 2);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -155,6 +166,7 @@ int main(void)
         cmocka_unit_test_setup(what_is_no_such_value_is_refused_and_changes_nothing, sound),
         cmocka_unit_test_setup(a_check_finds_numbers_out_of_range_and_a_missing_name, sound),
         cmocka_unit_test_setup(lists_know_how_many_they_take, sound),
+        cmocka_unit_test_setup(defaults_set_all_but_sequences, sound),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -7,22 +7,22 @@
 
 /* ---- profile ---- */
 
-#define FIELD(key, type, min, max, what)                                                                               \
-    {                                                                                                                  \
-#key, BOARD_FIELD_##type, offsetof(struct toy_profile, key), min, max, what, 0, NULL, NULL, NULL, NULL         \
-    }
+#define NAME(standard, what) BOARD_FIELD_NAME(struct toy_profile, standard, what)
+#define ROW(key, type, standard, min, max, what)                                                                       \
+    BOARD_FIELD_ROW(struct toy_profile, key, type, standard, min, max, what)
 
 static const struct board_field fields[] = {
-    FIELD(name, STRING, 1, 31, "Name of the profile."),
-    FIELD(lsb_v, REAL, 1e-6, 1e-3, "Weight of a code. E0."),
-    FIELD(period_us, UINT, 1000, 1000000, "Period of the samples. E0."),
-    FIELD(bit_ns, UINT, 100, 4000, "Period of CLK. E0."),
+    NAME("toy", "Name of the profile."),
+    ROW(lsb_v, REAL, 320e-6, 1e-6, 1e-3, "Weight of a code. E0."),
+    ROW(period_us, UINT, 10000, 1000, 1000000, "Period of the samples. E0."),
+    ROW(bit_ns, UINT, 1000, 100, 4000, "Period of CLK. E0."),
 };
 enum { FIELDS = sizeof fields / sizeof *fields };
 
 static void set_default(void *profile)
 {
-    *(struct toy_profile *)profile = (struct toy_profile){"toy", 320e-6, 10000, 1000};
+    *(struct toy_profile *)profile = (struct toy_profile){.name = ""};
+    board_field_defaults(fields, FIELDS, profile);
 }
 
 static bool check_profile(const void *profile, char *why, size_t cap)
