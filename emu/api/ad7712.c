@@ -6,9 +6,9 @@
 
 struct part_ad7712 {
     struct psabench_part part;
-    uint32_t clkin_hz, cells_max, rfs_access_ns, bit_access_ns, drdy_rise_ns;
-    double vref_v, noise_scale, offset_v, gain_error, source_ohm;
-    bool strict_timing, strict_drdy, free_settling;
+    struct ad7712_cfg cfg; /* of the options; its channels are alike */
+    unsigned looks;        /* place in the list of cells_max */
+    double source_ohm;
     struct ad7712 chip;
 };
 
@@ -23,28 +23,29 @@ static const struct ad7712 *const_chip_of(const struct psabench_part *p)
 }
 
 #define OPTIONS(X)                                                                                                     \
-    X("clkin_hz", API_UINT, part_ad7712, clkin_hz, "10000000", 400000, 10000000, NULL, "clock at MCLK IN, Hz")         \
-    X("vref_v", API_REAL, part_ad7712, vref_v, "2.5", 0.5, 5, NULL, "REF IN(+) - REF IN(-), V; full scale at gain 1")  \
-    X("noise_scale", API_REAL, part_ad7712, noise_scale, "1", 0, 1000, NULL, "noise, 1: published, 0: none")           \
-    X("offset_v", API_REAL, part_ad7712, offset_v, "0", -1, 1, NULL,                                                   \
+    X("clkin_hz", API_UINT, part_ad7712, cfg.clkin_hz, "10000000", 400000, 10000000, NULL, "clock at MCLK IN, Hz")     \
+    X("vref_v", API_REAL, part_ad7712, cfg.vref_v, "2.5", 0.5, 5, NULL,                                                \
+      "REF IN(+) - REF IN(-), V; full scale at gain 1")                                                                \
+    X("noise_scale", API_REAL, part_ad7712, cfg.noise_scale, "1", 0, 1000, NULL, "noise, 1: published, 0: none")       \
+    X("offset_v", API_REAL, part_ad7712, cfg.offset_v[0], "0", -1, 1, NULL,                                            \
       "offset of the uncalibrated path, V, which self-calibration takes away")                                         \
-    X("gain_error", API_REAL, part_ad7712, gain_error, "0", -0.5, 0.5, NULL,                                           \
+    X("gain_error", API_REAL, part_ad7712, cfg.gain_error[0], "0", -0.5, 0.5, NULL,                                    \
       "relative gain error of the uncalibrated path, which self-calibration removes")                                  \
     X("source_ohm", API_REAL, part_ad7712, source_ohm, "0", 0, 1e9, NULL,                                              \
       "resistance behind each input, ohm: the input's capacitor and the burn-out current meet it")                     \
-    X("looks", API_CHOICE, part_ad7712, cells_max, "auto", 0, 7, "auto|1|2|4|8|16|32|64",                              \
+    X("looks", API_CHOICE, part_ad7712, looks, "auto", 0, 7, "auto|1|2|4|8|16|32|64",                                  \
       "looks at the input per output period; auto: as many as make 4 kHz, at least 4")                                 \
-    X("rfs_access_ns", API_UINT, part_ad7712, rfs_access_ns, "0", 0, 10000, NULL,                                      \
+    X("rfs_access_ns", API_UINT, part_ad7712, cfg.rfs_access_ns, "0", 0, 10000, NULL,                                  \
       "RFS low to the first bit, ns; 0: 3 periods of MCLK")                                                            \
-    X("bit_access_ns", API_UINT, part_ad7712, bit_access_ns, "0", 0, 10000, NULL,                                      \
+    X("bit_access_ns", API_UINT, part_ad7712, cfg.bit_access_ns, "0", 0, 10000, NULL,                                  \
       "SCLK fall to the next bit, ns; 0: 1 period of MCLK")                                                            \
-    X("drdy_rise_ns", API_UINT, part_ad7712, drdy_rise_ns, "0", 0, 10000, NULL,                                        \
+    X("drdy_rise_ns", API_UINT, part_ad7712, cfg.drdy_rise_ns, "0", 0, 10000, NULL,                                    \
       "last SCLK fall to DRDY high, ns; 0: 1 period of MCLK")                                                          \
-    X("strict_timing", API_BOOL, part_ad7712, strict_timing, "0", 0, 1, NULL,                                          \
+    X("strict_timing", API_BOOL, part_ad7712, cfg.strict_timing, "0", 0, 1, NULL,                                      \
       "breaches of the limits garble words and lose writes, not only count")                                           \
-    X("strict_drdy", API_BOOL, part_ad7712, strict_drdy, "0", 0, 1, NULL,                                              \
+    X("strict_drdy", API_BOOL, part_ad7712, cfg.strict_drdy, "0", 0, 1, NULL,                                          \
       "a word read while DRDY is high reads as ones, not as the old word")                                             \
-    X("free_settling", API_BOOL, part_ad7712, free_settling, "0", 0, 1, NULL,                                          \
+    X("free_settling", API_BOOL, part_ad7712, cfg.free_settling, "0", 0, 1, NULL,                                      \
       "a new channel or gain does not restart the filter")
 
 static const struct api_option options[] = {OPTIONS(API_OPTION_ROW)};
@@ -116,28 +117,19 @@ static bool open_ad7712(struct psabench_part *p, char *why, size_t cap)
 {
     (void)why;
     (void)cap;
-    const struct part_ad7712 *s = (const struct part_ad7712 *)p;
-    const struct ad7712_cfg cfg = {.part = part_of(p->kind),
-                                   .clkin_hz = s->clkin_hz,
-                                   .vref_v = s->vref_v,
-                                   .noise_scale = s->noise_scale,
-                                   .offset_v = {s->offset_v, s->offset_v},
-                                   .gain_error = {s->gain_error, s->gain_error},
-                                   .cells_max = (uint8_t)(s->cells_max ? 1u << (s->cells_max - 1) : 0),
-                                   .rfs_access_ns = (int32_t)s->rfs_access_ns,
-                                   .bit_access_ns = (int32_t)s->bit_access_ns,
-                                   .drdy_rise_ns = (int32_t)s->drdy_rise_ns,
-                                   .strict_timing = s->strict_timing,
-                                   .strict_drdy = s->strict_drdy,
-                                   .free_settling = s->free_settling};
+    struct part_ad7712 *s = (struct part_ad7712 *)p;
+    s->cfg.part = part_of(p->kind);
+    s->cfg.cells_max = (uint8_t)(s->looks ? 1u << (s->looks - 1) : 0);
+    s->cfg.offset_v[1] = s->cfg.offset_v[0];
+    s->cfg.gain_error[1] = s->cfg.gain_error[0];
     const struct ad7712_io io = {.ctx = p,
                                  .vin_v = vin_v,
                                  .source_ohm = s->source_ohm > 0.0 ? source_ohm : NULL,
                                  .drdy = api_ignore_edge,
                                  .sdata = api_ignore_edge,
                                  .sclk = api_ignore_edge};
-    ad7712_init(chip_of(p), &cfg, &io, &p->bench->sched, api_noise(p, "adc"));
-    ad7712_power_up(chip_of(p), p->bench->sched.now_ns);
+    ad7712_init(&s->chip, &s->cfg, &io, &p->bench->sched, api_noise(p, "adc"));
+    ad7712_power_up(&s->chip, p->bench->sched.now_ns);
     return true;
 }
 

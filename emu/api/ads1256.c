@@ -8,10 +8,9 @@ enum { PINS_1255 = 9, PINS = 11 };
 
 struct part_ads1256 {
     struct psabench_part part;
-    uint32_t clkin_hz, cells_max;
-    unsigned start;
-    double vref_v, avdd_v, noise_scale, offset_v, gain_error, source_ohm;
-    bool strict_timing, strict_bus, strict_cs;
+    struct ads1256_cfg cfg; /* of the options */
+    uint32_t cells_max;
+    double source_ohm;
     struct ads1256 chip;
 };
 
@@ -26,26 +25,27 @@ static const struct ads1256 *const_chip_of(const struct psabench_part *p)
 }
 
 #define OPTIONS(X)                                                                                                     \
-    X("clkin_hz", API_UINT, part_ads1256, clkin_hz, "7680000", 100000, 10000000, NULL, "clock at CLKIN, Hz")           \
-    X("start", API_CHOICE, part_ads1256, start, "clock", 0, 2, "at_once|clock|crystal",                                \
+    X("clkin_hz", API_UINT, part_ads1256, cfg.clkin_hz, "7680000", 100000, 10000000, NULL, "clock at CLKIN, Hz")       \
+    X("start", API_CHOICE, part_ads1256, cfg.start, "clock", 0, 2, "at_once|clock|crystal",                            \
       "what power-up and the end of power-down wait for: nothing, 8192 periods of a clock, 30 ms of a crystal")        \
     X("sclk_hz", API_UINT, part_ads1256, part.sclk_hz, "1000000", 1, 50000000, NULL, "SCLK of psabench_spi(), Hz")     \
-    X("vref_v", API_REAL, part_ads1256, vref_v, "2.5", 0.5, 5.5, NULL, "VREFP - VREFN, V; full scale is twice this")   \
-    X("avdd_v", API_REAL, part_ads1256, avdd_v, "5", 3, 6, NULL, "analog supply, V; the buffer passes AVDD - 2 V")     \
-    X("noise_scale", API_REAL, part_ads1256, noise_scale, "1", 0, 1000, NULL, "noise, 1: published, 0: none")          \
-    X("offset_v", API_REAL, part_ads1256, offset_v, "0", -1, 1, NULL,                                                  \
+    X("vref_v", API_REAL, part_ads1256, cfg.vref_v, "2.5", 0.5, 5.5, NULL,                                             \
+      "VREFP - VREFN, V; full scale is twice this")                                                                    \
+    X("avdd_v", API_REAL, part_ads1256, cfg.avdd_v, "5", 3, 6, NULL, "analog supply, V; the buffer passes AVDD - 2 V") \
+    X("noise_scale", API_REAL, part_ads1256, cfg.noise_scale, "1", 0, 1000, NULL, "noise, 1: published, 0: none")      \
+    X("offset_v", API_REAL, part_ads1256, cfg.offset_v, "0", -1, 1, NULL,                                              \
       "offset of the uncalibrated path, V, which self-calibration takes away")                                         \
-    X("gain_error", API_REAL, part_ads1256, gain_error, "0", -0.5, 0.5, NULL,                                          \
+    X("gain_error", API_REAL, part_ads1256, cfg.gain_error, "0", -0.5, 0.5, NULL,                                      \
       "relative gain error of the uncalibrated path, which self-calibration removes")                                  \
     X("source_ohm", API_REAL, part_ads1256, source_ohm, "0", 0, 1e9, NULL,                                             \
       "resistance behind each input, ohm: sensor-detect currents meet it, an input without buffer loads it")           \
     X("cells_max", API_UINT, part_ads1256, cells_max, "0", 0, 65535, NULL,                                             \
       "looks at the input per conversion at 500 SPS and below; 0: one a millisecond")                                  \
-    X("strict_timing", API_BOOL, part_ads1256, strict_timing, "0", 0, 1, NULL,                                         \
+    X("strict_timing", API_BOOL, part_ads1256, cfg.strict_timing, "0", 0, 1, NULL,                                     \
       "a data read inside t6 of its command gives FFh")                                                                \
-    X("strict_bus", API_BOOL, part_ads1256, strict_bus, "0", 0, 1, NULL,                                               \
+    X("strict_bus", API_BOOL, part_ads1256, cfg.strict_bus, "0", 0, 1, NULL,                                           \
       "other breaches of timing do what silicon may do, not only count")                                               \
-    X("strict_cs", API_BOOL, part_ads1256, strict_cs, "0", 0, 1, NULL, "CS high ends RDATAC")
+    X("strict_cs", API_BOOL, part_ads1256, cfg.strict_cs, "0", 0, 1, NULL, "CS high ends RDATAC")
 
 static const struct api_option options[] = {OPTIONS(API_OPTION_ROW)};
 
@@ -105,23 +105,13 @@ static bool open_ads1256(struct psabench_part *p, char *why, size_t cap)
 {
     (void)why;
     (void)cap;
-    const struct part_ads1256 *s = (const struct part_ads1256 *)p;
-    const struct ads1256_cfg cfg = {.part = p->kind == &api_ads1255 ? ADS1256_PART_1255 : ADS1256_PART_1256,
-                                    .start = (enum ads1256_start)s->start,
-                                    .clkin_hz = s->clkin_hz,
-                                    .vref_v = s->vref_v,
-                                    .avdd_v = s->avdd_v,
-                                    .noise_scale = s->noise_scale,
-                                    .offset_v = s->offset_v,
-                                    .gain_error = s->gain_error,
-                                    .cells_max = (uint16_t)s->cells_max,
-                                    .strict_timing = s->strict_timing,
-                                    .strict_bus = s->strict_bus,
-                                    .strict_cs = s->strict_cs};
+    struct part_ads1256 *s = (struct part_ads1256 *)p;
+    s->cfg.part = p->kind == &api_ads1255 ? ADS1256_PART_1255 : ADS1256_PART_1256;
+    s->cfg.cells_max = (uint16_t)s->cells_max;
     const struct ads1256_io io = {
         .ctx = p, .ain_v = ain_v, .drdy = api_ignore_edge, .source_ohm = s->source_ohm > 0.0 ? source_ohm : NULL};
-    ads1256_init(chip_of(p), &cfg, &io, &p->bench->sched, api_noise(p, "adc"));
-    ads1256_power_up(chip_of(p), p->bench->sched.now_ns);
+    ads1256_init(&s->chip, &s->cfg, &io, &p->bench->sched, api_noise(p, "adc"));
+    ads1256_power_up(&s->chip, p->bench->sched.now_ns);
     return true;
 }
 

@@ -12,10 +12,7 @@ enum mode_pin { MODE_DR0, MODE_DR1, MODE_PHS, MODE_HPF, MODE_CSYNC };
 
 struct part_ads1282 {
     struct psabench_part part;
-    uint32_t clk_hz, power_up_tclk;
-    unsigned chain;
-    double vref_v, noise_scale;
-    bool strict_sdatac, strict_gap, wreg_gap_free, strict_sync, strict_config0, cal_corrected, pin_mode;
+    struct ads1282_cfg cfg; /* of the options */
     bool m0, m1, mclk;
     struct sched_ev mclk_fall;
     unsigned mode; /* bit i: enum mode_pin i is high */
@@ -33,29 +30,29 @@ static const struct part_ads1282 *const_part_of(const struct psabench_part *p)
 }
 
 #define OPTIONS(X)                                                                                                     \
-    X("clk_hz", API_UINT, part_ads1282, clk_hz, "4096000", 1000000, 4096000, NULL, "clock at CLK, Hz")                 \
-    X("power_up_tclk", API_UINT, part_ads1282, power_up_tclk, "65536", 0, 16777216, NULL,                              \
+    X("clk_hz", API_UINT, part_ads1282, cfg.clk_hz, "4096000", 1000000, 4096000, NULL, "clock at CLK, Hz")             \
+    X("power_up_tclk", API_UINT, part_ads1282, cfg.power_up_tclk, "65536", 0, 16777216, NULL,                          \
       "internal reset after power-up and PWDN, periods of CLK")                                                        \
     X("sclk_hz", API_UINT, part_ads1282, part.sclk_hz, "1024000", 1, 50000000, NULL, "SCLK of psabench_spi(), Hz")     \
-    X("vref_v", API_REAL, part_ads1282, vref_v, "5", 0.5, 5.5, NULL, "VREFP - VREFN, V; full scale is half of it")     \
-    X("noise_scale", API_REAL, part_ads1282, noise_scale, "1", 0, 1000, NULL, "noise, 1: published, 0: none")          \
-    X("chain", API_CHOICE, part_ads1282, chain, "exact", 0, 2, "exact|modulator|direct",                               \
+    X("vref_v", API_REAL, part_ads1282, cfg.vref_v, "5", 0.5, 5.5, NULL, "VREFP - VREFN, V; full scale is half of it") \
+    X("noise_scale", API_REAL, part_ads1282, cfg.noise_scale, "1", 0, 1000, NULL, "noise, 1: published, 0: none")      \
+    X("chain", API_CHOICE, part_ads1282, cfg.chain, "exact", 0, 2, "exact|modulator|direct",                           \
       "ideal modulator and bit-true filters; bit-true modulator too; settled value at the chain's delay")              \
-    X("strict_sdatac", API_BOOL, part_ads1282, strict_sdatac, "0", 0, 1, NULL,                                         \
+    X("strict_sdatac", API_BOOL, part_ads1282, cfg.strict_sdatac, "0", 0, 1, NULL,                                     \
       "in RDATAC obeys only WAKEUP, SDATAC and RESET")                                                                 \
-    X("strict_gap", API_BOOL, part_ads1282, strict_gap, "0", 0, 1, NULL,                                               \
+    X("strict_gap", API_BOOL, part_ads1282, cfg.strict_gap, "0", 0, 1, NULL,                                           \
       "a byte sooner than 24 tCLK after a command's last is lost, and its command with it")                            \
-    X("wreg_gap_free", API_BOOL, part_ads1282, wreg_gap_free, "0", 0, 1, NULL, "the bytes of WREG need no gap")        \
-    X("strict_sync", API_BOOL, part_ads1282, strict_sync, "0", 0, 1, NULL,                                             \
+    X("wreg_gap_free", API_BOOL, part_ads1282, cfg.wreg_gap_free, "0", 0, 1, NULL, "the bytes of WREG need no gap")    \
+    X("strict_sync", API_BOOL, part_ads1282, cfg.strict_sync, "0", 0, 1, NULL,                                         \
       "limits of a SYNC pulse matter: too close to CLK it is taken late, too short by none")                           \
-    X("strict_config0", API_BOOL, part_ads1282, strict_config0, "0", 0, 1, NULL,                                       \
+    X("strict_config0", API_BOOL, part_ads1282, cfg.strict_config0, "0", 0, 1, NULL,                                   \
       "each write to CONFIG0 restarts, even one that changes nothing")                                                 \
-    X("cal_corrected", API_BOOL, part_ads1282, cal_corrected, "0", 0, 1, NULL,                                         \
+    X("cal_corrected", API_BOOL, part_ads1282, cfg.cal_corrected, "0", 0, 1, NULL,                                     \
       "OFSCAL and GANCAL measure with OFC and FSC acting")
 
 #define OPTIONS_1281(X)                                                                                                \
     OPTIONS(X)                                                                                                         \
-    X("pin_mode", API_BOOL, part_ads1282, pin_mode, "0", 0, 1, NULL,                                                   \
+    X("pin_mode", API_BOOL, part_ads1282, cfg.pin_mode, "0", 0, 1, NULL,                                               \
       "PINMODE is high: DR0 DR1 PHS HPF CSYNC instead of registers and commands")
 
 static const struct api_option options_1282[] = {OPTIONS(API_OPTION_ROW)};
@@ -78,7 +75,7 @@ static void set_mode(struct psabench_part *p, unsigned bit, bool level, int64_t 
                                            .minimum_phase = s->mode >> MODE_PHS & 1,
                                            .high_pass = s->mode >> MODE_HPF & 1,
                                            .continuous_sync = s->mode >> MODE_CSYNC & 1};
-    if (s->pin_mode) ads1282_mode_pins(&s->chip, &mode, t_ns);
+    if (s->cfg.pin_mode) ads1282_mode_pins(&s->chip, &mode, t_ns);
 }
 
 API_GET_PIN(get_drdy, part_ads1282, ads1282_drdy);
@@ -145,22 +142,10 @@ static bool open_ads1282(struct psabench_part *p, char *why, size_t cap)
     (void)why;
     (void)cap;
     struct part_ads1282 *s = (struct part_ads1282 *)p;
-    const struct ads1282_cfg cfg = {.part = p->kind == &api_ads1281 ? ADS1282_PART_1281 : ADS1282_PART_1282,
-                                    .clk_hz = s->clk_hz,
-                                    .vref_v = s->vref_v,
-                                    .noise_scale = s->noise_scale,
-                                    .strict_sdatac = s->strict_sdatac,
-                                    .strict_gap = s->strict_gap,
-                                    .wreg_gap_free = s->wreg_gap_free,
-                                    .strict_sync = s->strict_sync,
-                                    .strict_config0 = s->strict_config0,
-                                    .cal_corrected = s->cal_corrected,
-                                    .pin_mode = s->pin_mode,
-                                    .power_up_tclk = s->power_up_tclk,
-                                    .chain = (enum ads1282_chain)s->chain};
+    s->cfg.part = p->kind == &api_ads1281 ? ADS1282_PART_1281 : ADS1282_PART_1282;
     const struct ads1282_io io = {.ctx = p, .vin_v = vin_v, .mflag = api_ignore_edge, .modulator = on_modulator};
     sched_ev(&s->mclk_fall, on_mclk_fall, s);
-    ads1282_init(&s->chip, &cfg, &io, &p->bench->sched, api_noise(p, "adc"));
+    ads1282_init(&s->chip, &s->cfg, &io, &p->bench->sched, api_noise(p, "adc"));
     ads1282_power_up(&s->chip, p->bench->sched.now_ns);
     return true;
 }
