@@ -65,24 +65,14 @@ static void restart_stream(struct board_node *n)
 /* ---- the controller's serial port ---- */
 
 /* Abort codes of sources can 3.3. */
-static uint32_t abort_of(enum psa2_result result)
-{
-    switch (result) {
-    case PSA2_OK:
-        return CO_OK;
-    case PSA2_NO_SUCH_REG:
-        return CO_AB_NO_SUB;
-    case PSA2_READ_ONLY:
-        return CO_AB_READ_ONLY;
-    case PSA2_BAD_VALUE:
-        return CO_AB_VALUE;
-    case PSA2_BUSY:
-        return CO_AB_STATE;
-    case PSA2_TIMEOUT:
-        return CO_AB_TRANSFER;
-    }
-    return CO_AB_GENERAL;
-}
+static const uint32_t aborts[] = {
+    [PSA2_OK] = CO_OK,
+    [PSA2_NO_SUCH_REG] = CO_AB_NO_SUB,
+    [PSA2_READ_ONLY] = CO_AB_READ_ONLY,
+    [PSA2_BAD_VALUE] = CO_AB_VALUE,
+    [PSA2_BUSY] = CO_AB_STATE,
+    [PSA2_TIMEOUT] = CO_AB_TRANSFER,
+};
 
 static void port_fault(struct psa2_can *c, enum psa2_group group, bool active, int64_t t_ns)
 {
@@ -102,7 +92,7 @@ static void request_done(void *ctx, struct psa2_request *r, enum psa2_result res
     if (!given_up && (result == PSA2_OK || result == PSA2_TIMEOUT))
         port_fault(c, r->group, result == PSA2_TIMEOUT, t_ns);
     const struct co_value v = {.number = r->answer[c->request_axis]};
-    co_sdo_answer(&c->node.node.sdo, c->ticket, abort_of(result), &v, t_ns);
+    co_sdo_answer(&c->node.node.sdo, c->ticket, aborts[result], &v, t_ns);
     if (result == PSA2_OK && r->op != PSA2_READ_REG) recheck_stream(c, t_ns);
 }
 
@@ -118,7 +108,7 @@ static uint32_t submit_request(struct psa2_can *c, enum psa2_group group, enum p
     const enum psa2_result result = c->port.submit(c->port.ctx, &c->request, t_ns);
     if (result == PSA2_OK) return CO_PENDING;
     c->request_busy = false;
-    return abort_of(result);
+    return aborts[result];
 }
 
 static void pulse_done(void *ctx, struct psa2_request *r, enum psa2_result result, int64_t t_ns)
@@ -173,49 +163,25 @@ static uint32_t write_stream(struct board_node *n, const struct co_entry *e, con
 
 static uint32_t read_settings(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
 {
-    const struct psa2_can *c = can_of(n);
+    const struct psa2_can_settings *set = &can_of(n)->set;
     (void)t_ns;
-    switch (e->index) {
-    case PSA2_OD_FRAME_FORM:
-        v->number = c->set.form;
-        return CO_OK;
-    case PSA2_OD_SAMPLE_MODE:
-        v->number = c->set.sample_mode;
-        return CO_OK;
-    case PSA2_OD_SAMPLE_NTH:
-        v->number = c->set.nth;
-        return CO_OK;
-    case PSA2_OD_SYNC_PIN:
-        v->number = c->set.sync_pin;
-        return CO_OK;
-    case PSA2_OD_ZERO_V:
-        v->number = (double)c->set.zero_v[e->sub - 1];
-        return CO_OK;
-    case PSA2_OD_SCALE_V_PER_G:
-        v->number = (double)c->set.scale_v_per_g[e->sub - 1];
-        return CO_OK;
-    default:
-        return CO_AB_NO_OBJECT;
-    }
+    if (e->index == PSA2_OD_FRAME_FORM) v->number = set->form;
+    else if (e->index == PSA2_OD_SAMPLE_MODE) v->number = set->sample_mode;
+    else if (e->index == PSA2_OD_SAMPLE_NTH) v->number = set->nth;
+    else if (e->index == PSA2_OD_SYNC_PIN) v->number = set->sync_pin;
+    else if (e->index == PSA2_OD_ZERO_V) v->number = (double)set->zero_v[e->sub - 1];
+    else v->number = (double)set->scale_v_per_g[e->sub - 1];
+    return CO_OK;
 }
 
 static uint32_t write_plain(struct board_node *n, const struct co_entry *e, const struct co_value *v, int64_t t_ns)
 {
-    struct psa2_can *c = can_of(n);
+    struct psa2_can_settings *set = &can_of(n)->set;
     (void)t_ns;
-    switch (e->index) {
-    case PSA2_OD_SYNC_PIN:
-        c->set.sync_pin = v->number != 0.0;
-        return CO_OK;
-    case PSA2_OD_ZERO_V:
-        c->set.zero_v[e->sub - 1] = (float)v->number;
-        return CO_OK;
-    case PSA2_OD_SCALE_V_PER_G:
-        c->set.scale_v_per_g[e->sub - 1] = (float)v->number;
-        return CO_OK;
-    default:
-        return CO_AB_NO_OBJECT;
-    }
+    if (e->index == PSA2_OD_SYNC_PIN) set->sync_pin = v->number != 0.0;
+    else if (e->index == PSA2_OD_ZERO_V) set->zero_v[e->sub - 1] = (float)v->number;
+    else set->scale_v_per_g[e->sub - 1] = (float)v->number;
+    return CO_OK;
 }
 
 /* ---- registers and opcodes ---- */
@@ -303,20 +269,16 @@ static double accel_g(const struct psa2_can *c, unsigned axis)
     return (v - (double)c->set.zero_v[axis]) / (double)c->set.scale_v_per_g[axis];
 }
 
+/* In the order of proto/psabench.yaml. */
 static double frame_head(const struct psa2_frame *f, uint8_t sub)
 {
-    switch (sub) {
-    case 1:
-        return (uint16_t)f->seq;
-    case 2:
-        return (uint8_t)((f->status & 0x0F) | f->temp_channel << 4);
-    case 3:
-        return (uint16_t)((uint64_t)f->t_sample_ns / NS_PER_TICK);
-    case 4:
-        return (int16_t)f->temp_code;
-    default:
-        return (uint32_t)((uint64_t)f->t_sample_ns / NS_PER_US);
-    }
+    const double value[] = {0.0,
+                            (uint16_t)f->seq,
+                            (uint8_t)((f->status & 0x0F) | f->temp_channel << 4),
+                            (uint16_t)((uint64_t)f->t_sample_ns / NS_PER_TICK),
+                            (int16_t)f->temp_code,
+                            (uint32_t)((uint64_t)f->t_sample_ns / NS_PER_US)};
+    return value[sub];
 }
 
 static uint32_t read_latest(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
@@ -325,25 +287,11 @@ static uint32_t read_latest(struct board_node *n, const struct co_entry *e, stru
     (void)t_ns;
     const struct psa2_frame *f = &c->latest;
     const unsigned axis = (unsigned)e->sub - 1;
-    switch (e->index) {
-    case PSA2_OD_CODES:
-        v->number = axis < AXES ? f->code[axis] : (int16_t)f->temp_code;
-        return CO_OK;
-    case PSA2_OD_RAW_WORDS:
-        v->number = (int32_t)f->raw[axis];
-        return CO_OK;
-    case PSA2_OD_FRAME_HEAD:
-        v->number = frame_head(f, e->sub);
-        return CO_OK;
-    case PSA2_OD_ACCEL_G:
-        v->number = accel_g(c, axis);
-        return CO_OK;
-    case PSA2_OD_ACCEL_UG:
-        v->number = 1e6 * accel_g(c, axis);
-        return CO_OK;
-    default:
-        return CO_AB_NO_OBJECT;
-    }
+    if (e->index == PSA2_OD_CODES) v->number = axis < AXES ? f->code[axis] : (int16_t)f->temp_code;
+    else if (e->index == PSA2_OD_RAW_WORDS) v->number = (int32_t)f->raw[axis];
+    else if (e->index == PSA2_OD_FRAME_HEAD) v->number = frame_head(f, e->sub);
+    else v->number = accel_g(c, axis) * (e->index == PSA2_OD_ACCEL_UG ? 1e6 : 1.0);
+    return CO_OK;
 }
 
 /* ---- which function answers for an object ---- */
@@ -426,8 +374,7 @@ void psa2_can_init(struct psa2_can *c, const struct board_can_cfg *cfg, const st
 {
     static const struct co_device device = {.od = &psa2_od, .tpdos = PSA2_TPDOS};
     static const struct board_node_type type = {.device = &device,
-                                                .objects = objects,
-                                                .object_count = sizeof objects / sizeof *objects,
+                                                BOARD_NODE_OBJECTS(objects),
                                                 .defaults = restore_settings,
                                                 .restart = restart_stream,
                                                 .sync = on_sync,
