@@ -1,5 +1,7 @@
 #include "board/board.h"
 
+#include <stdarg.h>
+#include <stdio.h>
 #include <string.h>
 
 void board_init(struct board *b, const struct board_line *lines, unsigned count)
@@ -7,6 +9,16 @@ void board_init(struct board *b, const struct board_line *lines, unsigned count)
     memset(b, 0, sizeof *b);
     line_faults_init(&b->line, &b->trace);
     for (unsigned i = 0; i < count; i++) (void)trace_add(&b->trace, lines[i].name, lines[i].level);
+}
+
+void board_put_truth(board_truth_fn *put, void *ctx, double value, const char *name, ...)
+{
+    char text[40];
+    va_list ap;
+    va_start(ap, name);
+    (void)vsnprintf(text, sizeof text, name, ap);
+    va_end(ap);
+    put(ctx, text, value);
 }
 
 bool board_has(const struct board_type *t, const char *capability)

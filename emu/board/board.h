@@ -95,6 +95,10 @@ struct board_type {
 /* The base of a board: its trace with these lines, no faults. */
 void board_init(struct board *b, const struct board_line *lines, unsigned count);
 
+/* A hidden parameter whose name has parts: "axis_x_gyro_bias_radps". */
+__attribute__((format(printf, 4, 5))) void board_put_truth(board_truth_fn *put, void *ctx, double value,
+                                                           const char *name, ...);
+
 bool board_has(const struct board_type *t, const char *capability);
 uint32_t board_fault_bit(const struct board_type *t,
                          const char *kind);              /* of a kind controller.*; 0: it cannot have it */

@@ -170,7 +170,9 @@ static uint32_t read_serial(struct board_node *n, const struct co_entry *e, stru
 {
     (void)e;
     (void)t_ns;
-    v->number = n->type->serial(n->board);
+    uint32_t serial;
+    memcpy(&serial, (const char *)n->board + n->type->serial_at, sizeof serial);
+    v->number = serial;
     return CO_OK;
 }
 

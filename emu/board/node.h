@@ -8,10 +8,9 @@
  *
  *     struct psd1_can { struct board_node node; ...settings of its own... };     // the node first
  *     static const struct board_object objects[] = {{PSD1_OD_CODES, read_codes, NULL}, ...};
- *     static const struct board_node_type type = {.device = &psd1_device, .objects = objects,
- *                                                 .object_count = 7, .serial = serial_of, .period_ns = period_of};
- *     const struct board_can psd1_can = {.size = sizeof(struct psd1_can), .init = init, .power_up = board_node_power_up,
- *                                        .power_down = board_node_power_down, .node = board_node_co};
+ *     static const struct board_node_type type = {.device = &psd1_device, BOARD_NODE_OBJECTS(objects),
+ *                                                 .serial_at = offsetof(struct psd1, unit.serial), .period_ns = period_of};
+ *     const struct board_can psd1_can = {.size = sizeof(struct psd1_can), .init = init, BOARD_NODE_LIFE};
  *     static void init(void *can, const struct board_can_cfg *cfg, void *board, struct can_bus *bus, struct sched *s)
  *     {   board_node_init(can, &type, cfg, board, bus, s);  ((struct psd1 *)board)->reading = on_reading; ... }
  *
@@ -42,7 +41,7 @@ struct board_node_type {
     const struct co_device *device;
     const struct board_object *objects;
     unsigned object_count;
-    uint32_t (*serial)(const void *board); /* object 1018h sub 4; NULL: the board's own objects answer */
+    size_t serial_at; /* object 1018h sub 4: a uint32_t in the board's struct; 0: the board's own objects answer */
     /* Of the stream as it is set now; NULL: the board checks its stream itself and sets `fits`. */
     int64_t (*period_ns)(const void *board);
     /* After each event of the node: selects the TPDOs. NULL: all of the device, after a reset. */
@@ -80,7 +79,10 @@ struct board_node {
 void board_node_init(struct board_node *n, const struct board_node_type *type, const struct board_can_cfg *cfg,
                      void *board, struct can_bus *bus, struct sched *s);
 
+#define BOARD_NODE_OBJECTS(table) .objects = (table), .object_count = sizeof(table) / sizeof *(table)
+
 /* For struct board_can; can: a struct that begins with the node. */
+#define BOARD_NODE_LIFE .power_up = board_node_power_up, .power_down = board_node_power_down, .node = board_node_co
 void board_node_power_up(void *can, int64_t t_ns);
 void board_node_power_down(void *can);
 struct co_node *board_node_co(void *can);

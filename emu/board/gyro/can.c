@@ -241,20 +241,14 @@ static const struct board_object objects[] = {
     {GYRO_OD_LATEST, read_latest, NULL},
 };
 
-static uint32_t serial_of(const void *board)
-{
-    return ((const struct gyro *)board)->cfg.serial;
-}
-
 static int64_t period_ns(const void *board)
 {
     return ((const struct gyro *)board)->profile.step_ns;
 }
 
 static const struct board_node_type type = {.device = &gyro_device,
-                                            .objects = objects,
-                                            .object_count = sizeof objects / sizeof *objects,
-                                            .serial = serial_of,
+                                            BOARD_NODE_OBJECTS(objects),
+                                            .serial_at = offsetof(struct gyro, cfg.serial),
                                             .period_ns = period_ns,
                                             .rx_other = on_level_frame};
 
@@ -268,8 +262,4 @@ static void init_can(void *can, const struct board_can_cfg *cfg, struct board *b
     gyro_attach(b, &(struct gyro_host){.ctx = can, .reading = on_reading, .condition = on_condition});
 }
 
-const struct board_can gyro_can = {.size = sizeof(struct gyro_can),
-                                   .init = init_can,
-                                   .power_up = board_node_power_up,
-                                   .power_down = board_node_power_down,
-                                   .node = board_node_co};
+const struct board_can gyro_can = {.size = sizeof(struct gyro_can), .init = init_can, BOARD_NODE_LIFE};

@@ -14,16 +14,6 @@ static void profile_default(void *profile)
     *(struct pik_profile *)profile = pik_profile_default();
 }
 
-static bool profile_check(const void *profile, char *why, size_t cap)
-{
-    return pik_profile_check(profile, why, cap);
-}
-
-static int64_t period_ns(const void *profile)
-{
-    return pik_profile_period_ns(profile);
-}
-
 static void about(const void *profile, char *out, size_t cap)
 {
     const struct pik_profile *p = profile;
@@ -154,19 +144,14 @@ static struct afe *afe(struct board *board, unsigned axis)
 static void truth(const struct board *board, board_truth_fn *put, void *ctx)
 {
     const struct pik *b = (const struct pik *)board;
-    static const char *const plus[] = {"x_plus_hz_per_v", "y_plus_hz_per_v", "z_plus_hz_per_v"};
-    static const char *const minus[] = {"x_minus_hz_per_v", "y_minus_hz_per_v", "z_minus_hz_per_v"};
-    static const char *const tc[] = {"x_tc_ppm_per_k", "y_tc_ppm_per_k", "z_tc_ppm_per_k"};
-    static const char *const zero[] = {"x_zero_v", "y_zero_v", "z_zero_v"};
-    static const char *const zero_tc[] = {"x_zero_tc_v_per_k", "y_zero_tc_v_per_k", "z_zero_tc_v_per_k"};
-    static const char *const c_pct[] = {"x_c_pct", "y_c_pct", "z_c_pct"};
     for (unsigned i = 0; i < PIK_AXES; i++) {
-        put(ctx, plus[i], pik_true_k_hz_per_v(b, i, 1, 25.0));
-        put(ctx, minus[i], pik_true_k_hz_per_v(b, i, -1, 25.0));
-        put(ctx, tc[i], b->specimen.ratio_tc[i] - b->specimen.uref_tc);
-        put(ctx, zero[i], b->specimen.zero_v[i]);
-        put(ctx, zero_tc[i], b->specimen.zero_tc[i]);
-        put(ctx, c_pct[i], b->specimen.c_pct[i]);
+        const char axis = "xyz"[i];
+        board_put_truth(put, ctx, pik_true_k_hz_per_v(b, i, 1, 25.0), "%c_plus_hz_per_v", axis);
+        board_put_truth(put, ctx, pik_true_k_hz_per_v(b, i, -1, 25.0), "%c_minus_hz_per_v", axis);
+        board_put_truth(put, ctx, b->specimen.ratio_tc[i] - b->specimen.uref_tc, "%c_tc_ppm_per_k", axis);
+        board_put_truth(put, ctx, b->specimen.zero_v[i], "%c_zero_v", axis);
+        board_put_truth(put, ctx, b->specimen.zero_tc[i], "%c_zero_tc_v_per_k", axis);
+        board_put_truth(put, ctx, b->specimen.c_pct[i], "%c_c_pct", axis);
     }
     put(ctx, "uref_ppm", b->specimen.uref_ppm);
     put(ctx, "clock_ppm", b->specimen.clock_ppm);
@@ -222,12 +207,12 @@ const struct board_type pik_board = {
     .field_count = PIK_FIELDS,
     .profile_name = "pik",
     .profile_default = profile_default,
-    .profile_check = profile_check,
+    .profile_check = pik_profile_check,
     .about = about,
     .cfg_default = cfg_default,
     .cfg_profiled = cfg_profiled,
     .node = 8,
-    .period_ns = period_ns,
+    .period_ns = pik_profile_period_ns,
     .lines = pik_lines,
     .line_count = PIK_LINES,
     .port_lines = port_lines,

@@ -93,21 +93,10 @@ static void on_saturated(void *ctx, bool on, int64_t t_ns)
     else co_node_error_end(n, PIK_EMCY_SATURATED, t_ns);
 }
 
-static uint32_t serial_of(const void *board)
-{
-    return ((const struct pik *)board)->cfg.serial;
-}
-
-static int64_t period_ns(const void *board)
-{
-    return pik_period_ns(board);
-}
-
 static const struct board_node_type type = {.device = &pik_device,
-                                            .objects = objects,
-                                            .object_count = sizeof objects / sizeof *objects,
-                                            .serial = serial_of,
-                                            .period_ns = period_ns};
+                                            BOARD_NODE_OBJECTS(objects),
+                                            .serial_at = offsetof(struct pik, cfg.serial),
+                                            .period_ns = pik_period_ns};
 
 static void init_can(void *can, const struct board_can_cfg *cfg, struct board *board, struct can_bus *bus,
                      struct sched *s)
@@ -116,8 +105,4 @@ static void init_can(void *can, const struct board_can_cfg *cfg, struct board *b
     pik_attach((struct pik *)board, &(struct pik_host){.ctx = can, .reading = on_reading, .saturated = on_saturated});
 }
 
-const struct board_can pik_can_side = {.size = sizeof(struct pik_can),
-                                       .init = init_can,
-                                       .power_up = board_node_power_up,
-                                       .power_down = board_node_power_down,
-                                       .node = board_node_co};
+const struct board_can pik_can_side = {.size = sizeof(struct pik_can), .init = init_can, BOARD_NODE_LIFE};

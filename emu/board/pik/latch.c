@@ -3,8 +3,9 @@
 
 #define STEP_NS 100000 /* of the register PERIOD */
 
-int64_t pik_period_ns(const struct pik *b)
+int64_t pik_period_ns(const void *pik)
 {
+    const struct pik *b = pik;
     return (int64_t)b->period_100us * STEP_NS;
 }
 

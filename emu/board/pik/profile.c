@@ -75,8 +75,9 @@ double pik_profile_threshold(const struct pik_profile *p)
     return p->uc_v / pik_profile_step_v(p);
 }
 
-int64_t pik_profile_period_ns(const struct pik_profile *p)
+int64_t pik_profile_period_ns(const void *profile)
 {
+    const struct pik_profile *p = profile;
     return (int64_t)p->latch_us * 1000;
 }
 
@@ -140,8 +141,9 @@ static bool check_reading(const struct pik_profile *p, char *why, size_t cap)
     return true;
 }
 
-bool pik_profile_check(const struct pik_profile *p, char *why, size_t cap)
+bool pik_profile_check(const void *profile, char *why, size_t cap)
 {
+    const struct pik_profile *p = profile;
     const double k = pik_profile_k_hz_per_v(p);
     if (!board_field_check(pik_fields, PIK_FIELDS, p, why, cap)) return false;
     if (k > 20e3 || k < 1.0)

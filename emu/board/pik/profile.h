@@ -55,9 +55,9 @@ double pik_profile_step_v(const struct pik_profile *p);
 double pik_profile_threshold(const struct pik_profile *p);
 
 /* Between two readings by the clock; 0: none come by themselves. */
-int64_t pik_profile_period_ns(const struct pik_profile *p);
+int64_t pik_profile_period_ns(const void *profile);
 
 /* True if a board can run it; else a sentence in why that begins with the field. */
-bool pik_profile_check(const struct pik_profile *p, char *why, size_t cap);
+bool pik_profile_check(const void *profile, char *why, size_t cap);
 
 #endif

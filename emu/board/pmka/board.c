@@ -135,25 +135,17 @@ static void put_integrator(const struct pmka *b, unsigned i, board_truth_fn *put
 {
     const struct pmka_int *n = &b->channel[i].integrator;
     const double uref_v = b->specimen.uref_v + b->specimen.uref_tc_v_per_k * (b->board_degc - PMKA_NOMINAL_DEGC);
-    const struct {
-        const char *name;
-        double value;
-    } row[] = {
-        {"cap_f", n->cap_f * n->cap_left},
-        {"r_in_ohm", n->r_in_ohm},
-        {"rr_plus_ohm", n->rr_ohm[PMKA_PLUS]},
-        {"rr_minus_ohm", n->rr_ohm[PMKA_MINUS]},
-        {"zero_v", n->zero_v},
-        {"ct_plus", pmka_int_ct(&n->cfg, PMKA_PLUS, uref_v, b->profile.uref_v, b->board_degc)},
-        {"ct_minus", pmka_int_ct(&n->cfg, PMKA_MINUS, uref_v, b->profile.uref_v, b->board_degc)},
-        {"uc_plus_v", b->specimen.uc_v[i][PMKA_PLUS]},
-        {"uc_minus_v", b->specimen.uc_v[i][PMKA_MINUS]},
-    };
-    for (unsigned k = 0; k < sizeof row / sizeof *row; k++) {
-        char name[40];
-        (void)snprintf(name, sizeof name, "integrator_%s_%s", who[i], row[k].name);
-        put(ctx, name, row[k].value);
-    }
+    const double ct_plus = pmka_int_ct(&n->cfg, PMKA_PLUS, uref_v, b->profile.uref_v, b->board_degc);
+    const double ct_minus = pmka_int_ct(&n->cfg, PMKA_MINUS, uref_v, b->profile.uref_v, b->board_degc);
+    board_put_truth(put, ctx, n->cap_f * n->cap_left, "integrator_%s_cap_f", who[i]);
+    board_put_truth(put, ctx, n->r_in_ohm, "integrator_%s_r_in_ohm", who[i]);
+    board_put_truth(put, ctx, n->rr_ohm[PMKA_PLUS], "integrator_%s_rr_plus_ohm", who[i]);
+    board_put_truth(put, ctx, n->rr_ohm[PMKA_MINUS], "integrator_%s_rr_minus_ohm", who[i]);
+    board_put_truth(put, ctx, n->zero_v, "integrator_%s_zero_v", who[i]);
+    board_put_truth(put, ctx, ct_plus, "integrator_%s_ct_plus", who[i]);
+    board_put_truth(put, ctx, ct_minus, "integrator_%s_ct_minus", who[i]);
+    board_put_truth(put, ctx, b->specimen.uc_v[i][PMKA_PLUS], "integrator_%s_uc_plus_v", who[i]);
+    board_put_truth(put, ctx, b->specimen.uc_v[i][PMKA_MINUS], "integrator_%s_uc_minus_v", who[i]);
 }
 
 /* At the temperature of the present period. */
@@ -166,11 +158,8 @@ static void truth(const struct board *board, board_truth_fn *put, void *ctx)
     put(ctx, "adc_gain", b->specimen.adc_gain);
     put(ctx, "temp_offset_k", b->specimen.temp_offset_k);
     for (unsigned i = 0; i < PMKA_INTS; i++) put_integrator(b, i, put, ctx);
-    for (unsigned a = 0; a < BOARD_AXES; a++) {
-        char name[40];
-        (void)snprintf(name, sizeof name, "axis_%s_integral_vs", who[a]);
-        put(ctx, name, b->axis[a].integral_vs);
-    }
+    for (unsigned a = 0; a < BOARD_AXES; a++)
+        board_put_truth(put, ctx, b->axis[a].integral_vs, "axis_%s_integral_vs", who[a]);
 }
 
 /* ---- digest ---- */

@@ -74,20 +74,14 @@ static uint32_t read_state(struct board_node *n, const struct co_entry *e, struc
 
 static const struct board_object objects[] = {{PMKA_OD_CODES, read_code, NULL}, {PMKA_OD_STATE, read_state, NULL}};
 
-static uint32_t serial_of(const void *board)
-{
-    return ((const struct pmka *)board)->cfg.serial;
-}
-
 static int64_t period_ns(const void *board)
 {
     return ((const struct pmka *)board)->profile.ts_ns;
 }
 
 static const struct board_node_type type = {.device = &pmka_device,
-                                            .objects = objects,
-                                            .object_count = sizeof objects / sizeof *objects,
-                                            .serial = serial_of,
+                                            BOARD_NODE_OBJECTS(objects),
+                                            .serial_at = offsetof(struct pmka, cfg.serial),
                                             .period_ns = period_ns};
 
 static void init_can(void *can, const struct board_can_cfg *cfg, struct board *board, struct can_bus *bus,
@@ -97,8 +91,4 @@ static void init_can(void *can, const struct board_can_cfg *cfg, struct board *b
     pmka_attach((struct pmka *)board, &(struct pmka_host){.ctx = can, .reading = on_reading});
 }
 
-const struct board_can pmka_can = {.size = sizeof(struct pmka_can),
-                                   .init = init_can,
-                                   .power_up = board_node_power_up,
-                                   .power_down = board_node_power_down,
-                                   .node = board_node_co};
+const struct board_can pmka_can = {.size = sizeof(struct pmka_can), .init = init_can, BOARD_NODE_LIFE};

@@ -14,16 +14,6 @@ static void profile_default(void *profile)
     *(struct psa2_profile *)profile = psa2_profile_default();
 }
 
-static bool profile_check(const void *profile, char *why, size_t cap)
-{
-    return psa2_profile_check(profile, why, cap);
-}
-
-static int64_t period_ns(const void *profile)
-{
-    return psa2_profile_period_ns(profile);
-}
-
 static void about(const void *profile, char *out, size_t cap)
 {
     const struct psa2_profile *p = profile;
@@ -192,12 +182,12 @@ const struct board_type psa2_board = {
     .field_count = PSA2_FIELDS,
     .profile_name = "article",
     .profile_default = profile_default,
-    .profile_check = profile_check,
+    .profile_check = psa2_profile_check,
     .about = about,
     .capabilities = capabilities,
     .node = 5,
     .frame_forms = 4,
-    .period_ns = period_ns,
+    .period_ns = psa2_profile_period_ns,
     .lines = psa2_lines,
     .line_count = PSA2_LINES,
     .port_lines = port_lines,

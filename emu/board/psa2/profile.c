@@ -161,8 +161,9 @@ static uint8_t config0_of(const struct psa2_profile *p)
 }
 
 /* DR is in bits 5..3 of CONFIG0, FILTR in bits 1..0 (sources 1.2). */
-int64_t psa2_profile_period_ns(const struct psa2_profile *p)
+int64_t psa2_profile_period_ns(const void *profile)
 {
+    const struct psa2_profile *p = profile;
     const uint8_t config0 = config0_of(p);
     const unsigned dr = config0 >> 3 & 7u;
     const unsigned fmod_periods = dr > 4 ? 256 : 4096u >> dr;
@@ -279,8 +280,9 @@ static bool check_times(const struct psa2_profile *p, char *why, size_t cap)
                     1e-3 * (double)low_ns, 1e-3 * (double)(read_ns + low_ns));
 }
 
-bool psa2_profile_check(const struct psa2_profile *p, char *why, size_t cap)
+bool psa2_profile_check(const void *profile, char *why, size_t cap)
 {
+    const struct psa2_profile *p = profile;
     return board_field_check(psa2_fields, PSA2_FIELDS, p, why, cap) && check_words(p, why, cap) &&
            check_setup(p, why, cap) && check_mode(p, why, cap) && check_sclk(p, why, cap) && check_gain(p, why, cap) &&
            check_int_low(p, why, cap) && check_times(p, why, cap);

@@ -73,9 +73,9 @@ unsigned psa2_frame_clks(const struct psa2_profile *p);
 int64_t psa2_int_low_ns(const struct psa2_profile *p);
 
 /* Data period of the accelerometer converters, ns, by the last CONFIG0 the set-up writes (reset value: 1000 SPS). */
-int64_t psa2_profile_period_ns(const struct psa2_profile *p);
+int64_t psa2_profile_period_ns(const void *profile);
 
 /* True if a board can run it; else a sentence in why (what, where, what would be right, with the arithmetic). */
-bool psa2_profile_check(const struct psa2_profile *p, char *why, size_t cap);
+bool psa2_profile_check(const void *profile, char *why, size_t cap);
 
 #endif

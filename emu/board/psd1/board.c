@@ -117,20 +117,14 @@ static void put_axis(const struct psd1 *b, unsigned i, board_truth_fn *put, void
     const struct psd1_gyro *g = &b->gyros.axis[i];
     const struct ad7712_cfg *a = &b->adc[i].cfg;
     const unsigned input = b->profile.adc_input - 1;
-    const struct {
-        const char *name;
-        double value;
-    } row[] = {
-        {"adc_offset_v", a->offset_v[input]}, {"adc_gain_error", a->gain_error[input]},
-        {"gyro_bias_radps", g->bias_radps},   {"gyro_scale", g->scale},
-        {"gyro_angle_rad", g->angle_rad},     {"rate_offset_radps", g->rate_offset_radps},
-        {"rate_scale", g->rate_scale},
-    };
-    for (unsigned k = 0; k < sizeof row / sizeof *row; k++) {
-        char name[40];
-        (void)snprintf(name, sizeof name, "axis_%c_%s", "xyz"[i], row[k].name);
-        put(ctx, name, row[k].value);
-    }
+    const char axis = "xyz"[i];
+    board_put_truth(put, ctx, a->offset_v[input], "axis_%c_adc_offset_v", axis);
+    board_put_truth(put, ctx, a->gain_error[input], "axis_%c_adc_gain_error", axis);
+    board_put_truth(put, ctx, g->bias_radps, "axis_%c_gyro_bias_radps", axis);
+    board_put_truth(put, ctx, g->scale, "axis_%c_gyro_scale", axis);
+    board_put_truth(put, ctx, g->angle_rad, "axis_%c_gyro_angle_rad", axis);
+    board_put_truth(put, ctx, g->rate_offset_radps, "axis_%c_rate_offset_radps", axis);
+    board_put_truth(put, ctx, g->rate_scale, "axis_%c_rate_scale", axis);
 }
 
 static void truth(const struct board *board, board_truth_fn *put, void *ctx)
@@ -140,11 +134,7 @@ static void truth(const struct board *board, board_truth_fn *put, void *ctx)
     put(ctx, "vref_tc_per_k", b->vref_tc_per_k);
     put(ctx, "supply_v", b->supply_v);
     for (unsigned i = 0; i < 3; i++) put_axis(b, i, put, ctx);
-    for (unsigned i = 0; i < 4; i++) {
-        char name[40];
-        (void)snprintf(name, sizeof name, "temp_offset_%c_k", "xyzb"[i]);
-        put(ctx, name, b->temp_offset_k[i]);
-    }
+    for (unsigned i = 0; i < 4; i++) board_put_truth(put, ctx, b->temp_offset_k[i], "temp_offset_%c_k", "xyzb"[i]);
 }
 
 /* ---- digest ---- */

@@ -165,20 +165,14 @@ static const struct board_object objects[] = {
     {PSD1_OD_GYRO_LOW, read_stored, NULL},  {PSD1_OD_RATE, read_stored, NULL},
 };
 
-static uint32_t serial_of(const void *board)
-{
-    return ((const struct psd1 *)board)->unit.serial;
-}
-
 static int64_t period_ns(const void *board)
 {
     return ad7712_period_ns(&((const struct psd1 *)board)->adc[0]);
 }
 
 static const struct board_node_type type = {.device = &psd1_device,
-                                            .objects = objects,
-                                            .object_count = sizeof objects / sizeof objects[0],
-                                            .serial = serial_of,
+                                            BOARD_NODE_OBJECTS(objects),
+                                            .serial_at = offsetof(struct psd1, unit.serial),
                                             .period_ns = period_ns};
 
 static void init_can(void *can, const struct board_can_cfg *cfg, struct board *board, struct can_bus *bus,
@@ -191,8 +185,4 @@ static void init_can(void *can, const struct board_can_cfg *cfg, struct board *b
     psd1_attach(b, &(struct psd1_host){.ctx = can, .cycle = on_cycle, .fault = on_fault});
 }
 
-const struct board_can psd1_can = {.size = sizeof(struct psd1_can),
-                                   .init = init_can,
-                                   .power_up = board_node_power_up,
-                                   .power_down = board_node_power_down,
-                                   .node = board_node_co};
+const struct board_can psd1_can = {.size = sizeof(struct psd1_can), .init = init_can, BOARD_NODE_LIFE};

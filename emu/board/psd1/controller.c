@@ -1,5 +1,6 @@
 #include "board/psd1/psd1.h"
 
+#include "board/bus_lines.h"
 #include "board/psd1/internal.h"
 
 #include <assert.h>
@@ -163,9 +164,7 @@ static double vin_v(void *ctx, unsigned channel, int64_t t_ns)
 const struct board_line psd1_lines[PSD1_LINES] = {
     {"A0", false}, {"INT0", false}, {"FL1", true}, {"FL2", false}, {"DR", true}, {"RFX", true}, {"RFY", true}, {"RFZ", true},
     {"TFS", true}, {"SCLK", false}, {"SDAT", false}, {"CLK_1M25", false}, {"CS", true}, {"RW", true},
-    {"AB0", false}, {"AB1", false}, {"AB2", false}, {"AB3", false},
-    {"D0", false}, {"D1", false}, {"D2", false}, {"D3", false}, {"D4", false}, {"D5", false}, {"D6", false}, {"D7", false},
-    {"D8", false}, {"D9", false}, {"D10", false}, {"D11", false}, {"D12", false}, {"D13", false}, {"D14", false}, {"D15", false},
+    BUS_LINES_AB(PSD1_LINE_AB0), BUS_LINES_D(PSD1_LINE_D0),
 };
 // clang-format on
 

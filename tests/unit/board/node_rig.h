@@ -18,6 +18,7 @@ struct fake {
     struct board_cycle *cycle;
     unsigned submits, resets;
     int64_t period_ns;
+    uint32_t serial;
 };
 
 struct rig {
@@ -57,12 +58,6 @@ static inline void fake_reset(struct board *board, int64_t t_ns)
     f->resets++;
     f->cycle = NULL;
     if (c) c->done(c->ctx, c, BOARD_CYCLE_OFF, t_ns);
-}
-
-static inline uint32_t fake_serial(const void *board)
-{
-    (void)board;
-    return 4711;
 }
 
 static inline int64_t fake_period(const void *board)
@@ -161,7 +156,7 @@ static inline struct rig *rig_of_device(const struct co_device *d, uint32_t bitr
     type = (struct board_node_type){.device = d,
                                     .objects = own,
                                     .object_count = sizeof own / sizeof own[0],
-                                    .serial = fake_serial,
+                                    .serial_at = offsetof(struct fake, serial),
                                     .period_ns = fake_period,
                                     .defaults = on_defaults,
                                     .sync = on_sync,
@@ -171,6 +166,7 @@ static inline struct rig *rig_of_device(const struct co_device *d, uint32_t bitr
     r->host = (struct can_node){.name = "host", .rx = on_rx, .ctx = r};
     can_attach(&r->bus, &r->host);
     r->board.period_ns = NS_PER_S / 1000;
+    r->board.serial = 4711;
     const struct board_can_cfg cfg = {.name = "unit", .type = &board, .node_id = NODE, .refused = on_refused, .ctx = r};
     board_node_init(&r->can, &type, &cfg, &r->board, &r->bus, &r->s);
     board_node_power_up(&r->can, 0);

@@ -43,11 +43,6 @@ static void send_sample(void *can, const struct toy_sample *s, int64_t t_ns)
     board_node_stream(can, TOY_SAMPLE_TPDO, &m, 1, t_ns);
 }
 
-static uint32_t serial_of(const void *board)
-{
-    return ((const struct toy *)board)->cfg.serial;
-}
-
 static int64_t period_ns(const void *board)
 {
     return toy_period_ns(&((const struct toy *)board)->profile);
@@ -55,9 +50,8 @@ static int64_t period_ns(const void *board)
 
 static const struct board_node_type type = {
     .device = &toy_device,
-    .objects = objects,
-    .object_count = sizeof objects / sizeof *objects,
-    .serial = serial_of,
+    BOARD_NODE_OBJECTS(objects),
+    .serial_at = offsetof(struct toy, cfg.serial),
     .period_ns = period_ns,
 };
 
@@ -73,7 +67,5 @@ static void init_can(void *can, const struct board_can_cfg *cfg, struct board *b
 const struct board_can toy_can = {
     .size = sizeof(struct toy_can),
     .init = init_can,
-    .power_up = board_node_power_up,
-    .power_down = board_node_power_down,
-    .node = board_node_co,
+    BOARD_NODE_LIFE,
 };
