@@ -49,7 +49,8 @@ static void heartbeat_due(void *ctx, int64_t t_ns)
 
 /* ---- emergency ---- */
 
-uint8_t co_node_error_register(const struct co_node *n)
+/* Bits of 1001h. */
+static uint8_t error_register(const struct co_node *n)
 {
     uint8_t reg = 0;
     for (unsigned i = 0; i < CO_ERRORS_MAX; i++) {
@@ -79,7 +80,7 @@ static void send_emcy(struct co_node *n, uint16_t code, uint8_t source, int64_t 
     if (n->state != CO_OPERATIONAL && n->state != CO_PRE_OPERATIONAL) return;
     uint8_t data[8];
     bits_put_le(data, code, 2);
-    data[2] = co_node_error_register(n);
+    data[2] = error_register(n);
     data[3] = source;
     bits_put_le(&data[4], (uint64_t)(t_ns / NS_PER_US), 4);
     send_frame(n, (uint32_t)ID_EMCY + n->cfg.id, data, sizeof data, t_ns);
@@ -107,7 +108,7 @@ void co_node_error_end(struct co_node *n, uint16_t code, int64_t t_ns)
     struct co_error *e = code ? find_error(n, code) : NULL;
     if (!e) return;
     *e = (struct co_error){0};
-    if (co_node_error_register(n) == 0) send_emcy(n, 0, 0, t_ns);
+    if (error_register(n) == 0) send_emcy(n, 0, 0, t_ns);
 }
 
 /* CiA 301, table 26, which has no code for error warning: error-passive ends there. In bus-off the messages wait in the
@@ -141,7 +142,7 @@ static uint32_t read_object(void *ctx, const struct co_entry *e, struct co_value
     if (e->index >= TPDO_FIRST && e->index <= TPDO_LAST) return co_pdo_read(n, e, v);
     switch (e->index) {
     case ERROR_REGISTER:
-        v->number = co_node_error_register(n);
+        v->number = error_register(n);
         return CO_OK;
     case ERROR_HISTORY:
         return read_history(n, e->sub, v);
@@ -202,7 +203,8 @@ static void reset_communication(struct co_node *n)
     co_pdo_reset(n);
 }
 
-void co_node_reset(struct co_node *n, enum co_event what, int64_t t_ns)
+/* As the NMT command; reset node resets the application through io.event first. */
+static void reset_node(struct co_node *n, enum co_event what, int64_t t_ns)
 {
     n->state = CO_INITIALISING;
     reset_communication(n);
@@ -230,10 +232,10 @@ static void on_nmt(struct co_node *n, const struct can_msg *m, int64_t t_ns)
         enter_state(n, CO_PRE_OPERATIONAL, t_ns);
         return;
     case NMT_RESET_NODE:
-        co_node_reset(n, CO_EV_RESET_NODE, t_ns);
+        reset_node(n, CO_EV_RESET_NODE, t_ns);
         return;
     case NMT_RESET_COMM:
-        co_node_reset(n, CO_EV_RESET_COMM, t_ns);
+        reset_node(n, CO_EV_RESET_COMM, t_ns);
         return;
     default:
         n->malformed++;
@@ -295,7 +297,7 @@ void co_node_power_up(struct co_node *n, int64_t t_ns)
 {
     can_attach(n->bus, &n->services);
     can_attach(n->bus, &n->stream);
-    co_node_reset(n, CO_EV_RESET_COMM, t_ns);
+    reset_node(n, CO_EV_RESET_COMM, t_ns);
 }
 
 void co_node_power_down(struct co_node *n)

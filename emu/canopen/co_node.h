@@ -80,9 +80,6 @@ void co_node_init(struct co_node *n, const struct co_node_cfg *cfg, const struct
 void co_node_power_up(struct co_node *n, int64_t t_ns);
 void co_node_power_down(struct co_node *n);
 
-/* Same as the NMT command; reset node resets the application through io.event first. */
-void co_node_reset(struct co_node *n, enum co_event what, int64_t t_ns);
-
 /* An error begins: 1001h, 1003h, EMCY (not in stopped) with five bytes source and time in us. An active error is not
  * reported again. */
 void co_node_error(struct co_node *n, uint16_t code, uint8_t reg, uint8_t source, int64_t t_ns);
@@ -90,8 +87,5 @@ void co_node_error(struct co_node *n, uint16_t code, uint8_t reg, uint8_t source
 /* The error ends, if it was active; the last one to end sends EMCY 0000h. */
 void co_node_error_end(struct co_node *n, uint16_t code, int64_t t_ns);
 bool co_node_has_error(const struct co_node *n, uint16_t code);
-
-/* Bits of 1001h. */
-uint8_t co_node_error_register(const struct co_node *n);
 
 #endif

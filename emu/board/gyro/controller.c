@@ -29,7 +29,7 @@ const char *const gyro_events[GYRO_EVENTS] = {
 
 /* ---- settings ---- */
 
-struct gyro_settings gyro_settings_default(void)
+static struct gyro_settings default_settings(void)
 {
     return (struct gyro_settings){
         .slew_dps = 9.0,
@@ -219,7 +219,7 @@ void gyro_attach(struct gyro *b, const struct gyro_host *host)
 static void reset_state(struct gyro *b, int64_t t_ns)
 {
     b->ready = false;
-    b->set = gyro_settings_default();
+    b->set = default_settings();
     gyro_settings_changed(b);
     b->inlet = (struct gyro_inlet){.any = false};
     b->level = gyro_level_of(0.0, 0.0);

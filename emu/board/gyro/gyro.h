@@ -114,8 +114,6 @@ void gyro_sample_until(struct gyro *b, int64_t t_ns);
 /* A frame of the level unit. */
 void gyro_take_level(struct gyro *b, int32_t x_lsb, int32_t y_lsb, uint16_t seq, int64_t t_ns);
 
-struct gyro_settings gyro_settings_default(void);
-
 /* Takes over what was written to set. */
 void gyro_settings_changed(struct gyro *b);
 

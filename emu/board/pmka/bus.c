@@ -12,46 +12,42 @@ enum { STATUS_FRESH = 1, STATUS_OVERRUN = 2, STATUS_SATURATED = 4, STATUS_CLIPPE
 
 /* ---- reading ---- */
 
-static uint16_t read_code(struct pmka *b, unsigned address)
+static uint16_t read_code(struct pmka *b)
 {
+    const unsigned address = b->bus.cycle->address;
     if (address == PMKA_K) b->bus.fresh = false; /* the last of them */
     return (uint16_t)b->latest.code[address];
 }
 
 /* Two bits an integrator: 1 positive, 3 negative. */
-static uint16_t read_resets(struct pmka *b, unsigned address)
+static uint16_t read_resets(struct pmka *b)
 {
     unsigned word = 0;
-    (void)address;
     for (unsigned i = 0; i < PMKA_INTS; i++) word |= ((unsigned)b->latest.reset[i] & 3u) << (2 * i);
     return (uint16_t)word;
 }
 
-static uint16_t read_rotation(struct pmka *b, unsigned address)
+static uint16_t read_rotation(struct pmka *b)
 {
     const struct pmka_reading *r = &b->latest;
     unsigned word = (unsigned)r->tau << 8 | (unsigned)r->cal << 12;
-    (void)address;
     for (unsigned i = 0; i < PMKA_INTS; i++) word |= (unsigned)r->serves[i] << (2 * i);
     return (uint16_t)word;
 }
 
-static uint16_t read_seq(struct pmka *b, unsigned address)
+static uint16_t read_seq(struct pmka *b)
 {
-    (void)address;
     return (uint16_t)b->latest.seq;
 }
 
-static uint16_t read_temp(struct pmka *b, unsigned address)
+static uint16_t read_temp(struct pmka *b)
 {
-    (void)address;
     return (uint16_t)b->latest.temp_code;
 }
 
-static uint16_t read_status(struct pmka *b, unsigned address)
+static uint16_t read_status(struct pmka *b)
 {
     unsigned word = b->bus.fresh ? STATUS_FRESH : 0u;
-    (void)address;
     if (b->bus.overrun) word |= STATUS_OVERRUN;
     for (unsigned i = 0; i < PMKA_INTS; i++) {
         if (b->latest.saturated[i]) word |= STATUS_SATURATED;
@@ -62,34 +58,29 @@ static uint16_t read_status(struct pmka *b, unsigned address)
     return (uint16_t)word;
 }
 
-static uint16_t read_mode(struct pmka *b, unsigned address)
+static uint16_t read_mode(struct pmka *b)
 {
-    (void)address;
     return (uint16_t)b->rotation.mode;
 }
 
-static uint16_t read_beat(struct pmka *b, unsigned address)
+static uint16_t read_beat(struct pmka *b)
 {
-    (void)address;
     return (uint16_t)b->rotation.beat_periods;
 }
 
-static uint16_t read_zero(struct pmka *b, unsigned address)
+static uint16_t read_zero(struct pmka *b)
 {
-    (void)address;
     return (uint16_t)b->rotation.zero_periods;
 }
 
-static uint16_t read_index(struct pmka *b, unsigned address)
+static uint16_t read_index(struct pmka *b)
 {
-    (void)address;
     return b->bus.index;
 }
 
-static uint16_t read_data(struct pmka *b, unsigned address)
+static uint16_t read_data(struct pmka *b)
 {
     const unsigned index = b->bus.index;
-    (void)address;
     if (index >= INDEX_ROM) return b->rom[index - INDEX_ROM];
     return (uint16_t)b->channel[index / 2].count[index % 2];
 }
@@ -132,8 +123,8 @@ static bool write_index(struct pmka *b, uint16_t word)
 }
 
 static const struct {
-    const char *name; /* NULL: nothing answers */
-    uint16_t (*read)(struct pmka *b, unsigned address);
+    const char *name;                 /* NULL: nothing answers */
+    uint16_t (*read)(struct pmka *b); /* b->bus.cycle has its address */
     bool (*write)(struct pmka *b, uint16_t word);
     bool of_reading; /* there is nothing before the first */
 } registers[PMKA_ADDRESSES] = {
@@ -208,7 +199,7 @@ enum board_cycle_result pmka_submit(struct pmka *b, struct board_cycle *c, int64
         return r;
     }
     b->bus.cycle = c;
-    if (!c->write) b->bus.answer = registers[c->address].read(b, c->address);
+    if (!c->write) b->bus.answer = registers[c->address].read(b);
     bus_lines_begin(&b->base.trace, &bus_lines, c, c->write ? c->data : b->bus.answer, t_ns);
     sched_at(b->sched, &b->bus.end, t_ns + (c->strobe_ns ? c->strobe_ns : b->profile.strobe_ns));
     return BOARD_CYCLE_OK;

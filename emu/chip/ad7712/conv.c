@@ -35,7 +35,7 @@ static enum phase first_phase(const struct ad7712 *a)
     return first[ad7712_md(a)];
 }
 
-void ad7712_set_drdy(struct ad7712 *a, bool level, int64_t t_ns)
+static void set_drdy(struct ad7712 *a, bool level, int64_t t_ns)
 {
     sched_cancel(a->sched, &a->rise_ev);
     if (level == a->drdy) return;
@@ -45,7 +45,7 @@ void ad7712_set_drdy(struct ad7712 *a, bool level, int64_t t_ns)
 
 static void on_rise(void *ctx, int64_t t_ns)
 {
-    ad7712_set_drdy(ctx, true, t_ns);
+    set_drdy(ctx, true, t_ns);
 }
 
 static unsigned code_of(const struct ad7712 *a)
@@ -148,7 +148,7 @@ void ad7712_freeze(struct ad7712 *a, enum ad7712_state state, int64_t t_ns)
     cancel_events(a);
     a->state = state;
     a->unread = false;
-    ad7712_set_drdy(a, true, t_ns);
+    set_drdy(a, true, t_ns);
 }
 
 void ad7712_start(struct ad7712 *a, int64_t t_ns)
@@ -190,7 +190,7 @@ static void put_word(struct ad7712 *a, uint32_t word, int64_t t_ns)
     a->port.reading = false;
     a->word = word;
     a->unread = true;
-    ad7712_set_drdy(a, false, t_ns);
+    set_drdy(a, false, t_ns);
 }
 
 static void use_word(struct ad7712 *a, double x, int64_t t_ns)
@@ -244,7 +244,7 @@ static void on_ready(void *ctx, int64_t t_ns)
 static void on_pulse(void *ctx, int64_t t_ns)
 {
     struct ad7712 *a = ctx;
-    if (a->port.rfs) ad7712_set_drdy(a, true, t_ns);
+    if (a->port.rfs) set_drdy(a, true, t_ns);
 }
 
 void ad7712_word_read(struct ad7712 *a)

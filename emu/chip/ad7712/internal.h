@@ -51,7 +51,6 @@ void ad7712_follow_pins(struct ad7712 *a, int64_t t_ns); /* SYNC, STANDBY or PD 
 void ad7712_port_init(struct ad7712 *a);
 void ad7712_port_forget(struct ad7712 *a, int64_t t_ns); /* frames, what waits to be stored; SDATA to high impedance */
 bool ad7712_deaf(const struct ad7712 *a);                /* no supplies, or STANDBY low */
-void ad7712_show(struct ad7712 *a, bool driven, bool level, int64_t at_ns, int64_t t_ns); /* SDATA from at_ns on */
 void ad7712_begin_read(struct ad7712 *a, int64_t t_ns);
 void ad7712_end_read(struct ad7712 *a, int64_t t_ns);
 void ad7712_begin_write(struct ad7712 *a, int64_t t_ns);
@@ -76,7 +75,6 @@ double ad7712_attenuation(const struct ad7712 *a, unsigned channel);
 /* ---- ad7712/conv.c ---- */
 
 void ad7712_conv_init(struct ad7712 *a);
-void ad7712_set_drdy(struct ad7712 *a, bool level, int64_t t_ns);
 void ad7712_freeze(struct ad7712 *a, enum ad7712_state state, int64_t t_ns); /* stops whatever runs; DRDY goes high */
 void ad7712_start(struct ad7712 *a, int64_t t_ns);              /* what MD says, from the next CLKIN edge on */
 void ad7712_restart(struct ad7712 *a, int64_t t_ns);            /* the same from the next modulator edge on */

@@ -21,7 +21,7 @@ int64_t ad7712_bit_access_ns(const struct ad7712 *a)
 }
 
 /* One change may be on its way. A later one takes its place: a bit that the clock did not wait for never appears. */
-void ad7712_show(struct ad7712 *a, bool driven, bool level, int64_t at_ns, int64_t t_ns)
+static void show_sdata(struct ad7712 *a, bool driven, bool level, int64_t at_ns, int64_t t_ns)
 {
     struct ad7712_port *p = &a->port;
     if (p->change_ns <= t_ns) {
@@ -75,7 +75,7 @@ void ad7712_begin_read(struct ad7712 *a, int64_t t_ns)
     if (!p->reading) choose_source(a); /* else it goes on where RFS interrupted it */
     p->reading = true;
     p->clocked = false;
-    ad7712_show(a, true, bit_out(a), t_ns + delay_ns(a, a->cfg.rfs_access_ns, 3), t_ns);
+    show_sdata(a, true, bit_out(a), t_ns + delay_ns(a, a->cfg.rfs_access_ns, 3), t_ns);
     if (p->mode) ad7712_own_clock(a, t_ns);
 }
 
@@ -86,7 +86,7 @@ void ad7712_end_read(struct ad7712 *a, int64_t t_ns)
     if (!p->reading) return;
     count_violation(a, t_ns - p->fall_ns < RFS_NS, &a->n.frame_violations);
     p->reading = p->index > 0 && p->index < p->width;
-    ad7712_show(a, false, false, t_ns + ad7712_tau_ns(a, HIZ_TAU), t_ns);
+    show_sdata(a, false, false, t_ns + ad7712_tau_ns(a, HIZ_TAU), t_ns);
 }
 
 static void on_load(void *ctx, int64_t t_ns)
@@ -159,7 +159,7 @@ static void shift_out(struct ad7712 *a, int64_t t_ns)
         return;
     }
     p->index++;
-    ad7712_show(a, true, bit_out(a), t_ns + ad7712_bit_access_ns(a), t_ns);
+    show_sdata(a, true, bit_out(a), t_ns + ad7712_bit_access_ns(a), t_ns);
     if (p->index == p->width) ad7712_word_over(a, t_ns);
 }
 
@@ -213,7 +213,7 @@ void ad7712_port_forget(struct ad7712 *a, int64_t t_ns)
     a->n.dropped += p->writing;
     p->reading = p->writing = p->clocked = p->garbled = false;
     p->index = p->width = 0;
-    if (ad7712_sdata_driven(a, t_ns) || p->driven_next) ad7712_show(a, false, false, t_ns, t_ns);
+    if (ad7712_sdata_driven(a, t_ns) || p->driven_next) show_sdata(a, false, false, t_ns, t_ns);
 }
 
 void ad7712_port_init(struct ad7712 *a)

@@ -130,7 +130,7 @@ bool ads1282_mflag(const struct ads1282 *a)
     return a->running && (a->last_lsb >= fs || a->last_lsb <= -fs);
 }
 
-void ads1282_notify_mflag(struct ads1282 *a, int64_t t_ns)
+static void notify_mflag(struct ads1282 *a, int64_t t_ns)
 {
     const bool level = ads1282_mflag(a);
     if (level == a->mflag) return;
@@ -238,7 +238,7 @@ static void on_watch(void *ctx, int64_t t_ns)
 {
     struct ads1282 *a = ctx;
     a->sample(a, t_ns);
-    ads1282_notify_mflag(a, t_ns);
+    notify_mflag(a, t_ns);
     sched_at(a->sched, &a->watch, a->next.t_ns);
 }
 
@@ -260,7 +260,7 @@ static void restart_at(struct ads1282 *a, int64_t edge, int64_t t_ns)
     a->cal.kind = ADS1282_CAL_NONE;
     choose_special(a);
     if (!a->running) a->last_lsb = 0;
-    ads1282_notify_mflag(a, t_ns);
+    notify_mflag(a, t_ns);
     if (!a->alive) return;
     a->sync_count = edge;
     a->period = 0;

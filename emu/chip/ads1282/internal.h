@@ -19,7 +19,6 @@ void ads1282_serial_deliver(struct ads1282 *a, uint32_t word, int64_t t_ns); /* 
 void ads1282_serial_period(struct ads1282 *a); /* a data period has ended, settled or not: interface time-out */
 void ads1282_serial_gap(struct ads1282 *a, int64_t t_ns);  /* a byte begins: how long since a command's last? */
 void ads1282_serial_fall(struct ads1282 *a, int64_t t_ns); /* SCLK falls, first of a byte or not */
-bool ads1282_serial_under_way(const struct ads1282 *a);    /* some but not all of a word has been clocked out */
 
 /* ---- Converter column: ads1282/conv.c ---- */
 
@@ -31,7 +30,6 @@ void ads1282_sync(struct ads1282 *a, int64_t t_ns);    /* SYNC: opcode or pin */
 void ads1282_calibrate(struct ads1282 *a, bool gain, int64_t t_ns);
 void ads1282_set_drdy(struct ads1282 *a, bool level, int64_t t_ns);
 void ads1282_retime(struct ads1282 *a); /* the clock's rate has changed */
-void ads1282_notify_mflag(struct ads1282 *a, int64_t t_ns);
 
 /* ---- Converter column: ads1282/chain.c ---- */
 

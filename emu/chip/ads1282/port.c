@@ -37,7 +37,8 @@ static unsigned bits_clocked(const struct ads1282 *a)
     return done ? done : a->in_byte;
 }
 
-bool ads1282_serial_under_way(const struct ads1282 *a)
+/* Some but not all of a word has been clocked out. */
+static bool word_under_way(const struct ads1282 *a)
 {
     const unsigned n = bits_clocked(a);
     return a->word_out && n > 0 && n < 32;
@@ -45,7 +46,7 @@ bool ads1282_serial_under_way(const struct ads1282 *a)
 
 static bool read_under_way(const struct ads1282 *a, int64_t t_ns)
 {
-    return ads1282_serial_under_way(a) && t_ns - a->sclk_ns < a->rest_ns;
+    return word_under_way(a) && t_ns - a->sclk_ns < a->rest_ns;
 }
 
 /* The output register takes a word, read or not: there is no lock. A read under way goes on at its bit in the new word
@@ -247,7 +248,7 @@ void ads1282_serial_gap(struct ads1282 *a, int64_t t_ns)
 void ads1282_serial_fall(struct ads1282 *a, int64_t t_ns)
 {
     a->rest_periods = 0;
-    a->count.late_reads += t_ns > a->update_ns && ads1282_serial_under_way(a);
+    a->count.late_reads += t_ns > a->update_ns && word_under_way(a);
     if (!a->word_out) return;
     a->unread = false;
     ads1282_set_drdy(a, true, t_ns);
