@@ -25,7 +25,7 @@ pytestmark = pytest.mark.host
 
 suite.load()
 PREFIX = {"psd1": "PSD1", "pmka": "PMKA", "pik": "PIK", "pik5": "PIK", "pik6": "PIK", "gyro": "GYRO"}
-# What takes seconds where time passes by itself; make alarms has all of it.
+# What takes seconds where time passes by itself; make false-positives has all of it.
 SOON = {
     "psd1": ("PSD1",),
     "pmka": ("PMKA-SAMP", "PMKA-BUS", "PMKA-ERR", "PMKA-CAN-04", "PMKA-CAN-05"),
