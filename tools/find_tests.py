@@ -1,4 +1,4 @@
-"""Which tests a file has, read off its text: what cmocka runs, what pytest collects, what @proves ties to ids."""
+"""Which tests a file has, read off its text: what cmocka runs, what pytest collects, what proves a requirement."""
 
 from __future__ import annotations
 
@@ -30,15 +30,24 @@ def collected_in_python(source: str) -> set[str]:
     return names
 
 
+IDS_FROM = {"proves": 0, "active": 0, "check": 1}  # the first of a mark's arguments that is an id
+
+
 def proved_in_python(source: str) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Functions decorated with @proves(...) and their ids. Raises ValueError where an id is no literal text."""
+    """Functions marked @proves(ID, ...), @active(ID, ...) or @check(STIMULUS, ID, ...), and their ids.
+
+    Raises ValueError where an id is no literal text.
+    """
     for node in ast.walk(ast.parse(source)):
         if not isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             continue
         for mark in node.decorator_list:
-            if not isinstance(mark, ast.Call) or ast.unparse(mark.func).rpartition(".")[2] != "proves":
+            kind = ast.unparse(mark.func).rpartition(".")[2] if isinstance(mark, ast.Call) else ""
+            if not isinstance(mark, ast.Call) or kind not in IDS_FROM:
                 continue
-            ids = [a.value for a in mark.args if isinstance(a, ast.Constant) and isinstance(a.value, str)]
-            if len(ids) != len(mark.args) or mark.keywords:
-                raise ValueError(f"line {mark.lineno}: @proves of {node.name} wants literal ids")
-            yield node.name, tuple(ids)
+            args = mark.args[IDS_FROM[kind] :]
+            ids = [a.value for a in args if isinstance(a, ast.Constant) and isinstance(a.value, str)]
+            if len(ids) != len(args) or (kind == "proves" and mark.keywords):
+                raise ValueError(f"line {mark.lineno}: @{kind} of {node.name} wants literal ids")
+            if ids or kind == "proves":
+                yield node.name, tuple(ids)

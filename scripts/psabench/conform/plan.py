@@ -3,32 +3,35 @@
     @stimulus("stream", boards=("psa2",))
     def stream(s: Subject) -> Capture: ...            # side effects, once a run, for all checks that want it
 
-    @proves("PSA2-FRAME-01")
-    @check("stream", needs={"line"})
-    def int_is_low_for_long_enough(e: Capture) -> str: ...   # pure: the same for a recording
+    @check("stream", "PSA2-FRAME-01", needs={"line"})
+    def int_is_low_for_long_enough(e: Capture, row: Requirement) -> str: ...   # pure: the same for a recording
 
-    @proves("PSA2-REQ-04")
-    @active(needs={"can"})
+    @active("PSA2-REQ-04", needs={"can"})
     def a_write_to_id_is_refused(s: Subject) -> str: ...
 
-The function's docstring says in its first line what is done. It returns in words what was seen, raises `Failed` where
-that is not what is due and `Inconclusive` where it cannot tell.
+After the stimulus stand the ids of the requirements that the test proves; a test that takes a second argument gets the
+row of the one that holds for the variant, for the figures in it. The function's docstring says in its first line what
+is done. It returns in words what was seen, raises `Failed` where that is not what is due and `Inconclusive` where it
+cannot tell.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeVar
+from functools import wraps
+from typing import TYPE_CHECKING, Any
 
 from psabench.conform.capture.log import Capture
+from psabench.conform.proves import proves, row_for
 from psabench.errors import expected
 
 if TYPE_CHECKING:
     from psabench.conform.dut import Subject
 
-Check = TypeVar("Check", bound=Callable[[Capture], str])
-Active = TypeVar("Active", bound="Callable[[Subject], str]")
+Check = Callable[[Capture], str]
+Active = Callable[["Subject"], str]
+Test = Callable[..., str]
 StimulusOf = Callable[["Subject"], Capture]
 
 WAYS = frozenset(
@@ -95,8 +98,12 @@ _stimuli: list[Stimulus] = []
 
 
 def check(
-    stimulus: str, *, needs: Iterable[str] = ("can",), on_recording: str | None = None, boards: Iterable[str] = ()
-) -> Callable[[Check], Check]:
+    stimulus: str,
+    *ids: str,
+    needs: Iterable[str] = ("can",),
+    on_recording: str | None = None,
+    boards: Iterable[str] = (),
+) -> Callable[[Test], Check]:
     """A pure test of the capture of this stimulus. Raises ValueError for a need or a part that there is not.
 
     on_recording: the part of a recording that it checks, that of its stimulus (STIMULUS_ON_RECORDING) by default.
@@ -106,21 +113,28 @@ def check(
     if part not in PARTS:
         raise ValueError(expected(", ".join(map(repr, PARTS)), repr(part), "on_recording"))
 
-    def register(test: Check) -> Check:
-        _plans[test] = Plan(stimulus=stimulus, needs=_ways(needs), on_recording=part, boards=frozenset(boards))
-        return test
-
-    return register
+    plan = Plan(stimulus=stimulus, needs=_ways(needs), on_recording=part, boards=frozenset(boards))
+    return lambda test: _planned(test, ids, plan)
 
 
-def active(*, needs: Iterable[str] = ("can",)) -> Callable[[Active], Active]:
+def active(*ids: str, needs: Iterable[str] = ("can",)) -> Callable[[Test], Active]:
     """A test that asks the board itself."""
+    plan = Plan(stimulus="", needs=_ways(needs))
+    return lambda test: _planned(test, ids, plan)
 
-    def register(test: Active) -> Active:
-        _plans[test] = Plan(stimulus="", needs=_ways(needs))
-        return test
 
-    return register
+def _planned(test: Test, ids: tuple[str, ...], plan: Plan) -> Test:
+    """The test with its plan, of what it looks at alone: where it wants the row that it proves, it gets that."""
+    planned = test
+    if test.__code__.co_argcount > 1:
+
+        @wraps(test)
+        def with_row(seen: Any) -> str:
+            return test(seen, row_for(seen, *ids))
+
+        planned = with_row
+    _plans[planned] = plan
+    return proves(*ids)(planned) if ids else planned
 
 
 def stimulus(name: str, *, boards: Iterable[str]) -> Callable[[StimulusOf], StimulusOf]:

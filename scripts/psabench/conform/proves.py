@@ -1,4 +1,4 @@
-"""@proves ties a test of the conformance suite to the requirements that it proves.
+"""What ties a test of the conformance suite to the requirements that it proves: @check and @active of `plan`, @proves.
 
 The ids are literals, so that tools/gen_requirements.py finds them without running anything.
 """
@@ -7,11 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from psabench.conform.capture.log import Capture
 from psabench.conform.requirements import Requirement, requirements
 from psabench.errors import expected
+
+if TYPE_CHECKING:
+    from psabench.conform.dut import Subject
 
 Test = TypeVar("Test", bound=Callable[..., str])
 
@@ -46,7 +49,7 @@ def suite_tests() -> tuple[SuiteTest, ...]:
     return tuple(_suite_tests)
 
 
-def row_for(e: Capture, *ids: str) -> Requirement:
+def row_for(e: Capture | Subject, *ids: str) -> Requirement:
     """The one of these requirements that holds for the variant. Raises ValueError when none does."""
     v = e.variant
     for i in ids:

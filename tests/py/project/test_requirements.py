@@ -349,6 +349,13 @@ class Group:
     @proof.proves("PSA2-FRAME-02", "PSA2-FRAME-03")
     def two(self): ...
 
+@check("stream", "PSA2-FRAME-06", needs={"can"})
+def three(e, row): ...
+
+@active("PSA2-FRAME-07", "PSA2-FRAME-08", needs={"can"})
+def four(s): ...
+
+@check("stream")
 @other("PSA2-FRAME-04")
 def none(): ...
 TEXT = '''@proves("PSA2-FRAME-05")'''
@@ -358,8 +365,16 @@ TEXT = '''@proves("PSA2-FRAME-05")'''
 def test_proofs_are_read_off_the_source() -> None:
     assert list(find_tests.proved_in_python(SUITE)) == [
         ("one", ("PSA2-FRAME-01",)),
+        ("three", ("PSA2-FRAME-06",)),
+        ("four", ("PSA2-FRAME-07", "PSA2-FRAME-08")),
         ("two", ("PSA2-FRAME-02", "PSA2-FRAME-03")),
     ]
+
+
+@pytest.mark.parametrize("mark", ["@check('stream', ID)", "@active(*IDS, needs={'can'})"])
+def test_an_id_beside_a_plan_is_literal_too(mark: str) -> None:
+    with pytest.raises(ValueError, match="of f wants literal ids"):
+        list(find_tests.proved_in_python(f"{mark}\ndef f(): ..."))
 
 
 @pytest.mark.parametrize("mark", ["@proves(ID)", "@proves(*IDS)", "@proves('A', ids=1)", "@proves(f'PSA2-{n}')"])

@@ -11,18 +11,16 @@ from psabench.conform.capture.messages import emergencies
 from psabench.conform.dictionary import as_the_dictionary_says, identity
 from psabench.conform.dut import Subject
 from psabench.conform.plan import active
-from psabench.conform.proves import proves
-from psabench.conform.requirements import requirements
+from psabench.conform.requirements import Requirement
 from psabench.conform.verdict import Failed
 
 FRAMES = (OD.COUNTERS, 14)  # level frames taken
 
 
-@proves("GYRO-MODE-09")
-@active(needs={"can"})
-def modes_that_cannot_be_are_refused(s: Subject) -> str:
+@active("GYRO-MODE-09", needs={"can"})
+def modes_that_cannot_be_are_refused(s: Subject, row: Requirement) -> str:
     """Ask for a mode just after Res and look for the reason."""
-    code = requirements()["GYRO-MODE-09"].limit("abort_code")
+    code = row.limit("abort_code")
     s.reset()
     s.run_for(0.01)
     refused(lambda: s.unit.node.write(OD.CONTROL, 1, int(Mode.LEVEL)), code, "mode 1 just after Res")
@@ -35,11 +33,10 @@ def modes_that_cannot_be_are_refused(s: Subject) -> str:
     return f"refused: {reason}"
 
 
-@proves("GYRO-MODE-10")
-@active(needs={"can"})
-def a_run_s_settings_stand_while_it_runs(s: Subject) -> str:
+@active("GYRO-MODE-10", needs={"can"})
+def a_run_s_settings_stand_while_it_runs(s: Subject, row: Requirement) -> str:
     """Write 2102h and 2103h in a run."""
-    code = requirements()["GYRO-MODE-10"].limit("abort_code")
+    code = row.limit("abort_code")
     levelled(s)
     unit(s).mode = Mode.GYROCOMPASS
     s.run_for(1.0)
@@ -51,11 +48,10 @@ def a_run_s_settings_stand_while_it_runs(s: Subject) -> str:
     return "both refused"
 
 
-@proves("GYRO-ERR-02")
-@active(needs={"can"})
-def what_does_not_settle_is_told(s: Subject) -> str:
+@active("GYRO-ERR-02", needs={"can"})
+def what_does_not_settle_is_told(s: Subject, row: Requirement) -> str:
     """Allow a fiftieth of an arc minute and a second, and let a run begin."""
-    code = int(requirements()["GYRO-ERR-02"].limit("emcy_code"))
+    code = int(row.limit("emcy_code"))
     levelled(s)
     unit(s).set(tolerance_arcmin=0.02, settle_s=0.0, settle_limit_s=1.0, latitude_deg=-60.0)
     with s.take(lines=False) as take:
@@ -76,8 +72,7 @@ def what_does_not_settle_is_told(s: Subject) -> str:
     return "no window, mode 2, NOT_SETTLED, FF23h"
 
 
-@proves("GYRO-LEV-05")
-@active(needs={"can"})
+@active("GYRO-LEV-05", needs={"can"})
 def frames_of_others_are_not_taken(s: Subject) -> str:
     """Send frames of another node's PSA-2 while the level unit is silent."""
     calm(s)
@@ -94,15 +89,13 @@ def frames_of_others_are_not_taken(s: Subject) -> str:
     return "none of 20 frames taken"
 
 
-@proves("GYRO-CAN-05")
-@active(needs={"can"})
+@active("GYRO-CAN-05", needs={"can"})
 def the_board_says_what_it_is(s: Subject) -> str:
     """Read 1008h and 1018h sub 2."""
     return identity(s, "GYRO-CAN-05", "GYRO")
 
 
-@proves("GYRO-CAN-04")
-@active(needs={"can"})
+@active("GYRO-CAN-04", needs={"can"})
 def objects_are_as_the_dictionary_says(s: Subject) -> str:
     """Read every object of the EDS and write where nothing may be written."""
     calm(s)

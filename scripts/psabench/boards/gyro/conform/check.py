@@ -12,7 +12,8 @@ from psabench.conform.capture.intervals import interval, wires_needed
 from psabench.conform.capture.log import CanLog, Capture
 from psabench.conform.capture.messages import as_laid_out, emergencies, in_turn, late_readings
 from psabench.conform.plan import check
-from psabench.conform.proves import proves, row_for
+from psabench.conform.proves import row_for
+from psabench.conform.requirements import Requirement
 from psabench.conform.verdict import Failed, Inconclusive
 from psabench.estimate.angles import wrapped_deg
 from psabench.link.protocol_files import dbc_node, message
@@ -25,38 +26,34 @@ US = 1e3
 LIMITS = ("GYRO-LAW-05", "GYRO-LAW-06")
 
 
-@proves("GYRO-CAN-01")
-@check("run", needs={"can"})
+@check("run", "GYRO-CAN-01", needs={"can"})
 def three_messages_make_a_reading(e: Capture) -> str:
     """Follow the messages of each step."""
     return in_turn(e, MESSAGES)
 
 
-@proves("GYRO-CAN-02")
-@check("run", needs={"can"})
-def steps_are_counted(e: Capture) -> str:
+@check("run", "GYRO-CAN-02", needs={"can"})
+def steps_are_counted(e: Capture, row: Requirement) -> str:
     """Look at STEP from reading to reading."""
     step = columns(e)["STEP"].astype(np.int64)
-    modulo = int(row_for(e, "GYRO-CAN-02").limit("modulo"))
+    modulo = int(row.limit("modulo"))
     bad = np.flatnonzero(np.diff(step) % modulo != 1)
     if len(bad):
         raise Failed(f"STEP {step[bad[0]]}, then {step[bad[0] + 1]}", "one more")
     return f"{len(step)} readings without a gap"
 
 
-@proves("GYRO-CAN-02")
-@check("run", needs={"line"})
-def steps_come_at_their_rate(e: Capture) -> str:
+@check("run", "GYRO-CAN-02", needs={"line"})
+def steps_come_at_their_rate(e: Capture, row: Requirement) -> str:
     """Measure from one rise of STEP to the next."""
     wires_needed(e, "STEP")
-    row, rises = row_for(e, "GYRO-CAN-02"), e.wires.rises("STEP")
+    rises = e.wires.rises("STEP")
     period_ns = row.limit("period_us") * US
     tolerance_ns = period_ns * row.limit("clock_error_ppm") * 1e-6
     return interval(e, rises[:-1], rises[1:], period_ns, tolerance_ns, "from step to step", ("STEP",))
 
 
-@proves("GYRO-CAN-03")
-@check("run", needs={"can"})
+@check("run", "GYRO-CAN-03", needs={"can"})
 def messages_have_their_lengths(e: Capture) -> str:
     """Look at the lengths of the three messages, and at bits that have no signal."""
     return as_laid_out(e, MESSAGES)
@@ -77,11 +74,10 @@ def _codes(e: Capture) -> tuple[np.ndarray, Floats]:
     return raw["SEQ"], volts
 
 
-@proves("GYRO-LEV-01")
-@check("run", needs={"can"})
-def level_angles_follow_from_the_codes(e: Capture) -> str:
+@check("run", "GYRO-LEV-01", needs={"can"})
+def level_angles_follow_from_the_codes(e: Capture, row: Requirement) -> str:
     """Compute BETA and GAMMA from the mean codes of the level unit's frames of each step."""
-    row, c = row_for(e, "GYRO-LEV-01"), columns(e)
+    c = columns(e)
     seq, volts = _codes(e)
     place = {int(s): k for k, s in enumerate(seq)}
     zero = np.array([setting(e, "zero_x_v"), setting(e, "zero_y_v")])
@@ -106,8 +102,7 @@ def level_angles_follow_from_the_codes(e: Capture) -> str:
     return f"{count} readings, {worst:.2f} udeg off at most"
 
 
-@proves("GYRO-LEV-02")
-@check("run", needs={"can"})
+@check("run", "GYRO-LEV-02", needs={"can"})
 def level_seq_is_that_of_the_last_frame(e: Capture) -> str:
     """Compare LEVEL_SEQ with the frames of the level unit that passed before the reading."""
     node = int(setting(e, "level_node"))
@@ -143,9 +138,8 @@ def _runs(rows: np.ndarray) -> list[tuple[int, ...]]:
     return [r for k, r in enumerate(found) if k == 0 or r != found[k - 1]]
 
 
-@proves("GYRO-LAW-01")
-@check("run", needs={"can"})
-def u1_levels(e: Capture) -> str:
+@check("run", "GYRO-LAW-01", needs={"can"})
+def u1_levels(e: Capture, row: Requirement) -> str:
     """Compute U1 of readings in which nothing turns from BETA and GAMMA of the same step."""
     c = columns(e)
     mine = _steady(c, Mode.GYROCOMPASS, (Phase.SETTLING, Phase.WINDOW)) | _steady(c, Mode.LEVEL, (Phase.IDLE,))
@@ -153,12 +147,11 @@ def u1_levels(e: Capture) -> str:
     due = -setting(e, "m1_per_s") * c["BETA"] * 3600 - vertical_degph(setting(e, "latitude_deg")) * np.cos(b) * np.sin(
         g
     )
-    return _as_the_law(c["U1"], due, mine & (c["SATURATED"] == 0), row_for(e, "GYRO-LAW-01").limit("tolerance_degph"))
+    return _as_the_law(c["U1"], due, mine & (c["SATURATED"] == 0), row.limit("tolerance_degph"))
 
 
-@proves("GYRO-LAW-02")
-@check("run", needs={"can"})
-def u2_holds_the_gimbal(e: Capture) -> str:
+@check("run", "GYRO-LAW-02", needs={"can"})
+def u2_holds_the_gimbal(e: Capture, row: Requirement) -> str:
     """Compute U2 at each position of a run from ENCODER, BETA and GAMMA; what the sensor is off there is a constant."""
     c, positions = columns(e), e.facts.get("positions")
     if not isinstance(positions, list):
@@ -172,14 +165,13 @@ def u2_holds_the_gimbal(e: Capture) -> str:
         here = mine & (k == at)
         if here.any():
             due[here] += np.median((c["U2"] - due)[here])
-    return _as_the_law(c["U2"], due, mine, row_for(e, "GYRO-LAW-02").limit("tolerance_degph"))
+    return _as_the_law(c["U2"], due, mine, row.limit("tolerance_degph"))
 
 
-@proves("GYRO-LAW-02")
-@check("hold", needs={"can"})
-def u2_turns_with_the_earth(e: Capture) -> str:
+@check("hold", "GYRO-LAW-02", needs={"can"})
+def u2_turns_with_the_earth(e: Capture, row: Requirement) -> str:
     """Turn Wz round by the latitude in mode 2, and compute U2 before and after with one constant for the sensor."""
-    parts, row = e.facts.get("latitudes"), row_for(e, "GYRO-LAW-02")
+    parts = e.facts.get("latitudes")
     if not isinstance(parts, list):
         raise Inconclusive("no latitudes in the recording")
     logs = [columns(e.with_can(CanLog(frames=e.can.frames[a:b]))) for _, a, b in parts]
@@ -195,16 +187,13 @@ def u2_turns_with_the_earth(e: Capture) -> str:
     return _as_the_law(c["U2"], law + np.median(c["U2"] - law), np.ones(len(law), bool), most)
 
 
-@proves("GYRO-LAW-03")
-@check("run", needs={"can"})
-def u2_runs_free_when_it_levels(e: Capture) -> str:
+@check("run", "GYRO-LAW-03", needs={"can"})
+def u2_runs_free_when_it_levels(e: Capture, row: Requirement) -> str:
     """Compute U2 of readings in mode 1."""
     c = columns(e)
     b, g = np.radians(c["BETA"]), np.radians(c["GAMMA"])
     due = vertical_degph(setting(e, "latitude_deg")) * np.cos(b) * np.cos(g)
-    return _as_the_law(
-        c["U2"], due, _steady(c, Mode.LEVEL, (Phase.IDLE,)), row_for(e, "GYRO-LAW-03").limit("tolerance_degph")
-    )
+    return _as_the_law(c["U2"], due, _steady(c, Mode.LEVEL, (Phase.IDLE,)), row.limit("tolerance_degph"))
 
 
 def _as_the_law(saw: Floats, due: Floats, mine: np.ndarray, most: float) -> str:
@@ -217,11 +206,10 @@ def _as_the_law(saw: Floats, due: Floats, mine: np.ndarray, most: float) -> str:
     return f"{len(off)} readings, {off.max():.3f} deg/h off at most"
 
 
-@proves("GYRO-LAW-04")
-@check("run", needs={"can"})
-def windows_show_the_rate_of_the_earth(e: Capture) -> str:
+@check("run", "GYRO-LAW-04", needs={"can"})
+def windows_show_the_rate_of_the_earth(e: Capture, row: Requirement) -> str:
     """Take the means of -m1 beta over the windows; the Earth's part of them goes as the sine of the angle."""
-    c, row = columns(e), row_for(e, "GYRO-LAW-04")
+    c = columns(e)
     count = int(c["POSITION"].max())
     if count < 3:
         raise Inconclusive(f"{count} positions")
@@ -240,8 +228,7 @@ def windows_show_the_rate_of_the_earth(e: Capture) -> str:
     return f"{saw:.4f} deg/h, We is {due:.4f}"
 
 
-@proves("GYRO-LAW-05", "GYRO-LAW-06")
-@check("limits", needs={"can"})
+@check("limits", "GYRO-LAW-05", "GYRO-LAW-06", needs={"can"})
 def rates_are_limited_and_say_so(e: Capture) -> str:
     """Look at U1, U2 and SATURATED when the level is reported wrongly and the loop is stiff."""
     c, most = columns(e), row_for(e, *LIMITS).limit("rate_max_dps") * 3600
@@ -259,11 +246,10 @@ def rates_are_limited_and_say_so(e: Capture) -> str:
     return f"{int(at_limit.sum())} readings at {most / 3600:g} deg/s, as many with SATURATED"
 
 
-@proves("GYRO-ERR-03")
-@check("limits", needs={"can"})
-def a_limited_rate_is_an_emergency(e: Capture) -> str:
+@check("limits", "GYRO-ERR-03", needs={"can"})
+def a_limited_rate_is_an_emergency(e: Capture, row: Requirement) -> str:
     """Look for EMCY FF24h and for its end a second after the last limited rate."""
-    row, c = row_for(e, "GYRO-ERR-03"), columns(e)
+    c = columns(e)
     found = emergencies(e, EMCY)
     code = int(row.limit("emcy_code"))
     begun = [t for k, t in found if k == code]
@@ -280,11 +266,10 @@ def a_limited_rate_is_an_emergency(e: Capture) -> str:
     return f"FF24h once, ended {ended[-1] - begun[0]:.3f} s later"
 
 
-@proves("GYRO-LEV-03")
-@check("silence", needs={"can"})
-def missing_frames_are_told(e: Capture) -> str:
+@check("silence", "GYRO-LEV-03", needs={"can"})
+def missing_frames_are_told(e: Capture, row: Requirement) -> str:
     """Look for LEVEL_LOST and EMCY FF21h while the level unit is silent, and for their end."""
-    row, c = row_for(e, "GYRO-LEV-03"), columns(e)
+    c = columns(e)
     lost = c["LEVEL_LOST"] == 1
     code = int(row.limit("emcy_code"))
     found = emergencies(e, EMCY)
@@ -302,11 +287,10 @@ def missing_frames_are_told(e: Capture) -> str:
     return f"LEVEL_LOST in {int(lost.sum())} readings, FF21h ended {took:.3f} s after it began"
 
 
-@proves("GYRO-LEV-04")
-@check("silence", needs={"can"})
-def angles_stay_without_the_level_unit(e: Capture) -> str:
+@check("silence", "GYRO-LEV-04", needs={"can"})
+def angles_stay_without_the_level_unit(e: Capture, row: Requirement) -> str:
     """Look at BETA, GAMMA and U1 while the level unit is silent."""
-    row, c = row_for(e, "GYRO-LEV-04"), columns(e)
+    c = columns(e)
     lost = np.flatnonzero(c["LEVEL_LOST"] == 1)
     silent = round(row.limit("silent_ms") * 1e3 / row_for(e, "GYRO-CAN-02").limit("period_us"))
     if len(lost) < 2 * silent:
@@ -321,8 +305,7 @@ def angles_stay_without_the_level_unit(e: Capture) -> str:
     return f"{len(mine)} readings with the same angles and U1, one emergency"
 
 
-@proves("GYRO-RES-01")
-@check("power_on", needs={"can"})
+@check("power_on", "GYRO-RES-01", needs={"can"})
 def res_ends_the_mode_and_counts_anew(e: Capture) -> str:
     """Look at MODE and STEP after a Res while it levelled."""
     period_s = row_for(e, "GYRO-CAN-02").limit("period_us") * 1e-6
@@ -335,12 +318,11 @@ def res_ends_the_mode_and_counts_anew(e: Capture) -> str:
     return f"{len(c['MODE'])} readings of mode 0, STEP from {c['STEP'][0]:g}"
 
 
-@proves("GYRO-SIG-01")
-@check("run", needs={"line", "can"})
-def lines_show_the_phases(e: Capture) -> str:
+@check("run", "GYRO-SIG-01", needs={"line", "can"})
+def lines_show_the_phases(e: Capture, row: Requirement) -> str:
     """Compare STEP, SLEW, SETTLE and WINDOW with the readings."""
     wires_needed(e, *LINES)
-    row, c = row_for(e, "GYRO-SIG-01"), columns(e)
+    c = columns(e)
     up, down = e.wires.pulses("STEP", 1)
     seen = interval(
         e, up, down, row.limit("step_high_us") * US, row.limit("tolerance_us") * US, "of STEP high", ("STEP",)
@@ -360,8 +342,7 @@ def lines_show_the_phases(e: Capture) -> str:
     return f"{seen}; SLEW, SETTLE and WINDOW with their phases"
 
 
-@proves("GYRO-SIG-01")
-@check("silence", needs={"line", "can"})
+@check("silence", "GYRO-SIG-01", needs={"line", "can"})
 def fault_shows_the_flags(e: Capture) -> str:
     """Compare FAULT with the flags of the readings while the level unit is silent for a while, twice."""
     wires_needed(e, "STEP", "FAULT")

@@ -10,7 +10,8 @@ from psabench.boards.gyro.conform.capture_readings import columns, setting
 from psabench.boards.gyro.device import Mode, Phase
 from psabench.conform.capture.log import CanLog, Capture
 from psabench.conform.plan import check
-from psabench.conform.proves import proves, row_for
+from psabench.conform.proves import row_for
+from psabench.conform.requirements import Requirement
 from psabench.conform.verdict import Failed, Inconclusive
 from psabench.estimate.angles import wrapped_deg
 from psabench.link.signals import Floats
@@ -19,8 +20,7 @@ LEAST = 20  # readings that a judgement wants
 ACCEL_OVER_S = 0.3  # rates so far apart give an acceleration: the encoder has an error that goes with its angle
 
 
-@proves("GYRO-MODE-01")
-@check("power_on", needs={"can"})
+@check("power_on", "GYRO-MODE-01", needs={"can"})
 def in_mode_0_the_torquers_are_left_alone(e: Capture) -> str:
     """Look at U1 and U2 of the readings with mode 0."""
     c = columns(e)
@@ -32,11 +32,10 @@ def in_mode_0_the_torquers_are_left_alone(e: Capture) -> str:
     return f"{int(mine.sum())} readings of mode 0, U1 and U2 0"
 
 
-@proves("GYRO-MODE-11")
-@check("level", needs={"can"})
-def mode_1_levels(e: Capture) -> str:
+@check("level", "GYRO-MODE-11", needs={"can"})
+def mode_1_levels(e: Capture, row: Requirement) -> str:
     """Look at BETA of the last readings, the platform having had its time."""
-    c, most = columns(e), row_for(e, "GYRO-MODE-11").limit("level_max_arcmin")
+    c, most = columns(e), row.limit("level_max_arcmin")
     beta_arcmin = c["BETA"][c["MODE"] == Mode.LEVEL] * 60
     if len(beta_arcmin) < 2 * LEAST:
         raise Inconclusive(f"{len(beta_arcmin)} readings of mode 1")
@@ -47,8 +46,7 @@ def mode_1_levels(e: Capture) -> str:
     return saw
 
 
-@proves("GYRO-MODE-04")
-@check("run", needs={"can"})
+@check("run", "GYRO-MODE-04", needs={"can"})
 def a_run_goes_through_its_positions(e: Capture) -> str:
     """Follow MODE, PHASE and POSITION."""
     c = columns(e)
@@ -68,11 +66,10 @@ def a_run_goes_through_its_positions(e: Capture) -> str:
     return f"{len(order)} phases in their order, then mode 2"
 
 
-@proves("GYRO-MODE-05")
-@check("run", needs={"can"})
-def windows_have_their_length(e: Capture) -> str:
+@check("run", "GYRO-MODE-05", needs={"can"})
+def windows_have_their_length(e: Capture, row: Requirement) -> str:
     """Count the readings of each window."""
-    row, c = row_for(e, "GYRO-MODE-05"), columns(e)
+    c = columns(e)
     due = round(row.limit("window_s") / (row_for(e, "GYRO-CAN-02").limit("period_us") * 1e-6))
     count = int(c["POSITION"].max())
     seen = [int(((c["PHASE"] == Phase.WINDOW) & (c["POSITION"] == k)).sum()) for k in range(1, count + 1)]
@@ -81,11 +78,10 @@ def windows_have_their_length(e: Capture) -> str:
     return f"{seen} readings"
 
 
-@proves("GYRO-MODE-06")
-@check("run", needs={"can"})
-def windows_begin_settled(e: Capture) -> str:
+@check("run", "GYRO-MODE-06", needs={"can"})
+def windows_begin_settled(e: Capture, row: Requirement) -> str:
     """Look at BETA and ENCODER as a window begins, and how long it has settled."""
-    row, c = row_for(e, "GYRO-MODE-06"), columns(e)
+    c = columns(e)
     positions = e.facts.get("positions")
     begins = np.flatnonzero((np.diff(c["PHASE"]) != 0) & (c["PHASE"][1:] == Phase.WINDOW)) + 1
     if not len(begins) or not isinstance(positions, list):
@@ -103,11 +99,10 @@ def windows_begin_settled(e: Capture) -> str:
     return f"{len(begins)} windows, settled for {least} steps and more"
 
 
-@proves("GYRO-MODE-06")
-@check("tilted", needs={"can"})
-def a_window_waits_for_the_level(e: Capture) -> str:
+@check("tilted", "GYRO-MODE-06", needs={"can"})
+def a_window_waits_for_the_level(e: Capture, row: Requirement) -> str:
     """Look at BETA from the begin of settling to the first window of a run that begins half a degree off."""
-    row, c = row_for(e, "GYRO-MODE-06"), columns(e)
+    c = columns(e)
     most = row.limit("tolerance_arcmin") / 60
     settling = np.flatnonzero((c["MODE"] == Mode.GYROCOMPASS) & (c["PHASE"] == Phase.SETTLING))
     window = np.flatnonzero(c["PHASE"] == Phase.WINDOW)
@@ -119,11 +114,9 @@ def a_window_waits_for_the_level(e: Capture) -> str:
     return f"beta {c['BETA'][settling[0]]:.4f} deg as settling begins, {c['BETA'][window[0]]:.4f} deg in the window"
 
 
-@proves("GYRO-MODE-08")
-@check("navigation", needs={"can"})
-def navigation_keeps_the_azimuth(e: Capture) -> str:
+@check("navigation", "GYRO-MODE-08", needs={"can"})
+def navigation_keeps_the_azimuth(e: Capture, row: Requirement) -> str:
     """Compare the heading of a parked vehicle before and after some time of mode 6, its drift being compensated."""
-    row = row_for(e, "GYRO-MODE-08")
     most = row.limit("drift_max_degph")
     moved_degph = abs(setting(e, "moved_deg")) / setting(e, "moved_s") * 3600
     drift_degph, free_degph = setting(e, "drift_degph"), setting(e, "free_deg") / setting(e, "free_s") * 3600
@@ -145,11 +138,10 @@ def _turns(e: Capture) -> list[tuple[float, float, Mapping[str, Floats]]]:
     return list(zip(ends[:-1], ends[1:], logs, strict=True))
 
 
-@proves("GYRO-MODE-02")
-@check("turns", needs={"can"})
-def a_turn_ends_at_its_angle_and_holds(e: Capture) -> str:
+@check("turns", "GYRO-MODE-02", needs={"can"})
+def a_turn_ends_at_its_angle_and_holds(e: Capture, row: Requirement) -> str:
     """Look where ENCODER ends in each turn by mode 3, and whether it stays there in mode 2."""
-    row, held = row_for(e, "GYRO-MODE-02"), e.facts.get("held")
+    held = e.facts.get("held")
     turns, worst = _turns(e), 0.0
     for _, to, c in turns:
         off = abs(wrapped_deg(float(c["ENCODER"][-1]) - to))
@@ -166,11 +158,10 @@ def a_turn_ends_at_its_angle_and_holds(e: Capture) -> str:
     return f"{len(turns)} turns, {worst:.4f} deg off at the end; {moved.max():.4f} deg in mode 2"
 
 
-@proves("GYRO-MODE-03")
-@check("turns", needs={"can"})
-def turns_take_the_shorter_way(e: Capture) -> str:
+@check("turns", "GYRO-MODE-03", needs={"can"})
+def turns_take_the_shorter_way(e: Capture, row: Requirement) -> str:
     """Look at ENCODER on the way: where it turns, how far and how fast."""
-    row, seen = row_for(e, "GYRO-MODE-03"), []
+    seen = []
     period_s = row_for(e, "GYRO-CAN-02").limit("period_us") * 1e-6
     allowed = 1 + row.limit("tolerance_pct") / 100
     for at, to, c in _turns(e):
@@ -191,8 +182,7 @@ def turns_take_the_shorter_way(e: Capture) -> str:
     return "; ".join(seen)
 
 
-@proves("GYRO-MODE-07")
-@check("navigation", needs={"can"})
+@check("navigation", "GYRO-MODE-07", needs={"can"})
 def a_calibration_measures_one_window(e: Capture) -> str:
     """Follow PHASE in mode 5 and count the readings of its window."""
     c = columns(e)

@@ -9,9 +9,8 @@ from psabench.conform.bus_host import burst, line, line_refused
 from psabench.conform.dictionary import as_the_dictionary_says, identity
 from psabench.conform.dut import Subject
 from psabench.conform.plan import active
-from psabench.conform.proves import proves
 from psabench.conform.registers import names_and_rights
-from psabench.conform.requirements import requirements
+from psabench.conform.requirements import Requirement, requirements
 from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.signals import unwrap
 
@@ -45,11 +44,9 @@ def signed(word: int, bits: int = 16) -> int:
     return (word + (1 << bits - 1)) % (1 << bits) - (1 << bits - 1)
 
 
-@proves("PIK-CNT-02")
-@active(needs={"bus", "can"})
-def the_period_can_be_set(s: Subject) -> str:
+@active("PIK-CNT-02", needs={"bus", "can"})
+def the_period_can_be_set(s: Subject, row: Requirement) -> str:
     """Set PERIOD 50, then 0 with three writes to LATCH; look at the stamps of the readings."""
-    row = requirements()["PIK-CNT-02"]
     calm(s)
     with s.take(lines=False) as take:
         line(s, f"{PERIOD} 32")
@@ -76,8 +73,7 @@ def the_period_can_be_set(s: Subject) -> str:
     return f"{due:g} us with PERIOD 50, three readings by three writes"
 
 
-@proves("PIK-CNT-04")
-@active(needs={"bus"})
+@active("PIK-CNT-04", needs={"bus"})
 def registers_hold_what_was_latched(s: Subject) -> str:
     """Latch by hand, read twice a while apart, latch again."""
     by_hand(s)
@@ -95,16 +91,15 @@ def registers_hold_what_was_latched(s: Subject) -> str:
     return f"{first} twice, then {later}"
 
 
-@proves("PIK-CNT-05")
-@active(needs={"bus"})
-def a_channel_is_up_minus_down(s: Subject) -> str:
+@active("PIK-CNT-05", needs={"bus"})
+def a_channel_is_up_minus_down(s: Subject, row: Requirement) -> str:
     """Read the nine counters of one latch."""
     by_hand(s)
     s.run_for(0.3)
     line(s, LATCH)
     c = counters(s)
     calm(s)
-    modulo = int(requirements()["PIK-CNT-05"].limit("modulo"))
+    modulo = int(row.limit("modulo"))
     for k in range(3):
         if c[k] != (c[3 + 2 * k] - c[4 + 2 * k]) % modulo:
             raise Failed(f"{'XYZ'[k]} {c[k]}, up {c[3 + 2 * k]}, down {c[4 + 2 * k]}", "the difference")
@@ -113,11 +108,10 @@ def a_channel_is_up_minus_down(s: Subject) -> str:
     return f"{c[:3]} of {c[3:]}"
 
 
-@proves("PIK-CNT-06")
-@active(needs={"bus"})
-def counters_can_be_cleared(s: Subject) -> str:
+@active("PIK-CNT-06", needs={"bus"})
+def counters_can_be_cleared(s: Subject, row: Requirement) -> str:
     """Measure rates with two latches, write CLEAR 1 and latch: X has counted since, Y and Z all the time."""
-    most = requirements()["PIK-CNT-06"].limit("error_max_pulses")
+    most = row.limit("error_max_pulses")
     by_hand(s)
     first = burst(s, LATCH, *COUNTERS)
     s.run_for(1.0)
@@ -137,8 +131,7 @@ def counters_can_be_cleared(s: Subject) -> str:
     return f"{before[:3]}, after CLEAR 1 {after[:3]}"
 
 
-@proves("PIK-RES-01")
-@active(needs={"bus", "can"})
+@active("PIK-RES-01", needs={"bus", "can"})
 def registers_begin_with_res(s: Subject) -> str:
     """Let it count for a second, press Res, and compare the registers of a reading with its totals on CAN."""
     calm(s)
@@ -177,11 +170,9 @@ def registers_begin_with_res(s: Subject) -> str:
     return f"{found} readings with the same counts since Res in registers and totals"
 
 
-@proves("PIK-CNT-07")
-@active(needs={"bus"})
-def readings_are_numbered_and_status_tells_a_latch(s: Subject) -> str:
+@active("PIK-CNT-07", needs={"bus"})
+def readings_are_numbered_and_status_tells_a_latch(s: Subject, row: Requirement) -> str:
     """Latch twice by hand and read SEQ and STATUS."""
-    row = requirements()["PIK-CNT-07"]
     latched, saturated = int(row.limit("latched_mask")), int(row.limit("saturated_mask"))
     by_hand(s)
     none, first, _, one, again, second = (c.data for c in burst(s, "R A", "R A", "R 9", LATCH, "R A", "R A", "R 9")[1:])
@@ -193,11 +184,9 @@ def readings_are_numbered_and_status_tells_a_latch(s: Subject) -> str:
     return f"SEQ {first}, then {second}; bit 3 of STATUS once"
 
 
-@proves("PIK-CNT-08")
-@active(needs={"bus"})
-def what_cannot_be_is_refused(s: Subject) -> str:
+@active("PIK-CNT-08", needs={"bus"})
+def what_cannot_be_is_refused(s: Subject, row: Requirement) -> str:
     """An address that is none, a write to what is read, a read of LATCH and CLEAR, X too early, a period of 0.1 ms."""
-    row = requirements()["PIK-CNT-08"]
     calm(s)
     line_refused(s, "R E", row.limit("no_address_code"))
     line_refused(s, "W 0 0", row.limit("read_only_code"))
@@ -212,8 +201,7 @@ def what_cannot_be_is_refused(s: Subject) -> str:
     return "seven refusals with their codes"
 
 
-@proves("PIK-CNT-09")
-@active(needs={"bus"})
+@active("PIK-CNT-09", needs={"bus"})
 def registers_have_their_names_and_rights(s: Subject) -> str:
     """Ask who is there, read and write every address."""
     calm(s)
@@ -222,11 +210,9 @@ def registers_have_their_names_and_rights(s: Subject) -> str:
     return seen
 
 
-@proves("PIK-CAN-05")
-@active(needs={"can"})
-def the_name_plate_is_right(s: Subject) -> str:
+@active("PIK-CAN-05", needs={"can"})
+def the_name_plate_is_right(s: Subject, row: Requirement) -> str:
     """Read 2210h."""
-    row = requirements()["PIK-CAN-05"]
     kind = "pik6" if s.variant.board == "pik6" else "pik"
     read = s.unit.node.read
     saw = read(OD.PLATE, 1), int(read(OD.PLATE, 2)), int(read(OD.PLATE, 3)), int(read(OD.PLATE, 4))
@@ -237,15 +223,13 @@ def the_name_plate_is_right(s: Subject) -> str:
     return f"{saw[0]}, {saw[1]} mHz/V, {saw[2]} Hz, {saw[3]} in 0.01 %"
 
 
-@proves("PIK-CAN-06")
-@active(needs={"can"})
+@active("PIK-CAN-06", needs={"can"})
 def the_board_says_what_it_is(s: Subject) -> str:
     """Read 1008h and 1018h sub 2."""
     return identity(s, "PIK-CAN-06", "PIK")
 
 
-@proves("PIK-CAN-07")
-@active(needs={"can"})
+@active("PIK-CAN-07", needs={"can"})
 def objects_are_as_the_dictionary_says(s: Subject) -> str:
     """Read every object of the EDS and write where nothing may be written."""
     calm(s)

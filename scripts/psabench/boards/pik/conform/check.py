@@ -8,7 +8,8 @@ from psabench.conform.capture.intervals import before, edges, first_bad, interva
 from psabench.conform.capture.log import CanLog, Capture, LineLog
 from psabench.conform.capture.messages import as_laid_out, emergencies, in_turn, late_readings
 from psabench.conform.plan import check
-from psabench.conform.proves import proves, row_for
+from psabench.conform.proves import row_for
+from psabench.conform.requirements import Requirement
 from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.protocol_files import message
 from psabench.link.signals import Floats, Ints, unwrap
@@ -63,12 +64,11 @@ def _allowed_hz(e: Capture, volts: float, part: float) -> float:
     return k * (abs(volts) * part + row_for(e, "PIK-LAW-01").limit("zero_max_v")) + 2.0 / 60.0
 
 
-@proves("PIK-LAW-01")
-@check("minute", needs={"can", "inputs"})
-def the_frequency_follows_the_input(e: Capture) -> str:
+@check("minute", "PIK-LAW-01", needs={"can", "inputs"})
+def the_frequency_follows_the_input(e: Capture, row: Requirement) -> str:
     """Compare pulses a second with the volts at the inputs."""
     k, seen = row_for(e, *COEFFICIENT).limit("k_hz_per_v"), []
-    part = row_for(e, "PIK-LAW-01").limit("pik6_tolerance_pct" if e.variant.board == "pik6" else "tolerance_pct") / 100
+    part = row.limit("pik6_tolerance_pct" if e.variant.board == "pik6" else "tolerance_pct") / 100
     for axis, (volts, hz) in rates(e).items():
         most = _allowed_hz(e, volts, part)
         if abs(hz - k * volts) > most:
@@ -77,8 +77,7 @@ def the_frequency_follows_the_input(e: Capture) -> str:
     return f"{', '.join(seen)} Hz"
 
 
-@proves("PIK-LAW-02", "PIK-LAW-03")
-@check("minute", needs={"can", "inputs"})
+@check("minute", "PIK-LAW-02", "PIK-LAW-03", needs={"can", "inputs"})
 def the_coefficient_is_the_printed_one(e: Capture) -> str:
     """Take the coefficient from the pulses of a minute."""
     row = row_for(e, *COEFFICIENT)
@@ -91,11 +90,10 @@ def the_coefficient_is_the_printed_one(e: Capture) -> str:
     return f"{', '.join(seen)} Hz/V"
 
 
-@proves("PIK-LAW-04")
-@check("minute", needs={"can", "inputs"})
-def the_count_is_the_integral(e: Capture) -> str:
+@check("minute", "PIK-LAW-04", needs={"can", "inputs"})
+def the_count_is_the_integral(e: Capture, row: Requirement) -> str:
     """Compare the totals of a minute at a still input with a straight line."""
-    most = row_for(e, "PIK-LAW-04").limit("error_max_pulses")
+    most = row.limit("error_max_pulses")
     t_s, n = totals(e, 100)
     worst = 0.0
     for k, axis in enumerate("XYZ"):
@@ -107,11 +105,9 @@ def the_count_is_the_integral(e: Capture) -> str:
     return f"{len(n)} readings, {worst:.2f} pulses from a straight line at most"
 
 
-@proves("PIK-LAW-05")
-@check("minute", needs={"can", "inputs"})
-def a_pulse_has_the_printed_weight(e: Capture) -> str:
+@check("minute", "PIK-LAW-05", needs={"can", "inputs"})
+def a_pulse_has_the_printed_weight(e: Capture, row: Requirement) -> str:
     """Take the weight from the measured coefficient and the accelerometer's volts a g on the load of the profile."""
-    row = row_for(e, "PIK-LAW-05")
     due = row.limit(f"{e.variant.board}_mps")
     volts, hz = max(rates(e).values(), key=lambda r: abs(r[0]))
     ma_v_per_g = row.limit("current_a_per_g") * float(e.variant["ra_ohm"])
@@ -121,11 +117,9 @@ def a_pulse_has_the_printed_weight(e: Capture) -> str:
     return f"{weight * 1e3:.3f} mm/s a pulse"
 
 
-@proves("PIK-LAW-09")
-@check("minute", needs={"can", "inputs"})
-def the_law_is_linear(e: Capture) -> str:
+@check("minute", "PIK-LAW-09", needs={"can", "inputs"})
+def the_law_is_linear(e: Capture, row: Requirement) -> str:
     """Compare the coefficients of the three channels, whose inputs are not alike."""
-    row = row_for(e, "PIK-LAW-09")
     found = rates(e)
     k = np.array([hz / volts for volts, hz in found.values()])
     zero = row_for(e, "PIK-LAW-01").limit("zero_max_v") / min(abs(v) for v, _ in found.values())
@@ -135,11 +129,10 @@ def the_law_is_linear(e: Capture) -> str:
     return f"coefficients {spread * 100:.4f} % apart at {', '.join(f'{v:g}' for v, _ in found.values())} V"
 
 
-@proves("PIK-SAT-02")
-@check("minute", needs={"can", "inputs"})
-def nothing_saturates_below_full_scale(e: Capture) -> str:
+@check("minute", "PIK-SAT-02", needs={"can", "inputs"})
+def nothing_saturates_below_full_scale(e: Capture, row: Requirement) -> str:
     """Look for SAT bits in a minute."""
-    most = row_for(e, "PIK-SAT-02").limit("input_max_v")
+    most = row.limit("input_max_v")
     if any(abs(v) > most for v in e.inputs_v.values()):
         raise Inconclusive(f"expected inputs of {most:g} V at most")
     raw = _told(e, "PIK_COUNTS").raw("PIK_COUNTS")
@@ -149,8 +142,7 @@ def nothing_saturates_below_full_scale(e: Capture) -> str:
     return f"{len(raw['X'])} readings without SAT"
 
 
-@proves("PIK-LAW-07")
-@check("stream", needs={"line", "inputs"})
+@check("stream", "PIK-LAW-07", needs={"line", "inputs"})
 def signs_have_their_lines(e: Capture) -> str:
     """Count pulses on the lines P and N of each channel."""
     wires_needed(e, *PULSES)
@@ -164,13 +156,12 @@ def signs_have_their_lines(e: Capture) -> str:
     return f"pulses on P and N: {', '.join(seen)}"
 
 
-@proves("PIK-LAW-08")
-@check("stream", needs={"line"})
-def a_reset_lasts_its_time(e: Capture) -> str:
+@check("stream", "PIK-LAW-08", needs={"line"})
+def a_reset_lasts_its_time(e: Capture, row: Requirement) -> str:
     """Measure the pulses."""
     wires_needed(e, *PULSES)
     due_ns = _tclk_ns(e)
-    slack_ns = ROUNDED_NS + due_ns * row_for(e, "PIK-LAW-08").limit("clock_error_ppm") * 1e-6
+    slack_ns = ROUNDED_NS + due_ns * row.limit("clock_error_ppm") * 1e-6
     seen = ""
     for name in PULSES:
         up, down = e.wires.pulses(name, 1)
@@ -188,12 +179,11 @@ def _tclk_ns(e: Capture) -> float:
     return row.limit("pik6_us" if e.variant.board == "pik6" else "pik_us") * US
 
 
-@proves("PIK-LAW-10")
-@check("stream", needs={"pins"})
-def pulses_begin_on_their_grid(e: Capture) -> str:
+@check("stream", "PIK-LAW-10", needs={"pins"})
+def pulses_begin_on_their_grid(e: Capture, row: Requirement) -> str:
     """Compare the rises of pulses with the clock, and measure from pulse to pulse."""
     wires_needed(e, "CLK", *PULSES)
-    row, tclk_ns = row_for(e, "PIK-LAW-10"), _tclk_ns(e)
+    tclk_ns = _tclk_ns(e)
     tick_ns = tclk_ns / row.limit("grid_per_tclk")
     clock, count = e.wires.rises("CLK"), 0
     for axis in "XYZ":
@@ -225,12 +215,11 @@ def pulses_begin_on_their_grid(e: Capture) -> str:
     return f"{count} pulses on a grid of {tick_ns:.1f} ns"
 
 
-@proves("PIK-LAW-10")
-@check("overdrive", needs={"line", "head"})
-def pulses_keep_their_distance(e: Capture) -> str:
+@check("overdrive", "PIK-LAW-10", needs={"line", "head"})
+def pulses_keep_their_distance(e: Capture, row: Requirement) -> str:
     """Measure from pulse to pulse of a channel that cannot keep up with its input."""
     wires_needed(e, *PULSES)
-    row, tclk_ns = row_for(e, "PIK-LAW-10"), _tclk_ns(e)
+    tclk_ns = _tclk_ns(e)
     least_ns, seen = row.limit("gap_min_per_tclk") * tclk_ns, []
     slack_ns = ROUNDED_NS + row.limit("tolerance_ns") + e.slack_ns(least_ns)
     for name in PULSES:
@@ -246,11 +235,10 @@ def pulses_keep_their_distance(e: Capture) -> str:
     return f"{len(seen)} gaps between pulses, {min(seen)} ns and more"
 
 
-@proves("PIK-SAT-01")
-@check("overdrive", needs={"can", "head"})
-def saturation_is_told(e: Capture) -> str:
+@check("overdrive", "PIK-SAT-01", needs={"can", "head"})
+def saturation_is_told(e: Capture, row: Requirement) -> str:
     """Look for SAT and EMCY FF11h while a channel cannot keep up, and for their end."""
-    row, raw = row_for(e, "PIK-SAT-01"), _told(e, "PIK_COUNTS").raw("PIK_COUNTS")
+    raw = _told(e, "PIK_COUNTS").raw("PIK_COUNTS")
     stamps = unwrap(_told(e, "PIK_TOTAL_Z").raw("PIK_TOTAL_Z")["TSTAMP"], 32) * 1e-6
     sat = np.stack([raw[f"SAT_{a}"] for a in "XYZ"], axis=1)[: len(stamps)]
     code = int(row.limit("emcy_code"))
@@ -268,8 +256,7 @@ def saturation_is_told(e: Capture) -> str:
     return f"SAT in {int(sat.any(axis=1).sum())} readings, FF11h, over {took_ms:.1f} ms after the last of them"
 
 
-@proves("PIK-CNT-01")
-@check("stream", needs={"line", "can"})
+@check("stream", "PIK-CNT-01", needs={"line", "can"})
 def counts_are_the_pulses(e: Capture) -> str:
     """Count pulses between falls of LATCH and compare them with the readings."""
     wires_needed(e, *PULSES, "LATCH")
@@ -298,35 +285,30 @@ def _between(log: LineLog, name: str, latch: Ints) -> Ints:
     return found
 
 
-@proves("PIK-CNT-02")
-@check("stream", needs={"line"})
-def counters_are_latched_every_period(e: Capture) -> str:
+@check("stream", "PIK-CNT-02", needs={"line"})
+def counters_are_latched_every_period(e: Capture, row: Requirement) -> str:
     """Measure from one fall of LATCH to the next."""
     wires_needed(e, "LATCH")
-    row, falls = row_for(e, "PIK-CNT-02"), e.wires.falls("LATCH")
+    falls = e.wires.falls("LATCH")
     due_ns, tolerance_ns = row.limit("default_us") * US, row.limit("tolerance_us") * US
     return interval(e, falls[:-1], falls[1:], due_ns, tolerance_ns, "from latch to latch", ("LATCH",))
 
 
-@proves("PIK-CNT-03")
-@check("stream", needs={"line"})
-def latch_is_low_for_its_time(e: Capture) -> str:
+@check("stream", "PIK-CNT-03", needs={"line"})
+def latch_is_low_for_its_time(e: Capture, row: Requirement) -> str:
     """Measure the lows of LATCH."""
     wires_needed(e, "LATCH")
-    row = row_for(e, "PIK-CNT-03")
     down, up = e.wires.pulses("LATCH", 0)
     return interval(e, down, up, row.limit("low_us") * US, row.limit("tolerance_us") * US, "of LATCH low", ("LATCH",))
 
 
-@proves("PIK-CAN-01")
-@check("stream", needs={"can"})
+@check("stream", "PIK-CAN-01", needs={"can"})
 def three_messages_make_a_reading(e: Capture) -> str:
     """Follow the messages of each reading."""
     return in_turn(e, MESSAGES)
 
 
-@proves("PIK-CAN-02")
-@check("stream", needs={"can"})
+@check("stream", "PIK-CAN-02", needs={"can"})
 def counts_are_differences_of_totals(e: Capture) -> str:
     """Compare PIK_COUNTS with the totals of this reading and the one before."""
     _, n = totals(e)
@@ -339,11 +321,10 @@ def counts_are_differences_of_totals(e: Capture) -> str:
     return f"{len(counts)} readings"
 
 
-@proves("PIK-CAN-03")
-@check("stream", needs={"can"})
-def readings_are_numbered_and_stamped(e: Capture) -> str:
+@check("stream", "PIK-CAN-03", needs={"can"})
+def readings_are_numbered_and_stamped(e: Capture, row: Requirement) -> str:
     """Look at SEQ and TSTAMP from reading to reading."""
-    row, due = row_for(e, "PIK-CAN-03"), row_for(e, "PIK-CNT-02").limit("default_us")
+    due = row_for(e, "PIK-CNT-02").limit("default_us")
     seq, stamps = _told(e, "PIK_COUNTS").raw("PIK_COUNTS")["SEQ"], _told(e, "PIK_TOTAL_Z").raw("PIK_TOTAL_Z")["TSTAMP"]
     if (np.diff(seq) % int(row.limit("modulo")) != 1).any():
         raise Failed(f"SEQ {seq[:6].tolist()} ...", "one more each time")
@@ -354,18 +335,16 @@ def readings_are_numbered_and_stamped(e: Capture) -> str:
     return f"{len(seq)} readings, {took.min():.0f} to {took.max():.0f} us apart"
 
 
-@proves("PIK-CAN-04")
-@check("stream", needs={"can"})
+@check("stream", "PIK-CAN-04", needs={"can"})
 def messages_have_their_lengths(e: Capture) -> str:
     """Look at lengths and at bits without a signal."""
     return as_laid_out(e, MESSAGES)
 
 
-@proves("PIK-RES-01")
-@check("power_on", needs={"can"})
-def counters_begin_with_res(e: Capture) -> str:
+@check("power_on", "PIK-RES-01", needs={"can"})
+def counters_begin_with_res(e: Capture, row: Requirement) -> str:
     """Look at SEQ and the totals of the first reading after Res."""
-    row, period_s = row_for(e, "PIK-RES-01"), row_for(e, "PIK-CNT-02").limit("default_us") * 1e-6
+    period_s = row_for(e, "PIK-CNT-02").limit("default_us") * 1e-6
     raw = _told(e, "PIK_COUNTS", 2).raw("PIK_COUNTS")
     _, n = totals(e, 2)
     seq, counts = int(raw["SEQ"][0]), [int(raw[a][0]) for a in "XYZ"]
@@ -378,12 +357,11 @@ def counters_begin_with_res(e: Capture) -> str:
     return f"SEQ {seq}, totals {n[0].tolist()}"
 
 
-@proves("PIK-SIG-01")
-@check("power_on", needs={"pins"})
-def lines_rest_at_their_levels(e: Capture) -> str:
+@check("power_on", "PIK-SIG-01", needs={"pins"})
+def lines_rest_at_their_levels(e: Capture, row: Requirement) -> str:
     """Look at every line before the first pulse or latch that comes when nothing has moved for longer than a pulse."""
     wires_needed(e, *PINS)
-    row, at = row_for(e, "PIK-SIG-01"), _at_rest_ns(e)
+    at = _at_rest_ns(e)
     for name in PINS:
         due = int(row.limits.get(f"{name.lower()}_level", 0))
         if int(e.wires[name].at(at)) != due:
@@ -403,9 +381,8 @@ def _at_rest_ns(e: Capture) -> int:
     return int(found[0]) - 1 - round(e.slack_ns(0.0))
 
 
-@proves("PIK-SIG-01")
-@check("power_cycle", needs={"pins", "supply"})
-def the_clock_rests_low(e: Capture) -> str:
+@check("power_cycle", "PIK-SIG-01", needs={"pins", "supply"})
+def the_clock_rests_low(e: Capture, row: Requirement) -> str:
     """Look at CLK while the board has no power: the longest time without an edge of it."""
     wires_needed(e, "CLK")
     ends = e.wires["CLK"].t_ns
@@ -415,7 +392,7 @@ def the_clock_rests_low(e: Capture) -> str:
     still_ns = int(ends[k + 1] - ends[k])
     if still_ns < 2 * _tclk_ns(e):
         raise Inconclusive(f"CLK moves on: {still_ns} ns without an edge at most")
-    level, due = int(e.wires["CLK"].level[k]), int(row_for(e, "PIK-SIG-01").limits.get("clk_level", 0))
+    level, due = int(e.wires["CLK"].level[k]), int(row.limits.get("clk_level", 0))
     if level != due:
         raise Failed(f"CLK {level} for {still_ns} ns", f"{due} at rest", at_ns=int(ends[k]), lines=("CLK",))
     return f"CLK {level} for {still_ns} ns without power"

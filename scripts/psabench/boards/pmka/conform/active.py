@@ -11,9 +11,8 @@ from psabench.conform.capture.log import CanLog
 from psabench.conform.dictionary import as_the_dictionary_says, identity
 from psabench.conform.dut import Subject
 from psabench.conform.plan import active
-from psabench.conform.proves import proves
 from psabench.conform.registers import names_and_rights
-from psabench.conform.requirements import requirements
+from psabench.conform.requirements import Requirement, requirements
 from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.busport import Cycle
 
@@ -33,15 +32,13 @@ def calm(s: Subject) -> None:
     s.run_for(0.002 + START_S + 2 * ts_s())
 
 
-@proves("PMKA-SAMP-04")
-@active(needs={"bus", "can"})
+@active("PMKA-SAMP-04", needs={"bus", "can"})
 def codes_of_the_bus_are_those_on_can(s: Subject) -> str:
     """Read 00h to 03h within a period, and find these codes on CAN."""
     return _as_on_can(s, 0, 4)
 
 
-@proves("PMKA-BUS-02")
-@active(needs={"bus", "can"})
+@active("PMKA-BUS-02", needs={"bus", "can"})
 def state_registers_are_the_messages(s: Subject) -> str:
     """Read 04h, 05h and 07h within a period, and find resets, rotation and temperature on CAN."""
     return _as_on_can(s, 4, 7)
@@ -84,8 +81,7 @@ def _as_on_can(s: Subject, first: int, end: int) -> str:
     return f"{found} readings as on CAN"
 
 
-@proves("PMKA-BUS-02")
-@active(needs={"bus"})
+@active("PMKA-BUS-02", needs={"bus"})
 def registers_have_their_names_and_rights(s: Subject) -> str:
     """Ask who is there, read and write every address."""
     calm(s)
@@ -95,8 +91,7 @@ def registers_have_their_names_and_rights(s: Subject) -> str:
     return seen
 
 
-@proves("PMKA-CAL-02")
-@active(needs={"bus", "can"})
+@active("PMKA-CAL-02", needs={"bus", "can"})
 def the_computer_turns_the_calibration(s: Subject) -> str:
     """Set mode program, command beats and calibrations, look at TAU, CAL and SERVES."""
     calm(s)
@@ -114,8 +109,7 @@ def the_computer_turns_the_calibration(s: Subject) -> str:
     return "five beats and calibrations as commanded"
 
 
-@proves("PMKA-ROM-01")
-@active(needs={"bus"})
+@active("PMKA-ROM-01", needs={"bus"})
 def the_rom_can_be_read(s: Subject) -> str:
     """Read all words of the ROM by INDEX and DATA."""
     rom = _rom(s)
@@ -124,11 +118,9 @@ def the_rom_can_be_read(s: Subject) -> str:
     return f"{len(rom.degc)} points from {rom.degc[0]:g} to {rom.degc[-1]:g} degC, serial number {rom.serial}"
 
 
-@proves("PMKA-ROM-02")
-@active(needs={"bus"})
-def the_sum_of_the_rom_is_0(s: Subject) -> str:
+@active("PMKA-ROM-02", needs={"bus"})
+def the_sum_of_the_rom_is_0(s: Subject, row: Requirement) -> str:
     """Add all words."""
-    row = requirements()["PMKA-ROM-02"]
     words = _rom_words(s)
     total = sum(words) & 0xFFFF
     if total != row.limit("sum") or words[0] != row.limit("layout"):
@@ -153,11 +145,10 @@ def _rom(s: Subject) -> est.Rom:
         raise Failed(str(err), "a ROM that is whole") from err
 
 
-@proves("PMKA-ROM-03")
-@active(needs={"bus"})
-def the_temperature_stands_still(s: Subject) -> str:
+@active("PMKA-ROM-03", needs={"bus"})
+def the_temperature_stands_still(s: Subject, row: Requirement) -> str:
     """Read TEMPERATURE over a second: it stands still to its noise, within the range of the table of the ROM."""
-    row, rom = requirements()["PMKA-ROM-03"], _rom(s)
+    rom = _rom(s)
     calm(s)
     seen = []
     for _ in range(20):
@@ -173,11 +164,9 @@ def _degc(s: Subject) -> float:
     return float((code - 0x10000 if code & 0x8000 else code) * requirements()["PMKA-ROM-03"].limit("code_degc"))
 
 
-@proves("PMKA-ROM-03")
-@active(needs={"bus", "chamber"})
-def the_temperature_is_that_of_the_chamber(s: Subject) -> str:
+@active("PMKA-ROM-03", needs={"bus", "chamber"})
+def the_temperature_is_that_of_the_chamber(s: Subject, row: Requirement) -> str:
     """Compare TEMPERATURE with the chamber at rest; heat the air for a minute, and see it follow."""
-    row = requirements()["PMKA-ROM-03"]
     calm(s)
     chamber = s.bench.chamber
     air, first, ramp = chamber.temp_degc, _degc(s), chamber.ramp_k_per_min
@@ -197,11 +186,9 @@ def the_temperature_is_that_of_the_chamber(s: Subject) -> str:
     return f"{first:.3f} degC at {air:.3f} degC; {later:.3f} degC while the air has {hot:.3f} degC"
 
 
-@proves("PMKA-BUS-03")
-@active(needs={"bus"})
-def a_reading_that_nobody_took_is_told(s: Subject) -> str:
+@active("PMKA-BUS-03", needs={"bus"})
+def a_reading_that_nobody_took_is_told(s: Subject, row: Requirement) -> str:
     """Read STATUS with and without a read of K in the period before."""
-    row = requirements()["PMKA-BUS-03"]
     waits, missed = int(row.limit("waits_mask")), int(row.limit("missed_mask"))
     calm(s)
     for _ in range(ATTEMPTS):
@@ -232,8 +219,7 @@ def _periods(a: Cycle, b: Cycle) -> float:
     return (b.t_s - a.t_s) / ts_s()
 
 
-@proves("PMKA-BUS-04")
-@active(needs={"bus"})
+@active("PMKA-BUS-04", needs={"bus"})
 def a_read_is_of_its_strobe_s_beginning(s: Subject) -> str:
     """Read SEQ with a strobe of 20 ms, and at once afterwards."""
     calm(s)
@@ -246,8 +232,7 @@ def a_read_is_of_its_strobe_s_beginning(s: Subject) -> str:
     return saw
 
 
-@proves("PMKA-BUS-04")
-@active(needs={"bus", "can"})
+@active("PMKA-BUS-04", needs={"bus", "can"})
 def a_write_acts_at_the_end_of_its_strobe(s: Subject) -> str:
     """Write MODE with a strobe of 20 ms and look from which reading on AUTONOMOUS has changed."""
     calm(s)
@@ -270,11 +255,9 @@ def a_write_acts_at_the_end_of_its_strobe(s: Subject) -> str:
     return saw
 
 
-@proves("PMKA-BUS-05")
-@active(needs={"bus"})
-def what_cannot_be_is_refused(s: Subject) -> str:
+@active("PMKA-BUS-05", needs={"bus"})
+def what_cannot_be_is_refused(s: Subject, row: Requirement) -> str:
     """Read an address that is none, command in mode autonomous, set a beat too short, read before the first reading."""
-    row = requirements()["PMKA-BUS-05"]
     calm(s)
     line_refused(s, "R F", row.limit("no_address_code"))
     line(s, "W 9 1")
@@ -288,8 +271,7 @@ def what_cannot_be_is_refused(s: Subject) -> str:
     return "four refusals with their codes"
 
 
-@proves("PMKA-BUS-06")
-@active(needs={"bus", "can"})
+@active("PMKA-BUS-06", needs={"bus", "can"})
 def resets_are_counted(s: Subject) -> str:
     """Count resets in the readings of a second, and compare them with INDEX 0 to 7."""
     s.reset()
@@ -310,15 +292,13 @@ def resets_are_counted(s: Subject) -> str:
     return f"{counted} counted, {told} told"
 
 
-@proves("PMKA-CAN-05")
-@active(needs={"can"})
+@active("PMKA-CAN-05", needs={"can"})
 def the_board_says_what_it_is(s: Subject) -> str:
     """Read 1008h and 1018h sub 2."""
     return identity(s, "PMKA-CAN-05", "PMKA")
 
 
-@proves("PMKA-CAN-06")
-@active(needs={"can"})
+@active("PMKA-CAN-06", needs={"can"})
 def objects_are_as_the_dictionary_says(s: Subject) -> str:
     """Read every object of the EDS and write where nothing may be written."""
     calm(s)

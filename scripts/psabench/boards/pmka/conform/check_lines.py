@@ -8,7 +8,8 @@ from psabench.boards.pmka.conform.capture_readings import columns
 from psabench.conform.capture.intervals import after, bus_word, first_bad, interval, nearest, wires_needed
 from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
-from psabench.conform.proves import proves, row_for
+from psabench.conform.proves import row_for
+from psabench.conform.requirements import Requirement
 from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.signals import Ints
 
@@ -37,11 +38,9 @@ def samples(e: Capture, least: int = LEAST) -> tuple[Ints, Ints]:
     return rises, bus_word(e, "MUX", 2, rises - 1 - round(e.slack_ns(0.0)))
 
 
-@proves("PMKA-SAMP-01")
-@check("stream", needs={"line"})
-def integrators_are_sampled_every_ts(e: Capture) -> str:
+@check("stream", "PMKA-SAMP-01", needs={"line"})
+def integrators_are_sampled_every_ts(e: Capture, row: Requirement) -> str:
     """Measure from one sample of an integrator to its next."""
-    row = row_for(e, "PMKA-SAMP-01")
     rises, which = samples(e)
     period_ns = row.limit("ts_us") * US
     tolerance_ns = period_ns * row.limit("clock_error_ppm") * 1e-6
@@ -54,11 +53,9 @@ def integrators_are_sampled_every_ts(e: Capture) -> str:
     return seen[0]
 
 
-@proves("PMKA-SAMP-02")
-@check("stream", needs={"line"})
-def four_samples_follow_one_another(e: Capture) -> str:
+@check("stream", "PMKA-SAMP-02", needs={"line"})
+def four_samples_follow_one_another(e: Capture, row: Requirement) -> str:
     """Follow MUX from X to K and measure the steps."""
-    row = row_for(e, "PMKA-SAMP-02")
     rises, which = samples(e)
     due = np.arange(len(which)) % 4
     first_bad(which != due, rises, [f"{'XYZK'[w]} sampled" for w in which], "X, Y, Z, K in turn", SAMPLE)
@@ -68,12 +65,10 @@ def four_samples_follow_one_another(e: Capture) -> str:
     return interval(e, a, b, row.limit("step_us") * US, row.limit("tolerance_us") * US, "from sample to sample", SAMPLE)
 
 
-@proves("PMKA-SAMP-03")
-@check("stream", needs={"pins"})
-def samples_are_held_and_converted(e: Capture) -> str:
+@check("stream", "PMKA-SAMP-03", needs={"pins"})
+def samples_are_held_and_converted(e: Capture, row: Requirement) -> str:
     """Measure SH, and CONV from it."""
     wires_needed(e, *SAMPLE)
-    row = row_for(e, "PMKA-SAMP-03")
     up, down = e.wires.pulses("SH", 1)
     begin, end = after(e.wires.rises("CONV"), up - 1), after(e.wires.falls("CONV"), up)
     if len(up) < LEAST:
@@ -84,12 +79,10 @@ def samples_are_held_and_converted(e: Capture) -> str:
     return interval(e, up, down, hold_ns, tolerance_ns, "of SH high", SAMPLE)
 
 
-@proves("PMKA-RST-02")
-@check("stream", needs={"pins"})
-def resets_last_half_a_period(e: Capture) -> str:
+@check("stream", "PMKA-RST-02", needs={"pins"})
+def resets_last_half_a_period(e: Capture, row: Requirement) -> str:
     """Measure RP1 to RN4, and compare their begin with the samples of their integrators."""
     wires_needed(e, *RESETS)
-    row = row_for(e, "PMKA-RST-02")
     rises, which = samples(e)
     tolerance_ns, seen, count = row.limit("tolerance_us") * US, "", 0
     for k in range(4):
@@ -107,8 +100,7 @@ def resets_last_half_a_period(e: Capture) -> str:
     return f"{count} resets; {seen}"
 
 
-@proves("PMKA-RST-05")
-@check("stream", needs={"pins", "can"})
+@check("stream", "PMKA-RST-05", needs={"pins", "can"})
 def resets_are_told_with_their_signs(e: Capture) -> str:
     """Count positive and negative resets of each integrator on the lines and in the readings."""
     wires_needed(e, *RESETS)
@@ -125,8 +117,7 @@ def resets_are_told_with_their_signs(e: Capture) -> str:
     return f"{sum(seen)} resets on the lines, as many told"
 
 
-@proves("PMKA-CAL-01")
-@check("stream", needs={"pins"})
+@check("stream", "PMKA-CAL-01", needs={"pins"})
 def a_calibrated_integrator_is_off_its_sensor(e: Capture) -> str:
     """Look for alternating resets, which only a calibration makes, while the key is closed."""
     wires_needed(e, *KEYS, *RESETS)
@@ -146,8 +137,7 @@ def a_calibrated_integrator_is_off_its_sensor(e: Capture) -> str:
     return f"{off} resets in turn, all with the key open"
 
 
-@proves("PMKA-ROT-04")
-@check("stream", needs={"line"})
+@check("stream", "PMKA-ROT-04", needs={"line"})
 def three_keys_are_closed_at_any_instant(e: Capture) -> str:
     """Count closed keys at every edge, and half a microsecond after."""
     wires_needed(e, *KEYS)
@@ -159,12 +149,10 @@ def three_keys_are_closed_at_any_instant(e: Capture) -> str:
     return f"{len(at_ns) - 1} moves of keys, three closed at any instant"
 
 
-@proves("PMKA-ROT-05")
-@check("stream", needs={"pins"})
-def keys_move_about_the_sample_of_the_spare(e: Capture) -> str:
+@check("stream", "PMKA-ROT-05", needs={"pins"})
+def keys_move_about_the_sample_of_the_spare(e: Capture, row: Requirement) -> str:
     """Measure from each closing of a key to the sample of K."""
     wires_needed(e, *KEYS)
-    row = row_for(e, "PMKA-ROT-05")
     rises, which = samples(e)
     spare = rises[which == SPARE]
     gap_ns, tolerance_ns = row.limit("gap_us") * US, row.limit("tolerance_us") * US
@@ -183,8 +171,7 @@ def keys_move_about_the_sample_of_the_spare(e: Capture) -> str:
     return seen
 
 
-@proves("PMKA-BUS-01")
-@check("strobes", needs={"pins", "bus"})
+@check("strobes", "PMKA-BUS-01", needs={"pins", "bus"})
 def cycles_are_on_the_bus(e: Capture) -> str:
     """Compare address, R/W and data of each strobe with the cycles that were made."""
     wires_needed(e, "CS", "RW", *ADDRESS, *DATA)
@@ -208,12 +195,10 @@ def cycles_are_on_the_bus(e: Capture) -> str:
     return f"{len(begin)} cycles on CS, RW, AB0..AB3 and D0..D15"
 
 
-@proves("PMKA-SIG-01")
-@check("power_on", needs={"pins"})
-def lines_rest_at_their_levels(e: Capture) -> str:
+@check("power_on", "PMKA-SIG-01", needs={"pins"})
+def lines_rest_at_their_levels(e: Capture, row: Requirement) -> str:
     """Look at every line before the first sample after Res."""
     wires_needed(e, *PINS)
-    row = row_for(e, "PMKA-SIG-01")
     rises, _ = samples(e, 1)
     at = int(rises[0]) - 1 - round(e.slack_ns(0.0))
     for name in PINS:
@@ -223,8 +208,7 @@ def lines_rest_at_their_levels(e: Capture) -> str:
     return f"{len(PINS)} lines at rest"
 
 
-@proves("PMKA-ERR-02")
-@check("power_on", needs={"pins"})
+@check("power_on", "PMKA-ERR-02", needs={"pins"})
 def res_ends_resets(e: Capture) -> str:
     """Look at RP1 to RN4 and the beat between Res and the first sample."""
     wires_needed(e, *RESETS, *TAU)

@@ -11,8 +11,8 @@ from psabench.boards.pmka.conform.capture_readings import CODES, STATE, columns,
 from psabench.conform.capture.log import Capture
 from psabench.conform.capture.messages import as_laid_out, booted, in_turn, late_readings
 from psabench.conform.plan import check
-from psabench.conform.proves import proves, row_for
-from psabench.conform.requirements import requirements
+from psabench.conform.proves import row_for
+from psabench.conform.requirements import Requirement, requirements
 from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.signals import Floats, Ints
 
@@ -35,18 +35,16 @@ def _steady(tau: Floats) -> np.ndarray:
     return same
 
 
-@proves("PMKA-CAN-01")
-@check("stream", needs={"can"})
+@check("stream", "PMKA-CAN-01", needs={"can"})
 def codes_and_state_alternate(e: Capture) -> str:
     """Follow the two messages of each reading."""
     return in_turn(e, (CODES, STATE))
 
 
-@proves("PMKA-CAN-02")
-@check("minute", needs={"can"})
-def readings_are_counted_without_gaps(e: Capture) -> str:
+@check("minute", "PMKA-CAN-02", needs={"can"})
+def readings_are_counted_without_gaps(e: Capture, row: Requirement) -> str:
     """Look at SEQ from reading to reading."""
-    modulo = int(row_for(e, "PMKA-CAN-02").limit("modulo"))
+    modulo = int(row.limit("modulo"))
     seq = columns(e)["SEQ"].astype(np.int64)
     gaps = np.flatnonzero(np.diff(seq) % modulo != 1)
     if len(gaps):
@@ -55,11 +53,10 @@ def readings_are_counted_without_gaps(e: Capture) -> str:
     return f"{len(seq)} readings, SEQ {seq[0]} to {seq[-1]}"
 
 
-@proves("PMKA-CAN-02")
-@check("power_on", needs={"can"})
-def readings_begin_with_0_after_res(e: Capture) -> str:
+@check("power_on", "PMKA-CAN-02", needs={"can"})
+def readings_begin_with_0_after_res(e: Capture, row: Requirement) -> str:
     """Look at SEQ of the first reading after Res; one that was reported late counts those before it."""
-    first = int(row_for(e, "PMKA-CAN-02").limit("first"))
+    first = int(row.limit("first"))
     seq = int(columns(e, 3)["SEQ"][0])
     late = late_readings(
         e,
@@ -73,8 +70,7 @@ def readings_begin_with_0_after_res(e: Capture) -> str:
     return f"SEQ {seq} first"
 
 
-@proves("PMKA-ERR-02")
-@check("power_on", needs={"can"})
+@check("power_on", "PMKA-ERR-02", needs={"can"})
 def res_begins_with_beat_0(e: Capture) -> str:
     """Look at TAU of the first reading after Res, and whether anything was reset before it; later at beat 1."""
     booted(e, "PMKA_HEARTBEAT")
@@ -88,18 +84,15 @@ def res_begins_with_beat_0(e: Capture) -> str:
     return f"TAU {tau} in the first reading, SEQ {seq}"
 
 
-@proves("PMKA-CAN-03")
-@check("stream", needs={"can"})
+@check("stream", "PMKA-CAN-03", needs={"can"})
 def messages_have_their_lengths(e: Capture) -> str:
     """Look at lengths and at bits without a signal."""
     return as_laid_out(e, (CODES, STATE))
 
 
-@proves("PMKA-CAN-04")
-@check("power_on", needs={"stamps"})
-def the_first_sample_comes_in_time(e: Capture) -> str:
+@check("power_on", "PMKA-CAN-04", needs={"stamps"})
+def the_first_sample_comes_in_time(e: Capture, row: Requirement) -> str:
     """Measure from the boot-up message to the first PMKA_CODES."""
-    row = row_for(e, "PMKA-CAN-04")
     boot, log = booted(e, "PMKA_HEARTBEAT"), e.frames_of(CODES)
     if not len(log):
         raise Inconclusive("no PMKA_CODES came")
@@ -111,11 +104,10 @@ def the_first_sample_comes_in_time(e: Capture) -> str:
     return f"{took_ms:.3f} ms from boot-up to the codes of SEQ {seq}"
 
 
-@proves("PMKA-INT-01")
-@check("stream", needs={"can", "inputs"})
-def an_integrator_moves_with_its_input(e: Capture) -> str:
+@check("stream", "PMKA-INT-01", needs={"can", "inputs"})
+def an_integrator_moves_with_its_input(e: Capture, row: Requirement) -> str:
     """Compare steps of codes without a reset with the volts at the input."""
-    row, c = row_for(e, "PMKA-INT-01"), columns(e)
+    c = columns(e)
     steady, seen = _steady(c["TAU"])[1:], []
     for k, axis in enumerate("XYZ"):
         volts = e.inputs_v.get(axis.lower(), 0.0)
@@ -132,27 +124,25 @@ def an_integrator_moves_with_its_input(e: Capture) -> str:
     return f"{', '.join(seen)} V a period for 1 V"
 
 
-@proves("PMKA-INT-04")
-@check("minute", needs={"can", "inputs"})
-def resets_are_as_many_as_the_input_wants(e: Capture) -> str:
+@check("minute", "PMKA-INT-04", needs={"can", "inputs"})
+def resets_are_as_many_as_the_input_wants(e: Capture, row: Requirement) -> str:
     """Count the resets of each axis in a minute: one a period at full scale."""
-    full_v, p = row_for(e, "PMKA-INT-04").limit("full_scale_v"), _periods(e)
+    full_v, p = row.limit("full_scale_v"), _periods(e)
     seen = []
     for axis in range(3):
         serving = p.serves == axis + 1
         made = float((p.reset * serving).sum()) / len(p) * full_v
         volts = e.inputs_v.get("xyz"[axis], 0.0)
-        if abs(made - volts) > row_for(e, "PMKA-INT-04").limit("tolerance_v"):
+        if abs(made - volts) > row.limit("tolerance_v"):
             raise Failed(f"resets for {made:.3f} V on {'XYZ'[axis]}", f"{volts:.3f} V")
         seen.append(f"{made:.3f}")
     return f"resets for {', '.join(seen)} V"
 
 
-@proves("PMKA-INT-04")
-@check("minute", needs={"can", "inputs"})
-def nothing_saturates_below_full_scale(e: Capture) -> str:
+@check("minute", "PMKA-INT-04", needs={"can", "inputs"})
+def nothing_saturates_below_full_scale(e: Capture, row: Requirement) -> str:
     """Look for SATURATED and CLIPPED in a minute."""
-    most, c = row_for(e, "PMKA-INT-04").limit("full_scale_v"), columns(e)
+    most, c = row.limit("full_scale_v"), columns(e)
     if any(abs(v) > most for v in e.inputs_v.values()):
         raise Inconclusive(f"expected inputs of {most:g} V at most")
     for flag in ("SATURATED", "CLIPPED"):
@@ -161,11 +151,10 @@ def nothing_saturates_below_full_scale(e: Capture) -> str:
     return f"{len(c['SEQ'])} readings without SATURATED and CLIPPED"
 
 
-@proves("PMKA-RST-01")
-@check("stream", needs={"can"})
-def resets_follow_codes_beyond_uc(e: Capture) -> str:
+@check("stream", "PMKA-RST-01", needs={"can"})
+def resets_follow_codes_beyond_uc(e: Capture, row: Requirement) -> str:
     """Look for the reset after each code beyond Uc, and for none after one within."""
-    row, c = row_for(e, "PMKA-RST-01"), columns(e)
+    c = columns(e)
     uc, tol, count = row.limit("uc_v"), row.limit("uc_tolerance_v"), 0
     for name in est.INTEGRATORS:
         code, reset = c[name][:-1], c[f"RESET_{name}"][1:]
@@ -184,11 +173,10 @@ def resets_follow_codes_beyond_uc(e: Capture) -> str:
     return f"{count} resets, each after a code beyond {uc:g} V"
 
 
-@proves("PMKA-RST-03")
-@check("minute", needs={"can"})
-def a_reset_moves_the_code_by_its_size(e: Capture) -> str:
+@check("minute", "PMKA-RST-03", needs={"can"})
+def a_reset_moves_the_code_by_its_size(e: Capture, row: Requirement) -> str:
     """Take the steps of calibrated integrators."""
-    row, p = row_for(e, "PMKA-RST-03"), _periods(e)
+    p = _periods(e)
     due, part = row.limit("nr_codes"), row.limit("tolerance_pct") / 100
     sizes = _sizes(p)
     if np.abs(sizes / due - 1).max() > part:
@@ -204,11 +192,10 @@ def _sizes(p: est.Periods) -> Floats:
         raise Inconclusive(str(err)) from err
 
 
-@proves("PMKA-RST-04")
-@check("minute", needs={"can"})
-def the_input_stays_connected_in_a_reset(e: Capture) -> str:
+@check("minute", "PMKA-RST-04", needs={"can"})
+def the_input_stays_connected_in_a_reset(e: Capture, row: Requirement) -> str:
     """Compare increments of periods with a reset, Nr added, with those without."""
-    row, p = row_for(e, "PMKA-RST-04"), _periods(e)
+    p = _periods(e)
     sizes, seen = _sizes(p), []
     for k in range(3):
         home = (p.serves[1:, k] == k + 1) & (p.serves[:-1, k] == k + 1) & (p.serves[1:, 3] != k + 1)
@@ -225,11 +212,10 @@ def the_input_stays_connected_in_a_reset(e: Capture) -> str:
     return f"increments with and without a reset: {'; '.join(seen)} codes"
 
 
-@proves("PMKA-RST-07")
-@check("minute", needs={"can"})
-def the_two_signs_have_sizes_of_their_own(e: Capture) -> str:
+@check("minute", "PMKA-RST-07", needs={"can"})
+def the_two_signs_have_sizes_of_their_own(e: Capture, row: Requirement) -> str:
     """Compare the ratio of Nr(+) and Nr(-) with that of CT(+) and CT(-) in the ROM."""
-    row, run = row_for(e, "PMKA-RST-07"), run_of(e)
+    run = run_of(e)
     sizes, degc = _sizes(run.periods), run.periods.degc.mean(keepdims=True)
     nr = sizes[:, 0] / sizes[:, 1] - 1
     ct = np.array([float(run.rom.ct_at(k, 0, degc)[0] / run.rom.ct_at(k, 1, degc)[0]) - 1 for k in range(4)])
@@ -243,11 +229,10 @@ def the_two_signs_have_sizes_of_their_own(e: Capture) -> str:
     return f"Nr(+)/Nr(-) - 1 = {', '.join(f'{v * 1e6:.0f}' for v in nr)} ppm, as the ROM says"
 
 
-@proves("PMKA-INT-03")
-@check("minute", needs={"can"})
-def a_code_is_worth_what_the_article_says(e: Capture) -> str:
+@check("minute", "PMKA-INT-03", needs={"can"})
+def a_code_is_worth_what_the_article_says(e: Capture, row: Requirement) -> str:
     """Take Sr / Nr of a calibration."""
-    row, p = row_for(e, "PMKA-INT-03"), _periods(e)
+    p = _periods(e)
     ts_s = row_for(e, "PMKA-SAMP-01").limit("ts_us") * 1e-6
     quanta = np.array([est.quantum_vs(float(nr), ts_s) for nr in _sizes(p).reshape(-1)])
     due, part = row.limit("quantum_vs"), row.limit("tolerance_pct") / 100
@@ -256,22 +241,19 @@ def a_code_is_worth_what_the_article_says(e: Capture) -> str:
     return f"{quanta.min():.4g} to {quanta.max():.4g} V s a code"
 
 
-@proves("PMKA-INT-02")
-@check("minute", needs={"can", "inputs"})
-def a_minute_is_integrated_without_a_gap(e: Capture) -> str:
+@check("minute", "PMKA-INT-02", needs={"can", "inputs"})
+def a_minute_is_integrated_without_a_gap(e: Capture, row: Requirement) -> str:
     """Sum all increments of a minute by the article's equations and compare them with the input."""
     run = run_of(e)
     integral = est.integrals_vs(run.periods, run.rom, run.calibrations)
-    return largest(e, run, integral, row_for(e, "PMKA-INT-02").limit("velocity_error_max_mmps"))
+    return largest(e, run, integral, row.limit("velocity_error_max_mmps"))
 
 
-@proves("PMKA-RST-06")
-@check("minute", needs={"can", "inputs"})
-def the_capacitor_does_not_matter(e: Capture) -> str:
+@check("minute", "PMKA-RST-06", needs={"can", "inputs"})
+def the_capacitor_does_not_matter(e: Capture, row: Requirement) -> str:
     """The same where capacitors lose some of their value, which the size of resets must show."""
     run = run_of(e)
     took_h = (run.calibrations[0].nr_at[-1] - run.calibrations[0].nr_at[0]) * run.rom.ts_s / 3600
-    row = row_for(e, "PMKA-RST-06")
     grown = float(run.calibrations[0].nr[-1].mean() / run.calibrations[0].nr[0].mean()) - 1
     due = -float(e.variant["cap_ageing_per_h"]) * took_h
     if abs(grown - due) > row.limit("growth_tolerance_pct") / 100 * due:
@@ -281,11 +263,10 @@ def the_capacitor_does_not_matter(e: Capture) -> str:
     return f"Nr grows by {grown * 1e6:.0f} ppm; {seen}"
 
 
-@proves("PMKA-ROT-07")
-@check("minute", needs={"can", "inputs"})
-def a_sum_across_hand_overs_is_wrong(e: Capture) -> str:
+@check("minute", "PMKA-ROT-07", needs={"can", "inputs"})
+def a_sum_across_hand_overs_is_wrong(e: Capture, row: Requirement) -> str:
     """Sum the codes as if one integrator had the axis all the time, and as they should be."""
-    row, run = row_for(e, "PMKA-ROT-07"), run_of(e)
+    run = run_of(e)
     p, out = run.periods, np.zeros((len(run.periods), 3))
     for axis in range(3):
         has: Ints = np.where(p.serves[:, 3] == axis + 1, 3, axis)
@@ -300,8 +281,7 @@ def a_sum_across_hand_overs_is_wrong(e: Capture) -> str:
     return f"{wrong:.0f} mm/s off; as they should be {largest(e, run, right, row.limit('right_max_mmps'))}"
 
 
-@proves("PMKA-CAL-01")
-@check("minute", needs={"can"})
+@check("minute", "PMKA-CAL-01", needs={"can"})
 def calibration_is_first_of_zero_then_of_resets(e: Capture) -> str:
     """Follow CAL in each beat, and look who serves no one meanwhile."""
     c, p = columns(e), _periods(e)
@@ -322,11 +302,10 @@ def calibration_is_first_of_zero_then_of_resets(e: Capture) -> str:
     return f"{count} beats, first the zero, then resets"
 
 
-@proves("PMKA-CAL-03")
-@check("minute", needs={"can"})
-def beats_have_their_lengths(e: Capture) -> str:
+@check("minute", "PMKA-CAL-03", needs={"can"})
+def beats_have_their_lengths(e: Capture, row: Requirement) -> str:
     """Count the periods of each beat, and those of its zero and its resets."""
-    row, c = row_for(e, "PMKA-CAL-03"), columns(e)
+    c = columns(e)
     turns = np.flatnonzero(np.diff(c["TAU"])) + 1
     if len(turns) < 3:
         raise Inconclusive(f"{len(turns)} changes of the beat")
@@ -339,15 +318,13 @@ def beats_have_their_lengths(e: Capture) -> str:
     return f"{len(turns) - 1} beats of {due[0]} periods, {due[1]} for the zero, {due[2]} for resets"
 
 
-@proves("PMKA-ROT-01")
-@check("minute", needs={"can"})
+@check("minute", "PMKA-ROT-01", needs={"can"})
 def in_beat_1_the_spare_is_free(e: Capture) -> str:
     """Look at SERVES in the middle of beat 1."""
     return _serves(e, 1, HOME)
 
 
-@proves("PMKA-ROT-02")
-@check("minute", needs={"can"})
+@check("minute", "PMKA-ROT-02", needs={"can"})
 def the_spare_serves_x_y_z_in_turn(e: Capture) -> str:
     """Look at SERVES in the middle of beats 2, 3 and 4."""
     seen = ""
@@ -358,8 +335,7 @@ def the_spare_serves_x_y_z_in_turn(e: Capture) -> str:
     return seen
 
 
-@proves("PMKA-ROT-03")
-@check("minute", needs={"can"})
+@check("minute", "PMKA-ROT-03", needs={"can"})
 def in_beat_5_the_spare_is_free(e: Capture) -> str:
     """Look at SERVES in the middle of beat 5."""
     return _serves(e, 5, HOME)
@@ -377,8 +353,7 @@ def _serves(e: Capture, tau: int, due: tuple[int, ...]) -> str:
     return f"{int(mine.sum())} readings of beat {tau}, SERVES {list(due)}"
 
 
-@proves("PMKA-ROT-04")
-@check("minute", needs={"can"})
+@check("minute", "PMKA-ROT-04", needs={"can"})
 def each_axis_has_an_integrator(e: Capture) -> str:
     """Look for each axis in SERVES of each reading: once, twice around a hand-over."""
     p, c = _periods(e), columns(e)
@@ -395,11 +370,10 @@ def each_axis_has_an_integrator(e: Capture) -> str:
     return f"{len(p)} readings, {twice} hand-overs"
 
 
-@proves("PMKA-ROT-06")
-@check("minute", needs={"can", "inputs"})
-def nothing_is_lost_in_a_hand_over(e: Capture) -> str:
+@check("minute", "PMKA-ROT-06", needs={"can", "inputs"})
+def nothing_is_lost_in_a_hand_over(e: Capture, row: Requirement) -> str:
     """Sum the increments of both integrators in the readings of hand-overs."""
-    row, run = row_for(e, "PMKA-ROT-06"), run_of(e)
+    run = run_of(e)
     p = run.periods
     ds = np.column_stack([est.increments_vs(p, k, run.calibrations[k], run.rom) for k in range(4)])
     step_us, ts_us = row_for(e, "PMKA-SAMP-02").limit("step_us"), row_for(e, "PMKA-SAMP-01").limit("ts_us")

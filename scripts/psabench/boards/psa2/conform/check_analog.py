@@ -11,7 +11,8 @@ from psabench.boards.psa2.conform.check_stream import number
 from psabench.boards.psa2.conform.stimulus_can import FACTOR, OFFSET, Answer
 from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
-from psabench.conform.proves import proves, row_for
+from psabench.conform.proves import row_for
+from psabench.conform.requirements import Requirement
 from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.signals import Floats
 
@@ -27,8 +28,7 @@ def _inputs(e: Capture) -> dict[int, float]:
     return found
 
 
-@proves("PSA2-ADC-01", "PSA1-ADC-01")
-@check("quiet", needs={"inputs"})
+@check("quiet", "PSA2-ADC-01", "PSA1-ADC-01", needs={"inputs"})
 def codes_are_volts(e: Capture) -> str:
     """Compare the mean code of each axis with the volts at its load."""
     p, row = pairs(e, 100), row_for(e, "PSA2-ADC-01")
@@ -43,12 +43,11 @@ def codes_are_volts(e: Capture) -> str:
     return ", ".join(said)
 
 
-@proves("PSA2-ADC-02")
-@check("quiet", needs={"inputs"})
-def codes_have_the_sign_of_the_volts(e: Capture) -> str:
+@check("quiet", "PSA2-ADC-02", needs={"inputs"})
+def codes_have_the_sign_of_the_volts(e: Capture, row: Requirement) -> str:
     """Compare signs."""
     p = pairs(e)
-    least = row_for(e, "PSA2-ADC-02").limit("least_v")
+    least = row.limit("least_v")
     seen = {k: v for k, v in _inputs(e).items() if abs(v) >= least}
     if not seen:
         raise Inconclusive(f"no input is {least:g} V or more from zero")
@@ -68,11 +67,9 @@ def _settled(e: Capture, name: str, least: int = LEAST) -> Pairs:
     return pairs(segment(e, name, f"{name} end"), least)
 
 
-@proves("PSA2-CHIP-05")
-@check("numbers")
-def ofc_and_fsc_act_as_they_should(e: Capture) -> str:
+@check("numbers", "PSA2-CHIP-05")
+def ofc_and_fsc_act_as_they_should(e: Capture, row: Requirement) -> str:
     """Write an offset and a factor, and compare the codes with those before."""
-    row = row_for(e, "PSA2-CHIP-05")
     before = _settled(e, "as it was")
     raw = before.code[_sound(e, before)]
     unity = row.limit("fsc_unity_code")
@@ -95,11 +92,10 @@ def ofc_and_fsc_act_as_they_should(e: Capture) -> str:
     return ", ".join(said)
 
 
-@proves("PSA2-ADC-03")
-@check("numbers", needs={"inputs"})
-def clip_tells_of_any_axis(e: Capture) -> str:
+@check("numbers", "PSA2-ADC-03", needs={"inputs"})
+def clip_tells_of_any_axis(e: Capture, row: Requirement) -> str:
     """Drive one axis beyond full scale, the others not: the code of that one at its limit, and CLIP."""
-    row, said = row_for(e, "PSA2-ADC-03"), []
+    said = []
     alone = fact(e, "alone")
     if set(alone) != {"one high", "one low"}:
         raise Inconclusive("the inputs of the three axes lie too near to each other for one to be driven beyond alone")
@@ -114,11 +110,9 @@ def clip_tells_of_any_axis(e: Capture) -> str:
     return f"{', then '.join(said)} alone at its limit, with CLIP"
 
 
-@proves("PSA2-ADC-03")
-@check("numbers")
-def codes_stop_at_their_limits(e: Capture) -> str:
+@check("numbers", "PSA2-ADC-03")
+def codes_stop_at_their_limits(e: Capture, row: Requirement) -> str:
     """Drive the codes beyond full scale, either way, by OFC and FSC: the code at its limit, CLIP, no wrap."""
-    row = row_for(e, "PSA2-ADC-03")
     if _settled(e, "as it was").clip.any():
         raise Failed("CLIP at an input within range", "0", frames=_settled(e, "as it was").frames[:3])
     for name, limit in (("high", "code_max"), ("low", "code_min")):
@@ -155,12 +149,10 @@ def _step(e: Capture) -> tuple[Pairs, int, Floats]:
     return p, first, y
 
 
-@proves("PSA2-ADC-06")
-@check("gain")
-def a_step_settles_in_its_time(e: Capture) -> str:
+@check("gain", "PSA2-ADC-06")
+def a_step_settles_in_its_time(e: Capture, row: Requirement) -> str:
     """Change the gain while frames flow: after how many frames do the codes stand?"""
     p, first, y = _step(e)
-    row = row_for(e, "PSA2-ADC-06")
     due = int(row.limit("settling_max_frames"))
     swing = np.abs(p.code[-50:].mean(axis=0) - p.code[:50].mean(axis=0))
     noise = row.limit("noise_max_sigma") * p.code[-50:].std(axis=0)
@@ -191,11 +183,9 @@ def _response_db(e: Capture, per_rate: float) -> float:
     return 20.0 * float(np.log10(max(abs(complex((impulse * wave).sum())) / rectangle, 1e-9)))
 
 
-@proves("PSA2-ADC-07")
-@check("gain")
-def the_filter_stops_above_its_band(e: Capture) -> str:
+@check("gain", "PSA2-ADC-07")
+def the_filter_stops_above_its_band(e: Capture, row: Requirement) -> str:
     """Response to a step of the gain: how much of half the data rate is left?"""
-    row = row_for(e, "PSA2-ADC-07")
     band_db = _response_db(e, row.limit("passband_per_rate"))
     stop_db = _response_db(e, row.limit("stop_per_rate"))
     if band_db - stop_db < row.limit("stop_min_db"):
@@ -203,11 +193,9 @@ def the_filter_stops_above_its_band(e: Capture) -> str:
     return f"{band_db:.2f} dB in the pass band, {stop_db:.0f} dB at half the data rate"
 
 
-@proves("PSA2-CHIP-06")
-@check("gain")
-def the_filter_has_its_corner(e: Capture) -> str:
+@check("gain", "PSA2-CHIP-06")
+def the_filter_has_its_corner(e: Capture, row: Requirement) -> str:
     """Response to a step of the gain at the corner and in the pass band."""
-    row = row_for(e, "PSA2-CHIP-06")
     corner = (row.limit("corner_per_rate"), row.limit("corner_db"), row.limit("tolerance_db"))
     inside = (row.limit("passband_1_per_rate"), row.limit("passband_2_per_rate"))
     for per_rate, due_db, slack_db in (corner, *((f, 0.0, row.limit("passband_db")) for f in inside)):
@@ -219,15 +207,13 @@ def the_filter_has_its_corner(e: Capture) -> str:
     )
 
 
-@proves("PSA2-READ-10")
-@check("gain")
-def three_axes_move_together(e: Capture) -> str:
+@check("gain", "PSA2-READ-10")
+def three_axes_move_together(e: Capture, row: Requirement) -> str:
     """Change the gain of all three converters: is the step in the three codes of the same frames?"""
     p, first, y = _step(e)
     part = y[max(first - 2, 0) : first + 70]
     apart = np.abs(part - part[:, :1]).max(axis=0)
     swing = np.abs(p.code[-50:].mean(axis=0) - p.code[:50].mean(axis=0))
-    row = row_for(e, "PSA2-READ-10")
     most = row.limit("apart_max_ppm") * 1e-6
     noise = row.limit("noise_max_sigma") * p.code[-50:].std(axis=0) * (1 / swing + 1 / swing[0])
     if (apart > most + noise).any():
@@ -236,11 +222,10 @@ def three_axes_move_together(e: Capture) -> str:
     return f"steps of three axes alike to {apart.max() * 1e6:.0f} ppm"
 
 
-@proves("PSA2-ADC-08")
-@check("gain")
-def settled_tells_of_a_new_gain(e: Capture) -> str:
+@check("gain", "PSA2-ADC-08")
+def settled_tells_of_a_new_gain(e: Capture, row: Requirement) -> str:
     """Count the frames without SETTLED after a write of CONFIG1."""
-    p, due = pairs(e, 100), int(row_for(e, "PSA2-ADC-08").limit("unsettled_frames"))
+    p, due = pairs(e, 100), int(row.limit("unsettled_frames"))
     off = np.flatnonzero(~p.settled)
     if len(off) != due or (len(off) and off[-1] - off[0] + 1 != due):
         raise Failed(
@@ -252,12 +237,10 @@ def settled_tells_of_a_new_gain(e: Capture) -> str:
     return f"{len(off)} frames without SETTLED in a row"
 
 
-@proves("PSA2-REG-08")
-@check("gain")
-def a_write_changes_all_codes(e: Capture) -> str:
+@check("gain", "PSA2-REG-08")
+def a_write_changes_all_codes(e: Capture, row: Requirement) -> str:
     """Write CONFIG1 through 2000h: the registers and the codes of all axes."""
     p, _, _ = _step(e)
-    row = row_for(e, "PSA2-REG-08")
     for a in fact(e, "read"):
         if number(a) != int(row.limit("config1_code")):
             raise Failed(f"CONFIG1 {number(a):02X}h", "0Ah on each converter")
@@ -270,11 +253,9 @@ def a_write_changes_all_codes(e: Capture) -> str:
 # ---- noise, damage, temperatures
 
 
-@proves("PSA2-CHIP-07", "PSA1-CHIP-01")
-@check("quiet", needs={"can", "inputs"})
-def noise_is_the_published_one(e: Capture) -> str:
+@check("quiet", "PSA2-CHIP-07", "PSA1-CHIP-01", needs={"can", "inputs"})
+def noise_is_the_published_one(e: Capture, row: Requirement) -> str:
     """Standard deviation of the codes at quiet inputs; words that another port damaged are left out."""
-    row = row_for(e, "PSA2-CHIP-07", "PSA1-CHIP-01")
     p = pairs(e, int(row.limit("readings_count")))
     code_uv = row_for(e, "PSA2-ADC-01").limit("code_uv")
     sound = _sound(e, p)
@@ -295,8 +276,7 @@ def _sound(e: Capture, p: Pairs) -> np.ndarray:
     return sound
 
 
-@proves("PSA2-SIG-12")
-@check("quiet", needs={"can", "inputs"})
+@check("quiet", "PSA2-SIG-12", needs={"can", "inputs"})
 def no_word_is_damaged_by_the_other_port(e: Capture) -> str:
     """Look for single codes far from the others while temperatures are scanned."""
     p = pairs(e, 100)
@@ -311,11 +291,10 @@ def no_word_is_damaged_by_the_other_port(e: Capture) -> str:
     return f"{len(p)} samples, none off by more than noise"
 
 
-@proves("PSA2-SIG-13")
-@check("quiet", needs={"can", "inputs"})
-def bursts_damage_words_where_nothing_gates_them(e: Capture) -> str:
+@check("quiet", "PSA2-SIG-13", needs={"can", "inputs"})
+def bursts_damage_words_where_nothing_gates_them(e: Capture, row: Requirement) -> str:
     """Count single codes far from the others."""
-    p, row = pairs(e, 100), row_for(e, "PSA2-SIG-13")
+    p = pairs(e, 100)
     bad = int((~_sound(e, p)).sum())
     if bad < row.limit("wrong_min_frames") or bad > row.limit("wrong_max_pct") / 100 * len(p):
         due = f"{row.limit('wrong_min_frames')} and more, at most {row.limit('wrong_max_pct'):g} %"
@@ -323,11 +302,10 @@ def bursts_damage_words_where_nothing_gates_them(e: Capture) -> str:
     return f"{bad} wrong frames of {len(p)}"
 
 
-@proves("PSA2-TEMP-04")
-@check("chamber", needs={"chamber"})
-def temperature_codes_are_kelvins(e: Capture) -> str:
+@check("chamber", "PSA2-TEMP-04", needs={"chamber"})
+def temperature_codes_are_kelvins(e: Capture, row: Requirement) -> str:
     """Compare the code of the converter board's sensor with the temperature of the chamber."""
-    p, row = pairs(e), row_for(e, "PSA2-TEMP-04")
+    p = pairs(e)
     temp_degc = fact(e, "temp_degc")
     codes = p.temp[(p.channel == int(row.limit("channel_code"))) & (p.temp != 0)]
     if not len(codes):

@@ -13,7 +13,7 @@ from psabench.boards.psa2.conform.check_stream import MESSAGES, US, number, unit
 from psabench.boards.psa2.conform.stimulus_can import Answer
 from psabench.conform.capture.log import CanLog, Capture
 from psabench.conform.plan import check
-from psabench.conform.proves import proves, row_for
+from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement
 from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link import signals
@@ -44,11 +44,9 @@ def _form(e: Capture, form: int, name: str, least: int = LEAST) -> CanLog:
     return log
 
 
-@proves("PSA2-FORM-01")
-@check("forms")
-def the_fast_form_drops_bits(e: Capture) -> str:
+@check("forms", "PSA2-FORM-01")
+def the_fast_form_drops_bits(e: Capture, row: Requirement) -> str:
     """Compare the codes of form 1 with those of form 0 at the same inputs."""
-    row = row_for(e, "PSA2-FORM-01")
     raw = _form(e, 1, "PSA2_FAST").raw("PSA2_FAST")
     pair = pairs(segment(e, "form 0", "form 0 end"))
     fast = np.stack([raw[a] for a in "XYZ"], axis=1)
@@ -77,8 +75,7 @@ def _apart(a: Floats, b: Floats) -> tuple[float, float]:
     return float(a.mean() - b.mean()), float(np.sqrt(a.var() / len(a) + b.var() / len(b)))
 
 
-@proves("PSA2-FORM-02")
-@check("forms")
+@check("forms", "PSA2-FORM-02")
 def tog_alternates(e: Capture) -> str:
     """Follow TOG through the frames of form 1."""
     log = _form(e, 1, "PSA2_FAST")
@@ -98,22 +95,19 @@ def _fd(log: CanLog, name: str) -> None:
         raise Failed(f"{name} without bit rate switch", "with it", frames=slow[:3])
 
 
-@proves("PSA2-FORM-03")
-@check("forms", needs={"fd"})
-def form_2_is_one_fd_frame_a_sample(e: Capture) -> str:
+@check("forms", "PSA2-FORM-03", needs={"fd"})
+def form_2_is_one_fd_frame_a_sample(e: Capture, row: Requirement) -> str:
     """Look at the frames of form 2: form, length, time stamps."""
     log = _form(e, 2, "PSA2_FRAME")
     _fd(log, "PSA2_FRAME")
-    return f"{len(log)} FD frames, {_evenly(e, row_for(e, 'PSA2-FORM-03'), log.raw('PSA2_FRAME')['TSTAMP'], 1)}"
+    return f"{len(log)} FD frames, {_evenly(e, row, log.raw('PSA2_FRAME')['TSTAMP'], 1)}"
 
 
-@proves("PSA2-FORM-04")
-@check("forms", needs={"fd"})
-def form_3_is_one_fd_frame_every_five_samples(e: Capture) -> str:
+@check("forms", "PSA2-FORM-04", needs={"fd"})
+def form_3_is_one_fd_frame_every_five_samples(e: Capture, row: Requirement) -> str:
     """Look at the frames of form 3: form, length, time stamps."""
     log = _form(e, 3, "PSA2_BLOCK")
     _fd(log, "PSA2_BLOCK")
-    row = row_for(e, "PSA2-FORM-04")
     samples = int(row.limit("samples_count"))
     return f"{len(log)} FD frames, {_evenly(e, row, log.raw('PSA2_BLOCK')['TSTAMP'], samples)}"
 
@@ -128,8 +122,7 @@ def _evenly(e: Capture, row: Requirement, stamp_us: Ints, samples: int) -> str:
     return f"{due:.0f} us apart"
 
 
-@proves("PSA2-FORM-05")
-@check("forms", needs={"fd"})
+@check("forms", "PSA2-FORM-05", needs={"fd"})
 def a_block_begins_anew_after_a_stop(e: Capture) -> str:
     """Stop the stream and start it: is the first sample of the block one after the start?"""
     stamps = e.facts.get("stamps")
@@ -149,11 +142,10 @@ def a_block_begins_anew_after_a_stop(e: Capture) -> str:
     return f"in {len(stamps)} starts the first sample of the first block comes after the stop"
 
 
-@proves("PSA2-FORM-06")
-@check("forms")
-def a_form_switches_its_tpdos(e: Capture) -> str:
+@check("forms", "PSA2-FORM-06")
+def a_form_switches_its_tpdos(e: Capture, row: Requirement) -> str:
     """Read bit 31 of the TPDOs in each form."""
-    mask = int(row_for(e, "PSA2-FORM-06").limit("off_mask"))
+    mask = int(row.limit("off_mask"))
     sends = {0: (0, 1), 1: (2,), 2: (4,), 3: (3,)}
     for form, on in sends.items():
         off = e.facts.get(f"off {form}")
@@ -167,8 +159,7 @@ def a_form_switches_its_tpdos(e: Capture) -> str:
     return "bit 31 clear for what each form sends, set for the others"
 
 
-@proves("PSA2-FORM-08")
-@check("forms", needs={"fd"})
+@check("forms", "PSA2-FORM-08", needs={"fd"})
 def fd_frames_are_those_of_two_forms(e: Capture) -> str:
     """Look at the form of every frame."""
     fd = {int(message(n).frame_id) - 5 + e.node for n in ("PSA2_FRAME", "PSA2_BLOCK")}
@@ -181,9 +172,8 @@ def fd_frames_are_those_of_two_forms(e: Capture) -> str:
 # ---- sample modes
 
 
-@proves("PSA2-SAMP-02")
-@check("sync")
-def each_sync_takes_one_sample(e: Capture) -> str:
+@check("sync", "PSA2-SAMP-02")
+def each_sync_takes_one_sample(e: Capture, row: Requirement) -> str:
     """Send SYNC frames in sample mode 1: one sample each, sampled at or after it."""
     cuts = [f"SYNC {k}" for k in range(10)] + ["SYNC end"]
     for a, b in itertools.pairwise(cuts):
@@ -194,28 +184,26 @@ def each_sync_takes_one_sample(e: Capture) -> str:
     begin = segment(e, cuts[0], cuts[-1])
     p = pairs(begin, LEAST)
     gaps = p.steps
-    far = e.facts.get("paced", True) and (gaps > int(row_for(e, "PSA2-SAMP-02").limit("apart_max_frames"))).any()
+    far = e.facts.get("paced", True) and (gaps > int(row.limit("apart_max_frames"))).any()
     if (gaps < 1).any() or far:
         raise Failed(f"SEQ {p.seq.tolist()}", "rising, one for each SYNC", frames=p.frames)
     return f"one sample for each of {len(p)} SYNCs"
 
 
-@proves("PSA2-SAMP-02")
-@check("sync", needs={"lockstep"})
-def a_sample_of_a_sync_is_not_older_than_it(e: Capture) -> str:
+@check("sync", "PSA2-SAMP-02", needs={"lockstep"})
+def a_sample_of_a_sync_is_not_older_than_it(e: Capture, row: Requirement) -> str:
     """Compare TSTAMP with the instant at which SYNC was sent."""
     wrap_us = unit_us(e) * (1 << STAMP_BITS)
     for k in range(10):
         p = pairs(segment(e, f"SYNC {k}", f"SYNC {k + 1}" if k < 9 else "SYNC end"), 1)
         since = (p.stamp[0] * unit_us(e) - e.marks[f"SYNC {k}"] / US) % wrap_us
-        most_us = row_for(e, "PSA2-SAMP-02").limit("after_max_us")
+        most_us = row.limit("after_max_us")
         if since > most_us:
             raise Failed(f"a sample {wrap_us - since:.0f} us before its SYNC", "at or after it", frames=p.frames)
     return "every sample at or after its SYNC, within a period"
 
 
-@proves("PSA2-SAMP-03")
-@check("rates")
+@check("rates", "PSA2-SAMP-03")
 def every_nth_frame_is_sent(e: Capture) -> str:
     """Sample mode 2 with N = 4: SEQ of what comes, at every data rate."""
     seen = 0
@@ -228,11 +216,10 @@ def every_nth_frame_is_sent(e: Capture) -> str:
     return f"{seen} samples, SEQ a multiple of 4"
 
 
-@proves("PSA2-READ-08")
-@check("rates")
-def the_frame_period_follows_dr(e: Capture) -> str:
+@check("rates", "PSA2-READ-08")
+def the_frame_period_follows_dr(e: Capture, row: Requirement) -> str:
     """Write CONFIG0 with each DR and measure TSTAMP against SEQ."""
-    row, said = row_for(e, "PSA2-READ-08"), []
+    said = []
     for dr in range(5):
         if e.facts.get(f"answer {dr}") != Answer():
             raise Failed(f"CONFIG0 with DR {dr:03b} answered by {e.facts.get(f'answer {dr}')}", "it is taken")
@@ -249,11 +236,10 @@ def the_frame_period_follows_dr(e: Capture) -> str:
     return f"{', '.join(said)} us"
 
 
-@proves("PSA2-SAMP-04")
-@check("sync")
-def sync_starts_the_filters_anew(e: Capture) -> str:
+@check("sync", "PSA2-SAMP-04")
+def sync_starts_the_filters_anew(e: Capture, row: Requirement) -> str:
     """SYNC with 2024h = 1: the pause in TSTAMP, and SEQ after it."""
-    row, ended = row_for(e, "PSA2-SAMP-04"), len(segment(e, "pulse", "pulse end").frames_of("PSA2_ZT"))
+    ended = len(segment(e, "pulse", "pulse end").frames_of("PSA2_ZT"))
     p = pairs(segment(e, "SYNC end", "pulse end"), LEAST)
     p = p.where(np.arange(len(p)) >= len(p) - ended - 1)  # from the last whole sample before the pulse on
     pause_ms = np.diff(p.stamp) * unit_us(e) * 1e-3
@@ -266,12 +252,10 @@ def sync_starts_the_filters_anew(e: Capture) -> str:
     return f"a pause of {pause_ms[k]:.3f} ms, SEQ goes on"
 
 
-@proves("PSA2-SAMP-04")
-@check("sync", needs={"pins"})
-def sync_pulses_sync_a(e: Capture) -> str:
+@check("sync", "PSA2-SAMP-04", needs={"pins"})
+def sync_pulses_sync_a(e: Capture, row: Requirement) -> str:
     """SYNC with 2024h = 1: the pulse on SYNC_A, and the fall of DRD_A after it."""
     up, _down = e.wires.pulses("SYNC_A", 1)
-    row = row_for(e, "PSA2-SAMP-04")
     if len(up) != 1:
         raise Failed(
             f"{len(up)} pulses on SYNC_A",
@@ -293,11 +277,9 @@ def sync_pulses_sync_a(e: Capture) -> str:
     return f"SYNC_A, then DRD_A {settled_ms:.4f} ms later"
 
 
-@proves("PSA2-CHIP-04")
-@check("rates", needs={"pins"})
-def filters_settle_in_their_time_at_each_rate(e: Capture) -> str:
+@check("rates", "PSA2-CHIP-04", needs={"pins"})
+def filters_settle_in_their_time_at_each_rate(e: Capture, row: Requirement) -> str:
     """Pulse SYNC_A at each data rate and measure the next fall of DRD_A."""
-    row = row_for(e, "PSA2-CHIP-04")
     up, _ = e.wires.pulses("SYNC_A", 1)
     falls = e.wires.falls("DRD_A")
     if len(up) != 5:

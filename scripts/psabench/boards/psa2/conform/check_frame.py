@@ -7,7 +7,7 @@ import numpy as np
 from psabench.boards.psa2.conform.capture_line import WORDS, Transfers, transfers
 from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
-from psabench.conform.proves import proves, row_for
+from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement
 from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.signals import Floats, Ints
@@ -42,11 +42,10 @@ def _first(bad: np.ndarray, at_ns: Ints, saw: Floats, due: str, unit: str = "ns"
         raise Failed(f"{saw[k]:.3f} {unit} ({int(bad.sum())} of {len(bad)})", due, at_ns=int(at_ns[k]), lines=LINES)
 
 
-@proves("PSA2-FRAME-01")
-@check("stream", needs={"line"})
-def a_transfer_has_four_words(e: Capture) -> str:
+@check("stream", "PSA2-FRAME-01", needs={"line"})
+def a_transfer_has_four_words(e: Capture, row: Requirement) -> str:
     """Count the groups of pulses of CLK in each transfer that pauses set apart."""
-    t, row = transfers(e.wires), row_for(e, "PSA2-FRAME-01")
+    t = transfers(e.wires)
     due, apart_ns = int(row.limit("words_count")), row.limit("apart_min_clk") * _clk_ns(e)
     for fall, rises in zip(t.fall_ns, t.rises, strict=True):
         count = int((np.diff(rises) > apart_ns).sum()) + (len(rises) > 0)
@@ -55,8 +54,7 @@ def a_transfer_has_four_words(e: Capture) -> str:
     return f"{len(t)} transfers of {due} words"
 
 
-@proves("PSA2-FRAME-06", "PSA2-FRAME-07", "PSA2-FRAME-08")
-@check("stream", needs={"line"})
+@check("stream", "PSA2-FRAME-06", "PSA2-FRAME-07", "PSA2-FRAME-08", needs={"line"})
 def words_have_their_bits_at_their_clock(e: Capture) -> str:
     """Count the pulses of CLK in each transfer and measure their period."""
     t, clk_ns = _whole(e), _clk_ns(e)
@@ -68,12 +66,10 @@ def words_have_their_bits_at_their_clock(e: Capture) -> str:
     return f"{len(t)} transfers of {WORDS} words of {bits} bits, CLK {1e3 / word_ns.mean():.6f} MHz"
 
 
-@proves("PSA2-FRAME-02")
-@check("stream", needs={"line"})
-def words_are_apart(e: Capture) -> str:
+@check("stream", "PSA2-FRAME-02", needs={"line"})
+def words_are_apart(e: Capture, row: Requirement) -> str:
     """Measure the pauses between the words of a transfer."""
     t, clk_ns, bits = _whole(e), _clk_ns(e), _word_bits(e)
-    row = row_for(e, "PSA2-FRAME-02")
     due_ns = row.limit("rise_to_rise_clk") * clk_ns
     rises = t.grid_ns(bits)
     pause_ns = (rises[:, bits::bits] - rises[:, bits - 1 : -1 : bits]).reshape(-1)
@@ -83,8 +79,7 @@ def words_are_apart(e: Capture) -> str:
     return f"{len(pause_ns)} pauses of {pause_ns.min() / clk_ns - 1:.3f} to {pause_ns.max() / clk_ns - 1:.3f} CLK"
 
 
-@proves("PSA2-FRAME-09", "PSA2-INT-01")
-@check("stream", needs={"line"})
+@check("stream", "PSA2-FRAME-09", "PSA2-INT-01", needs={"line"})
 def clk_runs_only_with_data(e: Capture) -> str:
     """Look for pulses of CLK outside transfers, and for more or fewer than one a bit within them."""
     t = _whole(e)
@@ -97,12 +92,10 @@ def clk_runs_only_with_data(e: Capture) -> str:
     return f"{len(rises)} pulses, all within {len(t)} transfers"
 
 
-@proves("PSA2-FRAME-10")
-@check("stream", needs={"line"})
-def data_stand_still_around_each_rise_of_clk(e: Capture) -> str:
+@check("stream", "PSA2-FRAME-10", needs={"line"})
+def data_stand_still_around_each_rise_of_clk(e: Capture, row: Requirement) -> str:
     """Look for changes of Data near a rise of CLK."""
     t, clk_ns = _whole(e), _clk_ns(e)
-    row = row_for(e, "PSA2-FRAME-10")
     changes = e.wires["Data"].t_ns[1:]
     keep_ns = (row.limit("hold_clk") - row.limit("tolerance_clk")) * clk_ns - e.slack_ns(clk_ns)
     rises = t.clk_rise_ns
@@ -128,25 +121,22 @@ def _rests_low(e: Capture, line: str, row: Requirement) -> str:
     return f"low in {len(pauses)} pauses and after {len(after)} transfers"
 
 
-@proves("PSA2-FRAME-11")
-@check("stream", needs={"line"})
-def data_rest_low(e: Capture) -> str:
+@check("stream", "PSA2-FRAME-11", needs={"line"})
+def data_rest_low(e: Capture, row: Requirement) -> str:
     """Look at Data in the pauses and between transfers."""
-    return _rests_low(e, "Data", row_for(e, "PSA2-FRAME-11"))
+    return _rests_low(e, "Data", row)
 
 
-@proves("PSA2-FRAME-12")
-@check("stream", needs={"line"})
-def clk_rests_low(e: Capture) -> str:
+@check("stream", "PSA2-FRAME-12", needs={"line"})
+def clk_rests_low(e: Capture, row: Requirement) -> str:
     """Look at CLK in the pauses and between transfers."""
-    return _rests_low(e, "CLK", row_for(e, "PSA2-FRAME-12"))
+    return _rests_low(e, "CLK", row)
 
 
-@proves("PSA2-FRAME-13")
-@check("stream", needs={"pins"})
-def clk_is_high_for_half_of_its_period(e: Capture) -> str:
+@check("stream", "PSA2-FRAME-13", needs={"pins"})
+def clk_is_high_for_half_of_its_period(e: Capture, row: Requirement) -> str:
     """Measure the pulses of CLK."""
-    row, clk_ns = row_for(e, "PSA2-FRAME-13"), _clk_ns(e)
+    clk_ns = _clk_ns(e)
     up, down = e.wires.pulses("CLK", 1)
     if not len(up):
         raise Inconclusive("no pulse on CLK was recorded")
@@ -156,19 +146,17 @@ def clk_is_high_for_half_of_its_period(e: Capture) -> str:
     return f"{len(high_ns)} pulses of {high_ns.min():.0f} to {high_ns.max():.0f} ns"
 
 
-@proves("PSA2-INT-02")
-@check("stream", needs={"line"})
-def int_is_low_long_enough(e: Capture) -> str:
+@check("stream", "PSA2-INT-02", needs={"line"})
+def int_is_low_long_enough(e: Capture, row: Requirement) -> str:
     """Measure the lows of Int."""
     t = _whole(e)
     low_ns = (t.rise_ns - t.fall_ns).astype(np.float64)
-    least_ns = row_for(e, "PSA2-INT-02").limit("int_low_min_us") * 1e3
+    least_ns = row.limit("int_low_min_us") * 1e3
     _first(low_ns < least_ns - e.slack_ns(least_ns), t.fall_ns, low_ns, f"not less than {least_ns:.0f} ns of Int low")
     return f"{len(t)} lows of {low_ns.min() * 1e-3:.3f} to {low_ns.max() * 1e-3:.3f} us"
 
 
-@proves("PSA2-INT-04", "PSA2-INT-05", "PSA2-INT-06")
-@check("stream", needs={"line"})
+@check("stream", "PSA2-INT-04", "PSA2-INT-05", "PSA2-INT-06", needs={"line"})
 def int_is_low_for_its_periods_of_clk(e: Capture) -> str:
     """Measure the lows of Int, and the lead-in before the first bit."""
     t, row, clk_ns = _whole(e), row_for(e, *LOWS), _clk_ns(e)
@@ -191,11 +179,10 @@ def _clk_falls(t: Transfers) -> tuple[Floats, Floats]:
     return np.array([f[0] for f in t.falls], np.float64), np.array([f[-1] for f in t.falls], np.float64)
 
 
-@proves("PSA2-INT-03")
-@check("stream", needs={"line"})
-def int_rises_with_the_last_fall_of_clk(e: Capture) -> str:
+@check("stream", "PSA2-INT-03", needs={"line"})
+def int_rises_with_the_last_fall_of_clk(e: Capture, row: Requirement) -> str:
     """Compare the rise of Int with the last falling edge of CLK."""
-    t, clk_ns, row = _whole(e), _clk_ns(e), row_for(e, "PSA2-INT-03")
+    t, clk_ns = _whole(e), _clk_ns(e)
     _first_ns, last_ns = _clk_falls(t)
     off_ns = t.rise_ns - last_ns
     slack_ns = row.limit("tolerance_clk") * clk_ns + e.slack_ns(0.0)
@@ -203,16 +190,15 @@ def int_rises_with_the_last_fall_of_clk(e: Capture) -> str:
     return f"{len(t)} rises of Int within {np.abs(off_ns).max():.1f} ns of the last fall of CLK"
 
 
-@proves("PSA2-INT-09")
-@check("stream", needs={"line"})
-def int_rests_high(e: Capture) -> str:
+@check("stream", "PSA2-INT-09", needs={"line"})
+def int_rests_high(e: Capture, row: Requirement) -> str:
     """Look at Int where CLK has long been still."""
     for name in LINES:
         if name not in e.wires:
             raise Inconclusive(f"the recording has no line {name}")
     edges = e.wires["CLK"].t_ns[1:]
     still_ns = np.diff(edges)
-    long = (still_ns > 2 * row_for(e, "PSA2-INT-09").limit("quiet_us") * 1e3) & e.wires.known(edges[:-1], edges[1:])
+    long = (still_ns > 2 * row.limit("quiet_us") * 1e3) & e.wires.known(edges[:-1], edges[1:])
     at_ns = (edges[:-1] + still_ns // 2)[long]
     if not len(at_ns):
         raise Inconclusive("CLK never runs and then stands still")
@@ -224,13 +210,12 @@ def int_rests_high(e: Capture) -> str:
     return f"high in {len(at_ns)} pauses between frames"
 
 
-@proves("PSA2-INT-10")
-@check("stream", needs={"line"})
-def int_changes_on_the_grid_of_clk(e: Capture) -> str:
+@check("stream", "PSA2-INT-10", needs={"line"})
+def int_changes_on_the_grid_of_clk(e: Capture, row: Requirement) -> str:
     """Measure from both edges of Int to the first fall of CLK: whole periods of CLK?"""
     t, clk_ns = _whole(e), _clk_ns(e)
     first_ns, _last_ns = _clk_falls(t)
-    tolerance_ns = row_for(e, "PSA2-INT-10").limit("tolerance_clk") * clk_ns
+    tolerance_ns = row.limit("tolerance_clk") * clk_ns
     for edges, what in ((t.fall_ns, "fall"), (t.rise_ns, "rise")):
         span_ns = np.abs(first_ns - edges)
         off_ns = np.abs(span_ns - np.rint(span_ns / clk_ns) * clk_ns)

@@ -12,18 +12,18 @@ from psabench.boards.psa2.conform.check_stream import number, unit_us
 from psabench.boards.psa2.conform.stimulus_objects import Row
 from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
-from psabench.conform.proves import proves, row_for
+from psabench.conform.proves import row_for
+from psabench.conform.requirements import Requirement
 from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.canopen_host import Described
 
 READ_ONLY, WRITE_ONLY = 0x06010002, 0x06010001
 
 
-@proves("PSA2-CAN-09")
-@check("objects")
-def the_board_says_who_it_is(e: Capture) -> str:
+@check("objects", "PSA2-CAN-09")
+def the_board_says_who_it_is(e: Capture, row: Requirement) -> str:
     """Read 1008h and 1018h."""
-    row, read = row_for(e, "PSA2-CAN-09"), fact(e, "read")
+    read = fact(e, "read")
     name = read[OD.DEVICE_NAME, 0].value
     if name != "PSA-2":
         raise Failed(f"1008h {name!r}", "'PSA-2'")
@@ -34,8 +34,7 @@ def the_board_says_who_it_is(e: Capture) -> str:
     return f"{name}, product {number(read[OD.IDENTITY, 2]):08X}h, revision {number(read[OD.IDENTITY, 3]):08X}h"
 
 
-@proves("PSA2-CAN-10")
-@check("objects")
+@check("objects", "PSA2-CAN-10")
 def object_2021h_is_the_word_width(e: Capture) -> str:
     """Read 2021h."""
     saw = number(fact(e, "read")[OD.WORD_BITS, 0])
@@ -45,11 +44,10 @@ def object_2021h_is_the_word_width(e: Capture) -> str:
     return f"{saw} bits"
 
 
-@proves("PSA2-CAN-11")
-@check("objects")
-def mirrors_show_the_sample(e: Capture) -> str:
+@check("objects", "PSA2-CAN-11")
+def mirrors_show_the_sample(e: Capture, row: Requirement) -> str:
     """Compare the mirrors with the PDO of the same number, or of one of those that came while it was asked for."""
-    p, row = pairs(e), row_for(e, "PSA2-CAN-11")
+    p = pairs(e)
     at = {int(s): k for k, s in enumerate(p.seq)}
     rounding = {OD.ACCEL_G: row.limit("rounding_g"), OD.ACCEL_UG: row.limit("rounding_ug")}
     for index, sub, answer, *numbers in fact(e, "mirrors"):
@@ -96,8 +94,7 @@ def encoded(d: Described) -> bytes:
     return (int(d.default) & ((1 << 8 * size) - 1)).to_bytes(size, "little")
 
 
-@proves("PSA2-CAN-12")
-@check("dictionary")
+@check("dictionary", "PSA2-CAN-12")
 def objects_have_type_rights_default_and_limits(e: Capture) -> str:
     """Read every object of the EDS, and write what it must reject."""
     rows: list[Row] = fact(e, "rows")

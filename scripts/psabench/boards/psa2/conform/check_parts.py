@@ -20,7 +20,7 @@ from psabench.boards.psa2.conform.check_serial import (
 from psabench.boards.psa2.conform.check_setup import ACCEL, TEMP, port_traffic
 from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
-from psabench.conform.proves import proves, row_for
+from psabench.conform.requirements import Requirement
 from psabench.conform.verdict import Failed, Inconclusive
 
 # ---- limits of the parts
@@ -51,9 +51,8 @@ def _known(
     return f"{len(found)} commands: {', '.join(f'{k:02X}h' for k in kinds)}"
 
 
-@proves("PSA2-CHIP-02")
-@check("registers", needs={"pins"}, on_recording="all")
-def accelerometer_converters_get_commands_that_they_have(e: Capture) -> str:
+@check("registers", "PSA2-CHIP-02", needs={"pins"}, on_recording="all")
+def accelerometer_converters_get_commands_that_they_have(e: Capture, row: Requirement) -> str:
     """Decode every burst on DIn."""
     found = port_traffic(e).of(temp=False)
     if not found:
@@ -61,16 +60,13 @@ def accelerometer_converters_get_commands_that_they_have(e: Capture) -> str:
     for b in port_traffic(e).reads:
         if "1" in b.sent:
             raise Failed("DIn high in a read", "low", at_ns=int(b.rise_ns[0]), lines=ACCEL)
-    row = row_for(e, "PSA2-CHIP-02")
     known = (0x00, 0x01, 0x04, 0x05, 0x06, 0x07, 0x10, 0x11)  # sources 1.3, those that a read survives
     return _known(e, found[:-1], known, (0x20, 0x40), ACCEL, int(row.limit("last_register")))
 
 
-@proves("PSA2-CHIP-08")
-@check("registers", needs={"pins"}, on_recording="all")
-def the_temperature_converter_gets_commands_that_it_has(e: Capture) -> str:
+@check("registers", "PSA2-CHIP-08", needs={"pins"}, on_recording="all")
+def the_temperature_converter_gets_commands_that_it_has(e: Capture, row: Requirement) -> str:
     """Decode every burst on DInT."""
-    row = row_for(e, "PSA2-CHIP-08")
     found = temp_messages(e)[:-1]
     plain = [m for m in found if m.sent[:1] != bytes([RDATA])]
     return _known(
@@ -106,11 +102,10 @@ def _widths(e: Capture, found: Sequence[Burst], lo_ns: float, hi_ns: float) -> N
                 )
 
 
-@proves("PSA2-CHIP-03")
-@check("registers", needs={"pins"}, on_recording="all")
-def transfers_keep_the_limits_of_the_accelerometer_converters(e: Capture) -> str:
+@check("registers", "PSA2-CHIP-03", needs={"pins"}, on_recording="all")
+def transfers_keep_the_limits_of_the_accelerometer_converters(e: Capture, row: Requirement) -> str:
     """Measure SClk and DIn against the limits of the part."""
-    row, found = row_for(e, "PSA2-CHIP-03"), port_bursts(e, temp=False)
+    found = port_bursts(e, temp=False)
     _widths(e, found, tclk_ns(e, row.limit("width_min_tclk")), tclk_ns(e, row.limit("width_max_tclk")))
     period = np.concatenate([np.diff(b.rise_ns) for b in found]).astype(np.float64)
     lo, hi = tclk_ns(e, row.limit("period_min_tclk")), tclk_ns(e, row.limit("period_max_tclk"))
@@ -125,11 +120,10 @@ def transfers_keep_the_limits_of_the_accelerometer_converters(e: Capture) -> str
     return f"periods of {period.min():.0f} to {period.max():.0f} ns, {said}"
 
 
-@proves("PSA2-CHIP-09")
-@check("registers", needs={"pins"}, on_recording="all")
-def transfers_keep_the_limits_of_the_temperature_converter(e: Capture) -> str:
+@check("registers", "PSA2-CHIP-09", needs={"pins"}, on_recording="all")
+def transfers_keep_the_limits_of_the_temperature_converter(e: Capture, row: Requirement) -> str:
     """Measure SClk, DInT and CST against the limits t1, t4, t5, t6, t10 and t11 of the part."""
-    row, found, told = row_for(e, "PSA2-CHIP-09"), port_bursts(e, temp=True), temp_messages(e)
+    found, told = port_bursts(e, temp=True), temp_messages(e)
     period = np.concatenate([np.diff(b.rise_ns) for b in found]).astype(np.float64)
     at = np.concatenate([b.rise_ns[1:] for b in found])
     least(e, period, at, tau_ns(e, row.limit("t1_min_tau")), "a period of SClk", TEMP)

@@ -29,7 +29,8 @@ from psabench.boards.psa2.conform.stimulus_can import (
 from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
 from psabench.conform.profile import proto_yaml
-from psabench.conform.proves import proves, row_for
+from psabench.conform.proves import row_for
+from psabench.conform.requirements import Requirement
 from psabench.conform.verdict import Failed, Inconclusive
 
 READ_ONLY, WRITE_ONLY = 0x06010002, 0x06010001
@@ -71,32 +72,27 @@ def _number24(e: Capture, sub: int, due: int, what: str) -> str:
     return f"{what} {due:06X}h on three converters"
 
 
-@proves("PSA2-RES-01")
-@check("registers")
-def ofc_is_zero(e: Capture) -> str:
+@check("registers", "PSA2-RES-01")
+def ofc_is_zero(e: Capture, row: Requirement) -> str:
     """Read the offset registers after the set-up."""
-    return _number24(e, OFC0, int(row_for(e, "PSA2-RES-01").limit("ofc_code")), "OFC")
+    return _number24(e, OFC0, int(row.limit("ofc_code")), "OFC")
 
 
-@proves("PSA2-RES-02")
-@check("registers")
-def fsc_is_one(e: Capture) -> str:
+@check("registers", "PSA2-RES-02")
+def fsc_is_one(e: Capture, row: Requirement) -> str:
     """Read the full-scale registers after the set-up."""
-    return _number24(e, FSC0, int(row_for(e, "PSA2-RES-02").limit("fsc_code")), "FSC")
+    return _number24(e, FSC0, int(row.limit("fsc_code")), "FSC")
 
 
-@proves("PSA2-REG-01")
-@check("registers")
-def config0_is_the_articles(e: Capture) -> str:
+@check("registers", "PSA2-REG-01")
+def config0_is_the_articles(e: Capture, row: Requirement) -> str:
     """Read CONFIG0 after the set-up."""
-    return _all(e, CONFIG0, int(row_for(e, "PSA2-REG-01").limit("config0_code")), "CONFIG0")
+    return _all(e, CONFIG0, int(row.limit("config0_code")), "CONFIG0")
 
 
-@proves("PSA2-REG-02", "PSA2-REG-03")
-@check("registers")
-def status_is_what_its_writes_left(e: Capture) -> str:
+@check("registers", "PSA2-REG-02", "PSA2-REG-03")
+def status_is_what_its_writes_left(e: Capture, row: Requirement) -> str:
     """Read STATUS of the temperature converter after the set-up."""
-    row = row_for(e, "PSA2-REG-02", "PSA2-REG-03")
     mask, due = int(row.limit("mask_bits")), int(row.limit("value_bits"))
     saw = register(e, TEMP, STATUS) & mask
     if saw != due:
@@ -104,28 +100,25 @@ def status_is_what_its_writes_left(e: Capture) -> str:
     return f"ACAL and BUFEN {saw:02X}h"
 
 
-@proves("PSA2-REG-04")
-@check("registers")
-def drate_is_100_a_second(e: Capture) -> str:
+@check("registers", "PSA2-REG-04")
+def drate_is_100_a_second(e: Capture, row: Requirement) -> str:
     """Read DRATE of the temperature converter after the set-up."""
-    saw, due = register(e, TEMP, DRATE), int(row_for(e, "PSA2-REG-04").limit("drate_code"))
+    saw, due = register(e, TEMP, DRATE), int(row.limit("drate_code"))
     if saw != due:
         raise Failed(f"DRATE {saw:02X}h", f"{due:02X}h")
     return f"DRATE {saw:02X}h"
 
 
-@proves("PSA2-REG-05", "PSA1-REG-01")
-@check("registers")
-def config1_is_the_boards(e: Capture) -> str:
+@check("registers", "PSA2-REG-05", "PSA1-REG-01")
+def config1_is_the_boards(e: Capture, row: Requirement) -> str:
     """Read CONFIG1 after the set-up."""
-    return _all(e, CONFIG1, int(row_for(e, "PSA2-REG-05", "PSA1-REG-01").limit("config1_code")), "CONFIG1")
+    return _all(e, CONFIG1, int(row.limit("config1_code")), "CONFIG1")
 
 
 # ---- rights, fields and reset values
 
 
-@proves("PSA2-REG-06", "PSA2-CHIP-01")
-@check("opcodes")
+@check("opcodes", "PSA2-REG-06", "PSA2-CHIP-01")
 def accelerometer_converters_have_their_reset_values(e: Capture) -> str:
     """RESET by opcode, then every register beside the table."""
     for k, (name, due) in enumerate(table("ads1282")):
@@ -133,8 +126,7 @@ def accelerometer_converters_have_their_reset_values(e: Capture) -> str:
     return f"{len(table('ads1282'))} registers of three converters"
 
 
-@proves("PSA2-REG-07")
-@check("opcodes")
+@check("opcodes", "PSA2-REG-07")
 def the_temperature_converter_has_its_reset_values(e: Capture) -> str:
     """RESET by opcode, then every register beside the table (OFC and FSC are what the calibration leaves)."""
     own = [(k + 1, n, v) for k, (n, v) in enumerate(table("ads1256")) if n[:3] not in ("OFC", "FSC")]
@@ -162,25 +154,22 @@ def _keeps(e: Capture, *, temp: bool, part: str) -> str:
     return f"{len(found)} registers read as they were written"
 
 
-@proves("PSA2-REG-06")
-@check("writes")
+@check("writes", "PSA2-REG-06")
 def accelerometer_converters_keep_what_is_written(e: Capture) -> str:
     """Write every writable register and read it on all three converters."""
     return _keeps(e, temp=False, part="ads1282")
 
 
-@proves("PSA2-REG-07")
-@check("writes")
+@check("writes", "PSA2-REG-07")
 def the_temperature_converter_keeps_what_is_written(e: Capture) -> str:
     """Write the registers that no scan touches and read them."""
     return _keeps(e, temp=True, part="ads1256")
 
 
-@proves("PSA2-REG-07")
-@check("writes")
-def the_part_of_the_temperature_converter_cannot_be_written(e: Capture) -> str:
+@check("writes", "PSA2-REG-07")
+def the_part_of_the_temperature_converter_cannot_be_written(e: Capture, row: Requirement) -> str:
     """Write every bit of STATUS: those that name the part stay."""
-    mask = int(row_for(e, "PSA2-REG-07").limit("status_id_mask"))
+    mask = int(row.limit("status_id_mask"))
     before, *after = (number(a) for a in fact(e, "status"))
     for saw in after:
         if (saw ^ before) & mask:
@@ -188,8 +177,7 @@ def the_part_of_the_temperature_converter_cannot_be_written(e: Capture) -> str:
     return f"STATUS {', '.join(f'{v:02X}h' for v in (before, *after))}"
 
 
-@proves("PSA2-SIG-03", "PSA2-ACC-10")
-@check("writes")
+@check("writes", "PSA2-SIG-03", "PSA2-ACC-10")
 def one_write_reaches_three_converters(e: Capture) -> str:
     """Write through 2000h and read 2000h, 2003h and 2004h."""
     found = _written(e, temp=False)
@@ -204,8 +192,7 @@ def one_write_reaches_three_converters(e: Capture) -> str:
     return f"{len(found)} writes, each the same on three converters"
 
 
-@proves("PSA2-ACC-01")
-@check("registers", needs={"pins"})
+@check("registers", "PSA2-ACC-01", needs={"pins"})
 def a_register_read_is_what_the_converter_says(e: Capture) -> str:
     """Compare SDO answers with the bytes on DOutX, DOutY, DOutZ and DOutT."""
     found = port_traffic(e).messages
@@ -256,8 +243,7 @@ def _no_overrun(e: Capture) -> None:
         raise Failed(f"{lost} overruns counted", "none")
 
 
-@proves("PSA2-ACC-02")
-@check("registers")
+@check("registers", "PSA2-ACC-02")
 def register_reads_cost_no_conversion(e: Capture) -> str:
     """Read all registers while frames flow: SEQ and the counter of overruns."""
     p = pairs(e)
@@ -266,8 +252,7 @@ def register_reads_cost_no_conversion(e: Capture) -> str:
     return f"{len(p)} frames without a gap beside {len(fact(e, 'read'))} reads"
 
 
-@proves("PSA2-ACC-02")
-@check("busy")
+@check("busy", "PSA2-ACC-02")
 def register_reads_cost_no_conversion_at_the_highest_rate(e: Capture) -> str:
     """Read registers again and again while 4000 frames a second flow: TOG, and the counter of overruns."""
     refused = [a for a in fact(e, "answers") if a != Answer()]
@@ -296,21 +281,19 @@ def _refused(answer: Answer, due: int, what: str) -> None:
         raise Failed(f"{what} {saw}", f"abort {due:08X}h")
 
 
-@proves("PSA2-ACC-03")
-@check("refusals")
-def a_read_only_register_is_not_written(e: Capture) -> str:
+@check("refusals", "PSA2-ACC-03")
+def a_read_only_register_is_not_written(e: Capture, row: Requirement) -> str:
     """Write to ID."""
-    due = int(row_for(e, "PSA2-ACC-03").limit("abort_code"))
+    due = int(row.limit("abort_code"))
     for index, sub, _, answer in fact(e, "read-only"):
         _refused(answer, due, f"a write to {index:04X}h:{sub}")
     return f"abort {due:08X}h"
 
 
-@proves("PSA2-ACC-04")
-@check("refusals")
-def reserved_values_are_refused(e: Capture) -> str:
+@check("refusals", "PSA2-ACC-04")
+def reserved_values_are_refused(e: Capture, row: Requirement) -> str:
     """Write values that the parts reserve, and read the registers again."""
-    due = int(row_for(e, "PSA2-ACC-04").limit("abort_code"))
+    due = int(row.limit("abort_code"))
     found = fact(e, "reserved")
     for index, sub, value, before, answer, after in found:
         _refused(answer, due, f"{value:02X}h to {index:04X}h:{sub}")
@@ -319,19 +302,17 @@ def reserved_values_are_refused(e: Capture) -> str:
     return f"{len(found)} values refused and not stored"
 
 
-@proves("PSA2-ACC-08")
-@check("refusals")
-def opcodes_that_want_more_are_refused(e: Capture) -> str:
+@check("refusals", "PSA2-ACC-08")
+def opcodes_that_want_more_are_refused(e: Capture, row: Requirement) -> str:
     """Write them to 2010h."""
-    due = int(row_for(e, "PSA2-ACC-08").limit("abort_code"))
+    due = int(row.limit("abort_code"))
     found = fact(e, "opcodes")
     for _, sub, value, answer in found:
         _refused(answer, due, f"opcode {value:02X}h to 2010h:{sub}")
     return f"{len(found)} opcodes refused"
 
 
-@proves("PSA2-ACC-08")
-@check("refusals", needs={"pins"})
+@check("refusals", "PSA2-ACC-08", needs={"pins"})
 def refused_opcodes_never_reach_a_converter(e: Capture) -> str:
     """Look for them on DIn and DInT."""
     sent = {1: {m.sent for m in port_traffic(e).of(temp=False)}, 2: {m.sent for m in port_traffic(e).of(temp=True)}}
@@ -346,37 +327,33 @@ def refused_opcodes_never_reach_a_converter(e: Capture) -> str:
     return f"none of {len(fact(e, 'opcodes'))} opcodes on DIn or DInT"
 
 
-@proves("PSA2-FORM-07")
-@check("refusals")
-def an_unknown_form_is_refused(e: Capture) -> str:
+@check("refusals", "PSA2-FORM-07")
+def an_unknown_form_is_refused(e: Capture, row: Requirement) -> str:
     """Write 4 to 2020h."""
-    due, answer = int(row_for(e, "PSA2-FORM-07").limit("abort_code")), fact(e, "form")
+    due, answer = int(row.limit("abort_code")), fact(e, "form")
     _refused(answer, due, "form 4")
     return f"abort {due:08X}h"
 
 
-@proves("PSA2-ACC-05")
-@check("early")
-def no_access_before_the_set_up_is_over(e: Capture) -> str:
+@check("early", "PSA2-ACC-05")
+def no_access_before_the_set_up_is_over(e: Capture, row: Requirement) -> str:
     """Read registers right after a reset."""
-    due = int(row_for(e, "PSA2-ACC-05").limit("abort_code"))
+    due = int(row.limit("abort_code"))
     for a in fact(e, "early"):
         _refused(a, due, "a read before the end of the set-up")
     return f"abort {due:08X}h for {len(fact(e, 'early'))} reads"
 
 
-@proves("PSA2-ACC-05")
-@check("early")
-def one_access_at_a_time(e: Capture) -> str:
+@check("early", "PSA2-ACC-05")
+def one_access_at_a_time(e: Capture, row: Requirement) -> str:
     """Read a register while a read that its client gave up is under way."""
-    due, saw = int(row_for(e, "PSA2-ACC-05").limit("abort_code")), fact(e, "busy")
+    due, saw = int(row.limit("abort_code")), fact(e, "busy")
     if due not in saw:
         raise Failed(f"aborts {', '.join(f'{a:08X}h' for a in saw) or 'none'}", f"{due:08X}h at least once")
     return f"abort {due:08X}h {saw.count(due)} times"
 
 
-@proves("PSA2-SAMP-05")
-@check("early")
+@check("early", "PSA2-SAMP-05")
 def a_sync_that_could_not_pulse_is_counted(e: Capture) -> str:
     """SYNC with 2024h = 1 while the set-up runs."""
     before, after = (number(a) for a in fact(e, "missed"))
@@ -388,8 +365,7 @@ def a_sync_that_could_not_pulse_is_counted(e: Capture) -> str:
 # ---- opcodes
 
 
-@proves("PSA2-ACC-07")
-@check("opcodes")
+@check("opcodes", "PSA2-ACC-07")
 def opcodes_are_taken(e: Capture) -> str:
     """RESET to both groups: answered, and CONFIG0 and DRATE are those of the parts afterwards."""
     for group, answer in zip(("accelerometer", "temperature"), fact(e, "answers"), strict=True):
@@ -401,8 +377,7 @@ def opcodes_are_taken(e: Capture) -> str:
     return _all(e, CONFIG0, dict(table("ads1282"))["CONFIG0"], "CONFIG0")
 
 
-@proves("PSA2-ACC-07")
-@check("opcodes", needs={"pins"})
+@check("opcodes", "PSA2-ACC-07", needs={"pins"})
 def opcodes_are_sent_to_their_group(e: Capture) -> str:
     """Look for RESET on DIn and DInT."""
     for code, temp in ((0x06, False), (0xFE, True)):
@@ -415,10 +390,8 @@ def opcodes_are_sent_to_their_group(e: Capture) -> str:
     return "06h on DIn, FEh on DInT"
 
 
-@proves("PSA2-ACC-09")
-@check("opcodes")
-def a_reset_opcode_is_followed_by_no_set_up(e: Capture) -> str:
+@check("opcodes", "PSA2-ACC-09")
+def a_reset_opcode_is_followed_by_no_set_up(e: Capture, row: Requirement) -> str:
     """CONFIG0 and CONFIG1 after RESET by opcode."""
-    row = row_for(e, "PSA2-ACC-09")
     _all(e, CONFIG0, int(row.limit("config0_code")), "CONFIG0")
     return _all(e, CONFIG1, int(row.limit("config1_code")), "CONFIG1")

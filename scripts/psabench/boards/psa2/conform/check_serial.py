@@ -10,7 +10,8 @@ from psabench.boards.psa2.conform.capture_spi import AXES, Burst, Message
 from psabench.boards.psa2.conform.check_setup import ACCEL, TEMP, port_traffic
 from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
-from psabench.conform.proves import proves, row_for
+from psabench.conform.proves import row_for
+from psabench.conform.requirements import Requirement
 from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.signals import Floats, Ints
 
@@ -81,9 +82,8 @@ def _column(found: Sequence[float]) -> tuple[Floats, Ints]:
 # ---- lines
 
 
-@proves("PSA2-SIG-01")
-@check("stream", needs={"pins"})
-def the_board_has_its_lines(e: Capture) -> str:
+@check("stream", "PSA2-SIG-01", needs={"pins"})
+def the_board_has_its_lines(e: Capture, row: Requirement) -> str:
     """Look for the lines of the article's table in the recording, and for those that a stream moves to move."""
     due = (
         "SYNC_A",
@@ -102,7 +102,7 @@ def the_board_has_its_lines(e: Capture) -> str:
         "Int",
     )
     missing = [name for name in due if name not in e.wires]
-    count = int(row_for(e, "PSA2-SIG-01").limit("lines_count"))
+    count = int(row.limit("lines_count"))
     if missing or len(due) != count:
         raise Failed(f"no {', '.join(missing)}", f"{count} lines")
     still = [name for name in due if name not in STILL_IN_A_STREAM and len(e.wires[name].t_ns) < 2]
@@ -111,11 +111,9 @@ def the_board_has_its_lines(e: Capture) -> str:
     return f"{count} lines"
 
 
-@proves("PSA2-SIG-02")
-@check("stream", needs={"pins"})
-def lines_stand_at_their_rest_levels(e: Capture) -> str:
+@check("stream", "PSA2-SIG-02", needs={"pins"})
+def lines_stand_at_their_rest_levels(e: Capture, row: Requirement) -> str:
     """Look at every line where nothing moves on any of the ports."""
-    row = row_for(e, "PSA2-SIG-02")
     levels = {n.removesuffix("_level"): int(v) for n, v in row.limits.items() if n.endswith("_level")}
     at_ns = _quiet(e, row.limit("quiet_us") * 1e3)
     names = {n.lower(): n for n in e.wires.recording.wires}
@@ -140,11 +138,9 @@ def _quiet(e: Capture, quiet_ns: float) -> Ints:
     return middle
 
 
-@proves("PSA2-SIG-04")
-@check("power_on", needs={"pins"})
-def sync_a_is_high_for_its_time(e: Capture) -> str:
+@check("power_on", "PSA2-SIG-04", needs={"pins"})
+def sync_a_is_high_for_its_time(e: Capture, row: Requirement) -> str:
     """Measure the pulse on SYNC_A."""
-    row = row_for(e, "PSA2-SIG-04")
     up, down = e.wires.pulses("SYNC_A", 1)
     if not len(up):
         raise Failed("no pulse on SYNC_A", "one after Res", at_ns=e.wires.start_ns, lines=("SYNC_A", "Res"))
@@ -152,11 +148,10 @@ def sync_a_is_high_for_its_time(e: Capture) -> str:
     return near(e, saw, up, row.limit("pulse_ns"), row.limit("tolerance_ns"), "of SYNC_A high", ("SYNC_A",))
 
 
-@proves("PSA2-SIG-04")
-@check("sync", needs={"pins"})
-def sync_a_moves_on_falling_edges_of_fclk(e: Capture) -> str:
+@check("sync", "PSA2-SIG-04", needs={"pins"})
+def sync_a_moves_on_falling_edges_of_fclk(e: Capture, row: Requirement) -> str:
     """Pulse SYNC_A while frames flow: where do its edges lie in the clock that the falls of DRD_A before it give?"""
-    row, edges = row_for(e, "PSA2-SIG-04"), e.wires["SYNC_A"].t_ns[1:]
+    edges = e.wires["SYNC_A"].t_ns[1:]
     if not len(edges):
         raise Failed("no pulse on SYNC_A", "one for the SYNC with 2024h = 1", at_ns=e.wires.end_ns, lines=("SYNC_A",))
     falls = e.wires.falls("DRD_A")
@@ -176,21 +171,17 @@ def sync_a_moves_on_falling_edges_of_fclk(e: Capture) -> str:
     return f"{len(edges)} edges, {phase.min():.3f} to {phase.max():.3f} tCLK after the rise of fCLK"
 
 
-@proves("PSA2-SIG-05")
-@check("stream", needs={"pins"})
-def sync_t_is_low_for_its_time(e: Capture) -> str:
+@check("stream", "PSA2-SIG-05", needs={"pins"})
+def sync_t_is_low_for_its_time(e: Capture, row: Requirement) -> str:
     """Measure the pulses on SYNC_T."""
-    row = row_for(e, "PSA2-SIG-05")
     down, up = e.wires.pulses("SYNC_T", 0)
     saw = (up - down).astype(np.float64)
     return near(e, saw, down, row.limit("pulse_ns"), row.limit("tolerance_ns"), "of SYNC_T low", ("SYNC_T",))
 
 
-@proves("PSA2-SIG-06")
-@check("stream", needs={"pins"})
-def cst_frames_every_burst_of_its_port(e: Capture) -> str:
+@check("stream", "PSA2-SIG-06", needs={"pins"})
+def cst_frames_every_burst_of_its_port(e: Capture, row: Requirement) -> str:
     """Measure CST around the messages to the temperature converter, and look for lows of CST without one."""
-    row = row_for(e, "PSA2-SIG-06")
     period_ns = NS / row_for(e, "PSA2-SIG-09").limit("sclk_hz")
     falls, rises = e.wires.pulses("CST", 0)
     found = temp_messages(e)
@@ -234,27 +225,23 @@ def _changes_at(e: Capture, found: Sequence[Burst], lines: Sequence[str], *, fal
     return f"{total} changes, all at {'falls' if falls else 'rises'} of SClk"
 
 
-@proves("PSA2-SIG-07")
-@check("registers", needs={"pins"}, on_recording="all")
-def the_accelerometer_port_is_spi_mode_0(e: Capture) -> str:
+@check("registers", "PSA2-SIG-07", needs={"pins"}, on_recording="all")
+def the_accelerometer_port_is_spi_mode_0(e: Capture, row: Requirement) -> str:
     """Compare changes of DIn and DOut with the edges of SClk while CST is high."""
-    delay_ns = row_for(e, "PSA2-SIG-07").limit("delay_max_ns")
+    delay_ns = row.limit("delay_max_ns")
     return _changes_at(e, port_bursts(e, temp=False), ("DIn", *AXES), falls=True, delay_ns=delay_ns)
 
 
-@proves("PSA2-SIG-08")
-@check("registers", needs={"pins"}, on_recording="all")
-def the_temperature_port_is_spi_mode_1(e: Capture) -> str:
+@check("registers", "PSA2-SIG-08", needs={"pins"}, on_recording="all")
+def the_temperature_port_is_spi_mode_1(e: Capture, row: Requirement) -> str:
     """Compare changes of DInT and DOutT with the edges of SClk while CST is low."""
-    delay_ns = row_for(e, "PSA2-SIG-08").limit("delay_max_ns")
+    delay_ns = row.limit("delay_max_ns")
     return _changes_at(e, port_bursts(e, temp=True), ("DInT", "DOutT"), falls=False, delay_ns=delay_ns)
 
 
-@proves("PSA2-SIG-09")
-@check("stream", needs={"pins"})
-def sclk_has_its_frequency_and_rests_low(e: Capture) -> str:
+@check("stream", "PSA2-SIG-09", needs={"pins"})
+def sclk_has_its_frequency_and_rests_low(e: Capture, row: Requirement) -> str:
     """Measure the period of SClk within bursts, and look at it between them."""
-    row = row_for(e, "PSA2-SIG-09")
     due_ns = NS / row.limit("sclk_hz")
     found = [b for b in port_traffic(e).bursts if b.bits > 1 and len(b.fall_ns) == b.bits]
     if not found:
@@ -274,15 +261,14 @@ def sclk_has_its_frequency_and_rests_low(e: Capture) -> str:
     return f"{period_ns.min():.2f} to {period_ns.max():.2f} ns a period of SClk, low between {len(found)} bursts"
 
 
-@proves("PSA2-SIG-10")
-@check("registers", needs={"pins"}, on_recording="all")
-def command_bytes_keep_their_gap(e: Capture) -> str:
+@check("registers", "PSA2-SIG-10", needs={"pins"}, on_recording="all")
+def command_bytes_keep_their_gap(e: Capture, row: Requirement) -> str:
     """Measure the time between the bytes of commands to the accelerometer converters."""
     found = [m for m in port_traffic(e).of(temp=False) if len(m.bursts) > 1]
     pairs = [(a, b) for m in found for a, b in zip(m.bursts, m.bursts[1:], strict=False)]
     gaps, _ = _column([float(b.rise_ns[0] - a.rise_ns[-1]) for a, b in pairs])
     at = np.array([b.rise_ns[0] for _, b in pairs], np.int64)
-    due_ns = tclk_ns(e, row_for(e, "PSA2-SIG-10").limit("gap_min_tclk"))
+    due_ns = tclk_ns(e, row.limit("gap_min_tclk"))
     return least(e, gaps, at, due_ns, "between bytes of a command", ACCEL)
 
 
@@ -292,16 +278,14 @@ def rdata_gaps(e: Capture) -> tuple[Floats, Ints]:
     return np.array(gaps), np.array([m.begin_ns for m in found], np.int64)
 
 
-@proves("PSA2-SIG-11")
-@check("stream", needs={"pins"})
-def data_wait_after_rdata(e: Capture) -> str:
+@check("stream", "PSA2-SIG-11", needs={"pins"})
+def data_wait_after_rdata(e: Capture, row: Requirement) -> str:
     """Measure RDATA to the first bit of its data."""
-    due_ns = tau_ns(e, row_for(e, "PSA2-SIG-11").limit("t6_min_tau"))
+    due_ns = tau_ns(e, row.limit("t6_min_tau"))
     return least(e, *rdata_gaps(e), due_ns, "from RDATA to its data", TEMP)
 
 
-@proves("PSA2-SIG-12")
-@check("stream", needs={"pins"})
+@check("stream", "PSA2-SIG-12", needs={"pins"})
 def dout_stands_still_while_the_other_port_is_used(e: Capture) -> str:
     """Look for changes of DOutX, DOutY and DOutZ while CST is low."""
     falls, rises = e.wires.pulses("CST", 0)
@@ -321,11 +305,9 @@ def dout_stands_still_while_the_other_port_is_used(e: Capture) -> str:
     return f"still in {len(falls)} lows of CST"
 
 
-@proves("PSA2-SIG-17")
-@check("stream", needs={"pins"})
-def clk_is_a_division_of_the_crystal(e: Capture) -> str:
+@check("stream", "PSA2-SIG-17", needs={"pins"})
+def clk_is_a_division_of_the_crystal(e: Capture, row: Requirement) -> str:
     """Divide the period of CLK by that of the crystal, which the data period gives."""
-    row = row_for(e, "PSA2-SIG-17")
     falls, rises = e.wires.falls("DRD_A"), e.wires.rises("CLK")
     if len(falls) < LEAST or len(rises) < 2:
         raise Inconclusive(f"{len(falls)} falls of DRD_A and {len(rises)} rises of CLK were recorded")
@@ -354,8 +336,7 @@ def _read_of_each_fall(e: Capture) -> list[tuple[int, list[Burst]]]:
     return [(int(falls[k]), reads[cut[k] : cut[k + 1]]) for k in range(len(falls) - 1)]
 
 
-@proves("PSA2-READ-01")
-@check("stream", needs={"pins"})
+@check("stream", "PSA2-READ-01", needs={"pins"})
 def every_conversion_is_read(e: Capture) -> str:
     """Count the reads after each fall of DRD_A."""
     found = _read_of_each_fall(e)
@@ -365,11 +346,10 @@ def every_conversion_is_read(e: Capture) -> str:
     return f"{len(found)} falls of DRD_A, one read after each"
 
 
-@proves("PSA2-READ-02", "PSA2-READ-03")
-@check("stream", needs={"pins"})
-def a_read_has_its_bits(e: Capture) -> str:
+@check("stream", "PSA2-READ-02", "PSA2-READ-03", needs={"pins"})
+def a_read_has_its_bits(e: Capture, row: Requirement) -> str:
     """Count the pulses of SClk of each read."""
-    due = int(row_for(e, "PSA2-READ-02", "PSA2-READ-03").limit("read_bits"))
+    due = int(row.limit("read_bits"))
     reads = port_traffic(e).reads
     if len(reads) < LEAST:
         raise Inconclusive(f"{len(reads)} reads were recorded")
@@ -379,11 +359,10 @@ def a_read_has_its_bits(e: Capture) -> str:
     return f"{len(reads)} reads of {due} bits"
 
 
-@proves("PSA2-READ-07")
-@check("stream", needs={"pins"})
-def drd_a_rises_with_the_first_bit_of_a_read(e: Capture) -> str:
+@check("stream", "PSA2-READ-07", needs={"pins"})
+def drd_a_rises_with_the_first_bit_of_a_read(e: Capture, row: Requirement) -> str:
     """Compare the rises of DRD_A with the first falls of SClk."""
-    delay_ns = row_for(e, "PSA2-READ-07").limit("delay_max_ns")
+    delay_ns = row.limit("delay_max_ns")
     falls, rises = e.wires.falls("DRD_A"), e.wires.rises("DRD_A")
     clocks = e.wires.falls("SClk")
     k = np.searchsorted(clocks, falls, "right")
@@ -402,11 +381,9 @@ def drd_a_rises_with_the_first_bit_of_a_read(e: Capture) -> str:
     return f"{len(late)} rises of DRD_A, {late.min():.0f} to {late.max():.0f} ns after the first fall of SClk"
 
 
-@proves("PSA2-INT-07", "PSA2-INT-08")
-@check("stream", needs={"pins"})
-def int_falls_after_the_read(e: Capture) -> str:
+@check("stream", "PSA2-INT-07", "PSA2-INT-08", needs={"pins"})
+def int_falls_after_the_read(e: Capture, row: Requirement) -> str:
     """Measure DRD_A to Int."""
-    row = row_for(e, "PSA2-INT-07", "PSA2-INT-08")
     lo, hi = row.limit("after_drd_min_us") * 1e3, row.limit("after_drd_max_us") * 1e3
     falls, ints = e.wires.falls("DRD_A"), e.wires.falls("Int")
     k = np.searchsorted(falls, ints, "right") - 1
@@ -422,8 +399,7 @@ def int_falls_after_the_read(e: Capture) -> str:
     return f"Int falls {after.min() * 1e-3:.2f} to {after.max() * 1e-3:.2f} us after DRD_A"
 
 
-@proves("PSA2-INT-11")
-@check("stream", needs={"pins"})
+@check("stream", "PSA2-INT-11", needs={"pins"})
 def every_conversion_gives_a_frame(e: Capture) -> str:
     """Count the falls of Int between falls of DRD_A."""
     falls, ints = e.wires.falls("DRD_A"), e.wires.falls("Int")

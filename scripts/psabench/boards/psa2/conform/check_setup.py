@@ -10,7 +10,7 @@ from psabench.boards.psa2.conform.capture_line import transfers
 from psabench.boards.psa2.conform.capture_spi import Traffic, traffic
 from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
-from psabench.conform.proves import proves, row_for
+from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement, requirements
 from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.signals import Ints
@@ -142,9 +142,8 @@ def first_fall(falls: Ints, after_ns: float, line: str) -> int:
     return int(later[0])
 
 
-@proves("PSA2-RES-03")
-@check("power_on", needs={"pins"})
-def res_rests_high_and_acts_low(e: Capture) -> str:
+@check("power_on", "PSA2-RES-03", needs={"pins"})
+def res_rests_high_and_acts_low(e: Capture, row: Requirement) -> str:
     """Look at Res before and after the reset."""
     low, high = e.wires.pulses("Res", 0)
     if not len(low):
@@ -152,13 +151,12 @@ def res_rests_high_and_acts_low(e: Capture) -> str:
     total_ns = int((high - low).sum())
     if not e.wires["Res"].at(e.wires.end_ns):
         raise Failed("Res low at the end", "high", at_ns=e.wires.end_ns, lines=("Res",))
-    if total_ns > row_for(e, "PSA2-RES-03").limit("low_max_share") * (e.wires.end_ns - e.wires.start_ns):
+    if total_ns > row.limit("low_max_share") * (e.wires.end_ns - e.wires.start_ns):
         raise Failed("Res low most of the time", "high", at_ns=int(low[0]), lines=("Res",))
     return f"{len(low)} low pulse of {total_ns * 1e-3:.1f} us, high otherwise"
 
 
-@proves("PSA2-RES-04")
-@check("power_on", needs={"pins"})
+@check("power_on", "PSA2-RES-04", needs={"pins"})
 def a_reset_brings_all_lines_to_rest(e: Capture) -> str:
     """Press Res, in a frame where that can be timed, and look at Int, Data and CLK until the set-up is over."""
     s = set_up(e)
@@ -177,8 +175,7 @@ def a_reset_brings_all_lines_to_rest(e: Capture) -> str:
     return f"Res came {'in a frame' if in_frame else 'between frames'}; all lines at rest, then the set-up"
 
 
-@proves("PSA2-SETUP-01")
-@check("power_on", needs={"pins"})
+@check("power_on", "PSA2-SETUP-01", needs={"pins"})
 def the_set_up_is_made_once(e: Capture) -> str:
     """Look for messages of the set-up after it."""
     s = set_up(e)
@@ -192,13 +189,12 @@ def the_set_up_is_made_once(e: Capture) -> str:
     return f"no message of the set-up in {(e.wires.end_ns - end_ns) / MS:.0f} ms after it"
 
 
-@proves("PSA2-SETUP-02")
-@check("power_on", needs={"pins"})
-def config0_is_written_first(e: Capture) -> str:
+@check("power_on", "PSA2-SETUP-02", needs={"pins"})
+def config0_is_written_first(e: Capture, row: Requirement) -> str:
     """Decode the first message to the accelerometer converters after Res."""
     s = set_up(e)
     step = s.nth("DIn", 0)
-    said = _is(step, row_for(e, "PSA2-SETUP-02"), "the first message")
+    said = _is(step, row, "the first message")
     falls = s.drd_a[s.drd_a <= step.begin_ns]
     if len(falls) != 1:
         due = "on the first"
@@ -216,41 +212,36 @@ def _status_write(e: Capture, row: str, n: int) -> str:
     return said
 
 
-@proves("PSA2-SETUP-03")
-@check("power_on", needs={"pins"})
+@check("power_on", "PSA2-SETUP-03", needs={"pins"})
 def bufen_is_written_second(e: Capture) -> str:
     """Decode the first message to the temperature converter."""
     return _status_write(e, "PSA2-SETUP-03", 0)
 
 
-@proves("PSA2-SETUP-04")
-@check("power_on", needs={"pins"})
+@check("power_on", "PSA2-SETUP-04", needs={"pins"})
 def acal_is_written_third(e: Capture) -> str:
     """Decode the second message to the temperature converter."""
     return _status_write(e, "PSA2-SETUP-04", 1)
 
 
-@proves("PSA2-SETUP-05")
-@check("power_on", needs={"pins"})
-def one_message_writes_bufen_and_acal(e: Capture) -> str:
+@check("power_on", "PSA2-SETUP-05", needs={"pins"})
+def one_message_writes_bufen_and_acal(e: Capture, row: Requirement) -> str:
     """Decode the first message to the temperature converter, and look for another one to STATUS."""
     said = _status_write(e, "PSA2-SETUP-05", 0)
-    register = sent_by(row_for(e, "PSA2-SETUP-05"))[0]
+    register = sent_by(row)[0]
     more = [x for x in set_up(e).steps if x.line == "DInT" and x.sent[:1] == bytes([register])]
     if len(more) != 1:
         raise Failed(f"{len(more)} writes to STATUS", "one", at_ns=more[-1].begin_ns, lines=TEMP)
     return said
 
 
-@proves("PSA2-SETUP-06")
-@check("power_on", needs={"pins"})
+@check("power_on", "PSA2-SETUP-06", needs={"pins"})
 def drate_is_written_after_status(e: Capture) -> str:
     """Decode the message after the writes to STATUS."""
     return _status_write(e, "PSA2-SETUP-06", sum(line == "DInT" for line, _ in demanded(e)) - 1)
 
 
-@proves("PSA2-SETUP-07")
-@check("power_on", needs={"pins"})
+@check("power_on", "PSA2-SETUP-07", needs={"pins"})
 def sync_t_follows_the_write_to_drate(e: Capture) -> str:
     """Find the first pulse on SYNC_T after Res, and the fall of DRD_T before it."""
     s = set_up(e)
@@ -264,8 +255,7 @@ def sync_t_follows_the_write_to_drate(e: Capture) -> str:
     return f"SYNC_T {(pulse.begin_ns - between[-1]) * 1e-3:.2f} us after the next fall of DRD_T"
 
 
-@proves("PSA2-SETUP-08")
-@check("power_on", needs={"pins"})
+@check("power_on", "PSA2-SETUP-08", needs={"pins"})
 def sync_a_ends_the_set_up(e: Capture) -> str:
     """Count the falls of DRD_A before the first pulse on SYNC_A."""
     s = set_up(e)
@@ -278,8 +268,7 @@ def sync_a_ends_the_set_up(e: Capture) -> str:
     return f"SYNC_A {(pulse.begin_ns - falls[-1]) * 1e-3:.3f} us after the second fall of DRD_A"
 
 
-@proves("PSA2-SETUP-09")
-@check("power_on", needs={"pins"})
+@check("power_on", "PSA2-SETUP-09", needs={"pins"})
 def each_step_waits_for_its_event(e: Capture) -> str:
     """Compare each step of the set-up with the falls of its data-ready line."""
     s = set_up(e)
@@ -297,45 +286,38 @@ def each_step_waits_for_its_event(e: Capture) -> str:
     return f"{len(s.until_sync_a())} steps, each after a fall of its own line and after the step before"
 
 
-@proves("PSA2-SETUP-10")
-@check("power_on", needs={"pins"})
-def the_write_to_drate_calibrates(e: Capture) -> str:
+@check("power_on", "PSA2-SETUP-10", needs={"pins"})
+def the_write_to_drate_calibrates(e: Capture, row: Requirement) -> str:
     """Measure how long DRD_T does not fall after the write to DRATE."""
     s = set_up(e)
     drate = s.nth("DInT", sum(line == "DInT" for line, _ in demanded(e)) - 1)
     fall_ns = first_fall(s.drd_t, drate.end_ns, "DRD_T")
-    row = row_for(e, "PSA2-SETUP-10")
     return _span(e, row, drate.end_ns, fall_ns, "selfcal_min_ms", "selfcal_max_ms", "without a fall of DRD_T")
 
 
-@proves("PSA2-SETUP-11")
-@check("power_on", needs={"pins"})
-def drd_a_falls_after_res(e: Capture) -> str:
+@check("power_on", "PSA2-SETUP-11", needs={"pins"})
+def drd_a_falls_after_res(e: Capture, row: Requirement) -> str:
     """Measure Res to the first fall of DRD_A."""
     s = set_up(e)
     fall_ns = first_fall(s.drd_a, s.res_ns, "DRD_A")
-    return _span(e, row_for(e, "PSA2-SETUP-11"), s.res_ns, fall_ns, "first_min_ms", "first_max_ms", "after Res")
+    return _span(e, row, s.res_ns, fall_ns, "first_min_ms", "first_max_ms", "after Res")
 
 
-@proves("PSA2-SETUP-12")
-@check("power_on", needs={"pins"})
-def config0_restarts_the_converters(e: Capture) -> str:
+@check("power_on", "PSA2-SETUP-12", needs={"pins"})
+def config0_restarts_the_converters(e: Capture, row: Requirement) -> str:
     """Measure the write of CONFIG0 to the next fall of DRD_A."""
     s = set_up(e)
     step = s.nth("DIn", 0)
     fall_ns = first_fall(s.drd_a, step.end_ns, "DRD_A")
-    row = row_for(e, "PSA2-SETUP-12")
     return _span(e, row, step.end_ns, fall_ns, "next_min_ms", "next_max_ms", "after the write of CONFIG0")
 
 
-@proves("PSA2-SETUP-13")
-@check("power_on", needs={"pins"})
-def the_first_frame_comes_when_the_filters_have_settled(e: Capture) -> str:
+@check("power_on", "PSA2-SETUP-13", needs={"pins"})
+def the_first_frame_comes_when_the_filters_have_settled(e: Capture, row: Requirement) -> str:
     """Measure SYNC_A to the next fall of DRD_A, and look for the frame that follows it."""
     s = set_up(e)
     begin_ns = s.nth("SYNC_A", 0).begin_ns
     fall_ns = first_fall(s.drd_a, begin_ns, "DRD_A")
-    row = row_for(e, "PSA2-SETUP-13")
     said = _span(e, row, begin_ns, fall_ns, "settling_min_ms", "settling_max_ms", "after SYNC_A")
     frame_ns = first_fall(e.wires.falls("Int"), begin_ns, "Int")
     second = s.drd_a[s.drd_a > fall_ns]
@@ -349,19 +331,17 @@ def the_first_frame_comes_when_the_filters_have_settled(e: Capture) -> str:
     return said
 
 
-@proves("PSA2-SETUP-14")
-@check("power_on", needs={"pins"})
-def the_gain_is_written_after_the_set_up(e: Capture) -> str:
+@check("power_on", "PSA2-SETUP-14", needs={"pins"})
+def the_gain_is_written_after_the_set_up(e: Capture, row: Requirement) -> str:
     """Decode the message to the accelerometer converters that follows SYNC_A."""
     s = set_up(e)
     step = s.nth("DIn", 1)
     if step.begin_ns < s.nth("SYNC_A", 0).begin_ns:
         raise Failed(f"{step.name} before SYNC_A", "after it", at_ns=step.begin_ns, lines=ACCEL)
-    return _is(step, row_for(e, "PSA2-SETUP-14"), "the message after SYNC_A")
+    return _is(step, row, "the message after SYNC_A")
 
 
-@proves("PSA2-SETUP-15")
-@check("power_on", needs={"pins"})
+@check("power_on", "PSA2-SETUP-15", needs={"pins"})
 def no_frame_before_the_set_up_is_over(e: Capture) -> str:
     """Look for falls of Int between Res and the first fall of DRD_A after SYNC_A."""
     s = set_up(e)
@@ -373,14 +353,13 @@ def no_frame_before_the_set_up_is_over(e: Capture) -> str:
     return f"Int high for {(until_ns - s.res_ns) / MS:.1f} ms after Res"
 
 
-@proves("PSA2-SETUP-15")
-@check("power_on", needs={"line"})
-def int_is_quiet_while_the_set_up_lasts(e: Capture) -> str:
+@check("power_on", "PSA2-SETUP-15", needs={"line"})
+def int_is_quiet_while_the_set_up_lasts(e: Capture, row: Requirement) -> str:
     """Press Res while frames flow: how long until Int falls again?"""
     falls = transfers(e.wires).fall_ns
     quiet_ns = np.diff(falls)
     k = int(np.argmax(quiet_ns))
-    due_ns = row_for(e, "PSA2-SETUP-15").limit("quiet_min_ms") * MS
+    due_ns = row.limit("quiet_min_ms") * MS
     if quiet_ns[k] < due_ns - e.slack_ns(due_ns):
         if len(e.wires.gaps_ns):
             raise Inconclusive("the line port lost samples, and with them time")
@@ -389,8 +368,7 @@ def int_is_quiet_while_the_set_up_lasts(e: Capture) -> str:
     return f"no fall of Int for {quiet_ns[k] / MS:.2f} ms"
 
 
-@proves("PSA2-SETUP-16")
-@check("power_on", needs={"pins"})
+@check("power_on", "PSA2-SETUP-16", needs={"pins"})
 def nothing_but_the_set_up_is_sent(e: Capture) -> str:
     """List all that is sent between Res and SYNC_A."""
     s = set_up(e)
@@ -405,8 +383,7 @@ def nothing_but_the_set_up_is_sent(e: Capture) -> str:
     return "; ".join(x.name for x in saw)
 
 
-@proves("PSA1-SETUP-01")
-@check("power_on", needs={"pins"})
+@check("power_on", "PSA1-SETUP-01", needs={"pins"})
 def the_accelerometer_converters_get_one_message(e: Capture) -> str:
     """List all that is sent to the accelerometer converters from Res to the first frames."""
     s = set_up(e)
@@ -422,8 +399,7 @@ def _names(due: list[tuple[str, bytes]]) -> str:
     return "; ".join(f"{sent.hex(' ').upper() or 'a pulse'} on {line}" for line, sent in due) or "nothing more"
 
 
-@proves("PSA2-ERR-04")
-@check("power_cycle", needs={"supply"})
+@check("power_cycle", "PSA2-ERR-04", needs={"supply"})
 def power_up_begins_anew(e: Capture) -> str:
     """Switch the supply off, in a frame where that can be timed, and on: what comes first on CAN and on the lines?"""
     boot = [f for f in e.can.of_id(0x700 + e.node).frames if f.data[:1] == b"\0"]

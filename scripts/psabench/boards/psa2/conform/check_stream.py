@@ -12,7 +12,8 @@ from psabench.boards.psa2.conform.check_serial import LEAST
 from psabench.boards.psa2.conform.stimulus_can import FRAMES, OVERRUNS, Answer
 from psabench.conform.capture.log import CanLog, Capture
 from psabench.conform.plan import check
-from psabench.conform.proves import proves, row_for
+from psabench.conform.proves import row_for
+from psabench.conform.requirements import Requirement
 from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.protocol_files import message
 
@@ -37,8 +38,7 @@ def unit_us(e: Capture) -> float:
 # ---- pairs
 
 
-@proves("PSA2-CAN-01")
-@check("stream")
+@check("stream", "PSA2-CAN-01")
 def xy_and_zt_alternate(e: Capture) -> str:
     """Look at the order of the two messages of a sample, and for others of the stream."""
     ids = {int(message(n).frame_id) - 5 + e.node: n for n in MESSAGES}
@@ -56,8 +56,7 @@ def xy_and_zt_alternate(e: Capture) -> str:
     return f"{len(found)} frames, PSA2_XY and PSA2_ZT in turn"
 
 
-@proves("PSA2-CAN-01")
-@check("stream", needs={"can", "stamps"})
+@check("stream", "PSA2-CAN-01", needs={"can", "stamps"})
 def xy_comes_before_its_zt(e: Capture) -> str:
     """Measure from each of the two messages to the other: those of a sample follow each other at once."""
     ids = {int(message(n).frame_id) - 5 + e.node: n for n in MESSAGES[:2]}
@@ -75,8 +74,7 @@ def xy_comes_before_its_zt(e: Capture) -> str:
     return f"PSA2_ZT {after_xy_us:.0f} us after PSA2_XY"
 
 
-@proves("PSA2-CAN-02")
-@check("stream")
+@check("stream", "PSA2-CAN-02")
 def messages_have_their_lengths(e: Capture) -> str:
     """Compare lengths, forms and ranges of all messages with the table."""
     seen = 0
@@ -94,11 +92,10 @@ def messages_have_their_lengths(e: Capture) -> str:
     return f"{seen} frames of their length"
 
 
-@proves("PSA2-CAN-03")
-@check("stream", needs={"pins", "stamps", "lockstep"})
-def no_frame_before_its_transfer_has_ended(e: Capture) -> str:
+@check("stream", "PSA2-CAN-03", needs={"pins", "stamps", "lockstep"})
+def no_frame_before_its_transfer_has_ended(e: Capture, row: Requirement) -> str:
     """Compare the time of each PSA2_XY on the bus with TSTAMP, and with the rise of Int."""
-    p, row = pairs(e), row_for(e, "PSA2-CAN-03")
+    p = pairs(e)
     stamp_us = p.stamp * unit_us(e)
     rx_us = np.array([f.t_s for f in p.frames]) / US
     after_us = (rx_us - stamp_us) % (unit_us(e) * (1 << STAMP_BITS))
@@ -118,8 +115,7 @@ def no_frame_before_its_transfer_has_ended(e: Capture) -> str:
     return f"PSA2_XY {after_us.min():.0f} us and more after the sample, {since_us.min():.0f} us after Int"
 
 
-@proves("PSA2-CAN-04")
-@check("quiet")
+@check("quiet", "PSA2-CAN-04")
 def seq_rises_by_one(e: Capture) -> str:
     """Look for gaps of SEQ."""
     p = pairs(e)
@@ -127,14 +123,13 @@ def seq_rises_by_one(e: Capture) -> str:
     return f"{len(p)} samples, SEQ {p.seq[0]} to {p.seq[-1]}"
 
 
-@proves("PSA2-SAMP-01")
-@check("quiet")
-def every_conversion_becomes_a_sample(e: Capture) -> str:
+@check("quiet", "PSA2-SAMP-01")
+def every_conversion_becomes_a_sample(e: Capture, row: Requirement) -> str:
     """Measure TSTAMP from sample to sample: one data period each?"""
     p = pairs(e)
     period_us = row_for(e, "PSA2-READ-06").limit("period_us")
     step_us = np.diff(p.stamp) * unit_us(e)
-    slack_us = row_for(e, "PSA2-SAMP-01").limit("tolerance_us") + e.slack_ns(period_us * 1e3) * 1e-3
+    slack_us = row.limit("tolerance_us") + e.slack_ns(period_us * 1e3) * 1e-3
     bad = np.flatnonzero(np.abs(step_us - period_us) > slack_us)
     if len(bad):
         saw = f"{step_us[bad[0]]:.0f} us from sample to sample ({len(bad)} of {len(step_us)})"
@@ -142,12 +137,10 @@ def every_conversion_becomes_a_sample(e: Capture) -> str:
     return f"{len(p)} samples, each {step_us.min():.0f} to {step_us.max():.0f} us after the one before"
 
 
-@proves("PSA2-CAN-05")
-@check("quiet")
-def tstamp_goes_by_the_data_period(e: Capture) -> str:
+@check("quiet", "PSA2-CAN-05")
+def tstamp_goes_by_the_data_period(e: Capture, row: Requirement) -> str:
     """Compare TSTAMP with SEQ times the data period."""
     p = pairs(e, 100)
-    row = row_for(e, "PSA2-CAN-05")
     period_us = row_for(e, "PSA2-READ-06").limit("period_us")
     n = np.concatenate(([0], np.cumsum(p.steps)))
     if not n[-1]:
@@ -168,9 +161,8 @@ def tstamp_goes_by_the_data_period(e: Capture) -> str:
     return f"{mean_us:.4f} us a sample over {n[-1]} periods, off by at most {off_us[k]:.1f} us"
 
 
-@proves("PSA2-CAN-05")
-@check("stream", needs={"pins", "exact"})
-def tstamp_is_the_fall_of_drd_a(e: Capture) -> str:
+@check("stream", "PSA2-CAN-05", needs={"pins", "exact"})
+def tstamp_is_the_fall_of_drd_a(e: Capture, row: Requirement) -> str:
     """Compare TSTAMP with the falls of DRD_A."""
     p = pairs(e)
     falls = e.wires.falls("DRD_A")
@@ -178,7 +170,7 @@ def tstamp_is_the_fall_of_drd_a(e: Capture) -> str:
         raise Inconclusive(f"{len(falls)} falls of DRD_A were recorded")
     due = np.unique(falls // round(unit_us(e) * 1e3) % (1 << STAMP_BITS))
     bad = ~np.isin(p.stamp % (1 << STAMP_BITS), due)
-    if bad.sum() > row_for(e, "PSA2-CAN-05").limit("edge_max_frames"):
+    if bad.sum() > row.limit("edge_max_frames"):
         k = int(np.flatnonzero(bad)[0])
         raise Failed(
             f"TSTAMP {p.stamp[k] % (1 << STAMP_BITS)} at no fall of DRD_A", "the instant of one", frames=p.about(k)
@@ -186,9 +178,8 @@ def tstamp_is_the_fall_of_drd_a(e: Capture) -> str:
     return f"{len(p)} time stamps, each a fall of DRD_A"
 
 
-@proves("PSA2-CAN-06")
-@check("starts")
-def samples_come_whole(e: Capture) -> str:
+@check("starts", "PSA2-CAN-06")
+def samples_come_whole(e: Capture, row: Requirement) -> str:
     """Start and stop the stream at all phases of a sample: is there a second half without a first?"""
     first, second = (int(message(n).frame_id) - 5 + e.node for n in ("PSA2_XY", "PSA2_ZT"))
     halves = [f for f in e.can.frames if f.can_id in (first, second) and not f.error]
@@ -198,14 +189,13 @@ def samples_come_whole(e: Capture) -> str:
         if f.can_id == second and (k == 0 or halves[k - 1].can_id == second):
             raise Failed("a PSA2_ZT without its PSA2_XY", "both", frames=halves[max(0, k - 2) : k + 2])
     torn = sum(a.can_id == b.can_id == first for a, b in itertools.pairwise(halves))
-    starts = int(row_for(e, "PSA2-CAN-06").limit("starts_count"))
+    starts = int(row.limit("starts_count"))
     if torn > starts:
         raise Failed(f"{torn} PSA2_XY without PSA2_ZT in {starts} stops", "at most one a stop")
     return f"{len(halves)} halves, {torn} cut by a stop"
 
 
-@proves("PSA2-CAN-08")
-@check("quiet")
+@check("quiet", "PSA2-CAN-08")
 def overrun_tells_of_lost_conversions(e: Capture) -> str:
     """Compare OVERRUN with the gaps of SEQ and with the counter of overruns."""
     p = pairs(e)
@@ -240,33 +230,29 @@ def _meanwhile(e: Capture, sub: int) -> Capture:
     return e.with_can(CanLog(frames=e.can.frames[at[0] : at[-1]]))
 
 
-@proves("PSA2-CNT-01")
-@check("quiet")
-def frames_are_counted(e: Capture) -> str:
+@check("quiet", "PSA2-CNT-01")
+def frames_are_counted(e: Capture, row: Requirement) -> str:
     """Compare the counter of frames with SEQ."""
     p, counted = pairs(_meanwhile(e, FRAMES)), _counted(e, FRAMES)
     span = int((p.seq[-1] - p.seq[0]) % (1 << SEQ_BITS)) + 1
-    row = row_for(e, "PSA2-CNT-01")
     fewer, more = int(row.limit("on_its_way_max_frames")), int(row.limit("edge_max_frames"))
     if not span - fewer <= counted <= span + more:
         raise Failed(f"{counted} frames counted, {span} by SEQ", f"{fewer} less to {more} more, at the ends")
     return f"{counted} frames counted, {span} by SEQ"
 
 
-@proves("PSA2-CNT-02")
-@check("quiet")
-def overruns_are_counted(e: Capture) -> str:
+@check("quiet", "PSA2-CNT-02")
+def overruns_are_counted(e: Capture, row: Requirement) -> str:
     """Compare the counter of overruns with OVERRUN."""
     counted = _counted(e, OVERRUNS)
-    late = int(row_for(e, "PSA2-CNT-02").limit("told_late_max_frames"))  # those were counted before
+    late = int(row.limit("told_late_max_frames"))  # those were counted before
     told = int(pairs(_meanwhile(e, OVERRUNS)).overrun[late:].sum())
     if counted < told or (counted and not pairs(e).overrun.any()):
         raise Failed(f"{counted} overruns counted, {told} told by OVERRUN", "as many")
     return f"{counted} overruns counted, {told} told by OVERRUN"
 
 
-@proves("PSA2-RES-05")
-@check("power_on")
+@check("power_on", "PSA2-RES-05")
 def seq_begins_with_0(e: Capture) -> str:
     """Look at the first sample after the reset."""
     boots = [k for k, f in enumerate(e.can.frames) if f.can_id == 0x700 + e.node and f.data[:1] == b"\0"]
@@ -282,15 +268,14 @@ def seq_begins_with_0(e: Capture) -> str:
     return "SEQ 0 first"
 
 
-@proves("PSA2-READ-06")
-@check("stream", needs={"line"})
-def frames_come_every_data_period(e: Capture) -> str:
+@check("stream", "PSA2-READ-06", needs={"line"})
+def frames_come_every_data_period(e: Capture, row: Requirement) -> str:
     """Measure the falls of Int."""
     t = transfers(e.wires)
-    period_ns = row_for(e, "PSA2-READ-06").limit("period_us") * 1e3
+    period_ns = row.limit("period_us") * 1e3
     clk_ns = 1e9 / row_for(e, *FORMATS).limit("clk_hz")
     step_ns = np.diff(t.fall_ns)
-    slack_ns = row_for(e, "PSA2-READ-06").limit("tolerance_clk") * clk_ns + e.slack_ns(period_ns)
+    slack_ns = row.limit("tolerance_clk") * clk_ns + e.slack_ns(period_ns)
     bad = np.flatnonzero((np.abs(step_ns - period_ns) > slack_ns) & e.wires.known(t.fall_ns[:-1], t.fall_ns[1:]))
     if len(bad) and e.variant["gate_sclk"]:  # without gates a burst for the other port may delay a read
         k = int(bad[0])

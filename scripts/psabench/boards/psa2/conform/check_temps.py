@@ -14,20 +14,20 @@ from psabench.boards.psa2.conform.check_words import Beside, beside, channel_on_
 from psabench.boards.psa2.conform.stimulus_can import Answer
 from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
-from psabench.conform.proves import proves, row_for
+from psabench.conform.proves import row_for
+from psabench.conform.requirements import Requirement
 from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.signals import Ints
 
 TEMP_LEAST = 120  # samples: fewer have not the temperatures that a judgement wants, one every 10 ms at 1000 SPS
 
 
-@proves("PSA2-TEMP-01")
-@check("quiet")
-def channels_take_turns(e: Capture) -> str:
+@check("quiet", "PSA2-TEMP-01")
+def channels_take_turns(e: Capture, row: Requirement) -> str:
     """Follow CHANNEL through the samples with T_NEW."""
     p = pairs(e, TEMP_LEAST)
     seen = p.channel[p.new]
-    count = int(row_for(e, "PSA2-TEMP-01").limit("channels_count"))
+    count = int(row.limit("channels_count"))
     if len(seen) < 2 * count:
         raise Failed(f"{len(seen)} new temperatures in {len(p)} samples", "one every 10 ms", frames=p.about(0))
     step = np.diff(seen) % count
@@ -41,11 +41,9 @@ def channels_take_turns(e: Capture) -> str:
     return f"{len(seen)} temperatures of {count} channels in turn"
 
 
-@proves("PSA2-TEMP-02")
-@check("stream", needs={"pins"})
-def temperature_codes_are_the_upper_bits_that_were_read(e: Capture) -> str:
+@check("stream", "PSA2-TEMP-02", needs={"pins"})
+def temperature_codes_are_the_upper_bits_that_were_read(e: Capture, row: Requirement) -> str:
     """Compare the temperature codes with the words on DOutT."""
-    row = row_for(e, "PSA2-TEMP-02")
     bits, code_bits = int(row.limit("read_bits")), int(row.limit("code_bits"))
     bursts = [b for m in port_traffic(e).of(temp=True) if m.sent[:1] == b"\x01" for b in m.bursts[1:]]
     if len(bursts) < LEAST:
@@ -66,11 +64,10 @@ def temperature_codes_are_the_upper_bits_that_were_read(e: Capture) -> str:
     return f"{same} codes are the upper {code_bits} of {bits} bits"
 
 
-@proves("PSA2-TEMP-05")
-@check("quiet")
-def temperatures_come_at_their_rate(e: Capture) -> str:
+@check("quiet", "PSA2-TEMP-05")
+def temperatures_come_at_their_rate(e: Capture, row: Requirement) -> str:
     """Measure TSTAMP between samples with T_NEW."""
-    p, row = pairs(e, TEMP_LEAST), row_for(e, "PSA2-TEMP-05")
+    p = pairs(e, TEMP_LEAST)
     at_us = p.stamp[p.new] * unit_us(e)
     if len(at_us) < LEAST:
         raise Failed(f"{len(at_us)} new temperatures in {len(p)} samples", "one every 10 ms", frames=p.about(0))
@@ -89,13 +86,12 @@ def temperatures_come_at_their_rate(e: Capture) -> str:
     return f"{len(at_us)} temperatures, {mean_ms:.3f} ms apart"
 
 
-@proves("PSA2-TEMP-08")
-@check("selfcal")
-def the_scan_waits_for_a_calibration(e: Capture) -> str:
+@check("selfcal", "PSA2-TEMP-08")
+def the_scan_waits_for_a_calibration(e: Capture, row: Requirement) -> str:
     """SELFCAL while temperatures are scanned: a pause, then they come again."""
     if e.facts.get("opcode") != Answer():
         raise Failed(f"SELFCAL answered by {e.facts.get('opcode')}", "it is taken")
-    p, row = pairs(e), row_for(e, "PSA2-TEMP-08")
+    p = pairs(e)
     at_ms = p.stamp[p.new] * unit_us(e) * 1e-3
     if len(at_ms) < LEAST:
         raise Failed(f"{len(at_ms)} new temperatures", "they come again", frames=p.about(len(p) - 3))
@@ -113,8 +109,7 @@ def the_scan_waits_for_a_calibration(e: Capture) -> str:
 # ---- the scan on its port
 
 
-@proves("PSA2-CHIP-08")
-@check("stream", needs={"pins"})
+@check("stream", "PSA2-CHIP-08", needs={"pins"})
 def drd_t_rises_when_a_temperature_is_read(e: Capture) -> str:
     """Look at DRD_T before and after each RDATA."""
     reads = [m for m in temp_messages(e) if m.sent[:1] == bytes([RDATA])][:-1]
@@ -129,8 +124,7 @@ def drd_t_rises_when_a_temperature_is_read(e: Capture) -> str:
     return f"DRD_T low before and high after each of {len(reads)} RDATA"
 
 
-@proves("PSA2-TEMP-06")
-@check("stream", needs={"pins"})
+@check("stream", "PSA2-TEMP-06", needs={"pins"})
 def the_scan_goes_by_its_steps(e: Capture) -> str:
     """Decode the messages to the temperature converter, with the edges of SYNC_T and DRD_T between them."""
     found = temp_messages(e)
@@ -188,8 +182,7 @@ def _is_of_its_channel(b: Beside, new: Ints, told: Ints, converted: Ints) -> str
     return f"{len(new)} temperatures, each told as the channel whose input was converted"
 
 
-@proves("PSA2-TEMP-09")
-@check("stream", needs={"pins"})
+@check("stream", "PSA2-TEMP-09", needs={"pins"})
 def a_temperature_on_can_is_of_its_channel(e: Capture) -> str:
     """Compare CHANNEL of each new temperature with the input that was written to MUX before it was read."""
     b = beside(e)
@@ -197,8 +190,7 @@ def a_temperature_on_can_is_of_its_channel(e: Capture) -> str:
     return _is_of_its_channel(b, new, b.samples.channel[new], converted)
 
 
-@proves("PSA2-WORD-06")
-@check("stream", needs={"pins"})
+@check("stream", "PSA2-WORD-06", needs={"pins"})
 def a_temperature_on_the_line_is_of_its_channel(e: Capture) -> str:
     """Compare the channel in word T of each new temperature with the input that was written to MUX before it."""
     b = beside(e)
@@ -215,25 +207,21 @@ def _ends_in_time(e: Capture) -> str:
     return least(e, margin_ns, ends, due_ns, "from a burst to the next fall of DRD_A", TEMP)
 
 
-@proves("PSA2-TEMP-07")
-@check("stream", needs={"pins"})
+@check("stream", "PSA2-TEMP-07", needs={"pins"})
 def bursts_keep_clear_of_the_next_conversion(e: Capture) -> str:
     """Measure the end of each burst to the temperature converter to the next fall of DRD_A."""
     return _ends_in_time(e)
 
 
-@proves("PSA2-TEMP-07")
-@check("busy", needs={"pins"})
+@check("busy", "PSA2-TEMP-07", needs={"pins"})
 def bursts_keep_clear_at_the_highest_rate(e: Capture) -> str:
     """The same with four thousand conversions a second, while registers of both groups are read."""
     return _ends_in_time(e)
 
 
-@proves("PSA2-CHIP-10")
-@check("stream", needs={"pins"})
-def a_temperature_settles_in_its_time(e: Capture) -> str:
+@check("stream", "PSA2-CHIP-10", needs={"pins"})
+def a_temperature_settles_in_its_time(e: Capture, row: Requirement) -> str:
     """Measure the rise of SYNC_T to the next fall of DRD_T."""
-    row = row_for(e, "PSA2-CHIP-10")
     rises, falls = e.wires.rises("SYNC_T"), e.wires.falls("DRD_T")
     rises = rises[rises < falls[-1]] if len(falls) else rises[:0]
     if not len(rises):

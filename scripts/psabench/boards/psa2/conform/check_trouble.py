@@ -10,18 +10,17 @@ from psabench.boards.psa2.conform.check_stream import number
 from psabench.boards.psa2.conform.stimulus_can import FORM, TIMEOUTS, Answer
 from psabench.conform.capture.log import CanFrame, Capture
 from psabench.conform.plan import check
-from psabench.conform.proves import proves, row_for
+from psabench.conform.proves import row_for
+from psabench.conform.requirements import Requirement
 from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.protocol_files import message
 
 # ---- what does not fit the bus
 
 
-@proves("PSA2-FIT-01")
-@check("fit")
-def a_form_that_does_not_fit_is_refused(e: Capture) -> str:
+@check("fit", "PSA2-FIT-01")
+def a_form_that_does_not_fit_is_refused(e: Capture, row: Requirement) -> str:
     """Ask for pairs at 4000 a second."""
-    row = row_for(e, "PSA2-FIT-01")
     if fact(e, "fast") != Answer():
         raise Failed(f"4000 SPS in form 1 answered by {fact(e, 'fast').abort:08X}h", "it is taken")
     due = int(row.limit("abort_code"))
@@ -36,11 +35,10 @@ def a_form_that_does_not_fit_is_refused(e: Capture) -> str:
     return f"abort {due:08X}h, EMCY, {text!r}"
 
 
-@proves("PSA2-FIT-02")
-@check("fit")
-def a_rate_that_does_not_fit_is_refused(e: Capture) -> str:
+@check("fit", "PSA2-FIT-02")
+def a_rate_that_does_not_fit_is_refused(e: Capture, row: Requirement) -> str:
     """Ask for 4000 SPS in pairs, and read CONFIG0."""
-    due = int(row_for(e, "PSA2-FIT-02").limit("abort_code"))
+    due = int(row.limit("abort_code"))
     if fact(e, "rate").abort != due:
         raise Failed(f"CONFIG0 = 66h answered by {fact(e, 'rate').abort:08X}h", f"abort {due:08X}h")
     before = int(row_for(e, "PSA2-REG-01").limit("config0_code"))
@@ -49,8 +47,7 @@ def a_rate_that_does_not_fit_is_refused(e: Capture) -> str:
     return f"abort {due:08X}h, CONFIG0 still {before:02X}h"
 
 
-@proves("PSA2-FIT-02")
-@check("fit", needs={"pins"})
+@check("fit", "PSA2-FIT-02", needs={"pins"})
 def a_refused_rate_never_reaches_the_converters(e: Capture) -> str:
     """Count the writes of CONFIG0 on DIn: the one in form 1 that was taken."""
     n = sum(m.sent[:1] == b"\x41" for m in port_traffic(e).of(temp=False))
@@ -59,11 +56,10 @@ def a_refused_rate_never_reaches_the_converters(e: Capture) -> str:
     return "one write of CONFIG0 on DIn, that in form 1"
 
 
-@proves("PSA2-FIT-04")
-@check("fit")
-def worst_case_times_are_those_of_the_table(e: Capture) -> str:
+@check("fit", "PSA2-FIT-04")
+def worst_case_times_are_those_of_the_table(e: Capture, row: Requirement) -> str:
     """Read 2031h after a rejection."""
-    due = f"{row_for(e, 'PSA2-FIT-04').limit('pair_us'):.3f} us"
+    due = f"{row.limit('pair_us'):.3f} us"
     for name in ("rate text", "form text"):
         text = fact(e, name).value
         if not isinstance(text, str) or due not in text:
@@ -87,13 +83,12 @@ def _emcy(e: Capture, code: int) -> CanFrame:
     return found[0]
 
 
-@proves("PSA2-ERR-02")
-@check("trouble")
-def a_silent_temperature_converter_is_told(e: Capture) -> str:
+@check("trouble", "PSA2-ERR-02")
+def a_silent_temperature_converter_is_told(e: Capture, row: Requirement) -> str:
     """Silence it by its SYNC command without WAKEUP: EMCY once, and its end."""
     if fact(e, "opcode") != Answer():
         raise Failed(f"SYNC FCh answered by {fact(e, 'opcode').abort:08X}h", "it is taken")
-    row, e = row_for(e, "PSA2-ERR-02"), segment(e, "silent", "silent end")
+    e = segment(e, "silent", "silent end")
     told = _emcy(e, int(row.limit("emcy_code")))
     if told.data[3] != int(row.limit("source_code")):
         raise Failed(f"source {told.data[3]}", f"{int(row.limit('source_code'))}", frames=[told])
@@ -103,11 +98,10 @@ def a_silent_temperature_converter_is_told(e: Capture) -> str:
     return f"EMCY {int(row.limit('emcy_code')):04X}h, then 0000h"
 
 
-@proves("PSA2-ERR-03")
-@check("trouble")
-def axes_go_on_without_temperatures(e: Capture) -> str:
+@check("trouble", "PSA2-ERR-03")
+def axes_go_on_without_temperatures(e: Capture, row: Requirement) -> str:
     """SEQ and T_NEW while the temperature converter is silent."""
-    p, row = pairs(segment(e, "stream", "silent end")), row_for(e, "PSA2-ERR-03")
+    p = pairs(segment(e, "stream", "silent end"))
     p.unbroken()
     at = p.new.nonzero()[0]
     if not len(at):
@@ -118,8 +112,7 @@ def axes_go_on_without_temperatures(e: Capture) -> str:
     return f"{len(p)} frames without a gap, {pause} of them without a temperature"
 
 
-@proves("BUS-EMCY-04")
-@check("trouble", boards=("psa2",))
+@check("trouble", "BUS-EMCY-04", boards=("psa2",))
 def the_history_has_the_latest_first(e: Capture) -> str:
     """Compare 1003h with the emergencies of different codes that came."""
     due = [f.data[:2] for f in reversed(emcys(e)) if f.data[:2] != b"\0\0"]
@@ -132,8 +125,7 @@ def the_history_has_the_latest_first(e: Capture) -> str:
     return f"{', '.join(f'{c[::-1].hex().upper()}h' for c in due)}, as they came"
 
 
-@proves("PSA2-CNT-03")
-@check("trouble")
+@check("trouble", "PSA2-CNT-03")
 def time_outs_are_counted(e: Capture) -> str:
     """2030h:9 before and after."""
     n = number(fact(e, "after")[TIMEOUTS]) - number(fact(e, "before")[TIMEOUTS])
@@ -143,11 +135,10 @@ def time_outs_are_counted(e: Capture) -> str:
     return f"{n} counted"
 
 
-@proves("PSA2-ACC-06")
-@check("trouble")
-def an_access_without_data_ready_is_aborted(e: Capture) -> str:
+@check("trouble", "PSA2-ACC-06")
+def an_access_without_data_ready_is_aborted(e: Capture, row: Requirement) -> str:
     """Read a register of the silent temperature converter."""
-    due, answer = int(row_for(e, "PSA2-ACC-06").limit("abort_code")), fact(e, "access")
+    due, answer = int(row.limit("abort_code")), fact(e, "access")
     if answer.abort != due:
         raise Failed(f"answered by {answer.abort:08X}h {answer.value}", f"abort {due:08X}h")
     return f"abort {due:08X}h"

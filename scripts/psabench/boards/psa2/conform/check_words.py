@@ -13,7 +13,8 @@ from psabench.boards.psa2.conform.check_setup import port_traffic
 from psabench.boards.psa2.conform.check_stream import FORMATS, LINES
 from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
-from psabench.conform.proves import proves, row_for
+from psabench.conform.proves import row_for
+from psabench.conform.requirements import Requirement
 from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.signals import Ints
 
@@ -94,8 +95,7 @@ def _same(saw: Ints, due: Ints, p: Pairs, what: str) -> str:
     return f"{len(bad)} frames, {what} as on CAN"
 
 
-@proves("PSA2-FRAME-03")
-@check("stream", needs={"line"})
+@check("stream", "PSA2-FRAME-03", needs={"line"})
 def words_come_least_significant_bit_first(e: Capture) -> str:
     """Read the words either way round: which way do they hold the codes of CAN?"""
     t, p = transfers(e.wires.unbroken()), pairs(e)
@@ -117,8 +117,7 @@ def words_come_least_significant_bit_first(e: Capture) -> str:
     return f"{count['least']} words are codes, read so; {count['most']} the other way round"
 
 
-@proves("PSA2-WORD-01", "PSA2-WORD-02", "PSA2-WORD-03", "PSA2-WORD-04")
-@check("stream", needs={"line"})
+@check("stream", "PSA2-WORD-01", "PSA2-WORD-02", "PSA2-WORD-03", "PSA2-WORD-04", needs={"line"})
 def words_are_the_codes(e: Capture) -> str:
     """Compare the words X, Y and Z of each frame with the codes of the same frame on CAN."""
     b = beside(e)
@@ -126,16 +125,14 @@ def words_are_the_codes(e: Capture) -> str:
     return _same(np.sort(b.line, axis=1), np.sort(due, axis=1), b.samples, "codes")
 
 
-@proves("PSA2-FRAME-04")
-@check("stream", needs={"line"})
+@check("stream", "PSA2-FRAME-04", needs={"line"})
 def the_first_word_is_that_of_the_lowest_address(e: Capture) -> str:
     """Compare the first word with the code of X on CAN."""
     b = beside(e)
     return _same(b.line[:, 0], _codes_due(e, b.samples)[:, 0], b.samples, "X first")
 
 
-@proves("PSA2-FRAME-05")
-@check("stream", needs={"line"})
+@check("stream", "PSA2-FRAME-05", needs={"line"})
 def words_are_in_their_order(e: Capture) -> str:
     """Compare the order of the words with X, Y, Z and T on CAN."""
     b = beside(e)
@@ -145,8 +142,7 @@ def words_are_in_their_order(e: Capture) -> str:
     return _same(saw, due, b.samples, "X, Y, Z, T in this order")
 
 
-@proves("PSA2-CAN-07")
-@check("stream", needs={"line"})
+@check("stream", "PSA2-CAN-07", needs={"line"})
 def can_and_line_carry_the_same(e: Capture) -> str:
     """Compare all that a frame carries on the line with its pair on CAN."""
     b = beside(e)
@@ -155,8 +151,7 @@ def can_and_line_carry_the_same(e: Capture) -> str:
     return _same(b.words[:, 3] & mask, b.samples.temp & mask, b.samples, "codes and T")
 
 
-@proves("PSA2-WORD-05", "PSA2-WORD-08")
-@check("stream", needs={"line"})
+@check("stream", "PSA2-WORD-05", "PSA2-WORD-08", needs={"line"})
 def word_t_has_the_temperature_code(e: Capture) -> str:
     """Compare the lower bits of word T with T on CAN."""
     b = beside(e)
@@ -170,19 +165,17 @@ def channel_on_the_line(e: Capture, b: Beside) -> Ints:
     return b.words[:, 3] >> int(row.limit("channel_shift_bits")) & ((1 << int(row.limit("channel_bits"))) - 1)
 
 
-@proves("PSA2-WORD-06")
-@check("stream", needs={"line"})
+@check("stream", "PSA2-WORD-06", needs={"line"})
 def word_t_has_the_channel(e: Capture) -> str:
     """Compare bits 19 to 16 of word T with CHANNEL on CAN."""
     b = beside(e)
     return _same(channel_on_the_line(e, b), b.samples.channel, b.samples, "CHANNEL")
 
 
-@proves("PSA2-WORD-07")
-@check("stream", needs={"line"})
-def word_t_has_the_status(e: Capture) -> str:
+@check("stream", "PSA2-WORD-07", needs={"line"})
+def word_t_has_the_status(e: Capture, row: Requirement) -> str:
     """Compare bits 23 to 20 of word T with the status bits on CAN."""
-    b, row = beside(e), row_for(e, "PSA2-WORD-07")
+    b = beside(e)
     p = b.samples
     due = sum(
         int(row.limit(f"{n}_bit")) * v
@@ -203,13 +196,12 @@ def _read_words(e: Capture) -> Ints:
     return signed(np.array([[int(w[:24], 2) for w in b.got] for b in reads], np.int64), 24)
 
 
-@proves("PSA2-READ-04")
-@check("stream", needs={"pins"})
-def three_axes_are_read_at_once(e: Capture) -> str:
+@check("stream", "PSA2-READ-04", needs={"pins"})
+def three_axes_are_read_at_once(e: Capture, row: Requirement) -> str:
     """Decode DOutX, DOutY and DOutZ by the same pulses of SClk, beside the codes on CAN."""
     read, p = _read_words(e), pairs(e)
     shift, same = aligned(read, p.code)
-    if same < len(p) - int(row_for(e, "PSA2-READ-04").limit("edge_max_frames")):
+    if same < len(p) - int(row.limit("edge_max_frames")):
         i = np.arange(len(p)) + shift
         at = np.flatnonzero([not (0 <= k < len(read)) or (read[k] != c).any() for k, c in zip(i, p.code, strict=True)])
         raise Failed(
@@ -221,8 +213,7 @@ def three_axes_are_read_at_once(e: Capture) -> str:
     return f"{same} samples of {len(p)} as they were read"
 
 
-@proves("PSA2-READ-05")
-@check("stream", needs={"pins"})
+@check("stream", "PSA2-READ-05", needs={"pins"})
 def a_frame_has_the_codes_of_the_read_before_it(e: Capture) -> str:
     """Compare the words of each frame with the read that ended before Int fell."""
     words, t = _words(e), transfers(e.wires)

@@ -9,9 +9,8 @@ from psabench.boards.psd1.conform.host import BOTH, calm, drive, has_host, perio
 from psabench.conform.bus_host import SHORT_S, burst, line, line_refused
 from psabench.conform.dut import Subject
 from psabench.conform.plan import active
-from psabench.conform.proves import proves
 from psabench.conform.registers import names_and_rights
-from psabench.conform.requirements import requirements
+from psabench.conform.requirements import Requirement
 from psabench.conform.verdict import Failed
 from psabench.errors import CycleRefused
 
@@ -38,8 +37,7 @@ def _waiting(s: Subject, axis: int = 0) -> None:
         s.run_for(HALF_S)
 
 
-@proves("PSD1-CYC-02")
-@active(needs={"bus"})
+@active("PSD1-CYC-02", needs={"bus"})
 def no_cycle_without_int0_and_fl1(s: Subject) -> str:
     """Write FLAGS 0, 1 and 2, look for a running cycle after each, then write 3."""
     calm(s)
@@ -72,8 +70,7 @@ def _without_flags(s: Subject) -> str:
     return f"no cycle with FLAGS 0, 1 and 2, {found[BOTH]} with 3"
 
 
-@proves("PSD1-CYC-05")
-@active(needs={"bus"})
+@active("PSD1-CYC-05", needs={"bus"})
 def a_cycle_goes_on_without_its_conditions(s: Subject) -> str:
     """Write FLAGS 0 while X waits, read the three words, look for another cycle."""
     _waiting(s)
@@ -86,8 +83,7 @@ def a_cycle_goes_on_without_its_conditions(s: Subject) -> str:
     return f"words {' '.join(f'{w:04X}h' for w in words)}, then no cycle"
 
 
-@proves("PSD1-FL2-06")
-@active(needs={"bus"})
+@active("PSD1-FL2-06", needs={"bus"})
 def a_word_waits_for_its_strobe(s: Subject) -> str:
     """Leave X unread for a second, then read X, Y and Z."""
     _waiting(s)
@@ -101,8 +97,7 @@ def a_word_waits_for_its_strobe(s: Subject) -> str:
     return f"X waited for a second, then {' '.join(f'{w:04X}h' for w in words)}"
 
 
-@proves("PSD1-BUS-02")
-@active(needs={"bus", "can"})
+@active("PSD1-BUS-02", needs={"bus", "can"})
 def words_are_answered_at_their_addresses(s: Subject) -> str:
     """Read X, Y and Z at 00h, 01h and 02h, and compare them with what the board tells of that cycle."""
     calm(s)
@@ -115,11 +110,10 @@ def words_are_answered_at_their_addresses(s: Subject) -> str:
     return "four cycles, the words at 00h, 01h and 02h"
 
 
-@proves("PSD1-BUS-03")
-@active(needs={"bus"})
-def a_strobe_for_another_word_is_refused(s: Subject) -> str:
+@active("PSD1-BUS-03", needs={"bus"})
+def a_strobe_for_another_word_is_refused(s: Subject, row: Requirement) -> str:
     """Read Y and Z while X waits, then X; read X before there is a cycle."""
-    code = requirements()["PSD1-BUS-03"].limit("abort_code")
+    code = row.limit("abort_code")
     calm(s)
     line_refused(s, "R 0", code)
     _waiting(s)
@@ -132,11 +126,10 @@ def a_strobe_for_another_word_is_refused(s: Subject) -> str:
     return f"refused, and X gave {first:04X}h afterwards"
 
 
-@proves("PSD1-BUS-04")
-@active(needs={"bus"})
-def a_word_is_taken_once(s: Subject) -> str:
+@active("PSD1-BUS-04", needs={"bus"})
+def a_word_is_taken_once(s: Subject, row: Requirement) -> str:
     """Read X twice."""
-    code = requirements()["PSD1-BUS-04"].limit("abort_code")
+    code = row.limit("abort_code")
     _waiting(s)
     line(s, "R 0")
     line_refused(s, "R 0", code)
@@ -144,11 +137,10 @@ def a_word_is_taken_once(s: Subject) -> str:
     return "the second strobe is refused"
 
 
-@proves("PSD1-BUS-05")
-@active(needs={"bus"})
-def words_of_the_built_in_host_are_refused(s: Subject) -> str:
+@active("PSD1-BUS-05", needs={"bus"})
+def words_of_the_built_in_host_are_refused(s: Subject, row: Requirement) -> str:
     """Read X, Y and Z while the board reads them itself, each time a little earlier in the cycle."""
-    code = requirements()["PSD1-BUS-05"].limit("abort_code")
+    code = row.limit("abort_code")
     calm(s)
     strobes = round(SCAN_S / SCAN_STEP_S)
     for axis in range(3):
@@ -173,8 +165,7 @@ def _a_period_later(s: Subject, less_s: float) -> None:
     s.run_for(period_s(s.variant) - SHORT_S - less_s)
 
 
-@proves("PSD1-BUS-06")
-@active(needs={"bus"})
+@active("PSD1-BUS-06", needs={"bus"})
 def registers_have_their_names_and_rights(s: Subject) -> str:
     """Ask who is there, read and write every address."""
     words = {"X": 0x08000022, "Y": 0x08000022, "Z": 0x08000022}
@@ -184,11 +175,9 @@ def registers_have_their_names_and_rights(s: Subject) -> str:
     return seen
 
 
-@proves("PSD1-BUS-10")
-@active(needs={"bus"})
-def channels_come_back_with_their_codes(s: Subject) -> str:
+@active("PSD1-BUS-10", needs={"bus"})
+def channels_come_back_with_their_codes(s: Subject, row: Requirement) -> str:
     """Write each channel to TEMP and SERVICE and read it back."""
-    row = requirements()["PSD1-BUS-10"]
     calm(s)
     bits = int(row.limit("code_bits"))
     seen = []
@@ -202,8 +191,7 @@ def channels_come_back_with_their_codes(s: Subject) -> str:
     return f"codes {' '.join(seen)}"
 
 
-@proves("PSD1-BUS-11")
-@active(needs={"bus"})
+@active("PSD1-BUS-11", needs={"bus"})
 def the_other_signals_are_there(s: Subject) -> str:
     """Read gyros, rate sensors, temperatures and service signals."""
     calm(s)
@@ -222,11 +210,9 @@ def the_other_signals_are_there(s: Subject) -> str:
     return f"gyros {gyros}, rates {rates}, service {service}"
 
 
-@proves("PSD1-BUS-11")
-@active(needs={"bus", "supply"})
-def the_service_signal_follows_the_supply(s: Subject) -> str:
+@active("PSD1-BUS-11", needs={"bus", "supply"})
+def the_service_signal_follows_the_supply(s: Subject, row: Requirement) -> str:
     """Lower the supply by a twentieth and read its code before and after."""
-    row = requirements()["PSD1-BUS-11"]
     calm(s)
     line(s, "W B 0000")
     supply = s.bench.supply
@@ -245,8 +231,7 @@ def the_service_signal_follows_the_supply(s: Subject) -> str:
     return f"code {before}, at 95 % of the supply {after}"
 
 
-@proves("PSD1-BUS-12")
-@active(needs={"bus"})
+@active("PSD1-BUS-12", needs={"bus"})
 def gyros_are_latched_with_the_cycle(s: Subject) -> str:
     """Read the registers of gyros and rate sensors twice in a cycle; where there is a rate table it turns meanwhile."""
     table = s.bench.table if "table" in s.probes else None
@@ -291,11 +276,9 @@ def _twice(s: Subject, text: str) -> tuple[int, int]:
     return first.data, line(s, text).data
 
 
-@proves("PSD1-BUS-13")
-@active(needs={"bus", "can", "table"})
-def gyros_count_arc_seconds(s: Subject) -> str:
+@active("PSD1-BUS-13", needs={"bus", "can", "table"})
+def gyros_count_arc_seconds(s: Subject, row: Requirement) -> str:
     """Turn a rate table by ten degrees and back; compare counts with its readout, and 04h to 06h with the counts."""
-    row = requirements()["PSD1-BUS-13"]
     modulo, table = 1 << int(row.limit("code_bits")), s.bench.table
     calm(s)
     at_deg, counts, seen = table.angle_deg(), _gyros(s), []
@@ -329,8 +312,7 @@ def _gyros(s: Subject) -> list[int]:
     return [int(s.unit.node.read(GYROS, k)) for k in (1, 2, 3)]
 
 
-@proves("PSD1-LATE-04")
-@active(needs={"bus", "can"})
+@active("PSD1-LATE-04", needs={"bus", "can"})
 def refusals_are_counted(s: Subject) -> str:
     """Strobe what is rejected, and words that seldom wait; look at the counters."""
     calm(s)

@@ -23,8 +23,7 @@ from psabench.conform.capture.bus_cycles import TAIL_S
 from psabench.conform.dictionary import as_the_dictionary_says, identity
 from psabench.conform.dut import Subject
 from psabench.conform.plan import active
-from psabench.conform.proves import proves
-from psabench.conform.requirements import requirements
+from psabench.conform.requirements import Requirement, requirements
 from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.busport import Cycle
 from psabench.link.can_host import QUANTUM_S
@@ -80,20 +79,17 @@ def _cycles(s: Subject, count: int) -> Readings:
     return found
 
 
-@proves("PSD1-UC-02")
-@active(needs={"can"})
-def control_words_are_read_as_they_are(s: Subject) -> str:
+@active("PSD1-UC-02", needs={"can"})
+def control_words_are_read_as_they_are(s: Subject, row: Requirement) -> str:
     """Read 2042h and 2043h after Res."""
     calm(s)
-    row = requirements()["PSD1-UC-02"]
     due = int(row.limit("uc1_code")), int(row.limit("uc2_code"))
     if _control(s) != due:
         raise Failed("{:06X}h, {:06X}h".format(*_control(s)), "{:06X}h, {:06X}h".format(*due))
     return "UC1 {:06X}h, UC2 {:06X}h".format(*due)
 
 
-@proves("PSD1-SETUP-01")
-@active(needs={"can"})
+@active("PSD1-SETUP-01", needs={"can"})
 def coefficients_are_kept(s: Subject) -> str:
     """Read 2044h and 2045h after the set-up, twice."""
     calm(s)
@@ -103,8 +99,7 @@ def coefficients_are_kept(s: Subject) -> str:
     return f"zero {first[:3]}, full scale {first[3:]}"
 
 
-@proves("PSD1-SETUP-01")
-@active(needs={"bus", "can"})
+@active("PSD1-SETUP-01", needs={"bus", "can"})
 def coefficients_are_shown_on_the_bus(s: Subject) -> str:
     """Read the six by COMMAND, UC_HIGH and UC_LOW, and compare them with 2044h and 2045h."""
     calm(s)
@@ -116,8 +111,7 @@ def coefficients_are_shown_on_the_bus(s: Subject) -> str:
     return "six by COMMAND as on CAN"
 
 
-@proves("PSD1-SETUP-04")
-@active(needs={"can"})
+@active("PSD1-SETUP-04", needs={"can"})
 def converters_are_in_step_after_res(s: Subject) -> str:
     """Press Res at six instants of a period and look at what each converter lost in the cycles that follow."""
     seen = []
@@ -138,13 +132,11 @@ def converters_are_in_step_after_res(s: Subject) -> str:
     return f"six times, lost words of X: {seen}, as many of the others"
 
 
-@proves("PSD1-UC-03")
-@active(needs={"can"})
-def uc1_calibrates_anew(s: Subject) -> str:
+@active("PSD1-UC-03", needs={"can"})
+def uc1_calibrates_anew(s: Subject, row: Requirement) -> str:
     """Write 2042h and 2043h as they are, look at the coefficients and at the time that each answer takes."""
     calm(s)
     before, (uc1, uc2) = _coefficients(s), _control(s)
-    row = requirements()["PSD1-UC-03"]
     most_s = row.limit("answer_max_periods") * period_s(s.variant) + row.limit("transfers_ms") * 1e-3 + QUANTUM_S
     took = []
     for index, value in ((UC1, uc1), (UC2, uc2)):
@@ -162,11 +154,9 @@ def uc1_calibrates_anew(s: Subject) -> str:
     return f"answers after {took[0] * 1e3:.1f} and {took[1] * 1e3:.1f} ms, six new coefficients"
 
 
-@proves("PSD1-UC-04")
-@active(needs={"can"})
-def control_words_that_cannot_be_are_refused(s: Subject) -> str:
+@active("PSD1-UC-04", needs={"can"})
+def control_words_that_cannot_be_are_refused(s: Subject, row: Requirement) -> str:
     """Write WL, PD, codes out of range, UC1 without and UC2 with a calibration."""
-    row = requirements()["PSD1-UC-04"]
     code, low, high = int(row.limit("abort_code")), int(row.limit("code_min")), int(row.limit("code_max"))
     calm(s)
     uc1, uc2 = _control(s)
@@ -192,13 +182,12 @@ def control_words_that_cannot_be_are_refused(s: Subject) -> str:
     return f"{len(wrong)} control words refused, each with its reason"
 
 
-@proves("PSD1-UC-05")
-@active(needs={"bus"})
-def commands_come_one_after_the_other(s: Subject) -> str:
+@active("PSD1-UC-05", needs={"bus"})
+def commands_come_one_after_the_other(s: Subject, row: Requirement) -> str:
     """Write COMMAND 1 twice."""
     calm(s)
     line(s, "W E 3")  # UC1 into UC_HIGH and UC_LOW
-    code = requirements()["PSD1-UC-05"].limit("abort_code")
+    code = row.limit("abort_code")
     if s.lockstep:
         line(s, "W E 1")
         line_refused(s, "W E 1", code)
@@ -215,15 +204,14 @@ def commands_come_one_after_the_other(s: Subject) -> str:
     return "the second is refused while the first is under way"
 
 
-@proves("PSD1-UC-06")
-@active(needs={"bus", "can"})
-def a_command_cuts_a_cycle_that_waits(s: Subject) -> str:
+@active("PSD1-UC-06", needs={"bus", "can"})
+def a_command_cuts_a_cycle_that_waits(s: Subject, row: Requirement) -> str:
     """Write 2043h while X waits for a host, look at Cut cycles and at the time."""
     calm(s)
     line(s, f"W F {BOTH:04X}")
     s.run_for(2 * period_s(s.variant))
     before = int(s.unit.node.read(COUNTERS, 24))
-    patience_s = requirements()["PSD1-UC-06"].limit("patience_ms") * 1e-3
+    patience_s = row.limit("patience_ms") * 1e-3
     begun_s = s.bench.time_s
     s.unit.node.write(UC2, 0, _control(s)[1])
     took_s = s.bench.time_s - begun_s
@@ -236,8 +224,7 @@ def a_command_cuts_a_cycle_that_waits(s: Subject) -> str:
     return f"one cycle cut, answer after {took_s * 1e3:.1f} ms"
 
 
-@proves("PSD1-UC-07")
-@active(needs={"can"})
+@active("PSD1-UC-07", needs={"can"})
 def control_words_are_read_back(s: Subject) -> str:
     """Read 2046h and compare it with 2043h, some cycles after the set-up and with another code."""
     calm(s)
@@ -253,9 +240,8 @@ def control_words_are_read_back(s: Subject) -> str:
     return f"as set up {STAYS} cycles later, another as written"
 
 
-@proves("PSD1-CHIP-01")
-@active(needs={"can", "inputs"})
-def the_gain_is_where_the_table_has_it(s: Subject) -> str:
+@active("PSD1-CHIP-01", needs={"can", "inputs"})
+def the_gain_is_where_the_table_has_it(s: Subject, row: Requirement) -> str:
     """Set gain 2 by G2..0 in both control words and compare the words with those of gain 1."""
     calm(s)
     zero = requirements()["PSD1-WORD-01"].limit("zero_code")
@@ -263,7 +249,6 @@ def the_gain_is_where_the_table_has_it(s: Subject) -> str:
     _set(s, 1 << GAIN_SHIFT)
     two = _mean(_cycles(s, 40)) - zero
     calm(s)
-    row = requirements()["PSD1-CHIP-01"]
     wide = [k for k in range(3) if abs(one[k]) > row.limit("input_min_codes")]
     if not wide:
         raise Inconclusive(f"expected inputs of {row.limit('input_min_codes'):g} codes and more")
@@ -283,11 +268,9 @@ def _set(s: Subject, bits: int) -> None:
     s.unit.node.write(UC2, 0, uc2 & ~GAIN_MASK | bits)
 
 
-@proves("PSD1-CHIP-02")
-@active(needs={"can", "pins"})
-def the_rate_is_that_of_the_code(s: Subject) -> str:
+@active("PSD1-CHIP-02", needs={"can", "pins"})
+def the_rate_is_that_of_the_code(s: Subject, row: Requirement) -> str:
     """Set codes 19, 100, 195 and 2000 and measure from fall to fall of DR."""
-    row = requirements()["PSD1-CHIP-02"]
     calm(s)
     uc2 = _control(s)[1]
     seen = []
@@ -307,11 +290,9 @@ def the_rate_is_that_of_the_code(s: Subject) -> str:
     return ", ".join(seen)
 
 
-@proves("PSD1-WORD-03")
-@active(needs={"can", "inputs"})
-def words_beyond_full_scale_are_marked(s: Subject) -> str:
+@active("PSD1-WORD-03", needs={"can", "inputs"})
+def words_beyond_full_scale_are_marked(s: Subject, row: Requirement) -> str:
     """Set gain 16, which makes the inputs larger than full scale, and look at words and CLIP."""
-    row = requirements()["PSD1-WORD-03"]
     full_v = requirements()["PSD1-WORD-01"].limit("full_scale_v") / (1 << CLIP_GAIN)
     beyond = {a: v for a, v in s.inputs_v.items() if abs(v) > (1 + row.limit("margin_pct") / 100) * full_v}
     if not any(v > 0 for v in beyond.values()) or not any(v < 0 for v in beyond.values()):
@@ -332,11 +313,10 @@ def words_beyond_full_scale_are_marked(s: Subject) -> str:
     return f"{', '.join(beyond)} at their limits, CLIP 1"
 
 
-@proves("PSD1-WORD-03")
-@active(needs={"can", "inputs"})
-def a_word_at_0_alone_is_marked(s: Subject) -> str:
+@active("PSD1-WORD-03", needs={"can", "inputs"})
+def a_word_at_0_alone_is_marked(s: Subject, row: Requirement) -> str:
     """Make the converters unipolar: negative inputs give 0000h, positive ones lie within, and CLIP is."""
-    row, zero = requirements()["PSD1-WORD-03"], requirements()["PSD1-WORD-01"]
+    zero = requirements()["PSD1-WORD-01"]
     least_v = row.limit("unipolar_min_v")
     below = [a for a, v in s.inputs_v.items() if v < -least_v]
     within = [a for a, v in s.inputs_v.items() if least_v < v < zero.limit("full_scale_v") - least_v]
@@ -356,11 +336,9 @@ def a_word_at_0_alone_is_marked(s: Subject) -> str:
     return f"0000h on {', '.join(below)} alone, CLIP 1"
 
 
-@proves("PSD1-LATE-01")
-@active(needs={"bus", "can", "line", "lockstep"})
-def late_begins_at_its_time(s: Subject) -> str:
+@active("PSD1-LATE-01", needs={"bus", "can", "line", "lockstep"})
+def late_begins_at_its_time(s: Subject, row: Requirement) -> str:
     """Read words sooner and later; count the strobes that the lines show to begin too long after FL2."""
-    row = requirements()["PSD1-LATE-01"]
     late_ns = row.limit("late_ns")
     calm(s)
     before = int(s.unit.node.read(COUNTERS, 16))
@@ -395,11 +373,10 @@ def _word_after(s: Subject, axis: int, wait_s: float) -> None:
     host.answer()
 
 
-@proves("PSD1-LATE-01")
-@active(needs={"bus", "can"})
-def late_strobes_are_told(s: Subject) -> str:
+@active("PSD1-LATE-01", needs={"bus", "can"})
+def late_strobes_are_told(s: Subject, row: Requirement) -> str:
     """Read words as they come, then some 0.2 ms late; look at LATE and Late strobes."""
-    late_s = requirements()["PSD1-LATE-01"].limit("late_ns") * 1e-9
+    late_s = row.limit("late_ns") * 1e-9
     calm(s)
     before = int(s.unit.node.read(COUNTERS, 16))
     s.unit.frames.forget()
@@ -444,8 +421,7 @@ def _stay_away(s: Subject) -> tuple[Readings, dict[str, int]]:
     return cycles, {k: after[k] - before[k] for k in after}
 
 
-@proves("PSD1-LATE-02")
-@active(needs={"bus", "can"})
+@active("PSD1-LATE-02", needs={"bus", "can"})
 def a_stretched_cycle_is_told(s: Subject) -> str:
     """Leave X unread for five periods, look at MIXED and Stretched cycles."""
     cycles, counted = _stay_away(s)
@@ -456,14 +432,12 @@ def a_stretched_cycle_is_told(s: Subject) -> str:
     return f"MIXED {mixed}, {counted['Stretched cycles']} counted"
 
 
-@proves("PSD1-LATE-03")
-@active(needs={"bus", "can"})
-def lost_conversions_are_told(s: Subject) -> str:
+@active("PSD1-LATE-03", needs={"bus", "can"})
+def lost_conversions_are_told(s: Subject, row: Requirement) -> str:
     """Leave X unread for five periods, look at OVERRUN and Lost X, Y, Z."""
     cycles, counted = _stay_away(s)
     overrun = [int(v) for v in cycles["OVERRUN"]]
     lost = [counted[f"Lost {a}"] for a in "XYZ"]
-    row = requirements()["PSD1-LATE-03"]
     apart = max(lost) - min(lost)
     hasty = bool(overrun[1]) if s.lockstep else False
     if overrun[2] != 1 or hasty or min(lost) < row.limit("lost_min") or apart > row.limit("apart_max"):
@@ -471,8 +445,7 @@ def lost_conversions_are_told(s: Subject) -> str:
     return f"OVERRUN {overrun}, lost {lost}"
 
 
-@proves("PSD1-CAN-02")
-@active(needs={"can"})
+@active("PSD1-CAN-02", needs={"can"})
 def messages_tell_what_their_objects_hold(s: Subject) -> str:
     """Switch all messages on, let cycles end, and compare the last with 2200h, 2202h, 2203h and 2204h."""
     calm(s)
@@ -500,15 +473,13 @@ def messages_tell_what_their_objects_hold(s: Subject) -> str:
     return f"{sum(map(len, MAPPED.values()))} signals as their objects hold them"
 
 
-@proves("PSD1-CAN-07")
-@active(needs={"can"})
+@active("PSD1-CAN-07", needs={"can"})
 def the_board_says_what_it_is(s: Subject) -> str:
     """Read 1008h and 1018h sub 2."""
     return identity(s, "PSD1-CAN-07", "PSD-1")
 
 
-@proves("PSD1-CAN-08")
-@active(needs={"can"})
+@active("PSD1-CAN-08", needs={"can"})
 def objects_are_as_the_dictionary_says(s: Subject) -> str:
     """Read every object of the EDS and write where nothing may be written."""
     calm(s)

@@ -8,7 +8,8 @@ from psabench.boards.psd1.conform.host import BEGUN
 from psabench.conform.capture.log import CanLog, Capture
 from psabench.conform.capture.messages import as_laid_out
 from psabench.conform.plan import check
-from psabench.conform.proves import proves, row_for
+from psabench.conform.proves import row_for
+from psabench.conform.requirements import Requirement
 from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.protocol_files import message
 from psabench.link.signals import Floats
@@ -27,8 +28,7 @@ def _told(e: Capture, name: str, least: int = 3) -> CanLog:
     return log
 
 
-@proves("PSD1-CAN-02")
-@check("messages", needs={"can"})
+@check("messages", "PSD1-CAN-02", needs={"can"})
 def messages_have_their_lengths(e: Capture) -> str:
     """Look at the lengths of the four messages, and at bits that have no signal."""
     for name in ALL:
@@ -36,11 +36,10 @@ def messages_have_their_lengths(e: Capture) -> str:
     return as_laid_out(e, ALL)
 
 
-@proves("PSD1-CAN-03")
-@check("messages", needs={"can"})
-def cnt_rises_by_one(e: Capture) -> str:
+@check("messages", "PSD1-CAN-03", needs={"can"})
+def cnt_rises_by_one(e: Capture, row: Requirement) -> str:
     """Look at CNT of PSD1_CYCLE from cycle to cycle, and in all messages of a cycle."""
-    modulo = int(row_for(e, "PSD1-CAN-03").limit("modulo"))
+    modulo = int(row.limit("modulo"))
     log = _told(e, "PSD1_CYCLE")
     cnt = log.raw("PSD1_CYCLE")["CNT"]
     parts = np.flatnonzero(np.diff(cnt) % modulo != 1)
@@ -62,8 +61,7 @@ def cnt_rises_by_one(e: Capture) -> str:
     return f"{len(cnt)} cycles, CNT {cnt[0]} to {cnt[-1]}"
 
 
-@proves("PSD1-CAN-04")
-@check("messages", needs={"can"})
+@check("messages", "PSD1-CAN-04", needs={"can"})
 def further_messages_are_off_until_wanted(e: Capture) -> str:
     """Look for PSD1_TIME, PSD1_GYRO and PSD1_RATE before and after they were switched on."""
     before = int(str(e.facts.get("before", 0)))
@@ -77,8 +75,7 @@ def further_messages_are_off_until_wanted(e: Capture) -> str:
     return "none before, all three after"
 
 
-@proves("PSD1-CAN-05")
-@check("messages", needs={"can"})
+@check("messages", "PSD1-CAN-05", needs={"can"})
 def strobes_are_told(e: Capture) -> str:
     """Look at READ_X, READ_Y and READ_Z of complete cycles."""
     log = _told(e, "PSD1_CYCLE")
@@ -98,11 +95,10 @@ def volts(e: Capture, log: CanLog) -> Floats:
     return np.asarray((codes - row.limit("zero_code")) / row.limit("zero_code") * row.limit("full_scale_v"), np.float64)
 
 
-@proves("PSD1-WORD-01")
-@check("words", needs={"can", "inputs"})
-def words_are_offset_binary(e: Capture) -> str:
+@check("words", "PSD1-WORD-01", needs={"can", "inputs"})
+def words_are_offset_binary(e: Capture, row: Requirement) -> str:
     """Compare the means of many words with the volts at the inputs."""
-    row, v = row_for(e, "PSD1-WORD-01"), volts(e, _told(e, "PSD1_CYCLE", 16))
+    v = volts(e, _told(e, "PSD1_CYCLE", 16))
     quiet = e.variant.profile == "psd1_quiet"
     most_v = row.limit("quiet_tolerance_pct" if quiet else "tolerance_pct") / 100 * row.limit("full_scale_v")
     for axis, mean in zip("xyz", v.mean(axis=0), strict=True):
@@ -111,11 +107,9 @@ def words_are_offset_binary(e: Capture) -> str:
     return f"{len(v)} words, means {', '.join(f'{m:.4f}' for m in v.mean(axis=0))} V"
 
 
-@proves("PSD1-CHIP-04")
-@check("words", needs={"can", "inputs"})
-def noise_is_that_of_the_table(e: Capture) -> str:
+@check("words", "PSD1-CHIP-04", needs={"can", "inputs"})
+def noise_is_that_of_the_table(e: Capture, row: Requirement) -> str:
     """Take the standard deviation of a thousand words of each axis."""
-    row = row_for(e, "PSD1-CHIP-04")
     v = volts(e, _told(e, "PSD1_CYCLE", int(row.limit("readings_count"))))
     noise_mv = v.std(axis=0, ddof=1) * 1e3
     due, part = row.limit("noise_mv"), row.limit("tolerance_pct") / 100

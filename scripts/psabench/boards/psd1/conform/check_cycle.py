@@ -22,7 +22,8 @@ from psabench.boards.psd1.conform.capture_cycles import (
 from psabench.conform.capture.intervals import after, before, edges, first_bad, interval, together, wires_needed
 from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
-from psabench.conform.proves import proves, row_for
+from psabench.conform.proves import row_for
+from psabench.conform.requirements import Requirement
 from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.signals import Ints
 
@@ -31,8 +32,7 @@ US = 1e3
 RATES = ("PSD1-CYC-12", "PSD1-CYC-13")
 
 
-@proves("PSD1-CYC-01")
-@check("stream", needs={"line"})
+@check("stream", "PSD1-CYC-01", needs={"line"})
 def words_are_read_in_turn(e: Capture) -> str:
     """Follow RFX, RFY, RFZ and the strobe that takes each word before the next transfer."""
     words = from_x(transfers(e))
@@ -45,8 +45,7 @@ def words_are_read_in_turn(e: Capture) -> str:
     return f"{len(words)} words X, Y, Z in turn, each word with its strobe"
 
 
-@proves("PSD1-CYC-02")
-@check("stream", needs={"pins"})
+@check("stream", "PSD1-CYC-02", needs={"pins"})
 def a_cycle_begins_with_its_three_conditions(e: Capture) -> str:
     """Look at INT0, FL1 and DR just before each rise of A0."""
     wires_needed(e, *START)
@@ -58,23 +57,21 @@ def a_cycle_begins_with_its_three_conditions(e: Capture) -> str:
     return f"{len(at_ns)} cycles, INT0 1, FL1 0 and DR 0 before each"
 
 
-@proves("PSD1-CYC-03")
-@check("stream", needs={"pins"})
-def a0_rises_with_the_clock(e: Capture) -> str:
+@check("stream", "PSD1-CYC-03", needs={"pins"})
+def a0_rises_with_the_clock(e: Capture, row: Requirement) -> str:
     """Compare each rise of A0 with the rises of 1M25."""
     at_ns = starts(e, cycles(e))
     return together(
         e,
         at_ns,
         e.wires.rises("CLK_1M25"),
-        row_for(e, "PSD1-CYC-03").limit("tolerance_ns"),
+        row.limit("tolerance_ns"),
         "A0 and a rise of 1M25",
         START,
     )
 
 
-@proves("PSD1-CYC-04")
-@check("stream", needs={"pins"})
+@check("stream", "PSD1-CYC-04", needs={"pins"})
 def a0_rises_with_the_first_clock_that_it_can(e: Capture) -> str:
     """Look whether the rise of 1M25 before that of A0 came too early for all conditions."""
     wires_needed(e, *START)
@@ -96,22 +93,19 @@ def _held(e: Capture) -> tuple[Ints, Ints, Ints]:
     return e.wires.rises("INT0"), e.wires.falls("FL1"), e.wires.falls("DR")
 
 
-@proves("PSD1-CYC-06")
-@check("stream", needs={"pins"})
-def rfx_falls_half_a_clock_after_a0(e: Capture) -> str:
+@check("stream", "PSD1-CYC-06", needs={"pins"})
+def rfx_falls_half_a_clock_after_a0(e: Capture, row: Requirement) -> str:
     """Measure from the rise of A0 to the fall of RFX, and compare that with the falls of 1M25."""
-    row, whole = row_for(e, "PSD1-CYC-06"), cycles(e)
+    whole = cycles(e)
     falls, tolerance_ns = of([c[0] for c in whole], "fall"), row.limit("tolerance_ns")
     together(e, falls, e.wires.falls("CLK_1M25"), tolerance_ns, "RFX and a fall of 1M25", START)
     return interval(e, starts(e, whole), falls, row.limit("a0_to_rfx_ns"), tolerance_ns, "from A0 to RFX", START)
 
 
-@proves("PSD1-CYC-07")
-@check("stream", needs={"pins"})
-def the_clock_runs_without_a_gap(e: Capture) -> str:
+@check("stream", "PSD1-CYC-07", needs={"pins"})
+def the_clock_runs_without_a_gap(e: Capture, row: Requirement) -> str:
     """Measure every period of 1M25 and its high half."""
     wires_needed(e, "CLK_1M25")
-    row = row_for(e, "PSD1-CYC-07")
     rises = e.wires.rises("CLK_1M25")
     up, down = e.wires.pulses("CLK_1M25", 1)
     if len(rises) < LEAST:
@@ -123,9 +117,8 @@ def the_clock_runs_without_a_gap(e: Capture) -> str:
     )
 
 
-@proves("PSD1-CYC-08")
-@check("stream", needs={"pins"})
-def a0_falls_where_the_profile_says(e: Capture) -> str:
+@check("stream", "PSD1-CYC-08", needs={"pins"})
+def a0_falls_where_the_profile_says(e: Capture, row: Requirement) -> str:
     """Compare the fall of A0 with the rise of RFZ and the end of the last FL2."""
     whole = cycles(e)
     early = e.variant["a0_release"] == "rfz"
@@ -136,17 +129,16 @@ def a0_falls_where_the_profile_says(e: Capture) -> str:
         e,
         fell,
         due,
-        row_for(e, "PSD1-CYC-08").limit("tolerance_ns"),
+        row.limit("tolerance_ns"),
         f"A0 and the {'rise of RFZ' if early else 'end of the last FL2'}",
         ("A0", "RFZ", "FL2"),
     )
 
 
-@proves("PSD1-CYC-09")
-@check("stream", needs={"pins"})
-def a_cycle_has_its_length(e: Capture) -> str:
+@check("stream", "PSD1-CYC-09", needs={"pins"})
+def a_cycle_has_its_length(e: Capture, row: Requirement) -> str:
     """Measure from the rise of A0 to the end of the last FL2."""
-    row, whole = row_for(e, "PSD1-CYC-09"), cycles(e)
+    whole = cycles(e)
     begin, end = starts(e, whole), of([c[2] for c in whole], "clear")
     least_ns = row.limit("shortest_us") * US
     took = end - begin
@@ -156,8 +148,7 @@ def a_cycle_has_its_length(e: Capture) -> str:
     return interval(e, begin, end, row.limit("built_in_us") * US, row.limit("tolerance_us") * US, "of a cycle", LINES)
 
 
-@proves("PSD1-CYC-10")
-@check("stream", needs={"pins"})
+@check("stream", "PSD1-CYC-10", needs={"pins"})
 def a_cycle_begins_only_after_the_last_has_ended(e: Capture) -> str:
     """Look for A0 and FL2 at rest before each rise of A0, and for a rise of 1M25 since."""
     whole = cycles(e)
@@ -171,8 +162,7 @@ def a_cycle_begins_only_after_the_last_has_ended(e: Capture) -> str:
     return f"{len(at_ns)} cycles, the next {int((at_ns[1:] - ends[:-1]).min())} ns after the last or later"
 
 
-@proves("PSD1-CYC-11")
-@check("stream", needs={"pins"})
+@check("stream", "PSD1-CYC-11", needs={"pins"})
 def nothing_moves_between_cycles(e: Capture) -> str:
     """Look for edges of any other line but 1M25 and DR between the last FL2 and the next A0."""
     wires_needed(e, *PINS)
@@ -188,8 +178,7 @@ def nothing_moves_between_cycles(e: Capture) -> str:
     return f"{len(begin)} pauses without an edge but of 1M25 and DR"
 
 
-@proves("PSD1-CYC-12", "PSD1-CYC-13")
-@check("stream", needs={"line"})
+@check("stream", "PSD1-CYC-12", "PSD1-CYC-13", needs={"line"})
 def cycles_come_at_their_rate(e: Capture) -> str:
     """Measure from one fall of RFX to the next."""
     row = row_for(e, *RATES)
@@ -199,8 +188,7 @@ def cycles_come_at_their_rate(e: Capture) -> str:
     return interval(e, falls[:-1], falls[1:], period_ns, tolerance_ns, "from cycle to cycle", FRAMES)
 
 
-@proves("PSD1-CYC-12")
-@check("stream", needs={"pins"})
+@check("stream", "PSD1-CYC-12", needs={"pins"})
 def a_cycle_follows_each_fall_of_dr(e: Capture) -> str:
     """Count the falls of DR and the rises of A0 in turn."""
     wires_needed(e, "DR", "A0")
@@ -215,16 +203,14 @@ def a_cycle_follows_each_fall_of_dr(e: Capture) -> str:
     return f"{n} falls of DR, {n} rises of A0 in turn"
 
 
-@proves("PSD1-SIG-01")
-@check("power_on", needs={"pins"})
-def lines_rest_at_their_levels(e: Capture) -> str:
+@check("power_on", "PSD1-SIG-01", needs={"pins"})
+def lines_rest_at_their_levels(e: Capture, row: Requirement) -> str:
     """Look at every line after Res, before the first control word goes out."""
     wires_needed(e, *PINS)
     moves = edges(e, "TFS")
     moves = moves[moves > e.wires.start_ns]
     if not len(moves):
         raise Inconclusive("TFS never moves after Res")
-    row = row_for(e, "PSD1-SIG-01")
     at = np.array([int(moves[0]) - 1 - round(e.slack_ns(0.0))], np.int64)
     for name in PINS:
         if name in ("CLK_1M25", "FL2"):
@@ -235,8 +221,7 @@ def lines_rest_at_their_levels(e: Capture) -> str:
     return f"{len(PINS) - 2} lines at rest"
 
 
-@proves("PSD1-FL2-05")
-@check("stream", needs={"line"})
+@check("stream", "PSD1-FL2-05", needs={"line"})
 def fl2_rests_at_its_level(e: Capture) -> str:
     """Look at FL2 while a word is transferred, and how long it is at each level."""
     words = transfers(e)

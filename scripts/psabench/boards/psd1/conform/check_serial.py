@@ -27,7 +27,8 @@ from psabench.conform.capture.intervals import (
 )
 from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
-from psabench.conform.proves import proves, row_for
+from psabench.conform.proves import row_for
+from psabench.conform.requirements import Requirement
 from psabench.conform.verdict import Failed, Inconclusive
 
 SERIAL = (*FRAMES, "SCLK", "SDAT", "CLK_1M25")
@@ -38,11 +39,10 @@ def _words(e: Capture) -> list[Transfer]:
     return [t for c in cycles(e) for t in c]
 
 
-@proves("PSD1-SER-01")
-@check("stream", needs={"pins"})
-def the_first_bit_comes_in_time(e: Capture) -> str:
+@check("stream", "PSD1-SER-01", needs={"pins"})
+def the_first_bit_comes_in_time(e: Capture, row: Requirement) -> str:
     """Look at SDAT 400 ns after the fall of RFx and up to the first rise of SCLK."""
-    words, row = _words(e), row_for(e, "PSD1-SER-01")
+    words = _words(e)
     due = of(words, "fall") + round(row.limit("access_max_ns") + e.slack_ns(row.limit("access_max_ns")))
     first = np.array([t.rises[0] for t in words], np.int64)
     late = after(edges(e, "SDAT"), due) <= first
@@ -59,16 +59,14 @@ def the_first_bit_comes_in_time(e: Capture) -> str:
     return f"{len(words)} words, {ones} of them begin with a 1"
 
 
-@proves("PSD1-SER-02")
-@check("stream", needs={"pins"})
+@check("stream", "PSD1-SER-02", needs={"pins"})
 def the_most_significant_bit_comes_first(e: Capture) -> str:
     """Compare the bits of SDAT at the rises of SCLK with the word on D0..D15."""
     words = _words(e)
     return _same_words(e, words, "bits of SDAT")
 
 
-@proves("PSD1-SER-02")
-@check("stream", needs={"line", "can"})
+@check("stream", "PSD1-SER-02", needs={"line", "can"})
 def words_of_the_line_are_those_on_can(e: Capture) -> str:
     """Look for the words of PSD1_CYCLE among those of SDAT, most significant bit first."""
     seen, told = serial_words(e, _words(e)).reshape(-1, 3), told_words(e)
@@ -79,8 +77,7 @@ def words_of_the_line_are_those_on_can(e: Capture) -> str:
     return f"{both} cycles with the same words on SDAT and on CAN"
 
 
-@proves("PSD1-CAN-01")
-@check("stream", needs={"line", "can"})
+@check("stream", "PSD1-CAN-01", needs={"line", "can"})
 def each_cycle_is_told_once(e: Capture) -> str:
     """Look for the words of PSD1_CYCLE, in their order and none left out, among those of SDAT."""
     return _found(serial_words(e, _words(e)).reshape(-1, 3), told_words(e))
@@ -114,11 +111,10 @@ def _hex(words: np.ndarray) -> str:
     return " ".join(f"{w:04X}" for w in words)
 
 
-@proves("PSD1-SER-03")
-@check("stream", needs={"line"})
-def the_first_edge_of_sclk_is_a_rise(e: Capture) -> str:
+@check("stream", "PSD1-SER-03", needs={"line"})
+def the_first_edge_of_sclk_is_a_rise(e: Capture, row: Requirement) -> str:
     """Measure from the fall of RFx to the first edge of SCLK."""
-    words, row = _words(e), row_for(e, "PSD1-SER-03")
+    words = _words(e)
     falls = of(words, "fall")
     edge = after(edges(e, "SCLK"), falls)
     down = e.wires["SCLK"].at(np.minimum(edge, e.wires.end_ns)) == 0
@@ -128,12 +124,11 @@ def the_first_edge_of_sclk_is_a_rise(e: Capture) -> str:
     )
 
 
-@proves("PSD1-SER-04")
-@check("stream", needs={"pins"})
-def sclk_is_the_clock_delayed(e: Capture) -> str:
+@check("stream", "PSD1-SER-04", needs={"pins"})
+def sclk_is_the_clock_delayed(e: Capture, row: Requirement) -> str:
     """Measure from each rise of 1M25 to the rise of SCLK that follows it, and from rise to rise."""
     wires_needed(e, "CLK_1M25")
-    words, row = _words(e), row_for(e, "PSD1-SER-04")
+    words = _words(e)
     rises = np.array([t.rises for t in words], np.int64)
     tolerance_ns, period_ns = row.limit("tolerance_ns"), row.limit("period_ns")
     interval(
@@ -144,11 +139,10 @@ def sclk_is_the_clock_delayed(e: Capture) -> str:
     return interval(e, begin, at_ns, row.limit("shift_ns"), tolerance_ns, "from 1M25 to SCLK", SERIAL)
 
 
-@proves("PSD1-SER-05")
-@check("stream", needs={"line"})
-def a_transfer_has_its_pulses(e: Capture) -> str:
+@check("stream", "PSD1-SER-05", needs={"line"})
+def a_transfer_has_its_pulses(e: Capture, row: Requirement) -> str:
     """Count the rises and falls of SCLK in each transfer."""
-    due = int(row_for(e, "PSD1-SER-05").limit("pulses_count"))
+    due = int(row.limit("pulses_count"))
     words = transfers(e)
     counts = np.array([len(t.rises) if len(t.falls) == due else len(t.falls) for t in words])
     saw = [f"{n} pulses of SCLK in a transfer" for n in counts]
@@ -156,11 +150,10 @@ def a_transfer_has_its_pulses(e: Capture) -> str:
     return f"{len(words)} transfers of {due} pulses"
 
 
-@proves("PSD1-SER-06")
-@check("stream", needs={"pins"})
-def bits_change_after_the_fall_of_sclk(e: Capture) -> str:
+@check("stream", "PSD1-SER-06", needs={"pins"})
+def bits_change_after_the_fall_of_sclk(e: Capture, row: Requirement) -> str:
     """Measure from the fall of SCLK to the change of SDAT that follows, up to the last bit."""
-    words, row = _words(e), row_for(e, "PSD1-SER-06")
+    words = _words(e)
     moves = edges(e, "SDAT")
     late: list[int] = []
     for t in words:
@@ -180,11 +173,10 @@ def bits_change_after_the_fall_of_sclk(e: Capture) -> str:
     return f"{len(took)} changes of SDAT, {took.min()} to {took.max()} ns after a fall of SCLK"
 
 
-@proves("PSD1-SER-07")
-@check("stream", needs={"line"})
-def rfx_is_low_for_its_time(e: Capture) -> str:
+@check("stream", "PSD1-SER-07", needs={"line"})
+def rfx_is_low_for_its_time(e: Capture, row: Requirement) -> str:
     """Measure the lows of RFX, RFY and RFZ, and look for the 16th pulse before their end."""
-    words, row = _words(e), row_for(e, "PSD1-SER-07")
+    words = _words(e)
     last = np.array([t.falls[-1] if len(t.falls) else t.rise + 1 for t in words], np.int64)
     late = last > of(words, "rise")
     first_bad(late, of(words, "rise"), ["a rise within pulse 16"] * len(words), "after it", SERIAL)
@@ -199,26 +191,23 @@ def rfx_is_low_for_its_time(e: Capture) -> str:
     )
 
 
-@proves("PSD1-SER-07")
-@check("stream", needs={"pins"})
-def rfx_rises_with_a_fall_of_the_clock(e: Capture) -> str:
+@check("stream", "PSD1-SER-07", needs={"pins"})
+def rfx_rises_with_a_fall_of_the_clock(e: Capture, row: Requirement) -> str:
     """Compare the rises of RFX, RFY and RFZ with the falls of 1M25."""
     wires_needed(e, "CLK_1M25")
-    tolerance_ns = row_for(e, "PSD1-SER-07").limit("tolerance_ns")
+    tolerance_ns = row.limit("tolerance_ns")
     return together(e, of(_words(e), "rise"), e.wires.falls("CLK_1M25"), tolerance_ns, "RFx and a fall of 1M25", SERIAL)
 
 
-@proves("PSD1-SER-08")
-@check("stream", needs={"line"})
-def fl2_is_set_as_rfx_rises(e: Capture) -> str:
+@check("stream", "PSD1-SER-08", needs={"line"})
+def fl2_is_set_as_rfx_rises(e: Capture, row: Requirement) -> str:
     """Compare FL2 with the rises of RFX, RFY and RFZ."""
     words = transfers(e)
-    tolerance_ns = row_for(e, "PSD1-SER-08").limit("tolerance_ns")
+    tolerance_ns = row.limit("tolerance_ns")
     return interval(e, of(words, "rise"), of(words, "fl2"), 0.0, tolerance_ns, "from RFx to FL2", HAND)
 
 
-@proves("PSD1-SER-09")
-@check("stream", needs={"line"})
+@check("stream", "PSD1-SER-09", needs={"line"})
 def one_converter_at_a_time(e: Capture) -> str:
     """Look for two of RFX, RFY and RFZ low at once."""
     wires_needed(e, *FRAMES)
@@ -228,8 +217,7 @@ def one_converter_at_a_time(e: Capture) -> str:
     return f"{len(transfers(e))} transfers, never two at once"
 
 
-@proves("PSD1-SER-10")
-@check("stream", needs={"line"})
+@check("stream", "PSD1-SER-10", needs={"line"})
 def sclk_rests_low(e: Capture) -> str:
     """Look for pulses of SCLK outside transfers."""
     words = transfers(e)
@@ -247,12 +235,10 @@ def sclk_rests_low(e: Capture) -> str:
     return f"{len(rises)} pulses of SCLK, all within transfers"
 
 
-@proves("PSD1-SER-11")
-@check("stream", needs={"pins"})
-def dr_rises_after_the_last_bit_of_x(e: Capture) -> str:
+@check("stream", "PSD1-SER-11", needs={"pins"})
+def dr_rises_after_the_last_bit_of_x(e: Capture, row: Requirement) -> str:
     """Look at DR 110 ns after the 16th fall of SCLK under RFX."""
     wires_needed(e, "DR")
-    row = row_for(e, "PSD1-SER-11")
     x = [c[0] for c in cycles(e)]
     most = row.limit("rise_max_ns")
     at_ns = np.array([t.falls[-1] for t in x], np.int64) + round(most + e.slack_ns(most))
@@ -266,15 +252,13 @@ def dr_rises_after_the_last_bit_of_x(e: Capture) -> str:
     return f"{len(x)} times high {most:g} ns after the last fall"
 
 
-@proves("PSD1-FL2-01")
-@check("stream", needs={"pins"})
-def fl2_is_cleared_by_the_clock_after_the_strobe(e: Capture) -> str:
+@check("stream", "PSD1-FL2-01", needs={"pins"})
+def fl2_is_cleared_by_the_clock_after_the_strobe(e: Capture, row: Requirement) -> str:
     """Compare the end of FL2 with the first fall of 1M25 strictly after that of the strobe."""
-    return _cleared(e, transfers(e), row_for(e, "PSD1-FL2-01").limit("tolerance_ns"))
+    return _cleared(e, transfers(e), row.limit("tolerance_ns"))
 
 
-@proves("PSD1-FL2-04")
-@check("stream", needs={"pins"})
+@check("stream", "PSD1-FL2-04", needs={"pins"})
 def fl2_of_z_is_cleared_likewise(e: Capture) -> str:
     """The same for the third strobe of each cycle."""
     return _cleared(e, [c[2] for c in cycles(e)], row_for(e, "PSD1-FL2-01").limit("tolerance_ns"))
@@ -290,18 +274,16 @@ def _cleared(e: Capture, words: list[Transfer], tolerance_ns: float) -> str:
     )
 
 
-@proves("PSD1-FL2-02")
-@check("stream", needs={"line"})
-def rfy_falls_as_fl2_of_x_is_cleared(e: Capture) -> str:
+@check("stream", "PSD1-FL2-02", needs={"line"})
+def rfy_falls_as_fl2_of_x_is_cleared(e: Capture, row: Requirement) -> str:
     """Measure from the end of FL2 of X to the fall of RFY."""
-    return _handed(e, 1, row_for(e, "PSD1-FL2-02").limit("tolerance_ns"))
+    return _handed(e, 1, row.limit("tolerance_ns"))
 
 
-@proves("PSD1-FL2-03")
-@check("stream", needs={"line"})
-def rfz_falls_as_fl2_of_y_is_cleared(e: Capture) -> str:
+@check("stream", "PSD1-FL2-03", needs={"line"})
+def rfz_falls_as_fl2_of_y_is_cleared(e: Capture, row: Requirement) -> str:
     """Measure from the end of FL2 of Y to the fall of RFZ."""
-    return _handed(e, 2, row_for(e, "PSD1-FL2-03").limit("tolerance_ns"))
+    return _handed(e, 2, row.limit("tolerance_ns"))
 
 
 def _handed(e: Capture, axis: int, tolerance_ns: float) -> str:
@@ -310,11 +292,10 @@ def _handed(e: Capture, axis: int, tolerance_ns: float) -> str:
     return interval(e, clear, fall, 0.0, tolerance_ns, f"from the end of FL2 to {FRAMES[axis]}", HAND)
 
 
-@proves("PSD1-FL2-07")
-@check("stream", needs={"pins"})
-def the_built_in_host_keeps_its_times(e: Capture) -> str:
+@check("stream", "PSD1-FL2-07", needs={"pins"})
+def the_built_in_host_keeps_its_times(e: Capture, row: Requirement) -> str:
     """Measure from FL2 to the strobe, and the strobe."""
-    words, row = _words(e), row_for(e, "PSD1-FL2-07")
+    words = _words(e)
     slow = "slow_" if e.variant.profile == "psd1_slow" else ""
     wait_ns, strobe_ns = row.limit(f"{slow}wait_ns"), row.limit(f"{slow}strobe_ns")
     tolerance_ns = row_for(e, "PSD1-SER-08").limit("tolerance_ns")
@@ -322,8 +303,7 @@ def the_built_in_host_keeps_its_times(e: Capture) -> str:
     return interval(e, of(words, "cs_fall"), of(words, "cs_rise"), strobe_ns, tolerance_ns, "of strobe", HAND)
 
 
-@proves("PSD1-BUS-01")
-@check("stream", needs={"pins"})
+@check("stream", "PSD1-BUS-01", needs={"pins"})
 def words_are_on_the_bus_at_their_address(e: Capture) -> str:
     """Look at D0..D15, AB0..AB3 and R/W in the strobe that takes each word."""
     words = _words(e)

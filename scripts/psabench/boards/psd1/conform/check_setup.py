@@ -30,8 +30,8 @@ from psabench.conform.capture.intervals import (
 from psabench.conform.capture.log import Capture
 from psabench.conform.capture.messages import booted, late_readings
 from psabench.conform.plan import check
-from psabench.conform.proves import proves, row_for
-from psabench.conform.requirements import requirements
+from psabench.conform.proves import row_for
+from psabench.conform.requirements import Requirement, requirements
 from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.signals import Ints
 
@@ -79,8 +79,7 @@ def controls(e: Capture) -> list[Frame]:
     return [f for f in frames(e) if f.line == "TFS"]
 
 
-@proves("PSD1-SETUP-02")
-@check("power_on", needs={"pins"})
+@check("power_on", "PSD1-SETUP-02", needs={"pins"})
 def the_set_up_goes_in_its_order(e: Capture) -> str:
     """Follow TFS, DR and the transfers of 24 bits from Res to the first word."""
     found = frames(e)
@@ -110,11 +109,10 @@ def the_set_up_goes_in_its_order(e: Capture) -> str:
     return f"{len(sent)} control words, {len(read)} coefficients, DR after the first and before the first word"
 
 
-@proves("PSD1-SETUP-03")
-@check("power_on", needs={"pins"})
-def the_first_cycle_comes_in_time(e: Capture) -> str:
+@check("power_on", "PSD1-SETUP-03", needs={"pins"})
+def the_first_cycle_comes_in_time(e: Capture, row: Requirement) -> str:
     """Measure from the first control word after Res to A0 of the first cycle."""
-    row, due = row_for(e, "PSD1-SETUP-03"), _first_cycle_ms(e)
+    due = _first_cycle_ms(e)
     found = frames(e)
     word = next((f for f in found if f.line == "RFX" and len(f.rises) != CONTROL_BITS), None)
     if word is None:
@@ -131,11 +129,10 @@ def the_first_cycle_comes_in_time(e: Capture) -> str:
     )
 
 
-@proves("PSD1-SETUP-03")
-@check("power_on", needs={"stamps"})
-def the_first_message_comes_in_time(e: Capture) -> str:
+@check("power_on", "PSD1-SETUP-03", needs={"stamps"})
+def the_first_message_comes_in_time(e: Capture, row: Requirement) -> str:
     """Measure from the boot-up message to the first PSD1_CYCLE."""
-    row, due_ms = row_for(e, "PSD1-SETUP-03"), _first_cycle_ms(e)
+    due_ms = _first_cycle_ms(e)
     boot = booted(e, "PSD1_HEARTBEAT")
     told = [f for f in e.frames_of("PSD1_CYCLE").frames if f.t_s > boot.t_s]
     if not told or len(told[0].data) != CYCLE_BYTES:
@@ -158,11 +155,10 @@ def _modulo(e: Capture) -> int:
     return int(row_for(e, "PSD1-CAN-03").limit("modulo"))
 
 
-@proves("PSD1-UC-01")
-@check("power_on", needs={"pins"})
-def control_words_go_out_in_their_time(e: Capture) -> str:
+@check("power_on", "PSD1-UC-01", needs={"pins"})
+def control_words_go_out_in_their_time(e: Capture, row: Requirement) -> str:
     """Measure TFS and the pulses of SCLK in it."""
-    row, sent = row_for(e, "PSD1-UC-01"), controls(e)
+    sent = controls(e)
     tolerance_ns, count = row.limit("tolerance_ns"), int(row.limit("pulses_count"))
     falls = np.array([f.fall for f in sent], np.int64)
     counts = np.array([len(f.rises) for f in sent])
@@ -174,11 +170,10 @@ def control_words_go_out_in_their_time(e: Capture) -> str:
     return interval(e, falls, rises, row.limit("tfs_low_ns"), tolerance_ns, "of TFS low", WRITE)
 
 
-@proves("PSD1-UC-02")
-@check("power_on", needs={"pins"})
-def the_control_words_are_those_of_the_page(e: Capture) -> str:
+@check("power_on", "PSD1-UC-02", needs={"pins"})
+def the_control_words_are_those_of_the_page(e: Capture, row: Requirement) -> str:
     """Read the first and the last control word of the set-up off SDAT."""
-    row, found = row_for(e, "PSD1-UC-02"), controls(e)
+    found = controls(e)
     words = [_word(e, f) for f in (found[0], found[-1])]
     due = [int(row.limit("uc1_code")), int(row.limit("uc2_code"))]
     if words != due:
@@ -191,11 +186,10 @@ def _word(e: Capture, f: Frame) -> int:
     return int("".join(map(str, e.wires["SDAT"].at(f.rises).tolist())) or "0", 2)
 
 
-@proves("PSD1-SER-12")
-@check("power_on", needs={"pins"})
-def the_register_has_its_four_modes(e: Capture) -> str:
+@check("power_on", "PSD1-SER-12", needs={"pins"})
+def the_register_has_its_four_modes(e: Capture, row: Requirement) -> str:
     """Count pulses of SCLK of control words, coefficients and words, and look for words on the bus."""
-    row, found = row_for(e, "PSD1-SER-12"), frames(e)
+    found = frames(e)
     word, control = int(row.limit("word_bits")), int(row.limit("control_bits"))
     counts = {name: {len(f.rises) for f in found if (f.line == "TFS") == (name == "TFS")} for name in ("TFS", "RFx")}
     at = found[0].fall
@@ -211,11 +205,10 @@ def the_register_has_its_four_modes(e: Capture) -> str:
     return f"{control} bits out, {control} and {word} bits in, words out to the bus"
 
 
-@proves("PSD1-CHIP-03")
-@check("power_on", needs={"pins"})
-def the_converters_limits_are_kept(e: Capture) -> str:
+@check("power_on", "PSD1-CHIP-03", needs={"pins"})
+def the_converters_limits_are_kept(e: Capture, row: Requirement) -> str:
     """Measure A0, RFS, TFS, SCLK and SDAT against the limits of the part."""
-    row, found = row_for(e, "PSD1-CHIP-03"), frames(e)
+    found = frames(e)
     log = e.wires
     a0, data = edges(e, "A0"), edges(e, "SDAT")
     for f in found:
@@ -250,8 +243,7 @@ def the_converters_limits_are_kept(e: Capture) -> str:
     return f"{len(found)} transfers within the limits of the part"
 
 
-@proves("PSD1-ERR-02")
-@check("power_on", needs={"pins"})
+@check("power_on", "PSD1-ERR-02", needs={"pins"})
 def res_brings_lines_to_rest_and_the_set_up(e: Capture) -> str:
     """Look for the set-up after a Res while cycles run, and no word before it has ended."""
     found = frames(e)
@@ -264,8 +256,7 @@ def res_brings_lines_to_rest_and_the_set_up(e: Capture) -> str:
     return f"{last + 1} transfers of the set-up, then words"
 
 
-@proves("PSD1-ERR-02")
-@check("power_on", needs={"can"})
+@check("power_on", "PSD1-ERR-02", needs={"can"})
 def cycles_are_counted_from_0_after_res(e: Capture) -> str:
     """Look at CNT of the first PSD1_CYCLE after Res."""
     boot = booted(e, "PSD1_HEARTBEAT")
@@ -279,12 +270,10 @@ def cycles_are_counted_from_0_after_res(e: Capture) -> str:
     return f"CNT {first[CNT_AT]} first"
 
 
-@proves("PSD1-BUS-07")
-@check("strobes", needs={"pins", "bus"})
-def status_tells_the_lines(e: Capture) -> str:
+@check("strobes", "PSD1-BUS-07", needs={"pins", "bus"})
+def status_tells_the_lines(e: Capture, row: Requirement) -> str:
     """Compare what is read from STATUS with the lines as its strobe begins."""
     wires_needed(e, *PINS)
-    row = row_for(e, "PSD1-BUS-07")
     begin = _reads_of_status(e)
     word = bus_word(e, "D", len(DATA), begin + round(e.slack_ns(0.0)))
     just = begin - 1 - round(e.slack_ns(0.0))
@@ -305,12 +294,10 @@ def status_tells_the_lines(e: Capture) -> str:
     return f"{len(begin)} reads of STATUS; active: {', '.join(seen)}"
 
 
-@proves("PSD1-BUS-14")
-@check("strobes", needs={"pins", "bus"})
-def status_tells_the_word_that_waits(e: Capture) -> str:
+@check("strobes", "PSD1-BUS-14", needs={"pins", "bus"})
+def status_tells_the_word_that_waits(e: Capture, row: Requirement) -> str:
     """Compare bits 2..0 of STATUS with FL2 and the axis whose word waits."""
     wires_needed(e, *PINS)
-    row = row_for(e, "PSD1-BUS-14")
     mask = int(row.limit("axis_mask"))
     begin = _reads_of_status(e)
     ready = e.wires["FL2"].at(begin - 1) == fl2_level(e)
@@ -340,8 +327,7 @@ def _reads_of_status(e: Capture) -> Ints:
     return begin
 
 
-@proves("PSD1-BUS-08")
-@check("strobes", needs={"pins", "bus"})
+@check("strobes", "PSD1-BUS-08", needs={"pins", "bus"})
 def the_bus_stands_in_a_strobe_and_rests_at_0(e: Capture) -> str:
     """Look for changes of address, data and R/W within strobes, and for their levels between them."""
     wires_needed(e, "CS", "RW", *ADDRESS, *DATA)
@@ -365,12 +351,11 @@ def the_bus_stands_in_a_strobe_and_rests_at_0(e: Capture) -> str:
     return f"{len(begin)} strobes, {writes} of them writes"
 
 
-@proves("PSD1-CAN-06")
-@check("messages", needs={"pins", "can"})
-def psd1_time_tells_the_cycle(e: Capture) -> str:
+@check("messages", "PSD1-CAN-06", needs={"pins", "can"})
+def psd1_time_tells_the_cycle(e: Capture, row: Requirement) -> str:
     """Compare TSTAMP, LENGTH and WAITED of PSD1_TIME with A0, FL2 and DR."""
     wires_needed(e, "DR")
-    row, whole = row_for(e, "PSD1-CAN-06"), cycles(e)
+    whole = cycles(e)
     log = e.frames_of("PSD1_TIME")
     if len(log) < 4:
         raise Inconclusive(f"{len(log)} messages PSD1_TIME came")

@@ -7,7 +7,8 @@ import numpy as np
 from psabench.conform.capture.intervals import wires_needed
 from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
-from psabench.conform.proves import proves, row_for
+from psabench.conform.proves import row_for
+from psabench.conform.requirements import Requirement
 from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.signals import Ints
 
@@ -24,11 +25,9 @@ def sample_codes(e: Capture) -> Ints:
     return np.stack([raw[axis] for axis in "XYZ"], axis=1)
 
 
-@proves("TOY-CAN-01")
-@check("stream", needs={"can", "inputs"})
-def codes_are_the_volts_at_the_inputs(e: Capture) -> str:
+@check("stream", "TOY-CAN-01", needs={"can", "inputs"})
+def codes_are_the_volts_at_the_inputs(e: Capture, row: Requirement) -> str:
     """Divide the known volts at the inputs by the weight of a code."""
-    row = row_for(e, "TOY-CAN-01")
     found = sample_codes(e)
     due = np.array([e.inputs_v.get(axis, 0.0) for axis in "xyz"]) / row.limit("code_v")
     if np.abs(found - due).max() > row.limit("error_max_codes"):
@@ -36,11 +35,9 @@ def codes_are_the_volts_at_the_inputs(e: Capture) -> str:
     return f"codes {found[0].tolist()} at {dict(e.inputs_v)} V"
 
 
-@proves("TOY-CAN-02")
-@check("stream", needs={"can", "stamps"})
-def samples_come_at_their_pace(e: Capture) -> str:
+@check("stream", "TOY-CAN-02", needs={"can", "stamps"})
+def samples_come_at_their_pace(e: Capture, row: Requirement) -> str:
     """Measure the time from frame to frame, and follow SEQ."""
-    row = row_for(e, "TOY-CAN-02")
     sample_codes(e)
     log = e.frames_of("TOY_SAMPLE")
     steps_us = np.diff(log.t_s) * 1e6
@@ -51,8 +48,7 @@ def samples_come_at_their_pace(e: Capture) -> str:
     return f"{len(log)} samples, {steps_us.min():.0f} to {steps_us.max():.0f} us apart"
 
 
-@proves("TOY-LINE-01")
-@check("stream", needs={"line"})
+@check("stream", "TOY-LINE-01", needs={"line"})
 def lines_carry_the_codes(e: Capture) -> str:
     """Read DATA at the rises of CLK while FRAME is low, and look for these words among the codes on CAN."""
     wires_needed(e, "FRAME", "CLK", "DATA")
