@@ -22,6 +22,7 @@ from dataclasses import dataclass
 from functools import wraps
 from typing import TYPE_CHECKING, Any
 
+from psabench.conform.capture.intervals import wires_needed
 from psabench.conform.capture.log import Capture
 from psabench.conform.proves import proves, row_for
 from psabench.errors import expected
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
 Check = Callable[[Capture], str]
 Active = Callable[["Subject"], str]
 Test = Callable[..., str]
+Prepare = Callable[[Any], None]
 StimulusOf = Callable[["Subject"], Capture]
 
 WAYS = frozenset(
@@ -103,36 +105,51 @@ def check(
     needs: Iterable[str] = ("can",),
     on_recording: str | None = None,
     boards: Iterable[str] = (),
+    wires: Iterable[str] = (),
 ) -> Callable[[Test], Check]:
     """A pure test of the capture of this stimulus. Raises ValueError for a need or a part that there is not.
 
     on_recording: the part of a recording that it checks, that of its stimulus (STIMULUS_ON_RECORDING) by default.
     boards: families that have the stimulus, where requirements of others, too, are proved, which have another test.
+    wires: lines without which it is inconclusive.
     """
     part = STIMULUS_ON_RECORDING.get(stimulus, "") if on_recording is None else on_recording
     if part not in PARTS:
         raise ValueError(expected(", ".join(map(repr, PARTS)), repr(part), "on_recording"))
 
     plan = Plan(stimulus=stimulus, needs=_ways(needs), on_recording=part, boards=frozenset(boards))
-    return lambda test: _planned(test, ids, plan)
+    names = tuple(wires)
+    return lambda test: _planned(test, ids, plan, before=(lambda e: wires_needed(e, *names)) if names else None)
 
 
-def active(*ids: str, needs: Iterable[str] = ("can",)) -> Callable[[Test], Active]:
-    """A test that asks the board itself."""
+def active(
+    *ids: str, needs: Iterable[str] = ("can",), before: Prepare | None = None, after: Prepare | None = None
+) -> Callable[[Test], Active]:
+    """A test that asks the board itself.
+
+    before: brings the board to a known state first; after: the same once it has passed.
+    """
     plan = Plan(stimulus="", needs=_ways(needs))
-    return lambda test: _planned(test, ids, plan)
+    return lambda test: _planned(test, ids, plan, before, after)
 
 
-def _planned(test: Test, ids: tuple[str, ...], plan: Plan) -> Test:
+def _planned(
+    test: Test, ids: tuple[str, ...], plan: Plan, before: Prepare | None = None, after: Prepare | None = None
+) -> Test:
     """The test with its plan, of what it looks at alone: where it wants the row that it proves, it gets that."""
-    planned = test
-    if test.__code__.co_argcount > 1:
+    planned, wants_row = test, test.__code__.co_argcount > 1
+    if wants_row or before or after:
 
         @wraps(test)
-        def with_row(seen: Any) -> str:
-            return test(seen, row_for(seen, *ids))
+        def whole_test(seen: Any) -> str:
+            if before:
+                before(seen)
+            saw = test(seen, row_for(seen, *ids)) if wants_row else test(seen)
+            if after:
+                after(seen)
+            return saw
 
-        planned = with_row
+        planned = whole_test
     _plans[planned] = plan
     return proves(*ids)(planned) if ids else planned
 

@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 from psabench.conform.capture.log import Capture
 from psabench.conform.dut import Subject, Take
 
 BOOT_S = 0.002
+
+
+@contextmanager
+def while_streaming(s: Subject) -> Iterator[None]:
+    """Readings flow within."""
+    s.unit.start()
+    yield
+    s.unit.stop()
 
 
 def from_res(s: Subject, dwell_s: float) -> Capture:
@@ -19,9 +28,8 @@ def from_res(s: Subject, dwell_s: float) -> Capture:
         take.facts["prompt"] = s.lockstep
         s.reset()
         s.run_for(BOOT_S)
-        s.unit.start()
-        s.run_for(dwell_s)
-        s.unit.stop()
+        with while_streaming(s):
+            s.run_for(dwell_s)
     return s.capture("power_on", take)
 
 
@@ -29,8 +37,6 @@ def readings(s: Subject, begun_s: float, pass_time: Callable[[], object], *, lin
     """Readings after a Res and begun_s while pass_time lets time pass."""
     s.reset()
     s.run_for(begun_s)
-    with s.take(lines=lines) as take:
-        s.unit.start()
+    with s.take(lines=lines) as take, while_streaming(s):
         pass_time()
-        s.unit.stop()
     return take

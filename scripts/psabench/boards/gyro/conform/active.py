@@ -12,12 +12,13 @@ from psabench.conform.dictionary import as_the_dictionary_says, identity
 from psabench.conform.dut import Subject
 from psabench.conform.plan import active
 from psabench.conform.requirements import Requirement
+from psabench.conform.stimulus.streamed import while_streaming
 from psabench.conform.verdict import Failed
 
 FRAMES = (OD.COUNTERS, 14)  # level frames taken
 
 
-@active("GYRO-MODE-09", needs={"can"})
+@active("GYRO-MODE-09", needs={"can"}, after=calm)
 def modes_that_cannot_be_are_refused(s: Subject, row: Requirement) -> str:
     """Ask for a mode just after Res and look for the reason."""
     code = row.limit("abort_code")
@@ -29,11 +30,10 @@ def modes_that_cannot_be_are_refused(s: Subject, row: Requirement) -> str:
         raise Failed("no reason in 2031h", "one in words")
     calm(s)
     s.unit.node.write(OD.CONTROL, 1, int(Mode.LEVEL))
-    calm(s)
     return f"refused: {reason}"
 
 
-@active("GYRO-MODE-10", needs={"can"})
+@active("GYRO-MODE-10", needs={"can"}, after=calm)
 def a_run_s_settings_stand_while_it_runs(s: Subject, row: Requirement) -> str:
     """Write 2102h and 2103h in a run."""
     code = row.limit("abort_code")
@@ -44,7 +44,6 @@ def a_run_s_settings_stand_while_it_runs(s: Subject, row: Requirement) -> str:
     refused(lambda: s.unit.node.write(OD.RUN, 1, 2), code, "2102h sub 1 in a run")
     calm(s)
     s.unit.node.write(OD.POSITIONS, 1, 5.0)
-    calm(s)
     return "both refused"
 
 
@@ -54,12 +53,10 @@ def what_does_not_settle_is_told(s: Subject, row: Requirement) -> str:
     code = int(row.limit("emcy_code"))
     levelled(s)
     unit(s).set(tolerance_arcmin=0.02, settle_s=0.0, settle_limit_s=1.0, latitude_deg=-60.0)
-    with s.take(lines=False) as take:
-        s.unit.start()
+    with s.take(lines=False) as take, while_streaming(s):
         unit(s).mode = Mode.GYROCOMPASS
         until_mode(s, Mode.HOLD, RUN_LIMIT_S)
         s.run_for(0.1)
-        s.unit.stop()
     e = s.capture("unsettled", take)
     c = columns(e)
     calm(s)
@@ -72,10 +69,9 @@ def what_does_not_settle_is_told(s: Subject, row: Requirement) -> str:
     return "no window, mode 2, NOT_SETTLED, FF23h"
 
 
-@active("GYRO-LEV-05", needs={"can"})
+@active("GYRO-LEV-05", needs={"can"}, before=calm)
 def frames_of_others_are_not_taken(s: Subject) -> str:
     """Send frames of another node's PSA-2 while the level unit is silent."""
-    calm(s)
     level_unit(s, False)
     node = int(s.unit.node.read(OD.LEVEL, 1))
     before = int(s.unit.node.read(*FRAMES))
@@ -95,8 +91,7 @@ def the_board_says_what_it_is(s: Subject) -> str:
     return identity(s, "GYRO-CAN-05", "GYRO")
 
 
-@active("GYRO-CAN-04", needs={"can"})
+@active("GYRO-CAN-04", needs={"can"}, before=calm)
 def objects_are_as_the_dictionary_says(s: Subject) -> str:
     """Read every object of the EDS and write where nothing may be written."""
-    calm(s)
     return as_the_dictionary_says(s, "gyro")

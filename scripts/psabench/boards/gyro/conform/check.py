@@ -8,7 +8,7 @@ import numpy as np
 
 from psabench.boards.gyro.conform.capture_readings import EARTH_DEGPH, EMCY, MESSAGES, columns, setting, vertical_degph
 from psabench.boards.gyro.device import Mode, Phase
-from psabench.conform.capture.intervals import interval, wires_needed
+from psabench.conform.capture.intervals import interval
 from psabench.conform.capture.log import CanLog, Capture
 from psabench.conform.capture.messages import as_laid_out, emergencies, in_turn, late_readings
 from psabench.conform.plan import check
@@ -43,10 +43,9 @@ def steps_are_counted(e: Capture, row: Requirement) -> str:
     return f"{len(step)} readings without a gap"
 
 
-@check("run", "GYRO-CAN-02", needs={"line"})
+@check("run", "GYRO-CAN-02", needs={"line"}, wires=("STEP",))
 def steps_come_at_their_rate(e: Capture, row: Requirement) -> str:
     """Measure from one rise of STEP to the next."""
-    wires_needed(e, "STEP")
     rises = e.wires.rises("STEP")
     period_ns = row.limit("period_us") * US
     tolerance_ns = period_ns * row.limit("clock_error_ppm") * 1e-6
@@ -318,10 +317,9 @@ def res_ends_the_mode_and_counts_anew(e: Capture) -> str:
     return f"{len(c['MODE'])} readings of mode 0, STEP from {c['STEP'][0]:g}"
 
 
-@check("run", "GYRO-SIG-01", needs={"line", "can"})
+@check("run", "GYRO-SIG-01", needs={"line", "can"}, wires=LINES)
 def lines_show_the_phases(e: Capture, row: Requirement) -> str:
     """Compare STEP, SLEW, SETTLE and WINDOW with the readings."""
-    wires_needed(e, *LINES)
     c = columns(e)
     up, down = e.wires.pulses("STEP", 1)
     seen = interval(
@@ -342,10 +340,9 @@ def lines_show_the_phases(e: Capture, row: Requirement) -> str:
     return f"{seen}; SLEW, SETTLE and WINDOW with their phases"
 
 
-@check("silence", "GYRO-SIG-01", needs={"line", "can"})
+@check("silence", "GYRO-SIG-01", needs={"line", "can"}, wires=("STEP", "FAULT"))
 def fault_shows_the_flags(e: Capture) -> str:
     """Compare FAULT with the flags of the readings while the level unit is silent for a while, twice."""
-    wires_needed(e, "STEP", "FAULT")
     if len(e.wires.gaps_ns):
         raise Inconclusive("samples were lost: a flag of a single step may be among them")
     c = columns(e)

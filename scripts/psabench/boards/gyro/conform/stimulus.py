@@ -10,7 +10,7 @@ from psabench.conform.capture.log import Capture
 from psabench.conform.dut import Subject
 from psabench.conform.plan import stimulus
 from psabench.conform.requirements import requirements
-from psabench.conform.stimulus.streamed import from_res
+from psabench.conform.stimulus.streamed import from_res, while_streaming
 from psabench.conform.verdict import Inconclusive
 from psabench.estimate.angles import wrapped_deg
 
@@ -108,11 +108,9 @@ def power_on(s: Subject) -> Capture:
 def level(s: Subject) -> Capture:
     """Mode 1, for as long as the platform may take to get level from where it is."""
     calm(s)
-    with s.take(lines=False) as take:
-        s.unit.start()
+    with s.take(lines=False) as take, while_streaming(s):
         unit(s).mode = Mode.LEVEL
         s.run_for(requirements()["GYRO-MODE-11"].limit("limit_s"))
-        s.unit.stop()
     return s.capture("level", take)
 
 
@@ -121,13 +119,11 @@ def run(s: Subject) -> Capture:
     """Levelling, then a run of three positions with the settings of power-on, on the lines and on CAN."""
     levelled(s)
     facts = settings(s)
-    with s.take() as take:
-        s.unit.start()
+    with s.take() as take, while_streaming(s):
         s.run_for(LEVEL_S)
         unit(s).mode = Mode.GYROCOMPASS
         until_mode(s, Mode.HOLD, RUN_LIMIT_S)
         s.run_for(2.0)
-        s.unit.stop()
     take.facts |= facts
     return s.capture("run", take)
 
@@ -138,11 +134,9 @@ def navigation(s: Subject) -> Capture:
     levelled(s)
     facts = settings(s) | {"calibration_s": CALIBRATION_S}
     unit(s).set(calibration_s=CALIBRATION_S)
-    with s.take(lines=False) as take:
-        s.unit.start()
+    with s.take(lines=False) as take, while_streaming(s):
         unit(s).mode = Mode.CALIBRATE
         until_mode(s, Mode.HOLD, RUN_LIMIT_S)
-        s.unit.stop()
     take.facts |= facts
     e = s.capture("navigation", take)
     c = columns(e)
@@ -173,8 +167,7 @@ def turns(s: Subject) -> Capture:
     """Turns of all kinds by mode 3, then mode 2."""
     levelled(s)
     parts: list[tuple[float, int, int]] = []  # angle, first and last frame
-    with s.take(lines=False) as take:
-        s.unit.start()
+    with s.take(lines=False) as take, while_streaming(s):
         s.run_for(0.1)
         for to_deg in TURNS_DEG:
             begin = len(take.frames)
@@ -183,7 +176,6 @@ def turns(s: Subject) -> Capture:
         begin = len(take.frames)
         unit(s).mode = Mode.HOLD
         s.run_for(3.0)
-        s.unit.stop()
     take.facts |= {"turns": parts, "held": (begin, len(take.frames))}
     calm(s)
     return s.capture("turns", take)
@@ -198,15 +190,13 @@ def hold(s: Subject) -> Capture:
     unit(s).mode = Mode.HOLD
     s.run_for(1.0)
     parts: list[tuple[float, int, int]] = []  # latitude, first and last frame
-    with s.take(lines=False) as take:
-        s.unit.start()
+    with s.take(lines=False) as take, while_streaming(s):
         for told_deg in (latitude_deg, -latitude_deg):
             unit(s).set(latitude_deg=told_deg)
             s.run_for(0.1)
             begin = len(take.frames)
             s.run_for(2.0)
             parts.append((told_deg, begin, len(take.frames)))
-        s.unit.stop()
     take.facts |= facts | {"latitudes": parts}
     calm(s)
     return s.capture("hold", take)
@@ -221,11 +211,9 @@ def tilted(s: Subject) -> Capture:
     s.run_for(5.0)
     unit(s).set(m1_per_s=SLOW_PER_S, zero_y_v=zero_v, settle_s=0.0, settle_limit_s=60.0, count=1, window_s=1.0)
     unit(s).positions_deg = (round(unit(s).encoder_deg),)
-    with s.take(lines=False) as take:
-        s.unit.start()
+    with s.take(lines=False) as take, while_streaming(s):
         unit(s).mode = Mode.GYROCOMPASS
         until_mode(s, Mode.HOLD, RUN_LIMIT_S)
-        s.unit.stop()
     calm(s)
     return s.capture("tilted", take)
 
@@ -234,15 +222,13 @@ def tilted(s: Subject) -> Capture:
 def limits(s: Subject) -> Capture:
     """A zero of the level sensors that is suddenly told wrongly, with a stiff loop: rates at their limits."""
     levelled(s)
-    with s.take(lines=False) as take:
-        s.unit.start()
+    with s.take(lines=False) as take, while_streaming(s):
         s.run_for(0.3)
         unit(s).set(m1_per_s=20.0)
         unit(s).set(zero_y_v=0.3)
         s.run_for(0.2)
         unit(s).set(m1_per_s=1.0, zero_y_v=0.0)
         s.run_for(8.0)
-        s.unit.stop()
     calm(s)
     return s.capture("limits", take)
 
@@ -252,14 +238,12 @@ def silence(s: Subject) -> Capture:
     """The level unit silent for a while, twice: shorter and longer than the unit waits."""
     levelled(s)
     facts = settings(s)
-    with s.take() as take:
-        s.unit.start()
+    with s.take() as take, while_streaming(s):
         s.run_for(0.3)
         level_unit(s, False)
         s.run_for(0.5)
         level_unit(s, True)
         s.run_for(2.5)
-        s.unit.stop()
     take.facts |= facts
     calm(s)
     return s.capture("silence", take)

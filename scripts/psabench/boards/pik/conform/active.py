@@ -44,10 +44,9 @@ def signed(word: int, bits: int = 16) -> int:
     return (word + (1 << bits - 1)) % (1 << bits) - (1 << bits - 1)
 
 
-@active("PIK-CNT-02", needs={"bus", "can"})
+@active("PIK-CNT-02", needs={"bus", "can"}, before=calm)
 def the_period_can_be_set(s: Subject, row: Requirement) -> str:
     """Set PERIOD 50, then 0 with three writes to LATCH; look at the stamps of the readings."""
-    calm(s)
     with s.take(lines=False) as take:
         line(s, f"{PERIOD} 32")
         s.unit.start()
@@ -73,10 +72,9 @@ def the_period_can_be_set(s: Subject, row: Requirement) -> str:
     return f"{due:g} us with PERIOD 50, three readings by three writes"
 
 
-@active("PIK-CNT-04", needs={"bus"})
+@active("PIK-CNT-04", needs={"bus"}, before=by_hand)
 def registers_hold_what_was_latched(s: Subject) -> str:
     """Latch by hand, read twice a while apart, latch again."""
-    by_hand(s)
     line(s, LATCH)
     first = counters(s)
     s.run_for(0.2)
@@ -91,10 +89,9 @@ def registers_hold_what_was_latched(s: Subject) -> str:
     return f"{first} twice, then {later}"
 
 
-@active("PIK-CNT-05", needs={"bus"})
+@active("PIK-CNT-05", needs={"bus"}, before=by_hand)
 def a_channel_is_up_minus_down(s: Subject, row: Requirement) -> str:
     """Read the nine counters of one latch."""
-    by_hand(s)
     s.run_for(0.3)
     line(s, LATCH)
     c = counters(s)
@@ -108,11 +105,10 @@ def a_channel_is_up_minus_down(s: Subject, row: Requirement) -> str:
     return f"{c[:3]} of {c[3:]}"
 
 
-@active("PIK-CNT-06", needs={"bus"})
+@active("PIK-CNT-06", needs={"bus"}, before=by_hand)
 def counters_can_be_cleared(s: Subject, row: Requirement) -> str:
     """Measure rates with two latches, write CLEAR 1 and latch: X has counted since, Y and Z all the time."""
     most = row.limit("error_max_pulses")
-    by_hand(s)
     first = burst(s, LATCH, *COUNTERS)
     s.run_for(1.0)
     cycles = burst(s, LATCH, *COUNTERS, f"{CLEAR} 1", LATCH, *COUNTERS)
@@ -131,10 +127,9 @@ def counters_can_be_cleared(s: Subject, row: Requirement) -> str:
     return f"{before[:3]}, after CLEAR 1 {after[:3]}"
 
 
-@active("PIK-RES-01", needs={"bus", "can"})
+@active("PIK-RES-01", needs={"bus", "can"}, before=calm)
 def registers_begin_with_res(s: Subject) -> str:
     """Let it count for a second, press Res, and compare the registers of a reading with its totals on CAN."""
-    calm(s)
     s.run_for(1.0)
     s.reset()
     with s.take(lines=False) as take:
@@ -170,11 +165,10 @@ def registers_begin_with_res(s: Subject) -> str:
     return f"{found} readings with the same counts since Res in registers and totals"
 
 
-@active("PIK-CNT-07", needs={"bus"})
+@active("PIK-CNT-07", needs={"bus"}, before=by_hand)
 def readings_are_numbered_and_status_tells_a_latch(s: Subject, row: Requirement) -> str:
     """Latch twice by hand and read SEQ and STATUS."""
     latched, saturated = int(row.limit("latched_mask")), int(row.limit("saturated_mask"))
-    by_hand(s)
     none, first, _, one, again, second = (c.data for c in burst(s, "R A", "R A", "R 9", LATCH, "R A", "R A", "R 9")[1:])
     calm(s)
     if none & latched or not one & latched or again & latched:
@@ -184,10 +178,9 @@ def readings_are_numbered_and_status_tells_a_latch(s: Subject, row: Requirement)
     return f"SEQ {first}, then {second}; bit 3 of STATUS once"
 
 
-@active("PIK-CNT-08", needs={"bus"})
+@active("PIK-CNT-08", needs={"bus"}, before=calm, after=calm)
 def what_cannot_be_is_refused(s: Subject, row: Requirement) -> str:
     """An address that is none, a write to what is read, a read of LATCH and CLEAR, X too early, a period of 0.1 ms."""
-    calm(s)
     line_refused(s, "R E", row.limit("no_address_code"))
     line_refused(s, "W 0 0", row.limit("read_only_code"))
     line_refused(s, "R B", row.limit("write_only_code"))
@@ -197,16 +190,13 @@ def what_cannot_be_is_refused(s: Subject, row: Requirement) -> str:
     s.run_for(0.003)
     line_refused(s, "R 0", row.limit("state_code"))
     line_refused(s, "R 9", row.limit("state_code"))
-    calm(s)
     return "seven refusals with their codes"
 
 
-@active("PIK-CNT-09", needs={"bus"})
+@active("PIK-CNT-09", needs={"bus"}, before=calm, after=calm)
 def registers_have_their_names_and_rights(s: Subject) -> str:
     """Ask who is there, read and write every address."""
-    calm(s)
     seen = names_and_rights(s, "pik", never={}, writes={"PERIOD": 100})
-    calm(s)
     return seen
 
 
@@ -229,8 +219,7 @@ def the_board_says_what_it_is(s: Subject) -> str:
     return identity(s, "PIK-CAN-06", "PIK")
 
 
-@active("PIK-CAN-07", needs={"can"})
+@active("PIK-CAN-07", needs={"can"}, before=calm)
 def objects_are_as_the_dictionary_says(s: Subject) -> str:
     """Read every object of the EDS and write where nothing may be written."""
-    calm(s)
     return as_the_dictionary_says(s, "pik")

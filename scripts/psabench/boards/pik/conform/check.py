@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from psabench.conform.capture.intervals import before, edges, first_bad, interval, wires_needed
+from psabench.conform.capture.intervals import before, edges, first_bad, interval
 from psabench.conform.capture.log import CanLog, Capture, LineLog
 from psabench.conform.capture.messages import as_laid_out, emergencies, in_turn, late_readings
 from psabench.conform.plan import check
@@ -142,10 +142,9 @@ def nothing_saturates_below_full_scale(e: Capture, row: Requirement) -> str:
     return f"{len(raw['X'])} readings without SAT"
 
 
-@check("stream", "PIK-LAW-07", needs={"line", "inputs"})
+@check("stream", "PIK-LAW-07", needs={"line", "inputs"}, wires=PULSES)
 def signs_have_their_lines(e: Capture) -> str:
     """Count pulses on the lines P and N of each channel."""
-    wires_needed(e, *PULSES)
     seen = []
     for axis, volts in e.inputs_v.items():
         p, n = (len(e.wires.rises(f"F{axis.upper()}{sign}")) for sign in "PN")
@@ -156,10 +155,9 @@ def signs_have_their_lines(e: Capture) -> str:
     return f"pulses on P and N: {', '.join(seen)}"
 
 
-@check("stream", "PIK-LAW-08", needs={"line"})
+@check("stream", "PIK-LAW-08", needs={"line"}, wires=PULSES)
 def a_reset_lasts_its_time(e: Capture, row: Requirement) -> str:
     """Measure the pulses."""
-    wires_needed(e, *PULSES)
     due_ns = _tclk_ns(e)
     slack_ns = ROUNDED_NS + due_ns * row.limit("clock_error_ppm") * 1e-6
     seen = ""
@@ -179,10 +177,9 @@ def _tclk_ns(e: Capture) -> float:
     return row.limit("pik6_us" if e.variant.board == "pik6" else "pik_us") * US
 
 
-@check("stream", "PIK-LAW-10", needs={"pins"})
+@check("stream", "PIK-LAW-10", needs={"pins"}, wires=("CLK", *PULSES))
 def pulses_begin_on_their_grid(e: Capture, row: Requirement) -> str:
     """Compare the rises of pulses with the clock, and measure from pulse to pulse."""
-    wires_needed(e, "CLK", *PULSES)
     tclk_ns = _tclk_ns(e)
     tick_ns = tclk_ns / row.limit("grid_per_tclk")
     clock, count = e.wires.rises("CLK"), 0
@@ -215,10 +212,9 @@ def pulses_begin_on_their_grid(e: Capture, row: Requirement) -> str:
     return f"{count} pulses on a grid of {tick_ns:.1f} ns"
 
 
-@check("overdrive", "PIK-LAW-10", needs={"line", "head"})
+@check("overdrive", "PIK-LAW-10", needs={"line", "head"}, wires=PULSES)
 def pulses_keep_their_distance(e: Capture, row: Requirement) -> str:
     """Measure from pulse to pulse of a channel that cannot keep up with its input."""
-    wires_needed(e, *PULSES)
     tclk_ns = _tclk_ns(e)
     least_ns, seen = row.limit("gap_min_per_tclk") * tclk_ns, []
     slack_ns = ROUNDED_NS + row.limit("tolerance_ns") + e.slack_ns(least_ns)
@@ -256,10 +252,9 @@ def saturation_is_told(e: Capture, row: Requirement) -> str:
     return f"SAT in {int(sat.any(axis=1).sum())} readings, FF11h, over {took_ms:.1f} ms after the last of them"
 
 
-@check("stream", "PIK-CNT-01", needs={"line", "can"})
+@check("stream", "PIK-CNT-01", needs={"line", "can"}, wires=(*PULSES, "LATCH"))
 def counts_are_the_pulses(e: Capture) -> str:
     """Count pulses between falls of LATCH and compare them with the readings."""
-    wires_needed(e, *PULSES, "LATCH")
     log = e.wires.unbroken()
     latch = log.falls("LATCH")
     if len(latch) < LEAST:
@@ -285,19 +280,17 @@ def _between(log: LineLog, name: str, latch: Ints) -> Ints:
     return found
 
 
-@check("stream", "PIK-CNT-02", needs={"line"})
+@check("stream", "PIK-CNT-02", needs={"line"}, wires=("LATCH",))
 def counters_are_latched_every_period(e: Capture, row: Requirement) -> str:
     """Measure from one fall of LATCH to the next."""
-    wires_needed(e, "LATCH")
     falls = e.wires.falls("LATCH")
     due_ns, tolerance_ns = row.limit("default_us") * US, row.limit("tolerance_us") * US
     return interval(e, falls[:-1], falls[1:], due_ns, tolerance_ns, "from latch to latch", ("LATCH",))
 
 
-@check("stream", "PIK-CNT-03", needs={"line"})
+@check("stream", "PIK-CNT-03", needs={"line"}, wires=("LATCH",))
 def latch_is_low_for_its_time(e: Capture, row: Requirement) -> str:
     """Measure the lows of LATCH."""
-    wires_needed(e, "LATCH")
     down, up = e.wires.pulses("LATCH", 0)
     return interval(e, down, up, row.limit("low_us") * US, row.limit("tolerance_us") * US, "of LATCH low", ("LATCH",))
 
@@ -357,10 +350,9 @@ def counters_begin_with_res(e: Capture, row: Requirement) -> str:
     return f"SEQ {seq}, totals {n[0].tolist()}"
 
 
-@check("power_on", "PIK-SIG-01", needs={"pins"})
+@check("power_on", "PIK-SIG-01", needs={"pins"}, wires=PINS)
 def lines_rest_at_their_levels(e: Capture, row: Requirement) -> str:
     """Look at every line before the first pulse or latch that comes when nothing has moved for longer than a pulse."""
-    wires_needed(e, *PINS)
     at = _at_rest_ns(e)
     for name in PINS:
         due = int(row.limits.get(f"{name.lower()}_level", 0))
@@ -381,10 +373,9 @@ def _at_rest_ns(e: Capture) -> int:
     return int(found[0]) - 1 - round(e.slack_ns(0.0))
 
 
-@check("power_cycle", "PIK-SIG-01", needs={"pins", "supply"})
+@check("power_cycle", "PIK-SIG-01", needs={"pins", "supply"}, wires=("CLK",))
 def the_clock_rests_low(e: Capture, row: Requirement) -> str:
     """Look at CLK while the board has no power: the longest time without an edge of it."""
-    wires_needed(e, "CLK")
     ends = e.wires["CLK"].t_ns
     if len(ends) < 3:
         raise Inconclusive("CLK does not move")

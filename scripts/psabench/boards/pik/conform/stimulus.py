@@ -6,7 +6,7 @@ from psabench.boards.objects import PikObjects as OD
 from psabench.conform.capture.log import Capture
 from psabench.conform.dut import Subject
 from psabench.conform.plan import stimulus
-from psabench.conform.stimulus.streamed import from_res, readings
+from psabench.conform.stimulus.streamed import from_res, readings, while_streaming
 from psabench.conform.verdict import Inconclusive
 
 START_S, STREAM_S, MINUTE_S = 0.06, 1.0, 60.5
@@ -43,15 +43,13 @@ def overdrive(s: Subject) -> Capture:
     s.unit.node.write_raw(BUS, PERIOD + 1, SOON.to_bytes(2, "little"))
     head = s.bench.head
     rest_deg = head.angle_deg
-    with s.take(lines=False) as take:
-        s.unit.start()
+    with s.take(lines=False) as take, while_streaming(s):
         head.turn(OVERDRIVE_DEG)
         s.run_for(0.2)
         with s.take() as looked:
             s.run_for(0.2)
         head.turn(rest_deg)
         s.run_for(0.4)
-        s.unit.stop()
     take.lines = looked.lines
     s.reset()
     s.run_for(START_S)

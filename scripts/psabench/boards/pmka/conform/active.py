@@ -13,6 +13,7 @@ from psabench.conform.dut import Subject
 from psabench.conform.plan import active
 from psabench.conform.registers import names_and_rights
 from psabench.conform.requirements import Requirement, requirements
+from psabench.conform.stimulus.streamed import while_streaming
 from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.busport import Cycle
 
@@ -47,8 +48,7 @@ def state_registers_are_the_messages(s: Subject) -> str:
 def _as_on_can(s: Subject, first: int, end: int) -> str:
     """Words first to end of X, Y, Z, K, RESETS, ROTATION, TEMPERATURE."""
     calm(s)
-    with s.take(lines=False) as take:
-        s.unit.start()
+    with s.take(lines=False) as take, while_streaming(s):
         seen = []
         for _ in range(60):
             words = [c.data for c in burst(s, *LATEST)]
@@ -56,7 +56,6 @@ def _as_on_can(s: Subject, first: int, end: int) -> str:
                 seen.append(words)
             s.run_for(0.3 * ts_s())
         s.run_for(3 * ts_s())
-        s.unit.stop()
     e = s.capture("registers", take)
     told = {}
     codes, states = e.frames_of("PMKA_CODES"), e.frames_of("PMKA_STATE")
@@ -81,20 +80,17 @@ def _as_on_can(s: Subject, first: int, end: int) -> str:
     return f"{found} readings as on CAN"
 
 
-@active("PMKA-BUS-02", needs={"bus"})
+@active("PMKA-BUS-02", needs={"bus"}, before=calm, after=calm)
 def registers_have_their_names_and_rights(s: Subject) -> str:
     """Ask who is there, read and write every address."""
-    calm(s)
     line(s, "W 9 0")  # COMMAND is taken in mode program
     seen = names_and_rights(s, "pmka", never={}, writes={"COMMAND": 0, "BEAT": 200, "ZERO": 100, "INDEX": 1, "MODE": 0})
-    calm(s)
     return seen
 
 
-@active("PMKA-CAL-02", needs={"bus", "can"})
+@active("PMKA-CAL-02", needs={"bus", "can"}, before=calm, after=calm)
 def the_computer_turns_the_calibration(s: Subject) -> str:
     """Set mode program, command beats and calibrations, look at TAU, CAL and SERVES."""
-    calm(s)
     line(s, "W 9 0")
     for tau, cal in ((2, 1), (4, 2), (5, 0), (1, 1), (3, 2)):
         line(s, f"W A {tau | cal << 4:X}")
@@ -105,7 +101,6 @@ def the_computer_turns_the_calibration(s: Subject) -> str:
         resting = tau - 2 if 2 <= tau <= 4 else 3
         if saw != (tau, cal) or serves[resting] != 0:
             raise Failed(f"beat {saw[0]}, calibration {saw[1]}, serves {serves}", f"beat {tau}, calibration {cal}")
-    calm(s)
     return "five beats and calibrations as commanded"
 
 
@@ -164,10 +159,9 @@ def _degc(s: Subject) -> float:
     return float((code - 0x10000 if code & 0x8000 else code) * requirements()["PMKA-ROM-03"].limit("code_degc"))
 
 
-@active("PMKA-ROM-03", needs={"bus", "chamber"})
+@active("PMKA-ROM-03", needs={"bus", "chamber"}, before=calm)
 def the_temperature_is_that_of_the_chamber(s: Subject, row: Requirement) -> str:
     """Compare TEMPERATURE with the chamber at rest; heat the air for a minute, and see it follow."""
-    calm(s)
     chamber = s.bench.chamber
     air, first, ramp = chamber.temp_degc, _degc(s), chamber.ramp_k_per_min
     if abs(first - air) > row.limit("offset_max_k"):
@@ -186,11 +180,10 @@ def the_temperature_is_that_of_the_chamber(s: Subject, row: Requirement) -> str:
     return f"{first:.3f} degC at {air:.3f} degC; {later:.3f} degC while the air has {hot:.3f} degC"
 
 
-@active("PMKA-BUS-03", needs={"bus"})
+@active("PMKA-BUS-03", needs={"bus"}, before=calm)
 def a_reading_that_nobody_took_is_told(s: Subject, row: Requirement) -> str:
     """Read STATUS with and without a read of K in the period before."""
     waits, missed = int(row.limit("waits_mask")), int(row.limit("missed_mask"))
-    calm(s)
     for _ in range(ATTEMPTS):
         s.run_for(3 * ts_s())
         before, *found, after = (c.data for c in burst(s, "R 6", "R 8", "R 3", "R 8", "R 6"))
@@ -219,10 +212,9 @@ def _periods(a: Cycle, b: Cycle) -> float:
     return (b.t_s - a.t_s) / ts_s()
 
 
-@active("PMKA-BUS-04", needs={"bus"})
+@active("PMKA-BUS-04", needs={"bus"}, before=calm)
 def a_read_is_of_its_strobe_s_beginning(s: Subject) -> str:
     """Read SEQ with a strobe of 20 ms, and at once afterwards."""
-    calm(s)
     long, after = burst(s, f"R 6 {STROBE_NS}", "R 6")
     made = (after.data - long.data) & 0xFFFF
     whole = int(_periods(long, after) + STROBE_NS * 1e-9 / ts_s())
@@ -232,17 +224,14 @@ def a_read_is_of_its_strobe_s_beginning(s: Subject) -> str:
     return saw
 
 
-@active("PMKA-BUS-04", needs={"bus", "can"})
+@active("PMKA-BUS-04", needs={"bus", "can"}, before=calm)
 def a_write_acts_at_the_end_of_its_strobe(s: Subject) -> str:
     """Write MODE with a strobe of 20 ms and look from which reading on AUTONOMOUS has changed."""
-    calm(s)
     was = line(s, "R 9").data & AUTONOMOUS
-    with s.take(lines=False) as take:
-        s.unit.start()
+    with s.take(lines=False) as take, while_streaming(s):
         s.run_for(3 * ts_s())
         first, written = burst(s, "R 6", f"W 9 {1 - was:X} {STROBE_NS}")
         s.run_for(3 * ts_s())
-        s.unit.stop()
     calm(s)
     states: CanLog = s.capture("mode", take).frames_of("PMKA_STATE")
     changed = [int.from_bytes(f.data[:2], "little") for f in states.frames if (f.data[4] >> 5 & 1) != was]
@@ -255,10 +244,9 @@ def a_write_acts_at_the_end_of_its_strobe(s: Subject) -> str:
     return saw
 
 
-@active("PMKA-BUS-05", needs={"bus"})
+@active("PMKA-BUS-05", needs={"bus"}, before=calm, after=calm)
 def what_cannot_be_is_refused(s: Subject, row: Requirement) -> str:
     """Read an address that is none, command in mode autonomous, set a beat too short, read before the first reading."""
-    calm(s)
     line_refused(s, "R F", row.limit("no_address_code"))
     line(s, "W 9 1")
     line_refused(s, "W A 1", row.limit("value_code"))
@@ -267,7 +255,6 @@ def what_cannot_be_is_refused(s: Subject, row: Requirement) -> str:
     s.reset()
     s.run_for(0.003)
     line_refused(s, "R 0", row.limit("state_code"))
-    calm(s)
     return "four refusals with their codes"
 
 
@@ -276,10 +263,8 @@ def resets_are_counted(s: Subject) -> str:
     """Count resets in the readings of a second, and compare them with INDEX 0 to 7."""
     s.reset()
     s.run_for(0.002)
-    with s.take(lines=False) as take:
-        s.unit.start()
+    with s.take(lines=False) as take, while_streaming(s):
         s.run_for(1.0)
-        s.unit.stop()
     counted = []
     for index in range(8):
         line(s, f"W D {COUNTS_AT + index:X}")
@@ -298,8 +283,7 @@ def the_board_says_what_it_is(s: Subject) -> str:
     return identity(s, "PMKA-CAN-05", "PMKA")
 
 
-@active("PMKA-CAN-06", needs={"can"})
+@active("PMKA-CAN-06", needs={"can"}, before=calm)
 def objects_are_as_the_dictionary_says(s: Subject) -> str:
     """Read every object of the EDS and write where nothing may be written."""
-    calm(s)
     return as_the_dictionary_says(s, "pmka")

@@ -65,10 +65,9 @@ def four_samples_follow_one_another(e: Capture, row: Requirement) -> str:
     return interval(e, a, b, row.limit("step_us") * US, row.limit("tolerance_us") * US, "from sample to sample", SAMPLE)
 
 
-@check("stream", "PMKA-SAMP-03", needs={"pins"})
+@check("stream", "PMKA-SAMP-03", needs={"pins"}, wires=SAMPLE)
 def samples_are_held_and_converted(e: Capture, row: Requirement) -> str:
     """Measure SH, and CONV from it."""
-    wires_needed(e, *SAMPLE)
     up, down = e.wires.pulses("SH", 1)
     begin, end = after(e.wires.rises("CONV"), up - 1), after(e.wires.falls("CONV"), up)
     if len(up) < LEAST:
@@ -79,10 +78,9 @@ def samples_are_held_and_converted(e: Capture, row: Requirement) -> str:
     return interval(e, up, down, hold_ns, tolerance_ns, "of SH high", SAMPLE)
 
 
-@check("stream", "PMKA-RST-02", needs={"pins"})
+@check("stream", "PMKA-RST-02", needs={"pins"}, wires=RESETS)
 def resets_last_half_a_period(e: Capture, row: Requirement) -> str:
     """Measure RP1 to RN4, and compare their begin with the samples of their integrators."""
-    wires_needed(e, *RESETS)
     rises, which = samples(e)
     tolerance_ns, seen, count = row.limit("tolerance_us") * US, "", 0
     for k in range(4):
@@ -100,10 +98,9 @@ def resets_last_half_a_period(e: Capture, row: Requirement) -> str:
     return f"{count} resets; {seen}"
 
 
-@check("stream", "PMKA-RST-05", needs={"pins", "can"})
+@check("stream", "PMKA-RST-05", needs={"pins", "can"}, wires=RESETS)
 def resets_are_told_with_their_signs(e: Capture) -> str:
     """Count positive and negative resets of each integrator on the lines and in the readings."""
-    wires_needed(e, *RESETS)
     c = columns(e)
     seen = []
     for k, name in enumerate("XYZK"):
@@ -117,10 +114,9 @@ def resets_are_told_with_their_signs(e: Capture) -> str:
     return f"{sum(seen)} resets on the lines, as many told"
 
 
-@check("stream", "PMKA-CAL-01", needs={"pins"})
+@check("stream", "PMKA-CAL-01", needs={"pins"}, wires=(*KEYS, *RESETS))
 def a_calibrated_integrator_is_off_its_sensor(e: Capture) -> str:
     """Look for alternating resets, which only a calibration makes, while the key is closed."""
-    wires_needed(e, *KEYS, *RESETS)
     off, ts_ns = 0, row_for(e, "PMKA-SAMP-01").limit("ts_us") * US
     for k, key in enumerate(KEYS):
         both = np.sort(np.concatenate([e.wires.rises(f"RP{k + 1}"), e.wires.rises(f"RN{k + 1}")]))
@@ -137,10 +133,9 @@ def a_calibrated_integrator_is_off_its_sensor(e: Capture) -> str:
     return f"{off} resets in turn, all with the key open"
 
 
-@check("stream", "PMKA-ROT-04", needs={"line"})
+@check("stream", "PMKA-ROT-04", needs={"line"}, wires=KEYS)
 def three_keys_are_closed_at_any_instant(e: Capture) -> str:
     """Count closed keys at every edge, and half a microsecond after."""
-    wires_needed(e, *KEYS)
     at_ns = np.unique(np.concatenate([e.wires[k].t_ns for k in KEYS])) + round(e.slack_ns(0.0))
     closed = sum((e.wires[k].at(at_ns).astype(np.int64) for k in KEYS), np.zeros(len(at_ns), np.int64))
     first_bad(closed != 3, at_ns, [f"{n} keys closed" for n in closed], "3: an integrator for each axis", KEYS)
@@ -149,10 +144,9 @@ def three_keys_are_closed_at_any_instant(e: Capture) -> str:
     return f"{len(at_ns) - 1} moves of keys, three closed at any instant"
 
 
-@check("stream", "PMKA-ROT-05", needs={"pins"})
+@check("stream", "PMKA-ROT-05", needs={"pins"}, wires=KEYS)
 def keys_move_about_the_sample_of_the_spare(e: Capture, row: Requirement) -> str:
     """Measure from each closing of a key to the sample of K."""
-    wires_needed(e, *KEYS)
     rises, which = samples(e)
     spare = rises[which == SPARE]
     gap_ns, tolerance_ns = row.limit("gap_us") * US, row.limit("tolerance_us") * US
@@ -171,10 +165,9 @@ def keys_move_about_the_sample_of_the_spare(e: Capture, row: Requirement) -> str
     return seen
 
 
-@check("strobes", "PMKA-BUS-01", needs={"pins", "bus"})
+@check("strobes", "PMKA-BUS-01", needs={"pins", "bus"}, wires=("CS", "RW", *ADDRESS, *DATA))
 def cycles_are_on_the_bus(e: Capture) -> str:
     """Compare address, R/W and data of each strobe with the cycles that were made."""
-    wires_needed(e, "CS", "RW", *ADDRESS, *DATA)
     begin, end = e.wires.pulses("CS", 0)
     if len(begin) != len(e.cycles) or not len(begin):
         raise Failed(
@@ -195,10 +188,9 @@ def cycles_are_on_the_bus(e: Capture) -> str:
     return f"{len(begin)} cycles on CS, RW, AB0..AB3 and D0..D15"
 
 
-@check("power_on", "PMKA-SIG-01", needs={"pins"})
+@check("power_on", "PMKA-SIG-01", needs={"pins"}, wires=PINS)
 def lines_rest_at_their_levels(e: Capture, row: Requirement) -> str:
     """Look at every line before the first sample after Res."""
-    wires_needed(e, *PINS)
     rises, _ = samples(e, 1)
     at = int(rises[0]) - 1 - round(e.slack_ns(0.0))
     for name in PINS:
@@ -208,10 +200,9 @@ def lines_rest_at_their_levels(e: Capture, row: Requirement) -> str:
     return f"{len(PINS)} lines at rest"
 
 
-@check("power_on", "PMKA-ERR-02", needs={"pins"})
+@check("power_on", "PMKA-ERR-02", needs={"pins"}, wires=(*RESETS, *TAU))
 def res_ends_resets(e: Capture) -> str:
     """Look at RP1 to RN4 and the beat between Res and the first sample."""
-    wires_needed(e, *RESETS, *TAU)
     rises, which = samples(e, 1)
     for name in (*RESETS, *TAU):
         if int(e.wires[name].at(int(rises[0]) - 1 - round(e.slack_ns(0.0)))):

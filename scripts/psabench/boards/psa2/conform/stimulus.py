@@ -5,6 +5,7 @@ from __future__ import annotations
 from psabench.conform.capture.log import Capture
 from psabench.conform.dut import Subject, Take
 from psabench.conform.plan import stimulus
+from psabench.conform.stimulus.streamed import while_streaming
 
 SETUP_S = 0.22  # Res to the first frames takes 0.19 s
 STREAM_S = 0.4
@@ -25,15 +26,13 @@ def into_a_frame(s: Subject, take: Take, lead_s: float = 0.0) -> None:
 def power_on(s: Subject) -> Capture:
     """Res in the middle of a frame, then until frames come: the set-up on all lines, boot-up, the first frames."""
     s.wait_ready()
-    with s.take() as take:
-        s.unit.start()
+    with s.take() as take, while_streaming(s):
         into_a_frame(s, take, ON_BUS_S)
         take.marks["reset"] = s.bench.time_s
         s.reset()
         s.run_for(0.01)
         s.unit.start()
         s.run_for(SETUP_S)
-        s.unit.stop()
     return s.capture("power_on", take)
 
 
@@ -41,8 +40,7 @@ def power_on(s: Subject) -> Capture:
 def power_cycle(s: Subject) -> Capture:
     """The supply off in the middle of a frame, and on again until frames come."""
     s.wait_ready()
-    with s.take() as take:
-        s.unit.start()
+    with s.take() as take, while_streaming(s):
         s.run_for(0.03)
         into_a_frame(s, take)
         take.marks["off"] = s.bench.time_s
@@ -51,7 +49,6 @@ def power_cycle(s: Subject) -> Capture:
         s.run_for(0.01)
         s.unit.start()
         s.run_for(SETUP_S)
-        s.unit.stop()
     return s.capture("power_cycle", take)
 
 
@@ -59,8 +56,6 @@ def power_cycle(s: Subject) -> Capture:
 def stream(s: Subject) -> Capture:
     """Some hundred frames, on the lines and on CAN."""
     s.wait_ready()
-    with s.take() as take:
-        s.unit.start()
+    with s.take() as take, while_streaming(s):
         s.run_for(STREAM_S)
-        s.unit.stop()
     return s.capture("stream", take)

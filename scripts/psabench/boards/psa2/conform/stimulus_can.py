@@ -19,6 +19,7 @@ from psabench.boards.psa2.conform.stimulus import PERIOD_S
 from psabench.conform.capture.log import Capture
 from psabench.conform.dut import Subject, Take
 from psabench.conform.plan import stimulus
+from psabench.conform.stimulus.streamed import while_streaming
 from psabench.conform.verdict import Failed, Inconclusive
 from psabench.errors import DeviceError
 
@@ -110,14 +111,12 @@ def split(index: int, sub: int, value: int) -> list[tuple[int, int, int]]:
 def quiet(s: Subject) -> Capture:
     """Frames for two and a half seconds, on CAN alone; counters meanwhile: the log has them among the frames."""
     s.wait_ready()
-    with s.take(lines=False) as take:
-        s.unit.start()
+    with s.take(lines=False) as take, while_streaming(s):
         s.run_for(10 * PERIOD_S)
         take.facts["before"] = counters(s)
         s.run_for(2.5)
         take.facts["after"] = counters(s, after=True)
         s.run_for(10 * PERIOD_S)
-        s.unit.stop()
     return s.capture("quiet", take)
 
 

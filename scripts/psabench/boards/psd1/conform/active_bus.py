@@ -37,10 +37,9 @@ def _waiting(s: Subject, axis: int = 0) -> None:
         s.run_for(HALF_S)
 
 
-@active("PSD1-CYC-02", needs={"bus"})
+@active("PSD1-CYC-02", needs={"bus"}, before=calm)
 def no_cycle_without_int0_and_fl1(s: Subject) -> str:
     """Write FLAGS 0, 1 and 2, look for a running cycle after each, then write 3."""
-    calm(s)
     if has_host(s.variant):
         return _without_flags(s)
     for flags in (0, 1, 2):
@@ -70,7 +69,7 @@ def _without_flags(s: Subject) -> str:
     return f"no cycle with FLAGS 0, 1 and 2, {found[BOTH]} with 3"
 
 
-@active("PSD1-CYC-05", needs={"bus"})
+@active("PSD1-CYC-05", needs={"bus"}, after=calm)
 def a_cycle_goes_on_without_its_conditions(s: Subject) -> str:
     """Write FLAGS 0 while X waits, read the three words, look for another cycle."""
     _waiting(s)
@@ -79,11 +78,10 @@ def a_cycle_goes_on_without_its_conditions(s: Subject) -> str:
     s.run_for(4 * period_s(s.variant))
     if status(s) & CYCLE:
         raise Failed("another cycle", "none with INT0 and FL1 away")
-    calm(s)
     return f"words {' '.join(f'{w:04X}h' for w in words)}, then no cycle"
 
 
-@active("PSD1-FL2-06", needs={"bus"})
+@active("PSD1-FL2-06", needs={"bus"}, after=calm)
 def a_word_waits_for_its_strobe(s: Subject) -> str:
     """Leave X unread for a second, then read X, Y and Z."""
     _waiting(s)
@@ -93,28 +91,24 @@ def a_word_waits_for_its_strobe(s: Subject) -> str:
     if (before, after) != (1, 1):
         raise Failed(f"bits 2..0 of STATUS {before:03b} and, a second later, {after:03b}", "X waits: 001")
     words = [word(s, axis).data for axis in range(3)]
-    calm(s)
     return f"X waited for a second, then {' '.join(f'{w:04X}h' for w in words)}"
 
 
-@active("PSD1-BUS-02", needs={"bus", "can"})
+@active("PSD1-BUS-02", needs={"bus", "can"}, before=calm, after=calm)
 def words_are_answered_at_their_addresses(s: Subject) -> str:
     """Read X, Y and Z at 00h, 01h and 02h, and compare them with what the board tells of that cycle."""
-    calm(s)
     for _ in range(4):
         words = [c.data for c in drive(s, 1)]
         told = [int(s.unit.node.read(OD.CODES, k)) for k in (1, 2, 3)]
         if words != told:
             raise Failed(f"{[f'{w:04X}h' for w in words]} on the bus", f"{[f'{w:04X}h' for w in told]} as 2200h tells")
-    calm(s)
     return "four cycles, the words at 00h, 01h and 02h"
 
 
-@active("PSD1-BUS-03", needs={"bus"})
+@active("PSD1-BUS-03", needs={"bus"}, before=calm, after=calm)
 def a_strobe_for_another_word_is_refused(s: Subject, row: Requirement) -> str:
     """Read Y and Z while X waits, then X; read X before there is a cycle."""
     code = row.limit("abort_code")
-    calm(s)
     line_refused(s, "R 0", code)
     _waiting(s)
     line_refused(s, "R 2", code)
@@ -122,26 +116,23 @@ def a_strobe_for_another_word_is_refused(s: Subject, row: Requirement) -> str:
     first = line(s, "R 0").data
     if first == 0:
         raise Failed("0000h from X after refusals", "its word")
-    calm(s)
     return f"refused, and X gave {first:04X}h afterwards"
 
 
-@active("PSD1-BUS-04", needs={"bus"})
+@active("PSD1-BUS-04", needs={"bus"}, after=calm)
 def a_word_is_taken_once(s: Subject, row: Requirement) -> str:
     """Read X twice."""
     code = row.limit("abort_code")
     _waiting(s)
     line(s, "R 0")
     line_refused(s, "R 0", code)
-    calm(s)
     return "the second strobe is refused"
 
 
-@active("PSD1-BUS-05", needs={"bus"})
+@active("PSD1-BUS-05", needs={"bus"}, before=calm)
 def words_of_the_built_in_host_are_refused(s: Subject, row: Requirement) -> str:
     """Read X, Y and Z while the board reads them itself, each time a little earlier in the cycle."""
     code = row.limit("abort_code")
-    calm(s)
     strobes = round(SCAN_S / SCAN_STEP_S)
     for axis in range(3):
         _into_a_cycle(s)
@@ -165,20 +156,17 @@ def _a_period_later(s: Subject, less_s: float) -> None:
     s.run_for(period_s(s.variant) - SHORT_S - less_s)
 
 
-@active("PSD1-BUS-06", needs={"bus"})
+@active("PSD1-BUS-06", needs={"bus"}, before=calm, after=calm)
 def registers_have_their_names_and_rights(s: Subject) -> str:
     """Ask who is there, read and write every address."""
     words = {"X": 0x08000022, "Y": 0x08000022, "Z": 0x08000022}
-    calm(s)
     seen = names_and_rights(s, "psd1", never=words, writes={"COMMAND": 3, "TEMP": 1, "SERVICE": 2, "FLAGS": 0})
-    calm(s)
     return seen
 
 
-@active("PSD1-BUS-10", needs={"bus"})
+@active("PSD1-BUS-10", needs={"bus"}, before=calm)
 def channels_come_back_with_their_codes(s: Subject, row: Requirement) -> str:
     """Write each channel to TEMP and SERVICE and read it back."""
-    calm(s)
     bits = int(row.limit("code_bits"))
     seen = []
     for address in ("A", "B"):
@@ -191,10 +179,9 @@ def channels_come_back_with_their_codes(s: Subject, row: Requirement) -> str:
     return f"codes {' '.join(seen)}"
 
 
-@active("PSD1-BUS-11", needs={"bus"})
+@active("PSD1-BUS-11", needs={"bus"}, before=calm)
 def the_other_signals_are_there(s: Subject) -> str:
     """Read gyros, rate sensors, temperatures and service signals."""
-    calm(s)
     run_cycles(s, 3)
     gyros = [line(s, f"R {a:X}").data for a in range(4, 7)]
     rates = [line(s, f"R {a:X}").data for a in range(7, 10)]
@@ -210,10 +197,9 @@ def the_other_signals_are_there(s: Subject) -> str:
     return f"gyros {gyros}, rates {rates}, service {service}"
 
 
-@active("PSD1-BUS-11", needs={"bus", "supply"})
+@active("PSD1-BUS-11", needs={"bus", "supply"}, before=calm)
 def the_service_signal_follows_the_supply(s: Subject, row: Requirement) -> str:
     """Lower the supply by a twentieth and read its code before and after."""
-    calm(s)
     line(s, "W B 0000")
     supply = s.bench.supply
     volts = supply.volt_v
@@ -312,10 +298,9 @@ def _gyros(s: Subject) -> list[int]:
     return [int(s.unit.node.read(GYROS, k)) for k in (1, 2, 3)]
 
 
-@active("PSD1-LATE-04", needs={"bus", "can"})
+@active("PSD1-LATE-04", needs={"bus", "can"}, before=calm)
 def refusals_are_counted(s: Subject) -> str:
     """Strobe what is rejected, and words that seldom wait; look at the counters."""
-    calm(s)
     counters = s.unit.counters()
     refused = sum(_is_refused(s, text) for text in ("R 0", "R 1", "R 2", "W 3 0", "R 3 100", "R 4 150"))
     now = s.unit.counters()

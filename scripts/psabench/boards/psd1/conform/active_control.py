@@ -24,6 +24,7 @@ from psabench.conform.dictionary import as_the_dictionary_says, identity
 from psabench.conform.dut import Subject
 from psabench.conform.plan import active
 from psabench.conform.requirements import Requirement, requirements
+from psabench.conform.stimulus.streamed import while_streaming
 from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.busport import Cycle
 from psabench.link.can_host import QUANTUM_S
@@ -79,30 +80,27 @@ def _cycles(s: Subject, count: int) -> Readings:
     return found
 
 
-@active("PSD1-UC-02", needs={"can"})
+@active("PSD1-UC-02", needs={"can"}, before=calm)
 def control_words_are_read_as_they_are(s: Subject, row: Requirement) -> str:
     """Read 2042h and 2043h after Res."""
-    calm(s)
     due = int(row.limit("uc1_code")), int(row.limit("uc2_code"))
     if _control(s) != due:
         raise Failed("{:06X}h, {:06X}h".format(*_control(s)), "{:06X}h, {:06X}h".format(*due))
     return "UC1 {:06X}h, UC2 {:06X}h".format(*due)
 
 
-@active("PSD1-SETUP-01", needs={"can"})
+@active("PSD1-SETUP-01", needs={"can"}, before=calm)
 def coefficients_are_kept(s: Subject) -> str:
     """Read 2044h and 2045h after the set-up, twice."""
-    calm(s)
     first, again = _coefficients(s), _coefficients(s)
     if not all(first) or first != again:
         raise Failed(f"{first}, then {again}", "six that are not 0, and the same again")
     return f"zero {first[:3]}, full scale {first[3:]}"
 
 
-@active("PSD1-SETUP-01", needs={"bus", "can"})
+@active("PSD1-SETUP-01", needs={"bus", "can"}, before=calm)
 def coefficients_are_shown_on_the_bus(s: Subject) -> str:
     """Read the six by COMMAND, UC_HIGH and UC_LOW, and compare them with 2044h and 2045h."""
-    calm(s)
     for command, due in zip((0x10, 0x11, 0x12, 0x20, 0x21, 0x22), _coefficients(s), strict=True):
         line(s, f"W E {command:X}")
         got = line(s, "R C").data << 16 | line(s, "R D").data
@@ -132,10 +130,9 @@ def converters_are_in_step_after_res(s: Subject) -> str:
     return f"six times, lost words of X: {seen}, as many of the others"
 
 
-@active("PSD1-UC-03", needs={"can"})
+@active("PSD1-UC-03", needs={"can"}, before=calm, after=calm)
 def uc1_calibrates_anew(s: Subject, row: Requirement) -> str:
     """Write 2042h and 2043h as they are, look at the coefficients and at the time that each answer takes."""
-    calm(s)
     before, (uc1, uc2) = _coefficients(s), _control(s)
     most_s = row.limit("answer_max_periods") * period_s(s.variant) + row.limit("transfers_ms") * 1e-3 + QUANTUM_S
     took = []
@@ -150,15 +147,13 @@ def uc1_calibrates_anew(s: Subject, row: Requirement) -> str:
         raise Failed(f"an answer after {took[0] * 1e3:.1f} ms", f"{most_s * 1e3:.1f} ms at most")
     if s.lockstep and took[0] < row.limit("answer_min_periods") * period_s(s.variant):
         raise Failed(f"an answer after {took[0] * 1e3:.1f} ms", "when the calibration is done")
-    calm(s)
     return f"answers after {took[0] * 1e3:.1f} and {took[1] * 1e3:.1f} ms, six new coefficients"
 
 
-@active("PSD1-UC-04", needs={"can"})
+@active("PSD1-UC-04", needs={"can"}, before=calm)
 def control_words_that_cannot_be_are_refused(s: Subject, row: Requirement) -> str:
     """Write WL, PD, codes out of range, UC1 without and UC2 with a calibration."""
     code, low, high = int(row.limit("abort_code")), int(row.limit("code_min")), int(row.limit("code_max"))
-    calm(s)
     uc1, uc2 = _control(s)
     wrong = [
         (UC2, uc2 | WL),
@@ -182,10 +177,9 @@ def control_words_that_cannot_be_are_refused(s: Subject, row: Requirement) -> st
     return f"{len(wrong)} control words refused, each with its reason"
 
 
-@active("PSD1-UC-05", needs={"bus"})
+@active("PSD1-UC-05", needs={"bus"}, before=calm, after=calm)
 def commands_come_one_after_the_other(s: Subject, row: Requirement) -> str:
     """Write COMMAND 1 twice."""
-    calm(s)
     line(s, "W E 3")  # UC1 into UC_HIGH and UC_LOW
     code = row.limit("abort_code")
     if s.lockstep:
@@ -200,14 +194,12 @@ def commands_come_one_after_the_other(s: Subject, row: Requirement) -> str:
         busy = told.data if isinstance(told, Cycle) else 0
     if not busy & 0x8000:
         raise Failed(f"COMMAND {busy:04X}h", "bit 15, under way")
-    calm(s)
     return "the second is refused while the first is under way"
 
 
-@active("PSD1-UC-06", needs={"bus", "can"})
+@active("PSD1-UC-06", needs={"bus", "can"}, before=calm, after=calm)
 def a_command_cuts_a_cycle_that_waits(s: Subject, row: Requirement) -> str:
     """Write 2043h while X waits for a host, look at Cut cycles and at the time."""
-    calm(s)
     line(s, f"W F {BOTH:04X}")
     s.run_for(2 * period_s(s.variant))
     before = int(s.unit.node.read(COUNTERS, 24))
@@ -220,14 +212,12 @@ def a_command_cuts_a_cycle_that_waits(s: Subject, row: Requirement) -> str:
         raise Failed(f"{cut} cycles cut", "1")
     if s.lockstep and took_s < patience_s:
         raise Failed(f"an answer after {took_s * 1e3:.2f} ms", f"{patience_s * 1e3:g} ms of patience first")
-    calm(s)
     return f"one cycle cut, answer after {took_s * 1e3:.1f} ms"
 
 
-@active("PSD1-UC-07", needs={"can"})
+@active("PSD1-UC-07", needs={"can"}, before=calm, after=calm)
 def control_words_are_read_back(s: Subject) -> str:
     """Read 2046h and compare it with 2043h, some cycles after the set-up and with another code."""
-    calm(s)
     sent = _control(s)[1]
     run_cycles(s, STAYS)
     for value in (sent, sent + 1):
@@ -236,14 +226,12 @@ def control_words_are_read_back(s: Subject) -> str:
         got = [int(s.unit.node.read(IN_CONVERTERS, k)) for k in AXES]
         if got != [value & ~MODE_MASK] * 3:
             raise Failed(f"{[f'{g:06X}h' for g in got]}", f"{value & ~MODE_MASK:06X}h three times")
-    calm(s)
     return f"as set up {STAYS} cycles later, another as written"
 
 
-@active("PSD1-CHIP-01", needs={"can", "inputs"})
+@active("PSD1-CHIP-01", needs={"can", "inputs"}, before=calm)
 def the_gain_is_where_the_table_has_it(s: Subject, row: Requirement) -> str:
     """Set gain 2 by G2..0 in both control words and compare the words with those of gain 1."""
-    calm(s)
     zero = requirements()["PSD1-WORD-01"].limit("zero_code")
     one = _mean(_cycles(s, 40)) - zero
     _set(s, 1 << GAIN_SHIFT)
@@ -268,10 +256,9 @@ def _set(s: Subject, bits: int) -> None:
     s.unit.node.write(UC2, 0, uc2 & ~GAIN_MASK | bits)
 
 
-@active("PSD1-CHIP-02", needs={"can", "pins"})
+@active("PSD1-CHIP-02", needs={"can", "pins"}, before=calm, after=calm)
 def the_rate_is_that_of_the_code(s: Subject, row: Requirement) -> str:
     """Set codes 19, 100, 195 and 2000 and measure from fall to fall of DR."""
-    calm(s)
     uc2 = _control(s)[1]
     seen = []
     for code in (int(row.limit("code_min")), 100, 195, int(row.limit("code_max"))):
@@ -286,7 +273,6 @@ def the_rate_is_that_of_the_code(s: Subject, row: Requirement) -> str:
         if not len(took_ns) or np.abs(took_ns - due_s * 1e9).max() > slack_ns:
             raise Failed(f"{took_ns.tolist()} ns from DR to DR with code {code}", f"{due_s * 1e9:.0f} ns")
         seen.append(f"{code}: {took_ns.mean() * 1e-3:.1f} us")
-    calm(s)
     return ", ".join(seen)
 
 
@@ -336,11 +322,10 @@ def a_word_at_0_alone_is_marked(s: Subject, row: Requirement) -> str:
     return f"0000h on {', '.join(below)} alone, CLIP 1"
 
 
-@active("PSD1-LATE-01", needs={"bus", "can", "line", "lockstep"})
+@active("PSD1-LATE-01", needs={"bus", "can", "line", "lockstep"}, before=calm)
 def late_begins_at_its_time(s: Subject, row: Requirement) -> str:
     """Read words sooner and later; count the strobes that the lines show to begin too long after FL2."""
     late_ns = row.limit("late_ns")
-    calm(s)
     before = int(s.unit.node.read(COUNTERS, 16))
     with s.take() as take:
         line(s, f"W F {BOTH:04X}")
@@ -373,11 +358,10 @@ def _word_after(s: Subject, axis: int, wait_s: float) -> None:
     host.answer()
 
 
-@active("PSD1-LATE-01", needs={"bus", "can"})
+@active("PSD1-LATE-01", needs={"bus", "can"}, before=calm, after=calm)
 def late_strobes_are_told(s: Subject, row: Requirement) -> str:
     """Read words as they come, then some 0.2 ms late; look at LATE and Late strobes."""
     late_s = row.limit("late_ns") * 1e-9
-    calm(s)
     before = int(s.unit.node.read(COUNTERS, 16))
     s.unit.frames.forget()
     s.unit.start()
@@ -390,7 +374,6 @@ def late_strobes_are_told(s: Subject, row: Requirement) -> str:
     status = line(s, "R 3").data
     if not status & 1 << 11:
         raise Failed(f"STATUS {status:04X}h", "bit 11, late")
-    calm(s)
     return f"LATE in {len(cycles['LATE'])} cycles, {told} late strobes counted"
 
 
@@ -445,18 +428,15 @@ def lost_conversions_are_told(s: Subject, row: Requirement) -> str:
     return f"OVERRUN {overrun}, lost {lost}"
 
 
-@active("PSD1-CAN-02", needs={"can"})
+@active("PSD1-CAN-02", needs={"can"}, before=calm)
 def messages_tell_what_their_objects_hold(s: Subject) -> str:
     """Switch all messages on, let cycles end, and compare the last with 2200h, 2202h, 2203h and 2204h."""
-    calm(s)
     messages_on(s, True)
     node = s.unit.node
-    with s.take(lines=False) as take:
-        s.unit.start()
+    with s.take(lines=False) as take, while_streaming(s):
         run_cycles(s, 4)
         node.write_raw(OD.BUS, FLAGS + 1, bytes(2))  # no further cycle begins
         s.run_for(2 * period_s(s.variant))
-        s.unit.stop()
     held = {index: [int(node.read(index, k)) for k in range(1, n + 1)] for index, n in HELD.items()}
     e = s.capture("messages", take)
     last = {}
@@ -479,8 +459,7 @@ def the_board_says_what_it_is(s: Subject) -> str:
     return identity(s, "PSD1-CAN-07", "PSD-1")
 
 
-@active("PSD1-CAN-08", needs={"can"})
+@active("PSD1-CAN-08", needs={"can"}, before=calm)
 def objects_are_as_the_dictionary_says(s: Subject) -> str:
     """Read every object of the EDS and write where nothing may be written."""
-    calm(s)
     return as_the_dictionary_says(s, "psd1", varies=(UC1, UC2) if s.variant.profile != "psd1" else ())

@@ -19,7 +19,7 @@ from psabench.boards.psd1.conform.capture_cycles import (
     transfers,
     trouble,
 )
-from psabench.conform.capture.intervals import after, before, edges, first_bad, interval, together, wires_needed
+from psabench.conform.capture.intervals import after, before, edges, first_bad, interval, together
 from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
@@ -45,10 +45,9 @@ def words_are_read_in_turn(e: Capture) -> str:
     return f"{len(words)} words X, Y, Z in turn, each word with its strobe"
 
 
-@check("stream", "PSD1-CYC-02", needs={"pins"})
+@check("stream", "PSD1-CYC-02", needs={"pins"}, wires=START)
 def a_cycle_begins_with_its_three_conditions(e: Capture) -> str:
     """Look at INT0, FL1 and DR just before each rise of A0."""
-    wires_needed(e, *START)
     at_ns = starts(e, cycles(e))
     just = at_ns - 1 - round(e.slack_ns(0.0))
     for name, due in (("INT0", 1), ("FL1", 0), ("DR", 0)):
@@ -71,10 +70,9 @@ def a0_rises_with_the_clock(e: Capture, row: Requirement) -> str:
     )
 
 
-@check("stream", "PSD1-CYC-04", needs={"pins"})
+@check("stream", "PSD1-CYC-04", needs={"pins"}, wires=START)
 def a0_rises_with_the_first_clock_that_it_can(e: Capture) -> str:
     """Look whether the rise of 1M25 before that of A0 came too early for all conditions."""
-    wires_needed(e, *START)
     whole = cycles(e)
     at_ns, held_ns = starts(e, whole), _held(e)
     ready = np.max([before(held_ns[k], starts(e, whole)) for k in range(len(held_ns))], axis=0)
@@ -102,10 +100,9 @@ def rfx_falls_half_a_clock_after_a0(e: Capture, row: Requirement) -> str:
     return interval(e, starts(e, whole), falls, row.limit("a0_to_rfx_ns"), tolerance_ns, "from A0 to RFX", START)
 
 
-@check("stream", "PSD1-CYC-07", needs={"pins"})
+@check("stream", "PSD1-CYC-07", needs={"pins"}, wires=("CLK_1M25",))
 def the_clock_runs_without_a_gap(e: Capture, row: Requirement) -> str:
     """Measure every period of 1M25 and its high half."""
-    wires_needed(e, "CLK_1M25")
     rises = e.wires.rises("CLK_1M25")
     up, down = e.wires.pulses("CLK_1M25", 1)
     if len(rises) < LEAST:
@@ -162,10 +159,9 @@ def a_cycle_begins_only_after_the_last_has_ended(e: Capture) -> str:
     return f"{len(at_ns)} cycles, the next {int((at_ns[1:] - ends[:-1]).min())} ns after the last or later"
 
 
-@check("stream", "PSD1-CYC-11", needs={"pins"})
+@check("stream", "PSD1-CYC-11", needs={"pins"}, wires=PINS)
 def nothing_moves_between_cycles(e: Capture) -> str:
     """Look for edges of any other line but 1M25 and DR between the last FL2 and the next A0."""
-    wires_needed(e, *PINS)
     whole = cycles(e)
     begin, end = of([c[2] for c in whole], "clear")[:-1], starts(e, whole)[1:]
     slack = round(e.slack_ns(0.0))
@@ -188,10 +184,9 @@ def cycles_come_at_their_rate(e: Capture) -> str:
     return interval(e, falls[:-1], falls[1:], period_ns, tolerance_ns, "from cycle to cycle", FRAMES)
 
 
-@check("stream", "PSD1-CYC-12", needs={"pins"})
+@check("stream", "PSD1-CYC-12", needs={"pins"}, wires=("DR", "A0"))
 def a_cycle_follows_each_fall_of_dr(e: Capture) -> str:
     """Count the falls of DR and the rises of A0 in turn."""
-    wires_needed(e, "DR", "A0")
     falls, rises = e.wires.falls("DR"), e.wires.rises("A0")
     if len(rises) < LEAST or not len(falls):
         raise Inconclusive(f"{len(falls)} falls of DR, {len(rises)} rises of A0 were recorded")
@@ -203,10 +198,9 @@ def a_cycle_follows_each_fall_of_dr(e: Capture) -> str:
     return f"{n} falls of DR, {n} rises of A0 in turn"
 
 
-@check("power_on", "PSD1-SIG-01", needs={"pins"})
+@check("power_on", "PSD1-SIG-01", needs={"pins"}, wires=PINS)
 def lines_rest_at_their_levels(e: Capture, row: Requirement) -> str:
     """Look at every line after Res, before the first control word goes out."""
-    wires_needed(e, *PINS)
     moves = edges(e, "TFS")
     moves = moves[moves > e.wires.start_ns]
     if not len(moves):

@@ -124,10 +124,9 @@ def the_first_edge_of_sclk_is_a_rise(e: Capture, row: Requirement) -> str:
     )
 
 
-@check("stream", "PSD1-SER-04", needs={"pins"})
+@check("stream", "PSD1-SER-04", needs={"pins"}, wires=("CLK_1M25",))
 def sclk_is_the_clock_delayed(e: Capture, row: Requirement) -> str:
     """Measure from each rise of 1M25 to the rise of SCLK that follows it, and from rise to rise."""
-    wires_needed(e, "CLK_1M25")
     words = _words(e)
     rises = np.array([t.rises for t in words], np.int64)
     tolerance_ns, period_ns = row.limit("tolerance_ns"), row.limit("period_ns")
@@ -191,10 +190,9 @@ def rfx_is_low_for_its_time(e: Capture, row: Requirement) -> str:
     )
 
 
-@check("stream", "PSD1-SER-07", needs={"pins"})
+@check("stream", "PSD1-SER-07", needs={"pins"}, wires=("CLK_1M25",))
 def rfx_rises_with_a_fall_of_the_clock(e: Capture, row: Requirement) -> str:
     """Compare the rises of RFX, RFY and RFZ with the falls of 1M25."""
-    wires_needed(e, "CLK_1M25")
     tolerance_ns = row.limit("tolerance_ns")
     return together(e, of(_words(e), "rise"), e.wires.falls("CLK_1M25"), tolerance_ns, "RFx and a fall of 1M25", SERIAL)
 
@@ -207,10 +205,9 @@ def fl2_is_set_as_rfx_rises(e: Capture, row: Requirement) -> str:
     return interval(e, of(words, "rise"), of(words, "fl2"), 0.0, tolerance_ns, "from RFx to FL2", HAND)
 
 
-@check("stream", "PSD1-SER-09", needs={"line"})
+@check("stream", "PSD1-SER-09", needs={"line"}, wires=FRAMES)
 def one_converter_at_a_time(e: Capture) -> str:
     """Look for two of RFX, RFY and RFZ low at once."""
-    wires_needed(e, *FRAMES)
     at_ns = np.unique(np.concatenate([e.wires[n].t_ns for n in FRAMES]))
     lows = sum((1 - e.wires[n].at(at_ns).astype(np.int64) for n in FRAMES), np.zeros(len(at_ns), np.int64))
     first_bad(lows > 1, at_ns, [f"{n} of RFX, RFY, RFZ low at once" for n in lows], "one at most", FRAMES)
@@ -235,10 +232,9 @@ def sclk_rests_low(e: Capture) -> str:
     return f"{len(rises)} pulses of SCLK, all within transfers"
 
 
-@check("stream", "PSD1-SER-11", needs={"pins"})
+@check("stream", "PSD1-SER-11", needs={"pins"}, wires=("DR",))
 def dr_rises_after_the_last_bit_of_x(e: Capture, row: Requirement) -> str:
     """Look at DR 110 ns after the 16th fall of SCLK under RFX."""
-    wires_needed(e, "DR")
     x = [c[0] for c in cycles(e)]
     most = row.limit("rise_max_ns")
     at_ns = np.array([t.falls[-1] for t in x], np.int64) + round(most + e.slack_ns(most))

@@ -270,10 +270,9 @@ def cycles_are_counted_from_0_after_res(e: Capture) -> str:
     return f"CNT {first[CNT_AT]} first"
 
 
-@check("strobes", "PSD1-BUS-07", needs={"pins", "bus"})
+@check("strobes", "PSD1-BUS-07", needs={"pins", "bus"}, wires=PINS)
 def status_tells_the_lines(e: Capture, row: Requirement) -> str:
     """Compare what is read from STATUS with the lines as its strobe begins."""
-    wires_needed(e, *PINS)
     begin = _reads_of_status(e)
     word = bus_word(e, "D", len(DATA), begin + round(e.slack_ns(0.0)))
     just = begin - 1 - round(e.slack_ns(0.0))
@@ -294,10 +293,9 @@ def status_tells_the_lines(e: Capture, row: Requirement) -> str:
     return f"{len(begin)} reads of STATUS; active: {', '.join(seen)}"
 
 
-@check("strobes", "PSD1-BUS-14", needs={"pins", "bus"})
+@check("strobes", "PSD1-BUS-14", needs={"pins", "bus"}, wires=PINS)
 def status_tells_the_word_that_waits(e: Capture, row: Requirement) -> str:
     """Compare bits 2..0 of STATUS with FL2 and the axis whose word waits."""
-    wires_needed(e, *PINS)
     mask = int(row.limit("axis_mask"))
     begin = _reads_of_status(e)
     ready = e.wires["FL2"].at(begin - 1) == fl2_level(e)
@@ -327,10 +325,9 @@ def _reads_of_status(e: Capture) -> Ints:
     return begin
 
 
-@check("strobes", "PSD1-BUS-08", needs={"pins", "bus"})
+@check("strobes", "PSD1-BUS-08", needs={"pins", "bus"}, wires=("CS", "RW", *ADDRESS, *DATA))
 def the_bus_stands_in_a_strobe_and_rests_at_0(e: Capture) -> str:
     """Look for changes of address, data and R/W within strobes, and for their levels between them."""
-    wires_needed(e, "CS", "RW", *ADDRESS, *DATA)
     begin, end = e.wires.pulses("CS", 0)
     if len(begin) < 8:
         raise Inconclusive(f"{len(begin)} strobes were recorded")
@@ -351,10 +348,9 @@ def the_bus_stands_in_a_strobe_and_rests_at_0(e: Capture) -> str:
     return f"{len(begin)} strobes, {writes} of them writes"
 
 
-@check("messages", "PSD1-CAN-06", needs={"pins", "can"})
+@check("messages", "PSD1-CAN-06", needs={"pins", "can"}, wires=("DR",))
 def psd1_time_tells_the_cycle(e: Capture, row: Requirement) -> str:
     """Compare TSTAMP, LENGTH and WAITED of PSD1_TIME with A0, FL2 and DR."""
-    wires_needed(e, "DR")
     whole = cycles(e)
     log = e.frames_of("PSD1_TIME")
     if len(log) < 4:

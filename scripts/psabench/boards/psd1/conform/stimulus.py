@@ -7,7 +7,7 @@ from psabench.conform.bus_host import line
 from psabench.conform.capture.log import Capture
 from psabench.conform.dut import Subject
 from psabench.conform.plan import stimulus
-from psabench.conform.stimulus.streamed import from_res
+from psabench.conform.stimulus.streamed import from_res, while_streaming
 
 CYCLES = 24  # of a stimulus
 MANY, FAST_S = 1030, 0.002  # readings that a noise wants; a word sooner than that
@@ -23,10 +23,8 @@ def power_on(s: Subject) -> Capture:
 def stream(s: Subject) -> Capture:
     """Cycles as the built-in host reads them, or as we do over the bus where there is none."""
     calm(s)
-    with s.take() as take:
-        s.unit.start()
+    with s.take() as take, while_streaming(s):
         run_cycles(s, CYCLES)
-        s.unit.stop()
     return s.capture("stream", take)
 
 
@@ -35,10 +33,8 @@ def words(s: Subject) -> Capture:
     """A thousand words at still inputs where the board reads them itself and is not slow, a few elsewhere."""
     calm(s)
     fast = has_host(s.variant) and period_s(s.variant) < FAST_S
-    with s.take(lines=False) as take:
-        s.unit.start()
+    with s.take(lines=False) as take, while_streaming(s):
         run_cycles(s, MANY if fast else 2 * CYCLES)
-        s.unit.stop()
     return s.capture("words", take)
 
 
@@ -46,8 +42,7 @@ def words(s: Subject) -> Capture:
 def messages(s: Subject) -> Capture:
     """The same with all messages switched on, and the objects that they map read afterwards."""
     calm(s)
-    with s.take() as take:
-        s.unit.start()
+    with s.take() as take, while_streaming(s):
         run_cycles(s, 3)
         s.unit.stop()
         take.marks["on"] = s.bench.time_s
@@ -55,7 +50,6 @@ def messages(s: Subject) -> Capture:
         messages_on(s, True)
         s.unit.start()
         run_cycles(s, CYCLES)
-        s.unit.stop()
     messages_on(s, False)
     return s.capture("messages", take)
 
