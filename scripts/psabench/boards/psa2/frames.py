@@ -6,7 +6,7 @@ wrong with them; `take` turns what has arrived into one `Frames`.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from enum import IntEnum
 from functools import cache
@@ -19,8 +19,6 @@ from psabench.link import signals
 from psabench.link.can_host import Message
 from psabench.link.protocol_files import message
 from psabench.link.signals import Floats, Ints
-
-Bits = npt.NDArray[np.uint8]
 
 
 class Form(IntEnum):
@@ -125,7 +123,8 @@ class FrameReader:
         first, second, form = self._first, self._second, self._form
         self._first, self._second = _Kept(), _Kept()
         if not first.data or form is None:
-            return _no_frames()
+            none = np.zeros(0)
+            return self._samples("PSA2_XY", none, none, dict.fromkeys("XYZ", none.astype(np.int64)))
         frames = {Form.PAIR: self._pairs, Form.FAST: self._fast, Form.FRAME: self._fd, Form.BLOCK: self._blocks}
         taken = frames[form](first, second)
         self.counters.frames += len(taken)
@@ -178,83 +177,54 @@ class FrameReader:
         self._stamp = int(unwrapped[-1])
         return unwrapped.astype(np.float64) * unit_s
 
-    def _status(self, settled: Ints, clip: Ints, overrun: Ints) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
-        self.counters.overruns += int(overrun.sum())
-        return settled.astype(np.bool_), clip.astype(np.bool_)
-
-    def _pairs(self, xy_kept: _Kept, zt_kept: _Kept) -> Frames:
-        xy, xy_at = _bits("PSA2_XY", xy_kept.data)
-        zt, zt_at = _bits("PSA2_ZT", zt_kept.data)
-        stamp = zt_at["TSTAMP"]
-        mixed = _mixed(signals.raw(xy, xy_at["SEQ"]), signals.raw(zt, stamp), self._seq, self._stamp)
-        self.counters.torn += int(mixed.sum())
-        xy, zt, t_rx_s = xy[~mixed], zt[~mixed], np.array(zt_kept.t_s)[~mixed]
-        seq = signals.raw(xy, xy_at["SEQ"])
-        self._count_gaps(seq, xy_at["SEQ"].bits)
-        settled, clipped = self._status(*(signals.raw(zt, zt_at[s]) for s in ("SETTLED", "CLIP", "OVERRUN")))
-        u = [signals.physical(xy, xy_at["X"]), signals.physical(xy, xy_at["Y"]), signals.physical(zt, zt_at["Z"])]
+    def _samples(self, name: str, t_rx_s: Floats, t_sample_s: Floats, columns: Mapping[str, Ints]) -> Frames:
+        """Of raw columns by the signals' names, (n,) each; `name` has the scale of X, Y, Z (all have the same)."""
+        absent = np.zeros(len(t_rx_s), dtype=np.int64)
+        self.counters.overruns += int(columns.get("OVERRUN", absent).sum())
+        scale = next(s.scale for s in _layout(name).values() if s.unit == "V")
         return Frames(
             t_rx_s=t_rx_s,
-            t_sample_s=self._times(signals.raw(zt, stamp), stamp.bits, stamp.scale),
-            seq=seq,
-            u_v=np.stack(u, axis=1),
-            temp_code=signals.raw(zt, zt_at["T"]),
-            temp_channel=signals.raw(zt, zt_at["CHANNEL"]),
-            settled=settled,
-            clipped=clipped,
+            t_sample_s=t_sample_s,
+            seq=columns.get("SEQ", absent - 1),
+            u_v=np.stack([columns[axis] * scale for axis in "XYZ"], axis=1),
+            temp_code=columns.get("T", absent),
+            temp_channel=columns.get("CHANNEL", absent),
+            settled=columns.get("SETTLED", absent).astype(np.bool_),
+            clipped=columns.get("CLIP", absent).astype(np.bool_),
         )
+
+    def _pairs(self, xy: _Kept, zt: _Kept) -> Frames:
+        columns = _columns("PSA2_XY", xy.data) | _columns("PSA2_ZT", zt.data)
+        seq, stamp = _layout("PSA2_XY")["SEQ"], _layout("PSA2_ZT")["TSTAMP"]
+        mixed = _mixed(columns["SEQ"], columns["TSTAMP"], self._seq, self._stamp)
+        self.counters.torn += int(mixed.sum())
+        columns = {name: column[~mixed] for name, column in columns.items()}
+        self._count_gaps(columns["SEQ"], seq.bits)
+        t_sample_s = self._times(columns["TSTAMP"], stamp.bits, stamp.scale)
+        return self._samples("PSA2_XY", np.array(zt.t_s)[~mixed], t_sample_s, columns)
 
     def _fast(self, kept: _Kept, _: _Kept) -> Frames:
-        bits, at = _bits("PSA2_FAST", kept.data)
-        self._count_gaps(signals.raw(bits, at["TOG"]), 1)
-        n = len(kept.data)
-        return Frames(
-            t_rx_s=np.array(kept.t_s),
-            t_sample_s=np.full(n, np.nan),
-            seq=np.full(n, -1),
-            u_v=np.stack([signals.physical(bits, at[s]) for s in "XYZ"], axis=1),
-            temp_code=np.zeros(n, dtype=np.int64),
-            temp_channel=np.zeros(n, dtype=np.int64),
-            settled=np.zeros(n, dtype=np.bool_),
-            clipped=np.zeros(n, dtype=np.bool_),
-        )
+        columns = _columns("PSA2_FAST", kept.data)
+        self._count_gaps(columns["TOG"], 1)
+        return self._samples("PSA2_FAST", np.array(kept.t_s), np.full(len(kept.data), np.nan), columns)
 
     def _fd(self, kept: _Kept, _: _Kept) -> Frames:
-        bits, at = _bits("PSA2_FRAME", kept.data)
-        settled, clipped = self._status(*(signals.raw(bits, at[s]) for s in ("SETTLED", "CLIP", "OVERRUN")))
-        return Frames(
-            t_rx_s=np.array(kept.t_s),
-            t_sample_s=self._stamped(signals.raw(bits, at["TSTAMP"]), at["TSTAMP"]),
-            seq=np.full(len(kept.data), -1),
-            u_v=np.stack([signals.physical(bits, at[s]) for s in "XYZ"], axis=1),
-            temp_code=signals.raw(bits, at["T"]),
-            temp_channel=signals.raw(bits, at["CHANNEL"]),
-            settled=settled,
-            clipped=clipped,
-        )
+        columns = _columns("PSA2_FRAME", kept.data)
+        t_sample_s = self._stamped(columns["TSTAMP"], _layout("PSA2_FRAME")["TSTAMP"])
+        return self._samples("PSA2_FRAME", np.array(kept.t_s), t_sample_s, columns)
 
     def _blocks(self, kept: _Kept, _: _Kept) -> Frames:
-        bits, at = _bits("PSA2_BLOCK", kept.data)
+        raw, at = _columns("PSA2_BLOCK", kept.data), _layout("PSA2_BLOCK")
         count = sum(name.startswith("STATUS") for name in at)
-
-        def column(name: str) -> Ints:
-            return np.stack([signals.raw(bits, at[f"{name}{k}"]) for k in range(count)], axis=1).reshape(-1)
-
-        scale = at["X0"].scale
-        status = column("STATUS")
-        settled, clipped = self._status(status & 1, status >> 1 & 1, status >> 2 & 1)
-        t0_s = self._stamped(signals.raw(bits, at["TSTAMP"]), at["TSTAMP"], count)
+        names = ("X", "Y", "Z", "T", "STATUS")
+        columns = {s: np.stack([raw[f"{s}{k}"] for k in range(count)], axis=1).reshape(-1) for s in names}
+        status = columns["STATUS"]
+        columns |= {name: status >> bit & 1 for bit, name in enumerate(("SETTLED", "CLIP", "OVERRUN"))}
+        columns["CHANNEL"] = status >> 4
+        t0_s = self._stamped(raw["TSTAMP"], at["TSTAMP"], count)
         period_s = np.median(np.diff(t0_s)) / count if len(t0_s) > 1 else np.nan
-        return Frames(
-            t_rx_s=np.repeat(np.array(kept.t_s), count),
-            t_sample_s=(t0_s[:, None] + np.arange(count) * period_s).reshape(-1),
-            seq=np.full(len(t0_s) * count, -1),
-            u_v=np.stack([column(s) * scale for s in "XYZ"], axis=1),
-            temp_code=column("T"),
-            temp_channel=status >> 4,
-            settled=settled,
-            clipped=clipped,
-        )
+        t_sample_s = (t0_s[:, None] + np.arange(count) * period_s).reshape(-1)
+        return self._samples("PSA2_BLOCK", np.repeat(np.array(kept.t_s), count), t_sample_s, columns)
 
     def _stamped(self, stamp: Ints, s: signals.Signal, each: int = 1) -> Floats:
         """Times of a form that has no sequence number; its gaps are counted in periods of the stream itself."""
@@ -285,24 +255,12 @@ def _mixed(seq: Ints, stamp: Ints, seq_before: int | None, stamp_before: int | N
     return mixed
 
 
-def _bits(name: str, data: list[bytes]) -> tuple[Bits, dict[str, signals.Signal]]:
-    return signals.payload(data, int(message(name).length)), _layout(name)
+def _columns(name: str, data: list[bytes]) -> dict[str, Ints]:
+    """Raw integers (n,) of each signal of frames that all are this message."""
+    bits = signals.payload(data, int(message(name).length))
+    return {signal: signals.raw(bits, at) for signal, at in _layout(name).items()}
 
 
 @cache
 def _layout(name: str) -> dict[str, signals.Signal]:
     return dict(signals.layout(message(name)))
-
-
-def _no_frames() -> Frames:
-    none, none_int, none_bool = np.zeros(0), np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.bool_)
-    return Frames(
-        t_rx_s=none,
-        t_sample_s=none,
-        seq=none_int,
-        u_v=np.zeros((0, 3)),
-        temp_code=none_int,
-        temp_channel=none_int,
-        settled=none_bool,
-        clipped=none_bool,
-    )

@@ -71,9 +71,12 @@ class CanLog:
         return {s: signals.raw(bits, at) for s, at in signals.layout(message(name)).items()}
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class LineLog:
-    """Levels of lines. An edge at t_ns happened in (t_ns - resolution_ns, t_ns]; about `gaps_ns` nothing is known."""
+    """Levels of lines; equal to itself alone. An edge at t_ns happened in (t_ns - resolution_ns, t_ns].
+
+    About `gaps_ns` nothing is known.
+    """
 
     recording: Vcd
     resolution_ns: float = 1.0

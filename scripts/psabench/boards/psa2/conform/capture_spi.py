@@ -163,25 +163,8 @@ class Traffic:
         return [m for m in self.messages if m.temp == temp]
 
 
-class _Same:
-    """A recording as a key: the same only as itself."""
-
-    def __init__(self, log: LineLog) -> None:
-        self.log = log
-
-    def __hash__(self) -> int:
-        return id(self.log)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Same) and other.log is self.log
-
-
 @lru_cache(maxsize=2)
-def _decoded(key: _Same, period_ns: float) -> Traffic:
-    found = bursts(key.log, period_ns)
-    return Traffic(tuple(found), tuple(messages(found, key.log)))
-
-
 def traffic(log: LineLog, sclk_hz: float) -> Traffic:
     """Both ports decoded, once a recording. Raises Inconclusive."""
-    return _decoded(_Same(log), 1e9 / sclk_hz)
+    found = bursts(log, 1e9 / sclk_hz)
+    return Traffic(tuple(found), tuple(messages(found, log)))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from psabench.boards.psa2.conform.capture_line import WORDS, Transfers, transfers
+from psabench.boards.psa2.conform.check_stream import FORMATS, LINES
 from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
@@ -12,8 +13,6 @@ from psabench.conform.requirements import Requirement
 from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.signals import Floats, Ints
 
-LINES = ("Int", "Data", "CLK")
-FORMATS = ("PSA2-FRAME-06", "PSA2-FRAME-07", "PSA2-FRAME-08")
 LOWS = ("PSA2-INT-04", "PSA2-INT-05", "PSA2-INT-06")
 
 

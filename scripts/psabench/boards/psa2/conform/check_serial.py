@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from psabench.boards.psa2.board import BOARD
 from psabench.boards.psa2.conform.capture_spi import AXES, Burst, Message
 from psabench.boards.psa2.conform.check_setup import ACCEL, TEMP, port_traffic
 from psabench.conform.capture.log import Capture
@@ -85,27 +86,11 @@ def _column(found: Sequence[float]) -> tuple[Floats, Ints]:
 @check("stream", "PSA2-SIG-01", needs={"pins"})
 def the_board_has_its_lines(e: Capture, row: Requirement) -> str:
     """Look for the lines of the article's table in the recording, and for those that a stream moves to move."""
-    due = (
-        "SYNC_A",
-        "SClk",
-        "DRD_A",
-        "DIn",
-        *AXES,
-        "SYNC_T",
-        "CST",
-        "DRD_T",
-        "DInT",
-        "DOutT",
-        "Res",
-        "Data",
-        "CLK",
-        "Int",
-    )
-    missing = [name for name in due if name not in e.wires]
+    missing = [name for name in BOARD.lines if name not in e.wires]
     count = int(row.limit("lines_count"))
-    if missing or len(due) != count:
+    if missing or len(BOARD.lines) != count:
         raise Failed(f"no {', '.join(missing)}", f"{count} lines")
-    still = [name for name in due if name not in STILL_IN_A_STREAM and len(e.wires[name].t_ns) < 2]
+    still = [name for name in BOARD.lines if name not in STILL_IN_A_STREAM and len(e.wires[name].t_ns) < 2]
     if still:
         raise Failed(f"{', '.join(still)} never moves", "it does", at_ns=e.wires.start_ns, lines=still)
     return f"{count} lines"

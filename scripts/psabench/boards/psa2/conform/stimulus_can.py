@@ -7,7 +7,7 @@ Settings are put back by a reset.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -27,14 +27,8 @@ ACCEL, TEMP = (OD.REG_X, OD.REG_Y, OD.REG_Z), OD.REG_T  # objects of registers; 
 CONFIG0, CONFIG1, OFC0, FSC0 = 2, 3, 6, 9  # sub-indices
 DRATE = 4
 REGISTERS = range(1, 12)
-COUNTERS, OPCODE, FORM, MODE, NTH, PULSES = (
-    OD.COUNTERS,
-    OD.OPCODE,
-    OD.FRAME_FORM,
-    OD.SAMPLE_MODE,
-    OD.SAMPLE_NTH,
-    OD.SYNC_PIN,
-)
+COUNTERS, OPCODE, FORM = OD.COUNTERS, OD.OPCODE, OD.FRAME_FORM
+MODE, NTH, PULSES = OD.SAMPLE_MODE, OD.SAMPLE_NTH, OD.SYNC_PIN
 FRAMES, OVERRUNS, TIMEOUTS, SYNCS_MISSED = 1, 2, 9, 12
 SYNC = 0x80
 RATES_HZ = (250, 500, 1000, 2000, 4000)  # by DR
@@ -52,21 +46,27 @@ class Answer:
     abort: int = 0
 
 
-def ask(s: Subject, index: int, sub: int = 0) -> Answer:
-    """Read an object. Raises LinkError where no one answers."""
+def answered(access: Callable[[], object]) -> Answer:
+    """What comes of an access by SDO. Raises LinkError where no one answers."""
     try:
-        return Answer(s.unit.node.read(index, sub))
+        return Answer(access())
     except DeviceError as e:
         return Answer(abort=e.abort_code)
+
+
+def ask(s: Subject, index: int, sub: int = 0) -> Answer:
+    """Read an object."""
+    return answered(lambda: s.unit.node.read(index, sub))
 
 
 def tell(s: Subject, index: int, sub: int, value: int) -> Answer:
     """Write an object."""
-    try:
-        s.unit.node.write(index, sub, value)
-    except DeviceError as e:
-        return Answer(abort=e.abort_code)
-    return Answer()
+    return answered(lambda: s.unit.node.write(index, sub, value))
+
+
+def tell_raw(s: Subject, index: int, sub: int, value: int) -> Answer:
+    """Write one byte, whatever the EDS says of the object."""
+    return answered(lambda: s.unit.node.write_raw(index, sub, bytes([value])))
 
 
 def cut(take: Take, name: str) -> None:
@@ -222,15 +222,6 @@ def refusals(s: Subject) -> Capture:
         take.facts["read-only"] = [(i, 1, 0x55, tell_raw(s, i, 1, 0x55)) for i in ACCEL]
         take.facts["form"] = tell_raw(s, FORM, 0, 4)
     return s.capture("refusals", take)
-
-
-def tell_raw(s: Subject, index: int, sub: int, value: int) -> Answer:
-    """Write one byte, whatever the EDS says of the object."""
-    try:
-        s.unit.node.write_raw(index, sub, bytes([value]))
-    except DeviceError as e:
-        return Answer(abort=e.abort_code)
-    return Answer()
 
 
 @stimulus("early", boards=("psa2",))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from psabench.boards.objects import Psa2Objects as OD
-from psabench.boards.psa2.conform.stimulus_can import ACCEL, CONFIG0, TEMP, Answer, ask, changed, tell
+from psabench.boards.psa2.conform.stimulus_can import ACCEL, CONFIG0, TEMP, Answer, answered, ask, changed, tell
 from psabench.conform.capture.log import Capture
 from psabench.conform.dut import Subject
 from psabench.conform.plan import stimulus
@@ -19,16 +19,11 @@ TRIES = 6  # in real time, on a busy machine, three answers may not come within 
 @stimulus("objects", boards=("psa2",))
 def objects(s: Subject) -> Capture:
     """Identity, width and mirrors. facts: read; mirrors, those of one sample, with its PDO in the log."""
-    wanted = [
-        (OD.CODES, 1),
-        (OD.CODES, 2),
-        (OD.CODES, 3),
-        (OD.CODES, 4),
-        (OD.FRAME_HEAD, 2),
-        (OD.FRAME_HEAD, 3),
-        (OD.FRAME_HEAD, 4),
-        (OD.FRAME_HEAD, 5),
-    ]
+    wanted = (
+        *((OD.CODES, k) for k in (1, 2, 3, 4)),
+        *((OD.FRAME_HEAD, k) for k in (2, 3, 4, 5)),
+        *((i, k) for i in (OD.RAW_WORDS, OD.ACCEL_G, OD.ACCEL_UG) for k in (1, 2, 3)),
+    )
     with changed(s), s.take(lines=False) as take:
         take.facts["read"] = {
             (i, sub): ask(s, i, sub)
@@ -41,15 +36,7 @@ def objects(s: Subject) -> Capture:
         s.run_for(0.4)
         s.unit.start()
         s.run_for(0.02)
-        found = []
-        for index, sub in (
-            *wanted,
-            (OD.RAW_WORDS, 1),
-            (OD.RAW_WORDS, 2),
-            (OD.RAW_WORDS, 3),
-            *((i, k) for i in (OD.ACCEL_G, OD.ACCEL_UG) for k in (1, 2, 3)),
-        ):
-            found.append(_of_one_sample(s, index, sub))
+        found = [_of_one_sample(s, index, sub) for index, sub in wanted]
         for _ in range(CHANNEL_LOOKS):  # every temperature channel is in one of them
             s.run_for(TEMP_PERIOD_S)
             found.append(_of_one_sample(s, OD.FRAME_HEAD, 2))
@@ -102,8 +89,4 @@ def _row(s: Subject, d: Described) -> Row:
 
 
 def _abort_of_write(s: Subject, d: Described, data: bytes) -> int:
-    try:
-        s.unit.node.write_raw(d.index, d.sub, data)
-    except DeviceError as e:
-        return e.abort_code
-    return 0
+    return answered(lambda: s.unit.node.write_raw(d.index, d.sub, data)).abort

@@ -29,15 +29,6 @@ from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.busport import Cycle
 from psabench.link.can_host import QUANTUM_S
 
-UC1, UC2, ZERO, FULL, IN_CONVERTERS, COUNTERS, REFUSAL = (
-    OD.UC1,
-    OD.UC2,
-    OD.ZERO_COEF,
-    OD.FULL_COEF,
-    OD.CONTROL,
-    OD.COUNTERS,
-    OD.REFUSAL,
-)
 AXES = (1, 2, 3)
 FS_MASK, GAIN_SHIFT, GAIN_MASK, MODE_MASK, WL, PD, CALIBRATE = 0xFFF, 18, 7 << 18, 7 << 21, 1 << 15, 1 << 16, 1 << 21
 CLIP_GAIN = 4  # code of gain 16
@@ -59,11 +50,11 @@ LATE_S = 0.5  # that the first frames may be late in real time
 
 def _control(s: Subject) -> tuple[int, int]:
     """UC1 and UC2."""
-    return int(s.unit.node.read(UC1)), int(s.unit.node.read(UC2))
+    return int(s.unit.node.read(OD.UC1)), int(s.unit.node.read(OD.UC2))
 
 
 def _coefficients(s: Subject) -> list[int]:
-    return [int(s.unit.node.read(index, k)) for index in (ZERO, FULL) for k in AXES]
+    return [int(s.unit.node.read(index, k)) for index in (OD.ZERO_COEF, OD.FULL_COEF) for k in AXES]
 
 
 def _cycles(s: Subject, count: int) -> Readings:
@@ -136,7 +127,7 @@ def uc1_calibrates_anew(s: Subject, row: Requirement) -> str:
     before, (uc1, uc2) = _coefficients(s), _control(s)
     most_s = row.limit("answer_max_periods") * period_s(s.variant) + row.limit("transfers_ms") * 1e-3 + QUANTUM_S
     took = []
-    for index, value in ((UC1, uc1), (UC2, uc2)):
+    for index, value in ((OD.UC1, uc1), (OD.UC2, uc2)):
         begun_s = s.bench.time_s
         s.unit.node.write(index, 0, value)
         took.append(s.bench.time_s - begun_s)
@@ -156,16 +147,16 @@ def control_words_that_cannot_be_are_refused(s: Subject, row: Requirement) -> st
     code, low, high = int(row.limit("abort_code")), int(row.limit("code_min")), int(row.limit("code_max"))
     uc1, uc2 = _control(s)
     wrong = [
-        (UC2, uc2 | WL),
-        (UC2, uc2 | PD),
-        (UC2, uc2 & ~FS_MASK | low - 1),
-        (UC2, uc2 & ~FS_MASK | high + 1),
-        (UC1, uc1 | WL),
-        (UC1, uc1 | PD),
-        (UC1, uc1 & ~FS_MASK | low - 1),
-        (UC1, uc1 & ~FS_MASK | high + 1),
-        (UC1, uc1 & ~MODE_MASK),
-        (UC2, uc2 | CALIBRATE),
+        (OD.UC2, uc2 | WL),
+        (OD.UC2, uc2 | PD),
+        (OD.UC2, uc2 & ~FS_MASK | low - 1),
+        (OD.UC2, uc2 & ~FS_MASK | high + 1),
+        (OD.UC1, uc1 | WL),
+        (OD.UC1, uc1 | PD),
+        (OD.UC1, uc1 & ~FS_MASK | low - 1),
+        (OD.UC1, uc1 & ~FS_MASK | high + 1),
+        (OD.UC1, uc1 & ~MODE_MASK),
+        (OD.UC2, uc2 | CALIBRATE),
     ]
     for index, value in wrong:
         refused(lambda i=index, v=value: s.unit.node.write(i, 0, v), code, f"{value:06X}h to {index:04X}h")  # type: ignore[misc]
@@ -202,12 +193,12 @@ def a_command_cuts_a_cycle_that_waits(s: Subject, row: Requirement) -> str:
     """Write 2043h while X waits for a host, look at Cut cycles and at the time."""
     line(s, f"W F {BOTH:04X}")
     s.run_for(2 * period_s(s.variant))
-    before = int(s.unit.node.read(COUNTERS, 24))
+    before = int(s.unit.node.read(OD.COUNTERS, 24))
     patience_s = row.limit("patience_ms") * 1e-3
     begun_s = s.bench.time_s
-    s.unit.node.write(UC2, 0, _control(s)[1])
+    s.unit.node.write(OD.UC2, 0, _control(s)[1])
     took_s = s.bench.time_s - begun_s
-    cut = int(s.unit.node.read(COUNTERS, 24)) - before
+    cut = int(s.unit.node.read(OD.COUNTERS, 24)) - before
     if cut != 1:
         raise Failed(f"{cut} cycles cut", "1")
     if s.lockstep and took_s < patience_s:
@@ -222,8 +213,8 @@ def control_words_are_read_back(s: Subject) -> str:
     run_cycles(s, STAYS)
     for value in (sent, sent + 1):
         if value != sent:
-            s.unit.node.write(UC2, 0, value)
-        got = [int(s.unit.node.read(IN_CONVERTERS, k)) for k in AXES]
+            s.unit.node.write(OD.UC2, 0, value)
+        got = [int(s.unit.node.read(OD.CONTROL, k)) for k in AXES]
         if got != [value & ~MODE_MASK] * 3:
             raise Failed(f"{[f'{g:06X}h' for g in got]}", f"{value & ~MODE_MASK:06X}h three times")
     return f"as set up {STAYS} cycles later, another as written"
@@ -252,8 +243,8 @@ def _mean(words: Readings) -> np.ndarray:
 
 def _set(s: Subject, bits: int) -> None:
     uc1, uc2 = _control(s)
-    s.unit.node.write(UC1, 0, uc1 & ~GAIN_MASK | bits)
-    s.unit.node.write(UC2, 0, uc2 & ~GAIN_MASK | bits)
+    s.unit.node.write(OD.UC1, 0, uc1 & ~GAIN_MASK | bits)
+    s.unit.node.write(OD.UC2, 0, uc2 & ~GAIN_MASK | bits)
 
 
 @active("PSD1-CHIP-02", needs={"can", "pins"}, before=calm, after=calm)
@@ -262,7 +253,7 @@ def the_rate_is_that_of_the_code(s: Subject, row: Requirement) -> str:
     uc2 = _control(s)[1]
     seen = []
     for code in (int(row.limit("code_min")), 100, 195, int(row.limit("code_max"))):
-        s.unit.node.write(UC2, 0, uc2 & ~FS_MASK | code)
+        s.unit.node.write(OD.UC2, 0, uc2 & ~FS_MASK | code)
         due_s = code * row.limit("divider") / row.limit("clkin_hz")
         with s.take() as take:
             s.run_for(3.3 * due_s)
@@ -310,8 +301,8 @@ def a_word_at_0_alone_is_marked(s: Subject, row: Requirement) -> str:
         raise Inconclusive(f"expected inputs of more than {least_v:g} V either way, one of them negative")
     calm(s)
     uc1, uc2 = _control(s)
-    s.unit.node.write(UC1, 0, uc1 | UNIPOLAR)
-    s.unit.node.write(UC2, 0, uc2 | UNIPOLAR)
+    s.unit.node.write(OD.UC1, 0, uc1 | UNIPOLAR)
+    s.unit.node.write(OD.UC2, 0, uc2 | UNIPOLAR)
     words = _cycles(s, 6)
     calm(s)
     low = [a for a in below if np.any(words[a.upper()][1:] != row.limit("code_min"))]
@@ -326,7 +317,7 @@ def a_word_at_0_alone_is_marked(s: Subject, row: Requirement) -> str:
 def late_begins_at_its_time(s: Subject, row: Requirement) -> str:
     """Read words sooner and later; count the strobes that the lines show to begin too long after FL2."""
     late_ns = row.limit("late_ns")
-    before = int(s.unit.node.read(COUNTERS, 16))
+    before = int(s.unit.node.read(OD.COUNTERS, 16))
     with s.take() as take:
         line(s, f"W F {BOTH:04X}")
         for k in range(LATE_CYCLES):
@@ -335,7 +326,7 @@ def late_begins_at_its_time(s: Subject, row: Requirement) -> str:
                 _word_after(s, axis, LATE_STEP_S * ((2 * k + axis) % LATE_STEPS))
         line(s, "W F 0000")
         s.run_for(TAIL_S)
-    told = int(s.unit.node.read(COUNTERS, 16)) - before
+    told = int(s.unit.node.read(OD.COUNTERS, 16)) - before
     words = transfers(s.capture("late", take))
     waited = of(words, "cs_fall") - of(words, "fl2")
     slack_ns = 0.0 if take.lines is None else take.lines.resolution_ns
@@ -362,13 +353,13 @@ def _word_after(s: Subject, axis: int, wait_s: float) -> None:
 def late_strobes_are_told(s: Subject, row: Requirement) -> str:
     """Read words as they come, then some 0.2 ms late; look at LATE and Late strobes."""
     late_s = row.limit("late_ns") * 1e-9
-    before = int(s.unit.node.read(COUNTERS, 16))
+    before = int(s.unit.node.read(OD.COUNTERS, 16))
     s.unit.frames.forget()
     s.unit.start()
     strobes = len(drive(s, 3, slow_s=10 * late_s))
     s.unit.stop()
     cycles = s.unit.frames.take()
-    told = int(s.unit.node.read(COUNTERS, 16)) - before
+    told = int(s.unit.node.read(OD.COUNTERS, 16)) - before
     if not isinstance(cycles, Readings) or not np.all(cycles["LATE"]) or told != strobes:
         raise Failed(f"{told} late strobes counted", f"LATE in each cycle, {strobes} counted")
     status = line(s, "R 3").data
@@ -380,7 +371,7 @@ def late_strobes_are_told(s: Subject, row: Requirement) -> str:
 def _counted(s: Subject) -> dict[str, int]:
     """What a host that stays away costs; few objects, for reading one takes a period."""
     subs = {"Stretched cycles": 17, "Lost X": 18, "Lost Y": 19, "Lost Z": 20}
-    return {name: int(s.unit.node.read(COUNTERS, sub)) for name, sub in subs.items()}
+    return {name: int(s.unit.node.read(OD.COUNTERS, sub)) for name, sub in subs.items()}
 
 
 def _stay_away(s: Subject) -> tuple[Readings, dict[str, int]]:
@@ -462,4 +453,4 @@ def the_board_says_what_it_is(s: Subject) -> str:
 @active("PSD1-CAN-08", needs={"can"}, before=calm)
 def objects_are_as_the_dictionary_says(s: Subject) -> str:
     """Read every object of the EDS and write where nothing may be written."""
-    return as_the_dictionary_says(s, "psd1", varies=(UC1, UC2) if s.variant.profile != "psd1" else ())
+    return as_the_dictionary_says(s, "psd1", varies=(OD.UC1, OD.UC2) if s.variant.profile != "psd1" else ())
