@@ -7,11 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from psabench.conform.capture.log import Capture
+from psabench.conform.capture.log import Bools, Capture
+from psabench.conform.requirements import Requirement
 from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.signals import Ints
-
-Numbers = npt.NDArray[np.int64] | npt.NDArray[np.float64]
 
 
 def wires_needed(e: Capture, *names: str) -> None:
@@ -21,11 +20,27 @@ def wires_needed(e: Capture, *names: str) -> None:
             raise Inconclusive(f"the recording has no line {name}")
 
 
-def first_bad(bad: npt.NDArray[np.bool_], at_ns: Ints, saw: Sequence[object], due: str, lines: Sequence[str]) -> None:
-    """Raises Failed for the first of `bad`, saying what was seen there and how many there are."""
-    if bad.any():
-        k = int(np.flatnonzero(bad)[0])
-        raise Failed(f"{saw[k]} ({int(bad.sum())} of {len(bad)})", due, at_ns=int(at_ns[k]), lines=lines)
+def first_of(bad: Bools) -> int | None:
+    """Place of the first that is true; None: none is."""
+    return int(np.argmax(bad)) if bad.any() else None
+
+
+def first_bad(
+    bad: npt.NDArray[np.bool_], at_ns: Ints, saw: Sequence[str] | str, due: str, lines: Sequence[str]
+) -> None:
+    """Raises Failed for the first of `bad`, saying what was seen there (a text for each, or for all) and how many."""
+    if (k := first_of(bad)) is not None:
+        what = saw if isinstance(saw, str) else saw[k]
+        raise Failed(f"{what} ({int(bad.sum())} of {len(bad)})", due, at_ns=int(at_ns[k]), lines=lines)
+
+
+def at_levels(e: Capture, names: Sequence[str], at_ns: int, row: Requirement, when: str, beside: Sequence[str]) -> str:
+    """Each line has its level of the row, `name_level`, 0 by default. Raises Failed, showing the lines beside it."""
+    for name in names:
+        due = int(row.limits.get(f"{name.lower()}_level", 0))
+        if int(e.wires[name].at(at_ns)) != due:
+            raise Failed(f"{name} {1 - due} {when}", f"{due}", at_ns=at_ns, lines=(name, *beside))
+    return f"{len(names)} lines at rest"
 
 
 def interval(

@@ -11,6 +11,7 @@ from psabench.conform.dut import Subject
 from psabench.conform.plan import active
 from psabench.conform.registers import names_and_rights
 from psabench.conform.requirements import Requirement, requirements
+from psabench.conform.stimulus.streamed import while_streaming
 from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.signals import unwrap
 
@@ -49,9 +50,8 @@ def the_period_can_be_set(s: Subject, row: Requirement) -> str:
     """Set PERIOD 50, then 0 with three writes to LATCH; look at the stamps of the readings."""
     with s.take(lines=False) as take:
         line(s, f"{PERIOD} 32")
-        s.unit.start()
-        s.run_for(0.1)
-        s.unit.stop()
+        with while_streaming(s):
+            s.run_for(0.1)
     log = s.capture("period", take).frames_of("PIK_TOTAL_Z")
     stamps = unwrap(log.raw("PIK_TOTAL_Z")["TSTAMP"], 32).tolist() if len(log) else []
     due = 0x32 * row.limit("unit_us")
@@ -134,14 +134,13 @@ def registers_begin_with_res(s: Subject) -> str:
     s.reset()
     with s.take(lines=False) as take:
         s.run_for(0.002 + START_S)
-        s.unit.start()
-        seen = []
-        for _ in range(8):
-            cycles = burst(s, "R 9", *COUNTERS, "R 9")
-            if cycles[0].data == cycles[-1].data:
-                seen.append((cycles[0].data, [c.data for c in cycles[1:-1]]))
-            s.run_for(0.01)
-        s.unit.stop()
+        with while_streaming(s):
+            seen = []
+            for _ in range(8):
+                cycles = burst(s, "R 9", *COUNTERS, "R 9")
+                if cycles[0].data == cycles[-1].data:
+                    seen.append((cycles[0].data, [c.data for c in cycles[1:-1]]))
+                s.run_for(0.01)
     e = s.capture("registers", take)
     counts, xy, z = (e.frames_of(name) for name in ("PIK_COUNTS", "PIK_TOTALS", "PIK_TOTAL_Z"))
     n = min(len(counts), len(xy), len(z))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from psabench.conform.capture.intervals import before, edges, first_bad, interval
+from psabench.conform.capture.intervals import at_levels, before, edges, first_bad, first_of, interval
 from psabench.conform.capture.log import CanLog, Capture, LineLog
 from psabench.conform.capture.messages import as_laid_out, emergencies, in_turn, late_readings
 from psabench.conform.plan import check
@@ -307,9 +307,7 @@ def counts_are_differences_of_totals(e: Capture) -> str:
     _, n = totals(e)
     raw = _told(e, "PIK_COUNTS").raw("PIK_COUNTS")
     counts = np.stack([raw[a] for a in "XYZ"], axis=1)[: len(n)]
-    bad = np.flatnonzero((np.diff(n, axis=0) != counts[1 : len(n)]).any(axis=1))
-    if len(bad):
-        k = int(bad[0])
+    if (k := first_of((np.diff(n, axis=0) != counts[1 : len(n)]).any(axis=1))) is not None:
         raise Failed(f"counts {counts[k + 1].tolist()}", f"{np.diff(n, axis=0)[k].tolist()}, difference of the totals")
     return f"{len(counts)} readings"
 
@@ -353,12 +351,7 @@ def counters_begin_with_res(e: Capture, row: Requirement) -> str:
 @check("power_on", "PIK-SIG-01", needs={"pins"}, wires=PINS)
 def lines_rest_at_their_levels(e: Capture, row: Requirement) -> str:
     """Look at every line before the first pulse or latch that comes when nothing has moved for longer than a pulse."""
-    at = _at_rest_ns(e)
-    for name in PINS:
-        due = int(row.limits.get(f"{name.lower()}_level", 0))
-        if int(e.wires[name].at(at)) != due:
-            raise Failed(f"{name} {1 - due} at rest", f"{due}", at_ns=at, lines=(name, *PULSES))
-    return f"{len(PINS)} lines at rest"
+    return at_levels(e, PINS, _at_rest_ns(e), row, "at rest", PULSES)
 
 
 def _at_rest_ns(e: Capture) -> int:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from psabench.boards.pmka.conform.capture_readings import columns
-from psabench.conform.capture.intervals import after, bus_word, first_bad, interval, nearest, wires_needed
+from psabench.conform.capture.intervals import after, at_levels, bus_word, first_bad, interval, nearest, wires_needed
 from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
@@ -124,9 +124,7 @@ def a_calibrated_integrator_is_off_its_sensor(e: Capture) -> str:
         turns = both[1:][(signs[1:] != signs[:-1]) & (np.diff(both) < 1.5 * ts_ns)]  # no input turns as fast
         level = e.wires[key].at(turns)
         bad = level == 1
-        first_bad(
-            bad, turns, [f"{key} closed while it is calibrated"] * len(turns), "open", (key, f"RP{k + 1}", f"RN{k + 1}")
-        )
+        first_bad(bad, turns, f"{key} closed while it is calibrated", "open", (key, f"RP{k + 1}", f"RN{k + 1}"))
         off += int((level == 0).sum())
     if not off:
         raise Inconclusive("no calibration of resets in the recording")
@@ -182,9 +180,7 @@ def cycles_are_on_the_bus(e: Capture) -> str:
     first_bad((seen != due).any(axis=1), begin, saw, "as the cycle was", ("CS", "RW", *ADDRESS))
     rest = end + round(e.slack_ns(0.0))
     moved = (bus_word(e, "AB", 4, rest) | bus_word(e, "D", 16, rest)) != 0
-    first_bad(
-        moved & (e.wires["CS"].at(rest) == 1), end, ["address or data not 0 after the strobe"] * len(end), "0", ("CS",)
-    )
+    first_bad(moved & (e.wires["CS"].at(rest) == 1), end, "address or data not 0 after the strobe", "0", ("CS",))
     return f"{len(begin)} cycles on CS, RW, AB0..AB3 and D0..D15"
 
 
@@ -193,11 +189,7 @@ def lines_rest_at_their_levels(e: Capture, row: Requirement) -> str:
     """Look at every line before the first sample after Res."""
     rises, _ = samples(e, 1)
     at = int(rises[0]) - 1 - round(e.slack_ns(0.0))
-    for name in PINS:
-        due = int(row.limits.get(f"{name.lower()}_level", 0))
-        if int(e.wires[name].at(at)) != due:
-            raise Failed(f"{name} {1 - due} before the first sample", f"{due}", at_ns=at, lines=(name, "SH"))
-    return f"{len(PINS)} lines at rest"
+    return at_levels(e, PINS, at, row, "before the first sample", ("SH",))
 
 
 @check("power_on", "PMKA-ERR-02", needs={"pins"}, wires=(*RESETS, *TAU))

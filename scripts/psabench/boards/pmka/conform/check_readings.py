@@ -8,6 +8,7 @@ import numpy as np
 
 from psabench.boards.pmka import estimate as est
 from psabench.boards.pmka.conform.capture_readings import CODES, STATE, columns, largest, run_of
+from psabench.conform.capture.intervals import first_of
 from psabench.conform.capture.log import Capture
 from psabench.conform.capture.messages import as_laid_out, booted, in_turn, late_readings
 from psabench.conform.plan import check
@@ -161,9 +162,7 @@ def resets_follow_codes_beyond_uc(e: Capture, row: Requirement) -> str:
         free = (c[f"SERVES_{name}"][1:] != 0) | (c["CAL"][1:] == est.CAL_ZERO)
         due = np.where(code > uc + tol, 1, np.where(code < -uc - tol, -1, 0))
         sure = free & (np.abs(np.abs(code) - uc) > tol)
-        bad = np.flatnonzero(sure & (reset != due))
-        if len(bad):
-            k = int(bad[0])
+        if (k := first_of(sure & (reset != due))) is not None:
             raise Failed(
                 f"RESET_{name} {int(reset[k])} after a code of {code[k]:.4f} V", f"{int(due[k])}: Uc is {uc:g} V"
             )
@@ -360,9 +359,7 @@ def each_axis_has_an_integrator(e: Capture) -> str:
     steady, twice = _steady(c["TAU"]), 0
     for axis in (1, 2, 3):
         count = (p.serves == axis).sum(axis=1)
-        bad = np.flatnonzero((count < 1) | (count > 2) | (steady & (count != 1)))
-        if len(bad):
-            k = int(bad[0])
+        if (k := first_of((count < 1) | (count > 2) | (steady & (count != 1)))) is not None:
             raise Failed(
                 f"SERVES {p.serves[k].tolist()}, TAU {int(c['TAU'][k])}", "each axis once, twice around a hand-over"
             )

@@ -6,6 +6,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from psabench.conform.capture.intervals import first_of
 from psabench.conform.capture.log import Bools, CanFrame, CanLog, Capture
 from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link import signals
@@ -45,9 +46,7 @@ class Pairs:
 
     def unbroken(self) -> None:
         """Raises Failed for the first gap of SEQ."""
-        bad = np.flatnonzero(self.steps != 1)
-        if len(bad):
-            k = int(bad[0])
+        if (k := first_of(self.steps != 1)) is not None:
             raise Failed(f"SEQ {self.seq[k]}, then {self.seq[k + 1]}", "one more", frames=self.about(k))
 
     def about(self, k: int) -> tuple[CanFrame, ...]:

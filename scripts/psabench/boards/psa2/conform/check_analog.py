@@ -9,6 +9,7 @@ from psabench.boards.psa2.conform.check_registers import fact
 from psabench.boards.psa2.conform.check_serial import LEAST
 from psabench.boards.psa2.conform.check_stream import number
 from psabench.boards.psa2.conform.stimulus_can import FACTOR, OFFSET, Answer
+from psabench.conform.capture.intervals import first_of
 from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
@@ -103,8 +104,7 @@ def clip_tells_of_any_axis(e: Capture, row: Requirement) -> str:
         p, axis, due = _settled(e, name), alone[name], int(row.limit(limit))
         others = np.delete(p.code, axis, axis=1)
         bad = (p.code[:, axis] != due) | (others == due).any(axis=1) | ~p.clip
-        if bad.any():
-            k = int(np.flatnonzero(bad)[0])
+        if (k := first_of(bad)) is not None:
             raise Failed(f"{p.code[k]}, CLIP {int(p.clip[k])}", f"{'XYZ'[axis]} {due} and CLIP 1", frames=p.about(k))
         said.append(f"{'XYZ'[axis]} {due}")
     return f"{', then '.join(said)} alone at its limit, with CLIP"
@@ -118,8 +118,7 @@ def codes_stop_at_their_limits(e: Capture, row: Requirement) -> str:
     for name, limit in (("high", "code_max"), ("low", "code_min")):
         p, due = _settled(e, name), int(row.limit(limit))
         bad = (p.code != due).any(axis=1) | ~p.clip
-        if bad.any():
-            k = int(np.flatnonzero(bad)[0])
+        if (k := first_of(bad)) is not None:
             raise Failed(f"{p.code[k]}, CLIP {int(p.clip[k])}", f"{due} and CLIP 1", frames=p.about(k))
     return f"{int(row.limit('code_max'))} and {int(row.limit('code_min'))}, with CLIP"
 

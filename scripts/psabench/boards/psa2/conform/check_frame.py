@@ -6,6 +6,7 @@ import numpy as np
 
 from psabench.boards.psa2.conform.capture_line import WORDS, Transfers, transfers
 from psabench.boards.psa2.conform.check_stream import FORMATS, LINES
+from psabench.conform.capture.intervals import first_of
 from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
@@ -36,8 +37,7 @@ def _whole(e: Capture) -> Transfers:
 
 def _first(bad: np.ndarray, at_ns: Ints, saw: Floats, due: str, unit: str = "ns") -> None:
     """Raises Failed for the first of `bad`."""
-    if bad.any():
-        k = int(np.flatnonzero(bad)[0])
+    if (k := first_of(bad)) is not None:
         raise Failed(f"{saw[k]:.3f} {unit} ({int(bad.sum())} of {len(bad)})", due, at_ns=int(at_ns[k]), lines=LINES)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from psabench.boards.psa2.board import BOARD
 from psabench.boards.psa2.conform.capture_spi import AXES, Burst, Message
 from psabench.boards.psa2.conform.check_setup import ACCEL, TEMP, port_traffic
+from psabench.conform.capture.intervals import first_of
 from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
@@ -236,8 +237,7 @@ def sclk_has_its_frequency_and_rests_low(e: Capture, row: Requirement) -> str:
     period_ns = np.array([b.rise_ns[-1] - b.rise_ns[0] for b in found]) / count
     slack_ns = due_ns * row.limit("tolerance_pct") / 100 + np.array([e.slack_ns(due_ns * n) for n in count]) / count
     off = np.abs(period_ns - due_ns) > slack_ns
-    if off.any():
-        k = int(np.flatnonzero(off)[0])
+    if (k := first_of(off)) is not None:
         due = f"{due_ns:.2f} +- {slack_ns[k]:.2f} ns"
         raise Failed(f"{period_ns[k]:.2f} ns a period of SClk", due, at_ns=int(at[k]), lines=("SClk",))
     tail = np.array([b.fall_ns[-1] - b.rise_ns[-1] for b in found], np.float64)

@@ -10,6 +10,7 @@ from psabench.boards.psa2.conform.capture_can import SEQ_BITS, STAMP_BITS, pairs
 from psabench.boards.psa2.conform.capture_line import transfers
 from psabench.boards.psa2.conform.check_serial import LEAST
 from psabench.boards.psa2.conform.stimulus_can import FRAMES, OVERRUNS, Answer
+from psabench.conform.capture.intervals import first_of
 from psabench.conform.capture.log import CanLog, Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
@@ -104,8 +105,7 @@ def no_frame_before_its_transfer_has_ended(e: Capture, row: Requirement) -> str:
     k = np.searchsorted(rises, rx_us * 1e3)
     since_us = rx_us[k > 0] - rises[k[k > 0] - 1] * 1e-3
     bad = after_us < least_us
-    if bad.any():
-        n = int(np.flatnonzero(bad)[0])
+    if (n := first_of(bad)) is not None:
         raise Failed(f"PSA2_XY {after_us[n]:.0f} us after its sample", f"{least_us:.0f} us or more", frames=p.about(n))
     if not len(since_us):
         raise Failed("no rise of Int before any PSA2_XY", "one before each", at_ns=e.wires.start_ns, lines=LINES)

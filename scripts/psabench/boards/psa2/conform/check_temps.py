@@ -12,6 +12,7 @@ from psabench.boards.psa2.conform.check_setup import TEMP, port_traffic
 from psabench.boards.psa2.conform.check_stream import unit_us
 from psabench.boards.psa2.conform.check_words import Beside, beside, channel_on_the_line
 from psabench.boards.psa2.conform.stimulus_can import Answer
+from psabench.conform.capture.intervals import first_of
 from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
@@ -170,8 +171,7 @@ def _converted(e: Capture, b: Beside) -> tuple[Ints, Ints]:
 
 def _is_of_its_channel(b: Beside, new: Ints, told: Ints, converted: Ints) -> str:
     bad = told != converted
-    if bad.any():
-        k = int(np.flatnonzero(bad)[0])
+    if (k := first_of(bad)) is not None:
         raise Failed(
             f"channel {told[k]} told ({int(bad.sum())} of {len(bad)})",
             f"{converted[k]}, whose input was converted",

@@ -11,6 +11,7 @@ from psabench.boards.psa2.conform.capture_line import transfers
 from psabench.boards.psa2.conform.check_serial import LEAST
 from psabench.boards.psa2.conform.check_setup import port_traffic
 from psabench.boards.psa2.conform.check_stream import FORMATS, LINES
+from psabench.conform.capture.intervals import first_of
 from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
@@ -87,8 +88,7 @@ def _same(saw: Ints, due: Ints, p: Pairs, what: str) -> str:
     """Raises Failed for the first row that differs."""
     bad = saw != due
     bad = bad.any(axis=1) if bad.ndim > 1 else bad
-    if bad.any():
-        k = int(np.flatnonzero(bad)[0])
+    if (k := first_of(bad)) is not None:
         raise Failed(
             f"{saw[k]} on the line ({int(bad.sum())} of {len(bad)})", f"{due[k]}, {what} on CAN", frames=p.about(k)
         )

@@ -46,7 +46,7 @@ class Answer:
     abort: int = 0
 
 
-def answered(access: Callable[[], object]) -> Answer:
+def answer_of(access: Callable[[], object]) -> Answer:
     """What comes of an access by SDO. Raises LinkError where no one answers."""
     try:
         return Answer(access())
@@ -56,17 +56,17 @@ def answered(access: Callable[[], object]) -> Answer:
 
 def ask(s: Subject, index: int, sub: int = 0) -> Answer:
     """Read an object."""
-    return answered(lambda: s.unit.node.read(index, sub))
+    return answer_of(lambda: s.unit.node.read(index, sub))
 
 
 def tell(s: Subject, index: int, sub: int, value: int) -> Answer:
     """Write an object."""
-    return answered(lambda: s.unit.node.write(index, sub, value))
+    return answer_of(lambda: s.unit.node.write(index, sub, value))
 
 
 def tell_raw(s: Subject, index: int, sub: int, value: int) -> Answer:
     """Write one byte, whatever the EDS says of the object."""
-    return answered(lambda: s.unit.node.write_raw(index, sub, bytes([value])))
+    return answer_of(lambda: s.unit.node.write_raw(index, sub, bytes([value])))
 
 
 def cut(take: Take, name: str) -> None:
@@ -96,9 +96,8 @@ def changed(s: Subject) -> Iterator[None]:
 def streamed(s: Subject, take: Take, name: str, dwell_s: float) -> None:
     """Frames for so long, between the cuts `name` and `name end`."""
     cut(take, name)
-    s.unit.start()
-    s.run_for(dwell_s)
-    s.unit.stop()
+    with while_streaming(s):
+        s.run_for(dwell_s)
     cut(take, f"{name} end")
 
 
@@ -126,11 +125,10 @@ def registers(s: Subject) -> Capture:
     s.wait_ready()
     with s.take() as take:
         take.facts["before"] = counters(s)
-        s.unit.start()
-        s.run_for(10 * PERIOD_S)
-        take.facts["read"] = {(i, sub): ask(s, i, sub) for i in (*ACCEL, TEMP) for sub in REGISTERS}
-        s.run_for(10 * PERIOD_S)
-        s.unit.stop()
+        with while_streaming(s):
+            s.run_for(10 * PERIOD_S)
+            take.facts["read"] = {(i, sub): ask(s, i, sub) for i in (*ACCEL, TEMP) for sub in REGISTERS}
+            s.run_for(10 * PERIOD_S)
         take.facts["after"] = counters(s, after=True)
     return s.capture("registers", take)
 
@@ -142,13 +140,12 @@ def busy(s: Subject) -> Capture:
         take.facts["answers"] = [tell(s, FORM, 0, 1), tell(s, ACCEL[0], CONFIG0, 0x46 | 4 << 3)]
         s.run_for(SETTLE_PERIODS / RATES_HZ[4])
         take.facts["before"] = counters(s)
-        s.unit.start()
-        for k in range(BUSY_ROUNDS):
-            s.run_for((1 + k / BUSY_ROUNDS) * PERIOD_S)  # at another phase of a conversion each
-            for index, sub in itertools.product((*ACCEL, TEMP), REGISTERS):
-                ask(s, index, sub)
-        s.run_for(10 * PERIOD_S)
-        s.unit.stop()
+        with while_streaming(s):
+            for k in range(BUSY_ROUNDS):
+                s.run_for((1 + k / BUSY_ROUNDS) * PERIOD_S)  # at another phase of a conversion each
+                for index, sub in itertools.product((*ACCEL, TEMP), REGISTERS):
+                    ask(s, index, sub)
+            s.run_for(10 * PERIOD_S)
         take.facts["after"] = counters(s, after=True)
     return s.capture("busy", take)
 
@@ -288,23 +285,22 @@ def sync(s: Subject) -> Capture:
     """
     with changed(s), s.take() as take:
         tell(s, MODE, 0, 1)
-        s.unit.start()
-        s.run_for(5 * PERIOD_S)
-        for k in range(10):
-            cut(take, f"SYNC {k}")
-            take.marks[f"SYNC {k}"] = s.bench.time_s
+        with while_streaming(s):
+            s.run_for(5 * PERIOD_S)
+            for k in range(10):
+                cut(take, f"SYNC {k}")
+                take.marks[f"SYNC {k}"] = s.bench.time_s
+                s.host.send(SYNC, b"")
+                s.run_for((4 + 0.3 * k) * PERIOD_S)
+                _wait_for_a_sample(s, take, f"SYNC {k}")
+            cut(take, "SYNC end")
+            tell(s, MODE, 0, 0)
+            s.run_for(20 * PERIOD_S)
+            tell(s, PULSES, 0, 1)
+            take.facts["before"] = ask(s, COUNTERS, SYNCS_MISSED)
+            cut(take, "pulse")
             s.host.send(SYNC, b"")
-            s.run_for((4 + 0.3 * k) * PERIOD_S)
-            _wait_for_a_sample(s, take, f"SYNC {k}")
-        cut(take, "SYNC end")
-        tell(s, MODE, 0, 0)
-        s.run_for(20 * PERIOD_S)
-        tell(s, PULSES, 0, 1)
-        take.facts["before"] = ask(s, COUNTERS, SYNCS_MISSED)
-        cut(take, "pulse")
-        s.host.send(SYNC, b"")
-        s.run_for(0.1)
-        s.unit.stop()
+            s.run_for(0.1)
         cut(take, "pulse end")
         take.facts["after"] = ask(s, COUNTERS, SYNCS_MISSED)
     return s.capture("sync", take)
@@ -329,12 +325,11 @@ def gain(s: Subject) -> Capture:
     """CONFIG1 written while frames flow: gain 4 for 2. Cuts "before", "gain"; facts: answer, read on all three."""
     with changed(s), s.take(lines=False) as take:
         cut(take, "before")
-        s.unit.start()
-        s.run_for(0.1)
-        cut(take, "gain")
-        take.facts["answer"] = tell(s, ACCEL[0], CONFIG1, 0x0A)
-        s.run_for(0.2)
-        s.unit.stop()
+        with while_streaming(s):
+            s.run_for(0.1)
+            cut(take, "gain")
+            take.facts["answer"] = tell(s, ACCEL[0], CONFIG1, 0x0A)
+            s.run_for(0.2)
         take.facts["read"] = [ask(s, i, CONFIG1) for i in ACCEL]
     return s.capture("gain", take)
 
@@ -435,7 +430,6 @@ def starts(s: Subject) -> Capture:
     s.wait_ready()
     with s.take(lines=False) as take:
         for k in range(24):
-            s.unit.start()
-            s.run_for((4 + 0.13 * k) * PERIOD_S)
-            s.unit.stop()
+            with while_streaming(s):
+                s.run_for((4 + 0.13 * k) * PERIOD_S)
     return s.capture("starts", take)

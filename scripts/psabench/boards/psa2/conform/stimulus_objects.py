@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from psabench.boards.objects import Psa2Objects as OD
-from psabench.boards.psa2.conform.stimulus_can import ACCEL, CONFIG0, TEMP, Answer, answered, ask, changed, tell
+from psabench.boards.psa2.conform.stimulus_can import ACCEL, CONFIG0, TEMP, Answer, answer_of, ask, changed, tell
 from psabench.conform.capture.log import Capture
 from psabench.conform.dut import Subject
 from psabench.conform.plan import stimulus
+from psabench.conform.stimulus.streamed import while_streaming
 from psabench.errors import DeviceError
 from psabench.link.canopen_host import Described
 
@@ -34,14 +35,13 @@ def objects(s: Subject) -> Capture:
             tell(s, OD.SCALE_V_PER_G, axis, 2)
         tell(s, ACCEL[0], CONFIG0, 0x46)  # 250 SPS: a sample lasts 4 ms
         s.run_for(0.4)
-        s.unit.start()
-        s.run_for(0.02)
-        found = [_of_one_sample(s, index, sub) for index, sub in wanted]
-        for _ in range(CHANNEL_LOOKS):  # every temperature channel is in one of them
-            s.run_for(TEMP_PERIOD_S)
-            found.append(_of_one_sample(s, OD.FRAME_HEAD, 2))
-        s.run_for(0.02)
-        s.unit.stop()
+        with while_streaming(s):
+            s.run_for(0.02)
+            found = [_of_one_sample(s, index, sub) for index, sub in wanted]
+            for _ in range(CHANNEL_LOOKS):  # every temperature channel is in one of them
+                s.run_for(TEMP_PERIOD_S)
+                found.append(_of_one_sample(s, OD.FRAME_HEAD, 2))
+            s.run_for(0.02)
         take.facts["mirrors"] = found
     return s.capture("objects", take)
 
@@ -89,4 +89,4 @@ def _row(s: Subject, d: Described) -> Row:
 
 
 def _abort_of_write(s: Subject, d: Described, data: bytes) -> int:
-    return answered(lambda: s.unit.node.write_raw(d.index, d.sub, data)).abort
+    return answer_of(lambda: s.unit.node.write_raw(d.index, d.sub, data)).abort

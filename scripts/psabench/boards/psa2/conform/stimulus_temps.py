@@ -21,6 +21,7 @@ from psabench.boards.psa2.conform.stimulus_can import (
 from psabench.conform.capture.log import Capture
 from psabench.conform.dut import Subject
 from psabench.conform.plan import stimulus
+from psabench.conform.stimulus.streamed import while_streaming
 
 HISTORY, HISTORY_LOOKS = OD.ERROR_HISTORY, 4
 
@@ -35,13 +36,12 @@ def trouble(s: Subject) -> Capture:
         _refused_form(s)
         take.facts["before"] = counters(s)
         cut(take, "stream")
-        s.unit.start()
-        s.run_for(20 * PERIOD_S)
-        cut(take, "silent")
-        take.facts["opcode"] = tell(s, OPCODE, 2, 0xFC)
-        take.facts["access"] = ask(s, TEMP, 1)
-        s.run_for(0.3)
-        s.unit.stop()
+        with while_streaming(s):
+            s.run_for(20 * PERIOD_S)
+            cut(take, "silent")
+            take.facts["opcode"] = tell(s, OPCODE, 2, 0xFC)
+            take.facts["access"] = ask(s, TEMP, 1)
+            s.run_for(0.3)
         take.facts["after"] = counters(s, after=True)
         cut(take, "silent end")
         _refused_form(s)
@@ -65,12 +65,11 @@ def selfcal(s: Subject) -> Capture:
     """SELFCAL to the temperature converter while it is scanned. Cuts "before", "selfcal"."""
     with changed(s), s.take(lines=False) as take:
         cut(take, "before")
-        s.unit.start()
-        s.run_for(0.08)
-        cut(take, "selfcal")
-        take.facts["opcode"] = tell(s, OPCODE, 2, 0xF0)
-        s.run_for(0.15)
-        s.unit.stop()
+        with while_streaming(s):
+            s.run_for(0.08)
+            cut(take, "selfcal")
+            take.facts["opcode"] = tell(s, OPCODE, 2, 0xF0)
+            s.run_for(0.15)
     return s.capture("selfcal", take)
 
 
@@ -80,7 +79,6 @@ def chamber(s: Subject) -> Capture:
     s.wait_ready()
     with s.take(lines=False) as take:
         take.facts["temp_degc"] = s.bench.chamber.temp_degc
-        s.unit.start()
-        s.run_for(0.1)
-        s.unit.stop()
+        with while_streaming(s):
+            s.run_for(0.1)
     return s.capture("chamber", take)

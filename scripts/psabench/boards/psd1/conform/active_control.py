@@ -60,11 +60,10 @@ def _coefficients(s: Subject) -> list[int]:
 def _cycles(s: Subject, count: int) -> Readings:
     """Words of the next cycles, as they are reported; of more in real time, where a busy machine is late."""
     s.unit.frames.forget()
-    s.unit.start()
-    run_cycles(s, count)
-    if not s.lockstep:
-        s.run_for(LATE_S)
-    s.unit.stop()
+    with while_streaming(s):
+        run_cycles(s, count)
+        if not s.lockstep:
+            s.run_for(LATE_S)
     found = s.unit.frames.take()
     if not isinstance(found, Readings) or len(found["X"]) < 2:
         raise Failed("no PSD1_CYCLE", f"{count} cycles")
@@ -355,9 +354,8 @@ def late_strobes_are_told(s: Subject, row: Requirement) -> str:
     late_s = row.limit("late_ns") * 1e-9
     before = int(s.unit.node.read(OD.COUNTERS, 16))
     s.unit.frames.forget()
-    s.unit.start()
-    strobes = len(drive(s, 3, slow_s=10 * late_s))
-    s.unit.stop()
+    with while_streaming(s):
+        strobes = len(drive(s, 3, slow_s=10 * late_s))
     cycles = s.unit.frames.take()
     told = int(s.unit.node.read(OD.COUNTERS, 16)) - before
     if not isinstance(cycles, Readings) or not np.all(cycles["LATE"]) or told != strobes:
@@ -378,16 +376,15 @@ def _stay_away(s: Subject) -> tuple[Readings, dict[str, int]]:
     """Two cycles in time, one whose X waits for five periods, one in time; what was counted meanwhile."""
     calm(s)
     s.unit.frames.forget()
-    s.unit.start()
-    line(s, f"W F {BOTH:04X}")
-    for k in range(6):
-        word(s, k % 3)
-    s.run_for(0.5 * period_s(s.variant))
-    before = _counted(s)
-    s.run_for(5.5 * period_s(s.variant))
-    for k in range(6):
-        word(s, k % 3)
-    s.unit.stop()
+    with while_streaming(s):
+        line(s, f"W F {BOTH:04X}")
+        for k in range(6):
+            word(s, k % 3)
+        s.run_for(0.5 * period_s(s.variant))
+        before = _counted(s)
+        s.run_for(5.5 * period_s(s.variant))
+        for k in range(6):
+            word(s, k % 3)
     cycles, after = s.unit.frames.take(), _counted(s)
     calm(s)
     if not isinstance(cycles, Readings) or len(cycles["MIXED"]) != 4:

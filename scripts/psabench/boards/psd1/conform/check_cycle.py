@@ -19,12 +19,12 @@ from psabench.boards.psd1.conform.capture_cycles import (
     transfers,
     trouble,
 )
-from psabench.conform.capture.intervals import after, before, edges, first_bad, interval, together
+from psabench.conform.capture.intervals import after, at_levels, before, edges, first_bad, interval, together
 from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement
-from psabench.conform.verdict import Failed, Inconclusive
+from psabench.conform.verdict import Inconclusive
 from psabench.link.signals import Ints
 
 START = ("CLK_1M25", "INT0", "FL1", "DR", "A0", "RFX")
@@ -39,9 +39,9 @@ def words_are_read_in_turn(e: Capture) -> str:
     if found := trouble(words):
         raise found
     late = of(words, "cs_rise")[:-1] > of(words, "fall")[1:]
-    first_bad(late, of(words, "fall")[1:], ["the next transfer before the strobe's end"] * len(late), "after", LINES)
+    first_bad(late, of(words, "fall")[1:], "the next transfer before the strobe's end", "after", LINES)
     none = of(words, "cs_fall") < 0
-    first_bad(none, of(words, "rise"), ["no strobe between two words"] * len(none), "a strobe for each word", LINES)
+    first_bad(none, of(words, "rise"), "no strobe between two words", "a strobe for each word", LINES)
     return f"{len(words)} words X, Y, Z in turn, each word with its strobe"
 
 
@@ -52,7 +52,7 @@ def a_cycle_begins_with_its_three_conditions(e: Capture) -> str:
     just = at_ns - 1 - round(e.slack_ns(0.0))
     for name, due in (("INT0", 1), ("FL1", 0), ("DR", 0)):
         bad = e.wires[name].at(just) != due
-        first_bad(bad, at_ns, [f"A0 rises with {name} {1 - due}"] * len(bad), f"{name} {due}", START)
+        first_bad(bad, at_ns, f"A0 rises with {name} {1 - due}", f"{name} {due}", START)
     return f"{len(at_ns)} cycles, INT0 1, FL1 0 and DR 0 before each"
 
 
@@ -151,10 +151,10 @@ def a_cycle_begins_only_after_the_last_has_ended(e: Capture) -> str:
     whole = cycles(e)
     at_ns, ends = starts(e, whole), of([c[2] for c in whole], "clear")
     early = at_ns[1:] <= ends[:-1]
-    first_bad(early, at_ns[1:], ["A0 rises before FL2 is cleared"] * len(early), "after the last FL2", LINES)
+    first_bad(early, at_ns[1:], "A0 rises before FL2 is cleared", "after the last FL2", LINES)
     just = at_ns - 1 - round(e.slack_ns(0.0))
     waits = e.wires["FL2"].at(just) == fl2_level(e)
-    first_bad(waits, at_ns, ["FL2 is active when A0 rises"] * len(waits), "no word waits", LINES)
+    first_bad(waits, at_ns, "FL2 is active when A0 rises", "no word waits", LINES)
     together(e, at_ns, e.wires.rises("CLK_1M25"), row_for(e, "PSD1-CYC-03").limit("tolerance_ns"), "A0 and 1M25", START)
     return f"{len(at_ns)} cycles, the next {int((at_ns[1:] - ends[:-1]).min())} ns after the last or later"
 
@@ -170,7 +170,7 @@ def nothing_moves_between_cycles(e: Capture) -> str:
         if name in ("CLK_1M25", "DR", *hosts):
             continue
         moved = after(edges(e, name), begin + slack) < end - slack
-        first_bad(moved, begin, [f"{name} moves between cycles"] * len(moved), "1M25 and DR alone", (name, "A0", "FL2"))
+        first_bad(moved, begin, f"{name} moves between cycles", "1M25 and DR alone", (name, "A0", "FL2"))
     return f"{len(begin)} pauses without an edge but of 1M25 and DR"
 
 
@@ -194,7 +194,7 @@ def a_cycle_follows_each_fall_of_dr(e: Capture) -> str:
     n = min(len(inside), len(falls))
     answers = after(rises, falls[:n])
     bad = inside[:n] != answers
-    first_bad(bad, falls[:n], ["a fall of DR without its cycle, or a cycle without one"] * n, "one for each", START)
+    first_bad(bad, falls[:n], "a fall of DR without its cycle, or a cycle without one", "one for each", START)
     return f"{n} falls of DR, {n} rises of A0 in turn"
 
 
@@ -205,14 +205,8 @@ def lines_rest_at_their_levels(e: Capture, row: Requirement) -> str:
     moves = moves[moves > e.wires.start_ns]
     if not len(moves):
         raise Inconclusive("TFS never moves after Res")
-    at = np.array([int(moves[0]) - 1 - round(e.slack_ns(0.0))], np.int64)
-    for name in PINS:
-        if name in ("CLK_1M25", "FL2"):
-            continue
-        due = int(row.limits.get(f"{name.lower()}_level", 0))
-        if int(e.wires[name].at(at)[0]) != due:
-            raise Failed(f"{name} {1 - due} at rest", f"{due}", at_ns=int(at[0]), lines=(name, "TFS"))
-    return f"{len(PINS) - 2} lines at rest"
+    names = [name for name in PINS if name not in ("CLK_1M25", "FL2")]
+    return at_levels(e, names, int(moves[0]) - 1 - round(e.slack_ns(0.0)), row, "at rest", ("TFS",))
 
 
 @check("stream", "PSD1-FL2-05", needs={"line"})
@@ -221,5 +215,5 @@ def fl2_rests_at_its_level(e: Capture) -> str:
     words = transfers(e)
     due = 1 - fl2_level(e)
     level = e.wires["FL2"].at(of(words, "fall") + round(e.slack_ns(0.0)) + 100)
-    first_bad(level != due, of(words, "fall"), [f"FL2 {1 - due} in a transfer"] * len(words), f"{due}", LINES)
+    first_bad(level != due, of(words, "fall"), f"FL2 {1 - due} in a transfer", f"{due}", LINES)
     return f"{len(words)} transfers with FL2 {due}"

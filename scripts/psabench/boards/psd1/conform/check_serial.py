@@ -49,7 +49,7 @@ def the_first_bit_comes_in_time(e: Capture, row: Requirement) -> str:
     first_bad(
         late,
         due,
-        ["SDAT moves after that"] * len(late),
+        "SDAT moves after that",
         f"the first bit within {row.limit('access_max_ns'):g} ns",
         SERIAL,
     )
@@ -118,7 +118,7 @@ def the_first_edge_of_sclk_is_a_rise(e: Capture, row: Requirement) -> str:
     falls = of(words, "fall")
     edge = after(edges(e, "SCLK"), falls)
     down = e.wires["SCLK"].at(np.minimum(edge, e.wires.end_ns)) == 0
-    first_bad(down, falls, ["the first edge of SCLK falls"] * len(words), "a rise", SERIAL)
+    first_bad(down, falls, "the first edge of SCLK falls", "a rise", SERIAL)
     return interval(
         e, falls, edge, row.limit("first_rise_ns"), row.limit("tolerance_ns"), "to the first rise of SCLK", SERIAL
     )
@@ -178,7 +178,7 @@ def rfx_is_low_for_its_time(e: Capture, row: Requirement) -> str:
     words = _words(e)
     last = np.array([t.falls[-1] if len(t.falls) else t.rise + 1 for t in words], np.int64)
     late = last > of(words, "rise")
-    first_bad(late, of(words, "rise"), ["a rise within pulse 16"] * len(words), "after it", SERIAL)
+    first_bad(late, of(words, "rise"), "a rise within pulse 16", "after it", SERIAL)
     return interval(
         e,
         of(words, "fall"),
@@ -225,10 +225,10 @@ def sclk_rests_low(e: Capture) -> str:
     for begin, end in spans:
         k = np.searchsorted(begin, rises, "right") - 1
         inside |= (k >= 0) & (rises <= end[np.maximum(k, 0)]) if len(begin) else False
-    first_bad(~inside, rises, ["SCLK rises outside a transfer"] * len(rises), "low", SERIAL)
+    first_bad(~inside, rises, "SCLK rises outside a transfer", "low", SERIAL)
     rest = of(words, "rise") + round(e.slack_ns(0.0))
     high = e.wires["SCLK"].at(rest) == 1
-    first_bad(high, rest, ["SCLK high after a transfer"] * len(words), "low", SERIAL)
+    first_bad(high, rest, "SCLK high after a transfer", "low", SERIAL)
     return f"{len(rises)} pulses of SCLK, all within transfers"
 
 
@@ -241,7 +241,7 @@ def dr_rises_after_the_last_bit_of_x(e: Capture, row: Requirement) -> str:
     first_bad(
         e.wires["DR"].at(at_ns) == 0,
         at_ns,
-        ["DR low"] * len(x),
+        "DR low",
         f"high {most:g} ns after the last fall",
         (*SERIAL, "DR"),
     )
@@ -263,7 +263,7 @@ def fl2_of_z_is_cleared_likewise(e: Capture) -> str:
 def _cleared(e: Capture, words: list[Transfer], tolerance_ns: float) -> str:
     wires_needed(e, "CLK_1M25")
     none = of(words, "cs_fall") < 0
-    first_bad(none, of(words, "rise"), ["FL2 cleared without a strobe"] * len(words), "by a strobe", HAND)
+    first_bad(none, of(words, "rise"), "FL2 cleared without a strobe", "by a strobe", HAND)
     due = after(e.wires.falls("CLK_1M25"), of(words, "cs_rise"))
     return interval(
         e, due, of(words, "clear"), 0.0, tolerance_ns, "from the fall of 1M25 after the strobe to the end of FL2", HAND
@@ -316,7 +316,7 @@ def words_are_on_the_bus_at_their_address(e: Capture) -> str:
 def _same_words(e: Capture, words: list[Transfer], what: str) -> str:
     wires_needed(e, "RW", *ADDRESS, *DATA)
     at_ns = of(words, "cs_fall")
-    first_bad(at_ns < 0, of(words, "rise"), ["no strobe"] * len(words), "a strobe for each word", LINES)
+    first_bad(at_ns < 0, of(words, "rise"), "no strobe", "a strobe for each word", LINES)
     at_ns = at_ns + round(e.slack_ns(0.0))
     seen, sent = bus_word(e, "D", len(DATA), at_ns), serial_words(e, words)
     saw = [f"{b:04X}h on D0..D15, {a:04X}h in the {what}" for a, b in zip(sent, seen, strict=True)]

@@ -335,10 +335,10 @@ def the_bus_stands_in_a_strobe_and_rests_at_0(e: Capture) -> str:
     free = end[e.wires["CS"].at(end + slack) == 1]  # another strobe may begin where one ends
     for name in ("RW", *ADDRESS, *DATA):
         moved = after(edges(e, name), begin + slack) < end - slack
-        first_bad(moved, begin, [f"{name} moves in a strobe"] * len(moved), "it is", ("CS", name))
+        first_bad(moved, begin, f"{name} moves in a strobe", "it is", ("CS", name))
         rest = 1 if name == "RW" else 0
         high = e.wires[name].at(free + slack) != rest
-        first_bad(high, free, [f"{name} {1 - rest} with CS high"] * len(high), f"{rest}", ("CS", name))
+        first_bad(high, free, f"{name} {1 - rest} with CS high", f"{rest}", ("CS", name))
     seen = sum(int(e.wires[name].at(begin + slack).any()) for name in DATA)
     if not seen:
         raise Failed("D0..D15 all 0 in every strobe", "data", at_ns=int(begin[0]), lines=("CS", *DATA))
