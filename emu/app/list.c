@@ -1,10 +1,8 @@
 #include "app/list.h"
 
 #include "control/control.h"
-#include "fault/fault.h"
 #include "scenario/find.h"
 #include "scenario/profile.h"
-#include "scpi/scpi.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -70,39 +68,7 @@ bool list_scenarios(FILE *out, char *why, size_t cap)
 
 void list_commands(FILE *out)
 {
-    char line[8704];
-    for (unsigned i = 0; control_markdown(control_tables, i, line, sizeof line); i++) {
-        fprintf(out, "%s\n", line);
-    }
+    control_markdown(control_tables, out);
     fprintf(out, "\n");
-    for (unsigned i = 0; control_markdown(control_truth_tables, i, line, sizeof line); i++) {
-        fprintf(out, "%s\n", line);
-    }
-}
-
-static void list_headers(FILE *out, const struct scpi_kind *kind)
-{
-    char line[2048];
-    for (unsigned i = 0; scpi_markdown(kind, i, line, sizeof line); i++) fprintf(out, "%s\n", line);
-}
-
-void list_scpi(FILE *out)
-{
-    list_headers(out, NULL);
-    for (const struct scpi_kind *k = scpi_kinds; k->name; k++) {
-        fprintf(out, "\n");
-        list_headers(out, k);
-    }
-}
-
-void list_faults(FILE *out)
-{
-    char line[2048];
-    for (unsigned i = 0; fault_markdown(i, line, sizeof line); i++) fprintf(out, "%s\n", line);
-    fprintf(out, "\n");
-    for (unsigned i = 0; fault_markdown_matrix(i, line, sizeof line); i++) fprintf(out, "%s\n", line);
-    fprintf(out, "\n");
-    for (unsigned i = 0; fault_markdown_boards(i, line, sizeof line); i++) fprintf(out, "%s\n", line);
-    fprintf(out, "\n");
-    for (unsigned i = 0; fault_markdown_events(i, line, sizeof line); i++) fprintf(out, "%s\n", line);
+    control_markdown(control_truth_tables, out);
 }

@@ -12,9 +12,7 @@ bool list_profiles(FILE *out, char *why, size_t cap);
 /* One line a scenario of proto/scenarios: its name and the first comment of its file. */
 bool list_scenarios(FILE *out, char *why, size_t cap);
 
-/* The command tables as Markdown. */
+/* The command tables in Markdown. */
 void list_commands(FILE *out);
-void list_scpi(FILE *out);
-void list_faults(FILE *out);
 
 #endif

@@ -4,6 +4,8 @@
 
 #include "command/error.h"
 
+#include <stdio.h>
+
 const char *control_type_name(enum control_type type);
 bool control_type_numeric(enum control_type type); /* has a range, perhaps a unit */
 
@@ -30,7 +32,7 @@ void control_arg_limits(const struct control_bench *b, const struct control_arg 
 const struct control_command *control_row(const struct control_table *const *tables, unsigned i);
 const struct control_command *control_find(const struct control_table *const *tables, const char *name);
 
-/* The table as Markdown, for docs/emulator.md and --list-commands: next line into out, false at the end. */
-bool control_markdown(const struct control_table *const *tables, unsigned line, char *out, size_t cap);
+/* The table in Markdown, for docs/emulator.md and --list-commands. */
+void control_markdown(const struct control_table *const *tables, FILE *out);
 
 #endif

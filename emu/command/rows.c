@@ -1,7 +1,6 @@
 /* Rows of the command tables: by number, by name, as a page. */
 #include "command/args.h"
 
-#include <stdio.h>
 #include <string.h>
 
 const struct control_command *control_row(const struct control_table *const *tables, unsigned i)
@@ -23,43 +22,29 @@ const struct control_command *control_find(const struct control_table *const *ta
 
 /* ---- as Markdown */
 
-static size_t markdown_arg(const struct control_arg *a, char *out, size_t cap)
+static void print_arg(FILE *out, const struct control_arg *a)
 {
-    size_t at = (size_t)snprintf(out, cap, "`%s`%s %s", a->name, a->optional ? " (optional)" : "", a->what);
-    if (control_type_numeric(a->type) && at < cap) {
-        at += (size_t)snprintf(out + at, cap - at, ", %.10g to ", a->min);
-        if (a->least > 0.0 && at < cap) {
-            at += (size_t)snprintf(out + at, cap - at, "%.10g and %.10g to ", -a->least, a->least);
-        }
-        if (at < cap) {
-            at += (size_t)snprintf(out + at, cap - at, "%.10g%s%s", a->max, a->unit ? " " : "", a->unit ? a->unit : "");
-        }
+    fprintf(out, "`%s`%s %s", a->name, a->optional ? " (optional)" : "", a->what);
+    if (control_type_numeric(a->type)) {
+        fprintf(out, ", %.10g to ", a->min);
+        if (a->least > 0.0) fprintf(out, "%.10g and %.10g to ", -a->least, a->least);
+        fprintf(out, "%.10g%s%s", a->max, a->unit ? " " : "", a->unit ? a->unit : "");
     }
     const char *word;
-    for (unsigned i = 0; (word = control_choice(a, i)) && at < cap; i++) {
-        at += (size_t)snprintf(out + at, cap - at, "%s%s", i ? ", " : ": ", word);
-    }
-    return at;
+    for (unsigned i = 0; (word = control_choice(a, i)); i++) fprintf(out, "%s%s", i ? ", " : ": ", word);
 }
 
-static const char *markdown_args(const struct control_command *row, char *out, size_t cap)
+void control_markdown(const struct control_table *const *tables, FILE *out)
 {
-    size_t at = 0;
-    snprintf(out, cap, "none");
-    for (unsigned i = 0; i < control_arg_count(row) && at + 2 < cap; i++) {
-        if (i) at += (size_t)snprintf(out + at, cap - at, "; ");
-        at += markdown_arg(&row->arg[i], out + at, cap - at);
+    const struct control_command *row;
+    fprintf(out, "| command | what it does | arguments |\n|---|---|---|\n");
+    for (unsigned i = 0; (row = control_row(tables, i)); i++) {
+        const unsigned args = control_arg_count(row);
+        fprintf(out, "| `%s` | %s | %s", row->name, row->what, args ? "" : "none");
+        for (unsigned k = 0; k < args; k++) {
+            if (k) fprintf(out, "; ");
+            print_arg(out, &row->arg[k]);
+        }
+        fprintf(out, " |\n");
     }
-    return out;
-}
-
-bool control_markdown(const struct control_table *const *tables, unsigned line, char *out, size_t cap)
-{
-    char args[8192];
-    if (line == 0) snprintf(out, cap, "| command | what it does | arguments |");
-    if (line == 1) snprintf(out, cap, "|---|---|---|");
-    if (line < 2) return true;
-    const struct control_command *row = control_row(tables, line - 2);
-    if (row) snprintf(out, cap, "| `%s` | %s | %s |", row->name, row->what, markdown_args(row, args, sizeof args));
-    return row != NULL;
 }

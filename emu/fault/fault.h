@@ -14,6 +14,8 @@
 #include "fault/trigger.h"
 #include "trace/line_fault.h"
 
+#include <stdio.h>
+
 #define FAULTS_MAX 64u
 
 #define FAULT_BIT(i) (UINT64_C(1) << (i))
@@ -102,13 +104,9 @@ bool fault_make(const struct control_bench *b, const struct control_value *v, st
 /* Whether a kind may be at a point; false with the reason in why[CONTROL_WHY_MAX]. */
 bool fault_fits(const struct control_bench *b, const struct fault *f, char *why);
 
-/* The kinds as Markdown, and which can be where, for docs/faults.md and --list-faults: next line into out, false at the end. */
-bool fault_markdown(unsigned line, char *out, size_t cap);
-bool fault_markdown_matrix(unsigned line, char *out, size_t cap);
-
-/* The same of each type of board: the kinds that its chips and its controller have, and its events. */
-bool fault_markdown_boards(unsigned line, char *out, size_t cap);
-bool fault_markdown_events(unsigned line, char *out, size_t cap);
+/* Tables in Markdown, for docs/faults.md and --list-faults: the kinds, which can be where, which the chips and the controller
+ * of each type of board have, and its events. */
+void fault_markdown(FILE *out);
 
 static inline bool fault_given(const struct fault *f, enum fault_arg arg)
 {

@@ -3,83 +3,52 @@
 
 #include "unit/boards.h"
 
-#include <stdarg.h>
-#include <stdio.h>
-
-struct text {
-    char *out;
-    size_t cap, at;
-};
-
-__attribute__((format(printf, 2, 3))) static void add_text(struct text *t, const char *format, ...)
-{
-    va_list ap;
-    va_start(ap, format);
-    if (t->at < t->cap) t->at += (size_t)vsnprintf(t->out + t->at, t->cap - t->at, format, ap);
-    va_end(ap);
-}
-
-static void add_args(struct text *t, const struct fault_kind *k)
+static void print_args(FILE *out, const struct fault_kind *k)
 {
     bool any = false;
     for (unsigned i = FAULT_FOR_S; i < FAULT_ARGS; i++) {
         if (!((k->need | k->may) & FAULT_BIT(i))) continue;
         const char *name = fault_args[i].name;
-        add_text(t, "%s`%s`%s", any ? ", " : "", name, k->need & FAULT_BIT(i) ? "" : " (optional)");
+        fprintf(out, "%s`%s`%s", any ? ", " : "", name, k->need & FAULT_BIT(i) ? "" : " (optional)");
         any = true;
     }
-    if (!any) add_text(t, "nothing");
+    if (!any) fprintf(out, "nothing");
 }
 
-bool fault_markdown(unsigned line, char *out, size_t cap)
+static void print_kinds(FILE *out)
 {
-    struct text t = {.out = out, .cap = cap};
-    if (line == 0) add_text(&t, "| kind | what it does | takes | how a host sees it | rejected if |");
-    if (line == 1) add_text(&t, "|---|---|---|---|---|");
-    if (line < 2) return true;
-    const struct fault_kind *k = fault_kind(line - 2);
-    if (!k) return false;
-    add_text(&t, "| `%s` | %s%s | ", k->name, k->what, k->once ? " Over at once." : "");
-    add_args(&t, k);
-    add_text(&t, " | %s | %s |", k->seen, k->unless ? k->unless : "");
-    return true;
+    const struct fault_kind *k;
+    fprintf(out, "| kind | what it does | takes | how a host sees it | rejected if |\n|---|---|---|---|---|\n");
+    for (unsigned i = 0; (k = fault_kind(i)) != NULL; i++) {
+        fprintf(out, "| `%s` | %s%s | ", k->name, k->what, k->once ? " Over at once." : "");
+        print_args(out, k);
+        fprintf(out, " | %s | %s |\n", k->seen, k->unless ? k->unless : "");
+    }
 }
 
 /* In a table a bar has to be escaped. */
-static void add_place(struct text *t, enum fault_place place)
+static void print_place(FILE *out, enum fault_place place)
 {
-    add_text(t, " `");
-    for (const char *s = fault_place_any(place); *s; s++) add_text(t, *s == '|' ? "\\|" : "%c", *s);
-    add_text(t, "` |");
+    fprintf(out, " `");
+    for (const char *s = fault_place_any(place); *s; s++) fprintf(out, *s == '|' ? "\\|" : "%c", *s);
+    fprintf(out, "` |");
 }
 
-bool fault_markdown_matrix(unsigned line, char *out, size_t cap)
+static void print_matrix(FILE *out)
 {
-    struct text t = {.out = out, .cap = cap};
-    const struct fault_kind *k = line < 2 ? NULL : fault_kind(line - 2);
-    if (line >= 2 && !k) return false;
-    if (line == 1) add_text(&t, "|---|");
-    else if (k) add_text(&t, "| `%s` |", k->name);
-    else add_text(&t, "| |");
-    for (unsigned i = 0; i < FAULT_PLACES; i++) {
-        if (line == 0) add_place(&t, (enum fault_place)i);
-        else if (line == 1) add_text(&t, "---|");
-        else if (!(k->places & FAULT_BIT(i))) add_text(&t, " rejected |");
-        else add_text(&t, k->fits ? " seen, or rejected (above) |" : " seen |");
-    }
-    return true;
-}
-
-/* The n-th part with a fault point of any type of board. */
-static const struct board_part *part_at(unsigned n, const struct board_type **type)
-{
-    for (const struct board_type *const *t = board_types; *t; t++) {
-        for (unsigned i = 0; i < (*t)->part_count; i++) {
-            *type = *t;
-            if ((*t)->parts[i].name && n-- == 0) return &(*t)->parts[i];
+    const struct fault_kind *k;
+    fprintf(out, "| |");
+    for (unsigned p = 0; p < FAULT_PLACES; p++) print_place(out, (enum fault_place)p);
+    fprintf(out, "\n|---|");
+    for (unsigned p = 0; p < FAULT_PLACES; p++) fprintf(out, "---|");
+    for (unsigned i = 0; (k = fault_kind(i)) != NULL; i++) {
+        fprintf(out, "\n| `%s` |", k->name);
+        for (unsigned p = 0; p < FAULT_PLACES; p++) {
+            const bool here = k->places & FAULT_BIT(p);
+            fprintf(out, !here ? " rejected |" : k->fits ? " seen, or rejected (above) |" : " seen |");
         }
     }
-    return NULL;
+    fprintf(out, "\n");
 }
 
 static bool part_has(const struct board_type *t, const struct board_part *p, const struct fault_kind *k)
@@ -89,36 +58,42 @@ static bool part_has(const struct board_type *t, const struct board_part *p, con
     return k->once ? p->registers > 0 : (p->faults & k->variant) != 0;
 }
 
-bool fault_markdown_boards(unsigned line, char *out, size_t cap)
+static void print_part(FILE *out, const struct board_type *type, const struct board_part *p)
 {
-    struct text t = {.out = out, .cap = cap};
-    const struct board_type *type;
     const struct fault_kind *k;
-    if (line == 0) add_text(&t, "| board | point | kinds it has | why not the others |");
-    if (line == 1) add_text(&t, "|---|---|---|---|");
-    if (line < 2) return true;
-    const struct board_part *p = part_at(line - 2, &type);
-    if (!p) return false;
-    add_text(&t, "| %s | `UNIT.%s` |", type->title, p->name);
+    fprintf(out, "| %s | `UNIT.%s` |", type->title, p->name);
     for (unsigned i = 0; (k = fault_kind(i)) != NULL; i++) {
-        if (part_has(type, p, k)) add_text(&t, " `%s`", k->name);
+        if (part_has(type, p, k)) fprintf(out, " `%s`", k->name);
     }
-    if (p->registers) add_text(&t, " (registers 0 to %u)", p->registers - 1);
-    add_text(&t, " | %s |", p->unless ? p->unless : "");
-    return true;
+    if (p->registers) fprintf(out, " (registers 0 to %u)", p->registers - 1);
+    fprintf(out, " | %s |\n", p->unless ? p->unless : "");
 }
 
-bool fault_markdown_events(unsigned line, char *out, size_t cap)
+static void print_boards(FILE *out)
 {
-    struct text t = {.out = out, .cap = cap};
-    if (line == 0) add_text(&t, "| board | events |");
-    if (line == 1) add_text(&t, "|---|---|");
-    if (line < 2) return true;
-    const struct board_type *const *type = board_types;
-    for (unsigned left = line - 2; *type && left > 0; left--) type++;
-    if (!*type) return false;
-    add_text(&t, "| %s |", (*type)->title);
-    for (unsigned i = 0; i < (*type)->event_count; i++) add_text(&t, "%s `%s`", i ? "," : "", (*type)->events[i]);
-    add_text(&t, " |");
-    return true;
+    fprintf(out, "| board | point | kinds it has | why not the others |\n|---|---|---|---|\n");
+    for (const struct board_type *const *t = board_types; *t; t++) {
+        for (unsigned i = 0; i < (*t)->part_count; i++) {
+            if ((*t)->parts[i].name) print_part(out, *t, &(*t)->parts[i]);
+        }
+    }
+}
+
+static void print_events(FILE *out)
+{
+    fprintf(out, "| board | events |\n|---|---|\n");
+    for (const struct board_type *const *t = board_types; *t; t++) {
+        fprintf(out, "| %s |", (*t)->title);
+        for (unsigned i = 0; i < (*t)->event_count; i++) fprintf(out, "%s `%s`", i ? "," : "", (*t)->events[i]);
+        fprintf(out, " |\n");
+    }
+}
+
+void fault_markdown(FILE *out)
+{
+    static void (*const tables[])(FILE * out) = {print_kinds, print_matrix, print_boards, print_events};
+    for (unsigned i = 0; i < sizeof tables / sizeof *tables; i++) {
+        if (i) fprintf(out, "\n");
+        tables[i](out);
+    }
 }

@@ -3,7 +3,6 @@
 #include "command/args.h"
 #include "scpi/internal.h"
 
-#include <stdio.h>
 #include <string.h>
 
 /* ---- a unit of a message */
@@ -175,59 +174,52 @@ void scpi_line(struct scpi *s, const char *text, size_t len, int64_t t_ns)
 
 /* ---- the rows for people */
 
-static void markdown_params(const struct control_command *row, unsigned suffixes, char *out, size_t cap)
+static void print_params(FILE *out, const struct control_command *row, unsigned suffixes)
 {
-    size_t at = 0;
-    out[0] = '\0';
-    for (unsigned i = suffixes; i < control_arg_count(row) && at + 2 < cap; i++) {
+    for (unsigned i = suffixes; i < control_arg_count(row); i++) {
         const struct control_arg *a = &row->arg[i];
-        const char *next = ": ";
-        at += (size_t)snprintf(out + at, cap - at, "%s%s%s", i > suffixes ? "; " : "", a->name,
-                               a->optional ? " (optional)" : "");
-        if (control_type_numeric(a->type) && at < cap) {
-            at += (size_t)snprintf(out + at, cap - at, " %.10g to %.10g", a->min, a->max);
+        const char *next = ": ", *word;
+        fprintf(out, "%s%s%s", i > suffixes ? "; " : "", a->name, a->optional ? " (optional)" : "");
+        if (control_type_numeric(a->type)) {
+            fprintf(out, " %.10g to %.10g", a->min, a->max);
             next = " ";
         }
-        const char *word;
-        for (unsigned k = 0; at < cap && (word = a->choices ? a->choices[k] : scpi_suffix(a->unit, k));
-             k++, next = ", ") {
-            at += (size_t)snprintf(out + at, cap - at, "%s%s", next, word);
-        }
-        if (a->type == CONTROL_BOOL && at < cap) at += (size_t)snprintf(out + at, cap - at, ": ON, OFF, 1, 0");
+        for (unsigned k = 0; (word = a->choices ? a->choices[k] : scpi_suffix(a->unit, k)); k++, next = ", ")
+            fprintf(out, "%s%s", next, word);
+        if (a->type == CONTROL_BOOL) fprintf(out, ": ON, OFF, 1, 0");
     }
 }
 
-/* The i-th header of the instrument's rows. */
-static const struct control_scpi *nth_header(const struct scpi_kind *kind, unsigned i,
-                                             const struct control_command **row)
+static void print_common(FILE *out)
 {
-    for (unsigned r = 0; (*row = control_row(control_tables, r)); r++) {
-        for (unsigned k = 0; scpi_belongs(kind, *row) && k < CONTROL_SCPI_MAX && (*row)->scpi[k].header; k++) {
-            if (i-- == 0) return &(*row)->scpi[k];
-        }
+    const struct scpi_command *row;
+    fprintf(out, "| header | parameter | what it does |\n|---|---|---|\n");
+    for (unsigned i = 0; (row = scpi_common(i)); i++) {
+        fprintf(out, "| `%s` | ", row->pattern);
+        if (row->max) fprintf(out, "0 to %u", row->max);
+        fprintf(out, " | %s |\n", row->what);
     }
-    return NULL;
 }
 
-bool scpi_markdown(const struct scpi_kind *kind, unsigned line, char *out, size_t cap)
+static void print_headers(FILE *out, const struct control_command *row)
 {
-    char params[512];
-    const struct control_command *row = NULL;
-    const struct scpi_command *common = kind ? NULL : scpi_common(line - 2);
-    if (line == 0)
-        snprintf(out, cap,
-                 kind ? "| header | parameters, response | command | what it does |"
-                      : "| header | parameter | what it does |");
-    if (line == 1) snprintf(out, cap, kind ? "|---|---|---|---|" : "|---|---|---|");
-    if (line < 2) return true;
-    if (common && common->max) snprintf(params, sizeof params, "0 to %u", common->max);
-    else params[0] = '\0';
-    if (common) snprintf(out, cap, "| `%s` | %s | %s |", common->pattern, params, common->what);
-    if (!kind) return common != NULL;
-    const struct control_scpi *how = nth_header(kind, line - 2, &row);
-    if (!how) return false;
-    if (how->result) snprintf(params, sizeof params, "returns %s", how->result);
-    else markdown_params(row, scpi_suffixes(how->header), params, sizeof params);
-    snprintf(out, cap, "| `%s` | %s | `%s` | %s |", how->header, params, row->name, row->what);
-    return true;
+    for (unsigned i = 0; i < CONTROL_SCPI_MAX && row->scpi[i].header; i++) {
+        const struct control_scpi *how = &row->scpi[i];
+        fprintf(out, "| `%s` | ", how->header);
+        if (how->result) fprintf(out, "returns %s", how->result);
+        else print_params(out, row, scpi_suffixes(how->header));
+        fprintf(out, " | `%s` | %s |\n", row->name, row->what);
+    }
+}
+
+void scpi_markdown(FILE *out)
+{
+    const struct control_command *row;
+    print_common(out);
+    for (const struct scpi_kind *kind = scpi_kinds; kind->name; kind++) {
+        fprintf(out, "\n| header | parameters, response | command | what it does |\n|---|---|---|---|\n");
+        for (unsigned i = 0; (row = control_row(control_tables, i)); i++) {
+            if (scpi_belongs(kind, row)) print_headers(out, row);
+        }
+    }
 }

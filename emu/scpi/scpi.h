@@ -10,6 +10,8 @@
 #include "control/control.h"
 #include "scpi/status.h"
 
+#include <stdio.h>
+
 #define SCPI_LINE_MAX 4096u
 #define SCPI_OUT_MAX  8192u
 #define SCPI_PATH_MAX 81u
@@ -62,7 +64,7 @@ bool scpi_busy(const struct scpi *s);
 /* Looks at the conditions: call for every session after anything that may have changed the bench. */
 void scpi_look(struct scpi *s, int64_t t_ns);
 
-/* The headers of an instrument as Markdown, for docs/scpi.md and --list-scpi: next line into out, false at the end. */
-bool scpi_markdown(const struct scpi_kind *kind, unsigned line, char *out, size_t cap);
+/* The common headers, then those of each kind of instrument, as tables in Markdown for docs/scpi.md and --list-scpi. */
+void scpi_markdown(FILE *out);
 
 #endif

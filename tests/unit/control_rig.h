@@ -179,4 +179,14 @@ static inline void assert_says(const char *line, const char *want)
     if (!strstr(reply, want)) fail_msg("%s\n  gave %s\n  want %s", line, reply, want);
 }
 
+/* The table in Markdown, to be read from its beginning; the caller closes it. */
+static inline FILE *table_file(const struct control_table *const *tables)
+{
+    FILE *file = tmpfile();
+    assert_non_null(file);
+    control_markdown(tables, file);
+    rewind(file);
+    return file;
+}
+
 #endif

@@ -22,4 +22,12 @@ static inline bool page_has(const char *path, const char *line)
     return found;
 }
 
+/* The next line of a table that the program wrote; false past the last. */
+static inline bool next_line(FILE *table, char *line, size_t cap)
+{
+    if (!fgets(line, (int)cap, table)) return false;
+    line[strcspn(line, "\n")] = '\0';
+    return true;
+}
+
 #endif

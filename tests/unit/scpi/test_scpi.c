@@ -275,12 +275,16 @@ static void the_page_shows_every_header(void **state)
 {
     (void)state;
     char line[2048];
-    for (int k = -1; k < 0 || scpi_kinds[k].name; k++) {
-        const struct scpi_kind *kind = k < 0 ? NULL : &scpi_kinds[k];
-        for (unsigned i = 0; scpi_markdown(kind, i, line, sizeof line); i++) {
-            if (!page_has("docs/scpi.md", line)) fail_msg("docs/scpi.md lacks (make docs):\n%s", line);
-        }
+    unsigned lines = 0;
+    FILE *table = tmpfile();
+    assert_non_null(table);
+    scpi_markdown(table);
+    rewind(table);
+    for (; next_line(table, line, sizeof line); lines++) {
+        if (!page_has("docs/scpi.md", line)) fail_msg("docs/scpi.md lacks (make docs):\n%s", line);
     }
+    fclose(table);
+    assert_true(lines > 2);
 }
 
 int main(void)
