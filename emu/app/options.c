@@ -104,9 +104,17 @@ struct target {
     struct options *o;
     char *why;
     size_t cap;
+    const struct row *row;
 };
 
-#define expected(t, option, got, ...) why_expected((t)->why, (t)->cap, option, WHY_TEXT(got), __VA_ARGS__)
+struct row {
+    const char *name; /* with its dashes */
+    bool (*set)(const struct target *t, const char *arg);
+    size_t offset;              /* in struct options: of set_path() and set_flag() */
+    enum options_action action; /* of set_action() */
+};
+
+#define expected(t, got, ...) why_expected((t)->why, (t)->cap, (t)->row->name, WHY_TEXT(got), __VA_ARGS__)
 
 /* Length of "can1=" at the beginning; 0: there is none. */
 static size_t bus_prefix(const char *arg)
@@ -116,12 +124,12 @@ static size_t bus_prefix(const char *arg)
 }
 
 // Long: one kind of adapter after the other.
-static bool set_can(struct target *t, const char *arg)
+static bool set_can(const struct target *t, const char *arg)
 {
     struct options *o = t->o;
     o->can_given = true;
     if (strcmp(arg, "none") == 0) return true;
-    if (o->can_count == OPTIONS_CAN_MAX) return expected(t, "--can", arg, "up to %u adapters", OPTIONS_CAN_MAX);
+    if (o->can_count == OPTIONS_CAN_MAX) return expected(t, arg, "up to %u adapters", OPTIONS_CAN_MAX);
     struct options_can *c = &o->can[o->can_count];
     const char *kind = arg + bus_prefix(arg);
     const char *colon = strchr(kind, ':');
@@ -133,7 +141,7 @@ static bool set_can(struct target *t, const char *arg)
     if (len == 10 && strncmp(kind, "socketcand", 10) == 0) {
         c->kind = OPTIONS_SOCKETCAND;
         if (rest && !parse_u64(rest, 65535, &port)) {
-            return expected(t, "--can", arg, "a port from 0 (any free port) to 65535");
+            return expected(t, arg, "a port from 0 (any free port) to 65535");
         }
         c->port = (uint16_t)port;
     } else if (len == 5 && strncmp(kind, "slcan", 5) == 0) {
@@ -143,35 +151,184 @@ static bool set_can(struct target *t, const char *arg)
     } else if (len == 3 && strncmp(kind, "log", 3) == 0 && rest) {
         c->kind = OPTIONS_CAN_LOG;
     } else {
-        return expected(t, "--can", arg, "socketcand[:PORT], slcan[:LINK], socketcan:IFACE, log:FILE or none");
+        return expected(t, arg, "socketcand[:PORT], slcan[:LINK], socketcan:IFACE, log:FILE or none");
     }
     o->can_count++;
     return true;
 }
 
 /* head:5025 or head:pty:LINK. */
-static bool set_scpi(struct target *t, const char *arg)
+static bool set_scpi(const struct target *t, const char *arg)
 {
     struct options *o = t->o;
-    if (o->scpi_count == OPTIONS_SCPI_MAX) return expected(t, "--scpi", arg, "up to %u instruments", OPTIONS_SCPI_MAX);
+    if (o->scpi_count == OPTIONS_SCPI_MAX) return expected(t, arg, "up to %u instruments", OPTIONS_SCPI_MAX);
     struct options_scpi *i = &o->scpi[o->scpi_count++];
     const size_t len = strcspn(arg, ":");
     const char *rest = arg[len] ? arg + len + 1 : "0";
     uint64_t port = 0;
     *i = (struct options_scpi){.arg = arg, .pty = strcmp(rest, "pty") == 0 || strncmp(rest, "pty:", 4) == 0};
     snprintf(i->kind, sizeof i->kind, "%.*s", (int)len, arg);
-    if (len == 0 || len >= sizeof i->kind) return expected(t, "--scpi", arg, "head, table, chamber, supply or all");
+    if (len == 0 || len >= sizeof i->kind) return expected(t, arg, "head, table, chamber, supply or all");
     if (i->pty && rest[3] && rest[4]) i->link = rest + 4;
     if (!i->pty && !parse_u64(rest, 65535, &port)) {
-        return expected(t, "--scpi", arg, "pty[:LINK] or a port from 0 (any free port) to 65535");
+        return expected(t, arg, "pty[:LINK] or a port from 0 (any free port) to 65535");
     }
     i->port = (uint16_t)port;
     return true;
 }
 
+static bool set_truth_every(const struct target *t, const char *arg)
+{
+    if (options_duration(arg, &t->o->truth_every_ns) && t->o->truth_every_ns >= 1000) return true;
+    return expected(t, arg, "a time of 1us or more, such as 10ms");
+}
+
+static bool set_pace(const struct target *t, const char *arg)
+{
+    for (int k = PACE_WALL; k <= PACE_FREE; k++) {
+        t->o->pace = (enum pace_kind)k;
+        if (strcmp(arg, pace_name(t->o->pace)) == 0) return true;
+    }
+    return expected(t, arg, "wall, step or free");
+}
+
+static bool set_for(const struct target *t, const char *arg)
+{
+    if (options_duration(arg, &t->o->for_ns)) return true;
+    return expected(t, arg, "a time such as 300ms, 10s or 2min, up to 1e6 s");
+}
+
+static bool set_seed(const struct target *t, const char *arg)
+{
+    t->o->seed_given = parse_u64(arg, UINT64_MAX, &t->o->seed);
+    return t->o->seed_given || expected(t, arg, "an integer from 0 to 2^64 - 1");
+}
+
+static bool set_rate(const struct target *t, const char *arg, uint32_t *hz, bool *given)
+{
+    uint64_t v;
+    *given = parse_u64(arg, 8000000, &v) && (v == 0 || v >= 10000);
+    if (!*given) return expected(t, arg, "0 or 10000 to 8000000 bit/s");
+    *hz = (uint32_t)v;
+    return true;
+}
+
+static bool set_bitrate(const struct target *t, const char *arg)
+{
+    return set_rate(t, arg, &t->o->bitrate_hz, &t->o->bitrate_given);
+}
+
+static bool set_data_bitrate(const struct target *t, const char *arg)
+{
+    return set_rate(t, arg, &t->o->data_bitrate_hz, &t->o->data_bitrate_given);
+}
+
+static bool set_epoch(const struct target *t, const char *arg)
+{
+    char *end;
+    const double s = strtod(arg, &end);
+    if (end == arg || *end || !(s >= 0 && s <= 9e9)) {
+        return expected(t, arg, "seconds from 0 to 9e9, as date +%%s prints them");
+    }
+    t->o->epoch_ns = (int64_t)nearbyint(s) * 1000000000 + (int64_t)nearbyint((s - nearbyint(s)) * 1e9);
+    return true;
+}
+
+static bool set_vcd_unit(const struct target *t, const char *arg)
+{
+    uint64_t v;
+    bool power = parse_u64(arg, 100000000, &v) && v > 0;
+    for (uint64_t x = power ? v : 1; x > 1; x /= 10) power = power && x % 10 == 0;
+    if (!power) return expected(t, arg, "1, 10, 100 ... 100000000 ns");
+    t->o->vcd_unit_ns = (uint32_t)v;
+    return true;
+}
+
+static bool set_line_hz(const struct target *t, const char *arg)
+{
+    uint64_t v;
+    if (!parse_u64(arg, 100000000, &v) || v < 1000) {
+        return expected(t, arg, "1000 to 100000000 samples per second");
+    }
+    t->o->line_hz = (int64_t)v;
+    return true;
+}
+
+/* a:LINK or LINK: names of units are plain. */
+static bool set_bus_port(const struct target *t, const char *arg)
+{
+    static const char plain[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_";
+    struct options *o = t->o;
+    if (o->bus_count == OPTIONS_BUS_MAX) return expected(t, arg, "up to %u bus ports", OPTIONS_BUS_MAX);
+    struct options_bus *b = &o->bus[o->bus_count++];
+    const size_t len = strspn(arg, plain);
+    const bool named = len > 0 && arg[len] == ':';
+    const char *link = named ? arg + len + 1 : arg;
+    *b = (struct options_bus){.arg = arg, .link = strcmp(link, "-") == 0 ? NULL : link};
+    if (!*link || (named && len >= sizeof b->unit)) return expected(t, arg, "[UNIT:]LINK, where LINK is a path or -");
+    if (named) snprintf(b->unit, sizeof b->unit, "%.*s", (int)len, arg);
+    return true;
+}
+
+static bool set_path(const struct target *t, const char *arg)
+{
+    if (!*arg) return expected(t, arg, "a path");
+    *(const char **)((char *)t->o + t->row->offset) = arg;
+    return true;
+}
+
+static bool set_flag(const struct target *t, const char *arg)
+{
+    (void)arg;
+    return *(bool *)((char *)t->o + t->row->offset) = true;
+}
+
+static bool set_action(const struct target *t, const char *arg)
+{
+    (void)arg;
+    t->o->action = t->row->action;
+    return true;
+}
+
+static bool set_scenario(const struct target *t, const char *arg)
+{
+    if (t->o->scenario) return why_fail(t->why, t->cap, "SCENARIO: expected one, got %s and %s", t->o->scenario, arg);
+    return set_path(t, arg);
+}
+
+#define IN(member) offsetof(struct options, member)
+
+// clang-format off
+static const struct row can_row = {"--can", .set = set_can}, scenario_row = {"SCENARIO", set_scenario, .offset = IN(scenario)};
+static const struct row rows[] = {
+    {"--can", .set = set_can},                         {"--pace", .set = set_pace},
+    {"--for", .set = set_for},                         {"--seed", .set = set_seed},
+    {"--bitrate", .set = set_bitrate},                 {"--data-bitrate", .set = set_data_bitrate},
+    {"--epoch", .set = set_epoch},                     {"--scpi", .set = set_scpi},
+    {"--bus-port", .set = set_bus_port},               {"--truth-every", .set = set_truth_every},
+    {"--vcd-unit", .set = set_vcd_unit},               {"--line-hz", .set = set_line_hz},
+    {"--control", set_path, .offset = IN(control)},       {"--truth", set_path, .offset = IN(truth)},
+    {"--unit", set_path, .offset = IN(unit)},             {"--vcd", set_path, .offset = IN(vcd)},
+    {"--line", set_path, .offset = IN(line)},             {"--restore", set_path, .offset = IN(restore)},
+    {"--truth-log", set_path, .offset = IN(truth_log)},   {"--resolved", set_path, .offset = IN(resolved)},
+    {"--until-eof", set_flag, .offset = IN(until_eof)},   {"--wait-client", set_flag, .offset = IN(wait_client)},
+    {"--start", set_flag, .offset = IN(start)},           {"--quiet", set_flag, .offset = IN(quiet)},
+    {"--help", set_action, .action = OPTIONS_HELP},
+    {"--version", set_action, .action = OPTIONS_VERSION},
+    {"--dump", set_action, .action = OPTIONS_DUMP},
+    {"--list-profiles", set_action, .action = OPTIONS_LIST_PROFILES},
+    {"--list-scenarios", set_action, .action = OPTIONS_LIST_SCENARIOS},
+    {"--list-keys", set_action, .action = OPTIONS_LIST_KEYS},
+    {"--list-commands", set_action, .action = OPTIONS_LIST_COMMANDS},
+    {"--list-scpi", set_action, .action = OPTIONS_LIST_SCPI},
+    {"--list-faults", set_action, .action = OPTIONS_LIST_FAULTS},
+};
+// clang-format on
+#define ROWS (sizeof rows / sizeof *rows)
+
 bool options_cans(struct options *o, char *text, char *why, size_t cap)
 {
-    struct target t = {o, why, cap};
+    const struct target t = {o, why, cap, &can_row};
     char *rest = NULL;
     o->can_count = 0;
     for (const char *one = strtok_r(text, " ", &rest); one; one = strtok_r(NULL, " ", &rest)) {
@@ -180,166 +337,7 @@ bool options_cans(struct options *o, char *text, char *why, size_t cap)
     return true;
 }
 
-static bool set_truth_every(struct target *t, const char *arg)
-{
-    if (options_duration(arg, &t->o->truth_every_ns) && t->o->truth_every_ns >= 1000) return true;
-    return expected(t, "--truth-every", arg, "a time of 1us or more, such as 10ms");
-}
-
-static bool set_pace(struct target *t, const char *arg)
-{
-    for (int k = PACE_WALL; k <= PACE_FREE; k++) {
-        t->o->pace = (enum pace_kind)k;
-        if (strcmp(arg, pace_name(t->o->pace)) == 0) return true;
-    }
-    return expected(t, "--pace", arg, "wall, step or free");
-}
-
-static bool set_for(struct target *t, const char *arg)
-{
-    if (options_duration(arg, &t->o->for_ns)) return true;
-    return expected(t, "--for", arg, "a time such as 300ms, 10s or 2min, up to 1e6 s");
-}
-
-static bool set_seed(struct target *t, const char *arg)
-{
-    t->o->seed_given = parse_u64(arg, UINT64_MAX, &t->o->seed);
-    return t->o->seed_given || expected(t, "--seed", arg, "an integer from 0 to 2^64 - 1");
-}
-
-static bool set_rate(struct target *t, const char *arg, const char *name, uint32_t *hz, bool *given)
-{
-    uint64_t v;
-    *given = parse_u64(arg, 8000000, &v) && (v == 0 || v >= 10000);
-    if (!*given) return expected(t, name, arg, "0 or 10000 to 8000000 bit/s");
-    *hz = (uint32_t)v;
-    return true;
-}
-
-static bool set_bitrate(struct target *t, const char *arg)
-{
-    return set_rate(t, arg, "--bitrate", &t->o->bitrate_hz, &t->o->bitrate_given);
-}
-
-static bool set_data_bitrate(struct target *t, const char *arg)
-{
-    return set_rate(t, arg, "--data-bitrate", &t->o->data_bitrate_hz, &t->o->data_bitrate_given);
-}
-
-static bool set_epoch(struct target *t, const char *arg)
-{
-    char *end;
-    const double s = strtod(arg, &end);
-    if (end == arg || *end || !(s >= 0 && s <= 9e9)) {
-        return expected(t, "--epoch", arg, "seconds from 0 to 9e9, as date +%%s prints them");
-    }
-    t->o->epoch_ns = (int64_t)nearbyint(s) * 1000000000 + (int64_t)nearbyint((s - nearbyint(s)) * 1e9);
-    return true;
-}
-
-static bool set_vcd_unit(struct target *t, const char *arg)
-{
-    uint64_t v;
-    bool power = parse_u64(arg, 100000000, &v) && v > 0;
-    for (uint64_t x = power ? v : 1; x > 1; x /= 10) power = power && x % 10 == 0;
-    if (!power) return expected(t, "--vcd-unit", arg, "1, 10, 100 ... 100000000 ns");
-    t->o->vcd_unit_ns = (uint32_t)v;
-    return true;
-}
-
-static bool set_line_hz(struct target *t, const char *arg)
-{
-    uint64_t v;
-    if (!parse_u64(arg, 100000000, &v) || v < 1000) {
-        return expected(t, "--line-hz", arg, "1000 to 100000000 samples per second");
-    }
-    t->o->line_hz = (int64_t)v;
-    return true;
-}
-
-/* a:LINK or LINK: names of units are plain. */
-static bool set_bus_port(struct target *t, const char *arg)
-{
-    static const char plain[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_";
-    struct options *o = t->o;
-    if (o->bus_count == OPTIONS_BUS_MAX) return expected(t, "--bus-port", arg, "up to %u bus ports", OPTIONS_BUS_MAX);
-    struct options_bus *b = &o->bus[o->bus_count++];
-    const size_t len = strspn(arg, plain);
-    const bool named = len > 0 && arg[len] == ':';
-    const char *link = named ? arg + len + 1 : arg;
-    *b = (struct options_bus){.arg = arg, .link = strcmp(link, "-") == 0 ? NULL : link};
-    if (!*link || (named && len >= sizeof b->unit))
-        return expected(t, "--bus-port", arg, "[UNIT:]LINK, where LINK is a path or -");
-    if (named) snprintf(b->unit, sizeof b->unit, "%.*s", (int)len, arg);
-    return true;
-}
-
-static bool set_path(struct target *t, const char *name, const char *arg, const char **path)
-{
-    if (!*arg) return expected(t, name, arg, "a path");
-    *path = arg;
-    return true;
-}
-
-// clang-format off
-static bool set_control(struct target *t, const char *arg) { return set_path(t, "--control", arg, &t->o->control); }
-static bool set_truth(struct target *t, const char *arg)   { return set_path(t, "--truth", arg, &t->o->truth); }
-static bool set_restore(struct target *t, const char *arg) { return set_path(t, "--restore", arg, &t->o->restore); }
-static bool set_truth_log(struct target *t, const char *arg) { return set_path(t, "--truth-log", arg, &t->o->truth_log); }
-static bool set_unit(struct target *t, const char *arg)    { return set_path(t, "--unit", arg, &t->o->unit); }
-static bool set_vcd(struct target *t, const char *arg)     { return set_path(t, "--vcd", arg, &t->o->vcd); }
-static bool set_line(struct target *t, const char *arg)    { return set_path(t, "--line", arg, &t->o->line); }
-static bool set_wait(struct target *t, const char *arg)    { (void)arg; return t->o->wait_client = true; }
-static bool set_until_eof(struct target *t, const char *arg) { (void)arg; return t->o->until_eof = true; }
-static bool set_start(struct target *t, const char *arg)   { (void)arg; return t->o->start = true; }
-static bool set_quiet(struct target *t, const char *arg)   { (void)arg; return t->o->quiet = true; }
-static bool set_help(struct target *t, const char *arg)    { (void)arg; t->o->action = OPTIONS_HELP; return true; }
-static bool set_version(struct target *t, const char *arg) { (void)arg; t->o->action = OPTIONS_VERSION; return true; }
-static bool set_profiles(struct target *t, const char *arg) { (void)arg; t->o->action = OPTIONS_LIST_PROFILES; return true; }
-static bool set_scenarios(struct target *t, const char *arg) { (void)arg; t->o->action = OPTIONS_LIST_SCENARIOS; return true; }
-static bool set_keys(struct target *t, const char *arg) { (void)arg; t->o->action = OPTIONS_LIST_KEYS; return true; }
-static bool set_dump(struct target *t, const char *arg) { (void)arg; t->o->action = OPTIONS_DUMP; return true; }
-static bool set_resolved(struct target *t, const char *arg) { return set_path(t, "--resolved", arg, &t->o->resolved); }
-static bool set_commands(struct target *t, const char *arg) { (void)arg; t->o->action = OPTIONS_LIST_COMMANDS; return true; }
-
-static bool set_list_scpi(struct target *t, const char *arg) { (void)arg; t->o->action = OPTIONS_LIST_SCPI; return true; }
-static bool set_list_faults(struct target *t, const char *arg) { (void)arg; t->o->action = OPTIONS_LIST_FAULTS; return true; }
-
-static const struct {
-    const char *name;
-    int has_arg;
-    bool (*set)(struct target *t, const char *arg);
-} rows[] = {
-    {"can", required_argument, set_can},           {"pace", required_argument, set_pace},
-    {"for", required_argument, set_for},           {"seed", required_argument, set_seed},
-    {"bitrate", required_argument, set_bitrate},   {"data-bitrate", required_argument, set_data_bitrate},
-    {"epoch", required_argument, set_epoch},       {"control", required_argument, set_control},
-    {"truth", required_argument, set_truth},       {"unit", required_argument, set_unit},
-    {"vcd", required_argument, set_vcd},           {"vcd-unit", required_argument, set_vcd_unit},
-    {"line", required_argument, set_line},         {"line-hz", required_argument, set_line_hz},
-    {"bus-port", required_argument, set_bus_port},
-    {"restore", required_argument, set_restore},   {"truth-log", required_argument, set_truth_log},
-    {"truth-every", required_argument, set_truth_every},
-    {"until-eof", no_argument, set_until_eof},
-    {"wait-client", no_argument, set_wait},        {"start", no_argument, set_start},
-    {"quiet", no_argument, set_quiet},             {"help", no_argument, set_help},
-    {"version", no_argument, set_version},         {"list-profiles", no_argument, set_profiles},
-    {"list-keys", no_argument, set_keys},           {"dump", no_argument, set_dump},
-    {"resolved", required_argument, set_resolved},
-    {"list-scenarios", no_argument, set_scenarios}, {"list-commands", no_argument, set_commands},
-    {"scpi", required_argument, set_scpi},         {"list-scpi", no_argument, set_list_scpi},
-    {"list-faults", no_argument, set_list_faults},
-};
-// clang-format on
-#define ROWS (sizeof rows / sizeof *rows)
-
-static bool set_scenario(struct target *t, const char *arg)
-{
-    if (t->o->scenario) return why_fail(t->why, t->cap, "SCENARIO: expected one, got %s and %s", t->o->scenario, arg);
-    return set_path(t, "SCENARIO", arg, &t->o->scenario);
-}
-
-static bool reject_option(struct target *t, const char *word, int c)
+static bool reject_option(const struct target *t, const char *word, int c)
 {
     if (c == ':') return why_fail(t->why, t->cap, "%s: expected an argument, got none (psa-emu --help)", word);
     return why_fail(t->why, t->cap, "expected an option that --help lists, got %s", word);
@@ -349,16 +347,17 @@ static bool parse_all(struct target *t, int argc, char *const argv[])
 {
     struct option longs[ROWS + 1] = {{0}};
     for (unsigned i = 0; i < ROWS; i++) {
-        longs[i] = (struct option){.name = rows[i].name, .has_arg = rows[i].has_arg, .val = 256 + (int)i};
+        const bool alone = rows[i].set == set_flag || rows[i].set == set_action;
+        longs[i] = (struct option){.name = rows[i].name + 2, .has_arg = !alone, .val = 256 + (int)i};
     }
     optind = 0;
     for (int c; (c = getopt_long(argc, argv, "-:", longs, NULL)) != -1;) {
-        const bool is_row = c >= 256;
-        if (!is_row && c != 1) return reject_option(t, argv[optind - 1], c);
-        if (is_row ? !rows[c - 256].set(t, optarg) : !set_scenario(t, optarg)) return false;
+        if (c < 256 && c != 1) return reject_option(t, argv[optind - 1], c);
+        t->row = c == 1 ? &scenario_row : &rows[c - 256];
+        if (!t->row->set(t, optarg)) return false;
     }
-    while (optind < argc) {
-        if (!set_scenario(t, argv[optind++])) return false;
+    for (t->row = &scenario_row; optind < argc; optind++) {
+        if (!set_scenario(t, argv[optind])) return false;
     }
     return true;
 }
@@ -367,7 +366,7 @@ bool options_parse(int argc, char *const argv[], struct options *o, char *why, s
 {
     *o = (struct options){
         .pace = PACE_WALL, .for_ns = INT64_MAX, .vcd_unit_ns = 10, .line_hz = 8000000, .truth_every_ns = 10000000};
-    struct target t = {o, why, cap};
+    struct target t = {o, why, cap, NULL};
     if (!parse_all(&t, argc, argv)) return false;
     if (o->pace == PACE_STEP && !o->control) {
         return why_fail(why, cap, "--pace step: expected --control PATH, whose commands advance the time, got none");
