@@ -69,16 +69,26 @@ enum control_outcome { CONTROL_DONE, CONTROL_LATER, CONTROL_REJECTED };
 struct control;
 struct control_error;
 
+/* One execution of a row. */
+struct control_call {
+    struct control *control;
+    const struct control_bench *bench;
+    const struct control_value *v; /* the arguments in the order of the row */
+    cJSON *result;                 /* the handler adds to it */
+    int64_t t_ns;
+};
+
 struct control_command {
     const char *name;
     const char *what;              /* one sentence */
     const struct control_arg *arg; /* up to the one without a name: CONTROL_ARGS(); NULL: none */
-    /* v: the arguments in the order of arg. Adds to result; CONTROL_REFUSED after control_reject(). */
-    enum control_outcome (*run)(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns);
-    bool changes; /* the bench's future: goes into the journal */
+    enum control_outcome (*run)(const struct control_call *call); /* CONTROL_REJECTED after control_reject() */
+    bool changes;                                                 /* the bench's future: goes into the journal */
     struct control_scpi scpi[CONTROL_SCPI_MAX];
     /* What the arguments do not say one by one; does nothing. False with the error. NULL: nothing more. */
     bool (*check)(const struct control_bench *b, const struct control_value *v, struct control_error *why);
+    /* Before run: why the bench cannot do it now, say without the instrument; NULL: it can. NULL: nothing is needed. */
+    const char *(*missing)(const struct control_bench *b);
 };
 
 struct control_table {

@@ -4,96 +4,84 @@
 
 #include <math.h>
 
-static enum control_outcome do_help(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+static enum control_outcome do_help(const struct control_call *call)
 {
-    (void)v;
-    (void)t_ns;
-    describe_commands(c, result);
+    describe_commands(call->control, call->result);
     return CONTROL_DONE;
 }
 
-static enum control_outcome do_time(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+static enum control_outcome do_time(const struct control_call *call)
 {
     struct control_pace p = {0};
-    (void)v;
-    c->bench->sim.pace(c->bench->ctx, &p);
-    cJSON_AddNumberToObject(result, "t_s", (double)t_ns * 1e-9);
-    cJSON_AddStringToObject(result, "pace", p.name);
+    call->bench->sim.pace(call->bench->ctx, &p);
+    cJSON_AddNumberToObject(call->result, "t_s", (double)call->t_ns * 1e-9);
+    cJSON_AddStringToObject(call->result, "pace", p.name);
     return CONTROL_DONE;
 }
 
-static enum control_outcome do_run(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+static enum control_outcome do_run(const struct control_call *call)
 {
-    (void)result;
-    (void)t_ns;
-    if (c->waiting) return control_reject(c, "state", "another run is in progress");
-    const int64_t for_ns = (int64_t)nearbyint(v[0].real * 1e9);
-    if (c->bench->sim.run(c->bench->ctx, for_ns, v[1].count, c->error.why)) return CONTROL_LATER;
-    c->error.code = "state";
+    if (call->control->waiting) return control_reject(call->control, "state", "another run is in progress");
+    const int64_t for_ns = (int64_t)nearbyint(call->v[0].real * 1e9);
+    if (call->bench->sim.run(call->bench->ctx, for_ns, call->v[1].count, call->control->error.why))
+        return CONTROL_LATER;
+    call->control->error.code = "state";
     return CONTROL_REJECTED;
 }
 
-static enum control_outcome do_units(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+static enum control_outcome do_units(const struct control_call *call)
 {
-    (void)v;
-    (void)t_ns;
-    describe_units(c->bench, result);
+    describe_units(call->bench, call->result);
     return CONTROL_DONE;
 }
 
-static enum control_outcome do_unit_reset(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+static enum control_outcome do_unit_reset(const struct control_call *call)
 {
-    (void)result;
-    if (!v[0].given && c->bench->units != 1) {
-        return control_reject(c, "argument", "unit: expected one of %u units, got nothing", c->bench->units);
+    if (!call->v[0].given && call->bench->units != 1) {
+        return control_reject(call->control, "argument", "unit: expected one of %u units, got nothing",
+                              call->bench->units);
     }
-    const struct unit *u = c->bench->unit[v[0].unit];
-    u->type->reset(u->board, t_ns);
+    const struct unit *u = call->bench->unit[call->v[0].unit];
+    u->type->reset(u->board, call->t_ns);
     return CONTROL_DONE;
 }
 
-static enum control_outcome do_frames(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+static enum control_outcome do_frames(const struct control_call *call)
 {
-    (void)v;
-    (void)t_ns;
-    describe_clients(c->bench, result);
+    describe_clients(call->bench, call->result);
     return CONTROL_DONE;
 }
 
-static enum control_outcome do_counters(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+static enum control_outcome do_counters(const struct control_call *call)
 {
-    if (v[0].given) {
-        describe_unit_counters(c->bench, v[0].unit, result);
+    if (call->v[0].given) {
+        describe_unit_counters(call->bench, call->v[0].unit, call->result);
         return CONTROL_DONE;
     }
-    describe_pace(c->bench, result);
-    describe_bus(c->bench, result, t_ns);
-    describe_clients(c->bench, result);
-    cJSON *control = cJSON_AddObjectToObject(result, "control");
-    cJSON_AddNumberToObject(control, "commands", c->commands);
-    cJSON_AddNumberToObject(control, "refused", c->refused);
-    cJSON *units = cJSON_AddObjectToObject(result, "units");
-    for (unsigned i = 0; i < c->bench->units; i++) {
-        describe_unit_counters(c->bench, i, cJSON_AddObjectToObject(units, c->bench->unit[i]->cfg.name));
+    describe_pace(call->bench, call->result);
+    describe_bus(call->bench, call->result, call->t_ns);
+    describe_clients(call->bench, call->result);
+    cJSON *control = cJSON_AddObjectToObject(call->result, "control");
+    cJSON_AddNumberToObject(control, "commands", call->control->commands);
+    cJSON_AddNumberToObject(control, "refused", call->control->refused);
+    cJSON *units = cJSON_AddObjectToObject(call->result, "units");
+    for (unsigned i = 0; i < call->bench->units; i++) {
+        describe_unit_counters(call->bench, i, cJSON_AddObjectToObject(units, call->bench->unit[i]->cfg.name));
     }
     return CONTROL_DONE;
 }
 
-static enum control_outcome do_endpoints(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+static enum control_outcome do_endpoints(const struct control_call *call)
 {
-    (void)v;
-    (void)t_ns;
-    if (!c->bench->process.endpoints) return control_reject(c, "state", "this bench has no endpoints");
-    if (!c->bench->process.endpoints(c->bench->ctx, result)) return control_reject(c, "machine", "out of memory");
+    if (!call->bench->process.endpoints) return control_reject(call->control, "state", "this bench has no endpoints");
+    if (!call->bench->process.endpoints(call->bench->ctx, call->result))
+        return control_reject(call->control, "machine", "out of memory");
     return CONTROL_DONE;
 }
 
-static enum control_outcome do_quit(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+static enum control_outcome do_quit(const struct control_call *call)
 {
-    (void)v;
-    (void)result;
-    (void)t_ns;
-    c->bench->process.quit(c->bench->ctx);
+    call->bench->process.quit(call->bench->ctx);
     return CONTROL_DONE;
 }
 

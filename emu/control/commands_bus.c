@@ -25,9 +25,10 @@ static enum control_outcome submit_cycle(struct control *c, struct control_cycle
     return CONTROL_LATER;
 }
 
-static enum control_outcome do_cycle(struct control *c, const struct control_value *v, bool write, int64_t t_ns)
+static enum control_outcome start_cycle(const struct control_call *call, bool write)
 {
-    const struct control_value *strobe = &v[write ? WRITE_STROBE : READ_STROBE];
+    struct control *c = call->control;
+    const struct control_value *v = call->v, *strobe = &v[write ? WRITE_STROBE : READ_STROBE];
     struct control_cycle *k = control_cycle_free(c);
     if (!k) return control_reject(c, "state", "expected up to %u cycles in progress", CONTROL_CYCLES_MAX);
     if (c->waiting && c->client) return control_reject(c, "state", "another run is in progress");
@@ -38,19 +39,17 @@ static enum control_outcome do_cycle(struct control *c, const struct control_val
                                     .strobe_ns = strobe->given ? (int64_t)strobe->count : 0,
                                     .done = control_cycle_done,
                                     .ctx = k};
-    return submit_cycle(c, k, t_ns);
+    return submit_cycle(c, k, call->t_ns);
 }
 
-static enum control_outcome do_read(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+static enum control_outcome do_read(const struct control_call *call)
 {
-    (void)result;
-    return do_cycle(c, v, false, t_ns);
+    return start_cycle(call, false);
 }
 
-static enum control_outcome do_write(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+static enum control_outcome do_write(const struct control_call *call)
 {
-    (void)result;
-    return do_cycle(c, v, true, t_ns);
+    return start_cycle(call, true);
 }
 
 static bool has_bus(const struct control_bench *b, const struct control_value *v, struct control_error *why)

@@ -29,19 +29,18 @@ static bool can_be_sent(const struct control_bench *b, const struct control_valu
                             "a bus of this bench");
 }
 
-static enum control_outcome do_send(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+static enum control_outcome do_send(const struct control_call *call)
 {
-    const unsigned bus = bus_of(c->bench, v);
+    const unsigned bus = bus_of(call->bench, call->v);
     struct can_msg m;
-    (void)result;
-    (void)can_text_get(v[FRAME].text, &m);
-    switch (can_send(c->bench->bus[bus], c->bench->host[bus], &m, t_ns)) {
+    (void)can_text_get(call->v[FRAME].text, &m);
+    switch (can_send(call->bench->bus[bus], call->bench->host[bus], &m, call->t_ns)) {
     case CAN_OK:
         return CONTROL_DONE;
     case CAN_FULL:
-        return control_reject(c, "state", "the queue of %u frames to send is full", CAN_QUEUE_MAX);
+        return control_reject(call->control, "state", "the queue of %u frames to send is full", CAN_QUEUE_MAX);
     default:
-        return control_reject(c, "state", "this bus does not carry frames of this format");
+        return control_reject(call->control, "state", "this bus does not carry frames of this format");
     }
 }
 

@@ -11,41 +11,41 @@ static bool check_add(const struct control_bench *b, const struct control_value 
     return fault_make(b, v, &f, why);
 }
 
-static enum control_outcome do_add(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+static enum control_outcome do_add(const struct control_call *call)
 {
-    struct fault_engine *e = c->bench->faults;
+    struct fault_engine *e = call->bench->faults;
     struct fault f;
-    if (!e) return control_reject(c, "state", "no faults on this bench");
-    if (!fault_make(c->bench, v, &f, &c->error)) return CONTROL_REJECTED;
-    if (v[FAULT_AT_S].given && f.at_ns < t_ns) {
-        return control_reject(c, "range", "at_s: expected at least %.10g s (now), got %.10g", (double)t_ns * 1e-9,
-                              v[FAULT_AT_S].real);
+    if (!e) return control_reject(call->control, "state", "no faults on this bench");
+    if (!fault_make(call->bench, call->v, &f, &call->control->error)) return CONTROL_REJECTED;
+    if (call->v[FAULT_AT_S].given && f.at_ns < call->t_ns) {
+        return control_reject(call->control, "range", "at_s: expected at least %.10g s (now), got %.10g",
+                              (double)call->t_ns * 1e-9, call->v[FAULT_AT_S].real);
     }
-    const uint32_t id = fault_add(e, &f, t_ns);
+    const uint32_t id = fault_add(e, &f, call->t_ns);
     if (id == 0) {
-        return control_reject(c, "state", "expected up to %u faults, waiting or active; remove some with fault.clear",
-                              FAULTS_MAX);
+        return control_reject(call->control, "state",
+                              "expected up to %u faults, waiting or active; remove some with fault.clear", FAULTS_MAX);
     }
-    cJSON_AddNumberToObject(result, "id", id);
+    cJSON_AddNumberToObject(call->result, "id", id);
     return CONTROL_DONE;
 }
 
-static enum control_outcome do_clear(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+static enum control_outcome do_clear(const struct control_call *call)
 {
-    struct fault_engine *e = c->bench->faults;
+    struct fault_engine *e = call->bench->faults;
     unsigned cleared = 0;
-    if (!e) return control_reject(c, "state", "no faults on this bench");
-    if (v[0].given && !fault_find(e, (uint32_t)v[0].count)) {
-        return control_reject(c, "range", "id: expected an id that fault.list shows, got %llu",
-                              (unsigned long long)v[0].count);
+    if (!e) return control_reject(call->control, "state", "no faults on this bench");
+    if (call->v[0].given && !fault_find(e, (uint32_t)call->v[0].count)) {
+        return control_reject(call->control, "range", "id: expected an id that fault.list shows, got %llu",
+                              (unsigned long long)call->v[0].count);
     }
     for (unsigned i = 0; i < FAULTS_MAX; i++) {
         struct fault *f = &e->fault[i];
-        if (f->id == 0 || (v[0].given && f->id != v[0].count)) continue;
-        fault_clear(e, f, t_ns);
+        if (f->id == 0 || (call->v[0].given && f->id != call->v[0].count)) continue;
+        fault_clear(e, f, call->t_ns);
         cleared++;
     }
-    cJSON_AddNumberToObject(result, "cleared", cleared);
+    cJSON_AddNumberToObject(call->result, "cleared", cleared);
     return CONTROL_DONE;
 }
 
@@ -89,27 +89,25 @@ static void add_kind(cJSON *to, const struct fault_kind *k, const struct fault_t
     }
 }
 
-static enum control_outcome do_kinds(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+static enum control_outcome do_kinds(const struct control_call *call)
 {
-    cJSON *kinds = cJSON_AddArrayToObject(result, "kinds");
+    cJSON *kinds = cJSON_AddArrayToObject(call->result, "kinds");
     const struct fault_kind *k;
-    const struct fault_types types = fault_types_of(c->bench);
-    (void)v;
-    (void)t_ns;
+    const struct fault_types types = fault_types_of(call->bench);
     for (unsigned i = 0; (k = fault_kind(i)) != NULL; i++) add_kind(kinds, k, &types);
     return CONTROL_DONE;
 }
 
-static enum control_outcome do_points(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+static enum control_outcome do_points(const struct control_call *call)
 {
-    cJSON *points = cJSON_AddArrayToObject(result, "points");
+    cJSON *points = cJSON_AddArrayToObject(call->result, "points");
     struct fault_point p;
     char name[FAULT_POINT_MAX];
-    const struct fault_kind *k = v[0].given ? fault_kind_find(v[0].text) : NULL;
-    (void)t_ns;
-    if (v[0].given && !k)
-        return control_reject(c, "range", "kind: expected a name that fault.kinds lists, got \"%.40s\"", v[0].text);
-    for (unsigned n = 0; fault_point(c->bench, n, &p, name); n++) {
+    const struct fault_kind *k = call->v[0].given ? fault_kind_find(call->v[0].text) : NULL;
+    if (call->v[0].given && !k)
+        return control_reject(call->control, "range", "kind: expected a name that fault.kinds lists, got \"%.40s\"",
+                              call->v[0].text);
+    for (unsigned n = 0; fault_point(call->bench, n, &p, name); n++) {
         if (!k || k->places & FAULT_BIT(p.place)) cJSON_AddItemToArray(points, cJSON_CreateString(name));
     }
     return CONTROL_DONE;
@@ -149,13 +147,11 @@ static void fault_describe(const struct fault *f, cJSON *to)
     if (begun && f->state != FAULT_ACTIVE) cJSON_AddNumberToObject(to, "ended_s", (double)f->ended_ns * 1e-9);
 }
 
-static enum control_outcome do_list(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+static enum control_outcome do_list(const struct control_call *call)
 {
-    const struct fault_engine *e = c->bench->faults;
-    cJSON *faults = cJSON_AddArrayToObject(result, "faults");
+    const struct fault_engine *e = call->bench->faults;
+    cJSON *faults = cJSON_AddArrayToObject(call->result, "faults");
     const struct fault *next;
-    (void)v;
-    (void)t_ns;
     for (uint32_t last = 0; e; last = next->id) { /* in order of their coming */
         next = NULL;
         for (unsigned i = 0; i < FAULTS_MAX; i++) {

@@ -3,41 +3,35 @@
 
 static const char *const faces[] = {"direct", "reversed", "side", "side_reversed", NULL}; /* order of enum head_face */
 
-static void add_head(const struct head *h, cJSON *result, int64_t t_ns)
+static enum control_outcome do_read(const struct control_call *call)
 {
-    const bool rest = head_at_rest(h, t_ns);
-    cJSON_AddNumberToObject(result, "angle_deg", head_read_deg(h, t_ns));
-    cJSON_AddStringToObject(result, "face", head_face_name(h->face));
-    cJSON_AddBoolToObject(result, "at_rest", rest);
-    cJSON_AddNumberToObject(result, "rest_in_s", rest ? 0.0 : (double)(head_rest_ns(h) - t_ns) * 1e-9);
-}
-
-static enum control_outcome do_turn(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
-{
-    if (!head_at_rest(&c->bench->lab->head, t_ns)) {
-        return control_reject(c, "state", "the head is turning, at rest in %.3f s",
-                              (double)(head_rest_ns(&c->bench->lab->head) - t_ns) * 1e-9);
-    }
-    control_settle_inputs(c->bench, t_ns);
-    head_turn(&c->bench->lab->head, v[0].real, t_ns);
-    add_head(&c->bench->lab->head, result, t_ns);
+    const struct head *h = &call->bench->lab->head;
+    const int64_t rest_in_ns = head_at_rest(h, call->t_ns) ? 0 : head_rest_ns(h) - call->t_ns;
+    cJSON_AddNumberToObject(call->result, "angle_deg", head_read_deg(h, call->t_ns));
+    cJSON_AddStringToObject(call->result, "face", head_face_name(h->face));
+    cJSON_AddBoolToObject(call->result, "at_rest", head_at_rest(h, call->t_ns));
+    cJSON_AddNumberToObject(call->result, "rest_in_s", (double)rest_in_ns * 1e-9);
     return CONTROL_DONE;
 }
 
-static enum control_outcome do_mount(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+static enum control_outcome do_turn(const struct control_call *call)
 {
-    if (!head_at_rest(&c->bench->lab->head, t_ns)) return control_reject(c, "state", "the head is turning");
-    control_settle_inputs(c->bench, t_ns);
-    head_mount(&c->bench->lab->head, (enum head_face)v[0].choice, t_ns);
-    add_head(&c->bench->lab->head, result, t_ns);
-    return CONTROL_DONE;
+    struct head *h = &call->bench->lab->head;
+    if (!head_at_rest(h, call->t_ns))
+        return control_reject(call->control, "state", "the head is turning, at rest in %.3f s",
+                              (double)(head_rest_ns(h) - call->t_ns) * 1e-9);
+    control_settle_inputs(call->bench, call->t_ns);
+    head_turn(h, call->v[0].real, call->t_ns);
+    return do_read(call);
 }
 
-static enum control_outcome do_read(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+static enum control_outcome do_mount(const struct control_call *call)
 {
-    (void)v;
-    add_head(&c->bench->lab->head, result, t_ns);
-    return CONTROL_DONE;
+    struct head *h = &call->bench->lab->head;
+    if (!head_at_rest(h, call->t_ns)) return control_reject(call->control, "state", "the head is turning");
+    control_settle_inputs(call->bench, call->t_ns);
+    head_mount(h, (enum head_face)call->v[0].choice, call->t_ns);
+    return do_read(call);
 }
 
 // clang-format off

@@ -2,29 +2,29 @@
 #include "command/args.h"
 #include "control/commands.h"
 
-static struct platform *platform_of(const struct control_bench *b)
-{
-    return b->lab && b->lab->platform.cfg.present ? &b->lab->platform : NULL;
-}
-
 static bool has_vehicle(const struct control_bench *b, const struct control_value *v, struct control_error *why)
 {
     (void)v;
-    return platform_of(b) || control_reject_in(why, "state", "this scenario has no platform and no vehicle");
+    return (b->lab && b->lab->platform.cfg.present) ||
+           control_reject_in(why, "state", "this scenario has no platform and no vehicle");
 }
 
-static enum control_outcome do_attitude(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+static struct vehicle *settled_vehicle(const struct control_call *call)
 {
-    struct platform *p = platform_of(c->bench);
-    (void)result;
-    control_settle_inputs(c->bench, t_ns);
-    vehicle_attitude(platform_vehicle(p, t_ns), v[0].real, v[1].real, v[2].real, t_ns);
+    control_settle_inputs(call->bench, call->t_ns);
+    return platform_vehicle(&call->bench->lab->platform, call->t_ns);
+}
+
+static enum control_outcome do_attitude(const struct control_call *call)
+{
+    const struct control_value *v = call->v;
+    vehicle_attitude(settled_vehicle(call), v[0].real, v[1].real, v[2].real, call->t_ns);
     return CONTROL_DONE;
 }
 
-static enum control_outcome do_sway(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+static enum control_outcome do_sway(const struct control_call *call)
 {
-    struct platform *p = platform_of(c->bench);
+    const struct control_value *v = call->v;
     const struct vehicle_sway sway = {.pitch_arcmin = v[0].real,
                                       .pitch_s = v[1].real,
                                       .roll_arcmin = v[2].real,
@@ -33,18 +33,13 @@ static enum control_outcome do_sway(struct control *c, const struct control_valu
                                       .east_s = v[5].real,
                                       .north_mg = v[6].real,
                                       .north_s = v[7].real};
-    (void)result;
-    control_settle_inputs(c->bench, t_ns);
-    vehicle_sway(platform_vehicle(p, t_ns), &sway, t_ns);
+    vehicle_sway(settled_vehicle(call), &sway, call->t_ns);
     return CONTROL_DONE;
 }
 
-static enum control_outcome do_fly(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+static enum control_outcome do_fly(const struct control_call *call)
 {
-    struct platform *p = platform_of(c->bench);
-    (void)result;
-    control_settle_inputs(c->bench, t_ns);
-    vehicle_fly(platform_vehicle(p, t_ns), v[0].real, v[1].real, t_ns);
+    vehicle_fly(settled_vehicle(call), call->v[0].real, call->v[1].real, call->t_ns);
     return CONTROL_DONE;
 }
 
@@ -59,12 +54,11 @@ static bool has_modes(const struct control_bench *b, const struct control_value 
            control_reject_in(why, "state", "unit: expected a gyro unit, got %s, a %s", u->cfg.name, u->type->title);
 }
 
-static enum control_outcome do_mode(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+static enum control_outcome do_mode(const struct control_call *call)
 {
-    struct unit *u = c->bench->unit[v[0].unit];
-    (void)result;
-    const char *why = u->type->platform->set_mode(u->board, v[1].choice, t_ns);
-    return why ? control_reject(c, "state", "%s", why) : CONTROL_DONE;
+    struct unit *u = call->bench->unit[call->v[0].unit];
+    const char *why = u->type->platform->set_mode(u->board, call->v[1].choice, call->t_ns);
+    return why ? control_reject(call->control, "state", "%s", why) : CONTROL_DONE;
 }
 
 // clang-format off

@@ -6,22 +6,24 @@ static enum control_outcome reject_unavailable(struct control *c)
     return control_reject(c, "state", "not available on this bench");
 }
 
-static enum control_outcome do_snapshot(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+static enum control_outcome do_snapshot(const struct control_call *call)
 {
-    (void)t_ns;
-    if (!c->bench->process.snapshot) return reject_unavailable(c);
-    c->error.code = "state";
-    return c->bench->process.snapshot(c->bench->ctx, v[0].text, result, c->error.why) ? CONTROL_DONE : CONTROL_REJECTED;
+    if (!call->bench->process.snapshot) return reject_unavailable(call->control);
+    call->control->error.code = "state";
+    return call->bench->process.snapshot(call->bench->ctx, call->v[0].text, call->result, call->control->error.why)
+               ? CONTROL_DONE
+               : CONTROL_REJECTED;
 }
 
-static enum control_outcome do_fork(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+static enum control_outcome do_fork(const struct control_call *call)
 {
-    (void)t_ns;
-    if (!c->bench->process.fork) return reject_unavailable(c);
-    const struct control_fork f = {
-        .control = v[0].text, .can = v[1].given ? v[1].text : "none", .truth = v[2].given ? v[2].text : NULL};
-    c->error.code = "machine";
-    return c->bench->process.fork(c->bench->ctx, &f, result, c->error.why) ? CONTROL_DONE : CONTROL_REJECTED;
+    if (!call->bench->process.fork) return reject_unavailable(call->control);
+    const struct control_fork f = {.control = call->v[0].text,
+                                   .can = call->v[1].given ? call->v[1].text : "none",
+                                   .truth = call->v[2].given ? call->v[2].text : NULL};
+    call->control->error.code = "machine";
+    return call->bench->process.fork(call->bench->ctx, &f, call->result, call->control->error.why) ? CONTROL_DONE
+                                                                                                   : CONTROL_REJECTED;
 }
 
 // clang-format off

@@ -168,24 +168,21 @@ static void add_state(const struct control_bench *b, unsigned unit, cJSON *to, i
 
 /* ---- the commands */
 
-static enum control_outcome do_help(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+static enum control_outcome do_help(const struct control_call *call)
 {
-    (void)v;
-    (void)t_ns;
-    describe_commands(c, result);
+    describe_commands(call->control, call->result);
     return CONTROL_DONE;
 }
 
-static enum control_outcome do_truth(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+static enum control_outcome do_truth(const struct control_call *call)
 {
-    (void)v;
-    add_truth(c->bench, result, t_ns);
+    add_truth(call->bench, call->result, call->t_ns);
     return CONTROL_DONE;
 }
 
-static enum control_outcome do_state(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+static enum control_outcome do_state(const struct control_call *call)
 {
-    add_state(c->bench, v[0].unit, result, t_ns);
+    add_state(call->bench, call->v[0].unit, call->result, call->t_ns);
     return CONTROL_DONE;
 }
 

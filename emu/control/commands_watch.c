@@ -17,78 +17,69 @@ static bool check_until(const struct control_bench *b, const struct control_valu
     return control_event_find(b, v[1].unit, "event", v[0].text, &event, why);
 }
 
-static enum control_outcome do_until(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+static enum control_outcome do_until(const struct control_call *call)
 {
-    (void)result;
-    (void)t_ns;
-    const struct control_bench *b = c->bench;
-    const uint64_t count = v[2].given ? v[2].count : 1;
-    const double limit_s = v[3].given ? v[3].real : 60.0;
+    const struct control_bench *b = call->bench;
+    const uint64_t count = call->v[2].given ? call->v[2].count : 1;
+    const double limit_s = call->v[3].given ? call->v[3].real : 60.0;
     unsigned event;
-    if (c->waiting) return control_reject(c, "state", "another run is in progress");
-    if (!control_event_find(b, v[1].unit, "event", v[0].text, &event, &c->error)) return CONTROL_REJECTED;
-    if (!b->sim.run(b->ctx, (int64_t)nearbyint(limit_s * 1e9), v[4].count, c->error.why)) return from_bench(c, false);
-    control_watch_until(c, event, v[1].unit, count);
+    if (call->control->waiting) return control_reject(call->control, "state", "another run is in progress");
+    if (!control_event_find(b, call->v[1].unit, "event", call->v[0].text, &event, &call->control->error))
+        return CONTROL_REJECTED;
+    if (!b->sim.run(b->ctx, (int64_t)nearbyint(limit_s * 1e9), call->v[4].count, call->control->error.why))
+        return from_bench(call->control, false);
+    control_watch_until(call->control, event, call->v[1].unit, count);
     return CONTROL_LATER;
 }
 
-static enum control_outcome do_subscribe(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+static enum control_outcome do_subscribe(const struct control_call *call)
 {
-    (void)result;
-    const double every_s = v[1].given ? v[1].real : 0.1;
-    if (!c->bench->process.push) return control_reject(c, "state", "no subscriptions on this bench");
-    if (control_subscribe(c, c->client, (enum control_topic)v[0].choice, (int64_t)nearbyint(every_s * 1e9), t_ns)) {
+    const double every_s = call->v[1].given ? call->v[1].real : 0.1;
+    if (!call->bench->process.push) return control_reject(call->control, "state", "no subscriptions on this bench");
+    if (control_subscribe(call->control, call->control->client, (enum control_topic)call->v[0].choice,
+                          (int64_t)nearbyint(every_s * 1e9), call->t_ns)) {
         return CONTROL_DONE;
     }
-    return control_reject(c, "state", "expected up to %u subscriptions", CONTROL_SUBS_MAX);
+    return control_reject(call->control, "state", "expected up to %u subscriptions", CONTROL_SUBS_MAX);
 }
 
-static enum control_outcome do_unsubscribe(struct control *c, const struct control_value *v, cJSON *result,
-                                           int64_t t_ns)
+static enum control_outcome do_unsubscribe(const struct control_call *call)
 {
-    (void)result;
-    (void)t_ns;
-    if (v[0].given) control_unsubscribe(c, c->client, (enum control_topic)v[0].choice);
-    else control_gone(c, c->client);
+    if (call->v[0].given)
+        control_unsubscribe(call->control, call->control->client, (enum control_topic)call->v[0].choice);
+    else control_gone(call->control, call->control->client);
     return CONTROL_DONE;
 }
 
-static enum control_outcome do_lines(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+static enum control_outcome do_lines(const struct control_call *call)
 {
-    if (!c->bench->units) return control_reject(c, "state", "this bench has no unit");
-    const uint64_t level = control_lines(c, v[0].unit, t_ns);
-    cJSON *lines = cJSON_AddObjectToObject(result, "lines");
-    const struct board_type *type = c->bench->unit[v[0].unit]->type;
+    if (!call->bench->units) return control_reject(call->control, "state", "this bench has no unit");
+    const uint64_t level = control_lines(call->control, call->v[0].unit, call->t_ns);
+    cJSON *lines = cJSON_AddObjectToObject(call->result, "lines");
+    const struct board_type *type = call->bench->unit[call->v[0].unit]->type;
     for (unsigned i = 0; i < type->line_count; i++) {
         cJSON_AddNumberToObject(lines, type->lines[i].name, (double)(level >> i & 1));
     }
     return CONTROL_DONE;
 }
 
-static enum control_outcome do_vcd_start(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+static enum control_outcome do_vcd_start(const struct control_call *call)
 {
-    const struct control_bench *b = c->bench;
-    (void)result;
-    (void)t_ns;
-    if (!b->recording.start || !b->units) return control_reject(c, "state", "no recordings on this bench");
-    return from_bench(c, b->recording.start(b->ctx, v[0].text, v[1].unit, c->error.why));
+    const struct control_bench *b = call->bench;
+    if (!b->recording.start || !b->units) return control_reject(call->control, "state", "no recordings on this bench");
+    return from_bench(call->control,
+                      b->recording.start(b->ctx, call->v[0].text, call->v[1].unit, call->control->error.why));
 }
 
-static enum control_outcome do_vcd_stop(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+static enum control_outcome do_vcd_stop(const struct control_call *call)
 {
-    (void)v;
-    (void)result;
-    (void)t_ns;
-    if (!c->bench->recording.stop) return control_reject(c, "state", "no recording");
-    return from_bench(c, c->bench->recording.stop(c->bench->ctx, c->error.why));
+    if (!call->bench->recording.stop) return control_reject(call->control, "state", "no recording");
+    return from_bench(call->control, call->bench->recording.stop(call->bench->ctx, call->control->error.why));
 }
 
-static enum control_outcome do_vcd_flush(struct control *c, const struct control_value *v, cJSON *result, int64_t t_ns)
+static enum control_outcome do_vcd_flush(const struct control_call *call)
 {
-    (void)v;
-    (void)result;
-    (void)t_ns;
-    return from_bench(c, c->bench->recording.flush(c->bench->ctx, c->error.why));
+    return from_bench(call->control, call->bench->recording.flush(call->bench->ctx, call->control->error.why));
 }
 
 // clang-format off

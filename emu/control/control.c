@@ -17,7 +17,9 @@ void control_init(struct control *c, const struct control_table *const *tables, 
 enum control_outcome control_do(struct control *c, const struct control_command *row, const struct control_value *v,
                                 cJSON *result, int64_t t_ns)
 {
-    const enum control_outcome outcome = row->run(c, v, result, t_ns);
+    const struct control_call call = {c, c->bench, v, result, t_ns};
+    const char *missing = row->missing ? row->missing(c->bench) : NULL;
+    const enum control_outcome outcome = missing ? control_reject(c, "state", "%s", missing) : row->run(&call);
     /* Rejected by its handler, too: converters may have taken their inputs by then, which moves their noise. */
     if (row->changes && c->bench->process.journal) {
         cJSON *args = control_args_json(row, v);

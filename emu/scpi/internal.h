@@ -11,13 +11,24 @@ struct scpi_failure {
     char what[CONTROL_WHY_MAX];
 };
 
+struct scpi_call;
+
 /* A command of every instrument: common ones, STATus, SYSTem. */
 struct scpi_command {
     const char *pattern; /* with ? if it asks */
     const char *what;
-    void (*run)(struct scpi *s, const struct scpi_command *row, unsigned value, int64_t t_ns);
-    unsigned max;  /* of its one parameter, an integer from 0; 0: it takes none */
-    size_t offset; /* of the register it is about, in struct scpi_status */
+    void (*run)(const struct scpi_call *call);
+    unsigned max;       /* of its one parameter, an integer from 0; 0: it takes none */
+    size_t offset;      /* of the register it is about, in struct scpi_status */
+    const char *answer; /* always the same */
+};
+
+/* One execution of it. */
+struct scpi_call {
+    struct scpi *s;
+    const struct scpi_command *row;
+    unsigned value; /* of the parameter */
+    int64_t t_ns;
 };
 
 const struct scpi_command *scpi_common(unsigned i); /* NULL past the last */

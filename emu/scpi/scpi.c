@@ -82,7 +82,7 @@ static bool do_common(struct scpi *s, const struct scpi_command *row, const stru
     if (row->max && p->text.n) return fail_unit(s, -138, range);
     if (row->max && !(p->number > -0.5 && p->number < row->max + 0.5)) return fail_unit(s, -222, range);
     scpi_look(s, t_ns);
-    row->run(s, row, row->max ? (unsigned)(p->number + 0.5) : 0, t_ns);
+    row->run(&(struct scpi_call){s, row, row->max ? (unsigned)(p->number + 0.5) : 0, t_ns});
     return true;
 }
 
