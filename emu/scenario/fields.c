@@ -165,12 +165,12 @@ bool yaml_load_value(struct yaml_file *f, const struct yaml_node *node, const st
 
 /* ---- sections */
 
-static bool fail_unknown(struct yaml_file *f, const struct yaml_node *key, const struct yaml_fields *t)
+bool yaml_fail_unknown(struct yaml_file *f, const struct yaml_node *key, const char *(*name)(const void *ctx, size_t i),
+                       const void *ctx)
 {
     char known[600] = "";
-    const char *name;
-    for (size_t i = 0; (name = key_at(t, i)); i++) why_list_add(known, sizeof known, name);
-    const char *text = yaml_scalar(key), *near = text ? yaml_nearest(text, key_at, t) : NULL;
+    for (size_t i = 0; name(ctx, i); i++) why_list_add(known, sizeof known, name(ctx, i));
+    const char *text = yaml_scalar(key), *near = text ? yaml_nearest(text, name, ctx) : NULL;
     const bool unit = near && strncmp(near, text, strlen(text)) == 0 && *yaml_unit(near);
     return yaml_file_fail(f, key, text ? text : "?", "unknown key%s%s%s; expected one of %s", near ? ", nearest: " : "",
                           near ? near : "", unit ? " (its unit is part of the name)" : "", known);
@@ -195,7 +195,7 @@ static bool load_pair(struct yaml_file *f, const struct yaml_node *node, const s
             return yaml_file_fail(f, pair->key, name, "expected the key once, got it twice");
         return yaml_load_value(f, pair->value, d, section + offset);
     }
-    return fail_unknown(f, pair->key, t);
+    return yaml_fail_unknown(f, pair->key, key_at, t);
 }
 
 bool yaml_load(struct yaml_file *f, const struct yaml_node *node, const char *name, const struct yaml_fields *t,
@@ -292,6 +292,13 @@ void yaml_dump(const struct yaml_fields *t, const void *section, cJSON *to)
         if (d->type == YAML_SECTION && d->present && !*(const bool *)(base + d->present)) continue;
         cJSON_AddItemToObject(to, d->key, yaml_dump_value(d, base));
     }
+}
+
+void yaml_dump_list(const struct yaml_fields *t, const void *first, size_t size, size_t count, const char *key,
+                    cJSON *to)
+{
+    cJSON *list = cJSON_AddArrayToObject(to, key);
+    for (size_t i = 0; i < count; i++) cJSON_AddItemToArray(list, section_of(t, (const char *)first + i * size));
 }
 
 /* ---- arguments that somebody else checks */

@@ -63,8 +63,16 @@ bool yaml_load_value(struct yaml_file *f, const struct yaml_node *node, const st
 bool yaml_load(struct yaml_file *f, const struct yaml_node *node, const char *name, const struct yaml_fields *t,
                void *section);
 
+/* The error of a key that is none of name(ctx, i), i = 0 ... NULL; false. */
+bool yaml_fail_unknown(struct yaml_file *f, const struct yaml_node *key, const char *(*name)(const void *ctx, size_t i),
+                       const void *ctx);
+
 /* Adds every key with its value. */
 void yaml_dump(const struct yaml_fields *t, const void *section, cJSON *to);
+
+/* Adds a list of mappings: `count` structs of `size` bytes in a row. */
+void yaml_dump_list(const struct yaml_fields *t, const void *first, size_t size, size_t count, const char *key,
+                    cJSON *to);
 
 /* The row's value; NULL for one that has none of its own. */
 cJSON *yaml_dump_value(const struct yaml_field *d, const void *section);

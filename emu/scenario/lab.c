@@ -162,12 +162,7 @@ static bool load_axes(struct yaml_file *f, const struct yaml_node *node, void *s
 static void dump_axes(const struct yaml_field *d, const void *section, cJSON *to)
 {
     const struct table_cfg *t = section;
-    cJSON *list = cJSON_AddArrayToObject(to, d->key);
-    for (unsigned i = 0; i < t->axes; i++) {
-        cJSON *j = cJSON_CreateObject();
-        yaml_dump(&scenario_axis_of_table_fields, &t->axis[i], j);
-        cJSON_AddItemToArray(list, j);
-    }
+    yaml_dump_list(&scenario_axis_of_table_fields, t->axis, sizeof *t->axis, t->axes, d->key, to);
 }
 
 bool scenario_load_table(struct yaml_file *f, const struct yaml_node *node, void *section)

@@ -1,7 +1,6 @@
 #include "scenario/profile.h"
 
 #include "base/why.h"
-#include "command/exact.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -44,22 +43,12 @@ static const char *key_at(const void *ctx, size_t i)
     return i < t->field_count ? t->fields[i].key : NULL;
 }
 
-static bool fail_unknown(struct yaml_file *f, const struct yaml_node *key_node, const char *key,
-                         const struct board_type *t)
-{
-    char known[400] = "";
-    for (size_t i = 0; i < t->field_count; i++) why_list_add(known, sizeof known, t->fields[i].key);
-    const char *near = yaml_nearest(key, key_at, t);
-    return yaml_file_fail(f, key_node, key, "unknown key%s%s; expected one of %s", near ? ", nearest: " : "",
-                          near ? near : "", known);
-}
-
 static bool load_pair(struct yaml_file *f, const struct yaml_item *pair, struct fill *fill)
 {
     const char *key = yaml_scalar(pair->key);
     if (!key) return yaml_file_expected(f, pair->key, NULL, "a key of one word");
     const struct board_field *field = board_field_find(fill->type->fields, fill->type->field_count, key);
-    if (!field) return fail_unknown(f, pair->key, key, fill->type);
+    if (!field) return yaml_fail_unknown(f, pair->key, key_at, fill->type);
     bool *seen = &fill->seen[field - fill->type->fields];
     if (*seen) return yaml_file_fail(f, pair->key, key, "expected the key once, got it twice");
     *seen = true;
@@ -147,49 +136,31 @@ bool profile_yaml_load(const char *path, const struct board_name **board, union 
 
 /* ---- the way back */
 
-static cJSON *number_of(const void *at)
+struct yaml_field profile_yaml_field(const struct board_field *d)
 {
-    char digits[EXACT_MAX];
-    double v;
-    memcpy(&v, at, sizeof v);
-    exact_number(v, digits);
-    return cJSON_CreateRaw(digits);
-}
-
-static cJSON *list_of(const struct board_field *d, const void *profile)
-{
-    char text[128];
-    cJSON *list = cJSON_CreateArray();
-    for (unsigned i = 0; d->type == BOARD_FIELD_REALS && i < d->count; i++)
-        cJSON_AddItemToArray(list, number_of((const char *)profile + d->offset + i * sizeof(double)));
-    for (unsigned i = 0; d->type == BOARD_FIELD_LIST && d->text(profile, i, text, sizeof text); i++)
-        cJSON_AddItemToArray(list, cJSON_CreateString(text));
-    return list;
+    static const enum yaml_type types[] = {
+        [BOARD_FIELD_STRING] = YAML_TEXT, [BOARD_FIELD_UINT] = YAML_U32,      [BOARD_FIELD_REAL] = YAML_REAL,
+        [BOARD_FIELD_BOOL] = YAML_BOOL,   [BOARD_FIELD_CHOICE] = YAML_CHOICE, [BOARD_FIELD_REALS] = YAML_REALS,
+        [BOARD_FIELD_LIST] = YAML_CUSTOM};
+    return (struct yaml_field){.key = d->key,
+                               .type = types[d->type],
+                               .offset = d->offset,
+                               .min = d->min,
+                               .max = d->max,
+                               .what = d->what,
+                               .choices = d->choices,
+                               .count = d->count};
 }
 
 cJSON *profile_dump_field(const struct board_field *d, const void *profile)
 {
-    const void *at = (const char *)profile + d->offset;
-    unsigned integer;
-    int choice;
-    switch (d->type) {
-    case BOARD_FIELD_STRING:
-        return cJSON_CreateString(at);
-    case BOARD_FIELD_UINT:
-        memcpy(&integer, at, sizeof integer);
-        return cJSON_CreateNumber(integer);
-    case BOARD_FIELD_REAL:
-        return number_of(at);
-    case BOARD_FIELD_BOOL:
-        return cJSON_CreateBool(*(const bool *)at);
-    case BOARD_FIELD_CHOICE:
-        memcpy(&choice, at, sizeof choice);
-        return cJSON_CreateString(d->choices[choice]);
-    case BOARD_FIELD_REALS:
-    case BOARD_FIELD_LIST:
-        break;
-    }
-    return list_of(d, profile);
+    char text[128];
+    const struct yaml_field row = profile_yaml_field(d);
+    if (d->type != BOARD_FIELD_LIST) return yaml_dump_value(&row, profile);
+    cJSON *list = cJSON_CreateArray();
+    for (unsigned i = 0; d->text(profile, i, text, sizeof text); i++)
+        cJSON_AddItemToArray(list, cJSON_CreateString(text));
+    return list;
 }
 
 cJSON *profile_dump(const struct board_type *type, const void *profile)

@@ -4,7 +4,7 @@
 #ifndef PSABENCH_SCENARIO_PROFILE_H
 #define PSABENCH_SCENARIO_PROFILE_H
 
-#include "scenario/yaml_file.h"
+#include "scenario/fields.h"
 #include "unit/boards.h"
 
 #include <cjson/cJSON.h>
@@ -26,6 +26,9 @@ bool profile_yaml_check(struct yaml_file *f, const struct yaml_node *mapping, co
 
 /* Every field by its key, as YAML takes it again. */
 cJSON *profile_dump(const struct board_type *type, const void *profile);
+
+/* A field as a row of a table of keys; a LIST is CUSTOM without functions. */
+struct yaml_field profile_yaml_field(const struct board_field *d);
 
 /* One of them. */
 cJSON *profile_dump_field(const struct board_field *d, const void *profile);

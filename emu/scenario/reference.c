@@ -55,71 +55,59 @@ static void print_range(FILE *out, const struct yaml_field *d)
     const bool number = d->type == YAML_REAL || d->type == YAML_U8 || d->type == YAML_U32 || d->type == YAML_U64 ||
                         d->type == YAML_REALS || d->type == YAML_EACH;
     if (d->type == YAML_U64) fprintf(out, "0 to 2^64 - 1");
-    else if (number) fprintf(out, "%.10g to %.10g", d->min, d->max);
-    if (d->type == YAML_TEXT) fprintf(out, "1 to %d characters", (int)d->max - 1);
+    else if (number && d->min < d->max) fprintf(out, "%.10g to %.10g", d->min, d->max);
+    if (d->type == YAML_TEXT && d->max > 0) fprintf(out, "1 to %d characters", (int)d->max - 1);
     for (unsigned i = 0; d->type == YAML_CHOICE && d->choices[i]; i++)
         fprintf(out, "%s`%s`", i ? ", " : "", d->choices[i]);
 }
 
-static void print_default(FILE *out, const struct yaml_field *d, const void *section)
+static void print_heading(FILE *out, const char *title, const char *words)
 {
-    cJSON *j = section && d->type != YAML_SECTION ? yaml_dump_value(d, section) : NULL;
-    char *text = j ? cJSON_PrintUnformatted(j) : NULL;
-    fprintf(out, "%s", text ? text : "");
+    fprintf(out, "### %s\n\n%s\n\n| key | kind, unit | range | default | meaning |\n|---|---|---|---|---|\n", title,
+            words);
+}
+
+/* value: the default, deleted here; NULL: none. */
+static void print_row(FILE *out, const struct yaml_field *d, cJSON *value)
+{
+    char *text = value ? cJSON_PrintUnformatted(value) : NULL;
+    fprintf(out, "| `%s` | ", d->key);
+    print_kind(out, d);
+    fprintf(out, " | ");
+    print_range(out, d);
+    fprintf(out, " | %s | %s |\n", text ? text : "", d->what);
     cJSON_free(text);
-    cJSON_Delete(j);
+    cJSON_Delete(value);
 }
 
 static void print_chapter(FILE *out, const struct chapter *c, const struct scenario *s)
 {
     const char *section = c->offset == NO_DEFAULTS ? NULL : (const char *)s + c->offset;
     const struct yaml_field *d;
+    char title[64] = "Scenario";
     size_t offset;
-    fprintf(out, "%s%s%s%s\n\n| key | kind, unit | range | default | meaning |\n|---|---|---|---|---|\n",
-            *c->path ? "### `" : "### ", *c->path ? c->path : "Scenario", *c->path ? "`\n\n" : "\n\n", c->words);
-    for (size_t i = 0; (d = yaml_row(c->rows, i, &offset)); i++) {
-        fprintf(out, "| `%s` | ", d->key);
-        print_kind(out, d);
-        fprintf(out, " | ");
-        print_range(out, d);
-        fprintf(out, " | ");
-        print_default(out, d, section ? section + offset : NULL);
-        fprintf(out, " | %s |\n", d->what);
-    }
+    if (*c->path) snprintf(title, sizeof title, "`%s`", c->path);
+    print_heading(out, title, c->words);
+    for (size_t i = 0; (d = yaml_row(c->rows, i, &offset)); i++)
+        print_row(out, d, section && d->type != YAML_SECTION ? yaml_dump_value(d, section + offset) : NULL);
     fprintf(out, "\n");
-}
-
-static void print_profile_range(FILE *out, const struct board_field *d)
-{
-    const bool number = d->type == BOARD_FIELD_UINT || d->type == BOARD_FIELD_REAL || d->type == BOARD_FIELD_REALS;
-    if (number) fprintf(out, "%.10g to %.10g", d->min, d->max);
-    for (unsigned i = 0; d->type == BOARD_FIELD_CHOICE && d->choices[i]; i++)
-        fprintf(out, "%s`%s`", i ? ", " : "", d->choices[i]);
 }
 
 static void print_profile(FILE *out, const struct board_type *t)
 {
-    static const char *const kinds[] = {
-        [BOARD_FIELD_STRING] = "text",  [BOARD_FIELD_UINT] = "integer",    [BOARD_FIELD_REAL] = "number",
-        [BOARD_FIELD_BOOL] = "boolean", [BOARD_FIELD_CHOICE] = "one word", [BOARD_FIELD_REALS] = "list",
-        [BOARD_FIELD_LIST] = "list"};
+    char title[96], words[96];
     union board_profile_store p;
     memset(&p, 0, sizeof p);
     t->profile_default(&p);
-    fprintf(out,
-            "### %s: `units[].profile_set`, and a file of proto/profiles\n\nThe board. The defaults are those of "
-            "`%s`.\n\n| key | kind, unit | range | default | meaning |\n|---|---|---|---|---|\n",
-            t->title, t->profile_name);
+    snprintf(title, sizeof title, "%s: `units[].profile_set`, and a file of proto/profiles", t->title);
+    snprintf(words, sizeof words, "The board. The defaults are those of `%s`.", t->profile_name);
+    print_heading(out, title, words);
     for (unsigned i = 0; i < t->field_count; i++) {
-        const struct board_field *d = &t->fields[i];
-        const char *unit = yaml_unit(d->key);
-        cJSON *j = profile_dump_field(d, &p);
-        char *text = cJSON_PrintUnformatted(j);
-        fprintf(out, "| `%s` | %s%s%s | ", d->key, kinds[d->type], *unit ? ", " : "", unit);
-        print_profile_range(out, d);
-        fprintf(out, " | %s | %s |\n", text ? text : "", d->what);
-        cJSON_free(text);
-        cJSON_Delete(j);
+        struct yaml_field d = profile_yaml_field(&t->fields[i]);
+        if (d.type == YAML_CUSTOM || d.type == YAML_TEXT) d.max = d.min = 0; /* of elements and characters */
+        if (d.type == YAML_CUSTOM) d.type = YAML_REALS;
+        d.count = 0;
+        print_row(out, &d, profile_dump_field(&t->fields[i], &p));
     }
     fprintf(out, "\n");
 }

@@ -77,12 +77,7 @@ static bool buses_are_loaded(struct yaml_file *f, const struct yaml_node *node, 
 static void dump_buses(const struct yaml_field *d, const void *section, cJSON *to)
 {
     const struct scenario *s = section;
-    cJSON *list = cJSON_AddArrayToObject(to, d->key);
-    for (unsigned i = 0; i < s->bus_count; i++) {
-        cJSON *j = cJSON_CreateObject();
-        yaml_dump(&scenario_buses_fields, &s->bus[i], j);
-        cJSON_AddItemToArray(list, j);
-    }
+    yaml_dump_list(&scenario_buses_fields, s->bus, sizeof *s->bus, s->bus_count, d->key, to);
 }
 
 /* ---- units and their spread */
@@ -229,12 +224,7 @@ static bool load_faults(struct yaml_file *f, const struct yaml_node *node, void 
 static void dump_timeline(const struct yaml_field *d, const void *section, cJSON *to)
 {
     const struct scenario_events *t = &((const struct scenario *)section)->timeline;
-    cJSON *list = cJSON_AddArrayToObject(to, d->key);
-    for (unsigned i = 0; i < t->count; i++) {
-        cJSON *j = cJSON_CreateObject();
-        yaml_dump(&scenario_event_fields, &t->event[i], j);
-        cJSON_AddItemToArray(list, j);
-    }
+    yaml_dump_list(&scenario_event_fields, t->event, sizeof *t->event, t->count, d->key, to);
 }
 
 static void dump_faults(const struct yaml_field *d, const void *section, cJSON *to)
