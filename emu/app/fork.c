@@ -1,6 +1,8 @@
 #define _GNU_SOURCE /* pipe2 */
 #include "app/service.h"
 
+#include "base/why.h"
+
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -33,10 +35,7 @@ static bool redirect_to_null(int keep)
 
 static bool take_over(struct service *s, const struct options *o, int out_fd, char *why, size_t cap)
 {
-    if (!redirect_to_null(out_fd)) {
-        snprintf(why, cap, "/dev/null or /proc: %s", strerror(errno));
-        return false;
-    }
+    if (!redirect_to_null(out_fd)) return why_fail(why, cap, "/dev/null or /proc: %s", strerror(errno));
     service_abandon(s);
     return service_reopen(s, o, why, cap);
 }
@@ -75,8 +74,8 @@ static bool put_result(pid_t pid, char *text, cJSON *result, char *why)
 {
     if (strncmp(text, failure, sizeof failure - 1) == 0 || !strstr(text, "ready all\n")) {
         text[strcspn(text, "\n")] = '\0';
-        snprintf(why, CONTROL_WHY_MAX, "%.240s", text[0] ? text + sizeof failure - 1 : "the child ended at once");
-        return false;
+        return why_fail(why, CONTROL_WHY_MAX, "%.240s",
+                        text[0] ? text + sizeof failure - 1 : "the child ended at once");
     }
     cJSON_AddNumberToObject(result, "pid", pid);
     ports_add_endpoints(result, text);
@@ -126,6 +125,5 @@ bool fork_service(struct service *s, const struct control_fork *f, cJSON *result
     if (pid > 0) read_all(pipe_fd[0], text, sizeof text);
     close(pipe_fd[0]);
     if (pid > 0) return put_result(pid, text, result, why);
-    snprintf(why, CONTROL_WHY_MAX, "fork: %s", strerror(err));
-    return false;
+    return why_fail(why, CONTROL_WHY_MAX, "fork: %s", strerror(err));
 }

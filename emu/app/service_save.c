@@ -1,6 +1,8 @@
 /* The journal, snapshots, and the state that the child of a fork takes over. */
 #include "app/service.h"
 
+#include "base/why.h"
+
 #include <inttypes.h>
 #include <string.h>
 
@@ -37,10 +39,7 @@ bool service_restore(struct service *s, const struct snapshot *from, char *why, 
     for (unsigned i = 0; i < w.buses; i++) w.hub[i] = &s->ports.hub[i];
     service_power_up(s);
     s->powered = true;
-    if (!snapshot_replay(from, &w, what, sizeof what)) {
-        snprintf(why, cap, "%s: %s", s->o->restore, what);
-        return false;
-    }
+    if (!snapshot_replay(from, &w, what, sizeof what)) return why_fail(why, cap, "%s: %s", s->o->restore, what);
     s->connections = s->ports.connections;
     if (s->loop.end_ns < SCHED_NEVER) s->loop.end_ns += s->bench->sched.now_ns;
     return true;

@@ -1,6 +1,7 @@
 #include "bench/journal.h"
 
 #include "base/can_text.h"
+#include "base/why.h"
 #include "command/exact.h"
 
 #include <assert.h>
@@ -176,15 +177,6 @@ void journal_moved(struct journal *j)
 
 /* ---- reading */
 
-__attribute__((format(printf, 3, 4))) static bool fail_entry(char *why, size_t cap, const char *format, ...)
-{
-    va_list ap;
-    va_start(ap, format);
-    vsnprintf(why, cap, format, ap);
-    va_end(ap);
-    return false;
-}
-
 static bool get_count(const cJSON *json, const char *name, double max, double *out)
 {
     const cJSON *j = cJSON_GetObjectItemCaseSensitive(json, name);
@@ -263,7 +255,7 @@ bool journal_read(const char *line, size_t len, struct journal_entry *e, char *w
     *e = (struct journal_entry){.json = len <= JOURNAL_LINE_MAX ? cJSON_ParseWithLength(line, len) : NULL};
     if (!cJSON_IsObject(e->json)) {
         journal_release(e);
-        return fail_entry(why, cap, "expected a JSON object of up to %u bytes", JOURNAL_LINE_MAX);
+        return why_fail(why, cap, "expected a JSON object of up to %u bytes", JOURNAL_LINE_MAX);
     }
     e->ran = cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(e->json, "ran"));
     if (get_count(e->json, "t", 1e15 * 9, &t_ns) && read_kind(e->json, e)) {
@@ -271,7 +263,7 @@ bool journal_read(const char *line, size_t len, struct journal_entry *e, char *w
         return true;
     }
     journal_release(e);
-    return fail_entry(why, cap, "expected an entry of an input log");
+    return why_fail(why, cap, "expected an entry of an input log");
 }
 
 void journal_release(struct journal_entry *e)

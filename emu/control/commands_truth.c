@@ -3,16 +3,6 @@
 #include "control/describe.h"
 #include "scenario/keys.h"
 
-static void add_count(cJSON *to, const char *name, uint64_t n)
-{
-    cJSON_AddNumberToObject(to, name, (double)n);
-}
-
-static void add_real(cJSON *to, const char *name, double v)
-{
-    cJSON_AddNumberToObject(to, name, v);
-}
-
 /* ---- parameters: by the tables of the scenario's keys */
 
 static void add_section(const struct yaml_fields *rows, const void *section, const char *name, cJSON *to)

@@ -4,16 +4,6 @@
 
 #include <string.h>
 
-static void add_count(cJSON *to, const char *name, uint64_t n)
-{
-    cJSON_AddNumberToObject(to, name, (double)n);
-}
-
-static void add_real(cJSON *to, const char *name, double v)
-{
-    cJSON_AddNumberToObject(to, name, v);
-}
-
 /* ---- commands */
 
 static void describe_arg(const struct control_arg *a, cJSON *list)

@@ -4,6 +4,16 @@
 
 #include "control/control.h"
 
+static inline void add_count(cJSON *to, const char *name, uint64_t n)
+{
+    cJSON_AddNumberToObject(to, name, (double)n);
+}
+
+static inline void add_real(cJSON *to, const char *name, double v)
+{
+    cJSON_AddNumberToObject(to, name, v);
+}
+
 void describe_commands(const struct control *c, cJSON *to);
 void describe_clients(const struct control_bench *b, cJSON *to);
 void describe_pace(const struct control_bench *b, cJSON *to);

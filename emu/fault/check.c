@@ -1,6 +1,7 @@
 /* Which faults are rejected, and why: the kind, the point, the values, the instant. */
 #include "fault/internal.h"
 
+#include "base/why.h"
 #include "command/args.h"
 #include "command/events.h"
 
@@ -54,9 +55,8 @@ bool fault_fits(const struct control_bench *b, const struct fault *f, char *why)
     if (f->kind->places & FAULT_BIT(f->point.place)) return !f->kind->fits || f->kind->fits(b, f, why);
     join_places(b, f, places, sizeof places);
     if (!places[0]) snprintf(places, sizeof places, "another board");
-    snprintf(why, CONTROL_WHY_MAX, "%s: expected a point on %s, got %s, which is %s", f->kind->name, places, f->name,
-             fault_place_what(f->point.place));
-    return false;
+    return why_fail(why, CONTROL_WHY_MAX, "%s: expected a point on %s, got %s, which is %s", f->kind->name, places,
+                    f->name, fault_place_what(f->point.place));
 }
 
 /* ---- values */

@@ -2,8 +2,9 @@
  * chip add up: its hook is given the sum of what is active. */
 #include "fault/internal.h"
 
+#include "base/why.h"
+
 #include <math.h>
-#include <stdio.h>
 
 static const struct board_part *part_of(const struct control_bench *b, const struct fault *f)
 {
@@ -54,8 +55,7 @@ static bool flip_register_bits(struct fault *f, int64_t t_ns)
 
 static bool reject_lacking(const struct fault *f, const char *reason, char *why)
 {
-    snprintf(why, CONTROL_WHY_MAX, "%s: %s", f->name, reason ? reason : f->kind->lacks);
-    return false;
+    return why_fail(why, CONTROL_WHY_MAX, "%s: %s", f->name, reason ? reason : f->kind->lacks);
 }
 
 static bool has_fault(const struct control_bench *b, const struct fault *f, char *why)
@@ -70,8 +70,7 @@ static bool has_clock(const struct control_bench *b, const struct fault *f, char
     const double ppm = f->value[FAULT_CLOCK_PPM];
     if (!has_fault(b, f, why)) return false;
     if (ppm == nearbyint(ppm)) return true;
-    snprintf(why, CONTROL_WHY_MAX, "clock_ppm: expected whole ppm, got %.10g", ppm);
-    return false;
+    return why_fail(why, CONTROL_WHY_MAX, "clock_ppm: expected whole ppm, got %.10g", ppm);
 }
 
 static bool has_register(const struct control_bench *b, const struct fault *f, char *why)
@@ -79,9 +78,8 @@ static bool has_register(const struct control_bench *b, const struct fault *f, c
     const struct board_part *p = part_of(b, f);
     if (p->registers == 0) return reject_lacking(f, NULL, why);
     if (f->value[FAULT_REGISTER] < p->registers) return true;
-    snprintf(why, CONTROL_WHY_MAX, "register: expected 0 to %u for %s, got %.0f", p->registers - 1, f->name,
-             f->value[FAULT_REGISTER]);
-    return false;
+    return why_fail(why, CONTROL_WHY_MAX, "register: expected 0 to %u for %s, got %.0f", p->registers - 1, f->name,
+                    f->value[FAULT_REGISTER]);
 }
 
 // clang-format off

@@ -1,7 +1,7 @@
 /* Faults of the lines of a board, as a probe, the VCD file and the line port see them (trace/line_fault.h). */
 #include "fault/internal.h"
 
-#include <stdio.h>
+#include "base/why.h"
 
 _Static_assert(LINE_FAULTS_MAX >= FAULTS_MAX, "each fault of a line that was accepted has room on its board");
 
@@ -40,15 +40,13 @@ static bool has_pulse(const struct control_bench *b, const struct fault *f, char
     const struct unit *u = b->unit[f->point.unit];
     const struct board_type *t = u->type;
     const unsigned pulses = t->pulses ? t->pulses(u->board) : 0;
-    if (pulses == 0 || f->point.index != t->pulse_line) {
-        snprintf(why, CONTROL_WHY_MAX, "%s: %s carries no pulses that are counted in a frame; %s%s does", f->kind->name,
-                 f->name, pulses ? "the line " : "no line of a ", pulses ? t->lines[t->pulse_line].name : t->title);
-        return false;
-    }
+    if (pulses == 0 || f->point.index != t->pulse_line)
+        return why_fail(why, CONTROL_WHY_MAX, "%s: %s carries no pulses that are counted in a frame; %s%s does",
+                        f->kind->name, f->name, pulses ? "the line " : "no line of a ",
+                        pulses ? t->lines[t->pulse_line].name : t->title);
     if (f->value[FAULT_PULSE] <= pulses) return true;
-    snprintf(why, CONTROL_WHY_MAX, "pulse: expected 1 to %u (pulses in a frame of this board), got %.0f", pulses,
-             f->value[FAULT_PULSE]);
-    return false;
+    return why_fail(why, CONTROL_WHY_MAX, "pulse: expected 1 to %u (pulses in a frame of this board), got %.0f", pulses,
+                    f->value[FAULT_PULSE]);
 }
 
 // clang-format off

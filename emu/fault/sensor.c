@@ -1,6 +1,8 @@
 /* Faults of sensors and of the analog chains behind them. */
 #include "fault/internal.h"
 
+#include "base/why.h"
+
 #include <math.h>
 #include <stdio.h>
 
@@ -25,8 +27,7 @@ static bool has_sensor(const struct control_bench *b, const struct fault *f, cha
 {
     const struct unit *u = b->unit[f->point.unit];
     if (u->cfg.axis[f->point.index].sensor != UNIT_NO_SENSOR) return true;
-    snprintf(why, CONTROL_WHY_MAX, "%s: the channel has no sensor", f->name);
-    return false;
+    return why_fail(why, CONTROL_WHY_MAX, "%s: the channel has no sensor", f->name);
 }
 
 static double range_v(const struct unit *u)
@@ -48,9 +49,8 @@ static double least_ppm(const struct unit *u)
 static bool at_least(const struct fault *f, enum fault_arg arg, double least, const char *unit, char *why)
 {
     if (fabs(f->value[arg]) >= least) return true;
-    snprintf(why, CONTROL_WHY_MAX, "%s: expected at least %.4g %s, one code of this board, got %.10g",
-             fault_args[arg].name, least, unit, f->value[arg]);
-    return false;
+    return why_fail(why, CONTROL_WHY_MAX, "%s: expected at least %.4g %s, one code of this board, got %.10g",
+                    fault_args[arg].name, least, unit, f->value[arg]);
 }
 
 static bool seen_volts(const struct control_bench *b, const struct fault *f, char *why)
@@ -69,10 +69,9 @@ static bool passes_chain(const struct control_bench *b, const struct fault *f, e
     const struct unit *u = b->unit[f->point.unit];
     const double most_v = fmin(u->cfg.board.afe[f->point.index].clip_v, range_v(u)); /* buffer, converter */
     if (!fault_given(f, limit) || fabs(f->value[limit]) < most_v) return true;
-    snprintf(why, CONTROL_WHY_MAX,
-             "%s: expected a limit within %.10g to %.10g V, which the analog chain passes, got %.10g",
-             fault_args[limit].name, -most_v, most_v, f->value[limit]);
-    return false;
+    return why_fail(why, CONTROL_WHY_MAX,
+                    "%s: expected a limit within %.10g to %.10g V, which the analog chain passes, got %.10g",
+                    fault_args[limit].name, -most_v, most_v, f->value[limit]);
 }
 
 /* What has grown to next to nothing when it ends was never seen. */
@@ -82,24 +81,21 @@ static bool grows_enough(const struct control_bench *b, const struct fault *f, c
     const double end_v = fabs(f->value[FAULT_DRIFT_V_PER_S]) * (double)f->for_ns / (double)NS_PER_S;
     if (!has_sensor(b, f, why)) return false;
     if (f->for_ns == 0 || end_v >= least) return true;
-    snprintf(why, CONTROL_WHY_MAX, "drift_v_per_s: %.10g: in %.10g s it comes to %.10g V, less than %.4g V, a code",
-             f->value[FAULT_DRIFT_V_PER_S], f->value[FAULT_FOR_S], end_v, least);
-    return false;
+    return why_fail(why, CONTROL_WHY_MAX,
+                    "drift_v_per_s: %.10g: in %.10g s it comes to %.10g V, less than %.4g V, a code",
+                    f->value[FAULT_DRIFT_V_PER_S], f->value[FAULT_FOR_S], end_v, least);
 }
 
 static bool has_limits(const struct control_bench *b, const struct fault *f, char *why)
 {
     if (!has_sensor(b, f, why)) return false;
-    if (!fault_given(f, FAULT_LOW_V) && !fault_given(f, FAULT_HIGH_V)) {
-        snprintf(why, CONTROL_WHY_MAX, "expected low_v or high_v, where the output stops, got neither");
-        return false;
-    }
+    if (!fault_given(f, FAULT_LOW_V) && !fault_given(f, FAULT_HIGH_V))
+        return why_fail(why, CONTROL_WHY_MAX, "expected low_v or high_v, where the output stops, got neither");
     if (!passes_chain(b, f, FAULT_LOW_V, why) || !passes_chain(b, f, FAULT_HIGH_V, why)) return false;
     if (!fault_given(f, FAULT_LOW_V) || !fault_given(f, FAULT_HIGH_V)) return true;
     if (f->value[FAULT_LOW_V] < f->value[FAULT_HIGH_V]) return true;
-    snprintf(why, CONTROL_WHY_MAX, "low_v: expected less than high_v, %.10g, got %.10g", f->value[FAULT_HIGH_V],
-             f->value[FAULT_LOW_V]);
-    return false;
+    return why_fail(why, CONTROL_WHY_MAX, "low_v: expected less than high_v, %.10g, got %.10g", f->value[FAULT_HIGH_V],
+                    f->value[FAULT_LOW_V]);
 }
 
 static double value_or(const struct fault *f, enum fault_arg arg, double otherwise)
@@ -170,8 +166,7 @@ static bool has_load(const struct control_bench *b, const struct fault *f, char 
 {
     const struct unit *u = b->unit[f->point.unit];
     if (u->cfg.board.afe[f->point.index].input == AFE_CURRENT) return true;
-    snprintf(why, CONTROL_WHY_MAX, "%s: no load resistor in the chain of a sensor with voltage output", f->name);
-    return false;
+    return why_fail(why, CONTROL_WHY_MAX, "%s: no load resistor in the chain of a sensor with voltage output", f->name);
 }
 
 static bool has_error(const struct control_bench *b, const struct fault *f, char *why)
@@ -179,15 +174,13 @@ static bool has_error(const struct control_bench *b, const struct fault *f, char
     const double least = least_ppm(b->unit[f->point.unit]);
     const double grown_ppm = f->value[FAULT_DRIFT_PPM_PER_S] * (double)f->for_ns / (double)NS_PER_S;
     const bool drifts = f->value[FAULT_DRIFT_PPM_PER_S] != 0.0;
-    if (f->value[FAULT_REFERENCE_PPM] == 0.0 && !drifts) {
-        snprintf(why, CONTROL_WHY_MAX, "expected reference_ppm other than 0, or drift_ppm_per_s, got neither");
-        return false;
-    }
+    if (f->value[FAULT_REFERENCE_PPM] == 0.0 && !drifts)
+        return why_fail(why, CONTROL_WHY_MAX, "expected reference_ppm other than 0, or drift_ppm_per_s, got neither");
     if (!drifts) return at_least(f, FAULT_REFERENCE_PPM, least, "ppm", why);
     if (f->value[FAULT_REFERENCE_PPM] != 0.0 || f->for_ns == 0 || grown_ppm >= least) return true;
-    snprintf(why, CONTROL_WHY_MAX, "drift_ppm_per_s: %.10g: in %.10g s it comes to %.10g ppm, less than %.4g ppm",
-             f->value[FAULT_DRIFT_PPM_PER_S], f->value[FAULT_FOR_S], grown_ppm, least);
-    return false;
+    return why_fail(why, CONTROL_WHY_MAX,
+                    "drift_ppm_per_s: %.10g: in %.10g s it comes to %.10g ppm, less than %.4g ppm",
+                    f->value[FAULT_DRIFT_PPM_PER_S], f->value[FAULT_FOR_S], grown_ppm, least);
 }
 
 static bool ripples_enough(const struct control_bench *b, const struct fault *f, char *why)

@@ -146,14 +146,7 @@ static void on_opened(void *ctx, bool open, int64_t t_ns)
     pty_discard(&port->pty);
 }
 
-/* Cannot happen while our own slave descriptor is open. */
-static void on_pty_closed(struct text_link *t, int64_t t_ns)
-{
-    (void)t_ns;
-    t->link.want_read = t->link.want_write = false;
-}
-
-static const struct text_link_ops pty_ops = {on_line, on_ready, NULL, on_pty_closed};
+static const struct text_link_ops pty_ops = {on_line, on_ready, NULL, NULL};
 
 int scpi_port_pty(struct scpi_port *p, const char *name)
 {

@@ -16,7 +16,7 @@ static void end_link(struct text_link *t, int64_t t_ns)
 {
     if (t->ended) return;
     t->ended = true;
-    t->ops->closed(t, t_ns);
+    if (t->ops->closed) t->ops->closed(t, t_ns);
 }
 
 /* Hands over lines until there are no more or the owner takes no more. */

@@ -15,9 +15,10 @@ struct text_link;
 struct text_link_ops {
     /* One line, or the news that an overlong one was skipped. */
     void (*line)(struct text_link *t, enum lines_result r, const char *line, size_t len, int64_t t_ns);
-    bool (*ready)(struct text_link *t);                /* takes another line now; NULL: always */
-    void (*was_read)(struct text_link *t);             /* after each read of the descriptor; may be NULL */
-    void (*closed)(struct text_link *t, int64_t t_ns); /* the peer has gone and all its lines were taken; called once */
+    bool (*ready)(struct text_link *t);    /* takes another line now; NULL: always */
+    void (*was_read)(struct text_link *t); /* after each read of the descriptor; may be NULL */
+    /* The peer has gone and all its lines were taken; called once. NULL: a pty, whose slave we have open ourselves. */
+    void (*closed)(struct text_link *t, int64_t t_ns);
 };
 
 struct text_link_cfg {

@@ -292,10 +292,7 @@ bool yaml_file_parse(struct yaml_file *f, const char *path, const char *text, si
 bool yaml_file_open(struct yaml_file *f, const char *path, char *why, size_t cap)
 {
     FILE *in = fopen(path, "rbe");
-    if (!in) {
-        snprintf(why, cap, "%s: %s", path, strerror(errno));
-        return false;
-    }
+    if (!in) return why_fail(why, cap, "%s: %s", path, strerror(errno));
     char *text = malloc(YAML_FILE_MAX);
     const size_t len = text ? fread(text, 1, YAML_FILE_MAX, in) : 0;
     const bool bad = ferror(in) || len == YAML_FILE_MAX || !text;

@@ -224,14 +224,7 @@ static void on_opened(void *ctx, bool open, int64_t t_ns)
     pty_discard(&s->pty);
 }
 
-/* Cannot happen while our own slave descriptor is open. */
-static void on_closed(struct text_link *t, int64_t t_ns)
-{
-    (void)t_ns;
-    t->link.want_read = t->link.want_write = false;
-}
-
-static const struct text_link_ops ops = {on_line, on_ready, NULL, on_closed};
+static const struct text_link_ops ops = {on_line, on_ready, NULL, NULL};
 
 int slcan_pty_open(struct slcan_pty *s, struct can_hub *hub, const char *name)
 {

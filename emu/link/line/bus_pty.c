@@ -94,14 +94,7 @@ static void on_opened(void *ctx, bool open, int64_t t_ns)
     pty_discard(&p->pty);
 }
 
-/* Cannot happen while our own slave descriptor is open. */
-static void on_closed(struct text_link *t, int64_t t_ns)
-{
-    (void)t_ns;
-    t->link.want_read = t->link.want_write = false;
-}
-
-static const struct text_link_ops text_ops = {on_line, on_ready, NULL, on_closed};
+static const struct text_link_ops text_ops = {on_line, on_ready, NULL, NULL};
 
 int bus_pty_open(struct bus_pty *p, struct links *links, const struct bus_pty_ops *ops, const char *name)
 {
