@@ -4,12 +4,6 @@
 
 #include <math.h>
 
-static enum control_outcome do_help(const struct control_call *call)
-{
-    describe_commands(call->control, call->result);
-    return CONTROL_DONE;
-}
-
 static enum control_outcome do_time(const struct control_call *call)
 {
     struct control_pace p = {0};
@@ -27,12 +21,6 @@ static enum control_outcome do_run(const struct control_call *call)
         return CONTROL_LATER;
     call->control->error.code = "state";
     return CONTROL_REJECTED;
-}
-
-static enum control_outcome do_units(const struct control_call *call)
-{
-    describe_units(call->bench, call->result);
-    return CONTROL_DONE;
 }
 
 static enum control_outcome do_unit_reset(const struct control_call *call)
@@ -87,14 +75,14 @@ static enum control_outcome do_quit(const struct control_call *call)
 
 // clang-format off
 static const struct control_command rows[] = {
-    {"help", "Lists the commands with their arguments.", NULL, .run = do_help},
+    {"help", "Lists the commands with their arguments.", NULL, .run = describe_commands},
     {"time", "Reads the simulated time and the pace.", NULL, .run = do_time},
     {"run", "Advances the time in step pace; replies when every event up to then has run and all output is delivered to the kernel.",
      CONTROL_ARGS({"for_s", CONTROL_REAL, false, "s", 0, 86400, .what = "simulated time to run"},
       {"after_tx", CONTROL_COUNT, true, NULL, 0, CONTROL_COUNT_MAX, .what = "wait until this many frames in all have come from CAN clients, or a client's queue of 128 is full; then run"}), .run = do_run},
     {"frames", "Reads the frame counters of each CAN client and its connection number (came): delivered, taken (received from it), dropped, overrun (lost in the kernel), refused (rejected).", NULL, .run = do_frames},
     {"counters", "Reads the counters of pace, bus, clients and units, or of one unit.", CONTROL_ARGS(CONTROL_UNIT_ARG(true)), .run = do_counters},
-    {"units", "Lists the units: name, board type, serial number, CAN node, profile.", NULL, .run = do_units},
+    {"units", "Lists the units: name, board type, serial number, CAN node, profile.", NULL, .run = describe_units},
     {"endpoints", "Lists the endpoints as the ready lines do: CAN adapters, instruments, line port, sockets.", NULL, .run = do_endpoints},
     {"unit.reset", "Resets a unit (PSA-2: a pulse on Res).", CONTROL_ARGS(CONTROL_UNIT_ARG(true)), .run = do_unit_reset, .changes = true},
     {"quit", "Terminates the emulator as SIGTERM does.", NULL, .run = do_quit},

@@ -158,12 +158,6 @@ static void add_state(const struct control_bench *b, unsigned unit, cJSON *to, i
 
 /* ---- the commands */
 
-static enum control_outcome do_help(const struct control_call *call)
-{
-    describe_commands(call->control, call->result);
-    return CONTROL_DONE;
-}
-
 static enum control_outcome do_truth(const struct control_call *call)
 {
     add_truth(call->bench, call->result, call->t_ns);
@@ -177,7 +171,7 @@ static enum control_outcome do_state(const struct control_call *call)
 }
 
 static const struct control_command rows[] = {
-    {"help", "Lists the commands with their arguments.", NULL, .run = do_help},
+    {"help", "Lists the commands with their arguments.", NULL, .run = describe_commands},
     {"truth", "Reads the hidden parameters of the bench, for graders after the estimate.", NULL, .run = do_truth},
     {"truth.state",
      "Reads the true state now: angles, rates, temperatures, supply, and the kinematics and sensor outputs of a unit.",

@@ -25,11 +25,11 @@ static void describe_arg(const struct control_arg *a, cJSON *list)
     cJSON_AddItemToArray(list, j);
 }
 
-void describe_commands(const struct control *c, cJSON *to)
+enum control_outcome describe_commands(const struct control_call *call)
 {
-    cJSON *list = cJSON_AddArrayToObject(to, "commands");
+    cJSON *list = cJSON_AddArrayToObject(call->result, "commands");
     const struct control_command *row;
-    for (unsigned i = 0; (row = control_row(c->tables, i)); i++) {
+    for (unsigned i = 0; (row = control_row(call->control->tables, i)); i++) {
         cJSON *j = cJSON_CreateObject();
         cJSON_AddStringToObject(j, "name", row->name);
         cJSON_AddStringToObject(j, "what", row->what);
@@ -41,6 +41,7 @@ void describe_commands(const struct control *c, cJSON *to)
         }
         cJSON_AddItemToArray(list, j);
     }
+    return CONTROL_DONE;
 }
 
 /* ---- traffic */
@@ -120,9 +121,10 @@ static void add_bus_name(const struct control_bench *b, const struct can_node *n
     }
 }
 
-void describe_units(const struct control_bench *b, cJSON *to)
+enum control_outcome describe_units(const struct control_call *call)
 {
-    cJSON *list = cJSON_AddArrayToObject(to, "units");
+    const struct control_bench *b = call->bench;
+    cJSON *list = cJSON_AddArrayToObject(call->result, "units");
     for (unsigned i = 0; i < b->units; i++) {
         const struct unit *u = b->unit[i];
         cJSON *j = cJSON_CreateObject();
@@ -135,6 +137,7 @@ void describe_units(const struct control_bench *b, cJSON *to)
         cJSON_AddBoolToObject(j, "ready", u->type->ready(u->board));
         cJSON_AddItemToArray(list, j);
     }
+    return CONTROL_DONE;
 }
 
 static void add_counters(const struct board_part *p, const struct board *board, cJSON *to)

@@ -14,11 +14,13 @@ static inline void add_real(cJSON *to, const char *name, double v)
     cJSON_AddNumberToObject(to, name, v);
 }
 
-void describe_commands(const struct control *c, cJSON *to);
+/* Handlers of `help` and `units`. */
+enum control_outcome describe_commands(const struct control_call *call);
+enum control_outcome describe_units(const struct control_call *call);
+
 void describe_clients(const struct control_bench *b, cJSON *to);
 void describe_pace(const struct control_bench *b, cJSON *to);
 void describe_bus(const struct control_bench *b, cJSON *to, int64_t t_ns);
-void describe_units(const struct control_bench *b, cJSON *to);
 void describe_unit_counters(const struct control_bench *b, unsigned unit, cJSON *to);
 
 /* What an operator sees at a glance: pace, frames, readings of the instruments that are there. */

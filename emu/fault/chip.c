@@ -11,13 +11,6 @@ static const struct board_part *part_of(const struct control_bench *b, const str
     return &b->unit[f->point.unit]->type->parts[f->point.index];
 }
 
-static bool is_same_point(const struct fault *f, const struct fault *other)
-{
-    return other->id != 0 && other->state == FAULT_ACTIVE && !other->kind->once &&
-           other->point.place == f->point.place && other->point.unit == f->point.unit &&
-           other->point.index == f->point.index;
-}
-
 /* ---- chips; the variant of a kind is its bit of enum board_chip_fault_bit */
 
 static void add_to_sum(const struct fault *f, struct chip_fault *s, double *ppm)
@@ -34,16 +27,10 @@ static void refresh_chip(struct fault *f, int64_t t_ns)
     struct chip_fault s = {.clock_ppm = 0};
     double ppm = 0.0;
     for (unsigned i = 0; i < FAULTS_MAX; i++) {
-        if (is_same_point(f, &f->engine->fault[i])) add_to_sum(&f->engine->fault[i], &s, &ppm);
+        if (fault_lasts_at(f, &f->engine->fault[i])) add_to_sum(&f->engine->fault[i], &s, &ppm);
     }
     s.clock_ppm = (int32_t)nearbyint(fmin(fmax(ppm, -FAULT_PPM_MAX), FAULT_PPM_MAX));
     part_of(f->engine->bench, f)->fault(fault_unit(f)->board, f->point.index, &s, t_ns);
-}
-
-static bool apply_chip(struct fault *f, int64_t t_ns)
-{
-    refresh_chip(f, t_ns);
-    return true;
 }
 
 static bool flip_register_bits(struct fault *f, int64_t t_ns)
@@ -83,7 +70,7 @@ static bool has_register(const struct control_bench *b, const struct fault *f, c
 }
 
 // clang-format off
-#define CHIP(v) .variant = (v), .places = FAULT_BIT(FAULT_AT_CHIP), .apply = apply_chip, .lift = refresh_chip
+#define CHIP(v) .variant = (v), .places = FAULT_BIT(FAULT_AT_CHIP), .lift = refresh_chip
 static const struct fault_kind chip[] = {
     {"chip.drdy_stuck", "The data-ready pin is stuck at level; conversions continue.", "no frames, or no new values of that chip, and an EMCY that says so",
      CHIP(BOARD_FAULT_DRDY), .need = FAULT_BIT(FAULT_LEVEL), .unless = "the controller does not use the pin of that chip", .fits = has_fault,
@@ -113,15 +100,9 @@ static void refresh_controller(struct fault *f, int64_t t_ns)
     (void)t_ns;
     for (unsigned i = 0; i < FAULTS_MAX; i++) {
         const struct fault *other = &f->engine->fault[i];
-        if (is_same_point(f, other)) all |= board_fault_bit(u->type, other->kind->name);
+        if (fault_lasts_at(f, other)) all |= board_fault_bit(u->type, other->kind->name);
     }
     board_set_faults(u->board, all);
-}
-
-static bool apply_controller(struct fault *f, int64_t t_ns)
-{
-    refresh_controller(f, t_ns);
-    return true;
 }
 
 static bool can_have_fault(const struct control_bench *b, const struct fault *f, char *why)
@@ -130,7 +111,7 @@ static bool can_have_fault(const struct control_bench *b, const struct fault *f,
 }
 
 // clang-format off
-#define CONTROLLER .places = FAULT_BIT(FAULT_AT_CONTROLLER), .apply = apply_controller, .lift = refresh_controller, .fits = can_have_fault
+#define CONTROLLER .places = FAULT_BIT(FAULT_AT_CONTROLLER), .lift = refresh_controller, .fits = can_have_fault
 static const struct fault_kind controller[] = {
     {"controller.skip_sync_t", "The controller omits the pulse on SYNC_T.", "no pulses on SYNC_T; temperature codes come every 10.00 ms at 100 SPS instead of every 10.25 ms",
      CONTROLLER, .unless = "no SYNC_T on the board", .lacks = "the controller of this board has no SYNC_T to give a pulse on"},

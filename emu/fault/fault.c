@@ -31,11 +31,18 @@ static void end_fault(struct fault *f, enum fault_state state, int64_t t_ns)
     notify_change(f, t_ns);
 }
 
+static bool apply_fault(struct fault *f, int64_t t_ns)
+{
+    if (f->kind->apply) return f->kind->apply(f, t_ns);
+    f->kind->lift(f, t_ns);
+    return true;
+}
+
 static void begin_fault(struct fault *f, int64_t t_ns)
 {
     f->state = FAULT_ACTIVE;
     f->began_ns = t_ns;
-    if (!f->kind->apply(f, t_ns)) {
+    if (!apply_fault(f, t_ns)) {
         end_fault(f, FAULT_VOID, t_ns);
         return;
     }

@@ -70,8 +70,9 @@ struct fault_kind {
     bool once;          /* over as soon as it is done */
     /* What its places do not say of this point or these values: false with the reason in why. NULL: it always fits. */
     bool (*fits)(const struct control_bench *b, const struct fault *f, char *why);
-    bool (*apply)(struct fault *f, int64_t t_ns); /* false: the point is no longer there, or has no room */
-    void (*lift)(struct fault *f, int64_t t_ns);  /* it is no longer ACTIVE; NULL for those that are over at once */
+    /* False: the point is no longer there, or has no room. NULL: lift does it, which puts the sum of what is ACTIVE in effect. */
+    bool (*apply)(struct fault *f, int64_t t_ns);
+    void (*lift)(struct fault *f, int64_t t_ns); /* it is no longer ACTIVE; NULL for those that are over at once */
 };
 
 struct fault_table {

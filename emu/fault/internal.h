@@ -12,6 +12,14 @@ static inline struct unit *fault_unit(const struct fault *f)
     return f->engine->bench->unit[f->point.unit];
 }
 
+/* Whether the other one is active, and lasts, at the same point. */
+static inline bool fault_lasts_at(const struct fault *f, const struct fault *other)
+{
+    return other->id != 0 && other->state == FAULT_ACTIVE && !other->kind->once &&
+           other->point.place == f->point.place && other->point.unit == f->point.unit &&
+           other->point.index == f->point.index;
+}
+
 /* fault/check.c: whether the values are those of its kind; false with the error. */
 bool fault_values_fit(const struct fault *f, struct control_error *why);
 

@@ -13,9 +13,7 @@ static unsigned count_active(const struct fault *f, enum fault_arg arg, double *
     *sum = 0.0;
     for (unsigned i = 0; i < FAULTS_MAX; i++) {
         const struct fault *other = &f->engine->fault[i];
-        const bool here = other->id != 0 && other->state == FAULT_ACTIVE && other->kind == f->kind &&
-                          other->point.place == f->point.place && other->point.index == f->point.index;
-        if (!here) continue;
+        if (other->kind != f->kind || !fault_lasts_at(f, other)) continue;
         n++;
         *sum += other->value[arg];
     }
@@ -42,32 +40,14 @@ static void refresh_sensor(struct fault *f, int64_t t_ns)
     platform_stick(platform_of(f), count_active(f, FAULT_ID, &unused) > 0, t_ns);
 }
 
-static bool apply_torquer(struct fault *f, int64_t t_ns)
-{
-    refresh_torquer(f, t_ns);
-    return true;
-}
-
-static bool apply_drift(struct fault *f, int64_t t_ns)
-{
-    refresh_drift(f, t_ns);
-    return true;
-}
-
-static bool apply_sensor(struct fault *f, int64_t t_ns)
-{
-    refresh_sensor(f, t_ns);
-    return true;
-}
-
 // clang-format off
 static const struct fault_kind platform[] = {
     {"platform.torquer", "The torquer of the axis gives no torque.", "the gyro unit gives no windows. Level: it does not settle (EMCY FF23h). Azimuth: the angle sensor does not follow (EMCY FF22h)",
-     .places = FAULT_BIT(FAULT_AT_TORQUER), .apply = apply_torquer, .lift = refresh_torquer},
+     .places = FAULT_BIT(FAULT_AT_TORQUER), .lift = refresh_torquer},
     {"platform.drift_step", "The gyroscope drift about the axis changes by drift_degph.", "the levelling rate (azimuth: the rate of the azimuth torquer) changes by drift_degph",
-     .places = FAULT_BIT(FAULT_AT_TORQUER), .need = FAULT_BIT(FAULT_DRIFT_DEGPH), .nonzero = FAULT_BIT(FAULT_DRIFT_DEGPH), .apply = apply_drift, .lift = refresh_drift},
+     .places = FAULT_BIT(FAULT_AT_TORQUER), .need = FAULT_BIT(FAULT_DRIFT_DEGPH), .nonzero = FAULT_BIT(FAULT_DRIFT_DEGPH), .lift = refresh_drift},
     {"platform.encoder_stuck", "The angle sensor of the outer gimbal freezes at its last value.", "ENCODER is constant; during a turn the unit reports it (EMCY FF22h)",
-     .places = FAULT_BIT(FAULT_AT_ENCODER), .apply = apply_sensor, .lift = refresh_sensor},
+     .places = FAULT_BIT(FAULT_AT_ENCODER), .lift = refresh_sensor},
 };
 // clang-format on
 const struct fault_table fault_platform = {platform, sizeof platform / sizeof *platform};

@@ -64,9 +64,8 @@ static void on_stall(struct can_client *can)
 
 /* ---- commands: true is acknowledged with CR, false rejected with BEL */
 
-static bool cmd_open(struct slcan_pty *s, const char *arg, int64_t t_ns)
+static bool cmd_open(struct slcan_pty *s, const char *arg)
 {
-    (void)t_ns;
     if (*arg) return false;
     s->listen_only = false;
     if (s->open) return true; /* python-can opens twice when it sets the bit rate */
@@ -78,17 +77,16 @@ static bool cmd_open(struct slcan_pty *s, const char *arg, int64_t t_ns)
     return true;
 }
 
-static bool cmd_listen(struct slcan_pty *s, const char *arg, int64_t t_ns)
+static bool cmd_listen(struct slcan_pty *s, const char *arg)
 {
-    if (!cmd_open(s, arg, t_ns)) return false;
+    if (!cmd_open(s, arg)) return false;
     s->listen_only = true;
     return true;
 }
 
 /* A client that sent and closed: its frames still go out, then it leaves the bus (on_flush), also when it closes again. */
-static bool cmd_close(struct slcan_pty *s, const char *arg, int64_t t_ns)
+static bool cmd_close(struct slcan_pty *s, const char *arg)
 {
-    (void)t_ns;
     if (*arg) return false;
     if (s->open) s->closing = s->can.leaving = true;
     s->open = false;
@@ -96,46 +94,22 @@ static bool cmd_close(struct slcan_pty *s, const char *arg, int64_t t_ns)
 }
 
 /* A bus of another bit rate would answer with error frames only: reject, so that the client notices. */
-static bool cmd_bitrate(struct slcan_pty *s, const char *arg, int64_t t_ns)
+static bool cmd_bitrate(struct slcan_pty *s, const char *arg)
 {
-    (void)t_ns;
     if (arg[0] < '0' || arg[0] > '8' || arg[1]) return false;
     const uint32_t bus_hz = s->hub->bus->cfg.bitrate_hz;
     return bus_hz == 0 || bitrate_hz[arg[0] - '0'] == bus_hz;
 }
 
-static bool cmd_data_bitrate(struct slcan_pty *s, const char *arg, int64_t t_ns)
+static bool cmd_data_bitrate(struct slcan_pty *s, const char *arg)
 {
-    (void)t_ns;
     if (arg[0] < '0' || arg[0] > '8' || arg[1]) return false;
     const struct can_bus_cfg *bus = &s->hub->bus->cfg;
     return bus->bitrate_hz == 0 || (uint32_t)(arg[0] - '0') * 1000000 == bus->data_bitrate_hz;
 }
 
-static bool cmd_version(struct slcan_pty *s, const char *arg, int64_t t_ns)
+static bool cmd_status(struct slcan_pty *s, const char *arg)
 {
-    (void)t_ns;
-    if (!*arg) send_reply(s, "V1013");
-    return !*arg;
-}
-
-static bool cmd_version_long(struct slcan_pty *s, const char *arg, int64_t t_ns)
-{
-    (void)t_ns;
-    if (!*arg) send_reply(s, "vpsabench");
-    return !*arg;
-}
-
-static bool cmd_serial(struct slcan_pty *s, const char *arg, int64_t t_ns)
-{
-    (void)t_ns;
-    if (!*arg) send_reply(s, "NPSAB");
-    return !*arg;
-}
-
-static bool cmd_status(struct slcan_pty *s, const char *arg, int64_t t_ns)
-{
-    (void)t_ns;
     if (*arg || !s->open) return false;
     char text[4] = {'F', '0', '0', '\0'};
     hex_put(text + 1, s->status, 2);
@@ -144,9 +118,8 @@ static bool cmd_status(struct slcan_pty *s, const char *arg, int64_t t_ns)
     return true;
 }
 
-static bool cmd_stamps(struct slcan_pty *s, const char *arg, int64_t t_ns)
+static bool cmd_stamps(struct slcan_pty *s, const char *arg)
 {
-    (void)t_ns;
     if ((arg[0] != '0' && arg[0] != '1') || arg[1] || s->open) return false;
     s->stamps = arg[0] == '1';
     return true;
@@ -154,18 +127,23 @@ static bool cmd_stamps(struct slcan_pty *s, const char *arg, int64_t t_ns)
 
 static const struct {
     char letter;
-    bool (*run)(struct slcan_pty *s, const char *arg, int64_t t_ns);
+    bool (*run)(struct slcan_pty *s, const char *arg);
+    const char *answer; /* of a command that does nothing else */
 } commands[] = {
-    {'O', cmd_open},    {'L', cmd_listen},       {'C', cmd_close},  {'S', cmd_bitrate}, {'Y', cmd_data_bitrate},
-    {'V', cmd_version}, {'v', cmd_version_long}, {'N', cmd_serial}, {'F', cmd_status},  {'Z', cmd_stamps},
+    {'O', cmd_open, NULL},         {'L', cmd_listen, NULL}, {'C', cmd_close, NULL},  {'S', cmd_bitrate, NULL},
+    {'Y', cmd_data_bitrate, NULL}, {'F', cmd_status, NULL}, {'Z', cmd_stamps, NULL}, {'V', NULL, "V1013"},
+    {'v', NULL, "vpsabench"},      {'N', NULL, "NPSAB"},
 };
 
-static bool do_command(struct slcan_pty *s, const char *line, int64_t t_ns)
+static bool do_command(struct slcan_pty *s, const char *line)
 {
-    for (unsigned i = 0; i < sizeof commands / sizeof commands[0]; i++) {
-        if (commands[i].letter == line[0]) return commands[i].run(s, line + 1, t_ns);
-    }
-    return false;
+    const unsigned rows = sizeof commands / sizeof commands[0];
+    unsigned i = 0;
+    while (i < rows && commands[i].letter != line[0]) i++;
+    if (i == rows || (!commands[i].run && line[1])) return false;
+    if (commands[i].run) return commands[i].run(s, line + 1);
+    send_reply(s, commands[i].answer);
+    return true;
 }
 
 static bool do_frame(struct slcan_pty *s, const struct can_msg *m, int64_t t_ns)
@@ -186,7 +164,7 @@ static void on_line(struct text_link *t, enum lines_result r, const char *line, 
     const enum slcan_err err = r == LINES_LINE ? slcan_decode(line, len, &m) : SLCAN_LONG;
     const bool done = err == SLCAN_OK                                ? do_frame(s, &m, t_ns)
                       : r == LINES_LINE && len == 0                  ? true /* python-can's absent data bit rate */
-                      : err == SLCAN_NO_FRAME && strlen(line) == len ? do_command(s, line, t_ns)
+                      : err == SLCAN_NO_FRAME && strlen(line) == len ? do_command(s, line)
                                                                      : false;
     if (!done) s->can.refused++;
     send_reply(s, done ? "\r" : "\a");
@@ -203,7 +181,7 @@ static void on_flush(struct link *l, int64_t t_ns)
 {
     struct slcan_pty *s = (struct slcan_pty *)l;
     if (!s->pty.openers) {
-        if (s->open) cmd_close(s, "", t_ns);
+        if (s->open) cmd_close(s, "");
         s->stamps = false;
         text_link_forget_output(&s->io);
     }
