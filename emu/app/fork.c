@@ -74,8 +74,8 @@ static bool put_result(pid_t pid, char *text, cJSON *result, char *why)
 {
     if (strncmp(text, failure, sizeof failure - 1) == 0 || !strstr(text, "ready all\n")) {
         text[strcspn(text, "\n")] = '\0';
-        return why_fail(why, CONTROL_WHY_MAX, "%.240s",
-                        text[0] ? text + sizeof failure - 1 : "the child ended at once");
+        snprintf(why, CONTROL_WHY_MAX, "%.240s", text[0] ? text + sizeof failure - 1 : "the child ended at once");
+        return false;
     }
     cJSON_AddNumberToObject(result, "pid", pid);
     ports_add_endpoints(result, text);

@@ -1,8 +1,6 @@
 /* Faults of the links: what happens to frames on a bus, from a board, and on their way to a program (base/can_fault.h). */
 #include "fault/internal.h"
 
-#include "base/why.h"
-
 #include <math.h>
 #include <stdio.h>
 
@@ -93,7 +91,8 @@ static bool has_bits(const struct control_bench *b, const struct fault *f, char 
     const struct can_bus *bus = f->point.place == FAULT_AT_BUS ? b->bus[f->point.index] : NULL;
     if (node) bus = bus_of(b, node);
     if (!bus || bus->cfg.bitrate_hz > 0) return true;
-    return why_fail(why, CONTROL_WHY_MAX, "%s: the bus is ideal (bitrate_hz 0): no bits, no error frames", f->name);
+    snprintf(why, CONTROL_WHY_MAX, "%s: the bus is ideal (bitrate_hz 0): no bits, no error frames", f->name);
+    return false;
 }
 
 #define AT(place) FAULT_BIT(FAULT_AT_##place)

@@ -27,7 +27,8 @@ static bool has_sensor(const struct control_bench *b, const struct fault *f, cha
 {
     const struct unit *u = b->unit[f->point.unit];
     if (u->cfg.axis[f->point.index].sensor != UNIT_NO_SENSOR) return true;
-    return why_fail(why, CONTROL_WHY_MAX, "%s: the channel has no sensor", f->name);
+    snprintf(why, CONTROL_WHY_MAX, "%s: the channel has no sensor", f->name);
+    return false;
 }
 
 static double range_v(const struct unit *u)
@@ -81,9 +82,9 @@ static bool grows_enough(const struct control_bench *b, const struct fault *f, c
     const double end_v = fabs(f->value[FAULT_DRIFT_V_PER_S]) * (double)f->for_ns / (double)NS_PER_S;
     if (!has_sensor(b, f, why)) return false;
     if (f->for_ns == 0 || end_v >= least) return true;
-    return why_fail(why, CONTROL_WHY_MAX,
-                    "drift_v_per_s: %.10g: in %.10g s it comes to %.10g V, less than %.4g V, a code",
-                    f->value[FAULT_DRIFT_V_PER_S], f->value[FAULT_FOR_S], end_v, least);
+    snprintf(why, CONTROL_WHY_MAX, "drift_v_per_s: %.10g: in %.10g s it comes to %.10g V, less than %.4g V, a code",
+             f->value[FAULT_DRIFT_V_PER_S], f->value[FAULT_FOR_S], end_v, least);
+    return false;
 }
 
 static bool has_limits(const struct control_bench *b, const struct fault *f, char *why)
@@ -166,7 +167,8 @@ static bool has_load(const struct control_bench *b, const struct fault *f, char 
 {
     const struct unit *u = b->unit[f->point.unit];
     if (u->cfg.board.afe[f->point.index].input == AFE_CURRENT) return true;
-    return why_fail(why, CONTROL_WHY_MAX, "%s: no load resistor in the chain of a sensor with voltage output", f->name);
+    snprintf(why, CONTROL_WHY_MAX, "%s: no load resistor in the chain of a sensor with voltage output", f->name);
+    return false;
 }
 
 static bool has_error(const struct control_bench *b, const struct fault *f, char *why)
@@ -178,9 +180,9 @@ static bool has_error(const struct control_bench *b, const struct fault *f, char
         return why_fail(why, CONTROL_WHY_MAX, "expected reference_ppm other than 0, or drift_ppm_per_s, got neither");
     if (!drifts) return at_least(f, FAULT_REFERENCE_PPM, least, "ppm", why);
     if (f->value[FAULT_REFERENCE_PPM] != 0.0 || f->for_ns == 0 || grown_ppm >= least) return true;
-    return why_fail(why, CONTROL_WHY_MAX,
-                    "drift_ppm_per_s: %.10g: in %.10g s it comes to %.10g ppm, less than %.4g ppm",
-                    f->value[FAULT_DRIFT_PPM_PER_S], f->value[FAULT_FOR_S], grown_ppm, least);
+    snprintf(why, CONTROL_WHY_MAX, "drift_ppm_per_s: %.10g: in %.10g s it comes to %.10g ppm, less than %.4g ppm",
+             f->value[FAULT_DRIFT_PPM_PER_S], f->value[FAULT_FOR_S], grown_ppm, least);
+    return false;
 }
 
 static bool ripples_enough(const struct control_bench *b, const struct fault *f, char *why)

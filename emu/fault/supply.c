@@ -1,20 +1,22 @@
 /* Faults of the supply. */
 #include "fault/internal.h"
 
-#include "base/why.h"
+#include <stdio.h>
 
 _Static_assert(SUPPLY_DIPS_MAX >= FAULTS_MAX, "each brown-out that was accepted has room in the supply");
 
 static bool reaches_brownout(const struct control_bench *b, const struct fault *f, char *why)
 {
     const struct supply *s = b->lab ? &b->lab->supply : NULL;
-    if (!s || !s->cfg.present)
-        return why_fail(why, CONTROL_WHY_MAX, "%s: this scenario has none (section supply): the boards are always fed",
-                        f->name);
+    if (!s || !s->cfg.present) {
+        snprintf(why, CONTROL_WHY_MAX, "%s: this scenario has none (section supply): the boards are always fed",
+                 f->name);
+        return false;
+    }
     if (s->set_v - f->value[FAULT_DROP_V] < s->cfg.brownout_v) return true;
-    return why_fail(why, CONTROL_WHY_MAX,
-                    "drop_v: %.10g: %.10g V less that is not below the threshold of the boards, %.10g V",
-                    f->value[FAULT_DROP_V], s->set_v, s->cfg.brownout_v);
+    snprintf(why, CONTROL_WHY_MAX, "drop_v: %.10g: %.10g V less that is not below the threshold of the boards, %.10g V",
+             f->value[FAULT_DROP_V], s->set_v, s->cfg.brownout_v);
+    return false;
 }
 
 static bool dip_supply(struct fault *f, int64_t t_ns)

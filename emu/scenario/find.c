@@ -1,8 +1,6 @@
 #define _GNU_SOURCE /* readlink, scandir */
 #include "scenario/find.h"
 
-#include "base/why.h"
-
 #include <dirent.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -49,9 +47,9 @@ bool find_proto_folder(const char *folder, char *path, char *why, size_t cap)
         snprintf(path, FIND_PATH_MAX, "%.440s/%.60s", dir, folder);
         if (dir[0] && access(path, R_OK) == 0) return true;
     }
-    return why_fail(why, cap,
-                    "proto/%s: expected a file here or beside the program; PSABENCH_PROTO=DIR names the folder proto",
-                    folder);
+    snprintf(why, cap,
+             "proto/%s: expected a file here or beside the program; PSABENCH_PROTO=DIR names the folder proto", folder);
+    return false;
 }
 
 static int is_named(const struct dirent *e)
@@ -93,7 +91,8 @@ bool find_proto(const char *folder, const char *name, const char *beside, char *
     if (is_path(name)) {
         take_path(name, beside, path);
         if (access(path, R_OK) == 0) return true;
-        return why_fail(why, cap, "%s: no such file, or not readable", path);
+        snprintf(why, cap, "%s: no such file, or not readable", path);
+        return false;
     }
     for (unsigned i = 0; proto_place(i, dir, sizeof dir); i++) {
         snprintf(path, FIND_PATH_MAX, "%.380s/%s/%.60s.yaml", dir, folder, name);
