@@ -5,8 +5,6 @@
 #include "base/text.h"
 #include "base/why.h"
 #include "command/exact.h"
-#include "fault/fault.h"
-#include "scpi/scpi.h"
 
 #include <errno.h>
 #include <signal.h>
@@ -122,8 +120,8 @@ int main(int argc, char *argv[])
     if (o.action == OPTIONS_HELP) return fputs(options_help(), stdout) < 0;
     if (o.action == OPTIONS_VERSION) return puts("psa-emu " VERSION) < 0;
     if (o.action == OPTIONS_LIST_COMMANDS) list_commands(stdout);
-    if (o.action == OPTIONS_LIST_SCPI) scpi_markdown(stdout);
-    if (o.action == OPTIONS_LIST_FAULTS) fault_markdown(stdout);
+    if (o.action == OPTIONS_LIST_SCPI) list_scpi(stdout);
+    if (o.action == OPTIONS_LIST_FAULTS) list_faults(stdout);
     if (o.action == OPTIONS_LIST_PROFILES && !list_profiles(stdout, why, sizeof why))
         return print_error(SERVICE_MACHINE, why);
     if (o.action == OPTIONS_LIST_SCENARIOS && !list_scenarios(stdout, why, sizeof why))

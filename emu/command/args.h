@@ -4,8 +4,6 @@
 
 #include "command/error.h"
 
-#include <stdio.h>
-
 const char *control_type_name(enum control_type type);
 bool control_type_numeric(enum control_type type); /* has a range, perhaps a unit */
 
@@ -31,8 +29,5 @@ void control_arg_limits(const struct control_bench *b, const struct control_arg 
 /* The i-th row of the tables; NULL past the last. */
 const struct control_command *control_row(const struct control_table *const *tables, unsigned i);
 const struct control_command *control_find(const struct control_table *const *tables, const char *name);
-
-/* The table in Markdown, for docs/emulator.md and --list-commands. */
-void control_markdown(const struct control_table *const *tables, FILE *out);
 
 #endif

@@ -14,8 +14,6 @@
 #include "fault/trigger.h"
 #include "trace/line_fault.h"
 
-#include <stdio.h>
-
 #define FAULTS_MAX 64u
 
 #define FAULT_BIT(i) (UINT64_C(1) << (i))
@@ -104,10 +102,6 @@ bool fault_make(const struct control_bench *b, const struct control_value *v, st
 
 /* Whether a kind may be at a point; false with the reason in why[CONTROL_WHY_MAX]. */
 bool fault_fits(const struct control_bench *b, const struct fault *f, char *why);
-
-/* Tables in Markdown, for docs/faults.md and --list-faults: the kinds, which can be where, which the chips and the controller
- * of each type of board have, and its events. */
-void fault_markdown(FILE *out);
 
 static inline bool fault_given(const struct fault *f, enum fault_arg arg)
 {

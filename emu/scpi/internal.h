@@ -11,18 +11,6 @@ struct scpi_failure {
     char what[CONTROL_WHY_MAX];
 };
 
-struct scpi_call;
-
-/* A command of every instrument: common ones, STATus, SYSTem. */
-struct scpi_command {
-    const char *pattern; /* with ? if it asks */
-    const char *what;
-    void (*run)(const struct scpi_call *call);
-    unsigned max;       /* of its one parameter, an integer from 0; 0: it takes none */
-    size_t offset;      /* of the register it is about, in struct scpi_status */
-    const char *answer; /* always the same */
-};
-
 /* One execution of it. */
 struct scpi_call {
     struct scpi *s;
@@ -31,16 +19,12 @@ struct scpi_call {
     int64_t t_ns;
 };
 
-const struct scpi_command *scpi_common(unsigned i); /* NULL past the last */
-
 /* Adds an answer to the response under way. */
 void scpi_put(struct scpi *s, const char *text);
 __attribute__((format(printf, 2, 3))) void scpi_putf(struct scpi *s, const char *format, ...);
 
 /* The fields of a result, named with commas between. */
 void scpi_put_fields(struct scpi *s, const cJSON *result, const char *fields);
-
-bool scpi_belongs(const struct scpi_kind *kind, const struct control_command *row);
 
 /* Whether a pattern is a query. */
 bool scpi_asks(const char *pattern);
@@ -56,9 +40,6 @@ cJSON *scpi_args(const struct control_bench *b, const struct control_command *ro
 /* MINimum, MAXimum, DEFault of a row's argument. False: the word is none of these. */
 bool scpi_limit(const struct control_bench *b, const struct control_command *row, unsigned arg,
                 const unsigned suffix[4], struct scpi_text word, double *out);
-
-/* How many arguments of the row are suffixes of the header. */
-unsigned scpi_suffixes(const char *pattern);
 
 /* Starts to wait for the end of what the instrument does. */
 void scpi_await(struct scpi *s, int64_t t_ns);

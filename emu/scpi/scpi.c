@@ -3,6 +3,7 @@
 #include "command/args.h"
 #include "scpi/internal.h"
 
+#include <stdio.h>
 #include <string.h>
 
 /* ---- a unit of a message */
@@ -170,56 +171,4 @@ void scpi_line(struct scpi *s, const char *text, size_t len, int64_t t_ns)
     s->len = len;
     scpi_look(s, t_ns);
     go_on(s, t_ns);
-}
-
-/* ---- the rows for people */
-
-static void print_params(FILE *out, const struct control_command *row, unsigned suffixes)
-{
-    for (unsigned i = suffixes; i < control_arg_count(row); i++) {
-        const struct control_arg *a = &row->arg[i];
-        const char *next = ": ", *word;
-        fprintf(out, "%s%s%s", i > suffixes ? "; " : "", a->name, a->optional ? " (optional)" : "");
-        if (control_type_numeric(a->type)) {
-            fprintf(out, " %.10g to %.10g", a->min, a->max);
-            next = " ";
-        }
-        for (unsigned k = 0; (word = a->choices ? a->choices[k] : scpi_suffix(a->unit, k)); k++, next = ", ")
-            fprintf(out, "%s%s", next, word);
-        if (a->type == CONTROL_BOOL) fprintf(out, ": ON, OFF, 1, 0");
-    }
-}
-
-static void print_common(FILE *out)
-{
-    const struct scpi_command *row;
-    fprintf(out, "| header | parameter | what it does |\n|---|---|---|\n");
-    for (unsigned i = 0; (row = scpi_common(i)); i++) {
-        fprintf(out, "| `%s` | ", row->pattern);
-        if (row->max) fprintf(out, "0 to %u", row->max);
-        fprintf(out, " | %s |\n", row->what);
-    }
-}
-
-static void print_headers(FILE *out, const struct control_command *row)
-{
-    for (unsigned i = 0; i < CONTROL_SCPI_MAX && row->scpi[i].header; i++) {
-        const struct control_scpi *how = &row->scpi[i];
-        fprintf(out, "| `%s` | ", how->header);
-        if (how->result) fprintf(out, "returns %s", how->result);
-        else print_params(out, row, scpi_suffixes(how->header));
-        fprintf(out, " | `%s` | %s |\n", row->name, row->what);
-    }
-}
-
-void scpi_markdown(FILE *out)
-{
-    const struct control_command *row;
-    print_common(out);
-    for (const struct scpi_kind *kind = scpi_kinds; kind->name; kind++) {
-        fprintf(out, "\n| header | parameters, response | command | what it does |\n|---|---|---|---|\n");
-        for (unsigned i = 0; (row = control_row(control_tables, i)); i++) {
-            if (scpi_belongs(kind, row)) print_headers(out, row);
-        }
-    }
 }

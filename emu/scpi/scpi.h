@@ -10,8 +10,6 @@
 #include "control/control.h"
 #include "scpi/status.h"
 
-#include <stdio.h>
-
 #define SCPI_LINE_MAX 4096u
 #define SCPI_OUT_MAX  8192u
 #define SCPI_PATH_MAX 81u
@@ -64,7 +62,26 @@ bool scpi_busy(const struct scpi *s);
 /* Looks at the conditions: call for every session after anything that may have changed the bench. */
 void scpi_look(struct scpi *s, int64_t t_ns);
 
-/* The common headers, then those of each kind of instrument, as tables in Markdown for docs/scpi.md and --list-scpi. */
-void scpi_markdown(FILE *out);
+/* ---- rows, for the page of headers */
+
+struct scpi_call;
+
+/* A command of every instrument: common ones, STATus, SYSTem. */
+struct scpi_command {
+    const char *pattern; /* with ? if it asks */
+    const char *what;
+    void (*run)(const struct scpi_call *call);
+    unsigned max;       /* of its one parameter, an integer from 0; 0: it takes none */
+    size_t offset;      /* of the register it is about, in struct scpi_status */
+    const char *answer; /* always the same */
+};
+
+const struct scpi_command *scpi_common(unsigned i); /* NULL past the last */
+
+/* Whether a row is one of the instrument's. */
+bool scpi_belongs(const struct scpi_kind *kind, const struct control_command *row);
+
+/* How many arguments of the row are suffixes of the header. */
+unsigned scpi_suffixes(const char *pattern);
 
 #endif

@@ -4,6 +4,7 @@
 
 #include "rig.h"
 
+#include "app/list.h"
 #include "bench/bench.h"
 #include "control/control.h"
 
@@ -184,7 +185,7 @@ static inline FILE *table_file(const struct control_table *const *tables)
 {
     FILE *file = tmpfile();
     assert_non_null(file);
-    control_markdown(tables, file);
+    list_table(file, tables);
     rewind(file);
     return file;
 }

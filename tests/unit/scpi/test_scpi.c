@@ -1,6 +1,8 @@
 /* SCPI: standard syntax, standard error numbers, messages, IEEE 488.2 status, the page of headers. */
 #include "scpi_say.h"
 
+#include "app/list.h"
+
 /* ---- matching */
 
 static const struct {
@@ -278,7 +280,7 @@ static void the_page_shows_every_header(void **state)
     unsigned lines = 0;
     FILE *table = tmpfile();
     assert_non_null(table);
-    scpi_markdown(table);
+    list_scpi(table);
     rewind(table);
     for (; next_line(table, line, sizeof line); lines++) {
         if (!page_has("docs/scpi.md", line)) fail_msg("docs/scpi.md lacks (make docs):\n%s", line);

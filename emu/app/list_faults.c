@@ -1,6 +1,7 @@
 /* The page of faults: kinds with what they take, the matrix of kinds and places, and what each type of board has. */
-#include "fault/internal.h"
+#include "app/list.h"
 
+#include "fault/fault.h"
 #include "unit/boards.h"
 
 static void print_args(FILE *out, const struct fault_kind *k)
@@ -89,7 +90,7 @@ static void print_events(FILE *out)
     }
 }
 
-void fault_markdown(FILE *out)
+void list_faults(FILE *out)
 {
     static void (*const tables[])(FILE * out) = {print_kinds, print_matrix, print_boards, print_events};
     for (unsigned i = 0; i < sizeof tables / sizeof *tables; i++) {
