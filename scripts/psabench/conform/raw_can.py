@@ -7,13 +7,15 @@ no clock of ours decides what silence is.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import wraps
 
 from psabench.boards.objects import Common
 from psabench.conform.capture.canbits import frame_bits
 from psabench.conform.capture.log import CanFrame
 from psabench.conform.dut import Subject, Take
+from psabench.conform.plan import active
 from psabench.conform.requirements import requirements
 from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.can_host import Message
@@ -302,6 +304,9 @@ class Talk:
         return self.fence()
 
 
+Dialogue = Callable[[Talk], str]
+
+
 @contextmanager
 def talk(s: Subject, *, reset: bool = False, take: Take | None = None) -> Iterator[Talk]:
     """A conversation that begins pre-operational; reset: settings are to be the defaults again when it ends."""
@@ -319,6 +324,20 @@ def talk(s: Subject, *, reset: bool = False, take: Take | None = None) -> Iterat
             s.run_for(0.01)  # the boot-up message, and what waited in the queues
         else:
             s.host.send(t.nmt_id, bytes([NMT_PREOP, t.node]))
+
+
+def dialogue(*, needs: Iterable[str] = ("can",), reset: bool = False) -> Callable[[Dialogue], Callable[[Subject], str]]:
+    """An active test that is a conversation: it gets a Talk, which ends with it as `talk` says."""
+
+    def register(test: Dialogue) -> Callable[[Subject], str]:
+        @wraps(test)
+        def converse(s: Subject) -> str:
+            with talk(s, reset=reset) as t:
+                return test(t)
+
+        return active(needs=needs)(converse)
+
+    return register
 
 
 def read(index: int, sub: int = 0) -> bytes:

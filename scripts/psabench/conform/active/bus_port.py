@@ -9,7 +9,7 @@ from psabench.conform.capture.bus_cycles import BUS, LINES, TAIL_S, Strobes, har
 from psabench.conform.dut import Subject
 from psabench.conform.plan import active
 from psabench.conform.proves import proves
-from psabench.conform.raw_can import ABORT, Talk, read, talk, words
+from psabench.conform.raw_can import ABORT, Talk, dialogue, read, words
 from psabench.conform.requirements import requirements
 from psabench.conform.verdict import Failed, Inconclusive
 
@@ -217,15 +217,14 @@ def a_strobe_is_as_long_as_it_is_told(s: Subject) -> str:
 
 
 @proves("BUS-PORT-09")
-@active(needs={"bus", "can"})
-def the_port_reads_what_can_reads(s: Subject) -> str:
+@dialogue(needs={"bus", "can"}, reset=True)
+def the_port_reads_what_can_reads(t: Talk) -> str:
     """Each readable register over CAN, by the port, over CAN again; those that stood still."""
     same = []
-    with talk(s, reset=True) as t:
-        s.wait_ready()
-        for name, (address, access) in registers(s).items():
-            if access != "wo" and _read_alike(t, address):
-                same.append(name)
+    t.s.wait_ready()
+    for name, (address, access) in registers(t.s).items():
+        if access != "wo" and _read_alike(t, address):
+            same.append(name)
     if not same:
         raise Inconclusive("no register stood still between two reads")
     return f"{', '.join(same)}: the same"

@@ -8,7 +8,6 @@ from psabench.boards.board import Setting
 from psabench.boards.objects import BusObjects, Common
 from psabench.boards.registry import BOARDS
 from psabench.conform.dut import Subject
-from psabench.conform.plan import active
 from psabench.conform.proves import proves
 from psabench.conform.raw_can import (
     BOOT_UP,
@@ -25,10 +24,10 @@ from psabench.conform.raw_can import (
     STOPPED,
     TPDO,
     Talk,
+    dialogue,
     ids,
     read,
     segment,
-    talk,
     write,
 )
 from psabench.conform.requirements import requirements
@@ -62,72 +61,66 @@ def _no_pdo(t: Talk, dwell_s: float, what: str) -> None:
 
 
 @proves("BUS-ID-02")
-@active()
-def it_listens_at_the_identifiers_of_its_node(s: Subject) -> str:
+@dialogue()
+def it_listens_at_the_identifiers_of_its_node(t: Talk) -> str:
     """Send NMT, SYNC and an SDO request where a unit of this node takes them."""
-    with talk(s) as t:
-        before = t.counter("SYNCs")
-        t.send(t.sync_id, b"")
-        syncs = t.counter("SYNCs") - before
-        if syncs != 1:
-            raise Failed(f"{syncs} SYNCs counted after one at {t.sync_id:03X}h", "1")
-        t.beat(BEAT_MS)
-        t.nmt(NMT_START)
-        _obeyed(t, OPERATIONAL, f"after a start at {t.nmt_id:03X}h")
-        t.nmt(NMT_PREOP)
-        t.beat(1000)
+    before = t.counter("SYNCs")
+    t.send(t.sync_id, b"")
+    syncs = t.counter("SYNCs") - before
+    if syncs != 1:
+        raise Failed(f"{syncs} SYNCs counted after one at {t.sync_id:03X}h", "1")
+    t.beat(BEAT_MS)
+    t.nmt(NMT_START)
+    _obeyed(t, OPERATIONAL, f"after a start at {t.nmt_id:03X}h")
+    t.nmt(NMT_PREOP)
+    t.beat(1000)
     return f"requests at {t.sdo_rx:03X}h answered, SYNC at {t.sync_id:03X}h counted, NMT at {t.nmt_id:03X}h obeyed"
 
 
 @proves("BUS-ID-03")
-@active()
-def requests_to_another_node_stay_unanswered(s: Subject) -> str:
+@dialogue()
+def requests_to_another_node_stay_unanswered(t: Talk) -> str:
     """Send SDO requests to the identifiers of other nodes, those that differ in one bit among them."""
-    with talk(s) as t:
-        before = [t.counter(c) for c in ("Malformed requests", "Requests refused")]
-        nodes = {1, 120, 127, *(s.node ^ 1 << bit for bit in range(7))} - {0, s.node}  # neighbours differ in one bit
-        others = [t.sdo_rx - s.node + n for n in sorted(nodes)]
-        came = [f for f in t.after(*((other, read(DEVICE_TYPE)) for other in others)) if f.can_id == t.sdo_tx]
-        if came:
-            raise Failed(f"{len(came)} answers to requests to other nodes", "none", frames=came)
-        moved = [t.counter(c) for c in ("Malformed requests", "Requests refused")]
+    before = [t.counter(c) for c in ("Malformed requests", "Requests refused")]
+    nodes = {1, 120, 127, *(t.s.node ^ 1 << bit for bit in range(7))} - {0, t.s.node}  # neighbours differ in one bit
+    others = [t.sdo_rx - t.s.node + n for n in sorted(nodes)]
+    came = [f for f in t.after(*((other, read(DEVICE_TYPE)) for other in others)) if f.can_id == t.sdo_tx]
+    if came:
+        raise Failed(f"{len(came)} answers to requests to other nodes", "none", frames=came)
+    moved = [t.counter(c) for c in ("Malformed requests", "Requests refused")]
     if moved != before:
         raise Failed(f"counters {before} became {moved}", "no change")
     return f"silence after requests at {', '.join(f'{i:03X}h' for i in others)}"
 
 
 @proves("BUS-ID-04")
-@active(needs={"can", "rtr"})
-def remote_frames_stay_unanswered(s: Subject) -> str:
+@dialogue(needs={"can", "rtr"})
+def remote_frames_stay_unanswered(t: Talk) -> str:
     """Ask for its PDO and its heartbeat by remote frames."""
-    with talk(s) as t:
-        asked = [*t.pdos.values(), t.heartbeat]
-        t.beat(0)
-        came = [f for f in t.after(*((i, b"") for i in asked), remote=True) if f.can_id in asked and not f.remote]
-        t.beat(1000)
+    asked = [*t.pdos.values(), t.heartbeat]
+    t.beat(0)
+    came = [f for f in t.after(*((i, b"") for i in asked), remote=True) if f.can_id in asked and not f.remote]
+    t.beat(1000)
     if came:
         raise Failed(f"frames {ids(came)} after remote frames", "none", frames=came)
     return f"no answer to remote frames {', '.join(f'{i:03X}h' for i in asked)}"
 
 
 @proves("BUS-BOOT-01")
-@active()
-def boot_up_is_the_first_frame(s: Subject) -> str:
+@dialogue(reset=True)
+def boot_up_is_the_first_frame(t: Talk) -> str:
     """Reset node and reset communication: what comes first."""
-    with talk(s, reset=True) as t:
-        for command in (NMT_RESET, NMT_RESET_COMMUNICATION):
-            t.fence()
-            came = [f for f in t.reset(command) if _mine(t, f.can_id)]
-            boots = [
-                f for f in came if f.can_id == t.heartbeat and f.data == bytes([_limit("BUS-BOOT-01", "state_code")])
-            ]
-            if len(boots) != 1 or came[0] is not boots[0]:
-                first = f"{came[0].can_id:03X}h" if came else "nothing"
-                raise Failed(
-                    f"{len(boots)} boot-up messages after NMT {command:02X}h, first of all {first}",
-                    "one, before anything else",
-                    frames=came,
-                )
+    for command in (NMT_RESET, NMT_RESET_COMMUNICATION):
+        t.fence()
+        came = [f for f in t.reset(command) if _mine(t, f.can_id)]
+        boots = [f for f in came if f.can_id == t.heartbeat and f.data == bytes([_limit("BUS-BOOT-01", "state_code")])]
+        if len(boots) != 1 or came[0] is not boots[0]:
+            first = f"{came[0].can_id:03X}h" if came else "nothing"
+            raise Failed(
+                f"{len(boots)} boot-up messages after NMT {command:02X}h, first of all {first}",
+                "one, before anything else",
+                frames=came,
+            )
     return "one boot-up message, before anything else, after 81h and after 82h"
 
 
@@ -136,81 +129,76 @@ def _mine(t: Talk, can_id: int) -> bool:
 
 
 @proves("BUS-BOOT-01")
-@active(needs={"can", "supply"})
-def boot_up_is_the_first_frame_after_power(s: Subject) -> str:
+@dialogue(needs={"can", "supply"})
+def boot_up_is_the_first_frame_after_power(t: Talk) -> str:
     """Switch the supply off and on: what comes first."""
-    with talk(s) as t:
-        s.bench.supply.output(False)
-        s.run_for(1.0)
-        t.drain()
-        at = len(t.heard)
-        s.bench.supply.output(True)
-        t.until(lambda: any(_mine(t, f.can_id) for f in t.heard[at:]), 5.0)
-        first = next((f for f in t.heard[at:] if _mine(t, f.can_id)), None)
-        if first is None or (first.can_id, first.data) != (t.heartbeat, bytes([_limit("BUS-BOOT-01", "state_code")])):
-            raise Failed(
-                f"{ids([first]) if first else 'nothing'} after power-on", "the boot-up message", frames=t.heard[at:]
-            )
-        t.fence()
-        boots = [f for f in t.heard[at:] if f.can_id == t.heartbeat and f.data == bytes([BOOT_UP])]
+    t.s.bench.supply.output(False)
+    t.s.run_for(1.0)
+    t.drain()
+    at = len(t.heard)
+    t.s.bench.supply.output(True)
+    t.until(lambda: any(_mine(t, f.can_id) for f in t.heard[at:]), 5.0)
+    first = next((f for f in t.heard[at:] if _mine(t, f.can_id)), None)
+    if first is None or (first.can_id, first.data) != (t.heartbeat, bytes([_limit("BUS-BOOT-01", "state_code")])):
+        raise Failed(
+            f"{ids([first]) if first else 'nothing'} after power-on", "the boot-up message", frames=t.heard[at:]
+        )
+    t.fence()
+    boots = [f for f in t.heard[at:] if f.can_id == t.heartbeat and f.data == bytes([BOOT_UP])]
     if len(boots) != 1:
         raise Failed(f"{len(boots)} boot-up messages after power-on", "one", frames=boots)
     return "one boot-up message, before anything else"
 
 
 @proves("BUS-BOOT-02")
-@active()
-def it_waits_pre_operational(s: Subject) -> str:
+@dialogue(reset=True)
+def it_waits_pre_operational(t: Talk) -> str:
     """After a reset look at its heartbeat, and for PDOs, until it is set up and longer."""
-    with talk(s, reset=True) as t:
-        t.reset()
-        t.beat(BEAT_MS)
-        _is(t.state(), _limit("BUS-BOOT-02", "state_code"), "after boot-up")
-        _no_pdo(t, 0.3, "before NMT start")
-        _is(t.state(), _limit("BUS-BOOT-02", "state_code"), "0.3 s later")
+    t.reset()
+    t.beat(BEAT_MS)
+    _is(t.state(), _limit("BUS-BOOT-02", "state_code"), "after boot-up")
+    _no_pdo(t, 0.3, "before NMT start")
+    _is(t.state(), _limit("BUS-BOOT-02", "state_code"), "0.3 s later")
     return "pre-operational, no PDO in 0.3 s"
 
 
 @proves("BUS-NMT-01")
-@active(needs={"can", "stream"})
-def start_makes_it_operational(s: Subject) -> str:
+@dialogue(needs={"can", "stream"}, reset=True)
+def start_makes_it_operational(t: Talk) -> str:
     """NMT start: the heartbeat and the PDOs."""
     row = requirements().rows["BUS-NMT-01"]
-    with talk(s, reset=True) as t:
-        t.beat(BEAT_MS)
-        t.nmt(int(row.limit("command_code")))
-        _obeyed(t, int(row.limit("state_code")), "after NMT start")
-        counts = {i: len(t.readings(1, i)) for i in t.pdos.values()}
+    t.beat(BEAT_MS)
+    t.nmt(int(row.limit("command_code")))
+    _obeyed(t, int(row.limit("state_code")), "after NMT start")
+    counts = {i: len(t.readings(1, i)) for i in t.pdos.values()}
     return f"operational, PDOs {', '.join(f'{i:03X}h' for i in counts)}"
 
 
 @proves("BUS-NMT-02")
-@active()
-def stop_stops_it(s: Subject) -> str:
+@dialogue(reset=True)
+def stop_stops_it(t: Talk) -> str:
     """NMT stop: the heartbeat."""
     row = requirements().rows["BUS-NMT-02"]
-    with talk(s, reset=True) as t:
-        t.beat(BEAT_MS)
-        t.nmt(NMT_START)
-        _obeyed(t, OPERATIONAL, "after NMT start")
-        t.nmt(int(row.limit("command_code")))
-        _obeyed(t, int(row.limit("state_code")), "after NMT stop")
+    t.beat(BEAT_MS)
+    t.nmt(NMT_START)
+    _obeyed(t, OPERATIONAL, "after NMT start")
+    t.nmt(int(row.limit("command_code")))
+    _obeyed(t, int(row.limit("state_code")), "after NMT stop")
     return "stopped"
 
 
 @proves("BUS-NMT-03")
-@active(needs={"can", "stream"})
-def pre_operational_ends_its_pdos(s: Subject) -> str:
+@dialogue(needs={"can", "stream"}, reset=True)
+def pre_operational_ends_its_pdos(t: Talk) -> str:
     """NMT start, PDOs, NMT 80h: no PDO after it was obeyed."""
     row = requirements().rows["BUS-NMT-03"]
-    with talk(s, reset=True) as t:
-        t.beat(BEAT_MS)
-        s.wait_ready()
-        t.stream()
-        t.nmt(int(row.limit("command_code")))
-        t.fence()
-        _no_pdo(t, 2 * SETTLE_S, "after NMT 80h")
-        _is(t.state(), int(row.limit("state_code")), "after NMT 80h")
+    t.beat(BEAT_MS)
+    t.s.wait_ready()
+    t.stream()
+    t.nmt(int(row.limit("command_code")))
+    t.fence()
+    _no_pdo(t, 2 * SETTLE_S, "after NMT 80h")
+    _is(t.state(), int(row.limit("state_code")), "after NMT 80h")
     return "pre-operational, and no PDO"
 
 
@@ -230,15 +218,14 @@ def _own_settings(s: Subject) -> dict[tuple[int, int], bytes]:
 
 
 @proves("BUS-NMT-04")
-@active()
-def reset_node_restores_the_defaults(s: Subject) -> str:
+@dialogue(reset=True)
+def reset_node_restores_the_defaults(t: Talk) -> str:
     """Write settings, NMT 81h, read them again; count readings before and after."""
-    with talk(s, reset=True) as t:
-        settings = _settings(t) | _own_settings(s)
-        _write(t, settings)
-        t.reset(_limit("BUS-NMT-04", "command_code"))
-        _are_defaults(t, settings, "NMT 81h")
-        _is(t.state(), PRE_OPERATIONAL, "after NMT 81h")
+    settings = _settings(t) | _own_settings(t.s)
+    _write(t, settings)
+    t.reset(_limit("BUS-NMT-04", "command_code"))
+    _are_defaults(t, settings, "NMT 81h")
+    _is(t.state(), PRE_OPERATIONAL, "after NMT 81h")
     return f"{len(settings)} settings have their defaults again"
 
 
@@ -262,103 +249,98 @@ def _are_defaults(t: Talk, settings: Settings, what: str) -> None:
 
 
 @proves("BUS-NMT-05")
-@active()
-def reset_communication_leaves_the_board_alone(s: Subject) -> str:
+@dialogue(reset=True)
+def reset_communication_leaves_the_board_alone(t: Talk) -> str:
     """Write settings of communication and of the board, NMT 82h, read both again; readings go on being counted."""
-    with talk(s, reset=True) as t:
-        s.wait_ready()
-        own = _own_settings(s)
-        _write(t, _settings(t) | own)
-        count = t.number(COUNTERS, 1)
-        t.reset(_limit("BUS-NMT-05", "command_code"))
-        _are_defaults(t, _settings(t), "NMT 82h")
-        for (index, sub), written in own.items():
-            if t.upload(index, sub) != written:
-                raise Failed(f"{index:04X}h:{sub} is {t.number(index, sub)} after NMT 82h", "what was written")
-        if t.number(COUNTERS, 1) < count:
-            raise Failed("the count of readings fell with NMT 82h", "that it goes on")
+    t.s.wait_ready()
+    own = _own_settings(t.s)
+    _write(t, _settings(t) | own)
+    count = t.number(COUNTERS, 1)
+    t.reset(_limit("BUS-NMT-05", "command_code"))
+    _are_defaults(t, _settings(t), "NMT 82h")
+    for (index, sub), written in own.items():
+        if t.upload(index, sub) != written:
+            raise Failed(f"{index:04X}h:{sub} is {t.number(index, sub)} after NMT 82h", "what was written")
+    if t.number(COUNTERS, 1) < count:
+        raise Failed("the count of readings fell with NMT 82h", "that it goes on")
     kept = ", ".join(f"{index:04X}h:{sub} has what was written" for index, sub in own) or "the board has no settings"
     return f"{len(_settings(t))} communication parameters have their defaults, {kept}"
 
 
 @proves("BUS-NMT-06")
-@active()
-def node_0_is_everybody(s: Subject) -> str:
+@dialogue(reset=True)
+def node_0_is_everybody(t: Talk) -> str:
     """NMT commands to node 0 and to another node."""
-    with talk(s, reset=True) as t:
-        t.beat(BEAT_MS)
-        other = 1 if s.node != 1 else 2
-        t.nmt(NMT_START, other)
-        t.nmt(NMT_STOP, other)
-        t.nmt(NMT_RESET, other)
-        t.fence()
-        _is(t.state(), PRE_OPERATIONAL, f"after commands to node {other}")
-        t.nmt(NMT_START, 0)
-        _obeyed(t, OPERATIONAL, "after a start of node 0")
-        t.nmt(NMT_PREOP, 0)
-        _obeyed(t, PRE_OPERATIONAL, "after NMT 80h to node 0")
-        t.nmt(NMT_START, 0)  # others that flowed flow again
-        t.nmt(NMT_PREOP)
+    t.beat(BEAT_MS)
+    other = 1 if t.s.node != 1 else 2
+    t.nmt(NMT_START, other)
+    t.nmt(NMT_STOP, other)
+    t.nmt(NMT_RESET, other)
+    t.fence()
+    _is(t.state(), PRE_OPERATIONAL, f"after commands to node {other}")
+    t.nmt(NMT_START, 0)
+    _obeyed(t, OPERATIONAL, "after a start of node 0")
+    t.nmt(NMT_PREOP, 0)
+    _obeyed(t, PRE_OPERATIONAL, "after NMT 80h to node 0")
+    t.nmt(NMT_START, 0)  # others that flowed flow again
+    t.nmt(NMT_PREOP)
     return f"obeys node 0 and itself, not node {other}"
 
 
 @proves("BUS-NMT-07")
-@active()
-def unknown_commands_change_nothing(s: Subject) -> str:
+@dialogue(reset=True)
+def unknown_commands_change_nothing(t: Talk) -> str:
     """NMT commands 00h, 03h, 7Fh and FFh, operational and pre-operational."""
     commands = (0x00, 0x03, 0x7F, 0xFF)
-    with talk(s, reset=True) as t:
-        t.beat(BEAT_MS)
-        for state, nmt in ((PRE_OPERATIONAL, NMT_PREOP), (OPERATIONAL, NMT_START)):
-            t.nmt(nmt)
+    t.beat(BEAT_MS)
+    for state, nmt in ((PRE_OPERATIONAL, NMT_PREOP), (OPERATIONAL, NMT_START)):
+        t.nmt(nmt)
+        t.fence()
+        for command in commands:
+            t.nmt(command)
             t.fence()
-            for command in commands:
-                t.nmt(command)
-                t.fence()
-                _is(t.state(), state, f"after NMT command {command:02X}h")
+            _is(t.state(), state, f"after NMT command {command:02X}h")
     return "the state stays through each of them"
 
 
 @proves("BUS-NMT-08")
-@active()
-def stopped_it_only_beats(s: Subject) -> str:
+@dialogue(reset=True)
+def stopped_it_only_beats(t: Talk) -> str:
     """Stopped: SDO requests, SYNCs; then what it says, and what it counted."""
-    with talk(s, reset=True) as t:
-        s.wait_ready()
-        syncs = t.counter("SYNCs")
-        t.beat(BEAT_MS)
-        t.nmt(NMT_START)
-        t.nmt(NMT_STOP)
-        _obeyed(t, STOPPED, "after NMT stop")
-        at = len(t.heard)
-        for _ in range(3):
-            t.send(t.sync_id, b"")
-            t.send(t.sdo_rx, read(DEVICE_TYPE))
-        if not t.until(lambda: len([f for f in t.heard[at:] if f.can_id == t.heartbeat]) > 3):
-            raise Failed("no heartbeat any more", "one every 20 ms")
-        t.nmt(NMT_PREOP)
-        t.fence()
-        known = {t.emcy, *t.pdos.values()}
-        came = [f for f in t.heard[at:] if f.can_id in known]
-        answers = [f for f in t.heard[at:] if f.can_id == t.sdo_tx][:-1]  # the last one is the fence's
-        if came or answers:
-            raise Failed(f"stopped, and it sent {ids([*came, *answers])}", "heartbeats alone", frames=[*came, *answers])
-        counted = t.counter("SYNCs") - syncs
+    t.s.wait_ready()
+    syncs = t.counter("SYNCs")
+    t.beat(BEAT_MS)
+    t.nmt(NMT_START)
+    t.nmt(NMT_STOP)
+    _obeyed(t, STOPPED, "after NMT stop")
+    at = len(t.heard)
+    for _ in range(3):
+        t.send(t.sync_id, b"")
+        t.send(t.sdo_rx, read(DEVICE_TYPE))
+    if not t.until(lambda: len([f for f in t.heard[at:] if f.can_id == t.heartbeat]) > 3):
+        raise Failed("no heartbeat any more", "one every 20 ms")
+    t.nmt(NMT_PREOP)
+    t.fence()
+    known = {t.emcy, *t.pdos.values()}
+    came = [f for f in t.heard[at:] if f.can_id in known]
+    answers = [f for f in t.heard[at:] if f.can_id == t.sdo_tx][:-1]  # the last one is the fence's
+    if came or answers:
+        raise Failed(f"stopped, and it sent {ids([*came, *answers])}", "heartbeats alone", frames=[*came, *answers])
+    counted = t.counter("SYNCs") - syncs
     if counted:
         raise Failed(f"{counted} SYNCs counted while stopped", "none")
     return "heartbeats alone; no SYNC counted"
 
 
 @proves("BUS-NMT-09")
-@active()
-def a_stop_ends_a_transfer(s: Subject) -> str:
+@dialogue(reset=True)
+def a_stop_ends_a_transfer(t: Talk) -> str:
     """Begin a segmented upload, stop, go pre-operational, ask for the next segment."""
     code = _limit("BUS-NMT-09", "abort_code")
-    with talk(s, reset=True) as t:
-        t.ask(read(NAME))
-        t.nmt(NMT_STOP)
-        t.nmt(NMT_PREOP)
-        found = t.abort_of(segment(0))
+    t.ask(read(NAME))
+    t.nmt(NMT_STOP)
+    t.nmt(NMT_PREOP)
+    found = t.abort_of(segment(0))
     if found != code:
         saw = "a segment" if found is None else f"abort {found:08X}h"
         raise Failed(f"{saw} after the stop", f"abort {code:08X}h")
@@ -366,46 +348,43 @@ def a_stop_ends_a_transfer(s: Subject) -> str:
 
 
 @proves("BUS-NMT-10")
-@active()
-def requests_are_answered_in_both_states(s: Subject) -> str:
+@dialogue()
+def requests_are_answered_in_both_states(t: Talk) -> str:
     """Upload 1000h pre-operational and operational."""
-    with talk(s) as t:
-        for nmt in (NMT_PREOP, NMT_START):
-            t.nmt(nmt)
-            for _ in range(REQUESTS):
-                t.upload(DEVICE_TYPE)
-        t.hush()
+    for nmt in (NMT_PREOP, NMT_START):
+        t.nmt(nmt)
+        for _ in range(REQUESTS):
+            t.upload(DEVICE_TYPE)
+    t.hush()
     return f"{REQUESTS} answers in each state"
 
 
 @proves("BUS-HB-02")
-@active()
-def no_heartbeat_where_the_period_is_0(s: Subject) -> str:
+@dialogue(reset=True)
+def no_heartbeat_where_the_period_is_0(t: Talk) -> str:
     """1017h = 0, then look for heartbeats."""
     row = requirements().rows["BUS-HB-02"]
-    with talk(s, reset=True) as t:
-        t.beat(0)
-        came = [f for f in t.during(row.limit("quiet_s")) if f.can_id == t.heartbeat]
+    t.beat(0)
+    came = [f for f in t.during(row.limit("quiet_s")) if f.can_id == t.heartbeat]
     if came:
         raise Failed(f"{len(came)} heartbeats with 1017h = 0", "none", frames=came)
     return f"none in {row.limit('quiet_s'):g} s"
 
 
 @proves("BUS-HB-03")
-@active(needs={"can", "stamps"})
-def a_new_period_holds_at_once(s: Subject) -> str:
+@dialogue(needs={"can", "stamps"}, reset=True)
+def a_new_period_holds_at_once(t: Talk) -> str:
     """Write 100 ms to 1017h and take the time of the next heartbeats."""
     late_s = requirements().rows["BUS-HB-03"].limit("jitter_max_ms") * 1e-3
     period_s = NEW_BEAT_MS * 1e-3
-    with talk(s, reset=True) as t:
-        written = t.answer_to(write(HEARTBEAT, 0, NEW_BEAT_MS.to_bytes(2, "little")))
-        beats = [t.next(t.heartbeat), t.next(t.heartbeat)]
+    written = t.answer_to(write(HEARTBEAT, 0, NEW_BEAT_MS.to_bytes(2, "little")))
+    beats = [t.next(t.heartbeat), t.next(t.heartbeat)]
     came = [written, *(b for b in beats if b is not None)]
     if len(came) < 3:
         raise Failed(f"{len(came) - 1} heartbeats with a period of {NEW_BEAT_MS} ms", "one in each")
     for a, b in itertools.pairwise(came):
         off_s = b.t_s - a.t_s - period_s
-        if abs(off_s) > late_s + s.slack_s(period_s):
+        if abs(off_s) > late_s + t.s.slack_s(period_s):
             raise Failed(
                 f"a heartbeat {b.t_s - a.t_s:.6f} s after the one before or the write", f"{period_s} s", frames=came
             )

@@ -17,6 +17,7 @@ from psabench.conform.raw_can import (
     NMT_RESET,
     TPDO,
     Talk,
+    dialogue,
     read,
     talk,
     words,
@@ -59,21 +60,20 @@ def _common(o: Described) -> bool:
 
 
 @proves("BUS-OD-01")
-@active()
-def the_common_objects_are_there(s: Subject) -> str:
+@dialogue(reset=True)
+def the_common_objects_are_there(t: Talk) -> str:
     """After a reset upload every communication object: its length, its default."""
     seen = 0
-    with talk(s, reset=True) as t:
-        t.reset()
-        for o in filter(_common, s.unit.node.objects()):
-            value = t.upload(o.index, o.sub)
-            what = f"{o.index:04X}h:{o.sub}"
-            if o.data_bytes is not None and len(value) != o.data_bytes:
-                raise Failed(f"{what} has {len(value)} bytes", f"{o.data_bytes}")
-            due = _due(o)
-            if due is not None and value != due:
-                raise Failed(f"{what} is {words(value)}", words(due))
-            seen += 1
+    t.reset()
+    for o in filter(_common, t.s.unit.node.objects()):
+        value = t.upload(o.index, o.sub)
+        what = f"{o.index:04X}h:{o.sub}"
+        if o.data_bytes is not None and len(value) != o.data_bytes:
+            raise Failed(f"{what} has {len(value)} bytes", f"{o.data_bytes}")
+        due = _due(o)
+        if due is not None and value != due:
+            raise Failed(f"{what} is {words(value)}", words(due))
+        seen += 1
     return f"{seen} objects with their types and defaults"
 
 
@@ -87,70 +87,65 @@ def _due(o: Described) -> bytes | None:
 
 
 @proves("BUS-OD-02")
-@active()
-def device_type(s: Subject) -> str:
+@dialogue()
+def device_type(t: Talk) -> str:
     """Upload 1000h."""
     due = int(requirements().rows["BUS-OD-02"].limit("device_type"))
-    with talk(s) as t:
-        found = t.upload(DEVICE_TYPE)
+    found = t.upload(DEVICE_TYPE)
     if found != due.to_bytes(4, "little"):
         raise Failed(words(found), f"{due:X}h in 4 bytes")
     return f"{due:X}h"
 
 
 @proves("BUS-OD-03")
-@active()
-def serial_number(s: Subject) -> str:
+@dialogue(reset=True)
+def serial_number(t: Talk) -> str:
     """Upload 1018h sub 4 before and after a reset."""
-    with talk(s, reset=True) as t:
-        before = t.upload(IDENTITY, SERIAL)
-        t.reset()
-        after = t.upload(IDENTITY, SERIAL)
+    before = t.upload(IDENTITY, SERIAL)
+    t.reset()
+    after = t.upload(IDENTITY, SERIAL)
     if before != after or len(before) != 4:
         raise Failed(f"{words(before)}, after a reset {words(after)}", "the same 4 bytes")
     return f"serial number {int.from_bytes(before, 'little')}"
 
 
 @proves("BUS-OD-04")
-@active(needs={"can", "stream"})
-def constants_name_the_node(s: Subject) -> str:
+@dialogue(needs={"can", "stream"}, reset=True)
+def constants_name_the_node(t: Talk) -> str:
     """Upload the objects that name an identifier, and see that it is the one in use."""
-    with talk(s, reset=True) as t:
-        t.reset()
-        due = {(EMCY_ID, 0): t.emcy, (SERVER, 1): t.sdo_rx, (SERVER, 2): t.sdo_tx}
-        due |= {(TPDO + k - 1, 1): can_id for k, can_id in t.pdos.items()}
-        for (index, sub), can_id in due.items():
-            found = t.number(index, sub) & 0x7FF
-            if found != can_id:
-                raise Failed(f"{index:04X}h:{sub} names {found:03X}h", f"{can_id:03X}h")
-        s.wait_ready()
-        for can_id in t.pdos.values():
-            t.stream(1, can_id)
-    return f"{len(due)} objects name the identifiers of node {s.node}"
+    t.reset()
+    due = {(EMCY_ID, 0): t.emcy, (SERVER, 1): t.sdo_rx, (SERVER, 2): t.sdo_tx}
+    due |= {(TPDO + k - 1, 1): can_id for k, can_id in t.pdos.items()}
+    for (index, sub), can_id in due.items():
+        found = t.number(index, sub) & 0x7FF
+        if found != can_id:
+            raise Failed(f"{index:04X}h:{sub} names {found:03X}h", f"{can_id:03X}h")
+    t.s.wait_ready()
+    for can_id in t.pdos.values():
+        t.stream(1, can_id)
+    return f"{len(due)} objects name the identifiers of node {t.s.node}"
 
 
 @proves("BUS-OD-05")
-@active()
-def the_remark_outlives_a_reset(s: Subject) -> str:
+@dialogue(reset=True)
+def the_remark_outlives_a_reset(t: Talk) -> str:
     """Write 2040h, NMT 81h, read it."""
-    with talk(s, reset=True) as t:
-        put(t, REMARK, b"kept over Res")
-        t.reset()
-        found = t.upload(REMARK)
-        put(t, REMARK, b"")
+    put(t, REMARK, b"kept over Res")
+    t.reset()
+    found = t.upload(REMARK)
+    put(t, REMARK, b"")
     if found != b"kept over Res":
         raise Failed(f"{found!r} after a reset", "what was written")
     return "kept"
 
 
 @proves("BUS-OD-05")
-@active(needs={"can", "supply"})
-def the_remark_goes_with_the_power(s: Subject) -> str:
+@dialogue(needs={"can", "supply"})
+def the_remark_goes_with_the_power(t: Talk) -> str:
     """Write 2040h, switch the supply off and on, read it."""
-    with talk(s) as t:
-        put(t, REMARK, b"gone with the power")
-        power_cycle(t)
-        found = t.upload(REMARK)
+    put(t, REMARK, b"gone with the power")
+    power_cycle(t)
+    found = t.upload(REMARK)
     if found:
         raise Failed(f"{found!r} after power-on", "nothing")
     return "forgotten"
@@ -168,26 +163,25 @@ def power_cycle(t: Talk) -> None:
 
 
 @proves("BUS-OD-06")
-@active()
-def mappings_lay_out_the_messages(s: Subject) -> str:
+@dialogue(reset=True)
+def mappings_lay_out_the_messages(t: Talk) -> str:
     """Upload each mapping and lay it beside the DBC; try to write it."""
     code = requirements().rows["BUS-SDO-10"].limit("read_only_code")
-    node, told = s.unit.node, []
-    with talk(s, reset=True) as t:
-        for k in range(8):
-            if not node.has(MAPPING + k):
-                continue
-            name = node.title(TPDO + k).partition(":")[0]
-            count = t.number(MAPPING + k)
-            entries = [t.number(MAPPING + k, sub) for sub in range(1, min(count, 64) + 1)]
-            t.refused(_write_one(MAPPING + k), code, f"a write to {MAPPING + k:04X}h:1")
-            if not node.default(MAPPING + k, 0):
-                continue  # of no object: the DBC alone has the layout (docs/reference/protocol.md, Objects)
-            bits = sum(e & 0xFF for e in entries)
-            if bits != 8 * int(message(name).length):
-                raise Failed(f"{MAPPING + k:04X}h maps {bits} bits", f"{8 * int(message(name).length)}, as {name} has")
-            _bounds(name, entries)
-            told.append(name)
+    node, told = t.s.unit.node, []
+    for k in range(8):
+        if not node.has(MAPPING + k):
+            continue
+        name = node.title(TPDO + k).partition(":")[0]
+        count = t.number(MAPPING + k)
+        entries = [t.number(MAPPING + k, sub) for sub in range(1, min(count, 64) + 1)]
+        t.refused(_write_one(MAPPING + k), code, f"a write to {MAPPING + k:04X}h:1")
+        if not node.default(MAPPING + k, 0):
+            continue  # of no object: the DBC alone has the layout (docs/reference/protocol.md, Objects)
+        bits = sum(e & 0xFF for e in entries)
+        if bits != 8 * int(message(name).length):
+            raise Failed(f"{MAPPING + k:04X}h maps {bits} bits", f"{8 * int(message(name).length)}, as {name} has")
+        _bounds(name, entries)
+        told.append(name)
     return f"{', '.join(told)} as mapped; no mapping is written"
 
 
@@ -207,21 +201,20 @@ def _bounds(name: str, entries: list[int]) -> None:
 
 
 @proves("BUS-OD-07", "BUS-ID-07")
-@active(needs={"can", "stream"})
-def mapped_objects_read_as_the_frames(s: Subject) -> str:
+@dialogue(needs={"can", "stream"}, reset=True)
+def mapped_objects_read_as_the_frames(t: Talk) -> str:
     """While PDOs come upload all that they map; find each value in a frame that came just before or after."""
     compared = 0
-    with talk(s, reset=True) as t:
-        s.wait_ready()
-        for k, can_id in t.pdos.items():
-            mapping = [t.number(MAPPING + k - 1, sub) for sub in range(1, min(t.number(MAPPING + k - 1), 64) + 1)]
-            t.stream(LEAST, can_id)
-            at = 0
-            for entry in mapping:
-                _compare(t, can_id, entry, at)
-                at += entry & 0xFF
-                compared += 1
-            t.hush()
+    t.s.wait_ready()
+    for k, can_id in t.pdos.items():
+        mapping = [t.number(MAPPING + k - 1, sub) for sub in range(1, min(t.number(MAPPING + k - 1), 64) + 1)]
+        t.stream(LEAST, can_id)
+        at = 0
+        for entry in mapping:
+            _compare(t, can_id, entry, at)
+            at += entry & 0xFF
+            compared += 1
+        t.hush()
     if not compared:
         raise Inconclusive("no PDO with a mapping")
     return f"{compared} mapped objects are what the frames carried"
@@ -244,19 +237,18 @@ def _compare(t: Talk, can_id: int, entry: int, at: int) -> None:
 
 
 @proves("BUS-CNT-01")
-@active()
-def counters_outlive_a_reset(s: Subject) -> str:
+@dialogue(reset=True)
+def counters_outlive_a_reset(t: Talk) -> str:
     """Refusals and SYNCs, NMT 81h, the counters again; the readings, which go on, are not less."""
     names = ("Requests refused", "Malformed requests", "SYNCs")
-    with talk(s, reset=True) as t:
-        s.wait_ready()
-        s.run_for(SOME_S)
-        t.ask(read(NOWHERE))
-        t.send(t.sdo_rx, b"\0")
-        t.send(t.sync_id, b"")
-        before, readings = [t.counter(n) for n in names], t.number(COUNTERS, READINGS)
-        t.reset(NMT_RESET)
-        after, later = [t.counter(n) for n in names], t.number(COUNTERS, READINGS)
+    t.s.wait_ready()
+    t.s.run_for(SOME_S)
+    t.ask(read(NOWHERE))
+    t.send(t.sdo_rx, b"\0")
+    t.send(t.sync_id, b"")
+    before, readings = [t.counter(n) for n in names], t.number(COUNTERS, READINGS)
+    t.reset(NMT_RESET)
+    after, later = [t.counter(n) for n in names], t.number(COUNTERS, READINGS)
     if later < readings:
         raise Failed(f"{readings} readings, {later} after NMT 81h", "as many or more")
     if after != before or not all(before):
@@ -265,24 +257,22 @@ def counters_outlive_a_reset(s: Subject) -> str:
 
 
 @proves("BUS-ERR-02")
-@active()
-def errors_on_the_wire_read_0(s: Subject) -> str:
+@dialogue()
+def errors_on_the_wire_read_0(t: Talk) -> str:
     """Upload the error counters of the CAN controller."""
     due = int(requirements().rows["BUS-ERR-02"].limit("count"))
-    with talk(s) as t:
-        found = {name: t.counter(name) for name in ERRORS_OF_CAN}
+    found = {name: t.counter(name) for name in ERRORS_OF_CAN}
     if any(v != due for v in found.values()):
         raise Failed(f"{found}", f"{due}")
     return f"{', '.join(found)} are {due}"
 
 
 @proves("BUS-ERR-01")
-@active(needs={"can", "errors"})
-def errors_on_the_wire_are_counted(s: Subject) -> str:
+@dialogue(needs={"can", "errors"})
+def errors_on_the_wire_are_counted(t: Talk) -> str:
     """Upload the error counters of the CAN controller while frames are destroyed."""
     most = int(requirements().rows["BUS-ERR-01"].limit("count_max"))
-    with talk(s) as t:
-        found = {name: t.counter(name) for name in ERRORS_OF_CAN[:2]}
+    found = {name: t.counter(name) for name in ERRORS_OF_CAN[:2]}
     if not any(found.values()) or max(found.values()) > most:
         raise Failed(f"{found}", f"1 to {most} in one of them")
     return f"{found}"
@@ -310,21 +300,20 @@ def the_load_is_the_share_of_the_bus(s: Subject) -> str:
 
 
 @proves("BUS-ID-08")
-@active(needs={"can", "stamps", "exact"})
-def an_answer_waits_for_the_interframe_space(s: Subject) -> str:
+@dialogue(needs={"can", "stamps", "exact"}, reset=True)
+def an_answer_waits_for_the_interframe_space(t: Talk) -> str:
     """Take the time from a request on a quiet bus to the end of its answer, and take off the bits of both."""
     row = requirements().rows["BUS-ID-08"]
     bit_s, least = 1.0 / row.limit("bit_hz"), row.limit("interframe_bits")
     found: list[float] = []
-    with talk(s, reset=True) as t:
-        t.beat(0)
-        for request in (read(DEVICE_TYPE), read(HEARTBEAT), read(NOWHERE)):
-            s.run_for(0.02)
-            t.drain()
-            sent_s = s.bench.time_s
-            answer = t.answer_to(request)
-            bits = frame_bits(t.sdo_rx, request) + frame_bits(answer.can_id, answer.data)
-            found.append((answer.t_s - sent_s) / bit_s - bits)
+    t.beat(0)
+    for request in (read(DEVICE_TYPE), read(HEARTBEAT), read(NOWHERE)):
+        t.s.run_for(0.02)
+        t.drain()
+        sent_s = t.s.bench.time_s
+        answer = t.answer_to(request)
+        bits = frame_bits(t.sdo_rx, request) + frame_bits(answer.can_id, answer.data)
+        found.append((answer.t_s - sent_s) / bit_s - bits)
     if min(found) < least - STAMP_S / bit_s:
         raise Failed(f"{min(found):.1f} bits between a request and its answer", f"{least} and more")
     return f"{', '.join(f'{x:.1f}' for x in found)} bits between requests and answers"

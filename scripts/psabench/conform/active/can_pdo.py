@@ -12,7 +12,7 @@ from psabench.conform.capture.log import CanFrame
 from psabench.conform.dut import Subject
 from psabench.conform.plan import active
 from psabench.conform.proves import proves
-from psabench.conform.raw_can import COUNTERS, NMT_START, OFF, TPDO, Talk, flood, talk, words, write
+from psabench.conform.raw_can import COUNTERS, NMT_START, OFF, TPDO, Talk, dialogue, flood, talk, words, write
 from psabench.conform.requirements import requirements
 from psabench.conform.verdict import Failed, Inconclusive
 
@@ -65,14 +65,13 @@ def _begin(t: Talk, kind: int) -> tuple[int, int]:
 
 
 @proves("BUS-SYNC-01")
-@active()
-def syncs_are_counted(s: Subject) -> str:
+@dialogue()
+def syncs_are_counted(t: Talk) -> str:
     """SYNCs without a byte and with a counter of 0, 7 and 255; one of two bytes."""
-    with talk(s) as t:
-        before = t.counter("SYNCs")
-        for data in (b"", b"\0", b"\7", b"\xff"):
-            t.send(t.sync_id, data)
-        counted = t.counter("SYNCs") - before
+    before = t.counter("SYNCs")
+    for data in (b"", b"\0", b"\7", b"\xff"):
+        t.send(t.sync_id, data)
+    counted = t.counter("SYNCs") - before
     if counted != 4:
         raise Failed(f"{counted} of 4 SYNCs counted", "4")
     return "4 of 4 counted, whatever their counter"
@@ -97,21 +96,20 @@ def event_types_send_each_reading(s: Subject) -> str:
 
 
 @proves("BUS-SYNC-03")
-@active(needs={"can", "stream"})
-def type_0_sends_new_readings_at_sync(s: Subject) -> str:
+@dialogue(needs={"can", "stream"}, reset=True)
+def type_0_sends_new_readings_at_sync(t: Talk) -> str:
     """Transmission type 0: no SYNC; one SYNC after a reading; a burst of SYNCs."""
-    with talk(s, reset=True) as t:
-        _, can_id = _begin(t, SYNC_NEW)
-        t.fence()
-        _silent(t, can_id)
-        came = _sent_by(t, can_id, t.after((t.sync_id, b"")))
-        if came != 1:
-            raise Failed(f"{came} frames at a SYNC after a reading", "1")
-        begin = t.number(COUNTERS, READINGS)
-        came = _sent_by(t, can_id, t.after(*[(t.sync_id, b"")] * 40))
-        count = t.number(COUNTERS, READINGS) - begin
-        if came > count + 1:
-            raise Failed(f"{came} frames at 40 SYNCs, while {count} readings were made", f"{count + 1} at most")
+    _, can_id = _begin(t, SYNC_NEW)
+    t.fence()
+    _silent(t, can_id)
+    came = _sent_by(t, can_id, t.after((t.sync_id, b"")))
+    if came != 1:
+        raise Failed(f"{came} frames at a SYNC after a reading", "1")
+    begin = t.number(COUNTERS, READINGS)
+    came = _sent_by(t, can_id, t.after(*[(t.sync_id, b"")] * 40))
+    count = t.number(COUNTERS, READINGS) - begin
+    if came > count + 1:
+        raise Failed(f"{came} frames at 40 SYNCs, while {count} readings were made", f"{count + 1} at most")
     return f"none without SYNC, 1 at a SYNC, {came} at 40 SYNCs and {count} readings"
 
 
@@ -130,100 +128,95 @@ def _silent(t: Talk, can_id: int) -> None:
 
 
 @proves("BUS-SYNC-04")
-@active(needs={"can", "stream"})
-def type_n_sends_at_every_nth_sync(s: Subject) -> str:
+@dialogue(needs={"can", "stream"}, reset=True)
+def type_n_sends_at_every_nth_sync(t: Talk) -> str:
     """Transmission types 1, 3 and 240: frames at 6, 9 and 480 SYNCs."""
     told = []
-    with talk(s, reset=True) as t:
-        index, can_id = _begin(t, SYNC_NEW)
-        for n, syncs in ((1, 6), (3, 9), (240, 480)):
-            t.download(index, 2, bytes([n]))
-            _silent(t, can_id)
-            came = 0
-            for k in range(0, syncs, 30):
-                came += _sent_by(t, can_id, t.after(*[(t.sync_id, b"")] * min(30, syncs - k)))
-            if came != syncs // n:
-                raise Failed(f"{came} frames at {syncs} SYNCs with type {n}", f"{syncs // n}")
-            told.append(f"{n}: {came} of {syncs}")
+    index, can_id = _begin(t, SYNC_NEW)
+    for n, syncs in ((1, 6), (3, 9), (240, 480)):
+        t.download(index, 2, bytes([n]))
+        _silent(t, can_id)
+        came = 0
+        for k in range(0, syncs, 30):
+            came += _sent_by(t, can_id, t.after(*[(t.sync_id, b"")] * min(30, syncs - k)))
+        if came != syncs // n:
+            raise Failed(f"{came} frames at {syncs} SYNCs with type {n}", f"{syncs // n}")
+        told.append(f"{n}: {came} of {syncs}")
     return "; ".join(told)
 
 
 @proves("BUS-SYNC-05")
-@active()
-def reserved_types_are_refused(s: Subject) -> str:
+@dialogue()
+def reserved_types_are_refused(t: Talk) -> str:
     """Write the transmission types 241 to 253."""
     row = requirements().rows["BUS-SYNC-05"]
     low, high = int(row.limit("type_min")), int(row.limit("type_max"))
-    with talk(s) as t:
-        index, _ = _first(t)
-        for kind in range(low, high + 1):
-            t.refused(write(index, 2, bytes([kind])), row.limit("abort_code"), f"type {kind}")
+    index, _ = _first(t)
+    for kind in range(low, high + 1):
+        t.refused(write(index, 2, bytes([kind])), row.limit("abort_code"), f"type {kind}")
     return f"{low} to {high} are refused"
 
 
 @proves("BUS-PDO-01")
-@active(needs={"can", "stream"})
-def a_tpdo_that_is_off_is_not_sent(s: Subject) -> str:
+@dialogue(needs={"can", "stream"}, reset=True)
+def a_tpdo_that_is_off_is_not_sent(t: Talk) -> str:
     """Set bit 31 of 18xxh sub 1 while readings are made, and clear it."""
     off = int(_limit("BUS-PDO-01", "off_mask"))
-    with talk(s, reset=True) as t:
-        index, can_id = _begin(t, EVENT)
-        t.readings(1, can_id)
-        cob = t.number(index, 1)
-        t.download(index, 1, (cob | off).to_bytes(4, "little"))
-        t.fence()
-        _silent(t, can_id)
-        t.download(index, 1, (cob & ~off).to_bytes(4, "little"))
-        t.readings(1, can_id)
+    index, can_id = _begin(t, EVENT)
+    t.readings(1, can_id)
+    cob = t.number(index, 1)
+    t.download(index, 1, (cob | off).to_bytes(4, "little"))
+    t.fence()
+    _silent(t, can_id)
+    t.download(index, 1, (cob & ~off).to_bytes(4, "little"))
+    t.readings(1, can_id)
     return f"{can_id:03X}h: none with bit 31, and again without"
 
 
 @proves("BUS-PDO-02")
-@active(needs={"can", "stream"})
-def the_identifier_of_a_tpdo(s: Subject) -> str:
+@dialogue(needs={"can", "stream"}, reset=True)
+def the_identifier_of_a_tpdo(t: Talk) -> str:
     """Another identifier while it is valid; services, more than 11 bits, RTR; another one while it is off."""
     code = _limit("BUS-PDO-02", "abort_code")
-    with talk(s, reset=True) as t:
-        index, can_id = _begin(t, EVENT)
-        cob = t.number(index, 1) & ~0x7FF
-        t.refused(write(index, 1, (cob | FREE_ID).to_bytes(4, "little")), code, f"{FREE_ID:03X}h while valid")
-        t.download(index, 1, (cob | can_id | OFF).to_bytes(4, "little"))
-        for service in (t.nmt_id, t.sync_id, t.emcy, t.sdo_tx, t.sdo_rx, t.heartbeat):
-            word = (cob | service | OFF).to_bytes(4, "little")
-            t.refused(write(index, 1, word), code, f"{service:03X}h")
-        for other, what in ((cob | LONG_ID | OFF, "more than 11 bits"), (FREE_ID | OFF, "RTR allowed")):
-            t.refused(write(index, 1, other.to_bytes(4, "little")), code, what)
-        t.download(index, 1, (cob | FREE_ID | OFF).to_bytes(4, "little"))
-        t.download(index, 1, (cob | FREE_ID).to_bytes(4, "little"))
-        t.readings(FEW, FREE_ID)
-        at = len(t.heard)
-        t.readings(FEW, FREE_ID)
-        left = _sent(t, at, can_id)
+    index, can_id = _begin(t, EVENT)
+    cob = t.number(index, 1) & ~0x7FF
+    t.refused(write(index, 1, (cob | FREE_ID).to_bytes(4, "little")), code, f"{FREE_ID:03X}h while valid")
+    t.download(index, 1, (cob | can_id | OFF).to_bytes(4, "little"))
+    for service in (t.nmt_id, t.sync_id, t.emcy, t.sdo_tx, t.sdo_rx, t.heartbeat):
+        word = (cob | service | OFF).to_bytes(4, "little")
+        t.refused(write(index, 1, word), code, f"{service:03X}h")
+    for other, what in ((cob | LONG_ID | OFF, "more than 11 bits"), (FREE_ID | OFF, "RTR allowed")):
+        t.refused(write(index, 1, other.to_bytes(4, "little")), code, what)
+    t.download(index, 1, (cob | FREE_ID | OFF).to_bytes(4, "little"))
+    t.download(index, 1, (cob | FREE_ID).to_bytes(4, "little"))
+    t.readings(FEW, FREE_ID)
+    at = len(t.heard)
+    t.readings(FEW, FREE_ID)
+    left = _sent(t, at, can_id)
     if left:
         raise Failed(f"frames {can_id:03X}h after it became {FREE_ID:03X}h", "none", frames=left)
     return f"{can_id:03X}h became {FREE_ID:03X}h; services are refused, and any while it is valid"
 
 
 @proves("BUS-PDO-03")
-@active(needs={"can", "stamps", "stream"})
-def the_inhibit_time_keeps_tpdos_apart(s: Subject) -> str:
+@dialogue(needs={"can", "stamps", "stream"}, reset=True)
+def the_inhibit_time_keeps_tpdos_apart(t: Talk) -> str:
     """An inhibit time of 50 ms: the time between frames, and the count of those left out."""
     row = requirements().rows["BUS-PDO-03"]
     unit_s, late_s = row.limit("unit_us") * 1e-6, row.limit("jitter_max_ms") * 1e-3
-    with talk(s, reset=True) as t:
-        index, can_id = _begin(t, EVENT)
-        t.download(index, 3, round(INHIBIT_S / unit_s).to_bytes(2, "little"))
-        _readings(t, 1)
-        sub = next(sub for sub, name in s.unit.node.names(COUNTERS).items() if name == "PDOs inhibited")
-        looks = [(COUNTERS, READINGS), (COUNTERS, sub), (COUNTERS, READINGS)]
-        before = [t.look(*x) for x in looks]
-        t.readings(FEW, can_id)
-        after = [t.look(*x) for x in looks]
-        came = _sent(t, before[1][1], can_id, after[1][1])
-        left_out = after[1][0] - before[1][0]
-        least, most = after[0][0] - before[2][0], after[2][0] - before[0][0]  # readings, by looks within and around
+    index, can_id = _begin(t, EVENT)
+    t.download(index, 3, round(INHIBIT_S / unit_s).to_bytes(2, "little"))
+    _readings(t, 1)
+    sub = next(sub for sub, name in t.s.unit.node.names(COUNTERS).items() if name == "PDOs inhibited")
+    looks = [(COUNTERS, READINGS), (COUNTERS, sub), (COUNTERS, READINGS)]
+    before = [t.look(*x) for x in looks]
+    t.readings(FEW, can_id)
+    after = [t.look(*x) for x in looks]
+    came = _sent(t, before[1][1], can_id, after[1][1])
+    left_out = after[1][0] - before[1][0]
+    least, most = after[0][0] - before[2][0], after[2][0] - before[0][0]  # readings, by looks within and around
     apart_s = [b.t_s - a.t_s for a, b in itertools.pairwise(came)]
-    if min(apart_s) < INHIBIT_S - s.slack_s(INHIBIT_S) - late_s:
+    if min(apart_s) < INHIBIT_S - t.s.slack_s(INHIBIT_S) - late_s:
         raise Failed(f"{min(apart_s):.6f} s between two frames {can_id:03X}h", f"{INHIBIT_S:g} s and more", frames=came)
     if not least - 2 <= len(came) + left_out <= most + 2:
         raise Failed(f"{len(came)} sent, {left_out} left out of {least} to {most} readings", "each sent or counted")
@@ -231,34 +224,30 @@ def the_inhibit_time_keeps_tpdos_apart(s: Subject) -> str:
 
 
 @proves("BUS-EMCY-04")
-@active(needs={"can", "stream"})
-def the_history_of_errors(s: Subject) -> str:
+@dialogue(needs={"can", "stream"}, reset=True)
+def the_history_of_errors(t: Talk) -> str:
     """An overload; 1003h beside the emergency; empty it."""
-    with talk(s, reset=True) as t:
-        told = _overload(t)
-        count, latest = t.number(HISTORY), t.upload(HISTORY, 1)
-        due = told.data[:2] + bytes([told.data[3], 0])
-        if count < 1 or latest != due:
-            raise Failed(
-                f"1003h has {count}, the latest {words(latest)}", f"{words(due)}, as the emergency", frames=[told]
-            )
-        t.download(HISTORY, 0, b"\0")
-        if t.number(HISTORY) or any(t.upload(HISTORY, 1)):
-            raise Failed("1003h holds emergencies after writing 0 to sub 0", "none")
+    told = _overload(t)
+    count, latest = t.number(HISTORY), t.upload(HISTORY, 1)
+    due = told.data[:2] + bytes([told.data[3], 0])
+    if count < 1 or latest != due:
+        raise Failed(f"1003h has {count}, the latest {words(latest)}", f"{words(due)}, as the emergency", frames=[told])
+    t.download(HISTORY, 0, b"\0")
+    if t.number(HISTORY) or any(t.upload(HISTORY, 1)):
+        raise Failed("1003h holds emergencies after writing 0 to sub 0", "none")
     return f"{count}, the latest {words(latest)}; none after the write"
 
 
 @proves("BUS-EMCY-04")
-@active(needs={"can", "lockstep", "stream"})
-def the_history_holds_eight(s: Subject) -> str:
+@dialogue(needs={"can", "lockstep", "stream"}, reset=True)
+def the_history_holds_eight(t: Talk) -> str:
     """Nine overloads, one after the other."""
     most = int(_limit("BUS-EMCY-04", "history_count"))
-    with talk(s, reset=True) as t:
-        for k in range(OVERLOADS):
-            _overload(t)
-            if t.number(HISTORY) != min(k + 1, most):
-                raise Failed(f"1003h has {t.number(HISTORY)} after {k + 1} emergencies", f"{min(k + 1, most)}")
-        empty = [k for k in range(1, most + 1) if not t.number(HISTORY, k)]
+    for k in range(OVERLOADS):
+        _overload(t)
+        if t.number(HISTORY) != min(k + 1, most):
+            raise Failed(f"1003h has {t.number(HISTORY)} after {k + 1} emergencies", f"{min(k + 1, most)}")
+    empty = [k for k in range(1, most + 1) if not t.number(HISTORY, k)]
     if empty:
         raise Failed(f"1003h:{empty[0]} is 0", "an emergency")
     return f"{most} of {OVERLOADS}"

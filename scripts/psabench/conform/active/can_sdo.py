@@ -6,8 +6,6 @@ import random
 import struct
 
 from psabench.boards.objects import Absent, Area, BusObjects, Common, Psa2Objects
-from psabench.conform.dut import Subject
-from psabench.conform.plan import active
 from psabench.conform.proves import proves
 from psabench.conform.raw_can import (
     ABORT,
@@ -17,10 +15,10 @@ from psabench.conform.raw_can import (
     TPDO,
     UPLOAD,
     Talk,
+    dialogue,
     long_write,
     read,
     segment,
-    talk,
     words,
     write,
 )
@@ -59,36 +57,32 @@ def put(t: Talk, index: int, text: bytes) -> None:
 
 
 @proves("BUS-SDO-01")
-@active()
-def short_values_come_expedited(s: Subject) -> str:
+@dialogue()
+def short_values_come_expedited(t: Talk) -> str:
     """Upload an object of each length of 1 to 4 bytes."""
     seen = {}
-    with talk(s) as t:
-        for o in s.unit.node.objects():
-            size = o.data_bytes
-            if (
-                size in SIZES
-                and size not in seen
-                and o.access != "wo"
-                and (o.index < Area.MANUFACTURER or o.index >= Area.BOARD_OWN)
-            ):
-                data = t.ask(read(o.index, o.sub))
-                if data[:4] != bytes([SIZES[size]]) + read(o.index, o.sub)[1:4]:
-                    raise Failed(
-                        f"{words(data)} for {o.index:04X}h:{o.sub} of {size} bytes", f"command {SIZES[size]:02X}h"
-                    )
-                seen[size] = o.index
+    for o in t.s.unit.node.objects():
+        size = o.data_bytes
+        if (
+            size in SIZES
+            and size not in seen
+            and o.access != "wo"
+            and (o.index < Area.MANUFACTURER or o.index >= Area.BOARD_OWN)
+        ):
+            data = t.ask(read(o.index, o.sub))
+            if data[:4] != bytes([SIZES[size]]) + read(o.index, o.sub)[1:4]:
+                raise Failed(f"{words(data)} for {o.index:04X}h:{o.sub} of {size} bytes", f"command {SIZES[size]:02X}h")
+            seen[size] = o.index
     return ", ".join(f"{index:04X}h: {size} bytes" for size, index in sorted(seen.items()))
 
 
 @proves("BUS-SDO-02")
-@active()
-def a_write_is_confirmed(s: Subject) -> str:
+@dialogue()
+def a_write_is_confirmed(t: Talk) -> str:
     """Write 1017h."""
     code = int(_row("BUS-SDO-02").limit("answer_code"))
-    with talk(s) as t:
-        request = write(HEARTBEAT, 0, t.upload(HEARTBEAT)[:2].ljust(2, b"\0"))
-        answer = t.ask(request)
+    request = write(HEARTBEAT, 0, t.upload(HEARTBEAT)[:2].ljust(2, b"\0"))
+    answer = t.ask(request)
     due = bytes([code]) + request[1:4]
     if answer[:4] != due:
         raise Failed(words(answer), words(due))
@@ -96,21 +90,20 @@ def a_write_is_confirmed(s: Subject) -> str:
 
 
 @proves("BUS-SDO-03")
-@active()
-def long_values_come_in_segments(s: Subject) -> str:
+@dialogue()
+def long_values_come_in_segments(t: Talk) -> str:
     """Upload 1008h, and a remark of 64 characters, segment by segment."""
     most = int(_row("BUS-SDO-03").limit("segment_bytes"))
     text = bytes(range(0x30, 0x30 + 64))
-    with talk(s) as t:
-        put(t, REMARK, text)
-        for index, due in ((NAME, s.unit.title.encode()), (REMARK, text)):
-            first = t.ask(read(index))
-            if len(due) <= 4:
-                continue
-            if first != bytes([0x41]) + read(index)[1:4] + len(due).to_bytes(4, "little"):
-                raise Failed(f"{words(first)} to an upload of {index:04X}h", f"41h and a length of {len(due)}")
-            _take_segments(t, due, most)
-        put(t, REMARK, b"")
+    put(t, REMARK, text)
+    for index, due in ((NAME, t.s.unit.title.encode()), (REMARK, text)):
+        first = t.ask(read(index))
+        if len(due) <= 4:
+            continue
+        if first != bytes([0x41]) + read(index)[1:4] + len(due).to_bytes(4, "little"):
+            raise Failed(f"{words(first)} to an upload of {index:04X}h", f"41h and a length of {len(due)}")
+        _take_segments(t, due, most)
+    put(t, REMARK, b"")
     return f"the name and {len(text)} characters in segments of {most}"
 
 
@@ -126,37 +119,35 @@ def _take_segments(t: Talk, due: bytes, most: int) -> None:
 
 
 @proves("BUS-SDO-04")
-@active()
-def strings_go_down_and_up(s: Subject) -> str:
+@dialogue()
+def strings_go_down_and_up(t: Talk) -> str:
     """Write remarks of several lengths and read them back."""
     longest = int(_row("BUS-SDO-04").limit("remark_chars"))
     sizes = (1, 7, 8, longest - 1, longest)
-    with talk(s) as t:
-        for n in sizes:
-            text = bytes(0x21 + (n + 3 * k) % 90 for k in range(n))
-            put(t, REMARK, text)
-            if t.upload(REMARK) != text:
-                raise Failed(f"a remark of {n} characters reads otherwise than written", text.decode())
-        put(t, REMARK, b"")
+    for n in sizes:
+        text = bytes(0x21 + (n + 3 * k) % 90 for k in range(n))
+        put(t, REMARK, text)
+        if t.upload(REMARK) != text:
+            raise Failed(f"a remark of {n} characters reads otherwise than written", text.decode())
+    put(t, REMARK, b"")
     return f"{', '.join(map(str, sizes))} characters"
 
 
 @proves("BUS-SDO-05")
-@active()
-def a_wrong_toggle_bit_is_refused(s: Subject) -> str:
+@dialogue()
+def a_wrong_toggle_bit_is_refused(t: Talk) -> str:
     """Begin with toggle 1; take a segment, and ask for it again; the same of a download."""
     code = _row("BUS-SDO-05").limit("abort_code")
-    with talk(s) as t:
-        begin = read(REMARK)
-        put(t, REMARK, b"0123456789")
-        for toggles in ((0x10,), (0, 0)):
-            t.ask(begin)
-            for toggle in toggles[:-1]:
-                t.ask(segment(toggle))
-            _aborted(t, segment(toggles[-1]), code, "a segment with the wrong toggle bit", REMARK)
-        t.ask(long_write(REMARK, 0, 10))
-        _aborted(t, segment(0x10, b"01234567"[:7]), code, "a segment with the wrong toggle bit", REMARK)
-        put(t, REMARK, b"")
+    begin = read(REMARK)
+    put(t, REMARK, b"0123456789")
+    for toggles in ((0x10,), (0, 0)):
+        t.ask(begin)
+        for toggle in toggles[:-1]:
+            t.ask(segment(toggle))
+        _aborted(t, segment(toggles[-1]), code, "a segment with the wrong toggle bit", REMARK)
+    t.ask(long_write(REMARK, 0, 10))
+    _aborted(t, segment(0x10, b"01234567"[:7]), code, "a segment with the wrong toggle bit", REMARK)
+    put(t, REMARK, b"")
     return f"abort {int(code):08X}h, up and down"
 
 
@@ -169,91 +160,86 @@ def _aborted(t: Talk, request: bytes, code: float, what: str, index: int) -> Non
 
 
 @proves("BUS-SDO-06")
-@active(needs={"can", "stamps"})
-def a_silent_client_is_given_up(s: Subject) -> str:
+@dialogue(needs={"can", "stamps"})
+def a_silent_client_is_given_up(t: Talk) -> str:
     """Begin an upload and a download in segments and ask nothing more."""
     row = _row("BUS-SDO-06")
     due_s, late_s = row.limit("patience_s"), row.limit("jitter_max_ms") * 1e-3
     waited = []
-    with talk(s) as t:
-        put(t, REMARK, b"0123456789")
-        for request in (read(REMARK), long_write(REMARK, 0, 20)):
-            begun = t.answer_to(request)
-            frame = t.next(t.sdo_tx, 2 * due_s + t.patience_s)
-            abort = bytes([ABORT]) + request[1:4] + int(row.limit("abort_code")).to_bytes(4, "little")
-            if frame is None or frame.data != abort:
-                raise Failed(words(frame.data) if frame else "nothing", words(abort), frames=[frame] if frame else [])
-            waited.append(frame.t_s - begun.t_s)
-            if abs(waited[-1] - due_s) > late_s + s.slack_s(due_s):
-                raise Failed(
-                    f"given up after {waited[-1]:.6f} s", f"{due_s:g} s +- {late_s * 1e3:g} ms", frames=[begun, frame]
-                )
-        put(t, REMARK, b"")
+    put(t, REMARK, b"0123456789")
+    for request in (read(REMARK), long_write(REMARK, 0, 20)):
+        begun = t.answer_to(request)
+        frame = t.next(t.sdo_tx, 2 * due_s + t.patience_s)
+        abort = bytes([ABORT]) + request[1:4] + int(row.limit("abort_code")).to_bytes(4, "little")
+        if frame is None or frame.data != abort:
+            raise Failed(words(frame.data) if frame else "nothing", words(abort), frames=[frame] if frame else [])
+        waited.append(frame.t_s - begun.t_s)
+        if abs(waited[-1] - due_s) > late_s + t.s.slack_s(due_s):
+            raise Failed(
+                f"given up after {waited[-1]:.6f} s", f"{due_s:g} s +- {late_s * 1e3:g} ms", frames=[begun, frame]
+            )
+    put(t, REMARK, b"")
     return f"given up after {', '.join(f'{w:.6f}' for w in waited)} s"
 
 
 @proves("BUS-SDO-07")
-@active()
-def unknown_commands_are_refused(s: Subject) -> str:
+@dialogue()
+def unknown_commands_are_refused(t: Talk) -> str:
     """Block transfers, a command that no one has defined, a segment of no transfer."""
     code = _row("BUS-SDO-07").limit("abort_code")
     commands = (0xA0, 0xC0, 0xE0, 0x60, 0x00)
-    with talk(s) as t:
-        for command in commands:
-            t.upload(DEVICE_TYPE)  # nothing is under way
-            request = bytes([command]) + read(NAME)[1:]
-            found = t.abort_of(request)
-            if found != code:
-                raise Failed(
-                    f"{'no refusal' if found is None else f'{found:08X}h'} of command {command:02X}h",
-                    f"{int(code):08X}h",
-                )
+    for command in commands:
+        t.upload(DEVICE_TYPE)  # nothing is under way
+        request = bytes([command]) + read(NAME)[1:]
+        found = t.abort_of(request)
+        if found != code:
+            raise Failed(
+                f"{'no refusal' if found is None else f'{found:08X}h'} of command {command:02X}h",
+                f"{int(code):08X}h",
+            )
     return f"abort {int(code):08X}h to {', '.join(f'{c:02X}h' for c in commands)}"
 
 
 @proves("BUS-SDO-08")
-@active()
-def no_such_object(s: Subject) -> str:
+@dialogue()
+def no_such_object(t: Talk) -> str:
     """Upload and write objects that there are not."""
     code = _row("BUS-SDO-08").limit("abort_code")
-    known = {o.index for o in s.unit.node.objects()}
+    known = {o.index for o in t.s.unit.node.objects()}
     strangers = [
         i
         for i in (0x0001, Absent.MANUFACTURER_STATUS, Absent.CONSUMER_HEARTBEAT, 0x2FFF, NOWHERE, 0xFFFF)
         if i not in known
     ]
-    with talk(s) as t:
-        for index in strangers:
-            t.refused(read(index), code, f"an upload of {index:04X}h")
-            t.refused(write(index, 0, b"\1"), code, f"a write to {index:04X}h")
+    for index in strangers:
+        t.refused(read(index), code, f"an upload of {index:04X}h")
+        t.refused(write(index, 0, b"\1"), code, f"a write to {index:04X}h")
     return f"abort {int(code):08X}h for {', '.join(f'{i:04X}h' for i in strangers)}"
 
 
 @proves("BUS-SDO-09")
-@active()
-def no_such_sub_index(s: Subject) -> str:
+@dialogue()
+def no_such_sub_index(t: Talk) -> str:
     """Upload sub-indices that objects have not: one more than the last, FFh, 1 of a variable."""
     code = _row("BUS-SDO-09").limit("abort_code")
     asked = [(IDENTITY, 5), (IDENTITY, 0xFF), (ERRORS, 9), (SERVER, 3), (TPDO, 4), (DEVICE_TYPE, 1), (HEARTBEAT, 1)]
-    with talk(s) as t:
-        for index, sub in asked:
-            t.refused(read(index, sub), code, f"an upload of {index:04X}h:{sub}")
+    for index, sub in asked:
+        t.refused(read(index, sub), code, f"an upload of {index:04X}h:{sub}")
     return f"abort {int(code):08X}h for {len(asked)} sub-indices"
 
 
 @proves("BUS-SDO-10")
-@active()
-def rights_are_kept(s: Subject) -> str:
+@dialogue()
+def rights_are_kept(t: Talk) -> str:
     """Write everything that is read-only or constant, read everything that is write-only."""
     row = _row("BUS-SDO-10")
-    locked = [o for o in s.unit.node.objects() if o.access in ("const", "ro") and o.index not in REGISTERS]
-    hidden = [o for o in s.unit.node.objects() if o.access == "wo" and o.index not in REGISTERS]
-    with talk(s) as t:
-        for o in locked:
-            data = bytes(min(o.data_bytes or 4, 4))
-            t.refused(write(o.index, o.sub, data), row.limit("read_only_code"), f"a write to {o.index:04X}h:{o.sub}")
-        for o in hidden:
-            t.refused(read(o.index, o.sub), row.limit("write_only_code"), f"an upload of {o.index:04X}h:{o.sub}")
+    locked = [o for o in t.s.unit.node.objects() if o.access in ("const", "ro") and o.index not in REGISTERS]
+    hidden = [o for o in t.s.unit.node.objects() if o.access == "wo" and o.index not in REGISTERS]
+    for o in locked:
+        data = bytes(min(o.data_bytes or 4, 4))
+        t.refused(write(o.index, o.sub, data), row.limit("read_only_code"), f"a write to {o.index:04X}h:{o.sub}")
+    for o in hidden:
+        t.refused(read(o.index, o.sub), row.limit("write_only_code"), f"an upload of {o.index:04X}h:{o.sub}")
     return f"{len(locked)} objects are not written, {len(hidden)} are not read"
 
 
@@ -267,56 +253,53 @@ REGISTERS = (
 
 
 @proves("BUS-SDO-11")
-@active()
-def the_wrong_length_is_refused(s: Subject) -> str:
+@dialogue()
+def the_wrong_length_is_refused(t: Talk) -> str:
     """Write 4, 3 and 1 bytes to 1017h, and 4 to 1800h sub 2."""
     row = _row("BUS-SDO-11")
-    with talk(s) as t:
-        before = t.upload(HEARTBEAT)
-        for index, sub, n, code in (
-            (HEARTBEAT, 0, 4, "long_code"),
-            (HEARTBEAT, 0, 3, "long_code"),
-            (TPDO, 2, 4, "long_code"),
-            (HEARTBEAT, 0, 1, "short_code"),
-            (TPDO, 3, 1, "short_code"),
-        ):
-            t.refused(write(index, sub, bytes([1] * n)), row.limit(code), f"{n} bytes to {index:04X}h:{sub}")
-        if t.upload(HEARTBEAT) != before:
-            raise Failed("1017h has changed", "what it was")
+    before = t.upload(HEARTBEAT)
+    for index, sub, n, code in (
+        (HEARTBEAT, 0, 4, "long_code"),
+        (HEARTBEAT, 0, 3, "long_code"),
+        (TPDO, 2, 4, "long_code"),
+        (HEARTBEAT, 0, 1, "short_code"),
+        (TPDO, 3, 1, "short_code"),
+    ):
+        t.refused(write(index, sub, bytes([1] * n)), row.limit(code), f"{n} bytes to {index:04X}h:{sub}")
+    if t.upload(HEARTBEAT) != before:
+        raise Failed("1017h has changed", "what it was")
     return "too long and too short are distinguished"
 
 
 @proves("BUS-SDO-12")
-@active()
-def other_than_announced_is_refused(s: Subject) -> str:
+@dialogue()
+def other_than_announced_is_refused(t: Talk) -> str:
     """Announce 10 bytes for 2040h and send 8, and announce 8 and send 10."""
     code = _row("BUS-SDO-12").limit("abort_code")
-    with talk(s) as t:
-        put(t, REMARK, b"kept")
-        for announced, sent in ((10, 8), (8, 10)):
-            t.ask(long_write(REMARK, 0, announced))
-            t.ask(segment(0, bytes(range(0x41, 0x48))))
-            _aborted(t, segment(0x10, b"HIJ"[: sent - 7], last=True), code, f"{sent} of {announced} bytes", REMARK)
-        if t.upload(REMARK) != b"kept":
-            raise Failed(f"2040h is {t.upload(REMARK)!r} after a download that was refused", "what it was")
-        put(t, REMARK, b"")
+    put(t, REMARK, b"kept")
+    for announced, sent in ((10, 8), (8, 10)):
+        t.ask(long_write(REMARK, 0, announced))
+        t.ask(segment(0, bytes(range(0x41, 0x48))))
+        _aborted(t, segment(0x10, b"HIJ"[: sent - 7], last=True), code, f"{sent} of {announced} bytes", REMARK)
+    if t.upload(REMARK) != b"kept":
+        raise Failed(f"2040h is {t.upload(REMARK)!r} after a download that was refused", "what it was")
+    put(t, REMARK, b"")
     return f"abort {int(code):08X}h"
 
 
 @proves("BUS-SDO-13")
-@active()
-def limits_are_kept(s: Subject) -> str:
+@dialogue()
+def limits_are_kept(t: Talk) -> str:
     """Write to each object with limits one less than the lowest and one more than the highest."""
     code = _row("BUS-SDO-13").limit("abort_code")
     tried = 0
-    with talk(s) as t:
-        for o in s.unit.node.objects():
-            for beyond in (o.low - 1 if o.low is not None else None, o.high + 1 if o.high is not None else None):
-                if o.access != "rw" or beyond is None or not _fits(beyond, o):
-                    continue
-                data = struct.pack("<f", beyond) if o.real else int(beyond).to_bytes(o.data_bytes or 1, "little")
-                t.refused(write(o.index, o.sub, data), code, f"{beyond:g} to {o.index:04X}h:{o.sub}")
-                tried += 1
+    for o in t.s.unit.node.objects():
+        for beyond in (o.low - 1 if o.low is not None else None, o.high + 1 if o.high is not None else None):
+            if o.access != "rw" or beyond is None or not _fits(beyond, o):
+                continue
+            data = struct.pack("<f", beyond) if o.real else int(beyond).to_bytes(o.data_bytes or 1, "little")
+            t.refused(write(o.index, o.sub, data), code, f"{beyond:g} to {o.index:04X}h:{o.sub}")
+            tried += 1
     if not tried:
         raise Failed("no object with limits", "1003h at least")
     return f"abort {int(code):08X}h to {tried} values outside"
@@ -328,61 +311,58 @@ def _fits(value: float, o: Described) -> bool:
 
 
 @proves("BUS-SDO-14")
-@active()
-def requests_of_the_wrong_length_are_counted(s: Subject) -> str:
+@dialogue()
+def requests_of_the_wrong_length_are_counted(t: Talk) -> str:
     """Requests of 0 to 7 bytes."""
     size = int(_row("BUS-SDO-14").limit("request_bytes"))
-    with talk(s) as t:
-        before = t.counter("Malformed requests")
-        came = [f for f in t.after(*((t.sdo_rx, read(DEVICE_TYPE)[:n]) for n in range(size))) if f.can_id == t.sdo_tx]
-        counted = t.counter("Malformed requests") - before
+    before = t.counter("Malformed requests")
+    came = [f for f in t.after(*((t.sdo_rx, read(DEVICE_TYPE)[:n]) for n in range(size))) if f.can_id == t.sdo_tx]
+    counted = t.counter("Malformed requests") - before
     if came or counted != size:
         raise Failed(f"{len(came)} answers, {counted} counted", f"none, {size} counted", frames=came)
     return f"{size} requests, no answer, all counted"
 
 
 @proves("BUS-SDO-15")
-@active()
-def each_request_has_one_answer(s: Subject) -> str:
+@dialogue()
+def each_request_has_one_answer(t: Talk) -> str:
     """A hundred requests of several kinds, good and bad, one after the other and all at once."""
     kinds = [read(HEARTBEAT), read(NOWHERE), read(IDENTITY, 2), write(DEVICE_TYPE, 0, bytes(4)), read(IDENTITY, 9)]
     asked = [kinds[k % len(kinds)] for k in range(HUNDRED)]
-    with talk(s) as t:
-        answers = []
-        for k in range(0, HUNDRED, 20):
-            came = t.after(*((t.sdo_rx, request) for request in asked[k : k + 20]))
-            answers += [f for f in came if f.can_id == t.sdo_tx]
-        if len(answers) != HUNDRED:
-            raise Failed(f"{len(answers)} answers to {HUNDRED} requests", f"{HUNDRED}", frames=answers)
-        for request, answer in zip(asked, answers, strict=True):
-            if len(answer.data) != 8 or answer.data[1:4] != request[1:4]:
-                raise Failed(f"{words(answer.data)} to {words(request)}", "its index and sub-index", frames=[answer])
+    answers = []
+    for k in range(0, HUNDRED, 20):
+        came = t.after(*((t.sdo_rx, request) for request in asked[k : k + 20]))
+        answers += [f for f in came if f.can_id == t.sdo_tx]
+    if len(answers) != HUNDRED:
+        raise Failed(f"{len(answers)} answers to {HUNDRED} requests", f"{HUNDRED}", frames=answers)
+    for request, answer in zip(asked, answers, strict=True):
+        if len(answer.data) != 8 or answer.data[1:4] != request[1:4]:
+            raise Failed(f"{words(answer.data)} to {words(request)}", "its index and sub-index", frames=[answer])
     return f"{HUNDRED} requests, {HUNDRED} answers in their order"
 
 
 @proves("BUS-SDO-16")
-@active()
-def a_refusal_changes_nothing(s: Subject) -> str:
+@dialogue()
+def a_refusal_changes_nothing(t: Talk) -> str:
     """Refused writes to 1017h and 1800h: their values before and after."""
-    with talk(s) as t:
-        for index, sub, data in (
-            (HEARTBEAT, 0, bytes(4)),
-            (HEARTBEAT, 0, b"\1"),
-            (TPDO, 2, bytes([250])),
-            (TPDO, 1, bytes(4)),
-            (ERRORS, 0, b"\1"),
-        ):
-            before = t.upload(index, sub)
-            if t.abort_of(write(index, sub, data)) is None:
-                raise Failed(f"{words(data)} to {index:04X}h:{sub} is taken", "a refusal")
-            if t.upload(index, sub) != before:
-                raise Failed(f"{index:04X}h:{sub} has changed with a refused write", words(before))
+    for index, sub, data in (
+        (HEARTBEAT, 0, bytes(4)),
+        (HEARTBEAT, 0, b"\1"),
+        (TPDO, 2, bytes([250])),
+        (TPDO, 1, bytes(4)),
+        (ERRORS, 0, b"\1"),
+    ):
+        before = t.upload(index, sub)
+        if t.abort_of(write(index, sub, data)) is None:
+            raise Failed(f"{words(data)} to {index:04X}h:{sub} is taken", "a refusal")
+        if t.upload(index, sub) != before:
+            raise Failed(f"{index:04X}h:{sub} has changed with a refused write", words(before))
     return "values stay, and the next request is served"
 
 
 @proves("BUS-SDO-17")
-@active()
-def refusals_are_counted(s: Subject) -> str:
+@dialogue()
+def refusals_are_counted(t: Talk) -> str:
     """Refusals of each kind, and the counter before and after."""
     bad = [
         read(NOWHERE),
@@ -394,50 +374,47 @@ def refusals_are_counted(s: Subject) -> str:
         bytes([0xE0]) + read(NAME)[1:],
         segment(0),
     ]
-    with talk(s) as t:
-        before = t.counter("Requests refused")
-        for k, request in enumerate(bad, 1):
-            if t.abort_of(request) is None:
-                raise Failed(f"{words(request)} is not refused", "an abort")
-            counted = t.counter("Requests refused") - before
-            if counted != k:
-                raise Failed(f"{counted} refusals counted after {k}, the last of {words(request)}", f"{k}")
+    before = t.counter("Requests refused")
+    for k, request in enumerate(bad, 1):
+        if t.abort_of(request) is None:
+            raise Failed(f"{words(request)} is not refused", "an abort")
+        counted = t.counter("Requests refused") - before
+        if counted != k:
+            raise Failed(f"{counted} refusals counted after {k}, the last of {words(request)}", f"{k}")
     return f"{len(bad)} refusals, {len(bad)} counted"
 
 
 @proves("BUS-SDO-18")
-@active()
-def an_abort_of_the_client_ends_it(s: Subject) -> str:
+@dialogue()
+def an_abort_of_the_client_ends_it(t: Talk) -> str:
     """Abort an upload of a long value, then ask for its next segment."""
-    with talk(s) as t:
-        put(t, REMARK, b"0123456789")
-        t.ask(read(REMARK))
-        came = [f for f in t.after((t.sdo_rx, bytes([ABORT]) + read(REMARK)[1:])) if f.can_id == t.sdo_tx]
-        if came:
-            raise Failed(f"{words(came[0].data)} to an abort", "silence", frames=came)
-        t.ask(read(REMARK))
-        t.send(t.sdo_rx, bytes([ABORT]) + read(REMARK)[1:])
-        if t.abort_of(segment(0)) is None:
-            raise Failed("the transfer goes on after an abort", "a refusal of its next segment")
-        put(t, REMARK, b"")
+    put(t, REMARK, b"0123456789")
+    t.ask(read(REMARK))
+    came = [f for f in t.after((t.sdo_rx, bytes([ABORT]) + read(REMARK)[1:])) if f.can_id == t.sdo_tx]
+    if came:
+        raise Failed(f"{words(came[0].data)} to an abort", "silence", frames=came)
+    t.ask(read(REMARK))
+    t.send(t.sdo_rx, bytes([ABORT]) + read(REMARK)[1:])
+    if t.abort_of(segment(0)) is None:
+        raise Failed("the transfer goes on after an abort", "a refusal of its next segment")
+    put(t, REMARK, b"")
     return "silence; the next segment is refused"
 
 
 @proves("BUS-SDO-19")
-@active()
-def garbage_does_not_stop_it(s: Subject) -> str:
+@dialogue(reset=True)
+def garbage_does_not_stop_it(t: Talk) -> str:
     """A thousand random requests, then good ones."""
     count = int(_row("BUS-SDO-19").limit("frames_count"))
     rng = random.Random(SEED)
-    with talk(s, reset=True) as t:
-        for _ in range(count // 50):
-            t.drain()
-            for _ in range(50):
-                t.send(t.sdo_rx, _harmless(rng.randbytes(rng.randrange(9))))
-            t.s.run_for(0.02)
-        t.fence()
-        if t.ask(read(DEVICE_TYPE))[0] & 0xE0 != UPLOAD:
-            raise Failed("no good answer after random frames", "one")
+    for _ in range(count // 50):
+        t.drain()
+        for _ in range(50):
+            t.send(t.sdo_rx, _harmless(rng.randbytes(rng.randrange(9))))
+        t.s.run_for(0.02)
+    t.fence()
+    if t.ask(read(DEVICE_TYPE))[0] & 0xE0 != UPLOAD:
+        raise Failed("no good answer after random frames", "one")
     return f"{count} random frames; answers go on"
 
 
