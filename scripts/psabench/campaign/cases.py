@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import KW_ONLY, dataclass, replace
 
 from psabench.campaign.setup import BEFORE_S, Hold, Setup, level_white_degph_rts
 
@@ -52,12 +52,13 @@ class Case:
     x: float = 0.0
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Study:
     """Cases that belong together; `axis` is the scan's, empty for a table."""
 
     name: str
     title: str
+    _: KW_ONLY
     cases: Callable[[Setup], Iterator[Case]]
     axis: str = ""
     figure: str = "p95"  # on the vertical axis: p95 or sd of the platform's error
@@ -319,34 +320,18 @@ def _with(base: Setup, change: Mapping[str, object]) -> Setup:
 STUDIES: Mapping[str, Study] = {
     s.name: s
     for s in (
-        Study(name="readings", title="Each reading of the article's sentence", cases=_readings),
-        Study(name="sources", title="One source of error at a time", cases=_sources),
-        Study(
-            name="step",
-            title="Error against step",
-            cases=_step,
-            axis="step of the gimbal, deg",
-            figure="sd",
-            log_y=True,
-        ),
-        Study(name="latitude", title="Error against latitude", cases=_latitude, axis="latitude, deg", figure="sd"),
-        Study(
-            name="tilt", title="Error against tilt", cases=_tilt, axis="pitch and roll, deg", figure="sd", log_y=True
-        ),
-        Study(
-            name="time",
-            title="Error against averaging time",
-            cases=_time,
-            axis="averaging window, s",
-            figure="sd",
-            log_y=True,
-        ),
-        Study(name="order", title="Number and order of positions", cases=_order),
-        Study(name="improved", title="The improved procedure, with the time that turns take", cases=_improved),
-        Study(name="slew", title="Error against the duration of the run", cases=_slew, axis="duration of the run, s"),
-        Study(name="hold", title="Heading after 4 h of hold", cases=_hold),
-        Study(name="wire", title="Cases that also run on an emulated board", cases=_wire),
-        Study(name="own", title="As set on the command line", cases=_own),
+        Study("readings", "Each reading of the article's sentence", cases=_readings),
+        Study("sources", "One source of error at a time", cases=_sources),
+        Study("step", "Error against step", cases=_step, axis="step of the gimbal, deg", figure="sd", log_y=True),
+        Study("latitude", "Error against latitude", cases=_latitude, axis="latitude, deg", figure="sd"),
+        Study("tilt", "Error against tilt", cases=_tilt, axis="pitch and roll, deg", figure="sd", log_y=True),
+        Study("time", "Error against averaging time", cases=_time, axis="averaging window, s", figure="sd", log_y=True),
+        Study("order", "Number and order of positions", cases=_order),
+        Study("improved", "The improved procedure, with the time that turns take", cases=_improved),
+        Study("slew", "Error against the duration of the run", cases=_slew, axis="duration of the run, s"),
+        Study("hold", "Heading after 4 h of hold", cases=_hold),
+        Study("wire", "Cases that also run through the wire", cases=_wire),
+        Study("own", "As set on the command line", cases=_own),
     )
 }
 DEFAULT_STUDIES = tuple(name for name in STUDIES if name != "own")

@@ -41,10 +41,19 @@ class Chain:
     run_s: float  # one run, one core
     part_runs: int  # of a part in the store: what an interrupt may cost
     compute: Callable[[Setup, int, int, int], Rows]  # set-up, seed, first run, runs
-    holds: bool  # whether it computes the hold
-    version: Callable[[], str]
-    build: Callable[[], str]  # of what computes here: digest of its files
     emulates: bool = False  # an emulator and the host's procedure, not the algebra
+
+    @property
+    def holds(self) -> bool:
+        """Whether it computes the hold."""
+        return not self.emulates
+
+    def version(self) -> str:
+        return versions() if self.emulates else nav_version()
+
+    def build(self) -> str:
+        """Of what computes here: digest of its files."""
+        return builds.wire() if self.emulates else builds.algebra()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,7 +109,8 @@ def _computed(w: Wanted) -> Rows:
     if w.hold is None:
         return chain.compute(w.setup, _seed(w), w.first_run, w.runs)
     if not chain.holds:
-        raise BadInput(expected(f"{' or '.join(_holding())} for a hold", w.chain, "--chain"))
+        algebra = " or ".join(c.name for c in CHAINS.values() if c.holds)
+        raise BadInput(expected(f"{algebra} for a hold", w.chain, "--chain"))
     found = nav_mc.hold(hold_config(w.setup, w.hold), _seed(w), first_run=w.first_run, runs=w.runs)
     return _columns(np.degrees(found.end_rad), np.degrees(found.max_rad))
 
@@ -108,10 +118,6 @@ def _computed(w: Wanted) -> Rows:
 def _seed(w: Wanted) -> int:
     """Of its own for each chain: what they share then is the set-up alone, and a comparison of two means something."""
     return int.from_bytes(hashlib.sha256(f"{w.seed} {w.chain}".encode()).digest()[:7], "little")
-
-
-def _holding() -> list[str]:
-    return [c.name for c in CHAINS.values() if c.holds]
 
 
 # ---- the algebra of libpsabench-nav
@@ -233,48 +239,12 @@ def versions() -> str:
 CHAINS: Mapping[str, Chain] = {
     c.name: c
     for c in (
+        Chain(name="closed", title="closed form", run_s=1e-7, part_runs=1 << 18, compute=_closed),
+        Chain(name="samples", title="sample by sample", run_s=2e-5, part_runs=1 << 13, compute=_samples),
         Chain(
-            name="closed",
-            title="closed form",
-            run_s=1e-7,
-            part_runs=1 << 18,
-            compute=_closed,
-            holds=True,
-            version=nav_version,
-            build=builds.algebra,
+            name="emulated", title="emulator in free pace", run_s=0.15, part_runs=20, compute=_emulated, emulates=True
         ),
-        Chain(
-            name="samples",
-            title="sample by sample",
-            run_s=2e-5,
-            part_runs=1 << 13,
-            compute=_samples,
-            holds=True,
-            version=nav_version,
-            build=builds.algebra,
-        ),
-        Chain(
-            name="emulated",
-            title="emulator in free pace",
-            run_s=0.15,
-            part_runs=20,
-            compute=_emulated,
-            holds=False,
-            emulates=True,
-            version=versions,
-            build=builds.wire,
-        ),
-        Chain(
-            name="wire",
-            title="live through the wire",
-            run_s=0.7,
-            part_runs=1,
-            compute=_wire,
-            holds=False,
-            emulates=True,
-            version=versions,
-            build=builds.wire,
-        ),
+        Chain(name="wire", title="live through the wire", run_s=0.7, part_runs=1, compute=_wire, emulates=True),
     )
 }
 

@@ -40,14 +40,18 @@ class Article:
     """
 
     printed: str
-    pulse: str
-    pulse_mps: float | None
-    scale: float
     zero_v: float
-    k_source: str
+    pulse: str = ""
+    scale: float = 5e-4
+    k_source: str = "E0"
     zero_source: str = "E0"
     error: str = ""
     why: str = ""
+
+    @property
+    def pulse_mps(self) -> float | None:
+        """The quantum as printed, m/s."""
+        return float(self.pulse) if self.pulse else None
 
 
 # PSD-1 of profile psd1_quiet, in V at the input. Self-calibration takes zero and full scale from one word each, with
@@ -66,43 +70,17 @@ ARTICLE: Mapping[str, Article] = {
     "pik": Article(
         printed="174 Hz/V within 0.15 %",
         pulse="60e-3",
-        pulse_mps=60e-3,
         scale=1.5e-3,
         zero_v=6e-4,
         k_source="E1",
         error="0.15 %",
         why=ONE_PULSE,
     ),
-    "pik5": Article(
-        printed="no figures but those of PIK",
-        pulse="",
-        pulse_mps=None,
-        scale=1.5e-3,
-        zero_v=6e-4,
-        k_source="E1",
-        why=ONE_PULSE,
-    ),
-    "pik6": Article(
-        printed="2000 Hz/V within 0.05 %",
-        pulse="5e-3",
-        pulse_mps=5e-3,
-        scale=5e-4,
-        zero_v=1.5e-4,
-        k_source="E1",
-        error="0.05 %",
-    ),
-    "pmka": Article(
-        printed="16-bit converter, Ts = 4.8 ms",
-        pulse="2.4e-5",
-        pulse_mps=2.4e-5,
-        scale=5e-4,
-        zero_v=3e-4,
-        k_source="E0",
-    ),
+    "pik5": Article(printed="no figures but those of PIK", scale=1.5e-3, zero_v=6e-4, k_source="E1", why=ONE_PULSE),
+    "pik6": Article(printed="2000 Hz/V within 0.05 %", pulse="5e-3", zero_v=1.5e-4, k_source="E1", error="0.05 %"),
+    "pmka": Article(printed="16-bit converter, Ts = 4.8 ms", pulse="2.4e-5", zero_v=3e-4),
     "psd1": Article(
         printed="16-bit words of a delta-sigma converter",
-        pulse="",
-        pulse_mps=None,
         scale=PSD1_SCALE,
         zero_v=PSD1_ZERO_V,
         k_source="E0 + E3",
@@ -110,22 +88,8 @@ ARTICLE: Mapping[str, Article] = {
         why=f"its drift is a zero: words are cut off, not rounded, up to a code ({PSD1_CODE_V * 1e6:.0f} µV) low, and "
         f"self-calibration takes the zero from one word, which has {PSD1_NOISE_V * 1e6:.0f} µV rms of noise",
     ),
-    "psa1": Article(
-        printed="resolution finer by more than an order",
-        pulse="",
-        pulse_mps=None,
-        scale=5e-4,
-        zero_v=1e-3,
-        k_source="E0",
-    ),
-    "psa2": Article(
-        printed="resolution finer by more than an order",
-        pulse="",
-        pulse_mps=None,
-        scale=5e-4,
-        zero_v=1e-3,
-        k_source="E0",
-    ),
+    "psa1": Article(printed="resolution finer by more than an order", zero_v=1e-3),
+    "psa2": Article(printed="resolution finer by more than an order", zero_v=1e-3),
 }
 
 

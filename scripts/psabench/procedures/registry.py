@@ -18,7 +18,7 @@ from psabench.procedures.reversal import ReversalParams, estimate_reversal, expe
 from psabench.procedures.turns import TurnsParams, estimate_turns, expected_turns, turns
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Procedure:
     """One row of the registry; `params` is the dataclass that `run` and `estimate` take."""
 
@@ -32,26 +32,8 @@ class Procedure:
 PROCEDURES: Mapping[str, Procedure] = {
     p.name: p
     for p in (
-        Procedure(
-            name="turns",
-            params=TurnsParams,
-            run=turns,
-            estimate=estimate_turns,
-            expected=expected_turns,
-        ),
-        Procedure(
-            name="fourier",
-            params=FourierParams,
-            run=fourier,
-            estimate=estimate_fourier,
-            expected=expected_fourier,
-        ),
-        Procedure(
-            name="reversal",
-            params=ReversalParams,
-            run=reversal,
-            estimate=estimate_reversal,
-            expected=expected_reversal,
-        ),
+        Procedure("turns", TurnsParams, turns, estimate_turns, expected_turns),
+        Procedure("fourier", FourierParams, fourier, estimate_fourier, expected_fourier),
+        Procedure("reversal", ReversalParams, reversal, estimate_reversal, expected_reversal),
     )
 }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 
 from psabench.conform.host.check import HEARTBEAT_S, limits
 from psabench.conform.host.stimulus import READY_S, HostBench
@@ -38,12 +38,13 @@ def _nothing(s: HostBench) -> None:
     """The board as it is."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Case:
     """title: what the board does. before: when it is powered and no host is there; play: once the stream runs."""
 
     name: str
     title: str
+    _: KW_ONLY
     play: Callable[[HostBench], None]
     before: Callable[[HostBench], None] = _nothing
     streams: bool = True  # a good host starts the stream
@@ -268,56 +269,41 @@ def _with_slow_answers(s: HostBench) -> None:
 CASES: Mapping[str, Case] = {
     c.name: c
     for c in (
+        Case("good", "a good board, over the wraps of SEQ and TSTAMP", before=_just_before_the_wrap, play=_good),
+        Case("power_on", "a board at power-on", play=lambda s: s.run(0.2)),
+        Case("slow", "answers that take 0.6 s", before=_with_slow_answers, play=lambda s: s.run(0.1)),
+        Case("lost", "1, 2 and 1000 samples are lost", play=_lost),
+        Case("torn", "halves of samples are lost", play=_hit("link.drop", (ZT, XY, ZT))),
+        Case("mixed", "the second half of a sample and the first of the next are lost", play=_mixed),
+        Case("order", "halves come in another order", play=_hit("link.reorder", (ZT, XY))),
+        Case("twice", "halves come twice", play=_hit("link.duplicate", (ZT, XY), frames=2)),
+        Case("delayed", "frames come 30 ms late", play=_delayed),
+        Case("corrupt", "a bit of a frame is wrong without a CRC error", play=_hit("link.corrupt", (ZT, XY, ZT, XY))),
+        Case("fast", "frame form 1, and three frames are lost", play=_fast, form=1, busy=30),
+        Case("length", "a PSA2_XY of 7 bytes", play=_length),
+        Case("others", "frames of another node, error frames, off the bus and back", play=_others),
+        Case("over_range", "each axis at 9.9 V and beyond the range, both ways", play=_over_range),
+        Case("restart", "a brown-out, then reset node by another master", play=_restart),
+        Case("flags", "words that have not settled, conversions that were lost", play=_flags),
+        Case("silence", "no frame, for a moment and for longer", play=_silence),
+        Case("frozen", "codes stand still while numbers go on", play=_frozen),
+        Case("setup_order", "a set-up in the wrong order", before=_in_wrong_order, play=_untouched, streams=False),
         Case(
-            name="good",
-            title="a good board, over the wraps of SEQ and TSTAMP",
-            before=_just_before_the_wrap,
-            play=_good,
-        ),
-        Case(name="power_on", title="a board at power-on", play=lambda s: s.run(0.2)),
-        Case(name="slow", title="answers that take 0.6 s", before=_with_slow_answers, play=lambda s: s.run(0.1)),
-        Case(name="lost", title="1, 2 and 1000 samples are lost", play=_lost),
-        Case(name="torn", title="halves of samples are lost", play=_hit("link.drop", (ZT, XY, ZT))),
-        Case(name="mixed", title="the second half of a sample and the first of the next are lost", play=_mixed),
-        Case(name="order", title="halves come in another order", play=_hit("link.reorder", (ZT, XY))),
-        Case(name="twice", title="halves come twice", play=_hit("link.duplicate", (ZT, XY), frames=2)),
-        Case(name="delayed", title="frames come 30 ms late", play=_delayed),
-        Case(
-            name="corrupt",
-            title="a bit of a frame is wrong without a CRC error",
-            play=_hit("link.corrupt", (ZT, XY, ZT, XY)),
-        ),
-        Case(name="fast", title="frame form 1, and three frames are lost", play=_fast, form=1, busy=30),
-        Case(name="length", title="a PSA2_XY of 7 bytes", play=_length),
-        Case(name="others", title="frames of another node, error frames, off the bus and back", play=_others),
-        Case(name="over_range", title="each axis at 9.9 V and beyond the range, both ways", play=_over_range),
-        Case(name="restart", title="a brown-out, then reset node by another master", play=_restart),
-        Case(name="flags", title="words that have not settled, conversions that were lost", play=_flags),
-        Case(name="silence", title="no frame, for a moment and for longer", play=_silence),
-        Case(name="frozen", title="codes stand still while numbers go on", play=_frozen),
-        Case(
-            name="setup_order",
-            title="a set-up in the wrong order",
-            before=_in_wrong_order,
-            play=_untouched,
-            streams=False,
-        ),
-        Case(
-            name="config0_x",
-            title="an incorrect CONFIG0 of converter X",
+            "config0_x",
+            "an incorrect CONFIG0 of converter X",
             before=_with_a_wrong_register("x"),
             play=_untouched,
             streams=False,
         ),
         Case(
-            name="config0_z",
-            title="an incorrect CONFIG0 of converter Z",
+            "config0_z",
+            "an incorrect CONFIG0 of converter Z",
             before=_with_a_wrong_register("z"),
             play=_untouched,
             streams=False,
         ),
-        Case(name="rate", title="a converter's clock 100 ppm off, then 2000 ppm", play=_rate),
-        Case(name="emcy", title="data-ready sticks: an emergency, and its end", play=_emcy),
-        Case(name="off", title="the supply is switched off", play=_off),
+        Case("rate", "a converter's clock 100 ppm off, then 2000 ppm", play=_rate),
+        Case("emcy", "data-ready sticks: an emergency, and its end", play=_emcy),
+        Case("off", "the supply is switched off", play=_off),
     )
 }

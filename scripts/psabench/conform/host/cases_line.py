@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 
 import numpy as np
 
@@ -31,12 +31,13 @@ CHANNELS = (0, 1, 2, 3)
 Frames = list[LineFrame]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class LineCase:
     """title: what is sent. first: samples of the line before the first frame; ppm: by which its clock is slow."""
 
     name: str
     title: str
+    _: KW_ONLY
     frames: Callable[[Form], Frames]
     first: Callable[[Form], Samples] = field(default=lambda _: idle(PERIOD))
     ppm: float = 0.0
@@ -187,48 +188,34 @@ def _cut(form: Form) -> Frames:
 LINE_CASES: Mapping[str, LineCase] = {
     c.name: c
     for c in (
-        LineCase(name="line_good", title="a good board: signs, bit order, channels", frames=_words),
+        LineCase("line_good", "a good board: signs, bit order, channels", frames=_words),
+        LineCase("line_fast", "its clock is 100 ppm fast", frames=lambda form: _good(form, 1500), ppm=-100.0),
+        LineCase("line_slow", "its clock is 100 ppm slow", frames=lambda form: _good(form, 1500), ppm=100.0),
+        LineCase("line_narrow", "DATA is right only a quarter of a period about the rise of CLK", frames=_narrow),
         LineCase(
-            name="line_fast", title="its clock is 100 ppm fast", frames=lambda form: _good(form, 1500), ppm=-100.0
+            "line_under_way", "listening begins in a frame", frames=lambda form: _good(form, 20), first=_under_way
         ),
-        LineCase(name="line_slow", title="its clock is 100 ppm slow", frames=lambda form: _good(form, 1500), ppm=100.0),
+        LineCase("line_missing", "a pulse of CLK is missing", frames=_at_pulses("skip")),
+        LineCase("line_extra", "a pulse of CLK too many", frames=_at_pulses("twin")),
         LineCase(
-            name="line_narrow",
-            title="DATA is right only a quarter of a period about the rise of CLK",
-            frames=_narrow,
-        ),
-        LineCase(
-            name="line_under_way",
-            title="listening begins in a frame",
-            frames=lambda form: _good(form, 20),
-            first=_under_way,
-        ),
-        LineCase(name="line_missing", title="a pulse of CLK is missing", frames=_at_pulses("skip")),
-        LineCase(name="line_extra", title="a pulse of CLK too many", frames=_at_pulses("twin")),
-        LineCase(
-            name="line_pauses",
-            title="a pause of 3 or of 5 periods",
+            "line_pauses",
+            "a pause of 3 or of 5 periods",
             frames=_with(80, *(_torn(pauses=p) for p in ((3, 4, 4), (4, 5, 4), (4, 4, 3), (5, 3, 4)))),
         ),
-        LineCase(name="line_cut", title="INT without a bit; frames cut off", frames=_cut),
+        LineCase("line_cut", "INT without a bit; frames cut off", frames=_cut),
         LineCase(
-            name="line_glitch",
-            title="pulses on INT that are no transfer",
+            "line_glitch",
+            "pulses on INT that are no transfer",
             frames=_with(60, *(LineFrame(codes=(n, n, n, n), glitch_samples=n) for n in (1, 2, 8))),
         ),
-        LineCase(name="line_lost", title="1, 2 and 5 frames do not come", frames=_gaps),
-        LineCase(name="line_silence", title="no frame for 40 ms, then for half a second", frames=_silence),
+        LineCase("line_lost", "1, 2 and 5 frames do not come", frames=_gaps),
+        LineCase("line_silence", "no frame for 40 ms, then for half a second", frames=_silence),
+        LineCase("line_stuck", "INT stays low for 0.6 s", frames=lambda form: _good(form, 700), stuck=(50, 650)),
+        LineCase("line_frozen", "words stand still for 1.5 s", frames=_frozen),
+        LineCase("line_over", "each axis at its limits", frames=_over),
         LineCase(
-            name="line_stuck",
-            title="INT stays low for 0.6 s",
-            frames=lambda form: _good(form, 700),
-            stuck=(50, 650),
-        ),
-        LineCase(name="line_frozen", title="words stand still for 1.5 s", frames=_frozen),
-        LineCase(name="line_over", title="each axis at its limits", frames=_over),
-        LineCase(
-            name="line_status",
-            title="words that have not settled; a conversion that was lost",
+            "line_status",
+            "words that have not settled; a conversion that was lost",
             frames=_with(60, *(LineFrame(codes=(5, 6, 7, 8), status=s) for s in (0, NEW, SETTLED | OVERRUN))),
         ),
     )
