@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from psabench.errors import BadInput, BenchError
-from psabench.options import Help, Parser
+from psabench.options import Parser
 
 # Help line of each command. Its module and libraries are loaded when it is called (`parse`).
 COMMANDS: Mapping[str, str] = {
@@ -106,7 +106,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
 
 def parser() -> argparse.ArgumentParser:
     """Of `psabench` itself: --help, --version, and the list of commands."""
-    top = Parser(prog="psabench", description=ABOUT, epilog=TOP_EPILOG, formatter_class=Help)
+    top = Parser(prog="psabench", description=ABOUT, epilog=TOP_EPILOG)
     top.add_argument("--version", action=Version, nargs=0, help="show program's version number and exit")
     commands = top.add_subparsers(required=True, metavar="COMMAND")
     for name, line in COMMANDS.items():

@@ -7,10 +7,12 @@ import difflib
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NoReturn, TypeVar
 
 from psabench.boards.registry import NAMES, of_name
 from psabench.errors import BadInput, expected
+
+Options = TypeVar("Options")
 
 LISTED = 12  # options that an error lists
 LINE_HZ = 8_000_000.0  # psabench.link.lineport.SAMPLE_HZ, without loading NumPy
@@ -38,6 +40,9 @@ _MESSAGES: tuple[tuple[str, Callable[[re.Match[str]], str]], ...] = (
 
 class Parser(argparse.ArgumentParser):
     """A parser whose errors are BadInput of one line, `<where>: expected <what>, got <value>`."""
+
+    def __init__(self, *args: Any, **how: Any) -> None:
+        super().__init__(*args, **{"formatter_class": Help, **how})
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         """Raises BadInput, for an unknown argument as well."""
@@ -68,6 +73,12 @@ class Help(argparse.RawDescriptionHelpFormatter):
 
     def __init__(self, prog: str) -> None:
         super().__init__(prog, max_help_position=32)
+
+
+def of_fields(kind: type[Options], args: argparse.Namespace, **others: Any) -> Options:
+    """A dataclass of options: each field the argument of its name, and others."""
+    named = {k: v for k, v in vars(args).items() if k in kind.__dataclass_fields__}  # type: ignore[attr-defined]
+    return kind(**{**named, **others})
 
 
 def yes_no(text: str) -> bool:

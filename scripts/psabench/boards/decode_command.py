@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from psabench.errors import BadInput, expected
-from psabench.options import LINE_HZ, Help, Parser, add_board, node_of, positive
+from psabench.options import LINE_HZ, Parser, add_board, node_of, positive
 
 EPILOG = """\
 examples:
@@ -26,7 +26,6 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     p = Parser(
         prog="psabench decode",
         description="Convert the frames of one node in a CAN log, or the words in a capture of the line port, to CSV.",
-        formatter_class=Help,
         epilog=EPILOG,
     )
     p.set_defaults(handler=_decode)

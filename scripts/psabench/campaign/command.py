@@ -17,7 +17,7 @@ from psabench.campaign.setup import Setup
 from psabench.campaign.store import Store
 from psabench.campaign.workers import reach, workers
 from psabench.errors import BadInput, expected
-from psabench.options import Help, Parser, natural
+from psabench.options import Parser, natural, of_fields
 from psabench.procedures.head_bench import Progress
 from psabench.progress import Bar
 
@@ -79,7 +79,6 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     p = Parser(
         prog="psabench campaign",
         description=ABOUT,
-        formatter_class=Help,
         epilog=EPILOG.format(studies=_studies(), settings="\n".join(settings.lines())),
     )
     p.set_defaults(handler=_main)
@@ -129,21 +128,7 @@ def _main(args: argparse.Namespace) -> int:
         return 0
     from psabench.campaign import page  # matplotlib takes a second: other commands and --list do without
 
-    options = Options(
-        studies=args.study,
-        case=args.case,
-        chain=args.chain,
-        scenario=args.scenario,
-        runs=args.runs,
-        seed=args.seed,
-        settings=args.set,
-        workers=args.workers,
-        dask=args.dask,
-        store=args.store,
-        out=args.out,
-        fresh=args.fresh,
-        forget_others=args.forget_others,
-    )
+    options = of_fields(Options, args, studies=args.study, settings=args.set)
     found = campaign(options, Bar())
     print("\n".join(page.console(found)))
     print(page.verdict(found))

@@ -13,6 +13,7 @@ from psabench.campaign import chains, claims, plots
 from psabench.campaign.cases import STUDIES, Case, Study
 from psabench.campaign.claims import Check, Claim, Figures, Found, HoldFigures
 from psabench.campaign.store import Rows
+from psabench.report.grading import aligned
 from psabench.report.page import figure, section, verdict_line, whole_page, write_report
 from psabench.report.page import table as html_table
 
@@ -172,18 +173,11 @@ def _label(case: Case) -> str:
     return f"{case.name}: {case.title}" if case.study in ("readings", "improved") else case.name
 
 
-def lines(rows: Sequence[Sequence[str]]) -> Iterator[str]:
-    """A table as text in columns."""
-    widths = [max(len(r[i]) for r in rows) for i in range(len(rows[0]))]
-    for r in rows:
-        yield "  ".join([r[0].ljust(widths[0]), *(x.rjust(w) for x, w in zip(r[1:], widths[1:], strict=True))])
-
-
 def console(c: Campaign) -> Iterator[str]:
     """Lines of all tables, then the claims."""
     for study in _studies(c):
         yield study.title
-        for line in lines(table(c, study)):
+        for line in aligned(table(c, study)):
             yield f"  {line}"
         yield from _too_large(c, study)
     for a in c.agreements:

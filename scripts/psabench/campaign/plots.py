@@ -7,14 +7,13 @@ from collections.abc import Mapping, Sequence
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from psabench.campaign.cases import Case, Study
 from psabench.campaign.claims import CLAIM_DEG, HOLD_DEG, SEVERAL_HOURS_DEG, Figures, HoldFigures
 from psabench.campaign.store import Rows
 from psabench.report import plots as style
 
-WIDTH, ROW = 7.4, 0.3  # inch
+ROW = 0.3  # inch
 BINS = 120
 
 
@@ -23,9 +22,7 @@ def distribution(rows: Mapping[str, Rows]) -> str:
     errors = {name: r[np.isfinite(r[:, 1]), 1].astype(np.float64) for name, r in rows.items()}
     half = max(float(np.quantile(np.abs(e), 0.99)) for e in errors.values())
     edges = np.linspace(-half, half, BINS + 1)
-    with matplotlib.rc_context(style.STYLE):
-        figure = Figure(figsize=(WIDTH, 3.2), layout="constrained")
-        ax = figure.subplots()
+    with style.drawing(3.2) as (figure, ax):
         ax.axvspan(-CLAIM_DEG, CLAIM_DEG, color=style.MUTED, alpha=0.14, lw=0)
         for (name, e), colour in zip(errors.items(), style.SERIES, strict=False):
             density = np.histogram(e, edges)[0] / (len(e) * (edges[1] - edges[0]))
@@ -43,9 +40,7 @@ def scan(study: Study, cases: Sequence[Case], found: Mapping[str, Figures]) -> s
     for case in cases:
         f = found[case.name].platform
         curves.setdefault(case.curve, []).append((case.x, f.rms if study.figure == "sd" else f.p95))
-    with matplotlib.rc_context(style.STYLE):
-        figure = Figure(figsize=(WIDTH, 3.2), layout="constrained")
-        ax = figure.subplots()
+    with style.drawing(3.2) as (figure, ax):
         for (curve, points), colour in zip(curves.items(), style.SERIES, strict=False):
             x, y = zip(*points, strict=True)
             ax.plot(x, y, "o-", ms=3.5, lw=1.4, color=colour, label=curve)
@@ -97,9 +92,7 @@ def held(cases: Sequence[Case], found: Mapping[str, HoldFigures]) -> str:
 def _dots(
     name: str, labels: Sequence[str], values: Sequence[tuple[str, Sequence[float]]], what: str, lines: Sequence[float]
 ) -> str:
-    with matplotlib.rc_context(style.STYLE):
-        figure = Figure(figsize=(WIDTH, 0.9 + ROW * len(labels)), layout="constrained")
-        ax = figure.subplots()
+    with style.drawing(0.9 + ROW * len(labels)) as (figure, ax):
         for at in lines:
             ax.axvline(at, color=style.MUTED, lw=1.0, ls="--")
         for (label, numbers), colour in zip(values, style.SERIES, strict=False):
@@ -119,9 +112,7 @@ def _dots(
 
 def agreement(name: str, rows: Mapping[str, Rows]) -> str:
     """Distribution functions of the heading error of the same set-up, by chain."""
-    with matplotlib.rc_context(style.STYLE):
-        figure = Figure(figsize=(WIDTH, 3.0), layout="constrained")
-        ax = figure.subplots()
+    with style.drawing(3.0) as (figure, ax):
         for (chain, r), colour in zip(rows.items(), style.SERIES, strict=False):
             errors = np.sort(r[np.isfinite(r[:, 1]), 1].astype(np.float64))
             level = np.arange(1, len(errors) + 1) / len(errors)

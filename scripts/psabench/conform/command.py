@@ -12,7 +12,6 @@ from psabench.conform.defaults import LINKS, MAX_S, OUT
 from psabench.options import (
     BUS_HELP,
     LINE_HZ,
-    Help,
     Parser,
     add_clock_ppm,
     add_default_node,
@@ -72,8 +71,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     """What follows `psabench conform`. Raises BadInput."""
     p = Parser(
         prog="psabench conform",
-        description="Check a board against docs/reference/requirements.md, using only its external interfaces.",
-        formatter_class=Help,
+        description="Check a board against docs/reference/requirements.md, over its interfaces alone.",
         epilog=EPILOG,
     )
     suites = p.add_subparsers(required=True, metavar="SUITE")
@@ -89,7 +87,6 @@ def _add_device(suites: Any) -> None:
         "device",
         help="check a board, emulated or real",
         description="Check a board, emulated or real, over its interfaces.",
-        formatter_class=Help,
         epilog=DEVICE_EPILOG,
     )
     p.set_defaults(handler=_device)
@@ -123,7 +120,6 @@ def _add_recording(suites: Any) -> None:
         "recording",
         help="check recordings of a bench",
         description="Check recordings of a board's CAN bus and lines.",
-        formatter_class=Help,
         epilog=RECORDING_EPILOG,
     )
     p.set_defaults(handler=_recording)
@@ -146,7 +142,6 @@ def _add_host(suites: Any) -> None:
         "host",
         help="check a host program that reads a board",
         description="Simulate good and faulty boards for a host program and check what it reports.",
-        formatter_class=Help,
         epilog=HOST_EPILOG.replace("%", "%%"),
     )
     p.set_defaults(handler=_host)
@@ -167,7 +162,6 @@ def _add_list(suites: Any) -> None:
         "list",
         help="list the requirements of a board",
         description="List the requirements of a board: grade, how each is observed, the text.",
-        formatter_class=Help,
     )
     p.set_defaults(handler=_list)
     _add_board(p)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -35,12 +34,20 @@ def device(args: argparse.Namespace) -> int:
         recorder_error=args.recorder_error,
         clock_ppm=args.clock_ppm,
     )
-    return _told(run, folder, everything=args.verbose)
+    return report.publish(folder, run, everything=args.verbose)
 
 
 def requirements_of(v: Variant) -> list[Requirement]:
     """Those of a board in a profile, without those of its hosts."""
     return [r for r in requirements() if r.group != "host" and r.applies(v.board, v.profile)]
+
+
+def selected(v: Variant, only: Sequence[str]) -> list[Requirement]:
+    """Those with these ids or prefixes, all without any. Raises BadInput for none."""
+    rows = [r for r in requirements_of(v) if not only or r.id.startswith(tuple(only))]
+    if not rows:
+        raise BadInput(expected(f"ids or prefixes of {v.name} (psabench conform list)", " ".join(only), "--only"))
+    return rows
 
 
 def device_run(
@@ -60,9 +67,7 @@ def device_run(
     clock_error, recorder_error: ppm by which clocks of an emulator that is started are fast, and its probes'. Raises
     BadInput where `only` selects nothing, LinkError or BenchError where the board cannot be reached.
     """
-    rows = [r for r in requirements_of(v) if not only or r.id.startswith(tuple(only))]
-    if not rows:
-        raise BadInput(expected(f"ids or prefixes of {v.name} (psabench conform list)", " ".join(only), "--only"))
+    rows = selected(v, only)
     suite.load()
     outcomes: list[Outcome] = []
     interrupted = False
@@ -76,14 +81,6 @@ def device_run(
     return report.Run(
         suite="device", subject=v.name, facts=facts, outcomes=outcomes, rows=rows, interrupted=interrupted
     )
-
-
-def _told(run: report.Run, folder: Path, *, everything: bool) -> int:
-    page = report.write(folder, run)
-    for line in report.lines(run, everything=everything):
-        print(line)
-    print(f"report: {page}", file=sys.stderr)
-    return 130 if run.interrupted else 0 if run.conforms else 1
 
 
 def _addresses(args: argparse.Namespace) -> Addresses:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import sys
 
 from psabench.conform import identity, recording, report, suite
 from psabench.conform.defaults import OUT
+from psabench.conform.device_command import selected
 from psabench.conform.excerpts import Excerpts
 from psabench.conform.profile import variant
-from psabench.conform.requirements import requirements
 from psabench.conform.sources.files import read_files
 from psabench.conform.sources.taken import Bounds
 from psabench.conform.verdict import Outcome
@@ -21,10 +20,7 @@ from psabench.progress import Bar
 def handle(args: argparse.Namespace) -> int:
     """Handler of `conform recording`."""
     v = variant(args.board, args.profile)
-    rows = [r for r in requirements() if r.group != "host" and r.applies(v.board, v.profile)]
-    rows = [r for r in rows if not args.only or r.id.startswith(tuple(args.only))]
-    if not rows:
-        raise BadInput(expected(f"ids or prefixes of {v.name} (psabench conform list)", " ".join(args.only), "--only"))
+    rows = selected(v, args.only)
     bench = _bench(args)
     suite.load()
     folder = args.out or OUT / f"recording-{v.board}-{v.profile}"
@@ -39,11 +35,7 @@ def handle(args: argparse.Namespace) -> int:
     run = report.Run(
         suite="recording", subject=v.name, facts=facts, outcomes=outcomes, rows=rows, interrupted=interrupted
     )
-    page = report.write(folder, run)
-    for line in [*_about(bench), *report.lines(run, everything=args.verbose)]:
-        print(line)
-    print(f"report: {page}", file=sys.stderr)
-    return 130 if interrupted else 0 if run.conforms else 1
+    return report.publish(folder, run, everything=args.verbose, first=_about(bench))
 
 
 def _bench(args: argparse.Namespace) -> recording.Bench:

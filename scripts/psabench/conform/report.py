@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -121,6 +122,15 @@ def write(folder: Path, run: Run) -> Path:
     page = write_report(folder, as_dict(run), html_page(run, folder), "conform.json")
     replace_file(folder / "junit.xml", junit(run))
     return page
+
+
+def publish(folder: Path, run: Run, *, everything: bool, first: Sequence[str] = ()) -> int:
+    """Write the report and print what it says, after `first`; the exit status of the command. Raises OSError."""
+    page = write(folder, run)
+    for line in [*first, *lines(run, everything=everything)]:
+        print(line)
+    print(f"report: {page}", file=sys.stderr)
+    return 130 if run.interrupted else 0 if run.conforms else 1
 
 
 def as_dict(run: Run) -> dict[str, Any]:

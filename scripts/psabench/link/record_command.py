@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from psabench.options import CAN_HELP, Help, Parser, add_board, natural, node_of, positive
+from psabench.options import CAN_HELP, Parser, add_board, natural, node_of, positive
 
 FORMATS = ".asc .blf .csv .db .log .mf4 .trc .txt"  # of python-can, without loading it
 
@@ -27,7 +27,6 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     p = Parser(
         prog="psabench record",
         description="Record all frames of a CAN bus and count the frames that one node lost.",
-        formatter_class=Help,
         epilog=EPILOG,
     )
     p.set_defaults(handler=_record)

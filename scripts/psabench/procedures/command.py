@@ -16,7 +16,7 @@ from typing import Any
 from psabench.boards.registry import DBC_NODE
 from psabench.errors import BadInput, expected
 from psabench.instruments import EXAMPLES
-from psabench.options import Help, Parser, natural, node_id, positive, yes_no
+from psabench.options import Parser, natural, node_id, of_fields, positive, yes_no
 from psabench.procedures.run_table import COMPARE, CONDITIONS, G_MPS2, ON_THE_HEAD, ON_THE_PLATFORM
 from psabench.progress import Bar
 from psabench.shell import command_line
@@ -126,9 +126,7 @@ def _parser() -> Parser:
     p = Parser(
         prog="psabench run",
         usage="psabench run [-h] [--list] PROCEDURE [option...]",
-        description="Run a procedure over CAN, compare its results with the truth where it is known, and write a report.\n\n"
-        + _table(),
-        formatter_class=Help,
+        description="Run a procedure over the wire, grade it where the truth is known, and report.\n\n" + _table(),
         epilog=EPILOG,
     )
     p.set_defaults(handler=_without_procedure)
@@ -165,7 +163,6 @@ def _parser_of(command: Command) -> Parser:
         prog=f"psabench run {command.name}",
         usage=f"psabench run {command.name} [-h] [option...]",
         description=_sentence(command.summary),
-        formatter_class=Help,
         epilog=f"examples:\n{command.examples}{command.notes}",
     )
     p.set_defaults(handler=command.handler, procedure=command.name)
@@ -239,19 +236,11 @@ def _calibrate(args: argparse.Namespace) -> int:
     from psabench.report import calibration as report
     from psabench.report import grading
 
-    options = run.RunOptions(
+    options = of_fields(
+        run.RunOptions,
+        args,
         procedures=list(PROCEDURES) if args.procedure == ALL else [args.procedure],
-        out=args.out,
         conditions=list(CONDITIONS) if args.condition == "both" else [args.condition],
-        can=args.can,
-        head=args.head,
-        control=args.control,
-        truth=args.truth,
-        scenario=args.scenario,
-        node=args.node,
-        average=args.average,
-        real_time=args.real_time,
-        seed=args.seed,
         g_mps2=args.gravity,
         params=_params(args),
     )
@@ -285,17 +274,7 @@ def _gyro(args: argparse.Namespace) -> int:
     from psabench.procedures import gyro_run
     from psabench.report import gyro_grading, gyro_page
 
-    options = gyro_run.GyroOptions(
-        procedure=args.procedure,
-        out=args.out,
-        can=args.can,
-        control=args.control,
-        truth=args.truth,
-        scenario=args.scenario,
-        seed=args.seed,
-        real_time=args.real_time,
-        params=_params(args),
-    )
+    options = of_fields(gyro_run.GyroOptions, args, params=_params(args))
     sections = gyro_run.run(options, Bar())
     page = gyro_page.write(args.out, sections, gyro_run.facts(options))
     if args.verbose:

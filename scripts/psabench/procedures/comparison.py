@@ -21,6 +21,7 @@ from psabench.errors import BenchError, expected
 from psabench.procedures import compare_converters as measured
 from psabench.procedures.compare_converters import CompareParams, Figures, Track
 from psabench.procedures.head_bench import Progress
+from psabench.report.grading import aligned
 
 Floats = npt.NDArray[np.float64]
 
@@ -348,16 +349,7 @@ def console_table(c: Comparison) -> str:
         ("velocity at rest and in motion", figures_table(c)),
         ("velocity less the exact integral, from the first reading to the last", errors_table(c)),
     )
-    return "\n\n".join(f"{head}\n{_aligned(rows)}" for head, rows in headed)
-
-
-def _aligned(rows: Table) -> str:
-    width = [max(len(r[i]) for r in rows) for i in range(len(rows[0]))]
-    lines = [
-        "  ".join(x.ljust(w) if i == 0 else x.rjust(w) for i, (x, w) in enumerate(zip(r, width, strict=True)))
-        for r in rows
-    ]
-    return "\n".join(f"  {line}".rstrip() for line in lines)
+    return "\n\n".join("\n  ".join([head, *aligned(rows)]) for head, rows in headed)
 
 
 def verdict(c: Comparison) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 
 from psabench.procedures import comparison
 from psabench.procedures.comparison import AXES, Comparison
+from psabench.report import plots
 from psabench.report.page import bullets, figure, section, table, verdict_line, whole_page, write_report
 
 TITLE = "Five generations of converters, one motion"
@@ -73,14 +74,7 @@ def figures(c: Comparison) -> tuple[str, str, str]:
 
 
 def _dots(c: Comparison) -> str:
-    import matplotlib
-    from matplotlib.figure import Figure
-
-    from psabench.report import plots as plots
-
-    with matplotlib.rc_context(plots.STYLE):
-        picture = Figure(figsize=(7.4, 0.9 + 0.36 * len(c.graded)), layout="constrained")
-        ax = picture.subplots()
+    with plots.drawing(0.9 + 0.36 * len(c.graded)) as (picture, ax):
         for i, g in enumerate(c.graded):
             values = (
                 ("quantum", "o", plots.SERIES[0], g.figures.track.quantum_mps(c.g_mps2)),
@@ -103,14 +97,7 @@ def _dots(c: Comparison) -> str:
 
 
 def _errors(c: Comparison) -> str:
-    import matplotlib
-    from matplotlib.figure import Figure
-
-    from psabench.report import plots as plots
-
-    with matplotlib.rc_context(plots.STYLE):
-        picture = Figure(figsize=(7.4, 1.25 * len(c.graded)), layout="constrained")
-        rows = picture.subplots(len(c.graded), 1, sharex=True)
+    with plots.drawing(1.25 * len(c.graded), len(c.graded), 1, sharex=True) as (picture, rows):
         for ax, g in zip(np.atleast_1d(rows), c.graded, strict=True):
             t_s = g.figures.track.t_s
             every = max(1, len(t_s) // 1400)
@@ -125,16 +112,9 @@ def _errors(c: Comparison) -> str:
 
 
 def _motion(c: Comparison) -> str:
-    import matplotlib
-    from matplotlib.figure import Figure
-
-    from psabench.report import plots as plots
-
     m = c.motion
     span = (m.t_s >= c.graded[0].figures.track.t_s[0]) & (m.t_s <= c.graded[0].figures.track.t_s[-1])
-    with matplotlib.rc_context(plots.STYLE):
-        picture = Figure(figsize=(7.4, 3.2), layout="constrained")
-        top, bottom = picture.subplots(2, 1, sharex=True)
+    with plots.drawing(3.2, 2, 1, sharex=True) as (picture, (top, bottom)):
         for i, colour in enumerate(plots.SERIES[:3]):
             top.plot(m.t_s[span][::5], m.a_mps2[span][::5, i], lw=1.0, color=colour, label=AXES[i])
             bottom.plot(m.t_s[span][::5], (m.v_mps[span] - m.v_mps[span][0])[::5, i], lw=1.0, color=colour)

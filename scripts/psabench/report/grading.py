@@ -102,6 +102,13 @@ def with_ci(value: float, ci_half: float, most: int = 9) -> tuple[str, str]:
     return f"{value:.{decimals}f}", f"{ci_half:.1g}" if small else f"{ci_half:.{decimals}f}"
 
 
+def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
+    """A table as lines of text: the first column to the left, the others to the right."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    cells = ([r[0].ljust(widths[0]), *(x.rjust(w) for x, w in zip(r[1:], widths[1:], strict=True))] for r in rows)
+    return ["  ".join(row).rstrip() for row in cells]
+
+
 def result_dict(section: Section) -> dict[str, object]:
     """One section of result.json: plain data, units in the names."""
     r = section.result
@@ -180,12 +187,8 @@ def console_comparison(sections: Sequence[Section]) -> str:
     for name, _, _, printed in ARTICLE:
         found = [next((e for e in s.result.estimates if e.name == name), None) for s in sections]
         rows.append((name, printed, *("-" if e is None else _beside(e, printed) for e in found)))
-    width = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
-    lines = [
-        f"  {row[0]:<{width[0]}}" + "".join(f"  {c:>{w}}" for c, w in zip(row[1:], width[1:], strict=True))
-        for row in rows
-    ]
-    return "\n".join(["beside the article, with its digits (?: not identifiable from these data)", *lines])
+    head = "beside the article, with its digits (?: not identifiable from these data)"
+    return "\n".join([head, *(f"  {line}" for line in aligned(rows))])
 
 
 def _beside(e: Estimate, printed: str) -> str:

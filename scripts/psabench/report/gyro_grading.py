@@ -14,7 +14,7 @@ from psabench.native.nav import DEGPH
 from psabench.procedures.gyrocompass import GyrocompassResult, allowance
 from psabench.procedures.heading_hold import HoldResult
 from psabench.procedures.result import DEG, LIMIT_CI
-from psabench.report.grading import with_ci
+from psabench.report.grading import aligned, with_ci
 
 # What the article says that its simulation reaches, and what a hold may be off by.
 CLAIMS: Mapping[str, tuple[float, str]] = {"heading_deg": (0.1, "deg"), "drift1_degph": (0.05, "deg/h")}
@@ -173,27 +173,16 @@ def hold_summary(s: GyroSection) -> str:
 
 def console_table(s: GyroSection) -> str:
     """What the terminal shows."""
-    lines = [s.title, *_aligned(table(s))]
+    lines = [s.title, *(f"  {line}" for line in aligned(table(s)))]
     c = s.result.compass
     lines.append(f"  |hypot(s, c) - 1| = {c.quality:.4f}, determinant {c.geometry:.2f} We^2")
     lines.append(f"  {s.result.latitude.words}")
     if s.hold is not None:
         lines.append(f"hold, drift of the azimuth axis compensated: {s.hold.drift2_radps / DEGPH:.3f} deg/h")
-        lines += _aligned(hold_table(s))
+        lines += [f"  {line}" for line in aligned(hold_table(s))]
         lines += [f"  {hold_summary(s)}"] if hold_summary(s) else []
     lines += [f"  DOUBT: {d}" for d in doubts(s)] + [f"  note: {n}" for n in s.result.notes]
     return "\n".join(lines)
-
-
-def _aligned(rows: Sequence[tuple[str, ...]]) -> list[str]:
-    width = [max(len(r[i]) for r in rows) for i in range(len(rows[0]))]
-    return [
-        "  "
-        + "  ".join(
-            x.ljust(w) if i == 0 else x.rjust(w) for i, (x, w) in enumerate(zip(r, width, strict=True))
-        ).rstrip()
-        for r in rows
-    ]
 
 
 # ---- data

@@ -7,11 +7,13 @@ from html import escape
 from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from psabench.estimate.angles import wrapped_deg
 from psabench.native.nav import DEGPH
 from psabench.procedures.result import DEG
 from psabench.report import gyro_grading as grading
+from psabench.report import plots
 from psabench.report.gyro_grading import GyroSection
 from psabench.report.page import bullets, figure, folded, section, table, verdict_line, whole_page, write_report
 
@@ -85,12 +87,7 @@ def _positions(s: GyroSection) -> str:
     return folded("Positions", table(rows))
 
 
-def _figure(picture: object, ident: str, caption: str) -> str:
-    from matplotlib.figure import Figure
-
-    from psabench.report import plots as plots
-
-    assert isinstance(picture, Figure)
+def _figure(picture: Figure, ident: str, caption: str) -> str:
     return figure(plots.svg(picture, ident), escape(caption))
 
 
@@ -108,22 +105,15 @@ def _method() -> str:
 # ---- pictures
 
 
-def rates_figure(s: GyroSection) -> object:
+def rates_figure(s: GyroSection) -> Figure:
     """S against alpha with its fit, and what is left."""
-    import matplotlib
-    from matplotlib.figure import Figure
-
-    from psabench.report import plots as plots
-
     r, p = s.result, s.result.params
     we_degph = p.we_radps / DEGPH
     alpha = wrapped_deg(np.array([(r.compass.alpha1_rad + row.position.delta_rad) * DEG for row in r.rows]))
     rate = np.array([row.position.s_radps / DEGPH for row in r.rows])
     left = np.array([row.residual_radps / DEGPH for row in r.rows])
     x = np.linspace(-180.0, 180.0, 361)
-    with matplotlib.rc_context(plots.STYLE):
-        picture = Figure(figsize=(7.4, 4.4), layout="constrained")
-        top, bottom = picture.subplots(2, 1, sharex=True, height_ratios=[3, 1.4])
+    with plots.drawing(4.4, 2, 1, sharex=True, height_ratios=[3, 1.4]) as (picture, (top, bottom)):
         top.plot(x, r.compass.drift1_radps / DEGPH + we_degph * np.sin(np.radians(x)), color=plots.MUTED, lw=1.0)
         top.axhline(r.compass.drift1_radps / DEGPH, color=plots.SERIES[1], lw=0.9, ls="--", label="drift")
         top.plot(alpha, rate, "o", color=plots.SERIES[0], ms=4.5, label="position")
@@ -138,19 +128,12 @@ def rates_figure(s: GyroSection) -> object:
         return picture
 
 
-def course_figure(s: GyroSection) -> object:
+def course_figure(s: GyroSection) -> Figure:
     """S of each window in time."""
-    import matplotlib
-    from matplotlib.figure import Figure
-
-    from psabench.report import plots as plots
-
     r = s.result
     run = r.windows[: len(r.params.table.sequence_deg)]
     begun_s = run[0].t_mid_s - run[0].length_s / 2.0
-    with matplotlib.rc_context(plots.STYLE):
-        picture = Figure(figsize=(7.4, 2.8), layout="constrained")
-        ax = picture.subplots()
+    with plots.drawing(2.8) as (picture, ax):
         for w in run:
             t = w.t_mid_s - begun_s + w.length_s * (np.arange(len(w.beta_rad)) / len(w.beta_rad) - 0.5)
             every = max(1, len(t) // 200)
@@ -165,20 +148,13 @@ def course_figure(s: GyroSection) -> object:
         return picture
 
 
-def hold_figure(s: GyroSection) -> object:
+def hold_figure(s: GyroSection) -> Figure:
     """Error of the heading in time, with what is to be expected of it."""
-    import matplotlib
-    from matplotlib.figure import Figure
-
-    from psabench.report import plots as plots
-
     assert s.hold is not None
     hours = np.array([h.t_s / 3600.0 for h in s.hold.held])
     band = np.array([h.half95_rad * DEG for h in s.hold.held])
     errors = np.array(grading.hold_errors_deg(s) or np.full(len(hours), np.nan))
-    with matplotlib.rc_context(plots.STYLE):
-        picture = Figure(figsize=(7.4, 3.0), layout="constrained")
-        ax = picture.subplots()
+    with plots.drawing(3.0) as (picture, ax):
         ax.fill_between(hours, -band, band, color=plots.MUTED, alpha=0.18, lw=0)
         for sign in (-1.0, 1.0):
             ax.axhline(sign * grading.HOLD_CLAIM_DEG, color=plots.SERIES[1], lw=0.9, ls="--")

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import matplotlib
@@ -28,6 +29,7 @@ _CSS = {
     _GRID: "var(--grid)",
     **{c: f"var(--s{i + 1})" for i, c in enumerate(SERIES)},
 }
+WIDTH = 7.4  # inch
 # For a picture that is alone, in the docs.
 LIGHT = {
     "var(--ink)": "#1d2733",
@@ -59,6 +61,17 @@ STYLE: dict[Any, Any] = {
 }
 
 
+@contextmanager
+def drawing(height: float, *grid: int, **how: Any) -> Iterator[tuple[Figure, Any]]:
+    """A picture of the page's width in its style, inch high, and its axes; grid, how: as `Figure.subplots` takes them.
+
+    What is drawn while the block runs has the style.
+    """
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(WIDTH, height), layout="constrained")
+        yield figure, figure.subplots(*grid, **how)
+
+
 def svg(figure: Figure, name: str) -> str:
     """Inline SVG in CSS variables; `name` keeps the ids of several pictures apart. Same input, same bytes."""
     out = io.StringIO()
@@ -82,9 +95,7 @@ def standalone(text: str) -> str:
 
 def turn_figure(section: Section) -> Figure:
     """Readings against angle with their fit, and below them the residual."""
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(7.4, 4.9), layout="constrained")
-        top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=[3, 2])
+    with drawing(4.9, 2, 1, sharex=True, height_ratios=[3, 2]) as (figure, (top, bottom)):
         unit, scale = _unit(max(float(np.abs(s.residual_v).max(initial=0.0)) for s in section.result.series))
         for colour, s in zip(SERIES, section.result.series, strict=False):
             _draw_turn(top, s, colour)
@@ -118,9 +129,7 @@ def second_harmonic_figure(section: Section) -> Figure:
     s = section.result.series[0]
     assert s.c_v is not None
     c = s.c_v
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(7.4, 2.9), layout="constrained")
-        ax = figure.subplots()
+    with drawing(2.9) as (figure, ax):
         set_deg = np.round(s.alpha_deg)
         at = np.unique(set_deg)
         first = harmonics.evaluate(np.array([c[0], c[1], c[2], 0.0, 0.0]), np.radians(s.alpha_deg))
@@ -144,9 +153,7 @@ def alpha0_figure(sections: Sequence[Section]) -> Figure | None:
     printed_deg = next(float(text) for name, _, _, text in ARTICLE if name == "alpha0_deg")
     truth = next((s.truth for s, _ in rows if s.truth is not None), None)
     centre_deg = math.degrees(sensor_of(truth).alpha0_rad) if truth is not None else printed_deg
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(7.4, 0.95 + 0.42 * len(rows)), layout="constrained")
-        axes = figure.subplots(1, 2, sharey=True)
+    with drawing(0.95 + 0.42 * len(rows), 1, 2, sharey=True) as (figure, axes):
         for ax in axes:
             for i, (_, e) in enumerate(rows):
                 colour = SERIES[2] if e.identifiable else SERIES[1]

@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from psabench.options import BUS_HELP, Help, Parser, add_scpi, node_id
+from psabench.options import BUS_HELP, Parser, add_scpi, node_id
 
 SHELL_EPILOG = """\
 examples:
@@ -36,7 +36,6 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     shell = Parser(
         prog="psabench shell",
         description="Open an interactive shell for the bench (docs/shell.md).",
-        formatter_class=Help,
         epilog=SHELL_EPILOG,
     )
     shell.set_defaults(handler=_shell)
@@ -53,7 +52,6 @@ def parse_script(words: Sequence[str]) -> argparse.Namespace:
     script = Parser(
         prog="psabench run script",
         description="Run a script of the shell.",
-        formatter_class=Help,
         epilog=SCRIPT_EPILOG,
     )
     script.set_defaults(handler=_script)

@@ -75,11 +75,7 @@ def host(args: argparse.Namespace) -> int:
         rows=rows,
         interrupted=interrupted,
     )
-    page = report.write(args.out, told)
-    for line in report.lines(told, everything=args.verbose):
-        print(line)
-    print(f"report: {page}", file=sys.stderr)
-    return 130 if interrupted else 0 if told.conforms else 1
+    return report.publish(args.out, told, everything=args.verbose)
 
 
 def wants_form(case: str) -> bool:
