@@ -20,15 +20,6 @@ from psabench.conform.requirements import requirements
 from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.can_host import Message
 
-NMT_START, NMT_STOP, NMT_PREOP, NMT_RESET, NMT_RESET_COMMUNICATION = 0x01, 0x02, 0x80, 0x81, 0x82
-BOOT_UP, STOPPED, OPERATIONAL, PRE_OPERATIONAL = 0x00, 0x04, 0x05, 0x7F
-DEVICE_TYPE, HEARTBEAT, COUNTERS, TPDO, MAPPING = (
-    Common.DEVICE_TYPE,
-    Common.HEARTBEAT_MS,
-    Common.COUNTERS,
-    Common.TPDO,
-    Common.TPDO_MAPPING,
-)
 UPLOAD, EXPEDITED, ABORT, FINE = 0x40, 0x23, 0x80, 0x60
 OFF = 0x80000000  # bit 31 of 18xxh sub 1
 LOCKSTEP_S, REAL_S = 1.0, 5.0  # patience for an answer, bench time; in real time the machine may be busy
@@ -40,6 +31,18 @@ LEAST = 5  # readings that a judgement wants
 FLOOD_ID, FLOOD_DATA = 0x001, bytes(range(0x55, 0x5D))
 BIT_S, SPACE_BITS = 1e-6, 3  # of a bus of 1 Mbit/s; on a slower one they take longer
 AHEAD, STEP_S = 60, 0.004  # frames that wait always; an emulator takes no more than 128 while its time stands still
+
+
+class Nmt:
+    """Commands (CiA 301, 7.2.8.3.1)."""
+
+    START, STOP, PREOP, RESET, RESET_COMMUNICATION = 0x01, 0x02, 0x80, 0x81, 0x82
+
+
+class State:
+    """Of a node, as its heartbeat tells (CiA 301, 7.2.8.3.2)."""
+
+    BOOT_UP, STOPPED, OPERATIONAL, PRE_OPERATIONAL = 0x00, 0x04, 0x05, 0x7F
 
 
 class Talk:
@@ -189,9 +192,9 @@ class Talk:
 
     def counter(self, name: str) -> int:
         """One of 2030h by its name. Raises Inconclusive where the board has none of that name."""
-        for sub, title in self.s.unit.node.names(COUNTERS).items():
+        for sub, title in self.s.unit.node.names(Common.COUNTERS).items():
             if title == name:
-                return self.number(COUNTERS, sub)
+                return self.number(Common.COUNTERS, sub)
         raise Inconclusive(f"this board has no counter {name}")
 
     def fence(self) -> list[CanFrame]:
@@ -208,7 +211,7 @@ class Talk:
         return self._fenced(at)
 
     def _fenced(self, at: int) -> list[CanFrame]:
-        request = read(DEVICE_TYPE, 0)
+        request = read(Common.DEVICE_TYPE, 0)
         due = bytes([0x43]) + request[1:4]
         self.send(self.sdo_rx, request)
 
@@ -226,7 +229,7 @@ class Talk:
 
     def beat(self, period_ms: int) -> None:
         """Set 1017h."""
-        self.download(HEARTBEAT, 0, period_ms.to_bytes(2, "little"))
+        self.download(Common.HEARTBEAT_MS, 0, period_ms.to_bytes(2, "little"))
 
     def state(self) -> int:
         """Of the next heartbeat. Raises Failed when none comes."""
@@ -244,7 +247,7 @@ class Talk:
 
         return self.until(said)
 
-    def reset(self, command: int = NMT_RESET) -> list[CanFrame]:
+    def reset(self, command: int = Nmt.RESET) -> list[CanFrame]:
         """NMT 81h or 82h; the frames from there to the answer of a first request. Raises Failed without a boot-up."""
         self.drain()
         at = len(self.heard)
@@ -261,7 +264,7 @@ class Talk:
         """Identifiers of the messages that the board sends as it comes, by number of the TPDO (from 1)."""
         found = {}
         for k in range(8):
-            default = self.s.unit.node.default(TPDO + k, 1) if self.s.unit.node.has(TPDO + k) else None
+            default = self.s.unit.node.default(Common.TPDO + k, 1) if self.s.unit.node.has(Common.TPDO + k) else None
             if isinstance(default, int) and not default & OFF:
                 found[k + 1] = default & 0x7FF
         return found
@@ -271,7 +274,7 @@ class Talk:
         can_id = next(iter(self.pdos.values())) if can_id is None else can_id
         self.drain()
         at = len(self.heard)
-        self.nmt(NMT_START)
+        self.nmt(Nmt.START)
         return self.readings(count, can_id, at=at)
 
     def readings(self, count: int, can_id: int, at: int | None = None) -> list[CanFrame]:
@@ -300,7 +303,7 @@ class Talk:
 
     def hush(self) -> list[CanFrame]:
         """NMT pre-operational; what came before it was obeyed."""
-        self.nmt(NMT_PREOP)
+        self.nmt(Nmt.PREOP)
         return self.fence()
 
 
@@ -313,7 +316,7 @@ def talk(s: Subject, *, reset: bool = False, take: Take | None = None) -> Iterat
     t = Talk(s, take)
     s.host.listeners.append(t.on_message)
     try:
-        t.nmt(NMT_PREOP)
+        t.nmt(Nmt.PREOP)
         if s.lockstep:
             s.run_for(BURST_S)  # what others left in the queues
         yield t
@@ -323,7 +326,7 @@ def talk(s: Subject, *, reset: bool = False, take: Take | None = None) -> Iterat
             s.reset()
             s.run_for(0.01)  # the boot-up message, and what waited in the queues
         else:
-            s.host.send(t.nmt_id, bytes([NMT_PREOP, t.node]))
+            s.host.send(t.nmt_id, bytes([Nmt.PREOP, t.node]))
 
 
 def dialogue(*, needs: Iterable[str] = ("can",), reset: bool = False) -> Callable[[Dialogue], Callable[[Subject], str]]:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from psabench.boards.objects import Common
 from psabench.boards.unit import REFUSAL, STROBE_NS
 from psabench.conform.capture.bus_cycles import BUS, LINES, TAIL_S, harmless, quiet, registers, say, strobes, tell
 from psabench.conform.dut import Subject
 from psabench.conform.plan import active
 from psabench.conform.proves import proves
-from psabench.conform.raw_can import ABORT, DEVICE_TYPE, NMT_RESET, Talk, dialogue, read, words, write
+from psabench.conform.raw_can import ABORT, Nmt, Talk, dialogue, read, words, write
 from psabench.conform.requirements import requirements
 from psabench.conform.verdict import Failed, Inconclusive
 
@@ -146,7 +147,7 @@ def a_word_that_does_not_wait_is_refused(t: Talk) -> str:
     """Reset node, and the word at address 0 before there is one; no host but one in lockstep is sure to ask so soon."""
     row = requirements().rows["BUS-CYC-04"]
     t.s.wait_ready()
-    t.reset(NMT_RESET)
+    t.reset(Nmt.RESET)
     t.refused(_read(0), row.limit("state_code"), "a word before the first reading")
     return f"refused with {int(row.limit('state_code')):08X}h"
 
@@ -220,7 +221,7 @@ def a_reset_cuts_a_cycle(t: Talk) -> str:
     assert t.s.port is not None
     t.s.port.ask(f"R {address:X} {LONGEST_NS}")
     t.s.run_for(SOON_S)
-    t.reset(NMT_RESET)
+    t.reset(Nmt.RESET)
     answer = tell(t.s)
     if not answer.startswith(f"E off R {address:02X}h"):
         raise Failed(answer, f"E off R {address:02X}h")
@@ -238,7 +239,7 @@ def a_cut_cycle_leaves_the_lines_at_rest(t: Talk) -> str:
     with t.s.take() as take:
         t.send(t.sdo_rx, _read(quiet(t.s)))
         t.s.run_for(SOON_S)
-        t.nmt(NMT_RESET)
+        t.nmt(Nmt.RESET)
         t.s.run_for(SOON_S)
     assert take.lines is not None
     low, high = strobes(take.lines).at(quiet(t.s)), take.lines["CS"].level[-1]
@@ -307,5 +308,5 @@ def who_gives_up_finds_the_bus_busy(t: Talk) -> str:
     t.s.run_for(1.1 * LONGEST_NS * 1e-9)
     _strobe(t, 0)
     t.upload(BUS, address + 1)
-    t.ask(read(DEVICE_TYPE))
+    t.ask(read(Common.DEVICE_TYPE))
     return f"abort {code:08X}h meanwhile, free after it"

@@ -9,33 +9,12 @@ from psabench.boards.objects import BusObjects, Common
 from psabench.boards.registry import BOARDS
 from psabench.conform.dut import Subject
 from psabench.conform.proves import proves
-from psabench.conform.raw_can import (
-    BOOT_UP,
-    COUNTERS,
-    DEVICE_TYPE,
-    HEARTBEAT,
-    NMT_PREOP,
-    NMT_RESET,
-    NMT_RESET_COMMUNICATION,
-    NMT_START,
-    NMT_STOP,
-    OPERATIONAL,
-    PRE_OPERATIONAL,
-    STOPPED,
-    TPDO,
-    Talk,
-    dialogue,
-    ids,
-    read,
-    segment,
-    write,
-)
+from psabench.conform.raw_can import Nmt, State, Talk, dialogue, ids, read, segment, write
 from psabench.conform.requirements import requirements
 from psabench.conform.verdict import Failed
 
 BEAT_MS, NEW_BEAT_MS = 20, 100
 SETTLE_S = 0.05  # in which a PDO would come, were there one
-REMARK, NAME = Common.REMARK, Common.DEVICE_NAME
 REQUESTS = 5
 
 
@@ -70,9 +49,9 @@ def it_listens_at_the_identifiers_of_its_node(t: Talk) -> str:
     if syncs != 1:
         raise Failed(f"{syncs} SYNCs counted after one at {t.sync_id:03X}h", "1")
     t.beat(BEAT_MS)
-    t.nmt(NMT_START)
-    _obeyed(t, OPERATIONAL, f"after a start at {t.nmt_id:03X}h")
-    t.nmt(NMT_PREOP)
+    t.nmt(Nmt.START)
+    _obeyed(t, State.OPERATIONAL, f"after a start at {t.nmt_id:03X}h")
+    t.nmt(Nmt.PREOP)
     t.beat(1000)
     return f"requests at {t.sdo_rx:03X}h answered, SYNC at {t.sync_id:03X}h counted, NMT at {t.nmt_id:03X}h obeyed"
 
@@ -84,7 +63,7 @@ def requests_to_another_node_stay_unanswered(t: Talk) -> str:
     before = [t.counter(c) for c in ("Malformed requests", "Requests refused")]
     nodes = {1, 120, 127, *(t.s.node ^ 1 << bit for bit in range(7))} - {0, t.s.node}  # neighbours differ in one bit
     others = [t.sdo_rx - t.s.node + n for n in sorted(nodes)]
-    came = [f for f in t.after(*((other, read(DEVICE_TYPE)) for other in others)) if f.can_id == t.sdo_tx]
+    came = [f for f in t.after(*((other, read(Common.DEVICE_TYPE)) for other in others)) if f.can_id == t.sdo_tx]
     if came:
         raise Failed(f"{len(came)} answers to requests to other nodes", "none", frames=came)
     moved = [t.counter(c) for c in ("Malformed requests", "Requests refused")]
@@ -110,7 +89,7 @@ def remote_frames_stay_unanswered(t: Talk) -> str:
 @dialogue(reset=True)
 def boot_up_is_the_first_frame(t: Talk) -> str:
     """Reset node and reset communication: what comes first."""
-    for command in (NMT_RESET, NMT_RESET_COMMUNICATION):
+    for command in (Nmt.RESET, Nmt.RESET_COMMUNICATION):
         t.fence()
         came = [f for f in t.reset(command) if _mine(t, f.can_id)]
         boots = [f for f in came if f.can_id == t.heartbeat and f.data == bytes([_limit("BUS-BOOT-01", "state_code")])]
@@ -144,7 +123,7 @@ def boot_up_is_the_first_frame_after_power(t: Talk) -> str:
             f"{ids([first]) if first else 'nothing'} after power-on", "the boot-up message", frames=t.heard[at:]
         )
     t.fence()
-    boots = [f for f in t.heard[at:] if f.can_id == t.heartbeat and f.data == bytes([BOOT_UP])]
+    boots = [f for f in t.heard[at:] if f.can_id == t.heartbeat and f.data == bytes([State.BOOT_UP])]
     if len(boots) != 1:
         raise Failed(f"{len(boots)} boot-up messages after power-on", "one", frames=boots)
     return "one boot-up message, before anything else"
@@ -180,8 +159,8 @@ def stop_stops_it(t: Talk) -> str:
     """NMT stop: the heartbeat."""
     row = requirements().rows["BUS-NMT-02"]
     t.beat(BEAT_MS)
-    t.nmt(NMT_START)
-    _obeyed(t, OPERATIONAL, "after NMT start")
+    t.nmt(Nmt.START)
+    _obeyed(t, State.OPERATIONAL, "after NMT start")
     t.nmt(int(row.limit("command_code")))
     _obeyed(t, int(row.limit("state_code")), "after NMT stop")
     return "stopped"
@@ -204,7 +183,11 @@ def pre_operational_ends_its_pdos(t: Talk) -> str:
 
 def _settings(t: Talk) -> dict[tuple[int, int], bytes]:
     """A value for a communication parameter of each kind, other than its default."""
-    return {(HEARTBEAT, 0): (777).to_bytes(2, "little"), (TPDO, 2): bytes([7]), (TPDO, 3): (9).to_bytes(2, "little")}
+    return {
+        (Common.HEARTBEAT_MS, 0): (777).to_bytes(2, "little"),
+        (Common.TPDO, 2): bytes([7]),
+        (Common.TPDO, 3): (9).to_bytes(2, "little"),
+    }
 
 
 STROBE = Setting(index=BusObjects.STROBE_NS, sub=0, value=(5000).to_bytes(4, "little"))  # of a board with a bus
@@ -225,7 +208,7 @@ def reset_node_restores_the_defaults(t: Talk) -> str:
     _write(t, settings)
     t.reset(_limit("BUS-NMT-04", "command_code"))
     _are_defaults(t, settings, "NMT 81h")
-    _is(t.state(), PRE_OPERATIONAL, "after NMT 81h")
+    _is(t.state(), State.PRE_OPERATIONAL, "after NMT 81h")
     return f"{len(settings)} settings have their defaults again"
 
 
@@ -255,13 +238,13 @@ def reset_communication_leaves_the_board_alone(t: Talk) -> str:
     t.s.wait_ready()
     own = _own_settings(t.s)
     _write(t, _settings(t) | own)
-    count = t.number(COUNTERS, 1)
+    count = t.number(Common.COUNTERS, 1)
     t.reset(_limit("BUS-NMT-05", "command_code"))
     _are_defaults(t, _settings(t), "NMT 82h")
     for (index, sub), written in own.items():
         if t.upload(index, sub) != written:
             raise Failed(f"{index:04X}h:{sub} is {t.number(index, sub)} after NMT 82h", "what was written")
-    if t.number(COUNTERS, 1) < count:
+    if t.number(Common.COUNTERS, 1) < count:
         raise Failed("the count of readings fell with NMT 82h", "that it goes on")
     kept = ", ".join(f"{index:04X}h:{sub} has what was written" for index, sub in own) or "the board has no settings"
     return f"{len(_settings(t))} communication parameters have their defaults, {kept}"
@@ -273,17 +256,17 @@ def node_0_is_everybody(t: Talk) -> str:
     """NMT commands to node 0 and to another node."""
     t.beat(BEAT_MS)
     other = 1 if t.s.node != 1 else 2
-    t.nmt(NMT_START, other)
-    t.nmt(NMT_STOP, other)
-    t.nmt(NMT_RESET, other)
+    t.nmt(Nmt.START, other)
+    t.nmt(Nmt.STOP, other)
+    t.nmt(Nmt.RESET, other)
     t.fence()
-    _is(t.state(), PRE_OPERATIONAL, f"after commands to node {other}")
-    t.nmt(NMT_START, 0)
-    _obeyed(t, OPERATIONAL, "after a start of node 0")
-    t.nmt(NMT_PREOP, 0)
-    _obeyed(t, PRE_OPERATIONAL, "after NMT 80h to node 0")
-    t.nmt(NMT_START, 0)  # others that flowed flow again
-    t.nmt(NMT_PREOP)
+    _is(t.state(), State.PRE_OPERATIONAL, f"after commands to node {other}")
+    t.nmt(Nmt.START, 0)
+    _obeyed(t, State.OPERATIONAL, "after a start of node 0")
+    t.nmt(Nmt.PREOP, 0)
+    _obeyed(t, State.PRE_OPERATIONAL, "after NMT 80h to node 0")
+    t.nmt(Nmt.START, 0)  # others that flowed flow again
+    t.nmt(Nmt.PREOP)
     return f"obeys node 0 and itself, not node {other}"
 
 
@@ -293,7 +276,7 @@ def unknown_commands_change_nothing(t: Talk) -> str:
     """NMT commands 00h, 03h, 7Fh and FFh, operational and pre-operational."""
     commands = (0x00, 0x03, 0x7F, 0xFF)
     t.beat(BEAT_MS)
-    for state, nmt in ((PRE_OPERATIONAL, NMT_PREOP), (OPERATIONAL, NMT_START)):
+    for state, nmt in ((State.PRE_OPERATIONAL, Nmt.PREOP), (State.OPERATIONAL, Nmt.START)):
         t.nmt(nmt)
         t.fence()
         for command in commands:
@@ -310,16 +293,16 @@ def stopped_it_only_beats(t: Talk) -> str:
     t.s.wait_ready()
     syncs = t.counter("SYNCs")
     t.beat(BEAT_MS)
-    t.nmt(NMT_START)
-    t.nmt(NMT_STOP)
-    _obeyed(t, STOPPED, "after NMT stop")
+    t.nmt(Nmt.START)
+    t.nmt(Nmt.STOP)
+    _obeyed(t, State.STOPPED, "after NMT stop")
     at = len(t.heard)
     for _ in range(3):
         t.send(t.sync_id, b"")
-        t.send(t.sdo_rx, read(DEVICE_TYPE))
+        t.send(t.sdo_rx, read(Common.DEVICE_TYPE))
     if not t.until(lambda: len([f for f in t.heard[at:] if f.can_id == t.heartbeat]) > 3):
         raise Failed("no heartbeat any more", "one every 20 ms")
-    t.nmt(NMT_PREOP)
+    t.nmt(Nmt.PREOP)
     t.fence()
     known = {t.emcy, *t.pdos.values()}
     came = [f for f in t.heard[at:] if f.can_id in known]
@@ -337,9 +320,9 @@ def stopped_it_only_beats(t: Talk) -> str:
 def a_stop_ends_a_transfer(t: Talk) -> str:
     """Begin a segmented upload, stop, go pre-operational, ask for the next segment."""
     code = _limit("BUS-NMT-09", "abort_code")
-    t.ask(read(NAME))
-    t.nmt(NMT_STOP)
-    t.nmt(NMT_PREOP)
+    t.ask(read(Common.DEVICE_NAME))
+    t.nmt(Nmt.STOP)
+    t.nmt(Nmt.PREOP)
     found = t.abort_of(segment(0))
     if found != code:
         saw = "a segment" if found is None else f"abort {found:08X}h"
@@ -351,10 +334,10 @@ def a_stop_ends_a_transfer(t: Talk) -> str:
 @dialogue()
 def requests_are_answered_in_both_states(t: Talk) -> str:
     """Upload 1000h pre-operational and operational."""
-    for nmt in (NMT_PREOP, NMT_START):
+    for nmt in (Nmt.PREOP, Nmt.START):
         t.nmt(nmt)
         for _ in range(REQUESTS):
-            t.upload(DEVICE_TYPE)
+            t.upload(Common.DEVICE_TYPE)
     t.hush()
     return f"{REQUESTS} answers in each state"
 
@@ -377,7 +360,7 @@ def a_new_period_holds_at_once(t: Talk) -> str:
     """Write 100 ms to 1017h and take the time of the next heartbeats."""
     late_s = requirements().rows["BUS-HB-03"].limit("jitter_max_ms") * 1e-3
     period_s = NEW_BEAT_MS * 1e-3
-    written = t.answer_to(write(HEARTBEAT, 0, NEW_BEAT_MS.to_bytes(2, "little")))
+    written = t.answer_to(write(Common.HEARTBEAT_MS, 0, NEW_BEAT_MS.to_bytes(2, "little")))
     beats = [t.next(t.heartbeat), t.next(t.heartbeat)]
     came = [written, *(b for b in beats if b is not None)]
     if len(came) < 3:

@@ -8,20 +8,7 @@ from psabench.conform.capture.canbits import frame_bits
 from psabench.conform.dut import Subject
 from psabench.conform.plan import active
 from psabench.conform.proves import proves
-from psabench.conform.raw_can import (
-    COUNTERS,
-    DEVICE_TYPE,
-    HEARTBEAT,
-    LEAST,
-    MAPPING,
-    NMT_RESET,
-    TPDO,
-    Talk,
-    dialogue,
-    read,
-    talk,
-    words,
-)
+from psabench.conform.raw_can import LEAST, Nmt, Talk, dialogue, read, talk, words
 from psabench.conform.requirements import requirements
 from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.canopen_host import Described
@@ -40,13 +27,7 @@ COMMON = (
     Common.IDENTITY,
     Common.SDO_SERVER_PARAMETER,
 )
-EMCY_ID, IDENTITY, SERVER, REMARK, LOAD = (
-    Common.COB_ID_EMCY,
-    Common.IDENTITY,
-    Common.SDO_SERVER_PARAMETER,
-    Common.REMARK,
-    "Bus load",
-)
+LOAD = "Bus load"
 SERIAL = 4
 NEAR = 3  # readings before and after an answer that it may be of
 ERRORS_OF_CAN = ("Transmit errors", "Receive errors", "Controller state")
@@ -56,7 +37,11 @@ SPACE_BITS = 3  # interframe space (ISO 11898-1, 10.4.6)
 
 
 def _common(o: Described) -> bool:
-    return o.index in COMMON or TPDO <= o.index < TPDO + 8 or MAPPING <= o.index < MAPPING + 8
+    return (
+        o.index in COMMON
+        or Common.TPDO <= o.index < Common.TPDO + 8
+        or Common.TPDO_MAPPING <= o.index < Common.TPDO_MAPPING + 8
+    )
 
 
 @proves("BUS-OD-01")
@@ -91,7 +76,7 @@ def _due(o: Described) -> bytes | None:
 def device_type(t: Talk) -> str:
     """Upload 1000h."""
     due = int(requirements().rows["BUS-OD-02"].limit("device_type"))
-    found = t.upload(DEVICE_TYPE)
+    found = t.upload(Common.DEVICE_TYPE)
     if found != due.to_bytes(4, "little"):
         raise Failed(words(found), f"{due:X}h in 4 bytes")
     return f"{due:X}h"
@@ -101,9 +86,9 @@ def device_type(t: Talk) -> str:
 @dialogue(reset=True)
 def serial_number(t: Talk) -> str:
     """Upload 1018h sub 4 before and after a reset."""
-    before = t.upload(IDENTITY, SERIAL)
+    before = t.upload(Common.IDENTITY, SERIAL)
     t.reset()
-    after = t.upload(IDENTITY, SERIAL)
+    after = t.upload(Common.IDENTITY, SERIAL)
     if before != after or len(before) != 4:
         raise Failed(f"{words(before)}, after a reset {words(after)}", "the same 4 bytes")
     return f"serial number {int.from_bytes(before, 'little')}"
@@ -114,8 +99,12 @@ def serial_number(t: Talk) -> str:
 def constants_name_the_node(t: Talk) -> str:
     """Upload the objects that name an identifier, and see that it is the one in use."""
     t.reset()
-    due = {(EMCY_ID, 0): t.emcy, (SERVER, 1): t.sdo_rx, (SERVER, 2): t.sdo_tx}
-    due |= {(TPDO + k - 1, 1): can_id for k, can_id in t.pdos.items()}
+    due = {
+        (Common.COB_ID_EMCY, 0): t.emcy,
+        (Common.SDO_SERVER_PARAMETER, 1): t.sdo_rx,
+        (Common.SDO_SERVER_PARAMETER, 2): t.sdo_tx,
+    }
+    due |= {(Common.TPDO + k - 1, 1): can_id for k, can_id in t.pdos.items()}
     for (index, sub), can_id in due.items():
         found = t.number(index, sub) & 0x7FF
         if found != can_id:
@@ -130,10 +119,10 @@ def constants_name_the_node(t: Talk) -> str:
 @dialogue(reset=True)
 def the_remark_outlives_a_reset(t: Talk) -> str:
     """Write 2040h, NMT 81h, read it."""
-    put(t, REMARK, b"kept over Res")
+    put(t, Common.REMARK, b"kept over Res")
     t.reset()
-    found = t.upload(REMARK)
-    put(t, REMARK, b"")
+    found = t.upload(Common.REMARK)
+    put(t, Common.REMARK, b"")
     if found != b"kept over Res":
         raise Failed(f"{found!r} after a reset", "what was written")
     return "kept"
@@ -143,9 +132,9 @@ def the_remark_outlives_a_reset(t: Talk) -> str:
 @dialogue(needs={"can", "supply"})
 def the_remark_goes_with_the_power(t: Talk) -> str:
     """Write 2040h, switch the supply off and on, read it."""
-    put(t, REMARK, b"gone with the power")
+    put(t, Common.REMARK, b"gone with the power")
     power_cycle(t)
-    found = t.upload(REMARK)
+    found = t.upload(Common.REMARK)
     if found:
         raise Failed(f"{found!r} after power-on", "nothing")
     return "forgotten"
@@ -169,17 +158,19 @@ def mappings_lay_out_the_messages(t: Talk) -> str:
     code = requirements().rows["BUS-SDO-10"].limit("read_only_code")
     node, told = t.s.unit.node, []
     for k in range(8):
-        if not node.has(MAPPING + k):
+        if not node.has(Common.TPDO_MAPPING + k):
             continue
-        name = node.title(TPDO + k).partition(":")[0]
-        count = t.number(MAPPING + k)
-        entries = [t.number(MAPPING + k, sub) for sub in range(1, min(count, 64) + 1)]
-        t.refused(_write_one(MAPPING + k), code, f"a write to {MAPPING + k:04X}h:1")
-        if not node.default(MAPPING + k, 0):
+        name = node.title(Common.TPDO + k).partition(":")[0]
+        count = t.number(Common.TPDO_MAPPING + k)
+        entries = [t.number(Common.TPDO_MAPPING + k, sub) for sub in range(1, min(count, 64) + 1)]
+        t.refused(_write_one(Common.TPDO_MAPPING + k), code, f"a write to {Common.TPDO_MAPPING + k:04X}h:1")
+        if not node.default(Common.TPDO_MAPPING + k, 0):
             continue  # of no object: the DBC alone has the layout (docs/reference/protocol.md, Objects)
         bits = sum(e & 0xFF for e in entries)
         if bits != 8 * int(message(name).length):
-            raise Failed(f"{MAPPING + k:04X}h maps {bits} bits", f"{8 * int(message(name).length)}, as {name} has")
+            raise Failed(
+                f"{Common.TPDO_MAPPING + k:04X}h maps {bits} bits", f"{8 * int(message(name).length)}, as {name} has"
+            )
         _bounds(name, entries)
         told.append(name)
     return f"{', '.join(told)} as mapped; no mapping is written"
@@ -207,7 +198,10 @@ def mapped_objects_read_as_the_frames(t: Talk) -> str:
     compared = 0
     t.s.wait_ready()
     for k, can_id in t.pdos.items():
-        mapping = [t.number(MAPPING + k - 1, sub) for sub in range(1, min(t.number(MAPPING + k - 1), 64) + 1)]
+        mapping = [
+            t.number(Common.TPDO_MAPPING + k - 1, sub)
+            for sub in range(1, min(t.number(Common.TPDO_MAPPING + k - 1), 64) + 1)
+        ]
         t.stream(LEAST, can_id)
         at = 0
         for entry in mapping:
@@ -246,9 +240,9 @@ def counters_outlive_a_reset(t: Talk) -> str:
     t.ask(read(NOWHERE))
     t.send(t.sdo_rx, b"\0")
     t.send(t.sync_id, b"")
-    before, readings = [t.counter(n) for n in names], t.number(COUNTERS, READINGS)
-    t.reset(NMT_RESET)
-    after, later = [t.counter(n) for n in names], t.number(COUNTERS, READINGS)
+    before, readings = [t.counter(n) for n in names], t.number(Common.COUNTERS, READINGS)
+    t.reset(Nmt.RESET)
+    after, later = [t.counter(n) for n in names], t.number(Common.COUNTERS, READINGS)
     if later < readings:
         raise Failed(f"{readings} readings, {later} after NMT 81h", "as many or more")
     if after != before or not all(before):
@@ -307,7 +301,7 @@ def an_answer_waits_for_the_interframe_space(t: Talk) -> str:
     bit_s, least = 1.0 / row.limit("bit_hz"), row.limit("interframe_bits")
     found: list[float] = []
     t.beat(0)
-    for request in (read(DEVICE_TYPE), read(HEARTBEAT), read(NOWHERE)):
+    for request in (read(Common.DEVICE_TYPE), read(Common.HEARTBEAT_MS), read(NOWHERE)):
         t.s.run_for(0.02)
         t.drain()
         sent_s = t.s.bench.time_s

@@ -12,7 +12,7 @@ from psabench.conform.capture.log import CanFrame
 from psabench.conform.dut import Subject
 from psabench.conform.plan import active
 from psabench.conform.proves import proves
-from psabench.conform.raw_can import COUNTERS, NMT_START, OFF, TPDO, Talk, dialogue, flood, talk, words, write
+from psabench.conform.raw_can import OFF, Nmt, Talk, dialogue, flood, talk, words, write
 from psabench.conform.requirements import requirements
 from psabench.conform.verdict import Failed, Inconclusive
 
@@ -33,18 +33,18 @@ def _limit(row: str, name: str) -> float:
 def _first(t: Talk) -> tuple[int, int]:
     """Object and identifier of the first TPDO that is sent as the board comes."""
     k, can_id = next(iter(t.pdos.items()))
-    return TPDO + k - 1, can_id
+    return Common.TPDO + k - 1, can_id
 
 
 def _readings(t: Talk, count: int) -> tuple[int, int, int]:
     """Let so many readings be made: how many there were, and what was heard meanwhile, from where to where."""
-    begin, at = t.look(COUNTERS, READINGS)
+    begin, at = t.look(Common.COUNTERS, READINGS)
     now, end = begin, at
     for _ in range(2000):
         if now - begin >= count:
             break
         t.s.run_for(0.002)
-        now, end = t.look(COUNTERS, READINGS)
+        now, end = t.look(Common.COUNTERS, READINGS)
     else:
         raise Inconclusive(f"{now - begin} readings in 4 s; expected {count}")
     return now - begin, at, end
@@ -59,7 +59,7 @@ def _begin(t: Talk, kind: int) -> tuple[int, int]:
     t.s.wait_ready()
     index, can_id = _first(t)
     t.download(index, 2, bytes([kind]))
-    t.nmt(NMT_START)
+    t.nmt(Nmt.START)
     _readings(t, FEW)
     return index, can_id
 
@@ -105,9 +105,9 @@ def type_0_sends_new_readings_at_sync(t: Talk) -> str:
     came = _sent_by(t, can_id, t.after((t.sync_id, b"")))
     if came != 1:
         raise Failed(f"{came} frames at a SYNC after a reading", "1")
-    begin = t.number(COUNTERS, READINGS)
+    begin = t.number(Common.COUNTERS, READINGS)
     came = _sent_by(t, can_id, t.after(*[(t.sync_id, b"")] * 40))
-    count = t.number(COUNTERS, READINGS) - begin
+    count = t.number(Common.COUNTERS, READINGS) - begin
     if came > count + 1:
         raise Failed(f"{came} frames at 40 SYNCs, while {count} readings were made", f"{count + 1} at most")
     return f"none without SYNC, 1 at a SYNC, {came} at 40 SYNCs and {count} readings"
@@ -207,8 +207,8 @@ def the_inhibit_time_keeps_tpdos_apart(t: Talk) -> str:
     index, can_id = _begin(t, EVENT)
     t.download(index, 3, round(INHIBIT_S / unit_s).to_bytes(2, "little"))
     _readings(t, 1)
-    sub = next(sub for sub, name in t.s.unit.node.names(COUNTERS).items() if name == "PDOs inhibited")
-    looks = [(COUNTERS, READINGS), (COUNTERS, sub), (COUNTERS, READINGS)]
+    sub = next(sub for sub, name in t.s.unit.node.names(Common.COUNTERS).items() if name == "PDOs inhibited")
+    looks = [(Common.COUNTERS, READINGS), (Common.COUNTERS, sub), (Common.COUNTERS, READINGS)]
     before = [t.look(*x) for x in looks]
     t.readings(FEW, can_id)
     after = [t.look(*x) for x in looks]
@@ -257,7 +257,7 @@ def _overload(t: Talk) -> CanFrame:
     """Samples lost, and the calm after it. Raises Inconclusive where the bus could not be filled."""
     code = int(_limit("BUS-EMCY-06", "emcy_code"))
     t.s.wait_ready()
-    t.nmt(NMT_START)
+    t.nmt(Nmt.START)
     t.fence()
     at = len(t.heard)
     dwell_s = FLOOD_S

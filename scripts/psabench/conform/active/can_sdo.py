@@ -7,40 +7,15 @@ import struct
 
 from psabench.boards.objects import Absent, Area, BusObjects, Common, Psa2Objects
 from psabench.conform.proves import proves
-from psabench.conform.raw_can import (
-    ABORT,
-    DEVICE_TYPE,
-    FINE,
-    HEARTBEAT,
-    TPDO,
-    UPLOAD,
-    Talk,
-    dialogue,
-    long_write,
-    read,
-    segment,
-    words,
-    write,
-)
-from psabench.conform.requirements import Requirement, requirements
+from psabench.conform.raw_can import ABORT, FINE, UPLOAD, Talk, dialogue, long_write, read, segment, words, write
+from psabench.conform.requirements import requirements
 from psabench.conform.verdict import Failed
 from psabench.link.canopen_host import Described
 
-NAME, ERRORS, IDENTITY, SERVER, REMARK = (
-    Common.DEVICE_NAME,
-    Common.ERROR_HISTORY,
-    Common.IDENTITY,
-    Common.SDO_SERVER_PARAMETER,
-    Common.REMARK,
-)
 NOWHERE = Area.PROFILE - 1
 SIZES = {1: 0x4F, 2: 0x4B, 3: 0x47, 4: 0x43}  # commands of expedited answers by their bytes
 SEED = 7  # of the random frames
 HUNDRED = 100
-
-
-def _row(name: str) -> Requirement:
-    return requirements().rows[name]
 
 
 def put(t: Talk, index: int, text: bytes) -> None:
@@ -80,8 +55,8 @@ def short_values_come_expedited(t: Talk) -> str:
 @dialogue()
 def a_write_is_confirmed(t: Talk) -> str:
     """Write 1017h."""
-    code = int(_row("BUS-SDO-02").limit("answer_code"))
-    request = write(HEARTBEAT, 0, t.upload(HEARTBEAT)[:2].ljust(2, b"\0"))
+    code = int(requirements()["BUS-SDO-02"].limit("answer_code"))
+    request = write(Common.HEARTBEAT_MS, 0, t.upload(Common.HEARTBEAT_MS)[:2].ljust(2, b"\0"))
     answer = t.ask(request)
     due = bytes([code]) + request[1:4]
     if answer[:4] != due:
@@ -93,17 +68,17 @@ def a_write_is_confirmed(t: Talk) -> str:
 @dialogue()
 def long_values_come_in_segments(t: Talk) -> str:
     """Upload 1008h, and a remark of 64 characters, segment by segment."""
-    most = int(_row("BUS-SDO-03").limit("segment_bytes"))
+    most = int(requirements()["BUS-SDO-03"].limit("segment_bytes"))
     text = bytes(range(0x30, 0x30 + 64))
-    put(t, REMARK, text)
-    for index, due in ((NAME, t.s.unit.title.encode()), (REMARK, text)):
+    put(t, Common.REMARK, text)
+    for index, due in ((Common.DEVICE_NAME, t.s.unit.title.encode()), (Common.REMARK, text)):
         first = t.ask(read(index))
         if len(due) <= 4:
             continue
         if first != bytes([0x41]) + read(index)[1:4] + len(due).to_bytes(4, "little"):
             raise Failed(f"{words(first)} to an upload of {index:04X}h", f"41h and a length of {len(due)}")
         _take_segments(t, due, most)
-    put(t, REMARK, b"")
+    put(t, Common.REMARK, b"")
     return f"the name and {len(text)} characters in segments of {most}"
 
 
@@ -122,14 +97,14 @@ def _take_segments(t: Talk, due: bytes, most: int) -> None:
 @dialogue()
 def strings_go_down_and_up(t: Talk) -> str:
     """Write remarks of several lengths and read them back."""
-    longest = int(_row("BUS-SDO-04").limit("remark_chars"))
+    longest = int(requirements()["BUS-SDO-04"].limit("remark_chars"))
     sizes = (1, 7, 8, longest - 1, longest)
     for n in sizes:
         text = bytes(0x21 + (n + 3 * k) % 90 for k in range(n))
-        put(t, REMARK, text)
-        if t.upload(REMARK) != text:
+        put(t, Common.REMARK, text)
+        if t.upload(Common.REMARK) != text:
             raise Failed(f"a remark of {n} characters reads otherwise than written", text.decode())
-    put(t, REMARK, b"")
+    put(t, Common.REMARK, b"")
     return f"{', '.join(map(str, sizes))} characters"
 
 
@@ -137,17 +112,17 @@ def strings_go_down_and_up(t: Talk) -> str:
 @dialogue()
 def a_wrong_toggle_bit_is_refused(t: Talk) -> str:
     """Begin with toggle 1; take a segment, and ask for it again; the same of a download."""
-    code = _row("BUS-SDO-05").limit("abort_code")
-    begin = read(REMARK)
-    put(t, REMARK, b"0123456789")
+    code = requirements()["BUS-SDO-05"].limit("abort_code")
+    begin = read(Common.REMARK)
+    put(t, Common.REMARK, b"0123456789")
     for toggles in ((0x10,), (0, 0)):
         t.ask(begin)
         for toggle in toggles[:-1]:
             t.ask(segment(toggle))
-        _aborted(t, segment(toggles[-1]), code, "a segment with the wrong toggle bit", REMARK)
-    t.ask(long_write(REMARK, 0, 10))
-    _aborted(t, segment(0x10, b"01234567"[:7]), code, "a segment with the wrong toggle bit", REMARK)
-    put(t, REMARK, b"")
+        _aborted(t, segment(toggles[-1]), code, "a segment with the wrong toggle bit", Common.REMARK)
+    t.ask(long_write(Common.REMARK, 0, 10))
+    _aborted(t, segment(0x10, b"01234567"[:7]), code, "a segment with the wrong toggle bit", Common.REMARK)
+    put(t, Common.REMARK, b"")
     return f"abort {int(code):08X}h, up and down"
 
 
@@ -163,11 +138,11 @@ def _aborted(t: Talk, request: bytes, code: float, what: str, index: int) -> Non
 @dialogue(needs={"can", "stamps"})
 def a_silent_client_is_given_up(t: Talk) -> str:
     """Begin an upload and a download in segments and ask nothing more."""
-    row = _row("BUS-SDO-06")
+    row = requirements()["BUS-SDO-06"]
     due_s, late_s = row.limit("patience_s"), row.limit("jitter_max_ms") * 1e-3
     waited = []
-    put(t, REMARK, b"0123456789")
-    for request in (read(REMARK), long_write(REMARK, 0, 20)):
+    put(t, Common.REMARK, b"0123456789")
+    for request in (read(Common.REMARK), long_write(Common.REMARK, 0, 20)):
         begun = t.answer_to(request)
         frame = t.next(t.sdo_tx, 2 * due_s + t.patience_s)
         abort = bytes([ABORT]) + request[1:4] + int(row.limit("abort_code")).to_bytes(4, "little")
@@ -178,7 +153,7 @@ def a_silent_client_is_given_up(t: Talk) -> str:
             raise Failed(
                 f"given up after {waited[-1]:.6f} s", f"{due_s:g} s +- {late_s * 1e3:g} ms", frames=[begun, frame]
             )
-    put(t, REMARK, b"")
+    put(t, Common.REMARK, b"")
     return f"given up after {', '.join(f'{w:.6f}' for w in waited)} s"
 
 
@@ -186,11 +161,11 @@ def a_silent_client_is_given_up(t: Talk) -> str:
 @dialogue()
 def unknown_commands_are_refused(t: Talk) -> str:
     """Block transfers, a command that no one has defined, a segment of no transfer."""
-    code = _row("BUS-SDO-07").limit("abort_code")
+    code = requirements()["BUS-SDO-07"].limit("abort_code")
     commands = (0xA0, 0xC0, 0xE0, 0x60, 0x00)
     for command in commands:
-        t.upload(DEVICE_TYPE)  # nothing is under way
-        request = bytes([command]) + read(NAME)[1:]
+        t.upload(Common.DEVICE_TYPE)  # nothing is under way
+        request = bytes([command]) + read(Common.DEVICE_NAME)[1:]
         found = t.abort_of(request)
         if found != code:
             raise Failed(
@@ -204,7 +179,7 @@ def unknown_commands_are_refused(t: Talk) -> str:
 @dialogue()
 def no_such_object(t: Talk) -> str:
     """Upload and write objects that there are not."""
-    code = _row("BUS-SDO-08").limit("abort_code")
+    code = requirements()["BUS-SDO-08"].limit("abort_code")
     known = {o.index for o in t.s.unit.node.objects()}
     strangers = [
         i
@@ -221,8 +196,16 @@ def no_such_object(t: Talk) -> str:
 @dialogue()
 def no_such_sub_index(t: Talk) -> str:
     """Upload sub-indices that objects have not: one more than the last, FFh, 1 of a variable."""
-    code = _row("BUS-SDO-09").limit("abort_code")
-    asked = [(IDENTITY, 5), (IDENTITY, 0xFF), (ERRORS, 9), (SERVER, 3), (TPDO, 4), (DEVICE_TYPE, 1), (HEARTBEAT, 1)]
+    code = requirements()["BUS-SDO-09"].limit("abort_code")
+    asked = [
+        (Common.IDENTITY, 5),
+        (Common.IDENTITY, 0xFF),
+        (Common.ERROR_HISTORY, 9),
+        (Common.SDO_SERVER_PARAMETER, 3),
+        (Common.TPDO, 4),
+        (Common.DEVICE_TYPE, 1),
+        (Common.HEARTBEAT_MS, 1),
+    ]
     for index, sub in asked:
         t.refused(read(index, sub), code, f"an upload of {index:04X}h:{sub}")
     return f"abort {int(code):08X}h for {len(asked)} sub-indices"
@@ -232,7 +215,7 @@ def no_such_sub_index(t: Talk) -> str:
 @dialogue()
 def rights_are_kept(t: Talk) -> str:
     """Write everything that is read-only or constant, read everything that is write-only."""
-    row = _row("BUS-SDO-10")
+    row = requirements()["BUS-SDO-10"]
     locked = [o for o in t.s.unit.node.objects() if o.access in ("const", "ro") and o.index not in REGISTERS]
     hidden = [o for o in t.s.unit.node.objects() if o.access == "wo" and o.index not in REGISTERS]
     for o in locked:
@@ -256,17 +239,17 @@ REGISTERS = (
 @dialogue()
 def the_wrong_length_is_refused(t: Talk) -> str:
     """Write 4, 3 and 1 bytes to 1017h, and 4 to 1800h sub 2."""
-    row = _row("BUS-SDO-11")
-    before = t.upload(HEARTBEAT)
+    row = requirements()["BUS-SDO-11"]
+    before = t.upload(Common.HEARTBEAT_MS)
     for index, sub, n, code in (
-        (HEARTBEAT, 0, 4, "long_code"),
-        (HEARTBEAT, 0, 3, "long_code"),
-        (TPDO, 2, 4, "long_code"),
-        (HEARTBEAT, 0, 1, "short_code"),
-        (TPDO, 3, 1, "short_code"),
+        (Common.HEARTBEAT_MS, 0, 4, "long_code"),
+        (Common.HEARTBEAT_MS, 0, 3, "long_code"),
+        (Common.TPDO, 2, 4, "long_code"),
+        (Common.HEARTBEAT_MS, 0, 1, "short_code"),
+        (Common.TPDO, 3, 1, "short_code"),
     ):
         t.refused(write(index, sub, bytes([1] * n)), row.limit(code), f"{n} bytes to {index:04X}h:{sub}")
-    if t.upload(HEARTBEAT) != before:
+    if t.upload(Common.HEARTBEAT_MS) != before:
         raise Failed("1017h has changed", "what it was")
     return "too long and too short are distinguished"
 
@@ -275,15 +258,15 @@ def the_wrong_length_is_refused(t: Talk) -> str:
 @dialogue()
 def other_than_announced_is_refused(t: Talk) -> str:
     """Announce 10 bytes for 2040h and send 8, and announce 8 and send 10."""
-    code = _row("BUS-SDO-12").limit("abort_code")
-    put(t, REMARK, b"kept")
+    code = requirements()["BUS-SDO-12"].limit("abort_code")
+    put(t, Common.REMARK, b"kept")
     for announced, sent in ((10, 8), (8, 10)):
-        t.ask(long_write(REMARK, 0, announced))
+        t.ask(long_write(Common.REMARK, 0, announced))
         t.ask(segment(0, bytes(range(0x41, 0x48))))
-        _aborted(t, segment(0x10, b"HIJ"[: sent - 7], last=True), code, f"{sent} of {announced} bytes", REMARK)
-    if t.upload(REMARK) != b"kept":
-        raise Failed(f"2040h is {t.upload(REMARK)!r} after a download that was refused", "what it was")
-    put(t, REMARK, b"")
+        _aborted(t, segment(0x10, b"HIJ"[: sent - 7], last=True), code, f"{sent} of {announced} bytes", Common.REMARK)
+    if t.upload(Common.REMARK) != b"kept":
+        raise Failed(f"2040h is {t.upload(Common.REMARK)!r} after a download that was refused", "what it was")
+    put(t, Common.REMARK, b"")
     return f"abort {int(code):08X}h"
 
 
@@ -291,7 +274,7 @@ def other_than_announced_is_refused(t: Talk) -> str:
 @dialogue()
 def limits_are_kept(t: Talk) -> str:
     """Write to each object with limits one less than the lowest and one more than the highest."""
-    code = _row("BUS-SDO-13").limit("abort_code")
+    code = requirements()["BUS-SDO-13"].limit("abort_code")
     tried = 0
     for o in t.s.unit.node.objects():
         for beyond in (o.low - 1 if o.low is not None else None, o.high + 1 if o.high is not None else None):
@@ -314,9 +297,11 @@ def _fits(value: float, o: Described) -> bool:
 @dialogue()
 def requests_of_the_wrong_length_are_counted(t: Talk) -> str:
     """Requests of 0 to 7 bytes."""
-    size = int(_row("BUS-SDO-14").limit("request_bytes"))
+    size = int(requirements()["BUS-SDO-14"].limit("request_bytes"))
     before = t.counter("Malformed requests")
-    came = [f for f in t.after(*((t.sdo_rx, read(DEVICE_TYPE)[:n]) for n in range(size))) if f.can_id == t.sdo_tx]
+    came = [
+        f for f in t.after(*((t.sdo_rx, read(Common.DEVICE_TYPE)[:n]) for n in range(size))) if f.can_id == t.sdo_tx
+    ]
     counted = t.counter("Malformed requests") - before
     if came or counted != size:
         raise Failed(f"{len(came)} answers, {counted} counted", f"none, {size} counted", frames=came)
@@ -327,7 +312,13 @@ def requests_of_the_wrong_length_are_counted(t: Talk) -> str:
 @dialogue()
 def each_request_has_one_answer(t: Talk) -> str:
     """A hundred requests of several kinds, good and bad, one after the other and all at once."""
-    kinds = [read(HEARTBEAT), read(NOWHERE), read(IDENTITY, 2), write(DEVICE_TYPE, 0, bytes(4)), read(IDENTITY, 9)]
+    kinds = [
+        read(Common.HEARTBEAT_MS),
+        read(NOWHERE),
+        read(Common.IDENTITY, 2),
+        write(Common.DEVICE_TYPE, 0, bytes(4)),
+        read(Common.IDENTITY, 9),
+    ]
     asked = [kinds[k % len(kinds)] for k in range(HUNDRED)]
     answers = []
     for k in range(0, HUNDRED, 20):
@@ -346,11 +337,11 @@ def each_request_has_one_answer(t: Talk) -> str:
 def a_refusal_changes_nothing(t: Talk) -> str:
     """Refused writes to 1017h and 1800h: their values before and after."""
     for index, sub, data in (
-        (HEARTBEAT, 0, bytes(4)),
-        (HEARTBEAT, 0, b"\1"),
-        (TPDO, 2, bytes([250])),
-        (TPDO, 1, bytes(4)),
-        (ERRORS, 0, b"\1"),
+        (Common.HEARTBEAT_MS, 0, bytes(4)),
+        (Common.HEARTBEAT_MS, 0, b"\1"),
+        (Common.TPDO, 2, bytes([250])),
+        (Common.TPDO, 1, bytes(4)),
+        (Common.ERROR_HISTORY, 0, b"\1"),
     ):
         before = t.upload(index, sub)
         if t.abort_of(write(index, sub, data)) is None:
@@ -366,12 +357,12 @@ def refusals_are_counted(t: Talk) -> str:
     """Refusals of each kind, and the counter before and after."""
     bad = [
         read(NOWHERE),
-        read(IDENTITY, 9),
-        write(DEVICE_TYPE, 0, bytes(4)),
-        write(HEARTBEAT, 0, b"\1"),
-        write(HEARTBEAT, 0, bytes(4)),
-        write(TPDO, 2, bytes([250])),
-        bytes([0xE0]) + read(NAME)[1:],
+        read(Common.IDENTITY, 9),
+        write(Common.DEVICE_TYPE, 0, bytes(4)),
+        write(Common.HEARTBEAT_MS, 0, b"\1"),
+        write(Common.HEARTBEAT_MS, 0, bytes(4)),
+        write(Common.TPDO, 2, bytes([250])),
+        bytes([0xE0]) + read(Common.DEVICE_NAME)[1:],
         segment(0),
     ]
     before = t.counter("Requests refused")
@@ -388,16 +379,16 @@ def refusals_are_counted(t: Talk) -> str:
 @dialogue()
 def an_abort_of_the_client_ends_it(t: Talk) -> str:
     """Abort an upload of a long value, then ask for its next segment."""
-    put(t, REMARK, b"0123456789")
-    t.ask(read(REMARK))
-    came = [f for f in t.after((t.sdo_rx, bytes([ABORT]) + read(REMARK)[1:])) if f.can_id == t.sdo_tx]
+    put(t, Common.REMARK, b"0123456789")
+    t.ask(read(Common.REMARK))
+    came = [f for f in t.after((t.sdo_rx, bytes([ABORT]) + read(Common.REMARK)[1:])) if f.can_id == t.sdo_tx]
     if came:
         raise Failed(f"{words(came[0].data)} to an abort", "silence", frames=came)
-    t.ask(read(REMARK))
-    t.send(t.sdo_rx, bytes([ABORT]) + read(REMARK)[1:])
+    t.ask(read(Common.REMARK))
+    t.send(t.sdo_rx, bytes([ABORT]) + read(Common.REMARK)[1:])
     if t.abort_of(segment(0)) is None:
         raise Failed("the transfer goes on after an abort", "a refusal of its next segment")
-    put(t, REMARK, b"")
+    put(t, Common.REMARK, b"")
     return "silence; the next segment is refused"
 
 
@@ -405,7 +396,7 @@ def an_abort_of_the_client_ends_it(t: Talk) -> str:
 @dialogue(reset=True)
 def garbage_does_not_stop_it(t: Talk) -> str:
     """A thousand random requests, then good ones."""
-    count = int(_row("BUS-SDO-19").limit("frames_count"))
+    count = int(requirements()["BUS-SDO-19"].limit("frames_count"))
     rng = random.Random(SEED)
     for _ in range(count // 50):
         t.drain()
@@ -413,7 +404,7 @@ def garbage_does_not_stop_it(t: Talk) -> str:
             t.send(t.sdo_rx, _harmless(rng.randbytes(rng.randrange(9))))
         t.s.run_for(0.02)
     t.fence()
-    if t.ask(read(DEVICE_TYPE))[0] & 0xE0 != UPLOAD:
+    if t.ask(read(Common.DEVICE_TYPE))[0] & 0xE0 != UPLOAD:
         raise Failed("no good answer after random frames", "one")
     return f"{count} random frames; answers go on"
 

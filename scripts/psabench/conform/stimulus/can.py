@@ -7,7 +7,7 @@ from psabench.boards.registry import BOARDS
 from psabench.conform.capture.log import Capture
 from psabench.conform.dut import Subject
 from psabench.conform.plan import stimulus
-from psabench.conform.raw_can import NMT_START, OFF, TPDO, Talk, flood, read, talk
+from psabench.conform.raw_can import OFF, Nmt, Talk, flood, read, talk
 from psabench.conform.verdict import Failed, Inconclusive
 
 BEATS_S, STREAM_S = 3.3, 0.2
@@ -27,7 +27,7 @@ def services(s: Subject) -> Capture:
         for index in CALLED:
             t.send(t.sdo_rx, read(index))
             s.run_for(0.005)
-        t.nmt(NMT_START)
+        t.nmt(Nmt.START)
         s.run_for(STREAM_S)
         t.hush()
     return s.capture("services", take)
@@ -42,7 +42,7 @@ def overload(s: Subject) -> Capture:
         with s.take(lines=False) as take:
             t.take = take
             before = t.counter("Dropped")
-            t.nmt(NMT_START)
+            t.nmt(Nmt.START)
             s.run_for(STREAM_S)
             for k in range(TRIES):
                 take.marks["flood"] = float(len(take.frames))
@@ -68,7 +68,7 @@ def everything_on(t: Talk) -> None:
     """TPDOs that the host may switch on. Those of a PSA-2 are chosen by its frame form."""
     node = t.s.unit.node
     for k in range(8):
-        if t.s.variant.family != "psa2" and node.has(TPDO + k):
-            cob = t.number(TPDO + k, 1)
+        if t.s.variant.family != "psa2" and node.has(Common.TPDO + k):
+            cob = t.number(Common.TPDO + k, 1)
             if cob & OFF:
-                t.download(TPDO + k, 1, (cob & ~OFF).to_bytes(4, "little"))
+                t.download(Common.TPDO + k, 1, (cob & ~OFF).to_bytes(4, "little"))
