@@ -220,11 +220,7 @@ def lost_samples_are_counted(e: HostCapture) -> str:
     seqs = [s.number for s, _ in m.pairs]
     gaps = {i: (b - a - 1) % SEQS for i, (a, b) in enumerate(itertools.pairwise(seqs), 1) if (b - a) % SEQS != 1}
     enough(len(gaps) == 3, "three gaps")
-    told: dict[int, int] = {}
-    for event in e.told.events:
-        if event.name == "lost":
-            told[event.at] = told.get(event.at, 0) + event.value
-    if told != gaps:
+    if (told := e.told.by_place("lost")) != gaps:
         raise Failed(f"lost {_gaps(told)}", f"lost {_gaps(gaps)}")
     e.nothing_but("lost", "stale")
     return f"lost {_gaps(gaps)}"

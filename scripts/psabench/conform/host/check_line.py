@@ -166,12 +166,8 @@ def a_glitch_is_no_frame(e: HostCapture) -> str:
 def frames_that_do_not_come_are_counted(e: HostCapture) -> str:
     """1, 2 and 5 frames are missing, by the time between two falls of INT."""
     _pairs(e)
-    want: dict[int, int] = _lost(e)
-    told: dict[int, int] = {}
-    for x in e.told.events:
-        if x.name == "lost":
-            told[x.at] = told.get(x.at, 0) + x.value
-    if told != want:
+    want = _lost(e)
+    if (told := e.told.by_place("lost")) != want:
         raise Failed(f"lost {told} (samples before: frames)", f"{want}")
     e.nothing_but("lost")
     return ", ".join(map(str, want.values()))

@@ -6,6 +6,7 @@ A line that is none of the protocol's is a finding, never an exception, and memo
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -106,6 +107,14 @@ class Told:
 
     def sum(self, name: str) -> int:
         return sum(self.of(name))
+
+    def by_place(self, name: str) -> dict[int, int]:
+        """Sums by the number of samples that had been told before."""
+        found: Counter[int] = Counter()
+        for e in self.events:
+            if e.name == name:
+                found[e.at] += e.value
+        return dict(found)
 
     def _refuse(self, line: bytes, why: str) -> None:
         self.bad_lines += 1

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import math
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -61,13 +62,7 @@ def _from_begin(frames: list[CanFrame]) -> tuple[CanFrame, ...]:
     zero_s = frames[0].t_s if abs(frames[0].t_s) > EPOCH_S else 0.0
     if not zero_s:
         return tuple(frames)
-    return tuple(_frame_at(f, f.t_s - zero_s) for f in frames)
-
-
-def _frame_at(f: CanFrame, t_s: float) -> CanFrame:
-    return CanFrame(
-        t_s=t_s, can_id=f.can_id, data=f.data, fd=f.fd, error=f.error, sent=f.sent, extended=f.extended, remote=f.remote
-    )
+    return tuple(replace(f, t_s=f.t_s - zero_s) for f in frames)
 
 
 def _frame(m: can.Message) -> CanFrame:
