@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import argparse
 import textwrap
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from pathlib import Path
@@ -306,6 +306,13 @@ _EXAMPLES: Mapping[str, str] = {
   psabench run reversal
   psabench run reversal --condition quiet --realisations 2   a shorter one, without noise
 """,
+    ALL: """\
+  psabench run all             quiet and realistic, on emulators started for it
+  psabench run all --condition quiet --realisations 2
+""",
+    COMPARE[0]: """\
+  psabench run compare-converters --out build/run/converters
+""",
     "gyrocompass": """\
   psabench run gyrocompass                                   the article's way and a better one
   psabench run gyrocompass --reading article --sequence 0,120,240 --window-s 20
@@ -339,38 +346,22 @@ def _of_the_platform(name: str) -> Parameters:
     return Parameters(fields=gyro_params.fields_of(name), defaults=gyrocompass.READINGS)
 
 
-def _commands() -> list[Command]:
-    head = [
-        Command(
+def _commands() -> Iterator[Command]:
+    every = f"{', '.join(ON_THE_HEAD)}: an accelerometer on the dividing head, each procedure on each bench"
+    for name, summary in (*ON_THE_HEAD.items(), (ALL, every)):
+        yield Command(
             name=name,
             summary=summary,
             handler=_calibrate,
             common=_HEAD,
-            load=partial(_of_the_head, name),
+            load=_of_all if name == ALL else partial(_of_the_head, name),
             examples=_EXAMPLES[name],
             notes=NOTES_HEAD,
         )
-        for name, summary in ON_THE_HEAD.items()
-    ]
-    every = Command(
-        name=ALL,
-        summary=f"{', '.join(ON_THE_HEAD)}: an accelerometer on the dividing head, each procedure on each bench",
-        handler=_calibrate,
-        common=_HEAD,
-        load=_of_all,
-        examples="  psabench run all             quiet and realistic, on emulators started for it\n"
-        "  psabench run all --condition quiet --realisations 2\n",
-        notes=NOTES_HEAD,
-    )
-    compare = Command(
-        name=COMPARE[0],
-        summary=COMPARE[1],
-        handler=_compare,
-        common=_STARTED,
-        examples="  psabench run compare-converters --out build/run/converters\n",
-    )
-    gyro = [
-        Command(
+    name, summary = COMPARE
+    yield Command(name=name, summary=summary, handler=_compare, common=_STARTED, examples=_EXAMPLES[name])
+    for name, summary in ON_THE_PLATFORM.items():
+        yield Command(
             name=name,
             summary=summary,
             handler=_gyro,
@@ -379,9 +370,6 @@ def _commands() -> list[Command]:
             examples=_EXAMPLES[name],
             notes=NOTES_PLATFORM,
         )
-        for name, summary in ON_THE_PLATFORM.items()
-    ]
-    return [*head, every, compare, *gyro]
 
 
 COMMANDS: Mapping[str, Command] = {c.name: c for c in _commands()}

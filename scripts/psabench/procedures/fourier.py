@@ -15,10 +15,19 @@ import numpy as np
 
 from psabench.estimate import model
 from psabench.estimate.face import Face
-from psabench.estimate.uncertainty import Estimate, alpha0_doubt, correlation, estimate, not_identifiable, propagate
+from psabench.estimate.uncertainty import Estimate, alpha0_doubt, correlation, not_identifiable, propagate
 from psabench.procedures.head_bench import HeadBench, Reading, Watch
 from psabench.procedures.result import DEG, ProcedureResult, option
-from psabench.procedures.series import FaceFit, SeriesParams, fit_face, fit_notes, measure_face, residual_rms_v
+from psabench.procedures.series import (
+    ONE_FACE,
+    FaceFit,
+    SeriesParams,
+    estimates_of,
+    fit_face,
+    fit_notes,
+    measure_face,
+    residual_rms_v,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,14 +46,6 @@ class FourierResult(ProcedureResult):
     """Result of `fourier`."""
 
 
-# name, symbol, unit, scale from the core's unit
-_SEPARATE = (
-    ("u0_v", "u_0", "V", 1.0),
-    ("alpha0_deg", "α_0", "deg", DEG),
-    ("kx_v_per_g", "k_x", "V/g", 1.0),
-    ("ky_v_per_g", "k_y", "V/g", 1.0),
-    ("kxy_v_per_g2", "k_xy", "V/g²", 1.0),
-)
 _MEASURED = (
     ("kx_eff_v_per_g", "√(k_x² + k_y²)", "V/g", 1.0),
     ("angle_deg", "α_0 + atan(k_y/k_x)", "deg", DEG),
@@ -71,13 +72,9 @@ def estimate_fourier(readings: Sequence[Reading], p: FourierParams, g_mps2: floa
     values = np.concatenate([model.one_face(c), model.measured(c)[:4], c])
     jacobian = np.concatenate([model.one_face_jacobian(c), model.measured_jacobian(c)[:4], np.eye(5)])
     cov = propagate(jacobian, face.fit.unit_cov * float(face.fit.sigma_v) ** 2)
-    table = (*_SEPARATE, *_MEASURED, *_COEFFICIENTS)
-    estimates = [
-        estimate(name, symbol, unit, v, math.sqrt(var), face.fit.dof, scale)
-        for (name, symbol, unit, scale), v, var in zip(table, values, np.diag(cov), strict=True)
-    ]
-    flagged = _flag(estimates, p.quadratic_bound_v_per_g2)
-    shown = len(_SEPARATE)
+    table = (*ONE_FACE, *_MEASURED, *_COEFFICIENTS)
+    flagged = _flag(estimates_of(table, values, cov, face.fit.dof), p.quadratic_bound_v_per_g2)
+    shown = len(ONE_FACE)
     return FourierResult(
         procedure="fourier",
         axis=p.axis,
@@ -85,7 +82,7 @@ def estimate_fourier(readings: Sequence[Reading], p: FourierParams, g_mps2: floa
         readings=tuple(readings),
         series=(face.series,),
         estimates=tuple(flagged),
-        correlation=correlation([row[0] for row in _SEPARATE], cov[:shown, :shown]),
+        correlation=correlation([row[0] for row in ONE_FACE], cov[:shown, :shown]),
         residual_rms_v=residual_rms_v([face]),
         drift=face.drift if p.drift else None,
         notes=tuple(_notes(face)),

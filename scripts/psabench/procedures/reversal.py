@@ -16,12 +16,15 @@ import numpy as np
 
 from psabench.estimate import model
 from psabench.estimate.face import Face
-from psabench.estimate.uncertainty import Correlation, Estimate, correlation, estimate, propagate
+from psabench.estimate.uncertainty import Correlation, Estimate, correlation, propagate
 from psabench.procedures.head_bench import HeadBench, Reading, Watch
 from psabench.procedures.result import DEG, ProcedureResult, option
 from psabench.procedures.series import (
+    ONE_FACE,
+    EstimateRow,
     FaceFit,
     SeriesParams,
+    estimates_of,
     fit_face,
     fit_notes,
     measure_face,
@@ -32,14 +35,7 @@ from psabench.procedures.series import (
 
 _UPRIGHT = (Face.DIRECT, Face.REVERSED)
 _SIDE = (Face.SIDE, Face.SIDE_REVERSED)
-_PAIR = (
-    ("u0_v", "u_0", "V", 1.0),
-    ("alpha0_deg", "α_0", "deg", DEG),
-    ("kx_v_per_g", "k_x", "V/g", 1.0),
-    ("ky_v_per_g", "k_y", "V/g", 1.0),
-    ("kxy_v_per_g2", "k_xy", "V/g²", 1.0),
-    ("kxx_minus_kyy_v_per_g2", "k_xx − k_yy", "V/g²", 1.0),
-)
+_PAIR = (*ONE_FACE, ("kxx_minus_kyy_v_per_g2", "k_xx − k_yy", "V/g²", 1.0))
 _SIDE_PAIR = (
     ("u0_side_v", "u_0 (side)", "V", 1.0),
     ("alpha0_side_deg", "α_0 (side)", "deg", DEG),
@@ -116,15 +112,11 @@ def _side_faces(readings: Sequence[Reading], p: ReversalParams) -> tuple[list[Fa
 
 
 def _pair(
-    faces: Sequence[FaceFit], table: Sequence[tuple[str, str, str, float]], sigma_v: float, dof: int
+    faces: Sequence[FaceFit], table: Sequence[EstimateRow], sigma_v: float, dof: int
 ) -> tuple[list[Estimate], Correlation]:
     c = np.concatenate([f.fit.c_v for f in faces])
     cov = propagate(model.reversal_jacobian(c), unit_cov(faces) * sigma_v**2)
-    estimates = [
-        estimate(name, symbol, unit, v, math.sqrt(var), dof, scale)
-        for (name, symbol, unit, scale), v, var in zip(table, model.reversal(c), np.diag(cov), strict=True)
-    ]
-    return estimates, correlation([row[0] for row in table], cov)
+    return estimates_of(table, model.reversal(c), cov, dof), correlation([row[0] for row in table], cov)
 
 
 def _remount_notes(estimates: Sequence[Estimate]) -> list[str]:

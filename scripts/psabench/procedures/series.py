@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
@@ -15,7 +16,7 @@ from psabench.estimate.face import Face
 from psabench.estimate.uncertainty import Estimate, lack_of_fit_p
 from psabench.estimate.uncertainty import estimate as make_estimate
 from psabench.procedures.head_bench import HeadBench, Reading, Watch
-from psabench.procedures.result import FaceSeries, option
+from psabench.procedures.result import DEG, Array, FaceSeries, option
 
 LACK_OF_FIT_P = 1e-3  # below this the report warns
 
@@ -42,6 +43,25 @@ class SeriesParams:
             raise ValueError(expected("0 to 180 deg, either way", self.step_deg, "step_deg"))
         if self.dwell_s < 0.0:
             raise ValueError(expected("0 or more", self.dwell_s, "dwell_s"))
+
+
+EstimateRow = tuple[str, str, str, float]  # name, symbol, unit, scale from the core's unit
+# What the harmonics of a face, or of a pair of them, are resolved into.
+ONE_FACE: tuple[EstimateRow, ...] = (
+    ("u0_v", "u_0", "V", 1.0),
+    ("alpha0_deg", "α_0", "deg", DEG),
+    ("kx_v_per_g", "k_x", "V/g", 1.0),
+    ("ky_v_per_g", "k_y", "V/g", 1.0),
+    ("kxy_v_per_g2", "k_xy", "V/g²", 1.0),
+)
+
+
+def estimates_of(table: Sequence[EstimateRow], values: Array, cov: Array, dof: int) -> list[Estimate]:
+    """The estimates of a table from their values and covariance in the core's units."""
+    rows = zip(table, values, np.diag(cov), strict=True)
+    return [
+        make_estimate(name, symbol, unit, v, math.sqrt(var), dof, scale) for (name, symbol, unit, scale), v, var in rows
+    ]
 
 
 def read_position(
