@@ -20,6 +20,7 @@ from psabench.campaign.command import Options
 from psabench.campaign.page import Campaign
 from psabench.progress import Bar
 from psabench.report import plots as report_plots
+from psabench.report.grading import aligned
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs/procedures/gyrocompass_campaign.md"
@@ -44,8 +45,8 @@ def _table(name: str, c: Campaign) -> str:
         rows = [("the article", "kindest reading", "honest", "improved", "verdict"), ("---",) * 5]
         rows += [(x.says, x.reading, x.honest, x.improved, x.verdict) for x in c.claims]
         return "".join(f"| {' | '.join(row)} |\n" for row in rows)
-    lines = page.lines(page.table(c, STUDIES[name]))
-    return "```\n" + "".join(f"{line.rstrip()}\n" for line in lines) + "```\n"
+    lines = aligned(page.table(c, STUDIES[name]))
+    return "```\n" + "".join(f"{line}\n" for line in lines) + "```\n"
 
 
 def draw(folder: Path, c: Campaign) -> None:
