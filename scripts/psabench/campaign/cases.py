@@ -330,7 +330,7 @@ STUDIES: Mapping[str, Study] = {
         Study("improved", "The improved procedure, with the time that turns take", cases=_improved),
         Study("slew", "Error against the duration of the run", cases=_slew, axis="duration of the run, s"),
         Study("hold", "Heading after 4 h of hold", cases=_hold),
-        Study("wire", "Cases that also run through the wire", cases=_wire),
+        Study("wire", "Cases that also run on an emulated board", cases=_wire),
         Study("own", "As set on the command line", cases=_own),
     )
 }

@@ -71,7 +71,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     """What follows `psabench conform`. Raises BadInput."""
     p = Parser(
         prog="psabench conform",
-        description="Check a board against docs/reference/requirements.md, over its interfaces alone.",
+        description="Check a board against docs/reference/requirements.md, using only its external interfaces.",
         epilog=EPILOG,
     )
     suites = p.add_subparsers(required=True, metavar="SUITE")
