@@ -126,8 +126,8 @@ def _parser() -> Parser:
     p = Parser(
         prog="psabench run",
         usage="psabench run [-h] [--list] PROCEDURE [option...]",
-        description="Run a procedure over CAN, compare its results with the truth where it is known, and write a report.\n\n"
-        + _table(),
+        description="Run a procedure over CAN, compare its results with the truth where it is known, and write a "
+        "report.\n\n" + _table(),
         epilog=EPILOG,
     )
     p.set_defaults(handler=_without_procedure)

@@ -14,7 +14,6 @@ from typing import Any
 import pytest
 from psabench.campaign import builds, chains, command, runner, workers
 from psabench.campaign.cases import STUDIES
-from psabench.campaign.chains import CHAINS
 from psabench.campaign.command import Options
 from psabench.campaign.runner import Plan
 from psabench.campaign.setup import Setup
@@ -30,7 +29,7 @@ QUIET = Bar(Path(os.devnull).open("w"))  # noqa: SIM115  # for as long as the te
 
 def another_build(monkeypatch: pytest.MonkeyPatch, build: str = "0123456789abcdef") -> None:
     """As if the library had been built again."""
-    monkeypatch.setattr(chains, "CHAINS", {n: replace(c, build=lambda: build) for n, c in CHAINS.items()})
+    monkeypatch.setattr(chains.Chain, "build", lambda _: build)
 
 
 def test_results_of_another_build_are_told_kept_and_never_mixed(
