@@ -75,7 +75,7 @@ static void advance_time(struct loop *l)
 /* ---- waiting */
 
 /* How long ppoll may sleep, real ns: 0 not at all, SCHED_NEVER until something happens. */
-static int64_t patience_ns(const struct loop *l)
+static int64_t timeout_ns(const struct loop *l)
 {
     int64_t wait_ns = SCHED_NEVER;
     const int64_t clock_ns = pace_clock_ns();
@@ -158,7 +158,7 @@ static void wait_and_serve(struct loop *l, const sigset_t *unblocked)
     if (may_skip_poll(l)) return;
     arm_timers(l);
     const unsigned n = collect_fds(l, polled, p);
-    const int64_t ns = patience_ns(l);
+    const int64_t ns = timeout_ns(l);
     const struct timespec t = {.tv_sec = (time_t)(ns / 1000000000), .tv_nsec = (long)(ns % 1000000000)};
     const int ready = ppoll(p, n, ns == SCHED_NEVER ? NULL : &t, unblocked);
     /* Input is stamped with the simulated time of its arrival: first bring the simulation there. */
@@ -218,11 +218,11 @@ void loop_run(struct loop *l, const volatile sig_atomic_t *stop)
     }
 }
 
-void loop_drain(struct loop *l, int patience_ms)
+void loop_drain(struct loop *l, int timeout_ms)
 {
     int64_t progress_ns = pace_clock_ns();
     size_t last = links_pending(l->links);
-    while (last > 0 && pace_clock_ns() - progress_ns < (int64_t)patience_ms * 1000000) {
+    while (last > 0 && pace_clock_ns() - progress_ns < (int64_t)timeout_ms * 1000000) {
         struct link *polled[LOOP_LINKS_MAX];
         struct pollfd p[LOOP_LINKS_MAX];
         arm_timers(l);

@@ -35,8 +35,8 @@ struct loop {
  * and which are open only while the loop waits, so that none is missed. */
 void loop_run(struct loop *l, const volatile sig_atomic_t *stop);
 
-/* Hands out what waits, while peers keep reading: at the end of a run. Gives up after patience_ms without progress. */
-void loop_drain(struct loop *l, int patience_ms);
+/* Hands out what waits, while peers keep reading: at the end of a run. Gives up after timeout_ms without progress. */
+void loop_drain(struct loop *l, int timeout_ms);
 
 /* Step pace: time is to move by for_ns once `taken` says so of after_taken. False: a run is under way. */
 bool loop_step(struct loop *l, int64_t for_ns, uint64_t after_taken);

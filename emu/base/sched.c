@@ -3,7 +3,7 @@
 #include <assert.h>
 #include <stddef.h>
 
-/* The queue is a list in order. A board has a dozen events, near ones (edges) and far ones (patience), so the place of a
+/* The queue is a list in order. A board has a dozen events, near ones (edges) and far ones (timeout), so the place of a
  * new one is looked for from both ends at once: cheaper than a heap up to hundreds of events. Behind its equals: the order
  * of scheduling. */
 static void insert_event(struct sched *s, struct sched_ev *e)

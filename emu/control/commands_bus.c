@@ -5,7 +5,7 @@
 
 enum { UNIT, ADDRESS, READ_STROBE, DATA = READ_STROBE, WRITE_STROBE };
 
-#define PATIENCE_NS (10 * NS_PER_S) /* simulated; a strobe is a second at most */
+#define TIMEOUT_NS (10 * NS_PER_S) /* simulated; a strobe is a second at most */
 
 static enum control_outcome submit_cycle(struct control *c, struct control_cycle *k, int64_t t_ns)
 {
@@ -17,7 +17,7 @@ static enum control_outcome submit_cycle(struct control *c, struct control_cycle
         return control_cycle_reject(c, k, r);
     }
     c->started = k;
-    if (k->client && control_by_step(b) && !b->sim.run(b->ctx, PATIENCE_NS, 0, c->error.why)) {
+    if (k->client && control_by_step(b) && !b->sim.run(b->ctx, TIMEOUT_NS, 0, c->error.why)) {
         c->error.code = "state";
         k->client = NULL; /* it goes its way, no client waits */
         return CONTROL_REJECTED;

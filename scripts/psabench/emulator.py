@@ -21,7 +21,7 @@ from psabench.errors import BadInput, BenchError
 from psabench.link.control import Control
 from psabench.places import executable, find_emulator, own_emulators
 
-START_S = 20.0  # patience for "ready all": a bare emulator needs milliseconds, one under sanitizers in a guest seconds
+START_S = 20.0  # timeout for "ready all": a bare emulator needs milliseconds, one under sanitizers in a guest seconds
 STOP_S = 10.0
 
 

@@ -25,9 +25,9 @@ from psabench.estimate.face import Face
 if TYPE_CHECKING:
     from pyvisa.resources import MessageBasedResource
 
-REPLY_S = 10.0  # patience for an answer, real time
+REPLY_S = 10.0  # timeout for an answer, real time
 CONNECT_S = 5.0
-REST_LIMIT_S = 3600.0  # patience for it, bench time
+REST_LIMIT_S = 3600.0  # timeout for it, bench time
 
 Wait = Callable[[float], None]
 

@@ -17,7 +17,7 @@ from psabench.boards.psa2.device import Psa2
 from psabench.emulator import Emulator
 from psabench.link.can_host import CanHost, StepClock, WallClock, open_bus
 from psabench.link.control import Control
-from rig import ADAPTERS, BENCH, HOST, PATIENCE_S, ROOT, SLC, SLC0, VCAN, MakeRig, Rig, bus_spec, need
+from rig import ADAPTERS, BENCH, HOST, ROOT, SLC, SLC0, TIMEOUT_S, VCAN, MakeRig, Rig, bus_spec, need
 
 logging.getLogger("can").setLevel(logging.ERROR)  # a warning for every message that a read has cut in two
 
@@ -80,7 +80,7 @@ def make_rig() -> Iterator[MakeRig]:
 def _end(emulator: Emulator) -> None:
     """End it as a user would, however the test went, and see that no sanitizer has anything to say."""
     emulator.signal(signal.SIGTERM)
-    emulator.wait(PATIENCE_S)
+    emulator.wait(TIMEOUT_S)
     said = emulator.messages()
     assert not re.search(r"Sanitizer|runtime error:|assert", said, re.IGNORECASE), said
 
@@ -92,5 +92,5 @@ def _rig_outside(stack: ExitStack) -> Rig:
     booted: list[bool] = []
     host.listeners.append(lambda m: booted.append((m.arbitration_id, bytes(m.data)) == BOOT_UP))
     unit.reset()
-    assert host.pump_until(lambda: any(booted), PATIENCE_S), "no boot-up message from the bench outside"
+    assert host.pump_until(lambda: any(booted), TIMEOUT_S), "no boot-up message from the bench outside"
     return Rig(spec=SLC0, host=host, unit=unit)

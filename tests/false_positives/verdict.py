@@ -19,7 +19,7 @@ from typing import Any
 from psabench.bench import scpi_addresses
 from psabench.boards.registry import BUS_BOARDS
 from psabench.conform import runner
-from psabench.conform.dut import INPUTS_V, UNIT, Addresses, Subject, scenario
+from psabench.conform.dut import INPUTS_V, UNIT, Addresses, Dut, scenario
 from psabench.conform.profile import variant
 from psabench.conform.verdict import Outcome, Verdict
 from psabench.emulator import Emulator
@@ -87,8 +87,8 @@ def in_lockstep(case: Case, only: Sequence[str]) -> list[Outcome]:
     """With an emulator whose time moves when we say so."""
     v = variant(case.board, case.profile)
     errors = {"clock_ppm": case.board_ppm, "recorder_ppm": case.probes_ppm}
-    with Subject.open(v, Addresses(), seed=case.seed, **errors) as subject:
-        return runner.run(subject, Silent(), only=only)
+    with Dut.open(v, Addresses(), seed=case.seed, **errors) as dut:
+        return runner.run(dut, Silent(), only=only)
 
 
 def real_time(case: Case, loops: int, only: Sequence[str]) -> list[Outcome]:
@@ -111,8 +111,8 @@ def real_time(case: Case, loops: int, only: Sequence[str]) -> list[Outcome]:
             inputs_v={} if v.family == "gyro" else INPUTS_V,
         )
         stack.enter_context(busy(loops))
-        with Subject.open(v, at) as subject:
-            return runner.run(subject, Silent(), only=only)
+        with Dut.open(v, at) as dut:
+            return runner.run(dut, Silent(), only=only)
 
 
 def _spin() -> None:

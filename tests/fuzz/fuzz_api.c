@@ -135,9 +135,9 @@ static void op_look(struct world *w, psabench_part *p)
 static void op_board(struct world *w, psabench_part *p)
 {
     const uint8_t b = script_byte(w->s), value = script_byte(w->s);
-    const int64_t patience_ns = script_span_ns(w->s);
-    if (b & 128) error(w, psabench_board_write(p, b >> 4 & 7, b & 15, value, patience_ns));
-    else assert(error(w, psabench_board_read(p, b >> 4 & 7, b & 15, patience_ns)) <= 255);
+    const int64_t timeout_ns = script_span_ns(w->s);
+    if (b & 128) error(w, psabench_board_write(p, b >> 4 & 7, b & 15, value, timeout_ns));
+    else assert(error(w, psabench_board_read(p, b >> 4 & 7, b & 15, timeout_ns)) <= 255);
 }
 
 static void op_vcd(struct world *w, psabench_part *p)

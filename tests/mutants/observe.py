@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 
 from psabench.conform.capture.log import LineLog
-from psabench.conform.dut import Addresses, Subject, Take
+from psabench.conform.dut import Addresses, Dut, Take
 from psabench.conform.profile import variant
 from psabench.conform.raw_can import Talk, read, segment, talk, write
 from psabench.conform.verdict import Failed, Inconclusive
@@ -54,11 +54,11 @@ class Sum:
         return self._hash.hexdigest()
 
 
-def _entries(s: Subject) -> list[tuple[int, int]]:
+def _entries(s: Dut) -> list[tuple[int, int]]:
     return [(d.index, d.sub) for d in s.unit.node.objects()]
 
 
-def _requests(s: Subject) -> Iterator[bytes]:
+def _requests(s: Dut) -> Iterator[bytes]:
     """Each object read, written in every size, read again; what is no object; transfers in segments."""
     for index, sub in [*_entries(s), (0x5FFF, 0), (0x1018, 9)]:
         yield read(index, sub)
@@ -70,7 +70,7 @@ def _requests(s: Subject) -> Iterator[bytes]:
     yield from (bytes([command]) + bytes(7) for command in (0x21, 0x00, 0x01, 0xA0, 0xE0, 0x80, 0x10))
 
 
-def _talk(s: Subject, total: Sum) -> None:
+def _talk(s: Dut, total: Sum) -> None:
     with talk(s) as t:
         for request in _requests(s):
             with suppress(Failed, Inconclusive):
@@ -78,7 +78,7 @@ def _talk(s: Subject, total: Sum) -> None:
         total.add([f.data for f in t.heard])
 
 
-def _states(s: Subject, total: Sum) -> None:
+def _states(s: Dut, total: Sum) -> None:
     with s.take() as take, talk(s) as t:
         for command in NMT:
             t.nmt(command)
@@ -89,7 +89,7 @@ def _states(s: Subject, total: Sum) -> None:
     total.take(take)
 
 
-def _stream(s: Subject, total: Sum) -> None:
+def _stream(s: Dut, total: Sum) -> None:
     """Each form (a PSA-2's), transmission type and way of sampling, with SYNCs between."""
     with talk(s) as t:
         t.nmt(0x01)
@@ -107,7 +107,7 @@ def _set(t: Talk, total: Sum, index: int, sub: int, value: int, size: int) -> No
         total.add(t.ask(write(index, sub, value.to_bytes(size, "little"))))
 
 
-def _look(s: Subject, t: Talk, total: Sum) -> None:
+def _look(s: Dut, t: Talk, total: Sum) -> None:
     with s.take(lines=False) as take:
         for _ in range(4):
             t.send(t.sync_id, b"")
@@ -115,7 +115,7 @@ def _look(s: Subject, t: Talk, total: Sum) -> None:
     total.take(take)
 
 
-def _cycles(s: Subject, total: Sum) -> None:
+def _cycles(s: Dut, total: Sum) -> None:
     """Each register on the parallel bus: read, written, read."""
     if s.port is None:
         return
@@ -129,7 +129,7 @@ def _cycles(s: Subject, total: Sum) -> None:
     total.take(take)
 
 
-def _modes(s: Subject, total: Sum) -> None:
+def _modes(s: Dut, total: Sum) -> None:
     """Each mode of a gyro unit: off, level, hold, a turn, a run, a calibration, navigation with its self test."""
     if s.variant.family != "gyro":
         return
@@ -146,7 +146,7 @@ def _modes(s: Subject, total: Sum) -> None:
     total.take(take)
 
 
-def _power(s: Subject, total: Sum) -> None:
+def _power(s: Dut, total: Sum) -> None:
     with s.take() as take:
         s.power_cycle(0.003)
         s.run_for(0.35)
@@ -157,7 +157,7 @@ def _power(s: Subject, total: Sum) -> None:
     total.take(take)
 
 
-def _beyond(s: Subject, total: Sum) -> None:
+def _beyond(s: Dut, total: Sum) -> None:
     with s.take() as take, talk(s) as t:
         s.power_cycle(0.003)
         s.run_for(0.3)
@@ -166,14 +166,14 @@ def _beyond(s: Subject, total: Sum) -> None:
     total.take(take)
 
 
-STEPS: tuple[Callable[[Subject, Sum], None], ...] = (_power, _states, _stream, _cycles, _talk, _power, _modes)
+STEPS: tuple[Callable[[Dut, Sum], None], ...] = (_power, _states, _stream, _cycles, _talk, _power, _modes)
 
 
 def seen(target: Target) -> str:
     """The number of one board."""
     total, v = Sum(), variant(target.board, target.profile)
     for steps, at in ((STEPS, Addresses()), ((_beyond,), Addresses(inputs_v=BEYOND_V))):
-        with Subject.open(v, at) as s:
+        with Dut.open(v, at) as s:
             for step in steps:
                 try:
                     step(s, total)

@@ -124,12 +124,12 @@ class Suite:
 
 def _end(child: subprocess.Popen[bytes]) -> None:
     """It and its group: first as Ctrl-C would, which lets it close its emulator."""
-    for sign, patience_s in ((signal.SIGINT, GRACE_S), (signal.SIGKILL, GRACE_S)):
+    for sign, timeout_s in ((signal.SIGINT, GRACE_S), (signal.SIGKILL, GRACE_S)):
         if child.poll() is not None:
             break
         os.killpg(child.pid, sign)
         try:
-            child.wait(patience_s)
+            child.wait(timeout_s)
         except subprocess.TimeoutExpired:
             continue
     try:

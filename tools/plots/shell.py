@@ -27,7 +27,7 @@ from xml.sax.saxutils import escape
 ROOT = Path(__file__).resolve().parents[2]
 COLUMNS, ROWS = 104, 34
 CELL_W, CELL_H, SIZE = 8.0, 17.0, 13.3
-PATIENCE_S = 20.0
+TIMEOUT_S = 20.0
 SESSION = (  # keys, and what must be on the screen before the next
     ("", "psa>"),
     ("dut.ready\r", "psa>"),
@@ -194,7 +194,7 @@ def play(argv: list[str]) -> Screen:
                 _until(master, screen, wanted, keys[-1:] in ("", "\r"))
         finally:
             process.terminate()
-            while process.poll() is None and select.select([master], [], [], PATIENCE_S)[0]:
+            while process.poll() is None and select.select([master], [], [], TIMEOUT_S)[0]:
                 with suppress(OSError):  # no one has the other end open any more
                     os.read(master, 65536)
             os.close(master)
@@ -203,7 +203,7 @@ def play(argv: list[str]) -> Screen:
 
 def _until(master: int, screen: Screen, wanted: str, prompt: bool) -> None:
     """Until the text is there (and a new prompt, if one is due), and a second longer: the status bar never rests."""
-    deadline_s = time.monotonic() + PATIENCE_S
+    deadline_s = time.monotonic() + TIMEOUT_S
     enough_s = deadline_s
     while time.monotonic() < min(deadline_s, enough_s):
         if select.select([master], [], [], 0.2)[0]:

@@ -80,7 +80,7 @@ static void step_event(void *ctx, int64_t t_ns)
     if (t_ns != SCHED_NEVER) sched_at(b->sched, &b->ev, t_ns);
 }
 
-/* ---- data-ready and patience ---- */
+/* ---- data-ready and timeout ---- */
 
 /* A host that does not read keeps DR low: that is no fault of the converters. */
 static void on_dr_timeout(void *ctx, int64_t t_ns)

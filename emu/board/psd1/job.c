@@ -5,7 +5,7 @@
 #include "board/psd1/internal.h"
 
 #define IGNORE_TAU   600     /* DRDY may take 512 tau to rise after a control word: sources 3.2 */
-#define JOB_WAIT_NS  1000000 /* E0: patience of a command with a cycle that is not read */
+#define JOB_WAIT_NS  1000000 /* E0: timeout of a command with a cycle that is not read */
 #define JOB_RETRY_NS 20000
 
 enum op { SEND, AWAIT, COEF, CONTROL, END };

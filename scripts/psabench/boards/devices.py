@@ -52,7 +52,7 @@ def identify(host: CanHost, node_id: int) -> type[Unit]:
     """The class of the unit at a node, from its name (object 1008h); PSA-2 where no one answers, or the name is new."""
     listeners = list(host.listeners)
     try:
-        title = str(CanopenNode(host, node_id, proto_file("psa2.eds"), patience_s=NAME_S).read(NAME))
+        title = str(CanopenNode(host, node_id, proto_file("psa2.eds"), timeout_s=NAME_S).read(NAME))
     except LinkError:
         return Psa2
     finally:

@@ -42,7 +42,7 @@ class Unit:
     board: ClassVar[str]  # as the EDS and the emulator call it: "psd1"
     title: ClassVar[str]  # object 1008h: "PSD-1"
     layout: ClassVar[ReadingLayout]
-    reading_s: ClassVar[float] = 0.01  # patience for one reading, bench time
+    reading_s: ClassVar[float] = 0.01  # timeout for one reading, bench time
 
     def __init__(self, host: CanHost, node_id: int | None = None) -> None:
         """node_id: None for the board's default."""
@@ -126,10 +126,10 @@ class Unit:
         subs = self.node.names(COUNTERS)
         return {name: int(self.node.read(COUNTERS, sub)) for sub, name in subs.items()}
 
-    def wait_ready(self, patience_s: float = 5.0) -> None:
-        """Until readings come. Raises LinkError when the unit is not ready after patience_s of bench time."""
+    def wait_ready(self, timeout_s: float = 5.0) -> None:
+        """Until readings come. Raises LinkError when the unit is not ready after timeout_s of bench time."""
         self.stop()
-        self.stream(1, patience_s)
+        self.stream(1, timeout_s)
 
     def start(self) -> None:
         """Readings flow from now on."""
@@ -147,19 +147,19 @@ class Unit:
         """A pulse on the board's reset: everything falls back to its defaults and is set up again."""
         self.node.nmt(NMT_RESET_NODE)
 
-    def stream(self, count: int, patience_s: float = 5.0) -> Frames | Readings:
-        """The next `count` readings; the stream runs only meanwhile. Raises LinkError when fewer come in patience_s."""
-        self._gather(count, patience_s)
+    def stream(self, count: int, timeout_s: float = 5.0) -> Frames | Readings:
+        """The next `count` readings; the stream runs only meanwhile. Raises LinkError when fewer come in timeout_s."""
+        self._gather(count, timeout_s)
         return self.frames.take().head(count)
 
-    def _gather(self, count: int, patience_s: float) -> None:
+    def _gather(self, count: int, timeout_s: float) -> None:
         self.frames.forget()
         self.start()
-        came = self.host.pump_until(lambda: len(self.frames) >= count, patience_s + count * self.reading_s)
+        came = self.host.pump_until(lambda: len(self.frames) >= count, timeout_s + count * self.reading_s)
         self.stop()
         if not came:
             raise LinkError(
-                f"node {self.node.node_id}: {len(self.frames)} of {count} samples came in {patience_s:g} s; "
+                f"node {self.node.node_id}: {len(self.frames)} of {count} samples came in {timeout_s:g} s; "
                 "is the board set up and the frame form one that this link carries?"
             )
 
@@ -189,7 +189,7 @@ class BusUnit(Unit):
         self.frames = ReadingReader(replace(self.frames.layout, messages=in_order), self.node.node_id)
         self.host.listeners.append(self.frames.on_message)
 
-    def stream(self, count: int, patience_s: float = 5.0) -> Readings:
-        """The next `count` readings; the stream runs only meanwhile. Raises LinkError when fewer come in patience_s."""
-        self._gather(count, patience_s)
+    def stream(self, count: int, timeout_s: float = 5.0) -> Readings:
+        """The next `count` readings; the stream runs only meanwhile. Raises LinkError when fewer come in timeout_s."""
+        self._gather(count, timeout_s)
         return self.frames.take().head(count)

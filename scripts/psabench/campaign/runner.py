@@ -17,7 +17,7 @@ from psabench.campaign.workers import Workers, spread
 from psabench.errors import BenchError
 from psabench.procedures.head_bench import Progress
 
-TASK_S = 0.4  # of one core: long beside the 2 ms that a Dask task costs, short beside a person's patience
+TASK_S = 0.4  # of one core: long beside the 2 ms that a Dask task costs, short for a person who waits
 ALONE_S = 4.0  # of one core: starting a cluster takes about as long
 
 

@@ -26,7 +26,7 @@ from psabench.errors import BadInput, expected
 
 FORMAT = 2  # of the tables below, the file's user_version; 1 had no build in the key
 APPLICATION = 0x70736162  # "psab", the file's application_id: `file` and we know what it is
-PATIENCE_S = 60.0  # for another process that writes
+TIMEOUT_S = 60.0  # for another process that writes
 CELL = np.dtype("<f4")
 
 Rows = npt.NDArray[np.float32]
@@ -102,7 +102,7 @@ class Store:
         self.path = path
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            self._db = sqlite3.connect(path, timeout=PATIENCE_S, isolation_level=None)
+            self._db = sqlite3.connect(path, timeout=TIMEOUT_S, isolation_level=None)
         except (OSError, sqlite3.Error) as e:
             raise BadInput(expected("a store of results (SQLite)", e, path)) from e
         try:

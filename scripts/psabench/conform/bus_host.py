@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from psabench.conform.dut import Subject
+from psabench.conform.dut import Dut
 from psabench.conform.verdict import Failed, Inconclusive
 from psabench.errors import DeviceError
 from psabench.link.busport import BusPort, Cycle
@@ -12,19 +12,19 @@ from psabench.link.busport import BusPort, Cycle
 SHORT_S = 50e-6  # a cycle and some more
 
 
-def port(s: Subject) -> BusPort:
+def port(s: Dut) -> BusPort:
     """Raises Inconclusive where there is none."""
     if s.port is None:
         raise Inconclusive("no bus port was connected (--bus-port)")
     return s.port
 
 
-def line(s: Subject, text: str) -> Cycle:
+def line(s: Dut, text: str) -> Cycle:
     """The cycle of a line to the bus port: "R 3", "W F 0003 400". Raises CycleRefused."""
     return burst(s, text)[0]
 
 
-def burst(s: Subject, *lines: str) -> list[Cycle]:
+def burst(s: Dut, *lines: str) -> list[Cycle]:
     """Cycles as close as can be: all lines at once where time passes by itself, a moment for each in lockstep."""
     if not s.lockstep:
         port(s).ask("\n".join(lines))
@@ -64,6 +64,6 @@ def refused(action: Callable[[], object], code: float, what: str) -> None:
     raise Failed(f"{what}: carried out, {done}" if isinstance(done, Cycle) else f"{what}: carried out", due)
 
 
-def line_refused(s: Subject, text: str, code: float) -> None:
+def line_refused(s: Dut, text: str, code: float) -> None:
     """A line to the bus port that must be rejected with this abort code. Raises Failed."""
     refused(lambda: line(s, text), code, text)

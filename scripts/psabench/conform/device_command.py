@@ -9,7 +9,7 @@ from typing import Any
 
 from psabench.conform import identity, report, runner, suite
 from psabench.conform.defaults import OUT
-from psabench.conform.dut import INPUTS_V, Addresses, Subject
+from psabench.conform.dut import INPUTS_V, Addresses, Dut
 from psabench.conform.excerpts import Excerpts
 from psabench.conform.profile import Variant, variant
 from psabench.conform.requirements import Requirement, requirements
@@ -71,11 +71,11 @@ def device_run(
     suite.load()
     outcomes: list[Outcome] = []
     interrupted = False
-    with Subject.open(v, at, seed=seed, clock_ppm=clock_error, recorder_ppm=recorder_error) as subject:
-        facts = identity.subject_facts(subject) | identity.suite_facts()
+    with Dut.open(v, at, seed=seed, clock_ppm=clock_error, recorder_ppm=recorder_error) as dut:
+        facts = identity.dut_facts(dut) | identity.suite_facts()
         keep = Excerpts(folder).keep
         try:
-            runner.run(subject, progress, only=only, clock_ppm=clock_ppm, told=outcomes.append, keep=keep)
+            runner.run(dut, progress, only=only, clock_ppm=clock_ppm, told=outcomes.append, keep=keep)
         except KeyboardInterrupt:
             interrupted = True
     return report.Run(

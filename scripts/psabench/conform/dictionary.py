@@ -7,7 +7,7 @@ from collections.abc import Container
 
 from psabench.boards.objects import Area, BusObjects, Common
 from psabench.conform.bus_host import refused
-from psabench.conform.dut import Subject
+from psabench.conform.dut import Dut
 from psabench.conform.requirements import requirements
 from psabench.conform.verdict import Failed
 from psabench.link.canopen_host import Described
@@ -20,7 +20,7 @@ OWN, BUS, READ_ONLY = (
 REAL_FORMATS = {4: "<f", 8: "<d"}
 
 
-def as_the_dictionary_says(s: Subject, eds: str, varies: Container[int] = ()) -> str:
+def as_the_dictionary_says(s: Dut, eds: str, varies: Container[int] = ()) -> str:
     """Every object of the board's own; returns what was seen, raises Failed. Just after Res.
 
     varies: objects whose default is that of one profile.
@@ -47,7 +47,7 @@ def as_the_dictionary_says(s: Subject, eds: str, varies: Container[int] = ()) ->
     return f"{len(objects)} objects of {eds}.eds"
 
 
-def identity(s: Subject, requirement: str, name: str) -> str:
+def identity(s: Dut, requirement: str, name: str) -> str:
     """Device name (1008h) and product code (1018h sub 2) against a requirement's limit; raises Failed."""
     saw, code = s.unit.node.read(Common.DEVICE_NAME), int(s.unit.node.read(Common.IDENTITY, 2))
     due = int(requirements()[requirement].limit("product_code"))

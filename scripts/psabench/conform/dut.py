@@ -80,7 +80,7 @@ class Take:
         )
 
 
-class Subject:
+class Dut:
     """See the module. `bench`, `unit` and `port` are for stimuli and active tests."""
 
     def __init__(
@@ -224,7 +224,7 @@ class Subject:
         self._stack.close()
         self.bench.close()
 
-    def __enter__(self) -> Subject:
+    def __enter__(self) -> Dut:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, err: BaseException | None, tb: TracebackType | None) -> None:
@@ -235,7 +235,7 @@ class Subject:
     @classmethod
     def open(
         cls, variant: Variant, at: Addresses, *, seed: int = 1, clock_ppm: float = 0.0, recorder_ppm: float = 0.0
-    ) -> Subject:
+    ) -> Dut:
         """At these addresses, or an emulator of ours. Raises BadInput, LinkError or BenchError.
 
         Of an emulator of ours: clock_ppm, by how much the board's clocks are fast; recorder_ppm, by how much that of
@@ -250,21 +250,21 @@ class Subject:
         return found
 
     @classmethod
-    def _connect(cls, variant: Variant, at: Addresses) -> Subject:
+    def _connect(cls, variant: Variant, at: Addresses) -> Dut:
         node = dbc_node(variant.family) if at.node is None else at.node
         bench = Bench.connect(at.can, control=at.control, scpi=at.scpi, node=node)
         with ExitStack() as stack:
             stack.callback(bench.close)
             probe = None if at.lines is None else PortProbe(at.lines, variant.family, at.line_hz)
             port = None if at.bus_port is None else stack.enter_context(BusPort(at.bus_port))
-            subject = cls(bench, variant, probe, port, at.inputs_v, probe)
+            dut = cls(bench, variant, probe, port, at.inputs_v, probe)
             if port is not None:
-                subject._stack.callback(port.close)
+                dut._stack.callback(port.close)
             stack.pop_all()
-        return subject
+        return dut
 
     @classmethod
-    def _start(cls, variant: Variant, at: Addresses, seed: int, clock_ppm: float, *, still: bool) -> Subject:
+    def _start(cls, variant: Variant, at: Addresses, seed: int, clock_ppm: float, *, still: bool) -> Dut:
         with ExitStack() as stack:
             folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="psabench-")))
             path = folder / "bench.yaml"
@@ -285,9 +285,9 @@ class Subject:
                 stack.callback(pins.close)
             port = stack.enter_context(BusPort(bus, advance=bench.wait)) if BOARDS[variant.family].bus else None
             inputs_v = at.inputs_v if BOARDS[variant.family].has_inputs else {}
-            subject = cls(bench, variant, probe, port, inputs_v, line_port)
-            subject._stack = stack.pop_all()
-        return subject
+            dut = cls(bench, variant, probe, port, inputs_v, line_port)
+            dut._stack = stack.pop_all()
+        return dut
 
 
 SENSITIVITIES = ("kx_v_per_g", "ky_v_per_g", "kz_v_per_g", "kxy_v_per_g2", "drift_v_per_s", "reading_noise_v")

@@ -9,7 +9,7 @@ from datetime import datetime
 from importlib.metadata import version
 
 from psabench.boards.objects import Common
-from psabench.conform.dut import Subject
+from psabench.conform.dut import Dut
 from psabench.conform.requirements import INDEX, requirements
 from psabench.errors import BenchError
 from psabench.places import find_emulator, proto_file
@@ -40,7 +40,7 @@ def requirements_hash() -> str:
     return digest.hexdigest()
 
 
-def subject_facts(s: Subject) -> dict[str, str]:
+def dut_facts(s: Dut) -> dict[str, str]:
     """What the board says of itself, and how it was reached."""
     found = {"board": s.variant.name}
     for name, (index, sub) in OBJECTS.items():

@@ -1,13 +1,13 @@
 """How a test of the device suite is carried out: a stimulus gives a capture, checks check it; an active test does both.
 
     @stimulus("stream", boards=("psa2",))
-    def stream(s: Subject) -> Capture: ...            # side effects, once a run, for all checks that want it
+    def stream(s: Dut) -> Capture: ...            # side effects, once a run, for all checks that want it
 
     @check("stream", "PSA2-FRAME-01", needs={"line"})
     def int_is_low_for_long_enough(e: Capture, row: Requirement) -> str: ...   # pure: the same for a recording
 
     @active("PSA2-REQ-04", needs={"can"})
-    def a_write_to_id_is_refused(s: Subject) -> str: ...
+    def a_write_to_id_is_refused(s: Dut) -> str: ...
 
 After the stimulus stand the ids of the requirements that the test proves; a test that takes a second argument gets the
 row of the one that holds for the variant, for the figures in it. The function's docstring says in its first line what
@@ -28,13 +28,13 @@ from psabench.conform.proves import proves, row_for
 from psabench.errors import expected
 
 if TYPE_CHECKING:
-    from psabench.conform.dut import Subject
+    from psabench.conform.dut import Dut
 
 Check = Callable[[Capture], str]
-Active = Callable[["Subject"], str]
+Active = Callable[["Dut"], str]
 Test = Callable[..., str]
 Prepare = Callable[[Any], None]
-StimulusOf = Callable[["Subject"], Capture]
+StimulusOf = Callable[["Dut"], Capture]
 
 WAYS = frozenset(
     "can line pins bus supply chamber head table lockstep exact inputs fd rtr stamps errors slow port stream".split()

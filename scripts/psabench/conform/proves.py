@@ -14,7 +14,7 @@ from psabench.conform.requirements import Requirement, requirements
 from psabench.errors import expected
 
 if TYPE_CHECKING:
-    from psabench.conform.dut import Subject
+    from psabench.conform.dut import Dut
 
 Test = TypeVar("Test", bound=Callable[..., str])
 
@@ -49,7 +49,7 @@ def suite_tests() -> tuple[SuiteTest, ...]:
     return tuple(_suite_tests)
 
 
-def row_for(e: Capture | Subject, *ids: str) -> Requirement:
+def row_for(e: Capture | Dut, *ids: str) -> Requirement:
     """The one of these requirements that holds for the variant. Raises ValueError when none does."""
     v = e.variant
     for i in ids:

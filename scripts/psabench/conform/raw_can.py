@@ -14,7 +14,7 @@ from functools import wraps
 from psabench.boards.objects import Common
 from psabench.conform.capture.canbits import frame_bits
 from psabench.conform.capture.log import CanFrame
-from psabench.conform.dut import Subject, Take
+from psabench.conform.dut import Dut, Take
 from psabench.conform.plan import active
 from psabench.conform.requirements import requirements
 from psabench.conform.verdict import Failed, Inconclusive
@@ -22,7 +22,7 @@ from psabench.link.can_host import Message
 
 UPLOAD, EXPEDITED, ABORT, FINE = 0x40, 0x23, 0x80, 0x60
 OFF = 0x80000000  # bit 31 of 18xxh sub 1
-LOCKSTEP_S, REAL_S = 1.0, 5.0  # patience for an answer, bench time; in real time the machine may be busy
+LOCKSTEP_S, REAL_S = 1.0, 5.0  # timeout for an answer, bench time; in real time the machine may be busy
 FIRST_S, LONGEST_S = 0.0005, 0.05  # steps of the board's time while waiting
 # An emulator takes no more than 128 frames while its time stands still: so many, then so long for them to pass.
 BURST, BURST_S = 50, 0.02
@@ -48,7 +48,7 @@ class State:
 class Talk:
     """A conversation. `heard` has what was received since it began, in order."""
 
-    def __init__(self, s: Subject, take: Take | None = None) -> None:
+    def __init__(self, s: Dut, take: Take | None = None) -> None:
         self.s, self.host, self.node, self.take = s, s.host, s.node, take
         self.heard: list[CanFrame] = []
         r = requirements().rows
@@ -57,7 +57,7 @@ class Talk:
         self.sdo_tx = int(r["BUS-ID-01"].limit("sdo_tx_id")) + s.node
         self.emcy = int(r["BUS-ID-01"].limit("emcy_id")) + s.node
         self.heartbeat = int(r["BUS-ID-01"].limit("heartbeat_id")) + s.node
-        self.patience_s = LOCKSTEP_S if s.lockstep else REAL_S
+        self.timeout_s = LOCKSTEP_S if s.lockstep else REAL_S
         self._taken = Take(rate=s.recorder_rate)
         self._burst = 0
 
@@ -87,9 +87,9 @@ class Talk:
         while self.host.receive(0.0):
             pass
 
-    def until(self, done: Callable[[], bool], patience_s: float | None = None) -> bool:
-        """Let time pass until something is so; False when it is not within the patience."""
-        left_s, step_s = self.patience_s if patience_s is None else patience_s, FIRST_S
+    def until(self, done: Callable[[], bool], timeout_s: float | None = None) -> bool:
+        """Let time pass until something is so; False when it is not within the timeout."""
+        left_s, step_s = self.timeout_s if timeout_s is None else timeout_s, FIRST_S
         if not self.s.lockstep:
             return self.host.pump_until(done, left_s)
         while not done() and left_s > 0.0:
@@ -105,26 +105,26 @@ class Talk:
         self.s.run_for(dwell_s)
         return [f for f in self.heard[at:] if not f.error]
 
-    def next(self, can_id: int, patience_s: float | None = None) -> CanFrame | None:
+    def next(self, can_id: int, timeout_s: float | None = None) -> CanFrame | None:
         """The next frame of an identifier that comes from now on."""
         self.drain()
-        return self._after(len(self.heard), can_id, patience_s)
+        return self._after(len(self.heard), can_id, timeout_s)
 
-    def _after(self, at: int, can_id: int, patience_s: float | None = None) -> CanFrame | None:
+    def _after(self, at: int, can_id: int, timeout_s: float | None = None) -> CanFrame | None:
         def found() -> CanFrame | None:
             return next((f for f in self.heard[at:] if f.can_id == can_id and not f.error), None)
 
-        self.until(lambda: found() is not None, patience_s)
+        self.until(lambda: found() is not None, timeout_s)
         return found()
 
     # ---- SDO
 
-    def answer_to(self, request: bytes, patience_s: float | None = None) -> CanFrame:
+    def answer_to(self, request: bytes, timeout_s: float | None = None) -> CanFrame:
         """The answer to a request. Raises Failed when none comes, or one of other than 8 bytes."""
         self.drain()
         at = len(self.heard)
         self.send(self.sdo_rx, request)
-        answer = self._after(at, self.sdo_tx, patience_s)
+        answer = self._after(at, self.sdo_tx, timeout_s)
         if answer is None:
             raise Failed(f"no answer to the SDO request {words(request)}", "an answer")
         if len(answer.data) != 8:
@@ -239,7 +239,7 @@ class Talk:
         return frame.data[0]
 
     def becomes(self, state: int) -> bool:
-        """Whether a heartbeat says so within the patience."""
+        """Whether a heartbeat says so within the timeout."""
         at = len(self.heard)
 
         def said() -> bool:
@@ -284,18 +284,18 @@ class Talk:
         def came() -> list[CanFrame]:
             return [f for f in self.heard[start:] if f.can_id == can_id and not f.error]
 
-        if not self.until(lambda: len(came()) >= count, self.patience_s + count * self.s.unit.reading_s):
+        if not self.until(lambda: len(came()) >= count, self.timeout_s + count * self.s.unit.reading_s):
             raise Failed(f"{len(came())} frames {can_id:03X}h after NMT start", f"{count} and more")
         return came()
 
-    def tells(self, code: int, patience_s: float | None = None) -> CanFrame:
+    def tells(self, code: int, timeout_s: float | None = None) -> CanFrame:
         """The first emergency with this code in what was heard or comes. Raises Failed when none does."""
 
         def found() -> CanFrame | None:
             mine = (f for f in self.heard if f.can_id == self.emcy and not f.error)
             return next((f for f in mine if f.data[:2] == code.to_bytes(2, "little")), None)
 
-        self.until(lambda: found() is not None, patience_s)
+        self.until(lambda: found() is not None, timeout_s)
         frame = found()
         if frame is None:
             raise Failed(f"no emergency {code:04X}h", "one", frames=[f for f in self.heard if f.can_id == self.emcy])
@@ -311,7 +311,7 @@ Dialogue = Callable[[Talk], str]
 
 
 @contextmanager
-def talk(s: Subject, *, reset: bool = False, take: Take | None = None) -> Iterator[Talk]:
+def talk(s: Dut, *, reset: bool = False, take: Take | None = None) -> Iterator[Talk]:
     """A conversation that begins pre-operational; reset: settings are to be the defaults again when it ends."""
     t = Talk(s, take)
     s.host.listeners.append(t.on_message)
@@ -329,12 +329,12 @@ def talk(s: Subject, *, reset: bool = False, take: Take | None = None) -> Iterat
             s.host.send(t.nmt_id, bytes([Nmt.PREOP, t.node]))
 
 
-def dialogue(*, needs: Iterable[str] = ("can",), reset: bool = False) -> Callable[[Dialogue], Callable[[Subject], str]]:
+def dialogue(*, needs: Iterable[str] = ("can",), reset: bool = False) -> Callable[[Dialogue], Callable[[Dut], str]]:
     """An active test that is a conversation: it gets a Talk, which ends with it as `talk` says."""
 
-    def register(test: Dialogue) -> Callable[[Subject], str]:
+    def register(test: Dialogue) -> Callable[[Dut], str]:
         @wraps(test)
-        def converse(s: Subject) -> str:
+        def converse(s: Dut) -> str:
             with talk(s, reset=reset) as t:
                 return test(t)
 

@@ -73,7 +73,7 @@ class Bench:
 
     @cached_property
     def probes(self) -> frozenset[str]:
-        """As `Subject.probes`; pins only where edges are known well enough."""
+        """As `Dut.probes`; pins only where edges are known well enough."""
         seen: set[str] = set()
         if self.recording.can is not None:
             frames = self.recording.can.frames

@@ -7,7 +7,7 @@ from functools import cache
 from typing import Any
 
 from psabench.conform.bus_host import line, line_refused, port
-from psabench.conform.dut import Subject
+from psabench.conform.dut import Dut
 from psabench.conform.profile import proto_yaml
 from psabench.conform.verdict import Failed
 
@@ -21,7 +21,7 @@ def table(board: str) -> tuple[Mapping[str, Any], ...]:
     return tuple(proto_yaml(f"{board}.yaml")["bus"])
 
 
-def names_and_rights(s: Subject, board: str, *, never: Mapping[str, int], writes: Mapping[str, int]) -> str:
+def names_and_rights(s: Dut, board: str, *, never: Mapping[str, int], writes: Mapping[str, int]) -> str:
     """Every address read and written; returns what was seen, raises Failed.
 
     never: registers whose read is rejected now, with its code; writes: what a writable one takes, where 0 will not do.
@@ -39,9 +39,7 @@ def names_and_rights(s: Subject, board: str, *, never: Mapping[str, int], writes
     return f"{len(rows)} registers with their names and rights"
 
 
-def _rights(
-    s: Subject, address: int, row: Mapping[str, Any], never: Mapping[str, int], writes: Mapping[str, int]
-) -> None:
+def _rights(s: Dut, address: int, row: Mapping[str, Any], never: Mapping[str, int], writes: Mapping[str, int]) -> None:
     name, access = str(row["name"]), str(row.get("access", "rw"))
     if access == "wo":
         line_refused(s, f"R {address:X}", WRITE_ONLY)

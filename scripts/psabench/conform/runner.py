@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 from psabench.conform.capture.log import Capture
-from psabench.conform.dut import Subject
+from psabench.conform.dut import Dut
 from psabench.conform.plan import Plan, plan_of, stimuli
 from psabench.conform.profile import Variant
 from psabench.conform.proves import SuiteTest, suite_tests
@@ -49,9 +49,9 @@ Keep = Callable[[str, Failed, Capture | None], tuple[str, ...]]
 
 @dataclass(slots=True)
 class Captures:
-    """The subject and what its stimuli have shown so far."""
+    """The device under test (DUT) and what its stimuli have shown so far."""
 
-    subject: Subject
+    dut: Dut
     keep: Keep
     shown: dict[str, Capture | Exception] = field(default_factory=dict)
 
@@ -65,12 +65,12 @@ class Captures:
         return found
 
     def _apply(self, name: str) -> Capture | Exception:
-        known = stimuli(self.subject.variant.family)
+        known = stimuli(self.dut.variant.family)
         if name not in known:
             return Inconclusive(f"no stimulus {name} for this board")
         try:
             for _ in range(PLAYS):
-                found = known[name].make(self.subject)
+                found = known[name].make(self.dut)
                 if found.lines is None or not len(found.lines.gaps_ns):
                     break  # else samples were lost on their way, and no one can tell what they were
             return found
@@ -99,7 +99,7 @@ def _turn(plan: Plan, order: Sequence[str]) -> int:
 
 
 def run(
-    subject: Subject,
+    dut: Dut,
     progress: Progress,
     *,
     only: Sequence[str] = (),
@@ -108,11 +108,11 @@ def run(
     keep: Keep = lambda *_: (),
 ) -> list[Outcome]:
     """Check everything; told: of each outcome as it comes. clock_ppm: allowed to all clocks."""
-    subject.allowed_ppm = clock_ppm
-    captures = Captures(subject, keep)
+    dut.allowed_ppm = clock_ppm
+    captures = Captures(dut, keep)
     outcomes: list[Outcome] = []
-    tests = wanted(subject.variant, only)
-    with progress.step(subject.variant.name, max(1, len(tests))) as advance:
+    tests = wanted(dut.variant, only)
+    with progress.step(dut.variant.name, max(1, len(tests))) as advance:
         for proof, rows in tests:
             outcomes.append(_outcome_of(captures, proof, rows))
             told(outcomes[-1])
@@ -124,7 +124,7 @@ def _outcome_of(captures: Captures, proof: SuiteTest, rows: tuple[Requirement, .
     plan = plan_of(proof.test)
     begun_s = time.monotonic()
     found = not_decided(proof.test, [r.id for r in rows], plan.stimulus)
-    missing = plan.needs - captures.subject.probes
+    missing = plan.needs - captures.dut.probes
     if missing:
         return replace(found, reason="; ".join(MISSING[m] for m in sorted(missing)))
     capture: Capture | None = None
@@ -132,7 +132,7 @@ def _outcome_of(captures: Captures, proof: SuiteTest, rows: tuple[Requirement, .
     def test() -> str:
         nonlocal capture
         capture = None if plan.is_active else captures.capture(plan.stimulus)
-        return proof.test(capture or captures.subject)
+        return proof.test(capture or captures.dut)
 
     found = decide(found, test, lambda e: captures.keep(found.test, e, capture))
     return replace(found, took_s=time.monotonic() - begun_s)

@@ -23,7 +23,7 @@ from types import TracebackType
 
 from psabench.errors import CycleRefused, LinkError, expected
 
-PATIENCE_S = 5.0  # for an answer
+TIMEOUT_S = 5.0  # for an answer
 QUANTUM_S = 0.001  # step of the bench's time while waiting for an answer
 LOOK_S = 0.02  # real time that an answer which is there needs to come through
 LINE_MAX = 4096  # characters without an end of line: that is no bus port
@@ -126,7 +126,7 @@ class BusPort:
     def ask(self, line: str) -> None:
         """Send a line as it is; its answer is the next that has not been taken."""
         data = line.encode() + b"\n"
-        deadline_s = time.monotonic() + PATIENCE_S
+        deadline_s = time.monotonic() + TIMEOUT_S
         while data:
             try:
                 data = data[os.write(self._fd, data) :]
@@ -135,30 +135,30 @@ class BusPort:
             except OSError as e:
                 raise self._gone() from e
             if data and time.monotonic() >= deadline_s:
-                raise LinkError(f"{self.path}: no input accepted for {PATIENCE_S:g} s")
+                raise LinkError(f"{self.path}: no input accepted for {TIMEOUT_S:g} s")
 
-    def answer(self, patience_s: float = PATIENCE_S) -> Cycle | Who:
+    def answer(self, timeout_s: float = TIMEOUT_S) -> Cycle | Who:
         """The answer to the oldest line that has none yet."""
-        return parse(self._line(patience_s))
+        return parse(self._line(timeout_s))
 
-    def answered(self, patience_s: float = PATIENCE_S) -> str:
+    def answered(self, timeout_s: float = TIMEOUT_S) -> str:
         """As `answer`, but the line as it is."""
-        return self._line(patience_s)
+        return self._line(timeout_s)
 
-    def _line(self, patience_s: float) -> str:
-        """One line. patience_s: of real time, or of the bench's time where we move it."""
-        left_s = patience_s
+    def _line(self, timeout_s: float) -> str:
+        """One line. timeout_s: of real time, or of the bench's time where we move it."""
+        left_s = timeout_s
         while b"\n" not in self._input:
             if len(self._input) > LINE_MAX:
                 raise LinkError(expected("an end of line", f"{len(self._input)} characters without", self.path))
             if left_s <= 0.0:
-                raise LinkError(f"{self.path}: no answer within {patience_s:g} s")
+                raise LinkError(f"{self.path}: no answer within {timeout_s:g} s")
             left_s -= self._receive(left_s)
         line, _, self._input = self._input.partition(b"\n")
         return line.rstrip(b"\r").decode("ascii", "replace")
 
     def _receive(self, left_s: float) -> float:
-        """What has come, or what comes soon; returns the time that it took of the patience."""
+        """What has come, or what comes soon; returns the time that it took of the timeout."""
         if self._advance is None:
             begun_s = time.monotonic()
             self._take(left_s)

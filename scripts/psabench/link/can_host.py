@@ -21,8 +21,8 @@ from can.interfaces.socketcan import SocketcanBus
 from psabench.errors import BadInput, LinkError, expected
 from psabench.link.control import Control, Reply
 
-BARRIER_S = 10.0  # patience for a frame that the emulator says it has sent
-GREETING_S = 10.0  # patience for the first words of a socketcand server
+BARRIER_S = 10.0  # timeout for a frame that the emulator says it has sent
+GREETING_S = 10.0  # timeout for the first words of a socketcand server
 LOOK_S = 0.2  # real time between looks whether a silent link is still there
 OTHERS_S = 0.005  # real time between looks at the other buses
 QUANTUM_S = 0.001  # step of simulated time while waiting for an answer
@@ -179,9 +179,9 @@ class CanHost:
     def advance(self, dwell_s: float) -> None:
         self.clock.advance(self, dwell_s)
 
-    def pump_until(self, done: Callable[[], bool], patience_s: float) -> bool:
-        """Let time pass until done() is true; False after patience_s of bench time."""
-        deadline_s = self.clock.now_s() + patience_s
+    def pump_until(self, done: Callable[[], bool], timeout_s: float) -> bool:
+        """Let time pass until done() is true; False after timeout_s of bench time."""
+        deadline_s = self.clock.now_s() + timeout_s
         while not done():
             if self.clock.now_s() >= deadline_s:
                 return False

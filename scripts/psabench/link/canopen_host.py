@@ -48,10 +48,10 @@ class _Network(canopen.Network):
 class _Sdo(SdoClient):
     """An SDO client that lets the bench's time pass while it waits."""
 
-    def __init__(self, node_id: int, od: canopen.ObjectDictionary, host: CanHost, patience_s: float) -> None:
+    def __init__(self, node_id: int, od: canopen.ObjectDictionary, host: CanHost, timeout_s: float) -> None:
         super().__init__(0x600 + node_id, 0x580 + node_id, od)  # type: ignore[no-untyped-call]
         self.host = host
-        self.patience_s = patience_s
+        self.timeout_s = timeout_s
         self._request = b""
         self._object = b""  # index and sub-index of the transfer under way, as on the wire
 
@@ -68,10 +68,10 @@ class _Sdo(SdoClient):
     def read_response(self) -> bytes:
         """The answer to our request: what a client before us asked for may come first, when its time stood still."""
         responses: queue.Queue[bytes] = self.responses
-        deadline_s = self.host.clock.now_s() + self.patience_s
+        deadline_s = self.host.clock.now_s() + self.timeout_s
         while True:
             if not self.host.pump_until(lambda: not responses.empty(), deadline_s - self.host.clock.now_s()):
-                raise SdoCommunicationError(f"no SDO answer within {self.patience_s:g} s")
+                raise SdoCommunicationError(f"no SDO answer within {self.timeout_s:g} s")
             response = responses.get()
             if self._is_ours(response):
                 break
@@ -123,15 +123,15 @@ class CanopenNode:
     Raises DeviceError with the node's abort code, LinkError when it does not answer.
     """
 
-    def __init__(self, host: CanHost, node_id: int, eds: Path, *, patience_s: float = ANSWER_S) -> None:
-        """patience_s: bench time for an answer."""
+    def __init__(self, host: CanHost, node_id: int, eds: Path, *, timeout_s: float = ANSWER_S) -> None:
+        """timeout_s: bench time for an answer."""
         self.host = host
         self.node_id = node_id
         network = _Network(host)
         remote = canopen.RemoteNode(node_id, canopen.import_od(str(eds), node_id))
         network.add_node(remote)
         self._od = remote.object_dictionary
-        self._sdo = _Sdo(node_id, self._od, host, patience_s)
+        self._sdo = _Sdo(node_id, self._od, host, timeout_s)
         self._sdo.network = network
         network.subscribe(0x580 + node_id, self._sdo.on_response)
 

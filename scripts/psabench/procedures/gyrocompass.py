@@ -37,7 +37,7 @@ __all__ = [
 ]
 
 
-LEVEL_LIMIT_S = 60.0  # patience for levelling
+LEVEL_LIMIT_S = 60.0  # timeout for levelling
 
 
 # ---- the run

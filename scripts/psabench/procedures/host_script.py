@@ -34,7 +34,7 @@ TURN_S = 0.005  # a request and its answer, on a busy bus
 SDO_REQUEST, SDO_ANSWER = 0x600, 0x580
 DOWNLOAD, DOWNLOADED, UPLOAD, UPLOADED, ABORT = 0x20, 0x60, 0x40, 0x43, 0x80
 SETTLED_S = 0.05  # recorded beyond the last thing that was asked for
-EMULATOR_S = 120.0  # patience for a process that takes a twentieth of a second
+EMULATOR_S = 120.0  # timeout for a process that takes a twentieth of a second
 
 Key = tuple[int, int, int]  # node, index, sub-index
 Scenario = Mapping[str, Any]

@@ -131,8 +131,8 @@ class PlatformBench(Protocol):
         """Settings of the loops; no compensation."""
         ...
 
-    def level(self, patience_s: float) -> None:
-        """Level the platform. Raises LinkError when it has not settled within patience_s."""
+    def level(self, timeout_s: float) -> None:
+        """Level the platform. Raises LinkError when it has not settled within timeout_s."""
         ...
 
     def measure(self, table: Table, done: Callable[[], None]) -> Sequence[Window]:

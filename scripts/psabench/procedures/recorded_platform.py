@@ -59,12 +59,12 @@ class RecordedPlatform(WirePlatform):
     def wait(self, dwell_s: float) -> None:
         self._script.wait(max(dwell_s, STRIDE_S))
 
-    def level(self, patience_s: float) -> None:
+    def level(self, timeout_s: float) -> None:
         """Level for a time that is enough; whether it was, the recording tells later. Raises LinkError."""
         length_s = LEVEL_TIMES / self._m1_per_s + LEVEL_LOOK_S
-        if length_s > patience_s:
+        if length_s > timeout_s:
             raise LinkError(
-                expected(f"levelling within {patience_s:g} s", f"{length_s:.3g} s (m1 {self._m1_per_s:g} 1/s)")
+                expected(f"levelling within {timeout_s:g} s", f"{length_s:.3g} s (m1 {self._m1_per_s:g} 1/s)")
             )
         self._begin(Mode.LEVEL)
         self.gyro.get("tolerance_arcmin")
@@ -128,7 +128,7 @@ class _Units:
         self.units: dict[str, Gyro | Psa2] = dict(made)
         heard = frozenset(i for u in self.units.values() for i in u.frames.ids)  # type: ignore[union-attr]
         self.bench = ScriptedBench(scenario, listen_to=heard, bus=gyros[0], plates=plates)
-        self._end_s = self._patience_s = 0.0
+        self._end_s = self._timeout_s = 0.0
 
     def board(self, kind: type[Gyro]) -> Gyro:
         """The first unit of that kind."""
@@ -138,17 +138,17 @@ class _Units:
     def time_s(self) -> float:
         return self.bench.now_s
 
-    def expect(self, length_s: float, patience_s: float) -> None:
-        """What comes takes so long, or up to patience_s more."""
-        self._end_s, self._patience_s = self.bench.now_s + length_s, patience_s
+    def expect(self, length_s: float, timeout_s: float) -> None:
+        """What comes takes so long, or up to timeout_s more."""
+        self._end_s, self._timeout_s = self.bench.now_s + length_s, timeout_s
 
     def wait(self, dwell_s: float) -> None:
         """Look at so much more of the recording, up to what is expected. Raises LinkError when there is no more."""
         if self.bench.now_s >= self._end_s:
-            if self._patience_s <= 0.0:
+            if self._timeout_s <= 0.0:
                 raise LinkError("the run takes longer than its positions can")
-            more_s = min(self._patience_s, STRIDE_S)
-            self._patience_s -= more_s
+            more_s = min(self._timeout_s, STRIDE_S)
+            self._timeout_s -= more_s
             self._end_s += more_s
         self.bench.recording(self._end_s)
         self.bench.now_s = min(self.bench.now_s + dwell_s, self._end_s)
@@ -290,7 +290,7 @@ class _Level(Psa2):
         self.node = _Node(units, self.board, node_id)  # type: ignore[assignment]
         self.frames = _Codes(units, [int(message("PSA2_XY").frame_id) + shift])  # type: ignore[assignment]
 
-    def wait_ready(self, patience_s: float = 5.0) -> None:
+    def wait_ready(self, timeout_s: float = 5.0) -> None:
         """The script begins when it is."""
 
     def stop(self) -> None:

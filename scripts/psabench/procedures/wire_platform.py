@@ -29,11 +29,11 @@ TURN_SLACK_S = 10.0  # beyond what a turn takes at its rate: it accelerates, and
 AWAY_S = 10.0  # waits from here on are spent away from the bus
 SEQ_BITS = 16
 SEQ_MODULUS = 1 << SEQ_BITS
-READY_S = 60.0  # patience for the run-up of the gyroscope
+READY_S = 60.0  # timeout for the run-up of the gyroscope
 BUSY_ABORT = 0x08000022  # CiA 301: not in the present state of the device
 DEG = 180.0 / math.pi
 
-LEVEL_SPANS, LEVEL_REST_S = 15.0, 10.0  # patience of levelling: time constants of the loop, and the torquer's own time
+LEVEL_SPANS, LEVEL_REST_S = 15.0, 10.0  # timeout of levelling: time constants of the loop, and the torquer's own time
 LEVEL_LOOKS, LEVEL_LOOK_S = 10, 0.1  # at beta, before the platform counts as level
 SELF_TEST_S, SELF_TEST_LOOK_S = 10.0, 1.2  # the unit nods for 1 to 5 s
 
@@ -99,12 +99,12 @@ class WirePlatform:
         self.gyro.set(m1_per_s=m1_per_s, m2_per_s=m2_per_s)
         self._m1_per_s, self._latitude_rad = self.gyro.get("m1_per_s"), latitude_rad
 
-    def level(self, patience_s: float) -> None:
+    def level(self, timeout_s: float) -> None:
         """Level; beta must lie within the unit's own tolerance for a second.
 
-        It may take 15 time constants of the loop, or patience_s: what is not level by then never is.
+        It may take 15 time constants of the loop, or timeout_s: what is not level by then never is.
         """
-        limit_s = min(patience_s, LEVEL_SPANS / self._m1_per_s + LEVEL_REST_S) if self._m1_per_s else patience_s
+        limit_s = min(timeout_s, LEVEL_SPANS / self._m1_per_s + LEVEL_REST_S) if self._m1_per_s else timeout_s
         self._begin(Mode.LEVEL)
         tolerance_deg = self.gyro.get("tolerance_arcmin") / 60.0
         deadline_s = self.t_s + limit_s
@@ -125,8 +125,8 @@ class WirePlatform:
         self._begin(Mode.GYROCOMPASS)
         windows = []
         turn_s = 360.0 / table.slew_dps + TURN_SLACK_S
-        patience_s = turn_s + table.settle_s + table.settle_limit_s + table.window_s
-        for w in self._windows(table.sequence_deg, patience_s):
+        timeout_s = turn_s + table.settle_s + table.settle_limit_s + table.window_s
+        for w in self._windows(table.sequence_deg, timeout_s):
             windows.append(w)
             done()
         self._set_rad = windows[-1].set_rad
@@ -136,8 +136,8 @@ class WirePlatform:
         """See `PlatformBench`."""
         self.gyro.set(calibration_s=length_s, settle_s=settle_s)
         self._begin(Mode.CALIBRATE)
-        patience_s = TURN_SLACK_S + settle_s + self.gyro.get("settle_limit_s") + length_s
-        return next(iter(self._windows([self._set_rad * DEG], patience_s)))
+        timeout_s = TURN_SLACK_S + settle_s + self.gyro.get("settle_limit_s") + length_s
+        return next(iter(self._windows([self._set_rad * DEG], timeout_s)))
 
     def navigate(self, c: Compensation) -> None:
         """See `PlatformBench`."""
@@ -195,9 +195,9 @@ class WirePlatform:
         if words := self._in_words(flags):
             raise LinkError(f"{doing}: {'; '.join(words)}")
 
-    def _windows(self, angles_deg: Sequence[float], patience_s: float) -> Iterator[Window]:
+    def _windows(self, angles_deg: Sequence[float], timeout_s: float) -> Iterator[Window]:
         """Those of the run under way, each when it is over. Raises LinkError when the run ends before the last, or one
-        does not come within patience_s.
+        does not come within timeout_s.
         """
         tape = _Tape(self.step_s)
         self.gyro.frames.forget()
@@ -205,11 +205,11 @@ class WirePlatform:
         self.gyro.start()
         try:
             for number, angle_deg in enumerate(angles_deg):
-                deadline_s = self.t_s + patience_s
+                deadline_s = self.t_s + timeout_s
                 while (span := tape.window()) is None:
                     self._still_running(tape, number + 1)
                     if self.t_s > deadline_s:
-                        raise LinkError(f"position {number + 1} was not measured in {patience_s:.0f} s: {tape.state}")
+                        raise LinkError(f"position {number + 1} was not measured in {timeout_s:.0f} s: {tape.state}")
                     self.wait(SLICE_S)
                     tape.add(self.gyro, self.level_unit)
                 yield self._of(tape, span, number, math.radians(angle_deg))

@@ -173,7 +173,7 @@ _EVENT = Arg(name="event", choices=EVENTS, strict=False, what="of a board")
 _COUNT = Arg(name="count", kind=Kind.COUNT, optional=True, low=1, high=1e9, what="how many of them")
 _UNIT = Arg(name="unit", optional=True, what="the first without it")
 _LIMIT = Arg(
-    name="limit_s", kind=Kind.REAL, unit="s", optional=True, low=0, high=86400, what="patience, 60 s without it"
+    name="limit_s", kind=Kind.REAL, unit="s", optional=True, low=0, high=86400, what="timeout, 60 s without it"
 )
 _CHECK = Arg(name="check", kind=Kind.REST, what=USAGE)
 _FILE = Arg(name="file", what="for psabench run script")

@@ -18,7 +18,7 @@ import pytest
 from broken_hosts import ROOT, build
 from psabench import cli
 
-PATIENCE_S = 120.0
+TIMEOUT_S = 120.0
 MAIN = "import sys; from psabench.cli import main; sys.exit(main())"
 
 
@@ -34,7 +34,7 @@ class Terminal:
 
     def wait_for(self, pattern: str) -> re.Match[str]:
         """What comes next that matches; what came before it is passed over."""
-        deadline_s = time.monotonic() + PATIENCE_S
+        deadline_s = time.monotonic() + TIMEOUT_S
         while not (found := re.search(pattern, self.seen)):
             assert select.select([self.fd], [], [], max(0.0, deadline_s - time.monotonic()))[0], self.seen
             try:
@@ -86,9 +86,7 @@ def test_a_person_starts_the_host_case_by_case(mode: str, host: Path, tmp_path: 
         )
         assert said.groups() == (f"127.0.0.1:{port}", "5", str(results))
         with results.open(mode) as told:
-            assert (
-                subprocess.run([host, said[1], said[2]], stdout=told, timeout=PATIENCE_S, check=False).returncode == 0
-            )
+            assert subprocess.run([host, said[1], said[2]], stdout=told, timeout=TIMEOUT_S, check=False).returncode == 0
         terminal.wait_for(r"  passed HOST-")
         # The file of results is emptied as the next case begins; what was kept of this one is one report of a host.
         kept = [json.loads(line) for line in (tmp_path / f"out/{case}.jsonl").read_text().splitlines()]
@@ -120,7 +118,7 @@ def test_a_pseudo_terminal_keeps_its_name(
     said = terminal.wait_for(rf"{case}: [^\n]+\n[^\n]+ {link}=(\S+) [^\n]*node=5")
     assert said[1] == str(out / link)
     with results.open("ab") as told:
-        assert subprocess.run([*start(tmp_path), said[1]], stdout=told, timeout=PATIENCE_S, check=False).returncode == 0
+        assert subprocess.run([*start(tmp_path), said[1]], stdout=told, timeout=TIMEOUT_S, check=False).returncode == 0
     terminal.wait_for(r"  passed HOST-")
     assert terminal.end() == 0
 

@@ -13,7 +13,7 @@ from random import Random
 
 import pytest
 from psabench.conform import runner, suite
-from psabench.conform.dut import Addresses, Subject
+from psabench.conform.dut import Addresses, Dut
 from psabench.conform.profile import variant
 from psabench.conform.verdict import Outcome
 from psabench.procedures.head_bench import Silent
@@ -50,9 +50,9 @@ def test_a_board_that_conforms_raises_no_alarm(case: Case) -> None:
 
 def another_than_is_said(case: Case) -> list[Outcome]:
     """The board is of this profile, the user says another."""
-    with Subject.open(variant(case.board, case.profile), Addresses(), seed=case.seed) as subject:
-        subject.variant = variant("psa2", "article")
-        return runner.run(subject, Silent(), only=["PSA2-FRAME", "PSA2-INT"])
+    with Dut.open(variant(case.board, case.profile), Addresses(), seed=case.seed) as dut:
+        dut.variant = variant("psa2", "article")
+        return runner.run(dut, Silent(), only=["PSA2-FRAME", "PSA2-INT"])
 
 
 def test_an_alarm_is_told() -> None:

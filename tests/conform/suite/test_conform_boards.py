@@ -14,7 +14,7 @@ import pytest
 from psabench.bench import scpi_addresses
 from psabench.boards.registry import BUS_BOARDS
 from psabench.conform import suite
-from psabench.conform.dut import INPUTS_V, UNIT, Addresses, Subject, scenario
+from psabench.conform.dut import INPUTS_V, UNIT, Addresses, Dut, scenario
 from psabench.conform.profile import Variant, variant
 from psabench.conform.runner import run
 from psabench.conform.verdict import Outcome, Verdict
@@ -36,7 +36,7 @@ OFF_PPM = {"psd1": -100.0, "pmka": -100.0, "pik6": 100.0}
 
 
 def judged(board: str, profile: str, seed: int = 1, ppm: float = 0.0, port_only: bool = False) -> list[Outcome]:
-    with Subject.open(variant(board, profile), Addresses(port_only=port_only), seed=seed, clock_ppm=ppm) as s:
+    with Dut.open(variant(board, profile), Addresses(port_only=port_only), seed=seed, clock_ppm=ppm) as s:
         return run(s, Silent(), only=(PREFIX[board],))
 
 
@@ -58,7 +58,7 @@ def test_through_the_line_port_what_it_shows_conforms(board: str) -> None:
 
 
 @contextmanager
-def in_real_time(v: Variant, folder: Path) -> Iterator[Subject]:
+def in_real_time(v: Variant, folder: Path) -> Iterator[Dut]:
     """An emulator whose time passes by itself, reached by addresses alone."""
     path, line, bus = folder / "bench.yaml", folder / "line", folder / "bus"
     path.write_text(json.dumps(scenario(v, INPUTS_V, 0.0)), encoding="utf-8")
@@ -73,14 +73,14 @@ def in_real_time(v: Variant, folder: Path) -> Iterator[Subject]:
             scpi=scpi_addresses(emulator.endpoints),
             inputs_v={} if v.family == "gyro" else INPUTS_V,
         )
-        with Subject.open(v, at) as subject:
-            yield subject
+        with Dut.open(v, at) as dut:
+            yield dut
 
 
 @pytest.mark.parametrize("board", SOON)
 def test_in_real_time_what_is_seen_conforms(board: str, tmp_path: Path) -> None:
-    with in_real_time(variant(board), tmp_path) as subject:
-        assert not subject.lockstep
-        outcomes = run(subject, Silent(), only=SOON[board])
+    with in_real_time(variant(board), tmp_path) as dut:
+        assert not dut.lockstep
+        outcomes = run(dut, Silent(), only=SOON[board])
     assert faults(outcomes, Verdict.NOT_OBSERVABLE) == []
     assert sum(o.verdict is Verdict.PASSED for o in outcomes) >= 4

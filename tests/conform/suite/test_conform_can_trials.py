@@ -9,7 +9,7 @@ from types import ModuleType
 import can
 import pytest
 from psabench.conform.active import bus_port, can_cycles, can_nmt, can_objects, can_pdo, can_sdo
-from psabench.conform.dut import Addresses, Subject
+from psabench.conform.dut import Addresses, Dut
 from psabench.conform.plan import plan_of
 from psabench.conform.profile import variant
 from psabench.conform.proves import suite_tests
@@ -19,21 +19,21 @@ from psabench.conform.verdict import Failed, Inconclusive
 from psabench.errors import BenchError
 
 Rule = Callable[[can.Message, Talk], list[can.Message]]
-Active = Callable[[Subject], str]
+Active = Callable[[Dut], str]
 MODULES = (can_nmt, can_sdo, can_objects, can_pdo, can_cycles)
 SLOW = ("the_history_holds_eight",)
 SEED = 20
 
 
 @pytest.fixture(scope="module", params=["psa2", "pik"])
-def board(request: pytest.FixtureRequest) -> Iterator[Subject]:
-    with Subject.open(variant(request.param), Addresses()) as s:
+def board(request: pytest.FixtureRequest) -> Iterator[Dut]:
+    with Dut.open(variant(request.param), Addresses()) as s:
         yield s
 
 
 @pytest.fixture(scope="module")
-def bus_board() -> Iterator[Subject]:
-    with Subject.open(variant("pik"), Addresses()) as s:
+def bus_board() -> Iterator[Dut]:
+    with Dut.open(variant("pik"), Addresses()) as s:
         yield s
 
 
@@ -43,7 +43,7 @@ def changed(m: can.Message, data: bytes, t_s: float = 0.0) -> can.Message:
     )
 
 
-def trials(modules: tuple[ModuleType, ...], s: Subject) -> list[Active]:
+def trials(modules: tuple[ModuleType, ...], s: Dut) -> list[Active]:
     """Those of these modules that can be carried out on this board."""
     rows, v = requirements().rows, s.variant
     names = {m.__name__ for m in modules}
@@ -88,7 +88,7 @@ def noise() -> Rule:
 
 
 @pytest.mark.parametrize("how", ["mute", "short", "empty", "noise"])
-def test_no_trial_passes_on_a_badly_broken_board(board: Subject, monkeypatch: pytest.MonkeyPatch, how: str) -> None:
+def test_no_trial_passes_on_a_badly_broken_board(board: Dut, monkeypatch: pytest.MonkeyPatch, how: str) -> None:
     rules: dict[str, Rule] = {"mute": mute, "short": short, "empty": empty, "noise": noise()}
     tampered(monkeypatch, rules[how])
     ways = (can_nmt, can_sdo, can_objects, can_pdo)
@@ -97,13 +97,13 @@ def test_no_trial_passes_on_a_badly_broken_board(board: Subject, monkeypatch: py
             print(active.__name__, active(board))
 
 
-def test_all_pass_as_it_is(board: Subject) -> None:
+def test_all_pass_as_it_is(board: Dut) -> None:
     for active in trials(MODULES, board):
         if active.__name__ not in SLOW:
             assert active(board), active.__name__
 
 
-def test_a_board_that_beats_on_is_noticed(board: Subject, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_board_that_beats_on_is_noticed(board: Dut, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Talk, "beat", lambda t, period_ms: None)  # the write never reaches it
     with pytest.raises(Failed, match="heartbeats with 1017h = 0"):
         can_nmt.no_heartbeat_where_the_period_is_0(board)
@@ -229,7 +229,7 @@ FAULTS: list[tuple[Active, Rule]] = [
 
 
 @pytest.mark.parametrize(("active", "rule"), FAULTS, ids=[f"{k}-{t.__name__}" for k, (t, _) in enumerate(FAULTS)])
-def test_a_trial_notices_its_fault(board: Subject, monkeypatch: pytest.MonkeyPatch, active: Active, rule: Rule) -> None:
+def test_a_trial_notices_its_fault(board: Dut, monkeypatch: pytest.MonkeyPatch, active: Active, rule: Rule) -> None:
     tampered(monkeypatch, rule)
     with pytest.raises((Failed, Inconclusive)):
         print(active(board))
@@ -249,7 +249,7 @@ OFF: list[tuple[Active, Rule]] = [
 
 @pytest.mark.parametrize(("active", "rule"), OFF, ids=[t.__name__ for t, _ in OFF])
 def test_clocks_may_lie_as_far_apart_as_the_run_allows(
-    bus_board: Subject, monkeypatch: pytest.MonkeyPatch, active: Active, rule: Rule
+    bus_board: Dut, monkeypatch: pytest.MonkeyPatch, active: Active, rule: Rule
 ) -> None:
     tampered(monkeypatch, rule)
     with pytest.raises(Failed):
@@ -274,9 +274,7 @@ CYCLES: list[tuple[Active, Rule]] = [
 
 
 @pytest.mark.parametrize(("active", "rule"), CYCLES, ids=[f"{k}-{t.__name__}" for k, (t, _) in enumerate(CYCLES)])
-def test_a_trial_of_cycles_notices(
-    bus_board: Subject, monkeypatch: pytest.MonkeyPatch, active: Active, rule: Rule
-) -> None:
+def test_a_trial_of_cycles_notices(bus_board: Dut, monkeypatch: pytest.MonkeyPatch, active: Active, rule: Rule) -> None:
     tampered(monkeypatch, rule)
     with pytest.raises((Failed, Inconclusive)):
         print(active(bus_board))
@@ -299,7 +297,7 @@ PORT: list[tuple[Active, str, str]] = [
 
 @pytest.mark.parametrize(("active", "old", "new"), PORT, ids=[t.__name__ for t, *_ in PORT])
 def test_a_trial_of_the_port_notices(
-    bus_board: Subject, monkeypatch: pytest.MonkeyPatch, active: Active, old: str, new: str
+    bus_board: Dut, monkeypatch: pytest.MonkeyPatch, active: Active, old: str, new: str
 ) -> None:
     port = bus_board.port
     assert port is not None

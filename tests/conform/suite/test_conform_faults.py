@@ -17,9 +17,9 @@ from unittest import mock
 import pytest
 from fault_case import FAR_S, VALUES
 from gen_fault_matrix import PAGE, Row, load, table
-from psabench.conform import dut as subject_module
+from psabench.conform import dut as dut_module
 from psabench.conform import runner, suite
-from psabench.conform.dut import Addresses, Subject
+from psabench.conform.dut import Addresses, Dut
 from psabench.conform.profile import variant
 from psabench.conform.verdict import Outcome, Verdict
 from psabench.errors import ControlError
@@ -30,7 +30,7 @@ pytestmark = pytest.mark.host
 suite.load()
 EVERYWHERE = os.environ.get("PSABENCH_FAULTS") == "all"
 BOARDS = sorted({r.board for r in load()})
-plain = subject_module.scenario
+plain = dut_module.scenario
 
 
 def by_current(bench: dict[str, Any]) -> None:
@@ -53,7 +53,7 @@ BENCHES = {"": lambda _: None, "current": by_current, "felt": felt}
 
 
 @contextmanager
-def opened(board: str, bench: str = "") -> Iterator[Subject]:
+def opened(board: str, bench: str = "") -> Iterator[Dut]:
     """The emulator that the suite starts for itself, with other inputs where a fault wants them."""
 
     def scenario(*args: Any, **options: Any) -> dict[str, Any]:
@@ -61,17 +61,17 @@ def opened(board: str, bench: str = "") -> Iterator[Subject]:
         BENCHES[bench](made)
         return made
 
-    with mock.patch.object(subject_module, "scenario", scenario), Subject.open(variant(board), Addresses()) as s:
+    with mock.patch.object(dut_module, "scenario", scenario), Dut.open(variant(board), Addresses()) as s:
         yield s
 
 
-def points(s: Subject, kind: str) -> list[str]:
+def points(s: Dut, kind: str) -> list[str]:
     """Of the board and of what is around it; a PSA-2 beside a gyro unit is tested as one."""
     found: list[str] = s.bench.control.call("fault.points", kind=kind).result["points"]
     return [p for p in found if not p.startswith("level.")]
 
 
-def taken(s: Subject, kind: str, point: str, values: Mapping[str, Any]) -> bool:
+def taken(s: Dut, kind: str, point: str, values: Mapping[str, Any]) -> bool:
     """Whether the emulator has that fault there, tried for an instant that does not come."""
     values = {k: v for k, v in values.items() if k not in ("after", "count", "since", "delay_s", "unit")}
     try:

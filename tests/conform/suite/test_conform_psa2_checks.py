@@ -17,7 +17,7 @@ from psa2_wrong_pins import WRONG_PINS
 from psabench.boards.psa2.conform.stimulus_can import Answer
 from psabench.conform import suite
 from psabench.conform.capture.log import CanLog, Capture
-from psabench.conform.dut import Addresses, Subject
+from psabench.conform.dut import Addresses, Dut
 from psabench.conform.plan import plan_of, stimuli
 from psabench.conform.profile import variant
 from psabench.conform.proves import suite_tests
@@ -46,21 +46,21 @@ class Stage:
     """Stimuli of several variants, each played once."""
 
     def __init__(self) -> None:
-        self.subjects: dict[tuple[str, str | None, str], Subject] = {}
+        self.duts: dict[tuple[str, str | None, str], Dut] = {}
         self.shown: dict[tuple[Any, str], Capture] = {}
 
     def capture(self, check: str) -> Capture:
         board, profile = OTHER.get(check, ("psa2", None))
         key = board, profile, "slcan" if check.startswith(FD) else "socketcand:0"
-        if key not in self.subjects:
-            self.subjects[key] = Subject.open(variant(board, profile), Addresses(adapter=key[2]), seed=3)
+        if key not in self.duts:
+            self.duts[key] = Dut.open(variant(board, profile), Addresses(adapter=key[2]), seed=3)
         name = plan_of(CHECKS[check]).stimulus
         if (key, name) not in self.shown:
-            self.shown[key, name] = stimuli("psa2")[name].make(self.subjects[key])
+            self.shown[key, name] = stimuli("psa2")[name].make(self.duts[key])
         return self.shown[key, name]
 
     def close(self) -> None:
-        for s in self.subjects.values():
+        for s in self.duts.values():
             s.close()
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 from psabench.conform import runner, suite
-from psabench.conform.dut import Addresses, Subject
+from psabench.conform.dut import Addresses, Dut
 from psabench.conform.plan import stimuli
 from psabench.conform.profile import Variant, variant
 from psabench.conform.requirements import requirements
@@ -18,8 +18,8 @@ SOCKETCAND, SLCAN = "socketcand:0", "slcan"
 
 
 def judged(v: Variant, at: Addresses, seed: int, clock_ppm: float) -> list[Outcome]:
-    with Subject.open(v, at, seed=seed, clock_ppm=clock_ppm) as subject:
-        return runner.run(subject, Silent(), only=["PSA2", "PSA1"])
+    with Dut.open(v, at, seed=seed, clock_ppm=clock_ppm) as dut:
+        return runner.run(dut, Silent(), only=["PSA2", "PSA1"])
 
 
 @pytest.mark.parametrize(
@@ -56,11 +56,9 @@ def test_a_profile_conforms(board: str, profile: str, seed: int, clock_ppm: floa
 @pytest.mark.parametrize("wrong", ["w24", "w16", "lab32", "intent"])
 def test_a_board_of_another_profile_does_not_conform(wrong: str) -> None:
     """The board is one, the user says another: the rows in which they differ fail, and none of the others crash."""
-    with Subject.open(variant("psa2", wrong), Addresses(), seed=3) as subject:
-        subject.variant = variant("psa2", "article")
-        found = runner.run(
-            subject, Silent(), only=["PSA2-SETUP", "PSA2-FRAME", "PSA2-INT", "PSA2-WORD", "PSA2-READ-02"]
-        )
+    with Dut.open(variant("psa2", wrong), Addresses(), seed=3) as dut:
+        dut.variant = variant("psa2", "article")
+        found = runner.run(dut, Silent(), only=["PSA2-SETUP", "PSA2-FRAME", "PSA2-INT", "PSA2-WORD", "PSA2-READ-02"])
     failed = {i for o in found if o.verdict is Verdict.FAILED for i in o.requirements}
     due = {
         "w24": {"PSA2-FRAME-06", "PSA2-INT-04"},

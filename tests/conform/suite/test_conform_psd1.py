@@ -14,7 +14,7 @@ from psabench.boards.psd1.conform import check_cycle as psd1_cycle
 from psabench.boards.psd1.conform import check_serial as psd1_serial
 from psabench.boards.psd1.conform.capture_cycles import PINS
 from psabench.conform.capture.log import CanFrame, CanLog, Capture, LineLog
-from psabench.conform.dut import Addresses, Subject
+from psabench.conform.dut import Addresses, Dut
 from psabench.conform.profile import variant
 from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.vcd import Vcd, Wire
@@ -233,7 +233,7 @@ def test_strobes_that_are_not_told_are_found() -> None:
 
 def test_a_converter_out_of_step_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     """Y loses a word more than the others after each Res of a board that waits for its host, who is never late."""
-    with Subject.open(variant("psd1", "psd1_host"), Addresses()) as s:
+    with Dut.open(variant("psd1", "psd1_host"), Addresses()) as s:
         assert psd1_control.converters_are_in_step_after_res(s)
         counters, looks = s.unit.counters, itertools.count()
 

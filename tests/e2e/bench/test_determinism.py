@@ -20,7 +20,7 @@ from psabench.emulator import Emulator
 from psabench.link.can_host import CanHost, StepClock, WallClock, open_bus
 from psabench.link.control import Control
 from psabench.link.record import record
-from rig import BENCH, HERE, PATIENCE_S, ROOT, bus_spec, psa_emu, talker, tool_env, unread, until
+from rig import BENCH, HERE, ROOT, TIMEOUT_S, bus_spec, psa_emu, talker, tool_env, unread, until
 
 pytestmark = pytest.mark.host
 
@@ -41,7 +41,7 @@ def record_free(path: Path, *, seed: int = 1, count: int = 1000) -> None:
     """Record an emulator that runs as fast as it goes, beginning with its first client."""
     extra = ("--wait-client", "--for", "1s")
     with Emulator(NOISY, pace="free", seed=seed, control=False, extra=extra) as emulator:
-        got = record(open_bus(bus_spec(emulator.endpoints[0])), path, 5, PATIENCE_S, count)
+        got = record(open_bus(bus_spec(emulator.endpoints[0])), path, 5, TIMEOUT_S, count)
     assert got.messages == count
     assert (got.counters.lost, got.counters.torn) == (0, 0)
 
@@ -119,13 +119,13 @@ def test_python_cans_own_logger_writes_the_same_bytes_twice(tmp_path: Path, endi
             argv = [sys.executable, "-m", "can.logger", "-c", "can0", "-f", str(path)]
             with subprocess.Popen(argv, env=tool_env(spec), stdout=subprocess.DEVNULL) as logger:
                 try:
-                    assert emulator.wait(PATIENCE_S) == 0
+                    assert emulator.wait(TIMEOUT_S) == 0
                     until(lambda: unread(int(emulator.endpoints[0]["port"])) == 0, "the logger to read")
                     # python-can does not notice the end of a connection but asks again at once, without end.
                     enough = cpu_ticks(logger.pid) + 5
                     until(lambda: cpu_ticks(logger.pid) >= enough, "the logger to have written what it read")
                     logger.send_signal(signal.SIGINT)
-                    assert logger.wait(PATIENCE_S) == 0
+                    assert logger.wait(TIMEOUT_S) == 0
                 finally:
                     logger.kill()
 
@@ -169,7 +169,7 @@ def trace(path: Path, *, pace: str = "free", scenario: str | Path = BENCH) -> by
                 for share in (0.4, 0.12, 0.48):
                     control.call("run", for_s=share * TRACED_S)
                 control.call("quit")
-            assert emulator.wait(PATIENCE_S) == 0
+            assert emulator.wait(TIMEOUT_S) == 0
     else:
         done = psa_emu(scenario, "--can", "none", "--pace", pace, "--for", f"{TRACED_S}s", "--vcd", path)
         assert done.returncode == 0, done.stderr
@@ -231,10 +231,10 @@ def run_and_hash(folder: Path, pace: str) -> str:
                 for share in (0.01, 0.4, 0.12, 0.47):
                     host.advance(share * MOVING_S)
                 control.call("quit")
-            assert emulator.wait(PATIENCE_S) == 0
+            assert emulator.wait(TIMEOUT_S) == 0
         else:
-            record(open_bus(bus_spec(emulator.endpoints[0])), log, 5, PATIENCE_S, 250)
-            assert emulator.wait(PATIENCE_S) == 0
+            record(open_bus(bus_spec(emulator.endpoints[0])), log, 5, TIMEOUT_S, 250)
+            assert emulator.wait(TIMEOUT_S) == 0
     frames = log.read_bytes().splitlines(keepends=True)[:250]
     assert len(frames) == 250
     assert truth.read_bytes().count(b"\n") == 2 * round(MOVING_S / 2e-3 + 1)

@@ -17,7 +17,7 @@ import pytest
 from psabench.emulator import Emulator
 from psabench.link.can_host import CanHost, StepClock, WallClock, open_bus
 from psabench.link.control import Control
-from rig import HERE, PATIENCE_S, bus_spec
+from rig import HERE, TIMEOUT_S, bus_spec
 
 pytestmark = pytest.mark.host
 
@@ -54,7 +54,7 @@ class LineReader:
 
     def take(self) -> bytes:
         """The first ENOUGH bytes, when the emulator has gone."""
-        self._thread.join(PATIENCE_S)
+        self._thread.join(TIMEOUT_S)
         os.close(self._fd)
         assert len(self._bytes) >= self.ENOUGH
         return self._bytes[: self.ENOUGH]
@@ -90,7 +90,7 @@ def script(folder: Path) -> str:
             hosts.append(host)
         clock = StepClock(control, hosts)
         table, head = (
-            stack.enter_context(closing(socket.create_connection((e["host"], int(e["port"])), PATIENCE_S)))
+            stack.enter_context(closing(socket.create_connection((e["host"], int(e["port"])), TIMEOUT_S)))
             for e in (emulator.endpoint(scpi="table"), emulator.endpoint(scpi="head"))
         )
         for k in range(12):
@@ -104,7 +104,7 @@ def script(folder: Path) -> str:
             clock.command(None, "run", for_s=0.03 if k % 3 else 0.0)
         counters = control.call("counters").result["units"]
         control.call("quit")
-        assert emulator.wait(PATIENCE_S) == 0
+        assert emulator.wait(TIMEOUT_S) == 0
         sampled = lines.take()
     heard.sort(key=lambda h: h[0])  # hosts one after the other, each in the order of its hearing
     assert {h[0] for h in heard} == {0, 1, 2}
@@ -127,4 +127,4 @@ def test_a_run_that_comes_to_the_end_is_answered_and_ends_the_emulator() -> None
         with Control(emulator.control_path) as control:
             assert control.call("run", for_s=0.03).t_ns == 30_000_000
             assert control.call("run", for_s=5.0).t_ns == 100_000_000
-            assert emulator.wait(PATIENCE_S) == 0
+            assert emulator.wait(TIMEOUT_S) == 0

@@ -19,7 +19,7 @@ from psabench.procedures.head_bench import Reading
 from psabench.procedures.result import ProcedureResult
 from psabench.procedures.turns import TurnsParams, turns
 from psabench.procedures.wire_bench import WireBench
-from rig import ADAPTERS, BENCH, HOST, PATIENCE_S, addresses, over, psabench, until
+from rig import ADAPTERS, BENCH, HOST, TIMEOUT_S, addresses, over, psabench, until
 
 EVERY = over("socketcand", "slcan", "vcan")
 SHORT = TurnsParams(readings=2)
@@ -83,7 +83,7 @@ def test_the_command_runs_on_a_bench_by_its_addresses(tmp_path: Path) -> None:
         where = addresses(emulator)
         truth = ("--truth", str(emulator.truth_path))
         with psabench("run", "turns", *where, *truth, "--average", "4", "--out", tmp_path) as run:
-            out, err = run.communicate(timeout=PATIENCE_S)
+            out, err = run.communicate(timeout=TIMEOUT_S)
     assert run.returncode == 0, out + err
     section = json.loads((tmp_path / "result.json").read_text())["sections"][0]
     assert section["procedure"] == "turns"
@@ -100,7 +100,7 @@ def test_the_control_socket_of_an_emulator_tells_its_addresses(tmp_path: Path) -
             assert b.head.turn(30.0) == pytest.approx(30.0, abs=0.01)
         assert emulator.control_path
         with psabench("run", "turns", "--control", emulator.control_path, "--average", "4", "--out", tmp_path) as run:
-            out, err = run.communicate(timeout=PATIENCE_S)
+            out, err = run.communicate(timeout=TIMEOUT_S)
     assert run.returncode == 0, out + err
     assert "report: " in out
 
@@ -199,7 +199,7 @@ def test_a_run_ends_at_the_very_event(bench: Bench) -> None:
 def test_in_real_time_an_event_is_waited_for() -> None:
     with Bench.start(BENCH, pace="wall") as b:
         b.unit.wait_ready()
-        b.run_until("DRD_A", count=3, limit_s=PATIENCE_S)
+        b.run_until("DRD_A", count=3, limit_s=TIMEOUT_S)
         with pytest.raises(TimeOut, match=r"POWER_DOWN: expected 1 within 0.05 s"):
             b.run_until("POWER_DOWN", limit_s=0.05)
 

@@ -16,7 +16,7 @@ from psabench.emulator import Emulator
 from psabench.link.can_host import CanHost, Message, StepClock, WallClock, open_bus
 from psabench.link.control import Control
 from psabench.link.vcd import read_vcd
-from rig import HOST, PATIENCE_S, ROOT, bus_spec, one_line, psa_emu
+from rig import HOST, ROOT, TIMEOUT_S, bus_spec, one_line, psa_emu
 
 pytestmark = HOST
 
@@ -284,8 +284,8 @@ def _each_board_is_the_one_of_its_passport(host: CanHost, letter: str, units: di
 
 def _open_takes_a_bus_by_its_name(port: int) -> None:
     for name, answer in ((b"can5", b"< ok >"), (b"can9", b"channel: expected can0, can1")):
-        with closing(socket.create_connection(("127.0.0.1", port), PATIENCE_S)) as s:
-            s.settimeout(PATIENCE_S)
+        with closing(socket.create_connection(("127.0.0.1", port), TIMEOUT_S)) as s:
+            s.settimeout(TIMEOUT_S)
             assert s.recv(64) == b"< hi >"
             s.sendall(b"< open " + name + b" >")
             assert answer in s.recv(256)

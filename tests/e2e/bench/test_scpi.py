@@ -16,7 +16,7 @@ from psabench.errors import BadInput, ControlError
 from psabench.link.control import Control
 from psabench.link.vcd import read_vcd
 from pyvisa.resources import MessageBasedResource
-from rig import HOST, PATIENCE_S, until
+from rig import HOST, TIMEOUT_S, until
 
 pytestmark = HOST
 
@@ -47,7 +47,7 @@ class Lab:
         """A client of the instrument; answers end in LF, which is all that VISA has to be told."""
         resource: MessageBasedResource = self._visa.open_resource(self.address(kind, over))  # type: ignore[assignment]
         resource.read_termination = resource.write_termination = "\n"
-        resource.timeout = round(PATIENCE_S * 1000)
+        resource.timeout = round(TIMEOUT_S * 1000)
         return resource
 
     def run(self, for_s: float) -> None:
@@ -245,7 +245,7 @@ def test_the_same_script_hears_the_same_answers(tmp_path: Path) -> None:
 
 def raw(lab: Lab) -> socket.socket:
     host, port = lab.address("head").split("::")[1:3]
-    return socket.create_connection((host, int(port)), PATIENCE_S)
+    return socket.create_connection((host, int(port)), TIMEOUT_S)
 
 
 def test_messages_in_pieces_too_long_or_of_any_bytes_are_told_apart(lab: Lab) -> None:

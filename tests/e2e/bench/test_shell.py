@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 from psabench.emulator import Emulator
 from psabench.places import find_emulator
-from rig import HOST, PATIENCE_S, PSABENCH, MakeRig, until
+from rig import HOST, PSABENCH, TIMEOUT_S, MakeRig, until
 from terminal import Terminal
 
 pytestmark = HOST
@@ -33,7 +33,7 @@ def shell(env: dict[str, str], *args: str | Path, stdin: str | None = None) -> s
         env=env,
         capture_output=True,
         text=True,
-        timeout=PATIENCE_S,
+        timeout=TIMEOUT_S,
         input=stdin,
         check=False,
     )
@@ -279,7 +279,7 @@ def test_the_control_socket_alone_tells_where_the_rest_is(env: dict[str, str]) -
         assert objects(done.stdout)[-1]["result"]["endpoints"] == emulator.endpoints
         done = shell(env, *there, "--command", "bench.quit")
         assert (done.returncode, done.stderr) == (0, "")
-        assert emulator.wait(PATIENCE_S) == 0
+        assert emulator.wait(TIMEOUT_S) == 0
 
 
 def test_a_device_without_a_control_socket(env: dict[str, str], make_rig: MakeRig) -> None:

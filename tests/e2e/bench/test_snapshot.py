@@ -18,7 +18,7 @@ from psabench.emulator import Emulator
 from psabench.errors import BadInput, ControlError
 from psabench.link.can_host import CanHost, StepClock, WallClock, open_bus
 from psabench.link.control import Control
-from rig import BENCH, HERE, PATIENCE_S, SEED, bus_spec, one_line, psa_emu, until
+from rig import BENCH, HERE, SEED, TIMEOUT_S, bus_spec, one_line, psa_emu, until
 
 pytestmark = pytest.mark.host
 
@@ -372,4 +372,4 @@ def test_a_child_outlives_its_parent(tmp_path: Path) -> None:
     with Control(tmp_path / "c") as child:
         assert child.call("run", for_s=0.01).t_ns == 15_000_000
         child.call("quit")
-    until(lambda: not (tmp_path / "c").exists(), "the child to leave", PATIENCE_S)
+    until(lambda: not (tmp_path / "c").exists(), "the child to leave", TIMEOUT_S)

@@ -13,7 +13,7 @@ from psabench.emulator import Emulator
 from psabench.errors import ControlError
 from psabench.link.busport import BusPort, Who
 from psabench.link.control import Control, Reply
-from rig import HERE, PATIENCE_S, talker
+from rig import HERE, TIMEOUT_S, talker
 
 pytestmark = pytest.mark.host
 
@@ -104,7 +104,7 @@ def test_a_board_without_a_bus_says_so() -> None:
 def begin_and_go(emulator: Emulator, line: bytes) -> None:
     """Sends a command and goes away without its answer, once it is carried out: the one behind it has been answered."""
     with socket.socket(socket.AF_UNIX) as rude:
-        rude.settimeout(PATIENCE_S)
+        rude.settimeout(TIMEOUT_S)
         rude.connect(str(emulator.control_path))
         rude.sendall(line + b'\n{"id":2,"cmd":"time"}\n')
         with rude.makefile("rb") as answers:
@@ -114,7 +114,7 @@ def begin_and_go(emulator: Emulator, line: bytes) -> None:
 
 def until_free(control: Control, command: str, **args: object) -> tuple[Reply, int]:
     """The answer, and how often the bus was another's before."""
-    deadline_s = time.monotonic() + PATIENCE_S
+    deadline_s = time.monotonic() + TIMEOUT_S
     for refused in itertools.count():
         try:
             return control.call(command, **args), refused
@@ -179,7 +179,7 @@ def test_cycles_are_in_a_snapshot(tmp_path: Path) -> None:
         assert control.call("counters", unit="m").result["board"]["cycles_refused"] == 1
 
 
-def test_patience_has_an_end() -> None:
+def test_timeout_has_an_end() -> None:
     """A strobe of a second: the answer is there when it is over, well before anybody gives up."""
     with Emulator(SCENARIO, pace="step") as emulator, control_of(emulator) as control:
         control.call("run", for_s=0.3)

@@ -8,7 +8,7 @@ from typing import Any
 import canopen
 import pytest
 from canopen.sdo.exceptions import SdoAbortedError
-from rig import EDS, PATIENCE_S, MakeRig, Rig, over, until
+from rig import EDS, TIMEOUT_S, MakeRig, Rig, over, until
 
 NODE = 5
 OPERATIONAL, STOPPED, PRE_OPERATIONAL = "OPERATIONAL", "STOPPED", "PRE-OPERATIONAL"
@@ -40,7 +40,7 @@ def network(rig: Rig) -> Iterator[canopen.Network]:
 @pytest.fixture
 def node(network: canopen.Network) -> Any:
     remote = network.add_node(NODE, str(EDS))
-    remote.sdo.RESPONSE_TIMEOUT = PATIENCE_S
+    remote.sdo.RESPONSE_TIMEOUT = TIMEOUT_S
     return remote
 
 
@@ -78,11 +78,11 @@ def test_nmt_moves_the_node_and_its_heartbeat_says_so(node: Any) -> None:
     node.sdo["Producer heartbeat time"].raw = 100  # ms
     for state in (OPERATIONAL, STOPPED, PRE_OPERATIONAL):
         node.nmt.state = state
-        heartbeats = (node.nmt.wait_for_heartbeat(PATIENCE_S) for _ in range(3))  # one may have been on its way
+        heartbeats = (node.nmt.wait_for_heartbeat(TIMEOUT_S) for _ in range(3))  # one may have been on its way
         assert state in heartbeats
     node.nmt.state = "RESET"
-    node.nmt.wait_for_bootup(PATIENCE_S)
-    assert node.nmt.wait_for_heartbeat(PATIENCE_S) == PRE_OPERATIONAL
+    node.nmt.wait_for_bootup(TIMEOUT_S)
+    assert node.nmt.wait_for_heartbeat(TIMEOUT_S) == PRE_OPERATIONAL
 
 
 @every_link

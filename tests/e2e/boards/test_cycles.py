@@ -89,7 +89,7 @@ def test_messages_that_are_off_come_when_the_host_wants_them(rig: Rig) -> None:
     unit.reset()
     rig.host.advance(SETUP_S)
     with pytest.raises(LinkError, match="0 of 3"):
-        unit.stream(3, patience_s=0.2)  # a reset has switched it off again
+        unit.stream(3, timeout_s=0.2)  # a reset has switched it off again
     with pytest.raises(ValueError, match="PSD1_NEVER"):
         unit.also("PSD1_NEVER")
 

@@ -15,7 +15,7 @@ from psabench.emulator import Emulator
 from psabench.errors import LinkError
 from psabench.link.can_host import CanHost, WallClock, open_bus
 from psabench.link.control import Control
-from rig import BENCH, HOST, PATIENCE_S, ROOT, MakeRig, bus_spec, one_line, psa_emu, psabench, until
+from rig import BENCH, HOST, ROOT, TIMEOUT_S, MakeRig, bus_spec, one_line, psa_emu, psabench, until
 
 UNIT = "units: [{name: a, node: 5, axes: {x: {sensor: mems}}}]\n"
 
@@ -261,7 +261,7 @@ def test_a_command_that_cannot_be_carried_out_is_refused_in_one_line(
         }
         with psabench(*args.format(**names).split()) as command:
             try:
-                _, err = command.communicate(timeout=PATIENCE_S)
+                _, err = command.communicate(timeout=TIMEOUT_S)
             finally:
                 command.kill()
     assert command.returncode == status, err
@@ -276,7 +276,7 @@ def test_what_is_no_socketcand_server_is_told_and_not_waited_for() -> None:
             try:
                 connection, _ = other.accept()
                 connection.sendall(b"220 mail ready\r\n")
-                _, err = command.communicate(timeout=PATIENCE_S)
+                _, err = command.communicate(timeout=TIMEOUT_S)
                 connection.close()
             finally:
                 command.kill()

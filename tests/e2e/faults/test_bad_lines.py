@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 from psabench.errors import ControlError
-from rig import HOST, PATIENCE_S, SEED, MakeRig, Rig, talker, until
+from rig import HOST, SEED, TIMEOUT_S, MakeRig, Rig, talker, until
 
 # ---- the socketcand port
 
@@ -275,7 +275,7 @@ def test_a_bad_command_is_refused_by_code_and_changes_nothing(make_rig: MakeRig,
     rig = make_rig("socketcand")
     t_ns = rig.control.call("time").t_ns
     with socket.socket(socket.AF_UNIX) as s:
-        s.settimeout(PATIENCE_S)
+        s.settimeout(TIMEOUT_S)
         s.connect(str(rig.emulator.control_path))
         s.sendall(line.encode() + b"\n")
         reply = json.loads(s.makefile().readline())

@@ -20,7 +20,7 @@ from psabench.link.can_host import CanHost, StepClock, WallClock, open_bus
 from psabench.link.control import Control
 from psabench.link.vcd import read_vcd
 from psabench.procedures.recording import load_csv
-from rig import HOST, PATIENCE_S, MakeRig, addresses, one_line, psabench, talker, until
+from rig import HOST, TIMEOUT_S, MakeRig, addresses, one_line, psabench, talker, until
 
 # ---- who vanishes, does not read, or sends too much
 
@@ -32,14 +32,14 @@ def test_a_program_that_vanishes_in_the_stream_disturbs_nobody_and_may_return(
     make_rig: MakeRig, how: str, pace: str
 ) -> None:
     rig = make_rig("socketcand", "stream", pace=pace)
-    assert rig.host.pump_until(lambda: len(rig.unit.frames) > 200, PATIENCE_S)
+    assert rig.host.pump_until(lambda: len(rig.unit.frames) > 200, TIMEOUT_S)
     for _ in range(3):
         with talker(rig.emulator) as s:
-            assert rig.host.pump_until(lambda: rig.clients()[1]["delivered"] > 40, PATIENCE_S)
+            assert rig.host.pump_until(lambda: rig.clients()[1]["delivered"] > 40, TIMEOUT_S)
             assert s.recv(64)
             if how == "reset":
                 s.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
-        assert rig.host.pump_until(lambda: len(rig.clients()) == 1, PATIENCE_S)
+        assert rig.host.pump_until(lambda: len(rig.clients()) == 1, TIMEOUT_S)
     assert (rig.unit.frames.counters.lost, rig.unit.frames.counters.torn) == (0, 0)
     assert rig.control.call("frames").result["gone"]["delivered"] > 100
     assert rig.clients()[0]["dropped"] == 0
@@ -54,7 +54,7 @@ def test_a_serial_port_that_is_closed_in_the_stream_can_be_opened_again(make_rig
     with CanHost(open_bus(rig.spec), WallClock()) as again:
         seen: list[int] = []
         again.listeners.append(lambda m: seen.append(m.arbitration_id))
-        assert again.pump_until(lambda: len(seen) > 100, PATIENCE_S)
+        assert again.pump_until(lambda: len(seen) > 100, TIMEOUT_S)
     assert set(seen) <= {0x185, 0x285, 0x705}
 
 
@@ -76,7 +76,7 @@ def test_a_program_that_never_reads_loses_frames_and_the_others_do_not(make_rig:
             assert sent < 2_000_000, "nothing was dropped: is its buffer without bounds?"
             loud.sendall(batch)
             sent += 2000
-            assert rig.host.pump_until(lambda expected=sent: len(seen) >= expected, PATIENCE_S)  # type: ignore[misc]
+            assert rig.host.pump_until(lambda expected=sent: len(seen) >= expected, TIMEOUT_S)  # type: ignore[misc]
         assert seen == list(range(2000)) * (sent // 2000)
         assert rig.clients()[0]["dropped"] == 0
         assert "reads too slowly, frames are dropped" in rig.emulator.messages()
@@ -92,7 +92,7 @@ def test_in_step_pace_time_waits_for_a_program_that_does_not_read(make_rig: Make
     with talker(rig.emulator) as deaf:
         until(lambda: len(rig.clients()) == 1, "the client")
         with socket.socket(socket.AF_UNIX) as s:
-            s.settimeout(PATIENCE_S)
+            s.settimeout(TIMEOUT_S)
             s.connect(str(rig.emulator.control_path))
             s.sendall(b'{"id": 1, "cmd": "run", "args": {"for_s": 600}}\n')
             # Time stands still when two looks, each after a turn of the loop, see the same instant.
@@ -121,7 +121,7 @@ def test_a_full_bus_costs_samples_that_are_counted_and_told(make_rig: MakeRig) -
     rig.unit.start()
     rig.host.advance(0.05)
     with talker(rig.emulator) as loud:
-        loud.settimeout(PATIENCE_S)
+        loud.settimeout(TIMEOUT_S)
         loud.sendall(flood(4000, can_id=0x010))
         rig.host.advance(0.3)
     rig.host.advance(3.0)  # the rest of the flood, and a second of calm
@@ -163,7 +163,7 @@ def test_a_signal_ends_the_emulator_with_its_files_complete(tmp_path: Path, numb
             until(lambda: control.call("time").t_ns > 250_000_000, "some frames")
         assert link.is_symlink()
         emulator.signal(number)
-        assert emulator.wait(PATIENCE_S) == status
+        assert emulator.wait(TIMEOUT_S) == status
         assert not control_path.exists()
         assert not link.is_symlink()
         assert "frames on the bus" in emulator.messages()
@@ -184,7 +184,7 @@ def test_ctrl_c_in_a_calibration_keeps_its_readings_and_ends_its_emulator(tmp_pa
             until(lambda: rows(csv) > 30, "some readings")
             emulator = int(Path(f"/proc/{run.pid}/task/{run.pid}/children").read_text().split()[0])
             run.send_signal(signal.SIGINT)
-            _, err = run.communicate(timeout=PATIENCE_S)
+            _, err = run.communicate(timeout=TIMEOUT_S)
         finally:
             run.kill()
     assert run.returncode == 130
@@ -205,13 +205,13 @@ def test_a_bench_that_was_interrupted_can_be_used_again(make_rig: MakeRig, tmp_p
         try:
             until(lambda: rows(tmp_path / "fourier.csv") > 30, "some readings")
             first.send_signal(signal.SIGINT)
-            first.communicate(timeout=PATIENCE_S)
+            first.communicate(timeout=TIMEOUT_S)
         finally:
             first.kill()
     assert first.returncode == 130
     with psabench("run", "turns", *there) as second:
         try:
-            out, err = second.communicate(timeout=PATIENCE_S)
+            out, err = second.communicate(timeout=TIMEOUT_S)
         finally:
             second.kill()
     assert second.returncode == 0, out + err
@@ -226,7 +226,7 @@ def test_an_emulator_that_dies_in_a_calibration_is_told_in_one_line(make_rig: Ma
         try:
             until(lambda: rows(tmp_path / "fourier.csv") > 30, "some readings")
             rig.emulator.signal(signal.SIGKILL)
-            _, err = run.communicate(timeout=PATIENCE_S)
+            _, err = run.communicate(timeout=TIMEOUT_S)
         finally:
             run.kill()
     assert run.returncode == 3
@@ -251,7 +251,7 @@ def test_a_recording_is_complete_whatever_ends_it(make_rig: MakeRig, tmp_path: P
                 rig.control.call("quit")
             else:
                 rig.emulator.signal(signal.SIGKILL)
-            out, err = record.communicate(timeout=PATIENCE_S)
+            out, err = record.communicate(timeout=TIMEOUT_S)
         finally:
             record.kill()
     assert record.returncode == (0 if how == "Ctrl-C" else 3)

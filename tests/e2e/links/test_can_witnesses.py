@@ -32,7 +32,7 @@ from psabench.link.can_host import CanHost, StepClock, WallClock, open_bus
 from psabench.link.control import Control
 from psabench.link.protocol_files import database, dbc_node
 from psabench.places import proto_file
-from rig import HOST, PATIENCE_S, VCAN, bus_spec, need, until
+from rig import HOST, TIMEOUT_S, VCAN, bus_spec, need, until
 
 SENSOR = "axes: {x: {sensor: mems, u0_v: -3.0, kx_v_per_g: 1.0}}"  # a negative code uses every bit of a signal
 PLATFORM = "site: {latitude_deg: 50}\nplatform: {}\n"
@@ -212,8 +212,8 @@ def test_python_canopen_reads_every_object_of_the_eds(board: str, tmp_path: Path
         stack.callback(network.disconnect)
         eds = proto_file(f"{kind.board}.eds")
         node: Any = network.add_node(dbc_node(kind.board), str(eds))
-        node.sdo.RESPONSE_TIMEOUT = PATIENCE_S
-        until(lambda: node.nmt.state != "INITIALISING", "a heartbeat or a boot-up", PATIENCE_S)
+        node.sdo.RESPONSE_TIMEOUT = TIMEOUT_S
+        until(lambda: node.nmt.state != "INITIALISING", "a heartbeat or a boot-up", TIMEOUT_S)
         read, taken = 0, []
         for obj in node.object_dictionary.values():
             parts = [obj] if isinstance(obj, canopen.objectdictionary.ODVariable) else list(obj.values())

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from psabench.boards.psa2.device import Psa2
-from rig import PATIENCE_S, MakeRig, need
+from rig import TIMEOUT_S, MakeRig, need
 
 pytestmark = pytest.mark.slc0
 
@@ -41,7 +41,7 @@ def test_a_second_of_frames_is_complete(unit: Psa2) -> None:
     unit.frames.forget()
     before = replace(unit.frames.counters)
     unit.start()
-    assert unit.host.pump_until(lambda: len(unit.frames) >= 1000, PATIENCE_S)
+    assert unit.host.pump_until(lambda: len(unit.frames) >= 1000, TIMEOUT_S)
     assert (unit.frames.counters.lost, unit.frames.counters.torn) == (before.lost, before.torn)
     frames = unit.frames.take()
     assert np.allclose(np.diff(frames.t_sample_s), 1e-3, atol=8.1e-6)  # the stamp counts 4 us
@@ -66,7 +66,7 @@ def test_candump_sees_both_halves_of_each_sample_in_order(unit: Psa2) -> None:
 
 def test_cansend_and_cangen_reach_the_unit(unit: Psa2) -> None:
     subprocess.run(["cansend", "slc0", "000#0105"], check=True)  # NMT: start node 5
-    assert unit.host.pump_until(lambda: len(unit.frames) >= 10, PATIENCE_S)
+    assert unit.host.pump_until(lambda: len(unit.frames) >= 10, TIMEOUT_S)
     unit.stop()
     before = statistic("tx_packets")
     # Ids of no one: the unit must take them without harm and go on answering.

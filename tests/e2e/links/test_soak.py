@@ -16,7 +16,7 @@ import pytest
 from psabench.boards.psa2.frames import Form
 from psabench.link.can_host import Message
 from psabench.link.signals import Floats
-from rig import PATIENCE_S, MakeRig, Rig, over
+from rig import TIMEOUT_S, MakeRig, Rig, over
 
 SOAK_S = float(os.environ.get("PSABENCH_SOAK_S", "60"))
 PERCENTILES = (50, 99, 99.9, 100)
@@ -61,7 +61,7 @@ def counted_losses(rig: Rig) -> int:
 
 def listen(rig: Rig, data_hz: float) -> None:
     """Listen for SOAK_S and hold the stream against what it should have been."""
-    assert rig.host.pump_until(lambda: len(rig.unit.frames) > 0, PATIENCE_S)  # the set-up after Res may be under way
+    assert rig.host.pump_until(lambda: len(rig.unit.frames) > 0, TIMEOUT_S)  # the set-up after Res may be under way
     arrivals = Arrivals(rig)
     rig.host.advance(SOAK_S)
     samples = len(rig.unit.frames)

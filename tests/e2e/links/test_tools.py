@@ -13,7 +13,7 @@ from pathlib import Path
 import can
 import pytest
 from psabench.boards.decode import decode_can
-from rig import DBC, PATIENCE_S, MakeRig, Rig, over, tool_env, unread, until
+from rig import DBC, TIMEOUT_S, MakeRig, Rig, over, tool_env, unread, until
 from terminal import Terminal
 
 PYTHON = sys.executable
@@ -44,7 +44,7 @@ def run(*argv: str | Path, rig: Rig, stdin: str | None = None) -> str:
         env=tool_env(rig.spec),
         capture_output=True,
         text=True,
-        timeout=PATIENCE_S,
+        timeout=TIMEOUT_S,
         input=stdin,
         check=False,
     )
@@ -81,7 +81,7 @@ def test_the_logger_writes_all_it_was_sent_in_each_format(make_rig: MakeRig, tmp
         rig.host.advance(0.1)  # more than it reads at once: when this is read, that was written
         until(lambda: unread(port) == 0, "the logger to read")
         logger.send_signal(signal.SIGINT)
-        assert logger.wait(PATIENCE_S) == 0
+        assert logger.wait(TIMEOUT_S) == 0
     logged = list(can.LogReader(log))
     assert 400 < certain <= len(ours)
     # On Ctrl-C python-can's database writer breaks off between its batches of 500.
@@ -103,7 +103,7 @@ def test_the_logger_writes_what_is_on_vcan0(make_rig: MakeRig, tmp_path: Path) -
         rig.host.advance(0.1)
         until(lambda: log.stat().st_size > 0, "8 kB of lines in the file")
         logger.send_signal(signal.SIGINT)
-        assert logger.wait(PATIENCE_S) == 0
+        assert logger.wait(TIMEOUT_S) == 0
     logged = contents(list(can.LogReader(log)))
     assert len(logged) > 120
     assert logged == contents(ours)[: len(logged)]
@@ -124,7 +124,7 @@ def test_the_player_puts_a_log_on_the_bus_frame_by_frame(transport: str, make_ri
             writer(can.Message(timestamp=k * 1e-3, arbitration_id=0x123, is_extended_id=False, data=payload))
     before = sum(c["taken"] for c in rig.clients())
     run(PYTHON, "-m", "can.player", log, rig=rig)
-    assert rig.host.pump_until(lambda: sum(m.arbitration_id == 0x123 for m in ours) >= frames, PATIENCE_S)
+    assert rig.host.pump_until(lambda: sum(m.arbitration_id == 0x123 for m in ours) >= frames, TIMEOUT_S)
     with can.LogReader(log) as played:
         assert contents([m for m in ours if m.arbitration_id == 0x123]) == contents(list(played))
     frames_of = rig.control.call("frames").result
@@ -218,7 +218,7 @@ def test_cansend_reaches_the_sdo_server(make_rig: MakeRig) -> None:
     rig = make_rig("vcan", pace="wall")
     ours = heard(rig)
     run("cansend", "vcan0", "605#4018100400000000", rig=rig)  # upload 1018h:4, serial number
-    assert rig.host.pump_until(lambda: any(m.arbitration_id == 0x585 for m in ours), PATIENCE_S)
+    assert rig.host.pump_until(lambda: any(m.arbitration_id == 0x585 for m in ours), TIMEOUT_S)
     answer = next(m for m in ours if m.arbitration_id == 0x585)
     assert bytes(answer.data) == bytes.fromhex("4318100401000000")
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import can
 import pytest
-from rig import PATIENCE_S, need
+from rig import TIMEOUT_S, need
 
 pytestmark = pytest.mark.vcan
 
@@ -42,7 +42,7 @@ def pair() -> Iterator[tuple[can.BusABC, can.BusABC]]:
 def test_a_frame_arrives_as_it_was_sent(pair: tuple[can.BusABC, can.BusABC], what: str, sent: can.Message) -> None:
     a, b = pair
     a.send(sent)
-    got = b.recv(timeout=PATIENCE_S)
+    got = b.recv(timeout=TIMEOUT_S)
     assert got is not None, f"{what}: nothing received"
     assert got.equals(sent, timestamp_delta=None, check_channel=False, check_direction=False)
 

@@ -31,7 +31,7 @@ BENCH = HERE / "bench.yaml"  # the article's board and sensor without noise; wha
 PSABENCH = ROOT / ".venv/bin/psabench"
 SEED = int(os.environ.get("TEST_SEED", "1"))  # of random input; a failure is replayed by giving it
 
-PATIENCE_S = 60.0  # for anything that takes milliseconds on an idle machine
+TIMEOUT_S = 60.0  # for anything that takes milliseconds on an idle machine
 ADAPTERS = {"socketcand": "socketcand:0", "slcan": "slcan", "vcan": "socketcan:vcan0"}  # transport: --can
 SLC0 = "socketcan:slc0,receive_own_messages=false"  # the emulator runs outside the guest, without a control socket
 
@@ -114,16 +114,16 @@ def need(transport: str) -> None:
     pytest.skip(f"no {interface} here; `make uml` runs this inside a kernel that has one")
 
 
-def until(condition: Callable[[], object], what: str, patience_s: float = PATIENCE_S) -> None:
+def until(condition: Callable[[], object], what: str, timeout_s: float = TIMEOUT_S) -> None:
     """Wait for a condition that another process causes. Fails, naming it, when it does not come."""
-    deadline_s = time.monotonic() + patience_s
+    deadline_s = time.monotonic() + timeout_s
     while not condition():
         if time.monotonic() >= deadline_s:
-            pytest.fail(f"waited {patience_s:g} s in vain for {what}")
+            pytest.fail(f"waited {timeout_s:g} s in vain for {what}")
         time.sleep(0.002)  # between two looks: nothing depends on its length
 
 
-def psa_emu(*args: str | Path, timeout_s: float = PATIENCE_S) -> subprocess.CompletedProcess[str]:
+def psa_emu(*args: str | Path, timeout_s: float = TIMEOUT_S) -> subprocess.CompletedProcess[str]:
     """Run the emulator to its end."""
     argv = [str(find_emulator()), *(str(a) for a in args)]
     return subprocess.run(argv, capture_output=True, text=True, timeout=timeout_s, check=False, cwd=ROOT)
@@ -159,7 +159,7 @@ def psabench(*args: str | Path) -> subprocess.Popen[str]:
 def talker(emulator: Emulator, words: Sequence[bytes] = (b"< open can0 >", b"< rawmode >")) -> Iterator[socket.socket]:
     """A raw connection after its handshake."""
     e = emulator.endpoint(can="socketcand")
-    with closing(socket.create_connection((e["host"], int(e["port"])), PATIENCE_S)) as s:
+    with closing(socket.create_connection((e["host"], int(e["port"])), TIMEOUT_S)) as s:
         assert s.recv(64) == b"< hi >"
         for word in words:
             s.sendall(word)

@@ -17,7 +17,7 @@ from types import TracebackType
 from typing import Self
 
 import pytest
-from rig import PATIENCE_S
+from rig import TIMEOUT_S
 
 ESCAPES = re.compile(r"\x1b(\[[0-9;?]*[A-Za-z]|[()][A-Z0-9]|[=>78])")
 
@@ -55,9 +55,9 @@ class Terminal:
     def pid(self) -> int:
         return self._process.pid
 
-    def wait_for(self, pattern: str, patience_s: float = PATIENCE_S) -> re.Match[str]:
+    def wait_for(self, pattern: str, timeout_s: float = TIMEOUT_S) -> re.Match[str]:
         """Until the pattern has been drawn since the last match."""
-        deadline_s = time.monotonic() + patience_s
+        deadline_s = time.monotonic() + timeout_s
         while not (found := re.search(pattern, self.text)):
             if time.monotonic() > deadline_s or not self._read(0.2):
                 pytest.fail(f"the screen never showed {pattern!r}; it drew {self.text[-2000:]!r}")
@@ -68,9 +68,9 @@ class Terminal:
     def type(self, keys: str) -> None:
         os.write(self._master, keys.encode())
 
-    def wait_end(self, patience_s: float = PATIENCE_S) -> int:
+    def wait_end(self, timeout_s: float = TIMEOUT_S) -> int:
         """Exit status."""
-        deadline_s = time.monotonic() + patience_s
+        deadline_s = time.monotonic() + timeout_s
         while self._process.poll() is None and time.monotonic() < deadline_s:
             self._read(0.05)
         return self._process.wait(1.0)

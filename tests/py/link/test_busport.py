@@ -119,7 +119,7 @@ def test_the_page_has_each_code_with_the_one_over_can() -> None:
         assert f"{abort:08X}h" in row, code
 
 
-def test_silence_is_told_with_the_patience() -> None:
+def test_silence_is_told_with_the_timeout() -> None:
     with port(lambda _: "") as (p, board):
         p.ask("R 0")
         with pytest.raises(LinkError, match=r"no answer within 0.01 s"):

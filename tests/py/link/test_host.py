@@ -246,7 +246,7 @@ def test_in_real_time_a_wait_is_spent_receiving() -> None:
     assert host.received == 3
 
 
-def test_patience_is_counted_in_time_of_the_bench(tmp_path: Path) -> None:
+def test_timeout_is_counted_in_time_of_the_bench(tmp_path: Path) -> None:
     replies: list[dict[str, Any]] = [{"result": IDLE}, *({"t_ns": k * 1_000_000} for k in range(1, 6))]
     with control(tmp_path, *replies) as (port, _), CanHost(FakeBus(), StepClock(port)) as host:
         assert not host.pump_until(lambda: False, 0.005)

@@ -122,9 +122,9 @@ class FakePlatform:
     def prepare(self, *, latitude_rad: float, m1_per_s: float, m2_per_s: float) -> None:
         self._told_rad, self._m1, self._m2 = latitude_rad, m1_per_s, m2_per_s
 
-    def level(self, patience_s: float) -> None:
+    def level(self, timeout_s: float) -> None:
         if not self.settles:
-            raise LinkError(f"the platform was not level after {patience_s:g} s: it never settles")
+            raise LinkError(f"the platform was not level after {timeout_s:g} s: it never settles")
         self.t_s += 10.0
 
     def measure(self, table: Table, done: Callable[[], None]) -> Sequence[Window]:

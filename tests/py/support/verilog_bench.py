@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from psabench.link.vcd import Ints, Wire
 
 MODELS = Path(__file__).resolve().parents[2] / "bench/verilog"
-PATIENCE_S = 300
+TIMEOUT_S = 300
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +61,7 @@ def simulate(
 
 
 def _run(command: list[str]) -> None:
-    p = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
+    p = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT_S, check=False)
     assert (p.returncode, p.stdout + p.stderr) == (0, ""), f"{' '.join(command)}\n{p.stdout}{p.stderr}"
 
 

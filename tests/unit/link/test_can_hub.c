@@ -14,7 +14,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-enum { PATIENCE_MS = 20000 };
+enum { TIMEOUT_MS = 20000 };
 
 struct bench {
     struct sched s;
@@ -37,7 +37,7 @@ static void say(void *ctx, const char *text)
 static bool readable(int fd)
 {
     struct pollfd p = {.fd = fd, .events = POLLIN};
-    return poll(&p, 1, PATIENCE_MS) == 1;
+    return poll(&p, 1, TIMEOUT_MS) == 1;
 }
 
 /* What the program reads; waits for it. */

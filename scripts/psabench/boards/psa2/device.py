@@ -61,21 +61,21 @@ class Psa2(Unit):
     def form(self, form: Form) -> None:
         self.node.write(OD.FRAME_FORM, 0, int(form))
 
-    def wait_ready(self, patience_s: float = 5.0) -> None:
+    def wait_ready(self, timeout_s: float = 5.0) -> None:
         """Until the set-up after Res is over: the controller then serves its registers and frames are settled.
 
-        Raises LinkError when the unit is not ready after patience_s of bench time.
+        Raises LinkError when the unit is not ready after timeout_s of bench time.
         """
-        deadline_s = self.host.clock.now_s() + patience_s
+        deadline_s = self.host.clock.now_s() + timeout_s
         while self.host.clock.now_s() < deadline_s:
             self.stop()
             if self.stream(1).settled.all():
                 return
-        raise LinkError(f"node {self.node.node_id}: frames are not settled after {patience_s:g} s")
+        raise LinkError(f"node {self.node.node_id}: frames are not settled after {timeout_s:g} s")
 
-    def stream(self, count: int, patience_s: float = 5.0) -> Frames:
-        """The next `count` samples; the stream runs only meanwhile. Raises LinkError when fewer come in patience_s."""
-        self._gather(count, patience_s)
+    def stream(self, count: int, timeout_s: float = 5.0) -> Frames:
+        """The next `count` samples; the stream runs only meanwhile. Raises LinkError when fewer come in timeout_s."""
+        self._gather(count, timeout_s)
         return self.frames.take().head(count)
 
     def words_v(self) -> tuple[float, float, float]:

@@ -6,7 +6,7 @@ import itertools
 import re
 
 from psabench.conform.capture.bus_cycles import BUS, LINES, TAIL_S, Strobes, harmless, quiet, registers, say, strobes
-from psabench.conform.dut import Subject
+from psabench.conform.dut import Dut
 from psabench.conform.plan import active
 from psabench.conform.proves import proves
 from psabench.conform.raw_can import ABORT, Talk, dialogue, read, words
@@ -50,7 +50,7 @@ def _refusal(answer: str, code: str, letter: str, address: str) -> None:
 
 @proves("BUS-PORT-01")
 @active(needs={"bus"})
-def each_line_has_its_answer_in_turn(s: Subject) -> str:
+def each_line_has_its_answer_in_turn(s: Dut) -> str:
     """A hundred lines at once, reads, questions and nonsense."""
     address = quiet(s)
     kinds = {f"R {address:X}": "R ", "?": "I ", f"R {NOWHERE:X}": "E no-address", "hello": "E syntax"}
@@ -75,7 +75,7 @@ def _time_ns(answer: str) -> int:
 
 @proves("BUS-PORT-02")
 @active(needs={"bus"})
-def a_read_cycle_and_its_answer(s: Subject) -> str:
+def a_read_cycle_and_its_answer(s: Dut) -> str:
     """R at an address that can always be read."""
     answer = say(s, f"R {quiet(s):X}")[0]
     _cycle(answer, "R", quiet(s))
@@ -84,7 +84,7 @@ def a_read_cycle_and_its_answer(s: Subject) -> str:
 
 @proves("BUS-PORT-03")
 @active(needs={"bus"})
-def a_write_cycle_and_its_answer(s: Subject) -> str:
+def a_write_cycle_and_its_answer(s: Dut) -> str:
     """W of what a register has."""
     address, word = harmless(s)
     answer = say(s, f"W {address:X} {word:X}")[0]
@@ -96,7 +96,7 @@ def a_write_cycle_and_its_answer(s: Subject) -> str:
 
 @proves("BUS-PORT-04")
 @active(needs={"bus"})
-def refused_lines_say_why(s: Subject) -> str:
+def refused_lines_say_why(s: Dut) -> str:
     """Lines that are none, numbers that are none, addresses that no one has, rights."""
     of = registers(s)
     ro = next(a for a, access in of.values() if access == "ro")
@@ -126,7 +126,7 @@ def refused_lines_say_why(s: Subject) -> str:
 
 @proves("BUS-PORT-05")
 @active(needs={"bus"})
-def it_says_who_is_there(s: Subject) -> str:
+def it_says_who_is_there(s: Dut) -> str:
     """The line ?"""
     answer = say(s, "?")[0]
     m = WHO.fullmatch(answer)
@@ -141,7 +141,7 @@ def it_says_who_is_there(s: Subject) -> str:
 
 @proves("BUS-PORT-06")
 @active(needs={"bus"})
-def a_long_line_is_refused(s: Subject) -> str:
+def a_long_line_is_refused(s: Dut) -> str:
     """A good line made as long as a line may be by blanks, and one longer."""
     most = int(requirements().rows["BUS-PORT-06"].limit("line_max_chars"))
     good = f"R {quiet(s):X}"
@@ -155,7 +155,7 @@ def a_long_line_is_refused(s: Subject) -> str:
 
 @proves("BUS-PORT-07")
 @active(needs={"bus"})
-def spelling_makes_no_difference(s: Subject) -> str:
+def spelling_makes_no_difference(s: Dut) -> str:
     """The same line in either case, with h, two digits, blanks, a CR."""
     a = quiet(s)
     lines = [f"r {a:x}", f"R {a:02X}h", f"r {a:02x}H\r", f"  R   {a:X}  ", f"R {a:X}\r", f"R\t{a:02X}"]
@@ -169,7 +169,7 @@ def spelling_makes_no_difference(s: Subject) -> str:
 
 @proves("BUS-PORT-08")
 @active(needs={"bus"})
-def times_go_on_by_the_strobe(s: Subject) -> str:
+def times_go_on_by_the_strobe(s: Dut) -> str:
     """Three cycles at once with a strobe of 1 ms each: their times."""
     strobe_ns = STROBE_MS * 1_000_000
     line = f"R {quiet(s):X} {strobe_ns}"
@@ -180,7 +180,7 @@ def times_go_on_by_the_strobe(s: Subject) -> str:
     return f"{apart_ns} ns apart"
 
 
-def _strobed(s: Subject, strobe_ns: int) -> tuple[int, Strobes]:
+def _strobed(s: Dut, strobe_ns: int) -> tuple[int, Strobes]:
     """Time of the answer to a cycle with this strobe, and the cycles that the lines show at its address."""
     with s.take() as take:
         _, t_ns = _cycle(say(s, f"R {quiet(s):X} {strobe_ns}", dwell_s=1e-4)[0], "R", quiet(s))
@@ -192,7 +192,7 @@ def _strobed(s: Subject, strobe_ns: int) -> tuple[int, Strobes]:
 
 @proves("BUS-PORT-08")
 @active(needs={"bus", "pins", "exact"})
-def times_are_those_of_cs(s: Subject) -> str:
+def times_are_those_of_cs(s: Dut) -> str:
     """A cycle: its time beside the rise of CS."""
     t_ns, found = _strobed(s, STROBE_NS)
     rises = found.rise_ns.tolist()
@@ -205,7 +205,7 @@ def times_are_those_of_cs(s: Subject) -> str:
 
 @proves("BUS-PORT-10")
 @active(needs={"bus", "pins"})
-def a_strobe_is_as_long_as_it_is_told(s: Subject) -> str:
+def a_strobe_is_as_long_as_it_is_told(s: Dut) -> str:
     """A cycle with a strobe of so many ns, in decimal: how long is CS low?"""
     _, found = _strobed(s, STROBE_NS)
     low_ns = (found.rise_ns - found.fall_ns).tolist()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from psabench.boards.objects import Common
 from psabench.boards.unit import REFUSAL, STROBE_NS
 from psabench.conform.capture.bus_cycles import BUS, LINES, TAIL_S, harmless, quiet, registers, say, strobes, tell
-from psabench.conform.dut import Subject
+from psabench.conform.dut import Dut
 from psabench.conform.plan import active
 from psabench.conform.proves import proves
 from psabench.conform.raw_can import ABORT, Nmt, Talk, dialogue, read, words, write
@@ -170,7 +170,7 @@ def a_short_strobe_is_refused(t: Talk) -> str:
 
 @proves("BUS-CYC-05")
 @active(needs={"bus"})
-def a_short_strobe_is_refused_by_the_port(s: Subject) -> str:
+def a_short_strobe_is_refused_by_the_port(s: Dut) -> str:
     """R with a strobe one less than the least, and with the least."""
     least = int(_limit("BUS-CYC-05", "strobe_min_ns"))
     answers = say(s, f"R {quiet(s):X} {least - 1}", f"R {quiet(s):X} {least}")

@@ -7,7 +7,7 @@ import itertools
 from psabench.boards.board import Setting
 from psabench.boards.objects import BusObjects, Common
 from psabench.boards.registry import BOARDS
-from psabench.conform.dut import Subject
+from psabench.conform.dut import Dut
 from psabench.conform.proves import proves
 from psabench.conform.raw_can import Nmt, State, Talk, dialogue, ids, read, segment, write
 from psabench.conform.requirements import requirements
@@ -193,7 +193,7 @@ def _settings(t: Talk) -> dict[tuple[int, int], bytes]:
 STROBE = Setting(index=BusObjects.STROBE_NS, sub=0, value=(5000).to_bytes(4, "little"))  # of a board with a bus
 
 
-def _own_settings(s: Subject) -> dict[tuple[int, int], bytes]:
+def _own_settings(s: Dut) -> dict[tuple[int, int], bytes]:
     """A setting of the board itself; empty for a board that has none."""
     board = BOARDS[s.variant.family]
     own = board.setting or (STROBE if board.bus else None)

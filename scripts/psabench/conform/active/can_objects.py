@@ -5,7 +5,7 @@ from __future__ import annotations
 from psabench.boards.objects import Common
 from psabench.conform.active.can_sdo import NOWHERE, put
 from psabench.conform.capture.canbits import frame_bits
-from psabench.conform.dut import Subject
+from psabench.conform.dut import Dut
 from psabench.conform.plan import active
 from psabench.conform.proves import proves
 from psabench.conform.raw_can import LEAST, Nmt, Talk, dialogue, read, talk, words
@@ -274,7 +274,7 @@ def errors_on_the_wire_are_counted(t: Talk) -> str:
 
 @proves("BUS-LOAD-01")
 @active(needs={"can", "stamps", "lockstep", "stream"})
-def the_load_is_the_share_of_the_bus(s: Subject) -> str:
+def the_load_is_the_share_of_the_bus(s: Dut) -> str:
     """Stream for a second between two reads of the load, and count the bits of all frames meanwhile."""
     row = requirements().rows["BUS-LOAD-01"]
     with s.take(lines=False) as take, talk(s, reset=True, take=take) as t:

@@ -9,14 +9,14 @@ import itertools
 
 from psabench.boards.objects import Common
 from psabench.conform.capture.log import CanFrame
-from psabench.conform.dut import Subject
+from psabench.conform.dut import Dut
 from psabench.conform.plan import active
 from psabench.conform.proves import proves
 from psabench.conform.raw_can import OFF, Nmt, Talk, dialogue, flood, talk, words, write
 from psabench.conform.requirements import requirements
 from psabench.conform.verdict import Failed, Inconclusive
 
-READINGS, PATIENCE_S = 1, 5.0  # sub-index of 2030h
+READINGS, TIMEOUT_S = 1, 5.0  # sub-index of 2030h
 FEW = 4  # readings in which something should come, or nothing
 FREE_ID = 0x1F0  # of no service and no message of a node below 112
 LONG_ID = 0x800  # the first that 11 bits do not hold
@@ -79,7 +79,7 @@ def syncs_are_counted(t: Talk) -> str:
 
 @proves("BUS-SYNC-02")
 @active(needs={"can", "stream"})
-def event_types_send_each_reading(s: Subject) -> str:
+def event_types_send_each_reading(s: Dut) -> str:
     """Transmission types 254 and 255: frames and readings of the same while."""
     told = []
     for kind in (255, EVENT):

@@ -139,12 +139,12 @@ def _aborted(t: Talk, request: bytes, code: float, what: str, index: int) -> Non
 def a_silent_client_is_given_up(t: Talk) -> str:
     """Begin an upload and a download in segments and ask nothing more."""
     row = requirements()["BUS-SDO-06"]
-    due_s, late_s = row.limit("patience_s"), row.limit("jitter_max_ms") * 1e-3
+    due_s, late_s = row.limit("timeout_s"), row.limit("jitter_max_ms") * 1e-3
     waited = []
     put(t, Common.REMARK, b"0123456789")
     for request in (read(Common.REMARK), long_write(Common.REMARK, 0, 20)):
         begun = t.answer_to(request)
-        frame = t.next(t.sdo_tx, 2 * due_s + t.patience_s)
+        frame = t.next(t.sdo_tx, 2 * due_s + t.timeout_s)
         abort = bytes([ABORT]) + request[1:4] + int(row.limit("abort_code")).to_bytes(4, "little")
         if frame is None or frame.data != abort:
             raise Failed(words(frame.data) if frame else "nothing", words(abort), frames=[frame] if frame else [])

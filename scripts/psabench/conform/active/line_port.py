@@ -7,7 +7,7 @@ import threading
 import numpy as np
 
 from psabench.boards.psa2.conform.capture_line import transfers
-from psabench.conform.dut import Subject
+from psabench.conform.dut import Dut
 from psabench.conform.plan import active
 from psabench.conform.probes import PortProbe
 from psabench.conform.proves import proves
@@ -21,13 +21,13 @@ LOOK_S, PAUSE_S, MOST_S = 0.05, 0.6, 20.0
 SLICE, SLOW_S = 1 << 14, 0.002  # bytes that a slow reader takes, and how long it rests after each
 
 
-def _port(s: Subject) -> PortProbe:
+def _port(s: Dut) -> PortProbe:
     if s.line_port is None:
         raise Inconclusive("no line port")
     return s.line_port
 
 
-def _look(s: Subject, dwell_s: float) -> bytes:
+def _look(s: Dut, dwell_s: float) -> bytes:
     _port(s).start()
     try:
         s.run_for(dwell_s)
@@ -38,7 +38,7 @@ def _look(s: Subject, dwell_s: float) -> bytes:
 
 @proves("LINE-GAP-01")
 @active(needs={"port"})
-def lost_samples_are_marked(s: Subject) -> str:
+def lost_samples_are_marked(s: Dut) -> str:
     """In real time leave the port unread for long; in lockstep, where nothing is lost, look for marks."""
     mask = int(requirements().rows["LINE-GAP-01"].limit("gap_mask"))
     s.wait_ready()
@@ -60,7 +60,7 @@ def lost_samples_are_marked(s: Subject) -> str:
 
 @proves("LINE-GAP-02")
 @active(needs={"port", "lockstep"})
-def a_slow_reader_loses_nothing(s: Subject) -> str:
+def a_slow_reader_loses_nothing(s: Dut) -> str:
     """Read slowly while time is to pass."""
     mask = int(requirements().rows["LINE-GAP-01"].limit("gap_mask"))
     s.wait_ready()
@@ -91,7 +91,7 @@ def a_slow_reader_loses_nothing(s: Subject) -> str:
 
 @proves("LINE-OPEN-01")
 @active(needs={"port"})
-def the_port_opens_again(s: Subject) -> str:
+def the_port_opens_again(s: Dut) -> str:
     """Open, read, close; open again: frames from the second fall of Int on."""
     s.wait_ready()
     _look(s, LOOK_S)

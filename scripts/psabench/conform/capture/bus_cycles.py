@@ -10,7 +10,7 @@ from psabench.boards.board import Bus
 from psabench.boards.objects import BusObjects
 from psabench.boards.registry import BOARDS
 from psabench.conform.capture.log import LineLog
-from psabench.conform.dut import Subject
+from psabench.conform.dut import Dut
 from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.signals import Ints
 
@@ -64,32 +64,32 @@ def strobes(log: LineLog) -> Strobes:
     return Strobes(fall_ns=fall, rise_ns=rise, write=write, address=word(ADDRESS), data=word(DATA))
 
 
-def registers(s: Subject) -> dict[str, tuple[int, str]]:
+def registers(s: Dut) -> dict[str, tuple[int, str]]:
     """Addresses and rights (ro, wo, rw) of the registers on the bus by name, as the EDS has them."""
     mine = [o for o in s.unit.node.objects() if o.index == BUS and o.sub]
     return {o.name: (o.sub - 1, o.access) for o in mine}
 
 
-def harmless(s: Subject) -> tuple[int, int]:
+def harmless(s: Dut) -> tuple[int, int]:
     """Address of a register that may be written, and with what."""
     bus = _bus(s)
     address = registers(s)[bus.harmless][0]
     return address, s.unit.bus_read(address) if bus.harmless_word is None else bus.harmless_word
 
 
-def quiet(s: Subject) -> int:
+def quiet(s: Dut) -> int:
     """Address of a register that can be read at any time."""
     return registers(s)[_bus(s).quiet][0]
 
 
-def _bus(s: Subject) -> Bus:
+def _bus(s: Dut) -> Bus:
     bus = BOARDS[s.variant.family].bus
     if bus is None:
         raise Inconclusive(f"a {s.variant.family} has no parallel bus")
     return bus
 
 
-def say(s: Subject, *lines: str, dwell_s: float = 0.0) -> list[str]:
+def say(s: Dut, *lines: str, dwell_s: float = 0.0) -> list[str]:
     """Lines all at once, and as many answers. dwell_s: that they take beyond a cycle each."""
     if s.port is None:
         raise Inconclusive("no bus port was connected (--bus-port)")
@@ -99,7 +99,7 @@ def say(s: Subject, *lines: str, dwell_s: float = 0.0) -> list[str]:
     return [s.port.answered() for _ in lines]
 
 
-def tell(s: Subject) -> str:
+def tell(s: Dut) -> str:
     """One answer more: to a line that was sent before."""
     if s.port is None:
         raise Inconclusive("no bus port was connected (--bus-port)")

@@ -262,7 +262,7 @@ def _off(s: HostBench) -> None:
 def _with_slow_answers(s: HostBench) -> None:
     s.run(0.3, speed=0.0)
     s.fault(
-        "link.delay", "bus.can0", can_id=0x580 + NODE, frames=2, hold_s=0.6 * limits("HOST-CAN-10").limit("patience_s")
+        "link.delay", "bus.can0", can_id=0x580 + NODE, frames=2, hold_s=0.6 * limits("HOST-CAN-10").limit("timeout_s")
     )
 
 

@@ -161,14 +161,14 @@ def the_stream_is_started_after_the_registers_are_known(e: HostCapture) -> str:
 @checks("slow")
 def nothing_is_asked_again_before_its_time(e: HostCapture) -> str:
     """Two answers come after 0.6 s: requests meanwhile."""
-    patience_s = float(limits("HOST-CAN-10").limit("patience_s"))
+    timeout_s = float(limits("HOST-CAN-10").limit("timeout_s"))
     answers = e.bus.of(SDO_TX)
     slow = 0
     for before, after in zip(_requests(e), _requests(e)[1:], strict=False):
         answered_s = next((a.t_s for a in answers if a.t_s > before.t_s), float("inf"))
         slow += answered_s - before.t_s > 0.1
         asked_s = e.wall_s(before.t_s, after.t_s)
-        if after.t_s < answered_s and asked_s < 0.95 * patience_s:
+        if after.t_s < answered_s and asked_s < 0.95 * timeout_s:
             raise Failed(f"{_named(after)} asked {asked_s:.3f} s after {_named(before)}", "its answer, or 1 s")
     enough(slow, "an answer that took its time")
     e.samples()

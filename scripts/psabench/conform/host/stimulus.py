@@ -31,10 +31,10 @@ from psabench.errors import BadInput, TimeOut, expected
 from psabench.link.control import Control
 
 STEP_S = 0.005  # simulated, between looks at the wall's clock
-COME_S = 60.0  # patience for a host to come: it may be an interpreter
+COME_S = 60.0  # timeout for a host to come: it may be an interpreter
 BY_HAND_S = 3600.0  # the same, where a person starts it
-STUCK_S = 30.0  # patience for a host that reads nothing
-END_S = 20.0  # patience for a host to end after its link has ended
+STUCK_S = 30.0  # timeout for a host that reads nothing
+END_S = 20.0  # timeout for a host to end after its link has ended
 READY_S = 3.0  # simulated, for a host to start the stream
 EMPTY_LOOKS = 10  # at a pseudo-terminal, one after the other, 10 ms apart, until it has been read
 PLACES = ("can", "pty", "line", "bus", "node", "form", "results", "word_bits", "code_bits")

@@ -43,8 +43,8 @@ class LinePort:
                 n = os.write(self._ours, left)
                 left, written = left[n:], written + n
 
-    def _room(self, host: Program | ByHand, patience_s: float) -> bool:
-        deadline_s = time.monotonic() + patience_s
+    def _room(self, host: Program | ByHand, timeout_s: float) -> bool:
+        deadline_s = time.monotonic() + timeout_s
         while not select.select([], [self._ours], [], 0.05)[1]:
             if host.gone() or time.monotonic() > deadline_s:
                 return False

@@ -5,7 +5,7 @@ from __future__ import annotations
 from psabench.boards.objects import Common
 from psabench.boards.registry import BOARDS
 from psabench.conform.capture.log import Capture
-from psabench.conform.dut import Subject
+from psabench.conform.dut import Dut
 from psabench.conform.plan import stimulus
 from psabench.conform.raw_can import OFF, Nmt, Talk, flood, read, talk
 from psabench.conform.verdict import Failed, Inconclusive
@@ -17,7 +17,7 @@ CALLED = (Common.DEVICE_TYPE, Common.ERROR_REGISTER, Common.DEVICE_NAME, Common.
 
 
 @stimulus("services", boards=BOARDS)
-def services(s: Subject) -> Capture:
+def services(s: Dut) -> Capture:
     """A reset, heartbeats, SDO requests good and bad, a stream."""
     with talk(s) as t, s.take(lines=False) as take:
         t.take = take
@@ -34,7 +34,7 @@ def services(s: Subject) -> Capture:
 
 
 @stimulus("overload", boards=BOARDS)
-def overload(s: Subject) -> Capture:
+def overload(s: Dut) -> Capture:
     """Every TPDO switched on, a stream, a bus that others fill until samples are lost, two seconds of calm."""
     with talk(s, reset=True) as t:
         s.wait_ready()
@@ -58,7 +58,7 @@ def overload(s: Subject) -> Capture:
     return s.capture("overload", take)
 
 
-def _nothing_lost(s: Subject) -> None:
+def _nothing_lost(s: Dut) -> None:
     if s.lockstep:
         raise Failed("no sample dropped on a bus that was full for seconds", "samples dropped and counted")
     raise Inconclusive("the bus could not be filled long enough for a sample to be lost")

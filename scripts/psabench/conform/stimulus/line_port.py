@@ -6,7 +6,7 @@ import numpy as np
 
 from psabench.boards.registry import BOARDS
 from psabench.conform.capture.log import Capture
-from psabench.conform.dut import Subject
+from psabench.conform.dut import Dut
 from psabench.conform.plan import stimulus
 from psabench.conform.sources.samples import line_log
 from psabench.conform.verdict import Inconclusive
@@ -16,7 +16,7 @@ LOOK_S, TAIL_S = 0.06, 0.02
 
 
 @stimulus("line_port", boards=BOARDS)
-def line_port(s: Subject) -> Capture:
+def line_port(s: Dut) -> Capture:
     """The line port, beside all pins where they are there. Facts: `bytes` of the port, its edges as `port`."""
     if s.line_port is None:
         raise Inconclusive("no line port")

@@ -6,20 +6,20 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from psabench.conform.capture.log import Capture
-from psabench.conform.dut import Subject, Take
+from psabench.conform.dut import Dut, Take
 
 BOOT_S = 0.002
 
 
 @contextmanager
-def while_streaming(s: Subject) -> Iterator[None]:
+def while_streaming(s: Dut) -> Iterator[None]:
     """Readings flow within."""
     s.unit.start()
     yield
     s.unit.stop()
 
 
-def from_res(s: Subject, dwell_s: float) -> Capture:
+def from_res(s: Dut, dwell_s: float) -> Capture:
     """The stimulus power_on: Res, and readings from as soon as it has booted.
 
     facts: prompt, in lockstep alone: the start came before the first reading.
@@ -33,7 +33,7 @@ def from_res(s: Subject, dwell_s: float) -> Capture:
     return s.capture("power_on", take)
 
 
-def readings(s: Subject, begun_s: float, pass_time: Callable[[], object], *, lines: bool = True) -> Take:
+def readings(s: Dut, begun_s: float, pass_time: Callable[[], object], *, lines: bool = True) -> Take:
     """Readings after a Res and begun_s while pass_time lets time pass."""
     s.reset()
     s.run_for(begun_s)

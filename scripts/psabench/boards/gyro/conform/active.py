@@ -9,7 +9,7 @@ from psabench.boards.objects import GyroObjects as OD
 from psabench.conform.bus_host import refused
 from psabench.conform.capture.messages import emergencies
 from psabench.conform.dictionary import as_the_dictionary_says, identity
-from psabench.conform.dut import Subject
+from psabench.conform.dut import Dut
 from psabench.conform.plan import active
 from psabench.conform.requirements import Requirement
 from psabench.conform.stimulus.streamed import while_streaming
@@ -19,7 +19,7 @@ FRAMES = (OD.COUNTERS, 14)  # level frames taken
 
 
 @active("GYRO-MODE-09", needs={"can"}, after=calm)
-def modes_that_cannot_be_are_refused(s: Subject, row: Requirement) -> str:
+def modes_that_cannot_be_are_refused(s: Dut, row: Requirement) -> str:
     """Ask for a mode just after Res and look for the reason."""
     code = row.limit("abort_code")
     s.reset()
@@ -34,7 +34,7 @@ def modes_that_cannot_be_are_refused(s: Subject, row: Requirement) -> str:
 
 
 @active("GYRO-MODE-10", needs={"can"}, after=calm)
-def a_run_s_settings_stand_while_it_runs(s: Subject, row: Requirement) -> str:
+def a_run_s_settings_stand_while_it_runs(s: Dut, row: Requirement) -> str:
     """Write 2102h and 2103h in a run."""
     code = row.limit("abort_code")
     levelled(s)
@@ -48,7 +48,7 @@ def a_run_s_settings_stand_while_it_runs(s: Subject, row: Requirement) -> str:
 
 
 @active("GYRO-ERR-02", needs={"can"})
-def what_does_not_settle_is_told(s: Subject, row: Requirement) -> str:
+def what_does_not_settle_is_told(s: Dut, row: Requirement) -> str:
     """Allow a fiftieth of an arc minute and a second, and let a run begin."""
     code = int(row.limit("emcy_code"))
     levelled(s)
@@ -70,7 +70,7 @@ def what_does_not_settle_is_told(s: Subject, row: Requirement) -> str:
 
 
 @active("GYRO-LEV-05", needs={"can"}, before=calm)
-def frames_of_others_are_not_taken(s: Subject) -> str:
+def frames_of_others_are_not_taken(s: Dut) -> str:
     """Send frames of another node's PSA-2 while the level unit is silent."""
     level_unit(s, False)
     node = int(s.unit.node.read(OD.LEVEL, 1))
@@ -86,12 +86,12 @@ def frames_of_others_are_not_taken(s: Subject) -> str:
 
 
 @active("GYRO-CAN-05", needs={"can"})
-def the_board_says_what_it_is(s: Subject) -> str:
+def the_board_says_what_it_is(s: Dut) -> str:
     """Read 1008h and 1018h sub 2."""
     return identity(s, "GYRO-CAN-05", "GYRO")
 
 
 @active("GYRO-CAN-04", needs={"can"}, before=calm)
-def objects_are_as_the_dictionary_says(s: Subject) -> str:
+def objects_are_as_the_dictionary_says(s: Dut) -> str:
     """Read every object of the EDS and write where nothing may be written."""
     return as_the_dictionary_says(s, "gyro")

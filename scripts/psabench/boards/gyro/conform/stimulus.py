@@ -7,7 +7,7 @@ from psabench.boards.gyro.device import SETTINGS, Gyro, Mode, Phase
 from psabench.boards.objects import GyroObjects as OD
 from psabench.boards.unit import NMT_PREOP, NMT_START
 from psabench.conform.capture.log import Capture
-from psabench.conform.dut import Subject
+from psabench.conform.dut import Dut
 from psabench.conform.plan import stimulus
 from psabench.conform.requirements import requirements
 from psabench.conform.stimulus.streamed import from_res, while_streaming
@@ -27,28 +27,28 @@ TILT_G, SLOW_PER_S = 0.0087, 0.15  # half a degree; 12 s from there to the toler
 FACTS = ("m1_per_s", "m2_per_s", "latitude_deg", "zero_x_v", "zero_y_v", "scale_x_v_per_g", "scale_y_v_per_g")
 
 
-def unit(s: Subject) -> Gyro:
+def unit(s: Dut) -> Gyro:
     """Raises Inconclusive where it is none."""
     if not isinstance(s.unit, Gyro):
         raise Inconclusive("no gyro unit")
     return s.unit
 
 
-def calm(s: Subject) -> None:
+def calm(s: Dut) -> None:
     """As after power-on, ready, its level unit streaming."""
     s.reset()
     s.run_for(READY_S)
     level_unit(s, True)
 
 
-def level_unit(s: Subject, on: bool) -> None:
+def level_unit(s: Dut, on: bool) -> None:
     """Let the level unit stream, or keep it silent."""
     node = int(s.unit.node.read(OD.LEVEL, 1))
     s.host.send(0x000, bytes([NMT_START if on else NMT_PREOP, node]))
     s.run_for(0.2 if on else 0.02)
 
 
-def settings(s: Subject) -> dict[str, object]:
+def settings(s: Dut) -> dict[str, object]:
     """What the laws of the controller want to know."""
     return {name: float(s.unit.node.read(*SETTINGS[name])) for name in FACTS} | {
         "level_node": int(s.unit.node.read(OD.LEVEL, 1)),
@@ -56,7 +56,7 @@ def settings(s: Subject) -> dict[str, object]:
     }
 
 
-def until_mode(s: Subject, mode: Mode, limit_s: float) -> None:
+def until_mode(s: Dut, mode: Mode, limit_s: float) -> None:
     """Raises Inconclusive where the unit does not come to that mode."""
     left_s = limit_s
     while int(s.unit.node.read(OD.CONTROL, 1)) != mode:
@@ -66,7 +66,7 @@ def until_mode(s: Subject, mode: Mode, limit_s: float) -> None:
         left_s -= WAIT_S
 
 
-def levelled(s: Subject) -> None:
+def levelled(s: Dut) -> None:
     """As after power-on, and level. Raises Inconclusive where it does not get so."""
     row = requirements()["GYRO-MODE-11"]
     calm(s)
@@ -81,7 +81,7 @@ def levelled(s: Subject) -> None:
     s.run_for(REST_S)
 
 
-def slew(s: Subject, to_deg: float) -> None:
+def slew(s: Dut, to_deg: float) -> None:
     """Turn there and stand for a second. Raises Inconclusive where the turn does not end."""
     unit(s).set(slew_deg=to_deg)
     unit(s).mode = Mode.SLEW
@@ -96,7 +96,7 @@ def slew(s: Subject, to_deg: float) -> None:
 
 
 @stimulus("power_on", boards=("gyro",))
-def power_on(s: Subject) -> Capture:
+def power_on(s: Dut) -> Capture:
     """From Res on while it levels, streaming as soon as it has booted."""
     calm(s)
     unit(s).mode = Mode.LEVEL
@@ -105,7 +105,7 @@ def power_on(s: Subject) -> Capture:
 
 
 @stimulus("level", boards=("gyro",))
-def level(s: Subject) -> Capture:
+def level(s: Dut) -> Capture:
     """Mode 1, for as long as the platform may take to get level from where it is."""
     calm(s)
     with s.take(lines=False) as take, while_streaming(s):
@@ -115,7 +115,7 @@ def level(s: Subject) -> Capture:
 
 
 @stimulus("run", boards=("gyro",))
-def run(s: Subject) -> Capture:
+def run(s: Dut) -> Capture:
     """Levelling, then a run of three positions with the settings of power-on, on the lines and on CAN."""
     levelled(s)
     facts = settings(s)
@@ -129,7 +129,7 @@ def run(s: Subject) -> Capture:
 
 
 @stimulus("navigation", boards=("gyro",))
-def navigation(s: Subject) -> Capture:
+def navigation(s: Dut) -> Capture:
     """A calibration, then the drift about z that it gave, navigation with it, and the heading of a parked vehicle."""
     levelled(s)
     facts = settings(s) | {"calibration_s": CALIBRATION_S}
@@ -155,7 +155,7 @@ def navigation(s: Subject) -> Capture:
     return s.capture("navigation", take)
 
 
-def _moved(s: Subject, dwell_s: float) -> tuple[float, float]:
+def _moved(s: Dut, dwell_s: float) -> tuple[float, float]:
     """How far the heading moves, deg, and in how many seconds of the bench."""
     first_deg, begun_s = unit(s).heading_deg, s.bench.time_s
     s.run_for(dwell_s)
@@ -163,7 +163,7 @@ def _moved(s: Subject, dwell_s: float) -> tuple[float, float]:
 
 
 @stimulus("turns", boards=("gyro",))
-def turns(s: Subject) -> Capture:
+def turns(s: Dut) -> Capture:
     """Turns of all kinds by mode 3, then mode 2."""
     levelled(s)
     parts: list[tuple[float, int, int]] = []  # angle, first and last frame
@@ -182,7 +182,7 @@ def turns(s: Subject) -> Capture:
 
 
 @stimulus("hold", boards=("gyro",))
-def hold(s: Subject) -> Capture:
+def hold(s: Dut) -> Capture:
     """Mode 2 with one latitude, then with that of the other hemisphere, which turns Wz round."""
     levelled(s)
     facts = settings(s)
@@ -203,7 +203,7 @@ def hold(s: Subject) -> Capture:
 
 
 @stimulus("tilted", boards=("gyro",))
-def tilted(s: Subject) -> Capture:
+def tilted(s: Dut) -> Capture:
     """A run that begins half a degree off the level, with a slow loop and no settling time: its first window."""
     levelled(s)
     zero_v, scale_v = unit(s).get("zero_y_v"), unit(s).get("scale_y_v_per_g")
@@ -219,7 +219,7 @@ def tilted(s: Subject) -> Capture:
 
 
 @stimulus("limits", boards=("gyro",))
-def limits(s: Subject) -> Capture:
+def limits(s: Dut) -> Capture:
     """A zero of the level sensors that is suddenly told wrongly, with a stiff loop: rates at their limits."""
     levelled(s)
     with s.take(lines=False) as take, while_streaming(s):
@@ -234,7 +234,7 @@ def limits(s: Subject) -> Capture:
 
 
 @stimulus("silence", boards=("gyro",))
-def silence(s: Subject) -> Capture:
+def silence(s: Dut) -> Capture:
     """The level unit silent for a while, twice: shorter and longer than the unit waits."""
     levelled(s)
     facts = settings(s)

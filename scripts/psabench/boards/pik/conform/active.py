@@ -7,7 +7,7 @@ from itertools import pairwise
 from psabench.boards.objects import PikObjects as OD
 from psabench.conform.bus_host import burst, line, line_refused
 from psabench.conform.dictionary import as_the_dictionary_says, identity
-from psabench.conform.dut import Subject
+from psabench.conform.dut import Dut
 from psabench.conform.plan import active
 from psabench.conform.registers import names_and_rights
 from psabench.conform.requirements import Requirement, requirements
@@ -23,19 +23,19 @@ HALF = 0.5  # a step of the name plate
 SEQ_MODULO = 256  # of PIK_COUNTS
 
 
-def calm(s: Subject) -> None:
+def calm(s: Dut) -> None:
     """As after power-on, with its first readings."""
     s.reset()
     s.run_for(0.002 + START_S)
 
 
-def by_hand(s: Subject) -> None:
+def by_hand(s: Dut) -> None:
     """Latched by the register alone."""
     calm(s)
     line(s, f"{PERIOD} 0")
 
 
-def counters(s: Subject) -> list[int]:
+def counters(s: Dut) -> list[int]:
     """00h to 08h."""
     return [c.data for c in burst(s, *COUNTERS)]
 
@@ -46,7 +46,7 @@ def signed(word: int, bits: int = 16) -> int:
 
 
 @active("PIK-CNT-02", needs={"bus", "can"}, before=calm)
-def the_period_can_be_set(s: Subject, row: Requirement) -> str:
+def the_period_can_be_set(s: Dut, row: Requirement) -> str:
     """Set PERIOD 50, then 0 with three writes to LATCH; look at the stamps of the readings."""
     with s.take(lines=False) as take:
         line(s, f"{PERIOD} 32")
@@ -73,7 +73,7 @@ def the_period_can_be_set(s: Subject, row: Requirement) -> str:
 
 
 @active("PIK-CNT-04", needs={"bus"}, before=by_hand)
-def registers_hold_what_was_latched(s: Subject) -> str:
+def registers_hold_what_was_latched(s: Dut) -> str:
     """Latch by hand, read twice a while apart, latch again."""
     line(s, LATCH)
     first = counters(s)
@@ -90,7 +90,7 @@ def registers_hold_what_was_latched(s: Subject) -> str:
 
 
 @active("PIK-CNT-05", needs={"bus"}, before=by_hand)
-def a_channel_is_up_minus_down(s: Subject, row: Requirement) -> str:
+def a_channel_is_up_minus_down(s: Dut, row: Requirement) -> str:
     """Read the nine counters of one latch."""
     s.run_for(0.3)
     line(s, LATCH)
@@ -106,7 +106,7 @@ def a_channel_is_up_minus_down(s: Subject, row: Requirement) -> str:
 
 
 @active("PIK-CNT-06", needs={"bus"}, before=by_hand)
-def counters_can_be_cleared(s: Subject, row: Requirement) -> str:
+def counters_can_be_cleared(s: Dut, row: Requirement) -> str:
     """Measure rates with two latches, write CLEAR 1 and latch: X has counted since, Y and Z all the time."""
     most = row.limit("error_max_pulses")
     first = burst(s, LATCH, *COUNTERS)
@@ -128,7 +128,7 @@ def counters_can_be_cleared(s: Subject, row: Requirement) -> str:
 
 
 @active("PIK-RES-01", needs={"bus", "can"}, before=calm)
-def registers_begin_with_res(s: Subject) -> str:
+def registers_begin_with_res(s: Dut) -> str:
     """Let it count for a second, press Res, and compare the registers of a reading with its totals on CAN."""
     s.run_for(1.0)
     s.reset()
@@ -165,7 +165,7 @@ def registers_begin_with_res(s: Subject) -> str:
 
 
 @active("PIK-CNT-07", needs={"bus"}, before=by_hand)
-def readings_are_numbered_and_status_tells_a_latch(s: Subject, row: Requirement) -> str:
+def readings_are_numbered_and_status_tells_a_latch(s: Dut, row: Requirement) -> str:
     """Latch twice by hand and read SEQ and STATUS."""
     latched, saturated = int(row.limit("latched_mask")), int(row.limit("saturated_mask"))
     none, first, _, one, again, second = (c.data for c in burst(s, "R A", "R A", "R 9", LATCH, "R A", "R A", "R 9")[1:])
@@ -178,7 +178,7 @@ def readings_are_numbered_and_status_tells_a_latch(s: Subject, row: Requirement)
 
 
 @active("PIK-CNT-08", needs={"bus"}, before=calm, after=calm)
-def what_cannot_be_is_refused(s: Subject, row: Requirement) -> str:
+def what_cannot_be_is_refused(s: Dut, row: Requirement) -> str:
     """An address that is none, a write to what is read, a read of LATCH and CLEAR, X too early, a period of 0.1 ms."""
     line_refused(s, "R E", row.limit("no_address_code"))
     line_refused(s, "W 0 0", row.limit("read_only_code"))
@@ -193,14 +193,14 @@ def what_cannot_be_is_refused(s: Subject, row: Requirement) -> str:
 
 
 @active("PIK-CNT-09", needs={"bus"}, before=calm, after=calm)
-def registers_have_their_names_and_rights(s: Subject) -> str:
+def registers_have_their_names_and_rights(s: Dut) -> str:
     """Ask who is there, read and write every address."""
     seen = names_and_rights(s, "pik", never={}, writes={"PERIOD": 100})
     return seen
 
 
 @active("PIK-CAN-05", needs={"can"})
-def the_name_plate_is_right(s: Subject, row: Requirement) -> str:
+def the_name_plate_is_right(s: Dut, row: Requirement) -> str:
     """Read 2210h."""
     kind = "pik6" if s.variant.board == "pik6" else "pik"
     read = s.unit.node.read
@@ -213,12 +213,12 @@ def the_name_plate_is_right(s: Subject, row: Requirement) -> str:
 
 
 @active("PIK-CAN-06", needs={"can"})
-def the_board_says_what_it_is(s: Subject) -> str:
+def the_board_says_what_it_is(s: Dut) -> str:
     """Read 1008h and 1018h sub 2."""
     return identity(s, "PIK-CAN-06", "PIK")
 
 
 @active("PIK-CAN-07", needs={"can"}, before=calm)
-def objects_are_as_the_dictionary_says(s: Subject) -> str:
+def objects_are_as_the_dictionary_says(s: Dut) -> str:
     """Read every object of the EDS and write where nothing may be written."""
     return as_the_dictionary_says(s, "pik")

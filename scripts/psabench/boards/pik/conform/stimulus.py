@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from psabench.boards.objects import PikObjects as OD
 from psabench.conform.capture.log import Capture
-from psabench.conform.dut import Subject
+from psabench.conform.dut import Dut
 from psabench.conform.plan import stimulus
 from psabench.conform.stimulus.streamed import from_res, readings, while_streaming
 from psabench.conform.verdict import Inconclusive
@@ -16,25 +16,25 @@ OVERDRIVE_DEG = -90.0  # there the accelerometer X gives more than its channel c
 
 
 @stimulus("power_on", boards=("pik",))
-def power_on(s: Subject) -> Capture:
+def power_on(s: Dut) -> Capture:
     """From Res to some readings, streaming as soon as it has booted."""
     return from_res(s, START_S)
 
 
 @stimulus("stream", boards=("pik",))
-def stream(s: Subject) -> Capture:
+def stream(s: Dut) -> Capture:
     """A second of pulses and readings."""
     return s.capture("stream", readings(s, START_S, lambda: s.run_for(STREAM_S)))
 
 
 @stimulus("minute", boards=("pik",))
-def minute(s: Subject) -> Capture:
+def minute(s: Dut) -> Capture:
     """A minute of readings at still inputs."""
     return s.capture("minute", readings(s, START_S, lambda: s.run_for(MINUTE_S), lines=False))
 
 
 @stimulus("overdrive", boards=("pik",))
-def overdrive(s: Subject) -> Capture:
+def overdrive(s: Dut) -> Capture:
     """The accelerometer X turned by a dividing head until its channel cannot keep up, and back; a reading each 2 ms."""
     if "head" not in s.probes:
         raise Inconclusive("no dividing head was connected")
@@ -57,7 +57,7 @@ def overdrive(s: Subject) -> Capture:
 
 
 @stimulus("power_cycle", boards=("pik",))
-def power_cycle(s: Subject) -> Capture:
+def power_cycle(s: Dut) -> Capture:
     """Readings, no power for a while, and its first periods afterwards."""
     s.reset()
     s.run_for(START_S)

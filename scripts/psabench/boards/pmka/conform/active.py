@@ -9,7 +9,7 @@ from psabench.boards.pmka.conform.stimulus import START_S, ts_s
 from psabench.conform.bus_host import burst, line, line_refused
 from psabench.conform.capture.log import CanLog
 from psabench.conform.dictionary import as_the_dictionary_says, identity
-from psabench.conform.dut import Subject
+from psabench.conform.dut import Dut
 from psabench.conform.plan import active
 from psabench.conform.registers import names_and_rights
 from psabench.conform.requirements import Requirement, requirements
@@ -27,25 +27,25 @@ SIGNS = {0: 0, 1: 1, 3: -1}  # two bits of RESETS
 AUTONOMOUS = 1
 
 
-def calm(s: Subject) -> None:
+def calm(s: Dut) -> None:
     """As after power-on, with its first readings."""
     s.reset()
     s.run_for(0.002 + START_S + 2 * ts_s())
 
 
 @active("PMKA-SAMP-04", needs={"bus", "can"})
-def codes_of_the_bus_are_those_on_can(s: Subject) -> str:
+def codes_of_the_bus_are_those_on_can(s: Dut) -> str:
     """Read 00h to 03h within a period, and find these codes on CAN."""
     return _as_on_can(s, 0, 4)
 
 
 @active("PMKA-BUS-02", needs={"bus", "can"})
-def state_registers_are_the_messages(s: Subject) -> str:
+def state_registers_are_the_messages(s: Dut) -> str:
     """Read 04h, 05h and 07h within a period, and find resets, rotation and temperature on CAN."""
     return _as_on_can(s, 4, 7)
 
 
-def _as_on_can(s: Subject, first: int, end: int) -> str:
+def _as_on_can(s: Dut, first: int, end: int) -> str:
     """Words first to end of X, Y, Z, K, RESETS, ROTATION, TEMPERATURE."""
     calm(s)
     with s.take(lines=False) as take, while_streaming(s):
@@ -81,7 +81,7 @@ def _as_on_can(s: Subject, first: int, end: int) -> str:
 
 
 @active("PMKA-BUS-02", needs={"bus"}, before=calm, after=calm)
-def registers_have_their_names_and_rights(s: Subject) -> str:
+def registers_have_their_names_and_rights(s: Dut) -> str:
     """Ask who is there, read and write every address."""
     line(s, "W 9 0")  # COMMAND is taken in mode program
     seen = names_and_rights(s, "pmka", never={}, writes={"COMMAND": 0, "BEAT": 200, "ZERO": 100, "INDEX": 1, "MODE": 0})
@@ -89,7 +89,7 @@ def registers_have_their_names_and_rights(s: Subject) -> str:
 
 
 @active("PMKA-CAL-02", needs={"bus", "can"}, before=calm, after=calm)
-def the_computer_turns_the_calibration(s: Subject) -> str:
+def the_computer_turns_the_calibration(s: Dut) -> str:
     """Set mode program, command beats and calibrations, look at TAU, CAL and SERVES."""
     line(s, "W 9 0")
     for tau, cal in ((2, 1), (4, 2), (5, 0), (1, 1), (3, 2)):
@@ -105,7 +105,7 @@ def the_computer_turns_the_calibration(s: Subject) -> str:
 
 
 @active("PMKA-ROM-01", needs={"bus"})
-def the_rom_can_be_read(s: Subject) -> str:
+def the_rom_can_be_read(s: Dut) -> str:
     """Read all words of the ROM by INDEX and DATA."""
     rom = _rom(s)
     if rom.ts_s != ts_s() or len(rom.degc) < 2 or rom.serial != s.unit.serial() & 0xFFFF:
@@ -114,7 +114,7 @@ def the_rom_can_be_read(s: Subject) -> str:
 
 
 @active("PMKA-ROM-02", needs={"bus"})
-def the_sum_of_the_rom_is_0(s: Subject, row: Requirement) -> str:
+def the_sum_of_the_rom_is_0(s: Dut, row: Requirement) -> str:
     """Add all words."""
     words = _rom_words(s)
     total = sum(words) & 0xFFFF
@@ -123,7 +123,7 @@ def the_sum_of_the_rom_is_0(s: Subject, row: Requirement) -> str:
     return f"{len(words)} words, sum 0"
 
 
-def _rom_words(s: Subject) -> list[int]:
+def _rom_words(s: Dut) -> list[int]:
     def word(w: int) -> int:
         line(s, f"W D {ROM_WORDS_AT + w:X}")
         return line(s, "R E").data
@@ -133,7 +133,7 @@ def _rom_words(s: Subject) -> list[int]:
     return head + [word(est.ROM_HEAD + w) for w in range(rows + 1)]
 
 
-def _rom(s: Subject) -> est.Rom:
+def _rom(s: Dut) -> est.Rom:
     try:
         return est.rom_of(_rom_words(s))
     except ValueError as err:
@@ -141,7 +141,7 @@ def _rom(s: Subject) -> est.Rom:
 
 
 @active("PMKA-ROM-03", needs={"bus"})
-def the_temperature_stands_still(s: Subject, row: Requirement) -> str:
+def the_temperature_stands_still(s: Dut, row: Requirement) -> str:
     """Read TEMPERATURE over a second: it stands still to its noise, within the range of the table of the ROM."""
     rom = _rom(s)
     calm(s)
@@ -154,13 +154,13 @@ def the_temperature_stands_still(s: Subject, row: Requirement) -> str:
     return f"{min(seen):.3f} to {max(seen):.3f} degC"
 
 
-def _degc(s: Subject) -> float:
+def _degc(s: Dut) -> float:
     code = line(s, "R 7").data
     return float((code - 0x10000 if code & 0x8000 else code) * requirements()["PMKA-ROM-03"].limit("code_degc"))
 
 
 @active("PMKA-ROM-03", needs={"bus", "chamber"}, before=calm)
-def the_temperature_is_that_of_the_chamber(s: Subject, row: Requirement) -> str:
+def the_temperature_is_that_of_the_chamber(s: Dut, row: Requirement) -> str:
     """Compare TEMPERATURE with the chamber at rest; heat the air for a minute, and see it follow."""
     chamber = s.bench.chamber
     air, first, ramp = chamber.temp_degc, _degc(s), chamber.ramp_k_per_min
@@ -181,7 +181,7 @@ def the_temperature_is_that_of_the_chamber(s: Subject, row: Requirement) -> str:
 
 
 @active("PMKA-BUS-03", needs={"bus"}, before=calm)
-def a_reading_that_nobody_took_is_told(s: Subject, row: Requirement) -> str:
+def a_reading_that_nobody_took_is_told(s: Dut, row: Requirement) -> str:
     """Read STATUS with and without a read of K in the period before."""
     waits, missed = int(row.limit("waits_mask")), int(row.limit("missed_mask"))
     for _ in range(ATTEMPTS):
@@ -213,7 +213,7 @@ def _periods(a: Cycle, b: Cycle) -> float:
 
 
 @active("PMKA-BUS-04", needs={"bus"}, before=calm)
-def a_read_is_of_its_strobe_s_beginning(s: Subject) -> str:
+def a_read_is_of_its_strobe_s_beginning(s: Dut) -> str:
     """Read SEQ with a strobe of 20 ms, and at once afterwards."""
     long, after = burst(s, f"R 6 {STROBE_NS}", "R 6")
     made = (after.data - long.data) & 0xFFFF
@@ -225,7 +225,7 @@ def a_read_is_of_its_strobe_s_beginning(s: Subject) -> str:
 
 
 @active("PMKA-BUS-04", needs={"bus", "can"}, before=calm)
-def a_write_acts_at_the_end_of_its_strobe(s: Subject) -> str:
+def a_write_acts_at_the_end_of_its_strobe(s: Dut) -> str:
     """Write MODE with a strobe of 20 ms and look from which reading on AUTONOMOUS has changed."""
     was = line(s, "R 9").data & AUTONOMOUS
     with s.take(lines=False) as take, while_streaming(s):
@@ -245,7 +245,7 @@ def a_write_acts_at_the_end_of_its_strobe(s: Subject) -> str:
 
 
 @active("PMKA-BUS-05", needs={"bus"}, before=calm, after=calm)
-def what_cannot_be_is_refused(s: Subject, row: Requirement) -> str:
+def what_cannot_be_is_refused(s: Dut, row: Requirement) -> str:
     """Read an address that is none, command in mode autonomous, set a beat too short, read before the first reading."""
     line_refused(s, "R F", row.limit("no_address_code"))
     line(s, "W 9 1")
@@ -259,7 +259,7 @@ def what_cannot_be_is_refused(s: Subject, row: Requirement) -> str:
 
 
 @active("PMKA-BUS-06", needs={"bus", "can"})
-def resets_are_counted(s: Subject) -> str:
+def resets_are_counted(s: Dut) -> str:
     """Count resets in the readings of a second, and compare them with INDEX 0 to 7."""
     s.reset()
     s.run_for(0.002)
@@ -278,12 +278,12 @@ def resets_are_counted(s: Subject) -> str:
 
 
 @active("PMKA-CAN-05", needs={"can"})
-def the_board_says_what_it_is(s: Subject) -> str:
+def the_board_says_what_it_is(s: Dut) -> str:
     """Read 1008h and 1018h sub 2."""
     return identity(s, "PMKA-CAN-05", "PMKA")
 
 
 @active("PMKA-CAN-06", needs={"can"}, before=calm)
-def objects_are_as_the_dictionary_says(s: Subject) -> str:
+def objects_are_as_the_dictionary_says(s: Dut) -> str:
     """Read every object of the EDS and write where nothing may be written."""
     return as_the_dictionary_says(s, "pmka")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from psabench.boards.pmka.device import Pmka
 from psabench.conform.bus_host import line
 from psabench.conform.capture.log import Capture
-from psabench.conform.dut import Subject
+from psabench.conform.dut import Dut
 from psabench.conform.plan import stimulus
 from psabench.conform.requirements import requirements
 from psabench.conform.stimulus.streamed import from_res, readings
@@ -22,14 +22,14 @@ def ts_s() -> float:
     return requirements()["PMKA-SAMP-01"].limit("ts_us") * 1e-6
 
 
-def unit(s: Subject) -> Pmka:
+def unit(s: Dut) -> Pmka:
     """Raises Inconclusive where it is none."""
     if not isinstance(s.unit, Pmka):
         raise Inconclusive("no PMKA")
     return s.unit
 
 
-def turn(s: Subject, beats: int, lengths: tuple[int, int, int]) -> None:
+def turn(s: Dut, beats: int, lengths: tuple[int, int, int]) -> None:
     """Let beats pass; where the board leaves the calibration to the computer, be that one."""
     beat, zero, resets = lengths
     if s.variant["rotation"] != "program":
@@ -45,19 +45,19 @@ def turn(s: Subject, beats: int, lengths: tuple[int, int, int]) -> None:
 
 
 @stimulus("power_on", boards=("pmka",))
-def power_on(s: Subject) -> Capture:
+def power_on(s: Dut) -> Capture:
     """From Res to some readings, streaming as soon as it has booted."""
     return from_res(s, START_S + 6 * ts_s())
 
 
 @stimulus("stream", boards=("pmka",))
-def stream(s: Subject) -> Capture:
+def stream(s: Dut) -> Capture:
     """A rotation and some more, on the lines and on CAN."""
     return s.capture("stream", readings(s, START_S, lambda: turn(s, ROTATION + 1, SHORT)))
 
 
 @stimulus("minute", boards=("pmka",))
-def minute(s: Subject) -> Capture:
+def minute(s: Dut) -> Capture:
     """A minute of readings through many rotations, and the words of the ROM."""
     take = readings(s, START_S, lambda: turn(s, MINUTE, (BEAT, ZERO, RESETS)), lines=False)
     take.facts["rom"] = unit(s).rom_words()
@@ -67,7 +67,7 @@ def minute(s: Subject) -> Capture:
 
 
 @stimulus("strobes", boards=("pmka",))
-def strobes(s: Subject) -> Capture:
+def strobes(s: Dut) -> Capture:
     """Reads and writes of registers over the bus port, while readings come."""
     cycles: list[Cycle] = []
 

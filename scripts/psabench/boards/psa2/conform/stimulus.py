@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from psabench.conform.capture.log import Capture
-from psabench.conform.dut import Subject, Take
+from psabench.conform.dut import Dut, Take
 from psabench.conform.plan import stimulus
 from psabench.conform.stimulus.streamed import while_streaming
 
@@ -12,7 +12,7 @@ STREAM_S = 0.4
 PERIOD_S, FRAME_TO_CAN_S, IN_FRAME_S, ON_BUS_S = 1e-3, 298e-6, 40e-6, 65e-6
 
 
-def into_a_frame(s: Subject, take: Take, lead_s: float = 0.0) -> None:
+def into_a_frame(s: Dut, take: Take, lead_s: float = 0.0) -> None:
     """Let time pass until a frame is under way on the line; only in lockstep can that be met."""
     s.run_for(10 * PERIOD_S)
     if not {"lockstep", "stamps"} <= s.probes or not take.frames:
@@ -23,7 +23,7 @@ def into_a_frame(s: Subject, take: Take, lead_s: float = 0.0) -> None:
 
 
 @stimulus("power_on", boards=("psa2",))
-def power_on(s: Subject) -> Capture:
+def power_on(s: Dut) -> Capture:
     """Res in the middle of a frame, then until frames come: the set-up on all lines, boot-up, the first frames."""
     s.wait_ready()
     with s.take() as take, while_streaming(s):
@@ -37,7 +37,7 @@ def power_on(s: Subject) -> Capture:
 
 
 @stimulus("power_cycle", boards=("psa2",))
-def power_cycle(s: Subject) -> Capture:
+def power_cycle(s: Dut) -> Capture:
     """The supply off in the middle of a frame, and on again until frames come."""
     s.wait_ready()
     with s.take() as take, while_streaming(s):
@@ -53,7 +53,7 @@ def power_cycle(s: Subject) -> Capture:
 
 
 @stimulus("stream", boards=("psa2",))
-def stream(s: Subject) -> Capture:
+def stream(s: Dut) -> Capture:
     """Some hundred frames, on the lines and on CAN."""
     s.wait_ready()
     with s.take() as take, while_streaming(s):

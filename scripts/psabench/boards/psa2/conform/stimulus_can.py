@@ -17,7 +17,7 @@ from psabench.boards.objects import Psa2Objects as OD
 from psabench.boards.psa2.conform.capture_can import CODE_MAX, pairs, segment
 from psabench.boards.psa2.conform.stimulus import PERIOD_S
 from psabench.conform.capture.log import Capture
-from psabench.conform.dut import Subject, Take
+from psabench.conform.dut import Dut, Take
 from psabench.conform.plan import stimulus
 from psabench.conform.stimulus.streamed import while_streaming
 from psabench.conform.verdict import Failed, Inconclusive
@@ -54,17 +54,17 @@ def answer_of(access: Callable[[], object]) -> Answer:
         return Answer(abort=e.abort_code)
 
 
-def ask(s: Subject, index: int, sub: int = 0) -> Answer:
+def ask(s: Dut, index: int, sub: int = 0) -> Answer:
     """Read an object."""
     return answer_of(lambda: s.unit.node.read(index, sub))
 
 
-def tell(s: Subject, index: int, sub: int, value: int) -> Answer:
+def tell(s: Dut, index: int, sub: int, value: int) -> Answer:
     """Write an object."""
     return answer_of(lambda: s.unit.node.write(index, sub, value))
 
 
-def tell_raw(s: Subject, index: int, sub: int, value: int) -> Answer:
+def tell_raw(s: Dut, index: int, sub: int, value: int) -> Answer:
     """Write one byte, whatever the EDS says of the object."""
     return answer_of(lambda: s.unit.node.write_raw(index, sub, bytes([value])))
 
@@ -76,14 +76,14 @@ def cut(take: Take, name: str) -> None:
     cuts[name] = len(take.frames)
 
 
-def counters(s: Subject, *, after: bool = False) -> dict[int, Answer]:
+def counters(s: Dut, *, after: bool = False) -> dict[int, Answer]:
     """Of object 2030h by sub-index; the frames last before a stream, first after it."""
     subs = (SYNCS_MISSED, TIMEOUTS, OVERRUNS, FRAMES)
     return {sub: ask(s, COUNTERS, sub) for sub in (subs[::-1] if after else subs)}
 
 
 @contextmanager
-def changed(s: Subject) -> Iterator[None]:
+def changed(s: Dut) -> Iterator[None]:
     """Settings may be changed within; a reset puts them back."""
     s.wait_ready()
     try:
@@ -93,7 +93,7 @@ def changed(s: Subject) -> Iterator[None]:
         s.run_for(PERIOD_S)
 
 
-def streamed(s: Subject, take: Take, name: str, dwell_s: float) -> None:
+def streamed(s: Dut, take: Take, name: str, dwell_s: float) -> None:
     """Frames for so long, between the cuts `name` and `name end`."""
     cut(take, name)
     with while_streaming(s):
@@ -107,7 +107,7 @@ def split(index: int, sub: int, value: int) -> list[tuple[int, int, int]]:
 
 
 @stimulus("quiet", boards=("psa2",))
-def quiet(s: Subject) -> Capture:
+def quiet(s: Dut) -> Capture:
     """Frames for two and a half seconds, on CAN alone; counters meanwhile: the log has them among the frames."""
     s.wait_ready()
     with s.take(lines=False) as take, while_streaming(s):
@@ -120,7 +120,7 @@ def quiet(s: Subject) -> Capture:
 
 
 @stimulus("registers", boards=("psa2",))
-def registers(s: Subject) -> Capture:
+def registers(s: Dut) -> Capture:
     """All registers read while frames flow. facts: read, by index and sub-index; counters before and after."""
     s.wait_ready()
     with s.take() as take:
@@ -134,7 +134,7 @@ def registers(s: Subject) -> Capture:
 
 
 @stimulus("busy", boards=("psa2",))
-def busy(s: Subject) -> Capture:
+def busy(s: Dut) -> Capture:
     """All registers read again and again at 4000 SPS in the fast form. facts: answers; counters before and after."""
     with changed(s), s.take() as take:
         take.facts["answers"] = [tell(s, FORM, 0, 1), tell(s, ACCEL[0], CONFIG0, 0x46 | 4 << 3)]
@@ -161,7 +161,7 @@ STATUS_WRITES = (0xF6, 0x04)  # all but ORDER, which turns the bits of an answer
 
 
 @stimulus("writes", boards=("psa2",))
-def writes(s: Subject) -> Capture:
+def writes(s: Dut) -> Capture:
     """Registers written and read again. facts: written, list of object, sub-index, value, answer, what reads then.
 
     status: of the temperature converter, before and after each of STATUS_WRITES.
@@ -181,7 +181,7 @@ def writes(s: Subject) -> Capture:
 
 
 @stimulus("opcodes", boards=("psa2",))
-def opcodes(s: Subject) -> Capture:
+def opcodes(s: Dut) -> Capture:
     """RESET as an opcode to both groups, then all registers. facts: answers, read; cuts around the opcode."""
     with changed(s), s.take() as take:
         s.run_for(5 * PERIOD_S)
@@ -208,7 +208,7 @@ OPCODES_REFUSED: Sequence[tuple[int, int, int]] = (
 
 
 @stimulus("refusals", boards=("psa2",))
-def refusals(s: Subject) -> Capture:
+def refusals(s: Dut) -> Capture:
     """Values that the board rejects. facts: reserved, (object, sub, value, answer, before, after); opcodes; others."""
     reserved = [*RESERVED, *([RESERVED_GAIN] if s.variant.board == "psa2" else [])]
     with changed(s), s.take() as take:
@@ -222,7 +222,7 @@ def refusals(s: Subject) -> Capture:
 
 
 @stimulus("early", boards=("psa2",))
-def early(s: Subject) -> Capture:
+def early(s: Dut) -> Capture:
     """Asked before the set-up is over, and while another request is under way. facts: early, busy, missed."""
     s.wait_ready()
     with s.take(lines=False) as take:
@@ -242,7 +242,7 @@ def early(s: Subject) -> Capture:
     return s.capture("early", take)
 
 
-def _busy(s: Subject, take: Take) -> list[int]:
+def _busy(s: Dut, take: Take) -> list[int]:
     """Abort codes of a request sent while one that its client gave up is under way: one to the temperature
     converter waits for the end of its conversion, 10 ms.
     """
@@ -261,7 +261,7 @@ def _busy(s: Subject, take: Take) -> list[int]:
 
 
 @stimulus("rates", boards=("psa2",))
-def rates(s: Subject) -> Capture:
+def rates(s: Dut) -> Capture:
     """Each data rate: frames (every fourth as a PDO), then a pulse on SYNC_A by SYNC. Cuts "DR 0" ... "DR 4"."""
     with changed(s), s.take() as take:
         tell(s, NTH, 0, 4)
@@ -278,7 +278,7 @@ def rates(s: Subject) -> Capture:
 
 
 @stimulus("sync", boards=("psa2",))
-def sync(s: Subject) -> Capture:
+def sync(s: Dut) -> Capture:
     """SYNC in sample mode 1, then with 2024h = 1. Cuts "SYNC 0" ... before each, "pulse" before the last.
 
     facts: paced, False where no one knows how long after one another they were sent.
@@ -309,7 +309,7 @@ def sync(s: Subject) -> Capture:
 LATE_S = 2.0  # real time that a busy machine may be late
 
 
-def _wait_for_a_sample(s: Subject, take: Take, since: str) -> None:
+def _wait_for_a_sample(s: Dut, take: Take, since: str) -> None:
     """In real time until one has come since the cut: a busy machine is late. In lockstep it has, or never will."""
 
     def came() -> bool:
@@ -321,7 +321,7 @@ def _wait_for_a_sample(s: Subject, take: Take, since: str) -> None:
 
 
 @stimulus("gain", boards=("psa2",))
-def gain(s: Subject) -> Capture:
+def gain(s: Dut) -> Capture:
     """CONFIG1 written while frames flow: gain 4 for 2. Cuts "before", "gain"; facts: answer, read on all three."""
     with changed(s), s.take(lines=False) as take:
         cut(take, "before")
@@ -340,7 +340,7 @@ APART_CODES = 2000  # of two axes, so that one can be beyond its limit alone, wh
 
 
 @stimulus("numbers", boards=("psa2",))
-def numbers(s: Subject) -> Capture:
+def numbers(s: Dut) -> Capture:
     """OFC and FSC written through 2000h: as they were, an offset, a factor, both limits. Cuts by these names.
 
     At last one axis alone is driven beyond either limit. facts: alone, its number by "one high" and "one low", where
@@ -386,7 +386,7 @@ def _alone(e: Capture) -> dict[str, tuple[int, int]]:
 
 
 @stimulus("forms", boards=("psa2",))
-def forms(s: Subject) -> Capture:
+def forms(s: Dut) -> Capture:
     """Every frame form for a while, the last one several times. Cuts "form 0" ..., "again 0" ...
 
     facts: answer of each, bit 31 of the TPDOs, stamps before each time.
@@ -406,7 +406,7 @@ def forms(s: Subject) -> Capture:
 
 
 @stimulus("fit", boards=("psa2",))
-def fit(s: Subject) -> Capture:
+def fit(s: Dut) -> Capture:
     """What the bus cannot carry. facts: words of 2031h, answers, CONFIG0 after; cuts "form", "rate"."""
     with changed(s), s.take() as take:
         cut(take, "rate")
@@ -425,7 +425,7 @@ def fit(s: Subject) -> Capture:
 
 
 @stimulus("starts", boards=("psa2",))
-def starts(s: Subject) -> Capture:
+def starts(s: Dut) -> Capture:
     """The stream started and stopped many times, at all phases of a sample."""
     s.wait_ready()
     with s.take(lines=False) as take:

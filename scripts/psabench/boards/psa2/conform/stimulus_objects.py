@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from psabench.boards.objects import Psa2Objects as OD
 from psabench.boards.psa2.conform.stimulus_can import ACCEL, CONFIG0, TEMP, Answer, answer_of, ask, changed, tell
 from psabench.conform.capture.log import Capture
-from psabench.conform.dut import Subject
+from psabench.conform.dut import Dut
 from psabench.conform.plan import stimulus
 from psabench.conform.stimulus.streamed import while_streaming
 from psabench.errors import DeviceError
@@ -18,7 +18,7 @@ TRIES = 6  # in real time, on a busy machine, three answers may not come within 
 
 
 @stimulus("objects", boards=("psa2",))
-def objects(s: Subject) -> Capture:
+def objects(s: Dut) -> Capture:
     """Identity, width and mirrors. facts: read; mirrors, those of one sample, with its PDO in the log."""
     wanted = (
         *((OD.CODES, k) for k in (1, 2, 3, 4)),
@@ -46,7 +46,7 @@ def objects(s: Subject) -> Capture:
     return s.capture("objects", take)
 
 
-def _of_one_sample(s: Subject, index: int, sub: int) -> tuple[int, int, Answer, Answer, Answer]:
+def _of_one_sample(s: Dut, index: int, sub: int) -> tuple[int, int, Answer, Answer, Answer]:
     """Object, sub-index, its value and the numbers of the samples that stood there before and after."""
     for _ in range(TRIES):
         before = ask(s, OD.FRAME_HEAD, 1)
@@ -58,7 +58,7 @@ def _of_one_sample(s: Subject, index: int, sub: int) -> tuple[int, int, Answer, 
 
 
 @stimulus("dictionary", boards=("psa2",))
-def dictionary(s: Subject) -> Capture:
+def dictionary(s: Dut) -> Capture:
     """Every object of the EDS but the registers read, and written where a write is rejected. facts: rows."""
     with changed(s), s.take(lines=False) as take:
         take.facts["rows"] = [_row(s, d) for d in s.unit.node.objects() if not (d.index in (*ACCEL, TEMP) and d.sub)]
@@ -75,7 +75,7 @@ class Row:
     write: int | None  # abort code of a write of the same (read-only) or of one too many; None: none was tried
 
 
-def _row(s: Subject, d: Described) -> Row:
+def _row(s: Dut, d: Described) -> Row:
     raw, abort, write = b"", 0, None
     try:
         raw = s.unit.node.read_raw(d.index, d.sub)
@@ -88,5 +88,5 @@ def _row(s: Subject, d: Described) -> Row:
     return Row(d, raw, abort, write)
 
 
-def _abort_of_write(s: Subject, d: Described, data: bytes) -> int:
+def _abort_of_write(s: Dut, d: Described, data: bytes) -> int:
     return answer_of(lambda: s.unit.node.write_raw(d.index, d.sub, data)).abort

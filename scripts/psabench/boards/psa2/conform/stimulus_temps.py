@@ -19,7 +19,7 @@ from psabench.boards.psa2.conform.stimulus_can import (
     tell,
 )
 from psabench.conform.capture.log import Capture
-from psabench.conform.dut import Subject
+from psabench.conform.dut import Dut
 from psabench.conform.plan import stimulus
 from psabench.conform.stimulus.streamed import while_streaming
 
@@ -27,7 +27,7 @@ HISTORY, HISTORY_LOOKS = OD.ERROR_HISTORY, 4
 
 
 @stimulus("trouble", boards=("psa2",))
-def trouble(s: Subject) -> Capture:
+def trouble(s: Dut) -> Capture:
     """The temperature converter silenced by its SYNC command without WAKEUP, a form rejected before and after it.
 
     facts: access, counters, history of errors.
@@ -49,7 +49,7 @@ def trouble(s: Subject) -> Capture:
     return s.capture("trouble", take)
 
 
-def _refused_form(s: Subject) -> None:
+def _refused_form(s: Dut) -> None:
     """An emergency of another kind: pairs at 4000 SPS, asked for and rejected, then everything as it was."""
     tell(s, FORM, 0, 1)
     tell(s, ACCEL[0], CONFIG0, 0x46 | 4 << 3)
@@ -61,7 +61,7 @@ def _refused_form(s: Subject) -> None:
 
 
 @stimulus("selfcal", boards=("psa2",))
-def selfcal(s: Subject) -> Capture:
+def selfcal(s: Dut) -> Capture:
     """SELFCAL to the temperature converter while it is scanned. Cuts "before", "selfcal"."""
     with changed(s), s.take(lines=False) as take:
         cut(take, "before")
@@ -74,7 +74,7 @@ def selfcal(s: Subject) -> Capture:
 
 
 @stimulus("chamber", boards=("psa2",))
-def chamber(s: Subject) -> Capture:
+def chamber(s: Dut) -> Capture:
     """Temperature codes beside the temperature of the chamber. facts: temp_degc."""
     s.wait_ready()
     with s.take(lines=False) as take:

@@ -7,7 +7,7 @@ import math
 from psabench.boards.objects import Psd1Objects as OD
 from psabench.boards.psd1.conform.host import BOTH, calm, drive, has_host, period_s, run_cycles, status, word
 from psabench.conform.bus_host import SHORT_S, burst, line, line_refused
-from psabench.conform.dut import Subject
+from psabench.conform.dut import Dut
 from psabench.conform.plan import active
 from psabench.conform.registers import names_and_rights
 from psabench.conform.requirements import Requirement
@@ -27,7 +27,7 @@ SCAN_S = 120e-6  # of two cycles and more
 SCAN_STEP_S = 0.8e-6  # less than a word waits for the built-in host
 
 
-def _waiting(s: Subject, axis: int = 0) -> None:
+def _waiting(s: Dut, axis: int = 0) -> None:
     """Let a cycle run until the word of an axis waits."""
     calm(s)
     line(s, f"W F {BOTH:04X}")
@@ -38,7 +38,7 @@ def _waiting(s: Subject, axis: int = 0) -> None:
 
 
 @active("PSD1-CYC-02", needs={"bus"}, before=calm)
-def no_cycle_without_int0_and_fl1(s: Subject) -> str:
+def no_cycle_without_int0_and_fl1(s: Dut) -> str:
     """Write FLAGS 0, 1 and 2, look for a running cycle after each, then write 3."""
     if has_host(s.variant):
         return _without_flags(s)
@@ -54,7 +54,7 @@ def no_cycle_without_int0_and_fl1(s: Subject) -> str:
     return "no cycle with FLAGS 0, 1 and 2, one with 3"
 
 
-def _without_flags(s: Subject) -> str:
+def _without_flags(s: Dut) -> str:
     """Where the board reads its words itself it counts them."""
     found = {}
     for flags in (0, 1, 2, BOTH):
@@ -70,7 +70,7 @@ def _without_flags(s: Subject) -> str:
 
 
 @active("PSD1-CYC-05", needs={"bus"}, after=calm)
-def a_cycle_goes_on_without_its_conditions(s: Subject) -> str:
+def a_cycle_goes_on_without_its_conditions(s: Dut) -> str:
     """Write FLAGS 0 while X waits, read the three words, look for another cycle."""
     _waiting(s)
     line(s, "W F 0000")
@@ -82,7 +82,7 @@ def a_cycle_goes_on_without_its_conditions(s: Subject) -> str:
 
 
 @active("PSD1-FL2-06", needs={"bus"}, after=calm)
-def a_word_waits_for_its_strobe(s: Subject) -> str:
+def a_word_waits_for_its_strobe(s: Dut) -> str:
     """Leave X unread for a second, then read X, Y and Z."""
     _waiting(s)
     before = line(s, "R 3").data & 0x07
@@ -95,7 +95,7 @@ def a_word_waits_for_its_strobe(s: Subject) -> str:
 
 
 @active("PSD1-BUS-02", needs={"bus", "can"}, before=calm, after=calm)
-def words_are_answered_at_their_addresses(s: Subject) -> str:
+def words_are_answered_at_their_addresses(s: Dut) -> str:
     """Read X, Y and Z at 00h, 01h and 02h, and compare them with what the board tells of that cycle."""
     for _ in range(4):
         words = [c.data for c in drive(s, 1)]
@@ -106,7 +106,7 @@ def words_are_answered_at_their_addresses(s: Subject) -> str:
 
 
 @active("PSD1-BUS-03", needs={"bus"}, before=calm, after=calm)
-def a_strobe_for_another_word_is_refused(s: Subject, row: Requirement) -> str:
+def a_strobe_for_another_word_is_refused(s: Dut, row: Requirement) -> str:
     """Read Y and Z while X waits, then X; read X before there is a cycle."""
     code = row.limit("abort_code")
     line_refused(s, "R 0", code)
@@ -120,7 +120,7 @@ def a_strobe_for_another_word_is_refused(s: Subject, row: Requirement) -> str:
 
 
 @active("PSD1-BUS-04", needs={"bus"}, after=calm)
-def a_word_is_taken_once(s: Subject, row: Requirement) -> str:
+def a_word_is_taken_once(s: Dut, row: Requirement) -> str:
     """Read X twice."""
     code = row.limit("abort_code")
     _waiting(s)
@@ -130,7 +130,7 @@ def a_word_is_taken_once(s: Subject, row: Requirement) -> str:
 
 
 @active("PSD1-BUS-05", needs={"bus"}, before=calm)
-def words_of_the_built_in_host_are_refused(s: Subject, row: Requirement) -> str:
+def words_of_the_built_in_host_are_refused(s: Dut, row: Requirement) -> str:
     """Read X, Y and Z while the board reads them itself, each time a little earlier in the cycle."""
     code = row.limit("abort_code")
     strobes = round(SCAN_S / SCAN_STEP_S)
@@ -143,7 +143,7 @@ def words_of_the_built_in_host_are_refused(s: Subject, row: Requirement) -> str:
     return f"{3 * strobes} strobes refused"
 
 
-def _into_a_cycle(s: Subject) -> None:
+def _into_a_cycle(s: Dut) -> None:
     """Look for a running cycle, in one period after the other."""
     for _ in range(math.ceil(period_s(s.variant) / CYCLE_S)):
         if status(s) & CYCLE:
@@ -151,13 +151,13 @@ def _into_a_cycle(s: Subject) -> None:
         _a_period_later(s, CYCLE_S)
 
 
-def _a_period_later(s: Subject, less_s: float) -> None:
+def _a_period_later(s: Dut, less_s: float) -> None:
     """From the answer to a line to when it was sent, a period later and so much less."""
     s.run_for(period_s(s.variant) - SHORT_S - less_s)
 
 
 @active("PSD1-BUS-06", needs={"bus"}, before=calm, after=calm)
-def registers_have_their_names_and_rights(s: Subject) -> str:
+def registers_have_their_names_and_rights(s: Dut) -> str:
     """Ask who is there, read and write every address."""
     words = {"X": 0x08000022, "Y": 0x08000022, "Z": 0x08000022}
     seen = names_and_rights(s, "psd1", never=words, writes={"COMMAND": 3, "TEMP": 1, "SERVICE": 2, "FLAGS": 0})
@@ -165,7 +165,7 @@ def registers_have_their_names_and_rights(s: Subject) -> str:
 
 
 @active("PSD1-BUS-10", needs={"bus"}, before=calm)
-def channels_come_back_with_their_codes(s: Subject, row: Requirement) -> str:
+def channels_come_back_with_their_codes(s: Dut, row: Requirement) -> str:
     """Write each channel to TEMP and SERVICE and read it back."""
     bits = int(row.limit("code_bits"))
     seen = []
@@ -180,7 +180,7 @@ def channels_come_back_with_their_codes(s: Subject, row: Requirement) -> str:
 
 
 @active("PSD1-BUS-11", needs={"bus"}, before=calm)
-def the_other_signals_are_there(s: Subject) -> str:
+def the_other_signals_are_there(s: Dut) -> str:
     """Read gyros, rate sensors, temperatures and service signals."""
     run_cycles(s, 3)
     gyros = [line(s, f"R {a:X}").data for a in range(4, 7)]
@@ -198,7 +198,7 @@ def the_other_signals_are_there(s: Subject) -> str:
 
 
 @active("PSD1-BUS-11", needs={"bus", "supply"}, before=calm)
-def the_service_signal_follows_the_supply(s: Subject, row: Requirement) -> str:
+def the_service_signal_follows_the_supply(s: Dut, row: Requirement) -> str:
     """Lower the supply by a twentieth and read its code before and after."""
     line(s, "W B 0000")
     supply = s.bench.supply
@@ -218,7 +218,7 @@ def the_service_signal_follows_the_supply(s: Subject, row: Requirement) -> str:
 
 
 @active("PSD1-BUS-12", needs={"bus"})
-def gyros_are_latched_with_the_cycle(s: Subject) -> str:
+def gyros_are_latched_with_the_cycle(s: Dut) -> str:
     """Read the registers of gyros and rate sensors twice in a cycle; where there is a rate table it turns meanwhile."""
     table = s.bench.table if "table" in s.probes else None
     if table is not None:
@@ -235,7 +235,7 @@ def gyros_are_latched_with_the_cycle(s: Subject) -> str:
     return f"{first} twice in a cycle" + (f", then {later}" if table is not None else "")
 
 
-def _latched(s: Subject) -> list[int]:
+def _latched(s: Dut) -> list[int]:
     """04h to 09h, each as it was read twice in one cycle. Raises Failed for one that no cycle shows twice alike."""
     calm(s)
     if not has_host(s.variant):
@@ -253,7 +253,7 @@ def _latched(s: Subject) -> list[int]:
     return found
 
 
-def _twice(s: Subject, text: str) -> tuple[int, int]:
+def _twice(s: Dut, text: str) -> tuple[int, int]:
     if has_host(s.variant):
         first, again = burst(s, text, text)
         return first.data, again.data
@@ -263,7 +263,7 @@ def _twice(s: Subject, text: str) -> tuple[int, int]:
 
 
 @active("PSD1-BUS-13", needs={"bus", "can", "table"})
-def gyros_count_arc_seconds(s: Subject, row: Requirement) -> str:
+def gyros_count_arc_seconds(s: Dut, row: Requirement) -> str:
     """Turn a rate table by ten degrees and back; compare counts with its readout, and 04h to 06h with the counts."""
     modulo, table = 1 << int(row.limit("code_bits")), s.bench.table
     calm(s)
@@ -292,14 +292,14 @@ def gyros_count_arc_seconds(s: Subject, row: Requirement) -> str:
     return f"{seen[0][1]} and {seen[1][1]} counts of gyro {'XYZ'[seen[0][0]]} for {ANGLE_DEG:g} deg and back"
 
 
-def _gyros(s: Subject) -> list[int]:
+def _gyros(s: Dut) -> list[int]:
     """2047h as of a cycle that begins now."""
     run_cycles(s, 2)
     return [int(s.unit.node.read(GYROS, k)) for k in (1, 2, 3)]
 
 
 @active("PSD1-LATE-04", needs={"bus", "can"}, before=calm)
-def refusals_are_counted(s: Subject) -> str:
+def refusals_are_counted(s: Dut) -> str:
     """Strobe what is rejected, and words that seldom wait; look at the counters."""
     counters = s.unit.counters()
     refused = sum(_is_refused(s, text) for text in ("R 0", "R 1", "R 2", "W 3 0", "R 3 100", "R 4 150"))
@@ -310,7 +310,7 @@ def refusals_are_counted(s: Subject) -> str:
     return f"{refused} refusals counted, two of them too short"
 
 
-def _is_refused(s: Subject, text: str) -> bool:
+def _is_refused(s: Dut, text: str) -> bool:
     try:
         line(s, text)
     except CycleRefused:

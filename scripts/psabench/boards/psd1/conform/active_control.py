@@ -21,7 +21,7 @@ from psabench.boards.readings import Readings
 from psabench.conform.bus_host import line, line_refused, port, refused
 from psabench.conform.capture.bus_cycles import TAIL_S
 from psabench.conform.dictionary import as_the_dictionary_says, identity
-from psabench.conform.dut import Subject
+from psabench.conform.dut import Dut
 from psabench.conform.plan import active
 from psabench.conform.requirements import Requirement, requirements
 from psabench.conform.stimulus.streamed import while_streaming
@@ -48,16 +48,16 @@ MAPPED = {
 LATE_S = 0.5  # that the first frames may be late in real time
 
 
-def _control(s: Subject) -> tuple[int, int]:
+def _control(s: Dut) -> tuple[int, int]:
     """UC1 and UC2."""
     return int(s.unit.node.read(OD.UC1)), int(s.unit.node.read(OD.UC2))
 
 
-def _coefficients(s: Subject) -> list[int]:
+def _coefficients(s: Dut) -> list[int]:
     return [int(s.unit.node.read(index, k)) for index in (OD.ZERO_COEF, OD.FULL_COEF) for k in AXES]
 
 
-def _cycles(s: Subject, count: int) -> Readings:
+def _cycles(s: Dut, count: int) -> Readings:
     """Words of the next cycles, as they are reported; of more in real time, where a busy machine is late."""
     s.unit.frames.forget()
     with while_streaming(s):
@@ -71,7 +71,7 @@ def _cycles(s: Subject, count: int) -> Readings:
 
 
 @active("PSD1-UC-02", needs={"can"}, before=calm)
-def control_words_are_read_as_they_are(s: Subject, row: Requirement) -> str:
+def control_words_are_read_as_they_are(s: Dut, row: Requirement) -> str:
     """Read 2042h and 2043h after Res."""
     due = int(row.limit("uc1_code")), int(row.limit("uc2_code"))
     if _control(s) != due:
@@ -80,7 +80,7 @@ def control_words_are_read_as_they_are(s: Subject, row: Requirement) -> str:
 
 
 @active("PSD1-SETUP-01", needs={"can"}, before=calm)
-def coefficients_are_kept(s: Subject) -> str:
+def coefficients_are_kept(s: Dut) -> str:
     """Read 2044h and 2045h after the set-up, twice."""
     first, again = _coefficients(s), _coefficients(s)
     if not all(first) or first != again:
@@ -89,7 +89,7 @@ def coefficients_are_kept(s: Subject) -> str:
 
 
 @active("PSD1-SETUP-01", needs={"bus", "can"}, before=calm)
-def coefficients_are_shown_on_the_bus(s: Subject) -> str:
+def coefficients_are_shown_on_the_bus(s: Dut) -> str:
     """Read the six by COMMAND, UC_HIGH and UC_LOW, and compare them with 2044h and 2045h."""
     for command, due in zip((0x10, 0x11, 0x12, 0x20, 0x21, 0x22), _coefficients(s), strict=True):
         line(s, f"W E {command:X}")
@@ -100,7 +100,7 @@ def coefficients_are_shown_on_the_bus(s: Subject) -> str:
 
 
 @active("PSD1-SETUP-04", needs={"can"})
-def converters_are_in_step_after_res(s: Subject) -> str:
+def converters_are_in_step_after_res(s: Dut) -> str:
     """Press Res at six instants of a period and look at what each converter lost in the cycles that follow."""
     seen = []
     for k in range(6):
@@ -121,7 +121,7 @@ def converters_are_in_step_after_res(s: Subject) -> str:
 
 
 @active("PSD1-UC-03", needs={"can"}, before=calm, after=calm)
-def uc1_calibrates_anew(s: Subject, row: Requirement) -> str:
+def uc1_calibrates_anew(s: Dut, row: Requirement) -> str:
     """Write 2042h and 2043h as they are, look at the coefficients and at the time that each answer takes."""
     before, (uc1, uc2) = _coefficients(s), _control(s)
     most_s = row.limit("answer_max_periods") * period_s(s.variant) + row.limit("transfers_ms") * 1e-3 + QUANTUM_S
@@ -141,7 +141,7 @@ def uc1_calibrates_anew(s: Subject, row: Requirement) -> str:
 
 
 @active("PSD1-UC-04", needs={"can"}, before=calm)
-def control_words_that_cannot_be_are_refused(s: Subject, row: Requirement) -> str:
+def control_words_that_cannot_be_are_refused(s: Dut, row: Requirement) -> str:
     """Write WL, PD, codes out of range, UC1 without and UC2 with a calibration."""
     code, low, high = int(row.limit("abort_code")), int(row.limit("code_min")), int(row.limit("code_max"))
     uc1, uc2 = _control(s)
@@ -168,7 +168,7 @@ def control_words_that_cannot_be_are_refused(s: Subject, row: Requirement) -> st
 
 
 @active("PSD1-UC-05", needs={"bus"}, before=calm, after=calm)
-def commands_come_one_after_the_other(s: Subject, row: Requirement) -> str:
+def commands_come_one_after_the_other(s: Dut, row: Requirement) -> str:
     """Write COMMAND 1 twice."""
     line(s, "W E 3")  # UC1 into UC_HIGH and UC_LOW
     code = row.limit("abort_code")
@@ -188,25 +188,25 @@ def commands_come_one_after_the_other(s: Subject, row: Requirement) -> str:
 
 
 @active("PSD1-UC-06", needs={"bus", "can"}, before=calm, after=calm)
-def a_command_cuts_a_cycle_that_waits(s: Subject, row: Requirement) -> str:
+def a_command_cuts_a_cycle_that_waits(s: Dut, row: Requirement) -> str:
     """Write 2043h while X waits for a host, look at Cut cycles and at the time."""
     line(s, f"W F {BOTH:04X}")
     s.run_for(2 * period_s(s.variant))
     before = int(s.unit.node.read(OD.COUNTERS, 24))
-    patience_s = row.limit("patience_ms") * 1e-3
+    timeout_s = row.limit("timeout_ms") * 1e-3
     begun_s = s.bench.time_s
     s.unit.node.write(OD.UC2, 0, _control(s)[1])
     took_s = s.bench.time_s - begun_s
     cut = int(s.unit.node.read(OD.COUNTERS, 24)) - before
     if cut != 1:
         raise Failed(f"{cut} cycles cut", "1")
-    if s.lockstep and took_s < patience_s:
-        raise Failed(f"an answer after {took_s * 1e3:.2f} ms", f"{patience_s * 1e3:g} ms of patience first")
+    if s.lockstep and took_s < timeout_s:
+        raise Failed(f"an answer after {took_s * 1e3:.2f} ms", f"{timeout_s * 1e3:g} ms of timeout first")
     return f"one cycle cut, answer after {took_s * 1e3:.1f} ms"
 
 
 @active("PSD1-UC-07", needs={"can"}, before=calm, after=calm)
-def control_words_are_read_back(s: Subject) -> str:
+def control_words_are_read_back(s: Dut) -> str:
     """Read 2046h and compare it with 2043h, some cycles after the set-up and with another code."""
     sent = _control(s)[1]
     run_cycles(s, STAYS)
@@ -220,7 +220,7 @@ def control_words_are_read_back(s: Subject) -> str:
 
 
 @active("PSD1-CHIP-01", needs={"can", "inputs"}, before=calm)
-def the_gain_is_where_the_table_has_it(s: Subject, row: Requirement) -> str:
+def the_gain_is_where_the_table_has_it(s: Dut, row: Requirement) -> str:
     """Set gain 2 by G2..0 in both control words and compare the words with those of gain 1."""
     zero = requirements()["PSD1-WORD-01"].limit("zero_code")
     one = _mean(_cycles(s, 40)) - zero
@@ -240,14 +240,14 @@ def _mean(words: Readings) -> np.ndarray:
     return np.array([float(np.mean(words[a])) for a in "XYZ"])
 
 
-def _set(s: Subject, bits: int) -> None:
+def _set(s: Dut, bits: int) -> None:
     uc1, uc2 = _control(s)
     s.unit.node.write(OD.UC1, 0, uc1 & ~GAIN_MASK | bits)
     s.unit.node.write(OD.UC2, 0, uc2 & ~GAIN_MASK | bits)
 
 
 @active("PSD1-CHIP-02", needs={"can", "pins"}, before=calm, after=calm)
-def the_rate_is_that_of_the_code(s: Subject, row: Requirement) -> str:
+def the_rate_is_that_of_the_code(s: Dut, row: Requirement) -> str:
     """Set codes 19, 100, 195 and 2000 and measure from fall to fall of DR."""
     uc2 = _control(s)[1]
     seen = []
@@ -267,7 +267,7 @@ def the_rate_is_that_of_the_code(s: Subject, row: Requirement) -> str:
 
 
 @active("PSD1-WORD-03", needs={"can", "inputs"})
-def words_beyond_full_scale_are_marked(s: Subject, row: Requirement) -> str:
+def words_beyond_full_scale_are_marked(s: Dut, row: Requirement) -> str:
     """Set gain 16, which makes the inputs larger than full scale, and look at words and CLIP."""
     full_v = requirements()["PSD1-WORD-01"].limit("full_scale_v") / (1 << CLIP_GAIN)
     beyond = {a: v for a, v in s.inputs_v.items() if abs(v) > (1 + row.limit("margin_pct") / 100) * full_v}
@@ -290,7 +290,7 @@ def words_beyond_full_scale_are_marked(s: Subject, row: Requirement) -> str:
 
 
 @active("PSD1-WORD-03", needs={"can", "inputs"})
-def a_word_at_0_alone_is_marked(s: Subject, row: Requirement) -> str:
+def a_word_at_0_alone_is_marked(s: Dut, row: Requirement) -> str:
     """Make the converters unipolar: negative inputs give 0000h, positive ones lie within, and CLIP is."""
     zero = requirements()["PSD1-WORD-01"]
     least_v = row.limit("unipolar_min_v")
@@ -313,7 +313,7 @@ def a_word_at_0_alone_is_marked(s: Subject, row: Requirement) -> str:
 
 
 @active("PSD1-LATE-01", needs={"bus", "can", "line", "lockstep"}, before=calm)
-def late_begins_at_its_time(s: Subject, row: Requirement) -> str:
+def late_begins_at_its_time(s: Dut, row: Requirement) -> str:
     """Read words sooner and later; count the strobes that the lines show to begin too long after FL2."""
     late_ns = row.limit("late_ns")
     before = int(s.unit.node.read(OD.COUNTERS, 16))
@@ -339,7 +339,7 @@ def late_begins_at_its_time(s: Subject, row: Requirement) -> str:
     return f"{told} of {len(waited)} strobes late, {waited.min()} to {waited.max()} ns after FL2"
 
 
-def _word_after(s: Subject, axis: int, wait_s: float) -> None:
+def _word_after(s: Dut, axis: int, wait_s: float) -> None:
     """Take a word, having waited; the line carries it out as time begins to pass."""
     s.run_for(wait_s)
     host = port(s)
@@ -349,7 +349,7 @@ def _word_after(s: Subject, axis: int, wait_s: float) -> None:
 
 
 @active("PSD1-LATE-01", needs={"bus", "can"}, before=calm, after=calm)
-def late_strobes_are_told(s: Subject, row: Requirement) -> str:
+def late_strobes_are_told(s: Dut, row: Requirement) -> str:
     """Read words as they come, then some 0.2 ms late; look at LATE and Late strobes."""
     late_s = row.limit("late_ns") * 1e-9
     before = int(s.unit.node.read(OD.COUNTERS, 16))
@@ -366,13 +366,13 @@ def late_strobes_are_told(s: Subject, row: Requirement) -> str:
     return f"LATE in {len(cycles['LATE'])} cycles, {told} late strobes counted"
 
 
-def _counted(s: Subject) -> dict[str, int]:
+def _counted(s: Dut) -> dict[str, int]:
     """What a host that stays away costs; few objects, for reading one takes a period."""
     subs = {"Stretched cycles": 17, "Lost X": 18, "Lost Y": 19, "Lost Z": 20}
     return {name: int(s.unit.node.read(OD.COUNTERS, sub)) for name, sub in subs.items()}
 
 
-def _stay_away(s: Subject) -> tuple[Readings, dict[str, int]]:
+def _stay_away(s: Dut) -> tuple[Readings, dict[str, int]]:
     """Two cycles in time, one whose X waits for five periods, one in time; what was counted meanwhile."""
     calm(s)
     s.unit.frames.forget()
@@ -393,7 +393,7 @@ def _stay_away(s: Subject) -> tuple[Readings, dict[str, int]]:
 
 
 @active("PSD1-LATE-02", needs={"bus", "can"})
-def a_stretched_cycle_is_told(s: Subject) -> str:
+def a_stretched_cycle_is_told(s: Dut) -> str:
     """Leave X unread for five periods, look at MIXED and Stretched cycles."""
     cycles, counted = _stay_away(s)
     mixed = [int(v) for v in cycles["MIXED"]]
@@ -404,7 +404,7 @@ def a_stretched_cycle_is_told(s: Subject) -> str:
 
 
 @active("PSD1-LATE-03", needs={"bus", "can"})
-def lost_conversions_are_told(s: Subject, row: Requirement) -> str:
+def lost_conversions_are_told(s: Dut, row: Requirement) -> str:
     """Leave X unread for five periods, look at OVERRUN and Lost X, Y, Z."""
     cycles, counted = _stay_away(s)
     overrun = [int(v) for v in cycles["OVERRUN"]]
@@ -417,7 +417,7 @@ def lost_conversions_are_told(s: Subject, row: Requirement) -> str:
 
 
 @active("PSD1-CAN-02", needs={"can"}, before=calm)
-def messages_tell_what_their_objects_hold(s: Subject) -> str:
+def messages_tell_what_their_objects_hold(s: Dut) -> str:
     """Switch all messages on, let cycles end, and compare the last with 2200h, 2202h, 2203h and 2204h."""
     messages_on(s, True)
     node = s.unit.node
@@ -442,12 +442,12 @@ def messages_tell_what_their_objects_hold(s: Subject) -> str:
 
 
 @active("PSD1-CAN-07", needs={"can"})
-def the_board_says_what_it_is(s: Subject) -> str:
+def the_board_says_what_it_is(s: Dut) -> str:
     """Read 1008h and 1018h sub 2."""
     return identity(s, "PSD1-CAN-07", "PSD-1")
 
 
 @active("PSD1-CAN-08", needs={"can"}, before=calm)
-def objects_are_as_the_dictionary_says(s: Subject) -> str:
+def objects_are_as_the_dictionary_says(s: Dut) -> str:
     """Read every object of the EDS and write where nothing may be written."""
     return as_the_dictionary_says(s, "psd1", varies=(OD.UC1, OD.UC2) if s.variant.profile != "psd1" else ())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from psabench.boards.objects import Psd1Objects as OD
 from psabench.conform.bus_host import code_of, line
-from psabench.conform.dut import Subject
+from psabench.conform.dut import Dut
 from psabench.conform.profile import Variant
 from psabench.conform.requirements import requirements
 from psabench.conform.verdict import Failed, Inconclusive
@@ -30,28 +30,28 @@ def period_s(variant: Variant) -> float:
 
 
 def setup_s(variant: Variant) -> float:
-    """Patience for the set-up."""
+    """Timeout for the set-up."""
     return 12 * period_s(variant)
 
 
-def status(s: Subject) -> int:
+def status(s: Dut) -> int:
     return line(s, "R 3").data
 
 
-def calm(s: Subject) -> None:
+def calm(s: Dut) -> None:
     """Set up with its defaults, as after power-on."""
     s.reset()
     s.run_for(0.002 + setup_s(s.variant))
 
 
-def messages_on(s: Subject, on: bool) -> None:
+def messages_on(s: Dut, on: bool) -> None:
     """Switch PSD1_TIME, PSD1_GYRO and PSD1_RATE on or off."""
     for index in TPDOS.values():
         value = int(s.unit.node.read(index, 1))
         s.unit.node.write(index, 1, value & ~OFF if on else value | OFF)
 
 
-def run_cycles(s: Subject, count: int) -> None:
+def run_cycles(s: Dut, count: int) -> None:
     """Let so many cycles pass, reading their words where the board does not."""
     if has_host(s.variant):
         s.run_for((count + 1) * period_s(s.variant))
@@ -59,7 +59,7 @@ def run_cycles(s: Subject, count: int) -> None:
         drive(s, count)
 
 
-def drive(s: Subject, count: int, slow_s: float = 0.0) -> list[Cycle]:
+def drive(s: Dut, count: int, slow_s: float = 0.0) -> list[Cycle]:
     """Let count cycles run and read their words, slow_s after they come. Raises Failed where none comes."""
     line(s, f"W F {BOTH:04X}")
     words = []
@@ -70,7 +70,7 @@ def drive(s: Subject, count: int, slow_s: float = 0.0) -> list[Cycle]:
     return words
 
 
-def word(s: Subject, axis: int, slow_s: float = 0.0) -> Cycle:
+def word(s: Dut, axis: int, slow_s: float = 0.0) -> Cycle:
     """The next word of an axis as soon as it waits."""
     if s.port is None:
         raise Inconclusive("a board without a built-in host wants a bus port to be read")

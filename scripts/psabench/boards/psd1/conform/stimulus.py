@@ -5,7 +5,7 @@ from __future__ import annotations
 from psabench.boards.psd1.conform.host import calm, has_host, messages_on, period_s, run_cycles, setup_s, word
 from psabench.conform.bus_host import line
 from psabench.conform.capture.log import Capture
-from psabench.conform.dut import Subject
+from psabench.conform.dut import Dut
 from psabench.conform.plan import stimulus
 from psabench.conform.stimulus.streamed import from_res, while_streaming
 
@@ -14,13 +14,13 @@ MANY, FAST_S = 1030, 0.002  # readings that a noise wants; a word sooner than th
 
 
 @stimulus("power_on", boards=("psd1",))
-def power_on(s: Subject) -> Capture:
+def power_on(s: Dut) -> Capture:
     """From Res to the first cycles, streaming as soon as it has booted."""
     return from_res(s, setup_s(s.variant))
 
 
 @stimulus("stream", boards=("psd1",))
-def stream(s: Subject) -> Capture:
+def stream(s: Dut) -> Capture:
     """Cycles as the built-in host reads them, or as we do over the bus where there is none."""
     calm(s)
     with s.take() as take, while_streaming(s):
@@ -29,7 +29,7 @@ def stream(s: Subject) -> Capture:
 
 
 @stimulus("words", boards=("psd1",))
-def words(s: Subject) -> Capture:
+def words(s: Dut) -> Capture:
     """A thousand words at still inputs where the board reads them itself and is not slow, a few elsewhere."""
     calm(s)
     fast = has_host(s.variant) and period_s(s.variant) < FAST_S
@@ -39,7 +39,7 @@ def words(s: Subject) -> Capture:
 
 
 @stimulus("messages", boards=("psd1",))
-def messages(s: Subject) -> Capture:
+def messages(s: Dut) -> Capture:
     """The same with all messages switched on, and the objects that they map read afterwards."""
     calm(s)
     with s.take() as take, while_streaming(s):
@@ -55,7 +55,7 @@ def messages(s: Subject) -> Capture:
 
 
 @stimulus("strobes", boards=("psd1",))
-def strobes(s: Subject) -> Capture:
+def strobes(s: Dut) -> Capture:
     """Reads of STATUS, and reads and writes of registers, all through some cycles; words are left waiting."""
     calm(s)
     own = has_host(s.variant)

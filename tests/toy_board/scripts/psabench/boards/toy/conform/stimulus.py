@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from psabench.conform.capture.log import Capture
-from psabench.conform.dut import Subject
+from psabench.conform.dut import Dut
 from psabench.conform.plan import stimulus
 from psabench.conform.stimulus.streamed import from_res, readings
 
@@ -11,12 +11,12 @@ START_S, STREAM_S = 0.06, 1.0
 
 
 @stimulus("power_on", boards=("toy",))
-def power_on(s: Subject) -> Capture:
+def power_on(s: Dut) -> Capture:
     """From Res to some samples, streaming as soon as it has booted."""
     return from_res(s, START_S)
 
 
 @stimulus("stream", boards=("toy",))
-def stream_for_a_second(s: Subject) -> Capture:
+def stream_for_a_second(s: Dut) -> Capture:
     """A second of samples on CAN and on the lines."""
     return s.capture("stream", readings(s, START_S, lambda: s.run_for(STREAM_S)))
