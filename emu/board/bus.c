@@ -28,11 +28,16 @@ const char *board_cycle_word(enum board_cycle_result r)
     return results[r].word;
 }
 
+const char *board_bus_name(const struct board_bus *bus, unsigned address)
+{
+    return address < bus->addresses ? bus->registers[address].name : NULL;
+}
+
 /* "; 00h to 0Dh do": each board's are in a row. */
 static void describe_addresses(const struct board_bus *bus, char *out, size_t cap)
 {
     unsigned last = bus->addresses;
-    while (last > 0 && !bus->name(last - 1)) last--;
+    while (last > 0 && !bus->registers[last - 1].name) last--;
     if (last > 0) (void)snprintf(out, cap, "; 00h to %02Xh do", last - 1);
 }
 
@@ -52,7 +57,7 @@ void board_cycle_why(const struct board_bus *bus, const struct board *board, con
                      enum board_cycle_result r, char out[BOARD_CYCLE_WHY_MAX])
 {
     char what[24] = "read of", detail[DETAIL];
-    const char *const name = bus->name(c->address);
+    const char *const name = board_bus_name(bus, c->address);
     const int64_t strobe_ns = c->strobe_ns > 0 ? c->strobe_ns : bus->strobe(board).own_ns;
     assert((size_t)r < sizeof results / sizeof *results);
     if (c->write) (void)snprintf(what, sizeof what, "write of %u to", c->data);

@@ -40,16 +40,27 @@ struct board_strobe {
 
 struct board;
 
+enum { BOARD_READABLE = 1, BOARD_WRITABLE = 2, BOARD_LATCHED = 4 /* there is nothing before the first reading */ };
+
+struct board_register {
+    const char *name; /* "X"; NULL: nothing is there */
+    uint8_t rights;
+    uint16_t most; /* that can be written, where no more is to be said */
+};
+
 struct board_bus {
     /* BOARD_CYCLE_OK: done() will be called later, never from inside; else it will not. */
     enum board_cycle_result (*submit)(struct board *board, struct board_cycle *c, int64_t t_ns);
     unsigned addresses;
-    const char *(*name)(unsigned address); /* of what is there: "X"; NULL: nothing */
+    const struct board_register *registers; /* by address */
     struct board_strobe (*strobe)(const struct board *board);
     /* Of a cycle rejected as BAD_VALUE or NOT_READY, what would be right, a clause: "it takes 0 to 3". May write nothing. */
     void (*expected)(const struct board *board, const struct board_cycle *c, enum board_cycle_result r, char *out,
                      size_t cap);
 };
+
+/* Name of what is at an address; NULL: nothing. */
+const char *board_bus_name(const struct board_bus *bus, unsigned address);
 
 #define BOARD_CYCLE_WHY_MAX 190u
 

@@ -25,7 +25,7 @@ static enum control_outcome put_result(struct control *c, const struct control_c
     const struct board_bus *bus = c->bench->unit[k->unit]->type->bus;
     if (!k->over) return control_reject(c, "state", "the cycle did not complete");
     if (k->result != BOARD_CYCLE_OK) return control_cycle_reject(c, k, k->result);
-    const char *name = bus->name(k->cycle.address);
+    const char *name = board_bus_name(bus, k->cycle.address);
     if (name) cJSON_AddStringToObject(result, "name", name);
     cJSON_AddNumberToObject(result, "data", k->cycle.data);
     cJSON_AddNumberToObject(result, "ended_s", (double)k->ended_ns * 1e-9);

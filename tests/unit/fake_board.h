@@ -62,11 +62,7 @@ static enum board_cycle_result fake_submit(struct board *board, struct board_cyc
     return BOARD_CYCLE_OK;
 }
 
-static const char *fake_name(unsigned address)
-{
-    static const char *const name[] = {"word", "command", "level", NULL};
-    return address < 4 ? name[address] : NULL;
-}
+static const struct board_register fake_registers[4] = {{.name = "word"}, {.name = "command"}, {.name = "level"}};
 
 static struct board_strobe fake_strobe(const struct board *board)
 {
@@ -170,8 +166,11 @@ static const struct board_part fake_parts[FAKE_PARTS] = {
 #define FAKE_FAULT_FROZEN_WORDS 4u
 static const struct board_controller_fault fake_faults[] = {{"controller.frozen_words", FAKE_FAULT_FROZEN_WORDS},
                                                             {NULL, 0}};
-static const struct board_bus fake_bus = {
-    .submit = fake_submit, .addresses = 4, .name = fake_name, .strobe = fake_strobe, .expected = fake_expected};
+static const struct board_bus fake_bus = {.submit = fake_submit,
+                                          .addresses = 4,
+                                          .registers = fake_registers,
+                                          .strobe = fake_strobe,
+                                          .expected = fake_expected};
 
 static const struct board_type fake_type = {
     .name = "fake",

@@ -99,14 +99,6 @@ static const struct board_part parts[PARTS] = {
 
 static const char *const port_lines[] = {"FXP", "FXN", "FYP", "FYN", "FZP", "FZN", "LATCH", NULL};
 
-BOARD_BUS(pik);
-
-static const struct board_bus bus = {.submit = submit,
-                                     .addresses = PIK_REGISTERS,
-                                     .name = pik_register_name,
-                                     .strobe = strobe,
-                                     .expected = pik_expected};
-
 /* ---- what faults are measured by ---- */
 
 /* One pulse in a second. */
@@ -225,7 +217,7 @@ const struct board_type pik_board = {
     .part_count = PARTS,
     .controller_faults = controller_faults,
     .can = &pik_can_side,
-    .bus = &bus,
+    .bus = &pik_bus,
     BOARD_LIFE_FUNCTIONS,
     .ready = ready,
     .observe = observe,

@@ -1,35 +1,26 @@
 /* The registers as a computer reads and writes them, one cycle at a time (E0: the article says "in binary code"). */
 #include "board/bus_lines.h"
+#include "board/life.h"
 #include "board/pik/internal.h"
 
 #include <stdio.h>
 
-enum { READABLE = 1, WRITABLE = 2, LATCHED = 4 };
-
-static const struct {
-    const char *name;
-    unsigned rights;
-} registers[PIK_REGISTERS] = {
-    [PIK_REG_X] = {"X", READABLE | LATCHED},
-    [PIK_REG_Y] = {"Y", READABLE | LATCHED},
-    [PIK_REG_Z] = {"Z", READABLE | LATCHED},
-    [PIK_REG_XP] = {"XP", READABLE | LATCHED},
-    [PIK_REG_XN] = {"XN", READABLE | LATCHED},
-    [PIK_REG_YP] = {"YP", READABLE | LATCHED},
-    [PIK_REG_YN] = {"YN", READABLE | LATCHED},
-    [PIK_REG_ZP] = {"ZP", READABLE | LATCHED},
-    [PIK_REG_ZN] = {"ZN", READABLE | LATCHED},
-    [PIK_REG_SEQ] = {"SEQ", READABLE | LATCHED},
-    [PIK_REG_STATUS] = {"STATUS", READABLE},
-    [PIK_REG_LATCH] = {"LATCH", WRITABLE},
-    [PIK_REG_PERIOD] = {"PERIOD", READABLE | WRITABLE},
-    [PIK_REG_CLEAR] = {"CLEAR", WRITABLE},
+static const struct board_register registers[PIK_REGISTERS] = {
+    [PIK_REG_X] = {"X", BOARD_READABLE | BOARD_LATCHED},
+    [PIK_REG_Y] = {"Y", BOARD_READABLE | BOARD_LATCHED},
+    [PIK_REG_Z] = {"Z", BOARD_READABLE | BOARD_LATCHED},
+    [PIK_REG_XP] = {"XP", BOARD_READABLE | BOARD_LATCHED},
+    [PIK_REG_XN] = {"XN", BOARD_READABLE | BOARD_LATCHED},
+    [PIK_REG_YP] = {"YP", BOARD_READABLE | BOARD_LATCHED},
+    [PIK_REG_YN] = {"YN", BOARD_READABLE | BOARD_LATCHED},
+    [PIK_REG_ZP] = {"ZP", BOARD_READABLE | BOARD_LATCHED},
+    [PIK_REG_ZN] = {"ZN", BOARD_READABLE | BOARD_LATCHED},
+    [PIK_REG_SEQ] = {"SEQ", BOARD_READABLE | BOARD_LATCHED},
+    [PIK_REG_STATUS] = {"STATUS", BOARD_READABLE},
+    [PIK_REG_LATCH] = {"LATCH", BOARD_WRITABLE},
+    [PIK_REG_PERIOD] = {"PERIOD", BOARD_READABLE | BOARD_WRITABLE},
+    [PIK_REG_CLEAR] = {"CLEAR", BOARD_WRITABLE},
 };
-
-const char *pik_register_name(unsigned address)
-{
-    return address < PIK_REGISTERS ? registers[address].name : NULL;
-}
 
 static uint16_t word_at(struct pik *b, unsigned address)
 {
@@ -88,8 +79,8 @@ static bool accepts_value(const struct pik *b, const struct board_cycle *c)
     return c->address != PIK_REG_CLEAR || c->data < 1u << PIK_AXES;
 }
 
-void pik_expected(const struct board *board, const struct board_cycle *c, enum board_cycle_result r, char *out,
-                  size_t cap)
+static void describe_expected(const struct board *board, const struct board_cycle *c, enum board_cycle_result r,
+                              char *out, size_t cap)
 {
     unsigned least, most;
     pik_period_range((const struct pik *)board, &least, &most);
@@ -104,11 +95,11 @@ static enum board_cycle_result check_cycle(const struct pik *b, const struct boa
     if (!b->on) return BOARD_CYCLE_OFF;
     if (c->address >= PIK_REGISTERS) return BOARD_CYCLE_NO_ADDRESS;
     const unsigned rights = registers[c->address].rights;
-    if (c->write && !(rights & WRITABLE)) return BOARD_CYCLE_READ_ONLY;
-    if (!c->write && !(rights & READABLE)) return BOARD_CYCLE_WRITE_ONLY;
+    if (c->write && !(rights & BOARD_WRITABLE)) return BOARD_CYCLE_READ_ONLY;
+    if (!c->write && !(rights & BOARD_READABLE)) return BOARD_CYCLE_WRITE_ONLY;
     if (c->strobe_ns != 0 && c->strobe_ns < b->profile.strobe_min_ns) return BOARD_CYCLE_TOO_SHORT;
     if (b->cycle) return BOARD_CYCLE_BUSY;
-    if (rights & LATCHED && !b->any) return BOARD_CYCLE_NOT_READY;
+    if (rights & BOARD_LATCHED && !b->any) return BOARD_CYCLE_NOT_READY;
     return !c->write || accepts_value(b, c) ? BOARD_CYCLE_OK : BOARD_CYCLE_BAD_VALUE;
 }
 
@@ -141,3 +132,11 @@ void pik_bus_init(struct pik *b)
 {
     sched_ev(&b->cycle_end, cycle_end, b);
 }
+
+BOARD_BUS(pik);
+
+const struct board_bus pik_bus = {.submit = submit,
+                                  .addresses = PIK_REGISTERS,
+                                  .registers = registers,
+                                  .strobe = strobe,
+                                  .expected = describe_expected};

@@ -120,9 +120,7 @@ bool pik_flip(struct pik *b, unsigned axis, unsigned reg, uint8_t mask, int64_t 
 
 /* As board_bus.submit. */
 enum board_cycle_result pik_submit(struct pik *b, struct board_cycle *c, int64_t t_ns);
-const char *pik_register_name(unsigned address);
-void pik_expected(const struct board *board, const struct board_cycle *c, enum board_cycle_result r, char *out,
-                  size_t cap);          /* as board_bus.expected */
+extern const struct board_bus pik_bus;
 int64_t pik_period_ns(const void *pik); /* of the readings, as the register has it */
 
 /* The coefficient that a channel has, Hz/V: truth. sign: of the input. */

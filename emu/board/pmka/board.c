@@ -207,13 +207,6 @@ static void digest(const struct board *board, struct sha256 *s)
     sha256_add(s, &b->counters, sizeof b->counters);
 }
 
-BOARD_BUS(pmka);
-
-static const struct board_bus bus = {.submit = submit,
-                                     .addresses = PMKA_ADDRESSES,
-                                     .name = pmka_register_name,
-                                     .strobe = strobe,
-                                     .expected = pmka_expected};
 static const char *const port_lines[] = {"KL1", "KL2", "KL3", "KL4", "SH", "MUX0", "MUX1", NULL};
 
 static const struct board_controller_fault controller_faults[] = {
@@ -254,7 +247,7 @@ const struct board_type pmka_board = {
     .part_count = PARTS,
     .controller_faults = controller_faults,
     .can = &pmka_can,
-    .bus = &bus,
+    .bus = &pmka_bus,
     BOARD_LIFE_FUNCTIONS,
     .ready = ready,
     .set_faults = set_faults,

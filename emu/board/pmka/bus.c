@@ -1,5 +1,6 @@
 /* Parallel bus of a PMKA: 16 addresses, one cycle at a time (docs/boards/pmka.md; ours, E0). */
 #include "board/bus_lines.h"
+#include "board/life.h"
 #include "board/pmka/internal.h"
 
 #include <stddef.h>
@@ -10,24 +11,49 @@
 
 enum { STATUS_FRESH = 1, STATUS_OVERRUN = 2, STATUS_SATURATED = 4, STATUS_CLIPPED = 8, STATUS_AUTONOMOUS = 16 };
 
+enum {
+    REG_RESETS = PMKA_INTS, /* behind the four codes */
+    REG_ROTATION,
+    REG_SEQ,
+    REG_TEMPERATURE,
+    REG_STATUS,
+    REG_MODE,
+    REG_COMMAND,
+    REG_BEAT,
+    REG_ZERO,
+    REG_INDEX,
+    REG_DATA
+};
+
+static const struct board_register registers[PMKA_ADDRESSES] = {
+    [0] = {"X", BOARD_READABLE | BOARD_LATCHED},
+    [1] = {"Y", BOARD_READABLE | BOARD_LATCHED},
+    [2] = {"Z", BOARD_READABLE | BOARD_LATCHED},
+    [PMKA_K] = {"K", BOARD_READABLE | BOARD_LATCHED},
+    [REG_RESETS] = {"RESETS", BOARD_READABLE | BOARD_LATCHED},
+    [REG_ROTATION] = {"ROTATION", BOARD_READABLE | BOARD_LATCHED},
+    [REG_SEQ] = {"SEQ", BOARD_READABLE | BOARD_LATCHED},
+    [REG_TEMPERATURE] = {"TEMPERATURE", BOARD_READABLE | BOARD_LATCHED},
+    [REG_STATUS] = {"STATUS", BOARD_READABLE},
+    [REG_MODE] = {"MODE", BOARD_READABLE | BOARD_WRITABLE},
+    [REG_COMMAND] = {"COMMAND", BOARD_WRITABLE},
+    [REG_BEAT] = {"BEAT", BOARD_READABLE | BOARD_WRITABLE},
+    [REG_ZERO] = {"ZERO", BOARD_READABLE | BOARD_WRITABLE},
+    [REG_INDEX] = {"INDEX", BOARD_READABLE | BOARD_WRITABLE},
+    [REG_DATA] = {"DATA", BOARD_READABLE},
+};
+
 /* ---- reading ---- */
 
-static uint16_t read_code(struct pmka *b)
-{
-    const unsigned address = b->bus.cycle->address;
-    if (address == PMKA_K) b->bus.fresh = false; /* the last of them */
-    return (uint16_t)b->latest.code[address];
-}
-
 /* Two bits an integrator: 1 positive, 3 negative. */
-static uint16_t read_resets(struct pmka *b)
+static uint16_t resets_word(const struct pmka *b)
 {
     unsigned word = 0;
     for (unsigned i = 0; i < PMKA_INTS; i++) word |= ((unsigned)b->latest.reset[i] & 3u) << (2 * i);
     return (uint16_t)word;
 }
 
-static uint16_t read_rotation(struct pmka *b)
+static uint16_t rotation_word(const struct pmka *b)
 {
     const struct pmka_reading *r = &b->latest;
     unsigned word = (unsigned)r->tau << 8 | (unsigned)r->cal << 12;
@@ -35,17 +61,8 @@ static uint16_t read_rotation(struct pmka *b)
     return (uint16_t)word;
 }
 
-static uint16_t read_seq(struct pmka *b)
-{
-    return (uint16_t)b->latest.seq;
-}
-
-static uint16_t read_temp(struct pmka *b)
-{
-    return (uint16_t)b->latest.temp_code;
-}
-
-static uint16_t read_status(struct pmka *b)
+/* Reading it clears OVERRUN. */
+static uint16_t status_word(struct pmka *b)
 {
     unsigned word = b->bus.fresh ? STATUS_FRESH : 0u;
     if (b->bus.overrun) word |= STATUS_OVERRUN;
@@ -58,40 +75,33 @@ static uint16_t read_status(struct pmka *b)
     return (uint16_t)word;
 }
 
-static uint16_t read_mode(struct pmka *b)
-{
-    return (uint16_t)b->rotation.mode;
-}
-
-static uint16_t read_beat(struct pmka *b)
-{
-    return (uint16_t)b->rotation.beat_periods;
-}
-
-static uint16_t read_zero(struct pmka *b)
-{
-    return (uint16_t)b->rotation.zero_periods;
-}
-
-static uint16_t read_index(struct pmka *b)
-{
-    return b->bus.index;
-}
-
-static uint16_t read_data(struct pmka *b)
+static uint16_t data_word(const struct pmka *b)
 {
     const unsigned index = b->bus.index;
     if (index >= INDEX_ROM) return b->rom[index - INDEX_ROM];
     return (uint16_t)b->channel[index / 2].count[index % 2];
 }
 
-/* ---- writing: false: the register does not take this value ---- */
-
-static bool write_mode(struct pmka *b, uint16_t word)
+static uint16_t read_register(struct pmka *b, unsigned address)
 {
-    if (word > PMKA_AUTONOMOUS) return false;
-    pmka_set_mode(b, (enum pmka_mode)word);
-    return true;
+    if (address == PMKA_K) b->bus.fresh = false; /* the last of them */
+    if (address <= PMKA_K) return (uint16_t)b->latest.code[address];
+    if (address == REG_RESETS) return resets_word(b);
+    if (address == REG_ROTATION) return rotation_word(b);
+    if (address == REG_SEQ) return (uint16_t)b->latest.seq;
+    if (address == REG_TEMPERATURE) return (uint16_t)b->latest.temp_code;
+    if (address == REG_STATUS) return status_word(b);
+    if (address == REG_MODE) return (uint16_t)b->rotation.mode;
+    if (address == REG_BEAT) return (uint16_t)b->rotation.beat_periods;
+    if (address == REG_ZERO) return (uint16_t)b->rotation.zero_periods;
+    return address == REG_INDEX ? b->bus.index : data_word(b);
+}
+
+/* ---- writing ---- */
+
+static bool is_index(unsigned word)
+{
+    return word < 2 * PMKA_INTS || (word >= INDEX_ROM && word < INDEX_ROM + PMKA_ROM_WORDS);
 }
 
 /* Bits 2..0 beat, 0: the present one goes on; bits 5..4 calibration. */
@@ -101,73 +111,37 @@ static bool write_command(struct pmka *b, uint16_t word)
     return !(word & ~0x37u) && cal <= PMKA_CAL_RESET && pmka_command(b, word & 7u, (enum pmka_cal)cal);
 }
 
-static bool write_beat(struct pmka *b, uint16_t word)
+/* False: the register does not take this value. */
+static bool write_register(struct pmka *b, unsigned address, uint16_t word)
 {
-    if (word < b->rotation.zero_periods + PMKA_BEAT_SPARE || word > BEAT_MAX) return false;
-    b->rotation.beat_periods = word;
+    struct pmka_rotation *r = &b->rotation;
+    if (address == REG_COMMAND) return write_command(b, word);
+    if (address == REG_MODE && word <= PMKA_AUTONOMOUS) pmka_set_mode(b, (enum pmka_mode)word);
+    else if (address == REG_BEAT && word >= r->zero_periods + PMKA_BEAT_SPARE && word <= BEAT_MAX)
+        r->beat_periods = word;
+    else if (address == REG_ZERO && word >= 1 && word + PMKA_BEAT_SPARE <= r->beat_periods) r->zero_periods = word;
+    else if (address == REG_INDEX && is_index(word)) b->bus.index = word;
+    else return false;
     return true;
-}
-
-static bool write_zero(struct pmka *b, uint16_t word)
-{
-    if (word < 1 || word + PMKA_BEAT_SPARE > b->rotation.beat_periods) return false;
-    b->rotation.zero_periods = word;
-    return true;
-}
-
-static bool write_index(struct pmka *b, uint16_t word)
-{
-    if (word >= 2 * PMKA_INTS && (word < INDEX_ROM || word >= INDEX_ROM + PMKA_ROM_WORDS)) return false;
-    b->bus.index = word;
-    return true;
-}
-
-static const struct {
-    const char *name;                 /* NULL: nothing answers */
-    uint16_t (*read)(struct pmka *b); /* b->bus.cycle has its address */
-    bool (*write)(struct pmka *b, uint16_t word);
-    bool of_reading; /* there is nothing before the first */
-} registers[PMKA_ADDRESSES] = {
-    {"X", read_code, NULL, true},
-    {"Y", read_code, NULL, true},
-    {"Z", read_code, NULL, true},
-    {"K", read_code, NULL, true},
-    {"RESETS", read_resets, NULL, true},
-    {"ROTATION", read_rotation, NULL, true},
-    {"SEQ", read_seq, NULL, true},
-    {"TEMPERATURE", read_temp, NULL, true},
-    {"STATUS", read_status, NULL, false},
-    {"MODE", read_mode, write_mode, false},
-    {"COMMAND", NULL, write_command, false},
-    {"BEAT", read_beat, write_beat, false},
-    {"ZERO", read_zero, write_zero, false},
-    {"INDEX", read_index, write_index, false},
-    {"DATA", read_data, NULL, false},
-};
-
-const char *pmka_register_name(unsigned address)
-{
-    return address < PMKA_ADDRESSES ? registers[address].name : NULL;
 }
 
 static void expected_value(const struct pmka *b, unsigned address, char *out, size_t cap)
 {
     const struct pmka_rotation *r = &b->rotation;
-    bool (*const write)(struct pmka *, uint16_t) = registers[address].write;
-    if (write == write_mode) (void)snprintf(out, cap, "it takes 0 or 1");
-    if (write == write_command)
+    if (address == REG_MODE) (void)snprintf(out, cap, "it takes 0 or 1");
+    if (address == REG_COMMAND)
         (void)snprintf(out, cap,
                        "it takes in MODE 0 alone: beat 0 to %u in bits 0 to 2, calibration 0 to %d in bits 4, 5",
                        PMKA_TAUS, PMKA_CAL_RESET);
-    if (write == write_beat) (void)snprintf(out, cap, "it takes %u to %u", r->zero_periods + PMKA_BEAT_SPARE, BEAT_MAX);
-    if (write == write_zero) (void)snprintf(out, cap, "it takes 1 to %u", r->beat_periods - PMKA_BEAT_SPARE);
-    if (write == write_index)
+    if (address == REG_BEAT) (void)snprintf(out, cap, "it takes %u to %u", r->zero_periods + PMKA_BEAT_SPARE, BEAT_MAX);
+    if (address == REG_ZERO) (void)snprintf(out, cap, "it takes 1 to %u", r->beat_periods - PMKA_BEAT_SPARE);
+    if (address == REG_INDEX)
         (void)snprintf(out, cap, "it takes 0 to %u and %u to %u", 2 * PMKA_INTS - 1, INDEX_ROM,
                        INDEX_ROM + PMKA_ROM_WORDS - 1);
 }
 
-void pmka_expected(const struct board *board, const struct board_cycle *c, enum board_cycle_result r, char *out,
-                   size_t cap)
+static void describe_expected(const struct board *board, const struct board_cycle *c, enum board_cycle_result r,
+                              char *out, size_t cap)
 {
     if (r == BOARD_CYCLE_BAD_VALUE) expected_value((const struct pmka *)board, c->address, out, cap);
     else (void)snprintf(out, cap, "STATUS (08h) has bit 0 when the first reading is there");
@@ -180,11 +154,11 @@ static enum board_cycle_result check_cycle(const struct pmka *b, const struct bo
     const int64_t strobe_ns = c->strobe_ns ? c->strobe_ns : b->profile.strobe_ns;
     if (b->life == PMKA_OFF) return BOARD_CYCLE_OFF;
     if (b->bus.cycle) return BOARD_CYCLE_BUSY;
-    if (!pmka_register_name(c->address)) return BOARD_CYCLE_NO_ADDRESS;
-    if (c->write && !registers[c->address].write) return BOARD_CYCLE_READ_ONLY;
-    if (!c->write && !registers[c->address].read) return BOARD_CYCLE_WRITE_ONLY;
+    if (c->address >= PMKA_ADDRESSES || !registers[c->address].name) return BOARD_CYCLE_NO_ADDRESS;
+    if (c->write && !(registers[c->address].rights & BOARD_WRITABLE)) return BOARD_CYCLE_READ_ONLY;
+    if (!c->write && !(registers[c->address].rights & BOARD_READABLE)) return BOARD_CYCLE_WRITE_ONLY;
     if (strobe_ns < b->profile.strobe_min_ns) return BOARD_CYCLE_TOO_SHORT;
-    if (registers[c->address].of_reading && !b->any) return BOARD_CYCLE_NOT_READY;
+    if (registers[c->address].rights & BOARD_LATCHED && !b->any) return BOARD_CYCLE_NOT_READY;
     return BOARD_CYCLE_OK;
 }
 
@@ -199,7 +173,7 @@ enum board_cycle_result pmka_submit(struct pmka *b, struct board_cycle *c, int64
         return r;
     }
     b->bus.cycle = c;
-    if (!c->write) b->bus.answer = registers[c->address].read(b);
+    if (!c->write) b->bus.answer = read_register(b, c->address);
     bus_lines_begin(&b->base.trace, &bus_lines, c, c->write ? c->data : b->bus.answer, t_ns);
     sched_at(b->sched, &b->bus.end, t_ns + (c->strobe_ns ? c->strobe_ns : b->profile.strobe_ns));
     return BOARD_CYCLE_OK;
@@ -224,7 +198,7 @@ static void strobe_ends(void *ctx, int64_t t_ns)
         finish_cycle(b, BOARD_CYCLE_OK, t_ns);
         return;
     }
-    finish_cycle(b, registers[c->address].write(b, c->data) ? BOARD_CYCLE_OK : BOARD_CYCLE_BAD_VALUE, t_ns);
+    finish_cycle(b, write_register(b, c->address, c->data) ? BOARD_CYCLE_OK : BOARD_CYCLE_BAD_VALUE, t_ns);
 }
 
 void pmka_bus_init(struct pmka *b)
@@ -239,3 +213,11 @@ void pmka_bus_cut(struct pmka *b, int64_t t_ns)
     b->bus.fresh = b->bus.overrun = false;
     if (b->bus.cycle) finish_cycle(b, BOARD_CYCLE_OFF, t_ns);
 }
+
+BOARD_BUS(pmka);
+
+const struct board_bus pmka_bus = {.submit = submit,
+                                   .addresses = PMKA_ADDRESSES,
+                                   .registers = registers,
+                                   .strobe = strobe,
+                                   .expected = describe_expected};

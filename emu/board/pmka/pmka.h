@@ -121,9 +121,7 @@ void pmka_set_mode(struct pmka *b, enum pmka_mode mode);
 
 /* Parallel bus: pmka/bus.c. */
 enum board_cycle_result pmka_submit(struct pmka *b, struct board_cycle *c, int64_t t_ns);
-const char *pmka_register_name(unsigned address);
-void pmka_expected(const struct board *board, const struct board_cycle *c, enum board_cycle_result r, char *out,
-                   size_t cap); /* as board_bus.expected */
+extern const struct board_bus pmka_bus;
 #define PMKA_ADDRESSES 16u
 
 #endif

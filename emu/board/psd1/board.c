@@ -184,10 +184,6 @@ static void digest(const struct board *board, struct sha256 *s)
     sha256_add(s, &b->counters, sizeof b->counters);
 }
 
-BOARD_BUS(psd1);
-
-static const struct board_bus bus = {
-    .submit = submit, .addresses = PSD1_REGS, .name = psd1_register_name, .strobe = strobe, .expected = psd1_expected};
 static const char *const port_lines[] = {"RFX", "RFY", "RFZ", "SCLK", "SDAT", "FL2", "CS", NULL};
 
 static const struct board_controller_fault controller_faults[] = {
@@ -223,7 +219,7 @@ const struct board_type psd1_board = {
     .part_count = PARTS,
     .controller_faults = controller_faults,
     .can = &psd1_can,
-    .bus = &bus,
+    .bus = &psd1_bus,
     BOARD_LIFE_FUNCTIONS,
     .ready = ready,
     .afe = afe,

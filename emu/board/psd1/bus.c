@@ -1,29 +1,40 @@
 /* The bus D0..D15 with A3..A0, R/W, CS: strobes, and the registers behind the addresses. */
+#include "board/life.h"
 #include "board/psd1/internal.h"
 
 #include <stdio.h>
 
-typedef uint16_t read_fn(struct psd1 *b, unsigned address, int64_t t_ns);
-typedef enum board_cycle_result check_fn(const struct psd1 *b, uint16_t data);
-typedef void write_fn(struct psd1 *b, uint16_t data, int64_t t_ns);
-
 /* ---- registers ---- */
 
-static uint16_t read_word(struct psd1 *b, unsigned address, int64_t t_ns)
+static const struct board_register registers[PSD1_REGS] = {
+    [PSD1_REG_X] = {"X", BOARD_READABLE},
+    [PSD1_REG_Y] = {"Y", BOARD_READABLE},
+    [PSD1_REG_Z] = {"Z", BOARD_READABLE},
+    [PSD1_REG_STATUS] = {"STATUS", BOARD_READABLE},
+    [PSD1_REG_GYRO_X] = {"GYRO_X", BOARD_READABLE},
+    [PSD1_REG_GYRO_X + 1] = {"GYRO_Y", BOARD_READABLE},
+    [PSD1_REG_GYRO_X + 2] = {"GYRO_Z", BOARD_READABLE},
+    [PSD1_REG_RATE_X] = {"RATE_X", BOARD_READABLE},
+    [PSD1_REG_RATE_X + 1] = {"RATE_Y", BOARD_READABLE},
+    [PSD1_REG_RATE_X + 2] = {"RATE_Z", BOARD_READABLE},
+    [PSD1_REG_TEMP] = {"TEMP", BOARD_READABLE | BOARD_WRITABLE, 3},
+    [PSD1_REG_SERVICE] = {"SERVICE", BOARD_READABLE | BOARD_WRITABLE, 3},
+    [PSD1_REG_UC_HIGH] = {"UC_HIGH", BOARD_READABLE | BOARD_WRITABLE, 0xFF},
+    [PSD1_REG_UC_LOW] = {"UC_LOW", BOARD_READABLE | BOARD_WRITABLE, 0xFFFF},
+    [PSD1_REG_COMMAND] = {"COMMAND", BOARD_READABLE | BOARD_WRITABLE, 0xFF},
+    [PSD1_REG_FLAGS] = {"FLAGS", BOARD_READABLE | BOARD_WRITABLE, 3},
+};
+
+static bool in_cycle(const struct psd1 *b)
 {
-    (void)address;
-    (void)t_ns;
-    return psd1_rk_bus(&b->rk);
+    return b->phase >= PSD1_RF_FALL && b->phase <= PSD1_CLEAR;
 }
 
-static uint16_t read_status(struct psd1 *b, unsigned address, int64_t t_ns)
+static uint16_t status_word(const struct psd1 *b)
 {
-    (void)address;
-    (void)t_ns;
-    const bool cycle = b->phase >= PSD1_RF_FALL && b->phase <= PSD1_CLEAR;
     const unsigned bits[] = {
         b->fl2 ? PSD1_ST_FL2 | b->axis << 1 : 0u,
-        cycle ? PSD1_ST_CYCLE : 0u,
+        in_cycle(b) ? PSD1_ST_CYCLE : 0u,
         b->int0 ? PSD1_ST_INT0 : 0u,
         b->fl1 ? PSD1_ST_FL1 : 0u,
         b->dr ? 0u : PSD1_ST_DR,
@@ -38,105 +49,27 @@ static uint16_t read_status(struct psd1 *b, unsigned address, int64_t t_ns)
     return (uint16_t)all;
 }
 
-/* Latched at A0: of the cycle under way, else of the latest. */
-static const struct psd1_cycle *latched_cycle(const struct psd1 *b)
-{
-    return b->phase >= PSD1_RF_FALL && b->phase <= PSD1_CLEAR ? &b->now : &b->latest;
-}
-
-static uint16_t read_gyro(struct psd1 *b, unsigned address, int64_t t_ns)
-{
-    (void)t_ns;
-    return (uint16_t)latched_cycle(b)->gyro[address - PSD1_REG_GYRO_X];
-}
-
-static uint16_t read_rate(struct psd1 *b, unsigned address, int64_t t_ns)
-{
-    (void)t_ns;
-    return (uint16_t)latched_cycle(b)->rate[address - PSD1_REG_RATE_X];
-}
-
-static uint16_t read_temp(struct psd1 *b, unsigned address, int64_t t_ns)
-{
-    (void)address;
-    return psd1_aux_temp(b, t_ns);
-}
-
-static uint16_t read_service(struct psd1 *b, unsigned address, int64_t t_ns)
-{
-    (void)address;
-    return psd1_aux_service(b, t_ns);
-}
-
-static uint16_t read_uc_high(struct psd1 *b, unsigned address, int64_t t_ns)
-{
-    (void)address;
-    (void)t_ns;
-    return (uint16_t)(b->staged >> 16);
-}
-
-static uint16_t read_uc_low(struct psd1 *b, unsigned address, int64_t t_ns)
-{
-    (void)address;
-    (void)t_ns;
-    return (uint16_t)b->staged;
-}
-
 /* Bit 15: it is under way, bit 14: it has failed. */
-static uint16_t read_command(struct psd1 *b, unsigned address, int64_t t_ns)
+static uint16_t command_word(const struct psd1 *b)
 {
-    (void)address;
-    (void)t_ns;
     const bool busy = b->job.request == &b->job.own;
     return (uint16_t)(b->last_command | (busy ? 0x8000u : 0u) | (b->job.failed ? 0x4000u : 0u));
 }
 
-static uint16_t read_flags(struct psd1 *b, unsigned address, int64_t t_ns)
+static uint16_t read_register(struct psd1 *b, unsigned address, int64_t t_ns)
 {
-    (void)address;
-    (void)t_ns;
-    return (uint16_t)((b->int0 ? 1u : 0u) | (b->fl1 ? 2u : 0u));
-}
-
-static enum board_cycle_result two_bits(const struct psd1 *b, uint16_t data)
-{
-    (void)b;
-    return data < 4 ? BOARD_CYCLE_OK : BOARD_CYCLE_BAD_VALUE;
-}
-
-static enum board_cycle_result eight_bits(const struct psd1 *b, uint16_t data)
-{
-    (void)b;
-    return data < 256 ? BOARD_CYCLE_OK : BOARD_CYCLE_BAD_VALUE;
-}
-
-static void write_temp(struct psd1 *b, uint16_t data, int64_t t_ns)
-{
-    (void)t_ns;
-    b->temp_channel = (uint8_t)data;
-}
-
-static void write_service(struct psd1 *b, uint16_t data, int64_t t_ns)
-{
-    (void)t_ns;
-    b->service_channel = (uint8_t)data;
-}
-
-static void write_uc_high(struct psd1 *b, uint16_t data, int64_t t_ns)
-{
-    (void)t_ns;
-    b->staged = (b->staged & 0xFFFF) | (uint32_t)data << 16;
-}
-
-static void write_uc_low(struct psd1 *b, uint16_t data, int64_t t_ns)
-{
-    (void)t_ns;
-    b->staged = (b->staged & 0xFF0000) | data;
-}
-
-static void write_flags(struct psd1 *b, uint16_t data, int64_t t_ns)
-{
-    psd1_flags(b, data & 1, data & 2, t_ns);
+    if (address <= PSD1_REG_Z) return psd1_rk_bus(&b->rk);
+    if (address == PSD1_REG_STATUS) return status_word(b);
+    if (address == PSD1_REG_TEMP) return psd1_aux_temp(b, t_ns);
+    if (address == PSD1_REG_SERVICE) return psd1_aux_service(b, t_ns);
+    if (address == PSD1_REG_UC_HIGH) return (uint16_t)(b->staged >> 16);
+    if (address == PSD1_REG_UC_LOW) return (uint16_t)b->staged;
+    if (address == PSD1_REG_COMMAND) return command_word(b);
+    if (address == PSD1_REG_FLAGS) return (uint16_t)((b->int0 ? 1u : 0u) | (b->fl1 ? 2u : 0u));
+    /* latched at A0: of the cycle under way, else of the latest */
+    const struct psd1_cycle *c = in_cycle(b) ? &b->now : &b->latest;
+    return address < PSD1_REG_RATE_X ? (uint16_t)c->gyro[address - PSD1_REG_GYRO_X]
+                                     : (uint16_t)c->rate[address - PSD1_REG_RATE_X];
 }
 
 /* ---- register COMMAND ---- */
@@ -152,15 +85,6 @@ static bool show_word(const struct psd1 *b, unsigned command, uint32_t *word)
     return uc || coef;
 }
 
-static enum board_cycle_result check_command(const struct psd1 *b, uint16_t data)
-{
-    const char *why = NULL;
-    uint32_t word;
-    if (data > 255) return BOARD_CYCLE_BAD_VALUE;
-    if (show_word(b, data, &word)) return BOARD_CYCLE_OK;
-    return psd1_request_check(b, (uint8_t)data, b->staged, &why);
-}
-
 static void own_done(void *ctx, struct psd1_request *r, enum board_cycle_result result, int64_t t_ns)
 {
     struct psd1 *b = ctx;
@@ -169,60 +93,44 @@ static void own_done(void *ctx, struct psd1_request *r, enum board_cycle_result 
     if (!b->job.failed && r->command >= PSD1_CMD_CONTROL) b->staged = r->word;
 }
 
-static void write_command(struct psd1 *b, uint16_t data, int64_t t_ns)
+static void write_command(struct psd1 *b, uint8_t command, int64_t t_ns)
 {
     const char *why = NULL;
-    b->last_command = (uint8_t)data;
+    b->last_command = command;
     b->job.failed = false;
-    if (show_word(b, data, &b->staged)) return;
-    b->job.own = (struct psd1_request){.command = (uint8_t)data, .word = b->staged, .done = own_done, .ctx = b};
+    if (show_word(b, command, &b->staged)) return;
+    b->job.own = (struct psd1_request){.command = command, .word = b->staged, .done = own_done, .ctx = b};
     b->job.failed = psd1_request(b, &b->job.own, &why, t_ns) != BOARD_CYCLE_OK; /* another client's came meanwhile */
 }
 
-static const struct {
-    const char *name;
-    read_fn *read;
-    check_fn *check;
-    write_fn *write;
-} registers[PSD1_REGS] = {
-    [PSD1_REG_X] = {"X", read_word, NULL, NULL},
-    [PSD1_REG_Y] = {"Y", read_word, NULL, NULL},
-    [PSD1_REG_Z] = {"Z", read_word, NULL, NULL},
-    [PSD1_REG_STATUS] = {"STATUS", read_status, NULL, NULL},
-    [PSD1_REG_GYRO_X] = {"GYRO_X", read_gyro, NULL, NULL},
-    [PSD1_REG_GYRO_X + 1] = {"GYRO_Y", read_gyro, NULL, NULL},
-    [PSD1_REG_GYRO_X + 2] = {"GYRO_Z", read_gyro, NULL, NULL},
-    [PSD1_REG_RATE_X] = {"RATE_X", read_rate, NULL, NULL},
-    [PSD1_REG_RATE_X + 1] = {"RATE_Y", read_rate, NULL, NULL},
-    [PSD1_REG_RATE_X + 2] = {"RATE_Z", read_rate, NULL, NULL},
-    [PSD1_REG_TEMP] = {"TEMP", read_temp, two_bits, write_temp},
-    [PSD1_REG_SERVICE] = {"SERVICE", read_service, two_bits, write_service},
-    [PSD1_REG_UC_HIGH] = {"UC_HIGH", read_uc_high, eight_bits, write_uc_high},
-    [PSD1_REG_UC_LOW] = {"UC_LOW", read_uc_low, NULL, write_uc_low},
-    [PSD1_REG_COMMAND] = {"COMMAND", read_command, check_command, write_command},
-    [PSD1_REG_FLAGS] = {"FLAGS", read_flags, two_bits, write_flags},
-};
+/* ---- writing ---- */
 
-const char *psd1_register_name(unsigned address)
+static void write_register(struct psd1 *b, unsigned address, uint16_t data, int64_t t_ns)
 {
-    return address < PSD1_REGS ? registers[address].name : NULL;
+    if (address == PSD1_REG_TEMP) b->temp_channel = (uint8_t)data;
+    if (address == PSD1_REG_SERVICE) b->service_channel = (uint8_t)data;
+    if (address == PSD1_REG_UC_HIGH) b->staged = (b->staged & 0xFFFF) | (uint32_t)data << 16;
+    if (address == PSD1_REG_UC_LOW) b->staged = (b->staged & 0xFF0000) | data;
+    if (address == PSD1_REG_COMMAND) write_command(b, (uint8_t)data, t_ns);
+    if (address == PSD1_REG_FLAGS) psd1_flags(b, data & 1, data & 2, t_ns);
 }
 
-static const char *expected_value(const struct psd1 *b, const struct board_cycle *c)
+static enum board_cycle_result check_value(const struct psd1 *b, const struct board_cycle *c, const char **why)
+{
+    uint32_t word;
+    if (c->data > registers[c->address].most) return BOARD_CYCLE_BAD_VALUE;
+    if (c->address != PSD1_REG_COMMAND || show_word(b, c->data, &word)) return BOARD_CYCLE_OK;
+    return psd1_request_check(b, (uint8_t)c->data, b->staged, why);
+}
+
+static void describe_expected(const struct board *board, const struct board_cycle *c, enum board_cycle_result r,
+                              char *out, size_t cap)
 {
     const char *why = NULL;
-    if (registers[c->address].check == two_bits) return "it takes 0 to 3";
-    if (registers[c->address].check == eight_bits || c->data > 255) return "it takes 0 to 255";
-    (void)psd1_request_check(b, (uint8_t)c->data, b->staged, &why);
-    return why;
-}
-
-void psd1_expected(const struct board *board, const struct board_cycle *c, enum board_cycle_result r, char *out,
-                   size_t cap)
-{
-    const char *const why = r == BOARD_CYCLE_BAD_VALUE ? expected_value((const struct psd1 *)board, c)
-                                                       : "STATUS (03h) has bit 0 while one does, its axis in bits 1, 2";
+    if (r == BOARD_CYCLE_NOT_READY) why = "STATUS (03h) has bit 0 while one does, its axis in bits 1, 2";
+    else (void)check_value((const struct psd1 *)board, c, &why);
     if (why) (void)snprintf(out, cap, "%s", why);
+    else (void)snprintf(out, cap, "it takes 0 to %u", registers[c->address].most);
 }
 
 /* ---- strobes ---- */
@@ -257,11 +165,12 @@ static void end_read(struct psd1 *b)
 
 static enum board_cycle_result check_cycle(const struct psd1 *b, const struct board_cycle *c, int64_t len_ns)
 {
+    const char *why; /* psd1_expected() has it */
     if (b->phase == PSD1_OFF || b->phase == PSD1_IN_RESET) return BOARD_CYCLE_OFF;
     if (c->address >= PSD1_REGS) return BOARD_CYCLE_NO_ADDRESS;
-    if (c->write && !registers[c->address].write) return BOARD_CYCLE_READ_ONLY;
+    if (c->write && !(registers[c->address].rights & BOARD_WRITABLE)) return BOARD_CYCLE_READ_ONLY;
     if (len_ns < (int64_t)b->profile.strobe_min_ns) return BOARD_CYCLE_TOO_SHORT;
-    if (c->write) return registers[c->address].check ? registers[c->address].check(b, c->data) : BOARD_CYCLE_OK;
+    if (c->write) return check_value(b, c, &why);
     if (c->address > PSD1_REG_Z) return BOARD_CYCLE_OK;
     if (b->profile.host_strobe_ns > 0) return BOARD_CYCLE_TAKEN;
     return b->fl2 && !b->taken && b->axis == c->address ? BOARD_CYCLE_OK : BOARD_CYCLE_NOT_READY;
@@ -284,7 +193,7 @@ static enum board_cycle_result begin_strobe(struct psd1 *b, struct board_cycle *
         return r;
     }
     if (r != BOARD_CYCLE_OK) count_rejected(b, r);
-    else if (!c->write) c->data = registers[c->address].read(b, c->address, t_ns);
+    else if (!c->write) c->data = read_register(b, c->address, t_ns);
     const bool data = c->write || r == BOARD_CYCLE_OK;
     s->busy = true;
     s->cycle = r == BOARD_CYCLE_OK ? c : NULL;
@@ -320,7 +229,7 @@ static void strobe_end(void *ctx, int64_t t_ns)
     }
     if (c) {
         b->counters.bus_cycles++;
-        if (c->write) registers[c->address].write(b, c->data, t_ns);
+        if (c->write) write_register(b, c->address, c->data, t_ns);
         c->done(c->ctx, c, BOARD_CYCLE_OK, t_ns);
     }
     if (!s->busy) begin_waiting(b, t_ns); /* unless done() has begun another */
@@ -393,3 +302,8 @@ void psd1_bus_stop(struct psd1 *b, int64_t t_ns)
     cut_cycle(&s->cycle, t_ns);
     cut_cycle(&s->waiting, t_ns);
 }
+
+BOARD_BUS(psd1);
+
+const struct board_bus psd1_bus = {
+    .submit = submit, .addresses = PSD1_REGS, .registers = registers, .strobe = strobe, .expected = describe_expected};

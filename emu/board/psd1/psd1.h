@@ -108,8 +108,6 @@ enum board_cycle_result psd1_request(struct psd1 *b, struct psd1_request *r, con
 /* Levels of INT0 and FL1, active or not, as register FLAGS sets them. */
 void psd1_flags(struct psd1 *b, bool int0, bool fl1, int64_t t_ns);
 
-const char *psd1_register_name(unsigned address); /* NULL: none */
-void psd1_expected(const struct board *board, const struct board_cycle *c, enum board_cycle_result r, char *out,
-                   size_t cap); /* as board_bus.wanted */
+extern const struct board_bus psd1_bus;
 
 #endif

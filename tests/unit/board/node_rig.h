@@ -44,11 +44,8 @@ static inline enum board_cycle_result fake_submit(struct board *board, struct bo
     return BOARD_CYCLE_OK;
 }
 
-static inline const char *fake_name(unsigned address)
-{
-    static const char *const names[ADDRESSES] = {"X", "Y", "Z", "STATUS"};
-    return address < ADDRESSES ? names[address] : NULL;
-}
+static const struct board_register fake_registers[ADDRESSES] = {
+    {.name = "X"}, {.name = "Y"}, {.name = "Z"}, {.name = "STATUS"}};
 
 /* As board.h has it: a reset cuts the cycle under way. */
 static inline void fake_reset(struct board *board, int64_t t_ns)
@@ -139,7 +136,7 @@ static inline struct rig *rig_of_device(const struct co_device *d, uint32_t bitr
     static struct board_counter counters[COUNTERS_MAX];
     static struct board_part part;
     static const struct board_bus bus = {
-        .submit = fake_submit, .addresses = ADDRESSES, .name = fake_name, .strobe = fake_strobe};
+        .submit = fake_submit, .addresses = ADDRESSES, .registers = fake_registers, .strobe = fake_strobe};
     static struct board_type board;
     static const struct board_object own[] = {{OWN_OBJECT, own_read, NULL}};
     static struct board_node_type type;

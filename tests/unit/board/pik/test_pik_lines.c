@@ -327,9 +327,9 @@ static void a_cycle_takes_its_strobe_and_ends_with_the_power(void **state)
 static void names_of_registers(void **state)
 {
     (void)state;
-    assert_string_equal(pik_register_name(PIK_REG_ZN), "ZN");
-    assert_string_equal(pik_register_name(PIK_REG_CLEAR), "CLEAR");
-    assert_null(pik_register_name(PIK_REGISTERS));
+    assert_string_equal(board_bus_name(&pik_bus, PIK_REG_ZN), "ZN");
+    assert_string_equal(board_bus_name(&pik_bus, PIK_REG_CLEAR), "CLEAR");
+    assert_null(board_bus_name(&pik_bus, PIK_REGISTERS));
 }
 
 int main(void)

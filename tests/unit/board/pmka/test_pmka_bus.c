@@ -208,8 +208,8 @@ static void what_is_refused(void **state)
     assert_int_equal(rig_read(&rig, MODE), 0);
     assert_int_equal(rig.b.rotation.asked_tau, 5);
     assert_int_equal(rig.b.rotation.asked_cal, PMKA_CAL_RESET);
-    assert_null(pmka_board.bus->name(NOTHING));
-    assert_string_equal(pmka_board.bus->name(ROTATION), "ROTATION");
+    assert_null(board_bus_name(&pmka_bus, NOTHING));
+    assert_string_equal(board_bus_name(&pmka_bus, ROTATION), "ROTATION");
     assert_int_equal(pmka_board.bus->addresses, 16);
 }
 
