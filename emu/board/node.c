@@ -98,12 +98,10 @@ static uint32_t write_bus(struct board_node *n, const struct co_entry *e, const 
     return submit_cycle(n, true, (uint8_t)(e->sub - 1), (uint16_t)v->number, t_ns);
 }
 
-static uint32_t read_strobe(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
+static double read_strobe(const struct board_node *n, const struct co_entry *e)
 {
     (void)e;
-    (void)t_ns;
-    v->number = n->strobe_ns;
-    return CO_OK;
+    return n->strobe_ns;
 }
 
 static uint32_t write_strobe(struct board_node *n, const struct co_entry *e, const struct co_value *v, int64_t t_ns)
@@ -166,14 +164,12 @@ static uint32_t read_counter(struct board_node *n, const struct co_entry *e, str
     return CO_OK;
 }
 
-static uint32_t read_serial(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
+static double read_serial(const struct board_node *n, const struct co_entry *e)
 {
     (void)e;
-    (void)t_ns;
     uint32_t serial;
     memcpy(&serial, (const char *)n->board + n->type->serial_at, sizeof serial);
-    v->number = serial;
-    return CO_OK;
+    return serial;
 }
 
 /* ---- whether the bus can carry the stream ---- */
@@ -224,8 +220,12 @@ static uint32_t write_remark(struct board_node *n, const struct co_entry *e, con
 /* ---- which function answers for an object ---- */
 
 static const struct board_object common[] = {
-    {IDENTITY, read_serial, NULL}, {BUS, read_bus, write_bus},        {COUNTERS, read_counter, NULL},
-    {REFUSAL, read_text, NULL},    {REMARK, read_text, write_remark}, {STROBE_NS, read_strobe, write_strobe},
+    {IDENTITY, .value = read_serial},
+    {BUS, .read = read_bus, .write = write_bus},
+    {COUNTERS, .read = read_counter},
+    {REFUSAL, .read = read_text},
+    {REMARK, .read = read_text, .write = write_remark},
+    {STROBE_NS, .value = read_strobe, .write = write_strobe},
 };
 
 static const struct board_object *find_object(const struct board_object *objects, size_t count, uint16_t index)
@@ -247,7 +247,9 @@ static uint32_t on_read(void *ctx, const struct co_entry *e, struct co_value *v,
 {
     struct board_node *n = ctx;
     const struct board_object *o = find_handler(n, e->index);
-    return o && o->read ? o->read(n, e, v, t_ns) : CO_AB_NO_OBJECT;
+    if (!o || !o->value) return o && o->read ? o->read(n, e, v, t_ns) : CO_AB_NO_OBJECT;
+    v->number = o->value(n, e);
+    return CO_OK;
 }
 
 static uint32_t on_write(void *ctx, const struct co_entry *e, const struct co_value *v, int64_t t_ns)

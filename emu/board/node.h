@@ -7,7 +7,7 @@
  * <board>_can.c, in the order of proto/<board>.yaml:
  *
  *     struct psd1_can { struct board_node node; ...settings of its own... };     // the node first
- *     static const struct board_object objects[] = {{PSD1_OD_CODES, read_codes, NULL}, ...};
+ *     static const struct board_object objects[] = {{PSD1_OD_CODES, .value = read_code}, ...};
  *     static const struct board_node_type type = {.device = &psd1_device, BOARD_NODE_OBJECTS(objects),
  *                                                 .serial_at = offsetof(struct psd1, unit.serial), .period_ns = period_of};
  *     const struct board_can psd1_can = {.size = sizeof(struct psd1_can), .init = init, BOARD_NODE_LIFE};
@@ -33,7 +33,9 @@ struct board_node;
  * checked. CO_OK, an abort code, or CO_PENDING: then co_sdo_answer() with the ticket node.sdo.ticket had. */
 struct board_object {
     uint16_t index;
-    uint32_t (*read)(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns);
+    double (*value)(const struct board_node *n, const struct co_entry *e); /* a number that is there */
+    uint32_t (*read)(struct board_node *n, const struct co_entry *e, struct co_value *v,
+                     int64_t t_ns); /* any other answer: a text, one that takes time */
     uint32_t (*write)(struct board_node *n, const struct co_entry *e, const struct co_value *v, int64_t t_ns);
 };
 

@@ -126,15 +126,13 @@ static double *value_of(struct gyro_settings *set, const struct row *r, uint8_t 
     return (double *)(void *)((char *)set + r->offset) + (sub - r->sub);
 }
 
-static uint32_t read_setting(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
+static double read_setting(const struct board_node *n, const struct co_entry *e)
 {
     struct gyro *b = n->board;
     const struct row *r = row_of(e);
-    (void)t_ns;
-    if (r) v->number = *value_of(&b->set, r, e->sub);
-    else if (e->index == GYRO_OD_HEADING) v->number = gyro_heading_deg(b);
-    else v->number = b->cfg.level_node;
-    return CO_OK;
+    if (r) return *value_of(&b->set, r, e->sub);
+    if (e->index == GYRO_OD_HEADING) return gyro_heading_deg(b);
+    return b->cfg.level_node;
 }
 
 static uint32_t reject_setting(struct board_node *n, uint32_t abort, const char *why)
@@ -158,13 +156,11 @@ static uint32_t write_setting(struct board_node *n, const struct co_entry *e, co
     return CO_OK;
 }
 
-static uint32_t read_control(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
+static double read_control(const struct board_node *n, const struct co_entry *e)
 {
     const struct gyro *b = gyro_of(n);
     const double value[] = {0.0, b->run.mode, b->run.phase, b->run.position, b->latest.flags};
-    (void)t_ns;
-    v->number = value[e->sub];
-    return CO_OK;
+    return value[e->sub];
 }
 
 static uint32_t write_mode(struct board_node *n, const struct co_entry *e, const struct co_value *v, int64_t t_ns)
@@ -177,7 +173,7 @@ static uint32_t write_mode(struct board_node *n, const struct co_entry *e, const
 }
 
 /* As the messages have it. */
-static uint32_t read_latest(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
+static double read_latest(const struct board_node *n, const struct co_entry *e)
 {
     const struct gyro_reading *r = &gyro_of(n)->latest;
     const struct psabench_gyro_rates_t u = rates_of(r);
@@ -185,35 +181,27 @@ static uint32_t read_latest(struct board_node *n, const struct co_entry *e, stru
     const unsigned state = (unsigned)r->mode | (unsigned)r->phase << 3 | r->position << 5 | r->flags << 12;
     const double value[] = {0.0,   u.u1,   u.u2,    angles_of(r).encoder, (uint16_t)r->step,
                             state, l.beta, l.gamma, l.level_seq};
-    (void)t_ns;
-    v->number = value[e->sub];
-    return CO_OK;
+    return value[e->sub];
 }
 
-static uint32_t read_clock(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
+static double read_clock(const struct board_node *n, const struct co_entry *e)
 {
     const struct gyro *b = gyro_of(n);
     const double value[] = {0.0, b->profile.step_ns, b->number};
-    (void)t_ns;
-    v->number = value[e->sub];
-    return CO_OK;
+    return value[e->sub];
 }
 
-static uint32_t read_past(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
+static double read_past(const struct board_node *n, const struct co_entry *e)
 {
     const struct gyro_past *past = gyro_of(n)->past;
     const unsigned i = e->sub - 1U;
-    (void)t_ns;
-    v->number = i < GYRO_FLAGS ? past[i].begun : past[i - GYRO_FLAGS].step;
-    return CO_OK;
+    return i < GYRO_FLAGS ? past[i].begun : past[i - GYRO_FLAGS].step;
 }
 
-static uint32_t read_self_test(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
+static double read_self_test(const struct board_node *n, const struct co_entry *e)
 {
     const struct gyro_nod *nod = &gyro_of(n)->nod;
-    (void)t_ns;
-    v->number = e->sub == 1 ? nod->way != GYRO_NOD_NONE : nod->result;
-    return CO_OK;
+    return e->sub == 1 ? nod->way != GYRO_NOD_NONE : nod->result;
 }
 
 static uint32_t begin_self_test(struct board_node *n, const struct co_entry *e, const struct co_value *v, int64_t t_ns)
@@ -226,19 +214,19 @@ static uint32_t begin_self_test(struct board_node *n, const struct co_entry *e, 
 }
 
 static const struct board_object objects[] = {
-    {GYRO_OD_CONTROL, read_control, write_mode},
-    {GYRO_OD_SLEW, read_setting, write_setting},
-    {GYRO_OD_RUN, read_setting, write_setting},
-    {GYRO_OD_POSITIONS, read_setting, write_setting},
-    {GYRO_OD_LOOPS, read_setting, write_setting},
-    {GYRO_OD_PLACE, read_setting, write_setting},
-    {GYRO_OD_HEADING, read_setting, write_setting},
-    {GYRO_OD_DRIFT, read_setting, write_setting},
-    {GYRO_OD_LEVEL, read_setting, write_setting},
-    {GYRO_OD_CLOCK, read_clock, NULL},
-    {GYRO_OD_PAST, read_past, NULL},
-    {GYRO_OD_SELF_TEST, read_self_test, begin_self_test},
-    {GYRO_OD_LATEST, read_latest, NULL},
+    {GYRO_OD_CONTROL, .value = read_control, .write = write_mode},
+    {GYRO_OD_SLEW, .value = read_setting, .write = write_setting},
+    {GYRO_OD_RUN, .value = read_setting, .write = write_setting},
+    {GYRO_OD_POSITIONS, .value = read_setting, .write = write_setting},
+    {GYRO_OD_LOOPS, .value = read_setting, .write = write_setting},
+    {GYRO_OD_PLACE, .value = read_setting, .write = write_setting},
+    {GYRO_OD_HEADING, .value = read_setting, .write = write_setting},
+    {GYRO_OD_DRIFT, .value = read_setting, .write = write_setting},
+    {GYRO_OD_LEVEL, .value = read_setting, .write = write_setting},
+    {GYRO_OD_CLOCK, .value = read_clock},
+    {GYRO_OD_PAST, .value = read_past},
+    {GYRO_OD_SELF_TEST, .value = read_self_test, .write = begin_self_test},
+    {GYRO_OD_LATEST, .value = read_latest},
 };
 
 static int64_t period_ns(const void *board)

@@ -16,28 +16,22 @@ static const struct pik *pik_of(const struct board_node *n)
 
 /* ---- objects ---- */
 
-static uint32_t read_totals(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
+static double read_totals(const struct board_node *n, const struct co_entry *e)
 {
-    (void)t_ns;
-    v->number = pik_of(n)->latched.total[e->sub - 1];
-    return CO_OK;
+    return pik_of(n)->latched.total[e->sub - 1];
 }
 
-static uint32_t read_increments(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
+static double read_increments(const struct board_node *n, const struct co_entry *e)
 {
-    (void)t_ns;
-    v->number = (int16_t)pik_of(n)->latched.increment[e->sub - 1];
-    return CO_OK;
+    return (int16_t)pik_of(n)->latched.increment[e->sub - 1];
 }
 
-static uint32_t read_reading(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
+static double read_reading(const struct board_node *n, const struct co_entry *e)
 {
     const struct pik_reading *r = &pik_of(n)->latched;
     const uint32_t value[] = {0,         r->seq,          (uint32_t)(r->t_ns / NS_PER_US),
                               r->status, (uint8_t)r->seq, r->status & SATURATED};
-    (void)t_ns;
-    v->number = value[e->sub];
-    return CO_OK;
+    return value[e->sub];
 }
 
 static uint32_t read_plate(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
@@ -53,10 +47,10 @@ static uint32_t read_plate(struct board_node *n, const struct co_entry *e, struc
 }
 
 static const struct board_object objects[] = {
-    {PIK_OD_TOTALS, read_totals, NULL},
-    {PIK_OD_INCREMENTS, read_increments, NULL},
-    {PIK_OD_READING, read_reading, NULL},
-    {PIK_OD_PLATE, read_plate, NULL},
+    {PIK_OD_TOTALS, .value = read_totals},
+    {PIK_OD_INCREMENTS, .value = read_increments},
+    {PIK_OD_READING, .value = read_reading},
+    {PIK_OD_PLATE, .read = read_plate},
 };
 
 /* ---- notifications of the board ---- */

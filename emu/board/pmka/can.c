@@ -53,26 +53,23 @@ static const struct pmka_reading *latest_reading(const struct board_node *n)
     return &((const struct pmka *)n->board)->latest;
 }
 
-static uint32_t read_code(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
+static double read_code(const struct board_node *n, const struct co_entry *e)
 {
-    (void)t_ns;
-    v->number = latest_reading(n)->code[e->sub - 1];
-    return CO_OK;
+    return latest_reading(n)->code[e->sub - 1];
 }
 
 /* The bytes of the message. */
-static uint32_t read_state(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
+static double read_state(const struct board_node *n, const struct co_entry *e)
 {
     enum { RESETS = 2, TEMPERATURE = 6 };
     struct can_msg m = {0};
-    (void)t_ns;
     pack_state(latest_reading(n), &m);
-    if (e->sub < RESETS) v->number = (uint16_t)latest_reading(n)->seq;
-    else v->number = e->sub < TEMPERATURE ? m.data[e->sub] : latest_reading(n)->temp_code;
-    return CO_OK;
+    if (e->sub < RESETS) return (uint16_t)latest_reading(n)->seq;
+    return e->sub < TEMPERATURE ? m.data[e->sub] : latest_reading(n)->temp_code;
 }
 
-static const struct board_object objects[] = {{PMKA_OD_CODES, read_code, NULL}, {PMKA_OD_STATE, read_state, NULL}};
+static const struct board_object objects[] = {{PMKA_OD_CODES, .value = read_code},
+                                              {PMKA_OD_STATE, .value = read_state}};
 
 static int64_t period_ns(const void *board)
 {

@@ -161,17 +161,15 @@ static uint32_t write_stream(struct board_node *n, const struct co_entry *e, con
     return CO_OK;
 }
 
-static uint32_t read_settings(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
+static double read_settings(const struct board_node *n, const struct co_entry *e)
 {
-    const struct psa2_can_settings *set = &can_of(n)->set;
-    (void)t_ns;
-    if (e->index == PSA2_OD_FRAME_FORM) v->number = set->form;
-    else if (e->index == PSA2_OD_SAMPLE_MODE) v->number = set->sample_mode;
-    else if (e->index == PSA2_OD_SAMPLE_NTH) v->number = set->nth;
-    else if (e->index == PSA2_OD_SYNC_PIN) v->number = set->sync_pin;
-    else if (e->index == PSA2_OD_ZERO_V) v->number = (double)set->zero_v[e->sub - 1];
-    else v->number = (double)set->scale_v_per_g[e->sub - 1];
-    return CO_OK;
+    const struct psa2_can_settings *set = &((const struct psa2_can *)n)->set;
+    if (e->index == PSA2_OD_FRAME_FORM) return set->form;
+    if (e->index == PSA2_OD_SAMPLE_MODE) return set->sample_mode;
+    if (e->index == PSA2_OD_SAMPLE_NTH) return set->nth;
+    if (e->index == PSA2_OD_SYNC_PIN) return set->sync_pin;
+    if (e->index == PSA2_OD_ZERO_V) return (double)set->zero_v[e->sub - 1];
+    return (double)set->scale_v_per_g[e->sub - 1];
 }
 
 static uint32_t write_plain(struct board_node *n, const struct co_entry *e, const struct co_value *v, int64_t t_ns)
@@ -252,13 +250,10 @@ static uint32_t read_counter(struct board_node *n, const struct co_entry *e, str
     return CO_OK;
 }
 
-static uint32_t read_unit(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
+static double read_unit(const struct board_node *n, const struct co_entry *e)
 {
-    const struct psa2_can *c = can_of(n);
-    (void)t_ns;
-    const struct psa2_can_info info = info_of(c);
-    v->number = e->index == PSA2_OD_IDENTITY ? (double)info.serial : (double)info.word_bits;
-    return CO_OK;
+    const struct psa2_can_info info = info_of((const struct psa2_can *)n);
+    return e->index == PSA2_OD_IDENTITY ? (double)info.serial : (double)info.word_bits;
 }
 
 /* ---- latest sample ---- */
@@ -281,41 +276,39 @@ static double frame_head(const struct psa2_frame *f, uint8_t sub)
     return value[sub];
 }
 
-static uint32_t read_latest(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
+static double read_latest(const struct board_node *n, const struct co_entry *e)
 {
-    const struct psa2_can *c = can_of(n);
-    (void)t_ns;
+    const struct psa2_can *c = (const struct psa2_can *)n;
     const struct psa2_frame *f = &c->latest;
     const unsigned axis = (unsigned)e->sub - 1;
-    if (e->index == PSA2_OD_CODES) v->number = axis < AXES ? f->code[axis] : (int16_t)f->temp_code;
-    else if (e->index == PSA2_OD_RAW_WORDS) v->number = (int32_t)f->raw[axis];
-    else if (e->index == PSA2_OD_FRAME_HEAD) v->number = frame_head(f, e->sub);
-    else v->number = accel_g(c, axis) * (e->index == PSA2_OD_ACCEL_UG ? 1e6 : 1.0);
-    return CO_OK;
+    if (e->index == PSA2_OD_CODES) return axis < AXES ? f->code[axis] : (int16_t)f->temp_code;
+    if (e->index == PSA2_OD_RAW_WORDS) return (int32_t)f->raw[axis];
+    if (e->index == PSA2_OD_FRAME_HEAD) return frame_head(f, e->sub);
+    return accel_g(c, axis) * (e->index == PSA2_OD_ACCEL_UG ? 1e6 : 1.0);
 }
 
 /* ---- which function answers for an object ---- */
 
 static const struct board_object objects[] = {
-    {PSA2_OD_IDENTITY, read_unit, NULL},
-    {PSA2_OD_REG_X, read_register, write_register},
-    {PSA2_OD_REG_Y, read_register, write_register},
-    {PSA2_OD_REG_Z, read_register, write_register},
-    {PSA2_OD_REG_T, read_register, write_register},
-    {PSA2_OD_OPCODE, NULL, write_opcode},
-    {PSA2_OD_FRAME_FORM, read_settings, write_stream},
-    {PSA2_OD_WORD_BITS, read_unit, NULL},
-    {PSA2_OD_SAMPLE_MODE, read_settings, write_stream},
-    {PSA2_OD_SAMPLE_NTH, read_settings, write_stream},
-    {PSA2_OD_SYNC_PIN, read_settings, write_plain},
-    {PSA2_OD_COUNTERS, read_counter, NULL},
-    {PSA2_OD_CODES, read_latest, NULL},
-    {PSA2_OD_RAW_WORDS, read_latest, NULL},
-    {PSA2_OD_FRAME_HEAD, read_latest, NULL},
-    {PSA2_OD_ZERO_V, read_settings, write_plain},
-    {PSA2_OD_SCALE_V_PER_G, read_settings, write_plain},
-    {PSA2_OD_ACCEL_G, read_latest, NULL},
-    {PSA2_OD_ACCEL_UG, read_latest, NULL},
+    {PSA2_OD_IDENTITY, .value = read_unit},
+    {PSA2_OD_REG_X, .read = read_register, .write = write_register},
+    {PSA2_OD_REG_Y, .read = read_register, .write = write_register},
+    {PSA2_OD_REG_Z, .read = read_register, .write = write_register},
+    {PSA2_OD_REG_T, .read = read_register, .write = write_register},
+    {PSA2_OD_OPCODE, .write = write_opcode},
+    {PSA2_OD_FRAME_FORM, .value = read_settings, .write = write_stream},
+    {PSA2_OD_WORD_BITS, .value = read_unit},
+    {PSA2_OD_SAMPLE_MODE, .value = read_settings, .write = write_stream},
+    {PSA2_OD_SAMPLE_NTH, .value = read_settings, .write = write_stream},
+    {PSA2_OD_SYNC_PIN, .value = read_settings, .write = write_plain},
+    {PSA2_OD_COUNTERS, .read = read_counter},
+    {PSA2_OD_CODES, .value = read_latest},
+    {PSA2_OD_RAW_WORDS, .value = read_latest},
+    {PSA2_OD_FRAME_HEAD, .value = read_latest},
+    {PSA2_OD_ZERO_V, .value = read_settings, .write = write_plain},
+    {PSA2_OD_SCALE_V_PER_G, .value = read_settings, .write = write_plain},
+    {PSA2_OD_ACCEL_G, .value = read_latest},
+    {PSA2_OD_ACCEL_UG, .value = read_latest},
 };
 
 /* ---- notifications of the node and of the board ---- */

@@ -113,11 +113,9 @@ static uint32_t submit_request(struct board_node *n, uint8_t command, uint32_t w
     return can->busy ? CO_PENDING : board_node_abort_of(r);
 }
 
-static uint32_t read_uc(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
+static double read_uc(const struct board_node *n, const struct co_entry *e)
 {
-    (void)t_ns;
-    v->number = e->index == PSD1_OD_UC1 ? board_of(n)->uc1 : board_of(n)->uc2;
-    return CO_OK;
+    return e->index == PSD1_OD_UC1 ? board_of(n)->uc1 : board_of(n)->uc2;
 }
 
 static uint32_t write_uc(struct board_node *n, const struct co_entry *e, const struct co_value *v, int64_t t_ns)
@@ -132,37 +130,38 @@ static uint32_t read_control(struct board_node *n, const struct co_entry *e, str
 }
 
 /* As latched or stored: no traffic. */
-static uint32_t read_stored(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
+static double read_stored(const struct board_node *n, const struct co_entry *e)
 {
     const struct psd1 *b = board_of(n);
     const unsigned axis = e->sub - 1u;
-    (void)t_ns;
-    if (e->index == PSD1_OD_ZERO_COEF) v->number = b->zero[axis];
-    else if (e->index == PSD1_OD_FULL_COEF) v->number = b->full[axis];
-    else if (e->index == PSD1_OD_GYRO) v->number = b->latest.gyro[axis];
-    else if (e->index == PSD1_OD_GYRO_LOW) v->number = (int16_t)b->latest.gyro[axis];
-    else if (e->index == PSD1_OD_RATE) v->number = b->latest.rate[axis];
-    else v->number = b->latest.word[axis];
-    return CO_OK;
+    if (e->index == PSD1_OD_ZERO_COEF) return b->zero[axis];
+    if (e->index == PSD1_OD_FULL_COEF) return b->full[axis];
+    if (e->index == PSD1_OD_GYRO) return b->latest.gyro[axis];
+    if (e->index == PSD1_OD_GYRO_LOW) return (int16_t)b->latest.gyro[axis];
+    if (e->index == PSD1_OD_RATE) return b->latest.rate[axis];
+    return b->latest.word[axis];
 }
 
 /* In the order of proto/psd1.yaml, as the messages have it. */
-static uint32_t read_cycle(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
+static double read_cycle(const struct board_node *n, const struct co_entry *e)
 {
     const struct psd1_cycle *c = &board_of(n)->latest;
     const uint32_t value[] = {
         0, (uint8_t)c->seq, c->status & 0x7Fu, (uint32_t)(c->t_a0_ns / 1000), length_of(c), waited_of(c), 0};
-    (void)t_ns;
-    v->number = value[e->sub];
-    return CO_OK;
+    return value[e->sub];
 }
 
 static const struct board_object objects[] = {
-    {PSD1_OD_UC1, read_uc, write_uc},       {PSD1_OD_UC2, read_uc, write_uc},
-    {PSD1_OD_ZERO_COEF, read_stored, NULL}, {PSD1_OD_FULL_COEF, read_stored, NULL},
-    {PSD1_OD_CONTROL, read_control, NULL},  {PSD1_OD_GYRO, read_stored, NULL},
-    {PSD1_OD_CODES, read_stored, NULL},     {PSD1_OD_CYCLE, read_cycle, NULL},
-    {PSD1_OD_GYRO_LOW, read_stored, NULL},  {PSD1_OD_RATE, read_stored, NULL},
+    {PSD1_OD_UC1, .value = read_uc, .write = write_uc},
+    {PSD1_OD_UC2, .value = read_uc, .write = write_uc},
+    {PSD1_OD_ZERO_COEF, .value = read_stored},
+    {PSD1_OD_FULL_COEF, .value = read_stored},
+    {PSD1_OD_CONTROL, .read = read_control},
+    {PSD1_OD_GYRO, .value = read_stored},
+    {PSD1_OD_CODES, .value = read_stored},
+    {PSD1_OD_CYCLE, .value = read_cycle},
+    {PSD1_OD_GYRO_LOW, .value = read_stored},
+    {PSD1_OD_RATE, .value = read_stored},
 };
 
 static int64_t period_ns(const void *board)

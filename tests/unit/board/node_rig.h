@@ -63,12 +63,10 @@ static inline int64_t fake_period(const void *board)
 }
 
 /* An object of the board's own, with a value that no common handler would give. */
-static inline uint32_t own_read(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
+static inline double own_read(const struct board_node *n, const struct co_entry *e)
 {
     (void)e;
-    (void)t_ns;
-    v->number = 40000 + ((const struct fake *)n->board)->counter[0];
-    return CO_OK;
+    return 40000 + ((const struct fake *)n->board)->counter[0];
 }
 
 static inline struct rig *rig_of(struct board_node *n)
@@ -138,7 +136,7 @@ static inline struct rig *rig_of_device(const struct co_device *d, uint32_t bitr
     static const struct board_bus bus = {
         .submit = fake_submit, .addresses = ADDRESSES, .registers = fake_registers, .strobe = fake_strobe};
     static struct board_type board;
-    static const struct board_object own[] = {{OWN_OBJECT, own_read, NULL}};
+    static const struct board_object own[] = {{OWN_OBJECT, .value = own_read}};
     static struct board_node_type type;
     struct rig *r = &rig;
     memset(r, 0, sizeof *r);

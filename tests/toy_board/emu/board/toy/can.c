@@ -8,25 +8,21 @@ static const struct toy *board_of(const struct board_node *n)
 
 /* ---- objects ---- */
 
-static uint32_t read_codes(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
+static double read_codes(const struct board_node *n, const struct co_entry *e)
 {
-    (void)t_ns;
-    v->number = board_of(n)->latest.code[e->sub - 1];
-    return CO_OK;
+    return board_of(n)->latest.code[e->sub - 1];
 }
 
-static uint32_t read_sample(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
+static double read_sample(const struct board_node *n, const struct co_entry *e)
 {
     const struct toy_sample *s = &board_of(n)->latest;
     const uint32_t value[] = {0, s->seq, (uint8_t)s->seq, s->clipped};
-    (void)t_ns;
-    v->number = value[e->sub];
-    return CO_OK;
+    return value[e->sub];
 }
 
 static const struct board_object objects[] = {
-    {TOY_OD_CODES, read_codes, NULL},
-    {TOY_OD_SAMPLE, read_sample, NULL},
+    {TOY_OD_CODES, .value = read_codes},
+    {TOY_OD_SAMPLE, .value = read_sample},
 };
 
 /* ---- stream ---- */
